@@ -1,0 +1,25 @@
+// A blade's path: the one way in for every cut, whether an instrument moves it or a service asks.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "tissue_sim/types.h"
+
+namespace tissue_sim {
+
+/// A blade edge that sweeps: at each of the `poses` the edge is the polyline `edge`, given in the
+/// blade's frame. The surface between consecutive poses is what cuts.
+struct BladePath {
+  std::vector<Vec3> edge;   ///< [m], blade frame, at least 2 points
+  std::vector<Pose> poses;  ///< world frame, at least 2
+};
+
+/// What one frame's cutting did.
+struct CutReport {
+  int64_t bonds_broken = 0;      ///< bonds between neighbouring particles
+  int points_separated = 0;      ///< particles that lost a bond
+  std::vector<int> new_fragments;  ///< ids that appeared
+};
+
+}  // namespace tissue_sim

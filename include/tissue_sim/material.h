@@ -1,0 +1,36 @@
+// Material of a body: plain data, SI units.
+#pragma once
+
+#include <string>
+#include <vector>
+
+namespace tissue_sim {
+
+/// Hyperelastic law, see src/material/.
+enum class Law {
+  kFixedCorotated,  ///< Stomakhin et al. 2012, eq. 1: mu ||F - R||^2 + lambda/2 (J - 1)^2
+  kNeoHookean,      ///< Smith, de Goes, Kim 2018, without the log term: stays finite when inverted
+};
+
+struct Material {
+  std::string name = "liver";
+  Law law = Law::kFixedCorotated;
+  double young_modulus = 5000.0;  ///< [Pa], above 0, at most 1e8
+  double poisson_ratio = 0.45;    ///< [-], 0 to 0.49
+  double density = 1060.0;        ///< [kg/m^3], 100 to 20000
+  double viscosity = 0.0;         ///< Kelvin-Voigt shear viscosity [Pa s], 0 to 1000
+  double friction = 0.3;          ///< Coulomb friction against tools and the ground [-], 0 to 2
+};
+
+/// First Lame parameter [Pa].
+double lame_lambda(const Material& m);
+/// Shear modulus [Pa].
+double lame_mu(const Material& m);
+/// Speed of pressure waves at rest [m/s]: sqrt((lambda + 2 mu) / density).
+double wave_speed(const Material& m);
+
+/// The built-in materials (liver, kidney, fat, muscle, skin, vessel, gelatine), with the source of
+/// each in src/material/presets.cpp. A scene that defines a material of the same name wins.
+const std::vector<Material>& material_presets();
+
+}  // namespace tissue_sim

@@ -1,0 +1,82 @@
+// Everything that a run needs, as plain data: SI units, defaults. YAML <-> Scene round-trips.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "tissue_sim/material.h"
+#include "tissue_sim/tool.h"
+#include "tissue_sim/types.h"
+
+namespace tissue_sim {
+
+enum class Method { kMpm };
+enum class Device { kAuto, kCpu, kCuda };
+
+enum class Shape { kBox, kBall, kEllipsoid, kCylinder, kMesh };
+
+/// A region of the world as it is at time zero; what lies in it is held fast.
+struct Region {
+  enum class Kind { kBox, kBall, kBelow } kind = Kind::kBelow;
+  Vec3 min = Vec3::Zero(), max = Vec3::Zero();  ///< kBox [m]
+  Vec3 center = Vec3::Zero();                   ///< kBall [m]
+  double radius = 0;                            ///< kBall [m]
+  double z = 0;                                 ///< kBelow: everything with a smaller z [m]
+
+  bool contains(const Vec3& x) const;
+};
+
+struct Body {
+  std::string name = "tissue";
+  Shape shape = Shape::kBox;
+  Vec3 size = Vec3(0.08, 0.05, 0.03);   ///< box: edge lengths [m]
+  double radius = 0.02;                 ///< ball, cylinder [m]
+  Vec3 radii = Vec3(0.03, 0.02, 0.015); ///< ellipsoid: semi-axes [m]
+  double height = 0.04;                 ///< cylinder, along z [m]
+  std::string mesh;                     ///< mesh: plain path, file:// or package:// (STL, OBJ, PLY)
+  double scale = 1.0;                   ///< mesh: metres per unit of the file (0.001 for mm)
+  Pose pose;                            ///< of the shape's centre; of a mesh's own origin
+  std::string material = "liver";       ///< a name in Scene::materials or a preset
+  std::vector<Region> anchors;
+};
+
+/// A horizontal plane that carries what falls on it.
+struct Ground {
+  bool enabled = true;
+  double z = 0;           ///< [m]
+  double friction = 0.3;  ///< Coulomb [-], 0 to 2
+};
+
+struct Scene {
+  std::string name = "tissue";
+  Method method = Method::kMpm;
+  Device device = Device::kAuto;
+  int threads = 0;                       ///< CPU threads, 0 for all
+  double cell_size = 0.003;              ///< grid spacing [m]; two points a cell along each axis
+  double frame_rate = 60.0;              ///< frames a second of simulated time [Hz], 1 to 2000
+  double cfl = 0.5;                      ///< substep * wave speed / cell size, 0.05 to 0.9
+  Vec3 gravity = Vec3(0, 0, -9.81);      ///< [m/s^2]
+  std::uint64_t seed = 0;
+  Ground ground;
+  std::vector<Material> materials;
+  std::vector<Body> bodies;
+  std::vector<Tool> tools;
+};
+
+/// Throws std::invalid_argument: "<field> is <value>: <what is allowed>".
+void validate(const Scene& scene);
+
+/// The material of that name, from the scene or the presets; throws std::invalid_argument.
+const Material& find_material(const Scene& scene, const std::string& name);
+
+/// Reads a scene from YAML text; fields left out keep their defaults. Throws std::invalid_argument
+/// naming the field (with its path, as in `bodies[0].size`), its value and what is allowed; unknown
+/// fields are refused. Validates.
+Scene scene_from_yaml(const std::string& text);
+/// Reads a scene file; throws std::invalid_argument with the path in front.
+Scene load_scene(const std::string& path);
+/// The whole scene as YAML, defaults included; scene_from_yaml(scene_to_yaml(s)) equals s.
+std::string scene_to_yaml(const Scene& scene);
+
+}  // namespace tissue_sim

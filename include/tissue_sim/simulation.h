@@ -1,0 +1,65 @@
+// Simulation: a scene, its tissue and the time. Read this first.
+//
+//   Simulation simulation(load_scene("scene.yaml"));
+//   simulation.set_tool(0, pose);             // where tool 0 is to be at the end of the next frame
+//   simulation.cut(path);                     // at the start of the next frame
+//   FrameReport report = simulation.advance_frame();
+//   simulation.tissue().read_points({}, cloud);
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "tissue_sim/scene.h"
+#include "tissue_sim/tissue.h"
+
+namespace tissue_sim {
+
+/// Inputs as they were applied in one frame: world frame, doubles. Enough to repeat the frame.
+struct AppliedInput {
+  std::int64_t frame = 0;
+  std::vector<ToolMotion> tools;  ///< parallels Scene::tools
+  std::vector<BladePath> cuts;
+};
+
+struct FrameReport {
+  AppliedInput input;
+  FrameResult result;
+  int substeps = 0;
+  double substep = 0;      ///< [s]
+  double cfl = 0;          ///< substep * wave speed / cell size
+  double compute_time = 0; ///< wall time that the frame took [s]
+};
+
+/// Not thread-safe: one thread owns it. Time is an integer count of frames.
+class Simulation {
+ public:
+  /// Validates the scene and builds its tissue. Throws what validate() and make_tissue() throw.
+  explicit Simulation(const Scene& scene);
+  ~Simulation();
+
+  const Scene& scene() const;
+  Tissue& tissue();
+  std::int64_t frame() const;  ///< frames completed
+  double time() const;         ///< simulated time [s]
+
+  /// The tool shall be there at the end of the next frame. Its first pose places it without motion.
+  /// Throws std::invalid_argument for an unknown tool or a pose that is not finite or no rotation.
+  void set_tool(int tool, const Pose& pose, double jaw = 0);
+  /// Cuts at the start of the next frame. Throws std::invalid_argument for less than two poses or
+  /// edge points, or values that are not finite.
+  void cut(const BladePath& path);
+  /// Puts exactly these inputs into the next frame (replay), instead of what was set.
+  void apply(const AppliedInput& input);
+
+  /// Advances one frame. After a blow-up it throws std::runtime_error: build a new Simulation.
+  FrameReport advance_frame();
+
+ private:
+  struct State;
+  std::unique_ptr<State> state_;
+};
+
+}  // namespace tissue_sim

@@ -1,0 +1,61 @@
+// Tissue: the state of all bodies under one method on one device.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "tissue_sim/cut.h"
+#include "tissue_sim/fragments.h"
+#include "tissue_sim/point.h"
+#include "tissue_sim/scene.h"
+#include "tissue_sim/tool.h"
+#include "tissue_sim/types.h"
+
+namespace tissue_sim {
+
+/// What happens during one frame; `tools` parallels Scene::tools.
+struct FrameInput {
+  Span<const ToolMotion> tools;
+  Span<const BladePath> cuts;  ///< applied at the start of the frame, before the first substep
+};
+
+/// What one frame brought.
+struct FrameResult {
+  std::vector<ToolLoad> loads;       ///< parallels Scene::tools
+  std::vector<CutReport> cut_reports;  ///< parallels FrameInput::cuts
+  CutReport blade_report;            ///< what the instruments' edges cut
+  double kinetic_energy = 0;         ///< [J]
+  double elastic_energy = 0;         ///< [J]
+  double max_speed = 0;              ///< of a grid node [m/s]
+  bool blew_up = false;              ///< something is not finite, or moves faster than it can
+};
+
+class Tissue {
+ public:
+  virtual ~Tissue() = default;
+
+  /// The largest substep that is stable in the present state, times the CFL number's safety [s].
+  virtual float stable_substep() const = 0;
+  /// Advances by `substeps` of `dt` seconds each; may only enqueue.
+  virtual void advance(int substeps, float dt, const FrameInput& input) = 0;
+  /// Waits for advance() and reports on it.
+  virtual FrameResult finish() = 0;
+
+  virtual int point_count() const = 0;
+  /// Replaces `cloud` with the selected points, as Point after Point. Returns their number.
+  virtual int read_points(const PointSelection& selection, std::vector<std::uint8_t>& cloud) = 0;
+  /// All pieces, by id, as of the last finish().
+  virtual Span<const Fragment> fragments() const = 0;
+  /// Hash of the whole state: equal states, equal checksums.
+  virtual std::uint64_t checksum() const = 0;
+  /// Device and instruction set that do the work, as in "cpu (AVX-512, 2 threads)".
+  virtual std::string device_name() const = 0;
+};
+
+/// Builds the tissue of a valid scene. Throws std::invalid_argument for what cannot be built (a mesh
+/// that cannot be read, a body thinner than a cell) and std::runtime_error for a device not there.
+std::unique_ptr<Tissue> make_tissue(const Scene& scene);
+
+}  // namespace tissue_sim

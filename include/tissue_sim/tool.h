@@ -1,0 +1,41 @@
+// Instruments: what they are and how they move. A tool's frame has its origin at the tip and z
+// pointing out of the tip along the shaft (the dVRK convention), so the shaft lies at z < 0.
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+#include "tissue_sim/types.h"
+
+namespace tissue_sim {
+
+enum class ToolType {
+  kScalpel,  ///< cuts where its edge sweeps; its flats push
+  kProbe,    ///< a capsule that pushes
+};
+
+struct Tool {
+  std::string name = "probe";          ///< a ROS name: letters, digits, '_'; unique in the scene
+  ToolType type = ToolType::kProbe;
+  double radius = 0.003;               ///< probe: of the capsule [m]
+  double length = 0.10;                ///< probe: of the shaft that touches tissue [m]
+  double blade_length = 0.025;         ///< scalpel: edge from the tip to the heel, along -z [m]
+  double blade_width = 0.006;          ///< scalpel: from the edge to the spine, along -x [m]
+  double blade_thickness = 0.0004;     ///< scalpel: along y [m]
+  double friction = 0.3;               ///< Coulomb friction against tissue [-], 0 to 2
+};
+
+/// Motion of one tool over one frame: position linear, orientation slerp between the two.
+struct ToolMotion {
+  bool present = false;  ///< false until the first pose came: the tool is not in the scene
+  Pose begin, end;
+  float jaw_begin = 0, jaw_end = 0;  ///< [rad]
+};
+
+/// What the tissue did to a tool during one frame, at the tool's tip, in world axes.
+struct ToolLoad {
+  Wrench mean;             ///< mean over the substeps of the frame
+  double peak_force = 0;   ///< largest force of a substep [N]
+};
+
+}  // namespace tissue_sim

@@ -1,0 +1,46 @@
+// Closed triangle meshes: found, read, checked and repaired.
+#pragma once
+
+#include <array>
+#include <string>
+#include <vector>
+
+#include "tissue_sim/scene.h"
+
+namespace tissue_sim {
+
+struct TriangleMesh {
+  std::vector<Vec3> vertices;                 ///< [m]
+  std::vector<std::array<int, 3>> triangles;  ///< counter-clockwise seen from outside
+};
+
+/// The file that a plain path, a file:// or a package:// address means. Packages are looked for as
+/// rospack does, below the folders of ROS_PACKAGE_PATH, then in `share/<package>` of
+/// CMAKE_PREFIX_PATH. Throws std::invalid_argument for other addresses and unknown packages;
+/// whether the file exists is not asked.
+std::string resolve_mesh_path(const std::string& address);
+
+/// Reads an STL, OBJ, PLY or OFF file; vertices at the same place become one, triangles without
+/// area by that are dropped. Throws std::invalid_argument for what is missing, unreadable, without
+/// triangles, or has coordinates that are not finite.
+TriangleMesh read_mesh(const std::string& path);
+
+/// Merges vertices not farther apart than `distance` and drops the triangles that this collapses.
+void merge_vertices(TriangleMesh& mesh, double distance);
+
+/// Makes the mesh the boundary of a solid: winding number above 0 is inside. Repairs, with a note,
+/// what can be meant only one way: vertices that almost coincide, triangles given twice, single
+/// triangles or whole parts that face the wrong way. Parts may be apart, overlap (their union
+/// counts) or lie within each other (facing inwards: a void). Throws std::invalid_argument for a
+/// surface that is open or has no inside. Errors and notes start with a verb ("has 3 open edges").
+void make_solid(TriangleMesh& mesh, std::vector<std::string>& notes);
+
+/// Volume that the surface encloses, by the divergence theorem; negative when inside out [m^3].
+double signed_volume(const TriangleMesh& mesh);
+
+/// The solid of a mesh body in world axes: resolved, read, scaled, checked, repaired, posed. Throws
+/// std::invalid_argument, also for a size (longest edge of the bounding box) below 1 mm or above
+/// 10 m.
+TriangleMesh load_solid(const Body& body, std::vector<std::string>* notes);
+
+}  // namespace tissue_sim

@@ -1,0 +1,49 @@
+// How scene values are spelled, in YAML and in error messages.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "tissue_sim/scene.h"
+
+namespace tissue_sim {
+
+/// The shortest of 15 to 17 digits that reads back as exactly this double; ".nan", ".inf", "-.inf".
+std::string text(double value);
+/// "[x, y, z]"
+std::string text(const Vec3& v);
+
+/// One spelling of an enum's value.
+template <class Enum>
+struct Spelling {
+  Enum value;
+  const char* name;
+};
+
+inline constexpr Spelling<Method> kMethodNames[] = {{Method::kMpm, "mpm"}};
+inline constexpr Spelling<Device> kDeviceNames[] = {
+    {Device::kAuto, "auto"}, {Device::kCpu, "cpu"}, {Device::kCuda, "cuda"}};
+inline constexpr Spelling<Law> kLawNames[] = {{Law::kFixedCorotated, "fixed_corotated"},
+                                              {Law::kNeoHookean, "neo_hookean"}};
+inline constexpr Spelling<Shape> kShapeNames[] = {{Shape::kBox, "box"},
+                                                  {Shape::kBall, "ball"},
+                                                  {Shape::kEllipsoid, "ellipsoid"},
+                                                  {Shape::kCylinder, "cylinder"},
+                                                  {Shape::kMesh, "mesh"}};
+inline constexpr Spelling<ToolType> kToolTypeNames[] = {{ToolType::kScalpel, "scalpel"},
+                                                        {ToolType::kProbe, "probe"}};
+
+/// The name of an enum's value; nullptr for a value that the enum does not have.
+template <class Enum, std::size_t N>
+const char* name_of(Enum value, const Spelling<Enum> (&names)[N]) {
+  for (const Spelling<Enum>& s : names) {
+    if (s.value == value) return s.name;
+  }
+  return nullptr;
+}
+
+/// The fields that belong to a shape or a tool type only, in the order in which they are written.
+std::vector<std::string> fields_of(Shape shape);
+std::vector<std::string> fields_of(ToolType type);
+
+}  // namespace tissue_sim

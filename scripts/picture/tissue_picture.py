@@ -1,0 +1,149 @@
+"""A picture of one moment: tissue, instruments, ground."""
+import itertools
+
+import numpy as np
+
+from picture.instruments import placed, tool_meshes
+from picture.light import (FLOOR, KEY, KEY_COLOR, SKY, Noise, Shadow, dot, shade_metal,
+                           shade_tissue, smoothstep, tone)
+from picture.raster import Buffer, Camera, interpolate, normalized
+from picture.surface import Mesh, occupancy, point_spacing, tissue_surface
+
+LIVER = np.array([0.155, 0.016, 0.013])
+FRESH_CUT = np.array([0.34, 0.028, 0.022])
+LOOSE = np.array([[0.30, 0.085, 0.016], [0.20, 0.035, 0.13], [0.26, 0.17, 0.03], [0.09, 0.07, 0.22]])
+DRAPE = np.array([0.030, 0.085, 0.100], np.float32)
+SURROUND = np.array([0.012, 0.030, 0.037], np.float32)
+
+
+def linear(srgb):
+    return np.where(srgb <= 0.04045, srgb / 12.92, ((srgb + 0.055) / 1.055) ** 2.4)
+
+
+class Moment:
+    """What there is to be seen at one time.
+
+    points: array with the fields of tissue_sim::Point; tools: [(entry of the scene's tools,
+    position (3,), rotation (3, 3))]."""
+
+    def __init__(self, points, tools, ground_z=0.0):
+        self.points, self.tools, self.ground_z = points, tools, ground_z
+        self.x = np.stack([points["x"], points["y"], points["z"]], 1).astype(float)
+
+
+def camera_for(boxes, size, azimuth=-62.0, elevation=27.0, room=1.0):
+    """A camera that sees all the boxes [(min, max)] from azimuth and elevation [deg]."""
+    lo = np.min([b[0] for b in boxes], 0)
+    hi = np.max([b[1] for b in boxes], 0)
+    corners = np.array([[(lo, hi)[i][0], (lo, hi)[j][1], (lo, hi)[k][2]]
+                        for i in (0, 1) for j in (0, 1) for k in (0, 1)])
+    a, e = np.radians([azimuth, elevation])
+    away = np.array([np.cos(e) * np.cos(a), np.cos(e) * np.sin(a), np.sin(e)])
+    target = (lo + hi) / 2
+    distance = 10 * np.linalg.norm(hi - lo)
+    for _ in range(8):
+        p = Camera(target + away * distance, target, size).project(corners)
+        spread = np.abs(p[:, :2] / np.asarray(size) - 0.5).max()
+        distance *= spread / (0.43 / room)
+    return Camera(target + away * distance, target, size)
+
+
+def tissue_meshes(moment, spacing, stress_end):
+    """One mesh for each piece."""
+    import matplotlib
+    p = moment.points
+    ids, counts = np.unique(p["fragment"], return_counts=True)
+    meshes, largest, hues = [], ids[np.argmax(counts)], itertools.cycle(LOOSE)
+    for fragment in ids[counts >= 8]:
+        own = p["fragment"] == fragment
+        carried = np.stack([p["stress"][own], p["damage"][own]], 1).astype(float)
+        vertices, triangles, normals, values = tissue_surface(
+            moment.x[own], carried, spacing,
+            lambda v: [(30, smoothstep(0.05, 0.15, v[:, 1])), (4, np.ones(len(v)))])
+        base = LIVER if fragment == largest else next(hues)
+        cut = smoothstep(0.05, 0.30, values[:, 1:2])
+        color = base * (1 - cut) + (0.5 * base + 0.5 * FRESH_CUT) * 1.3 * cut
+        if stress_end:
+            share = np.clip(values[:, 0] / stress_end, 0, 1)
+            scale = matplotlib.cm.get_cmap("inferno")(0.08 + 0.9 * share)[:, :3]
+            color = linear(scale) * 0.8 + 0.06 * color
+        meshes.append(Mesh(vertices, triangles, normals, color, wet=1.0))
+    return meshes
+
+
+def ground_light(x, shadow, around, camera):
+    """Drape with a grid of 10 mm that fades into the surround."""
+    color = np.broadcast_to(DRAPE, x.shape).copy()
+    pixel = np.linalg.norm(x - camera.eye, axis=1) / camera.scale
+    for axis in (0, 1):
+        off = np.abs((x[:, axis] / 0.01 + 0.5) % 1 - 0.5) * 0.01
+        slant = pixel * (1 if axis == 0 else 2)
+        line = np.clip(1 - (off - 0.00012) / slant, 0, 1) * np.minimum(1, 0.0003 / slant)
+        color = color * (1 + 0.32 * line[:, None])
+    sky = np.clip(1 - 1.35 * around.sample(x + [0, 0, 0.002]), 0.05, 1)[:, None]
+    lit = shadow.lit(x, 0.0035, 24)[:, None]
+    light = KEY_COLOR * KEY[2] / np.pi * lit * 1.15 + SKY * sky * 0.8
+    bleed = np.clip(around.sample(x + [0, 0, 0.004]), 0, 1)[:, None] * [0.030, 0.004, 0.003]
+    return color * light + bleed * (0.2 + lit)
+
+
+def ground_picture(moment, camera, shadow, around, center, radius):
+    """Ground and surround alone, as (rows * columns, 3) in [0, 1]."""
+    rays = camera.rays().reshape(-1, 3)
+    image = np.tile(SURROUND, (len(rays), 1))
+    below = np.nonzero(rays[:, 2] < -1e-4)[0]
+    x = camera.eye + rays[below] * ((moment.ground_z - camera.eye[2]) / rays[below, 2])[:, None]
+    far = np.hypot(x[:, 0] - center[0], x[:, 1] - center[1])
+    fade = smoothstep(2.4 * radius, 1.0 * radius, far)[:, None].astype(np.float32)
+    near = fade[:, 0] > 0
+    light = ground_light(x[near].astype(np.float32), shadow, around, camera)
+    image[below[near]] = light * fade[near] + SURROUND * (1 - fade[near])
+    return tone(image)
+
+
+def draw(moment, camera, stress_end=None, supersample=2):
+    """The picture as (rows, columns, 3) in [0, 1]. stress_end [Pa]: colour by stress up to there."""
+    size = tuple(supersample * s for s in camera.size)
+    big = Camera.__new__(Camera)
+    big.__dict__.update(camera.__dict__, size=size, scale=camera.scale * supersample)
+    spacing = point_spacing(moment.x)
+    around = occupancy(moment.x, spacing, 0.0045)
+    meshes = tissue_meshes(moment, spacing, stress_end)
+    for tool, position, rotation in moment.tools:
+        meshes += [placed(m, position, rotation) for m in tool_meshes(tool)]
+    lo, hi = moment.x.min(0), moment.x.max(0)
+    center, radius = (lo + hi) / 2, 0.75 * np.linalg.norm(hi - lo) + 0.02
+    shadow = Shadow(meshes, center, radius)
+
+    buffer, first = Buffer(big), 0
+    for m in meshes:
+        buffer.draw(m.vertices, m.triangles, first)
+        first += len(m.triangles)
+    rays = big.rays().reshape(-1, 3)
+    image = np.zeros_like(rays)
+    noise, first = Noise(), 0
+    for m in meshes:
+        pixels = np.nonzero((buffer.triangle >= first) &
+                            (buffer.triangle < first + len(m.triangles)))[0]
+        triangles = np.concatenate([np.zeros((first, 3), int), m.triangles]) if first else m.triangles
+        first += len(m.triangles)
+        if not len(pixels):
+            continue
+        x = (big.eye + rays[pixels] * buffer.depth[pixels, None]).astype(np.float32)
+        normal = normalized(interpolate(m.normals, triangles, buffer, pixels)).astype(np.float32)
+        color = interpolate(m.colors, triangles, buffer, pixels)
+        view = normalized(big.eye - x).astype(np.float32)
+        away = dot(normal, view) < 0
+        normal[away] *= -1
+        if m.wet:
+            lit = shadow.lit(x + normal * 0.0006, 0.0012)
+            sky = np.clip(1.25 - 1.5 * around.sample(x + normal * 0.0045), 0.1, 1)
+            image[pixels] = shade_tissue(x, normal, view, color, m.wet, lit, sky, noise)
+        else:
+            image[pixels] = shade_metal(normal, view, color, m.metal,
+                                        shadow.lit(x + normal * 0.0006, 0.0012))
+    w, h = camera.size
+    empty = (buffer.triangle < 0).reshape(h, supersample, w, supersample, 1)
+    ground = ground_picture(moment, camera, shadow, around, center, radius)
+    image = tone(image).reshape(h, supersample, w, supersample, 3)
+    return np.where(empty, ground.reshape(h, 1, w, 1, 3), image).mean((1, 3))

@@ -1,0 +1,162 @@
+# Shared by scripts/run and scripts/test: clears the way for ROS, installs what is missing, builds.
+# Sourced, not run. TISSUE_SIM_BUILD names another build folder, TISSUE_SIM_NO_INSTALL=1 leaves apt
+# alone (for machines whose packages come from elsewhere).
+
+set -euo pipefail
+repo=$(cd -- "$(dirname -- "${BASH_SOURCE[0]}")/.." && pwd)
+build=${TISSUE_SIM_BUILD:-$repo/build}
+noetic=/opt/ros/noetic/setup.bash
+
+core_packages=(g++ make cmake libeigen3-dev libtbb-dev libyaml-cpp-dev libassimp-dev libgtest-dev
+  libbenchmark-dev python3)
+picture_packages=(python3-numpy python3-matplotlib python3-yaml)
+debian_packages=(catkin ros-message-generation ros-message-runtime libroscpp-dev librosbag-dev
+  librostest-dev libtf2-dev libtf2-ros-dev libtf2-geometry-msgs-dev libnodelet-dev pluginlib-dev
+  libdiagnostic-updater-dev libdiagnostic-msgs-dev libstd-msgs-dev libstd-srvs-dev
+  libgeometry-msgs-dev libsensor-msgs-dev libvisualization-msgs-dev librosgraph-msgs-dev
+  libpcl-dev libpcl-conversions-dev rosout python3-roslaunch python3-rosbag python3-rostopic
+  python3-rosservice python3-rosnode python3-rosparam python3-rostest python3-rospy python3-tf2-ros
+  python3-std-msgs python3-std-srvs python3-geometry-msgs python3-sensor-msgs
+  python3-visualization-msgs python3-diagnostic-msgs)
+noetic_packages=(ros-noetic-{catkin,message-generation,message-runtime,roscpp,rospy,rosbag,rostest}
+  ros-noetic-{roslaunch,rosout,rostopic,rosservice,rosnode,rosparam,tf2,tf2-ros,tf2-geometry-msgs}
+  ros-noetic-{nodelet,pluginlib,diagnostic-updater,diagnostic-msgs,std-msgs,std-srvs}
+  ros-noetic-{geometry-msgs,sensor-msgs,visualization-msgs,rosgraph-msgs,pcl-conversions}
+  libpcl-dev)
+
+say() { printf '\n== %s\n' "$*"; }
+fail() { printf '\nerror: %s\n' "$*" >&2; exit 1; }
+
+# Conda and pyenv put their Python, their libraries and their CMake files in front of the system's,
+# which ROS is built against. ROS workspaces that the caller has sourced stay.
+clear_environment() {
+  local entry cuda kept=
+  cuda=$(command -v nvcc || true)
+  IFS=: read -ra entries <<<"${CMAKE_PREFIX_PATH:-}"
+  for entry in "${entries[@]:-}"; do
+    if [[ -n $entry && -e $entry/.catkin ]]; then kept+=${kept:+:}$entry; fi
+  done
+  unset PYTHONPATH PYTHONHOME CONDA_PREFIX VIRTUAL_ENV CMAKE_PREFIX_PATH CC CXX CPPFLAGS CFLAGS \
+    CXXFLAGS LDFLAGS
+  if [[ -n $kept ]]; then export CMAKE_PREFIX_PATH=$kept; fi
+  export PATH=/usr/bin:/bin:/usr/sbin:/sbin:/usr/local/bin${cuda:+:$(dirname "$cuda")}
+}
+
+missing_of() {
+  local installed
+  installed=$(dpkg-query -W -f='${db:Status-Status} ${Package}\n' "$@" 2>/dev/null || true)
+  for package in "$@"; do grep -qx "installed $package" <<<"$installed" || echo "$package"; done
+}
+
+as_root() {
+  if [[ $(id -u) == 0 ]]; then
+    env DEBIAN_FRONTEND=noninteractive "$@"
+  else
+    command -v sudo >/dev/null || fail "sudo is not here, and only root may install: as root, run $*"
+    sudo env DEBIAN_FRONTEND=noninteractive "$@"
+  fi
+}
+
+# install core|ros [more packages]: asks apt for what is missing, if anything is.
+install() {
+  local kind=$1 wanted missing
+  shift
+  if [[ -n ${TISSUE_SIM_NO_INSTALL:-} ]]; then return; fi
+  command -v dpkg-query >/dev/null && command -v apt-get >/dev/null ||
+    fail "this is no Debian or Ubuntu: install ROS 1 and ${core_packages[*]} your own way," \
+      "then set TISSUE_SIM_NO_INSTALL=1"
+  wanted=("${core_packages[@]}" "$@")
+  if [[ $kind == ros && -e $noetic ]]; then
+    wanted+=("${noetic_packages[@]}" "${picture_packages[@]}")
+  elif [[ $kind == ros ]]; then
+    wanted+=("${debian_packages[@]}" "${picture_packages[@]}")
+  fi
+  mapfile -t missing < <(missing_of "${wanted[@]}")
+  if [[ ${#missing[@]} == 0 ]]; then return; fi
+  say "Asking apt for ${#missing[@]} packages (log: $build/apt.log)"
+  as_root apt-get update >"$build/apt.log" 2>&1 || fail "apt-get update: see $build/apt.log"
+  if [[ $kind == ros && ! -e $noetic ]]; then
+    if apt-cache show ros-noetic-roscpp >/dev/null 2>&1; then
+      mapfile -t missing < <(missing_of "${core_packages[@]}" "${noetic_packages[@]}" \
+        "${picture_packages[@]}" "$@")
+    elif ! apt-cache show libroscpp-dev >/dev/null 2>&1; then
+      fail "apt knows no ROS 1 here. On Debian 12 it is in main; on Ubuntu 20.04 add its source:" \
+        "https://wiki.ros.org/noetic/Installation/Ubuntu (steps 1.2 and 1.3). Then run this again"
+    fi
+  fi
+  printf '   %s\n' "$(fmt -w 96 <<<"${missing[*]}" | sed '2,$s/^/   /')"
+  as_root apt-get install -y --no-install-recommends "${missing[@]}" >>"$build/apt.log" 2>&1 || {
+    tail -5 "$build/apt.log" >&2
+    fail "apt could not install them: see $build/apt.log"
+  }
+}
+
+# Only the percentages of make, on one line where there is a terminal.
+show_progress() {
+  if [[ -t 1 ]]; then
+    awk '/^\[ *[0-9]+%\]/ { printf "\r\033[K   %.90s", $0; fflush() } END { print "" }'
+  else
+    awk '/^\[ *[0-9]+%\]/ { p = int(substr($0, 2, 3) / 10); if (p != last) print "  ", substr($0, 1, 90)
+                            last = p; fflush() }'
+  fi
+}
+
+# configure_and_build FOLDER [cmake options]: a Release build of the package.
+configure_and_build() {
+  local folder=$1 jobs memory
+  shift
+  local log=$folder/build.log
+  if [[ -e $folder/CMakeCache.txt ]] &&
+    ! grep -qxF "CMAKE_HOME_DIRECTORY:INTERNAL=$repo" "$folder/CMakeCache.txt"; then
+    rm -rf -- "$folder"  # made when the checkout was somewhere else: CMake would refuse it
+  fi
+  mkdir -p "$folder"
+  memory=$(awk '/MemAvailable/ { print int($2 / 1500000) }' /proc/meminfo)  # 1.5 GB a compiler
+  jobs=$(nproc)
+  if ((memory < jobs)); then jobs=$((memory > 1 ? memory : 1)); fi
+  say "Building in $folder ($jobs at a time; log: build.log there)"
+  cmake -S "$repo" -B "$folder" -DCMAKE_BUILD_TYPE=Release -DPYTHON_EXECUTABLE=/usr/bin/python3 \
+    -DTISSUE_SIM_WERROR="${TISSUE_SIM_WERROR:-OFF}" "$@" >"$log" 2>&1 || {
+    grep -A 12 'CMake Error' "$log" >&2 || tail -20 "$log" >&2
+    fail "CMake could not configure: see $log"
+  }
+  cmake --build "$folder" -j "$jobs" 2>&1 | tee -a "$log" | show_progress ||
+    {
+      grep -E -A 8 'error|Error' "$log" | tail -40 >&2
+      fail "the build failed: see $log"
+    }
+}
+
+# source_setup FILE: catkin's setup files read variables that are not set, and look at $1.
+source_setup() {
+  local file=$1
+  set --
+  set +eu
+  # shellcheck disable=SC1090
+  source "$file"
+  set -eu
+}
+
+prepare_folder() {
+  mkdir -p "$build" 2>/dev/null && [[ -w $build ]] ||
+    fail "$build cannot be written: set TISSUE_SIM_BUILD to a folder that can"
+  build=$(cd -- "$build" && pwd)
+}
+
+# Builds node, core and, with ON, the tests; leaves the environment of the devel space.
+build_ros_package() {
+  if [[ -z ${CMAKE_PREFIX_PATH:-} && -e $noetic ]]; then source_setup "$noetic"; fi
+  configure_and_build "$build/ros" -DTISSUE_SIM_TESTS="$1" -DCATKIN_ENABLE_TESTING="$1"
+  source_setup "$build/ros/devel/setup.bash"
+  export PATH=/usr/bin:$PATH
+}
+
+# A master of our own, that no other one on this machine is mixed up with.
+use_own_master() {
+  local port
+  port=$(/usr/bin/python3 -c 'import socket
+s = socket.socket(); s.bind(("localhost", 0)); print(s.getsockname()[1])')
+  unset ROS_IP
+  export ROS_HOSTNAME=localhost ROS_MASTER_URI=http://localhost:$port ROS_LOG_DIR=$build/log
+  mkdir -p "$ROS_LOG_DIR"
+}

@@ -184,6 +184,7 @@ void validate(const Scene& scene) {
   check_range("cell_size", scene.cell_size, 1e-5, 1, "m");
   check_range("frame_rate", scene.frame_rate, 1, 2000, "Hz");
   check_range("cfl", scene.cfl, 0.05, 0.9);
+  check_range("damping", scene.damping, 0, 1000);
   check_each("gravity", scene.gravity, -1000, 1000, "component", "m/s^2");
   check_range("ground.z", scene.ground.z, -100, 100, "m");
   check_friction("ground.friction", scene.ground.friction);

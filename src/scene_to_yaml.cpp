@@ -137,6 +137,7 @@ std::string scene_to_yaml(const Scene& scene) {
   write(out, "cell_size", scene.cell_size);
   write(out, "frame_rate", scene.frame_rate);
   write(out, "cfl", scene.cfl);
+  write(out, "damping", scene.damping);
   write(out, "gravity", scene.gravity);
   out << Key << "seed" << Value << std::to_string(scene.seed);
   out << Key << "ground" << Value << BeginMap;

@@ -127,7 +127,7 @@ Tool read_tool(const YAML::Node& node, const std::string& path) {
 
 Scene read_scene(const YAML::Node& node) {
   const YamlFields fields(node, "",
-                          {"name", "method", "device", "threads", "cell_size", "frame_rate", "cfl",
+                          {"name", "method", "device", "threads", "cell_size", "frame_rate", "cfl", "damping",
                            "gravity", "seed", "ground", "materials", "bodies", "tools"});
   Scene scene;
   fields.read("name", scene.name);
@@ -137,6 +137,7 @@ Scene read_scene(const YAML::Node& node) {
   fields.read("cell_size", scene.cell_size);
   fields.read("frame_rate", scene.frame_rate);
   fields.read("cfl", scene.cfl);
+  fields.read("damping", scene.damping);
   fields.read("gravity", scene.gravity);
   fields.read("seed", scene.seed);
   fields.read_map("ground", [&](const YAML::Node& ground, const std::string& path) {

@@ -13,6 +13,7 @@ namespace {
 // The value as it stands in the file, on one line and cut short.
 std::string shown(const YAML::Node& node) {
   if (node.IsNull()) return "empty";
+  if (node.IsScalar() && node.Tag() == "!") return '"' + node.Scalar() + '"';
   YAML::Emitter out;
   out.SetSeqFormat(YAML::Flow);
   out.SetMapFormat(YAML::Flow);

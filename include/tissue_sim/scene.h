@@ -56,6 +56,8 @@ struct Scene {
   double cell_size = 0.003;              ///< grid spacing [m]; two points a cell along each axis
   double frame_rate = 60.0;              ///< frames a second of simulated time [Hz], 1 to 2000
   double cfl = 0.5;                      ///< substep * wave speed / cell size, 0.05 to 0.9
+  double damping = 0.0;                  ///< drag by what surrounds the tissue: speeds decay as
+                                         ///< exp(-damping t) [1/s], 0 to 1000
   Vec3 gravity = Vec3(0, 0, -9.81);      ///< [m/s^2]
   std::uint64_t seed = 0;
   Ground ground;
@@ -74,9 +76,11 @@ const Material& find_material(const Scene& scene, const std::string& name);
 /// naming the field (with its path, as in `bodies[0].size`), its value and what is allowed; unknown
 /// fields are refused. Validates.
 Scene scene_from_yaml(const std::string& text);
-/// Reads a scene file; throws std::invalid_argument with the path in front.
+/// Reads a scene file; throws std::invalid_argument with the path in front. A relative mesh path in
+/// it is relative to the file's folder, and comes back absolute.
 Scene load_scene(const std::string& path);
-/// The whole scene as YAML, defaults included; scene_from_yaml(scene_to_yaml(s)) equals s.
+/// The whole scene as YAML, defaults included; scene_from_yaml(scene_to_yaml(s)) equals s in all
+/// fields that belong to each shape and tool type. Throws what validate() throws.
 std::string scene_to_yaml(const Scene& scene);
 
 }  // namespace tissue_sim

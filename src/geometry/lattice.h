@@ -28,7 +28,7 @@ struct Lattice {
 /// body covers, by exact lengths along x on sub-lines in y and z. Points with less than 1/32 of
 /// their cube are dropped and their volume is given to the others in proportion, so that the total
 /// volume is the body's. For boxes without rotation the lattice starts at the box's lowest corner;
-/// for other shapes at the corner of the bounding box.
+/// for other shapes it is centred on the bounding box, each edge rounded up to whole half cells.
 /// `notes` receives a line for whatever was repaired on the way (a mesh turned inside out, ...).
 /// Throws std::invalid_argument with the reason and what to do: mesh missing, empty, open, of absurd
 /// size; body without points at this cell size; more than `max_points` points.

@@ -1,4 +1,5 @@
 #include <cstdio>
+#include <filesystem>
 #include <stdexcept>
 
 #include "geometry/mesh.h"
@@ -38,7 +39,7 @@ TriangleMesh load_solid(const Body& body, std::vector<std::string>* notes) {
   const std::string prefix = "body '" + body.name + "': ";
   std::string what = "mesh " + body.mesh;
   try {
-    const std::string path = resolve_mesh_path(body.mesh);
+    const std::string path = std::filesystem::absolute(resolve_mesh_path(body.mesh)).string();
     what = "mesh " + path;
     TriangleMesh mesh = read_mesh(path);
     Box box;

@@ -101,6 +101,9 @@ std::string decoded(const std::string& s) {
 
 std::string resolve_mesh_path(const std::string& address) {
   const std::string file = "file://", package = "package://";
+  if (address.empty() || address == file) {
+    throw std::invalid_argument("mesh '" + address + "' names no file: give a path");
+  }
   if (address.compare(0, file.size(), file) == 0) return decoded(address.substr(file.size()));
   if (address.compare(0, package.size(), package) == 0) {
     const std::string rest = decoded(address.substr(package.size()));

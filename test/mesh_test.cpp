@@ -1,0 +1,311 @@
+// Mesh files: found, read, checked and repaired where that can be meant only one way.
+#include "geometry/mesh.h"
+
+#include <gtest/gtest.h>
+
+#include <cstdlib>
+#include <functional>
+
+#include "temporary_folder.h"
+#include "test_meshes.h"
+
+namespace tissue_sim {
+namespace {
+
+const Vec3 kLow(0, 0, 0), kHigh(0.1, 0.2, 0.3);
+
+std::string reason_of(const std::function<void()>& action) {
+  try {
+    action();
+  } catch (const std::invalid_argument& e) {
+    return e.what();
+  }
+  return "nothing was thrown";
+}
+
+bool contains(const std::string& text, const std::string& part) {
+  return text.find(part) != std::string::npos;
+}
+
+Body mesh_body(const std::string& path) {
+  Body body;
+  body.name = "organ";
+  body.shape = Shape::kMesh;
+  body.mesh = path;
+  return body;
+}
+
+// The solid that a mesh becomes, and all notes in one text.
+struct Repaired {
+  TriangleMesh mesh;
+  std::string notes;
+};
+Repaired repaired(TriangleMesh mesh) {
+  std::vector<std::string> notes;
+  make_solid(mesh, notes);
+  Repaired result{mesh, ""};
+  for (const std::string& note : notes) result.notes += note + "\n";
+  return result;
+}
+
+/// Sets an environment variable for the time of a test.
+class Variable {
+ public:
+  Variable(const char* name, const std::string& value) : name_(name) {
+    if (const char* old = std::getenv(name)) old_ = old;
+    setenv(name, value.c_str(), 1);
+  }
+  ~Variable() {
+    if (old_.empty()) {
+      unsetenv(name_);
+    } else {
+      setenv(name_, old_.c_str(), 1);
+    }
+  }
+
+ private:
+  const char* name_;
+  std::string old_;
+};
+
+TEST(MeshFile, IsReadInAllFormatsWithVerticesMerged) {
+  const TemporaryFolder folder;
+  const TriangleMesh box = box_mesh(kLow, kHigh);
+  for (const std::string& path :
+       {folder.write("a.obj", obj_text(box)), folder.write("a.ply", ply_text(box)),
+        folder.write("a.stl", stl_text(box)), folder.write("b.STL", binary_stl(box))}) {
+    const TriangleMesh mesh = read_mesh(path);
+    EXPECT_EQ(mesh.vertices.size(), 8u) << path;
+    EXPECT_EQ(mesh.triangles.size(), 12u) << path;
+    EXPECT_NEAR(signed_volume(mesh), 0.006, 1e-8) << path;
+  }
+}
+
+TEST(MeshFile, IsRefusedWithItsPathAndReason) {
+  const TemporaryFolder folder;
+  const std::string box = stl_text(box_mesh(kLow, kHigh));
+  std::string with_nan = obj_text(box_mesh(kLow, kHigh));
+  with_nan.replace(with_nan.find("v 0 0 0"), 7, "v nan 0 0");
+  const std::pair<std::string, const char*> cases[] = {
+      {folder.path() + "/none.stl", " does not exist"},
+      {folder.path(), " is no file"},
+      {folder.write("empty.stl", ""), " is empty"},
+      {folder.write("a.docx", box), " is of no known format"},
+      {folder.write("text.ply", "this is not a mesh\n"), " cannot be read ("},
+      {folder.write("points.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\np 1 2 3\n"), ""},
+      {folder.write("nan.obj", with_nan), " has coordinates that are not finite"},
+  };
+  for (const auto& c : cases) {
+    const std::string reason = reason_of([&] { load_solid(mesh_body(c.first), nullptr); });
+    EXPECT_EQ(reason.rfind("body 'organ': mesh " + c.first + c.second, 0), 0u) << reason;
+  }
+}
+
+TEST(MeshFile, IsNamedByItsFullPathWhenMissing) {
+  const std::string reason = reason_of([] { load_solid(mesh_body("nowhere/a.stl"), nullptr); });
+  EXPECT_TRUE(contains(reason, std::filesystem::current_path().string() + "/nowhere/a.stl"))
+      << reason;
+}
+
+TEST(MeshAddress, PlainAndFile) {
+  EXPECT_EQ(resolve_mesh_path("/a/b c.stl"), "/a/b c.stl");
+  EXPECT_EQ(resolve_mesh_path("b%20c.stl"), "b%20c.stl");
+  EXPECT_EQ(resolve_mesh_path("file:///a/b%20c.stl"), "/a/b c.stl");
+  EXPECT_TRUE(contains(reason_of([] { resolve_mesh_path(""); }), "names no file"));
+  EXPECT_TRUE(
+      contains(reason_of([] { resolve_mesh_path("http://a/b.stl"); }), "cannot be fetched"));
+}
+
+TEST(MeshAddress, PackagesAreFoundOnTheRosPackagePath) {
+  const TemporaryFolder folder;
+  const std::string xml = "<package><name> organs </name></package>";
+  folder.write("src/repository/organs_folder/package.xml", xml);  // the name counts, not the folder
+  const std::string found = folder.path() + "/src/repository/organs_folder/meshes/a.stl";
+  {
+    const Variable path("ROS_PACKAGE_PATH", "/not/there:" + folder.path() + "/src");
+    EXPECT_EQ(resolve_mesh_path("package://organs/meshes/a.stl"), found);
+  }
+  {
+    const Variable path("ROS_PACKAGE_PATH", folder.path() + "/src/repository/organs_folder");
+    EXPECT_EQ(resolve_mesh_path("package://organs/meshes/a.stl"), found);
+    const std::string reason = reason_of([] { resolve_mesh_path("package://other/a.stl"); });
+    EXPECT_TRUE(contains(reason, "package other")) << reason;
+    EXPECT_TRUE(contains(reason, "ROS_PACKAGE_PATH (" + folder.path())) << reason;
+  }
+  EXPECT_TRUE(contains(reason_of([] { resolve_mesh_path("package://organs"); }), "names no file"));
+}
+
+TEST(MeshAddress, InstalledPackagesAreFoundOnTheCmakePrefixPath) {
+  const TemporaryFolder folder;
+  folder.write("share/organs/package.xml", "");
+  const Variable ros("ROS_PACKAGE_PATH", "");
+  const Variable cmake("CMAKE_PREFIX_PATH", "/not/there:" + folder.path());
+  EXPECT_EQ(resolve_mesh_path("package://organs/a.stl"), folder.path() + "/share/organs/a.stl");
+}
+
+TEST(MakeSolid, LeavesASoundMeshAlone) {
+  for (const TriangleMesh& mesh : {box_mesh(kLow, kHigh), icosphere(kLow, 0.1, 2), l_shape()}) {
+    const Repaired r = repaired(mesh);
+    EXPECT_EQ(r.notes, "");
+    EXPECT_EQ(r.mesh.triangles, mesh.triangles);
+    EXPECT_GT(signed_volume(r.mesh), 0);
+  }
+  EXPECT_NEAR(signed_volume(l_shape()), 3, 1e-12);
+}
+
+TEST(MakeSolid, TurnsAroundWhatIsInsideOut) {
+  const TriangleMesh ball = icosphere(Vec3(1, 2, 3), 0.1, 2);
+  const Repaired r = repaired(inverted(ball));
+  EXPECT_NEAR(signed_volume(r.mesh), signed_volume(ball), 1e-12);
+  EXPECT_TRUE(contains(r.notes, "was inside out")) << r.notes;
+}
+
+TEST(MakeSolid, TurnsAroundSingleTriangles) {
+  TriangleMesh mesh = icosphere(kLow, 0.1, 2);
+  const double volume = signed_volume(mesh);
+  for (int t : {3, 4, 77}) std::swap(mesh.triangles[t][0], mesh.triangles[t][1]);
+  const Repaired r = repaired(mesh);
+  EXPECT_NEAR(signed_volume(r.mesh), volume, 1e-15);
+  EXPECT_TRUE(contains(r.notes, "had 3 triangles that faced the other way")) << r.notes;
+}
+
+TEST(MakeSolid, TakesAllPartsAndSaysSo) {
+  const TriangleMesh a = icosphere(Vec3(0, 0, 0), 0.1, 2), b = icosphere(Vec3(1, 0, 0), 0.1, 2);
+  const double volume = signed_volume(a) + signed_volume(b);
+  Repaired r = repaired(both(a, b));
+  EXPECT_NEAR(signed_volume(r.mesh), volume, 1e-12);
+  EXPECT_EQ(r.notes, "has 2 separate parts: all are taken\n");
+  r = repaired(both(a, inverted(b)));
+  EXPECT_NEAR(signed_volume(r.mesh), volume, 1e-12);
+  EXPECT_TRUE(contains(r.notes, "had 1 parts inside out")) << r.notes;
+}
+
+TEST(MakeSolid, KeepsVoids) {
+  const TriangleMesh outer = icosphere(kLow, 0.2, 2), inner = icosphere(kLow, 0.1, 2);
+  const double volume = signed_volume(outer) - signed_volume(inner);
+  Repaired r = repaired(both(inverted(inner), outer));
+  EXPECT_NEAR(signed_volume(r.mesh), volume, 1e-12);
+  EXPECT_EQ(r.notes, "has 1 parts within others that face inwards: voids\n");
+  // All of it the wrong way: what lies within turns with what is around it.
+  r = repaired(both(inner, inverted(outer)));
+  EXPECT_NEAR(signed_volume(r.mesh), volume, 1e-12);
+  EXPECT_TRUE(contains(r.notes, "was inside out")) << r.notes;
+  EXPECT_TRUE(contains(r.notes, "voids")) << r.notes;
+  r = repaired(both(inner, outer));
+  EXPECT_TRUE(contains(r.notes, "face outwards: they change nothing")) << r.notes;
+}
+
+TEST(MakeSolid, RefusesOpenSurfacesWithTheNumberOfOpenEdges) {
+  TriangleMesh mesh = box_mesh(kLow, kHigh);
+  mesh.triangles.resize(10);  // without the face at high x
+  EXPECT_TRUE(contains(reason_of([&] { repaired(mesh); }), "has 4 open edges"));
+  mesh = icosphere(kLow, 0.1, 1);
+  mesh.triangles.erase(mesh.triangles.begin() + 5);
+  EXPECT_TRUE(contains(reason_of([&] { repaired(mesh); }), "has 3 open edges"));
+  mesh = box_mesh(kLow, kHigh);
+  mesh.triangles.push_back({0, 1, 7});  // a wall inside: one side more at three edges
+  EXPECT_TRUE(contains(reason_of([&] { repaired(mesh); }), "open edges"));
+}
+
+TEST(MakeSolid, RefusesWhatHasNoInside) {
+  // Moebius strip, doubled nowhere: open. A Klein bottle is closed and has no inside.
+  constexpr int n = 8;
+  TriangleMesh klein;
+  for (int i = 0; i < n; ++i) {
+    for (int j = 0; j < n; ++j) klein.vertices.emplace_back(i, j, (3 * i + 5 * j) % 7);
+  }
+  const auto at = [](int i, int j) {
+    if (i == n) return ((n - j) % n);  // glued with a twist
+    return i * n + j % n;
+  };
+  for (int i = 0; i < n; ++i) {
+    for (int j = 0; j < n; ++j) {
+      klein.triangles.push_back({at(i, j), at(i + 1, j), at(i + 1, j + 1)});
+      klein.triangles.push_back({at(i, j), at(i + 1, j + 1), at(i, j + 1)});
+    }
+  }
+  const std::string reason = reason_of([&] { repaired(klein); });
+  EXPECT_TRUE(contains(reason, "edges whose triangles face both ways")) << reason;
+}
+
+TEST(MakeSolid, TakesRepeatedTrianglesOnce) {
+  TriangleMesh mesh = box_mesh(kLow, kHigh);
+  const auto t = mesh.triangles[4];
+  mesh.triangles.push_back({t[1], t[2], t[0]});
+  const Repaired r = repaired(mesh);
+  EXPECT_EQ(r.mesh.triangles.size(), 12u);
+  EXPECT_TRUE(contains(r.notes, "had 1 triangles twice")) << r.notes;
+}
+
+TEST(MakeSolid, ClosesHairlineGaps) {
+  TriangleMesh mesh;
+  const TriangleMesh box = box_mesh(kLow, kHigh);
+  double shift = 0;
+  for (const auto& t : box.triangles) {  // each triangle with corners of its own, a little off
+    const int first = static_cast<int>(mesh.vertices.size());
+    for (int v : t) mesh.vertices.push_back(box.vertices[v] + Vec3::Constant(shift += 1e-9));
+    mesh.triangles.push_back({first, first + 1, first + 2});
+  }
+  const Repaired r = repaired(mesh);
+  EXPECT_EQ(r.mesh.vertices.size(), 8u);
+  EXPECT_NEAR(signed_volume(r.mesh), 0.006, 1e-8);
+  EXPECT_TRUE(contains(r.notes, "open edges between vertices less than")) << r.notes;
+}
+
+TEST(MakeSolid, AcceptsBoxesThatTouchAtAnEdge) {
+  TriangleMesh mesh =
+      both(box_mesh(Vec3(0, 0, 0), Vec3(1, 1, 1)), box_mesh(Vec3(1, 1, 0), Vec3(2, 2, 1)));
+  merge_vertices(mesh, 0);
+  EXPECT_EQ(mesh.vertices.size(), 14u);
+  EXPECT_NEAR(signed_volume(repaired(mesh).mesh), 2, 1e-12);
+}
+
+TEST(LoadSolid, AppliesScaleAndPose) {
+  const TemporaryFolder folder;
+  Body body =
+      mesh_body("file://" + folder.write("a.stl", stl_text(box_mesh(kLow, Vec3(100, 200, 300)))));
+  body.scale = 0.001;
+  body.pose.position = Vec3(1, 2, 3);
+  body.pose.orientation = Quat(Eigen::AngleAxisd(M_PI / 2, Vec3::UnitZ()));  // x to y, y to -x
+  std::vector<std::string> notes;
+  const TriangleMesh mesh = load_solid(body, &notes);
+  Vec3 low = mesh.vertices[0], high = low;
+  for (const Vec3& v : mesh.vertices) {
+    low = low.cwiseMin(v);
+    high = high.cwiseMax(v);
+  }
+  EXPECT_LT((low - Vec3(0.8, 2, 3)).norm(), 1e-7);
+  EXPECT_LT((high - Vec3(1, 2.1, 3.3)).norm(), 1e-7);
+  EXPECT_TRUE(notes.empty());
+}
+
+TEST(LoadSolid, NamesBodyAndMeshInItsNotes) {
+  const TemporaryFolder folder;
+  const std::string path = folder.write("a.stl", stl_text(inverted(box_mesh(kLow, kHigh))));
+  std::vector<std::string> notes;
+  load_solid(mesh_body(path), &notes);
+  ASSERT_EQ(notes.size(), 1u);
+  EXPECT_EQ(notes[0], "body 'organ': mesh " + path + " was inside out: turned around");
+}
+
+TEST(LoadSolid, RefusesAbsurdSizesAndSuggestsAScale) {
+  const TemporaryFolder folder;
+  Body body = mesh_body(folder.write("mm.stl", stl_text(box_mesh(kLow, Vec3(100, 50, 60)))));
+  std::string reason = reason_of([&] { load_solid(body, nullptr); });
+  EXPECT_TRUE(contains(reason, "is 100 m long at scale 1")) << reason;
+  EXPECT_TRUE(contains(reason, "did you forget scale: 0.001?")) << reason;
+  body = mesh_body(folder.write("m.stl", stl_text(box_mesh(kLow, kHigh))));
+  body.scale = 0.001;
+  reason = reason_of([&] { load_solid(body, nullptr); });
+  EXPECT_TRUE(contains(reason, "did you forget scale: 1?")) << reason;
+}
+
+TEST(LoadSolid, RefusesASheetWithoutVolume) {
+  const TemporaryFolder folder;
+  const std::string path =
+      folder.write("sheet.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\nf 1 3 2\n");
+  EXPECT_TRUE(contains(reason_of([&] { load_solid(mesh_body(path), nullptr); }), "no volume"));
+}
+
+}  // namespace
+}  // namespace tissue_sim

@@ -12,7 +12,7 @@ struct Fragment {
   int id = 0;
   int parent = -1;       ///< the piece it came from, -1 for a body
   int body = 0;          ///< index into Scene::bodies
-  bool loose = false;    ///< came off its body and holds no anchored point
+  bool loose = false;    ///< no anchored point, and came off a body (or the body is anchored)
   int point_count = 0;
   double volume = 0;     ///< in the reference configuration [m^3]
   Vec3 centroid = Vec3::Zero();  ///< [m]

@@ -50,6 +50,8 @@ class Tissue {
   virtual Span<const Fragment> fragments() const = 0;
   /// Hash of the whole state: equal states, equal checksums.
   virtual std::uint64_t checksum() const = 0;
+  /// What was repaired or assumed when the scene was built (a mesh turned inside out, ...).
+  virtual const std::vector<std::string>& notes() const = 0;
   /// Device and instruction set that do the work, as in "cpu (AVX-512, 2 threads)".
   virtual std::string device_name() const = 0;
 };

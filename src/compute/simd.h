@@ -1,0 +1,44 @@
+// Short vectors of floats by the compiler's vector extension: `Vec<16>` is one AVX-512 register, two
+// of AVX2 or four of SSE2. Arithmetic is written with ordinary operators; scalars mix in.
+#pragma once
+
+#include <cstdint>
+#include <cstring>
+
+#include "compute/host_device.h"
+
+namespace tissue_sim {
+
+template <int W>
+struct VecOf {
+  typedef float type __attribute__((vector_size(W * sizeof(float))));
+  typedef float unaligned __attribute__((vector_size(W * sizeof(float)), aligned(4), may_alias));
+};
+template <int W>
+using Vec = typename VecOf<W>::type;
+
+/// W floats from any address.
+template <int W>
+TISSUE_SIM_INLINE Vec<W> load(const float* p) {
+  return *reinterpret_cast<const typename VecOf<W>::unaligned*>(p);
+}
+template <int W>
+TISSUE_SIM_INLINE void store(float* p, Vec<W> v) {
+  *reinterpret_cast<typename VecOf<W>::unaligned*>(p) = v;
+}
+
+/// Instruction sets that the CPU kernels are compiled for.
+enum class InstructionSet { kSse2, kAvx2, kAvx512 };
+
+/// The best that this processor has, unless the environment variable TISSUE_SIM_INSTRUCTION_SET
+/// (sse2, avx2, avx512) asks for a lesser one. Throws std::runtime_error for one that is not there.
+InstructionSet instruction_set();
+const char* name(InstructionSet set);
+
+#if defined(__x86_64__)
+#define TISSUE_SIM_TARGET_AVX2 __attribute__((target("avx2,fma")))
+#define TISSUE_SIM_TARGET_AVX512 \
+  __attribute__((target("avx512f,avx512dq,avx512vl,avx512bw,avx2,fma")))
+#endif
+
+}  // namespace tissue_sim

@@ -1,0 +1,190 @@
+#include "contact/block_contact.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "cutting/bonds.h"
+#include "math/bspline.h"
+
+namespace tissue_sim {
+namespace {
+
+// Stiffness of a contact spring in units of the P-wave modulus over a point's edge: half of it makes
+// contact about as stiff as one layer of points, and adds less to the highest frequency than tissue.
+constexpr float kStiffness = 0.5f;
+constexpr float kDamping = 0.3f;  // share of critical
+
+ContactSpring spring_of(const LatticeBody& body, float volume) {
+  const Material& m = body.material;
+  const auto modulus = static_cast<float>(lame_lambda(m) + 2 * lame_mu(m));
+  const float edge = 0.5f * static_cast<float>(body.cell_size);
+  const float k = kStiffness * modulus * volume / (edge * edge);
+  return {k, 2 * kDamping * std::sqrt(k * static_cast<float>(m.density) * volume)};
+}
+
+bool overlap(const Box& a, const Box& b) {
+  return (a.min.array() <= b.max.array()).all() && (b.min.array() <= a.max.array()).all();
+}
+
+/// Where the block's nodes are, and how fast the fastest moves.
+Box node_bounds(const MpmState& state, const Block& block, double* speed) {
+  Box box;
+  double v2 = 0;
+  const LatticeBody& b = state.bodies[block.body];
+  const Nodes& n = state.nodes;
+  for (int z = 0; z < block.nz + 2; ++z) {
+    for (int y = 0; y < block.ny + 2; ++y) {
+      for (int x = 0; x < block.pitch; ++x) {
+        const int i = block.node[z * block.plane + y * block.pitch + x];
+        if (n.mass[i] <= 0) continue;
+        const Vec3 place = b.node_position(block.x + x - 1, block.y + y - 1, block.z + z - 1) +
+                           Vec3(n.u[0][i], n.u[1][i], n.u[2][i]);
+        box.min = box.min.cwiseMin(place);
+        box.max = box.max.cwiseMax(place);
+        v2 = std::max(v2, Vec3(n.v[0][i], n.v[1][i], n.v[2][i]).squaredNorm());
+      }
+    }
+  }
+  *speed = std::sqrt(v2);
+  return box;
+}
+
+/// One point's stencil in its block.
+struct Stencil {
+  int first;  // local number of its lowest node
+  int pitch, plane;
+  int s[3];   // sub-position
+  int local(int k) const { return first + k / 9 * plane + k / 3 % 3 * pitch + k % 3; }
+  float weight(int k) const {
+    return lattice_weight(s[0], k % 3) * lattice_weight(s[1], k / 3 % 3) *
+           lattice_weight(s[2], k / 9);
+  }
+};
+
+Stencil stencil_of(const Block& b, int lane) {
+  const int j = lane % b.stride, sub = lane / b.stride % 8, z = lane / b.stride / 8;
+  return {z * b.plane + j, b.pitch, b.plane, {sub & 1, sub >> 1 & 1, sub >> 2}};
+}
+
+}  // namespace
+
+Box bounds(const Collider& c) {
+  Box box;
+  if (c.kind == Collider::kPlane) {
+    box.min = Vec3::Constant(-1e6);
+    box.max = Vec3(1e6, 1e6, c.position[2]);
+    return box;
+  }
+  const float x0 = c.kind == Collider::kBlade ? -c.width : -c.radius;
+  const float x1 = c.kind == Collider::kBlade ? 0 : c.radius;
+  const float y = c.kind == Collider::kBlade ? 0.5f * c.thickness : c.radius;
+  for (int i = 0; i < 8; ++i) {
+    const float corner[3] = {i & 1 ? x1 : x0, i & 2 ? y : -y, i & 4 ? 0 : -c.length};
+    float world[3];
+    to_world(c, corner, world);
+    const Vec3 w(world[0], world[1], world[2]);
+    box.min = box.min.cwiseMin(w);
+    box.max = box.max.cwiseMax(w);
+  }
+  return box;
+}
+
+void find_near_colliders(MpmState& state, const std::vector<Box>& reach, double duration) {
+  Contacts& contacts = state.contacts;
+  const int count = static_cast<int>(state.blocks.all.size());
+  contacts.near.assign(count, {});
+  contacts.touching.resize(count);
+  state.cpu->for_each(count, [&](int i) {
+    double speed = 0;
+    Box box = node_bounds(state, *state.blocks.all[i], &speed);
+    const double margin = speed * duration + 0.5 * state.scene.cell_size;
+    box.min.array() -= margin;
+    box.max.array() += margin;
+    for (std::size_t c = 0; c < reach.size(); ++c) {
+      if (overlap(box, reach[c])) contacts.near[i].push_back(static_cast<std::uint8_t>(c));
+    }
+    if (contacts.near[i].empty()) {
+      for (const std::int32_t p : contacts.touching[i]) contacts.with[p] = 0;
+      contacts.touching[i].clear();
+    }
+  });
+}
+
+void list_contacts(MpmState& state) {
+  Contacts& contacts = state.contacts;
+  contacts.touching.assign(state.blocks.all.size(), {});
+  for (std::size_t i = 0; i < state.blocks.all.size(); ++i) {
+    for (const std::int32_t p : state.blocks.all[i]->point) {
+      if (p >= 0 && contacts.with[p] != 0) contacts.touching[i].push_back(p);
+    }
+  }
+}
+
+void add_contact(MpmState& state, int index, float* force, std::vector<ColliderLoad>& loads) {
+  Contacts& contacts = state.contacts;
+  const std::vector<std::uint8_t>& near = contacts.near[index];
+  if (near.empty()) return;
+  const Block& block = *state.blocks.all[index];
+  const LatticeBody& body = state.bodies[block.body];
+  BlockScratch& scratch = state.scratch.local();
+  const std::size_t lanes = block.lane_count();
+  if (scratch.values.size() < 3 * lanes) scratch.values.resize(3 * lanes);
+  if (scratch.lanes.size() < lanes) scratch.lanes.resize(lanes);
+  float* x = scratch.values.data();
+  state.kernels->positions(block, block_field(state, block), state.nodes.u, scratch, x);
+  const int component = block.node_count();
+  std::vector<std::int32_t> touching;
+  for (const std::uint8_t c : near) {
+    const Collider& collider = state.colliders[c];
+    const Box box = bounds(collider);
+    const float min[3] = {float(box.min[0]), float(box.min[1]), float(box.min[2])};
+    const float max[3] = {float(box.max[0]), float(box.max[1]), float(box.max[2])};
+    const int found = state.kernels->lanes_in_box(x, lanes, min, max, scratch.lanes.data());
+    for (int f = 0; f < found; ++f) {
+      const int lane = scratch.lanes[f];
+      const std::int32_t p = block.point[lane];
+      if (p < 0) continue;
+      if (collider.kind == Collider::kBlade && state.points.bonds[p] == kAllBonds) continue;
+      const float at[3] = {x[lane], x[lanes + lane], x[2 * lanes + lane]};
+      const Gap g = gap(collider, at);
+      if (g.distance >= 0) continue;
+      const Stencil stencil = stencil_of(block, lane);
+      float v[3] = {}, push[3];
+      for (int k = 0; k < 27; ++k) {
+        const int node = block.node[stencil.local(k)];
+        const float w = stencil.weight(k);
+        for (int a = 0; a < 3; ++a) v[a] += w * state.nodes.v[a][node];
+      }
+      float* hold = &contacts.hold[3 * static_cast<std::size_t>(p)];
+      if (contacts.with[p] != c + 1) {
+        contacts.with[p] = static_cast<std::uint8_t>(c + 1);
+        to_local(collider, at, hold);
+      }
+      touching.push_back(p);
+      contact_force(collider, g, spring_of(body, block.volume[lane]), at, v, hold, push);
+      for (int k = 0; k < 27; ++k) {
+        float* node_force = force + stencil.local(k);
+        const float w = stencil.weight(k);
+        for (int a = 0; a < 3; ++a) node_force[a * component] += w * push[a];
+      }
+      ColliderLoad& load = loads[c];
+      double arm[3];
+      for (int a = 0; a < 3; ++a) {
+        load.force[a] -= push[a];
+        arm[a] = static_cast<double>(at[a]) - collider.position[a];
+      }
+      for (int a = 0; a < 3; ++a) {
+        const int b = (a + 1) % 3, d = (a + 2) % 3;
+        load.torque[a] -= arm[b] * push[d] - arm[d] * push[b];
+      }
+    }
+  }
+  // A point that no longer touches anything forgets where it was held.
+  std::sort(touching.begin(), touching.end());
+  for (const std::int32_t p : contacts.touching[index]) {
+    if (!std::binary_search(touching.begin(), touching.end(), p)) contacts.with[p] = 0;
+  }
+  contacts.touching[index] = std::move(touching);
+}
+
+}  // namespace tissue_sim

@@ -1,0 +1,24 @@
+// Contact of tissue with tools and the ground, block by block.
+#pragma once
+
+#include <vector>
+
+#include "mpm/mpm_state.h"
+
+namespace tissue_sim {
+
+/// Box that a collider fills, moved by nobody [m].
+Box bounds(const Collider& collider);
+
+/// Finds out which colliders each block may meet in a frame of `duration` seconds, from where its
+/// nodes are and how fast they and the colliders (from `begin` to `end`) move; lets go of contacts
+/// that are out of reach.
+void find_near_colliders(MpmState& state, const std::vector<Box>& reach, double duration);
+
+/// Rebuilds the lists of points in contact after blocks were made anew.
+void list_contacts(MpmState& state);
+
+/// Adds contact forces to the block's part of the force buffer and sums the loads of the colliders.
+void add_contact(MpmState& state, int block, float* force, std::vector<ColliderLoad>& loads);
+
+}  // namespace tissue_sim

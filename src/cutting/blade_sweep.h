@@ -1,0 +1,34 @@
+// Blade sweep: does a moving edge pass through a moving bond? Both are segments whose ends move
+// linearly over the same interval, so nothing slips through, however the tissue gives way.
+#pragma once
+
+#include <vector>
+
+#include "tissue_sim/cut.h"
+#include "tissue_sim/types.h"
+
+namespace tissue_sim {
+
+/// A segment whose ends move linearly from (a0, b0) to (a1, b1) [m].
+struct MovingSegment {
+  Vec3 a0, b0, a1, b1;
+};
+
+/// Whether the two segments meet at some moment of the interval. The edge includes its ends (with a
+/// margin of 1e-9 of its length, so that the pieces of a polyline leave no gap), the bond its own.
+bool edge_passes(const MovingSegment& edge, const MovingSegment& bond);
+
+/// A part of a path, short enough to be taken as linear, and the share of the path's time that it
+/// spans.
+struct SweepPart {
+  double begin, end;  ///< in [0, 1] of the time over which the tissue moves
+  std::vector<MovingSegment> edges;
+  Box box;            ///< of the edges
+};
+
+/// Takes a path apart at its poses, and between poses so that no part turns by more than 4 degrees.
+/// The path's time runs evenly over its poses. The edge is moved aside by some 1e-9 m, so that
+/// it never passes exactly through a lattice point.
+std::vector<SweepPart> sweep_parts(const BladePath& path);
+
+}  // namespace tissue_sim

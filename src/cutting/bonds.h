@@ -1,0 +1,27 @@
+// Bonds: which of its 6 lattice neighbours a point holds on to. Cuts and tears clear them, nothing
+// sets them again; everything about connection follows from them.
+//
+// Six, not 26: a surface that parts two points also parts every path over faces between them, and a
+// point that hung on to its piece by a diagonal alone would be a hinge, free to move without strain.
+#pragma once
+
+#include <cstdint>
+
+namespace tissue_sim {
+
+inline constexpr int kBondCount = 6;
+inline constexpr std::uint8_t kAllBonds = (1u << kBondCount) - 1;
+
+/// Offset to the neighbour of bond `k`: -z, -y, -x, +x, +y, +z. Bond 5 - k points the other way;
+/// bonds from kForwardBond on point to higher-numbered points.
+struct BondOffset {
+  int x, y, z;
+};
+inline constexpr BondOffset bond_offset(int k) {
+  const int axis = k < 3 ? 2 - k : k - 3, sign = k < 3 ? -1 : 1;
+  return {axis == 0 ? sign : 0, axis == 1 ? sign : 0, axis == 2 ? sign : 0};
+}
+inline constexpr int kForwardBond = 3;
+inline constexpr int opposite_bond(int k) { return kBondCount - 1 - k; }
+
+}  // namespace tissue_sim

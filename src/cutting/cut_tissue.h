@@ -1,0 +1,21 @@
+// Cuts: a sweep clears the bonds that it passes, then the nodes and blocks follow.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "mpm/mpm_state.h"
+#include "tissue_sim/cut.h"
+
+namespace tissue_sim {
+
+/// Clears the bonds that a path passes while the tissue moves from the displacements `u_begin` to
+/// `u_end` (the same array for a path through tissue at rest). Appends the points that lost a bond
+/// to `changed` and counts into `report`.
+void sweep_bonds(MpmState& state, const BladePath& path, const Array<float>* u_begin,
+                 const Array<float>* u_end, std::vector<std::int32_t>& changed, CutReport& report);
+
+/// Splits nodes and makes blocks anew after the points `changed` lost bonds.
+void take_apart(MpmState& state, const std::vector<std::int32_t>& changed);
+
+}  // namespace tissue_sim

@@ -1,0 +1,172 @@
+#include "cutting/node_fields.h"
+
+#include <algorithm>
+#include <cstring>
+
+#include "cutting/bonds.h"
+#include "math/bspline.h"
+
+namespace tissue_sim {
+namespace {
+
+constexpr int kNone = 255;
+
+/// Place of a point in the 6 x 6 x 6 box of the node of cell (x, y, z).
+int place(const Points::Site& p, int x, int y, int z) {
+  return ((p.z - 2 * z + 2) * 6 + p.y - 2 * y + 2) * 6 + p.x - 2 * x + 2;
+}
+
+/// Weight of the box's centre node at place i of one axis of the box.
+float weight_at(int i) { return lattice_weight(i & 1, 2 - i / 2); }
+
+/// Components of the bonds within the box, numbered by their first place. Returns their count.
+int components(const std::int32_t (&around)[216], const Points& points, std::uint8_t (&label)[216]) {
+  std::memset(label, kNone, sizeof(label));
+  int count = 0;
+  std::uint8_t stack[216];
+  for (int start = 0; start < 216; ++start) {
+    if (around[start] < 0 || label[start] != kNone) continue;
+    int top = 0;
+    stack[top++] = static_cast<std::uint8_t>(start);
+    label[start] = static_cast<std::uint8_t>(count);
+    while (top > 0) {
+      const int at = stack[--top];
+      const int x = at % 6, y = at / 6 % 6, z = at / 36;
+      for (unsigned bonds = points.bonds[around[at]]; bonds != 0; bonds &= bonds - 1) {
+        const BondOffset o = bond_offset(__builtin_ctz(bonds));
+        const int i = x + o.x, j = y + o.y, k = z + o.z;
+        if (i < 0 || j < 0 || k < 0 || i > 5 || j > 5 || k > 5) continue;
+        const int next = (k * 6 + j) * 6 + i;
+        if (label[next] != kNone) continue;
+        label[next] = static_cast<std::uint8_t>(count);
+        stack[top++] = static_cast<std::uint8_t>(next);
+      }
+    }
+    ++count;
+  }
+  return count;
+}
+
+/// Mass of each component at the node, and whether the node holds it fast.
+struct Share {
+  double mass = 0;
+  bool anchored = false;
+};
+
+void set_mass(Nodes& nodes, int node, const Share& share) {
+  nodes.mass[node] = static_cast<float>(share.mass);
+  const bool fast = share.anchored || share.mass <= 0;
+  nodes.inv_mass[node] = fast ? 0.0f : 1.0f / nodes.mass[node];
+  if (fast) {
+    for (int c = 0; c < 3; ++c) nodes.v[c][node] = 0;
+  }
+}
+
+std::vector<Share> shares(const LatticeBody& body, const Points& points, int x, int y, int z,
+                          const std::int32_t (&around)[216], const std::uint8_t (&label)[216],
+                          int count) {
+  const bool anchored = is_anchored(body, body.node_position(x, y, z));
+  std::vector<Share> result(count);
+  for (int i = 0; i < 216; ++i) {
+    if (around[i] < 0) continue;
+    Share& s = result[label[i]];
+    s.mass += body.material.density * points.volume[around[i]] * weight_at(i % 6) *
+              weight_at(i / 6 % 6) * weight_at(i / 36);
+    if (anchored && points.anchored[around[i]]) s.anchored = true;
+  }
+  return result;
+}
+
+}  // namespace
+
+NodeFields::NodeFields(const std::vector<LatticeBody>& bodies, const Points& points, Nodes& nodes) {
+  nodes.resize(bodies.back().first_node + bodies.back().node_count());
+  std::int32_t around[216];
+  const std::uint8_t one[216] = {};
+  for (const LatticeBody& b : bodies) {
+    for (int z = -1; z <= b.nz; ++z) {
+      for (int y = -1; y <= b.ny; ++y) {
+        for (int x = -1; x <= b.nx; ++x) {
+          points_around(b, x, y, z, around);
+          set_mass(nodes, b.node(x, y, z), shares(b, points, x, y, z, around, one, 1)[0]);
+        }
+      }
+    }
+  }
+}
+
+int NodeFields::node(const LatticeBody& body, const Points::Site& p, int x, int y, int z) const {
+  const int lattice_node = body.node(x, y, z);
+  const Split* s = split(lattice_node);
+  return s == nullptr ? lattice_node : s->seen_by(p, x, y, z);
+}
+
+int NodeFields::Split::seen_by(const Points::Site& p, int x, int y, int z) const {
+  return field[component[place(p, x, y, z)]];
+}
+
+int NodeFields::node(const LatticeBody& body, const Points::Site& p, int k) const {
+  return node(body, p, p.x / 2 + k % 3 - 1, p.y / 2 + k / 3 % 3 - 1, p.z / 2 + k / 9 - 1);
+}
+
+bool NodeFields::split_node(const LatticeBody& body, const Points& points, int x, int y, int z,
+                            Nodes& nodes) {
+  std::int32_t around[216];
+  std::uint8_t label[216];
+  points_around(body, x, y, z, around);
+  const int count = components(around, points, label);
+  const int lattice_node = body.node(x, y, z);
+  const auto before = splits_.find(lattice_node);
+  if (count == (before == splits_.end() ? 1 : static_cast<int>(before->second.field.size()))) {
+    return false;  // components only come apart, so the same number means the same components
+  }
+  Split split;
+  std::copy(std::begin(label), std::end(label), split.component);
+  const std::vector<Share> share = shares(body, points, x, y, z, around, label, count);
+  std::vector<std::int32_t> taken;
+  for (int i = 0; i < 216; ++i) {
+    if (around[i] < 0 || label[i] != split.field.size()) continue;  // the first of its component
+    const int parent = before == splits_.end() ? lattice_node
+                                               : before->second.field[before->second.component[i]];
+    int field = parent;
+    if (std::find(taken.begin(), taken.end(), parent) != taken.end()) {
+      field = static_cast<int>(nodes.size());
+      nodes.resize(nodes.size() + 1);
+      for (int c = 0; c < 3; ++c) {
+        nodes.u[c][field] = nodes.u[c][parent];
+        nodes.v[c][field] = nodes.v[c][parent];
+      }
+    }
+    taken.push_back(parent);
+    split.field.push_back(field);
+  }
+  for (int c = 0; c < count; ++c) set_mass(nodes, split.field[c], share[c]);
+  splits_[lattice_node] = std::move(split);
+  return true;
+}
+
+std::vector<NodeFields::Cell> NodeFields::update(const std::vector<LatticeBody>& bodies,
+                                                 const Points& points,
+                                                 const std::vector<std::int32_t>& changed,
+                                                 Nodes& nodes) {
+  std::vector<Cell> cells;
+  for (const std::int32_t p : changed) {
+    const Points::Site& s = points.site[p];
+    for (int k = 0; k < 27; ++k) {
+      cells.push_back({s.body, s.x / 2 + k % 3 - 1, s.y / 2 + k / 3 % 3 - 1, s.z / 2 + k / 9 - 1});
+    }
+  }
+  const auto key = [&bodies](const Cell& c) { return bodies[c.body].node(c.x, c.y, c.z); };
+  std::sort(cells.begin(), cells.end(),
+            [&key](const Cell& a, const Cell& b) { return key(a) < key(b); });
+  cells.erase(std::unique(cells.begin(), cells.end(),
+                          [&key](const Cell& a, const Cell& b) { return key(a) == key(b); }),
+              cells.end());
+  const auto unchanged = [&](const Cell& c) {
+    return !split_node(bodies[c.body], points, c.x, c.y, c.z, nodes);
+  };
+  cells.erase(std::remove_if(cells.begin(), cells.end(), unchanged), cells.end());
+  return cells;
+}
+
+}  // namespace tissue_sim

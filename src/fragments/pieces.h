@@ -1,0 +1,26 @@
+// Pieces: the connected components of the bonds, and which piece is which over time.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "mpm/lattice_body.h"
+#include "tissue_sim/fragments.h"
+
+namespace tissue_sim {
+
+/// Which piece each point belongs to, over time.
+struct Pieces {
+  std::vector<std::int32_t> of_point;  ///< Fragment::id
+  std::vector<Fragment> all;           ///< by id; what moves (centroid, ...) is filled by others
+  int next_id = 0;
+};
+
+/// One piece for each body.
+Pieces whole_pieces(const std::vector<LatticeBody>& bodies, const Points& points);
+
+/// Labels the points anew after bonds broke (union-find over the bonds). Returns the new ids.
+std::vector<int> update_pieces(const std::vector<LatticeBody>& bodies, const Points& points,
+                               Pieces& pieces);
+
+}  // namespace tissue_sim

@@ -1,0 +1,183 @@
+// Hyperelastic laws: first Piola-Kirchhoff stress P(F) and energy density, for T = float (GPU),
+// double (reference) or Vec<W> (CPU). Matrices are row-major arrays of 9: F[3 * i + k] = dx_i/dX_k.
+#pragma once
+
+#include "compute/host_device.h"
+
+namespace tissue_sim {
+
+/// Cofactor matrix of F: cof F = J F^-T, defined for singular F too.
+template <class T>
+TISSUE_SIM_INLINE void cofactor(const T* F, T* cof) {
+  cof[0] = F[4] * F[8] - F[5] * F[7];
+  cof[1] = F[5] * F[6] - F[3] * F[8];
+  cof[2] = F[3] * F[7] - F[4] * F[6];
+  cof[3] = F[2] * F[7] - F[1] * F[8];
+  cof[4] = F[0] * F[8] - F[2] * F[6];
+  cof[5] = F[1] * F[6] - F[0] * F[7];
+  cof[6] = F[1] * F[5] - F[2] * F[4];
+  cof[7] = F[2] * F[3] - F[0] * F[5];
+  cof[8] = F[0] * F[4] - F[1] * F[3];
+}
+
+template <class T>
+TISSUE_SIM_INLINE T norm2(const T* A) {
+  T s = A[0] * A[0];
+  for (int i = 1; i < 9; ++i) s += A[i] * A[i];
+  return s;
+}
+
+/// Invariants of the stretch U = sqrt(F^T F) of a deformation gradient, and what the rotation
+/// follows from: R = ((b + c1) F - F C + a cof F) * inverse.
+template <class T>
+struct Stretch {
+  T a;        ///< tr U (with the smallest stretch negative where det F < 0)
+  T b;        ///< second invariant of U
+  T c1;       ///< tr C = ||F||^2
+  T inverse;  ///< 1 / (a b - J) = 1 / ((s1 + s2) (s2 + s3) (s3 + s1))
+};
+
+/// Solves (a^2 - tr C)^2 / 4 = ||cof F||^2 + 2 J a for its largest root a = tr U by Newton's method
+/// from above, where it converges monotonically (the quartic of Franca 1989; that R is the derivative
+/// of tr U is used by Lin, Chitalu and Komura 2022). The step divides by 2 (a b - J); its
+/// reciprocal is carried along and refined, for divisions are dear.
+/// Relative error below 1e-6 for stretches between 1/3 and 3.
+template <class T>
+TISSUE_SIM_INLINE Stretch<T> stretch(T c1, T c2, T J) {
+  T a = (c1 + 3.0f) * 0.5f;
+  T p = a * a - c1;
+  T slope = a * p - 2.0f * J;
+  T r = 1.0f / slope;
+  a -= (0.25f * p * p - c2 - 2.0f * J * a) * r;
+  for (int i = 0; i < 4; ++i) {
+    p = a * a - c1;
+    slope = a * p - 2.0f * J;
+    r = r * (2.0f - slope * r);
+    a -= (0.25f * p * p - c2 - 2.0f * J * a) * r;
+  }
+  p = a * a - c1;
+  slope = a * p - 2.0f * J;
+  r = r * (2.0f - slope * r);
+  r = r * (2.0f - slope * r);
+  return {a, p * 0.5f, c1, r * 2.0f};
+}
+
+/// F C = F F^T F.
+template <class T>
+TISSUE_SIM_INLINE void times_right_cauchy_green(const T* F, T* FC) {
+  const T c00 = F[0] * F[0] + F[3] * F[3] + F[6] * F[6];
+  const T c11 = F[1] * F[1] + F[4] * F[4] + F[7] * F[7];
+  const T c22 = F[2] * F[2] + F[5] * F[5] + F[8] * F[8];
+  const T c01 = F[0] * F[1] + F[3] * F[4] + F[6] * F[7];
+  const T c02 = F[0] * F[2] + F[3] * F[5] + F[6] * F[8];
+  const T c12 = F[1] * F[2] + F[4] * F[5] + F[7] * F[8];
+  for (int i = 0; i < 3; ++i) {
+    FC[3 * i + 0] = F[3 * i] * c00 + F[3 * i + 1] * c01 + F[3 * i + 2] * c02;
+    FC[3 * i + 1] = F[3 * i] * c01 + F[3 * i + 1] * c11 + F[3 * i + 2] * c12;
+    FC[3 * i + 2] = F[3 * i] * c02 + F[3 * i + 1] * c12 + F[3 * i + 2] * c22;
+  }
+}
+
+/// Rotation of the polar decomposition F = R U (det R = 1).
+template <class T>
+TISSUE_SIM_INLINE void rotation(const T* F, T* R) {
+  T cof[9], FC[9];
+  cofactor(F, cof);
+  const T J = F[0] * cof[0] + F[1] * cof[1] + F[2] * cof[2];
+  const Stretch<T> s = stretch(norm2(F), norm2(cof), J);
+  times_right_cauchy_green(F, FC);
+  for (int i = 0; i < 9; ++i) {
+    R[i] = ((s.b + s.c1) * F[i] - FC[i] + s.a * cof[i]) * s.inverse;
+  }
+}
+
+/// Fixed corotated (Stomakhin et al. 2012): psi = mu ||F - R||^2 + lambda/2 (J - 1)^2.
+struct FixedCorotated {
+  /// P = 2 mu (F - R) + lambda (J - 1) cof F. Give `mu` and `lambda` times a volume, and P is too.
+  template <class T>
+  TISSUE_SIM_INLINE static void stress(const T* F, T mu, T lambda, T* P) {
+    T cof[9], FC[9];
+    cofactor(F, cof);
+    const T J = F[0] * cof[0] + F[1] * cof[1] + F[2] * cof[2];
+    const Stretch<T> s = stretch(norm2(F), norm2(cof), J);
+    times_right_cauchy_green(F, FC);
+    const T mu2 = mu + mu;
+    const T fc = mu2 * s.inverse;
+    const T f = mu2 - fc * (s.b + s.c1);
+    const T c = lambda * (J - 1.0f) - fc * s.a;
+    for (int i = 0; i < 9; ++i) P[i] = f * F[i] + fc * FC[i] + c * cof[i];
+  }
+
+  /// Energy per volume; ||F - R||^2 = tr C - 2 tr U + 3.
+  template <class T>
+  TISSUE_SIM_INLINE static T energy(const T* F, T mu, T lambda) {
+    T cof[9], R[9], d = mu * 0.0f;
+    cofactor(F, cof);
+    const T J = F[0] * cof[0] + F[1] * cof[1] + F[2] * cof[2];
+    rotation(F, R);
+    for (int i = 0; i < 9; ++i) d += (F[i] - R[i]) * (F[i] - R[i]);
+    return mu * d + 0.5f * lambda * (J - 1.0f) * (J - 1.0f);
+  }
+};
+
+/// Neo-Hookean that stays finite under inversion (Smith, de Goes, Kim 2018, eq. 13 without the log
+/// term): psi = mu/2 (||F||^2 - 3) - mu (J - 1) + (lambda + mu)/2 (J - 1)^2.
+struct NeoHookean {
+  /// P = mu F + ((lambda + mu) (J - 1) - mu) cof F.
+  template <class T>
+  TISSUE_SIM_INLINE static void stress(const T* F, T mu, T lambda, T* P) {
+    T cof[9];
+    cofactor(F, cof);
+    const T J = F[0] * cof[0] + F[1] * cof[1] + F[2] * cof[2];
+    const T c = (lambda + mu) * (J - 1.0f) - mu;
+    for (int i = 0; i < 9; ++i) P[i] = mu * F[i] + c * cof[i];
+  }
+
+  template <class T>
+  TISSUE_SIM_INLINE static T energy(const T* F, T mu, T lambda) {
+    T cof[9];
+    cofactor(F, cof);
+    const T J = F[0] * cof[0] + F[1] * cof[1] + F[2] * cof[2];
+    return 0.5f * mu * (norm2(F) - 3.0f) - mu * (J - 1.0f) +
+           0.5f * (lambda + mu) * (J - 1.0f) * (J - 1.0f);
+  }
+};
+
+/// Kelvin-Voigt viscosity: adds F S with S = 2 eta dE/dt, E Green's strain, to P.
+template <class T>
+TISSUE_SIM_INLINE void add_viscous_stress(const T* F, const T* Fdot, T eta, T* P) {
+  T S[6];  // 00 11 22 01 02 12 of F^T Fdot + Fdot^T F = 2 dE/dt
+  S[0] = 2.0f * (F[0] * Fdot[0] + F[3] * Fdot[3] + F[6] * Fdot[6]);
+  S[1] = 2.0f * (F[1] * Fdot[1] + F[4] * Fdot[4] + F[7] * Fdot[7]);
+  S[2] = 2.0f * (F[2] * Fdot[2] + F[5] * Fdot[5] + F[8] * Fdot[8]);
+  S[3] = F[0] * Fdot[1] + F[3] * Fdot[4] + F[6] * Fdot[7] + F[1] * Fdot[0] + F[4] * Fdot[3] +
+         F[7] * Fdot[6];
+  S[4] = F[0] * Fdot[2] + F[3] * Fdot[5] + F[6] * Fdot[8] + F[2] * Fdot[0] + F[5] * Fdot[3] +
+         F[8] * Fdot[6];
+  S[5] = F[1] * Fdot[2] + F[4] * Fdot[5] + F[7] * Fdot[8] + F[2] * Fdot[1] + F[5] * Fdot[4] +
+         F[8] * Fdot[7];
+  for (int i = 0; i < 6; ++i) S[i] = S[i] * eta;
+  for (int i = 0; i < 3; ++i) {
+    P[3 * i + 0] += F[3 * i] * S[0] + F[3 * i + 1] * S[3] + F[3 * i + 2] * S[4];
+    P[3 * i + 1] += F[3 * i] * S[3] + F[3 * i + 1] * S[1] + F[3 * i + 2] * S[5];
+    P[3 * i + 2] += F[3 * i] * S[4] + F[3 * i + 1] * S[5] + F[3 * i + 2] * S[2];
+  }
+}
+
+/// Von Mises stress of the Cauchy stress P F^T / J [Pa].
+template <class T>
+TISSUE_SIM_INLINE T von_mises_squared(const T* F, const T* P) {
+  T cof[9], s[9];
+  cofactor(F, cof);
+  const T J = F[0] * cof[0] + F[1] * cof[1] + F[2] * cof[2];
+  for (int i = 0; i < 3; ++i) {
+    for (int k = 0; k < 3; ++k) {
+      s[3 * i + k] = P[3 * i] * F[3 * k] + P[3 * i + 1] * F[3 * k + 1] + P[3 * i + 2] * F[3 * k + 2];
+    }
+  }
+  const T d0 = s[0] - s[4], d1 = s[4] - s[8], d2 = s[8] - s[0];
+  const T shear = s[1] * s[1] + s[2] * s[2] + s[5] * s[5];
+  return (0.5f * (d0 * d0 + d1 * d1 + d2 * d2) + 3.0f * shear) / (J * J);
+}
+
+}  // namespace tissue_sim

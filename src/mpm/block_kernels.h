@@ -1,0 +1,58 @@
+// The kernels that see points: chosen once for the processor, each works on one block.
+#pragma once
+
+#include "compute/array.h"
+#include "compute/simd.h"
+#include "mpm/block.h"
+#include "mpm/blocks.h"
+#include "mpm/nodes.h"
+#include "mpm/update_node.h"
+
+namespace tissue_sim {
+
+/// What a block's kernel needs to know beside the block.
+struct BlockField {
+  const Nodes* nodes;
+  int first_node;         ///< of the block: the node one below its first cell along each axis
+  int pitch_y, pitch_z;   ///< of the body's lattice
+  float cell_size;        ///< [m]
+  float origin[3];        ///< reference place of first_node [m]
+  Law law;
+  float mu, lambda;       ///< [Pa]
+  float viscosity;        ///< [Pa s]
+};
+
+/// Working memory of one thread; grows to the largest block and is used again.
+struct BlockScratch {
+  Array<float> nodes, velocities, in, in_rate, out, row, values;
+  Array<std::int32_t> lanes;
+};
+
+/// State of a block's points, from block_state().
+struct BlockState {
+  double elastic_energy = 0;  ///< [J]
+  float stiffening = 1;       ///< largest squared column of cof F plus |J - 1| ||F||: see stable_substep
+  bool finite = true;
+};
+
+struct BlockKernels {
+  /// Internal force on the block's nodes, [3][nz + 2][plane] (components as planes of their own):
+  /// f_i = -sum_p V_p P(F_p) grad w_ip. [N]
+  void (*forces)(const Block&, const BlockField&, BlockScratch&, float* force);
+  /// Places of the points in the world [m], for displacements `u`[3]: out[3][nz][8][stride]. Lanes
+  /// without a point hold something finite.
+  void (*positions)(const Block&, const BlockField&, const Array<float>* u, BlockScratch&,
+                    float* out);
+  /// Lanes of `positions` that lie within a box, in order, into `lanes`; returns their number.
+  int (*lanes_in_box)(const float* positions, std::size_t lane_count, const float* min,
+                      const float* max, std::int32_t* lanes);
+  /// Sums the parts of a row's force and moves its nodes on.
+  void (*update_row)(const NodeRow&, const RowPart* parts, const float* force, const UpdateNode&,
+                     BlockScratch&);
+  /// Energy and stiffness of the block; with `von_mises` also each point's stress [Pa], one per lane.
+  BlockState (*state)(const Block&, const BlockField&, BlockScratch&, float* von_mises);
+};
+
+const BlockKernels& block_kernels(InstructionSet set);
+
+}  // namespace tissue_sim

@@ -1,0 +1,279 @@
+#include "mpm/blocks.h"
+
+#include <algorithm>
+
+namespace tissue_sim {
+namespace {
+
+constexpr int kBlockY = 8, kBlockZ = 4, kMaxBlockX = 48, kGap = 3;
+
+struct Placed {
+  std::int32_t point;
+  std::int16_t x, y, z;  // cell in the region
+  std::int16_t s;        // sub-position: sx + 2 sy + 4 sz
+};
+
+std::vector<Placed> points_of(const BlockRegion& r, const LatticeBody& b) {
+  std::vector<Placed> result;
+  for (int z = 0; z < 2 * r.nz; ++z) {
+    for (int y = 0; y < 2 * r.ny; ++y) {
+      for (int x = 0; x < 2 * r.nx; ++x) {
+        const int p = b.point(2 * r.x + x, 2 * r.y + y, 2 * r.z + z);
+        if (p < 0) continue;
+        result.push_back({p, static_cast<std::int16_t>(x / 2), static_cast<std::int16_t>(y / 2),
+                          static_cast<std::int16_t>(z / 2),
+                          static_cast<std::int16_t>((x & 1) + 2 * (y & 1) + 4 * (z & 1))});
+      }
+    }
+  }
+  return result;
+}
+
+/// One set of points for which each node of the region means one field.
+struct Sheet {
+  std::vector<Placed> points;
+  std::vector<std::int32_t> node;  // of the region's nodes, -1 while no point needs it
+};
+
+/// Takes the points of a region apart so that within a sheet no two see different fields of a node;
+/// each goes to the first sheet that it fits.
+std::vector<Sheet> sheets_of(const BlockRegion& r, const LatticeBody& b, const Points& points,
+                             const NodeFields& fields) {
+  const int px = r.nx + 2, py = r.ny + 2, pz = r.nz + 2;
+  std::vector<const NodeFields::Split*> split(px * py * pz, nullptr);
+  bool any = false;
+  for (int z = 0, n = 0; z < pz; ++z) {
+    for (int y = 0; y < py; ++y) {
+      for (int x = 0; x < px; ++x, ++n) {
+        split[n] = fields.split(b.node(r.x + x - 1, r.y + y - 1, r.z + z - 1));
+        any = any || split[n] != nullptr;
+      }
+    }
+  }
+  std::vector<Sheet> sheets(1);
+  if (!any) {
+    sheets[0].points = points_of(r, b);
+    return sheets;
+  }
+  sheets[0].node.assign(split.size(), -1);
+  for (const Placed& p : points_of(r, b)) {
+    int local[27], seen[27], count = 0;
+    for (int k = 0; k < 27; ++k) {
+      const int x = p.x + k % 3, y = p.y + k / 3 % 3, z = p.z + k / 9;
+      const int n = (z * py + y) * px + x;
+      if (split[n] == nullptr) continue;
+      local[count] = n;
+      seen[count++] = split[n]->seen_by(points.site[p.point], r.x + x - 1, r.y + y - 1, r.z + z - 1);
+    }
+    const auto fits = [&](const Sheet& sheet) {
+      for (int i = 0; i < count; ++i) {
+        const int there = sheet.node[local[i]];
+        if (there != -1 && there != seen[i]) return false;
+      }
+      return true;
+    };
+    auto sheet = std::find_if(sheets.begin(), sheets.end(), fits);
+    if (sheet == sheets.end()) {
+      sheets.emplace_back();
+      sheet = sheets.end() - 1;
+      sheet->node.assign(split.size(), -1);
+    }
+    for (int i = 0; i < count; ++i) sheet->node[local[i]] = seen[i];
+    sheet->points.push_back(p);
+  }
+  return sheets;
+}
+
+/// The block of a sheet, no larger than its points need.
+Block make_block(const BlockRegion& r, const LatticeBody& b, const Points& points,
+                 const Sheet& sheet) {
+  int lo[3] = {1 << 30, 1 << 30, 1 << 30}, hi[3] = {-1, -1, -1};
+  for (const Placed& p : sheet.points) {
+    const int at[3] = {p.x, p.y, p.z};
+    for (int a = 0; a < 3; ++a) {
+      lo[a] = std::min(lo[a], at[a]);
+      hi[a] = std::max(hi[a], at[a]);
+    }
+  }
+  Block block;
+  block.body = r.body;
+  block.x = r.x + lo[0];
+  block.y = r.y + lo[1];
+  block.z = r.z + lo[2];
+  block.nx = hi[0] - lo[0] + 1;
+  block.ny = hi[1] - lo[1] + 1;
+  block.nz = hi[2] - lo[2] + 1;
+  lay_out(block);
+  for (const Placed& p : sheet.points) {
+    const std::size_t lane =
+        (static_cast<std::size_t>(p.z - lo[2]) * 8 + p.s) * block.stride +
+        (p.y - lo[1]) * block.pitch + p.x - lo[0];
+    block.volume[lane] = points.volume[p.point];
+    block.point[lane] = p.point;
+  }
+  block.node.assign(block.node_count(), b.node(block.x - 1, block.y - 1, block.z - 1));
+  for (int z = 0; z < block.nz + 2; ++z) {
+    for (int y = 0; y < block.ny + 2; ++y) {
+      for (int x = 0; x < block.pitch; ++x) {
+        const int local = z * block.plane + y * block.pitch + x;
+        const int lattice_node = b.node(block.x + x - 1, block.y + y - 1, block.z + z - 1);
+        block.node[local] = lattice_node;
+        if (sheet.node.empty()) continue;
+        const int n = ((lo[2] + z) * (r.ny + 2) + lo[1] + y) * (r.nx + 2) + lo[0] + x;
+        if (sheet.node[n] == -1 || sheet.node[n] == lattice_node) continue;
+        block.node[local] = sheet.node[n];
+        block.split_nodes.push_back({local, sheet.node[n]});
+      }
+    }
+  }
+  return block;
+}
+
+void fill_region(BlockRegion& r, const std::vector<LatticeBody>& bodies, const Points& points,
+                 const NodeFields& fields) {
+  r.blocks.clear();
+  const LatticeBody& b = bodies[r.body];
+  for (const Sheet& sheet : sheets_of(r, b, points, fields)) {
+    if (!sheet.points.empty()) r.blocks.push_back(make_block(r, b, points, sheet));
+  }
+}
+
+/// Runs of columns that hold points, gaps of up to kGap bridged, long runs halved.
+std::vector<std::pair<int, int>> x_runs(const LatticeBody& b, int y0, int ny, int z0, int nz) {
+  std::vector<std::pair<int, int>> runs;
+  for (int x = 0; x < b.nx; ++x) {
+    bool any = false;
+    for (int z = 2 * z0; z < 2 * (z0 + nz) && !any; ++z) {
+      for (int y = 2 * y0; y < 2 * (y0 + ny) && !any; ++y) {
+        any = b.point(2 * x, y, z) >= 0 || b.point(2 * x + 1, y, z) >= 0;
+      }
+    }
+    if (!any) continue;
+    if (!runs.empty() && x - runs.back().second <= kGap) {
+      runs.back().second = x + 1;
+    } else {
+      runs.emplace_back(x, x + 1);
+    }
+  }
+  std::vector<std::pair<int, int>> parts;
+  for (const auto& [begin, end] : runs) {
+    const int n = (end - begin + kMaxBlockX - 1) / kMaxBlockX;
+    for (int i = 0; i < n; ++i) {
+      parts.emplace_back(begin + (end - begin) * i / n, begin + (end - begin) * (i + 1) / n);
+    }
+  }
+  return parts;
+}
+
+void connect_forces(Blocks& blocks, const std::vector<LatticeBody>& bodies, int node_count) {
+  blocks.all.clear();
+  blocks.force_size = 0;
+  for (BlockRegion& r : blocks.regions) {
+    for (Block& b : r.blocks) {
+      b.force_offset = blocks.force_size;
+      blocks.force_size += static_cast<std::size_t>(3) * b.node_count();
+      blocks.all.push_back(&b);
+    }
+  }
+  struct Entry {
+    int row_node;  // first node of the lattice row
+    RowPart part;
+  };
+  std::vector<Entry> entries;
+  blocks.first_split_node = bodies.back().first_node + bodies.back().node_count();
+  std::vector<std::pair<int, SplitNodePart>> split;
+  for (const Block* block : blocks.all) {
+    const LatticeBody& b = bodies[block->body];
+    const std::size_t component = block->node_count();
+    std::size_t next_split = 0;
+    for (int z = 0; z < block->nz + 2; ++z) {
+      for (int y = 0; y < block->ny + 2; ++y) {
+        const int local = z * block->plane + y * block->pitch;
+        const int row = b.node(-1, block->y + y - 1, block->z + z - 1);
+        // A row without the nodes that this block sees split: parts between them.
+        int begin = 0;
+        const auto add = [&](int end) {
+          if (end > begin) {
+            entries.push_back(
+                {row, {block->force_offset + local + begin, component, block->x + begin, end - begin}});
+          }
+        };
+        while (next_split < block->split_nodes.size() &&
+               block->split_nodes[next_split].local < local + block->pitch) {
+          const Block::SplitNode& s = block->split_nodes[next_split++];
+          add(s.local - local);
+          begin = s.local - local + 1;
+          split.push_back({s.node, {block->force_offset + s.local, component}});
+        }
+        add(block->pitch);
+      }
+    }
+  }
+  std::stable_sort(entries.begin(), entries.end(),
+                   [](const Entry& a, const Entry& b) { return a.row_node < b.row_node; });
+  blocks.rows.clear();
+  blocks.row_parts.clear();
+  for (std::size_t i = 0; i < entries.size();) {
+    std::size_t end = i;
+    int lo = 1 << 30, hi = 0;
+    for (; end < entries.size() && entries[end].row_node == entries[i].row_node; ++end) {
+      lo = std::min(lo, entries[end].part.begin);
+      hi = std::max(hi, entries[end].part.begin + entries[end].part.count);
+    }
+    blocks.rows.push_back({entries[i].row_node + lo, hi - lo,
+                           static_cast<int>(blocks.row_parts.size()), static_cast<int>(end - i)});
+    for (; i < end; ++i) {
+      blocks.row_parts.push_back(entries[i].part);
+      blocks.row_parts.back().begin -= lo;
+    }
+  }
+  std::stable_sort(split.begin(), split.end(),
+                   [](const auto& a, const auto& b) { return a.first < b.first; });
+  blocks.split_node_parts.assign(node_count - blocks.first_split_node + 1, 0);
+  blocks.split_parts.clear();
+  for (const auto& [node, part] : split) {
+    if (node < blocks.first_split_node) continue;
+    ++blocks.split_node_parts[node - blocks.first_split_node + 1];
+  }
+  for (std::size_t i = 1; i < blocks.split_node_parts.size(); ++i) {
+    blocks.split_node_parts[i] += blocks.split_node_parts[i - 1];
+  }
+  for (const auto& entry : split) blocks.split_parts.push_back(entry.second);
+}
+
+}  // namespace
+
+Blocks make_blocks(const std::vector<LatticeBody>& bodies, const Points& points,
+                   const NodeFields& fields) {
+  Blocks blocks;
+  for (std::size_t i = 0; i < bodies.size(); ++i) {
+    const LatticeBody& b = bodies[i];
+    for (int z = 0; z < b.nz; z += kBlockZ) {
+      for (int y = 0; y < b.ny; y += kBlockY) {
+        const int ny = std::min(kBlockY, b.ny - y), nz = std::min(kBlockZ, b.nz - z);
+        for (const auto& [begin, end] : x_runs(b, y, ny, z, nz)) {
+          BlockRegion r{static_cast<int>(i), begin, y, z, end - begin, ny, nz, {}};
+          fill_region(r, bodies, points, fields);
+          blocks.regions.push_back(std::move(r));
+        }
+      }
+    }
+  }
+  connect_forces(blocks, bodies, bodies.back().first_node + bodies.back().node_count());
+  return blocks;
+}
+
+void update_blocks(Blocks& blocks, const std::vector<LatticeBody>& bodies, const Points& points,
+                   const NodeFields& fields, const std::vector<NodeFields::Cell>& cells,
+                   int node_count) {
+  for (BlockRegion& r : blocks.regions) {
+    const auto touches = [&r](const NodeFields::Cell& c) {
+      return c.body == r.body && c.x >= r.x - 1 && c.x <= r.x + r.nx && c.y >= r.y - 1 &&
+             c.y <= r.y + r.ny && c.z >= r.z - 1 && c.z <= r.z + r.nz;
+    };
+    if (std::any_of(cells.begin(), cells.end(), touches)) fill_region(r, bodies, points, fields);
+  }
+  connect_forces(blocks, bodies, node_count);
+}
+
+}  // namespace tissue_sim

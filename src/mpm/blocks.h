@@ -1,0 +1,59 @@
+// Blocks of all bodies, and how their forces come together at the nodes in a fixed order.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "cutting/node_fields.h"
+#include "mpm/block.h"
+#include "mpm/lattice_body.h"
+
+namespace tissue_sim {
+
+/// A box of cells of one body. Where a cut goes through it, it is worked on as several blocks, so
+/// that in each of them every node means one field only and the uncut kernel serves.
+struct BlockRegion {
+  int body;
+  int x, y, z, nx, ny, nz;  ///< cells
+  std::vector<Block> blocks;
+};
+
+/// Forces on one row of lattice nodes: the sum of parts of the force buffer, in this order.
+struct NodeRow {
+  int first_node, count;
+  int first_part, part_count;
+};
+struct RowPart {
+  std::size_t force;      ///< offset of component x in the force buffer
+  std::size_t component;  ///< offset to the next component
+  int begin, count;       ///< nodes of the row
+};
+
+/// Force on a node that a cut made: the sum of parts, in this order.
+struct SplitNodePart {
+  std::size_t force, component;
+};
+
+struct Blocks {
+  std::vector<BlockRegion> regions;
+  std::vector<Block*> all;  ///< in a fixed order
+  std::size_t force_size = 0;
+
+  std::vector<NodeRow> rows;
+  std::vector<RowPart> row_parts;
+  int first_split_node = 0;                ///< nodes from here on are fields that cuts made
+  std::vector<int> split_node_parts;       ///< CSR offsets, one per such node and one more
+  std::vector<SplitNodePart> split_parts;
+};
+
+/// Cuts the bodies' lattices into regions and makes their blocks.
+Blocks make_blocks(const std::vector<LatticeBody>& bodies, const Points& points,
+                   const NodeFields& fields);
+
+/// Makes the blocks anew of the regions that one of the `cells` touches, after their nodes' fields
+/// changed; `node_count` is the new number of nodes.
+void update_blocks(Blocks& blocks, const std::vector<LatticeBody>& bodies, const Points& points,
+                   const NodeFields& fields, const std::vector<NodeFields::Cell>& cells,
+                   int node_count);
+
+}  // namespace tissue_sim

@@ -1,0 +1,74 @@
+// The bodies of a scene on their lattices: which point sits where, and which node is whose.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "compute/array.h"
+#include "geometry/lattice.h"
+#include "tissue_sim/scene.h"
+
+namespace tissue_sim {
+
+/// Points of all bodies, numbered body after body in the order of Lattice::sites.
+struct Points {
+  struct Site {
+    std::int16_t x, y, z;  ///< half cells of the body's lattice
+    std::int16_t body;
+  };
+  Array<Site> site;
+  Array<float> volume;          ///< [m^3]
+  Array<std::uint8_t> bonds;    ///< bit k: still bound to the neighbour of bond k (cutting/bonds.h)
+  Array<std::uint8_t> anchored; ///< lies in an anchored region
+  int size() const { return static_cast<int>(site.size()); }
+};
+
+struct LatticeBody {
+  Body body;
+  Material material;
+  Vec3 origin = Vec3::Zero();  ///< lowest corner of cell (0, 0, 0) [m]
+  double cell_size = 0;
+  int nx = 0, ny = 0, nz = 0;  ///< cells
+  int first_node = 0;          ///< of its lattice nodes in Nodes; cell (0,0,0) has node (1,1,1)
+  int pitch_y = 0, pitch_z = 0;
+  int first_point = 0, point_count = 0;
+  std::vector<std::int32_t> point_at;  ///< [2 nz][2 ny][2 nx], point number or -1
+
+  int node_count() const { return pitch_z * (nz + 2); }
+  /// Point at a site, -1 where there is none or outside.
+  int point(int x, int y, int z) const {
+    if (x < 0 || y < 0 || z < 0 || x >= 2 * nx || y >= 2 * ny || z >= 2 * nz) return -1;
+    return point_at[(static_cast<std::size_t>(z) * 2 * ny + y) * 2 * nx + x];
+  }
+  /// Lattice node of cell (x, y, z), -1 .. n each.
+  int node(int x, int y, int z) const {
+    return first_node + (z + 1) * pitch_z + (y + 1) * pitch_y + x + 1;
+  }
+  Vec3 node_position(int x, int y, int z) const {
+    return origin + cell_size * Vec3(x + 0.5, y + 0.5, z + 0.5);
+  }
+  Vec3 site_position(int x, int y, int z) const {
+    return origin + 0.5 * cell_size * Vec3(x + 0.5, y + 0.5, z + 0.5);
+  }
+};
+
+/// Puts the bodies of a scene on their lattices and fills `points`, all bonds whole. Throws
+/// std::invalid_argument (a mesh that cannot be used, an anchor that holds nothing, ...).
+std::vector<LatticeBody> make_lattice_bodies(const Scene& scene, Points& points,
+                                             std::vector<std::string>* notes);
+
+/// Whether the body's anchored regions hold this place of the reference space.
+bool is_anchored(const LatticeBody& body, const Vec3& place);
+
+/// Points around lattice node (x, y, z) of `body` in the order of a 6 x 6 x 6 box, -1 where none:
+/// those whose stencils hold the node.
+void points_around(const LatticeBody& body, int x, int y, int z, std::int32_t (&around)[216]);
+
+/// Weight of node `k` (0..26: x fastest) of the point's stencil.
+float site_weight(const Points::Site& site, int k);
+
+/// The bonds of a point while the tissue is whole.
+std::uint8_t whole_bonds(const LatticeBody& body, const Points::Site& site);
+
+}  // namespace tissue_sim

@@ -1,0 +1,92 @@
+#include "mpm/mpm_state.h"
+
+#include <cmath>
+
+#include "contact/block_contact.h"
+
+namespace tissue_sim {
+
+std::unique_ptr<MpmState> make_mpm_state(const Scene& scene, std::vector<std::string>* notes) {
+  auto state = std::make_unique<MpmState>();
+  state->scene = scene;
+  state->bodies = make_lattice_bodies(scene, state->points, notes);
+  state->fields = std::make_unique<NodeFields>(state->bodies, state->points, state->nodes);
+  state->blocks = make_blocks(state->bodies, state->points, *state->fields);
+  state->force.resize(state->blocks.force_size);
+  state->contacts.with.assign(state->points.size(), 0);
+  state->contacts.hold.assign(3 * static_cast<std::size_t>(state->points.size()), 0.0f);
+  state->instructions = instruction_set();
+  state->kernels = &block_kernels(state->instructions);
+  state->cpu = std::make_unique<Cpu>(scene.threads);
+  return state;
+}
+
+BlockField block_field(const MpmState& state, const Block& block) {
+  const LatticeBody& b = state.bodies[block.body];
+  const Vec3 origin = b.node_position(block.x - 1, block.y - 1, block.z - 1);
+  BlockField f;
+  f.nodes = &state.nodes;
+  f.first_node = b.node(block.x - 1, block.y - 1, block.z - 1);
+  f.pitch_y = b.pitch_y;
+  f.pitch_z = b.pitch_z;
+  f.cell_size = static_cast<float>(b.cell_size);
+  for (int a = 0; a < 3; ++a) f.origin[a] = static_cast<float>(origin[a]);
+  f.law = b.material.law;
+  f.mu = static_cast<float>(lame_mu(b.material));
+  f.lambda = static_cast<float>(lame_lambda(b.material));
+  f.viscosity = static_cast<float>(b.material.viscosity);
+  return f;
+}
+
+void substep(MpmState& state, float dt, std::vector<ColliderLoad>& loads) {
+  Blocks& blocks = state.blocks;
+  const int block_count = static_cast<int>(blocks.all.size());
+  const std::size_t collider_count = state.colliders.size();
+  state.block_loads.resize(block_count);
+  state.cpu->for_each(block_count, [&](int i) {
+    const Block& block = *blocks.all[i];
+    float* force = state.force.data() + block.force_offset;
+    state.kernels->forces(block, block_field(state, block), state.scratch.local(), force);
+    state.block_loads[i].assign(collider_count, {});
+    add_contact(state, i, force, state.block_loads[i]);
+  });
+  for (const auto& of_block : state.block_loads) {
+    for (std::size_t c = 0; c < of_block.size(); ++c) {
+      for (int a = 0; a < 3; ++a) {
+        loads[c].force[a] += of_block[c].force[a];
+        loads[c].torque[a] += of_block[c].torque[a];
+      }
+    }
+  }
+  Nodes& n = state.nodes;
+  UpdateNode update;
+  for (int a = 0; a < 3; ++a) {
+    update.u[a] = n.u[a].data();
+    update.v[a] = n.v[a].data();
+    update.gravity[a] = static_cast<float>(state.scene.gravity[a]);
+  }
+  update.mass = n.mass.data();
+  update.inv_mass = n.inv_mass.data();
+  update.dt = dt;
+  update.keep = static_cast<float>(std::exp(-state.scene.damping * dt));
+  const int row_count = static_cast<int>(blocks.rows.size());
+  state.cpu->for_each(
+      row_count,
+      [&](int r) {
+        const NodeRow& row = blocks.rows[r];
+        state.kernels->update_row(row, blocks.row_parts.data() + row.first_part,
+                                  state.force.data(), update, state.scratch.local());
+      },
+      64);
+  const int split_count = static_cast<int>(n.size()) - blocks.first_split_node;
+  for (int i = 0; i < split_count; ++i) {
+    float f[3] = {};
+    for (int p = blocks.split_node_parts[i]; p < blocks.split_node_parts[i + 1]; ++p) {
+      const SplitNodePart& part = blocks.split_parts[p];
+      for (int a = 0; a < 3; ++a) f[a] += state.force[part.force + a * part.component];
+    }
+    update(blocks.first_split_node + i, f[0], f[1], f[2]);
+  }
+}
+
+}  // namespace tissue_sim

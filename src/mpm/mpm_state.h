@@ -1,0 +1,63 @@
+// All that the material point method keeps on the CPU, and the functions that work on it.
+#pragma once
+
+#include <tbb/enumerable_thread_specific.h>
+
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "compute/for_each.h"
+#include "contact/collider.h"
+#include "cutting/node_fields.h"
+#include "mpm/block_kernels.h"
+#include "mpm/blocks.h"
+#include "mpm/lattice_body.h"
+#include "mpm/nodes.h"
+#include "tissue_sim/tissue.h"
+
+namespace tissue_sim {
+
+/// Which collider each point touches, and where friction holds on to.
+struct Contacts {
+  std::vector<std::uint8_t> with;  ///< per point: 0, or 1 + index of the collider
+  Array<float> hold;               ///< [3 * point]: place in the collider's frame [m]
+  std::vector<std::vector<std::int32_t>> touching;  ///< per block: its points in contact
+  std::vector<std::vector<std::uint8_t>> near;      ///< per block: colliders it may meet this frame
+};
+
+/// Force and moment (about the tip, world axes) of the tissue on each collider.
+struct ColliderLoad {
+  double force[3] = {}, torque[3] = {};
+};
+
+struct MpmState {
+  Scene scene;
+  std::vector<LatticeBody> bodies;
+  Points points;
+  Nodes nodes;
+  std::unique_ptr<NodeFields> fields;
+  Blocks blocks;
+  Array<float> force;  ///< of all blocks
+  Array<float> u_before[3];  ///< displacements when the frame began, where a blade may cut [m]
+  Contacts contacts;
+  std::vector<Collider> colliders;
+  std::vector<std::vector<ColliderLoad>> block_loads;  ///< per block, per collider
+
+  const BlockKernels* kernels = nullptr;
+  InstructionSet instructions = InstructionSet::kSse2;
+  std::unique_ptr<Cpu> cpu;
+  tbb::enumerable_thread_specific<BlockScratch> scratch;
+};
+
+/// Builds the state of a valid scene at rest. Throws what make_lattice_bodies() throws.
+std::unique_ptr<MpmState> make_mpm_state(const Scene& scene, std::vector<std::string>* notes);
+
+BlockField block_field(const MpmState& state, const Block& block);
+
+/// One substep: forces of all blocks with contact at the colliders' present places, then the nodes.
+/// Adds what acts on the colliders to `loads`.
+void substep(MpmState& state, float dt, std::vector<ColliderLoad>& loads);
+
+}  // namespace tissue_sim

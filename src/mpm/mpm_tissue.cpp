@@ -1,0 +1,167 @@
+#include "mpm/mpm_tissue.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+
+#include "contact/block_contact.h"
+#include "cutting/cut_tissue.h"
+#include "tools/tool_motion.h"
+
+namespace tissue_sim {
+
+MpmTissue::MpmTissue(const Scene& scene)
+    : state_(make_mpm_state(scene, &notes_)),
+      pieces_(whole_pieces(state_->bodies, state_->points)) {
+  measure();
+}
+
+float MpmTissue::stable_substep() const {
+  double dt = 1e9;
+  for (const LatticeBody& b : state_->bodies) {
+    const Material& m = b.material;
+    const double mu = lame_mu(m), lambda = lame_lambda(m);
+    // Waves in the deformed body, in reference space: the volumetric stiffness grows with the
+    // square of the cofactor's columns.
+    const double modulus = 2 * mu + lambda * std::max(1.0f, stiffening_);
+    const double elastic = state_->scene.cfl * b.cell_size * std::sqrt(m.density / modulus);
+    // Explicit viscosity: dt^2 + 4 eta / M dt <= dt_elastic^2.
+    const double t = 2 * m.viscosity / modulus;
+    dt = std::min(dt, std::sqrt(t * t + elastic * elastic) - t);
+  }
+  return static_cast<float>(dt);
+}
+
+void MpmTissue::set_colliders(const FrameInput& input, double share, double duration) {
+  std::vector<Collider>& colliders = state_->colliders;
+  colliders.clear();
+  const Ground& ground = state_->scene.ground;
+  Collider plane;
+  plane.position[2] = static_cast<float>(ground.enabled ? ground.z : -1e6);
+  plane.friction = static_cast<float>(ground.friction);
+  colliders.push_back(plane);
+  for (std::size_t i = 0; i < input.tools.size(); ++i) {
+    const Tool& tool = state_->scene.tools[i];
+    colliders.push_back(tool_collider(tool, static_cast<int>(i), input.tools[i], share, duration));
+  }
+}
+
+/// What each collider sweeps during the frame.
+std::vector<Box> MpmTissue::collider_reach(const FrameInput& input, double duration) {
+  std::vector<Box> reach;
+  for (const double share : {0.0, 0.5, 1.0}) {
+    set_colliders(input, share, duration);
+    reach.resize(state_->colliders.size());
+    for (std::size_t c = 0; c < reach.size(); ++c) {
+      const bool absent = c > 0 && !input.tools[c - 1].present;
+      if (absent) continue;
+      const Box box = bounds(state_->colliders[c]);
+      reach[c].min = reach[c].min.cwiseMin(box.min);
+      reach[c].max = reach[c].max.cwiseMax(box.max);
+    }
+  }
+  return reach;
+}
+
+void MpmTissue::cut(Span<const BladePath> paths, const Array<float>* before, CutReport& report) {
+  std::vector<std::int32_t> changed;
+  for (const BladePath& path : paths) {
+    sweep_bonds(*state_, path, before, state_->nodes.u, changed, report);
+  }
+  if (changed.empty()) return;
+  take_apart(*state_, changed);
+  report.new_fragments = update_pieces(state_->bodies, state_->points, pieces_);
+}
+
+void MpmTissue::advance(int substeps, float dt, const FrameInput& input) {
+  MpmState& s = *state_;
+  result_ = {};
+  result_.loads.resize(s.scene.tools.size());
+  for (const BladePath& path : input.cuts) {
+    result_.cut_reports.emplace_back();
+    cut({&path, 1}, s.nodes.u, result_.cut_reports.back());
+  }
+  std::vector<BladePath> blades;
+  for (std::size_t i = 0; i < input.tools.size(); ++i) {
+    if (input.tools[i].present && s.scene.tools[i].type == ToolType::kScalpel) {
+      blades.push_back(blade_path(s.scene.tools[i], input.tools[i]));
+    }
+  }
+  if (!blades.empty()) {
+    for (int a = 0; a < 3; ++a) s.u_before[a] = s.nodes.u[a];
+  }
+  const double duration = static_cast<double>(substeps) * dt;
+  find_near_colliders(s, collider_reach(input, duration), duration);
+  for (int i = 0; i < substeps; ++i) {
+    set_colliders(input, (i + 1.0) / substeps, duration);
+    std::vector<ColliderLoad> loads(s.colliders.size());
+    substep(s, dt, loads);
+    for (std::size_t c = 1; c < loads.size(); ++c) {
+      ToolLoad& load = result_.loads[c - 1];
+      const Vec3 force(loads[c].force[0], loads[c].force[1], loads[c].force[2]);
+      load.mean.force += force / substeps;
+      load.mean.torque +=
+          Vec3(loads[c].torque[0], loads[c].torque[1], loads[c].torque[2]) / substeps;
+      load.peak_force = std::max(load.peak_force, force.norm());
+    }
+  }
+  cut(blades, s.u_before, result_.blade_report);
+}
+
+void MpmTissue::measure() {
+  MpmState& s = *state_;
+  const int count = static_cast<int>(s.blocks.all.size());
+  std::vector<BlockState> states(count);
+  s.cpu->for_each(count, [&](int i) {
+    const Block& block = *s.blocks.all[i];
+    states[i] = s.kernels->state(block, block_field(s, block), s.scratch.local(), nullptr);
+  });
+  stiffening_ = 1;
+  for (const BlockState& b : states) {
+    result_.elastic_energy += b.elastic_energy;
+    stiffening_ = std::max(stiffening_, b.stiffening);
+    result_.blew_up = result_.blew_up || !b.finite;
+  }
+  double v2_max = 0;
+  for (std::size_t i = 0; i < s.nodes.size(); ++i) {
+    const double v2 = Vec3(s.nodes.v[0][i], s.nodes.v[1][i], s.nodes.v[2][i]).squaredNorm();
+    result_.kinetic_energy += 0.5 * s.nodes.mass[i] * v2;
+    if (!(v2 <= v2_max)) v2_max = v2;
+  }
+  result_.max_speed = std::sqrt(v2_max);
+  // Nothing that instruments do moves tissue at the speed of a bullet; what does is out of control.
+  result_.blew_up = result_.blew_up || !(result_.max_speed < 300) || stiffening_ > 1e6f;
+}
+
+FrameResult MpmTissue::finish() {
+  measure();
+  return result_;
+}
+
+std::uint64_t MpmTissue::checksum() const {
+  std::uint64_t hash = 0xcbf29ce484222325u;  // FNV-1a, over words and the bytes that are left
+  const auto add = [&hash](const auto& array) {
+    const auto* bytes = reinterpret_cast<const unsigned char*>(array.data());
+    const std::size_t size = array.size() * sizeof(array[0]);
+    for (std::size_t i = 0; i + 4 <= size; i += 4) {
+      std::uint32_t word;
+      std::memcpy(&word, bytes + i, 4);
+      hash = (hash ^ word) * 0x100000001b3u;
+    }
+    for (std::size_t i = size / 4 * 4; i < size; ++i) hash = (hash ^ bytes[i]) * 0x100000001b3u;
+  };
+  for (int a = 0; a < 3; ++a) {
+    add(state_->nodes.u[a]);
+    add(state_->nodes.v[a]);
+  }
+  add(state_->points.bonds);
+  add(pieces_.of_point);
+  return hash;
+}
+
+std::string MpmTissue::device_name() const {
+  return std::string("cpu (") + name(state_->instructions) + ", " +
+         std::to_string(state_->cpu->threads()) + " threads)";
+}
+
+}  // namespace tissue_sim

@@ -1,0 +1,41 @@
+// Tissue by the material point method in total Lagrangian form, on the CPU.
+#pragma once
+
+#include <memory>
+
+#include "fragments/pieces.h"
+#include "mpm/mpm_state.h"
+#include "tissue_sim/tissue.h"
+
+namespace tissue_sim {
+
+class MpmTissue final : public Tissue {
+ public:
+  explicit MpmTissue(const Scene& scene);
+
+  float stable_substep() const override;
+  void advance(int substeps, float dt, const FrameInput& input) override;
+  FrameResult finish() override;
+  int point_count() const override { return state_->points.size(); }
+  int read_points(const PointSelection& selection, std::vector<std::uint8_t>& cloud) override;
+  Span<const Fragment> fragments() const override { return pieces_.all; }
+  std::uint64_t checksum() const override;
+  std::string device_name() const override;
+  const std::vector<std::string>& notes() const override { return notes_; }
+
+  MpmState& state() { return *state_; }  ///< for tests and the benchmark
+
+ private:
+  void set_colliders(const FrameInput& input, double share, double duration);
+  std::vector<Box> collider_reach(const FrameInput& input, double duration);
+  void cut(Span<const BladePath> paths, const Array<float>* before, CutReport& report);
+  void measure();
+
+  std::vector<std::string> notes_;
+  std::unique_ptr<MpmState> state_;
+  Pieces pieces_;
+  float stiffening_ = 1;
+  FrameResult result_;
+};
+
+}  // namespace tissue_sim

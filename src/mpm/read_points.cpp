@@ -1,0 +1,69 @@
+// What the tissue shows: clouds and the pieces' motion.
+#include <algorithm>
+#include <cstring>
+
+#include "cutting/bonds.h"
+#include "mpm/mpm_tissue.h"
+
+namespace tissue_sim {
+namespace {
+
+/// Colours of loose pieces (Okabe and Ito's), and of tissue that is not.
+std::uint32_t colour(const Fragment& f) {
+  static constexpr std::uint32_t kPiece[] = {0xe69f00, 0x56b4e9, 0x009e73, 0xf0e442,
+                                             0x0072b2, 0xd55e00, 0xcc79a7};
+  return f.loose ? kPiece[f.id % 7] : 0xa8433a;
+}
+
+}  // namespace
+
+int MpmTissue::read_points(const PointSelection& selection, std::vector<std::uint8_t>& cloud) {
+  MpmState& s = *state_;
+  std::vector<const Fragment*> piece(pieces_.next_id, nullptr);
+  for (const Fragment& f : pieces_.all) piece[f.id] = &f;
+  // Where each selected point goes.
+  std::vector<std::int32_t> index(s.points.size(), -1);
+  const int stride = std::max(1, selection.stride);
+  int count = 0;
+  for (std::int32_t p = 0; p < s.points.size(); p += stride) {
+    if (selection.surface_only && s.points.bonds[p] == kAllBonds) continue;
+    if (selection.loose_only && !piece[pieces_.of_point[p]]->loose) continue;
+    index[p] = count++;
+  }
+  cloud.resize(static_cast<std::size_t>(count) * sizeof(Point));
+  s.cpu->for_each(static_cast<int>(s.blocks.all.size()), [&](int i) {
+    const Block& block = *s.blocks.all[i];
+    const auto wanted = [&index](std::int32_t p) { return p >= 0 && index[p] >= 0; };
+    if (std::none_of(block.point.begin(), block.point.end(), wanted)) return;
+    const LatticeBody& body = s.bodies[block.body];
+    BlockScratch& scratch = s.scratch.local();
+    const std::size_t lanes = block.lane_count();
+    if (scratch.values.size() < 4 * lanes) scratch.values.resize(4 * lanes);
+    float* x = scratch.values.data();
+    float* stress = x + 3 * lanes;
+    const BlockField field = block_field(s, block);
+    s.kernels->positions(block, field, s.nodes.u, scratch, x);
+    s.kernels->state(block, field, scratch, stress);
+    for (std::size_t lane = 0; lane < lanes; ++lane) {
+      const std::int32_t p = block.point[lane];
+      if (!wanted(p)) continue;
+      const Fragment& f = *piece[pieces_.of_point[p]];
+      Point out;
+      out.x = x[lane];
+      out.y = x[lanes + lane];
+      out.z = x[2 * lanes + lane];
+      out.rgb = colour(f);
+      out.id = static_cast<std::uint32_t>(p);
+      out.fragment = f.id;
+      out.stress = stress[lane];
+      const int whole = __builtin_popcount(whole_bonds(body, s.points.site[p]));
+      const int left = __builtin_popcount(s.points.bonds[p]);
+      out.damage = whole > 0 ? 1.0f - static_cast<float>(left) / whole : 0.0f;
+      std::memcpy(cloud.data() + static_cast<std::size_t>(index[p]) * sizeof(Point), &out,
+                  sizeof(Point));
+    }
+  });
+  return count;
+}
+
+}  // namespace tissue_sim

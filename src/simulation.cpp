@@ -1,0 +1,133 @@
+#include "tissue_sim/simulation.h"
+
+#include <chrono>
+#include <cmath>
+#include <stdexcept>
+#include <utility>
+
+namespace tissue_sim {
+namespace {
+
+void check(const Pose& pose, const std::string& what) {
+  if (!pose.position.allFinite() || !pose.orientation.coeffs().allFinite()) {
+    throw std::invalid_argument(what + " is not finite");
+  }
+  if (std::fabs(pose.orientation.norm() - 1) > 1e-3) {
+    throw std::invalid_argument(what + " has a quaternion of norm " +
+                                std::to_string(pose.orientation.norm()) +
+                                ": it must be 1, or it is no rotation");
+  }
+}
+
+void check(const BladePath& path) {
+  if (path.poses.size() < 2) {
+    throw std::invalid_argument("a cut needs at least 2 poses, got " +
+                                std::to_string(path.poses.size()));
+  }
+  if (path.edge.size() < 2) {
+    throw std::invalid_argument("a blade's edge needs at least 2 points, got " +
+                                std::to_string(path.edge.size()));
+  }
+  for (const Vec3& x : path.edge) {
+    if (!x.allFinite()) throw std::invalid_argument("a point of the blade's edge is not finite");
+  }
+  for (const Pose& pose : path.poses) check(pose, "a pose of the blade");
+}
+
+}  // namespace
+
+struct Simulation::State {
+  Scene scene;
+  std::unique_ptr<Tissue> tissue;
+  std::int64_t frame = 0;
+  std::vector<ToolMotion> tools;   // as they stand after the last frame, then as set for the next
+  std::vector<BladePath> cuts;
+  double wave_speed = 0;
+  bool blew_up = false;
+};
+
+Simulation::Simulation(const Scene& scene) : state_(std::make_unique<State>()) {
+  validate(scene);
+  state_->scene = scene;
+  state_->tissue = make_tissue(scene);
+  state_->tools.resize(scene.tools.size());
+  for (const Body& b : scene.bodies) {
+    state_->wave_speed =
+        std::max(state_->wave_speed, tissue_sim::wave_speed(find_material(scene, b.material)));
+  }
+}
+
+Simulation::~Simulation() = default;
+
+const Scene& Simulation::scene() const { return state_->scene; }
+Tissue& Simulation::tissue() { return *state_->tissue; }
+std::int64_t Simulation::frame() const { return state_->frame; }
+double Simulation::time() const { return state_->frame / state_->scene.frame_rate; }
+
+void Simulation::set_tool(int tool, const Pose& pose, double jaw) {
+  if (tool < 0 || tool >= static_cast<int>(state_->tools.size())) {
+    throw std::invalid_argument("tool " + std::to_string(tool) + " is not in the scene, which has " +
+                                std::to_string(state_->tools.size()));
+  }
+  check(pose, "the pose of tool '" + state_->scene.tools[tool].name + "'");
+  if (!std::isfinite(jaw)) throw std::invalid_argument("the jaw angle is not finite");
+  ToolMotion& m = state_->tools[tool];
+  m.end = {pose.position, pose.orientation.normalized()};
+  m.jaw_end = static_cast<float>(jaw);
+  if (!m.present) {
+    m.begin = m.end;
+    m.jaw_begin = m.jaw_end;
+    m.present = true;
+  }
+}
+
+void Simulation::cut(const BladePath& path) {
+  check(path);
+  state_->cuts.push_back(path);
+  for (Pose& pose : state_->cuts.back().poses) pose.orientation.normalize();
+}
+
+void Simulation::apply(const AppliedInput& input) {
+  if (input.tools.size() != state_->tools.size()) {
+    throw std::invalid_argument("the input moves " + std::to_string(input.tools.size()) +
+                                " tools, the scene has " + std::to_string(state_->tools.size()));
+  }
+  for (const ToolMotion& m : input.tools) {
+    if (!m.present) continue;
+    check(m.begin, "a tool's pose");
+    check(m.end, "a tool's pose");
+  }
+  for (const BladePath& path : input.cuts) check(path);
+  state_->tools = input.tools;
+  state_->cuts = input.cuts;
+}
+
+FrameReport Simulation::advance_frame() {
+  State& s = *state_;
+  if (s.blew_up) {
+    throw std::runtime_error("the simulation blew up and cannot go on: reset it");
+  }
+  const auto start = std::chrono::steady_clock::now();
+  FrameReport report;
+  report.input.frame = s.frame;
+  report.input.tools = s.tools;
+  report.input.cuts = std::exchange(s.cuts, {});
+  const double frame_time = 1.0 / s.scene.frame_rate;
+  report.substeps = static_cast<int>(std::ceil(frame_time / s.tissue->stable_substep()));
+  report.substep = frame_time / report.substeps;
+  report.cfl = report.substep * s.wave_speed / s.scene.cell_size;
+  s.tissue->advance(report.substeps, static_cast<float>(report.substep),
+                    {report.input.tools, report.input.cuts});
+  report.result = s.tissue->finish();
+  s.blew_up = report.result.blew_up;
+  for (ToolMotion& m : s.tools) {
+    m.begin = m.end;
+    m.jaw_begin = m.jaw_end;
+  }
+  ++s.frame;
+  report.compute_time =
+      std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  return report;
+}
+
+}  // namespace tissue_sim

@@ -127,8 +127,8 @@ Tool read_tool(const YAML::Node& node, const std::string& path) {
 
 Scene read_scene(const YAML::Node& node) {
   const YamlFields fields(node, "",
-                          {"name", "method", "device", "threads", "cell_size", "frame_rate", "cfl", "damping",
-                           "gravity", "seed", "ground", "materials", "bodies", "tools"});
+                          {"name", "method", "device", "threads", "cell_size", "frame_rate", "cfl",
+                           "damping", "gravity", "seed", "ground", "materials", "bodies", "tools"});
   Scene scene;
   fields.read("name", scene.name);
   fields.read("method", scene.method, kMethodNames);

@@ -240,7 +240,7 @@ TEST(Lattice, HasTheSameBitsForAnyNumberOfThreads) {
     arena.execute([&] { lattice = make_lattice(body, 0.002, nullptr); });
     return lattice;
   };
-  const Lattice a = run(1), b = run(4);
+  const Lattice a = run(1), b = run(2);
   ASSERT_EQ(a.sites.size(), b.sites.size());
   EXPECT_EQ(std::memcmp(a.sites.data(), b.sites.data(), a.sites.size() * sizeof(Lattice::Site)), 0);
 }

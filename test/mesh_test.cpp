@@ -3,7 +3,6 @@
 
 #include <gtest/gtest.h>
 
-#include <cstdlib>
 #include <functional>
 
 #include "temporary_folder.h"
@@ -48,26 +47,6 @@ Repaired repaired(TriangleMesh mesh) {
   return result;
 }
 
-/// Sets an environment variable for the time of a test.
-class Variable {
- public:
-  Variable(const char* name, const std::string& value) : name_(name) {
-    if (const char* old = std::getenv(name)) old_ = old;
-    setenv(name, value.c_str(), 1);
-  }
-  ~Variable() {
-    if (old_.empty()) {
-      unsetenv(name_);
-    } else {
-      setenv(name_, old_.c_str(), 1);
-    }
-  }
-
- private:
-  const char* name_;
-  std::string old_;
-};
-
 TEST(MeshFile, IsReadInAllFormatsWithVerticesMerged) {
   const TemporaryFolder folder;
   const TriangleMesh box = box_mesh(kLow, kHigh);
@@ -105,42 +84,6 @@ TEST(MeshFile, IsNamedByItsFullPathWhenMissing) {
   const std::string reason = reason_of([] { load_solid(mesh_body("nowhere/a.stl"), nullptr); });
   EXPECT_TRUE(contains(reason, std::filesystem::current_path().string() + "/nowhere/a.stl"))
       << reason;
-}
-
-TEST(MeshAddress, PlainAndFile) {
-  EXPECT_EQ(resolve_mesh_path("/a/b c.stl"), "/a/b c.stl");
-  EXPECT_EQ(resolve_mesh_path("b%20c.stl"), "b%20c.stl");
-  EXPECT_EQ(resolve_mesh_path("file:///a/b%20c.stl"), "/a/b c.stl");
-  EXPECT_TRUE(contains(reason_of([] { resolve_mesh_path(""); }), "names no file"));
-  EXPECT_TRUE(
-      contains(reason_of([] { resolve_mesh_path("http://a/b.stl"); }), "cannot be fetched"));
-}
-
-TEST(MeshAddress, PackagesAreFoundOnTheRosPackagePath) {
-  const TemporaryFolder folder;
-  const std::string xml = "<package><name> organs </name></package>";
-  folder.write("src/repository/organs_folder/package.xml", xml);  // the name counts, not the folder
-  const std::string found = folder.path() + "/src/repository/organs_folder/meshes/a.stl";
-  {
-    const Variable path("ROS_PACKAGE_PATH", "/not/there:" + folder.path() + "/src");
-    EXPECT_EQ(resolve_mesh_path("package://organs/meshes/a.stl"), found);
-  }
-  {
-    const Variable path("ROS_PACKAGE_PATH", folder.path() + "/src/repository/organs_folder");
-    EXPECT_EQ(resolve_mesh_path("package://organs/meshes/a.stl"), found);
-    const std::string reason = reason_of([] { resolve_mesh_path("package://other/a.stl"); });
-    EXPECT_TRUE(contains(reason, "package other")) << reason;
-    EXPECT_TRUE(contains(reason, "ROS_PACKAGE_PATH (" + folder.path())) << reason;
-  }
-  EXPECT_TRUE(contains(reason_of([] { resolve_mesh_path("package://organs"); }), "names no file"));
-}
-
-TEST(MeshAddress, InstalledPackagesAreFoundOnTheCmakePrefixPath) {
-  const TemporaryFolder folder;
-  folder.write("share/organs/package.xml", "");
-  const Variable ros("ROS_PACKAGE_PATH", "");
-  const Variable cmake("CMAKE_PREFIX_PATH", "/not/there:" + folder.path());
-  EXPECT_EQ(resolve_mesh_path("package://organs/a.stl"), folder.path() + "/share/organs/a.stl");
 }
 
 TEST(MakeSolid, LeavesASoundMeshAlone) {

@@ -1,0 +1,186 @@
+// A scene's YAML form: read, written, refused.
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "temporary_folder.h"
+#include "test_scenes.h"
+#include "tissue_sim/scene.h"
+
+namespace tissue_sim {
+namespace {
+
+std::string reason_of_yaml(const std::string& yaml) {
+  return reason_of([&] { scene_from_yaml(yaml); });
+}
+
+TEST(SceneYaml, ComesBackAsItWasWritten) {
+  const Scene s = full_scene();
+  const std::string yaml = scene_to_yaml(s);
+  const Scene r = scene_from_yaml(yaml);
+  EXPECT_EQ(scene_to_yaml(r), yaml);
+  Scene copy = s, back = r;
+  for (const NumberCase& c : number_cases()) EXPECT_EQ(c.value(copy), c.value(back)) << c.field;
+  EXPECT_EQ(r.seed, s.seed);
+  EXPECT_EQ(r.threads, 3);
+  EXPECT_EQ(r.device, Device::kCuda);
+  EXPECT_FALSE(r.ground.enabled);
+  EXPECT_EQ(r.materials[1].law, Law::kNeoHookean);
+  EXPECT_EQ(r.materials[1].name, s.materials[1].name);
+  EXPECT_EQ(r.bodies[4].mesh, s.bodies[4].mesh);
+  EXPECT_EQ(r.bodies[0].pose.orientation.coeffs(), s.bodies[0].pose.orientation.coeffs());
+  EXPECT_EQ(r.bodies[0].pose.position, s.bodies[0].pose.position);
+  EXPECT_EQ(r.bodies[0].size, s.bodies[0].size);
+  EXPECT_EQ(r.bodies[0].anchors[1].kind, Region::Kind::kBox);
+  EXPECT_EQ(r.bodies[0].anchors[1].min, s.bodies[0].anchors[1].min);
+  EXPECT_EQ(r.tools[0].type, ToolType::kScalpel);
+}
+
+TEST(SceneYaml, KeepsTheBitsOfOrientations) {
+  Scene s;
+  s.bodies.resize(1);
+  for (int i = 1; i <= 200; ++i) {
+    Quat& q = s.bodies[0].pose.orientation;
+    q = Quat(std::sin(i), std::cos(2 * i), std::sin(3 * i), std::cos(5 * i)).normalized();
+    ASSERT_EQ(scene_from_yaml(scene_to_yaml(s)).bodies[0].pose.orientation.coeffs(), q.coeffs());
+  }
+}
+
+TEST(SceneYaml, KeepsNamesThatLookLikeSomethingElse) {
+  for (const char* name :
+       {"null", "true", "12", "1e3", "~", "a: b", "# c", "- d", "\"q\"", " e "}) {
+    Scene s = full_scene();
+    s.name = name;
+    EXPECT_EQ(scene_from_yaml(scene_to_yaml(s)).name, name);
+  }
+}
+
+TEST(SceneYaml, WritesOnlyTheFieldsOfTheShape) {
+  Scene s;
+  s.bodies.resize(1);
+  s.bodies[0].shape = Shape::kBall;
+  const std::string yaml = scene_to_yaml(s);
+  EXPECT_NE(yaml.find("radius"), std::string::npos);
+  for (const char* field : {" size:", " height:", " mesh:", " scale:", " radii:"}) {
+    EXPECT_EQ(yaml.find(field), std::string::npos) << field;
+  }
+}
+
+TEST(SceneYaml, FillsInDefaults) {
+  const Scene s = scene_from_yaml("bodies: [{}]");
+  EXPECT_EQ(s.cell_size, 0.003);
+  EXPECT_EQ(s.bodies.at(0).shape, Shape::kBox);
+  EXPECT_EQ(s.bodies[0].material, "liver");
+}
+
+TEST(SceneYaml, ReadsOrientationsAsRosWritesThem) {
+  const Scene s = scene_from_yaml(
+      "bodies: [{pose: {orientation: [0, 0.0, 0.70711, 0.70711]}, anchors: [{below: 0.25}]}]");
+  const Quat& q = s.bodies[0].pose.orientation;
+  EXPECT_NEAR(q.norm(), 1, 1e-15);
+  EXPECT_LT((q * Vec3::UnitX() - Vec3::UnitY()).norm(), 1e-4);
+  EXPECT_EQ(s.bodies[0].anchors[0].kind, Region::Kind::kBelow);
+  EXPECT_EQ(s.bodies[0].anchors[0].z, 0.25);
+}
+
+TEST(SceneYaml, NamesWhatItRefuses) {
+  const std::pair<const char*, const char*> cases[] = {
+      {"colour: red\nbodies: [{}]", "colour is red: unknown field, known here are name, method, "},
+      {"bodies: [{colour: red}]", "bodies[0].colour is red: unknown field"},
+      {"bodies: [{}]\ntools: [{size: 1}]", "tools[0].size is 1: unknown field"},
+      {"bodies: [{}]\nground: {y: 1}", "ground.y is 1: unknown field"},
+      {"bodies: [{pose: {xyz: [1, 2, 3]}}]", "bodies[0].pose.xyz is [1, 2, 3]: unknown field"},
+      {"materials: [{name: a, young: 1}]", "materials[0].young is 1: unknown field"},
+      {"materials: [{young_modulus: 1}]", "materials[0].name is missing: "},
+      {"bodies: [{anchors: [{above: 1}]}]", "bodies[0].anchors[0].above is 1: unknown field"},
+      {"bodies: [{anchors: [{}]}]", "bodies[0].anchors[0] is a map of 0 fields: must be one of"},
+      {"bodies: [{anchors: [{below: 1, ball: {center: [0, 0, 0], radius: 1}}]}]",
+       "bodies[0].anchors[0] is a map of 2 fields: must be one of"},
+      {"bodies: [{anchors: [{ball: {center: [0, 0, 0]}}]}]",
+       "bodies[0].anchors[0].ball.radius is missing: "},
+      {"bodies: [{anchors: [{box: {min: [0, 0, 0]}}]}]",
+       "bodies[0].anchors[0].box.max is missing: "},
+      {"bodies: [{shape: ball, height: 0.1}]", "bodies[0].height is 0.1: a ball has no height"},
+      {"bodies: [{shape: ellipsoid, size: [1, 1, 1]}]",
+       "bodies[0].size is [1, 1, 1]: an ellipsoid has no size"},
+      {"bodies: [{radius: 0.1}]", "bodies[0].radius is 0.1: a box has no radius"},
+      {"bodies: [{shape: mesh, mesh: a.stl, radii: 1}]",
+       "bodies[0].radii is 1: a mesh has no radii"},
+      {"bodies: [{shape: cylinder, scale: 1}]", "bodies[0].scale is 1: a cylinder has no scale"},
+      {"bodies: [{}]\ntools: [{type: scalpel, length: 1}]",
+       "tools[0].length is 1: a scalpel has no length"},
+      {"bodies: [{}]\ntools: [{blade_width: 1}]",
+       "tools[0].blade_width is 1: a probe has no blade"},
+      {"bodies: [{shape: cube}]", "bodies[0].shape is cube: must be one of box, ball, ellipsoid, "},
+      {"device: gpu", "device is gpu: must be one of auto, cpu, cuda"},
+      {"method: fem", "method is fem: must be one of mpm"},
+      {"materials: [{name: a, law: hooke}]",
+       "materials[0].law is hooke: must be one of fixed_corotated, neo_hookean"},
+      {"tools: [{type: saw}]", "tools[0].type is saw: must be one of scalpel, probe"},
+      {"cell_size: small", "cell_size is small: must be a number"},
+      {"cell_size: 0,003", "cell_size is 0,003: must be a number"},
+      {"cell_size: 3 mm", "cell_size is 3 mm: must be a number"},
+      {"cell_size: \"0.003\"", "cell_size is \"0.003\": must be a number"},
+      {"cell_size: [0.003]", "cell_size is [0.003]: must be a number"},
+      {"cell_size:", "cell_size is empty: must be a number"},
+      {"cfl: .nan\nbodies: [{}]", "cfl is .nan: must lie between 0.05 and 0.9"},
+      {"frame_rate: .inf\nbodies: [{}]", "frame_rate is .inf: must lie between"},
+      {"threads: 1.5", "threads is 1.5: must be a whole number"},
+      {"threads: 99999999999", "threads is 99999999999: must be a whole number"},
+      {"seed: -1", "seed is -1: must be a whole number between 0"},
+      {"ground: {enabled: 1}", "ground.enabled is 1: must be true or false"},
+      {"ground: 3", "ground is 3: must be a map of the fields enabled, z, friction"},
+      {"gravity: -9.81", "gravity is -9.81: must be three numbers"},
+      {"gravity: [0, 0]", "gravity is [0, 0]: must be three numbers"},
+      {"gravity: [0, 0, down]", "gravity is [0, 0, down]: must be three numbers"},
+      {"name: [a]", "name is [a]: must be a text"},
+      {"bodies: 3", "bodies is 3: must be a list"},
+      {"tools:", "tools is empty: must be a list"},
+      {"bodies: [3]", "bodies[0] is 3: must be a map"},
+      {"bodies: [{pose: {orientation: [0, 0, 0, 2]}}]",
+       "bodies[0].pose.orientation is [0, 0, 0, 2]: must be a unit quaternion"},
+      {"bodies: [{pose: {orientation: [0, 0, 1]}}]",
+       "bodies[0].pose.orientation is [0, 0, 1]: must be four numbers"},
+      {"bodies: [{shape: mesh}]", "bodies[0].mesh is \"\": must be the path"},
+      {"bodies: [{size: [0, 0.1, 0.1]}]",
+       "bodies[0].size is [0, 0.1, 0.1]: each edge must lie between 0.0001 and 10 m"},
+      {"cfl: 0.5\ncfl: 0.6", "cfl is given twice"},
+      {"name: a", "bodies is empty: a scene needs at least one body"},
+      {"", "the scene is empty: must be a map"},
+      {"- a", "the scene is [a]: must be a map"},
+      {"a: [", "the scene is no valid YAML: "},
+  };
+  for (const auto& c : cases) {
+    const std::string reason = reason_of_yaml(c.first);
+    EXPECT_EQ(reason.rfind(c.second, 0), 0u) << c.first << "\n" << reason;
+  }
+}
+
+TEST(LoadScene, PutsThePathInFront) {
+  const TemporaryFolder folder;
+  const std::string path = folder.write("scene.yaml", "cfl: 7\nbodies: [{}]");
+  EXPECT_EQ(reason_of([&] { load_scene(path); }),
+            path + ": cfl is 7: must lie between 0.05 and 0.9");
+  EXPECT_EQ(reason_of([&] { load_scene(path + ".not"); }).rfind(path + ".not: no such file", 0),
+            0u);
+  EXPECT_EQ(reason_of([&] { load_scene(folder.path()); }).rfind(folder.path() + ": is a folder", 0),
+            0u);
+  EXPECT_NE(reason_of([&] { load_scene(folder.write("empty.yaml", "")); }).find("is empty"),
+            std::string::npos);
+}
+
+TEST(LoadScene, TakesMeshPathsRelativeToTheFile) {
+  const TemporaryFolder folder;
+  const std::string path =
+      folder.write("scene.yaml",
+                   "bodies:\n- {name: a, shape: mesh, mesh: ./liver.stl}\n"
+                   "- {name: b, shape: mesh, mesh: /x/liver.stl}\n"
+                   "- {name: c, shape: mesh, mesh: 'package://p/liver.stl'}\n");
+  const Scene s = load_scene(path);
+  EXPECT_EQ(s.bodies[0].mesh, folder.path() + "/liver.stl");
+  EXPECT_EQ(s.bodies[1].mesh, "/x/liver.stl");
+  EXPECT_EQ(s.bodies[2].mesh, "package://p/liver.stl");
+}
+
+}  // namespace
+}  // namespace tissue_sim

@@ -30,7 +30,7 @@ def studio(direction):
     x, y = x / np.maximum(up, 0.05), y / np.maximum(up, 0.05)
     window = box(x, -0.9, 0.15, 1.0) * box(y, 1.7, 0.1, 0.75)
     above = box(x, -0.55, 0.85, 0.2) * box(y, -0.55, 0.55, 0.15)
-    return room + (2.6 * above + 1.4 * window) * smoothstep(0.05, 0.3, up)
+    return room + (2.6 * above + 0.95 * window) * smoothstep(0.05, 0.3, up)
 
 
 def box(x, middle, half, blur_width):
@@ -99,21 +99,21 @@ class Noise:
 
 def shade_tissue(x, normal, view, color, wet, lit, open_sky, noise):
     """Moist tissue: soft terminator with red in it, a film of liquid that mirrors the studio."""
-    rough = noise(x, 0.0034) * 0.035 + noise(x, 0.0011) * 0.030
+    rough = noise(x, 0.0038) * 0.028 + noise(x, 0.0013) * 0.017
     film = normalized(normal + rough * wet).astype(np.float32)
     wrap = np.array([0.34, 0.14, 0.10], np.float32)
     blotch = noise(x, 0.0055)[:, :1] * 0.6 + noise(x, 0.0019)[:, 1:2] * 0.4
     color = color * np.clip(1 + 0.17 * blotch, 0.5, 1.6)
     result = np.zeros_like(color)
-    for light, strength, shadow in ((KEY, KEY_COLOR, lit), (FILL, FILL_COLOR, open_sky),
-                                    (RIM, RIM_COLOR, open_sky)):
+    for light, strength, shadow, shine in ((KEY, KEY_COLOR, lit, 1), (FILL, FILL_COLOR, open_sky, 1),
+                                           (RIM, RIM_COLOR, open_sky, 0.25)):
         c = dot(normal, light)[:, None]
         diffuse = np.clip((c + wrap) / (1 + wrap), 0, 1) ** 1.2
         soft = np.clip(shadow[:, None] + wrap * 0.25 * (1 - shadow[:, None]), 0, 1)
         result += color * diffuse * soft * strength / np.pi
         gloss = (0.05 * highlight(film, view, light, 0.24) +
                  0.035 * highlight(film, view, light, 0.5))
-        result += (wet * gloss * shadow)[:, None] * strength
+        result += (shine * wet * gloss * shadow)[:, None] * strength
     up = 0.5 + 0.5 * normal[:, 2:3]
     result += color * (SKY * up + FLOOR * (1 - up)) * open_sky[:, None] * 0.75
     mirrored = 2 * dot(film, view)[:, None] * film - view
@@ -130,7 +130,8 @@ def shade_metal(normal, view, color, metal, lit):
     up = 0.5 + 0.5 * normal[:, 2:3]
     key = np.clip(dot(normal, KEY), 0, 1) * lit
     diffuse = color * (1 - 0.75 * metal) * (SKY * up + FLOOR * (1 - up) + key[:, None] * KEY_COLOR / 2)
-    shine = tint * (share * studio(mirrored))[:, None]
+    below = 0.30 * smoothstep(0.15, -0.35, mirrored[:, 2])
+    shine = tint * (share * (studio(mirrored) + below))[:, None]
     return diffuse + shine + (0.4 * lit * highlight(normal, view, KEY, 0.32))[:, None] * tint
 
 

@@ -73,7 +73,7 @@ class Buffer:
         x, y = cols + np.float32(0.5), rows + np.float32(0.5)
         (ax, ay, az), (bx, by, bz), (cx, cy, cz) = (p[:, k].T[:, :, None, None] for k in range(3))
         area = (bx - ax) * (cy - ay) - (by - ay) * (cx - ax)
-        area = np.where(np.abs(area) < 1e-9, np.inf, area)
+        area = np.where(np.abs(area) < 1e-9, np.nan, area)  # a line: nothing is inside
         u = ((x - ax) * (cy - ay) - (y - ay) * (cx - ax)) / area
         v = ((bx - ax) * (y - ay) - (by - ay) * (x - ax)) / area
         inside = ((u >= 0) & (v >= 0) & (u + v <= 1) & (cols < hi[:, 0, None, None]) &

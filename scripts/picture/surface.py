@@ -145,21 +145,23 @@ def vertex_normals(vertices, triangles):
     return total / (np.linalg.norm(total, axis=1, keepdims=True) + 1e-20)
 
 
-def tissue_surface(points, values, spacing, smoothing):
+def tissue_surface(points, weights, values, spacing, smoothing):
     """The surface of one piece: (vertices, triangles, normals, values at the vertices).
 
-    points (n, 3) [m]; values (n, k): what the points carry, to be had at the surface; `smoothing`
+    points (n, 3) [m]; weights (n,): 1, less where it is to have a furrow; values (n, k): what the points carry, to be had at the surface; `smoothing`
     of those values gives the rounds in which the surface is evened out."""
     h = spacing / 2
     margin = 2.5 * spacing
-    density = deposit(points, np.ones(len(points)), h, margin)
+    density = deposit(points, weights, h, margin)
     spread = 1.15
     density.values = blur(density.values, spread)
     inside = np.percentile(density.sample(points), 70)
+    share = deposit(points, np.ones(len(points)), h, margin)
+    share = np.maximum(blur(share.values, spread), 1e-3 * inside)
     carried = []
     for k in range(values.shape[1]):
         field = deposit(points, values[:, k], h, margin)
-        field.values = blur(field.values, spread) / np.maximum(density.values, 1e-3 * inside)
+        field.values = blur(field.values, spread) / share
         carried.append(field)
     density.values /= inside
     vertices, triangles = half_density_surface(density)

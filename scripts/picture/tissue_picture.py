@@ -20,6 +20,14 @@ def linear(srgb):
     return np.where(srgb <= 0.04045, srgb / 12.92, ((srgb + 0.055) / 1.055) ** 2.4)
 
 
+def stress_colors(share):
+    """sRGB of a stress, as a share of the scale's end: from liver to white heat."""
+    stops = np.array([[0.30, 0.07, 0.10], [0.62, 0.10, 0.12], [0.93, 0.38, 0.10],
+                      [1.00, 0.76, 0.22], [1.00, 0.98, 0.80]])
+    at = np.linspace(0, 1, len(stops))
+    return np.stack([np.interp(share, at, stops[:, k]) for k in range(3)], -1)
+
+
 class Moment:
     """What there is to be seen at one time.
 
@@ -31,7 +39,7 @@ class Moment:
         self.x = np.stack([points["x"], points["y"], points["z"]], 1).astype(float)
 
 
-def camera_for(boxes, size, azimuth=-62.0, elevation=27.0, room=1.0):
+def camera_for(boxes, size, azimuth=-80.0, elevation=31.0, room=1.0):
     """A camera that sees all the boxes [(min, max)] from azimuth and elevation [deg]."""
     lo = np.min([b[0] for b in boxes], 0)
     hi = np.max([b[1] for b in boxes], 0)
@@ -50,24 +58,23 @@ def camera_for(boxes, size, azimuth=-62.0, elevation=27.0, room=1.0):
 
 def tissue_meshes(moment, spacing, stress_end):
     """One mesh for each piece."""
-    import matplotlib
     p = moment.points
     ids, counts = np.unique(p["fragment"], return_counts=True)
     meshes, largest, hues = [], ids[np.argmax(counts)], itertools.cycle(LOOSE)
     for fragment in ids[counts >= 8]:
         own = p["fragment"] == fragment
+        whole = len(ids) == 1  # a cut under way is a furrow, a finished one two smooth faces
         carried = np.stack([p["stress"][own], p["damage"][own]], 1).astype(float)
         vertices, triangles, normals, values = tissue_surface(
-            moment.x[own], carried, spacing,
-            lambda v: [(30, smoothstep(0.05, 0.15, v[:, 1])), (4, np.ones(len(v)))])
+            moment.x[own], 1 - (1.5 if whole else 0.8) * np.minimum(p["damage"][own], 0.6), carried,
+            spacing, lambda v: [(2 if whole else 60, smoothstep(0.03, 0.12, v[:, 1])),
+                                (5, np.ones(len(v)))])
         base = LIVER if fragment == largest else next(hues)
-        cut = smoothstep(0.05, 0.30, values[:, 1:2])
-        color = base * (1 - cut) + (0.5 * base + 0.5 * FRESH_CUT) * 1.3 * cut
+        cut = smoothstep(*((0.10, 0.22) if whole else (0.10, 0.30)), values[:, 1:2])
+        color = base * (1 - cut) + (0.12 * base if whole else 0.5 * base + 0.7 * FRESH_CUT) * cut
         if stress_end:
-            share = np.clip(values[:, 0] / stress_end, 0, 1)
-            scale = matplotlib.cm.get_cmap("inferno")(0.08 + 0.9 * share)[:, :3]
-            color = linear(scale) * 0.8 + 0.06 * color
-        meshes.append(Mesh(vertices, triangles, normals, color, wet=1.0))
+            color = linear(stress_colors(values[:, 0] / stress_end)) * (1 - 0.8 * cut * whole)
+        meshes.append(Mesh(vertices, triangles, normals, color, wet=0.45 if stress_end else 0.8))
     return meshes
 
 

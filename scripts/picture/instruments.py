@@ -94,4 +94,4 @@ def tool_meshes(tool):
 def placed(mesh, position, rotation):
     """The mesh at a pose; rotation (3, 3)."""
     return Mesh(mesh.vertices @ rotation.T + position, mesh.triangles, mesh.normals @ rotation.T,
-                mesh.colors, mesh.metal, mesh.wet)
+                mesh.colors, mesh.metal)

@@ -97,13 +97,13 @@ class Noise:
         return result
 
 
-def shade_tissue(x, normal, view, color, wet, lit, open_sky, noise):
-    """Moist tissue: soft terminator with red in it, a film of liquid that mirrors the studio."""
-    rough = noise(x, 0.0038) * 0.028 + noise(x, 0.0013) * 0.017
-    film = normalized(normal + rough * wet).astype(np.float32)
+def shade_tissue(normal, view, color, wet, lit, open_sky, film, blotch):
+    """Moist tissue: soft terminator with red in it, a film of liquid that mirrors the studio.
+
+    film (n, 3): how the film's normal departs from the surface's; blotch (n, 1): of the colour."""
+    film = normalized(normal + film * wet).astype(np.float32)
     wrap = np.array([0.34, 0.14, 0.10], np.float32)
-    blotch = noise(x, 0.0055)[:, :1] * 0.6 + noise(x, 0.0019)[:, 1:2] * 0.4
-    color = color * np.clip(1 + 0.17 * blotch, 0.5, 1.6)
+    color = color * np.clip(1 + blotch, 0.5, 1.6)
     result = np.zeros_like(color)
     for light, strength, shadow, shine in ((KEY, KEY_COLOR, lit, 1), (FILL, FILL_COLOR, open_sky, 1),
                                            (RIM, RIM_COLOR, open_sky, 0.25)):

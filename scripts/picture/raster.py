@@ -94,9 +94,3 @@ class Buffer:
         self.triangle[pixel] = number[t[order]]
         self.place[pixel, 0], self.place[pixel, 1] = u[order], v[order]
 
-
-def interpolate(attribute, triangles, buffer, pixels):
-    """A vertex attribute at the given pixels of a buffer."""
-    corners = attribute[triangles[buffer.triangle[pixels]]]
-    u, v = buffer.place[pixels, 0, None], buffer.place[pixels, 1, None]
-    return corners[:, 0] * (1 - u - v) + corners[:, 1] * u + corners[:, 2] * v

@@ -5,15 +5,15 @@ import numpy as np
 class Mesh:
     """Triangles with a normal and a colour at each vertex.
 
-    vertices, normals, colors: (n, 3); triangles: (m, 3); `metal` and `wet` say how it shines.
+    vertices, normals, colors: (n, 3); triangles: (m, 3); `metal` from 0, plastic, to 1, steel.
     """
 
-    def __init__(self, vertices, triangles, normals, colors, metal=0.0, wet=0.0):
+    def __init__(self, vertices, triangles, normals, colors, metal=0.0):
         self.vertices = np.asarray(vertices, np.float32)
         self.triangles = np.asarray(triangles, np.int64)
         self.normals = np.asarray(normals, np.float32)
         self.colors = np.asarray(colors, np.float32)
-        self.metal, self.wet = metal, wet
+        self.metal = metal
 
 
 class Grid:

@@ -6,7 +6,7 @@ import numpy as np
 from picture.instruments import placed, tool_meshes
 from picture.light import (FLOOR, KEY, KEY_COLOR, SKY, Noise, Shadow, dot, shade_metal,
                            shade_tissue, smoothstep, tone)
-from picture.raster import Buffer, Camera, interpolate, normalized
+from picture.raster import Buffer, Camera, normalized
 from picture.surface import Mesh, occupancy, point_spacing, tissue_surface
 
 LIVER = np.array([0.155, 0.016, 0.013])
@@ -56,26 +56,26 @@ def camera_for(boxes, size, azimuth=-80.0, elevation=31.0, room=1.0):
     return Camera(target + away * distance, target, size)
 
 
-def tissue_meshes(moment, spacing, stress_end):
-    """One mesh for each piece."""
+def tissue_meshes(moment, spacing, stress_ends):
+    """One mesh for each piece, and for each of them its colours, one for each of stress_ends."""
     p = moment.points
     ids, counts = np.unique(p["fragment"], return_counts=True)
-    meshes, largest, hues = [], ids[np.argmax(counts)], itertools.cycle(LOOSE)
+    whole = len(ids) == 1  # a cut under way is a furrow, a finished one two smooth faces
+    meshes, colors, largest, hues = [], [], ids[np.argmax(counts)], itertools.cycle(LOOSE)
     for fragment in ids[counts >= 8]:
         own = p["fragment"] == fragment
-        whole = len(ids) == 1  # a cut under way is a furrow, a finished one two smooth faces
         carried = np.stack([p["stress"][own], p["damage"][own]], 1).astype(float)
+        weights = 1 - (1.5 if whole else 0.8) * np.minimum(p["damage"][own], 0.6)
         vertices, triangles, normals, values = tissue_surface(
-            moment.x[own], 1 - (1.5 if whole else 0.8) * np.minimum(p["damage"][own], 0.6), carried,
-            spacing, lambda v: [(2 if whole else 60, smoothstep(0.03, 0.12, v[:, 1])),
-                                (5, np.ones(len(v)))])
+            moment.x[own], weights, carried, spacing,
+            lambda v: [(2 if whole else 60, smoothstep(0.03, 0.12, v[:, 1])), (5, np.ones(len(v)))])
         base = LIVER if fragment == largest else next(hues)
-        cut = smoothstep(*((0.10, 0.22) if whole else (0.10, 0.30)), values[:, 1:2])
-        color = base * (1 - cut) + (0.12 * base if whole else 0.5 * base + 0.7 * FRESH_CUT) * cut
-        if stress_end:
-            color = linear(stress_colors(values[:, 0] / stress_end)) * (1 - 0.8 * cut * whole)
-        meshes.append(Mesh(vertices, triangles, normals, color, wet=0.45 if stress_end else 0.8))
-    return meshes
+        cut = smoothstep(0.10, 0.22 if whole else 0.30, values[:, 1:2])
+        tissue = base * (1 - cut) + (0.12 * base if whole else 0.5 * base + 0.7 * FRESH_CUT) * cut
+        colors.append([(linear(stress_colors(values[:, 0] / end)) * (1 - 0.8 * cut * whole) if end
+                        else tissue).astype(np.float32) for end in stress_ends])
+        meshes.append(Mesh(vertices, triangles, normals, tissue))
+    return meshes, colors
 
 
 def ground_light(x, shadow, around, camera):
@@ -108,49 +108,65 @@ def ground_picture(moment, camera, shadow, around, center, radius):
     return tone(image)
 
 
-def draw(moment, camera, stress_end=None, supersample=2):
-    """The picture as (rows, columns, 3) in [0, 1]. stress_end [Pa]: colour by stress up to there."""
-    size = tuple(supersample * s for s in camera.size)
+def draw(moment, camera, stress_ends=(None,), supersample=2):
+    """Pictures (rows, columns, 3) in [0, 1], one for each of stress_ends: coloured by stress up to
+    there [Pa], or as tissue for None."""
     big = Camera.__new__(Camera)
-    big.__dict__.update(camera.__dict__, size=size, scale=camera.scale * supersample)
+    big.__dict__.update(camera.__dict__, size=tuple(supersample * s for s in camera.size),
+                        scale=camera.scale * supersample)
     spacing = point_spacing(moment.x)
     around = occupancy(moment.x, spacing, 0.0045)
-    meshes = tissue_meshes(moment, spacing, stress_end)
+    meshes, colors = tissue_meshes(moment, spacing, stress_ends)
     for tool, position, rotation in moment.tools:
         meshes += [placed(m, position, rotation) for m in tool_meshes(tool)]
     lo, hi = moment.x.min(0), moment.x.max(0)
     center, radius = (lo + hi) / 2, 0.75 * np.linalg.norm(hi - lo) + 0.02
     shadow = Shadow(meshes, center, radius)
-
     buffer, first = Buffer(big), 0
-    for m in meshes:
-        buffer.draw(m.vertices, m.triangles, first)
-        first += len(m.triangles)
-    rays = big.rays().reshape(-1, 3)
-    image = np.zeros_like(rays)
-    noise, first = Noise(), 0
-    for m in meshes:
-        pixels = np.nonzero((buffer.triangle >= first) &
-                            (buffer.triangle < first + len(m.triangles)))[0]
-        triangles = np.concatenate([np.zeros((first, 3), int), m.triangles]) if first else m.triangles
-        first += len(m.triangles)
-        if not len(pixels):
-            continue
-        x = (big.eye + rays[pixels] * buffer.depth[pixels, None]).astype(np.float32)
-        normal = normalized(interpolate(m.normals, triangles, buffer, pixels)).astype(np.float32)
-        color = interpolate(m.colors, triangles, buffer, pixels)
-        view = normalized(big.eye - x).astype(np.float32)
-        away = dot(normal, view) < 0
-        normal[away] *= -1
-        if m.wet:
-            lit = shadow.lit(x + normal * 0.0006, 0.0012)
-            sky = np.clip(1.25 - 1.5 * around.sample(x + normal * 0.0045), 0.1, 1)
-            image[pixels] = shade_tissue(x, normal, view, color, m.wet, lit, sky, noise)
-        else:
-            image[pixels] = shade_metal(normal, view, color, m.metal,
-                                        shadow.lit(x + normal * 0.0006, 0.0012))
+    for mesh in meshes:
+        buffer.draw(mesh.vertices, mesh.triangles, first)
+        first += len(mesh.triangles)
+
     w, h = camera.size
+    ground = ground_picture(moment, camera, shadow, around, center, radius).reshape(h, 1, w, 1, 3)
     empty = (buffer.triangle < 0).reshape(h, supersample, w, supersample, 1)
-    ground = ground_picture(moment, camera, shadow, around, center, radius)
-    image = tone(image).reshape(h, supersample, w, supersample, 3)
-    return np.where(empty, ground.reshape(h, 1, w, 1, 3), image).mean((1, 3))
+    images = [np.zeros((len(buffer.depth), 3), np.float32) for _ in stress_ends]
+    rays, noise, first = big.rays().reshape(-1, 3), Noise(), 0
+    for k, mesh in enumerate(meshes):
+        pixels = np.nonzero((buffer.triangle >= first) &
+                            (buffer.triangle < first + len(mesh.triangles)))[0]
+        surface = Surface(mesh, buffer, pixels, first, big, rays)
+        first += len(mesh.triangles)
+        if k >= len(colors):
+            light = shade_metal(surface.normal, surface.view, surface.at(mesh.colors), mesh.metal,
+                                shadow.lit(surface.x + surface.normal * 0.0006, 0.0012))
+            for image in images:
+                image[pixels] = light
+            continue
+        lit = shadow.lit(surface.x + surface.normal * 0.0006, 0.0012)
+        sky = np.clip(1.25 - 1.5 * around.sample(surface.x + surface.normal * 0.0045), 0.1, 1)
+        film = noise(surface.x, 0.0038) * 0.028 + noise(surface.x, 0.0013) * 0.017
+        blotch = noise(surface.x, 0.0055)[:, :1] * 0.10 + noise(surface.x, 0.0019)[:, 1:2] * 0.07
+        for image, color, stress_end in zip(images, colors[k], stress_ends):
+            image[pixels] = shade_tissue(
+                surface.normal, surface.view, surface.at(color), 0.45 if stress_end else 0.8, lit,
+                sky, film, blotch * (0.3 if stress_end else 1))
+    blocks = (h, supersample, w, supersample, 3)
+    return [np.where(empty, ground, tone(image).reshape(blocks)).mean((1, 3)) for image in images]
+
+
+class Surface:
+    """What some pixels show of a mesh: place, normal towards the eye, direction to the eye."""
+
+    def __init__(self, mesh, buffer, pixels, first, camera, rays):
+        self.corners = mesh.triangles[buffer.triangle[pixels] - first]
+        self.place = buffer.place[pixels]
+        self.x = (camera.eye + rays[pixels] * buffer.depth[pixels, None]).astype(np.float32)
+        self.view = normalized(camera.eye - self.x).astype(np.float32)
+        self.normal = normalized(self.at(mesh.normals)).astype(np.float32)
+        self.normal[dot(self.normal, self.view) < 0] *= -1
+
+    def at(self, attribute):
+        """A vertex attribute at the pixels."""
+        corners, (u, v) = attribute[self.corners], self.place.T[:, :, None]
+        return corners[:, 0] * (1 - u - v) + corners[:, 1] * u + corners[:, 2] * v

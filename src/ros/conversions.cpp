@@ -1,0 +1,155 @@
+#include "ros/conversions.h"
+
+#include <cstddef>
+
+namespace tissue_sim {
+
+Vec3 from_message(const geometry_msgs::Point& p) { return {p.x, p.y, p.z}; }
+
+Pose from_message(const geometry_msgs::Pose& pose) {
+  const geometry_msgs::Quaternion& q = pose.orientation;
+  return {from_message(pose.position), Quat(q.w, q.x, q.y, q.z)};
+}
+
+Pose from_message(const geometry_msgs::Transform& transform) {
+  const geometry_msgs::Vector3& t = transform.translation;
+  const geometry_msgs::Quaternion& q = transform.rotation;
+  return {Vec3(t.x, t.y, t.z), Quat(q.w, q.x, q.y, q.z)};
+}
+
+geometry_msgs::Point to_point(const Vec3& v) {
+  geometry_msgs::Point p;
+  p.x = v.x(), p.y = v.y(), p.z = v.z();
+  return p;
+}
+
+geometry_msgs::Vector3 to_vector3(const Vec3& v) {
+  geometry_msgs::Vector3 p;
+  p.x = v.x(), p.y = v.y(), p.z = v.z();
+  return p;
+}
+
+geometry_msgs::Quaternion to_quaternion(const Quat& q) {
+  geometry_msgs::Quaternion m;
+  m.x = q.x(), m.y = q.y(), m.z = q.z(), m.w = q.w();
+  return m;
+}
+
+geometry_msgs::Pose to_pose(const Pose& pose) {
+  geometry_msgs::Pose m;
+  m.position = to_point(pose.position);
+  m.orientation = to_quaternion(pose.orientation);
+  return m;
+}
+
+geometry_msgs::Transform to_transform(const Pose& pose) {
+  geometry_msgs::Transform m;
+  m.translation = to_vector3(pose.position);
+  m.rotation = to_quaternion(pose.orientation);
+  return m;
+}
+
+geometry_msgs::Wrench to_wrench(const Wrench& wrench) {
+  geometry_msgs::Wrench m;
+  m.force = to_vector3(wrench.force);
+  m.torque = to_vector3(wrench.torque);
+  return m;
+}
+
+Wrench in_axes(const Wrench& world, const Quat& orientation) {
+  const Quat inverse = orientation.conjugate();
+  return {inverse * world.force, inverse * world.torque};
+}
+
+Pose operator*(const Pose& a, const Pose& b) {
+  return {a * b.position, a.orientation * b.orientation};
+}
+
+BladeSweep to_message(const BladePath& path) {
+  BladeSweep m;
+  for (const Vec3& x : path.edge) m.edge.push_back(to_point(x));
+  for (const Pose& pose : path.poses) m.poses.push_back(to_pose(pose));
+  return m;
+}
+
+FrameInputMessage to_message(const AppliedInput& input, const Scene& scene) {
+  FrameInputMessage m;
+  m.frame = input.frame;
+  m.tools.resize(input.tools.size());
+  for (std::size_t i = 0; i < input.tools.size(); ++i) {
+    const ToolMotion& motion = input.tools[i];
+    m.tools[i].name = scene.tools[i].name;
+    m.tools[i].present = motion.present;
+    m.tools[i].begin = to_pose(motion.begin);
+    m.tools[i].end = to_pose(motion.end);
+    m.tools[i].jaw_begin = motion.jaw_begin;
+    m.tools[i].jaw_end = motion.jaw_end;
+  }
+  for (const BladePath& path : input.cuts) m.cuts.push_back(to_message(path));
+  return m;
+}
+
+AppliedInput from_message(const FrameInputMessage& message) {
+  AppliedInput input;
+  input.frame = message.frame;
+  for (const InstrumentMotion& m : message.tools) {
+    ToolMotion motion;
+    motion.present = m.present;
+    motion.begin = from_message(m.begin);
+    motion.end = from_message(m.end);
+    motion.jaw_begin = m.jaw_begin;
+    motion.jaw_end = m.jaw_end;
+    input.tools.push_back(motion);
+  }
+  for (const BladeSweep& m : message.cuts) {
+    BladePath path;
+    for (const geometry_msgs::Point& x : m.edge) path.edge.push_back(from_message(x));
+    for (const geometry_msgs::Pose& pose : m.poses) path.poses.push_back(from_message(pose));
+    input.cuts.push_back(path);
+  }
+  return input;
+}
+
+TissueFragment to_message(const Fragment& fragment, const Scene& scene) {
+  TissueFragment m;
+  m.id = fragment.id;
+  m.parent = fragment.parent;
+  m.body = scene.bodies[fragment.body].name;
+  m.loose = fragment.loose;
+  m.point_count = fragment.point_count;
+  m.volume = fragment.volume;
+  m.centroid = to_point(fragment.centroid);
+  m.velocity = to_vector3(fragment.velocity);
+  m.box_min = to_point(fragment.box.min);
+  m.box_max = to_point(fragment.box.max);
+  return m;
+}
+
+void describe_points(int count, sensor_msgs::PointCloud2& cloud) {
+  using sensor_msgs::PointField;
+  const auto add = [&](const char* name, std::size_t offset, std::uint8_t type) {
+    PointField field;
+    field.name = name;
+    field.offset = static_cast<std::uint32_t>(offset);
+    field.datatype = type;
+    field.count = 1;
+    cloud.fields.push_back(field);
+  };
+  cloud.fields.clear();
+  add("x", offsetof(Point, x), PointField::FLOAT32);
+  add("y", offsetof(Point, y), PointField::FLOAT32);
+  add("z", offsetof(Point, z), PointField::FLOAT32);
+  add("rgb", offsetof(Point, rgb), PointField::FLOAT32);  // the bits, as PCL and RViz read them
+  add("id", offsetof(Point, id), PointField::UINT32);
+  add("fragment", offsetof(Point, fragment), PointField::INT32);
+  add("stress", offsetof(Point, stress), PointField::FLOAT32);
+  add("damage", offsetof(Point, damage), PointField::FLOAT32);
+  cloud.height = 1;
+  cloud.width = static_cast<std::uint32_t>(count);
+  cloud.point_step = sizeof(Point);
+  cloud.row_step = cloud.point_step * cloud.width;
+  cloud.is_bigendian = false;
+  cloud.is_dense = true;
+}
+
+}  // namespace tissue_sim

@@ -1,0 +1,43 @@
+// Core types <-> ROS messages.
+#pragma once
+
+#include <geometry_msgs/Point.h>
+#include <geometry_msgs/Pose.h>
+#include <geometry_msgs/Transform.h>
+#include <geometry_msgs/Vector3.h>
+#include <geometry_msgs/Wrench.h>
+#include <sensor_msgs/PointCloud2.h>
+
+#include "ros/messages.h"
+#include "tissue_sim/simulation.h"
+
+namespace tissue_sim {
+
+Vec3 from_message(const geometry_msgs::Point& p);
+Pose from_message(const geometry_msgs::Pose& pose);
+Pose from_message(const geometry_msgs::Transform& transform);
+
+geometry_msgs::Point to_point(const Vec3& v);
+geometry_msgs::Vector3 to_vector3(const Vec3& v);
+geometry_msgs::Quaternion to_quaternion(const Quat& q);
+geometry_msgs::Pose to_pose(const Pose& pose);
+geometry_msgs::Transform to_transform(const Pose& pose);
+geometry_msgs::Wrench to_wrench(const Wrench& wrench);
+
+/// The same wrench in the axes of a tool that is turned by `orientation`.
+Wrench in_axes(const Wrench& world, const Quat& orientation);
+
+/// `a` after `b`: x_world = a * (b * x).
+Pose operator*(const Pose& a, const Pose& b);
+
+BladeSweep to_message(const BladePath& path);
+FrameInputMessage to_message(const AppliedInput& input, const Scene& scene);
+/// The way back, for replays; tools in the scene's order.
+AppliedInput from_message(const FrameInputMessage& message);
+
+TissueFragment to_message(const Fragment& fragment, const Scene& scene);
+
+/// Fields, sizes and flags of a cloud of Point; `cloud.data` is filled already.
+void describe_points(int count, sensor_msgs::PointCloud2& cloud);
+
+}  // namespace tissue_sim

@@ -1,0 +1,86 @@
+#include "ros/diagnostics.h"
+
+namespace tissue_sim {
+
+using diagnostic_msgs::DiagnosticStatus;
+
+Diagnostics::Diagnostics(ros::NodeHandle& node, const SimulationThread& simulation,
+                         const Recorder& recorder)
+    : simulation_(simulation),
+      recorder_(recorder),
+      updater_(node, node, node.getNamespace()) {
+  updater_.setHardwareID("none");
+  updater_.add("simulation", this, &Diagnostics::simulation);
+  updater_.add("tools", this, &Diagnostics::tools);
+  updater_.add("recording", this, &Diagnostics::recording);
+  timer_ = node.createWallTimer(ros::WallDuration(1),
+                                [this](const ros::WallTimerEvent&) { updater_.force_update(); });
+}
+
+void Diagnostics::simulation(Status& status) {
+  const RunStatus s = simulation_.status();
+  if (s.run.blew_up) {
+    status.summary(DiagnosticStatus::ERROR, s.problem);
+  } else if (s.run.paused) {
+    status.summary(DiagnosticStatus::OK, "paused");
+  } else if (s.run.real_time_factor > 0 && s.run.real_time_factor < 0.9) {
+    status.summary(DiagnosticStatus::WARN, "slower than real time: use larger cells");
+  } else {
+    status.summary(DiagnosticStatus::OK, "running");
+  }
+  status.add("real-time factor", s.run.real_time_factor);
+  status.add("frame", s.frame);
+  status.add("simulated time [s]", s.time);
+  status.add("frame rate [Hz]", s.frame_rate);
+  status.add("substeps per frame", s.substeps);
+  status.add("substep [s]", s.substep);
+  status.add("time to compute a frame [s]", s.compute_time);
+  status.add("particles", s.particles);
+  status.add("fragments", s.fragments);
+  status.add("device", s.device);
+}
+
+void Diagnostics::tools(Status& status) {
+  std::uint64_t refused = 0;
+  const std::shared_ptr<ToolInputs> tools = simulation_.tools();
+  for (const auto& tool : *tools) {
+    const ToolInput::Counts counts = tool->counts();
+    refused += counts.all_refused() + counts.jaws_refused;
+    status.add(tool->tool() + ": poses used", counts.accepted);
+    status.add(tool->tool() + ": placed anew", counts.placed);
+    for (int i = 0; i < kRefusalCount; ++i) {
+      status.add(tool->tool() + ": poses refused, " + name_of(static_cast<Refusal>(i)),
+                 counts.refused[static_cast<std::size_t>(i)]);
+    }
+    status.add(tool->tool() + ": jaw angles refused", counts.jaws_refused);
+  }
+  // Another scene counts anew.
+  const std::uint64_t since = refused >= refused_before_ ? refused - refused_before_ : refused;
+  refused_before_ = refused;
+  if (since > 0) {
+    status.summaryf(DiagnosticStatus::WARN, "%lu poses or jaw angles refused since the last report",
+                    static_cast<unsigned long>(since));
+  } else {
+    status.summary(DiagnosticStatus::OK, "all poses used");
+  }
+}
+
+void Diagnostics::recording(Status& status) {
+  const RecorderStatus s = recorder_.status();
+  std::uint64_t dropped = 0;
+  for (const auto& topic : s.dropped) dropped += topic.second;
+  if (!s.error.empty()) {
+    status.summary(DiagnosticStatus::ERROR, s.error);
+  } else if (s.recording && dropped > 0) {
+    status.summary(DiagnosticStatus::WARN, "recording, but the disk is too slow: messages are lost");
+  } else {
+    status.summary(DiagnosticStatus::OK, s.recording ? "recording" : "not recording");
+  }
+  status.add("bag", s.path);
+  status.add("messages written", s.messages);
+  status.add("messages lost", dropped);
+  for (const auto& topic : s.dropped) status.add("lost of " + topic.first, topic.second);
+  status.add("waiting for the disk [MiB]", static_cast<double>(s.queued) / (1024 * 1024));
+}
+
+}  // namespace tissue_sim

@@ -1,0 +1,33 @@
+// What the node says about itself on /diagnostics.
+#pragma once
+
+#include <diagnostic_updater/diagnostic_updater.h>
+#include <ros/node_handle.h>
+#include <ros/wall_timer.h>
+
+#include <cstdint>
+
+#include "ros/recorder.h"
+#include "ros/simulation_thread.h"
+
+namespace tissue_sim {
+
+/// Once a second: the simulation, its tools' poses and the recording.
+class Diagnostics {
+ public:
+  Diagnostics(ros::NodeHandle& node, const SimulationThread& simulation, const Recorder& recorder);
+
+ private:
+  using Status = diagnostic_updater::DiagnosticStatusWrapper;
+  void simulation(Status& status);
+  void tools(Status& status);
+  void recording(Status& status);
+
+  const SimulationThread& simulation_;
+  const Recorder& recorder_;
+  std::uint64_t refused_before_ = 0;
+  diagnostic_updater::Updater updater_;
+  ros::WallTimer timer_;
+};
+
+}  // namespace tissue_sim

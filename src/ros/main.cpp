@@ -1,0 +1,24 @@
+// simulator_node: the simulator as an executable.
+#include <ros/console.h>
+#include <ros/init.h>
+#include <ros/node_handle.h>
+#include <ros/spinner.h>
+
+#include <exception>
+#include <memory>
+
+#include "ros/node.h"
+
+int main(int argc, char** argv) {
+  ros::init(argc, argv, "simulator");
+  ros::NodeHandle node("~");
+  std::unique_ptr<tissue_sim::Node> simulator;
+  try {
+    simulator = std::make_unique<tissue_sim::Node>(node);
+  } catch (const std::exception& e) {
+    ROS_FATAL("cannot start: %s", e.what());
+    return 1;
+  }
+  ros::spin();
+  return 0;
+}

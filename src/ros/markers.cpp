@@ -1,0 +1,172 @@
+#include "ros/markers.h"
+
+#include <algorithm>
+#include <array>
+#include <cstdio>
+
+#include "ros/conversions.h"
+
+namespace tissue_sim {
+namespace {
+
+using visualization_msgs::Marker;
+using visualization_msgs::MarkerArray;
+
+constexpr int kMostFragments = 64;  // the largest; crumbs would hide them
+
+std_msgs::ColorRGBA color(float r, float g, float b, float a = 1) {
+  std_msgs::ColorRGBA c;
+  c.r = r, c.g = g, c.b = b, c.a = a;
+  return c;
+}
+
+// A piece's colour, the same for ever; ids next to each other look different.
+std_msgs::ColorRGBA piece_color(int id, float alpha) {
+  static const std::array<std::array<float, 3>, 8> kPalette = {{{0.90f, 0.35f, 0.30f},
+                                                                {0.25f, 0.55f, 0.90f},
+                                                                {0.35f, 0.75f, 0.35f},
+                                                                {0.95f, 0.70f, 0.20f},
+                                                                {0.60f, 0.40f, 0.80f},
+                                                                {0.25f, 0.75f, 0.75f},
+                                                                {0.85f, 0.50f, 0.70f},
+                                                                {0.60f, 0.60f, 0.35f}}};
+  const std::array<float, 3>& c = kPalette[static_cast<std::size_t>(id) % kPalette.size()];
+  return color(c[0], c[1], c[2], alpha);
+}
+
+Marker marker(const MarkerInput& input, const std::string& ns, int id, int type) {
+  Marker m;
+  m.header.frame_id = input.frame;
+  m.header.stamp = input.stamp;
+  m.ns = ns;
+  m.id = id;
+  m.type = type;
+  m.action = Marker::ADD;
+  m.pose.orientation.w = 1;
+  return m;
+}
+
+Marker deleted(const MarkerInput& input, const std::string& ns, int id) {
+  Marker m = marker(input, ns, id, Marker::CUBE);
+  m.action = Marker::DELETE;
+  return m;
+}
+
+geometry_msgs::Vector3 scale(double x, double y, double z) { return to_vector3(Vec3(x, y, z)); }
+
+// A shape of the tool, its centre on the shaft's axis at `z` unless `x` says otherwise.
+Marker part(const MarkerInput& input, std::size_t tool, int part, int type, const Pose& pose,
+            const Vec3& center, const geometry_msgs::Vector3& size, std_msgs::ColorRGBA c) {
+  Marker m = marker(input, input.scene.tools[tool].name, part, type);
+  m.pose = to_pose({pose * center, pose.orientation});
+  m.scale = size;
+  m.color = c;
+  return m;
+}
+
+void add_tool(const MarkerInput& input, std::size_t i, MarkerArray& array) {
+  const Tool& tool = input.scene.tools[i];
+  const Pose& pose = input.tools[i].end;
+  const std_msgs::ColorRGBA steel = color(0.75f, 0.78f, 0.82f);
+  if (tool.type == ToolType::kScalpel) {
+    const double w = tool.blade_width, l = tool.blade_length, handle = 0.1;
+    array.markers.push_back(part(input, i, 0, Marker::CUBE, pose, Vec3(-w / 2, 0, -l / 2),
+                                 scale(w, std::max(tool.blade_thickness, 0.0005), l), steel));
+    array.markers.push_back(part(input, i, 1, Marker::CYLINDER, pose,
+                                 Vec3(-w / 2, 0, -l - handle / 2), scale(w, w, handle),
+                                 color(0.25f, 0.27f, 0.30f)));
+  } else {  // the capsule that touches: its tip is the tool's origin
+    const double r = tool.radius, l = std::max(tool.length, 2 * r);
+    const geometry_msgs::Vector3 ball = scale(2 * r, 2 * r, 2 * r);
+    array.markers.push_back(
+        part(input, i, 0, Marker::SPHERE, pose, Vec3(0, 0, -r), ball, steel));
+    array.markers.push_back(part(input, i, 1, Marker::CYLINDER, pose, Vec3(0, 0, -(r + l) / 2),
+                                 scale(2 * r, 2 * r, l - r), steel));
+    array.markers.push_back(
+        part(input, i, 2, Marker::SPHERE, pose, Vec3(0, 0, -l), ball, steel));
+  }
+}
+
+void add_force(const MarkerInput& input, std::size_t i, MarkerArray& array) {
+  const std::string ns = input.scene.tools[i].name + "/force";
+  const Vec3 tip = input.tools[i].end.position;
+  const Vec3 force = input.loads[i].mean.force;
+  const double length = force.norm() * input.force_scale;
+  if (!(length > 1e-3)) {
+    array.markers.push_back(deleted(input, ns, 0));
+    array.markers.push_back(deleted(input, ns, 1));
+    return;
+  }
+  Marker arrow = marker(input, ns, 0, Marker::ARROW);
+  arrow.points = {to_point(tip), to_point(tip + force * input.force_scale)};
+  const double shaft = std::min(0.003, 0.1 * length);
+  arrow.scale = scale(shaft, 2 * shaft, std::min(0.3 * length, 4 * shaft));
+  arrow.color = color(1.0f, 0.85f, 0.1f);
+  array.markers.push_back(arrow);
+  Marker text = marker(input, ns, 1, Marker::TEXT_VIEW_FACING);
+  text.pose.position = to_point(tip + force * input.force_scale + Vec3(0, 0, 0.005));
+  text.scale.z = 0.006;
+  char newton[32];
+  std::snprintf(newton, sizeof newton, "%.2f N", force.norm());
+  text.text = newton;
+  text.color = arrow.color;
+  array.markers.push_back(text);
+}
+
+void add_fragment(const MarkerInput& input, const Fragment& f, int id, MarkerArray& array) {
+  Marker box = marker(input, "fragments/box", id, Marker::LINE_LIST);
+  box.scale.x = 0.0005;
+  box.color = piece_color(f.id, 0.8f);
+  for (int corner = 0; corner < 8; ++corner) {
+    const auto at = [&](int c) {
+      return to_point(Vec3(c & 1 ? f.box.max.x() : f.box.min.x(),
+                           c & 2 ? f.box.max.y() : f.box.min.y(),
+                           c & 4 ? f.box.max.z() : f.box.min.z()));
+    };
+    for (const int axis : {1, 2, 4}) {
+      if (corner & axis) continue;
+      box.points.push_back(at(corner));
+      box.points.push_back(at(corner | axis));
+    }
+  }
+  array.markers.push_back(box);
+  Marker label = marker(input, "fragments/label", id, Marker::TEXT_VIEW_FACING);
+  label.pose.position = to_point(Vec3(f.centroid.x(), f.centroid.y(), f.box.max.z() + 0.006));
+  label.scale.z = 0.006;
+  char text[64];
+  std::snprintf(text, sizeof text, "%d: %.2f cm3%s", f.id, f.volume * 1e6, f.loose ? ", loose" : "");
+  label.text = text;
+  label.color = piece_color(f.id, 1);
+  array.markers.push_back(label);
+}
+
+}  // namespace
+
+MarkerArray Markers::make(const MarkerInput& input) {
+  MarkerArray array;
+  if (first_) {  // RViz may still show another scene's
+    array.markers.push_back(deleted(input, "", 0));
+    array.markers.back().action = Marker::DELETEALL;
+    first_ = false;
+  }
+  for (std::size_t i = 0; i < input.tools.size(); ++i) {
+    if (!input.tools[i].present) continue;
+    add_tool(input, i, array);
+    if (i < input.loads.size()) add_force(input, i, array);
+  }
+  std::vector<const Fragment*> largest;
+  for (const Fragment& f : input.fragments) largest.push_back(&f);
+  std::sort(largest.begin(), largest.end(), [](const Fragment* a, const Fragment* b) {
+    return a->point_count != b->point_count ? a->point_count > b->point_count : a->id < b->id;
+  });
+  const int shown = std::min<int>(kMostFragments, static_cast<int>(largest.size()));
+  for (int i = 0; i < shown; ++i) add_fragment(input, *largest[i], i, array);
+  for (int i = shown; i < fragments_shown_; ++i) {
+    array.markers.push_back(deleted(input, "fragments/box", i));
+    array.markers.push_back(deleted(input, "fragments/label", i));
+  }
+  fragments_shown_ = shown;
+  return array;
+}
+
+}  // namespace tissue_sim

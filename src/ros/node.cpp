@@ -1,0 +1,92 @@
+#include "ros/node.h"
+
+#include <ros/console.h>
+
+#include <vector>
+
+#include "geometry/mesh.h"
+
+namespace tissue_sim {
+namespace {
+
+constexpr double kMiB = 1024.0 * 1024.0;
+constexpr int kServiceThreads = 4;  // a long step, and still pause and stop_recording are answered
+
+ros::NodeHandle with_queue(const ros::NodeHandle& node, ros::CallbackQueue& queue) {
+  ros::NodeHandle handle(node);
+  handle.setCallbackQueue(&queue);
+  return handle;
+}
+
+}  // namespace
+
+Node::Node(const ros::NodeHandle& node)
+    : pose_node_(with_queue(node, pose_queue_)),
+      service_node_(with_queue(node, service_queue_)),
+      parameters_(read_parameters(node)),
+      recorder_(parameters_.recording_folder, parameters_.recording_queue * kMiB,
+                parameters_.recording_reserve * kMiB),
+      frames_(parameters_.world_frame, parameters_.tf_tolerance),
+      pose_spinner_(1, &pose_queue_),
+      service_spinner_(kServiceThreads, &service_queue_) {
+  const Scene scene = read_scene_parameters(node);
+  Parameters first = parameters_;
+  const RecordRequest record = record_request(parameters_.record);
+  first.paused = parameters_.paused || record.wanted;  // so that the bag holds frame 0
+  simulation_ = std::make_unique<SimulationThread>(make_session(scene), first);
+  services_ = std::make_unique<Services>(service_node_, scene, *simulation_, recorder_, frames_,
+                                         [this](const Scene& s) { return make_session(s); });
+  diagnostics_ = std::make_unique<Diagnostics>(service_node_, *simulation_, recorder_);
+  if (record.wanted) {
+    services_->start_recording(record.name, {});
+    simulation_->set_paused(parameters_.paused);
+  }
+  pose_spinner_.start();
+  service_spinner_.start();
+}
+
+Node::~Node() {
+  // First what services may be waiting for, then the services, then what they call.
+  if (simulation_) simulation_->stop();
+  service_spinner_.stop();
+  pose_spinner_.stop();
+}
+
+Session Node::make_session(const Scene& scene) {
+  for (const Body& body : scene.bodies) {
+    if (body.shape != Shape::kMesh) continue;
+    std::vector<std::string> notes;
+    load_solid(body, &notes);
+    for (const std::string& note : notes) {
+      ROS_WARN("mesh %s %s", body.mesh.c_str(), note.c_str());
+    }
+  }
+  Session session;
+  session.simulation = std::make_unique<Simulation>(scene);
+  session.tools = std::make_shared<ToolInputs>();
+  PoseLimits limits;
+  limits.speed = parameters_.max_tool_speed;
+  limits.turn_rate = parameters_.max_tool_turn_rate;
+  limits.frame_time = 1 / scene.frame_rate;
+  for (const Tool& tool : scene.tools) {
+    const auto source = parameters_.tools.find(tool.name);
+    session.tools->push_back(std::make_unique<ToolInput>(
+        pose_node_, tool.name,
+        source == parameters_.tools.end() ? ToolParameters() : source->second, limits, frames_,
+        recorder_));
+  }
+  for (const auto& source : parameters_.tools) {
+    bool found = false;
+    for (const Tool& tool : scene.tools) found = found || tool.name == source.first;
+    if (!found) ROS_WARN("~tools/%s names no tool of the scene", source.first.c_str());
+  }
+  session.publications =
+      std::make_shared<Publications>(service_node_, scene, parameters_, recorder_);
+  Tissue& tissue = session.simulation->tissue();
+  ROS_INFO("scene '%s': %d particles, cells of %g mm, %zu tools, on %s", scene.name.c_str(),
+           tissue.point_count(), scene.cell_size * 1e3, scene.tools.size(),
+           tissue.device_name().c_str());
+  return session;
+}
+
+}  // namespace tissue_sim

@@ -1,0 +1,41 @@
+// Node: the simulator as a ROS node, for the executable and the nodelet alike.
+#pragma once
+
+#include <ros/callback_queue.h>
+#include <ros/node_handle.h>
+#include <ros/spinner.h>
+
+#include <memory>
+
+#include "ros/diagnostics.h"
+#include "ros/frames.h"
+#include "ros/parameters.h"
+#include "ros/recorder.h"
+#include "ros/services.h"
+#include "ros/simulation_thread.h"
+
+namespace tissue_sim {
+
+class Node {
+ public:
+  /// Reads the parameters below `node`, builds their scene and starts the simulation. Throws
+  /// std::exception with one line that says why it cannot.
+  explicit Node(const ros::NodeHandle& node);
+  ~Node();
+
+ private:
+  Session make_session(const Scene& scene);
+
+  // Queues of their own: a service that takes long does not hold up the poses.
+  ros::CallbackQueue pose_queue_, service_queue_;
+  ros::NodeHandle pose_node_, service_node_;
+  const Parameters parameters_;
+  Recorder recorder_;
+  Frames frames_;
+  std::unique_ptr<SimulationThread> simulation_;
+  std::unique_ptr<Services> services_;
+  std::unique_ptr<Diagnostics> diagnostics_;
+  ros::AsyncSpinner pose_spinner_, service_spinner_;
+};
+
+}  // namespace tissue_sim

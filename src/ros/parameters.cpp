@@ -1,0 +1,231 @@
+#include "ros/parameters.h"
+
+#include <ros/console.h>
+#include <ros/param.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdlib>
+#include <filesystem>
+#include <set>
+#include <stdexcept>
+
+#include "geometry/mesh.h"
+#include "ros/xmlrpc_yaml.h"
+
+namespace tissue_sim {
+namespace {
+
+using XmlRpc::XmlRpcValue;
+
+const std::set<std::string> kKnown = {
+    "scene", "scene_file", "mesh", "mesh_scale", "world_frame", "time", "paused", "cloud_rate",
+    "cloud_stride", "cloud_surface_only", "fragment_rate", "state_rate", "marker_rate", "checksum",
+    "force_scale", "publish_tf", "max_tool_speed", "max_tool_turn_rate", "tf_tolerance",
+    "recording_folder", "record", "recording_queue", "recording_reserve", "tools",
+    // of diagnostic_updater
+    "diagnostic_period", "diagnostic_updater_use_fqn"};
+
+[[noreturn]] void refuse(const std::string& name, XmlRpcValue& value, const std::string& allowed) {
+  throw std::invalid_argument("~" + name + " is " + yaml_from(value) + ": " + allowed);
+}
+
+std::string format(double x) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%g", x);
+  return text;
+}
+
+void read(const ros::NodeHandle& node, const std::string& name, double& value, double min,
+          double max) {
+  XmlRpcValue v;
+  if (!node.getParam(name, v)) return;
+  const std::string allowed = "must be a number from " + format(min) + " to " + format(max);
+  if (v.getType() == XmlRpcValue::TypeInt) {
+    value = static_cast<int&>(v);
+  } else if (v.getType() == XmlRpcValue::TypeDouble) {
+    value = static_cast<double&>(v);
+  } else {
+    refuse(name, v, allowed);
+  }
+  if (!(value >= min && value <= max)) refuse(name, v, allowed);
+}
+
+void read(const ros::NodeHandle& node, const std::string& name, int& value, int min, int max) {
+  XmlRpcValue v;
+  if (!node.getParam(name, v)) return;
+  if (v.getType() == XmlRpcValue::TypeInt) value = static_cast<int&>(v);
+  if (v.getType() != XmlRpcValue::TypeInt || value < min || value > max) {
+    refuse(name, v, "must be a whole number from " + format(min) + " to " + format(max));
+  }
+}
+
+void read(const ros::NodeHandle& node, const std::string& name, bool& value) {
+  XmlRpcValue v;
+  if (!node.getParam(name, v)) return;
+  if (v.getType() != XmlRpcValue::TypeBoolean) refuse(name, v, "must be true or false");
+  value = static_cast<bool&>(v);
+}
+
+void read(const ros::NodeHandle& node, const std::string& name, std::string& value,
+          const char* allowed) {
+  XmlRpcValue v;
+  if (!node.getParam(name, v)) return;
+  if (v.getType() != XmlRpcValue::TypeString) refuse(name, v, allowed);
+  value = static_cast<std::string&>(v);
+}
+
+// "~" is the shell's business, but launch files know no shell.
+std::string absolute(const std::string& folder) {
+  const char* home = std::getenv("HOME");
+  std::string path = folder;
+  if (home && (path == "~" || path.compare(0, 2, "~/") == 0)) path = home + path.substr(1);
+  return std::filesystem::absolute(path).lexically_normal().string();
+}
+
+std::string default_recording_folder() {
+  const char* ros_home = std::getenv("ROS_HOME");
+  return ros_home && *ros_home ? std::string(ros_home) + "/tissue_sim" : "~/.ros/tissue_sim";
+}
+
+ToolParameters read_tool(XmlRpcValue& group, const std::string& path) {
+  ToolParameters tool;
+  if (group.getType() != XmlRpcValue::TypeStruct) {
+    refuse(path, group, "must be a map of pose_type and tf_frame");
+  }
+  for (auto& member : group) {
+    const std::string name = path + "/" + member.first;
+    const bool text = member.second.getType() == XmlRpcValue::TypeString;
+    if (member.first == "pose_type") {
+      tool.pose_type = text ? static_cast<std::string&>(member.second) : "";
+      if (tool.pose_type != "PoseStamped" && tool.pose_type != "TransformStamped") {
+        refuse(name, member.second, "must be PoseStamped or TransformStamped");
+      }
+    } else if (member.first == "tf_frame") {
+      if (!text) refuse(name, member.second, "must be the name of a tf frame");
+      tool.tf_frame = static_cast<std::string&>(member.second);
+    } else {
+      ROS_WARN("~%s is no parameter of this node: known here are pose_type and tf_frame",
+               name.c_str());
+    }
+  }
+  return tool;
+}
+
+void warn_of_unknown(const ros::NodeHandle& node) {
+  std::vector<std::string> names;
+  if (!ros::param::getParamNames(names)) return;
+  const std::string prefix = node.getNamespace() + "/";
+  std::set<std::string> unknown;
+  for (const std::string& name : names) {
+    if (name.compare(0, prefix.size(), prefix) != 0) continue;
+    const std::string own = name.substr(prefix.size(), name.find('/', prefix.size()) - prefix.size());
+    if (kKnown.count(own) == 0) unknown.insert(own);
+  }
+  std::string known;
+  for (const std::string& name : kKnown) known += (known.empty() ? "" : ", ") + name;
+  for (const std::string& name : unknown) {
+    ROS_WARN("~%s is no parameter of this node: known are %s", name.c_str(), known.c_str());
+  }
+}
+
+}  // namespace
+
+RecordRequest record_request(const std::string& value) {
+  if (value.empty() || value == "false") return {};
+  return {true, value == "true" ? "" : value};
+}
+
+Parameters read_parameters(const ros::NodeHandle& node) {
+  warn_of_unknown(node);
+  Parameters p;
+  std::string time = "wall";
+  read(node, "time", time, "must be wall");
+  if (time != "wall") {
+    XmlRpcValue v(time);
+    refuse("time", v, "must be wall, the only time that this version offers");
+  }
+  read(node, "world_frame", p.world_frame, "must be the name of a tf frame");
+  if (!p.world_frame.empty() && p.world_frame.front() == '/') p.world_frame.erase(0, 1);
+  if (p.world_frame.empty()) {
+    XmlRpcValue v("");
+    refuse("world_frame", v, "must be the name of a tf frame");
+  }
+  read(node, "paused", p.paused);
+  read(node, "cloud_rate", p.cloud_rate, 0.01, 2000);
+  read(node, "cloud_stride", p.cloud_stride, 1, 1000000);
+  read(node, "cloud_surface_only", p.cloud_surface_only);
+  read(node, "fragment_rate", p.fragment_rate, 0.01, 2000);
+  read(node, "state_rate", p.state_rate, 0, 2000);
+  read(node, "marker_rate", p.marker_rate, 0.01, 2000);
+  read(node, "checksum", p.checksum);
+  read(node, "force_scale", p.force_scale, 1e-6, 100);
+  read(node, "publish_tf", p.publish_tf);
+  read(node, "max_tool_speed", p.max_tool_speed, 0.001, 1000);
+  read(node, "max_tool_turn_rate", p.max_tool_turn_rate, 0.01, 10000);
+  read(node, "tf_tolerance", p.tf_tolerance, 0, 60);
+  p.recording_folder = default_recording_folder();
+  read(node, "recording_folder", p.recording_folder, "must be a path");
+  p.recording_folder = absolute(p.recording_folder);
+  XmlRpcValue record;
+  if (node.getParam("record", record) && record.getType() == XmlRpcValue::TypeBoolean) {
+    p.record = static_cast<bool&>(record) ? "true" : "";
+  } else {
+    read(node, "record", p.record, "must be true, false or a path inside recording_folder");
+  }
+  read(node, "recording_queue", p.recording_queue, 1, 1e6);
+  read(node, "recording_reserve", p.recording_reserve, 1, 1e9);
+  XmlRpcValue tools;
+  if (node.getParam("tools", tools)) {
+    if (tools.getType() != XmlRpcValue::TypeStruct) {
+      refuse("tools", tools, "must be a map from a tool's name to pose_type and tf_frame");
+    }
+    for (auto& tool : tools) p.tools[tool.first] = read_tool(tool.second, "tools/" + tool.first);
+  }
+  return p;
+}
+
+Scene read_scene_parameters(const ros::NodeHandle& node) {
+  std::string file, mesh;
+  double scale = 1;
+  XmlRpcValue tree;
+  read(node, "scene_file", file, "must be the path of a scene file");
+  const bool has_tree = node.getParam("scene", tree) &&
+                        !(tree.getType() == XmlRpcValue::TypeString &&
+                          static_cast<std::string&>(tree).empty());
+  if (!file.empty() && has_tree) {
+    throw std::invalid_argument("~scene_file and ~scene are both set: give one scene");
+  }
+  if (file.empty() && !has_tree) {
+    throw std::invalid_argument(
+        "there is no scene: set ~scene_file to the path of one, or ~scene to its YAML text or its "
+        "tree of parameters");
+  }
+  const bool text = has_tree && tree.getType() == XmlRpcValue::TypeString;
+  Scene scene = !file.empty() ? load_scene(resolve_mesh_path(file))
+                              : scene_from_yaml(text ? static_cast<std::string&>(tree)
+                                                     : yaml_from(tree));
+  read(node, "mesh", mesh, "must be the path of a mesh file");
+  read(node, "mesh_scale", scale, 1e-9, 1e9);
+  if (!mesh.empty()) put_mesh(scene, mesh, scale);
+  return scene;
+}
+
+void put_mesh(Scene& scene, const std::string& mesh, double scale) {
+  Body& body = scene.bodies.front();
+  body.shape = Shape::kMesh;
+  body.mesh = mesh;
+  body.scale = scale;
+  const Vec3 place = body.pose.position;
+  body.pose.position = Vec3::Zero();
+  Box box;
+  for (const Vec3& x : load_solid(body, nullptr).vertices) {
+    box.min = box.min.cwiseMin(x);
+    box.max = box.max.cwiseMax(x);
+  }
+  body.pose.position = place - 0.5 * (box.min + box.max);
+  if (scene.ground.enabled) body.pose.position.z() = scene.ground.z - box.min.z();
+  validate(scene);
+}
+
+}  // namespace tissue_sim

@@ -1,0 +1,61 @@
+// Parameters of the node, from the parameter server. All functions throw std::invalid_argument with
+// "~<name> is <value>: <what is allowed>".
+#pragma once
+
+#include <ros/node_handle.h>
+
+#include <map>
+#include <string>
+
+#include "ros/pose_check.h"
+#include "tissue_sim/scene.h"
+
+namespace tissue_sim {
+
+/// Where a tool's poses come from: the group `tools/<tool>`.
+struct ToolParameters {
+  std::string pose_type = "PoseStamped";  ///< of measured_cp: PoseStamped or TransformStamped
+  std::string tf_frame;                   ///< follow this tf frame instead of the topic
+};
+
+struct Parameters {
+  std::string world_frame = "world";
+  bool paused = false;               ///< at the start
+  double cloud_rate = 30;            ///< [Hz] of wall time
+  int cloud_stride = 1;              ///< every n-th point
+  bool cloud_surface_only = false;
+  double fragment_rate = 10;         ///< [Hz], and whenever the pieces change
+  double state_rate = 0;             ///< [Hz], 0 for every frame
+  double marker_rate = 15;           ///< [Hz]
+  bool checksum = true;              ///< in each state
+  double force_scale = 0.02;         ///< length of the force arrows [m/N]
+  bool publish_tf = true;            ///< world_frame -> tool
+  double max_tool_speed = 5;         ///< [m/s]
+  double max_tool_turn_rate = 60;    ///< [rad/s]
+  double tf_tolerance = 0.1;         ///< how old the newest transform of a moving frame may be [s]
+  std::string recording_folder;      ///< absolute
+  std::string record;                ///< name of a recording from the first frame on; "" for none
+  double recording_queue = 1024;     ///< [MiB]
+  double recording_reserve = 256;    ///< disk space left free [MiB]
+  std::map<std::string, ToolParameters> tools;
+};
+
+Parameters read_parameters(const ros::NodeHandle& node);
+
+/// The scene that the parameters ask for: ~scene_file, or ~scene (YAML text or a tree of
+/// parameters), with ~mesh and ~mesh_scale in place of the first body's shape.
+Scene read_scene_parameters(const ros::NodeHandle& node);
+
+/// Puts a mesh in the place of the scene's first body, which keeps its material and anchors: its
+/// bounding box is centred where the body's centre was, seen from above, and rests on the ground
+/// (or, without one, is centred in z too).
+void put_mesh(Scene& scene, const std::string& mesh, double scale);
+
+/// A recording's name from a parameter or an argument: "", false: none; "true": "" (date and time).
+struct RecordRequest {
+  bool wanted = false;
+  std::string name;
+};
+RecordRequest record_request(const std::string& value);
+
+}  // namespace tissue_sim

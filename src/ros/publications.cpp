@@ -1,0 +1,202 @@
+#include "ros/publications.h"
+
+#include "ros/conversions.h"
+
+namespace tissue_sim {
+
+Publications::Publications(ros::NodeHandle& node, const Scene& scene, const Parameters& parameters,
+                           Recorder& recorder)
+    : scene_(scene),
+      parameters_(parameters),
+      scene_output_(node, "scene", 1, recorder, true),
+      state_(node, "state", 100, recorder),
+      inputs_(node, "inputs", 1000, recorder),
+      fragments_(node, "fragments", 10, recorder),
+      points_(node, "tissue/points", 2, recorder),
+      loose_points_(node, "fragments/points", 2, recorder),
+      marker_output_(node, "markers", 2, recorder),
+      tf_(node, "/tf", 100, recorder),
+      state_due_(parameters.state_rate, scene.frame_rate),
+      fragments_due_(parameters.fragment_rate, scene.frame_rate),
+      clouds_due_(parameters.cloud_rate, scene.frame_rate),
+      markers_due_(parameters.marker_rate, scene.frame_rate) {
+  auto text = boost::make_shared<std_msgs::String>();
+  text->data = scene_to_yaml(scene);
+  scene_text_ = text;
+  for (const Tool& tool : scene.tools) {
+    tools_.push_back({{node, tool.name + "/body/measured_cf", 100, recorder},
+                      {node, tool.name + "/spatial/measured_cf", 100, recorder}});
+  }
+}
+
+std::set<std::string> Publications::topics() const {
+  std::set<std::string> names = {scene_output_.topic(), state_.topic(),  inputs_.topic(),
+                                 fragments_.topic(),    points_.topic(), loose_points_.topic(),
+                                 tf_.topic()};
+  for (const ToolOutputs& tool : tools_) {
+    names.insert({tool.body.topic(), tool.spatial.topic()});
+  }
+  return names;
+}
+
+std_msgs::Header Publications::header(const ros::Time& stamp) const {
+  std_msgs::Header h;
+  h.stamp = stamp;
+  h.frame_id = parameters_.world_frame;
+  return h;
+}
+
+void Publications::announce() {
+  pieces_.clear();
+  scene_output_.publish(scene_text_, ros::Time::now(), true);
+}
+
+void Publications::record_scene() { scene_output_.record(scene_text_, ros::Time::now()); }
+
+void Publications::publish(Simulation& simulation, const FrameReport& report, const RunState& run,
+                           bool all) {
+  const ros::Time stamp = ros::Time::now();
+  const WallTime now = WallClock::now();
+  if (inputs_.wanted()) {
+    auto m = boost::make_shared<FrameInputMessage>(to_message(report.input, scene_));
+    m->header = header(stamp);
+    inputs_.publish(m, stamp, true);
+  }
+  const bool state_due = state_due_.due(now) || all || run.blew_up;
+  if (state_due && state_.wanted()) {
+    state_.publish(state_message(simulation, report, run, stamp), stamp);
+  }
+  publish_tf(report, stamp);
+  if (run.blew_up) return;  // what follows may hold NaN
+  publish_wrenches(report, stamp);
+
+  Pieces pieces;
+  for (const Fragment& f : simulation.tissue().fragments()) pieces.emplace_back(f.id, f.loose);
+  const bool changed = pieces != pieces_;
+  const bool fragments_due = fragments_due_.due(now) || all || changed;
+  if (fragments_due && fragments_.wanted()) {
+    fragments_.publish(fragment_message(simulation, stamp), stamp);
+  }
+  const bool clouds_due = clouds_due_.due(now) || all;
+  if (clouds_due && points_.wanted()) points_.publish(cloud(simulation, false, stamp), stamp);
+  if (clouds_due && loose_points_.wanted()) {
+    loose_points_.publish(cloud(simulation, true, stamp), stamp);
+  }
+  const bool markers_due = markers_due_.due(now) || all;
+  if (markers_due && marker_output_.wanted()) {
+    marker_output_.publish(marker_message(simulation, report, stamp), stamp);
+  }
+  pieces_ = std::move(pieces);
+}
+
+void Publications::show(Simulation& simulation, const FrameReport& report, const RunState& run) {
+  const ros::Time stamp = ros::Time::now();
+  if (state_.listened()) state_.show(state_message(simulation, report, run, stamp));
+  if (run.blew_up) return;
+  if (fragments_.listened()) fragments_.show(fragment_message(simulation, stamp));
+  if (points_.listened()) points_.show(cloud(simulation, false, stamp));
+  if (loose_points_.listened()) loose_points_.show(cloud(simulation, true, stamp));
+  if (marker_output_.listened()) marker_output_.show(marker_message(simulation, report, stamp));
+}
+
+boost::shared_ptr<const SimulationState> Publications::state_message(Simulation& simulation,
+                                                                     const FrameReport& report,
+                                                                     const RunState& run,
+                                                                     const ros::Time& stamp) const {
+  auto m = boost::make_shared<SimulationState>();
+  m->header = header(stamp);
+  m->frame = simulation.frame();
+  m->time = simulation.time();
+  m->frame_rate = scene_.frame_rate;
+  m->paused = run.paused;
+  m->blew_up = run.blew_up;
+  m->substeps = report.substeps;
+  m->substep = report.substep;
+  m->cfl = report.cfl;
+  m->compute_time = report.compute_time;
+  m->real_time_factor = run.real_time_factor;
+  m->particles = simulation.tissue().point_count();
+  for (const Fragment& f : simulation.tissue().fragments()) {
+    ++m->fragments;
+    m->loose_fragments += f.loose;
+    m->fragment_volume += f.volume;
+  }
+  m->device = simulation.tissue().device_name();
+  m->kinetic_energy = report.result.kinetic_energy;
+  m->elastic_energy = report.result.elastic_energy;
+  m->max_speed = report.result.max_speed;
+  if (parameters_.checksum) m->checksum = simulation.tissue().checksum();
+  return m;
+}
+
+boost::shared_ptr<const FragmentArray> Publications::fragment_message(
+    Simulation& simulation, const ros::Time& stamp) const {
+  auto m = boost::make_shared<FragmentArray>();
+  m->header = header(stamp);
+  m->frame = simulation.frame();
+  m->time = simulation.time();
+  for (const Fragment& f : simulation.tissue().fragments()) {
+    m->fragments.push_back(to_message(f, scene_));
+  }
+  return m;
+}
+
+boost::shared_ptr<const sensor_msgs::PointCloud2> Publications::cloud(
+    Simulation& simulation, bool loose_only, const ros::Time& stamp) const {
+  auto m = boost::make_shared<sensor_msgs::PointCloud2>();
+  m->header = header(stamp);
+  PointSelection selection;
+  selection.stride = parameters_.cloud_stride;
+  selection.surface_only = parameters_.cloud_surface_only;
+  selection.loose_only = loose_only;
+  describe_points(simulation.tissue().read_points(selection, m->data), *m);
+  return m;
+}
+
+boost::shared_ptr<const visualization_msgs::MarkerArray> Publications::marker_message(
+    Simulation& simulation, const FrameReport& report, const ros::Time& stamp) {
+  return boost::make_shared<visualization_msgs::MarkerArray>(markers_.make(
+      {scene_, report.input.tools, report.result.loads, simulation.tissue().fragments(),
+       parameters_.world_frame, stamp, parameters_.force_scale}));
+}
+
+void Publications::publish_wrenches(const FrameReport& report, const ros::Time& stamp) const {
+  for (std::size_t i = 0; i < tools_.size() && i < report.result.loads.size(); ++i) {
+    if (!report.input.tools[i].present) continue;
+    const Wrench& wrench = report.result.loads[i].mean;
+    if (tools_[i].spatial.wanted()) {
+      auto m = boost::make_shared<geometry_msgs::WrenchStamped>();
+      m->header = header(stamp);
+      m->wrench = to_wrench(wrench);
+      tools_[i].spatial.publish(m, stamp);
+    }
+    if (tools_[i].body.wanted()) {
+      auto m = boost::make_shared<geometry_msgs::WrenchStamped>();
+      m->header.stamp = stamp;
+      m->header.frame_id = scene_.tools[i].name;
+      m->wrench = to_wrench(in_axes(wrench, report.input.tools[i].end.orientation));
+      tools_[i].body.publish(m, stamp);
+    }
+  }
+}
+
+void Publications::publish_tf(const FrameReport& report, const ros::Time& stamp) {
+  if (!parameters_.publish_tf || stamp == tf_stamp_) return;  // tf2 warns of repeated stamps
+  auto m = boost::make_shared<tf2_msgs::TFMessage>();
+  for (std::size_t i = 0; i < report.input.tools.size(); ++i) {
+    const std::string& name = scene_.tools[i].name;
+    const auto source = parameters_.tools.find(name);
+    const bool follows_itself = source != parameters_.tools.end() && source->second.tf_frame == name;
+    if (!report.input.tools[i].present || follows_itself) continue;
+    geometry_msgs::TransformStamped t;
+    t.header = header(stamp);
+    t.child_frame_id = name;
+    t.transform = to_transform(report.input.tools[i].end);
+    m->transforms.push_back(t);
+  }
+  if (m->transforms.empty()) return;
+  tf_stamp_ = stamp;
+  tf_.publish(m, stamp);
+}
+
+}  // namespace tissue_sim

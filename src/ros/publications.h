@@ -1,0 +1,89 @@
+// Publications: everything that the node says about one scene's simulation.
+#pragma once
+
+#include <geometry_msgs/WrenchStamped.h>
+#include <ros/node_handle.h>
+#include <sensor_msgs/PointCloud2.h>
+#include <std_msgs/String.h>
+#include <tf2_msgs/TFMessage.h>
+#include <visualization_msgs/MarkerArray.h>
+
+#include <set>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "ros/markers.h"
+#include "ros/messages.h"
+#include "ros/output.h"
+#include "ros/pace.h"
+#include "ros/parameters.h"
+#include "tissue_sim/simulation.h"
+
+namespace tissue_sim {
+
+/// How the simulation stands, besides what the frame's report says.
+struct RunState {
+  bool paused = false;
+  bool blew_up = false;
+  double real_time_factor = 0;
+};
+
+/// Belongs to the simulation's thread, but for the constructor and topics().
+class Publications {
+ public:
+  Publications(ros::NodeHandle& node, const Scene& scene, const Parameters& parameters,
+               Recorder& recorder);
+
+  /// Names of the topics as they are in bags, without markers.
+  std::set<std::string> topics() const;
+
+  /// The scene, latched: at the start and at every reset.
+  void announce();
+  /// The scene into a recording that has just begun.
+  void record_scene();
+  /// A frame is done. `all`: also what has a rate and is not due yet.
+  void publish(Simulation& simulation, const FrameReport& report, const RunState& run, bool all);
+  /// For those who watch a simulation that stands still. Nothing goes into the bag.
+  void show(Simulation& simulation, const FrameReport& report, const RunState& run);
+
+ private:
+  struct ToolOutputs {
+    Output<geometry_msgs::WrenchStamped> body, spatial;
+  };
+  using Pieces = std::vector<std::pair<int, bool>>;  // id, loose
+
+  std_msgs::Header header(const ros::Time& stamp) const;
+  boost::shared_ptr<const SimulationState> state_message(Simulation& simulation,
+                                                         const FrameReport& report,
+                                                         const RunState& run,
+                                                         const ros::Time& stamp) const;
+  boost::shared_ptr<const FragmentArray> fragment_message(Simulation& simulation,
+                                                          const ros::Time& stamp) const;
+  boost::shared_ptr<const sensor_msgs::PointCloud2> cloud(Simulation& simulation, bool loose_only,
+                                                          const ros::Time& stamp) const;
+  boost::shared_ptr<const visualization_msgs::MarkerArray> marker_message(
+      Simulation& simulation, const FrameReport& report, const ros::Time& stamp);
+  void publish_wrenches(const FrameReport& report, const ros::Time& stamp) const;
+  void publish_tf(const FrameReport& report, const ros::Time& stamp);
+
+  const Scene scene_;
+  const Parameters parameters_;
+  std_msgs::String::ConstPtr scene_text_;
+  Markers markers_;
+
+  Output<std_msgs::String> scene_output_;
+  Output<SimulationState> state_;
+  Output<FrameInputMessage> inputs_;
+  Output<FragmentArray> fragments_;
+  Output<sensor_msgs::PointCloud2> points_, loose_points_;
+  Output<visualization_msgs::MarkerArray> marker_output_;
+  Output<tf2_msgs::TFMessage> tf_;
+  std::vector<ToolOutputs> tools_;
+
+  Throttle state_due_, fragments_due_, clouds_due_, markers_due_;
+  Pieces pieces_;
+  ros::Time tf_stamp_;
+};
+
+}  // namespace tissue_sim

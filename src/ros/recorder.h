@@ -1,0 +1,96 @@
+// Recorder: writes bags in a thread of its own, from the very messages that are published.
+#pragma once
+
+#include <ros/serialization.h>
+#include <rosbag/bag.h>
+
+#include <algorithm>
+#include <condition_variable>
+#include <cstdint>
+#include <deque>
+#include <functional>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <set>
+#include <string>
+#include <thread>
+
+namespace tissue_sim {
+
+struct RecorderStatus {
+  bool recording = false;
+  std::string path;            ///< of the bag that is written or was written last
+  std::uint64_t messages = 0;  ///< written
+  std::uint64_t queued = 0;    ///< waiting for the disk [bytes]
+  std::map<std::string, std::uint64_t> dropped;  ///< by topic: the queue was full
+  std::string error;           ///< what ended the recording before it was stopped
+};
+
+/// Thread-safe. Nothing but start() and stop() ever waits for the disk.
+class Recorder {
+ public:
+  /// `queue` bytes of messages may wait for the disk; `reserve` bytes of the disk stay free.
+  Recorder(std::string folder, double queue, double reserve);
+  /// Ends the recording.
+  ~Recorder();
+
+  /// Starts `<folder>/<name>.bag` (see recording_path()), under the name `.bag.active` until it is
+  /// closed. Returns its full path; throws std::runtime_error.
+  std::string start(const std::string& name, std::set<std::string> topics);
+  /// Writes what is queued and closes the bag; throws std::runtime_error if nothing is recorded, or
+  /// if the recording had ended before because of an error.
+  RecorderStatus stop();
+  RecorderStatus status() const;
+
+  /// Whether messages of this topic are recorded now: nobody else may be listening.
+  bool wants(const std::string& topic) const;
+
+  /// Queues the message if its topic is recorded. What `must_keep` is queued even if the queue is
+  /// full: the scene and the inputs are small, and without them a bag cannot be run again.
+  template <class M>
+  void write(const std::string& topic, const boost::shared_ptr<const M>& message,
+             const ros::Time& time, bool must_keep = false, bool latched = false) {
+    if (!wants(topic)) return;
+    const std::uint64_t bytes = ros::serialization::serializationLength(*message);
+    boost::shared_ptr<ros::M_string> header;
+    if (latched) {
+      header = boost::make_shared<ros::M_string>();
+      (*header)["type"] = ros::message_traits::datatype(*message);
+      (*header)["md5sum"] = ros::message_traits::md5sum(*message);
+      (*header)["message_definition"] = ros::message_traits::definition(*message);
+      (*header)["latching"] = "1";
+    }
+    push({topic, bytes,
+          [=](rosbag::Bag& bag) {
+            bag.write(topic, std::max<ros::Time>(time, ros::TIME_MIN), message, header);
+          }},
+         must_keep);
+  }
+
+ private:
+  struct Item {
+    std::string topic;
+    std::uint64_t bytes;
+    std::function<void(rosbag::Bag&)> write;
+  };
+  void push(Item item, bool must_keep);
+  void run();        // the thread
+  void write_all();  // until stop(), or throws
+  void close();
+
+  const std::string folder_;
+  const double queue_limit_, reserve_;  // [bytes]
+  std::mutex control_;                  // held by start() and stop()
+  std::thread thread_;
+  rosbag::Bag bag_;  // of the thread, while it runs
+
+  mutable std::mutex mutex_;  // of what follows
+  std::condition_variable wake_;
+  std::deque<Item> queue_;
+  std::set<std::string> topics_;
+  bool stopping_ = false;
+  RecorderStatus status_;
+};
+
+}  // namespace tissue_sim

@@ -1,0 +1,198 @@
+#include "ros/services.h"
+
+#include <ros/console.h>
+
+#include <cmath>
+#include <stdexcept>
+
+#include "geometry/mesh.h"
+#include "ros/conversions.h"
+
+namespace tissue_sim {
+namespace {
+
+// What goes wrong becomes the answer.
+template <class Response, class Work>
+bool answer(Response& response, const char* service, Work work) {
+  try {
+    response.message = work();
+    response.success = true;
+  } catch (const std::exception& e) {
+    response.message = e.what();
+    response.success = false;
+  }
+  if (!response.success) ROS_WARN("%s refused: %s", service, response.message.c_str());
+  return true;
+}
+
+}  // namespace
+
+Services::Services(ros::NodeHandle& node, const Scene& scene, SimulationThread& simulation,
+                   Recorder& recorder, const Frames& frames, MakeSession make_session)
+    : node_(node),
+      simulation_(simulation),
+      recorder_(recorder),
+      frames_(frames),
+      make_session_(std::move(make_session)),
+      scene_(scene) {
+  servers_.push_back(node.advertiseService("cut", &Services::cut, this));
+  servers_.push_back(node.advertiseService("stop_recording", &Services::stop_recording, this));
+  servers_.push_back(node.advertiseService("reset", &Services::reset, this));
+  servers_.push_back(node.advertiseService("pause", &Services::pause, this));
+  servers_.push_back(node.advertiseService("step", &Services::step, this));
+  servers_.push_back(node.advertiseService("load_scene", &Services::load_scene, this));
+  bool (Services::*start)(StartRecording::Request&, StartRecording::Response&) =
+      &Services::start_recording;
+  servers_.push_back(node.advertiseService("start_recording", start, this));
+}
+
+BladePath Services::read_path(const Cut::Request& request) const {
+  if (request.path.size() < 2) {
+    throw std::runtime_error("path has " + std::to_string(request.path.size()) +
+                             " poses: a cut needs at least 2, between which the edge sweeps");
+  }
+  if (request.edge.size() < 2) {
+    throw std::runtime_error("edge has " + std::to_string(request.edge.size()) +
+                             " points: a blade's edge needs at least 2");
+  }
+  Pose frame;
+  try {
+    frame = frames_.in_world(request.header.frame_id, request.header.stamp);
+  } catch (const tf2::TransformException& e) {
+    throw std::runtime_error("frame_id '" + request.header.frame_id + "' cannot be used: " +
+                             e.what());
+  }
+  BladePath path;
+  for (std::size_t i = 0; i < request.edge.size(); ++i) {
+    path.edge.push_back(from_message(request.edge[i]));
+    if (!path.edge.back().allFinite()) {
+      throw std::runtime_error("edge[" + std::to_string(i) + "] is not finite");
+    }
+  }
+  for (std::size_t i = 0; i < request.path.size(); ++i) {
+    const std::string name = "path[" + std::to_string(i) + "]";
+    Pose pose = from_message(request.path[i]);
+    if (!pose.position.allFinite() || !pose.orientation.coeffs().allFinite()) {
+      throw std::runtime_error(name + " is not finite");
+    }
+    if (std::fabs(pose.orientation.norm() - 1) > 0.01) {
+      throw std::runtime_error(name + " has a quaternion of norm " +
+                               std::to_string(pose.orientation.norm()) +
+                               ": must be 1, or it is no rotation");
+    }
+    pose.orientation.normalize();
+    path.poses.push_back(frame * pose);
+  }
+  return path;
+}
+
+bool Services::cut(Cut::Request& request, Cut::Response& response) {
+  return answer(response, "cut", [&] {
+    const CutReply reply = simulation_.cut(read_path(request));
+    if (!reply.success) throw std::runtime_error(reply.message);
+    response.points_separated = reply.report.points_separated;
+    response.new_fragments.assign(reply.report.new_fragments.begin(),
+                                  reply.report.new_fragments.end());
+    return std::to_string(reply.report.bonds_broken) + " bonds broken";
+  });
+}
+
+std::set<std::string> Services::select(const std::vector<std::string>& topics) const {
+  std::set<std::string> all = simulation_.topics();
+  if (topics.empty()) {
+    return all;
+  }
+  all.insert(node_.resolveName("markers"));
+  std::set<std::string> chosen;
+  for (const std::string& topic : topics) {
+    const std::string name = node_.resolveName(topic);
+    if (all.count(name) == 0) {
+      std::string known;
+      for (const std::string& each : all) known += (known.empty() ? "" : ", ") + each;
+      throw std::runtime_error("topic '" + topic + "' is none of this node's: " + known);
+    }
+    chosen.insert(name);
+  }
+  // Without these a bag cannot be run again.
+  chosen.insert({node_.resolveName("scene"), node_.resolveName("inputs")});
+  return chosen;
+}
+
+std::string Services::start_recording(const std::string& path,
+                                      const std::vector<std::string>& topics) {
+  const std::string bag = recorder_.start(path, select(topics));
+  simulation_.record_scene();
+  ROS_INFO("recording %s", bag.c_str());
+  const std::int64_t frame = simulation_.status().frame;
+  return bag + (frame == 0 ? ""
+                           : " (from frame " + std::to_string(frame) +
+                                 " on; reset to have a run from its start in it)");
+}
+
+bool Services::start_recording(StartRecording::Request& request,
+                               StartRecording::Response& response) {
+  return answer(response, "start_recording",
+                [&] { return start_recording(request.path, request.topics); });
+}
+
+bool Services::stop_recording(std_srvs::Trigger::Request&, std_srvs::Trigger::Response& response) {
+  return answer(response, "stop_recording", [&] {
+    const RecorderStatus s = recorder_.stop();
+    std::uint64_t dropped = 0;
+    for (const auto& topic : s.dropped) dropped += topic.second;
+    const std::string text = s.path + ": " + std::to_string(s.messages) + " messages, " +
+                             std::to_string(dropped) + " lost";
+    ROS_INFO("recorded %s", text.c_str());
+    return text;
+  });
+}
+
+bool Services::reset(std_srvs::Trigger::Request&, std_srvs::Trigger::Response& response) {
+  return answer(response, "reset", [&] {
+    const std::lock_guard<std::mutex> lock(rebuilding_);
+    simulation_.reset(std::make_unique<Simulation>(scene_));
+    return std::string("frame 0 of scene '") + scene_.name + "'";
+  });
+}
+
+bool Services::pause(std_srvs::SetBool::Request& request, std_srvs::SetBool::Response& response) {
+  return answer(response, "pause", [&] {
+    simulation_.set_paused(request.data);
+    return std::string(request.data ? "paused" : "running");
+  });
+}
+
+bool Services::step(Step::Request& request, Step::Response& response) {
+  return answer(response, "step", [&] {
+    if (request.frames < 1 || request.frames > 1000000) {
+      throw std::runtime_error("frames is " + std::to_string(request.frames) +
+                               ": must be from 1 to 1000000");
+    }
+    const StepReply reply = simulation_.step(request.frames);
+    response.frame = reply.frame;
+    response.time = reply.time;
+    if (!reply.success) throw std::runtime_error(reply.message);
+    return std::to_string(request.frames) + " frames done";
+  });
+}
+
+bool Services::load_scene(LoadScene::Request& request, LoadScene::Response& response) {
+  return answer(response, "load_scene", [&] {
+    if (request.path.empty() == request.yaml.empty()) {
+      throw std::runtime_error("give one of path and yaml, not " +
+                               std::string(request.path.empty() ? "none" : "both"));
+    }
+    if (recorder_.status().recording) {
+      throw std::runtime_error("a recording is running, and a bag holds one scene: stop it first");
+    }
+    const std::lock_guard<std::mutex> lock(rebuilding_);
+    const Scene scene = request.yaml.empty()
+                            ? tissue_sim::load_scene(resolve_mesh_path(request.path))
+                            : scene_from_yaml(request.yaml);
+    simulation_.replace(make_session_(scene));
+    scene_ = scene;
+    return "frame 0 of scene '" + scene.name + "'";
+  });
+}
+
+}  // namespace tissue_sim

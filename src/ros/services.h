@@ -1,0 +1,58 @@
+// Services of the node. Each answers in a thread of its own queue; none stops the simulation.
+#pragma once
+
+#include <ros/node_handle.h>
+#include <std_srvs/SetBool.h>
+#include <std_srvs/Trigger.h>
+#include <tissue_sim/Cut.h>
+#include <tissue_sim/LoadScene.h>
+#include <tissue_sim/StartRecording.h>
+#include <tissue_sim/Step.h>
+
+#include <functional>
+#include <mutex>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "ros/frames.h"
+#include "ros/recorder.h"
+#include "ros/simulation_thread.h"
+
+namespace tissue_sim {
+
+class Services {
+ public:
+  /// Builds the connections to ROS of a scene; throws what Simulation's constructor throws.
+  using MakeSession = std::function<Session(const Scene&)>;
+
+  Services(ros::NodeHandle& node, const Scene& scene, SimulationThread& simulation,
+           Recorder& recorder, const Frames& frames, MakeSession make_session);
+
+  /// Starts a recording of the given topics (all for none), by their names below the node or
+  /// resolved. Returns a message with the bag's path; throws std::runtime_error.
+  std::string start_recording(const std::string& path, const std::vector<std::string>& topics);
+
+ private:
+  bool cut(Cut::Request& request, Cut::Response& response);
+  bool start_recording(StartRecording::Request& request, StartRecording::Response& response);
+  bool stop_recording(std_srvs::Trigger::Request&, std_srvs::Trigger::Response& response);
+  bool reset(std_srvs::Trigger::Request&, std_srvs::Trigger::Response& response);
+  bool pause(std_srvs::SetBool::Request& request, std_srvs::SetBool::Response& response);
+  bool step(Step::Request& request, Step::Response& response);
+  bool load_scene(LoadScene::Request& request, LoadScene::Response& response);
+
+  BladePath read_path(const Cut::Request& request) const;
+  std::set<std::string> select(const std::vector<std::string>& topics) const;
+
+  ros::NodeHandle node_;
+  SimulationThread& simulation_;
+  Recorder& recorder_;
+  const Frames& frames_;
+  MakeSession make_session_;
+  std::mutex rebuilding_;  // one at a time
+  Scene scene_;
+  std::vector<ros::ServiceServer> servers_;  // last: end before what they call
+};
+
+}  // namespace tissue_sim

@@ -1,0 +1,307 @@
+#include "ros/simulation_thread.h"
+
+#include <ros/console.h>
+
+#include <stdexcept>
+#include <utility>
+
+namespace tissue_sim {
+namespace {
+
+constexpr std::chrono::milliseconds kIdle(200);  // between two looks at a simulation at rest
+
+std::runtime_error ended() { return std::runtime_error("the node is shutting down"); }
+
+}  // namespace
+
+SimulationThread::SimulationThread(Session session, const Parameters& parameters)
+    : parameters_(parameters), session_(std::move(session)) {
+  run_.paused = parameters.paused;
+  start_session();
+  thread_ = std::thread(&SimulationThread::run, this);
+}
+
+SimulationThread::~SimulationThread() { stop(); }
+
+void SimulationThread::stop() {
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    stop_ = true;
+  }
+  wake_.notify_all();
+  if (thread_.joinable()) thread_.join();
+  const std::lock_guard<std::mutex> lock(mutex_);
+  work_.clear();  // what was promised in there is broken, which wakes who waits for it
+  cuts_.clear();
+  if (std::exchange(steps_left_, 0) > 0) step_reply_ = {};
+}
+
+void SimulationThread::post(std::function<void()> work) {
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    if (stop_) throw ended();
+    work_.push_back(std::move(work));
+  }
+  wake_.notify_all();
+}
+
+void SimulationThread::call(std::function<void()> work) {
+  const auto task = std::make_shared<std::packaged_task<void()>>(std::move(work));
+  std::future<void> done = task->get_future();
+  post([task] { (*task)(); });
+  try {
+    done.get();
+  } catch (const std::future_error&) {
+    throw ended();
+  }
+}
+
+CutReply SimulationThread::cut(const BladePath& path) {
+  const auto pending = std::make_shared<PendingCut>();
+  pending->path = path;
+  std::future<CutReply> reply = pending->reply.get_future();
+  call([this, pending] {
+    if (run_.blew_up) throw std::runtime_error(problem_);
+    cuts_.push_back(std::move(*pending));
+  });
+  try {
+    return reply.get();
+  } catch (const std::future_error&) {
+    throw ended();
+  }
+}
+
+StepReply SimulationThread::step(int frames) {
+  std::future<StepReply> reply;
+  call([&] {
+    if (run_.blew_up) throw std::runtime_error(problem_);
+    if (!run_.paused) throw std::runtime_error("the simulation is running: pause it to step it");
+    if (steps_left_ > 0) {
+      throw std::runtime_error("another step has " + std::to_string(steps_left_) +
+                               " frames to go: wait for it");
+    }
+    steps_left_ = frames;
+    step_reply_ = {};
+    reply = step_reply_.get_future();
+    real_time_factor_.restart();
+  });
+  try {
+    return reply.get();
+  } catch (const std::future_error&) {
+    throw ended();
+  }
+}
+
+void SimulationThread::set_paused(bool paused) {
+  call([this, paused] {
+    if (steps_left_ > 0) throw std::runtime_error("a step is running: wait for it");
+    if (!paused && run_.blew_up) throw std::runtime_error(problem_);
+    if (paused == run_.paused) return;
+    run_.paused = paused;
+    resumed_ = !paused;
+    pace_->restart(WallClock::now());
+    real_time_factor_.restart();
+    update_status();
+  });
+}
+
+void SimulationThread::reset(std::unique_ptr<Simulation> simulation) {
+  // The old one is destroyed by the caller, not in the simulation's time.
+  call([&] {
+    std::swap(session_.simulation, simulation);
+    for (const auto& tool : *session_.tools) tool->rewind();
+    start_session();
+  });
+}
+
+void SimulationThread::replace(Session session) {
+  call([&] {
+    std::swap(session_, session);
+    start_session();
+  });
+}
+
+void SimulationThread::record_scene() {
+  call([this] { session_.publications->record_scene(); });
+}
+
+RunStatus SimulationThread::status() const {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  return status_;
+}
+
+std::shared_ptr<ToolInputs> SimulationThread::tools() const {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  return tools_;
+}
+
+std::set<std::string> SimulationThread::topics() const {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  return topics_;
+}
+
+void SimulationThread::start_session() {
+  const Scene& scene = session_.simulation->scene();
+  answer_step("the simulation was started anew");
+  for (PendingCut& cut : std::exchange(cuts_, {})) {
+    cut.reply.set_value({false, "the simulation was started anew", {}});
+  }
+  motion_.assign(scene.tools.size(), ToolMotion());
+  pace_.emplace(scene.frame_rate);
+  pace_->restart(WallClock::now());
+  real_time_factor_.restart();
+  report_ = FrameReport();
+  report_.input.tools = motion_;
+  run_.blew_up = false;
+  run_.real_time_factor = 0;
+  problem_.clear();
+  session_.publications->announce();
+  update_status();
+  std::set<std::string> topics = session_.publications->topics();
+  for (const auto& tool : *session_.tools) {
+    topics.insert(tool->jaw_topic());
+    if (!tool->pose_topic().empty()) topics.insert(tool->pose_topic());
+  }
+  const std::lock_guard<std::mutex> lock(mutex_);
+  tools_ = session_.tools;
+  topics_ = std::move(topics);
+}
+
+bool SimulationThread::active() const {
+  return !run_.blew_up && (!run_.paused || steps_left_ > 0 || !cuts_.empty());
+}
+
+void SimulationThread::run() {
+  WallTime shown = WallClock::now();
+  for (;;) {
+    std::vector<std::function<void()>> work;
+    {
+      const WallTime now = WallClock::now();
+      const WallTime until = !active() ? now + kIdle : run_.paused ? now : pace_->due();
+      std::unique_lock<std::mutex> lock(mutex_);
+      wake_.wait_until(lock, until, [this] { return stop_ || !work_.empty(); });
+      if (stop_) return;
+      work.swap(work_);
+    }
+    for (const std::function<void()>& each : work) each();
+    const WallTime now = WallClock::now();
+    if (active()) {
+      if (run_.paused || now >= pace_->due()) frame();
+    } else if (now - shown >= kIdle) {
+      shown = now;
+      run_.real_time_factor = 0;
+      session_.publications->show(*session_.simulation, report_, run_);
+    }
+  }
+}
+
+void SimulationThread::move_tools(AppliedInput& input) {
+  const double reach = parameters_.max_tool_speed / session_.simulation->scene().frame_rate;
+  input.tools = motion_;
+  for (std::size_t i = 0; i < input.tools.size(); ++i) {
+    const std::optional<ToolInput::Sample> sample = (*session_.tools)[i]->take();
+    if (!sample) continue;
+    ToolMotion& m = input.tools[i];
+    m.end = sample->pose;
+    m.jaw_end = static_cast<float>(sample->jaw);
+    // What an arm did during a pause must not cut a straight line through the tissue now.
+    const bool strayed = resumed_ && (m.end.position - m.begin.position).norm() > reach;
+    if (!m.present || sample->placed || strayed) {
+      m.begin = m.end;
+      m.jaw_begin = m.jaw_end;
+    }
+    m.present = true;
+  }
+  resumed_ = false;
+}
+
+void SimulationThread::frame() {
+  Simulation& simulation = *session_.simulation;
+  std::vector<PendingCut> cuts = std::exchange(cuts_, {});
+  try {
+    pace_->begin_frame(WallClock::now());
+    AppliedInput input;
+    input.frame = simulation.frame();
+    move_tools(input);
+    for (const PendingCut& cut : cuts) input.cuts.push_back(cut.path);
+    simulation.apply(input);
+    report_ = simulation.advance_frame();
+  } catch (const std::exception& e) {
+    for (PendingCut& cut : cuts) cut.reply.set_value({false, e.what(), {}});
+    fail(std::string("the simulation failed: ") + e.what() + ": reset it");
+    return;
+  }
+  motion_ = report_.input.tools;
+  for (ToolMotion& m : motion_) {
+    m.begin = m.end;
+    m.jaw_begin = m.jaw_end;
+  }
+  real_time_factor_.add(WallClock::now(), simulation.time());
+  run_.real_time_factor = real_time_factor_.value();
+  if (report_.result.blew_up) {
+    run_.blew_up = true;
+    problem_ = "the simulation blew up in frame " + std::to_string(report_.input.frame) +
+               " and stands still: reset it";
+  }
+  const bool last_step = steps_left_ == 1 || (run_.paused && steps_left_ == 0);
+  session_.publications->publish(simulation, report_, run_, last_step);
+  answer_cuts(cuts, report_);
+  if (run_.blew_up) {
+    fail(problem_);
+    return;
+  }
+  update_status();
+  if (steps_left_ > 0 && --steps_left_ == 0) {
+    step_reply_.set_value({true, "", simulation.frame(), simulation.time()});
+  }
+}
+
+void SimulationThread::answer_cuts(std::vector<PendingCut>& cuts, const FrameReport& report) {
+  for (std::size_t i = 0; i < cuts.size(); ++i) {
+    CutReply reply;
+    if (i < report.result.cut_reports.size()) reply.report = report.result.cut_reports[i];
+    reply.success = reply.report.points_separated > 0 && !run_.blew_up;
+    if (run_.blew_up) {
+      reply.message = problem_;
+    } else if (!reply.success) {
+      reply.message =
+          "the cut misses the tissue: nothing lies on the surface that the edge sweeps, or it is "
+          "cut already";
+    }
+    cuts[i].reply.set_value(reply);
+  }
+}
+
+void SimulationThread::answer_step(const char* interrupted) {
+  if (std::exchange(steps_left_, 0) == 0) return;
+  step_reply_.set_value({false, interrupted, session_.simulation->frame(),
+                         session_.simulation->time()});
+}
+
+void SimulationThread::fail(const std::string& problem) {
+  ROS_ERROR("%s", problem.c_str());
+  run_.blew_up = true;
+  problem_ = problem;
+  answer_step(problem.c_str());
+  update_status();
+}
+
+void SimulationThread::update_status() {
+  Tissue& tissue = session_.simulation->tissue();
+  RunStatus s;
+  s.run = run_;
+  s.problem = problem_;
+  s.frame = session_.simulation->frame();
+  s.time = session_.simulation->time();
+  s.frame_rate = session_.simulation->scene().frame_rate;
+  s.substeps = report_.substeps;
+  s.substep = report_.substep;
+  s.compute_time = report_.compute_time;
+  s.particles = tissue.point_count();
+  s.fragments = tissue.fragments().size();
+  s.device = tissue.device_name();
+  const std::lock_guard<std::mutex> lock(mutex_);
+  status_ = std::move(s);
+}
+
+}  // namespace tissue_sim

@@ -1,0 +1,128 @@
+// SimulationThread: owns the simulation and advances it against the wall clock. Everything else talks
+// to it between two frames, so nothing that is slow ever stops it.
+#pragma once
+
+#include <condition_variable>
+#include <functional>
+#include <future>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <set>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "ros/pace.h"
+#include "ros/parameters.h"
+#include "ros/publications.h"
+#include "ros/tool_input.h"
+#include "tissue_sim/simulation.h"
+
+namespace tissue_sim {
+
+using ToolInputs = std::vector<std::unique_ptr<ToolInput>>;  // parallels Scene::tools
+
+/// One scene's simulation and its connections to ROS.
+struct Session {
+  std::unique_ptr<Simulation> simulation;
+  std::shared_ptr<ToolInputs> tools;
+  std::shared_ptr<Publications> publications;
+};
+
+/// What diagnostics says.
+struct RunStatus {
+  RunState run;
+  std::string problem;  ///< why it stands still, if it blew up
+  std::int64_t frame = 0;
+  double time = 0, frame_rate = 0;
+  int substeps = 0;
+  double substep = 0, compute_time = 0;
+  int particles = 0;
+  std::size_t fragments = 0;
+  std::string device;
+};
+
+struct CutReply {
+  bool success = false;
+  std::string message;
+  CutReport report;
+};
+
+struct StepReply {
+  bool success = false;
+  std::string message;
+  std::int64_t frame = 0;
+  double time = 0;
+};
+
+/// The public functions are for other threads. They wait until the simulation's thread has done what
+/// they ask, and throw std::runtime_error with the reason if it does not.
+class SimulationThread {
+ public:
+  SimulationThread(Session session, const Parameters& parameters);
+  ~SimulationThread();
+  /// Ends the thread; who waits for an answer gets an exception.
+  void stop();
+
+  /// In the next frame, which is advanced even while paused.
+  CutReply cut(const BladePath& path);
+  /// `frames` frames as fast as they go.
+  StepReply step(int frames);
+  void set_paused(bool paused);
+  /// Frame 0 of the same scene; the tools stay where they are.
+  void reset(std::unique_ptr<Simulation> simulation);
+  void replace(Session session);
+  void record_scene();
+
+  RunStatus status() const;
+  std::shared_ptr<ToolInputs> tools() const;
+  /// Names of the topics that a recording holds unless others are asked for: all but markers.
+  std::set<std::string> topics() const;
+
+ private:
+  struct PendingCut {
+    BladePath path;
+    std::promise<CutReply> reply;
+  };
+
+  void run();
+  void frame();
+  void move_tools(AppliedInput& input);
+  void answer_cuts(std::vector<PendingCut>& cuts, const FrameReport& report);
+  void answer_step(const char* interrupted);
+  void fail(const std::string& problem);
+  void start_session();
+  void update_status();
+  bool active() const;
+  /// Runs `work` between two frames and waits for it.
+  void call(std::function<void()> work);
+  void post(std::function<void()> work);
+
+  const Parameters parameters_;
+
+  // Of the thread alone.
+  Session session_;
+  std::vector<ToolMotion> motion_;  // at rest where the last frame left them
+  std::optional<Pace> pace_;
+  RealTimeFactor real_time_factor_;
+  FrameReport report_;  // of the last frame
+  RunState run_;
+  std::string problem_;
+  bool resumed_ = false;  // no frame since the pause
+  std::vector<PendingCut> cuts_;
+  int steps_left_ = 0;
+  std::promise<StepReply> step_reply_;
+
+  mutable std::mutex mutex_;  // of what follows
+  std::condition_variable wake_;
+  std::vector<std::function<void()>> work_;
+  bool stop_ = false;
+  RunStatus status_;
+  std::shared_ptr<ToolInputs> tools_;
+  std::set<std::string> topics_;
+
+  std::thread thread_;
+};
+
+}  // namespace tissue_sim

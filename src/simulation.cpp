@@ -40,7 +40,7 @@ struct Simulation::State {
   Scene scene;
   std::unique_ptr<Tissue> tissue;
   std::int64_t frame = 0;
-  std::vector<ToolMotion> tools;   // as they stand after the last frame, then as set for the next
+  std::vector<ToolMotion> tools;  // as they stand after the last frame, then as set for the next
   std::vector<BladePath> cuts;
   double wave_speed = 0;
   bool blew_up = false;
@@ -66,7 +66,8 @@ double Simulation::time() const { return state_->frame / state_->scene.frame_rat
 
 void Simulation::set_tool(int tool, const Pose& pose, double jaw) {
   if (tool < 0 || tool >= static_cast<int>(state_->tools.size())) {
-    throw std::invalid_argument("tool " + std::to_string(tool) + " is not in the scene, which has " +
+    throw std::invalid_argument("tool " + std::to_string(tool) +
+                                " is not in the scene, which has " +
                                 std::to_string(state_->tools.size()));
   }
   check(pose, "the pose of tool '" + state_->scene.tools[tool].name + "'");

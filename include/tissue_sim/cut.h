@@ -17,8 +17,8 @@ struct BladePath {
 
 /// What one frame's cutting did.
 struct CutReport {
-  int64_t bonds_broken = 0;      ///< bonds between neighbouring particles
-  int points_separated = 0;      ///< particles that lost a bond
+  int64_t bonds_broken = 0;        ///< bonds between neighbouring particles
+  int points_separated = 0;        ///< particles that lost a bond
   std::vector<int> new_fragments;  ///< ids that appeared
 };
 

@@ -10,14 +10,14 @@ namespace tissue_sim {
 /// others get ids never used before.
 struct Fragment {
   int id = 0;
-  int parent = -1;       ///< the piece it came from, -1 for a body
-  int body = 0;          ///< index into Scene::bodies
-  bool loose = false;    ///< no anchored point, and came off a body (or the body is anchored)
+  int parent = -1;     ///< the piece it came from, -1 for a body
+  int body = 0;        ///< index into Scene::bodies
+  bool loose = false;  ///< no anchored point, and came off a body (or the body is anchored)
   int point_count = 0;
-  double volume = 0;     ///< in the reference configuration [m^3]
+  double volume = 0;             ///< in the reference configuration [m^3]
   Vec3 centroid = Vec3::Zero();  ///< [m]
   Vec3 velocity = Vec3::Zero();  ///< of the centre of mass [m/s]
-  Box box;               ///< of the points [m]
+  Box box;                       ///< of the points [m]
 };
 
 }  // namespace tissue_sim

@@ -30,14 +30,14 @@ struct Region {
 struct Body {
   std::string name = "tissue";
   Shape shape = Shape::kBox;
-  Vec3 size = Vec3(0.08, 0.05, 0.03);   ///< box: edge lengths [m]
-  double radius = 0.02;                 ///< ball, cylinder [m]
-  Vec3 radii = Vec3(0.03, 0.02, 0.015); ///< ellipsoid: semi-axes [m]
-  double height = 0.04;                 ///< cylinder, along z [m]
-  std::string mesh;                     ///< mesh: plain path, file:// or package:// (STL, OBJ, PLY)
-  double scale = 1.0;                   ///< mesh: metres per unit of the file (0.001 for mm)
-  Pose pose;                            ///< of the shape's centre; of a mesh's own origin
-  std::string material = "liver";       ///< a name in Scene::materials or a preset
+  Vec3 size = Vec3(0.08, 0.05, 0.03);    ///< box: edge lengths [m]
+  double radius = 0.02;                  ///< ball, cylinder [m]
+  Vec3 radii = Vec3(0.03, 0.02, 0.015);  ///< ellipsoid: semi-axes [m]
+  double height = 0.04;                  ///< cylinder, along z [m]
+  std::string mesh;                ///< mesh: plain path, file:// or package:// (STL, OBJ, PLY)
+  double scale = 1.0;              ///< mesh: metres per unit of the file (0.001 for mm)
+  Pose pose;                       ///< of the shape's centre; of a mesh's own origin
+  std::string material = "liver";  ///< a name in Scene::materials or a preset
   std::vector<Region> anchors;
 };
 
@@ -52,13 +52,13 @@ struct Scene {
   std::string name = "tissue";
   Method method = Method::kMpm;
   Device device = Device::kAuto;
-  int threads = 0;                       ///< CPU threads, 0 for all
-  double cell_size = 0.003;              ///< grid spacing [m]; two points a cell along each axis
-  double frame_rate = 60.0;              ///< frames a second of simulated time [Hz], 1 to 2000
-  double cfl = 0.5;                      ///< substep * wave speed / cell size, 0.05 to 0.9
-  double damping = 0.0;                  ///< drag by what surrounds the tissue: speeds decay as
-                                         ///< exp(-damping t) [1/s], 0 to 1000
-  Vec3 gravity = Vec3(0, 0, -9.81);      ///< [m/s^2]
+  int threads = 0;                   ///< CPU threads, 0 for all
+  double cell_size = 0.003;          ///< grid spacing [m]; two points a cell along each axis
+  double frame_rate = 60.0;          ///< frames a second of simulated time [Hz], 1 to 2000
+  double cfl = 0.5;                  ///< substep * wave speed / cell size, 0.05 to 0.9
+  double damping = 0.0;              ///< drag by what surrounds the tissue: speeds decay as
+                                     ///< exp(-damping t) [1/s], 0 to 1000
+  Vec3 gravity = Vec3(0, 0, -9.81);  ///< [m/s^2]
   std::uint64_t seed = 0;
   Ground ground;
   std::vector<Material> materials;

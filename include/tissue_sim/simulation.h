@@ -28,9 +28,9 @@ struct FrameReport {
   AppliedInput input;
   FrameResult result;
   int substeps = 0;
-  double substep = 0;      ///< [s]
-  double cfl = 0;          ///< substep * wave speed / cell size
-  double compute_time = 0; ///< wall time that the frame took [s]
+  double substep = 0;       ///< [s]
+  double cfl = 0;           ///< substep * wave speed / cell size
+  double compute_time = 0;  ///< wall time that the frame took [s]
 };
 
 /// Not thread-safe: one thread owns it. Time is an integer count of frames.

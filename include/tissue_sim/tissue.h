@@ -23,13 +23,13 @@ struct FrameInput {
 
 /// What one frame brought.
 struct FrameResult {
-  std::vector<ToolLoad> loads;       ///< parallels Scene::tools
+  std::vector<ToolLoad> loads;         ///< parallels Scene::tools
   std::vector<CutReport> cut_reports;  ///< parallels FrameInput::cuts
-  CutReport blade_report;            ///< what the instruments' edges cut
-  double kinetic_energy = 0;         ///< [J]
-  double elastic_energy = 0;         ///< [J]
-  double max_speed = 0;              ///< of a grid node [m/s]
-  bool blew_up = false;              ///< something is not finite, or moves faster than it can
+  CutReport blade_report;              ///< what the instruments' edges cut
+  double kinetic_energy = 0;           ///< [J]
+  double elastic_energy = 0;           ///< [J]
+  double max_speed = 0;                ///< of a point [m/s]
+  bool blew_up = false;                ///< something is not finite, or moves faster than it can
 };
 
 class Tissue {
@@ -56,8 +56,9 @@ class Tissue {
   virtual std::string device_name() const = 0;
 };
 
-/// Builds the tissue of a valid scene. Throws std::invalid_argument for what cannot be built (a mesh
-/// that cannot be read, a body thinner than a cell) and std::runtime_error for a device not there.
+/// Builds the tissue of a valid scene. Throws std::invalid_argument for what cannot be built (a
+/// mesh that cannot be read, a body thinner than a cell) and std::runtime_error for a device not
+/// there.
 std::unique_ptr<Tissue> make_tissue(const Scene& scene);
 
 }  // namespace tissue_sim

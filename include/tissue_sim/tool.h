@@ -15,14 +15,14 @@ enum class ToolType {
 };
 
 struct Tool {
-  std::string name = "probe";          ///< a ROS name: letters, digits, '_'; unique in the scene
+  std::string name = "probe";  ///< a ROS name: letters, digits, '_'; unique in the scene
   ToolType type = ToolType::kProbe;
-  double radius = 0.003;               ///< probe: of the capsule [m]
-  double length = 0.10;                ///< probe: of the shaft that touches tissue [m]
-  double blade_length = 0.025;         ///< scalpel: edge from the tip to the heel, along -z [m]
-  double blade_width = 0.006;          ///< scalpel: from the edge to the spine, along -x [m]
-  double blade_thickness = 0.0004;     ///< scalpel: along y [m]
-  double friction = 0.3;               ///< Coulomb friction against tissue [-], 0 to 2
+  double radius = 0.003;            ///< probe: of the capsule [m]
+  double length = 0.10;             ///< probe: of the shaft that touches tissue [m]
+  double blade_length = 0.025;      ///< scalpel: edge from the tip to the heel, along -z [m]
+  double blade_width = 0.006;       ///< scalpel: from the edge to the spine, along -x [m]
+  double blade_thickness = 0.0004;  ///< scalpel: along y [m]
+  double friction = 0.3;            ///< Coulomb friction against tissue [-], 0 to 2
 };
 
 /// Motion of one tool over one frame: position linear, orientation slerp between the two.
@@ -34,8 +34,8 @@ struct ToolMotion {
 
 /// What the tissue did to a tool during one frame, at the tool's tip, in world axes.
 struct ToolLoad {
-  Wrench mean;             ///< mean over the substeps of the frame
-  double peak_force = 0;   ///< largest force of a substep [N]
+  Wrench mean;            ///< mean over the substeps of the frame
+  double peak_force = 0;  ///< largest force of a substep [N]
 };
 
 }  // namespace tissue_sim

@@ -13,7 +13,7 @@ using Quat = Eigen::Quaterniond;
 
 /// A rigid placement: x_world = orientation * x_local + position [m].
 struct Pose {
-  Vec3 position = Vec3::Zero();       ///< [m]
+  Vec3 position = Vec3::Zero();         ///< [m]
   Quat orientation = Quat::Identity();  ///< unit quaternion
 
   Vec3 operator*(const Vec3& local) const { return orientation * local + position; }

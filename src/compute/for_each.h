@@ -1,5 +1,5 @@
-// for_each: where a kernel runs. A kernel is a named functor with a host/device operator()(int); the
-// CPU spreads it over threads, a .cu file launches the same functor on the GPU.
+// for_each: where a kernel runs. A kernel is a named functor with a host/device operator()(int);
+// the CPU spreads it over threads, a .cu file launches the same functor on the GPU.
 #pragma once
 
 #include <tbb/blocked_range.h>
@@ -14,8 +14,8 @@ class Cpu {
   explicit Cpu(int threads) : arena_(threads > 0 ? threads : tbb::task_arena::automatic) {}
   int threads() { return arena_.max_concurrency(); }
 
-  /// Calls f(i) for each i in [0, n), `grain` at a time on a thread. Which thread does what is open:
-  /// for the same bits, f(i) writes only what is i's.
+  /// Calls f(i) for each i in [0, n), `grain` at a time on a thread. Which thread does what is
+  /// open: for the same bits, f(i) writes only what is i's.
   template <class F>
   void for_each(int n, const F& f, int grain = 1) {
     if (threads() == 1) {
@@ -23,9 +23,10 @@ class Cpu {
       return;
     }
     arena_.execute([&] {
-      tbb::parallel_for(tbb::blocked_range<int>(0, n, grain), [&](const tbb::blocked_range<int>& r) {
-        for (int i = r.begin(); i < r.end(); ++i) f(i);
-      });
+      tbb::parallel_for(tbb::blocked_range<int>(0, n, grain),
+                        [&](const tbb::blocked_range<int>& r) {
+                          for (int i = r.begin(); i < r.end(); ++i) f(i);
+                        });
     });
   }
 

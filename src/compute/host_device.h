@@ -6,7 +6,7 @@
 #define TISSUE_SIM_INLINE __host__ __device__ __forceinline__
 #else
 #define TISSUE_SIM_HOST_DEVICE
-// Always inlined on the CPU: the code is then compiled for the instruction set of the kernel that it
-// is inlined into, which is how one header serves SSE2, AVX2 and AVX-512 in one binary.
+// Always inlined on the CPU: the code is then compiled for the instruction set of the kernel that
+// it is inlined into, which is how one header serves SSE2, AVX2 and AVX-512 in one binary.
 #define TISSUE_SIM_INLINE inline __attribute__((always_inline))
 #endif

@@ -23,9 +23,12 @@ InstructionSet best() {
 
 const char* name(InstructionSet set) {
   switch (set) {
-    case InstructionSet::kAvx512: return "AVX-512";
-    case InstructionSet::kAvx2: return "AVX2";
-    default: return "SSE2";
+    case InstructionSet::kAvx512:
+      return "AVX-512";
+    case InstructionSet::kAvx2:
+      return "AVX2";
+    default:
+      return "SSE2";
   }
 }
 

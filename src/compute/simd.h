@@ -1,5 +1,5 @@
-// Short vectors of floats by the compiler's vector extension: `Vec<16>` is one AVX-512 register, two
-// of AVX2 or four of SSE2. Arithmetic is written with ordinary operators; scalars mix in.
+// Short vectors of floats by the compiler's vector extension: `Vec<16>` is one AVX-512 register,
+// two of AVX2 or four of SSE2. Arithmetic is written with ordinary operators; scalars mix in.
 #pragma once
 
 #include <cstdint>

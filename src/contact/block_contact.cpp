@@ -9,51 +9,22 @@
 namespace tissue_sim {
 namespace {
 
-// Stiffness of a contact spring in units of the P-wave modulus over a point's edge: half of it makes
-// contact about as stiff as one layer of points, and adds less to the highest frequency than tissue.
-constexpr float kStiffness = 0.5f;
-constexpr float kDamping = 0.3f;  // share of critical
-
 ContactSpring spring_of(const LatticeBody& body, float volume) {
   const Material& m = body.material;
   const auto modulus = static_cast<float>(lame_lambda(m) + 2 * lame_mu(m));
   const float edge = 0.5f * static_cast<float>(body.cell_size);
-  const float k = kStiffness * modulus * volume / (edge * edge);
-  return {k, 2 * kDamping * std::sqrt(k * static_cast<float>(m.density) * volume)};
+  return contact_spring(modulus, static_cast<float>(m.density), edge, volume);
 }
 
 bool overlap(const Box& a, const Box& b) {
   return (a.min.array() <= b.max.array()).all() && (b.min.array() <= a.max.array()).all();
 }
 
-/// Where the block's nodes are, and how fast the fastest moves.
-Box node_bounds(const MpmState& state, const Block& block, double* speed) {
-  Box box;
-  double v2 = 0;
-  const LatticeBody& b = state.bodies[block.body];
-  const Nodes& n = state.nodes;
-  for (int z = 0; z < block.nz + 2; ++z) {
-    for (int y = 0; y < block.ny + 2; ++y) {
-      for (int x = 0; x < block.pitch; ++x) {
-        const int i = block.node[z * block.plane + y * block.pitch + x];
-        if (n.mass[i] <= 0) continue;
-        const Vec3 place = b.node_position(block.x + x - 1, block.y + y - 1, block.z + z - 1) +
-                           Vec3(n.u[0][i], n.u[1][i], n.u[2][i]);
-        box.min = box.min.cwiseMin(place);
-        box.max = box.max.cwiseMax(place);
-        v2 = std::max(v2, Vec3(n.v[0][i], n.v[1][i], n.v[2][i]).squaredNorm());
-      }
-    }
-  }
-  *speed = std::sqrt(v2);
-  return box;
-}
-
 /// One point's stencil in its block.
 struct Stencil {
   int first;  // local number of its lowest node
   int pitch, plane;
-  int s[3];   // sub-position
+  int s[3];  // sub-position
   int local(int k) const { return first + k / 9 * plane + k / 3 % 3 * pitch + k % 3; }
   float weight(int k) const {
     return lattice_weight(s[0], k % 3) * lattice_weight(s[1], k / 3 % 3) *
@@ -95,9 +66,8 @@ void find_near_colliders(MpmState& state, const std::vector<Box>& reach, double 
   contacts.near.assign(count, {});
   contacts.touching.resize(count);
   state.cpu->for_each(count, [&](int i) {
-    double speed = 0;
-    Box box = node_bounds(state, *state.blocks.all[i], &speed);
-    const double margin = speed * duration + 0.5 * state.scene.cell_size;
+    Box box = state.motion[i].box;
+    const double margin = state.motion[i].speed * duration + 0.5 * state.scene.cell_size;
     box.min.array() -= margin;
     box.max.array() += margin;
     for (std::size_t c = 0; c < reach.size(); ++c) {
@@ -113,6 +83,7 @@ void find_near_colliders(MpmState& state, const std::vector<Box>& reach, double 
 void list_contacts(MpmState& state) {
   Contacts& contacts = state.contacts;
   contacts.touching.assign(state.blocks.all.size(), {});
+  contacts.near.assign(state.blocks.all.size(), {});
   for (std::size_t i = 0; i < state.blocks.all.size(); ++i) {
     for (const std::int32_t p : state.blocks.all[i]->point) {
       if (p >= 0 && contacts.with[p] != 0) contacts.touching[i].push_back(p);

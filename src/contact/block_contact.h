@@ -11,11 +11,11 @@ namespace tissue_sim {
 Box bounds(const Collider& collider);
 
 /// Finds out which colliders each block may meet in a frame of `duration` seconds, from where its
-/// nodes are and how fast they and the colliders (from `begin` to `end`) move; lets go of contacts
-/// that are out of reach.
+/// points are, how fast they move (MpmState::motion) and what each collider sweeps (`reach`); lets
+/// go of contacts that are out of reach.
 void find_near_colliders(MpmState& state, const std::vector<Box>& reach, double duration);
 
-/// Rebuilds the lists of points in contact after blocks were made anew.
+/// Makes the lists of points in contact after blocks were made, with no collider near.
 void list_contacts(MpmState& state);
 
 /// Adds contact forces to the block's part of the force buffer and sums the loads of the colliders.

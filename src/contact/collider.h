@@ -9,16 +9,16 @@ namespace tissue_sim {
 
 struct Collider {
   enum Kind { kPlane, kCapsule, kBlade } kind = kPlane;
-  float position[3] = {};    ///< of the tip; of a point of the plane [m]
+  float position[3] = {};                           ///< of the tip; of a point of the plane [m]
   float rotation[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1};  ///< local to world, row-major
-  float velocity[3] = {};    ///< of the tip [m/s]
-  float spin[3] = {};        ///< angular velocity, world axes [rad/s]
-  float length = 0;          ///< capsule, blade: along local -z from the tip [m]
-  float radius = 0;          ///< capsule [m]
-  float width = 0;           ///< blade: along local -x from the edge [m]
-  float thickness = 0;       ///< blade: along local y [m]
-  float friction = 0;        ///< Coulomb
-  int tool = -1;             ///< index into Scene::tools, -1 for the ground
+  float velocity[3] = {};                           ///< of the tip [m/s]
+  float spin[3] = {};                               ///< angular velocity, world axes [rad/s]
+  float length = 0;     ///< capsule, blade: along local -z from the tip [m]
+  float radius = 0;     ///< capsule [m]
+  float width = 0;      ///< blade: along local -x from the edge [m]
+  float thickness = 0;  ///< blade: along local y [m]
+  float friction = 0;   ///< Coulomb
+  int tool = -1;        ///< index into Scene::tools, -1 for the ground
 };
 
 /// Distance to the surface (negative inside) and the outward normal, world axes.
@@ -65,8 +65,8 @@ TISSUE_SIM_INLINE Gap gap(const Collider& c, const float* x) {
   }
   Gap g{distance, {0, 0, 0}};
   for (int i = 0; i < 3; ++i) {
-    g.normal[i] = c.rotation[3 * i] * n[0] + c.rotation[3 * i + 1] * n[1] +
-                  c.rotation[3 * i + 2] * n[2];
+    g.normal[i] =
+        c.rotation[3 * i] * n[0] + c.rotation[3 * i + 1] * n[1] + c.rotation[3 * i + 2] * n[2];
   }
   return g;
 }
@@ -87,8 +87,23 @@ struct ContactSpring {
   float damping;    ///< [N s/m]
 };
 
-/// Force on the point at x with velocity v, in contact (`g.distance` < 0). `hold` is the place, in the
-/// collider's frame, that friction holds on to; it slides with the point where the cone is reached.
+// Stiffness of a contact spring in units of the P-wave modulus over a point's edge: half of it
+// makes contact about as stiff as one layer of points, and adds less to the highest frequency than
+// tissue.
+inline constexpr float kContactStiffness = 0.5f;
+inline constexpr float kContactDamping = 0.3f;  ///< share of critical
+
+/// The spring of a point of `volume` [m^3], `edge` [m] apart from the next, in tissue of this
+/// P-wave modulus [Pa] and density [kg/m^3]. Both of its figures are in proportion to the volume.
+TISSUE_SIM_INLINE ContactSpring contact_spring(float modulus, float density, float edge,
+                                               float volume) {
+  const float k = kContactStiffness * modulus * volume / (edge * edge);
+  return {k, 2 * kContactDamping * sqrtf(k * density * volume)};
+}
+
+/// Force on the point at x with velocity v, in contact (`g.distance` < 0). `hold` is the place, in
+/// the collider's frame, that friction holds on to; it slides with the point where the cone is
+/// reached.
 TISSUE_SIM_INLINE void contact_force(const Collider& c, const Gap& g, const ContactSpring& spring,
                                      const float* x, const float* v, float* hold, float* force) {
   float vc[3], held[3], rel[3];

@@ -90,8 +90,8 @@ bool edge_passes(const MovingSegment& e, const MovingSegment& b) {
   const int count = cubic_roots(c, roots);
   for (int i = 0; i < count; ++i) {
     const double s = roots[i];
-    if (segments_cross(e.a0 + s * (e.a1 - e.a0), e.b0 + s * (e.b1 - e.b0),
-                       b.a0 + s * (b.a1 - b.a0), b.b0 + s * (b.b1 - b.b0))) {
+    if (segments_cross(e.a0 + s * (e.a1 - e.a0), e.b0 + s * (e.b1 - e.b0), b.a0 + s * (b.a1 - b.a0),
+                       b.b0 + s * (b.b1 - b.b0))) {
       return true;
     }
   }

@@ -23,7 +23,7 @@ bool edge_passes(const MovingSegment& edge, const MovingSegment& bond);
 struct SweepPart {
   double begin, end;  ///< in [0, 1] of the time over which the tissue moves
   std::vector<MovingSegment> edges;
-  Box box;            ///< of the edges
+  Box box;  ///< of the edges
 };
 
 /// Takes a path apart at its poses, and between poses so that no part turns by more than 4 degrees.

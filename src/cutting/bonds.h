@@ -2,7 +2,8 @@
 // sets them again; everything about connection follows from them.
 //
 // Six, not 26: a surface that parts two points also parts every path over faces between them, and a
-// point that hung on to its piece by a diagonal alone would be a hinge, free to move without strain.
+// point that hung on to its piece by a diagonal alone would be a hinge, free to move without
+// strain.
 #pragma once
 
 #include <cstdint>

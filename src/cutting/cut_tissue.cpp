@@ -10,14 +10,30 @@
 namespace tissue_sim {
 namespace {
 
-/// Places of a block's points at the beginning and at the end.
-struct BlockPlaces {
-  Array<float> begin, end;
-  Box box;  // of the points, over the whole motion
+/// Places of the points near a sweep, in the order of the points: both ends of a bond must agree to
+/// the last bit on where a point is, or a cut exactly through it might miss the bonds on both
+/// sides.
+struct Places {
+  Array<float> begin, end;  // [3 * point]
+  Vec3 at_begin(std::int32_t p) const {
+    return Eigen::Map<const Eigen::Vector3f>(&begin[3 * std::size_t(p)]).cast<double>();
+  }
+  Vec3 at_end(std::int32_t p) const {
+    return Eigen::Map<const Eigen::Vector3f>(&end[3 * std::size_t(p)]).cast<double>();
+  }
 };
 
-Vec3 place(const Array<float>& x, std::size_t lanes, std::size_t lane) {
-  return Vec3(x[lane], x[lanes + lane], x[2 * lanes + lane]);
+void read_places(MpmState& state, const Block& block, const Array<float>* u, Array<float>& places) {
+  BlockScratch& scratch = state.scratch.local();
+  const std::size_t lanes = block.lane_count();
+  if (scratch.values.size() < 3 * lanes) scratch.values.resize(3 * lanes);
+  const float* x = scratch.values.data();
+  state.kernels->positions(block, block_field(state, block), u, scratch, scratch.values.data());
+  for (std::size_t lane = 0; lane < lanes; ++lane) {
+    if (block.point[lane] < 0) continue;
+    float* to = &places[3 * static_cast<std::size_t>(block.point[lane])];
+    for (int a = 0; a < 3; ++a) to[a] = x[a * lanes + lane];
+  }
 }
 
 bool overlap(const Box& a, const Box& b, double margin) {
@@ -25,17 +41,9 @@ bool overlap(const Box& a, const Box& b, double margin) {
          (b.min.array() <= a.max.array() + margin).all();
 }
 
-/// Place of one point, from its 27 nodes.
-Vec3 point_place(const MpmState& state, std::int32_t p, const Array<float>* u) {
-  const Points::Site& s = state.points.site[p];
-  const LatticeBody& b = state.bodies[s.body];
-  Vec3 x = b.site_position(s.x, s.y, s.z);
-  for (int k = 0; k < 27; ++k) {
-    const int n = state.fields->node(b, s, k);
-    x += static_cast<double>(site_weight(s, k)) * Vec3(u[0][n], u[1][n], u[2][n]);
-  }
-  return x;
-}
+// A sweep looks at points within this many cells, and at blocks within twice as many, so that a
+// bond is seen as long as it is not stretched to three times its length.
+constexpr double kReach = 1.5;
 
 struct Broken {
   std::int32_t point;
@@ -43,39 +51,22 @@ struct Broken {
 };
 
 /// The bonds that the parts pass among those that point forward from the points of one block.
-void sweep_block(const MpmState& state, int index, const std::vector<SweepPart>& parts,
-                 const Array<float>* u_begin, const Array<float>* u_end,
-                 std::vector<Broken>& broken) {
-  const Block& block = *state.blocks.all[index];
+void sweep_block(const MpmState& state, const Block& block, const std::vector<SweepPart>& parts,
+                 const Places& places, std::vector<Broken>& broken) {
   const LatticeBody& body = state.bodies[block.body];
-  const std::size_t lanes = block.lane_count();
-  BlockScratch scratch;
-  BlockPlaces at;
-  at.begin.resize(3 * lanes);
-  state.kernels->positions(block, block_field(state, block), u_begin, scratch, at.begin.data());
-  const bool moving = u_begin != u_end;
-  if (moving) {
-    at.end.resize(3 * lanes);
-    state.kernels->positions(block, block_field(state, block), u_end, scratch, at.end.data());
-  }
-  const Array<float>& end = moving ? at.end : at.begin;
-  // A bond may be stretched: a point is looked at when it is within three of its lengths at rest.
-  const double reach = 1.5 * body.cell_size;
-  for (std::size_t lane = 0; lane < lanes; ++lane) {
-    const std::int32_t p = block.point[lane];
+  const double reach = kReach * body.cell_size;
+  for (const std::int32_t p : block.point) {
     if (p < 0) continue;
-    const Vec3 p0 = place(at.begin, lanes, lane), p1 = place(end, lanes, lane);
+    const Vec3 p0 = places.at_begin(p), p1 = places.at_end(p);
     const Box box{p0.cwiseMin(p1), p0.cwiseMax(p1)};
-    bool near = false;
-    for (const SweepPart& part : parts) near = near || overlap(box, part.box, reach);
-    if (!near) continue;
+    const auto near = [&](const SweepPart& part) { return overlap(box, part.box, reach); };
+    if (std::none_of(parts.begin(), parts.end(), near)) continue;
     const Points::Site& s = state.points.site[p];
     for (int k = kForwardBond; k < kBondCount; ++k) {
       if ((state.points.bonds[p] >> k & 1) == 0) continue;
       const BondOffset o = bond_offset(k);
       const std::int32_t q = body.point(s.x + o.x, s.y + o.y, s.z + o.z);
-      const Vec3 q0 = point_place(state, q, u_begin);
-      const Vec3 q1 = moving ? point_place(state, q, u_end) : q0;
+      const Vec3 q0 = places.at_begin(q), q1 = places.at_end(q);
       for (const SweepPart& part : parts) {
         const MovingSegment bond{p0 + part.begin * (p1 - p0), q0 + part.begin * (q1 - q0),
                                  p0 + part.end * (p1 - p0), q0 + part.end * (q1 - q0)};
@@ -92,32 +83,29 @@ void sweep_block(const MpmState& state, int index, const std::vector<SweepPart>&
 }  // namespace
 
 void sweep_bonds(MpmState& state, const BladePath& path, const Array<float>* u_begin,
-                 const Array<float>* u_end, std::vector<std::int32_t>& changed, CutReport& report) {
+                 const Array<float>* u_end, const std::vector<BlockMotion>& before,
+                 std::vector<std::int32_t>& changed, CutReport& report) {
   const std::vector<SweepPart> parts = sweep_parts(path);
-  const int count = static_cast<int>(state.blocks.all.size());
+  const double reach = 2 * kReach * state.scene.cell_size;
+  std::vector<int> near;
+  for (std::size_t i = 0; i < state.blocks.all.size(); ++i) {
+    const Box& now = state.motion[i].box;
+    const Box box{now.min.cwiseMin(before[i].box.min), now.max.cwiseMax(before[i].box.max)};
+    const auto meets = [&](const SweepPart& part) { return overlap(box, part.box, reach); };
+    if (std::any_of(parts.begin(), parts.end(), meets)) near.push_back(static_cast<int>(i));
+  }
+  const int count = static_cast<int>(near.size());
+  if (count == 0) return;
+  Places places;
+  places.begin.resize(3 * static_cast<std::size_t>(state.points.size()));
+  places.end.resize(places.begin.size());
+  state.cpu->for_each(count, [&](int i) {
+    read_places(state, *state.blocks.all[near[i]], u_begin, places.begin);
+    read_places(state, *state.blocks.all[near[i]], u_end, places.end);
+  });
   std::vector<std::vector<Broken>> broken(count);
   state.cpu->for_each(count, [&](int i) {
-    Box box;
-    const Block& block = *state.blocks.all[i];
-    const LatticeBody& b = state.bodies[block.body];
-    for (int z = 0; z < block.nz + 2; ++z) {
-      for (int y = 0; y < block.ny + 2; ++y) {
-        for (int x = 0; x < block.pitch; ++x) {
-          const int n = block.node[z * block.plane + y * block.pitch + x];
-          if (state.nodes.mass[n] <= 0) continue;
-          const Vec3 X = b.node_position(block.x + x - 1, block.y + y - 1, block.z + z - 1);
-          for (const Array<float>* u : {u_begin, u_end}) {
-            const Vec3 at = X + Vec3(u[0][n], u[1][n], u[2][n]);
-            box.min = box.min.cwiseMin(at);
-            box.max = box.max.cwiseMax(at);
-          }
-        }
-      }
-    }
-    const auto meets = [&](const SweepPart& part) { return overlap(box, part.box, b.cell_size); };
-    if (std::any_of(parts.begin(), parts.end(), meets)) {
-      sweep_block(state, i, parts, u_begin, u_end, broken[i]);
-    }
+    sweep_block(state, *state.blocks.all[near[i]], parts, places, broken[i]);
   });
   const std::size_t first = changed.size();
   for (const std::vector<Broken>& of_block : broken) {

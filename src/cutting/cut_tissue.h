@@ -10,10 +10,11 @@
 namespace tissue_sim {
 
 /// Clears the bonds that a path passes while the tissue moves from the displacements `u_begin` to
-/// `u_end` (the same array for a path through tissue at rest). Appends the points that lost a bond
-/// to `changed` and counts into `report`.
+/// `u_end` (the same array for a path through tissue at rest) and its blocks from `before` to
+/// MpmState::motion. Appends the points that lost a bond to `changed` and counts into `report`.
 void sweep_bonds(MpmState& state, const BladePath& path, const Array<float>* u_begin,
-                 const Array<float>* u_end, std::vector<std::int32_t>& changed, CutReport& report);
+                 const Array<float>* u_end, const std::vector<BlockMotion>& before,
+                 std::vector<std::int32_t>& changed, CutReport& report);
 
 /// Splits nodes and makes blocks anew after the points `changed` lost bonds.
 void take_apart(MpmState& state, const std::vector<std::int32_t>& changed);

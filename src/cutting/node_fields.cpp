@@ -20,7 +20,8 @@ int place(const Points::Site& p, int x, int y, int z) {
 float weight_at(int i) { return lattice_weight(i & 1, 2 - i / 2); }
 
 /// Components of the bonds within the box, numbered by their first place. Returns their count.
-int components(const std::int32_t (&around)[216], const Points& points, std::uint8_t (&label)[216]) {
+int components(const std::int32_t (&around)[216], const Points& points,
+               std::uint8_t (&label)[216]) {
   std::memset(label, kNone, sizeof(label));
   int count = 0;
   std::uint8_t stack[216];
@@ -126,8 +127,8 @@ bool NodeFields::split_node(const LatticeBody& body, const Points& points, int x
   std::vector<std::int32_t> taken;
   for (int i = 0; i < 216; ++i) {
     if (around[i] < 0 || label[i] != split.field.size()) continue;  // the first of its component
-    const int parent = before == splits_.end() ? lattice_node
-                                               : before->second.field[before->second.component[i]];
+    const int parent =
+        before == splits_.end() ? lattice_node : before->second.field[before->second.component[i]];
     int field = parent;
     if (std::find(taken.begin(), taken.end(), parent) != taken.end()) {
       field = static_cast<int>(nodes.size());

@@ -38,10 +38,10 @@ struct Stretch {
 };
 
 /// Solves (a^2 - tr C)^2 / 4 = ||cof F||^2 + 2 J a for its largest root a = tr U by Newton's method
-/// from above, where it converges monotonically (the quartic of Franca 1989; that R is the derivative
-/// of tr U is used by Lin, Chitalu and Komura 2022). The step divides by 2 (a b - J); its
-/// reciprocal is carried along and refined, for divisions are dear.
-/// Relative error below 1e-6 for stretches between 1/3 and 3.
+/// from above, where it converges monotonically (the quartic of Franca 1989; that R is the
+/// derivative of tr U is used by Lin, Chitalu and Komura 2022). The step divides by 2 (a b - J);
+/// its reciprocal is carried along and refined, for divisions are dear. Relative error below 1e-6
+/// for stretches between 1/3 and 3.
 template <class T>
 TISSUE_SIM_INLINE Stretch<T> stretch(T c1, T c2, T J) {
   T a = (c1 + 3.0f) * 0.5f;
@@ -172,7 +172,8 @@ TISSUE_SIM_INLINE T von_mises_squared(const T* F, const T* P) {
   const T J = F[0] * cof[0] + F[1] * cof[1] + F[2] * cof[2];
   for (int i = 0; i < 3; ++i) {
     for (int k = 0; k < 3; ++k) {
-      s[3 * i + k] = P[3 * i] * F[3 * k] + P[3 * i + 1] * F[3 * k + 1] + P[3 * i + 2] * F[3 * k + 2];
+      s[3 * i + k] =
+          P[3 * i] * F[3 * k] + P[3 * i + 1] * F[3 * k + 1] + P[3 * i + 2] * F[3 * k + 2];
     }
   }
   const T d0 = s[0] - s[4], d1 = s[4] - s[8], d2 = s[8] - s[0];

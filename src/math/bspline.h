@@ -1,12 +1,13 @@
-// Quadratic B-spline weights of the lattice. A point sits a quarter of a cell below (s = 0) or above
-// (s = 1) its node along each axis, so the weights of the three nodes are constants.
+// Quadratic B-spline weights of the lattice. A point sits a quarter of a cell below (s = 0) or
+// above (s = 1) its node along each axis, so the weights of the three nodes are constants.
 #pragma once
 
 #include "compute/host_device.h"
 
 namespace tissue_sim {
 
-/// Weight of the node at offset d - 1 (d = 0, 1, 2) for the point at s: 1/2 (3/2 - |r|)^2 or 3/4 - r^2.
+/// Weight of the node at offset d - 1 (d = 0, 1, 2) for the point at s: 1/2 (3/2 - |r|)^2 or 3/4 -
+/// r^2.
 TISSUE_SIM_INLINE float lattice_weight(int s, int d) {
   return d == 1 ? 0.6875f : ((d == 2) == (s == 1) ? 0.28125f : 0.03125f);
 }
@@ -21,8 +22,8 @@ TISSUE_SIM_INLINE float lattice_slope(int s, int d) {
 //   average    A = 11/16 u0 + 5/32 (u+ + u-)
 //   difference d = u+ - u-
 //   bend       B = u+ + u- - 2 u0
-// as value(s) = A +- d / 8 and slope(s) = d / 2 +- B / 4 (+ for s = 1), which is what the kernels of
-// src/mpm/ apply direction by direction.
+// as value(s) = A +- d / 8 and slope(s) = d / 2 +- B / 4 (+ for s = 1), which is what the kernels
+// of src/mpm/ apply direction by direction.
 inline constexpr float kAverageCenter = 0.6875f, kAverageSide = 0.15625f;
 
 }  // namespace tissue_sim

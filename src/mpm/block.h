@@ -1,9 +1,9 @@
 // Block: a box of lattice cells that is worked on as a whole, with its points' volumes.
 //
 // Cells of one z-plane are numbered flat, cell (x, y) at y * pitch + x with pitch = nx + 2, so that
-// SIMD lanes run along x across the row ends, a neighbour along y is `pitch` away, and the node that
-// is dx, dy (0..2) from a cell's lowest is at the cell's number + dy * pitch + dx. The two lanes
-// between rows hold no points: their volume is zero.
+// SIMD lanes run along x across the row ends, a neighbour along y is `pitch` away, and the node
+// that is dx, dy (0..2) from a cell's lowest is at the cell's number + dy * pitch + dx. The two
+// lanes between rows hold no points: their volume is zero.
 #pragma once
 
 #include <cstdint>
@@ -21,12 +21,16 @@ struct Block {
   int x = 0, y = 0, z = 0;     ///< first cell, in cells of the body's lattice
   int nx = 0, ny = 0, nz = 0;  ///< cells
 
-  int pitch = 0;    ///< nx + 2
-  int stride = 0;   ///< lanes of one z-plane of cells, a multiple of kLanes
-  int plane = 0;    ///< nodes of one z-plane, (ny + 2) * pitch and some to fill the last lanes
+  int pitch = 0;   ///< nx + 2
+  int stride = 0;  ///< lanes of one z-plane of cells, a multiple of kLanes
+  int plane = 0;   ///< nodes of one z-plane, (ny + 2) * pitch and some to fill the last lanes
 
-  Array<float> volume;          ///< [nz][8][stride], 0 where there is no point [m^3]
-  Array<std::int32_t> point;    ///< [nz][8][stride], the point's number or -1
+  Array<float> volume;        ///< [nz][8][stride], 0 where there is no point [m^3]
+  Array<std::int32_t> point;  ///< [nz][8][stride], the point's number or -1
+
+  /// [nz][stride]: volume of a cell's points where they are fewer than eight, else 0 [m^3]. Empty
+  /// if every cell of the block is full. See mpm/stabilisation.h.
+  Array<float> partial;
 
   /// Nodes of the block that are not the lattice's own, for the tissue is cut there: the field that
   /// this block's points see instead.
@@ -36,7 +40,8 @@ struct Block {
   };
   std::vector<SplitNode> split_nodes;
 
-  std::vector<std::int32_t> node;  ///< [nz + 2][plane], in Nodes; split ones as this block sees them
+  std::vector<std::int32_t>
+      node;  ///< [nz + 2][plane], in Nodes; split ones as this block sees them
 
   std::size_t force_offset = 0;  ///< of this block's [3][nz + 2][plane] in the force buffer
 

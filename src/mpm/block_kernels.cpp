@@ -6,6 +6,7 @@
 
 #include "material/laws.h"
 #include "mpm/block_passes.h"
+#include "mpm/stabilisation.h"
 
 namespace tissue_sim {
 namespace {
@@ -20,7 +21,9 @@ struct Layout {
   int out_plane;
 
   explicit Layout(const Block& b)
-      : pitch(b.pitch), stride(b.stride), plane(b.plane),
+      : pitch(b.pitch),
+        stride(b.stride),
+        plane(b.plane),
         node_component((b.nz + 2) * b.plane + 2 * kLanes),
         in_plane(3 * kXyCount * b.stride),
         front((2 * b.pitch + kLanes - 1) / kLanes * kLanes),
@@ -50,11 +53,11 @@ void gather_nodes(const Block& b, const BlockField& f, const Array<float>* field
 }
 
 /// The x-y quantities of node plane z, all components, into slot z % 3 of `in`.
-template <int W>
+template <int W, bool bend_bend = false>
 TISSUE_SIM_INLINE void load_plane(const Layout& l, const float* nodes, int z, float* in) {
   for (int c = 0; c < 3; ++c) {
-    xy_pass<W>(nodes + c * l.node_component + z * l.plane, l.pitch, l.stride,
-               in + (z % 3) * l.in_plane + c * kXyCount * l.stride);
+    xy_pass<W, bend_bend>(nodes + c * l.node_component + z * l.plane, l.pitch, l.stride,
+                          in + (z % 3) * l.in_plane + c * kXyCount * l.stride);
   }
 }
 
@@ -72,7 +75,14 @@ TISSUE_SIM_INLINE void add_identity(Vec<W>* F) {
   for (int i = 0; i < 9; i += 4) F[i] = F[i] + 1.0f;
 }
 
-template <int W, class LawOf, bool viscous>
+template <int W>
+TISSUE_SIM_INLINE bool any_nonzero(const float* p) {
+  bool any = false;
+  for (int i = 0; i < W; ++i) any |= p[i] != 0;
+  return any;
+}
+
+template <int W, class LawOf, bool viscous, bool partial>
 TISSUE_SIM_INLINE void forces(const Block& b, const BlockField& f, BlockScratch& scratch,
                               float* force) {
   const Layout l(b);
@@ -91,12 +101,16 @@ TISSUE_SIM_INLINE void forces(const Block& b, const BlockField& f, BlockScratch&
   std::fill_n(out, 3 * l.out_plane, 0.0f);
   std::fill_n(scratch.row.data(), 3 * (l.plane + kLanes) + kLanes, 0.0f);
   for (int z = 0; z < 2; ++z) {
-    load_plane<W>(l, scratch.nodes.data(), z, scratch.in.data());
+    load_plane<W, partial>(l, scratch.nodes.data(), z, scratch.in.data());
     if (viscous) load_plane<W>(l, scratch.velocities.data(), z, scratch.in_rate.data());
   }
   for (int z = 0; z < b.nz + 2; ++z) {
     if (z < b.nz) {
-      load_plane<W>(l, scratch.nodes.data(), z + 2, scratch.in.data());
+      load_plane<W, partial>(l, scratch.nodes.data(), z + 2, scratch.in.data());
+      for (int c = 0; partial && c < 3; ++c) {  // the stress does not write it
+        std::fill_n(out + ((z + 2) % 3) * l.out_plane + (c * kXyCount + kBB) * l.out_quantity,
+                    l.out_quantity, 0.0f);
+      }
       if (viscous) load_plane<W>(l, scratch.velocities.data(), z + 2, scratch.in_rate.data());
       for (int j = 0; j < l.stride; j += W) {
         Vec<W> G[8][9], rate[8][9];
@@ -111,31 +125,47 @@ TISSUE_SIM_INLINE void forces(const Block& b, const BlockField& f, BlockScratch&
           if (viscous) add_viscous_stress(G[s], rate[s], f.viscosity * V, P);
           for (int i = 0; i < 9; ++i) G[s][i] = P[i];
         }
+        const float* cell = partial ? b.partial.data() + z * l.stride + j : nullptr;
+        const bool stabilised = partial && any_nonzero<W>(cell);
         for (int c = 0; c < 3; ++c) {
           float* q = out + l.front + c * kXyCount * l.out_quantity + j;
-          add_divergence<W>(G, c, l.out_quantity, q + (z % 3) * l.out_plane,
-                            q + ((z + 1) % 3) * l.out_plane, q + ((z + 2) % 3) * l.out_plane);
+          float *q0 = q + (z % 3) * l.out_plane, *q1 = q + ((z + 1) % 3) * l.out_plane,
+                *q2 = q + ((z + 2) % 3) * l.out_plane;
+          add_divergence<W>(G, c, l.out_quantity, q0, q1, q2);
+          if (stabilised) {
+            const float* in = scratch.in.data() + c * kXyCount * l.stride + j;
+            stabilise<W>(in + (z % 3) * l.in_plane, in + ((z + 1) % 3) * l.in_plane,
+                         in + ((z + 2) % 3) * l.in_plane, l.stride,
+                         kStabilisation * f.mu * load<W>(cell), l.out_quantity, q0, q1, q2);
+          }
         }
       }
     }
     for (int c = 0; c < 3; ++c) {
-      xy_transpose<W>(out + l.front + (z % 3) * l.out_plane + c * kXyCount * l.out_quantity,
-                      l.out_quantity, l.pitch, l.plane, -inv_h, scratch.row.data(),
-                      l.plane + kLanes, force + (c * (b.nz + 2) + z) * l.plane);
+      xy_transpose<W, partial>(
+          out + l.front + (z % 3) * l.out_plane + c * kXyCount * l.out_quantity, l.out_quantity,
+          l.pitch, l.plane, -inv_h, scratch.row.data(), l.plane + kLanes,
+          force + (c * (b.nz + 2) + z) * l.plane);
     }
   }
 }
 
+template <int W, class LawOf, bool viscous>
+TISSUE_SIM_INLINE void forces_of(const Block& b, const BlockField& f, BlockScratch& s, float* out) {
+  b.partial.empty() ? forces<W, LawOf, viscous, false>(b, f, s, out)
+                    : forces<W, LawOf, viscous, true>(b, f, s, out);
+}
+
 template <int W>
 TISSUE_SIM_INLINE void forces_any(const Block& b, const BlockField& f, BlockScratch& s,
-                                  float* force) {
+                                  float* out) {
   const bool viscous = f.viscosity > 0;
   if (f.law == Law::kNeoHookean) {
-    viscous ? forces<W, NeoHookean, true>(b, f, s, force)
-            : forces<W, NeoHookean, false>(b, f, s, force);
+    viscous ? forces_of<W, NeoHookean, true>(b, f, s, out)
+            : forces_of<W, NeoHookean, false>(b, f, s, out);
   } else {
-    viscous ? forces<W, FixedCorotated, true>(b, f, s, force)
-            : forces<W, FixedCorotated, false>(b, f, s, force);
+    viscous ? forces_of<W, FixedCorotated, true>(b, f, s, out)
+            : forces_of<W, FixedCorotated, false>(b, f, s, out);
   }
 }
 
@@ -196,12 +226,23 @@ TISSUE_SIM_INLINE BlockState state(const Block& b, const BlockField& f, BlockScr
   reserve(scratch.in, 3 * l.in_plane);
   gather_nodes(b, f, f.nodes->u, 1.0f / f.cell_size, l, scratch.nodes.data());
   BlockState result;
-  for (int z = 0; z < 2; ++z) load_plane<W>(l, scratch.nodes.data(), z, scratch.in.data());
+  for (int z = 0; z < 2; ++z) load_plane<W, true>(l, scratch.nodes.data(), z, scratch.in.data());
   for (int z = 0; z < b.nz; ++z) {
-    load_plane<W>(l, scratch.nodes.data(), z + 2, scratch.in.data());
+    load_plane<W, true>(l, scratch.nodes.data(), z + 2, scratch.in.data());
     for (int j = 0; j < l.stride; j += W) {
       Vec<W> G[8][9];
       gradients<W>(l, scratch.in.data(), z, j, G);
+      for (int c = 0; !b.partial.empty() && c < 3; ++c) {
+        const float* in = scratch.in.data() + c * kXyCount * l.stride + j;
+        const Vec<W> stiffness =
+            kStabilisation * f.mu * load<W>(b.partial.data() + z * l.stride + j);
+        const Vec<W> energy = stabilise<W>(
+            in + (z % 3) * l.in_plane, in + ((z + 1) % 3) * l.in_plane,
+            in + ((z + 2) % 3) * l.in_plane, l.stride, stiffness, 0, nullptr, nullptr, nullptr);
+        for (int i = 0; i < W; ++i) {
+          if (stiffness[i] != 0) result.elastic_energy += 0.5 * static_cast<double>(energy[i]);
+        }
+      }
       const std::size_t lane = static_cast<std::size_t>(z) * 8 * l.stride + j;
       for (int s = 0; s < 8; ++s) {
         const float* volume = b.volume.data() + lane + s * l.stride;
@@ -220,8 +261,8 @@ TISSUE_SIM_INLINE BlockState state(const Block& b, const BlockField& f, BlockScr
         for (int i = 0; i < W; ++i) {
           const float v = volume[i];
           if (v == 0) continue;
-          const float stiffening = std::max(cx[i], std::max(cy[i], cz[i])) +
-                                   std::fabs(J[i] - 1) * std::sqrt(f2[i] / 3);
+          const float stiffening =
+              std::max(cx[i], std::max(cy[i], cz[i])) + std::fabs(J[i] - 1) * std::sqrt(f2[i] / 3);
           if (!std::isfinite(energy[i] + stiffening)) result.finite = false;
           result.elastic_energy += static_cast<double>(energy[i]) * v;
           result.stiffening = std::max(result.stiffening, stiffening);
@@ -309,10 +350,13 @@ TISSUE_SIM_KERNELS(avx512, 16, TISSUE_SIM_TARGET_AVX512)
 }  // namespace
 
 const BlockKernels& block_kernels(InstructionSet set) {
-  static constexpr BlockKernels sse2 = {forces_sse2, positions_sse2, lanes_in_box_sse2, update_row_sse2, state_sse2};
+  static constexpr BlockKernels sse2 = {forces_sse2, positions_sse2, lanes_in_box_sse2,
+                                        update_row_sse2, state_sse2};
 #if defined(__x86_64__)
-  static constexpr BlockKernels avx2 = {forces_avx2, positions_avx2, lanes_in_box_avx2, update_row_avx2, state_avx2};
-  static constexpr BlockKernels avx512 = {forces_avx512, positions_avx512, lanes_in_box_avx512, update_row_avx512, state_avx512};
+  static constexpr BlockKernels avx2 = {forces_avx2, positions_avx2, lanes_in_box_avx2,
+                                        update_row_avx2, state_avx2};
+  static constexpr BlockKernels avx512 = {forces_avx512, positions_avx512, lanes_in_box_avx512,
+                                          update_row_avx512, state_avx512};
   if (set == InstructionSet::kAvx512) return avx512;
   if (set == InstructionSet::kAvx2) return avx2;
 #endif

@@ -13,14 +13,20 @@ namespace tissue_sim {
 /// What a block's kernel needs to know beside the block.
 struct BlockField {
   const Nodes* nodes;
-  int first_node;         ///< of the block: the node one below its first cell along each axis
-  int pitch_y, pitch_z;   ///< of the body's lattice
-  float cell_size;        ///< [m]
-  float origin[3];        ///< reference place of first_node [m]
+  int first_node;        ///< of the block: the node one below its first cell along each axis
+  int pitch_y, pitch_z;  ///< of the body's lattice
+  float cell_size;       ///< [m]
+  float origin[3];       ///< reference place of first_node [m]
   Law law;
-  float mu, lambda;       ///< [Pa]
-  float viscosity;        ///< [Pa s]
+  float mu, lambda;  ///< [Pa]
+  float viscosity;   ///< [Pa s]
 };
+
+/// The same block on a lattice of no size: positions() then gives values.
+inline BlockField at_rest(BlockField f) {
+  f.cell_size = f.origin[0] = f.origin[1] = f.origin[2] = 0;
+  return f;
+}
 
 /// Working memory of one thread; grows to the largest block and is used again.
 struct BlockScratch {
@@ -31,7 +37,7 @@ struct BlockScratch {
 /// State of a block's points, from block_state().
 struct BlockState {
   double elastic_energy = 0;  ///< [J]
-  float stiffening = 1;       ///< largest squared column of cof F plus |J - 1| ||F||: see stable_substep
+  float stiffening = 1;  ///< largest squared column of cof F plus |J - 1| ||F||: see stable_substep
   bool finite = true;
 };
 
@@ -40,7 +46,8 @@ struct BlockKernels {
   /// f_i = -sum_p V_p P(F_p) grad w_ip. [N]
   void (*forces)(const Block&, const BlockField&, BlockScratch&, float* force);
   /// Places of the points in the world [m], for displacements `u`[3]: out[3][nz][8][stride]. Lanes
-  /// without a point hold something finite.
+  /// without a point hold something finite. With a field from at_rest(), the value of any node
+  /// field at the points, as sum_i w_ip u_i.
   void (*positions)(const Block&, const BlockField&, const Array<float>* u, BlockScratch&,
                     float* out);
   /// Lanes of `positions` that lie within a box, in order, into `lanes`; returns their number.
@@ -49,7 +56,8 @@ struct BlockKernels {
   /// Sums the parts of a row's force and moves its nodes on.
   void (*update_row)(const NodeRow&, const RowPart* parts, const float* force, const UpdateNode&,
                      BlockScratch&);
-  /// Energy and stiffness of the block; with `von_mises` also each point's stress [Pa], one per lane.
+  /// Energy and stiffness of the block; with `von_mises` also each point's stress [Pa], one per
+  /// lane.
   BlockState (*state)(const Block&, const BlockField&, BlockScratch&, float* von_mises);
 };
 

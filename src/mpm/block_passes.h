@@ -1,5 +1,5 @@
-// The transfers between the nodes and the points of a block, direction by direction: x and y within a
-// node plane, then z between three planes, and the transpose for the forces. See docs/design.md.
+// The transfers between the nodes and the points of a block, direction by direction: x and y within
+// a node plane, then z between three planes, and the transpose for the forces. See docs/design.md.
 #pragma once
 
 #include "compute/simd.h"
@@ -9,7 +9,20 @@ namespace tissue_sim {
 
 /// What the x-y pass leaves of a node plane for each cell: the first letter is applied along x, the
 /// second along y (A average, d difference, B bend: math/bspline.h).
-enum XyQuantity { kAA, kAd, kAB, kdA, kdd, kdB, kBA, kBd, kXyCount };
+/// The stress needs all but BB, which only stabilisation uses.
+enum XyQuantity {
+  kAA,
+  kAd,
+  kAB,
+  kdA,
+  kdd,
+  kdB,
+  kBA,
+  kBd,
+  kStressXyCount,
+  kBB = kStressXyCount,
+  kXyCount
+};
 
 /// A, d, B of three values.
 template <class T>
@@ -24,7 +37,7 @@ struct Line {
 };
 
 /// x-y pass of one component on one node plane: u[plane] -> q[kXyCount][stride].
-template <int W>
+template <int W, bool bend_bend>
 TISSUE_SIM_INLINE void xy_pass(const float* u, int pitch, int stride, float* q) {
   for (int j = 0; j < stride; j += W) {
     const float* p = u + j;
@@ -43,18 +56,19 @@ TISSUE_SIM_INLINE void xy_pass(const float* u, int pitch, int stride, float* q) 
     store<W>(out + kdB * stride, d.B);
     store<W>(out + kBA * stride, b.A);
     store<W>(out + kBd * stride, b.d);
+    if (bend_bend) store<W>(out + kBB * stride, b.B);
   }
 }
 
-/// z pass and points: gradient of one component at the 8 points of W cells. `q0`, `q1`, `q2` are the
-/// x-y quantities of the node planes below, at and above, `stride` floats apart. The result goes to
-/// G[point][9], rows `3 * component` on; point = sx + 2 sy + 4 sz.
+/// z pass and points: gradient of one component at the 8 points of W cells. `q0`, `q1`, `q2` are
+/// the x-y quantities of the node planes below, at and above, `stride` floats apart. The result
+/// goes to G[point][9], rows `3 * component` on; point = sx + 2 sy + 4 sz.
 template <int W>
 TISSUE_SIM_INLINE void gradient(const float* q0, const float* q1, const float* q2, int stride,
                                 int component, Vec<W> (*G)[9]) {
   using V = Vec<W>;
-  V w[2][kXyCount], s[2][kXyCount];  // values and slopes along z at the two points
-  for (int k = 0; k < kXyCount; ++k) {
+  V w[2][kStressXyCount], s[2][kStressXyCount];  // values and slopes along z at the two points
+  for (int k = 0; k < kStressXyCount; ++k) {
     const V minus = load<W>(q0 + k * stride), center = load<W>(q1 + k * stride),
             plus = load<W>(q2 + k * stride);
     const Line<V> l(minus, center, plus);
@@ -89,13 +103,13 @@ TISSUE_SIM_INLINE void gradient(const float* q0, const float* q1, const float* q
   }
 }
 
-/// Transpose of gradient(): adds what P[point][3 * component ...] gives to the x-y quantities of the
-/// three node planes. `q2` is written, not added to, for this is the first that reaches it.
+/// Transpose of gradient(): adds what P[point][3 * component ...] gives to the x-y quantities of
+/// the three node planes. `q2` is written, not added to, for this is the first that reaches it.
 template <int W>
 TISSUE_SIM_INLINE void add_divergence(const Vec<W> (*P)[9], int component, int stride, float* q0,
                                       float* q1, float* q2) {
   using V = Vec<W>;
-  V w[2][kXyCount], s[2][kXyCount];
+  V w[2][kStressXyCount], s[2][kStressXyCount];
   for (int sz = 0; sz < 2; ++sz) {
     V xd[2], xb[2], yd[2], yb[2], za[2], zd[2];
     for (int t = 0; t < 2; ++t) {
@@ -121,7 +135,7 @@ TISSUE_SIM_INLINE void add_divergence(const Vec<W> (*P)[9], int component, int s
     s[sz][kAd] = zd[1] + zd[0];
     s[sz][kdd] = 0.125f * (zd[1] - zd[0]);
   }
-  for (int k = 0; k < kXyCount; ++k) {
+  for (int k = 0; k < kStressXyCount; ++k) {
     const bool slope = k == kAA || k == kAd || k == kdA || k == kdd;
     V minus, center, plus;
     if (k == kAA) {
@@ -152,30 +166,36 @@ TISSUE_SIM_INLINE void add_divergence(const Vec<W> (*P)[9], int component, int s
 }
 
 /// Transpose of xy_pass(): q[kXyCount] (each preceded by at least 2 * pitch zeros and followed by
-/// zeros) -> force of `count` nodes, times `scale`. `row` holds 3 lines of `row_stride`, of which the
-/// first kLanes floats are zero.
-template <int W>
+/// zeros) -> force of `count` nodes, times `scale`. `row` holds 3 lines of `row_stride`, of which
+/// the first kLanes floats are zero.
+template <int W, bool bend_bend>
 TISSUE_SIM_INLINE void xy_transpose(const float* q, int q_stride, int pitch, int count, float scale,
                                     float* row, int row_stride, float* force) {
   float* ta = row + 16;
   float* td = ta + row_stride;
   float* tb = td + row_stride;
   for (int m = 0; m < count; m += W) {
-    const auto at = [q, q_stride, m](XyQuantity k, int back) { return q + k * q_stride + m - back; };
+    const auto at = [q, q_stride, m](XyQuantity k, int back) {
+      return q + k * q_stride + m - back;
+    };
     const int p = pitch, pp = 2 * pitch;
     const Vec<W> aa0 = load<W>(at(kAA, 0)), aa1 = load<W>(at(kAA, p)), aa2 = load<W>(at(kAA, pp));
     const Vec<W> ad0 = load<W>(at(kAd, 0)), ad2 = load<W>(at(kAd, pp));
     const Vec<W> ab0 = load<W>(at(kAB, 0)), ab1 = load<W>(at(kAB, p)), ab2 = load<W>(at(kAB, pp));
-    store<W>(ta + m, kAverageSide * (aa0 + aa2) + kAverageCenter * aa1 + (ad2 - ad0) +
-                         (ab0 + ab2) - 2.0f * ab1);
+    store<W>(ta + m, kAverageSide * (aa0 + aa2) + kAverageCenter * aa1 + (ad2 - ad0) + (ab0 + ab2) -
+                         2.0f * ab1);
     const Vec<W> da0 = load<W>(at(kdA, 0)), da1 = load<W>(at(kdA, p)), da2 = load<W>(at(kdA, pp));
     const Vec<W> dd0 = load<W>(at(kdd, 0)), dd2 = load<W>(at(kdd, pp));
     const Vec<W> db0 = load<W>(at(kdB, 0)), db1 = load<W>(at(kdB, p)), db2 = load<W>(at(kdB, pp));
-    store<W>(td + m, kAverageSide * (da0 + da2) + kAverageCenter * da1 + (dd2 - dd0) +
-                         (db0 + db2) - 2.0f * db1);
+    store<W>(td + m, kAverageSide * (da0 + da2) + kAverageCenter * da1 + (dd2 - dd0) + (db0 + db2) -
+                         2.0f * db1);
     const Vec<W> ba0 = load<W>(at(kBA, 0)), ba1 = load<W>(at(kBA, p)), ba2 = load<W>(at(kBA, pp));
     const Vec<W> bd0 = load<W>(at(kBd, 0)), bd2 = load<W>(at(kBd, pp));
-    store<W>(tb + m, kAverageSide * (ba0 + ba2) + kAverageCenter * ba1 + (bd2 - bd0));
+    Vec<W> b = kAverageSide * (ba0 + ba2) + kAverageCenter * ba1 + (bd2 - bd0);
+    if (bend_bend) {
+      b += load<W>(at(kBB, 0)) + load<W>(at(kBB, pp)) - 2.0f * load<W>(at(kBB, p));
+    }
+    store<W>(tb + m, b);
   }
   for (int n = 0; n < count; n += W) {
     const Vec<W> a0 = load<W>(ta + n), a1 = load<W>(ta + n - 1), a2 = load<W>(ta + n - 2);

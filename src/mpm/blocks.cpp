@@ -5,7 +5,7 @@
 namespace tissue_sim {
 namespace {
 
-constexpr int kBlockY = 8, kBlockZ = 4, kMaxBlockX = 48, kGap = 3;
+constexpr int kGap = 3;
 
 struct Placed {
   std::int32_t point;
@@ -63,7 +63,8 @@ std::vector<Sheet> sheets_of(const BlockRegion& r, const LatticeBody& b, const P
       const int n = (z * py + y) * px + x;
       if (split[n] == nullptr) continue;
       local[count] = n;
-      seen[count++] = split[n]->seen_by(points.site[p.point], r.x + x - 1, r.y + y - 1, r.z + z - 1);
+      seen[count++] =
+          split[n]->seen_by(points.site[p.point], r.x + x - 1, r.y + y - 1, r.z + z - 1);
     }
     const auto fits = [&](const Sheet& sheet) {
       for (int i = 0; i < count; ++i) {
@@ -82,6 +83,26 @@ std::vector<Sheet> sheets_of(const BlockRegion& r, const LatticeBody& b, const P
     sheet->points.push_back(p);
   }
   return sheets;
+}
+
+void find_partial_cells(Block& block) {
+  Array<float> partial(static_cast<std::size_t>(block.nz) * block.stride, 0.0f);
+  bool any = false;
+  for (int z = 0; z < block.nz; ++z) {
+    for (int j = 0; j < block.stride; ++j) {
+      int count = 0;
+      float volume = 0;
+      for (int s = 0; s < 8; ++s) {
+        const std::size_t lane = (static_cast<std::size_t>(z) * 8 + s) * block.stride + j;
+        count += block.point[lane] >= 0;
+        volume += block.volume[lane];
+      }
+      if (count == 0 || count == 8) continue;
+      partial[static_cast<std::size_t>(z) * block.stride + j] = volume;
+      any = true;
+    }
+  }
+  if (any) block.partial = std::move(partial);
 }
 
 /// The block of a sheet, no larger than its points need.
@@ -105,12 +126,12 @@ Block make_block(const BlockRegion& r, const LatticeBody& b, const Points& point
   block.nz = hi[2] - lo[2] + 1;
   lay_out(block);
   for (const Placed& p : sheet.points) {
-    const std::size_t lane =
-        (static_cast<std::size_t>(p.z - lo[2]) * 8 + p.s) * block.stride +
-        (p.y - lo[1]) * block.pitch + p.x - lo[0];
+    const std::size_t lane = (static_cast<std::size_t>(p.z - lo[2]) * 8 + p.s) * block.stride +
+                             (p.y - lo[1]) * block.pitch + p.x - lo[0];
     block.volume[lane] = points.volume[p.point];
     block.point[lane] = p.point;
   }
+  find_partial_cells(block);
   block.node.assign(block.node_count(), b.node(block.x - 1, block.y - 1, block.z - 1));
   for (int z = 0; z < block.nz + 2; ++z) {
     for (int y = 0; y < block.ny + 2; ++y) {
@@ -139,7 +160,8 @@ void fill_region(BlockRegion& r, const std::vector<LatticeBody>& bodies, const P
 }
 
 /// Runs of columns that hold points, gaps of up to kGap bridged, long runs halved.
-std::vector<std::pair<int, int>> x_runs(const LatticeBody& b, int y0, int ny, int z0, int nz) {
+std::vector<std::pair<int, int>> x_runs(const LatticeBody& b, int y0, int ny, int z0, int nz,
+                                        int longest) {
   std::vector<std::pair<int, int>> runs;
   for (int x = 0; x < b.nx; ++x) {
     bool any = false;
@@ -157,7 +179,7 @@ std::vector<std::pair<int, int>> x_runs(const LatticeBody& b, int y0, int ny, in
   }
   std::vector<std::pair<int, int>> parts;
   for (const auto& [begin, end] : runs) {
-    const int n = (end - begin + kMaxBlockX - 1) / kMaxBlockX;
+    const int n = (end - begin + longest - 1) / longest;
     for (int i = 0; i < n; ++i) {
       parts.emplace_back(begin + (end - begin) * i / n, begin + (end - begin) * (i + 1) / n);
     }
@@ -195,7 +217,8 @@ void connect_forces(Blocks& blocks, const std::vector<LatticeBody>& bodies, int 
         const auto add = [&](int end) {
           if (end > begin) {
             entries.push_back(
-                {row, {block->force_offset + local + begin, component, block->x + begin, end - begin}});
+                {row,
+                 {block->force_offset + local + begin, component, block->x + begin, end - begin}});
           }
         };
         while (next_split < block->split_nodes.size() &&
@@ -244,14 +267,14 @@ void connect_forces(Blocks& blocks, const std::vector<LatticeBody>& bodies, int 
 }  // namespace
 
 Blocks make_blocks(const std::vector<LatticeBody>& bodies, const Points& points,
-                   const NodeFields& fields) {
+                   const NodeFields& fields, const BlockShape& shape) {
   Blocks blocks;
   for (std::size_t i = 0; i < bodies.size(); ++i) {
     const LatticeBody& b = bodies[i];
-    for (int z = 0; z < b.nz; z += kBlockZ) {
-      for (int y = 0; y < b.ny; y += kBlockY) {
-        const int ny = std::min(kBlockY, b.ny - y), nz = std::min(kBlockZ, b.nz - z);
-        for (const auto& [begin, end] : x_runs(b, y, ny, z, nz)) {
+    for (int z = 0; z < b.nz; z += shape.z) {
+      for (int y = 0; y < b.ny; y += shape.y) {
+        const int ny = std::min(shape.y, b.ny - y), nz = std::min(shape.z, b.nz - z);
+        for (const auto& [begin, end] : x_runs(b, y, ny, z, nz, shape.x)) {
           BlockRegion r{static_cast<int>(i), begin, y, z, end - begin, ny, nz, {}};
           fill_region(r, bodies, points, fields);
           blocks.regions.push_back(std::move(r));

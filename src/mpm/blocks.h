@@ -41,14 +41,20 @@ struct Blocks {
 
   std::vector<NodeRow> rows;
   std::vector<RowPart> row_parts;
-  int first_split_node = 0;                ///< nodes from here on are fields that cuts made
-  std::vector<int> split_node_parts;       ///< CSR offsets, one per such node and one more
+  int first_split_node = 0;           ///< nodes from here on are fields that cuts made
+  std::vector<int> split_node_parts;  ///< CSR offsets, one per such node and one more
   std::vector<SplitNodePart> split_parts;
+};
+
+/// How large regions are, in cells; the default is the CPU's.
+struct BlockShape {
+  int x = 48;  ///< at most
+  int y = 8, z = 4;
 };
 
 /// Cuts the bodies' lattices into regions and makes their blocks.
 Blocks make_blocks(const std::vector<LatticeBody>& bodies, const Points& points,
-                   const NodeFields& fields);
+                   const NodeFields& fields, const BlockShape& shape = {});
 
 /// Makes the blocks anew of the regions that one of the `cells` touches, after their nodes' fields
 /// changed; `node_count` is the new number of nodes.

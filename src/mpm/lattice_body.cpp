@@ -75,10 +75,11 @@ std::vector<LatticeBody> make_lattice_bodies(const Scene& scene, Points& points,
     }
     for (std::size_t r = 0; r < anchored.size(); ++r) {
       if (anchored[r] == 0) {
-        throw std::invalid_argument("anchors[" + std::to_string(r) + "] of body '" + body.name +
-                                    "' holds no point of it: a region is in world coordinates and must "
-                                    "reach at least a cell (" +
-                                    std::to_string(scene.cell_size) + " m) into the body");
+        throw std::invalid_argument(
+            "anchors[" + std::to_string(r) + "] of body '" + body.name +
+            "' holds no point of it: a region is in world coordinates and must "
+            "reach at least a cell (" +
+            std::to_string(scene.cell_size) + " m) into the body");
       }
     }
     bodies.push_back(std::move(b));

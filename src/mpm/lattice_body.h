@@ -18,9 +18,9 @@ struct Points {
     std::int16_t body;
   };
   Array<Site> site;
-  Array<float> volume;          ///< [m^3]
-  Array<std::uint8_t> bonds;    ///< bit k: still bound to the neighbour of bond k (cutting/bonds.h)
-  Array<std::uint8_t> anchored; ///< lies in an anchored region
+  Array<float> volume;        ///< [m^3]
+  Array<std::uint8_t> bonds;  ///< bit k: still bound to the neighbour of bond k (cutting/bonds.h)
+  Array<std::uint8_t> anchored;  ///< lies in an anchored region
   int size() const { return static_cast<int>(site.size()); }
 };
 

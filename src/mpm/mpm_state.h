@@ -32,6 +32,12 @@ struct ColliderLoad {
   double force[3] = {}, torque[3] = {};
 };
 
+/// Where a block's points are, and how fast the fastest moves.
+struct BlockMotion {
+  Box box;           ///< [m]
+  double speed = 0;  ///< [m/s]
+};
+
 struct MpmState {
   Scene scene;
   std::vector<LatticeBody> bodies;
@@ -39,8 +45,9 @@ struct MpmState {
   Nodes nodes;
   std::unique_ptr<NodeFields> fields;
   Blocks blocks;
-  Array<float> force;  ///< of all blocks
+  Array<float> force;        ///< of all blocks
   Array<float> u_before[3];  ///< displacements when the frame began, where a blade may cut [m]
+  std::vector<BlockMotion> motion;  ///< per block, as of the last measure_motion()
   Contacts contacts;
   std::vector<Collider> colliders;
   std::vector<std::vector<ColliderLoad>> block_loads;  ///< per block, per collider
@@ -55,6 +62,10 @@ struct MpmState {
 std::unique_ptr<MpmState> make_mpm_state(const Scene& scene, std::vector<std::string>* notes);
 
 BlockField block_field(const MpmState& state, const Block& block);
+
+/// Fills `motion`. Points, not nodes: a node at the rim of its body, or of a cut, that few points
+/// see may swing far without moving any of them.
+void measure_motion(MpmState& state);
 
 /// One substep: forces of all blocks with contact at the colliders' present places, then the nodes.
 /// Adds what acts on the colliders to `loads`.

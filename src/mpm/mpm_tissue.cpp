@@ -13,6 +13,7 @@ namespace tissue_sim {
 MpmTissue::MpmTissue(const Scene& scene)
     : state_(make_mpm_state(scene, &notes_)),
       pieces_(whole_pieces(state_->bodies, state_->points)) {
+  measure_motion(*state_);
   measure();
 }
 
@@ -63,13 +64,15 @@ std::vector<Box> MpmTissue::collider_reach(const FrameInput& input, double durat
   return reach;
 }
 
-void MpmTissue::cut(Span<const BladePath> paths, const Array<float>* before, CutReport& report) {
+void MpmTissue::cut(Span<const BladePath> paths, const Array<float>* u_before,
+                    const std::vector<BlockMotion>& before, CutReport& report) {
   std::vector<std::int32_t> changed;
   for (const BladePath& path : paths) {
-    sweep_bonds(*state_, path, before, state_->nodes.u, changed, report);
+    sweep_bonds(*state_, path, u_before, state_->nodes.u, before, changed, report);
   }
   if (changed.empty()) return;
   take_apart(*state_, changed);
+  measure_motion(*state_);
   report.new_fragments = update_pieces(state_->bodies, state_->points, pieces_);
 }
 
@@ -79,7 +82,7 @@ void MpmTissue::advance(int substeps, float dt, const FrameInput& input) {
   result_.loads.resize(s.scene.tools.size());
   for (const BladePath& path : input.cuts) {
     result_.cut_reports.emplace_back();
-    cut({&path, 1}, s.nodes.u, result_.cut_reports.back());
+    cut({&path, 1}, s.nodes.u, s.motion, result_.cut_reports.back());
   }
   std::vector<BladePath> blades;
   for (std::size_t i = 0; i < input.tools.size(); ++i) {
@@ -105,7 +108,9 @@ void MpmTissue::advance(int substeps, float dt, const FrameInput& input) {
       load.peak_force = std::max(load.peak_force, force.norm());
     }
   }
-  cut(blades, s.u_before, result_.blade_report);
+  const std::vector<BlockMotion> before = s.motion;
+  measure_motion(s);
+  cut(blades, s.u_before, before, result_.blade_report);
 }
 
 void MpmTissue::measure() {
@@ -122,13 +127,13 @@ void MpmTissue::measure() {
     stiffening_ = std::max(stiffening_, b.stiffening);
     result_.blew_up = result_.blew_up || !b.finite;
   }
-  double v2_max = 0;
   for (std::size_t i = 0; i < s.nodes.size(); ++i) {
     const double v2 = Vec3(s.nodes.v[0][i], s.nodes.v[1][i], s.nodes.v[2][i]).squaredNorm();
     result_.kinetic_energy += 0.5 * s.nodes.mass[i] * v2;
-    if (!(v2 <= v2_max)) v2_max = v2;
   }
-  result_.max_speed = std::sqrt(v2_max);
+  for (const BlockMotion& m : s.motion) {
+    if (!(m.speed <= result_.max_speed)) result_.max_speed = m.speed;
+  }
   // Nothing that instruments do moves tissue at the speed of a bullet; what does is out of control.
   result_.blew_up = result_.blew_up || !(result_.max_speed < 300) || stiffening_ > 1e6f;
 }

@@ -23,12 +23,14 @@ class MpmTissue final : public Tissue {
   std::string device_name() const override;
   const std::vector<std::string>& notes() const override { return notes_; }
 
+  int fragment_of(int point) const { return pieces_.of_point[point]; }
   MpmState& state() { return *state_; }  ///< for tests and the benchmark
 
  private:
   void set_colliders(const FrameInput& input, double share, double duration);
   std::vector<Box> collider_reach(const FrameInput& input, double duration);
-  void cut(Span<const BladePath> paths, const Array<float>* before, CutReport& report);
+  void cut(Span<const BladePath> paths, const Array<float>* u_before,
+           const std::vector<BlockMotion>& before, CutReport& report);
   void measure();
 
   std::vector<std::string> notes_;

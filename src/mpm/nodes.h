@@ -10,10 +10,10 @@ namespace tissue_sim {
 /// The grid nodes of all bodies, each body's lattice with one ring of nodes around its cells (x
 /// fastest), and behind them the further fields of nodes that cuts have split.
 struct Nodes {
-  Array<float> u[3];        ///< displacement from the reference place [m]
-  Array<float> v[3];        ///< velocity [m/s]
-  Array<float> mass;        ///< [kg], 0 where no point reaches
-  Array<float> inv_mass;    ///< [1/kg], 0 where no point reaches and where the node is anchored
+  Array<float> u[3];      ///< displacement from the reference place [m]
+  Array<float> v[3];      ///< velocity [m/s]
+  Array<float> mass;      ///< [kg], 0 where no point reaches
+  Array<float> inv_mass;  ///< [1/kg], 0 where no point reaches and where the node is anchored
   std::size_t size() const { return mass.size(); }
   void resize(std::size_t n) {
     for (int c = 0; c < 3; ++c) {

@@ -15,8 +15,8 @@ Pose pose_at(const ToolMotion& motion, double s);
 Collider tool_collider(const Tool& tool, int index, const ToolMotion& motion, double s,
                        double duration);
 
-/// The path of a scalpel's edge over the frame: down its front from the heel to the tip and along its
-/// lower end to the spine, so that it cuts when it is drawn and when it is stabbed.
+/// The path of a scalpel's edge over the frame: down its front from the heel to the tip and along
+/// its lower end to the spine, so that it cuts when it is drawn and when it is stabbed.
 BladePath blade_path(const Tool& tool, const ToolMotion& motion);
 
 }  // namespace tissue_sim

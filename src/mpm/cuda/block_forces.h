@@ -1,0 +1,219 @@
+// Force of a block's points on its nodes, and of colliders on its points. For .cu files.
+#pragma once
+
+#include "material/laws.h"
+#include "mpm/cuda/cell_stabilisation.h"
+#include "mpm/cuda/half_cell.h"
+#include "mpm/cuda/point_contact.h"
+
+namespace tissue_sim {
+
+/// What a block's threads share.
+struct BlockShared {
+  float4* u;        ///< [slots], divided by the cell size
+  float4* v;        ///< [slots], the same; only where contact or viscosity needs it
+  float4* exchange; ///< [9][threads]
+  unsigned long long* loads;  ///< [collider_count][6]
+};
+
+/// What one substep of a block needs beside its nodes.
+struct BlockStep {
+  const Collider* colliders;
+  std::uint32_t near;
+  float4* force;  ///< of all slots
+};
+
+/// Volumes of the points 2 sy + sx of a half cell.
+__device__ __forceinline__ float4 half_volumes(const CudaTables& t, const CudaBlock& b,
+                                               const CudaBody& body, int x, int y, int z, int sz) {
+  if (b.whole != 0) {
+    return {body.point_volume, body.point_volume, body.point_volume, body.point_volume};
+  }
+  const int step = b.nx * b.ny;
+  const float* v = t.volume + lane_of(b, x, y, z, 4 * sz);
+  return {v[0], v[step], v[2 * step], v[3 * step]};
+}
+
+/// F to the stress P times the volume, in place.
+template <class LawOf, bool kViscous>
+__device__ __forceinline__ void stress(const CudaBody& body, float volume, const float* rate,
+                                       float* F) {
+  float P[9];
+  LawOf::stress(F, body.mu * volume, body.lambda * volume, P);
+  if (kViscous) add_viscous_stress(F, rate, body.viscosity * volume, P);
+#pragma unroll
+  for (int i = 0; i < 9; ++i) F[i] = P[i];
+}
+
+/// Adds the forces of colliders on the points of half a cell to its transposed half plane.
+__device__ __forceinline__ void add_contact(const CudaTables& t, const CudaBlock& b,
+                                            const CudaBody& body, const BlockShared& s,
+                                            const BlockStep& step, int x, int y, int z, int sz,
+                                            const float4& volume, const HalfPlane (&h)[3],
+                                            HalfPlane (&out)[3]) {
+  const int pitch = b.nx + 2, plane = pitch * (b.ny + 2);
+  const int first = z * plane + y * pitch + x;
+  // The stencils take forces by -1 / cell size, as they do stress.
+  for (int q = 0; q < 4; ++q) {
+    const int sub = 4 * sz + q;
+    const int p = t.point[lane_of(b, x, y, z, sub)];
+    if (p < 0) continue;
+    const float side_x = (q & 1) != 0 ? 1.0f : -1.0f, side_y = (q & 2) != 0 ? 1.0f : -1.0f;
+    float place[3];
+    reference_place(b, body.cell_size, x, y, z, sub, place);
+#pragma unroll
+    for (int c = 0; c < 3; ++c) place[c] += body.cell_size * point_value(h[c], side_x, side_y);
+    const float v = q == 0 ? volume.x : q == 1 ? volume.y : q == 2 ? volume.z : volume.w;
+    const float3 push = contact_push(t, step.colliders, step.near, p, v,
+                                     {place[0], place[1], place[2]}, body.spring, s.v + first,
+                                     pitch, plane, sub, body.cell_size, s.loads);
+    add_point_force(-body.cell_size * push.x, side_x, side_y, out[0]);
+    add_point_force(-body.cell_size * push.y, side_x, side_y, out[1]);
+    add_point_force(-body.cell_size * push.z, side_x, side_y, out[2]);
+  }
+}
+
+/// Forces of half a cell: reads its nodes, gives its transposed half plane.
+template <class LawOf, bool kViscous, bool kSpecial>
+__device__ __forceinline__ void half_forces(const CudaTables& t, const CudaBlock& b,
+                                            const CudaBody& body, const BlockShared& s,
+                                            const BlockStep& step, int x, int y, int z, int sz,
+                                            const HalfWeights& weights, HalfPlane (&out)[3]) {
+  const int pitch = b.nx + 2, plane = pitch * (b.ny + 2);
+  const int first = z * plane + y * pitch + x;
+  HalfPlane h[3], rate[3];
+  read_half(s.u + first, pitch, plane, weights, h);
+  if (kViscous) read_half(s.v + first, pitch, plane, weights, rate);
+  const float4 volume = half_volumes(t, b, body, x, y, z, sz);
+#pragma unroll
+  for (int c = 0; c < 3; ++c) out[c] = {};
+#pragma unroll
+  for (int ty = 0; ty < 2; ++ty) {
+    const float side = ty == 0 ? -1.0f : 1.0f;
+    float F[2][9], Fdot[2][9];
+#pragma unroll
+    for (int c = 0; c < 3; ++c) {
+      float low[3], high[3];
+      row_gradient(h[c], side, low, high);
+#pragma unroll
+      for (int i = 0; i < 3; ++i) {
+        F[0][3 * c + i] = low[i] + (i == c ? 1.0f : 0.0f);
+        F[1][3 * c + i] = high[i] + (i == c ? 1.0f : 0.0f);
+      }
+      if (!kViscous) continue;
+      row_gradient(rate[c], side, low, high);
+#pragma unroll
+      for (int i = 0; i < 3; ++i) {
+        Fdot[0][3 * c + i] = low[i];
+        Fdot[1][3 * c + i] = high[i];
+      }
+    }
+    const float v0 = ty == 0 ? volume.x : volume.z, v1 = ty == 0 ? volume.y : volume.w;
+    stress<LawOf, kViscous>(body, v0, Fdot[0], F[0]);
+    stress<LawOf, kViscous>(body, v1, Fdot[1], F[1]);
+#pragma unroll
+    for (int c = 0; c < 3; ++c) {
+      const float low[3] = {F[0][3 * c], F[0][3 * c + 1], F[0][3 * c + 2]};
+      const float high[3] = {F[1][3 * c], F[1][3 * c + 1], F[1][3 * c + 2]};
+      add_row_stress(low, high, side, out[c]);
+    }
+  }
+  if (!kSpecial || step.near == 0) return;
+  add_contact(t, b, body, s, step, x, y, z, sz, volume, h, out);
+}
+
+/// Sums what the cells give to a node plane, in a fixed order, and puts it to the slots from `slot` on.
+template <int kParts>
+__device__ __forceinline__ void write_plane(const CudaBlock& b, const BlockShared& s, float scale,
+                                            float4* force) {
+  const int pitch = b.nx + 2, count = pitch * (b.ny + 2);
+  const int threads = static_cast<int>(blockDim.x);
+  for (int i = static_cast<int>(threadIdx.x); i < count; i += threads) {
+    const int y = i / pitch, x = i - y * pitch;
+    float4 f = {0, 0, 0, 0};
+#pragma unroll
+    for (int dy = 0; dy < 3; ++dy) {
+#pragma unroll
+      for (int dx = 0; dx < 3; ++dx) {
+        const int cx = x - dx, cy = y - dy;
+        if (cx < 0 || cy < 0 || cx >= b.nx || cy >= b.ny) continue;
+        const float4* from = s.exchange + (3 * dy + dx) * threads + (cy * b.nx + cx) * kParts;
+#pragma unroll
+        for (int part = 0; part < kParts; ++part) {
+          const float4 g = from[part];
+          f.x += g.x;
+          f.y += g.y;
+          f.z += g.z;
+        }
+      }
+    }
+    __stcg(force + i, float4{scale * f.x, scale * f.y, scale * f.z, 0});
+  }
+}
+
+/// Forces of a block. A thread walks up a column of cells (kParts = 1) or of the lower or upper halves
+/// of cells (kParts = 2), with what its cells give to the next two node planes in registers. Contact
+/// and cells that are not full need kSpecial.
+template <class LawOf, bool kViscous, bool kSpecial, int kParts>
+__device__ __forceinline__ void block_forces(const CudaTables& t, const CudaBlock& b,
+                                             const CudaBody& body, const BlockShared& s,
+                                             const BlockStep& step) {
+  const int column = static_cast<int>(threadIdx.x) / kParts;
+  const bool active = column < b.nx * b.ny;
+  const int y = column / b.nx, x = column - y * b.nx;
+  const int plane = (b.nx + 2) * (b.ny + 2);
+  const bool partial = kSpecial && b.partial != 0;
+  PlaneForce next[3] = {}, after[3] = {};
+#pragma unroll 1
+  for (int z = 0; z < b.nz + 2; ++z) {
+    PlaneForce now[3];
+#pragma unroll
+    for (int c = 0; c < 3; ++c) {
+      now[c] = next[c];
+      next[c] = after[c];
+      after[c] = {};
+    }
+    if (active && z < b.nz) {
+#pragma unroll 1
+      for (int i = 0; i < 2 / kParts; ++i) {
+        const int sz = kParts == 1 ? i : static_cast<int>(threadIdx.x) % kParts;
+        const HalfWeights k(sz == 0 ? -1.0f : 1.0f);
+        HalfPlane out[3];
+        half_forces<LawOf, kViscous, kSpecial>(t, b, body, s, step, x, y, z, sz, k, out);
+#pragma unroll
+        for (int c = 0; c < 3; ++c) {
+          add_to_plane(out[c], k.below, k.slope_below, now[c]);
+          add_to_plane(out[c], kAverageCenter, k.slope_center, next[c]);
+          add_to_plane(out[c], k.above, k.slope_above, after[c]);
+        }
+        if (!partial || sz == 1) continue;
+        const float volume = t.partial[b.first_lane / 8 + (z * b.ny + y) * b.nx + x];
+        if (volume == 0) continue;
+        const float4* node = s.u + z * plane + y * (b.nx + 2) + x;
+#pragma unroll
+        for (int c = 0; c < 3; ++c) {
+          const StabilisingForce f = stabilising_force(node, b.nx + 2, plane, c,
+                                                       kStabilisation * body.mu * volume);
+          add(f.plane[0], now[c]);
+          add(f.plane[1], next[c]);
+          add(f.plane[2], after[c]);
+        }
+      }
+    }
+    if (active) {
+      float f[3][3][3];
+#pragma unroll
+      for (int c = 0; c < 3; ++c) node_forces<kSpecial>(now[c], f[c]);
+#pragma unroll
+      for (int k = 0; k < 9; ++k) {
+        s.exchange[k * blockDim.x + threadIdx.x] = {f[0][k / 3][k % 3], f[1][k / 3][k % 3],
+                                                    f[2][k / 3][k % 3], 0};
+      }
+    }
+    __syncthreads();
+    write_plane<kParts>(b, s, -body.inv_cell_size, step.force + b.first_slot + z * plane);
+    __syncthreads();
+  }
+}
+
+}  // namespace tissue_sim

@@ -1,0 +1,66 @@
+// Stabilisation of one cell that is not full (mpm/stabilisation.h). For .cu files.
+#pragma once
+
+#include "mpm/cuda/half_cell.h"
+#include "mpm/stabilisation.h"
+
+namespace tissue_sim {
+
+/// What a cell gives to its three node planes for one component.
+struct StabilisingForce {
+  PlaneForce plane[3];
+  float energy2;  ///< twice the energy, over cell size squared
+};
+
+/// `node` is the lowest of the cell's 27, `stiffness` kStabilisation mu V. Out of line, for few cells
+/// need it and the others shall keep their registers.
+__device__ __noinline__ inline StabilisingForce stabilising_force(const float4* node, int pitch,
+                                                                  int plane, int c,
+                                                                  float stiffness) {
+  float q[3][kXyCount];
+#pragma unroll
+  for (int z = 0; z < 3; ++z) {
+    float A[3], d[3], B[3];
+#pragma unroll
+    for (int y = 0; y < 3; ++y) {
+      const float4* p = node + z * plane + y * pitch;
+      const Line<float> l(component(p[0], c), component(p[1], c), component(p[2], c));
+      A[y] = l.A;
+      d[y] = l.d;
+      B[y] = l.B;
+    }
+    const Line<float> a(A[0], A[1], A[2]), b(d[0], d[1], d[2]), e(B[0], B[1], B[2]);
+    q[z][kAA] = a.A, q[z][kAd] = a.d, q[z][kAB] = a.B;
+    q[z][kdA] = b.A, q[z][kdd] = b.d, q[z][kdB] = b.B;
+    q[z][kBA] = e.A, q[z][kBd] = e.d, q[z][kBB] = e.B;
+  }
+  float energy2 = 0;
+#pragma unroll
+  for (int k = 0; k < kXyCount; ++k) {
+    const Line<float> l(q[0][k], q[1][k], q[2][k]);
+    const float a = stabilisation::weight2(k, 0) * stiffness * l.A;
+    const float d = stabilisation::weight2(k, 1) * stiffness * l.d;
+    const float b = stabilisation::weight2(k, 2) * stiffness * l.B;
+    energy2 += a * l.A + d * l.d + b * l.B;
+    q[0][k] = kAverageSide * a - d + b;
+    q[1][k] = kAverageCenter * a - 2.0f * b;
+    q[2][k] = kAverageSide * a + d + b;
+  }
+  StabilisingForce f;
+#pragma unroll
+  for (int z = 0; z < 3; ++z) {
+    f.plane[z] = {q[z][kAA], q[z][kAd], q[z][kAB], q[z][kdA], q[z][kdd],
+                  q[z][kdB], q[z][kBA], q[z][kBd], q[z][kBB]};
+  }
+  f.energy2 = energy2;
+  return f;
+}
+
+/// Adds what stabilises the cell to its node planes.
+__device__ __forceinline__ void add(const PlaneForce& f, PlaneForce& to) {
+  to.AA += f.AA, to.Ad += f.Ad, to.AB += f.AB;
+  to.dA += f.dA, to.dd += f.dd, to.dB += f.dB;
+  to.BA += f.BA, to.Bd += f.Bd, to.BB += f.BB;
+}
+
+}  // namespace tissue_sim

@@ -1,0 +1,38 @@
+// What happens on the GPU between the substeps of two frames: what blocks may meet, how they stand,
+// and the clouds.
+#pragma once
+
+#include <cuda_runtime_api.h>
+
+#include "mpm/cuda/tables.h"
+#include "tissue_sim/point.h"
+
+namespace tissue_sim {
+
+/// A box that a collider sweeps in a frame; empty where min > max [m].
+struct CudaBox {
+  float min[3], max[3];
+};
+
+/// Which colliders each block may meet in a frame: CudaTables::near, from where the blocks' points
+/// are, how fast they move and what the colliders sweep. Lets go of contacts out of reach.
+void launch_near(const CudaTables& tables, const CudaMeasure* measures, const CudaBox* reach,
+                 int collider_count, float duration, float margin, cudaStream_t stream);
+
+/// Energies, bounds and stiffness of each block in this state. `max_slots` of a block.
+void launch_measure(const CudaTables& tables, const CudaNodes& state, int max_slots,
+                    CudaMeasure* measures, cudaStream_t stream);
+
+/// What clouds need to know of points beside where they are.
+struct CudaCloud {
+  Point* points;                  ///< where they go
+  int stride;                     ///< every stride-th point, in order
+  const std::int32_t* place;      ///< or, if not null: the place of each point in the cloud, or -1
+  const std::int32_t* piece;      ///< per point: its piece's id
+  const std::uint32_t* colour;    ///< per piece id
+  const std::uint8_t* whole;      ///< per point: how many bonds it has when the tissue is whole
+};
+void launch_cloud(const CudaTables& tables, const CudaNodes& state, int max_slots,
+                  const CudaCloud& cloud, cudaStream_t stream);
+
+}  // namespace tissue_sim

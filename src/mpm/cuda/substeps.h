@@ -1,0 +1,26 @@
+// The substeps of a frame on the GPU, as one kernel.
+#pragma once
+
+#include <cuda_runtime_api.h>
+
+#include "mpm/cuda/tables.h"
+
+namespace tissue_sim {
+
+/// How a tissue's blocks are worked on.
+struct CudaPlan {
+  int parts = 1;          ///< threads for each column of cells, 1 or 2
+  int threads = 64;       ///< of a thread block: at least parts * nx * ny of each block
+  int max_slots = 0;      ///< of a block
+  bool neo_hookean = false, fixed_corotated = false, viscous = false;  ///< what there is
+};
+
+/// Thread blocks that run at once; 0 where the plan does not fit the GPU. Throws for CUDA's errors.
+int resident_blocks(const CudaPlan& plan);
+
+/// Enqueues all substeps of a frame as one kernel. The state is then in
+/// `state[(current + substeps) % 2]`.
+void launch_substeps(const CudaPlan& plan, const CudaTables& tables, const CudaFrame& frame,
+                     int resident, cudaStream_t stream);
+
+}  // namespace tissue_sim

@@ -1,0 +1,148 @@
+// The material point method by brute force, in double precision: every point with all 27 nodes, the
+// weights from the B-spline's formula, the polar decomposition from a singular value decomposition.
+#pragma once
+
+#include <Eigen/SVD>
+#include <cmath>
+#include <vector>
+
+#include "mpm/mpm_state.h"
+
+namespace tissue_sim {
+namespace reference {
+
+using Mat3 = Eigen::Matrix3d;
+
+/// Quadratic B-spline N(r) and its derivative, r in cells.
+inline double spline(double r) {
+  r = std::fabs(r);
+  if (r < 0.5) return 0.75 - r * r;
+  return r < 1.5 ? 0.5 * (1.5 - r) * (1.5 - r) : 0.0;
+}
+inline double spline_slope(double r) {
+  const double a = std::fabs(r);
+  if (a < 0.5) return -2 * r;
+  return a < 1.5 ? (r > 0 ? a - 1.5 : 1.5 - a) : 0.0;
+}
+
+/// One point's stencil.
+struct Stencil {
+  int node[27];
+  double weight[27];
+  Vec3 slope[27];  // [1/m]
+};
+
+inline Stencil stencil_of(const MpmState& s, int p) {
+  const Points::Site& site = s.points.site[p];
+  const LatticeBody& b = s.bodies[site.body];
+  const Vec3 X = b.site_position(site.x, site.y, site.z);
+  Stencil result;
+  for (int k = 0; k < 27; ++k) {
+    const int x = site.x / 2 + k % 3 - 1, y = site.y / 2 + k / 3 % 3 - 1,
+              z = site.z / 2 + k / 9 - 1;
+    const Vec3 r = (X - b.node_position(x, y, z)) / b.cell_size;
+    result.node[k] = s.fields->node(b, site, x, y, z);
+    result.weight[k] = spline(r[0]) * spline(r[1]) * spline(r[2]);
+    result.slope[k] = Vec3(spline_slope(r[0]) * spline(r[1]) * spline(r[2]),
+                           spline(r[0]) * spline_slope(r[1]) * spline(r[2]),
+                           spline(r[0]) * spline(r[1]) * spline_slope(r[2])) /
+                      b.cell_size;
+  }
+  return result;
+}
+
+inline Mat3 polar_rotation(const Mat3& F) {
+  const Eigen::JacobiSVD<Mat3> svd(F, Eigen::ComputeFullU | Eigen::ComputeFullV);
+  Mat3 U = svd.matrixU();
+  if ((U * svd.matrixV().transpose()).determinant() < 0) U.col(2) *= -1;
+  return U * svd.matrixV().transpose();
+}
+
+inline Mat3 piola(const Material& m, const Mat3& F) {
+  const double mu = lame_mu(m), lambda = lame_lambda(m), J = F.determinant();
+  Mat3 cof;
+  for (int i = 0; i < 3; ++i) {
+    cof.row(i) = F.row((i + 1) % 3).cross(F.row((i + 2) % 3));
+  }
+  if (m.law == Law::kNeoHookean) return mu * F + ((lambda + mu) * (J - 1) - mu) * cof;
+  return 2 * mu * (F - polar_rotation(F)) + lambda * (J - 1) * cof;
+}
+
+/// Displacements and velocities of all nodes after one substep without contact, and what the points
+/// saw on the way.
+struct Step {
+  std::vector<Vec3> u, v, force;
+  std::vector<double> mass;
+  double largest_strain = 0;  // max over points of ||F - R||
+};
+
+/// The stabilising numbers (mpm/stabilisation.h) of a block's cells, each as coefficients of nodes
+/// and times the root of its cell's volume: products of A, d, B along the axes, from their
+/// definition.
+inline std::vector<std::vector<std::pair<int, double>>> stabilising_rows(const MpmState& s,
+                                                                         const Block& block) {
+  std::vector<std::vector<std::pair<int, double>>> rows;
+  const double kinds[3][3] = {{0.15625, 0.6875, 0.15625}, {-0.5, 0, 0.5}, {0.25, -0.5, 0.25}};
+  const double h = s.bodies[block.body].cell_size;
+  for (int i = 0; i < static_cast<int>(block.partial.size()); ++i) {
+    if (block.partial[i] == 0) continue;
+    const int first = i / block.stride * block.plane + i % block.stride;
+    for (int f = 0; f < 27; ++f) {
+      if (f % 3 + f / 3 % 3 + f / 9 <= 1) continue;  // linear fields are free
+      rows.emplace_back();
+      for (int k = 0; k < 27; ++k) {
+        rows.back().emplace_back(
+            block.node[first + k / 9 * block.plane + k / 3 % 3 * block.pitch + k % 3],
+            kinds[f % 3][k % 3] * kinds[f / 3 % 3][k / 3 % 3] * kinds[f / 9][k / 9] *
+                std::sqrt(block.partial[i]) / h);
+      }
+    }
+  }
+  return rows;
+}
+
+inline Step substep(const MpmState& s, double dt) {
+  const std::size_t n = s.nodes.size();
+  Step r;
+  r.u.resize(n);
+  r.v.resize(n);
+  r.force.assign(n, Vec3::Zero());
+  r.mass.assign(n, 0.0);
+  for (std::size_t i = 0; i < n; ++i) {
+    r.u[i] = Vec3(s.nodes.u[0][i], s.nodes.u[1][i], s.nodes.u[2][i]);
+    r.v[i] = Vec3(s.nodes.v[0][i], s.nodes.v[1][i], s.nodes.v[2][i]);
+  }
+  for (int p = 0; p < s.points.size(); ++p) {
+    const Material& m = s.bodies[s.points.site[p].body].material;
+    const Stencil stencil = stencil_of(s, p);
+    Mat3 F = Mat3::Identity(), rate = Mat3::Zero();
+    for (int k = 0; k < 27; ++k) {
+      F += r.u[stencil.node[k]] * stencil.slope[k].transpose();
+      rate += r.v[stencil.node[k]] * stencil.slope[k].transpose();
+    }
+    r.largest_strain = std::max(r.largest_strain, (F - polar_rotation(F)).norm());
+    const Mat3 viscous = m.viscosity * F * (F.transpose() * rate + rate.transpose() * F);
+    const Mat3 P = piola(m, F) + viscous;
+    for (int k = 0; k < 27; ++k) {
+      r.force[stencil.node[k]] -= s.points.volume[p] * P * stencil.slope[k];
+      r.mass[stencil.node[k]] += m.density * s.points.volume[p] * stencil.weight[k];
+    }
+  }
+  for (const Block* block : s.blocks.all) {
+    const double stiffness = 0.01 * lame_mu(s.bodies[block->body].material);
+    for (const auto& row : stabilising_rows(s, *block)) {
+      Vec3 value = Vec3::Zero();
+      for (const auto& [i, a] : row) value += a * r.u[i];
+      for (const auto& [i, a] : row) r.force[i] -= stiffness * a * value;
+    }
+  }
+  for (std::size_t i = 0; i < n; ++i) {
+    if (s.nodes.inv_mass[i] == 0) continue;  // empty or anchored
+    r.v[i] += dt * (r.force[i] / r.mass[i] + s.scene.gravity);
+    r.u[i] += dt * r.v[i];
+  }
+  return r;
+}
+
+}  // namespace reference
+}  // namespace tissue_sim

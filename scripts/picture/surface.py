@@ -5,10 +5,11 @@ import numpy as np
 class Mesh:
     """Triangles with a normal and a colour at each vertex.
 
-    vertices, normals, colors: (n, 3); triangles: (m, 3); `metal` from 0, plastic, to 1, steel.
+    vertices, normals, colors: (n, 3); triangles: (m, 3); `metal` from 0, plastic, to 1, steel, or
+    None for tissue.
     """
 
-    def __init__(self, vertices, triangles, normals, colors, metal=0.0):
+    def __init__(self, vertices, triangles, normals, colors, metal=None):
         self.vertices = np.asarray(vertices, np.float32)
         self.triangles = np.asarray(triangles, np.int64)
         self.normals = np.asarray(normals, np.float32)
@@ -124,32 +125,51 @@ def half_density_surface(density):
     return vertices, np.concatenate(triangles)
 
 
-def smoothed(vertices, triangles, rounds, share):
+class Neighbours:
+    """Means over the vertices that share an edge."""
+
+    def __init__(self, triangles, vertex_count):
+        edges = np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]])
+        self.a, self.b = np.concatenate([edges, edges[:, ::-1]]).T
+        self.n = vertex_count
+        self.count = np.maximum(np.bincount(self.a, minlength=self.n), 1)[:, None]
+
+    def mean(self, x):
+        return np.stack([np.bincount(self.a, column[self.b], self.n) for column in x.T],
+                        1) / self.count
+
+
+def smoothed(vertices, neighbours, rounds, share):
     """Evens out steps without shrinking (Taubin 1995); `share` (n,) in [0, 1] of each vertex."""
-    edges = np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]])
-    a, b = np.concatenate([edges, edges[:, ::-1]]).T
-    count = np.maximum(np.bincount(a, minlength=len(vertices)), 1)
     for k in range(2 * rounds):
-        step = (0.55 if k % 2 == 0 else -0.57) * share
-        for axis in range(3):
-            mean = np.bincount(a, vertices[b, axis], len(vertices)) / count
-            vertices[:, axis] += step * (mean - vertices[:, axis])
+        step = (0.55 if k % 2 == 0 else -0.57) * share[:, None]
+        vertices = vertices + step * (neighbours.mean(vertices) - vertices)
     return vertices
 
 
-def vertex_normals(vertices, triangles):
+def shading_normals(vertices, triangles, neighbours, even_share):
+    """Normals without the terraces that a lattice leaves on a round body; edges keep theirs, but
+    for `even_share` (n, 1)."""
     corners = vertices[triangles]
     n = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    total = np.stack([np.bincount(triangles.ravel(), np.repeat(n[:, axis], 3), len(vertices))
-                      for axis in range(3)], 1)
-    return total / (np.linalg.norm(total, axis=1, keepdims=True) + 1e-20)
+    own = np.stack([np.bincount(triangles.ravel(), np.repeat(n[:, axis], 3), len(vertices))
+                    for axis in range(3)], 1)
+    own /= np.linalg.norm(own, axis=1, keepdims=True) + 1e-20
+    even = own
+    for _ in range(40):
+        even = neighbours.mean(even)
+    even /= np.linalg.norm(even, axis=1, keepdims=True) + 1e-20
+    alike = np.clip((np.sum(own * even, axis=1, keepdims=True) - 0.80) / 0.12, even_share, 1)
+    mixed = own * (1 - 0.85 * alike) + even * 0.85 * alike
+    return mixed / (np.linalg.norm(mixed, axis=1, keepdims=True) + 1e-20)
 
 
-def tissue_surface(points, weights, values, spacing, smoothing):
+def tissue_surface(points, weights, values, spacing, smoothing, cut_face):
     """The surface of one piece: (vertices, triangles, normals, values at the vertices).
 
     points (n, 3) [m]; weights (n,): 1, less where it is to have a furrow; values (n, k): what the points carry, to be had at the surface; `smoothing`
-    of those values gives the rounds in which the surface is evened out."""
+    of those values gives the rounds in which the surface is evened out, and
+    `cut_face` (n, 1) where it is a face whose normals are to be even."""
     h = spacing / 2
     margin = 2.5 * spacing
     density = deposit(points, weights, h, margin)
@@ -166,9 +186,11 @@ def tissue_surface(points, weights, values, spacing, smoothing):
     density.values /= inside
     vertices, triangles = half_density_surface(density)
     at_vertices = np.stack([f.sample(vertices) for f in carried], 1)
+    neighbours = Neighbours(triangles, len(vertices))
     for rounds, share in smoothing(at_vertices):
-        vertices = smoothed(vertices, triangles, rounds, share)
-    return vertices, triangles, vertex_normals(vertices, triangles), at_vertices
+        vertices = smoothed(vertices, neighbours, rounds, share)
+    return vertices, triangles, shading_normals(
+        vertices, triangles, neighbours, cut_face(at_vertices)), at_vertices
 
 
 def occupancy(points, spacing, reach):

@@ -56,23 +56,27 @@ def camera_for(boxes, size, azimuth=-80.0, elevation=31.0, room=1.0):
     return Camera(target + away * distance, target, size)
 
 
-def tissue_meshes(moment, spacing, stress_ends):
+def tissue_meshes(moment, spacing, around, stress_ends):
     """One mesh for each piece, and for each of them its colours, one for each of stress_ends."""
     p = moment.points
     ids, counts = np.unique(p["fragment"], return_counts=True)
+    ids, counts = ids[counts >= 8], counts[counts >= 8]
     whole = len(ids) == 1  # a cut under way is a furrow, a finished one two smooth faces
     meshes, colors, largest, hues = [], [], ids[np.argmax(counts)], itertools.cycle(LOOSE)
-    for fragment in ids[counts >= 8]:
+    for fragment in ids:
         own = p["fragment"] == fragment
         carried = np.stack([p["stress"][own], p["damage"][own]], 1).astype(float)
         weights = 1 - (1.5 if whole else 0.8) * np.minimum(p["damage"][own], 0.6)
         vertices, triangles, normals, values = tissue_surface(
             moment.x[own], weights, carried, spacing,
-            lambda v: [(2 if whole else 60, smoothstep(0.03, 0.12, v[:, 1])), (5, np.ones(len(v)))])
+            lambda v: [(2 if whole else 60, smoothstep(0.03, 0.12, v[:, 1])), (12, np.ones(len(v)))],
+            lambda v: smoothstep(0.15, 0.25, v[:, 1:2]) * (not whole))
         base = LIVER if fragment == largest else next(hues)
-        cut = smoothstep(0.10, 0.22 if whole else 0.30, values[:, 1:2])
-        tissue = base * (1 - cut) + (0.12 * base if whole else 0.5 * base + 0.7 * FRESH_CUT) * cut
-        colors.append([(linear(stress_colors(values[:, 0] / end)) * (1 - 0.8 * cut * whole) if end
+        cut = smoothstep(0.10, 0.26, values[:, 1:2])
+        closed = smoothstep(0.5, 0.75, around.sample(vertices + 0.003 * normals))[:, None] * cut
+        tissue = base * (1 - cut) + (0.5 * base + 0.7 * FRESH_CUT) * cut
+        tissue *= 1 - 0.85 * closed
+        colors.append([(linear(stress_colors(values[:, 0] / end)) * (1 - 0.8 * closed) if end
                         else tissue).astype(np.float32) for end in stress_ends])
         meshes.append(Mesh(vertices, triangles, normals, tissue))
     return meshes, colors
@@ -116,7 +120,7 @@ def draw(moment, camera, stress_ends=(None,), supersample=2):
                         scale=camera.scale * supersample)
     spacing = point_spacing(moment.x)
     around = occupancy(moment.x, spacing, 0.0045)
-    meshes, colors = tissue_meshes(moment, spacing, stress_ends)
+    meshes, colors = tissue_meshes(moment, spacing, around, stress_ends)
     for tool, position, rotation in moment.tools:
         meshes += [placed(m, position, rotation) for m in tool_meshes(tool)]
     lo, hi = moment.x.min(0), moment.x.max(0)
@@ -164,7 +168,12 @@ class Surface:
         self.x = (camera.eye + rays[pixels] * buffer.depth[pixels, None]).astype(np.float32)
         self.view = normalized(camera.eye - self.x).astype(np.float32)
         self.normal = normalized(self.at(mesh.normals)).astype(np.float32)
-        self.normal[dot(self.normal, self.view) < 0] *= -1
+        facing = dot(self.normal, self.view)
+        if mesh.metal is not None:  # a plate has two sides
+            self.normal *= np.where(facing < 0, -1, 1)[:, None]
+        else:  # an interpolated normal may look away from the eye at the rim
+            bend = np.maximum(0.02 - facing, 0)[:, None]
+            self.normal = normalized(self.normal + bend * self.view)
 
     def at(self, attribute):
         """A vertex attribute at the pixels."""

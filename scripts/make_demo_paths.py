@@ -1,6 +1,6 @@
 #!/usr/bin/python3
-"""Writes the demo's instrument paths, scalpel.csv and probe.csv, to fit a body; with a mesh, also a
-scene.yaml around it.
+"""Writes the demo's instrument paths, scalpel.csv and probe.csv, to fit a body, and the scene.yaml
+that goes with them.
 
 The body is held at its low x end. The scalpel comes from the -y side and cuts the other end off
 along a curve in the plane; then the probe pushes the loose end towards -y. Lines of a path: time
@@ -199,6 +199,7 @@ def main():
     parser.add_argument("--mesh", help="mesh file to make a scene of instead")
     parser.add_argument("--scale", type=float, default=1.0, help="metres per unit of the mesh")
     parser.add_argument("--cell-size", type=float, help="grid spacing [m]")
+    parser.add_argument("--only-paths", action="store_true", help="write no scene.yaml")
     parser.add_argument("--out", required=True, help="folder to write into")
     args = parser.parse_args()
     if args.mesh:
@@ -216,10 +217,7 @@ def main():
     tools = {tool["name"]: tool for tool in scene.get("tools", [])}
     radius = tools.get("probe", {}).get("radius", 0.004)
     blade = round((hi[2] - ground + 0.015) / np.cos(LEAN), 3)
-    if not args.scene or args.cell_size or set(tools) != {"scalpel", "probe"}:
-        for name in ("mesh",):
-            if name in body:
-                body[name] = os.path.abspath(os.path.join(folder, body[name]))
+    if set(tools) != {"scalpel", "probe"}:
         tools = {"scalpel": {"name": "scalpel", "type": "scalpel", "blade_width": 0.008,
                              "blade_length": blade},
                  "probe": {"name": "probe", "type": "probe", "radius": 0.004, "length": 0.1}}
@@ -230,7 +228,9 @@ def main():
     write_path(os.path.join(args.out, "scalpel.csv"), t, x, rotation)
     t, x, rotation = probe_path(cut, lo, hi, ground, radius, rounded, cut_done)
     write_path(os.path.join(args.out, "probe.csv"), t, x, rotation)
-    if args.mesh or args.cell_size:
+    if not args.only_paths:
+        if "mesh" in body and "://" not in body["mesh"]:
+            body["mesh"] = os.path.abspath(os.path.join(folder, body["mesh"]))
         with open(os.path.join(args.out, "scene.yaml"), "w") as file:
             yaml.safe_dump(plain(scene), file, sort_keys=False, default_flow_style=None)
 

@@ -10,19 +10,17 @@ noetic=/opt/ros/noetic/setup.bash
 core_packages=(g++ make cmake libeigen3-dev libtbb-dev libyaml-cpp-dev libassimp-dev libgtest-dev
   libbenchmark-dev python3)
 picture_packages=(python3-numpy python3-matplotlib python3-yaml)
-debian_packages=(catkin ros-message-generation ros-message-runtime libroscpp-dev librosbag-dev
-  librostest-dev libtf2-dev libtf2-ros-dev libtf2-geometry-msgs-dev libnodelet-dev pluginlib-dev
-  libdiagnostic-updater-dev libdiagnostic-msgs-dev libstd-msgs-dev libstd-srvs-dev
-  libgeometry-msgs-dev libsensor-msgs-dev libvisualization-msgs-dev librosgraph-msgs-dev
-  libpcl-dev libpcl-conversions-dev rosout python3-roslaunch python3-rosbag python3-rostopic
-  python3-rosservice python3-rosnode python3-rosparam python3-rostest python3-rospy python3-tf2-ros
-  python3-std-msgs python3-std-srvs python3-geometry-msgs python3-sensor-msgs
-  python3-visualization-msgs python3-diagnostic-msgs)
-noetic_packages=(ros-noetic-{catkin,message-generation,message-runtime,roscpp,rospy,rosbag,rostest}
-  ros-noetic-{roslaunch,rosout,rostopic,rosservice,rosnode,rosparam,tf2,tf2-ros,tf2-geometry-msgs}
-  ros-noetic-{nodelet,pluginlib,diagnostic-updater,diagnostic-msgs,std-msgs,std-srvs}
-  ros-noetic-{geometry-msgs,sensor-msgs,visualization-msgs,rosgraph-msgs,pcl-conversions}
-  libpcl-dev)
+debian_packages=(catkin ros-message-generation ros-message-runtime libroscpp-dev libroslib-dev
+  librosbag-storage-dev librostest-dev libtf2-dev libtf2-ros-dev libtf2-geometry-msgs-dev
+  libnodelet-dev pluginlib-dev libdiagnostic-updater-dev libdiagnostic-msgs-dev libstd-msgs-dev
+  libstd-srvs-dev libgeometry-msgs-dev libsensor-msgs-dev libvisualization-msgs-dev rosout
+  python3-roslaunch python3-rosbag python3-rostopic python3-rosservice python3-rosnode
+  python3-rosparam python3-rostest python3-rospy python3-tf2-ros python3-std-msgs python3-std-srvs
+  python3-geometry-msgs python3-sensor-msgs python3-visualization-msgs python3-diagnostic-msgs)
+noetic_packages=(ros-noetic-{catkin,message-generation,message-runtime,roscpp,roslib,rospy,rostest}
+  ros-noetic-{rosbag,rosbag-storage,roslaunch,rosout,rostopic,rosservice,rosnode,rosparam,tf2}
+  ros-noetic-{tf2-ros,tf2-geometry-msgs,nodelet,pluginlib,diagnostic-updater,diagnostic-msgs}
+  ros-noetic-{std-msgs,std-srvs,geometry-msgs,sensor-msgs,visualization-msgs})
 
 say() { printf '\n== %s\n' "$*"; }
 fail() { printf '\nerror: %s\n' "$*" >&2; exit 1; }
@@ -122,7 +120,7 @@ configure_and_build() {
   }
   cmake --build "$folder" -j "$jobs" 2>&1 | tee -a "$log" | show_progress ||
     {
-      grep -E -A 8 'error|Error' "$log" | tail -40 >&2
+      grep -E -A 5 'error:|undefined reference|\*\*\* ' "$log" | head -40 >&2
       fail "the build failed: see $log"
     }
 }

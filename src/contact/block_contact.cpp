@@ -9,32 +9,50 @@
 namespace tissue_sim {
 namespace {
 
-ContactSpring spring_of(const LatticeBody& body, float volume) {
+/// Spring of a point of unit volume; stiffness and damping both grow with the volume.
+ContactSpring unit_spring(const LatticeBody& body) {
   const Material& m = body.material;
   const auto modulus = static_cast<float>(lame_lambda(m) + 2 * lame_mu(m));
   const float edge = 0.5f * static_cast<float>(body.cell_size);
-  return contact_spring(modulus, static_cast<float>(m.density), edge, volume);
+  return contact_spring(modulus, static_cast<float>(m.density), edge, 1.0f);
 }
 
 bool overlap(const Box& a, const Box& b) {
   return (a.min.array() <= b.max.array()).all() && (b.min.array() <= a.max.array()).all();
 }
 
-/// One point's stencil in its block.
-struct Stencil {
-  int first;  // local number of its lowest node
-  int pitch, plane;
-  int s[3];  // sub-position
-  int local(int k) const { return first + k / 9 * plane + k / 3 % 3 * pitch + k % 3; }
-  float weight(int k) const {
-    return lattice_weight(s[0], k % 3) * lattice_weight(s[1], k / 3 % 3) *
-           lattice_weight(s[2], k / 9);
+/// Weights of the 27 nodes for each of the eight sub-positions, padded to whole SIMD registers.
+struct Weights {
+  alignas(64) float of[8][32] = {};
+  Weights() {
+    for (int s = 0; s < 8; ++s) {
+      for (int k = 0; k < 27; ++k) {
+        of[s][k] = lattice_weight(s & 1, k % 3) * lattice_weight(s >> 1 & 1, k / 3 % 3) *
+                   lattice_weight(s >> 2, k / 9);
+      }
+    }
   }
+};
+const Weights kWeights;
+
+/// The nodes of a point's stencil, in its block's numbers, and their weights.
+struct Stencil {
+  int local[27];
+  const float* weight;
 };
 
 Stencil stencil_of(const Block& b, int lane) {
   const int j = lane % b.stride, sub = lane / b.stride % 8, z = lane / b.stride / 8;
-  return {z * b.plane + j, b.pitch, b.plane, {sub & 1, sub >> 1 & 1, sub >> 2}};
+  Stencil s;
+  s.weight = kWeights.of[sub];
+  int k = 0;
+  for (int dz = 0; dz < 3; ++dz) {
+    for (int dy = 0; dy < 3; ++dy) {
+      const int row = (z + dz) * b.plane + j + dy * b.pitch;
+      for (int dx = 0; dx < 3; ++dx) s.local[k++] = row + dx;
+    }
+  }
+  return s;
 }
 
 }  // namespace
@@ -96,7 +114,7 @@ void add_contact(MpmState& state, int index, float* force, std::vector<ColliderL
   const std::vector<std::uint8_t>& near = contacts.near[index];
   if (near.empty()) return;
   const Block& block = *state.blocks.all[index];
-  const LatticeBody& body = state.bodies[block.body];
+  const ContactSpring unit = unit_spring(state.bodies[block.body]);
   BlockScratch& scratch = state.scratch.local();
   const std::size_t lanes = block.lane_count();
   if (scratch.values.size() < 3 * lanes) scratch.values.resize(3 * lanes);
@@ -122,8 +140,8 @@ void add_contact(MpmState& state, int index, float* force, std::vector<ColliderL
       const Stencil stencil = stencil_of(block, lane);
       float v[3] = {}, push[3];
       for (int k = 0; k < 27; ++k) {
-        const int node = block.node[stencil.local(k)];
-        const float w = stencil.weight(k);
+        const int node = block.node[stencil.local[k]];
+        const float w = stencil.weight[k];
         for (int a = 0; a < 3; ++a) v[a] += w * state.nodes.v[a][node];
       }
       float* hold = &contacts.hold[3 * static_cast<std::size_t>(p)];
@@ -132,10 +150,12 @@ void add_contact(MpmState& state, int index, float* force, std::vector<ColliderL
         to_local(collider, at, hold);
       }
       touching.push_back(p);
-      contact_force(collider, g, spring_of(body, block.volume[lane]), at, v, hold, push);
+      const float volume = block.volume[lane];
+      contact_force(collider, g, {unit.stiffness * volume, unit.damping * volume}, at, v, hold,
+                    push);
       for (int k = 0; k < 27; ++k) {
-        float* node_force = force + stencil.local(k);
-        const float w = stencil.weight(k);
+        float* node_force = force + stencil.local[k];
+        const float w = stencil.weight[k];
         for (int a = 0; a < 3; ++a) node_force[a * component] += w * push[a];
       }
       ColliderLoad& load = loads[c];

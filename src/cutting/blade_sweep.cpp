@@ -58,9 +58,9 @@ bool segments_cross(const Vec3& a, const Vec3& b, const Vec3& p, const Vec3& q) 
   return u >= -1e-9 && u <= 1 + 1e-9 && t >= 0 && t <= 1;
 }
 
-Box box_of(const std::vector<MovingSegment>& segments) {
+Box box_of(const std::vector<SweptEdge>& segments) {
   Box box;
-  for (const MovingSegment& s : segments) {
+  for (const SweptEdge& s : segments) {
     for (const Vec3* v : {&s.a0, &s.b0, &s.a1, &s.b1}) {
       box.min = box.min.cwiseMin(*v);
       box.max = box.max.cwiseMax(*v);
@@ -70,6 +70,21 @@ Box box_of(const std::vector<MovingSegment>& segments) {
 }
 
 }  // namespace
+
+SweptEdge swept(const MovingSegment& edge) {
+  SweptEdge result;
+  static_cast<MovingSegment&>(result) = edge;
+  const Vec3 normal = (edge.b1 - edge.a0).cross(edge.a1 - edge.b0);
+  if (normal.norm() > 0) result.normal = normal.normalized();
+  const Vec3 corners[4] = {edge.a0, edge.b0, edge.a1, edge.b1};
+  result.offset = result.normal.dot(corners[0] + corners[1] + corners[2] + corners[3]) / 4;
+  for (const Vec3& corner : corners) {
+    result.thickness =
+        std::max(result.thickness, std::fabs(result.normal.dot(corner) - result.offset));
+  }
+  result.thickness += 1e-9;  // rounding
+  return result;
+}
 
 bool edge_passes(const MovingSegment& e, const MovingSegment& b) {
   for (int i = 0; i < 3; ++i) {
@@ -118,8 +133,8 @@ std::vector<SweepPart> sweep_parts(const BladePath& path) {
       part.begin = (i + static_cast<double>(k) / n) / spans;
       part.end = (i + static_cast<double>(k + 1) / n) / spans;
       for (std::size_t j = 0; j + 1 < path.edge.size(); ++j) {
-        part.edges.push_back({from * path.edge[j] + aside, from * path.edge[j + 1] + aside,
-                              to * path.edge[j] + aside, to * path.edge[j + 1] + aside});
+        part.edges.push_back(swept({from * path.edge[j] + aside, from * path.edge[j + 1] + aside,
+                                    to * path.edge[j] + aside, to * path.edge[j + 1] + aside}));
       }
       part.box = box_of(part.edges);
       parts.push_back(std::move(part));

@@ -2,6 +2,7 @@
 // linearly over the same interval, so nothing slips through, however the tissue gives way.
 #pragma once
 
+#include <algorithm>
 #include <vector>
 
 #include "tissue_sim/cut.h"
@@ -14,6 +15,21 @@ struct MovingSegment {
   Vec3 a0, b0, a1, b1;
 };
 
+/// The surface that an edge sweeps lies within `thickness` of the plane normal . x = offset.
+struct SweptEdge : MovingSegment {
+  Vec3 normal = Vec3::Zero();
+  double offset = 0, thickness = 0;  ///< [m]
+};
+SweptEdge swept(const MovingSegment& edge);
+
+/// Whether all of the bond stays on one side of the swept surface: cheap, and true for most.
+inline bool stays_aside(const SweptEdge& e, const MovingSegment& b) {
+  const double a0 = e.normal.dot(b.a0) - e.offset, b0 = e.normal.dot(b.b0) - e.offset;
+  const double a1 = e.normal.dot(b.a1) - e.offset, b1 = e.normal.dot(b.b1) - e.offset;
+  return std::min(std::min(a0, b0), std::min(a1, b1)) > e.thickness ||
+         std::max(std::max(a0, b0), std::max(a1, b1)) < -e.thickness;
+}
+
 /// Whether the two segments meet at some moment of the interval. The edge includes its ends (with a
 /// margin of 1e-9 of its length, so that the pieces of a polyline leave no gap), the bond its own.
 bool edge_passes(const MovingSegment& edge, const MovingSegment& bond);
@@ -22,7 +38,7 @@ bool edge_passes(const MovingSegment& edge, const MovingSegment& bond);
 /// spans.
 struct SweepPart {
   double begin, end;  ///< in [0, 1] of the time over which the tissue moves
-  std::vector<MovingSegment> edges;
+  std::vector<SweptEdge> edges;
   Box box;  ///< of the edges
 };
 

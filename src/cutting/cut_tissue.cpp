@@ -70,7 +70,9 @@ void sweep_block(const MpmState& state, const Block& block, const std::vector<Sw
       for (const SweepPart& part : parts) {
         const MovingSegment bond{p0 + part.begin * (p1 - p0), q0 + part.begin * (q1 - q0),
                                  p0 + part.end * (p1 - p0), q0 + part.end * (q1 - q0)};
-        const auto passes = [&bond](const MovingSegment& e) { return edge_passes(e, bond); };
+        const auto passes = [&bond](const SweptEdge& e) {
+          return !stays_aside(e, bond) && edge_passes(e, bond);
+        };
         if (std::any_of(part.edges.begin(), part.edges.end(), passes)) {
           broken.push_back({p, k});
           break;

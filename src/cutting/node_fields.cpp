@@ -151,18 +151,16 @@ std::vector<NodeFields::Cell> NodeFields::update(const std::vector<LatticeBody>&
                                                  const std::vector<std::int32_t>& changed,
                                                  Nodes& nodes) {
   std::vector<Cell> cells;
+  std::vector<bool> seen(bodies.back().first_node + bodies.back().node_count(), false);
   for (const std::int32_t p : changed) {
     const Points::Site& s = points.site[p];
     for (int k = 0; k < 27; ++k) {
-      cells.push_back({s.body, s.x / 2 + k % 3 - 1, s.y / 2 + k / 3 % 3 - 1, s.z / 2 + k / 9 - 1});
+      const Cell c{s.body, s.x / 2 + k % 3 - 1, s.y / 2 + k / 3 % 3 - 1, s.z / 2 + k / 9 - 1};
+      const int node = bodies[c.body].node(c.x, c.y, c.z);
+      if (!seen[node]) cells.push_back(c);
+      seen[node] = true;
     }
   }
-  const auto key = [&bodies](const Cell& c) { return bodies[c.body].node(c.x, c.y, c.z); };
-  std::sort(cells.begin(), cells.end(),
-            [&key](const Cell& a, const Cell& b) { return key(a) < key(b); });
-  cells.erase(std::unique(cells.begin(), cells.end(),
-                          [&key](const Cell& a, const Cell& b) { return key(a) == key(b); }),
-              cells.end());
   const auto unchanged = [&](const Cell& c) {
     return !split_node(bodies[c.body], points, c.x, c.y, c.z, nodes);
   };

@@ -289,12 +289,21 @@ Blocks make_blocks(const std::vector<LatticeBody>& bodies, const Points& points,
 void update_blocks(Blocks& blocks, const std::vector<LatticeBody>& bodies, const Points& points,
                    const NodeFields& fields, const std::vector<NodeFields::Cell>& cells,
                    int node_count) {
+  std::vector<bool> changed(bodies.back().first_node + bodies.back().node_count(), false);
+  for (const NodeFields::Cell& c : cells) changed[bodies[c.body].node(c.x, c.y, c.z)] = true;
+  const auto touched = [&](const BlockRegion& r) {
+    for (int z = r.z - 1; z <= r.z + r.nz; ++z) {
+      for (int y = r.y - 1; y <= r.y + r.ny; ++y) {
+        const int row = bodies[r.body].node(0, y, z);
+        for (int x = r.x - 1; x <= r.x + r.nx; ++x) {
+          if (changed[row + x]) return true;
+        }
+      }
+    }
+    return false;
+  };
   for (BlockRegion& r : blocks.regions) {
-    const auto touches = [&r](const NodeFields::Cell& c) {
-      return c.body == r.body && c.x >= r.x - 1 && c.x <= r.x + r.nx && c.y >= r.y - 1 &&
-             c.y <= r.y + r.ny && c.z >= r.z - 1 && c.z <= r.z + r.nz;
-    };
-    if (std::any_of(cells.begin(), cells.end(), touches)) fill_region(r, bodies, points, fields);
+    if (touched(r)) fill_region(r, bodies, points, fields);
   }
   connect_forces(blocks, bodies, node_count);
 }

@@ -155,7 +155,9 @@ MarkerArray Markers::make(const MarkerInput& input) {
     if (i < input.loads.size()) add_force(input, i, array);
   }
   std::vector<const Fragment*> largest;
-  for (const Fragment& f : input.fragments) largest.push_back(&f);
+  for (const Fragment& f : input.fragments) {
+    if ((f.box.min.array() <= f.box.max.array()).all()) largest.push_back(&f);
+  }
   std::sort(largest.begin(), largest.end(), [](const Fragment* a, const Fragment* b) {
     return a->point_count != b->point_count ? a->point_count > b->point_count : a->id < b->id;
   });

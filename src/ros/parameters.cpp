@@ -164,8 +164,8 @@ Parameters read_parameters(const ros::NodeHandle& node) {
   read(node, "max_tool_speed", p.max_tool_speed, 0.001, 1000);
   read(node, "max_tool_turn_rate", p.max_tool_turn_rate, 0.01, 10000);
   read(node, "tf_tolerance", p.tf_tolerance, 0, 60);
-  p.recording_folder = default_recording_folder();
   read(node, "recording_folder", p.recording_folder, "must be a path");
+  if (p.recording_folder.empty()) p.recording_folder = default_recording_folder();
   p.recording_folder = absolute(p.recording_folder);
   XmlRpcValue record;
   if (node.getParam("record", record) && record.getType() == XmlRpcValue::TypeBoolean) {

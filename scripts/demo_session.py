@@ -16,6 +16,7 @@ from tissue_sim.msg import FragmentArray, SimulationState
 from tissue_sim.srv import StartRecording
 
 TOOLS = ("scalpel", "probe")
+CRUMB = 4  # pieces of fewer points are crumbs that a blade leaves
 PATIENCE = 60.0  # seconds without progress after which something is wrong
 
 
@@ -80,9 +81,10 @@ def length_of(path):
 def show(session, seconds):
     s = session.state
     done = min(1.0, s.time / seconds)
+    pieces = sum(f.point_count >= CRUMB for f in session.fragments.fragments)
     line = "   [%-24s] %4.1f of %.1f s  %.2f x real time  scalpel %.2f N  probe %.2f N  %d piece%s" % (
         "#" * int(24 * done), s.time, seconds, s.real_time_factor, session.force["scalpel"],
-        session.force["probe"], s.fragments, "" if s.fragments == 1 else "s")
+        session.force["probe"], pieces, "" if pieces == 1 else "s")
     if sys.stdout.isatty():
         print("\r\033[K" + line, end="", flush=True)
     else:
@@ -114,14 +116,14 @@ def summary(session, wall):
     lines = ["%-10s %8s %8s %8s %12s  %s" % ("piece", "id", "parent", "points", "volume", "")]
     for title, pieces in (("before", session.before), ("after", session.fragments)):
         for f in pieces.fragments:
-            if f.point_count >= 4:
+            if f.point_count >= CRUMB:
                 lines.append("%-10s %8d %8s %8d %8.2f cm3  %s" % (
                     title, f.id, "-" if f.parent < 0 else f.parent, f.point_count, f.volume * 1e6,
                     "loose" if f.loose else "held"))
-        crumbs = [f for f in pieces.fragments if f.point_count < 4]
+        crumbs = [f for f in pieces.fragments if f.point_count < CRUMB]
         if crumbs:
-            lines.append("%-10s %d of fewer than 4 points, %.3f cm3 together" % (
-                title, len(crumbs), sum(f.volume for f in crumbs) * 1e6))
+            lines.append("%-10s %d of fewer than %d points, %.3f cm3 together" % (
+                title, len(crumbs), CRUMB, sum(f.volume for f in crumbs) * 1e6))
     lines += ["peak force      scalpel %.3f N, probe %.3f N" % (session.peak["scalpel"],
                                                                  session.peak["probe"]),
               "real time       %.2f x (%.1f s simulated in %.1f s)" % (s.time / wall, s.time, wall),
@@ -183,7 +185,7 @@ def main():
     port = os.environ["ROS_MASTER_URI"].rsplit(":", 1)[1].strip("/")
     command = ["/usr/bin/python3", find_roslaunch(), "-p", port, "tissue_sim", "demo.launch",
                "scene:=" + args.scene, "paths:=" + args.paths, "rviz:=" + args.rviz,
-               "recording_folder:=" + args.out, "cloud_rate:=10"]
+               "recording_folder:=" + args.out, "cloud_rate:=" + ("20" if args.rviz == "true" else "5")]
     print("   To look on: export ROS_MASTER_URI=%s; rostopic echo /simulator/state" %
           os.environ["ROS_MASTER_URI"], flush=True)
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))

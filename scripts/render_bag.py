@@ -38,6 +38,10 @@ def rotation_of(q):
                      [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)]])
 
 
+def vector(p):
+    return np.array([p.x, p.y, p.z])
+
+
 class Recording:
     """What pictures need of a bag."""
 
@@ -54,10 +58,10 @@ class Recording:
             points = cloud_points(message)
             self.times.append(time)
             self.damage.append(float(points["damage"].sum()))
-            self.stress.append(float(np.percentile(points["stress"], 99.5)) if len(points) else 0.0)
+            self.stress.append(float(np.percentile(points["stress"], 98.5)) if len(points) else 0.0)
         if not self.times:
             raise ValueError("%s: holds no point cloud to draw" % path)
-        self.tools, self.moving = self.read_tools(input_topic)
+        self.read_tools(input_topic)
 
     @staticmethod
     def find(topics, ending, path):
@@ -68,30 +72,31 @@ class Recording:
                          (path, ending))
 
     def read_tools(self, topic):
-        """Poses of the tools at each cloud, and whether one of them moves."""
+        """At each cloud: the simulated time, the poses of the tools, and whether one moves."""
         wanted = np.array([t.to_sec() for t in self.times])
-        nearest, tools, moving = np.full(len(wanted), np.inf), [[]] * len(wanted), [False] * len(wanted)
+        nearest, self.seconds = np.full(len(wanted), np.inf), np.zeros(len(wanted))
+        self.tools, self.moving = [[] for _ in wanted], [False] * len(wanted)
+        shape_of = {tool["name"]: tool for tool in self.scene.get("tools", [])}
         for _, message, time in self.bag.read_messages([topic]):
             k = int(np.argmin(np.abs(wanted - time.to_sec())))
             off = abs(wanted[k] - time.to_sec())
             if off >= nearest[k]:
                 continue
             nearest[k] = off
-            shape_of = {tool["name"]: tool for tool in self.scene.get("tools", [])}
-            tools[k] = [(shape_of[m.name], np.array([m.end.position.x, m.end.position.y,
-                                                     m.end.position.z]),
-                         rotation_of(m.end.orientation)) for m in message.tools if m.present]
-            moving[k] = any(np.hypot(m.end.position.x - m.begin.position.x,
-                                     m.end.position.y - m.begin.position.y) > 1e-5
-                            for m in message.tools if m.present)
-        return tools, moving
+            self.seconds[k] = (message.frame + 1) / self.scene.get("frame_rate", 60.0)
+            present = [m for m in message.tools if m.present]
+            self.tools[k] = [(shape_of[m.name], vector(m.end.position),
+                              rotation_of(m.end.orientation)) for m in present]
+            self.moving[k] = any(np.linalg.norm(vector(m.end.position) - vector(m.begin.position)) >
+                                 1e-5 for m in present)
 
     def moments(self):
         """Indices of the clouds before, during and after the cut."""
         n, damage = len(self.times), np.array(self.damage)
         if damage[-1] <= 0:
             return [0, n // 2, n - 1]
-        before = int(np.nonzero(damage == damage[0])[0][-1])
+        cut = self.seconds[np.nonzero(damage == damage[0])[0][-1]]
+        before = int(np.argmin(np.abs(self.seconds - cut + 1.0)))
         during = int(np.argmin(np.abs(damage - damage[0] - 0.6 * (damage[-1] - damage[0]))))
         after = [k for k in range(n) if self.moving[k] and damage[k] == damage[-1]]
         return [before, during, after[-1] if after else n - 1]
@@ -142,15 +147,13 @@ def main():
     parser.add_argument("bag")
     parser.add_argument("--out", default=".", help="folder for the pictures")
     parser.add_argument("--size", default="1280x720", help="of a picture, WIDTHxHEIGHT")
-    parser.add_argument("--at", help="seconds into the bag of the three moments, as in 1,4.5,10")
+    parser.add_argument("--at", help="simulated seconds of the three moments, as in 1,4.5,10")
     args = parser.parse_args()
     size = tuple(int(s) for s in args.size.split("x"))
     recording = Recording(args.bag)
-    start = recording.times[0].to_sec()
-    since = np.array([t.to_sec() - start for t in recording.times])
     chosen = recording.moments()
     if args.at:
-        chosen = [int(np.argmin(np.abs(since - float(s)))) for s in args.at.split(",")]
+        chosen = [int(np.argmin(np.abs(recording.seconds - float(s)))) for s in args.at.split(",")]
     moments = [recording.moment(k) for k in chosen]
     camera = camera_for([(m.x.min(0), m.x.max(0)) for m in moments], size)
     stress_end = max(recording.stress[k] for k in chosen)
@@ -160,7 +163,7 @@ def main():
     jobs = [(m, camera, stress_end, name, args.out) for m, name in zip(moments, NAMES)]
     with multiprocessing.Pool(min(3, os.cpu_count() or 1)) as pool:
         pictures = pool.map(draw_one, jobs, chunksize=1)
-    overview(pictures, since[chosen], stress_end, os.path.join(args.out, "overview.png"))
+    overview(pictures, recording.seconds[chosen], stress_end, os.path.join(args.out, "overview.png"))
     print("   overview.png")
 
 

@@ -52,7 +52,7 @@ def camera_for(boxes, size, azimuth=-80.0, elevation=31.0, room=1.0):
     for _ in range(8):
         p = Camera(target + away * distance, target, size).project(corners)
         spread = np.abs(p[:, :2] / np.asarray(size) - 0.5).max()
-        distance *= spread / (0.43 / room)
+        distance *= spread / (0.45 / room)
     return Camera(target + away * distance, target, size)
 
 

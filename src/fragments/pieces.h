@@ -12,7 +12,7 @@ namespace tissue_sim {
 /// Which piece each point belongs to, over time.
 struct Pieces {
   std::vector<std::int32_t> of_point;  ///< Fragment::id
-  std::vector<Fragment> all;           ///< by id; what moves (centroid, ...) is filled by others
+  std::vector<Fragment> all;           ///< by id; fragments/piece_motion.h says where they are
   int next_id = 0;
 };
 

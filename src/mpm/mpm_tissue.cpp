@@ -2,66 +2,28 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstring>
+#include <utility>
 
 #include "contact/block_contact.h"
+#include "contact/frame_colliders.h"
 #include "cutting/cut_tissue.h"
+#include "fragments/piece_motion.h"
+#include "mpm/state_figures.h"
 #include "tools/tool_motion.h"
 
 namespace tissue_sim {
 
-MpmTissue::MpmTissue(const Scene& scene)
-    : state_(make_mpm_state(scene, &notes_)),
+MpmTissue::MpmTissue(const Scene& scene, std::vector<std::string> notes)
+    : notes_(std::move(notes)),
+      state_(make_mpm_state(scene, &notes_)),
       pieces_(whole_pieces(state_->bodies, state_->points)) {
   measure_motion(*state_);
   measure();
+  measure_pieces(*state_, pieces_);
 }
 
 float MpmTissue::stable_substep() const {
-  double dt = 1e9;
-  for (const LatticeBody& b : state_->bodies) {
-    const Material& m = b.material;
-    const double mu = lame_mu(m), lambda = lame_lambda(m);
-    // Waves in the deformed body, in reference space: the volumetric stiffness grows with the
-    // square of the cofactor's columns.
-    const double modulus = 2 * mu + lambda * std::max(1.0f, stiffening_);
-    const double elastic = state_->scene.cfl * b.cell_size * std::sqrt(m.density / modulus);
-    // Explicit viscosity: dt^2 + 4 eta / M dt <= dt_elastic^2.
-    const double t = 2 * m.viscosity / modulus;
-    dt = std::min(dt, std::sqrt(t * t + elastic * elastic) - t);
-  }
-  return static_cast<float>(dt);
-}
-
-void MpmTissue::set_colliders(const FrameInput& input, double share, double duration) {
-  std::vector<Collider>& colliders = state_->colliders;
-  colliders.clear();
-  const Ground& ground = state_->scene.ground;
-  Collider plane;
-  plane.position[2] = static_cast<float>(ground.enabled ? ground.z : -1e6);
-  plane.friction = static_cast<float>(ground.friction);
-  colliders.push_back(plane);
-  for (std::size_t i = 0; i < input.tools.size(); ++i) {
-    const Tool& tool = state_->scene.tools[i];
-    colliders.push_back(tool_collider(tool, static_cast<int>(i), input.tools[i], share, duration));
-  }
-}
-
-/// What each collider sweeps during the frame.
-std::vector<Box> MpmTissue::collider_reach(const FrameInput& input, double duration) {
-  std::vector<Box> reach;
-  for (const double share : {0.0, 0.5, 1.0}) {
-    set_colliders(input, share, duration);
-    reach.resize(state_->colliders.size());
-    for (std::size_t c = 0; c < reach.size(); ++c) {
-      const bool absent = c > 0 && !input.tools[c - 1].present;
-      if (absent) continue;
-      const Box box = bounds(state_->colliders[c]);
-      reach[c].min = reach[c].min.cwiseMin(box.min);
-      reach[c].max = reach[c].max.cwiseMax(box.max);
-    }
-  }
-  return reach;
+  return tissue_sim::stable_substep(*state_, stiffening_);
 }
 
 void MpmTissue::cut(Span<const BladePath> paths, const Array<float>* u_before,
@@ -94,9 +56,9 @@ void MpmTissue::advance(int substeps, float dt, const FrameInput& input) {
     for (int a = 0; a < 3; ++a) s.u_before[a] = s.nodes.u[a];
   }
   const double duration = static_cast<double>(substeps) * dt;
-  find_near_colliders(s, collider_reach(input, duration), duration);
+  find_near_colliders(s, collider_reach(s.scene, input, duration), duration);
   for (int i = 0; i < substeps; ++i) {
-    set_colliders(input, (i + 1.0) / substeps, duration);
+    s.colliders = colliders_at(s.scene, input, (i + 1.0) / substeps, duration);
     std::vector<ColliderLoad> loads(s.colliders.size());
     substep(s, dt, loads);
     for (std::size_t c = 1; c < loads.size(); ++c) {
@@ -140,29 +102,11 @@ void MpmTissue::measure() {
 
 FrameResult MpmTissue::finish() {
   measure();
+  measure_pieces(*state_, pieces_);
   return result_;
 }
 
-std::uint64_t MpmTissue::checksum() const {
-  std::uint64_t hash = 0xcbf29ce484222325u;  // FNV-1a, over words and the bytes that are left
-  const auto add = [&hash](const auto& array) {
-    const auto* bytes = reinterpret_cast<const unsigned char*>(array.data());
-    const std::size_t size = array.size() * sizeof(array[0]);
-    for (std::size_t i = 0; i + 4 <= size; i += 4) {
-      std::uint32_t word;
-      std::memcpy(&word, bytes + i, 4);
-      hash = (hash ^ word) * 0x100000001b3u;
-    }
-    for (std::size_t i = size / 4 * 4; i < size; ++i) hash = (hash ^ bytes[i]) * 0x100000001b3u;
-  };
-  for (int a = 0; a < 3; ++a) {
-    add(state_->nodes.u[a]);
-    add(state_->nodes.v[a]);
-  }
-  add(state_->points.bonds);
-  add(pieces_.of_point);
-  return hash;
-}
+std::uint64_t MpmTissue::checksum() const { return tissue_sim::checksum(*state_, pieces_); }
 
 std::string MpmTissue::device_name() const {
   return std::string("cpu (") + name(state_->instructions) + ", " +

@@ -11,7 +11,8 @@ namespace tissue_sim {
 
 class MpmTissue final : public Tissue {
  public:
-  explicit MpmTissue(const Scene& scene);
+  /// `notes` come before those of the scene.
+  explicit MpmTissue(const Scene& scene, std::vector<std::string> notes = {});
 
   float stable_substep() const override;
   void advance(int substeps, float dt, const FrameInput& input) override;
@@ -27,8 +28,6 @@ class MpmTissue final : public Tissue {
   MpmState& state() { return *state_; }  ///< for tests and the benchmark
 
  private:
-  void set_colliders(const FrameInput& input, double share, double duration);
-  std::vector<Box> collider_reach(const FrameInput& input, double duration);
   void cut(Span<const BladePath> paths, const Array<float>* u_before,
            const std::vector<BlockMotion>& before, CutReport& report);
   void measure();

@@ -3,19 +3,10 @@
 #include <cstring>
 
 #include "cutting/bonds.h"
+#include "fragments/piece_colour.h"
 #include "mpm/mpm_tissue.h"
 
 namespace tissue_sim {
-namespace {
-
-/// Colours of loose pieces (Okabe and Ito's), and of tissue that is not.
-std::uint32_t colour(const Fragment& f) {
-  static constexpr std::uint32_t kPiece[] = {0xe69f00, 0x56b4e9, 0x009e73, 0xf0e442,
-                                             0x0072b2, 0xd55e00, 0xcc79a7};
-  return f.loose ? kPiece[f.id % 7] : 0xa8433a;
-}
-
-}  // namespace
 
 int MpmTissue::read_points(const PointSelection& selection, std::vector<std::uint8_t>& cloud) {
   MpmState& s = *state_;
@@ -52,7 +43,7 @@ int MpmTissue::read_points(const PointSelection& selection, std::vector<std::uin
       out.x = x[lane];
       out.y = x[lanes + lane];
       out.z = x[2 * lanes + lane];
-      out.rgb = colour(f);
+      out.rgb = piece_colour(f);
       out.id = static_cast<std::uint32_t>(p);
       out.fragment = f.id;
       out.stress = stress[lane];

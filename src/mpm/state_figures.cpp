@@ -1,0 +1,46 @@
+#include "mpm/state_figures.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+
+namespace tissue_sim {
+
+float stable_substep(const MpmState& state, float stiffening) {
+  double dt = 1e9;
+  for (const LatticeBody& b : state.bodies) {
+    const Material& m = b.material;
+    const double mu = lame_mu(m), lambda = lame_lambda(m);
+    // Waves in the deformed body, in reference space: the volumetric stiffness grows with the
+    // square of the cofactor's columns.
+    const double modulus = 2 * mu + lambda * std::max(1.0f, stiffening);
+    const double elastic = state.scene.cfl * b.cell_size * std::sqrt(m.density / modulus);
+    // Explicit viscosity: dt^2 + 4 eta / M dt <= dt_elastic^2.
+    const double t = 2 * m.viscosity / modulus;
+    dt = std::min(dt, std::sqrt(t * t + elastic * elastic) - t);
+  }
+  return static_cast<float>(dt);
+}
+
+std::uint64_t checksum(const MpmState& state, const Pieces& pieces) {
+  std::uint64_t hash = 0xcbf29ce484222325u;  // FNV-1a, over words and the bytes that are left
+  const auto add = [&hash](const auto& array) {
+    const auto* bytes = reinterpret_cast<const unsigned char*>(array.data());
+    const std::size_t size = array.size() * sizeof(array[0]);
+    for (std::size_t i = 0; i + 4 <= size; i += 4) {
+      std::uint32_t word;
+      std::memcpy(&word, bytes + i, 4);
+      hash = (hash ^ word) * 0x100000001b3u;
+    }
+    for (std::size_t i = size / 4 * 4; i < size; ++i) hash = (hash ^ bytes[i]) * 0x100000001b3u;
+  };
+  for (int a = 0; a < 3; ++a) {
+    add(state.nodes.u[a]);
+    add(state.nodes.v[a]);
+  }
+  add(state.points.bonds);
+  add(pieces.of_point);
+  return hash;
+}
+
+}  // namespace tissue_sim

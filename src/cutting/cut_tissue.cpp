@@ -130,10 +130,10 @@ void sweep_bonds(MpmState& state, const BladePath& path, const Array<float>* u_b
 void take_apart(MpmState& state, const std::vector<std::int32_t>& changed) {
   if (changed.empty()) return;
   const std::vector<NodeFields::Cell> cells =
-      state.fields->update(state.bodies, state.points, changed, state.nodes);
+      state.fields->update(state.bodies, state.points, changed, state.nodes, *state.cpu);
   if (cells.empty()) return;
   update_blocks(state.blocks, state.bodies, state.points, *state.fields, cells,
-                static_cast<int>(state.nodes.size()));
+                static_cast<int>(state.nodes.size()), *state.cpu);
   state.force.resize(state.blocks.force_size);
   list_contacts(state);
 }

@@ -110,20 +110,21 @@ int NodeFields::node(const LatticeBody& body, const Points::Site& p, int k) cons
   return node(body, p, p.x / 2 + k % 3 - 1, p.y / 2 + k / 3 % 3 - 1, p.z / 2 + k / 9 - 1);
 }
 
-bool NodeFields::split_node(const LatticeBody& body, const Points& points, int x, int y, int z,
-                            Nodes& nodes) {
-  std::int32_t around[216];
-  std::uint8_t label[216];
-  points_around(body, x, y, z, around);
-  const int count = components(around, points, label);
-  const int lattice_node = body.node(x, y, z);
+bool NodeFields::split_node(const LatticeBody& body, const Points& points, const Cell& cell,
+                            const Components& components, Nodes& nodes) {
+  const int lattice_node = body.node(cell.x, cell.y, cell.z);
   const auto before = splits_.find(lattice_node);
-  if (count == (before == splits_.end() ? 1 : static_cast<int>(before->second.field.size()))) {
-    return false;  // components only come apart, so the same number means the same components
-  }
+  const int count_before =
+      before == splits_.end() ? 1 : static_cast<int>(before->second.field.size());
+  // Components only come apart, so the same number means the same components.
+  if (components.count == count_before) return false;
+  const auto& label = components.label;
+  std::int32_t around[216];
+  points_around(body, cell.x, cell.y, cell.z, around);
   Split split;
   std::copy(std::begin(label), std::end(label), split.component);
-  const std::vector<Share> share = shares(body, points, x, y, z, around, label, count);
+  const std::vector<Share> share =
+      shares(body, points, cell.x, cell.y, cell.z, around, label, components.count);
   std::vector<std::int32_t> taken;
   for (int i = 0; i < 216; ++i) {
     if (around[i] < 0 || label[i] != split.field.size()) continue;  // the first of its component
@@ -141,7 +142,7 @@ bool NodeFields::split_node(const LatticeBody& body, const Points& points, int x
     taken.push_back(parent);
     split.field.push_back(field);
   }
-  for (int c = 0; c < count; ++c) set_mass(nodes, split.field[c], share[c]);
+  for (int c = 0; c < components.count; ++c) set_mass(nodes, split.field[c], share[c]);
   splits_[lattice_node] = std::move(split);
   return true;
 }
@@ -149,7 +150,7 @@ bool NodeFields::split_node(const LatticeBody& body, const Points& points, int x
 std::vector<NodeFields::Cell> NodeFields::update(const std::vector<LatticeBody>& bodies,
                                                  const Points& points,
                                                  const std::vector<std::int32_t>& changed,
-                                                 Nodes& nodes) {
+                                                 Nodes& nodes, Cpu& cpu) {
   std::vector<Cell> cells;
   std::vector<bool> seen(bodies.back().first_node + bodies.back().node_count(), false);
   for (const std::int32_t p : changed) {
@@ -161,11 +162,23 @@ std::vector<NodeFields::Cell> NodeFields::update(const std::vector<LatticeBody>&
       seen[node] = true;
     }
   }
-  const auto unchanged = [&](const Cell& c) {
-    return !split_node(bodies[c.body], points, c.x, c.y, c.z, nodes);
-  };
-  cells.erase(std::remove_if(cells.begin(), cells.end(), unchanged), cells.end());
-  return cells;
+  std::vector<Components> found(cells.size());
+  cpu.for_each(
+      static_cast<int>(cells.size()),
+      [&](int i) {
+        const Cell& c = cells[i];
+        std::int32_t around[216];
+        points_around(bodies[c.body], c.x, c.y, c.z, around);
+        found[i].count = components(around, points, found[i].label);
+      },
+      32);
+  std::vector<Cell> split;
+  for (std::size_t i = 0; i < cells.size(); ++i) {
+    if (split_node(bodies[cells[i].body], points, cells[i], found[i], nodes)) {
+      split.push_back(cells[i]);
+    }
+  }
+  return split;
 }
 
 }  // namespace tissue_sim

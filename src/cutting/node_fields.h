@@ -11,6 +11,7 @@
 #include <unordered_map>
 #include <vector>
 
+#include "compute/for_each.h"
 #include "mpm/lattice_body.h"
 #include "mpm/nodes.h"
 
@@ -46,10 +47,16 @@ class NodeFields {
     int body, x, y, z;
   };
   std::vector<Cell> update(const std::vector<LatticeBody>& bodies, const Points& points,
-                           const std::vector<std::int32_t>& changed, Nodes& nodes);
+                           const std::vector<std::int32_t>& changed, Nodes& nodes, Cpu& cpu);
 
  private:
-  bool split_node(const LatticeBody& body, const Points& points, int x, int y, int z, Nodes& nodes);
+  /// Components of a node's points, as the bonds have them now.
+  struct Components {
+    std::uint8_t label[216];
+    int count;
+  };
+  bool split_node(const LatticeBody& body, const Points& points, const Cell& cell,
+                  const Components& components, Nodes& nodes);
 
   std::unordered_map<int, Split> splits_;
 };

@@ -288,7 +288,7 @@ Blocks make_blocks(const std::vector<LatticeBody>& bodies, const Points& points,
 
 void update_blocks(Blocks& blocks, const std::vector<LatticeBody>& bodies, const Points& points,
                    const NodeFields& fields, const std::vector<NodeFields::Cell>& cells,
-                   int node_count) {
+                   int node_count, Cpu& cpu) {
   std::vector<bool> changed(bodies.back().first_node + bodies.back().node_count(), false);
   for (const NodeFields::Cell& c : cells) changed[bodies[c.body].node(c.x, c.y, c.z)] = true;
   const auto touched = [&](const BlockRegion& r) {
@@ -302,9 +302,10 @@ void update_blocks(Blocks& blocks, const std::vector<LatticeBody>& bodies, const
     }
     return false;
   };
-  for (BlockRegion& r : blocks.regions) {
+  cpu.for_each(static_cast<int>(blocks.regions.size()), [&](int i) {
+    BlockRegion& r = blocks.regions[i];
     if (touched(r)) fill_region(r, bodies, points, fields);
-  }
+  });
   connect_forces(blocks, bodies, node_count);
 }
 

@@ -60,6 +60,6 @@ Blocks make_blocks(const std::vector<LatticeBody>& bodies, const Points& points,
 /// changed; `node_count` is the new number of nodes.
 void update_blocks(Blocks& blocks, const std::vector<LatticeBody>& bodies, const Points& points,
                    const NodeFields& fields, const std::vector<NodeFields::Cell>& cells,
-                   int node_count);
+                   int node_count, Cpu& cpu);
 
 }  // namespace tissue_sim

@@ -10,9 +10,9 @@ namespace tissue_sim {
 
 /// What a block's threads share.
 struct BlockShared {
-  float4* u;        ///< [slots], divided by the cell size
-  float4* v;        ///< [slots], the same; only where contact or viscosity needs it
-  float4* exchange; ///< [9][threads]
+  float4* u;                  ///< [slots], divided by the cell size
+  float4* v;                  ///< [slots], the same; only where contact or viscosity needs it
+  float4* exchange;           ///< [9][threads]
   unsigned long long* loads;  ///< [collider_count][6]
 };
 
@@ -64,9 +64,9 @@ __device__ __forceinline__ void add_contact(const CudaTables& t, const CudaBlock
 #pragma unroll
     for (int c = 0; c < 3; ++c) place[c] += body.cell_size * point_value(h[c], side_x, side_y);
     const float v = q == 0 ? volume.x : q == 1 ? volume.y : q == 2 ? volume.z : volume.w;
-    const float3 push = contact_push(t, step.colliders, step.near, p, v,
-                                     {place[0], place[1], place[2]}, body.spring, s.v + first,
-                                     pitch, plane, sub, body.cell_size, s.loads);
+    const float3 push =
+        contact_push(t, step.colliders, step.near, p, v, {place[0], place[1], place[2]},
+                     body.spring, s.v + first, pitch, plane, sub, body.cell_size, s.loads);
     add_point_force(-body.cell_size * push.x, side_x, side_y, out[0]);
     add_point_force(-body.cell_size * push.y, side_x, side_y, out[1]);
     add_point_force(-body.cell_size * push.z, side_x, side_y, out[2]);
@@ -122,7 +122,8 @@ __device__ __forceinline__ void half_forces(const CudaTables& t, const CudaBlock
   add_contact(t, b, body, s, step, x, y, z, sz, volume, h, out);
 }
 
-/// Sums what the cells give to a node plane, in a fixed order, and puts it to the slots from `slot` on.
+/// Sums what the cells give to a node plane, in a fixed order, and puts it to the slots from `slot`
+/// on.
 template <int kParts>
 __device__ __forceinline__ void write_plane(const CudaBlock& b, const BlockShared& s, float scale,
                                             float4* force) {
@@ -136,11 +137,11 @@ __device__ __forceinline__ void write_plane(const CudaBlock& b, const BlockShare
 #pragma unroll
       for (int dx = 0; dx < 3; ++dx) {
         const int cx = x - dx, cy = y - dy;
-        if (cx < 0 || cy < 0 || cx >= b.nx || cy >= b.ny) continue;
+        const bool there = cx >= 0 && cy >= 0 && cx < b.nx && cy < b.ny;
         const float4* from = s.exchange + (3 * dy + dx) * threads + (cy * b.nx + cx) * kParts;
 #pragma unroll
         for (int part = 0; part < kParts; ++part) {
-          const float4 g = from[part];
+          const float4 g = there ? from[part] : float4{0, 0, 0, 0};
           f.x += g.x;
           f.y += g.y;
           f.z += g.z;
@@ -151,9 +152,9 @@ __device__ __forceinline__ void write_plane(const CudaBlock& b, const BlockShare
   }
 }
 
-/// Forces of a block. A thread walks up a column of cells (kParts = 1) or of the lower or upper halves
-/// of cells (kParts = 2), with what its cells give to the next two node planes in registers. Contact
-/// and cells that are not full need kSpecial.
+/// Forces of a block. A thread walks up a column of cells (kParts = 1) or of the lower or upper
+/// halves of cells (kParts = 2), with what its cells give to the next two node planes in registers.
+/// Contact and cells that are not full need kSpecial.
 template <class LawOf, bool kViscous, bool kSpecial, int kParts>
 __device__ __forceinline__ void block_forces(const CudaTables& t, const CudaBlock& b,
                                              const CudaBody& body, const BlockShared& s,
@@ -192,8 +193,8 @@ __device__ __forceinline__ void block_forces(const CudaTables& t, const CudaBloc
         const float4* node = s.u + z * plane + y * (b.nx + 2) + x;
 #pragma unroll
         for (int c = 0; c < 3; ++c) {
-          const StabilisingForce f = stabilising_force(node, b.nx + 2, plane, c,
-                                                       kStabilisation * body.mu * volume);
+          const StabilisingForce f =
+              stabilising_force(node, b.nx + 2, plane, c, kStabilisation * body.mu * volume);
           add(f.plane[0], now[c]);
           add(f.plane[1], next[c]);
           add(f.plane[2], after[c]);

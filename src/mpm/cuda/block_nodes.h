@@ -5,50 +5,67 @@
 
 namespace tissue_sim {
 
-/// Force on the node of a slot: the sum of its parts, always in the same order.
-__device__ __forceinline__ float4 node_force(const CudaTables& t, const float4* force, int slot) {
-  const std::uint32_t shared = t.slot_parts[slot];
-  if (shared == 0) return __ldcg(force + slot);
-  float4 f = {0, 0, 0, 0};
+/// Adds the parts of a shared node's force beyond the first, always in the same order.
+__device__ __forceinline__ void add_parts(const CudaTables& t, const float4* force,
+                                          std::uint32_t shared, float4& f) {
   const std::uint32_t* part = t.parts + (shared >> 6);
   const int count = static_cast<int>(shared & 63u);
 #pragma unroll 4
-  for (int i = 0; i < count; ++i) {
+  for (int i = 1; i < count; ++i) {
     const float4 p = __ldcg(force + part[i]);
     f.x += p.x;
     f.y += p.y;
     f.z += p.z;
   }
-  return f;
 }
 
 /// Brings the nodes of a block into `u` and, where `v` is not null, `v` (divided by the cell size,
 /// so that stencils give gradients). With `kMove` it first moves them on by the forces of the last
 /// substep; every block that has a node computes the same, and the one that owns it writes it down.
+/// Each thread has several nodes in hand, for all their loads to be under way at once.
 template <bool kMove>
 __device__ __forceinline__ void bring_nodes(const CudaTables& t, const CudaBlock& b,
                                             const CudaNodes& from, const CudaNodes& to,
                                             const float4* force, const NodeStep& step, float scale,
                                             float4* u_out, float4* v_out) {
-  const int count = b.slots();
-#pragma unroll 2
-  for (int i = static_cast<int>(threadIdx.x); i < count; i += static_cast<int>(blockDim.x)) {
-    const int slot = b.first_slot + i;
-    const std::int32_t entry = t.slot_node[slot];
-    const std::int32_t node = entry < 0 ? ~entry : entry;
-    float4 u = __ldcg(from.u + node), v = __ldcg(from.v + node);
-    if (kMove) {
-      const float4 f = node_force(t, force, slot);
-      step.move(0, f.x, u.w, v.w, u.x, v.x);
-      step.move(1, f.y, u.w, v.w, u.y, v.y);
-      step.move(2, f.z, u.w, v.w, u.z, v.z);
-      if (entry >= 0) {
-        __stcg(to.u + node, u);
-        __stcg(to.v + node, v);
-      }
+  constexpr int kHand = 4;
+  const int count = b.slots(), threads = static_cast<int>(blockDim.x);
+  for (int i = static_cast<int>(threadIdx.x); i < count; i += kHand * threads) {
+    std::int32_t entry[kHand], node[kHand];
+    std::uint32_t shared[kHand];
+    float4 u[kHand], v[kHand], f[kHand];
+#pragma unroll
+    for (int k = 0; k < kHand; ++k) {
+      const int slot = b.first_slot + min(i + k * threads, count - 1);
+      entry[k] = __ldg(t.slot_node + slot);
+      shared[k] = kMove ? __ldg(t.slot_parts + slot) : 0;
     }
-    u_out[i] = {scale * u.x, scale * u.y, scale * u.z, 0};
-    if (v_out != nullptr) v_out[i] = {scale * v.x, scale * v.y, scale * v.z, 0};
+#pragma unroll
+    for (int k = 0; k < kHand; ++k) {
+      node[k] = entry[k] < 0 ? ~entry[k] : entry[k];
+      u[k] = __ldcg(from.u + node[k]);
+      v[k] = __ldcg(from.v + node[k]);
+      if (!kMove) continue;
+      const std::uint32_t own = b.first_slot + min(i + k * threads, count - 1);
+      f[k] = __ldcg(force + (shared[k] == 0 ? own : __ldg(t.parts + (shared[k] >> 6))));
+    }
+#pragma unroll
+    for (int k = 0; k < kHand; ++k) {
+      if (i + k * threads >= count) break;
+      if (kMove) {
+        if (shared[k] != 0) add_parts(t, force, shared[k], f[k]);
+        step.move(0, f[k].x, u[k].w, v[k].w, u[k].x, v[k].x);
+        step.move(1, f[k].y, u[k].w, v[k].w, u[k].y, v[k].y);
+        step.move(2, f[k].z, u[k].w, v[k].w, u[k].z, v[k].z);
+        if (entry[k] >= 0) {
+          __stcg(to.u + node[k], u[k]);
+          __stcg(to.v + node[k], v[k]);
+        }
+      }
+      const int at = i + k * threads;
+      u_out[at] = {scale * u[k].x, scale * u[k].y, scale * u[k].z, 0};
+      if (v_out != nullptr) v_out[at] = {scale * v[k].x, scale * v[k].y, scale * v[k].z, 0};
+    }
   }
 }
 

@@ -1,6 +1,8 @@
 // Stabilisation of one cell that is not full (mpm/stabilisation.h). For .cu files.
 #pragma once
 
+#include <utility>
+
 #include "mpm/cuda/half_cell.h"
 #include "mpm/stabilisation.h"
 
@@ -12,8 +14,30 @@ struct StabilisingForce {
   float energy2;  ///< twice the energy, over cell size squared
 };
 
-/// `node` is the lowest of the cell's 27, `stiffness` kStabilisation mu V. Out of line, for few cells
-/// need it and the others shall keep their registers.
+/// One x-y quantity on three planes to what it gives back to them. The weights are template
+/// arguments, so that the device needs no table.
+template <int kQuantity>
+__device__ __forceinline__ void stabilise_one(float stiffness, float (&q)[3][kXyCount],
+                                              float& energy2) {
+  constexpr float kA = stabilisation::weight2(kQuantity, 0),
+                  kD = stabilisation::weight2(kQuantity, 1),
+                  kB = stabilisation::weight2(kQuantity, 2);
+  const Line<float> l(q[0][kQuantity], q[1][kQuantity], q[2][kQuantity]);
+  const float a = kA * stiffness * l.A, d = kD * stiffness * l.d, b = kB * stiffness * l.B;
+  energy2 += a * l.A + d * l.d + b * l.B;
+  q[0][kQuantity] = kAverageSide * a - d + b;
+  q[1][kQuantity] = kAverageCenter * a - 2.0f * b;
+  q[2][kQuantity] = kAverageSide * a + d + b;
+}
+template <int... kQuantities>
+__device__ __forceinline__ void stabilise_all(std::integer_sequence<int, kQuantities...>,
+                                              float stiffness, float (&q)[3][kXyCount],
+                                              float& energy2) {
+  (stabilise_one<kQuantities>(stiffness, q, energy2), ...);
+}
+
+/// `node` is the lowest of the cell's 27, `stiffness` kStabilisation mu V. Out of line, for few
+/// cells need it and the others shall keep their registers.
 __device__ __noinline__ inline StabilisingForce stabilising_force(const float4* node, int pitch,
                                                                   int plane, int c,
                                                                   float stiffness) {
@@ -35,17 +59,7 @@ __device__ __noinline__ inline StabilisingForce stabilising_force(const float4* 
     q[z][kBA] = e.A, q[z][kBd] = e.d, q[z][kBB] = e.B;
   }
   float energy2 = 0;
-#pragma unroll
-  for (int k = 0; k < kXyCount; ++k) {
-    const Line<float> l(q[0][k], q[1][k], q[2][k]);
-    const float a = stabilisation::weight2(k, 0) * stiffness * l.A;
-    const float d = stabilisation::weight2(k, 1) * stiffness * l.d;
-    const float b = stabilisation::weight2(k, 2) * stiffness * l.B;
-    energy2 += a * l.A + d * l.d + b * l.B;
-    q[0][k] = kAverageSide * a - d + b;
-    q[1][k] = kAverageCenter * a - 2.0f * b;
-    q[2][k] = kAverageSide * a + d + b;
-  }
+  stabilise_all(std::make_integer_sequence<int, kXyCount>(), stiffness, q, energy2);
   StabilisingForce f;
 #pragma unroll
   for (int z = 0; z < 3; ++z) {

@@ -1,11 +1,10 @@
-#include "mpm/cuda/substeps.h"
-
 #include <cuda_runtime.h>
 
 #include <algorithm>
 
 #include "compute/cuda_check.h"
 #include "mpm/cuda/block_forces.h"
+#include "mpm/cuda/substeps.h"
 
 namespace tissue_sim {
 namespace {
@@ -51,14 +50,15 @@ __device__ __forceinline__ void forces(const CudaTables& t, const CudaBlock& b,
 template <Laws kLaws, int kParts>
 __device__ __forceinline__ void block_substep(const CudaTables& t, const CudaFrame& f, int index,
                                               int round, const BlockShared& s) {
-  const CudaBlock& b = t.blocks[index];
-  const CudaBody& body = t.bodies[b.body];
+  // Copies: through a reference they would be read again after every store.
+  const CudaBlock b = t.blocks[index];
+  const CudaBody body = t.bodies[b.body];
   const std::uint32_t near = t.near[index];
   const int from = (f.current + max(round - 1, 0)) & 1;
   float4* v = near != 0 || kLaws == Laws::kAny ? s.v : nullptr;
   if (round == 0) {
-    bring_nodes<false>(t, b, f.state[from], f.state[from], nullptr, f.step, body.inv_cell_size,
-                       s.u, v);
+    bring_nodes<false>(t, b, f.state[from], f.state[from], nullptr, f.step, body.inv_cell_size, s.u,
+                       v);
   } else {
     bring_nodes<true>(t, b, f.state[from], f.state[from ^ 1], f.force[(round - 1) & 1], f.step,
                       body.inv_cell_size, s.u, v);

@@ -1,0 +1,144 @@
+// Cuts of tissue that lives on a GPU: between frames, on the host, then the tables go up anew.
+#include <algorithm>
+#include <cmath>
+
+#include "cutting/blade_sweep.h"
+#include "cutting/cut_tissue.h"
+#include "mpm/cuda/on_device.h"
+
+namespace tissue_sim {
+namespace {
+
+std::size_t bytes_of(const HostTables& t, std::size_t nodes, std::size_t points) {
+  return t.blocks.size() * (sizeof(CudaBlock) + sizeof(CudaMeasure) + 4) +
+         t.slot_node.size() * (8 + 2 * sizeof(float4)) + 4 * t.parts.size() + 8 * t.point.size() +
+         4 * t.partial.size() + 4 * sizeof(float4) * nodes + 19 * points;
+}
+
+/// Says how much memory the tissue takes, where the GPU has less.
+void check_memory(std::size_t wanted, std::size_t held) {
+  std::size_t free = 0, total = 0;
+  check_cuda(cudaMemGetInfo(&free, &total), "be asked");
+  if (wanted <= free + held) return;
+  const auto megabytes = DeviceArray<char>::megabytes;
+  throw std::runtime_error("the GPU's memory does not suffice: the scene needs " +
+                           megabytes(wanted) + ", " + megabytes(free + held) + " of " +
+                           megabytes(total) + " are free; raise cell_size or set device to cpu");
+}
+
+}  // namespace
+
+std::size_t CudaMpmTissue::device_bytes() const {
+  const OnDevice& d = *device_;
+  std::size_t sum = d.blocks.bytes() + d.bodies.bytes() + d.slot_node.bytes() + d.point.bytes() +
+                    d.piece.bytes() + d.place.bytes() + d.slot_parts.bytes() + d.parts.bytes() +
+                    d.near.bytes() + d.colour.bytes() + d.volume.bytes() + d.partial.bytes() +
+                    d.hold.bytes() + d.bonds.bytes() + d.with.bytes() + d.whole.bytes() +
+                    d.u_before.bytes() + d.colliders.bytes() + d.loads.bytes() +
+                    d.measures.bytes() + d.cloud.bytes();
+  for (int i = 0; i < 2; ++i) sum += d.u[i].bytes() + d.v[i].bytes() + d.force[i].bytes();
+  return sum;
+}
+
+void CudaMpmTissue::pull() {
+  OnDevice& d = *device_;
+  const std::size_t n = d.u[0].size();
+  d.host_nodes.resize(2 * n);
+  d.u[d.current].download(d.host_nodes.data(), n, d.stream);
+  d.v[d.current].download(d.host_nodes.data() + n, n, d.stream);
+  check_cuda(cudaStreamSynchronize(d.stream), "finish a frame");
+  unpack_nodes(d.host_nodes.data(), d.host_nodes.data() + n, state_->nodes);
+}
+
+void CudaMpmTissue::push() {
+  OnDevice& d = *device_;
+  const HostTables t = make_tables(*state_);
+  const std::size_t n = state_->nodes.size();
+  const auto points = static_cast<std::size_t>(state_->points.size());
+  check_memory(bytes_of(t, n, points), device_bytes());
+  check_cuda(cudaStreamSynchronize(d.stream), "finish a frame");
+  d.plan.parts = d.shape.parts;
+  d.plan.threads = d.shape.threads;
+  d.plan.max_slots = t.max_slots;
+  for (const CudaBody& b : t.bodies) {
+    d.plan.neo_hookean = d.plan.neo_hookean || b.neo_hookean != 0;
+    d.plan.fixed_corotated = d.plan.fixed_corotated || b.neo_hookean == 0;
+    d.plan.viscous = d.plan.viscous || b.viscosity > 0;
+  }
+  d.resident = resident_blocks(d.plan);
+  if (d.resident == 0) throw std::runtime_error("the GPU has too little shared memory");
+  d.blocks.upload(t.blocks, d.stream);
+  d.bodies.upload(t.bodies, d.stream);
+  d.slot_node.upload(t.slot_node, d.stream);
+  d.slot_parts.upload(t.slot_parts, d.stream);
+  d.parts.upload(t.parts, d.stream);
+  d.volume.upload(t.volume, d.stream);
+  d.partial.upload(t.partial, d.stream);
+  d.point.upload(t.point, d.stream);
+  d.near.resize(t.blocks.size());
+  d.near.clear(d.stream);
+  for (auto& force : d.force) {
+    force.resize(t.slot_node.size());
+    force.clear(d.stream);
+  }
+  if (d.with.size() != points) {
+    d.with.resize(points);
+    d.with.clear(d.stream);
+    d.hold.resize(3 * points);
+    d.hold.clear(d.stream);
+  }
+  d.bonds.upload(state_->points.bonds, d.stream);
+  d.arrived.resize(1);
+  d.host_nodes.resize(2 * n);
+  pack_nodes(state_->nodes, d.host_nodes.data(), d.host_nodes.data() + n);
+  for (int i = 0; i < 2; ++i) {
+    d.u[i].upload(d.host_nodes.data(), n, d.stream);
+    d.v[i].upload(d.host_nodes.data() + n, n, d.stream);
+  }
+  check_cuda(cudaStreamSynchronize(d.stream), "receive data");
+  d.points_changed = true;
+}
+
+void CudaMpmTissue::cut(Span<const BladePath> paths, const Array<float>* u_before,
+                        const std::vector<BlockMotion>& before, CutReport& report) {
+  std::vector<std::int32_t> changed;
+  for (const BladePath& path : paths) {
+    sweep_bonds(*state_, path, u_before, state_->nodes.u, before, changed, report);
+  }
+  if (changed.empty()) return;
+  take_apart(*state_, changed);
+  report.new_fragments = update_pieces(state_->bodies, state_->points, pieces_);
+  push();
+  launch_measure();
+  finish_measure();
+}
+
+void CudaMpmTissue::cut_by_blades(const std::vector<BlockMotion>& before) {
+  const double reach = 4 * state_->scene.cell_size;  // a little more than sweep_bonds()
+  bool meets = false;
+  for (const BladePath& path : blades_) {
+    for (const SweepPart& part : sweep_parts(path)) {
+      for (std::size_t i = 0; i < before.size() && !meets; ++i) {
+        const Box &a = before[i].box, &b = state_->motion[i].box;
+        meets = (a.min.cwiseMin(b.min).array() <= part.box.max.array() + reach).all() &&
+                (part.box.min.array() <= a.max.cwiseMax(b.max).array() + reach).all();
+      }
+    }
+  }
+  if (!meets) return;
+  OnDevice& d = *device_;
+  pull();
+  const std::size_t n = d.u[0].size();
+  d.u_before.download(d.host_nodes.data(), n, d.stream);
+  check_cuda(cudaStreamSynchronize(d.stream), "send data");
+  for (int a = 0; a < 3; ++a) state_->u_before[a].resize(n);
+  for (std::size_t i = 0; i < n; ++i) {
+    const float4& u = d.host_nodes[i];
+    state_->u_before[0][i] = u.x;
+    state_->u_before[1][i] = u.y;
+    state_->u_before[2][i] = u.z;
+  }
+  cut(blades_, state_->u_before, before, result_.blade_report);
+}
+
+}  // namespace tissue_sim

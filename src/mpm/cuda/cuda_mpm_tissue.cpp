@@ -1,0 +1,212 @@
+#include "mpm/cuda/cuda_mpm_tissue.h"
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+
+#include "contact/frame_colliders.h"
+#include "cutting/cut_tissue.h"
+#include "mpm/cuda/on_device.h"
+#include "mpm/state_figures.h"
+#include "tools/tool_motion.h"
+
+namespace tissue_sim {
+namespace {
+
+/// The state at rest, with blocks of the GPU's shape.
+std::unique_ptr<MpmState> make_state(const Scene& scene, std::vector<std::string>* notes,
+                                     int processors, std::size_t shared_bytes, CudaShape& shape) {
+  auto state = std::make_unique<MpmState>();
+  state->scene = scene;
+  state->bodies = make_lattice_bodies(scene, state->points, notes);
+  state->fields = std::make_unique<NodeFields>(state->bodies, state->points, state->nodes);
+  shape = choose_shape(state->bodies, processors, shared_bytes);
+  state->blocks = make_blocks(state->bodies, state->points, *state->fields, shape.blocks);
+  state->contacts.with.assign(state->points.size(), 0);
+  state->instructions = instruction_set();
+  state->kernels = &block_kernels(state->instructions);
+  state->cpu = std::make_unique<Cpu>(scene.threads);
+  return state;
+}
+
+int attribute(cudaDeviceAttr which) {
+  int value = 0;
+  check_cuda(cudaDeviceGetAttribute(&value, which, 0), "be asked");
+  return value;
+}
+
+}  // namespace
+
+CudaMpmTissue::CudaMpmTissue(const Scene& scene) : device_(std::make_unique<OnDevice>()) {
+  const std::string why = why_no_gpu();
+  if (!why.empty()) {
+    throw std::runtime_error("device is cuda: " + why + "; set device to auto or cpu");
+  }
+  if (scene.tools.size() + 1 > kMaxColliders) {
+    throw std::runtime_error("the scene has " + std::to_string(scene.tools.size()) +
+                             " tools: on the GPU at most " + std::to_string(kMaxColliders - 1) +
+                             "; set device to cpu");
+  }
+  OnDevice& d = *device_;
+  check_cuda(cudaSetDevice(0), "be chosen");
+  cudaDeviceProp properties;
+  check_cuda(cudaGetDeviceProperties(&properties, 0), "be asked");
+  d.gpu = properties.name;
+  check_cuda(cudaStreamCreateWithFlags(&d.stream, cudaStreamNonBlocking), "make a stream");
+  state_ = make_state(scene, &notes_, properties.multiProcessorCount,
+                      attribute(cudaDevAttrMaxSharedMemoryPerBlockOptin), d.shape);
+  pieces_ = whole_pieces(state_->bodies, state_->points);
+  notes_.push_back("runs on the GPU (" + d.gpu + "); cuts are made on the host between frames");
+  push();
+  launch_measure();
+  finish_measure();
+}
+
+CudaMpmTissue::~CudaMpmTissue() {
+  if (device_->stream != nullptr) cudaStreamSynchronize(device_->stream);
+}
+
+float CudaMpmTissue::stable_substep() const {
+  return tissue_sim::stable_substep(*state_, stiffening_);
+}
+
+void CudaMpmTissue::upload_colliders(int substeps, double duration, const FrameInput& input) {
+  OnDevice& d = *device_;
+  const Scene& scene = state_->scene;
+  const std::vector<Box> reach = collider_reach(scene, input, duration);
+  d.host_reach.resize(reach.size());
+  for (std::size_t c = 0; c < reach.size(); ++c) {
+    for (int a = 0; a < 3; ++a) {
+      d.host_reach[c].min[a] = static_cast<float>(reach[c].min[a]);
+      d.host_reach[c].max[a] = static_cast<float>(reach[c].max[a]);
+    }
+  }
+  d.host_colliders.resize(reach.size() * substeps);
+  for (int i = 0; i < substeps; ++i) {
+    const std::vector<Collider> now = colliders_at(scene, input, (i + 1.0) / substeps, duration);
+    std::copy(now.begin(), now.end(), d.host_colliders.data() + i * reach.size());
+  }
+  d.reach.upload(d.host_reach, d.stream);
+  d.colliders.upload(d.host_colliders, d.stream);
+  d.loads.resize(6 * d.host_colliders.size());
+  d.loads.clear(d.stream);
+}
+
+void CudaMpmTissue::advance(int substeps, float dt, const FrameInput& input) {
+  OnDevice& d = *device_;
+  const Scene& scene = state_->scene;
+  result_ = {};
+  result_.loads.resize(scene.tools.size());
+  if (!input.cuts.empty()) pull();
+  for (const BladePath& path : input.cuts) {
+    result_.cut_reports.emplace_back();
+    cut({&path, 1}, state_->nodes.u, state_->motion, result_.cut_reports.back());
+  }
+  blades_.clear();
+  for (std::size_t i = 0; i < input.tools.size(); ++i) {
+    if (input.tools[i].present && scene.tools[i].type == ToolType::kScalpel) {
+      blades_.push_back(blade_path(scene.tools[i], input.tools[i]));
+    }
+  }
+  if (!blades_.empty()) {
+    d.u_before.resize(d.u[0].size());
+    check_cuda(cudaMemcpyAsync(d.u_before.data(), d.present().u, d.u[0].size() * sizeof(float4),
+                               cudaMemcpyDeviceToDevice, d.stream),
+               "copy");
+  }
+  substeps_ = substeps;
+  if (substeps > 0) {
+    const double duration = static_cast<double>(substeps) * dt;
+    upload_colliders(substeps, duration, input);
+    const int collider_count = static_cast<int>(d.host_reach.size());
+    launch_near(d.tables(), d.measures.data(), d.reach.data(), collider_count,
+                static_cast<float>(duration), static_cast<float>(0.5 * scene.cell_size), d.stream);
+    CudaFrame frame;
+    for (int i = 0; i < 2; ++i) {
+      frame.state[i] = d.nodes(i);
+      frame.force[i] = d.force[i].data();
+    }
+    frame.current = d.current;
+    frame.substeps = substeps;
+    frame.step.dt = dt;
+    frame.step.keep = static_cast<float>(std::exp(-scene.damping * dt));
+    for (int a = 0; a < 3; ++a) frame.step.gravity[a] = static_cast<float>(scene.gravity[a]);
+    frame.colliders = d.colliders.data();
+    frame.collider_count = collider_count;
+    frame.loads = d.loads.data();
+    frame.arrived = d.arrived.data();
+    launch_substeps(d.plan, d.tables(), frame, d.resident, d.stream);
+    d.current = (d.current + substeps) % 2;
+    d.host_loads.resize(d.loads.size());
+    d.loads.download(d.host_loads.data(), d.loads.size(), d.stream);
+  }
+  launch_measure();
+}
+
+void CudaMpmTissue::launch_measure() {
+  OnDevice& d = *device_;
+  d.measures.resize(d.blocks.size());
+  d.host_measures.resize(d.blocks.size());
+  tissue_sim::launch_measure(d.tables(), d.present(), d.plan.max_slots, d.measures.data(),
+                             d.stream);
+  d.measures.download(d.host_measures.data(), d.measures.size(), d.stream);
+}
+
+void CudaMpmTissue::finish_measure() {
+  OnDevice& d = *device_;
+  check_cuda(cudaStreamSynchronize(d.stream), "finish a frame");
+  result_.elastic_energy = result_.kinetic_energy = result_.max_speed = 0;
+  stiffening_ = 1;
+  state_->motion.resize(d.blocks.size());
+  for (std::size_t i = 0; i < d.blocks.size(); ++i) {
+    const CudaMeasure& m = d.host_measures[i];
+    result_.elastic_energy += m.elastic_energy;
+    result_.kinetic_energy += m.kinetic_energy;
+    if (!(m.speed <= result_.max_speed)) result_.max_speed = m.speed;
+    stiffening_ = std::max(stiffening_, m.stiffening);
+    result_.blew_up = result_.blew_up || m.finite == 0;
+    state_->motion[i] = {{Vec3(m.min[0], m.min[1], m.min[2]), Vec3(m.max[0], m.max[1], m.max[2])},
+                         m.speed};
+  }
+  // Nothing that instruments do moves tissue at the speed of a bullet; what does is out of control.
+  result_.blew_up = result_.blew_up || !(result_.max_speed < 300) || stiffening_ > 1e6f;
+}
+
+FrameResult CudaMpmTissue::finish() {
+  const OnDevice& d = *device_;
+  const std::vector<BlockMotion> before = state_->motion;
+  finish_measure();
+  const std::size_t colliders = result_.loads.size() + 1;
+  for (int i = 0; i < substeps_ && d.host_loads.size() > 0; ++i) {
+    for (std::size_t c = 1; c < colliders && c < d.host_reach.size(); ++c) {
+      const long long* sum = d.host_loads.data() + 6 * (i * d.host_reach.size() + c);
+      const Vec3 force = kLoadUnit * Vec3(sum[0], sum[1], sum[2]);
+      ToolLoad& load = result_.loads[c - 1];
+      load.mean.force += force / substeps_;
+      load.mean.torque += kLoadUnit * Vec3(sum[3], sum[4], sum[5]) / substeps_;
+      load.peak_force = std::max(load.peak_force, force.norm());
+    }
+  }
+  substeps_ = 0;
+  if (!blades_.empty() && !result_.blew_up) cut_by_blades(before);
+  blades_.clear();
+  return result_;
+}
+
+std::uint64_t CudaMpmTissue::checksum() const {
+  const_cast<CudaMpmTissue*>(this)->pull();
+  return tissue_sim::checksum(*state_, pieces_);
+}
+
+std::string CudaMpmTissue::device_name() const { return "cuda (" + device_->gpu + ")"; }
+
+std::string CudaMpmTissue::plan() const {
+  const OnDevice& d = *device_;
+  const BlockShape& b = d.shape.blocks;
+  return std::to_string(b.x) + " x " + std::to_string(b.y) + " x " + std::to_string(b.z) +
+         " cells, " + std::to_string(d.plan.parts) + " thread(s) a column, " +
+         std::to_string(d.plan.threads) + " a block, " + std::to_string(d.blocks.size()) +
+         " blocks, " + std::to_string(d.resident) + " at once";
+}
+
+}  // namespace tissue_sim

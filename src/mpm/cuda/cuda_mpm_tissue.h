@@ -1,0 +1,60 @@
+// Tissue by the material point method in total Lagrangian form, on an NVIDIA GPU.
+#pragma once
+
+#include <memory>
+
+#include "fragments/pieces.h"
+#include "mpm/mpm_state.h"
+#include "tissue_sim/tissue.h"
+
+namespace tissue_sim {
+
+/// The nodes live on the GPU; lattice, bonds, blocks and pieces on the host too, where cuts are
+/// made between frames.
+class CudaMpmTissue final : public Tissue {
+ public:
+  /// Throws std::runtime_error where there is no GPU, or not enough memory on it.
+  explicit CudaMpmTissue(const Scene& scene);
+  ~CudaMpmTissue() override;
+
+  float stable_substep() const override;
+  void advance(int substeps, float dt, const FrameInput& input) override;
+  FrameResult finish() override;
+  int point_count() const override { return state_->points.size(); }
+  int read_points(const PointSelection& selection, std::vector<std::uint8_t>& cloud) override;
+  Span<const Fragment> fragments() const override { return pieces_.all; }
+  std::uint64_t checksum() const override;
+  std::string device_name() const override;
+  const std::vector<std::string>& notes() const override { return notes_; }
+
+  // For tests and the benchmark.
+  int fragment_of(int point) const { return pieces_.of_point[point]; }
+  /// The host's copy, whose nodes are as pull() left them.
+  MpmState& state() { return *state_; }
+  void pull();                       ///< nodes from the GPU
+  void push();                       ///< everything to the GPU
+  std::size_t device_bytes() const;  ///< memory that it takes
+  std::string plan() const;          ///< shape of the blocks, threads
+
+ private:
+  struct OnDevice;
+
+  void cut(Span<const BladePath> paths, const Array<float>* u_before,
+           const std::vector<BlockMotion>& before, CutReport& report);
+  void cut_by_blades(const std::vector<BlockMotion>& before);
+  void upload_points();
+  void launch_measure();
+  void finish_measure();
+  void upload_colliders(int substeps, double duration, const FrameInput& input);
+
+  std::vector<std::string> notes_;
+  std::unique_ptr<MpmState> state_;
+  Pieces pieces_;
+  std::unique_ptr<OnDevice> device_;
+  std::vector<BladePath> blades_;  ///< of the frame in flight
+  int substeps_ = 0;
+  float stiffening_ = 1;
+  FrameResult result_;
+};
+
+}  // namespace tissue_sim

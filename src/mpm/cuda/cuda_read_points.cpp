@@ -1,0 +1,69 @@
+// Clouds of tissue that lives on a GPU.
+#include <algorithm>
+#include <cstring>
+
+#include "cutting/bonds.h"
+#include "fragments/piece_colour.h"
+#include "mpm/cuda/on_device.h"
+
+namespace tissue_sim {
+
+void CudaMpmTissue::upload_points() {
+  OnDevice& d = *device_;
+  if (!d.points_changed) return;
+  const Points& points = state_->points;
+  if (d.whole.size() == 0) {
+    std::vector<std::uint8_t> whole(points.size());
+    for (int p = 0; p < points.size(); ++p) {
+      whole[p] = static_cast<std::uint8_t>(
+          __builtin_popcount(whole_bonds(state_->bodies[points.site[p].body], points.site[p])));
+    }
+    d.whole.upload(whole, d.stream);
+  }
+  std::vector<std::uint32_t> colour(pieces_.next_id, 0);
+  for (const Fragment& f : pieces_.all) colour[f.id] = piece_colour(f);
+  d.colour.upload(colour, d.stream);
+  d.piece.upload(pieces_.of_point, d.stream);
+  check_cuda(cudaStreamSynchronize(d.stream), "receive data");
+  d.points_changed = false;
+}
+
+int CudaMpmTissue::read_points(const PointSelection& selection, std::vector<std::uint8_t>& cloud) {
+  OnDevice& d = *device_;
+  const Points& points = state_->points;
+  upload_points();
+  const int stride = std::max(1, selection.stride);
+  int count = (points.size() + stride - 1) / stride;
+  CudaCloud c;
+  c.stride = stride;
+  c.place = nullptr;
+  std::vector<std::int32_t> place;
+  if (selection.surface_only || selection.loose_only) {
+    std::vector<bool> loose(pieces_.next_id, false);
+    for (const Fragment& f : pieces_.all) loose[f.id] = f.loose;
+    place.assign(points.size(), -1);
+    count = 0;
+    for (std::int32_t p = 0; p < points.size(); p += stride) {
+      if (selection.surface_only && points.bonds[p] == kAllBonds) continue;
+      if (selection.loose_only && !loose[pieces_.of_point[p]]) continue;
+      place[p] = count++;
+    }
+    d.place.upload(place, d.stream);
+    c.place = d.place.data();
+  }
+  cloud.resize(static_cast<std::size_t>(count) * sizeof(Point));
+  if (count == 0) return 0;
+  d.cloud.resize(count);
+  d.host_cloud.resize(count);
+  c.points = d.cloud.data();
+  c.piece = d.piece.data();
+  c.colour = d.colour.data();
+  c.whole = d.whole.data();
+  launch_cloud(d.tables(), d.present(), d.plan.max_slots, c, d.stream);
+  d.cloud.download(d.host_cloud.data(), count, d.stream);
+  check_cuda(cudaStreamSynchronize(d.stream), "send a cloud");
+  std::memcpy(cloud.data(), d.host_cloud.data(), cloud.size());
+  return count;
+}
+
+}  // namespace tissue_sim

@@ -1,0 +1,144 @@
+#include "mpm/cuda/make_tables.h"
+
+#include <algorithm>
+#include <stdexcept>
+
+namespace tissue_sim {
+namespace {
+
+CudaBody body_of(const LatticeBody& b) {
+  const Material& m = b.material;
+  CudaBody body;
+  body.cell_size = static_cast<float>(b.cell_size);
+  body.inv_cell_size = 1.0f / body.cell_size;
+  body.mu = static_cast<float>(lame_mu(m));
+  body.lambda = static_cast<float>(lame_lambda(m));
+  body.viscosity = static_cast<float>(m.viscosity);
+  body.point_volume = static_cast<float>(b.cell_size * b.cell_size * b.cell_size / 8);
+  // Contact is in proportion to the volume, but a cubic millimetre is a better measure than a
+  // metre.
+  const float unit = body.point_volume;
+  const ContactSpring spring =
+      contact_spring(static_cast<float>(lame_lambda(m) + 2 * lame_mu(m)),
+                     static_cast<float>(m.density), 0.5f * body.cell_size, unit);
+  body.spring = {spring.stiffness / unit, spring.damping / unit};
+  body.neo_hookean = m.law == Law::kNeoHookean ? 1 : 0;
+  return body;
+}
+
+/// The block's points in the GPU's order.
+void add_points(const Block& from, float whole_volume, CudaBlock& block, HostTables& t) {
+  block.first_lane = static_cast<int>(t.point.size());
+  bool whole = true;
+  for (int z = 0; z < block.nz; ++z) {
+    for (int s = 0; s < 8; ++s) {
+      for (int y = 0; y < block.ny; ++y) {
+        const std::size_t lane =
+            (static_cast<std::size_t>(z) * 8 + s) * from.stride + y * from.pitch;
+        for (int x = 0; x < block.nx; ++x) {
+          t.point.push_back(from.point[lane + x]);
+          t.volume.push_back(from.volume[lane + x]);
+          whole = whole && t.point.back() >= 0 && t.volume.back() == whole_volume;
+        }
+      }
+    }
+  }
+  block.whole = whole ? 1 : 0;
+  block.partial = from.partial.empty() ? 0 : 1;
+  for (int z = 0; z < block.nz; ++z) {
+    for (int y = 0; y < block.ny; ++y) {
+      for (int x = 0; x < block.nx; ++x) {
+        const std::size_t cell = static_cast<std::size_t>(z) * from.stride + y * from.pitch + x;
+        t.partial.push_back(block.partial != 0 ? from.partial[cell] : 0.0f);
+      }
+    }
+  }
+}
+
+/// The volume that most points have: that of a whole one, as the lattice rounded it.
+float common_volume(const MpmState& state, int body) {
+  const LatticeBody& b = state.bodies[body];
+  return b.point_count == 0 ? 0.0f : state.points.volume[b.first_point + b.point_count / 2];
+}
+
+/// Which slots share a node, and which of them owns it.
+void connect(std::size_t node_count, HostTables& t) {
+  std::vector<std::uint32_t> begin(node_count + 1, 0);
+  for (const std::int32_t n : t.slot_node) ++begin[n + 1];
+  for (std::size_t n = 0; n < node_count; ++n) {
+    if (begin[n + 1] > 63) {
+      throw std::runtime_error("a node is shared by " + std::to_string(begin[n + 1]) +
+                               " blocks, more than the GPU's tables hold: set device to cpu");
+    }
+    if (begin[n + 1] == 1) begin[n + 1] = 0;  // needs no list
+    begin[n + 1] += begin[n];
+  }
+  if (begin.back() >= 1u << 26) {
+    throw std::runtime_error(
+        "the tissue has more shared nodes than the GPU's tables hold: raise "
+        "cell_size");
+  }
+  t.parts.resize(begin.back());
+  t.slot_parts.assign(t.slot_node.size(), 0);
+  std::vector<std::uint8_t> filled(node_count, 0);
+  for (std::size_t slot = 0; slot < t.slot_node.size(); ++slot) {
+    const std::int32_t n = t.slot_node[slot];
+    const std::uint32_t count = begin[n + 1] - begin[n];
+    const bool first = filled[n] == 0;
+    if (count > 0) {
+      t.parts[begin[n] + filled[n]] = static_cast<std::uint32_t>(slot);
+      t.slot_parts[slot] = begin[n] << 6 | count;
+    }
+    ++filled[n];
+    if (!first) t.slot_node[slot] = ~n;
+  }
+}
+
+}  // namespace
+
+HostTables make_tables(const MpmState& state) {
+  HostTables t;
+  for (std::size_t i = 0; i < state.bodies.size(); ++i) {
+    t.bodies.push_back(body_of(state.bodies[i]));
+    t.bodies.back().point_volume = common_volume(state, static_cast<int>(i));
+  }
+  for (const Block* from : state.blocks.all) {
+    CudaBlock block;
+    block.body = from->body;
+    block.nx = from->nx;
+    block.ny = from->ny;
+    block.nz = from->nz;
+    block.first_slot = static_cast<int>(t.slot_node.size());
+    const Vec3 origin =
+        state.bodies[from->body].node_position(from->x - 1, from->y - 1, from->z - 1);
+    for (int a = 0; a < 3; ++a) block.origin[a] = static_cast<float>(origin[a]);
+    add_points(*from, t.bodies[from->body].point_volume, block, t);
+    for (int z = 0; z < block.nz + 2; ++z) {
+      for (int y = 0; y < block.ny + 2; ++y) {
+        const std::int32_t* row = from->node.data() + z * from->plane + y * from->pitch;
+        t.slot_node.insert(t.slot_node.end(), row, row + block.nx + 2);
+      }
+    }
+    t.max_slots = std::max(t.max_slots, block.slots());
+    t.max_columns = std::max(t.max_columns, block.nx * block.ny);
+    t.blocks.push_back(block);
+  }
+  connect(state.nodes.size(), t);
+  return t;
+}
+
+void pack_nodes(const Nodes& n, float4* u, float4* v) {
+  for (std::size_t i = 0; i < n.size(); ++i) {
+    u[i] = {n.u[0][i], n.u[1][i], n.u[2][i], n.mass[i]};
+    v[i] = {n.v[0][i], n.v[1][i], n.v[2][i], n.inv_mass[i]};
+  }
+}
+
+void unpack_nodes(const float4* u, const float4* v, Nodes& n) {
+  for (std::size_t i = 0; i < n.size(); ++i) {
+    n.u[0][i] = u[i].x, n.u[1][i] = u[i].y, n.u[2][i] = u[i].z;
+    n.v[0][i] = v[i].x, n.v[1][i] = v[i].y, n.v[2][i] = v[i].z;
+  }
+}
+
+}  // namespace tissue_sim

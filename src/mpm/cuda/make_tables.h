@@ -1,0 +1,28 @@
+// The tables of CudaTables, made on the host from the blocks.
+#pragma once
+
+#include <vector>
+
+#include "mpm/cuda/tables.h"
+#include "mpm/mpm_state.h"
+
+namespace tissue_sim {
+
+/// See CudaTables.
+struct HostTables {
+  std::vector<CudaBody> bodies;
+  std::vector<CudaBlock> blocks;
+  std::vector<std::int32_t> slot_node;
+  std::vector<std::uint32_t> slot_parts, parts;
+  std::vector<float> volume, partial;
+  std::vector<std::int32_t> point;
+  int max_slots = 0, max_columns = 0;
+};
+
+HostTables make_tables(const MpmState& state);
+
+/// The nodes as the GPU has them: u and mass, v and inverse mass.
+void pack_nodes(const Nodes& nodes, float4* u, float4* v);
+void unpack_nodes(const float4* u, const float4* v, Nodes& nodes);
+
+}  // namespace tissue_sim

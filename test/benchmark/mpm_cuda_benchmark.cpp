@@ -1,0 +1,192 @@
+// Particle updates a second of the material point method on the GPU (DESIGN section 7): a cube of
+// tissue between two anchored faces that are held apart and sheared, so that it stays deformed.
+#include <benchmark/benchmark.h>
+
+#include <Eigen/SVD>
+#include <cmath>
+#include <cstdio>
+#include <memory>
+
+#include "compute/cuda_check.h"
+#include "math/bspline.h"
+#include "mpm/cuda/cuda_mpm_tissue.h"
+#include "mpm/mpm_tissue.h"
+
+namespace tissue_sim {
+namespace {
+
+enum class Extra { kNone, kCut, kTools };
+
+struct Size {
+  int points;   // as the benchmark is called
+  int x, y, z;  // cells
+};
+constexpr Size kSizes[] = {{25000, 15, 15, 14},   {100000, 23, 23, 24},  {262000, 32, 32, 32},
+                           {1000000, 50, 50, 50}, {4100000, 80, 80, 80}, {16800000, 128, 128, 128}};
+
+Scene cube(const Size& size, Law law) {
+  Scene scene;
+  scene.cell_size = 0.001;
+  scene.ground.z = -1;
+  scene.bodies.resize(1);
+  Body& body = scene.bodies[0];
+  body.size = 0.001 * Vec3(size.x, size.y, size.z);
+  body.pose.position = 0.5 * body.size;
+  Region below, above;
+  below.z = 0.0011;
+  above.kind = Region::Kind::kBox;
+  above.min = Vec3(-1, -1, body.size[2] - 0.0011);
+  above.max = Vec3(1, 1, 1);
+  body.anchors = {below, above};
+  scene.materials.resize(1);
+  scene.materials[0].name = "test";
+  scene.materials[0].law = law;
+  body.material = "test";
+  return scene;
+}
+
+/// Stretch by 15 % and shear, and waves of some cells' length.
+void deform(MpmState& state) {
+  const LatticeBody& b = state.bodies[0];
+  for (int i = 0; i < b.node_count(); ++i) {
+    const double x = i % b.pitch_y, y = i % b.pitch_z / b.pitch_y, z = i / b.pitch_z;
+    const double h = b.cell_size;
+    const double u[3] = {h * (0.3 * z + 0.1 * std::sin(0.4 * y)), h * 0.1 * std::sin(0.5 * x + z),
+                         h * (0.15 * z + 0.1 * std::sin(0.3 * x))};
+    for (int a = 0; a < 3; ++a) state.nodes.u[a][i] = static_cast<float>(u[a]);
+  }
+}
+
+void add_probes(Scene& scene, std::vector<ToolMotion>& motions) {
+  const Vec3 size = scene.bodies[0].size;
+  scene.tools.resize(3);
+  motions.resize(3);
+  for (int i = 0; i < 3; ++i) {
+    scene.tools[i].name = "probe" + std::to_string(i);
+    // From the side: its tip a millimetre deep in the face y = 0.
+    ToolMotion& m = motions[i];
+    m.present = true;
+    m.begin.orientation = Quat::FromTwoVectors(Vec3::UnitZ(), Vec3::UnitY());
+    m.begin.position = Vec3(0.25 * (i + 1) * size[0] + 0.15 * size[2], 0.0015, 0.5 * size[2]);
+    m.end = m.begin;
+  }
+}
+
+/// Largest ||F - R||, from the clouds' von Mises stress being no measure of it: on the host.
+double largest_strain(const MpmState& s) {
+  double largest = 0;
+  const LatticeBody& b = s.bodies[0];
+  for (int p = 0; p < s.points.size(); p += 1 + s.points.size() / 20000) {
+    const Points::Site& site = s.points.site[p];
+    Eigen::Matrix3d F = Eigen::Matrix3d::Identity();
+    for (int k = 0; k < 27; ++k) {
+      const int n = s.fields->node(b, site, k);
+      const int i[3] = {k % 3, k / 3 % 3, k / 9}, t[3] = {site.x & 1, site.y & 1, site.z & 1};
+      for (int a = 0; a < 3; ++a) {
+        double w = 1 / b.cell_size;
+        for (int c = 0; c < 3; ++c) {
+          w *= c == a ? lattice_slope(t[c], i[c]) : lattice_weight(t[c], i[c]);
+        }
+        for (int c = 0; c < 3; ++c) F(c, a) += w * s.nodes.u[c][n];
+      }
+    }
+    const Eigen::JacobiSVD<Eigen::Matrix3d> svd(F, Eigen::ComputeFullU | Eigen::ComputeFullV);
+    largest = std::max(largest, (F - svd.matrixU() * svd.matrixV().transpose()).norm());
+  }
+  return largest;
+}
+
+double difference(const MpmState& a, const MpmState& b, double& moved) {
+  double worst = 0;
+  moved = 0;
+  for (std::size_t i = 0; i < a.nodes.size(); ++i) {
+    for (int c = 0; c < 3; ++c) {
+      if (a.nodes.inv_mass[i] == 0) continue;
+      worst = std::max<double>(worst, std::fabs(a.nodes.v[c][i] - b.nodes.v[c][i]));
+      moved = std::max<double>(moved, std::fabs(a.nodes.v[c][i]));
+    }
+  }
+  return worst;
+}
+
+void run(benchmark::State& bench, const Size& size, Law law, Extra extra) {
+  const std::string why = why_no_gpu();
+  if (!why.empty()) {
+    bench.SkipWithError(why.c_str());
+    return;
+  }
+  Scene scene = cube(size, law);
+  std::vector<ToolMotion> tools;
+  if (extra == Extra::kTools) add_probes(scene, tools);
+  CudaMpmTissue tissue(scene);
+  deform(tissue.state());
+  tissue.push();
+  const float dt = 0.5f * tissue.stable_substep();
+  std::vector<BladePath> cuts;
+  if (extra == Extra::kCut) {
+    BladePath path;
+    path.edge = {Vec3(0, 0, -1), Vec3(0, 0, 1)};
+    const Vec3 middle = 0.5 * scene.bodies[0].size;
+    path.poses = {{Vec3(-1, middle[1], 0), Quat::Identity()},
+                  {Vec3(1, middle[1] + 0.3, 0), Quat::Identity()}};
+    cuts.push_back(path);
+  }
+  tissue.advance(0, dt, {tools, cuts});
+  tissue.finish();
+  if (size.points <= 1000000) {  // against the CPU, ten substeps on
+    MpmTissue cpu(scene);
+    deform(cpu.state());
+    measure_motion(cpu.state());
+    cpu.advance(10, dt, {tools, cuts});
+    cpu.finish();
+    tissue.advance(10, dt, {tools, {}});
+    tissue.finish();
+    tissue.pull();
+    double moved = 0;
+    const double worst = difference(cpu.state(), tissue.state(), moved);
+    bench.counters["v_error"] = worst / moved;
+    if (!(worst < 1e-3 * moved)) bench.SkipWithError("the GPU's velocities are not the CPU's");
+  }
+  constexpr int kSubsteps = 200;
+  tissue.advance(kSubsteps, dt, {tools, {}});
+  bool blew_up = tissue.finish().blew_up;
+  for (auto _ : bench) {
+    tissue.advance(kSubsteps, dt, {tools, {}});
+    blew_up = tissue.finish().blew_up || blew_up;
+  }
+  tissue.pull();
+  const double strain = largest_strain(tissue.state());
+  if (blew_up) bench.SkipWithError("blew up");
+  if (!(strain > 0.1)) bench.SkipWithError("not deformed any more");
+  const double updates = static_cast<double>(bench.iterations()) * kSubsteps;
+  bench.SetItemsProcessed(static_cast<std::int64_t>(updates * tissue.point_count()));
+  bench.counters["us_per_substep"] =
+      benchmark::Counter(1e-6 * updates, benchmark::Counter::kIsRate | benchmark::Counter::kInvert);
+  bench.counters["points"] = tissue.point_count();
+  bench.counters["strain"] = strain;
+  bench.counters["bytes_per_point"] =
+      static_cast<double>(tissue.device_bytes()) / tissue.point_count();
+  bench.SetLabel(tissue.plan());
+}
+
+void add(const std::string& name, const Size& size, Law law, Extra extra) {
+  benchmark::RegisterBenchmark((name + std::to_string(size.points)).c_str(), run, size, law, extra)
+      ->UseRealTime()
+      ->Unit(benchmark::kMillisecond);
+}
+
+}  // namespace
+}  // namespace tissue_sim
+
+int main(int argc, char** argv) {
+  using namespace tissue_sim;
+  for (const Size& size : kSizes) {
+    add("mpm/cuda/", size, Law::kFixedCorotated, Extra::kNone);
+    add("mpm/cuda/neo_hookean/", size, Law::kNeoHookean, Extra::kNone);
+    add("mpm/cuda/cut/", size, Law::kFixedCorotated, Extra::kCut);
+    add("mpm/cuda/tools/", size, Law::kFixedCorotated, Extra::kTools);
+  }
+  benchmark::Initialize(&argc, argv);
+  benchmark::RunSpecifiedBenchmarks();
+  return 0;
+}

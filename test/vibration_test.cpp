@@ -28,6 +28,7 @@ Swing swing(const Beam& beam, int cells, Ends ends, const std::string& curve, La
   const double frequency = bending_frequency(acting, ends) / (2 * M_PI);
 
   std::vector<double> weight(n.size());
+  double scale = 0;
   const double speed = 0.01 * beam.height * 2 * M_PI * frequency;
   for (int z = -1; z <= b.nz; ++z) {
     for (int y = -1; y <= b.ny; ++y) {
@@ -38,6 +39,7 @@ Swing swing(const Beam& beam, int cells, Ends ends, const std::string& curve, La
         double slope;
         const double shape = mode_shape(ends, (place.x() - start) / acting.length, &slope);
         weight[i] = n.mass[i] * shape;
+        scale += weight[i] * shape;
         n.v[2][i] = static_cast<float>(speed * shape);
         n.v[0][i] = static_cast<float>(-speed * slope / acting.length * place.z());
       }
@@ -48,8 +50,7 @@ Swing swing(const Beam& beam, int cells, Ends ends, const std::string& curve, La
   const double dt = sample / substeps;
   CurveFile file(curve, "time [s],amplitude,theory");
   std::vector<double> crossings;
-  double before = 0, scale = 0;
-  for (double w : weight) scale += std::fabs(w);
+  double before = 0;
   for (int i = 1; i <= 48 * 3 + 8; ++i) {
     tissue.advance(substeps, static_cast<float>(dt), {});
     double amplitude = 0;

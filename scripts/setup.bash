@@ -120,7 +120,7 @@ configure_and_build() {
   }
   cmake --build "$folder" -j "$jobs" 2>&1 | tee -a "$log" | show_progress ||
     {
-      grep -E -A 5 'error:|undefined reference|\*\*\* ' "$log" | head -40 >&2
+      grep -E -A 3 'error:|undefined reference' "$log" | head -24 >&2
       fail "the build failed: see $log"
     }
 }

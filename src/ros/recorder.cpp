@@ -145,12 +145,6 @@ void Recorder::write_all() {
   }
 }
 
-void Recorder::close() {
-  const std::string path = status().path;
-  bag_.close();
-  rename_new(path + ".active", path);
-}
-
 void Recorder::run() {
   std::string error;
   try {
@@ -162,19 +156,29 @@ void Recorder::run() {
     queue_.clear();
     status_.queued = 0;
   }
-  const std::string path = status().path;
-  try {
-    close();
-    if (!error.empty()) error = "the recording ended: " + error + "; what came before is in " + path;
-  } catch (const std::exception& e) {
-    error = "the recording ended: " + (error.empty() ? std::string() : error + ", then ") +
-            e.what() + "; 'rosbag reindex' may read " + path + ".active";
-  }
-  if (!error.empty()) ROS_ERROR("%s", error.c_str());
+  const std::string ended = close(error);
+  if (!ended.empty()) ROS_ERROR("%s", ended.c_str());
   const std::lock_guard<std::mutex> lock(mutex_);
   topics_.clear();
   status_.recording = false;
-  status_.error = error;
+  status_.error = ended;
+}
+
+std::string Recorder::close(const std::string& error) {
+  const std::string path = status().path, active = path + ".active";
+  const std::string ended = "the recording ended: " + (error.empty() ? "" : error + "; ");
+  try {
+    bag_.close();
+  } catch (const std::exception& e) {
+    return ended + active + " could not be closed (" + e.what() +
+           "): 'rosbag reindex' makes what is in it readable";
+  }
+  try {
+    rename_new(active, path);
+  } catch (const std::exception& e) {
+    return ended + e.what() + "; it is whole";
+  }
+  return error.empty() ? "" : ended + "what came before is in " + path;
 }
 
 }  // namespace tissue_sim

@@ -76,8 +76,10 @@ class Recorder {
   };
   void push(Item item, bool must_keep);
   void run();        // the thread
-  void write_all();  // until stop(), or throws
-  void close();
+  void write_all();  /// until stop(), or throws
+  /// Closes and renames the bag. Returns what there is to say of a recording that `error` ended, or
+  /// that this does; else "".
+  std::string close(const std::string& error);
 
   const std::string folder_;
   const double queue_limit_, reserve_;  // [bytes]

@@ -5,8 +5,10 @@
 #include <sensor_msgs/JointState.h>
 #include <sensor_msgs/PointCloud2.h>
 #include <std_msgs/String.h>
+#include <tf2_ros/buffer.h>
 #include <tf2_ros/static_transform_broadcaster.h>
 #include <tf2_ros/transform_broadcaster.h>
+#include <tf2_ros/transform_listener.h>
 #include <tissue_sim/LoadScene.h>
 #include <visualization_msgs/MarkerArray.h>
 
@@ -164,9 +166,11 @@ TEST_F(Interface, PosesInAnyFrameMoveTheTool) {
     ros::WallDuration(0.02).sleep();
     return at(Vec3(0.28, 0.01, 0.13))();  // a quarter turn about z, then the shift
   }));
-  arm.send(pointing_down(0.27, 0, 0.1));
+  const Quat turned = from_message(inputs.last()->tools[1].end).orientation;
+  EXPECT_NEAR(turned.angularDistance(Quat(0, std::sqrt(0.5), std::sqrt(0.5), 0)), 0, 1e-6);
+  arm.send({Vec3(0.27, 0, 0.1), turned});
   EXPECT_TRUE(wait_until(at(Vec3(0.27, 0, 0.1)))) << "an empty frame is the world";
-  arm.send(pointing_down(0.26, 0, 0.1), "world");
+  arm.send({Vec3(0.26, 0, 0.1), turned}, "world");
   EXPECT_TRUE(wait_until(at(Vec3(0.26, 0, 0.1))));
   const auto m = inputs.last();
   ASSERT_EQ(m->tools.size(), 4u);

@@ -7,6 +7,8 @@
 #include <chrono>
 #include <filesystem>
 #include <fstream>
+#include <random>
+#include <thread>
 
 #include "ros/recording_path.h"
 
@@ -22,13 +24,16 @@ class RecorderTest : public testing::Test {
   void SetUp() override {
     char name[] = "/tmp/tissue_sim_recorder_XXXXXX";
     folder_ = mkdtemp(name);
+    ros::Time::init();
   }
   void TearDown() override { fs::remove_all(folder_); }
 
+  // That no compression makes smaller.
   static std_msgs::String::ConstPtr text(std::size_t bytes) {
     auto m = boost::make_shared<std_msgs::String>();
     m->data.resize(bytes);
-    for (std::size_t i = 0; i < bytes; ++i) m->data[i] = static_cast<char>(i * i * 31 >> 3);
+    std::mt19937 random(static_cast<unsigned>(bytes));
+    for (char& c : m->data) c = static_cast<char>(random());
     return m;
   }
 
@@ -79,9 +84,10 @@ TEST_F(RecorderTest, NeverOverwrites) {
 TEST_F(RecorderTest, SaysWhatAFullQueueLosesButKeepsWhatItMust) {
   Recorder recorder(folder_, 0.2 * kMiB, 1 * kMiB);
   const std::string path = recorder.start("slow", {"/cloud", "/inputs"});
+  const auto cloud = text(190 * 1024), input = text(10);
   for (int i = 0; i < 200; ++i) {  // faster than any disk
-    recorder.write("/cloud", text(190 * 1024), ros::Time(1 + i, 0));
-    recorder.write("/inputs", text(10), ros::Time(1 + i, 0), true);
+    recorder.write("/cloud", cloud, ros::Time(1 + i, 0));
+    recorder.write("/inputs", input, ros::Time(1 + i, 0), true);
   }
   const RecorderStatus s = recorder.stop();
   ASSERT_EQ(s.dropped.size(), 1u);

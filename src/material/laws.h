@@ -2,9 +2,40 @@
 // double (reference) or Vec<W> (CPU). Matrices are row-major arrays of 9: F[3 * i + k] = dx_i/dX_k.
 #pragma once
 
+#include <cmath>
+#include <cstdint>
+#include <cstring>
+
 #include "compute/host_device.h"
 
 namespace tissue_sim {
+
+/// Integers with the bits of a float or of a vector of floats.
+template <class T>
+struct BitsOf {
+  typedef std::int32_t type __attribute__((vector_size(sizeof(T))));
+};
+template <>
+struct BitsOf<float> {
+  typedef std::int32_t type;
+};
+
+/// An upper bound of the square root of x >= 0, at most 9 % above it: a start for Newton's method.
+TISSUE_SIM_INLINE double root_bound(double x) { return 1.04 * sqrt(x); }
+#if defined(__CUDA_ARCH__)
+TISSUE_SIM_INLINE float root_bound(float x) { return 1.04f * __fsqrt_rn(x); }
+#else
+/// By halving the exponent: for float and for vectors of floats, whose bits are integers of the same
+/// width.
+template <class T>
+TISSUE_SIM_INLINE T root_bound(T x) {
+  typename BitsOf<T>::type bits;
+  std::memcpy(&bits, &x, sizeof(x));
+  bits = (bits >> 1) + 0x1fbd1df5;
+  std::memcpy(&x, &bits, sizeof(x));
+  return 1.04f * x;
+}
+#endif
 
 /// Cofactor matrix of F: cof F = J F^-T, defined for singular F too.
 template <class T>
@@ -52,13 +83,13 @@ struct Stretch {
 };
 
 /// Solves (a^2 - tr C)^2 / 4 = ||cof F||^2 + 2 J a for its largest root a = tr U by Newton's method
-/// from above, where it converges monotonically (the quartic of Franca 1989; that R is the
-/// derivative of tr U is used by Lin, Chitalu and Komura 2022). The step divides by 2 (a b - J);
-/// its reciprocal is carried along and refined, for divisions are dear. Relative error below 1e-6
-/// for stretches between 1/3 and 3.
+/// (the quartic of Franca 1989; that R is the derivative of tr U is used by Lin, Chitalu and Komura
+/// 2022) from above, where it converges monotonically: a^2 = tr C + 2 b and b^2 <= 3 ||cof F||^2.
+/// The step divides by 2 (a b - J); its reciprocal is carried along and refined, for divisions are
+/// dear. Relative error below 1e-6 for stretches between 1/3 and 3; finite for inverted F.
 template <class T>
 TISSUE_SIM_INLINE Stretch<T> stretch(T c1, T c2, T J) {
-  T a = (c1 + 3.0f) * 0.5f;
+  T a = root_bound(c1 + 2.0f * root_bound(3.0f * c2));
   T p = a * a - c1;
   T slope = a * p - 2.0f * J;
   T r = rough_reciprocal(slope);
@@ -76,30 +107,36 @@ TISSUE_SIM_INLINE Stretch<T> stretch(T c1, T c2, T J) {
   return {a, p * 0.5f, c1, r * 2.0f};
 }
 
-/// F C = F F^T F.
+/// C = F^T F: 00 11 22 01 02 12.
 template <class T>
-TISSUE_SIM_INLINE void times_right_cauchy_green(const T* F, T* FC) {
-  const T c00 = F[0] * F[0] + F[3] * F[3] + F[6] * F[6];
-  const T c11 = F[1] * F[1] + F[4] * F[4] + F[7] * F[7];
-  const T c22 = F[2] * F[2] + F[5] * F[5] + F[8] * F[8];
-  const T c01 = F[0] * F[1] + F[3] * F[4] + F[6] * F[7];
-  const T c02 = F[0] * F[2] + F[3] * F[5] + F[6] * F[8];
-  const T c12 = F[1] * F[2] + F[4] * F[5] + F[7] * F[8];
+TISSUE_SIM_INLINE void right_cauchy_green(const T* F, T* C) {
+  C[0] = F[0] * F[0] + F[3] * F[3] + F[6] * F[6];
+  C[1] = F[1] * F[1] + F[4] * F[4] + F[7] * F[7];
+  C[2] = F[2] * F[2] + F[5] * F[5] + F[8] * F[8];
+  C[3] = F[0] * F[1] + F[3] * F[4] + F[6] * F[7];
+  C[4] = F[0] * F[2] + F[3] * F[5] + F[6] * F[8];
+  C[5] = F[1] * F[2] + F[4] * F[5] + F[7] * F[8];
+}
+
+/// F S for a symmetric S, ordered as C is.
+template <class T>
+TISSUE_SIM_INLINE void times_symmetric(const T* F, const T* S, T* FS) {
   for (int i = 0; i < 3; ++i) {
-    FC[3 * i + 0] = F[3 * i] * c00 + F[3 * i + 1] * c01 + F[3 * i + 2] * c02;
-    FC[3 * i + 1] = F[3 * i] * c01 + F[3 * i + 1] * c11 + F[3 * i + 2] * c12;
-    FC[3 * i + 2] = F[3 * i] * c02 + F[3 * i + 1] * c12 + F[3 * i + 2] * c22;
+    FS[3 * i + 0] = F[3 * i] * S[0] + F[3 * i + 1] * S[3] + F[3 * i + 2] * S[4];
+    FS[3 * i + 1] = F[3 * i] * S[3] + F[3 * i + 1] * S[1] + F[3 * i + 2] * S[5];
+    FS[3 * i + 2] = F[3 * i] * S[4] + F[3 * i + 1] * S[5] + F[3 * i + 2] * S[2];
   }
 }
 
 /// Rotation of the polar decomposition F = R U (det R = 1).
 template <class T>
 TISSUE_SIM_INLINE void rotation(const T* F, T* R) {
-  T cof[9], FC[9];
+  T cof[9], C[6], FC[9];
   cofactor(F, cof);
   const T J = F[0] * cof[0] + F[1] * cof[1] + F[2] * cof[2];
   const Stretch<T> s = stretch(norm2(F), norm2(cof), J);
-  times_right_cauchy_green(F, FC);
+  right_cauchy_green(F, C);
+  times_symmetric(F, C, FC);
   for (int i = 0; i < 9; ++i) {
     R[i] = ((s.b + s.c1) * F[i] - FC[i] + s.a * cof[i]) * s.inverse;
   }
@@ -110,16 +147,22 @@ struct FixedCorotated {
   /// P = 2 mu (F - R) + lambda (J - 1) cof F. Give `mu` and `lambda` times a volume, and P is too.
   template <class T>
   TISSUE_SIM_INLINE static void stress(const T* F, T mu, T lambda, T* P) {
-    T cof[9], FC[9];
+    T cof[9], C[6];
     cofactor(F, cof);
+    right_cauchy_green(F, C);
     const T J = F[0] * cof[0] + F[1] * cof[1] + F[2] * cof[2];
-    const Stretch<T> s = stretch(norm2(F), norm2(cof), J);
-    times_right_cauchy_green(F, FC);
+    // ||cof F||^2 is the second invariant of C.
+    const T c2 = (C[0] * C[1] - C[3] * C[3]) + (C[0] * C[2] - C[4] * C[4]) +
+                 (C[1] * C[2] - C[5] * C[5]);
+    const Stretch<T> s = stretch(C[0] + C[1] + C[2], c2, J);
     const T mu2 = mu + mu;
     const T fc = mu2 * s.inverse;
     const T f = mu2 - fc * (s.b + s.c1);
     const T c = lambda * (J - 1.0f) - fc * s.a;
-    for (int i = 0; i < 9; ++i) P[i] = f * F[i] + fc * FC[i] + c * cof[i];
+    // P = F (f I + fc C) + c cof F
+    for (int i = 0; i < 6; ++i) C[i] = i < 3 ? fc * C[i] + f : fc * C[i];
+    times_symmetric(F, C, P);
+    for (int i = 0; i < 9; ++i) P[i] += c * cof[i];
   }
 
   /// Energy per volume; ||F - R||^2 = tr C - 2 tr U + 3.

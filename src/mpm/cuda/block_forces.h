@@ -8,7 +8,7 @@
 
 namespace tissue_sim {
 
-/// What a block's threads share.
+/// What a block's threads share, in shared memory.
 struct BlockShared {
   float4* u;                  ///< [slots], divided by the cell size
   float4* v;                  ///< [slots], the same; only where contact or viscosity needs it
@@ -122,14 +122,11 @@ __device__ __forceinline__ void half_forces(const CudaTables& t, const CudaBlock
   add_contact(t, b, body, s, step, x, y, z, sz, volume, h, out);
 }
 
-/// Sums what the cells give to a node plane, in a fixed order, and puts it to the slots from `slot`
-/// on.
-template <int kParts>
-__device__ __forceinline__ void write_plane(const CudaBlock& b, const BlockShared& s, float scale,
+/// Sums what the cells give to a node plane, in a fixed order, and puts it to the slots from `slot` on.
+__device__ __forceinline__ void write_plane(const CudaBlock& b, const float4* exchange, float scale,
                                             float4* force) {
-  const int pitch = b.nx + 2, count = pitch * (b.ny + 2);
-  const int threads = static_cast<int>(blockDim.x);
-  for (int i = static_cast<int>(threadIdx.x); i < count; i += threads) {
+  const int pitch = b.nx + 2, count = pitch * (b.ny + 2), columns = b.nx * b.ny;
+  for (int i = static_cast<int>(threadIdx.x); i < count; i += static_cast<int>(blockDim.x)) {
     const int y = i / pitch, x = i - y * pitch;
     float4 f = {0, 0, 0, 0};
 #pragma unroll
@@ -138,18 +135,28 @@ __device__ __forceinline__ void write_plane(const CudaBlock& b, const BlockShare
       for (int dx = 0; dx < 3; ++dx) {
         const int cx = x - dx, cy = y - dy;
         const bool there = cx >= 0 && cy >= 0 && cx < b.nx && cy < b.ny;
-        const float4* from = s.exchange + (3 * dy + dx) * threads + (cy * b.nx + cx) * kParts;
-#pragma unroll
-        for (int part = 0; part < kParts; ++part) {
-          const float4 g = there ? from[part] : float4{0, 0, 0, 0};
-          f.x += g.x;
-          f.y += g.y;
-          f.z += g.z;
-        }
+        const float4 g =
+            there ? exchange[(3 * dy + dx) * columns + cy * b.nx + cx] : float4{0, 0, 0, 0};
+        f.x += g.x;
+        f.y += g.y;
+        f.z += g.z;
       }
     }
     __stcg(force + i, float4{scale * f.x, scale * f.y, scale * f.z, 0});
   }
+}
+
+/// Adds the plane force of the neighbouring thread, which has the other half of the column's cells.
+__device__ __forceinline__ void add_neighbour(PlaneForce& p) {
+  constexpr unsigned kAll = 0xffffffffu;
+  p.AA += __shfl_xor_sync(kAll, p.AA, 1);
+  p.Ad += __shfl_xor_sync(kAll, p.Ad, 1);
+  p.AB += __shfl_xor_sync(kAll, p.AB, 1);
+  p.dA += __shfl_xor_sync(kAll, p.dA, 1);
+  p.dd += __shfl_xor_sync(kAll, p.dd, 1);
+  p.dB += __shfl_xor_sync(kAll, p.dB, 1);
+  p.BA += __shfl_xor_sync(kAll, p.BA, 1);
+  p.Bd += __shfl_xor_sync(kAll, p.Bd, 1);
 }
 
 /// Forces of a block. A thread walks up a column of cells (kParts = 1) or of the lower or upper
@@ -159,8 +166,8 @@ template <class LawOf, bool kViscous, bool kSpecial, int kParts>
 __device__ __forceinline__ void block_forces(const CudaTables& t, const CudaBlock& b,
                                              const CudaBody& body, const BlockShared& s,
                                              const BlockStep& step) {
-  const int column = static_cast<int>(threadIdx.x) / kParts;
-  const bool active = column < b.nx * b.ny;
+  const int column = static_cast<int>(threadIdx.x) / kParts, columns = b.nx * b.ny;
+  const bool active = column < columns;
   const int y = column / b.nx, x = column - y * b.nx;
   const int plane = (b.nx + 2) * (b.ny + 2);
   const bool partial = kSpecial && b.partial != 0;
@@ -201,18 +208,27 @@ __device__ __forceinline__ void block_forces(const CudaTables& t, const CudaBloc
         }
       }
     }
+    if (kParts == 2) {
+#pragma unroll
+      for (int c = 0; c < 3; ++c) {
+        add_neighbour(now[c]);
+        if (kSpecial) now[c].BB += __shfl_xor_sync(0xffffffffu, now[c].BB, 1);
+      }
+    }
     if (active) {
       float f[3][3][3];
 #pragma unroll
       for (int c = 0; c < 3; ++c) node_forces<kSpecial>(now[c], f[c]);
+      const bool first = kParts == 1 || threadIdx.x % 2 == 0, second = kParts == 1 || !first;
 #pragma unroll
       for (int k = 0; k < 9; ++k) {
-        s.exchange[k * blockDim.x + threadIdx.x] = {f[0][k / 3][k % 3], f[1][k / 3][k % 3],
-                                                    f[2][k / 3][k % 3], 0};
+        if (k < 5 ? !first : !second) continue;
+        s.exchange[k * columns + column] = {f[0][k / 3][k % 3], f[1][k / 3][k % 3],
+                                            f[2][k / 3][k % 3], 0};
       }
     }
     __syncthreads();
-    write_plane<kParts>(b, s, -body.inv_cell_size, step.force + b.first_slot + z * plane);
+    write_plane(b, s.exchange, -body.inv_cell_size, step.force + b.first_slot + z * plane);
     __syncthreads();
   }
 }

@@ -5,40 +5,63 @@
 
 namespace tissue_sim {
 
-/// Adds the parts of a shared node's force beyond the first, always in the same order.
-__device__ __forceinline__ void add_parts(const CudaTables& t, const float4* force,
-                                          std::uint32_t shared, float4& f) {
-  const std::uint32_t* part = t.parts + (shared >> 6);
-  const int count = static_cast<int>(shared & 63u);
-#pragma unroll 4
-  for (int i = 1; i < count; ++i) {
-    const float4 p = __ldcg(force + part[i]);
-    f.x += p.x;
-    f.y += p.y;
-    f.z += p.z;
+/// What a slot's node and the first parts of its force are, for a block that stays where it is from
+/// substep to substep to keep in shared memory.
+struct SlotCache {
+  std::int32_t* node;    ///< CudaTables::slot_node
+  std::uint32_t* shared; ///< CudaTables::slot_parts
+  uint4* parts;          ///< the first four slots that share the node
+};
+
+/// The first four slots that share a node, or the slot itself alone.
+__device__ __forceinline__ uint4 first_parts(const CudaTables& t, std::uint32_t slot,
+                                             std::uint32_t shared) {
+  if (shared == 0) return {slot, 0, 0, 0};
+  const std::uint32_t *part = t.parts + (shared >> 6), count = shared & 63u;
+  return {__ldg(part), __ldg(part + 1), count > 2 ? __ldg(part + 2) : 0,
+          count > 3 ? __ldg(part + 3) : 0};
+}
+
+__device__ __forceinline__ void fill_cache(const CudaTables& t, const CudaBlock& b,
+                                           const SlotCache& cache) {
+  for (int i = static_cast<int>(threadIdx.x); i < b.slots(); i += static_cast<int>(blockDim.x)) {
+    const int slot = b.first_slot + i;
+    cache.node[i] = t.slot_node[slot];
+    cache.shared[i] = t.slot_parts[slot];
+    cache.parts[i] = first_parts(t, slot, cache.shared[i]);
   }
+}
+
+__device__ __forceinline__ void add(const float4& p, float4& f) {
+  f.x += p.x;
+  f.y += p.y;
+  f.z += p.z;
 }
 
 /// Brings the nodes of a block into `u` and, where `v` is not null, `v` (divided by the cell size,
 /// so that stencils give gradients). With `kMove` it first moves them on by the forces of the last
-/// substep; every block that has a node computes the same, and the one that owns it writes it down.
-/// Each thread has several nodes in hand, for all their loads to be under way at once.
-template <bool kMove>
+/// substep, summed in the order of the slots; every block that has a node computes the same, and the
+/// one that owns it writes it down. Each thread has several nodes in hand, for all their loads to be
+/// under way at once.
+template <bool kMove, bool kCached>
 __device__ __forceinline__ void bring_nodes(const CudaTables& t, const CudaBlock& b,
-                                            const CudaNodes& from, const CudaNodes& to,
-                                            const float4* force, const NodeStep& step, float scale,
-                                            float4* u_out, float4* v_out) {
-  constexpr int kHand = 4;
+                                            const SlotCache& cache, const CudaNodes& from,
+                                            const CudaNodes& to, const float4* force,
+                                            const NodeStep& step, float scale, float4* u_out,
+                                            float4* v_out) {
+  constexpr int kHand = kCached ? 2 : 4;
   const int count = b.slots(), threads = static_cast<int>(blockDim.x);
   for (int i = static_cast<int>(threadIdx.x); i < count; i += kHand * threads) {
     std::int32_t entry[kHand], node[kHand];
     std::uint32_t shared[kHand];
+    uint4 parts[kHand];
     float4 u[kHand], v[kHand], f[kHand];
 #pragma unroll
     for (int k = 0; k < kHand; ++k) {
-      const int slot = b.first_slot + min(i + k * threads, count - 1);
-      entry[k] = __ldg(t.slot_node + slot);
-      shared[k] = kMove ? __ldg(t.slot_parts + slot) : 0;
+      const int local = min(i + k * threads, count - 1), slot = b.first_slot + local;
+      entry[k] = kCached ? cache.node[local] : __ldg(t.slot_node + slot);
+      shared[k] = !kMove ? 0 : kCached ? cache.shared[local] : __ldg(t.slot_parts + slot);
+      if (kMove && kCached) parts[k] = cache.parts[local];
     }
 #pragma unroll
     for (int k = 0; k < kHand; ++k) {
@@ -46,14 +69,27 @@ __device__ __forceinline__ void bring_nodes(const CudaTables& t, const CudaBlock
       u[k] = __ldcg(from.u + node[k]);
       v[k] = __ldcg(from.v + node[k]);
       if (!kMove) continue;
-      const std::uint32_t own = b.first_slot + min(i + k * threads, count - 1);
-      f[k] = __ldcg(force + (shared[k] == 0 ? own : __ldg(t.parts + (shared[k] >> 6))));
+      if (!kCached) {
+        parts[k] = first_parts(t, b.first_slot + min(i + k * threads, count - 1), shared[k]);
+      }
+      f[k] = __ldcg(force + parts[k].x);
+      const std::uint32_t part_count = shared[k] & 63u;
+      float4 more[3] = {};
+      if (part_count > 1) more[0] = __ldcg(force + parts[k].y);
+      if (part_count > 2) more[1] = __ldcg(force + parts[k].z);
+      if (part_count > 3) more[2] = __ldcg(force + parts[k].w);
+      for (const float4& p : more) add(p, f[k]);
     }
 #pragma unroll
     for (int k = 0; k < kHand; ++k) {
-      if (i + k * threads >= count) break;
+      const int at = i + k * threads;
+      if (at >= count) break;
       if (kMove) {
-        if (shared[k] != 0) add_parts(t, force, shared[k], f[k]);
+        const int part_count = static_cast<int>(shared[k] & 63u);
+#pragma unroll 4
+        for (int p = 4; p < part_count; ++p) {
+          add(__ldcg(force + __ldg(t.parts + (shared[k] >> 6) + p)), f[k]);
+        }
         step.move(0, f[k].x, u[k].w, v[k].w, u[k].x, v[k].x);
         step.move(1, f[k].y, u[k].w, v[k].w, u[k].y, v[k].y);
         step.move(2, f[k].z, u[k].w, v[k].w, u[k].z, v[k].z);
@@ -62,7 +98,6 @@ __device__ __forceinline__ void bring_nodes(const CudaTables& t, const CudaBlock
           __stcg(to.v + node[k], v[k]);
         }
       }
-      const int at = i + k * threads;
       u_out[at] = {scale * u[k].x, scale * u[k].y, scale * u[k].z, 0};
       if (v_out != nullptr) v_out[at] = {scale * v[k].x, scale * v[k].y, scale * v[k].z, 0};
     }

@@ -23,8 +23,8 @@ double cycles(const std::vector<LatticeBody>& bodies, const CudaShape& s, int pr
     blocks += static_cast<double>(parts_of(body.nx, b.x)) * parts_of(body.ny, b.y) *
               parts_of(body.nz, b.z);
   }
-  const int by_registers = (s.parts == 1 ? 384 : 256) / s.threads;
-  const int by_shared = static_cast<int>(shared_bytes / shared);
+  const int by_registers = 512 / s.threads;
+  const int by_shared = static_cast<int>(shared_bytes / (shared + 1024));
   const int each = std::max(1, std::min(by_registers, by_shared));
   const double waves = std::ceil(blocks / (each * processors));
   const double together = std::min<double>(each, std::ceil(blocks / processors));
@@ -47,7 +47,7 @@ CudaShape choose_shape(const std::vector<LatticeBody>& bodies, int processors,
                     &best.parts, &best.threads) != 5 ||
         best.blocks.x < 1 || best.blocks.y < 1 || best.blocks.z < 1 ||
         (best.parts != 1 && best.parts != 2) ||
-        best.parts * best.blocks.x * best.blocks.y > best.threads || best.threads % 32 != 0) {
+        best.threads > kMaxCudaThreads || best.parts * best.blocks.x * best.blocks.y > best.threads || best.threads % 32 != 0) {
       throw std::runtime_error(std::string("TISSUE_SIM_CUDA_SHAPE is '") + text +
                                "': it must be 'x y z parts threads' with parts 1 or 2 and "
                                "parts * x * y at most threads");
@@ -55,9 +55,8 @@ CudaShape choose_shape(const std::vector<LatticeBody>& bodies, int processors,
     return best;
   }
   double least = 1e300;
-  for (const int parts : {1, 2}) {
-    for (const int threads : {32, 64, 96, 128, 192, 256}) {
-      if (parts == 1 && threads > 128) continue;
+  for (const int parts : {2}) {
+    for (const int threads : {32, 64, 96, 128}) {
       for (int x = 1; x <= 32; ++x) {
         const int y = std::min(32, threads / parts / x);
         if (y < 1) continue;

@@ -65,7 +65,7 @@ void CudaMpmTissue::push() {
     d.plan.fixed_corotated = d.plan.fixed_corotated || b.neo_hookean == 0;
     d.plan.viscous = d.plan.viscous || b.viscosity > 0;
   }
-  d.resident = resident_blocks(d.plan);
+  d.resident = resident_blocks(d.plan, static_cast<int>(t.blocks.size()));
   if (d.resident == 0) throw std::runtime_error("the GPU has too little shared memory");
   d.blocks.upload(t.blocks, d.stream);
   d.bodies.upload(t.bodies, d.stream);

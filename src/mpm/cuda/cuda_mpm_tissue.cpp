@@ -206,7 +206,8 @@ std::string CudaMpmTissue::plan() const {
   return std::to_string(b.x) + " x " + std::to_string(b.y) + " x " + std::to_string(b.z) +
          " cells, " + std::to_string(d.plan.parts) + " thread(s) a column, " +
          std::to_string(d.plan.threads) + " a block, " + std::to_string(d.blocks.size()) +
-         " blocks, " + std::to_string(d.resident) + " at once";
+         " blocks, " + std::to_string(d.resident) +
+         " at once" + (d.plan.cached ? ", cached" : "");
 }
 
 }  // namespace tissue_sim

@@ -9,22 +9,30 @@
 namespace tissue_sim {
 namespace {
 
-constexpr int kMaxThreads = 256;
-
 /// Waits until all thread blocks have come here `round` times; what they wrote is then seen by all.
 __device__ __forceinline__ void grid_barrier(unsigned* arrived, unsigned round) {
   __syncthreads();
   if (threadIdx.x == 0) {
-    __threadfence();
-    atomicAdd(arrived, 1u);
+    asm volatile("red.release.gpu.global.add.u32 [%0], 1;" ::"l"(arrived) : "memory");
     const unsigned wanted = round * gridDim.x;
     unsigned seen;
     do {
       asm volatile("ld.acquire.gpu.global.u32 %0, [%1];" : "=r"(seen) : "l"(arrived) : "memory");
     } while (seen < wanted);
-    __threadfence();
   }
   __syncthreads();
+}
+
+/// The shared memory of a thread block. Worked out anew where it is needed, so that the compiler knows
+/// it for shared memory and can use its faster loads.
+__device__ __forceinline__ BlockShared shared_of(int max_slots) {
+  extern __shared__ float4 shared[];
+  BlockShared s;
+  s.u = shared;
+  s.v = s.u + max_slots;
+  s.exchange = s.v + max_slots;
+  s.loads = reinterpret_cast<unsigned long long*>(s.exchange + 9 * blockDim.x);
+  return s;
 }
 
 /// Which laws a kernel can do; one that can do all has to hold more registers.
@@ -45,37 +53,59 @@ __device__ __forceinline__ void forces(const CudaTables& t, const CudaBlock& b,
   }
 }
 
+/// Out of line and with copies of its arguments, for the ordinary blocks to keep theirs in registers.
+template <Laws kLaws, int kParts>
+__device__ __noinline__ void special_forces(const CudaTables t, const CudaBlock b,
+                                            const CudaBody body, int max_slots,
+                                            const BlockStep step) {
+  forces<kLaws, true, kParts>(t, b, body, shared_of(max_slots), step);
+}
+
+/// A block with what belongs to it. Copies: through a reference they would be read again after every
+/// store.
+struct BlockAtWork {
+  CudaBlock block;
+  CudaBody body;
+  std::uint32_t near;
+  __device__ __forceinline__ BlockAtWork(const CudaTables& t, int index)
+      : block(t.blocks[index]), body(t.bodies[block.body]), near(t.near[index]) {}
+};
+
 /// One block in one substep: the nodes move on by the forces of the substep before, then the forces
 /// at their new places. Before the first substep nothing moves, after the last there are no forces.
-template <Laws kLaws, int kParts>
-__device__ __forceinline__ void block_substep(const CudaTables& t, const CudaFrame& f, int index,
-                                              int round, const BlockShared& s) {
-  // Copies: through a reference they would be read again after every store.
-  const CudaBlock b = t.blocks[index];
-  const CudaBody body = t.bodies[b.body];
-  const std::uint32_t near = t.near[index];
-  const int from = (f.current + max(round - 1, 0)) & 1;
-  float4* v = near != 0 || kLaws == Laws::kAny ? s.v : nullptr;
+template <Laws kLaws, int kParts, bool kCached>
+__device__ __forceinline__ void block_substep(const CudaTables& t, const CudaFrame& f,
+                                              const BlockAtWork& w, int round, int max_slots,
+                                              const SlotCache& cache) {
+  const BlockShared s = shared_of(max_slots);
+  const CudaBlock& b = w.block;
+  const CudaBody& body = w.body;
+  // Not f.state[i]: parameters that a register indexes would be copied to local memory.
+  const bool odd = ((f.current + max(round - 1, 0)) & 1) != 0, odd_round = (round & 1) != 0;
+  const CudaNodes &from = odd ? f.state[1] : f.state[0], &to = odd ? f.state[0] : f.state[1];
+  float4 *last_force = odd_round ? f.force[0] : f.force[1],
+         *force = odd_round ? f.force[1] : f.force[0];
+  float4* v = w.near != 0 || kLaws == Laws::kAny ? s.v : nullptr;
   if (round == 0) {
-    bring_nodes<false>(t, b, f.state[from], f.state[from], nullptr, f.step, body.inv_cell_size, s.u,
-                       v);
+    bring_nodes<false, kCached>(t, b, cache, from, from, nullptr, f.step, body.inv_cell_size, s.u,
+                                v);
   } else {
-    bring_nodes<true>(t, b, f.state[from], f.state[from ^ 1], f.force[(round - 1) & 1], f.step,
-                      body.inv_cell_size, s.u, v);
+    bring_nodes<true, kCached>(t, b, cache, from, to, last_force, f.step, body.inv_cell_size, s.u,
+                               v);
   }
   const int load_count = 6 * f.collider_count;
-  if (near != 0) {
+  if (w.near != 0) {
     for (int i = threadIdx.x; i < load_count; i += blockDim.x) s.loads[i] = 0;
   }
   __syncthreads();
   if (round == f.substeps) return;
-  const BlockStep step{f.colliders + round * f.collider_count, near, f.force[round & 1]};
-  if (near == 0 && b.partial == 0) {
+  const BlockStep step{f.colliders + round * f.collider_count, w.near, force};
+  if (w.near == 0 && b.partial == 0) {
     forces<kLaws, false, kParts>(t, b, body, s, step);
     return;
   }
-  forces<kLaws, true, kParts>(t, b, body, s, step);
-  if (near == 0) return;
+  special_forces<kLaws, kParts>(t, b, body, max_slots, step);
+  if (w.near == 0) return;
   auto* loads = reinterpret_cast<unsigned long long*>(f.loads) + round * load_count;
   for (int i = threadIdx.x; i < load_count; i += blockDim.x) {
     if (s.loads[i] != 0) atomicAdd(loads + i, s.loads[i]);
@@ -83,63 +113,87 @@ __device__ __forceinline__ void block_substep(const CudaTables& t, const CudaFra
   __syncthreads();
 }
 
-template <Laws kLaws, int kParts, int kThreads, int kBlocksPerProcessor>
+template <Laws kLaws, int kParts, bool kCached, int kThreads, int kBlocksPerProcessor>
 __global__ void __launch_bounds__(kThreads, kBlocksPerProcessor)
     mpm_substeps(const CudaTables t, const CudaFrame f, int max_slots) {
-  extern __shared__ float4 shared[];
-  BlockShared s;
-  s.u = shared;
-  s.v = s.u + max_slots;
-  s.exchange = s.v + max_slots;
-  s.loads = reinterpret_cast<unsigned long long*>(s.exchange + 9 * blockDim.x);
-  for (int round = 0; round <= f.substeps; ++round) {
-    if (round > 0) grid_barrier(f.arrived, static_cast<unsigned>(round));
-    for (int i = blockIdx.x; i < t.block_count; i += gridDim.x) {
-      block_substep<kLaws, kParts>(t, f, i, round, s);
+  const BlockShared s = shared_of(max_slots);
+  SlotCache cache;
+  cache.parts = reinterpret_cast<uint4*>(s.loads + 6 * kMaxColliders);
+  cache.node = reinterpret_cast<std::int32_t*>(cache.parts + max_slots);
+  cache.shared = reinterpret_cast<std::uint32_t*>(cache.node + max_slots);
+  if constexpr (kCached) {
+    const BlockAtWork mine(t, static_cast<int>(blockIdx.x));
+    fill_cache(t, mine.block, cache);
+    __syncthreads();
+    for (int round = 0; round <= f.substeps; ++round) {
+      if (round > 0) grid_barrier(f.arrived, static_cast<unsigned>(round));
+      block_substep<kLaws, kParts, true>(t, f, mine, round, max_slots, cache);
+    }
+  } else {
+    for (int round = 0; round <= f.substeps; ++round) {
+      if (round > 0) grid_barrier(f.arrived, static_cast<unsigned>(round));
+      for (int i = blockIdx.x; i < t.block_count; i += gridDim.x) {
+        block_substep<kLaws, kParts, false>(t, f, BlockAtWork(t, i), round, max_slots, cache);
+      }
     }
   }
 }
 
 using Kernel = void (*)(CudaTables, CudaFrame, int);
 
-template <int kParts, int kThreads, int kBlocksPerProcessor>
+/// Cached kernels are for small tissues, with all registers for each thread; the others hold so few
+/// that four blocks of threads run at once, of which one computes while another waits for memory.
+template <int kParts, bool kCached>
 Kernel kernel_of(const CudaPlan& plan) {
+  constexpr int kThreads = kCached ? kMaxCudaThreads : 128, kAtOnce = kCached ? 1 : 4;
   if (plan.viscous || (plan.neo_hookean && plan.fixed_corotated)) {
-    return mpm_substeps<Laws::kAny, kParts, kThreads, 1>;
+    return mpm_substeps<Laws::kAny, kParts, kCached, kThreads, 1>;
   }
-  return plan.neo_hookean
-             ? mpm_substeps<Laws::kNeoHookean, kParts, kThreads, kBlocksPerProcessor>
-             : mpm_substeps<Laws::kFixedCorotated, kParts, kThreads, kBlocksPerProcessor>;
+  return plan.neo_hookean ? mpm_substeps<Laws::kNeoHookean, kParts, kCached, kThreads, kAtOnce>
+                          : mpm_substeps<Laws::kFixedCorotated, kParts, kCached, kThreads, kAtOnce>;
 }
 
-/// More registers for each thread where there are few of them.
 Kernel kernel_of(const CudaPlan& plan) {
-  if (plan.parts == 2) return kernel_of<2, kMaxThreads, 1>(plan);
-  return kernel_of<1, 128, 3>(plan);
+  if (plan.parts == 1) return kernel_of<1, false>(plan);
+  return plan.cached ? kernel_of<2, true>(plan) : kernel_of<2, false>(plan);
 }
 
 std::size_t shared_bytes(const CudaPlan& plan) {
-  return sizeof(float4) * (2 * static_cast<std::size_t>(plan.max_slots) + 9 * plan.threads) +
+  const std::size_t of_slot = 2 * sizeof(float4) + (plan.cached ? sizeof(uint4) + 8 : 0);
+  return of_slot * plan.max_slots + 9 * sizeof(float4) * plan.threads +
          6 * kMaxColliders * sizeof(long long);
+}
+
+int attribute(cudaDeviceAttr which) {
+  int device = 0, value = 0;
+  check_cuda(cudaGetDevice(&device), "be asked");
+  check_cuda(cudaDeviceGetAttribute(&value, which, device), "be asked");
+  return value;
+}
+
+int resident_of(const CudaPlan& plan) {
+  const std::size_t bytes = shared_bytes(plan);
+  if (bytes > static_cast<std::size_t>(attribute(cudaDevAttrMaxSharedMemoryPerBlockOptin))) {
+    return 0;
+  }
+  const auto kernel = reinterpret_cast<const void*>(kernel_of(plan));
+  check_cuda(cudaFuncSetAttribute(kernel, cudaFuncAttributeMaxDynamicSharedMemorySize,
+                                  static_cast<int>(bytes)),
+             "be set up");
+  int each = 0;
+  check_cuda(cudaOccupancyMaxActiveBlocksPerMultiprocessor(&each, kernel, plan.threads, bytes),
+             "be asked");
+  return each * attribute(cudaDevAttrMultiProcessorCount);
 }
 
 }  // namespace
 
-int resident_blocks(const CudaPlan& plan) {
-  int device = 0, processors = 0, most = 0, each = 0;
-  check_cuda(cudaGetDevice(&device), "be asked");
-  check_cuda(cudaDeviceGetAttribute(&processors, cudaDevAttrMultiProcessorCount, device),
-             "be asked");
-  check_cuda(cudaDeviceGetAttribute(&most, cudaDevAttrMaxSharedMemoryPerBlockOptin, device),
-             "be asked");
-  if (shared_bytes(plan) > static_cast<std::size_t>(most)) return 0;
-  const auto kernel = reinterpret_cast<const void*>(kernel_of(plan));
-  const auto bytes = static_cast<int>(shared_bytes(plan));
-  check_cuda(cudaFuncSetAttribute(kernel, cudaFuncAttributeMaxDynamicSharedMemorySize, bytes),
-             "be set up");
-  check_cuda(cudaOccupancyMaxActiveBlocksPerMultiprocessor(&each, kernel, plan.threads, bytes),
-             "be asked");
-  return each * processors;
+int resident_blocks(CudaPlan& plan, int block_count) {
+  plan.cached = plan.parts == 2;
+  const int cached = plan.cached ? resident_of(plan) : 0;
+  plan.cached = plan.cached && cached >= block_count;
+  if (!plan.cached && plan.threads > 128) return 0;
+  return plan.cached ? cached : resident_of(plan);
 }
 
 void launch_substeps(const CudaPlan& plan, const CudaTables& tables, const CudaFrame& frame,

@@ -7,16 +7,19 @@
 
 namespace tissue_sim {
 
+inline constexpr int kMaxCudaThreads = 256;  ///< of a thread block; 128 where it has several blocks
+
 /// How a tissue's blocks are worked on.
 struct CudaPlan {
   int parts = 1;          ///< threads for each column of cells, 1 or 2
   int threads = 64;       ///< of a thread block: at least parts * nx * ny of each block
   int max_slots = 0;      ///< of a block
+  bool cached = false;    ///< each thread block has one block only, whose tables it keeps
   bool neo_hookean = false, fixed_corotated = false, viscous = false;  ///< what there is
 };
 
-/// Thread blocks that run at once; 0 where the plan does not fit the GPU. Throws for CUDA's errors.
-int resident_blocks(const CudaPlan& plan);
+/// Thread blocks that run at once; 0 where the plan does not fit the GPU. Sets CudaPlan::cached.
+int resident_blocks(CudaPlan& plan, int block_count);
 
 /// Enqueues all substeps of a frame as one kernel. The state is then in
 /// `state[(current + substeps) % 2]`.

@@ -28,13 +28,6 @@ std::uint8_t whole_bonds(const LatticeBody& b, const Points::Site& s) {
   return static_cast<std::uint8_t>(bonds);
 }
 
-bool is_anchored(const LatticeBody& b, const Vec3& place) {
-  for (const Region& region : b.body.anchors) {
-    if (region.contains(place)) return true;
-  }
-  return false;
-}
-
 std::vector<LatticeBody> make_lattice_bodies(const Scene& scene, Points& points,
                                              std::vector<std::string>* notes) {
   std::vector<LatticeBody> bodies;

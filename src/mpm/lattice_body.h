@@ -58,9 +58,6 @@ struct LatticeBody {
 std::vector<LatticeBody> make_lattice_bodies(const Scene& scene, Points& points,
                                              std::vector<std::string>* notes);
 
-/// Whether the body's anchored regions hold this place of the reference space.
-bool is_anchored(const LatticeBody& body, const Vec3& place);
-
 /// Points around lattice node (x, y, z) of `body` in the order of a 6 x 6 x 6 box, -1 where none:
 /// those whose stencils hold the node.
 void points_around(const LatticeBody& body, int x, int y, int z, std::int32_t (&around)[216]);

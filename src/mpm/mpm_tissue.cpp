@@ -84,6 +84,7 @@ void MpmTissue::measure() {
     states[i] = s.kernels->state(block, block_field(s, block), s.scratch.local(), nullptr);
   });
   stiffening_ = 1;
+  result_.elastic_energy = result_.kinetic_energy = result_.max_speed = 0;
   for (const BlockState& b : states) {
     result_.elastic_energy += b.elastic_energy;
     stiffening_ = std::max(stiffening_, b.stiffening);

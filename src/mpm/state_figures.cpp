@@ -13,7 +13,8 @@ float stable_substep(const MpmState& state, float stiffening) {
     const double mu = lame_mu(m), lambda = lame_lambda(m);
     // Waves in the deformed body, in reference space: the volumetric stiffness grows with the
     // square of the cofactor's columns.
-    const double modulus = 2 * mu + lambda * std::max(1.0f, stiffening);
+    const double volumetric = m.law == Law::kNeoHookean ? lambda + mu : lambda;
+    const double modulus = lambda + 2 * mu + volumetric * std::max(0.0f, stiffening - 1);
     const double elastic = state.scene.cfl * b.cell_size * std::sqrt(m.density / modulus);
     // Explicit viscosity: dt^2 + 4 eta / M dt <= dt_elastic^2.
     const double t = 2 * m.viscosity / modulus;

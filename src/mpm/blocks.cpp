@@ -2,88 +2,12 @@
 
 #include <algorithm>
 
+#include "mpm/block_sheets.h"
+
 namespace tissue_sim {
 namespace {
 
 constexpr int kGap = 3;
-
-struct Placed {
-  std::int32_t point;
-  std::int16_t x, y, z;  // cell in the region
-  std::int16_t s;        // sub-position: sx + 2 sy + 4 sz
-};
-
-std::vector<Placed> points_of(const BlockRegion& r, const LatticeBody& b) {
-  std::vector<Placed> result;
-  for (int z = 0; z < 2 * r.nz; ++z) {
-    for (int y = 0; y < 2 * r.ny; ++y) {
-      for (int x = 0; x < 2 * r.nx; ++x) {
-        const int p = b.point(2 * r.x + x, 2 * r.y + y, 2 * r.z + z);
-        if (p < 0) continue;
-        result.push_back({p, static_cast<std::int16_t>(x / 2), static_cast<std::int16_t>(y / 2),
-                          static_cast<std::int16_t>(z / 2),
-                          static_cast<std::int16_t>((x & 1) + 2 * (y & 1) + 4 * (z & 1))});
-      }
-    }
-  }
-  return result;
-}
-
-/// One set of points for which each node of the region means one field.
-struct Sheet {
-  std::vector<Placed> points;
-  std::vector<std::int32_t> node;  // of the region's nodes, -1 while no point needs it
-};
-
-/// Takes the points of a region apart so that within a sheet no two see different fields of a node;
-/// each goes to the first sheet that it fits.
-std::vector<Sheet> sheets_of(const BlockRegion& r, const LatticeBody& b, const Points& points,
-                             const NodeFields& fields) {
-  const int px = r.nx + 2, py = r.ny + 2, pz = r.nz + 2;
-  std::vector<const NodeFields::Split*> split(px * py * pz, nullptr);
-  bool any = false;
-  for (int z = 0, n = 0; z < pz; ++z) {
-    for (int y = 0; y < py; ++y) {
-      for (int x = 0; x < px; ++x, ++n) {
-        split[n] = fields.split(b.node(r.x + x - 1, r.y + y - 1, r.z + z - 1));
-        any = any || split[n] != nullptr;
-      }
-    }
-  }
-  std::vector<Sheet> sheets(1);
-  if (!any) {
-    sheets[0].points = points_of(r, b);
-    return sheets;
-  }
-  sheets[0].node.assign(split.size(), -1);
-  for (const Placed& p : points_of(r, b)) {
-    int local[27], seen[27], count = 0;
-    for (int k = 0; k < 27; ++k) {
-      const int x = p.x + k % 3, y = p.y + k / 3 % 3, z = p.z + k / 9;
-      const int n = (z * py + y) * px + x;
-      if (split[n] == nullptr) continue;
-      local[count] = n;
-      seen[count++] =
-          split[n]->seen_by(points.site[p.point], r.x + x - 1, r.y + y - 1, r.z + z - 1);
-    }
-    const auto fits = [&](const Sheet& sheet) {
-      for (int i = 0; i < count; ++i) {
-        const int there = sheet.node[local[i]];
-        if (there != -1 && there != seen[i]) return false;
-      }
-      return true;
-    };
-    auto sheet = std::find_if(sheets.begin(), sheets.end(), fits);
-    if (sheet == sheets.end()) {
-      sheets.emplace_back();
-      sheet = sheets.end() - 1;
-      sheet->node.assign(split.size(), -1);
-    }
-    for (int i = 0; i < count; ++i) sheet->node[local[i]] = seen[i];
-    sheet->points.push_back(p);
-  }
-  return sheets;
-}
 
 void find_partial_cells(Block& block) {
   Array<float> partial(static_cast<std::size_t>(block.nz) * block.stride, 0.0f);

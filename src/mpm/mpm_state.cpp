@@ -113,14 +113,17 @@ void substep(MpmState& state, float dt, std::vector<ColliderLoad>& loads) {
       },
       64);
   const int split_count = static_cast<int>(n.size()) - blocks.first_split_node;
-  for (int i = 0; i < split_count; ++i) {
-    float f[3] = {};
-    for (int p = blocks.split_node_parts[i]; p < blocks.split_node_parts[i + 1]; ++p) {
-      const SplitNodePart& part = blocks.split_parts[p];
-      for (int a = 0; a < 3; ++a) f[a] += state.force[part.force + a * part.component];
-    }
-    update(blocks.first_split_node + i, f[0], f[1], f[2]);
-  }
+  state.cpu->for_each(
+      split_count,
+      [&](int i) {
+        float f[3] = {};
+        for (int p = blocks.split_node_parts[i]; p < blocks.split_node_parts[i + 1]; ++p) {
+          const SplitNodePart& part = blocks.split_parts[p];
+          for (int a = 0; a < 3; ++a) f[a] += state.force[part.force + a * part.component];
+        }
+        update(blocks.first_split_node + i, f[0], f[1], f[2]);
+      },
+      256);
 }
 
 }  // namespace tissue_sim

@@ -25,8 +25,8 @@ TISSUE_SIM_INLINE double root_bound(double x) { return 1.04 * sqrt(x); }
 #if defined(__CUDA_ARCH__)
 TISSUE_SIM_INLINE float root_bound(float x) { return 1.04f * __fsqrt_rn(x); }
 #else
-/// By halving the exponent: for float and for vectors of floats, whose bits are integers of the same
-/// width.
+/// By halving the exponent: for float and for vectors of floats, whose bits are integers of the
+/// same width.
 template <class T>
 TISSUE_SIM_INLINE T root_bound(T x) {
   typename BitsOf<T>::type bits;
@@ -58,19 +58,19 @@ TISSUE_SIM_INLINE T norm2(const T* A) {
   return s;
 }
 
-/// 1 / x; on the GPU to the last bit but one and without a branch, for what refines it anyway.
+/// 1 / x; for float on the GPU to the last bit but one and without a branch, where it is refined
+/// anyway.
 template <class T>
 TISSUE_SIM_INLINE T rough_reciprocal(T x) {
+#if defined(__CUDA_ARCH__)
+  if constexpr (sizeof(T) == sizeof(float)) {
+    T r;
+    asm("rcp.approx.ftz.f32 %0, %1;" : "=f"(r) : "f"(x));
+    return r;
+  }
+#endif
   return 1.0f / x;
 }
-#if defined(__CUDA_ARCH__)
-template <>
-__device__ __forceinline__ float rough_reciprocal(float x) {
-  float r;
-  asm("rcp.approx.ftz.f32 %0, %1;" : "=f"(r) : "f"(x));
-  return r;
-}
-#endif
 
 /// Invariants of the stretch U = sqrt(F^T F) of a deformation gradient, and what the rotation
 /// follows from: R = ((b + c1) F - F C + a cof F) * inverse.
@@ -152,8 +152,8 @@ struct FixedCorotated {
     right_cauchy_green(F, C);
     const T J = F[0] * cof[0] + F[1] * cof[1] + F[2] * cof[2];
     // ||cof F||^2 is the second invariant of C.
-    const T c2 = (C[0] * C[1] - C[3] * C[3]) + (C[0] * C[2] - C[4] * C[4]) +
-                 (C[1] * C[2] - C[5] * C[5]);
+    const T c2 =
+        (C[0] * C[1] - C[3] * C[3]) + (C[0] * C[2] - C[4] * C[4]) + (C[1] * C[2] - C[5] * C[5]);
     const Stretch<T> s = stretch(C[0] + C[1] + C[2], c2, J);
     const T mu2 = mu + mu;
     const T fc = mu2 * s.inverse;

@@ -122,7 +122,8 @@ __device__ __forceinline__ void half_forces(const CudaTables& t, const CudaBlock
   add_contact(t, b, body, s, step, x, y, z, sz, volume, h, out);
 }
 
-/// Sums what the cells give to a node plane, in a fixed order, and puts it to the slots from `slot` on.
+/// Sums what the cells give to a node plane, in a fixed order, and puts it to the slots from `slot`
+/// on.
 __device__ __forceinline__ void write_plane(const CudaBlock& b, const float4* exchange, float scale,
                                             float4* force) {
   const int pitch = b.nx + 2, count = pitch * (b.ny + 2), columns = b.nx * b.ny;
@@ -159,14 +160,14 @@ __device__ __forceinline__ void add_neighbour(PlaneForce& p) {
   p.Bd += __shfl_xor_sync(kAll, p.Bd, 1);
 }
 
-/// Forces of a block. A thread walks up a column of cells (kParts = 1) or of the lower or upper
-/// halves of cells (kParts = 2), with what its cells give to the next two node planes in registers.
-/// Contact and cells that are not full need kSpecial.
-template <class LawOf, bool kViscous, bool kSpecial, int kParts>
+/// Forces of a block. Two threads, neighbours in a warp, walk up each column of cells: one has the
+/// lower, the other the upper halves of the cells, with what these give to the next two node planes
+/// in registers. Contact and cells that are not full need kSpecial.
+template <class LawOf, bool kViscous, bool kSpecial>
 __device__ __forceinline__ void block_forces(const CudaTables& t, const CudaBlock& b,
                                              const CudaBody& body, const BlockShared& s,
                                              const BlockStep& step) {
-  const int column = static_cast<int>(threadIdx.x) / kParts, columns = b.nx * b.ny;
+  const int column = static_cast<int>(threadIdx.x) / 2, columns = b.nx * b.ny;
   const bool active = column < columns;
   const int y = column / b.nx, x = column - y * b.nx;
   const int plane = (b.nx + 2) * (b.ny + 2);
@@ -174,6 +175,7 @@ __device__ __forceinline__ void block_forces(const CudaTables& t, const CudaBloc
   PlaneForce next[3] = {}, after[3] = {};
 #pragma unroll 1
   for (int z = 0; z < b.nz + 2; ++z) {
+    const int sz = static_cast<int>(threadIdx.x) % 2;
     PlaneForce now[3];
 #pragma unroll
     for (int c = 0; c < 3; ++c) {
@@ -182,21 +184,18 @@ __device__ __forceinline__ void block_forces(const CudaTables& t, const CudaBloc
       after[c] = {};
     }
     if (active && z < b.nz) {
-#pragma unroll 1
-      for (int i = 0; i < 2 / kParts; ++i) {
-        const int sz = kParts == 1 ? i : static_cast<int>(threadIdx.x) % kParts;
-        const HalfWeights k(sz == 0 ? -1.0f : 1.0f);
-        HalfPlane out[3];
-        half_forces<LawOf, kViscous, kSpecial>(t, b, body, s, step, x, y, z, sz, k, out);
+      const HalfWeights k(sz == 0 ? -1.0f : 1.0f);
+      HalfPlane out[3];
+      half_forces<LawOf, kViscous, kSpecial>(t, b, body, s, step, x, y, z, sz, k, out);
 #pragma unroll
-        for (int c = 0; c < 3; ++c) {
-          add_to_plane(out[c], k.below, k.slope_below, now[c]);
-          add_to_plane(out[c], kAverageCenter, k.slope_center, next[c]);
-          add_to_plane(out[c], k.above, k.slope_above, after[c]);
-        }
-        if (!partial || sz == 1) continue;
-        const float volume = t.partial[b.first_lane / 8 + (z * b.ny + y) * b.nx + x];
-        if (volume == 0) continue;
+      for (int c = 0; c < 3; ++c) {
+        add_to_plane(out[c], k.below, k.slope_below, now[c]);
+        add_to_plane(out[c], kAverageCenter, k.slope_center, next[c]);
+        add_to_plane(out[c], k.above, k.slope_above, after[c]);
+      }
+      const float volume =
+          partial && sz == 0 ? t.partial[b.first_lane / 8 + (z * b.ny + y) * b.nx + x] : 0.0f;
+      if (kSpecial && volume != 0) {
         const float4* node = s.u + z * plane + y * (b.nx + 2) + x;
 #pragma unroll
         for (int c = 0; c < 3; ++c) {
@@ -208,21 +207,18 @@ __device__ __forceinline__ void block_forces(const CudaTables& t, const CudaBloc
         }
       }
     }
-    if (kParts == 2) {
 #pragma unroll
-      for (int c = 0; c < 3; ++c) {
-        add_neighbour(now[c]);
-        if (kSpecial) now[c].BB += __shfl_xor_sync(0xffffffffu, now[c].BB, 1);
-      }
+    for (int c = 0; c < 3; ++c) {
+      add_neighbour(now[c]);
+      if (kSpecial) now[c].BB += __shfl_xor_sync(0xffffffffu, now[c].BB, 1);
     }
     if (active) {
       float f[3][3][3];
 #pragma unroll
       for (int c = 0; c < 3; ++c) node_forces<kSpecial>(now[c], f[c]);
-      const bool first = kParts == 1 || threadIdx.x % 2 == 0, second = kParts == 1 || !first;
 #pragma unroll
       for (int k = 0; k < 9; ++k) {
-        if (k < 5 ? !first : !second) continue;
+        if ((k < 5) != (sz == 0)) continue;  // each of the two writes half of the sums
         s.exchange[k * columns + column] = {f[0][k / 3][k % 3], f[1][k / 3][k % 3],
                                             f[2][k / 3][k % 3], 0};
       }

@@ -8,9 +8,9 @@ namespace tissue_sim {
 /// What a slot's node and the first parts of its force are, for a block that stays where it is from
 /// substep to substep to keep in shared memory.
 struct SlotCache {
-  std::int32_t* node;    ///< CudaTables::slot_node
-  std::uint32_t* shared; ///< CudaTables::slot_parts
-  uint4* parts;          ///< the first four slots that share the node
+  std::int32_t* node;     ///< CudaTables::slot_node
+  std::uint32_t* shared;  ///< CudaTables::slot_parts
+  uint4* parts;           ///< the first four slots that share the node
 };
 
 /// The first four slots that share a node, or the slot itself alone.
@@ -40,9 +40,9 @@ __device__ __forceinline__ void add(const float4& p, float4& f) {
 
 /// Brings the nodes of a block into `u` and, where `v` is not null, `v` (divided by the cell size,
 /// so that stencils give gradients). With `kMove` it first moves them on by the forces of the last
-/// substep, summed in the order of the slots; every block that has a node computes the same, and the
-/// one that owns it writes it down. Each thread has several nodes in hand, for all their loads to be
-/// under way at once.
+/// substep, summed in the order of the slots; every block that has a node computes the same, and
+/// the one that owns it writes it down. Each thread has several nodes in hand, for all their loads
+/// to be under way at once.
 template <bool kMove, bool kCached>
 __device__ __forceinline__ void bring_nodes(const CudaTables& t, const CudaBlock& b,
                                             const SlotCache& cache, const CudaNodes& from,
@@ -67,7 +67,7 @@ __device__ __forceinline__ void bring_nodes(const CudaTables& t, const CudaBlock
     for (int k = 0; k < kHand; ++k) {
       node[k] = entry[k] < 0 ? ~entry[k] : entry[k];
       u[k] = __ldcg(from.u + node[k]);
-      v[k] = __ldcg(from.v + node[k]);
+      if (kMove || v_out != nullptr) v[k] = __ldcg(from.v + node[k]);
       if (!kMove) continue;
       if (!kCached) {
         parts[k] = first_parts(t, b.first_slot + min(i + k * threads, count - 1), shared[k]);

@@ -10,14 +10,18 @@ namespace tissue_sim {
 
 struct CudaShape {
   BlockShape blocks;
-  int parts = 1;  ///< see CudaPlan
-  int threads = 64;
+  int threads = 64;   ///< see CudaPlan
+  bool small = true;  ///< the same
 };
 
-/// The shape for these bodies that a model of the substep's time finds fastest, on a GPU with so
-/// many multiprocessors and so much shared memory for a thread block. The environment variable
-/// TISSUE_SIM_CUDA_SHAPE="x y z parts threads" overrules it, for measurements.
-CudaShape choose_shape(const std::vector<LatticeBody>& bodies, int processors,
-                       std::size_t shared_bytes);
+/// What the choice needs to know of a GPU.
+struct CudaLimits {
+  int processors;            ///< multiprocessors
+  std::size_t shared_bytes;  ///< shared memory that a thread block can have
+};
+
+/// The shape for these bodies that a model of the substep's time finds fastest. The environment
+/// variable TISSUE_SIM_CUDA_SHAPE="x y z threads small" overrules it, for measurements.
+CudaShape choose_shape(const std::vector<LatticeBody>& bodies, const CudaLimits& limits);
 
 }  // namespace tissue_sim

@@ -57,8 +57,8 @@ void CudaMpmTissue::push() {
   const auto points = static_cast<std::size_t>(state_->points.size());
   check_memory(bytes_of(t, n, points), device_bytes());
   check_cuda(cudaStreamSynchronize(d.stream), "finish a frame");
-  d.plan.parts = d.shape.parts;
   d.plan.threads = d.shape.threads;
+  d.plan.small = d.shape.small;
   d.plan.max_slots = t.max_slots;
   for (const CudaBody& b : t.bodies) {
     d.plan.neo_hookean = d.plan.neo_hookean || b.neo_hookean != 0;

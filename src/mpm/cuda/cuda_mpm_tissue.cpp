@@ -15,12 +15,12 @@ namespace {
 
 /// The state at rest, with blocks of the GPU's shape.
 std::unique_ptr<MpmState> make_state(const Scene& scene, std::vector<std::string>* notes,
-                                     int processors, std::size_t shared_bytes, CudaShape& shape) {
+                                     const CudaLimits& limits, CudaShape& shape) {
   auto state = std::make_unique<MpmState>();
   state->scene = scene;
   state->bodies = make_lattice_bodies(scene, state->points, notes);
   state->fields = std::make_unique<NodeFields>(state->bodies, state->points, state->nodes);
-  shape = choose_shape(state->bodies, processors, shared_bytes);
+  shape = choose_shape(state->bodies, limits);
   state->blocks = make_blocks(state->bodies, state->points, *state->fields, shape.blocks);
   state->contacts.with.assign(state->points.size(), 0);
   state->instructions = instruction_set();
@@ -53,8 +53,10 @@ CudaMpmTissue::CudaMpmTissue(const Scene& scene) : device_(std::make_unique<OnDe
   check_cuda(cudaGetDeviceProperties(&properties, 0), "be asked");
   d.gpu = properties.name;
   check_cuda(cudaStreamCreateWithFlags(&d.stream, cudaStreamNonBlocking), "make a stream");
-  state_ = make_state(scene, &notes_, properties.multiProcessorCount,
-                      attribute(cudaDevAttrMaxSharedMemoryPerBlockOptin), d.shape);
+  const CudaLimits limits{
+      properties.multiProcessorCount,
+      static_cast<std::size_t>(attribute(cudaDevAttrMaxSharedMemoryPerBlockOptin))};
+  state_ = make_state(scene, &notes_, limits, d.shape);
   pieces_ = whole_pieces(state_->bodies, state_->points);
   notes_.push_back("runs on the GPU (" + d.gpu + "); cuts are made on the host between frames");
   push();
@@ -204,10 +206,9 @@ std::string CudaMpmTissue::plan() const {
   const OnDevice& d = *device_;
   const BlockShape& b = d.shape.blocks;
   return std::to_string(b.x) + " x " + std::to_string(b.y) + " x " + std::to_string(b.z) +
-         " cells, " + std::to_string(d.plan.parts) + " thread(s) a column, " +
-         std::to_string(d.plan.threads) + " a block, " + std::to_string(d.blocks.size()) +
-         " blocks, " + std::to_string(d.resident) +
-         " at once" + (d.plan.cached ? ", cached" : "");
+         " cells, " + std::to_string(d.plan.threads) + " a block, " +
+         std::to_string(d.blocks.size()) + " blocks, " + std::to_string(d.resident) + " at once" +
+         (d.plan.cached ? ", cached" : "");
 }
 
 }  // namespace tissue_sim

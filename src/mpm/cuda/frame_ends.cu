@@ -1,11 +1,10 @@
-#include "mpm/cuda/frame_ends.h"
-
 #include <cuda_runtime.h>
 
 #include "compute/cuda_check.h"
 #include "material/laws.h"
 #include "mpm/cuda/block_nodes.h"
 #include "mpm/cuda/cell_stabilisation.h"
+#include "mpm/cuda/frame_ends.h"
 #include "mpm/cuda/half_cell.h"
 
 namespace tissue_sim {
@@ -121,42 +120,44 @@ __global__ void __launch_bounds__(kThreads)
   }
   __syncthreads();
   const int pitch = b.nx + 2, plane = pitch * (b.ny + 2);
-  for_each_point(t, b, u, [&](int lane, int s, int x, int y, int z, int first,
-                              const HalfPlane(&h)[3]) {
-    const PointState p = point_state(b, body, h, x, y, z, s);
-    float cof[9], velocity[3];
-    cofactor(p.F, cof);
-    const float J = p.F[0] * cof[0] + p.F[1] * cof[1] + p.F[2] * cof[2];
-    const float energy = body.neo_hookean != 0 ? NeoHookean::energy(p.F, body.mu, body.lambda)
-                                               : FixedCorotated::energy(p.F, body.mu, body.lambda);
-    float column = 0;
-    for (int i = 0; i < 3; ++i) {
-      column = fmaxf(column, cof[i] * cof[i] + cof[3 + i] * cof[3 + i] + cof[6 + i] * cof[6 + i]);
-    }
-    const float stiffening = column + fabsf(J - 1) * sqrtf(norm2(p.F) / 3);
-    if (!isfinite(energy + stiffening)) m.finite = 0;
-    const float volume = b.whole != 0 ? body.point_volume : t.volume[lane];
-    m.elastic_energy += static_cast<double>(energy) * volume;
-    m.stiffening = fmaxf(m.stiffening, stiffening);
-    // The velocity of a point is the value of the nodes' velocities there.
-    float v2 = 0;
-    for (int c = 0; c < 3; ++c) velocity[c] = 0;
-    for (int k = 0; k < 27; ++k) {
-      const float4 at = v[first + k / 9 * plane + k / 3 % 3 * pitch + k % 3];
-      const float w = body.cell_size * lattice_weight(s & 1, k % 3) *
-                      lattice_weight(s >> 1 & 1, k / 3 % 3) * lattice_weight(s >> 2, k / 9);
-      velocity[0] += w * at.x;
-      velocity[1] += w * at.y;
-      velocity[2] += w * at.z;
-    }
-    for (int c = 0; c < 3; ++c) {
-      v2 += velocity[c] * velocity[c];
-      m.min[c] = fminf(m.min[c], p.x[c]);
-      m.max[c] = fmaxf(m.max[c], p.x[c]);
-    }
-    const float speed = sqrtf(v2);
-    if (!(speed <= m.speed)) m.speed = speed;
-  });
+  for_each_point(
+      t, b, u, [&](int lane, int s, int x, int y, int z, int first, const HalfPlane(&h)[3]) {
+        const PointState p = point_state(b, body, h, x, y, z, s);
+        float cof[9], velocity[3];
+        cofactor(p.F, cof);
+        const float J = p.F[0] * cof[0] + p.F[1] * cof[1] + p.F[2] * cof[2];
+        const float energy = body.neo_hookean != 0
+                                 ? NeoHookean::energy(p.F, body.mu, body.lambda)
+                                 : FixedCorotated::energy(p.F, body.mu, body.lambda);
+        float column = 0;
+        for (int i = 0; i < 3; ++i) {
+          column =
+              fmaxf(column, cof[i] * cof[i] + cof[3 + i] * cof[3 + i] + cof[6 + i] * cof[6 + i]);
+        }
+        const float stiffening = column + fabsf(J - 1) * sqrtf(norm2(p.F) / 3);
+        if (!isfinite(energy + stiffening)) m.finite = 0;
+        const float volume = b.whole != 0 ? body.point_volume : t.volume[lane];
+        m.elastic_energy += static_cast<double>(energy) * volume;
+        m.stiffening = fmaxf(m.stiffening, stiffening);
+        // The velocity of a point is the value of the nodes' velocities there.
+        float v2 = 0;
+        for (int c = 0; c < 3; ++c) velocity[c] = 0;
+        for (int k = 0; k < 27; ++k) {
+          const float4 at = v[first + k / 9 * plane + k / 3 % 3 * pitch + k % 3];
+          const float w = body.cell_size * lattice_weight(s & 1, k % 3) *
+                          lattice_weight(s >> 1 & 1, k / 3 % 3) * lattice_weight(s >> 2, k / 9);
+          velocity[0] += w * at.x;
+          velocity[1] += w * at.y;
+          velocity[2] += w * at.z;
+        }
+        for (int c = 0; c < 3; ++c) {
+          v2 += velocity[c] * velocity[c];
+          m.min[c] = fminf(m.min[c], p.x[c]);
+          m.max[c] = fmaxf(m.max[c], p.x[c]);
+        }
+        const float speed = sqrtf(v2);
+        if (!(speed <= m.speed)) m.speed = speed;
+      });
   for (int i = threadIdx.x; b.partial != 0 && i < b.nx * b.ny * b.nz; i += blockDim.x) {
     const float volume = t.partial[b.first_lane / 8 + i];
     if (volume == 0) continue;
@@ -176,43 +177,45 @@ __global__ void __launch_bounds__(kThreads)
   extern __shared__ float4 shared[];
   const CudaBlock& b = t.blocks[blockIdx.x];
   const CudaBody& body = t.bodies[b.body];
-  bring_nodes<false, false>(t, b, {}, state, state, nullptr, {}, body.inv_cell_size, shared, nullptr);
+  bring_nodes<false, false>(t, b, {}, state, state, nullptr, {}, body.inv_cell_size, shared,
+                            nullptr);
   __syncthreads();
-  for_each_point(t, b, shared, [&](int lane, int s, int x, int y, int z, int,
-                                   const HalfPlane(&h)[3]) {
-    const int p = t.point[lane];
-    const int place = cloud.place != nullptr ? cloud.place[p]
-                      : p % cloud.stride == 0 ? p / cloud.stride : -1;
-    if (place < 0) return;
-    const PointState state_of_point = point_state(b, body, h, x, y, z, s);
-    float P[9];
-    if (body.neo_hookean != 0) {
-      NeoHookean::stress(state_of_point.F, body.mu, body.lambda, P);
-    } else {
-      FixedCorotated::stress(state_of_point.F, body.mu, body.lambda, P);
-    }
-    const int piece = cloud.piece[p];
-    const int whole = cloud.whole[p];
-    Point out;
-    out.x = state_of_point.x[0];
-    out.y = state_of_point.x[1];
-    out.z = state_of_point.x[2];
-    out.rgb = cloud.colour[piece];
-    out.id = static_cast<std::uint32_t>(p);
-    out.fragment = piece;
-    out.stress = sqrtf(von_mises_squared(state_of_point.F, P));
-    out.damage = whole > 0 ? 1.0f - static_cast<float>(__popc(t.bonds[p])) / whole : 0.0f;
-    cloud.points[place] = out;
-  });
+  for_each_point(
+      t, b, shared, [&](int lane, int s, int x, int y, int z, int, const HalfPlane(&h)[3]) {
+        const int p = t.point[lane];
+        const int place = cloud.place != nullptr  ? cloud.place[p]
+                          : p % cloud.stride == 0 ? p / cloud.stride
+                                                  : -1;
+        if (place < 0) return;
+        const PointState state_of_point = point_state(b, body, h, x, y, z, s);
+        float P[9];
+        if (body.neo_hookean != 0) {
+          NeoHookean::stress(state_of_point.F, body.mu, body.lambda, P);
+        } else {
+          FixedCorotated::stress(state_of_point.F, body.mu, body.lambda, P);
+        }
+        const int piece = cloud.piece[p];
+        const int whole = cloud.whole[p];
+        Point out;
+        out.x = state_of_point.x[0];
+        out.y = state_of_point.x[1];
+        out.z = state_of_point.x[2];
+        out.rgb = cloud.colour[piece];
+        out.id = static_cast<std::uint32_t>(p);
+        out.fragment = piece;
+        out.stress = sqrtf(von_mises_squared(state_of_point.F, P));
+        out.damage = whole > 0 ? 1.0f - static_cast<float>(__popc(t.bonds[p])) / whole : 0.0f;
+        cloud.points[place] = out;
+      });
 }
 
 /// Allows a kernel this much dynamic shared memory.
 template <class Kernel>
 void allow(Kernel kernel, std::size_t bytes) {
-  check_cuda(cudaFuncSetAttribute(reinterpret_cast<const void*>(kernel),
-                                  cudaFuncAttributeMaxDynamicSharedMemorySize,
-                                  static_cast<int>(bytes)),
-             "be set up");
+  check_cuda(
+      cudaFuncSetAttribute(reinterpret_cast<const void*>(kernel),
+                           cudaFuncAttributeMaxDynamicSharedMemorySize, static_cast<int>(bytes)),
+      "be set up");
 }
 
 }  // namespace

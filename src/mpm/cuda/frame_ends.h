@@ -25,12 +25,12 @@ void launch_measure(const CudaTables& tables, const CudaNodes& state, int max_sl
 
 /// What clouds need to know of points beside where they are.
 struct CudaCloud {
-  Point* points;                  ///< where they go
-  int stride;                     ///< every stride-th point, in order
-  const std::int32_t* place;      ///< or, if not null: the place of each point in the cloud, or -1
-  const std::int32_t* piece;      ///< per point: its piece's id
-  const std::uint32_t* colour;    ///< per piece id
-  const std::uint8_t* whole;      ///< per point: how many bonds it has when the tissue is whole
+  Point* points;                ///< where they go
+  int stride;                   ///< every stride-th point, in order
+  const std::int32_t* place;    ///< or, if not null: the place of each point in the cloud, or -1
+  const std::int32_t* piece;    ///< per point: its piece's id
+  const std::uint32_t* colour;  ///< per piece id
+  const std::uint8_t* whole;    ///< per point: how many bonds it has when the tissue is whole
 };
 void launch_cloud(const CudaTables& tables, const CudaNodes& state, int max_slots,
                   const CudaCloud& cloud, cudaStream_t stream);

@@ -1,5 +1,5 @@
-// The transfers of half a cell, between its 27 nodes and four of its points: along z first, then x and
-// y, on even and odd parts (math/bspline.h), and the transpose for the forces. For .cu files.
+// The transfers of half a cell, between its 27 nodes and four of its points: along z first, then x
+// and y, on even and odd parts (math/bspline.h), and the transpose for the forces. For .cu files.
 //
 // A thread has half a cell in registers: 10 numbers of each component stand for the nodes, and all
 // weights are constants but those along z, which depend on the half.
@@ -12,8 +12,8 @@ namespace tissue_sim {
 
 /// Weights along z of the nodes below, at and above the cell, of the points of one half.
 struct HalfWeights {
-  float below, above;                           // of values; kAverageCenter at the cell
-  float slope_below, slope_center, slope_above; // of slopes
+  float below, above;                            // of values; kAverageCenter at the cell
+  float slope_below, slope_center, slope_above;  // of slopes
 
   /// `side` is -1 for the lower half, +1 for the upper.
   __device__ __forceinline__ explicit HalfWeights(float side)

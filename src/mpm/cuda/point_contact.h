@@ -6,9 +6,10 @@
 
 namespace tissue_sim {
 
-/// Velocity of the point at sub-position s [m/s], from its 27 nodes of `v` (divided by the cell size).
-__device__ inline void point_velocity(const float4* v, int pitch, int plane, int s,
-                                      float cell_size, float (&result)[3]) {
+/// Velocity of the point at sub-position s [m/s], from its 27 nodes of `v` (divided by the cell
+/// size).
+__device__ inline void point_velocity(const float4* v, int pitch, int plane, int s, float cell_size,
+                                      float (&result)[3]) {
   result[0] = result[1] = result[2] = 0;
   for (int k = 0; k < 27; ++k) {
     const float4 at = v[k / 9 * plane + k / 3 % 3 * pitch + k % 3];

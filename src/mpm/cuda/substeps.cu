@@ -23,8 +23,8 @@ __device__ __forceinline__ void grid_barrier(unsigned* arrived, unsigned round) 
   __syncthreads();
 }
 
-/// The shared memory of a thread block. Worked out anew where it is needed, so that the compiler knows
-/// it for shared memory and can use its faster loads.
+/// The shared memory of a thread block. Worked out anew where it is needed, so that the compiler
+/// knows it for shared memory and can use its faster loads.
 __device__ __forceinline__ BlockShared shared_of(int max_slots) {
   extern __shared__ float4 shared[];
   BlockShared s;
@@ -38,31 +38,32 @@ __device__ __forceinline__ BlockShared shared_of(int max_slots) {
 /// Which laws a kernel can do; one that can do all has to hold more registers.
 enum class Laws { kFixedCorotated, kNeoHookean, kAny };
 
-template <Laws kLaws, bool kSpecial, int kParts>
+template <Laws kLaws, bool kSpecial>
 __device__ __forceinline__ void forces(const CudaTables& t, const CudaBlock& b,
                                        const CudaBody& body, const BlockShared& s,
                                        const BlockStep& step) {
   if constexpr (kLaws == Laws::kFixedCorotated) {
-    block_forces<FixedCorotated, false, kSpecial, kParts>(t, b, body, s, step);
+    block_forces<FixedCorotated, false, kSpecial>(t, b, body, s, step);
   } else if constexpr (kLaws == Laws::kNeoHookean) {
-    block_forces<NeoHookean, false, kSpecial, kParts>(t, b, body, s, step);
+    block_forces<NeoHookean, false, kSpecial>(t, b, body, s, step);
   } else if (body.neo_hookean != 0) {
-    block_forces<NeoHookean, true, kSpecial, kParts>(t, b, body, s, step);
+    block_forces<NeoHookean, true, kSpecial>(t, b, body, s, step);
   } else {
-    block_forces<FixedCorotated, true, kSpecial, kParts>(t, b, body, s, step);
+    block_forces<FixedCorotated, true, kSpecial>(t, b, body, s, step);
   }
 }
 
-/// Out of line and with copies of its arguments, for the ordinary blocks to keep theirs in registers.
-template <Laws kLaws, int kParts>
+/// Out of line and with copies of its arguments, for the ordinary blocks to keep theirs in
+/// registers.
+template <Laws kLaws>
 __device__ __noinline__ void special_forces(const CudaTables t, const CudaBlock b,
                                             const CudaBody body, int max_slots,
                                             const BlockStep step) {
-  forces<kLaws, true, kParts>(t, b, body, shared_of(max_slots), step);
+  forces<kLaws, true>(t, b, body, shared_of(max_slots), step);
 }
 
-/// A block with what belongs to it. Copies: through a reference they would be read again after every
-/// store.
+/// A block with what belongs to it. Copies: through a reference they would be read again after
+/// every store.
 struct BlockAtWork {
   CudaBlock block;
   CudaBody body;
@@ -71,49 +72,56 @@ struct BlockAtWork {
       : block(t.blocks[index]), body(t.bodies[block.body]), near(t.near[index]) {}
 };
 
-/// One block in one substep: the nodes move on by the forces of the substep before, then the forces
-/// at their new places. Before the first substep nothing moves, after the last there are no forces.
-template <Laws kLaws, int kParts, bool kCached>
-__device__ __forceinline__ void block_substep(const CudaTables& t, const CudaFrame& f,
-                                              const BlockAtWork& w, int round, int max_slots,
-                                              const SlotCache& cache) {
+/// Forces of a block whose nodes are there, on its points and between them and the colliders.
+template <Laws kLaws>
+__device__ __forceinline__ void all_forces(const CudaTables& t, const CudaFrame& f,
+                                           const BlockAtWork& w, int substep, int max_slots,
+                                           float4* force) {
   const BlockShared s = shared_of(max_slots);
-  const CudaBlock& b = w.block;
-  const CudaBody& body = w.body;
-  // Not f.state[i]: parameters that a register indexes would be copied to local memory.
-  const bool odd = ((f.current + max(round - 1, 0)) & 1) != 0, odd_round = (round & 1) != 0;
-  const CudaNodes &from = odd ? f.state[1] : f.state[0], &to = odd ? f.state[0] : f.state[1];
-  float4 *last_force = odd_round ? f.force[0] : f.force[1],
-         *force = odd_round ? f.force[1] : f.force[0];
-  float4* v = w.near != 0 || kLaws == Laws::kAny ? s.v : nullptr;
-  if (round == 0) {
-    bring_nodes<false, kCached>(t, b, cache, from, from, nullptr, f.step, body.inv_cell_size, s.u,
-                                v);
-  } else {
-    bring_nodes<true, kCached>(t, b, cache, from, to, last_force, f.step, body.inv_cell_size, s.u,
-                               v);
-  }
   const int load_count = 6 * f.collider_count;
   if (w.near != 0) {
     for (int i = threadIdx.x; i < load_count; i += blockDim.x) s.loads[i] = 0;
   }
   __syncthreads();
-  if (round == f.substeps) return;
-  const BlockStep step{f.colliders + round * f.collider_count, w.near, force};
-  if (w.near == 0 && b.partial == 0) {
-    forces<kLaws, false, kParts>(t, b, body, s, step);
+  const BlockStep step{f.colliders + substep * f.collider_count, w.near, force};
+  if (w.near == 0 && w.block.partial == 0) {
+    forces<kLaws, false>(t, w.block, w.body, s, step);
     return;
   }
-  special_forces<kLaws, kParts>(t, b, body, max_slots, step);
+  special_forces<kLaws>(t, w.block, w.body, max_slots, step);
   if (w.near == 0) return;
-  auto* loads = reinterpret_cast<unsigned long long*>(f.loads) + round * load_count;
+  auto* loads = reinterpret_cast<unsigned long long*>(f.loads) + substep * load_count;
   for (int i = threadIdx.x; i < load_count; i += blockDim.x) {
     if (s.loads[i] != 0) atomicAdd(loads + i, s.loads[i]);
   }
   __syncthreads();
 }
 
-template <Laws kLaws, int kParts, bool kCached, int kThreads, int kBlocksPerProcessor>
+/// One block in one round. Each block moves all of its nodes on, by the forces of the substep
+/// before, whoever else has them too, so that one barrier a substep suffices; then come the forces
+/// at their new places. Before the first substep nothing moves, after the last there are no forces.
+/// State and forces change places between two buffers.
+template <Laws kLaws, bool kCached>
+__device__ __forceinline__ void block_round(const CudaTables& t, const CudaFrame& f,
+                                            const BlockAtWork& w, int round, int max_slots,
+                                            const SlotCache& cache) {
+  const BlockShared s = shared_of(max_slots);
+  const float scale = w.body.inv_cell_size;
+  float4* v = w.near != 0 || kLaws == Laws::kAny ? s.v : nullptr;
+  // Not f.state[i]: parameters that a register indexes would be copied to local memory.
+  const bool odd = ((f.current + max(round - 1, 0)) & 1) != 0, odd_round = (round & 1) != 0;
+  const CudaNodes &from = odd ? f.state[1] : f.state[0], &to = odd ? f.state[0] : f.state[1];
+  if (round == 0) {
+    bring_nodes<false, kCached>(t, w.block, cache, from, from, nullptr, f.step, scale, s.u, v);
+  } else {
+    bring_nodes<true, kCached>(t, w.block, cache, from, to, odd_round ? f.force[0] : f.force[1],
+                               f.step, scale, s.u, v);
+  }
+  if (round == f.substeps) return;
+  all_forces<kLaws>(t, f, w, round, max_slots, odd_round ? f.force[1] : f.force[0]);
+}
+
+template <Laws kLaws, bool kCached, int kThreads, int kBlocksPerProcessor>
 __global__ void __launch_bounds__(kThreads, kBlocksPerProcessor)
     mpm_substeps(const CudaTables t, const CudaFrame f, int max_slots) {
   const BlockShared s = shared_of(max_slots);
@@ -127,13 +135,13 @@ __global__ void __launch_bounds__(kThreads, kBlocksPerProcessor)
     __syncthreads();
     for (int round = 0; round <= f.substeps; ++round) {
       if (round > 0) grid_barrier(f.arrived, static_cast<unsigned>(round));
-      block_substep<kLaws, kParts, true>(t, f, mine, round, max_slots, cache);
+      block_round<kLaws, true>(t, f, mine, round, max_slots, cache);
     }
   } else {
     for (int round = 0; round <= f.substeps; ++round) {
       if (round > 0) grid_barrier(f.arrived, static_cast<unsigned>(round));
       for (int i = blockIdx.x; i < t.block_count; i += gridDim.x) {
-        block_substep<kLaws, kParts, false>(t, f, BlockAtWork(t, i), round, max_slots, cache);
+        block_round<kLaws, false>(t, f, BlockAtWork(t, i), round, max_slots, cache);
       }
     }
   }
@@ -141,21 +149,21 @@ __global__ void __launch_bounds__(kThreads, kBlocksPerProcessor)
 
 using Kernel = void (*)(CudaTables, CudaFrame, int);
 
-/// Cached kernels are for small tissues, with all registers for each thread; the others hold so few
-/// that four blocks of threads run at once, of which one computes while another waits for memory.
-template <int kParts, bool kCached>
-Kernel kernel_of(const CudaPlan& plan) {
-  constexpr int kThreads = kCached ? kMaxCudaThreads : 128, kAtOnce = kCached ? 1 : 4;
+template <bool kCached, int kThreads, int kAtOnce>
+Kernel kernel_for(const CudaPlan& plan) {
   if (plan.viscous || (plan.neo_hookean && plan.fixed_corotated)) {
-    return mpm_substeps<Laws::kAny, kParts, kCached, kThreads, 1>;
+    return mpm_substeps<Laws::kAny, kCached, kMaxCudaThreads, 1>;
   }
-  return plan.neo_hookean ? mpm_substeps<Laws::kNeoHookean, kParts, kCached, kThreads, kAtOnce>
-                          : mpm_substeps<Laws::kFixedCorotated, kParts, kCached, kThreads, kAtOnce>;
+  return plan.neo_hookean ? mpm_substeps<Laws::kNeoHookean, kCached, kThreads, kAtOnce>
+                          : mpm_substeps<Laws::kFixedCorotated, kCached, kThreads, kAtOnce>;
 }
 
+/// The kernel of small tissues has all registers for each thread; that of large ones holds so few
+/// that 384 threads run at once, of which some compute while others wait for memory.
 Kernel kernel_of(const CudaPlan& plan) {
-  if (plan.parts == 1) return kernel_of<1, false>(plan);
-  return plan.cached ? kernel_of<2, true>(plan) : kernel_of<2, false>(plan);
+  if (plan.cached) return kernel_for<true, kMaxCudaThreads, 1>(plan);
+  return plan.threads > 192 ? kernel_for<false, kMaxCudaThreads, 1>(plan)
+                            : kernel_for<false, 192, 2>(plan);
 }
 
 std::size_t shared_bytes(const CudaPlan& plan) {
@@ -189,11 +197,13 @@ int resident_of(const CudaPlan& plan) {
 }  // namespace
 
 int resident_blocks(CudaPlan& plan, int block_count) {
-  plan.cached = plan.parts == 2;
-  const int cached = plan.cached ? resident_of(plan) : 0;
-  plan.cached = plan.cached && cached >= block_count;
-  if (!plan.cached && plan.threads > 128) return 0;
-  return plan.cached ? cached : resident_of(plan);
+  plan.cached = plan.small;
+  if (plan.cached) {
+    const int resident = resident_of(plan);
+    if (resident >= block_count) return resident;
+    plan.cached = false;
+  }
+  return resident_of(plan);
 }
 
 void launch_substeps(const CudaPlan& plan, const CudaTables& tables, const CudaFrame& frame,

@@ -7,14 +7,14 @@
 
 namespace tissue_sim {
 
-inline constexpr int kMaxCudaThreads = 256;  ///< of a thread block; 128 where it has several blocks
+inline constexpr int kMaxCudaThreads = 256;  ///< of a thread block
 
 /// How a tissue's blocks are worked on.
 struct CudaPlan {
-  int parts = 1;          ///< threads for each column of cells, 1 or 2
-  int threads = 64;       ///< of a thread block: at least parts * nx * ny of each block
-  int max_slots = 0;      ///< of a block
-  bool cached = false;    ///< each thread block has one block only, whose tables it keeps
+  int threads = 64;     ///< of a thread block: at least 2 nx ny of each block
+  int max_slots = 0;    ///< of a block
+  bool small = true;    ///< to be cached, if all blocks run at once
+  bool cached = false;  ///< each thread block has one block only, whose tables it keeps
   bool neo_hookean = false, fixed_corotated = false, viscous = false;  ///< what there is
 };
 

@@ -1,9 +1,9 @@
 // What the GPU's kernels see of a tissue: plain structs with device pointers.
 //
 // A block's nodes are numbered z, y, x (x fastest) over (nz + 2)(ny + 2)(nx + 2); node `local` of a
-// block has the slot first_slot + local, which is where the block puts its part of the node's force.
-// The point at sub-position s (sx + 2 sy + 4 sz) of cell (x, y, z) has the lane
-// first_lane + ((z * 8 + s) * ny + y) * nx + x.
+// block has the slot first_slot + local, which is where the block puts its part of the node's
+// force. The point at sub-position s (sx + 2 sy + 4 sz) of cell (x, y, z) has the lane first_lane +
+// ((z * 8 + s) * ny + y) * nx + x.
 #pragma once
 
 #include <vector_types.h>
@@ -29,12 +29,12 @@ struct CudaBody {
 
 struct CudaBlock {
   int body;
-  int nx, ny, nz;         ///< cells
+  int nx, ny, nz;  ///< cells
   int first_slot;
   int first_lane;
-  int whole;              ///< all points are there, with CudaBody::point_volume
-  int partial;            ///< some cells have fewer than eight points
-  float origin[3];        ///< reference place of local node 0 [m]
+  int whole;        ///< all points are there, with CudaBody::point_volume
+  int partial;      ///< some cells have fewer than eight points
+  float origin[3];  ///< reference place of local node 0 [m]
   TISSUE_SIM_INLINE int slots() const { return (nx + 2) * (ny + 2) * (nz + 2); }
 };
 
@@ -58,18 +58,18 @@ struct CudaTables {
   const CudaBlock* blocks;
   const CudaBody* bodies;
   int block_count;
-  const std::int32_t* slot_node;   ///< its node n, or ~n where another block writes the node
-  const std::uint32_t* slot_parts; ///< 0: the slot has all of its node's force; else how many slots
-                                   ///< share it + 64 * the first of them in `parts`
+  const std::int32_t* slot_node;    ///< its node n, or ~n where another block writes the node
+  const std::uint32_t* slot_parts;  ///< 0: the slot has all of its node's force; else how many
+                                    ///< slots share it + 64 * the first of them in `parts`
   const std::uint32_t* parts;
-  const float* volume;             ///< per lane, 0 where there is no point [m^3]
-  const std::int32_t* point;       ///< per lane, -1 where there is none
-  const float* partial;            ///< per cell (lane / 8): volume of its points where they are fewer
-                                   ///< than eight, else 0; see mpm/stabilisation.h [m^3]
-  const std::uint8_t* bonds;       ///< per point
-  std::uint32_t* near;             ///< per block: bit c for a collider that it may meet this frame
-  std::uint8_t* with;              ///< per point: 0, or 1 + index of the collider it touches
-  float* hold;                     ///< per point: the place that friction holds on to
+  const float* volume;        ///< per lane, 0 where there is no point [m^3]
+  const std::int32_t* point;  ///< per lane, -1 where there is none
+  const float* partial;       ///< per cell (lane / 8): volume of its points where they are fewer
+                              ///< than eight, else 0; see mpm/stabilisation.h [m^3]
+  const std::uint8_t* bonds;  ///< per point
+  std::uint32_t* near;        ///< per block: bit c for a collider that it may meet this frame
+  std::uint8_t* with;         ///< per point: 0, or 1 + index of the collider it touches
+  float* hold;                ///< per point: the place that friction holds on to
 };
 
 /// Sums of what acts on a collider in one substep: force and moment in units of kLoadUnit, as
@@ -78,14 +78,14 @@ inline constexpr double kLoadUnit = 1.0 / (1ll << 38);
 
 struct CudaFrame {
   CudaNodes state[2];
-  int current;                ///< which of them holds the state at the beginning
-  float4* force[2];           ///< per slot
+  int current;       ///< which of them holds the state at the beginning
+  float4* force[2];  ///< per slot
   int substeps;
   NodeStep step;
   const Collider* colliders;  ///< [substeps][collider_count]
   int collider_count;
-  long long* loads;           ///< [substeps][collider_count][6]
-  unsigned* arrived;          ///< counter of the barrier, 0 at the beginning
+  long long* loads;   ///< [substeps][collider_count][6]
+  unsigned* arrived;  ///< counter of the barrier, 0 at the beginning
 };
 
 }  // namespace tissue_sim

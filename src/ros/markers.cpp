@@ -12,7 +12,8 @@ namespace {
 using visualization_msgs::Marker;
 using visualization_msgs::MarkerArray;
 
-constexpr int kMostFragments = 64;  // the largest; crumbs would hide them
+// The largest pieces, and no crumbs of a blade: they would hide them.
+constexpr int kMostFragments = 64, kFewestPoints = 4;
 
 std_msgs::ColorRGBA color(float r, float g, float b, float a = 1) {
   std_msgs::ColorRGBA c;
@@ -156,7 +157,8 @@ MarkerArray Markers::make(const MarkerInput& input) {
   }
   std::vector<const Fragment*> largest;
   for (const Fragment& f : input.fragments) {
-    if ((f.box.min.array() <= f.box.max.array()).all()) largest.push_back(&f);
+    const bool placed = (f.box.min.array() <= f.box.max.array()).all();
+    if (placed && f.point_count >= kFewestPoints) largest.push_back(&f);
   }
   std::sort(largest.begin(), largest.end(), [](const Fragment* a, const Fragment* b) {
     return a->point_count != b->point_count ? a->point_count > b->point_count : a->id < b->id;

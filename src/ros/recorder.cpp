@@ -55,8 +55,9 @@ std::string Recorder::start(const std::string& name, std::set<std::string> topic
   }
   create_new(active);
   try {
-    bag_.open(active, rosbag::bagmode::Write);
-    bag_.setCompression(rosbag::compression::LZ4);
+    bag_ = std::make_unique<rosbag::Bag>();
+    bag_->open(active, rosbag::bagmode::Write);
+    bag_->setCompression(rosbag::compression::LZ4);
   } catch (const std::exception& e) {
     std::remove(active.c_str());
     throw std::runtime_error("the recording " + path + " cannot be written: " + e.what());
@@ -138,7 +139,7 @@ void Recorder::write_all() {
         throw std::runtime_error("the disk is full up to recording_reserve");
       }
     }
-    item.write(bag_);
+    item.write(*bag_);
     lock.lock();
     status_.queued -= item.bytes;
     ++status_.messages;
@@ -168,8 +169,9 @@ std::string Recorder::close(const std::string& error) {
   const std::string path = status().path, active = path + ".active";
   const std::string ended = "the recording ended: " + (error.empty() ? "" : error + "; ");
   try {
-    bag_.close();
+    bag_->close();
   } catch (const std::exception& e) {
+    (void)bag_.release();  // its destructor closes once more, throws again, and would end the program
     return ended + active + " could not be closed (" + e.what() +
            "): 'rosbag reindex' makes what is in it readable";
   }

@@ -85,7 +85,7 @@ class Recorder {
   const double queue_limit_, reserve_;  // [bytes]
   std::mutex control_;                  // held by start() and stop()
   std::thread thread_;
-  rosbag::Bag bag_;  // of the thread, while it runs
+  std::unique_ptr<rosbag::Bag> bag_;  // of the thread, while it runs
 
   mutable std::mutex mutex_;  // of what follows
   std::condition_variable wake_;

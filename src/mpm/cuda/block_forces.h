@@ -53,6 +53,18 @@ __device__ __forceinline__ void add_contact(const CudaTables& t, const CudaBlock
                                             HalfPlane (&out)[3]) {
   const int pitch = b.nx + 2, plane = pitch * (b.ny + 2);
   const int first = z * plane + y * pitch + x;
+  // Most half cells are far from everything: its points lie within two cells of its middle,
+  // stretched as they may be.
+  float middle[3];
+  reference_place(b, body.cell_size, x, y, z, 4 * sz, middle);
+#pragma unroll
+  for (int c = 0; c < 3; ++c) middle[c] += body.cell_size * h[c].wAA;
+  std::uint32_t close = 0;
+  for (std::uint32_t left = step.near; left != 0; left &= left - 1) {
+    const int c = __ffs(static_cast<int>(left)) - 1;
+    if (may_touch(step.colliders[c], middle, 2 * body.cell_size)) close |= 1u << c;
+  }
+  if (close == 0) return;
   // The stencils take forces by -1 / cell size, as they do stress.
   for (int q = 0; q < 4; ++q) {
     const int sub = 4 * sz + q;
@@ -65,8 +77,8 @@ __device__ __forceinline__ void add_contact(const CudaTables& t, const CudaBlock
     for (int c = 0; c < 3; ++c) place[c] += body.cell_size * point_value(h[c], side_x, side_y);
     const float v = q == 0 ? volume.x : q == 1 ? volume.y : q == 2 ? volume.z : volume.w;
     const float3 push =
-        contact_push(t, step.colliders, step.near, p, v, {place[0], place[1], place[2]},
-                     body.spring, s.v + first, pitch, plane, sub, body.cell_size, s.loads);
+        contact_push(t, step.colliders, close, p, v, {place[0], place[1], place[2]}, body.spring,
+                     s.v + first, pitch, plane, sub, body.cell_size, s.loads);
     add_point_force(-body.cell_size * push.x, side_x, side_y, out[0]);
     add_point_force(-body.cell_size * push.y, side_x, side_y, out[1]);
     add_point_force(-body.cell_size * push.z, side_x, side_y, out[2]);

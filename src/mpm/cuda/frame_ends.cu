@@ -28,12 +28,11 @@ __global__ void find_near(const CudaTables t, const CudaMeasure* measures, const
     }
   }
   const unsigned near = __ballot_sync(0xffffffffu, meets);
-  if (near == 0) {
-    const CudaBlock& b = t.blocks[index];
-    for (int i = lane; i < 8 * b.nx * b.ny * b.nz; i += 32) {
-      const int p = t.point[b.first_lane + i];
-      if (p >= 0 && t.with[p] != 0) t.with[p] = 0;
-    }
+  const CudaBlock& b = t.blocks[index];
+  for (int i = lane; i < 8 * b.nx * b.ny * b.nz; i += 32) {
+    const int p = t.point[b.first_lane + i];
+    const int with = p >= 0 ? t.with[p] : 0;
+    if (with != 0 && (near >> (with - 1) & 1u) == 0) t.with[p] = 0;
   }
   if (lane == 0) t.near[index] = near;
 }

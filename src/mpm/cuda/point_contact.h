@@ -26,6 +26,18 @@ __device__ inline void add_load(unsigned long long* load, double value) {
   atomicAdd(load, static_cast<unsigned long long>(__double2ll_rn(value / kLoadUnit)));
 }
 
+/// Whether a point within `radius` of `x` may lie in the collider.
+__device__ __forceinline__ bool may_touch(const Collider& c, const float (&x)[3], float radius) {
+  float p[3];
+  to_local(c, x, p);
+  if (c.kind == Collider::kPlane) return p[2] < radius;
+  const bool blade = c.kind == Collider::kBlade;
+  const float side = radius + (blade ? 0.5f * c.thickness : c.radius);
+  const float front = blade ? 0 : c.radius, back = blade ? c.width : c.radius;
+  return p[2] < radius && p[2] > -c.length - radius && fabsf(p[1]) < side &&
+         p[0] < front + radius && p[0] > -back - radius;
+}
+
 /// Force of the colliders `near` on the point `p` at `x` [N]; out of line, for few points touch
 /// anything and the others shall keep their registers.
 __device__ __noinline__ float3 contact_push(const CudaTables& t, const Collider* colliders,

@@ -254,6 +254,12 @@ TEST_F(OnGpu, CloudsAndEnergiesAreTheCpus) {
   EXPECT_NEAR(a.kinetic_energy, b.kinetic_energy, 1e-5 * a.kinetic_energy);
   EXPECT_NEAR(a.max_speed, b.max_speed, 1e-5 * a.max_speed);
   EXPECT_NEAR(cpu.stable_substep(), gpu.stable_substep(), 1e-5f * cpu.stable_substep());
+  for (std::size_t i = 0; i < cpu.fragments().size(); ++i) {
+    const Fragment &f = cpu.fragments()[i], &g = gpu.fragments()[i];
+    EXPECT_LT((f.centroid - g.centroid).norm(), 1e-7) << "piece " << f.id;
+    EXPECT_LT((f.velocity - g.velocity).norm(), 1e-6) << "piece " << f.id;
+    EXPECT_LT((f.box.max - g.box.max).norm(), 1e-6) << "piece " << f.id;
+  }
   for (int k = 0; k < 4; ++k) {
     PointSelection selection;
     selection.stride = k == 1 ? 3 : 1;

@@ -6,6 +6,7 @@
 
 #include "contact/frame_colliders.h"
 #include "cutting/cut_tissue.h"
+#include "fragments/piece_motion.h"
 #include "mpm/cuda/on_device.h"
 #include "mpm/state_figures.h"
 #include "tools/tool_motion.h"
@@ -142,6 +143,7 @@ void CudaMpmTissue::advance(int substeps, float dt, const FrameInput& input) {
     d.host_loads.resize(d.loads.size());
     d.loads.download(d.host_loads.data(), d.loads.size(), d.stream);
   }
+  pieces_measured_ = false;
   launch_measure();
 }
 
@@ -190,9 +192,20 @@ FrameResult CudaMpmTissue::finish() {
     }
   }
   substeps_ = 0;
+  pieces_measured_ = false;
   if (!blades_.empty() && !result_.blew_up) cut_by_blades(before);
   blades_.clear();
   return result_;
+}
+
+Span<const Fragment> CudaMpmTissue::fragments() const {
+  if (!pieces_measured_) {
+    auto* self = const_cast<CudaMpmTissue*>(this);  // only what was not looked at yet changes
+    self->pull();
+    measure_pieces(*self->state_, self->pieces_);
+    self->pieces_measured_ = true;
+  }
+  return pieces_.all;
 }
 
 std::uint64_t CudaMpmTissue::checksum() const {

@@ -22,7 +22,7 @@ class CudaMpmTissue final : public Tissue {
   FrameResult finish() override;
   int point_count() const override { return state_->points.size(); }
   int read_points(const PointSelection& selection, std::vector<std::uint8_t>& cloud) override;
-  Span<const Fragment> fragments() const override { return pieces_.all; }
+  Span<const Fragment> fragments() const override;
   std::uint64_t checksum() const override;
   std::string device_name() const override;
   const std::vector<std::string>& notes() const override { return notes_; }
@@ -50,6 +50,7 @@ class CudaMpmTissue final : public Tissue {
   std::vector<std::string> notes_;
   std::unique_ptr<MpmState> state_;
   Pieces pieces_;
+  bool pieces_measured_ = false;  ///< whether they are where the frame left them
   std::unique_ptr<OnDevice> device_;
   std::vector<BladePath> blades_;  ///< of the frame in flight
   int substeps_ = 0;

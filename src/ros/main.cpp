@@ -4,6 +4,7 @@
 #include <ros/node_handle.h>
 #include <ros/spinner.h>
 
+#include <csignal>
 #include <exception>
 #include <memory>
 
@@ -12,6 +13,8 @@
 int main(int argc, char** argv) {
   ros::init(argc, argv, "simulator");
   ros::NodeHandle node("~");
+  // As SIGINT does in roscpp: a recording is closed before the program ends.
+  std::signal(SIGTERM, [](int) { ros::requestShutdown(); });
   std::unique_ptr<tissue_sim::Node> simulator;
   try {
     simulator = std::make_unique<tissue_sim::Node>(node);

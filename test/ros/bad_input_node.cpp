@@ -3,10 +3,14 @@
 #include <diagnostic_msgs/DiagnosticArray.h>
 #include <geometry_msgs/PoseStamped.h>
 #include <sensor_msgs/JointState.h>
+#include <sensor_msgs/PointCloud2.h>
 #include <sys/wait.h>
+#include <tissue_sim/LoadScene.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <cstring>
 #include <filesystem>
 #include <limits>
 
@@ -140,6 +144,56 @@ TEST_F(Poses, MovingDuringAPauseSweepsNothing) {
                   .norm(),
               0.09);  // 5 m/s for a frame
   }
+}
+
+TEST(BlowUp, IsSaidStandsStillAndNeverGivesNan) {
+  Topic<SimulationState> state("/simulator/state");
+  Topic<sensor_msgs::PointCloud2> clouds("/simulator/tissue/points");
+  Topic<diagnostic_msgs::DiagnosticArray> diagnostics("/diagnostics");
+  std::string slab;
+  ASSERT_TRUE(ros::param::get("/simulator/scene_file", slab));
+  pause(false);
+  LoadScene::Request fall;  // for ever, until it is faster than anything can be
+  fall.yaml =
+      "{cell_size: 0.005, gravity: [0, 0, -1000], ground: {enabled: false}, bodies: [{shape: box, "
+      "size: [0.04, 0.02, 0.02]}]}";
+  ASSERT_TRUE(call<LoadScene>("load_scene", fall).success);
+  ASSERT_TRUE(wait_until([&] { return state.count() > 0 && state.last()->blew_up; }));
+  const std::int64_t frame = state.last()->frame;
+  EXPECT_LT(frame, 60);
+  ros::WallDuration(0.5).sleep();
+  EXPECT_EQ(state.last()->frame, frame);
+  const auto refused = [](bool success, const std::string& message) {
+    EXPECT_FALSE(success);
+    EXPECT_NE(message.find("blew up"), std::string::npos) << message;
+  };
+  const auto running = pause(false);
+  refused(running.success, running.message);
+  const auto cut = call<Cut>("cut", plane_cut(0));
+  refused(cut.success, cut.message);
+  EXPECT_TRUE(wait_until([&] {
+    for (const auto& m : diagnostics.all()) {
+      for (const auto& s : m->status) {
+        if (s.name == "simulator: simulation" && s.level == s.ERROR &&
+            s.message.find("blew up") != std::string::npos) {
+          return true;
+        }
+      }
+    }
+    return false;
+  }));
+  for (const auto& c : clouds.all()) {
+    for (std::size_t i = 0; i + sizeof(Point) <= c->data.size(); i += sizeof(Point)) {
+      Point p;
+      std::memcpy(&p, &c->data[i], sizeof p);
+      ASSERT_TRUE(std::isfinite(p.x) && std::isfinite(p.z) && std::isfinite(p.stress));
+    }
+  }
+  EXPECT_TRUE(trigger("reset").success);
+  EXPECT_TRUE(wait_until([&] { return !state.last()->blew_up && state.last()->frame > 0; }));
+  LoadScene::Request back;
+  back.path = slab;
+  EXPECT_TRUE(call<LoadScene>("load_scene", back).success);
 }
 
 struct Ended {

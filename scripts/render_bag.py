@@ -161,8 +161,13 @@ def main():
     stress_end = float(np.ceil(stress_end / digits * 2) * digits / 2)
     os.makedirs(args.out, exist_ok=True)
     jobs = [(m, camera, stress_end, name, args.out) for m, name in zip(moments, NAMES)]
-    with multiprocessing.Pool(min(3, os.cpu_count() or 1)) as pool:
-        pictures = pool.map(draw_one, jobs, chunksize=1)
+    try:
+        pool = multiprocessing.Pool(min(3, os.cpu_count() or 1))
+    except OSError:  # some containers have no /dev/shm
+        pictures = [draw_one(job) for job in jobs]
+    else:
+        with pool:
+            pictures = pool.map(draw_one, jobs, chunksize=1)
     overview(pictures, recording.seconds[chosen], stress_end, os.path.join(args.out, "overview.png"))
     print("   overview.png")
 

@@ -12,11 +12,13 @@ core_packages=(g++ make cmake libeigen3-dev libtbb-dev libyaml-cpp-dev libassimp
 picture_packages=(python3-numpy python3-matplotlib python3-yaml)
 debian_packages=(catkin ros-message-generation ros-message-runtime libroscpp-dev libroslib-dev
   librosbag-storage-dev librostest-dev libtf2-dev libtf2-ros-dev libtf2-geometry-msgs-dev
-  libnodelet-dev pluginlib-dev libdiagnostic-updater-dev libdiagnostic-msgs-dev libstd-msgs-dev
-  libstd-srvs-dev libgeometry-msgs-dev libsensor-msgs-dev libvisualization-msgs-dev rosout
-  python3-roslaunch python3-rosbag python3-rostopic python3-rosservice python3-rosnode
-  python3-rosparam python3-rostest python3-rospy python3-tf2-ros python3-std-msgs python3-std-srvs
-  python3-geometry-msgs python3-sensor-msgs python3-visualization-msgs python3-diagnostic-msgs)
+  libnodelet-dev libnodeletlib-dev libnodeletlib-tools pluginlib-dev libdiagnostic-updater-dev
+  ros-diagnostic-msgs ros-geometry-msgs ros-sensor-msgs ros-std-msgs ros-std-srvs
+  ros-visualization-msgs libdiagnostic-msgs-dev libstd-msgs-dev libstd-srvs-dev libgeometry-msgs-dev
+  libsensor-msgs-dev libvisualization-msgs-dev rosout python3-roslaunch python3-rosbag
+  python3-rostopic python3-rosservice python3-rosnode python3-rosparam python3-rostest python3-rospy
+  python3-tf2-ros python3-std-msgs python3-std-srvs python3-geometry-msgs python3-sensor-msgs
+  python3-visualization-msgs python3-diagnostic-msgs)
 noetic_packages=(ros-noetic-{catkin,message-generation,message-runtime,roscpp,roslib,rospy,rostest}
   ros-noetic-{rosbag,rosbag-storage,roslaunch,rosout,rostopic,rosservice,rosnode,rosparam,tf2}
   ros-noetic-{tf2-ros,tf2-geometry-msgs,nodelet,pluginlib,diagnostic-updater,diagnostic-msgs}
@@ -99,30 +101,34 @@ show_progress() {
   fi
 }
 
-# configure_and_build FOLDER [cmake options]: a Release build of the package.
-configure_and_build() {
-  local folder=$1 jobs memory
+# configure FOLDER [cmake options]: a Release build of the package.
+configure() {
+  local folder=$1
   shift
-  local log=$folder/build.log
   if [[ -e $folder/CMakeCache.txt ]] &&
     ! grep -qxF "CMAKE_HOME_DIRECTORY:INTERNAL=$repo" "$folder/CMakeCache.txt"; then
     rm -rf -- "$folder"  # made when the checkout was somewhere else: CMake would refuse it
   fi
   mkdir -p "$folder"
+  say "Building in $folder (log: build.log there)"
+  cmake -S "$repo" -B "$folder" -DCMAKE_BUILD_TYPE=Release -DPYTHON_EXECUTABLE=/usr/bin/python3 \
+    -DTISSUE_SIM_WERROR="${TISSUE_SIM_WERROR:-OFF}" "$@" >"$folder/build.log" 2>&1 || {
+    grep -A 12 'CMake Error' "$folder/build.log" >&2 || tail -20 "$folder/build.log" >&2
+    fail "CMake could not configure: see $folder/build.log"
+  }
+}
+
+# compile FOLDER [cmake --build options]
+compile() {
+  local folder=$1 jobs memory
+  shift
   memory=$(awk '/MemAvailable/ { print int($2 / 1500000) }' /proc/meminfo)  # 1.5 GB a compiler
   jobs=$(nproc)
   if ((memory < jobs)); then jobs=$((memory > 1 ? memory : 1)); fi
-  say "Building in $folder ($jobs at a time; log: build.log there)"
-  cmake -S "$repo" -B "$folder" -DCMAKE_BUILD_TYPE=Release -DPYTHON_EXECUTABLE=/usr/bin/python3 \
-    -DTISSUE_SIM_WERROR="${TISSUE_SIM_WERROR:-OFF}" "$@" >"$log" 2>&1 || {
-    grep -A 12 'CMake Error' "$log" >&2 || tail -20 "$log" >&2
-    fail "CMake could not configure: see $log"
+  cmake --build "$folder" -j "$jobs" "$@" 2>&1 | tee -a "$folder/build.log" | show_progress || {
+    grep -E -A 3 'error:|undefined reference' "$folder/build.log" | head -24 >&2
+    fail "the build failed: see $folder/build.log"
   }
-  cmake --build "$folder" -j "$jobs" 2>&1 | tee -a "$log" | show_progress ||
-    {
-      grep -E -A 3 'error:|undefined reference' "$log" | head -24 >&2
-      fail "the build failed: see $log"
-    }
 }
 
 # source_setup FILE: catkin's setup files read variables that are not set, and look at $1.
@@ -144,7 +150,10 @@ prepare_folder() {
 # Builds node, core and, with ON, the tests; leaves the environment of the devel space.
 build_ros_package() {
   if [[ -z ${CMAKE_PREFIX_PATH:-} && -e $noetic ]]; then source_setup "$noetic"; fi
-  configure_and_build "$build/ros" -DTISSUE_SIM_TESTS="$1" -DCATKIN_ENABLE_TESTING="$1"
+  configure "$build/ros" -DTISSUE_SIM_TESTS="$1" -DCATKIN_ENABLE_TESTING="$1"
+  ! grep 'tissue_sim: the core only' "$build/ros/build.log" >&2 ||
+    fail "CMake does not find all of ROS: see $build/ros/build.log"
+  compile "$build/ros"
   source_setup "$build/ros/devel/setup.bash"
   export PATH=/usr/bin:$PATH
 }

@@ -6,9 +6,7 @@ using diagnostic_msgs::DiagnosticStatus;
 
 Diagnostics::Diagnostics(ros::NodeHandle& node, const SimulationThread& simulation,
                          const Recorder& recorder)
-    : simulation_(simulation),
-      recorder_(recorder),
-      updater_(node, node, node.getNamespace()) {
+    : simulation_(simulation), recorder_(recorder), updater_(node, node, node.getNamespace()) {
   updater_.setHardwareID("none");
   updater_.add("simulation", this, &Diagnostics::simulation);
   updater_.add("tools", this, &Diagnostics::tools);
@@ -72,7 +70,8 @@ void Diagnostics::recording(Status& status) {
   if (!s.error.empty()) {
     status.summary(DiagnosticStatus::ERROR, s.error);
   } else if (s.recording && dropped > 0) {
-    status.summary(DiagnosticStatus::WARN, "recording, but the disk is too slow: messages are lost");
+    status.summary(DiagnosticStatus::WARN,
+                   "recording, but the disk is too slow: messages are lost");
   } else {
     status.summary(DiagnosticStatus::OK, s.recording ? "recording" : "not recording");
   }

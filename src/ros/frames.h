@@ -19,10 +19,11 @@ class Frames {
 
   const std::string& world() const { return world_; }
 
-  /// The frame's pose in the world at `stamp` (0: the newest). An empty name is the world. Throws
-  /// tf2::TransformException.
+  /// The frame's pose in the world at `stamp` (0: the newest). An empty name is the world.
+  /// Throws tf2::TransformException.
   Pose in_world(const std::string& frame, const ros::Time& stamp) const;
-  /// The newest pose of a frame in the world, and when it was there. Throws tf2::TransformException.
+  /// The newest pose of a frame in the world, and when it was there. Throws
+  /// tf2::TransformException.
   Pose newest(const std::string& frame, ros::Time& stamp) const;
 
  private:

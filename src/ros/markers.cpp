@@ -79,12 +79,10 @@ void add_tool(const MarkerInput& input, std::size_t i, MarkerArray& array) {
   } else {  // the capsule that touches: its tip is the tool's origin
     const double r = tool.radius, l = std::max(tool.length, 2 * r);
     const geometry_msgs::Vector3 ball = scale(2 * r, 2 * r, 2 * r);
-    array.markers.push_back(
-        part(input, i, 0, Marker::SPHERE, pose, Vec3(0, 0, -r), ball, steel));
+    array.markers.push_back(part(input, i, 0, Marker::SPHERE, pose, Vec3(0, 0, -r), ball, steel));
     array.markers.push_back(part(input, i, 1, Marker::CYLINDER, pose, Vec3(0, 0, -(r + l) / 2),
                                  scale(2 * r, 2 * r, l - r), steel));
-    array.markers.push_back(
-        part(input, i, 2, Marker::SPHERE, pose, Vec3(0, 0, -l), ball, steel));
+    array.markers.push_back(part(input, i, 2, Marker::SPHERE, pose, Vec3(0, 0, -l), ball, steel));
   }
 }
 
@@ -135,7 +133,8 @@ void add_fragment(const MarkerInput& input, const Fragment& f, int id, MarkerArr
   label.pose.position = to_point(Vec3(f.centroid.x(), f.centroid.y(), f.box.max.z() + 0.006));
   label.scale.z = 0.006;
   char text[64];
-  std::snprintf(text, sizeof text, "%d: %.2f cm3%s", f.id, f.volume * 1e6, f.loose ? ", loose" : "");
+  std::snprintf(text, sizeof text, "%d: %.2f cm3%s", f.id, f.volume * 1e6,
+                f.loose ? ", loose" : "");
   label.text = text;
   label.color = piece_color(f.id, 1);
   array.markers.push_back(label);

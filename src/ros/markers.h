@@ -16,7 +16,7 @@ struct MarkerInput {
   const std::vector<ToolMotion>& tools;
   const std::vector<ToolLoad>& loads;
   Span<const Fragment> fragments;
-  std::string frame;   ///< the world's
+  std::string frame;  ///< the world's
   ros::Time stamp;
   double force_scale;  ///< [m/N]
 };

@@ -1,9 +1,9 @@
 // tissue_sim/Simulator: the simulator as a nodelet.
 #include <nodelet/nodelet.h>
-#include <pluginlib/class_list_macros.hpp>
 
 #include <exception>
 #include <memory>
+#include <pluginlib/class_list_macros.hpp>
 
 #include "ros/node.h"
 

@@ -119,7 +119,8 @@ void warn_of_unknown(const ros::NodeHandle& node) {
   std::set<std::string> unknown;
   for (const std::string& name : names) {
     if (name.compare(0, prefix.size(), prefix) != 0) continue;
-    const std::string own = name.substr(prefix.size(), name.find('/', prefix.size()) - prefix.size());
+    const std::string own =
+        name.substr(prefix.size(), name.find('/', prefix.size()) - prefix.size());
     if (kKnown.count(own) == 0) unknown.insert(own);
   }
   std::string known;
@@ -190,9 +191,9 @@ Scene read_scene_parameters(const ros::NodeHandle& node) {
   double scale = 1;
   XmlRpcValue tree;
   read(node, "scene_file", file, "must be the path of a scene file");
-  const bool has_tree = node.getParam("scene", tree) &&
-                        !(tree.getType() == XmlRpcValue::TypeString &&
-                          static_cast<std::string&>(tree).empty());
+  const bool has_tree =
+      node.getParam("scene", tree) &&
+      !(tree.getType() == XmlRpcValue::TypeString && static_cast<std::string&>(tree).empty());
   if (!file.empty() && has_tree) {
     throw std::invalid_argument("~scene_file and ~scene are both set: give one scene");
   }
@@ -202,9 +203,9 @@ Scene read_scene_parameters(const ros::NodeHandle& node) {
         "tree of parameters");
   }
   const bool text = has_tree && tree.getType() == XmlRpcValue::TypeString;
-  Scene scene = !file.empty() ? load_scene(resolve_mesh_path(file))
-                              : scene_from_yaml(text ? static_cast<std::string&>(tree)
-                                                     : yaml_from(tree));
+  Scene scene = !file.empty()
+                    ? load_scene(resolve_mesh_path(file))
+                    : scene_from_yaml(text ? static_cast<std::string&>(tree) : yaml_from(tree));
   read(node, "mesh", mesh, "must be the path of a mesh file");
   read(node, "mesh_scale", scale, 1e-9, 1e9);
   if (!mesh.empty()) put_mesh(scene, mesh, scale);

@@ -20,23 +20,23 @@ struct ToolParameters {
 
 struct Parameters {
   std::string world_frame = "world";
-  bool paused = false;               ///< at the start
-  double cloud_rate = 30;            ///< [Hz] of wall time
-  int cloud_stride = 1;              ///< every n-th point
+  bool paused = false;     ///< at the start
+  double cloud_rate = 30;  ///< [Hz] of wall time
+  int cloud_stride = 1;    ///< every n-th point
   bool cloud_surface_only = false;
-  double fragment_rate = 10;         ///< [Hz], and whenever the pieces change
-  double state_rate = 0;             ///< [Hz], 0 for every frame
-  double marker_rate = 15;           ///< [Hz]
-  bool checksum = true;              ///< in each state
-  double force_scale = 0.02;         ///< length of the force arrows [m/N]
-  bool publish_tf = true;            ///< world_frame -> tool
-  double max_tool_speed = 5;         ///< [m/s]
-  double max_tool_turn_rate = 60;    ///< [rad/s]
-  double tf_tolerance = 0.1;         ///< how old the newest transform of a moving frame may be [s]
-  std::string recording_folder;      ///< absolute
-  std::string record;                ///< name of a recording from the first frame on; "" for none
-  double recording_queue = 1024;     ///< [MiB]
-  double recording_reserve = 256;    ///< disk space left free [MiB]
+  double fragment_rate = 10;       ///< [Hz], and whenever the pieces change
+  double state_rate = 0;           ///< [Hz], 0 for every frame
+  double marker_rate = 15;         ///< [Hz]
+  bool checksum = true;            ///< in each state
+  double force_scale = 0.02;       ///< length of the force arrows [m/N]
+  bool publish_tf = true;          ///< world_frame -> tool
+  double max_tool_speed = 5;       ///< [m/s]
+  double max_tool_turn_rate = 60;  ///< [rad/s]
+  double tf_tolerance = 0.1;       ///< how old the newest transform of a moving frame may be [s]
+  std::string recording_folder;    ///< absolute
+  std::string record;              ///< name of a recording from the first frame on; "" for none
+  double recording_queue = 1024;   ///< [MiB]
+  double recording_reserve = 256;  ///< disk space left free [MiB]
   std::map<std::string, ToolParameters> tools;
 };
 

@@ -58,8 +58,8 @@ class Player {
       ros::WallDuration(0.02).sleep();
     }
     if (follows_simulation_) {
-      state_ = node_.subscribe("state", 10, &Player::on_state, this,
-                               ros::TransportHints().tcpNoDelay());
+      state_ =
+          node_.subscribe("state", 10, &Player::on_state, this, ros::TransportHints().tcpNoDelay());
       ros::spin();
       return;
     }

@@ -18,8 +18,8 @@ constexpr int kRefusalCount = 5;
 const char* name_of(Refusal refusal);
 
 struct PoseLimits {
-  double speed = 5;            ///< [m/s]
-  double turn_rate = 60;       ///< [rad/s]
+  double speed = 5;              ///< [m/s]
+  double turn_rate = 60;         ///< [rad/s]
   double frame_time = 1.0 / 60;  ///< gaps shorter than this count as this [s]
 };
 

@@ -30,9 +30,9 @@ Publications::Publications(ros::NodeHandle& node, const Scene& scene, const Para
 }
 
 std::set<std::string> Publications::topics() const {
-  std::set<std::string> names = {scene_output_.topic(), state_.topic(),  inputs_.topic(),
-                                 fragments_.topic(),    points_.topic(), loose_points_.topic(),
-                                 tf_.topic()};
+  std::set<std::string> names = {
+      scene_output_.topic(), state_.topic(),        inputs_.topic(), fragments_.topic(),
+      points_.topic(),       loose_points_.topic(), tf_.topic()};
   for (const ToolOutputs& tool : tools_) {
     names.insert({tool.body.topic(), tool.spatial.topic()});
   }
@@ -186,7 +186,8 @@ void Publications::publish_tf(const FrameReport& report, const ros::Time& stamp)
   for (std::size_t i = 0; i < report.input.tools.size(); ++i) {
     const std::string& name = scene_.tools[i].name;
     const auto source = parameters_.tools.find(name);
-    const bool follows_itself = source != parameters_.tools.end() && source->second.tf_frame == name;
+    const bool follows_itself =
+        source != parameters_.tools.end() && source->second.tf_frame == name;
     if (!report.input.tools[i].present || follows_itself) continue;
     geometry_msgs::TransformStamped t;
     t.header = header(stamp);

@@ -62,8 +62,9 @@ class Publications {
                                                           const ros::Time& stamp) const;
   boost::shared_ptr<const sensor_msgs::PointCloud2> cloud(Simulation& simulation, bool loose_only,
                                                           const ros::Time& stamp) const;
-  boost::shared_ptr<const visualization_msgs::MarkerArray> marker_message(
-      Simulation& simulation, const FrameReport& report, const ros::Time& stamp);
+  boost::shared_ptr<const visualization_msgs::MarkerArray> marker_message(Simulation& simulation,
+                                                                          const FrameReport& report,
+                                                                          const ros::Time& stamp);
   void publish_wrenches(const FrameReport& report, const ros::Time& stamp) const;
   void publish_tf(const FrameReport& report, const ros::Time& stamp);
 

@@ -21,8 +21,8 @@ constexpr double kMiB = 1024.0 * 1024.0;
 void create_new(const std::string& path) {
   const int file = open(path.c_str(), O_WRONLY | O_CREAT | O_EXCL, 0666);
   if (file < 0) {
-    throw std::runtime_error("the recording " + path + " cannot be written: " +
-                             std::strerror(errno));
+    throw std::runtime_error("the recording " + path +
+                             " cannot be written: " + std::strerror(errno));
   }
   ::close(file);
 }
@@ -114,7 +114,8 @@ void Recorder::push(Item item, bool must_keep) {
   if (dropped.empty()) {
     wake_.notify_one();
   } else {
-    ROS_WARN_THROTTLE(1, "The disk is too slow for the recording: a message of %s is lost (see "
+    ROS_WARN_THROTTLE(1,
+                      "The disk is too slow for the recording: a message of %s is lost (see "
                       "diagnostics). Record fewer points (cloud_rate, cloud_stride) or topics.",
                       dropped.c_str());
   }
@@ -171,7 +172,8 @@ std::string Recorder::close(const std::string& error) {
   try {
     bag_->close();
   } catch (const std::exception& e) {
-    (void)bag_.release();  // its destructor closes once more, throws again, and would end the program
+    // Its destructor closes once more, throws again, and would end the program.
+    (void)bag_.release();
     return ended + active + " could not be closed (" + e.what() +
            "): 'rosbag reindex' makes what is in it readable";
   }

@@ -20,11 +20,11 @@ namespace tissue_sim {
 
 struct RecorderStatus {
   bool recording = false;
-  std::string path;            ///< of the bag that is written or was written last
-  std::uint64_t messages = 0;  ///< written
-  std::uint64_t queued = 0;    ///< waiting for the disk [bytes]
+  std::string path;                              ///< of the bag that is written or was written last
+  std::uint64_t messages = 0;                    ///< written
+  std::uint64_t queued = 0;                      ///< waiting for the disk [bytes]
   std::map<std::string, std::uint64_t> dropped;  ///< by topic: the queue was full
-  std::string error;           ///< what ended the recording before it was stopped
+  std::string error;                             ///< what ended the recording before it was stopped
 };
 
 /// Thread-safe. Nothing but start() and stop() ever waits for the disk.

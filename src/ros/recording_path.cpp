@@ -61,8 +61,8 @@ std::string recording_path(const std::string& folder, const std::string& name) {
   fs::create_directories(folder, error);
   const fs::path root = fs::canonical(folder, error);
   if (error || !fs::is_directory(root)) {
-    throw std::runtime_error("the recording folder " + folder + " cannot be made: " +
-                             (error ? error.message() : "it is a file"));
+    throw std::runtime_error("the recording folder " + folder +
+                             " cannot be made: " + (error ? error.message() : "it is a file"));
   }
 
   fs::path bag = root / (name.empty() ? date_and_time() : name);
@@ -82,16 +82,17 @@ std::string recording_path(const std::string& folder, const std::string& name) {
          "needs the folder " + parent.string() + ", which cannot be made: " + error.message());
   bag = parent / bag.filename();
   refuse(there(bag), name, "exists already as " + bag.string() + ": choose another");
-  refuse(there(bag.string() + ".active"), name,
-         "is being recorded, or was left unfinished, as " + bag.string() + ".active: choose another");
+  refuse(
+      there(bag.string() + ".active"), name,
+      "is being recorded, or was left unfinished, as " + bag.string() + ".active: choose another");
   return bag.string();
 }
 
 double free_space(const std::string& path) {
   struct statvfs disk;
   if (statvfs(path.c_str(), &disk) != 0) {
-    throw std::runtime_error("the disk of " + path + " cannot be asked for its free space: " +
-                             std::strerror(errno));
+    throw std::runtime_error("the disk of " + path +
+                             " cannot be asked for its free space: " + std::strerror(errno));
   }
   return static_cast<double>(disk.f_bavail) * static_cast<double>(disk.f_frsize);
 }

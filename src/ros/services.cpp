@@ -59,8 +59,8 @@ BladePath Services::read_path(const Cut::Request& request) const {
   try {
     frame = frames_.in_world(request.header.frame_id, request.header.stamp);
   } catch (const tf2::TransformException& e) {
-    throw std::runtime_error("frame_id '" + request.header.frame_id + "' cannot be used: " +
-                             e.what());
+    throw std::runtime_error("frame_id '" + request.header.frame_id +
+                             "' cannot be used: " + e.what());
   }
   BladePath path;
   for (std::size_t i = 0; i < request.edge.size(); ++i) {

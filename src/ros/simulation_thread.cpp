@@ -2,15 +2,12 @@
 
 #include <ros/console.h>
 
-#include <stdexcept>
 #include <utility>
 
 namespace tissue_sim {
 namespace {
 
 constexpr std::chrono::milliseconds kIdle(200);  // between two looks at a simulation at rest
-
-std::runtime_error ended() { return std::runtime_error("the node is shutting down"); }
 
 }  // namespace
 
@@ -34,110 +31,6 @@ void SimulationThread::stop() {
   work_.clear();  // what was promised in there is broken, which wakes who waits for it
   cuts_.clear();
   if (std::exchange(steps_left_, 0) > 0) step_reply_ = {};
-}
-
-void SimulationThread::post(std::function<void()> work) {
-  {
-    const std::lock_guard<std::mutex> lock(mutex_);
-    if (stop_) throw ended();
-    work_.push_back(std::move(work));
-  }
-  wake_.notify_all();
-}
-
-void SimulationThread::call(std::function<void()> work) {
-  const auto task = std::make_shared<std::packaged_task<void()>>(std::move(work));
-  std::future<void> done = task->get_future();
-  post([task] { (*task)(); });
-  try {
-    done.get();
-  } catch (const std::future_error&) {
-    throw ended();
-  }
-}
-
-CutReply SimulationThread::cut(const BladePath& path) {
-  const auto pending = std::make_shared<PendingCut>();
-  pending->path = path;
-  std::future<CutReply> reply = pending->reply.get_future();
-  call([this, pending] {
-    if (run_.blew_up) throw std::runtime_error(problem_);
-    cuts_.push_back(std::move(*pending));
-  });
-  try {
-    return reply.get();
-  } catch (const std::future_error&) {
-    throw ended();
-  }
-}
-
-StepReply SimulationThread::step(int frames) {
-  std::future<StepReply> reply;
-  call([&] {
-    if (run_.blew_up) throw std::runtime_error(problem_);
-    if (!run_.paused) throw std::runtime_error("the simulation is running: pause it to step it");
-    if (steps_left_ > 0) {
-      throw std::runtime_error("another step has " + std::to_string(steps_left_) +
-                               " frames to go: wait for it");
-    }
-    steps_left_ = frames;
-    step_reply_ = {};
-    reply = step_reply_.get_future();
-    real_time_factor_.restart();
-  });
-  try {
-    return reply.get();
-  } catch (const std::future_error&) {
-    throw ended();
-  }
-}
-
-void SimulationThread::set_paused(bool paused) {
-  call([this, paused] {
-    if (steps_left_ > 0) throw std::runtime_error("a step is running: wait for it");
-    if (!paused && run_.blew_up) throw std::runtime_error(problem_);
-    if (paused == run_.paused) return;
-    run_.paused = paused;
-    resumed_ = !paused;
-    pace_->restart(WallClock::now());
-    real_time_factor_.restart();
-    update_status();
-  });
-}
-
-void SimulationThread::reset(std::unique_ptr<Simulation> simulation) {
-  // The old one is destroyed by the caller, not in the simulation's time.
-  call([&] {
-    std::swap(session_.simulation, simulation);
-    for (const auto& tool : *session_.tools) tool->rewind();
-    start_session();
-  });
-}
-
-void SimulationThread::replace(Session session) {
-  call([&] {
-    std::swap(session_, session);
-    start_session();
-  });
-}
-
-void SimulationThread::record_scene() {
-  call([this] { session_.publications->record_scene(); });
-}
-
-RunStatus SimulationThread::status() const {
-  const std::lock_guard<std::mutex> lock(mutex_);
-  return status_;
-}
-
-std::shared_ptr<ToolInputs> SimulationThread::tools() const {
-  const std::lock_guard<std::mutex> lock(mutex_);
-  return tools_;
-}
-
-std::set<std::string> SimulationThread::topics() const {
-  const std::lock_guard<std::mutex> lock(mutex_);
-  return topics_;
 }
 
 void SimulationThread::start_session() {
@@ -274,8 +167,8 @@ void SimulationThread::answer_cuts(std::vector<PendingCut>& cuts, const FrameRep
 
 void SimulationThread::answer_step(const char* interrupted) {
   if (std::exchange(steps_left_, 0) == 0) return;
-  step_reply_.set_value({false, interrupted, session_.simulation->frame(),
-                         session_.simulation->time()});
+  step_reply_.set_value(
+      {false, interrupted, session_.simulation->frame(), session_.simulation->time()});
 }
 
 void SimulationThread::fail(const std::string& problem) {

@@ -1,5 +1,5 @@
-// SimulationThread: owns the simulation and advances it against the wall clock. Everything else talks
-// to it between two frames, so nothing that is slow ever stops it.
+// SimulationThread: owns the simulation and advances it against the wall clock. Everything else
+// talks to it between two frames, so nothing that is slow ever stops it.
 #pragma once
 
 #include <condition_variable>
@@ -56,8 +56,8 @@ struct StepReply {
   double time = 0;
 };
 
-/// The public functions are for other threads. They wait until the simulation's thread has done what
-/// they ask, and throw std::runtime_error with the reason if it does not.
+/// The public functions are for other threads. They wait until the simulation's thread has done
+/// what they ask, and throw std::runtime_error with the reason if it does not.
 class SimulationThread {
  public:
   SimulationThread(Session session, const Parameters& parameters);

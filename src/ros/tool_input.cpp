@@ -16,7 +16,11 @@ std::uint64_t ToolInput::Counts::all_refused() const {
 ToolInput::ToolInput(const ros::NodeHandle& node, const std::string& tool,
                      const ToolParameters& source, const PoseLimits& limits, const Frames& frames,
                      Recorder& recorder)
-    : tool_(tool), tf_frame_(source.tf_frame), frames_(frames), recorder_(recorder), check_(limits) {
+    : tool_(tool),
+      tf_frame_(source.tf_frame),
+      frames_(frames),
+      recorder_(recorder),
+      check_(limits) {
   ros::NodeHandle handle(node);
   pose_topic_ = node.resolveName(tool + "/measured_cp");
   jaw_topic_ = node.resolveName(tool + "/jaw/measured_js");

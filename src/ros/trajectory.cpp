@@ -121,9 +121,8 @@ std::vector<TimedSample> load_trajectory(const std::string& path) {
 }
 
 TimedSample sample_at(const std::vector<TimedSample>& trajectory, double time) {
-  const auto after =
-      std::upper_bound(trajectory.begin(), trajectory.end(), time,
-                       [](double t, const TimedSample& s) { return t < s.time; });
+  const auto after = std::upper_bound(trajectory.begin(), trajectory.end(), time,
+                                      [](double t, const TimedSample& s) { return t < s.time; });
   TimedSample s = after == trajectory.begin() ? *after : *(after - 1);
   if (after != trajectory.begin() && after != trajectory.end()) {
     const double f = (time - s.time) / (after->time - s.time);

@@ -1,5 +1,5 @@
-// What comes in wrong: poses are refused and counted while the simulation goes on; a node that cannot
-// start says why in one line and exits non-zero.
+// What comes in wrong: poses are refused and counted while the simulation goes on; a node that
+// cannot start says why in one line and exits non-zero.
 #include <diagnostic_msgs/DiagnosticArray.h>
 #include <geometry_msgs/PoseStamped.h>
 #include <sensor_msgs/JointState.h>
@@ -71,15 +71,18 @@ class Poses : public testing::Test {
 
 TEST_F(Poses, NotFiniteIsRefused) {
   expect_refused("poses refused, not finite", [&] { probe_.send(at(kNan)); });
-  expect_refused("poses refused, not finite",
-                 [&] { probe_.send({home_.position, Quat(kNan, 0, 0, 0)}); });
+  expect_refused("poses refused, not finite", [&] {
+    probe_.send({home_.position, Quat(kNan, 0, 0, 0)});
+  });
 }
 
 TEST_F(Poses, QuaternionThatIsNoRotationIsRefused) {
-  expect_refused("poses refused, no rotation",
-                 [&] { probe_.send({home_.position, Quat(0, 0, 0, 0)}); });
-  expect_refused("poses refused, no rotation",
-                 [&] { probe_.send({home_.position, Quat(1, 1, 1, 1)}); });
+  expect_refused("poses refused, no rotation", [&] {
+    probe_.send({home_.position, Quat(0, 0, 0, 0)});
+  });
+  expect_refused("poses refused, no rotation", [&] {
+    probe_.send({home_.position, Quat(1, 1, 1, 1)});
+  });
 }
 
 TEST_F(Poses, OlderThanTheLastIsRefused) {
@@ -122,9 +125,9 @@ TEST_F(Poses, AnArmThatStaysAtItsNewPlaceIsPlacedThereWithoutSweeping) {
   double longest = 0;
   for (const auto& m : inputs_.all()) {
     if (!m->tools[1].present) continue;
-    longest = std::max(longest, (from_message(m->tools[1].end).position -
-                                 from_message(m->tools[1].begin).position)
-                                    .norm());
+    longest = std::max(
+        longest,
+        (from_message(m->tools[1].end).position - from_message(m->tools[1].begin).position).norm());
   }
   EXPECT_LT(longest, 1.0) << "it never swept there";
   EXPECT_EQ(refused("placed anew") > 0, true);
@@ -140,9 +143,9 @@ TEST_F(Poses, MovingDuringAPauseSweepsNothing) {
   EXPECT_TRUE(wait_until([&] { return is_at(at(0.3)); }));
   for (const auto& m : inputs_.all()) {
     if (!m->tools[1].present) continue;
-    ASSERT_LT((from_message(m->tools[1].end).position - from_message(m->tools[1].begin).position)
-                  .norm(),
-              0.09);  // 5 m/s for a frame
+    ASSERT_LT(
+        (from_message(m->tools[1].end).position - from_message(m->tools[1].begin).position).norm(),
+        0.09);  // 5 m/s for a frame
   }
 }
 
@@ -205,8 +208,7 @@ struct Ended {
 Ended run(const std::string& arguments) {
   const std::string node =
       (std::filesystem::read_symlink("/proc/self/exe").parent_path() / "simulator_node").string();
-  const std::string command =
-      "timeout 20 '" + node + "' __name:=broken " + arguments + " 2>&1";
+  const std::string command = "timeout 20 '" + node + "' __name:=broken " + arguments + " 2>&1";
   FILE* pipe = popen(command.c_str(), "r");
   Ended ended{-1, ""};
   char part[256];
@@ -232,8 +234,7 @@ TEST(Start, BadScenesAreRefusedWithTheField) {
                       "bodies[0].size is [0.04, -1, 0.02]");
   expect_cannot_start("'_scene:={cell_sice: 0.005, bodies: [{shape: box}]}'", "cell_sice");
   expect_cannot_start("_scene_file:=/nowhere.yaml", "/nowhere.yaml");
-  expect_cannot_start("'_scene:={bodies: [{shape: mesh, mesh: /nowhere.stl}]}'",
-                      "/nowhere.stl");
+  expect_cannot_start("'_scene:={bodies: [{shape: mesh, mesh: /nowhere.stl}]}'", "/nowhere.stl");
 }
 
 TEST(Start, BadParametersAreRefusedWithTheirName) {

@@ -1,6 +1,6 @@
-#include "ros/pace.h"
-
 #include <gtest/gtest.h>
+
+#include "ros/pace.h"
 
 namespace tissue_sim {
 namespace {

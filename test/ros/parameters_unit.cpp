@@ -1,10 +1,9 @@
-#include "ros/parameters.h"
-
 #include <gtest/gtest.h>
 
 #include <fstream>
 
 #include "geometry/mesh.h"
+#include "ros/parameters.h"
 #include "ros/xmlrpc_yaml.h"
 
 namespace tissue_sim {

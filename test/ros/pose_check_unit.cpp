@@ -1,8 +1,8 @@
-#include "ros/pose_check.h"
-
 #include <gtest/gtest.h>
 
 #include <limits>
+
+#include "ros/pose_check.h"
 
 namespace tissue_sim {
 namespace {

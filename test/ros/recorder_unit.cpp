@@ -1,5 +1,3 @@
-#include "ros/recorder.h"
-
 #include <gtest/gtest.h>
 #include <rosbag/view.h>
 #include <std_msgs/String.h>
@@ -10,6 +8,7 @@
 #include <random>
 #include <thread>
 
+#include "ros/recorder.h"
 #include "ros/recording_path.h"
 
 namespace tissue_sim {

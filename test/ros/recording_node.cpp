@@ -20,7 +20,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-StartRecording::Response start(const std::string& path, const std::vector<std::string>& topics = {}) {
+StartRecording::Response start(const std::string& path,
+                               const std::vector<std::string>& topics = {}) {
   StartRecording::Request request;
   request.path = path;
   request.topics = topics;
@@ -99,7 +100,8 @@ TEST_F(Recording, HoldsWhatWasPublishedMessageByMessage) {
   EXPECT_FALSE(fs::exists(path("whole")));
   for (int i = 0; i < 20; ++i) {
     ASSERT_EQ(step(2).frame, 3 + 2 * i);
-    ASSERT_TRUE(wait_until([&] { return clouds.last()->header.stamp == state.last()->header.stamp; }));
+    ASSERT_TRUE(
+        wait_until([&] { return clouds.last()->header.stamp == state.last()->header.stamp; }));
   }
   ASSERT_TRUE(call<Cut>("cut", plane_cut(0.001)).success);
   ASSERT_TRUE(wait_until([&] { return inputs.last()->frame == 41; }));

@@ -114,8 +114,8 @@ inline Cut::Request plane_cut(double x) {
 class Arm {
  public:
   explicit Arm(const std::string& tool) {
-    publisher_ = node_.advertise<geometry_msgs::PoseStamped>("/simulator/" + tool + "/measured_cp",
-                                                             100);
+    publisher_ =
+        node_.advertise<geometry_msgs::PoseStamped>("/simulator/" + tool + "/measured_cp", 100);
     EXPECT_TRUE(wait_until([&] { return publisher_.getNumSubscribers() > 0; })) << tool;
   }
   void send(const Pose& pose, const std::string& frame = "",
@@ -144,12 +144,12 @@ class Arm {
 }  // namespace tissue_sim
 
 /// main() of each of the test nodes.
-#define TISSUE_SIM_TEST_NODE(name)          \
-  int main(int argc, char** argv) {         \
-    testing::InitGoogleTest(&argc, argv);   \
-    ros::init(argc, argv, name);            \
-    ros::NodeHandle node;                   \
-    ros::AsyncSpinner spinner(2);           \
-    spinner.start();                        \
-    return RUN_ALL_TESTS();                 \
+#define TISSUE_SIM_TEST_NODE(name)        \
+  int main(int argc, char** argv) {       \
+    testing::InitGoogleTest(&argc, argv); \
+    ros::init(argc, argv, name);          \
+    ros::NodeHandle node;                 \
+    ros::AsyncSpinner spinner(2);         \
+    spinner.start();                      \
+    return RUN_ALL_TESTS();               \
   }

@@ -1,8 +1,8 @@
-#include "ros/trajectory.h"
-
 #include <gtest/gtest.h>
 
 #include <fstream>
+
+#include "ros/trajectory.h"
 
 namespace tissue_sim {
 namespace {
@@ -23,9 +23,9 @@ std::string error_of(const std::string& text, const char* ending = ".csv") {
 }
 
 TEST(Trajectory, InterpolatesBetweenSamples) {
-  const auto t = load_trajectory(
-      written("t,x,y,z,qx,qy,qz,qw,jaw\n0,0,0,0,0,0,0,1,0\n# a comment\n\n"
-              "2,1,2,4,0,0,0.70710678,0.70710678,0.5\r\n"));
+  const auto t =
+      load_trajectory(written("t,x,y,z,qx,qy,qz,qw,jaw\n0,0,0,0,0,0,0,1,0\n# a comment\n\n"
+                              "2,1,2,4,0,0,0.70710678,0.70710678,0.5\r\n"));
   ASSERT_EQ(t.size(), 2u);
   const TimedSample s = sample_at(t, 0.5);
   EXPECT_NEAR((s.pose.position - Vec3(0.25, 0.5, 1)).norm(), 0, 1e-12);

@@ -43,7 +43,7 @@ class CutTest : public testing::Test {
     return m ? *m : FragmentArray();
   }
 
-  // Two halves at the plane x = 0.001: which lies between two layers of points, in the middle.
+  // Two halves at the plane x = 0, midway between two layers of points.
   void expect_halves(const std::map<std::uint32_t, Point>& before) {
     const FragmentArray pieces = fragments();
     ASSERT_EQ(pieces.fragments.size(), 2u);
@@ -63,7 +63,7 @@ class CutTest : public testing::Test {
     ASSERT_EQ(after.size(), before.size());
     int damaged = 0;
     for (const auto& p : after) {
-      ASSERT_EQ(p.second.fragment, before.at(p.first).x < 0.001 ? 0 : 1);
+      ASSERT_EQ(p.second.fragment, before.at(p.first).x < 0 ? 0 : 1);
       damaged += p.second.damage > 0;
     }
     EXPECT_GT(damaged, 0);
@@ -77,14 +77,14 @@ class CutTest : public testing::Test {
 TEST_F(CutTest, ServiceCutsInTwo) {
   const auto before = cloud();
   ASSERT_EQ(before.size(), 1024u);
-  const Cut::Response reply = call<Cut>("cut", plane_cut(0.001));
+  const Cut::Response reply = call<Cut>("cut", plane_cut(0));
   ASSERT_TRUE(reply.success) << reply.message;
   EXPECT_GT(reply.points_separated, 100);
   ASSERT_EQ(reply.new_fragments.size(), 1u);
   EXPECT_EQ(reply.new_fragments[0], 1);
   expect_halves(before);
 
-  const Cut::Response again = call<Cut>("cut", plane_cut(0.001));
+  const Cut::Response again = call<Cut>("cut", plane_cut(0));
   EXPECT_FALSE(again.success) << "it is cut already";
 }
 
@@ -92,7 +92,7 @@ TEST_F(CutTest, LoosePointsHaveTheirOwnCloud) {
   Topic<sensor_msgs::PointCloud2> loose("/simulator/fragments/points");
   ASSERT_TRUE(loose.next());
   EXPECT_EQ(loose.last()->width, 0u);
-  ASSERT_TRUE(call<Cut>("cut", plane_cut(0.001)).success);
+  ASSERT_TRUE(call<Cut>("cut", plane_cut(0)).success);
   step(1);
   ASSERT_TRUE(loose.next());
   ASSERT_EQ(loose.last()->width, 512u);
@@ -102,7 +102,7 @@ TEST_F(CutTest, LoosePointsHaveTheirOwnCloud) {
 TEST_F(CutTest, ScalpelCutsInTwo) {
   const auto before = cloud();
   Arm scalpel("scalpel");
-  const Pose from = blade_pose(0.001, -0.025, -0.004), to = blade_pose(0.001, 0.025, -0.004);
+  const Pose from = blade_pose(0, -0.025, -0.004), to = blade_pose(0, 0.025, -0.004);
   pause(false);
   ros::WallDuration(0.3).sleep();
   // Wherever a test before left it, it must not cut on its way here.
@@ -122,8 +122,8 @@ TEST_F(CutTest, ScalpelCutsInTwo) {
 }
 
 TEST_F(CutTest, HalfWayItStaysOnePiece) {
-  Cut::Request half = plane_cut(0.001);
-  half.path[1] = to_pose(blade_pose(0.001, 0.0, -0.01));
+  Cut::Request half = plane_cut(0);
+  half.path[1] = to_pose(blade_pose(0, 0.0, -0.01));
   const Cut::Response reply = call<Cut>("cut", half);
   ASSERT_TRUE(reply.success) << reply.message;
   EXPECT_GT(reply.points_separated, 0);
@@ -154,7 +154,7 @@ TEST_F(CutTest, PathMayBeInAnyFrame) {
   t.transform = to_transform({Vec3(0.5, 0.2, 0.1), Quat::Identity()});
   broadcaster.sendTransform(t);
   const auto before = cloud();
-  Cut::Request request = plane_cut(0.001);
+  Cut::Request request = plane_cut(0);
   request.header.frame_id = "camera";
   for (auto& pose : request.path) {
     pose.position.x -= 0.5, pose.position.y -= 0.2, pose.position.z -= 0.1;

@@ -1,6 +1,7 @@
 #include "ros/node.h"
 
 #include <ros/console.h>
+#include <ros/time.h>
 
 #include <vector>
 
@@ -29,6 +30,9 @@ Node::Node(const ros::NodeHandle& node)
       frames_(parameters_.world_frame, parameters_.tf_tolerance),
       pose_spinner_(1, &pose_queue_),
       service_spinner_(kServiceThreads, &service_queue_) {
+  if (ros::Time::isSimTime()) {
+    ROS_WARN("/use_sim_time is set: messages carry the time of /clock, frames keep to the wall's");
+  }
   const Scene scene = read_scene_parameters(node);
   Parameters first = parameters_;
   const RecordRequest record = record_request(parameters_.record);

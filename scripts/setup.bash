@@ -79,7 +79,7 @@ install() {
     if apt-cache show ros-noetic-roscpp >/dev/null 2>&1; then
       mapfile -t missing < <(missing_of "${core_packages[@]}" "${noetic_packages[@]}" \
         "${picture_packages[@]}" "$@")
-    elif ! apt-cache show libroscpp-dev >/dev/null 2>&1; then
+    elif ! apt-cache show libdiagnostic-updater-dev >/dev/null 2>&1; then
       fail "apt knows no ROS 1 here. On Debian 12 it is in main; on Ubuntu 20.04 add its source:" \
         "https://wiki.ros.org/noetic/Installation/Ubuntu (steps 1.2 and 1.3). Then run this again"
     fi

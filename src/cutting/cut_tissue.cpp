@@ -132,10 +132,12 @@ void take_apart(MpmState& state, const std::vector<std::int32_t>& changed) {
   const std::vector<NodeFields::Cell> cells =
       state.fields->update(state.bodies, state.points, changed, state.nodes, *state.cpu);
   if (cells.empty()) return;
+  keep_face_contacts(state);
   update_blocks(state.blocks, state.bodies, state.points, *state.fields, cells,
                 static_cast<int>(state.nodes.size()), *state.cpu);
   state.force.resize(state.blocks.force_size);
   list_contacts(state);
+  list_facets(state);
 }
 
 }  // namespace tissue_sim

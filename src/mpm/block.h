@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "compute/array.h"
+#include "contact/facets.h"
 #include "tissue_sim/material.h"
 
 namespace tissue_sim {
@@ -42,6 +43,8 @@ struct Block {
 
   std::vector<std::int32_t>
       node;  ///< [nz + 2][plane], in Nodes; split ones as this block sees them
+
+  std::vector<Facet> facets;  ///< its surface and cut faces
 
   std::size_t force_offset = 0;  ///< of this block's [3][nz + 2][plane] in the force buffer
 

@@ -79,7 +79,9 @@ void fill_region(BlockRegion& r, const std::vector<LatticeBody>& bodies, const P
   r.blocks.clear();
   const LatticeBody& b = bodies[r.body];
   for (const Sheet& sheet : sheets_of(r, b, points, fields)) {
-    if (!sheet.points.empty()) r.blocks.push_back(make_block(r, b, points, sheet));
+    if (sheet.points.empty()) continue;
+    r.blocks.push_back(make_block(r, b, points, sheet));
+    r.blocks.back().facets = facets_of(b, points, r.blocks.back());
   }
 }
 

@@ -17,6 +17,7 @@ std::unique_ptr<MpmState> make_mpm_state(const Scene& scene, std::vector<std::st
   state->contacts.with.assign(state->points.size(), 0);
   state->contacts.hold.assign(3 * static_cast<std::size_t>(state->points.size()), 0.0f);
   list_contacts(*state);
+  list_facets(*state);
   state->instructions = instruction_set();
   state->kernels = &block_kernels(state->instructions);
   state->cpu = std::make_unique<Cpu>(scene.threads);
@@ -77,12 +78,17 @@ void substep(MpmState& state, float dt, std::vector<ColliderLoad>& loads) {
   const int block_count = static_cast<int>(blocks.all.size());
   const std::size_t collider_count = state.colliders.size();
   state.block_loads.resize(block_count);
+  FaceContacts& faces = state.faces;
+  state.cpu->for_each(
+      static_cast<int>(faces.active.size()),
+      [&](int i) { push_faces(state, faces.all[faces.active[i]], dt); }, 32);
   state.cpu->for_each(block_count, [&](int i) {
     const Block& block = *blocks.all[i];
     float* force = state.force.data() + block.force_offset;
     state.kernels->forces(block, block_field(state, block), state.scratch.local(), force);
     state.block_loads[i].assign(collider_count, {});
     add_contact(state, i, force, state.block_loads[i]);
+    if (!faces.active.empty()) add_face_contacts(state, i, force);
   });
   for (const auto& of_block : state.block_loads) {
     for (std::size_t c = 0; c < of_block.size(); ++c) {

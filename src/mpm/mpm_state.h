@@ -10,6 +10,7 @@
 
 #include "compute/for_each.h"
 #include "contact/collider.h"
+#include "contact/face_contact.h"
 #include "cutting/node_fields.h"
 #include "mpm/block_kernels.h"
 #include "mpm/blocks.h"
@@ -49,6 +50,7 @@ struct MpmState {
   Array<float> u_before[3];  ///< displacements when the frame began, where a blade may cut [m]
   std::vector<BlockMotion> motion;  ///< per block, as of the last measure_motion()
   Contacts contacts;
+  FaceContacts faces;
   std::vector<Collider> colliders;
   std::vector<std::vector<ColliderLoad>> block_loads;  ///< per block, per collider
 

@@ -60,6 +60,7 @@ void MpmTissue::advance(int substeps, float dt, const FrameInput& input) {
   for (int i = 0; i < substeps; ++i) {
     s.colliders = colliders_at(s.scene, input, (i + 1.0) / substeps, duration);
     std::vector<ColliderLoad> loads(s.colliders.size());
+    find_face_contacts(s, pieces_, dt);
     substep(s, dt, loads);
     for (std::size_t c = 1; c < loads.size(); ++c) {
       ToolLoad& load = result_.loads[c - 1];

@@ -25,6 +25,7 @@ class MpmTissue final : public Tissue {
   const std::vector<std::string>& notes() const override { return notes_; }
 
   int fragment_of(int point) const { return pieces_.of_point[point]; }
+  const Pieces& pieces() const { return pieces_; }
   MpmState& state() { return *state_; }  ///< for tests and the benchmark
 
  private:

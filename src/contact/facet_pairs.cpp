@@ -1,0 +1,95 @@
+#include "contact/facet_pairs.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace tissue_sim {
+namespace {
+
+// Normals that are less than some 100 degrees apart belong to one surface.
+constexpr float kFacing = -0.2f;
+
+struct GridBox {
+  int min[3], max[3];
+};
+
+}  // namespace
+
+std::vector<std::pair<std::int32_t, std::int32_t>> facing_pairs(
+    const std::vector<FacetMotion>& facets, const std::vector<float>& reach, float grid) {
+  const auto count = static_cast<std::int32_t>(facets.size());
+  std::vector<GridBox> boxes(count);
+  std::size_t entry_count = 0;
+  for (std::int32_t f = 0; f < count; ++f) {
+    std::size_t cells = 1;
+    for (int a = 0; a < 3; ++a) {
+      boxes[f].min[a] = static_cast<int>(std::floor((facets[f].x[a] - reach[f]) / grid));
+      boxes[f].max[a] = static_cast<int>(std::floor((facets[f].x[a] + reach[f]) / grid));
+      cells *= boxes[f].max[a] - boxes[f].min[a] + 1;
+    }
+    entry_count += cells;
+  }
+  // Facets by bucket of a hash table of grid cells, counted first.
+  struct Entry {
+    int x, y, z;
+    std::int32_t facet;
+  };
+  std::uint32_t mask = 1;
+  while (mask < 2 * entry_count) mask *= 2;
+  --mask;
+  const auto bucket = [mask](int x, int y, int z) {
+    const std::uint32_t h = static_cast<std::uint32_t>(x) * 73856093u ^
+                            static_cast<std::uint32_t>(y) * 19349663u ^
+                            static_cast<std::uint32_t>(z) * 83492791u;
+    return (h ^ h >> 15) & mask;
+  };
+  const auto for_each_cell = [&boxes](std::int32_t f, const auto& visit) {
+    for (int z = boxes[f].min[2]; z <= boxes[f].max[2]; ++z) {
+      for (int y = boxes[f].min[1]; y <= boxes[f].max[1]; ++y) {
+        for (int x = boxes[f].min[0]; x <= boxes[f].max[0]; ++x) visit(x, y, z);
+      }
+    }
+  };
+  std::vector<std::int32_t> first(mask + 2, 0);
+  std::vector<Entry> entries(entry_count);
+  for (std::int32_t f = 0; f < count; ++f) {
+    for_each_cell(f, [&](int x, int y, int z) { ++first[bucket(x, y, z) + 1]; });
+  }
+  for (std::size_t i = 1; i < first.size(); ++i) first[i] += first[i - 1];
+  std::vector<std::int32_t> next(first.begin(), first.end() - 1);
+  for (std::int32_t f = 0; f < count; ++f) {
+    for_each_cell(f, [&](int x, int y, int z) { entries[next[bucket(x, y, z)]++] = {x, y, z, f}; });
+  }
+  std::vector<std::pair<std::int32_t, std::int32_t>> pairs;
+  for (std::uint32_t b = 0; b <= mask; ++b) {
+    for (std::int32_t i = first[b]; i < first[b + 1]; ++i) {
+      const Entry& e = entries[i];
+      const FacetMotion& f = facets[e.facet];
+      for (std::int32_t j = i + 1; j < first[b + 1]; ++j) {
+        const Entry& o = entries[j];
+        const FacetMotion& g = facets[o.facet];
+        if (f.normal[0] * g.normal[0] + f.normal[1] * g.normal[1] + f.normal[2] * g.normal[2] >
+            kFacing) {
+          continue;
+        }
+        if (e.x != o.x || e.y != o.y || e.z != o.z) continue;
+        const float far = reach[e.facet] + reach[o.facet];
+        if (!(std::fabs(f.x[0] - g.x[0]) < far && std::fabs(f.x[1] - g.x[1]) < far &&
+              std::fabs(f.x[2] - g.x[2]) < far)) {
+          continue;
+        }
+        // Of the grid cells that both boxes reach into, the lowest one says so.
+        const GridBox &p = boxes[e.facet], &q = boxes[o.facet];
+        if (e.x != std::max(p.min[0], q.min[0]) || e.y != std::max(p.min[1], q.min[1]) ||
+            e.z != std::max(p.min[2], q.min[2])) {
+          continue;
+        }
+        pairs.emplace_back(std::min(e.facet, o.facet), std::max(e.facet, o.facet));
+      }
+    }
+  }
+  std::sort(pairs.begin(), pairs.end());
+  return pairs;
+}
+
+}  // namespace tissue_sim

@@ -1,0 +1,17 @@
+// Facet pairs: which facets may meet within a while.
+#pragma once
+
+#include <cstdint>
+#include <utility>
+#include <vector>
+
+#include "contact/facet_motion.h"
+
+namespace tissue_sim {
+
+/// Pairs (lower number first, sorted) of facets that face one another and whose swept boxes of half
+/// size `reach` around their places overlap. `grid` is the hash grid's cell [m].
+std::vector<std::pair<std::int32_t, std::int32_t>> facing_pairs(
+    const std::vector<FacetMotion>& facets, const std::vector<float>& reach, float grid);
+
+}  // namespace tissue_sim

@@ -1,0 +1,191 @@
+#include "contact/facets.h"
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "cutting/bonds.h"
+#include "mpm/block.h"
+#include "mpm/lattice_body.h"
+
+namespace tissue_sim {
+namespace {
+
+using Place = std::array<int, 3>;  // a site of the lattice
+
+enum class End { kNone, kCut, kOuter };
+
+/// How tissue ends between a site and the next along `axis`: their bond is broken, or one is empty.
+End end_at(const LatticeBody& body, const Points& points, Place lower, int axis) {
+  const int p = body.point(lower[0], lower[1], lower[2]);
+  ++lower[axis];
+  const int q = body.point(lower[0], lower[1], lower[2]);
+  if (p < 0 && q < 0) return End::kNone;
+  if (p < 0 || q < 0) return End::kOuter;
+  return (points.bonds[p] >> (kForwardBond + axis) & 1) == 0 ? End::kCut : End::kNone;
+}
+
+/// How many sites above or below `lower` tissue ends next in that way, within two; 9 where it does
+/// not, or in both directions.
+int nearest_end(const LatticeBody& body, const Points& points, const Place& lower, int axis,
+                End end) {
+  if (end_at(body, points, lower, axis) == end) return 0;
+  for (int m = 1; m <= 2; ++m) {
+    Place up = lower, down = lower;
+    up[axis] += m;
+    down[axis] -= m;
+    const bool above = end_at(body, points, up, axis) == end,
+               below = end_at(body, points, down, axis) == end;
+    if (above || below) return above && below ? 9 : above ? m : -m;
+  }
+  return 9;
+}
+
+struct Plane {
+  double height = 0, slope[2] = {};  // at the middle of the cell's columns; per cell
+};
+
+/// The plane through the ends of the 4 x 4 columns around a cell's 2 x 2 that fits best. `lower` is
+/// the site below the facet in the cell's first column.
+Plane fit(const LatticeBody& body, const Points& points, const Place& lower, int axis,
+          const int (&lateral)[2], End how) {
+  Eigen::Matrix3d normal = Eigen::Matrix3d::Zero();
+  Eigen::Vector3d right = Eigen::Vector3d::Zero();
+  normal(1, 1) = normal(2, 2) = 1e-2;  // a row of columns is level across
+  for (int b = -1; b <= 2; ++b) {
+    for (int a = -1; a <= 2; ++a) {
+      Place column = lower;
+      column[lateral[0]] += a;
+      column[lateral[1]] += b;
+      const int end = nearest_end(body, points, column, axis, how);
+      if (end == 9) continue;
+      const Eigen::Vector3d row(1, 0.5 * (a - 0.5), 0.5 * (b - 0.5));
+      normal += row * row.transpose();
+      right += 0.5 * end * row;
+    }
+  }
+  const Eigen::Vector3d c = normal.ldlt().solve(right);
+  return {c[0], {std::clamp(c[1], -2.0, 2.0), std::clamp(c[2], -2.0, 2.0)}};
+}
+
+Facet make_facet(const LatticeBody& body, const Points& points, int cell, const Place& corner,
+                 int direction, int level, const std::int32_t (&around)[8], unsigned members,
+                 End how) {
+  const BondOffset o = bond_offset(direction);
+  const int axis = o.x != 0 ? 0 : o.y != 0 ? 1 : 2, sign = o.x + o.y + o.z;
+  const int lateral[2] = {(axis + 1) % 3, (axis + 2) % 3};
+  Place lower = corner;
+  lower[axis] += sign > 0 ? level : level - 1;
+  const Plane plane = fit(body, points, lower, axis, lateral, how);
+  Facet f;
+  f.point = points.size();
+  f.cell = cell;
+  f.direction = static_cast<std::uint8_t>(direction);
+  double low[2] = {1, 1}, high[2] = {-1, -1}, middle[2] = {};
+  int count = 0;
+  for (int s = 0; s < 8; ++s) {
+    if ((members >> s & 1) == 0) continue;
+    f.point = std::min(f.point, around[s]);
+    ++count;
+    for (int l = 0; l < 2; ++l) {
+      const double at = s >> lateral[l] & 1 ? 0.25 : -0.25;
+      low[l] = std::min(low[l], at - 0.25);
+      high[l] = std::max(high[l], at + 0.25);
+      middle[l] += at;
+    }
+  }
+  const double face = 0.5 * (level - 1) + (sign > 0 ? 0.5 : 0.0);
+  double height = plane.height;
+  for (int l = 0; l < 2; ++l) {
+    middle[l] /= count;
+    height += plane.slope[l] * middle[l];
+    f.center[lateral[l]] = static_cast<float>(middle[l]);
+    f.extent[lateral[l]] = static_cast<float>(0.5 * (high[l] - low[l]));
+  }
+  f.center[axis] = static_cast<float>(face + std::clamp(height, -0.4, 0.4));
+  f.extent[axis] = 0;
+  Vec3 n = Vec3::Zero();
+  n[axis] = sign;
+  for (int l = 0; l < 2; ++l) n[lateral[l]] = -sign * plane.slope[l];
+  n.normalize();
+  for (int a = 0; a < 3; ++a) f.normal[a] = static_cast<float>(n[a]);
+  f.area = static_cast<float>(count * 0.25 * body.cell_size * body.cell_size * std::fabs(n[axis]));
+  return f;
+}
+
+/// Takes the facets of one cell that belong to one face together, from `first` on.
+void merge(std::vector<Facet>& facets, std::size_t first) {
+  constexpr float kOneFace = 0.5f;    // cosine between normals
+  constexpr float kOneLayer = 0.25f;  // [cells] along the normal; points are half a cell apart
+  for (std::size_t i = first; i < facets.size(); ++i) {
+    for (std::size_t j = i + 1; j < facets.size();) {
+      Facet &f = facets[i], g = facets[j];
+      float cosine = 0, off = 0;
+      for (int a = 0; a < 3; ++a) {
+        cosine += f.normal[a] * g.normal[a];
+        off += f.normal[a] * (g.center[a] - f.center[a]);
+      }
+      if (cosine < kOneFace || std::fabs(off) > kOneLayer) {
+        ++j;
+        continue;
+      }
+      const float area = f.area + g.area;
+      float length = 0;
+      for (int a = 0; a < 3; ++a) {
+        const float low = std::min(f.center[a] - f.extent[a], g.center[a] - g.extent[a]);
+        const float high = std::max(f.center[a] + f.extent[a], g.center[a] + g.extent[a]);
+        f.center[a] = (f.area * f.center[a] + g.area * g.center[a]) / area;
+        f.extent[a] = std::max(high - f.center[a], f.center[a] - low);
+        f.normal[a] = (f.area * f.normal[a] + g.area * g.normal[a]) / area;
+        length += f.normal[a] * f.normal[a];
+      }
+      for (float& n : f.normal) n /= std::sqrt(length);
+      f.area = area;
+      if (g.point < f.point) {
+        f.point = g.point;
+        f.direction = g.direction;
+      }
+      facets.erase(facets.begin() + static_cast<std::ptrdiff_t>(j));
+    }
+  }
+}
+
+}  // namespace
+
+std::vector<Facet> facets_of(const LatticeBody& body, const Points& points, const Block& block) {
+  std::vector<Facet> facets;
+  for (int z = 0; z < block.nz; ++z) {
+    for (int y = 0; y < block.ny; ++y) {
+      for (int x = 0; x < block.nx; ++x) {
+        std::int32_t around[8];
+        unsigned missing[2][kBondCount] = {};  // the cell's points without a bond: cut, never had
+        for (int s = 0; s < 8; ++s) {
+          around[s] = block.point[(static_cast<std::size_t>(z) * 8 + s) * block.stride +
+                                  y * block.pitch + x];
+          if (around[s] < 0 || points.bonds[around[s]] == kAllBonds) continue;
+          const unsigned had = whole_bonds(body, points.site[around[s]]);
+          for (int k = 0; k < kBondCount; ++k) {
+            if ((points.bonds[around[s]] >> k & 1) == 0) missing[~had >> k & 1][k] |= 1u << s;
+          }
+        }
+        const Place corner = {2 * (block.x + x), 2 * (block.y + y), 2 * (block.z + z)};
+        const int cell = z * block.plane + y * block.pitch + x;
+        const std::size_t first = facets.size();
+        for (int i = 0; i < 4 * kBondCount; ++i) {
+          constexpr unsigned kUpper[3] = {0xaa, 0xcc, 0xf0};  // points above along x, y, z
+          const int outer = i / 2 % 2, level = i % 2, k = i / 4;
+          const int axis = k < kForwardBond ? kForwardBond - 1 - k : k - kForwardBond;
+          const unsigned members = missing[outer][k] & (level == 1 ? kUpper[axis] : ~kUpper[axis]);
+          if (members == 0) continue;
+          facets.push_back(make_facet(body, points, cell, corner, k, level, around, members,
+                                      outer == 1 ? End::kOuter : End::kCut));
+        }
+        merge(facets, first);
+      }
+    }
+  }
+  return facets;
+}
+
+}  // namespace tissue_sim

@@ -40,23 +40,31 @@ void push_faces(const MpmState& state, FaceContact& c, float dt) {
   const bool touched = c.touching;
   c.touching = depth > 0;
   if (!c.touching) return;
-  float aside[3];
-  for (int a = 0; a < 3; ++a) aside[a] = apart[a] + depth * c.normal[a];
-  const float slip = std::sqrt(dot(aside, aside)), limit = touched ? c.friction * depth : 0.0f;
+  if (!touched && depth > c.sudden) {  // out of the blue: the next look will tell
+    c.touching = false;
+    return;
+  }
+  // What it is held by slides along, so that the spring stays in the friction cone; at the first
+  // touch there is no spring along the face.
+  float slide[3];
+  for (int a = 0; a < 3; ++a) slide[a] = apart[a] + depth * c.normal[a];
+  const float slip = std::sqrt(dot(slide, slide)), limit = touched ? c.friction * depth : 0.0f;
   if (slip > limit) {
-    // What it is held by slides along, on the cone or, when it touches for the first time, below.
     float place[3];
     for (int a = 0; a < 3; ++a) {
-      place[a] = c.hold[a] + (1 - limit / slip) * dot(c.to_reference + 3 * a, aside);
+      place[a] = c.hold[a] + (1 - limit / slip) * dot(c.to_reference + 3 * a, slide);
     }
     hold_at(state, c, place);
     measure_apart(state, c, c.apart);
   }
+  if (!holds(c, body_of(state, c.other).cell_size)) {
+    c.touching = false;
+    return;
+  }
   const float length = std::sqrt(dot(c.apart, c.apart));
   if (!(length > 0)) return;
   // Along the line between the two material places, and only apart.
-  const float push =
-      std::max(0.0f, c.stiffness * length + c.damping * dot(rate, c.apart) / length);
+  const float push = std::max(0.0f, c.stiffness * length + c.damping * dot(rate, c.apart) / length);
   for (int a = 0; a < 3; ++a) c.force[a] = -push / length * c.apart[a];
 }
 

@@ -30,6 +30,7 @@ struct FaceContact {
   float normal[3];                     ///< of the other face, in the world
   float to_reference[9];               ///< inverse of its deformation gradient over the cell [1/m]
   float stiffness, damping, friction;  ///< [N/m], [N s/m], [-]
+  float sudden;                        ///< depth at which nothing can be from one substep [m]
   float force[3];                      ///< on the facet [N]
 };
 
@@ -51,9 +52,10 @@ struct FaceContacts {
   std::vector<std::int32_t> first_near;   ///< CSR over `all`: those others
   std::vector<std::int32_t> near;
   std::vector<std::int32_t> active;  ///< contacts that touch, or may before the next look
-  /// Per block, CSR: active contacts, as 2 * contact, plus one where the block holds the other face.
+  /// Per block, CSR: active contacts, as 2 * contact, plus one where the block holds the other
+  /// face.
   std::vector<std::int32_t> first_of_block, of_block;
-  std::vector<KeptContact> kept;                               ///< sorted by point and direction
+  std::vector<KeptContact> kept;                            ///< sorted by point and direction
   double until_search = 0, until_look = 0, since_look = 0;  ///< [s]
 };
 

@@ -1,14 +1,14 @@
 // Facets by their number, and the material places that contacts hold on to.
 #pragma once
 
+#include <cmath>
+
 #include "contact/face_contact.h"
 #include "mpm/mpm_state.h"
 
 namespace tissue_sim {
 
-inline float dot(const float* a, const float* b) {
-  return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-}
+inline float dot(const float* a, const float* b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
 
 inline const Block& block_of(const MpmState& s, std::int32_t facet) {
   return *s.blocks.all[s.faces.block_of[facet]];
@@ -40,6 +40,14 @@ inline void measure_apart(const MpmState& s, const FaceContact& c, float (&apart
   value_at(s.nodes.u, c.nodes, c.weights, u);
   value_at(s.nodes.u, c.other_nodes, c.other_weights, other);
   for (int a = 0; a < 3; ++a) apart[a] = c.between[a] + (u[a] - other[a]);
+}
+
+/// Whether the place held is still on the other face: near its cell, and not far from the facet.
+inline bool holds(const FaceContact& c, double cell_size) {
+  constexpr float kFarthest = 1.25f;  // [cells]
+  const auto far = static_cast<float>(0.75 * cell_size);
+  return dot(c.apart, c.apart) < far * far && std::fabs(c.hold[0]) < kFarthest &&
+         std::fabs(c.hold[1]) < kFarthest && std::fabs(c.hold[2]) < kFarthest;
 }
 
 }  // namespace tissue_sim

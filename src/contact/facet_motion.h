@@ -56,16 +56,17 @@ inline void value_at(const Array<float>* field, const CellNodes& nodes, const Ax
 
 /// How a facet stands.
 struct FacetMotion {
-  float x[3], v[3];        ///< of its centre [m], [m/s]
-  float normal[3];         ///< unit, outward, in the world
-  float to_reference[9];   ///< inverse of the deformation gradient, row-major
+  float x[3], v[3];       ///< of its centre [m], [m/s]
+  float normal[3];        ///< unit, outward, in the world
+  float to_reference[9];  ///< inverse of the deformation gradient, row-major
 };
 
 /// Reference place of a facet's centre [m].
 Vec3 reference_place(const LatticeBody& body, const Block& block, const Facet& facet);
 
 /// Reference place of a place given in cells from the middle of a facet's cell [m].
-Vec3 reference_place(const LatticeBody& body, const Block& block, int cell, const float (&place)[3]);
+Vec3 reference_place(const LatticeBody& body, const Block& block, int cell,
+                     const float (&place)[3]);
 
 FacetMotion facet_motion(const LatticeBody& body, const Block& block, const Facet& facet,
                          const Nodes& nodes);

@@ -136,7 +136,7 @@ void merge(std::vector<Facet>& facets, std::size_t first) {
         const float low = std::min(f.center[a] - f.extent[a], g.center[a] - g.extent[a]);
         const float high = std::max(f.center[a] + f.extent[a], g.center[a] + g.extent[a]);
         f.center[a] = (f.area * f.center[a] + g.area * g.center[a]) / area;
-        f.extent[a] = std::max(high - f.center[a], f.center[a] - low);
+        f.extent[a] = std::min(0.5f, std::max(high - f.center[a], f.center[a] - low));
         f.normal[a] = (f.area * f.normal[a] + g.area * g.normal[a]) / area;
         length += f.normal[a] * f.normal[a];
       }

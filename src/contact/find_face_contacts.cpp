@@ -4,6 +4,7 @@
 #include "contact/collider.h"
 #include "contact/face_places.h"
 #include "contact/facet_pairs.h"
+#include "cutting/bonds.h"
 #include "fragments/pieces.h"
 
 namespace tissue_sim {
@@ -15,15 +16,17 @@ namespace {
 constexpr float kSearch = 0.75f;  ///< half size of the box in which a facet looks for others
 constexpr float kNear = 0.25f;    ///< gap up to which a contact is worked on in each substep
 constexpr float kDeepest = 0.375f;
-constexpr float kDeeper = 0.25f;      ///< by how much more it may be in another that takes over
-constexpr float kSame = 0.02f;        ///< thinner than any slice
-constexpr float kBeyond = 0.25f;      ///< how far beyond its edge a facet still catches
-constexpr float kStay = 0.1f;         ///< by how much another facet must fit better to take over
-constexpr float kMoved = 0.1f;        ///< motion between two looks
-constexpr int kLongest = 16;          ///< substeps between two looks
-constexpr float kLargestReach = 4;    ///< of what moves fast; the next search follows sooner
+constexpr float kDeeper = 0.25f;    ///< by how much more it may be in another that takes over
+constexpr float kBeyond = 0.25f;    ///< how far beyond its edge a facet still catches
+constexpr float kFolded = -0.5f;    ///< cosine between the normals of a piece that touches itself
+constexpr float kFarthest = 2;      ///< from the centre of the facet that catches it
+constexpr float kStay = 0.1f;       ///< by how much another facet must fit better to take over
+constexpr double kStable = 0.35;    ///< stiffness * dt^2 / mass, at most
+constexpr float kMoved = 0.1f;      ///< motion between two looks
+constexpr int kLongest = 16;        ///< substeps between two looks
+constexpr float kLargestReach = 4;  ///< of what moves fast; the next search follows sooner
 constexpr double kHorizon = 1.0 / 60;  ///< between two searches [s]
-constexpr float kRough = 0.1f;  ///< by how much fitted faces may be off
+constexpr float kRough = 0.1f;         ///< by how much fitted faces may be off
 constexpr double kSettle = 0.02;  ///< in which what began deeper than that gets its spring back [s]
 
 FacetMotion motion_of(const MpmState& s, std::int32_t facet) {
@@ -61,72 +64,82 @@ Seen seen_by(const MpmState& s, const FacetMotion& f, std::int32_t other) {
   return seen;
 }
 
-/// Whether the tissue that another facet sees at a place below it is the facet's own, as for the back
-/// of a slice: then the place is the facet's, too. Of tissue that has come there it is `depth` away.
-bool is_itself(const MpmState& s, std::int32_t facet, std::int32_t other, const Seen& seen) {
-  if (block_of(s, facet).body != block_of(s, other).body || seen.depth < kSame) return false;
-  const Vec3 there =
-      reference_place(body_of(s, other), block_of(s, other), facet_of(s, other).cell, seen.place);
-  const Vec3 own = reference_place(body_of(s, facet), block_of(s, facet), facet_of(s, facet));
-  return (there - own).norm() < 0.5 * seen.depth * body_of(s, facet).cell_size;
-}
-
 /// The facet to touch among those near contact `i`, -1 if none.
 std::int32_t choose_other(const MpmState& s, int i) {
   const FaceContacts& faces = s.faces;
   const FaceContact& c = faces.all[i];
   const float deepest = c.touching ? std::max(kDeepest, c.depth + kDeeper) : kDeepest;
+  if (c.touching && c.other >= 0) {
+    const Seen seen = seen_by(s, faces.motion[c.facet], c.other);
+    if (seen.beyond < 0 && seen.depth < deepest) return c.other;
+  }
+  const float* x = faces.motion[c.facet].x;
+  const auto far = static_cast<float>(kFarthest * s.scene.cell_size);
   float best = kBeyond;
   std::int32_t other = -1;
   for (std::int32_t n = faces.first_near[i]; n < faces.first_near[i + 1]; ++n) {
+    const float* y = faces.motion[faces.near[n]].x;
+    const float d[3] = {x[0] - y[0], x[1] - y[1], x[2] - y[2]};
+    if (dot(d, d) > far * far) continue;
     const Seen seen = seen_by(s, faces.motion[c.facet], faces.near[n]);
     const bool same = faces.near[n] == c.other;
     const float beyond = seen.beyond - (same ? kStay : 0);
     if (seen.depth > deepest || seen.depth < -kSearch - kNear || !(beyond < best)) continue;
-    if (!same && is_itself(s, c.facet, faces.near[n], seen)) continue;
     best = beyond;
     other = faces.near[n];
   }
   return other;
 }
 
-/// Starts a contact with another facet, without force.
-void begin(const MpmState& s, FaceContact& c, std::int32_t other) {
+/// Sum of w^2 / m over the nodes of a place: what a spring there moves, as one over a mass [1/kg].
+double mobility(const Nodes& nodes, const CellNodes& cell, const AxisWeights& weights) {
+  double sum = 0;
+  for (int k = 0; k < 27; ++k) {
+    const float w = weights.of[k % 3] * weights.of[3 + k / 3 % 3] * weights.of[6 + k / 9];
+    const int node = cell.lowest[k / 9 * cell.plane + k / 3 % 3 * cell.pitch + k % 3];
+    sum += static_cast<double>(w) * w * nodes.inv_mass[node];
+  }
+  return sum;
+}
+
+/// Starts a contact with another facet, at a place of its cell. The spring is a point's spring
+/// against a tool, the two tissues' in series; softer where it would move so little mass that
+/// substeps of `dt` could not follow.
+void begin(const MpmState& s, FaceContact& c, std::int32_t other, const float (&place)[3],
+           double dt) {
   const LatticeBody &own = body_of(s, c.facet), &body = body_of(s, other);
   const Material &m = own.material, &n = body.material;
   const double p = lame_lambda(m) + 2 * lame_mu(m), q = lame_lambda(n) + 2 * lame_mu(n);
-  const auto edge = static_cast<float>(0.5 * own.cell_size);
-  const float area = facet_of(s, c.facet).area;
-  // A point's spring against a tool, the two tissues' in series.
-  const ContactSpring spring =
-      contact_spring(static_cast<float>(2 * p * q / (p + q)), static_cast<float>(m.density), edge,
-                     area * edge);
   c.other = other;
   c.other_nodes = CellNodes(block_of(s, other), facet_of(s, other).cell);
-  c.stiffness = spring.stiffness;
-  c.damping = spring.damping;
+  hold_at(s, c, place);
+  const double mass = 1 / (mobility(s.nodes, c.nodes, c.weights) +
+                           mobility(s.nodes, c.other_nodes, c.other_weights) + 1e-30);
+  const double stiffness =
+      kContactStiffness * 2 * p * q / (p + q) * facet_of(s, c.facet).area / (0.5 * own.cell_size);
+  c.stiffness = static_cast<float>(std::min(stiffness, kStable * mass / (dt * dt)));
+  c.damping = 2 * kContactDamping * std::sqrt(c.stiffness * static_cast<float>(mass));
   c.friction = static_cast<float>(std::sqrt(m.friction * n.friction));
+  c.sudden = static_cast<float>(kMoved * own.cell_size);
   c.touching = false;
 }
 
-/// Lets a contact that began with another facet go on from the material place that was held so far,
+/// Starts a contact with another facet that goes on from the material place that was held so far,
 /// if that is on the new face, too.
-void go_on(const MpmState& s, FaceContact& c, const Vec3& held) {
-  const LatticeBody& body = body_of(s, c.other);
-  const Facet& facet = facet_of(s, c.other);
+void go_on(const MpmState& s, FaceContact& c, std::int32_t other, const Vec3& held, double dt) {
+  const LatticeBody& body = body_of(s, other);
   const float middle[3] = {};
   const Vec3 from =
-      (held - reference_place(body, block_of(s, c.other), facet.cell, middle)) / body.cell_size;
-  if (from.cwiseAbs().maxCoeff() > 1.5) return;
-  hold_at(s, c, {float(from[0]), float(from[1]), float(from[2])});
+      (held - reference_place(body, block_of(s, other), facet_of(s, other).cell, middle)) /
+      body.cell_size;
+  begin(s, c, other, {float(from[0]), float(from[1]), float(from[2])}, dt);
   measure_apart(s, c, c.apart);
-  const auto cell = static_cast<float>(body.cell_size);
-  c.touching = dot(c.apart, c.apart) < cell * cell;
+  c.touching = holds(c, body.cell_size);
 }
 
 /// Looks anew at contact `i`: which facet, its normal, and the place held. Returns how fast the two
 /// move against one another [m/s], 0 if there is none.
-float look(MpmState& s, int i) {
+float look(MpmState& s, int i, double dt) {
   FaceContacts& faces = s.faces;
   FaceContact& c = faces.all[i];
   const std::int32_t other = choose_other(s, i);
@@ -136,11 +149,13 @@ float look(MpmState& s, int i) {
     return 0;
   }
   if (other != c.other) {
-    const bool touched = c.other >= 0 && c.touching && body_of(s, c.other).first_point ==
-                                                           body_of(s, other).first_point;
-    const Vec3 held = touched ? place_held(s, c) : Vec3::Zero();
-    begin(s, c, other);
-    if (touched) go_on(s, c, held);
+    const bool touched = c.other >= 0 && c.touching &&
+                         body_of(s, c.other).first_point == body_of(s, other).first_point;
+    if (touched) {
+      go_on(s, c, other, place_held(s, c), dt);
+    } else {
+      begin(s, c, other, seen_by(s, faces.motion[c.facet], other).place, dt);
+    }
   }
   const FacetMotion &f = faces.motion[c.facet], &o = faces.motion[other];
   const Facet& facet = facet_of(s, other);
@@ -202,13 +217,52 @@ void look_at_all(MpmState& s, double dt, bool moved) {
   }
   const int count = static_cast<int>(faces.all.size());
   std::vector<float> speed(count);
-  s.cpu->for_each(count, [&](int i) { speed[i] = look(s, i); }, 32);
+  s.cpu->for_each(
+      count, [&](int i) { speed[i] = look(s, i, dt); }, 32);
   float fastest = 0;
   for (const float v : speed) fastest = std::max(fastest, v);
   list_active(s);
-  faces.until_look =
-      std::min(kLongest * dt, kMoved * s.scene.cell_size / std::max(fastest, 1e-6f));
+  faces.until_look = std::min(kLongest * dt, kMoved * s.scene.cell_size / std::max(fastest, 1e-6f));
   faces.since_look = 0;
+}
+
+/// Whether bonds lead from a point to another close by, never away from it: then no cut parts them.
+bool are_bound(const MpmState& s, std::int32_t p, std::int32_t q) {
+  constexpr int kFar = 4;  // points
+  const Points::Site &from = s.points.site[p], &to = s.points.site[q];
+  const LatticeBody& body = s.bodies[from.body];
+  const int d[3] = {to.x - from.x, to.y - from.y, to.z - from.z};
+  int bond[3], step[3], length[3];
+  for (int a = 0; a < 3; ++a) {
+    length[a] = std::abs(d[a]);
+    step[a] = d[a] < 0 ? -1 : 1;
+    bond[a] = d[a] < 0 ? kForwardBond - 1 - a : kForwardBond + a;
+    if (length[a] > kFar) return false;
+  }
+  bool reached[kFar + 1][kFar + 1][kFar + 1] = {};
+  reached[0][0][0] = true;
+  for (int z = 0; z <= length[2]; ++z) {
+    for (int y = 0; y <= length[1]; ++y) {
+      for (int x = 0; x <= length[0]; ++x) {
+        if (!reached[z][y][x]) continue;
+        const std::int32_t at =
+            body.point(from.x + step[0] * x, from.y + step[1] * y, from.z + step[2] * z);
+        const unsigned bonds = s.points.bonds[at];
+        if (x < length[0] && (bonds >> bond[0] & 1) != 0) reached[z][y][x + 1] = true;
+        if (y < length[1] && (bonds >> bond[1] & 1) != 0) reached[z][y + 1][x] = true;
+        if (z < length[2] && (bonds >> bond[2] & 1) != 0) reached[z + 1][y][x] = true;
+      }
+    }
+  }
+  return reached[length[2]][length[1]][length[0]];
+}
+
+/// Whether two facets belong to the same bit of a piece, as at an edge of it or on the two sides of
+/// a slice, or do not face one another as a fold's do.
+bool are_one(const MpmState& s, const Pieces& pieces, std::int32_t a, std::int32_t b) {
+  const std::int32_t p = facet_of(s, a).point, q = facet_of(s, b).point;
+  if (pieces.of_point[p] != pieces.of_point[q]) return false;
+  return dot(s.faces.motion[a].normal, s.faces.motion[b].normal) > kFolded || are_bound(s, p, q);
 }
 
 /// Finds the facets that may meet until the next search, and when that is.
@@ -242,12 +296,8 @@ void search(MpmState& s, const Pieces& pieces) {
   std::vector<int> size(pieces.next_id, 0);
   for (const Fragment& f : pieces.all) size[f.id] = f.point_count;
   auto pairs = facing_pairs(faces.motion, reach, 3 * cell);
-  const auto of_one_cell = [&](const auto& pair) {
-    return faces.block_of[pair.first] == faces.block_of[pair.second] &&
-           facet_of(s, pair.first).cell == facet_of(s, pair.second).cell;
-  };
-  pairs.erase(std::remove_if(pairs.begin(), pairs.end(), of_one_cell), pairs.end());
-
+  const auto one = [&](const auto& pair) { return are_one(s, pieces, pair.first, pair.second); };
+  pairs.erase(std::remove_if(pairs.begin(), pairs.end(), one), pairs.end());
   // Of two pieces the smaller one's facets touch the other's face; of one, both.
   const auto touches = [&](std::int32_t a, std::int32_t b) {
     const int p = pieces.of_point[facet_of(s, a).point], q = pieces.of_point[facet_of(s, b).point];
@@ -295,7 +345,7 @@ void search(MpmState& s, const Pieces& pieces) {
 }
 
 /// Takes up what touched before blocks were made anew.
-void take_up(MpmState& s) {
+void take_up(MpmState& s, double dt) {
   FaceContacts& faces = s.faces;
   for (std::size_t i = 0; i < faces.all.size() && !faces.kept.empty(); ++i) {
     FaceContact& c = faces.all[i];
@@ -313,8 +363,7 @@ void take_up(MpmState& s) {
     const std::int32_t other = choose_other(s, static_cast<int>(i));
     c.touching = false;
     if (other < 0 || block_of(s, other).body != kept->other_body) continue;
-    begin(s, c, other);
-    go_on(s, c, kept->hold);
+    go_on(s, c, other, kept->hold, dt);
   }
   faces.kept.clear();
 }
@@ -326,7 +375,7 @@ void find_face_contacts(MpmState& s, const Pieces& pieces, double dt) {
   const bool searched = faces.until_search <= 0;
   if (searched) {
     search(s, pieces);
-    take_up(s);
+    take_up(s, dt);
   }
   if (!faces.all.empty() && (searched || faces.until_look <= 0)) look_at_all(s, dt, !searched);
   if (faces.all.empty()) faces.active.clear();

@@ -1,8 +1,7 @@
 // Tissue against tissue: faces of cuts, pieces among themselves, folds.
 #include <gtest/gtest.h>
 
-#include <iostream>
-
+#include "contact/face_places.h"
 #include "cut_scenes.h"
 #include "momentum.h"
 
@@ -17,29 +16,66 @@ FrameResult advance_frame(MpmTissue& tissue) {
   return tissue.finish();
 }
 
-/// Gives the points of each piece a velocity: of the nodes by the piece that sees them.
-template <class Velocity>
-void throw_pieces(MpmTissue& tissue, const Velocity& velocity) {
+FrameResult advance(MpmTissue& tissue, double seconds) {
+  FrameResult result;
+  for (int f = 0; f < std::lround(seconds / kFrame); ++f) result = advance_frame(tissue);
+  return result;
+}
+
+double total(const FrameResult& r) { return r.kinetic_energy + r.elastic_energy; }
+
+/// Throws each piece with a velocity of its own, turning about the origin.
+void throw_pieces(MpmTissue& tissue, const std::vector<Vec3>& velocity, const Vec3& spin) {
   MpmState& s = tissue.state();
   const std::vector<Vec3> home = homes(s);
   for (int p = 0; p < s.points.size(); ++p) {
     const LatticeBody& b = s.bodies[s.points.site[p].body];
     for (int k = 0; k < 27; ++k) {
       const int node = s.fields->node(b, s.points.site[p], k);
-      const Vec3 v = velocity(tissue.fragment_of(p), home[node]);
+      const Vec3 v = velocity[tissue.fragment_of(p)] + spin.cross(home[node]);
       for (int a = 0; a < 3; ++a) s.nodes.v[a][node] = static_cast<float>(v[a]);
     }
   }
   measure_motion(s);
 }
 
-double largest_force(const MpmState& s) {
-  double largest = 0;
+/// Force of the strongest contact [N].
+double strongest(const MpmState& s) {
+  float largest = 0;
   for (const std::int32_t i : s.faces.active) {
-    const float* f = s.faces.all[i].force;
-    largest = std::max(largest, Vec3(f[0], f[1], f[2]).norm());
+    largest = std::max(largest, dot(s.faces.all[i].force, s.faces.all[i].force));
   }
-  return largest;
+  return std::sqrt(static_cast<double>(largest));
+}
+
+int touching(const MpmState& s) {
+  int count = 0;
+  for (const std::int32_t i : s.faces.active) count += s.faces.all[i].touching ? 1 : 0;
+  return count;
+}
+
+/// Tissue that comes to rest: damped by its own viscosity.
+Material viscous() {
+  Material m;
+  m.name = "viscous";
+  m.viscosity = 5;
+  return m;
+}
+
+/// The lowest corner of the box is at `low`.
+Body box(const std::string& name, const Vec3& low, const Vec3& size) {
+  Body body;
+  body.name = name;
+  body.size = size;
+  body.pose.position = low + 0.5 * size;
+  body.material = "viscous";
+  return body;
+}
+
+Region below(double z) {
+  Region region;
+  region.z = z;
+  return region;
 }
 
 TEST(FaceContact, FreshCutIsFreeOfStress) {
@@ -50,97 +86,181 @@ TEST(FaceContact, FreshCutIsFreeOfStress) {
     cut_now(tissue, plane_cut(Vec3(0.02, 0.0171, 0.02), normal));
     ASSERT_EQ(tissue.fragments().size(), 2u);
     find_face_contacts(s, tissue.pieces(), 1e-6);
-    double strongest = 0;
-    int faces = 0;
+    EXPECT_GT(s.faces.active.size(), 15u * 15u) << "the faces are found";
+    double stiffest = 0;
     for (const std::int32_t i : s.faces.active) {
       push_faces(s, s.faces.all[i], 1e-6f);
-      faces += s.faces.all[i].depth > -0.01f;
-      strongest = std::max(strongest, double(s.faces.all[i].stiffness) * 0.002);
+      stiffest = std::max<double>(stiffest, s.faces.all[i].stiffness);
     }
-    EXPECT_GT(faces, 15 * 15) << "they are found";
-    std::cout << "faces " << faces << " active " << s.faces.active.size() << " force "
-              << largest_force(s) << " of " << strongest << "\n";
-    EXPECT_LT(largest_force(s), 1e-3 * strongest);
+    EXPECT_LT(strongest(s), 1e-5 * stiffest * 0.002);
   }
 }
 
-TEST(FaceContact, KeepsMomentumOfPiecesThatCollideAndScrape) {
-  Scene scene = free_box(Vec3(0.03, 0.02, 0.02), 0.002);
-  MpmTissue tissue(scene);
+TEST(FaceContact, KeepsMomentumAndMakesNoEnergyWherePiecesCollideAndScrape) {
+  MpmTissue tissue(free_box(Vec3(0.03, 0.02, 0.02), 0.002));
   cut_now(tissue, plane_cut(Vec3(0.0151, 0.01, 0.01), Vec3(1, 0.3, 0.1)));
-  throw_pieces(tissue, [](int piece, const Vec3& x) -> Vec3 {
-    return Vec3((piece == 0 ? -0.1 : 0.1), (piece == 0 ? 0.05 : -0.05), 0) + Vec3(2, 1, 3).cross(x);
-  });
-  // towards one another?
+  ASSERT_EQ(tissue.fragments().size(), 2u);
+  const bool first_is_left = tissue.fragments()[0].centroid[0] < tissue.fragments()[1].centroid[0];
+  std::vector<Vec3> velocity = {Vec3(0.15, 0.1, 0), Vec3(-0.15, -0.1, 0.05)};
+  if (!first_is_left) std::swap(velocity[0], velocity[1]);
+  throw_pieces(tissue, velocity, Vec3(2, 1, 3));
   MpmState& s = tissue.state();
   const std::vector<Vec3> home = homes(s);
   const Momentum start = momentum(s, home);
-  double energy = 1e9;
+  tissue.advance(0, 1e-4f, {});
+  double energy = total(tissue.finish());
+  const double first = energy;
+  int most = 0;
   for (int f = 0; f < 20; ++f) {
     const FrameResult r = advance_frame(tissue);
     const Momentum now = momentum(s, home);
-    const double total = r.kinetic_energy + r.elastic_energy;
-    std::cout << f << " lin "
-              << (now.linear - start.linear).norm() / (start.linear.norm() + 0.1 * 0.012) << " ang "
-              << (now.angular - start.angular).norm() / start.angular.norm() << " energy "
-              << r.kinetic_energy << " + " << r.elastic_energy << " = " << total << " touching "
-              << s.faces.active.size() << " F " << largest_force(s) << "\n";
-    energy = total;
-    if (f == 10)
-      for (const std::int32_t i : s.faces.active) {
-        const FaceContact& c = s.faces.all[i];
-        if (!c.touching) continue;
-        const auto show = [&](std::int32_t id) {
-          const Block& b = *s.blocks.all[s.faces.block_of[id]];
-          const Facet& q = b.facets[id - s.faces.first_facet[s.faces.block_of[id]]];
-          const auto& st = s.points.site[q.point];
-          std::cout << " site " << st.x << "," << st.y << "," << st.z << " dir " << int(q.direction)
-                    << " n " << q.normal[0] << "," << q.normal[1] << "," << q.normal[2] << " piece "
-                    << tissue.fragment_of(q.point) << " area " << q.area * 1e6 << " ext "
-                    << q.extent[0] << q.extent[1] << q.extent[2] << " ctr " << q.center[0] << ","
-                    << q.center[1] << "," << q.center[2];
-        };
-        show(c.facet);
-        std::cout << " |";
-        show(c.other);
-        std::cout << " depth " << c.depth << "\n";
-      }
+    EXPECT_LT((now.linear - start.linear).norm(), 3e-5 * start.linear.norm());
+    EXPECT_LT((now.angular - start.angular).norm(), 3e-5 * start.angular.norm());
+    // Velocities are half a substep behind: what rings seems to swing by a percent.
+    EXPECT_LT(total(r), 1.01 * energy) << "frame " << f;
+    energy = std::min(energy, total(r));
+    most = std::max(most, touching(s));
   }
-  (void)energy;
+  EXPECT_GT(most, 20) << "they do collide";
+  EXPECT_LT(energy, 0.9 * first) << "and scrape";
 }
 
-TEST(FaceContact, Slide) {
-  for (const double degrees : {10.0, 15.0, 18.0, 22.0}) {
-    Scene scene = free_box(Vec3(0.04, 0.02, 0.01), 0.002);
-    scene.bodies[0].anchors.emplace_back();
-    scene.bodies[0].anchors[0].z = 0.0025;
-    scene.materials.push_back(Material());
-    scene.materials[0].name = "m";
-    scene.materials[0].viscosity = 5;
-    scene.bodies[0].material = "m";
-    Body top = scene.bodies[0];
-    top.anchors.clear();
-    top.name = "top";
-    top.size = Vec3(0.016, 0.012, 0.008);
-    top.pose.position = Vec3(0.01, 0.01, 0.0141);
-    scene.bodies.push_back(top);
-    const double a = degrees * M_PI / 180;
-    scene.gravity = 9.81 * Vec3(std::sin(a), 0, -std::cos(a));
+TEST(FaceContact, NeverPulls) {
+  MpmTissue tissue(free_box(Vec3(0.03, 0.02, 0.02), 0.002));
+  cut_now(tissue, plane_cut(Vec3(0.0151, 0.01, 0.01), Vec3::UnitX()));
+  const bool first_is_left = tissue.fragments()[0].centroid[0] < tissue.fragments()[1].centroid[0];
+  std::vector<Vec3> velocity = {Vec3(0.1, 0, 0), Vec3(-0.1, 0, 0)};
+  if (!first_is_left) std::swap(velocity[0], velocity[1]);
+  throw_pieces(tissue, velocity, Vec3::Zero());
+  const MpmState& s = tissue.state();
+  const float dt = tissue.stable_substep();
+  bool touched = false;
+  for (int i = 0; i < 200; ++i) {
+    tissue.advance(1, dt, {});
+    for (const std::int32_t c : s.faces.active) {
+      EXPECT_GE(dot(s.faces.all[c].force, s.faces.all[c].normal), 0);
+    }
+    touched = touched || touching(s) > 0;
+  }
+  EXPECT_TRUE(touched);
+  tissue.finish();
+  EXPECT_EQ(touching(s), 0) << "they have bounced";
+  const Span<const Fragment> pieces = tissue.fragments();
+  EXPECT_GT(std::fabs(pieces[0].velocity[0] - pieces[1].velocity[0]), 0.05);
+}
+
+TEST(FaceContact, PiecesPressedTogetherPartWithoutResistance) {
+  MpmTissue tissue(free_box(Vec3(0.03, 0.02, 0.02), 0.002));
+  cut_now(tissue, plane_cut(Vec3(0.0151, 0.01, 0.01), Vec3(1, 0.2, 0)));
+  throw_pieces(tissue, {Vec3(0.1, 0, 0), Vec3(0.1, 0, 0)}, Vec3::Zero());
+  advance(tissue, 0.05);  // side by side
+  const bool first_is_left = tissue.fragments()[0].centroid[0] < tissue.fragments()[1].centroid[0];
+  std::vector<Vec3> velocity = {Vec3(-0.1, 0, 0), Vec3(0.1, 0, 0)};
+  if (!first_is_left) std::swap(velocity[0], velocity[1]);
+  throw_pieces(tissue, velocity, Vec3::Zero());
+  tissue.advance(0, 1e-4f, {});
+  const FrameResult before = tissue.finish();
+  const FrameResult after = advance(tissue, 0.1);
+  EXPECT_EQ(touching(tissue.state()), 0);
+  EXPECT_NEAR(total(after), total(before), 3e-3 * total(before));
+  for (int p = 0; p < 2; ++p) {
+    EXPECT_NEAR(tissue.fragments()[p].velocity[0], velocity[p][0], 1e-3);
+  }
+}
+
+TEST(FaceContact, ABlockStaysOnASlopeUpToTheAngleOfFrictionAndSlidesBeyond) {
+  for (const double degrees : {14.0, 20.0}) {  // friction 0.3: 16.7 degrees
+    Scene scene = free_box(Vec3(0.05, 0.016, 0.01), 0.002);
+    scene.materials = {viscous()};
+    scene.bodies = {box("slope", Vec3::Zero(), Vec3(0.05, 0.016, 0.01)),
+                    box("block", Vec3(0.003, 0.002, 0.0101), Vec3(0.016, 0.012, 0.008))};
+    scene.bodies[0].anchors = {below(0.0085)};
+    const double slope = degrees * M_PI / 180;
+    scene.gravity = 9.81 * Vec3(std::sin(slope), 0, -std::cos(slope));
     MpmTissue tissue(scene);
-    double x0 = 0, v0 = 0;
-    for (int f = 0; f < 18; ++f) {
-      const FrameResult r = advance_frame(tissue);
-      const Fragment& t = tissue.fragments()[1];
-      if (f == 8) x0 = t.centroid[0], v0 = t.velocity[0];
-      if (f == 17) {
-        const double expected = 9.81 * (std::sin(a) - 0.3 * std::cos(a));
-        std::cout << degrees << " deg: v " << v0 << " -> " << t.velocity[0] << " x " << x0 << " -> "
-                  << t.centroid[0] << " z " << t.centroid[2] << " acc "
-                  << (t.velocity[0] - v0) / (9 * kFrame) << " expected " << std::max(0.0, expected)
-                  << " KE " << r.kinetic_energy << "\n";
-      }
+    advance(tissue, 0.15);
+    const Fragment before = tissue.fragments()[1];
+    const double time = 0.1;
+    advance(tissue, time);
+    const Fragment after = tissue.fragments()[1];
+    EXPECT_NEAR(after.centroid[2], before.centroid[2], 1e-4);
+    if (degrees < 16) {
+      EXPECT_LT(after.velocity.norm(), 2e-3);
+      EXPECT_NEAR(after.centroid[0], before.centroid[0], 1e-4);
+    } else {
+      const double expected = 9.81 * (std::sin(slope) - 0.3 * std::cos(slope));
+      EXPECT_NEAR((after.velocity[0] - before.velocity[0]) / time, expected, 0.05 * expected);
     }
   }
+}
+
+TEST(FaceContact, StackedPiecesComeToRestAndStay) {
+  Scene scene = free_box(Vec3(0.02, 0.02, 0.02), 0.0025);
+  scene.materials = {viscous()};
+  scene.bodies[0].material = "viscous";
+  scene.gravity = Vec3(0, 0, -9.81);
+  scene.ground.enabled = true;
+  MpmTissue tissue(scene);
+  cut_now(tissue, plane_cut(Vec3(0.01, 0.01, 0.0126), Vec3(0.1, 0, 1)));
+  cut_now(tissue, plane_cut(Vec3(0.01, 0.01, 0.0063), Vec3(0, -0.05, 1)));
+  ASSERT_EQ(tissue.fragments().size(), 3u);
+  advance(tissue, 1);
+  std::vector<Vec3> place;
+  for (const Fragment& f : tissue.fragments()) place.push_back(f.centroid);
+  const FrameResult last = advance(tissue, 1);
+  EXPECT_LT(last.kinetic_energy, 1e-6 * last.elastic_energy);
+  EXPECT_LT(last.max_speed, 1e-5);
+  for (std::size_t i = 0; i < place.size(); ++i) {
+    EXPECT_LT((tissue.fragments()[i].centroid - place[i]).norm(), 2e-6);
+  }
+}
+
+TEST(FaceContact, AFlapFallsBackOntoItsBed) {
+  Scene scene = free_box(Vec3(0.04, 0.012, 0.012), 0.002);
+  scene.materials = {viscous()};
+  scene.bodies[0].material = "viscous";
+  scene.bodies[0].anchors = {below(0.004)};
+  scene.gravity = Vec3(0, 0, -9.81);
+  MpmTissue tissue(scene);
+  BladePath path;  // a level cut that leaves the last fifth whole
+  path.edge = {Vec3(0, -0.1, 0), Vec3(0, 0.1, 0)};
+  for (const double x : {-0.01, 0.032})
+    path.poses.push_back({Vec3(x, 0, 0.0081), Quat::Identity()});
+  cut_now(tissue, path);
+  ASSERT_EQ(tissue.fragments().size(), 1u);
+  MpmState& s = tissue.state();
+  const auto is_flap = [&](int p) { return s.points.site[p].z >= 8 && s.points.site[p].x < 32; };
+  for (int p = 0; p < s.points.size(); ++p) {  // thrown up
+    if (!is_flap(p)) continue;
+    for (int k = 0; k < 27; ++k) {
+      const int node = s.fields->node(s.bodies[0], s.points.site[p], k);
+      if (s.nodes.inv_mass[node] > 0) s.nodes.v[2][node] = 0.4f;
+    }
+  }
+  const auto gap = [&] {  // of the layers on both sides of the cut, at the flap's end [m]
+    double top = 0, bed = 0;
+    int n = 0, m = 0;
+    std::vector<std::uint8_t> cloud;
+    const int count = tissue.read_points({}, cloud);
+    const auto* points = reinterpret_cast<const Point*>(cloud.data());
+    for (int i = 0; i < count; ++i) {
+      const Points::Site& site = s.points.site[points[i].id];
+      if (site.x > 3) continue;
+      if (site.z == 8) top += points[i].z, ++n;
+      if (site.z == 7) bed += points[i].z, ++m;
+    }
+    return top / n - bed / m;
+  };
+  double widest = 0;
+  for (int f = 0; f < 15; ++f) {
+    advance_frame(tissue);
+    widest = std::max(widest, gap());
+  }
+  EXPECT_GT(widest, 0.003) << "it opens";
+  const FrameResult last = advance(tissue, 0.8);
+  EXPECT_NEAR(gap(), 0.001, 0.0002) << "and lies on its bed again";
+  EXPECT_GT(touching(s), 20);
+  EXPECT_LT(last.max_speed, 1e-3);
 }
 
 }  // namespace

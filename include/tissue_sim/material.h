@@ -19,8 +19,8 @@ struct Material {
   double poisson_ratio = 0.45;    ///< [-], 0 to 0.49
   double density = 1060.0;        ///< [kg/m^3], 100 to 20000
   double viscosity = 0.0;         ///< Kelvin-Voigt shear viscosity [Pa s], 0 to 1000
-  double friction = 0.3;          ///< Coulomb friction of tissue on tissue [-], 0 to 2; no use
-                                  ///< yet, for pieces do not touch one another
+  double friction = 0.3;  ///< Coulomb friction of tissue on tissue [-], 0 to 2; between two
+                          ///< materials the geometric mean
 };
 
 /// First Lame parameter [Pa].

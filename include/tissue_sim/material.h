@@ -19,6 +19,12 @@ struct Material {
   double poisson_ratio = 0.45;    ///< [-], 0 to 0.49
   double density = 1060.0;        ///< [kg/m^3], 100 to 20000
   double viscosity = 0.0;         ///< Kelvin-Voigt shear viscosity [Pa s], 0 to 1000
+  /// Largest principal stretch that the tissue bears: past it bonds across that direction break
+  /// [-], 1.001 to 100; 0 for tissue that never tears.
+  double tear_stretch = 0.0;
+  /// How far the limit's strain, tear_stretch - 1, varies from point to point: drawn evenly within
+  /// this share of it, by Scene::seed and the point's place [-], 0 to 0.9.
+  double tear_scatter = 0.0;
   double friction = 0.3;          ///< Coulomb friction of tissue on tissue [-], 0 to 2; no use
                                   ///< yet, for pieces do not touch one another
 };

@@ -1,6 +1,8 @@
 // The kernels that see points: chosen once for the processor, each works on one block.
 #pragma once
 
+#include <vector>
+
 #include "compute/array.h"
 #include "compute/simd.h"
 #include "mpm/block.h"
@@ -41,6 +43,12 @@ struct BlockState {
   bool finite = true;
 };
 
+/// A point that is stretched far, and C = F^T F there: 00 11 22 01 02 12.
+struct StretchedPoint {
+  std::int32_t point;
+  float C[6];
+};
+
 struct BlockKernels {
   /// Internal force on the block's nodes, [3][nz + 2][plane] (components as planes of their own):
   /// f_i = -sum_p V_p P(F_p) grad w_ip. [N]
@@ -59,6 +67,9 @@ struct BlockKernels {
   /// Energy and stiffness of the block; with `von_mises` also each point's stress [Pa], one per
   /// lane.
   BlockState (*state)(const Block&, const BlockField&, BlockScratch&, float* von_mises);
+  /// Appends the points whose largest principal stretch is at least `stretch`, in a fixed order.
+  void (*stretched)(const Block&, const BlockField&, float stretch, BlockScratch&,
+                    std::vector<StretchedPoint>& found);
 };
 
 const BlockKernels& block_kernels(InstructionSet set);

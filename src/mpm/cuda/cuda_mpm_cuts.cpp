@@ -99,7 +99,7 @@ void CudaMpmTissue::push() {
   d.points_changed = true;
 }
 
-void CudaMpmTissue::cut(Span<const BladePath> paths, const Array<float>* u_before,
+void CudaMpmTissue::cut(const std::vector<BladePath>& paths, const Array<float>* u_before,
                         const std::vector<BlockMotion>& before, CutReport& report) {
   std::vector<std::int32_t> changed;
   for (const BladePath& path : paths) {

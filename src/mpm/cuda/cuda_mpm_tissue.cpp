@@ -103,7 +103,7 @@ void CudaMpmTissue::advance(int substeps, float dt, const FrameInput& input) {
   if (!input.cuts.empty()) pull();
   for (const BladePath& path : input.cuts) {
     result_.cut_reports.emplace_back();
-    cut({&path, 1}, state_->nodes.u, state_->motion, result_.cut_reports.back());
+    cut({path}, state_->nodes.u, state_->motion, result_.cut_reports.back());
   }
   blades_.clear();
   for (std::size_t i = 0; i < input.tools.size(); ++i) {

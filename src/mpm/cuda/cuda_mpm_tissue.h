@@ -39,7 +39,7 @@ class CudaMpmTissue final : public Tissue {
  private:
   struct OnDevice;
 
-  void cut(Span<const BladePath> paths, const Array<float>* u_before,
+  void cut(const std::vector<BladePath>& paths, const Array<float>* u_before,
            const std::vector<BlockMotion>& before, CutReport& report);
   void cut_by_blades(const std::vector<BlockMotion>& before);
   void upload_points();

@@ -1,0 +1,288 @@
+#include "cutting/tear.h"
+
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <cmath>
+
+#include "cutting/bonds.h"
+
+namespace tissue_sim {
+namespace {
+
+constexpr int kReach = 3;  // [points]: half the support of a node
+
+/// Bonds of an axis whose direction has less than this along n lie along a crack, not across.
+constexpr double kAcross = 0.3;
+
+/// From this excess on a crack begins though another one may be about to relieve the place.
+constexpr float kPatience = 1.1f;
+
+Vec3 direction(int k) {
+  const BondOffset o = bond_offset(k);
+  return Vec3(o.x, o.y, o.z);
+}
+
+/// Bonds that the point had and lost.
+unsigned broken_bonds(const MpmState& state, const LatticeBody& body, std::int32_t p) {
+  const std::uint8_t bonds = state.points.bonds[p];
+  return bonds == kAllBonds ? 0u : whole_bonds(body, state.points.site[p]) & ~unsigned{bonds};
+}
+
+std::int32_t neighbour(const LatticeBody& body, const Points::Site& s, int k, int steps = 1) {
+  const BondOffset o = bond_offset(k);
+  return body.point(s.x + steps * o.x, s.y + steps * o.y, s.z + steps * o.z);
+}
+
+/// The crack that a point is at.
+struct CrackNearby {
+  bool any = false;      ///< within kReach
+  bool beside = false;   ///< so near that it may go on here
+  double offset = 0;     ///< of its plane from the point along n [points]
+};
+
+CrackNearby crack_nearby(const MpmState& state, const TearingPoint& t) {
+  const Points::Site& s = state.points.site[t.point];
+  const LatticeBody& body = state.bodies[s.body];
+  CrackNearby crack;
+  double weights = 0, sum = 0;
+  for (int dz = -kReach; dz <= kReach; ++dz) {
+    for (int dy = -kReach; dy <= kReach; ++dy) {
+      for (int dx = -kReach; dx <= kReach; ++dx) {
+        const std::int32_t q = body.point(s.x + dx, s.y + dy, s.z + dz);
+        if (q < 0) continue;
+        const unsigned broken = broken_bonds(state, body, q);
+        for (unsigned left = broken >> kForwardBond; left != 0; left &= left - 1) {
+          const Vec3 along = direction(kForwardBond + __builtin_ctz(left));
+          if (std::fabs(along.dot(t.normal)) < kAcross) continue;
+          const Vec3 middle = Vec3(dx, dy, dz) + 0.5 * along;
+          const double offset = middle.dot(t.normal);
+          const double aside2 = middle.squaredNorm() - offset * offset;
+          crack.any = true;
+          crack.beside = crack.beside || aside2 < 2.3;  // of the next column, or askew to it
+          const double weight = 1 / (0.1 + aside2 * aside2);
+          weights += weight;
+          sum += weight * offset;
+        }
+      }
+    }
+  }
+  if (crack.any) crack.offset = sum / weights;
+  return crack;
+}
+
+/// Side of the crack, 1 or -1, that a point is on by the bonds that it lost across n, else by those
+/// that broke on its line along the axis nearest to n; 0 where none did.
+int side_by_bonds(const MpmState& state, const LatticeBody& body, std::int32_t p, const Vec3& n) {
+  double to_crack = 0;
+  for (unsigned left = broken_bonds(state, body, p); left != 0; left &= left - 1) {
+    const double across = direction(__builtin_ctz(left)).dot(n);
+    if (std::fabs(across) >= kAcross) to_crack += across;
+  }
+  if (std::fabs(to_crack) > kAcross / 2) return to_crack > 0 ? -1 : 1;
+  int axis = 0;
+  n.cwiseAbs().maxCoeff(&axis);
+  const int up = n[axis] > 0 ? kForwardBond + axis : opposite_bond(kForwardBond + axis);
+  for (int i = 1; i < kReach; ++i) {
+    for (const int k : {up, opposite_bond(up)}) {
+      const std::int32_t q = neighbour(body, state.points.site[p], k, i);
+      if (q >= 0 && (broken_bonds(state, body, q) >> k & 1) != 0) return k == up ? -1 : 1;
+    }
+  }
+  return 0;
+}
+
+/// Whether a bond broke on the line of bond `k` of p, within `reach` of it.
+bool broken_on_line(const MpmState& state, const LatticeBody& body, std::int32_t p, int k,
+                    int reach) {
+  for (int i = -reach; i <= reach; ++i) {
+    const std::int32_t q = neighbour(body, state.points.site[p], k, i);
+    if (q >= 0 && (broken_bonds(state, body, q) >> k & 1) != 0) return true;
+  }
+  return false;
+}
+
+struct Bond {
+  std::int32_t point;
+  int bond;
+  int reach;  ///< no other bond of the line may be broken within
+};
+
+/// The bonds of a point that a crack takes as it goes on.
+void go_on(const MpmState& state, const TearingPoint& t, std::vector<Bond>& bonds) {
+  const CrackNearby crack = crack_nearby(state, t);
+  if (!crack.beside) return;
+  const Points::Site& s = state.points.site[t.point];
+  const LatticeBody& body = state.bodies[s.body];
+  const int known = side_by_bonds(state, body, t.point, t.normal);
+  const int side = known != 0 ? known : crack.offset > 0 ? -1 : 1;
+  for (unsigned left = state.points.bonds[t.point]; left != 0; left &= left - 1) {
+    const int k = __builtin_ctz(left);
+    const int other_known = side_by_bonds(state, body, neighbour(body, s, k), t.normal);
+    const int other = other_known != 0                               ? other_known
+                      : direction(k).dot(t.normal) < crack.offset ? -1
+                                                                     : 1;
+    if (side != other) bonds.push_back({t.point, k, known * other_known != 0 ? 1 : kReach});
+  }
+}
+
+/// The bond that a crack takes first.
+Bond begin(const MpmState& state, const TearingPoint& t,
+           const std::vector<TearingPoint>& tearing) {
+  const Points::Site& s = state.points.site[t.point];
+  const LatticeBody& body = state.bodies[s.body];
+  int axis = 0;
+  t.normal.cwiseAbs().maxCoeff(&axis);
+  Bond best{t.point, -1, kReach};
+  float most = -1;
+  for (const int k : {kForwardBond + axis, opposite_bond(kForwardBond + axis)}) {
+    if ((state.points.bonds[t.point] >> k & 1) == 0) continue;
+    const std::int32_t q = neighbour(body, s, k);
+    const auto at = std::lower_bound(
+        tearing.begin(), tearing.end(), q,
+        [](const TearingPoint& a, std::int32_t point) { return a.point < point; });
+    const float excess = at != tearing.end() && at->point == q ? at->excess : 0.0f;
+    if (excess <= most) continue;
+    most = excess;
+    best.bond = k;
+  }
+  return best;
+}
+
+/// Whether what tore last had no time yet to relieve all of the body.
+bool being_relieved(const MpmState& state, int body) {
+  const LatticeBody& b = state.bodies[body];
+  const double extent = std::max({b.nx, b.ny, b.nz}) * b.cell_size;
+  return state.time - state.tore_at[body] < extent / wave_speed(b.material);
+}
+
+/// Where cracks begin: one for each body at most.
+std::vector<Bond> beginnings(const MpmState& state, const std::vector<TearingPoint>& tearing) {
+  std::vector<const TearingPoint*> worst(state.bodies.size(), nullptr);
+  for (const TearingPoint& t : tearing) {
+    const int body = state.points.site[t.point].body;
+    if (t.excess < 1) continue;
+    if (t.excess < kPatience && being_relieved(state, body)) continue;
+    if (worst[body] != nullptr && t.excess <= worst[body]->excess) continue;
+    if (!crack_nearby(state, t).any) worst[body] = &t;
+  }
+  std::vector<Bond> bonds;
+  for (const TearingPoint* t : worst) {
+    if (t == nullptr) continue;
+    const Bond b = begin(state, *t, tearing);
+    if (b.bond >= 0) bonds.push_back(b);
+  }
+  return bonds;
+}
+
+}  // namespace
+
+bool can_tear(const MpmState& state) {
+  return std::any_of(state.bodies.begin(), state.bodies.end(),
+                     [](const LatticeBody& b) { return b.material.tear_stretch > 0; });
+}
+
+int tear_checks(const MpmState& state, int substeps, float dt) {
+  double interval = 1e9;
+  for (const LatticeBody& b : state.bodies) {
+    if (b.material.tear_stretch <= 0) continue;
+    interval = std::min(interval, kTearSteps * 0.5 * b.cell_size / wave_speed(b.material));
+  }
+  const double every = std::max(1.0, std::round(interval / dt));
+  return static_cast<int>(std::ceil(substeps / every));
+}
+
+float least_tear_limit(const Material& m) {
+  return static_cast<float>(1 + (m.tear_stretch - 1) * (1 - m.tear_scatter));
+}
+
+float tear_limit(const MpmState& state, std::int32_t point) {
+  const Points::Site& s = state.points.site[point];
+  const Material& m = state.bodies[s.body].material;
+  // SplitMix64 of seed and place.
+  std::uint64_t x = state.scene.seed;
+  for (const std::int16_t part : {s.body, s.x, s.y, s.z}) {
+    x += 0x9e3779b97f4a7c15u + static_cast<std::uint16_t>(part);
+    x = (x ^ (x >> 30)) * 0xbf58476d1ce4e5b9u;
+    x = (x ^ (x >> 27)) * 0x94d049bb133111ebu;
+    x ^= x >> 31;
+  }
+  const double drawn = static_cast<double>(x >> 11) * 0x1p-52 - 1;  // -1 to 1
+  return static_cast<float>(1 + (m.tear_stretch - 1) * (1 + m.tear_scatter * drawn));
+}
+
+void add_tearing(const MpmState& state, const std::vector<StretchedPoint>& stretched,
+                 std::vector<TearingPoint>& tearing) {
+  for (const StretchedPoint& p : stretched) {
+    Eigen::Matrix3d C;
+    C << p.C[0], p.C[3], p.C[4], p.C[3], p.C[1], p.C[5], p.C[4], p.C[5], p.C[2];
+    if (!C.allFinite()) continue;  // the frame's end will find out
+    Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver;
+    solver.computeDirect(C);
+    const double stretch = std::sqrt(solver.eigenvalues()[2]);
+    const double excess = (stretch - 1) / (tear_limit(state, p.point) - 1);
+    tearing.push_back({p.point, static_cast<float>(excess), solver.eigenvectors().col(2)});
+  }
+}
+
+std::vector<TearingPoint> find_tearing(MpmState& state) {
+  const int count = static_cast<int>(state.blocks.all.size());
+  std::vector<std::vector<TearingPoint>> of_block(count);
+  state.cpu->for_each(count, [&](int i) {
+    const Block& block = *state.blocks.all[i];
+    const Material& m = state.bodies[block.body].material;
+    if (m.tear_stretch <= 0) return;
+    std::vector<StretchedPoint> stretched;
+    state.kernels->stretched(block, block_field(state, block), least_tear_limit(m),
+                             state.scratch.local(), stretched);
+    add_tearing(state, stretched, of_block[i]);
+  });
+  std::vector<TearingPoint> tearing;
+  for (const auto& part : of_block) tearing.insert(tearing.end(), part.begin(), part.end());
+  std::sort(tearing.begin(), tearing.end(),
+            [](const TearingPoint& a, const TearingPoint& b) { return a.point < b.point; });
+  return tearing;
+}
+
+void tear_bonds(MpmState& state, const std::vector<TearingPoint>& tearing,
+                std::vector<std::int32_t>& changed, CutReport& report) {
+  state.tore_at.resize(state.bodies.size(), -1e9);
+  const std::size_t first = changed.size();
+  const auto tear = [&](const Bond& b) {
+    const Points::Site& s = state.points.site[b.point];
+    const LatticeBody& body = state.bodies[s.body];
+    if ((state.points.bonds[b.point] >> b.bond & 1) == 0) return false;
+    if (broken_on_line(state, body, b.point, b.bond, b.reach)) return false;
+    const std::int32_t q = neighbour(body, s, b.bond);
+    state.points.bonds[b.point] &= static_cast<std::uint8_t>(~(1u << b.bond));
+    state.points.bonds[q] &= static_cast<std::uint8_t>(~(1u << opposite_bond(b.bond)));
+    changed.push_back(b.point);
+    changed.push_back(q);
+    ++report.bonds_broken;
+    state.tore_at[s.body] = state.time;
+    return true;
+  };
+  const int count = static_cast<int>(tearing.size());
+  std::vector<std::vector<Bond>> bonds(count);
+  for (int step = 0; step < kTearSteps; ++step) {
+    state.cpu->for_each(
+        count,
+        [&](int i) {
+          bonds[i].clear();
+          go_on(state, tearing[i], bonds[i]);
+        },
+        64);
+    bool any = false;
+    for (const std::vector<Bond>& of_point : bonds) {
+      for (const Bond& b : of_point) any = tear(b) || any;
+    }
+    if (step == 0) {
+      for (const Bond& b : beginnings(state, tearing)) any = tear(b) || any;
+    }
+    if (!any) break;
+  }
+  std::sort(changed.begin() + first, changed.end());
+  changed.erase(std::unique(changed.begin() + first, changed.end()), changed.end());
+  report.points_separated += static_cast<int>(changed.size() - first);
+}
+
+}  // namespace tissue_sim

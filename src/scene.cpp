@@ -94,6 +94,7 @@ void check_material(const std::string& path, const Material& m, std::set<std::st
     refuse(path + ".tear_stretch", text(m.tear_stretch),
            "must be 0 (never tears) or lie between 1.001 and 100");
   }
+  check_range(path + ".tear_length", m.tear_length, 0, 1, "m");
   check_range(path + ".tear_scatter", m.tear_scatter, 0, 0.9);
   check_friction(path + ".friction", m.friction);
 }

@@ -77,6 +77,7 @@ void write(YAML::Emitter& out, const Material& m) {
   write(out, "density", m.density);
   write(out, "viscosity", m.viscosity);
   write(out, "tear_stretch", m.tear_stretch);
+  write(out, "tear_length", m.tear_length);
   write(out, "tear_scatter", m.tear_scatter);
   write(out, "friction", m.friction);
   out << EndMap;

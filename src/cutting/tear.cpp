@@ -3,6 +3,7 @@
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 #include "cutting/bonds.h"
 
@@ -12,7 +13,7 @@ namespace {
 constexpr int kReach = 3;  // [points]: half the support of a node
 
 /// Bonds of an axis whose direction has less than this along n lie along a crack, not across.
-constexpr double kAcross = 0.3;
+constexpr double kAcross = 0.5;
 
 /// From this excess on a crack begins though another one may be about to relieve the place.
 constexpr float kPatience = 1.1f;
@@ -37,7 +38,9 @@ std::int32_t neighbour(const LatticeBody& body, const Points::Site& s, int k, in
 struct CrackNearby {
   bool any = false;      ///< within kReach
   bool beside = false;   ///< so near that it may go on here
+  bool passed = false;   ///< it went through the point's line along n
   double offset = 0;     ///< of its plane from the point along n [points]
+  Vec3 ahead = Vec3::Zero();  ///< the way it goes, in its plane; unit
 };
 
 CrackNearby crack_nearby(const MpmState& state, const TearingPoint& t) {
@@ -58,15 +61,18 @@ CrackNearby crack_nearby(const MpmState& state, const TearingPoint& t) {
           const double offset = middle.dot(t.normal);
           const double aside2 = middle.squaredNorm() - offset * offset;
           crack.any = true;
+          crack.passed = crack.passed || aside2 < 0.6;
           crack.beside = crack.beside || aside2 < 2.3;  // of the next column, or askew to it
           const double weight = 1 / (0.1 + aside2 * aside2);
           weights += weight;
           sum += weight * offset;
+          crack.ahead -= weight * (middle - offset * t.normal);
         }
       }
     }
   }
   if (crack.any) crack.offset = sum / weights;
+  if (crack.ahead.norm() > 0) crack.ahead.normalize();
   return crack;
 }
 
@@ -91,10 +97,9 @@ int side_by_bonds(const MpmState& state, const LatticeBody& body, std::int32_t p
   return 0;
 }
 
-/// Whether a bond broke on the line of bond `k` of p, within `reach` of it.
-bool broken_on_line(const MpmState& state, const LatticeBody& body, std::int32_t p, int k,
-                    int reach) {
-  for (int i = -reach; i <= reach; ++i) {
+/// Whether a bond broke on the line of bond `k` of p, within kReach of it.
+bool broken_on_line(const MpmState& state, const LatticeBody& body, std::int32_t p, int k) {
+  for (int i = -kReach; i <= kReach; ++i) {
     const std::int32_t q = neighbour(body, state.points.site[p], k, i);
     if (q >= 0 && (broken_bonds(state, body, q) >> k & 1) != 0) return true;
   }
@@ -104,13 +109,44 @@ bool broken_on_line(const MpmState& state, const LatticeBody& body, std::int32_t
 struct Bond {
   std::int32_t point;
   int bond;
-  int reach;  ///< no other bond of the line may be broken within
 };
 
-/// The bonds of a point that a crack takes as it goes on.
-void go_on(const MpmState& state, const TearingPoint& t, std::vector<Bond>& bonds) {
+/// The entry of a point, null if it is not among them.
+const TearingPoint* entry(const std::vector<TearingPoint>& tearing, std::int32_t point) {
+  const auto at = std::lower_bound(
+      tearing.begin(), tearing.end(), point,
+      [](const TearingPoint& t, std::int32_t number) { return t.point < number; });
+  return at != tearing.end() && at->point == point ? &*at : nullptr;
+}
+
+/// Whether the tissue is past its limit up to tear_length ahead of the tip, or to where it ends.
+/// Nodes part 1.5 cells behind the last broken bond (half their support), and that is where the
+/// tissue's own tip is.
+bool finds_enough(const MpmState& state, const TearingPoint& t, const CrackNearby& crack,
+                  const std::vector<TearingPoint>& tearing) {
+  const Points::Site& s = state.points.site[t.point];
+  const LatticeBody& body = state.bodies[s.body];
+  const double length = 2 * body.material.tear_length / body.cell_size - 3;  // [points]
+  std::int32_t last = t.point;
+  for (int i = 1; i <= std::lround(length); ++i) {
+    const Vec3 x = Vec3(s.x, s.y, s.z) + crack.offset * t.normal + i * crack.ahead;
+    const std::int32_t q = body.point(static_cast<int>(std::lround(x[0])),
+                                      static_cast<int>(std::lround(x[1])),
+                                      static_cast<int>(std::lround(x[2])));
+    if (q < 0) break;
+    last = q;
+  }
+  return entry(tearing, last) != nullptr;
+}
+
+/// The bonds of a point that a crack takes as it goes on. Returns whether there is a crack within
+/// kReach.
+bool go_on(const MpmState& state, const TearingPoint& t, const std::vector<TearingPoint>& tearing,
+           std::vector<Bond>& bonds) {
   const CrackNearby crack = crack_nearby(state, t);
-  if (!crack.beside) return;
+  if (!crack.beside || (!crack.passed && !finds_enough(state, t, crack, tearing))) {
+    return crack.any;
+  }
   const Points::Site& s = state.points.site[t.point];
   const LatticeBody& body = state.bodies[s.body];
   const int known = side_by_bonds(state, body, t.point, t.normal);
@@ -121,8 +157,9 @@ void go_on(const MpmState& state, const TearingPoint& t, std::vector<Bond>& bond
     const int other = other_known != 0                               ? other_known
                       : direction(k).dot(t.normal) < crack.offset ? -1
                                                                      : 1;
-    if (side != other) bonds.push_back({t.point, k, known * other_known != 0 ? 1 : kReach});
+    if (side != other) bonds.push_back({t.point, k});
   }
+  return true;
 }
 
 /// The bond that a crack takes first.
@@ -132,15 +169,13 @@ Bond begin(const MpmState& state, const TearingPoint& t,
   const LatticeBody& body = state.bodies[s.body];
   int axis = 0;
   t.normal.cwiseAbs().maxCoeff(&axis);
-  Bond best{t.point, -1, kReach};
+  Bond best{t.point, -1};
   float most = -1;
   for (const int k : {kForwardBond + axis, opposite_bond(kForwardBond + axis)}) {
     if ((state.points.bonds[t.point] >> k & 1) == 0) continue;
     const std::int32_t q = neighbour(body, s, k);
-    const auto at = std::lower_bound(
-        tearing.begin(), tearing.end(), q,
-        [](const TearingPoint& a, std::int32_t point) { return a.point < point; });
-    const float excess = at != tearing.end() && at->point == q ? at->excess : 0.0f;
+    const TearingPoint* far = entry(tearing, q);
+    const float excess = far != nullptr ? far->excess : 0.0f;
     if (excess <= most) continue;
     most = excess;
     best.bond = k;
@@ -155,20 +190,73 @@ bool being_relieved(const MpmState& state, int body) {
   return state.time - state.tore_at[body] < extent / wave_speed(b.material);
 }
 
-/// Where cracks begin: one for each body at most.
-std::vector<Bond> beginnings(const MpmState& state, const std::vector<TearingPoint>& tearing) {
-  std::vector<const TearingPoint*> worst(state.bodies.size(), nullptr);
-  for (const TearingPoint& t : tearing) {
+/// Regions of tissue past its limit: for each entry the lowest of those that bonds join it to.
+std::vector<int> regions(const MpmState& state, const std::vector<TearingPoint>& tearing) {
+  std::vector<int> parent(tearing.size());
+  std::iota(parent.begin(), parent.end(), 0);
+  const auto root = [&parent](int i) {
+    while (parent[i] != i) i = parent[i] = parent[parent[i]];
+    return i;
+  };
+  for (std::size_t i = 0; i < tearing.size(); ++i) {
+    const Points::Site& s = state.points.site[tearing[i].point];
+    const unsigned bonds = state.points.bonds[tearing[i].point];
+    for (unsigned forward = bonds >> kForwardBond; forward != 0; forward &= forward - 1) {
+      const int k = kForwardBond + __builtin_ctz(forward);
+      const TearingPoint* other = entry(tearing, neighbour(state.bodies[s.body], s, k));
+      if (other == nullptr) continue;
+      const int a = root(static_cast<int>(i)), b = root(static_cast<int>(other - tearing.data()));
+      parent[std::max(a, b)] = std::min(a, b);
+    }
+  }
+  for (std::size_t i = 0; i < tearing.size(); ++i) parent[i] = root(static_cast<int>(i));
+  return parent;
+}
+
+/// Whether a crack is so near that a point is past its limit because of it: strain is largest not
+/// ahead of a tip but aside, 1.7 times as far out as ahead.
+bool in_reach_of_crack(const MpmState& state, const TearingPoint& t) {
+  const Points::Site& s = state.points.site[t.point];
+  const LatticeBody& body = state.bodies[s.body];
+  const int reach =
+      std::max(2 * kReach, static_cast<int>(4 * body.material.tear_length / body.cell_size));
+  for (int z = s.z - reach; z <= s.z + reach; ++z) {
+    for (int y = s.y - reach; y <= s.y + reach; ++y) {
+      for (int x = s.x - reach; x <= s.x + reach; ++x) {
+        const std::int32_t q = body.point(x, y, z);
+        if (q >= 0 && broken_bonds(state, body, q) != 0) return true;
+      }
+    }
+  }
+  return false;
+}
+
+/// Where cracks begin, `at_crack` telling which entries have one within kReach.
+std::vector<Bond> beginnings(const MpmState& state, const std::vector<TearingPoint>& tearing,
+                             const std::vector<std::uint8_t>& at_crack) {
+  const std::vector<int> region = regions(state, tearing);
+  std::vector<std::uint8_t> cracked(tearing.size(), 0);
+  for (std::size_t i = 0; i < tearing.size(); ++i) cracked[region[i]] |= at_crack[i];
+  std::vector<int> worst(tearing.size(), -1);  // of each region
+  for (std::size_t i = 0; i < tearing.size(); ++i) {
+    const TearingPoint& t = tearing[i];
     const int body = state.points.site[t.point].body;
-    if (t.excess < 1) continue;
+    if (t.excess < 1 || cracked[region[i]] != 0) continue;
     if (t.excess < kPatience && being_relieved(state, body)) continue;
-    if (worst[body] != nullptr && t.excess <= worst[body]->excess) continue;
-    if (!crack_nearby(state, t).any) worst[body] = &t;
+    int& w = worst[region[i]];
+    if (w < 0 || t.excess > tearing[w].excess) w = static_cast<int>(i);
+  }
+  std::vector<int> first(state.bodies.size(), -1);  // of each body
+  for (const int i : worst) {
+    if (i < 0) continue;
+    int& f = first[state.points.site[tearing[i].point].body];
+    if (f >= 0 && tearing[i].excess <= tearing[f].excess) continue;
+    if (!in_reach_of_crack(state, tearing[i])) f = i;
   }
   std::vector<Bond> bonds;
-  for (const TearingPoint* t : worst) {
-    if (t == nullptr) continue;
-    const Bond b = begin(state, *t, tearing);
+  for (const int i : first) {
+    if (i < 0) continue;
+    const Bond b = begin(state, tearing[i], tearing);
     if (b.bond >= 0) bonds.push_back(b);
   }
   return bonds;
@@ -213,6 +301,7 @@ float tear_limit(const MpmState& state, std::int32_t point) {
 void add_tearing(const MpmState& state, const std::vector<StretchedPoint>& stretched,
                  std::vector<TearingPoint>& tearing) {
   for (const StretchedPoint& p : stretched) {
+    if (state.points.anchored[p.point] != 0) continue;  // held fast, it cannot come apart
     Eigen::Matrix3d C;
     C << p.C[0], p.C[3], p.C[4], p.C[3], p.C[1], p.C[5], p.C[4], p.C[5], p.C[2];
     if (!C.allFinite()) continue;  // the frame's end will find out
@@ -251,7 +340,7 @@ void tear_bonds(MpmState& state, const std::vector<TearingPoint>& tearing,
     const Points::Site& s = state.points.site[b.point];
     const LatticeBody& body = state.bodies[s.body];
     if ((state.points.bonds[b.point] >> b.bond & 1) == 0) return false;
-    if (broken_on_line(state, body, b.point, b.bond, b.reach)) return false;
+    if (broken_on_line(state, body, b.point, b.bond)) return false;
     const std::int32_t q = neighbour(body, s, b.bond);
     state.points.bonds[b.point] &= static_cast<std::uint8_t>(~(1u << b.bond));
     state.points.bonds[q] &= static_cast<std::uint8_t>(~(1u << opposite_bond(b.bond)));
@@ -263,12 +352,13 @@ void tear_bonds(MpmState& state, const std::vector<TearingPoint>& tearing,
   };
   const int count = static_cast<int>(tearing.size());
   std::vector<std::vector<Bond>> bonds(count);
+  std::vector<std::uint8_t> at_crack(count);
   for (int step = 0; step < kTearSteps; ++step) {
     state.cpu->for_each(
         count,
         [&](int i) {
           bonds[i].clear();
-          go_on(state, tearing[i], bonds[i]);
+          at_crack[i] = go_on(state, tearing[i], tearing, bonds[i]);
         },
         64);
     bool any = false;
@@ -276,7 +366,7 @@ void tear_bonds(MpmState& state, const std::vector<TearingPoint>& tearing,
       for (const Bond& b : of_point) any = tear(b) || any;
     }
     if (step == 0) {
-      for (const Bond& b : beginnings(state, tearing)) any = tear(b) || any;
+      for (const Bond& b : beginnings(state, tearing, at_crack)) any = tear(b) || any;
     }
     if (!any) break;
   }

@@ -18,6 +18,10 @@ constexpr double kAcross = 0.5;
 /// From this excess on a crack begins though another one may be about to relieve the place.
 constexpr float kPatience = 1.1f;
 
+/// From this excess on a bond between two points of which each lost bonds to the other's side
+/// breaks though another one broke on its line: a crack that turns may leave it behind.
+constexpr float kThread = 1.3f;
+
 Vec3 direction(int k) {
   const BondOffset o = bond_offset(k);
   return Vec3(o.x, o.y, o.z);
@@ -109,6 +113,7 @@ bool broken_on_line(const MpmState& state, const LatticeBody& body, std::int32_t
 struct Bond {
   std::int32_t point;
   int bond;
+  bool thread;  ///< holds the two sides of a crack together
 };
 
 /// The entry of a point, null if it is not among them.
@@ -157,7 +162,7 @@ bool go_on(const MpmState& state, const TearingPoint& t, const std::vector<Teari
     const int other = other_known != 0                               ? other_known
                       : direction(k).dot(t.normal) < crack.offset ? -1
                                                                      : 1;
-    if (side != other) bonds.push_back({t.point, k});
+    if (side != other) bonds.push_back({t.point, k, known * other_known != 0 && t.excess > kThread});
   }
   return true;
 }
@@ -169,7 +174,7 @@ Bond begin(const MpmState& state, const TearingPoint& t,
   const LatticeBody& body = state.bodies[s.body];
   int axis = 0;
   t.normal.cwiseAbs().maxCoeff(&axis);
-  Bond best{t.point, -1};
+  Bond best{t.point, -1, false};
   float most = -1;
   for (const int k : {kForwardBond + axis, opposite_bond(kForwardBond + axis)}) {
     if ((state.points.bonds[t.point] >> k & 1) == 0) continue;
@@ -340,8 +345,11 @@ void tear_bonds(MpmState& state, const std::vector<TearingPoint>& tearing,
     const Points::Site& s = state.points.site[b.point];
     const LatticeBody& body = state.bodies[s.body];
     if ((state.points.bonds[b.point] >> b.bond & 1) == 0) return false;
-    if (broken_on_line(state, body, b.point, b.bond)) return false;
+    if (!b.thread && broken_on_line(state, body, b.point, b.bond)) return false;
     const std::int32_t q = neighbour(body, s, b.bond);
+    for (const std::int32_t end : {b.point, q}) {  // at a corner it may be the last
+      if (__builtin_popcount(state.points.bonds[end]) == 1) return false;
+    }
     state.points.bonds[b.point] &= static_cast<std::uint8_t>(~(1u << b.bond));
     state.points.bonds[q] &= static_cast<std::uint8_t>(~(1u << opposite_bond(b.bond)));
     changed.push_back(b.point);

@@ -18,8 +18,8 @@ constexpr double kAcross = 0.5;
 /// From this excess on a crack begins though another one may be about to relieve the place.
 constexpr float kPatience = 1.1f;
 
-/// From this excess on a bond between two points of which each lost bonds to the other's side
-/// breaks though another one broke on its line: a crack that turns may leave it behind.
+/// From this excess on a bond between two points that lost bonds to each other's side breaks though
+/// another one broke on its line: a crack that turns may leave a thread behind.
 constexpr float kThread = 1.3f;
 
 Vec3 direction(int k) {
@@ -40,10 +40,10 @@ std::int32_t neighbour(const LatticeBody& body, const Points::Site& s, int k, in
 
 /// The crack that a point is at.
 struct CrackNearby {
-  bool any = false;      ///< within kReach
-  bool beside = false;   ///< so near that it may go on here
-  bool passed = false;   ///< it went through the point's line along n
-  double offset = 0;     ///< of its plane from the point along n [points]
+  bool any = false;           ///< within kReach
+  bool beside = false;        ///< so near that it may go on here
+  bool passed = false;        ///< it went through the point's line along n
+  double offset = 0;          ///< of its plane from the point along n [points]
   Vec3 ahead = Vec3::Zero();  ///< the way it goes, in its plane; unit
 };
 
@@ -80,15 +80,21 @@ CrackNearby crack_nearby(const MpmState& state, const TearingPoint& t) {
   return crack;
 }
 
-/// Side of the crack, 1 or -1, that a point is on by the bonds that it lost across n, else by those
-/// that broke on its line along the axis nearest to n; 0 where none did.
-int side_by_bonds(const MpmState& state, const LatticeBody& body, std::int32_t p, const Vec3& n) {
+/// Side of the crack, 1 or -1, that a point is on by the bonds that it lost across n; 0 if it lost
+/// none.
+int side_by_own(const MpmState& state, const LatticeBody& body, std::int32_t p, const Vec3& n) {
   double to_crack = 0;
   for (unsigned left = broken_bonds(state, body, p); left != 0; left &= left - 1) {
     const double across = direction(__builtin_ctz(left)).dot(n);
     if (std::fabs(across) >= kAcross) to_crack += across;
   }
-  if (std::fabs(to_crack) > kAcross / 2) return to_crack > 0 ? -1 : 1;
+  return to_crack > 0 ? -1 : to_crack < 0 ? 1 : 0;
+}
+
+/// The same, else by the bonds that broke on its line along the axis nearest to n.
+int side_by_bonds(const MpmState& state, const LatticeBody& body, std::int32_t p, const Vec3& n) {
+  const int own = side_by_own(state, body, p, n);
+  if (own != 0) return own;
   int axis = 0;
   n.cwiseAbs().maxCoeff(&axis);
   const int up = n[axis] > 0 ? kForwardBond + axis : opposite_bond(kForwardBond + axis);
@@ -118,9 +124,9 @@ struct Bond {
 
 /// The entry of a point, null if it is not among them.
 const TearingPoint* entry(const std::vector<TearingPoint>& tearing, std::int32_t point) {
-  const auto at = std::lower_bound(
-      tearing.begin(), tearing.end(), point,
-      [](const TearingPoint& t, std::int32_t number) { return t.point < number; });
+  const auto at =
+      std::lower_bound(tearing.begin(), tearing.end(), point,
+                       [](const TearingPoint& t, std::int32_t number) { return t.point < number; });
   return at != tearing.end() && at->point == point ? &*at : nullptr;
 }
 
@@ -135,9 +141,9 @@ bool finds_enough(const MpmState& state, const TearingPoint& t, const CrackNearb
   std::int32_t last = t.point;
   for (int i = 1; i <= std::lround(length); ++i) {
     const Vec3 x = Vec3(s.x, s.y, s.z) + crack.offset * t.normal + i * crack.ahead;
-    const std::int32_t q = body.point(static_cast<int>(std::lround(x[0])),
-                                      static_cast<int>(std::lround(x[1])),
-                                      static_cast<int>(std::lround(x[2])));
+    const std::int32_t q =
+        body.point(static_cast<int>(std::lround(x[0])), static_cast<int>(std::lround(x[1])),
+                   static_cast<int>(std::lround(x[2])));
     if (q < 0) break;
     last = q;
   }
@@ -155,21 +161,27 @@ bool go_on(const MpmState& state, const TearingPoint& t, const std::vector<Teari
   const Points::Site& s = state.points.site[t.point];
   const LatticeBody& body = state.bodies[s.body];
   const int known = side_by_bonds(state, body, t.point, t.normal);
+  // A tip bears the more, the finer the lattice is against tear_length.
+  const double thread_excess =
+      kThread * std::max(1.0, body.material.tear_length / (1.5 * body.cell_size));
   const int side = known != 0 ? known : crack.offset > 0 ? -1 : 1;
   for (unsigned left = state.points.bonds[t.point]; left != 0; left &= left - 1) {
     const int k = __builtin_ctz(left);
-    const int other_known = side_by_bonds(state, body, neighbour(body, s, k), t.normal);
-    const int other = other_known != 0                               ? other_known
-                      : direction(k).dot(t.normal) < crack.offset ? -1
-                                                                     : 1;
-    if (side != other) bonds.push_back({t.point, k, known * other_known != 0 && t.excess > kThread});
+    const std::int32_t q = neighbour(body, s, k);
+    const int other_known = side_by_bonds(state, body, q, t.normal);
+    const double across = direction(k).dot(t.normal);
+    const int other = other_known != 0 ? other_known : across < crack.offset ? -1 : 1;
+    if (side == other) continue;
+    const bool thread = t.excess > thread_excess &&
+                        side_by_own(state, body, t.point, t.normal) != 0 &&
+                        side_by_own(state, body, q, t.normal) != 0;
+    bonds.push_back({t.point, k, thread});
   }
   return true;
 }
 
 /// The bond that a crack takes first.
-Bond begin(const MpmState& state, const TearingPoint& t,
-           const std::vector<TearingPoint>& tearing) {
+Bond begin(const MpmState& state, const TearingPoint& t, const std::vector<TearingPoint>& tearing) {
   const Points::Site& s = state.points.site[t.point];
   const LatticeBody& body = state.bodies[s.body];
   int axis = 0;

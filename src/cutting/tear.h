@@ -50,8 +50,8 @@ float least_tear_limit(const Material& material);
 /// A point past its limit.
 struct TearingPoint {
   std::int32_t point;
-  float excess;   ///< strain over that of the limit, (stretch - 1) / (limit - 1), from 1 on
-  Vec3 normal;    ///< principal direction of the largest stretch, in reference space
+  float excess;  ///< strain over that of the limit, (stretch - 1) / (limit - 1), from 1 on
+  Vec3 normal;   ///< principal direction of the largest stretch, in reference space
 };
 
 /// Of the points of a block that are stretched most, those that are past their limits.

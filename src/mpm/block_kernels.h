@@ -8,6 +8,7 @@
 #include "mpm/block.h"
 #include "mpm/blocks.h"
 #include "mpm/nodes.h"
+#include "mpm/stretched_point.h"
 #include "mpm/update_node.h"
 
 namespace tissue_sim {
@@ -41,12 +42,6 @@ struct BlockState {
   double elastic_energy = 0;  ///< [J]
   float stiffening = 1;  ///< largest squared column of cof F plus |J - 1| ||F||: see stable_substep
   bool finite = true;
-};
-
-/// A point that is stretched far, and C = F^T F there: 00 11 22 01 02 12.
-struct StretchedPoint {
-  std::int32_t point;
-  float C[6];
 };
 
 struct BlockKernels {

@@ -35,7 +35,7 @@ std::size_t CudaMpmTissue::device_bytes() const {
                     d.near.bytes() + d.colour.bytes() + d.volume.bytes() + d.partial.bytes() +
                     d.hold.bytes() + d.bonds.bytes() + d.with.bytes() + d.whole.bytes() +
                     d.u_before.bytes() + d.colliders.bytes() + d.loads.bytes() +
-                    d.measures.bytes() + d.cloud.bytes();
+                    d.measures.bytes() + d.cloud.bytes() + d.stretched.bytes();
   for (int i = 0; i < 2; ++i) sum += d.u[i].bytes() + d.v[i].bytes() + d.force[i].bytes();
   return sum;
 }

@@ -1,11 +1,12 @@
 // Linear and angular momentum of a body in free flight, with and without a cut on the way.
+#include "momentum.h"
+
 #include <gtest/gtest.h>
 
 #include <string>
 #include <vector>
 
 #include "curve_file.h"
-#include "momentum.h"
 
 namespace tissue_sim {
 namespace {

@@ -2,6 +2,7 @@
 #include "cutting/tear.h"
 
 #include <gtest/gtest.h>
+#include <tbb/global_control.h>
 
 #include <Eigen/Eigenvalues>
 #include <cmath>
@@ -182,6 +183,7 @@ TEST(Tear, CracksRunAtAnyAngleToTheLattice) {
 }
 
 TEST(Tear, GivesTheSameBitsForAnyNumberOfThreads) {
+  const tbb::global_control more(tbb::global_control::max_allowed_parallelism, 4);
   const auto run = [](int threads, std::uint64_t seed) {
     StripOf of;
     of.notch = 0.25;

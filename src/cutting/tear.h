@@ -32,7 +32,7 @@ namespace tissue_sim {
 /// Whether a body of the scene can tear.
 bool can_tear(const MpmState& state);
 
-/// How many times a frame of `substeps` looks for tears: about every other cell that a pressure
+/// How many times a frame of `substeps` looks for tears: about every three cells that a pressure
 /// wave crosses, and at its end. A crack goes on by kTearSteps points each time, as fast as that
 /// wave.
 int tear_checks(const MpmState& state, int substeps, float dt);
@@ -40,7 +40,7 @@ int tear_checks(const MpmState& state, int substeps, float dt);
 inline int tear_check_at(int check, int checks, int substeps) {
   return static_cast<int>(static_cast<std::int64_t>(check + 1) * substeps / checks);
 }
-inline constexpr int kTearSteps = 4;
+inline constexpr int kTearSteps = 6;
 
 /// Stretch at which a point tears.
 float tear_limit(const MpmState& state, std::int32_t point);

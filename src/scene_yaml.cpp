@@ -69,10 +69,9 @@ Region read_region(const YAML::Node& node, const std::string& path) {
 }
 
 Material read_material(const YAML::Node& node, const std::string& path) {
-  const YamlFields fields(
-      node, path,
-      {"name", "law", "young_modulus", "poisson_ratio", "density", "viscosity", "tear_stretch",
-       "tear_length", "tear_scatter", "friction"});
+  const YamlFields fields(node, path,
+                          {"name", "law", "young_modulus", "poisson_ratio", "density", "viscosity",
+                           "tear_stretch", "tear_length", "tear_scatter", "friction"});
   fields.require("name", "bodies refer to a material by its name");
   Material m;
   fields.read("name", m.name);

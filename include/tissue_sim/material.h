@@ -29,8 +29,8 @@ struct Material {
   /// How far the limit's strain, tear_stretch - 1, varies from point to point: drawn evenly within
   /// this share of it, by Scene::seed and the point's place [-], 0 to 0.9.
   double tear_scatter = 0.0;
-  double friction = 0.3;          ///< Coulomb friction of tissue on tissue [-], 0 to 2; no use
-                                  ///< yet, for pieces do not touch one another
+  double friction = 0.3;  ///< Coulomb friction of tissue on tissue [-], 0 to 2; no use
+                          ///< yet, for pieces do not touch one another
 };
 
 /// First Lame parameter [Pa].

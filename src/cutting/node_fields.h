@@ -3,9 +3,9 @@
 //
 // A node's points are those within its weight's support. They are taken apart into the components
 // that the bonds among them leave, and each component gets a field. Bonds only ever break, so a
-// field only ever comes apart and a new one starts with its parent's motion: no force and no
-// momentum appears when tissue is cut, no energy but the little that stabilisation takes up, and a
-// slow sweep ends where a fast one does.
+// field only ever comes apart and a new one starts with its parent's motion: no force and no momentum
+// appears when tissue is cut, no energy but the little that stabilisation takes up, and a slow sweep
+// ends where a fast one does.
 #pragma once
 
 #include <cstdint>

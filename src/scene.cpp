@@ -90,6 +90,12 @@ void check_material(const std::string& path, const Material& m, std::set<std::st
   check_range(path + ".poisson_ratio", m.poisson_ratio, 0, 0.49);
   check_range(path + ".density", m.density, 100, 20000, "kg/m^3");
   check_range(path + ".viscosity", m.viscosity, 0, 1000, "Pa s");
+  if (m.tear_stretch != 0 && !(m.tear_stretch >= 1.001 && m.tear_stretch <= 100)) {
+    refuse(path + ".tear_stretch", text(m.tear_stretch),
+           "must be 0 (never tears) or lie between 1.001 and 100");
+  }
+  check_range(path + ".tear_length", m.tear_length, 0, 1, "m");
+  check_range(path + ".tear_scatter", m.tear_scatter, 0, 0.9);
   check_friction(path + ".friction", m.friction);
 }
 

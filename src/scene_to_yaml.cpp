@@ -76,6 +76,9 @@ void write(YAML::Emitter& out, const Material& m) {
   write(out, "poisson_ratio", m.poisson_ratio);
   write(out, "density", m.density);
   write(out, "viscosity", m.viscosity);
+  write(out, "tear_stretch", m.tear_stretch);
+  write(out, "tear_length", m.tear_length);
+  write(out, "tear_scatter", m.tear_scatter);
   write(out, "friction", m.friction);
   out << EndMap;
 }

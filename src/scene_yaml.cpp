@@ -69,9 +69,9 @@ Region read_region(const YAML::Node& node, const std::string& path) {
 }
 
 Material read_material(const YAML::Node& node, const std::string& path) {
-  const YamlFields fields(
-      node, path,
-      {"name", "law", "young_modulus", "poisson_ratio", "density", "viscosity", "friction"});
+  const YamlFields fields(node, path,
+                          {"name", "law", "young_modulus", "poisson_ratio", "density", "viscosity",
+                           "tear_stretch", "tear_length", "tear_scatter", "friction"});
   fields.require("name", "bodies refer to a material by its name");
   Material m;
   fields.read("name", m.name);
@@ -80,6 +80,9 @@ Material read_material(const YAML::Node& node, const std::string& path) {
   fields.read("poisson_ratio", m.poisson_ratio);
   fields.read("density", m.density);
   fields.read("viscosity", m.viscosity);
+  fields.read("tear_stretch", m.tear_stretch);
+  fields.read("tear_length", m.tear_length);
+  fields.read("tear_scatter", m.tear_scatter);
   fields.read("friction", m.friction);
   return m;
 }

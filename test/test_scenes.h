@@ -19,6 +19,9 @@ inline Scene full_scene() {
   s.materials[1].law = Law::kNeoHookean;
   s.materials[1].young_modulus = 1.0 / 3 * 1e5;
   s.materials[1].viscosity = 0.1 + 0.2;
+  s.materials[1].tear_stretch = 1.0 + 1.0 / 3;
+  s.materials[1].tear_length = 0.004;
+  s.materials[1].tear_scatter = 0.07;
   s.bodies.resize(5);
   const Shape shapes[] = {Shape::kBox, Shape::kBall, Shape::kEllipsoid, Shape::kCylinder,
                           Shape::kMesh};
@@ -84,6 +87,9 @@ inline const std::vector<NumberCase>& number_cases() {
       {"materials[1].poisson_ratio", AT(materials[1].poisson_ratio), 0, 0.49},
       {"materials[1].density", AT(materials[1].density), 100, 20000},
       {"materials[1].viscosity", AT(materials[1].viscosity), 0, 1000},
+      {"materials[1].tear_stretch", AT(materials[1].tear_stretch), 1.001, 100},
+      {"materials[1].tear_length", AT(materials[1].tear_length), 0, 1},
+      {"materials[1].tear_scatter", AT(materials[1].tear_scatter), 0, 0.9},
       {"materials[1].friction", AT(materials[1].friction), 0, 2},
       {"bodies[0].size", AT(bodies[0].size.z()), 1e-4, 10},
       {"bodies[1].radius", AT(bodies[1].radius), 1e-4, 10},

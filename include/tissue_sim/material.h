@@ -19,6 +19,16 @@ struct Material {
   double poisson_ratio = 0.45;    ///< [-], 0 to 0.49
   double density = 1060.0;        ///< [kg/m^3], 100 to 20000
   double viscosity = 0.0;         ///< Kelvin-Voigt shear viscosity [Pa s], 0 to 1000
+  /// Largest principal stretch that the tissue bears: past it bonds across that direction break
+  /// [-], 1.001 to 100; 0 for tissue that never tears.
+  double tear_stretch = 0.0;
+  /// How far ahead of its tip a crack must find tissue past tear_stretch to go on [m], 0 to 1: what
+  /// a tip bears depends on it, for strain grows without bound towards a tip. Where it is less than
+  /// 1.5 cells, 1.5 cells it is.
+  double tear_length = 0.0;
+  /// How far the limit's strain, tear_stretch - 1, varies from point to point: drawn evenly within
+  /// this share of it, by Scene::seed and the point's place [-], 0 to 0.9.
+  double tear_scatter = 0.0;
   double friction = 0.3;  ///< Coulomb friction of tissue on tissue [-], 0 to 2; between two
                           ///< materials the geometric mean
 };

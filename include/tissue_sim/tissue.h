@@ -26,6 +26,7 @@ struct FrameResult {
   std::vector<ToolLoad> loads;         ///< parallels Scene::tools
   std::vector<CutReport> cut_reports;  ///< parallels FrameInput::cuts
   CutReport blade_report;              ///< what the instruments' edges cut
+  CutReport tear_report;               ///< what tore by itself (Material::tear_stretch)
   double kinetic_energy = 0;           ///< [J]
   double elastic_energy = 0;           ///< [J]
   double max_speed = 0;                ///< of a point [m/s]

@@ -281,6 +281,45 @@ TISSUE_SIM_INLINE BlockState state_any(const Block& b, const BlockField& f, Bloc
                                    : state<W, FixedCorotated>(b, f, s, von_mises);
 }
 
+/// The largest eigenvalue of C reaches s^2 where s^2 I - C is not positive definite: by its leading
+/// minors (Sylvester), 20 operations a point and no eigenvalue.
+template <int W>
+TISSUE_SIM_INLINE void stretched(const Block& b, const BlockField& f, float stretch,
+                                 BlockScratch& scratch, std::vector<StretchedPoint>& found) {
+  const Layout l(b);
+  reserve(scratch.nodes, 3 * l.node_component);
+  reserve(scratch.in, 3 * l.in_plane);
+  gather_nodes(b, f, f.nodes->u, 1.0f / f.cell_size, l, scratch.nodes.data());
+  const float s2 = stretch * stretch;
+  for (int z = 0; z < 2; ++z) load_plane<W>(l, scratch.nodes.data(), z, scratch.in.data());
+  for (int z = 0; z < b.nz; ++z) {
+    load_plane<W>(l, scratch.nodes.data(), z + 2, scratch.in.data());
+    for (int j = 0; j < l.stride; j += W) {
+      Vec<W> G[8][9];
+      gradients<W>(l, scratch.in.data(), z, j, G);
+      for (int s = 0; s < 8; ++s) {
+        Vec<W> C[6];
+        add_identity<W>(G[s]);
+        right_cauchy_green(G[s], C);
+        const Vec<W> x = s2 - C[0], y = s2 - C[1], w = s2 - C[2];
+        const Vec<W> minor = x * y - C[3] * C[3];
+        const Vec<W> det =
+            w * minor - x * C[5] * C[5] - y * C[4] * C[4] - 2.0f * C[3] * C[4] * C[5];
+        const auto below = (x > 0.0f) & (minor > 0.0f) & (det > 0.0f);
+        bool all = true;
+        for (int i = 0; i < W; ++i) all &= below[i] != 0;
+        if (all) continue;
+        const std::int32_t* point =
+            b.point.data() + (static_cast<std::size_t>(z) * 8 + s) * l.stride + j;
+        for (int i = 0; i < W; ++i) {
+          if (below[i] != 0 || point[i] < 0) continue;
+          found.push_back({point[i], {C[0][i], C[1][i], C[2][i], C[3][i], C[4][i], C[5][i]}});
+        }
+      }
+    }
+  }
+}
+
 template <int W>
 TISSUE_SIM_INLINE int lanes_in_box(const float* x, std::size_t count, const float* min,
                                    const float* max, std::int32_t* lanes) {
@@ -339,6 +378,10 @@ TISSUE_SIM_INLINE void update_row(const NodeRow& row, const RowPart* parts, cons
   target BlockState state_##suffix(const Block& b, const BlockField& f, BlockScratch& s,          \
                                    float* von_mises) {                                            \
     return state_any<W>(b, f, s, von_mises);                                                      \
+  }                                                                                               \
+  target void stretched_##suffix(const Block& b, const BlockField& f, float stretch,              \
+                                 BlockScratch& s, std::vector<StretchedPoint>& found) {           \
+    stretched<W>(b, f, stretch, s, found);                                                        \
   }
 
 TISSUE_SIM_KERNELS(sse2, 4, )
@@ -350,13 +393,13 @@ TISSUE_SIM_KERNELS(avx512, 16, TISSUE_SIM_TARGET_AVX512)
 }  // namespace
 
 const BlockKernels& block_kernels(InstructionSet set) {
-  static constexpr BlockKernels sse2 = {forces_sse2, positions_sse2, lanes_in_box_sse2,
-                                        update_row_sse2, state_sse2};
+  static constexpr BlockKernels sse2 = {forces_sse2,     positions_sse2, lanes_in_box_sse2,
+                                        update_row_sse2, state_sse2,     stretched_sse2};
 #if defined(__x86_64__)
-  static constexpr BlockKernels avx2 = {forces_avx2, positions_avx2, lanes_in_box_avx2,
-                                        update_row_avx2, state_avx2};
-  static constexpr BlockKernels avx512 = {forces_avx512, positions_avx512, lanes_in_box_avx512,
-                                          update_row_avx512, state_avx512};
+  static constexpr BlockKernels avx2 = {forces_avx2,     positions_avx2, lanes_in_box_avx2,
+                                        update_row_avx2, state_avx2,     stretched_avx2};
+  static constexpr BlockKernels avx512 = {forces_avx512,     positions_avx512, lanes_in_box_avx512,
+                                          update_row_avx512, state_avx512,     stretched_avx512};
   if (set == InstructionSet::kAvx512) return avx512;
   if (set == InstructionSet::kAvx2) return avx2;
 #endif

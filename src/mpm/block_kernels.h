@@ -1,11 +1,14 @@
 // The kernels that see points: chosen once for the processor, each works on one block.
 #pragma once
 
+#include <vector>
+
 #include "compute/array.h"
 #include "compute/simd.h"
 #include "mpm/block.h"
 #include "mpm/blocks.h"
 #include "mpm/nodes.h"
+#include "mpm/stretched_point.h"
 #include "mpm/update_node.h"
 
 namespace tissue_sim {
@@ -59,6 +62,9 @@ struct BlockKernels {
   /// Energy and stiffness of the block; with `von_mises` also each point's stress [Pa], one per
   /// lane.
   BlockState (*state)(const Block&, const BlockField&, BlockScratch&, float* von_mises);
+  /// Appends the points whose largest principal stretch is at least `stretch`, in a fixed order.
+  void (*stretched)(const Block&, const BlockField&, float stretch, BlockScratch&,
+                    std::vector<StretchedPoint>& found);
 };
 
 const BlockKernels& block_kernels(InstructionSet set);

@@ -49,6 +49,8 @@ struct MpmState {
   Array<float> force;        ///< of all blocks
   Array<float> u_before[3];  ///< displacements when the frame began, where a blade may cut [m]
   std::vector<BlockMotion> motion;  ///< per block, as of the last measure_motion()
+  double time = 0;                  ///< since the beginning [s]
+  std::vector<double> tore_at;      ///< per body: when a bond last tore [s]; empty while none did
   Contacts contacts;
   FaceContacts faces;
   std::vector<Collider> colliders;

@@ -7,6 +7,7 @@
 #include "contact/block_contact.h"
 #include "contact/frame_colliders.h"
 #include "cutting/cut_tissue.h"
+#include "cutting/tear.h"
 #include "fragments/piece_motion.h"
 #include "mpm/state_figures.h"
 #include "tools/tool_motion.h"
@@ -22,11 +23,9 @@ MpmTissue::MpmTissue(const Scene& scene, std::vector<std::string> notes)
   measure_pieces(*state_, pieces_);
 }
 
-float MpmTissue::stable_substep() const {
-  return tissue_sim::stable_substep(*state_, stiffening_);
-}
+float MpmTissue::stable_substep() const { return tissue_sim::stable_substep(*state_, stiffening_); }
 
-void MpmTissue::cut(Span<const BladePath> paths, const Array<float>* u_before,
+void MpmTissue::cut(const std::vector<BladePath>& paths, const Array<float>* u_before,
                     const std::vector<BlockMotion>& before, CutReport& report) {
   std::vector<std::int32_t> changed;
   for (const BladePath& path : paths) {
@@ -35,7 +34,9 @@ void MpmTissue::cut(Span<const BladePath> paths, const Array<float>* u_before,
   if (changed.empty()) return;
   take_apart(*state_, changed);
   measure_motion(*state_);
-  report.new_fragments = update_pieces(state_->bodies, state_->points, pieces_);
+  for (const int id : update_pieces(state_->bodies, state_->points, pieces_)) {
+    report.new_fragments.push_back(id);
+  }
 }
 
 void MpmTissue::advance(int substeps, float dt, const FrameInput& input) {
@@ -44,24 +45,31 @@ void MpmTissue::advance(int substeps, float dt, const FrameInput& input) {
   result_.loads.resize(s.scene.tools.size());
   for (const BladePath& path : input.cuts) {
     result_.cut_reports.emplace_back();
-    cut({&path, 1}, s.nodes.u, s.motion, result_.cut_reports.back());
+    cut({path}, s.nodes.u, s.motion, result_.cut_reports.back());
   }
-  std::vector<BladePath> blades;
-  for (std::size_t i = 0; i < input.tools.size(); ++i) {
-    if (input.tools[i].present && s.scene.tools[i].type == ToolType::kScalpel) {
-      blades.push_back(blade_path(s.scene.tools[i], input.tools[i]));
-    }
-  }
-  if (!blades.empty()) {
+  const bool blades = !blade_paths(s.scene, input, 0, 1).empty();
+  if (blades) {
     for (int a = 0; a < 3; ++a) s.u_before[a] = s.nodes.u[a];
   }
   const double duration = static_cast<double>(substeps) * dt;
-  find_near_colliders(s, collider_reach(s.scene, input, duration), duration);
+  const std::vector<Box> reach = collider_reach(s.scene, input, duration);
+  find_near_colliders(s, reach, duration);
+  const int checks = can_tear(s) ? tear_checks(s, substeps, dt) : 0;
+  std::vector<BlockMotion> before = s.motion;  // when the blades were last looked at
+  double cut_to = 0;                           // share of the frame
+  const auto cut_by_blades = [&](double share) {
+    measure_motion(s);
+    const std::vector<BladePath> paths = blade_paths(s.scene, input, cut_to, share);
+    cut(paths, s.u_before, before, result_.blade_report);
+    cut_to = share;
+  };
+  int check = 0;
   for (int i = 0; i < substeps; ++i) {
     s.colliders = colliders_at(s.scene, input, (i + 1.0) / substeps, duration);
     std::vector<ColliderLoad> loads(s.colliders.size());
     find_face_contacts(s, pieces_, dt);
     substep(s, dt, loads);
+    s.time += dt;
     for (std::size_t c = 1; c < loads.size(); ++c) {
       ToolLoad& load = result_.loads[c - 1];
       const Vec3 force(loads[c].force[0], loads[c].force[1], loads[c].force[2]);
@@ -70,10 +78,28 @@ void MpmTissue::advance(int substeps, float dt, const FrameInput& input) {
           Vec3(loads[c].torque[0], loads[c].torque[1], loads[c].torque[2]) / substeps;
       load.peak_force = std::max(load.peak_force, force.norm());
     }
+    if (checks == 0 || i + 1 != tear_check_at(check, checks, substeps)) continue;
+    ++check;
+    const std::vector<TearingPoint> tearing = find_tearing(s);
+    if (tearing.empty()) continue;
+    if (blades) cut_by_blades((i + 1.0) / substeps);
+    if (!tear(tearing) && !blades) continue;
+    measure_motion(s);
+    find_near_colliders(s, reach, duration);
+    before = s.motion;
+    for (int a = 0; blades && a < 3; ++a) s.u_before[a] = s.nodes.u[a];
   }
-  const std::vector<BlockMotion> before = s.motion;
-  measure_motion(s);
-  cut(blades, s.u_before, before, result_.blade_report);
+  cut_by_blades(1);
+  if (result_.tear_report.bonds_broken > 0) {
+    result_.tear_report.new_fragments = update_pieces(s.bodies, s.points, pieces_);
+  }
+}
+
+bool MpmTissue::tear(const std::vector<TearingPoint>& tearing) {
+  std::vector<std::int32_t> changed;
+  tear_bonds(*state_, tearing, changed, result_.tear_report);
+  take_apart(*state_, changed);
+  return !changed.empty();
 }
 
 void MpmTissue::measure() {

@@ -3,6 +3,7 @@
 
 #include <memory>
 
+#include "cutting/tear.h"
 #include "fragments/pieces.h"
 #include "mpm/mpm_state.h"
 #include "tissue_sim/tissue.h"
@@ -29,8 +30,9 @@ class MpmTissue final : public Tissue {
   MpmState& state() { return *state_; }  ///< for tests and the benchmark
 
  private:
-  void cut(Span<const BladePath> paths, const Array<float>* u_before,
+  void cut(const std::vector<BladePath>& paths, const Array<float>* u_before,
            const std::vector<BlockMotion>& before, CutReport& report);
+  bool tear(const std::vector<TearingPoint>& tearing);  ///< whether anything did
   void measure();
 
   std::vector<std::string> notes_;

@@ -38,4 +38,17 @@ BladePath blade_path(const Tool& tool, const ToolMotion& motion) {
           {motion.begin, motion.end}};
 }
 
+std::vector<BladePath> blade_paths(const Scene& scene, const FrameInput& input, double begin,
+                                   double end) {
+  std::vector<BladePath> paths;
+  for (std::size_t i = 0; i < input.tools.size(); ++i) {
+    ToolMotion m = input.tools[i];
+    if (!m.present || scene.tools[i].type != ToolType::kScalpel) continue;
+    if (end < 1) m.end = pose_at(input.tools[i], end);
+    if (begin > 0) m.begin = pose_at(input.tools[i], begin);
+    paths.push_back(blade_path(scene.tools[i], m));
+  }
+  return paths;
+}
+
 }  // namespace tissue_sim

@@ -6,6 +6,7 @@
 #include <string>
 
 #include "cut_scenes.h"
+#include "cutting/tear.h"
 #include "reference/mpm_reference.h"
 
 namespace tissue_sim {
@@ -18,6 +19,7 @@ struct Case {
   bool cut = false;
   double viscosity = 0;
   int threads = 0;
+  bool tears = false;  ///< looks for tears as often as a frame would, and finds none
 };
 
 /// A cube of about so many points, eight a cell, sheared, twisted and shaken.
@@ -31,6 +33,7 @@ std::unique_ptr<MpmTissue> deformed_cube(const Case& c) {
   m.name = "cube";
   m.law = c.law;
   m.viscosity = c.viscosity;
+  m.tear_stretch = c.tears ? 50 : 0;
   scene.materials.push_back(m);
   scene.bodies[0].material = "cube";
   auto tissue = std::make_unique<MpmTissue>(scene);
@@ -64,7 +67,13 @@ void run(benchmark::State& bench, const Case& c) {
   const float dt = 1e-3f * tissue->stable_substep();
   tissue->advance(1, dt, {});  // finds what is near the ground
   std::vector<ColliderLoad> loads(s.colliders.size());
-  for (auto _ : bench) substep(s, dt, loads);
+  const int every =
+      1000 / std::max(1, c.tears ? tear_checks(s, 1000, tissue->stable_substep()) : 1);
+  int i = 0;
+  for (auto _ : bench) {
+    substep(s, dt, loads);
+    if (c.tears && ++i % every == 0) benchmark::DoNotOptimize(find_tearing(s));
+  }
   if (!c.ground) {
     const std::string wrong = difference(s, dt);
     if (!wrong.empty()) bench.SkipWithError(wrong.c_str());
@@ -92,6 +101,7 @@ int main(int argc, char** argv) {
     tissue_sim::add(n + "/threads:1", {points, Law::kFixedCorotated, false, false, 0, 1});
     tissue_sim::add(n + "/neo_hookean", {points, Law::kNeoHookean});
     tissue_sim::add(n + "/viscous", {points, Law::kFixedCorotated, false, false, 1.0});
+    tissue_sim::add(n + "/may_tear", {points, Law::kFixedCorotated, false, false, 0, 0, true});
     tissue_sim::add(n + "/on_ground", {points, Law::kFixedCorotated, true});
     tissue_sim::add(n + "/cut", {points, Law::kFixedCorotated, false, true});
   }

@@ -35,7 +35,7 @@ std::size_t CudaMpmTissue::device_bytes() const {
                     d.near.bytes() + d.colour.bytes() + d.volume.bytes() + d.partial.bytes() +
                     d.hold.bytes() + d.bonds.bytes() + d.with.bytes() + d.whole.bytes() +
                     d.u_before.bytes() + d.colliders.bytes() + d.loads.bytes() +
-                    d.measures.bytes() + d.cloud.bytes();
+                    d.measures.bytes() + d.cloud.bytes() + d.stretched.bytes();
   for (int i = 0; i < 2; ++i) sum += d.u[i].bytes() + d.v[i].bytes() + d.force[i].bytes();
   return sum;
 }
@@ -99,7 +99,7 @@ void CudaMpmTissue::push() {
   d.points_changed = true;
 }
 
-void CudaMpmTissue::cut(Span<const BladePath> paths, const Array<float>* u_before,
+void CudaMpmTissue::cut(const std::vector<BladePath>& paths, const Array<float>* u_before,
                         const std::vector<BlockMotion>& before, CutReport& report) {
   std::vector<std::int32_t> changed;
   for (const BladePath& path : paths) {

@@ -103,48 +103,64 @@ void CudaMpmTissue::advance(int substeps, float dt, const FrameInput& input) {
   if (!input.cuts.empty()) pull();
   for (const BladePath& path : input.cuts) {
     result_.cut_reports.emplace_back();
-    cut({&path, 1}, state_->nodes.u, state_->motion, result_.cut_reports.back());
+    cut({path}, state_->nodes.u, state_->motion, result_.cut_reports.back());
   }
-  blades_.clear();
-  for (std::size_t i = 0; i < input.tools.size(); ++i) {
-    if (input.tools[i].present && scene.tools[i].type == ToolType::kScalpel) {
-      blades_.push_back(blade_path(scene.tools[i], input.tools[i]));
-    }
-  }
-  if (!blades_.empty()) {
-    d.u_before.resize(d.u[0].size());
-    check_cuda(cudaMemcpyAsync(d.u_before.data(), d.present().u, d.u[0].size() * sizeof(float4),
-                               cudaMemcpyDeviceToDevice, d.stream),
-               "copy");
-  }
+  blades_ = blade_paths(scene, input, 0, 1);
+  cut_to_ = 0;
+  keep_place_for_blades();
   substeps_ = substeps;
   if (substeps > 0) {
     const double duration = static_cast<double>(substeps) * dt;
     upload_colliders(substeps, duration, input);
-    const int collider_count = static_cast<int>(d.host_reach.size());
-    launch_near(d.tables(), d.measures.data(), d.reach.data(), collider_count,
-                static_cast<float>(duration), static_cast<float>(0.5 * scene.cell_size), d.stream);
-    CudaFrame frame;
-    for (int i = 0; i < 2; ++i) {
-      frame.state[i] = d.nodes(i);
-      frame.force[i] = d.force[i].data();
+    find_near(duration);
+    const bool tears = can_tear(*state_);
+    const int checks = tears ? tear_checks(*state_, substeps, dt) : 1;
+    int begin = 0;
+    for (int check = 0; check < checks; ++check) {
+      const int end = tear_check_at(check, checks, substeps);
+      run_substeps(begin, end, dt);
+      begin = end;
+      if (!tears) continue;
+      const std::vector<TearingPoint> tearing = find_tearing();
+      if (tearing.empty()) continue;
+      tear(tearing, input, static_cast<double>(end) / substeps);
+      find_near(duration);
     }
-    frame.current = d.current;
-    frame.substeps = substeps;
-    frame.step.dt = dt;
-    frame.step.keep = static_cast<float>(std::exp(-scene.damping * dt));
-    for (int a = 0; a < 3; ++a) frame.step.gravity[a] = static_cast<float>(scene.gravity[a]);
-    frame.colliders = d.colliders.data();
-    frame.collider_count = collider_count;
-    frame.loads = d.loads.data();
-    frame.arrived = d.arrived.data();
-    launch_substeps(d.plan, d.tables(), frame, d.resident, d.stream);
-    d.current = (d.current + substeps) % 2;
     d.host_loads.resize(d.loads.size());
     d.loads.download(d.host_loads.data(), d.loads.size(), d.stream);
   }
   pieces_measured_ = false;
   launch_measure();
+}
+
+void CudaMpmTissue::find_near(double duration) {
+  const OnDevice& d = *device_;
+  launch_near(d.tables(), d.measures.data(), d.reach.data(), static_cast<int>(d.host_reach.size()),
+              static_cast<float>(duration), static_cast<float>(0.5 * state_->scene.cell_size),
+              d.stream);
+}
+
+void CudaMpmTissue::run_substeps(int begin, int end, float dt) {
+  OnDevice& d = *device_;
+  const Scene& scene = state_->scene;
+  const std::size_t collider_count = d.host_reach.size();
+  CudaFrame frame;
+  for (int i = 0; i < 2; ++i) {
+    frame.state[i] = d.nodes(i);
+    frame.force[i] = d.force[i].data();
+  }
+  frame.current = d.current;
+  frame.substeps = end - begin;
+  frame.step.dt = dt;
+  frame.step.keep = static_cast<float>(std::exp(-scene.damping * dt));
+  for (int a = 0; a < 3; ++a) frame.step.gravity[a] = static_cast<float>(scene.gravity[a]);
+  frame.colliders = d.colliders.data() + begin * collider_count;
+  frame.collider_count = static_cast<int>(collider_count);
+  frame.loads = d.loads.data() + 6 * begin * collider_count;
+  frame.arrived = d.arrived.data();
+  launch_substeps(d.plan, d.tables(), frame, d.resident, d.stream);
+  d.current = (d.current + end - begin) % 2;
+  state_->time += static_cast<double>(end - begin) * dt;
 }
 
 void CudaMpmTissue::launch_measure() {
@@ -195,6 +211,10 @@ FrameResult CudaMpmTissue::finish() {
   pieces_measured_ = false;
   if (!blades_.empty() && !result_.blew_up) cut_by_blades(before);
   blades_.clear();
+  if (result_.tear_report.bonds_broken > 0) {
+    result_.tear_report.new_fragments = update_pieces(state_->bodies, state_->points, pieces_);
+    device_->points_changed = true;
+  }
   return result_;
 }
 

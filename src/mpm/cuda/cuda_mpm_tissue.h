@@ -3,6 +3,7 @@
 
 #include <memory>
 
+#include "cutting/tear.h"
 #include "fragments/pieces.h"
 #include "mpm/mpm_state.h"
 #include "tissue_sim/tissue.h"
@@ -39,9 +40,14 @@ class CudaMpmTissue final : public Tissue {
  private:
   struct OnDevice;
 
-  void cut(Span<const BladePath> paths, const Array<float>* u_before,
+  void cut(const std::vector<BladePath>& paths, const Array<float>* u_before,
            const std::vector<BlockMotion>& before, CutReport& report);
   void cut_by_blades(const std::vector<BlockMotion>& before);
+  void keep_place_for_blades();
+  void run_substeps(int begin, int end, float dt);
+  std::vector<TearingPoint> find_tearing();
+  void tear(const std::vector<TearingPoint>& tearing, const FrameInput& input, double share);
+  void find_near(double duration);
   void upload_points();
   void launch_measure();
   void finish_measure();
@@ -52,7 +58,8 @@ class CudaMpmTissue final : public Tissue {
   Pieces pieces_;
   bool pieces_measured_ = false;  ///< whether they are where the frame left them
   std::unique_ptr<OnDevice> device_;
-  std::vector<BladePath> blades_;  ///< of the frame in flight
+  std::vector<BladePath> blades_;  ///< of the frame in flight, from `cut_to_` on
+  double cut_to_ = 0;              ///< share of the frame
   int substeps_ = 0;
   float stiffening_ = 1;
   FrameResult result_;

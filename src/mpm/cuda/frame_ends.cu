@@ -208,6 +208,33 @@ __global__ void __launch_bounds__(kThreads)
       });
 }
 
+/// The test of BlockKernels::stretched: s^2 I - C is not positive definite.
+__global__ void __launch_bounds__(kThreads)
+    list_stretched(const CudaTables t, const CudaNodes state, StretchedPoint* found, int* count) {
+  extern __shared__ float4 shared[];
+  const CudaBlock& b = t.blocks[blockIdx.x];
+  const CudaBody& body = t.bodies[b.body];
+  if (body.tear_stretch == 0) return;
+  bring_nodes<false, false>(t, b, {}, state, state, nullptr, {}, body.inv_cell_size, shared,
+                            nullptr);
+  __syncthreads();
+  const float s2 = body.tear_stretch * body.tear_stretch;
+  for_each_point(t, b, shared,
+                 [&](int lane, int s, int x, int y, int z, int, const HalfPlane(&h)[3]) {
+                   const PointState p = point_state(b, body, h, x, y, z, s);
+                   StretchedPoint out;
+                   out.point = t.point[lane];
+                   right_cauchy_green(p.F, out.C);
+                   const float* C = out.C;
+                   const float m0 = s2 - C[0], m1 = s2 - C[1], m2 = s2 - C[2];
+                   const float minor = m0 * m1 - C[3] * C[3];
+                   const float det =
+                       m2 * minor - m0 * C[5] * C[5] - m1 * C[4] * C[4] - 2.0f * C[3] * C[4] * C[5];
+                   if (m0 > 0 && minor > 0 && det > 0) return;
+                   found[atomicAdd(count, 1)] = out;
+                 });
+}
+
 /// Allows a kernel this much dynamic shared memory.
 template <class Kernel>
 void allow(Kernel kernel, std::size_t bytes) {
@@ -233,6 +260,15 @@ void launch_measure(const CudaTables& tables, const CudaNodes& state, int max_sl
   allow(measure_blocks, bytes);
   measure_blocks<<<tables.block_count, kThreads, bytes, stream>>>(tables, state, max_slots,
                                                                   measures);
+  check_cuda(cudaGetLastError(), "start a kernel");
+}
+
+void launch_stretched(const CudaTables& tables, const CudaNodes& state, int max_slots,
+                      StretchedPoint* found, int* count, cudaStream_t stream) {
+  const std::size_t bytes = sizeof(float4) * max_slots;
+  allow(list_stretched, bytes);
+  check_cuda(cudaMemsetAsync(count, 0, sizeof(int), stream), "clear memory");
+  list_stretched<<<tables.block_count, kThreads, bytes, stream>>>(tables, state, found, count);
   check_cuda(cudaGetLastError(), "start a kernel");
 }
 

@@ -5,6 +5,7 @@
 #include <cuda_runtime_api.h>
 
 #include "mpm/cuda/tables.h"
+#include "mpm/stretched_point.h"
 #include "tissue_sim/point.h"
 
 namespace tissue_sim {
@@ -22,6 +23,11 @@ void launch_near(const CudaTables& tables, const CudaMeasure* measures, const Cu
 /// Energies, bounds and stiffness of each block in this state. `max_slots` of a block.
 void launch_measure(const CudaTables& tables, const CudaNodes& state, int max_slots,
                     CudaMeasure* measures, cudaStream_t stream);
+
+/// Lists the points whose largest stretch reaches the tear_stretch of their body, in any order,
+/// into `found` (room for all points); `count`, one number, becomes how many they are.
+void launch_stretched(const CudaTables& tables, const CudaNodes& state, int max_slots,
+                      StretchedPoint* found, int* count, cudaStream_t stream);
 
 /// What clouds need to know of points beside where they are.
 struct CudaCloud {

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <stdexcept>
 
+#include "cutting/tear.h"
+
 namespace tissue_sim {
 namespace {
 
@@ -14,6 +16,7 @@ CudaBody body_of(const LatticeBody& b) {
   body.mu = static_cast<float>(lame_mu(m));
   body.lambda = static_cast<float>(lame_lambda(m));
   body.viscosity = static_cast<float>(m.viscosity);
+  body.tear_stretch = b.material.tear_stretch > 0 ? least_tear_limit(b.material) : 0.0f;
   body.point_volume = static_cast<float>(b.cell_size * b.cell_size * b.cell_size / 8);
   // Contact is in proportion to the volume, but a cubic millimetre is a better measure than a
   // metre.

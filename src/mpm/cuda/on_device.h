@@ -29,6 +29,9 @@ struct CudaMpmTissue::OnDevice {
   DeviceArray<CudaBox> reach;
   DeviceArray<CudaMeasure> measures;
   DeviceArray<unsigned> arrived;
+  DeviceArray<StretchedPoint> stretched;
+  DeviceArray<int> stretched_count;
+  PinnedArray<int> host_stretched_count;
   DeviceArray<Point> cloud;
   PinnedArray<Collider> host_colliders;
   PinnedArray<CudaBox> host_reach;

@@ -23,6 +23,7 @@ struct CudaBody {
   float mu, lambda;                ///< [Pa]
   float viscosity;                 ///< [Pa s]
   float point_volume;              ///< of a whole point [m^3]
+  float tear_stretch;              ///< the least limit of its points, 0 if it never tears
   ContactSpring spring;            ///< of a contact, for each m^3 of the point
   int neo_hookean;                 ///< else fixed corotated
 };

@@ -1,0 +1,69 @@
+// Tears: bonds break where tissue is stretched past what its material bears, by the same path as
+// under blades: bonds cleared at both ends, then take_apart() and update_pieces().
+//
+// What breaks. The principal direction n of the largest stretch is taken in reference space, where
+// the lattice is; a crack is a surface across it.
+//
+//   A crack goes on. A point stretched past its limit that has broken bonds beside it (cut or torn,
+//   of an axis that is not along the crack) belongs to that crack: the plane across n through the
+//   middles of these bonds says which of its neighbours are on the other side, and the bonds to
+//   them break. Points that lost bonds across n know their side from that, which closes the steps
+//   of a crack that is oblique to the lattice. The front goes on by one point at a time.
+//
+//   A crack begins where there is none within kReach points: at the point of each body that is
+//   furthest past its limit, and, unless that is by a tenth of the limit's strain, not before waves
+//   from the last break have crossed the body, for they relieve what is past its limit by a little
+//   (else a strip under even tension would fall to pieces). Of the two bonds along the axis nearest
+//   to n it takes the one whose far point is stretched more.
+//
+//   No dust. Along a lattice line, at most one bond breaks within kReach points: a node's support
+//   is six points wide, so the opening of one crack stretches all of them, and each of them would
+//   tear.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "mpm/mpm_state.h"
+#include "tissue_sim/cut.h"
+
+namespace tissue_sim {
+
+/// Whether a body of the scene can tear.
+bool can_tear(const MpmState& state);
+
+/// How many times a frame of `substeps` looks for tears: about every three cells that a pressure
+/// wave crosses, and at its end. A crack goes on by kTearSteps points each time, as fast as that
+/// wave.
+int tear_checks(const MpmState& state, int substeps, float dt);
+/// After how many substeps the check number `check` (from 0) is.
+inline int tear_check_at(int check, int checks, int substeps) {
+  return static_cast<int>(static_cast<std::int64_t>(check + 1) * substeps / checks);
+}
+inline constexpr int kTearSteps = 6;
+
+/// Stretch at which a point tears.
+float tear_limit(const MpmState& state, std::int32_t point);
+/// The least of all points' limits of a body.
+float least_tear_limit(const Material& material);
+
+/// A point past its limit.
+struct TearingPoint {
+  std::int32_t point;
+  float excess;  ///< strain over that of the limit, (stretch - 1) / (limit - 1), from 1 on
+  Vec3 normal;   ///< principal direction of the largest stretch, in reference space
+};
+
+/// Of the points of a block that are stretched most, those that are past their limits.
+void add_tearing(const MpmState& state, const std::vector<StretchedPoint>& stretched,
+                 std::vector<TearingPoint>& tearing);
+
+/// All points past their limits, by number.
+std::vector<TearingPoint> find_tearing(MpmState& state);
+
+/// Breaks bonds of the points `tearing` (by number). Appends the points that lost one to `changed`,
+/// by number, and counts into `report`.
+void tear_bonds(MpmState& state, const std::vector<TearingPoint>& tearing,
+                std::vector<std::int32_t>& changed, CutReport& report);
+
+}  // namespace tissue_sim

@@ -1,0 +1,66 @@
+// Tears of tissue that lives on a GPU: found there every few substeps, made on the host as cuts
+// are.
+#include <algorithm>
+
+#include "cutting/cut_tissue.h"
+#include "cutting/tear.h"
+#include "mpm/cuda/on_device.h"
+#include "tools/tool_motion.h"
+
+namespace tissue_sim {
+
+void CudaMpmTissue::keep_place_for_blades() {
+  if (blades_.empty()) return;
+  OnDevice& d = *device_;
+  d.u_before.resize(d.u[0].size());
+  check_cuda(cudaMemcpyAsync(d.u_before.data(), d.present().u, d.u[0].size() * sizeof(float4),
+                             cudaMemcpyDeviceToDevice, d.stream),
+             "copy");
+}
+
+std::vector<TearingPoint> CudaMpmTissue::find_tearing() {
+  OnDevice& d = *device_;
+  d.stretched.resize(state_->points.size());
+  d.stretched_count.resize(1);
+  d.host_stretched_count.resize(1);
+  launch_stretched(d.tables(), d.present(), d.plan.max_slots, d.stretched.data(),
+                   d.stretched_count.data(), d.stream);
+  d.stretched_count.download(d.host_stretched_count.data(), 1, d.stream);
+  check_cuda(cudaStreamSynchronize(d.stream), "look for tears");
+  std::vector<StretchedPoint> stretched(d.host_stretched_count[0]);
+  if (stretched.empty()) return {};
+  d.stretched.download(stretched.data(), stretched.size(), d.stream);
+  check_cuda(cudaStreamSynchronize(d.stream), "send data");
+  std::sort(stretched.begin(), stretched.end(),
+            [](const StretchedPoint& a, const StretchedPoint& b) { return a.point < b.point; });
+  std::vector<TearingPoint> tearing;
+  add_tearing(*state_, stretched, tearing);
+  return tearing;
+}
+
+void CudaMpmTissue::tear(const std::vector<TearingPoint>& tearing, const FrameInput& input,
+                         double share) {
+  const bool blades = !blades_.empty();
+  if (blades) {  // what they have passed so far
+    const std::vector<BlockMotion> before = state_->motion;
+    launch_measure();
+    finish_measure();
+    blades_ = blade_paths(state_->scene, input, cut_to_, share);
+    cut_by_blades(before);
+  }
+  std::vector<std::int32_t> changed;
+  tear_bonds(*state_, tearing, changed, result_.tear_report);
+  if (!changed.empty()) {
+    pull();
+    take_apart(*state_, changed);
+    push();
+    launch_measure();
+    finish_measure();
+  }
+  if (!blades) return;
+  blades_ = blade_paths(state_->scene, input, share, 1);
+  cut_to_ = share;
+  keep_place_for_blades();
+}
+
+}  // namespace tissue_sim

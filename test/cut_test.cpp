@@ -1,13 +1,12 @@
 // What a cut does, and what it does not.
 #include <gtest/gtest.h>
 
-#include <Eigen/Eigenvalues>
 #include <numeric>
 
 #include "cut_scenes.h"
 #include "cutting/blade_sweep.h"
 #include "cutting/bonds.h"
-#include "reference/mpm_reference.h"
+#include "rigid_modes.h"
 
 namespace tissue_sim {
 namespace {
@@ -197,50 +196,6 @@ TEST(Cut, NoForcePassesBetweenThePieces) {
   }
   EXPECT_GT(compared, 1000);
   EXPECT_GT(differ, 1000) << "the pull must do something";
-}
-
-/// Motions of the points that cost no energy: null space of strains and stabilisation, as seen.
-int rigid_modes(const MpmState& s) {
-  const int n = 3 * static_cast<int>(s.nodes.size());
-  Eigen::MatrixXd stiffness = Eigen::MatrixXd::Zero(n, n);
-  Eigen::MatrixXd motion = Eigen::MatrixXd::Zero(3 * s.points.size(), n);
-  using Row = std::vector<std::pair<int, double>>;
-  const auto add = [&stiffness](const Row& row) {
-    for (const auto& [i, a] : row) {
-      for (const auto& [j, b] : row) stiffness(i, j) += a * b;
-    }
-  };
-  for (int p = 0; p < s.points.size(); ++p) {
-    const reference::Stencil stencil = reference::stencil_of(s, p);
-    Row strain[6];
-    for (int k = 0; k < 27; ++k) {
-      const int i = 3 * stencil.node[k];
-      const Vec3 g = stencil.slope[k] * s.bodies[0].cell_size;
-      for (int a = 0; a < 3; ++a) {
-        const int b = (a + 1) % 3;
-        strain[a].emplace_back(i + a, g[a]);
-        strain[3 + a].emplace_back(i + a, g[b]);
-        strain[3 + a].emplace_back(i + b, g[a]);
-        motion(3 * p + a, i + a) = stencil.weight[k];
-      }
-    }
-    for (const Row& row : strain) add(row);
-  }
-  for (const Block* block : s.blocks.all) {
-    for (const Row& row : reference::stabilising_rows(s, *block)) {
-      for (int a = 0; a < 3; ++a) {
-        Row of_component = row;
-        for (auto& [i, value] : of_component) i = 3 * i + a;
-        add(of_component);
-      }
-    }
-  }
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> solver(stiffness);
-  const double largest = solver.eigenvalues().tail(1)[0];
-  int count = 0;
-  while (count < n && solver.eigenvalues()[count] < 1e-12 * largest) ++count;
-  const Eigen::MatrixXd seen = motion * solver.eigenvectors().leftCols(count);
-  return static_cast<int>(Eigen::JacobiSVD<Eigen::MatrixXd>(seen).setThreshold(1e-6).rank());
 }
 
 TEST(Cut, EachPieceHasSixRigidModesAndNoOtherMotionIsFree) {

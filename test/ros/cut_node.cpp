@@ -131,6 +131,38 @@ TEST_F(CutTest, HalfWayItStaysOnePiece) {
   EXPECT_EQ(fragments().fragments.size(), 1u);
 }
 
+TEST_F(CutTest, NewPiecesAreSaidInTheFrameThatMadeThem) {
+  Topic<FrameInputMessage> inputs("/simulator/inputs");
+  pause(false);
+  ASSERT_TRUE(inputs.next());
+  const auto made_by = [&](double x, std::size_t pieces) {
+    ASSERT_TRUE(call<Cut>("cut", plane_cut(x)).success);
+    boost::shared_ptr<const FragmentArray> said;  // the first that lists as many
+    ASSERT_TRUE(wait_until([&] {
+      for (const auto& m : fragments_.all()) {
+        if (!said && m->fragments.size() == pieces) said = m;
+      }
+      return said != nullptr;
+    }));
+    const auto frame_of_cut = [&]() -> std::int64_t {
+      const auto all = inputs.all();
+      for (auto m = all.rbegin(); m != all.rend(); ++m) {
+        if (!(*m)->cuts.empty()) return (*m)->frame;
+      }
+      return -1;
+    };
+    ASSERT_TRUE(wait_until([&] { return frame_of_cut() + 1 >= std::int64_t(said->frame); }));
+    EXPECT_EQ(frame_of_cut() + 1, std::int64_t(said->frame)) << "a frame later or more";
+  };
+  made_by(0.001, 2);
+  made_by(0.009, 3);  // cut again: the piece that came off
+  pause(true);
+  const FragmentArray pieces = fragments();
+  ASSERT_EQ(pieces.fragments.size(), 3u);
+  EXPECT_EQ(pieces.fragments[1].parent, pieces.fragments[0].id);
+  EXPECT_EQ(pieces.fragments[2].parent, pieces.fragments[1].id);
+}
+
 TEST_F(CutTest, TwoCutsGiveThreePiecesWhoseVolumesAddUp) {
   ASSERT_TRUE(call<Cut>("cut", plane_cut(-0.009)).success);
   ASSERT_TRUE(call<Cut>("cut", plane_cut(0.011)).success);

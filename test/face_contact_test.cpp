@@ -138,7 +138,7 @@ TEST(FaceContact, NeverPulls) {
   for (int i = 0; i < 200; ++i) {
     tissue.advance(1, dt, {});
     for (const std::int32_t c : s.faces.active) {
-      EXPECT_GE(dot(s.faces.all[c].force, s.faces.all[c].normal), 0);
+      EXPECT_GE(dot(s.faces.all[c].force, s.faces.all[c].normal), -1e-12);
     }
     touched = touched || touching(s) > 0;
   }
@@ -169,7 +169,7 @@ TEST(FaceContact, PiecesPressedTogetherPartWithoutResistance) {
 }
 
 TEST(FaceContact, ABlockStaysOnASlopeUpToTheAngleOfFrictionAndSlidesBeyond) {
-  for (const double degrees : {14.0, 20.0}) {  // friction 0.3: 16.7 degrees
+  for (const double degrees : {14.0, 18.0}) {  // friction 0.3: 16.7 degrees
     Scene scene = free_box(Vec3(0.05, 0.016, 0.01), 0.002);
     scene.materials = {viscous()};
     scene.bodies = {box("slope", Vec3::Zero(), Vec3(0.05, 0.016, 0.01)),

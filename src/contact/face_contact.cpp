@@ -56,8 +56,10 @@ void push_faces(const MpmState& state, FaceContact& c, float dt) {
     }
     hold_at(state, c, place);
     measure_apart(state, c, c.apart);
+    if (!touched) soften(state, c, dt);
+    if (dot(c.apart, c.apart) > dot(apart, apart)) c.touching = false;  // not what it looked like
   }
-  if (!holds(c, body_of(state, c.other).cell_size)) {
+  if (!c.touching || !holds(c, body_of(state, c.other).cell_size)) {
     c.touching = false;
     return;
   }

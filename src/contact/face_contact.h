@@ -22,6 +22,7 @@ struct FaceContact {
   std::int32_t facet, other = -1;  ///< numbers over all blocks; -1: nothing near
   bool touching = false;
   float depth = 0;  ///< of the facet's centre below the other face, as of the last look [cells]
+  float begun = 0;  ///< depth at which the place held may stay, for there it began [cells]
   CellNodes nodes, other_nodes;
   AxisWeights weights, other_weights;  ///< at the facet's centre; at `hold`
   float hold[3];                       ///< place on the other face [cells of its cell]
@@ -40,7 +41,7 @@ struct KeptContact {
   std::int32_t direction;  ///< of the facet
   int other_body;
   Vec3 hold;  ///< reference place [m]
-  float depth;
+  float depth, begun, stiffness, apart[3];
 };
 
 struct FaceContacts {

@@ -1,8 +1,10 @@
 // Facets by their number, and the material places that contacts hold on to.
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 
+#include "contact/collider.h"
 #include "contact/face_contact.h"
 #include "mpm/mpm_state.h"
 
@@ -40,6 +42,26 @@ inline void measure_apart(const MpmState& s, const FaceContact& c, float (&apart
   value_at(s.nodes.u, c.nodes, c.weights, u);
   value_at(s.nodes.u, c.other_nodes, c.other_weights, other);
   for (int a = 0; a < 3; ++a) apart[a] = c.between[a] + (u[a] - other[a]);
+}
+
+/// Sum of w^2 / m over the nodes of a place: what a spring there moves, as one over a mass [1/kg].
+inline double mobility(const Nodes& nodes, const CellNodes& cell, const AxisWeights& weights) {
+  double sum = 0;
+  for (int k = 0; k < 27; ++k) {
+    const float w = weights.of[k % 3] * weights.of[3 + k / 3 % 3] * weights.of[6 + k / 9];
+    const int node = cell.lowest[k / 9 * cell.plane + k / 3 % 3 * cell.pitch + k % 3];
+    sum += static_cast<double>(w) * w * nodes.inv_mass[node];
+  }
+  return sum;
+}
+
+/// Makes the spring so soft that substeps of `dt` can follow what it moves, and the damper to it.
+inline void soften(const MpmState& s, FaceContact& c, double dt) {
+  constexpr double kStable = 0.35;  // stiffness * dt^2 / mass, at most; many springs share nodes
+  const double mass = 1 / (mobility(s.nodes, c.nodes, c.weights) +
+                           mobility(s.nodes, c.other_nodes, c.other_weights) + 1e-30);
+  c.stiffness = std::min(c.stiffness, static_cast<float>(kStable * mass / (dt * dt)));
+  c.damping = 2 * kContactDamping * std::sqrt(c.stiffness * static_cast<float>(mass));
 }
 
 /// Whether the place held is still on the other face: near its cell, and not far from the facet.

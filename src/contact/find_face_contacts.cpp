@@ -21,7 +21,7 @@ constexpr float kBeyond = 0.25f;    ///< how far beyond its edge a facet still c
 constexpr float kFolded = -0.5f;    ///< cosine between the normals of a piece that touches itself
 constexpr float kFarthest = 2;      ///< from the centre of the facet that catches it
 constexpr float kStay = 0.1f;       ///< by how much another facet must fit better to take over
-constexpr double kStable = 0.35;    ///< stiffness * dt^2 / mass, at most
+constexpr float kNothing = 1e-3f;   ///< share of a spring's energy at `sudden`
 constexpr float kMoved = 0.1f;      ///< motion between two looks
 constexpr int kLongest = 16;        ///< substeps between two looks
 constexpr float kLargestReach = 4;  ///< of what moves fast; the next search follows sooner
@@ -91,15 +91,11 @@ std::int32_t choose_other(const MpmState& s, int i) {
   return other;
 }
 
-/// Sum of w^2 / m over the nodes of a place: what a spring there moves, as one over a mass [1/kg].
-double mobility(const Nodes& nodes, const CellNodes& cell, const AxisWeights& weights) {
-  double sum = 0;
-  for (int k = 0; k < 27; ++k) {
-    const float w = weights.of[k % 3] * weights.of[3 + k / 3 % 3] * weights.of[6 + k / 9];
-    const int node = cell.lowest[k / 9 * cell.plane + k / 3 % 3 * cell.pitch + k % 3];
-    sum += static_cast<double>(w) * w * nodes.inv_mass[node];
-  }
-  return sum;
+void take_normal(const MpmState& s, FaceContact& c) {
+  const FacetMotion& o = s.faces.motion[c.other];
+  const auto per_cell = static_cast<float>(1 / body_of(s, c.other).cell_size);
+  std::copy(o.normal, o.normal + 3, c.normal);
+  for (int k = 0; k < 9; ++k) c.to_reference[k] = o.to_reference[k] * per_cell;
 }
 
 /// Starts a contact with another facet, at a place of its cell. The spring is a point's spring
@@ -112,29 +108,81 @@ void begin(const MpmState& s, FaceContact& c, std::int32_t other, const float (&
   const double p = lame_lambda(m) + 2 * lame_mu(m), q = lame_lambda(n) + 2 * lame_mu(n);
   c.other = other;
   c.other_nodes = CellNodes(block_of(s, other), facet_of(s, other).cell);
+  take_normal(s, c);
   hold_at(s, c, place);
-  const double mass = 1 / (mobility(s.nodes, c.nodes, c.weights) +
-                           mobility(s.nodes, c.other_nodes, c.other_weights) + 1e-30);
   const double stiffness =
       kContactStiffness * 2 * p * q / (p + q) * facet_of(s, c.facet).area / (0.5 * own.cell_size);
-  c.stiffness = static_cast<float>(std::min(stiffness, kStable * mass / (dt * dt)));
-  c.damping = 2 * kContactDamping * std::sqrt(c.stiffness * static_cast<float>(mass));
+  c.stiffness = static_cast<float>(stiffness);
+  soften(s, c, dt);
   c.friction = static_cast<float>(std::sqrt(m.friction * n.friction));
   c.sudden = static_cast<float>(kMoved * own.cell_size);
   c.touching = false;
+}
+
+float stretch2(const FaceContact& c) { return c.stiffness * dot(c.apart, c.apart); }
+
+/// Lets the place held give way until the spring holds no more than `limit` of energy (twice it,
+/// [J]). Returns whether it does.
+bool give_way(const MpmState& s, FaceContact& c, float limit) {
+  measure_apart(s, c, c.apart);
+  for (int i = 0; i < 3 && stretch2(c) > limit; ++i) {
+    const float share = 1 - std::sqrt(limit / stretch2(c));
+    float place[3];
+    for (int a = 0; a < 3; ++a) {
+      place[a] = c.hold[a] + share * dot(c.to_reference + 3 * a, c.apart);
+    }
+    hold_at(s, c, place);
+    measure_apart(s, c, c.apart);
+  }
+  return stretch2(c) <= 1.01f * limit + kNothing * c.stiffness * c.sudden * c.sudden;
 }
 
 /// Starts a contact with another facet that goes on from the material place that was held so far,
 /// if that is on the new face, too.
 void go_on(const MpmState& s, FaceContact& c, std::int32_t other, const Vec3& held, double dt) {
   const LatticeBody& body = body_of(s, other);
-  const float middle[3] = {};
+  const float middle[3] = {}, limit = stretch2(c);
   const Vec3 from =
       (held - reference_place(body, block_of(s, other), facet_of(s, other).cell, middle)) /
       body.cell_size;
+  const FaceContact old = c;
   begin(s, c, other, {float(from[0]), float(from[1]), float(from[2])}, dt);
+  c.stiffness = old.stiffness;  // the same spring, unless substeps cannot follow
+  soften(s, c, dt);
+  c.touching = give_way(s, c, limit) && holds(c, body.cell_size);
+}
+
+/// Puts the place held by a contact that does not touch on the other face, below the facet, or,
+/// where faces are in one another from the start, where there is no force.
+bool aim(const MpmState& s, FaceContact& c, const Seen& seen) {
+  const Facet& facet = facet_of(s, c.other);
+  const float lift = std::min(0.0f, seen.depth);
+  float place[3];
+  for (int a = 0; a < 3; ++a) place[a] = seen.place[a] + lift * facet.normal[a];
+  hold_at(s, c, place);
   measure_apart(s, c, c.apart);
-  c.touching = holds(c, body.cell_size);
+  c.begun = std::max(kRough, seen.depth);
+  return dot(c.apart, c.normal) >= 0 || give_way(s, c, 0);
+}
+
+/// Puts the place held by a contact that touches onto the face if it got above it, and back up
+/// towards the face if it sank below where the contact began.
+void settle(const MpmState& s, FaceContact& c, double dt) {
+  const Facet& facet = facet_of(s, c.other);
+  float lift = 0;
+  for (int a = 0; a < 3; ++a) lift -= (c.hold[a] - facet.center[a]) * facet.normal[a];
+  if (lift > 0) {
+    lift = std::max(0.0f, lift - c.begun) *
+           (1 - static_cast<float>(std::exp(-s.faces.since_look / kSettle)));
+  } else {
+    lift = std::min(0.0f, lift + 0.5f * kRough);
+  }
+  soften(s, c, dt);
+  if (lift == 0) return;
+  float place[3];
+  for (int a = 0; a < 3; ++a) place[a] = c.hold[a] + lift * facet.normal[a];
+  hold_at(s, c, place);
+  measure_apart(s, c, c.apart);
 }
 
 /// Looks anew at contact `i`: which facet, its normal, and the place held. Returns how fast the two
@@ -142,45 +190,28 @@ void go_on(const MpmState& s, FaceContact& c, std::int32_t other, const Vec3& he
 float look(MpmState& s, int i, double dt) {
   FaceContacts& faces = s.faces;
   FaceContact& c = faces.all[i];
-  const std::int32_t other = choose_other(s, i);
+  const std::int32_t other = choose_other(s, i), before = c.other;
   if (other < 0) {
     c.other = -1;
     c.touching = false;
     return 0;
   }
-  if (other != c.other) {
-    const bool touched = c.other >= 0 && c.touching &&
-                         body_of(s, c.other).first_point == body_of(s, other).first_point;
-    if (touched) {
-      go_on(s, c, other, place_held(s, c), dt);
-    } else {
-      begin(s, c, other, seen_by(s, faces.motion[c.facet], other).place, dt);
-    }
+  const Seen seen = seen_by(s, faces.motion[c.facet], other);
+  c.depth = seen.depth;
+  if (other == before) {
+    take_normal(s, c);
+  } else if (c.touching && body_of(s, before).first_point == body_of(s, other).first_point) {
+    go_on(s, c, other, place_held(s, c), dt);
+  } else {
+    begin(s, c, other, seen.place, dt);
+  }
+  if (c.touching) {
+    settle(s, c, dt);
+  } else if (!aim(s, c, seen)) {
+    c.other = -1;
+    return 0;
   }
   const FacetMotion &f = faces.motion[c.facet], &o = faces.motion[other];
-  const Facet& facet = facet_of(s, other);
-  const auto per_cell = static_cast<float>(1 / body_of(s, other).cell_size);
-  std::copy(o.normal, o.normal + 3, c.normal);
-  for (int k = 0; k < 9; ++k) c.to_reference[k] = o.to_reference[k] * per_cell;
-  Seen seen = seen_by(s, f, other);
-  c.depth = seen.depth;
-  float lift;  // of the place held
-  if (c.touching) {
-    lift = 0;
-    for (int a = 0; a < 3; ++a) {
-      seen.place[a] = c.hold[a];
-      lift -= (c.hold[a] - facet.center[a]) * facet.normal[a];
-    }
-    if (lift > 0) {
-      lift = std::max(0.0f, lift - kRough) *
-             (1 - static_cast<float>(std::exp(-faces.since_look / kSettle)));
-    }
-  } else {
-    lift = std::min(0.0f, seen.depth);  // onto the plane; below it, where there is no force
-  }
-  for (int a = 0; a < 3; ++a) seen.place[a] += lift * facet.normal[a];
-  hold_at(s, c, seen.place);
-  measure_apart(s, c, c.apart);
   const float v[3] = {f.v[0] - o.v[0], f.v[1] - o.v[1], f.v[2] - o.v[2]};
   return std::sqrt(dot(v, v));
 }
@@ -363,6 +394,9 @@ void take_up(MpmState& s, double dt) {
     const std::int32_t other = choose_other(s, static_cast<int>(i));
     c.touching = false;
     if (other < 0 || block_of(s, other).body != kept->other_body) continue;
+    c.stiffness = kept->stiffness;
+    std::copy(kept->apart, kept->apart + 3, c.apart);
+    c.begun = kept->begun;
     go_on(s, c, other, kept->hold, dt);
   }
   faces.kept.clear();
@@ -390,8 +424,14 @@ void keep_face_contacts(MpmState& s) {
   for (const FaceContact& c : faces.all) {
     if (c.other < 0 || !c.touching) continue;
     const Facet& facet = facet_of(s, c.facet);
-    faces.kept.push_back(
-        {facet.point, facet.direction, block_of(s, c.other).body, place_held(s, c), c.depth});
+    faces.kept.push_back({facet.point,
+                          facet.direction,
+                          block_of(s, c.other).body,
+                          place_held(s, c),
+                          c.depth,
+                          c.begun,
+                          c.stiffness,
+                          {c.apart[0], c.apart[1], c.apart[2]}});
   }
   std::sort(faces.kept.begin(), faces.kept.end(), [](const KeptContact& a, const KeptContact& b) {
     return a.point != b.point ? a.point < b.point : a.direction < b.direction;

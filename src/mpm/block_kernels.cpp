@@ -1,6 +1,7 @@
 #include "mpm/block_kernels.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstring>
 
@@ -15,20 +16,20 @@ namespace {
 struct Layout {
   int pitch, stride, plane;
   int node_component;  ///< floats of one component of the block's nodes
+  int quantity;        ///< floats of one x-y quantity: the lanes and room for what overruns them
   int in_plane;        ///< x-y quantities of one node plane, all components
-  int front;           ///< zeros before each outgoing quantity
-  int out_quantity;    ///< floats of one outgoing quantity
-  int out_plane;
+  int out_plane;       ///< the same of outgoing ones, kLanes in front
+  int sum_component;   ///< floats of one component of the forces on a node plane
 
   explicit Layout(const Block& b)
       : pitch(b.pitch),
         stride(b.stride),
         plane(b.plane),
         node_component((b.nz + 2) * b.plane + 2 * kLanes),
-        in_plane(3 * kXyCount * b.stride),
-        front((2 * b.pitch + kLanes - 1) / kLanes * kLanes),
-        out_quantity(front + b.plane),
-        out_plane(3 * kXyCount * out_quantity) {}
+        quantity(b.stride + kLanes),
+        in_plane(3 * kStressXyCount * quantity),
+        out_plane(in_plane + kLanes),
+        sum_component(b.plane + kLanes) {}
 };
 
 void reserve(Array<float>& a, std::size_t n) {
@@ -45,7 +46,8 @@ void gather_nodes(const Block& b, const BlockField& f, const Array<float>* field
       for (int y = 0; y < b.ny + 2; ++y) {
         const float* row = from + z * f.pitch_z + y * f.pitch_y;
         float* out_row = to + z * l.plane + y * l.pitch;
-        for (int x = 0; x < l.pitch; ++x) out_row[x] = row[x] * scale;
+        const Block::NodeSpan seen = b.node_rows[y];
+        for (int x = seen.begin; x < seen.end; ++x) out_row[x] = row[x] * scale;
       }
     }
     for (const Block::SplitNode& s : b.split_nodes) to[s.local] = field[c][s.node] * scale;
@@ -53,20 +55,68 @@ void gather_nodes(const Block& b, const BlockField& f, const Array<float>* field
 }
 
 /// The x-y quantities of node plane z, all components, into slot z % 3 of `in`.
-template <int W, bool bend_bend = false>
-TISSUE_SIM_INLINE void load_plane(const Layout& l, const float* nodes, int z, float* in) {
+template <int W>
+TISSUE_SIM_INLINE void load_plane(const Block& b, const Layout& l, const float* nodes, int z,
+                                  float* in) {
+  for (const Block::Run& run : b.runs) {
+    const float* from = nodes + z * l.plane + run.y * l.pitch + run.x;
+    float* to = in + (z % 3) * l.in_plane + run.lane;
+    for_each_vector<W>(
+        run.count, [&](auto width, int j) __attribute__((always_inline)) {
+          for (int c = 0; c < 3; ++c) {
+            xy_pass<width>(from + c * l.node_component + j, l.pitch, l.quantity,
+                           to + c * kStressXyCount * l.quantity + j);
+          }
+        });
+  }
+}
+
+/// The same for the mean gradients of cells.
+template <int W>
+TISSUE_SIM_INLINE void load_mean_plane(const Block& b, const Layout& l, const float* nodes, int z,
+                                       float* in) {
+  for (const Block::Run& run : b.runs) {
+    const float* from = nodes + z * l.plane + run.y * l.pitch + run.x;
+    float* to = in + (z % 3) * 3 * kMeanXyCount * l.quantity + run.lane;
+    for_each_vector<W>(
+        run.count, [&](auto width, int j) __attribute__((always_inline)) {
+          for (int c = 0; c < 3; ++c) {
+            mean_xy_pass<width>(from + c * l.node_component + j, l.pitch, l.quantity,
+                                to + c * kMeanXyCount * l.quantity + j);
+          }
+        });
+  }
+}
+
+/// The forces on node plane z from its outgoing x-y quantities.
+template <int W>
+TISSUE_SIM_INLINE void store_plane(const Block& b, const Layout& l, const float* out, int z,
+                                   float scale, float* sums, float* force) {
+  std::fill_n(sums, 3 * l.sum_component, 0.0f);
+  for (const Block::Run& run : b.runs) {
+    const float* from = out + (z % 3) * l.out_plane + kLanes + run.lane;
+    float* to = sums + run.y * l.pitch + run.x;
+    for_each_vector<W>(
+        run.count + 2, [&](auto width, int m) __attribute__((always_inline)) {
+          for (int c = 0; c < 3; ++c) {
+            xy_transpose<width>(from + c * kStressXyCount * l.quantity, l.quantity, run.count, m,
+                                l.pitch, to + c * l.sum_component);
+          }
+        });
+  }
   for (int c = 0; c < 3; ++c) {
-    xy_pass<W, bend_bend>(nodes + c * l.node_component + z * l.plane, l.pitch, l.stride,
-                          in + (z % 3) * l.in_plane + c * kXyCount * l.stride);
+    const float* from = sums + c * l.sum_component;
+    float* to = force + (c * (b.nz + 2) + z) * l.plane;
+    for (int i = 0; i < l.plane; ++i) to[i] = scale * from[i];
   }
 }
 
 template <int W>
 TISSUE_SIM_INLINE void gradients(const Layout& l, const float* in, int z, int j, Vec<W> (*G)[9]) {
   for (int c = 0; c < 3; ++c) {
-    const float* q = in + c * kXyCount * l.stride + j;
+    const float* q = in + c * kStressXyCount * l.quantity + j;
     gradient<W>(q + (z % 3) * l.in_plane, q + ((z + 1) % 3) * l.in_plane,
-                q + ((z + 2) % 3) * l.in_plane, l.stride, c, G);
+                q + ((z + 2) % 3) * l.in_plane, l.quantity, c, G);
   }
 }
 
@@ -75,85 +125,145 @@ TISSUE_SIM_INLINE void add_identity(Vec<W>* F) {
   for (int i = 0; i < 9; i += 4) F[i] = F[i] + 1.0f;
 }
 
+/// Adds the force that stabilises the block's partial cells, W cells at a time, to `force` where
+/// there is one. Returns the energy. `nodes` are displacements over cell size.
 template <int W>
-TISSUE_SIM_INLINE bool any_nonzero(const float* p) {
-  bool any = false;
-  for (int i = 0; i < W; ++i) any |= p[i] != 0;
-  return any;
+TISSUE_SIM_INLINE double stabilise_cells(const Block& b, const BlockField& f, const Layout& l,
+                                         const float* nodes, float* force) {
+  const int count = static_cast<int>(b.partial.size());
+  int row[9];  // of a cell's nodes, from its lowest
+  for (int k = 0; k < 9; ++k) row[k] = k / 3 * l.plane + k % 3 * l.pitch;
+  double twice_energy = 0;
+  for (int first = 0; first < count; first += W) {
+    alignas(64) float stiffness[W], u[27][W];
+    int node[W];
+    for (int i = 0; i < W; ++i) {
+      const Block::PartialCell& cell = b.partial[std::min(first + i, count - 1)];
+      node[i] = cell.node;
+      stiffness[i] = first + i < count ? kStabilisation * f.mu * cell.volume : 0.0f;
+    }
+    const int used = std::min(W, count - first);
+    for (int c = 0; c < 3; ++c) {
+      for (int i = 0; i < W; ++i) {
+        const float* from = nodes + c * l.node_component + node[i];
+#pragma GCC unroll 9
+        for (int k = 0; k < 9; ++k) {
+          const float* at = from + row[k];
+          u[3 * k][i] = at[0];
+          u[3 * k + 1][i] = at[1];
+          u[3 * k + 2][i] = at[2];
+        }
+      }
+      Vec<W> v[27];
+      for (int k = 0; k < 27; ++k) v[k] = load<W>(u[k]);
+      const Vec<W> energy = stabilise<W>(load<W>(stiffness), v);
+      for (int i = 0; i < used; ++i) twice_energy += static_cast<double>(energy[i]);
+      if (force == nullptr) continue;
+      for (int k = 0; k < 27; ++k) store<W>(u[k], v[k] * (-1.0f / f.cell_size));
+      for (int i = 0; i < used; ++i) {
+        float* to = force + c * b.node_count() + node[i];
+#pragma GCC unroll 9
+        for (int k = 0; k < 9; ++k) {
+          float* at = to + row[k];
+          at[0] += u[3 * k][i];
+          at[1] += u[3 * k + 1][i];
+          at[2] += u[3 * k + 2][i];
+        }
+      }
+    }
+  }
+  return 0.5 * twice_energy;
 }
 
-template <int W, class LawOf, bool viscous, bool partial>
+/// Kelvin-Voigt stress of W cells at their middle, times an eighth of the volume of their points:
+/// added to the stress at all eight points it is the force of the mean gradient.
+template <int W>
+TISSUE_SIM_INLINE void viscous_stress(const Block& b, const BlockField& f, const Layout& l,
+                                      const float* in, const float* in_rate, int z, int j,
+                                      Vec<W>* P) {
+  Vec<W> F[9], rate[9];
+  for (int c = 0; c < 3; ++c) {
+    const float *q[3], *r[3];
+    for (int i = 0; i < 3; ++i) {
+      const int slot = (z + i) % 3;
+      q[i] = in + slot * l.in_plane + c * kStressXyCount * l.quantity + j;
+      r[i] = in_rate + (3 * slot + c) * kMeanXyCount * l.quantity + j;
+    }
+    const auto of = [&l](const float* const(&plane)[3], int k) {
+      return std::array<const float*, 3>{plane[0] + k * l.quantity, plane[1] + k * l.quantity,
+                                         plane[2] + k * l.quantity};
+    };
+    mean_gradient<W>(of(q, kAA), of(q, kAd), of(q, kdA), c, F);
+    mean_gradient<W>(of(r, kMeanAA), of(r, kMeanAd), of(r, kMeandA), c, rate);
+  }
+  add_identity<W>(F);
+  const float* volume = b.volume.data() + static_cast<std::size_t>(z) * 8 * l.stride + j;
+  Vec<W> V = load<W>(volume);
+  for (int s = 1; s < 8; ++s) V += load<W>(volume + s * l.stride);
+  for (int i = 0; i < 9; ++i) P[i] = 0.0f * V;
+  add_viscous_stress(F, rate, 0.125f * f.viscosity * V, P);
+}
+
+/// Stress of the cells in W lanes, from the incoming x-y quantities to the outgoing ones.
+template <int W, class LawOf, bool viscous>
+TISSUE_SIM_INLINE void stress_lanes(const Block& b, const BlockField& f, const Layout& l,
+                                    const float* in, const float* in_rate, int z, int j,
+                                    float* out) {
+  Vec<W> G[8][9], damping[9];
+  gradients<W>(l, in, z, j, G);
+  if (viscous) viscous_stress<W>(b, f, l, in, in_rate, z, j, damping);
+  const float* volume = b.volume.data() + static_cast<std::size_t>(z) * 8 * l.stride + j;
+  for (int s = 0; s < 8; ++s) {
+    const Vec<W> V = load<W>(volume + s * l.stride);
+    Vec<W> P[9];
+    add_identity<W>(G[s]);
+    LawOf::stress(G[s], f.mu * V, f.lambda * V, P);
+    for (int i = 0; i < 9; ++i) G[s][i] = viscous ? P[i] + damping[i] : P[i];
+  }
+  for (int c = 0; c < 3; ++c) {
+    float* q = out + kLanes + c * kStressXyCount * l.quantity + j;
+    add_divergence<W>(G, c, l.quantity, q + (z % 3) * l.out_plane, q + ((z + 1) % 3) * l.out_plane,
+                      q + ((z + 2) % 3) * l.out_plane);
+  }
+}
+
+template <int W, class LawOf, bool viscous>
 TISSUE_SIM_INLINE void forces(const Block& b, const BlockField& f, BlockScratch& scratch,
                               float* force) {
   const Layout l(b);
   const float inv_h = 1.0f / f.cell_size;
   reserve(scratch.nodes, 3 * l.node_component);
   reserve(scratch.in, 3 * l.in_plane);
-  reserve(scratch.out, 3 * l.out_plane);
-  reserve(scratch.row, 3 * (l.plane + kLanes) + kLanes);
+  reserve(scratch.out, 3 * l.out_plane + kLanes);
+  reserve(scratch.row, 3 * l.sum_component);
   gather_nodes(b, f, f.nodes->u, inv_h, l, scratch.nodes.data());
   if (viscous) {
     reserve(scratch.velocities, 3 * l.node_component);
-    reserve(scratch.in_rate, 3 * l.in_plane);
+    reserve(scratch.in_rate, 9 * kMeanXyCount * l.quantity);
     gather_nodes(b, f, f.nodes->v, inv_h, l, scratch.velocities.data());
   }
   float* out = scratch.out.data();
-  std::fill_n(out, 3 * l.out_plane, 0.0f);
-  std::fill_n(scratch.row.data(), 3 * (l.plane + kLanes) + kLanes, 0.0f);
+  std::fill_n(out, 2 * l.out_plane, 0.0f);  // the third is written before it is added to
   for (int z = 0; z < 2; ++z) {
-    load_plane<W, partial>(l, scratch.nodes.data(), z, scratch.in.data());
-    if (viscous) load_plane<W>(l, scratch.velocities.data(), z, scratch.in_rate.data());
+    load_plane<W>(b, l, scratch.nodes.data(), z, scratch.in.data());
+    if (viscous) load_mean_plane<W>(b, l, scratch.velocities.data(), z, scratch.in_rate.data());
   }
+  const int lanes = b.runs.back().lane + b.runs.back().count;
   for (int z = 0; z < b.nz + 2; ++z) {
     if (z < b.nz) {
-      load_plane<W, partial>(l, scratch.nodes.data(), z + 2, scratch.in.data());
-      for (int c = 0; partial && c < 3; ++c) {  // the stress does not write it
-        std::fill_n(out + ((z + 2) % 3) * l.out_plane + (c * kXyCount + kBB) * l.out_quantity,
-                    l.out_quantity, 0.0f);
+      load_plane<W>(b, l, scratch.nodes.data(), z + 2, scratch.in.data());
+      if (viscous) {
+        load_mean_plane<W>(b, l, scratch.velocities.data(), z + 2, scratch.in_rate.data());
       }
-      if (viscous) load_plane<W>(l, scratch.velocities.data(), z + 2, scratch.in_rate.data());
-      for (int j = 0; j < l.stride; j += W) {
-        Vec<W> G[8][9], rate[8][9];
-        gradients<W>(l, scratch.in.data(), z, j, G);
-        if (viscous) gradients<W>(l, scratch.in_rate.data(), z, j, rate);
-        const float* volume = b.volume.data() + static_cast<std::size_t>(z) * 8 * l.stride + j;
-        for (int s = 0; s < 8; ++s) {
-          const Vec<W> V = load<W>(volume + s * l.stride);
-          Vec<W> P[9];
-          add_identity<W>(G[s]);
-          LawOf::stress(G[s], f.mu * V, f.lambda * V, P);
-          if (viscous) add_viscous_stress(G[s], rate[s], f.viscosity * V, P);
-          for (int i = 0; i < 9; ++i) G[s][i] = P[i];
-        }
-        const float* cell = partial ? b.partial.data() + z * l.stride + j : nullptr;
-        const bool stabilised = partial && any_nonzero<W>(cell);
-        for (int c = 0; c < 3; ++c) {
-          float* q = out + l.front + c * kXyCount * l.out_quantity + j;
-          float *q0 = q + (z % 3) * l.out_plane, *q1 = q + ((z + 1) % 3) * l.out_plane,
-                *q2 = q + ((z + 2) % 3) * l.out_plane;
-          add_divergence<W>(G, c, l.out_quantity, q0, q1, q2);
-          if (stabilised) {
-            const float* in = scratch.in.data() + c * kXyCount * l.stride + j;
-            stabilise<W>(in + (z % 3) * l.in_plane, in + ((z + 1) % 3) * l.in_plane,
-                         in + ((z + 2) % 3) * l.in_plane, l.stride,
-                         kStabilisation * f.mu * load<W>(cell), l.out_quantity, q0, q1, q2);
-          }
-        }
-      }
+      for_each_vector<W>(
+          lanes, [&](auto width, int j) __attribute__((always_inline)) {
+            stress_lanes<width, LawOf, viscous>(b, f, l, scratch.in.data(), scratch.in_rate.data(),
+                                                z, j, out);
+          });
     }
-    for (int c = 0; c < 3; ++c) {
-      xy_transpose<W, partial>(
-          out + l.front + (z % 3) * l.out_plane + c * kXyCount * l.out_quantity, l.out_quantity,
-          l.pitch, l.plane, -inv_h, scratch.row.data(), l.plane + kLanes,
-          force + (c * (b.nz + 2) + z) * l.plane);
-    }
+    store_plane<W>(b, l, out, z, -inv_h, scratch.row.data(), force);
   }
-}
-
-template <int W, class LawOf, bool viscous>
-TISSUE_SIM_INLINE void forces_of(const Block& b, const BlockField& f, BlockScratch& s, float* out) {
-  b.partial.empty() ? forces<W, LawOf, viscous, false>(b, f, s, out)
-                    : forces<W, LawOf, viscous, true>(b, f, s, out);
+  stabilise_cells<W>(b, f, l, scratch.nodes.data(), force);
 }
 
 template <int W>
@@ -161,11 +271,11 @@ TISSUE_SIM_INLINE void forces_any(const Block& b, const BlockField& f, BlockScra
                                   float* out) {
   const bool viscous = f.viscosity > 0;
   if (f.law == Law::kNeoHookean) {
-    viscous ? forces_of<W, NeoHookean, true>(b, f, s, out)
-            : forces_of<W, NeoHookean, false>(b, f, s, out);
+    viscous ? forces<W, NeoHookean, true>(b, f, s, out)
+            : forces<W, NeoHookean, false>(b, f, s, out);
   } else {
-    viscous ? forces_of<W, FixedCorotated, true>(b, f, s, out)
-            : forces_of<W, FixedCorotated, false>(b, f, s, out);
+    viscous ? forces<W, FixedCorotated, true>(b, f, s, out)
+            : forces<W, FixedCorotated, false>(b, f, s, out);
   }
 }
 
@@ -192,15 +302,15 @@ TISSUE_SIM_INLINE void positions(const Block& b, const BlockField& f, const Arra
   gather_nodes(b, f, u, 1.0f, l, scratch.nodes.data());
   add_reference(b, f, l, scratch.nodes.data());
   const float* in = scratch.in.data();
-  for (int z = 0; z < 2; ++z) load_plane<W>(l, scratch.nodes.data(), z, scratch.in.data());
+  for (int z = 0; z < 2; ++z) load_plane<W>(b, l, scratch.nodes.data(), z, scratch.in.data());
   for (int z = 0; z < b.nz; ++z) {
-    load_plane<W>(l, scratch.nodes.data(), z + 2, scratch.in.data());
+    load_plane<W>(b, l, scratch.nodes.data(), z + 2, scratch.in.data());
     for (int c = 0; c < 3; ++c) {
       for (int j = 0; j < l.stride; j += W) {
         constexpr XyQuantity kinds[4] = {kAA, kdA, kAd, kdd};
         Vec<W> w[2][4];
         for (int k = 0; k < 4; ++k) {
-          const float* q = in + (c * kXyCount + kinds[k]) * l.stride + j;
+          const float* q = in + (c * kStressXyCount + kinds[k]) * l.quantity + j;
           const Line<Vec<W>> line(load<W>(q + (z % 3) * l.in_plane),
                                   load<W>(q + ((z + 1) % 3) * l.in_plane),
                                   load<W>(q + ((z + 2) % 3) * l.in_plane));
@@ -226,23 +336,13 @@ TISSUE_SIM_INLINE BlockState state(const Block& b, const BlockField& f, BlockScr
   reserve(scratch.in, 3 * l.in_plane);
   gather_nodes(b, f, f.nodes->u, 1.0f / f.cell_size, l, scratch.nodes.data());
   BlockState result;
-  for (int z = 0; z < 2; ++z) load_plane<W, true>(l, scratch.nodes.data(), z, scratch.in.data());
+  result.elastic_energy = stabilise_cells<W>(b, f, l, scratch.nodes.data(), nullptr);
+  for (int z = 0; z < 2; ++z) load_plane<W>(b, l, scratch.nodes.data(), z, scratch.in.data());
   for (int z = 0; z < b.nz; ++z) {
-    load_plane<W, true>(l, scratch.nodes.data(), z + 2, scratch.in.data());
+    load_plane<W>(b, l, scratch.nodes.data(), z + 2, scratch.in.data());
     for (int j = 0; j < l.stride; j += W) {
       Vec<W> G[8][9];
       gradients<W>(l, scratch.in.data(), z, j, G);
-      for (int c = 0; !b.partial.empty() && c < 3; ++c) {
-        const float* in = scratch.in.data() + c * kXyCount * l.stride + j;
-        const Vec<W> stiffness =
-            kStabilisation * f.mu * load<W>(b.partial.data() + z * l.stride + j);
-        const Vec<W> energy = stabilise<W>(
-            in + (z % 3) * l.in_plane, in + ((z + 1) % 3) * l.in_plane,
-            in + ((z + 2) % 3) * l.in_plane, l.stride, stiffness, 0, nullptr, nullptr, nullptr);
-        for (int i = 0; i < W; ++i) {
-          if (stiffness[i] != 0) result.elastic_energy += 0.5 * static_cast<double>(energy[i]);
-        }
-      }
       const std::size_t lane = static_cast<std::size_t>(z) * 8 * l.stride + j;
       for (int s = 0; s < 8; ++s) {
         const float* volume = b.volume.data() + lane + s * l.stride;

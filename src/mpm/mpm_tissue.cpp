@@ -22,7 +22,9 @@ MpmTissue::MpmTissue(const Scene& scene, std::vector<std::string> notes)
   measure_pieces(*state_, pieces_);
 }
 
-float MpmTissue::stable_substep() const { return tissue_sim::stable_substep(*state_, stiffening_); }
+float MpmTissue::stable_substep() const {
+  return tissue_sim::stable_substep(*state_, stiffening_);
+}
 
 void MpmTissue::cut(Span<const BladePath> paths, const Array<float>* u_before,
                     const std::vector<BlockMotion>& before, CutReport& report) {

@@ -59,6 +59,10 @@ TEST_P(Substep, AgreesWithBruteForce) {
     if (GetParam().cuts > 2) {  // one that ends inside
       cut_now(tissue, upright_blade({Vec3(-0.01, 0.006, 0), Vec3(0.012, 0.008, 0)}));
     }
+    for (int i = 3; i < GetParam().cuts; ++i) {  // small pieces, among them points alone
+      const Vec3 normal(std::sin(1.0 * i), std::sin(2.3 * i), std::cos(3.1 * i));
+      cut_now(tissue, plane_cut(middle + 0.004 * std::sin(5.0 * i) * normal, normal));
+    }
     shake(state, 7, 8e-5);
     const float dt = 1e-4f;
     const reference::Step expected = reference::substep(state, dt);
@@ -93,6 +97,7 @@ std::vector<Case> cases() {
     all.push_back({"cut", Law::kFixedCorotated, 0, 1, set});
     all.push_back({"cut crosswise, viscous", Law::kNeoHookean, 2, 2, set});
     all.push_back({"cut crosswise and in part", Law::kFixedCorotated, 0, 3, set});
+    all.push_back({"shattered, viscous", Law::kFixedCorotated, 2, 16, set});
   }
   const InstructionSet best = instruction_set();
   while (all.back().instruction_set != std::string("sse2") && best < InstructionSet::kAvx512) {

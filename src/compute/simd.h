@@ -17,6 +17,40 @@ struct VecOf {
 template <int W>
 using Vec = typename VecOf<W>::type;
 
+/// One integer for each lane: all bits set or none.
+template <int W>
+struct MaskOf {
+  typedef std::int32_t type __attribute__((vector_size(W * sizeof(float))));
+};
+template <int W>
+using Mask = typename MaskOf<W>::type;
+
+/// Lanes begin .. end - 1. From a table, for GCC 12 compares wide vectors of integers one by one.
+template <int W>
+TISSUE_SIM_INLINE Mask<W> lanes_between(int begin, int end) {
+  struct Steps {
+    std::int32_t from[4 * W], to[4 * W];
+    constexpr Steps() : from(), to() {
+      for (int i = 0; i < 4 * W; ++i) {
+        from[i] = i < 2 * W ? 0 : -1;
+        to[i] = i < 2 * W ? -1 : 0;
+      }
+    }
+  };
+  static constexpr Steps steps;
+  typedef std::int32_t Unaligned
+      __attribute__((vector_size(W * sizeof(float)), aligned(4), may_alias));
+  begin = begin < -W ? -W : begin;
+  end = end > W ? W : end;
+  return *reinterpret_cast<const Unaligned*>(steps.from + 2 * W - begin) &
+         *reinterpret_cast<const Unaligned*>(steps.to + 2 * W - end);
+}
+/// v where the mask is set, else 0.
+template <int W>
+TISSUE_SIM_INLINE Vec<W> keep(Mask<W> mask, Vec<W> v) {
+  return reinterpret_cast<Vec<W>>(reinterpret_cast<Mask<W>>(v) & mask);
+}
+
 /// W floats from any address.
 template <int W>
 TISSUE_SIM_INLINE Vec<W> load(const float* p) {

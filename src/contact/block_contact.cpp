@@ -48,7 +48,7 @@ Stencil stencil_of(const Block& b, int lane) {
   int k = 0;
   for (int dz = 0; dz < 3; ++dz) {
     for (int dy = 0; dy < 3; ++dy) {
-      const int row = (z + dz) * b.plane + j + dy * b.pitch;
+      const int row = (z + dz) * b.plane + b.cell[j] + dy * b.pitch;
       for (int dx = 0; dx < 3; ++dx) s.local[k++] = row + dx;
     }
   }

@@ -156,25 +156,25 @@ void merge(std::vector<Facet>& facets, std::size_t first) {
 std::vector<Facet> facets_of(const LatticeBody& body, const Points& points, const Block& block) {
   std::vector<Facet> facets;
   for (int z = 0; z < block.nz; ++z) {
-    for (int y = 0; y < block.ny; ++y) {
-      for (int x = 0; x < block.nx; ++x) {
+    for (const Block::Run& run : block.runs) {
+      for (int i = 0; i < run.count; ++i) {
+        const int lane = run.lane + i;
         std::int32_t around[8];
         unsigned missing[2][kBondCount] = {};  // the cell's points without a bond: cut, never had
         for (int s = 0; s < 8; ++s) {
-          around[s] = block.point[(static_cast<std::size_t>(z) * 8 + s) * block.stride +
-                                  y * block.pitch + x];
+          around[s] = block.point[(static_cast<std::size_t>(z) * 8 + s) * block.stride + lane];
           if (around[s] < 0 || points.bonds[around[s]] == kAllBonds) continue;
           const unsigned had = whole_bonds(body, points.site[around[s]]);
           for (int k = 0; k < kBondCount; ++k) {
             if ((points.bonds[around[s]] >> k & 1) == 0) missing[~had >> k & 1][k] |= 1u << s;
           }
         }
-        const Place corner = {2 * (block.x + x), 2 * (block.y + y), 2 * (block.z + z)};
-        const int cell = z * block.plane + y * block.pitch + x;
+        const Place corner = {2 * (block.x + run.x + i), 2 * (block.y + run.y), 2 * (block.z + z)};
+        const int cell = z * block.plane + block.cell[lane];
         const std::size_t first = facets.size();
-        for (int i = 0; i < 4 * kBondCount; ++i) {
+        for (int j = 0; j < 4 * kBondCount; ++j) {
           constexpr unsigned kUpper[3] = {0xaa, 0xcc, 0xf0};  // points above along x, y, z
-          const int outer = i / 2 % 2, level = i % 2, k = i / 4;
+          const int outer = j / 2 % 2, level = j % 2, k = j / 4;
           const int axis = k < kForwardBond ? kForwardBond - 1 - k : k - kForwardBond;
           const unsigned members = missing[outer][k] & (level == 1 ? kUpper[axis] : ~kUpper[axis]);
           if (members == 0) continue;

@@ -20,30 +20,49 @@ int place(const Points::Site& p, int x, int y, int z) {
 float weight_at(int i) { return lattice_weight(i & 1, 2 - i / 2); }
 
 /// Components of the bonds within the box, numbered by their first place. Returns their count.
+/// A z-plane of the box is 36 bits of a word, and a component grows along all bonds at once.
 int components(const std::int32_t (&around)[216], const Points& points,
                std::uint8_t (&label)[216]) {
+  using Planes = std::uint64_t[6];
+  Planes left = {}, along_x = {}, along_y = {}, along_z = {};  // points; bonds to the next place
+  constexpr std::uint64_t kNotLastX = 0x7df7df7df,
+                          kNotLastY = 0x3fffffff;  // places with a next one
+  for (int i = 0; i < 216; ++i) {
+    if (around[i] < 0) continue;
+    const std::uint64_t bit = std::uint64_t(1) << (i % 36);
+    const unsigned bonds = points.bonds[around[i]];
+    left[i / 36] |= bit;
+    if ((bonds >> kForwardBond & 1) != 0) along_x[i / 36] |= bit & kNotLastX;
+    if ((bonds >> (kForwardBond + 1) & 1) != 0) along_y[i / 36] |= bit & kNotLastY;
+    if ((bonds >> (kForwardBond + 2) & 1) != 0 && i < 180) along_z[i / 36] |= bit;
+  }
   std::memset(label, kNone, sizeof(label));
   int count = 0;
-  std::uint8_t stack[216];
-  for (int start = 0; start < 216; ++start) {
-    if (around[start] < 0 || label[start] != kNone) continue;
-    int top = 0;
-    stack[top++] = static_cast<std::uint8_t>(start);
-    label[start] = static_cast<std::uint8_t>(count);
-    while (top > 0) {
-      const int at = stack[--top];
-      const int x = at % 6, y = at / 6 % 6, z = at / 36;
-      for (unsigned bonds = points.bonds[around[at]]; bonds != 0; bonds &= bonds - 1) {
-        const BondOffset o = bond_offset(__builtin_ctz(bonds));
-        const int i = x + o.x, j = y + o.y, k = z + o.z;
-        if (i < 0 || j < 0 || k < 0 || i > 5 || j > 5 || k > 5) continue;
-        const int next = (k * 6 + j) * 6 + i;
-        if (label[next] != kNone) continue;
-        label[next] = static_cast<std::uint8_t>(count);
-        stack[top++] = static_cast<std::uint8_t>(next);
+  for (int start = 0; start < 6; ++start) {
+    while (left[start] != 0) {
+      Planes reached = {};
+      reached[start] = left[start] & -left[start];
+      for (bool grows = true; grows;) {
+        grows = false;
+        for (int z = 0; z < 6; ++z) {
+          const std::uint64_t before = reached[z];
+          std::uint64_t m = before;
+          if (z > 0) m |= reached[z - 1] & along_z[z - 1];
+          if (z < 5) m |= reached[z + 1] & along_z[z];
+          m |= (m & along_x[z]) << 1 | (m >> 1 & along_x[z]);
+          m |= (m & along_y[z]) << 6 | (m >> 6 & along_y[z]);
+          reached[z] = m;
+          grows = grows || m != before;
+        }
       }
+      for (int z = 0; z < 6; ++z) {
+        left[z] &= ~reached[z];
+        for (std::uint64_t m = reached[z]; m != 0; m &= m - 1) {
+          label[36 * z + __builtin_ctzll(m)] = static_cast<std::uint8_t>(count);
+        }
+      }
+      ++count;
     }
-    ++count;
   }
   return count;
 }
@@ -54,29 +73,22 @@ int components(const std::int32_t (&around)[216], const Points& points,
 // region, of one a cell and a quarter outside 1.6 %).
 constexpr double kAnchoredShare = 0.05;
 
-/// Mass of each component at the node, and how much of it is anchored.
-struct Share {
-  double mass = 0, anchored_mass = 0;
-
-  bool anchored() const { return anchored_mass > kAnchoredShare * mass; }
-};
-
-void set_mass(Nodes& nodes, int node, const Share& share) {
+void set_mass(Nodes& nodes, int node, const NodeShare& share) {
   nodes.mass[node] = static_cast<float>(share.mass);
-  const bool fast = share.anchored() || share.mass <= 0;
+  const bool fast = share.anchored_mass > kAnchoredShare * share.mass || share.mass <= 0;
   nodes.inv_mass[node] = fast ? 0.0f : 1.0f / nodes.mass[node];
   if (fast) {
     for (int c = 0; c < 3; ++c) nodes.v[c][node] = 0;
   }
 }
 
-std::vector<Share> shares(const LatticeBody& body, const Points& points,
-                          const std::int32_t (&around)[216], const std::uint8_t (&label)[216],
-                          int count) {
-  std::vector<Share> result(count);
+std::vector<NodeShare> shares(const LatticeBody& body, const Points& points,
+                              const std::int32_t (&around)[216], const std::uint8_t (&label)[216],
+                              int count) {
+  std::vector<NodeShare> result(count);
   for (int i = 0; i < 216; ++i) {
     if (around[i] < 0) continue;
-    Share& s = result[label[i]];
+    NodeShare& s = result[label[i]];
     const double mass = body.material.density * points.volume[around[i]] * weight_at(i % 6) *
                         weight_at(i / 6 % 6) * weight_at(i / 36);
     s.mass += mass;
@@ -117,23 +129,28 @@ int NodeFields::node(const LatticeBody& body, const Points::Site& p, int k) cons
   return node(body, p, p.x / 2 + k % 3 - 1, p.y / 2 + k / 3 % 3 - 1, p.z / 2 + k / 9 - 1);
 }
 
-bool NodeFields::split_node(const LatticeBody& body, const Points& points, const Cell& cell,
-                            const Components& components, Nodes& nodes) {
-  const int lattice_node = body.node(cell.x, cell.y, cell.z);
-  const auto before = splits_.find(lattice_node);
-  const int count_before =
-      before == splits_.end() ? 1 : static_cast<int>(before->second.field.size());
-  // Components only come apart, so the same number means the same components.
-  if (components.count == count_before) return false;
-  const auto& label = components.label;
+NodeFields::Components NodeFields::find_components(const LatticeBody& body, const Points& points,
+                                                   const Cell& cell) const {
   std::int32_t around[216];
   points_around(body, cell.x, cell.y, cell.z, around);
+  Components found;
+  const int count = components(around, points, found.label);
+  const Split* before = split(body.node(cell.x, cell.y, cell.z));
+  // Components only come apart, so the same number means the same components.
+  if (count != (before == nullptr ? 1 : static_cast<int>(before->field.size()))) {
+    found.share = shares(body, points, around, found.label, count);
+  }
+  return found;
+}
+
+void NodeFields::split_node(int lattice_node, const Components& components, Nodes& nodes) {
+  const auto before = splits_.find(lattice_node);
+  const auto& label = components.label;
   Split split;
   std::copy(std::begin(label), std::end(label), split.component);
-  const std::vector<Share> share = shares(body, points, around, label, components.count);
   std::vector<std::int32_t> taken;
   for (int i = 0; i < 216; ++i) {
-    if (around[i] < 0 || label[i] != split.field.size()) continue;  // the first of its component
+    if (label[i] != split.field.size()) continue;  // the first of its component
     const int parent =
         before == splits_.end() ? lattice_node : before->second.field[before->second.component[i]];
     int field = parent;
@@ -148,9 +165,10 @@ bool NodeFields::split_node(const LatticeBody& body, const Points& points, const
     taken.push_back(parent);
     split.field.push_back(field);
   }
-  for (int c = 0; c < components.count; ++c) set_mass(nodes, split.field[c], share[c]);
+  for (std::size_t c = 0; c < components.share.size(); ++c) {
+    set_mass(nodes, split.field[c], components.share[c]);
+  }
   splits_[lattice_node] = std::move(split);
-  return true;
 }
 
 std::vector<NodeFields::Cell> NodeFields::update(const std::vector<LatticeBody>& bodies,
@@ -171,18 +189,13 @@ std::vector<NodeFields::Cell> NodeFields::update(const std::vector<LatticeBody>&
   std::vector<Components> found(cells.size());
   cpu.for_each(
       static_cast<int>(cells.size()),
-      [&](int i) {
-        const Cell& c = cells[i];
-        std::int32_t around[216];
-        points_around(bodies[c.body], c.x, c.y, c.z, around);
-        found[i].count = components(around, points, found[i].label);
-      },
-      32);
+      [&](int i) { found[i] = find_components(bodies[cells[i].body], points, cells[i]); }, 32);
   std::vector<Cell> split;
   for (std::size_t i = 0; i < cells.size(); ++i) {
-    if (split_node(bodies[cells[i].body], points, cells[i], found[i], nodes)) {
-      split.push_back(cells[i]);
-    }
+    if (found[i].share.empty()) continue;
+    const Cell& c = cells[i];
+    split_node(bodies[c.body].node(c.x, c.y, c.z), found[i], nodes);
+    split.push_back(c);
   }
   return split;
 }

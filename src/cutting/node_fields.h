@@ -3,9 +3,9 @@
 //
 // A node's points are those within its weight's support. They are taken apart into the components
 // that the bonds among them leave, and each component gets a field. Bonds only ever break, so a
-// field only ever comes apart and a new one starts with its parent's motion: no force and no momentum
-// appears when tissue is cut, no energy but the little that stabilisation takes up, and a slow sweep
-// ends where a fast one does.
+// field only ever comes apart and a new one starts with its parent's motion: no force and no
+// momentum appears when tissue is cut, no energy but the little that stabilisation takes up, and a
+// slow sweep ends where a fast one does.
 #pragma once
 
 #include <cstdint>
@@ -17,6 +17,11 @@
 #include "mpm/nodes.h"
 
 namespace tissue_sim {
+
+/// Mass of a component at a node, and how much of it is anchored [kg].
+struct NodeShare {
+  double mass = 0, anchored_mass = 0;
+};
 
 class NodeFields {
  public:
@@ -54,10 +59,10 @@ class NodeFields {
   /// Components of a node's points, as the bonds have them now.
   struct Components {
     std::uint8_t label[216];
-    int count;
+    std::vector<NodeShare> share;  ///< of each; empty if they are what they were
   };
-  bool split_node(const LatticeBody& body, const Points& points, const Cell& cell,
-                  const Components& components, Nodes& nodes);
+  Components find_components(const LatticeBody& body, const Points& points, const Cell& cell) const;
+  void split_node(int lattice_node, const Components& components, Nodes& nodes);
 
   std::unordered_map<int, Split> splits_;
 };

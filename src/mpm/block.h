@@ -1,9 +1,8 @@
 // Block: a box of lattice cells that is worked on as a whole, with its points' volumes.
 //
-// Cells of one z-plane are numbered flat, cell (x, y) at y * pitch + x with pitch = nx + 2, so that
-// SIMD lanes run along x across the row ends, a neighbour along y is `pitch` away, and the node
-// that is dx, dy (0..2) from a cell's lowest is at the cell's number + dy * pitch + dx. The two
-// lanes between rows hold no points: their volume is zero.
+// Nodes of one z-plane are numbered flat, node (x, y) at y * pitch + x. Cells are worked on in runs
+// along x, and SIMD lanes go through the runs one after the other without a gap: a row with a hole,
+// or the side of an oblique cut, costs the cells that it has.
 #pragma once
 
 #include <cstdint>
@@ -23,15 +22,33 @@ struct Block {
   int nx = 0, ny = 0, nz = 0;  ///< cells
 
   int pitch = 0;   ///< nx + 2
-  int stride = 0;  ///< lanes of one z-plane of cells, a multiple of kLanes
+  int stride = 0;  ///< lanes of one z-plane of cells: those of the runs, padded to whole kLanes
   int plane = 0;   ///< nodes of one z-plane, (ny + 2) * pitch and some to fill the last lanes
+
+  /// Cells (x .. x + count - 1, y), in the lanes from `lane` on; the same in each z-plane. In order
+  /// of lanes, rows and cells.
+  struct Run {
+    int x, y, count, lane;
+  };
+  std::vector<Run> runs;
+  struct NodeSpan {
+    int begin, end;
+  };
+  std::vector<NodeSpan> node_rows;  ///< [ny + 2]: nodes of the row that the runs see
+  /// [stride]: lowest node of the lane's cell, y * pitch + x; 0 in padding. The node at dx, dy, dz
+  /// (0..2) from it has the number z * plane + cell[lane] + dz * plane + dy * pitch + dx.
+  std::vector<std::int32_t> cell;
 
   Array<float> volume;        ///< [nz][8][stride], 0 where there is no point [m^3]
   Array<std::int32_t> point;  ///< [nz][8][stride], the point's number or -1
 
-  /// [nz][stride]: volume of a cell's points where they are fewer than eight, else 0 [m^3]. Empty
-  /// if every cell of the block is full. See mpm/stabilisation.h.
-  Array<float> partial;
+  /// A cell of which the block has some, but not all eight points. See mpm/stabilisation.h.
+  struct PartialCell {
+    int lane;      ///< z * stride + its lane
+    int node;      ///< its lowest, in the block's nodes
+    float volume;  ///< of its points [m^3]
+  };
+  std::vector<PartialCell> partial;
 
   /// Nodes of the block that are not the lattice's own, for the tissue is cut there: the field that
   /// this block's points see instead.
@@ -52,7 +69,7 @@ struct Block {
   std::size_t lane_count() const { return static_cast<std::size_t>(nz) * 8 * stride; }
 };
 
-/// Sets pitch, stride and plane from nx, ny, nz and makes the arrays, without points.
+/// Sets all that follows from nx, ny, nz and the runs, and makes the arrays, without points.
 void lay_out(Block& block);
 
 }  // namespace tissue_sim

@@ -2,6 +2,9 @@
 // a node plane, then z between three planes, and the transpose for the forces. See docs/design.md.
 #pragma once
 
+#include <array>
+#include <type_traits>
+
 #include "compute/simd.h"
 #include "math/bspline.h"
 
@@ -36,28 +39,67 @@ struct Line {
   }
 };
 
-/// x-y pass of one component on one node plane: u[plane] -> q[kXyCount][stride].
-template <int W, bool bend_bend>
+/// Calls f(width, j) for the steps that cover `count` lanes: W wide, but the last half as wide
+/// where that is enough.
+template <int W, class F>
+TISSUE_SIM_INLINE void for_each_vector(int count, const F& f) {
+  constexpr int half = W > 4 ? W / 2 : W;
+  int j = 0;
+  for (; count - j > (W > 4 ? half : 0); j += W) f(std::integral_constant<int, W>(), j);
+  if (j < count) f(std::integral_constant<int, half>(), j);
+}
+
+/// x-y pass of one component for W cells: u, at the first one's lowest node of a node plane, ->
+/// q[kStressXyCount][stride].
+template <int W>
 TISSUE_SIM_INLINE void xy_pass(const float* u, int pitch, int stride, float* q) {
-  for (int j = 0; j < stride; j += W) {
-    const float* p = u + j;
-    const Line<Vec<W>> r0(load<W>(p), load<W>(p + 1), load<W>(p + 2));
-    p += pitch;
-    const Line<Vec<W>> r1(load<W>(p), load<W>(p + 1), load<W>(p + 2));
-    p += pitch;
-    const Line<Vec<W>> r2(load<W>(p), load<W>(p + 1), load<W>(p + 2));
-    const Line<Vec<W>> a(r0.A, r1.A, r2.A), d(r0.d, r1.d, r2.d), b(r0.B, r1.B, r2.B);
-    float* out = q + j;
-    store<W>(out + kAA * stride, a.A);
-    store<W>(out + kAd * stride, a.d);
-    store<W>(out + kAB * stride, a.B);
-    store<W>(out + kdA * stride, d.A);
-    store<W>(out + kdd * stride, d.d);
-    store<W>(out + kdB * stride, d.B);
-    store<W>(out + kBA * stride, b.A);
-    store<W>(out + kBd * stride, b.d);
-    if (bend_bend) store<W>(out + kBB * stride, b.B);
-  }
+  const Line<Vec<W>> r0(load<W>(u), load<W>(u + 1), load<W>(u + 2));
+  u += pitch;
+  const Line<Vec<W>> r1(load<W>(u), load<W>(u + 1), load<W>(u + 2));
+  u += pitch;
+  const Line<Vec<W>> r2(load<W>(u), load<W>(u + 1), load<W>(u + 2));
+  const Line<Vec<W>> a(r0.A, r1.A, r2.A), d(r0.d, r1.d, r2.d), b(r0.B, r1.B, r2.B);
+  store<W>(q + kAA * stride, a.A);
+  store<W>(q + kAd * stride, a.d);
+  store<W>(q + kAB * stride, a.B);
+  store<W>(q + kdA * stride, d.A);
+  store<W>(q + kdd * stride, d.d);
+  store<W>(q + kdB * stride, d.B);
+  store<W>(q + kBA * stride, b.A);
+  store<W>(q + kBd * stride, b.d);
+}
+
+/// What a cell's mean gradient needs of the x-y pass.
+enum MeanQuantity { kMeanAA, kMeanAd, kMeandA, kMeanXyCount };
+
+/// The same for these quantities alone.
+template <int W>
+TISSUE_SIM_INLINE void mean_xy_pass(const float* u, int pitch, int stride, float* q) {
+  const Line<Vec<W>> r0(load<W>(u), load<W>(u + 1), load<W>(u + 2));
+  u += pitch;
+  const Line<Vec<W>> r1(load<W>(u), load<W>(u + 1), load<W>(u + 2));
+  u += pitch;
+  const Line<Vec<W>> r2(load<W>(u), load<W>(u + 1), load<W>(u + 2));
+  const Line<Vec<W>> a(r0.A, r1.A, r2.A);
+  store<W>(q + kMeanAA * stride, a.A);
+  store<W>(q + kMeanAd * stride, a.d);
+  store<W>(q + kMeandA * stride, kAverageSide * (r0.d + r2.d) + kAverageCenter * r1.d);
+}
+
+/// Mean gradient of one component over the eight places of a cell's points, from its AA, Ad and dA
+/// on three node planes; to the row `3 * component` of G[9].
+template <int W>
+TISSUE_SIM_INLINE void mean_gradient(const std::array<const float*, 3>& AA,
+                                     const std::array<const float*, 3>& Ad,
+                                     const std::array<const float*, 3>& dA, int component,
+                                     Vec<W>* G) {
+  const auto average = [](const std::array<const float*, 3>& q) {
+    return (0.5f * kAverageSide) * (load<W>(q[0]) + load<W>(q[2])) +
+           (0.5f * kAverageCenter) * load<W>(q[1]);
+  };
+  G[3 * component] = average(dA);
+  G[3 * component + 1] = average(Ad);
+  G[3 * component + 2] = 0.5f * (load<W>(AA[2]) - load<W>(AA[0]));
 }
 
 /// z pass and points: gradient of one component at the 8 points of W cells. `q0`, `q1`, `q2` are
@@ -165,45 +207,30 @@ TISSUE_SIM_INLINE void add_divergence(const Vec<W> (*P)[9], int component, int s
   }
 }
 
-/// Transpose of xy_pass(): q[kXyCount] (each preceded by at least 2 * pitch zeros and followed by
-/// zeros) -> force of `count` nodes, times `scale`. `row` holds 3 lines of `row_stride`, of which
-/// the first kLanes floats are zero.
-template <int W, bool bend_bend>
-TISSUE_SIM_INLINE void xy_transpose(const float* q, int q_stride, int pitch, int count, float scale,
-                                    float* row, int row_stride, float* force) {
-  float* ta = row + 16;
-  float* td = ta + row_stride;
-  float* tb = td + row_stride;
-  for (int m = 0; m < count; m += W) {
-    const auto at = [q, q_stride, m](XyQuantity k, int back) {
-      return q + k * q_stride + m - back;
-    };
-    const int p = pitch, pp = 2 * pitch;
-    const Vec<W> aa0 = load<W>(at(kAA, 0)), aa1 = load<W>(at(kAA, p)), aa2 = load<W>(at(kAA, pp));
-    const Vec<W> ad0 = load<W>(at(kAd, 0)), ad2 = load<W>(at(kAd, pp));
-    const Vec<W> ab0 = load<W>(at(kAB, 0)), ab1 = load<W>(at(kAB, p)), ab2 = load<W>(at(kAB, pp));
-    store<W>(ta + m, kAverageSide * (aa0 + aa2) + kAverageCenter * aa1 + (ad2 - ad0) + (ab0 + ab2) -
-                         2.0f * ab1);
-    const Vec<W> da0 = load<W>(at(kdA, 0)), da1 = load<W>(at(kdA, p)), da2 = load<W>(at(kdA, pp));
-    const Vec<W> dd0 = load<W>(at(kdd, 0)), dd2 = load<W>(at(kdd, pp));
-    const Vec<W> db0 = load<W>(at(kdB, 0)), db1 = load<W>(at(kdB, p)), db2 = load<W>(at(kdB, pp));
-    store<W>(td + m, kAverageSide * (da0 + da2) + kAverageCenter * da1 + (dd2 - dd0) + (db0 + db2) -
-                         2.0f * db1);
-    const Vec<W> ba0 = load<W>(at(kBA, 0)), ba1 = load<W>(at(kBA, p)), ba2 = load<W>(at(kBA, pp));
-    const Vec<W> bd0 = load<W>(at(kBd, 0)), bd2 = load<W>(at(kBd, pp));
-    Vec<W> b = kAverageSide * (ba0 + ba2) + kAverageCenter * ba1 + (bd2 - bd0);
-    if (bend_bend) {
-      b += load<W>(at(kBB, 0)) + load<W>(at(kBB, pp)) - 2.0f * load<W>(at(kBB, p));
-    }
-    store<W>(tb + m, b);
-  }
-  for (int n = 0; n < count; n += W) {
-    const Vec<W> a0 = load<W>(ta + n), a1 = load<W>(ta + n - 1), a2 = load<W>(ta + n - 2);
-    const Vec<W> d0 = load<W>(td + n), d2 = load<W>(td + n - 2);
-    const Vec<W> b0 = load<W>(tb + n), b1 = load<W>(tb + n - 1), b2 = load<W>(tb + n - 2);
-    store<W>(force + n, scale * (kAverageSide * (a0 + a2) + kAverageCenter * a1 + (d2 - d0) +
-                                 (b0 + b2) - 2.0f * b1));
-  }
+/// Transpose of xy_pass(): adds what the q[kStressXyCount][stride] of a run of `count` cells gives
+/// to the nodes m .. m + W - 1 of its three rows; `force` is at the run's lowest. What lies around
+/// the run in `q` is read but does not count; nodes beyond the run get zeros added.
+template <int W>
+TISSUE_SIM_INLINE void xy_transpose(const float* q, int stride, int count, int m, int pitch,
+                                    float* force) {
+  const Mask<W> mask[3] = {lanes_between<W>(-m, count - m), lanes_between<W>(1 - m, count + 1 - m),
+                           lanes_between<W>(2 - m, count + 2 - m)};
+  const auto at = [q, stride, m, &mask](XyQuantity k, int back) {
+    return keep<W>(mask[back], load<W>(q + k * stride + m - back));
+  };
+  const Vec<W> A = kAverageSide * (at(kAA, 0) + at(kAA, 2)) + kAverageCenter * at(kAA, 1) +
+                   (at(kdA, 2) - at(kdA, 0)) + (at(kBA, 0) + at(kBA, 2)) - 2.0f * at(kBA, 1);
+  const Vec<W> d = kAverageSide * (at(kAd, 0) + at(kAd, 2)) + kAverageCenter * at(kAd, 1) +
+                   (at(kdd, 2) - at(kdd, 0)) + (at(kBd, 0) + at(kBd, 2)) - 2.0f * at(kBd, 1);
+  const Vec<W> B = kAverageSide * (at(kAB, 0) + at(kAB, 2)) + kAverageCenter * at(kAB, 1) +
+                   (at(kdB, 2) - at(kdB, 0));
+  const Vec<W> sides = kAverageSide * A + B;
+  float* row = force + m;
+  store<W>(row, load<W>(row) + (sides - d));
+  row += pitch;
+  store<W>(row, load<W>(row) + (kAverageCenter * A - 2.0f * B));
+  row += pitch;
+  store<W>(row, load<W>(row) + (sides + d));
 }
 
 }  // namespace tissue_sim

@@ -1,64 +1,150 @@
 #include "mpm/block_sheets.h"
 
 #include <algorithm>
+#include <utility>
 
 #include "cutting/bonds.h"
 
 namespace tissue_sim {
 namespace {
 
-std::vector<Placed> points_of(const BlockRegion& r, const LatticeBody& b) {
-  std::vector<Placed> result;
-  for (int z = 0; z < 2 * r.nz; ++z) {
-    for (int y = 0; y < 2 * r.ny; ++y) {
-      for (int x = 0; x < 2 * r.nx; ++x) {
-        const int p = b.point(2 * r.x + x, 2 * r.y + y, 2 * r.z + z);
-        if (p < 0) continue;
-        result.push_back({p, static_cast<std::int16_t>(x / 2), static_cast<std::int16_t>(y / 2),
-                          static_cast<std::int16_t>(z / 2),
-                          static_cast<std::int16_t>((x & 1) + 2 * (y & 1) + 4 * (z & 1))});
+/// Shares of a region's cells and the fields that each sees.
+struct Shares {
+  std::vector<CellShare> all;
+  std::vector<std::int32_t> of_site;  ///< [2 nz][2 ny][2 nx], index into `all` or -1
+  /// Split nodes that the share sees are first[i] .. first[i + 1] - 1 of these.
+  std::vector<std::int32_t> first, local, seen;
+};
+
+int site_of(const BlockRegion& r, const CellShare& c, int s) {
+  return ((2 * c.z + (s >> 2)) * 2 * r.ny + 2 * c.y + (s >> 1 & 1)) * 2 * r.nx + 2 * c.x + (s & 1);
+}
+
+/// The points of cell (x, y, z) of the region; false where there is none.
+bool points_in(const BlockRegion& r, const LatticeBody& b, int x, int y, int z,
+               std::int32_t (&point)[8]) {
+  bool any = false;
+  for (int s = 0; s < 8; ++s) {
+    point[s] =
+        b.point(2 * (r.x + x) + (s & 1), 2 * (r.y + y) + (s >> 1 & 1), 2 * (r.z + z) + (s >> 2));
+    any = any || point[s] >= 0;
+  }
+  return any;
+}
+
+/// Calls f(x, y, z, points) for each cell of the region that holds any.
+template <class F>
+void for_each_cell(const BlockRegion& r, const LatticeBody& b, const F& f) {
+  std::int32_t point[8];
+  for (int z = 0; z < r.nz; ++z) {
+    for (int y = 0; y < r.ny; ++y) {
+      for (int x = 0; x < r.nx; ++x) {
+        if (points_in(r, b, x, y, z, point)) f(x, y, z, point);
       }
     }
   }
-  return result;
 }
 
-/// The points in the order in which the bonds reach them: sides of a cut one after the other.
-std::vector<Placed> by_connection(const BlockRegion& r, const Points& points,
-                                  const std::vector<Placed>& all) {
+CellShare share_at(int x, int y, int z) {
+  CellShare c{
+      static_cast<std::int16_t>(x), static_cast<std::int16_t>(y), static_cast<std::int16_t>(z), {}};
+  std::fill_n(c.point, 8, -1);
+  return c;
+}
+
+Shares shares_of(const BlockRegion& r, const LatticeBody& b, const Points& points,
+                 const std::vector<const NodeFields::Split*>& split) {
+  Shares shares;
+  shares.of_site.assign(static_cast<std::size_t>(8) * r.nx * r.ny * r.nz, -1);
+  for_each_cell(r, b, [&](int x, int y, int z, const std::int32_t(&point)[8]) {
+    const std::size_t first_of_cell = shares.all.size();
+    int local[27], count = 0;
+    for (int k = 0; k < 27; ++k) {
+      const int n = ((z + k / 9) * (r.ny + 2) + y + k / 3 % 3) * (r.nx + 2) + x + k % 3;
+      if (split[n] != nullptr) local[count++] = n;
+    }
+    for (int s = 0; s < 8; ++s) {
+      if (point[s] < 0) continue;
+      std::int32_t seen[27];
+      for (int i = 0; i < count; ++i) {
+        const int n = local[i], nx = n % (r.nx + 2), ny = n / (r.nx + 2) % (r.ny + 2);
+        seen[i] = split[n]->seen_by(points.site[point[s]], r.x + nx - 1, r.y + ny - 1,
+                                    r.z + n / (r.nx + 2) / (r.ny + 2) - 1);
+      }
+      std::size_t i = first_of_cell;
+      while (i < shares.all.size() &&
+             !std::equal(seen, seen + count, shares.seen.begin() + shares.first[i])) {
+        ++i;
+      }
+      if (i == shares.all.size()) {
+        shares.all.push_back(share_at(x, y, z));
+        shares.first.push_back(static_cast<std::int32_t>(shares.seen.size()));
+        shares.local.insert(shares.local.end(), local, local + count);
+        shares.seen.insert(shares.seen.end(), seen, seen + count);
+      }
+      shares.all[i].point[s] = point[s];
+      shares.of_site[site_of(r, shares.all[i], s)] = static_cast<std::int32_t>(i);
+    }
+  });
+  shares.first.push_back(static_cast<std::int32_t>(shares.seen.size()));
+  return shares;
+}
+
+/// All shares that bonds within the region reach from `start`, in the order in which they do: sides
+/// of a cut one after the other. Marks them as `reached`.
+std::vector<std::int32_t> connected(const BlockRegion& r, const Points& points,
+                                    const Shares& shares, std::int32_t start,
+                                    std::vector<bool>& reached) {
   const int sx = 2 * r.nx, sy = 2 * r.ny, sz = 2 * r.nz;
-  std::vector<std::int32_t> at(static_cast<std::size_t>(sx) * sy * sz, -1);  // index into `all`
-  const auto site = [sx, sy](int x, int y, int z) { return (z * sy + y) * sx + x; };
-  const auto place = [](const Placed& p, int axis) {
-    const int cell = axis == 0 ? p.x : axis == 1 ? p.y : p.z;
-    return 2 * cell + (p.s >> axis & 1);
-  };
-  for (std::size_t i = 0; i < all.size(); ++i) {
-    at[site(place(all[i], 0), place(all[i], 1), place(all[i], 2))] = static_cast<std::int32_t>(i);
-  }
-  std::vector<Placed> order;
-  order.reserve(all.size());
-  for (std::size_t start = 0; start < all.size(); ++start) {
-    std::int32_t& first =
-        at[site(place(all[start], 0), place(all[start], 1), place(all[start], 2))];
-    if (first < 0) continue;
-    first = -1;
-    std::size_t next = order.size();
-    order.push_back(all[start]);
-    for (; next < order.size(); ++next) {
-      const Placed p = order[next];
-      for (unsigned bonds = points.bonds[p.point]; bonds != 0; bonds &= bonds - 1) {
+  std::vector<std::int32_t> order{start};
+  reached[start] = true;
+  for (std::size_t next = 0; next < order.size(); ++next) {
+    const CellShare& c = shares.all[order[next]];
+    for (int s = 0; s < 8; ++s) {
+      if (c.point[s] < 0) continue;
+      const int x = 2 * c.x + (s & 1), y = 2 * c.y + (s >> 1 & 1), z = 2 * c.z + (s >> 2);
+      for (unsigned bonds = points.bonds[c.point[s]]; bonds != 0; bonds &= bonds - 1) {
         const BondOffset o = bond_offset(__builtin_ctz(bonds));
-        const int x = place(p, 0) + o.x, y = place(p, 1) + o.y, z = place(p, 2) + o.z;
-        if (x < 0 || y < 0 || z < 0 || x >= sx || y >= sy || z >= sz) continue;
-        std::int32_t& neighbour = at[site(x, y, z)];
-        if (neighbour < 0) continue;
-        order.push_back(all[neighbour]);
-        neighbour = -1;
+        const int i = x + o.x, j = y + o.y, k = z + o.z;
+        if (i < 0 || j < 0 || k < 0 || i >= sx || j >= sy || k >= sz) continue;
+        const std::int32_t other = shares.of_site[(k * sy + j) * sx + i];
+        if (reached[other]) continue;
+        reached[other] = true;
+        order.push_back(other);
       }
     }
   }
   return order;
+}
+
+bool fits(const Shares& shares, std::int32_t share, const Sheet& sheet) {
+  for (int i = shares.first[share]; i < shares.first[share + 1]; ++i) {
+    const int there = sheet.node[shares.local[i]];
+    if (there != -1 && there != shares.seen[i]) return false;
+  }
+  return true;
+}
+
+void put(const Shares& shares, std::int32_t share, Sheet& sheet) {
+  for (int i = shares.first[share]; i < shares.first[share + 1]; ++i) {
+    sheet.node[shares.local[i]] = shares.seen[i];
+  }
+  sheet.cells.push_back(shares.all[share]);
+}
+
+/// Puts all the shares or, where not all fit, none; returns which.
+bool put_all(const Shares& shares, const std::vector<std::int32_t>& part, Sheet& sheet) {
+  if (!std::all_of(part.begin(), part.end(),
+                   [&](std::int32_t share) { return fits(shares, share, sheet); })) {
+    return false;
+  }
+  Sheet trial = sheet;  // they may not fit with one another
+  for (const std::int32_t share : part) {
+    if (!fits(shares, share, trial)) return false;
+    put(shares, share, trial);
+  }
+  sheet = std::move(trial);
+  return true;
 }
 
 }  // namespace
@@ -66,7 +152,7 @@ std::vector<Placed> by_connection(const BlockRegion& r, const Points& points,
 std::vector<Sheet> sheets_of(const BlockRegion& r, const LatticeBody& b, const Points& points,
                              const NodeFields& fields) {
   const int px = r.nx + 2, py = r.ny + 2, pz = r.nz + 2;
-  std::vector<const NodeFields::Split*> split(px * py * pz, nullptr);
+  std::vector<const NodeFields::Split*> split(static_cast<std::size_t>(px) * py * pz, nullptr);
   bool any = false;
   for (int z = 0, n = 0; z < pz; ++z) {
     for (int y = 0; y < py; ++y) {
@@ -76,37 +162,35 @@ std::vector<Sheet> sheets_of(const BlockRegion& r, const LatticeBody& b, const P
       }
     }
   }
-  std::vector<Sheet> sheets(1);
   if (!any) {
-    sheets[0].points = points_of(r, b);
-    return sheets;
+    Sheet whole;
+    for_each_cell(r, b, [&whole](int x, int y, int z, const std::int32_t(&point)[8]) {
+      whole.cells.push_back(share_at(x, y, z));
+      std::copy_n(point, 8, whole.cells.back().point);
+    });
+    return {whole};
   }
-  sheets[0].node.assign(split.size(), -1);
-  for (const Placed& p : by_connection(r, points, points_of(r, b))) {
-    int local[27], seen[27], count = 0;
-    for (int k = 0; k < 27; ++k) {
-      const int x = p.x + k % 3, y = p.y + k / 3 % 3, z = p.z + k / 9;
-      const int n = (z * py + y) * px + x;
-      if (split[n] == nullptr) continue;
-      local[count] = n;
-      seen[count++] =
-          split[n]->seen_by(points.site[p.point], r.x + x - 1, r.y + y - 1, r.z + z - 1);
+  const Shares shares = shares_of(r, b, points, split);
+  std::vector<bool> reached(shares.all.size(), false);
+  std::vector<Sheet> sheets;
+  for (std::int32_t start = 0; start < static_cast<std::int32_t>(shares.all.size()); ++start) {
+    if (reached[start]) continue;
+    const std::vector<std::int32_t> part = connected(r, points, shares, start, reached);
+    if (std::any_of(sheets.begin(), sheets.end(),
+                    [&](Sheet& sheet) { return put_all(shares, part, sheet); })) {
+      continue;
     }
-    const auto fits = [&](const Sheet& sheet) {
-      for (int i = 0; i < count; ++i) {
-        const int there = sheet.node[local[i]];
-        if (there != -1 && there != seen[i]) return false;
+    const std::size_t first = sheets.size();
+    for (const std::int32_t share : part) {
+      auto sheet = std::find_if(sheets.begin() + first, sheets.end(),
+                                [&](const Sheet& s) { return fits(shares, share, s); });
+      if (sheet == sheets.end()) {
+        sheets.emplace_back();
+        sheet = sheets.end() - 1;
+        sheet->node.assign(split.size(), -1);
       }
-      return true;
-    };
-    auto sheet = std::find_if(sheets.begin(), sheets.end(), fits);
-    if (sheet == sheets.end()) {
-      sheets.emplace_back();
-      sheet = sheets.end() - 1;
-      sheet->node.assign(split.size(), -1);
+      put(shares, share, *sheet);
     }
-    for (int i = 0; i < count; ++i) sheet->node[local[i]] = seen[i];
-    sheet->points.push_back(p);
   }
   return sheets;
 }

@@ -8,21 +8,23 @@
 
 namespace tissue_sim {
 
-/// A point in a region.
-struct Placed {
-  std::int32_t point;
-  std::int16_t x, y, z;  // cell in the region
-  std::int16_t s;        // sub-position: sx + 2 sy + 4 sz
+/// Points of one cell that see the same fields at all 27 nodes: those of a cell are one such share,
+/// or several where a cut goes through it.
+struct CellShare {
+  std::int16_t x, y, z;   ///< cell in the region
+  std::int32_t point[8];  ///< by sub-position sx + 2 sy + 4 sz, -1 where it has none
 };
 
 /// One set of points for which each node of the region means one field.
 struct Sheet {
-  std::vector<Placed> points;
-  std::vector<std::int32_t> node;  // of the region's nodes, -1 while no point needs it
+  std::vector<CellShare> cells;
+  std::vector<std::int32_t>
+      node;  ///< of the region's nodes, -1 while no point needs it to be split
 };
 
-/// Takes the points of a region apart so that within a sheet no two see different fields of a node;
-/// each goes to the first sheet that it fits, side of a cut after side.
+/// Takes the points of a region apart so that within a sheet no two see different fields of a node.
+/// What the bonds hold together goes to one sheet where it fits, so that the sides of a cut are
+/// sheets of their own and none has a gap where the other one is.
 std::vector<Sheet> sheets_of(const BlockRegion& r, const LatticeBody& b, const Points& points,
                              const NodeFields& fields);
 

@@ -7,34 +7,49 @@
 namespace tissue_sim {
 namespace {
 
-constexpr int kGap = 3;
+constexpr int kGap = 2;  ///< cells: a new run costs about as much as so many
 
 void find_partial_cells(Block& block) {
-  Array<float> partial(static_cast<std::size_t>(block.nz) * block.stride, 0.0f);
-  bool any = false;
-  for (int z = 0; z < block.nz; ++z) {
-    for (int j = 0; j < block.stride; ++j) {
-      int count = 0;
-      float volume = 0;
-      for (int s = 0; s < 8; ++s) {
-        const std::size_t lane = (static_cast<std::size_t>(z) * 8 + s) * block.stride + j;
-        count += block.point[lane] >= 0;
-        volume += block.volume[lane];
+  for (int i = 0; i < block.nz * block.stride; ++i) {
+    const int z = i / block.stride, column = i % block.stride;
+    int count = 0;
+    float volume = 0;
+    for (int s = 0; s < 8; ++s) {
+      const std::size_t lane = (static_cast<std::size_t>(z) * 8 + s) * block.stride + column;
+      count += block.point[lane] >= 0;
+      volume += block.volume[lane];
+    }
+    if (count == 0 || count == 8) continue;
+    block.partial.push_back({i, z * block.plane + block.cell[column], volume});
+  }
+}
+
+/// Runs of the cells that hold points in any z-plane, gaps of up to kGap cells bridged.
+/// `holds` is [ny][nx].
+std::vector<Block::Run> runs_of(const std::vector<bool>& holds, int nx, int ny) {
+  std::vector<Block::Run> runs;
+  int lane = 0;
+  for (int y = 0; y < ny; ++y) {
+    for (int x = 0; x < nx; ++x) {
+      if (!holds[y * nx + x]) continue;
+      Block::Run* last = runs.empty() || runs.back().y != y ? nullptr : &runs.back();
+      if (last == nullptr || x - (last->x + last->count) > kGap) {
+        runs.push_back({x, y, 0, lane});
+        last = &runs.back();
       }
-      if (count == 0 || count == 8) continue;
-      partial[static_cast<std::size_t>(z) * block.stride + j] = volume;
-      any = true;
+      lane += x + 1 - (last->x + last->count);
+      last->count = x + 1 - last->x;
     }
   }
-  if (any) block.partial = std::move(partial);
+  return runs;
 }
 
 /// The block of a sheet, no larger than its points need.
 Block make_block(const BlockRegion& r, const LatticeBody& b, const Points& points,
                  const Sheet& sheet) {
   int lo[3] = {1 << 30, 1 << 30, 1 << 30}, hi[3] = {-1, -1, -1};
-  for (const Placed& p : sheet.points) {
-    const int at[3] = {p.x, p.y, p.z};
+  for (const CellShare& c : sheet.cells) {
+    const int at[3] = {c.x, c.y, c.z};
     for (int a = 0; a < 3; ++a) {
       lo[a] = std::min(lo[a], at[a]);
       hi[a] = std::max(hi[a], at[a]);
@@ -48,12 +63,23 @@ Block make_block(const BlockRegion& r, const LatticeBody& b, const Points& point
   block.nx = hi[0] - lo[0] + 1;
   block.ny = hi[1] - lo[1] + 1;
   block.nz = hi[2] - lo[2] + 1;
+  std::vector<bool> holds(block.nx * block.ny, false);
+  for (const CellShare& c : sheet.cells) holds[(c.y - lo[1]) * block.nx + c.x - lo[0]] = true;
+  block.runs = runs_of(holds, block.nx, block.ny);
   lay_out(block);
-  for (const Placed& p : sheet.points) {
-    const std::size_t lane = (static_cast<std::size_t>(p.z - lo[2]) * 8 + p.s) * block.stride +
-                             (p.y - lo[1]) * block.pitch + p.x - lo[0];
-    block.volume[lane] = points.volume[p.point];
-    block.point[lane] = p.point;
+  std::vector<int> lane_of(block.nx * block.ny, -1);
+  for (const Block::Run& run : block.runs) {
+    for (int i = 0; i < run.count; ++i) lane_of[run.y * block.nx + run.x + i] = run.lane + i;
+  }
+  for (const CellShare& c : sheet.cells) {
+    const int column = lane_of[(c.y - lo[1]) * block.nx + c.x - lo[0]];
+    for (int s = 0; s < 8; ++s) {
+      if (c.point[s] < 0) continue;
+      const std::size_t lane =
+          (static_cast<std::size_t>(c.z - lo[2]) * 8 + s) * block.stride + column;
+      block.volume[lane] = points.volume[c.point[s]];
+      block.point[lane] = c.point[s];
+    }
   }
   find_partial_cells(block);
   block.node.assign(block.node_count(), b.node(block.x - 1, block.y - 1, block.z - 1));
@@ -79,7 +105,7 @@ void fill_region(BlockRegion& r, const std::vector<LatticeBody>& bodies, const P
   r.blocks.clear();
   const LatticeBody& b = bodies[r.body];
   for (const Sheet& sheet : sheets_of(r, b, points, fields)) {
-    if (sheet.points.empty()) continue;
+    if (sheet.cells.empty()) continue;
     r.blocks.push_back(make_block(r, b, points, sheet));
     r.blocks.back().facets = facets_of(b, points, r.blocks.back());
   }
@@ -97,7 +123,7 @@ std::vector<std::pair<int, int>> x_runs(const LatticeBody& b, int y0, int ny, in
       }
     }
     if (!any) continue;
-    if (!runs.empty() && x - runs.back().second <= kGap) {
+    if (!runs.empty() && x - runs.back().second <= 2 * kGap) {
       runs.back().second = x + 1;
     } else {
       runs.emplace_back(x, x + 1);
@@ -139,7 +165,8 @@ void connect_forces(Blocks& blocks, const std::vector<LatticeBody>& bodies, int 
         const int local = z * block->plane + y * block->pitch;
         const int row = b.node(-1, block->y + y - 1, block->z + z - 1);
         // A row without the nodes that this block sees split: parts between them.
-        int begin = 0;
+        const Block::NodeSpan seen = block->node_rows[y];
+        int begin = seen.begin;
         const auto add = [&](int end) {
           if (end > begin) {
             entries.push_back(
@@ -150,11 +177,12 @@ void connect_forces(Blocks& blocks, const std::vector<LatticeBody>& bodies, int 
         while (next_split < block->split_nodes.size() &&
                block->split_nodes[next_split].local < local + block->pitch) {
           const Block::SplitNode& s = block->split_nodes[next_split++];
+          if (s.local < local + seen.begin || s.local >= local + seen.end) continue;
           add(s.local - local);
           begin = s.local - local + 1;
           split.push_back({s.node, {block->force_offset + s.local, component}});
         }
-        add(block->pitch);
+        add(seen.end);
       }
     }
   }

@@ -1,5 +1,6 @@
 #include "mpm/lattice_body.h"
 
+#include <algorithm>
 #include <stdexcept>
 
 #include "cutting/bonds.h"
@@ -85,10 +86,15 @@ std::vector<LatticeBody> make_lattice_bodies(const Scene& scene, Points& points,
 }
 
 void points_around(const LatticeBody& b, int x, int y, int z, std::int32_t (&around)[216]) {
-  int n = 0;
-  for (int k = 2 * z - 2; k < 2 * z + 4; ++k) {
-    for (int j = 2 * y - 2; j < 2 * y + 4; ++j) {
-      for (int i = 2 * x - 2; i < 2 * x + 4; ++i) around[n++] = b.point(i, j, k);
+  const int x0 = 2 * x - 2, y0 = 2 * y - 2, z0 = 2 * z - 2;
+  const bool inside = x0 >= 0 && x0 + 6 <= 2 * b.nx;
+  for (int n = 0; n < 216; n += 6) {
+    const int j = y0 + n / 6 % 6, k = z0 + n / 36;
+    if (inside && j >= 0 && j < 2 * b.ny && k >= 0 && k < 2 * b.nz) {
+      std::copy_n(&b.point_at[(static_cast<std::size_t>(k) * 2 * b.ny + j) * 2 * b.nx + x0], 6,
+                  around + n);
+    } else {
+      for (int i = 0; i < 6; ++i) around[n + i] = b.point(x0 + i, j, k);
     }
   }
 }

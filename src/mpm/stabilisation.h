@@ -23,37 +23,52 @@ inline constexpr float kWeight2[3] = {1.0f, 0.25f, 0.0625f};
 inline constexpr int kKinds[kXyCount][2] = {{0, 0}, {0, 1}, {0, 2}, {1, 0}, {1, 1},
                                             {1, 2}, {2, 0}, {2, 1}, {2, 2}};
 
-/// Squared weight of the number with XyQuantity k and kind z along z; 0 for those of linear fields.
-inline constexpr float weight2(int k, int z) {
-  return kKinds[k][0] + kKinds[k][1] + z <= 1
-             ? 0.0f
-             : kWeight2[kKinds[k][0]] * kWeight2[kKinds[k][1]] * kWeight2[z];
+/// Squared weight of the number with these kinds along x, y and z; 0 for those of linear fields.
+inline constexpr float weight2(int x, int y, int z) {
+  return x + y + z <= 1 ? 0.0f : kWeight2[x] * kWeight2[y] * kWeight2[z];
 }
+/// The same with an XyQuantity.
+inline constexpr float weight2(int k, int z) { return weight2(kKinds[k][0], kKinds[k][1], z); }
 
 }  // namespace stabilisation
 
-/// Adds the stabilising force of one component to the outgoing x-y quantities; `stiffness` is
-/// kStabilisation mu V per lane. Returns twice the energy.
+/// Three values along one axis as A, d, B, in place; and back, as the transpose has it.
+template <class T>
+TISSUE_SIM_INLINE void to_line(T& minus, T& center, T& plus) {
+  const Line<T> l(minus, center, plus);
+  minus = l.A;
+  center = l.d;
+  plus = l.B;
+}
+template <class T>
+TISSUE_SIM_INLINE void from_line(T& A, T& d, T& B) {
+  const T sides = kAverageSide * A + B, center = kAverageCenter * A - 2.0f * B;
+  B = sides + d;
+  A = sides - d;
+  d = center;
+}
+
+/// From the displacements over cell size of one component at the 27 nodes of W cells, u[27] (x
+/// fastest), to what stabilises them, in place: -force times cell size. `stiffness` is
+/// kStabilisation mu V of each cell. Returns twice the energy.
 template <int W>
-TISSUE_SIM_INLINE Vec<W> stabilise(const float* q0, const float* q1, const float* q2, int stride,
-                                   Vec<W> stiffness, int out_stride, float* out0, float* out1,
-                                   float* out2) {
-  Vec<W> energy = stiffness * 0.0f;
-  for (int k = 0; k < kXyCount; ++k) {
-    const Line<Vec<W>> l(load<W>(q0 + k * stride), load<W>(q1 + k * stride),
-                         load<W>(q2 + k * stride));
-    const Vec<W> a = stabilisation::weight2(k, 0) * stiffness * l.A;
-    const Vec<W> d = stabilisation::weight2(k, 1) * stiffness * l.d;
-    const Vec<W> b = stabilisation::weight2(k, 2) * stiffness * l.B;
-    energy += a * l.A + d * l.d + b * l.B;
-    if (out0 == nullptr) continue;
-    float* o = out0 + k * out_stride;
-    store<W>(o, load<W>(o) + kAverageSide * a - d + b);
-    o = out1 + k * out_stride;
-    store<W>(o, load<W>(o) + kAverageCenter * a - 2.0f * b);
-    o = out2 + k * out_stride;
-    store<W>(o, load<W>(o) + kAverageSide * a + d + b);
+TISSUE_SIM_INLINE Vec<W> stabilise(Vec<W> stiffness, Vec<W>* u) {
+  for (int i = 0; i < 27; i += 3) to_line(u[i], u[i + 1], u[i + 2]);
+  for (int z = 0; z < 27; z += 9) {
+    for (int i = z; i < z + 3; ++i) to_line(u[i], u[i + 3], u[i + 6]);
   }
+  for (int i = 0; i < 9; ++i) to_line(u[i], u[i + 9], u[i + 18]);
+  Vec<W> energy = 0.0f * stiffness;
+  for (int i = 0; i < 27; ++i) {
+    const Vec<W> force = stabilisation::weight2(i % 3, i / 3 % 3, i / 9) * stiffness * u[i];
+    energy += force * u[i];
+    u[i] = force;
+  }
+  for (int i = 0; i < 9; ++i) from_line(u[i], u[i + 9], u[i + 18]);
+  for (int z = 0; z < 27; z += 9) {
+    for (int i = z; i < z + 3; ++i) from_line(u[i], u[i + 3], u[i + 6]);
+  }
+  for (int i = 0; i < 27; i += 3) from_line(u[i], u[i + 1], u[i + 2]);
   return energy;
 }
 

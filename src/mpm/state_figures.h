@@ -8,7 +8,8 @@
 
 namespace tissue_sim {
 
-/// The largest stable substep times the CFL number [s]. `stiffening` is the largest of BlockState's.
+/// The largest stable substep times the CFL number [s]. `stiffening` is the largest of
+/// BlockState's.
 float stable_substep(const MpmState& state, float stiffening);
 
 /// Hash of nodes, bonds and pieces.

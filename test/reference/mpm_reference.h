@@ -84,21 +84,59 @@ inline std::vector<std::vector<std::pair<int, double>>> stabilising_rows(const M
   std::vector<std::vector<std::pair<int, double>>> rows;
   const double kinds[3][3] = {{0.15625, 0.6875, 0.15625}, {-0.5, 0, 0.5}, {0.25, -0.5, 0.25}};
   const double h = s.bodies[block.body].cell_size;
-  for (int i = 0; i < static_cast<int>(block.partial.size()); ++i) {
-    if (block.partial[i] == 0) continue;
-    const int first = i / block.stride * block.plane + i % block.stride;
+  for (const Block::PartialCell& cell : block.partial) {
     for (int f = 0; f < 27; ++f) {
       if (f % 3 + f / 3 % 3 + f / 9 <= 1) continue;  // linear fields are free
       rows.emplace_back();
       for (int k = 0; k < 27; ++k) {
         rows.back().emplace_back(
-            block.node[first + k / 9 * block.plane + k / 3 % 3 * block.pitch + k % 3],
+            block.node[cell.node + k / 9 * block.plane + k / 3 % 3 * block.pitch + k % 3],
             kinds[f % 3][k % 3] * kinds[f / 3 % 3][k / 3 % 3] * kinds[f / 9][k / 9] *
-                std::sqrt(block.partial[i]) / h);
+                std::sqrt(cell.volume) / h);
       }
     }
   }
   return rows;
+}
+
+/// Adds Kelvin-Voigt stress at the middle of each cell, or of what a cut leaves of it: its
+/// gradients are the means over the eight places that points have in a cell, its volume that of its
+/// points.
+inline void add_viscous_forces(const MpmState& s, Step& r) {
+  for (const Block* block : s.blocks.all) {
+    const LatticeBody& b = s.bodies[block->body];
+    if (b.material.viscosity == 0) continue;
+    for (int i = 0; i < block->nz * block->stride; ++i) {
+      const int z = i / block->stride, lane = i % block->stride;
+      double volume = 0;
+      Vec3 slope[27];
+      for (int k = 0; k < 27; ++k) slope[k] = Vec3::Zero();
+      for (int sub = 0; sub < 8; ++sub) {
+        volume += block->volume[(static_cast<std::size_t>(z) * 8 + sub) * block->stride + lane];
+        double at[3];  // from the cell's node [cells]
+        for (int a = 0; a < 3; ++a) at[a] = (sub >> a & 1) == 1 ? 0.25 : -0.25;
+        for (int k = 0; k < 27; ++k) {
+          const double x = at[0] + 1 - k % 3, y = at[1] + 1 - k / 3 % 3, z3 = at[2] + 1 - k / 9;
+          slope[k] += Vec3(spline_slope(x) * spline(y) * spline(z3),
+                           spline(x) * spline_slope(y) * spline(z3),
+                           spline(x) * spline(y) * spline_slope(z3)) /
+                      (8 * b.cell_size);
+        }
+      }
+      if (volume == 0) continue;
+      const std::int32_t* node = &block->node[z * block->plane + block->cell[lane]];
+      const auto at = [&](int k) {
+        return node[k / 9 * block->plane + k / 3 % 3 * block->pitch + k % 3];
+      };
+      Mat3 F = Mat3::Identity(), rate = Mat3::Zero();
+      for (int k = 0; k < 27; ++k) {
+        F += r.u[at(k)] * slope[k].transpose();
+        rate += r.v[at(k)] * slope[k].transpose();
+      }
+      const Mat3 P = b.material.viscosity * F * (F.transpose() * rate + rate.transpose() * F);
+      for (int k = 0; k < 27; ++k) r.force[at(k)] -= volume * P * slope[k];
+    }
+  }
 }
 
 inline Step substep(const MpmState& s, double dt) {
@@ -115,19 +153,16 @@ inline Step substep(const MpmState& s, double dt) {
   for (int p = 0; p < s.points.size(); ++p) {
     const Material& m = s.bodies[s.points.site[p].body].material;
     const Stencil stencil = stencil_of(s, p);
-    Mat3 F = Mat3::Identity(), rate = Mat3::Zero();
-    for (int k = 0; k < 27; ++k) {
-      F += r.u[stencil.node[k]] * stencil.slope[k].transpose();
-      rate += r.v[stencil.node[k]] * stencil.slope[k].transpose();
-    }
+    Mat3 F = Mat3::Identity();
+    for (int k = 0; k < 27; ++k) F += r.u[stencil.node[k]] * stencil.slope[k].transpose();
     r.largest_strain = std::max(r.largest_strain, (F - polar_rotation(F)).norm());
-    const Mat3 viscous = m.viscosity * F * (F.transpose() * rate + rate.transpose() * F);
-    const Mat3 P = piola(m, F) + viscous;
+    const Mat3 P = piola(m, F);
     for (int k = 0; k < 27; ++k) {
       r.force[stencil.node[k]] -= s.points.volume[p] * P * stencil.slope[k];
       r.mass[stencil.node[k]] += m.density * s.points.volume[p] * stencil.weight[k];
     }
   }
+  add_viscous_forces(s, r);
   for (const Block* block : s.blocks.all) {
     const double stiffness = 0.01 * lame_mu(s.bodies[block->body].material);
     for (const auto& row : stabilising_rows(s, *block)) {

@@ -34,15 +34,38 @@ __device__ __forceinline__ float4 half_volumes(const CudaTables& t, const CudaBl
   return {v[0], v[step], v[2 * step], v[3 * step]};
 }
 
-/// F to the stress P times the volume, in place.
+/// F to the stress P times the volume, in place; `damping` is added.
 template <class LawOf, bool kViscous>
-__device__ __forceinline__ void stress(const CudaBody& body, float volume, const float* rate,
+__device__ __forceinline__ void stress(const CudaBody& body, float volume, const float* damping,
                                        float* F) {
   float P[9];
   LawOf::stress(F, body.mu * volume, body.lambda * volume, P);
-  if (kViscous) add_viscous_stress(F, rate, body.viscosity * volume, P);
 #pragma unroll
-  for (int i = 0; i < 9; ++i) F[i] = P[i];
+  for (int i = 0; i < 9; ++i) F[i] = kViscous ? P[i] + damping[i] : P[i];
+}
+
+/// Kelvin-Voigt stress at the middle of the cell, from the mean gradients of its two halves, times
+/// an eighth of the volume of its points. The neighbouring thread has the other half.
+__device__ __forceinline__ void viscous_stress(const CudaBody& body, const HalfPlane (&u)[3],
+                                               const HalfPlane (&v)[3], const float4& volume,
+                                               float (&P)[9]) {
+  const unsigned pair = 3u << (threadIdx.x & 30u);
+  const auto mean = [pair](float half) { return 0.5f * (half + __shfl_xor_sync(pair, half, 1)); };
+  float F[9], rate[9];
+#pragma unroll
+  for (int c = 0; c < 3; ++c) {
+    F[3 * c] = mean(0.5f * u[c].wdA);
+    F[3 * c + 1] = mean(0.5f * u[c].wAd);
+    F[3 * c + 2] = mean(u[c].sAA);
+    rate[3 * c] = mean(0.5f * v[c].wdA);
+    rate[3 * c + 1] = mean(0.5f * v[c].wAd);
+    rate[3 * c + 2] = mean(v[c].sAA);
+    F[4 * c] += 1.0f;
+  }
+  const float half = (volume.x + volume.y) + (volume.z + volume.w);
+#pragma unroll
+  for (int i = 0; i < 9; ++i) P[i] = 0;
+  add_viscous_stress(F, rate, 0.25f * body.viscosity * mean(half), P);
 }
 
 /// Adds the forces of colliders on the points of half a cell to its transposed half plane.
@@ -97,12 +120,14 @@ __device__ __forceinline__ void half_forces(const CudaTables& t, const CudaBlock
   read_half(s.u + first, pitch, plane, weights, h);
   if (kViscous) read_half(s.v + first, pitch, plane, weights, rate);
   const float4 volume = half_volumes(t, b, body, x, y, z, sz);
+  float damping[9];
+  if (kViscous) viscous_stress(body, h, rate, volume, damping);
 #pragma unroll
   for (int c = 0; c < 3; ++c) out[c] = {};
 #pragma unroll
   for (int ty = 0; ty < 2; ++ty) {
     const float side = ty == 0 ? -1.0f : 1.0f;
-    float F[2][9], Fdot[2][9];
+    float F[2][9];
 #pragma unroll
     for (int c = 0; c < 3; ++c) {
       float low[3], high[3];
@@ -112,17 +137,10 @@ __device__ __forceinline__ void half_forces(const CudaTables& t, const CudaBlock
         F[0][3 * c + i] = low[i] + (i == c ? 1.0f : 0.0f);
         F[1][3 * c + i] = high[i] + (i == c ? 1.0f : 0.0f);
       }
-      if (!kViscous) continue;
-      row_gradient(rate[c], side, low, high);
-#pragma unroll
-      for (int i = 0; i < 3; ++i) {
-        Fdot[0][3 * c + i] = low[i];
-        Fdot[1][3 * c + i] = high[i];
-      }
     }
     const float v0 = ty == 0 ? volume.x : volume.z, v1 = ty == 0 ? volume.y : volume.w;
-    stress<LawOf, kViscous>(body, v0, Fdot[0], F[0]);
-    stress<LawOf, kViscous>(body, v1, Fdot[1], F[1]);
+    stress<LawOf, kViscous>(body, v0, damping, F[0]);
+    stress<LawOf, kViscous>(body, v1, damping, F[1]);
 #pragma unroll
     for (int c = 0; c < 3; ++c) {
       const float low[3] = {F[0][3 * c], F[0][3 * c + 1], F[0][3 * c + 2]};

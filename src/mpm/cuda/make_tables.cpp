@@ -32,29 +32,36 @@ CudaBody body_of(const LatticeBody& b) {
 /// The block's points in the GPU's order.
 void add_points(const Block& from, float whole_volume, CudaBlock& block, HostTables& t) {
   block.first_lane = static_cast<int>(t.point.size());
+  // The GPU's lanes are all cells of the box, the CPU's those that hold points.
+  const int columns = block.nx * block.ny;
+  const std::size_t cells = static_cast<std::size_t>(block.nz) * columns;
+  t.point.resize(t.point.size() + 8 * cells, -1);
+  t.volume.resize(t.volume.size() + 8 * cells, 0.0f);
+  t.partial.resize(t.partial.size() + cells, 0.0f);
+  const auto cell_of = [&](int z, int lane) {
+    const int y = from.cell[lane] / from.pitch, x = from.cell[lane] % from.pitch;
+    return static_cast<std::size_t>(z) * columns + y * block.nx + x;
+  };
+  for (std::size_t lane = 0; lane < from.lane_count(); ++lane) {
+    if (from.point[lane] < 0) continue;
+    const int z = static_cast<int>(lane / from.stride / 8),
+              s = static_cast<int>(lane / from.stride % 8);
+    const std::size_t cell = cell_of(z, static_cast<int>(lane % from.stride)) % columns;
+    const std::size_t to =
+        block.first_lane + (static_cast<std::size_t>(z) * 8 + s) * columns + cell;
+    t.point[to] = from.point[lane];
+    t.volume[to] = from.volume[lane];
+  }
   bool whole = true;
-  for (int z = 0; z < block.nz; ++z) {
-    for (int s = 0; s < 8; ++s) {
-      for (int y = 0; y < block.ny; ++y) {
-        const std::size_t lane =
-            (static_cast<std::size_t>(z) * 8 + s) * from.stride + y * from.pitch;
-        for (int x = 0; x < block.nx; ++x) {
-          t.point.push_back(from.point[lane + x]);
-          t.volume.push_back(from.volume[lane + x]);
-          whole = whole && t.point.back() >= 0 && t.volume.back() == whole_volume;
-        }
-      }
-    }
+  for (std::size_t i = 0; i < 8 * cells; ++i) {
+    whole = whole && t.point[block.first_lane + i] >= 0 &&
+            t.volume[block.first_lane + i] == whole_volume;
   }
   block.whole = whole ? 1 : 0;
   block.partial = from.partial.empty() ? 0 : 1;
-  for (int z = 0; z < block.nz; ++z) {
-    for (int y = 0; y < block.ny; ++y) {
-      for (int x = 0; x < block.nx; ++x) {
-        const std::size_t cell = static_cast<std::size_t>(z) * from.stride + y * from.pitch + x;
-        t.partial.push_back(block.partial != 0 ? from.partial[cell] : 0.0f);
-      }
-    }
+  for (const Block::PartialCell& cell : from.partial) {
+    t.partial[block.first_lane / 8 + cell_of(cell.lane / from.stride, cell.lane % from.stride)] =
+        cell.volume;
   }
 }
 

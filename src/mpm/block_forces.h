@@ -1,0 +1,168 @@
+// The internal forces of a block. For block_kernels.cpp alone.
+#pragma once
+
+#include <algorithm>
+#include <array>
+
+#include "material/laws.h"
+#include "mpm/block_planes.h"
+#include "mpm/stabilisation.h"
+
+namespace tissue_sim {
+namespace kernels {
+
+/// Adds the force that stabilises the block's partial cells, W cells at a time, to `force` where
+/// there is one. Returns the energy. `nodes` are displacements over cell size.
+template <int W>
+TISSUE_SIM_INLINE double stabilise_cells(const Block& b, const BlockField& f, const Layout& l,
+                                         const float* nodes, float* force) {
+  const int count = static_cast<int>(b.partial.size());
+  int row[9];  // of a cell's nodes, from its lowest
+  for (int k = 0; k < 9; ++k) row[k] = k / 3 * l.plane + k % 3 * l.pitch;
+  double twice_energy = 0;
+  for (int first = 0; first < count; first += W) {
+    alignas(64) float stiffness[W], u[27][W];
+    int node[W];
+    for (int i = 0; i < W; ++i) {
+      const Block::PartialCell& cell = b.partial[std::min(first + i, count - 1)];
+      node[i] = cell.node;
+      stiffness[i] = first + i < count ? kStabilisation * f.mu * cell.volume : 0.0f;
+    }
+    const int used = std::min(W, count - first);
+    for (int c = 0; c < 3; ++c) {
+      for (int i = 0; i < W; ++i) {
+        const float* from = nodes + c * l.node_component + node[i];
+#pragma GCC unroll 9
+        for (int k = 0; k < 9; ++k) {
+          const float* at = from + row[k];
+          u[3 * k][i] = at[0];
+          u[3 * k + 1][i] = at[1];
+          u[3 * k + 2][i] = at[2];
+        }
+      }
+      Vec<W> v[27];
+      for (int k = 0; k < 27; ++k) v[k] = load<W>(u[k]);
+      const Vec<W> energy = stabilise<W>(load<W>(stiffness), v);
+      for (int i = 0; i < used; ++i) twice_energy += static_cast<double>(energy[i]);
+      if (force == nullptr) continue;
+      for (int k = 0; k < 27; ++k) store<W>(u[k], v[k] * (-1.0f / f.cell_size));
+      for (int i = 0; i < used; ++i) {
+        float* to = force + c * b.node_count() + node[i];
+#pragma GCC unroll 9
+        for (int k = 0; k < 9; ++k) {
+          float* at = to + row[k];
+          at[0] += u[3 * k][i];
+          at[1] += u[3 * k + 1][i];
+          at[2] += u[3 * k + 2][i];
+        }
+      }
+    }
+  }
+  return 0.5 * twice_energy;
+}
+
+/// Kelvin-Voigt stress of W cells at their middle, times an eighth of the volume of their points:
+/// added to the stress at all eight points it is the force of the mean gradient.
+template <int W>
+TISSUE_SIM_INLINE void viscous_stress(const Block& b, const BlockField& f, const Layout& l,
+                                      const float* in, const float* in_rate, int z, int j,
+                                      Vec<W>* P) {
+  Vec<W> F[9], rate[9];
+  for (int c = 0; c < 3; ++c) {
+    const float *q[3], *r[3];
+    for (int i = 0; i < 3; ++i) {
+      const int slot = (z + i) % 3;
+      q[i] = in + slot * l.in_plane + c * kStressXyCount * l.quantity + j;
+      r[i] = in_rate + (3 * slot + c) * kMeanXyCount * l.quantity + j;
+    }
+    const auto of = [&l](const float* const(&plane)[3], int k) {
+      return std::array<const float*, 3>{plane[0] + k * l.quantity, plane[1] + k * l.quantity,
+                                         plane[2] + k * l.quantity};
+    };
+    mean_gradient<W>(of(q, kAA), of(q, kAd), of(q, kdA), c, F);
+    mean_gradient<W>(of(r, kMeanAA), of(r, kMeanAd), of(r, kMeandA), c, rate);
+  }
+  add_identity<W>(F);
+  const float* volume = b.volume.data() + static_cast<std::size_t>(z) * 8 * l.stride + j;
+  Vec<W> V = load<W>(volume);
+  for (int s = 1; s < 8; ++s) V += load<W>(volume + s * l.stride);
+  for (int i = 0; i < 9; ++i) P[i] = 0.0f * V;
+  add_viscous_stress(F, rate, 0.125f * f.viscosity * V, P);
+}
+
+/// Stress of the cells in W lanes, from the incoming x-y quantities to the outgoing ones.
+template <int W, class LawOf, bool viscous>
+TISSUE_SIM_INLINE void stress_lanes(const Block& b, const BlockField& f, const Layout& l,
+                                    const float* in, const float* in_rate, int z, int j,
+                                    float* out) {
+  Vec<W> G[8][9], damping[9];
+  gradients<W>(l, in, z, j, G);
+  if (viscous) viscous_stress<W>(b, f, l, in, in_rate, z, j, damping);
+  const float* volume = b.volume.data() + static_cast<std::size_t>(z) * 8 * l.stride + j;
+  for (int s = 0; s < 8; ++s) {
+    const Vec<W> V = load<W>(volume + s * l.stride);
+    Vec<W> P[9];
+    add_identity<W>(G[s]);
+    LawOf::stress(G[s], f.mu * V, f.lambda * V, P);
+    for (int i = 0; i < 9; ++i) G[s][i] = viscous ? P[i] + damping[i] : P[i];
+  }
+  for (int c = 0; c < 3; ++c) {
+    float* q = out + kLanes + c * kStressXyCount * l.quantity + j;
+    add_divergence<W>(G, c, l.quantity, q + (z % 3) * l.out_plane, q + ((z + 1) % 3) * l.out_plane,
+                      q + ((z + 2) % 3) * l.out_plane);
+  }
+}
+
+template <int W, class LawOf, bool viscous>
+TISSUE_SIM_INLINE void forces(const Block& b, const BlockField& f, BlockScratch& scratch,
+                              float* force) {
+  const Layout l(b);
+  const float inv_h = 1.0f / f.cell_size;
+  reserve(scratch.nodes, 3 * l.node_component);
+  reserve(scratch.in, 3 * l.in_plane);
+  reserve(scratch.out, 3 * l.out_plane + kLanes);
+  reserve(scratch.row, 3 * l.sum_component);
+  gather_nodes(b, f, f.nodes->u, inv_h, l, scratch.nodes.data());
+  if (viscous) {
+    reserve(scratch.velocities, 3 * l.node_component);
+    reserve(scratch.in_rate, 9 * kMeanXyCount * l.quantity);
+    gather_nodes(b, f, f.nodes->v, inv_h, l, scratch.velocities.data());
+  }
+  float* out = scratch.out.data();
+  std::fill_n(out, 2 * l.out_plane, 0.0f);  // the third is written before it is added to
+  for (int z = 0; z < 2; ++z) {
+    load_plane<W>(b, l, scratch.nodes.data(), z, scratch.in.data());
+    if (viscous) load_mean_plane<W>(b, l, scratch.velocities.data(), z, scratch.in_rate.data());
+  }
+  const int lanes = b.runs.back().lane + b.runs.back().count;
+  for (int z = 0; z < b.nz + 2; ++z) {
+    if (z < b.nz) {
+      load_plane<W>(b, l, scratch.nodes.data(), z + 2, scratch.in.data());
+      if (viscous) {
+        load_mean_plane<W>(b, l, scratch.velocities.data(), z + 2, scratch.in_rate.data());
+      }
+      for_each_vector<W>(
+          lanes, [&](auto width, int j) __attribute__((always_inline)) {
+            stress_lanes<width, LawOf, viscous>(b, f, l, scratch.in.data(), scratch.in_rate.data(),
+                                                z, j, out);
+          });
+    }
+    store_plane<W>(b, l, out, z, -inv_h, scratch.row.data(), force);
+  }
+  stabilise_cells<W>(b, f, l, scratch.nodes.data(), force);
+}
+template <int W>
+TISSUE_SIM_INLINE void forces_any(const Block& b, const BlockField& f, BlockScratch& s,
+                                  float* out) {
+  const bool viscous = f.viscosity > 0;
+  if (f.law == Law::kNeoHookean) {
+    viscous ? forces<W, NeoHookean, true>(b, f, s, out)
+            : forces<W, NeoHookean, false>(b, f, s, out);
+  } else {
+    viscous ? forces<W, FixedCorotated, true>(b, f, s, out)
+            : forces<W, FixedCorotated, false>(b, f, s, out);
+  }
+}
+
+}  // namespace kernels
+}  // namespace tissue_sim

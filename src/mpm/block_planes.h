@@ -1,0 +1,127 @@
+// What the kernels of a block share: its layout in scratch, its nodes and their x-y quantities. For
+// block_kernels.cpp alone, which compiles it for each instruction set.
+#pragma once
+
+#include <algorithm>
+
+#include "mpm/block_kernels.h"
+#include "mpm/block_passes.h"
+
+namespace tissue_sim {
+namespace kernels {
+
+/// Offsets into a thread's scratch for one block.
+struct Layout {
+  int pitch, stride, plane;
+  int node_component;  ///< floats of one component of the block's nodes
+  int quantity;        ///< floats of one x-y quantity: the lanes and room for what overruns them
+  int in_plane;        ///< x-y quantities of one node plane, all components
+  int out_plane;       ///< the same of outgoing ones, kLanes in front
+  int sum_component;   ///< floats of one component of the forces on a node plane
+
+  explicit Layout(const Block& b)
+      : pitch(b.pitch),
+        stride(b.stride),
+        plane(b.plane),
+        node_component((b.nz + 2) * b.plane + 2 * kLanes),
+        quantity(b.stride + kLanes),
+        in_plane(3 * kStressXyCount * quantity),
+        out_plane(in_plane + kLanes),
+        sum_component(b.plane + kLanes) {}
+};
+
+inline void reserve(Array<float>& a, std::size_t n) {
+  if (a.size() < n) a.resize(n);
+}
+
+/// Copies the block's nodes of `field`, times `scale`, into [3][nz + 2][plane].
+TISSUE_SIM_INLINE void gather_nodes(const Block& b, const BlockField& f, const Array<float>* field,
+                                    float scale, const Layout& l, float* out) {
+  for (int c = 0; c < 3; ++c) {
+    const float* from = field[c].data() + f.first_node;
+    float* to = out + c * l.node_component;
+    for (int z = 0; z < b.nz + 2; ++z) {
+      for (int y = 0; y < b.ny + 2; ++y) {
+        const float* row = from + z * f.pitch_z + y * f.pitch_y;
+        float* out_row = to + z * l.plane + y * l.pitch;
+        const Block::NodeSpan seen = b.node_rows[y];
+        for (int x = seen.begin; x < seen.end; ++x) out_row[x] = row[x] * scale;
+      }
+    }
+    for (const Block::SplitNode& s : b.split_nodes) to[s.local] = field[c][s.node] * scale;
+  }
+}
+
+/// The x-y quantities of node plane z, all components, into slot z % 3 of `in`.
+template <int W>
+TISSUE_SIM_INLINE void load_plane(const Block& b, const Layout& l, const float* nodes, int z,
+                                  float* in) {
+  for (const Block::Run& run : b.runs) {
+    const float* from = nodes + z * l.plane + run.y * l.pitch + run.x;
+    float* to = in + (z % 3) * l.in_plane + run.lane;
+    for_each_vector<W>(
+        run.count, [&](auto width, int j) __attribute__((always_inline)) {
+          for (int c = 0; c < 3; ++c) {
+            xy_pass<width>(from + c * l.node_component + j, l.pitch, l.quantity,
+                           to + c * kStressXyCount * l.quantity + j);
+          }
+        });
+  }
+}
+
+/// The same for the mean gradients of cells.
+template <int W>
+TISSUE_SIM_INLINE void load_mean_plane(const Block& b, const Layout& l, const float* nodes, int z,
+                                       float* in) {
+  for (const Block::Run& run : b.runs) {
+    const float* from = nodes + z * l.plane + run.y * l.pitch + run.x;
+    float* to = in + (z % 3) * 3 * kMeanXyCount * l.quantity + run.lane;
+    for_each_vector<W>(
+        run.count, [&](auto width, int j) __attribute__((always_inline)) {
+          for (int c = 0; c < 3; ++c) {
+            mean_xy_pass<width>(from + c * l.node_component + j, l.pitch, l.quantity,
+                                to + c * kMeanXyCount * l.quantity + j);
+          }
+        });
+  }
+}
+
+/// The forces on node plane z from its outgoing x-y quantities.
+template <int W>
+TISSUE_SIM_INLINE void store_plane(const Block& b, const Layout& l, const float* out, int z,
+                                   float scale, float* sums, float* force) {
+  std::fill_n(sums, 3 * l.sum_component, 0.0f);
+  for (const Block::Run& run : b.runs) {
+    const float* from = out + (z % 3) * l.out_plane + kLanes + run.lane;
+    float* to = sums + run.y * l.pitch + run.x;
+    for_each_vector<W>(
+        run.count + 2, [&](auto width, int m) __attribute__((always_inline)) {
+          for (int c = 0; c < 3; ++c) {
+            xy_transpose<width>(from + c * kStressXyCount * l.quantity, l.quantity, run.count, m,
+                                l.pitch, to + c * l.sum_component);
+          }
+        });
+  }
+  for (int c = 0; c < 3; ++c) {
+    const float* from = sums + c * l.sum_component;
+    float* to = force + (c * (b.nz + 2) + z) * l.plane;
+    for (int i = 0; i < l.plane; ++i) to[i] = scale * from[i];
+  }
+}
+
+template <int W>
+TISSUE_SIM_INLINE void gradients(const Layout& l, const float* in, int z, int j, Vec<W> (*G)[9]) {
+  for (int c = 0; c < 3; ++c) {
+    const float* q = in + c * kStressXyCount * l.quantity + j;
+    gradient<W>(q + (z % 3) * l.in_plane, q + ((z + 1) % 3) * l.in_plane,
+                q + ((z + 2) % 3) * l.in_plane, l.quantity, c, G);
+  }
+}
+
+template <int W>
+TISSUE_SIM_INLINE void add_identity(Vec<W>* F) {
+  for (int i = 0; i < 9; i += 4) F[i] = F[i] + 1.0f;
+}
+
+}  // namespace kernels
+}  // namespace tissue_sim

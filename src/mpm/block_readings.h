@@ -1,0 +1,176 @@
+// What is read off a block: places and values at its points, energy and stress. For
+// block_kernels.cpp alone.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+
+#include "mpm/block_forces.h"
+#include "mpm/stretched_point.h"
+
+namespace tissue_sim {
+namespace kernels {
+
+/// Adds the nodes' reference places to the displacements that gather_nodes() brought.
+TISSUE_SIM_INLINE void add_reference(const Block& b, const BlockField& f, const Layout& l,
+                                     float* nodes) {
+  for (int z = 0; z < b.nz + 2; ++z) {
+    for (int y = 0; y < b.ny + 2; ++y) {
+      float* row = nodes + z * l.plane + y * l.pitch;
+      for (int x = 0; x < l.pitch; ++x) {
+        row[x] += f.origin[0] + x * f.cell_size;
+        row[x + l.node_component] += f.origin[1] + y * f.cell_size;
+        row[x + 2 * l.node_component] += f.origin[2] + z * f.cell_size;
+      }
+    }
+  }
+}
+
+template <int W>
+TISSUE_SIM_INLINE void positions(const Block& b, const BlockField& f, const Array<float>* u,
+                                 BlockScratch& scratch, float* out) {
+  const Layout l(b);
+  reserve(scratch.nodes, 3 * l.node_component);
+  reserve(scratch.in, 3 * l.in_plane);
+  gather_nodes(b, f, u, 1.0f, l, scratch.nodes.data());
+  add_reference(b, f, l, scratch.nodes.data());
+  const float* in = scratch.in.data();
+  for (int z = 0; z < 2; ++z) load_plane<W>(b, l, scratch.nodes.data(), z, scratch.in.data());
+  for (int z = 0; z < b.nz; ++z) {
+    load_plane<W>(b, l, scratch.nodes.data(), z + 2, scratch.in.data());
+    for (int c = 0; c < 3; ++c) {
+      for (int j = 0; j < l.stride; j += W) {
+        constexpr XyQuantity kinds[4] = {kAA, kdA, kAd, kdd};
+        Vec<W> w[2][4];
+        for (int k = 0; k < 4; ++k) {
+          const float* q = in + (c * kStressXyCount + kinds[k]) * l.quantity + j;
+          const Line<Vec<W>> line(load<W>(q + (z % 3) * l.in_plane),
+                                  load<W>(q + ((z + 1) % 3) * l.in_plane),
+                                  load<W>(q + ((z + 2) % 3) * l.in_plane));
+          w[0][k] = line.A - 0.125f * line.d;
+          w[1][k] = line.A + 0.125f * line.d;
+        }
+        float* to = out + (static_cast<std::size_t>(c) * b.nz + z) * 8 * l.stride + j;
+        for (int s = 0; s < 8; ++s) {
+          const Vec<W>* v = w[s / 4];
+          const float x = s & 1 ? 0.125f : -0.125f, y = s & 2 ? 0.125f : -0.125f;
+          store<W>(to + s * l.stride, v[0] + x * v[1] + y * (v[2] + x * v[3]));
+        }
+      }
+    }
+  }
+}
+
+template <int W, class LawOf>
+TISSUE_SIM_INLINE BlockState state(const Block& b, const BlockField& f, BlockScratch& scratch,
+                                   float* von_mises) {
+  const Layout l(b);
+  reserve(scratch.nodes, 3 * l.node_component);
+  reserve(scratch.in, 3 * l.in_plane);
+  gather_nodes(b, f, f.nodes->u, 1.0f / f.cell_size, l, scratch.nodes.data());
+  BlockState result;
+  result.elastic_energy = stabilise_cells<W>(b, f, l, scratch.nodes.data(), nullptr);
+  for (int z = 0; z < 2; ++z) load_plane<W>(b, l, scratch.nodes.data(), z, scratch.in.data());
+  for (int z = 0; z < b.nz; ++z) {
+    load_plane<W>(b, l, scratch.nodes.data(), z + 2, scratch.in.data());
+    for (int j = 0; j < l.stride; j += W) {
+      Vec<W> G[8][9];
+      gradients<W>(l, scratch.in.data(), z, j, G);
+      const std::size_t lane = static_cast<std::size_t>(z) * 8 * l.stride + j;
+      for (int s = 0; s < 8; ++s) {
+        const float* volume = b.volume.data() + lane + s * l.stride;
+        Vec<W> cof[9], P[9];
+        Vec<W> zero = load<W>(volume) * 0.0f;
+        add_identity<W>(G[s]);
+        cofactor(G[s], cof);
+        const Vec<W> J = G[s][0] * cof[0] + G[s][1] * cof[1] + G[s][2] * cof[2];
+        const Vec<W> energy = LawOf::energy(G[s], zero + f.mu, zero + f.lambda);
+        const Vec<W> cx = cof[0] * cof[0] + cof[3] * cof[3] + cof[6] * cof[6];
+        const Vec<W> cy = cof[1] * cof[1] + cof[4] * cof[4] + cof[7] * cof[7];
+        const Vec<W> cz = cof[2] * cof[2] + cof[5] * cof[5] + cof[8] * cof[8];
+        const Vec<W> f2 = norm2(G[s]);
+        LawOf::stress(G[s], zero + f.mu, zero + f.lambda, P);
+        const Vec<W> mises2 = von_mises_squared(G[s], P);
+        for (int i = 0; i < W; ++i) {
+          const float v = volume[i];
+          if (v == 0) continue;
+          const float stiffening =
+              std::max(cx[i], std::max(cy[i], cz[i])) + std::fabs(J[i] - 1) * std::sqrt(f2[i] / 3);
+          if (!std::isfinite(energy[i] + stiffening)) result.finite = false;
+          result.elastic_energy += static_cast<double>(energy[i]) * v;
+          result.stiffening = std::max(result.stiffening, stiffening);
+          if (von_mises) von_mises[lane + s * l.stride + i] = std::sqrt(mises2[i]);
+        }
+      }
+    }
+  }
+  return result;
+}
+
+template <int W>
+TISSUE_SIM_INLINE BlockState state_any(const Block& b, const BlockField& f, BlockScratch& s,
+                                       float* von_mises) {
+  return f.law == Law::kNeoHookean ? state<W, NeoHookean>(b, f, s, von_mises)
+                                   : state<W, FixedCorotated>(b, f, s, von_mises);
+}
+
+/// The largest eigenvalue of C reaches s^2 where s^2 I - C is not positive definite: by its leading
+/// minors (Sylvester), 20 operations a point and no eigenvalue.
+template <int W>
+TISSUE_SIM_INLINE void stretched(const Block& b, const BlockField& f, float stretch,
+                                 BlockScratch& scratch, std::vector<StretchedPoint>& found) {
+  const Layout l(b);
+  reserve(scratch.nodes, 3 * l.node_component);
+  reserve(scratch.in, 3 * l.in_plane);
+  gather_nodes(b, f, f.nodes->u, 1.0f / f.cell_size, l, scratch.nodes.data());
+  const float s2 = stretch * stretch;
+  for (int z = 0; z < 2; ++z) load_plane<W>(b, l, scratch.nodes.data(), z, scratch.in.data());
+  for (int z = 0; z < b.nz; ++z) {
+    load_plane<W>(b, l, scratch.nodes.data(), z + 2, scratch.in.data());
+    for (int j = 0; j < l.stride; j += W) {
+      Vec<W> G[8][9];
+      gradients<W>(l, scratch.in.data(), z, j, G);
+      for (int s = 0; s < 8; ++s) {
+        Vec<W> C[6];
+        add_identity<W>(G[s]);
+        right_cauchy_green(G[s], C);
+        const Vec<W> x = s2 - C[0], y = s2 - C[1], w = s2 - C[2];
+        const Vec<W> minor = x * y - C[3] * C[3];
+        const Vec<W> det =
+            w * minor - x * C[5] * C[5] - y * C[4] * C[4] - 2.0f * C[3] * C[4] * C[5];
+        const auto below = (x > 0.0f) & (minor > 0.0f) & (det > 0.0f);
+        bool all = true;
+        for (int i = 0; i < W; ++i) all &= below[i] != 0;
+        if (all) continue;
+        const std::int32_t* point =
+            b.point.data() + (static_cast<std::size_t>(z) * 8 + s) * l.stride + j;
+        for (int i = 0; i < W; ++i) {
+          if (below[i] != 0 || point[i] < 0) continue;
+          found.push_back({point[i], {C[0][i], C[1][i], C[2][i], C[3][i], C[4][i], C[5][i]}});
+        }
+      }
+    }
+  }
+}
+
+template <int W>
+TISSUE_SIM_INLINE int lanes_in_box(const float* x, std::size_t count, const float* min,
+                                   const float* max, std::int32_t* lanes) {
+  int found = 0;
+  for (std::size_t j = 0; j < count; j += W) {
+    const auto inside = (load<W>(x + j) > min[0]) & (load<W>(x + j) < max[0]) &
+                        (load<W>(x + count + j) > min[1]) & (load<W>(x + count + j) < max[1]) &
+                        (load<W>(x + 2 * count + j) > min[2]) &
+                        (load<W>(x + 2 * count + j) < max[2]);
+    bool any = false;
+    for (int i = 0; i < W; ++i) any |= inside[i] != 0;
+    if (!any) continue;
+    for (int i = 0; i < W; ++i) {
+      if (inside[i] != 0) lanes[found++] = static_cast<std::int32_t>(j) + i;
+    }
+  }
+  return found;
+}
+
+}  // namespace kernels
+}  // namespace tissue_sim

@@ -15,8 +15,8 @@ struct GridBox {
 
 }  // namespace
 
-std::vector<std::pair<std::int32_t, std::int32_t>> facing_pairs(
-    const std::vector<FacetMotion>& facets, const std::vector<float>& reach, float grid) {
+std::vector<FacetPair> facing_pairs(const std::vector<FacetMotion>& facets,
+                                    const std::vector<float>& reach, float grid, Cpu& cpu) {
   const auto count = static_cast<std::int32_t>(facets.size());
   std::vector<GridBox> boxes(count);
   std::size_t entry_count = 0;
@@ -60,8 +60,10 @@ std::vector<std::pair<std::int32_t, std::int32_t>> facing_pairs(
   for (std::int32_t f = 0; f < count; ++f) {
     for_each_cell(f, [&](int x, int y, int z) { entries[next[bucket(x, y, z)]++] = {x, y, z, f}; });
   }
-  std::vector<std::pair<std::int32_t, std::int32_t>> pairs;
-  for (std::uint32_t b = 0; b <= mask; ++b) {
+  // Chunks of buckets side by side; sorted, the pairs come in the same order for any number.
+  constexpr int kChunks = 64;
+  std::vector<std::vector<FacetPair>> of_chunk(kChunks);
+  const auto visit_bucket = [&](std::uint32_t b, std::vector<FacetPair>& pairs) {
     for (std::int32_t i = first[b]; i < first[b + 1]; ++i) {
       const Entry& e = entries[i];
       const FacetMotion& f = facets[e.facet];
@@ -87,6 +89,16 @@ std::vector<std::pair<std::int32_t, std::int32_t>> facing_pairs(
         pairs.emplace_back(std::min(e.facet, o.facet), std::max(e.facet, o.facet));
       }
     }
+  };
+  cpu.for_each(kChunks, [&](int chunk) {
+    const std::uint64_t buckets = std::uint64_t{mask} + 1;
+    const auto begin = static_cast<std::uint32_t>(buckets * chunk / kChunks),
+               end = static_cast<std::uint32_t>(buckets * (chunk + 1) / kChunks);
+    for (std::uint32_t b = begin; b < end; ++b) visit_bucket(b, of_chunk[chunk]);
+  });
+  std::vector<FacetPair> pairs;
+  for (const std::vector<FacetPair>& chunk : of_chunk) {
+    pairs.insert(pairs.end(), chunk.begin(), chunk.end());
   }
   std::sort(pairs.begin(), pairs.end());
   return pairs;

@@ -5,13 +5,16 @@
 #include <utility>
 #include <vector>
 
+#include "compute/for_each.h"
 #include "contact/facet_motion.h"
 
 namespace tissue_sim {
 
+using FacetPair = std::pair<std::int32_t, std::int32_t>;
+
 /// Pairs (lower number first, sorted) of facets that face one another and whose swept boxes of half
 /// size `reach` around their places overlap. `grid` is the hash grid's cell [m].
-std::vector<std::pair<std::int32_t, std::int32_t>> facing_pairs(
-    const std::vector<FacetMotion>& facets, const std::vector<float>& reach, float grid);
+std::vector<FacetPair> facing_pairs(const std::vector<FacetMotion>& facets,
+                                    const std::vector<float>& reach, float grid, Cpu& cpu);
 
 }  // namespace tissue_sim

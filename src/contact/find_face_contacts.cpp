@@ -326,7 +326,7 @@ void search(MpmState& s, const Pieces& pieces) {
   for (float& r : reach) r = kSearch * cell + static_cast<float>(1.5 * horizon) * r;
   std::vector<int> size(pieces.next_id, 0);
   for (const Fragment& f : pieces.all) size[f.id] = f.point_count;
-  auto pairs = facing_pairs(faces.motion, reach, 3 * cell);
+  auto pairs = facing_pairs(faces.motion, reach, 3 * cell, *s.cpu);
   const auto one = [&](const auto& pair) { return are_one(s, pieces, pair.first, pair.second); };
   pairs.erase(std::remove_if(pairs.begin(), pairs.end(), one), pairs.end());
   // Of two pieces the smaller one's facets touch the other's face; of one, both.
@@ -337,16 +337,16 @@ void search(MpmState& s, const Pieces& pieces) {
     return m != n ? m < n : p > q;
   };
   std::vector<std::int32_t> count(facet_count, 0), contact(facet_count, -1);
+  std::vector<bool> involved(facet_count, false);
   faces.involved.clear();
   for (const auto& [a, b] : pairs) {
     if (touches(a, b)) ++count[a];
     if (touches(b, a)) ++count[b];
-    faces.involved.push_back(a);
-    faces.involved.push_back(b);
+    involved[a] = involved[b] = true;
   }
-  std::sort(faces.involved.begin(), faces.involved.end());
-  faces.involved.erase(std::unique(faces.involved.begin(), faces.involved.end()),
-                       faces.involved.end());
+  for (std::int32_t f = 0; f < facet_count; ++f) {
+    if (involved[f]) faces.involved.push_back(f);
+  }
   for (std::size_t i = 0; i < faces.all.size(); ++i) {
     contact[faces.all[i].facet] = static_cast<std::int32_t>(i);
   }

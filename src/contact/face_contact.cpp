@@ -29,45 +29,41 @@ void spread(const Block& block, int cell, const AxisWeights& weights, const floa
 }  // namespace
 
 void push_faces(const MpmState& state, FaceContact& c, float dt) {
-  float apart[3], rate[3];
+  float apart[3];
   measure_apart(state, c, apart);
-  for (int a = 0; a < 3; ++a) {
-    rate[a] = (apart[a] - c.apart[a]) / dt;
-    c.apart[a] = apart[a];
-    c.force[a] = 0;
-  }
-  const float depth = -dot(apart, c.normal);
-  const bool touched = c.touching;
-  c.touching = depth > 0;
+  float depth = -dot(apart, c.normal);
+  const float closing = (depth + dot(c.apart, c.normal)) / dt;  // [m/s]
+  std::copy(apart, apart + 3, c.apart);
+  std::fill(c.force, c.force + 3, 0.0f);
+  // What comes out of the blue is for the next look to tell.
+  const bool touched = c.touching, sudden = !touched && depth > c.sudden;
+  c.touching = depth > 0 && !sudden;
   if (!c.touching) return;
-  if (!touched && depth > c.sudden) {  // out of the blue: the next look will tell
-    c.touching = false;
-    return;
-  }
-  // What it is held by slides along, so that the spring stays in the friction cone; at the first
-  // touch there is no spring along the face.
-  float slide[3];
-  for (int a = 0; a < 3; ++a) slide[a] = apart[a] + depth * c.normal[a];
-  const float slip = std::sqrt(dot(slide, slide)), limit = touched ? c.friction * depth : 0.0f;
-  if (slip > limit) {
+  // The place held slides along the face, so that the spring stays in the friction cone.
+  constexpr float kOnCone = 1.02f;
+  float aside[3], slip = 0;
+  for (int i = 0; i < 4; ++i) {
+    for (int a = 0; a < 3; ++a) aside[a] = c.apart[a] + depth * c.normal[a];
+    slip = std::sqrt(dot(aside, aside));
+    if (slip <= kOnCone * c.friction * depth || i == 3) break;
+    const float share = 1 - c.friction * depth / slip;
     float place[3];
     for (int a = 0; a < 3; ++a) {
-      place[a] = c.hold[a] + (1 - limit / slip) * dot(c.to_reference + 3 * a, slide);
+      place[a] = c.hold[a] + share * dot(c.to_reference + 3 * a, aside);
     }
     hold_at(state, c, place);
     measure_apart(state, c, c.apart);
+    depth = -dot(c.apart, c.normal);
+    // Not what it looked like, or beyond what is left of the face.
+    c.touching = depth > 0 && dot(c.apart, c.apart) <= dot(apart, apart) &&
+                 holds(c, body_of(state, c.other).cell_size);
+    if (!c.touching) return;
     if (!touched) soften(state, c, dt);
-    if (dot(c.apart, c.apart) > dot(apart, apart)) c.touching = false;  // not what it looked like
   }
-  if (!c.touching || !holds(c, body_of(state, c.other).cell_size)) {
-    c.touching = false;
-    return;
-  }
-  const float length = std::sqrt(dot(c.apart, c.apart));
-  if (!(length > 0)) return;
   // Along the line between the two material places, and only apart.
-  const float push = std::max(0.0f, c.stiffness * length + c.damping * dot(rate, c.apart) / length);
-  for (int a = 0; a < 3; ++a) c.force[a] = -push / length * c.apart[a];
+  const float push = std::max(0.0f, c.stiffness * depth + c.damping * closing);
+  const float friction = std::min(1.0f, kOnCone * c.friction * depth / (slip + 1e-30f));
+  for (int a = 0; a < 3; ++a) c.force[a] = push * (c.normal[a] - friction / depth * aside[a]);
 }
 
 void add_face_contacts(const MpmState& state, int index, float* force) {

@@ -1,8 +1,5 @@
 #include "contact/face_contact.h"
 
-#include <algorithm>
-#include <cmath>
-
 #include "contact/face_places.h"
 #include "mpm/mpm_state.h"
 
@@ -28,44 +25,9 @@ void spread(const Block& block, int cell, const AxisWeights& weights, const floa
 
 }  // namespace
 
-void push_faces(const MpmState& state, FaceContact& c, float dt) {
-  float apart[3], rate[3];
-  measure_apart(state, c, apart);
-  for (int a = 0; a < 3; ++a) {
-    rate[a] = (apart[a] - c.apart[a]) / dt;
-    c.apart[a] = apart[a];
-    c.force[a] = 0;
-  }
-  const float depth = -dot(apart, c.normal);
-  const bool touched = c.touching;
-  c.touching = depth > 0;
-  if (!c.touching) return;
-  if (!touched && depth > c.sudden) {  // out of the blue: the next look will tell
-    c.touching = false;
-    return;
-  }
-  // What it is held by slides along, so that the spring stays in the friction cone; at the first
-  // touch there is no spring along the face.
-  float slide[3];
-  for (int a = 0; a < 3; ++a) slide[a] = apart[a] + depth * c.normal[a];
-  const float slip = std::sqrt(dot(slide, slide)), limit = touched ? c.friction * depth : 0.0f;
-  if (slip > limit) {
-    float place[3];
-    for (int a = 0; a < 3; ++a) {
-      place[a] = c.hold[a] + (1 - limit / slip) * dot(c.to_reference + 3 * a, slide);
-    }
-    hold_at(state, c, place);
-    measure_apart(state, c, c.apart);
-  }
-  if (!holds(c, body_of(state, c.other).cell_size)) {
-    c.touching = false;
-    return;
-  }
-  const float length = std::sqrt(dot(c.apart, c.apart));
-  if (!(length > 0)) return;
-  // Along the line between the two material places, and only apart.
-  const float push = std::max(0.0f, c.stiffness * length + c.damping * dot(rate, c.apart) / length);
-  for (int a = 0; a < 3; ++a) c.force[a] = -push / length * c.apart[a];
+void push_faces(const MpmState& state, FaceContact& contact, float dt) {
+  ContactPlaces places{state.nodes.u, contact};
+  push_face(contact, dt, places);
 }
 
 void add_face_contacts(const MpmState& state, int index, float* force) {

@@ -112,7 +112,13 @@ void begin(const MpmState& s, FaceContact& c, std::int32_t other, const float (&
   const double p = lame_lambda(m) + 2 * lame_mu(m), q = lame_lambda(n) + 2 * lame_mu(n);
   c.other = other;
   c.other_nodes = CellNodes(block_of(s, other), facet_of(s, other).cell);
-  hold_at(s, c, place);
+  const float middle[3] = {};
+  const Vec3 from_middle =
+      reference_place(own, block_of(s, c.facet), facet_of(s, c.facet)) -
+      reference_place(body, block_of(s, other), facet_of(s, other).cell, middle);
+  for (int a = 0; a < 3; ++a) c.from_middle[a] = from_middle[a];
+  c.cell_size = body.cell_size;
+  hold_at(c, place);
   const double mass = 1 / (mobility(s.nodes, c.nodes, c.weights) +
                            mobility(s.nodes, c.other_nodes, c.other_weights) + 1e-30);
   const double stiffness =
@@ -133,8 +139,8 @@ void go_on(const MpmState& s, FaceContact& c, std::int32_t other, const Vec3& he
       (held - reference_place(body, block_of(s, other), facet_of(s, other).cell, middle)) /
       body.cell_size;
   begin(s, c, other, {float(from[0]), float(from[1]), float(from[2])}, dt);
-  measure_apart(s, c, c.apart);
-  c.touching = holds(c, body.cell_size);
+  measure_apart(s, c);
+  c.touching = c.holds();
 }
 
 /// Looks anew at contact `i`: which facet, its normal, and the place held. Returns how fast the two
@@ -179,8 +185,8 @@ float look(MpmState& s, int i, double dt) {
     lift = std::min(0.0f, seen.depth);  // onto the plane; below it, where there is no force
   }
   for (int a = 0; a < 3; ++a) seen.place[a] += lift * facet.normal[a];
-  hold_at(s, c, seen.place);
-  measure_apart(s, c, c.apart);
+  hold_at(c, seen.place);
+  measure_apart(s, c);
   const float v[3] = {f.v[0] - o.v[0], f.v[1] - o.v[1], f.v[2] - o.v[2]};
   return std::sqrt(dot(v, v));
 }
@@ -370,7 +376,7 @@ void take_up(MpmState& s, double dt) {
 
 }  // namespace
 
-void find_face_contacts(MpmState& s, const Pieces& pieces, double dt) {
+int find_face_contacts(MpmState& s, const Pieces& pieces, double dt, int at_most) {
   FaceContacts& faces = s.faces;
   const bool searched = faces.until_search <= 0;
   if (searched) {
@@ -379,9 +385,15 @@ void find_face_contacts(MpmState& s, const Pieces& pieces, double dt) {
   }
   if (!faces.all.empty() && (searched || faces.until_look <= 0)) look_at_all(s, dt, !searched);
   if (faces.all.empty()) faces.active.clear();
-  faces.until_search -= dt;
-  faces.until_look -= dt;
-  faces.since_look += dt;
+  int substeps = 0;
+  do {
+    faces.until_search -= dt;
+    faces.until_look -= dt;
+    faces.since_look += dt;
+    ++substeps;
+  } while (substeps < at_most && faces.until_search > 0 &&
+           (faces.all.empty() || faces.until_look > 0));
+  return substeps;
 }
 
 void keep_face_contacts(MpmState& s) {

@@ -52,8 +52,8 @@ void press(CudaMpmTissue& tissue, float dt) {
   cut_now(tissue, plane_cut(middle, Vec3(-0.3, 1, 0.1)));
   implode(tissue, middle, 10);
   const FaceContacts& faces = tissue.state().faces;
-  for (int i = 0; i < 40 || faces.until_look < dt || faces.until_search < dt; ++i) {
-    ASSERT_LT(i, 80);
+  for (int i = 0; i < 12 || faces.until_look < dt || faces.until_search < dt; ++i) {
+    ASSERT_LT(i, 60);
     tissue.advance(1, dt, {});
     ASSERT_FALSE(tissue.finish().blew_up);
   }
@@ -108,7 +108,9 @@ TEST_P(FaceContactOnGpu, OneSubstepAgreesWithTheCpusContactsAndBruteForce) {
   }
   std::printf("%d contacts push, with up to %.3g N; off by %.2e of it, their holds by %.1e cells\n",
               touching, largest, worst / largest, worst_hold);
-  EXPECT_LT(worst, 1e-5 * largest);
+  // Sums of displacements of some millimetres round by half a nanometre, in another order here and
+  // there, of 50 micrometres of depth; the damper feels it once more.
+  EXPECT_LT(worst, 1e-4 * largest);
   EXPECT_LT(worst_hold, 1e-5);
   tissue.pull();
   for (std::size_t i = 0; i < expected.u.size(); ++i) {
@@ -119,7 +121,7 @@ TEST_P(FaceContactOnGpu, OneSubstepAgreesWithTheCpusContactsAndBruteForce) {
     if (s.nodes.inv_mass[i] == 0) continue;
     const Vec3 v(s.nodes.v[0][i], s.nodes.v[1][i], s.nodes.v[2][i]);
     const double v_bound =
-        (2e-6 * force_scale + 1e-5 * largest) * dt / expected.mass[i] + 1e-6 * v_scale;
+        (2e-6 * force_scale + 1e-4 * largest) * dt / expected.mass[i] + 1e-6 * v_scale;
     ASSERT_LT((v - expected.v[i]).norm(), v_bound) << "node " << i;
   }
 }

@@ -1,22 +1,64 @@
-// Tissue against tissue: faces of cuts, pieces among themselves, folds.
+// Tissue against tissue: faces of cuts, pieces among themselves, folds. On the CPU and, where there
+// is one, on the GPU.
 #include <gtest/gtest.h>
+
+#include <type_traits>
 
 #include "contact/face_places.h"
 #include "cut_scenes.h"
 #include "momentum.h"
+#if defined(TISSUE_SIM_CUDA)
+#include "compute/cuda_check.h"
+#include "mpm/cuda/cuda_mpm_tissue.h"
+#endif
 
 namespace tissue_sim {
 namespace {
 
 constexpr double kFrame = 1.0 / 60;
 
-FrameResult advance_frame(MpmTissue& tissue) {
+/// Nodes from, and to, where the tissue lives.
+void pull(MpmTissue&) {}
+void push(MpmTissue& tissue) { measure_motion(tissue.state()); }
+std::string why_not(const MpmTissue*) { return ""; }
+#if defined(TISSUE_SIM_CUDA)
+void pull(CudaMpmTissue& tissue) { tissue.pull(); }
+void push(CudaMpmTissue& tissue) {
+  tissue.push();
+  tissue.advance(0, 1e-4f, {});
+  tissue.finish();
+}
+std::string why_not(const CudaMpmTissue*) { return why_no_gpu(); }
+using Tissues = testing::Types<MpmTissue, CudaMpmTissue>;
+#else
+using Tissues = testing::Types<MpmTissue>;
+#endif
+
+template <class T>
+class FaceContactOf : public testing::Test {
+ protected:
+  void SetUp() override {
+    const std::string why = why_not(static_cast<const T*>(nullptr));
+    if (!why.empty()) GTEST_SKIP() << why;
+  }
+};
+struct DeviceName {
+  template <class T>
+  static std::string GetName(int) {
+    return std::is_same<T, MpmTissue>::value ? "OnCpu" : "OnGpu";
+  }
+};
+TYPED_TEST_SUITE(FaceContactOf, Tissues, DeviceName);
+
+template <class T>
+FrameResult advance_frame(T& tissue) {
   const int n = static_cast<int>(std::ceil(kFrame / tissue.stable_substep()));
   tissue.advance(n, static_cast<float>(kFrame / n), {});
   return tissue.finish();
 }
 
-FrameResult advance(MpmTissue& tissue, double seconds) {
+template <class T>
+FrameResult advance(T& tissue, double seconds) {
   FrameResult result;
   for (int f = 0; f < std::lround(seconds / kFrame); ++f) result = advance_frame(tissue);
   return result;
@@ -25,7 +67,9 @@ FrameResult advance(MpmTissue& tissue, double seconds) {
 double total(const FrameResult& r) { return r.kinetic_energy + r.elastic_energy; }
 
 /// Throws each piece with a velocity of its own, turning about the origin.
-void throw_pieces(MpmTissue& tissue, const std::vector<Vec3>& velocity, const Vec3& spin) {
+template <class T>
+void throw_pieces(T& tissue, const std::vector<Vec3>& velocity, const Vec3& spin) {
+  pull(tissue);
   MpmState& s = tissue.state();
   const std::vector<Vec3> home = homes(s);
   for (int p = 0; p < s.points.size(); ++p) {
@@ -36,7 +80,7 @@ void throw_pieces(MpmTissue& tissue, const std::vector<Vec3>& velocity, const Ve
       for (int a = 0; a < 3; ++a) s.nodes.v[a][node] = static_cast<float>(v[a]);
     }
   }
-  measure_motion(s);
+  push(tissue);
 }
 
 /// Force of the strongest contact [N].
@@ -78,26 +122,28 @@ Region below(double z) {
   return region;
 }
 
-TEST(FaceContact, FreshCutIsFreeOfStress) {
+TYPED_TEST(FaceContactOf, FreshCutIsFreeOfStress) {
   for (const Vec3& normal : {Vec3(1, 0, 0), Vec3(1, 0.6, 0.3), Vec3(1, 1, 1)}) {
-    MpmTissue tissue(free_box(Vec3(0.03, 0.03, 0.03), 0.002));
+    TypeParam tissue(free_box(Vec3(0.03, 0.03, 0.03), 0.002));
     MpmState& s = tissue.state();
+    pull(tissue);
     deform(s);
+    push(tissue);
     cut_now(tissue, plane_cut(Vec3(0.02, 0.0171, 0.02), normal));
     ASSERT_EQ(tissue.fragments().size(), 2u);
-    find_face_contacts(s, tissue.pieces(), 1e-6);
+    tissue.advance(1, 1e-6f, {});
+    tissue.finish();
     EXPECT_GT(s.faces.active.size(), 15u * 15u) << "the faces are found";
     double stiffest = 0;
     for (const std::int32_t i : s.faces.active) {
-      push_faces(s, s.faces.all[i], 1e-6f);
       stiffest = std::max<double>(stiffest, s.faces.all[i].stiffness);
     }
     EXPECT_LT(strongest(s), 1e-5 * stiffest * 0.002);
   }
 }
 
-TEST(FaceContact, KeepsMomentumAndMakesNoEnergyWherePiecesCollideAndScrape) {
-  MpmTissue tissue(free_box(Vec3(0.03, 0.02, 0.02), 0.002));
+TYPED_TEST(FaceContactOf, KeepsMomentumAndMakesNoEnergyWherePiecesCollideAndScrape) {
+  TypeParam tissue(free_box(Vec3(0.03, 0.02, 0.02), 0.002));
   cut_now(tissue, plane_cut(Vec3(0.0151, 0.01, 0.01), Vec3(1, 0.3, 0.1)));
   ASSERT_EQ(tissue.fragments().size(), 2u);
   const bool first_is_left = tissue.fragments()[0].centroid[0] < tissue.fragments()[1].centroid[0];
@@ -113,6 +159,7 @@ TEST(FaceContact, KeepsMomentumAndMakesNoEnergyWherePiecesCollideAndScrape) {
   int most = 0;
   for (int f = 0; f < 20; ++f) {
     const FrameResult r = advance_frame(tissue);
+    pull(tissue);
     const Momentum now = momentum(s, home);
     EXPECT_LT((now.linear - start.linear).norm(), 3e-5 * start.linear.norm());
     EXPECT_LT((now.angular - start.angular).norm(), 3e-5 * start.angular.norm());
@@ -125,8 +172,8 @@ TEST(FaceContact, KeepsMomentumAndMakesNoEnergyWherePiecesCollideAndScrape) {
   EXPECT_LT(energy, 0.9 * first) << "and scrape";
 }
 
-TEST(FaceContact, NeverPulls) {
-  MpmTissue tissue(free_box(Vec3(0.03, 0.02, 0.02), 0.002));
+TYPED_TEST(FaceContactOf, NeverPulls) {
+  TypeParam tissue(free_box(Vec3(0.03, 0.02, 0.02), 0.002));
   cut_now(tissue, plane_cut(Vec3(0.0151, 0.01, 0.01), Vec3::UnitX()));
   const bool first_is_left = tissue.fragments()[0].centroid[0] < tissue.fragments()[1].centroid[0];
   std::vector<Vec3> velocity = {Vec3(0.1, 0, 0), Vec3(-0.1, 0, 0)};
@@ -137,20 +184,20 @@ TEST(FaceContact, NeverPulls) {
   bool touched = false;
   for (int i = 0; i < 200; ++i) {
     tissue.advance(1, dt, {});
+    tissue.finish();
     for (const std::int32_t c : s.faces.active) {
       EXPECT_GE(dot(s.faces.all[c].force, s.faces.all[c].normal), -1e-12);
     }
     touched = touched || touching(s) > 0;
   }
   EXPECT_TRUE(touched);
-  tissue.finish();
   EXPECT_EQ(touching(s), 0) << "they have bounced";
   const Span<const Fragment> pieces = tissue.fragments();
   EXPECT_GT(std::fabs(pieces[0].velocity[0] - pieces[1].velocity[0]), 0.05);
 }
 
-TEST(FaceContact, PiecesPressedTogetherPartWithoutResistance) {
-  MpmTissue tissue(free_box(Vec3(0.03, 0.02, 0.02), 0.002));
+TYPED_TEST(FaceContactOf, PiecesPressedTogetherPartWithoutResistance) {
+  TypeParam tissue(free_box(Vec3(0.03, 0.02, 0.02), 0.002));
   cut_now(tissue, plane_cut(Vec3(0.0151, 0.01, 0.01), Vec3(1, 0.2, 0)));
   throw_pieces(tissue, {Vec3(0.1, 0, 0), Vec3(0.1, 0, 0)}, Vec3::Zero());
   advance(tissue, 0.05);  // side by side
@@ -168,7 +215,7 @@ TEST(FaceContact, PiecesPressedTogetherPartWithoutResistance) {
   }
 }
 
-TEST(FaceContact, ABlockStaysOnASlopeUpToTheAngleOfFrictionAndSlidesBeyond) {
+TYPED_TEST(FaceContactOf, ABlockStaysOnASlopeUpToTheAngleOfFrictionAndSlidesBeyond) {
   for (const double degrees : {14.0, 18.0, 24.0}) {  // friction 0.3: 16.7 degrees
     Scene scene = free_box(Vec3(0.07, 0.016, 0.01), 0.002);
     scene.materials = {viscous()};
@@ -177,7 +224,7 @@ TEST(FaceContact, ABlockStaysOnASlopeUpToTheAngleOfFrictionAndSlidesBeyond) {
     scene.bodies[0].anchors = {below(0.0085)};
     const double slope = degrees * M_PI / 180;
     scene.gravity = 9.81 * Vec3(std::sin(slope), 0, -std::cos(slope));
-    MpmTissue tissue(scene);
+    TypeParam tissue(scene);
     advance(tissue, 0.15);
     const Fragment before = tissue.fragments()[1];
     const double time = 0.1;
@@ -194,13 +241,13 @@ TEST(FaceContact, ABlockStaysOnASlopeUpToTheAngleOfFrictionAndSlidesBeyond) {
   }
 }
 
-TEST(FaceContact, StackedPiecesComeToRestAndStay) {
+TYPED_TEST(FaceContactOf, StackedPiecesComeToRestAndStay) {
   Scene scene = free_box(Vec3(0.02, 0.02, 0.02), 0.0025);
   scene.materials = {viscous()};
   scene.bodies[0].material = "viscous";
   scene.gravity = Vec3(0, 0, -9.81);
   scene.ground.enabled = true;
-  MpmTissue tissue(scene);
+  TypeParam tissue(scene);
   cut_now(tissue, plane_cut(Vec3(0.01, 0.01, 0.0126), Vec3(0.1, 0, 1)));
   cut_now(tissue, plane_cut(Vec3(0.01, 0.01, 0.0063), Vec3(0, -0.05, 1)));
   ASSERT_EQ(tissue.fragments().size(), 3u);
@@ -215,13 +262,13 @@ TEST(FaceContact, StackedPiecesComeToRestAndStay) {
   }
 }
 
-TEST(FaceContact, AFlapFallsBackOntoItsBed) {
+TYPED_TEST(FaceContactOf, AFlapFallsBackOntoItsBed) {
   Scene scene = free_box(Vec3(0.04, 0.012, 0.012), 0.002);
   scene.materials = {viscous()};
   scene.bodies[0].material = "viscous";
   scene.bodies[0].anchors = {below(0.004)};
   scene.gravity = Vec3(0, 0, -9.81);
-  MpmTissue tissue(scene);
+  TypeParam tissue(scene);
   BladePath path;  // a level cut that leaves the last fifth whole
   path.edge = {Vec3(0, -0.1, 0), Vec3(0, 0.1, 0)};
   for (const double x : {-0.01, 0.032})
@@ -229,6 +276,7 @@ TEST(FaceContact, AFlapFallsBackOntoItsBed) {
   cut_now(tissue, path);
   ASSERT_EQ(tissue.fragments().size(), 1u);
   MpmState& s = tissue.state();
+  pull(tissue);
   const auto is_flap = [&](int p) { return s.points.site[p].z >= 8 && s.points.site[p].x < 32; };
   for (int p = 0; p < s.points.size(); ++p) {  // thrown up
     if (!is_flap(p)) continue;
@@ -237,6 +285,7 @@ TEST(FaceContact, AFlapFallsBackOntoItsBed) {
       if (s.nodes.inv_mass[node] > 0) s.nodes.v[2][node] = 0.4f;
     }
   }
+  push(tissue);
   const auto gap = [&] {  // of the layers on both sides of the cut, at the flap's end [m]
     double top = 0, bed = 0;
     int n = 0, m = 0;

@@ -77,6 +77,7 @@ TEST_P(OnGpuWith, OneSubstepAgreesWithBruteForce) {
     tissue.pull();
     shake(state, 7, 8e-5);
     tissue.push();
+    state.faces.until_search = 1e9;  // faces that are shaken into one another do not push
     const float dt = 1e-4f;
     const reference::Step expected = reference::substep(state, dt);
     EXPECT_GT(expected.largest_strain, 0.1) << "the state must be deformed to tell anything";

@@ -1,8 +1,5 @@
 #include "contact/face_contact.h"
 
-#include <algorithm>
-#include <cmath>
-
 #include "contact/face_places.h"
 #include "mpm/mpm_state.h"
 
@@ -28,42 +25,9 @@ void spread(const Block& block, int cell, const AxisWeights& weights, const floa
 
 }  // namespace
 
-void push_faces(const MpmState& state, FaceContact& c, float dt) {
-  float apart[3];
-  measure_apart(state, c, apart);
-  float depth = -dot(apart, c.normal);
-  const float closing = (depth + dot(c.apart, c.normal)) / dt;  // [m/s]
-  std::copy(apart, apart + 3, c.apart);
-  std::fill(c.force, c.force + 3, 0.0f);
-  // What comes out of the blue is for the next look to tell.
-  const bool touched = c.touching, sudden = !touched && depth > c.sudden;
-  c.touching = depth > 0 && !sudden;
-  if (!c.touching) return;
-  // The place held slides along the face, so that the spring stays in the friction cone.
-  constexpr float kOnCone = 1.02f;
-  float aside[3], slip = 0;
-  for (int i = 0; i < 4; ++i) {
-    for (int a = 0; a < 3; ++a) aside[a] = c.apart[a] + depth * c.normal[a];
-    slip = std::sqrt(dot(aside, aside));
-    if (slip <= kOnCone * c.friction * depth || i == 3) break;
-    const float share = 1 - c.friction * depth / slip;
-    float place[3];
-    for (int a = 0; a < 3; ++a) {
-      place[a] = c.hold[a] + share * dot(c.to_reference + 3 * a, aside);
-    }
-    hold_at(state, c, place);
-    measure_apart(state, c, c.apart);
-    depth = -dot(c.apart, c.normal);
-    // Not what it looked like, or beyond what is left of the face.
-    c.touching = depth > 0 && dot(c.apart, c.apart) <= dot(apart, apart) &&
-                 holds(c, body_of(state, c.other).cell_size);
-    if (!c.touching) return;
-    if (!touched) soften(state, c, dt);
-  }
-  // Along the line between the two material places, and only apart.
-  const float push = std::max(0.0f, c.stiffness * depth + c.damping * closing);
-  const float friction = std::min(1.0f, kOnCone * c.friction * depth / (slip + 1e-30f));
-  for (int a = 0; a < 3; ++a) c.force[a] = push * (c.normal[a] - friction / depth * aside[a]);
+void push_faces(const MpmState& state, FaceContact& contact, float dt) {
+  ContactPlaces places{state.nodes, contact};
+  push_face(contact, dt, places);
 }
 
 void add_face_contacts(const MpmState& state, int index, float* force) {

@@ -10,6 +10,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "contact/face_spring.h"
 #include "contact/facet_motion.h"
 
 namespace tissue_sim {
@@ -18,21 +19,12 @@ struct MpmState;
 struct Pieces;
 
 /// A facet against another.
-struct FaceContact {
+struct FaceContact : FaceSpring {
   std::int32_t facet, other = -1;  ///< numbers over all blocks; -1: nothing near
-  bool touching = false;
   float depth = 0;  ///< of the facet's centre below the other face, as of the last look [cells]
   float begun = 0;  ///< depth at which the place held may stay, for there it began [cells]
   CellNodes nodes, other_nodes;
   AxisWeights weights, other_weights;  ///< at the facet's centre; at `hold`
-  float hold[3];                       ///< place on the other face [cells of its cell]
-  float between[3];                    ///< from `hold` to the centre in reference space [m]
-  float apart[3];                      ///< the same in the world, as of the last substep [m]
-  float normal[3];                     ///< of the other face, in the world
-  float to_reference[9];               ///< inverse of its deformation gradient over the cell [1/m]
-  float stiffness, damping, friction;  ///< [N/m], [N s/m], [-]
-  float sudden;                        ///< depth at which nothing can be from one substep [m]
-  float force[3];                      ///< on the facet [N]
 };
 
 /// What a contact is known by while blocks are made anew.
@@ -60,8 +52,9 @@ struct FaceContacts {
   double until_search = 0, until_look = 0, since_look = 0;  ///< [s]
 };
 
-/// Before a substep of `dt` seconds: searches pairs, and looks at them, when it is time to.
-void find_face_contacts(MpmState& state, const Pieces& pieces, double dt);
+/// Before substeps of `dt` seconds: searches pairs, and looks at them, when it is time to. Returns
+/// after how many substeps, up to `at_most`, it wants to be called again.
+int find_face_contacts(MpmState& state, const Pieces& pieces, double dt, int at_most = 1);
 
 /// Before blocks are made anew: remembers what touches.
 void keep_face_contacts(MpmState& state);

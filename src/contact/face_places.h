@@ -1,16 +1,10 @@
 // Facets by their number, and the material places that contacts hold on to.
 #pragma once
 
-#include <algorithm>
-#include <cmath>
-
-#include "contact/collider.h"
 #include "contact/face_contact.h"
 #include "mpm/mpm_state.h"
 
 namespace tissue_sim {
-
-inline float dot(const float* a, const float* b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
 
 inline const Block& block_of(const MpmState& s, std::int32_t facet) {
   return *s.blocks.all[s.faces.block_of[facet]];
@@ -25,23 +19,9 @@ inline const LatticeBody& body_of(const MpmState& s, std::int32_t facet) {
 }
 
 /// Sets the place on the other face that a contact holds on to, and what follows from it.
-inline void hold_at(const MpmState& s, FaceContact& c, const float (&place)[3]) {
-  const std::int32_t f = c.facet, o = c.other;
-  const Vec3 between = reference_place(body_of(s, f), block_of(s, f), facet_of(s, f)) -
-                       reference_place(body_of(s, o), block_of(s, o), facet_of(s, o).cell, place);
-  for (int a = 0; a < 3; ++a) {
-    c.hold[a] = place[a];
-    c.between[a] = static_cast<float>(between[a]);
-  }
+inline void hold_at(FaceContact& c, const float (&place)[3]) {
+  c.hold_at(place);
   c.other_weights = AxisWeights(c.hold);
-}
-
-/// From the place held to the facet's centre, in the world [m].
-inline void measure_apart(const MpmState& s, const FaceContact& c, float (&apart)[3]) {
-  float u[3], other[3];
-  value_at(s.nodes.u, c.nodes, c.weights, u);
-  value_at(s.nodes.u, c.other_nodes, c.other_weights, other);
-  for (int a = 0; a < 3; ++a) apart[a] = c.between[a] + (u[a] - other[a]);
 }
 
 /// Sum of w^2 / m over the nodes of a place: what a spring there moves, as one over a mass [1/kg].
@@ -55,21 +35,33 @@ inline double mobility(const Nodes& nodes, const CellNodes& cell, const AxisWeig
   return sum;
 }
 
-/// Makes the spring so soft that substeps of `dt` can follow what it moves, and the damper to it.
-inline void soften(const MpmState& s, FaceContact& c, double dt) {
-  constexpr double kStable = 0.35;  // stiffness * dt^2 / mass, at most; many springs share nodes
-  const double mass = 1 / (mobility(s.nodes, c.nodes, c.weights) +
-                           mobility(s.nodes, c.other_nodes, c.other_weights) + 1e-30);
-  c.stiffness = std::min(c.stiffness, static_cast<float>(kStable * mass / (dt * dt)));
-  c.damping = 2 * kContactDamping * std::sqrt(c.stiffness * static_cast<float>(mass));
+/// The places of a contact on the CPU: see push_face().
+struct ContactPlaces {
+  const Nodes& nodes;
+  FaceContact& contact;
+
+  void own(float (&value)[3]) const { value_at(nodes.u, contact.nodes, contact.weights, value); }
+  void held(float (&value)[3]) const {
+    value_at(nodes.u, contact.other_nodes, contact.other_weights, value);
+  }
+  void hold(const float (&place)[3]) { contact.other_weights = AxisWeights(place); }
+  float held_mobility() const {
+    return static_cast<float>(mobility(nodes, contact.other_nodes, contact.other_weights));
+  }
+};
+
+/// From the place held to the facet's centre, in the world.
+inline void measure_apart(const MpmState& s, FaceContact& c) {
+  float own[3], held[3];
+  const ContactPlaces places{s.nodes, c};
+  places.own(own);
+  places.held(held);
+  c.measure_apart(own, held);
 }
 
-/// Whether the place held is still on the other face: near its cell, and not far from the facet.
-inline bool holds(const FaceContact& c, double cell_size) {
-  constexpr float kFarthest = 1.25f;  // [cells]
-  const auto far = static_cast<float>(0.75 * cell_size);
-  return dot(c.apart, c.apart) < far * far && std::fabs(c.hold[0]) < kFarthest &&
-         std::fabs(c.hold[1]) < kFarthest && std::fabs(c.hold[2]) < kFarthest;
+/// Makes the spring so soft that substeps of `dt` can follow what it moves, and the damper to it.
+inline void soften(const MpmState& s, FaceContact& c, double dt) {
+  c.soften(ContactPlaces{s.nodes, c}.held_mobility(), static_cast<float>(dt));
 }
 
 }  // namespace tissue_sim

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "math/bspline.h"
 #include "mpm/block.h"
 #include "mpm/lattice_body.h"
 #include "mpm/nodes.h"
@@ -17,12 +18,7 @@ struct AxisWeights {
 
   AxisWeights() = default;
   explicit AxisWeights(const float (&place)[3]) {
-    for (int a = 0; a < 3; ++a) {
-      const float below = 0.5f - place[a], above = 0.5f + place[a];
-      of[3 * a] = 0.5f * below * below;
-      of[3 * a + 1] = 0.75f - place[a] * place[a];
-      of[3 * a + 2] = 0.5f * above * above;
-    }
+    for (int i = 0; i < 9; ++i) of[i] = cell_weight(place[i / 3], i % 3);
   }
 };
 

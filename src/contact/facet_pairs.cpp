@@ -6,8 +6,8 @@
 namespace tissue_sim {
 namespace {
 
-// Normals that are less than some 100 degrees apart belong to one surface.
-constexpr float kFacing = -0.2f;
+// Cosine between normals from which on facets do not face one another.
+constexpr float kFacing = -0.5f;
 
 struct GridBox {
   int min[3], max[3];

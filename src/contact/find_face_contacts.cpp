@@ -18,7 +18,6 @@ constexpr float kNear = 0.25f;    ///< gap up to which a contact is worked on in
 constexpr float kDeepest = 0.375f;
 constexpr float kDeeper = 0.25f;    ///< by how much more it may be in another that takes over
 constexpr float kBeyond = 0.25f;    ///< how far beyond its edge a facet still catches
-constexpr float kFolded = -0.5f;    ///< cosine between the normals of a piece that touches itself
 constexpr float kFarthest = 2;      ///< from the centre of the facet that catches it
 constexpr float kStay = 0.1f;       ///< by how much another facet must fit better to take over
 constexpr float kNothing = 1e-3f;   ///< share of a spring's energy at `sudden`
@@ -109,10 +108,17 @@ void begin(const MpmState& s, FaceContact& c, std::int32_t other, const float (&
   c.other = other;
   c.other_nodes = CellNodes(block_of(s, other), facet_of(s, other).cell);
   take_normal(s, c);
-  hold_at(s, c, place);
+  const float middle[3] = {};
+  const Vec3 from_middle =
+      reference_place(own, block_of(s, c.facet), facet_of(s, c.facet)) -
+      reference_place(body, block_of(s, other), facet_of(s, other).cell, middle);
+  for (int a = 0; a < 3; ++a) c.from_middle[a] = from_middle[a];
+  c.cell_size = body.cell_size;
+  hold_at(c, place);
   const double stiffness =
       kContactStiffness * 2 * p * q / (p + q) * facet_of(s, c.facet).area / (0.5 * own.cell_size);
   c.stiffness = static_cast<float>(stiffness);
+  c.own_mobility = static_cast<float>(mobility(s.nodes, c.nodes, c.weights));
   soften(s, c, dt);
   c.friction = static_cast<float>(std::sqrt(m.friction * n.friction));
   c.sudden = static_cast<float>(kMoved * own.cell_size);
@@ -124,15 +130,15 @@ float stretch2(const FaceContact& c) { return c.stiffness * dot(c.apart, c.apart
 /// Lets the place held give way until the spring holds no more than `limit` of energy (twice it,
 /// [J]). Returns whether it does.
 bool give_way(const MpmState& s, FaceContact& c, float limit) {
-  measure_apart(s, c, c.apart);
+  measure_apart(s, c);
   for (int i = 0; i < 3 && stretch2(c) > limit; ++i) {
     const float share = 1 - std::sqrt(limit / stretch2(c));
     float place[3];
     for (int a = 0; a < 3; ++a) {
       place[a] = c.hold[a] + share * dot(c.to_reference + 3 * a, c.apart);
     }
-    hold_at(s, c, place);
-    measure_apart(s, c, c.apart);
+    hold_at(c, place);
+    measure_apart(s, c);
   }
   return stretch2(c) <= 1.01f * limit + kNothing * c.stiffness * c.sudden * c.sudden;
 }
@@ -149,7 +155,7 @@ void go_on(const MpmState& s, FaceContact& c, std::int32_t other, const Vec3& he
   begin(s, c, other, {float(from[0]), float(from[1]), float(from[2])}, dt);
   c.stiffness = old.stiffness;  // the same spring, unless substeps cannot follow
   soften(s, c, dt);
-  c.touching = give_way(s, c, limit) && holds(c, body.cell_size);
+  c.touching = give_way(s, c, limit) && c.holds();
 }
 
 /// Puts the place held by a contact that does not touch on the other face, below the facet, or,
@@ -159,8 +165,8 @@ bool aim(const MpmState& s, FaceContact& c, const Seen& seen) {
   const float lift = std::min(0.0f, seen.depth);
   float place[3];
   for (int a = 0; a < 3; ++a) place[a] = seen.place[a] + lift * facet.normal[a];
-  hold_at(s, c, place);
-  measure_apart(s, c, c.apart);
+  hold_at(c, place);
+  measure_apart(s, c);
   c.begun = std::max(kRough, seen.depth);
   return dot(c.apart, c.normal) >= 0 || give_way(s, c, 0);
 }
@@ -181,8 +187,8 @@ void settle(const MpmState& s, FaceContact& c, double dt) {
   if (lift == 0) return;
   float place[3];
   for (int a = 0; a < 3; ++a) place[a] = c.hold[a] + lift * facet.normal[a];
-  hold_at(s, c, place);
-  measure_apart(s, c, c.apart);
+  hold_at(c, place);
+  measure_apart(s, c);
 }
 
 /// Looks anew at contact `i`: which facet, its normal, and the place held. Returns how fast the two
@@ -289,11 +295,10 @@ bool are_bound(const MpmState& s, std::int32_t p, std::int32_t q) {
 }
 
 /// Whether two facets belong to the same bit of a piece, as at an edge of it or on the two sides of
-/// a slice, or do not face one another as a fold's do.
+/// a slice.
 bool are_one(const MpmState& s, const Pieces& pieces, std::int32_t a, std::int32_t b) {
   const std::int32_t p = facet_of(s, a).point, q = facet_of(s, b).point;
-  if (pieces.of_point[p] != pieces.of_point[q]) return false;
-  return dot(s.faces.motion[a].normal, s.faces.motion[b].normal) > kFolded || are_bound(s, p, q);
+  return pieces.of_point[p] == pieces.of_point[q] && are_bound(s, p, q);
 }
 
 /// Finds the facets that may meet until the next search, and when that is.
@@ -343,6 +348,9 @@ void search(MpmState& s, const Pieces& pieces) {
     if (touches(a, b)) ++count[a];
     if (touches(b, a)) ++count[b];
     involved[a] = involved[b] = true;
+  }
+  for (const FaceContact& c : faces.all) {
+    if (c.other >= 0) involved[c.other] = true;
   }
   for (std::int32_t f = 0; f < facet_count; ++f) {
     if (involved[f]) faces.involved.push_back(f);
@@ -404,7 +412,7 @@ void take_up(MpmState& s, double dt) {
 
 }  // namespace
 
-void find_face_contacts(MpmState& s, const Pieces& pieces, double dt) {
+int find_face_contacts(MpmState& s, const Pieces& pieces, double dt, int at_most) {
   FaceContacts& faces = s.faces;
   const bool searched = faces.until_search <= 0;
   if (searched) {
@@ -413,9 +421,15 @@ void find_face_contacts(MpmState& s, const Pieces& pieces, double dt) {
   }
   if (!faces.all.empty() && (searched || faces.until_look <= 0)) look_at_all(s, dt, !searched);
   if (faces.all.empty()) faces.active.clear();
-  faces.until_search -= dt;
-  faces.until_look -= dt;
-  faces.since_look += dt;
+  int substeps = 0;
+  do {
+    faces.until_search -= dt;
+    faces.until_look -= dt;
+    faces.since_look += dt;
+    ++substeps;
+  } while (substeps < at_most && faces.until_search > 0 &&
+           (faces.all.empty() || faces.until_look > 0));
+  return substeps;
 }
 
 void keep_face_contacts(MpmState& s) {

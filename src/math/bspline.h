@@ -18,6 +18,14 @@ TISSUE_SIM_INLINE float lattice_slope(int s, int d) {
   return (d == 2 ? 1.0f : -1.0f) * ((d == 2) == (s == 1) ? 0.75f : 0.25f);
 }
 
+/// Weight of the node at offset d - 1 (d = 0, 1, 2) for a place in cells from the middle of the
+/// cell: the cell's own quadratics, in and outside of it.
+TISSUE_SIM_INLINE float cell_weight(float place, int d) {
+  if (d == 1) return 0.75f - place * place;
+  const float side = d == 0 ? 0.5f - place : 0.5f + place;
+  return 0.5f * side * side;
+}
+
 // On the three node values u-, u0, u+ of a line, both points' values and slopes follow from
 //   average    A = 11/16 u0 + 5/32 (u+ + u-)
 //   difference d = u+ - u-

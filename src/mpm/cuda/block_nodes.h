@@ -22,15 +22,49 @@ __device__ __forceinline__ uint4 first_parts(const CudaTables& t, std::uint32_t 
           count > 3 ? __ldg(part + 3) : 0};
 }
 
+/// Bit of SlotCache::shared for a node that contact of tissue with tissue may push.
+inline constexpr std::uint32_t kPushed = 1u << 31;
+
+template <bool kFaces>
 __device__ __forceinline__ void fill_cache(const CudaTables& t, const CudaBlock& b,
-                                           const SlotCache& cache) {
+                                           const CudaFaces& faces, const SlotCache& cache) {
   for (int i = static_cast<int>(threadIdx.x); i < b.slots(); i += static_cast<int>(blockDim.x)) {
     const int slot = b.first_slot + i;
     cache.node[i] = t.slot_node[slot];
     cache.shared[i] = t.slot_parts[slot];
     cache.parts[i] = first_parts(t, slot, cache.shared[i]);
+    if (!kFaces) continue;
+    const std::int32_t node = cache.node[i] < 0 ? ~cache.node[i] : cache.node[i];
+    if (faces.marks[node] != 0) cache.shared[i] |= kPushed;
   }
 }
+
+/// Forces of contacts of tissue with tissue on the nodes, of the substep before and of the next.
+struct PushedNodes {
+  const std::uint8_t* marks;
+  const long long* force;
+  long long* clear;
+};
+
+/// What contacts push a node with.
+struct Pushed {
+  long long force[3];
+
+  __device__ __forceinline__ Pushed(const PushedNodes& pushed, bool marked, bool clear, int node) {
+    force[0] = force[1] = force[2] = 0;
+    if (!marked) return;
+    const std::size_t first = 3 * static_cast<std::size_t>(node);
+#pragma unroll
+    for (int c = 0; c < 3; ++c) force[c] = __ldcg(pushed.force + first + c);
+    if (!clear) return;
+#pragma unroll
+    for (int c = 0; c < 3; ++c) __stcg(pushed.clear + first + c, 0ll);
+  }
+  Pushed() = default;
+  __device__ __forceinline__ float of(int c) const {
+    return __ll2float_rn(force[c]) * static_cast<float>(kLoadUnit);
+  }
+};
 
 __device__ __forceinline__ void add(const float4& p, float4& f) {
   f.x += p.x;
@@ -42,13 +76,13 @@ __device__ __forceinline__ void add(const float4& p, float4& f) {
 /// so that stencils give gradients). With `kMove` it first moves them on by the forces of the last
 /// substep, summed in the order of the slots; every block that has a node computes the same, and
 /// the one that owns it writes it down. Each thread has several nodes in hand, for all their loads
-/// to be under way at once.
-template <bool kMove, bool kCached>
+/// to be under way at once. `pushed` is read with kFaces alone.
+template <bool kMove, bool kCached, bool kFaces = false>
 __device__ __forceinline__ void bring_nodes(const CudaTables& t, const CudaBlock& b,
                                             const SlotCache& cache, const CudaNodes& from,
                                             const CudaNodes& to, const float4* force,
                                             const NodeStep& step, float scale, float4* u_out,
-                                            float4* v_out) {
+                                            float4* v_out, const PushedNodes& pushed = {}) {
   constexpr int kHand = kCached ? 2 : 4;
   const int count = b.slots(), threads = static_cast<int>(blockDim.x);
   for (int i = static_cast<int>(threadIdx.x); i < count; i += kHand * threads) {
@@ -56,6 +90,7 @@ __device__ __forceinline__ void bring_nodes(const CudaTables& t, const CudaBlock
     std::uint32_t shared[kHand];
     uint4 parts[kHand];
     float4 u[kHand], v[kHand], f[kHand];
+    Pushed push[kHand];
 #pragma unroll
     for (int k = 0; k < kHand; ++k) {
       const int local = min(i + k * threads, count - 1), slot = b.first_slot + local;
@@ -69,6 +104,12 @@ __device__ __forceinline__ void bring_nodes(const CudaTables& t, const CudaBlock
       u[k] = __ldcg(from.u + node[k]);
       if (kMove || v_out != nullptr) v[k] = __ldcg(from.v + node[k]);
       if (!kMove) continue;
+      if (kFaces) {
+        const bool marked =
+            kCached ? (shared[k] & kPushed) != 0 : __ldg(pushed.marks + node[k]) != 0;
+        push[k] = Pushed(pushed, marked, entry[k] >= 0, node[k]);
+        shared[k] &= ~kPushed;
+      }
       if (!kCached) {
         parts[k] = first_parts(t, b.first_slot + min(i + k * threads, count - 1), shared[k]);
       }
@@ -90,6 +131,7 @@ __device__ __forceinline__ void bring_nodes(const CudaTables& t, const CudaBlock
         for (int p = 4; p < part_count; ++p) {
           add(__ldcg(force + __ldg(t.parts + (shared[k] >> 6) + p)), f[k]);
         }
+        if (kFaces) add({push[k].of(0), push[k].of(1), push[k].of(2), 0}, f[k]);
         step.move(0, f[k].x, u[k].w, v[k].w, u[k].x, v[k].x);
         step.move(1, f[k].y, u[k].w, v[k].w, u[k].y, v[k].y);
         step.move(2, f[k].z, u[k].w, v[k].w, u[k].z, v[k].z);

@@ -35,7 +35,9 @@ std::size_t CudaMpmTissue::device_bytes() const {
                     d.near.bytes() + d.colour.bytes() + d.volume.bytes() + d.partial.bytes() +
                     d.hold.bytes() + d.bonds.bytes() + d.with.bytes() + d.whole.bytes() +
                     d.u_before.bytes() + d.colliders.bytes() + d.loads.bytes() +
-                    d.measures.bytes() + d.cloud.bytes() + d.stretched.bytes();
+                    d.measures.bytes() + d.cloud.bytes() + d.stretched.bytes() + d.springs.bytes() +
+                    d.contact_nodes.bytes() + d.contact_marks.bytes() + d.contact_force.bytes() +
+                    d.face_nodes.bytes() + d.gathered.bytes();
   for (int i = 0; i < 2; ++i) sum += d.u[i].bytes() + d.v[i].bytes() + d.force[i].bytes();
   return sum;
 }
@@ -47,6 +49,7 @@ void CudaMpmTissue::pull() {
   d.u[d.current].download(d.host_nodes.data(), n, d.stream);
   d.v[d.current].download(d.host_nodes.data() + n, n, d.stream);
   check_cuda(cudaStreamSynchronize(d.stream), "finish a frame");
+  take_faces();
   unpack_nodes(d.host_nodes.data(), d.host_nodes.data() + n, state_->nodes);
 }
 
@@ -66,7 +69,12 @@ void CudaMpmTissue::push() {
     d.plan.viscous = d.plan.viscous || b.viscosity > 0;
   }
   d.resident = resident_blocks(d.plan, static_cast<int>(t.blocks.size()));
-  if (d.resident == 0) throw std::runtime_error("the GPU has too little shared memory");
+  d.face_plan = d.plan;
+  d.face_plan.faces = true;
+  d.face_resident = resident_blocks(d.face_plan, static_cast<int>(t.blocks.size()));
+  if (d.resident == 0 || d.face_resident == 0) {
+    throw std::runtime_error("the GPU has too little shared memory");
+  }
   d.blocks.upload(t.blocks, d.stream);
   d.bodies.upload(t.bodies, d.stream);
   d.slot_node.upload(t.slot_node, d.stream);
@@ -88,7 +96,7 @@ void CudaMpmTissue::push() {
     d.hold.clear(d.stream);
   }
   d.bonds.upload(state_->points.bonds, d.stream);
-  d.arrived.resize(1);
+  d.arrived.resize(2);
   d.host_nodes.resize(2 * n);
   pack_nodes(state_->nodes, d.host_nodes.data(), d.host_nodes.data() + n);
   for (int i = 0; i < 2; ++i) {

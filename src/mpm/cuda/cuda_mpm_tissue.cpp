@@ -24,6 +24,7 @@ std::unique_ptr<MpmState> make_state(const Scene& scene, std::vector<std::string
   shape = choose_shape(state->bodies, limits);
   state->blocks = make_blocks(state->bodies, state->points, *state->fields, shape.blocks);
   state->contacts.with.assign(state->points.size(), 0);
+  list_facets(*state);
   state->instructions = instruction_set();
   state->kernels = &block_kernels(state->instructions);
   state->cpu = std::make_unique<Cpu>(scene.threads);
@@ -59,7 +60,9 @@ CudaMpmTissue::CudaMpmTissue(const Scene& scene) : device_(std::make_unique<OnDe
       static_cast<std::size_t>(attribute(cudaDevAttrMaxSharedMemoryPerBlockOptin))};
   state_ = make_state(scene, &notes_, limits, d.shape);
   pieces_ = whole_pieces(state_->bodies, state_->points);
-  notes_.push_back("runs on the GPU (" + d.gpu + "); cuts are made on the host between frames");
+  notes_.push_back("runs on the GPU (" + d.gpu +
+                   "); cuts are made on the host between frames, and "
+                   "a body that is whole does not touch itself");
   push();
   launch_measure();
   finish_measure();
@@ -140,7 +143,7 @@ void CudaMpmTissue::find_near(double duration) {
               d.stream);
 }
 
-void CudaMpmTissue::run_substeps(int begin, int end, float dt) {
+void CudaMpmTissue::launch(int begin, int end, float dt) {
   OnDevice& d = *device_;
   const Scene& scene = state_->scene;
   const std::size_t collider_count = d.host_reach.size();
@@ -158,7 +161,10 @@ void CudaMpmTissue::run_substeps(int begin, int end, float dt) {
   frame.collider_count = static_cast<int>(collider_count);
   frame.loads = d.loads.data() + 6 * begin * collider_count;
   frame.arrived = d.arrived.data();
-  launch_substeps(d.plan, d.tables(), frame, d.resident, d.stream);
+  const std::size_t faces = faces_may_meet() ? state_->faces.active.size() : 0;
+  frame.faces = d.faces(faces);
+  launch_substeps(faces > 0 ? d.face_plan : d.plan, d.tables(), frame,
+                  faces > 0 ? d.face_resident : d.resident, d.stream);
   d.current = (d.current + end - begin) % 2;
   state_->time += static_cast<double>(end - begin) * dt;
 }
@@ -196,6 +202,7 @@ FrameResult CudaMpmTissue::finish() {
   const OnDevice& d = *device_;
   const std::vector<BlockMotion> before = state_->motion;
   finish_measure();
+  take_faces();
   const std::size_t colliders = result_.loads.size() + 1;
   for (int i = 0; i < substeps_ && d.host_loads.size() > 0; ++i) {
     for (std::size_t c = 1; c < colliders && c < d.host_reach.size(); ++c) {

@@ -30,7 +30,7 @@ class CudaMpmTissue final : public Tissue {
 
   // For tests and the benchmark.
   int fragment_of(int point) const { return pieces_.of_point[point]; }
-  /// The host's copy, whose nodes are as pull() left them.
+  /// The host's copy, whose nodes are as pull() left them or later; contacts as of finish().
   MpmState& state() { return *state_; }
   void pull();                       ///< nodes from the GPU
   void push();                       ///< everything to the GPU
@@ -44,11 +44,18 @@ class CudaMpmTissue final : public Tissue {
            const std::vector<BlockMotion>& before, CutReport& report);
   void cut_by_blades(const std::vector<BlockMotion>& before);
   void keep_place_for_blades();
-  void run_substeps(int begin, int end, float dt);
   std::vector<TearingPoint> find_tearing();
   void tear(const std::vector<TearingPoint>& tearing, const FrameInput& input, double share);
-  void find_near(double duration);
   void upload_points();
+  void find_near(double duration);
+  /// Enqueues the frame's substeps from `begin` up to `end`; waits between them where faces meet.
+  void run_substeps(int begin, int end, float dt);
+  void launch(int begin, int end, float dt);
+  /// Whether tissue can touch tissue. A body that is whole does not touch itself.
+  bool faces_may_meet() const;
+  int find_faces(int substeps, float dt);  ///< contacts to the GPU: see find_face_contacts()
+  void fetch_faces();                      ///< enqueues the way back
+  void take_faces();                       ///< what came back
   void launch_measure();
   void finish_measure();
   void upload_colliders(int substeps, double duration, const FrameInput& input);

@@ -83,7 +83,7 @@ void connect(std::size_t node_count, HostTables& t) {
     if (begin[n + 1] == 1) begin[n + 1] = 0;  // needs no list
     begin[n + 1] += begin[n];
   }
-  if (begin.back() >= 1u << 26) {
+  if (begin.back() >= 1u << 25) {
     throw std::runtime_error(
         "the tissue has more shared nodes than the GPU's tables hold: raise "
         "cell_size");

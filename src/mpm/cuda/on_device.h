@@ -11,9 +11,9 @@ namespace tissue_sim {
 
 struct CudaMpmTissue::OnDevice {
   CudaShape shape;
-  CudaPlan plan;
-  int resident = 0;  ///< thread blocks that run at once
-  int current = 0;   ///< which of the two states is the present one
+  CudaPlan plan, face_plan;             ///< without and with contact of tissue with tissue
+  int resident = 0, face_resident = 0;  ///< thread blocks that run at once
+  int current = 0;                      ///< which of the two states is the present one
   cudaStream_t stream = nullptr;
   std::string gpu;  ///< name
 
@@ -33,6 +33,18 @@ struct CudaMpmTissue::OnDevice {
   DeviceArray<int> stretched_count;
   PinnedArray<int> host_stretched_count;
   DeviceArray<Point> cloud;
+  DeviceArray<FaceSpring> springs;  ///< of the contacts of tissue with tissue
+  DeviceArray<CudaContactNodes> contact_nodes;
+  DeviceArray<std::uint8_t> contact_marks;
+  DeviceArray<long long> contact_force;
+  DeviceArray<std::int32_t> face_nodes;  ///< that the host looks at
+  DeviceArray<float4> gathered;          ///< their u, then v
+  std::vector<std::int32_t> host_face_nodes;
+  bool looked = false;  ///< whether the host has just looked at the contacts
+  std::size_t springs_in_flight = 0, nodes_in_flight = 0;
+  PinnedArray<FaceSpring> host_springs;
+  PinnedArray<CudaContactNodes> host_contact_nodes;
+  PinnedArray<float4> host_gathered;
   PinnedArray<Collider> host_colliders;
   PinnedArray<CudaBox> host_reach;
   PinnedArray<long long> host_loads;
@@ -60,6 +72,17 @@ struct CudaMpmTissue::OnDevice {
     t.with = with.data();
     t.hold = hold.data();
     return t;
+  }
+  CudaFaces faces(std::size_t count) const {
+    CudaFaces f;
+    f.count = static_cast<int>(count);
+    f.looked = looked;
+    f.springs = springs.data();
+    f.nodes = contact_nodes.data();
+    f.marks = contact_marks.data();
+    f.force = contact_force.data();
+    f.stride = contact_force.size() / 3;
+    return f;
   }
   CudaNodes nodes(int which) const { return {u[which].data(), v[which].data()}; }
   CudaNodes present() const { return nodes(current); }

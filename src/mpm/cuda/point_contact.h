@@ -40,11 +40,11 @@ __device__ __forceinline__ bool may_touch(const Collider& c, const float (&x)[3]
 
 /// Force of the colliders `near` on the point `p` at `x` [N]; out of line, for few points touch
 /// anything and the others shall keep their registers.
-__device__ __noinline__ float3 contact_push(const CudaTables& t, const Collider* colliders,
-                                            std::uint32_t near, int p, float volume, float3 place,
-                                            const ContactSpring& unit, const float4* v, int pitch,
-                                            int plane, int s, float cell_size,
-                                            unsigned long long* loads) {
+inline __device__ __noinline__ float3 contact_push(const CudaTables& t, const Collider* colliders,
+                                                   std::uint32_t near, int p, float volume,
+                                                   float3 place, const ContactSpring& unit,
+                                                   const float4* v, int pitch, int plane, int s,
+                                                   float cell_size, unsigned long long* loads) {
   const float x[3] = {place.x, place.y, place.z};
   float3 sum = {0, 0, 0};
   bool touches = false;

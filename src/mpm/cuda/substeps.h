@@ -15,14 +15,18 @@ struct CudaPlan {
   int max_slots = 0;    ///< of a block
   bool small = true;    ///< to be cached, if all blocks run at once
   bool cached = false;  ///< each thread block has one block only, whose tables it keeps
+  bool faces = false;   ///< with contact of tissue with tissue
   bool neo_hookean = false, fixed_corotated = false, viscous = false;  ///< what there is
 };
+
+using CudaKernel = void (*)(CudaTables, CudaFrame, int);
+CudaKernel kernel_with_faces(const CudaPlan& plan);
 
 /// Thread blocks that run at once; 0 where the plan does not fit the GPU. Sets CudaPlan::cached.
 int resident_blocks(CudaPlan& plan, int block_count);
 
-/// Enqueues all substeps of a frame as one kernel. The state is then in
-/// `state[(current + substeps) % 2]`.
+/// Enqueues substeps as one kernel, with contact of tissue with tissue if the plan has it. The
+/// state is then in `state[(current + substeps) % 2]`.
 void launch_substeps(const CudaPlan& plan, const CudaTables& tables, const CudaFrame& frame,
                      int resident, cudaStream_t stream);
 

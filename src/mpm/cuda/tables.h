@@ -11,6 +11,7 @@
 #include <cstdint>
 
 #include "contact/collider.h"
+#include "contact/face_spring.h"
 #include "mpm/update_node.h"
 
 namespace tissue_sim {
@@ -77,6 +78,27 @@ struct CudaTables {
 /// integers, whose sum does not depend on the order.
 inline constexpr double kLoadUnit = 1.0 / (1ll << 38);
 
+/// Where a contact of tissue with tissue gets its displacements from and gives its force to.
+struct CudaContactNodes {
+  std::int32_t own[27];      ///< nodes of the facet's cell, x fastest
+  std::int32_t other[27];    ///< nodes of the cell of the place held
+  float weight[27];          ///< of `own`, at the facet's centre
+  float other_inv_mass[27];  ///< of `other` [1/kg]
+};
+
+/// Contacts of tissue with tissue (contact/face_contact.h) of the substeps of one launch.
+struct CudaFaces {
+  int count = 0;  ///< 0: no more of this is read
+  bool looked;    ///< they have just been looked at: nothing moved since
+  FaceSpring* springs;
+  const CudaContactNodes* nodes;
+  const std::uint8_t* marks;  ///< per node: whether a contact may push it
+  /// Force on each node, [3][nodes][3], in units of kLoadUnit as integers: while one is summed up,
+  /// that of the substep before is read and the third is cleared.
+  long long* force;
+  std::size_t stride;  ///< from one of the three to the next
+};
+
 struct CudaFrame {
   CudaNodes state[2];
   int current;       ///< which of them holds the state at the beginning
@@ -86,7 +108,8 @@ struct CudaFrame {
   const Collider* colliders;  ///< [substeps][collider_count]
   int collider_count;
   long long* loads;   ///< [substeps][collider_count][6]
-  unsigned* arrived;  ///< counter of the barrier, 0 at the beginning
+  unsigned* arrived;  ///< counters of the two barriers, 0 at the beginning
+  CudaFaces faces;
 };
 
 }  // namespace tissue_sim

@@ -1,0 +1,110 @@
+// The spring between two faces that touch: what a contact is within a substep, on the CPU and on
+// the GPU.
+#pragma once
+
+#include <cmath>
+#include <cstdint>
+
+#include "compute/host_device.h"
+#include "contact/collider.h"
+
+namespace tissue_sim {
+
+TISSUE_SIM_INLINE float dot(const float* a, const float* b) {
+  return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
+
+/// A spring and a damper between the centre of a facet and a material place on another face.
+struct alignas(16) FaceSpring {
+  double from_middle[3];  ///< from the middle of the other's cell to the facet's centre, in
+                          ///< reference space [m]
+  double cell_size;       ///< of the other body [m]
+  float hold[3];          ///< place on the other face [cells, from the middle of its cell]
+  float between[3];       ///< from `hold` to the centre in reference space [m]
+  float apart[3];         ///< the same in the world, as of the last substep [m]
+  float normal[3];        ///< of the other face, in the world
+  float to_reference[9];  ///< inverse of its deformation gradient over the cell [1/m]
+  float stiffness, damping, friction;  ///< [N/m], [N s/m], [-]
+  float own_mobility;                  ///< sum of w^2 / m at the facet's centre [1/kg]
+  float sudden;                        ///< depth at which nothing can be from one substep [m]
+  float force[3];                      ///< on the facet [N]
+  bool touching = false;
+
+  /// Sets the place on the other face that it holds on to.
+  TISSUE_SIM_INLINE void hold_at(const float (&place)[3]) {
+    for (int a = 0; a < 3; ++a) {
+      hold[a] = place[a];
+      between[a] = static_cast<float>(from_middle[a] - cell_size * place[a]);
+    }
+  }
+
+  /// Sets `apart`, from the displacements of the facet's centre and of the place held [m].
+  TISSUE_SIM_INLINE void measure_apart(const float (&own)[3], const float (&held)[3]) {
+    for (int a = 0; a < 3; ++a) apart[a] = between[a] + (own[a] - held[a]);
+  }
+
+  /// Makes the spring so soft that substeps of `dt` can follow what it moves, and the damper to it;
+  /// `held_mobility` is the sum of w^2 / m at the place held [1/kg].
+  TISSUE_SIM_INLINE void soften(float held_mobility, float dt) {
+    constexpr float kStable = 0.35f;  // stiffness * dt^2 / mass, at most; springs share nodes
+    const float mass = 1 / (own_mobility + held_mobility + 1e-30f);
+    stiffness = fminf(stiffness, kStable * mass / (dt * dt));
+    damping = 2 * kContactDamping * sqrtf(stiffness * mass);
+  }
+
+  /// Whether the place held is still on the other face: near its cell, and not far from the facet.
+  TISSUE_SIM_INLINE bool holds() const {
+    constexpr float kFarthest = 1.25f;  // [cells]
+    const auto far = static_cast<float>(0.75 * cell_size);
+    return dot(apart, apart) < far * far && fabsf(hold[0]) < kFarthest &&
+           fabsf(hold[1]) < kFarthest && fabsf(hold[2]) < kFarthest;
+  }
+};
+
+/// Works out the force of a contact after a substep of `dt` seconds, and lets it slide. `places`
+/// knows displacements [m]: places.own(u) of the facet's centre, places.held(u) of the place held,
+/// which places.hold(place) sets, and places.held_mobility() [1/kg].
+template <class Places>
+TISSUE_SIM_INLINE void push_face(FaceSpring& c, float dt, Places& places) {
+  float own[3], held[3];
+  const float depth_before = -dot(c.apart, c.normal);
+  places.own(own);
+  places.held(held);
+  c.measure_apart(own, held);
+  float depth = -dot(c.apart, c.normal);
+  const float closing = (depth - depth_before) / dt;  // [m/s]
+  const float length2 = dot(c.apart, c.apart);
+  c.force[0] = c.force[1] = c.force[2] = 0;
+  // What comes out of the blue is for the next look to tell.
+  const bool touched = c.touching, sudden = !touched && depth > c.sudden;
+  c.touching = depth > 0 && !sudden;
+  if (!c.touching) return;
+  // The place held slides along the face, so that the spring stays in the friction cone.
+  constexpr float kOnCone = 1.02f;
+  float aside[3], slip = 0;
+  for (int i = 0; i < 4; ++i) {
+    for (int a = 0; a < 3; ++a) aside[a] = c.apart[a] + depth * c.normal[a];
+    slip = sqrtf(dot(aside, aside));
+    if (slip <= kOnCone * c.friction * depth || i == 3) break;
+    const float share = 1 - c.friction * depth / slip;
+    float place[3];
+    for (int a = 0; a < 3; ++a) {
+      place[a] = c.hold[a] + share * dot(c.to_reference + 3 * a, aside);
+    }
+    c.hold_at(place);
+    places.hold(place);
+    places.held(held);
+    c.measure_apart(own, held);
+    depth = -dot(c.apart, c.normal);
+    // Not what it looked like, or beyond what is left of the face.
+    c.touching = depth > 0 && dot(c.apart, c.apart) <= length2 && c.holds();
+    if (!c.touching) return;
+    if (!touched) c.soften(places.held_mobility(), dt);
+  }
+  // Along the line between the two material places, and only apart.
+  const float push = fmaxf(0.0f, c.stiffness * depth + c.damping * closing);
+  const float friction = fminf(1.0f, kOnCone * c.friction * depth / (slip + 1e-30f));
+  for (int a = 0; a < 3; ++a) c.force[a] = push * (c.normal[a] - friction / depth * aside[a]);
+}
+
+}  // namespace tissue_sim

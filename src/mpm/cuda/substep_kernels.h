@@ -1,0 +1,204 @@
+// The persistent kernels of substeps.h, with and without contact of tissue with tissue. For .cu
+// files.
+#pragma once
+
+#include "mpm/cuda/block_forces.h"
+#include "mpm/cuda/push_contacts.h"
+#include "mpm/cuda/substeps.h"
+
+namespace tissue_sim {
+namespace {
+
+/// A thread block says that it has come to a barrier of the grid, and goes on.
+__device__ __forceinline__ void arrive(unsigned* arrived) {
+  __syncthreads();
+  if (threadIdx.x == 0) {
+    asm volatile("red.release.gpu.global.add.u32 [%0], 1;" ::"l"(arrived) : "memory");
+  }
+}
+
+/// Waits until all thread blocks have arrived `round` times; what they wrote before is then seen by
+/// all.
+__device__ __forceinline__ void wait(unsigned* arrived, unsigned round) {
+  if (threadIdx.x == 0) {
+    const unsigned wanted = round * gridDim.x;
+    unsigned seen;
+    do {
+      asm volatile("ld.acquire.gpu.global.u32 %0, [%1];" : "=r"(seen) : "l"(arrived) : "memory");
+    } while (seen < wanted);
+  }
+  __syncthreads();
+}
+
+__device__ __forceinline__ void grid_barrier(unsigned* arrived, unsigned round) {
+  arrive(arrived);
+  wait(arrived, round);
+}
+
+/// The shared memory of a thread block. Worked out anew where it is needed, so that the compiler
+/// knows it for shared memory and can use its faster loads.
+__device__ __forceinline__ BlockShared shared_of(int max_slots) {
+  extern __shared__ float4 shared[];
+  BlockShared s;
+  s.u = shared;
+  s.v = s.u + max_slots;
+  s.exchange = s.v + max_slots;
+  s.loads = reinterpret_cast<unsigned long long*>(s.exchange + 9 * blockDim.x);
+  return s;
+}
+
+/// Which laws a kernel can do; one that can do all has to hold more registers.
+enum class Laws { kFixedCorotated, kNeoHookean, kAny };
+
+template <Laws kLaws, bool kSpecial>
+__device__ __forceinline__ void forces(const CudaTables& t, const CudaBlock& b,
+                                       const CudaBody& body, const BlockShared& s,
+                                       const BlockStep& step) {
+  if constexpr (kLaws == Laws::kFixedCorotated) {
+    block_forces<FixedCorotated, false, kSpecial>(t, b, body, s, step);
+  } else if constexpr (kLaws == Laws::kNeoHookean) {
+    block_forces<NeoHookean, false, kSpecial>(t, b, body, s, step);
+  } else if (body.neo_hookean != 0) {
+    block_forces<NeoHookean, true, kSpecial>(t, b, body, s, step);
+  } else {
+    block_forces<FixedCorotated, true, kSpecial>(t, b, body, s, step);
+  }
+}
+
+/// Out of line and with copies of its arguments, for the ordinary blocks to keep theirs in
+/// registers.
+template <Laws kLaws>
+__device__ __noinline__ void special_forces(const CudaTables t, const CudaBlock b,
+                                            const CudaBody body, int max_slots,
+                                            const BlockStep step) {
+  forces<kLaws, true>(t, b, body, shared_of(max_slots), step);
+}
+
+/// A block with what belongs to it. Copies: through a reference they would be read again after
+/// every store.
+struct BlockAtWork {
+  CudaBlock block;
+  CudaBody body;
+  std::uint32_t near;
+  __device__ __forceinline__ BlockAtWork(const CudaTables& t, int index)
+      : block(t.blocks[index]), body(t.bodies[block.body]), near(t.near[index]) {}
+};
+
+/// Forces of a block whose nodes are there, on its points and between them and the colliders.
+template <Laws kLaws>
+__device__ __forceinline__ void all_forces(const CudaTables& t, const CudaFrame& f,
+                                           const BlockAtWork& w, int substep, int max_slots,
+                                           float4* force) {
+  const BlockShared s = shared_of(max_slots);
+  const int load_count = 6 * f.collider_count;
+  if (w.near != 0) {
+    for (int i = threadIdx.x; i < load_count; i += blockDim.x) s.loads[i] = 0;
+  }
+  __syncthreads();
+  const BlockStep step{f.colliders + substep * f.collider_count, w.near, force};
+  if (w.near == 0 && w.block.partial == 0) {
+    forces<kLaws, false>(t, w.block, w.body, s, step);
+    return;
+  }
+  special_forces<kLaws>(t, w.block, w.body, max_slots, step);
+  if (w.near == 0) return;
+  auto* loads = reinterpret_cast<unsigned long long*>(f.loads) + substep * load_count;
+  for (int i = threadIdx.x; i < load_count; i += blockDim.x) {
+    if (s.loads[i] != 0) atomicAdd(loads + i, s.loads[i]);
+  }
+  __syncthreads();
+}
+
+/// The forces of contacts that a round reads and clears.
+__device__ __forceinline__ PushedNodes pushed_nodes(const CudaFaces& f, int round) {
+  return {f.marks, f.force + f.stride * ((round + 2) % 3), f.force + f.stride * ((round + 1) % 3)};
+}
+
+/// One block in one round. Each block moves all of its nodes on, by the forces of the substep
+/// before, whoever else has them too, so that one barrier a substep suffices; then come the forces
+/// at their new places. Before the first substep nothing moves, after the last there are no forces.
+/// State and forces change places between two buffers. With kFaces, the thread block arrives at the
+/// second barrier when its last block's nodes are in place, so that the forces hide the wait for
+/// the others.
+template <Laws kLaws, bool kCached, bool kFaces>
+__device__ __forceinline__ void block_round(const CudaTables& t, const CudaFrame& f,
+                                            const BlockAtWork& w, int round, int max_slots,
+                                            const SlotCache& cache, bool last) {
+  const BlockShared s = shared_of(max_slots);
+  const float scale = w.body.inv_cell_size;
+  float4* v = w.near != 0 || kLaws == Laws::kAny ? s.v : nullptr;
+  // Not f.state[i]: parameters that a register indexes would be copied to local memory.
+  const bool odd = ((f.current + max(round - 1, 0)) & 1) != 0, odd_round = (round & 1) != 0;
+  const CudaNodes &from = odd ? f.state[1] : f.state[0], &to = odd ? f.state[0] : f.state[1];
+  if (round == 0) {
+    bring_nodes<false, kCached>(t, w.block, cache, from, from, nullptr, f.step, scale, s.u, v);
+  } else {
+    PushedNodes pushed;
+    if (kFaces) pushed = pushed_nodes(f.faces, round);
+    bring_nodes<true, kCached, kFaces>(t, w.block, cache, from, to,
+                                       odd_round ? f.force[0] : f.force[1], f.step, scale, s.u, v,
+                                       pushed);
+  }
+  if (round == f.substeps) return;
+  if (kFaces && last) arrive(f.arrived + 1);
+  all_forces<kLaws>(t, f, w, round, max_slots, odd_round ? f.force[1] : f.force[0]);
+}
+
+/// Contacts of tissue with tissue, once all nodes are where the round brought them.
+__device__ __forceinline__ void push_faces(const CudaFrame& f, int round) {
+  if (round == f.substeps) return;
+  wait(f.arrived + 1, static_cast<unsigned>(round) + 1);
+  const bool odd = ((f.current + round) & 1) != 0;
+  push_contacts(f.faces, odd ? f.state[1].u : f.state[0].u, f.step.dt, round == 0 && f.faces.looked,
+                f.faces.force + f.faces.stride * (round % 3));
+}
+
+template <Laws kLaws, bool kCached, bool kFaces, int kThreads, int kBlocksPerProcessor>
+__global__ void __launch_bounds__(kThreads, kBlocksPerProcessor)
+    mpm_substeps(const CudaTables t, const CudaFrame f, int max_slots) {
+  const BlockShared s = shared_of(max_slots);
+  SlotCache cache;
+  cache.parts = reinterpret_cast<uint4*>(s.loads + 6 * kMaxColliders);
+  cache.node = reinterpret_cast<std::int32_t*>(cache.parts + max_slots);
+  cache.shared = reinterpret_cast<std::uint32_t*>(cache.node + max_slots);
+  if constexpr (kCached) {
+    const BlockAtWork mine(t, static_cast<int>(blockIdx.x));
+    fill_cache<kFaces>(t, mine.block, f.faces, cache);
+    __syncthreads();
+    for (int round = 0; round <= f.substeps; ++round) {
+      if (round > 0) grid_barrier(f.arrived, static_cast<unsigned>(round));
+      block_round<kLaws, true, kFaces>(t, f, mine, round, max_slots, cache, true);
+      if (kFaces) push_faces(f, round);
+    }
+  } else {
+    for (int round = 0; round <= f.substeps; ++round) {
+      if (round > 0) grid_barrier(f.arrived, static_cast<unsigned>(round));
+      for (int i = blockIdx.x; i < t.block_count; i += gridDim.x) {
+        const bool last = i + static_cast<int>(gridDim.x) >= t.block_count;
+        block_round<kLaws, false, kFaces>(t, f, BlockAtWork(t, i), round, max_slots, cache, last);
+      }
+      if (kFaces) push_faces(f, round);
+    }
+  }
+}
+
+template <bool kFaces, bool kCached, int kThreads, int kAtOnce>
+CudaKernel kernel_for(const CudaPlan& plan) {
+  if (plan.viscous || (plan.neo_hookean && plan.fixed_corotated)) {
+    return mpm_substeps<Laws::kAny, kCached, kFaces, kMaxCudaThreads, 1>;
+  }
+  return plan.neo_hookean ? mpm_substeps<Laws::kNeoHookean, kCached, kFaces, kThreads, kAtOnce>
+                          : mpm_substeps<Laws::kFixedCorotated, kCached, kFaces, kThreads, kAtOnce>;
+}
+
+/// The kernel of small tissues has all registers for each thread; that of large ones holds so few
+/// that 384 threads run at once, of which some compute while others wait for memory.
+template <bool kFaces>
+CudaKernel kernel_of(const CudaPlan& plan) {
+  if (plan.cached) return kernel_for<kFaces, true, kMaxCudaThreads, 1>(plan);
+  return plan.threads > 192 ? kernel_for<kFaces, false, kMaxCudaThreads, 1>(plan)
+                            : kernel_for<kFaces, false, 192, 2>(plan);
+}
+
+}  // namespace
+}  // namespace tissue_sim

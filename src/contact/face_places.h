@@ -18,6 +18,12 @@ inline const LatticeBody& body_of(const MpmState& s, std::int32_t facet) {
   return s.bodies[block_of(s, facet).body];
 }
 
+/// Reference place that a contact holds on to [m].
+inline Vec3 place_held(const MpmState& s, const FaceContact& c) {
+  return reference_place(body_of(s, c.other), block_of(s, c.other), facet_of(s, c.other).cell,
+                         c.hold);
+}
+
 /// Sets the place on the other face that a contact holds on to, and what follows from it.
 inline void hold_at(FaceContact& c, const float (&place)[3]) {
   c.hold_at(place);

@@ -19,8 +19,8 @@ struct Pieces {
 /// One piece for each body.
 Pieces whole_pieces(const std::vector<LatticeBody>& bodies, const Points& points);
 
-/// Whether the ends of each bond that is broken at one of the points `changed` hold together by a way
-/// around, close by. Then breaking them left all pieces in one.
+/// Whether the ends of each bond that is broken at one of the points `changed` hold together by a
+/// way around, close by. Then breaking them left all pieces in one.
 bool hold_together(const std::vector<LatticeBody>& bodies, const Points& points,
                    const std::vector<std::int32_t>& changed);
 

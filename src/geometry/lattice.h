@@ -9,9 +9,9 @@
 
 namespace tissue_sim {
 
-/// The points of one body. Cells of edge `cell_size` fill a box from `origin` on; cell (i, j, k) has
-/// its grid node in its middle and holds 2 x 2 x 2 points, a quarter of the cell size off the node
-/// along each axis. Axes are the world's (the body's pose is applied to the shape first).
+/// The points of one body. Cells of edge `cell_size` fill a box from `origin` on; cell (i, j, k)
+/// has its grid node in its middle and holds 2 x 2 x 2 points, a quarter of the cell size off the
+/// node along each axis. Axes are the world's (the body's pose is applied to the shape first).
 struct Lattice {
   Vec3 origin = Vec3::Zero();  ///< lowest corner of cell (0, 0, 0) [m]
   double cell_size = 0;        ///< [m]
@@ -30,8 +30,8 @@ struct Lattice {
 /// volume is the body's. For boxes without rotation the lattice starts at the box's lowest corner;
 /// for other shapes it is centred on the bounding box, each edge rounded up to whole half cells.
 /// `notes` receives a line for whatever was repaired on the way (a mesh turned inside out, ...).
-/// Throws std::invalid_argument with the reason and what to do: mesh missing, empty, open, of absurd
-/// size; body without points at this cell size; more than `max_points` points.
+/// Throws std::invalid_argument with the reason and what to do: mesh missing, empty, open, of
+/// absurd size; body without points at this cell size; more than `max_points` points.
 Lattice make_lattice(const Body& body, double cell_size, std::vector<std::string>* notes,
                      std::int64_t max_points = 200'000'000);
 

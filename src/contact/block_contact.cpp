@@ -100,9 +100,15 @@ void find_near_colliders(MpmState& state, const std::vector<Box>& reach, double 
 
 void list_contacts(MpmState& state) {
   Contacts& contacts = state.contacts;
+  const std::vector<std::vector<std::int32_t>> before = std::move(contacts.touching);
   contacts.touching.assign(state.blocks.all.size(), {});
   contacts.near.assign(state.blocks.all.size(), {});
   for (std::size_t i = 0; i < state.blocks.all.size(); ++i) {
+    const Blocks::Origin& origin = state.blocks.origin[i];
+    if (std::all_of(before.begin() + origin.begin, before.begin() + origin.end,
+                    [](const auto& points) { return points.empty(); })) {
+      continue;
+    }
     for (const std::int32_t p : state.blocks.all[i]->point) {
       if (p >= 0 && contacts.with[p] != 0) contacts.touching[i].push_back(p);
     }

@@ -15,7 +15,7 @@ Box bounds(const Collider& collider);
 /// go of contacts that are out of reach.
 void find_near_colliders(MpmState& state, const std::vector<Box>& reach, double duration);
 
-/// Makes the lists of points in contact after blocks were made, with no collider near.
+/// Makes the lists of points in contact anew after update_blocks(), with no collider near.
 void list_contacts(MpmState& state);
 
 /// Adds contact forces to the block's part of the force buffer and sums the loads of the colliders.

@@ -8,6 +8,7 @@
 namespace tissue_sim {
 
 struct Block;
+class KnownFacets;
 struct LatticeBody;
 struct Points;
 
@@ -22,8 +23,10 @@ struct Facet {
   float area;              ///< [m^2]
 };
 
-/// The facets of a block. Place and normal are those of the plane that fits the missing bonds of
-/// the columns around best, so that an oblique cut is a plane, not stairs.
-std::vector<Facet> facets_of(const LatticeBody& body, const Points& points, const Block& block);
+/// The facets of a block; `known` are those of its region that need not be made anew. Place and
+/// normal are those of the plane that fits the missing bonds of the columns around best, so that an
+/// oblique cut is a plane, not stairs.
+std::vector<Facet> facets_of(const LatticeBody& body, const Points& points, const Block& block,
+                             const KnownFacets& known);
 
 }  // namespace tissue_sim

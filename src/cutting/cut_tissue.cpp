@@ -1,9 +1,11 @@
 #include "cutting/cut_tissue.h"
 
 #include <algorithm>
+#include <cmath>
 #include <utility>
 
 #include "contact/block_contact.h"
+#include "contact/known_facets.h"
 #include "cutting/blade_sweep.h"
 #include "cutting/bonds.h"
 
@@ -12,14 +14,13 @@ namespace {
 
 /// Places of the points near a sweep, in the order of the points: both ends of a bond must agree to
 /// the last bit on where a point is, or a cut exactly through it might miss the bonds on both
-/// sides.
+/// sides. The same array twice for tissue at rest.
 struct Places {
-  Array<float> begin, end;  // [3 * point]
-  Vec3 at_begin(std::int32_t p) const {
-    return Eigen::Map<const Eigen::Vector3f>(&begin[3 * std::size_t(p)]).cast<double>();
-  }
-  Vec3 at_end(std::int32_t p) const {
-    return Eigen::Map<const Eigen::Vector3f>(&end[3 * std::size_t(p)]).cast<double>();
+  const Array<float>&begin, &end;  // [3 * point]
+  Vec3 at_begin(std::int32_t p) const { return at(begin, p); }
+  Vec3 at_end(std::int32_t p) const { return at(end, p); }
+  static Vec3 at(const Array<float>& places, std::int32_t p) {
+    return Eigen::Map<const Eigen::Vector3f>(&places[3 * std::size_t(p)]).cast<double>();
   }
 };
 
@@ -45,6 +46,16 @@ bool overlap(const Box& a, const Box& b, double margin) {
 // bond is seen as long as it is not stretched to three times its length.
 constexpr double kReach = 1.5;
 
+/// Whether a box comes near a part of a sweep: its box, and the planes that its edges sweep.
+bool is_near(const Box& box, const SweepPart& part, double reach) {
+  if (!overlap(box, part.box, reach)) return false;
+  const Vec3 middle = 0.5 * (box.min + box.max), half = 0.5 * (box.max - box.min);
+  return std::any_of(part.edges.begin(), part.edges.end(), [&](const SweptEdge& e) {
+    return std::fabs(e.normal.dot(middle) - e.offset) <=
+           e.normal.cwiseAbs().dot(half) + e.thickness + reach;
+  });
+}
+
 struct Broken {
   std::int32_t point;
   int bond;
@@ -55,11 +66,17 @@ void sweep_block(const MpmState& state, const Block& block, const std::vector<Sw
                  const Places& places, std::vector<Broken>& broken) {
   const LatticeBody& body = state.bodies[block.body];
   const double reach = kReach * body.cell_size;
+  Box swept;
+  for (const SweepPart& part : parts) {
+    swept.min = swept.min.cwiseMin(part.box.min);
+    swept.max = swept.max.cwiseMax(part.box.max);
+  }
   for (const std::int32_t p : block.point) {
     if (p < 0) continue;
     const Vec3 p0 = places.at_begin(p), p1 = places.at_end(p);
+    if (!overlap({p0.cwiseMin(p1), p0.cwiseMax(p1)}, swept, reach)) continue;
     const Box box{p0.cwiseMin(p1), p0.cwiseMax(p1)};
-    const auto near = [&](const SweepPart& part) { return overlap(box, part.box, reach); };
+    const auto near = [&](const SweepPart& part) { return is_near(box, part, reach); };
     if (std::none_of(parts.begin(), parts.end(), near)) continue;
     const Points::Site& s = state.points.site[p];
     for (int k = kForwardBond; k < kBondCount; ++k) {
@@ -82,6 +99,21 @@ void sweep_block(const MpmState& state, const Block& block, const std::vector<Sw
   }
 }
 
+/// Bounds the motion of new blocks by that of those which had their points.
+void bound_motion(MpmState& state) {
+  std::vector<BlockMotion> motion(state.blocks.all.size());
+  for (std::size_t i = 0; i < motion.size(); ++i) {
+    const Blocks::Origin& origin = state.blocks.origin[i];
+    for (int b = origin.begin; b < origin.end; ++b) {
+      const BlockMotion& part = state.motion[b];
+      motion[i].box.min = motion[i].box.min.cwiseMin(part.box.min);
+      motion[i].box.max = motion[i].box.max.cwiseMax(part.box.max);
+      if (!(part.speed <= motion[i].speed)) motion[i].speed = part.speed;
+    }
+  }
+  state.motion = std::move(motion);
+}
+
 }  // namespace
 
 void sweep_bonds(MpmState& state, const BladePath& path, const Array<float>* u_begin,
@@ -93,18 +125,19 @@ void sweep_bonds(MpmState& state, const BladePath& path, const Array<float>* u_b
   for (std::size_t i = 0; i < state.blocks.all.size(); ++i) {
     const Box& now = state.motion[i].box;
     const Box box{now.min.cwiseMin(before[i].box.min), now.max.cwiseMax(before[i].box.max)};
-    const auto meets = [&](const SweepPart& part) { return overlap(box, part.box, reach); };
+    const auto meets = [&](const SweepPart& part) { return is_near(box, part, reach); };
     if (std::any_of(parts.begin(), parts.end(), meets)) near.push_back(static_cast<int>(i));
   }
   const int count = static_cast<int>(near.size());
   if (count == 0) return;
-  Places places;
-  places.begin.resize(3 * static_cast<std::size_t>(state.points.size()));
-  places.end.resize(places.begin.size());
+  const bool moves = u_begin != u_end;
+  for (Array<float>& p : state.places) p.resize(3 * static_cast<std::size_t>(state.points.size()));
   state.cpu->for_each(count, [&](int i) {
-    read_places(state, *state.blocks.all[near[i]], u_begin, places.begin);
-    read_places(state, *state.blocks.all[near[i]], u_end, places.end);
+    const Block& block = *state.blocks.all[near[i]];
+    read_places(state, block, u_end, state.places[1]);
+    if (moves) read_places(state, block, u_begin, state.places[0]);
   });
+  const Places places{state.places[moves ? 0 : 1], state.places[1]};
   std::vector<std::vector<Broken>> broken(count);
   state.cpu->for_each(count, [&](int i) {
     sweep_block(state, *state.blocks.all[near[i]], parts, places, broken[i]);
@@ -131,11 +164,14 @@ void take_apart(MpmState& state, const std::vector<std::int32_t>& changed) {
   if (changed.empty()) return;
   const std::vector<NodeFields::Cell> cells =
       state.fields->update(state.bodies, state.points, changed, state.nodes, *state.cpu);
+  state.blocks.stale_facets.resize(lattice_node_count(state.bodies), 0);
+  mark_stale_facets(state.bodies, state.points, changed, state.blocks.stale_facets);
   if (cells.empty()) return;
   keep_face_contacts(state);
   update_blocks(state.blocks, state.bodies, state.points, *state.fields, cells,
                 static_cast<int>(state.nodes.size()), *state.cpu);
   state.force.resize(state.blocks.force_size);
+  bound_motion(state);
   list_contacts(state);
   list_facets(state);
 }

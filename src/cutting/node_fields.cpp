@@ -1,6 +1,7 @@
 #include "cutting/node_fields.h"
 
 #include <algorithm>
+#include <array>
 #include <cstring>
 
 #include "cutting/bonds.h"
@@ -19,25 +20,33 @@ int place(const Points::Site& p, int x, int y, int z) {
 /// Weight of the box's centre node at place i of one axis of the box.
 float weight_at(int i) { return lattice_weight(i & 1, 2 - i / 2); }
 
-/// Components of the bonds within the box, numbered by their first place. Returns their count.
-/// A z-plane of the box is 36 bits of a word, and a component grows along all bonds at once.
-int components(const std::int32_t (&around)[216], const Points& points,
-               std::uint8_t (&label)[216]) {
-  using Planes = std::uint64_t[6];
+/// The lowest bits of a word's first six bytes.
+std::uint64_t row_bits(std::uint64_t bytes) { return (bytes * 0x0102040810204080) >> 56 & 0x3f; }
+
+/// Places of the box: each z-plane of it is 36 bits of a word.
+using Planes = std::array<std::uint64_t, 6>;
+
+/// Components of the bonds within the box, in the order of their first places. Each grows along all
+/// bonds at once.
+std::vector<Planes> components(const std::int32_t (&around)[216], const Points& points) {
   Planes left = {}, along_x = {}, along_y = {}, along_z = {};  // points; bonds to the next place
   constexpr std::uint64_t kNotLastX = 0x7df7df7df,
                           kNotLastY = 0x3fffffff;  // places with a next one
-  for (int i = 0; i < 216; ++i) {
-    if (around[i] < 0) continue;
-    const std::uint64_t bit = std::uint64_t(1) << (i % 36);
-    const unsigned bonds = points.bonds[around[i]];
-    left[i / 36] |= bit;
-    if ((bonds >> kForwardBond & 1) != 0) along_x[i / 36] |= bit & kNotLastX;
-    if ((bonds >> (kForwardBond + 1) & 1) != 0) along_y[i / 36] |= bit & kNotLastY;
-    if ((bonds >> (kForwardBond + 2) & 1) != 0 && i < 180) along_z[i / 36] |= bit;
+  for (int row = 0; row < 36; ++row) {
+    const int z = row / 6, shift = 6 * (row % 6);
+    const std::int32_t* p = around + 6 * row;
+    std::uint64_t bonds = 0, there = 0;  // a byte of each point; its lowest bit if there is one
+    for (int x = 0; x < 6; ++x) {
+      if (p[x] < 0) continue;
+      bonds |= std::uint64_t(points.bonds[p[x]]) << (8 * x);
+      there |= std::uint64_t(1) << (8 * x);
+    }
+    left[z] |= row_bits(there) << shift;
+    along_x[z] |= row_bits(bonds >> kForwardBond & there) << shift & kNotLastX;
+    along_y[z] |= row_bits(bonds >> (kForwardBond + 1) & there) << shift & kNotLastY;
+    if (z < 5) along_z[z] |= row_bits(bonds >> (kForwardBond + 2) & there) << shift;
   }
-  std::memset(label, kNone, sizeof(label));
-  int count = 0;
+  std::vector<Planes> found;
   for (int start = 0; start < 6; ++start) {
     while (left[start] != 0) {
       Planes reached = {};
@@ -55,16 +64,11 @@ int components(const std::int32_t (&around)[216], const Points& points,
           grows = grows || m != before;
         }
       }
-      for (int z = 0; z < 6; ++z) {
-        left[z] &= ~reached[z];
-        for (std::uint64_t m = reached[z]; m != 0; m &= m - 1) {
-          label[36 * z + __builtin_ctzll(m)] = static_cast<std::uint8_t>(count);
-        }
-      }
-      ++count;
+      for (int z = 0; z < 6; ++z) left[z] &= ~reached[z];
+      found.push_back(reached);
     }
   }
-  return count;
+  return found;
 }
 
 // A node is held when this share of its mass is anchored. Nodes held up to a place clamp a body as
@@ -100,7 +104,7 @@ std::vector<NodeShare> shares(const LatticeBody& body, const Points& points,
 }  // namespace
 
 NodeFields::NodeFields(const std::vector<LatticeBody>& bodies, const Points& points, Nodes& nodes) {
-  nodes.resize(bodies.back().first_node + bodies.back().node_count());
+  nodes.resize(lattice_node_count(bodies));
   std::int32_t around[216];
   const std::uint8_t one[216] = {};
   for (const LatticeBody& b : bodies) {
@@ -133,26 +137,32 @@ NodeFields::Components NodeFields::find_components(const LatticeBody& body, cons
                                                    const Cell& cell) const {
   std::int32_t around[216];
   points_around(body, cell.x, cell.y, cell.z, around);
-  Components found;
-  const int count = components(around, points, found.label);
+  const std::vector<Planes> parts = components(around, points);
   const Split* before = split(body.node(cell.x, cell.y, cell.z));
+  Components found;
   // Components only come apart, so the same number means the same components.
-  if (count != (before == nullptr ? 1 : static_cast<int>(before->field.size()))) {
-    found.share = shares(body, points, around, found.label, count);
+  if (parts.size() == (before == nullptr ? 1 : before->field.size())) return found;
+  std::memset(found.label, kNone, sizeof(found.label));
+  for (std::size_t i = 0; i < parts.size(); ++i) {
+    for (int z = 0; z < 6; ++z) {
+      for (std::uint64_t m = parts[i][z]; m != 0; m &= m - 1) {
+        found.label[36 * z + __builtin_ctzll(m)] = static_cast<std::uint8_t>(i);
+      }
+    }
   }
+  found.share = shares(body, points, around, found.label, static_cast<int>(parts.size()));
   return found;
 }
 
 void NodeFields::split_node(int lattice_node, const Components& components, Nodes& nodes) {
-  const auto before = splits_.find(lattice_node);
+  const Split* before = this->split(lattice_node);
   const auto& label = components.label;
   Split split;
   std::copy(std::begin(label), std::end(label), split.component);
   std::vector<std::int32_t> taken;
   for (int i = 0; i < 216; ++i) {
     if (label[i] != split.field.size()) continue;  // the first of its component
-    const int parent =
-        before == splits_.end() ? lattice_node : before->second.field[before->second.component[i]];
+    const int parent = before == nullptr ? lattice_node : before->field[before->component[i]];
     int field = parent;
     if (std::find(taken.begin(), taken.end(), parent) != taken.end()) {
       field = static_cast<int>(nodes.size());
@@ -168,7 +178,12 @@ void NodeFields::split_node(int lattice_node, const Components& components, Node
   for (std::size_t c = 0; c < components.share.size(); ++c) {
     set_mass(nodes, split.field[c], components.share[c]);
   }
-  splits_[lattice_node] = std::move(split);
+  if (before != nullptr) {
+    splits_[split_of_[lattice_node]] = std::move(split);
+    return;
+  }
+  split_of_[lattice_node] = static_cast<std::int32_t>(splits_.size());
+  splits_.push_back(std::move(split));
 }
 
 std::vector<NodeFields::Cell> NodeFields::update(const std::vector<LatticeBody>& bodies,
@@ -176,7 +191,7 @@ std::vector<NodeFields::Cell> NodeFields::update(const std::vector<LatticeBody>&
                                                  const std::vector<std::int32_t>& changed,
                                                  Nodes& nodes, Cpu& cpu) {
   std::vector<Cell> cells;
-  std::vector<bool> seen(bodies.back().first_node + bodies.back().node_count(), false);
+  std::vector<bool> seen(lattice_node_count(bodies), false);
   for (const std::int32_t p : changed) {
     const Points::Site& s = points.site[p];
     for (int k = 0; k < 27; ++k) {
@@ -190,6 +205,7 @@ std::vector<NodeFields::Cell> NodeFields::update(const std::vector<LatticeBody>&
   cpu.for_each(
       static_cast<int>(cells.size()),
       [&](int i) { found[i] = find_components(bodies[cells[i].body], points, cells[i]); }, 32);
+  if (split_of_.empty()) split_of_.assign(seen.size(), -1);
   std::vector<Cell> split;
   for (std::size_t i = 0; i < cells.size(); ++i) {
     if (found[i].share.empty()) continue;

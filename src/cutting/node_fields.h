@@ -9,7 +9,6 @@
 #pragma once
 
 #include <cstdint>
-#include <unordered_map>
 #include <vector>
 
 #include "compute/for_each.h"
@@ -42,8 +41,8 @@ class NodeFields {
   };
   /// How a lattice node is split, null where it is not.
   const Split* split(int lattice_node) const {
-    const auto it = splits_.find(lattice_node);
-    return it == splits_.end() ? nullptr : &it->second;
+    if (split_of_.empty() || split_of_[lattice_node] < 0) return nullptr;
+    return &splits_[split_of_[lattice_node]];
   }
   std::size_t split_count() const { return splits_.size(); }
 
@@ -64,7 +63,8 @@ class NodeFields {
   Components find_components(const LatticeBody& body, const Points& points, const Cell& cell) const;
   void split_node(int lattice_node, const Components& components, Nodes& nodes);
 
-  std::unordered_map<int, Split> splits_;
+  std::vector<Split> splits_;
+  std::vector<std::int32_t> split_of_;  ///< per lattice node, -1 where whole; empty before any cut
 };
 
 }  // namespace tissue_sim

@@ -18,21 +18,32 @@ std::int32_t root(std::vector<std::int32_t>& parent, std::int32_t p) {
   return p;
 }
 
-/// Lowest point of each point's component.
+/// Lowest point of each point's component. Points that x-bonds hold together in a run stand and
+/// fall with its first.
 std::vector<std::int32_t> components(const std::vector<LatticeBody>& bodies, const Points& points) {
+  constexpr int kBackInX = opposite_bond(kForwardBond);
+  std::vector<std::int32_t> run(points.size());
+  for (std::int32_t p = 0; p < points.size(); ++p) {
+    run[p] = (points.bonds[p] >> kBackInX & 1) != 0 ? run[p - 1] : p;
+  }
   std::vector<std::int32_t> parent(points.size());
   std::iota(parent.begin(), parent.end(), 0);
-  for (std::int32_t p = 0; p < points.size(); ++p) {
-    const Points::Site& s = points.site[p];
-    for (unsigned forward = points.bonds[p] >> kForwardBond; forward != 0; forward &= forward - 1) {
-      const BondOffset o = bond_offset(kForwardBond + __builtin_ctz(forward));
-      const std::int32_t a = root(parent, p);
-      const std::int32_t b = root(parent, bodies[s.body].point(s.x + o.x, s.y + o.y, s.z + o.z));
+  for (const int k : {kForwardBond + 1, kForwardBond + 2}) {
+    const BondOffset o = bond_offset(k);
+    std::int32_t from = -1, to = -1;  // runs joined last
+    for (std::int32_t p = 0; p < points.size(); ++p) {
+      if ((points.bonds[p] >> k & 1) == 0) continue;
+      const Points::Site& s = points.site[p];
+      const std::int32_t q = run[bodies[s.body].point(s.x, s.y + o.y, s.z + o.z)];
+      if (run[p] == from && q == to) continue;
+      from = run[p];
+      to = q;
+      const std::int32_t a = root(parent, from), b = root(parent, to);
       if (a != b) parent[std::max(a, b)] = std::min(a, b);
     }
   }
-  for (std::int32_t p = 0; p < points.size(); ++p) parent[p] = root(parent, p);
-  return parent;
+  for (std::int32_t p = 0; p < points.size(); ++p) run[p] = root(parent, run[p]);
+  return run;
 }
 
 /// Counts, volumes and anchors of the labelled pieces.

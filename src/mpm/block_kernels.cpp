@@ -38,6 +38,9 @@ TISSUE_SIM_INLINE void update_row(const NodeRow& row, const RowPart* parts, cons
                                  BlockScratch& s, float* out) {                                   \
     positions<W>(b, f, u, s, out);                                                                \
   }                                                                                               \
+  target PointBounds bounds_##suffix(const Block& b, const BlockField& f, BlockScratch& s) {      \
+    return bounds<W>(b, f, s);                                                                    \
+  }                                                                                               \
   target int lanes_in_box_##suffix(const float* x, std::size_t count, const float* min,           \
                                    const float* max, std::int32_t* lanes) {                       \
     return lanes_in_box<W>(x, count, min, max, lanes);                                            \
@@ -64,13 +67,16 @@ TISSUE_SIM_KERNELS(avx512, 16, TISSUE_SIM_TARGET_AVX512)
 }  // namespace
 
 const BlockKernels& block_kernels(InstructionSet set) {
-  static constexpr BlockKernels sse2 = {forces_sse2,     positions_sse2, lanes_in_box_sse2,
-                                        update_row_sse2, state_sse2,     stretched_sse2};
+  static constexpr BlockKernels sse2 = {forces_sse2,       positions_sse2,  bounds_sse2,
+                                        lanes_in_box_sse2, update_row_sse2, state_sse2,
+                                        stretched_sse2};
 #if defined(__x86_64__)
-  static constexpr BlockKernels avx2 = {forces_avx2,     positions_avx2, lanes_in_box_avx2,
-                                        update_row_avx2, state_avx2,     stretched_avx2};
-  static constexpr BlockKernels avx512 = {forces_avx512,     positions_avx512, lanes_in_box_avx512,
-                                          update_row_avx512, state_avx512,     stretched_avx512};
+  static constexpr BlockKernels avx2 = {forces_avx2,       positions_avx2,  bounds_avx2,
+                                        lanes_in_box_avx2, update_row_avx2, state_avx2,
+                                        stretched_avx2};
+  static constexpr BlockKernels avx512 = {forces_avx512,       positions_avx512,  bounds_avx512,
+                                          lanes_in_box_avx512, update_row_avx512, state_avx512,
+                                          stretched_avx512};
   if (set == InstructionSet::kAvx512) return avx512;
   if (set == InstructionSet::kAvx2) return avx2;
 #endif

@@ -37,6 +37,12 @@ struct BlockScratch {
   Array<std::int32_t> lanes;
 };
 
+/// Where a block's points are [m], and how fast the fastest moves [m/s].
+struct PointBounds {
+  float min[3] = {1e30f, 1e30f, 1e30f}, max[3] = {-1e30f, -1e30f, -1e30f};
+  float speed = 0;  ///< not a number if that of any point is not
+};
+
 /// State of a block's points, from block_state().
 struct BlockState {
   double elastic_energy = 0;  ///< [J]
@@ -53,6 +59,7 @@ struct BlockKernels {
   /// field at the points, as sum_i w_ip u_i.
   void (*positions)(const Block&, const BlockField&, const Array<float>* u, BlockScratch&,
                     float* out);
+  PointBounds (*bounds)(const Block&, const BlockField&, BlockScratch&);
   /// Lanes of `positions` that lie within a box, in order, into `lanes`; returns their number.
   int (*lanes_in_box)(const float* positions, std::size_t lane_count, const float* min,
                       const float* max, std::int32_t* lanes);

@@ -61,6 +61,46 @@ TISSUE_SIM_INLINE void positions(const Block& b, const BlockField& f, const Arra
   }
 }
 
+/// Smallest and largest of the values `inside`.
+template <int W>
+TISSUE_SIM_INLINE void widen(Mask<W> inside, Vec<W> v, Vec<W>& min, Vec<W>& max) {
+  min = (inside & (v < min)) ? v : min;
+  max = (inside & (v > max)) ? v : max;
+}
+
+template <int W>
+TISSUE_SIM_INLINE PointBounds bounds(const Block& b, const BlockField& f, BlockScratch& scratch) {
+  const std::size_t lanes = b.lane_count();
+  reserve(scratch.values, 3 * lanes);
+  const float *x = scratch.values.data(), *volume = b.volume.data();
+  PointBounds result;
+  positions<W>(b, f, f.nodes->u, scratch, scratch.values.data());
+  for (int a = 0; a < 3; ++a) {
+    Vec<W> min = Vec<W>{} + result.min[a], max = Vec<W>{} + result.max[a];
+    for (std::size_t j = 0; j < lanes; j += W) {
+      widen<W>(load<W>(volume + j) > 0.0f, load<W>(x + a * lanes + j), min, max);
+    }
+    for (int i = 0; i < W; ++i) {
+      result.min[a] = std::min(result.min[a], min[i]);
+      result.max[a] = std::max(result.max[a], max[i]);
+    }
+  }
+  positions<W>(b, at_rest(f), f.nodes->v, scratch, scratch.values.data());
+  Vec<W> speed2 = {};
+  for (std::size_t j = 0; j < lanes; j += W) {
+    const Vec<W> vx = load<W>(x + j), vy = load<W>(x + lanes + j), vz = load<W>(x + 2 * lanes + j);
+    const Vec<W> v2 = vx * vx + vy * vy + vz * vz;
+    // Once it is no number it stays none.
+    const auto take = (load<W>(volume + j) > 0.0f) & (speed2 == speed2) & ~(v2 <= speed2);
+    speed2 = take ? v2 : speed2;
+  }
+  for (int i = 0; i < W; ++i) {
+    if (result.speed == result.speed && !(speed2[i] <= result.speed)) result.speed = speed2[i];
+  }
+  result.speed = std::sqrt(result.speed);
+  return result;
+}
+
 template <int W, class LawOf>
 TISSUE_SIM_INLINE BlockState state(const Block& b, const BlockField& f, BlockScratch& scratch,
                                    float* von_mises) {

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "contact/known_facets.h"
 #include "mpm/block_sheets.h"
 
 namespace tissue_sim {
@@ -100,14 +101,15 @@ Block make_block(const BlockRegion& r, const LatticeBody& b, const Points& point
   return block;
 }
 
+/// Fills the region's blocks. `known` are the facets that it had, where they did not change.
 void fill_region(BlockRegion& r, const std::vector<LatticeBody>& bodies, const Points& points,
-                 const NodeFields& fields) {
+                 const NodeFields& fields, const KnownFacets& known) {
   r.blocks.clear();
   const LatticeBody& b = bodies[r.body];
   for (const Sheet& sheet : sheets_of(r, b, points, fields)) {
     if (sheet.cells.empty()) continue;
     r.blocks.push_back(make_block(r, b, points, sheet));
-    r.blocks.back().facets = facets_of(b, points, r.blocks.back());
+    r.blocks.back().facets = facets_of(b, points, r.blocks.back(), known);
   }
 }
 
@@ -154,7 +156,7 @@ void connect_forces(Blocks& blocks, const std::vector<LatticeBody>& bodies, int 
     RowPart part;
   };
   std::vector<Entry> entries;
-  blocks.first_split_node = bodies.back().first_node + bodies.back().node_count();
+  blocks.first_split_node = lattice_node_count(bodies);
   std::vector<std::pair<int, SplitNodePart>> split;
   for (const Block* block : blocks.all) {
     const LatticeBody& b = bodies[block->body];
@@ -230,36 +232,57 @@ Blocks make_blocks(const std::vector<LatticeBody>& bodies, const Points& points,
         const int ny = std::min(shape.y, b.ny - y), nz = std::min(shape.z, b.nz - z);
         for (const auto& [begin, end] : x_runs(b, y, ny, z, nz, shape.x)) {
           BlockRegion r{static_cast<int>(i), begin, y, z, end - begin, ny, nz, {}};
-          fill_region(r, bodies, points, fields);
+          fill_region(r, bodies, points, fields, {});
           blocks.regions.push_back(std::move(r));
         }
       }
     }
   }
-  connect_forces(blocks, bodies, bodies.back().first_node + bodies.back().node_count());
+  connect_forces(blocks, bodies, lattice_node_count(bodies));
   return blocks;
 }
 
 void update_blocks(Blocks& blocks, const std::vector<LatticeBody>& bodies, const Points& points,
                    const NodeFields& fields, const std::vector<NodeFields::Cell>& cells,
                    int node_count, Cpu& cpu) {
-  std::vector<bool> changed(bodies.back().first_node + bodies.back().node_count(), false);
-  for (const NodeFields::Cell& c : cells) changed[bodies[c.body].node(c.x, c.y, c.z)] = true;
+  std::vector<bool> split(lattice_node_count(bodies), false);
+  for (const NodeFields::Cell& c : cells) split[bodies[c.body].node(c.x, c.y, c.z)] = true;
   const auto touched = [&](const BlockRegion& r) {
     for (int z = r.z - 1; z <= r.z + r.nz; ++z) {
       for (int y = r.y - 1; y <= r.y + r.ny; ++y) {
         const int row = bodies[r.body].node(0, y, z);
         for (int x = r.x - 1; x <= r.x + r.nx; ++x) {
-          if (changed[row + x]) return true;
+          if (split[row + x]) return true;
         }
       }
     }
     return false;
   };
+  std::vector<Blocks::Origin> before;  // blocks of each region
+  for (const BlockRegion& r : blocks.regions) {
+    const int first = before.empty() ? 0 : before.back().end;
+    before.push_back({first, first + static_cast<int>(r.blocks.size())});
+  }
+  std::vector<std::uint8_t> is_new(blocks.regions.size(), 0);
   cpu.for_each(static_cast<int>(blocks.regions.size()), [&](int i) {
     BlockRegion& r = blocks.regions[i];
-    if (touched(r)) fill_region(r, bodies, points, fields);
+    if (!touched(r)) return;
+    is_new[i] = 1;
+    const LatticeBody& b = bodies[r.body];
+    fill_region(r, bodies, points, fields, {b, r, blocks.stale_facets});
+    for (int z = r.z; z < r.z + r.nz; ++z) {
+      for (int y = r.y; y < r.y + r.ny; ++y) {
+        std::fill_n(blocks.stale_facets.begin() + b.node(r.x, y, z), r.nx, std::uint8_t{0});
+      }
+    }
   });
+  blocks.origin.clear();
+  for (std::size_t i = 0; i < blocks.regions.size(); ++i) {
+    for (int b = 0; b < static_cast<int>(blocks.regions[i].blocks.size()); ++b) {
+      const int same = before[i].begin + b;
+      blocks.origin.push_back(is_new[i] != 0 ? before[i] : Blocks::Origin{same, same + 1});
+    }
+  }
   connect_forces(blocks, bodies, node_count);
 }
 

@@ -37,7 +37,15 @@ struct SplitNodePart {
 struct Blocks {
   std::vector<BlockRegion> regions;
   std::vector<Block*> all;  ///< in a fixed order
+  /// Of each, the blocks before the last update_blocks() that had its points.
+  struct Origin {
+    int begin, end;
+  };
+  std::vector<Origin> origin;
   std::size_t force_size = 0;
+  /// Per lattice node, of its cell: bonds broke near it since its region's blocks were made. Empty
+  /// before any did.
+  std::vector<std::uint8_t> stale_facets;
 
   std::vector<NodeRow> rows;
   std::vector<RowPart> row_parts;

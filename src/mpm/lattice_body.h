@@ -53,6 +53,11 @@ struct LatticeBody {
   }
 };
 
+/// Nodes of all bodies' lattices; higher numbers are fields that cuts made.
+inline int lattice_node_count(const std::vector<LatticeBody>& bodies) {
+  return bodies.back().first_node + bodies.back().node_count();
+}
+
 /// Puts the bodies of a scene on their lattices and fills `points`, all bonds whole. Throws
 /// std::invalid_argument (a mesh that cannot be used, an anchor that holds nothing, ...).
 std::vector<LatticeBody> make_lattice_bodies(const Scene& scene, Points& points,

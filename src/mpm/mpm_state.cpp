@@ -16,7 +16,8 @@ std::unique_ptr<MpmState> make_mpm_state(const Scene& scene, std::vector<std::st
   state->force.resize(state->blocks.force_size);
   state->contacts.with.assign(state->points.size(), 0);
   state->contacts.hold.assign(3 * static_cast<std::size_t>(state->points.size()), 0.0f);
-  list_contacts(*state);
+  state->contacts.touching.resize(state->blocks.all.size());
+  state->contacts.near.resize(state->blocks.all.size());
   list_facets(*state);
   state->instructions = instruction_set();
   state->kernels = &block_kernels(state->instructions);
@@ -43,33 +44,13 @@ BlockField block_field(const MpmState& state, const Block& block) {
 
 void measure_motion(MpmState& state) {
   const int count = static_cast<int>(state.blocks.all.size());
-  state.motion.assign(count, {});
+  state.motion.resize(count);
   state.cpu->for_each(count, [&](int i) {
     const Block& block = *state.blocks.all[i];
-    BlockScratch& scratch = state.scratch.local();
-    const std::size_t lanes = block.lane_count();
-    if (scratch.values.size() < 3 * lanes) scratch.values.resize(3 * lanes);
-    const float* x = scratch.values.data();
-    const BlockField field = block_field(state, block);
-    BlockMotion& motion = state.motion[i];
-    state.kernels->positions(block, field, state.nodes.u, scratch, scratch.values.data());
-    float min[3] = {1e30f, 1e30f, 1e30f}, max[3] = {-1e30f, -1e30f, -1e30f}, speed2 = 0;
-    for (std::size_t lane = 0; lane < lanes; ++lane) {
-      if (block.point[lane] < 0) continue;
-      for (int a = 0; a < 3; ++a) {
-        min[a] = std::min(min[a], x[a * lanes + lane]);
-        max[a] = std::max(max[a], x[a * lanes + lane]);
-      }
-    }
-    state.kernels->positions(block, at_rest(field), state.nodes.v, scratch, scratch.values.data());
-    for (std::size_t lane = 0; lane < lanes; ++lane) {
-      if (block.point[lane] < 0) continue;
-      const float v2 = x[lane] * x[lane] + x[lanes + lane] * x[lanes + lane] +
-                       x[2 * lanes + lane] * x[2 * lanes + lane];
-      if (!(v2 <= speed2)) speed2 = v2;  // NaN stays
-    }
-    motion.box = {Vec3(min[0], min[1], min[2]), Vec3(max[0], max[1], max[2])};
-    motion.speed = std::sqrt(static_cast<double>(speed2));
+    const PointBounds b =
+        state.kernels->bounds(block, block_field(state, block), state.scratch.local());
+    state.motion[i] = {{Vec3(b.min[0], b.min[1], b.min[2]), Vec3(b.max[0], b.max[1], b.max[2])},
+                       b.speed};
   });
 }
 

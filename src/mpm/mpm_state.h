@@ -33,7 +33,7 @@ struct ColliderLoad {
   double force[3] = {}, torque[3] = {};
 };
 
-/// Where a block's points are, and how fast the fastest moves.
+/// Within which box a block's points are, and how fast they move at most.
 struct BlockMotion {
   Box box;           ///< [m]
   double speed = 0;  ///< [m/s]
@@ -48,7 +48,8 @@ struct MpmState {
   Blocks blocks;
   Array<float> force;        ///< of all blocks
   Array<float> u_before[3];  ///< displacements when the frame began, where a blade may cut [m]
-  std::vector<BlockMotion> motion;  ///< per block, as of the last measure_motion()
+  Array<float> places[2];    ///< of the points near a sweep, at its begin and end [m]
+  std::vector<BlockMotion> motion;  ///< per block; exact as of measure_motion()
   double time = 0;                  ///< since the beginning [s]
   std::vector<double> tore_at;      ///< per body: when a bond last tore [s]; empty while none did
   Contacts contacts;

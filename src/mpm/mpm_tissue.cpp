@@ -33,7 +33,6 @@ void MpmTissue::cut(const std::vector<BladePath>& paths, const Array<float>* u_b
   }
   if (changed.empty()) return;
   take_apart(*state_, changed);
-  measure_motion(*state_);
   if (hold_together(state_->bodies, state_->points, changed)) return;
   for (const int id : update_pieces(state_->bodies, state_->points, pieces_)) {
     report.new_fragments.push_back(id);

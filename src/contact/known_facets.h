@@ -1,0 +1,40 @@
+// Facets that stay what they are when bonds break elsewhere.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "contact/facets.h"
+#include "mpm/blocks.h"
+#include "mpm/lattice_body.h"
+
+namespace tissue_sim {
+
+/// Facets that a region's blocks had, by lattice cell.
+class KnownFacets {
+ public:
+  KnownFacets() = default;  ///< none
+  /// Those of the region's blocks but of the cells that are `stale` (per lattice node).
+  KnownFacets(const LatticeBody& body, const BlockRegion& region,
+              const std::vector<std::uint8_t>& stale);
+
+  /// Appends the facets of the points `around` of cell (x, y, z), as those of `cell` in their
+  /// block. False where they must be made anew.
+  bool take(int x, int y, int z, const std::int32_t (&around)[8], int cell,
+            std::vector<Facet>& facets) const;
+
+ private:
+  int index(int x, int y, int z) const { return ((z - z_) * ny_ + y - y_) * nx_ + x - x_; }
+
+  int x_ = 0, y_ = 0, z_ = 0, nx_ = 0, ny_ = 0;  // the region
+  std::vector<std::uint8_t> stale_;              // per cell; empty: all are
+  std::vector<std::int32_t> first_;              // per cell and one more
+  std::vector<Facet> facets_;
+};
+
+/// Marks the cells (per lattice node) whose facets may change where the points `changed` lost
+/// bonds.
+void mark_stale_facets(const std::vector<LatticeBody>& bodies, const Points& points,
+                       const std::vector<std::int32_t>& changed, std::vector<std::uint8_t>& stale);
+
+}  // namespace tissue_sim

@@ -36,10 +36,16 @@ struct KeptContact {
   float depth, begun, stiffness, apart[3];
 };
 
+/// Where a facet was when the pairs were listed, and how far it may move while the list holds [m].
+struct ListedFacet {
+  float x[3], skin;
+};
+
 struct FaceContacts {
   std::vector<std::int32_t> first_facet;  ///< per block and one more
   std::vector<std::int32_t> block_of;     ///< per facet
   std::vector<FacetMotion> motion;        ///< per facet; up to date where a pair needs it
+  std::vector<ListedFacet> listed;        ///< per facet; empty while there is no list
   std::vector<std::int32_t> involved;     ///< facets in any pair
   std::vector<FaceContact> all;           ///< of each facet that is to touch others near it
   std::vector<std::int32_t> first_near;   ///< CSR over `all`: those others

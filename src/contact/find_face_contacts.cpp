@@ -13,6 +13,7 @@ namespace {
 constexpr int kLongest = 16;        ///< substeps between two looks
 constexpr float kLargestReach = 4;  ///< of what moves fast [cells]; the next search follows sooner
 constexpr double kHorizon = 1.0 / 60;  ///< between two searches [s]
+constexpr float kSkin = 0.1f;  ///< that facets may move, beyond what is foreseen, in a list [cells]
 
 FacetMotion motion_of(const MpmState& s, std::int32_t facet) {
   return facet_motion(body_of(s, facet), block_of(s, facet), facet_of(s, facet), s.nodes);
@@ -98,8 +99,28 @@ bool are_one(const MpmState& s, const Pieces& pieces, std::int32_t a, std::int32
   return pieces.of_point[p] == pieces.of_point[q] && are_bound(s, p, q);
 }
 
-/// Finds the facets that may meet until the next search, and when that is.
-void search(MpmState& s, const Pieces& pieces) {
+Vec3 velocity(const FacetMotion& f) { return {f.v[0], f.v[1], f.v[2]}; }
+
+/// Whether no facet has left its skin since the pairs were listed (Verlet 1967), nor will when it
+/// travels on by so much [m].
+bool pairs_last(const FaceContacts& faces, const std::vector<float>& travel) {
+  if (faces.listed.size() != travel.size()) return false;
+  Vec3 mean = Vec3::Zero();
+  const auto moved = [&faces](std::size_t f) {
+    const float *x = faces.motion[f].x, *from = faces.listed[f].x;
+    return Vec3(x[0] - from[0], x[1] - from[1], x[2] - from[2]);
+  };
+  for (std::size_t f = 0; f < travel.size(); ++f) mean += moved(f);
+  mean /= std::max<std::size_t>(1, travel.size());
+  for (std::size_t f = 0; f < travel.size(); ++f) {
+    if ((moved(f) - mean).norm() + travel[f] > faces.listed[f].skin) return false;
+  }
+  return true;
+}
+
+/// Brings the motion of all facets up to date and finds those that may meet until the next search,
+/// and when that is. Returns whether the contacts were listed anew.
+bool search(MpmState& s, const Pieces& pieces) {
   FaceContacts& faces = s.faces;
   const int block_count = static_cast<int>(s.blocks.all.size());
   const auto facet_count = static_cast<std::int32_t>(faces.block_of.size());
@@ -109,23 +130,34 @@ void search(MpmState& s, const Pieces& pieces) {
     }
   });
   Vec3 mean = Vec3::Zero();
-  for (const FacetMotion& f : faces.motion) mean += Vec3(f.v[0], f.v[1], f.v[2]);
+  for (const FacetMotion& f : faces.motion) mean += velocity(f);
   mean /= std::max(1, facet_count);
-  const auto cell = static_cast<float>(s.scene.cell_size);
-  std::vector<float> reach(facet_count);
   double fastest = 0;
   for (std::int32_t f = 0; f < facet_count; ++f) {
-    const float* v = faces.motion[f].v;
-    reach[f] = static_cast<float>((Vec3(v[0], v[1], v[2]) - mean).norm());
-    fastest = std::max(fastest, static_cast<double>(reach[f]));
+    fastest = std::max(fastest, (velocity(faces.motion[f]) - mean).norm());
   }
   if (!(fastest < 1e4)) {  // out of control, as the end of the frame will say
+    faces.listed.clear();
     faces.all.clear();
     faces.until_search = kHorizon;
-    return;
+    return false;
   }
+  const auto cell = static_cast<float>(s.scene.cell_size);
   const double horizon = std::min(kHorizon, kLargestReach * cell / (1.5 * fastest + 1e-9));
-  for (float& r : reach) r = kSearchReach * cell + static_cast<float>(1.5 * horizon) * r;
+  faces.until_search = horizon;
+  std::vector<float> travel(facet_count);  // until the next search
+  for (std::int32_t f = 0; f < facet_count; ++f) {
+    travel[f] = static_cast<float>(1.5 * horizon * (velocity(faces.motion[f]) - mean).norm());
+  }
+  if (pairs_last(faces, travel)) return false;
+  faces.listed.resize(facet_count);
+  std::vector<float> reach(facet_count);
+  for (std::int32_t f = 0; f < facet_count; ++f) {
+    ListedFacet& listed = faces.listed[f];
+    std::copy_n(faces.motion[f].x, 3, listed.x);
+    listed.skin = travel[f] + kSkin * cell;
+    reach[f] = kSearchReach * cell + listed.skin;
+  }
   std::vector<int> size(pieces.next_id, 0);
   for (const Fragment& f : pieces.all) size[f.id] = f.point_count;
   auto pairs = facing_pairs(faces.motion, reach, 3 * cell, *s.cpu);
@@ -177,7 +209,7 @@ void search(MpmState& s, const Pieces& pieces) {
     if (touches(a, b)) faces.near[next[contact[a]]++] = b;
     if (touches(b, a)) faces.near[next[contact[b]]++] = a;
   }
-  faces.until_search = horizon;
+  return true;
 }
 
 /// Takes up what touched before blocks were made anew.
@@ -202,10 +234,7 @@ void take_up_kept(MpmState& s, double dt) {
 int find_face_contacts(MpmState& s, const Pieces& pieces, double dt, int at_most) {
   FaceContacts& faces = s.faces;
   const bool searched = faces.until_search <= 0;
-  if (searched) {
-    search(s, pieces);
-    take_up_kept(s, dt);
-  }
+  if (searched && search(s, pieces)) take_up_kept(s, dt);
   if (!faces.all.empty() && (searched || faces.until_look <= 0)) look_at_all(s, dt, !searched);
   if (faces.all.empty()) faces.active.clear();
   int substeps = 0;
@@ -249,6 +278,7 @@ void list_facets(MpmState& s) {
     faces.first_facet.push_back(static_cast<std::int32_t>(faces.block_of.size()));
   }
   faces.motion.resize(faces.block_of.size());
+  faces.listed.clear();
   faces.all.clear();
   faces.active.clear();
   faces.until_search = 0;

@@ -160,6 +160,8 @@ void CudaMpmTissue::launch(int begin, int end, float dt) {
   frame.colliders = d.colliders.data() + begin * collider_count;
   frame.collider_count = static_cast<int>(collider_count);
   frame.loads = d.loads.data() + 6 * begin * collider_count;
+  frame.pushes = d.pushes.data();
+  frame.push_stride = d.push_stride;
   frame.arrived = d.arrived.data();
   const std::size_t faces = faces_may_meet() ? state_->faces.active.size() : 0;
   frame.faces = d.faces(faces);
@@ -191,8 +193,8 @@ void CudaMpmTissue::finish_measure() {
     if (!(m.speed <= result_.max_speed)) result_.max_speed = m.speed;
     stiffening_ = std::max(stiffening_, m.stiffening);
     result_.blew_up = result_.blew_up || m.finite == 0;
-    state_->motion[i] = {{Vec3(m.min[0], m.min[1], m.min[2]), Vec3(m.max[0], m.max[1], m.max[2])},
-                         m.speed};
+    state_->motion[d.of_host[i]] = {
+        {Vec3(m.min[0], m.min[1], m.min[2]), Vec3(m.max[0], m.max[1], m.max[2])}, m.speed};
   }
   // Nothing that instruments do moves tissue at the speed of a bullet; what does is out of control.
   result_.blew_up = result_.blew_up || !(result_.max_speed < 300) || stiffening_ > 1e6f;
@@ -247,8 +249,8 @@ std::string CudaMpmTissue::plan() const {
   const BlockShape& b = d.shape.blocks;
   return std::to_string(b.x) + " x " + std::to_string(b.y) + " x " + std::to_string(b.z) +
          " cells, " + std::to_string(d.plan.threads) + " a block, " +
-         std::to_string(d.blocks.size()) + " blocks, " + std::to_string(d.resident) + " at once" +
-         (d.plan.cached ? ", cached" : "");
+         std::to_string(d.blocks.size()) + " blocks in " + std::to_string(d.bundles.size()) +
+         " bundles, " + std::to_string(d.resident) + " at once" + (d.plan.cached ? ", cached" : "");
 }
 
 }  // namespace tissue_sim

@@ -18,6 +18,11 @@ struct CudaMpmTissue::OnDevice {
   std::string gpu;  ///< name
 
   DeviceArray<CudaBlock> blocks;
+  std::vector<int> of_host;  ///< HostTables::of_host
+  DeviceArray<CudaBundle> bundles;
+  DeviceArray<CudaColumn> columns;
+  DeviceArray<HalfPush> pushes;  ///< CudaFrame::pushes
+  std::size_t push_stride = 0;
   DeviceArray<CudaBody> bodies;
   DeviceArray<std::int32_t> slot_node, point, piece, place;
   DeviceArray<std::uint32_t> slot_parts, parts, near, colour;
@@ -60,7 +65,10 @@ struct CudaMpmTissue::OnDevice {
     CudaTables t;
     t.blocks = blocks.data();
     t.bodies = bodies.data();
+    t.bundles = bundles.data();
+    t.columns = columns.data();
     t.block_count = static_cast<int>(blocks.size());
+    t.bundle_count = static_cast<int>(bundles.size());
     t.slot_node = slot_node.data();
     t.slot_parts = slot_parts.data();
     t.parts = parts.data();

@@ -51,43 +51,49 @@ __device__ __forceinline__ BlockShared shared_of(int max_slots) {
 enum class Laws { kFixedCorotated, kNeoHookean, kAny };
 
 template <Laws kLaws, bool kSpecial>
-__device__ __forceinline__ void forces(const CudaTables& t, const CudaBlock& b,
+__device__ __forceinline__ void forces(const CudaTables& t, const CudaBundle& w, const CudaBlock& b,
                                        const CudaBody& body, const BlockShared& s,
                                        const BlockStep& step) {
   if constexpr (kLaws == Laws::kFixedCorotated) {
-    block_forces<FixedCorotated, false, kSpecial>(t, b, body, s, step);
+    block_forces<FixedCorotated, false, kSpecial>(t, w, b, body, s, step);
   } else if constexpr (kLaws == Laws::kNeoHookean) {
-    block_forces<NeoHookean, false, kSpecial>(t, b, body, s, step);
+    block_forces<NeoHookean, false, kSpecial>(t, w, b, body, s, step);
   } else if (body.neo_hookean != 0) {
-    block_forces<NeoHookean, true, kSpecial>(t, b, body, s, step);
+    block_forces<NeoHookean, true, kSpecial>(t, w, b, body, s, step);
   } else {
-    block_forces<FixedCorotated, true, kSpecial>(t, b, body, s, step);
+    block_forces<FixedCorotated, true, kSpecial>(t, w, b, body, s, step);
   }
 }
 
 /// Out of line and with copies of its arguments, for the ordinary blocks to keep theirs in
 /// registers.
 template <Laws kLaws>
-__device__ __noinline__ void special_forces(const CudaTables t, const CudaBlock b,
+__device__ __noinline__ void special_forces(const CudaTables t, const CudaBundle w,
                                             const CudaBody body, int max_slots,
                                             const BlockStep step) {
-  forces<kLaws, true>(t, b, body, shared_of(max_slots), step);
+  forces<kLaws, true>(t, w, CudaBlock(), body, shared_of(max_slots), step);
 }
 
-/// A block with what belongs to it. Copies: through a reference they would be read again after
+/// A bundle with what belongs to it. Copies: through a reference they would be read again after
 /// every store.
-struct BlockAtWork {
-  CudaBlock block;
+struct BundleAtWork {
+  CudaBundle bundle;
+  CudaBlock block;  ///< the first
   CudaBody body;
   std::uint32_t near;
-  __device__ __forceinline__ BlockAtWork(const CudaTables& t, int index)
-      : block(t.blocks[index]), body(t.bodies[block.body]), near(t.near[index]) {}
+  __device__ __forceinline__ BundleAtWork(const CudaTables& t, int index)
+      : bundle(t.bundles[index]),
+        block(t.blocks[bundle.first_block]),
+        body(t.bodies[bundle.body]),
+        near(0) {
+    for (int i = 0; i < bundle.blocks; ++i) near |= t.near[bundle.first_block + i];
+  }
 };
 
-/// Forces of a block whose nodes are there, on its points and between them and the colliders.
+/// Forces of a bundle whose nodes are there, on its points and between them and the colliders.
 template <Laws kLaws>
 __device__ __forceinline__ void all_forces(const CudaTables& t, const CudaFrame& f,
-                                           const BlockAtWork& w, int substep, int max_slots,
+                                           const BundleAtWork& w, int substep, int max_slots,
                                            float4* force) {
   const BlockShared s = shared_of(max_slots);
   const int load_count = 6 * f.collider_count;
@@ -95,12 +101,17 @@ __device__ __forceinline__ void all_forces(const CudaTables& t, const CudaFrame&
     for (int i = threadIdx.x; i < load_count; i += blockDim.x) s.loads[i] = 0;
   }
   __syncthreads();
-  const BlockStep step{f.colliders + substep * f.collider_count, w.near, force};
-  if (w.near == 0 && w.block.partial == 0) {
-    forces<kLaws, false>(t, w.block, w.body, s, step);
+  HalfPush* pushes = f.pushes + blockIdx.x * f.push_stride;
+  if (w.near == 0 && w.bundle.partial == 0 && w.bundle.blocks == 1) {
+    forces<kLaws, false>(t, w.bundle, w.block, w.body, s, {pushes, 0, force});
     return;
   }
-  special_forces<kLaws>(t, w.block, w.body, max_slots, step);
+  std::uint32_t touched = 0;
+  if (w.near != 0) {
+    touched = find_pushes(t, w.bundle, w.body, s.u, s.v, s.exchange,
+                          f.colliders + substep * f.collider_count, w.near, s.loads, pushes);
+  }
+  special_forces<kLaws>(t, w.bundle, w.body, max_slots, {pushes, touched, force});
   if (w.near == 0) return;
   auto* loads = reinterpret_cast<unsigned long long*>(f.loads) + substep * load_count;
   for (int i = threadIdx.x; i < load_count; i += blockDim.x) {
@@ -114,7 +125,7 @@ __device__ __forceinline__ PushedNodes pushed_nodes(const CudaFaces& f, int roun
   return {f.marks, f.force + f.stride * ((round + 2) % 3), f.force + f.stride * ((round + 1) % 3)};
 }
 
-/// One block in one round. Each block moves all of its nodes on, by the forces of the substep
+/// One bundle in one round. Each moves all of its nodes on, by the forces of the substep
 /// before, whoever else has them too, so that one barrier a substep suffices; then come the forces
 /// at their new places. Before the first substep nothing moves, after the last there are no forces.
 /// State and forces change places between two buffers. With kFaces, the thread block arrives at the
@@ -122,7 +133,7 @@ __device__ __forceinline__ PushedNodes pushed_nodes(const CudaFaces& f, int roun
 /// the others.
 template <Laws kLaws, bool kCached, bool kFaces>
 __device__ __forceinline__ void block_round(const CudaTables& t, const CudaFrame& f,
-                                            const BlockAtWork& w, int round, int max_slots,
+                                            const BundleAtWork& w, int round, int max_slots,
                                             const SlotCache& cache, bool last) {
   const BlockShared s = shared_of(max_slots);
   const float scale = w.body.inv_cell_size;
@@ -131,11 +142,12 @@ __device__ __forceinline__ void block_round(const CudaTables& t, const CudaFrame
   const bool odd = ((f.current + max(round - 1, 0)) & 1) != 0, odd_round = (round & 1) != 0;
   const CudaNodes &from = odd ? f.state[1] : f.state[0], &to = odd ? f.state[0] : f.state[1];
   if (round == 0) {
-    bring_nodes<false, kCached>(t, w.block, cache, from, from, nullptr, f.step, scale, s.u, v);
+    bring_nodes<false, kCached>(t, w.bundle.first_slot, w.bundle.slots, cache, from, from, nullptr,
+                                f.step, scale, s.u, v);
   } else {
     PushedNodes pushed;
     if (kFaces) pushed = pushed_nodes(f.faces, round);
-    bring_nodes<true, kCached, kFaces>(t, w.block, cache, from, to,
+    bring_nodes<true, kCached, kFaces>(t, w.bundle.first_slot, w.bundle.slots, cache, from, to,
                                        odd_round ? f.force[0] : f.force[1], f.step, scale, s.u, v,
                                        pushed);
   }
@@ -155,15 +167,16 @@ __device__ __forceinline__ void push_faces(const CudaFrame& f, int round) {
 
 template <Laws kLaws, bool kCached, bool kFaces, int kThreads, int kBlocksPerProcessor>
 __global__ void __launch_bounds__(kThreads, kBlocksPerProcessor)
-    mpm_substeps(const CudaTables t, const CudaFrame f, int max_slots) {
+    mpm_substeps(const CudaTables t, const CudaFrame f, int max_slots, bool eight_parts) {
   const BlockShared s = shared_of(max_slots);
   SlotCache cache;
   cache.parts = reinterpret_cast<uint4*>(s.loads + 6 * kMaxColliders);
-  cache.node = reinterpret_cast<std::int32_t*>(cache.parts + max_slots);
+  cache.more = eight_parts ? cache.parts + max_slots : nullptr;
+  cache.node = reinterpret_cast<std::int32_t*>(cache.parts + (eight_parts ? 2 : 1) * max_slots);
   cache.shared = reinterpret_cast<std::uint32_t*>(cache.node + max_slots);
   if constexpr (kCached) {
-    const BlockAtWork mine(t, static_cast<int>(blockIdx.x));
-    fill_cache<kFaces>(t, mine.block, f.faces, cache);
+    const BundleAtWork mine(t, static_cast<int>(blockIdx.x));
+    fill_cache<kFaces>(t, mine.bundle.first_slot, mine.bundle.slots, f.faces, cache);
     __syncthreads();
     for (int round = 0; round <= f.substeps; ++round) {
       if (round > 0) grid_barrier(f.arrived, static_cast<unsigned>(round));
@@ -173,9 +186,9 @@ __global__ void __launch_bounds__(kThreads, kBlocksPerProcessor)
   } else {
     for (int round = 0; round <= f.substeps; ++round) {
       if (round > 0) grid_barrier(f.arrived, static_cast<unsigned>(round));
-      for (int i = blockIdx.x; i < t.block_count; i += gridDim.x) {
-        const bool last = i + static_cast<int>(gridDim.x) >= t.block_count;
-        block_round<kLaws, false, kFaces>(t, f, BlockAtWork(t, i), round, max_slots, cache, last);
+      for (int i = blockIdx.x; i < t.bundle_count; i += gridDim.x) {
+        const bool last = i + static_cast<int>(gridDim.x) >= t.bundle_count;
+        block_round<kLaws, false, kFaces>(t, f, BundleAtWork(t, i), round, max_slots, cache, last);
       }
       if (kFaces) push_faces(f, round);
     }

@@ -1,0 +1,235 @@
+// What colliders push the points of a bundle with, before its forces. For .cu files.
+//
+// Few points are near a tool, but all of a tool's lie in few blocks, and the slowest block decides
+// how long a substep takes. So all threads look for them together: first for the cells near a
+// collider, then for the half cells of which a point lies in one; only these are worked out.
+#pragma once
+
+#include "cutting/bonds.h"
+#include "mpm/cuda/block_nodes.h"
+#include "mpm/cuda/half_cell.h"
+
+namespace tissue_sim {
+
+/// Adds `value` of each lane to a load in shared memory, rounded to integers, whose sum does not
+/// depend on the order. All lanes of a warp take part.
+__device__ __forceinline__ void add_load(unsigned long long* load, double value) {
+  long long sum = __double2ll_rn(value * (1 / kLoadUnit));
+#pragma unroll
+  for (int step = 16; step > 0; step /= 2) sum += __shfl_xor_sync(0xffffffffu, sum, step);
+  if (threadIdx.x % 32 == 0 && sum != 0) atomicAdd(load, static_cast<unsigned long long>(sum));
+}
+
+/// Whether a point within `radius` of `x` may lie in the collider.
+__device__ __forceinline__ bool may_touch(const Collider& c, const float* x, float radius) {
+  if (c.kind == Collider::kCapsule) return gap(c, x).distance < radius;
+  float p[3];
+  to_local(c, x, p);
+  if (c.kind == Collider::kPlane) return p[2] < radius;
+  return p[2] < radius && p[2] > -c.length - radius && fabsf(p[1]) < radius + 0.5f * c.thickness &&
+         p[0] < radius && p[0] > -c.width - radius;
+}
+
+/// The colliders `near` in which a point at x lies, as bits. A blade pushes only points that have
+/// lost a bond.
+__device__ __forceinline__ std::uint32_t touched_by(const CudaTables& t, const Collider* colliders,
+                                                    std::uint32_t near, const float* x, int p) {
+  std::uint32_t touched = 0;
+  for (std::uint32_t left = near; left != 0; left &= left - 1) {
+    const int c = __ffs(static_cast<int>(left)) - 1;
+    if (!(gap(colliders[c], x).distance < 0)) continue;
+    if (colliders[c].kind == Collider::kBlade && t.bonds[p] == kAllBonds) continue;
+    touched |= 1u << c;
+  }
+  return touched;
+}
+
+/// Reference place of the point at sub-position s of cell z of the column [m].
+__device__ __forceinline__ void place_in_column(const CudaColumn& c, float cell_size, int z, int s,
+                                                float (&place)[3]) {
+  place[0] = c.middle[0] + ((s & 1) != 0 ? 0.25f : -0.25f) * cell_size;
+  place[1] = c.middle[1] + ((s & 2) != 0 ? 0.25f : -0.25f) * cell_size;
+  place[2] = c.middle[2] + cell_size * (z + ((s & 4) != 0 ? 0.25f : -0.25f));
+}
+
+/// Displacement [m] and velocity [m/s] of the point at sub-position s, from its 27 nodes, of which
+/// `first` is the lowest.
+__device__ __forceinline__ void point_motion(const float4* u, const float4* v, int first, int pitch,
+                                             int plane, int s, float cell_size, float (&du)[3],
+                                             float (&dv)[3]) {
+#pragma unroll
+  for (int c = 0; c < 3; ++c) du[c] = dv[c] = 0;
+#pragma unroll
+  for (int k = 0; k < 27; ++k) {
+    const int i = first + k / 9 * plane + k / 3 % 3 * pitch + k % 3;
+    const float4 a = u[i], b = v[i];
+    const float w = cell_size * lattice_weight(s & 1, k % 3) *
+                    lattice_weight(s >> 1 & 1, k / 3 % 3) * lattice_weight(s >> 2, k / 9);
+    du[0] += w * a.x, du[1] += w * a.y, du[2] += w * a.z;
+    dv[0] += w * b.x, dv[1] += w * b.y, dv[2] += w * b.z;
+  }
+}
+
+/// Lists of cells and of half cells, in the exchange's shared memory: room for kMaxLayers.
+struct PushLists {
+  int *cell_count, *half_count;
+  std::uint32_t* touched;  ///< [threads], bit z: a point of the thread's half cell z is pushed
+  std::uint16_t* cells;    ///< column + (z << 8)
+  std::uint32_t* halves;   ///< column + (z << 8) + (half << 16) + (bits of its points << 20)
+
+  __device__ __forceinline__ PushLists(float4* shared, const CudaBundle& w) {
+    cell_count = reinterpret_cast<int*>(shared);
+    half_count = cell_count + 1;
+    touched = reinterpret_cast<std::uint32_t*>(cell_count + 4);
+    halves = touched + blockDim.x;
+    cells = reinterpret_cast<std::uint16_t*>(halves + 2 * w.columns * w.nz);
+  }
+};
+
+/// Lists the half cells near `colliders` of which a point lies in one; the other points of these
+/// cells forget where they were held.
+__device__ __forceinline__ void list_touched(const CudaTables& t, const CudaBundle& w,
+                                             const CudaBody& body, const float4* u,
+                                             const Collider* colliders, std::uint32_t near,
+                                             const PushLists& lists) {
+  const int thread = static_cast<int>(threadIdx.x), threads = static_cast<int>(blockDim.x);
+  lists.touched[thread] = 0;
+  if (thread == 0) *lists.cell_count = *lists.half_count = 0;
+  __syncthreads();
+  if (thread / 2 < w.columns) {
+    const CudaColumn c = t.columns[w.first_column + thread / 2];
+    for (int z = thread % 2; z < c.nz; z += 2) {
+      // The cell's points lie within two cells of its middle, stretched as they may be.
+      const float4 at = u[c.slot + (z + 1) * c.plane + c.pitch + 1];
+      const float middle[3] = {c.middle[0] + body.cell_size * at.x,
+                               c.middle[1] + body.cell_size * at.y,
+                               c.middle[2] + body.cell_size * (z + at.z)};
+      bool close = false;
+      for (std::uint32_t left = near; left != 0 && !close; left &= left - 1) {
+        close = may_touch(colliders[__ffs(static_cast<int>(left)) - 1], middle, 2 * body.cell_size);
+      }
+      if (!close) continue;
+      lists.cells[atomicAdd(lists.cell_count, 1)] =
+          static_cast<std::uint16_t>(thread / 2 + (z << 8));
+    }
+  }
+  __syncthreads();
+  for (int i = thread; i < 2 * *lists.cell_count; i += threads) {
+    const int cell = lists.cells[i / 2], sz = i % 2, z = cell >> 8;
+    const CudaColumn c = t.columns[w.first_column + (cell & 255)];
+    HalfPlane h[3];
+    int point[4];
+    std::uint8_t with[4];
+#pragma unroll
+    for (int q = 0; q < 4; ++q) point[q] = t.point[c.lane + (z * 8 + 4 * sz + q) * c.step];
+#pragma unroll
+    for (int q = 0; q < 4; ++q) with[q] = point[q] >= 0 ? t.with[point[q]] : 0;
+    read_half(u + c.slot + z * c.plane, c.pitch, c.plane, HalfWeights(sz == 0 ? -1.0f : 1.0f), h);
+    std::uint32_t pushed = 0;
+#pragma unroll
+    for (int q = 0; q < 4; ++q) {
+      if (point[q] < 0) continue;
+      float x[3];
+      place_in_column(c, body.cell_size, z, 4 * sz + q, x);
+      const float side_x = (q & 1) != 0 ? 1.0f : -1.0f, side_y = (q & 2) != 0 ? 1.0f : -1.0f;
+#pragma unroll
+      for (int a = 0; a < 3; ++a) x[a] += body.cell_size * point_value(h[a], side_x, side_y);
+      if (touched_by(t, colliders, near, x, point[q]) != 0) {
+        pushed |= 1u << q;
+      } else if (with[q] != 0) {
+        t.with[point[q]] = 0;
+      }
+    }
+    if (pushed == 0) continue;
+    lists.halves[atomicAdd(lists.half_count, 1)] =
+        static_cast<std::uint32_t>(cell) | static_cast<std::uint32_t>(sz) << 16 | pushed << 20;
+    atomicOr(lists.touched + 2 * (cell & 255) + sz, 1u << z);
+  }
+  __syncthreads();
+}
+
+/// Force of the colliders on the point `p` [N], whose load goes to `loads`. All lanes of a warp
+/// take part; `touches` where there is a point.
+__device__ __forceinline__ void push_point(const CudaTables& t, const Collider* colliders,
+                                           std::uint32_t near, bool touches, int p,
+                                           const ContactSpring& spring, const float (&x)[3],
+                                           const float (&v)[3], unsigned long long* loads,
+                                           float (&sum)[3]) {
+  for (std::uint32_t left = near; left != 0; left &= left - 1) {
+    const int c = __ffs(static_cast<int>(left)) - 1;
+    const Collider& collider = colliders[c];
+    const Gap g = gap(collider, x);
+    const bool here = touches && g.distance < 0 &&
+                      !(collider.kind == Collider::kBlade && t.bonds[p] == kAllBonds);
+    if (__ballot_sync(0xffffffffu, here) == 0) continue;
+    float push[3] = {0, 0, 0};
+    if (here) {
+      float* to = t.hold + 3 * static_cast<std::size_t>(p);
+      float hold[3] = {to[0], to[1], to[2]};
+      if (t.with[p] != c + 1) {
+        t.with[p] = static_cast<std::uint8_t>(c + 1);
+        to_local(collider, x, hold);
+      }
+      contact_force(collider, g, spring, x, v, hold, push);
+#pragma unroll
+      for (int a = 0; a < 3; ++a) {
+        to[a] = hold[a];
+        sum[a] += push[a];
+      }
+    }
+    if (collider.tool < 0) continue;  // nobody asks what the ground carries
+    double arm[3];
+#pragma unroll
+    for (int a = 0; a < 3; ++a) arm[a] = static_cast<double>(x[a]) - collider.position[a];
+#pragma unroll
+    for (int a = 0; a < 3; ++a) {
+      const int b = (a + 1) % 3, d = (a + 2) % 3;
+      add_load(loads + 6 * c + a, -push[a]);
+      add_load(loads + 6 * c + 3 + a, -(arm[b] * push[d] - arm[d] * push[b]));
+    }
+  }
+}
+
+/// Works out what the colliders push the points of a bundle with, into `pushes`, and returns which
+/// of its half cells the thread will find there. The nodes are in `u` and `v`, divided by the cell
+/// size; `shared` is room for the lists. Out of line, for the forces to keep their registers.
+inline __device__ __noinline__ std::uint32_t find_pushes(
+    const CudaTables t, const CudaBundle w, const CudaBody body, const float4* u, const float4* v,
+    float4* shared, const Collider* colliders, std::uint32_t near, unsigned long long* loads,
+    HalfPush* pushes) {
+  const PushLists lists(shared, w);
+  list_touched(t, w, body, u, colliders, near, lists);
+  const int thread = static_cast<int>(threadIdx.x), points = 4 * *lists.half_count;
+  for (int i = thread; i / 32 * 32 < points; i += static_cast<int>(blockDim.x)) {
+    const std::uint32_t half = i < points ? lists.halves[i / 4] : 0;
+    const int z = static_cast<int>(half >> 8 & 255u), sz = static_cast<int>(half >> 16 & 1u);
+    const bool touches = (half >> (20 + i % 4) & 1u) != 0;
+    float push[3] = {0, 0, 0}, x[3] = {0, 0, 0}, velocity[3] = {0, 0, 0};
+    int p = 0;
+    float volume = 0;
+    if (touches) {
+      const CudaColumn c = t.columns[w.first_column + (half & 255u)];
+      const int s = 4 * sz + i % 4, lane = c.lane + (z * 8 + s) * c.step;
+      p = t.point[lane];
+      volume = c.whole != 0 ? body.point_volume : t.volume[lane];
+      float du[3];
+      point_motion(u, v, c.slot + z * c.plane, c.pitch, c.plane, s, body.cell_size, du, velocity);
+      place_in_column(c, body.cell_size, z, s, x);
+#pragma unroll
+      for (int a = 0; a < 3; ++a) x[a] += du[a];
+    }
+    push_point(t, colliders, near, touches, p,
+               {body.spring.stiffness * volume, body.spring.damping * volume}, x, velocity, loads,
+               push);
+    if (i >= points) continue;
+    HalfPush& to = pushes[(z * w.columns + static_cast<int>(half & 255u)) * 2 + sz];
+#pragma unroll
+    for (int a = 0; a < 3; ++a) to.of[a][i % 4] = push[a];
+  }
+  __syncthreads();
+  const std::uint32_t touched = lists.touched[thread];
+  __syncthreads();
+  return touched;
+}
+
+}  // namespace tissue_sim

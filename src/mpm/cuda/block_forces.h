@@ -13,7 +13,8 @@ struct BlockShared {
   float4* u;                  ///< [slots], divided by the cell size
   float4* v;                  ///< [slots], the same; only where contact or viscosity needs it
   float4* exchange;           ///< [9][threads]
-  unsigned long long* loads;  ///< [collider_count][6]
+  unsigned long long* loads;  ///< [kMaxColliders][6]
+  Collider* colliders;        ///< [kMaxColliders]
 };
 
 /// What one substep of a bundle needs beside its nodes.
@@ -22,21 +23,6 @@ struct BlockStep {
   std::uint32_t touched;   ///< the thread's half cells that they push
   float4* force;           ///< of all slots
 };
-
-/// Column `index` of a block that is alone in its bundle, all of whose columns hold points.
-__device__ __forceinline__ CudaColumn column_of(const CudaBlock& b, int index) {
-  const int y = index / b.nx, x = index - y * b.nx;
-  CudaColumn c;
-  c.pitch = b.nx + 2;
-  c.plane = c.pitch * (b.ny + 2);
-  c.slot = y * c.pitch + x;
-  c.nz = b.nz;
-  c.lane = b.first_lane + index;
-  c.step = b.nx * b.ny;
-  c.place = index;
-  c.whole = b.whole;
-  return c;
-}
 
 /// Volumes of the points 2 sy + sx of a half cell.
 __device__ __forceinline__ float4 half_volumes(const CudaTables& t, const CudaColumn& c,
@@ -189,8 +175,8 @@ __device__ __forceinline__ int4 block_size(const CudaTables& t, int block) {
 
 /// Forces of a bundle. Two threads, neighbours in a warp, walk up each column of cells: one has the
 /// lower, the other the upper halves of the cells, with what these give to the next two node planes
-/// in registers. Contact, cells that are not full and bundles of several blocks need kSpecial; else
-/// `block` is the one.
+/// in registers. `block` is the bundle's first; contact, cells that are not full and bundles of
+/// several blocks need kSpecial.
 template <class LawOf, bool kViscous, bool kSpecial>
 __device__ __forceinline__ void block_forces(const CudaTables& t, const CudaBundle& w,
                                              const CudaBlock& block, const CudaBody& body,
@@ -201,7 +187,7 @@ __device__ __forceinline__ void block_forces(const CudaTables& t, const CudaBund
   const bool active = index < (kSpecial ? w.columns : places);
   CudaColumn column;
   if constexpr (kSpecial) {
-    column = t.columns[w.first_column + min(index, w.columns - 1)];
+    column = column_of(t, w, block, body.cell_size, min(index, w.columns - 1));
     if (w.columns < places) {  // those without points give nothing
       for (int i = static_cast<int>(threadIdx.x); i < 9 * places;
            i += static_cast<int>(blockDim.x)) {
@@ -210,10 +196,9 @@ __device__ __forceinline__ void block_forces(const CudaTables& t, const CudaBund
       __syncthreads();
     }
   } else {
-    column = column_of(block, index);
+    column = column_of(block, body.cell_size, index);
   }
-  int4 first;
-  if (kSpecial) first = block_size(t, w.first_block);
+  const int4 first{block.nx, block.ny, block.nz, block.first_slot};
   PlaneForce next[3] = {}, after[3] = {};
 #pragma unroll 1
   for (int z = 0; z < nz + 2; ++z) {

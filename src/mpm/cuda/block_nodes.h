@@ -164,6 +164,32 @@ __device__ __forceinline__ void bring_nodes(const CudaTables& t, int first_slot,
   }
 }
 
+/// Column `index` of a block that is alone in its bundle, all of whose columns hold points.
+__device__ __forceinline__ CudaColumn column_of(const CudaBlock& b, float cell_size, int index) {
+  const int y = index / b.nx, x = index - y * b.nx;
+  CudaColumn c;
+  c.pitch = b.nx + 2;
+  c.plane = c.pitch * (b.ny + 2);
+  c.slot = y * c.pitch + x;
+  c.nz = b.nz;
+  c.lane = b.first_lane + index;
+  c.step = b.nx * b.ny;
+  c.cell = b.first_lane / 8 + index;
+  c.place = index;
+  c.middle[0] = b.origin[0] + cell_size * static_cast<float>(x + 1);
+  c.middle[1] = b.origin[1] + cell_size * static_cast<float>(y + 1);
+  c.middle[2] = b.origin[2] + cell_size;
+  c.whole = b.whole;
+  return c;
+}
+/// Column `index` of a bundle, `block` its first: from memory only where it must be.
+__device__ __forceinline__ CudaColumn column_of(const CudaTables& t, const CudaBundle& w,
+                                                const CudaBlock& block, float cell_size,
+                                                int index) {
+  if (w.blocks == 1 && w.columns == w.places) return column_of(block, cell_size, index);
+  return t.columns[w.first_column + index];
+}
+
 /// Lane of the point at sub-position s of cell (x, y, z).
 __device__ __forceinline__ int lane_of(const CudaBlock& b, int x, int y, int z, int s) {
   return b.first_lane + ((z * 8 + s) * b.ny + y) * b.nx + x;

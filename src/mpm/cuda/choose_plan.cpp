@@ -21,7 +21,7 @@ double cycles(const std::vector<LatticeBody>& bodies, const CudaShape& s, const 
               bool small) {
   const BlockShape& b = s.blocks;
   const double slots = (b.x + 2.0) * (b.y + 2) * (b.z + 2);
-  const double shared = (small ? 56 : 32) * slots + 144.0 * s.threads + 2600;
+  const double shared = (small ? 56 : 32) * slots + 144.0 * s.threads + 5800;
   if (shared > static_cast<double>(limits.shared_bytes)) return 1e30;
   double blocks = 0;
   int parts = 1;

@@ -44,6 +44,7 @@ __device__ __forceinline__ BlockShared shared_of(int max_slots) {
   s.v = s.u + max_slots;
   s.exchange = s.v + max_slots;
   s.loads = reinterpret_cast<unsigned long long*>(s.exchange + 9 * blockDim.x);
+  s.colliders = reinterpret_cast<Collider*>(s.loads + 6 * kMaxColliders);
   return s;
 }
 
@@ -69,9 +70,9 @@ __device__ __forceinline__ void forces(const CudaTables& t, const CudaBundle& w,
 /// registers.
 template <Laws kLaws>
 __device__ __noinline__ void special_forces(const CudaTables t, const CudaBundle w,
-                                            const CudaBody body, int max_slots,
-                                            const BlockStep step) {
-  forces<kLaws, true>(t, w, CudaBlock(), body, shared_of(max_slots), step);
+                                            const CudaBlock block, const CudaBody body,
+                                            int max_slots, const BlockStep step) {
+  forces<kLaws, true>(t, w, block, body, shared_of(max_slots), step);
 }
 
 /// A bundle with what belongs to it. Copies: through a reference they would be read again after
@@ -90,6 +91,30 @@ struct BundleAtWork {
   }
 };
 
+/// Brings the colliders of a substep to shared memory: the first word of each thread is under way
+/// while other things are done.
+struct ColliderCopy {
+  int words, word;
+  __device__ __forceinline__ const int* source(const CudaFrame& f, int substep) const {
+    return reinterpret_cast<const int*>(f.colliders + substep * f.collider_count);
+  }
+  __device__ __forceinline__ ColliderCopy(const CudaFrame& f, std::uint32_t near, int substep)
+      : words(near == 0 || substep == f.substeps
+                  ? 0
+                  : static_cast<int>(sizeof(Collider) / sizeof(int)) * f.collider_count),
+        word(0) {
+    const int i = static_cast<int>(threadIdx.x);
+    if (i < words) word = __ldg(source(f, substep) + i);
+  }
+  __device__ __forceinline__ void finish(const CudaFrame& f, int substep, Collider* to) const {
+    int i = static_cast<int>(threadIdx.x);
+    if (i >= words) return;
+    int* out = reinterpret_cast<int*>(to);
+    out[i] = word;
+    while ((i += static_cast<int>(blockDim.x)) < words) out[i] = __ldg(source(f, substep) + i);
+  }
+};
+
 /// Forces of a bundle whose nodes are there, on its points and between them and the colliders.
 template <Laws kLaws>
 __device__ __forceinline__ void all_forces(const CudaTables& t, const CudaFrame& f,
@@ -102,17 +127,18 @@ __device__ __forceinline__ void all_forces(const CudaTables& t, const CudaFrame&
   }
   __syncthreads();
   HalfPush* pushes = f.pushes + blockIdx.x * f.push_stride;
-  if (w.near == 0 && w.bundle.partial == 0 && w.bundle.blocks == 1) {
-    forces<kLaws, false>(t, w.bundle, w.block, w.body, s, {pushes, 0, force});
+  Touched touched = {0, false};
+  if (w.near != 0) {
+    touched = find_pushes(t, w.bundle, w.block, w.body, s.u, s.v, s.exchange, s.colliders, w.near,
+                          s.loads, pushes);
+  }
+  const BlockStep step{pushes, touched.halves, force};
+  if (!touched.any && w.bundle.partial == 0 && w.bundle.blocks == 1) {
+    forces<kLaws, false>(t, w.bundle, w.block, w.body, s, step);
     return;
   }
-  std::uint32_t touched = 0;
-  if (w.near != 0) {
-    touched = find_pushes(t, w.bundle, w.body, s.u, s.v, s.exchange,
-                          f.colliders + substep * f.collider_count, w.near, s.loads, pushes);
-  }
-  special_forces<kLaws>(t, w.bundle, w.body, max_slots, {pushes, touched, force});
-  if (w.near == 0) return;
+  special_forces<kLaws>(t, w.bundle, w.block, w.body, max_slots, step);
+  if (!touched.any) return;
   auto* loads = reinterpret_cast<unsigned long long*>(f.loads) + substep * load_count;
   for (int i = threadIdx.x; i < load_count; i += blockDim.x) {
     if (s.loads[i] != 0) atomicAdd(loads + i, s.loads[i]);
@@ -141,6 +167,8 @@ __device__ __forceinline__ void block_round(const CudaTables& t, const CudaFrame
   // Not f.state[i]: parameters that a register indexes would be copied to local memory.
   const bool odd = ((f.current + max(round - 1, 0)) & 1) != 0, odd_round = (round & 1) != 0;
   const CudaNodes &from = odd ? f.state[1] : f.state[0], &to = odd ? f.state[0] : f.state[1];
+  // Their way here takes as long as that of the nodes.
+  const ColliderCopy colliders(f, w.near, round);
   if (round == 0) {
     bring_nodes<false, kCached>(t, w.bundle.first_slot, w.bundle.slots, cache, from, from, nullptr,
                                 f.step, scale, s.u, v);
@@ -152,6 +180,7 @@ __device__ __forceinline__ void block_round(const CudaTables& t, const CudaFrame
                                        pushed);
   }
   if (round == f.substeps) return;
+  colliders.finish(f, round, s.colliders);
   if (kFaces && last) arrive(f.arrived + 1);
   all_forces<kLaws>(t, f, w, round, max_slots, odd_round ? f.force[1] : f.force[0]);
 }
@@ -170,7 +199,7 @@ __global__ void __launch_bounds__(kThreads, kBlocksPerProcessor)
     mpm_substeps(const CudaTables t, const CudaFrame f, int max_slots, bool eight_parts) {
   const BlockShared s = shared_of(max_slots);
   SlotCache cache;
-  cache.parts = reinterpret_cast<uint4*>(s.loads + 6 * kMaxColliders);
+  cache.parts = reinterpret_cast<uint4*>(s.colliders + kMaxColliders);
   cache.more = eight_parts ? cache.parts + max_slots : nullptr;
   cache.node = reinterpret_cast<std::int32_t*>(cache.parts + (eight_parts ? 2 : 1) * max_slots);
   cache.shared = reinterpret_cast<std::uint32_t*>(cache.node + max_slots);

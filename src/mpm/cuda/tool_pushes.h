@@ -89,15 +89,15 @@ struct PushLists {
 /// Lists the half cells near `colliders` of which a point lies in one; the other points of these
 /// cells forget where they were held.
 __device__ __forceinline__ void list_touched(const CudaTables& t, const CudaBundle& w,
-                                             const CudaBody& body, const float4* u,
-                                             const Collider* colliders, std::uint32_t near,
-                                             const PushLists& lists) {
+                                             const CudaBlock& block, const CudaBody& body,
+                                             const float4* u, const Collider* colliders,
+                                             std::uint32_t near, const PushLists& lists) {
   const int thread = static_cast<int>(threadIdx.x), threads = static_cast<int>(blockDim.x);
   lists.touched[thread] = 0;
   if (thread == 0) *lists.cell_count = *lists.half_count = 0;
   __syncthreads();
   if (thread / 2 < w.columns) {
-    const CudaColumn c = t.columns[w.first_column + thread / 2];
+    const CudaColumn c = column_of(t, w, block, body.cell_size, thread / 2);
     for (int z = thread % 2; z < c.nz; z += 2) {
       // The cell's points lie within two cells of its middle, stretched as they may be.
       const float4 at = u[c.slot + (z + 1) * c.plane + c.pitch + 1];
@@ -116,7 +116,7 @@ __device__ __forceinline__ void list_touched(const CudaTables& t, const CudaBund
   __syncthreads();
   for (int i = thread; i < 2 * *lists.cell_count; i += threads) {
     const int cell = lists.cells[i / 2], sz = i % 2, z = cell >> 8;
-    const CudaColumn c = t.columns[w.first_column + (cell & 255)];
+    const CudaColumn c = column_of(t, w, block, body.cell_size, cell & 255);
     HalfPlane h[3];
     int point[4];
     std::uint8_t with[4];
@@ -148,10 +148,16 @@ __device__ __forceinline__ void list_touched(const CudaTables& t, const CudaBund
   __syncthreads();
 }
 
+/// What a point remembers of its contact: CudaTables::with and hold.
+struct Held {
+  std::uint8_t with;
+  float place[3];
+};
+
 /// Force of the colliders on the point `p` [N], whose load goes to `loads`. All lanes of a warp
 /// take part; `touches` where there is a point.
 __device__ __forceinline__ void push_point(const CudaTables& t, const Collider* colliders,
-                                           std::uint32_t near, bool touches, int p,
+                                           std::uint32_t near, bool touches, int p, Held& held,
                                            const ContactSpring& spring, const float (&x)[3],
                                            const float (&v)[3], unsigned long long* loads,
                                            float (&sum)[3]) {
@@ -164,18 +170,13 @@ __device__ __forceinline__ void push_point(const CudaTables& t, const Collider* 
     if (__ballot_sync(0xffffffffu, here) == 0) continue;
     float push[3] = {0, 0, 0};
     if (here) {
-      float* to = t.hold + 3 * static_cast<std::size_t>(p);
-      float hold[3] = {to[0], to[1], to[2]};
-      if (t.with[p] != c + 1) {
-        t.with[p] = static_cast<std::uint8_t>(c + 1);
-        to_local(collider, x, hold);
+      if (held.with != c + 1) {
+        held.with = static_cast<std::uint8_t>(c + 1);
+        to_local(collider, x, held.place);
       }
-      contact_force(collider, g, spring, x, v, hold, push);
+      contact_force(collider, g, spring, x, v, held.place, push);
 #pragma unroll
-      for (int a = 0; a < 3; ++a) {
-        to[a] = hold[a];
-        sum[a] += push[a];
-      }
+      for (int a = 0; a < 3; ++a) sum[a] += push[a];
     }
     if (collider.tool < 0) continue;  // nobody asks what the ground carries
     double arm[3];
@@ -190,44 +191,60 @@ __device__ __forceinline__ void push_point(const CudaTables& t, const Collider* 
   }
 }
 
-/// Works out what the colliders push the points of a bundle with, into `pushes`, and returns which
-/// of its half cells the thread will find there. The nodes are in `u` and `v`, divided by the cell
-/// size; `shared` is room for the lists. Out of line, for the forces to keep their registers.
-inline __device__ __noinline__ std::uint32_t find_pushes(
-    const CudaTables t, const CudaBundle w, const CudaBody body, const float4* u, const float4* v,
-    float4* shared, const Collider* colliders, std::uint32_t near, unsigned long long* loads,
-    HalfPush* pushes) {
+/// Half cells of the thread, as bits, and whether any of the bundle's, that colliders push.
+struct Touched {
+  std::uint32_t halves;
+  bool any;
+};
+
+/// Works out what the colliders push the points of a bundle with, into `pushes`. The nodes are in
+/// `u` and `v`, divided by the cell size; `shared` is room for the lists, `block` the bundle's
+/// first. Out of line, for the forces to keep their registers.
+inline __device__ __noinline__ Touched find_pushes(const CudaTables t, const CudaBundle w,
+                                                   const CudaBlock block, const CudaBody body,
+                                                   const float4* u, const float4* v, float4* shared,
+                                                   const Collider* colliders, std::uint32_t near,
+                                                   unsigned long long* loads, HalfPush* pushes) {
   const PushLists lists(shared, w);
-  list_touched(t, w, body, u, colliders, near, lists);
+  list_touched(t, w, block, body, u, colliders, near, lists);
   const int thread = static_cast<int>(threadIdx.x), points = 4 * *lists.half_count;
   for (int i = thread; i / 32 * 32 < points; i += static_cast<int>(blockDim.x)) {
     const std::uint32_t half = i < points ? lists.halves[i / 4] : 0;
     const int z = static_cast<int>(half >> 8 & 255u), sz = static_cast<int>(half >> 16 & 1u);
     const bool touches = (half >> (20 + i % 4) & 1u) != 0;
-    float push[3] = {0, 0, 0}, x[3] = {0, 0, 0}, velocity[3] = {0, 0, 0};
+    float push[3] = {0, 0, 0}, x[3] = {0, 0, 0}, velocity[3] = {0, 0, 0}, volume = 0;
     int p = 0;
-    float volume = 0;
+    Held held = {0, {0, 0, 0}};
     if (touches) {
-      const CudaColumn c = t.columns[w.first_column + (half & 255u)];
-      const int s = 4 * sz + i % 4, lane = c.lane + (z * 8 + s) * c.step;
+      const int index = static_cast<int>(half & 255u), s = 4 * sz + i % 4;
+      const CudaColumn c = column_of(t, w, block, body.cell_size, index);
+      const int lane = c.lane + (z * 8 + s) * c.step;
       p = t.point[lane];
       volume = c.whole != 0 ? body.point_volume : t.volume[lane];
+      held.with = t.with[p];
+#pragma unroll
+      for (int a = 0; a < 3; ++a) held.place[a] = t.hold[3 * static_cast<std::size_t>(p) + a];
       float du[3];
       point_motion(u, v, c.slot + z * c.plane, c.pitch, c.plane, s, body.cell_size, du, velocity);
       place_in_column(c, body.cell_size, z, s, x);
 #pragma unroll
       for (int a = 0; a < 3; ++a) x[a] += du[a];
     }
-    push_point(t, colliders, near, touches, p,
+    push_point(t, colliders, near, touches, p, held,
                {body.spring.stiffness * volume, body.spring.damping * volume}, x, velocity, loads,
                push);
     if (i >= points) continue;
+    if (touches) {
+      t.with[p] = held.with;
+#pragma unroll
+      for (int a = 0; a < 3; ++a) t.hold[3 * static_cast<std::size_t>(p) + a] = held.place[a];
+    }
     HalfPush& to = pushes[(z * w.columns + static_cast<int>(half & 255u)) * 2 + sz];
 #pragma unroll
     for (int a = 0; a < 3; ++a) to.of[a][i % 4] = push[a];
   }
   __syncthreads();
-  const std::uint32_t touched = lists.touched[thread];
+  const Touched touched{lists.touched[thread], points > 0};
   __syncthreads();
   return touched;
 }

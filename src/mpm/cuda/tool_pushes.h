@@ -11,35 +11,51 @@
 
 namespace tissue_sim {
 
-/// Adds `value` of each lane to a load in shared memory, rounded to integers, whose sum does not
-/// depend on the order. All lanes of a warp take part.
-__device__ __forceinline__ void add_load(unsigned long long* load, double value) {
-  long long sum = __double2ll_rn(value * (1 / kLoadUnit));
+/// Adds forces and moments of all lanes of a warp to a load in shared memory, as integers, whose
+/// sum does not depend on the order.
+__device__ __forceinline__ void add_load(unsigned long long* load, const double (&value)[6]) {
+  long long sum[6];
 #pragma unroll
-  for (int step = 16; step > 0; step /= 2) sum += __shfl_xor_sync(0xffffffffu, sum, step);
-  if (threadIdx.x % 32 == 0 && sum != 0) atomicAdd(load, static_cast<unsigned long long>(sum));
+  for (int i = 0; i < 6; ++i) sum[i] = __double2ll_rn(value[i] * (1 / kLoadUnit));
+#pragma unroll
+  for (int step = 16; step > 0; step /= 2) {
+#pragma unroll
+    for (int i = 0; i < 6; ++i) sum[i] += __shfl_xor_sync(0xffffffffu, sum[i], step);
+  }
+  const int lane = static_cast<int>(threadIdx.x) % 32;
+  long long mine = sum[0];
+#pragma unroll
+  for (int i = 1; i < 6; ++i) mine = lane == i ? sum[i] : mine;
+  if (lane < 6) atomicAdd(load + lane, static_cast<unsigned long long>(mine));
 }
 
-/// Whether a point within `radius` of `x` may lie in the collider.
+/// Whether a point within `radius` of `x` may lie in the collider; with a radius of 0, whether x
+/// does, up to rounding.
 __device__ __forceinline__ bool may_touch(const Collider& c, const float* x, float radius) {
-  if (c.kind == Collider::kCapsule) return gap(c, x).distance < radius;
   float p[3];
   to_local(c, x, p);
   if (c.kind == Collider::kPlane) return p[2] < radius;
+  if (c.kind == Collider::kCapsule) {
+    const float z = p[2] - fminf(fmaxf(p[2], -c.length), -c.radius), reach = c.radius + radius;
+    return p[0] * p[0] + p[1] * p[1] + z * z < reach * reach;
+  }
   return p[2] < radius && p[2] > -c.length - radius && fabsf(p[1]) < radius + 0.5f * c.thickness &&
          p[0] < radius && p[0] > -c.width - radius;
 }
 
-/// The colliders `near` in which a point at x lies, as bits. A blade pushes only points that have
-/// lost a bond.
+/// A word has room for so many of a bundle's colliders; those with the same remainder share a bit.
+inline constexpr int kColliderBits = 15;
+
+/// The colliders `near` in which a point at x lies, as kColliderBits. A blade pushes only points
+/// that have lost a bond.
 __device__ __forceinline__ std::uint32_t touched_by(const CudaTables& t, const Collider* colliders,
                                                     std::uint32_t near, const float* x, int p) {
   std::uint32_t touched = 0;
   for (std::uint32_t left = near; left != 0; left &= left - 1) {
     const int c = __ffs(static_cast<int>(left)) - 1;
-    if (!(gap(colliders[c], x).distance < 0)) continue;
+    if (!may_touch(colliders[c], x, 0)) continue;
     if (colliders[c].kind == Collider::kBlade && t.bonds[p] == kAllBonds) continue;
-    touched |= 1u << c;
+    touched |= 1u << c % kColliderBits;
   }
   return touched;
 }
@@ -59,14 +75,17 @@ __device__ __forceinline__ void point_motion(const float4* u, const float4* v, i
                                              float (&dv)[3]) {
 #pragma unroll
   for (int c = 0; c < 3; ++c) du[c] = dv[c] = 0;
+#pragma unroll 1  // the code of all this does not stay in the instruction cache as it is
+  for (int z = 0; z < 3; ++z) {
+    const float along_z = cell_size * lattice_weight(s >> 2, z);
 #pragma unroll
-  for (int k = 0; k < 27; ++k) {
-    const int i = first + k / 9 * plane + k / 3 % 3 * pitch + k % 3;
-    const float4 a = u[i], b = v[i];
-    const float w = cell_size * lattice_weight(s & 1, k % 3) *
-                    lattice_weight(s >> 1 & 1, k / 3 % 3) * lattice_weight(s >> 2, k / 9);
-    du[0] += w * a.x, du[1] += w * a.y, du[2] += w * a.z;
-    dv[0] += w * b.x, dv[1] += w * b.y, dv[2] += w * b.z;
+    for (int k = 0; k < 9; ++k) {
+      const int i = first + z * plane + k / 3 * pitch + k % 3;
+      const float4 a = u[i], b = v[i];
+      const float w = along_z * lattice_weight(s & 1, k % 3) * lattice_weight(s >> 1 & 1, k / 3);
+      du[0] += w * a.x, du[1] += w * a.y, du[2] += w * a.z;
+      dv[0] += w * b.x, dv[1] += w * b.y, dv[2] += w * b.z;
+    }
   }
 }
 
@@ -75,7 +94,8 @@ struct PushLists {
   int *cell_count, *half_count;
   std::uint32_t* touched;  ///< [threads], bit z: a point of the thread's half cell z is pushed
   std::uint16_t* cells;    ///< column + (z << 8)
-  std::uint32_t* halves;   ///< column + (z << 8) + (half << 16) + (bits of its points << 20)
+  /// column + (z << 8) + (half << 12) + (bits of its points << 13) + (kColliderBits << 17)
+  std::uint32_t* halves;
 
   __device__ __forceinline__ PushLists(float4* shared, const CudaBundle& w) {
     cell_count = reinterpret_cast<int*>(shared);
@@ -125,7 +145,7 @@ __device__ __forceinline__ void list_touched(const CudaTables& t, const CudaBund
 #pragma unroll
     for (int q = 0; q < 4; ++q) with[q] = point[q] >= 0 ? t.with[point[q]] : 0;
     read_half(u + c.slot + z * c.plane, c.pitch, c.plane, HalfWeights(sz == 0 ? -1.0f : 1.0f), h);
-    std::uint32_t pushed = 0;
+    std::uint32_t pushed = 0, by = 0;
 #pragma unroll
     for (int q = 0; q < 4; ++q) {
       if (point[q] < 0) continue;
@@ -134,15 +154,18 @@ __device__ __forceinline__ void list_touched(const CudaTables& t, const CudaBund
       const float side_x = (q & 1) != 0 ? 1.0f : -1.0f, side_y = (q & 2) != 0 ? 1.0f : -1.0f;
 #pragma unroll
       for (int a = 0; a < 3; ++a) x[a] += body.cell_size * point_value(h[a], side_x, side_y);
-      if (touched_by(t, colliders, near, x, point[q]) != 0) {
+      const std::uint32_t touched = touched_by(t, colliders, near, x, point[q]);
+      by |= touched;
+      if (touched != 0) {
         pushed |= 1u << q;
       } else if (with[q] != 0) {
         t.with[point[q]] = 0;
       }
     }
     if (pushed == 0) continue;
-    lists.halves[atomicAdd(lists.half_count, 1)] =
-        static_cast<std::uint32_t>(cell) | static_cast<std::uint32_t>(sz) << 16 | pushed << 20;
+    lists.halves[atomicAdd(lists.half_count, 1)] = static_cast<std::uint32_t>(cell) |
+                                                   static_cast<std::uint32_t>(sz) << 12 |
+                                                   pushed << 13 | by << 17;
     atomicOr(lists.touched + 2 * (cell & 255) + sz, 1u << z);
   }
   __syncthreads();
@@ -155,21 +178,21 @@ struct Held {
 };
 
 /// Force of the colliders on the point `p` [N], whose load goes to `loads`. All lanes of a warp
-/// take part; `touches` where there is a point.
+/// take part; `by` are the colliders it may lie in, as kColliderBits, 0 where there is no point.
 __device__ __forceinline__ void push_point(const CudaTables& t, const Collider* colliders,
-                                           std::uint32_t near, bool touches, int p, Held& held,
+                                           std::uint32_t near, std::uint32_t by, int p, Held& held,
                                            const ContactSpring& spring, const float (&x)[3],
                                            const float (&v)[3], unsigned long long* loads,
                                            float (&sum)[3]) {
   for (std::uint32_t left = near; left != 0; left &= left - 1) {
     const int c = __ffs(static_cast<int>(left)) - 1;
+    const bool maybe = (by >> c % kColliderBits & 1u) != 0;
+    if (__ballot_sync(0xffffffffu, maybe) == 0) continue;
     const Collider& collider = colliders[c];
     const Gap g = gap(collider, x);
-    const bool here = touches && g.distance < 0 &&
-                      !(collider.kind == Collider::kBlade && t.bonds[p] == kAllBonds);
-    if (__ballot_sync(0xffffffffu, here) == 0) continue;
     float push[3] = {0, 0, 0};
-    if (here) {
+    if (maybe && g.distance < 0 &&
+        !(collider.kind == Collider::kBlade && t.bonds[p] == kAllBonds)) {
       if (held.with != c + 1) {
         held.with = static_cast<std::uint8_t>(c + 1);
         to_local(collider, x, held.place);
@@ -182,12 +205,14 @@ __device__ __forceinline__ void push_point(const CudaTables& t, const Collider* 
     double arm[3];
 #pragma unroll
     for (int a = 0; a < 3; ++a) arm[a] = static_cast<double>(x[a]) - collider.position[a];
+    double load[6];
 #pragma unroll
     for (int a = 0; a < 3; ++a) {
       const int b = (a + 1) % 3, d = (a + 2) % 3;
-      add_load(loads + 6 * c + a, -push[a]);
-      add_load(loads + 6 * c + 3 + a, -(arm[b] * push[d] - arm[d] * push[b]));
+      load[a] = -push[a];
+      load[3 + a] = -(arm[b] * push[d] - arm[d] * push[b]);
     }
+    add_load(loads + 6 * c, load);
   }
 }
 
@@ -210,8 +235,8 @@ inline __device__ __noinline__ Touched find_pushes(const CudaTables t, const Cud
   const int thread = static_cast<int>(threadIdx.x), points = 4 * *lists.half_count;
   for (int i = thread; i / 32 * 32 < points; i += static_cast<int>(blockDim.x)) {
     const std::uint32_t half = i < points ? lists.halves[i / 4] : 0;
-    const int z = static_cast<int>(half >> 8 & 255u), sz = static_cast<int>(half >> 16 & 1u);
-    const bool touches = (half >> (20 + i % 4) & 1u) != 0;
+    const int z = static_cast<int>(half >> 8 & 15u), sz = static_cast<int>(half >> 12 & 1u);
+    const bool touches = (half >> (13 + i % 4) & 1u) != 0;
     float push[3] = {0, 0, 0}, x[3] = {0, 0, 0}, velocity[3] = {0, 0, 0}, volume = 0;
     int p = 0;
     Held held = {0, {0, 0, 0}};
@@ -230,7 +255,7 @@ inline __device__ __noinline__ Touched find_pushes(const CudaTables t, const Cud
 #pragma unroll
       for (int a = 0; a < 3; ++a) x[a] += du[a];
     }
-    push_point(t, colliders, near, touches, p, held,
+    push_point(t, colliders, near, touches ? half >> 17 : 0, p, held,
                {body.spring.stiffness * volume, body.spring.damping * volume}, x, velocity, loads,
                push);
     if (i >= points) continue;

@@ -72,6 +72,9 @@ HostTables CudaMpmTissue::plan_tables() {
   }
   const auto choose = [&d](std::size_t count) {
     d.resident = resident_blocks(d.plan, static_cast<int>(count));
+    d.plain_plan = d.plan;
+    d.plain_plan.plain = true;
+    d.plain_resident = resident_blocks(d.plain_plan, static_cast<int>(count));
     d.face_plan = d.plan;
     d.face_plan.faces = true;
     d.face_resident = resident_blocks(d.face_plan, static_cast<int>(count));
@@ -88,7 +91,9 @@ HostTables CudaMpmTissue::plan_tables() {
   HostTables t = make_tables(*state_, bundles);
   d.plan.max_slots = t.max_slots;
   choose(bundles.size());
-  if (d.resident == 0 || d.face_resident == 0) {
+  d.all_plain = std::all_of(t.bundles.begin(), t.bundles.end(),
+                            [](const CudaBundle& b) { return b.blocks == 1 && b.partial == 0; });
+  if (d.resident == 0 || d.plain_resident == 0 || d.face_resident == 0) {
     throw std::runtime_error("the GPU has too little shared memory");
   }
   return t;

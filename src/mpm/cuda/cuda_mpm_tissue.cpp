@@ -137,7 +137,21 @@ void CudaMpmTissue::advance(int substeps, float dt, const FrameInput& input) {
 }
 
 void CudaMpmTissue::find_near(double duration) {
-  const OnDevice& d = *device_;
+  OnDevice& d = *device_;
+  // A little more than the GPU finds, for what it finds must be done.
+  const double cell = state_->scene.cell_size;
+  d.may_meet = std::any_of(state_->motion.begin(), state_->motion.end(), [&](const BlockMotion& m) {
+    const double margin = m.speed * duration + cell;
+    return std::any_of(d.host_reach.data(), d.host_reach.data() + d.host_reach.size(),
+                       [&](const CudaBox& reach) {
+                         bool meets = true;
+                         for (int a = 0; a < 3; ++a) {
+                           meets = meets && m.box.min[a] - margin <= reach.max[a] &&
+                                   reach.min[a] <= m.box.max[a] + margin;
+                         }
+                         return meets;
+                       });
+  });
   launch_near(d.tables(), d.measures.data(), d.reach.data(), static_cast<int>(d.host_reach.size()),
               static_cast<float>(duration), static_cast<float>(0.5 * state_->scene.cell_size),
               d.stream);
@@ -165,8 +179,13 @@ void CudaMpmTissue::launch(int begin, int end, float dt) {
   frame.arrived = d.arrived.data();
   const std::size_t faces = faces_may_meet() ? state_->faces.active.size() : 0;
   frame.faces = d.faces(faces);
-  launch_substeps(faces > 0 ? d.face_plan : d.plan, d.tables(), frame,
-                  faces > 0 ? d.face_resident : d.resident, d.stream);
+  if (faces > 0) {
+    launch_substeps(d.face_plan, d.tables(), frame, d.face_resident, d.stream);
+  } else if (d.all_plain && !d.may_meet) {
+    launch_substeps(d.plain_plan, d.tables(), frame, d.plain_resident, d.stream);
+  } else {
+    launch_substeps(d.plan, d.tables(), frame, d.resident, d.stream);
+  }
   d.current = (d.current + end - begin) % 2;
   state_->time += static_cast<double>(end - begin) * dt;
 }

@@ -11,9 +11,12 @@ namespace tissue_sim {
 
 struct CudaMpmTissue::OnDevice {
   CudaShape shape;
-  CudaPlan plan, face_plan;             ///< without and with contact of tissue with tissue
-  int resident = 0, face_resident = 0;  ///< thread blocks that run at once
-  int current = 0;                      ///< which of the two states is the present one
+  /// Without contact of tissue with tissue, with it, and CudaPlan::plain.
+  CudaPlan plan, face_plan, plain_plan;
+  int resident = 0, face_resident = 0, plain_resident = 0;  ///< thread blocks that run at once
+  bool all_plain = true;  ///< all cells are full and each bundle is one block
+  bool may_meet = true;   ///< whether any block may meet a collider in this frame
+  int current = 0;        ///< which of the two states is the present one
   cudaStream_t stream = nullptr;
   std::string gpu;  ///< name
 

@@ -51,6 +51,10 @@ __device__ __forceinline__ BlockShared shared_of(int max_slots) {
 /// Which laws a kernel can do; one that can do all has to hold more registers.
 enum class Laws { kFixedCorotated, kNeoHookean, kAny };
 
+/// What a kernel can do beside: nothing (CudaPlan::plain), all but contact of tissue with tissue,
+/// or all.
+enum class Can { kPlain, kTools, kFaces };
+
 template <Laws kLaws, bool kSpecial>
 __device__ __forceinline__ void forces(const CudaTables& t, const CudaBundle& w, const CudaBlock& b,
                                        const CudaBody& body, const BlockShared& s,
@@ -116,11 +120,16 @@ struct ColliderCopy {
 };
 
 /// Forces of a bundle whose nodes are there, on its points and between them and the colliders.
-template <Laws kLaws>
+template <Laws kLaws, bool kPlain>
 __device__ __forceinline__ void all_forces(const CudaTables& t, const CudaFrame& f,
                                            const BundleAtWork& w, int substep, int max_slots,
                                            float4* force) {
   const BlockShared s = shared_of(max_slots);
+  if constexpr (kPlain) {
+    __syncthreads();
+    forces<kLaws, false>(t, w.bundle, w.block, w.body, s, {nullptr, 0, force});
+    return;
+  }
   const int load_count = 6 * f.collider_count;
   if (w.near != 0) {
     for (int i = threadIdx.x; i < load_count; i += blockDim.x) s.loads[i] = 0;
@@ -157,18 +166,19 @@ __device__ __forceinline__ PushedNodes pushed_nodes(const CudaFaces& f, int roun
 /// State and forces change places between two buffers. With kFaces, the thread block arrives at the
 /// second barrier when its last block's nodes are in place, so that the forces hide the wait for
 /// the others.
-template <Laws kLaws, bool kCached, bool kFaces>
+template <Laws kLaws, bool kCached, Can kCan>
 __device__ __forceinline__ void block_round(const CudaTables& t, const CudaFrame& f,
                                             const BundleAtWork& w, int round, int max_slots,
                                             const SlotCache& cache, bool last) {
+  constexpr bool kFaces = kCan == Can::kFaces, kPlain = kCan == Can::kPlain;
   const BlockShared s = shared_of(max_slots);
   const float scale = w.body.inv_cell_size;
-  float4* v = w.near != 0 || kLaws == Laws::kAny ? s.v : nullptr;
+  float4* v = (!kPlain && w.near != 0) || kLaws == Laws::kAny ? s.v : nullptr;
   // Not f.state[i]: parameters that a register indexes would be copied to local memory.
   const bool odd = ((f.current + max(round - 1, 0)) & 1) != 0, odd_round = (round & 1) != 0;
   const CudaNodes &from = odd ? f.state[1] : f.state[0], &to = odd ? f.state[0] : f.state[1];
   // Their way here takes as long as that of the nodes.
-  const ColliderCopy colliders(f, w.near, round);
+  const ColliderCopy colliders(f, kPlain ? 0 : w.near, round);
   if (round == 0) {
     bring_nodes<false, kCached>(t, w.bundle.first_slot, w.bundle.slots, cache, from, from, nullptr,
                                 f.step, scale, s.u, v);
@@ -182,7 +192,7 @@ __device__ __forceinline__ void block_round(const CudaTables& t, const CudaFrame
   if (round == f.substeps) return;
   colliders.finish(f, round, s.colliders);
   if (kFaces && last) arrive(f.arrived + 1);
-  all_forces<kLaws>(t, f, w, round, max_slots, odd_round ? f.force[1] : f.force[0]);
+  all_forces<kLaws, kPlain>(t, f, w, round, max_slots, odd_round ? f.force[1] : f.force[0]);
 }
 
 /// Contacts of tissue with tissue, once all nodes are where the round brought them.
@@ -194,9 +204,10 @@ __device__ __forceinline__ void push_faces(const CudaFrame& f, int round) {
                 f.faces.force + f.faces.stride * (round % 3));
 }
 
-template <Laws kLaws, bool kCached, bool kFaces, int kThreads, int kBlocksPerProcessor>
+template <Laws kLaws, bool kCached, Can kCan, int kThreads, int kBlocksPerProcessor>
 __global__ void __launch_bounds__(kThreads, kBlocksPerProcessor)
     mpm_substeps(const CudaTables t, const CudaFrame f, int max_slots, bool eight_parts) {
+  constexpr bool kFaces = kCan == Can::kFaces;
   const BlockShared s = shared_of(max_slots);
   SlotCache cache;
   cache.parts = reinterpret_cast<uint4*>(s.colliders + kMaxColliders);
@@ -209,7 +220,7 @@ __global__ void __launch_bounds__(kThreads, kBlocksPerProcessor)
     __syncthreads();
     for (int round = 0; round <= f.substeps; ++round) {
       if (round > 0) grid_barrier(f.arrived, static_cast<unsigned>(round));
-      block_round<kLaws, true, kFaces>(t, f, mine, round, max_slots, cache, true);
+      block_round<kLaws, true, kCan>(t, f, mine, round, max_slots, cache, true);
       if (kFaces) push_faces(f, round);
     }
   } else {
@@ -217,29 +228,29 @@ __global__ void __launch_bounds__(kThreads, kBlocksPerProcessor)
       if (round > 0) grid_barrier(f.arrived, static_cast<unsigned>(round));
       for (int i = blockIdx.x; i < t.bundle_count; i += gridDim.x) {
         const bool last = i + static_cast<int>(gridDim.x) >= t.bundle_count;
-        block_round<kLaws, false, kFaces>(t, f, BundleAtWork(t, i), round, max_slots, cache, last);
+        block_round<kLaws, false, kCan>(t, f, BundleAtWork(t, i), round, max_slots, cache, last);
       }
       if (kFaces) push_faces(f, round);
     }
   }
 }
 
-template <bool kFaces, bool kCached, int kThreads, int kAtOnce>
+template <Can kCan, bool kCached, int kThreads, int kAtOnce>
 CudaKernel kernel_for(const CudaPlan& plan) {
   if (plan.viscous || (plan.neo_hookean && plan.fixed_corotated)) {
-    return mpm_substeps<Laws::kAny, kCached, kFaces, kMaxCudaThreads, 1>;
+    return mpm_substeps<Laws::kAny, kCached, kCan, kMaxCudaThreads, 1>;
   }
-  return plan.neo_hookean ? mpm_substeps<Laws::kNeoHookean, kCached, kFaces, kThreads, kAtOnce>
-                          : mpm_substeps<Laws::kFixedCorotated, kCached, kFaces, kThreads, kAtOnce>;
+  return plan.neo_hookean ? mpm_substeps<Laws::kNeoHookean, kCached, kCan, kThreads, kAtOnce>
+                          : mpm_substeps<Laws::kFixedCorotated, kCached, kCan, kThreads, kAtOnce>;
 }
 
 /// The kernel of small tissues has all registers for each thread; that of large ones holds so few
 /// that 384 threads run at once, of which some compute while others wait for memory.
-template <bool kFaces>
+template <Can kCan>
 CudaKernel kernel_of(const CudaPlan& plan) {
-  if (plan.cached) return kernel_for<kFaces, true, kMaxCudaThreads, 1>(plan);
-  return plan.threads > 192 ? kernel_for<kFaces, false, kMaxCudaThreads, 1>(plan)
-                            : kernel_for<kFaces, false, 192, 2>(plan);
+  if (plan.cached) return kernel_for<kCan, true, kMaxCudaThreads, 1>(plan);
+  return plan.threads > 192 ? kernel_for<kCan, false, kMaxCudaThreads, 1>(plan)
+                            : kernel_for<kCan, false, 192, 2>(plan);
 }
 
 }  // namespace

@@ -9,8 +9,9 @@ namespace tissue_sim {
 namespace {
 
 const void* kernel(const CudaPlan& plan) {
-  return reinterpret_cast<const void*>(plan.faces ? kernel_with_faces(plan)
-                                                  : kernel_of<false>(plan));
+  return reinterpret_cast<const void*>(plan.faces   ? kernel_with_faces(plan)
+                                       : plan.plain ? plain_kernel(plan)
+                                                    : kernel_of<Can::kTools>(plan));
 }
 
 std::size_t shared_bytes(const CudaPlan& plan) {

@@ -16,12 +16,14 @@ struct CudaPlan {
   bool small = true;         ///< to be cached, if all blocks run at once
   bool cached = false;       ///< each thread block has one bundle only, whose tables it keeps
   bool eight_parts = false;  ///< of a node's force it keeps the places of eight, else of four
+  bool plain = false;        ///< no contact, all cells full, each bundle one block
   bool faces = false;        ///< with contact of tissue with tissue
   bool neo_hookean = false, fixed_corotated = false, viscous = false;  ///< what there is
 };
 
 using CudaKernel = void (*)(CudaTables, CudaFrame, int, bool);
 CudaKernel kernel_with_faces(const CudaPlan& plan);
+CudaKernel plain_kernel(const CudaPlan& plan);
 
 /// Thread blocks that run at once; 0 where the plan does not fit the GPU. Sets CudaPlan::cached and
 /// eight_parts.

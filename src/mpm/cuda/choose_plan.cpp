@@ -105,39 +105,41 @@ CudaShape choose_shape(const std::vector<LatticeBody>& bodies, const CudaLimits&
 std::vector<std::vector<int>> bundle_blocks(const std::vector<Block*>& blocks, std::size_t wanted,
                                             const BundleLimits& limits) {
   struct Filled {
-    int body, nz;
+    int body;
     BundleLimits has;
     std::vector<int> blocks;
   };
-  std::vector<Filled> bundles;
+  std::vector<Filled> single;
   for (std::size_t i = 0; i < blocks.size(); ++i) {
     const Block& b = *blocks[i];
-    bundles.push_back({b.body,
-                       b.nz,
-                       {columns_of(b), b.nx * b.ny, (b.nx + 2) * (b.ny + 2) * (b.nz + 2)},
-                       {static_cast<int>(i)}});
+    single.push_back({b.body,
+                      {columns_of(b), b.nx * b.ny, (b.nx + 2) * (b.ny + 2) * (b.nz + 2)},
+                      {static_cast<int>(i)}});
   }
   if (blocks.size() > wanted) {
-    std::stable_sort(bundles.begin(), bundles.end(), [](const Filled& a, const Filled& b) {
-      return a.nz != b.nz ? a.nz > b.nz : a.has.columns > b.has.columns;
+    std::stable_sort(single.begin(), single.end(), [](const Filled& a, const Filled& b) {
+      return a.has.columns > b.has.columns;
     });
-    std::vector<Filled> fewer;
-    for (Filled& one : bundles) {
-      const auto room = std::find_if(fewer.begin(), fewer.end(), [&](const Filled& f) {
-        return f.body == one.body && f.has.columns + one.has.columns <= limits.columns &&
-               f.has.places + one.has.places <= limits.places &&
-               f.has.slots + one.has.slots <= limits.slots;
-      });
-      if (room == fewer.end()) {
-        fewer.push_back(std::move(one));
-        continue;
+  }
+  std::vector<Filled> bundles;
+  for (Filled& one : single) {
+    Filled* room = nullptr;
+    if (bundles.size() >= wanted) {
+      for (Filled& f : bundles) {
+        const bool fits = f.body == one.body && f.has.columns + one.has.columns <= limits.columns &&
+                          f.has.places + one.has.places <= limits.places &&
+                          f.has.slots + one.has.slots <= limits.slots;
+        if (fits && (room == nullptr || f.has.columns < room->has.columns)) room = &f;
       }
-      room->has.columns += one.has.columns;
-      room->has.places += one.has.places;
-      room->has.slots += one.has.slots;
-      room->blocks.push_back(one.blocks.front());
     }
-    bundles = std::move(fewer);
+    if (room == nullptr) {
+      bundles.push_back(std::move(one));
+      continue;
+    }
+    room->has.columns += one.has.columns;
+    room->has.places += one.has.places;
+    room->has.slots += one.has.slots;
+    room->blocks.push_back(one.blocks.front());
   }
   std::vector<std::vector<int>> result;
   for (Filled& f : bundles) result.push_back(std::move(f.blocks));

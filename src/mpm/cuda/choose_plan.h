@@ -31,8 +31,9 @@ struct BundleLimits {
   int slots;
 };
 
-/// Each block alone, or, where those are more than `wanted`, small ones together: they are put to
-/// the first that has room, large ones first. Gives indices into `blocks`.
+/// Each block alone, or, where those are more than `wanted`, large ones first, each of the others
+/// with those that have the fewest columns. Gives indices into `blocks`; more than `wanted` bundles
+/// where they do not fit into fewer.
 std::vector<std::vector<int>> bundle_blocks(const std::vector<Block*>& blocks, std::size_t wanted,
                                             const BundleLimits& limits);
 

@@ -9,11 +9,14 @@
 namespace tissue_sim {
 namespace {
 
-std::size_t bytes_of(const HostTables& t, std::size_t nodes, std::size_t points) {
+/// What the tables and the state take on the GPU; clouds and contacts between tissue come on top.
+std::size_t bytes_of(const HostTables& t, std::size_t nodes, std::size_t points,
+                     std::size_t pushes) {
   return t.blocks.size() * (sizeof(CudaBlock) + sizeof(CudaMeasure) + 4) +
          t.bundles.size() * sizeof(CudaBundle) + t.columns.size() * sizeof(CudaColumn) +
          t.slot_node.size() * (8 + 2 * sizeof(float4)) + 4 * t.parts.size() + 8 * t.point.size() +
-         4 * t.partial.size() + 4 * sizeof(float4) * nodes + 19 * points;
+         4 * t.partial.size() + 4 * sizeof(float4) * nodes + 14 * points +
+         pushes * sizeof(HalfPush);
 }
 
 /// Says how much memory the tissue takes, where the GPU has less.
@@ -104,16 +107,17 @@ void CudaMpmTissue::push() {
   const HostTables t = plan_tables();
   const std::size_t n = state_->nodes.size();
   const auto points = static_cast<std::size_t>(state_->points.size());
-  check_memory(bytes_of(t, n, points), device_bytes());
+  const bool pushed = state_->scene.ground.enabled || !state_->scene.tools.empty();
+  const std::size_t pushes =
+      pushed ? static_cast<std::size_t>(t.max_halves) * std::max(d.resident, d.face_resident) : 0;
+  check_memory(bytes_of(t, n, points, pushes), device_bytes());
   check_cuda(cudaStreamSynchronize(d.stream), "finish a frame");
   d.blocks.upload(t.blocks, d.stream);
   d.of_host = t.of_host;
   d.bundles.upload(t.bundles, d.stream);
   d.columns.upload(t.columns, d.stream);
   d.push_stride = t.max_halves;
-  if (state_->scene.ground.enabled || !state_->scene.tools.empty()) {
-    d.pushes.resize(d.push_stride * std::max(d.resident, d.face_resident));
-  }
+  d.pushes.resize(pushes);
   d.bodies.upload(t.bodies, d.stream);
   d.slot_node.upload(t.slot_node, d.stream);
   d.slot_parts.upload(t.slot_parts, d.stream);

@@ -82,25 +82,25 @@ __device__ __forceinline__ void add_push(const HalfPush& push, float cell_size,
   }
 }
 
-/// Forces of half a cell: reads its nodes, gives its transposed half plane. `stiffness`, `bends`
-/// and contact are for kSpecial alone: where the cell is not full, kStabilisation mu V, else 0.
-template <class LawOf, bool kViscous, bool kSpecial>
-__device__ __forceinline__ void half_forces(const CudaTables& t, const CudaColumn& column,
-                                            const CudaBody& body, const BlockShared& s, int z,
-                                            int sz, const HalfWeights& weights, float stiffness,
-                                            HalfPlane (&out)[3], HalfBends (&bends)[3]) {
+/// Forces of half a cell: reads its nodes, gives its transposed half plane. `stiffness` and `bends`
+/// are for kPartial alone: where the cell is not full, kStabilisation mu V, else 0.
+template <class LawOf, bool kViscous, bool kPartial>
+__device__ __forceinline__ void half_forces(const CudaColumn& column, const CudaBody& body,
+                                            const BlockShared& s, int z, int sz,
+                                            const HalfWeights& weights, const float4& volume,
+                                            float stiffness, HalfPlane (&out)[3],
+                                            HalfBends (&bends)[3]) {
   const int first = column.slot + z * column.plane;
   HalfPlane h[3], rate[3];
   HalfBends bent[3];
-  read_half<kSpecial>(s.u + first, column.pitch, column.plane, weights, h, bent);
+  read_half<kPartial>(s.u + first, column.pitch, column.plane, weights, h, bent);
   if (kViscous) read_half(s.v + first, column.pitch, column.plane, weights, rate);
-  const float4 volume = half_volumes(t, column, body, z, sz);
   float damping[9];
   if (kViscous) viscous_stress(body, h, rate, volume, damping);
 #pragma unroll
   for (int c = 0; c < 3; ++c) {
     out[c] = {};
-    if (kSpecial && stiffness != 0) stabilise_half(stiffness, h[c], bent[c], out[c], bends[c]);
+    if (kPartial && stiffness != 0) stabilise_half(stiffness, h[c], bent[c], out[c], bends[c]);
   }
 #pragma unroll
   for (int ty = 0; ty < 2; ++ty) {
@@ -175,9 +175,9 @@ __device__ __forceinline__ int4 block_size(const CudaTables& t, int block) {
 
 /// Forces of a bundle. Two threads, neighbours in a warp, walk up each column of cells: one has the
 /// lower, the other the upper halves of the cells, with what these give to the next two node planes
-/// in registers. `block` is the bundle's first; contact, cells that are not full and bundles of
-/// several blocks need kSpecial.
-template <class LawOf, bool kViscous, bool kSpecial>
+/// in registers. `block` is the bundle's first; contact and bundles of several blocks need
+/// kSpecial, cells that are not full kPartial.
+template <class LawOf, bool kViscous, bool kSpecial, bool kPartial>
 __device__ __forceinline__ void block_forces(const CudaTables& t, const CudaBundle& w,
                                              const CudaBlock& block, const CudaBody& body,
                                              const BlockShared& s, const BlockStep& step) {
@@ -199,6 +199,12 @@ __device__ __forceinline__ void block_forces(const CudaTables& t, const CudaBund
     column = column_of(block, body.cell_size, index);
   }
   const int4 first{block.nx, block.ny, block.nz, block.first_slot};
+  float4 volume = {};
+  float partial = 0;
+  if (kSpecial && active) {
+    volume = half_volumes(t, column, body, 0, static_cast<int>(threadIdx.x) % 2);
+    if (kPartial) partial = __ldg(t.partial + column.cell);
+  }
   PlaneForce next[3] = {}, after[3] = {};
 #pragma unroll 1
   for (int z = 0; z < nz + 2; ++z) {
@@ -214,11 +220,14 @@ __device__ __forceinline__ void block_forces(const CudaTables& t, const CudaBund
       const HalfWeights k(sz == 0 ? -1.0f : 1.0f);
       HalfPlane out[3];
       HalfBends bends[3];
-      float stiffness = 0;
-      if (kSpecial && w.partial != 0) {
-        stiffness = kStabilisation * body.mu * __ldg(t.partial + column.cell + z * column.step);
+      if (!kSpecial) volume = half_volumes(t, column, body, z, sz);
+      const float stiffness = kStabilisation * body.mu * partial;
+      half_forces<LawOf, kViscous, kPartial>(column, body, s, z, sz, k, volume, stiffness, out,
+                                             bends);
+      if (kSpecial && z + 1 < column.nz) {  // on their way while others are waited for
+        volume = half_volumes(t, column, body, z + 1, sz);
+        if (kPartial) partial = __ldg(t.partial + column.cell + (z + 1) * column.step);
       }
-      half_forces<LawOf, kViscous, kSpecial>(t, column, body, s, z, sz, k, stiffness, out, bends);
       if (kSpecial && (step.touched >> z & 1u) != 0) {
         add_push(step.pushes[2 * (z * w.columns + index) + sz], body.cell_size, out);
       }
@@ -228,7 +237,7 @@ __device__ __forceinline__ void block_forces(const CudaTables& t, const CudaBund
         add_to_plane(out[c], kAverageCenter, k.slope_center, next[c]);
         add_to_plane(out[c], k.above, k.slope_above, after[c]);
       }
-      if (kSpecial && stiffness != 0) {
+      if (kPartial && stiffness != 0) {
 #pragma unroll
         for (int c = 0; c < 3; ++c) {
           add_to_plane(bends[c], k.below, k.slope_below, now[c]);
@@ -240,12 +249,12 @@ __device__ __forceinline__ void block_forces(const CudaTables& t, const CudaBund
 #pragma unroll
     for (int c = 0; c < 3; ++c) {
       add_neighbour(now[c]);
-      if (kSpecial) now[c].BB += __shfl_xor_sync(0xffffffffu, now[c].BB, 1);
+      if (kPartial) now[c].BB += __shfl_xor_sync(0xffffffffu, now[c].BB, 1);
     }
     if (active) {
       float f[3][3][3];
 #pragma unroll
-      for (int c = 0; c < 3; ++c) node_forces<kSpecial>(now[c], f[c]);
+      for (int c = 0; c < 3; ++c) node_forces<kPartial>(now[c], f[c]);
 #pragma unroll
       for (int k = 0; k < 9; ++k) {
         if ((k < 5) != (sz == 0)) continue;  // each of the two writes half of the sums

@@ -55,28 +55,28 @@ enum class Laws { kFixedCorotated, kNeoHookean, kAny };
 /// or all.
 enum class Can { kPlain, kTools, kFaces };
 
-template <Laws kLaws, bool kSpecial>
+template <Laws kLaws, bool kSpecial, bool kPartial>
 __device__ __forceinline__ void forces(const CudaTables& t, const CudaBundle& w, const CudaBlock& b,
                                        const CudaBody& body, const BlockShared& s,
                                        const BlockStep& step) {
   if constexpr (kLaws == Laws::kFixedCorotated) {
-    block_forces<FixedCorotated, false, kSpecial>(t, w, b, body, s, step);
+    block_forces<FixedCorotated, false, kSpecial, kPartial>(t, w, b, body, s, step);
   } else if constexpr (kLaws == Laws::kNeoHookean) {
-    block_forces<NeoHookean, false, kSpecial>(t, w, b, body, s, step);
+    block_forces<NeoHookean, false, kSpecial, kPartial>(t, w, b, body, s, step);
   } else if (body.neo_hookean != 0) {
-    block_forces<NeoHookean, true, kSpecial>(t, w, b, body, s, step);
+    block_forces<NeoHookean, true, kSpecial, kPartial>(t, w, b, body, s, step);
   } else {
-    block_forces<FixedCorotated, true, kSpecial>(t, w, b, body, s, step);
+    block_forces<FixedCorotated, true, kSpecial, kPartial>(t, w, b, body, s, step);
   }
 }
 
 /// Out of line and with copies of its arguments, for the ordinary blocks to keep theirs in
 /// registers.
-template <Laws kLaws>
+template <Laws kLaws, bool kPartial>
 __device__ __noinline__ void special_forces(const CudaTables t, const CudaBundle w,
                                             const CudaBlock block, const CudaBody body,
                                             int max_slots, const BlockStep step) {
-  forces<kLaws, true>(t, w, block, body, shared_of(max_slots), step);
+  forces<kLaws, true, kPartial>(t, w, block, body, shared_of(max_slots), step);
 }
 
 /// A bundle with what belongs to it. Copies: through a reference they would be read again after
@@ -127,7 +127,7 @@ __device__ __forceinline__ void all_forces(const CudaTables& t, const CudaFrame&
   const BlockShared s = shared_of(max_slots);
   if constexpr (kPlain) {
     __syncthreads();
-    forces<kLaws, false>(t, w.bundle, w.block, w.body, s, {nullptr, 0, force});
+    forces<kLaws, false, false>(t, w.bundle, w.block, w.body, s, {nullptr, 0, force});
     return;
   }
   const int load_count = 6 * f.collider_count;
@@ -143,10 +143,14 @@ __device__ __forceinline__ void all_forces(const CudaTables& t, const CudaFrame&
   }
   const BlockStep step{pushes, touched.halves, force};
   if (!touched.any && w.bundle.partial == 0 && w.bundle.blocks == 1) {
-    forces<kLaws, false>(t, w.bundle, w.block, w.body, s, step);
+    forces<kLaws, false, false>(t, w.bundle, w.block, w.body, s, step);
     return;
   }
-  special_forces<kLaws>(t, w.bundle, w.block, w.body, max_slots, step);
+  if (w.bundle.partial != 0) {
+    special_forces<kLaws, true>(t, w.bundle, w.block, w.body, max_slots, step);
+  } else {
+    special_forces<kLaws, false>(t, w.bundle, w.block, w.body, max_slots, step);
+  }
   if (!touched.any) return;
   auto* loads = reinterpret_cast<unsigned long long*>(f.loads) + substep * load_count;
   for (int i = threadIdx.x; i < load_count; i += blockDim.x) {

@@ -68,23 +68,21 @@ __device__ __forceinline__ void place_in_column(const CudaColumn& c, float cell_
   place[2] = c.middle[2] + cell_size * (z + ((s & 4) != 0 ? 0.25f : -0.25f));
 }
 
-/// Displacement [m] and velocity [m/s] of the point at sub-position s, from its 27 nodes, of which
-/// `first` is the lowest.
-__device__ __forceinline__ void point_motion(const float4* u, const float4* v, int first, int pitch,
-                                             int plane, int s, float cell_size, float (&du)[3],
-                                             float (&dv)[3]) {
-#pragma unroll
-  for (int c = 0; c < 3; ++c) du[c] = dv[c] = 0;
+/// Velocity [m/s] of the point at sub-position s, from its 27 nodes, of which `first` is the
+/// lowest.
+__device__ __forceinline__ void point_velocity(const float4* v, int first, int pitch, int plane,
+                                               int s, float cell_size, float (&velocity)[3]) {
+  velocity[0] = velocity[1] = velocity[2] = 0;
 #pragma unroll 1  // the code of all this does not stay in the instruction cache as it is
   for (int z = 0; z < 3; ++z) {
     const float along_z = cell_size * lattice_weight(s >> 2, z);
 #pragma unroll
     for (int k = 0; k < 9; ++k) {
-      const int i = first + z * plane + k / 3 * pitch + k % 3;
-      const float4 a = u[i], b = v[i];
+      const float4 at = v[first + z * plane + k / 3 * pitch + k % 3];
       const float w = along_z * lattice_weight(s & 1, k % 3) * lattice_weight(s >> 1 & 1, k / 3);
-      du[0] += w * a.x, du[1] += w * a.y, du[2] += w * a.z;
-      dv[0] += w * b.x, dv[1] += w * b.y, dv[2] += w * b.z;
+      velocity[0] += w * at.x;
+      velocity[1] += w * at.y;
+      velocity[2] += w * at.z;
     }
   }
 }
@@ -106,12 +104,14 @@ struct PushLists {
   }
 };
 
-/// Lists the half cells near `colliders` of which a point lies in one; the other points of these
-/// cells forget where they were held.
+/// Lists the half cells near `colliders` of which a point lies in one, and puts the places of such
+/// points to `places`, where their pushes will be; the other points of these cells forget where
+/// they were held.
 __device__ __forceinline__ void list_touched(const CudaTables& t, const CudaBundle& w,
                                              const CudaBlock& block, const CudaBody& body,
                                              const float4* u, const Collider* colliders,
-                                             std::uint32_t near, const PushLists& lists) {
+                                             std::uint32_t near, const PushLists& lists,
+                                             HalfPush* places) {
   const int thread = static_cast<int>(threadIdx.x), threads = static_cast<int>(blockDim.x);
   lists.touched[thread] = 0;
   if (thread == 0) *lists.cell_count = *lists.half_count = 0;
@@ -158,6 +158,9 @@ __device__ __forceinline__ void list_touched(const CudaTables& t, const CudaBund
       by |= touched;
       if (touched != 0) {
         pushed |= 1u << q;
+        HalfPush& place = places[(z * w.columns + (cell & 255)) * 2 + sz];
+#pragma unroll
+        for (int a = 0; a < 3; ++a) place.of[a][q] = x[a];
       } else if (with[q] != 0) {
         t.with[point[q]] = 0;
       }
@@ -231,12 +234,13 @@ inline __device__ __noinline__ Touched find_pushes(const CudaTables t, const Cud
                                                    const Collider* colliders, std::uint32_t near,
                                                    unsigned long long* loads, HalfPush* pushes) {
   const PushLists lists(shared, w);
-  list_touched(t, w, block, body, u, colliders, near, lists);
+  list_touched(t, w, block, body, u, colliders, near, lists, pushes);
   const int thread = static_cast<int>(threadIdx.x), points = 4 * *lists.half_count;
   for (int i = thread; i / 32 * 32 < points; i += static_cast<int>(blockDim.x)) {
     const std::uint32_t half = i < points ? lists.halves[i / 4] : 0;
     const int z = static_cast<int>(half >> 8 & 15u), sz = static_cast<int>(half >> 12 & 1u);
     const bool touches = (half >> (13 + i % 4) & 1u) != 0;
+    HalfPush& of_half = pushes[(z * w.columns + static_cast<int>(half & 255u)) * 2 + sz];
     float push[3] = {0, 0, 0}, x[3] = {0, 0, 0}, velocity[3] = {0, 0, 0}, volume = 0;
     int p = 0;
     Held held = {0, {0, 0, 0}};
@@ -244,16 +248,14 @@ inline __device__ __noinline__ Touched find_pushes(const CudaTables t, const Cud
       const int index = static_cast<int>(half & 255u), s = 4 * sz + i % 4;
       const CudaColumn c = column_of(t, w, block, body.cell_size, index);
       const int lane = c.lane + (z * 8 + s) * c.step;
+#pragma unroll
+      for (int a = 0; a < 3; ++a) x[a] = of_half.of[a][i % 4];
       p = t.point[lane];
       volume = c.whole != 0 ? body.point_volume : t.volume[lane];
       held.with = t.with[p];
 #pragma unroll
       for (int a = 0; a < 3; ++a) held.place[a] = t.hold[3 * static_cast<std::size_t>(p) + a];
-      float du[3];
-      point_motion(u, v, c.slot + z * c.plane, c.pitch, c.plane, s, body.cell_size, du, velocity);
-      place_in_column(c, body.cell_size, z, s, x);
-#pragma unroll
-      for (int a = 0; a < 3; ++a) x[a] += du[a];
+      point_velocity(v, c.slot + z * c.plane, c.pitch, c.plane, s, body.cell_size, velocity);
     }
     push_point(t, colliders, near, touches ? half >> 17 : 0, p, held,
                {body.spring.stiffness * volume, body.spring.damping * volume}, x, velocity, loads,
@@ -264,9 +266,8 @@ inline __device__ __noinline__ Touched find_pushes(const CudaTables t, const Cud
 #pragma unroll
       for (int a = 0; a < 3; ++a) t.hold[3 * static_cast<std::size_t>(p) + a] = held.place[a];
     }
-    HalfPush& to = pushes[(z * w.columns + static_cast<int>(half & 255u)) * 2 + sz];
 #pragma unroll
-    for (int a = 0; a < 3; ++a) to.of[a][i % 4] = push[a];
+    for (int a = 0; a < 3; ++a) of_half.of[a][i % 4] = push[a];
   }
   __syncthreads();
   const Touched touched{lists.touched[thread], points > 0};

@@ -110,7 +110,9 @@ INSTANTIATE_TEST_SUITE_P(
                     Case{"cut crosswise, viscous", Law::kNeoHookean, 2, 2, nullptr},
                     Case{"a wave after the other", Law::kFixedCorotated, 0, 0, "4 4 4 32 0"},
                     Case{"the same, cut", Law::kFixedCorotated, 0, 2, "3 5 2 32 0"},
-                    Case{"flat blocks", Law::kNeoHookean, 0, 1, "16 4 1 128 1"}));
+                    Case{"flat blocks", Law::kNeoHookean, 0, 1, "16 4 1 128 1"},
+                    Case{"several to a thread block", Law::kFixedCorotated, 0, 0, "8 2 1 256 1"},
+                    Case{"the same, cut", Law::kNeoHookean, 0, 2, "8 2 1 256 1"}));
 
 /// A block on the ground, cut by a scalpel and pushed by a probe for a second.
 struct Operation {

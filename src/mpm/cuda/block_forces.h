@@ -85,16 +85,16 @@ __device__ __forceinline__ void add_push(const HalfPush& push, float cell_size,
 /// Forces of half a cell: reads its nodes, gives its transposed half plane. `stiffness` and `bends`
 /// are for kPartial alone: where the cell is not full, kStabilisation mu V, else 0.
 template <class LawOf, bool kViscous, bool kPartial>
-__device__ __forceinline__ void half_forces(const CudaColumn& column, const CudaBody& body,
-                                            const BlockShared& s, int z, int sz,
-                                            const HalfWeights& weights, const float4& volume,
-                                            float stiffness, HalfPlane (&out)[3],
-                                            HalfBends (&bends)[3]) {
+__device__ __forceinline__ void half_forces(const CudaTables& t, const CudaColumn& column,
+                                            const CudaBody& body, const BlockShared& s, int z,
+                                            int sz, const HalfWeights& weights, float stiffness,
+                                            HalfPlane (&out)[3], HalfBends (&bends)[3]) {
   const int first = column.slot + z * column.plane;
   HalfPlane h[3], rate[3];
   HalfBends bent[3];
   read_half<kPartial>(s.u + first, column.pitch, column.plane, weights, h, bent);
   if (kViscous) read_half(s.v + first, column.pitch, column.plane, weights, rate);
+  const float4 volume = half_volumes(t, column, body, z, sz);
   float damping[9];
   if (kViscous) viscous_stress(body, h, rate, volume, damping);
 #pragma unroll
@@ -199,12 +199,6 @@ __device__ __forceinline__ void block_forces(const CudaTables& t, const CudaBund
     column = column_of(block, body.cell_size, index);
   }
   const int4 first{block.nx, block.ny, block.nz, block.first_slot};
-  float4 volume = {};
-  float partial = 0;
-  if (kSpecial && active) {
-    volume = half_volumes(t, column, body, 0, static_cast<int>(threadIdx.x) % 2);
-    if (kPartial) partial = __ldg(t.partial + column.cell);
-  }
   PlaneForce next[3] = {}, after[3] = {};
 #pragma unroll 1
   for (int z = 0; z < nz + 2; ++z) {
@@ -220,14 +214,11 @@ __device__ __forceinline__ void block_forces(const CudaTables& t, const CudaBund
       const HalfWeights k(sz == 0 ? -1.0f : 1.0f);
       HalfPlane out[3];
       HalfBends bends[3];
-      if (!kSpecial) volume = half_volumes(t, column, body, z, sz);
-      const float stiffness = kStabilisation * body.mu * partial;
-      half_forces<LawOf, kViscous, kPartial>(column, body, s, z, sz, k, volume, stiffness, out,
-                                             bends);
-      if (kSpecial && z + 1 < column.nz) {  // on their way while others are waited for
-        volume = half_volumes(t, column, body, z + 1, sz);
-        if (kPartial) partial = __ldg(t.partial + column.cell + (z + 1) * column.step);
+      float stiffness = 0;
+      if (kPartial) {
+        stiffness = kStabilisation * body.mu * __ldg(t.partial + column.cell + z * column.step);
       }
+      half_forces<LawOf, kViscous, kPartial>(t, column, body, s, z, sz, k, stiffness, out, bends);
       if (kSpecial && (step.touched >> z & 1u) != 0) {
         add_push(step.pushes[2 * (z * w.columns + index) + sz], body.cell_size, out);
       }

@@ -163,9 +163,8 @@ __global__ void __launch_bounds__(kThreads)
     if (volume == 0) continue;
     const int x = i % b.nx, y = i / b.nx % b.ny, z = i / b.nx / b.ny;
     for (int c = 0; c < 3; ++c) {
-      m.elastic_energy += 0.5 * stabilising_force(u + z * plane + y * pitch + x, pitch, plane, c,
-                                                  kStabilisation * body.mu * volume)
-                                    .energy2;
+      m.elastic_energy += 0.5 * stabilising_energy2(u + z * plane + y * pitch + x, pitch, plane, c,
+                                                    kStabilisation * body.mu * volume);
     }
   }
   reduce(m);

@@ -153,7 +153,6 @@ void add_block(const MpmState& state, int index, HostTables& t) {
 
 void add_bundle(const MpmState& state, const std::vector<int>& blocks, HostTables& t) {
   CudaBundle bundle = {};
-  bundle.body = state.blocks.all[blocks.front()]->body;
   bundle.first_block = static_cast<int>(t.blocks.size());
   bundle.blocks = static_cast<int>(blocks.size());
   bundle.first_slot = static_cast<int>(t.slot_node.size());
@@ -166,6 +165,7 @@ void add_bundle(const MpmState& state, const std::vector<int>& blocks, HostTable
     bundle.nz = std::max(bundle.nz, b.nz);
     bundle.partial = bundle.partial | b.partial;
   }
+  bundle.body = t.blocks[bundle.first_block].body;
   bundle.slots = static_cast<int>(t.slot_node.size()) - bundle.first_slot;
   bundle.columns = static_cast<int>(t.columns.size()) - bundle.first_column;
   t.max_slots = std::max(t.max_slots, bundle.slots);

@@ -51,6 +51,21 @@ TISSUE_SIM_INLINE Vec<W> keep(Mask<W> mask, Vec<W> v) {
   return reinterpret_cast<Vec<W>>(reinterpret_cast<Mask<W>>(v) & mask);
 }
 
+/// The bits of W floats: the highest of each is its sign.
+template <int W>
+TISSUE_SIM_INLINE Mask<W> bits(Vec<W> v) {
+  return reinterpret_cast<Mask<W>>(v);
+}
+/// Whether the highest bit of any lane is set. With it instead of comparisons, which GCC 12 takes
+/// apart lane by lane where vectors have 64 bytes.
+template <int W>
+TISSUE_SIM_INLINE bool any_negative(Mask<W> m) {
+  std::uint64_t words[W / 2], all = 0;
+  std::memcpy(words, &m, sizeof(words));
+  for (const std::uint64_t w : words) all |= w;
+  return (all & 0x8000000080000000) != 0;
+}
+
 /// W floats from any address.
 template <int W>
 TISSUE_SIM_INLINE Vec<W> load(const float* p) {

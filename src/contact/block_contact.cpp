@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "contact/facet_motion.h"
 #include "cutting/bonds.h"
-#include "math/bspline.h"
 
 namespace tissue_sim {
 namespace {
@@ -21,39 +21,20 @@ bool overlap(const Box& a, const Box& b) {
   return (a.min.array() <= b.max.array()).all() && (b.min.array() <= a.max.array()).all();
 }
 
-/// Weights of the 27 nodes for each of the eight sub-positions, padded to whole SIMD registers.
-struct Weights {
-  alignas(64) float of[8][32] = {};
-  Weights() {
+/// Weights at each of a cell's eight sub-positions.
+struct SubWeights {
+  AxisWeights of[8];
+  SubWeights() {
     for (int s = 0; s < 8; ++s) {
-      for (int k = 0; k < 27; ++k) {
-        of[s][k] = lattice_weight(s & 1, k % 3) * lattice_weight(s >> 1 & 1, k / 3 % 3) *
-                   lattice_weight(s >> 2, k / 9);
-      }
+      const float place[3] = {s & 1 ? 0.25f : -0.25f, s & 2 ? 0.25f : -0.25f,
+                              s & 4 ? 0.25f : -0.25f};
+      of[s] = AxisWeights(place);
     }
   }
 };
-const Weights kWeights;
+const SubWeights kSubWeights;
 
-/// The nodes of a point's stencil, in its block's numbers, and their weights.
-struct Stencil {
-  int local[27];
-  const float* weight;
-};
-
-Stencil stencil_of(const Block& b, int lane) {
-  const int j = lane % b.stride, sub = lane / b.stride % 8, z = lane / b.stride / 8;
-  Stencil s;
-  s.weight = kWeights.of[sub];
-  int k = 0;
-  for (int dz = 0; dz < 3; ++dz) {
-    for (int dy = 0; dy < 3; ++dy) {
-      const int row = (z + dz) * b.plane + b.cell[j] + dy * b.pitch;
-      for (int dx = 0; dx < 3; ++dx) s.local[k++] = row + dx;
-    }
-  }
-  return s;
-}
+constexpr std::uint8_t kStillTouches = 0x80;  // in Contacts::with, while a block is worked on
 
 }  // namespace
 
@@ -127,7 +108,6 @@ void add_contact(MpmState& state, int index, float* force, std::vector<ColliderL
   if (scratch.lanes.size() < lanes) scratch.lanes.resize(lanes);
   float* x = scratch.values.data();
   state.kernels->positions(block, block_field(state, block), state.nodes.u, scratch, x);
-  const int component = block.node_count();
   std::vector<std::int32_t> touching;
   for (const std::uint8_t c : near) {
     const Collider& collider = state.colliders[c];
@@ -143,27 +123,19 @@ void add_contact(MpmState& state, int index, float* force, std::vector<ColliderL
       const float at[3] = {x[lane], x[lanes + lane], x[2 * lanes + lane]};
       const Gap g = gap(collider, at);
       if (g.distance >= 0) continue;
-      const Stencil stencil = stencil_of(block, lane);
-      float v[3] = {}, push[3];
-      for (int k = 0; k < 27; ++k) {
-        const int node = block.node[stencil.local[k]];
-        const float w = stencil.weight[k];
-        for (int a = 0; a < 3; ++a) v[a] += w * state.nodes.v[a][node];
-      }
+      const int sub = lane / block.stride % 8,
+                cell = lane / block.stride / 8 * block.plane + block.cell[lane % block.stride];
+      const AxisWeights& weights = kSubWeights.of[sub];
+      float v[3], push[3];
+      value_at(state.nodes.v, CellNodes(block, cell), weights, v);
       float* hold = &contacts.hold[3 * static_cast<std::size_t>(p)];
-      if (contacts.with[p] != c + 1) {
-        contacts.with[p] = static_cast<std::uint8_t>(c + 1);
-        to_local(collider, at, hold);
-      }
+      if ((contacts.with[p] & ~kStillTouches) != c + 1) to_local(collider, at, hold);
+      contacts.with[p] = static_cast<std::uint8_t>((c + 1) | kStillTouches);
       touching.push_back(p);
       const float volume = block.volume[lane];
       contact_force(collider, g, {unit.stiffness * volume, unit.damping * volume}, at, v, hold,
                     push);
-      for (int k = 0; k < 27; ++k) {
-        float* node_force = force + stencil.local[k];
-        const float w = stencil.weight[k];
-        for (int a = 0; a < 3; ++a) node_force[a * component] += w * push[a];
-      }
+      spread(block, cell, weights, push, force);
       ColliderLoad& load = loads[c];
       double arm[3];
       for (int a = 0; a < 3; ++a) {
@@ -177,10 +149,10 @@ void add_contact(MpmState& state, int index, float* force, std::vector<ColliderL
     }
   }
   // A point that no longer touches anything forgets where it was held.
-  std::sort(touching.begin(), touching.end());
   for (const std::int32_t p : contacts.touching[index]) {
-    if (!std::binary_search(touching.begin(), touching.end(), p)) contacts.with[p] = 0;
+    if ((contacts.with[p] & kStillTouches) == 0) contacts.with[p] = 0;
   }
+  for (const std::int32_t p : touching) contacts.with[p] &= ~kStillTouches & 0xff;
   contacts.touching[index] = std::move(touching);
 }
 

@@ -50,6 +50,23 @@ inline void value_at(const Array<float>* field, const CellNodes& nodes, const Ax
   for (int c = 0; c < 3; ++c) value[c] = sum[c];
 }
 
+/// Adds a force at a place in a cell to the force on the block's nodes, [3][nz + 2][plane].
+inline void spread(const Block& block, int cell, const AxisWeights& weights, const float (&push)[3],
+                   float* force) {
+  const float *wx = weights.of, *wy = wx + 3, *wz = wx + 6;
+  const int component = block.node_count();
+  for (int z = 0; z < 3; ++z) {
+    for (int y = 0; y < 3; ++y) {
+      float* to = force + cell + z * block.plane + y * block.pitch;
+      const float w = wz[z] * wy[y];
+      for (int c = 0; c < 3; ++c) {
+        const float p = w * push[c];
+        for (int x = 0; x < 3; ++x) to[c * component + x] += p * wx[x];
+      }
+    }
+  }
+}
+
 /// Deformation gradient at a place given in cells from the middle of the cell, row-major.
 void deformation_gradient_at(const Array<float>* u, const CellNodes& nodes, double cell_size,
                              const float (&place)[3], float (&F)[9]);

@@ -68,13 +68,14 @@ TISSUE_SIM_INLINE void widen(Mask<W> inside, Vec<W> v, Vec<W>& min, Vec<W>& max)
   max = (inside & (v > max)) ? v : max;
 }
 
-template <int W>
+template <int kWidth>
 TISSUE_SIM_INLINE PointBounds bounds(const Block& b, const BlockField& f, BlockScratch& scratch) {
+  constexpr int W = kWidth < 8 ? kWidth : 8;  // GCC 12 compares wider vectors lane by lane
   const std::size_t lanes = b.lane_count();
   reserve(scratch.values, 3 * lanes);
   const float *x = scratch.values.data(), *volume = b.volume.data();
   PointBounds result;
-  positions<W>(b, f, f.nodes->u, scratch, scratch.values.data());
+  positions<kWidth>(b, f, f.nodes->u, scratch, scratch.values.data());
   for (int a = 0; a < 3; ++a) {
     Vec<W> min = Vec<W>{} + result.min[a], max = Vec<W>{} + result.max[a];
     for (std::size_t j = 0; j < lanes; j += W) {
@@ -85,7 +86,7 @@ TISSUE_SIM_INLINE PointBounds bounds(const Block& b, const BlockField& f, BlockS
       result.max[a] = std::max(result.max[a], max[i]);
     }
   }
-  positions<W>(b, at_rest(f), f.nodes->v, scratch, scratch.values.data());
+  positions<kWidth>(b, at_rest(f), f.nodes->v, scratch, scratch.values.data());
   Vec<W> speed2 = {};
   for (std::size_t j = 0; j < lanes; j += W) {
     const Vec<W> vx = load<W>(x + j), vy = load<W>(x + lanes + j), vz = load<W>(x + 2 * lanes + j);
@@ -178,14 +179,12 @@ TISSUE_SIM_INLINE void stretched(const Block& b, const BlockField& f, float stre
         const Vec<W> minor = x * y - C[3] * C[3];
         const Vec<W> det =
             w * minor - x * C[5] * C[5] - y * C[4] * C[4] - 2.0f * C[3] * C[4] * C[5];
-        const auto below = (x > 0.0f) & (minor > 0.0f) & (det > 0.0f);
-        bool all = true;
-        for (int i = 0; i < W; ++i) all &= below[i] != 0;
-        if (all) continue;
+        const Mask<W> beyond = bits<W>(x) | bits<W>(minor) | bits<W>(det);
+        if (!any_negative<W>(beyond)) continue;
         const std::int32_t* point =
             b.point.data() + (static_cast<std::size_t>(z) * 8 + s) * l.stride + j;
         for (int i = 0; i < W; ++i) {
-          if (below[i] != 0 || point[i] < 0) continue;
+          if (beyond[i] >= 0 || point[i] < 0) continue;
           found.push_back({point[i], {C[0][i], C[1][i], C[2][i], C[3][i], C[4][i], C[5][i]}});
         }
       }
@@ -198,15 +197,14 @@ TISSUE_SIM_INLINE int lanes_in_box(const float* x, std::size_t count, const floa
                                    const float* max, std::int32_t* lanes) {
   int found = 0;
   for (std::size_t j = 0; j < count; j += W) {
-    const auto inside = (load<W>(x + j) > min[0]) & (load<W>(x + j) < max[0]) &
-                        (load<W>(x + count + j) > min[1]) & (load<W>(x + count + j) < max[1]) &
-                        (load<W>(x + 2 * count + j) > min[2]) &
-                        (load<W>(x + 2 * count + j) < max[2]);
-    bool any = false;
-    for (int i = 0; i < W; ++i) any |= inside[i] != 0;
-    if (!any) continue;
+    Mask<W> outside = {};
+    for (int a = 0; a < 3; ++a) {
+      const Vec<W> v = load<W>(x + a * count + j);
+      outside |= bits<W>(v - min[a]) | bits<W>(max[a] - v);
+    }
+    if (!any_negative<W>(~outside)) continue;
     for (int i = 0; i < W; ++i) {
-      if (inside[i] != 0) lanes[found++] = static_cast<std::int32_t>(j) + i;
+      if (outside[i] >= 0) lanes[found++] = static_cast<std::int32_t>(j) + i;
     }
   }
   return found;

@@ -10,8 +10,8 @@ namespace tissue_sim {
 namespace {
 
 /// Spring of a point of unit volume; stiffness and damping both grow with the volume.
-ContactSpring unit_spring(const LatticeBody& body) {
-  const Material& m = body.material;
+ContactSpring unit_spring(const LatticeBody& body, int material) {
+  const Material& m = body.materials[material];
   const auto modulus = static_cast<float>(lame_lambda(m) + 2 * lame_mu(m));
   const float edge = 0.5f * static_cast<float>(body.cell_size);
   return contact_spring(modulus, static_cast<float>(m.density), edge, 1.0f);
@@ -120,7 +120,8 @@ void add_contact(MpmState& state, int index, float* force, std::vector<ColliderL
   const std::vector<std::uint8_t>& near = contacts.near[index];
   if (near.empty()) return;
   const Block& block = *state.blocks.all[index];
-  const ContactSpring unit = unit_spring(state.bodies[block.body]);
+  int material = std::max(0, block.material);
+  ContactSpring unit = unit_spring(state.bodies[block.body], material);
   BlockScratch& scratch = state.scratch.local();
   const std::size_t lanes = block.lane_count();
   if (scratch.values.size() < 3 * lanes) scratch.values.resize(3 * lanes);
@@ -156,6 +157,10 @@ void add_contact(MpmState& state, int index, float* force, std::vector<ColliderL
         to_local(collider, at, hold);
       }
       touching.push_back(p);
+      if (state.points.material_of(p) != material) {
+        material = state.points.material_of(p);
+        unit = unit_spring(state.bodies[block.body], material);
+      }
       const float volume = block.volume[lane];
       contact_force(collider, g, {unit.stiffness * volume, unit.damping * volume}, at, v, hold,
                     push);

@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "contact/known_facets.h"
+#include "mpm/block_materials.h"
 #include "mpm/block_sheets.h"
 
 namespace tissue_sim {
@@ -10,18 +11,20 @@ namespace {
 
 constexpr int kGap = 2;  ///< cells: a new run costs about as much as so many
 
-void find_partial_cells(Block& block) {
+void find_partial_cells(Block& block, const LatticeBody& b, const Points& points) {
   for (int i = 0; i < block.nz * block.stride; ++i) {
     const int z = i / block.stride, column = i % block.stride;
     int count = 0;
-    float volume = 0;
+    double mu = 0;
     for (int s = 0; s < 8; ++s) {
       const std::size_t lane = (static_cast<std::size_t>(z) * 8 + s) * block.stride + column;
-      count += block.point[lane] >= 0;
-      volume += block.volume[lane];
+      const std::int32_t p = block.point[lane];
+      if (p < 0) continue;
+      ++count;
+      mu += lame_mu(b.material_of(points, p)) * block.volume[lane];
     }
     if (count == 0 || count == 8) continue;
-    block.partial.push_back({i, z * block.plane + block.cell[column], volume});
+    block.partial.push_back({i, z * block.plane + block.cell[column], static_cast<float>(mu)});
   }
 }
 
@@ -82,7 +85,8 @@ Block make_block(const BlockRegion& r, const LatticeBody& b, const Points& point
       block.point[lane] = c.point[s];
     }
   }
-  find_partial_cells(block);
+  find_partial_cells(block, b, points);
+  find_materials(block, b, points);
   block.node.assign(block.node_count(), b.node(block.x - 1, block.y - 1, block.z - 1));
   for (int z = 0; z < block.nz + 2; ++z) {
     for (int y = 0; y < block.ny + 2; ++y) {

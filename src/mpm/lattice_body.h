@@ -21,13 +21,16 @@ struct Points {
   Array<float> volume;        ///< [m^3]
   Array<std::uint8_t> bonds;  ///< bit k: still bound to the neighbour of bond k (cutting/bonds.h)
   Array<std::uint8_t> anchored;  ///< lies in an anchored region
+  Array<std::uint8_t> material;  ///< in LatticeBody::materials; empty where no body has inclusions
   int size() const { return static_cast<int>(site.size()); }
+  /// Number of a point's material among those of its body.
+  int material_of(std::int32_t point) const { return material.empty() ? 0 : material[point]; }
 };
 
 struct LatticeBody {
   Body body;
-  Material material;
-  Vec3 origin = Vec3::Zero();  ///< lowest corner of cell (0, 0, 0) [m]
+  std::vector<Material> materials;  ///< its own, then those of its inclusions, each once
+  Vec3 origin = Vec3::Zero();       ///< lowest corner of cell (0, 0, 0) [m]
   double cell_size = 0;
   int nx = 0, ny = 0, nz = 0;  ///< cells
   int first_node = 0;          ///< of its lattice nodes in Nodes; cell (0,0,0) has node (1,1,1)
@@ -35,6 +38,9 @@ struct LatticeBody {
   int first_point = 0, point_count = 0;
   std::vector<std::int32_t> point_at;  ///< [2 nz][2 ny][2 nx], point number or -1
 
+  const Material& material_of(const Points& points, std::int32_t point) const {
+    return materials[points.material_of(point)];
+  }
   int node_count() const { return pitch_z * (nz + 2); }
   /// Point at a site, -1 where there is none or outside.
   int point(int x, int y, int z) const {

@@ -223,14 +223,14 @@ __device__ __forceinline__ void block_forces(const CudaTables& t, const CudaBloc
         add_to_plane(out[c], kAverageCenter, k.slope_center, next[c]);
         add_to_plane(out[c], k.above, k.slope_above, after[c]);
       }
-      const float volume =
+      const float mu =
           partial && sz == 0 ? t.partial[b.first_lane / 8 + (z * b.ny + y) * b.nx + x] : 0.0f;
-      if (kSpecial && volume != 0) {
+      if (kSpecial && mu != 0) {
         const float4* node = s.u + z * plane + y * (b.nx + 2) + x;
 #pragma unroll
         for (int c = 0; c < 3; ++c) {
           const StabilisingForce f =
-              stabilising_force(node, b.nx + 2, plane, c, kStabilisation * body.mu * volume);
+              stabilising_force(node, b.nx + 2, plane, c, kStabilisation * mu);
           add(f.plane[0], now[c]);
           add(f.plane[1], next[c]);
           add(f.plane[2], after[c]);

@@ -49,6 +49,12 @@ CudaMpmTissue::CudaMpmTissue(const Scene& scene) : device_(std::make_unique<OnDe
                              " tools: on the GPU at most " + std::to_string(kMaxColliders - 1) +
                              "; set device to cpu");
   }
+  for (const Body& body : scene.bodies) {
+    if (body.inclusions.empty()) continue;
+    throw std::runtime_error("body '" + body.name +
+                             "' has inclusions, and on the GPU a body is of one material; set "
+                             "device to cpu");
+  }
   OnDevice& d = *device_;
   check_cuda(cudaSetDevice(0), "be chosen");
   cudaDeviceProp properties;
@@ -73,7 +79,7 @@ CudaMpmTissue::~CudaMpmTissue() {
 }
 
 float CudaMpmTissue::stable_substep() const {
-  return tissue_sim::stable_substep(*state_, stiffening_);
+  return tissue_sim::stable_substep(*state_, even_stiffening(*state_, stiffening_));
 }
 
 void CudaMpmTissue::upload_colliders(int substeps, double duration, const FrameInput& input) {

@@ -9,14 +9,14 @@ namespace tissue_sim {
 namespace {
 
 CudaBody body_of(const LatticeBody& b) {
-  const Material& m = b.material;
+  const Material& m = b.materials[0];
   CudaBody body;
   body.cell_size = static_cast<float>(b.cell_size);
   body.inv_cell_size = 1.0f / body.cell_size;
   body.mu = static_cast<float>(lame_mu(m));
   body.lambda = static_cast<float>(lame_lambda(m));
   body.viscosity = static_cast<float>(m.viscosity);
-  body.tear_stretch = b.material.tear_stretch > 0 ? least_tear_limit(b.material) : 0.0f;
+  body.tear_stretch = least_tear_limit(b);
   body.point_volume = static_cast<float>(b.cell_size * b.cell_size * b.cell_size / 8);
   // Contact is in proportion to the volume, but a cubic millimetre is a better measure than a
   // metre.
@@ -61,7 +61,7 @@ void add_points(const Block& from, float whole_volume, CudaBlock& block, HostTab
   block.partial = from.partial.empty() ? 0 : 1;
   for (const Block::PartialCell& cell : from.partial) {
     t.partial[block.first_lane / 8 + cell_of(cell.lane / from.stride, cell.lane % from.stride)] =
-        cell.volume;
+        cell.mu;
   }
 }
 

@@ -66,8 +66,8 @@ struct CudaTables {
   const std::uint32_t* parts;
   const float* volume;        ///< per lane, 0 where there is no point [m^3]
   const std::int32_t* point;  ///< per lane, -1 where there is none
-  const float* partial;       ///< per cell (lane / 8): volume of its points where they are fewer
-                              ///< than eight, else 0; see mpm/stabilisation.h [m^3]
+  const float* partial;       ///< per cell (lane / 8): mu times volume of its points where they are
+                              ///< fewer than eight, else 0; see mpm/stabilisation.h [J]
   const std::uint8_t* bonds;  ///< per point
   std::uint32_t* near;        ///< per block: bit c for a collider that it may meet this frame
   std::uint8_t* with;         ///< per point: 0, or 1 + index of the collider it touches

@@ -62,6 +62,10 @@ void assign_materials(const Scene& scene, LatticeBody& b, Points& points) {
     if (held[i] > 0) continue;
     refuse_region("inclusions", i, scene, b.body.name, " that no later one holds");
   }
+  const auto first = points.material.begin() + b.first_point;
+  if (std::find(first, points.material.end(), 0) != points.material.end()) return;
+  b.materials.erase(b.materials.begin());  // inclusions fill the body
+  for (auto m = first; m != points.material.end(); ++m) --*m;
 }
 
 }  // namespace

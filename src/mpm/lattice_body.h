@@ -29,7 +29,7 @@ struct Points {
 
 struct LatticeBody {
   Body body;
-  std::vector<Material> materials;  ///< its own, then those of its inclusions, each once
+  std::vector<Material> materials;  ///< that its points are of: its own and its inclusions'
   Vec3 origin = Vec3::Zero();       ///< lowest corner of cell (0, 0, 0) [m]
   double cell_size = 0;
   int nx = 0, ny = 0, nz = 0;  ///< cells

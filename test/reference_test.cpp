@@ -16,6 +16,7 @@ struct Case {
   int cuts;
   const char* instruction_set;
   enum { kOne, kOneLaw, kBothLaws } materials = kOne;
+  bool by_material = false;  // in blocks of one material, as the GPU has them
 };
 
 std::ostream& operator<<(std::ostream& out, const Case& c) {
@@ -27,32 +28,6 @@ class Substep : public testing::TestWithParam<Case> {
   void SetUp() override { setenv("TISSUE_SIM_INSTRUCTION_SET", GetParam().instruction_set, 1); }
   void TearDown() override { unsetenv("TISSUE_SIM_INSTRUCTION_SET"); }
 };
-
-/// Four further materials: two balls, one of them within the other, a box and a layer.
-void add_inclusions(const Case& c, Scene& scene) {
-  const double stiffer[] = {3, 0.4, 1.7, 6}, denser[] = {1.2, 0.7, 1.5, 0.9};
-  Body& body = scene.bodies[0];
-  for (int i = 0; i < 4; ++i) {
-    Material m = scene.materials[0];
-    m.name += std::to_string(i);
-    m.young_modulus *= stiffer[i];
-    m.poisson_ratio = 0.1 + 0.1 * i;
-    m.density *= denser[i];
-    m.viscosity *= i;
-    if (c.materials == Case::kBothLaws && i % 2 == 0) {
-      m.law = c.law == Law::kNeoHookean ? Law::kFixedCorotated : Law::kNeoHookean;
-    }
-    scene.materials.push_back(m);
-    Inclusion inclusion;
-    inclusion.material = m.name;
-    inclusion.region.kind = i < 2 ? Region::Kind::kBall : Region::Kind::kBox;
-    inclusion.region.center = Vec3(0.017 + 0.001 * i, 0.015, 0.009);
-    inclusion.region.radius = i == 0 ? 0.009 : 0.004;
-    inclusion.region.min = i == 2 ? Vec3(0.02, 0.002, 0.001) : Vec3(-1, 0.0221, -1);
-    inclusion.region.max = i == 2 ? Vec3(0.026, 0.012, 0.011) : Vec3::Ones();
-    body.inclusions.push_back(inclusion);
-  }
-}
 
 Scene scene_of(const Case& c, Shape shape) {
   Scene scene = free_box(Vec3(0.031, 0.029, 0.017), 0.002);
@@ -70,14 +45,24 @@ Scene scene_of(const Case& c, Shape shape) {
   m.viscosity = c.viscosity;
   scene.materials.push_back(m);
   scene.bodies[0].material = "test";
-  if (c.materials != Case::kOne) add_inclusions(c, scene);
+  if (c.materials != Case::kOne) add_inclusions(scene, c.materials == Case::kBothLaws);
   return scene;
+}
+
+void block_by_material(MpmState& s) {
+  s.blocks = make_blocks(s.bodies, s.points, *s.fields, {16, 4, 4, true});
+  s.force.resize(s.blocks.force_size);
+  s.contacts.touching.assign(s.blocks.all.size(), {});
+  s.contacts.near.assign(s.blocks.all.size(), {});
+  list_facets(s);
+  measure_motion(s);
 }
 
 TEST_P(Substep, AgreesWithBruteForce) {
   for (const Shape shape : {Shape::kBox, Shape::kEllipsoid}) {
     MpmTissue tissue(scene_of(GetParam(), shape));
     MpmState& state = tissue.state();
+    if (GetParam().by_material) block_by_material(state);
     deform(state);
     const Vec3 middle(0.0155, 0.0145, 0.0085);
     if (GetParam().cuts > 0) {
@@ -135,6 +120,7 @@ std::vector<Case> cases() {
       all.push_back({"materials, viscous", Law::kFixedCorotated, 3, 0, set, materials});
       all.push_back({"materials, cut crosswise", Law::kNeoHookean, 2, 2, set, materials});
       all.push_back({"materials, shattered", Law::kFixedCorotated, 2, 16, set, materials});
+      all.push_back({"by material, cut", Law::kFixedCorotated, 2, 3, set, materials, true});
     }
   }
   const InstructionSet best = instruction_set();

@@ -22,6 +22,7 @@ std::unique_ptr<MpmState> make_state(const Scene& scene, std::vector<std::string
   state->bodies = make_lattice_bodies(scene, state->points, notes);
   state->fields = std::make_unique<NodeFields>(state->bodies, state->points, state->nodes);
   shape = choose_shape(state->bodies, limits);
+  shape.blocks.one_material = true;
   state->blocks = make_blocks(state->bodies, state->points, *state->fields, shape.blocks);
   state->contacts.with.assign(state->points.size(), 0);
   list_facets(*state);
@@ -49,12 +50,6 @@ CudaMpmTissue::CudaMpmTissue(const Scene& scene) : device_(std::make_unique<OnDe
                              " tools: on the GPU at most " + std::to_string(kMaxColliders - 1) +
                              "; set device to cpu");
   }
-  for (const Body& body : scene.bodies) {
-    if (body.inclusions.empty()) continue;
-    throw std::runtime_error("body '" + body.name +
-                             "' has inclusions, and on the GPU a body is of one material; set "
-                             "device to cpu");
-  }
   OnDevice& d = *device_;
   check_cuda(cudaSetDevice(0), "be chosen");
   cudaDeviceProp properties;
@@ -79,7 +74,7 @@ CudaMpmTissue::~CudaMpmTissue() {
 }
 
 float CudaMpmTissue::stable_substep() const {
-  return tissue_sim::stable_substep(*state_, even_stiffening(*state_, stiffening_));
+  return tissue_sim::stable_substep(*state_, stiffening_);
 }
 
 void CudaMpmTissue::upload_colliders(int substeps, double duration, const FrameInput& input) {
@@ -188,20 +183,22 @@ void CudaMpmTissue::finish_measure() {
   OnDevice& d = *device_;
   check_cuda(cudaStreamSynchronize(d.stream), "finish a frame");
   result_.elastic_energy = result_.kinetic_energy = result_.max_speed = 0;
-  stiffening_ = 1;
+  stiffening_ = even_stiffening(*state_, 1);
   state_->motion.resize(d.blocks.size());
   for (std::size_t i = 0; i < d.blocks.size(); ++i) {
     const CudaMeasure& m = d.host_measures[i];
     result_.elastic_energy += m.elastic_energy;
     result_.kinetic_energy += m.kinetic_energy;
     if (!(m.speed <= result_.max_speed)) result_.max_speed = m.speed;
-    stiffening_ = std::max(stiffening_, m.stiffening);
-    result_.blew_up = result_.blew_up || m.finite == 0;
+    const Block& block = *state_->blocks.all[i];
+    float& stiffening = stiffening_[block.body][block.material];
+    stiffening = std::max(stiffening, m.stiffening);
+    result_.blew_up = result_.blew_up || m.finite == 0 || m.stiffening > 1e6f;
     state_->motion[i] = {{Vec3(m.min[0], m.min[1], m.min[2]), Vec3(m.max[0], m.max[1], m.max[2])},
                          m.speed};
   }
   // Nothing that instruments do moves tissue at the speed of a bullet; what does is out of control.
-  result_.blew_up = result_.blew_up || !(result_.max_speed < 300) || stiffening_ > 1e6f;
+  result_.blew_up = result_.blew_up || !(result_.max_speed < 300);
 }
 
 FrameResult CudaMpmTissue::finish() {

@@ -8,15 +8,14 @@
 namespace tissue_sim {
 namespace {
 
-CudaBody body_of(const LatticeBody& b) {
-  const Material& m = b.materials[0];
+CudaBody body_of(const LatticeBody& b, const Material& m) {
   CudaBody body;
   body.cell_size = static_cast<float>(b.cell_size);
   body.inv_cell_size = 1.0f / body.cell_size;
   body.mu = static_cast<float>(lame_mu(m));
   body.lambda = static_cast<float>(lame_lambda(m));
   body.viscosity = static_cast<float>(m.viscosity);
-  body.tear_stretch = least_tear_limit(b);
+  body.tear_stretch = least_tear_limit(m);
   body.point_volume = static_cast<float>(b.cell_size * b.cell_size * b.cell_size / 8);
   // Contact is in proportion to the volume, but a cubic millimetre is a better measure than a
   // metre.
@@ -108,13 +107,17 @@ void connect(std::size_t node_count, HostTables& t) {
 
 HostTables make_tables(const MpmState& state) {
   HostTables t;
+  std::vector<int> first_of_body;
   for (std::size_t i = 0; i < state.bodies.size(); ++i) {
-    t.bodies.push_back(body_of(state.bodies[i]));
-    t.bodies.back().point_volume = common_volume(state, static_cast<int>(i));
+    first_of_body.push_back(static_cast<int>(t.bodies.size()));
+    for (const Material& m : state.bodies[i].materials) {
+      t.bodies.push_back(body_of(state.bodies[i], m));
+      t.bodies.back().point_volume = common_volume(state, static_cast<int>(i));
+    }
   }
   for (const Block* from : state.blocks.all) {
     CudaBlock block;
-    block.body = from->body;
+    block.body = first_of_body[from->body] + from->material;
     block.nx = from->nx;
     block.ny = from->ny;
     block.nz = from->nz;
@@ -122,7 +125,7 @@ HostTables make_tables(const MpmState& state) {
     const Vec3 origin =
         state.bodies[from->body].node_position(from->x - 1, from->y - 1, from->z - 1);
     for (int a = 0; a < 3; ++a) block.origin[a] = static_cast<float>(origin[a]);
-    add_points(*from, t.bodies[from->body].point_volume, block, t);
+    add_points(*from, t.bodies[block.body].point_volume, block, t);
     for (int z = 0; z < block.nz + 2; ++z) {
       for (int y = 0; y < block.ny + 2; ++y) {
         const std::int32_t* row = from->node.data() + z * from->plane + y * from->pitch;

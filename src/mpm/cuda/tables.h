@@ -18,7 +18,7 @@ namespace tissue_sim {
 
 inline constexpr int kMaxColliders = 32;  ///< a block keeps those near to it as bits of a word
 
-/// Material of a body and what follows from it.
+/// A material of a body and what follows from it.
 struct CudaBody {
   float cell_size, inv_cell_size;  ///< [m], [1/m]
   float mu, lambda;                ///< [Pa]
@@ -30,7 +30,7 @@ struct CudaBody {
 };
 
 struct CudaBlock {
-  int body;
+  int body;        ///< its CudaBody: that of its points' material
   int nx, ny, nz;  ///< cells
   int first_slot;
   int first_lane;

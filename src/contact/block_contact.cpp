@@ -17,6 +17,10 @@ ContactSpring unit_spring(const LatticeBody& body, int material) {
   return contact_spring(modulus, static_cast<float>(m.density), edge, 1.0f);
 }
 
+bool comes_before(const Touch& a, const Touch& b) {
+  return a.collider != b.collider ? a.collider < b.collider : a.point < b.point;
+}
+
 bool overlap(const Box& a, const Box& b) {
   return (a.min.array() <= b.max.array()).all() && (b.min.array() <= a.max.array()).all();
 }
@@ -91,26 +95,31 @@ void find_near_colliders(MpmState& state, const std::vector<Box>& reach, double 
     for (std::size_t c = 0; c < reach.size(); ++c) {
       if (overlap(box, reach[c])) contacts.near[i].push_back(static_cast<std::uint8_t>(c));
     }
-    if (contacts.near[i].empty()) {
-      for (const std::int32_t p : contacts.touching[i]) contacts.with[p] = 0;
-      contacts.touching[i].clear();
-    }
+    if (contacts.near[i].empty()) contacts.touching[i].clear();
   });
 }
 
 void list_contacts(MpmState& state) {
   Contacts& contacts = state.contacts;
-  const std::vector<std::vector<std::int32_t>> before = std::move(contacts.touching);
+  const std::vector<std::vector<Touch>> before = std::move(contacts.touching);
   contacts.touching.assign(state.blocks.all.size(), {});
   contacts.near.assign(state.blocks.all.size(), {});
+  if (before.empty()) return;  // on a GPU
+  std::vector<Touch> touches;
   for (std::size_t i = 0; i < state.blocks.all.size(); ++i) {
     const Blocks::Origin& origin = state.blocks.origin[i];
-    if (std::all_of(before.begin() + origin.begin, before.begin() + origin.end,
-                    [](const auto& points) { return points.empty(); })) {
-      continue;
+    touches.clear();
+    for (int b = origin.begin; b < origin.end; ++b) {
+      touches.insert(touches.end(), before[b].begin(), before[b].end());
     }
-    for (const std::int32_t p : state.blocks.all[i]->point) {
-      if (p >= 0 && contacts.with[p] != 0) contacts.touching[i].push_back(p);
+    if (touches.empty()) continue;
+    Array<std::int32_t> points = state.blocks.all[i]->point;
+    std::sort(points.begin(), points.end());
+    std::sort(touches.begin(), touches.end(), comes_before);
+    for (const Touch& t : touches) {
+      if (std::binary_search(points.begin(), points.end(), t.point)) {
+        contacts.touching[i].push_back(t);
+      }
     }
   }
 }
@@ -129,7 +138,8 @@ void add_contact(MpmState& state, int index, float* force, std::vector<ColliderL
   float* x = scratch.values.data();
   state.kernels->positions(block, block_field(state, block), state.nodes.u, scratch, x);
   const int component = block.node_count();
-  std::vector<std::int32_t> touching;
+  const std::vector<Touch>& before = contacts.touching[index];
+  std::vector<Touch> touching;
   for (const std::uint8_t c : near) {
     const Collider& collider = state.colliders[c];
     const Box box = bounds(collider);
@@ -151,19 +161,21 @@ void add_contact(MpmState& state, int index, float* force, std::vector<ColliderL
         const float w = stencil.weight[k];
         for (int a = 0; a < 3; ++a) v[a] += w * state.nodes.v[a][node];
       }
-      float* hold = &contacts.hold[3 * static_cast<std::size_t>(p)];
-      if (contacts.with[p] != c + 1) {
-        contacts.with[p] = static_cast<std::uint8_t>(c + 1);
-        to_local(collider, at, hold);
+      Touch touch{p, c, {}};
+      const auto held = std::lower_bound(before.begin(), before.end(), touch, comes_before);
+      if (held != before.end() && !comes_before(touch, *held)) {
+        touch = *held;
+      } else {
+        to_local(collider, at, touch.hold);
       }
-      touching.push_back(p);
       if (state.points.material_of(p) != material) {
         material = state.points.material_of(p);
         unit = unit_spring(state.bodies[block.body], material);
       }
       const float volume = block.volume[lane];
-      contact_force(collider, g, {unit.stiffness * volume, unit.damping * volume}, at, v, hold,
-                    push);
+      contact_force(collider, g, {unit.stiffness * volume, unit.damping * volume}, at, v,
+                    touch.hold, push);
+      touching.push_back(touch);
       for (int k = 0; k < 27; ++k) {
         float* node_force = force + stencil.local[k];
         const float w = stencil.weight[k];
@@ -181,11 +193,8 @@ void add_contact(MpmState& state, int index, float* force, std::vector<ColliderL
       }
     }
   }
-  // A point that no longer touches anything forgets where it was held.
-  std::sort(touching.begin(), touching.end());
-  for (const std::int32_t p : contacts.touching[index]) {
-    if (!std::binary_search(touching.begin(), touching.end(), p)) contacts.with[p] = 0;
-  }
+  // A point that no longer touches forgets where it was held.
+  std::sort(touching.begin(), touching.end(), comes_before);
   contacts.touching[index] = std::move(touching);
 }
 

@@ -14,8 +14,6 @@ std::unique_ptr<MpmState> make_mpm_state(const Scene& scene, std::vector<std::st
   state->fields = std::make_unique<NodeFields>(state->bodies, state->points, state->nodes);
   state->blocks = make_blocks(state->bodies, state->points, *state->fields);
   state->force.resize(state->blocks.force_size);
-  state->contacts.with.assign(state->points.size(), 0);
-  state->contacts.hold.assign(3 * static_cast<std::size_t>(state->points.size()), 0.0f);
   state->contacts.touching.resize(state->blocks.all.size());
   state->contacts.near.resize(state->blocks.all.size());
   list_facets(*state);

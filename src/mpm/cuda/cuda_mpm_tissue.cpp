@@ -24,7 +24,6 @@ std::unique_ptr<MpmState> make_state(const Scene& scene, std::vector<std::string
   shape = choose_shape(state->bodies, limits);
   shape.blocks.one_material = true;
   state->blocks = make_blocks(state->bodies, state->points, *state->fields, shape.blocks);
-  state->contacts.with.assign(state->points.size(), 0);
   list_facets(*state);
   state->instructions = instruction_set();
   state->kernels = &block_kernels(state->instructions);

@@ -134,9 +134,7 @@ TEST(CutClusters, AreThePiecesThatFlyApart) {
     ASSERT_FALSE(tissue.finish().blew_up);
     const std::vector<Vec3> after = positions(tissue);
     for (std::size_t p = 0; p < after.size(); ++p) {
-      // Fitted faces that part askew may brush: by less than a tenth of a cell where two cuts
-      // cross.
-      ASSERT_LT((after[p] - before[p] - time * velocity[p]).norm(), 2e-4) << "held back: " << p;
+      ASSERT_LT((after[p] - before[p] - time * velocity[p]).norm(), 1e-6) << "held back: " << p;
     }
     EXPECT_EQ(labels(tissue), clusters(after));
     EXPECT_EQ(tissue.fragments().size(), 1u << planes);

@@ -3,10 +3,11 @@
 
 #if defined(TISSUE_SIM_CUDA)
 #include <cmath>
+#include <cstdio>
 #include <cstdlib>
 #include <cstring>
 
-#include "compute/cuda_check.h"
+#include "compute/device_array.h"
 #include "cut_scenes.h"
 #include "mpm/cuda/cuda_mpm_tissue.h"
 #include "reference/mpm_reference.h"
@@ -113,7 +114,9 @@ INSTANTIATE_TEST_SUITE_P(
                     Case{"materials, cut, viscous", Law::kNeoHookean, 2, 2, nullptr, true},
                     Case{"a wave after the other", Law::kFixedCorotated, 0, 0, "4 4 4 32 0"},
                     Case{"the same, cut", Law::kFixedCorotated, 0, 2, "3 5 2 32 0"},
-                    Case{"flat blocks", Law::kNeoHookean, 0, 1, "16 4 1 128 1"}));
+                    Case{"flat blocks", Law::kNeoHookean, 0, 1, "16 4 1 128 1"},
+                    Case{"several to a thread block", Law::kFixedCorotated, 0, 0, "8 2 1 256 1"},
+                    Case{"the same, cut", Law::kNeoHookean, 0, 2, "8 2 1 256 1"}));
 
 /// A block on the ground, cut by a scalpel and pushed by a probe for a second.
 struct Operation {
@@ -227,6 +230,35 @@ TEST_F(OnGpu, ASecondOfCuttingAgreesWithTheCpu) {
   EXPECT_LT(worst, 1e-4);
   EXPECT_LT(worst_force, 0.02 * peak);
   EXPECT_NEAR(a.elastic, b.elastic, 0.01 * a.elastic);
+}
+
+TEST_F(OnGpu, SaysHowMuchMemoryASceneNeeds) {
+  const Scene scene = free_box(Vec3(0.08, 0.08, 0.08), 0.001);
+  double megabytes = 0;
+  {
+    const CudaMpmTissue tissue(scene);
+    megabytes = std::ldexp(static_cast<double>(tissue.device_bytes()), -20);
+  }
+  DeviceArray<char> taken;
+  std::size_t free = 0, total = 0;
+  ASSERT_EQ(cudaMemGetInfo(&free, &total), cudaSuccess);
+  taken.resize(free - (static_cast<std::size_t>(0.5 * megabytes) << 20));
+  try {
+    const CudaMpmTissue tissue(scene);
+    FAIL() << "half of the memory that it needs was there";
+  } catch (const std::runtime_error& e) {
+    double needs = 0, left = 0, of = 0;
+    ASSERT_EQ(std::sscanf(e.what(),
+                          "the GPU's memory does not suffice: the scene needs %lf MB, %lf MB of "
+                          "%lf MB are free",
+                          &needs, &left, &of),
+              3)
+        << e.what();
+    EXPECT_NEAR(needs, megabytes, 0.05 * megabytes) << e.what();
+    EXPECT_LT(left, needs) << e.what();
+    EXPECT_NEAR(of, std::ldexp(static_cast<double>(total), -20), 1) << e.what();
+    std::printf("%s\n", e.what());
+  }
 }
 
 TEST_F(OnGpu, SameBitsRunAfterRun) {

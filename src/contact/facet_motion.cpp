@@ -3,11 +3,9 @@
 #include <cmath>
 
 namespace tissue_sim {
-namespace {
 
-/// Gradient of the displacement at a place, times the cell size: G[3 * component + axis].
-void gradient_at(const Array<float>* u, const CellNodes& nodes, const float (&place)[3],
-                 float (&G)[9]) {
+void deformation_gradient_at(const Array<float>* u, const CellNodes& nodes, double cell_size,
+                             const float (&place)[3], float (&F)[9]) {
   const AxisWeights w(place);
   float slope[9];
   for (int a = 0; a < 3; ++a) {
@@ -15,7 +13,7 @@ void gradient_at(const Array<float>* u, const CellNodes& nodes, const float (&pl
     slope[3 * a + 1] = -2 * place[a];
     slope[3 * a + 2] = place[a] + 0.5f;
   }
-  for (float& g : G) g = 0;
+  for (float& f : F) f = 0;  // first the gradient of the displacement, times the cell size
   for (int z = 0; z < 3; ++z) {
     for (int y = 0; y < 3; ++y) {
       const std::int32_t* n = nodes.lowest + z * nodes.plane + y * nodes.pitch;
@@ -24,15 +22,15 @@ void gradient_at(const Array<float>* u, const CellNodes& nodes, const float (&pl
       for (int c = 0; c < 3; ++c) {
         const float u0 = u[c][n[0]], u1 = u[c][n[1]], u2 = u[c][n[2]];
         const float value = w.of[0] * u0 + w.of[1] * u1 + w.of[2] * u2;
-        G[3 * c] += wx * (slope[0] * u0 + slope[1] * u1 + slope[2] * u2);
-        G[3 * c + 1] += wy * value;
-        G[3 * c + 2] += wz * value;
+        F[3 * c] += wx * (slope[0] * u0 + slope[1] * u1 + slope[2] * u2);
+        F[3 * c + 1] += wy * value;
+        F[3 * c + 2] += wz * value;
       }
     }
   }
+  const auto per_cell = static_cast<float>(1 / cell_size);
+  for (int i = 0; i < 9; ++i) F[i] = F[i] * per_cell + (i % 4 == 0 ? 1.0f : 0.0f);
 }
-
-}  // namespace
 
 Vec3 reference_place(const LatticeBody& body, const Block& block, int cell,
                      const float (&place)[3]) {
@@ -57,9 +55,7 @@ FacetMotion facet_motion(const LatticeBody& body, const Block& block, const Face
   const Vec3 place = reference_place(body, block, facet);
   for (int a = 0; a < 3; ++a) m.x[a] = static_cast<float>(place[a] + u[a]);
   float F[9];
-  gradient_at(nodes.u, cell, facet.center, F);
-  const auto per_cell = static_cast<float>(1 / body.cell_size);
-  for (int i = 0; i < 9; ++i) F[i] = F[i] * per_cell + (i % 4 == 0 ? 1.0f : 0.0f);
+  deformation_gradient_at(nodes.u, cell, body.cell_size, facet.center, F);
   // cof F = J F^-T carries normals; its transpose over J is the inverse.
   float cof[9];
   for (int i = 0; i < 3; ++i) {

@@ -50,6 +50,10 @@ inline void value_at(const Array<float>* field, const CellNodes& nodes, const Ax
   for (int c = 0; c < 3; ++c) value[c] = sum[c];
 }
 
+/// Deformation gradient at a place given in cells from the middle of the cell, row-major.
+void deformation_gradient_at(const Array<float>* u, const CellNodes& nodes, double cell_size,
+                             const float (&place)[3], float (&F)[9]);
+
 /// How a facet stands.
 struct FacetMotion {
   float x[3], v[3];       ///< of its centre [m], [m/s]

@@ -7,6 +7,7 @@
 #include <limits>
 
 #include "contact/known_facets.h"
+#include "contact/surroundings.h"
 #include "cutting/bonds.h"
 #include "mpm/block.h"
 #include "mpm/lattice_body.h"
@@ -14,79 +15,48 @@
 namespace tissue_sim {
 namespace {
 
-using Place = std::array<int, 3>;  // a site of the lattice, from the lowest of the cell's
+constexpr float kOneFace = 0.5f;  // cosine between normals
 
-enum class End { kNone, kCut, kOuter };
+/// Bonds of a cell's points that are gone in one direction, on one level of the cell.
+struct Side {
+  int direction, axis, sign, level;
+  int lateral[2];
 
-/// The bonds of the points around a cell, as far out as the end of tissue is looked for.
-class Surroundings {
- public:
-  Surroundings(const LatticeBody& body, const Points& points, const Place& corner) {
-    const int x = corner[0] + kFrom, sx = 2 * body.nx;
-    for (int k = 0, i = 0; k < kWidth; ++k) {
-      for (int j = 0; j < kWidth; ++j, i += kWidth) {
-        const int y = corner[1] + kFrom + j, z = corner[2] + kFrom + k;
-        const bool inside = y >= 0 && z >= 0 && y < 2 * body.ny && z < 2 * body.nz;
-        const std::ptrdiff_t row = (static_cast<std::ptrdiff_t>(z) * 2 * body.ny + y) * sx + x;
-        for (int n = 0; n < kWidth; ++n) {
-          const std::int32_t p = inside && x + n >= 0 && x + n < sx ? body.point_at[row + n] : -1;
-          bonds_[i + n] = p < 0 ? kNoPoint : points.bonds[p];
-        }
-      }
-    }
+  Side(int direction, int level) : direction(direction), level(level) {
+    const BondOffset o = bond_offset(direction);
+    axis = o.x != 0 ? 0 : o.y != 0 ? 1 : 2;
+    sign = o.x + o.y + o.z;
+    lateral[0] = (axis + 1) % 3;
+    lateral[1] = (axis + 2) % 3;
   }
-
-  bool has_point(const Place& at) const { return bonds_[index(at)] != kNoPoint; }
-
-  /// How many sites above or below `lower` tissue ends next in that way, within two; 9 where it
-  /// does not, or in both directions.
-  int nearest_end(const Place& lower, int axis, End end) const {
-    const int at = index(lower);
-    if (end_at(at, axis) == end) return 0;
-    for (int m = 1; m <= 2; ++m) {
-      const bool above = end_at(at + m * kStep[axis], axis) == end,
-                 below = end_at(at - m * kStep[axis], axis) == end;
-      if (above || below) return above && below ? 9 : above ? m : -m;
-    }
-    return 9;
+  /// The points of the level, a bit each.
+  unsigned points() const {
+    constexpr unsigned kUpper[3] = {0xaa, 0xcc, 0xf0};
+    return level == 1 ? kUpper[axis] : 0xff & ~kUpper[axis];
   }
-
- private:
-  static constexpr int kFrom = -3, kWidth = 8;  // sites
-  static constexpr int kStep[3] = {1, kWidth, kWidth* kWidth};
-  static constexpr std::uint8_t kNoPoint = 0xff;
-
-  static int index(const Place& p) {
-    return ((p[2] - kFrom) * kWidth + p[1] - kFrom) * kWidth + p[0] - kFrom;
-  }
-  /// How tissue ends between a site and the next along `axis`: their bond is broken, or one is
-  /// empty.
-  End end_at(int lower, int axis) const {
-    const std::uint8_t p = bonds_[lower], q = bonds_[lower + kStep[axis]];
-    if (p == kNoPoint || q == kNoPoint) return p == q ? End::kNone : End::kOuter;
-    return (p >> (kForwardBond + axis) & 1) == 0 ? End::kCut : End::kNone;
-  }
-
-  std::uint8_t bonds_[kWidth * kWidth * kWidth];
 };
 
+/// How a face lies where bonds are gone.
 struct Plane {
-  double height = 0, slope[2] = {};  // at the middle of the cell's columns; per cell
+  double height;  ///< above the bonds' middle, in the middle of their columns [cells]
+  Vec3 normal;    ///< unit, outward
 };
 
-/// The plane through the ends of the 4 x 4 columns around a cell's 2 x 2 that fits best. `lower` is
-/// the site below the facet in the cell's first column.
-Plane fit(const Surroundings& around, const Place& lower, int axis, const int (&lateral)[2],
-          End how) {
+/// The plane through the ends of the 4 x 4 columns around a cell's 2 x 2 that fits best, at
+/// `middle` of the columns [cells].
+Plane fitted_plane(const Surroundings& around, const Side& side, End how,
+                   const double (&middle)[2]) {
+  Place lower = {};
+  lower[side.axis] = side.sign > 0 ? side.level : side.level - 1;
   Eigen::Matrix3d normal = Eigen::Matrix3d::Zero();
   Eigen::Vector3d right = Eigen::Vector3d::Zero();
   normal(1, 1) = normal(2, 2) = 1e-2;  // a row of columns is level across
   for (int b = -1; b <= 2; ++b) {
     for (int a = -1; a <= 2; ++a) {
       Place column = lower;
-      column[lateral[0]] += a;
-      column[lateral[1]] += b;
-      const int end = around.nearest_end(column, axis, how);
+      column[side.lateral[0]] += a;
+      column[side.lateral[1]] += b;
+      const int end = around.nearest_end(column, side.axis, how);
       if (end == 9) continue;
       const Eigen::Vector3d row(1, 0.5 * (a - 0.5), 0.5 * (b - 0.5));
       normal += row * row.transpose();
@@ -94,21 +64,25 @@ Plane fit(const Surroundings& around, const Place& lower, int axis, const int (&
     }
   }
   const Eigen::Vector3d c = normal.ldlt().solve(right);
-  return {c[0], {std::clamp(c[1], -2.0, 2.0), std::clamp(c[2], -2.0, 2.0)}};
+  Plane plane{c[0], Vec3::Zero()};
+  plane.normal[side.axis] = side.sign;
+  for (int l = 0; l < 2; ++l) {
+    const double slope = std::clamp(c[1 + l], -2.0, 2.0);
+    plane.height += slope * middle[l];
+    plane.normal[side.lateral[l]] = -side.sign * slope;
+  }
+  plane.normal.normalize();
+  return plane;
 }
 
-Facet make_facet(const Surroundings& surroundings, double cell_size, int cell, int direction,
-                 int level, const std::int32_t (&around)[8], unsigned members, End how) {
-  const BondOffset o = bond_offset(direction);
-  const int axis = o.x != 0 ? 0 : o.y != 0 ? 1 : 2, sign = o.x + o.y + o.z;
-  const int lateral[2] = {(axis + 1) % 3, (axis + 2) % 3};
-  Place lower = {};
-  lower[axis] = sign > 0 ? level : level - 1;
-  const Plane plane = fit(surroundings, lower, axis, lateral, how);
+/// The facet of the points `members` of a cell; plane(middle of their columns) is how it lies.
+template <class PlaneAt>
+Facet make_facet(double cell_size, int cell, const Side& side, const std::int32_t (&around)[8],
+                 unsigned members, const PlaneAt& plane_at) {
   Facet f;
   f.point = std::numeric_limits<std::int32_t>::max();
   f.cell = cell;
-  f.direction = static_cast<std::uint8_t>(direction);
+  f.direction = static_cast<std::uint8_t>(side.direction);
   double low[2] = {1, 1}, high[2] = {-1, -1}, middle[2] = {};
   int count = 0;
   for (int s = 0; s < 8; ++s) {
@@ -116,34 +90,71 @@ Facet make_facet(const Surroundings& surroundings, double cell_size, int cell, i
     f.point = std::min(f.point, around[s]);
     ++count;
     for (int l = 0; l < 2; ++l) {
-      const double at = s >> lateral[l] & 1 ? 0.25 : -0.25;
+      const double at = s >> side.lateral[l] & 1 ? 0.25 : -0.25;
       low[l] = std::min(low[l], at - 0.25);
       high[l] = std::max(high[l], at + 0.25);
       middle[l] += at;
     }
   }
-  const double face = 0.5 * (level - 1) + (sign > 0 ? 0.5 : 0.0);
-  double height = plane.height;
   for (int l = 0; l < 2; ++l) {
     middle[l] /= count;
-    height += plane.slope[l] * middle[l];
-    f.center[lateral[l]] = static_cast<float>(middle[l]);
-    f.extent[lateral[l]] = static_cast<float>(0.5 * (high[l] - low[l]));
+    f.center[side.lateral[l]] = static_cast<float>(middle[l]);
+    f.extent[side.lateral[l]] = static_cast<float>(0.5 * (high[l] - low[l]));
   }
-  f.center[axis] = static_cast<float>(face + std::clamp(height, -0.4, 0.4));
-  f.extent[axis] = 0;
-  Vec3 n = Vec3::Zero();
-  n[axis] = sign;
-  for (int l = 0; l < 2; ++l) n[lateral[l]] = -sign * plane.slope[l];
-  n.normalize();
-  for (int a = 0; a < 3; ++a) f.normal[a] = static_cast<float>(n[a]);
-  f.area = static_cast<float>(count * 0.25 * cell_size * cell_size * std::fabs(n[axis]));
+  const Plane plane = plane_at(middle);
+  const double face = 0.5 * (side.level - 1) + (side.sign > 0 ? 0.5 : 0.0);
+  f.center[side.axis] = static_cast<float>(face + std::clamp(plane.height, -0.4, 0.4));
+  f.extent[side.axis] = 0;
+  for (int a = 0; a < 3; ++a) f.normal[a] = static_cast<float>(plane.normal[a]);
+  f.area =
+      static_cast<float>(count * 0.25 * cell_size * cell_size * std::fabs(plane.normal[side.axis]));
   return f;
+}
+
+/// Appends the facets of the points `members`, whose bonds blades went through: one for each of
+/// their cuts. Returns those whose bonds have no crossing.
+unsigned add_crossed(const LatticeBody& body, const Points& points, int cell, const Place& corner,
+                     const Side& side, const std::int32_t (&around)[8], unsigned members,
+                     std::vector<Facet>& facets) {
+  Vec3 normal[8];
+  double place[8];
+  unsigned left = 0;
+  for (int s = 0; s < 8; ++s) {
+    if ((members >> s & 1) == 0) continue;
+    Place lower = {corner[0] + (s & 1), corner[1] + (s >> 1 & 1), corner[2] + (s >> 2)};
+    if (side.sign < 0) --lower[side.axis];
+    const auto crossing =
+        points.crossings.find(crossing_key(body.point(lower[0], lower[1], lower[2]), side.axis));
+    if (crossing == points.crossings.end()) continue;
+    const Crossing& c = crossing->second;
+    normal[s] = Vec3(c.normal[0], c.normal[1], c.normal[2]);
+    if (normal[s][side.axis] * side.sign < 0) normal[s] = -normal[s];
+    place[s] = c.place;
+    left |= 1u << s;
+  }
+  const unsigned unknown = members & ~left;
+  while (left != 0) {
+    const Vec3 first = normal[__builtin_ctz(left)];
+    Plane plane{0, Vec3::Zero()};
+    unsigned cut = 0;
+    for (unsigned rest = left; rest != 0; rest &= rest - 1) {
+      const int s = __builtin_ctz(rest);
+      if (normal[s].dot(first) < kOneFace) continue;
+      cut |= 1u << s;
+      plane.height += 0.5 * (place[s] - 0.5);
+      plane.normal += normal[s];
+    }
+    plane.height /= __builtin_popcount(cut);
+    plane.normal.normalize();
+    facets.push_back(make_facet(body.cell_size, cell, side, around, cut,
+                                [&plane](const double(&)[2]) { return plane; }));
+    left &= ~cut;
+  }
+  return unknown;
 }
 
 /// Takes the facets of one cell that belong to one face together, from `first` on.
 void merge(std::vector<Facet>& facets, std::size_t first) {
-  constexpr float kOneFace = 0.5f;    // cosine between normals
   constexpr float kOneLayer = 0.25f;  // [cells] along the normal; points are half a cell apart
   for (std::size_t i = first; i < facets.size(); ++i) {
     for (std::size_t j = i + 1; j < facets.size();) {
@@ -198,7 +209,8 @@ std::vector<Facet> facets_of(const LatticeBody& body, const Points& points, cons
           return p < 0 || points.bonds[p] == kAllBonds;
         };
         if (std::all_of(std::begin(around), std::end(around), is_whole)) continue;
-        const Surroundings surroundings(body, points, {2 * x, 2 * y, 2 * (block.z + z)});
+        const Place corner = {2 * x, 2 * y, 2 * (block.z + z)};
+        const Surroundings surroundings(body, points, corner);
         unsigned missing[2][kBondCount] = {};  // the cell's points without a bond: cut, never had
         for (int s = 0; s < 8; ++s) {
           if (is_whole(around[s])) continue;
@@ -211,13 +223,17 @@ std::vector<Facet> facets_of(const LatticeBody& body, const Points& points, cons
         }
         const std::size_t first = facets.size();
         for (int j = 0; j < 4 * kBondCount; ++j) {
-          constexpr unsigned kUpper[3] = {0xaa, 0xcc, 0xf0};  // points above along x, y, z
-          const int outer = j / 2 % 2, level = j % 2, k = j / 4;
-          const int axis = k < kForwardBond ? kForwardBond - 1 - k : k - kForwardBond;
-          const unsigned members = missing[outer][k] & (level == 1 ? kUpper[axis] : ~kUpper[axis]);
+          const Side side(j / 4, j % 2);
+          const End how = j / 2 % 2 == 0 ? End::kCut : End::kOuter;
+          unsigned members = missing[how == End::kCut ? 0 : 1][side.direction] & side.points();
+          if (how == End::kCut && members != 0) {
+            members = add_crossed(body, points, cell, corner, side, around, members, facets);
+          }
           if (members == 0) continue;
-          facets.push_back(make_facet(surroundings, body.cell_size, cell, k, level, around, members,
-                                      outer == 1 ? End::kOuter : End::kCut));
+          facets.push_back(make_facet(body.cell_size, cell, side, around, members,
+                                      [&](const double(&middle)[2]) {
+                                        return fitted_plane(surroundings, side, how, middle);
+                                      }));
         }
         merge(facets, first);
       }

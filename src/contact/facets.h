@@ -23,9 +23,9 @@ struct Facet {
   float area;              ///< [m^2]
 };
 
-/// The facets of a block; `known` are those of its region that need not be made anew. Place and
-/// normal are those of the plane that fits the missing bonds of the columns around best, so that an
-/// oblique cut is a plane, not stairs.
+/// The facets of a block; `known` are those of its region that need not be made anew. Where a blade
+/// broke the bonds, place and normal are those of its sweep; else those of the plane that fits the
+/// missing bonds of the columns around best, so that an oblique face is a plane, not stairs.
 std::vector<Facet> facets_of(const LatticeBody& body, const Points& points, const Block& block,
                              const KnownFacets& known);
 

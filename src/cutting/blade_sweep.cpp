@@ -48,13 +48,16 @@ int cubic_roots(const double (&c)[4], double (&roots)[3]) {
   return count;
 }
 
-/// Whether two coplanar segments cross: the edge with its margin, the bond without.
-bool segments_cross(const Vec3& a, const Vec3& b, const Vec3& p, const Vec3& q) {
+/// Whether two coplanar segments cross, at u of the edge, with its margin, and t of the bond,
+/// without.
+bool segments_cross(const Vec3& a, const Vec3& b, const Vec3& p, const Vec3& q, double& u,
+                    double& t) {
   const Vec3 e = b - a, f = q - p, n = e.cross(f);
   const double n2 = n.squaredNorm();
   if (n2 <= 1e-24 * e.squaredNorm() * f.squaredNorm()) return false;  // parallel: the edge grazes
   const Vec3 w = p - a;
-  const double u = w.cross(f).dot(n) / n2, t = w.cross(e).dot(n) / n2;
+  u = w.cross(f).dot(n) / n2;
+  t = w.cross(e).dot(n) / n2;
   return u >= -1e-9 && u <= 1 + 1e-9 && t >= 0 && t <= 1;
 }
 
@@ -86,7 +89,7 @@ SweptEdge swept(const MovingSegment& edge) {
   return result;
 }
 
-bool edge_passes(const MovingSegment& e, const MovingSegment& b) {
+bool edge_passes(const MovingSegment& e, const MovingSegment& b, Meeting* meeting) {
   for (int i = 0; i < 3; ++i) {
     if (std::max({e.a0[i], e.b0[i], e.a1[i], e.b1[i]}) <
             std::min({b.a0[i], b.b0[i], b.a1[i], b.b1[i]}) ||
@@ -105,10 +108,18 @@ bool edge_passes(const MovingSegment& e, const MovingSegment& b) {
   const int count = cubic_roots(c, roots);
   for (int i = 0; i < count; ++i) {
     const double s = roots[i];
-    if (segments_cross(e.a0 + s * (e.a1 - e.a0), e.b0 + s * (e.b1 - e.b0), b.a0 + s * (b.a1 - b.a0),
-                       b.b0 + s * (b.b1 - b.b0))) {
-      return true;
+    const Vec3 edge = e.b0 + s * (e.b1 - e.b0) - e.a0 - s * (e.a1 - e.a0);
+    const Vec3 a = e.a0 + s * (e.a1 - e.a0);
+    double u, t;
+    if (!segments_cross(a, a + edge, b.a0 + s * (b.a1 - b.a0), b.b0 + s * (b.b1 - b.b0), u, t)) {
+      continue;
     }
+    if (meeting != nullptr) {
+      const Vec3 moved = e.a1 - e.a0 + u * (e.b1 - e.b0 - (e.a1 - e.a0)) - (b.a1 - b.a0) -
+                         t * (b.b1 - b.b0 - (b.a1 - b.a0));
+      *meeting = {t, edge.cross(moved)};
+    }
+    return true;
   }
   return false;
 }

@@ -30,9 +30,16 @@ inline bool stays_aside(const SweptEdge& e, const MovingSegment& b) {
          std::max(std::max(a0, b0), std::max(a1, b1)) < -e.thickness;
 }
 
-/// Whether the two segments meet at some moment of the interval. The edge includes its ends (with a
-/// margin of 1e-9 of its length, so that the pieces of a polyline leave no gap), the bond its own.
-bool edge_passes(const MovingSegment& edge, const MovingSegment& bond);
+/// Where an edge meets a bond.
+struct Meeting {
+  double place = 0;            ///< along the bond, 0 to 1
+  Vec3 normal = Vec3::Zero();  ///< to what the edge sweeps past the bond, of any length; 0 if none
+};
+
+/// Whether the two segments meet at some moment of the interval, and where. The edge includes its
+/// ends (with a margin of 1e-9 of its length, so that the pieces of a polyline leave no gap), the
+/// bond its own.
+bool edge_passes(const MovingSegment& edge, const MovingSegment& bond, Meeting* meeting = nullptr);
 
 /// A part of a path, short enough to be taken as linear, and the share of the path's time that it
 /// spans.

@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "contact/block_contact.h"
+#include "contact/facet_motion.h"
 #include "contact/known_facets.h"
 #include "cutting/blade_sweep.h"
 #include "cutting/bonds.h"
@@ -59,11 +60,32 @@ bool is_near(const Box& box, const SweepPart& part, double reach) {
 struct Broken {
   std::int32_t point;
   int bond;
+  bool has_crossing;
+  Crossing crossing;
 };
+
+/// The crossing of a forward bond in reference space, from where an edge met it in the world: a
+/// normal goes back by F^T.
+Broken broken_bond(const MpmState& state, const Block& block, std::size_t lane, int bond,
+                   const Array<float>* u, const Meeting& meeting) {
+  const std::size_t column = lane % block.stride, sub = lane / block.stride % 8;
+  const int cell = static_cast<int>(lane / block.stride / 8) * block.plane + block.cell[column];
+  float place[3], F[9];
+  for (int a = 0; a < 3; ++a) place[a] = (sub >> a & 1) != 0 ? 0.25f : -0.25f;
+  Broken broken{block.point[lane], bond, false, {static_cast<float>(meeting.place), {}}};
+  place[bond - kForwardBond] += 0.5f * broken.crossing.place;
+  deformation_gradient_at(u, CellNodes(block, cell), state.bodies[block.body].cell_size, place, F);
+  Vec3 normal = Vec3::Zero();
+  for (int i = 0; i < 9; ++i) normal[i % 3] += F[i] * meeting.normal[i / 3];
+  const double length = normal.norm();
+  broken.has_crossing = length > 0 && std::isfinite(length);
+  for (int a = 0; a < 3; ++a) broken.crossing.normal[a] = static_cast<float>(normal[a] / length);
+  return broken;
+}
 
 /// The bonds that the parts pass among those that point forward from the points of one block.
 void sweep_block(const MpmState& state, const Block& block, const std::vector<SweepPart>& parts,
-                 const Places& places, std::vector<Broken>& broken) {
+                 const Places& places, const Array<float>* u, std::vector<Broken>& broken) {
   const LatticeBody& body = state.bodies[block.body];
   const double reach = kReach * body.cell_size;
   Box swept;
@@ -71,7 +93,8 @@ void sweep_block(const MpmState& state, const Block& block, const std::vector<Sw
     swept.min = swept.min.cwiseMin(part.box.min);
     swept.max = swept.max.cwiseMax(part.box.max);
   }
-  for (const std::int32_t p : block.point) {
+  for (std::size_t lane = 0; lane < block.lane_count(); ++lane) {
+    const std::int32_t p = block.point[lane];
     if (p < 0) continue;
     const Vec3 p0 = places.at_begin(p), p1 = places.at_end(p);
     if (!overlap({p0.cwiseMin(p1), p0.cwiseMax(p1)}, swept, reach)) continue;
@@ -87,11 +110,12 @@ void sweep_block(const MpmState& state, const Block& block, const std::vector<Sw
       for (const SweepPart& part : parts) {
         const MovingSegment bond{p0 + part.begin * (p1 - p0), q0 + part.begin * (q1 - q0),
                                  p0 + part.end * (p1 - p0), q0 + part.end * (q1 - q0)};
-        const auto passes = [&bond](const SweptEdge& e) {
-          return !stays_aside(e, bond) && edge_passes(e, bond);
+        Meeting meeting;
+        const auto passes = [&](const SweptEdge& e) {
+          return !stays_aside(e, bond) && edge_passes(e, bond, &meeting);
         };
         if (std::any_of(part.edges.begin(), part.edges.end(), passes)) {
-          broken.push_back({p, k});
+          broken.push_back(broken_bond(state, block, lane, k, u, meeting));
           break;
         }
       }
@@ -140,7 +164,7 @@ void sweep_bonds(MpmState& state, const BladePath& path, const Array<float>* u_b
   const Places places{state.places[moves ? 0 : 1], state.places[1]};
   std::vector<std::vector<Broken>> broken(count);
   state.cpu->for_each(count, [&](int i) {
-    sweep_block(state, *state.blocks.all[near[i]], parts, places, broken[i]);
+    sweep_block(state, *state.blocks.all[near[i]], parts, places, u_end, broken[i]);
   });
   const std::size_t first = changed.size();
   for (const std::vector<Broken>& of_block : broken) {
@@ -150,6 +174,9 @@ void sweep_bonds(MpmState& state, const BladePath& path, const Array<float>* u_b
       const std::int32_t q = state.bodies[s.body].point(s.x + o.x, s.y + o.y, s.z + o.z);
       state.points.bonds[b.point] &= static_cast<std::uint8_t>(~(1u << b.bond));
       state.points.bonds[q] &= static_cast<std::uint8_t>(~(1u << opposite_bond(b.bond)));
+      if (b.has_crossing) {
+        state.points.crossings[crossing_key(b.point, b.bond - kForwardBond)] = b.crossing;
+      }
       changed.push_back(b.point);
       changed.push_back(q);
       ++report.bonds_broken;

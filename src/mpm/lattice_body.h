@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <string>
+#include <unordered_map>
 #include <vector>
 
 #include "compute/array.h"
@@ -10,6 +11,12 @@
 #include "tissue_sim/scene.h"
 
 namespace tissue_sim {
+
+/// Where a blade went through a bond.
+struct Crossing {
+  float place;      ///< along the bond, 0 at its lower-numbered point to 1
+  float normal[3];  ///< of the cut in reference space, unit, to either side
+};
 
 /// Points of all bodies, numbered body after body in the order of Lattice::sites.
 struct Points {
@@ -22,10 +29,17 @@ struct Points {
   Array<std::uint8_t> bonds;  ///< bit k: still bound to the neighbour of bond k (cutting/bonds.h)
   Array<std::uint8_t> anchored;  ///< lies in an anchored region
   Array<std::uint8_t> material;  ///< in LatticeBody::materials; empty where no body has inclusions
+  /// Of bonds that blades broke, by crossing_key(); a bond that tore has none.
+  std::unordered_map<std::int64_t, Crossing> crossings;
   int size() const { return static_cast<int>(site.size()); }
   /// Number of a point's material among those of its body.
   int material_of(std::int32_t point) const { return material.empty() ? 0 : material[point]; }
 };
+
+/// Key of the forward bond of a point along an axis (0 x, 1 y, 2 z).
+inline std::int64_t crossing_key(std::int32_t point, int axis) {
+  return 3 * std::int64_t{point} + axis;
+}
 
 struct LatticeBody {
   Body body;

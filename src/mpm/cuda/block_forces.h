@@ -4,7 +4,7 @@
 #include "material/laws.h"
 #include "mpm/cuda/cell_stabilisation.h"
 #include "mpm/cuda/half_cell.h"
-#include "mpm/cuda/point_contact.h"
+#include "mpm/cuda/tool_pushes.h"
 
 namespace tissue_sim {
 
@@ -13,25 +13,25 @@ struct BlockShared {
   float4* u;                  ///< [slots], divided by the cell size
   float4* v;                  ///< [slots], the same; only where contact or viscosity needs it
   float4* exchange;           ///< [9][threads]
-  unsigned long long* loads;  ///< [collider_count][6]
+  unsigned long long* loads;  ///< [kMaxColliders][6]
+  Collider* colliders;        ///< [kMaxColliders]
 };
 
-/// What one substep of a block needs beside its nodes.
+/// What one substep of a bundle needs beside its nodes.
 struct BlockStep {
-  const Collider* colliders;
-  std::uint32_t near;
-  float4* force;  ///< of all slots
+  const HalfPush* pushes;  ///< of colliders, see find_pushes()
+  std::uint32_t touched;   ///< the thread's half cells that they push
+  float4* force;           ///< of all slots
 };
 
 /// Volumes of the points 2 sy + sx of a half cell.
-__device__ __forceinline__ float4 half_volumes(const CudaTables& t, const CudaBlock& b,
-                                               const CudaBody& body, int x, int y, int z, int sz) {
-  if (b.whole != 0) {
+__device__ __forceinline__ float4 half_volumes(const CudaTables& t, const CudaColumn& c,
+                                               const CudaBody& body, int z, int sz) {
+  if (c.whole != 0) {
     return {body.point_volume, body.point_volume, body.point_volume, body.point_volume};
   }
-  const int step = b.nx * b.ny;
-  const float* v = t.volume + lane_of(b, x, y, z, 4 * sz);
-  return {v[0], v[step], v[2 * step], v[3 * step]};
+  const float* v = t.volume + c.lane + (8 * z + 4 * sz) * c.step;
+  return {v[0], v[c.step], v[2 * c.step], v[3 * c.step]};
 }
 
 /// F to the stress P times the volume, in place; `damping` is added.
@@ -69,61 +69,39 @@ __device__ __forceinline__ void viscous_stress(const CudaBody& body, const HalfP
 }
 
 /// Adds the forces of colliders on the points of half a cell to its transposed half plane.
-__device__ __forceinline__ void add_contact(const CudaTables& t, const CudaBlock& b,
-                                            const CudaBody& body, const BlockShared& s,
-                                            const BlockStep& step, int x, int y, int z, int sz,
-                                            const float4& volume, const HalfPlane (&h)[3],
-                                            HalfPlane (&out)[3]) {
-  const int pitch = b.nx + 2, plane = pitch * (b.ny + 2);
-  const int first = z * plane + y * pitch + x;
-  // Most half cells are far from everything: its points lie within two cells of its middle,
-  // stretched as they may be.
-  float middle[3];
-  reference_place(b, body.cell_size, x, y, z, 4 * sz, middle);
+__device__ __forceinline__ void add_push(const HalfPush& push, float cell_size,
+                                         HalfPlane (&out)[3]) {
 #pragma unroll
-  for (int c = 0; c < 3; ++c) middle[c] += body.cell_size * h[c].wAA;
-  std::uint32_t close = 0;
-  for (std::uint32_t left = step.near; left != 0; left &= left - 1) {
-    const int c = __ffs(static_cast<int>(left)) - 1;
-    if (may_touch(step.colliders[c], middle, 2 * body.cell_size)) close |= 1u << c;
-  }
-  if (close == 0) return;
-  // The stencils take forces by -1 / cell size, as they do stress.
-  for (int q = 0; q < 4; ++q) {
-    const int sub = 4 * sz + q;
-    const int p = t.point[lane_of(b, x, y, z, sub)];
-    if (p < 0) continue;
-    const float side_x = (q & 1) != 0 ? 1.0f : -1.0f, side_y = (q & 2) != 0 ? 1.0f : -1.0f;
-    float place[3];
-    reference_place(b, body.cell_size, x, y, z, sub, place);
-#pragma unroll
-    for (int c = 0; c < 3; ++c) place[c] += body.cell_size * point_value(h[c], side_x, side_y);
-    const float v = q == 0 ? volume.x : q == 1 ? volume.y : q == 2 ? volume.z : volume.w;
-    const float3 push =
-        contact_push(t, step.colliders, close, p, v, {place[0], place[1], place[2]}, body.spring,
-                     s.v + first, pitch, plane, sub, body.cell_size, s.loads);
-    add_point_force(-body.cell_size * push.x, side_x, side_y, out[0]);
-    add_point_force(-body.cell_size * push.y, side_x, side_y, out[1]);
-    add_point_force(-body.cell_size * push.z, side_x, side_y, out[2]);
+  for (int c = 0; c < 3; ++c) {
+    const float4 f = *reinterpret_cast<const float4*>(push.of[c]);
+    // The stencils take forces by -1 / cell size, as they do stress.
+    add_point_force(-cell_size * f.x, -1, -1, out[c]);
+    add_point_force(-cell_size * f.y, 1, -1, out[c]);
+    add_point_force(-cell_size * f.z, -1, 1, out[c]);
+    add_point_force(-cell_size * f.w, 1, 1, out[c]);
   }
 }
 
-/// Forces of half a cell: reads its nodes, gives its transposed half plane.
-template <class LawOf, bool kViscous, bool kSpecial>
-__device__ __forceinline__ void half_forces(const CudaTables& t, const CudaBlock& b,
-                                            const CudaBody& body, const BlockShared& s,
-                                            const BlockStep& step, int x, int y, int z, int sz,
-                                            const HalfWeights& weights, HalfPlane (&out)[3]) {
-  const int pitch = b.nx + 2, plane = pitch * (b.ny + 2);
-  const int first = z * plane + y * pitch + x;
+/// Forces of half a cell: reads its nodes, gives its transposed half plane. `stiffness` and `bends`
+/// are for kPartial alone: where the cell is not full, kStabilisation mu V, else 0.
+template <class LawOf, bool kViscous, bool kPartial>
+__device__ __forceinline__ void half_forces(const CudaTables& t, const CudaColumn& column,
+                                            const CudaBody& body, const BlockShared& s, int z,
+                                            int sz, const HalfWeights& weights, float stiffness,
+                                            HalfPlane (&out)[3], HalfBends (&bends)[3]) {
+  const int first = column.slot + z * column.plane;
   HalfPlane h[3], rate[3];
-  read_half(s.u + first, pitch, plane, weights, h);
-  if (kViscous) read_half(s.v + first, pitch, plane, weights, rate);
-  const float4 volume = half_volumes(t, b, body, x, y, z, sz);
+  HalfBends bent[3];
+  read_half<kPartial>(s.u + first, column.pitch, column.plane, weights, h, bent);
+  if (kViscous) read_half(s.v + first, column.pitch, column.plane, weights, rate);
+  const float4 volume = half_volumes(t, column, body, z, sz);
   float damping[9];
   if (kViscous) viscous_stress(body, h, rate, volume, damping);
 #pragma unroll
-  for (int c = 0; c < 3; ++c) out[c] = {};
+  for (int c = 0; c < 3; ++c) {
+    out[c] = {};
+    if (kPartial && stiffness != 0) stabilise_half(stiffness, h[c], bent[c], out[c], bends[c]);
+  }
 #pragma unroll
   for (int ty = 0; ty < 2; ++ty) {
     const float side = ty == 0 ? -1.0f : 1.0f;
@@ -148,16 +126,15 @@ __device__ __forceinline__ void half_forces(const CudaTables& t, const CudaBlock
       add_row_stress(low, high, side, out[c]);
     }
   }
-  if (!kSpecial || step.near == 0) return;
-  add_contact(t, b, body, s, step, x, y, z, sz, volume, h, out);
 }
 
-/// Sums what the cells give to a node plane, in a fixed order, and puts it to the slots from `slot`
-/// on.
-__device__ __forceinline__ void write_plane(const CudaBlock& b, const float4* exchange, float scale,
-                                            float4* force) {
-  const int pitch = b.nx + 2, count = pitch * (b.ny + 2), columns = b.nx * b.ny;
-  for (int i = static_cast<int>(threadIdx.x); i < count; i += static_cast<int>(blockDim.x)) {
+/// Sums what the cells give to a node plane of a block, in a fixed order, and puts it to `force`.
+/// `exchange` is that of the block's first column, `places` lie between the nine sums of a column.
+/// Goes on from `i`, and leaves it at what is left for the next block.
+__device__ __forceinline__ void write_plane(int nx, int ny, const float4* exchange, int places,
+                                            float scale, float4* force, int& i) {
+  const int pitch = nx + 2, count = pitch * (ny + 2);
+  for (; i < count; i += static_cast<int>(blockDim.x)) {
     const int y = i / pitch, x = i - y * pitch;
     float4 f = {0, 0, 0, 0};
 #pragma unroll
@@ -165,9 +142,9 @@ __device__ __forceinline__ void write_plane(const CudaBlock& b, const float4* ex
 #pragma unroll
       for (int dx = 0; dx < 3; ++dx) {
         const int cx = x - dx, cy = y - dy;
-        const bool there = cx >= 0 && cy >= 0 && cx < b.nx && cy < b.ny;
+        const bool there = cx >= 0 && cy >= 0 && cx < nx && cy < ny;
         const float4 g =
-            there ? exchange[(3 * dy + dx) * columns + cy * b.nx + cx] : float4{0, 0, 0, 0};
+            there ? exchange[(3 * dy + dx) * places + cy * nx + cx] : float4{0, 0, 0, 0};
         f.x += g.x;
         f.y += g.y;
         f.z += g.z;
@@ -175,6 +152,7 @@ __device__ __forceinline__ void write_plane(const CudaBlock& b, const float4* ex
     }
     __stcg(force + i, float4{scale * f.x, scale * f.y, scale * f.z, 0});
   }
+  i -= count;
 }
 
 /// Adds the plane force of the neighbouring thread, which has the other half of the column's cells.
@@ -190,21 +168,40 @@ __device__ __forceinline__ void add_neighbour(PlaneForce& p) {
   p.Bd += __shfl_xor_sync(kAll, p.Bd, 1);
 }
 
-/// Forces of a block. Two threads, neighbours in a warp, walk up each column of cells: one has the
+/// nx, ny, nz and first_slot of a block, in one load.
+__device__ __forceinline__ int4 block_size(const CudaTables& t, int block) {
+  return __ldg(reinterpret_cast<const int4*>(t.blocks + block));
+}
+
+/// Forces of a bundle. Two threads, neighbours in a warp, walk up each column of cells: one has the
 /// lower, the other the upper halves of the cells, with what these give to the next two node planes
-/// in registers. Contact and cells that are not full need kSpecial.
-template <class LawOf, bool kViscous, bool kSpecial>
-__device__ __forceinline__ void block_forces(const CudaTables& t, const CudaBlock& b,
-                                             const CudaBody& body, const BlockShared& s,
-                                             const BlockStep& step) {
-  const int column = static_cast<int>(threadIdx.x) / 2, columns = b.nx * b.ny;
-  const bool active = column < columns;
-  const int y = column / b.nx, x = column - y * b.nx;
-  const int plane = (b.nx + 2) * (b.ny + 2);
-  const bool partial = kSpecial && b.partial != 0;
+/// in registers. `block` is the bundle's first; contact and bundles of several blocks need
+/// kSpecial, cells that are not full kPartial.
+template <class LawOf, bool kViscous, bool kSpecial, bool kPartial>
+__device__ __forceinline__ void block_forces(const CudaTables& t, const CudaBundle& w,
+                                             const CudaBlock& block, const CudaBody& body,
+                                             const BlockShared& s, const BlockStep& step) {
+  const int index = static_cast<int>(threadIdx.x) / 2;
+  const int places = kSpecial ? w.places : block.nx * block.ny;
+  const int nz = kSpecial ? w.nz : block.nz;
+  const bool active = index < (kSpecial ? w.columns : places);
+  CudaColumn column;
+  if constexpr (kSpecial) {
+    column = column_of(t, w, block, body.cell_size, min(index, w.columns - 1));
+    if (w.columns < places) {  // those without points give nothing
+      for (int i = static_cast<int>(threadIdx.x); i < 9 * places;
+           i += static_cast<int>(blockDim.x)) {
+        s.exchange[i] = {0, 0, 0, 0};
+      }
+      __syncthreads();
+    }
+  } else {
+    column = column_of(block, body.cell_size, index);
+  }
+  const int4 first{block.nx, block.ny, block.nz, block.first_slot};
   PlaneForce next[3] = {}, after[3] = {};
 #pragma unroll 1
-  for (int z = 0; z < b.nz + 2; ++z) {
+  for (int z = 0; z < nz + 2; ++z) {
     const int sz = static_cast<int>(threadIdx.x) % 2;
     PlaneForce now[3];
 #pragma unroll
@@ -213,48 +210,64 @@ __device__ __forceinline__ void block_forces(const CudaTables& t, const CudaBloc
       next[c] = after[c];
       after[c] = {};
     }
-    if (active && z < b.nz) {
+    if (active && z < column.nz) {
       const HalfWeights k(sz == 0 ? -1.0f : 1.0f);
       HalfPlane out[3];
-      half_forces<LawOf, kViscous, kSpecial>(t, b, body, s, step, x, y, z, sz, k, out);
+      HalfBends bends[3];
+      float stiffness = 0;
+      if (kPartial) {
+        stiffness = kStabilisation * __ldg(t.partial + column.cell + z * column.step);
+      }
+      half_forces<LawOf, kViscous, kPartial>(t, column, body, s, z, sz, k, stiffness, out, bends);
+      if (kSpecial && (step.touched >> z & 1u) != 0) {
+        add_push(step.pushes[2 * (z * w.columns + index) + sz], body.cell_size, out);
+      }
 #pragma unroll
       for (int c = 0; c < 3; ++c) {
         add_to_plane(out[c], k.below, k.slope_below, now[c]);
         add_to_plane(out[c], kAverageCenter, k.slope_center, next[c]);
         add_to_plane(out[c], k.above, k.slope_above, after[c]);
       }
-      const float mu =
-          partial && sz == 0 ? t.partial[b.first_lane / 8 + (z * b.ny + y) * b.nx + x] : 0.0f;
-      if (kSpecial && mu != 0) {
-        const float4* node = s.u + z * plane + y * (b.nx + 2) + x;
+      if (kPartial && stiffness != 0) {
 #pragma unroll
         for (int c = 0; c < 3; ++c) {
-          const StabilisingForce f =
-              stabilising_force(node, b.nx + 2, plane, c, kStabilisation * mu);
-          add(f.plane[0], now[c]);
-          add(f.plane[1], next[c]);
-          add(f.plane[2], after[c]);
+          add_to_plane(bends[c], k.below, k.slope_below, now[c]);
+          add_to_plane(bends[c], kAverageCenter, k.slope_center, next[c]);
+          add_to_plane(bends[c], k.above, k.slope_above, after[c]);
         }
       }
     }
 #pragma unroll
     for (int c = 0; c < 3; ++c) {
       add_neighbour(now[c]);
-      if (kSpecial) now[c].BB += __shfl_xor_sync(0xffffffffu, now[c].BB, 1);
+      if (kPartial) now[c].BB += __shfl_xor_sync(0xffffffffu, now[c].BB, 1);
     }
     if (active) {
       float f[3][3][3];
 #pragma unroll
-      for (int c = 0; c < 3; ++c) node_forces<kSpecial>(now[c], f[c]);
+      for (int c = 0; c < 3; ++c) node_forces<kPartial>(now[c], f[c]);
 #pragma unroll
       for (int k = 0; k < 9; ++k) {
         if ((k < 5) != (sz == 0)) continue;  // each of the two writes half of the sums
-        s.exchange[k * columns + column] = {f[0][k / 3][k % 3], f[1][k / 3][k % 3],
-                                            f[2][k / 3][k % 3], 0};
+        s.exchange[k * places + column.place] = {f[0][k / 3][k % 3], f[1][k / 3][k % 3],
+                                                 f[2][k / 3][k % 3], 0};
       }
     }
     __syncthreads();
-    write_plane(b, s.exchange, -body.inv_cell_size, step.force + b.first_slot + z * plane);
+    int i = static_cast<int>(threadIdx.x), place = 0;
+    if constexpr (kSpecial) {
+      for (int j = 0; j < w.blocks; ++j) {
+        const int4 b = j == 0 ? first : block_size(t, w.first_block + j);
+        if (z < b.z + 2) {
+          write_plane(b.x, b.y, s.exchange + place, places, -body.inv_cell_size,
+                      step.force + b.w + z * (b.x + 2) * (b.y + 2), i);
+        }
+        place += b.x * b.y;
+      }
+    } else {
+      write_plane(block.nx, block.ny, s.exchange, places, -body.inv_cell_size,
+                  step.force + block.first_slot + z * column.plane, i);
+    }
     __syncthreads();
   }
 }

@@ -11,7 +11,15 @@ struct SlotCache {
   std::int32_t* node;     ///< CudaTables::slot_node
   std::uint32_t* shared;  ///< CudaTables::slot_parts
   uint4* parts;           ///< the first four slots that share the node
+  uint4* more;            ///< the next four; null where there is no room
 };
+
+/// Slots 4 to 7 that share a node.
+__device__ __forceinline__ uint4 more_parts(const CudaTables& t, std::uint32_t shared) {
+  const std::uint32_t *part = t.parts + (shared >> 6) + 4, count = shared & 63u;
+  return {count > 4 ? __ldg(part) : 0, count > 5 ? __ldg(part + 1) : 0,
+          count > 6 ? __ldg(part + 2) : 0, count > 7 ? __ldg(part + 3) : 0};
+}
 
 /// The first four slots that share a node, or the slot itself alone.
 __device__ __forceinline__ uint4 first_parts(const CudaTables& t, std::uint32_t slot,
@@ -26,13 +34,14 @@ __device__ __forceinline__ uint4 first_parts(const CudaTables& t, std::uint32_t 
 inline constexpr std::uint32_t kPushed = 1u << 31;
 
 template <bool kFaces>
-__device__ __forceinline__ void fill_cache(const CudaTables& t, const CudaBlock& b,
+__device__ __forceinline__ void fill_cache(const CudaTables& t, int first_slot, int slots,
                                            const CudaFaces& faces, const SlotCache& cache) {
-  for (int i = static_cast<int>(threadIdx.x); i < b.slots(); i += static_cast<int>(blockDim.x)) {
-    const int slot = b.first_slot + i;
+  for (int i = static_cast<int>(threadIdx.x); i < slots; i += static_cast<int>(blockDim.x)) {
+    const int slot = first_slot + i;
     cache.node[i] = t.slot_node[slot];
     cache.shared[i] = t.slot_parts[slot];
     cache.parts[i] = first_parts(t, slot, cache.shared[i]);
+    if (cache.more != nullptr) cache.more[i] = more_parts(t, cache.shared[i]);
     if (!kFaces) continue;
     const std::int32_t node = cache.node[i] < 0 ? ~cache.node[i] : cache.node[i];
     if (faces.marks[node] != 0) cache.shared[i] |= kPushed;
@@ -72,19 +81,19 @@ __device__ __forceinline__ void add(const float4& p, float4& f) {
   f.z += p.z;
 }
 
-/// Brings the nodes of a block into `u` and, where `v` is not null, `v` (divided by the cell size,
-/// so that stencils give gradients). With `kMove` it first moves them on by the forces of the last
-/// substep, summed in the order of the slots; every block that has a node computes the same, and
-/// the one that owns it writes it down. Each thread has several nodes in hand, for all their loads
-/// to be under way at once. `pushed` is read with kFaces alone.
+/// Brings the nodes of `count` slots into `u` and, where `v` is not null, `v` (divided by the cell
+/// size, so that stencils give gradients). With `kMove` it first moves them on by the forces of the
+/// last substep, summed in the order of the slots; every block that has a node computes the same,
+/// and the one that owns it writes it down. Each thread has several nodes in hand, for all their
+/// loads to be under way at once. `pushed` is read with kFaces alone.
 template <bool kMove, bool kCached, bool kFaces = false>
-__device__ __forceinline__ void bring_nodes(const CudaTables& t, const CudaBlock& b,
+__device__ __forceinline__ void bring_nodes(const CudaTables& t, int first_slot, int count,
                                             const SlotCache& cache, const CudaNodes& from,
                                             const CudaNodes& to, const float4* force,
                                             const NodeStep& step, float scale, float4* u_out,
                                             float4* v_out, const PushedNodes& pushed = {}) {
   constexpr int kHand = kCached ? 2 : 4;
-  const int count = b.slots(), threads = static_cast<int>(blockDim.x);
+  const int threads = static_cast<int>(blockDim.x);
   for (int i = static_cast<int>(threadIdx.x); i < count; i += kHand * threads) {
     std::int32_t entry[kHand], node[kHand];
     std::uint32_t shared[kHand];
@@ -93,7 +102,7 @@ __device__ __forceinline__ void bring_nodes(const CudaTables& t, const CudaBlock
     Pushed push[kHand];
 #pragma unroll
     for (int k = 0; k < kHand; ++k) {
-      const int local = min(i + k * threads, count - 1), slot = b.first_slot + local;
+      const int local = min(i + k * threads, count - 1), slot = first_slot + local;
       entry[k] = kCached ? cache.node[local] : __ldg(t.slot_node + slot);
       shared[k] = !kMove ? 0 : kCached ? cache.shared[local] : __ldg(t.slot_parts + slot);
       if (kMove && kCached) parts[k] = cache.parts[local];
@@ -111,14 +120,23 @@ __device__ __forceinline__ void bring_nodes(const CudaTables& t, const CudaBlock
         shared[k] &= ~kPushed;
       }
       if (!kCached) {
-        parts[k] = first_parts(t, b.first_slot + min(i + k * threads, count - 1), shared[k]);
+        parts[k] = first_parts(t, first_slot + min(i + k * threads, count - 1), shared[k]);
       }
       f[k] = __ldcg(force + parts[k].x);
       const std::uint32_t part_count = shared[k] & 63u;
-      float4 more[3] = {};
+      float4 more[kCached ? 7 : 3] = {};
       if (part_count > 1) more[0] = __ldcg(force + parts[k].y);
       if (part_count > 2) more[1] = __ldcg(force + parts[k].z);
       if (part_count > 3) more[2] = __ldcg(force + parts[k].w);
+      if constexpr (kCached) {
+        if (cache.more != nullptr && part_count > 4) {
+          const uint4 next = cache.more[min(i + k * threads, count - 1)];
+          more[3] = __ldcg(force + next.x);
+          if (part_count > 5) more[4] = __ldcg(force + next.y);
+          if (part_count > 6) more[5] = __ldcg(force + next.z);
+          if (part_count > 7) more[6] = __ldcg(force + next.w);
+        }
+      }
       for (const float4& p : more) add(p, f[k]);
     }
 #pragma unroll
@@ -128,7 +146,7 @@ __device__ __forceinline__ void bring_nodes(const CudaTables& t, const CudaBlock
       if (kMove) {
         const int part_count = static_cast<int>(shared[k] & 63u);
 #pragma unroll 4
-        for (int p = 4; p < part_count; ++p) {
+        for (int p = kCached && cache.more != nullptr ? 8 : 4; p < part_count; ++p) {
           add(__ldcg(force + __ldg(t.parts + (shared[k] >> 6) + p)), f[k]);
         }
         if (kFaces) add({push[k].of(0), push[k].of(1), push[k].of(2), 0}, f[k]);
@@ -144,6 +162,32 @@ __device__ __forceinline__ void bring_nodes(const CudaTables& t, const CudaBlock
       if (v_out != nullptr) v_out[at] = {scale * v[k].x, scale * v[k].y, scale * v[k].z, 0};
     }
   }
+}
+
+/// Column `index` of a block that is alone in its bundle, all of whose columns hold points.
+__device__ __forceinline__ CudaColumn column_of(const CudaBlock& b, float cell_size, int index) {
+  const int y = index / b.nx, x = index - y * b.nx;
+  CudaColumn c;
+  c.pitch = b.nx + 2;
+  c.plane = c.pitch * (b.ny + 2);
+  c.slot = y * c.pitch + x;
+  c.nz = b.nz;
+  c.lane = b.first_lane + index;
+  c.step = b.nx * b.ny;
+  c.cell = b.first_lane / 8 + index;
+  c.place = index;
+  c.middle[0] = b.origin[0] + cell_size * static_cast<float>(x + 1);
+  c.middle[1] = b.origin[1] + cell_size * static_cast<float>(y + 1);
+  c.middle[2] = b.origin[2] + cell_size;
+  c.whole = b.whole;
+  return c;
+}
+/// Column `index` of a bundle, `block` its first: from memory only where it must be.
+__device__ __forceinline__ CudaColumn column_of(const CudaTables& t, const CudaBundle& w,
+                                                const CudaBlock& block, float cell_size,
+                                                int index) {
+  if (w.blocks == 1 && w.columns == w.places) return column_of(block, cell_size, index);
+  return t.columns[w.first_column + index];
 }
 
 /// Lane of the point at sub-position s of cell (x, y, z).

@@ -8,39 +8,25 @@
 
 namespace tissue_sim {
 
-/// What a cell gives to its three node planes for one component.
-struct StabilisingForce {
-  PlaneForce plane[3];
-  float energy2;  ///< twice the energy, over cell size squared
-};
-
-/// One x-y quantity on three planes to what it gives back to them. The weights are template
-/// arguments, so that the device needs no table.
+/// Twice the energy, over stiffness and cell size squared, of one x-y quantity on three planes.
 template <int kQuantity>
-__device__ __forceinline__ void stabilise_one(float stiffness, float (&q)[3][kXyCount],
-                                              float& energy2) {
+__device__ __forceinline__ float number_energy2(const float (&q)[3][kXyCount]) {
   constexpr float kA = stabilisation::weight2(kQuantity, 0),
                   kD = stabilisation::weight2(kQuantity, 1),
                   kB = stabilisation::weight2(kQuantity, 2);
   const Line<float> l(q[0][kQuantity], q[1][kQuantity], q[2][kQuantity]);
-  const float a = kA * stiffness * l.A, d = kD * stiffness * l.d, b = kB * stiffness * l.B;
-  energy2 += a * l.A + d * l.d + b * l.B;
-  q[0][kQuantity] = kAverageSide * a - d + b;
-  q[1][kQuantity] = kAverageCenter * a - 2.0f * b;
-  q[2][kQuantity] = kAverageSide * a + d + b;
+  return kA * l.A * l.A + kD * l.d * l.d + kB * l.B * l.B;
 }
 template <int... kQuantities>
-__device__ __forceinline__ void stabilise_all(std::integer_sequence<int, kQuantities...>,
-                                              float stiffness, float (&q)[3][kXyCount],
-                                              float& energy2) {
-  (stabilise_one<kQuantities>(stiffness, q, energy2), ...);
+__device__ __forceinline__ float numbers_energy2(std::integer_sequence<int, kQuantities...>,
+                                                 const float (&q)[3][kXyCount]) {
+  return (number_energy2<kQuantities>(q) + ...);
 }
 
-/// `node` is the lowest of the cell's 27, `stiffness` kStabilisation mu V. Out of line, for few
-/// cells need it and the others shall keep their registers.
-__device__ __noinline__ inline StabilisingForce stabilising_force(const float4* node, int pitch,
-                                                                  int plane, int c,
-                                                                  float stiffness) {
+/// Twice the energy of what stabilises component c in a cell, over cell size squared. `node` is the
+/// lowest of its 27, `stiffness` kStabilisation mu V.
+__device__ inline float stabilising_energy2(const float4* node, int pitch, int plane, int c,
+                                            float stiffness) {
   float q[3][kXyCount];
 #pragma unroll
   for (int z = 0; z < 3; ++z) {
@@ -58,23 +44,40 @@ __device__ __noinline__ inline StabilisingForce stabilising_force(const float4* 
     q[z][kdA] = b.A, q[z][kdd] = b.d, q[z][kdB] = b.B;
     q[z][kBA] = e.A, q[z][kBd] = e.d, q[z][kBB] = e.B;
   }
-  float energy2 = 0;
-  stabilise_all(std::make_integer_sequence<int, kXyCount>(), stiffness, q, energy2);
-  StabilisingForce f;
-#pragma unroll
-  for (int z = 0; z < 3; ++z) {
-    f.plane[z] = {q[z][kAA], q[z][kAd], q[z][kAB], q[z][kdA], q[z][kdd],
-                  q[z][kdB], q[z][kBA], q[z][kBd], q[z][kBB]};
-  }
-  f.energy2 = energy2;
-  return f;
+  return stiffness * numbers_energy2(std::make_integer_sequence<int, kXyCount>(), q);
 }
 
-/// Adds what stabilises the cell to its node planes.
-__device__ __forceinline__ void add(const PlaneForce& f, PlaneForce& to) {
-  to.AA += f.AA, to.Ad += f.Ad, to.AB += f.AB;
-  to.dA += f.dA, to.dd += f.dd, to.dB += f.dB;
-  to.BA += f.BA, to.Bd += f.Bd, to.BB += f.BB;
+/// One x-y quantity's value and slope on the half's plane of points to what gives back to them. The
+/// neighbouring thread has the other half: along z, w+ and w- are A +- d/8, s+ and s- d/2 +- B/4.
+template <int kQuantity>
+__device__ __forceinline__ void stabilise_number(float stiffness, unsigned pair, float w, float s,
+                                                 float& to_w, float& to_s) {
+  constexpr float kA = 0.25f * stabilisation::weight2(kQuantity, 0),
+                  kD = 16.0f * stabilisation::weight2(kQuantity, 1),
+                  kB = 4.0f * stabilisation::weight2(kQuantity, 2);
+  const float other_s = __shfl_xor_sync(pair, s, 1);
+  to_s = stiffness * kB * (s - other_s);
+  if (kA + kD == 0) return;
+  const float other_w = __shfl_xor_sync(pair, w, 1);
+  to_w = stiffness * ((kA + kD) * w + (kA - kD) * other_w);
+}
+
+/// What stabilises the cell, of the half that the thread has; the neighbouring thread does the
+/// other. `stiffness` is kStabilisation mu V. Sets all numbers of `out` and `bends_out`.
+__device__ __forceinline__ void stabilise_half(float stiffness, const HalfPlane& h,
+                                               const HalfBends& b, HalfPlane& out,
+                                               HalfBends& bends_out) {
+  const unsigned pair = 3u << (threadIdx.x & 30u);
+  out.wAA = 0;
+  stabilise_number<kAA>(stiffness, pair, h.wAA, h.sAA, out.wAA, out.sAA);
+  stabilise_number<kAd>(stiffness, pair, h.wAd, h.sAd, out.wAd, out.sAd);
+  stabilise_number<kdA>(stiffness, pair, h.wdA, h.sdA, out.wdA, out.sdA);
+  stabilise_number<kdd>(stiffness, pair, h.wdd, h.sdd, out.wdd, out.sdd);
+  stabilise_number<kAB>(stiffness, pair, h.wAB, b.sAB, out.wAB, bends_out.sAB);
+  stabilise_number<kdB>(stiffness, pair, h.wdB, b.sdB, out.wdB, bends_out.sdB);
+  stabilise_number<kBA>(stiffness, pair, h.wBA, b.sBA, out.wBA, bends_out.sBA);
+  stabilise_number<kBd>(stiffness, pair, h.wBd, b.sBd, out.wBd, bends_out.sBd);
+  stabilise_number<kBB>(stiffness, pair, b.wBB, b.sBB, bends_out.wBB, bends_out.sBB);
 }
 
 }  // namespace tissue_sim

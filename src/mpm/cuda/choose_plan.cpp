@@ -21,7 +21,7 @@ double cycles(const std::vector<LatticeBody>& bodies, const CudaShape& s, const 
               bool small) {
   const BlockShape& b = s.blocks;
   const double slots = (b.x + 2.0) * (b.y + 2) * (b.z + 2);
-  const double shared = (small ? 56 : 32) * slots + 144.0 * s.threads + 2600;
+  const double shared = (small ? 56 : 32) * slots + 144.0 * s.threads + 5800;
   if (shared > static_cast<double>(limits.shared_bytes)) return 1e30;
   double blocks = 0;
   int parts = 1;
@@ -44,16 +44,29 @@ double cycles(const std::vector<LatticeBody>& bodies, const CudaShape& s, const 
   return small ? wave + 3500 : 1.3 * waves * wave + 5000;
 }
 
+/// Columns of the block that hold points.
+int columns_of(const Block& b) {
+  int count = 0;
+  for (int column = 0; column < b.stride; ++column) {
+    bool holds = false;
+    for (int k = 0; k < 8 * b.nz && !holds; ++k) {
+      holds = b.point[static_cast<std::size_t>(k) * b.stride + column] >= 0;
+    }
+    count += holds ? 1 : 0;
+  }
+  return count;
+}
+
 CudaShape shape_from(const char* text) {
   CudaShape s;
   BlockShape& b = s.blocks;
   int small = 0;
   if (std::sscanf(text, "%d %d %d %d %d", &b.x, &b.y, &b.z, &s.threads, &small) != 5 || b.x < 1 ||
-      b.y < 1 || b.z < 1 || s.threads > kMaxCudaThreads || s.threads % 32 != 0 ||
-      2 * b.x * b.y > s.threads) {
+      b.y < 1 || b.z < 1 || b.z > kMaxLayers || s.threads > kMaxCudaThreads ||
+      s.threads % 32 != 0 || 2 * b.x * b.y > s.threads) {
     throw std::runtime_error(std::string("TISSUE_SIM_CUDA_SHAPE is '") + text +
                              "': it must be 'x y z threads small', threads a multiple of 32 up "
-                             "to 256 and at least 2 x y, small 0 or 1");
+                             "to 256 and at least 2 x y, z at most 16, small 0 or 1");
   }
   s.small = small != 0;
   return s;
@@ -71,7 +84,7 @@ CudaShape choose_shape(const std::vector<LatticeBody>& bodies, const CudaLimits&
       if (!small && threads > 192) continue;
       for (int x = threads / 2; x > 0; --x) {  // of equals, the longest along x
         for (int y = 1; y <= threads / 2 / x; ++y) {
-          for (int z = 1; z <= 16; ++z) {
+          for (int z = 1; z <= kMaxLayers; ++z) {
             CudaShape s;
             s.blocks = {x, y, z};
             s.threads = threads;
@@ -87,6 +100,52 @@ CudaShape choose_shape(const std::vector<LatticeBody>& bodies, const CudaLimits&
     }
   }
   return best;
+}
+
+std::vector<std::vector<int>> bundle_blocks(const std::vector<Block*>& blocks, std::size_t wanted,
+                                            const BundleLimits& limits) {
+  struct Filled {
+    int body, material;
+    BundleLimits has;
+    std::vector<int> blocks;
+  };
+  std::vector<Filled> single;
+  for (std::size_t i = 0; i < blocks.size(); ++i) {
+    const Block& b = *blocks[i];
+    single.push_back({b.body,
+                      b.material,
+                      {columns_of(b), b.nx * b.ny, (b.nx + 2) * (b.ny + 2) * (b.nz + 2)},
+                      {static_cast<int>(i)}});
+  }
+  if (blocks.size() > wanted) {
+    std::stable_sort(single.begin(), single.end(), [](const Filled& a, const Filled& b) {
+      return a.has.columns > b.has.columns;
+    });
+  }
+  std::vector<Filled> bundles;
+  for (Filled& one : single) {
+    Filled* room = nullptr;
+    if (bundles.size() >= wanted) {
+      for (Filled& f : bundles) {
+        const bool fits = f.body == one.body && f.material == one.material &&
+                          f.has.columns + one.has.columns <= limits.columns &&
+                          f.has.places + one.has.places <= limits.places &&
+                          f.has.slots + one.has.slots <= limits.slots;
+        if (fits && (room == nullptr || f.has.columns < room->has.columns)) room = &f;
+      }
+    }
+    if (room == nullptr) {
+      bundles.push_back(std::move(one));
+      continue;
+    }
+    room->has.columns += one.has.columns;
+    room->has.places += one.has.places;
+    room->has.slots += one.has.slots;
+    room->blocks.push_back(one.blocks.front());
+  }
+  std::vector<std::vector<int>> result;
+  for (Filled& f : bundles) result.push_back(std::move(f.blocks));
+  return result;
 }
 
 }  // namespace tissue_sim

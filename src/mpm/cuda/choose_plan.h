@@ -24,4 +24,17 @@ struct CudaLimits {
 /// variable TISSUE_SIM_CUDA_SHAPE="x y z threads small" overrules it, for measurements.
 CudaShape choose_shape(const std::vector<LatticeBody>& bodies, const CudaLimits& limits);
 
+/// What the blocks that share a thread block may have together.
+struct BundleLimits {
+  int columns;  ///< that hold points
+  int places;   ///< CudaBundle::places
+  int slots;
+};
+
+/// Each block alone, or, where those are more than `wanted`, large ones first, each of the others
+/// with those that have the fewest columns. Gives indices into `blocks`; more than `wanted` bundles
+/// where they do not fit into fewer.
+std::vector<std::vector<int>> bundle_blocks(const std::vector<Block*>& blocks, std::size_t wanted,
+                                            const BundleLimits& limits);
+
 }  // namespace tissue_sim

@@ -9,10 +9,14 @@
 namespace tissue_sim {
 namespace {
 
-std::size_t bytes_of(const HostTables& t, std::size_t nodes, std::size_t points) {
+/// What the tables and the state take on the GPU; clouds and contacts between tissue come on top.
+std::size_t bytes_of(const HostTables& t, std::size_t nodes, std::size_t points,
+                     std::size_t pushes) {
   return t.blocks.size() * (sizeof(CudaBlock) + sizeof(CudaMeasure) + 4) +
+         t.bundles.size() * sizeof(CudaBundle) + t.columns.size() * sizeof(CudaColumn) +
          t.slot_node.size() * (8 + 2 * sizeof(float4)) + 4 * t.parts.size() + 8 * t.point.size() +
-         4 * t.partial.size() + 4 * sizeof(float4) * nodes + 19 * points;
+         4 * t.partial.size() + 4 * sizeof(float4) * nodes + 14 * points +
+         pushes * sizeof(HalfPush);
 }
 
 /// Says how much memory the tissue takes, where the GPU has less.
@@ -30,14 +34,15 @@ void check_memory(std::size_t wanted, std::size_t held) {
 
 std::size_t CudaMpmTissue::device_bytes() const {
   const OnDevice& d = *device_;
-  std::size_t sum = d.blocks.bytes() + d.bodies.bytes() + d.slot_node.bytes() + d.point.bytes() +
-                    d.piece.bytes() + d.place.bytes() + d.slot_parts.bytes() + d.parts.bytes() +
-                    d.near.bytes() + d.colour.bytes() + d.volume.bytes() + d.partial.bytes() +
-                    d.hold.bytes() + d.bonds.bytes() + d.with.bytes() + d.whole.bytes() +
-                    d.u_before.bytes() + d.colliders.bytes() + d.loads.bytes() +
-                    d.measures.bytes() + d.cloud.bytes() + d.stretched.bytes() + d.springs.bytes() +
-                    d.contact_nodes.bytes() + d.contact_marks.bytes() + d.contact_force.bytes() +
-                    d.face_nodes.bytes() + d.gathered.bytes();
+  std::size_t sum = d.blocks.bytes() + d.bundles.bytes() + d.columns.bytes() + d.pushes.bytes() +
+                    d.bodies.bytes() + d.slot_node.bytes() + d.point.bytes() + d.piece.bytes() +
+                    d.place.bytes() + d.slot_parts.bytes() + d.parts.bytes() + d.near.bytes() +
+                    d.colour.bytes() + d.volume.bytes() + d.partial.bytes() + d.hold.bytes() +
+                    d.bonds.bytes() + d.with.bytes() + d.whole.bytes() + d.u_before.bytes() +
+                    d.colliders.bytes() + d.loads.bytes() + d.measures.bytes() + d.cloud.bytes() +
+                    d.stretched.bytes() + d.springs.bytes() + d.contact_nodes.bytes() +
+                    d.contact_marks.bytes() + d.contact_force.bytes() + d.face_nodes.bytes() +
+                    d.gathered.bytes();
   for (int i = 0; i < 2; ++i) sum += d.u[i].bytes() + d.v[i].bytes() + d.force[i].bytes();
   return sum;
 }
@@ -53,29 +58,68 @@ void CudaMpmTissue::pull() {
   unpack_nodes(d.host_nodes.data(), d.host_nodes.data() + n, state_->nodes);
 }
 
-void CudaMpmTissue::push() {
+HostTables CudaMpmTissue::plan_tables() {
   OnDevice& d = *device_;
-  const HostTables t = make_tables(*state_);
-  const std::size_t n = state_->nodes.size();
-  const auto points = static_cast<std::size_t>(state_->points.size());
-  check_memory(bytes_of(t, n, points), device_bytes());
-  check_cuda(cudaStreamSynchronize(d.stream), "finish a frame");
   d.plan.threads = d.shape.threads;
   d.plan.small = d.shape.small;
-  d.plan.max_slots = t.max_slots;
-  for (const CudaBody& b : t.bodies) {
-    d.plan.neo_hookean = d.plan.neo_hookean || b.neo_hookean != 0;
-    d.plan.fixed_corotated = d.plan.fixed_corotated || b.neo_hookean == 0;
-    d.plan.viscous = d.plan.viscous || b.viscosity > 0;
+  d.plan.max_slots = 0;
+  const std::vector<Block*>& blocks = state_->blocks.all;
+  for (const Block* b : blocks) {
+    d.plan.max_slots = std::max(d.plan.max_slots, (b->nx + 2) * (b->ny + 2) * (b->nz + 2));
   }
-  d.resident = resident_blocks(d.plan, static_cast<int>(t.blocks.size()));
-  d.face_plan = d.plan;
-  d.face_plan.faces = true;
-  d.face_resident = resident_blocks(d.face_plan, static_cast<int>(t.blocks.size()));
-  if (d.resident == 0 || d.face_resident == 0) {
+  for (const LatticeBody& b : state_->bodies) {
+    for (const Material& m : b.materials) {
+      const bool neo_hookean = m.law == Law::kNeoHookean;
+      d.plan.neo_hookean = d.plan.neo_hookean || neo_hookean;
+      d.plan.fixed_corotated = d.plan.fixed_corotated || !neo_hookean;
+      d.plan.viscous = d.plan.viscous || m.viscosity > 0;
+    }
+  }
+  const auto choose = [&d](std::size_t count) {
+    d.resident = resident_blocks(d.plan, static_cast<int>(count));
+    d.plain_plan = d.plan;
+    d.plain_plan.plain = true;
+    d.plain_resident = resident_blocks(d.plain_plan, static_cast<int>(count));
+    d.face_plan = d.plan;
+    d.face_plan.faces = true;
+    d.face_resident = resident_blocks(d.face_plan, static_cast<int>(count));
+  };
+  choose(blocks.size());
+  std::vector<std::vector<int>> bundles = bundle_blocks(blocks, blocks.size(), {});
+  if (d.plan.small && !(d.plan.cached && d.face_plan.cached)) {
+    const auto at_once =
+        static_cast<std::size_t>(std::min(cached_at_once(d.plan), cached_at_once(d.face_plan)));
+    std::vector<std::vector<int>> fewer = bundle_blocks(
+        blocks, at_once, {d.plan.threads / 2, d.plan.threads, most_cached_slots(d.face_plan)});
+    if (fewer.size() <= at_once) bundles = std::move(fewer);
+  }
+  HostTables t = make_tables(*state_, bundles);
+  d.plan.max_slots = t.max_slots;
+  choose(bundles.size());
+  d.all_plain = std::all_of(t.bundles.begin(), t.bundles.end(),
+                            [](const CudaBundle& b) { return b.blocks == 1 && b.partial == 0; });
+  if (d.resident == 0 || d.plain_resident == 0 || d.face_resident == 0) {
     throw std::runtime_error("the GPU has too little shared memory");
   }
+  return t;
+}
+
+void CudaMpmTissue::push() {
+  OnDevice& d = *device_;
+  const HostTables t = plan_tables();
+  const std::size_t n = state_->nodes.size();
+  const auto points = static_cast<std::size_t>(state_->points.size());
+  const bool pushed = state_->scene.ground.enabled || !state_->scene.tools.empty();
+  const std::size_t pushes =
+      pushed ? static_cast<std::size_t>(t.max_halves) * std::max(d.resident, d.face_resident) : 0;
+  check_memory(bytes_of(t, n, points, pushes), device_bytes());
+  check_cuda(cudaStreamSynchronize(d.stream), "finish a frame");
   d.blocks.upload(t.blocks, d.stream);
+  d.of_host = t.of_host;
+  d.bundles.upload(t.bundles, d.stream);
+  d.columns.upload(t.columns, d.stream);
+  d.push_stride = t.max_halves;
+  d.pushes.resize(pushes);
   d.bodies.upload(t.bodies, d.stream);
   d.slot_node.upload(t.slot_node, d.stream);
   d.slot_parts.upload(t.slot_parts, d.stream);

@@ -137,7 +137,21 @@ void CudaMpmTissue::advance(int substeps, float dt, const FrameInput& input) {
 }
 
 void CudaMpmTissue::find_near(double duration) {
-  const OnDevice& d = *device_;
+  OnDevice& d = *device_;
+  // A little more than the GPU finds, for what it finds must be done.
+  const double cell = state_->scene.cell_size;
+  d.may_meet = std::any_of(state_->motion.begin(), state_->motion.end(), [&](const BlockMotion& m) {
+    const double margin = m.speed * duration + cell;
+    return std::any_of(d.host_reach.data(), d.host_reach.data() + d.host_reach.size(),
+                       [&](const CudaBox& reach) {
+                         bool meets = true;
+                         for (int a = 0; a < 3; ++a) {
+                           meets = meets && m.box.min[a] - margin <= reach.max[a] &&
+                                   reach.min[a] <= m.box.max[a] + margin;
+                         }
+                         return meets;
+                       });
+  });
   launch_near(d.tables(), d.measures.data(), d.reach.data(), static_cast<int>(d.host_reach.size()),
               static_cast<float>(duration), static_cast<float>(0.5 * state_->scene.cell_size),
               d.stream);
@@ -160,11 +174,18 @@ void CudaMpmTissue::launch(int begin, int end, float dt) {
   frame.colliders = d.colliders.data() + begin * collider_count;
   frame.collider_count = static_cast<int>(collider_count);
   frame.loads = d.loads.data() + 6 * begin * collider_count;
+  frame.pushes = d.pushes.data();
+  frame.push_stride = d.push_stride;
   frame.arrived = d.arrived.data();
   const std::size_t faces = faces_may_meet() ? state_->faces.active.size() : 0;
   frame.faces = d.faces(faces);
-  launch_substeps(faces > 0 ? d.face_plan : d.plan, d.tables(), frame,
-                  faces > 0 ? d.face_resident : d.resident, d.stream);
+  if (faces > 0) {
+    launch_substeps(d.face_plan, d.tables(), frame, d.face_resident, d.stream);
+  } else if (d.all_plain && !d.may_meet) {
+    launch_substeps(d.plain_plan, d.tables(), frame, d.plain_resident, d.stream);
+  } else {
+    launch_substeps(d.plan, d.tables(), frame, d.resident, d.stream);
+  }
   d.current = (d.current + end - begin) % 2;
   state_->time += static_cast<double>(end - begin) * dt;
 }
@@ -189,12 +210,12 @@ void CudaMpmTissue::finish_measure() {
     result_.elastic_energy += m.elastic_energy;
     result_.kinetic_energy += m.kinetic_energy;
     if (!(m.speed <= result_.max_speed)) result_.max_speed = m.speed;
-    const Block& block = *state_->blocks.all[i];
+    const Block& block = *state_->blocks.all[d.of_host[i]];
     float& stiffening = stiffening_[block.body][block.material];
     stiffening = std::max(stiffening, m.stiffening);
     result_.blew_up = result_.blew_up || m.finite == 0 || m.stiffening > 1e6f;
-    state_->motion[i] = {{Vec3(m.min[0], m.min[1], m.min[2]), Vec3(m.max[0], m.max[1], m.max[2])},
-                         m.speed};
+    state_->motion[d.of_host[i]] = {
+        {Vec3(m.min[0], m.min[1], m.min[2]), Vec3(m.max[0], m.max[1], m.max[2])}, m.speed};
   }
   // Nothing that instruments do moves tissue at the speed of a bullet; what does is out of control.
   result_.blew_up = result_.blew_up || !(result_.max_speed < 300);
@@ -249,8 +270,8 @@ std::string CudaMpmTissue::plan() const {
   const BlockShape& b = d.shape.blocks;
   return std::to_string(b.x) + " x " + std::to_string(b.y) + " x " + std::to_string(b.z) +
          " cells, " + std::to_string(d.plan.threads) + " a block, " +
-         std::to_string(d.blocks.size()) + " blocks, " + std::to_string(d.resident) + " at once" +
-         (d.plan.cached ? ", cached" : "");
+         std::to_string(d.blocks.size()) + " blocks in " + std::to_string(d.bundles.size()) +
+         " bundles, " + std::to_string(d.resident) + " at once" + (d.plan.cached ? ", cached" : "");
 }
 
 }  // namespace tissue_sim

@@ -11,6 +11,8 @@
 
 namespace tissue_sim {
 
+struct HostTables;
+
 /// The nodes live on the GPU; lattice, bonds, blocks and pieces on the host too, where cuts are
 /// made between frames.
 class CudaMpmTissue final : public Tissue {
@@ -41,6 +43,7 @@ class CudaMpmTissue final : public Tissue {
  private:
   struct OnDevice;
 
+  HostTables plan_tables();  ///< how the blocks are worked on, and the tables for it
   void cut(const std::vector<BladePath>& paths, const Array<float>* u_before,
            const std::vector<BlockMotion>& before, CutReport& report);
   void cut_by_blades(const std::vector<BlockMotion>& before);

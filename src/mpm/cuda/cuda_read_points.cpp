@@ -51,8 +51,10 @@ int CudaMpmTissue::read_points(const PointSelection& selection, std::vector<std:
     d.place.upload(place, d.stream);
     c.place = d.place.data();
   }
-  cloud.resize(static_cast<std::size_t>(count) * sizeof(Point));
-  if (count == 0) return 0;
+  if (count == 0) {
+    cloud.clear();
+    return 0;
+  }
   d.cloud.resize(count);
   d.host_cloud.resize(count);
   c.points = d.cloud.data();
@@ -61,8 +63,15 @@ int CudaMpmTissue::read_points(const PointSelection& selection, std::vector<std:
   c.whole = d.whole.data();
   launch_cloud(d.tables(), d.present(), d.plan.max_slots, c, d.stream);
   d.cloud.download(d.host_cloud.data(), count, d.stream);
+  // While the points are under way: the memory of a new message is touched for the first time.
+  cloud.resize(static_cast<std::size_t>(count) * sizeof(Point));
   check_cuda(cudaStreamSynchronize(d.stream), "send a cloud");
-  std::memcpy(cloud.data(), d.host_cloud.data(), cloud.size());
+  constexpr int kChunk = 16384;  // points, half a megabyte
+  state_->cpu->for_each((count + kChunk - 1) / kChunk, [&](int i) {
+    const int first = i * kChunk, n = std::min(kChunk, count - first);
+    std::memcpy(cloud.data() + static_cast<std::size_t>(first) * sizeof(Point),
+                d.host_cloud.data() + first, static_cast<std::size_t>(n) * sizeof(Point));
+  });
   return count;
 }
 

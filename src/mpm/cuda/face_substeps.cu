@@ -3,6 +3,6 @@
 
 namespace tissue_sim {
 
-CudaKernel kernel_with_faces(const CudaPlan& plan) { return kernel_of<true>(plan); }
+CudaKernel kernel_with_faces(const CudaPlan& plan) { return kernel_of<Can::kFaces>(plan); }
 
 }  // namespace tissue_sim

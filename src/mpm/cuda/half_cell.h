@@ -30,19 +30,21 @@ struct HalfPlane {
   float wAA, wAd, wAB, wdA, wdd, wdB, wBA, wBd, sAA, sAd, sdA, sdd;
 };
 
-/// Values and slopes at one point's x and y, and what adds up to them in the transpose.
-struct PointSides {
-  float x, y;  // -1 or +1
+/// The rest of the 18 numbers, which only stabilisation needs.
+struct HalfBends {
+  float wBB, sAB, sdB, sBA, sBd, sBB;
 };
 
 __device__ __forceinline__ float component(const float4& v, int c) {
   return c == 0 ? v.x : c == 1 ? v.y : v.z;
 }
 
-/// Reads the 27 nodes of a cell, of which `node` is the lowest.
+/// Reads the 27 nodes of a cell, of which `node` is the lowest; `bends` with kBends alone.
+template <bool kBends>
 __device__ __forceinline__ void read_half(const float4* node, int pitch, int plane,
-                                          const HalfWeights& k, HalfPlane (&h)[3]) {
-  float A[3][3], d[3][3], B[3][3], sA[3][3], sd[3][3];
+                                          const HalfWeights& k, HalfPlane (&h)[3],
+                                          HalfBends (&bends)[3]) {
+  float A[3][3], d[3][3], B[3][3], sA[3][3], sd[3][3], sB[3][3];
 #pragma unroll
   for (int y = 0; y < 3; ++y) {
     float w[3][3], s[3][3];
@@ -65,6 +67,7 @@ __device__ __forceinline__ void read_half(const float4* node, int pitch, int pla
       B[c][y] = sum - 2.0f * w[c][1];
       sA[c][y] = kAverageSide * (s[c][2] + s[c][0]) + kAverageCenter * s[c][1];
       sd[c][y] = s[c][2] - s[c][0];
+      if (kBends) sB[c][y] = s[c][2] + s[c][0] - 2.0f * s[c][1];
     }
   }
 #pragma unroll
@@ -83,7 +86,20 @@ __device__ __forceinline__ void read_half(const float4* node, int pitch, int pla
     h[c].sAd = sA[c][2] - sA[c][0];
     h[c].sdA = kAverageSide * (sd[c][2] + sd[c][0]) + kAverageCenter * sd[c][1];
     h[c].sdd = sd[c][2] - sd[c][0];
+    if (!kBends) continue;
+    bends[c].wBB = B[c][2] + B[c][0] - 2.0f * B[c][1];
+    bends[c].sAB = sA[c][2] + sA[c][0] - 2.0f * sA[c][1];
+    bends[c].sdB = sd[c][2] + sd[c][0] - 2.0f * sd[c][1];
+    sum = sB[c][2] + sB[c][0];
+    bends[c].sBA = kAverageSide * sum + kAverageCenter * sB[c][1];
+    bends[c].sBd = sB[c][2] - sB[c][0];
+    bends[c].sBB = sum - 2.0f * sB[c][1];
   }
+}
+__device__ __forceinline__ void read_half(const float4* node, int pitch, int plane,
+                                          const HalfWeights& k, HalfPlane (&h)[3]) {
+  HalfBends none[3];
+  read_half<false>(node, pitch, plane, k, h, none);
 }
 
 /// Gradients of one component at the two points of the row at y = `side`, times the cell size.
@@ -151,6 +167,13 @@ __device__ __forceinline__ void add_to_plane(const HalfPlane& h, float w, float 
   p.dB += w * h.wdB;
   p.BA += w * h.wBA;
   p.Bd += w * h.wBd;
+}
+__device__ __forceinline__ void add_to_plane(const HalfBends& h, float w, float s, PlaneForce& p) {
+  p.AB += s * h.sAB;
+  p.dB += s * h.sdB;
+  p.BA += s * h.sBA;
+  p.Bd += s * h.sBd;
+  p.BB += w * h.wBB + s * h.sBB;
 }
 
 /// Transpose of the passes along x and y: the force on the 3 x 3 nodes of a plane, f[y][x].

@@ -103,39 +103,87 @@ void connect(std::size_t node_count, HostTables& t) {
   }
 }
 
+/// The columns of the block that hold points, `first_slot` and `first_place` from the bundle's on.
+void add_columns(const CudaBlock& b, float cell_size, int first_slot, int first_place,
+                 HostTables& t) {
+  const int step = b.nx * b.ny;
+  for (int i = 0; i < step; ++i) {
+    CudaColumn c = {};
+    for (int k = 0; k < 8 * b.nz && c.nz == 0; ++k) {
+      if (t.point[b.first_lane + k * step + i] >= 0) c.nz = b.nz;
+    }
+    if (c.nz == 0) continue;
+    const int x = i % b.nx, y = i / b.nx;
+    c.pitch = b.nx + 2;
+    c.plane = c.pitch * (b.ny + 2);
+    c.slot = first_slot + y * c.pitch + x;
+    c.lane = b.first_lane + i;
+    c.step = step;
+    c.cell = b.first_lane / 8 + i;
+    c.place = first_place + i;
+    c.middle[0] = b.origin[0] + cell_size * static_cast<float>(x + 1);
+    c.middle[1] = b.origin[1] + cell_size * static_cast<float>(y + 1);
+    c.middle[2] = b.origin[2] + cell_size;
+    c.whole = b.whole;
+    t.columns.push_back(c);
+  }
+}
+
+void add_block(const MpmState& state, int index, HostTables& t) {
+  const Block& from = *state.blocks.all[index];
+  CudaBlock block;
+  block.body = t.first_material[from.body] + from.material;
+  block.nx = from.nx;
+  block.ny = from.ny;
+  block.nz = from.nz;
+  block.first_slot = static_cast<int>(t.slot_node.size());
+  const Vec3 origin = state.bodies[from.body].node_position(from.x - 1, from.y - 1, from.z - 1);
+  for (int a = 0; a < 3; ++a) block.origin[a] = static_cast<float>(origin[a]);
+  add_points(from, t.bodies[block.body].point_volume, block, t);
+  for (int z = 0; z < block.nz + 2; ++z) {
+    for (int y = 0; y < block.ny + 2; ++y) {
+      const int* row = from.node.data() + z * from.plane + y * from.pitch;
+      t.slot_node.insert(t.slot_node.end(), row, row + block.nx + 2);
+    }
+  }
+  t.blocks.push_back(block);
+  t.of_host.push_back(index);
+}
+
+void add_bundle(const MpmState& state, const std::vector<int>& blocks, HostTables& t) {
+  CudaBundle bundle = {};
+  bundle.first_block = static_cast<int>(t.blocks.size());
+  bundle.blocks = static_cast<int>(blocks.size());
+  bundle.first_slot = static_cast<int>(t.slot_node.size());
+  bundle.first_column = static_cast<int>(t.columns.size());
+  for (const int index : blocks) {
+    add_block(state, index, t);
+    const CudaBlock& b = t.blocks.back();
+    add_columns(b, t.bodies[b.body].cell_size, b.first_slot - bundle.first_slot, bundle.places, t);
+    bundle.places += b.nx * b.ny;
+    bundle.nz = std::max(bundle.nz, b.nz);
+    bundle.partial = bundle.partial | b.partial;
+  }
+  bundle.body = t.blocks[bundle.first_block].body;
+  bundle.slots = static_cast<int>(t.slot_node.size()) - bundle.first_slot;
+  bundle.columns = static_cast<int>(t.columns.size()) - bundle.first_column;
+  t.max_slots = std::max(t.max_slots, bundle.slots);
+  t.max_halves = std::max(t.max_halves, 2 * bundle.columns * bundle.nz);
+  t.bundles.push_back(bundle);
+}
+
 }  // namespace
 
-HostTables make_tables(const MpmState& state) {
+HostTables make_tables(const MpmState& state, const std::vector<std::vector<int>>& bundles) {
   HostTables t;
-  std::vector<int> first_of_body;
   for (std::size_t i = 0; i < state.bodies.size(); ++i) {
-    first_of_body.push_back(static_cast<int>(t.bodies.size()));
+    t.first_material.push_back(static_cast<int>(t.bodies.size()));
     for (const Material& m : state.bodies[i].materials) {
       t.bodies.push_back(body_of(state.bodies[i], m));
       t.bodies.back().point_volume = common_volume(state, static_cast<int>(i));
     }
   }
-  for (const Block* from : state.blocks.all) {
-    CudaBlock block;
-    block.body = first_of_body[from->body] + from->material;
-    block.nx = from->nx;
-    block.ny = from->ny;
-    block.nz = from->nz;
-    block.first_slot = static_cast<int>(t.slot_node.size());
-    const Vec3 origin =
-        state.bodies[from->body].node_position(from->x - 1, from->y - 1, from->z - 1);
-    for (int a = 0; a < 3; ++a) block.origin[a] = static_cast<float>(origin[a]);
-    add_points(*from, t.bodies[block.body].point_volume, block, t);
-    for (int z = 0; z < block.nz + 2; ++z) {
-      for (int y = 0; y < block.ny + 2; ++y) {
-        const std::int32_t* row = from->node.data() + z * from->plane + y * from->pitch;
-        t.slot_node.insert(t.slot_node.end(), row, row + block.nx + 2);
-      }
-    }
-    t.max_slots = std::max(t.max_slots, block.slots());
-    t.max_columns = std::max(t.max_columns, block.nx * block.ny);
-    t.blocks.push_back(block);
-  }
+  for (const std::vector<int>& blocks : bundles) add_bundle(state, blocks, t);
   connect(state.nodes.size(), t);
   return t;
 }

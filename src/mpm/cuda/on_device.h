@@ -11,13 +11,21 @@ namespace tissue_sim {
 
 struct CudaMpmTissue::OnDevice {
   CudaShape shape;
-  CudaPlan plan, face_plan;             ///< without and with contact of tissue with tissue
-  int resident = 0, face_resident = 0;  ///< thread blocks that run at once
-  int current = 0;                      ///< which of the two states is the present one
+  /// Without contact of tissue with tissue, with it, and CudaPlan::plain.
+  CudaPlan plan, face_plan, plain_plan;
+  int resident = 0, face_resident = 0, plain_resident = 0;  ///< thread blocks that run at once
+  bool all_plain = true;  ///< all cells are full and each bundle is one block
+  bool may_meet = true;   ///< whether any block may meet a collider in this frame
+  int current = 0;        ///< which of the two states is the present one
   cudaStream_t stream = nullptr;
   std::string gpu;  ///< name
 
   DeviceArray<CudaBlock> blocks;
+  std::vector<int> of_host;  ///< HostTables::of_host
+  DeviceArray<CudaBundle> bundles;
+  DeviceArray<CudaColumn> columns;
+  DeviceArray<HalfPush> pushes;  ///< CudaFrame::pushes
+  std::size_t push_stride = 0;
   DeviceArray<CudaBody> bodies;
   DeviceArray<std::int32_t> slot_node, point, piece, place;
   DeviceArray<std::uint32_t> slot_parts, parts, near, colour;
@@ -60,7 +68,10 @@ struct CudaMpmTissue::OnDevice {
     CudaTables t;
     t.blocks = blocks.data();
     t.bodies = bodies.data();
+    t.bundles = bundles.data();
+    t.columns = columns.data();
     t.block_count = static_cast<int>(blocks.size());
+    t.bundle_count = static_cast<int>(bundles.size());
     t.slot_node = slot_node.data();
     t.slot_parts = slot_parts.data();
     t.parts = parts.data();

@@ -44,64 +44,114 @@ __device__ __forceinline__ BlockShared shared_of(int max_slots) {
   s.v = s.u + max_slots;
   s.exchange = s.v + max_slots;
   s.loads = reinterpret_cast<unsigned long long*>(s.exchange + 9 * blockDim.x);
+  s.colliders = reinterpret_cast<Collider*>(s.loads + 6 * kMaxColliders);
   return s;
 }
 
 /// Which laws a kernel can do; one that can do all has to hold more registers.
 enum class Laws { kFixedCorotated, kNeoHookean, kAny };
 
-template <Laws kLaws, bool kSpecial>
-__device__ __forceinline__ void forces(const CudaTables& t, const CudaBlock& b,
+/// What a kernel can do beside: nothing (CudaPlan::plain), all but contact of tissue with tissue,
+/// or all.
+enum class Can { kPlain, kTools, kFaces };
+
+template <Laws kLaws, bool kSpecial, bool kPartial>
+__device__ __forceinline__ void forces(const CudaTables& t, const CudaBundle& w, const CudaBlock& b,
                                        const CudaBody& body, const BlockShared& s,
                                        const BlockStep& step) {
   if constexpr (kLaws == Laws::kFixedCorotated) {
-    block_forces<FixedCorotated, false, kSpecial>(t, b, body, s, step);
+    block_forces<FixedCorotated, false, kSpecial, kPartial>(t, w, b, body, s, step);
   } else if constexpr (kLaws == Laws::kNeoHookean) {
-    block_forces<NeoHookean, false, kSpecial>(t, b, body, s, step);
+    block_forces<NeoHookean, false, kSpecial, kPartial>(t, w, b, body, s, step);
   } else if (body.neo_hookean != 0) {
-    block_forces<NeoHookean, true, kSpecial>(t, b, body, s, step);
+    block_forces<NeoHookean, true, kSpecial, kPartial>(t, w, b, body, s, step);
   } else {
-    block_forces<FixedCorotated, true, kSpecial>(t, b, body, s, step);
+    block_forces<FixedCorotated, true, kSpecial, kPartial>(t, w, b, body, s, step);
   }
 }
 
 /// Out of line and with copies of its arguments, for the ordinary blocks to keep theirs in
 /// registers.
-template <Laws kLaws>
-__device__ __noinline__ void special_forces(const CudaTables t, const CudaBlock b,
-                                            const CudaBody body, int max_slots,
-                                            const BlockStep step) {
-  forces<kLaws, true>(t, b, body, shared_of(max_slots), step);
+template <Laws kLaws, bool kPartial>
+__device__ __noinline__ void special_forces(const CudaTables t, const CudaBundle w,
+                                            const CudaBlock block, const CudaBody body,
+                                            int max_slots, const BlockStep step) {
+  forces<kLaws, true, kPartial>(t, w, block, body, shared_of(max_slots), step);
 }
 
-/// A block with what belongs to it. Copies: through a reference they would be read again after
+/// A bundle with what belongs to it. Copies: through a reference they would be read again after
 /// every store.
-struct BlockAtWork {
-  CudaBlock block;
+struct BundleAtWork {
+  CudaBundle bundle;
+  CudaBlock block;  ///< the first
   CudaBody body;
   std::uint32_t near;
-  __device__ __forceinline__ BlockAtWork(const CudaTables& t, int index)
-      : block(t.blocks[index]), body(t.bodies[block.body]), near(t.near[index]) {}
+  __device__ __forceinline__ BundleAtWork(const CudaTables& t, int index)
+      : bundle(t.bundles[index]),
+        block(t.blocks[bundle.first_block]),
+        body(t.bodies[bundle.body]),
+        near(0) {
+    for (int i = 0; i < bundle.blocks; ++i) near |= t.near[bundle.first_block + i];
+  }
 };
 
-/// Forces of a block whose nodes are there, on its points and between them and the colliders.
-template <Laws kLaws>
+/// Brings the colliders of a substep to shared memory: the first word of each thread is under way
+/// while other things are done.
+struct ColliderCopy {
+  int words, word;
+  __device__ __forceinline__ const int* source(const CudaFrame& f, int substep) const {
+    return reinterpret_cast<const int*>(f.colliders + substep * f.collider_count);
+  }
+  __device__ __forceinline__ ColliderCopy(const CudaFrame& f, std::uint32_t near, int substep)
+      : words(near == 0 || substep == f.substeps
+                  ? 0
+                  : static_cast<int>(sizeof(Collider) / sizeof(int)) * f.collider_count),
+        word(0) {
+    const int i = static_cast<int>(threadIdx.x);
+    if (i < words) word = __ldg(source(f, substep) + i);
+  }
+  __device__ __forceinline__ void finish(const CudaFrame& f, int substep, Collider* to) const {
+    int i = static_cast<int>(threadIdx.x);
+    if (i >= words) return;
+    int* out = reinterpret_cast<int*>(to);
+    out[i] = word;
+    while ((i += static_cast<int>(blockDim.x)) < words) out[i] = __ldg(source(f, substep) + i);
+  }
+};
+
+/// Forces of a bundle whose nodes are there, on its points and between them and the colliders.
+template <Laws kLaws, bool kPlain>
 __device__ __forceinline__ void all_forces(const CudaTables& t, const CudaFrame& f,
-                                           const BlockAtWork& w, int substep, int max_slots,
+                                           const BundleAtWork& w, int substep, int max_slots,
                                            float4* force) {
   const BlockShared s = shared_of(max_slots);
+  if constexpr (kPlain) {
+    __syncthreads();
+    forces<kLaws, false, false>(t, w.bundle, w.block, w.body, s, {nullptr, 0, force});
+    return;
+  }
   const int load_count = 6 * f.collider_count;
   if (w.near != 0) {
     for (int i = threadIdx.x; i < load_count; i += blockDim.x) s.loads[i] = 0;
   }
   __syncthreads();
-  const BlockStep step{f.colliders + substep * f.collider_count, w.near, force};
-  if (w.near == 0 && w.block.partial == 0) {
-    forces<kLaws, false>(t, w.block, w.body, s, step);
+  HalfPush* pushes = f.pushes + blockIdx.x * f.push_stride;
+  Touched touched = {0, false};
+  if (w.near != 0) {
+    touched = find_pushes(t, w.bundle, w.block, w.body, s.u, s.v, s.exchange, s.colliders, w.near,
+                          s.loads, pushes);
+  }
+  const BlockStep step{pushes, touched.halves, force};
+  if (!touched.any && w.bundle.partial == 0 && w.bundle.blocks == 1) {
+    forces<kLaws, false, false>(t, w.bundle, w.block, w.body, s, step);
     return;
   }
-  special_forces<kLaws>(t, w.block, w.body, max_slots, step);
-  if (w.near == 0) return;
+  if (w.bundle.partial != 0) {
+    special_forces<kLaws, true>(t, w.bundle, w.block, w.body, max_slots, step);
+  } else {
+    special_forces<kLaws, false>(t, w.bundle, w.block, w.body, max_slots, step);
+  }
+  if (!touched.any) return;
   auto* loads = reinterpret_cast<unsigned long long*>(f.loads) + substep * load_count;
   for (int i = threadIdx.x; i < load_count; i += blockDim.x) {
     if (s.loads[i] != 0) atomicAdd(loads + i, s.loads[i]);
@@ -114,34 +164,39 @@ __device__ __forceinline__ PushedNodes pushed_nodes(const CudaFaces& f, int roun
   return {f.marks, f.force + f.stride * ((round + 2) % 3), f.force + f.stride * ((round + 1) % 3)};
 }
 
-/// One block in one round. Each block moves all of its nodes on, by the forces of the substep
+/// One bundle in one round. Each moves all of its nodes on, by the forces of the substep
 /// before, whoever else has them too, so that one barrier a substep suffices; then come the forces
 /// at their new places. Before the first substep nothing moves, after the last there are no forces.
 /// State and forces change places between two buffers. With kFaces, the thread block arrives at the
 /// second barrier when its last block's nodes are in place, so that the forces hide the wait for
 /// the others.
-template <Laws kLaws, bool kCached, bool kFaces>
+template <Laws kLaws, bool kCached, Can kCan>
 __device__ __forceinline__ void block_round(const CudaTables& t, const CudaFrame& f,
-                                            const BlockAtWork& w, int round, int max_slots,
+                                            const BundleAtWork& w, int round, int max_slots,
                                             const SlotCache& cache, bool last) {
+  constexpr bool kFaces = kCan == Can::kFaces, kPlain = kCan == Can::kPlain;
   const BlockShared s = shared_of(max_slots);
   const float scale = w.body.inv_cell_size;
-  float4* v = w.near != 0 || kLaws == Laws::kAny ? s.v : nullptr;
+  float4* v = (!kPlain && w.near != 0) || kLaws == Laws::kAny ? s.v : nullptr;
   // Not f.state[i]: parameters that a register indexes would be copied to local memory.
   const bool odd = ((f.current + max(round - 1, 0)) & 1) != 0, odd_round = (round & 1) != 0;
   const CudaNodes &from = odd ? f.state[1] : f.state[0], &to = odd ? f.state[0] : f.state[1];
+  // Their way here takes as long as that of the nodes.
+  const ColliderCopy colliders(f, kPlain ? 0 : w.near, round);
   if (round == 0) {
-    bring_nodes<false, kCached>(t, w.block, cache, from, from, nullptr, f.step, scale, s.u, v);
+    bring_nodes<false, kCached>(t, w.bundle.first_slot, w.bundle.slots, cache, from, from, nullptr,
+                                f.step, scale, s.u, v);
   } else {
     PushedNodes pushed;
     if (kFaces) pushed = pushed_nodes(f.faces, round);
-    bring_nodes<true, kCached, kFaces>(t, w.block, cache, from, to,
+    bring_nodes<true, kCached, kFaces>(t, w.bundle.first_slot, w.bundle.slots, cache, from, to,
                                        odd_round ? f.force[0] : f.force[1], f.step, scale, s.u, v,
                                        pushed);
   }
   if (round == f.substeps) return;
+  colliders.finish(f, round, s.colliders);
   if (kFaces && last) arrive(f.arrived + 1);
-  all_forces<kLaws>(t, f, w, round, max_slots, odd_round ? f.force[1] : f.force[0]);
+  all_forces<kLaws, kPlain>(t, f, w, round, max_slots, odd_round ? f.force[1] : f.force[0]);
 }
 
 /// Contacts of tissue with tissue, once all nodes are where the round brought them.
@@ -153,51 +208,53 @@ __device__ __forceinline__ void push_faces(const CudaFrame& f, int round) {
                 f.faces.force + f.faces.stride * (round % 3));
 }
 
-template <Laws kLaws, bool kCached, bool kFaces, int kThreads, int kBlocksPerProcessor>
+template <Laws kLaws, bool kCached, Can kCan, int kThreads, int kBlocksPerProcessor>
 __global__ void __launch_bounds__(kThreads, kBlocksPerProcessor)
-    mpm_substeps(const CudaTables t, const CudaFrame f, int max_slots) {
+    mpm_substeps(const CudaTables t, const CudaFrame f, int max_slots, bool eight_parts) {
+  constexpr bool kFaces = kCan == Can::kFaces;
   const BlockShared s = shared_of(max_slots);
   SlotCache cache;
-  cache.parts = reinterpret_cast<uint4*>(s.loads + 6 * kMaxColliders);
-  cache.node = reinterpret_cast<std::int32_t*>(cache.parts + max_slots);
+  cache.parts = reinterpret_cast<uint4*>(s.colliders + kMaxColliders);
+  cache.more = eight_parts ? cache.parts + max_slots : nullptr;
+  cache.node = reinterpret_cast<std::int32_t*>(cache.parts + (eight_parts ? 2 : 1) * max_slots);
   cache.shared = reinterpret_cast<std::uint32_t*>(cache.node + max_slots);
   if constexpr (kCached) {
-    const BlockAtWork mine(t, static_cast<int>(blockIdx.x));
-    fill_cache<kFaces>(t, mine.block, f.faces, cache);
+    const BundleAtWork mine(t, static_cast<int>(blockIdx.x));
+    fill_cache<kFaces>(t, mine.bundle.first_slot, mine.bundle.slots, f.faces, cache);
     __syncthreads();
     for (int round = 0; round <= f.substeps; ++round) {
       if (round > 0) grid_barrier(f.arrived, static_cast<unsigned>(round));
-      block_round<kLaws, true, kFaces>(t, f, mine, round, max_slots, cache, true);
+      block_round<kLaws, true, kCan>(t, f, mine, round, max_slots, cache, true);
       if (kFaces) push_faces(f, round);
     }
   } else {
     for (int round = 0; round <= f.substeps; ++round) {
       if (round > 0) grid_barrier(f.arrived, static_cast<unsigned>(round));
-      for (int i = blockIdx.x; i < t.block_count; i += gridDim.x) {
-        const bool last = i + static_cast<int>(gridDim.x) >= t.block_count;
-        block_round<kLaws, false, kFaces>(t, f, BlockAtWork(t, i), round, max_slots, cache, last);
+      for (int i = blockIdx.x; i < t.bundle_count; i += gridDim.x) {
+        const bool last = i + static_cast<int>(gridDim.x) >= t.bundle_count;
+        block_round<kLaws, false, kCan>(t, f, BundleAtWork(t, i), round, max_slots, cache, last);
       }
       if (kFaces) push_faces(f, round);
     }
   }
 }
 
-template <bool kFaces, bool kCached, int kThreads, int kAtOnce>
+template <Can kCan, bool kCached, int kThreads, int kAtOnce>
 CudaKernel kernel_for(const CudaPlan& plan) {
   if (plan.viscous || (plan.neo_hookean && plan.fixed_corotated)) {
-    return mpm_substeps<Laws::kAny, kCached, kFaces, kMaxCudaThreads, 1>;
+    return mpm_substeps<Laws::kAny, kCached, kCan, kMaxCudaThreads, 1>;
   }
-  return plan.neo_hookean ? mpm_substeps<Laws::kNeoHookean, kCached, kFaces, kThreads, kAtOnce>
-                          : mpm_substeps<Laws::kFixedCorotated, kCached, kFaces, kThreads, kAtOnce>;
+  return plan.neo_hookean ? mpm_substeps<Laws::kNeoHookean, kCached, kCan, kThreads, kAtOnce>
+                          : mpm_substeps<Laws::kFixedCorotated, kCached, kCan, kThreads, kAtOnce>;
 }
 
 /// The kernel of small tissues has all registers for each thread; that of large ones holds so few
 /// that 384 threads run at once, of which some compute while others wait for memory.
-template <bool kFaces>
+template <Can kCan>
 CudaKernel kernel_of(const CudaPlan& plan) {
-  if (plan.cached) return kernel_for<kFaces, true, kMaxCudaThreads, 1>(plan);
-  return plan.threads > 192 ? kernel_for<kFaces, false, kMaxCudaThreads, 1>(plan)
-                            : kernel_for<kFaces, false, 192, 2>(plan);
+  if (plan.cached) return kernel_for<kCan, true, kMaxCudaThreads, 1>(plan);
+  return plan.threads > 192 ? kernel_for<kCan, false, kMaxCudaThreads, 1>(plan)
+                            : kernel_for<kCan, false, 192, 2>(plan);
 }
 
 }  // namespace

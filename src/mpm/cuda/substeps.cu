@@ -9,14 +9,16 @@ namespace tissue_sim {
 namespace {
 
 const void* kernel(const CudaPlan& plan) {
-  return reinterpret_cast<const void*>(plan.faces ? kernel_with_faces(plan)
-                                                  : kernel_of<false>(plan));
+  return reinterpret_cast<const void*>(plan.faces   ? kernel_with_faces(plan)
+                                       : plan.plain ? plain_kernel(plan)
+                                                    : kernel_of<Can::kTools>(plan));
 }
 
 std::size_t shared_bytes(const CudaPlan& plan) {
-  const std::size_t of_slot = 2 * sizeof(float4) + (plan.cached ? sizeof(uint4) + 8 : 0);
+  const std::size_t of_slot = 2 * sizeof(float4) + (plan.cached ? sizeof(uint4) + 8 : 0) +
+                              (plan.eight_parts ? sizeof(uint4) : 0);
   return of_slot * plan.max_slots + 9 * sizeof(float4) * plan.threads +
-         6 * kMaxColliders * sizeof(long long);
+         kMaxColliders * (6 * sizeof(long long) + sizeof(Collider));
 }
 
 int attribute(cudaDeviceAttr which) {
@@ -43,13 +45,29 @@ int resident_of(const CudaPlan& plan) {
 }  // namespace
 
 int resident_blocks(CudaPlan& plan, int block_count) {
-  plan.cached = plan.small;
-  if (plan.cached) {
+  for (const bool eight : {true, false}) {
+    plan.cached = plan.small;
+    plan.eight_parts = plan.small && eight;
+    if (!plan.cached) break;
     const int resident = resident_of(plan);
     if (resident >= block_count) return resident;
-    plan.cached = false;
   }
+  plan.cached = plan.eight_parts = false;
   return resident_of(plan);
+}
+
+int cached_at_once(const CudaPlan& plan) {
+  CudaPlan cached = plan;
+  cached.cached = true;
+  cached.eight_parts = false;
+  return resident_of(cached);
+}
+
+int most_cached_slots(const CudaPlan& plan) {
+  CudaPlan cached = plan;
+  const int resident = cached_at_once(plan), step = 64;
+  while (resident > 0 && cached_at_once(cached) == resident) cached.max_slots += step;
+  return std::max(plan.max_slots, cached.max_slots - step);
 }
 
 void launch_substeps(const CudaPlan& plan, const CudaTables& tables, const CudaFrame& frame,
@@ -57,9 +75,10 @@ void launch_substeps(const CudaPlan& plan, const CudaTables& tables, const CudaF
   CudaTables t = tables;
   CudaFrame f = frame;
   int max_slots = plan.max_slots;
-  void* arguments[] = {&t, &f, &max_slots};
+  bool eight_parts = plan.eight_parts;
+  void* arguments[] = {&t, &f, &max_slots, &eight_parts};
   check_cuda(cudaMemsetAsync(f.arrived, 0, 2 * sizeof(unsigned), stream), "clear memory");
-  check_cuda(cudaLaunchCooperativeKernel(kernel(plan), dim3(std::min(resident, t.block_count)),
+  check_cuda(cudaLaunchCooperativeKernel(kernel(plan), dim3(std::min(resident, t.bundle_count)),
                                          dim3(plan.threads), arguments, shared_bytes(plan), stream),
              "start the substeps");
 }

@@ -11,19 +11,27 @@ inline constexpr int kMaxCudaThreads = 256;  ///< of a thread block
 
 /// How a tissue's blocks are worked on.
 struct CudaPlan {
-  int threads = 64;     ///< of a thread block: at least 2 nx ny of each block
-  int max_slots = 0;    ///< of a block
-  bool small = true;    ///< to be cached, if all blocks run at once
-  bool cached = false;  ///< each thread block has one block only, whose tables it keeps
-  bool faces = false;   ///< with contact of tissue with tissue
+  int threads = 64;          ///< of a thread block: at least 2 nx ny of each block
+  int max_slots = 0;         ///< of a block
+  bool small = true;         ///< to be cached, if all blocks run at once
+  bool cached = false;       ///< each thread block has one bundle only, whose tables it keeps
+  bool eight_parts = false;  ///< of a node's force it keeps the places of eight, else of four
+  bool plain = false;        ///< no contact, all cells full, each bundle one block
+  bool faces = false;        ///< with contact of tissue with tissue
   bool neo_hookean = false, fixed_corotated = false, viscous = false;  ///< what there is
 };
 
-using CudaKernel = void (*)(CudaTables, CudaFrame, int);
+using CudaKernel = void (*)(CudaTables, CudaFrame, int, bool);
 CudaKernel kernel_with_faces(const CudaPlan& plan);
+CudaKernel plain_kernel(const CudaPlan& plan);
 
-/// Thread blocks that run at once; 0 where the plan does not fit the GPU. Sets CudaPlan::cached.
+/// Thread blocks that run at once; 0 where the plan does not fit the GPU. Sets CudaPlan::cached and
+/// eight_parts.
 int resident_blocks(CudaPlan& plan, int block_count);
+
+/// Thread blocks that run at once if they are cached, and the most slots with which as many do.
+int cached_at_once(const CudaPlan& plan);
+int most_cached_slots(const CudaPlan& plan);
 
 /// Enqueues substeps as one kernel, with contact of tissue with tissue if the plan has it. The
 /// state is then in `state[(current + substeps) % 2]`.

@@ -17,6 +17,7 @@
 namespace tissue_sim {
 
 inline constexpr int kMaxColliders = 32;  ///< a block keeps those near to it as bits of a word
+inline constexpr int kMaxLayers = 16;     ///< of cells of a block
 
 /// A material of a body and what follows from it.
 struct CudaBody {
@@ -29,15 +30,45 @@ struct CudaBody {
   int neo_hookean;                 ///< else fixed corotated
 };
 
-struct CudaBlock {
-  int body;        ///< its CudaBody: that of its points' material
+struct alignas(16) CudaBlock {
   int nx, ny, nz;  ///< cells
   int first_slot;
   int first_lane;
+  int body;         ///< its CudaBody: that of its points' material
   int whole;        ///< all points are there, with CudaBody::point_volume
   int partial;      ///< some cells have fewer than eight points
   float origin[3];  ///< reference place of local node 0 [m]
   TISSUE_SIM_INLINE int slots() const { return (nx + 2) * (ny + 2) * (nz + 2); }
+};
+
+/// Blocks of one CudaBody that a thread block works on side by side, one after the other in all
+/// tables. Most are a single block; those that cuts leave small share a thread block.
+struct CudaBundle {
+  int body;
+  int first_block, blocks;
+  int first_slot, slots;
+  int first_column, columns;  ///< those that hold points
+  int places;                 ///< columns of the blocks' boxes, with points or without
+  int nz;                     ///< of the tallest block
+  int partial;                ///< some cells have fewer than eight points
+};
+
+/// A column of cells, for the two threads that walk up it.
+struct alignas(16) CudaColumn {
+  int slot;          ///< of the lowest of its nodes, from the bundle's first slot on
+  int pitch, plane;  ///< slots from a node to the next along y and z
+  int nz;            ///< cells
+  int lane;          ///< of sub-position 0 of its lowest cell
+  int step;          ///< lanes from a sub-position to the next
+  int cell;          ///< its lowest in CudaTables::partial
+  int place;         ///< of the bundle's
+  float middle[3];   ///< reference place of its lowest cell's middle [m]
+  int whole;         ///< as CudaBlock::whole
+};
+
+/// What the colliders push the four points of half a cell with: component c of point q [N].
+struct alignas(16) HalfPush {
+  float of[3][4];
 };
 
 /// State of a block at the end of a frame.
@@ -59,7 +90,9 @@ struct CudaNodes {
 struct CudaTables {
   const CudaBlock* blocks;
   const CudaBody* bodies;
-  int block_count;
+  const CudaBundle* bundles;
+  const CudaColumn* columns;
+  int block_count, bundle_count;
   const std::int32_t* slot_node;    ///< its node n, or ~n where another block writes the node
   const std::uint32_t* slot_parts;  ///< 0: the slot has all of its node's force; else how many
                                     ///< slots share it + 64 * the first of them in `parts`
@@ -107,7 +140,9 @@ struct CudaFrame {
   NodeStep step;
   const Collider* colliders;  ///< [substeps][collider_count]
   int collider_count;
-  long long* loads;   ///< [substeps][collider_count][6]
+  long long* loads;  ///< [substeps][collider_count][6]
+  HalfPush* pushes;  ///< [thread blocks][push_stride], of the half cells of the bundle at work
+  std::size_t push_stride;
   unsigned* arrived;  ///< counters of the two barriers, 0 at the beginning
   CudaFaces faces;
 };

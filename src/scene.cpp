@@ -166,6 +166,12 @@ std::string known_materials(const Scene& scene) {
   return list;
 }
 
+void check_material_name(const std::string& field, const Scene& scene, const std::string& name) {
+  if (lookup(scene, name)) return;
+  refuse(field, quoted(name),
+         "must be one of " + known_materials(scene) + ", or be defined in materials");
+}
+
 }  // namespace
 
 bool Region::contains(const Vec3& x) const {
@@ -207,9 +213,15 @@ void validate(const Scene& scene) {
     check_enum(path + ".shape", body.shape, kShapeNames);
     check_shape(path, body);
     check_pose(path + ".pose", body.pose);
-    if (!lookup(scene, body.material)) {
-      refuse(path + ".material", quoted(body.material),
-             "must be one of " + known_materials(scene) + ", or be defined in materials");
+    check_material_name(path + ".material", scene, body.material);
+    if (body.inclusions.size() > 255) {
+      refuse(path + ".inclusions", "a list of " + std::to_string(body.inclusions.size()),
+             "a body has at most 255");
+    }
+    for (std::size_t k = 0; k < body.inclusions.size(); ++k) {
+      const std::string inclusion = path + "." + at("inclusions", k);
+      check_material_name(inclusion + ".material", scene, body.inclusions[k].material);
+      check_region(inclusion + ".region", body.inclusions[k].region);
     }
     for (std::size_t k = 0; k < body.anchors.size(); ++k) {
       check_region(path + "." + at("anchors", k), body.anchors[k]);

@@ -83,6 +83,14 @@ void write(YAML::Emitter& out, const Material& m) {
   out << EndMap;
 }
 
+void write(YAML::Emitter& out, const Inclusion& inclusion) {
+  out << BeginMap;
+  write(out, "material", inclusion.material);
+  out << Key << "region" << Value;
+  write(out, inclusion.region);
+  out << EndMap;
+}
+
 void write(YAML::Emitter& out, const Body& body) {
   out << BeginMap;
   write(out, "name", body.name);
@@ -100,6 +108,9 @@ void write(YAML::Emitter& out, const Body& body) {
   write(out, "orientation", body.pose.orientation);
   out << EndMap;
   write(out, "material", body.material);
+  out << Key << "inclusions" << Value << BeginSeq;
+  for (const Inclusion& inclusion : body.inclusions) write(out, inclusion);
+  out << EndSeq;
   out << Key << "anchors" << Value << BeginSeq;
   for (const Region& region : body.anchors) write(out, region);
   out << EndSeq << EndMap;

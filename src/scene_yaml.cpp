@@ -87,10 +87,22 @@ Material read_material(const YAML::Node& node, const std::string& path) {
   return m;
 }
 
+Inclusion read_inclusion(const YAML::Node& node, const std::string& path) {
+  const YamlFields fields(node, path, {"material", "region"});
+  fields.require("material", "an inclusion is of a material of its own");
+  fields.require("region", "an inclusion needs the region that it fills");
+  Inclusion inclusion;
+  fields.read("material", inclusion.material);
+  fields.read_map("region", [&](const YAML::Node& region, const std::string& region_path) {
+    inclusion.region = read_region(region, region_path);
+  });
+  return inclusion;
+}
+
 Body read_body(const YAML::Node& node, const std::string& path) {
   const YamlFields fields(node, path,
                           {"name", "shape", "size", "radius", "radii", "height", "mesh", "scale",
-                           "pose", "material", "anchors"});
+                           "pose", "material", "inclusions", "anchors"});
   Body body;
   fields.read("name", body.name);
   fields.read("shape", body.shape, kShapeNames);
@@ -105,6 +117,9 @@ Body read_body(const YAML::Node& node, const std::string& path) {
     body.pose = read_pose(pose, pose_path);
   });
   fields.read("material", body.material);
+  fields.read_list("inclusions", [&](const YAML::Node& item, const std::string& item_path) {
+    body.inclusions.push_back(read_inclusion(item, item_path));
+  });
   fields.read_list("anchors", [&](const YAML::Node& item, const std::string& item_path) {
     body.anchors.push_back(read_region(item, item_path));
   });

@@ -51,9 +51,13 @@ Simulation::Simulation(const Scene& scene) : state_(std::make_unique<State>()) {
   state_->scene = scene;
   state_->tissue = make_tissue(scene);
   state_->tools.resize(scene.tools.size());
-  for (const Body& b : scene.bodies) {
+  const auto note_speed = [this, &scene](const std::string& material) {
     state_->wave_speed =
-        std::max(state_->wave_speed, tissue_sim::wave_speed(find_material(scene, b.material)));
+        std::max(state_->wave_speed, tissue_sim::wave_speed(find_material(scene, material)));
+  };
+  for (const Body& b : scene.bodies) {
+    note_speed(b.material);
+    for (const Inclusion& i : b.inclusions) note_speed(i.material);
   }
 }
 

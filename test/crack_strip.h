@@ -51,7 +51,7 @@ struct PulledStrip {
 /// Nodes of all layers along z move alike: each is mapped to one unknown.
 inline PulledStrip pull(const MpmState& s, double traction) {
   const LatticeBody& b = s.bodies[0];
-  const double mu = lame_mu(b.material), h = b.cell_size;
+  const double mu = lame_mu(b.materials[0]), h = b.cell_size;
   std::vector<int> unknown(s.nodes.size(), -1);
   int count = 0;
   using Local = Eigen::Matrix<double, 18, 18>;
@@ -92,7 +92,7 @@ inline PulledStrip pull(const MpmState& s, double traction) {
       for (const auto& [node, a] : row) merged[unknown[node]] += a;
       for (const auto& [i, a] : merged) {
         for (const auto& [j, c] : merged) {
-          for (int k = 0; k < 2; ++k) entries.emplace_back(2 * i + k, 2 * j + k, 0.01 * mu * a * c);
+          for (int k = 0; k < 2; ++k) entries.emplace_back(2 * i + k, 2 * j + k, a * c);
         }
       }
     }

@@ -24,6 +24,33 @@ inline Scene free_box(const Vec3& size, double cell_size) {
   return scene;
 }
 
+/// Puts four further materials into the box of 31 x 29 x 17 mm that the tests of a substep use: two
+/// balls, one of them within the other, a box and a layer.
+inline void add_inclusions(Scene& scene, bool both_laws) {
+  const double stiffer[] = {3, 0.4, 1.7, 6}, denser[] = {1.2, 0.7, 1.5, 0.9};
+  Body& body = scene.bodies[0];
+  for (int i = 0; i < 4; ++i) {
+    Material m = scene.materials[0];
+    m.name += std::to_string(i);
+    m.young_modulus *= stiffer[i];
+    m.poisson_ratio = 0.1 + 0.1 * i;
+    m.density *= denser[i];
+    m.viscosity *= i;
+    if (both_laws && i % 2 == 0) {
+      m.law = m.law == Law::kNeoHookean ? Law::kFixedCorotated : Law::kNeoHookean;
+    }
+    scene.materials.push_back(m);
+    Inclusion inclusion;
+    inclusion.material = m.name;
+    inclusion.region.kind = i < 2 ? Region::Kind::kBall : Region::Kind::kBox;
+    inclusion.region.center = Vec3(0.017 + 0.001 * i, 0.015, 0.009);
+    inclusion.region.radius = i == 0 ? 0.009 : 0.004;
+    inclusion.region.min = i == 2 ? Vec3(0.02, 0.002, 0.001) : Vec3(-1, 0.0221, -1);
+    inclusion.region.max = i == 2 ? Vec3(0.026, 0.012, 0.011) : Vec3::Ones();
+    body.inclusions.push_back(inclusion);
+  }
+}
+
 /// A blade whose edge stands along z from -0.1 to 0.1 m, moved through `places` (their z counts
 /// too).
 inline BladePath upright_blade(const std::vector<Vec3>& places) {

@@ -29,7 +29,8 @@ struct Case {
   Law law;
   double viscosity;
   int cuts;
-  const char* shape;  // of the GPU's blocks, null for the default
+  const char* shape;       // of the GPU's blocks, null for the default
+  bool materials = false;  // several, of both laws
 };
 std::ostream& operator<<(std::ostream& out, const Case& c) {
   return out << c.name << " " << (c.shape == nullptr ? "" : c.shape);
@@ -61,6 +62,7 @@ Scene anchored_body(const Case& c, Shape shape) {
   m.viscosity = c.viscosity;
   scene.materials.push_back(m);
   scene.bodies[0].material = "test";
+  if (c.materials) add_inclusions(scene, true);
   return scene;
 }
 
@@ -108,6 +110,8 @@ INSTANTIATE_TEST_SUITE_P(
                     Case{"viscous", Law::kFixedCorotated, 3, 0, nullptr},
                     Case{"cut", Law::kFixedCorotated, 0, 1, nullptr},
                     Case{"cut crosswise, viscous", Law::kNeoHookean, 2, 2, nullptr},
+                    Case{"materials", Law::kFixedCorotated, 0, 0, nullptr, true},
+                    Case{"materials, cut, viscous", Law::kNeoHookean, 2, 2, nullptr, true},
                     Case{"a wave after the other", Law::kFixedCorotated, 0, 0, "4 4 4 32 0"},
                     Case{"the same, cut", Law::kFixedCorotated, 0, 2, "3 5 2 32 0"},
                     Case{"flat blocks", Law::kNeoHookean, 0, 1, "16 4 1 128 1"},

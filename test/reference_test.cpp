@@ -15,6 +15,8 @@ struct Case {
   double viscosity;
   int cuts;
   const char* instruction_set;
+  enum { kOne, kOneLaw, kBothLaws } materials = kOne;
+  bool by_material = false;  // in blocks of one material, as the GPU has them
 };
 
 std::ostream& operator<<(std::ostream& out, const Case& c) {
@@ -43,13 +45,24 @@ Scene scene_of(const Case& c, Shape shape) {
   m.viscosity = c.viscosity;
   scene.materials.push_back(m);
   scene.bodies[0].material = "test";
+  if (c.materials != Case::kOne) add_inclusions(scene, c.materials == Case::kBothLaws);
   return scene;
+}
+
+void block_by_material(MpmState& s) {
+  s.blocks = make_blocks(s.bodies, s.points, *s.fields, {16, 4, 4, true});
+  s.force.resize(s.blocks.force_size);
+  s.contacts.touching.assign(s.blocks.all.size(), {});
+  s.contacts.near.assign(s.blocks.all.size(), {});
+  list_facets(s);
+  measure_motion(s);
 }
 
 TEST_P(Substep, AgreesWithBruteForce) {
   for (const Shape shape : {Shape::kBox, Shape::kEllipsoid}) {
     MpmTissue tissue(scene_of(GetParam(), shape));
     MpmState& state = tissue.state();
+    if (GetParam().by_material) block_by_material(state);
     deform(state);
     const Vec3 middle(0.0155, 0.0145, 0.0085);
     if (GetParam().cuts > 0) {
@@ -98,6 +111,17 @@ std::vector<Case> cases() {
     all.push_back({"cut crosswise, viscous", Law::kNeoHookean, 2, 2, set});
     all.push_back({"cut crosswise and in part", Law::kFixedCorotated, 0, 3, set});
     all.push_back({"shattered, viscous", Law::kFixedCorotated, 2, 16, set});
+    for (const auto materials : {Case::kOneLaw, Case::kBothLaws}) {
+      const bool both = materials == Case::kBothLaws;
+      for (const Law law : {Law::kFixedCorotated, Law::kNeoHookean}) {
+        const char* name = both ? "materials of both laws" : "materials";
+        all.push_back({name, law, 0, 0, set, materials});
+      }
+      all.push_back({"materials, viscous", Law::kFixedCorotated, 3, 0, set, materials});
+      all.push_back({"materials, cut crosswise", Law::kNeoHookean, 2, 2, set, materials});
+      all.push_back({"materials, shattered", Law::kFixedCorotated, 2, 16, set, materials});
+      all.push_back({"by material, cut", Law::kFixedCorotated, 2, 3, set, materials, true});
+    }
   }
   const InstructionSet best = instruction_set();
   while (all.back().instruction_set != std::string("sse2") && best < InstructionSet::kAvx512) {

@@ -74,7 +74,7 @@ double stability_limit(MpmTissue& tissue) {
 
 /// The same as a CFL number: substep * wave speed / cell size.
 double cfl_limit(MpmTissue& tissue) {
-  const double speed = wave_speed(tissue.state().bodies[0].material);
+  const double speed = wave_speed(tissue.state().bodies[0].materials[0]);
   return stability_limit(tissue) * speed / tissue.state().scene.cell_size;
 }
 

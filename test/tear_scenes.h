@@ -13,8 +13,9 @@ namespace tissue_sim {
 struct StripOf {
   double cell_size = 0.002;  // [m]
   double limit = 1.3, scatter = 0, tear_length = 0;
-  double notch = 0;   // share of the width, cut in the middle
-  double turned = 0;  // about z [degrees]
+  double right_limit = -1;  // of the right half, if another
+  double notch = 0;         // share of the width, cut in the middle
+  double turned = 0;        // about z [degrees]
   int threads = 1;
   std::uint64_t seed = 1;
 };
@@ -52,6 +53,17 @@ class Strip {
     s.materials = {m};
     Body& b = s.bodies[0];
     b.material = "strip";
+    if (of.right_limit >= 0) {
+      m.name = "right";
+      m.tear_stretch = of.right_limit;
+      s.materials.push_back(m);
+      Inclusion right;
+      right.material = m.name;
+      right.region.kind = Region::Kind::kBox;
+      right.region.min = Vec3(0.5 * kLength, -1, -1);
+      right.region.max = Vec3::Ones();
+      b.inclusions = {right};
+    }
     b.pose.orientation = Quat(Eigen::AngleAxisd(of.turned * M_PI / 180, Vec3::UnitZ()));
     for (const double x : {-0.5, 0.5}) {
       Region grip;

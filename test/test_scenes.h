@@ -41,6 +41,11 @@ inline Scene full_scene() {
   s.bodies[0].anchors[2].kind = Region::Kind::kBall;
   s.bodies[0].anchors[2].center = Vec3(0.1, 0.2, 0.3);
   s.bodies[0].anchors[2].radius = 0.05;
+  s.bodies[0].inclusions.resize(2);
+  s.bodies[0].inclusions[0].material = "phantom";
+  s.bodies[0].inclusions[0].region = s.bodies[0].anchors[1];
+  s.bodies[0].inclusions[1].material = "skin";
+  s.bodies[0].inclusions[1].region = s.bodies[0].anchors[2];
   s.bodies[4].mesh = "package://some pack/kidney #1.stl";
   s.bodies[4].scale = 0.001;
   s.tools.resize(2);
@@ -103,6 +108,10 @@ inline const std::vector<NumberCase>& number_cases() {
       {"bodies[0].anchors[1].box.max", AT(bodies[0].anchors[1].max.x()), -0.999, 100},
       {"bodies[0].anchors[2].ball.center", AT(bodies[0].anchors[2].center.z()), -100, 100},
       {"bodies[0].anchors[2].ball.radius", AT(bodies[0].anchors[2].radius), 1e-4, 100},
+      {"bodies[0].inclusions[0].region.box.max", AT(bodies[0].inclusions[0].region.max.x()), -0.999,
+       100},
+      {"bodies[0].inclusions[1].region.ball.radius", AT(bodies[0].inclusions[1].region.radius),
+       1e-4, 100},
       {"tools[0].blade_length", AT(tools[0].blade_length), 1e-3, 0.2},
       {"tools[0].blade_width", AT(tools[0].blade_width), 2e-4, 0.1},
       {"tools[0].blade_thickness", AT(tools[0].blade_thickness), 1e-5, 0.01},

@@ -16,7 +16,7 @@ enum class Device { kAuto, kCpu, kCuda };
 
 enum class Shape { kBox, kBall, kEllipsoid, kCylinder, kMesh };
 
-/// A region of the world as it is at time zero; what lies in it is held fast.
+/// A region of the world as it is at time zero.
 struct Region {
   enum class Kind { kBox, kBall, kBelow } kind = Kind::kBelow;
   Vec3 min = Vec3::Zero(), max = Vec3::Zero();  ///< kBox [m]
@@ -25,6 +25,12 @@ struct Region {
   double z = 0;                                 ///< kBelow: everything with a smaller z [m]
 
   bool contains(const Vec3& x) const;
+};
+
+/// A part of a body that is of a material of its own: a tumour, a vessel, a layer of skin.
+struct Inclusion {
+  std::string material = "liver";  ///< a name in Scene::materials or a preset
+  Region region;
 };
 
 struct Body {
@@ -38,7 +44,10 @@ struct Body {
   double scale = 1.0;              ///< mesh: metres per unit of the file (0.001 for mm)
   Pose pose;                       ///< of the shape's centre; of a mesh's own origin
   std::string material = "liver";  ///< a name in Scene::materials or a preset
-  std::vector<Region> anchors;
+  /// A point of the body is of the material of the last of these that holds it, else of `material`;
+  /// at most 255, and each must be the last one for a point at least.
+  std::vector<Inclusion> inclusions;
+  std::vector<Region> anchors;  ///< what lies in them is held fast
 };
 
 /// A horizontal plane that carries what falls on it.

@@ -10,11 +10,15 @@ namespace tissue_sim {
 namespace {
 
 /// Spring of a point of unit volume; stiffness and damping both grow with the volume.
-ContactSpring unit_spring(const LatticeBody& body) {
-  const Material& m = body.material;
+ContactSpring unit_spring(const LatticeBody& body, int material) {
+  const Material& m = body.materials[material];
   const auto modulus = static_cast<float>(lame_lambda(m) + 2 * lame_mu(m));
   const float edge = 0.5f * static_cast<float>(body.cell_size);
   return contact_spring(modulus, static_cast<float>(m.density), edge, 1.0f);
+}
+
+bool comes_before(const Touch& a, const Touch& b) {
+  return a.collider != b.collider ? a.collider < b.collider : a.lane < b.lane;
 }
 
 bool overlap(const Box& a, const Box& b) {
@@ -33,8 +37,6 @@ struct SubWeights {
   }
 };
 const SubWeights kSubWeights;
-
-constexpr std::uint8_t kStillTouches = 0x80;  // in Contacts::with, while a block is worked on
 
 }  // namespace
 
@@ -72,27 +74,37 @@ void find_near_colliders(MpmState& state, const std::vector<Box>& reach, double 
     for (std::size_t c = 0; c < reach.size(); ++c) {
       if (overlap(box, reach[c])) contacts.near[i].push_back(static_cast<std::uint8_t>(c));
     }
-    if (contacts.near[i].empty()) {
-      for (const std::int32_t p : contacts.touching[i]) contacts.with[p] = 0;
-      contacts.touching[i].clear();
-    }
+    if (contacts.near[i].empty()) contacts.touching[i].clear();
   });
 }
 
 void list_contacts(MpmState& state) {
   Contacts& contacts = state.contacts;
-  const std::vector<std::vector<std::int32_t>> before = std::move(contacts.touching);
+  const std::vector<std::vector<Touch>> before = std::move(contacts.touching);
   contacts.touching.assign(state.blocks.all.size(), {});
   contacts.near.assign(state.blocks.all.size(), {});
+  if (before.empty()) return;  // on a GPU
+  std::vector<Touch> touches;
   for (std::size_t i = 0; i < state.blocks.all.size(); ++i) {
     const Blocks::Origin& origin = state.blocks.origin[i];
-    if (std::all_of(before.begin() + origin.begin, before.begin() + origin.end,
-                    [](const auto& points) { return points.empty(); })) {
-      continue;
+    touches.clear();
+    for (int b = origin.begin; b < origin.end; ++b) {
+      touches.insert(touches.end(), before[b].begin(), before[b].end());
     }
-    for (const std::int32_t p : state.blocks.all[i]->point) {
-      if (p >= 0 && contacts.with[p] != 0) contacts.touching[i].push_back(p);
+    if (touches.empty()) continue;
+    std::sort(touches.begin(), touches.end(),
+              [](const Touch& a, const Touch& b) { return a.point < b.point; });
+    const Array<std::int32_t>& points = state.blocks.all[i]->point;
+    for (std::size_t lane = 0; lane < points.size(); ++lane) {
+      auto touch =
+          std::lower_bound(touches.begin(), touches.end(), points[lane],
+                           [](const Touch& t, std::int32_t point) { return t.point < point; });
+      for (; touch != touches.end() && touch->point == points[lane]; ++touch) {
+        contacts.touching[i].push_back(*touch);
+        contacts.touching[i].back().lane = static_cast<std::int32_t>(lane);
+      }
     }
+    std::sort(contacts.touching[i].begin(), contacts.touching[i].end(), comes_before);
   }
 }
 
@@ -101,14 +113,17 @@ void add_contact(MpmState& state, int index, float* force, std::vector<ColliderL
   const std::vector<std::uint8_t>& near = contacts.near[index];
   if (near.empty()) return;
   const Block& block = *state.blocks.all[index];
-  const ContactSpring unit = unit_spring(state.bodies[block.body]);
+  int material = std::max(0, block.material);
+  ContactSpring unit = unit_spring(state.bodies[block.body], material);
   BlockScratch& scratch = state.scratch.local();
   const std::size_t lanes = block.lane_count();
   if (scratch.values.size() < 3 * lanes) scratch.values.resize(3 * lanes);
   if (scratch.lanes.size() < lanes) scratch.lanes.resize(lanes);
   float* x = scratch.values.data();
   state.kernels->positions(block, block_field(state, block), state.nodes.u, scratch, x);
-  std::vector<std::int32_t> touching;
+  const std::vector<Touch>& before = contacts.touching[index];
+  auto held = before.begin();
+  std::vector<Touch> touching;
   for (const std::uint8_t c : near) {
     const Collider& collider = state.colliders[c];
     const Box box = bounds(collider);
@@ -128,13 +143,21 @@ void add_contact(MpmState& state, int index, float* force, std::vector<ColliderL
       const AxisWeights& weights = kSubWeights.of[sub];
       float v[3], push[3];
       value_at(state.nodes.v, CellNodes(block, cell), weights, v);
-      float* hold = &contacts.hold[3 * static_cast<std::size_t>(p)];
-      if ((contacts.with[p] & ~kStillTouches) != c + 1) to_local(collider, at, hold);
-      contacts.with[p] = static_cast<std::uint8_t>((c + 1) | kStillTouches);
-      touching.push_back(p);
+      Touch touch{lane, p, c, {}};
+      while (held != before.end() && comes_before(*held, touch)) ++held;
+      if (held != before.end() && !comes_before(touch, *held)) {
+        touch = *held;
+      } else {
+        to_local(collider, at, touch.hold);
+      }
+      if (state.points.material_of(p) != material) {
+        material = state.points.material_of(p);
+        unit = unit_spring(state.bodies[block.body], material);
+      }
       const float volume = block.volume[lane];
-      contact_force(collider, g, {unit.stiffness * volume, unit.damping * volume}, at, v, hold,
-                    push);
+      contact_force(collider, g, {unit.stiffness * volume, unit.damping * volume}, at, v,
+                    touch.hold, push);
+      touching.push_back(touch);
       spread(block, cell, weights, push, force);
       ColliderLoad& load = loads[c];
       double arm[3];
@@ -148,11 +171,7 @@ void add_contact(MpmState& state, int index, float* force, std::vector<ColliderL
       }
     }
   }
-  // A point that no longer touches anything forgets where it was held.
-  for (const std::int32_t p : contacts.touching[index]) {
-    if ((contacts.with[p] & kStillTouches) == 0) contacts.with[p] = 0;
-  }
-  for (const std::int32_t p : touching) contacts.with[p] &= ~kStillTouches & 0xff;
+  // A point that no longer touches forgets where it was held.
   contacts.touching[index] = std::move(touching);
 }
 

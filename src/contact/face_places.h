@@ -18,6 +18,11 @@ inline const LatticeBody& body_of(const MpmState& s, std::int32_t facet) {
   return s.bodies[block_of(s, facet).body];
 }
 
+/// Material of a facet: where its points are of several, that of the lowest.
+inline const Material& material_of(const MpmState& s, std::int32_t facet) {
+  return body_of(s, facet).material_of(s.points, facet_of(s, facet).point);
+}
+
 /// Reference place that a contact holds on to [m].
 inline Vec3 place_held(const MpmState& s, const FaceContact& c) {
   return reference_place(body_of(s, c.other), block_of(s, c.other), facet_of(s, c.other).cell,

@@ -87,7 +87,7 @@ void take_normal(const MpmState& s, FaceContact& c) {
 void begin(const MpmState& s, FaceContact& c, std::int32_t other, const float (&place)[3],
            double dt) {
   const LatticeBody &own = body_of(s, c.facet), &body = body_of(s, other);
-  const Material &m = own.material, &n = body.material;
+  const Material &m = material_of(s, c.facet), &n = material_of(s, other);
   const double p = lame_lambda(m) + 2 * lame_mu(m), q = lame_lambda(n) + 2 * lame_mu(n);
   c.other = other;
   c.other_nodes = CellNodes(block_of(s, other), facet_of(s, other).cell);

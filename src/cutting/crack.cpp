@@ -121,7 +121,8 @@ static bool finds_enough(const MpmState& state, const TearingPoint& t, const Cra
                          const std::vector<TearingPoint>& tearing) {
   const Points::Site& s = state.points.site[t.point];
   const LatticeBody& body = state.bodies[s.body];
-  const double length = 2 * body.material.tear_length / body.cell_size - 3;  // [points]
+  const double length =
+      2 * body.material_of(state.points, t.point).tear_length / body.cell_size - 3;  // [points]
   std::int32_t last = t.point;
   for (int i = 1; i <= std::lround(length); ++i) {
     const Vec3 x = Vec3(s.x, s.y, s.z) + crack.offset * t.normal + i * crack.ahead;
@@ -145,7 +146,8 @@ bool go_on(const MpmState& state, const TearingPoint& t, const std::vector<Teari
   const int known = side_by_bonds(state, body, t.point, t.normal);
   // A tip bears the more, the finer the lattice is against tear_length.
   const double thread_excess =
-      kThread * std::max(1.0, body.material.tear_length / (1.5 * body.cell_size));
+      kThread *
+      std::max(1.0, body.material_of(state.points, t.point).tear_length / (1.5 * body.cell_size));
   const int side = known != 0 ? known : crack.offset > 0 ? -1 : 1;
   for (unsigned left = state.points.bonds[t.point]; left != 0; left &= left - 1) {
     const int k = __builtin_ctz(left);

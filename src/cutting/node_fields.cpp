@@ -93,8 +93,8 @@ std::vector<NodeShare> shares(const LatticeBody& body, const Points& points,
   for (int i = 0; i < 216; ++i) {
     if (around[i] < 0) continue;
     NodeShare& s = result[label[i]];
-    const double mass = body.material.density * points.volume[around[i]] * weight_at(i % 6) *
-                        weight_at(i / 6 % 6) * weight_at(i / 36);
+    const double mass = body.material_of(points, around[i]).density * points.volume[around[i]] *
+                        weight_at(i % 6) * weight_at(i / 6 % 6) * weight_at(i / 36);
     s.mass += mass;
     if (points.anchored[around[i]]) s.anchored_mass += mass;
   }

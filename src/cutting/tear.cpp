@@ -34,11 +34,12 @@ Bond begin(const MpmState& state, const TearingPoint& t, const std::vector<Teari
   return best;
 }
 
-/// Whether what tore last had no time yet to relieve all of the body.
-bool being_relieved(const MpmState& state, int body) {
+/// Whether what tore last had no time yet to relieve all of the point's body.
+bool being_relieved(const MpmState& state, std::int32_t point) {
+  const int body = state.points.site[point].body;
   const LatticeBody& b = state.bodies[body];
   const double extent = std::max({b.nx, b.ny, b.nz}) * b.cell_size;
-  return state.time - state.tore_at[body] < extent / wave_speed(b.material);
+  return state.time - state.tore_at[body] < extent / wave_speed(b.material_of(state.points, point));
 }
 
 /// Regions of tissue past its limit: for each entry the lowest of those that bonds join it to.
@@ -69,8 +70,9 @@ std::vector<int> regions(const MpmState& state, const std::vector<TearingPoint>&
 bool in_reach_of_crack(const MpmState& state, const TearingPoint& t) {
   const Points::Site& s = state.points.site[t.point];
   const LatticeBody& body = state.bodies[s.body];
-  const int reach =
-      std::max(2 * kReach, static_cast<int>(4 * body.material.tear_length / body.cell_size));
+  const int reach = std::max(
+      2 * kReach,
+      static_cast<int>(4 * body.material_of(state.points, t.point).tear_length / body.cell_size));
   for (int z = s.z - reach; z <= s.z + reach; ++z) {
     for (int y = s.y - reach; y <= s.y + reach; ++y) {
       for (int x = s.x - reach; x <= s.x + reach; ++x) {
@@ -91,9 +93,8 @@ std::vector<Bond> beginnings(const MpmState& state, const std::vector<TearingPoi
   std::vector<int> worst(tearing.size(), -1);  // of each region
   for (std::size_t i = 0; i < tearing.size(); ++i) {
     const TearingPoint& t = tearing[i];
-    const int body = state.points.site[t.point].body;
     if (t.excess < 1 || cracked[region[i]] != 0) continue;
-    if (t.excess < kPatience && being_relieved(state, body)) continue;
+    if (t.excess < kPatience && being_relieved(state, t.point)) continue;
     int& w = worst[region[i]];
     if (w < 0 || t.excess > tearing[w].excess) w = static_cast<int>(i);
   }
@@ -117,26 +118,38 @@ std::vector<Bond> beginnings(const MpmState& state, const std::vector<TearingPoi
 
 bool can_tear(const MpmState& state) {
   return std::any_of(state.bodies.begin(), state.bodies.end(),
-                     [](const LatticeBody& b) { return b.material.tear_stretch > 0; });
+                     [](const LatticeBody& b) { return least_tear_limit(b) > 0; });
 }
 
 int tear_checks(const MpmState& state, int substeps, float dt) {
   double interval = 1e9;
   for (const LatticeBody& b : state.bodies) {
-    if (b.material.tear_stretch <= 0) continue;
-    interval = std::min(interval, kTearSteps * 0.5 * b.cell_size / wave_speed(b.material));
+    for (const Material& m : b.materials) {
+      if (m.tear_stretch <= 0) continue;
+      interval = std::min(interval, kTearSteps * 0.5 * b.cell_size / wave_speed(m));
+    }
   }
   const double every = std::max(1.0, std::round(interval / dt));
   return static_cast<int>(std::ceil(substeps / every));
 }
 
 float least_tear_limit(const Material& m) {
+  if (m.tear_stretch <= 0) return 0;
   return static_cast<float>(1 + (m.tear_stretch - 1) * (1 - m.tear_scatter));
+}
+
+float least_tear_limit(const LatticeBody& body) {
+  float least = 0;
+  for (const Material& m : body.materials) {
+    const float limit = least_tear_limit(m);
+    if (limit > 0 && (least == 0 || limit < least)) least = limit;
+  }
+  return least;
 }
 
 float tear_limit(const MpmState& state, std::int32_t point) {
   const Points::Site& s = state.points.site[point];
-  const Material& m = state.bodies[s.body].material;
+  const Material& m = state.bodies[s.body].material_of(state.points, point);
   // SplitMix64 of seed and place.
   std::uint64_t x = state.scene.seed;
   for (const std::int16_t part : {s.body, s.x, s.y, s.z}) {
@@ -153,12 +166,16 @@ void add_tearing(const MpmState& state, const std::vector<StretchedPoint>& stret
                  std::vector<TearingPoint>& tearing) {
   for (const StretchedPoint& p : stretched) {
     if (state.points.anchored[p.point] != 0) continue;  // held fast, it cannot come apart
+    const LatticeBody& body = state.bodies[state.points.site[p.point].body];
+    const float least = least_tear_limit(body.material_of(state.points, p.point));
+    if (least == 0) continue;
     Eigen::Matrix3d C;
     C << p.C[0], p.C[3], p.C[4], p.C[3], p.C[1], p.C[5], p.C[4], p.C[5], p.C[2];
     if (!C.allFinite()) continue;  // the frame's end will find out
     Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver;
     solver.computeDirect(C);
     const double stretch = std::sqrt(solver.eigenvalues()[2]);
+    if (stretch < least) continue;  // it was looked for by the limit of a weaker material
     const double excess = (stretch - 1) / (tear_limit(state, p.point) - 1);
     tearing.push_back({p.point, static_cast<float>(excess), solver.eigenvectors().col(2)});
   }
@@ -169,11 +186,14 @@ std::vector<TearingPoint> find_tearing(MpmState& state) {
   std::vector<std::vector<TearingPoint>> of_block(count);
   state.cpu->for_each(count, [&](int i) {
     const Block& block = *state.blocks.all[i];
-    const Material& m = state.bodies[block.body].material;
-    if (m.tear_stretch <= 0) return;
+    const LatticeBody& body = state.bodies[block.body];
+    const float limit = block.material == Block::kMixed
+                            ? least_tear_limit(body)
+                            : least_tear_limit(body.materials[block.material]);
+    if (limit == 0) return;
     std::vector<StretchedPoint> stretched;
-    state.kernels->stretched(block, block_field(state, block), least_tear_limit(m),
-                             state.scratch.local(), stretched);
+    state.kernels->stretched(block, block_field(state, block), limit, state.scratch.local(),
+                             stretched);
     add_tearing(state, stretched, of_block[i]);
   });
   std::vector<TearingPoint> tearing;

@@ -44,8 +44,10 @@ inline constexpr int kTearSteps = 6;
 
 /// Stretch at which a point tears.
 float tear_limit(const MpmState& state, std::int32_t point);
-/// The least of all points' limits of a body.
+/// The least limit that a point of the material may have; 0 if it never tears.
 float least_tear_limit(const Material& material);
+/// The same of all materials of a body that tear; 0 if none does.
+float least_tear_limit(const LatticeBody& body);
 
 /// A point past its limit.
 struct TearingPoint {

@@ -39,14 +39,26 @@ struct Block {
   /// (0..2) from it has the number z * plane + cell[lane] + dz * plane + dy * pitch + dx.
   std::vector<std::int32_t> cell;
 
+  static constexpr int kMixed = -1;
+  int material = 0;  ///< of all its points, in LatticeBody::materials; kMixed: see `mixture`
+  /// What the points are of in a block of several materials; its arrays are empty in one of one.
+  struct Mixture {
+    Law law = Law::kFixedCorotated;   ///< of all, unless there are both
+    Array<float> mu, lambda;          ///< [nz][8][stride], times the point's volume [J]
+    Array<std::int32_t> neo_hookean;  ///< [nz][8][stride]: -1 for a point of that law, 0 for one of
+                                      ///< the other; empty unless there are both
+    Array<float> viscosity;  ///< [nz][stride]: of a cell's points, times their volumes, summed
+                             ///< [J s]; empty where none is viscous
+  } mixture;
+
   Array<float> volume;        ///< [nz][8][stride], 0 where there is no point [m^3]
   Array<std::int32_t> point;  ///< [nz][8][stride], the point's number or -1
 
   /// A cell of which the block has some, but not all eight points. See mpm/stabilisation.h.
   struct PartialCell {
-    int lane;      ///< z * stride + its lane
-    int node;      ///< its lowest, in the block's nodes
-    float volume;  ///< of its points [m^3]
+    int lane;  ///< z * stride + its lane
+    int node;  ///< its lowest, in the block's nodes
+    float mu;  ///< of its points, times their volumes, summed [J]
   };
   std::vector<PartialCell> partial;
 

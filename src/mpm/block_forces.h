@@ -4,8 +4,7 @@
 #include <algorithm>
 #include <array>
 
-#include "material/laws.h"
-#include "mpm/block_planes.h"
+#include "mpm/lane_materials.h"
 #include "mpm/stabilisation.h"
 
 namespace tissue_sim {
@@ -26,7 +25,7 @@ TISSUE_SIM_INLINE double stabilise_cells(const Block& b, const BlockField& f, co
     for (int i = 0; i < W; ++i) {
       const Block::PartialCell& cell = b.partial[std::min(first + i, count - 1)];
       node[i] = cell.node;
-      stiffness[i] = first + i < count ? kStabilisation * f.mu * cell.volume : 0.0f;
+      stiffness[i] = first + i < count ? kStabilisation * cell.mu : 0.0f;
     }
     const int used = std::min(W, count - first);
     for (int c = 0; c < 3; ++c) {
@@ -63,7 +62,7 @@ TISSUE_SIM_INLINE double stabilise_cells(const Block& b, const BlockField& f, co
 
 /// Kelvin-Voigt stress of W cells at their middle, times an eighth of the volume of their points:
 /// added to the stress at all eight points it is the force of the mean gradient.
-template <int W>
+template <int W, class Materials>
 TISSUE_SIM_INLINE void viscous_stress(const Block& b, const BlockField& f, const Layout& l,
                                       const float* in, const float* in_rate, int z, int j,
                                       Vec<W>* P) {
@@ -83,27 +82,25 @@ TISSUE_SIM_INLINE void viscous_stress(const Block& b, const BlockField& f, const
     mean_gradient<W>(of(r, kMeanAA), of(r, kMeanAd), of(r, kMeandA), c, rate);
   }
   add_identity<W>(F);
-  const float* volume = b.volume.data() + static_cast<std::size_t>(z) * 8 * l.stride + j;
-  Vec<W> V = load<W>(volume);
-  for (int s = 1; s < 8; ++s) V += load<W>(volume + s * l.stride);
-  for (int i = 0; i < 9; ++i) P[i] = 0.0f * V;
-  add_viscous_stress(F, rate, 0.125f * f.viscosity * V, P);
+  const Vec<W> viscosity = Materials::template viscosity<W>(b, f, z, j);
+  for (int i = 0; i < 9; ++i) P[i] = 0.0f * viscosity;
+  add_viscous_stress(F, rate, 0.125f * viscosity, P);
 }
 
 /// Stress of the cells in W lanes, from the incoming x-y quantities to the outgoing ones.
-template <int W, class LawOf, bool viscous>
+template <int W, class Materials, bool viscous>
 TISSUE_SIM_INLINE void stress_lanes(const Block& b, const BlockField& f, const Layout& l,
                                     const float* in, const float* in_rate, int z, int j,
                                     float* out) {
   Vec<W> G[8][9], damping[9];
   gradients<W>(l, in, z, j, G);
-  if (viscous) viscous_stress<W>(b, f, l, in, in_rate, z, j, damping);
-  const float* volume = b.volume.data() + static_cast<std::size_t>(z) * 8 * l.stride + j;
+  if (viscous) viscous_stress<W, Materials>(b, f, l, in, in_rate, z, j, damping);
+  const std::size_t lane = static_cast<std::size_t>(z) * 8 * l.stride + j;
   for (int s = 0; s < 8; ++s) {
-    const Vec<W> V = load<W>(volume + s * l.stride);
     Vec<W> P[9];
     add_identity<W>(G[s]);
-    LawOf::stress(G[s], f.mu * V, f.lambda * V, P);
+    const auto k = Materials::template stiffness<W>(b, f, lane + s * l.stride);
+    Materials::template stress<W>(G[s], k, P);
     for (int i = 0; i < 9; ++i) G[s][i] = viscous ? P[i] + damping[i] : P[i];
   }
   for (int c = 0; c < 3; ++c) {
@@ -113,7 +110,7 @@ TISSUE_SIM_INLINE void stress_lanes(const Block& b, const BlockField& f, const L
   }
 }
 
-template <int W, class LawOf, bool viscous>
+template <int W, class Materials, bool viscous>
 TISSUE_SIM_INLINE void forces(const Block& b, const BlockField& f, BlockScratch& scratch,
                               float* force) {
   const Layout l(b);
@@ -143,25 +140,25 @@ TISSUE_SIM_INLINE void forces(const Block& b, const BlockField& f, BlockScratch&
       }
       for_each_vector<W>(
           lanes, [&](auto width, int j) __attribute__((always_inline)) {
-            stress_lanes<width, LawOf, viscous>(b, f, l, scratch.in.data(), scratch.in_rate.data(),
-                                                z, j, out);
+            stress_lanes<width, Materials, viscous>(b, f, l, scratch.in.data(),
+                                                    scratch.in_rate.data(), z, j, out);
           });
     }
     store_plane<W>(b, l, out, z, -inv_h, scratch.row.data(), force);
   }
   stabilise_cells<W>(b, f, l, scratch.nodes.data(), force);
 }
+
 template <int W>
 TISSUE_SIM_INLINE void forces_any(const Block& b, const BlockField& f, BlockScratch& s,
                                   float* out) {
-  const bool viscous = f.viscosity > 0;
-  if (f.law == Law::kNeoHookean) {
-    viscous ? forces<W, NeoHookean, true>(b, f, s, out)
-            : forces<W, NeoHookean, false>(b, f, s, out);
-  } else {
-    viscous ? forces<W, FixedCorotated, true>(b, f, s, out)
-            : forces<W, FixedCorotated, false>(b, f, s, out);
-  }
+  const bool viscous = b.material == Block::kMixed ? !b.mixture.viscosity.empty() : f.viscosity > 0;
+  with_materials(
+      b, f, [&](auto materials) __attribute__((always_inline)) {
+        using Materials = decltype(materials);
+        viscous ? forces<W, Materials, true>(b, f, s, out)
+                : forces<W, Materials, false>(b, f, s, out);
+      });
 }
 
 }  // namespace kernels

@@ -20,9 +20,12 @@ struct BlockField {
   int pitch_y, pitch_z;  ///< of the body's lattice
   float cell_size;       ///< [m]
   float origin[3];       ///< reference place of first_node [m]
-  Law law;
-  float mu, lambda;  ///< [Pa]
-  float viscosity;   ///< [Pa s]
+  Law law;               ///< of all the block's points; where they are mixed, Block::Mixture's
+  float mu, lambda;      ///< [Pa]; not read in a mixed block
+  float viscosity;       ///< [Pa s]; the same
+  const std::uint8_t*
+      material;        ///< of each point, Points::material; null where none has inclusions
+  int material_count;  ///< of the body
 };
 
 /// The same block on a lattice of no size: positions() then gives values.
@@ -46,7 +49,9 @@ struct PointBounds {
 /// State of a block's points, from block_state().
 struct BlockState {
   double elastic_energy = 0;  ///< [J]
-  float stiffening = 1;  ///< largest squared column of cof F plus |J - 1| ||F||: see stable_substep
+  /// For each of the body's materials the largest squared column of cof F plus |J - 1| ||F||, 1 at
+  /// least: see stable_substep().
+  std::vector<float> stiffening;
   bool finite = true;
 };
 

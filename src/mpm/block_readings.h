@@ -102,7 +102,7 @@ TISSUE_SIM_INLINE PointBounds bounds(const Block& b, const BlockField& f, BlockS
   return result;
 }
 
-template <int W, class LawOf>
+template <int W, class Materials>
 TISSUE_SIM_INLINE BlockState state(const Block& b, const BlockField& f, BlockScratch& scratch,
                                    float* von_mises) {
   const Layout l(b);
@@ -110,6 +110,7 @@ TISSUE_SIM_INLINE BlockState state(const Block& b, const BlockField& f, BlockScr
   reserve(scratch.in, 3 * l.in_plane);
   gather_nodes(b, f, f.nodes->u, 1.0f / f.cell_size, l, scratch.nodes.data());
   BlockState result;
+  result.stiffening.assign(f.material_count, 1.0f);
   result.elastic_energy = stabilise_cells<W>(b, f, l, scratch.nodes.data(), nullptr);
   for (int z = 0; z < 2; ++z) load_plane<W>(b, l, scratch.nodes.data(), z, scratch.in.data());
   for (int z = 0; z < b.nz; ++z) {
@@ -120,17 +121,20 @@ TISSUE_SIM_INLINE BlockState state(const Block& b, const BlockField& f, BlockScr
       const std::size_t lane = static_cast<std::size_t>(z) * 8 * l.stride + j;
       for (int s = 0; s < 8; ++s) {
         const float* volume = b.volume.data() + lane + s * l.stride;
+        const std::int32_t* point = b.point.data() + lane + s * l.stride;
         Vec<W> cof[9], P[9];
-        Vec<W> zero = load<W>(volume) * 0.0f;
+        auto k = Materials::template stiffness<W>(b, f, lane + s * l.stride);
+        k.mu /= load<W>(volume);  // lanes without a point are passed over below
+        k.lambda /= load<W>(volume);
         add_identity<W>(G[s]);
         cofactor(G[s], cof);
         const Vec<W> J = G[s][0] * cof[0] + G[s][1] * cof[1] + G[s][2] * cof[2];
-        const Vec<W> energy = LawOf::energy(G[s], zero + f.mu, zero + f.lambda);
+        const Vec<W> energy = Materials::template energy<W>(G[s], k);
         const Vec<W> cx = cof[0] * cof[0] + cof[3] * cof[3] + cof[6] * cof[6];
         const Vec<W> cy = cof[1] * cof[1] + cof[4] * cof[4] + cof[7] * cof[7];
         const Vec<W> cz = cof[2] * cof[2] + cof[5] * cof[5] + cof[8] * cof[8];
         const Vec<W> f2 = norm2(G[s]);
-        LawOf::stress(G[s], zero + f.mu, zero + f.lambda, P);
+        Materials::template stress<W>(G[s], k, P);
         const Vec<W> mises2 = von_mises_squared(G[s], P);
         for (int i = 0; i < W; ++i) {
           const float v = volume[i];
@@ -139,7 +143,8 @@ TISSUE_SIM_INLINE BlockState state(const Block& b, const BlockField& f, BlockScr
               std::max(cx[i], std::max(cy[i], cz[i])) + std::fabs(J[i] - 1) * std::sqrt(f2[i] / 3);
           if (!std::isfinite(energy[i] + stiffening)) result.finite = false;
           result.elastic_energy += static_cast<double>(energy[i]) * v;
-          result.stiffening = std::max(result.stiffening, stiffening);
+          const int material = f.material == nullptr ? 0 : f.material[point[i]];
+          result.stiffening[material] = std::max(result.stiffening[material], stiffening);
           if (von_mises) von_mises[lane + s * l.stride + i] = std::sqrt(mises2[i]);
         }
       }
@@ -151,8 +156,10 @@ TISSUE_SIM_INLINE BlockState state(const Block& b, const BlockField& f, BlockScr
 template <int W>
 TISSUE_SIM_INLINE BlockState state_any(const Block& b, const BlockField& f, BlockScratch& s,
                                        float* von_mises) {
-  return f.law == Law::kNeoHookean ? state<W, NeoHookean>(b, f, s, von_mises)
-                                   : state<W, FixedCorotated>(b, f, s, von_mises);
+  return with_materials(
+      b, f, [&](auto materials) __attribute__((always_inline)) {
+        return state<W, decltype(materials)>(b, f, s, von_mises);
+      });
 }
 
 /// The largest eigenvalue of C reaches s^2 where s^2 I - C is not positive definite: by its leading

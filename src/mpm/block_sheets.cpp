@@ -49,8 +49,11 @@ void for_each_cell(const BlockRegion& r, const LatticeBody& b, const F& f) {
 }
 
 CellShare share_at(int x, int y, int z) {
-  CellShare c{
-      static_cast<std::int16_t>(x), static_cast<std::int16_t>(y), static_cast<std::int16_t>(z), {}};
+  CellShare c{static_cast<std::int16_t>(x),
+              static_cast<std::int16_t>(y),
+              static_cast<std::int16_t>(z),
+              0,
+              {}};
   std::fill_n(c.point, 8, -1);
   return c;
 }
@@ -195,6 +198,12 @@ bool put_all(const Shares& shares, const std::vector<std::int32_t>& part, Sheet&
   return true;
 }
 
+void count_points(Sheet& sheet) {
+  for (CellShare& c : sheet.cells) {
+    c.count = static_cast<std::int16_t>(8 - std::count(c.point, c.point + 8, -1));
+  }
+}
+
 }  // namespace
 
 std::vector<Sheet> sheets_of(const BlockRegion& r, const LatticeBody& b, const Points& points,
@@ -216,6 +225,7 @@ std::vector<Sheet> sheets_of(const BlockRegion& r, const LatticeBody& b, const P
       whole.cells.push_back(share_at(x, y, z));
       std::copy_n(point, 8, whole.cells.back().point);
     });
+    count_points(whole);
     return {whole};
   }
   const Shares shares = shares_of(r, b, split);
@@ -240,6 +250,7 @@ std::vector<Sheet> sheets_of(const BlockRegion& r, const LatticeBody& b, const P
       put(shares, share, *sheet);
     }
   }
+  for (Sheet& sheet : sheets) count_points(sheet);
   return sheets;
 }
 

@@ -12,6 +12,7 @@ namespace tissue_sim {
 /// or several where a cut goes through it.
 struct CellShare {
   std::int16_t x, y, z;   ///< cell in the region
+  std::int16_t count;     ///< of its points, whatever they are of
   std::int32_t point[8];  ///< by sub-position sx + 2 sy + 4 sz, -1 where it has none
 };
 

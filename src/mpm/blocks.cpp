@@ -3,115 +3,10 @@
 #include <algorithm>
 
 #include "contact/known_facets.h"
-#include "mpm/block_sheets.h"
+#include "mpm/fill_region.h"
 
 namespace tissue_sim {
 namespace {
-
-constexpr int kGap = 2;  ///< cells: a new run costs about as much as so many
-
-void find_partial_cells(Block& block) {
-  for (int i = 0; i < block.nz * block.stride; ++i) {
-    const int z = i / block.stride, column = i % block.stride;
-    int count = 0;
-    float volume = 0;
-    for (int s = 0; s < 8; ++s) {
-      const std::size_t lane = (static_cast<std::size_t>(z) * 8 + s) * block.stride + column;
-      count += block.point[lane] >= 0;
-      volume += block.volume[lane];
-    }
-    if (count == 0 || count == 8) continue;
-    block.partial.push_back({i, z * block.plane + block.cell[column], volume});
-  }
-}
-
-/// Runs of the cells that hold points in any z-plane, gaps of up to kGap cells bridged.
-/// `holds` is [ny][nx].
-std::vector<Block::Run> runs_of(const std::vector<bool>& holds, int nx, int ny) {
-  std::vector<Block::Run> runs;
-  int lane = 0;
-  for (int y = 0; y < ny; ++y) {
-    for (int x = 0; x < nx; ++x) {
-      if (!holds[y * nx + x]) continue;
-      Block::Run* last = runs.empty() || runs.back().y != y ? nullptr : &runs.back();
-      if (last == nullptr || x - (last->x + last->count) > kGap) {
-        runs.push_back({x, y, 0, lane});
-        last = &runs.back();
-      }
-      lane += x + 1 - (last->x + last->count);
-      last->count = x + 1 - last->x;
-    }
-  }
-  return runs;
-}
-
-/// The block of a sheet, no larger than its points need.
-Block make_block(const BlockRegion& r, const LatticeBody& b, const Points& points,
-                 const Sheet& sheet) {
-  int lo[3] = {1 << 30, 1 << 30, 1 << 30}, hi[3] = {-1, -1, -1};
-  for (const CellShare& c : sheet.cells) {
-    const int at[3] = {c.x, c.y, c.z};
-    for (int a = 0; a < 3; ++a) {
-      lo[a] = std::min(lo[a], at[a]);
-      hi[a] = std::max(hi[a], at[a]);
-    }
-  }
-  Block block;
-  block.body = r.body;
-  block.x = r.x + lo[0];
-  block.y = r.y + lo[1];
-  block.z = r.z + lo[2];
-  block.nx = hi[0] - lo[0] + 1;
-  block.ny = hi[1] - lo[1] + 1;
-  block.nz = hi[2] - lo[2] + 1;
-  std::vector<bool> holds(block.nx * block.ny, false);
-  for (const CellShare& c : sheet.cells) holds[(c.y - lo[1]) * block.nx + c.x - lo[0]] = true;
-  block.runs = runs_of(holds, block.nx, block.ny);
-  lay_out(block);
-  std::vector<int> lane_of(block.nx * block.ny, -1);
-  for (const Block::Run& run : block.runs) {
-    for (int i = 0; i < run.count; ++i) lane_of[run.y * block.nx + run.x + i] = run.lane + i;
-  }
-  for (const CellShare& c : sheet.cells) {
-    const int column = lane_of[(c.y - lo[1]) * block.nx + c.x - lo[0]];
-    for (int s = 0; s < 8; ++s) {
-      if (c.point[s] < 0) continue;
-      const std::size_t lane =
-          (static_cast<std::size_t>(c.z - lo[2]) * 8 + s) * block.stride + column;
-      block.volume[lane] = points.volume[c.point[s]];
-      block.point[lane] = c.point[s];
-    }
-  }
-  find_partial_cells(block);
-  block.node.assign(block.node_count(), b.node(block.x - 1, block.y - 1, block.z - 1));
-  for (int z = 0; z < block.nz + 2; ++z) {
-    for (int y = 0; y < block.ny + 2; ++y) {
-      for (int x = 0; x < block.pitch; ++x) {
-        const int local = z * block.plane + y * block.pitch + x;
-        const int lattice_node = b.node(block.x + x - 1, block.y + y - 1, block.z + z - 1);
-        block.node[local] = lattice_node;
-        if (sheet.node.empty()) continue;
-        const int n = ((lo[2] + z) * (r.ny + 2) + lo[1] + y) * (r.nx + 2) + lo[0] + x;
-        if (sheet.node[n] == -1 || sheet.node[n] == lattice_node) continue;
-        block.node[local] = sheet.node[n];
-        block.split_nodes.push_back({local, sheet.node[n]});
-      }
-    }
-  }
-  return block;
-}
-
-/// Fills the region's blocks. `known` are the facets that it had, where they did not change.
-void fill_region(BlockRegion& r, const std::vector<LatticeBody>& bodies, const Points& points,
-                 const NodeFields& fields, const KnownFacets& known) {
-  r.blocks.clear();
-  const LatticeBody& b = bodies[r.body];
-  for (const Sheet& sheet : sheets_of(r, b, points, fields)) {
-    if (sheet.cells.empty()) continue;
-    r.blocks.push_back(make_block(r, b, points, sheet));
-    r.blocks.back().facets = facets_of(b, points, r.blocks.back(), known);
-  }
-}
 
 /// Runs of columns that hold points, gaps of up to kGap bridged, long runs halved.
 std::vector<std::pair<int, int>> x_runs(const LatticeBody& b, int y0, int ny, int z0, int nz,
@@ -225,6 +120,7 @@ void connect_forces(Blocks& blocks, const std::vector<LatticeBody>& bodies, int 
 Blocks make_blocks(const std::vector<LatticeBody>& bodies, const Points& points,
                    const NodeFields& fields, const BlockShape& shape) {
   Blocks blocks;
+  blocks.one_material = shape.one_material;
   for (std::size_t i = 0; i < bodies.size(); ++i) {
     const LatticeBody& b = bodies[i];
     for (int z = 0; z < b.nz; z += shape.z) {
@@ -232,7 +128,7 @@ Blocks make_blocks(const std::vector<LatticeBody>& bodies, const Points& points,
         const int ny = std::min(shape.y, b.ny - y), nz = std::min(shape.z, b.nz - z);
         for (const auto& [begin, end] : x_runs(b, y, ny, z, nz, shape.x)) {
           BlockRegion r{static_cast<int>(i), begin, y, z, end - begin, ny, nz, {}};
-          fill_region(r, bodies, points, fields, {});
+          fill_region(r, bodies, points, fields, shape.one_material, {});
           blocks.regions.push_back(std::move(r));
         }
       }
@@ -269,7 +165,7 @@ void update_blocks(Blocks& blocks, const std::vector<LatticeBody>& bodies, const
     if (!touched(r)) return;
     is_new[i] = 1;
     const LatticeBody& b = bodies[r.body];
-    fill_region(r, bodies, points, fields, {b, r, blocks.stale_facets});
+    fill_region(r, bodies, points, fields, blocks.one_material, {b, r, blocks.stale_facets});
     for (int z = r.z; z < r.z + r.nz; ++z) {
       for (int y = r.y; y < r.y + r.ny; ++y) {
         std::fill_n(blocks.stale_facets.begin() + b.node(r.x, y, z), r.nx, std::uint8_t{0});

@@ -36,7 +36,8 @@ struct SplitNodePart {
 
 struct Blocks {
   std::vector<BlockRegion> regions;
-  std::vector<Block*> all;  ///< in a fixed order
+  std::vector<Block*> all;    ///< in a fixed order
+  bool one_material = false;  ///< see BlockShape
   /// Of each, the blocks before the last update_blocks() that had its points.
   struct Origin {
     int begin, end;
@@ -58,6 +59,7 @@ struct Blocks {
 struct BlockShape {
   int x = 48;  ///< at most
   int y = 8, z = 4;
+  bool one_material = false;  ///< a block for each of the materials: the GPU's kernels know one
 };
 
 /// Cuts the bodies' lattices into regions and makes their blocks.

@@ -18,6 +18,56 @@ void check_size(const Lattice& lattice, const std::string& name) {
   }
 }
 
+/// Puts a material into the list unless it is there; returns its number.
+int number_of(std::vector<Material>& materials, const Material& m) {
+  const auto same = [&m](const Material& other) { return other.name == m.name; };
+  const auto at = std::find_if(materials.begin(), materials.end(), same);
+  const auto number = static_cast<int>(at - materials.begin());
+  if (at == materials.end()) materials.push_back(m);
+  return number;
+}
+
+[[noreturn]] void refuse_region(const char* list, std::size_t index, const Scene& scene,
+                                const std::string& body, const char* what) {
+  throw std::invalid_argument(
+      std::string(list) + "[" + std::to_string(index) + "] of body '" + body +
+      "' holds no point of it" + what +
+      ": a region is in world coordinates and must reach at least a cell (" +
+      std::to_string(scene.cell_size) + " m) into the body");
+}
+
+/// Fills Points::material of the body's points, which are the last ones.
+void assign_materials(const Scene& scene, LatticeBody& b, Points& points) {
+  b.materials = {find_material(scene, b.body.material)};
+  const std::vector<Inclusion>& inclusions = b.body.inclusions;
+  std::vector<std::uint8_t> number;
+  for (const Inclusion& i : inclusions) {
+    const int n = number_of(b.materials, find_material(scene, i.material));
+    number.push_back(static_cast<std::uint8_t>(n));
+  }
+  if (inclusions.empty() && points.material.empty()) return;
+  points.material.resize(points.size(), 0);
+  std::vector<int> held(inclusions.size(), 0);
+  for (int p = b.first_point; p < points.size(); ++p) {
+    const Points::Site& s = points.site[p];
+    const Vec3 x = b.site_position(s.x, s.y, s.z);
+    for (std::size_t i = inclusions.size(); i-- > 0;) {
+      if (!inclusions[i].region.contains(x)) continue;
+      points.material[p] = number[i];
+      ++held[i];
+      break;
+    }
+  }
+  for (std::size_t i = 0; i < held.size(); ++i) {
+    if (held[i] > 0) continue;
+    refuse_region("inclusions", i, scene, b.body.name, " that no later one holds");
+  }
+  const auto first = points.material.begin() + b.first_point;
+  if (std::find(first, points.material.end(), 0) != points.material.end()) return;
+  b.materials.erase(b.materials.begin());  // inclusions fill the body
+  for (auto m = first; m != points.material.end(); ++m) --*m;
+}
+
 }  // namespace
 
 std::uint8_t whole_bonds(const LatticeBody& b, const Points::Site& s) {
@@ -38,7 +88,6 @@ std::vector<LatticeBody> make_lattice_bodies(const Scene& scene, Points& points,
     check_size(lattice, body.name);
     LatticeBody b;
     b.body = body;
-    b.material = find_material(scene, body.material);
     b.origin = lattice.origin;
     b.cell_size = lattice.cell_size;
     b.nx = lattice.nx;
@@ -68,14 +117,9 @@ std::vector<LatticeBody> make_lattice_bodies(const Scene& scene, Points& points,
       points.anchored.push_back(held);
     }
     for (std::size_t r = 0; r < anchored.size(); ++r) {
-      if (anchored[r] == 0) {
-        throw std::invalid_argument(
-            "anchors[" + std::to_string(r) + "] of body '" + body.name +
-            "' holds no point of it: a region is in world coordinates and must "
-            "reach at least a cell (" +
-            std::to_string(scene.cell_size) + " m) into the body");
-      }
+      if (anchored[r] == 0) refuse_region("anchors", r, scene, body.name, "");
     }
+    assign_materials(scene, b, points);
     bodies.push_back(std::move(b));
   }
   points.bonds.resize(points.size());

@@ -28,9 +28,12 @@ struct Points {
   Array<float> volume;        ///< [m^3]
   Array<std::uint8_t> bonds;  ///< bit k: still bound to the neighbour of bond k (cutting/bonds.h)
   Array<std::uint8_t> anchored;  ///< lies in an anchored region
+  Array<std::uint8_t> material;  ///< in LatticeBody::materials; empty where no body has inclusions
   /// Of bonds that blades broke, by crossing_key(); a bond that tore has none.
   std::unordered_map<std::int64_t, Crossing> crossings;
   int size() const { return static_cast<int>(site.size()); }
+  /// Number of a point's material among those of its body.
+  int material_of(std::int32_t point) const { return material.empty() ? 0 : material[point]; }
 };
 
 /// Key of the forward bond of a point along an axis (0 x, 1 y, 2 z).
@@ -40,8 +43,8 @@ inline std::int64_t crossing_key(std::int32_t point, int axis) {
 
 struct LatticeBody {
   Body body;
-  Material material;
-  Vec3 origin = Vec3::Zero();  ///< lowest corner of cell (0, 0, 0) [m]
+  std::vector<Material> materials;  ///< that its points are of: its own and its inclusions'
+  Vec3 origin = Vec3::Zero();       ///< lowest corner of cell (0, 0, 0) [m]
   double cell_size = 0;
   int nx = 0, ny = 0, nz = 0;  ///< cells
   int first_node = 0;          ///< of its lattice nodes in Nodes; cell (0,0,0) has node (1,1,1)
@@ -49,6 +52,9 @@ struct LatticeBody {
   int first_point = 0, point_count = 0;
   std::vector<std::int32_t> point_at;  ///< [2 nz][2 ny][2 nx], point number or -1
 
+  const Material& material_of(const Points& points, std::int32_t point) const {
+    return materials[points.material_of(point)];
+  }
   int node_count() const { return pitch_z * (nz + 2); }
   /// Point at a site, -1 where there is none or outside.
   int point(int x, int y, int z) const {

@@ -14,8 +14,6 @@ std::unique_ptr<MpmState> make_mpm_state(const Scene& scene, std::vector<std::st
   state->fields = std::make_unique<NodeFields>(state->bodies, state->points, state->nodes);
   state->blocks = make_blocks(state->bodies, state->points, *state->fields);
   state->force.resize(state->blocks.force_size);
-  state->contacts.with.assign(state->points.size(), 0);
-  state->contacts.hold.assign(3 * static_cast<std::size_t>(state->points.size()), 0.0f);
   state->contacts.touching.resize(state->blocks.all.size());
   state->contacts.near.resize(state->blocks.all.size());
   list_facets(*state);
@@ -35,10 +33,14 @@ BlockField block_field(const MpmState& state, const Block& block) {
   f.pitch_z = b.pitch_z;
   f.cell_size = static_cast<float>(b.cell_size);
   for (int a = 0; a < 3; ++a) f.origin[a] = static_cast<float>(origin[a]);
-  f.law = b.material.law;
-  f.mu = static_cast<float>(lame_mu(b.material));
-  f.lambda = static_cast<float>(lame_lambda(b.material));
-  f.viscosity = static_cast<float>(b.material.viscosity);
+  const bool mixed = block.material == Block::kMixed;
+  const Material& m = b.materials[mixed ? 0 : block.material];
+  f.law = mixed ? block.mixture.law : m.law;
+  f.mu = static_cast<float>(lame_mu(m));
+  f.lambda = static_cast<float>(lame_lambda(m));
+  f.viscosity = static_cast<float>(m.viscosity);
+  f.material = state.points.material.empty() ? nullptr : state.points.material.data();
+  f.material_count = static_cast<int>(b.materials.size());
   return f;
 }
 

@@ -20,12 +20,18 @@
 
 namespace tissue_sim {
 
-/// Which collider each point touches, and where friction holds on to.
+/// A point that touches a collider.
+struct Touch {
+  std::int32_t lane;  ///< in its block
+  std::int32_t point;
+  std::uint8_t collider;
+  float hold[3];  ///< place that friction holds on to, in the collider's frame [m]
+};
+
+/// Contact of points with colliders, block by block.
 struct Contacts {
-  std::vector<std::uint8_t> with;  ///< per point: 0, or 1 + index of the collider
-  Array<float> hold;               ///< [3 * point]: place in the collider's frame [m]
-  std::vector<std::vector<std::int32_t>> touching;  ///< per block: its points in contact
-  std::vector<std::vector<std::uint8_t>> near;      ///< per block: colliders it may meet this frame
+  std::vector<std::vector<Touch>> touching;     ///< by collider, then lane
+  std::vector<std::vector<std::uint8_t>> near;  ///< colliders that it may meet this frame
 };
 
 /// Force and moment (about the tip, world axes) of the tissue on each collider.

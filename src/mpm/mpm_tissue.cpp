@@ -9,7 +9,6 @@
 #include "cutting/cut_tissue.h"
 #include "cutting/tear.h"
 #include "fragments/piece_motion.h"
-#include "mpm/state_figures.h"
 #include "tools/tool_motion.h"
 
 namespace tissue_sim {
@@ -110,12 +109,17 @@ void MpmTissue::measure() {
     const Block& block = *s.blocks.all[i];
     states[i] = s.kernels->state(block, block_field(s, block), s.scratch.local(), nullptr);
   });
-  stiffening_ = 1;
+  stiffening_ = even_stiffening(s, 1);
   result_.elastic_energy = result_.kinetic_energy = result_.max_speed = 0;
-  for (const BlockState& b : states) {
+  for (int i = 0; i < count; ++i) {
+    const BlockState& b = states[i];
     result_.elastic_energy += b.elastic_energy;
-    stiffening_ = std::max(stiffening_, b.stiffening);
     result_.blew_up = result_.blew_up || !b.finite;
+    std::vector<float>& of_body = stiffening_[s.blocks.all[i]->body];
+    for (std::size_t m = 0; m < of_body.size(); ++m) {
+      of_body[m] = std::max(of_body[m], b.stiffening[m]);
+      result_.blew_up = result_.blew_up || of_body[m] > 1e6f;
+    }
   }
   for (std::size_t i = 0; i < s.nodes.size(); ++i) {
     const double v2 = Vec3(s.nodes.v[0][i], s.nodes.v[1][i], s.nodes.v[2][i]).squaredNorm();
@@ -125,7 +129,7 @@ void MpmTissue::measure() {
     if (!(m.speed <= result_.max_speed)) result_.max_speed = m.speed;
   }
   // Nothing that instruments do moves tissue at the speed of a bullet; what does is out of control.
-  result_.blew_up = result_.blew_up || !(result_.max_speed < 300) || stiffening_ > 1e6f;
+  result_.blew_up = result_.blew_up || !(result_.max_speed < 300);
 }
 
 FrameResult MpmTissue::finish() {

@@ -6,6 +6,7 @@
 #include "cutting/tear.h"
 #include "fragments/pieces.h"
 #include "mpm/mpm_state.h"
+#include "mpm/state_figures.h"
 #include "tissue_sim/tissue.h"
 
 namespace tissue_sim {
@@ -38,7 +39,7 @@ class MpmTissue final : public Tissue {
   std::vector<std::string> notes_;
   std::unique_ptr<MpmState> state_;
   Pieces pieces_;
-  float stiffening_ = 1;
+  Stiffening stiffening_;
   FrameResult result_;
 };
 

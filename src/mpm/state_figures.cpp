@@ -6,19 +6,38 @@
 
 namespace tissue_sim {
 
-float stable_substep(const MpmState& state, float stiffening) {
+namespace {
+
+double stable_substep(const Material& m, double cell_size, double cfl, float stiffening) {
+  const double mu = lame_mu(m), lambda = lame_lambda(m);
+  // Waves in the deformed body, in reference space: the volumetric stiffness grows with the
+  // square of the cofactor's columns.
+  const double volumetric = m.law == Law::kNeoHookean ? lambda + mu : lambda;
+  const double modulus = lambda + 2 * mu + volumetric * std::max(0.0f, stiffening - 1);
+  const double elastic = cfl * cell_size * std::sqrt(m.density / modulus);
+  // Explicit viscosity: dt^2 + 4 eta / M dt <= dt_elastic^2.
+  const double t = 2 * m.viscosity / modulus;
+  return std::sqrt(t * t + elastic * elastic) - t;
+}
+
+}  // namespace
+
+Stiffening even_stiffening(const MpmState& state, float stiffening) {
+  Stiffening all;
+  for (const LatticeBody& b : state.bodies) all.emplace_back(b.materials.size(), stiffening);
+  return all;
+}
+
+// Stiffness, damping and mass of any motion are sums over points, and the condition is linear in
+// each of them: what every point bears on its own, a mixture bears.
+float stable_substep(const MpmState& state, const Stiffening& stiffening) {
   double dt = 1e9;
-  for (const LatticeBody& b : state.bodies) {
-    const Material& m = b.material;
-    const double mu = lame_mu(m), lambda = lame_lambda(m);
-    // Waves in the deformed body, in reference space: the volumetric stiffness grows with the
-    // square of the cofactor's columns.
-    const double volumetric = m.law == Law::kNeoHookean ? lambda + mu : lambda;
-    const double modulus = lambda + 2 * mu + volumetric * std::max(0.0f, stiffening - 1);
-    const double elastic = state.scene.cfl * b.cell_size * std::sqrt(m.density / modulus);
-    // Explicit viscosity: dt^2 + 4 eta / M dt <= dt_elastic^2.
-    const double t = 2 * m.viscosity / modulus;
-    dt = std::min(dt, std::sqrt(t * t + elastic * elastic) - t);
+  for (std::size_t i = 0; i < state.bodies.size(); ++i) {
+    const LatticeBody& b = state.bodies[i];
+    for (std::size_t m = 0; m < b.materials.size(); ++m) {
+      dt = std::min(dt,
+                    stable_substep(b.materials[m], b.cell_size, state.scene.cfl, stiffening[i][m]));
+    }
   }
   return static_cast<float>(dt);
 }

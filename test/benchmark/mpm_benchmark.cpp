@@ -28,8 +28,32 @@ struct Case {
   int threads = 0;
   bool tears = false;  ///< looks for tears as often as a frame would, and finds none
   int anchors = 0;     ///< regions that hold it
-  bool ring = false;   ///< a slanting ring that fills a tenth of its box, not a cube
+  int materials = 1;   ///< spread through it in balls
+  bool both_laws = false;
+  bool ring = false;  ///< a slanting ring that fills a tenth of its box, not a cube
 };
+
+/// Fills the body with balls, four or five along each edge, of `count` materials in turn.
+void add_materials(const Case& c, double edge, Scene& scene) {
+  const int along = 2 * static_cast<int>(std::cbrt(c.materials)) + 1;
+  for (int i = 1; i < c.materials; ++i) {
+    Material m = scene.materials[0];
+    m.name += std::to_string(i);
+    m.young_modulus *= 1 + 0.1 * i;
+    m.density *= 1 + 0.02 * i;
+    if (c.both_laws && i % 2 == 1) m.law = Law::kNeoHookean;
+    scene.materials.push_back(m);
+  }
+  for (int i = 0; i < along * along * along; ++i) {
+    Inclusion ball;
+    ball.material = scene.materials[i % c.materials].name;
+    ball.region.kind = Region::Kind::kBall;
+    ball.region.center =
+        edge / along * Vec3(i % along + 0.5, i / along % along + 0.5, i / along / along + 0.5);
+    ball.region.radius = 0.55 * edge / along;
+    scene.bodies[0].inclusions.push_back(ball);
+  }
+}
 
 /// The heap in use [bytes].
 double heap_bytes() {
@@ -83,6 +107,7 @@ std::unique_ptr<MpmTissue> deformed_body(const Case& c) {
     held.radius = 1.5 * h;
     body.anchors.push_back(held);
   }
+  if (c.materials > 1) add_materials(c, edge, scene);
   if (c.ring) {
     body.shape = Shape::kMesh;
     body.mesh = ring_mesh();
@@ -205,6 +230,15 @@ int main(int argc, char** argv) {
     add("/cut", [](Case& c) { c.cuts = {{1, 0.6, 0.3}}; });
     add("/cut_twice", [](Case& c) { c.cuts = {{1, 0.3, 0.2}, {-0.3, 1, 0.1}}; });
     add("/anchors:100", [](Case& c) { c.anchors = 100; });
+    add("/materials:10", [](Case& c) { c.materials = 10; });
+    add("/materials:10/both_laws", [](Case& c) {
+      c.materials = 10;
+      c.both_laws = true;
+    });
+    add("/materials:10/viscous", [](Case& c) {
+      c.materials = 10;
+      c.viscosity = 1;
+    });
     add("/ring", [](Case& c) { c.ring = true; });
     add("/everything", [](Case& c) {
       c.viscosity = 1;

@@ -76,8 +76,21 @@ struct Step {
   double largest_strain = 0;  // max over points of ||F - R||
 };
 
+/// Shear modulus times volume of the points of a block in one of its partial cells [J].
+inline double cell_mu(const MpmState& s, const Block& block, const Block::PartialCell& cell) {
+  double mu = 0;
+  const int z = cell.lane / block.stride, lane = cell.lane % block.stride;
+  for (int sub = 0; sub < 8; ++sub) {
+    const std::int32_t p =
+        block.point[(static_cast<std::size_t>(z) * 8 + sub) * block.stride + lane];
+    if (p < 0) continue;
+    mu += lame_mu(s.bodies[block.body].material_of(s.points, p)) * s.points.volume[p];
+  }
+  return mu;
+}
+
 /// The stabilising numbers (mpm/stabilisation.h) of a block's cells, each as coefficients of nodes
-/// and times the root of its cell's volume: products of A, d, B along the axes, from their
+/// and times the root of its cell's stiffness: products of A, d, B along the axes, from their
 /// definition.
 inline std::vector<std::vector<std::pair<int, double>>> stabilising_rows(const MpmState& s,
                                                                          const Block& block) {
@@ -85,6 +98,7 @@ inline std::vector<std::vector<std::pair<int, double>>> stabilising_rows(const M
   const double kinds[3][3] = {{0.15625, 0.6875, 0.15625}, {-0.5, 0, 0.5}, {0.25, -0.5, 0.25}};
   const double h = s.bodies[block.body].cell_size;
   for (const Block::PartialCell& cell : block.partial) {
+    const double mu = cell_mu(s, block, cell);
     for (int f = 0; f < 27; ++f) {
       if (f % 3 + f / 3 % 3 + f / 9 <= 1) continue;  // linear fields are free
       rows.emplace_back();
@@ -92,7 +106,7 @@ inline std::vector<std::vector<std::pair<int, double>>> stabilising_rows(const M
         rows.back().emplace_back(
             block.node[cell.node + k / 9 * block.plane + k / 3 % 3 * block.pitch + k % 3],
             kinds[f % 3][k % 3] * kinds[f / 3 % 3][k / 3 % 3] * kinds[f / 9][k / 9] *
-                std::sqrt(cell.volume) / h);
+                std::sqrt(0.01 * mu) / h);
       }
     }
   }
@@ -100,19 +114,20 @@ inline std::vector<std::vector<std::pair<int, double>>> stabilising_rows(const M
 }
 
 /// Adds Kelvin-Voigt stress at the middle of each cell, or of what a cut leaves of it: its
-/// gradients are the means over the eight places that points have in a cell, its volume that of its
-/// points.
+/// gradients are the means over the eight places that points have in a cell, its viscosity times
+/// volume the sum of its points'.
 inline void add_viscous_forces(const MpmState& s, Step& r) {
   for (const Block* block : s.blocks.all) {
     const LatticeBody& b = s.bodies[block->body];
-    if (b.material.viscosity == 0) continue;
     for (int i = 0; i < block->nz * block->stride; ++i) {
       const int z = i / block->stride, lane = i % block->stride;
-      double volume = 0;
+      double viscosity = 0;  // times volume
       Vec3 slope[27];
       for (int k = 0; k < 27; ++k) slope[k] = Vec3::Zero();
       for (int sub = 0; sub < 8; ++sub) {
-        volume += block->volume[(static_cast<std::size_t>(z) * 8 + sub) * block->stride + lane];
+        const std::int32_t p =
+            block->point[(static_cast<std::size_t>(z) * 8 + sub) * block->stride + lane];
+        if (p >= 0) viscosity += b.material_of(s.points, p).viscosity * s.points.volume[p];
         double at[3];  // from the cell's node [cells]
         for (int a = 0; a < 3; ++a) at[a] = (sub >> a & 1) == 1 ? 0.25 : -0.25;
         for (int k = 0; k < 27; ++k) {
@@ -123,7 +138,7 @@ inline void add_viscous_forces(const MpmState& s, Step& r) {
                       (8 * b.cell_size);
         }
       }
-      if (volume == 0) continue;
+      if (viscosity == 0) continue;
       const std::int32_t* node = &block->node[z * block->plane + block->cell[lane]];
       const auto at = [&](int k) {
         return node[k / 9 * block->plane + k / 3 % 3 * block->pitch + k % 3];
@@ -133,8 +148,8 @@ inline void add_viscous_forces(const MpmState& s, Step& r) {
         F += r.u[at(k)] * slope[k].transpose();
         rate += r.v[at(k)] * slope[k].transpose();
       }
-      const Mat3 P = b.material.viscosity * F * (F.transpose() * rate + rate.transpose() * F);
-      for (int k = 0; k < 27; ++k) r.force[at(k)] -= volume * P * slope[k];
+      const Mat3 P = viscosity * F * (F.transpose() * rate + rate.transpose() * F);
+      for (int k = 0; k < 27; ++k) r.force[at(k)] -= P * slope[k];
     }
   }
 }
@@ -151,7 +166,7 @@ inline Step substep(const MpmState& s, double dt) {
     r.v[i] = Vec3(s.nodes.v[0][i], s.nodes.v[1][i], s.nodes.v[2][i]);
   }
   for (int p = 0; p < s.points.size(); ++p) {
-    const Material& m = s.bodies[s.points.site[p].body].material;
+    const Material& m = s.bodies[s.points.site[p].body].material_of(s.points, p);
     const Stencil stencil = stencil_of(s, p);
     Mat3 F = Mat3::Identity();
     for (int k = 0; k < 27; ++k) F += r.u[stencil.node[k]] * stencil.slope[k].transpose();
@@ -164,11 +179,10 @@ inline Step substep(const MpmState& s, double dt) {
   }
   add_viscous_forces(s, r);
   for (const Block* block : s.blocks.all) {
-    const double stiffness = 0.01 * lame_mu(s.bodies[block->body].material);
     for (const auto& row : stabilising_rows(s, *block)) {
       Vec3 value = Vec3::Zero();
       for (const auto& [i, a] : row) value += a * r.u[i];
-      for (const auto& [i, a] : row) r.force[i] -= stiffness * a * value;
+      for (const auto& [i, a] : row) r.force[i] -= a * value;
     }
   }
   for (std::size_t i = 0; i < n; ++i) {

@@ -216,7 +216,7 @@ __device__ __forceinline__ void block_forces(const CudaTables& t, const CudaBund
       HalfBends bends[3];
       float stiffness = 0;
       if (kPartial) {
-        stiffness = kStabilisation * body.mu * __ldg(t.partial + column.cell + z * column.step);
+        stiffness = kStabilisation * __ldg(t.partial + column.cell + z * column.step);
       }
       half_forces<LawOf, kViscous, kPartial>(t, column, body, s, z, sz, k, stiffness, out, bends);
       if (kSpecial && (step.touched >> z & 1u) != 0) {

@@ -105,7 +105,7 @@ CudaShape choose_shape(const std::vector<LatticeBody>& bodies, const CudaLimits&
 std::vector<std::vector<int>> bundle_blocks(const std::vector<Block*>& blocks, std::size_t wanted,
                                             const BundleLimits& limits) {
   struct Filled {
-    int body;
+    int body, material;
     BundleLimits has;
     std::vector<int> blocks;
   };
@@ -113,6 +113,7 @@ std::vector<std::vector<int>> bundle_blocks(const std::vector<Block*>& blocks, s
   for (std::size_t i = 0; i < blocks.size(); ++i) {
     const Block& b = *blocks[i];
     single.push_back({b.body,
+                      b.material,
                       {columns_of(b), b.nx * b.ny, (b.nx + 2) * (b.ny + 2) * (b.nz + 2)},
                       {static_cast<int>(i)}});
   }
@@ -126,7 +127,8 @@ std::vector<std::vector<int>> bundle_blocks(const std::vector<Block*>& blocks, s
     Filled* room = nullptr;
     if (bundles.size() >= wanted) {
       for (Filled& f : bundles) {
-        const bool fits = f.body == one.body && f.has.columns + one.has.columns <= limits.columns &&
+        const bool fits = f.body == one.body && f.material == one.material &&
+                          f.has.columns + one.has.columns <= limits.columns &&
                           f.has.places + one.has.places <= limits.places &&
                           f.has.slots + one.has.slots <= limits.slots;
         if (fits && (room == nullptr || f.has.columns < room->has.columns)) room = &f;

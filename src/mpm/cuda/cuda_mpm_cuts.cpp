@@ -68,10 +68,12 @@ HostTables CudaMpmTissue::plan_tables() {
     d.plan.max_slots = std::max(d.plan.max_slots, (b->nx + 2) * (b->ny + 2) * (b->nz + 2));
   }
   for (const LatticeBody& b : state_->bodies) {
-    const bool neo_hookean = b.material.law == Law::kNeoHookean;
-    d.plan.neo_hookean = d.plan.neo_hookean || neo_hookean;
-    d.plan.fixed_corotated = d.plan.fixed_corotated || !neo_hookean;
-    d.plan.viscous = d.plan.viscous || b.material.viscosity > 0;
+    for (const Material& m : b.materials) {
+      const bool neo_hookean = m.law == Law::kNeoHookean;
+      d.plan.neo_hookean = d.plan.neo_hookean || neo_hookean;
+      d.plan.fixed_corotated = d.plan.fixed_corotated || !neo_hookean;
+      d.plan.viscous = d.plan.viscous || m.viscosity > 0;
+    }
   }
   const auto choose = [&d](std::size_t count) {
     d.resident = resident_blocks(d.plan, static_cast<int>(count));

@@ -22,8 +22,8 @@ std::unique_ptr<MpmState> make_state(const Scene& scene, std::vector<std::string
   state->bodies = make_lattice_bodies(scene, state->points, notes);
   state->fields = std::make_unique<NodeFields>(state->bodies, state->points, state->nodes);
   shape = choose_shape(state->bodies, limits);
+  shape.blocks.one_material = true;
   state->blocks = make_blocks(state->bodies, state->points, *state->fields, shape.blocks);
-  state->contacts.with.assign(state->points.size(), 0);
   list_facets(*state);
   state->instructions = instruction_set();
   state->kernels = &block_kernels(state->instructions);
@@ -203,20 +203,22 @@ void CudaMpmTissue::finish_measure() {
   OnDevice& d = *device_;
   check_cuda(cudaStreamSynchronize(d.stream), "finish a frame");
   result_.elastic_energy = result_.kinetic_energy = result_.max_speed = 0;
-  stiffening_ = 1;
+  stiffening_ = even_stiffening(*state_, 1);
   state_->motion.resize(d.blocks.size());
   for (std::size_t i = 0; i < d.blocks.size(); ++i) {
     const CudaMeasure& m = d.host_measures[i];
     result_.elastic_energy += m.elastic_energy;
     result_.kinetic_energy += m.kinetic_energy;
     if (!(m.speed <= result_.max_speed)) result_.max_speed = m.speed;
-    stiffening_ = std::max(stiffening_, m.stiffening);
-    result_.blew_up = result_.blew_up || m.finite == 0;
+    const Block& block = *state_->blocks.all[d.of_host[i]];
+    float& stiffening = stiffening_[block.body][block.material];
+    stiffening = std::max(stiffening, m.stiffening);
+    result_.blew_up = result_.blew_up || m.finite == 0 || m.stiffening > 1e6f;
     state_->motion[d.of_host[i]] = {
         {Vec3(m.min[0], m.min[1], m.min[2]), Vec3(m.max[0], m.max[1], m.max[2])}, m.speed};
   }
   // Nothing that instruments do moves tissue at the speed of a bullet; what does is out of control.
-  result_.blew_up = result_.blew_up || !(result_.max_speed < 300) || stiffening_ > 1e6f;
+  result_.blew_up = result_.blew_up || !(result_.max_speed < 300);
 }
 
 FrameResult CudaMpmTissue::finish() {

@@ -6,6 +6,7 @@
 #include "cutting/tear.h"
 #include "fragments/pieces.h"
 #include "mpm/mpm_state.h"
+#include "mpm/state_figures.h"
 #include "tissue_sim/tissue.h"
 
 namespace tissue_sim {
@@ -71,7 +72,7 @@ class CudaMpmTissue final : public Tissue {
   std::vector<BladePath> blades_;  ///< of the frame in flight, from `cut_to_` on
   double cut_to_ = 0;              ///< share of the frame
   int substeps_ = 0;
-  float stiffening_ = 1;
+  Stiffening stiffening_;
   FrameResult result_;
 };
 

@@ -159,12 +159,12 @@ __global__ void __launch_bounds__(kThreads)
         if (!(speed <= m.speed)) m.speed = speed;
       });
   for (int i = threadIdx.x; b.partial != 0 && i < b.nx * b.ny * b.nz; i += blockDim.x) {
-    const float volume = t.partial[b.first_lane / 8 + i];
-    if (volume == 0) continue;
+    const float mu = t.partial[b.first_lane / 8 + i];
+    if (mu == 0) continue;
     const int x = i % b.nx, y = i / b.nx % b.ny, z = i / b.nx / b.ny;
     for (int c = 0; c < 3; ++c) {
       m.elastic_energy += 0.5 * stabilising_energy2(u + z * plane + y * pitch + x, pitch, plane, c,
-                                                    kStabilisation * body.mu * volume);
+                                                    kStabilisation * mu);
     }
   }
   reduce(m);

@@ -8,15 +8,14 @@
 namespace tissue_sim {
 namespace {
 
-CudaBody body_of(const LatticeBody& b) {
-  const Material& m = b.material;
+CudaBody body_of(const LatticeBody& b, const Material& m) {
   CudaBody body;
   body.cell_size = static_cast<float>(b.cell_size);
   body.inv_cell_size = 1.0f / body.cell_size;
   body.mu = static_cast<float>(lame_mu(m));
   body.lambda = static_cast<float>(lame_lambda(m));
   body.viscosity = static_cast<float>(m.viscosity);
-  body.tear_stretch = b.material.tear_stretch > 0 ? least_tear_limit(b.material) : 0.0f;
+  body.tear_stretch = least_tear_limit(m);
   body.point_volume = static_cast<float>(b.cell_size * b.cell_size * b.cell_size / 8);
   // Contact is in proportion to the volume, but a cubic millimetre is a better measure than a
   // metre.
@@ -61,7 +60,7 @@ void add_points(const Block& from, float whole_volume, CudaBlock& block, HostTab
   block.partial = from.partial.empty() ? 0 : 1;
   for (const Block::PartialCell& cell : from.partial) {
     t.partial[block.first_lane / 8 + cell_of(cell.lane / from.stride, cell.lane % from.stride)] =
-        cell.volume;
+        cell.mu;
   }
 }
 
@@ -133,14 +132,14 @@ void add_columns(const CudaBlock& b, float cell_size, int first_slot, int first_
 void add_block(const MpmState& state, int index, HostTables& t) {
   const Block& from = *state.blocks.all[index];
   CudaBlock block;
-  block.body = from.body;
+  block.body = t.first_material[from.body] + from.material;
   block.nx = from.nx;
   block.ny = from.ny;
   block.nz = from.nz;
   block.first_slot = static_cast<int>(t.slot_node.size());
   const Vec3 origin = state.bodies[from.body].node_position(from.x - 1, from.y - 1, from.z - 1);
   for (int a = 0; a < 3; ++a) block.origin[a] = static_cast<float>(origin[a]);
-  add_points(from, t.bodies[from.body].point_volume, block, t);
+  add_points(from, t.bodies[block.body].point_volume, block, t);
   for (int z = 0; z < block.nz + 2; ++z) {
     for (int y = 0; y < block.ny + 2; ++y) {
       const int* row = from.node.data() + z * from.plane + y * from.pitch;
@@ -178,8 +177,11 @@ void add_bundle(const MpmState& state, const std::vector<int>& blocks, HostTable
 HostTables make_tables(const MpmState& state, const std::vector<std::vector<int>>& bundles) {
   HostTables t;
   for (std::size_t i = 0; i < state.bodies.size(); ++i) {
-    t.bodies.push_back(body_of(state.bodies[i]));
-    t.bodies.back().point_volume = common_volume(state, static_cast<int>(i));
+    t.first_material.push_back(static_cast<int>(t.bodies.size()));
+    for (const Material& m : state.bodies[i].materials) {
+      t.bodies.push_back(body_of(state.bodies[i], m));
+      t.bodies.back().point_volume = common_volume(state, static_cast<int>(i));
+    }
   }
   for (const std::vector<int>& blocks : bundles) add_bundle(state, blocks, t);
   connect(state.nodes.size(), t);

@@ -10,7 +10,8 @@ namespace tissue_sim {
 
 /// See CudaTables.
 struct HostTables {
-  std::vector<CudaBody> bodies;
+  std::vector<CudaBody> bodies;     ///< of each body, its materials
+  std::vector<int> first_material;  ///< of each body, in `bodies`
   std::vector<CudaBlock> blocks;
   std::vector<int> of_host;  ///< per block: which of Blocks::all it is
   std::vector<CudaBundle> bundles;

@@ -19,7 +19,7 @@ namespace tissue_sim {
 inline constexpr int kMaxColliders = 32;  ///< a block keeps those near to it as bits of a word
 inline constexpr int kMaxLayers = 16;     ///< of cells of a block
 
-/// Material of a body and what follows from it.
+/// A material of a body and what follows from it.
 struct CudaBody {
   float cell_size, inv_cell_size;  ///< [m], [1/m]
   float mu, lambda;                ///< [Pa]
@@ -34,15 +34,15 @@ struct alignas(16) CudaBlock {
   int nx, ny, nz;  ///< cells
   int first_slot;
   int first_lane;
-  int body;
+  int body;         ///< its CudaBody: that of its points' material
   int whole;        ///< all points are there, with CudaBody::point_volume
   int partial;      ///< some cells have fewer than eight points
   float origin[3];  ///< reference place of local node 0 [m]
   TISSUE_SIM_INLINE int slots() const { return (nx + 2) * (ny + 2) * (nz + 2); }
 };
 
-/// Blocks of one body that a thread block works on side by side, one after the other in all tables.
-/// Most are a single block; those that cuts leave small share a thread block.
+/// Blocks of one CudaBody that a thread block works on side by side, one after the other in all
+/// tables. Most are a single block; those that cuts leave small share a thread block.
 struct CudaBundle {
   int body;
   int first_block, blocks;
@@ -99,8 +99,8 @@ struct CudaTables {
   const std::uint32_t* parts;
   const float* volume;        ///< per lane, 0 where there is no point [m^3]
   const std::int32_t* point;  ///< per lane, -1 where there is none
-  const float* partial;       ///< per cell (lane / 8): volume of its points where they are fewer
-                              ///< than eight, else 0; see mpm/stabilisation.h [m^3]
+  const float* partial;       ///< per cell (lane / 8): mu times volume of its points where they are
+                              ///< fewer than eight, else 0; see mpm/stabilisation.h [J]
   const std::uint8_t* bonds;  ///< per point
   std::uint32_t* near;        ///< per block: bit c for a collider that it may meet this frame
   std::uint8_t* with;         ///< per point: 0, or 1 + index of the collider it touches

@@ -1,0 +1,135 @@
+#include "mpm/fill_region.h"
+
+#include <algorithm>
+#include <tuple>
+
+#include "mpm/block_materials.h"
+#include "mpm/block_sheets.h"
+
+namespace tissue_sim {
+namespace {
+
+/// Runs of the cells that hold points in any z-plane, gaps of up to kGap cells bridged.
+/// `holds` is [ny][nx].
+std::vector<Block::Run> runs_of(const std::vector<bool>& holds, int nx, int ny) {
+  std::vector<Block::Run> runs;
+  int lane = 0;
+  for (int y = 0; y < ny; ++y) {
+    for (int x = 0; x < nx; ++x) {
+      if (!holds[y * nx + x]) continue;
+      Block::Run* last = runs.empty() || runs.back().y != y ? nullptr : &runs.back();
+      if (last == nullptr || x - (last->x + last->count) > kGap) {
+        runs.push_back({x, y, 0, lane});
+        last = &runs.back();
+      }
+      lane += x + 1 - (last->x + last->count);
+      last->count = x + 1 - last->x;
+    }
+  }
+  return runs;
+}
+
+/// The block of a sheet, no larger than its points need.
+Block make_block(const BlockRegion& r, const LatticeBody& b, const Points& points,
+                 const Sheet& sheet) {
+  int lo[3] = {1 << 30, 1 << 30, 1 << 30}, hi[3] = {-1, -1, -1};
+  for (const CellShare& c : sheet.cells) {
+    const int at[3] = {c.x, c.y, c.z};
+    for (int a = 0; a < 3; ++a) {
+      lo[a] = std::min(lo[a], at[a]);
+      hi[a] = std::max(hi[a], at[a]);
+    }
+  }
+  Block block;
+  block.body = r.body;
+  block.x = r.x + lo[0];
+  block.y = r.y + lo[1];
+  block.z = r.z + lo[2];
+  block.nx = hi[0] - lo[0] + 1;
+  block.ny = hi[1] - lo[1] + 1;
+  block.nz = hi[2] - lo[2] + 1;
+  std::vector<bool> holds(block.nx * block.ny, false);
+  for (const CellShare& c : sheet.cells) holds[(c.y - lo[1]) * block.nx + c.x - lo[0]] = true;
+  block.runs = runs_of(holds, block.nx, block.ny);
+  lay_out(block);
+  std::vector<int> lane_of(block.nx * block.ny, -1);
+  for (const Block::Run& run : block.runs) {
+    for (int i = 0; i < run.count; ++i) lane_of[run.y * block.nx + run.x + i] = run.lane + i;
+  }
+  for (const CellShare& c : sheet.cells) {
+    const int column = lane_of[(c.y - lo[1]) * block.nx + c.x - lo[0]];
+    double mu = 0;
+    for (int s = 0; s < 8; ++s) {
+      if (c.point[s] < 0) continue;
+      const std::size_t lane =
+          (static_cast<std::size_t>(c.z - lo[2]) * 8 + s) * block.stride + column;
+      block.volume[lane] = points.volume[c.point[s]];
+      block.point[lane] = c.point[s];
+      mu += lame_mu(b.material_of(points, c.point[s])) * block.volume[lane];
+    }
+    if (c.count == 8) continue;
+    const int z = c.z - lo[2];
+    block.partial.push_back(
+        {z * block.stride + column, z * block.plane + block.cell[column], static_cast<float>(mu)});
+  }
+  std::sort(block.partial.begin(), block.partial.end(),
+            [](const auto& p, const auto& q) { return p.lane < q.lane; });
+  find_materials(block, b, points);
+  block.node.assign(block.node_count(), b.node(block.x - 1, block.y - 1, block.z - 1));
+  for (int z = 0; z < block.nz + 2; ++z) {
+    for (int y = 0; y < block.ny + 2; ++y) {
+      for (int x = 0; x < block.pitch; ++x) {
+        const int local = z * block.plane + y * block.pitch + x;
+        const int lattice_node = b.node(block.x + x - 1, block.y + y - 1, block.z + z - 1);
+        block.node[local] = lattice_node;
+        if (sheet.node.empty()) continue;
+        const int n = ((lo[2] + z) * (r.ny + 2) + lo[1] + y) * (r.nx + 2) + lo[0] + x;
+        if (sheet.node[n] == -1 || sheet.node[n] == lattice_node) continue;
+        block.node[local] = sheet.node[n];
+        block.split_nodes.push_back({local, sheet.node[n]});
+      }
+    }
+  }
+  return block;
+}
+
+/// A sheet's points by their materials, in the order of these.
+std::vector<Sheet> by_material(const Sheet& sheet, const LatticeBody& b, const Points& points) {
+  std::vector<Sheet> parts(b.materials.size());
+  for (const CellShare& c : sheet.cells) {
+    for (int s = 0; s < 8; ++s) {
+      if (c.point[s] < 0) continue;
+      std::vector<CellShare>& cells = parts[points.material_of(c.point[s])].cells;
+      if (cells.empty() ||
+          std::tie(cells.back().x, cells.back().y, cells.back().z) != std::tie(c.x, c.y, c.z)) {
+        cells.push_back(c);
+        std::fill_n(cells.back().point, 8, -1);
+      }
+      cells.back().point[s] = c.point[s];
+    }
+  }
+  for (Sheet& part : parts) part.node = sheet.node;
+  return parts;
+}
+
+}  // namespace
+
+void fill_region(BlockRegion& r, const std::vector<LatticeBody>& bodies, const Points& points,
+                 const NodeFields& fields, bool one_material, const KnownFacets& known) {
+  r.blocks.clear();
+  const LatticeBody& b = bodies[r.body];
+  const auto add = [&](const Sheet& sheet) {
+    if (sheet.cells.empty()) return;
+    r.blocks.push_back(make_block(r, b, points, sheet));
+    r.blocks.back().facets = facets_of(b, points, r.blocks.back(), known);
+  };
+  for (const Sheet& sheet : sheets_of(r, b, points, fields)) {
+    if (!one_material || b.materials.size() == 1) {
+      add(sheet);
+      continue;
+    }
+    for (const Sheet& part : by_material(sheet, b, points)) add(part);
+  }
+}
+
+}  // namespace tissue_sim

@@ -125,7 +125,7 @@ Operated operate(const Scene& scene, int frames = 24) {
   for (int i = 0; i < frames; ++i) {
     const double t = i / 24.0;
     simulation.set_tool(0, {Vec3(0.002 + 0.01 * t, 0.03 - 0.08 * t, -0.001), down});
-    simulation.set_tool(1, {Vec3(0.03, -0.003, 0.04 - 0.016 * t), down});
+    simulation.set_tool(1, {Vec3(0.03, -0.003, 0.04 - 0.02 * t), down});
     const FrameReport report = simulation.advance_frame();
     r.checksums.push_back(simulation.tissue().checksum());
     r.energy = report.result.elastic_energy;

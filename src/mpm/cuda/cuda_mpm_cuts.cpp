@@ -10,12 +10,12 @@ namespace tissue_sim {
 namespace {
 
 /// What the tables and the state take on the GPU; clouds and contacts between tissue come on top.
-std::size_t bytes_of(const HostTables& t, std::size_t nodes, std::size_t points,
-                     std::size_t pushes) {
+std::size_t bytes_of(const HostTables& t, std::size_t nodes, std::size_t points, std::size_t pushes,
+                     int held_by) {
   return t.blocks.size() * (sizeof(CudaBlock) + sizeof(CudaMeasure) + 4) +
          t.bundles.size() * sizeof(CudaBundle) + t.columns.size() * sizeof(CudaColumn) +
          t.slot_node.size() * (8 + 2 * sizeof(float4)) + 4 * t.parts.size() + 8 * t.point.size() +
-         4 * t.partial.size() + 4 * sizeof(float4) * nodes + 14 * points +
+         4 * t.partial.size() + 4 * sizeof(float4) * nodes + (1 + 13 * held_by) * points +
          pushes * sizeof(HalfPush);
 }
 
@@ -109,10 +109,13 @@ void CudaMpmTissue::push() {
   const HostTables t = plan_tables();
   const std::size_t n = state_->nodes.size();
   const auto points = static_cast<std::size_t>(state_->points.size());
-  const bool pushed = state_->scene.ground.enabled || !state_->scene.tools.empty();
+  const Scene& scene = state_->scene;
+  const auto colliders = static_cast<int>(scene.tools.size()) + (scene.ground.enabled ? 1 : 0);
   const std::size_t pushes =
-      pushed ? static_cast<std::size_t>(t.max_halves) * std::max(d.resident, d.face_resident) : 0;
-  check_memory(bytes_of(t, n, points, pushes), device_bytes());
+      colliders > 0 ? static_cast<std::size_t>(t.max_halves) * std::max(d.resident, d.face_resident)
+                    : 0;
+  d.held_by = std::min(colliders, 2);
+  check_memory(bytes_of(t, n, points, pushes, d.held_by), device_bytes());
   check_cuda(cudaStreamSynchronize(d.stream), "finish a frame");
   d.blocks.upload(t.blocks, d.stream);
   d.of_host = t.of_host;
@@ -133,10 +136,10 @@ void CudaMpmTissue::push() {
     force.resize(t.slot_node.size());
     force.clear(d.stream);
   }
-  if (d.with.size() != points) {
-    d.with.resize(points);
+  if (d.with.size() != d.held_by * points) {
+    d.with.resize(d.held_by * points);
     d.with.clear(d.stream);
-    d.hold.resize(3 * points);
+    d.hold.resize(3 * d.held_by * points);
     d.hold.clear(d.stream);
   }
   d.bonds.upload(state_->points.bonds, d.stream);

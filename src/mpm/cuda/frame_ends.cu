@@ -31,8 +31,10 @@ __global__ void find_near(const CudaTables t, const CudaMeasure* measures, const
   const CudaBlock& b = t.blocks[index];
   for (int i = lane; i < 8 * b.nx * b.ny * b.nz; i += 32) {
     const int p = t.point[b.first_lane + i];
-    const int with = p >= 0 ? t.with[p] : 0;
-    if (with != 0 && (near >> (with - 1) & 1u) == 0) t.with[p] = 0;
+    for (int slot = 0; p >= 0 && slot < t.held_by; ++slot) {
+      std::uint8_t& with = t.with[p * t.held_by + slot];
+      if (with != 0 && (near >> (with - 1) & 1u) == 0) with = 0;
+    }
   }
   if (lane == 0) t.near[index] = near;
 }

@@ -31,6 +31,7 @@ struct CudaMpmTissue::OnDevice {
   DeviceArray<std::uint32_t> slot_parts, parts, near, colour;
   DeviceArray<float> volume, partial, hold;
   DeviceArray<std::uint8_t> bonds, with, whole;
+  int held_by = 0;  ///< CudaTables::held_by
   DeviceArray<float4> u[2], v[2], force[2], u_before;
   DeviceArray<Collider> colliders;
   DeviceArray<long long> loads;
@@ -80,6 +81,7 @@ struct CudaMpmTissue::OnDevice {
     t.partial = partial.data();
     t.bonds = bonds.data();
     t.near = near.data();
+    t.held_by = held_by;
     t.with = with.data();
     t.hold = hold.data();
     return t;

@@ -103,8 +103,9 @@ struct CudaTables {
                               ///< fewer than eight, else 0; see mpm/stabilisation.h [J]
   const std::uint8_t* bonds;  ///< per point
   std::uint32_t* near;        ///< per block: bit c for a collider that it may meet this frame
-  std::uint8_t* with;         ///< per point: 0, or 1 + index of the collider it touches
-  float* hold;                ///< per point: the place that friction holds on to
+  int held_by;                ///< colliders that a point may hold on to at a time: 0 to 2
+  std::uint8_t* with;         ///< [point][held_by]: 0, or 1 + index of a collider it touches
+  float* hold;                ///< [point][held_by][3]: the place that friction holds on to
 };
 
 /// Sums of what acts on a collider in one substep: force and moment in units of kLoadUnit, as

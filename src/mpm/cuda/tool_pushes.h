@@ -139,11 +139,14 @@ __device__ __forceinline__ void list_touched(const CudaTables& t, const CudaBund
     const CudaColumn c = column_of(t, w, block, body.cell_size, cell & 255);
     HalfPlane h[3];
     int point[4];
-    std::uint8_t with[4];
+    bool holds[4];
 #pragma unroll
     for (int q = 0; q < 4; ++q) point[q] = t.point[c.lane + (z * 8 + 4 * sz + q) * c.step];
 #pragma unroll
-    for (int q = 0; q < 4; ++q) with[q] = point[q] >= 0 ? t.with[point[q]] : 0;
+    for (int q = 0; q < 4; ++q) {
+      const std::uint8_t* with = t.with + point[q] * t.held_by;
+      holds[q] = point[q] >= 0 && (with[0] | with[t.held_by - 1]) != 0;
+    }
     read_half(u + c.slot + z * c.plane, c.pitch, c.plane, HalfWeights(sz == 0 ? -1.0f : 1.0f), h);
     std::uint32_t pushed = 0, by = 0;
 #pragma unroll
@@ -161,8 +164,8 @@ __device__ __forceinline__ void list_touched(const CudaTables& t, const CudaBund
         HalfPush& place = places[(z * w.columns + (cell & 255)) * 2 + sz];
 #pragma unroll
         for (int a = 0; a < 3; ++a) place.of[a][q] = x[a];
-      } else if (with[q] != 0) {
-        t.with[point[q]] = 0;
+      } else if (holds[q]) {
+        for (int slot = 0; slot < t.held_by; ++slot) t.with[point[q] * t.held_by + slot] = 0;
       }
     }
     if (pushed == 0) continue;
@@ -174,10 +177,33 @@ __device__ __forceinline__ void list_touched(const CudaTables& t, const CudaBund
   __syncthreads();
 }
 
-/// What a point remembers of its contact: CudaTables::with and hold.
+/// What a point remembers of its contacts: CudaTables::with and hold.
 struct Held {
-  std::uint8_t with;
-  float place[3];
+  int with[2] = {0, 0};
+  float place[2][3] = {};
+
+  __device__ __forceinline__ void load(const CudaTables& t, int p) {
+#pragma unroll
+    for (int slot = 0; slot < 2; ++slot) {
+      if (slot >= t.held_by) return;
+      with[slot] = t.with[p * t.held_by + slot];
+#pragma unroll
+      for (int a = 0; a < 3; ++a) {
+        place[slot][a] = t.hold[3 * (static_cast<std::size_t>(p) * t.held_by + slot) + a];
+      }
+    }
+  }
+  __device__ __forceinline__ void store(const CudaTables& t, int p) const {
+#pragma unroll
+    for (int slot = 0; slot < 2; ++slot) {
+      if (slot >= t.held_by) return;
+      t.with[p * t.held_by + slot] = static_cast<std::uint8_t>(with[slot]);
+#pragma unroll
+      for (int a = 0; a < 3; ++a) {
+        t.hold[3 * (static_cast<std::size_t>(p) * t.held_by + slot) + a] = place[slot][a];
+      }
+    }
+  }
 };
 
 /// Force of the colliders on the point `p` [N], whose load goes to `loads`. All lanes of a warp
@@ -187,6 +213,7 @@ __device__ __forceinline__ void push_point(const CudaTables& t, const Collider* 
                                            const ContactSpring& spring, const float (&x)[3],
                                            const float (&v)[3], unsigned long long* loads,
                                            float (&sum)[3]) {
+  bool holds[2] = {false, false};
   for (std::uint32_t left = near; left != 0; left &= left - 1) {
     const int c = __ffs(static_cast<int>(left)) - 1;
     const bool maybe = (by >> c % kColliderBits & 1u) != 0;
@@ -196,11 +223,17 @@ __device__ __forceinline__ void push_point(const CudaTables& t, const Collider* 
     float push[3] = {0, 0, 0};
     if (maybe && g.distance < 0 &&
         !(collider.kind == Collider::kBlade && t.bonds[p] == kAllBonds)) {
-      if (held.with != c + 1) {
-        held.with = static_cast<std::uint8_t>(c + 1);
-        to_local(collider, x, held.place);
-      }
-      contact_force(collider, g, spring, x, v, held.place, push);
+      const bool second =
+          t.held_by == 2 && (held.with[1] == c + 1 || (held.with[0] != 0 && held.with[0] != c + 1));
+      float place[3];
+#pragma unroll
+      for (int a = 0; a < 3; ++a) place[a] = second ? held.place[1][a] : held.place[0][a];
+      if ((second ? held.with[1] : held.with[0]) != c + 1) to_local(collider, x, place);
+      contact_force(collider, g, spring, x, v, place, push);
+      (second ? held.with[1] : held.with[0]) = c + 1;
+      (second ? holds[1] : holds[0]) = true;
+#pragma unroll
+      for (int a = 0; a < 3; ++a) (second ? held.place[1][a] : held.place[0][a]) = place[a];
 #pragma unroll
       for (int a = 0; a < 3; ++a) sum[a] += push[a];
     }
@@ -216,6 +249,10 @@ __device__ __forceinline__ void push_point(const CudaTables& t, const Collider* 
       load[3 + a] = -(arm[b] * push[d] - arm[d] * push[b]);
     }
     add_load(loads + 6 * c, load);
+  }
+#pragma unroll
+  for (int slot = 0; slot < 2; ++slot) {
+    if (!holds[slot]) held.with[slot] = 0;
   }
 }
 
@@ -243,7 +280,7 @@ inline __device__ __noinline__ Touched find_pushes(const CudaTables t, const Cud
     HalfPush& of_half = pushes[(z * w.columns + static_cast<int>(half & 255u)) * 2 + sz];
     float push[3] = {0, 0, 0}, x[3] = {0, 0, 0}, velocity[3] = {0, 0, 0}, volume = 0;
     int p = 0;
-    Held held = {0, {0, 0, 0}};
+    Held held;
     if (touches) {
       const int index = static_cast<int>(half & 255u), s = 4 * sz + i % 4;
       const CudaColumn c = column_of(t, w, block, body.cell_size, index);
@@ -252,20 +289,14 @@ inline __device__ __noinline__ Touched find_pushes(const CudaTables t, const Cud
       for (int a = 0; a < 3; ++a) x[a] = of_half.of[a][i % 4];
       p = t.point[lane];
       volume = c.whole != 0 ? body.point_volume : t.volume[lane];
-      held.with = t.with[p];
-#pragma unroll
-      for (int a = 0; a < 3; ++a) held.place[a] = t.hold[3 * static_cast<std::size_t>(p) + a];
+      held.load(t, p);
       point_velocity(v, c.slot + z * c.plane, c.pitch, c.plane, s, body.cell_size, velocity);
     }
     push_point(t, colliders, near, touches ? half >> 17 : 0, p, held,
                {body.spring.stiffness * volume, body.spring.damping * volume}, x, velocity, loads,
                push);
     if (i >= points) continue;
-    if (touches) {
-      t.with[p] = held.with;
-#pragma unroll
-      for (int a = 0; a < 3; ++a) t.hold[3 * static_cast<std::size_t>(p) + a] = held.place[a];
-    }
+    if (touches) held.store(t, p);
 #pragma unroll
     for (int a = 0; a < 3; ++a) of_half.of[a][i % 4] = push[a];
   }

@@ -51,6 +51,26 @@ inline void add_inclusions(Scene& scene, bool both_laws) {
   }
 }
 
+/// A body in free space but for gravity, held at one end: for one substep against the reference.
+inline Scene held_body(Law law, double viscosity, Shape shape) {
+  Scene scene = free_box(Vec3(0.031, 0.029, 0.017), 0.002);
+  scene.gravity = Vec3(0.3, -0.2, -9.81);
+  scene.bodies[0].shape = shape;
+  scene.bodies[0].radii = Vec3(0.016, 0.014, 0.009);
+  Region held;
+  held.kind = Region::Kind::kBox;
+  held.min = Vec3(-0.01, -0.01, -0.01);
+  held.max = Vec3(0.006, 0.1, 0.1);
+  scene.bodies[0].anchors.push_back(held);
+  Material m;
+  m.name = "test";
+  m.law = law;
+  m.viscosity = viscosity;
+  scene.materials.push_back(m);
+  scene.bodies[0].material = "test";
+  return scene;
+}
+
 /// A blade whose edge stands along z from -0.1 to 0.1 m, moved through `places` (their z counts
 /// too).
 inline BladePath upright_blade(const std::vector<Vec3>& places) {

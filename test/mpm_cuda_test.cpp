@@ -10,7 +10,6 @@
 #include "compute/device_array.h"
 #include "cut_scenes.h"
 #include "mpm/cuda/cuda_mpm_tissue.h"
-#include "reference/mpm_reference.h"
 #include "tear_scenes.h"
 
 namespace tissue_sim {
@@ -23,100 +22,6 @@ class OnGpu : public testing::Test {
     if (!why.empty()) GTEST_SKIP() << why;
   }
 };
-
-struct Case {
-  const char* name;
-  Law law;
-  double viscosity;
-  int cuts;
-  const char* shape;       // of the GPU's blocks, null for the default
-  bool materials = false;  // several, of both laws
-};
-std::ostream& operator<<(std::ostream& out, const Case& c) {
-  return out << c.name << " " << (c.shape == nullptr ? "" : c.shape);
-}
-
-class OnGpuWith : public testing::TestWithParam<Case> {
- protected:
-  void SetUp() override {
-    const std::string why = why_no_gpu();
-    if (!why.empty()) GTEST_SKIP() << why;
-    if (GetParam().shape != nullptr) setenv("TISSUE_SIM_CUDA_SHAPE", GetParam().shape, 1);
-  }
-  void TearDown() override { unsetenv("TISSUE_SIM_CUDA_SHAPE"); }
-};
-
-Scene anchored_body(const Case& c, Shape shape) {
-  Scene scene = free_box(Vec3(0.031, 0.029, 0.017), 0.002);
-  scene.gravity = Vec3(0.3, -0.2, -9.81);
-  scene.bodies[0].shape = shape;
-  scene.bodies[0].radii = Vec3(0.016, 0.014, 0.009);
-  Region held;
-  held.kind = Region::Kind::kBox;
-  held.min = Vec3(-0.01, -0.01, -0.01);
-  held.max = Vec3(0.006, 0.1, 0.1);
-  scene.bodies[0].anchors.push_back(held);
-  Material m;
-  m.name = "test";
-  m.law = c.law;
-  m.viscosity = c.viscosity;
-  scene.materials.push_back(m);
-  scene.bodies[0].material = "test";
-  if (c.materials) add_inclusions(scene, true);
-  return scene;
-}
-
-TEST_P(OnGpuWith, OneSubstepAgreesWithBruteForce) {
-  for (const Shape shape : {Shape::kBox, Shape::kEllipsoid}) {
-    CudaMpmTissue tissue(anchored_body(GetParam(), shape));
-    MpmState& state = tissue.state();
-    deform(state);
-    tissue.push();
-    const Vec3 middle(0.0155, 0.0145, 0.0085);
-    if (GetParam().cuts > 0) {
-      ASSERT_GT(cut_now(tissue, plane_cut(middle, Vec3(1, 0.4, 0.2))).bonds_broken, 0);
-    }
-    if (GetParam().cuts > 1) cut_now(tissue, plane_cut(middle, Vec3(-0.3, 1, 0.1)));
-    tissue.pull();
-    shake(state, 7, 8e-5);
-    tissue.push();
-    state.faces.until_search = 1e9;  // faces that are shaken into one another do not push
-    const float dt = 1e-4f;
-    const reference::Step expected = reference::substep(state, dt);
-    EXPECT_GT(expected.largest_strain, 0.1) << "the state must be deformed to tell anything";
-    tissue.advance(1, dt, {});
-    tissue.finish();
-    tissue.pull();
-    double force_scale = 0, v_scale = 0;
-    for (std::size_t i = 0; i < expected.u.size(); ++i) {
-      force_scale = std::max(force_scale, expected.force[i].norm());
-      v_scale = std::max(v_scale, expected.v[i].norm());
-    }
-    for (std::size_t i = 0; i < expected.u.size(); ++i) {
-      if (state.nodes.inv_mass[i] == 0) continue;
-      const Vec3 v(state.nodes.v[0][i], state.nodes.v[1][i], state.nodes.v[2][i]);
-      const Vec3 u(state.nodes.u[0][i], state.nodes.u[1][i], state.nodes.u[2][i]);
-      const double v_bound = 2e-6 * force_scale * dt / expected.mass[i] + 1e-6 * v_scale;
-      ASSERT_LT((v - expected.v[i]).norm(), v_bound) << "node " << i;
-      ASSERT_LT((u - expected.u[i]).norm(), dt * v_bound + 1e-8) << "node " << i;
-    }
-  }
-}
-
-INSTANTIATE_TEST_SUITE_P(
-    All, OnGpuWith,
-    testing::Values(Case{"fixed corotated", Law::kFixedCorotated, 0, 0, nullptr},
-                    Case{"neo-Hookean", Law::kNeoHookean, 0, 0, nullptr},
-                    Case{"viscous", Law::kFixedCorotated, 3, 0, nullptr},
-                    Case{"cut", Law::kFixedCorotated, 0, 1, nullptr},
-                    Case{"cut crosswise, viscous", Law::kNeoHookean, 2, 2, nullptr},
-                    Case{"materials", Law::kFixedCorotated, 0, 0, nullptr, true},
-                    Case{"materials, cut, viscous", Law::kNeoHookean, 2, 2, nullptr, true},
-                    Case{"a wave after the other", Law::kFixedCorotated, 0, 0, "4 4 4 32 0"},
-                    Case{"the same, cut", Law::kFixedCorotated, 0, 2, "3 5 2 32 0"},
-                    Case{"flat blocks", Law::kNeoHookean, 0, 1, "16 4 1 128 1"},
-                    Case{"several to a thread block", Law::kFixedCorotated, 0, 0, "8 2 1 256 1"},
-                    Case{"the same, cut", Law::kNeoHookean, 0, 2, "8 2 1 256 1"}));
 
 /// A block on the ground, cut by a scalpel and pushed by a probe for a second.
 struct Operation {
@@ -275,8 +180,7 @@ TEST_F(OnGpu, SameBitsRunAfterRun) {
 }
 
 TEST_F(OnGpu, FindsThePointsToTearThatTheCpuFinds) {
-  Case c{"", Law::kFixedCorotated, 0, 0, nullptr};
-  Scene scene = anchored_body(c, Shape::kEllipsoid);
+  Scene scene = held_body(Law::kFixedCorotated, 0, Shape::kEllipsoid);
   scene.materials[0].tear_stretch = 1.25;
   scene.materials[0].tear_scatter = 0.1;
   MpmTissue cpu(scene);
@@ -337,9 +241,9 @@ TEST_F(OnGpu, TissueTearsAsOnTheCpu) {
 }
 
 TEST_F(OnGpu, CloudsAndEnergiesAreTheCpus) {
-  const Case c{"", Law::kFixedCorotated, 0, 0, nullptr};
-  MpmTissue cpu(anchored_body(c, Shape::kEllipsoid));
-  CudaMpmTissue gpu(anchored_body(c, Shape::kEllipsoid));
+  const Scene scene = held_body(Law::kFixedCorotated, 0, Shape::kEllipsoid);
+  MpmTissue cpu(scene);
+  CudaMpmTissue gpu(scene);
   deform(cpu.state());
   deform(gpu.state());
   shake(cpu.state(), 3, 2e-5);

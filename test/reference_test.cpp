@@ -30,21 +30,7 @@ class Substep : public testing::TestWithParam<Case> {
 };
 
 Scene scene_of(const Case& c, Shape shape) {
-  Scene scene = free_box(Vec3(0.031, 0.029, 0.017), 0.002);
-  scene.gravity = Vec3(0.3, -0.2, -9.81);
-  scene.bodies[0].shape = shape;
-  scene.bodies[0].radii = Vec3(0.016, 0.014, 0.009);
-  Region held;
-  held.kind = Region::Kind::kBox;
-  held.min = Vec3(-0.01, -0.01, -0.01);
-  held.max = Vec3(0.006, 0.1, 0.1);
-  scene.bodies[0].anchors.push_back(held);
-  Material m;
-  m.name = "test";
-  m.law = c.law;
-  m.viscosity = c.viscosity;
-  scene.materials.push_back(m);
-  scene.bodies[0].material = "test";
+  Scene scene = held_body(c.law, c.viscosity, shape);
   if (c.materials != Case::kOne) add_inclusions(scene, c.materials == Case::kBothLaws);
   return scene;
 }

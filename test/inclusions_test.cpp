@@ -78,9 +78,7 @@ TEST(Inclusions, OnlyBlocksOfSeveralMaterialsPay) {
 /// A soft block on the ground, held at one end, that a scalpel cuts, a probe presses and its own
 /// weight tears.
 Scene operation(const std::string& material) {
-  Scene s;
-  s.threads = 1;
-  s.cell_size = 0.004;
+  Scene s = operation_scene(Vec3(0.08, 0.024, 0.028), Vec3(0, 0, 0.02));
   s.materials.resize(2);
   for (Material& m : s.materials) {
     m.young_modulus = 2000;
@@ -93,21 +91,7 @@ Scene operation(const std::string& material) {
   }
   s.materials[0].name = "own";
   s.materials[1].name = "twin";
-  s.bodies.resize(1);
-  Body& b = s.bodies[0];
-  b.material = material;
-  b.size = Vec3(0.08, 0.024, 0.028);
-  b.pose.position = Vec3(0, 0, 0.02);
-  Region held;
-  held.kind = Region::Kind::kBox;
-  held.min = Vec3(-1, -1, -1);
-  held.max = Vec3(-0.03, 1, 1);
-  b.anchors = {held};
-  s.tools.resize(2);
-  s.tools[0].name = "scalpel";
-  s.tools[0].type = ToolType::kScalpel;
-  s.tools[1].name = "probe";
-  s.tools[1].radius = 0.006;
+  s.bodies[0].material = material;
   return s;
 }
 
@@ -153,15 +137,16 @@ TEST(Inclusions, OfAMaterialLikeTheBodysChangeNothingButBits) {
   Scene plain = mixed;
   mixed.bodies[0].inclusions = {ball("twin", Vec3(0, 0, 0.02), 0.014),
                                 ball("twin", Vec3(0.035, 0, 0.034), 0.01)};
-  const Operated a = operate(plain), b = operate(mixed);
+  // Not all the way: through cuts and contact rounding grows, on each processor in its own way.
+  const Operated a = operate(plain, 20), b = operate(mixed, 20);
   EXPECT_GT(a.cut, 10);
   EXPECT_EQ(a.cut, b.cut);
-  // What rounding grows to through cuts and contact differs from processor to processor.
-  EXPECT_NEAR(b.energy, a.energy, 1e-2 * a.energy);
-  EXPECT_NEAR(b.push, a.push, 2e-2 * a.push);
+  EXPECT_GT(a.push, 5e-4);
+  EXPECT_NEAR(b.energy, a.energy, 1e-3 * a.energy);
+  EXPECT_NEAR(b.push, a.push, 1e-3 * a.push);
   ASSERT_EQ(a.centroids.size(), b.centroids.size());
   for (std::size_t i = 0; i < a.centroids.size(); ++i) {
-    EXPECT_LT((a.centroids[i] - b.centroids[i]).norm(), 2e-5);
+    EXPECT_LT((a.centroids[i] - b.centroids[i]).norm(), 1e-6);
   }
 }
 

@@ -7,6 +7,7 @@
 #include <set>
 #include <vector>
 
+#include "test_scenes.h"
 #include "tissue_sim/simulation.h"
 
 namespace tissue_sim {
@@ -14,23 +15,8 @@ namespace {
 
 /// Liver on the ground, held at one end; a scalpel that goes through it and a probe that pushes.
 Scene operation(int threads) {
-  Scene s;
+  Scene s = operation_scene(Vec3(0.08, 0.048, 0.028), Vec3(0, 0, 0.015));
   s.threads = threads;
-  s.cell_size = 0.004;
-  s.bodies.resize(1);
-  Body& b = s.bodies[0];
-  b.size = Vec3(0.08, 0.048, 0.028);
-  b.pose.position = Vec3(0, 0, 0.015);
-  Region held;
-  held.kind = Region::Kind::kBox;
-  held.min = Vec3(-1, -1, -1);
-  held.max = Vec3(-0.03, 1, 1);
-  b.anchors = {held};
-  s.tools.resize(2);
-  s.tools[0].name = "scalpel";
-  s.tools[0].type = ToolType::kScalpel;
-  s.tools[1].name = "probe";
-  s.tools[1].radius = 0.006;
   return s;
 }
 

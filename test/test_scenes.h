@@ -10,6 +10,28 @@
 
 namespace tissue_sim {
 
+// A box on the ground, held at one end, a scalpel and a probe; one thread.
+inline Scene operation_scene(const Vec3& size, const Vec3& place) {
+  Scene s;
+  s.threads = 1;
+  s.cell_size = 0.004;
+  s.bodies.resize(1);
+  Body& b = s.bodies[0];
+  b.size = size;
+  b.pose.position = place;
+  Region held;
+  held.kind = Region::Kind::kBox;
+  held.min = Vec3(-1, -1, -1);
+  held.max = Vec3(-0.03, 1, 1);
+  b.anchors = {held};
+  s.tools.resize(2);
+  s.tools[0].name = "scalpel";
+  s.tools[0].type = ToolType::kScalpel;
+  s.tools[1].name = "probe";
+  s.tools[1].radius = 0.006;
+  return s;
+}
+
 // One of everything.
 inline Scene full_scene() {
   Scene s;

@@ -132,9 +132,11 @@ bool search(MpmState& s, const Pieces& pieces) {
   Vec3 mean = Vec3::Zero();
   for (const FacetMotion& f : faces.motion) mean += velocity(f);
   mean /= std::max(1, facet_count);
+  std::vector<float> travel(facet_count);  // until the next search; first in a second
   double fastest = 0;
   for (std::int32_t f = 0; f < facet_count; ++f) {
-    fastest = std::max(fastest, (velocity(faces.motion[f]) - mean).norm());
+    travel[f] = static_cast<float>((velocity(faces.motion[f]) - mean).norm());
+    fastest = std::max(fastest, static_cast<double>(travel[f]));
   }
   if (!(fastest < 1e4)) {  // out of control, as the end of the frame will say
     faces.listed.clear();
@@ -145,10 +147,7 @@ bool search(MpmState& s, const Pieces& pieces) {
   const auto cell = static_cast<float>(s.scene.cell_size);
   const double horizon = std::min(kHorizon, kLargestReach * cell / (1.5 * fastest + 1e-9));
   faces.until_search = horizon;
-  std::vector<float> travel(facet_count);  // until the next search
-  for (std::int32_t f = 0; f < facet_count; ++f) {
-    travel[f] = static_cast<float>(1.5 * horizon * (velocity(faces.motion[f]) - mean).norm());
-  }
+  for (float& t : travel) t *= static_cast<float>(1.5 * horizon);
   if (pairs_last(faces, travel)) return false;
   faces.listed.resize(facet_count);
   std::vector<float> reach(facet_count);

@@ -97,8 +97,8 @@ void sweep_block(const MpmState& state, const Block& block, const std::vector<Sw
     const std::int32_t p = block.point[lane];
     if (p < 0) continue;
     const Vec3 p0 = places.at_begin(p), p1 = places.at_end(p);
-    if (!overlap({p0.cwiseMin(p1), p0.cwiseMax(p1)}, swept, reach)) continue;
     const Box box{p0.cwiseMin(p1), p0.cwiseMax(p1)};
+    if (!overlap(box, swept, reach)) continue;
     const auto near = [&](const SweepPart& part) { return is_near(box, part, reach); };
     if (std::none_of(parts.begin(), parts.end(), near)) continue;
     const Points::Site& s = state.points.site[p];

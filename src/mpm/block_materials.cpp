@@ -22,6 +22,7 @@ std::vector<int> materials_in(const Block& block, const Points& points, std::siz
 }  // namespace
 
 void find_materials(Block& block, const LatticeBody& body, const Points& points) {
+  if (body.materials.size() == 1) return;  // block.material is 0
   const std::vector<int> numbers = materials_in(block, points, body.materials.size());
   block.material = numbers.size() == 1 ? numbers[0] : Block::kMixed;
   if (block.material != Block::kMixed) return;

@@ -133,7 +133,8 @@ TEST(Inclusions, OneThatFillsItsBodyIsAsTheBodyOfItsMaterial) {
 
 TEST(Inclusions, OfAMaterialLikeTheBodysChangeNothingButBits) {
   Scene mixed = operation("own");
-  mixed.materials[0].tear_stretch = mixed.materials[1].tear_stretch = 0;
+  // They never tear, but might: so both take the cautious substep, which bits do not change.
+  mixed.materials[0].tear_stretch = mixed.materials[1].tear_stretch = 100;
   Scene plain = mixed;
   mixed.bodies[0].inclusions = {ball("twin", Vec3(0, 0, 0.02), 0.014),
                                 ball("twin", Vec3(0.035, 0, 0.034), 0.01)};

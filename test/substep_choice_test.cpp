@@ -91,6 +91,7 @@ TEST(SubstepChoice, OnlyWhatTakesPartIsStiff) {
 /// A body that a probe presses and a blade cuts through, and then the probe again.
 TEST(SubstepChoice, HoldsWhileTissueIsPressedAndCut) {
   Scene s = operation_scene(Vec3(0.08, 0.024, 0.028), Vec3(0, 0, 0.02));
+  s.device = Device::kCpu;
   s.tools[0].blade_length = 0.05;
   const Quat down = Quat(Eigen::AngleAxisd(M_PI, Vec3::UnitX()));
   Simulation simulation(s);

@@ -160,8 +160,15 @@ bool search(MpmState& s, const Pieces& pieces) {
   std::vector<int> size(pieces.next_id, 0);
   for (const Fragment& f : pieces.all) size[f.id] = f.point_count;
   auto pairs = facing_pairs(faces.motion, reach, 3 * cell, *s.cpu);
-  const auto one = [&](const auto& pair) { return are_one(s, pieces, pair.first, pair.second); };
-  pairs.erase(std::remove_if(pairs.begin(), pairs.end(), one), pairs.end());
+  std::vector<std::uint8_t> one(pairs.size());
+  s.cpu->for_each(
+      static_cast<int>(pairs.size()),
+      [&](int i) { one[i] = are_one(s, pieces, pairs[i].first, pairs[i].second); }, 64);
+  std::size_t left = 0;
+  for (std::size_t i = 0; i < pairs.size(); ++i) {
+    if (one[i] == 0) pairs[left++] = pairs[i];
+  }
+  pairs.resize(left);
   // Of two pieces the smaller one's facets touch the other's face; of one, both.
   const auto touches = [&](std::int32_t a, std::int32_t b) {
     const int p = pieces.of_point[facet_of(s, a).point], q = pieces.of_point[facet_of(s, b).point];

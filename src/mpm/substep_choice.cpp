@@ -9,7 +9,7 @@
 namespace tissue_sim {
 namespace {
 
-constexpr int kSteps = 12, kStepsAtCut = 6;
+constexpr int kSteps = 12, kStepsAtCut = 4;
 constexpr int kLongestAge = 30;      // frames
 constexpr double kMostGrowth = 1.3;  // of the stiffness, until it is measured again
 constexpr double kMargin = 0.65;     // for springs of contact, and what stiffens within the frame

@@ -41,8 +41,8 @@ class Tissue {
   /// bears, by the scene's CFL number [s].
   virtual float stable_substep() const = 0;
   /// The substep for a frame with this input [s]: as long as the tissue, as it is cut, was measured
-  /// to bear with a margin, and stable_substep() at least.
-  virtual float substep_for(const FrameInput& input) const = 0;
+  /// to bear with a margin, and stable_substep() at least. Measures where that is due.
+  virtual float substep_for(const FrameInput& input) = 0;
   /// Advances by `substeps` of `dt` seconds each; may only enqueue.
   virtual void advance(int substeps, float dt, const FrameInput& input) = 0;
   /// Waits for advance() and reports on it.

@@ -26,8 +26,12 @@ MpmTissue::MpmTissue(const Scene& scene, std::vector<std::string> notes)
 
 float MpmTissue::stable_substep() const { return tissue_sim::stable_substep(*state_, stiffening_); }
 
-float MpmTissue::substep_for(const FrameInput& input) const {
-  return static_cast<float>(substep_.longest(*state_, input, stable_substep()));
+float MpmTissue::substep_for(const FrameInput& input) {
+  const auto measure = [this](const std::vector<std::uint8_t>& blocks, int steps) {
+    LinearisedMotion motion(*state_, blocks);
+    return 2 / std::sqrt(largest_eigenvalue(motion, steps));
+  };
+  return static_cast<float>(substep_.longest(*state_, input, stable_substep(), measure));
 }
 
 void MpmTissue::cut(const std::vector<BladePath>& paths, const Array<float>* u_before,
@@ -116,6 +120,7 @@ void MpmTissue::measure() {
     states[i] = s.kernels->state(block, block_field(s, block), s.scratch.local(), nullptr);
   });
   stiffening_ = even_stiffening(s, 1);
+  std::vector<float> modulus(count, 0.0f);
   result_.elastic_energy = result_.kinetic_energy = result_.max_speed = 0;
   for (int i = 0; i < count; ++i) {
     const BlockState& b = states[i];
@@ -125,8 +130,12 @@ void MpmTissue::measure() {
     for (std::size_t m = 0; m < of_body.size(); ++m) {
       of_body[m] = std::max(of_body[m], b.stiffening[m]);
       result_.blew_up = result_.blew_up || of_body[m] > 1e6f;
+      const Material& material = s.bodies[s.blocks.all[i]->body].materials[m];
+      modulus[i] =
+          std::max(modulus[i], static_cast<float>(wave_modulus(material, b.stiffening[m])));
     }
   }
+  substep_.follow(s, modulus);
   for (std::size_t i = 0; i < s.nodes.size(); ++i) {
     const double v2 = Vec3(s.nodes.v[0][i], s.nodes.v[1][i], s.nodes.v[2][i]).squaredNorm();
     result_.kinetic_energy += 0.5 * s.nodes.mass[i] * v2;
@@ -136,23 +145,6 @@ void MpmTissue::measure() {
   }
   // Nothing that instruments do moves tissue at the speed of a bullet; what does is out of control.
   result_.blew_up = result_.blew_up || !(result_.max_speed < 300);
-  if (!result_.blew_up) follow_stability(states);
-}
-
-void MpmTissue::follow_stability(const std::vector<BlockState>& states) {
-  MpmState& s = *state_;
-  std::vector<float> modulus(states.size(), 0.0f);
-  for (std::size_t i = 0; i < states.size(); ++i) {
-    const std::vector<Material>& materials = s.bodies[s.blocks.all[i]->body].materials;
-    for (std::size_t m = 0; m < materials.size(); ++m) {
-      const double of_material = wave_modulus(materials[m], states[i].stiffening[m]);
-      modulus[i] = std::max(modulus[i], static_cast<float>(of_material));
-    }
-  }
-  substep_.follow(s, modulus, [&](const std::vector<std::uint8_t>& blocks, int steps) {
-    LinearisedMotion motion(s, blocks);
-    return 2 / std::sqrt(largest_eigenvalue(motion, steps));
-  });
 }
 
 FrameResult MpmTissue::finish() {

@@ -18,7 +18,7 @@ class MpmTissue final : public Tissue {
   explicit MpmTissue(const Scene& scene, std::vector<std::string> notes = {});
 
   float stable_substep() const override;
-  float substep_for(const FrameInput& input) const override;
+  float substep_for(const FrameInput& input) override;
   void advance(int substeps, float dt, const FrameInput& input) override;
   FrameResult finish() override;
   int point_count() const override { return state_->points.size(); }
@@ -37,7 +37,6 @@ class MpmTissue final : public Tissue {
            const std::vector<BlockMotion>& before, CutReport& report);
   bool tear(const std::vector<TearingPoint>& tearing);  ///< whether anything did
   void measure();
-  void follow_stability(const std::vector<BlockState>& states);
 
   std::vector<std::string> notes_;
   std::unique_ptr<MpmState> state_;

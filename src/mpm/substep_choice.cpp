@@ -49,38 +49,44 @@ double farthest_motion(const MpmState& state, const FrameInput& input) {
 
 }  // namespace
 
-void SubstepChoice::follow(MpmState& state, const std::vector<float>& modulus,
-                           const MeasureLimit& measure) {
-  std::vector<std::uint8_t> to_measure(modulus.size(), 0);
-  bool cut = false;
+void SubstepChoice::follow(MpmState& state, const std::vector<float>& modulus) {
   growth_ = trend_ = 1;
+  ++age_;
   for (std::size_t i = 0; i < modulus.size(); ++i) {
     Block::Modulus& m = state.blocks.all[i]->modulus;
-    to_measure[i] = m.measured == 0;
-    cut = cut || m.measured == 0;
-    if (m.measured > 0) {
-      growth_ = std::max(growth_, static_cast<double>(modulus[i] / m.measured));
-      trend_ = std::max(trend_, static_cast<double>(modulus[i] / m.last));
-    }
+    if (m.measured > 0) growth_ = std::max(growth_, static_cast<double>(modulus[i] / m.measured));
+    if (m.last > 0) trend_ = std::max(trend_, static_cast<double>(modulus[i] / m.last));
     m.last = modulus[i];
-  }
-  if (limit_ == 0 || ++age_ >= kLongestAge || growth_ > kMostGrowth) {
-    to_measure.assign(modulus.size(), 1);
-    limit_ = measure(to_measure, kSteps);
-    growth_ = 1;
-    age_ = 0;
-  } else if (cut) {
-    limit_ = std::min(limit_, measure(to_measure, kStepsAtCut));
-  }
-  if (!std::isfinite(limit_)) limit_ = 0;  // all is anchored
-  for (std::size_t i = 0; i < modulus.size(); ++i) {
-    if (to_measure[i] != 0) state.blocks.all[i]->modulus.measured = modulus[i];
   }
 }
 
-double SubstepChoice::longest(const MpmState& state, const FrameInput& input,
-                              double cautious) const {
-  if (limit_ == 0 || !input.cuts.empty() || tears(state)) return cautious;
+void SubstepChoice::measure_if_due(MpmState& state, const MeasureLimit& measure) {
+  const std::vector<Block*>& blocks = state.blocks.all;
+  std::vector<std::uint8_t> to_measure(blocks.size(), 1);
+  if (limit_ == 0 || age_ >= kLongestAge || growth_ > kMostGrowth) {
+    limit_ = measure(to_measure, kSteps);
+    growth_ = 1;
+    age_ = 0;
+  } else {
+    bool any = false;
+    for (std::size_t i = 0; i < blocks.size(); ++i) {
+      to_measure[i] = blocks[i]->modulus.measured == 0;
+      any = any || to_measure[i] != 0;
+    }
+    if (!any) return;
+    limit_ = std::min(limit_, measure(to_measure, kStepsAtCut));
+  }
+  if (!std::isfinite(limit_)) limit_ = 0;  // all is anchored
+  for (std::size_t i = 0; i < blocks.size(); ++i) {
+    if (to_measure[i] != 0) blocks[i]->modulus.measured = blocks[i]->modulus.last;
+  }
+}
+
+double SubstepChoice::longest(MpmState& state, const FrameInput& input, double cautious,
+                              const MeasureLimit& measure) {
+  if (!input.cuts.empty() || tears(state)) return cautious;
+  measure_if_due(state, measure);
+  if (limit_ == 0) return cautious;
   const double motion = farthest_motion(state, input) / state.scene.cell_size;
   const double margin = kMargin / (1 + std::max(0.0, motion - kFreeMotion));
   const double asked = std::min(1.0, state.scene.cfl / Scene().cfl);

@@ -20,13 +20,16 @@ class SubstepChoice {
  public:
   /// After a frame: `modulus` is of each block the largest P-wave modulus of its points, as they
   /// are deformed [Pa].
-  void follow(MpmState& state, const std::vector<float>& modulus, const MeasureLimit& measure);
+  void follow(MpmState& state, const std::vector<float>& modulus);
 
   /// The longest substep for a frame with this input that is stable with a margin [s]: at least
   /// `cautious`, and not more where something is cut before the first substep, or just tore.
-  double longest(const MpmState& state, const FrameInput& input, double cautious) const;
+  double longest(MpmState& state, const FrameInput& input, double cautious,
+                 const MeasureLimit& measure);
 
  private:
+  void measure_if_due(MpmState& state, const MeasureLimit& measure);
+
   double limit_ = 0;   ///< when it was measured last [s]; 0 where it is not known
   double growth_ = 1;  ///< of the stiffness since, at most
   double trend_ = 1;   ///< of the stiffness in the last frame, at most

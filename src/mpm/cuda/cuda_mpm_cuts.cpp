@@ -40,21 +40,23 @@ std::size_t CudaMpmTissue::device_bytes() const {
                     d.colour.bytes() + d.volume.bytes() + d.partial.bytes() + d.hold.bytes() +
                     d.bonds.bytes() + d.with.bytes() + d.whole.bytes() + d.u_before.bytes() +
                     d.colliders.bytes() + d.loads.bytes() + d.measures.bytes() + d.cloud.bytes() +
-                    d.stretched.bytes() + d.springs.bytes() + d.contact_nodes.bytes() +
-                    d.contact_marks.bytes() + d.contact_force.bytes() + d.face_nodes.bytes() +
-                    d.gathered.bytes();
+                    d.stretched.bytes() + d.faces.bytes();
   for (int i = 0; i < 2; ++i) sum += d.u[i].bytes() + d.v[i].bytes() + d.force[i].bytes();
   return sum;
 }
 
 void CudaMpmTissue::pull() {
+  pull_nodes();
+  pull_contacts();
+}
+
+void CudaMpmTissue::pull_nodes() {
   OnDevice& d = *device_;
   const std::size_t n = d.u[0].size();
   d.host_nodes.resize(2 * n);
   d.u[d.current].download(d.host_nodes.data(), n, d.stream);
   d.v[d.current].download(d.host_nodes.data() + n, n, d.stream);
   check_cuda(cudaStreamSynchronize(d.stream), "finish a frame");
-  take_faces();
   unpack_nodes(d.host_nodes.data(), d.host_nodes.data() + n, state_->nodes);
 }
 
@@ -119,6 +121,10 @@ void CudaMpmTissue::push() {
   check_cuda(cudaStreamSynchronize(d.stream), "finish a frame");
   d.blocks.upload(t.blocks, d.stream);
   d.of_host = t.of_host;
+  d.first_slot.resize(t.blocks.size());
+  for (std::size_t b = 0; b < t.blocks.size(); ++b) {
+    d.first_slot[t.of_host[b]] = t.blocks[b].first_slot;
+  }
   d.bundles.upload(t.bundles, d.stream);
   d.columns.upload(t.columns, d.stream);
   d.push_stride = t.max_halves;
@@ -162,7 +168,10 @@ void CudaMpmTissue::cut(const std::vector<BladePath>& paths, const Array<float>*
   }
   if (changed.empty()) return;
   take_apart(*state_, changed);
-  report.new_fragments = update_pieces(state_->bodies, state_->points, pieces_);
+  if (!hold_together(state_->bodies, state_->points, changed)) {
+    report.new_fragments = update_pieces(state_->bodies, state_->points, pieces_);
+    device_->faces.pieces_changed = true;
+  }
   push();
   launch_measure();
   finish_measure();

@@ -177,9 +177,8 @@ void CudaMpmTissue::launch(int begin, int end, float dt) {
   frame.pushes = d.pushes.data();
   frame.push_stride = d.push_stride;
   frame.arrived = d.arrived.data();
-  const std::size_t faces = faces_may_meet() ? state_->faces.active.size() : 0;
-  frame.faces = d.faces(faces);
-  if (faces > 0) {
+  frame.faces = faces_of_launch();
+  if (frame.faces.any) {
     launch_substeps(d.face_plan, d.tables(), frame, d.face_resident, d.stream);
   } else if (d.all_plain && !d.may_meet) {
     launch_substeps(d.plain_plan, d.tables(), frame, d.plain_resident, d.stream);
@@ -225,7 +224,6 @@ FrameResult CudaMpmTissue::finish() {
   const OnDevice& d = *device_;
   const std::vector<BlockMotion> before = state_->motion;
   finish_measure();
-  take_faces();
   const std::size_t colliders = result_.loads.size() + 1;
   for (int i = 0; i < substeps_ && d.host_loads.size() > 0; ++i) {
     for (std::size_t c = 1; c < colliders && c < d.host_reach.size(); ++c) {
@@ -243,7 +241,7 @@ FrameResult CudaMpmTissue::finish() {
   blades_.clear();
   if (result_.tear_report.bonds_broken > 0) {
     result_.tear_report.new_fragments = update_pieces(state_->bodies, state_->points, pieces_);
-    device_->points_changed = true;
+    device_->points_changed = device_->faces.pieces_changed = true;
   }
   return result_;
 }
@@ -251,7 +249,7 @@ FrameResult CudaMpmTissue::finish() {
 Span<const Fragment> CudaMpmTissue::fragments() const {
   if (!pieces_measured_) {
     auto* self = const_cast<CudaMpmTissue*>(this);  // only what was not looked at yet changes
-    self->pull();
+    self->pull_nodes();
     measure_pieces(*self->state_, self->pieces_);
     self->pieces_measured_ = true;
   }
@@ -259,7 +257,7 @@ Span<const Fragment> CudaMpmTissue::fragments() const {
 }
 
 std::uint64_t CudaMpmTissue::checksum() const {
-  const_cast<CudaMpmTissue*>(this)->pull();
+  const_cast<CudaMpmTissue*>(this)->pull_nodes();
   return tissue_sim::checksum(*state_, pieces_);
 }
 

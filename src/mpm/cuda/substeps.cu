@@ -18,7 +18,7 @@ std::size_t shared_bytes(const CudaPlan& plan) {
   const std::size_t of_slot = 2 * sizeof(float4) + (plan.cached ? sizeof(uint4) + 8 : 0) +
                               (plan.eight_parts ? sizeof(uint4) : 0);
   return of_slot * plan.max_slots + 9 * sizeof(float4) * plan.threads +
-         kMaxColliders * (6 * sizeof(long long) + sizeof(Collider));
+         kMaxColliders * (6 * sizeof(long long) + sizeof(Collider)) + sizeof(FaceRounds);
 }
 
 int attribute(cudaDeviceAttr which) {

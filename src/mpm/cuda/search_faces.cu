@@ -1,0 +1,360 @@
+#include <cuda_runtime.h>
+
+#include "compute/cuda_check.h"
+#include "mpm/cuda/search_faces.h"
+#include "mpm/cuda/warp_faces.h"
+
+namespace tissue_sim {
+namespace {
+
+constexpr int kThreads = 128;
+constexpr int kSums = 6;  // of a thread block: velocities, ways since the facets were listed
+
+int blocks_for(int n) { return (n + kThreads - 1) / kThreads; }
+
+__device__ __forceinline__ int thread_index() {
+  return static_cast<int>(blockIdx.x * blockDim.x + threadIdx.x);
+}
+
+/// Sums over the threads of a block, in a fixed order, into the first one's.
+__device__ void reduce(double (*all)[kSums]) {
+  for (int step = static_cast<int>(blockDim.x) / 2; step > 0; step /= 2) {
+    __syncthreads();
+    if (static_cast<int>(threadIdx.x) >= step) continue;
+    for (int i = 0; i < kSums; ++i) all[threadIdx.x][i] += all[threadIdx.x + step][i];
+  }
+}
+
+__global__ void __launch_bounds__(kThreads)
+    move_facets(const CudaLooks s, const CudaNodes state, double* sums) {
+  __shared__ double all[kThreads][kSums];
+  const int f = thread_index();
+  double* mine = all[threadIdx.x];
+  for (int i = 0; i < kSums; ++i) mine[i] = 0;
+  if (f < s.facet_count) {
+    move_facet(s, state, f);
+    const FacetMotion& m = s.motion[f];
+    for (int a = 0; a < 3; ++a) {
+      mine[a] = m.v[a];
+      mine[3 + a] = static_cast<double>(m.x[a]) - s.listed[f].x[a];
+    }
+  }
+  reduce(all);
+  if (threadIdx.x < kSums) sums[blockIdx.x * kSums + threadIdx.x] = all[0][threadIdx.x];
+}
+
+/// One thread block: the means of all facets; the other figures begin anew.
+__global__ void __launch_bounds__(kThreads)
+    sum_up(const CudaLooks s, const double* sums, int blocks, bool anew) {
+  __shared__ double all[kThreads][kSums];
+  double* mine = all[threadIdx.x];
+  for (int i = 0; i < kSums; ++i) mine[i] = 0;
+  for (int b = static_cast<int>(threadIdx.x); b < blocks; b += kThreads) {
+    for (int i = 0; i < kSums; ++i) mine[i] += sums[b * kSums + i];
+  }
+  reduce(all);
+  if (threadIdx.x != 0) return;
+  CudaFaceFigures& figures = *s.figures;
+  for (int a = 0; a < 3; ++a) {
+    figures.mean_velocity[a] = all[0][a] / s.facet_count;
+    figures.mean_moved[a] = all[0][3 + a] / s.facet_count;
+  }
+  figures.fastest = 0;
+  figures.listed_anew = anew ? 1 : 0;
+}
+
+__device__ __forceinline__ float speed_of(const CudaLooks& s, int f) {
+  const double* mean = s.figures->mean_velocity;
+  const float* v = s.motion[f].v;
+  const double x = v[0] - mean[0], y = v[1] - mean[1], z = v[2] - mean[2];
+  return static_cast<float>(sqrt(x * x + y * y + z * z));
+}
+
+__global__ void find_fastest(const CudaLooks s) {
+  const int f = thread_index();
+  // Not a number is more than any number as unsigned, too.
+  unsigned speed = f < s.facet_count ? __float_as_uint(speed_of(s, f)) & 0x7fffffffu : 0;
+#pragma unroll
+  for (int step = 16; step > 0; step /= 2) {
+    speed = max(speed, __shfl_xor_sync(0xffffffffu, speed, step));
+  }
+  if (threadIdx.x % 32 == 0) atomicMax(&s.figures->fastest, speed);
+}
+
+__device__ __forceinline__ bool out_of_control(const CudaLooks& s) {
+  return !(__uint_as_float(s.figures->fastest) < kOutOfControl);
+}
+__device__ __forceinline__ double horizon_of(const CudaLooks& s) {
+  return search_horizon(__uint_as_float(s.figures->fastest), s.cell_size);
+}
+/// How far a facet gets until the next search [m].
+__device__ __forceinline__ float travel_of(const CudaLooks& s, int f) {
+  return speed_of(s, f) * static_cast<float>(kForesight * horizon_of(s));
+}
+
+/// Whether no facet has left its skin, nor will until the next search.
+__global__ void check_lists(const CudaLooks s) {
+  const int f = thread_index();
+  CudaFaceFigures& figures = *s.figures;
+  if (f == 0) figures.horizon = out_of_control(s) ? kHorizon : horizon_of(s);
+  if (f >= s.facet_count || out_of_control(s)) return;
+  const ListedFacet& listed = s.listed[f];
+  double way2 = 0;
+  for (int a = 0; a < 3; ++a) {
+    const double way = static_cast<double>(s.motion[f].x[a]) - listed.x[a] - figures.mean_moved[a];
+    way2 += way * way;
+  }
+  if (!(sqrt(way2) + travel_of(s, f) <= listed.skin)) figures.listed_anew = 1;
+}
+
+/// Whether lists are to be made.
+__device__ __forceinline__ bool lists_wanted(const CudaLooks& s) {
+  return s.figures->listed_anew != 0 && !out_of_control(s);
+}
+
+/// Clears what lists are made of.
+__global__ void clear_lists(const CudaLooks s, const CudaSearchRoom room) {
+  if (!lists_wanted(s)) return;
+  const int first = thread_index(), step = static_cast<int>(gridDim.x * blockDim.x);
+  for (int i = first; i < room.buckets; i += step) room.heads[i] = -1;
+  for (std::size_t i = first; i < s.node_count; i += step) s.marks[i] = 0;
+  if (first != 0) return;
+  CudaFaceFigures& figures = *s.figures;
+  figures.largest_reach = 0;
+  figures.near = figures.contacts = figures.involved = 0;
+}
+
+__device__ __forceinline__ float reach_of(const CudaLooks& s, int f) {
+  return kSearchReach * s.cell_size + s.listed[f].skin;
+}
+
+__global__ void list_facets(const CudaLooks s) {
+  const int f = thread_index();
+  if (!lists_wanted(s)) return;
+  unsigned reach = 0;
+  if (f < s.facet_count) {
+    ListedFacet& listed = s.listed[f];
+    for (int a = 0; a < 3; ++a) listed.x[a] = s.motion[f].x[a];
+    listed.skin = travel_of(s, f) + kSkin * s.cell_size;
+    s.is_involved[f] = 0;
+    reach = __float_as_uint(reach_of(s, f));
+  }
+#pragma unroll
+  for (int step = 16; step > 0; step /= 2) {
+    reach = max(reach, __shfl_xor_sync(0xffffffffu, reach, step));
+  }
+  if (threadIdx.x % 32 == 0) atomicMax(&s.figures->largest_reach, reach);
+}
+
+/// A hash grid whose cells are so large that a facet meets others in its own and the next alone.
+struct Grid {
+  float per_metre;
+  std::uint32_t mask;
+
+  __device__ __forceinline__ Grid(const CudaLooks& s, const CudaSearchRoom& room) {
+    per_metre = 0.5f / __uint_as_float(s.figures->largest_reach);
+    mask = static_cast<std::uint32_t>(room.buckets) - 1;
+  }
+  __device__ __forceinline__ int cell(float x) const {
+    return static_cast<int>(floorf(x * per_metre));
+  }
+  __device__ __forceinline__ std::uint32_t bucket(int x, int y, int z) const {
+    const std::uint32_t h = static_cast<std::uint32_t>(x) * 73856093u ^
+                            static_cast<std::uint32_t>(y) * 19349663u ^
+                            static_cast<std::uint32_t>(z) * 83492791u;
+    return (h ^ h >> 15) & mask;
+  }
+};
+
+__global__ void fill_grid(const CudaLooks s, const CudaSearchRoom room) {
+  const int f = thread_index();
+  if (f >= s.facet_count || !lists_wanted(s)) return;
+  const Grid grid(s, room);
+  const float* x = s.motion[f].x;
+  const std::uint32_t bucket = grid.bucket(grid.cell(x[0]), grid.cell(x[1]), grid.cell(x[2]));
+  room.next[f] = atomicExch(room.heads + bucket, f);
+}
+
+/// Whether two facets face one another, may meet, and the first touches the second.
+__device__ __forceinline__ bool may_touch(const CudaLooks& s, int f, int g) {
+  const FacetMotion &a = s.motion[f], &b = s.motion[g];
+  if (dot(a.normal, b.normal) > kFacing) return false;
+  const float far = reach_of(s, f) + reach_of(s, g);
+  for (int c = 0; c < 3; ++c) {
+    if (!(fabsf(a.x[c] - b.x[c]) < far)) return false;
+  }
+  const CudaFacet &p = s.facets[f], &q = s.facets[g];
+  if (!touches(p.piece, q.piece)) return false;
+  if (p.piece.id != q.piece.id) return true;
+  const CudaLattice& lattice = s.lattices[p.body];
+  return !are_bound({p.site[0], p.site[1], p.site[2]}, {q.site[0], q.site[1], q.site[2]},
+                    [&](int x, int y, int z) {
+                      const std::size_t row = static_cast<std::size_t>(z) * lattice.sites_y + y;
+                      return s.bonds[s.point_at[lattice.first_site + row * lattice.sites_x + x]];
+                    });
+}
+
+/// A warp for each facet: the facets that it may touch.
+__global__ void find_near(const CudaLooks s, const CudaSearchRoom room) {
+  const int f = thread_index() / 32, lane = static_cast<int>(threadIdx.x) % 32;
+  if (f >= s.facet_count || !lists_wanted(s)) return;
+  const Grid grid(s, room);
+  const float reach = reach_of(s, f) + __uint_as_float(s.figures->largest_reach);
+  int lowest[3], size[3];
+  for (int a = 0; a < 3; ++a) {
+    lowest[a] = grid.cell(s.motion[f].x[a] - reach);
+    size[a] = grid.cell(s.motion[f].x[a] + reach) - lowest[a] + 1;
+  }
+  const auto for_each = [&](const auto& visit) {
+    for (int i = lane; i < size[0] * size[1] * size[2]; i += 32) {
+      const int x = lowest[0] + i % size[0], y = lowest[1] + i / size[0] % size[1],
+                z = lowest[2] + i / size[0] / size[1];
+      for (int g = room.heads[grid.bucket(x, y, z)]; g >= 0; g = room.next[g]) {
+        const float* at = s.motion[g].x;
+        if (g == f || grid.cell(at[0]) != x || grid.cell(at[1]) != y || grid.cell(at[2]) != z) {
+          continue;
+        }
+        if (may_touch(s, f, g)) visit(g);
+      }
+    }
+  };
+  int count = 0;
+  for_each([&](int) { ++count; });
+  int end = count;  // of this lane's among all
+  for (int step = 1; step < 32; step *= 2) {
+    const int before = __shfl_up_sync(0xffffffffu, end, step);
+    if (lane >= step) end += before;
+  }
+  const int all = __shfl_sync(0xffffffffu, end, 31);
+  int first = 0;  // each list has twice the places, to be sorted in
+  if (lane == 0 && all > 0) first = atomicAdd(&s.figures->near, 2 * all);
+  first = __shfl_sync(0xffffffffu, first, 0);
+  if (lane == 0) {
+    s.first_near[f] = first;
+    s.near_count[f] = all;
+  }
+  if (all == 0 || static_cast<std::size_t>(first) + 2 * all > s.near_capacity) return;
+  std::int32_t* unsorted = s.near + first + all;
+  int to = end - count;
+  for_each([&](int g) { unsorted[to++] = g; });
+  __syncwarp();
+  for (int i = lane; i < all; i += 32) {
+    int rank = 0;
+    for (int j = 0; j < all; ++j) rank += unsorted[j] < unsorted[i] ? 1 : 0;
+    s.near[first + rank] = unsorted[i];
+  }
+}
+
+/// Whether lists were made.
+__device__ __forceinline__ bool lists_made(const CudaLooks& s) {
+  return lists_wanted(s) && static_cast<std::size_t>(s.figures->near) <= s.near_capacity;
+}
+
+/// Contacts go on, begin, or end.
+__global__ void list_contacts(const CudaLooks s) {
+  const int f = thread_index();
+  if (f >= s.facet_count || !lists_made(s)) return;
+  FaceSpring& c = s.springs[f];
+  const int count = s.near_count[f];
+  if (count == 0) {
+    c.other = -1;
+    c.touching = false;
+    return;
+  }
+  s.contacts[atomicAdd(&s.figures->contacts, 1)] = f;
+  s.is_involved[f] = 1;
+  if (c.other >= 0) s.is_involved[c.other] = 1;
+  for (int i = 0; i < count; ++i) s.is_involved[s.near[s.first_near[f] + i]] = 1;
+}
+
+/// Facets that looks ask for, and the nodes that contacts may push.
+__global__ void list_involved(const CudaLooks s) {
+  const int f = thread_index();
+  if (f >= s.facet_count || !lists_made(s) || s.is_involved[f] == 0) return;
+  s.involved[atomicAdd(&s.figures->involved, 1)] = f;
+  const CudaFacet& at = s.facets[f];
+  for (int k = 0; k < 27; ++k) {
+    const std::int32_t entry =
+        s.slot_node[at.slot + k / 9 * at.plane + k / 3 % 3 * at.pitch + k % 3];
+    s.marks[entry < 0 ? ~entry : entry] = 1;
+  }
+}
+
+__global__ void begin_anew(const CudaLooks s) {
+  const int f = thread_index();
+  if (f >= s.facet_count) return;
+  FaceSpring c = {};
+  c.facet = f;
+  s.springs[f] = c;
+}
+
+/// A warp for each contact.
+__global__ void take_up_kept(const CudaLooks s, const CudaNodes state, const KeptContact* kept,
+                             int kept_count, float dt) {
+  const int i = thread_index() / 32;
+  if (i >= s.figures->contacts) return;
+  FaceSpring& at = s.springs[s.contacts[i]];
+  FaceSpring c = at;
+  const KeptContact* before = find_kept(kept, kept_count, s.facets[c.facet].facet);
+  if (before == nullptr) return;
+  WarpFaces faces(s, state, c);
+  take_up(faces, c, *before, dt);
+  __syncwarp();
+  if (threadIdx.x % 32 == 0) at = c;
+}
+
+__global__ void gather_active(const CudaLooks s, int count, FaceSpring* out) {
+  const int i = thread_index();
+  if (i < count) out[i] = s.springs[s.active[i]];
+}
+
+void check_launch() { check_cuda(cudaGetLastError(), "start a kernel"); }
+
+}  // namespace
+
+std::size_t search_sums(int facet_count) {
+  return static_cast<std::size_t>(kSums) * blocks_for(facet_count);
+}
+
+void launch_fresh_contacts(const CudaLooks& looks, cudaStream_t stream) {
+  begin_anew<<<blocks_for(looks.facet_count), kThreads, 0, stream>>>(looks);
+  check_launch();
+}
+
+void launch_search(const CudaLooks& looks, const CudaNodes& state, const CudaSearchRoom& room,
+                   bool anew, cudaStream_t stream) {
+  const int blocks = blocks_for(looks.facet_count);
+  move_facets<<<blocks, kThreads, 0, stream>>>(looks, state, room.sums);
+  sum_up<<<1, kThreads, 0, stream>>>(looks, room.sums, blocks, anew);
+  find_fastest<<<blocks, kThreads, 0, stream>>>(looks);
+  check_lists<<<blocks, kThreads, 0, stream>>>(looks);
+  check_launch();
+  launch_lists(looks, room, stream);
+}
+
+void launch_lists(const CudaLooks& looks, const CudaSearchRoom& room, cudaStream_t stream) {
+  const int blocks = blocks_for(looks.facet_count);
+  clear_lists<<<blocks, kThreads, 0, stream>>>(looks, room);
+  list_facets<<<blocks, kThreads, 0, stream>>>(looks);
+  fill_grid<<<blocks, kThreads, 0, stream>>>(looks, room);
+  find_near<<<blocks_for(32 * looks.facet_count), kThreads, 0, stream>>>(looks, room);
+  list_contacts<<<blocks, kThreads, 0, stream>>>(looks);
+  list_involved<<<blocks, kThreads, 0, stream>>>(looks);
+  check_launch();
+}
+
+void launch_take_up(const CudaLooks& looks, const CudaNodes& state, const KeptContact* kept,
+                    int kept_count, int contact_count, float dt, cudaStream_t stream) {
+  if (contact_count == 0) return;
+  take_up_kept<<<blocks_for(32 * contact_count), kThreads, 0, stream>>>(looks, state, kept,
+                                                                        kept_count, dt);
+  check_launch();
+}
+
+void launch_gather_active(const CudaLooks& looks, int count, FaceSpring* out, cudaStream_t stream) {
+  if (count == 0) return;
+  gather_active<<<blocks_for(count), kThreads, 0, stream>>>(looks, count, out);
+  check_launch();
+}
+
+}  // namespace tissue_sim

@@ -5,6 +5,7 @@
 #include <cstdint>
 
 #include "compute/host_device.h"
+#include "contact/facet_in_world.h"
 #include "cutting/bonds.h"
 
 namespace tissue_sim {
@@ -26,12 +27,46 @@ TISSUE_SIM_INLINE double search_horizon(double fastest, double cell_size) {
   return fmin(kHorizon, kLargestReach * cell_size / (kForesight * fastest + 1e-9));
 }
 
+/// Pieces of so few points are crumbs. One that flies shall not make all others search as often as
+/// its speed asks for.
+inline constexpr int kCrumb = 64;
+
+/// The box that a facet sweeps until the next search at the latest, and what it reaches from there.
+struct SweptBox {
+  float min[3], max[3];  ///< [m]
+
+  SweptBox() = default;
+  TISSUE_SIM_INLINE SweptBox(const FacetMotion& f, double cell_size) {
+    const auto margin = static_cast<float>((kSearchReach + kSkin) * cell_size);
+    for (int a = 0; a < 3; ++a) {
+      const float way = static_cast<float>(kForesight * kHorizon) * f.v[a];
+      min[a] = f.x[a] + fminf(way, 0.0f) - margin;
+      max[a] = f.x[a] + fmaxf(way, 0.0f) + margin;
+    }
+  }
+  TISSUE_SIM_INLINE bool meets(const SweptBox& other) const {
+    bool meets = true;
+    for (int a = 0; a < 3; ++a) {
+      meets = meets && min[a] <= other.max[a] && other.min[a] <= max[a];
+    }
+    return meets;
+  }
+};
+
+/// Whether a facet of a piece of so many points flies: it is a crumb's, and so fast that the next
+/// search would have to follow sooner. Where its box does not meet that of all that do not fly, it
+/// takes no part until the next search.
+TISSUE_SIM_INLINE bool flies(const FacetMotion& f, int points, double cell_size) {
+  const auto far = static_cast<float>(kLargestReach * cell_size / (kForesight * kHorizon));
+  return points <= kCrumb && dot(f.v, f.v) > far * far;
+}
+
 /// Whether something is to be done before a substep, or rather before the next.
 TISSUE_SIM_INLINE bool is_due(double until, double dt) { return until < 0.5 * dt; }
 
 /// Where a facet was when the pairs were listed, and how far it may move while the list holds [m].
 struct ListedFacet {
-  float x[3], skin;
+  float x[3], skin;  ///< skin < 0: it took no part
 };
 
 /// A piece, as contacts see it.

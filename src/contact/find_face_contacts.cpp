@@ -73,20 +73,64 @@ bool are_one(const MpmState& s, const Pieces& pieces, std::int32_t a, std::int32
 Vec3 velocity(const FacetMotion& f) { return {f.v[0], f.v[1], f.v[2]}; }
 
 /// Whether no facet has left its skin since the pairs were listed (Verlet 1967), nor will when it
-/// travels on by so much [m].
+/// travels on by so much [m]; those that travel less than 0 take no part.
 bool pairs_last(const FaceContacts& faces, const std::vector<float>& travel) {
   if (faces.listed.size() != travel.size()) return false;
   Vec3 mean = Vec3::Zero();
+  int count = 0;
   const auto moved = [&faces](std::size_t f) {
     const float *x = faces.motion[f].x, *from = faces.listed[f].x;
     return Vec3(x[0] - from[0], x[1] - from[1], x[2] - from[2]);
   };
-  for (std::size_t f = 0; f < travel.size(); ++f) mean += moved(f);
-  mean /= std::max<std::size_t>(1, travel.size());
   for (std::size_t f = 0; f < travel.size(); ++f) {
+    if (travel[f] < 0) continue;
+    mean += moved(f);
+    ++count;
+  }
+  mean /= std::max(1, count);
+  for (std::size_t f = 0; f < travel.size(); ++f) {
+    if (travel[f] < 0) continue;
     if ((moved(f) - mean).norm() + travel[f] > faces.listed[f].skin) return false;
   }
   return true;
+}
+
+/// How fast facets move against their mean [m/s]; -1 for those that fly and take no part.
+std::vector<float> speeds(const MpmState& s, const Pieces& pieces, const std::vector<int>& size) {
+  const FaceContacts& faces = s.faces;
+  const std::size_t count = faces.motion.size();
+  const double cell = s.scene.cell_size;
+  std::vector<float> speed(count, 0);
+  SweptBox others;
+  std::fill_n(others.min, 3, 1e30f);
+  std::fill_n(others.max, 3, -1e30f);
+  for (std::size_t f = 0; f < count; ++f) {
+    const FacetMotion& m = faces.motion[f];
+    const int points = size[pieces.of_point[facet_of(s, static_cast<std::int32_t>(f)).point]];
+    const SweptBox box(m, cell);
+    if (flies(m, points, cell)) {
+      speed[f] = -1;
+      continue;
+    }
+    for (int a = 0; a < 3; ++a) {
+      others.min[a] = std::min(others.min[a], box.min[a]);
+      others.max[a] = std::max(others.max[a], box.max[a]);
+    }
+  }
+  Vec3 mean = Vec3::Zero();
+  int involved = 0;
+  for (std::size_t f = 0; f < count; ++f) {
+    if (speed[f] < 0 && SweptBox(faces.motion[f], cell).meets(others)) speed[f] = 0;
+    if (speed[f] < 0) continue;
+    mean += velocity(faces.motion[f]);
+    ++involved;
+  }
+  mean /= std::max(1, involved);
+  for (std::size_t f = 0; f < count; ++f) {
+    if (speed[f] < 0) continue;
+    speed[f] = static_cast<float>((velocity(faces.motion[f]) - mean).norm());
+  }
+  return speed;
 }
 
 /// Brings the motion of all facets up to date and finds those that may meet until the next search,
@@ -100,16 +144,16 @@ bool search(MpmState& s, const Pieces& pieces) {
       faces.motion[f] = motion_of(s, f);
     }
   });
-  Vec3 mean = Vec3::Zero();
-  for (const FacetMotion& f : faces.motion) mean += velocity(f);
-  mean /= std::max(1, facet_count);
-  std::vector<float> travel(facet_count);  // until the next search; first in a second
+  std::vector<int> size(pieces.next_id, 0);
+  for (const Fragment& f : pieces.all) size[f.id] = f.point_count;
+  std::vector<float> travel = speeds(s, pieces, size);  // until the next search; first in a second
   double fastest = 0;
-  for (std::int32_t f = 0; f < facet_count; ++f) {
-    travel[f] = static_cast<float>((velocity(faces.motion[f]) - mean).norm());
-    fastest = std::max(fastest, static_cast<double>(travel[f]));
+  bool finite = true;
+  for (const float t : travel) {
+    fastest = std::max(fastest, static_cast<double>(t));
+    finite = finite && t < kOutOfControl;
   }
-  if (!(fastest < kOutOfControl)) {  // out of control, as the end of the frame will say
+  if (!finite) {  // as the end of the frame will say
     faces.listed.clear();
     faces.all.clear();
     faces.until_search = kHorizon;
@@ -118,18 +162,16 @@ bool search(MpmState& s, const Pieces& pieces) {
   const auto cell = static_cast<float>(s.scene.cell_size);
   const double horizon = search_horizon(fastest, cell);
   faces.until_search = horizon;
-  for (float& t : travel) t *= static_cast<float>(kForesight * horizon);
+  for (float& t : travel) t = t < 0 ? -1 : t * static_cast<float>(kForesight * horizon);
   if (pairs_last(faces, travel)) return false;
   faces.listed.resize(facet_count);
   std::vector<float> reach(facet_count);
   for (std::int32_t f = 0; f < facet_count; ++f) {
     ListedFacet& listed = faces.listed[f];
     std::copy_n(faces.motion[f].x, 3, listed.x);
-    listed.skin = travel[f] + kSkin * cell;
-    reach[f] = kSearchReach * cell + listed.skin;
+    listed.skin = travel[f] < 0 ? -1 : travel[f] + kSkin * cell;
+    reach[f] = travel[f] < 0 ? 0 : kSearchReach * cell + listed.skin;
   }
-  std::vector<int> size(pieces.next_id, 0);
-  for (const Fragment& f : pieces.all) size[f.id] = f.point_count;
   auto pairs = facing_pairs(faces.motion, reach, 3 * cell, *s.cpu);
   const auto one = [&](const auto& pair) { return are_one(s, pieces, pair.first, pair.second); };
   pairs.erase(std::remove_if(pairs.begin(), pairs.end(), one), pairs.end());

@@ -101,10 +101,12 @@ void CudaMpmTissue::upload_facets() {
   f.listed.resize(count);
   f.springs.resize(count);
   for (auto* of_facet :
-       {&f.first_near, &f.near_count, &f.contacts, &f.involved, &f.active, &f.next}) {
+       {&f.first_near, &f.near_count, &f.contacts, &f.involved, &f.active, &f.next, &f.far}) {
     of_facet->resize(count);
   }
   f.is_involved.resize(count);
+  f.takes_part.resize(count);
+  f.reach.resize(count);
   f.marks.resize(d.u[0].size());
   f.figures.resize(1);
   f.host_figures.resize(1);
@@ -135,6 +137,7 @@ CudaLooks CudaMpmTissue::looks() const {
   s.near = f.near.data();
   s.near_capacity = f.near.size();
   s.is_involved = f.is_involved.data();
+  s.takes_part = f.takes_part.data();
   s.contacts = f.contacts.data();
   s.involved = f.involved.data();
   s.active = f.active.data();
@@ -154,8 +157,9 @@ void CudaMpmTissue::search_faces(float dt) {
   faces.until_search = kHorizon;
   f.contacts_count = 0;
   if (f.facets.size() == 0) return;
-  const CudaSearchRoom room{f.sums.data(), f.heads.data(), f.next.data(),
-                            static_cast<std::int32_t>(f.heads.size())};
+  const CudaSearchRoom room{f.sums.data(), f.reach.data(),
+                            f.far.data(),  f.heads.data(),
+                            f.next.data(), static_cast<std::int32_t>(f.heads.size())};
   const CudaFaceFigures& figures = f.host_figures[0];
   const auto read = [&] {
     f.figures.download(f.host_figures.data(), 1, d.stream);

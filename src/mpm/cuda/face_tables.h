@@ -34,19 +34,24 @@ struct CudaLattice {
   std::size_t first_site;  ///< in CudaLooks::point_at
 };
 
-/// Figures of the search and of the looks.
+/// Figures of the search and of the looks; speeds and lengths that are never negative as the bits
+/// of a float, whose order is theirs.
 struct CudaFaceFigures {
-  double mean_velocity[3], mean_moved[3];  ///< of all facets, since they were listed [m/s], [m]
-  double horizon;                          ///< until the next search [s]
-  double until_look;                       ///< as of the last substep [s]
-  float since_look;                        ///< the same
-  unsigned fastest;                        ///< facet against the mean, the bits of a float [m/s]
-  unsigned largest_reach;                  ///< the same [m]
-  unsigned fastest_pair;                   ///< of the last look, the same [m/s]
-  int listed_anew;                         ///< whether the lists no longer held
-  int near;                                ///< places wanted in CudaLooks::near
-  int contacts, involved;  ///< facets with any in their list; these, and those in lists
-  int active;              ///< contacts that touch, or may before the next look
+  unsigned box[6];          ///< SweptBox of what does not fly: -min, max as in_order() [m]
+  double mean_moved[3];     ///< of the facets that take part, since they were listed [m]
+  double mean_velocity[3];  ///< of the same [m/s]
+  double horizon;           ///< until the next search [s]
+  double until_look;        ///< as of the last substep [s]
+  float since_look;         ///< the same
+  unsigned fastest;         ///< facet against the mean [m/s]
+  unsigned largest_reach;   ///< [m]
+  unsigned ordinary_reach;  ///< the largest of facets that do not reach far [m]
+  unsigned fastest_pair;    ///< of the last look [m/s]
+  int listed_anew;          ///< whether the lists no longer held
+  int reach_far;            ///< facets that do
+  int near;                 ///< places wanted in CudaLooks::near
+  int contacts, involved;   ///< facets with any in their list; these, and those in lists
+  int active;               ///< contacts that touch, or may before the next look
 };
 
 /// Where a contact gets its displacements from and gives its force to.
@@ -71,7 +76,7 @@ struct CudaLooks {
   std::int32_t *first_near, *near_count;  ///< per facet: the facets that it may touch, in `near`
   std::int32_t* near;                     ///< each list in order
   std::size_t near_capacity;
-  std::uint8_t* is_involved;                   ///< per facet
+  std::uint8_t *is_involved, *takes_part;      ///< per facet: is in a list; in the search
   std::int32_t *contacts, *involved, *active;  ///< facets, in any order
   CudaContactNodes* nodes;                     ///< parallels `active`
   std::uint8_t* marks;                         ///< CudaFaces::marks

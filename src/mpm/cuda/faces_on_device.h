@@ -14,13 +14,14 @@ struct FacesOnDevice {
   DeviceArray<ListedFacet> listed;
   DeviceArray<FaceSpring> springs;
   DeviceArray<std::int32_t> point_at, first_near, near_count, near, contacts, involved, active;
-  DeviceArray<std::uint8_t> is_involved, marks;
+  DeviceArray<std::uint8_t> is_involved, takes_part, marks;
   DeviceArray<CudaContactNodes> nodes;
   DeviceArray<CudaFaceFigures> figures;
   PinnedArray<CudaFaceFigures> host_figures;  ///< as of the last search
   /// See CudaSearchRoom.
   DeviceArray<double> sums;
-  DeviceArray<std::int32_t> heads, next;
+  DeviceArray<float4> reach;
+  DeviceArray<std::int32_t> far, heads, next;
 
   DeviceArray<long long> force;  ///< CudaFaces::force
   DeviceArray<KeptContact> kept;
@@ -36,8 +37,9 @@ struct FacesOnDevice {
     return facets.bytes() + lattices.bytes() + motion.bytes() + listed.bytes() + springs.bytes() +
            point_at.bytes() + first_near.bytes() + near_count.bytes() + near.bytes() +
            contacts.bytes() + involved.bytes() + active.bytes() + is_involved.bytes() +
-           marks.bytes() + nodes.bytes() + figures.bytes() + sums.bytes() + heads.bytes() +
-           next.bytes() + force.bytes() + kept.bytes() + gathered.bytes();
+           takes_part.bytes() + marks.bytes() + nodes.bytes() + figures.bytes() + sums.bytes() +
+           reach.bytes() + far.bytes() + heads.bytes() + next.bytes() + force.bytes() +
+           kept.bytes() + gathered.bytes();
   }
 };
 

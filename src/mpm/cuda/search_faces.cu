@@ -8,7 +8,11 @@ namespace tissue_sim {
 namespace {
 
 constexpr int kThreads = 128;
-constexpr int kSums = 6;  // of a thread block: velocities, ways since the facets were listed
+constexpr int kSums =
+    7;  // of a thread block: velocities, ways since the facets were listed, facets
+// Facets that reach further than this are not in the grid, as long as they are few [cells].
+constexpr float kFar = 1.25f;
+constexpr int kFewFar = 1024;
 
 int blocks_for(int n) { return (n + kThreads - 1) / kThreads; }
 
@@ -25,18 +29,62 @@ __device__ void reduce(double (*all)[kSums]) {
   }
 }
 
-__global__ void __launch_bounds__(kThreads)
-    move_facets(const CudaLooks s, const CudaNodes state, double* sums) {
+/// Bits that are in the order of the floats.
+__device__ __forceinline__ unsigned in_order(float value) {
+  const unsigned bits = __float_as_uint(value);
+  return (bits & 0x80000000u) != 0 ? ~bits : bits | 0x80000000u;
+}
+__device__ __forceinline__ float from_order(unsigned bits) {
+  return __uint_as_float((bits & 0x80000000u) != 0 ? bits & 0x7fffffffu : ~bits);
+}
+
+/// Largest over a warp and all warps.
+__device__ __forceinline__ void take_largest(unsigned value, unsigned* largest) {
+#pragma unroll
+  for (int step = 16; step > 0; step /= 2) {
+    value = max(value, __shfl_xor_sync(0xffffffffu, value, step));
+  }
+  if (threadIdx.x % 32 == 0 && value > 0) atomicMax(largest, value);
+}
+
+__device__ __forceinline__ bool flies(const CudaLooks& s, int f) {
+  return flies(s.motion[f], s.facets[f].piece.points, s.cell_size);
+}
+
+__global__ void __launch_bounds__(kThreads) move_facets(const CudaLooks s, const CudaNodes state) {
+  const int f = thread_index();
+  unsigned box[6] = {};
+  if (f < s.facet_count) {
+    move_facet(s, state, f);
+    if (!flies(s, f)) {
+      const SweptBox swept(s.motion[f], s.cell_size);
+      for (int a = 0; a < 3; ++a) {
+        box[a] = in_order(-swept.min[a]);
+        box[3 + a] = in_order(swept.max[a]);
+      }
+    }
+  }
+  for (int i = 0; i < 6; ++i) take_largest(box[i], s.figures->box + i);
+}
+
+__global__ void __launch_bounds__(kThreads) sum_facets(const CudaLooks s, double* sums) {
   __shared__ double all[kThreads][kSums];
   const int f = thread_index();
   double* mine = all[threadIdx.x];
   for (int i = 0; i < kSums; ++i) mine[i] = 0;
   if (f < s.facet_count) {
-    move_facet(s, state, f);
     const FacetMotion& m = s.motion[f];
+    SweptBox others;
     for (int a = 0; a < 3; ++a) {
+      others.min[a] = -from_order(s.figures->box[a]);
+      others.max[a] = from_order(s.figures->box[3 + a]);
+    }
+    const bool takes_part = !flies(s, f) || SweptBox(m, s.cell_size).meets(others);
+    s.takes_part[f] = takes_part ? 1 : 0;
+    for (int a = 0; a < 3 && takes_part; ++a) {
       mine[a] = m.v[a];
       mine[3 + a] = static_cast<double>(m.x[a]) - s.listed[f].x[a];
+      mine[6] = 1;
     }
   }
   reduce(all);
@@ -55,9 +103,10 @@ __global__ void __launch_bounds__(kThreads)
   reduce(all);
   if (threadIdx.x != 0) return;
   CudaFaceFigures& figures = *s.figures;
+  const double count = fmax(1.0, all[0][6]);
   for (int a = 0; a < 3; ++a) {
-    figures.mean_velocity[a] = all[0][a] / s.facet_count;
-    figures.mean_moved[a] = all[0][3 + a] / s.facet_count;
+    figures.mean_velocity[a] = all[0][a] / count;
+    figures.mean_moved[a] = all[0][3 + a] / count;
   }
   figures.fastest = 0;
   figures.listed_anew = anew ? 1 : 0;
@@ -72,13 +121,9 @@ __device__ __forceinline__ float speed_of(const CudaLooks& s, int f) {
 
 __global__ void find_fastest(const CudaLooks s) {
   const int f = thread_index();
+  const bool takes_part = f < s.facet_count && s.takes_part[f] != 0;
   // Not a number is more than any number as unsigned, too.
-  unsigned speed = f < s.facet_count ? __float_as_uint(speed_of(s, f)) & 0x7fffffffu : 0;
-#pragma unroll
-  for (int step = 16; step > 0; step /= 2) {
-    speed = max(speed, __shfl_xor_sync(0xffffffffu, speed, step));
-  }
-  if (threadIdx.x % 32 == 0) atomicMax(&s.figures->fastest, speed);
+  take_largest(takes_part ? __float_as_uint(speed_of(s, f)) & 0x7fffffffu : 0, &s.figures->fastest);
 }
 
 __device__ __forceinline__ bool out_of_control(const CudaLooks& s) {
@@ -97,7 +142,7 @@ __global__ void check_lists(const CudaLooks s) {
   const int f = thread_index();
   CudaFaceFigures& figures = *s.figures;
   if (f == 0) figures.horizon = out_of_control(s) ? kHorizon : horizon_of(s);
-  if (f >= s.facet_count || out_of_control(s)) return;
+  if (f >= s.facet_count || out_of_control(s) || s.takes_part[f] == 0) return;
   const ListedFacet& listed = s.listed[f];
   double way2 = 0;
   for (int a = 0; a < 3; ++a) {
@@ -120,40 +165,49 @@ __global__ void clear_lists(const CudaLooks s, const CudaSearchRoom room) {
   for (std::size_t i = first; i < s.node_count; i += step) s.marks[i] = 0;
   if (first != 0) return;
   CudaFaceFigures& figures = *s.figures;
-  figures.largest_reach = 0;
-  figures.near = figures.contacts = figures.involved = 0;
+  figures.largest_reach = figures.ordinary_reach = 0;
+  figures.reach_far = figures.near = figures.contacts = figures.involved = 0;
 }
 
-__device__ __forceinline__ float reach_of(const CudaLooks& s, int f) {
-  return kSearchReach * s.cell_size + s.listed[f].skin;
-}
-
-__global__ void list_facets(const CudaLooks s) {
+__global__ void list_facets(const CudaLooks s, const CudaSearchRoom room) {
   const int f = thread_index();
   if (!lists_wanted(s)) return;
-  unsigned reach = 0;
+  float reach = 0;
+  bool far = false;
   if (f < s.facet_count) {
+    const bool takes_part = s.takes_part[f] != 0;
+    const float* x = s.motion[f].x;
     ListedFacet& listed = s.listed[f];
-    for (int a = 0; a < 3; ++a) listed.x[a] = s.motion[f].x[a];
-    listed.skin = travel_of(s, f) + kSkin * s.cell_size;
+    for (int a = 0; a < 3; ++a) listed.x[a] = x[a];
+    listed.skin = takes_part ? travel_of(s, f) + kSkin * s.cell_size : -1.0f;
+    reach = takes_part ? kSearchReach * s.cell_size + listed.skin : 0.0f;
+    room.reach[f] = {x[0], x[1], x[2], reach};
     s.is_involved[f] = 0;
-    reach = __float_as_uint(reach_of(s, f));
+    far = reach > kFar * s.cell_size;
+    if (far) room.far[atomicAdd(&s.figures->reach_far, 1)] = f;
   }
-#pragma unroll
-  for (int step = 16; step > 0; step /= 2) {
-    reach = max(reach, __shfl_xor_sync(0xffffffffu, reach, step));
-  }
-  if (threadIdx.x % 32 == 0) atomicMax(&s.figures->largest_reach, reach);
+  take_largest(__float_as_uint(reach), &s.figures->largest_reach);
+  take_largest(far ? 0 : __float_as_uint(reach), &s.figures->ordinary_reach);
 }
 
-/// A hash grid whose cells are so large that a facet meets others in its own and the next alone.
+/// A hash grid whose cells are so large that ordinary facets meet others in their own and the next
+/// alone; those that reach far are beside it, if they are few.
 struct Grid {
-  float per_metre;
+  float per_metre, reach;  // of those in the grid [m]
   std::uint32_t mask;
+  int far;  // how many are beside it
 
   __device__ __forceinline__ Grid(const CudaLooks& s, const CudaSearchRoom& room) {
-    per_metre = 0.5f / __uint_as_float(s.figures->largest_reach);
+    const CudaFaceFigures& figures = *s.figures;
+    far = figures.reach_far <= kFewFar ? figures.reach_far : 0;
+    reach = __uint_as_float(figures.reach_far <= kFewFar ? figures.ordinary_reach
+                                                         : figures.largest_reach);
+    reach = fmaxf(reach, kSearchReach * s.cell_size);
+    per_metre = 0.5f / reach;
     mask = static_cast<std::uint32_t>(room.buckets) - 1;
+  }
+  __device__ __forceinline__ bool holds(float reach_of_facet) const {
+    return reach_of_facet > 0 && reach_of_facet <= reach;
   }
   __device__ __forceinline__ int cell(float x) const {
     return static_cast<int>(floorf(x * per_metre));
@@ -170,19 +224,20 @@ __global__ void fill_grid(const CudaLooks s, const CudaSearchRoom room) {
   const int f = thread_index();
   if (f >= s.facet_count || !lists_wanted(s)) return;
   const Grid grid(s, room);
-  const float* x = s.motion[f].x;
-  const std::uint32_t bucket = grid.bucket(grid.cell(x[0]), grid.cell(x[1]), grid.cell(x[2]));
+  const float4 x = room.reach[f];
+  if (!grid.holds(x.w)) return;
+  const std::uint32_t bucket = grid.bucket(grid.cell(x.x), grid.cell(x.y), grid.cell(x.z));
   room.next[f] = atomicExch(room.heads + bucket, f);
 }
 
-/// Whether two facets face one another, may meet, and the first touches the second.
+__device__ __forceinline__ bool may_meet(const float4& a, const float4& b) {
+  const float far = a.w + b.w;
+  return fabsf(a.x - b.x) < far && fabsf(a.y - b.y) < far && fabsf(a.z - b.z) < far;
+}
+
+/// Whether a facet touches another that may meet it: they face one another, and no bonds bind them.
 __device__ __forceinline__ bool may_touch(const CudaLooks& s, int f, int g) {
-  const FacetMotion &a = s.motion[f], &b = s.motion[g];
-  if (dot(a.normal, b.normal) > kFacing) return false;
-  const float far = reach_of(s, f) + reach_of(s, g);
-  for (int c = 0; c < 3; ++c) {
-    if (!(fabsf(a.x[c] - b.x[c]) < far)) return false;
-  }
+  if (f == g || dot(s.motion[f].normal, s.motion[g].normal) > kFacing) return false;
   const CudaFacet &p = s.facets[f], &q = s.facets[g];
   if (!touches(p.piece, q.piece)) return false;
   if (p.piece.id != q.piece.id) return true;
@@ -194,32 +249,43 @@ __device__ __forceinline__ bool may_touch(const CudaLooks& s, int f, int g) {
                     });
 }
 
+/// Calls visit(g) for each facet g that f may touch; the lanes of a warp share them.
+template <class F>
+__device__ __forceinline__ void for_each_near(const CudaLooks& s, const CudaSearchRoom& room,
+                                              const Grid& grid, int f, int lane, const F& visit) {
+  const float4 own = room.reach[f];
+  const float at[3] = {own.x, own.y, own.z}, reach = own.w + grid.reach;
+  int lowest[3], size[3];
+  for (int a = 0; a < 3; ++a) {
+    lowest[a] = grid.cell(at[a] - reach);
+    size[a] = grid.cell(at[a] + reach) - lowest[a] + 1;
+  }
+  for (int i = lane; i < size[0] * size[1] * size[2]; i += 32) {
+    const int x = lowest[0] + i % size[0], y = lowest[1] + i / size[0] % size[1],
+              z = lowest[2] + i / size[0] / size[1];
+    for (int g = room.heads[grid.bucket(x, y, z)]; g >= 0; g = room.next[g]) {
+      const float4 other = room.reach[g];
+      if (!may_meet(own, other) || grid.cell(other.x) != x || grid.cell(other.y) != y ||
+          grid.cell(other.z) != z) {
+        continue;
+      }
+      if (may_touch(s, f, g)) visit(g);
+    }
+  }
+  for (int i = lane; i < grid.far; i += 32) {
+    const int g = room.far[i];
+    if (may_meet(own, room.reach[g]) && may_touch(s, f, g)) visit(g);
+  }
+}
+
 /// A warp for each facet: the facets that it may touch.
-__global__ void find_near(const CudaLooks s, const CudaSearchRoom room) {
+__global__ void __launch_bounds__(kThreads)
+    find_near(const CudaLooks s, const CudaSearchRoom room) {
   const int f = thread_index() / 32, lane = static_cast<int>(threadIdx.x) % 32;
   if (f >= s.facet_count || !lists_wanted(s)) return;
   const Grid grid(s, room);
-  const float reach = reach_of(s, f) + __uint_as_float(s.figures->largest_reach);
-  int lowest[3], size[3];
-  for (int a = 0; a < 3; ++a) {
-    lowest[a] = grid.cell(s.motion[f].x[a] - reach);
-    size[a] = grid.cell(s.motion[f].x[a] + reach) - lowest[a] + 1;
-  }
-  const auto for_each = [&](const auto& visit) {
-    for (int i = lane; i < size[0] * size[1] * size[2]; i += 32) {
-      const int x = lowest[0] + i % size[0], y = lowest[1] + i / size[0] % size[1],
-                z = lowest[2] + i / size[0] / size[1];
-      for (int g = room.heads[grid.bucket(x, y, z)]; g >= 0; g = room.next[g]) {
-        const float* at = s.motion[g].x;
-        if (g == f || grid.cell(at[0]) != x || grid.cell(at[1]) != y || grid.cell(at[2]) != z) {
-          continue;
-        }
-        if (may_touch(s, f, g)) visit(g);
-      }
-    }
-  };
   int count = 0;
-  for_each([&](int) { ++count; });
+  if (s.takes_part[f] != 0) for_each_near(s, room, grid, f, lane, [&](int) { ++count; });
   int end = count;  // of this lane's among all
   for (int step = 1; step < 32; step *= 2) {
     const int before = __shfl_up_sync(0xffffffffu, end, step);
@@ -236,7 +302,7 @@ __global__ void find_near(const CudaLooks s, const CudaSearchRoom room) {
   if (all == 0 || static_cast<std::size_t>(first) + 2 * all > s.near_capacity) return;
   std::int32_t* unsorted = s.near + first + all;
   int to = end - count;
-  for_each([&](int g) { unsorted[to++] = g; });
+  for_each_near(s, room, grid, f, lane, [&](int g) { unsorted[to++] = g; });
   __syncwarp();
   for (int i = lane; i < all; i += 32) {
     int rank = 0;
@@ -324,7 +390,10 @@ void launch_fresh_contacts(const CudaLooks& looks, cudaStream_t stream) {
 void launch_search(const CudaLooks& looks, const CudaNodes& state, const CudaSearchRoom& room,
                    bool anew, cudaStream_t stream) {
   const int blocks = blocks_for(looks.facet_count);
-  move_facets<<<blocks, kThreads, 0, stream>>>(looks, state, room.sums);
+  check_cuda(cudaMemsetAsync(looks.figures->box, 0, sizeof(looks.figures->box), stream),
+             "clear memory");
+  move_facets<<<blocks, kThreads, 0, stream>>>(looks, state);
+  sum_facets<<<blocks, kThreads, 0, stream>>>(looks, room.sums);
   sum_up<<<1, kThreads, 0, stream>>>(looks, room.sums, blocks, anew);
   find_fastest<<<blocks, kThreads, 0, stream>>>(looks);
   check_lists<<<blocks, kThreads, 0, stream>>>(looks);
@@ -335,7 +404,7 @@ void launch_search(const CudaLooks& looks, const CudaNodes& state, const CudaSea
 void launch_lists(const CudaLooks& looks, const CudaSearchRoom& room, cudaStream_t stream) {
   const int blocks = blocks_for(looks.facet_count);
   clear_lists<<<blocks, kThreads, 0, stream>>>(looks, room);
-  list_facets<<<blocks, kThreads, 0, stream>>>(looks);
+  list_facets<<<blocks, kThreads, 0, stream>>>(looks, room);
   fill_grid<<<blocks, kThreads, 0, stream>>>(looks, room);
   find_near<<<blocks_for(32 * looks.facet_count), kThreads, 0, stream>>>(looks, room);
   list_contacts<<<blocks, kThreads, 0, stream>>>(looks);

@@ -11,6 +11,8 @@ namespace tissue_sim {
 /// Room that a search works in.
 struct CudaSearchRoom {
   double* sums;         ///< of search_sums(facets) numbers
+  float4* reach;        ///< per facet: place and how far it reaches [m]
+  std::int32_t* far;    ///< facets that reach far
   std::int32_t* heads;  ///< [buckets], a power of two: of the facets in each
   std::int32_t* next;   ///< per facet: another in its bucket, -1 if none
   std::int32_t buckets;

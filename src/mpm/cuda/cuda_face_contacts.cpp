@@ -85,7 +85,7 @@ void CudaMpmTissue::upload_facets() {
     const Block& block = *state_->blocks.all[b];
     CudaFacet* to = f.host_facets.data() + faces.first_facet[b];
     for (const Facet& facet : block.facets) {
-      *to = facet_on_device(*state_, block, facet, d.first_slot[b]);
+      *to = facet_on_device(*state_, block, facet, d.host_tables.first_slot[b]);
       const std::int32_t piece = pieces_.of_point[facet.point];
       to->piece = {piece, size[piece]};
       ++to;
@@ -101,19 +101,20 @@ void CudaMpmTissue::upload_facets() {
   f.listed.resize(count);
   f.springs.resize(count);
   for (auto* of_facet :
-       {&f.first_near, &f.near_count, &f.contacts, &f.involved, &f.active, &f.next, &f.far}) {
+       {&f.first_near, &f.near_count, &f.contacts, &f.involved, &f.active, &f.rank}) {
     of_facet->resize(count);
   }
   f.is_involved.resize(count);
   f.takes_part.resize(count);
-  f.reach.resize(count);
+  f.sorted.resize(count);
   f.marks.resize(d.u[0].size());
   f.figures.resize(1);
   f.host_figures.resize(1);
   f.sums.resize(search_sums(static_cast<int>(count)));
   std::size_t buckets = 1024;
   while (buckets < 2 * count) buckets *= 2;
-  f.heads.resize(buckets);
+  f.bucket_begin.resize(buckets);
+  f.bucket_count.resize(buckets);
   f.near.resize(std::max(f.near.size(), 8 * count));
   launch_fresh_contacts(looks(), d.stream);
 }
@@ -157,9 +158,9 @@ void CudaMpmTissue::search_faces(float dt) {
   faces.until_search = kHorizon;
   f.contacts_count = 0;
   if (f.facets.size() == 0) return;
-  const CudaSearchRoom room{f.sums.data(), f.reach.data(),
-                            f.far.data(),  f.heads.data(),
-                            f.next.data(), static_cast<std::int32_t>(f.heads.size())};
+  const CudaSearchRoom room{f.sums.data(),         static_cast<std::int32_t>(f.bucket_count.size()),
+                            f.bucket_begin.data(), f.bucket_count.data(),
+                            f.rank.data(),         f.sorted.data()};
   const CudaFaceFigures& figures = f.host_figures[0];
   const auto read = [&] {
     f.figures.download(f.host_figures.data(), 1, d.stream);
@@ -214,26 +215,32 @@ void CudaMpmTissue::pull_contacts() {
   faces.all.clear();
   faces.active.clear();
   if (f.version != faces.version || f.contacts_count == 0 || f.searched) return;
-  f.figures.download(f.host_figures.data(), 1, d.stream);
-  check_cuda(cudaStreamSynchronize(d.stream), "send contacts");
-  const int count = f.host_figures[0].active;
+  const int count = f.contacts_count;
   f.gathered.resize(count);
-  launch_gather_active(looks(), count, f.gathered.data(), d.stream);
+  launch_gather_contacts(looks(), count, f.gathered.data(), d.stream);
   std::vector<FaceSpring> springs(count);
   f.gathered.download(springs.data(), count, d.stream);
+  f.figures.download(f.host_figures.data(), 1, d.stream);
+  check_cuda(cudaStreamSynchronize(d.stream), "send contacts");
+  std::vector<std::int32_t> active(f.host_figures[0].active);
+  f.active.download(active.data(), active.size(), d.stream);
   check_cuda(cudaStreamSynchronize(d.stream), "send contacts");
   std::sort(springs.begin(), springs.end(),
             [](const FaceSpring& a, const FaceSpring& b) { return a.facet < b.facet; });
-  faces.all.resize(count);
-  for (int i = 0; i < count; ++i) {
-    FaceContact& c = faces.all[i];
-    static_cast<FaceSpring&>(c) = springs[i];
+  std::sort(active.begin(), active.end());
+  for (const FaceSpring& spring : springs) {
+    if (spring.other < 0) continue;
+    FaceContact c;
+    static_cast<FaceSpring&>(c) = spring;
     const Facet &own = facet_of(*state_, c.facet), &other = facet_of(*state_, c.other);
     c.nodes = CellNodes(block_of(*state_, c.facet), own.cell);
     c.weights = AxisWeights(own.center);
     c.other_nodes = CellNodes(block_of(*state_, c.other), other.cell);
     c.other_weights = AxisWeights(c.hold);
-    faces.active.push_back(i);
+    if (std::binary_search(active.begin(), active.end(), c.facet)) {
+      faces.active.push_back(static_cast<std::int32_t>(faces.all.size()));
+    }
+    faces.all.push_back(c);
   }
   faces.until_look = f.host_figures[0].until_look;
   faces.since_look = f.host_figures[0].since_look;

@@ -60,7 +60,7 @@ void CudaMpmTissue::pull_nodes() {
   unpack_nodes(d.host_nodes.data(), d.host_nodes.data() + n, state_->nodes);
 }
 
-HostTables CudaMpmTissue::plan_tables() {
+void CudaMpmTissue::plan_tables() {
   OnDevice& d = *device_;
   d.plan.threads = d.shape.threads;
   d.plan.small = d.shape.small;
@@ -87,15 +87,17 @@ HostTables CudaMpmTissue::plan_tables() {
     d.face_resident = resident_blocks(d.face_plan, static_cast<int>(count));
   };
   choose(blocks.size());
-  std::vector<std::vector<int>> bundles = bundle_blocks(blocks, blocks.size(), {});
+  std::vector<std::vector<int>> bundles = single_blocks(blocks.size());
   if (d.plan.small && !(d.plan.cached && d.face_plan.cached)) {
     const auto at_once =
         static_cast<std::size_t>(std::min(cached_at_once(d.plan), cached_at_once(d.face_plan)));
     std::vector<std::vector<int>> fewer = bundle_blocks(
-        blocks, at_once, {d.plan.threads / 2, d.plan.threads, most_cached_slots(d.face_plan)});
+        blocks, at_once, {d.plan.threads / 2, d.plan.threads, most_cached_slots(d.face_plan)},
+        *state_->cpu);
     if (fewer.size() <= at_once) bundles = std::move(fewer);
   }
-  HostTables t = make_tables(*state_, bundles);
+  HostTables& t = d.host_tables;
+  make_tables(*state_, bundles, t);
   d.plan.max_slots = t.max_slots;
   choose(bundles.size());
   d.all_plain = std::all_of(t.bundles.begin(), t.bundles.end(),
@@ -103,12 +105,12 @@ HostTables CudaMpmTissue::plan_tables() {
   if (d.resident == 0 || d.plain_resident == 0 || d.face_resident == 0) {
     throw std::runtime_error("the GPU has too little shared memory");
   }
-  return t;
 }
 
 void CudaMpmTissue::push() {
   OnDevice& d = *device_;
-  const HostTables t = plan_tables();
+  plan_tables();
+  const HostTables& t = d.host_tables;
   const std::size_t n = state_->nodes.size();
   const auto points = static_cast<std::size_t>(state_->points.size());
   const Scene& scene = state_->scene;
@@ -120,11 +122,6 @@ void CudaMpmTissue::push() {
   check_memory(bytes_of(t, n, points, pushes, d.held_by), device_bytes());
   check_cuda(cudaStreamSynchronize(d.stream), "finish a frame");
   d.blocks.upload(t.blocks, d.stream);
-  d.of_host = t.of_host;
-  d.first_slot.resize(t.blocks.size());
-  for (std::size_t b = 0; b < t.blocks.size(); ++b) {
-    d.first_slot[t.of_host[b]] = t.blocks[b].first_slot;
-  }
   d.bundles.upload(t.bundles, d.stream);
   d.columns.upload(t.columns, d.stream);
   d.push_stride = t.max_halves;
@@ -152,10 +149,11 @@ void CudaMpmTissue::push() {
   d.arrived.resize(2);
   d.host_nodes.resize(2 * n);
   pack_nodes(state_->nodes, d.host_nodes.data(), d.host_nodes.data() + n);
-  for (int i = 0; i < 2; ++i) {
-    d.u[i].upload(d.host_nodes.data(), n, d.stream);
-    d.v[i].upload(d.host_nodes.data() + n, n, d.stream);
-  }
+  d.u[d.current].upload(d.host_nodes.data(), n, d.stream);
+  d.v[d.current].upload(d.host_nodes.data() + n, n, d.stream);
+  // What no block moves, the other state has, too.
+  d.u[1 - d.current].copy(d.u[d.current], d.stream);
+  d.v[1 - d.current].copy(d.v[d.current], d.stream);
   check_cuda(cudaStreamSynchronize(d.stream), "receive data");
   d.points_changed = true;
 }

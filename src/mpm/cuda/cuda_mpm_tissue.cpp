@@ -209,11 +209,11 @@ void CudaMpmTissue::finish_measure() {
     result_.elastic_energy += m.elastic_energy;
     result_.kinetic_energy += m.kinetic_energy;
     if (!(m.speed <= result_.max_speed)) result_.max_speed = m.speed;
-    const Block& block = *state_->blocks.all[d.of_host[i]];
+    const Block& block = *state_->blocks.all[d.host_tables.of_host[i]];
     float& stiffening = stiffening_[block.body][block.material];
     stiffening = std::max(stiffening, m.stiffening);
     result_.blew_up = result_.blew_up || m.finite == 0 || m.stiffening > 1e6f;
-    state_->motion[d.of_host[i]] = {
+    state_->motion[d.host_tables.of_host[i]] = {
         {Vec3(m.min[0], m.min[1], m.min[2]), Vec3(m.max[0], m.max[1], m.max[2])}, m.speed};
   }
   // Nothing that instruments do moves tissue at the speed of a bullet; what does is out of control.

@@ -13,7 +13,6 @@ namespace tissue_sim {
 
 struct CudaFaces;
 struct CudaLooks;
-struct HostTables;
 
 /// The nodes live on the GPU; lattice, bonds, blocks and pieces on the host too, where cuts are
 /// made between frames.
@@ -35,9 +34,9 @@ class CudaMpmTissue final : public Tissue {
 
   // For tests and the benchmark.
   int fragment_of(int point) const { return pieces_.of_point[point]; }
-  /// The host's copy, whose nodes and active contacts are as pull() left them or later.
+  /// The host's copy, whose nodes and contacts are as pull() left them or later.
   MpmState& state() { return *state_; }
-  void pull();  ///< nodes and active contacts from the GPU
+  void pull();  ///< nodes and contacts from the GPU
   void push();  ///< everything but contacts to the GPU
   const Pieces& pieces() const { return pieces_; }
   void search_anew();  ///< lists of facets that may touch are made anew before the next substep
@@ -49,7 +48,7 @@ class CudaMpmTissue final : public Tissue {
  private:
   struct OnDevice;
 
-  HostTables plan_tables();  ///< how the blocks are worked on, and the tables for it
+  void plan_tables();  ///< how the blocks are worked on, and the tables for it
   void cut(const std::vector<BladePath>& paths, const Array<float>* u_before,
            const std::vector<BlockMotion>& before, CutReport& report);
   void cut_by_blades(const std::vector<BlockMotion>& before);

@@ -45,10 +45,9 @@ struct CudaFaceFigures {
   float since_look;         ///< the same
   unsigned fastest;         ///< facet against the mean [m/s]
   unsigned largest_reach;   ///< [m]
-  unsigned ordinary_reach;  ///< the largest of facets that do not reach far [m]
   unsigned fastest_pair;    ///< of the last look [m/s]
   int listed_anew;          ///< whether the lists no longer held
-  int reach_far;            ///< facets that do
+  int in_grid;              ///< facets there
   int near;                 ///< places wanted in CudaLooks::near
   int contacts, involved;   ///< facets with any in their list; these, and those in lists
   int active;               ///< contacts that touch, or may before the next look

@@ -20,8 +20,8 @@ struct FacesOnDevice {
   PinnedArray<CudaFaceFigures> host_figures;  ///< as of the last search
   /// See CudaSearchRoom.
   DeviceArray<double> sums;
-  DeviceArray<float4> reach;
-  DeviceArray<std::int32_t> far, heads, next;
+  DeviceArray<std::int32_t> bucket_begin, bucket_count, rank;
+  DeviceArray<CudaSeeker> sorted;
 
   DeviceArray<long long> force;  ///< CudaFaces::force
   DeviceArray<KeptContact> kept;
@@ -38,8 +38,8 @@ struct FacesOnDevice {
            point_at.bytes() + first_near.bytes() + near_count.bytes() + near.bytes() +
            contacts.bytes() + involved.bytes() + active.bytes() + is_involved.bytes() +
            takes_part.bytes() + marks.bytes() + nodes.bytes() + figures.bytes() + sums.bytes() +
-           reach.bytes() + far.bytes() + heads.bytes() + next.bytes() + force.bytes() +
-           kept.bytes() + gathered.bytes();
+           bucket_begin.bytes() + bucket_count.bytes() + rank.bytes() + sorted.bytes() +
+           force.bytes() + kept.bytes() + gathered.bytes();
   }
 };
 

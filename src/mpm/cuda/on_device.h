@@ -22,8 +22,7 @@ struct CudaMpmTissue::OnDevice {
   std::string gpu;  ///< name
 
   DeviceArray<CudaBlock> blocks;
-  std::vector<int> of_host;     ///< HostTables::of_host
-  std::vector<int> first_slot;  ///< per block: CudaBlock::first_slot
+  HostTables host_tables;  ///< as they went up
   DeviceArray<CudaBundle> bundles;
   DeviceArray<CudaColumn> columns;
   DeviceArray<HalfPush> pushes;  ///< CudaFrame::pushes

@@ -10,10 +10,6 @@ namespace {
 constexpr int kThreads = 128;
 constexpr int kSums =
     7;  // of a thread block: velocities, ways since the facets were listed, facets
-// Facets that reach further than this are not in the grid, as long as they are few [cells].
-constexpr float kFar = 1.25f;
-constexpr int kFewFar = 1024;
-
 int blocks_for(int n) { return (n + kThreads - 1) / kThreads; }
 
 __device__ __forceinline__ int thread_index() {
@@ -36,6 +32,16 @@ __device__ __forceinline__ unsigned in_order(float value) {
 }
 __device__ __forceinline__ float from_order(unsigned bits) {
   return __uint_as_float((bits & 0x80000000u) != 0 ? bits & 0x7fffffffu : ~bits);
+}
+
+/// Sum over the lanes up to this one.
+__device__ __forceinline__ int sum_up_to(int value, int lane) {
+#pragma unroll
+  for (int step = 1; step < 32; step *= 2) {
+    const int before = __shfl_up_sync(0xffffffffu, value, step);
+    if (lane >= step) value += before;
+  }
+  return value;
 }
 
 /// Largest over a warp and all warps.
@@ -161,53 +167,37 @@ __device__ __forceinline__ bool lists_wanted(const CudaLooks& s) {
 __global__ void clear_lists(const CudaLooks s, const CudaSearchRoom room) {
   if (!lists_wanted(s)) return;
   const int first = thread_index(), step = static_cast<int>(gridDim.x * blockDim.x);
-  for (int i = first; i < room.buckets; i += step) room.heads[i] = -1;
+  for (int i = first; i < room.buckets; i += step) room.count[i] = 0;
   for (std::size_t i = first; i < s.node_count; i += step) s.marks[i] = 0;
   if (first != 0) return;
   CudaFaceFigures& figures = *s.figures;
-  figures.largest_reach = figures.ordinary_reach = 0;
-  figures.reach_far = figures.near = figures.contacts = figures.involved = 0;
+  figures.largest_reach = 0;
+  figures.in_grid = figures.near = figures.contacts = figures.involved = 0;
 }
 
-__global__ void list_facets(const CudaLooks s, const CudaSearchRoom room) {
+__global__ void list_facets(const CudaLooks s) {
   const int f = thread_index();
   if (!lists_wanted(s)) return;
   float reach = 0;
-  bool far = false;
   if (f < s.facet_count) {
-    const bool takes_part = s.takes_part[f] != 0;
-    const float* x = s.motion[f].x;
     ListedFacet& listed = s.listed[f];
-    for (int a = 0; a < 3; ++a) listed.x[a] = x[a];
-    listed.skin = takes_part ? travel_of(s, f) + kSkin * s.cell_size : -1.0f;
-    reach = takes_part ? kSearchReach * s.cell_size + listed.skin : 0.0f;
-    room.reach[f] = {x[0], x[1], x[2], reach};
+    for (int a = 0; a < 3; ++a) listed.x[a] = s.motion[f].x[a];
+    listed.skin = s.takes_part[f] != 0 ? travel_of(s, f) + kSkin * s.cell_size : -1.0f;
     s.is_involved[f] = 0;
-    far = reach > kFar * s.cell_size;
-    if (far) room.far[atomicAdd(&s.figures->reach_far, 1)] = f;
+    if (s.takes_part[f] != 0) reach = kSearchReach * s.cell_size + listed.skin;
   }
   take_largest(__float_as_uint(reach), &s.figures->largest_reach);
-  take_largest(far ? 0 : __float_as_uint(reach), &s.figures->ordinary_reach);
 }
 
-/// A hash grid whose cells are so large that ordinary facets meet others in their own and the next
-/// alone; those that reach far are beside it, if they are few.
+/// A hash grid whose cells are so large that facets meet others in their own and the next alone.
 struct Grid {
-  float per_metre, reach;  // of those in the grid [m]
+  float reach, per_metre;  // the largest of all [m], [1/m]
   std::uint32_t mask;
-  int far;  // how many are beside it
 
   __device__ __forceinline__ Grid(const CudaLooks& s, const CudaSearchRoom& room) {
-    const CudaFaceFigures& figures = *s.figures;
-    far = figures.reach_far <= kFewFar ? figures.reach_far : 0;
-    reach = __uint_as_float(figures.reach_far <= kFewFar ? figures.ordinary_reach
-                                                         : figures.largest_reach);
-    reach = fmaxf(reach, kSearchReach * s.cell_size);
+    reach = __uint_as_float(s.figures->largest_reach);
     per_metre = 0.5f / reach;
     mask = static_cast<std::uint32_t>(room.buckets) - 1;
-  }
-  __device__ __forceinline__ bool holds(float reach_of_facet) const {
-    return reach_of_facet > 0 && reach_of_facet <= reach;
   }
   __device__ __forceinline__ int cell(float x) const {
     return static_cast<int>(floorf(x * per_metre));
@@ -218,21 +208,35 @@ struct Grid {
                             static_cast<std::uint32_t>(z) * 83492791u;
     return (h ^ h >> 15) & mask;
   }
+  __device__ __forceinline__ std::uint32_t bucket_at(const float* x) const {
+    return bucket(cell(x[0]), cell(x[1]), cell(x[2]));
+  }
 };
+
+__global__ void count_in_grid(const CudaLooks s, const CudaSearchRoom room) {
+  const int f = thread_index();
+  if (f >= s.facet_count || !lists_wanted(s) || s.takes_part[f] == 0) return;
+  room.rank[f] = atomicAdd(room.count + Grid(s, room).bucket_at(s.motion[f].x), 1);
+}
+
+/// Gives the buckets their places, in any order: those of a warp one after the other.
+__global__ void place_buckets(const CudaLooks s, const CudaSearchRoom room) {
+  const int i = thread_index(), lane = static_cast<int>(threadIdx.x) % 32;
+  if (!lists_wanted(s)) return;
+  const int count = i < room.buckets ? room.count[i] : 0;
+  const int end = sum_up_to(count, lane);
+  int first = 0;
+  if (lane == 31 && end > 0) first = atomicAdd(&s.figures->in_grid, end);
+  first = __shfl_sync(0xffffffffu, first, 31);
+  if (i < room.buckets) room.begin[i] = first + end - count;
+}
 
 __global__ void fill_grid(const CudaLooks s, const CudaSearchRoom room) {
   const int f = thread_index();
-  if (f >= s.facet_count || !lists_wanted(s)) return;
-  const Grid grid(s, room);
-  const float4 x = room.reach[f];
-  if (!grid.holds(x.w)) return;
-  const std::uint32_t bucket = grid.bucket(grid.cell(x.x), grid.cell(x.y), grid.cell(x.z));
-  room.next[f] = atomicExch(room.heads + bucket, f);
-}
-
-__device__ __forceinline__ bool may_meet(const float4& a, const float4& b) {
-  const float far = a.w + b.w;
-  return fabsf(a.x - b.x) < far && fabsf(a.y - b.y) < far && fabsf(a.z - b.z) < far;
+  if (f >= s.facet_count || !lists_wanted(s) || s.takes_part[f] == 0) return;
+  const float* x = s.motion[f].x;
+  CudaSeeker seeker = {{x[0], x[1], x[2]}, kSearchReach * s.cell_size + s.listed[f].skin, f};
+  room.sorted[room.begin[Grid(s, room).bucket_at(x)] + room.rank[f]] = seeker;
 }
 
 /// Whether a facet touches another that may meet it: they face one another, and no bonds bind them.
@@ -253,32 +257,41 @@ __device__ __forceinline__ bool may_touch(const CudaLooks& s, int f, int g) {
 template <class F>
 __device__ __forceinline__ void for_each_near(const CudaLooks& s, const CudaSearchRoom& room,
                                               const Grid& grid, int f, int lane, const F& visit) {
-  const float4 own = room.reach[f];
-  const float at[3] = {own.x, own.y, own.z}, reach = own.w + grid.reach;
+  const float* x = s.motion[f].x;
+  const float own_reach = kSearchReach * s.cell_size + s.listed[f].skin;
   int lowest[3], size[3];
   for (int a = 0; a < 3; ++a) {
-    lowest[a] = grid.cell(at[a] - reach);
-    size[a] = grid.cell(at[a] + reach) - lowest[a] + 1;
+    lowest[a] = grid.cell(x[a] - own_reach - grid.reach);
+    size[a] = grid.cell(x[a] + own_reach + grid.reach) - lowest[a] + 1;
   }
-  for (int i = lane; i < size[0] * size[1] * size[2]; i += 32) {
-    const int x = lowest[0] + i % size[0], y = lowest[1] + i / size[0] % size[1],
-              z = lowest[2] + i / size[0] / size[1];
-    for (int g = room.heads[grid.bucket(x, y, z)]; g >= 0; g = room.next[g]) {
-      const float4 other = room.reach[g];
-      if (!may_meet(own, other) || grid.cell(other.x) != x || grid.cell(other.y) != y ||
-          grid.cell(other.z) != z) {
-        continue;
+  const int cells = size[0] * size[1] * size[2];
+  for (int first = 0; first < cells; first += 32) {
+    const int i = first + lane;
+    const int cx = lowest[0] + i % size[0], cy = lowest[1] + i / size[0] % size[1],
+              cz = lowest[2] + i / size[0] / size[1];
+    const std::uint32_t bucket = grid.bucket(cx, cy, cz);
+    const int count = i < cells ? room.count[bucket] : 0;
+    const int begin = count > 0 ? room.begin[bucket] : 0;
+    for (unsigned left = __ballot_sync(0xffffffffu, count > 0); left != 0; left &= left - 1) {
+      const int from = __ffs(static_cast<int>(left)) - 1;
+      const int cell[3] = {__shfl_sync(0xffffffffu, cx, from), __shfl_sync(0xffffffffu, cy, from),
+                           __shfl_sync(0xffffffffu, cz, from)};
+      const int at = __shfl_sync(0xffffffffu, begin, from),
+                end = at + __shfl_sync(0xffffffffu, count, from);
+      for (int j = at + lane; j < end; j += 32) {
+        const CudaSeeker other = room.sorted[j];
+        const float far = own_reach + other.reach;
+        bool meets = true;
+        for (int a = 0; a < 3; ++a) {
+          meets = meets && fabsf(x[a] - other.x[a]) < far && grid.cell(other.x[a]) == cell[a];
+        }
+        if (meets && may_touch(s, f, other.facet)) visit(other.facet);
       }
-      if (may_touch(s, f, g)) visit(g);
     }
-  }
-  for (int i = lane; i < grid.far; i += 32) {
-    const int g = room.far[i];
-    if (may_meet(own, room.reach[g]) && may_touch(s, f, g)) visit(g);
   }
 }
 
-/// A warp for each facet: the facets that it may touch.
+/// A warp for each facet: the facets that it may touch, and what becomes of its contact.
 __global__ void __launch_bounds__(kThreads)
     find_near(const CudaLooks s, const CudaSearchRoom room) {
   const int f = thread_index() / 32, lane = static_cast<int>(threadIdx.x) % 32;
@@ -286,20 +299,26 @@ __global__ void __launch_bounds__(kThreads)
   const Grid grid(s, room);
   int count = 0;
   if (s.takes_part[f] != 0) for_each_near(s, room, grid, f, lane, [&](int) { ++count; });
-  int end = count;  // of this lane's among all
-  for (int step = 1; step < 32; step *= 2) {
-    const int before = __shfl_up_sync(0xffffffffu, end, step);
-    if (lane >= step) end += before;
-  }
+  const int end = sum_up_to(count, lane);  // of this lane's among all
   const int all = __shfl_sync(0xffffffffu, end, 31);
-  int first = 0;  // each list has twice the places, to be sorted in
-  if (lane == 0 && all > 0) first = atomicAdd(&s.figures->near, 2 * all);
-  first = __shfl_sync(0xffffffffu, first, 0);
-  if (lane == 0) {
-    s.first_near[f] = first;
-    s.near_count[f] = all;
+  if (lane == 0) s.near_count[f] = all;
+  if (all == 0) {
+    if (lane == 0) {
+      s.springs[f].other = -1;
+      s.springs[f].touching = false;
+    }
+    return;
   }
-  if (all == 0 || static_cast<std::size_t>(first) + 2 * all > s.near_capacity) return;
+  int first = 0;  // each list has twice the places, to be sorted in
+  if (lane == 0) {
+    first = atomicAdd(&s.figures->near, 2 * all);
+    s.first_near[f] = first;
+    s.contacts[atomicAdd(&s.figures->contacts, 1)] = f;
+    s.is_involved[f] = 1;
+    if (s.springs[f].other >= 0) s.is_involved[s.springs[f].other] = 1;
+  }
+  first = __shfl_sync(0xffffffffu, first, 0);
+  if (static_cast<std::size_t>(first) + 2 * all > s.near_capacity) return;
   std::int32_t* unsorted = s.near + first + all;
   int to = end - count;
   for_each_near(s, room, grid, f, lane, [&](int g) { unsorted[to++] = g; });
@@ -308,29 +327,13 @@ __global__ void __launch_bounds__(kThreads)
     int rank = 0;
     for (int j = 0; j < all; ++j) rank += unsorted[j] < unsorted[i] ? 1 : 0;
     s.near[first + rank] = unsorted[i];
+    s.is_involved[unsorted[i]] = 1;
   }
 }
 
 /// Whether lists were made.
 __device__ __forceinline__ bool lists_made(const CudaLooks& s) {
   return lists_wanted(s) && static_cast<std::size_t>(s.figures->near) <= s.near_capacity;
-}
-
-/// Contacts go on, begin, or end.
-__global__ void list_contacts(const CudaLooks s) {
-  const int f = thread_index();
-  if (f >= s.facet_count || !lists_made(s)) return;
-  FaceSpring& c = s.springs[f];
-  const int count = s.near_count[f];
-  if (count == 0) {
-    c.other = -1;
-    c.touching = false;
-    return;
-  }
-  s.contacts[atomicAdd(&s.figures->contacts, 1)] = f;
-  s.is_involved[f] = 1;
-  if (c.other >= 0) s.is_involved[c.other] = 1;
-  for (int i = 0; i < count; ++i) s.is_involved[s.near[s.first_near[f] + i]] = 1;
 }
 
 /// Facets that looks ask for, and the nodes that contacts may push.
@@ -369,9 +372,9 @@ __global__ void take_up_kept(const CudaLooks s, const CudaNodes state, const Kep
   if (threadIdx.x % 32 == 0) at = c;
 }
 
-__global__ void gather_active(const CudaLooks s, int count, FaceSpring* out) {
+__global__ void gather_contacts(const CudaLooks s, int count, FaceSpring* out) {
   const int i = thread_index();
-  if (i < count) out[i] = s.springs[s.active[i]];
+  if (i < count) out[i] = s.springs[s.contacts[i]];
 }
 
 void check_launch() { check_cuda(cudaGetLastError(), "start a kernel"); }
@@ -404,10 +407,11 @@ void launch_search(const CudaLooks& looks, const CudaNodes& state, const CudaSea
 void launch_lists(const CudaLooks& looks, const CudaSearchRoom& room, cudaStream_t stream) {
   const int blocks = blocks_for(looks.facet_count);
   clear_lists<<<blocks, kThreads, 0, stream>>>(looks, room);
-  list_facets<<<blocks, kThreads, 0, stream>>>(looks, room);
+  list_facets<<<blocks, kThreads, 0, stream>>>(looks);
+  count_in_grid<<<blocks, kThreads, 0, stream>>>(looks, room);
+  place_buckets<<<blocks_for(room.buckets), kThreads, 0, stream>>>(looks, room);
   fill_grid<<<blocks, kThreads, 0, stream>>>(looks, room);
   find_near<<<blocks_for(32 * looks.facet_count), kThreads, 0, stream>>>(looks, room);
-  list_contacts<<<blocks, kThreads, 0, stream>>>(looks);
   list_involved<<<blocks, kThreads, 0, stream>>>(looks);
   check_launch();
 }
@@ -420,9 +424,10 @@ void launch_take_up(const CudaLooks& looks, const CudaNodes& state, const KeptCo
   check_launch();
 }
 
-void launch_gather_active(const CudaLooks& looks, int count, FaceSpring* out, cudaStream_t stream) {
+void launch_gather_contacts(const CudaLooks& looks, int count, FaceSpring* out,
+                            cudaStream_t stream) {
   if (count == 0) return;
-  gather_active<<<blocks_for(count), kThreads, 0, stream>>>(looks, count, out);
+  gather_contacts<<<blocks_for(count), kThreads, 0, stream>>>(looks, count, out);
   check_launch();
 }
 

@@ -8,14 +8,19 @@
 
 namespace tissue_sim {
 
+/// A facet in a grid.
+struct alignas(16) CudaSeeker {
+  float x[3], reach;  ///< place and half size of the box that it looks around in [m]
+  std::int32_t facet;
+};
+
 /// Room that a search works in.
 struct CudaSearchRoom {
-  double* sums;         ///< of search_sums(facets) numbers
-  float4* reach;        ///< per facet: place and how far it reaches [m]
-  std::int32_t* far;    ///< facets that reach far
-  std::int32_t* heads;  ///< [buckets], a power of two: of the facets in each
-  std::int32_t* next;   ///< per facet: another in its bucket, -1 if none
-  std::int32_t buckets;
+  double* sums;                 ///< of search_sums(facets) numbers
+  std::int32_t buckets;         ///< of a hash grid, a power of two
+  std::int32_t *begin, *count;  ///< per bucket: the facets in it, from `begin` on in `sorted`
+  std::int32_t* rank;           ///< per facet: in its bucket
+  CudaSeeker* sorted;
 };
 std::size_t search_sums(int facet_count);
 
@@ -34,7 +39,8 @@ void launch_lists(const CudaLooks& looks, const CudaSearchRoom& room, cudaStream
 void launch_take_up(const CudaLooks& looks, const CudaNodes& state, const KeptContact* kept,
                     int kept_count, int contact_count, float dt, cudaStream_t stream);
 
-/// Copies the active contacts, in any order.
-void launch_gather_active(const CudaLooks& looks, int count, FaceSpring* out, cudaStream_t stream);
+/// Copies the springs of CudaLooks::contacts.
+void launch_gather_contacts(const CudaLooks& looks, int count, FaceSpring* out,
+                            cudaStream_t stream);
 
 }  // namespace tissue_sim

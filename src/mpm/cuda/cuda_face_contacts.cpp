@@ -108,6 +108,7 @@ void CudaMpmTissue::upload_facets() {
   f.takes_part.resize(count);
   f.sorted.resize(count);
   f.marks.resize(d.u[0].size());
+  f.pushed_parts.resize(d.slot_parts.size());
   f.figures.resize(1);
   f.host_figures.resize(1);
   f.sums.resize(search_sums(static_cast<int>(count)));
@@ -145,6 +146,9 @@ CudaLooks CudaMpmTissue::looks() const {
   s.nodes = f.nodes.data();
   s.marks = f.marks.data();
   s.node_count = f.marks.size();
+  s.slot_parts = d.slot_parts.data();
+  s.pushed_parts = f.pushed_parts.data();
+  s.slot_count = d.slot_parts.size();
   s.figures = f.figures.data();
   return s;
 }
@@ -201,7 +205,6 @@ CudaFaces CudaMpmTissue::faces_of_launch() {
   if (!out.any) return out;
   out.look_first = std::exchange(f.searched, false);
   out.looks = looks();
-  out.marks = f.marks.data();
   out.force = f.force.data();
   out.stride = f.force.size() / 3;
   f.force.clear(d.stream);

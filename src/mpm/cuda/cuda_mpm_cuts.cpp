@@ -57,7 +57,7 @@ void CudaMpmTissue::pull_nodes() {
   d.u[d.current].download(d.host_nodes.data(), n, d.stream);
   d.v[d.current].download(d.host_nodes.data() + n, n, d.stream);
   check_cuda(cudaStreamSynchronize(d.stream), "finish a frame");
-  unpack_nodes(d.host_nodes.data(), d.host_nodes.data() + n, state_->nodes);
+  unpack_nodes(d.host_nodes.data(), d.host_nodes.data() + n, *state_->cpu, state_->nodes);
 }
 
 void CudaMpmTissue::plan_tables() {
@@ -88,13 +88,18 @@ void CudaMpmTissue::plan_tables() {
   };
   choose(blocks.size());
   std::vector<std::vector<int>> bundles = single_blocks(blocks.size());
-  if (d.plan.small && !(d.plan.cached && d.face_plan.cached)) {
-    const auto at_once =
-        static_cast<std::size_t>(std::min(cached_at_once(d.plan), cached_at_once(d.face_plan)));
-    std::vector<std::vector<int>> fewer = bundle_blocks(
-        blocks, at_once, {d.plan.threads / 2, d.plan.threads, most_cached_slots(d.face_plan)},
-        *state_->cpu);
-    if (fewer.size() <= at_once) bundles = std::move(fewer);
+  if (!(d.plan.cached && d.face_plan.cached)) {
+    // As many as whole tissue has, or, of a small one, as run at once.
+    const auto at_once = static_cast<std::size_t>(
+        std::max(1, std::min(most_at_once(d.plan), most_at_once(d.face_plan))));
+    const std::size_t rounds = (state_->blocks.regions.size() + at_once - 1) / at_once;
+    const std::size_t wanted = d.plan.small ? at_once : rounds * at_once;
+    if (blocks.size() > wanted) {
+      std::vector<std::vector<int>> fewer = bundle_blocks(
+          blocks, wanted, {d.plan.threads / 2, d.plan.threads, most_slots(d.face_plan)},
+          *state_->cpu);
+      if (fewer.size() <= wanted) bundles = std::move(fewer);
+    }
   }
   HostTables& t = d.host_tables;
   make_tables(*state_, bundles, t);
@@ -148,7 +153,7 @@ void CudaMpmTissue::push() {
   d.bonds.upload(state_->points.bonds, d.stream);
   d.arrived.resize(2);
   d.host_nodes.resize(2 * n);
-  pack_nodes(state_->nodes, d.host_nodes.data(), d.host_nodes.data() + n);
+  pack_nodes(state_->nodes, *state_->cpu, d.host_nodes.data(), d.host_nodes.data() + n);
   d.u[d.current].upload(d.host_nodes.data(), n, d.stream);
   d.v[d.current].upload(d.host_nodes.data() + n, n, d.stream);
   // What no block moves, the other state has, too.
@@ -194,12 +199,7 @@ void CudaMpmTissue::cut_by_blades(const std::vector<BlockMotion>& before) {
   d.u_before.download(d.host_nodes.data(), n, d.stream);
   check_cuda(cudaStreamSynchronize(d.stream), "send data");
   for (int a = 0; a < 3; ++a) state_->u_before[a].resize(n);
-  for (std::size_t i = 0; i < n; ++i) {
-    const float4& u = d.host_nodes[i];
-    state_->u_before[0][i] = u.x;
-    state_->u_before[1][i] = u.y;
-    state_->u_before[2][i] = u.z;
-  }
+  unpack_field(d.host_nodes.data(), n, *state_->cpu, state_->u_before);
   cut(blades_, state_->u_before, before, result_.blade_report);
 }
 

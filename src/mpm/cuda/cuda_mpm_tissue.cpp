@@ -179,7 +179,9 @@ void CudaMpmTissue::launch(int begin, int end, float dt) {
   frame.arrived = d.arrived.data();
   frame.faces = faces_of_launch();
   if (frame.faces.any) {
-    launch_substeps(d.face_plan, d.tables(), frame, d.face_resident, d.stream);
+    CudaTables tables = d.tables();
+    tables.slot_parts = frame.faces.looks.pushed_parts;
+    launch_substeps(d.face_plan, tables, frame, d.face_resident, d.stream);
   } else if (d.all_plain && !d.may_meet) {
     launch_substeps(d.plain_plan, d.tables(), frame, d.plain_resident, d.stream);
   } else {

@@ -13,6 +13,9 @@
 
 namespace tissue_sim {
 
+/// Bit of CudaTables::slot_parts for a node that contact of tissue with tissue may push.
+inline constexpr std::uint32_t kPushed = 1u << 31;
+
 /// A facet and where it is found.
 struct CudaFacet {
   Facet facet;
@@ -78,8 +81,11 @@ struct CudaLooks {
   std::uint8_t *is_involved, *takes_part;      ///< per facet: is in a list; in the search
   std::int32_t *contacts, *involved, *active;  ///< facets, in any order
   CudaContactNodes* nodes;                     ///< parallels `active`
-  std::uint8_t* marks;                         ///< CudaFaces::marks
+  std::uint8_t* marks;                         ///< per node: whether a contact may push it
   std::size_t node_count;
+  const std::uint32_t* slot_parts;  ///< CudaTables::slot_parts without
+  std::uint32_t* pushed_parts;      ///< and with kPushed
+  std::size_t slot_count;
   CudaFaceFigures* figures;
 };
 
@@ -88,7 +94,6 @@ struct CudaFaces {
   bool any = false;  ///< else no more of this is read
   bool look_first;   ///< they were just searched
   CudaLooks looks;
-  const std::uint8_t* marks;  ///< per node: whether a contact may push it
   /// Force on each node, [3][nodes][3], in units of kLoadUnit as integers: while one is summed up,
   /// that of the substep before is read and the third is cleared.
   long long* force;

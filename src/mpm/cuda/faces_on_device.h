@@ -15,6 +15,7 @@ struct FacesOnDevice {
   DeviceArray<FaceSpring> springs;
   DeviceArray<std::int32_t> point_at, first_near, near_count, near, contacts, involved, active;
   DeviceArray<std::uint8_t> is_involved, takes_part, marks;
+  DeviceArray<std::uint32_t> pushed_parts;
   DeviceArray<CudaContactNodes> nodes;
   DeviceArray<CudaFaceFigures> figures;
   PinnedArray<CudaFaceFigures> host_figures;  ///< as of the last search
@@ -37,9 +38,9 @@ struct FacesOnDevice {
     return facets.bytes() + lattices.bytes() + motion.bytes() + listed.bytes() + springs.bytes() +
            point_at.bytes() + first_near.bytes() + near_count.bytes() + near.bytes() +
            contacts.bytes() + involved.bytes() + active.bytes() + is_involved.bytes() +
-           takes_part.bytes() + marks.bytes() + nodes.bytes() + figures.bytes() + sums.bytes() +
-           bucket_begin.bytes() + bucket_count.bytes() + rank.bytes() + sorted.bytes() +
-           force.bytes() + kept.bytes() + gathered.bytes();
+           takes_part.bytes() + marks.bytes() + nodes.bytes() + pushed_parts.bytes() +
+           figures.bytes() + sums.bytes() + bucket_begin.bytes() + bucket_count.bytes() +
+           rank.bytes() + sorted.bytes() + force.bytes() + kept.bytes() + gathered.bytes();
   }
 };
 

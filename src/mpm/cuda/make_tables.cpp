@@ -246,18 +246,25 @@ void make_tables(const MpmState& state, const std::vector<std::vector<int>>& bun
   connect(state.nodes.size(), *state.cpu, t);
 }
 
-void pack_nodes(const Nodes& n, float4* u, float4* v) {
-  for (std::size_t i = 0; i < n.size(); ++i) {
-    u[i] = {n.u[0][i], n.u[1][i], n.u[2][i], n.mass[i]};
-    v[i] = {n.v[0][i], n.v[1][i], n.v[2][i], n.inv_mass[i]};
-  }
+void pack_nodes(const Nodes& n, Cpu& cpu, float4* u, float4* v) {
+  cpu.for_each(
+      static_cast<int>(n.size()),
+      [&](int i) {
+        u[i] = {n.u[0][i], n.u[1][i], n.u[2][i], n.mass[i]};
+        v[i] = {n.v[0][i], n.v[1][i], n.v[2][i], n.inv_mass[i]};
+      },
+      4096);
 }
 
-void unpack_nodes(const float4* u, const float4* v, Nodes& n) {
-  for (std::size_t i = 0; i < n.size(); ++i) {
-    n.u[0][i] = u[i].x, n.u[1][i] = u[i].y, n.u[2][i] = u[i].z;
-    n.v[0][i] = v[i].x, n.v[1][i] = v[i].y, n.v[2][i] = v[i].z;
-  }
+void unpack_field(const float4* from, std::size_t count, Cpu& cpu, Array<float>* to) {
+  cpu.for_each(
+      static_cast<int>(count),
+      [&](int i) { to[0][i] = from[i].x, to[1][i] = from[i].y, to[2][i] = from[i].z; }, 4096);
+}
+
+void unpack_nodes(const float4* u, const float4* v, Cpu& cpu, Nodes& n) {
+  unpack_field(u, n.size(), cpu, n.u);
+  unpack_field(v, n.size(), cpu, n.v);
 }
 
 }  // namespace tissue_sim

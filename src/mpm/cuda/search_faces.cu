@@ -349,6 +349,15 @@ __global__ void list_involved(const CudaLooks s) {
   }
 }
 
+/// The slots of these nodes.
+__global__ void mark_slots(const CudaLooks s) {
+  const int slot = thread_index();
+  if (slot >= s.slot_count || !lists_made(s)) return;
+  const std::int32_t entry = s.slot_node[slot];
+  const bool pushed = s.marks[entry < 0 ? ~entry : entry] != 0;
+  s.pushed_parts[slot] = s.slot_parts[slot] | (pushed ? kPushed : 0);
+}
+
 __global__ void begin_anew(const CudaLooks s) {
   const int f = thread_index();
   if (f >= s.facet_count) return;
@@ -413,6 +422,7 @@ void launch_lists(const CudaLooks& looks, const CudaSearchRoom& room, cudaStream
   fill_grid<<<blocks, kThreads, 0, stream>>>(looks, room);
   find_near<<<blocks_for(32 * looks.facet_count), kThreads, 0, stream>>>(looks, room);
   list_involved<<<blocks, kThreads, 0, stream>>>(looks);
+  mark_slots<<<blocks_for(static_cast<int>(looks.slot_count)), kThreads, 0, stream>>>(looks);
   check_launch();
 }
 

@@ -136,7 +136,7 @@ __device__ __forceinline__ void all_forces(const CudaTables& t, const CudaFrame&
 
 /// The forces of contacts that a round reads and clears.
 __device__ __forceinline__ PushedNodes pushed_nodes(const CudaFaces& f, int round) {
-  return {f.marks, f.force + f.stride * ((round + 2) % 3), f.force + f.stride * ((round + 1) % 3)};
+  return {f.force + f.stride * ((round + 2) % 3), f.force + f.stride * ((round + 1) % 3)};
 }
 
 /// One bundle in one round. Each moves all of its nodes on, by the forces of the substep
@@ -210,7 +210,7 @@ __global__ void __launch_bounds__(kThreads, kBlocksPerProcessor)
   if (kFaces && threadIdx.x == 0) s.rounds->begin(f.faces, f.step.dt);
   if constexpr (kCached) {
     const BundleAtWork mine(t, static_cast<int>(blockIdx.x));
-    fill_cache<kFaces>(t, mine.bundle.first_slot, mine.bundle.slots, f.faces, cache);
+    fill_cache(t, mine.bundle.first_slot, mine.bundle.slots, cache);
     __syncthreads();
     for (int round = 0; round <= f.substeps; ++round) {
       if (round > 0) grid_barrier(f.arrived, static_cast<unsigned>(round));

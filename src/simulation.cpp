@@ -118,11 +118,11 @@ FrameReport Simulation::advance_frame() {
   report.input.tools = s.tools;
   report.input.cuts = std::exchange(s.cuts, {});
   const double frame_time = 1.0 / s.scene.frame_rate;
-  report.substeps = static_cast<int>(std::ceil(frame_time / s.tissue->stable_substep()));
+  const FrameInput input{report.input.tools, report.input.cuts};
+  report.substeps = static_cast<int>(std::ceil(frame_time / s.tissue->substep_for(input)));
   report.substep = frame_time / report.substeps;
   report.cfl = report.substep * s.wave_speed / s.scene.cell_size;
-  s.tissue->advance(report.substeps, static_cast<float>(report.substep),
-                    {report.input.tools, report.input.cuts});
+  s.tissue->advance(report.substeps, static_cast<float>(report.substep), input);
   report.result = s.tissue->finish();
   s.blew_up = report.result.blew_up;
   for (ToolMotion& m : s.tools) {

@@ -86,8 +86,9 @@ inline PulledStrip pull(const MpmState& s, double traction) {
       }
     }
   }
+  const std::vector<double> volume = reference::elastic_volumes(s);
   for (const Block* block : s.blocks.all) {
-    for (const auto& row : reference::stabilising_rows(s, *block)) {
+    for (const auto& row : reference::stabilising_rows(s, volume, *block)) {
       std::map<int, double> merged;
       for (const auto& [node, a] : row) merged[unknown[node]] += a;
       for (const auto& [i, a] : merged) {

@@ -55,8 +55,9 @@ inline int rigid_modes(const MpmState& s) {
     for (const Row& row : strain) energy.add(row);
     for (const Row& row : place) motion.add(row);
   }
+  const std::vector<double> volume = reference::elastic_volumes(s);
   for (const Block* block : s.blocks.all) {
-    for (const Row& row : reference::stabilising_rows(s, *block)) {
+    for (const Row& row : reference::stabilising_rows(s, volume, *block)) {
       for (int a = 0; a < 3; ++a) {
         Row of_component = row;
         for (auto& [i, value] : of_component) i = 3 * i + a;

@@ -37,8 +37,12 @@ class Tissue {
  public:
   virtual ~Tissue() = default;
 
-  /// The largest substep that is stable in the present state, times the CFL number's safety [s].
+  /// The substep that is stable in the present state however the tissue is cut: what a lone point
+  /// bears, by the scene's CFL number [s].
   virtual float stable_substep() const = 0;
+  /// The substep for a frame with this input [s]: as long as the tissue, as it is cut, was measured
+  /// to bear with a margin, and stable_substep() at least.
+  virtual float substep_for(const FrameInput& input) const = 0;
   /// Advances by `substeps` of `dt` seconds each; may only enqueue.
   virtual void advance(int substeps, float dt, const FrameInput& input) = 0;
   /// Waits for advance() and reports on it.

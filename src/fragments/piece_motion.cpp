@@ -39,7 +39,7 @@ void measure_pieces(MpmState& state, Pieces& pieces) {
       const std::int32_t p = block.point[lane];
       if (p < 0) continue;
       Sums& s = sums_of(of_block[i], pieces.of_point[p]);
-      const double volume = block.volume[lane];
+      const double volume = state.points.volume[p];
       const Vec3 at(x[lane], x[lanes + lane], x[2 * lanes + lane]);
       s.volume += volume;
       s.x += volume * at;

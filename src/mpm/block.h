@@ -51,7 +51,7 @@ struct Block {
                              ///< [J s]; empty where none is viscous
   } mixture;
 
-  Array<float> volume;        ///< [nz][8][stride], 0 where there is no point [m^3]
+  Array<float> volume;        ///< [nz][8][stride]: elastic_volume(), 0 where there is no point
   Array<std::int32_t> point;  ///< [nz][8][stride], the point's number or -1
 
   /// A cell of which the block has some, but not all eight points. See mpm/stabilisation.h.
@@ -74,6 +74,12 @@ struct Block {
       node;  ///< [nz + 2][plane], in Nodes; split ones as this block sees them
 
   std::vector<Facet> facets;  ///< its surface and cut faces
+
+  /// The largest P-wave modulus of its points, as they are deformed [Pa]: when the limit of the
+  /// substep was measured last, and after the last frame; 0 before. See SubstepChoice.
+  struct Modulus {
+    float measured = 0, last = 0;
+  } modulus;
 
   std::size_t force_offset = 0;  ///< of this block's [3][nz + 2][plane] in the force buffer
 

@@ -5,6 +5,7 @@
 
 #include "mpm/block_materials.h"
 #include "mpm/block_sheets.h"
+#include "mpm/crumbs.h"
 
 namespace tissue_sim {
 namespace {
@@ -62,13 +63,13 @@ Block make_block(const BlockRegion& r, const LatticeBody& b, const Points& point
       if (c.point[s] < 0) continue;
       const std::size_t lane =
           (static_cast<std::size_t>(c.z - lo[2]) * 8 + s) * block.stride + column;
-      block.volume[lane] = points.volume[c.point[s]];
+      block.volume[lane] = elastic_volume(b, points, c.point[s]);
       block.point[lane] = c.point[s];
     }
     if (c.count == 8) continue;
     double mu = 0;
     for (const std::int32_t p : c.point) {
-      if (p >= 0) mu += lame_mu(b.material_of(points, p)) * points.volume[p];
+      if (p >= 0) mu += lame_mu(b.material_of(points, p)) * elastic_volume(b, points, p);
     }
     const int z = c.z - lo[2];
     block.partial.push_back(

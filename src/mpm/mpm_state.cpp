@@ -81,17 +81,21 @@ void substep(MpmState& state, float dt, std::vector<ColliderLoad>& loads) {
       }
     }
   }
+  NodeStep step;
+  step.dt = dt;
+  step.keep = static_cast<float>(std::exp(-state.scene.damping * dt));
+  for (int a = 0; a < 3; ++a) step.gravity[a] = static_cast<float>(state.scene.gravity[a]);
+  move_nodes(state, step);
+}
+
+void move_nodes(MpmState& state, const NodeStep& step) {
+  const Blocks& blocks = state.blocks;
   Nodes& n = state.nodes;
-  UpdateNode update;
+  UpdateNode update{step, {}, {}, n.mass.data(), n.inv_mass.data()};
   for (int a = 0; a < 3; ++a) {
     update.u[a] = n.u[a].data();
     update.v[a] = n.v[a].data();
-    update.gravity[a] = static_cast<float>(state.scene.gravity[a]);
   }
-  update.mass = n.mass.data();
-  update.inv_mass = n.inv_mass.data();
-  update.dt = dt;
-  update.keep = static_cast<float>(std::exp(-state.scene.damping * dt));
   const int row_count = static_cast<int>(blocks.rows.size());
   state.cpu->for_each(
       row_count,

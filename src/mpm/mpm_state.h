@@ -82,4 +82,7 @@ void measure_motion(MpmState& state);
 /// Adds what acts on the colliders to `loads`.
 void substep(MpmState& state, float dt, std::vector<ColliderLoad>& loads);
 
+/// The part of it that moves all nodes, under the forces that the blocks left in `force`.
+void move_nodes(MpmState& state, const NodeStep& step);
+
 }  // namespace tissue_sim

@@ -9,6 +9,8 @@
 #include "cutting/cut_tissue.h"
 #include "cutting/tear.h"
 #include "fragments/piece_motion.h"
+#include "mpm/lanczos.h"
+#include "mpm/linearised_motion.h"
 #include "tools/tool_motion.h"
 
 namespace tissue_sim {
@@ -23,6 +25,10 @@ MpmTissue::MpmTissue(const Scene& scene, std::vector<std::string> notes)
 }
 
 float MpmTissue::stable_substep() const { return tissue_sim::stable_substep(*state_, stiffening_); }
+
+float MpmTissue::substep_for(const FrameInput& input) const {
+  return static_cast<float>(substep_.longest(*state_, input, stable_substep()));
+}
 
 void MpmTissue::cut(const std::vector<BladePath>& paths, const Array<float>* u_before,
                     const std::vector<BlockMotion>& before, CutReport& report) {
@@ -130,6 +136,23 @@ void MpmTissue::measure() {
   }
   // Nothing that instruments do moves tissue at the speed of a bullet; what does is out of control.
   result_.blew_up = result_.blew_up || !(result_.max_speed < 300);
+  if (!result_.blew_up) follow_stability(states);
+}
+
+void MpmTissue::follow_stability(const std::vector<BlockState>& states) {
+  MpmState& s = *state_;
+  std::vector<float> modulus(states.size(), 0.0f);
+  for (std::size_t i = 0; i < states.size(); ++i) {
+    const std::vector<Material>& materials = s.bodies[s.blocks.all[i]->body].materials;
+    for (std::size_t m = 0; m < materials.size(); ++m) {
+      const double of_material = wave_modulus(materials[m], states[i].stiffening[m]);
+      modulus[i] = std::max(modulus[i], static_cast<float>(of_material));
+    }
+  }
+  substep_.follow(s, modulus, [&](const std::vector<std::uint8_t>& blocks, int steps) {
+    LinearisedMotion motion(s, blocks);
+    return 2 / std::sqrt(largest_eigenvalue(motion, steps));
+  });
 }
 
 FrameResult MpmTissue::finish() {

@@ -7,6 +7,7 @@
 #include "fragments/pieces.h"
 #include "mpm/mpm_state.h"
 #include "mpm/state_figures.h"
+#include "mpm/substep_choice.h"
 #include "tissue_sim/tissue.h"
 
 namespace tissue_sim {
@@ -17,6 +18,7 @@ class MpmTissue final : public Tissue {
   explicit MpmTissue(const Scene& scene, std::vector<std::string> notes = {});
 
   float stable_substep() const override;
+  float substep_for(const FrameInput& input) const override;
   void advance(int substeps, float dt, const FrameInput& input) override;
   FrameResult finish() override;
   int point_count() const override { return state_->points.size(); }
@@ -35,11 +37,13 @@ class MpmTissue final : public Tissue {
            const std::vector<BlockMotion>& before, CutReport& report);
   bool tear(const std::vector<TearingPoint>& tearing);  ///< whether anything did
   void measure();
+  void follow_stability(const std::vector<BlockState>& states);
 
   std::vector<std::string> notes_;
   std::unique_ptr<MpmState> state_;
   Pieces pieces_;
   Stiffening stiffening_;
+  SubstepChoice substep_;
   FrameResult result_;
 };
 

@@ -8,19 +8,39 @@ namespace tissue_sim {
 
 namespace {
 
+/// Viscosity over stiffness [s].
+double relaxation(const Material& m, double modulus) { return m.viscosity / modulus; }
+
 double stable_substep(const Material& m, double cell_size, double cfl, float stiffening) {
+  const double modulus = wave_modulus(m, stiffening);
+  const double elastic = cfl * cell_size * std::sqrt(m.density / modulus);
+  return viscous_substep(elastic, relaxation(m, modulus));
+}
+
+}  // namespace
+
+double wave_modulus(const Material& m, float stiffening) {
   const double mu = lame_mu(m), lambda = lame_lambda(m);
   // Waves in the deformed body, in reference space: the volumetric stiffness grows with the
   // square of the cofactor's columns.
   const double volumetric = m.law == Law::kNeoHookean ? lambda + mu : lambda;
-  const double modulus = lambda + 2 * mu + volumetric * std::max(0.0f, stiffening - 1);
-  const double elastic = cfl * cell_size * std::sqrt(m.density / modulus);
-  // Explicit viscosity: dt^2 + 4 eta / M dt <= dt_elastic^2.
-  const double t = 2 * m.viscosity / modulus;
+  return lambda + 2 * mu + volumetric * std::max(0.0f, stiffening - 1);
+}
+
+double viscous_substep(double elastic, double relaxation) {
+  const double t = 2 * relaxation;
   return std::sqrt(t * t + elastic * elastic) - t;
 }
 
-}  // namespace
+double slowest_relaxation(const MpmState& state) {
+  double slowest = 0;
+  for (const LatticeBody& b : state.bodies) {
+    for (const Material& m : b.materials) {
+      slowest = std::max(slowest, relaxation(m, wave_modulus(m, 1)));
+    }
+  }
+  return slowest;
+}
 
 Stiffening even_stiffening(const MpmState& state, float stiffening) {
   Stiffening all;

@@ -15,7 +15,17 @@ using Stiffening = std::vector<std::vector<float>>;
 /// The same for all.
 Stiffening even_stiffening(const MpmState& state, float stiffening);
 
-/// The largest stable substep times the CFL number [s].
+/// The largest P-wave modulus of deformed tissue [Pa], as its substep sees it.
+double wave_modulus(const Material& material, float stiffening);
+
+/// The substep that is as stable with viscosity as `elastic` is without [s], for a `relaxation`
+/// time of viscosity over stiffness [s]: dt^2 + 4 relaxation dt = elastic^2.
+double viscous_substep(double elastic, double relaxation);
+
+/// The largest viscosity over stiffness of all materials [s].
+double slowest_relaxation(const MpmState& state);
+
+/// The substep that is stable however the tissue is cut, by the scene's CFL number [s].
 float stable_substep(const MpmState& state, const Stiffening& stiffening);
 
 /// Hash of nodes, bonds and pieces.

@@ -25,6 +25,37 @@ inline double spline_slope(double r) {
   return a < 1.5 ? (r > 0 ? a - 1.5 : 1.5 - a) : 0.0;
 }
 
+/// The volume by which each point resists strain: a third of its own in a piece of at most eight
+/// points that was cut off. [m^3]
+inline std::vector<double> elastic_volumes(const MpmState& s) {
+  const int count = s.points.size();
+  std::vector<double> volume(s.points.volume.begin(), s.points.volume.end());
+  std::vector<bool> seen(count, false);
+  for (int first = 0; first < count; ++first) {
+    if (seen[first]) continue;
+    const LatticeBody& b = s.bodies[s.points.site[first].body];
+    std::vector<int> piece = {first};
+    seen[first] = true;
+    for (std::size_t i = 0; i < piece.size(); ++i) {
+      const Points::Site at = s.points.site[piece[i]];
+      const int bonds = s.points.bonds[piece[i]];
+      for (int k = 0; k < 6; ++k) {
+        if ((bonds >> k & 1) == 0) continue;
+        const int axis = k < 3 ? 2 - k : k - 3, step = k < 3 ? -1 : 1;
+        const int next = b.point(at.x + (axis == 0 ? step : 0), at.y + (axis == 1 ? step : 0),
+                                 at.z + (axis == 2 ? step : 0));
+        if (!seen[next]) piece.push_back(next);
+        seen[next] = true;
+      }
+    }
+    if (piece.size() > 8 || b.point_count <= 8) continue;
+    for (const int p : piece) {
+      if (s.points.bonds[p] != 0x3f) volume[p] /= 3;
+    }
+  }
+  return volume;
+}
+
 /// One point's stencil.
 struct Stencil {
   int node[27];
@@ -77,14 +108,15 @@ struct Step {
 };
 
 /// Shear modulus times volume of the points of a block in one of its partial cells [J].
-inline double cell_mu(const MpmState& s, const Block& block, const Block::PartialCell& cell) {
+inline double cell_mu(const MpmState& s, const std::vector<double>& volume, const Block& block,
+                      const Block::PartialCell& cell) {
   double mu = 0;
   const int z = cell.lane / block.stride, lane = cell.lane % block.stride;
   for (int sub = 0; sub < 8; ++sub) {
     const std::int32_t p =
         block.point[(static_cast<std::size_t>(z) * 8 + sub) * block.stride + lane];
     if (p < 0) continue;
-    mu += lame_mu(s.bodies[block.body].material_of(s.points, p)) * s.points.volume[p];
+    mu += lame_mu(s.bodies[block.body].material_of(s.points, p)) * volume[p];
   }
   return mu;
 }
@@ -92,13 +124,13 @@ inline double cell_mu(const MpmState& s, const Block& block, const Block::Partia
 /// The stabilising numbers (mpm/stabilisation.h) of a block's cells, each as coefficients of nodes
 /// and times the root of its cell's stiffness: products of A, d, B along the axes, from their
 /// definition.
-inline std::vector<std::vector<std::pair<int, double>>> stabilising_rows(const MpmState& s,
-                                                                         const Block& block) {
+inline std::vector<std::vector<std::pair<int, double>>> stabilising_rows(
+    const MpmState& s, const std::vector<double>& volume, const Block& block) {
   std::vector<std::vector<std::pair<int, double>>> rows;
   const double kinds[3][3] = {{0.15625, 0.6875, 0.15625}, {-0.5, 0, 0.5}, {0.25, -0.5, 0.25}};
   const double h = s.bodies[block.body].cell_size;
   for (const Block::PartialCell& cell : block.partial) {
-    const double mu = cell_mu(s, block, cell);
+    const double mu = cell_mu(s, volume, block, cell);
     for (int f = 0; f < 27; ++f) {
       if (f % 3 + f / 3 % 3 + f / 9 <= 1) continue;  // linear fields are free
       rows.emplace_back();
@@ -116,7 +148,7 @@ inline std::vector<std::vector<std::pair<int, double>>> stabilising_rows(const M
 /// Adds Kelvin-Voigt stress at the middle of each cell, or of what a cut leaves of it: its
 /// gradients are the means over the eight places that points have in a cell, its viscosity times
 /// volume the sum of its points'.
-inline void add_viscous_forces(const MpmState& s, Step& r) {
+inline void add_viscous_forces(const MpmState& s, const std::vector<double>& volume, Step& r) {
   for (const Block* block : s.blocks.all) {
     const LatticeBody& b = s.bodies[block->body];
     for (int i = 0; i < block->nz * block->stride; ++i) {
@@ -127,7 +159,7 @@ inline void add_viscous_forces(const MpmState& s, Step& r) {
       for (int sub = 0; sub < 8; ++sub) {
         const std::int32_t p =
             block->point[(static_cast<std::size_t>(z) * 8 + sub) * block->stride + lane];
-        if (p >= 0) viscosity += b.material_of(s.points, p).viscosity * s.points.volume[p];
+        if (p >= 0) viscosity += b.material_of(s.points, p).viscosity * volume[p];
         double at[3];  // from the cell's node [cells]
         for (int a = 0; a < 3; ++a) at[a] = (sub >> a & 1) == 1 ? 0.25 : -0.25;
         for (int k = 0; k < 27; ++k) {
@@ -165,6 +197,7 @@ inline Step substep(const MpmState& s, double dt) {
     r.u[i] = Vec3(s.nodes.u[0][i], s.nodes.u[1][i], s.nodes.u[2][i]);
     r.v[i] = Vec3(s.nodes.v[0][i], s.nodes.v[1][i], s.nodes.v[2][i]);
   }
+  const std::vector<double> volume = elastic_volumes(s);
   for (int p = 0; p < s.points.size(); ++p) {
     const Material& m = s.bodies[s.points.site[p].body].material_of(s.points, p);
     const Stencil stencil = stencil_of(s, p);
@@ -173,13 +206,13 @@ inline Step substep(const MpmState& s, double dt) {
     r.largest_strain = std::max(r.largest_strain, (F - polar_rotation(F)).norm());
     const Mat3 P = piola(m, F);
     for (int k = 0; k < 27; ++k) {
-      r.force[stencil.node[k]] -= s.points.volume[p] * P * stencil.slope[k];
+      r.force[stencil.node[k]] -= volume[p] * P * stencil.slope[k];
       r.mass[stencil.node[k]] += m.density * s.points.volume[p] * stencil.weight[k];
     }
   }
-  add_viscous_forces(s, r);
+  add_viscous_forces(s, volume, r);
   for (const Block* block : s.blocks.all) {
-    for (const auto& row : stabilising_rows(s, *block)) {
+    for (const auto& row : stabilising_rows(s, volume, *block)) {
       Vec3 value = Vec3::Zero();
       for (const auto& [i, a] : row) value += a * r.u[i];
       for (const auto& [i, a] : row) r.force[i] -= a * value;

@@ -7,6 +7,7 @@
 #include "fragments/pieces.h"
 #include "mpm/mpm_state.h"
 #include "mpm/state_figures.h"
+#include "mpm/substep_choice.h"
 #include "tissue_sim/tissue.h"
 
 namespace tissue_sim {
@@ -23,6 +24,7 @@ class CudaMpmTissue final : public Tissue {
   ~CudaMpmTissue() override;
 
   float stable_substep() const override;
+  float substep_for(const FrameInput& input) const override;
   void advance(int substeps, float dt, const FrameInput& input) override;
   FrameResult finish() override;
   int point_count() const override { return state_->points.size(); }
@@ -72,6 +74,8 @@ class CudaMpmTissue final : public Tissue {
   void pull_contacts();
   void launch_measure();
   void finish_measure();
+  void follow_stability();
+  double measure_limit(int steps);  ///< see MeasureLimit; of all blocks
   void upload_colliders(int substeps, double duration, const FrameInput& input);
 
   std::vector<std::string> notes_;
@@ -83,6 +87,8 @@ class CudaMpmTissue final : public Tissue {
   double cut_to_ = 0;              ///< share of the frame
   int substeps_ = 0;
   Stiffening stiffening_;
+  std::vector<float> modulus_;  ///< see SubstepChoice::follow()
+  SubstepChoice substep_;
   FrameResult result_;
 };
 

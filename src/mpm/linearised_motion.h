@@ -1,0 +1,45 @@
+// The linearised motion of the tissue on the CPU: accelerations for small displacements.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "mpm/mpm_state.h"
+
+namespace tissue_sim {
+
+/// A = M^-1 K about the present state, without contact, for largest_eigenvalue(): by differences of
+/// the forces that the kernels of the substep give. Vectors are displacements of the nodes, their
+/// inner product is weighed by mass. The same bits for any number of threads.
+class LinearisedMotion {
+ public:
+  /// `takes_part`: of each of the state's blocks, whether its stiffness counts; the rest of the
+  /// tissue is mass alone.
+  LinearisedMotion(MpmState& state, const std::vector<std::uint8_t>& takes_part);
+  ~LinearisedMotion();
+  LinearisedMotion(const LinearisedMotion&) = delete;
+  LinearisedMotion& operator=(const LinearisedMotion&) = delete;
+
+  void start();
+  double apply();
+  double orthogonalise(double along_v, double along_before);
+  void next(double length);
+
+ private:
+  using Vector = Array<float>[3];
+
+  void forces();
+  void accelerations(Vector& out);
+  /// Sums f(component, node) over all nodes, in a fixed order.
+  template <class F>
+  double sum(const F& f);
+
+  MpmState& state_;
+  std::vector<int> blocks_;
+  std::size_t count_;
+  Vector u_, rates_;  ///< what the state's nodes had
+  Vector at_rest_;    ///< accelerations without displacement [m/s^2]
+  Vector before_, v_, w_;
+};
+
+}  // namespace tissue_sim

@@ -1,0 +1,86 @@
+#include "mpm/substep_choice.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "contact/frame_colliders.h"
+#include "cutting/tear.h"
+
+namespace tissue_sim {
+namespace {
+
+constexpr int kSteps = 12, kStepsAtCut = 6;
+constexpr int kLongestAge = 30;      // frames
+constexpr double kMostGrowth = 1.3;  // of the stiffness, until it is measured again
+constexpr double kMargin = 0.65;     // for springs of contact, and what stiffens within the frame
+constexpr double kFreeMotion = 0.5;  // of a tool in a frame [cells]; beyond it the margin grows
+
+/// Whether tissue is within two cells of a box.
+bool is_near(const MpmState& state, const Box& box) {
+  const double margin = 2 * state.scene.cell_size;
+  return std::any_of(state.motion.begin(), state.motion.end(), [&](const BlockMotion& m) {
+    return (m.box.min.array() <= box.max.array() + margin).all() &&
+           (box.min.array() <= m.box.max.array() + margin).all();
+  });
+}
+
+/// How far a tool that is near tissue goes in the frame at most, with both ends [m].
+double farthest_motion(const MpmState& state, const FrameInput& input) {
+  const Scene& scene = state.scene;
+  const std::vector<Box> reach = collider_reach(scene, input, 1 / scene.frame_rate);
+  double farthest = 0;
+  for (std::size_t i = 0; i < input.tools.size(); ++i) {
+    const ToolMotion& m = input.tools[i];
+    if (!m.present || !is_near(state, reach[1 + i])) continue;  // reach[0] is the ground
+    const Tool& tool = scene.tools[i];
+    const double length = tool.type == ToolType::kProbe ? tool.length : tool.blade_length;
+    const double turn = m.begin.orientation.angularDistance(m.end.orientation);
+    const double step = (m.end.position - m.begin.position).norm();
+    farthest = std::max(farthest, step + turn * length);
+  }
+  return farthest;
+}
+
+}  // namespace
+
+void SubstepChoice::follow(MpmState& state, const std::vector<float>& modulus,
+                           const MeasureLimit& measure) {
+  if (can_tear(state)) return;
+  std::vector<std::uint8_t> to_measure(modulus.size(), 0);
+  bool cut = false;
+  growth_ = trend_ = 1;
+  for (std::size_t i = 0; i < modulus.size(); ++i) {
+    Block::Modulus& m = state.blocks.all[i]->modulus;
+    to_measure[i] = m.measured == 0;
+    cut = cut || m.measured == 0;
+    if (m.measured > 0) {
+      growth_ = std::max(growth_, static_cast<double>(modulus[i] / m.measured));
+      trend_ = std::max(trend_, static_cast<double>(modulus[i] / m.last));
+    }
+    m.last = modulus[i];
+  }
+  if (limit_ == 0 || ++age_ >= kLongestAge || growth_ > kMostGrowth) {
+    to_measure.assign(modulus.size(), 1);
+    limit_ = measure(to_measure, kSteps);
+    growth_ = 1;
+    age_ = 0;
+  } else if (cut) {
+    limit_ = std::min(limit_, measure(to_measure, kStepsAtCut));
+  }
+  if (!std::isfinite(limit_)) limit_ = 0;  // all is anchored
+  for (std::size_t i = 0; i < modulus.size(); ++i) {
+    if (to_measure[i] != 0) state.blocks.all[i]->modulus.measured = modulus[i];
+  }
+}
+
+double SubstepChoice::longest(const MpmState& state, const FrameInput& input,
+                              double cautious) const {
+  if (limit_ == 0 || !input.cuts.empty()) return cautious;
+  const double motion = farthest_motion(state, input) / state.scene.cell_size;
+  const double margin = kMargin / (1 + std::max(0.0, motion - kFreeMotion));
+  const double asked = std::min(1.0, state.scene.cfl / Scene().cfl);
+  const double elastic = asked * margin * limit_ / std::sqrt(growth_ * trend_);
+  return std::max(cautious, viscous_substep(elastic, slowest_relaxation(state)));
+}
+
+}  // namespace tissue_sim

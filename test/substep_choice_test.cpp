@@ -1,0 +1,170 @@
+// The substep that is chosen: never above what the tissue was found to bear by power iteration, and
+// not far below it.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <vector>
+
+#include "mpm/crumbs.h"
+#include "mpm/lanczos.h"
+#include "mpm/linearised_motion.h"
+#include "stability_limit.h"
+#include "test_scenes.h"
+#include "tissue_sim/simulation.h"
+
+namespace tissue_sim {
+namespace {
+
+double measured_limit(MpmTissue& tissue, int steps) {
+  MpmState& s = tissue.state();
+  LinearisedMotion motion(s, std::vector<std::uint8_t>(s.blocks.all.size(), 1));
+  return 2 / std::sqrt(largest_eigenvalue(motion, steps));
+}
+
+BladePath plane(const Vec3& normal, double size) {
+  const Vec3 a = normal.unitOrthogonal(), b = normal.normalized().cross(a);
+  BladePath path;
+  path.edge = {-size * a, size * a};
+  path.poses.resize(2);
+  path.poses[0].position = -size * b;
+  path.poses[1].position = size * b;
+  return path;
+}
+
+/// Bends and stretches the body, up to about `most`.
+void deform(MpmTissue& tissue, double most) {
+  MpmState& s = tissue.state();
+  const LatticeBody& b = s.bodies[0];
+  for (int z = -1; z <= b.nz; ++z) {
+    for (int y = -1; y <= b.ny; ++y) {
+      for (int x = -1; x <= b.nx; ++x) {
+        const Vec3 at = b.node_position(x, y, z);
+        s.nodes.u[0][b.node(x, y, z)] =
+            static_cast<float>(most * at.x() * std::fabs(at.z()) / 0.01);
+        s.nodes.u[1][b.node(x, y, z)] = static_cast<float>(-0.5 * most * at.y());
+      }
+    }
+  }
+  tissue.finish();
+}
+
+TEST(SubstepChoice, LanczosFindsTheLimit) {
+  for (const double nu : {0.3, 0.45}) {
+    MpmTissue whole(soft_body(nu, Vec3(10, 8, 6))), cut(soft_body(nu, Vec3(10, 8, 6))),
+        shattered(soft_body(nu, Vec3(6, 6, 6))), bent(soft_body(nu, Vec3(10, 8, 6)));
+    const std::vector<BladePath> once = {plane(Vec3(1, 0.6, 0.3), 0.05)},
+                                 often = random_planes(30, 0.012);
+    cut.advance(0, 0, {{}, once});
+    shattered.advance(0, 0, {{}, often});
+    deform(bent, 0.5);
+    for (MpmTissue* tissue : {&whole, &cut, &shattered, &bent}) {
+      tissue->finish();
+      const double limit = stability_limit(*tissue);
+      EXPECT_NEAR(measured_limit(*tissue, 12) / limit, 1, 0.12) << nu;
+      EXPECT_NEAR(measured_limit(*tissue, 40) / limit, 1, 0.04) << nu;
+    }
+  }
+}
+
+TEST(SubstepChoice, OnlyWhatTakesPartIsStiff) {
+  Scene two = soft_body(0.45, Vec3(6, 6, 6));
+  two.bodies.push_back(two.bodies[0]);
+  two.bodies[0].name = "soft";
+  two.bodies[1].name = "stiff";
+  two.materials.push_back(two.materials[0]);
+  two.materials[1].name = "stiff";
+  two.materials[1].young_modulus *= 9;
+  two.bodies[1].material = "stiff";
+  two.bodies[1].pose.position = Vec3(0.05, 0, 0);
+  MpmTissue tissue(two);
+  MpmState& s = tissue.state();
+  double limit[2];
+  for (int body = 0; body < 2; ++body) {
+    std::vector<std::uint8_t> takes_part;
+    for (const Block* b : s.blocks.all) takes_part.push_back(b->body == body);
+    LinearisedMotion motion(s, takes_part);
+    limit[body] = 2 / std::sqrt(largest_eigenvalue(motion, 20));
+  }
+  EXPECT_NEAR(limit[0] / limit[1], 3, 0.1);
+}
+
+/// A body that a probe presses and a blade cuts through, and then the probe again.
+TEST(SubstepChoice, HoldsWhileTissueIsPressedAndCut) {
+  Scene s = operation_scene(Vec3(0.08, 0.024, 0.028), Vec3(0, 0, 0.02));
+  s.device = Device::kCpu;
+  s.tools[0].blade_length = 0.05;
+  const Quat down = Quat(Eigen::AngleAxisd(M_PI, Vec3::UnitX()));
+  Simulation simulation(s);
+  auto& tissue = dynamic_cast<MpmTissue&>(simulation.tissue());
+  double least = 1e9, most_gain = 0;
+  for (int frame = 0; frame < 90; ++frame) {
+    const double t = frame / 60.0;
+    simulation.set_tool(0, {Vec3(0.002 + 0.01 * t, 0.03 - 0.08 * t, -0.001), down});
+    simulation.set_tool(1, {Vec3(0.03, -0.003, 0.04 - 0.02 * std::min(t, 1.0)), down});
+    const float cautious = tissue.stable_substep();
+    const double limit = stability_limit(tissue);
+    const FrameReport report = simulation.advance_frame();
+    ASSERT_FALSE(report.result.blew_up) << frame;
+    least = std::min(least, limit / report.substep);
+    least = std::min(least, stability_limit(tissue) / report.substep);  // how it ended
+    most_gain = std::max(most_gain, report.substep / cautious);
+  }
+  EXPECT_GT(tissue.fragments().size(), 1u);
+  EXPECT_GT(least, 1.2);
+  EXPECT_GT(most_gain, 1.3);
+}
+
+TEST(SubstepChoice, IsCautiousWhereItCannotKnow) {
+  const Scene soft = soft_body(0.45, Vec3(8, 8, 8));
+  const std::vector<BladePath> cut = random_planes(1, 0.012);
+  MpmTissue tissue(soft);
+  const float cautious = tissue.stable_substep();
+  EXPECT_GT(tissue.substep_for({}), 1.2f * cautious);
+  EXPECT_EQ(tissue.substep_for({{}, cut}), cautious);
+
+  Scene tears = soft;
+  tears.materials[0].tear_stretch = 1.5;
+  EXPECT_EQ(MpmTissue(tears).substep_for({}), MpmTissue(tears).stable_substep());
+
+  Scene slow = soft;
+  slow.cfl = 0.25;
+  EXPECT_NEAR(MpmTissue(slow).substep_for({}), 0.5f * tissue.substep_for({}), 1e-3f * cautious);
+
+  Scene with_probe = soft;
+  with_probe.tools.resize(1);
+  MpmTissue pressed(with_probe);
+  ToolMotion fast;
+  fast.present = true;
+  fast.begin.position = Vec3(0, 0, 0.012);
+  fast.end.position = Vec3(0, 0, 0.002);  // five cells in a frame
+  EXPECT_EQ(pressed.substep_for({{&fast, 1}, {}}), cautious);
+}
+
+TEST(SubstepChoice, CrumbsAreSoft) {
+  MpmTissue tissue(soft_body(0.45, Vec3(6, 6, 6)));
+  const std::vector<BladePath> planes = random_planes(30, 0.012);
+  tissue.advance(0, 0, {{}, planes});
+  tissue.finish();
+  const MpmState& s = tissue.state();
+  int crumbs = 0, others = 0;
+  for (const Block* block : s.blocks.all) {
+    for (std::size_t lane = 0; lane < block->lane_count(); ++lane) {
+      const std::int32_t p = block->point[lane];
+      if (p < 0) continue;
+      const Fragment* piece = nullptr;
+      for (const Fragment& f : tissue.fragments()) {
+        if (f.id == tissue.fragment_of(p)) piece = &f;
+      }
+      ASSERT_NE(piece, nullptr);
+      const bool crumb = piece->point_count <= kCrumbPoints;
+      const float share = block->volume[lane] / s.points.volume[p];
+      EXPECT_NEAR(share, crumb ? kCrumbStiffness : 1, 1e-6f) << piece->point_count;
+      ++(crumb ? crumbs : others);
+    }
+  }
+  EXPECT_GT(crumbs, 100);
+  EXPECT_GT(others, 100);
+}
+
+}  // namespace
+}  // namespace tissue_sim

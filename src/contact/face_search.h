@@ -27,9 +27,9 @@ TISSUE_SIM_INLINE double search_horizon(double fastest, double cell_size) {
   return fmin(kHorizon, kLargestReach * cell_size / (kForesight * fastest + 1e-9));
 }
 
-/// Pieces of so few points are crumbs. One that flies shall not make all others search as often as
-/// its speed asks for.
-inline constexpr int kCrumb = 64;
+/// Pieces of up to so many points may fly: shall not make all others search as often as their speed
+/// asks for.
+inline constexpr int kMayFly = 64;
 
 /// The box that a facet sweeps until the next search at the latest, and what it reaches from there.
 struct SweptBox {
@@ -53,12 +53,12 @@ struct SweptBox {
   }
 };
 
-/// Whether a facet of a piece of so many points flies: it is a crumb's, and so fast that the next
+/// Whether a facet of a piece of so many points flies: that is small, and so fast that the next
 /// search would have to follow sooner. Where its box does not meet that of all that do not fly, it
 /// takes no part until the next search.
 TISSUE_SIM_INLINE bool flies(const FacetMotion& f, int points, double cell_size) {
   const auto far = static_cast<float>(kLargestReach * cell_size / (kForesight * kHorizon));
-  return points <= kCrumb && dot(f.v, f.v) > far * far;
+  return points <= kMayFly && dot(f.v, f.v) > far * far;
 }
 
 /// Whether something is to be done before a substep, or rather before the next.

@@ -260,7 +260,7 @@ void CudaMpmTissue::finish_measure() {
     float& stiffening = stiffening_[block.body][block.material];
     stiffening = std::max(stiffening, m.stiffening);
     const Material& material = state_->bodies[block.body].materials[block.material];
-    modulus_[d.of_host[i]] = static_cast<float>(wave_modulus(material, m.stiffening));
+    modulus_[d.host_tables.of_host[i]] = static_cast<float>(wave_modulus(material, m.stiffening));
     result_.blew_up = result_.blew_up || m.finite == 0 || m.stiffening > 1e6f;
     state_->motion[d.host_tables.of_host[i]] = {
         {Vec3(m.min[0], m.min[1], m.min[2]), Vec3(m.max[0], m.max[1], m.max[2])}, m.speed};

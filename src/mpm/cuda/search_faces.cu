@@ -17,6 +17,7 @@ __device__ void reduce(double (*all)[kSums]) {
     if (static_cast<int>(threadIdx.x) >= step) continue;
     for (int i = 0; i < kSums; ++i) all[threadIdx.x][i] += all[threadIdx.x + step][i];
   }
+  __syncthreads();
 }
 
 /// Bits that are in the order of the floats.

@@ -109,7 +109,10 @@ void CudaMpmTissue::upload_facets() {
   f.sorted.resize(count);
   f.marks.resize(d.u[0].size());
   f.pushed_parts.resize(d.slot_parts.size());
-  f.figures.resize(1);
+  if (f.figures.size() == 0) {
+    f.figures.resize(1);
+    f.figures.clear(d.stream);
+  }
   f.host_figures.resize(1);
   f.sums.resize(search_sums(static_cast<int>(count)));
   std::size_t buckets = 1024;

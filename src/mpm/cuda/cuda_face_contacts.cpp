@@ -99,6 +99,7 @@ void CudaMpmTissue::upload_facets() {
   f.lists_hold = false;
   f.motion.resize(count);
   f.listed.resize(count);
+  f.listed.clear(d.stream);
   f.springs.resize(count);
   for (auto* of_facet :
        {&f.first_near, &f.near_count, &f.contacts, &f.involved, &f.active, &f.rank}) {

@@ -111,6 +111,7 @@ Operated operate(const Scene& scene, int frames = 24) {
     simulation.set_tool(0, {Vec3(0.002 + 0.01 * t, 0.03 - 0.08 * t, -0.001), down});
     simulation.set_tool(1, {Vec3(0.03, -0.003, 0.04 - 0.02 * t), down});
     const FrameReport report = simulation.advance_frame();
+    EXPECT_FALSE(report.result.blew_up) << i;
     r.checksums.push_back(simulation.tissue().checksum());
     r.energy = report.result.elastic_energy;
     r.push = std::max(r.push, report.result.loads[1].peak_force);
@@ -133,17 +134,17 @@ TEST(Inclusions, OneThatFillsItsBodyIsAsTheBodyOfItsMaterial) {
 
 TEST(Inclusions, OfAMaterialLikeTheBodysChangeNothingButBits) {
   Scene mixed = operation("own");
-  // They never tear, but might: so both take the cautious substep, which bits do not change.
-  mixed.materials[0].tear_stretch = mixed.materials[1].tear_stretch = 100;
+  mixed.materials[0].tear_stretch = mixed.materials[1].tear_stretch = 0;
   Scene plain = mixed;
   mixed.bodies[0].inclusions = {ball("twin", Vec3(0, 0, 0.02), 0.014),
                                 ball("twin", Vec3(0.035, 0, 0.034), 0.01)};
-  // Not all the way: through cuts and contact rounding grows, on each processor in its own way.
+  // Not all the way: through cuts and contact rounding grows, on each processor in its own way, and
+  // a frame may have a substep more.
   const Operated a = operate(plain, 20), b = operate(mixed, 20);
   EXPECT_GT(a.cut, 10);
   EXPECT_EQ(a.cut, b.cut);
   EXPECT_GT(a.push, 5e-4);
-  EXPECT_NEAR(b.energy, a.energy, 1e-3 * a.energy);
+  EXPECT_NEAR(b.energy, a.energy, 5e-3 * a.energy);
   EXPECT_NEAR(b.push, a.push, 0.03 * a.push);
   ASSERT_EQ(a.centroids.size(), b.centroids.size());
   for (std::size_t i = 0; i < a.centroids.size(); ++i) {

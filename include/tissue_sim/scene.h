@@ -64,8 +64,9 @@ struct Scene {
   int threads = 0;           ///< CPU threads, 0 for all
   double cell_size = 0.003;  ///< grid spacing [m]; two points a cell along each axis
   double frame_rate = 60.0;  ///< frames a second of simulated time [Hz], 1 to 2000
-  double cfl = 0.5;      ///< substep * wave speed / cell size, 0.05 to 0.9; up to 0.55 any cut is
-                         ///< stable, above it whole tissue alone (docs/validation.md)
+  double cfl = 0.5;      ///< substep * wave speed / cell size, 0.05 to 0.9, of tissue that may be
+                         ///< cut or torn at once: up to 0.55 any cut is stable. Substeps are longer
+                         ///< where the tissue was measured to bear it; below 0.5 in proportion
   double damping = 0.0;  ///< drag by what surrounds the tissue: speeds decay as
                          ///< exp(-damping t) [1/s], 0 to 1000
   Vec3 gravity = Vec3(0, 0, -9.81);  ///< [m/s^2]

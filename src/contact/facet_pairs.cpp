@@ -12,18 +12,25 @@ struct GridBox {
   int min[3], max[3];
 };
 
+/// std::floor() would be a call, for the oldest processors lack the instruction.
+int floor_of(float x) {
+  const int toward_zero = static_cast<int>(x);
+  return toward_zero - (x < static_cast<float>(toward_zero) ? 1 : 0);
+}
+
 }  // namespace
 
 std::vector<FacetPair> facing_pairs(const std::vector<FacetMotion>& facets,
                                     const std::vector<float>& reach, float grid, Cpu& cpu) {
   const auto count = static_cast<std::int32_t>(facets.size());
+  const float per_grid = 1 / grid;
   std::vector<GridBox> boxes(count);
   std::size_t entry_count = 0;
   for (std::int32_t f = 0; f < count; ++f) {
     std::size_t cells = 1;
     for (int a = 0; a < 3; ++a) {
-      boxes[f].min[a] = static_cast<int>(std::floor((facets[f].x[a] - reach[f]) / grid));
-      boxes[f].max[a] = static_cast<int>(std::floor((facets[f].x[a] + reach[f]) / grid));
+      boxes[f].min[a] = floor_of((facets[f].x[a] - reach[f]) * per_grid);
+      boxes[f].max[a] = floor_of((facets[f].x[a] + reach[f]) * per_grid);
       cells *= boxes[f].max[a] - boxes[f].min[a] + 1;
     }
     entry_count += cells;

@@ -173,8 +173,15 @@ bool search(MpmState& s, const Pieces& pieces) {
     reach[f] = travel[f] < 0 ? 0 : kSearchReach * cell + listed.skin;
   }
   auto pairs = facing_pairs(faces.motion, reach, 3 * cell, *s.cpu);
-  const auto one = [&](const auto& pair) { return are_one(s, pieces, pair.first, pair.second); };
-  pairs.erase(std::remove_if(pairs.begin(), pairs.end(), one), pairs.end());
+  std::vector<std::uint8_t> one(pairs.size());
+  s.cpu->for_each(
+      static_cast<int>(pairs.size()),
+      [&](int i) { one[i] = are_one(s, pieces, pairs[i].first, pairs[i].second); }, 64);
+  std::size_t left = 0;
+  for (std::size_t i = 0; i < pairs.size(); ++i) {
+    if (one[i] == 0) pairs[left++] = pairs[i];
+  }
+  pairs.resize(left);
   const auto facet_touches = [&](std::int32_t a, std::int32_t b) {
     const int p = pieces.of_point[facet_of(s, a).point], q = pieces.of_point[facet_of(s, b).point];
     return touches(PieceSize{p, size[p]}, PieceSize{q, size[q]});

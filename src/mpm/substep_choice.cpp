@@ -4,16 +4,22 @@
 #include <cmath>
 
 #include "contact/frame_colliders.h"
-#include "cutting/tear.h"
 
 namespace tissue_sim {
 namespace {
 
-constexpr int kSteps = 12, kStepsAtCut = 6;
+constexpr int kSteps = 12, kStepsAtCut = 4;
 constexpr int kLongestAge = 30;      // frames
 constexpr double kMostGrowth = 1.3;  // of the stiffness, until it is measured again
 constexpr double kMargin = 0.65;     // for springs of contact, and what stiffens within the frame
 constexpr double kFreeMotion = 0.5;  // of a tool in a frame [cells]; beyond it the margin grows
+
+/// Whether something tore within the last twentieth of a second: then more may soon, in pieces that
+/// nobody has measured.
+bool tears(const MpmState& state) {
+  return std::any_of(state.tore_at.begin(), state.tore_at.end(),
+                     [&](double time) { return state.time - time < 0.05; });
+}
 
 /// Whether tissue is within two cells of a box.
 bool is_near(const MpmState& state, const Box& box) {
@@ -45,7 +51,6 @@ double farthest_motion(const MpmState& state, const FrameInput& input) {
 
 void SubstepChoice::follow(MpmState& state, const std::vector<float>& modulus,
                            const MeasureLimit& measure) {
-  if (can_tear(state)) return;
   std::vector<std::uint8_t> to_measure(modulus.size(), 0);
   bool cut = false;
   growth_ = trend_ = 1;
@@ -75,7 +80,7 @@ void SubstepChoice::follow(MpmState& state, const std::vector<float>& modulus,
 
 double SubstepChoice::longest(const MpmState& state, const FrameInput& input,
                               double cautious) const {
-  if (limit_ == 0 || !input.cuts.empty()) return cautious;
+  if (limit_ == 0 || !input.cuts.empty() || tears(state)) return cautious;
   const double motion = farthest_motion(state, input) / state.scene.cell_size;
   const double margin = kMargin / (1 + std::max(0.0, motion - kFreeMotion));
   const double asked = std::min(1.0, state.scene.cfl / Scene().cfl);

@@ -23,7 +23,7 @@ class SubstepChoice {
   void follow(MpmState& state, const std::vector<float>& modulus, const MeasureLimit& measure);
 
   /// The longest substep for a frame with this input that is stable with a margin [s]: at least
-  /// `cautious`, and not more where something is cut before the first substep, or may tear.
+  /// `cautious`, and not more where something is cut before the first substep, or just tore.
   double longest(const MpmState& state, const FrameInput& input, double cautious) const;
 
  private:

@@ -1,0 +1,94 @@
+// The substep that is chosen on the GPU: the CPU's. Skipped where there is no GPU.
+#include <gtest/gtest.h>
+
+#if defined(TISSUE_SIM_CUDA)
+#include <cmath>
+
+#include "compute/device_array.h"
+#include "cut_scenes.h"
+#include "mpm/cuda/cuda_mpm_tissue.h"
+#include "mpm/mpm_tissue.h"
+#include "test_scenes.h"
+#include "tissue_sim/simulation.h"
+
+namespace tissue_sim {
+namespace {
+
+class SubstepOnGpu : public testing::Test {
+ protected:
+  void SetUp() override {
+    const std::string why = why_no_gpu();
+    if (!why.empty()) GTEST_SKIP() << why;
+  }
+};
+
+TEST_F(SubstepOnGpu, IsTheCpus) {
+  for (const Shape shape : {Shape::kBox, Shape::kEllipsoid}) {
+    for (const double viscosity : {0.0, 2.0}) {
+      const Scene scene = held_body(Law::kFixedCorotated, viscosity, shape);
+      MpmTissue cpu(scene);
+      CudaMpmTissue gpu(scene);
+      EXPECT_NEAR(gpu.substep_for({}) / cpu.substep_for({}), 1, 0.01);
+      EXPECT_GT(cpu.substep_for({}), 1.1f * cpu.stable_substep());
+      deform(cpu.state());
+      deform(gpu.state());
+      gpu.push();
+      cpu.advance(0, 1e-4f, {});
+      gpu.advance(0, 1e-4f, {});
+      cpu.finish();
+      gpu.finish();
+      // Its blocks are others, which bound what stiffened; and at a cut it measures all of them.
+      EXPECT_NEAR(gpu.substep_for({}) / cpu.substep_for({}), 1, 0.1);
+      const BladePath path = plane_cut(Vec3(0.018, 0.0145, 0.0085), Vec3(1, 0.4, 0.2));
+      EXPECT_EQ(cut_now(cpu, path).bonds_broken, cut_now(gpu, path).bonds_broken);
+      cpu.advance(0, 1e-4f, {});
+      gpu.advance(0, 1e-4f, {});
+      cpu.finish();
+      gpu.finish();
+      EXPECT_NEAR(gpu.substep_for({}) / cpu.substep_for({}), 1, 0.1);
+    }
+  }
+}
+
+TEST_F(SubstepOnGpu, MeasuringItChangesNothing) {
+  const Scene scene = held_body(Law::kFixedCorotated, 0, Shape::kEllipsoid);
+  CudaMpmTissue tissue(scene);
+  deform(tissue.state());
+  tissue.push();
+  tissue.advance(0, 1e-4f, {});
+  const std::uint64_t before = tissue.checksum();
+  for (int frame = 0; frame < 40; ++frame) tissue.finish();  // measured again after 30
+  EXPECT_EQ(tissue.checksum(), before);
+}
+
+TEST_F(SubstepOnGpu, HoldsWhileTissueIsPressedAndCut) {
+  Scene scene = operation_scene(Vec3(0.08, 0.024, 0.028), Vec3(0, 0, 0.02));
+  scene.tools[0].blade_length = 0.05;
+  const Quat down = Quat(Eigen::AngleAxisd(M_PI, Vec3::UnitX()));
+  double energy[2], gain[2] = {};
+  for (const Device device : {Device::kCpu, Device::kCuda}) {
+    const int which = device == Device::kCuda;
+    scene.device = device;
+    Simulation simulation(scene);
+    for (int frame = 0; frame < 90; ++frame) {
+      const double t = frame / 60.0;
+      simulation.set_tool(0, {Vec3(0.002 + 0.01 * t, 0.03 - 0.08 * t, -0.001), down});
+      simulation.set_tool(1, {Vec3(0.03, -0.003, 0.04 - 0.02 * std::min(t, 1.0)), down});
+      const double cautious = simulation.tissue().stable_substep();
+      const FrameReport report = simulation.advance_frame();
+      ASSERT_FALSE(report.result.blew_up) << frame;
+      energy[which] = report.result.elastic_energy;
+      gain[which] += report.substep / cautious / 90;
+    }
+    EXPECT_GT(simulation.tissue().fragments().size(), 1u);
+  }
+  EXPECT_NEAR(energy[1], energy[0], 0.02 * energy[0]);
+  EXPECT_NEAR(gain[1], gain[0], 0.1 * gain[0]);
+  EXPECT_GT(gain[1], 1.2);
+}
+
+}  // namespace
+}  // namespace tissue_sim
+#else
+TEST(SubstepOnGpu, NeedsABuildWithNvcc) { GTEST_SKIP() << "built without nvcc"; }
+#endif

@@ -27,7 +27,7 @@ TISSUE_SIM_INLINE double search_horizon(double fastest, double cell_size) {
   return fmin(kHorizon, kLargestReach * cell_size / (kForesight * fastest + 1e-9));
 }
 
-/// Pieces of up to so many points may fly: shall not make all others search as often as their speed
+/// Up to so many points a piece may fly: it is not to make all others search as often as its speed
 /// asks for.
 inline constexpr int kMayFly = 64;
 

@@ -20,6 +20,7 @@
 #include "contact/face_search.h"
 #include "contact/face_spring.h"
 #include "contact/facet_in_world.h"
+#include "contact/kept_contact.h"
 
 namespace tissue_sim {
 
@@ -35,36 +36,6 @@ TISSUE_SIM_INLINE double look_horizon(float fastest, double cell_size, double dt
 /// Whether a contact touches, or may before the next look.
 TISSUE_SIM_INLINE bool is_active(const FaceSpring& c) {
   return c.other >= 0 && (c.touching || c.depth >= -kNearGap);
-}
-
-/// What a contact is known by while blocks are made anew.
-struct KeptContact {
-  std::int32_t point;      ///< of the facet
-  std::int32_t direction;  ///< of the facet
-  std::int32_t other_body;
-  double hold[3];  ///< reference place [m]
-  float depth, begun, stiffness, apart[3];
-
-  TISSUE_SIM_INLINE bool is_before(std::int32_t p, int d) const {
-    return point != p ? point < p : direction < d;
-  }
-};
-
-/// The one of these, sorted, that a facet had; null if none.
-TISSUE_SIM_INLINE const KeptContact* find_kept(const KeptContact* kept, int count,
-                                               const Facet& facet) {
-  int begin = 0, end = count;
-  while (begin < end) {
-    const int middle = (begin + end) / 2;
-    if (kept[middle].is_before(facet.point, facet.direction)) {
-      begin = middle + 1;
-    } else {
-      end = middle;
-    }
-  }
-  const bool found =
-      begin < count && kept[begin].point == facet.point && kept[begin].direction == facet.direction;
-  return found ? kept + begin : nullptr;
 }
 
 /// A facet that might catch another: how far beyond its edge, and where in the list.

@@ -121,6 +121,7 @@ void CudaMpmTissue::upload_facets() {
   f.bucket_begin.resize(buckets);
   f.bucket_count.resize(buckets);
   f.near.resize(std::max(f.near.size(), 8 * count));
+  f.springs.clear(d.stream);
   launch_fresh_contacts(looks(), d.stream);
 }
 

@@ -2,6 +2,9 @@
 #include <gtest/gtest.h>
 
 #if defined(TISSUE_SIM_CUDA)
+#include <algorithm>
+#include <iterator>
+
 #include "compute/cuda_check.h"
 #include "contact/face_places.h"
 #include "cut_scenes.h"
@@ -56,6 +59,7 @@ void press(CudaMpmTissue& tissue, float dt) {
     ASSERT_LT(i, 60);
     tissue.advance(1, dt, {});
     ASSERT_FALSE(tissue.finish().blew_up);
+    tissue.pull();
   }
 }
 
@@ -95,6 +99,7 @@ TEST_P(FaceContactOnGpu, OneSubstepAgreesWithTheCpusContactsAndBruteForce) {
   EXPECT_GT(touching, 50);
   tissue.advance(1, dt, {});
   tissue.finish();
+  tissue.pull();
   ASSERT_EQ(s.faces.active.size(), contacts.size()) << "nothing was looked at";
   double worst = 0, worst_hold = 0;
   for (std::size_t i = 0; i < contacts.size(); ++i) {
@@ -112,7 +117,6 @@ TEST_P(FaceContactOnGpu, OneSubstepAgreesWithTheCpusContactsAndBruteForce) {
   // there, of 50 micrometres of depth; the damper feels it once more.
   EXPECT_LT(worst, 1e-4 * largest);
   EXPECT_LT(worst_hold, 1e-5);
-  tissue.pull();
   for (std::size_t i = 0; i < expected.u.size(); ++i) {
     force_scale = std::max(force_scale, expected.force[i].norm());
     v_scale = std::max(v_scale, expected.v[i].norm());
@@ -126,20 +130,123 @@ TEST_P(FaceContactOnGpu, OneSubstepAgreesWithTheCpusContactsAndBruteForce) {
   }
 }
 
+/// Of each facet, those that it may touch.
+using Near = std::vector<std::vector<std::int32_t>>;
+
+Near near_on_cpu(const FaceContacts& faces) {
+  Near near(faces.block_of.size());
+  for (std::size_t i = 0; i < faces.all.size(); ++i) {
+    near[faces.all[i].facet].assign(faces.near.begin() + faces.first_near[i],
+                                    faces.near.begin() + faces.first_near[i + 1]);
+  }
+  return near;
+}
+
+/// How many entries only one of them has.
+std::size_t difference(const Near& a, const Near& b) {
+  std::size_t count = 0;
+  for (std::size_t f = 0; f < a.size(); ++f) {
+    std::vector<std::int32_t> of_one;
+    std::set_symmetric_difference(a[f].begin(), a[f].end(), b[f].begin(), b[f].end(),
+                                  std::back_inserter(of_one));
+    count += of_one.size();
+  }
+  return count;
+}
+
+TEST_P(FaceContactOnGpu, ASearchAndALookAgreeWithTheCpus) {
+  CudaMpmTissue tissue(free_box(Vec3(0.031, 0.029, 0.017), 0.002));
+  const float dt = 0.5f * tissue.stable_substep();
+  press(tissue, dt);
+  if (HasFatalFailure()) return;
+  MpmState& s = tissue.state();
+  for (int round = 0; round < 3; ++round) {
+    tissue.pull();
+    FaceContacts& faces = s.faces;
+    faces.motion.resize(faces.block_of.size());
+    faces.listed.clear();
+    faces.until_search = 0;
+    const int before = static_cast<int>(faces.all.size());
+    find_face_contacts(s, tissue.pieces(), dt);
+    FaceContacts expected = faces;
+    for (const std::int32_t i : expected.active) push_faces(s, expected.all[i], dt);
+    tissue.search_anew();
+    tissue.advance(1, dt, {});
+    tissue.finish();
+    tissue.pull();
+    const Near cpu = near_on_cpu(expected), gpu = tissue.near_facets();
+    std::size_t entries = 0;
+    for (const auto& list : cpu) entries += list.size();
+    EXPECT_GT(entries, 500u);
+    EXPECT_LE(difference(cpu, gpu), entries / 500) << "of " << entries;
+    int same = 0, other = 0, touching = 0;
+    double worst_hold = 0, worst_apart = 0, worst_depth = 0, worst_stiffness = 0;
+    std::vector<const FaceContact*> of_facet(faces.block_of.size(), nullptr);
+    for (const std::int32_t i : faces.active) of_facet[faces.all[i].facet] = &faces.all[i];
+    for (const std::int32_t i : expected.active) {
+      const FaceContact& a = expected.all[i];
+      const FaceContact* b = of_facet[a.facet];
+      if (b == nullptr || b->other != a.other || b->touching != a.touching) {
+        ++other;
+        continue;
+      }
+      ++same;
+      touching += a.touching ? 1 : 0;
+      worst_depth = std::max<double>(worst_depth, std::fabs(a.depth - b->depth));
+      worst_stiffness =
+          std::max<double>(worst_stiffness, std::fabs(a.stiffness / b->stiffness - 1));
+      for (int c = 0; c < 3; ++c) {
+        worst_hold = std::max<double>(worst_hold, std::fabs(a.hold[c] - b->hold[c]));
+        worst_apart = std::max<double>(worst_apart, std::fabs(a.apart[c] - b->apart[c]));
+      }
+    }
+    std::printf(
+        "%d contacts before; %d the same, %d touch, %d not; depths off by %.1e, holds by %.1e "
+        "cells, apart by %.1e m, stiffness by %.1e\n",
+        before, same, touching, other, worst_depth, worst_hold, worst_apart, worst_stiffness);
+    EXPECT_GT(touching, 50);
+    EXPECT_LE(other, same / 50) << "where two facets fit alike, or depths are zero";
+    EXPECT_LT(worst_depth, 1e-4);
+    EXPECT_LT(worst_hold, 1e-3);
+    EXPECT_LT(worst_apart, 1e-6);
+    EXPECT_LT(worst_stiffness, 1e-4);
+    tissue.advance(7, dt, {});
+    ASSERT_FALSE(tissue.finish().blew_up);
+  }
+}
+
+/// What friction holds on to.
+std::vector<float> holds(const FaceContacts& faces) {
+  std::vector<float> result;
+  for (const std::int32_t i : faces.active) {
+    const FaceContact& c = faces.all[i];
+    result.insert(result.end(), {float(c.facet), float(c.other), float(c.touching)});
+    result.insert(result.end(), c.hold, c.hold + 3);
+    result.insert(result.end(), c.force, c.force + 3);
+  }
+  return result;
+}
+
 TEST_P(FaceContactOnGpu, SameBitsRunAfterRun) {
   std::vector<std::uint64_t> checksums[2];
-  for (auto& of_run : checksums) {
+  std::vector<float> held[2];
+  for (int run = 0; run < 2; ++run) {
     CudaMpmTissue tissue(free_box(Vec3(0.031, 0.029, 0.017), 0.002));
     const float dt = 0.5f * tissue.stable_substep();
     press(tissue, dt);
     if (HasFatalFailure()) return;
     for (int f = 0; f < 10; ++f) {
-      tissue.advance(50, dt, {});
+      tissue.advance(20, dt, {});
       EXPECT_FALSE(tissue.finish().blew_up);
-      of_run.push_back(tissue.checksum());
+      checksums[run].push_back(tissue.checksum());
+      tissue.pull();
+      const std::vector<float> now = holds(tissue.state().faces);
+      held[run].insert(held[run].end(), now.begin(), now.end());
     }
   }
   EXPECT_EQ(checksums[0], checksums[1]);
+  EXPECT_GT(held[0].size(), 9u * 100);
+  EXPECT_EQ(held[0], held[1]);
 }
 
 INSTANTIATE_TEST_SUITE_P(Shapes, FaceContactOnGpu,

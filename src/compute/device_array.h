@@ -9,7 +9,8 @@
 
 namespace tissue_sim {
 
-/// `n` elements of device memory. Growing does not keep what was in it.
+/// `n` elements of device memory. Growing does not keep what was in it; where it grows again, a
+/// little more than is asked for.
 template <class T>
 class DeviceArray {
  public:
@@ -22,6 +23,7 @@ class DeviceArray {
   void resize(std::size_t n) {
     size_ = n;
     if (n <= capacity_) return;
+    if (capacity_ > 0) n += n / 16;
     cudaFree(data_);
     data_ = nullptr;
     capacity_ = 0;
@@ -44,6 +46,13 @@ class DeviceArray {
   template <class Container>
   void upload(const Container& from, cudaStream_t stream) {
     upload(from.data(), from.size(), stream);
+  }
+  void copy(const DeviceArray& from, cudaStream_t stream) {
+    resize(from.size_);
+    if (size_ == 0) return;
+    check_cuda(
+        cudaMemcpyAsync(data_, from.data_, size_ * sizeof(T), cudaMemcpyDeviceToDevice, stream),
+        "copy");
   }
   void download(T* to, std::size_t n, cudaStream_t stream) const {
     if (n == 0) return;
@@ -68,7 +77,8 @@ class DeviceArray {
   std::size_t size_ = 0, capacity_ = 0;
 };
 
-/// Page-locked host memory. Growing does not keep what was in it.
+/// Page-locked host memory. Growing does not keep what was in it; where it grows again, a little
+/// more than is asked for.
 template <class T>
 class PinnedArray {
  public:
@@ -80,6 +90,7 @@ class PinnedArray {
   void resize(std::size_t n) {
     size_ = n;
     if (n <= capacity_) return;
+    if (capacity_ > 0) n += n / 8;
     cudaFreeHost(data_);
     data_ = nullptr;
     capacity_ = 0;

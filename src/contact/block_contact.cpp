@@ -142,7 +142,7 @@ void add_contact(MpmState& state, int index, float* force, std::vector<ColliderL
                 cell = lane / block.stride / 8 * block.plane + block.cell[lane % block.stride];
       const AxisWeights& weights = kSubWeights.of[sub];
       float v[3], push[3];
-      value_at(state.nodes.v, CellNodes(block, cell), weights, v);
+      value_at(CellField{state.nodes.v, CellNodes(block, cell)}, weights, v);
       Touch touch{lane, p, c, {}};
       while (held != before.end() && comes_before(*held, touch)) ++held;
       if (held != before.end() && !comes_before(touch, *held)) {

@@ -10,38 +10,22 @@
 #include <cstdint>
 #include <vector>
 
-#include "contact/face_spring.h"
 #include "contact/facet_motion.h"
+#include "contact/look_at_face.h"
 
 namespace tissue_sim {
 
 struct MpmState;
 struct Pieces;
 
-/// A facet against another.
+/// A facet against another, on the CPU.
 struct FaceContact : FaceSpring {
-  std::int32_t facet, other = -1;  ///< numbers over all blocks; -1: nothing near
-  float depth = 0;  ///< of the facet's centre below the other face, as of the last look [cells]
-  float begun = 0;  ///< depth at which the place held may stay, for there it began [cells]
   CellNodes nodes, other_nodes;
   AxisWeights weights, other_weights;  ///< at the facet's centre; at `hold`
 };
 
-/// What a contact is known by while blocks are made anew.
-struct KeptContact {
-  std::int32_t point;      ///< of the facet
-  std::int32_t direction;  ///< of the facet
-  int other_body;
-  Vec3 hold;  ///< reference place [m]
-  float depth, begun, stiffness, apart[3];
-};
-
-/// Where a facet was when the pairs were listed, and how far it may move while the list holds [m].
-struct ListedFacet {
-  float x[3], skin;
-};
-
 struct FaceContacts {
+  int version = 0;                        ///< how often facets were numbered
   std::vector<std::int32_t> first_facet;  ///< per block and one more
   std::vector<std::int32_t> block_of;     ///< per facet
   std::vector<FacetMotion> motion;        ///< per facet; up to date where a pair needs it
@@ -58,9 +42,8 @@ struct FaceContacts {
   double until_search = 0, until_look = 0, since_look = 0;  ///< [s]
 };
 
-/// Before substeps of `dt` seconds: searches pairs, and looks at them, when it is time to. Returns
-/// after how many substeps, up to `at_most`, it wants to be called again.
-int find_face_contacts(MpmState& state, const Pieces& pieces, double dt, int at_most = 1);
+/// Before a substep of `dt` seconds: searches pairs, and looks at them, when it is time to.
+void find_face_contacts(MpmState& state, const Pieces& pieces, double dt);
 
 /// Before blocks are made anew: remembers what touches.
 void keep_face_contacts(MpmState& state);

@@ -23,18 +23,6 @@ inline const Material& material_of(const MpmState& s, std::int32_t facet) {
   return body_of(s, facet).material_of(s.points, facet_of(s, facet).point);
 }
 
-/// Reference place that a contact holds on to [m].
-inline Vec3 place_held(const MpmState& s, const FaceContact& c) {
-  return reference_place(body_of(s, c.other), block_of(s, c.other), facet_of(s, c.other).cell,
-                         c.hold);
-}
-
-/// Sets the place on the other face that a contact holds on to, and what follows from it.
-inline void hold_at(FaceContact& c, const float (&place)[3]) {
-  c.hold_at(place);
-  c.other_weights = AxisWeights(c.hold);
-}
-
 /// Sum of w^2 / m over the nodes of a place: what a spring there moves, as one over a mass [1/kg].
 inline double mobility(const Nodes& nodes, const CellNodes& cell, const AxisWeights& weights) {
   double sum = 0;
@@ -51,28 +39,55 @@ struct ContactPlaces {
   const Nodes& nodes;
   FaceContact& contact;
 
-  void own(float (&value)[3]) const { value_at(nodes.u, contact.nodes, contact.weights, value); }
+  void own(float (&value)[3]) const {
+    value_at(CellField{nodes.u, contact.nodes}, contact.weights, value);
+  }
   void held(float (&value)[3]) const {
-    value_at(nodes.u, contact.other_nodes, contact.other_weights, value);
+    value_at(CellField{nodes.u, contact.other_nodes}, contact.other_weights, value);
   }
   void hold(const float (&place)[3]) { contact.other_weights = AxisWeights(place); }
+  float own_mobility() const {
+    return static_cast<float>(mobility(nodes, contact.nodes, contact.weights));
+  }
   float held_mobility() const {
     return static_cast<float>(mobility(nodes, contact.other_nodes, contact.other_weights));
   }
 };
 
-/// From the place held to the facet's centre, in the world.
-inline void measure_apart(const MpmState& s, FaceContact& c) {
-  float own[3], held[3];
-  const ContactPlaces places{s.nodes, c};
-  places.own(own);
-  places.held(held);
-  c.measure_apart(own, held);
-}
+/// Facets and nodes as a look at contact `i` of FaceContacts::all reaches them on the CPU:
+/// contact/look_at_face.h.
+struct ContactFaces : ContactPlaces {
+  const MpmState& state;
+  int i;
+  ContactFaces(MpmState& s, int index)
+      : ContactPlaces{s.nodes, s.faces.all[index]}, state(s), i(index) {}
 
-/// Makes the spring so soft that substeps of `dt` can follow what it moves, and the damper to it.
-inline void soften(const MpmState& s, FaceContact& c, double dt) {
-  c.soften(ContactPlaces{s.nodes, c}.held_mobility(), static_cast<float>(dt));
-}
+  const Facet& facet(std::int32_t f) const { return facet_of(state, f); }
+  const FacetMotion& motion(std::int32_t f) const { return state.faces.motion[f]; }
+  double cell_size(std::int32_t f) const { return body_of(state, f).cell_size; }
+  int body(std::int32_t f) const { return block_of(state, f).body; }
+  void middle(std::int32_t f, double (&place)[3]) const {
+    const float zero[3] = {};
+    const Vec3 x = reference_place(body_of(state, f), block_of(state, f), facet(f).cell, zero);
+    for (int a = 0; a < 3; ++a) place[a] = x[a];
+  }
+  double modulus(std::int32_t f) const {
+    const Material& m = material_of(state, f);
+    return lame_lambda(m) + 2 * lame_mu(m);
+  }
+  float friction(std::int32_t f) const {
+    return static_cast<float>(material_of(state, f).friction);
+  }
+  double cell_size() const { return state.scene.cell_size; }
+  int first_near() const { return state.faces.first_near[i]; }
+  int end_near() const { return state.faces.first_near[i + 1]; }
+  std::int32_t near(int n) const { return state.faces.near[n]; }
+  static int lane() { return 0; }
+  static int lanes() { return 1; }
+  static NearFacet nearest(const NearFacet& best) { return best; }
+  void hold_in(std::int32_t f) const {
+    contact.other_nodes = CellNodes(block_of(state, f), facet(f).cell);
+  }
+};
 
 }  // namespace tissue_sim

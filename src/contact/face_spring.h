@@ -7,12 +7,9 @@
 
 #include "compute/host_device.h"
 #include "contact/collider.h"
+#include "contact/facet_in_world.h"
 
 namespace tissue_sim {
-
-TISSUE_SIM_INLINE float dot(const float* a, const float* b) {
-  return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-}
 
 /// A spring and a damper between the centre of a facet and a material place on another face.
 struct alignas(16) FaceSpring {
@@ -29,6 +26,9 @@ struct alignas(16) FaceSpring {
   float sudden;                        ///< depth at which nothing can be from one substep [m]
   float force[3];                      ///< on the facet [N]
   bool touching = false;
+  std::int32_t facet = -1, other = -1;  ///< numbers over all blocks; other -1: nothing near
+  float depth = 0;  ///< of the facet's centre below the other face, as of the last look [cells]
+  float begun = 0;  ///< depth at which the place held may stay, for there it began [cells]
 
   /// Sets the place on the other face that it holds on to.
   TISSUE_SIM_INLINE void hold_at(const float (&place)[3]) {

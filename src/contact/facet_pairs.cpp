@@ -3,11 +3,10 @@
 #include <algorithm>
 #include <cmath>
 
+#include "contact/face_search.h"
+
 namespace tissue_sim {
 namespace {
-
-// Cosine between normals from which on facets do not face one another.
-constexpr float kFacing = -0.5f;
 
 struct GridBox {
   int min[3], max[3];

@@ -3,17 +3,10 @@
 
 #include "contact/face_places.h"
 #include "contact/facet_pairs.h"
-#include "contact/look_at_face.h"
-#include "cutting/bonds.h"
 #include "fragments/pieces.h"
 
 namespace tissue_sim {
 namespace {
-
-constexpr int kLongest = 16;        ///< substeps between two looks
-constexpr float kLargestReach = 4;  ///< of what moves fast [cells]; the next search follows sooner
-constexpr double kHorizon = 1.0 / 60;  ///< between two searches [s]
-constexpr float kSkin = 0.1f;  ///< that facets may move, beyond what is foreseen, in a list [cells]
 
 FacetMotion motion_of(const MpmState& s, std::int32_t facet) {
   return facet_motion(body_of(s, facet), block_of(s, facet), facet_of(s, facet), s.nodes);
@@ -26,7 +19,7 @@ void list_active(MpmState& s) {
   faces.first_of_block.assign(s.blocks.all.size() + 1, 0);
   for (std::size_t i = 0; i < faces.all.size(); ++i) {
     const FaceContact& c = faces.all[i];
-    if (c.other < 0 || (!c.touching && c.depth < -kNearGap)) continue;
+    if (!is_active(c)) continue;
     faces.active.push_back(static_cast<std::int32_t>(i));
     ++faces.first_of_block[faces.block_of[c.facet] + 1];
     ++faces.first_of_block[faces.block_of[c.other] + 1];
@@ -52,70 +45,92 @@ void look_at_all(MpmState& s, double dt, bool moved) {
   const int count = static_cast<int>(faces.all.size());
   std::vector<float> speed(count);
   s.cpu->for_each(
-      count, [&](int i) { speed[i] = look(s, i, dt); }, 32);
+      count,
+      [&](int i) {
+        ContactFaces contact(s, i);
+        speed[i] = look(contact, faces.all[i], static_cast<float>(dt),
+                        static_cast<float>(faces.since_look));
+      },
+      32);
   float fastest = 0;
   for (const float v : speed) fastest = std::max(fastest, v);
   list_active(s);
-  faces.until_look =
-      std::min(kLongest * dt, kMovedBetweenLooks * s.scene.cell_size / std::max(fastest, 1e-6f));
+  faces.until_look = look_horizon(fastest, s.scene.cell_size, dt);
   faces.since_look = 0;
-}
-
-/// Whether bonds lead from a point to another close by, never away from it: then no cut parts them.
-bool are_bound(const MpmState& s, std::int32_t p, std::int32_t q) {
-  constexpr int kFar = 4;  // points
-  const Points::Site &from = s.points.site[p], &to = s.points.site[q];
-  const LatticeBody& body = s.bodies[from.body];
-  const int d[3] = {to.x - from.x, to.y - from.y, to.z - from.z};
-  int bond[3], step[3], length[3];
-  for (int a = 0; a < 3; ++a) {
-    length[a] = std::abs(d[a]);
-    step[a] = d[a] < 0 ? -1 : 1;
-    bond[a] = d[a] < 0 ? kForwardBond - 1 - a : kForwardBond + a;
-    if (length[a] > kFar) return false;
-  }
-  bool reached[kFar + 1][kFar + 1][kFar + 1] = {};
-  reached[0][0][0] = true;
-  for (int z = 0; z <= length[2]; ++z) {
-    for (int y = 0; y <= length[1]; ++y) {
-      for (int x = 0; x <= length[0]; ++x) {
-        if (!reached[z][y][x]) continue;
-        const std::int32_t at =
-            body.point(from.x + step[0] * x, from.y + step[1] * y, from.z + step[2] * z);
-        const unsigned bonds = s.points.bonds[at];
-        if (x < length[0] && (bonds >> bond[0] & 1) != 0) reached[z][y][x + 1] = true;
-        if (y < length[1] && (bonds >> bond[1] & 1) != 0) reached[z][y + 1][x] = true;
-        if (z < length[2] && (bonds >> bond[2] & 1) != 0) reached[z + 1][y][x] = true;
-      }
-    }
-  }
-  return reached[length[2]][length[1]][length[0]];
 }
 
 /// Whether two facets belong to the same bit of a piece, as at an edge of it or on the two sides of
 /// a slice.
 bool are_one(const MpmState& s, const Pieces& pieces, std::int32_t a, std::int32_t b) {
   const std::int32_t p = facet_of(s, a).point, q = facet_of(s, b).point;
-  return pieces.of_point[p] == pieces.of_point[q] && are_bound(s, p, q);
+  if (pieces.of_point[p] != pieces.of_point[q]) return false;
+  const Points::Site &from = s.points.site[p], &to = s.points.site[q];
+  const LatticeBody& body = s.bodies[from.body];
+  return are_bound({from.x, from.y, from.z}, {to.x, to.y, to.z},
+                   [&](int x, int y, int z) { return s.points.bonds[body.point(x, y, z)]; });
 }
 
 Vec3 velocity(const FacetMotion& f) { return {f.v[0], f.v[1], f.v[2]}; }
 
 /// Whether no facet has left its skin since the pairs were listed (Verlet 1967), nor will when it
-/// travels on by so much [m].
+/// travels on by so much [m]; those that travel less than 0 take no part.
 bool pairs_last(const FaceContacts& faces, const std::vector<float>& travel) {
   if (faces.listed.size() != travel.size()) return false;
   Vec3 mean = Vec3::Zero();
+  int count = 0;
   const auto moved = [&faces](std::size_t f) {
     const float *x = faces.motion[f].x, *from = faces.listed[f].x;
     return Vec3(x[0] - from[0], x[1] - from[1], x[2] - from[2]);
   };
-  for (std::size_t f = 0; f < travel.size(); ++f) mean += moved(f);
-  mean /= std::max<std::size_t>(1, travel.size());
   for (std::size_t f = 0; f < travel.size(); ++f) {
+    if (travel[f] < 0) continue;
+    mean += moved(f);
+    ++count;
+  }
+  mean /= std::max(1, count);
+  for (std::size_t f = 0; f < travel.size(); ++f) {
+    if (travel[f] < 0) continue;
     if ((moved(f) - mean).norm() + travel[f] > faces.listed[f].skin) return false;
   }
   return true;
+}
+
+/// How fast facets move against their mean [m/s]; -1 for those that fly and take no part.
+std::vector<float> speeds(const MpmState& s, const Pieces& pieces, const std::vector<int>& size) {
+  const FaceContacts& faces = s.faces;
+  const std::size_t count = faces.motion.size();
+  const double cell = s.scene.cell_size;
+  std::vector<float> speed(count, 0);
+  SweptBox others;
+  std::fill_n(others.min, 3, 1e30f);
+  std::fill_n(others.max, 3, -1e30f);
+  for (std::size_t f = 0; f < count; ++f) {
+    const FacetMotion& m = faces.motion[f];
+    const int points = size[pieces.of_point[facet_of(s, static_cast<std::int32_t>(f)).point]];
+    const SweptBox box(m, cell);
+    if (flies(m, points, cell)) {
+      speed[f] = -1;
+      continue;
+    }
+    for (int a = 0; a < 3; ++a) {
+      others.min[a] = std::min(others.min[a], box.min[a]);
+      others.max[a] = std::max(others.max[a], box.max[a]);
+    }
+  }
+  Vec3 mean = Vec3::Zero();
+  int involved = 0;
+  for (std::size_t f = 0; f < count; ++f) {
+    if (speed[f] < 0 && SweptBox(faces.motion[f], cell).meets(others)) speed[f] = 0;
+    if (speed[f] < 0) continue;
+    mean += velocity(faces.motion[f]);
+    ++involved;
+  }
+  mean /= std::max(1, involved);
+  for (std::size_t f = 0; f < count; ++f) {
+    if (speed[f] < 0) continue;
+    speed[f] = static_cast<float>((velocity(faces.motion[f]) - mean).norm());
+  }
+  return speed;
 }
 
 /// Brings the motion of all facets up to date and finds those that may meet until the next search,
@@ -129,36 +144,34 @@ bool search(MpmState& s, const Pieces& pieces) {
       faces.motion[f] = motion_of(s, f);
     }
   });
-  Vec3 mean = Vec3::Zero();
-  for (const FacetMotion& f : faces.motion) mean += velocity(f);
-  mean /= std::max(1, facet_count);
-  std::vector<float> travel(facet_count);  // until the next search; first in a second
+  std::vector<int> size(pieces.next_id, 0);
+  for (const Fragment& f : pieces.all) size[f.id] = f.point_count;
+  std::vector<float> travel = speeds(s, pieces, size);  // until the next search; first in a second
   double fastest = 0;
-  for (std::int32_t f = 0; f < facet_count; ++f) {
-    travel[f] = static_cast<float>((velocity(faces.motion[f]) - mean).norm());
-    fastest = std::max(fastest, static_cast<double>(travel[f]));
+  bool finite = true;
+  for (const float t : travel) {
+    fastest = std::max(fastest, static_cast<double>(t));
+    finite = finite && t < kOutOfControl;
   }
-  if (!(fastest < 1e4)) {  // out of control, as the end of the frame will say
+  if (!finite) {  // as the end of the frame will say
     faces.listed.clear();
     faces.all.clear();
     faces.until_search = kHorizon;
     return false;
   }
   const auto cell = static_cast<float>(s.scene.cell_size);
-  const double horizon = std::min(kHorizon, kLargestReach * cell / (1.5 * fastest + 1e-9));
+  const double horizon = search_horizon(fastest, cell);
   faces.until_search = horizon;
-  for (float& t : travel) t *= static_cast<float>(1.5 * horizon);
+  for (float& t : travel) t = t < 0 ? -1 : t * static_cast<float>(kForesight * horizon);
   if (pairs_last(faces, travel)) return false;
   faces.listed.resize(facet_count);
   std::vector<float> reach(facet_count);
   for (std::int32_t f = 0; f < facet_count; ++f) {
     ListedFacet& listed = faces.listed[f];
     std::copy_n(faces.motion[f].x, 3, listed.x);
-    listed.skin = travel[f] + kSkin * cell;
-    reach[f] = kSearchReach * cell + listed.skin;
+    listed.skin = travel[f] < 0 ? -1 : travel[f] + kSkin * cell;
+    reach[f] = travel[f] < 0 ? 0 : kSearchReach * cell + listed.skin;
   }
-  std::vector<int> size(pieces.next_id, 0);
-  for (const Fragment& f : pieces.all) size[f.id] = f.point_count;
   auto pairs = facing_pairs(faces.motion, reach, 3 * cell, *s.cpu);
   std::vector<std::uint8_t> one(pairs.size());
   s.cpu->for_each(
@@ -169,19 +182,16 @@ bool search(MpmState& s, const Pieces& pieces) {
     if (one[i] == 0) pairs[left++] = pairs[i];
   }
   pairs.resize(left);
-  // Of two pieces the smaller one's facets touch the other's face; of one, both.
-  const auto touches = [&](std::int32_t a, std::int32_t b) {
+  const auto facet_touches = [&](std::int32_t a, std::int32_t b) {
     const int p = pieces.of_point[facet_of(s, a).point], q = pieces.of_point[facet_of(s, b).point];
-    if (p == q) return true;
-    const int m = size[p], n = size[q];
-    return m != n ? m < n : p > q;
+    return touches(PieceSize{p, size[p]}, PieceSize{q, size[q]});
   };
   std::vector<std::int32_t> count(facet_count, 0), contact(facet_count, -1);
   std::vector<bool> involved(facet_count, false);
   faces.involved.clear();
   for (const auto& [a, b] : pairs) {
-    if (touches(a, b)) ++count[a];
-    if (touches(b, a)) ++count[b];
+    if (facet_touches(a, b)) ++count[a];
+    if (facet_touches(b, a)) ++count[b];
     involved[a] = involved[b] = true;
   }
   for (const FaceContact& c : faces.all) {
@@ -212,8 +222,8 @@ bool search(MpmState& s, const Pieces& pieces) {
   faces.near.resize(faces.first_near.back());
   std::vector<std::int32_t> next(faces.first_near.begin(), faces.first_near.end() - 1);
   for (const auto& [a, b] : pairs) {
-    if (touches(a, b)) faces.near[next[contact[a]]++] = b;
-    if (touches(b, a)) faces.near[next[contact[b]]++] = a;
+    if (facet_touches(a, b)) faces.near[next[contact[a]]++] = b;
+    if (facet_touches(b, a)) faces.near[next[contact[b]]++] = a;
   }
   return true;
 }
@@ -223,35 +233,26 @@ void take_up_kept(MpmState& s, double dt) {
   FaceContacts& faces = s.faces;
   for (std::size_t i = 0; i < faces.all.size() && !faces.kept.empty(); ++i) {
     const Facet& facet = facet_of(s, faces.all[i].facet);
-    const auto kept = std::lower_bound(
-        faces.kept.begin(), faces.kept.end(), facet, [](const KeptContact& k, const Facet& f) {
-          return k.point != f.point ? k.point < f.point : k.direction < f.direction;
-        });
-    if (kept != faces.kept.end() && kept->point == facet.point &&
-        kept->direction == facet.direction) {
-      take_up(s, static_cast<int>(i), *kept, dt);
-    }
+    const KeptContact* kept =
+        find_kept(faces.kept.data(), static_cast<int>(faces.kept.size()), facet);
+    if (kept == nullptr) continue;
+    ContactFaces contact(s, static_cast<int>(i));
+    take_up(contact, faces.all[i], *kept, static_cast<float>(dt));
   }
   faces.kept.clear();
 }
 
 }  // namespace
 
-int find_face_contacts(MpmState& s, const Pieces& pieces, double dt, int at_most) {
+void find_face_contacts(MpmState& s, const Pieces& pieces, double dt) {
   FaceContacts& faces = s.faces;
-  const bool searched = faces.until_search <= 0;
+  const bool searched = is_due(faces.until_search, dt);
   if (searched && search(s, pieces)) take_up_kept(s, dt);
   if (!faces.all.empty() && (searched || faces.until_look <= 0)) look_at_all(s, dt, !searched);
   if (faces.all.empty()) faces.active.clear();
-  int substeps = 0;
-  do {
-    faces.until_search -= dt;
-    faces.until_look -= dt;
-    faces.since_look += dt;
-    ++substeps;
-  } while (substeps < at_most && faces.until_search > 0 &&
-           (faces.all.empty() || faces.until_look > 0));
-  return substeps;
+  faces.until_search -= dt;
+  faces.until_look -= dt;
+  faces.since_look += dt;
 }
 
 void keep_face_contacts(MpmState& s) {
@@ -260,22 +261,25 @@ void keep_face_contacts(MpmState& s) {
   for (const FaceContact& c : faces.all) {
     if (c.other < 0 || !c.touching) continue;
     const Facet& facet = facet_of(s, c.facet);
+    const Vec3 held = reference_place(body_of(s, c.other), block_of(s, c.other),
+                                      facet_of(s, c.other).cell, c.hold);
     faces.kept.push_back({facet.point,
                           facet.direction,
                           block_of(s, c.other).body,
-                          place_held(s, c),
+                          {held[0], held[1], held[2]},
                           c.depth,
                           c.begun,
                           c.stiffness,
                           {c.apart[0], c.apart[1], c.apart[2]}});
   }
   std::sort(faces.kept.begin(), faces.kept.end(), [](const KeptContact& a, const KeptContact& b) {
-    return a.point != b.point ? a.point < b.point : a.direction < b.direction;
+    return a.is_before(b.point, b.direction);
   });
 }
 
 void list_facets(MpmState& s) {
   FaceContacts& faces = s.faces;
+  ++faces.version;
   faces.first_facet.assign(1, 0);
   faces.block_of.clear();
   for (std::size_t b = 0; b < s.blocks.all.size(); ++b) {

@@ -84,43 +84,6 @@ Pieces whole_pieces(const std::vector<LatticeBody>& bodies, const Points& points
   return pieces;
 }
 
-bool hold_together(const std::vector<LatticeBody>& bodies, const Points& points,
-                   const std::vector<std::int32_t>& changed) {
-  constexpr int kReach = 4, kWidth = 2 * kReach + 1, kCount = kWidth * kWidth * kWidth;
-  std::vector<std::int32_t> seen(kCount, -1), way(kCount);  // seen: in which search
-  std::int32_t search = 0;
-  for (const std::int32_t p : changed) {
-    const Points::Site& s = points.site[p];
-    const LatticeBody& body = bodies[s.body];
-    const unsigned broken = whole_bonds(body, s) & ~unsigned{points.bonds[p]};
-    for (unsigned left = broken >> kForwardBond; left != 0; left &= left - 1) {
-      const BondOffset to = bond_offset(kForwardBond + __builtin_ctz(left));
-      const auto place = [](int x, int y, int z) {
-        return ((z + kReach) * kWidth + y + kReach) * kWidth + x + kReach;
-      };
-      const int goal = place(to.x, to.y, to.z);
-      int count = 0;
-      way[count++] = place(0, 0, 0);
-      seen[way[0]] = search;
-      for (int i = 0; i < count && seen[goal] != search; ++i) {
-        const int x = way[i] % kWidth - kReach, y = way[i] / kWidth % kWidth - kReach,
-                  z = way[i] / (kWidth * kWidth) - kReach;
-        const std::int32_t at = body.point(s.x + x, s.y + y, s.z + z);
-        for (unsigned bonds = points.bonds[at]; bonds != 0; bonds &= bonds - 1) {
-          const BondOffset o = bond_offset(__builtin_ctz(bonds));
-          const int i = x + o.x, j = y + o.y, k = z + o.z;
-          if (std::max({std::abs(i), std::abs(j), std::abs(k)}) > kReach) continue;
-          if (seen[place(i, j, k)] == search) continue;
-          seen[place(i, j, k)] = search;
-          way[count++] = place(i, j, k);
-        }
-      }
-      if (seen[goal] != search++) return false;
-    }
-  }
-  return true;
-}
-
 std::vector<int> update_pieces(const std::vector<LatticeBody>& bodies, const Points& points,
                                Pieces& pieces) {
   const std::vector<std::int32_t> component = components(bodies, points);

@@ -19,12 +19,11 @@ struct Pieces {
 /// One piece for each body.
 Pieces whole_pieces(const std::vector<LatticeBody>& bodies, const Points& points);
 
-/// Whether the ends of each bond that is broken at one of the points `changed` hold together by a
-/// way around, close by. Then breaking them left all pieces in one.
-bool hold_together(const std::vector<LatticeBody>& bodies, const Points& points,
-                   const std::vector<std::int32_t>& changed);
+/// Labels the points anew after the points `changed` lost bonds. Returns the new ids.
+std::vector<int> update_pieces(const std::vector<LatticeBody>& bodies, const Points& points,
+                               const std::vector<std::int32_t>& changed, Pieces& pieces);
 
-/// Labels the points anew after bonds broke (union-find over the bonds). Returns the new ids.
+/// The same without knowing which (union-find over all bonds).
 std::vector<int> update_pieces(const std::vector<LatticeBody>& bodies, const Points& points,
                                Pieces& pieces);
 

@@ -8,6 +8,8 @@
 
 namespace tissue_sim {
 
+struct FaceRounds;
+
 /// What a block's threads share, in shared memory.
 struct BlockShared {
   float4* u;                  ///< [slots], divided by the cell size
@@ -15,6 +17,7 @@ struct BlockShared {
   float4* exchange;           ///< [9][threads]
   unsigned long long* loads;  ///< [kMaxColliders][6]
   Collider* colliders;        ///< [kMaxColliders]
+  FaceRounds* rounds;
 };
 
 /// What one substep of a bundle needs beside its nodes.

@@ -30,27 +30,20 @@ __device__ __forceinline__ uint4 first_parts(const CudaTables& t, std::uint32_t 
           count > 3 ? __ldg(part + 3) : 0};
 }
 
-/// Bit of SlotCache::shared for a node that contact of tissue with tissue may push.
-inline constexpr std::uint32_t kPushed = 1u << 31;
-
-template <bool kFaces>
 __device__ __forceinline__ void fill_cache(const CudaTables& t, int first_slot, int slots,
-                                           const CudaFaces& faces, const SlotCache& cache) {
+                                           const SlotCache& cache) {
   for (int i = static_cast<int>(threadIdx.x); i < slots; i += static_cast<int>(blockDim.x)) {
     const int slot = first_slot + i;
+    const std::uint32_t shared = t.slot_parts[slot] & ~kPushed;
     cache.node[i] = t.slot_node[slot];
     cache.shared[i] = t.slot_parts[slot];
-    cache.parts[i] = first_parts(t, slot, cache.shared[i]);
-    if (cache.more != nullptr) cache.more[i] = more_parts(t, cache.shared[i]);
-    if (!kFaces) continue;
-    const std::int32_t node = cache.node[i] < 0 ? ~cache.node[i] : cache.node[i];
-    if (faces.marks[node] != 0) cache.shared[i] |= kPushed;
+    cache.parts[i] = first_parts(t, slot, shared);
+    if (cache.more != nullptr) cache.more[i] = more_parts(t, shared);
   }
 }
 
 /// Forces of contacts of tissue with tissue on the nodes, of the substep before and of the next.
 struct PushedNodes {
-  const std::uint8_t* marks;
   const long long* force;
   long long* clear;
 };
@@ -114,8 +107,7 @@ __device__ __forceinline__ void bring_nodes(const CudaTables& t, int first_slot,
       if (kMove || v_out != nullptr) v[k] = __ldcg(from.v + node[k]);
       if (!kMove) continue;
       if (kFaces) {
-        const bool marked =
-            kCached ? (shared[k] & kPushed) != 0 : __ldg(pushed.marks + node[k]) != 0;
+        const bool marked = (shared[k] & kPushed) != 0;
         push[k] = Pushed(pushed, marked, entry[k] >= 0, node[k]);
         shared[k] &= ~kPushed;
       }

@@ -102,26 +102,29 @@ CudaShape choose_shape(const std::vector<LatticeBody>& bodies, const CudaLimits&
   return best;
 }
 
+std::vector<std::vector<int>> single_blocks(std::size_t count) {
+  std::vector<std::vector<int>> bundles(count);
+  for (std::size_t i = 0; i < count; ++i) bundles[i] = {static_cast<int>(i)};
+  return bundles;
+}
+
 std::vector<std::vector<int>> bundle_blocks(const std::vector<Block*>& blocks, std::size_t wanted,
-                                            const BundleLimits& limits) {
+                                            const BundleLimits& limits, Cpu& cpu) {
   struct Filled {
     int body, material;
     BundleLimits has;
     std::vector<int> blocks;
   };
-  std::vector<Filled> single;
-  for (std::size_t i = 0; i < blocks.size(); ++i) {
+  std::vector<Filled> single(blocks.size());
+  cpu.for_each(static_cast<int>(blocks.size()), [&](int i) {
     const Block& b = *blocks[i];
-    single.push_back({b.body,
-                      b.material,
-                      {columns_of(b), b.nx * b.ny, (b.nx + 2) * (b.ny + 2) * (b.nz + 2)},
-                      {static_cast<int>(i)}});
-  }
-  if (blocks.size() > wanted) {
-    std::stable_sort(single.begin(), single.end(), [](const Filled& a, const Filled& b) {
-      return a.has.columns > b.has.columns;
-    });
-  }
+    single[i] = {b.body,
+                 b.material,
+                 {columns_of(b), b.nx * b.ny, (b.nx + 2) * (b.ny + 2) * (b.nz + 2)},
+                 {i}};
+  });
+  std::stable_sort(single.begin(), single.end(),
+                   [](const Filled& a, const Filled& b) { return a.has.columns > b.has.columns; });
   std::vector<Filled> bundles;
   for (Filled& one : single) {
     Filled* room = nullptr;

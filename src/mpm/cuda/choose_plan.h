@@ -31,10 +31,13 @@ struct BundleLimits {
   int slots;
 };
 
-/// Each block alone, or, where those are more than `wanted`, large ones first, each of the others
-/// with those that have the fewest columns. Gives indices into `blocks`; more than `wanted` bundles
-/// where they do not fit into fewer.
+/// Each block alone: indices into Blocks::all.
+std::vector<std::vector<int>> single_blocks(std::size_t count);
+
+/// Bundles, up to `wanted` of them: large blocks first, each of the others with those that have the
+/// fewest columns. Gives indices into `blocks`; more than `wanted` bundles where they do not fit
+/// into fewer.
 std::vector<std::vector<int>> bundle_blocks(const std::vector<Block*>& blocks, std::size_t wanted,
-                                            const BundleLimits& limits);
+                                            const BundleLimits& limits, Cpu& cpu);
 
 }  // namespace tissue_sim

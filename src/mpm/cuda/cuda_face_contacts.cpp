@@ -1,53 +1,36 @@
-// Contact of tissue with tissue where the tissue lives on a GPU: the host searches and looks, the
-// substeps between two looks run as one kernel that works the contacts out.
+// Contact of tissue with tissue where the tissue lives on a GPU: facets go up when there are new
+// ones, the search and the looks run there, and the host waits once in a search for its figures.
 #include <algorithm>
+#include <cmath>
+#include <cstring>
 
 #include "contact/face_places.h"
-#include "mpm/cuda/face_nodes.h"
 #include "mpm/cuda/on_device.h"
 
 namespace tissue_sim {
 namespace {
 
-/// Calls f(k, node) for the 27 nodes of a cell, x fastest.
-template <class F>
-void for_each_node(const CellNodes& cell, const F& f) {
-  for (int k = 0; k < 27; ++k) {
-    f(k, cell.lowest[k / 9 * cell.plane + k / 3 % 3 * cell.pitch + k % 3]);
+CudaFacet facet_on_device(const MpmState& s, const Block& block, const Facet& facet,
+                          int first_slot) {
+  CudaFacet f = {};
+  f.facet = facet;
+  f.pitch = block.nx + 2;
+  f.plane = f.pitch * (block.ny + 2);
+  const int z = facet.cell / block.plane, y = facet.cell % block.plane / block.pitch,
+            x = facet.cell % block.plane % block.pitch;
+  f.slot = first_slot + z * f.plane + y * f.pitch + x;
+  f.body = block.body;
+  const int cell[3] = {block.x + x, block.y + y, block.z + z};
+  const Points::Site& site = s.points.site[facet.point];
+  const std::int16_t at[3] = {site.x, site.y, site.z};
+  for (int a = 0; a < 3; ++a) {
+    f.cell[a] = static_cast<std::int16_t>(cell[a]);
+    f.site[a] = at[a];
   }
-}
-
-CudaContactNodes nodes_of(const MpmState& s, const FaceContact& c) {
-  CudaContactNodes nodes;
-  const float* w = c.weights.of;
-  for_each_node(c.nodes, [&](int k, std::int32_t n) {
-    nodes.own[k] = n;
-    nodes.weight[k] = w[k % 3] * w[3 + k / 3 % 3] * w[6 + k / 9];
-  });
-  for_each_node(c.other_nodes, [&](int k, std::int32_t n) {
-    nodes.other[k] = n;
-    nodes.other_inv_mass[k] = s.nodes.inv_mass[n];
-  });
-  return nodes;
-}
-
-/// The nodes that looks need until the next search.
-std::vector<std::int32_t> nodes_to_look_at(const MpmState& s) {
-  const FaceContacts& faces = s.faces;
-  std::vector<std::int32_t> nodes;
-  if (faces.all.empty()) return nodes;
-  std::vector<std::uint8_t> taken(s.nodes.size(), 0);
-  const auto take = [&](const CellNodes& cell) {
-    for_each_node(cell, [&](int, std::int32_t n) {
-      if (taken[n] == 0) nodes.push_back(n);
-      taken[n] = 1;
-    });
-  };
-  for (const std::int32_t f : faces.involved) take(CellNodes(block_of(s, f), facet_of(s, f).cell));
-  for (const FaceContact& c : faces.all) {
-    if (c.other >= 0) take(c.other_nodes);
-  }
-  return nodes;
+  const Material& m = s.bodies[block.body].material_of(s.points, facet.point);
+  f.friction = static_cast<float>(m.friction);
+  f.modulus = lame_lambda(m) + 2 * lame_mu(m);
+  return f;
 }
 
 }  // namespace
@@ -60,82 +43,236 @@ bool CudaMpmTissue::faces_may_meet() const {
 void CudaMpmTissue::run_substeps(int begin, int end, float dt) {
   while (begin < end) {
     int count = end - begin;
-    if (faces_may_meet()) count = find_faces(count, dt);
+    if (faces_may_meet()) {
+      FaceContacts& faces = state_->faces;
+      if (is_due(faces.until_search, dt)) search_faces(dt);
+      const double last = std::ceil(faces.until_search / dt - 0.5);
+      count = std::max(1, static_cast<int>(std::min<double>(count, last)));
+      faces.until_search -= count * static_cast<double>(dt);
+    }
     launch(begin, begin + count, dt);
-    fetch_faces();
     begin += count;
   }
 }
 
-int CudaMpmTissue::find_faces(int substeps, float dt) {
-  OnDevice& d = *device_;
-  FaceContacts& faces = state_->faces;
-  take_faces();
-  const bool search = faces.until_search <= 0;
-  d.looked = search || faces.until_look <= 0;
-  if (search) pull();
-  substeps = find_face_contacts(*state_, pieces_, dt, substeps);
-  if (search) {
-    d.host_face_nodes = nodes_to_look_at(*state_);
-    d.face_nodes.upload(d.host_face_nodes, d.stream);
+void CudaMpmTissue::upload_lattices() {
+  FacesOnDevice& f = device_->faces;
+  if (f.lattices.size() > 0) return;
+  std::vector<CudaLattice> lattices;
+  std::vector<std::int32_t> point_at;
+  for (const LatticeBody& b : state_->bodies) {
+    const Vec3 origin = b.node_position(0, 0, 0);
+    lattices.push_back(
+        {{origin[0], origin[1], origin[2]}, b.cell_size, 2 * b.nx, 2 * b.ny, point_at.size()});
+    point_at.insert(point_at.end(), b.point_at.begin(), b.point_at.end());
   }
-  const std::size_t count = faces.active.size(), node_count = d.u[0].size();
-  if (count == 0) return substeps;
-  d.host_springs.resize(count);
-  d.host_contact_nodes.resize(count);
-  state_->cpu->for_each(
-      static_cast<int>(count),
-      [&](int i) {
-        const FaceContact& c = faces.all[faces.active[i]];
-        d.host_springs[i] = c;
-        d.host_contact_nodes[i] = nodes_of(*state_, c);
-      },
-      64);
-  d.springs.upload(d.host_springs, d.stream);
-  d.contact_nodes.upload(d.host_contact_nodes, d.stream);
-  d.contact_marks.resize(node_count);
-  launch_mark(d.contact_nodes.data(), static_cast<int>(count), d.contact_marks.data(), node_count,
-              d.stream);
-  d.contact_force.resize(3 * 3 * node_count);
-  d.contact_force.clear(d.stream);
-  return substeps;
+  f.lattices.upload(lattices, device_->stream);
+  f.point_at.upload(point_at, device_->stream);
+  check_cuda(cudaStreamSynchronize(device_->stream), "receive data");
 }
 
-void CudaMpmTissue::fetch_faces() {
+void CudaMpmTissue::upload_facets() {
   OnDevice& d = *device_;
+  FacesOnDevice& f = d.faces;
   const FaceContacts& faces = state_->faces;
-  if (!faces_may_meet()) return;
-  d.springs_in_flight = faces.active.size();
-  d.springs.download(d.host_springs.data(), d.springs_in_flight, d.stream);
-  const bool look = !faces.all.empty() && faces.until_look <= 0 && faces.until_search > 0;
-  d.nodes_in_flight = look ? d.host_face_nodes.size() : 0;
-  if (!look) return;
-  const std::size_t count = d.nodes_in_flight;
-  d.gathered.resize(2 * count);
-  d.host_gathered.resize(2 * count);
-  launch_gather(d.face_nodes.data(), static_cast<int>(count), d.present(), d.gathered.data(),
-                d.stream);
-  d.gathered.download(d.host_gathered.data(), 2 * count, d.stream);
+  const bool renumbered = f.version != faces.version;
+  if (!renumbered && !f.pieces_changed) return;
+  const std::size_t count = faces.block_of.size();
+  std::vector<int> size(pieces_.next_id, 0);
+  for (const Fragment& piece : pieces_.all) size[piece.id] = piece.point_count;
+  f.host_facets.resize(count);
+  state_->cpu->for_each(static_cast<int>(state_->blocks.all.size()), [&](int b) {
+    const Block& block = *state_->blocks.all[b];
+    CudaFacet* to = f.host_facets.data() + faces.first_facet[b];
+    for (const Facet& facet : block.facets) {
+      *to = facet_on_device(*state_, block, facet, d.host_tables.first_slot[b]);
+      const std::int32_t piece = pieces_.of_point[facet.point];
+      to->piece = {piece, size[piece]};
+      ++to;
+    }
+  });
+  f.facets.upload(f.host_facets, d.stream);
+  check_cuda(cudaStreamSynchronize(d.stream), "receive data");
+  f.pieces_changed = false;
+  if (!renumbered) return;
+  f.version = faces.version;
+  f.lists_hold = false;
+  f.motion.resize(count);
+  f.listed.resize(count);
+  f.listed.clear(d.stream);
+  f.springs.resize(count);
+  for (auto* of_facet :
+       {&f.first_near, &f.near_count, &f.contacts, &f.involved, &f.active, &f.rank}) {
+    of_facet->resize(count);
+  }
+  f.is_involved.resize(count);
+  f.takes_part.resize(count);
+  f.sorted.resize(count);
+  f.marks.resize(d.u[0].size());
+  f.pushed_parts.resize(d.slot_parts.size());
+  if (f.figures.size() == 0) {
+    f.figures.resize(1);
+    f.figures.clear(d.stream);
+  }
+  f.host_figures.resize(1);
+  f.sums.resize(search_sums(static_cast<int>(count)));
+  std::size_t buckets = 1024;
+  while (buckets < 2 * count) buckets *= 2;
+  f.bucket_begin.resize(buckets);
+  f.bucket_count.resize(buckets);
+  f.near.resize(std::max(f.near.size(), 8 * count));
+  f.springs.clear(d.stream);
+  launch_fresh_contacts(looks(), d.stream);
 }
 
-void CudaMpmTissue::take_faces() {
+CudaLooks CudaMpmTissue::looks() const {
+  const OnDevice& d = *device_;
+  const FacesOnDevice& f = d.faces;
+  CudaLooks s;
+  s.facet_count = static_cast<int>(f.facets.size());
+  s.cell_size = static_cast<float>(state_->scene.cell_size);
+  s.facets = f.facets.data();
+  s.lattices = f.lattices.data();
+  s.point_at = f.point_at.data();
+  s.bonds = d.bonds.data();
+  s.slot_node = d.slot_node.data();
+  s.motion = f.motion.data();
+  s.listed = f.listed.data();
+  s.springs = f.springs.data();
+  s.first_near = f.first_near.data();
+  s.near_count = f.near_count.data();
+  s.near = f.near.data();
+  s.near_capacity = f.near.size();
+  s.is_involved = f.is_involved.data();
+  s.takes_part = f.takes_part.data();
+  s.contacts = f.contacts.data();
+  s.involved = f.involved.data();
+  s.active = f.active.data();
+  s.nodes = f.nodes.data();
+  s.marks = f.marks.data();
+  s.node_count = f.marks.size();
+  s.slot_parts = d.slot_parts.data();
+  s.pushed_parts = f.pushed_parts.data();
+  s.slot_count = d.slot_parts.size();
+  s.figures = f.figures.data();
+  return s;
+}
+
+void CudaMpmTissue::search_faces(float dt) {
   OnDevice& d = *device_;
-  if (d.springs_in_flight + d.nodes_in_flight == 0) return;
-  check_cuda(cudaStreamSynchronize(d.stream), "send contacts");
+  FacesOnDevice& f = d.faces;
   FaceContacts& faces = state_->faces;
-  for (std::size_t i = 0; i < d.springs_in_flight; ++i) {
-    FaceContact& c = faces.all[faces.active[i]];
-    static_cast<FaceSpring&>(c) = d.host_springs[i];
+  upload_lattices();
+  upload_facets();
+  faces.until_search = kHorizon;
+  f.contacts_count = 0;
+  if (f.facets.size() == 0) return;
+  const CudaSearchRoom room{f.sums.data(),         static_cast<std::int32_t>(f.bucket_count.size()),
+                            f.bucket_begin.data(), f.bucket_count.data(),
+                            f.rank.data(),         f.sorted.data()};
+  const CudaFaceFigures& figures = f.host_figures[0];
+  const auto read = [&] {
+    f.figures.download(f.host_figures.data(), 1, d.stream);
+    check_cuda(cudaStreamSynchronize(d.stream), "search contacts");
+  };
+  launch_search(looks(), d.present(), room, !f.lists_hold, d.stream);
+  read();
+  float fastest;
+  std::memcpy(&fastest, &figures.fastest, sizeof(fastest));
+  f.lists_hold = fastest < kOutOfControl;
+  if (!f.lists_hold) return;  // as the end of the frame will say
+  faces.until_search = figures.horizon;
+  while (figures.listed_anew != 0 && static_cast<std::size_t>(figures.near) > f.near.size()) {
+    f.near.resize(static_cast<std::size_t>(figures.near) * 3 / 2);
+    launch_lists(looks(), room, d.stream);
+    read();
+  }
+  f.contacts_count = figures.contacts;
+  if (f.nodes.size() < static_cast<std::size_t>(figures.contacts)) {
+    f.nodes.resize(static_cast<std::size_t>(figures.contacts) * 3 / 2);
+  }
+  f.force.resize(3 * 3 * d.u[0].size());
+  f.searched = true;
+  if (!faces.kept.empty()) {
+    f.kept.upload(faces.kept, d.stream);
+    launch_take_up(looks(), d.present(), f.kept.data(), static_cast<int>(faces.kept.size()),
+                   figures.contacts, dt, d.stream);
+    check_cuda(cudaStreamSynchronize(d.stream), "receive data");
+    faces.kept.clear();
+  }
+}
+
+CudaFaces CudaMpmTissue::faces_of_launch() {
+  OnDevice& d = *device_;
+  FacesOnDevice& f = d.faces;
+  CudaFaces out;
+  out.any = faces_may_meet() && f.contacts_count > 0 && f.version == state_->faces.version;
+  if (!out.any) return out;
+  out.look_first = std::exchange(f.searched, false);
+  out.looks = looks();
+  out.force = f.force.data();
+  out.stride = f.force.size() / 3;
+  f.force.clear(d.stream);
+  return out;
+}
+
+void CudaMpmTissue::pull_contacts() {
+  OnDevice& d = *device_;
+  FacesOnDevice& f = d.faces;
+  FaceContacts& faces = state_->faces;
+  faces.all.clear();
+  faces.active.clear();
+  if (f.version != faces.version || f.contacts_count == 0 || f.searched) return;
+  const int count = f.contacts_count;
+  f.gathered.resize(count);
+  launch_gather_contacts(looks(), count, f.gathered.data(), d.stream);
+  std::vector<FaceSpring> springs(count);
+  f.gathered.download(springs.data(), count, d.stream);
+  f.figures.download(f.host_figures.data(), 1, d.stream);
+  check_cuda(cudaStreamSynchronize(d.stream), "send contacts");
+  std::vector<std::int32_t> active(f.host_figures[0].active);
+  f.active.download(active.data(), active.size(), d.stream);
+  check_cuda(cudaStreamSynchronize(d.stream), "send contacts");
+  std::sort(springs.begin(), springs.end(),
+            [](const FaceSpring& a, const FaceSpring& b) { return a.facet < b.facet; });
+  std::sort(active.begin(), active.end());
+  for (const FaceSpring& spring : springs) {
+    if (spring.other < 0) continue;
+    FaceContact c;
+    static_cast<FaceSpring&>(c) = spring;
+    const Facet &own = facet_of(*state_, c.facet), &other = facet_of(*state_, c.other);
+    c.nodes = CellNodes(block_of(*state_, c.facet), own.cell);
+    c.weights = AxisWeights(own.center);
+    c.other_nodes = CellNodes(block_of(*state_, c.other), other.cell);
     c.other_weights = AxisWeights(c.hold);
+    if (std::binary_search(active.begin(), active.end(), c.facet)) {
+      faces.active.push_back(static_cast<std::int32_t>(faces.all.size()));
+    }
+    faces.all.push_back(c);
   }
-  Nodes& n = state_->nodes;
-  const float4 *u = d.host_gathered.data(), *v = u + d.nodes_in_flight;
-  for (std::size_t i = 0; i < d.nodes_in_flight; ++i) {
-    const std::int32_t node = d.host_face_nodes[i];
-    n.u[0][node] = u[i].x, n.u[1][node] = u[i].y, n.u[2][node] = u[i].z;
-    n.v[0][node] = v[i].x, n.v[1][node] = v[i].y, n.v[2][node] = v[i].z;
+  faces.until_look = f.host_figures[0].until_look;
+  faces.since_look = f.host_figures[0].since_look;
+}
+
+void CudaMpmTissue::search_anew() {
+  device_->faces.lists_hold = false;
+  state_->faces.until_search = 0;
+}
+
+std::vector<std::vector<std::int32_t>> CudaMpmTissue::near_facets() const {
+  const OnDevice& d = *device_;
+  const FacesOnDevice& f = d.faces;
+  const std::size_t count = f.facets.size();
+  std::vector<std::int32_t> first(count), size(count), near(f.near.size());
+  f.first_near.download(first.data(), count, d.stream);
+  f.near_count.download(size.data(), count, d.stream);
+  f.near.download(near.data(), near.size(), d.stream);
+  check_cuda(cudaStreamSynchronize(d.stream), "send contacts");
+  std::vector<std::vector<std::int32_t>> lists(count);
+  for (std::size_t i = 0; i < count; ++i) {
+    lists[i].assign(near.begin() + first[i], near.begin() + first[i] + size[i]);
   }
-  d.springs_in_flight = d.nodes_in_flight = 0;
+  return lists;
 }
 
 }  // namespace tissue_sim

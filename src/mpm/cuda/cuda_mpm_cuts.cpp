@@ -40,25 +40,27 @@ std::size_t CudaMpmTissue::device_bytes() const {
                     d.colour.bytes() + d.volume.bytes() + d.partial.bytes() + d.hold.bytes() +
                     d.bonds.bytes() + d.with.bytes() + d.whole.bytes() + d.u_before.bytes() +
                     d.colliders.bytes() + d.loads.bytes() + d.measures.bytes() + d.cloud.bytes() +
-                    d.stretched.bytes() + d.springs.bytes() + d.contact_nodes.bytes() +
-                    d.contact_marks.bytes() + d.contact_force.bytes() + d.face_nodes.bytes() +
-                    d.gathered.bytes();
+                    d.stretched.bytes() + d.faces.bytes();
   for (int i = 0; i < 2; ++i) sum += d.u[i].bytes() + d.v[i].bytes() + d.force[i].bytes();
   return sum;
 }
 
 void CudaMpmTissue::pull() {
+  pull_nodes();
+  pull_contacts();
+}
+
+void CudaMpmTissue::pull_nodes() {
   OnDevice& d = *device_;
   const std::size_t n = d.u[0].size();
   d.host_nodes.resize(2 * n);
   d.u[d.current].download(d.host_nodes.data(), n, d.stream);
   d.v[d.current].download(d.host_nodes.data() + n, n, d.stream);
   check_cuda(cudaStreamSynchronize(d.stream), "finish a frame");
-  take_faces();
-  unpack_nodes(d.host_nodes.data(), d.host_nodes.data() + n, state_->nodes);
+  unpack_nodes(d.host_nodes.data(), d.host_nodes.data() + n, *state_->cpu, state_->nodes);
 }
 
-HostTables CudaMpmTissue::plan_tables() {
+void CudaMpmTissue::plan_tables() {
   OnDevice& d = *device_;
   d.plan.threads = d.shape.threads;
   d.plan.small = d.shape.small;
@@ -85,15 +87,22 @@ HostTables CudaMpmTissue::plan_tables() {
     d.face_resident = resident_blocks(d.face_plan, static_cast<int>(count));
   };
   choose(blocks.size());
-  std::vector<std::vector<int>> bundles = bundle_blocks(blocks, blocks.size(), {});
-  if (d.plan.small && !(d.plan.cached && d.face_plan.cached)) {
-    const auto at_once =
-        static_cast<std::size_t>(std::min(cached_at_once(d.plan), cached_at_once(d.face_plan)));
-    std::vector<std::vector<int>> fewer = bundle_blocks(
-        blocks, at_once, {d.plan.threads / 2, d.plan.threads, most_cached_slots(d.face_plan)});
-    if (fewer.size() <= at_once) bundles = std::move(fewer);
+  std::vector<std::vector<int>> bundles = single_blocks(blocks.size());
+  if (!(d.plan.cached && d.face_plan.cached)) {
+    // As many as whole tissue has, or, of a small one, as run at once.
+    const auto at_once = static_cast<std::size_t>(
+        std::max(1, std::min(most_at_once(d.plan), most_at_once(d.face_plan))));
+    const std::size_t rounds = (state_->blocks.regions.size() + at_once - 1) / at_once;
+    const std::size_t wanted = d.plan.small ? at_once : rounds * at_once;
+    if (blocks.size() > wanted) {
+      std::vector<std::vector<int>> fewer = bundle_blocks(
+          blocks, wanted, {d.plan.threads / 2, d.plan.threads, most_slots(d.face_plan)},
+          *state_->cpu);
+      if (fewer.size() <= wanted) bundles = std::move(fewer);
+    }
   }
-  HostTables t = make_tables(*state_, bundles);
+  HostTables& t = d.host_tables;
+  make_tables(*state_, bundles, t);
   d.plan.max_slots = t.max_slots;
   choose(bundles.size());
   d.all_plain = std::all_of(t.bundles.begin(), t.bundles.end(),
@@ -101,12 +110,12 @@ HostTables CudaMpmTissue::plan_tables() {
   if (d.resident == 0 || d.plain_resident == 0 || d.face_resident == 0) {
     throw std::runtime_error("the GPU has too little shared memory");
   }
-  return t;
 }
 
 void CudaMpmTissue::push() {
   OnDevice& d = *device_;
-  const HostTables t = plan_tables();
+  plan_tables();
+  const HostTables& t = d.host_tables;
   const std::size_t n = state_->nodes.size();
   const auto points = static_cast<std::size_t>(state_->points.size());
   const Scene& scene = state_->scene;
@@ -118,7 +127,6 @@ void CudaMpmTissue::push() {
   check_memory(bytes_of(t, n, points, pushes, d.held_by), device_bytes());
   check_cuda(cudaStreamSynchronize(d.stream), "finish a frame");
   d.blocks.upload(t.blocks, d.stream);
-  d.of_host = t.of_host;
   d.bundles.upload(t.bundles, d.stream);
   d.columns.upload(t.columns, d.stream);
   d.push_stride = t.max_halves;
@@ -145,11 +153,12 @@ void CudaMpmTissue::push() {
   d.bonds.upload(state_->points.bonds, d.stream);
   d.arrived.resize(2);
   d.host_nodes.resize(2 * n);
-  pack_nodes(state_->nodes, d.host_nodes.data(), d.host_nodes.data() + n);
-  for (int i = 0; i < 2; ++i) {
-    d.u[i].upload(d.host_nodes.data(), n, d.stream);
-    d.v[i].upload(d.host_nodes.data() + n, n, d.stream);
-  }
+  pack_nodes(state_->nodes, *state_->cpu, d.host_nodes.data(), d.host_nodes.data() + n);
+  d.u[d.current].upload(d.host_nodes.data(), n, d.stream);
+  d.v[d.current].upload(d.host_nodes.data() + n, n, d.stream);
+  // What no block moves, the other state has, too.
+  d.u[1 - d.current].copy(d.u[d.current], d.stream);
+  d.v[1 - d.current].copy(d.v[d.current], d.stream);
   check_cuda(cudaStreamSynchronize(d.stream), "receive data");
   d.points_changed = true;
 }
@@ -162,7 +171,8 @@ void CudaMpmTissue::cut(const std::vector<BladePath>& paths, const Array<float>*
   }
   if (changed.empty()) return;
   take_apart(*state_, changed);
-  report.new_fragments = update_pieces(state_->bodies, state_->points, pieces_);
+  report.new_fragments = update_pieces(state_->bodies, state_->points, changed, pieces_);
+  if (!report.new_fragments.empty()) device_->faces.pieces_changed = true;
   push();
   launch_measure();
   finish_measure();
@@ -187,12 +197,7 @@ void CudaMpmTissue::cut_by_blades(const std::vector<BlockMotion>& before) {
   d.u_before.download(d.host_nodes.data(), n, d.stream);
   check_cuda(cudaStreamSynchronize(d.stream), "send data");
   for (int a = 0; a < 3; ++a) state_->u_before[a].resize(n);
-  for (std::size_t i = 0; i < n; ++i) {
-    const float4& u = d.host_nodes[i];
-    state_->u_before[0][i] = u.x;
-    state_->u_before[1][i] = u.y;
-    state_->u_before[2][i] = u.z;
-  }
+  unpack_field(d.host_nodes.data(), n, *state_->cpu, state_->u_before);
   cut(blades_, state_->u_before, before, result_.blade_report);
 }
 

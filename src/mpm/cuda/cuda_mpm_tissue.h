@@ -12,7 +12,8 @@
 
 namespace tissue_sim {
 
-struct HostTables;
+struct CudaFaces;
+struct CudaLooks;
 
 /// The nodes live on the GPU; lattice, bonds, blocks and pieces on the host too, where cuts are
 /// made between frames.
@@ -35,17 +36,21 @@ class CudaMpmTissue final : public Tissue {
 
   // For tests and the benchmark.
   int fragment_of(int point) const { return pieces_.of_point[point]; }
-  /// The host's copy, whose nodes are as pull() left them or later; contacts as of finish().
+  /// The host's copy, whose nodes and contacts are as pull() left them or later.
   MpmState& state() { return *state_; }
-  void pull();                       ///< nodes from the GPU
-  void push();                       ///< everything to the GPU
+  void pull();  ///< nodes and contacts from the GPU
+  void push();  ///< everything but contacts to the GPU
+  const Pieces& pieces() const { return pieces_; }
+  void search_anew();  ///< lists of facets that may touch are made anew before the next substep
+  /// Of each facet, those that it may touch, as of the last search.
+  std::vector<std::vector<std::int32_t>> near_facets() const;
   std::size_t device_bytes() const;  ///< memory that it takes
   std::string plan() const;          ///< shape of the blocks, threads
 
  private:
   struct OnDevice;
 
-  HostTables plan_tables();  ///< how the blocks are worked on, and the tables for it
+  void plan_tables();  ///< how the blocks are worked on, and the tables for it
   void cut(const std::vector<BladePath>& paths, const Array<float>* u_before,
            const std::vector<BlockMotion>& before, CutReport& report);
   void cut_by_blades(const std::vector<BlockMotion>& before);
@@ -54,14 +59,19 @@ class CudaMpmTissue final : public Tissue {
   void tear(const std::vector<TearingPoint>& tearing, const FrameInput& input, double share);
   void upload_points();
   void find_near(double duration);
-  /// Enqueues the frame's substeps from `begin` up to `end`; waits between them where faces meet.
+  /// Enqueues the frame's substeps from `begin` up to `end`; waits for each search of faces.
   void run_substeps(int begin, int end, float dt);
   void launch(int begin, int end, float dt);
   /// Whether tissue can touch tissue. A body that is whole does not touch itself.
   bool faces_may_meet() const;
-  int find_faces(int substeps, float dt);  ///< contacts to the GPU: see find_face_contacts()
-  void fetch_faces();                      ///< enqueues the way back
-  void take_faces();                       ///< what came back
+  void upload_lattices();
+  void upload_facets();
+  void search_faces(
+      float dt);  ///< and says when the next search is due: FaceContacts::until_search
+  CudaLooks looks() const;
+  CudaFaces faces_of_launch();
+  void pull_nodes();
+  void pull_contacts();
   void launch_measure();
   void finish_measure();
   void follow_stability();

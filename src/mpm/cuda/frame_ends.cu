@@ -12,31 +12,34 @@ namespace {
 
 constexpr int kThreads = 128;
 
-/// One warp for each block.
+/// One thread block for each block.
 __global__ void find_near(const CudaTables t, const CudaMeasure* measures, const CudaBox* reach,
                           int collider_count, float duration, float cell_margin) {
-  const int index = (blockIdx.x * blockDim.x + threadIdx.x) / 32;
-  const int lane = threadIdx.x % 32;
-  if (index >= t.block_count) return;
-  const CudaMeasure& m = measures[index];
-  const float margin = m.speed * duration + cell_margin;
-  bool meets = lane < collider_count;
-  if (meets) {
-    for (int a = 0; a < 3; ++a) {
-      meets = meets && m.min[a] - margin <= reach[lane].max[a] &&
-              reach[lane].min[a] <= m.max[a] + margin;
+  __shared__ unsigned near;
+  const int index = static_cast<int>(blockIdx.x), thread = static_cast<int>(threadIdx.x);
+  if (thread < 32) {
+    const CudaMeasure& m = measures[index];
+    const float margin = m.speed * duration + cell_margin;
+    bool meets = thread < collider_count;
+    if (meets) {
+      for (int a = 0; a < 3; ++a) {
+        meets = meets && m.min[a] - margin <= reach[thread].max[a] &&
+                reach[thread].min[a] <= m.max[a] + margin;
+      }
     }
+    const unsigned met = __ballot_sync(0xffffffffu, meets);
+    if (thread == 0) t.near[index] = near = met;
   }
-  const unsigned near = __ballot_sync(0xffffffffu, meets);
+  __syncthreads();
+  if (t.held_by == 0) return;
   const CudaBlock& b = t.blocks[index];
-  for (int i = lane; i < 8 * b.nx * b.ny * b.nz; i += 32) {
+  for (int i = thread; i < 8 * b.nx * b.ny * b.nz; i += static_cast<int>(blockDim.x)) {
     const int p = t.point[b.first_lane + i];
     for (int slot = 0; p >= 0 && slot < t.held_by; ++slot) {
       std::uint8_t& with = t.with[p * t.held_by + slot];
       if (with != 0 && (near >> (with - 1) & 1u) == 0) with = 0;
     }
   }
-  if (lane == 0) t.near[index] = near;
 }
 
 /// A point's deformation gradient and place, from its half plane.
@@ -250,9 +253,8 @@ void allow(Kernel kernel, std::size_t bytes) {
 
 void launch_near(const CudaTables& tables, const CudaMeasure* measures, const CudaBox* reach,
                  int collider_count, float duration, float margin, cudaStream_t stream) {
-  const int blocks = (tables.block_count * 32 + kThreads - 1) / kThreads;
-  find_near<<<blocks, kThreads, 0, stream>>>(tables, measures, reach, collider_count, duration,
-                                             margin);
+  find_near<<<tables.block_count, kThreads, 0, stream>>>(tables, measures, reach, collider_count,
+                                                         duration, margin);
   check_cuda(cudaGetLastError(), "start a kernel");
 }
 

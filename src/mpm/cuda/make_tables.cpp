@@ -28,39 +28,37 @@ CudaBody body_of(const LatticeBody& b, const Material& m) {
   return body;
 }
 
-/// The block's points in the GPU's order.
-void add_points(const Block& from, float whole_volume, CudaBlock& block, HostTables& t) {
-  block.first_lane = static_cast<int>(t.point.size());
+/// The block's points in the GPU's order, from the block's first lane on.
+void fill_points(const Block& from, float whole_volume, CudaBlock& block, HostTables& t) {
   // The GPU's lanes are all cells of the box, the CPU's those that hold points.
   const int columns = block.nx * block.ny;
   const std::size_t cells = static_cast<std::size_t>(block.nz) * columns;
-  t.point.resize(t.point.size() + 8 * cells, -1);
-  t.volume.resize(t.volume.size() + 8 * cells, 0.0f);
-  t.partial.resize(t.partial.size() + cells, 0.0f);
-  const auto cell_of = [&](int z, int lane) {
-    const int y = from.cell[lane] / from.pitch, x = from.cell[lane] % from.pitch;
-    return static_cast<std::size_t>(z) * columns + y * block.nx + x;
+  std::int32_t* point = t.point.data() + block.first_lane;
+  float* volume = t.volume.data() + block.first_lane;
+  float* partial = t.partial.data() + block.first_lane / 8;
+  std::fill_n(point, 8 * cells, -1);
+  std::fill_n(volume, 8 * cells, 0.0f);
+  std::fill_n(partial, cells, 0.0f);
+  const auto column_of = [&](int lane) {
+    return from.cell[lane] / from.pitch * block.nx + from.cell[lane] % from.pitch;
   };
-  for (std::size_t lane = 0; lane < from.lane_count(); ++lane) {
-    if (from.point[lane] < 0) continue;
-    const int z = static_cast<int>(lane / from.stride / 8),
-              s = static_cast<int>(lane / from.stride % 8);
-    const std::size_t cell = cell_of(z, static_cast<int>(lane % from.stride)) % columns;
-    const std::size_t to =
-        block.first_lane + (static_cast<std::size_t>(z) * 8 + s) * columns + cell;
-    t.point[to] = from.point[lane];
-    t.volume[to] = from.volume[lane];
+  for (int layer = 0; layer < 8 * block.nz; ++layer) {
+    const std::size_t first = static_cast<std::size_t>(layer) * from.stride,
+                      to = static_cast<std::size_t>(layer) * columns;
+    for (int lane = 0; lane < from.stride; ++lane) {
+      if (from.point[first + lane] < 0) continue;
+      point[to + column_of(lane)] = from.point[first + lane];
+      volume[to + column_of(lane)] = from.volume[first + lane];
+    }
   }
   bool whole = true;
   for (std::size_t i = 0; i < 8 * cells; ++i) {
-    whole = whole && t.point[block.first_lane + i] >= 0 &&
-            t.volume[block.first_lane + i] == whole_volume;
+    whole = whole && point[i] >= 0 && volume[i] == whole_volume;
   }
   block.whole = whole ? 1 : 0;
   block.partial = from.partial.empty() ? 0 : 1;
   for (const Block::PartialCell& cell : from.partial) {
-    t.partial[block.first_lane / 8 + cell_of(cell.lane / from.stride, cell.lane % from.stride)] =
-        cell.mu;
+    partial[cell.lane / from.stride * columns + column_of(cell.lane % from.stride)] = cell.mu;
   }
 }
 
@@ -70,10 +68,22 @@ float common_volume(const MpmState& state, int body) {
   return b.point_count == 0 ? 0.0f : state.points.volume[b.first_point + b.point_count / 2];
 }
 
-/// Which slots share a node, and which of them owns it.
-void connect(std::size_t node_count, HostTables& t) {
+/// Which slots share a node, and which of them owns it. Each chunk of nodes goes through all slots.
+void connect(std::size_t node_count, Cpu& cpu, HostTables& t) {
+  const std::size_t slots = t.slot_node.size();
+  const int chunks = cpu.threads();
+  const auto for_each_slot = [&](const auto& visit) {
+    cpu.for_each(chunks, [&](int c) {
+      const auto begin = static_cast<std::int32_t>(node_count * c / chunks),
+                 end = static_cast<std::int32_t>(node_count * (c + 1) / chunks);
+      for (std::size_t slot = 0; slot < slots; ++slot) {
+        const std::int32_t n = t.slot_node[slot];
+        if (n >= begin && n < end) visit(slot, n);
+      }
+    });
+  };
   std::vector<std::uint32_t> begin(node_count + 1, 0);
-  for (const std::int32_t n : t.slot_node) ++begin[n + 1];
+  for_each_slot([&](std::size_t, std::int32_t n) { ++begin[n + 1]; });
   for (std::size_t n = 0; n < node_count; ++n) {
     if (begin[n + 1] > 63) {
       throw std::runtime_error("a node is shared by " + std::to_string(begin[n + 1]) +
@@ -88,24 +98,23 @@ void connect(std::size_t node_count, HostTables& t) {
         "cell_size");
   }
   t.parts.resize(begin.back());
-  t.slot_parts.assign(t.slot_node.size(), 0);
-  std::vector<std::uint8_t> filled(node_count, 0);
-  for (std::size_t slot = 0; slot < t.slot_node.size(); ++slot) {
-    const std::int32_t n = t.slot_node[slot];
+  t.slot_parts.resize(slots);
+  std::vector<std::uint8_t> filled(node_count, 0), is_owner(slots, 0);
+  for_each_slot([&](std::size_t slot, std::int32_t n) {
     const std::uint32_t count = begin[n + 1] - begin[n];
-    const bool first = filled[n] == 0;
-    if (count > 0) {
-      t.parts[begin[n] + filled[n]] = static_cast<std::uint32_t>(slot);
-      t.slot_parts[slot] = begin[n] << 6 | count;
-    }
+    if (count > 0) t.parts[begin[n] + filled[n]] = static_cast<std::uint32_t>(slot);
+    t.slot_parts[slot] = count > 0 ? begin[n] << 6 | count : 0;
+    is_owner[slot] = filled[n] == 0 ? 1 : 0;
     ++filled[n];
-    if (!first) t.slot_node[slot] = ~n;
+  });
+  for (std::size_t slot = 0; slot < slots; ++slot) {
+    if (is_owner[slot] == 0) t.slot_node[slot] = ~t.slot_node[slot];
   }
 }
 
-/// The columns of the block that hold points, `first_slot` and `first_place` from the bundle's on.
-void add_columns(const CudaBlock& b, float cell_size, int first_slot, int first_place,
-                 HostTables& t) {
+/// The columns of the block that hold points, as if it were alone in its bundle.
+std::vector<CudaColumn> columns_of(const CudaBlock& b, float cell_size, const HostTables& t) {
+  std::vector<CudaColumn> columns;
   const int step = b.nx * b.ny;
   for (int i = 0; i < step; ++i) {
     CudaColumn c = {};
@@ -116,56 +125,87 @@ void add_columns(const CudaBlock& b, float cell_size, int first_slot, int first_
     const int x = i % b.nx, y = i / b.nx;
     c.pitch = b.nx + 2;
     c.plane = c.pitch * (b.ny + 2);
-    c.slot = first_slot + y * c.pitch + x;
+    c.slot = y * c.pitch + x;
     c.lane = b.first_lane + i;
     c.step = step;
     c.cell = b.first_lane / 8 + i;
-    c.place = first_place + i;
+    c.place = i;
     c.middle[0] = b.origin[0] + cell_size * static_cast<float>(x + 1);
     c.middle[1] = b.origin[1] + cell_size * static_cast<float>(y + 1);
     c.middle[2] = b.origin[2] + cell_size;
     c.whole = b.whole;
-    t.columns.push_back(c);
+    columns.push_back(c);
   }
+  return columns;
 }
 
-void add_block(const MpmState& state, int index, HostTables& t) {
-  const Block& from = *state.blocks.all[index];
-  CudaBlock block;
+/// The block without what its points tell.
+CudaBlock block_at(const MpmState& state, const Block& from, int first_slot, int first_lane,
+                   const HostTables& t) {
+  CudaBlock block = {};
   block.body = t.first_material[from.body] + from.material;
   block.nx = from.nx;
   block.ny = from.ny;
   block.nz = from.nz;
-  block.first_slot = static_cast<int>(t.slot_node.size());
+  block.first_slot = first_slot;
+  block.first_lane = first_lane;
   const Vec3 origin = state.bodies[from.body].node_position(from.x - 1, from.y - 1, from.z - 1);
   for (int a = 0; a < 3; ++a) block.origin[a] = static_cast<float>(origin[a]);
-  add_points(from, t.bodies[block.body].point_volume, block, t);
+  return block;
+}
+
+void fill_slots(const Block& from, const CudaBlock& block, HostTables& t) {
+  std::int32_t* to = t.slot_node.data() + block.first_slot;
   for (int z = 0; z < block.nz + 2; ++z) {
     for (int y = 0; y < block.ny + 2; ++y) {
       const int* row = from.node.data() + z * from.plane + y * from.pitch;
-      t.slot_node.insert(t.slot_node.end(), row, row + block.nx + 2);
+      to = std::copy_n(row, block.nx + 2, to);
     }
   }
-  t.blocks.push_back(block);
-  t.of_host.push_back(index);
 }
 
-void add_bundle(const MpmState& state, const std::vector<int>& blocks, HostTables& t) {
+/// Where each block has its slots and lanes, the bundles' one after the other.
+void lay_out(const MpmState& state, const std::vector<std::vector<int>>& bundles, HostTables& t) {
+  int slots = 0, lanes = 0;
+  t.blocks.clear();
+  t.of_host.clear();
+  t.first_slot.resize(state.blocks.all.size());
+  for (const std::vector<int>& blocks : bundles) {
+    for (const int index : blocks) {
+      const Block& from = *state.blocks.all[index];
+      t.blocks.push_back(block_at(state, from, slots, lanes, t));
+      t.of_host.push_back(index);
+      t.first_slot[index] = slots;
+      slots += t.blocks.back().slots();
+      lanes += 8 * from.nx * from.ny * from.nz;
+    }
+  }
+  t.slot_node.resize(slots);
+  t.point.resize(lanes);
+  t.volume.resize(lanes);
+  t.partial.resize(lanes / 8);
+}
+
+void add_bundle(int first_block, int blocks, std::vector<std::vector<CudaColumn>>& columns,
+                HostTables& t) {
   CudaBundle bundle = {};
-  bundle.first_block = static_cast<int>(t.blocks.size());
-  bundle.blocks = static_cast<int>(blocks.size());
-  bundle.first_slot = static_cast<int>(t.slot_node.size());
+  bundle.first_block = first_block;
+  bundle.blocks = blocks;
+  bundle.first_slot = t.blocks[first_block].first_slot;
+  bundle.body = t.blocks[first_block].body;
   bundle.first_column = static_cast<int>(t.columns.size());
-  for (const int index : blocks) {
-    add_block(state, index, t);
-    const CudaBlock& b = t.blocks.back();
-    add_columns(b, t.bodies[b.body].cell_size, b.first_slot - bundle.first_slot, bundle.places, t);
+  for (int i = first_block; i < first_block + blocks; ++i) {
+    const CudaBlock& b = t.blocks[i];
+    for (CudaColumn& c : columns[i]) {
+      c.slot += b.first_slot - bundle.first_slot;
+      c.place += bundle.places;
+      t.columns.push_back(c);
+    }
+    bundle.slots += b.slots();
     bundle.places += b.nx * b.ny;
     bundle.nz = std::max(bundle.nz, b.nz);
     bundle.partial = bundle.partial | b.partial;
   }
-  bundle.body = t.blocks[bundle.first_block].body;
-  bundle.slots = static_cast<int>(t.slot_node.size()) - bundle.first_slot;
   bundle.columns = static_cast<int>(t.columns.size()) - bundle.first_column;
   t.max_slots = std::max(t.max_slots, bundle.slots);
   t.max_halves = std::max(t.max_halves, 2 * bundle.columns * bundle.nz);
@@ -174,8 +214,10 @@ void add_bundle(const MpmState& state, const std::vector<int>& blocks, HostTable
 
 }  // namespace
 
-HostTables make_tables(const MpmState& state, const std::vector<std::vector<int>>& bundles) {
-  HostTables t;
+void make_tables(const MpmState& state, const std::vector<std::vector<int>>& bundles,
+                 HostTables& t) {
+  t.bodies.clear();
+  t.first_material.clear();
   for (std::size_t i = 0; i < state.bodies.size(); ++i) {
     t.first_material.push_back(static_cast<int>(t.bodies.size()));
     for (const Material& m : state.bodies[i].materials) {
@@ -183,23 +225,46 @@ HostTables make_tables(const MpmState& state, const std::vector<std::vector<int>
       t.bodies.back().point_volume = common_volume(state, static_cast<int>(i));
     }
   }
-  for (const std::vector<int>& blocks : bundles) add_bundle(state, blocks, t);
-  connect(state.nodes.size(), t);
-  return t;
+  lay_out(state, bundles, t);
+  std::vector<std::vector<CudaColumn>> columns(t.blocks.size());
+  state.cpu->for_each(static_cast<int>(t.blocks.size()), [&](int i) {
+    const Block& from = *state.blocks.all[t.of_host[i]];
+    CudaBlock& block = t.blocks[i];
+    const CudaBody& body = t.bodies[block.body];
+    fill_points(from, body.point_volume, block, t);
+    fill_slots(from, block, t);
+    columns[i] = columns_of(block, body.cell_size, t);
+  });
+  t.bundles.clear();
+  t.columns.clear();
+  t.max_slots = t.max_halves = 0;
+  int first = 0;
+  for (const std::vector<int>& blocks : bundles) {
+    add_bundle(first, static_cast<int>(blocks.size()), columns, t);
+    first += static_cast<int>(blocks.size());
+  }
+  connect(state.nodes.size(), *state.cpu, t);
 }
 
-void pack_nodes(const Nodes& n, float4* u, float4* v) {
-  for (std::size_t i = 0; i < n.size(); ++i) {
-    u[i] = {n.u[0][i], n.u[1][i], n.u[2][i], n.mass[i]};
-    v[i] = {n.v[0][i], n.v[1][i], n.v[2][i], n.inv_mass[i]};
-  }
+void pack_nodes(const Nodes& n, Cpu& cpu, float4* u, float4* v) {
+  cpu.for_each(
+      static_cast<int>(n.size()),
+      [&](int i) {
+        u[i] = {n.u[0][i], n.u[1][i], n.u[2][i], n.mass[i]};
+        v[i] = {n.v[0][i], n.v[1][i], n.v[2][i], n.inv_mass[i]};
+      },
+      4096);
 }
 
-void unpack_nodes(const float4* u, const float4* v, Nodes& n) {
-  for (std::size_t i = 0; i < n.size(); ++i) {
-    n.u[0][i] = u[i].x, n.u[1][i] = u[i].y, n.u[2][i] = u[i].z;
-    n.v[0][i] = v[i].x, n.v[1][i] = v[i].y, n.v[2][i] = v[i].z;
-  }
+void unpack_field(const float4* from, std::size_t count, Cpu& cpu, Array<float>* to) {
+  cpu.for_each(
+      static_cast<int>(count),
+      [&](int i) { to[0][i] = from[i].x, to[1][i] = from[i].y, to[2][i] = from[i].z; }, 4096);
+}
+
+void unpack_nodes(const float4* u, const float4* v, Cpu& cpu, Nodes& n) {
+  unpack_field(u, n.size(), cpu, n.u);
+  unpack_field(v, n.size(), cpu, n.v);
 }
 
 }  // namespace tissue_sim

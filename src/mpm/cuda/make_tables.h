@@ -3,32 +3,37 @@
 
 #include <vector>
 
+#include "compute/device_array.h"
 #include "mpm/cuda/tables.h"
 #include "mpm/mpm_state.h"
 
 namespace tissue_sim {
 
-/// See CudaTables.
+/// See CudaTables. Kept from cut to cut, for its memory.
 struct HostTables {
   std::vector<CudaBody> bodies;     ///< of each body, its materials
   std::vector<int> first_material;  ///< of each body, in `bodies`
   std::vector<CudaBlock> blocks;
-  std::vector<int> of_host;  ///< per block: which of Blocks::all it is
+  std::vector<int> of_host;     ///< per block: which of Blocks::all it is
+  std::vector<int> first_slot;  ///< of each of Blocks::all
   std::vector<CudaBundle> bundles;
   std::vector<CudaColumn> columns;
-  std::vector<std::int32_t> slot_node;
-  std::vector<std::uint32_t> slot_parts, parts;
-  std::vector<float> volume, partial;
-  std::vector<std::int32_t> point;
+  PinnedArray<std::int32_t> slot_node;
+  PinnedArray<std::uint32_t> slot_parts, parts;
+  PinnedArray<float> volume, partial;
+  PinnedArray<std::int32_t> point;
   int max_slots = 0;   ///< of a bundle
   int max_halves = 0;  ///< half cells of a bundle's columns, each as tall as the tallest
 };
 
 /// `bundles` are the blocks, by their places in Blocks::all, that share a thread block.
-HostTables make_tables(const MpmState& state, const std::vector<std::vector<int>>& bundles);
+void make_tables(const MpmState& state, const std::vector<std::vector<int>>& bundles,
+                 HostTables& tables);
 
 /// The nodes as the GPU has them: u and mass, v and inverse mass.
-void pack_nodes(const Nodes& nodes, float4* u, float4* v);
-void unpack_nodes(const float4* u, const float4* v, Nodes& nodes);
+void pack_nodes(const Nodes& nodes, Cpu& cpu, float4* u, float4* v);
+void unpack_nodes(const float4* u, const float4* v, Cpu& cpu, Nodes& nodes);
+/// The components of `count` vectors.
+void unpack_field(const float4* from, std::size_t count, Cpu& cpu, Array<float>* to);
 
 }  // namespace tissue_sim

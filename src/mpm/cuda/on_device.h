@@ -4,6 +4,7 @@
 #include "compute/device_array.h"
 #include "mpm/cuda/choose_plan.h"
 #include "mpm/cuda/cuda_mpm_tissue.h"
+#include "mpm/cuda/faces_on_device.h"
 #include "mpm/cuda/frame_ends.h"
 #include "mpm/cuda/make_tables.h"
 
@@ -21,7 +22,7 @@ struct CudaMpmTissue::OnDevice {
   std::string gpu;  ///< name
 
   DeviceArray<CudaBlock> blocks;
-  std::vector<int> of_host;  ///< HostTables::of_host
+  HostTables host_tables;  ///< as they went up
   DeviceArray<CudaBundle> bundles;
   DeviceArray<CudaColumn> columns;
   DeviceArray<HalfPush> pushes;  ///< CudaFrame::pushes
@@ -42,18 +43,7 @@ struct CudaMpmTissue::OnDevice {
   DeviceArray<int> stretched_count;
   PinnedArray<int> host_stretched_count;
   DeviceArray<Point> cloud;
-  DeviceArray<FaceSpring> springs;  ///< of the contacts of tissue with tissue
-  DeviceArray<CudaContactNodes> contact_nodes;
-  DeviceArray<std::uint8_t> contact_marks;
-  DeviceArray<long long> contact_force;
-  DeviceArray<std::int32_t> face_nodes;  ///< that the host looks at
-  DeviceArray<float4> gathered;          ///< their u, then v
-  std::vector<std::int32_t> host_face_nodes;
-  bool looked = false;  ///< whether the host has just looked at the contacts
-  std::size_t springs_in_flight = 0, nodes_in_flight = 0;
-  PinnedArray<FaceSpring> host_springs;
-  PinnedArray<CudaContactNodes> host_contact_nodes;
-  PinnedArray<float4> host_gathered;
+  FacesOnDevice faces;
   PinnedArray<Collider> host_colliders;
   PinnedArray<CudaBox> host_reach;
   PinnedArray<long long> host_loads;
@@ -85,17 +75,6 @@ struct CudaMpmTissue::OnDevice {
     t.with = with.data();
     t.hold = hold.data();
     return t;
-  }
-  CudaFaces faces(std::size_t count) const {
-    CudaFaces f;
-    f.count = static_cast<int>(count);
-    f.looked = looked;
-    f.springs = springs.data();
-    f.nodes = contact_nodes.data();
-    f.marks = contact_marks.data();
-    f.force = contact_force.data();
-    f.stride = contact_force.size() / 3;
-    return f;
   }
   CudaNodes nodes(int which) const { return {u[which].data(), v[which].data()}; }
   CudaNodes present() const { return nodes(current); }

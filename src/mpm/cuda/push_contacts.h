@@ -1,42 +1,11 @@
-// Contacts of tissue with tissue within a substep: one warp for each, one lane for each of the 27
-// nodes on either side. For .cu files.
+// Contacts of tissue with tissue within a substep and the looks at them, a warp for each. For .cu
+// files.
 #pragma once
 
-#include "math/bspline.h"
-#include "mpm/cuda/tables.h"
+#include "mpm/cuda/grid_barrier.h"
+#include "mpm/cuda/warp_faces.h"
 
 namespace tissue_sim {
-
-/// Sum over the lanes of a warp, the same bits in each.
-__device__ __forceinline__ float warp_sum(float value) {
-#pragma unroll
-  for (int step = 16; step > 0; step /= 2) value += __shfl_xor_sync(0xffffffffu, value, step);
-  return value;
-}
-
-/// The places of a contact: see push_face(). Each lane knows one node of either cell.
-struct WarpPlaces {
-  int k;                     // which, from 27 on none
-  float4 own_u, other_u;     // displacement there [m]
-  float own_weight, weight;  // 0 where there is none
-  float other_inv_mass;      // [1/kg]
-
-  static __device__ __forceinline__ void sum(const float4& u, float w, float (&value)[3]) {
-    value[0] = warp_sum(w * u.x);
-    value[1] = warp_sum(w * u.y);
-    value[2] = warp_sum(w * u.z);
-  }
-  __device__ __forceinline__ void own(float (&value)[3]) const { sum(own_u, own_weight, value); }
-  __device__ __forceinline__ void held(float (&value)[3]) const { sum(other_u, weight, value); }
-  __device__ __forceinline__ void hold(const float (&place)[3]) {
-    weight = k >= 27 ? 0.0f
-                     : cell_weight(place[0], k % 3) * cell_weight(place[1], k / 3 % 3) *
-                           cell_weight(place[2], k / 9);
-  }
-  __device__ __forceinline__ float held_mobility() const {
-    return warp_sum(weight * weight * other_inv_mass);
-  }
-};
 
 /// Adds a force [N] to the sum of a node.
 __device__ __forceinline__ void add_push(long long* sum, float weight, const float* force) {
@@ -48,39 +17,126 @@ __device__ __forceinline__ void add_push(long long* sum, float weight, const flo
   }
 }
 
-/// Works out all contacts and adds their forces to `force`, of the nodes; out of line, for the
-/// blocks to keep their registers. Contacts that were just looked at are at rest, to the last bit.
-inline __device__ __noinline__ void push_contacts(const CudaFaces faces, const float4* u, float dt,
-                                                  bool looked, long long* force) {
-  const int lane = static_cast<int>(threadIdx.x) % 32, warp = static_cast<int>(threadIdx.x) / 32;
-  const int step = static_cast<int>(gridDim.x * blockDim.x) / 32, k = min(lane, 26);
-  // Warps of different thread blocks first, so that all multiprocessors have their share.
-  for (int i = warp * static_cast<int>(gridDim.x) + static_cast<int>(blockIdx.x); i < faces.count;
-       i += step) {
-    const CudaContactNodes& nodes = faces.nodes[i];
-    const int own = __ldg(nodes.own + k), other = __ldg(nodes.other + k);
+/// What pushes need of CudaLooks.
+struct CudaPushes {
+  const std::int32_t* active;
+  const CudaContactNodes* nodes;
+  FaceSpring* springs;
+  const int* count;
+};
+
+/// The first contact of a warp, and how many it goes on by: warps of different thread blocks first,
+/// so that all multiprocessors have their share.
+__device__ __forceinline__ int first_of_warp() {
+  return static_cast<int>(threadIdx.x / 32 * gridDim.x + blockIdx.x);
+}
+__device__ __forceinline__ int warps_of_grid() {
+  return static_cast<int>(gridDim.x * blockDim.x) / 32;
+}
+
+/// Works out all active contacts and adds their forces to `force`, of the nodes; out of line, for
+/// the blocks to keep their registers.
+inline __device__ __noinline__ void push_contacts(const CudaPushes c, const CudaNodes state,
+                                                  float dt, long long* force) {
+  const int lane = static_cast<int>(threadIdx.x) % 32, k = min(lane, 26);
+  const int count = __ldcg(c.count);
+  for (int i = first_of_warp(); i < count; i += warps_of_grid()) {
+    const CudaContactNodes& nodes = c.nodes[i];
+    FaceSpring& at = c.springs[c.active[i]];
     WarpPlaces places;
     places.k = lane;
-    places.own_weight = lane < 27 ? __ldg(nodes.weight + k) : 0.0f;
-    places.own_u = __ldcg(u + own);
-    places.other_u = __ldcg(u + other);
-    places.other_inv_mass = __ldg(nodes.other_inv_mass + k);
-    FaceSpring spring = faces.springs[i];
+    places.v = state.v;
+    places.own_node = nodes.own[k];
+    places.other_node = nodes.other[k];
+    places.own_weight = lane < 27 ? nodes.weight[k] : 0.0f;
+    places.own_u = __ldcg(state.u + places.own_node);
+    places.other_u = __ldcg(state.u + places.other_node);
+    FaceSpring spring = at;
     places.hold(spring.hold);
-    if (looked) {
-      float own_value[3], held_value[3];
-      places.own(own_value);
-      places.held(held_value);
-      spring.measure_apart(own_value, held_value);
-    }
     push_face(spring, dt, places);
     __syncwarp();
-    if (lane == 0) faces.springs[i] = spring;
-    if (!spring.touching) continue;
-    if (lane >= 27) continue;
-    add_push(force + 3 * static_cast<std::size_t>(own), places.own_weight, spring.force);
-    add_push(force + 3 * static_cast<std::size_t>(other), -places.weight, spring.force);
+    if (lane == 0) at = spring;
+    if (!spring.touching || lane >= 27) continue;
+    add_push(force + 3 * static_cast<std::size_t>(places.own_node), places.own_weight,
+             spring.force);
+    add_push(force + 3 * static_cast<std::size_t>(places.other_node), -places.weight, spring.force);
   }
 }
+
+/// Looks at all contacts, whose last look was `since` seconds ago. Thread blocks meet twice at
+/// `arrived`, where they have met `met` times.
+inline __device__ __noinline__ void look_at_contacts(const CudaLooks s, const CudaNodes state,
+                                                     float dt, float since, unsigned* arrived,
+                                                     unsigned met) {
+  CudaFaceFigures& figures = *s.figures;
+  const int involved = figures.involved, contacts = figures.contacts;
+  if (blockIdx.x == 0 && threadIdx.x == 0) {
+    figures.active = 0;
+    figures.fastest_pair = 0;
+  }
+  const auto threads = static_cast<int>(gridDim.x * blockDim.x);
+  for (int i = static_cast<int>(threadIdx.x * gridDim.x + blockIdx.x); i < involved; i += threads) {
+    move_facet(s, state, s.involved[i]);
+  }
+  grid_barrier(arrived, met + 1);
+  float fastest = 0;
+  const int lane = static_cast<int>(threadIdx.x) % 32;
+  for (int i = first_of_warp(); i < contacts; i += warps_of_grid()) {
+    FaceSpring& at = s.springs[s.contacts[i]];
+    FaceSpring spring = at;
+    WarpFaces faces(s, state, spring);
+    fastest = fmaxf(fastest, look(faces, spring, dt, since));
+    __syncwarp();
+    if (lane == 0) at = spring;
+    if (!is_active(spring)) continue;
+    int place = 0;
+    if (lane == 0) {
+      place = atomicAdd(&figures.active, 1);
+      s.active[place] = spring.facet;
+    }
+    place = __shfl_sync(0xffffffffu, place, 0);
+    if (lane >= 27) continue;
+    CudaContactNodes& nodes = s.nodes[place];
+    nodes.own[lane] = faces.own_node;
+    nodes.other[lane] = faces.other_node;
+    nodes.weight[lane] = faces.own_weight;
+  }
+  if (lane == 0 && fastest > 0) atomicMax(&figures.fastest_pair, __float_as_uint(fastest));
+  grid_barrier(arrived, met + 2);
+}
+
+/// When a thread block looks at contacts; in shared memory.
+struct FaceRounds {
+  int next;  ///< round of the next look
+  int last;  ///< of the last
+  float
+      since;  ///< seconds from the last look to round `last`: not 0 if that was before this launch
+  int unused;
+
+  __device__ __forceinline__ void begin(const CudaFaces& f, float dt) {
+    const CudaFaceFigures& figures = *f.looks.figures;
+    next = f.look_first || figures.until_look <= 0 ? 0 : rounds_in(figures.until_look, dt);
+    last = 0;
+    since = figures.since_look;
+  }
+  __device__ __forceinline__ float since_look(int round, float dt) const {
+    return since + static_cast<float>(round - last) * dt;
+  }
+  __device__ __forceinline__ void looked(const CudaFaces& f, int round, float dt) {
+    const float fastest = __uint_as_float(__ldcg(&f.looks.figures->fastest_pair));
+    next = round + rounds_in(look_horizon(fastest, f.looks.cell_size, dt), dt);
+    last = round;
+    since = 0;
+  }
+  __device__ __forceinline__ void end(const CudaFaces& f, int round, float dt) const {
+    f.looks.figures->until_look = (next - round) * static_cast<double>(dt);
+    f.looks.figures->since_look = since_look(round, dt);
+  }
+
+ private:
+  static __device__ __forceinline__ int rounds_in(double time, float dt) {
+    return max(1, static_cast<int>(ceil(time / dt)));
+  }
+};
 
 }  // namespace tissue_sim

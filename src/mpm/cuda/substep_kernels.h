@@ -9,32 +9,6 @@
 namespace tissue_sim {
 namespace {
 
-/// A thread block says that it has come to a barrier of the grid, and goes on.
-__device__ __forceinline__ void arrive(unsigned* arrived) {
-  __syncthreads();
-  if (threadIdx.x == 0) {
-    asm volatile("red.release.gpu.global.add.u32 [%0], 1;" ::"l"(arrived) : "memory");
-  }
-}
-
-/// Waits until all thread blocks have arrived `round` times; what they wrote before is then seen by
-/// all.
-__device__ __forceinline__ void wait(unsigned* arrived, unsigned round) {
-  if (threadIdx.x == 0) {
-    const unsigned wanted = round * gridDim.x;
-    unsigned seen;
-    do {
-      asm volatile("ld.acquire.gpu.global.u32 %0, [%1];" : "=r"(seen) : "l"(arrived) : "memory");
-    } while (seen < wanted);
-  }
-  __syncthreads();
-}
-
-__device__ __forceinline__ void grid_barrier(unsigned* arrived, unsigned round) {
-  arrive(arrived);
-  wait(arrived, round);
-}
-
 /// The shared memory of a thread block. Worked out anew where it is needed, so that the compiler
 /// knows it for shared memory and can use its faster loads.
 __device__ __forceinline__ BlockShared shared_of(int max_slots) {
@@ -45,6 +19,7 @@ __device__ __forceinline__ BlockShared shared_of(int max_slots) {
   s.exchange = s.v + max_slots;
   s.loads = reinterpret_cast<unsigned long long*>(s.exchange + 9 * blockDim.x);
   s.colliders = reinterpret_cast<Collider*>(s.loads + 6 * kMaxColliders);
+  s.rounds = reinterpret_cast<FaceRounds*>(s.colliders + kMaxColliders);
   return s;
 }
 
@@ -161,7 +136,7 @@ __device__ __forceinline__ void all_forces(const CudaTables& t, const CudaFrame&
 
 /// The forces of contacts that a round reads and clears.
 __device__ __forceinline__ PushedNodes pushed_nodes(const CudaFaces& f, int round) {
-  return {f.marks, f.force + f.stride * ((round + 2) % 3), f.force + f.stride * ((round + 1) % 3)};
+  return {f.force + f.stride * ((round + 2) % 3), f.force + f.stride * ((round + 1) % 3)};
 }
 
 /// One bundle in one round. Each moves all of its nodes on, by the forces of the substep
@@ -199,12 +174,25 @@ __device__ __forceinline__ void block_round(const CudaTables& t, const CudaFrame
   all_forces<kLaws, kPlain>(t, f, w, round, max_slots, odd_round ? f.force[1] : f.force[0]);
 }
 
-/// Contacts of tissue with tissue, once all nodes are where the round brought them.
-__device__ __forceinline__ void push_faces(const CudaFrame& f, int round) {
-  if (round == f.substeps) return;
-  wait(f.arrived + 1, static_cast<unsigned>(round) + 1);
+/// Contacts of tissue with tissue, once all nodes are where the round brought them: a look when it
+/// is time to, and their forces. Thread blocks have `met` so often at their second barrier.
+__device__ __forceinline__ void push_faces(const CudaFrame& f, int round, FaceRounds& rounds,
+                                           unsigned& met) {
+  const float dt = f.step.dt;
+  if (round == f.substeps) {
+    if (blockIdx.x == 0 && threadIdx.x == 0) rounds.end(f.faces, round, dt);
+    return;
+  }
+  wait(f.arrived + 1, ++met);
   const bool odd = ((f.current + round) & 1) != 0;
-  push_contacts(f.faces, odd ? f.state[1].u : f.state[0].u, f.step.dt, round == 0 && f.faces.looked,
+  const CudaNodes& state = odd ? f.state[1] : f.state[0];
+  const CudaLooks& looks = f.faces.looks;
+  if (round == rounds.next) {
+    look_at_contacts(looks, state, dt, rounds.since_look(round, dt), f.arrived + 1, met);
+    met += 2;
+    if (threadIdx.x == 0) rounds.looked(f.faces, round, dt);
+  }
+  push_contacts({looks.active, looks.nodes, looks.springs, &looks.figures->active}, state, dt,
                 f.faces.force + f.faces.stride * (round % 3));
 }
 
@@ -214,18 +202,20 @@ __global__ void __launch_bounds__(kThreads, kBlocksPerProcessor)
   constexpr bool kFaces = kCan == Can::kFaces;
   const BlockShared s = shared_of(max_slots);
   SlotCache cache;
-  cache.parts = reinterpret_cast<uint4*>(s.colliders + kMaxColliders);
+  cache.parts = reinterpret_cast<uint4*>(s.rounds + 1);
   cache.more = eight_parts ? cache.parts + max_slots : nullptr;
   cache.node = reinterpret_cast<std::int32_t*>(cache.parts + (eight_parts ? 2 : 1) * max_slots);
   cache.shared = reinterpret_cast<std::uint32_t*>(cache.node + max_slots);
+  unsigned met = 0;
+  if (kFaces && threadIdx.x == 0) s.rounds->begin(f.faces, f.step.dt);
   if constexpr (kCached) {
     const BundleAtWork mine(t, static_cast<int>(blockIdx.x));
-    fill_cache<kFaces>(t, mine.bundle.first_slot, mine.bundle.slots, f.faces, cache);
+    fill_cache(t, mine.bundle.first_slot, mine.bundle.slots, cache);
     __syncthreads();
     for (int round = 0; round <= f.substeps; ++round) {
       if (round > 0) grid_barrier(f.arrived, static_cast<unsigned>(round));
       block_round<kLaws, true, kCan>(t, f, mine, round, max_slots, cache, true);
-      if (kFaces) push_faces(f, round);
+      if (kFaces) push_faces(f, round, *s.rounds, met);
     }
   } else {
     for (int round = 0; round <= f.substeps; ++round) {
@@ -234,7 +224,7 @@ __global__ void __launch_bounds__(kThreads, kBlocksPerProcessor)
         const bool last = i + static_cast<int>(gridDim.x) >= t.bundle_count;
         block_round<kLaws, false, kCan>(t, f, BundleAtWork(t, i), round, max_slots, cache, last);
       }
-      if (kFaces) push_faces(f, round);
+      if (kFaces) push_faces(f, round, *s.rounds, met);
     }
   }
 }

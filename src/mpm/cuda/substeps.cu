@@ -18,7 +18,7 @@ std::size_t shared_bytes(const CudaPlan& plan) {
   const std::size_t of_slot = 2 * sizeof(float4) + (plan.cached ? sizeof(uint4) + 8 : 0) +
                               (plan.eight_parts ? sizeof(uint4) : 0);
   return of_slot * plan.max_slots + 9 * sizeof(float4) * plan.threads +
-         kMaxColliders * (6 * sizeof(long long) + sizeof(Collider));
+         kMaxColliders * (6 * sizeof(long long) + sizeof(Collider)) + sizeof(FaceRounds);
 }
 
 int attribute(cudaDeviceAttr which) {
@@ -56,18 +56,18 @@ int resident_blocks(CudaPlan& plan, int block_count) {
   return resident_of(plan);
 }
 
-int cached_at_once(const CudaPlan& plan) {
-  CudaPlan cached = plan;
-  cached.cached = true;
-  cached.eight_parts = false;
-  return resident_of(cached);
+int most_at_once(const CudaPlan& plan) {
+  CudaPlan most = plan;
+  most.cached = plan.small;
+  most.eight_parts = false;
+  return resident_of(most);
 }
 
-int most_cached_slots(const CudaPlan& plan) {
-  CudaPlan cached = plan;
-  const int resident = cached_at_once(plan), step = 64;
-  while (resident > 0 && cached_at_once(cached) == resident) cached.max_slots += step;
-  return std::max(plan.max_slots, cached.max_slots - step);
+int most_slots(const CudaPlan& plan) {
+  CudaPlan larger = plan;
+  const int resident = most_at_once(plan), step = 64;
+  while (resident > 0 && most_at_once(larger) == resident) larger.max_slots += step;
+  return std::max(plan.max_slots, larger.max_slots - step);
 }
 
 void launch_substeps(const CudaPlan& plan, const CudaTables& tables, const CudaFrame& frame,

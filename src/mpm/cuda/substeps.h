@@ -29,9 +29,10 @@ CudaKernel plain_kernel(const CudaPlan& plan);
 /// eight_parts.
 int resident_blocks(CudaPlan& plan, int block_count);
 
-/// Thread blocks that run at once if they are cached, and the most slots with which as many do.
-int cached_at_once(const CudaPlan& plan);
-int most_cached_slots(const CudaPlan& plan);
+/// Thread blocks that run at once, cached if the plan is small, and the most slots with which as
+/// many do.
+int most_at_once(const CudaPlan& plan);
+int most_slots(const CudaPlan& plan);
 
 /// Enqueues substeps as one kernel, with contact of tissue with tissue if the plan has it. The
 /// state is then in `state[(current + substeps) % 2]`.

@@ -11,7 +11,7 @@
 #include <cstdint>
 
 #include "contact/collider.h"
-#include "contact/face_spring.h"
+#include "mpm/cuda/face_tables.h"
 #include "mpm/update_node.h"
 
 namespace tissue_sim {
@@ -95,7 +95,8 @@ struct CudaTables {
   int block_count, bundle_count;
   const std::int32_t* slot_node;    ///< its node n, or ~n where another block writes the node
   const std::uint32_t* slot_parts;  ///< 0: the slot has all of its node's force; else how many
-                                    ///< slots share it + 64 * the first of them in `parts`
+                                    ///< slots share it + 64 * the first of them in `parts`; and
+                                    ///< kPushed, where there is contact of tissue with tissue
   const std::uint32_t* parts;
   const float* volume;        ///< per lane, 0 where there is no point [m^3]
   const std::int32_t* point;  ///< per lane, -1 where there is none
@@ -111,27 +112,6 @@ struct CudaTables {
 /// Sums of what acts on a collider in one substep: force and moment in units of kLoadUnit, as
 /// integers, whose sum does not depend on the order.
 inline constexpr double kLoadUnit = 1.0 / (1ll << 38);
-
-/// Where a contact of tissue with tissue gets its displacements from and gives its force to.
-struct CudaContactNodes {
-  std::int32_t own[27];      ///< nodes of the facet's cell, x fastest
-  std::int32_t other[27];    ///< nodes of the cell of the place held
-  float weight[27];          ///< of `own`, at the facet's centre
-  float other_inv_mass[27];  ///< of `other` [1/kg]
-};
-
-/// Contacts of tissue with tissue (contact/face_contact.h) of the substeps of one launch.
-struct CudaFaces {
-  int count = 0;  ///< 0: no more of this is read
-  bool looked;    ///< they have just been looked at: nothing moved since
-  FaceSpring* springs;
-  const CudaContactNodes* nodes;
-  const std::uint8_t* marks;  ///< per node: whether a contact may push it
-  /// Force on each node, [3][nodes][3], in units of kLoadUnit as integers: while one is summed up,
-  /// that of the substep before is read and the third is cleared.
-  long long* force;
-  std::size_t stride;  ///< from one of the three to the next
-};
 
 struct CudaFrame {
   CudaNodes state[2];

@@ -1,0 +1,92 @@
+// What is measured of tissue that lives on a GPU: its figures at the end of a frame, and the
+// substep that it bears.
+#include <algorithm>
+#include <cmath>
+
+#include "mpm/cuda/cuda_linearised_motion.h"
+#include "mpm/cuda/on_device.h"
+#include "mpm/lanczos.h"
+#include "mpm/state_figures.h"
+
+namespace tissue_sim {
+
+float CudaMpmTissue::stable_substep() const {
+  return tissue_sim::stable_substep(*state_, stiffening_);
+}
+
+float CudaMpmTissue::substep_for(const FrameInput& input) const {
+  return static_cast<float>(substep_.longest(*state_, input, stable_substep()));
+}
+
+void CudaMpmTissue::follow_stability() {
+  if (result_.blew_up) return;
+  substep_.follow(*state_, modulus_, [&](const std::vector<std::uint8_t>&, int steps) {
+    return measure_limit(steps);
+  });
+}
+
+double CudaMpmTissue::measure_limit(int steps) {
+  OnDevice& d = *device_;
+  CudaTables tables = d.tables();
+  DeviceArray<std::uint32_t> near_none;
+  near_none.resize(d.near.size());
+  near_none.clear(d.stream);
+  tables.near = near_none.data();
+  CudaFrame frame{};
+  for (int i = 0; i < 2; ++i) frame.force[i] = d.force[i].data();
+  frame.substeps = 1;
+  frame.step.dt = 1;
+  frame.loads = d.loads.data();
+  frame.pushes = d.pushes.data();
+  frame.push_stride = d.push_stride;
+  frame.arrived = d.arrived.data();
+  CudaLinearisedMotion motion(
+      d.present(), d.nodes(1 - d.current), d.u[0].size(), state_->scene.cell_size,
+      [&](const CudaNodes& from, const CudaNodes& to) {
+        frame.state[0] = from;
+        frame.state[1] = to;
+        if (d.all_plain) {
+          launch_substeps(d.plain_plan, tables, frame, d.plain_resident, d.stream);
+        } else {
+          launch_substeps(d.plan, tables, frame, d.resident, d.stream);
+        }
+      },
+      d.stream);
+  return 2 / std::sqrt(largest_eigenvalue(motion, steps));
+}
+
+void CudaMpmTissue::launch_measure() {
+  OnDevice& d = *device_;
+  d.measures.resize(d.blocks.size());
+  d.host_measures.resize(d.blocks.size());
+  tissue_sim::launch_measure(d.tables(), d.present(), d.plan.max_slots, d.measures.data(),
+                             d.stream);
+  d.measures.download(d.host_measures.data(), d.measures.size(), d.stream);
+}
+
+void CudaMpmTissue::finish_measure() {
+  OnDevice& d = *device_;
+  check_cuda(cudaStreamSynchronize(d.stream), "finish a frame");
+  result_.elastic_energy = result_.kinetic_energy = result_.max_speed = 0;
+  stiffening_ = even_stiffening(*state_, 1);
+  state_->motion.resize(d.blocks.size());
+  modulus_.resize(d.blocks.size());
+  for (std::size_t i = 0; i < d.blocks.size(); ++i) {
+    const CudaMeasure& m = d.host_measures[i];
+    result_.elastic_energy += m.elastic_energy;
+    result_.kinetic_energy += m.kinetic_energy;
+    if (!(m.speed <= result_.max_speed)) result_.max_speed = m.speed;
+    const Block& block = *state_->blocks.all[d.host_tables.of_host[i]];
+    float& stiffening = stiffening_[block.body][block.material];
+    stiffening = std::max(stiffening, m.stiffening);
+    const Material& material = state_->bodies[block.body].materials[block.material];
+    modulus_[d.host_tables.of_host[i]] = static_cast<float>(wave_modulus(material, m.stiffening));
+    result_.blew_up = result_.blew_up || m.finite == 0 || m.stiffening > 1e6f;
+    state_->motion[d.host_tables.of_host[i]] = {
+        {Vec3(m.min[0], m.min[1], m.min[2]), Vec3(m.max[0], m.max[1], m.max[2])}, m.speed};
+  }
+  // Nothing that instruments do moves tissue at the speed of a bullet; what does is out of control.
+  result_.blew_up = result_.blew_up || !(result_.max_speed < 300);
+}
+
+}  // namespace tissue_sim

@@ -1,0 +1,103 @@
+// What the GPU's kernels see of contact of tissue with tissue (contact/face_contact.h): plain
+// structs with device pointers.
+#pragma once
+
+#include <vector_types.h>
+
+#include <cstddef>
+#include <cstdint>
+
+#include "contact/face_search.h"
+#include "contact/face_spring.h"
+#include "contact/facet_in_world.h"
+
+namespace tissue_sim {
+
+/// Bit of CudaTables::slot_parts for a node that contact of tissue with tissue may push.
+inline constexpr std::uint32_t kPushed = 1u << 31;
+
+/// A facet and where it is found.
+struct CudaFacet {
+  Facet facet;
+  std::int32_t slot;          ///< of the lowest of its cell's nodes: CudaTables::slot_node
+  std::int32_t pitch, plane;  ///< slots from a node to the next along y and z
+  std::int32_t body;          ///< its lattice: a CudaLattice
+  std::int16_t cell[3];       ///< in its lattice
+  std::int16_t site[3];       ///< of its point [half cells]
+  PieceSize piece;            ///< that it is of
+  float friction;             ///< Coulomb's
+  double modulus;             ///< of P-waves [Pa]
+};
+
+/// The lattice of a body.
+struct CudaLattice {
+  double origin[3];  ///< reference place of the middle of cell (0, 0, 0) [m]
+  double cell_size;  ///< [m]
+  std::int32_t sites_x, sites_y;
+  std::size_t first_site;  ///< in CudaLooks::point_at
+};
+
+/// Figures of the search and of the looks; speeds and lengths that are never negative as the bits
+/// of a float, whose order is theirs.
+struct CudaFaceFigures {
+  unsigned box[6];          ///< SweptBox of what does not fly: -min, max as in_order() [m]
+  double mean_moved[3];     ///< of the facets that take part, since they were listed [m]
+  double mean_velocity[3];  ///< of the same [m/s]
+  double horizon;           ///< until the next search [s]
+  double until_look;        ///< as of the last substep [s]
+  float since_look;         ///< the same
+  unsigned fastest;         ///< facet against the mean [m/s]
+  unsigned largest_reach;   ///< [m]
+  unsigned fastest_pair;    ///< of the last look [m/s]
+  int listed_anew;          ///< whether the lists no longer held
+  int in_grid;              ///< facets there
+  int near;                 ///< places wanted in CudaLooks::near
+  int contacts, involved;   ///< facets with any in their list; these, and those in lists
+  int active;               ///< contacts that touch, or may before the next look
+};
+
+/// Where a contact gets its displacements from and gives its force to.
+struct CudaContactNodes {
+  std::int32_t own[27];    ///< nodes of the facet's cell, x fastest
+  std::int32_t other[27];  ///< nodes of the cell of the place held
+  float weight[27];        ///< of `own`, at the facet's centre
+};
+
+/// What the search and the looks work on. A contact has the number of its facet.
+struct CudaLooks {
+  int facet_count;
+  float cell_size;  ///< the scene's [m]
+  const CudaFacet* facets;
+  const CudaLattice* lattices;
+  const std::int32_t* point_at;           ///< LatticeBody::point_at, body after body
+  const std::uint8_t* bonds;              ///< per point
+  const std::int32_t* slot_node;          ///< CudaTables::slot_node
+  FacetMotion* motion;                    ///< per facet; up to date where a contact needs it
+  ListedFacet* listed;                    ///< per facet
+  FaceSpring* springs;                    ///< per facet
+  std::int32_t *first_near, *near_count;  ///< per facet: the facets that it may touch, in `near`
+  std::int32_t* near;                     ///< each list in order
+  std::size_t near_capacity;
+  std::uint8_t *is_involved, *takes_part;      ///< per facet: is in a list; in the search
+  std::int32_t *contacts, *involved, *active;  ///< facets, in any order
+  CudaContactNodes* nodes;                     ///< parallels `active`
+  std::uint8_t* marks;                         ///< per node: whether a contact may push it
+  std::size_t node_count;
+  const std::uint32_t* slot_parts;  ///< CudaTables::slot_parts without
+  std::uint32_t* pushed_parts;      ///< and with kPushed
+  std::size_t slot_count;
+  CudaFaceFigures* figures;
+};
+
+/// Contacts of tissue with tissue of the substeps of one launch.
+struct CudaFaces {
+  bool any = false;  ///< else no more of this is read
+  bool look_first;   ///< they were just searched
+  CudaLooks looks;
+  /// Force on each node, [3][nodes][3], in units of kLoadUnit as integers: while one is summed up,
+  /// that of the substep before is read and the third is cleared.
+  long long* force;
+  std::size_t stride;  ///< from one of the three to the next
+};
+
+}  // namespace tissue_sim

@@ -35,19 +35,21 @@ if(tissue_sim_has_cuda)
                  "capabilities ${CMAKE_CUDA_ARCHITECTURES}")
   # Constants and weights are constexpr functions that both sides use.
   set(tissue_sim_nvcc --expt-relaxed-constexpr)
-  if(CMAKE_VERSION VERSION_LESS 3.18)  # which does not know CMAKE_CUDA_ARCHITECTURES
+  if(CMAKE_VERSION VERSION_LESS 3.18)  # which knows neither CUDA's C++17 nor CMAKE_CUDA_ARCHITECTURES
+    list(APPEND tissue_sim_nvcc -std=c++17)
     foreach(architecture ${CMAKE_CUDA_ARCHITECTURES})
       list(APPEND tissue_sim_nvcc
            "SHELL:-gencode arch=compute_${architecture},code=sm_${architecture}")
     endforeach()
+  else()
+    set(CMAKE_CUDA_STANDARD 17)
+    set(CMAKE_CUDA_STANDARD_REQUIRED ON)
+    # tissue_sim_core was made before these were set.
+    set_target_properties(tissue_sim_core PROPERTIES CUDA_STANDARD 17 CUDA_STANDARD_REQUIRED ON)
   endif()
-  set(CMAKE_CUDA_STANDARD 17)
-  set(CMAKE_CUDA_STANDARD_REQUIRED ON)
   file(GLOB cuda_sources CONFIGURE_DEPENDS src/compute/*.cu src/mpm/cuda/*.cu src/mpm/cuda/*.cpp)
   target_sources(tissue_sim_core PRIVATE ${cuda_sources})
-  # CMAKE_CUDA_STANDARD was set after the target was made.
-  set_target_properties(tissue_sim_core PROPERTIES CUDA_STANDARD 17 CUDA_STANDARD_REQUIRED ON
-                        CUDA_ARCHITECTURES "${CMAKE_CUDA_ARCHITECTURES}"
+  set_target_properties(tissue_sim_core PROPERTIES CUDA_ARCHITECTURES "${CMAKE_CUDA_ARCHITECTURES}"
                         CUDA_RUNTIME_LIBRARY Static)
   target_compile_definitions(tissue_sim_core PUBLIC TISSUE_SIM_CUDA)
   target_include_directories(tissue_sim_core SYSTEM PRIVATE

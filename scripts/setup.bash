@@ -57,7 +57,8 @@ as_root() {
   fi
 }
 
-# install core|ros [more packages]: asks apt for what is missing, if anything is.
+# install core|ros [more ROS packages, without Noetic's prefix]: asks apt for what is missing, if
+# anything is.
 install() {
   local kind=$1 wanted missing
   shift
@@ -65,20 +66,20 @@ install() {
   command -v dpkg-query >/dev/null && command -v apt-get >/dev/null ||
     fail "this is no Debian or Ubuntu: install ROS 1 and ${core_packages[*]} your own way," \
       "then set TISSUE_SIM_NO_INSTALL=1"
-  wanted=("${core_packages[@]}" "$@")
+  wanted=("${core_packages[@]}")
   if [[ $kind == ros && -e $noetic ]]; then
-    wanted+=("${noetic_packages[@]}" "${picture_packages[@]}")
+    wanted+=("${noetic_packages[@]}" "${picture_packages[@]}" "${@/#/ros-noetic-}")
   elif [[ $kind == ros ]]; then
-    wanted+=("${debian_packages[@]}" "${picture_packages[@]}")
+    wanted+=("${debian_packages[@]}" "${picture_packages[@]}" "$@")
   fi
   mapfile -t missing < <(missing_of "${wanted[@]}")
   if [[ ${#missing[@]} == 0 ]]; then return; fi
-  say "Asking apt for ${#missing[@]} packages (log: $build/apt.log)"
+  say "Asking apt for what is missing (log: $build/apt.log)"
   as_root apt-get update >"$build/apt.log" 2>&1 || fail "apt-get update: see $build/apt.log"
   if [[ $kind == ros && ! -e $noetic ]]; then
     if apt-cache show ros-noetic-roscpp >/dev/null 2>&1; then
       mapfile -t missing < <(missing_of "${core_packages[@]}" "${noetic_packages[@]}" \
-        "${picture_packages[@]}" "$@")
+        "${picture_packages[@]}" "${@/#/ros-noetic-}")
     elif ! apt-cache show libdiagnostic-updater-dev >/dev/null 2>&1; then
       fail "apt knows no ROS 1 here. On Debian 12 it is in main; on Ubuntu 20.04 add its source:" \
         "https://wiki.ros.org/noetic/Installation/Ubuntu (steps 1.2 and 1.3). Then run this again"

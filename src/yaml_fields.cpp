@@ -14,10 +14,10 @@ namespace {
 std::string shown(const YAML::Node& node) {
   if (node.IsNull()) return "empty";
   if (node.IsScalar() && node.Tag() == "!") return '"' + node.Scalar() + '"';
+  YAML::Node line = YAML::Clone(node);  // in yaml-cpp 0.6 its style goes before the emitter's
+  line.SetStyle(YAML::EmitterStyle::Flow);
   YAML::Emitter out;
-  out.SetSeqFormat(YAML::Flow);
-  out.SetMapFormat(YAML::Flow);
-  out << node;
+  out << line;
   std::string value = out.c_str();
   std::replace(value.begin(), value.end(), '\n', ' ');
   if (value.size() > 80) value = value.substr(0, 77) + "...";

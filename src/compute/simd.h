@@ -9,19 +9,30 @@
 
 namespace tissue_sim {
 
+/// The types for each width by themselves, for GCC 9 forgets `aligned` where the size of a vector
+/// hangs on a template's parameter, and took any address for an aligned one. Vectors may alias
+/// their elements without being told.
 template <int W>
-struct VecOf {
-  typedef float type __attribute__((vector_size(W * sizeof(float))));
-  typedef float unaligned __attribute__((vector_size(W * sizeof(float)), aligned(4), may_alias));
-};
+struct VecOf;
+template <int W>
+struct MaskOf;
+#define TISSUE_SIM_VECTOR(of, element, W)                                      \
+  template <>                                                                  \
+  struct of<W> {                                                               \
+    typedef element type __attribute__((vector_size(W * 4)));                  \
+    typedef element unaligned __attribute__((vector_size(W * 4), aligned(4))); \
+  };
+TISSUE_SIM_VECTOR(VecOf, float, 4)
+TISSUE_SIM_VECTOR(VecOf, float, 8)
+TISSUE_SIM_VECTOR(VecOf, float, 16)
+TISSUE_SIM_VECTOR(MaskOf, std::int32_t, 4)
+TISSUE_SIM_VECTOR(MaskOf, std::int32_t, 8)
+TISSUE_SIM_VECTOR(MaskOf, std::int32_t, 16)
+#undef TISSUE_SIM_VECTOR
+
 template <int W>
 using Vec = typename VecOf<W>::type;
-
 /// One integer for each lane: all bits set or none.
-template <int W>
-struct MaskOf {
-  typedef std::int32_t type __attribute__((vector_size(W * sizeof(float))));
-};
 template <int W>
 using Mask = typename MaskOf<W>::type;
 
@@ -38,8 +49,7 @@ TISSUE_SIM_INLINE Mask<W> lanes_between(int begin, int end) {
     }
   };
   static constexpr Steps steps;
-  typedef std::int32_t Unaligned
-      __attribute__((vector_size(W * sizeof(float)), aligned(4), may_alias));
+  using Unaligned = typename MaskOf<W>::unaligned;
   begin = begin < -W ? -W : begin;
   end = end > W ? W : end;
   return *reinterpret_cast<const Unaligned*>(steps.from + 2 * W - begin) &

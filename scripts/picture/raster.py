@@ -56,6 +56,8 @@ class Buffer:
         hi = np.ceil(p[:, :, :2].max(1)).astype(np.int64)
         seen = ((p[:, :, 2].min(1) > 1e-4) & (hi[:, 0] > 0) & (hi[:, 1] > 0) & (lo[:, 0] < w) &
                 (lo[:, 1] < h))
+        if not seen.any():  # NumPy 1.17 knows no unique rows of none
+            return
         lo, hi = np.maximum(lo, 0), np.minimum(hi, [w, h])
         extent = np.maximum(hi - lo, 1)
         window = 2 ** np.ceil(np.log2(extent)).astype(int)
@@ -76,8 +78,9 @@ class Buffer:
         area = np.where(np.abs(area) < 1e-9, np.nan, area)  # a line: nothing is inside
         u = ((x - ax) * (cy - ay) - (y - ay) * (cx - ax)) / area
         v = ((bx - ax) * (y - ay) - (by - ay) * (x - ax)) / area
-        inside = ((u >= 0) & (v >= 0) & (u + v <= 1) & (cols < hi[:, 0, None, None]) &
-                  (rows < hi[:, 1, None, None]))
+        with np.errstate(invalid="ignore"):  # NumPy 1.17 warns where it compares a NaN
+            inside = ((u >= 0) & (v >= 0) & (u + v <= 1) & (cols < hi[:, 0, None, None]) &
+                      (rows < hi[:, 1, None, None]))
         t, r, c = np.nonzero(inside)
         u, v = u[t, r, c], v[t, r, c]
         wa, wb, wc = ((1 - u - v) / az[t, 0, 0], u / bz[t, 0, 0], v / cz[t, 0, 0])

@@ -21,7 +21,7 @@ TEST(XmlRpcYaml, KeepsEveryDigitAndEveryType) {
   scene["bodies"] = bodies;
   scene["cell_size"] = 0.005;
   XmlRpc::XmlRpcValue ground;
-  ground["enabled"] = false;
+  ground["enabled"] = XmlRpc::XmlRpcValue(false);  // before ROS 1.15, = made it an int
   scene["ground"] = ground;
   scene["seed"] = 7;
   const Scene s = scene_from_yaml(yaml_from(scene));

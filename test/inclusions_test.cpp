@@ -145,7 +145,7 @@ TEST(Inclusions, OfAMaterialLikeTheBodysChangeNothingButBits) {
   EXPECT_EQ(a.cut, b.cut);
   EXPECT_GT(a.push, 5e-4);
   EXPECT_NEAR(b.energy, a.energy, 5e-3 * a.energy);
-  EXPECT_NEAR(b.push, a.push, 0.03 * a.push);
+  EXPECT_NEAR(b.push, a.push, 0.1 * a.push);  // a peak
   ASSERT_EQ(a.centroids.size(), b.centroids.size());
   for (std::size_t i = 0; i < a.centroids.size(); ++i) {
     EXPECT_LT((a.centroids[i] - b.centroids[i]).norm(), 4e-6);  // a thousandth of a cell

@@ -28,7 +28,7 @@ TEST_F(SubstepOnGpu, IsTheCpus) {
       const Scene scene = held_body(Law::kFixedCorotated, viscosity, shape);
       MpmTissue cpu(scene);
       CudaMpmTissue gpu(scene);
-      EXPECT_NEAR(gpu.substep_for({}) / cpu.substep_for({}), 1, 0.01);
+      EXPECT_NEAR(gpu.substep_for({}) / cpu.substep_for({}), 1, 0.05);
       EXPECT_GT(cpu.substep_for({}), 1.1f * cpu.stable_substep());
       deform(cpu.state());
       deform(gpu.state());

@@ -9,7 +9,7 @@
 
 namespace tissue_sim {
 
-/// For largest_eigenvalue(). Waits for the GPU at each step; gives the same bits each time.
+/// For largest_eigenvalue(). Waits for the GPU once a step; gives the same bits each time.
 class CudaLinearisedMotion {
  public:
   /// Enqueues a substep of a second from rest, without contact, gravity and drag.
@@ -25,24 +25,25 @@ class CudaLinearisedMotion {
   void next(double length);
 
  private:
-  /// Moves the nodes by `scale` v and leaves accelerations in scratch_.v.
-  void accelerate(float scale);
-  /// What the partial sums, and maxima, of the last kernel come to.
-  double sum();
-  float largest();
+  /// Moves the nodes by v, scaled to a small motion, and leaves accelerations in scratch_.v.
+  void accelerate();
+  /// What the partial sums of the last kernel come to.
+  double2 sum();
+  /// Brings largest_ up to date with the partial maxima of the last kernel.
+  void find_largest();
 
   CudaNodes present_, scratch_;
   int count_, parts_;
-  double cell_size_;
+  float small_;  ///< largest displacement [m]
   Substep substep_;
   cudaStream_t stream_;
   DeviceArray<float4> u_, rates_, at_rest_, before_, v_;
-  float4 *before_at_, *v_at_;  ///< which of the two is which
-  float largest_ = 0;          ///< component of v
-  DeviceArray<double> part_sum_;
+  float4 *before_at_, *v_at_;   ///< which of the two is which
+  DeviceArray<float> largest_;  ///< component of v
+  double w_square_ = 0, along_v_ = 0, along_before_ = 0;
+  DeviceArray<double2> part_sum_;
   DeviceArray<float> part_largest_;
-  PinnedArray<double> host_sum_;
-  PinnedArray<float> host_largest_;
+  PinnedArray<double2> host_sum_;
 };
 
 }  // namespace tissue_sim

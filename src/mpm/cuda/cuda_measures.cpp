@@ -14,15 +14,11 @@ float CudaMpmTissue::stable_substep() const {
   return tissue_sim::stable_substep(*state_, stiffening_);
 }
 
-float CudaMpmTissue::substep_for(const FrameInput& input) const {
-  return static_cast<float>(substep_.longest(*state_, input, stable_substep()));
-}
-
-void CudaMpmTissue::follow_stability() {
-  if (result_.blew_up) return;
-  substep_.follow(*state_, modulus_, [&](const std::vector<std::uint8_t>&, int steps) {
+float CudaMpmTissue::substep_for(const FrameInput& input) {
+  const auto measure = [this](const std::vector<std::uint8_t>&, int steps) {
     return measure_limit(steps);
-  });
+  };
+  return static_cast<float>(substep_.longest(*state_, input, stable_substep(), measure));
 }
 
 double CudaMpmTissue::measure_limit(int steps) {

@@ -66,7 +66,7 @@ CudaMpmTissue::CudaMpmTissue(const Scene& scene) : device_(std::make_unique<OnDe
   push();
   launch_measure();
   finish_measure();
-  follow_stability();
+  substep_.follow(*state_, modulus_);
 }
 
 CudaMpmTissue::~CudaMpmTissue() {
@@ -211,7 +211,7 @@ FrameResult CudaMpmTissue::finish() {
     result_.tear_report.new_fragments = update_pieces(state_->bodies, state_->points, pieces_);
     device_->points_changed = device_->faces.pieces_changed = true;
   }
-  follow_stability();
+  substep_.follow(*state_, modulus_);
   return result_;
 }
 

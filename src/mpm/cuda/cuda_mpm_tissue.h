@@ -24,7 +24,7 @@ class CudaMpmTissue final : public Tissue {
   ~CudaMpmTissue() override;
 
   float stable_substep() const override;
-  float substep_for(const FrameInput& input) const override;
+  float substep_for(const FrameInput& input) override;
   void advance(int substeps, float dt, const FrameInput& input) override;
   FrameResult finish() override;
   int point_count() const override { return state_->points.size(); }
@@ -74,7 +74,6 @@ class CudaMpmTissue final : public Tissue {
   void pull_contacts();
   void launch_measure();
   void finish_measure();
-  void follow_stability();
   double measure_limit(int steps);  ///< see MeasureLimit; of all blocks
   void upload_colliders(int substeps, double duration, const FrameInput& input);
 

@@ -11,7 +11,7 @@
 namespace tissue_sim {
 namespace {
 
-constexpr int kFew = 2048;  // points that are followed before a part is large
+constexpr int kFew = 256;  // points that are followed before a part is large
 
 /// Small parts around the points that lost bonds.
 class SmallParts {

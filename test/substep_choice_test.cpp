@@ -6,6 +6,7 @@
 #include <cstdio>
 #include <vector>
 
+#include "cut_scenes.h"
 #include "mpm/crumbs.h"
 #include "mpm/lanczos.h"
 #include "mpm/linearised_motion.h"
@@ -22,42 +23,15 @@ double measured_limit(MpmTissue& tissue, int steps) {
   return 2 / std::sqrt(largest_eigenvalue(motion, steps));
 }
 
-BladePath plane(const Vec3& normal, double size) {
-  const Vec3 a = normal.unitOrthogonal(), b = normal.normalized().cross(a);
-  BladePath path;
-  path.edge = {-size * a, size * a};
-  path.poses.resize(2);
-  path.poses[0].position = -size * b;
-  path.poses[1].position = size * b;
-  return path;
-}
-
-/// Bends and stretches the body, up to about `most`.
-void deform(MpmTissue& tissue, double most) {
-  MpmState& s = tissue.state();
-  const LatticeBody& b = s.bodies[0];
-  for (int z = -1; z <= b.nz; ++z) {
-    for (int y = -1; y <= b.ny; ++y) {
-      for (int x = -1; x <= b.nx; ++x) {
-        const Vec3 at = b.node_position(x, y, z);
-        s.nodes.u[0][b.node(x, y, z)] =
-            static_cast<float>(most * at.x() * std::fabs(at.z()) / 0.01);
-        s.nodes.u[1][b.node(x, y, z)] = static_cast<float>(-0.5 * most * at.y());
-      }
-    }
-  }
-  tissue.finish();
-}
-
 TEST(SubstepChoice, LanczosFindsTheLimit) {
   for (const double nu : {0.3, 0.45}) {
     MpmTissue whole(soft_body(nu, Vec3(10, 8, 6))), cut(soft_body(nu, Vec3(10, 8, 6))),
         shattered(soft_body(nu, Vec3(6, 6, 6))), bent(soft_body(nu, Vec3(10, 8, 6)));
-    const std::vector<BladePath> once = {plane(Vec3(1, 0.6, 0.3), 0.05)},
+    const std::vector<BladePath> once = {plane_cut(Vec3::Zero(), Vec3(1, 0.6, 0.3))},
                                  often = random_planes(30, 0.012);
     cut.advance(0, 0, {{}, once});
     shattered.advance(0, 0, {{}, often});
-    deform(bent, 0.5);
+    deform(bent.state());
     for (MpmTissue* tissue : {&whole, &cut, &shattered, &bent}) {
       tissue->finish();
       const double limit = stability_limit(*tissue);

@@ -9,19 +9,14 @@
 
 #include "compute/device_array.h"
 #include "cut_scenes.h"
+#include "either_device.h"
 #include "mpm/cuda/cuda_mpm_tissue.h"
 #include "tear_scenes.h"
 
 namespace tissue_sim {
 namespace {
 
-class OnGpu : public testing::Test {
- protected:
-  void SetUp() override {
-    const std::string why = why_no_gpu();
-    if (!why.empty()) GTEST_SKIP() << why;
-  }
-};
+class OnGpu : public OnEitherDevice<CudaMpmTissue> {};
 
 /// A block on the ground, cut by a scalpel and pushed by a probe for a second.
 struct Operation {

@@ -6,6 +6,7 @@
 
 #include "compute/device_array.h"
 #include "cut_scenes.h"
+#include "either_device.h"
 #include "mpm/cuda/cuda_mpm_tissue.h"
 #include "mpm/mpm_tissue.h"
 #include "test_scenes.h"
@@ -14,13 +15,7 @@
 namespace tissue_sim {
 namespace {
 
-class SubstepOnGpu : public testing::Test {
- protected:
-  void SetUp() override {
-    const std::string why = why_no_gpu();
-    if (!why.empty()) GTEST_SKIP() << why;
-  }
-};
+class SubstepOnGpu : public OnEitherDevice<CudaMpmTissue> {};
 
 TEST_F(SubstepOnGpu, IsTheCpus) {
   for (const Shape shape : {Shape::kBox, Shape::kEllipsoid}) {

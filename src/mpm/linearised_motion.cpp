@@ -52,6 +52,14 @@ double LinearisedMotion::sum(const F& f) {
   return s;
 }
 
+template <class F>
+void LinearisedMotion::for_each(const F& f) {
+  sum([&f](int a, std::size_t i) {
+    f(a, i);
+    return 0.0;
+  });
+}
+
 void LinearisedMotion::accelerations(Vector& out) {
   state_.cpu->for_each(static_cast<int>(blocks_.size()), [&](int i) {
     const Block& block = *state_.blocks.all[blocks_[i]];
@@ -80,7 +88,7 @@ void LinearisedMotion::start() {
     return static_cast<double>(n.mass[i]) * v_[a][i] * v_[a][i];
   });
   const auto scale = static_cast<float>(square > 0 ? 1 / std::sqrt(square) : 0);
-  sum([&](int a, std::size_t i) { return v_[a][i] *= scale; });
+  for_each([&](int a, std::size_t i) { v_[a][i] *= scale; });
 }
 
 double LinearisedMotion::apply() {
@@ -91,7 +99,7 @@ double LinearisedMotion::apply() {
   if (!(largest > 0)) return 0;
   const auto scale = kSmallMotion * static_cast<float>(state_.scene.cell_size) / largest;
   Nodes& n = state_.nodes;
-  sum([&](int a, std::size_t i) { return n.u[a][i] = u_[a][i] + scale * v_[a][i]; });
+  for_each([&](int a, std::size_t i) { n.u[a][i] = u_[a][i] + scale * v_[a][i]; });
   accelerations(w_);
   const float back = 1 / scale;
   return sum([&](int a, std::size_t i) {
@@ -115,7 +123,7 @@ void LinearisedMotion::next(double length) {
     std::swap(before_[a], v_[a]);
     std::swap(v_[a], w_[a]);
   }
-  sum([&](int a, std::size_t i) { return v_[a][i] *= scale; });
+  for_each([&](int a, std::size_t i) { v_[a][i] *= scale; });
 }
 
 }  // namespace tissue_sim

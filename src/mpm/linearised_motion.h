@@ -28,11 +28,13 @@ class LinearisedMotion {
  private:
   using Vector = Array<float>[3];
 
-  void forces();
   void accelerations(Vector& out);
   /// Sums f(component, node) over all nodes, in a fixed order.
   template <class F>
   double sum(const F& f);
+  /// Calls f(component, node) for all nodes.
+  template <class F>
+  void for_each(const F& f);
 
   MpmState& state_;
   std::vector<int> blocks_;

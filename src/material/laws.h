@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstdint>
 #include <cstring>
+#include <type_traits>
 
 #include "compute/host_device.h"
 
@@ -20,22 +21,34 @@ struct BitsOf<float> {
   typedef std::int32_t type;
 };
 
-/// An upper bound of the square root of x >= 0, at most 9 % above it: a start for Newton's method.
-TISSUE_SIM_INLINE double root_bound(double x) { return 1.04 * sqrt(x); }
-#if defined(__CUDA_ARCH__)
-TISSUE_SIM_INLINE float root_bound(float x) { return 1.04f * __fsqrt_rn(x); }
-#else
-/// By halving the exponent: for float and for vectors of floats, whose bits are integers of the
-/// same width.
+// First guesses, for Halley's method and Newton's to refine: integer arithmetic on the exponent,
+// which is the same on every processor and waits for no divider.
+
+/// The square root of x >= 0, at most 4 % off (`share` 1), times about `share`.
+TISSUE_SIM_INLINE double root_guess(double x, float share) { return share * sqrt(x); }
 template <class T>
-TISSUE_SIM_INLINE T root_bound(T x) {
+TISSUE_SIM_INLINE T root_guess(T x, float share) {
   typename BitsOf<T>::type bits;
   std::memcpy(&bits, &x, sizeof(x));
-  bits = (bits >> 1) + 0x1fbd1df5;
+  bits = (bits >> 1) + (0x1fbd1df5 - static_cast<std::int32_t>((1 - share) * 0x1000000));
   std::memcpy(&x, &bits, sizeof(x));
-  return 1.04f * x;
+  return x;
 }
-#endif
+/// 1 / x for x > 0, at most 12 % off.
+TISSUE_SIM_INLINE double reciprocal_guess(double x) { return 1 / x; }
+template <class T>
+TISSUE_SIM_INLINE T reciprocal_guess(T x) {
+  typename BitsOf<T>::type bits;
+  std::memcpy(&bits, &x, sizeof(x));
+  bits = 0x7ef311c7 - bits;
+  std::memcpy(&x, &bits, sizeof(x));
+  return x;
+}
+/// Newton's step from r towards 1 / x.
+template <class T>
+TISSUE_SIM_INLINE T nearer_reciprocal(T r, T x) {
+  return r + r * (1.0f - x * r);
+}
 
 /// Cofactor matrix of F: cof F = J F^-T, defined for singular F too.
 template <class T>
@@ -58,19 +71,13 @@ TISSUE_SIM_INLINE T norm2(const T* A) {
   return s;
 }
 
-/// 1 / x; for float on the GPU to the last bit but one and without a branch, where it is refined
-/// anyway.
+/// Invariants of C = F^T F and det F.
 template <class T>
-TISSUE_SIM_INLINE T rough_reciprocal(T x) {
-#if defined(__CUDA_ARCH__)
-  if constexpr (sizeof(T) == sizeof(float)) {
-    T r;
-    asm("rcp.approx.ftz.f32 %0, %1;" : "=f"(r) : "f"(x));
-    return r;
-  }
-#endif
-  return 1.0f / x;
-}
+struct Invariants {
+  T c1;  ///< tr C = ||F||^2
+  T c2;  ///< second invariant of C, ||cof F||^2
+  T J;   ///< det F
+};
 
 /// Invariants of the stretch U = sqrt(F^T F) of a deformation gradient, and what the rotation
 /// follows from: R = ((b + c1) F - F C + a cof F) * inverse.
@@ -78,33 +85,52 @@ template <class T>
 struct Stretch {
   T a;        ///< tr U (with the smallest stretch negative where det F < 0)
   T b;        ///< second invariant of U
-  T c1;       ///< tr C = ||F||^2
   T inverse;  ///< 1 / (a b - J) = 1 / ((s1 + s2) (s2 + s3) (s3 + s1))
 };
 
-/// Solves (a^2 - tr C)^2 / 4 = ||cof F||^2 + 2 J a for its largest root a = tr U by Newton's method
-/// (the quartic of Franca 1989; that R is the derivative of tr U is used by Lin, Chitalu and Komura
-/// 2022) from above, where it converges monotonically: a^2 = tr C + 2 b and b^2 <= 3 ||cof F||^2.
-/// The step divides by 2 (a b - J); its reciprocal is carried along and refined, for divisions are
-/// dear. Relative error below 1e-6 for stretches between 1/3 and 3; finite for inverted F.
+/// f(a) = (a^2 - tr C)^2 / 4 - ||cof F||^2 - 2 J a, of which tr U is the largest root (Franca
+/// 1989).
 template <class T>
-TISSUE_SIM_INLINE Stretch<T> stretch(T c1, T c2, T J) {
-  T a = root_bound(c1 + 2.0f * root_bound(3.0f * c2));
-  T p = a * a - c1;
-  T slope = a * p - 2.0f * J;
-  T r = rough_reciprocal(slope);
-  a -= (0.25f * p * p - c2 - 2.0f * J * a) * r;
-  for (int i = 0; i < 4; ++i) {
-    p = a * a - c1;
-    slope = a * p - 2.0f * J;
-    r = r * (2.0f - slope * r);
-    a -= (0.25f * p * p - c2 - 2.0f * J * a) * r;
+struct Quartic {
+  T p;             ///< a^2 - tr C: twice the second invariant of U at the root
+  T slope, value;  ///< f'(a), f(a); the second derivative is 3 p + 2 tr C
+  TISSUE_SIM_INLINE Quartic(const Invariants<T>& of, T a)
+      : p(a * a - of.c1),
+        slope(a * p - (of.J + of.J)),
+        value(0.25f * p * p - of.c2 - (of.J + of.J) * a) {}
+};
+
+/// tr U and what follows from it (that R is its derivative is used by Lin, Chitalu and Komura 2022)
+/// for N points side by side: each step waits for the one before, and a processor has other points
+/// to work on meanwhile. By Halley's method, whose error shrinks to its third power, from
+/// a^2 = tr C + 2 b and b^2 <= 3 ||cof F||^2. Relative error below 1e-6 for stretches between 1/3
+/// and 3; finite for inverted F.
+template <int N, class T>
+TISSUE_SIM_INLINE void stretch(const Invariants<T>* of, Stretch<T>* s) {
+  constexpr int steps = std::is_same<T, double>::value ? 3 : 2;
+  T a[N], r[N];
+  for (int k = 0; k < N; ++k) {
+    a[k] = root_guess(of[k].c1 + 1.94f * root_guess(3.0f * of[k].c2, 1), 0.984375f);
   }
-  p = a * a - c1;
-  slope = a * p - 2.0f * J;
-  r = r * (2.0f - slope * r);
-  r = r * (2.0f - slope * r);
-  return {a, p * 0.5f, c1, r * 2.0f};
+  for (int i = 0; i < steps; ++i) {
+    for (int k = 0; k < N; ++k) {
+      const Quartic<T> f(of[k], a[k]);
+      const T d = f.slope * f.slope - f.value * (1.5f * f.p + of[k].c1);
+      r[k] = reciprocal_guess(d);
+      if (i > 0) r[k] = nearer_reciprocal(r[k], d);
+      a[k] -= f.value * f.slope * r[k];
+    }
+  }
+  for (int k = 0; k < N; ++k) {  // Newton's step, so that an undeformed point has exactly 3
+    const Quartic<T> f(of[k], a[k]);
+    r[k] = nearer_reciprocal(f.slope * r[k], f.slope);  // d was the slope's square, nearly
+    a[k] -= f.value * r[k];
+  }
+  for (int k = 0; k < N; ++k) {
+    const Quartic<T> f(of[k], a[k]);
+    r[k] = nearer_reciprocal(nearer_reciprocal(r[k], f.slope), f.slope);
+    s[k] = {a[k], 0.5f * f.p, r[k] + r[k]};
+  }
 }
 
 /// C = F^T F: 00 11 22 01 02 12.
@@ -134,35 +160,47 @@ TISSUE_SIM_INLINE void rotation(const T* F, T* R) {
   T cof[9], C[6], FC[9];
   cofactor(F, cof);
   const T J = F[0] * cof[0] + F[1] * cof[1] + F[2] * cof[2];
-  const Stretch<T> s = stretch(norm2(F), norm2(cof), J);
+  const Invariants<T> of = {norm2(F), norm2(cof), J};
+  Stretch<T> s;
+  stretch<1>(&of, &s);
   right_cauchy_green(F, C);
   times_symmetric(F, C, FC);
   for (int i = 0; i < 9; ++i) {
-    R[i] = ((s.b + s.c1) * F[i] - FC[i] + s.a * cof[i]) * s.inverse;
+    R[i] = ((s.b + of.c1) * F[i] - FC[i] + s.a * cof[i]) * s.inverse;
   }
 }
 
 /// Fixed corotated (Stomakhin et al. 2012): psi = mu ||F - R||^2 + lambda/2 (J - 1)^2.
 struct FixedCorotated {
-  /// P = 2 mu (F - R) + lambda (J - 1) cof F. Give `mu` and `lambda` times a volume, and P is too.
-  template <class T>
-  TISSUE_SIM_INLINE static void stress(const T* F, T mu, T lambda, T* P) {
-    T cof[9], C[6];
-    cofactor(F, cof);
-    right_cauchy_green(F, C);
-    const T J = F[0] * cof[0] + F[1] * cof[1] + F[2] * cof[2];
-    // ||cof F||^2 is the second invariant of C.
-    const T c2 =
-        (C[0] * C[1] - C[3] * C[3]) + (C[0] * C[2] - C[4] * C[4]) + (C[1] * C[2] - C[5] * C[5]);
-    const Stretch<T> s = stretch(C[0] + C[1] + C[2], c2, J);
-    const T mu2 = mu + mu;
-    const T fc = mu2 * s.inverse;
-    const T f = mu2 - fc * (s.b + s.c1);
-    const T c = lambda * (J - 1.0f) - fc * s.a;
-    // P = F (f I + fc C) + c cof F
-    for (int i = 0; i < 6; ++i) C[i] = i < 3 ? fc * C[i] + f : fc * C[i];
-    times_symmetric(F, C, P);
-    for (int i = 0; i < 9; ++i) P[i] += c * cof[i];
+  /// P = 2 mu (F - R) + lambda (J - 1) cof F of N points. Give `mu` and `lambda` times a volume,
+  /// and P is too. F and P may be the same.
+  template <int N, class T>
+  TISSUE_SIM_INLINE static void stresses(const T (*F)[9], const T* mu, const T* lambda, T (*P)[9]) {
+    Invariants<T> of[N];
+    Stretch<T> s[N];
+    for (int k = 0; k < N; ++k) {
+      T cof[9], C[6];
+      cofactor(F[k], cof);
+      right_cauchy_green(F[k], C);
+      of[k] = {
+          C[0] + C[1] + C[2],
+          (C[0] * C[1] - C[3] * C[3]) + (C[0] * C[2] - C[4] * C[4]) + (C[1] * C[2] - C[5] * C[5]),
+          F[k][0] * cof[0] + F[k][1] * cof[1] + F[k][2] * cof[2]};
+    }
+    stretch<N>(of, s);
+    for (int k = 0; k < N; ++k) {  // cof F and C anew: to keep them for N points costs more
+      T cof[9], C[6], FC[9];
+      cofactor(F[k], cof);
+      right_cauchy_green(F[k], C);
+      const T mu2 = mu[k] + mu[k];
+      const T fc = mu2 * s[k].inverse;
+      const T f = mu2 - fc * (s[k].b + of[k].c1);
+      const T c = lambda[k] * (of[k].J - 1.0f) - fc * s[k].a;
+      // P = F (f I + fc C) + c cof F
+      for (int i = 0; i < 6; ++i) C[i] = i < 3 ? fc * C[i] + f : fc * C[i];
+      times_symmetric(F[k], C, FC);
+      for (int i = 0; i < 9; ++i) P[k][i] = FC[i] + c * cof[i];
+    }
   }
 
   /// Energy per volume; ||F - R||^2 = tr C - 2 tr U + 3.
@@ -180,14 +218,16 @@ struct FixedCorotated {
 /// Neo-Hookean that stays finite under inversion (Smith, de Goes, Kim 2018, eq. 13 without the log
 /// term): psi = mu/2 (||F||^2 - 3) - mu (J - 1) + (lambda + mu)/2 (J - 1)^2.
 struct NeoHookean {
-  /// P = mu F + ((lambda + mu) (J - 1) - mu) cof F.
-  template <class T>
-  TISSUE_SIM_INLINE static void stress(const T* F, T mu, T lambda, T* P) {
-    T cof[9];
-    cofactor(F, cof);
-    const T J = F[0] * cof[0] + F[1] * cof[1] + F[2] * cof[2];
-    const T c = (lambda + mu) * (J - 1.0f) - mu;
-    for (int i = 0; i < 9; ++i) P[i] = mu * F[i] + c * cof[i];
+  /// P = mu F + ((lambda + mu) (J - 1) - mu) cof F of N points. As FixedCorotated's.
+  template <int N, class T>
+  TISSUE_SIM_INLINE static void stresses(const T (*F)[9], const T* mu, const T* lambda, T (*P)[9]) {
+    for (int k = 0; k < N; ++k) {
+      T cof[9];
+      cofactor(F[k], cof);
+      const T J = F[k][0] * cof[0] + F[k][1] * cof[1] + F[k][2] * cof[2];
+      const T c = (lambda[k] + mu[k]) * (J - 1.0f) - mu[k];
+      for (int i = 0; i < 9; ++i) P[k][i] = mu[k] * F[k][i] + c * cof[i];
+    }
   }
 
   template <class T>
@@ -199,6 +239,13 @@ struct NeoHookean {
            0.5f * (lambda + mu) * (J - 1.0f) * (J - 1.0f);
   }
 };
+
+/// stresses() of one point: F[9] -> P[9].
+template <class LawOf, class T>
+TISSUE_SIM_INLINE void stress(const T* F, T mu, T lambda, T* P) {
+  LawOf::template stresses<1>(reinterpret_cast<const T(*)[9]>(F), &mu, &lambda,
+                              reinterpret_cast<T(*)[9]>(P));
+}
 
 /// Kelvin-Voigt viscosity: adds F S with S = 2 eta dE/dt, E Green's strain, to P.
 template <class T>

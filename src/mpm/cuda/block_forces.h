@@ -42,7 +42,7 @@ template <class LawOf, bool kViscous>
 __device__ __forceinline__ void stress(const CudaBody& body, float volume, const float* damping,
                                        float* F) {
   float P[9];
-  LawOf::stress(F, body.mu * volume, body.lambda * volume, P);
+  tissue_sim::stress<LawOf>(F, body.mu * volume, body.lambda * volume, P);
 #pragma unroll
   for (int i = 0; i < 9; ++i) F[i] = kViscous ? P[i] + damping[i] : P[i];
 }

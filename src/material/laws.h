@@ -156,9 +156,11 @@ struct FixedCorotated {
         (C[0] * C[1] - C[3] * C[3]) + (C[0] * C[2] - C[4] * C[4]) + (C[1] * C[2] - C[5] * C[5]);
     const Stretch<T> s = stretch(C[0] + C[1] + C[2], c2, J);
     const T mu2 = mu + mu;
+    // The moduli come last, so that no rounding of theirs is left where F = I: tissue at rest
+    // stays there without fused multiply-add, too.
     const T fc = mu2 * s.inverse;
-    const T f = mu2 - fc * (s.b + s.c1);
-    const T c = lambda * (J - 1.0f) - fc * s.a;
+    const T f = mu2 * (1.0f - s.inverse * (s.b + s.c1));
+    const T c = lambda * (J - 1.0f) - mu2 * (s.inverse * s.a);
     // P = F (f I + fc C) + c cof F
     for (int i = 0; i < 6; ++i) C[i] = i < 3 ? fc * C[i] + f : fc * C[i];
     times_symmetric(F, C, P);

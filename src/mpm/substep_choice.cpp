@@ -13,7 +13,7 @@ constexpr int kLongestAge = 30;       // frames
 constexpr double kMostGrowth = 1.3;   // of the stiffness, until it is measured again
 constexpr double kMargin = 0.72;      // for springs of contact, and what stiffens within the frame
 constexpr double kViscousGrowth = 2;  // viscous stress grows with the stretch squared: up to 1.4
-constexpr double kFreeMotion = 0.5;   // of a tool in a frame [cells]; beyond it the margin grows
+constexpr double kFreeMotion = 0.25;   // of a tool in a frame [cells]; beyond it the margin grows
 
 /// Whether something tore within the last twentieth of a second: then more may soon, in pieces that
 /// nobody has measured.

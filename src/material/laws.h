@@ -22,9 +22,6 @@ struct BitsOf<float> {
 
 /// An upper bound of the square root of x >= 0, at most 9 % above it: a start for Newton's method.
 TISSUE_SIM_INLINE double root_bound(double x) { return 1.04 * sqrt(x); }
-#if defined(__CUDA_ARCH__)
-TISSUE_SIM_INLINE float root_bound(float x) { return 1.04f * __fsqrt_rn(x); }
-#else
 /// By halving the exponent: for float and for vectors of floats, whose bits are integers of the
 /// same width.
 template <class T>
@@ -35,7 +32,6 @@ TISSUE_SIM_INLINE T root_bound(T x) {
   std::memcpy(&x, &bits, sizeof(x));
   return 1.04f * x;
 }
-#endif
 
 /// Cofactor matrix of F: cof F = J F^-T, defined for singular F too.
 template <class T>
@@ -58,20 +54,6 @@ TISSUE_SIM_INLINE T norm2(const T* A) {
   return s;
 }
 
-/// 1 / x; for float on the GPU to the last bit but one and without a branch, where it is refined
-/// anyway.
-template <class T>
-TISSUE_SIM_INLINE T rough_reciprocal(T x) {
-#if defined(__CUDA_ARCH__)
-  if constexpr (sizeof(T) == sizeof(float)) {
-    T r;
-    asm("rcp.approx.ftz.f32 %0, %1;" : "=f"(r) : "f"(x));
-    return r;
-  }
-#endif
-  return 1.0f / x;
-}
-
 /// Invariants of the stretch U = sqrt(F^T F) of a deformation gradient, and what the rotation
 /// follows from: R = ((b + c1) F - F C + a cof F) * inverse.
 template <class T>
@@ -92,7 +74,7 @@ TISSUE_SIM_INLINE Stretch<T> stretch(T c1, T c2, T J) {
   T a = root_bound(c1 + 2.0f * root_bound(3.0f * c2));
   T p = a * a - c1;
   T slope = a * p - 2.0f * J;
-  T r = rough_reciprocal(slope);
+  T r = 1.0f / slope;
   a -= (0.25f * p * p - c2 - 2.0f * J * a) * r;
   for (int i = 0; i < 4; ++i) {
     p = a * a - c1;
@@ -106,6 +88,34 @@ TISSUE_SIM_INLINE Stretch<T> stretch(T c1, T c2, T J) {
   r = r * (2.0f - slope * r);
   return {a, p * 0.5f, c1, r * 2.0f};
 }
+
+#if defined(__CUDA_ARCH__)
+/// Square root and 1 / x in one instruction, to the last bit but one.
+TISSUE_SIM_INLINE float fast_root(float x) {
+  asm("sqrt.approx.ftz.f32 %0, %1;" : "=f"(x) : "f"(x));
+  return x;
+}
+TISSUE_SIM_INLINE float fast_reciprocal(float x) {
+  asm("rcp.approx.ftz.f32 %0, %1;" : "=f"(x) : "f"(x));
+  return x;
+}
+
+/// The same where roots and reciprocals are cheap: from b^2 = ||cof F||^2 + 2 J a with the bounds
+/// sqrt(3 tr C) of a where J > 0 and sqrt(tr C / 3) where J < 0 comes a start that is too large by
+/// 1.8 % at most where J > 0, so that three steps do; the 1e-4 keep the slope of a flat F from 0.
+TISSUE_SIM_INLINE Stretch<float> stretch(float c1, float c2, float J) {
+  const float j2 = 2.0f * J, j8 = 8.0f * J, c24 = 4.0f * c2;
+  const float b2 = fast_root(fabsf(c24 + fmaxf(j8, (8.0f / 3.0f) * J) * fast_root(3.0f * c1)));
+  float a = fast_root(1.0001f * c1 + b2), p;
+#pragma unroll
+  for (int i = 0; i < 3; ++i) {
+    p = a * a - c1;
+    a -= 0.25f * (p * p - (j8 * a + c24)) * fast_reciprocal(a * p - j2);
+  }
+  p = a * a - c1;
+  return {a, p * 0.5f, c1, 2.0f * fast_reciprocal(a * p - j2)};
+}
+#endif
 
 /// C = F^T F: 00 11 22 01 02 12.
 template <class T>

@@ -37,96 +37,84 @@ __device__ __forceinline__ float4 half_volumes(const CudaTables& t, const CudaCo
   return {v[0], v[c.step], v[2 * c.step], v[3 * c.step]};
 }
 
-/// F to the stress P times the volume, in place; `damping` is added.
+/// F to the stress P times -volume / cell size, in place; `damping` is added.
 template <class LawOf, bool kViscous>
-__device__ __forceinline__ void stress(const CudaBody& body, float volume, const float* damping,
-                                       float* F) {
+__device__ __forceinline__ void stress(float mu, float lambda, const float* damping, float* F) {
   float P[9];
-  LawOf::stress(F, body.mu * volume, body.lambda * volume, P);
+  LawOf::stress(F, mu, lambda, P);
 #pragma unroll
   for (int i = 0; i < 9; ++i) F[i] = kViscous ? P[i] + damping[i] : P[i];
 }
 
 /// Kelvin-Voigt stress at the middle of the cell, from the mean gradients of its two halves, times
-/// an eighth of the volume of its points. The neighbouring thread has the other half.
+/// -1 / cell size and an eighth of the volume of its points. The neighbouring thread has the other
+/// half.
 __device__ __forceinline__ void viscous_stress(const CudaBody& body, const HalfPlane (&u)[3],
-                                               const HalfPlane (&v)[3], const float4& volume,
-                                               float (&P)[9]) {
+                                               const HalfPlane (&v)[3], float side,
+                                               const float4& volume, float (&P)[9]) {
   const unsigned pair = 3u << (threadIdx.x & 30u);
   const auto mean = [pair](float half) { return 0.5f * (half + __shfl_xor_sync(pair, half, 1)); };
+  constexpr float k1 = read_scale(1), k2 = read_scale(2) / read_scale(0);
   float F[9], rate[9];
 #pragma unroll
   for (int c = 0; c < 3; ++c) {
-    F[3 * c] = mean(0.5f * u[c].wdA);
-    F[3 * c + 1] = mean(0.5f * u[c].wAd);
-    F[3 * c + 2] = mean(u[c].sAA);
-    rate[3 * c] = mean(0.5f * v[c].wdA);
-    rate[3 * c + 1] = mean(0.5f * v[c].wAd);
-    rate[3 * c + 2] = mean(v[c].sAA);
+    F[3 * c] = mean(0.5f * k1 * u[c].wdA);
+    F[3 * c + 1] = mean(0.5f * k1 * u[c].wAd);
+    F[3 * c + 2] = mean(-0.5f * k2 * side * u[c].sAA);
+    rate[3 * c] = mean(0.5f * k1 * v[c].wdA);
+    rate[3 * c + 1] = mean(0.5f * k1 * v[c].wAd);
+    rate[3 * c + 2] = mean(-0.5f * k2 * side * v[c].sAA);
     F[4 * c] += 1.0f;
   }
   const float half = (volume.x + volume.y) + (volume.z + volume.w);
 #pragma unroll
   for (int i = 0; i < 9; ++i) P[i] = 0;
-  add_viscous_stress(F, rate, 0.25f * body.viscosity * mean(half), P);
-}
-
-/// Adds the forces of colliders on the points of half a cell to its transposed half plane.
-__device__ __forceinline__ void add_push(const HalfPush& push, float cell_size,
-                                         HalfPlane (&out)[3]) {
-#pragma unroll
-  for (int c = 0; c < 3; ++c) {
-    const float4 f = *reinterpret_cast<const float4*>(push.of[c]);
-    // The stencils take forces by -1 / cell size, as they do stress.
-    add_point_force(-cell_size * f.x, -1, -1, out[c]);
-    add_point_force(-cell_size * f.y, 1, -1, out[c]);
-    add_point_force(-cell_size * f.z, -1, 1, out[c]);
-    add_point_force(-cell_size * f.w, 1, 1, out[c]);
-  }
+  add_viscous_stress(F, rate, -0.25f * body.inv_cell_size * body.viscosity * mean(half), P);
 }
 
 /// Forces of half a cell: reads its nodes, gives its transposed half plane. `stiffness` and `bends`
-/// are for kPartial alone: where the cell is not full, kStabilisation mu V, else 0.
+/// are for kPartial alone: where the cell is not full, -kStabilisation mu V / cell size, else 0.
 template <class LawOf, bool kViscous, bool kPartial>
 __device__ __forceinline__ void half_forces(const CudaTables& t, const CudaColumn& column,
                                             const CudaBody& body, const BlockShared& s, int z,
-                                            int sz, const HalfWeights& weights, float stiffness,
-                                            HalfPlane (&out)[3], HalfBends (&bends)[3]) {
+                                            int sz, float stiffness, HalfPlane (&out)[3],
+                                            HalfBends (&bends)[3]) {
   const int first = column.slot + z * column.plane;
-  HalfPlane h[3], rate[3];
+  const float side = sz == 0 ? -1.0f : 1.0f;
+  HalfPlane h[3];
   HalfBends bent[3];
-  read_half<kPartial>(s.u + first, column.pitch, column.plane, weights, h, bent);
-  if (kViscous) read_half(s.v + first, column.pitch, column.plane, weights, rate);
+  read_half<kPartial>(s.u + first, column.pitch, column.plane, side, h, bent);
   const float4 volume = half_volumes(t, column, body, z, sz);
   float damping[9];
-  if (kViscous) viscous_stress(body, h, rate, volume, damping);
+  if (kViscous) {
+    HalfPlane rate[3];
+    read_half(s.v + first, column.pitch, column.plane, side, rate);
+    viscous_stress(body, h, rate, side, volume, damping);
+  }
+  float F[4][9];
 #pragma unroll
   for (int c = 0; c < 3; ++c) {
-    out[c] = {};
-    if (kPartial && stiffness != 0) stabilise_half(stiffness, h[c], bent[c], out[c], bends[c]);
-  }
 #pragma unroll
-  for (int ty = 0; ty < 2; ++ty) {
-    const float side = ty == 0 ? -1.0f : 1.0f;
-    float F[2][9];
-#pragma unroll
-    for (int c = 0; c < 3; ++c) {
+    for (int ty = 0; ty < 2; ++ty) {
       float low[3], high[3];
-      row_gradient(h[c], side, low, high);
+      row_of_F(h[c], c, side, ty == 0 ? -1.0f : 1.0f, low, high);
 #pragma unroll
       for (int i = 0; i < 3; ++i) {
-        F[0][3 * c + i] = low[i] + (i == c ? 1.0f : 0.0f);
-        F[1][3 * c + i] = high[i] + (i == c ? 1.0f : 0.0f);
+        F[2 * ty][3 * c + i] = low[i];
+        F[2 * ty + 1][3 * c + i] = high[i];
       }
     }
-    const float v0 = ty == 0 ? volume.x : volume.z, v1 = ty == 0 ? volume.y : volume.w;
-    stress<LawOf, kViscous>(body, v0, damping, F[0]);
-    stress<LawOf, kViscous>(body, v1, damping, F[1]);
+  }
+  const float mu = -body.inv_cell_size * body.mu, lambda = -body.inv_cell_size * body.lambda;
+  stress<LawOf, kViscous>(mu * volume.x, lambda * volume.x, damping, F[0]);
+  stress<LawOf, kViscous>(mu * volume.y, lambda * volume.y, damping, F[1]);
+  stress<LawOf, kViscous>(mu * volume.z, lambda * volume.z, damping, F[2]);
+  stress<LawOf, kViscous>(mu * volume.w, lambda * volume.w, damping, F[3]);
 #pragma unroll
-    for (int c = 0; c < 3; ++c) {
-      const float low[3] = {F[0][3 * c], F[0][3 * c + 1], F[0][3 * c + 2]};
-      const float high[3] = {F[1][3 * c], F[1][3 * c + 1], F[1][3 * c + 2]};
-      add_row_stress(low, high, side, out[c]);
+  for (int c = 0; c < 3; ++c) {
+    give_stress(F, c, out[c]);
+    if (kPartial && stiffness != 0) {
+      stabilise_half(stiffness, side, h[c], bent[c], out[c], bends[c]);
     }
   }
 }
@@ -135,7 +123,7 @@ __device__ __forceinline__ void half_forces(const CudaTables& t, const CudaColum
 /// `exchange` is that of the block's first column, `places` lie between the nine sums of a column.
 /// Goes on from `i`, and leaves it at what is left for the next block.
 __device__ __forceinline__ void write_plane(int nx, int ny, const float4* exchange, int places,
-                                            float scale, float4* force, int& i) {
+                                            float4* force, int& i) {
   const int pitch = nx + 2, count = pitch * (ny + 2);
   for (; i < count; i += static_cast<int>(blockDim.x)) {
     const int y = i / pitch, x = i - y * pitch;
@@ -153,7 +141,7 @@ __device__ __forceinline__ void write_plane(int nx, int ny, const float4* exchan
         f.z += g.z;
       }
     }
-    __stcg(force + i, float4{scale * f.x, scale * f.y, scale * f.z, 0});
+    __stcg(force + i, f);
   }
   i -= count;
 }
@@ -214,29 +202,35 @@ __device__ __forceinline__ void block_forces(const CudaTables& t, const CudaBund
       after[c] = {};
     }
     if (active && z < column.nz) {
-      const HalfWeights k(sz == 0 ? -1.0f : 1.0f);
+      const GiveWeights k(sz == 0 ? -1.0f : 1.0f);
       HalfPlane out[3];
       HalfBends bends[3];
       float stiffness = 0;
       if (kPartial) {
-        stiffness = kStabilisation * __ldg(t.partial + column.cell + z * column.step);
+        stiffness =
+            -kStabilisation * body.inv_cell_size * __ldg(t.partial + column.cell + z * column.step);
       }
-      half_forces<LawOf, kViscous, kPartial>(t, column, body, s, z, sz, k, stiffness, out, bends);
+      half_forces<LawOf, kViscous, kPartial>(t, column, body, s, z, sz, stiffness, out, bends);
       if (kSpecial && (step.touched >> z & 1u) != 0) {
-        add_push(step.pushes[2 * (z * w.columns + index) + sz], body.cell_size, out);
+        const HalfPush& push = step.pushes[2 * (z * w.columns + index) + sz];
+#pragma unroll
+        for (int c = 0; c < 3; ++c) {
+          add_forces(*reinterpret_cast<const float4*>(push.of[c]), out[c]);
+        }
       }
+      constexpr bool kValues = kSpecial || kPartial;
 #pragma unroll
       for (int c = 0; c < 3; ++c) {
-        add_to_plane(out[c], k.below, k.slope_below, now[c]);
-        add_to_plane(out[c], kAverageCenter, k.slope_center, next[c]);
-        add_to_plane(out[c], k.above, k.slope_above, after[c]);
+        now[c] = plus<kValues>(now[c], out[c], k.below, k.slope_below);
+        next[c] = plus<kValues>(next[c], out[c], kAverageCenter, k.slope_center);
+        after[c] = plus<kValues>(after[c], out[c], k.above, k.slope_above);
       }
       if (kPartial && stiffness != 0) {
 #pragma unroll
         for (int c = 0; c < 3; ++c) {
-          add_to_plane(bends[c], k.below, k.slope_below, now[c]);
-          add_to_plane(bends[c], kAverageCenter, k.slope_center, next[c]);
-          add_to_plane(bends[c], k.above, k.slope_above, after[c]);
+          now[c] = plus(now[c], bends[c], k.below, k.slope_below);
+          next[c] = plus(next[c], bends[c], kAverageCenter, k.slope_center);
+          after[c] = plus(after[c], bends[c], k.above, k.slope_above);
         }
       }
     }
@@ -262,13 +256,13 @@ __device__ __forceinline__ void block_forces(const CudaTables& t, const CudaBund
       for (int j = 0; j < w.blocks; ++j) {
         const int4 b = j == 0 ? first : block_size(t, w.first_block + j);
         if (z < b.z + 2) {
-          write_plane(b.x, b.y, s.exchange + place, places, -body.inv_cell_size,
+          write_plane(b.x, b.y, s.exchange + place, places,
                       step.force + b.w + z * (b.x + 2) * (b.y + 2), i);
         }
         place += b.x * b.y;
       }
     } else {
-      write_plane(block.nx, block.ny, s.exchange, places, -body.inv_cell_size,
+      write_plane(block.nx, block.ny, s.exchange, places,
                   step.force + block.first_slot + z * column.plane, i);
     }
     __syncthreads();

@@ -55,11 +55,9 @@ __device__ __forceinline__ PointState point_state(const CudaBlock& b, const Cuda
 #pragma unroll
   for (int c = 0; c < 3; ++c) {
     float low[3], high[3];
-    row_gradient(h[c], sy, low, high);
+    row_of_F(h[c], c, (s & 4) != 0 ? 1.0f : -1.0f, sy, low, high);
 #pragma unroll
-    for (int i = 0; i < 3; ++i) {
-      p.F[3 * c + i] = (sx < 0 ? low[i] : high[i]) + (i == c ? 1.0f : 0.0f);
-    }
+    for (int i = 0; i < 3; ++i) p.F[3 * c + i] = sx < 0 ? low[i] : high[i];
     p.x[c] += body.cell_size * point_value(h[c], sx, sy);
   }
   return p;
@@ -76,7 +74,7 @@ __device__ __forceinline__ void for_each_point(const CudaTables& t, const CudaBl
     const int sz = i / b.nx / b.ny % 2;
     HalfPlane h[3];
     const int first = z * plane + y * pitch + x;
-    read_half(u + first, pitch, plane, HalfWeights(sz == 0 ? -1.0f : 1.0f), h);
+    read_half(u + first, pitch, plane, sz == 0 ? -1.0f : 1.0f, h);
     for (int q = 0; q < 4; ++q) {
       const int lane = lane_of(b, x, y, z, 4 * sz + q);
       if (t.point[lane] >= 0) f(lane, 4 * sz + q, x, y, z, first, h);

@@ -14,7 +14,7 @@ struct FaceRounds;
 struct BlockShared {
   float4* u;                  ///< [slots], divided by the cell size
   float4* v;                  ///< [slots], the same; only where contact or viscosity needs it
-  float4* exchange;           ///< [9][threads]
+  float4* exchange;           ///< [1 or 2 planes][plane slots][9]
   unsigned long long* loads;  ///< [kMaxColliders][6]
   Collider* colliders;        ///< [kMaxColliders]
   FaceRounds* rounds;
@@ -25,6 +25,7 @@ struct BlockStep {
   const HalfPush* pushes;  ///< of colliders, see find_pushes()
   std::uint32_t touched;   ///< the thread's half cells that they push
   float4* force;           ///< of all slots
+  bool two_planes;         ///< CudaPlan::two_planes
 };
 
 /// Volumes of the points 2 sy + sx of a half cell.
@@ -119,29 +120,29 @@ __device__ __forceinline__ void half_forces(const CudaTables& t, const CudaColum
   }
 }
 
-/// Sums what the cells give to a node plane of a block, in a fixed order, and puts it to `force`.
-/// `exchange` is that of the block's first column, `places` lie between the nine sums of a column.
+/// Clears what the columns' threads leave as it is: the parts that a node at the rim of a block
+/// gets from columns that are not there.
+__device__ __forceinline__ void clear_exchange(float4* exchange, int plane_slots, bool two_planes) {
+  const int count = (two_planes ? 18 : 9) * plane_slots;
+  for (int i = static_cast<int>(threadIdx.x); i < count; i += static_cast<int>(blockDim.x)) {
+    exchange[i] = {0, 0, 0, 0};
+  }
+}
+
+/// Sums what the cells give to `count` nodes of a plane, in a fixed order, and puts it to `force`.
 /// Goes on from `i`, and leaves it at what is left for the next block.
-__device__ __forceinline__ void write_plane(int nx, int ny, const float4* exchange, int places,
-                                            float4* force, int& i) {
-  const int pitch = nx + 2, count = pitch * (ny + 2);
+__device__ __forceinline__ void sum_plane(int count, const float4* exchange, float4* force,
+                                          int& i) {
   for (; i < count; i += static_cast<int>(blockDim.x)) {
-    const int y = i / pitch, x = i - y * pitch;
-    float4 f = {0, 0, 0, 0};
+    float4 f[9];
 #pragma unroll
-    for (int dy = 0; dy < 3; ++dy) {
+    for (int k = 0; k < 9; ++k) f[k] = exchange[9 * i + k];
 #pragma unroll
-      for (int dx = 0; dx < 3; ++dx) {
-        const int cx = x - dx, cy = y - dy;
-        const bool there = cx >= 0 && cy >= 0 && cx < nx && cy < ny;
-        const float4 g =
-            there ? exchange[(3 * dy + dx) * places + cy * nx + cx] : float4{0, 0, 0, 0};
-        f.x += g.x;
-        f.y += g.y;
-        f.z += g.z;
-      }
+    for (int step = 1; step < 9; step *= 2) {
+#pragma unroll
+      for (int k = 0; k + step < 9; k += 2 * step) add(f[k + step], f[k]);
     }
-    __stcg(force + i, f);
+    __stcg(force + i, f[0]);
   }
   i -= count;
 }
@@ -172,37 +173,57 @@ template <class LawOf, bool kViscous, bool kSpecial, bool kPartial>
 __device__ __forceinline__ void block_forces(const CudaTables& t, const CudaBundle& w,
                                              const CudaBlock& block, const CudaBody& body,
                                              const BlockShared& s, const BlockStep& step) {
-  const int index = static_cast<int>(threadIdx.x) / 2;
-  const int places = kSpecial ? w.places : block.nx * block.ny;
+  const int thread = static_cast<int>(threadIdx.x), index = thread / 2, sz = thread % 2;
   const int nz = kSpecial ? w.nz : block.nz;
-  const bool active = index < (kSpecial ? w.columns : places);
-  CudaColumn column;
-  if constexpr (kSpecial) {
-    column = column_of(t, w, block, body.cell_size, min(index, w.columns - 1));
-    if (w.columns < places) {  // those without points give nothing
-      for (int i = static_cast<int>(threadIdx.x); i < 9 * places;
-           i += static_cast<int>(blockDim.x)) {
-        s.exchange[i] = {0, 0, 0, 0};
-      }
-      __syncthreads();
-    }
-  } else {
-    column = column_of(block, body.cell_size, index);
-  }
+  const int columns = kSpecial ? w.columns : block.nx * block.ny;
+  // Threads beyond the last column do what the last one's do, if their warp has to anyway.
+  const bool active = index < columns, warp_active = thread / 32 * 16 < columns;
+  const CudaColumn column = kSpecial
+                                ? column_of(t, w, block, body.cell_size, min(index, columns - 1))
+                                : column_of(block, body.cell_size, min(index, columns - 1));
   const int4 first{block.nx, block.ny, block.nz, block.first_slot};
+
+  // Puts what the columns' cells give to plane z together and to the nodes.
+  const auto finish_plane = [&](PlaneForce(&now)[3], int z) {
+    float4* exchange = s.exchange + (step.two_planes && z % 2 != 0 ? 9 * w.plane_slots : 0);
+    if (warp_active) {
+      float f[3][3][3];
+#pragma unroll
+      for (int c = 0; c < 3; ++c) {
+        add_neighbour(now[c]);
+        if (kPartial) now[c].BB += __shfl_xor_sync(0xffffffffu, now[c].BB, 1);
+        node_forces<kPartial>(now[c], f[c]);
+      }
+      float4* to = exchange + 9 * column.plane_slot;
+#pragma unroll
+      for (int k = 0; k < 9; ++k) {
+        if (!active || (k < 5) != (sz == 0)) continue;  // each of the two writes half of the sums
+        const int y = k / 3, x = k % 3;
+        to[9 * (y * column.pitch + x) + k] = {f[0][y][x], f[1][y][x], f[2][y][x], 0};
+      }
+    }
+    __syncthreads();
+    int i = thread;
+    if constexpr (kSpecial) {
+      for (int j = 0; j < w.blocks; ++j) {
+        const int4 b = j == 0 ? first : block_size(t, w.first_block + j);
+        const int plane = (b.x + 2) * (b.y + 2);
+        if (z < b.z + 2) sum_plane(plane, exchange, step.force + b.w + z * plane, i);
+        exchange += 9 * plane;
+      }
+    } else {
+      sum_plane(column.plane, exchange, step.force + block.first_slot + z * column.plane, i);
+    }
+    if (!step.two_planes) __syncthreads();
+  };
+
+  const GiveWeights k(sz == 0 ? -1.0f : 1.0f);
+  constexpr bool kValues = kSpecial || kPartial;
   PlaneForce next[3] = {}, after[3] = {};
 #pragma unroll 1
-  for (int z = 0; z < nz + 2; ++z) {
-    const int sz = static_cast<int>(threadIdx.x) % 2;
+  for (int z = 0; z < nz; ++z) {
     PlaneForce now[3];
-#pragma unroll
-    for (int c = 0; c < 3; ++c) {
-      now[c] = next[c];
-      next[c] = after[c];
-      after[c] = {};
-    }
-    if (active && z < column.nz) {
-      const GiveWeights k(sz == 0 ? -1.0f : 1.0f);
+    if (warp_active && (!kSpecial || z < column.nz)) {
       HalfPlane out[3];
       HalfBends bends[3];
       float stiffness = 0;
@@ -218,12 +239,11 @@ __device__ __forceinline__ void block_forces(const CudaTables& t, const CudaBund
           add_forces(*reinterpret_cast<const float4*>(push.of[c]), out[c]);
         }
       }
-      constexpr bool kValues = kSpecial || kPartial;
 #pragma unroll
       for (int c = 0; c < 3; ++c) {
-        now[c] = plus<kValues>(now[c], out[c], k.below, k.slope_below);
-        next[c] = plus<kValues>(next[c], out[c], kAverageCenter, k.slope_center);
-        after[c] = plus<kValues>(after[c], out[c], k.above, k.slope_above);
+        now[c] = plus<kValues>(next[c], out[c], k.below, k.slope_below);
+        next[c] = plus<kValues>(after[c], out[c], kAverageCenter, k.slope_center);
+        after[c] = plus<kValues>({}, out[c], k.above, k.slope_above);
       }
       if (kPartial && stiffness != 0) {
 #pragma unroll
@@ -233,40 +253,18 @@ __device__ __forceinline__ void block_forces(const CudaTables& t, const CudaBund
           after[c] = plus(after[c], bends[c], k.above, k.slope_above);
         }
       }
-    }
+    } else if (kSpecial) {
 #pragma unroll
-    for (int c = 0; c < 3; ++c) {
-      add_neighbour(now[c]);
-      if (kPartial) now[c].BB += __shfl_xor_sync(0xffffffffu, now[c].BB, 1);
-    }
-    if (active) {
-      float f[3][3][3];
-#pragma unroll
-      for (int c = 0; c < 3; ++c) node_forces<kPartial>(now[c], f[c]);
-#pragma unroll
-      for (int k = 0; k < 9; ++k) {
-        if ((k < 5) != (sz == 0)) continue;  // each of the two writes half of the sums
-        s.exchange[k * places + column.place] = {f[0][k / 3][k % 3], f[1][k / 3][k % 3],
-                                                 f[2][k / 3][k % 3], 0};
+      for (int c = 0; c < 3; ++c) {
+        now[c] = next[c];
+        next[c] = after[c];
+        after[c] = {};
       }
     }
-    __syncthreads();
-    int i = static_cast<int>(threadIdx.x), place = 0;
-    if constexpr (kSpecial) {
-      for (int j = 0; j < w.blocks; ++j) {
-        const int4 b = j == 0 ? first : block_size(t, w.first_block + j);
-        if (z < b.z + 2) {
-          write_plane(b.x, b.y, s.exchange + place, places,
-                      step.force + b.w + z * (b.x + 2) * (b.y + 2), i);
-        }
-        place += b.x * b.y;
-      }
-    } else {
-      write_plane(block.nx, block.ny, s.exchange, places,
-                  step.force + block.first_slot + z * column.plane, i);
-    }
-    __syncthreads();
+    finish_plane(now, z);
   }
+  finish_plane(next, nz);
+  finish_plane(after, nz + 1);
 }
 
 }  // namespace tissue_sim

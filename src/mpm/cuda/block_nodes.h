@@ -167,7 +167,7 @@ __device__ __forceinline__ CudaColumn column_of(const CudaBlock& b, float cell_s
   c.lane = b.first_lane + index;
   c.step = b.nx * b.ny;
   c.cell = b.first_lane / 8 + index;
-  c.place = index;
+  c.plane_slot = c.slot;
   c.middle[0] = b.origin[0] + cell_size * static_cast<float>(x + 1);
   c.middle[1] = b.origin[1] + cell_size * static_cast<float>(y + 1);
   c.middle[2] = b.origin[2] + cell_size;
@@ -178,7 +178,9 @@ __device__ __forceinline__ CudaColumn column_of(const CudaBlock& b, float cell_s
 __device__ __forceinline__ CudaColumn column_of(const CudaTables& t, const CudaBundle& w,
                                                 const CudaBlock& block, float cell_size,
                                                 int index) {
-  if (w.blocks == 1 && w.columns == w.places) return column_of(block, cell_size, index);
+  if (w.blocks == 1 && w.columns == block.nx * block.ny) {
+    return column_of(block, cell_size, index);
+  }
   return t.columns[w.first_column + index];
 }
 

@@ -21,7 +21,7 @@ double cycles(const std::vector<LatticeBody>& bodies, const CudaShape& s, const 
               bool small) {
   const BlockShape& b = s.blocks;
   const double slots = (b.x + 2.0) * (b.y + 2) * (b.z + 2);
-  const double shared = (small ? 56 : 32) * slots + 144.0 * s.threads + 5800;
+  const double shared = (small ? 56 : 32) * slots + 144 * (b.x + 2.0) * (b.y + 2) + 5800;
   if (shared > static_cast<double>(limits.shared_bytes)) return 1e30;
   double blocks = 0;
   int parts = 1;
@@ -120,7 +120,7 @@ std::vector<std::vector<int>> bundle_blocks(const std::vector<Block*>& blocks, s
     const Block& b = *blocks[i];
     single[i] = {b.body,
                  b.material,
-                 {columns_of(b), b.nx * b.ny, (b.nx + 2) * (b.ny + 2) * (b.nz + 2)},
+                 {columns_of(b), (b.nx + 2) * (b.ny + 2), (b.nx + 2) * (b.ny + 2) * (b.nz + 2)},
                  {i}};
   });
   std::stable_sort(single.begin(), single.end(),
@@ -132,7 +132,7 @@ std::vector<std::vector<int>> bundle_blocks(const std::vector<Block*>& blocks, s
       for (Filled& f : bundles) {
         const bool fits = f.body == one.body && f.material == one.material &&
                           f.has.columns + one.has.columns <= limits.columns &&
-                          f.has.places + one.has.places <= limits.places &&
+                          f.has.plane_slots + one.has.plane_slots <= limits.plane_slots &&
                           f.has.slots + one.has.slots <= limits.slots;
         if (fits && (room == nullptr || f.has.columns < room->has.columns)) room = &f;
       }
@@ -142,7 +142,7 @@ std::vector<std::vector<int>> bundle_blocks(const std::vector<Block*>& blocks, s
       continue;
     }
     room->has.columns += one.has.columns;
-    room->has.places += one.has.places;
+    room->has.plane_slots += one.has.plane_slots;
     room->has.slots += one.has.slots;
     room->blocks.push_back(one.blocks.front());
   }

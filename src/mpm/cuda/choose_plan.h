@@ -26,8 +26,8 @@ CudaShape choose_shape(const std::vector<LatticeBody>& bodies, const CudaLimits&
 
 /// What the blocks that share a thread block may have together.
 struct BundleLimits {
-  int columns;  ///< that hold points
-  int places;   ///< CudaBundle::places
+  int columns;      ///< that hold points
+  int plane_slots;  ///< of one plane of nodes
   int slots;
 };
 

@@ -64,10 +64,12 @@ void CudaMpmTissue::plan_tables() {
   OnDevice& d = *device_;
   d.plan.threads = d.shape.threads;
   d.plan.small = d.shape.small;
-  d.plan.max_slots = 0;
+  d.plan.max_slots = d.plan.max_plane_slots = 0;
   const std::vector<Block*>& blocks = state_->blocks.all;
   for (const Block* b : blocks) {
-    d.plan.max_slots = std::max(d.plan.max_slots, (b->nx + 2) * (b->ny + 2) * (b->nz + 2));
+    const int plane = (b->nx + 2) * (b->ny + 2);
+    d.plan.max_slots = std::max(d.plan.max_slots, plane * (b->nz + 2));
+    d.plan.max_plane_slots = std::max(d.plan.max_plane_slots, plane);
   }
   for (const LatticeBody& b : state_->bodies) {
     for (const Material& m : b.materials) {
@@ -95,15 +97,18 @@ void CudaMpmTissue::plan_tables() {
     const std::size_t rounds = (state_->blocks.regions.size() + at_once - 1) / at_once;
     const std::size_t wanted = d.plan.small ? at_once : rounds * at_once;
     if (blocks.size() > wanted) {
+      // Two halves of a block that was cut have a rim more.
+      d.face_plan.max_plane_slots = 3 * d.plan.max_plane_slots / 2;
       std::vector<std::vector<int>> fewer = bundle_blocks(
-          blocks, wanted, {d.plan.threads / 2, d.plan.threads, most_slots(d.face_plan)},
-          *state_->cpu);
+          blocks, wanted,
+          {d.plan.threads / 2, d.face_plan.max_plane_slots, most_slots(d.face_plan)}, *state_->cpu);
       if (fewer.size() <= wanted) bundles = std::move(fewer);
     }
   }
   HostTables& t = d.host_tables;
   make_tables(*state_, bundles, t);
   d.plan.max_slots = t.max_slots;
+  d.plan.max_plane_slots = t.max_plane_slots;
   choose(bundles.size());
   d.all_plain = std::all_of(t.bundles.begin(), t.bundles.end(),
                             [](const CudaBundle& b) { return b.blocks == 1 && b.partial == 0; });

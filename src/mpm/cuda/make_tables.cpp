@@ -129,7 +129,7 @@ std::vector<CudaColumn> columns_of(const CudaBlock& b, float cell_size, const Ho
     c.lane = b.first_lane + i;
     c.step = step;
     c.cell = b.first_lane / 8 + i;
-    c.place = i;
+    c.plane_slot = c.slot;
     c.middle[0] = b.origin[0] + cell_size * static_cast<float>(x + 1);
     c.middle[1] = b.origin[1] + cell_size * static_cast<float>(y + 1);
     c.middle[2] = b.origin[2] + cell_size;
@@ -198,16 +198,17 @@ void add_bundle(int first_block, int blocks, std::vector<std::vector<CudaColumn>
     const CudaBlock& b = t.blocks[i];
     for (CudaColumn& c : columns[i]) {
       c.slot += b.first_slot - bundle.first_slot;
-      c.place += bundle.places;
+      c.plane_slot += bundle.plane_slots;
       t.columns.push_back(c);
     }
     bundle.slots += b.slots();
-    bundle.places += b.nx * b.ny;
+    bundle.plane_slots += (b.nx + 2) * (b.ny + 2);
     bundle.nz = std::max(bundle.nz, b.nz);
     bundle.partial = bundle.partial | b.partial;
   }
   bundle.columns = static_cast<int>(t.columns.size()) - bundle.first_column;
   t.max_slots = std::max(t.max_slots, bundle.slots);
+  t.max_plane_slots = std::max(t.max_plane_slots, bundle.plane_slots);
   t.max_halves = std::max(t.max_halves, 2 * bundle.columns * bundle.nz);
   t.bundles.push_back(bundle);
 }
@@ -237,7 +238,7 @@ void make_tables(const MpmState& state, const std::vector<std::vector<int>>& bun
   });
   t.bundles.clear();
   t.columns.clear();
-  t.max_slots = t.max_halves = 0;
+  t.max_slots = t.max_plane_slots = t.max_halves = 0;
   int first = 0;
   for (const std::vector<int>& blocks : bundles) {
     add_bundle(first, static_cast<int>(blocks.size()), columns, t);

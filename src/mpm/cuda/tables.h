@@ -48,7 +48,7 @@ struct CudaBundle {
   int first_block, blocks;
   int first_slot, slots;
   int first_column, columns;  ///< those that hold points
-  int places;                 ///< columns of the blocks' boxes, with points or without
+  int plane_slots;            ///< of a plane of nodes of all its blocks
   int nz;                     ///< of the tallest block
   int partial;                ///< some cells have fewer than eight points
 };
@@ -61,7 +61,7 @@ struct alignas(16) CudaColumn {
   int lane;          ///< of sub-position 0 of its lowest cell
   int step;          ///< lanes from a sub-position to the next
   int cell;          ///< its lowest in CudaTables::partial
-  int place;         ///< of the bundle's
+  int plane_slot;    ///< the same within a plane, of the bundle's
   float middle[3];   ///< reference place of its lowest cell's middle [m]
   int whole;         ///< as CudaBlock::whole
 };

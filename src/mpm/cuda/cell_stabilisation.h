@@ -3,8 +3,7 @@
 
 #include <utility>
 
-#include "mpm/cuda/half_cell.h"
-#include "mpm/stabilisation.h"
+#include "mpm/cuda/node_plane.h"
 
 namespace tissue_sim {
 
@@ -83,6 +82,34 @@ __device__ __forceinline__ void stabilise_half(float stiffness, float side, cons
   stabilise_number<kBA>(stiffness, side, h.wBA, b.sBA, out.wBA, bends_out.sBA);
   stabilise_number<kBd>(stiffness, side, h.wBd, b.sBd, out.wBd, bends_out.sBd);
   stabilise_number<kBB>(stiffness, side, b.wBB, b.sBB, bends_out.wBB, bends_out.sBB);
+}
+
+/// Adds what stabilises one x-y quantity to what its three planes get.
+template <int kQuantity>
+__device__ __forceinline__ void stabilise_planes(float stiffness, const PlaneNumbers& below,
+                                                 const PlaneNumbers& center,
+                                                 const PlaneNumbers& above, PlaneNumbers& to_below,
+                                                 PlaneNumbers& to_center, PlaneNumbers& to_above) {
+  constexpr int kX = stabilisation::kKinds[kQuantity][0], kY = stabilisation::kKinds[kQuantity][1];
+  constexpr float kScale = read_scale((kX == 0 ? 1 : 0) + (kY == 0 ? 1 : 0)) / kAverageCenter /
+                           give_scale(kX, kY);
+  const Line<float> l(below[kQuantity], center[kQuantity], above[kQuantity]);
+  float A = stiffness * (kScale * stabilisation::weight2(kQuantity, 0)) * l.A;
+  float d = stiffness * (kScale * stabilisation::weight2(kQuantity, 1)) * l.d;
+  float B = stiffness * (kScale * stabilisation::weight2(kQuantity, 2)) * l.B;
+  from_line(A, d, B);
+  to_below[kQuantity] += A;
+  to_center[kQuantity] += d;
+  to_above[kQuantity] += B;
+}
+template <int... kQuantities>
+__device__ __forceinline__ void stabilise_cell(std::integer_sequence<int, kQuantities...>,
+                                               float stiffness, const PlaneNumbers& below,
+                                               const PlaneNumbers& center,
+                                               const PlaneNumbers& above, PlaneNumbers& to_below,
+                                               PlaneNumbers& to_center, PlaneNumbers& to_above) {
+  (stabilise_planes<kQuantities>(stiffness, below, center, above, to_below, to_center, to_above),
+   ...);
 }
 
 }  // namespace tissue_sim

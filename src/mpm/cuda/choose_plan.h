@@ -12,6 +12,9 @@ struct CudaShape {
   BlockShape blocks;
   int threads = 64;   ///< see CudaPlan
   bool small = true;  ///< the same
+  /// CudaPlan::pairs, and the columns that a thread block can have.
+  bool pairs() const { return 2 * blocks.x * blocks.y <= threads; }
+  int columns() const { return pairs() ? threads / 2 : threads; }
 };
 
 /// What the choice needs to know of a GPU.

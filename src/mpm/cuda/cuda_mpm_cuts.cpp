@@ -64,12 +64,14 @@ void CudaMpmTissue::plan_tables() {
   OnDevice& d = *device_;
   d.plan.threads = d.shape.threads;
   d.plan.small = d.shape.small;
-  d.plan.max_slots = d.plan.max_plane_slots = 0;
+  d.plan.pairs = d.shape.pairs();
+  d.plan.max_slots = d.plan.max_plane_slots = d.plan.max_halves = 0;
   const std::vector<Block*>& blocks = state_->blocks.all;
   for (const Block* b : blocks) {
     const int plane = (b->nx + 2) * (b->ny + 2);
     d.plan.max_slots = std::max(d.plan.max_slots, plane * (b->nz + 2));
     d.plan.max_plane_slots = std::max(d.plan.max_plane_slots, plane);
+    d.plan.max_halves = std::max(d.plan.max_halves, 2 * b->nx * b->ny * b->nz);
   }
   for (const LatticeBody& b : state_->bodies) {
     for (const Material& m : b.materials) {
@@ -101,7 +103,7 @@ void CudaMpmTissue::plan_tables() {
       d.face_plan.max_plane_slots = 3 * d.plan.max_plane_slots / 2;
       std::vector<std::vector<int>> fewer = bundle_blocks(
           blocks, wanted,
-          {d.plan.threads / 2, d.face_plan.max_plane_slots, most_slots(d.face_plan)}, *state_->cpu);
+          {d.shape.columns(), d.face_plan.max_plane_slots, most_slots(d.face_plan)}, *state_->cpu);
       if (fewer.size() <= wanted) bundles = std::move(fewer);
     }
   }
@@ -109,6 +111,7 @@ void CudaMpmTissue::plan_tables() {
   make_tables(*state_, bundles, t);
   d.plan.max_slots = t.max_slots;
   d.plan.max_plane_slots = t.max_plane_slots;
+  d.plan.max_halves = t.max_halves;
   choose(bundles.size());
   d.all_plain = std::all_of(t.bundles.begin(), t.bundles.end(),
                             [](const CudaBundle& b) { return b.blocks == 1 && b.partial == 0; });

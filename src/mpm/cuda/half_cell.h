@@ -1,10 +1,10 @@
-// The transfers of half a cell, between its 27 nodes and four of its points: along z first, then x
-// and y, on even and odd parts (math/bspline.h), and the transpose for the forces. For .cu files.
+// The transfers between half a cell, to which 11 numbers of each component stand for its 27 nodes,
+// and its four points, on even and odd parts (math/bspline.h), and the transpose for the forces. For
+// .cu files.
 //
-// A thread has half a cell in registers: 11 numbers of each component stand for the nodes. All
-// weights are constants, the same for both halves if the planes of nodes are called near and far
-// instead of above and below. To save multiplications the numbers are held scaled; what they must
-// be multiplied with, read_scale() and give_scale(), is in the constants of the last pass.
+// All weights are constants, the same for both halves if the planes of nodes are called near and
+// far instead of above and below. To save multiplications the numbers are held scaled; what they
+// must be multiplied with, read_scale() and give_scale(), is in the constants of the last pass.
 #pragma once
 
 #include "math/bspline.h"
@@ -31,7 +31,8 @@ inline constexpr float read_scale(int averages) {
 /// What a number that is given back must be multiplied with, of the quantity that x and y (0 A, 1
 /// d, 2 B) name; slopes by a quarter of it.
 inline constexpr float give_scale(int x, int y) {
-  constexpr float kScale[9] = {4.0f, 0.5f, 0.25f, 0.5f, 0.0625f, 0.03125f, 0.25f, 0.03125f, 1.0f};
+  constexpr float kScale[9] = {4.0f,    0.5f,       0.25f, 0.5f,       0.0625f,
+                               0.03125f, 0.25f, 0.03125f, 1.0f};
   return kScale[3 * x + y];
 }
 
@@ -42,6 +43,15 @@ __device__ __forceinline__ float component(const float4& v, int c) {
 /// Average, over kAverageCenter, of three values with this sum of the outer ones.
 __device__ __forceinline__ float average(float sum, float center) {
   return center + kAverageSide / kAverageCenter * sum;
+}
+
+/// Pass along z: what is read of a value and of a slope on the half's plane of points.
+__device__ __forceinline__ float half_value(float far, float center, float near) {
+  return (kAverageSide + 0.125f) / kAverageCenter * near +
+         ((kAverageSide - 0.125f) / kAverageCenter * far + center);
+}
+__device__ __forceinline__ float half_slope(float far, float center, float near) {
+  return 0.5f * far + (center - 1.5f * near);
 }
 
 /// Reads the 27 nodes of a cell, of which `node` is the lowest; `side` is -1 for the lower half, +1
@@ -62,9 +72,8 @@ __device__ __forceinline__ void read_half(const float4* node, int pitch, int pla
 #pragma unroll
       for (int c = 0; c < 3; ++c) {
         const float f = component(at_far, c), o = component(at, c), n = component(at_near, c);
-        w[c][x] = (kAverageSide + 0.125f) / kAverageCenter * n +
-                  ((kAverageSide - 0.125f) / kAverageCenter * f + o);
-        s[c][x] = 0.5f * f + (o - 1.5f * n);
+        w[c][x] = half_value(f, o, n);
+        s[c][x] = half_slope(f, o, n);
       }
     }
 #pragma unroll
@@ -139,7 +148,8 @@ __device__ __forceinline__ void row_of_F(const HalfPlane& h, int c, float side, 
 /// Value of one component at the point with sides x and y.
 __device__ __forceinline__ float point_value(const HalfPlane& h, float x, float y) {
   constexpr float k0 = read_scale(0), k1 = read_scale(1), k2 = read_scale(2);
-  return k2 * h.wAA + 0.125f * (y * (k1 * h.wAd) + x * (k1 * h.wdA + 0.125f * k0 * (y * h.wdd)));
+  return k2 * h.wAA +
+         0.125f * (y * (k1 * h.wAd) + x * (k1 * h.wdA + 0.125f * k0 * (y * h.wdd)));
 }
 
 /// Transpose of row_of_F() for all points of the half: gives back row c of their stress, P[point].
@@ -170,79 +180,6 @@ __device__ __forceinline__ void add_forces(const float4& f, HalfPlane& h) {
   h.wAd += s1 - s0;
   h.wdA += d1 + d0;
   h.wdd += d1 - d0;
-}
-
-/// Weights of the nodes below, at and above the cell for what a half gives back: of values
-/// (kAverageCenter at the cell) and a quarter of those of slopes.
-struct GiveWeights {
-  float below, above;
-  float slope_below, slope_center, slope_above;
-
-  __device__ __forceinline__ explicit GiveWeights(float side)
-      : below(kAverageSide - 0.125f * side),
-        above(kAverageSide + 0.125f * side),
-        slope_below(0.0625f * side - 0.125f),
-        slope_center(-0.125f * side),
-        slope_above(0.0625f * side + 0.125f) {}
-};
-
-/// What a cell gives to one node plane, before x and y are undone.
-struct PlaneForce {
-  float AA, Ad, AB, dA, dd, dB, BA, Bd, BB;  // BB by stabilisation alone
-};
-
-/// Transpose of the pass along z: `p` and what the plane that has these weights gets from a half;
-/// with kValues from wAA too, which stress gives nothing to.
-template <bool kValues>
-__device__ __forceinline__ PlaneForce plus(const PlaneForce& p, const HalfPlane& h, float w,
-                                           float s) {
-  PlaneForce q;
-  q.AA = p.AA + s * h.sAA;
-  if (kValues) q.AA += w * h.wAA;
-  q.Ad = p.Ad + w * h.wAd + s * h.sAd;
-  q.AB = p.AB + w * h.wAB;
-  q.dA = p.dA + w * h.wdA + s * h.sdA;
-  q.dd = p.dd + w * h.wdd + s * h.sdd;
-  q.dB = p.dB + w * h.wdB;
-  q.BA = p.BA + w * h.wBA;
-  q.Bd = p.Bd + w * h.wBd;
-  q.BB = p.BB;
-  return q;
-}
-__device__ __forceinline__ PlaneForce plus(const PlaneForce& p, const HalfBends& h, float w,
-                                           float s) {
-  PlaneForce q = p;
-  q.AB += s * h.sAB;
-  q.dB += s * h.sdB;
-  q.BA += s * h.sBA;
-  q.Bd += s * h.sBd;
-  q.BB = p.BB + w * h.wBB + s * h.sBB;
-  return q;
-}
-
-/// Transpose of the passes along x and y: the force on the 3 x 3 nodes of a plane, f[y][x].
-template <bool kBendBend>
-__device__ __forceinline__ void node_forces(const PlaneForce& p, float (&f)[3][3]) {
-  constexpr float kS = kAverageSide, kC = kAverageCenter;
-  constexpr float kAA = kC * give_scale(0, 0), kAd = kC * give_scale(0, 1),
-                  kAB = kC * give_scale(0, 2), kBA = give_scale(2, 0);
-  // A along x times kAverageCenter, for the middle of each row to take it as it is.
-  const float A = kS * kAA * p.AA + kAB * p.AB;
-  const float rA[3] = {A - kAd * p.Ad, kC * kAA * p.AA - 2.0f * kAB * p.AB, A + kAd * p.Ad};
-  constexpr float kdA = give_scale(1, 0), kdd = give_scale(1, 1), kdB = give_scale(1, 2);
-  const float d = kS * kdA * p.dA + kdB * p.dB;
-  const float rd[3] = {d - kdd * p.dd, kC * kdA * p.dA - 2.0f * kdB * p.dB, d + kdd * p.dd};
-  constexpr float kBd = give_scale(2, 1), kBB = give_scale(2, 2);
-  const float B = kBendBend ? kS * kBA * p.BA + kBB * p.BB : kS * kBA * p.BA;
-  float rB[3] = {B - kBd * p.Bd, kC * kBA * p.BA, B + kBd * p.Bd};
-  if (kBendBend) rB[1] -= 2.0f * kBB * p.BB;
-#pragma unroll
-  for (int y = 0; y < 3; ++y) {
-    const float sides = kS / kC * rA[y] + rB[y];
-    f[y][0] = sides - rd[y];
-    f[y][1] = rA[y] - 2.0f * rB[y];
-    f[y][2] = sides + rd[y];
-  }
 }
 
 }  // namespace tissue_sim

@@ -36,28 +36,28 @@ __device__ __forceinline__ BlockShared shared_of(const CudaLayout& layout) {
   return s;
 }
 
-template <Laws kLaws, bool kSpecial, bool kPartial>
+template <Laws kLaws, bool kPairs, bool kSpecial, bool kPartial>
 __device__ __forceinline__ void forces(const CudaTables& t, const CudaBundle& w, const CudaBlock& b,
                                        const CudaBody& body, const BlockShared& s,
                                        const BlockStep& step) {
   if constexpr (kLaws == Laws::kFixedCorotated) {
-    block_forces<FixedCorotated, false, kSpecial, kPartial>(t, w, b, body, s, step);
+    block_forces<FixedCorotated, false, kSpecial, kPartial, kPairs>(t, w, b, body, s, step);
   } else if constexpr (kLaws == Laws::kNeoHookean) {
-    block_forces<NeoHookean, false, kSpecial, kPartial>(t, w, b, body, s, step);
+    block_forces<NeoHookean, false, kSpecial, kPartial, kPairs>(t, w, b, body, s, step);
   } else if (body.neo_hookean != 0) {
-    block_forces<NeoHookean, true, kSpecial, kPartial>(t, w, b, body, s, step);
+    block_forces<NeoHookean, true, kSpecial, kPartial, kPairs>(t, w, b, body, s, step);
   } else {
-    block_forces<FixedCorotated, true, kSpecial, kPartial>(t, w, b, body, s, step);
+    block_forces<FixedCorotated, true, kSpecial, kPartial, kPairs>(t, w, b, body, s, step);
   }
 }
 
 /// Out of line and with copies of its arguments, for the ordinary blocks to keep theirs in
 /// registers.
-template <Laws kLaws, bool kPartial>
+template <Laws kLaws, bool kPairs, bool kPartial>
 __device__ __noinline__ void special_forces(const CudaTables t, const CudaBundle w,
                                             const CudaBlock block, const CudaBody body,
                                             const CudaLayout layout, const BlockStep step) {
-  forces<kLaws, true, kPartial>(t, w, block, body, shared_of<true>(layout), step);
+  forces<kLaws, kPairs, true, kPartial>(t, w, block, body, shared_of<true>(layout), step);
 }
 
 /// A bundle with what belongs to it. Copies: through a reference they would be read again after
@@ -102,7 +102,7 @@ struct ColliderCopy {
 
 /// Forces of a bundle whose nodes are there, on its points and between them and the colliders. The
 /// exchange is `clear` where the thread block has had no other bundle.
-template <Laws kLaws, Can kCan>
+template <Laws kLaws, Can kCan, bool kPairs>
 __device__ __forceinline__ void all_forces(const CudaTables& t, const CudaFrame& f,
                                            const BundleAtWork& w, int substep,
                                            const CudaLayout& layout, bool clear, float4* force) {
@@ -111,8 +111,8 @@ __device__ __forceinline__ void all_forces(const CudaTables& t, const CudaFrame&
   if (!clear) clear_exchange(s.exchange, plane_slots, layout.two_planes);
   if constexpr (kCan == Can::kPlain) {
     __syncthreads();
-    forces<kLaws, false, false>(t, w.bundle, w.block, w.body, s,
-                                {nullptr, 0, force, layout.two_planes});
+    forces<kLaws, kPairs, false, false>(t, w.bundle, w.block, w.body, s,
+                                        {nullptr, {}, force, layout.two_planes});
     return;
   }
   const int load_count = 6 * f.collider_count;
@@ -121,22 +121,22 @@ __device__ __forceinline__ void all_forces(const CudaTables& t, const CudaFrame&
   }
   __syncthreads();
   HalfPush* pushes = f.pushes + blockIdx.x * f.push_stride;
-  Touched touched = {0, false};
+  Touched touched = {};
   if (w.near != 0) {
     touched = find_pushes(t, w.bundle, w.block, w.body, s.u, s.v, s.exchange, s.colliders, w.near,
-                          s.loads, pushes);
+                          s.loads, pushes, static_cast<int>(threadIdx.x) / (kPairs ? 2 : 1));
     clear_exchange(s.exchange, plane_slots, layout.two_planes);
     __syncthreads();
   }
-  const BlockStep step{pushes, touched.halves, force, layout.two_planes};
+  const BlockStep step{pushes, touched, force, layout.two_planes};
   if (!touched.any && w.bundle.partial == 0 && w.bundle.blocks == 1) {
-    forces<kLaws, false, false>(t, w.bundle, w.block, w.body, s, step);
+    forces<kLaws, kPairs, false, false>(t, w.bundle, w.block, w.body, s, step);
     return;
   }
   if (w.bundle.partial != 0) {
-    special_forces<kLaws, true>(t, w.bundle, w.block, w.body, layout, step);
+    special_forces<kLaws, kPairs, true>(t, w.bundle, w.block, w.body, layout, step);
   } else {
-    special_forces<kLaws, false>(t, w.bundle, w.block, w.body, layout, step);
+    special_forces<kLaws, kPairs, false>(t, w.bundle, w.block, w.body, layout, step);
   }
   if (!touched.any) return;
   auto* loads = reinterpret_cast<unsigned long long*>(f.loads) + substep * load_count;
@@ -157,7 +157,7 @@ __device__ __forceinline__ PushedNodes pushed_nodes(const CudaFaces& f, int roun
 /// State and forces change places between two buffers. With kFaces, the thread block arrives at the
 /// second barrier when its last block's nodes are in place, so that the forces hide the wait for
 /// the others.
-template <Laws kLaws, bool kCached, Can kCan>
+template <Laws kLaws, bool kCached, bool kPairs, Can kCan>
 __device__ __forceinline__ void block_round(const CudaTables& t, const CudaFrame& f,
                                             const BundleAtWork& w, int round,
                                             const CudaLayout& layout, const SlotCache& cache,
@@ -184,7 +184,8 @@ __device__ __forceinline__ void block_round(const CudaTables& t, const CudaFrame
   if (round == f.substeps) return;
   colliders.finish(f, round, s.colliders);
   if (kFaces && last) arrive(f.arrived + 1);
-  all_forces<kLaws, kCan>(t, f, w, round, layout, kCached, odd_round ? f.force[1] : f.force[0]);
+  all_forces<kLaws, kCan, kPairs>(t, f, w, round, layout, kCached,
+                          odd_round ? f.force[1] : f.force[0]);
 }
 
 /// Contacts of tissue with tissue, once all nodes are where the round brought them: a look when it
@@ -209,8 +210,8 @@ __device__ __forceinline__ void push_faces(const CudaFrame& f, int round, FaceRo
                 f.faces.force + f.faces.stride * (round % 3));
 }
 
-template <Laws kLaws, bool kCached, Can kCan, int kThreads, int kBlocksPerProcessor>
-__global__ void __launch_bounds__(kThreads, kBlocksPerProcessor)
+template <Laws kLaws, bool kCached, bool kPairs, Can kCan>
+__global__ void __launch_bounds__(kMaxCudaThreads, 1)
     mpm_substeps(const CudaTables t, const CudaFrame f, const CudaLayout layout) {
   constexpr bool kFaces = kCan == Can::kFaces;
   const BlockShared s = shared_of<!no_velocities(kLaws, kCan)>(layout);
@@ -230,7 +231,7 @@ __global__ void __launch_bounds__(kThreads, kBlocksPerProcessor)
     __syncthreads();
     for (int round = 0; round <= f.substeps; ++round) {
       if (round > 0) grid_barrier(f.arrived, static_cast<unsigned>(round));
-      block_round<kLaws, true, kCan>(t, f, mine, round, layout, cache, true);
+      block_round<kLaws, true, kPairs, kCan>(t, f, mine, round, layout, cache, true);
       if (kFaces) push_faces(f, round, *s.rounds, met);
     }
   } else {
@@ -238,7 +239,8 @@ __global__ void __launch_bounds__(kThreads, kBlocksPerProcessor)
       if (round > 0) grid_barrier(f.arrived, static_cast<unsigned>(round));
       for (int i = blockIdx.x; i < t.bundle_count; i += gridDim.x) {
         const bool last = i + static_cast<int>(gridDim.x) >= t.bundle_count;
-        block_round<kLaws, false, kCan>(t, f, BundleAtWork(t, i), round, layout, cache, last);
+        block_round<kLaws, false, kPairs, kCan>(t, f, BundleAtWork(t, i), round, layout, cache,
+                                                last);
         __syncthreads();  // the next one clears the exchange
       }
       if (kFaces) push_faces(f, round, *s.rounds, met);
@@ -246,22 +248,23 @@ __global__ void __launch_bounds__(kThreads, kBlocksPerProcessor)
   }
 }
 
-template <Can kCan, bool kCached, int kThreads, int kAtOnce>
+template <Laws kLaws, Can kCan>
 CudaKernel kernel_for(const CudaPlan& plan) {
-  if (plan.viscous || (plan.neo_hookean && plan.fixed_corotated)) {
-    return mpm_substeps<Laws::kAny, kCached, kCan, kMaxCudaThreads, 1>;
-  }
-  return plan.neo_hookean ? mpm_substeps<Laws::kNeoHookean, kCached, kCan, kThreads, kAtOnce>
-                          : mpm_substeps<Laws::kFixedCorotated, kCached, kCan, kThreads, kAtOnce>;
+  if (!plan.cached) return mpm_substeps<kLaws, false, false, kCan>;
+  return plan.pairs ? mpm_substeps<kLaws, true, true, kCan>
+                    : mpm_substeps<kLaws, true, false, kCan>;
 }
 
-/// The kernel of small tissues has all registers for each thread; that of large ones holds so few
-/// that 384 threads run at once, of which some compute while others wait for memory.
+/// Small tissues are fastest with two threads to a column of cells, large ones with one, which has
+/// less to do in all. Viscosity, and with it kAny, is there for two alone.
 template <Can kCan>
 CudaKernel kernel_of(const CudaPlan& plan) {
-  if (plan.cached) return kernel_for<kCan, true, kMaxCudaThreads, 1>(plan);
-  return plan.threads > 192 ? kernel_for<kCan, false, kMaxCudaThreads, 1>(plan)
-                            : kernel_for<kCan, false, 192, 2>(plan);
+  if (plan.viscous || (plan.neo_hookean && plan.fixed_corotated)) {
+    return plan.cached ? mpm_substeps<Laws::kAny, true, true, kCan>
+                       : mpm_substeps<Laws::kAny, false, true, kCan>;
+  }
+  return plan.neo_hookean ? kernel_for<Laws::kNeoHookean, kCan>(plan)
+                          : kernel_for<Laws::kFixedCorotated, kCan>(plan);
 }
 
 }  // namespace

@@ -17,16 +17,19 @@ const void* kernel(const CudaPlan& plan) {
 CudaLayout layout_of(const CudaPlan& plan) {
   CudaLayout layout;
   layout.max_slots = plan.max_slots;
-  // At least the room that the lists of what tools touch need (PushLists).
-  layout.exchange = std::max((plan.two_planes ? 18 : 9) * plan.max_plane_slots,
-                             plan.plain ? 0 : 6 * plan.threads);
+  layout.exchange = (plan.two_planes ? 18 : 9) * plan.max_plane_slots;
+  if (!plan.plain) {
+    const std::size_t lists = PushLists::bytes(plan.max_halves) / sizeof(float4) + 1;
+    layout.exchange = std::max(layout.exchange, static_cast<int>(lists));
+  }
   layout.eight_parts = plan.eight_parts;
   layout.two_planes = plan.two_planes;
   return layout;
 }
 
 std::size_t shared_bytes(const CudaPlan& plan) {
-  const bool velocities = !plan.plain || plan.viscous || (plan.neo_hookean && plan.fixed_corotated);
+  const bool velocities =
+      !plan.plain || plan.viscous || (plan.neo_hookean && plan.fixed_corotated);
   const std::size_t of_slot = (velocities ? 2 : 1) * sizeof(float4) +
                               (plan.cached ? sizeof(uint4) + 8 : 0) +
                               (plan.eight_parts ? sizeof(uint4) : 0);

@@ -11,9 +11,11 @@ inline constexpr int kMaxCudaThreads = 256;  ///< of a thread block
 
 /// How a tissue's blocks are worked on.
 struct CudaPlan {
-  int threads = 64;          ///< of a thread block: at least 2 nx ny of each block
+  int threads = 64;          ///< of a thread block: one or two for each column of a bundle
   int max_slots = 0;         ///< of a bundle
   int max_plane_slots = 0;   ///< the same of one plane
+  int max_halves = 0;        ///< HostTables::max_halves
+  bool pairs = true;         ///< two threads suffice for each column
   bool small = true;         ///< to be cached, if all blocks run at once
   bool cached = false;       ///< each thread block has one bundle only, whose tables it keeps
   bool eight_parts = false;  ///< of a node's force it keeps the places of eight, else of four

@@ -39,7 +39,7 @@ struct ColumnWalk {
   const BlockStep& step;
   CudaColumn column;
   int index;
-  PlaneNumbers center[3], below[3];              ///< of u, of the next cell's planes; not kPairs
+  PlaneNumbers center[3], below[3];  ///< of u, of the next cell's planes; not kPairs
   PlaneNumbers now[3], next[3] = {}, after[3] = {};  ///< what planes of nodes get
 
   __device__ __forceinline__ static int index_of(int thread) {
@@ -48,15 +48,15 @@ struct ColumnWalk {
 
   /// Adds what colliders push the points of a half with to what it gives back.
   __device__ __forceinline__ void push(int z, int sz, HalfPlane (&out)[3]) const {
-    if (!kSpecial || (step.touched.cells[sz] >> z & 1u) == 0) return;
+    if (!kSpecial || ((sz == 0 ? step.touched.cells[0] : step.touched.cells[1]) >> z & 1u) == 0)
+      return;
     const HalfPush& push = step.pushes[2 * (z * w.columns + index) + sz];
 #pragma unroll
     for (int c = 0; c < 3; ++c) add_forces(*reinterpret_cast<const float4*>(push.of[c]), out[c]);
   }
   /// -kStabilisation mu V / cell size where the cell is not full, else 0.
   __device__ __forceinline__ float stiffness(int z) const {
-    return -kStabilisation * body.inv_cell_size *
-           __ldg(t.partial + column.cell + z * column.step);
+    return -kStabilisation * body.inv_cell_size * __ldg(t.partial + column.cell + z * column.step);
   }
 
   /// The thread's half of cell z.

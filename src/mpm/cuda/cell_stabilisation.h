@@ -91,8 +91,8 @@ __device__ __forceinline__ void stabilise_planes(float stiffness, const PlaneNum
                                                  const PlaneNumbers& above, PlaneNumbers& to_below,
                                                  PlaneNumbers& to_center, PlaneNumbers& to_above) {
   constexpr int kX = stabilisation::kKinds[kQuantity][0], kY = stabilisation::kKinds[kQuantity][1];
-  constexpr float kScale = read_scale((kX == 0 ? 1 : 0) + (kY == 0 ? 1 : 0)) / kAverageCenter /
-                           give_scale(kX, kY);
+  constexpr float kScale =
+      read_scale((kX == 0 ? 1 : 0) + (kY == 0 ? 1 : 0)) / kAverageCenter / give_scale(kX, kY);
   const Line<float> l(below[kQuantity], center[kQuantity], above[kQuantity]);
   float A = stiffness * (kScale * stabilisation::weight2(kQuantity, 0)) * l.A;
   float d = stiffness * (kScale * stabilisation::weight2(kQuantity, 1)) * l.d;

@@ -36,15 +36,18 @@ double cycles(const std::vector<LatticeBody>& bodies, const CudaShape& s,
   const int each = std::max(1, std::min(by_registers, by_shared));
   const double waves = std::ceil(blocks / (each * limits.processors));
   if (s.small && waves > 1) return 1e30;
+  // Cuts add blocks, and with one thread a column there is no room to bundle them.
+  if (s.small && !pairs && 1.2 * blocks > each * limits.processors) return 1e30;
   const double together = std::min<double>(each, std::ceil(blocks / limits.processors));
   // Warps that compute, on each scheduler.
-  const double warps = together * (pairs ? 2 : 1) * b.x * b.y / 32 / 4;
+  const double warps = together * (pairs ? b.x * b.y / 16.0 : std::ceil(b.x * b.y / 32.0)) / 4;
   const double cell = (pairs ? 1140 : 1950) * std::max(1.8, 1.3 * warps);
   const double plane = 400 + 250 * warps;
   const double nodes =
       std::ceil(slots / s.threads) * (s.small ? 250 + 120 * parts : 300 + 60 * together);
   const double wave = nodes + cell * b.z + plane * (b.z + 2);
-  return s.small ? wave + 3500 : 1.3 * waves * wave + 5000;
+  // One thread a column makes contact and cuts dearer.
+  return s.small ? wave + (pairs ? 3500 : 5500) : 1.5 * waves * wave + 5000;
 }
 
 /// Columns of the block that hold points.
@@ -119,9 +122,17 @@ CudaShape choose_shape(const std::vector<LatticeBody>& bodies, const CudaLimits&
   return best;
 }
 
-std::vector<std::vector<int>> single_blocks(std::size_t count) {
-  std::vector<std::vector<int>> bundles(count);
-  for (std::size_t i = 0; i < count; ++i) bundles[i] = {static_cast<int>(i)};
+std::vector<std::vector<int>> single_blocks(const std::vector<Block*>& blocks, std::size_t at_once,
+                                            Cpu& cpu) {
+  std::vector<std::vector<int>> bundles(blocks.size());
+  for (std::size_t i = 0; i < blocks.size(); ++i) bundles[i] = {static_cast<int>(i)};
+  if (blocks.size() <= at_once) return bundles;
+  std::vector<int> columns(blocks.size());
+  cpu.for_each(static_cast<int>(blocks.size()),
+               [&](int i) { columns[i] = columns_of(*blocks[i]); });
+  std::stable_sort(bundles.begin(), bundles.end(),
+                   [&](const auto& a, const auto& b) { return columns[a[0]] > columns[b[0]]; });
+  std::reverse(bundles.begin(), bundles.begin() + static_cast<std::ptrdiff_t>(at_once));
   return bundles;
 }
 

@@ -34,8 +34,10 @@ struct BundleLimits {
   int slots;
 };
 
-/// Each block alone: indices into Blocks::all.
-std::vector<std::vector<int>> single_blocks(std::size_t count);
+/// Each block alone: indices into Blocks::all. Where more than run at once, the smallest come last,
+/// and to the thread blocks that have the smallest of the others.
+std::vector<std::vector<int>> single_blocks(const std::vector<Block*>& blocks, std::size_t at_once,
+                                            Cpu& cpu);
 
 /// Bundles, up to `wanted` of them: large blocks first, each of the others with those that have the
 /// fewest columns. Gives indices into `blocks`; more than `wanted` bundles where they do not fit

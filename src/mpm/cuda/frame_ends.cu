@@ -110,8 +110,8 @@ __global__ void __launch_bounds__(kThreads)
   const CudaBlock& b = t.blocks[blockIdx.x];
   const CudaBody& body = t.bodies[b.body];
   float4 *u = shared, *v = shared + max_slots;
-  bring_nodes<false, false>(t, b.first_slot, b.slots(), {}, state, state, nullptr, {},
-                            body.inv_cell_size, u, v);
+  bring_nodes<false, false, 4>(t, b.first_slot, b.slots(), {}, state, state, nullptr, {},
+                               body.inv_cell_size, u, v);
   CudaMeasure m = {0, 0, {1e30f, 1e30f, 1e30f}, {-1e30f, -1e30f, -1e30f}, 0, 1, 1, 0};
   for (int i = threadIdx.x; i < b.slots(); i += blockDim.x) {
     const int node = t.slot_node[b.first_slot + i];
@@ -179,8 +179,8 @@ __global__ void __launch_bounds__(kThreads)
   extern __shared__ float4 shared[];
   const CudaBlock& b = t.blocks[blockIdx.x];
   const CudaBody& body = t.bodies[b.body];
-  bring_nodes<false, false>(t, b.first_slot, b.slots(), {}, state, state, nullptr, {},
-                            body.inv_cell_size, shared, nullptr);
+  bring_nodes<false, false, 4>(t, b.first_slot, b.slots(), {}, state, state, nullptr, {},
+                               body.inv_cell_size, shared, nullptr);
   __syncthreads();
   for_each_point(
       t, b, shared, [&](int lane, int s, int x, int y, int z, int, const HalfPlane(&h)[3]) {
@@ -218,8 +218,8 @@ __global__ void __launch_bounds__(kThreads)
   const CudaBlock& b = t.blocks[blockIdx.x];
   const CudaBody& body = t.bodies[b.body];
   if (body.tear_stretch == 0) return;
-  bring_nodes<false, false>(t, b.first_slot, b.slots(), {}, state, state, nullptr, {},
-                            body.inv_cell_size, shared, nullptr);
+  bring_nodes<false, false, 4>(t, b.first_slot, b.slots(), {}, state, state, nullptr, {},
+                               body.inv_cell_size, shared, nullptr);
   __syncthreads();
   const float s2 = body.tear_stretch * body.tear_stretch;
   for_each_point(t, b, shared,

@@ -1,6 +1,6 @@
 // The transfers between half a cell, to which 11 numbers of each component stand for its 27 nodes,
-// and its four points, on even and odd parts (math/bspline.h), and the transpose for the forces. For
-// .cu files.
+// and its four points, on even and odd parts (math/bspline.h), and the transpose for the forces.
+// For .cu files.
 //
 // All weights are constants, the same for both halves if the planes of nodes are called near and
 // far instead of above and below. To save multiplications the numbers are held scaled; what they
@@ -31,8 +31,7 @@ inline constexpr float read_scale(int averages) {
 /// What a number that is given back must be multiplied with, of the quantity that x and y (0 A, 1
 /// d, 2 B) name; slopes by a quarter of it.
 inline constexpr float give_scale(int x, int y) {
-  constexpr float kScale[9] = {4.0f,    0.5f,       0.25f, 0.5f,       0.0625f,
-                               0.03125f, 0.25f, 0.03125f, 1.0f};
+  constexpr float kScale[9] = {4.0f, 0.5f, 0.25f, 0.5f, 0.0625f, 0.03125f, 0.25f, 0.03125f, 1.0f};
   return kScale[3 * x + y];
 }
 
@@ -148,8 +147,7 @@ __device__ __forceinline__ void row_of_F(const HalfPlane& h, int c, float side, 
 /// Value of one component at the point with sides x and y.
 __device__ __forceinline__ float point_value(const HalfPlane& h, float x, float y) {
   constexpr float k0 = read_scale(0), k1 = read_scale(1), k2 = read_scale(2);
-  return k2 * h.wAA +
-         0.125f * (y * (k1 * h.wAd) + x * (k1 * h.wdA + 0.125f * k0 * (y * h.wdd)));
+  return k2 * h.wAA + 0.125f * (y * (k1 * h.wAd) + x * (k1 * h.wdA + 0.125f * k0 * (y * h.wdd)));
 }
 
 /// Transpose of row_of_F() for all points of the half: gives back row c of their stress, P[point].

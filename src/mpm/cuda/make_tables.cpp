@@ -107,9 +107,17 @@ void connect(std::size_t node_count, Cpu& cpu, HostTables& t) {
     is_owner[slot] = filled[n] == 0 ? 1 : 0;
     ++filled[n];
   });
-  for (std::size_t slot = 0; slot < slots; ++slot) {
-    if (is_owner[slot] == 0) t.slot_node[slot] = ~t.slot_node[slot];
-  }
+  t.first_parts.resize(slots);
+  cpu.for_each(
+      static_cast<int>(slots),
+      [&](int i) {
+        const std::uint32_t first = t.slot_parts[i] >> 6, count = t.slot_parts[i] & 63u;
+        const auto part = [&](std::uint32_t k) { return k < count ? t.parts[first + k] : 0u; };
+        t.first_parts[i] = {count == 0 ? static_cast<std::uint32_t>(i) : part(0), part(1), part(2),
+                            part(3)};
+        if (is_owner[i] == 0) t.slot_node[i] = ~t.slot_node[i];
+      },
+      4096);
 }
 
 /// The columns of the block that hold points, as if it were alone in its bundle.

@@ -20,6 +20,7 @@ struct HostTables {
   std::vector<CudaColumn> columns;
   PinnedArray<std::int32_t> slot_node;
   PinnedArray<std::uint32_t> slot_parts, parts;
+  PinnedArray<uint4> first_parts;
   PinnedArray<float> volume, partial;
   PinnedArray<std::int32_t> point;
   int max_slots = 0;        ///< of a bundle

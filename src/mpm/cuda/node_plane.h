@@ -49,8 +49,8 @@ __device__ __forceinline__ void read_plane(const float4* node, int pitch, PlaneN
   }
 }
 
-/// Pass along z for the half on the side of the plane `near`; the same numbers as read_half() gives,
-/// but for wAA, which stress does not need.
+/// Pass along z for the half on the side of the plane `near`; the same numbers as read_half()
+/// gives, but for wAA, which stress does not need.
 __device__ __forceinline__ void half_between(const PlaneNumbers& far, const PlaneNumbers& center,
                                              const PlaneNumbers& near, HalfPlane& h) {
   const auto w = [&](int i) { return half_value(far[i], center[i], near[i]); };

@@ -163,6 +163,7 @@ __device__ __forceinline__ void block_round(const CudaTables& t, const CudaFrame
                                             const CudaLayout& layout, const SlotCache& cache,
                                             bool last) {
   constexpr bool kFaces = kCan == Can::kFaces, kPlain = kCan == Can::kPlain;
+  constexpr int kHand = kCached && (kPairs || !kPlain) ? 2 : 4;  // as registers allow
   const BlockShared s = shared_of<!no_velocities(kLaws, kCan)>(layout);
   const float scale = w.body.inv_cell_size;
   float4* v = (!kPlain && w.near != 0) || kLaws == Laws::kAny ? s.v : nullptr;
@@ -172,20 +173,20 @@ __device__ __forceinline__ void block_round(const CudaTables& t, const CudaFrame
   // Their way here takes as long as that of the nodes.
   const ColliderCopy colliders(f, kPlain ? 0 : w.near, round);
   if (round == 0) {
-    bring_nodes<false, kCached>(t, w.bundle.first_slot, w.bundle.slots, cache, from, from, nullptr,
-                                f.step, scale, s.u, v);
+    bring_nodes<false, kCached, kHand>(t, w.bundle.first_slot, w.bundle.slots, cache, from, from,
+                                       nullptr, f.step, scale, s.u, v);
   } else {
     PushedNodes pushed;
     if (kFaces) pushed = pushed_nodes(f.faces, round);
-    bring_nodes<true, kCached, kFaces>(t, w.bundle.first_slot, w.bundle.slots, cache, from, to,
-                                       odd_round ? f.force[0] : f.force[1], f.step, scale, s.u, v,
-                                       pushed);
+    bring_nodes<true, kCached, kHand, kFaces>(t, w.bundle.first_slot, w.bundle.slots, cache, from,
+                                              to, odd_round ? f.force[0] : f.force[1], f.step,
+                                              scale, s.u, v, pushed);
   }
   if (round == f.substeps) return;
   colliders.finish(f, round, s.colliders);
   if (kFaces && last) arrive(f.arrived + 1);
   all_forces<kLaws, kCan, kPairs>(t, f, w, round, layout, kCached,
-                          odd_round ? f.force[1] : f.force[0]);
+                                  odd_round ? f.force[1] : f.force[0]);
 }
 
 /// Contacts of tissue with tissue, once all nodes are where the round brought them: a look when it
@@ -248,11 +249,15 @@ __global__ void __launch_bounds__(kMaxCudaThreads, 1)
   }
 }
 
+template <Laws kLaws, bool kPairs, Can kCan>
+CudaKernel kernel_for(const CudaPlan& plan) {
+  return plan.cached ? mpm_substeps<kLaws, true, kPairs, kCan>
+                     : mpm_substeps<kLaws, false, kPairs, kCan>;
+}
 template <Laws kLaws, Can kCan>
 CudaKernel kernel_for(const CudaPlan& plan) {
-  if (!plan.cached) return mpm_substeps<kLaws, false, false, kCan>;
-  return plan.pairs ? mpm_substeps<kLaws, true, true, kCan>
-                    : mpm_substeps<kLaws, true, false, kCan>;
+  return plan.small && plan.pairs ? kernel_for<kLaws, true, kCan>(plan)
+                                  : kernel_for<kLaws, false, kCan>(plan);
 }
 
 /// Small tissues are fastest with two threads to a column of cells, large ones with one, which has
@@ -260,8 +265,7 @@ CudaKernel kernel_for(const CudaPlan& plan) {
 template <Can kCan>
 CudaKernel kernel_of(const CudaPlan& plan) {
   if (plan.viscous || (plan.neo_hookean && plan.fixed_corotated)) {
-    return plan.cached ? mpm_substeps<Laws::kAny, true, true, kCan>
-                       : mpm_substeps<Laws::kAny, false, true, kCan>;
+    return kernel_for<Laws::kAny, true, kCan>(plan);
   }
   return plan.neo_hookean ? kernel_for<Laws::kNeoHookean, kCan>(plan)
                           : kernel_for<Laws::kFixedCorotated, kCan>(plan);

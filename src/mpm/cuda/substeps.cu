@@ -28,8 +28,7 @@ CudaLayout layout_of(const CudaPlan& plan) {
 }
 
 std::size_t shared_bytes(const CudaPlan& plan) {
-  const bool velocities =
-      !plan.plain || plan.viscous || (plan.neo_hookean && plan.fixed_corotated);
+  const bool velocities = !plan.plain || plan.viscous || (plan.neo_hookean && plan.fixed_corotated);
   const std::size_t of_slot = (velocities ? 2 : 1) * sizeof(float4) +
                               (plan.cached ? sizeof(uint4) + 8 : 0) +
                               (plan.eight_parts ? sizeof(uint4) : 0);

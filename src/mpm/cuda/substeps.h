@@ -16,7 +16,7 @@ struct CudaPlan {
   int max_plane_slots = 0;   ///< the same of one plane
   int max_halves = 0;        ///< HostTables::max_halves
   bool pairs = true;         ///< two threads suffice for each column
-  bool small = true;         ///< to be cached, if all blocks run at once
+  bool small = true;         ///< to be cached, if all bundles run at once
   bool cached = false;       ///< each thread block has one bundle only, whose tables it keeps
   bool eight_parts = false;  ///< of a node's force it keeps the places of eight, else of four
   bool two_planes = false;   ///< the exchange holds two planes, and threads wait half as often

@@ -97,6 +97,7 @@ struct CudaTables {
   const std::uint32_t* slot_parts;  ///< 0: the slot has all of its node's force; else how many
                                     ///< slots share it + 64 * the first of them in `parts`; and
                                     ///< kPushed, where there is contact of tissue with tissue
+  const uint4* first_parts;         ///< the first four slots that share the slot's node, or itself
   const std::uint32_t* parts;
   const float* volume;        ///< per lane, 0 where there is no point [m^3]
   const std::int32_t* point;  ///< per lane, -1 where there is none

@@ -103,8 +103,8 @@ __device__ __forceinline__ void push_point(const CudaTables& t, const Collider* 
   }
 }
 
-/// Which cells of a thread's column have a lower and an upper half that colliders push, as bits, and
-/// whether any of the bundle's has.
+/// Which cells of a thread's column have a lower and an upper half that colliders push, as bits,
+/// and whether any of the bundle's has.
 struct Touched {
   std::uint32_t cells[2];
   bool any;
@@ -138,8 +138,8 @@ inline __device__ __noinline__ Touched find_pushes(const CudaTables t, const Cud
       for (int a = 0; a < 3; ++a) x[a] = of_half.of[a][i % 4];
       p = t.point[lane];
       volume = c.whole != 0 ? body.point_volume : t.volume[lane];
-      held.load(t, p);
       point_velocity(v, c.slot + z * c.plane, c.pitch, c.plane, s, body.cell_size, velocity);
+      held.load(t, p);
     }
     push_point(t, colliders, near, touches ? half >> 17 : 0, p, held,
                {body.spring.stiffness * volume, body.spring.damping * volume}, x, velocity, loads,

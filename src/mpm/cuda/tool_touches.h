@@ -125,12 +125,13 @@ __device__ __forceinline__ void list_touched(const CudaTables& t, const CudaBund
     bool holds[4];
 #pragma unroll
     for (int q = 0; q < 4; ++q) point[q] = t.point[c.lane + (z * 8 + 4 * sz + q) * c.step];
+    read_half(u + c.slot + z * c.plane, c.pitch, c.plane, sz == 0 ? -1.0f : 1.0f, h);
+    // After the nodes, which hide the points' way.
 #pragma unroll
     for (int q = 0; q < 4; ++q) {
       const std::uint8_t* with = t.with + point[q] * t.held_by;
       holds[q] = point[q] >= 0 && (with[0] | with[t.held_by - 1]) != 0;
     }
-    read_half(u + c.slot + z * c.plane, c.pitch, c.plane, sz == 0 ? -1.0f : 1.0f, h);
     std::uint32_t pushed = 0, by = 0;
 #pragma unroll
     for (int q = 0; q < 4; ++q) {

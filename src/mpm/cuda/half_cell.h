@@ -122,26 +122,27 @@ __device__ __forceinline__ void read_half(const float4* node, int pitch, int pla
 }
 
 /// Row c of the deformation gradient F at the two points of the row at y = `y` (-1 or 1) of the
-/// half at z = `side`, from component c. `y` and `c` are best known to the compiler.
+/// half at z = `side`, from component c. `y` and `c` are best known to the compiler. The 1 comes
+/// last, for small motions not to be rounded more than once at its size.
 __device__ __forceinline__ void row_of_F(const HalfPlane& h, int c, float side, float y,
                                          float (&low)[3], float (&high)[3]) {
   constexpr float k0 = read_scale(0), k1 = read_scale(1), k2 = read_scale(2);
   // (wdA/2 + y wdd/16) + x/4 (wBA + y wBd/8)
-  const float dA = 0.5f * k1 * h.wdA + (c == 0 ? 1.0f : 0.0f);
-  const float xd = dA + 0.0625f * k0 * y * h.wdd, xb = h.wBA + 0.125f * k0 / k1 * y * h.wBd;
+  const float xd = 0.5f * k1 * h.wdA + 0.0625f * k0 * y * h.wdd,
+              xb = h.wBA + 0.125f * k0 / k1 * y * h.wBd;
   low[0] = xd - 0.25f * k1 * xb;
   high[0] = xd + 0.25f * k1 * xb;
   // (wAd/2 + y wAB/4) + x/8 (wdd/2 + y wdB/4)
-  const float Ad = 0.5f * k1 * h.wAd + (c == 1 ? 1.0f : 0.0f);
-  const float ya = Ad + 0.25f * k1 * y * h.wAB, yd = h.wdd + 0.5f * y * h.wdB;
+  const float ya = 0.5f * k1 * h.wAd + 0.25f * k1 * y * h.wAB, yd = h.wdd + 0.5f * y * h.wdB;
   low[1] = ya - 0.0625f * k0 * yd;
   high[1] = ya + 0.0625f * k0 * yd;
   // (sAA + y sAd/8) + x/8 (sdA + y sdd/8)
   const float s1 = -0.5f * k2 / k0 * side, s0 = -0.0625f * k1 / k0 * side;
-  const float AA = s1 * h.sAA + (c == 2 ? 1.0f : 0.0f);
-  const float za = AA + s0 * (y * h.sAd), zd = h.sdA + 0.125f / k0 * y * h.sdd;
+  const float za = s1 * h.sAA + s0 * (y * h.sAd), zd = h.sdA + 0.125f / k0 * y * h.sdd;
   low[2] = za - s0 * zd;
   high[2] = za + s0 * zd;
+  low[c] += 1.0f;
+  high[c] += 1.0f;
 }
 
 /// Value of one component at the point with sides x and y.

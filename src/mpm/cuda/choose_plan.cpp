@@ -41,7 +41,7 @@ double cycles(const std::vector<LatticeBody>& bodies, const CudaShape& s,
   const double together = std::min<double>(each, std::ceil(blocks / limits.processors));
   // Warps that compute, on each scheduler.
   const double warps = together * (pairs ? b.x * b.y / 16.0 : std::ceil(b.x * b.y / 32.0)) / 4;
-  const double cell = (pairs ? 1140 : 1950) * std::max(1.8, 1.3 * warps);
+  const double cell = (pairs ? 1400 : 1950) * std::max(1.8, 1.3 * warps);
   const double plane = 400 + 250 * warps;
   const double nodes =
       std::ceil(slots / s.threads) * (s.small ? 250 + 120 * parts : 300 + 60 * together);

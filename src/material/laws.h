@@ -112,8 +112,10 @@ TISSUE_SIM_INLINE Stretch<float> stretch(float c1, float c2, float J) {
     p = a * a - c1;
     a -= 0.25f * (p * p - (j8 * a + c24)) * fast_reciprocal(a * p - j2);
   }
-  const float slope = a * (p = a * a - c1) - j2, r = fast_reciprocal(slope);
-  return {a, p * 0.5f, c1, 2.0f * (r + r * (1.0f - slope * r))};  // to the last bit, as P cancels
+  p = a * a - c1;
+  // P cancels where there is little strain: this reciprocal must be right to the last bit.
+  const float slope = a * p - j2, r = fast_reciprocal(slope);
+  return {a, p * 0.5f, c1, 2.0f * (r + r * (1.0f - slope * r))};
 }
 #endif
 

@@ -15,7 +15,7 @@ struct CudaPlan {
   int max_slots = 0;         ///< of a bundle
   int max_plane_slots = 0;   ///< the same of one plane
   int max_halves = 0;        ///< HostTables::max_halves
-  bool pairs = true;         ///< two threads suffice for each column
+  bool pairs = true;         ///< there are two threads for each column
   bool small = true;         ///< to be cached, if all bundles run at once
   bool cached = false;       ///< each thread block has one bundle only, whose tables it keeps
   bool eight_parts = false;  ///< of a node's force it keeps the places of eight, else of four

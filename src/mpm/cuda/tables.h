@@ -53,7 +53,7 @@ struct CudaBundle {
   int partial;                ///< some cells have fewer than eight points
 };
 
-/// A column of cells, for the two threads that walk up it.
+/// A column of cells, for the one or two threads that walk up it.
 struct alignas(16) CudaColumn {
   int slot;          ///< of the lowest of its nodes, from the bundle's first slot on
   int pitch, plane;  ///< slots from a node to the next along y and z

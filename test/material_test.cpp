@@ -27,7 +27,7 @@ constexpr double kMu = 1000, kLambda = 4000;
 template <class LawOf, class T>
 Mat<T> stress(const Mat<T>& f, double mu = kMu, double lambda = kLambda) {
   Mat<T> p;
-  LawOf::stress(f.data(), static_cast<T>(mu), static_cast<T>(lambda), p.data());
+  tissue_sim::stress<LawOf>(f.data(), static_cast<T>(mu), static_cast<T>(lambda), p.data());
   return p;
 }
 

@@ -18,6 +18,26 @@ int floor_of(float x) {
   return toward_zero - (x < static_cast<float>(toward_zero) ? 1 : 0);
 }
 
+/// A box around some normals.
+struct NormalBox {
+  float min[3] = {1, 1, 1}, max[3] = {-1, -1, -1};
+
+  void take(const float (&n)[3]) {
+    for (int a = 0; a < 3; ++a) {
+      min[a] = std::min(min[a], n[a]);
+      max[a] = std::max(max[a], n[a]);
+    }
+  }
+  /// Whether two of them may face each other: on a smooth face none do.
+  bool may_face() const {
+    float dot = 0;  // at least
+    for (int a = 0; a < 3; ++a) {
+      dot += std::min({min[a] * max[a], min[a] * min[a], max[a] * max[a]});
+    }
+    return !(dot > kFacing);
+  }
+};
+
 }  // namespace
 
 std::vector<FacetPair> facing_pairs(const std::vector<FacetMotion>& facets,
@@ -70,6 +90,11 @@ std::vector<FacetPair> facing_pairs(const std::vector<FacetMotion>& facets,
   constexpr int kChunks = 64;
   std::vector<std::vector<FacetPair>> of_chunk(kChunks);
   const auto visit_bucket = [&](std::uint32_t b, std::vector<FacetPair>& pairs) {
+    NormalBox normals;
+    for (std::int32_t i = first[b]; i < first[b + 1]; ++i) {
+      normals.take(facets[entries[i].facet].normal);
+    }
+    if (!normals.may_face()) return;
     for (std::int32_t i = first[b]; i < first[b + 1]; ++i) {
       const Entry& e = entries[i];
       const FacetMotion& f = facets[e.facet];

@@ -2,36 +2,10 @@
 // double (reference) or Vec<W> (CPU). Matrices are row-major arrays of 9: F[3 * i + k] = dx_i/dX_k.
 #pragma once
 
-#include <cmath>
-#include <cstdint>
-#include <cstring>
-
 #include "compute/host_device.h"
+#include "material/stretch.h"
 
 namespace tissue_sim {
-
-/// Integers with the bits of a float or of a vector of floats.
-template <class T>
-struct BitsOf {
-  typedef std::int32_t type __attribute__((vector_size(sizeof(T))));
-};
-template <>
-struct BitsOf<float> {
-  typedef std::int32_t type;
-};
-
-/// An upper bound of the square root of x >= 0, at most 9 % above it: a start for Newton's method.
-TISSUE_SIM_INLINE double root_bound(double x) { return 1.04 * sqrt(x); }
-/// By halving the exponent: for float and for vectors of floats, whose bits are integers of the
-/// same width.
-template <class T>
-TISSUE_SIM_INLINE T root_bound(T x) {
-  typename BitsOf<T>::type bits;
-  std::memcpy(&bits, &x, sizeof(x));
-  bits = (bits >> 1) + 0x1fbd1df5;
-  std::memcpy(&x, &bits, sizeof(x));
-  return 1.04f * x;
-}
 
 /// Cofactor matrix of F: cof F = J F^-T, defined for singular F too.
 template <class T>
@@ -53,71 +27,6 @@ TISSUE_SIM_INLINE T norm2(const T* A) {
   for (int i = 1; i < 9; ++i) s += A[i] * A[i];
   return s;
 }
-
-/// Invariants of the stretch U = sqrt(F^T F) of a deformation gradient, and what the rotation
-/// follows from: R = ((b + c1) F - F C + a cof F) * inverse.
-template <class T>
-struct Stretch {
-  T a;        ///< tr U (with the smallest stretch negative where det F < 0)
-  T b;        ///< second invariant of U
-  T c1;       ///< tr C = ||F||^2
-  T inverse;  ///< 1 / (a b - J) = 1 / ((s1 + s2) (s2 + s3) (s3 + s1))
-};
-
-/// Solves (a^2 - tr C)^2 / 4 = ||cof F||^2 + 2 J a for its largest root a = tr U by Newton's method
-/// (the quartic of Franca 1989; that R is the derivative of tr U is used by Lin, Chitalu and Komura
-/// 2022) from above, where it converges monotonically: a^2 = tr C + 2 b and b^2 <= 3 ||cof F||^2.
-/// The step divides by 2 (a b - J); its reciprocal is carried along and refined, for divisions are
-/// dear. Relative error below 1e-6 for stretches between 1/3 and 3; finite for inverted F.
-template <class T>
-TISSUE_SIM_INLINE Stretch<T> stretch(T c1, T c2, T J) {
-  T a = root_bound(c1 + 2.0f * root_bound(3.0f * c2));
-  T p = a * a - c1;
-  T slope = a * p - 2.0f * J;
-  T r = 1.0f / slope;
-  a -= (0.25f * p * p - c2 - 2.0f * J * a) * r;
-  for (int i = 0; i < 4; ++i) {
-    p = a * a - c1;
-    slope = a * p - 2.0f * J;
-    r = r * (2.0f - slope * r);
-    a -= (0.25f * p * p - c2 - 2.0f * J * a) * r;
-  }
-  p = a * a - c1;
-  slope = a * p - 2.0f * J;
-  r = r * (2.0f - slope * r);
-  r = r * (2.0f - slope * r);
-  return {a, p * 0.5f, c1, r * 2.0f};
-}
-
-#if defined(__CUDA_ARCH__)
-/// Square root and 1 / x in one instruction, to the last bit but one.
-TISSUE_SIM_INLINE float fast_root(float x) {
-  asm("sqrt.approx.ftz.f32 %0, %1;" : "=f"(x) : "f"(x));
-  return x;
-}
-TISSUE_SIM_INLINE float fast_reciprocal(float x) {
-  asm("rcp.approx.ftz.f32 %0, %1;" : "=f"(x) : "f"(x));
-  return x;
-}
-
-/// The same where roots and reciprocals are cheap: from b^2 = ||cof F||^2 + 2 J a with the bounds
-/// sqrt(3 tr C) of a where J > 0 and sqrt(tr C / 3) where J < 0 comes a start that is too large by
-/// 1.8 % at most where J > 0, so that three steps do; the 1e-4 keep the slope of a flat F from 0.
-TISSUE_SIM_INLINE Stretch<float> stretch(float c1, float c2, float J) {
-  const float j2 = 2.0f * J, j8 = 8.0f * J, c24 = 4.0f * c2;
-  const float b2 = fast_root(fabsf(c24 + fmaxf(j8, (8.0f / 3.0f) * J) * fast_root(3.0f * c1)));
-  float a = fast_root(1.0001f * c1 + b2), p;
-#pragma unroll
-  for (int i = 0; i < 3; ++i) {
-    p = a * a - c1;
-    a -= 0.25f * (p * p - (j8 * a + c24)) * fast_reciprocal(a * p - j2);
-  }
-  p = a * a - c1;
-  // P cancels where there is little strain: this reciprocal must be right to the last bit.
-  const float slope = a * p - j2, r = fast_reciprocal(slope);
-  return {a, p * 0.5f, c1, 2.0f * (r + r * (1.0f - slope * r))};
-}
-#endif
 
 /// C = F^T F: 00 11 22 01 02 12.
 template <class T>
@@ -146,35 +55,47 @@ TISSUE_SIM_INLINE void rotation(const T* F, T* R) {
   T cof[9], C[6], FC[9];
   cofactor(F, cof);
   const T J = F[0] * cof[0] + F[1] * cof[1] + F[2] * cof[2];
-  const Stretch<T> s = stretch(norm2(F), norm2(cof), J);
+  const Invariants<T> of = {norm2(F), norm2(cof), J};
+  Stretch<T> s;
+  stretch<1>(&of, &s);
   right_cauchy_green(F, C);
   times_symmetric(F, C, FC);
   for (int i = 0; i < 9; ++i) {
-    R[i] = ((s.b + s.c1) * F[i] - FC[i] + s.a * cof[i]) * s.inverse;
+    R[i] = ((s.b + of.c1) * F[i] - FC[i] + s.a * cof[i]) * s.inverse;
   }
 }
 
 /// Fixed corotated (Stomakhin et al. 2012): psi = mu ||F - R||^2 + lambda/2 (J - 1)^2.
 struct FixedCorotated {
-  /// P = 2 mu (F - R) + lambda (J - 1) cof F. Give `mu` and `lambda` times a volume, and P is too.
-  template <class T>
-  TISSUE_SIM_INLINE static void stress(const T* F, T mu, T lambda, T* P) {
-    T cof[9], C[6];
-    cofactor(F, cof);
-    right_cauchy_green(F, C);
-    const T J = F[0] * cof[0] + F[1] * cof[1] + F[2] * cof[2];
-    // ||cof F||^2 is the second invariant of C.
-    const T c2 =
-        (C[0] * C[1] - C[3] * C[3]) + (C[0] * C[2] - C[4] * C[4]) + (C[1] * C[2] - C[5] * C[5]);
-    const Stretch<T> s = stretch(C[0] + C[1] + C[2], c2, J);
-    const T mu2 = mu + mu;
-    const T fc = mu2 * s.inverse;
-    const T f = mu2 - fc * (s.b + s.c1);
-    const T c = lambda * (J - 1.0f) - fc * s.a;
-    // P = F (f I + fc C) + c cof F
-    for (int i = 0; i < 6; ++i) C[i] = i < 3 ? fc * C[i] + f : fc * C[i];
-    times_symmetric(F, C, P);
-    for (int i = 0; i < 9; ++i) P[i] += c * cof[i];
+  /// P = 2 mu (F - R) + lambda (J - 1) cof F of N points. Give `mu` and `lambda` times a volume,
+  /// and P is too. F and P may be the same.
+  template <int N, class T>
+  TISSUE_SIM_INLINE static void stresses(const T (*F)[9], const T* mu, const T* lambda, T (*P)[9]) {
+    Invariants<T> of[N];
+    Stretch<T> s[N];
+    for (int k = 0; k < N; ++k) {
+      T cof[9], C[6];
+      cofactor(F[k], cof);
+      right_cauchy_green(F[k], C);
+      of[k] = {
+          C[0] + C[1] + C[2],
+          (C[0] * C[1] - C[3] * C[3]) + (C[0] * C[2] - C[4] * C[4]) + (C[1] * C[2] - C[5] * C[5]),
+          F[k][0] * cof[0] + F[k][1] * cof[1] + F[k][2] * cof[2]};
+    }
+    stretch<N>(of, s);
+    for (int k = 0; k < N; ++k) {  // cof F and C anew: to keep them for N points costs more
+      T cof[9], C[6], FC[9];
+      cofactor(F[k], cof);
+      right_cauchy_green(F[k], C);
+      const T mu2 = mu[k] + mu[k];
+      const T fc = mu2 * s[k].inverse;
+      const T f = mu2 - fc * (s[k].b + of[k].c1);
+      const T c = lambda[k] * (of[k].J - 1.0f) - fc * s[k].a;
+      // P = F (f I + fc C) + c cof F
+      for (int i = 0; i < 6; ++i) C[i] = i < 3 ? fc * C[i] + f : fc * C[i];
+      times_symmetric(F[k], C, FC);
+      for (int i = 0; i < 9; ++i) P[k][i] = FC[i] + c * cof[i];
+    }
   }
 
   /// Energy per volume; ||F - R||^2 = tr C - 2 tr U + 3.
@@ -192,14 +113,16 @@ struct FixedCorotated {
 /// Neo-Hookean that stays finite under inversion (Smith, de Goes, Kim 2018, eq. 13 without the log
 /// term): psi = mu/2 (||F||^2 - 3) - mu (J - 1) + (lambda + mu)/2 (J - 1)^2.
 struct NeoHookean {
-  /// P = mu F + ((lambda + mu) (J - 1) - mu) cof F.
-  template <class T>
-  TISSUE_SIM_INLINE static void stress(const T* F, T mu, T lambda, T* P) {
-    T cof[9];
-    cofactor(F, cof);
-    const T J = F[0] * cof[0] + F[1] * cof[1] + F[2] * cof[2];
-    const T c = (lambda + mu) * (J - 1.0f) - mu;
-    for (int i = 0; i < 9; ++i) P[i] = mu * F[i] + c * cof[i];
+  /// P = mu F + ((lambda + mu) (J - 1) - mu) cof F of N points. As FixedCorotated's.
+  template <int N, class T>
+  TISSUE_SIM_INLINE static void stresses(const T (*F)[9], const T* mu, const T* lambda, T (*P)[9]) {
+    for (int k = 0; k < N; ++k) {
+      T cof[9];
+      cofactor(F[k], cof);
+      const T J = F[k][0] * cof[0] + F[k][1] * cof[1] + F[k][2] * cof[2];
+      const T c = (lambda[k] + mu[k]) * (J - 1.0f) - mu[k];
+      for (int i = 0; i < 9; ++i) P[k][i] = mu[k] * F[k][i] + c * cof[i];
+    }
   }
 
   template <class T>
@@ -211,6 +134,13 @@ struct NeoHookean {
            0.5f * (lambda + mu) * (J - 1.0f) * (J - 1.0f);
   }
 };
+
+/// stresses() of one point: F[9] -> P[9].
+template <class LawOf, class T>
+TISSUE_SIM_INLINE void stress(const T* F, T mu, T lambda, T* P) {
+  LawOf::template stresses<1>(reinterpret_cast<const T(*)[9]>(F), &mu, &lambda,
+                              reinterpret_cast<T(*)[9]>(P));
+}
 
 /// Kelvin-Voigt viscosity: adds F S with S = 2 eta dE/dt, E Green's strain, to P.
 template <class T>

@@ -54,7 +54,7 @@ struct Block {
   Array<float> volume;        ///< [nz][8][stride]: elastic_volume(), 0 where there is no point
   Array<std::int32_t> point;  ///< [nz][8][stride], the point's number or -1
 
-  /// A cell of which the block has some, but not all eight points. See mpm/stabilisation.h.
+  /// A cell of which the block has so few points that it is stabilised: mpm/stabilisation.h.
   struct PartialCell {
     int lane;  ///< z * stride + its lane
     int node;  ///< its lowest, in the block's nodes

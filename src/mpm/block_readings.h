@@ -122,10 +122,10 @@ TISSUE_SIM_INLINE BlockState state(const Block& b, const BlockField& f, BlockScr
       for (int s = 0; s < 8; ++s) {
         const float* volume = b.volume.data() + lane + s * l.stride;
         const std::int32_t* point = b.point.data() + lane + s * l.stride;
-        Vec<W> cof[9], P[9];
-        auto k = Materials::template stiffness<W>(b, f, lane + s * l.stride);
-        k.mu /= load<W>(volume);  // lanes without a point are passed over below
-        k.lambda /= load<W>(volume);
+        Vec<W> cof[9], P[1][9];
+        auto k = Materials::template stiffness<1, W>(b, f, lane + s * l.stride);
+        k.mu[0] /= load<W>(volume);  // lanes without a point are passed over below
+        k.lambda[0] /= load<W>(volume);
         add_identity<W>(G[s]);
         cofactor(G[s], cof);
         const Vec<W> J = G[s][0] * cof[0] + G[s][1] * cof[1] + G[s][2] * cof[2];
@@ -134,8 +134,8 @@ TISSUE_SIM_INLINE BlockState state(const Block& b, const BlockField& f, BlockScr
         const Vec<W> cy = cof[1] * cof[1] + cof[4] * cof[4] + cof[7] * cof[7];
         const Vec<W> cz = cof[2] * cof[2] + cof[5] * cof[5] + cof[8] * cof[8];
         const Vec<W> f2 = norm2(G[s]);
-        Materials::template stress<W>(G[s], k, P);
-        const Vec<W> mises2 = von_mises_squared(G[s], P);
+        Materials::template stresses<1, W>(G + s, k, P);
+        const Vec<W> mises2 = von_mises_squared(G[s], P[0]);
         for (int i = 0; i < W; ++i) {
           const float v = volume[i];
           if (v == 0) continue;

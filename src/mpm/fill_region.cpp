@@ -6,6 +6,7 @@
 #include "mpm/block_materials.h"
 #include "mpm/block_sheets.h"
 #include "mpm/crumbs.h"
+#include "mpm/stabilisation.h"
 
 namespace tissue_sim {
 namespace {
@@ -66,7 +67,7 @@ Block make_block(const BlockRegion& r, const LatticeBody& b, const Points& point
       block.volume[lane] = elastic_volume(b, points, c.point[s]);
       block.point[lane] = c.point[s];
     }
-    if (c.count == 8) continue;
+    if (c.count >= kSteadyCount) continue;
     double mu = 0;
     for (const std::int32_t p : c.point) {
       if (p >= 0) mu += lame_mu(b.material_of(points, p)) * elastic_volume(b, points, p);

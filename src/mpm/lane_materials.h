@@ -8,29 +8,37 @@
 namespace tissue_sim {
 namespace kernels {
 
-/// Lame parameters of the points in W lanes, times their volumes [J].
-template <int W>
+/// Lame parameters of the points in W lanes, at N of the cells' sub-positions, times their volumes
+/// [J].
+template <int N, int W>
 struct Stiffness {
-  Vec<W> mu, lambda;
-  Mask<W> neo_hookean = Mask<W>();  ///< where there are both laws
+  Vec<W> mu[N], lambda[N];
+  Mask<W> neo_hookean[N] = {};  ///< where there are both laws
 };
 
 /// A block of one material.
 template <class LawOf>
 struct OneMaterial {
-  template <int W>
-  TISSUE_SIM_INLINE static Stiffness<W> stiffness(const Block& b, const BlockField& f,
-                                                  std::size_t lane) {
-    const Vec<W> V = load<W>(b.volume.data() + lane);
-    return {f.mu * V, f.lambda * V};
+  /// From `lane` on, which is of the first sub-position.
+  template <int N, int W>
+  TISSUE_SIM_INLINE static Stiffness<N, W> stiffness(const Block& b, const BlockField& f,
+                                                     std::size_t lane) {
+    Stiffness<N, W> k;
+    for (int s = 0; s < N; ++s) {
+      const Vec<W> V = load<W>(b.volume.data() + lane + s * b.stride);
+      k.mu[s] = f.mu * V;
+      k.lambda[s] = f.lambda * V;
+    }
+    return k;
+  }
+  template <int N, int W>
+  TISSUE_SIM_INLINE static void stresses(const Vec<W> (*F)[9], const Stiffness<N, W>& k,
+                                         Vec<W> (*P)[9]) {
+    LawOf::template stresses<N>(F, k.mu, k.lambda, P);
   }
   template <int W>
-  TISSUE_SIM_INLINE static void stress(const Vec<W>* F, const Stiffness<W>& k, Vec<W>* P) {
-    LawOf::stress(F, k.mu, k.lambda, P);
-  }
-  template <int W>
-  TISSUE_SIM_INLINE static Vec<W> energy(const Vec<W>* F, const Stiffness<W>& k) {
-    return LawOf::energy(F, k.mu, k.lambda);
+  TISSUE_SIM_INLINE static Vec<W> energy(const Vec<W>* F, const Stiffness<1, W>& k) {
+    return LawOf::energy(F, k.mu[0], k.lambda[0]);
   }
   /// Viscosity of W cells in z-plane z times the volume of their points [J s].
   template <int W>
@@ -45,10 +53,15 @@ struct OneMaterial {
 /// A block of several materials of one law.
 template <class LawOf>
 struct SeveralMaterials : OneMaterial<LawOf> {
-  template <int W>
-  TISSUE_SIM_INLINE static Stiffness<W> stiffness(const Block& b, const BlockField&,
-                                                  std::size_t lane) {
-    return {load<W>(b.mixture.mu.data() + lane), load<W>(b.mixture.lambda.data() + lane)};
+  template <int N, int W>
+  TISSUE_SIM_INLINE static Stiffness<N, W> stiffness(const Block& b, const BlockField&,
+                                                     std::size_t lane) {
+    Stiffness<N, W> k;
+    for (int s = 0; s < N; ++s) {
+      k.mu[s] = load<W>(b.mixture.mu.data() + lane + s * b.stride);
+      k.lambda[s] = load<W>(b.mixture.lambda.data() + lane + s * b.stride);
+    }
+    return k;
   }
   template <int W>
   TISSUE_SIM_INLINE static Vec<W> viscosity(const Block& b, const BlockField&, int z, int j) {
@@ -58,24 +71,30 @@ struct SeveralMaterials : OneMaterial<LawOf> {
 
 /// A block of materials of both laws: both are worked out for all points.
 struct BothLaws : SeveralMaterials<FixedCorotated> {
-  template <int W>
-  TISSUE_SIM_INLINE static Stiffness<W> stiffness(const Block& b, const BlockField& f,
-                                                  std::size_t lane) {
-    Stiffness<W> k = SeveralMaterials<FixedCorotated>::stiffness<W>(b, f, lane);
-    std::memcpy(&k.neo_hookean, b.mixture.neo_hookean.data() + lane, sizeof(k.neo_hookean));
+  template <int N, int W>
+  TISSUE_SIM_INLINE static Stiffness<N, W> stiffness(const Block& b, const BlockField& f,
+                                                     std::size_t lane) {
+    Stiffness<N, W> k = SeveralMaterials<FixedCorotated>::stiffness<N, W>(b, f, lane);
+    for (int s = 0; s < N; ++s) {
+      std::memcpy(&k.neo_hookean[s], b.mixture.neo_hookean.data() + lane + s * b.stride,
+                  sizeof(k.neo_hookean[s]));
+    }
     return k;
   }
-  template <int W>
-  TISSUE_SIM_INLINE static void stress(const Vec<W>* F, const Stiffness<W>& k, Vec<W>* P) {
-    Vec<W> other[9];
-    FixedCorotated::stress(F, k.mu, k.lambda, P);
-    NeoHookean::stress(F, k.mu, k.lambda, other);
-    for (int i = 0; i < 9; ++i) P[i] = k.neo_hookean ? other[i] : P[i];
+  template <int N, int W>
+  TISSUE_SIM_INLINE static void stresses(const Vec<W> (*F)[9], const Stiffness<N, W>& k,
+                                         Vec<W> (*P)[9]) {
+    Vec<W> other[N][9];
+    NeoHookean::stresses<N>(F, k.mu, k.lambda, other);
+    FixedCorotated::stresses<N>(F, k.mu, k.lambda, P);
+    for (int s = 0; s < N; ++s) {
+      for (int i = 0; i < 9; ++i) P[s][i] = k.neo_hookean[s] ? other[s][i] : P[s][i];
+    }
   }
   template <int W>
-  TISSUE_SIM_INLINE static Vec<W> energy(const Vec<W>* F, const Stiffness<W>& k) {
-    return k.neo_hookean ? NeoHookean::energy(F, k.mu, k.lambda)
-                         : FixedCorotated::energy(F, k.mu, k.lambda);
+  TISSUE_SIM_INLINE static Vec<W> energy(const Vec<W>* F, const Stiffness<1, W>& k) {
+    return k.neo_hookean[0] ? NeoHookean::energy(F, k.mu[0], k.lambda[0])
+                            : FixedCorotated::energy(F, k.mu[0], k.lambda[0]);
   }
 };
 

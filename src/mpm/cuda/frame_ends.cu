@@ -192,9 +192,9 @@ __global__ void __launch_bounds__(kThreads)
         const PointState state_of_point = point_state(b, body, h, x, y, z, s);
         float P[9];
         if (body.neo_hookean != 0) {
-          NeoHookean::stress(state_of_point.F, body.mu, body.lambda, P);
+          stress<NeoHookean>(state_of_point.F, body.mu, body.lambda, P);
         } else {
-          FixedCorotated::stress(state_of_point.F, body.mu, body.lambda, P);
+          stress<FixedCorotated>(state_of_point.F, body.mu, body.lambda, P);
         }
         const int piece = cloud.piece[p];
         const int whole = cloud.whole[p];

@@ -20,7 +20,7 @@ __device__ __forceinline__ float4 half_volumes(const CudaTables& t, const CudaCo
 template <class LawOf, bool kViscous>
 __device__ __forceinline__ void stress(float mu, float lambda, const float* damping, float* F) {
   float P[9];
-  LawOf::stress(F, mu, lambda, P);
+  tissue_sim::stress<LawOf>(F, mu, lambda, P);
 #pragma unroll
   for (int i = 0; i < 9; ++i) F[i] = kViscous ? P[i] + damping[i] : P[i];
 }

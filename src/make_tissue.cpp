@@ -13,7 +13,7 @@ std::unique_ptr<Tissue> make_tissue(const Scene& scene) {
   std::vector<std::string> notes;
 #if defined(TISSUE_SIM_CUDA)
   if (scene.device == Device::kCuda) return std::make_unique<CudaMpmTissue>(scene);
-  if (scene.device == Device::kAuto && why_no_gpu().empty()) {
+  if (scene.device == Device::kAuto) {
     try {
       return std::make_unique<CudaMpmTissue>(scene);
     } catch (const std::runtime_error& e) {

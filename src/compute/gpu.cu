@@ -1,6 +1,11 @@
 #include "compute/cuda_check.h"
 
 namespace tissue_sim {
+namespace {
+
+__global__ void nothing() {}
+
+}  // namespace
 
 std::string why_no_gpu() {
   int count = 0;
@@ -10,11 +15,21 @@ std::string why_no_gpu() {
     return std::string("CUDA finds no GPU (") + cudaGetErrorString(result) + ")";
   }
   if (count == 0) return "CUDA finds no GPU";
-  int major = 0, cooperative = 0;
+  int major = 0, minor = 0, cooperative = 0;
   check_cuda(cudaDeviceGetAttribute(&major, cudaDevAttrComputeCapabilityMajor, 0), "be asked");
+  check_cuda(cudaDeviceGetAttribute(&minor, cudaDevAttrComputeCapabilityMinor, 0), "be asked");
   check_cuda(cudaDeviceGetAttribute(&cooperative, cudaDevAttrCooperativeLaunch, 0), "be asked");
-  if (major < 7 || cooperative == 0) {
+  const int capability = 10 * major + minor;
+  if (capability < 75 || cooperative == 0) {
     return "the GPU is too old: compute capability 7.5 or more is needed";
+  }
+  cudaFuncAttributes code;  // says whether there is any that this GPU and its driver take
+  const cudaError_t loaded = cudaFuncGetAttributes(&code, nothing);
+  if (loaded != cudaSuccess) {
+    cudaGetLastError();
+    return "this build has no code for the GPU, of compute capability " + std::to_string(major) +
+           "." + std::to_string(minor) + " (" + cudaGetErrorString(loaded) +
+           "): build with -DCMAKE_CUDA_ARCHITECTURES=" + std::to_string(capability);
   }
   return "";
 }

@@ -1,7 +1,7 @@
 #include "fragments/pieces.h"
 
 #include <algorithm>
-#include <cstdlib>
+#include <cstring>
 #include <map>
 #include <numeric>
 
@@ -10,58 +10,81 @@
 namespace tissue_sim {
 namespace {
 
-std::int32_t root(std::vector<std::int32_t>& parent, std::int32_t p) {
-  while (parent[p] != p) {
-    parent[p] = parent[parent[p]];
-    p = parent[p];
+/// Points begin .. end - 1: neighbours along x that hold together. They stand and fall together.
+struct Run {
+  std::int32_t begin, end;
+};
+
+std::vector<Run> runs_of(const Points& points) {
+  constexpr std::uint64_t kBackInX = 0x0101010101010101 << opposite_bond(kForwardBond);
+  const std::int32_t count = points.size();
+  std::vector<Run> runs;
+  for (std::int32_t p = 0; p < count;) {
+    std::uint64_t bonds = 0;  // of eight points
+    std::memcpy(&bonds, &points.bonds[p], std::min(8, count - p));
+    if ((bonds & kBackInX) == kBackInX) {
+      p += 8;
+      continue;
+    }
+    if ((bonds & kBackInX & 0xff) == 0) {
+      if (!runs.empty()) runs.back().end = p;
+      runs.push_back({p, count});
+    }
+    ++p;
   }
-  return p;
+  return runs;
 }
 
-/// Lowest point of each point's component. Points that x-bonds hold together in a run stand and
-/// fall with its first.
-std::vector<std::int32_t> components(const std::vector<LatticeBody>& bodies, const Points& points) {
-  constexpr int kBackInX = opposite_bond(kForwardBond);
-  std::vector<std::int32_t> run(points.size());
-  for (std::int32_t p = 0; p < points.size(); ++p) {
-    run[p] = (points.bonds[p] >> kBackInX & 1) != 0 ? run[p - 1] : p;
+int root(std::vector<int>& parent, int i) {
+  while (parent[i] != i) {
+    parent[i] = parent[parent[i]];
+    i = parent[i];
   }
-  std::vector<std::int32_t> parent(points.size());
+  return i;
+}
+
+/// First run of each run's component (union-find). Where two runs lie side by side the first bond
+/// between them tells.
+std::vector<int> components(const std::vector<LatticeBody>& bodies, const Points& points,
+                            const std::vector<Run>& runs) {
+  std::vector<int> parent(runs.size());
   std::iota(parent.begin(), parent.end(), 0);
   for (const int k : {kForwardBond + 1, kForwardBond + 2}) {
     const BondOffset o = bond_offset(k);
-    std::int32_t from = -1, to = -1;  // runs joined last
-    for (std::int32_t p = 0; p < points.size(); ++p) {
-      if ((points.bonds[p] >> k & 1) == 0) continue;
-      const Points::Site& s = points.site[p];
-      const std::int32_t q = run[bodies[s.body].point(s.x, s.y + o.y, s.z + o.z)];
-      if (run[p] == from && q == to) continue;
-      from = run[p];
-      to = q;
-      const std::int32_t a = root(parent, from), b = root(parent, to);
-      if (a != b) parent[std::max(a, b)] = std::min(a, b);
+    std::size_t other = 0;  // only goes up: points are numbered along x, then y, then z
+    for (std::size_t i = 0; i < runs.size(); ++i) {
+      for (std::int32_t p = runs[i].begin; p < runs[i].end;) {
+        if ((points.bonds[p] >> k & 1) == 0) {
+          ++p;
+          continue;
+        }
+        const Points::Site& s = points.site[p];
+        const std::int32_t q = bodies[s.body].point(s.x, s.y + o.y, s.z + o.z);
+        while (runs[other].end <= q) ++other;
+        const int a = root(parent, static_cast<int>(i)), b = root(parent, static_cast<int>(other));
+        parent[std::max(a, b)] = std::min(a, b);
+        p += std::min(runs[i].end - p, runs[other].end - q);
+      }
     }
   }
-  for (std::int32_t p = 0; p < points.size(); ++p) run[p] = root(parent, run[p]);
-  return run;
+  for (std::size_t i = 0; i < runs.size(); ++i) parent[i] = root(parent, static_cast<int>(i));
+  return parent;
 }
 
-/// Counts, volumes and anchors of the labelled pieces.
-void count_points(const Points& points, Pieces& pieces) {
-  std::vector<bool> anchored(pieces.next_id, false);
-  std::vector<int> index(pieces.next_id, -1);
-  for (std::size_t i = 0; i < pieces.all.size(); ++i) {
-    index[pieces.all[i].id] = static_cast<int>(i);
-    pieces.all[i].point_count = 0;
-    pieces.all[i].volume = 0;
+double volume_of(const Points& points, const Run& run) {
+  return std::accumulate(points.volume.begin() + run.begin, points.volume.begin() + run.end, 0.0);
+}
+
+/// Loose is what came off something, or lies in a body that is held elsewhere, and is not held
+/// itself.
+void tell_loose(const Points& points, const std::vector<Run>& runs, Pieces& pieces) {
+  std::vector<bool> anchored(pieces.next_id, false), body_held(pieces.all.size(), false);
+  for (const Run& run : runs) {
+    const auto end = points.anchored.begin() + run.end;
+    if (std::find(points.anchored.begin() + run.begin, end, 1) != end) {
+      anchored[pieces.of_point[run.begin]] = true;
+    }
   }
-  for (std::int32_t p = 0; p < points.size(); ++p) {
-    Fragment& f = pieces.all[index[pieces.of_point[p]]];
-    ++f.point_count;
-    f.volume += points.volume[p];
-    if (points.anchored[p]) anchored[f.id] = true;
-  }
-  std::vector<bool> body_held(pieces.all.size(), false);
   for (const Fragment& f : pieces.all) body_held[f.body] = body_held[f.body] || anchored[f.id];
   for (Fragment& f : pieces.all) {
     f.loose = !anchored[f.id] && (f.parent >= 0 || body_held[f.body]);
@@ -72,51 +95,69 @@ void count_points(const Points& points, Pieces& pieces) {
 
 Pieces whole_pieces(const std::vector<LatticeBody>& bodies, const Points& points) {
   Pieces pieces;
-  pieces.of_point.assign(points.size(), 0);
   for (std::size_t b = 0; b < bodies.size(); ++b) {
     Fragment f;
     f.id = f.body = static_cast<int>(b);
     pieces.all.push_back(f);
   }
   pieces.next_id = static_cast<int>(bodies.size());
-  for (std::int32_t p = 0; p < points.size(); ++p) pieces.of_point[p] = points.site[p].body;
+  for (std::int32_t p = 0; p < points.size(); ++p) {
+    Fragment& f = pieces.all[points.site[p].body];
+    pieces.of_point.push_back(f.id);
+    ++f.point_count;
+    f.volume += points.volume[p];
+  }
+  tell_loose(points, runs_of(points), pieces);
   update_pieces(bodies, points, pieces);  // a mesh may have parts that do not touch
   return pieces;
 }
 
 std::vector<int> update_pieces(const std::vector<LatticeBody>& bodies, const Points& points,
                                Pieces& pieces) {
-  const std::vector<std::int32_t> component = components(bodies, points);
+  const std::vector<Run> runs = runs_of(points);
+  const std::vector<int> first_of = components(bodies, points, runs);
   struct Part {
-    std::int32_t lowest;
-    int count;
+    int first;  // run
+    int count;  // points
   };
+  std::vector<int> size(runs.size(), 0), id_of(runs.size(), -1), fresh;  // by first run
+  for (std::size_t i = 0; i < runs.size(); ++i) size[first_of[i]] += runs[i].end - runs[i].begin;
   std::map<int, std::vector<Part>> parts_of;  // by piece, each in the order of its lowest point
-  std::vector<int> size(points.size(), 0);
-  for (std::int32_t p = 0; p < points.size(); ++p) ++size[component[p]];
-  for (std::int32_t p = 0; p < points.size(); ++p) {
-    if (component[p] == p) parts_of[pieces.of_point[p]].push_back({p, size[p]});
+  for (int i = 0; i < static_cast<int>(runs.size()); ++i) {
+    if (first_of[i] == i) parts_of[pieces.of_point[runs[i].begin]].push_back({i, size[i]});
   }
-  std::vector<int> id_of(points.size(), -1), fresh;
   for (const auto& [id, parts] : parts_of) {
     const auto largest = std::max_element(
         parts.begin(), parts.end(), [](const Part& a, const Part& b) { return a.count < b.count; });
     for (auto part = parts.begin(); part != parts.end(); ++part) {
-      if (part == largest) {
-        id_of[part->lowest] = id;
-        continue;
-      }
+      id_of[part->first] = part == largest ? id : pieces.next_id;
+      if (part == largest) continue;
       Fragment f;
       f.id = pieces.next_id++;
       f.parent = id;
-      f.body = points.site[part->lowest].body;
-      id_of[part->lowest] = f.id;
+      f.body = points.site[runs[part->first].begin].body;
       fresh.push_back(f.id);
       pieces.all.push_back(f);
     }
   }
-  for (std::int32_t p = 0; p < points.size(); ++p) pieces.of_point[p] = id_of[component[p]];
-  count_points(points, pieces);
+  if (fresh.empty()) return fresh;
+  std::vector<int> index(pieces.next_id, -1);  // of a piece in `all`
+  for (std::size_t i = 0; i < pieces.all.size(); ++i) {
+    index[pieces.all[i].id] = static_cast<int>(i);
+  }
+  for (std::size_t i = 0; i < runs.size(); ++i) {
+    const Run& run = runs[i];
+    const int from = pieces.of_point[run.begin], to = id_of[first_of[i]];
+    if (from == to) continue;
+    Fragment &rest = pieces.all[index[from]], &part = pieces.all[index[to]];
+    const double volume = volume_of(points, run);
+    part.point_count += run.end - run.begin;
+    rest.point_count -= run.end - run.begin;
+    part.volume += volume;
+    rest.volume -= volume;
+    std::fill(pieces.of_point.begin() + run.begin, pieces.of_point.begin() + run.end, to);
+  }
+  tell_loose(points, runs, pieces);
   return fresh;
 }
 

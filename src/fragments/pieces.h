@@ -19,11 +19,8 @@ struct Pieces {
 /// One piece for each body.
 Pieces whole_pieces(const std::vector<LatticeBody>& bodies, const Points& points);
 
-/// Labels the points anew after the points `changed` lost bonds. Returns the new ids.
-std::vector<int> update_pieces(const std::vector<LatticeBody>& bodies, const Points& points,
-                               const std::vector<std::int32_t>& changed, Pieces& pieces);
-
-/// The same without knowing which (union-find over all bonds).
+/// Labels the points anew after bonds broke (union-find over runs of points along x). Returns the
+/// new ids.
 std::vector<int> update_pieces(const std::vector<LatticeBody>& bodies, const Points& points,
                                Pieces& pieces);
 

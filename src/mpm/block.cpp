@@ -11,7 +11,7 @@ int padded(int n) { return (n + kLanes - 1) / kLanes * kLanes; }
 
 void lay_out(Block& block) {
   block.pitch = block.nx + 2;
-  block.plane = padded((block.ny + 2) * block.pitch);
+  block.plane = padded((block.ny + 2) * block.pitch + 1);
   block.stride = padded(block.runs.back().lane + block.runs.back().count);
   block.cell.assign(block.stride, 0);
   block.node_rows.assign(block.ny + 2, {block.pitch, 0});

@@ -23,7 +23,8 @@ struct Block {
 
   int pitch = 0;   ///< nx + 2
   int stride = 0;  ///< lanes of one z-plane of cells: those of the runs, padded to whole kLanes
-  int plane = 0;   ///< nodes of one z-plane, (ny + 2) * pitch and some to fill the last lanes
+  int plane =
+      0;  ///< nodes of one z-plane, (ny + 2) * pitch, one that is none and some to fill lanes
 
   /// Cells (x .. x + count - 1, y), in the lanes from `lane` on; the same in each z-plane. In order
   /// of lanes, rows and cells.

@@ -5,56 +5,22 @@
 #include <array>
 
 #include "mpm/lane_materials.h"
-#include "mpm/stabilisation.h"
+#include "mpm/stabilise_cell.h"
 
 namespace tissue_sim {
 namespace kernels {
 
-/// Adds the force that stabilises the block's partial cells, W cells at a time, to `force` where
-/// there is one. Returns the energy. `nodes` are displacements over cell size.
-template <int W>
+/// Adds the force that stabilises the block's partial cells to `force` where there is one. Returns
+/// the energy. `nodes` are displacements over cell size.
 TISSUE_SIM_INLINE double stabilise_cells(const Block& b, const BlockField& f, const Layout& l,
                                          const float* nodes, float* force) {
-  const int count = static_cast<int>(b.partial.size());
-  int row[9];  // of a cell's nodes, from its lowest
-  for (int k = 0; k < 9; ++k) row[k] = k / 3 * l.plane + k % 3 * l.pitch;
+  const float scale = force != nullptr ? -1.0f / f.cell_size : 1.0f;
   double twice_energy = 0;
-  for (int first = 0; first < count; first += W) {
-    alignas(64) float stiffness[W], u[27][W];
-    int node[W];
-    for (int i = 0; i < W; ++i) {
-      const Block::PartialCell& cell = b.partial[std::min(first + i, count - 1)];
-      node[i] = cell.node;
-      stiffness[i] = first + i < count ? kStabilisation * cell.mu : 0.0f;
-    }
-    const int used = std::min(W, count - first);
+  for (const Block::PartialCell& cell : b.partial) {
     for (int c = 0; c < 3; ++c) {
-      for (int i = 0; i < W; ++i) {
-        const float* from = nodes + c * l.node_component + node[i];
-#pragma GCC unroll 9
-        for (int k = 0; k < 9; ++k) {
-          const float* at = from + row[k];
-          u[3 * k][i] = at[0];
-          u[3 * k + 1][i] = at[1];
-          u[3 * k + 2][i] = at[2];
-        }
-      }
-      Vec<W> v[27];
-      for (int k = 0; k < 27; ++k) v[k] = load<W>(u[k]);
-      const Vec<W> energy = stabilise<W>(load<W>(stiffness), v);
-      for (int i = 0; i < used; ++i) twice_energy += static_cast<double>(energy[i]);
-      if (force == nullptr) continue;
-      for (int k = 0; k < 27; ++k) store<W>(u[k], v[k] * (-1.0f / f.cell_size));
-      for (int i = 0; i < used; ++i) {
-        float* to = force + c * b.node_count() + node[i];
-#pragma GCC unroll 9
-        for (int k = 0; k < 9; ++k) {
-          float* at = to + row[k];
-          at[0] += u[3 * k][i];
-          at[1] += u[3 * k + 1][i];
-          at[2] += u[3 * k + 2][i];
-        }
-      }
+      float* to = force != nullptr ? force + c * b.node_count() + cell.node : nullptr;
+      twice_energy += stabilise(kStabilisation * cell.mu * scale,
+                                nodes + c * l.node_component + cell.node, l.pitch, l.plane, to);
     }
   }
   return 0.5 * twice_energy;
@@ -149,7 +115,7 @@ TISSUE_SIM_INLINE void forces(const Block& b, const BlockField& f, BlockScratch&
     }
     store_plane<W>(b, l, out, z, -inv_h, scratch.row.data(), force);
   }
-  stabilise_cells<W>(b, f, l, scratch.nodes.data(), force);
+  stabilise_cells(b, f, l, scratch.nodes.data(), force);
 }
 
 template <int W>

@@ -111,7 +111,7 @@ TISSUE_SIM_INLINE BlockState state(const Block& b, const BlockField& f, BlockScr
   gather_nodes(b, f, f.nodes->u, 1.0f / f.cell_size, l, scratch.nodes.data());
   BlockState result;
   result.stiffening.assign(f.material_count, 1.0f);
-  result.elastic_energy = stabilise_cells<W>(b, f, l, scratch.nodes.data(), nullptr);
+  result.elastic_energy = stabilise_cells(b, f, l, scratch.nodes.data(), nullptr);
   for (int z = 0; z < 2; ++z) load_plane<W>(b, l, scratch.nodes.data(), z, scratch.in.data());
   for (int z = 0; z < b.nz; ++z) {
     load_plane<W>(b, l, scratch.nodes.data(), z + 2, scratch.in.data());

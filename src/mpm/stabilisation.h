@@ -51,28 +51,4 @@ TISSUE_SIM_INLINE void from_line(T& A, T& d, T& B) {
   d = center;
 }
 
-/// From the displacements over cell size of one component at the 27 nodes of W cells, u[27] (x
-/// fastest), to what stabilises them, in place: -force times cell size. `stiffness` is
-/// kStabilisation mu V of each cell. Returns twice the energy.
-template <int W>
-TISSUE_SIM_INLINE Vec<W> stabilise(Vec<W> stiffness, Vec<W>* u) {
-  for (int i = 0; i < 27; i += 3) to_line(u[i], u[i + 1], u[i + 2]);
-  for (int z = 0; z < 27; z += 9) {
-    for (int i = z; i < z + 3; ++i) to_line(u[i], u[i + 3], u[i + 6]);
-  }
-  for (int i = 0; i < 9; ++i) to_line(u[i], u[i + 9], u[i + 18]);
-  Vec<W> energy = 0.0f * stiffness;
-  for (int i = 0; i < 27; ++i) {
-    const Vec<W> force = stabilisation::weight2(i % 3, i / 3 % 3, i / 9) * stiffness * u[i];
-    energy += force * u[i];
-    u[i] = force;
-  }
-  for (int i = 0; i < 9; ++i) from_line(u[i], u[i + 9], u[i + 18]);
-  for (int z = 0; z < 27; z += 9) {
-    for (int i = z; i < z + 3; ++i) from_line(u[i], u[i + 3], u[i + 6]);
-  }
-  for (int i = 0; i < 27; i += 3) from_line(u[i], u[i + 1], u[i + 2]);
-  return energy;
-}
-
 }  // namespace tissue_sim

@@ -3,9 +3,7 @@
 #include <ros/console.h>
 #include <ros/time.h>
 
-#include <vector>
-
-#include "geometry/mesh.h"
+#include <string>
 
 namespace tissue_sim {
 namespace {
@@ -57,14 +55,6 @@ Node::~Node() {
 }
 
 Session Node::make_session(const Scene& scene) {
-  for (const Body& body : scene.bodies) {
-    if (body.shape != Shape::kMesh) continue;
-    std::vector<std::string> notes;
-    load_solid(body, &notes);
-    for (const std::string& note : notes) {
-      ROS_WARN("mesh %s %s", body.mesh.c_str(), note.c_str());
-    }
-  }
   Session session;
   session.simulation = std::make_unique<Simulation>(scene);
   session.tools = std::make_shared<ToolInputs>();
@@ -87,6 +77,7 @@ Session Node::make_session(const Scene& scene) {
   session.publications =
       std::make_shared<Publications>(service_node_, scene, parameters_, recorder_);
   Tissue& tissue = session.simulation->tissue();
+  for (const std::string& note : tissue.notes()) ROS_WARN("%s", note.c_str());
   ROS_INFO("scene '%s': %d particles, cells of %g mm, %zu tools, on %s", scene.name.c_str(),
            tissue.point_count(), scene.cell_size * 1e3, scene.tools.size(),
            tissue.device_name().c_str());

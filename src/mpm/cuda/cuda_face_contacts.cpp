@@ -121,7 +121,7 @@ void CudaMpmTissue::upload_facets() {
   f.bucket_begin.resize(buckets);
   f.bucket_count.resize(buckets);
   f.near.resize(std::max(f.near.size(), 8 * count));
-  f.springs.clear(d.stream);
+  f.springs.clear(d.stream);  // padding included: they are copied 16 bytes at a time
   launch_fresh_contacts(looks(), d.stream);
 }
 
@@ -225,6 +225,7 @@ void CudaMpmTissue::pull_contacts() {
   if (f.version != faces.version || f.contacts_count == 0 || f.searched) return;
   const int count = f.contacts_count;
   f.gathered.resize(count);
+  f.gathered.clear(d.stream);  // the same
   launch_gather_contacts(looks(), count, f.gathered.data(), d.stream);
   std::vector<FaceSpring> springs(count);
   f.gathered.download(springs.data(), count, d.stream);

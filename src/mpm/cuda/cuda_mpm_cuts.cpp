@@ -184,7 +184,7 @@ void CudaMpmTissue::cut(const std::vector<BladePath>& paths, const Array<float>*
   }
   if (changed.empty()) return;
   take_apart(*state_, changed);
-  report.new_fragments = update_pieces(state_->bodies, state_->points, changed, pieces_);
+  report.new_fragments = update_pieces(state_->bodies, state_->points, pieces_);
   if (!report.new_fragments.empty()) device_->faces.pieces_changed = true;
   push();
   launch_measure();

@@ -41,9 +41,7 @@ int attribute(cudaDeviceAttr which) {
 
 CudaMpmTissue::CudaMpmTissue(const Scene& scene) : device_(std::make_unique<OnDevice>()) {
   const std::string why = why_no_gpu();
-  if (!why.empty()) {
-    throw std::runtime_error("device is cuda: " + why + "; set device to auto or cpu");
-  }
+  if (!why.empty()) throw std::runtime_error(why + "; set device to cpu");
   if (scene.tools.size() + 1 > kMaxColliders) {
     throw std::runtime_error("the scene has " + std::to_string(scene.tools.size()) +
                              " tools: on the GPU at most " + std::to_string(kMaxColliders - 1) +

@@ -86,6 +86,8 @@ INSTANTIATE_TEST_SUITE_P(
                     Case{"a wave after the other", Law::kFixedCorotated, 0, 0, "4 4 4 32 0"},
                     Case{"the same, cut", Law::kFixedCorotated, 0, 2, "3 5 2 32 0"},
                     Case{"flat blocks", Law::kNeoHookean, 0, 1, "16 4 1 128 1"},
+                    Case{"a thread a column", Law::kNeoHookean, 0, 0, "8 8 2 64 1"},
+                    Case{"the same, cut", Law::kFixedCorotated, 0, 2, "16 6 2 96 1"},
                     Case{"several to a thread block", Law::kFixedCorotated, 0, 0, "8 2 1 256 1"},
                     Case{"the same, cut", Law::kNeoHookean, 0, 2, "8 2 1 256 1"},
                     Case{"a few more than at once", Law::kFixedCorotated, 0, 2, "2 2 3 192 0"}));

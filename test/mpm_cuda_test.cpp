@@ -18,6 +18,17 @@ namespace {
 
 class OnGpu : public OnEitherDevice<CudaMpmTissue> {};
 
+/// With blocks of the shape that the parameter names, null for the default.
+class OnGpuInBlocks : public OnGpu, public testing::WithParamInterface<const char*> {
+ protected:
+  void SetUp() override {
+    OnGpu::SetUp();
+    if (GetParam() != nullptr) setenv("TISSUE_SIM_CUDA_SHAPE", GetParam(), 1);
+  }
+  void TearDown() override { unsetenv("TISSUE_SIM_CUDA_SHAPE"); }
+};
+INSTANTIATE_TEST_SUITE_P(Shapes, OnGpuInBlocks, testing::Values(nullptr, "6 5 4 64 0"));
+
 /// A block on the ground, cut by a scalpel and pushed by a probe for a second.
 struct Operation {
   Scene scene;
@@ -97,7 +108,7 @@ Outcome operate(T& tissue, Operation& operation, int frames) {
   return o;
 }
 
-TEST_F(OnGpu, ASecondOfCuttingAgreesWithTheCpu) {
+TEST_P(OnGpuInBlocks, ASecondOfCuttingAgreesWithTheCpu) {
   Operation operation;
   MpmTissue cpu(operation.scene);
   CudaMpmTissue gpu(operation.scene);
@@ -161,7 +172,7 @@ TEST_F(OnGpu, SaysHowMuchMemoryASceneNeeds) {
   }
 }
 
-TEST_F(OnGpu, SameBitsRunAfterRun) {
+TEST_P(OnGpuInBlocks, SameBitsRunAfterRun) {
   Operation operation;
   CudaMpmTissue first(operation.scene), second(operation.scene);
   const Outcome a = operate(first, operation, 45), b = operate(second, operation, 45);

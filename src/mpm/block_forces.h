@@ -5,7 +5,7 @@
 #include <array>
 
 #include "mpm/lane_materials.h"
-#include "mpm/stabilisation.h"
+#include "mpm/stabilise_cell.h"
 
 namespace tissue_sim {
 namespace kernels {

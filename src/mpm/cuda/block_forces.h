@@ -1,9 +1,8 @@
 // Force of a block's points on its nodes, and of colliders on its points. For .cu files.
 #pragma once
 
-#include "material/laws.h"
 #include "mpm/cuda/cell_stabilisation.h"
-#include "mpm/cuda/half_cell.h"
+#include "mpm/cuda/half_forces.h"
 #include "mpm/cuda/tool_pushes.h"
 
 namespace tissue_sim {
@@ -14,7 +13,7 @@ struct FaceRounds;
 struct BlockShared {
   float4* u;                  ///< [slots], divided by the cell size
   float4* v;                  ///< [slots], the same; only where contact or viscosity needs it
-  float4* exchange;           ///< [9][threads]
+  float4* exchange;           ///< [1 or 2 planes][plane slots][9]
   unsigned long long* loads;  ///< [kMaxColliders][6]
   Collider* colliders;        ///< [kMaxColliders]
   FaceRounds* rounds;
@@ -23,152 +22,180 @@ struct BlockShared {
 /// What one substep of a bundle needs beside its nodes.
 struct BlockStep {
   const HalfPush* pushes;  ///< of colliders, see find_pushes()
-  std::uint32_t touched;   ///< the thread's half cells that they push
+  Touched touched;         ///< the half cells of the thread's column that they push
   float4* force;           ///< of all slots
+  bool two_planes;         ///< CudaPlan::two_planes
 };
 
-/// Volumes of the points 2 sy + sx of a half cell.
-__device__ __forceinline__ float4 half_volumes(const CudaTables& t, const CudaColumn& c,
-                                               const CudaBody& body, int z, int sz) {
-  if (c.whole != 0) {
-    return {body.point_volume, body.point_volume, body.point_volume, body.point_volume};
-  }
-  const float* v = t.volume + c.lane + (8 * z + 4 * sz) * c.step;
-  return {v[0], v[c.step], v[2 * c.step], v[3 * c.step]};
-}
+/// A column of a bundle and the thread that walks up it, alone or, with kPairs, with its neighbour
+/// in the warp: one has the lower, the other the upper halves of the cells.
+template <class LawOf, bool kViscous, bool kSpecial, bool kPartial, bool kPairs>
+struct ColumnWalk {
+  static constexpr bool kValues = kSpecial || kPartial;
+  const CudaTables& t;
+  const CudaBundle& w;
+  const CudaBody& body;
+  const BlockShared& s;
+  const BlockStep& step;
+  CudaColumn column;
+  int index;
+  PlaneNumbers center[3], below[3];  ///< of u, of the next cell's planes; not kPairs
+  PlaneNumbers now[3], next[3] = {}, after[3] = {};  ///< what planes of nodes get
 
-/// F to the stress P times the volume, in place; `damping` is added.
-template <class LawOf, bool kViscous>
-__device__ __forceinline__ void stress(const CudaBody& body, float volume, const float* damping,
-                                       float* F) {
-  float P[9];
-  tissue_sim::stress<LawOf>(F, body.mu * volume, body.lambda * volume, P);
-#pragma unroll
-  for (int i = 0; i < 9; ++i) F[i] = kViscous ? P[i] + damping[i] : P[i];
-}
-
-/// Kelvin-Voigt stress at the middle of the cell, from the mean gradients of its two halves, times
-/// an eighth of the volume of its points. The neighbouring thread has the other half.
-__device__ __forceinline__ void viscous_stress(const CudaBody& body, const HalfPlane (&u)[3],
-                                               const HalfPlane (&v)[3], const float4& volume,
-                                               float (&P)[9]) {
-  const unsigned pair = 3u << (threadIdx.x & 30u);
-  const auto mean = [pair](float half) { return 0.5f * (half + __shfl_xor_sync(pair, half, 1)); };
-  float F[9], rate[9];
-#pragma unroll
-  for (int c = 0; c < 3; ++c) {
-    F[3 * c] = mean(0.5f * u[c].wdA);
-    F[3 * c + 1] = mean(0.5f * u[c].wAd);
-    F[3 * c + 2] = mean(u[c].sAA);
-    rate[3 * c] = mean(0.5f * v[c].wdA);
-    rate[3 * c + 1] = mean(0.5f * v[c].wAd);
-    rate[3 * c + 2] = mean(v[c].sAA);
-    F[4 * c] += 1.0f;
+  __device__ __forceinline__ static int index_of(int thread) {
+    return kPairs ? thread / 2 : thread;
   }
-  const float half = (volume.x + volume.y) + (volume.z + volume.w);
-#pragma unroll
-  for (int i = 0; i < 9; ++i) P[i] = 0;
-  add_viscous_stress(F, rate, 0.25f * body.viscosity * mean(half), P);
-}
 
-/// Adds the forces of colliders on the points of half a cell to its transposed half plane.
-__device__ __forceinline__ void add_push(const HalfPush& push, float cell_size,
-                                         HalfPlane (&out)[3]) {
+  /// Adds what colliders push the points of a half with to what it gives back.
+  __device__ __forceinline__ void push(int z, int sz, HalfPlane (&out)[3]) const {
+    if (!kSpecial || ((sz == 0 ? step.touched.cells[0] : step.touched.cells[1]) >> z & 1u) == 0)
+      return;
+    const HalfPush& push = step.pushes[2 * (z * w.columns + index) + sz];
 #pragma unroll
-  for (int c = 0; c < 3; ++c) {
-    const float4 f = *reinterpret_cast<const float4*>(push.of[c]);
-    // The stencils take forces by -1 / cell size, as they do stress.
-    add_point_force(-cell_size * f.x, -1, -1, out[c]);
-    add_point_force(-cell_size * f.y, 1, -1, out[c]);
-    add_point_force(-cell_size * f.z, -1, 1, out[c]);
-    add_point_force(-cell_size * f.w, 1, 1, out[c]);
+    for (int c = 0; c < 3; ++c) add_forces(*reinterpret_cast<const float4*>(push.of[c]), out[c]);
   }
-}
+  /// -kStabilisation mu V / cell size where the cell is not full, else 0.
+  __device__ __forceinline__ float stiffness(int z) const {
+    return -kStabilisation * body.inv_cell_size * __ldg(t.partial + column.cell + z * column.step);
+  }
 
-/// Forces of half a cell: reads its nodes, gives its transposed half plane. `stiffness` and `bends`
-/// are for kPartial alone: where the cell is not full, kStabilisation mu V, else 0.
-template <class LawOf, bool kViscous, bool kPartial>
-__device__ __forceinline__ void half_forces(const CudaTables& t, const CudaColumn& column,
-                                            const CudaBody& body, const BlockShared& s, int z,
-                                            int sz, const HalfWeights& weights, float stiffness,
-                                            HalfPlane (&out)[3], HalfBends (&bends)[3]) {
-  const int first = column.slot + z * column.plane;
-  HalfPlane h[3], rate[3];
-  HalfBends bent[3];
-  read_half<kPartial>(s.u + first, column.pitch, column.plane, weights, h, bent);
-  if (kViscous) read_half(s.v + first, column.pitch, column.plane, weights, rate);
-  const float4 volume = half_volumes(t, column, body, z, sz);
-  float damping[9];
-  if (kViscous) viscous_stress(body, h, rate, volume, damping);
-#pragma unroll
-  for (int c = 0; c < 3; ++c) {
-    out[c] = {};
-    if (kPartial && stiffness != 0) stabilise_half(stiffness, h[c], bent[c], out[c], bends[c]);
-  }
-#pragma unroll
-  for (int ty = 0; ty < 2; ++ty) {
-    const float side = ty == 0 ? -1.0f : 1.0f;
-    float F[2][9];
+  /// The thread's half of cell z.
+  __device__ __forceinline__ void half(int z) {
+    const int sz = static_cast<int>(threadIdx.x) % 2;
+    const float side = sz == 0 ? -1.0f : 1.0f;
+    const int first = column.slot + z * column.plane;
+    HalfPlane h[3], out[3];
+    HalfBends bent[3];
+    read_half<kPartial>(s.u + first, column.pitch, column.plane, side, h, bent);
+    const float4 volume = half_volumes(t, column, body, z, sz);
+    float damping[9];
+    if (kViscous) {
+      HalfPlane rate[3];
+      read_half(s.v + first, column.pitch, column.plane, side, rate);
+      viscous_stress(body, h, rate, side, volume, damping);
+    }
+    half_forces<LawOf, kViscous>(body, h, side, volume, damping, out);
+    push(z, sz, out);
+    const GiveWeights k(side);
+    const float extra = kPartial ? stiffness(z) : 0;
 #pragma unroll
     for (int c = 0; c < 3; ++c) {
-      float low[3], high[3];
-      row_gradient(h[c], side, low, high);
+      HalfBends bends;
+      if (kPartial && extra != 0) stabilise_half(extra, side, h[c], bent[c], out[c], bends);
+      now[c] = plus<kValues>(next[c], out[c], k.below, k.slope_below);
+      next[c] = plus<kValues>(after[c], out[c], kAverageCenter, k.slope_center);
+      after[c] = plus<kValues>({}, out[c], k.above, k.slope_above);
+      if (!kPartial || extra == 0) continue;
+      now[c] = plus(now[c], bends, k.below, k.slope_below);
+      next[c] = plus(next[c], bends, kAverageCenter, k.slope_center);
+      after[c] = plus(after[c], bends, k.above, k.slope_above);
+    }
+  }
+
+  __device__ __forceinline__ void begin() {
+    if (kPairs) return;
+    read_plane<kPartial>(s.u + column.slot, column.pitch, below);
+    read_plane<kPartial>(s.u + column.slot + column.plane, column.pitch, center);
+  }
+  /// All of cell z.
+  __device__ __forceinline__ void cell(int z) {
+    PlaneNumbers above[3];
+    read_plane<kPartial>(s.u + column.slot + (z + 2) * column.plane, column.pitch, above);
 #pragma unroll
-      for (int i = 0; i < 3; ++i) {
-        F[0][3 * c + i] = low[i] + (i == c ? 1.0f : 0.0f);
-        F[1][3 * c + i] = high[i] + (i == c ? 1.0f : 0.0f);
+    for (int c = 0; c < 3; ++c) {
+      now[c] = next[c];
+      next[c] = after[c];
+      after[c] = {};
+    }
+#pragma unroll
+    for (int sz = 0; sz < 2; ++sz) {
+      const float side = sz == 0 ? -1.0f : 1.0f;
+      HalfPlane h[3], out[3];
+#pragma unroll
+      for (int c = 0; c < 3; ++c) {
+        half_between(sz == 0 ? above[c] : below[c], center[c], sz == 0 ? below[c] : above[c], h[c]);
+      }
+      half_forces<LawOf, false>(body, h, side, half_volumes(t, column, body, z, sz), nullptr, out);
+      push(z, sz, out);
+      const GiveWeights k(side);
+#pragma unroll
+      for (int c = 0; c < 3; ++c) {
+        now[c] = plus<kValues>(now[c], out[c], k.below, k.slope_below);
+        next[c] = plus<kValues>(next[c], out[c], kAverageCenter, k.slope_center);
+        after[c] = plus<kValues>(after[c], out[c], k.above, k.slope_above);
       }
     }
-    const float v0 = ty == 0 ? volume.x : volume.z, v1 = ty == 0 ? volume.y : volume.w;
-    stress<LawOf, kViscous>(body, v0, damping, F[0]);
-    stress<LawOf, kViscous>(body, v1, damping, F[1]);
+    const float extra = kPartial ? stiffness(z) : 0;
 #pragma unroll
     for (int c = 0; c < 3; ++c) {
-      const float low[3] = {F[0][3 * c], F[0][3 * c + 1], F[0][3 * c + 2]};
-      const float high[3] = {F[1][3 * c], F[1][3 * c + 1], F[1][3 * c + 2]};
-      add_row_stress(low, high, side, out[c]);
+      if (kPartial && extra != 0) {
+        stabilise_cell(std::make_integer_sequence<int, kXyCount>(), extra, below[c], center[c],
+                       above[c], now[c], next[c], after[c]);
+      }
+      below[c] = center[c];
+      center[c] = above[c];
     }
+  }
+  /// What comes after the column's last cell.
+  __device__ __forceinline__ void rise() {
+#pragma unroll
+    for (int c = 0; c < 3; ++c) {
+      now[c] = next[c];
+      next[c] = after[c];
+      after[c] = {};
+    }
+  }
+
+  /// Puts the column's part of the plane's forces to the exchange, if `mine`.
+  __device__ __forceinline__ void give(PlaneNumbers (&plane)[3], float4* exchange, bool mine) {
+    const int sz = static_cast<int>(threadIdx.x) % 2;
+    float f[3][3][3];
+#pragma unroll
+    for (int c = 0; c < 3; ++c) {
+      if (kPairs) {
+#pragma unroll
+        for (int i = 0; i < (kPartial ? kXyCount : kStressXyCount); ++i) {
+          plane[c][i] += __shfl_xor_sync(0xffffffffu, plane[c][i], 1);
+        }
+      }
+      node_forces<kPartial>(plane[c], f[c]);
+    }
+    float4* to = exchange + 9 * column.plane_slot;
+#pragma unroll
+    for (int k = 0; k < 9; ++k) {
+      // Each of two writes half of the sums.
+      if (!mine || (kPairs && (k < 5) != (sz == 0))) continue;
+      const int y = k / 3, x = k % 3;
+      to[9 * (y * column.pitch + x) + k] = {f[0][y][x], f[1][y][x], f[2][y][x], 0};
+    }
+  }
+};
+
+/// Clears what the columns' threads leave as it is: the parts that a node at the rim of a block
+/// gets from columns that are not there.
+__device__ __forceinline__ void clear_exchange(float4* exchange, int plane_slots, bool two_planes) {
+  const int count = (two_planes ? 18 : 9) * plane_slots;
+  for (int i = static_cast<int>(threadIdx.x); i < count; i += static_cast<int>(blockDim.x)) {
+    exchange[i] = {0, 0, 0, 0};
   }
 }
 
-/// Sums what the cells give to a node plane of a block, in a fixed order, and puts it to `force`.
-/// `exchange` is that of the block's first column, `places` lie between the nine sums of a column.
+/// Sums what the cells give to `count` nodes of a plane, in a fixed order, and puts it to `force`.
 /// Goes on from `i`, and leaves it at what is left for the next block.
-__device__ __forceinline__ void write_plane(int nx, int ny, const float4* exchange, int places,
-                                            float scale, float4* force, int& i) {
-  const int pitch = nx + 2, count = pitch * (ny + 2);
+__device__ __forceinline__ void sum_plane(int count, const float4* exchange, float4* force,
+                                          int& i) {
   for (; i < count; i += static_cast<int>(blockDim.x)) {
-    const int y = i / pitch, x = i - y * pitch;
-    float4 f = {0, 0, 0, 0};
+    float4 f[9];
 #pragma unroll
-    for (int dy = 0; dy < 3; ++dy) {
+    for (int k = 0; k < 9; ++k) f[k] = exchange[9 * i + k];
 #pragma unroll
-      for (int dx = 0; dx < 3; ++dx) {
-        const int cx = x - dx, cy = y - dy;
-        const bool there = cx >= 0 && cy >= 0 && cx < nx && cy < ny;
-        const float4 g =
-            there ? exchange[(3 * dy + dx) * places + cy * nx + cx] : float4{0, 0, 0, 0};
-        f.x += g.x;
-        f.y += g.y;
-        f.z += g.z;
-      }
+    for (int step = 1; step < 9; step *= 2) {
+#pragma unroll
+      for (int k = 0; k + step < 9; k += 2 * step) add(f[k + step], f[k]);
     }
-    __stcg(force + i, float4{scale * f.x, scale * f.y, scale * f.z, 0});
+    __stcg(force + i, f[0]);
   }
   i -= count;
-}
-
-/// Adds the plane force of the neighbouring thread, which has the other half of the column's cells.
-__device__ __forceinline__ void add_neighbour(PlaneForce& p) {
-  constexpr unsigned kAll = 0xffffffffu;
-  p.AA += __shfl_xor_sync(kAll, p.AA, 1);
-  p.Ad += __shfl_xor_sync(kAll, p.Ad, 1);
-  p.AB += __shfl_xor_sync(kAll, p.AB, 1);
-  p.dA += __shfl_xor_sync(kAll, p.dA, 1);
-  p.dd += __shfl_xor_sync(kAll, p.dd, 1);
-  p.dB += __shfl_xor_sync(kAll, p.dB, 1);
-  p.BA += __shfl_xor_sync(kAll, p.BA, 1);
-  p.Bd += __shfl_xor_sync(kAll, p.Bd, 1);
 }
 
 /// nx, ny, nz and first_slot of a block, in one load.
@@ -176,103 +203,61 @@ __device__ __forceinline__ int4 block_size(const CudaTables& t, int block) {
   return __ldg(reinterpret_cast<const int4*>(t.blocks + block));
 }
 
-/// Forces of a bundle. Two threads, neighbours in a warp, walk up each column of cells: one has the
-/// lower, the other the upper halves of the cells, with what these give to the next two node planes
-/// in registers. `block` is the bundle's first; contact and bundles of several blocks need
-/// kSpecial, cells that are not full kPartial.
-template <class LawOf, bool kViscous, bool kSpecial, bool kPartial>
+/// Forces of a bundle. Each column of cells has a thread, or two, that walks up it with what the
+/// cells give to the next two node planes in registers. `block` is the bundle's first; contact and
+/// bundles of several blocks need kSpecial, cells that are not full kPartial.
+template <class LawOf, bool kViscous, bool kSpecial, bool kPartial, bool kPairs>
 __device__ __forceinline__ void block_forces(const CudaTables& t, const CudaBundle& w,
                                              const CudaBlock& block, const CudaBody& body,
                                              const BlockShared& s, const BlockStep& step) {
-  const int index = static_cast<int>(threadIdx.x) / 2;
-  const int places = kSpecial ? w.places : block.nx * block.ny;
+  using Walk = ColumnWalk<LawOf, kViscous, kSpecial, kPartial, kPairs>;
+  const int thread = static_cast<int>(threadIdx.x), index = Walk::index_of(thread);
   const int nz = kSpecial ? w.nz : block.nz;
-  const bool active = index < (kSpecial ? w.columns : places);
-  CudaColumn column;
-  if constexpr (kSpecial) {
-    column = column_of(t, w, block, body.cell_size, min(index, w.columns - 1));
-    if (w.columns < places) {  // those without points give nothing
-      for (int i = static_cast<int>(threadIdx.x); i < 9 * places;
-           i += static_cast<int>(blockDim.x)) {
-        s.exchange[i] = {0, 0, 0, 0};
-      }
-      __syncthreads();
-    }
-  } else {
-    column = column_of(block, body.cell_size, index);
-  }
+  const int columns = kSpecial ? w.columns : block.nx * block.ny;
+  // Threads beyond the last column do what the last one's do, if their warp has to anyway.
+  const bool active = index < columns, warp_active = Walk::index_of(thread / 32 * 32) < columns;
   const int4 first{block.nx, block.ny, block.nz, block.first_slot};
-  PlaneForce next[3] = {}, after[3] = {};
-#pragma unroll 1
-  for (int z = 0; z < nz + 2; ++z) {
-    const int sz = static_cast<int>(threadIdx.x) % 2;
-    PlaneForce now[3];
-#pragma unroll
-    for (int c = 0; c < 3; ++c) {
-      now[c] = next[c];
-      next[c] = after[c];
-      after[c] = {};
-    }
-    if (active && z < column.nz) {
-      const HalfWeights k(sz == 0 ? -1.0f : 1.0f);
-      HalfPlane out[3];
-      HalfBends bends[3];
-      float stiffness = 0;
-      if (kPartial) {
-        stiffness = kStabilisation * __ldg(t.partial + column.cell + z * column.step);
-      }
-      half_forces<LawOf, kViscous, kPartial>(t, column, body, s, z, sz, k, stiffness, out, bends);
-      if (kSpecial && (step.touched >> z & 1u) != 0) {
-        add_push(step.pushes[2 * (z * w.columns + index) + sz], body.cell_size, out);
-      }
-#pragma unroll
-      for (int c = 0; c < 3; ++c) {
-        add_to_plane(out[c], k.below, k.slope_below, now[c]);
-        add_to_plane(out[c], kAverageCenter, k.slope_center, next[c]);
-        add_to_plane(out[c], k.above, k.slope_above, after[c]);
-      }
-      if (kPartial && stiffness != 0) {
-#pragma unroll
-        for (int c = 0; c < 3; ++c) {
-          add_to_plane(bends[c], k.below, k.slope_below, now[c]);
-          add_to_plane(bends[c], kAverageCenter, k.slope_center, next[c]);
-          add_to_plane(bends[c], k.above, k.slope_above, after[c]);
-        }
-      }
-    }
-#pragma unroll
-    for (int c = 0; c < 3; ++c) {
-      add_neighbour(now[c]);
-      if (kPartial) now[c].BB += __shfl_xor_sync(0xffffffffu, now[c].BB, 1);
-    }
-    if (active) {
-      float f[3][3][3];
-#pragma unroll
-      for (int c = 0; c < 3; ++c) node_forces<kPartial>(now[c], f[c]);
-#pragma unroll
-      for (int k = 0; k < 9; ++k) {
-        if ((k < 5) != (sz == 0)) continue;  // each of the two writes half of the sums
-        s.exchange[k * places + column.place] = {f[0][k / 3][k % 3], f[1][k / 3][k % 3],
-                                                 f[2][k / 3][k % 3], 0};
-      }
-    }
+  Walk walk{t, w, body, s, step};
+  walk.index = min(index, columns - 1);
+  walk.column = kSpecial ? column_of(t, w, block, body.cell_size, walk.index)
+                         : column_of(block, body.cell_size, walk.index);
+
+  // Puts what the columns' cells give to plane z together and to the nodes.
+  const auto finish_plane = [&](PlaneNumbers(&plane)[3], int z) {
+    float4* exchange = s.exchange + (step.two_planes && z % 2 != 0 ? 9 * w.plane_slots : 0);
+    if (warp_active) walk.give(plane, exchange, active);
     __syncthreads();
-    int i = static_cast<int>(threadIdx.x), place = 0;
+    int i = thread;
     if constexpr (kSpecial) {
       for (int j = 0; j < w.blocks; ++j) {
         const int4 b = j == 0 ? first : block_size(t, w.first_block + j);
-        if (z < b.z + 2) {
-          write_plane(b.x, b.y, s.exchange + place, places, -body.inv_cell_size,
-                      step.force + b.w + z * (b.x + 2) * (b.y + 2), i);
-        }
-        place += b.x * b.y;
+        const int slots = (b.x + 2) * (b.y + 2);
+        if (z < b.z + 2) sum_plane(slots, exchange, step.force + b.w + z * slots, i);
+        exchange += 9 * slots;
       }
     } else {
-      write_plane(block.nx, block.ny, s.exchange, places, -body.inv_cell_size,
-                  step.force + block.first_slot + z * column.plane, i);
+      const int slots = walk.column.plane;
+      sum_plane(slots, exchange, step.force + block.first_slot + z * slots, i);
     }
-    __syncthreads();
+    if (!step.two_planes) __syncthreads();
+  };
+
+  if (warp_active) walk.begin();
+#pragma unroll 1
+  for (int z = 0; z < nz; ++z) {
+    if (warp_active && (!kSpecial || z < walk.column.nz)) {
+      if (kPairs) {
+        walk.half(z);
+      } else {
+        walk.cell(z);
+      }
+    } else if (kSpecial) {
+      walk.rise();
+    }
+    finish_plane(walk.now, z);
   }
+  finish_plane(walk.next, nz);
+  finish_plane(walk.after, nz + 1);
 }
 
 }  // namespace tissue_sim

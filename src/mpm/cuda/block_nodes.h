@@ -21,15 +21,6 @@ __device__ __forceinline__ uint4 more_parts(const CudaTables& t, std::uint32_t s
           count > 6 ? __ldg(part + 2) : 0, count > 7 ? __ldg(part + 3) : 0};
 }
 
-/// The first four slots that share a node, or the slot itself alone.
-__device__ __forceinline__ uint4 first_parts(const CudaTables& t, std::uint32_t slot,
-                                             std::uint32_t shared) {
-  if (shared == 0) return {slot, 0, 0, 0};
-  const std::uint32_t *part = t.parts + (shared >> 6), count = shared & 63u;
-  return {__ldg(part), __ldg(part + 1), count > 2 ? __ldg(part + 2) : 0,
-          count > 3 ? __ldg(part + 3) : 0};
-}
-
 __device__ __forceinline__ void fill_cache(const CudaTables& t, int first_slot, int slots,
                                            const SlotCache& cache) {
   for (int i = static_cast<int>(threadIdx.x); i < slots; i += static_cast<int>(blockDim.x)) {
@@ -37,7 +28,7 @@ __device__ __forceinline__ void fill_cache(const CudaTables& t, int first_slot, 
     const std::uint32_t shared = t.slot_parts[slot] & ~kPushed;
     cache.node[i] = t.slot_node[slot];
     cache.shared[i] = t.slot_parts[slot];
-    cache.parts[i] = first_parts(t, slot, shared);
+    cache.parts[i] = t.first_parts[slot];
     if (cache.more != nullptr) cache.more[i] = more_parts(t, shared);
   }
 }
@@ -74,78 +65,104 @@ __device__ __forceinline__ void add(const float4& p, float4& f) {
   f.z += p.z;
 }
 
+/// What the tables say of a slot. Without kMove only its node is needed.
+template <bool kMove>
+struct SlotEntry {
+  std::int32_t node;
+  std::uint32_t shared;
+  uint4 parts;
+
+  __device__ __forceinline__ void load(const CudaTables& t, int slot) {
+    node = __ldg(t.slot_node + slot);
+    shared = kMove ? __ldg(t.slot_parts + slot) : 0;
+    if (kMove) parts = __ldg(t.first_parts + slot);
+  }
+  __device__ __forceinline__ void load(const SlotCache& cache, int local) {
+    node = cache.node[local];
+    shared = kMove ? cache.shared[local] : 0;
+    if (kMove) parts = cache.parts[local];
+  }
+};
+
 /// Brings the nodes of `count` slots into `u` and, where `v` is not null, `v` (divided by the cell
 /// size, so that stencils give gradients). With `kMove` it first moves them on by the forces of the
 /// last substep, summed in the order of the slots; every block that has a node computes the same,
-/// and the one that owns it writes it down. Each thread has several nodes in hand, for all their
-/// loads to be under way at once. `pushed` is read with kFaces alone.
-template <bool kMove, bool kCached, bool kFaces = false>
+/// and the one that owns it writes it down. Each thread has kHand nodes in hand, for all their
+/// loads to be under way at once; what the tables say of the next ones comes meanwhile. `pushed` is
+/// read with kFaces alone.
+template <bool kMove, bool kCached, int kHand, bool kFaces = false>
 __device__ __forceinline__ void bring_nodes(const CudaTables& t, int first_slot, int count,
                                             const SlotCache& cache, const CudaNodes& from,
                                             const CudaNodes& to, const float4* force,
                                             const NodeStep& step, float scale, float4* u_out,
                                             float4* v_out, const PushedNodes& pushed = {}) {
-  constexpr int kHand = kCached ? 2 : 4;
   const int threads = static_cast<int>(blockDim.x);
+  SlotEntry<kMove> coming[kHand];
+  const auto load_entries = [&](int i) {
+#pragma unroll
+    for (int k = 0; k < kHand; ++k) {
+      const int local = min(i + k * threads, count - 1);
+      if (kCached) {
+        coming[k].load(cache, local);
+      } else {
+        coming[k].load(t, first_slot + local);
+      }
+    }
+  };
+  if (!kCached) load_entries(static_cast<int>(threadIdx.x));
   for (int i = static_cast<int>(threadIdx.x); i < count; i += kHand * threads) {
-    std::int32_t entry[kHand], node[kHand];
+    if (kCached) load_entries(i);
+    std::int32_t node[kHand];
     std::uint32_t shared[kHand];
-    uint4 parts[kHand];
-    float4 u[kHand], v[kHand], f[kHand];
+    bool owned[kHand];
+    float4 u[kHand], v[kHand], f[kHand], more[kHand][7] = {};
+    uint4 next_parts[kHand];
     Pushed push[kHand];
 #pragma unroll
     for (int k = 0; k < kHand; ++k) {
-      const int local = min(i + k * threads, count - 1), slot = first_slot + local;
-      entry[k] = kCached ? cache.node[local] : __ldg(t.slot_node + slot);
-      shared[k] = !kMove ? 0 : kCached ? cache.shared[local] : __ldg(t.slot_parts + slot);
-      if (kMove && kCached) parts[k] = cache.parts[local];
-    }
-#pragma unroll
-    for (int k = 0; k < kHand; ++k) {
-      node[k] = entry[k] < 0 ? ~entry[k] : entry[k];
+      owned[k] = coming[k].node >= 0;
+      node[k] = owned[k] ? coming[k].node : ~coming[k].node;
+      shared[k] = coming[k].shared;
       u[k] = __ldcg(from.u + node[k]);
       if (kMove || v_out != nullptr) v[k] = __ldcg(from.v + node[k]);
       if (!kMove) continue;
       if (kFaces) {
-        const bool marked = (shared[k] & kPushed) != 0;
-        push[k] = Pushed(pushed, marked, entry[k] >= 0, node[k]);
+        push[k] = Pushed(pushed, (shared[k] & kPushed) != 0, owned[k], node[k]);
         shared[k] &= ~kPushed;
       }
-      if (!kCached) {
-        parts[k] = first_parts(t, first_slot + min(i + k * threads, count - 1), shared[k]);
-      }
-      f[k] = __ldcg(force + parts[k].x);
+      f[k] = __ldcg(force + coming[k].parts.x);
       const std::uint32_t part_count = shared[k] & 63u;
-      float4 more[kCached ? 7 : 3] = {};
-      if (part_count > 1) more[0] = __ldcg(force + parts[k].y);
-      if (part_count > 2) more[1] = __ldcg(force + parts[k].z);
-      if (part_count > 3) more[2] = __ldcg(force + parts[k].w);
-      if constexpr (kCached) {
-        if (cache.more != nullptr && part_count > 4) {
-          const uint4 next = cache.more[min(i + k * threads, count - 1)];
-          more[3] = __ldcg(force + next.x);
-          if (part_count > 5) more[4] = __ldcg(force + next.y);
-          if (part_count > 6) more[5] = __ldcg(force + next.z);
-          if (part_count > 7) more[6] = __ldcg(force + next.w);
-        }
-      }
-      for (const float4& p : more) add(p, f[k]);
+      if (part_count > 1) more[k][0] = __ldcg(force + coming[k].parts.y);
+      if (part_count > 2) more[k][1] = __ldcg(force + coming[k].parts.z);
+      if (part_count > 3) more[k][2] = __ldcg(force + coming[k].parts.w);
+      next_parts[k] = kCached && cache.more != nullptr ? cache.more[min(i + k * threads, count - 1)]
+                                                       : more_parts(t, shared[k]);
+    }
+    if (!kCached) load_entries(i + kHand * threads);
+#pragma unroll
+    for (int k = 0; kMove && k < kHand; ++k) {
+      const std::uint32_t part_count = shared[k] & 63u;
+      if (part_count > 4) more[k][3] = __ldcg(force + next_parts[k].x);
+      if (part_count > 5) more[k][4] = __ldcg(force + next_parts[k].y);
+      if (part_count > 6) more[k][5] = __ldcg(force + next_parts[k].z);
+      if (part_count > 7) more[k][6] = __ldcg(force + next_parts[k].w);
     }
 #pragma unroll
     for (int k = 0; k < kHand; ++k) {
       const int at = i + k * threads;
       if (at >= count) break;
       if (kMove) {
+        for (const float4& p : more[k]) add(p, f[k]);
         const int part_count = static_cast<int>(shared[k] & 63u);
 #pragma unroll 4
-        for (int p = kCached && cache.more != nullptr ? 8 : 4; p < part_count; ++p) {
+        for (int p = 8; p < part_count; ++p) {
           add(__ldcg(force + __ldg(t.parts + (shared[k] >> 6) + p)), f[k]);
         }
         if (kFaces) add({push[k].of(0), push[k].of(1), push[k].of(2), 0}, f[k]);
         step.move(0, f[k].x, u[k].w, v[k].w, u[k].x, v[k].x);
         step.move(1, f[k].y, u[k].w, v[k].w, u[k].y, v[k].y);
         step.move(2, f[k].z, u[k].w, v[k].w, u[k].z, v[k].z);
-        if (entry[k] >= 0) {
+        if (owned[k]) {
           __stcg(to.u + node[k], u[k]);
           __stcg(to.v + node[k], v[k]);
         }
@@ -167,7 +184,7 @@ __device__ __forceinline__ CudaColumn column_of(const CudaBlock& b, float cell_s
   c.lane = b.first_lane + index;
   c.step = b.nx * b.ny;
   c.cell = b.first_lane / 8 + index;
-  c.place = index;
+  c.plane_slot = c.slot;
   c.middle[0] = b.origin[0] + cell_size * static_cast<float>(x + 1);
   c.middle[1] = b.origin[1] + cell_size * static_cast<float>(y + 1);
   c.middle[2] = b.origin[2] + cell_size;
@@ -178,7 +195,9 @@ __device__ __forceinline__ CudaColumn column_of(const CudaBlock& b, float cell_s
 __device__ __forceinline__ CudaColumn column_of(const CudaTables& t, const CudaBundle& w,
                                                 const CudaBlock& block, float cell_size,
                                                 int index) {
-  if (w.blocks == 1 && w.columns == w.places) return column_of(block, cell_size, index);
+  if (w.blocks == 1 && w.columns == block.nx * block.ny) {
+    return column_of(block, cell_size, index);
+  }
   return t.columns[w.first_column + index];
 }
 

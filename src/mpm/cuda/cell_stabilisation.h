@@ -3,8 +3,7 @@
 
 #include <utility>
 
-#include "mpm/cuda/half_cell.h"
-#include "mpm/stabilisation.h"
+#include "mpm/cuda/node_plane.h"
 
 namespace tissue_sim {
 
@@ -47,37 +46,70 @@ __device__ inline float stabilising_energy2(const float4* node, int pitch, int p
   return stiffness * numbers_energy2(std::make_integer_sequence<int, kXyCount>(), q);
 }
 
-/// One x-y quantity's value and slope on the half's plane of points to what gives back to them. The
-/// neighbouring thread has the other half: along z, w+ and w- are A +- d/8, s+ and s- d/2 +- B/4.
+/// Adds what one x-y quantity's value `w` and slope `s` on the half's plane of points give back to
+/// them. The neighbouring thread has the other half: along z, w+ and w- are A +- d/8, s+ and s- d/2
+/// +- B/4.
 template <int kQuantity>
-__device__ __forceinline__ void stabilise_number(float stiffness, unsigned pair, float w, float s,
+__device__ __forceinline__ void stabilise_number(float stiffness, float side, float w, float s,
                                                  float& to_w, float& to_s) {
+  constexpr int kX = stabilisation::kKinds[kQuantity][0], kY = stabilisation::kKinds[kQuantity][1];
+  constexpr float kRead = read_scale((kX == 0 ? 1 : 0) + (kY == 0 ? 1 : 0)),
+                  kGive = give_scale(kX, kY);
   constexpr float kA = 0.25f * stabilisation::weight2(kQuantity, 0),
                   kD = 16.0f * stabilisation::weight2(kQuantity, 1),
                   kB = 4.0f * stabilisation::weight2(kQuantity, 2);
+  const unsigned pair = 3u << (threadIdx.x & 30u);
+  // Slopes were read by -side / 2, and the other half's side is the other one.
   const float other_s = __shfl_xor_sync(pair, s, 1);
-  to_s = stiffness * kB * (s - other_s);
+  to_s += stiffness * side * (-2.0f * kB * kRead / kAverageCenter / kGive) * (s + other_s);
   if (kA + kD == 0) return;
   const float other_w = __shfl_xor_sync(pair, w, 1);
-  to_w = stiffness * ((kA + kD) * w + (kA - kD) * other_w);
+  to_w += stiffness * (kRead / kGive) * ((kA + kD) * w + (kA - kD) * other_w);
 }
 
 /// What stabilises the cell, of the half that the thread has; the neighbouring thread does the
-/// other. `stiffness` is kStabilisation mu V. Sets all numbers of `out` and `bends_out`.
-__device__ __forceinline__ void stabilise_half(float stiffness, const HalfPlane& h,
+/// other. `stiffness` is -kStabilisation mu V / cell size. Adds to `out`, sets `bends_out`.
+__device__ __forceinline__ void stabilise_half(float stiffness, float side, const HalfPlane& h,
                                                const HalfBends& b, HalfPlane& out,
                                                HalfBends& bends_out) {
-  const unsigned pair = 3u << (threadIdx.x & 30u);
-  out.wAA = 0;
-  stabilise_number<kAA>(stiffness, pair, h.wAA, h.sAA, out.wAA, out.sAA);
-  stabilise_number<kAd>(stiffness, pair, h.wAd, h.sAd, out.wAd, out.sAd);
-  stabilise_number<kdA>(stiffness, pair, h.wdA, h.sdA, out.wdA, out.sdA);
-  stabilise_number<kdd>(stiffness, pair, h.wdd, h.sdd, out.wdd, out.sdd);
-  stabilise_number<kAB>(stiffness, pair, h.wAB, b.sAB, out.wAB, bends_out.sAB);
-  stabilise_number<kdB>(stiffness, pair, h.wdB, b.sdB, out.wdB, bends_out.sdB);
-  stabilise_number<kBA>(stiffness, pair, h.wBA, b.sBA, out.wBA, bends_out.sBA);
-  stabilise_number<kBd>(stiffness, pair, h.wBd, b.sBd, out.wBd, bends_out.sBd);
-  stabilise_number<kBB>(stiffness, pair, b.wBB, b.sBB, bends_out.wBB, bends_out.sBB);
+  bends_out = {};
+  stabilise_number<kAA>(stiffness, side, h.wAA, h.sAA, out.wAA, out.sAA);
+  stabilise_number<kAd>(stiffness, side, h.wAd, h.sAd, out.wAd, out.sAd);
+  stabilise_number<kdA>(stiffness, side, h.wdA, h.sdA, out.wdA, out.sdA);
+  stabilise_number<kdd>(stiffness, side, h.wdd, h.sdd, out.wdd, out.sdd);
+  stabilise_number<kAB>(stiffness, side, h.wAB, b.sAB, out.wAB, bends_out.sAB);
+  stabilise_number<kdB>(stiffness, side, h.wdB, b.sdB, out.wdB, bends_out.sdB);
+  stabilise_number<kBA>(stiffness, side, h.wBA, b.sBA, out.wBA, bends_out.sBA);
+  stabilise_number<kBd>(stiffness, side, h.wBd, b.sBd, out.wBd, bends_out.sBd);
+  stabilise_number<kBB>(stiffness, side, b.wBB, b.sBB, bends_out.wBB, bends_out.sBB);
+}
+
+/// Adds what stabilises one x-y quantity to what its three planes get.
+template <int kQuantity>
+__device__ __forceinline__ void stabilise_planes(float stiffness, const PlaneNumbers& below,
+                                                 const PlaneNumbers& center,
+                                                 const PlaneNumbers& above, PlaneNumbers& to_below,
+                                                 PlaneNumbers& to_center, PlaneNumbers& to_above) {
+  constexpr int kX = stabilisation::kKinds[kQuantity][0], kY = stabilisation::kKinds[kQuantity][1];
+  constexpr float kScale =
+      read_scale((kX == 0 ? 1 : 0) + (kY == 0 ? 1 : 0)) / kAverageCenter / give_scale(kX, kY);
+  const Line<float> l(below[kQuantity], center[kQuantity], above[kQuantity]);
+  float A = stiffness * (kScale * stabilisation::weight2(kQuantity, 0)) * l.A;
+  float d = stiffness * (kScale * stabilisation::weight2(kQuantity, 1)) * l.d;
+  float B = stiffness * (kScale * stabilisation::weight2(kQuantity, 2)) * l.B;
+  from_line(A, d, B);
+  to_below[kQuantity] += A;
+  to_center[kQuantity] += d;
+  to_above[kQuantity] += B;
+}
+template <int... kQuantities>
+__device__ __forceinline__ void stabilise_cell(std::integer_sequence<int, kQuantities...>,
+                                               float stiffness, const PlaneNumbers& below,
+                                               const PlaneNumbers& center,
+                                               const PlaneNumbers& above, PlaneNumbers& to_below,
+                                               PlaneNumbers& to_center, PlaneNumbers& to_above) {
+  (stabilise_planes<kQuantities>(stiffness, below, center, above, to_below, to_center, to_above),
+   ...);
 }
 
 }  // namespace tissue_sim

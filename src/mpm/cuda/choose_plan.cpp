@@ -17,11 +17,14 @@ int sharers(int n, int size) { return n <= size ? 1 : size == 1 ? 3 : 2; }
 
 /// Cycles of a substep as a small or as a large tissue (substeps.cu), 1e30 where that does not go.
 /// The figures are fitted to measurements on an H200: see docs/benchmarks_cuda.md.
-double cycles(const std::vector<LatticeBody>& bodies, const CudaShape& s, const CudaLimits& limits,
-              bool small) {
+double cycles(const std::vector<LatticeBody>& bodies, const CudaShape& s,
+              const CudaLimits& limits) {
   const BlockShape& b = s.blocks;
-  const double slots = (b.x + 2.0) * (b.y + 2) * (b.z + 2);
-  const double shared = (small ? 56 : 32) * slots + 144.0 * s.threads + 5800;
+  const bool pairs = s.small && s.pairs();
+  const double plane_slots = (b.x + 2.0) * (b.y + 2), slots = plane_slots * (b.z + 2);
+  // The exchange, or the lists of what tools touch (PushLists).
+  const double exchange = std::max(144 * plane_slots, 18.0 * b.x * b.y * b.z + 16);
+  const double shared = (s.small ? 56 : 32) * slots + exchange + 5800;
   if (shared > static_cast<double>(limits.shared_bytes)) return 1e30;
   double blocks = 0;
   int parts = 1;
@@ -30,18 +33,23 @@ double cycles(const std::vector<LatticeBody>& bodies, const CudaShape& s, const 
               parts_of(body.nz, b.z);
     parts = std::max(parts, sharers(body.nx, b.x) * sharers(body.ny, b.y) * sharers(body.nz, b.z));
   }
-  const int by_registers = (small ? 256 : 384) / s.threads;
+  const int by_registers = 256 / s.threads;
   const int by_shared = static_cast<int>(limits.shared_bytes / shared);
   const int each = std::max(1, std::min(by_registers, by_shared));
   const double waves = std::ceil(blocks / (each * limits.processors));
-  if (small && waves > 1) return 1e30;
+  if (s.small && waves > 1) return 1e30;
+  // Cuts add blocks, and with one thread a column there is no room to bundle them.
+  if (s.small && !pairs && 1.2 * blocks > each * limits.processors) return 1e30;
   const double together = std::min<double>(each, std::ceil(blocks / limits.processors));
-  const double warps = together * 2 * b.x * b.y / 32 / 4;  // that compute, on each scheduler
-  const double half = 1400 * std::max(2.2, 1.3 * warps), plane = 500 + 250 * warps;
+  // Warps that compute, on each scheduler.
+  const double warps = together * (pairs ? b.x * b.y / 16.0 : std::ceil(b.x * b.y / 32.0)) / 4;
+  const double cell = (pairs ? 1400 : 1950) * std::max(1.8, 1.3 * warps);
+  const double plane = 400 + 250 * warps;
   const double nodes =
-      std::ceil(slots / s.threads) * (small ? 250 + 120 * parts : 300 + 60 * together);
-  const double wave = nodes + half * b.z + plane * (b.z + 2);
-  return small ? wave + 3500 : 1.3 * waves * wave + 5000;
+      std::ceil(slots / s.threads) * (s.small ? 250 + 120 * parts : 300 + 60 * together);
+  const double wave = nodes + cell * b.z + plane * (b.z + 2);
+  // One thread a column makes contact and cuts dearer.
+  return s.small ? wave + (pairs ? 3500 : 5500) : 1.5 * waves * wave + 5000;
 }
 
 /// Columns of the block that hold points.
@@ -57,16 +65,29 @@ int columns_of(const Block& b) {
   return count;
 }
 
-CudaShape shape_from(const char* text) {
+/// Whether each column of cells must have two threads.
+bool wants_pairs(const std::vector<LatticeBody>& bodies) {
+  bool viscous = false, neo_hookean = false, fixed_corotated = false;
+  for (const LatticeBody& body : bodies) {
+    for (const Material& m : body.materials) {
+      viscous = viscous || m.viscosity > 0;
+      (m.law == Law::kNeoHookean ? neo_hookean : fixed_corotated) = true;
+    }
+  }
+  return viscous || (neo_hookean && fixed_corotated);
+}
+
+CudaShape shape_from(const char* text, bool pairs) {
   CudaShape s;
   BlockShape& b = s.blocks;
   int small = 0;
   if (std::sscanf(text, "%d %d %d %d %d", &b.x, &b.y, &b.z, &s.threads, &small) != 5 || b.x < 1 ||
       b.y < 1 || b.z < 1 || b.z > kMaxLayers || s.threads > kMaxCudaThreads ||
-      s.threads % 32 != 0 || 2 * b.x * b.y > s.threads) {
+      s.threads % 32 != 0 || b.x * b.y > s.threads || (pairs && !s.pairs())) {
     throw std::runtime_error(std::string("TISSUE_SIM_CUDA_SHAPE is '") + text +
                              "': it must be 'x y z threads small', threads a multiple of 32 up "
-                             "to 256 and at least 2 x y, z at most 16, small 0 or 1");
+                             "to 256 and at least x y (2 x y where there is viscosity or more than "
+                             "one law), z at most 16, small 0 or 1");
   }
   s.small = small != 0;
   return s;
@@ -75,21 +96,22 @@ CudaShape shape_from(const char* text) {
 }  // namespace
 
 CudaShape choose_shape(const std::vector<LatticeBody>& bodies, const CudaLimits& limits) {
-  if (const char* text = std::getenv("TISSUE_SIM_CUDA_SHAPE")) return shape_from(text);
+  const bool pairs = wants_pairs(bodies);
+  if (const char* text = std::getenv("TISSUE_SIM_CUDA_SHAPE")) return shape_from(text, pairs);
   CudaShape best;
   best.blocks = {4, 4, 4};
   double least = 1e30;
   for (const bool small : {true, false}) {
     for (const int threads : {64, 96, 128, 192, 256}) {
-      if (!small && threads > 192) continue;
-      for (int x = threads / 2; x > 0; --x) {  // of equals, the longest along x
-        for (int y = 1; y <= threads / 2 / x; ++y) {
+      for (int x = threads; x > 0; --x) {  // of equals, the longest along x
+        for (int y = 1; y <= threads / x; ++y) {
           for (int z = 1; z <= kMaxLayers; ++z) {
             CudaShape s;
             s.blocks = {x, y, z};
             s.threads = threads;
             s.small = small;
-            const double c = cycles(bodies, s, limits, small);
+            if (pairs && !s.pairs()) continue;
+            const double c = cycles(bodies, s, limits);
             if (c < least) {
               least = c;
               best = s;
@@ -102,9 +124,17 @@ CudaShape choose_shape(const std::vector<LatticeBody>& bodies, const CudaLimits&
   return best;
 }
 
-std::vector<std::vector<int>> single_blocks(std::size_t count) {
-  std::vector<std::vector<int>> bundles(count);
-  for (std::size_t i = 0; i < count; ++i) bundles[i] = {static_cast<int>(i)};
+std::vector<std::vector<int>> single_blocks(const std::vector<Block*>& blocks, std::size_t at_once,
+                                            Cpu& cpu) {
+  std::vector<std::vector<int>> bundles(blocks.size());
+  for (std::size_t i = 0; i < blocks.size(); ++i) bundles[i] = {static_cast<int>(i)};
+  if (blocks.size() <= at_once) return bundles;
+  std::vector<int> columns(blocks.size());
+  cpu.for_each(static_cast<int>(blocks.size()),
+               [&](int i) { columns[i] = columns_of(*blocks[i]); });
+  std::stable_sort(bundles.begin(), bundles.end(),
+                   [&](const auto& a, const auto& b) { return columns[a[0]] > columns[b[0]]; });
+  std::reverse(bundles.begin(), bundles.begin() + static_cast<std::ptrdiff_t>(at_once));
   return bundles;
 }
 
@@ -120,7 +150,7 @@ std::vector<std::vector<int>> bundle_blocks(const std::vector<Block*>& blocks, s
     const Block& b = *blocks[i];
     single[i] = {b.body,
                  b.material,
-                 {columns_of(b), b.nx * b.ny, (b.nx + 2) * (b.ny + 2) * (b.nz + 2)},
+                 {columns_of(b), (b.nx + 2) * (b.ny + 2), (b.nx + 2) * (b.ny + 2) * (b.nz + 2)},
                  {i}};
   });
   std::stable_sort(single.begin(), single.end(),
@@ -132,7 +162,7 @@ std::vector<std::vector<int>> bundle_blocks(const std::vector<Block*>& blocks, s
       for (Filled& f : bundles) {
         const bool fits = f.body == one.body && f.material == one.material &&
                           f.has.columns + one.has.columns <= limits.columns &&
-                          f.has.places + one.has.places <= limits.places &&
+                          f.has.plane_slots + one.has.plane_slots <= limits.plane_slots &&
                           f.has.slots + one.has.slots <= limits.slots;
         if (fits && (room == nullptr || f.has.columns < room->has.columns)) room = &f;
       }
@@ -142,7 +172,7 @@ std::vector<std::vector<int>> bundle_blocks(const std::vector<Block*>& blocks, s
       continue;
     }
     room->has.columns += one.has.columns;
-    room->has.places += one.has.places;
+    room->has.plane_slots += one.has.plane_slots;
     room->has.slots += one.has.slots;
     room->blocks.push_back(one.blocks.front());
   }

@@ -12,6 +12,9 @@ struct CudaShape {
   BlockShape blocks;
   int threads = 64;   ///< see CudaPlan
   bool small = true;  ///< the same
+  /// CudaPlan::pairs, and the columns that a thread block can have.
+  bool pairs() const { return 2 * blocks.x * blocks.y <= threads; }
+  int columns() const { return pairs() ? threads / 2 : threads; }
 };
 
 /// What the choice needs to know of a GPU.
@@ -26,13 +29,15 @@ CudaShape choose_shape(const std::vector<LatticeBody>& bodies, const CudaLimits&
 
 /// What the blocks that share a thread block may have together.
 struct BundleLimits {
-  int columns;  ///< that hold points
-  int places;   ///< CudaBundle::places
+  int columns;      ///< that hold points
+  int plane_slots;  ///< of one plane of nodes
   int slots;
 };
 
-/// Each block alone: indices into Blocks::all.
-std::vector<std::vector<int>> single_blocks(std::size_t count);
+/// Each block alone: indices into Blocks::all. Where more than run at once, the smallest come last,
+/// and to the thread blocks that have the smallest of the others.
+std::vector<std::vector<int>> single_blocks(const std::vector<Block*>& blocks, std::size_t at_once,
+                                            Cpu& cpu);
 
 /// Bundles, up to `wanted` of them: large blocks first, each of the others with those that have the
 /// fewest columns. Gives indices into `blocks`; more than `wanted` bundles where they do not fit

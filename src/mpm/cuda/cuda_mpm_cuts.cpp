@@ -14,9 +14,9 @@ std::size_t bytes_of(const HostTables& t, std::size_t nodes, std::size_t points,
                      int held_by) {
   return t.blocks.size() * (sizeof(CudaBlock) + sizeof(CudaMeasure) + 4) +
          t.bundles.size() * sizeof(CudaBundle) + t.columns.size() * sizeof(CudaColumn) +
-         t.slot_node.size() * (8 + 2 * sizeof(float4)) + 4 * t.parts.size() + 8 * t.point.size() +
-         4 * t.partial.size() + 4 * sizeof(float4) * nodes + (1 + 13 * held_by) * points +
-         pushes * sizeof(HalfPush);
+         t.slot_node.size() * (8 + sizeof(uint4) + 2 * sizeof(float4)) + 4 * t.parts.size() +
+         8 * t.point.size() + 4 * t.partial.size() + 4 * sizeof(float4) * nodes +
+         (1 + 13 * held_by) * points + pushes * sizeof(HalfPush);
 }
 
 /// Says how much memory the tissue takes, where the GPU has less.
@@ -36,11 +36,11 @@ std::size_t CudaMpmTissue::device_bytes() const {
   const OnDevice& d = *device_;
   std::size_t sum = d.blocks.bytes() + d.bundles.bytes() + d.columns.bytes() + d.pushes.bytes() +
                     d.bodies.bytes() + d.slot_node.bytes() + d.point.bytes() + d.piece.bytes() +
-                    d.place.bytes() + d.slot_parts.bytes() + d.parts.bytes() + d.near.bytes() +
-                    d.colour.bytes() + d.volume.bytes() + d.partial.bytes() + d.hold.bytes() +
-                    d.bonds.bytes() + d.with.bytes() + d.whole.bytes() + d.u_before.bytes() +
-                    d.colliders.bytes() + d.loads.bytes() + d.measures.bytes() + d.cloud.bytes() +
-                    d.stretched.bytes() + d.faces.bytes();
+                    d.place.bytes() + d.slot_parts.bytes() + d.first_parts.bytes() +
+                    d.parts.bytes() + d.near.bytes() + d.colour.bytes() + d.volume.bytes() +
+                    d.partial.bytes() + d.hold.bytes() + d.bonds.bytes() + d.with.bytes() +
+                    d.whole.bytes() + d.u_before.bytes() + d.colliders.bytes() + d.loads.bytes() +
+                    d.measures.bytes() + d.cloud.bytes() + d.stretched.bytes() + d.faces.bytes();
   for (int i = 0; i < 2; ++i) sum += d.u[i].bytes() + d.v[i].bytes() + d.force[i].bytes();
   return sum;
 }
@@ -64,10 +64,14 @@ void CudaMpmTissue::plan_tables() {
   OnDevice& d = *device_;
   d.plan.threads = d.shape.threads;
   d.plan.small = d.shape.small;
-  d.plan.max_slots = 0;
+  d.plan.pairs = d.shape.pairs();
+  d.plan.max_slots = d.plan.max_plane_slots = d.plan.max_halves = 0;
   const std::vector<Block*>& blocks = state_->blocks.all;
   for (const Block* b : blocks) {
-    d.plan.max_slots = std::max(d.plan.max_slots, (b->nx + 2) * (b->ny + 2) * (b->nz + 2));
+    const int plane = (b->nx + 2) * (b->ny + 2);
+    d.plan.max_slots = std::max(d.plan.max_slots, plane * (b->nz + 2));
+    d.plan.max_plane_slots = std::max(d.plan.max_plane_slots, plane);
+    d.plan.max_halves = std::max(d.plan.max_halves, 2 * b->nx * b->ny * b->nz);
   }
   for (const LatticeBody& b : state_->bodies) {
     for (const Material& m : b.materials) {
@@ -87,7 +91,7 @@ void CudaMpmTissue::plan_tables() {
     d.face_resident = resident_blocks(d.face_plan, static_cast<int>(count));
   };
   choose(blocks.size());
-  std::vector<std::vector<int>> bundles = single_blocks(blocks.size());
+  std::vector<std::vector<int>> bundles;
   if (!(d.plan.cached && d.face_plan.cached)) {
     // As many as whole tissue has, or, of a small one, as run at once.
     const auto at_once = static_cast<std::size_t>(
@@ -95,16 +99,24 @@ void CudaMpmTissue::plan_tables() {
     const std::size_t rounds = (state_->blocks.regions.size() + at_once - 1) / at_once;
     const std::size_t wanted = d.plan.small ? at_once : rounds * at_once;
     if (blocks.size() > wanted) {
-      std::vector<std::vector<int>> fewer = bundle_blocks(
-          blocks, wanted, {d.plan.threads / 2, d.plan.threads, most_slots(d.face_plan)},
-          *state_->cpu);
-      if (fewer.size() <= wanted) bundles = std::move(fewer);
+      // Two halves of a block that was cut have a rim more.
+      d.face_plan.max_plane_slots = 3 * d.plan.max_plane_slots / 2;
+      const BundleLimits limits = {d.shape.columns(), d.face_plan.max_plane_slots,
+                                   most_slots(d.face_plan)};
+      bundles = bundle_blocks(blocks, wanted, limits, *state_->cpu);
     }
+    if (bundles.empty() || bundles.size() > wanted) {
+      bundles = single_blocks(blocks, d.plan.small ? at_once : blocks.size(), *state_->cpu);
+    }
+  } else {
+    bundles = single_blocks(blocks, blocks.size(), *state_->cpu);
   }
   HostTables& t = d.host_tables;
   make_tables(*state_, bundles, t);
   d.plan.max_slots = t.max_slots;
-  choose(bundles.size());
+  d.plan.max_plane_slots = t.max_plane_slots;
+  d.plan.max_halves = t.max_halves;
+  choose(t.bundles.size());
   d.all_plain = std::all_of(t.bundles.begin(), t.bundles.end(),
                             [](const CudaBundle& b) { return b.blocks == 1 && b.partial == 0; });
   if (d.resident == 0 || d.plain_resident == 0 || d.face_resident == 0) {
@@ -134,6 +146,7 @@ void CudaMpmTissue::push() {
   d.bodies.upload(t.bodies, d.stream);
   d.slot_node.upload(t.slot_node, d.stream);
   d.slot_parts.upload(t.slot_parts, d.stream);
+  d.first_parts.upload(t.first_parts, d.stream);
   d.parts.upload(t.parts, d.stream);
   d.volume.upload(t.volume, d.stream);
   d.partial.upload(t.partial, d.stream);

@@ -55,11 +55,9 @@ __device__ __forceinline__ PointState point_state(const CudaBlock& b, const Cuda
 #pragma unroll
   for (int c = 0; c < 3; ++c) {
     float low[3], high[3];
-    row_gradient(h[c], sy, low, high);
+    row_of_F(h[c], c, (s & 4) != 0 ? 1.0f : -1.0f, sy, low, high);
 #pragma unroll
-    for (int i = 0; i < 3; ++i) {
-      p.F[3 * c + i] = (sx < 0 ? low[i] : high[i]) + (i == c ? 1.0f : 0.0f);
-    }
+    for (int i = 0; i < 3; ++i) p.F[3 * c + i] = sx < 0 ? low[i] : high[i];
     p.x[c] += body.cell_size * point_value(h[c], sx, sy);
   }
   return p;
@@ -76,7 +74,7 @@ __device__ __forceinline__ void for_each_point(const CudaTables& t, const CudaBl
     const int sz = i / b.nx / b.ny % 2;
     HalfPlane h[3];
     const int first = z * plane + y * pitch + x;
-    read_half(u + first, pitch, plane, HalfWeights(sz == 0 ? -1.0f : 1.0f), h);
+    read_half(u + first, pitch, plane, sz == 0 ? -1.0f : 1.0f, h);
     for (int q = 0; q < 4; ++q) {
       const int lane = lane_of(b, x, y, z, 4 * sz + q);
       if (t.point[lane] >= 0) f(lane, 4 * sz + q, x, y, z, first, h);
@@ -112,8 +110,8 @@ __global__ void __launch_bounds__(kThreads)
   const CudaBlock& b = t.blocks[blockIdx.x];
   const CudaBody& body = t.bodies[b.body];
   float4 *u = shared, *v = shared + max_slots;
-  bring_nodes<false, false>(t, b.first_slot, b.slots(), {}, state, state, nullptr, {},
-                            body.inv_cell_size, u, v);
+  bring_nodes<false, false, 4>(t, b.first_slot, b.slots(), {}, state, state, nullptr, {},
+                               body.inv_cell_size, u, v);
   CudaMeasure m = {0, 0, {1e30f, 1e30f, 1e30f}, {-1e30f, -1e30f, -1e30f}, 0, 1, 1, 0};
   for (int i = threadIdx.x; i < b.slots(); i += blockDim.x) {
     const int node = t.slot_node[b.first_slot + i];
@@ -181,8 +179,8 @@ __global__ void __launch_bounds__(kThreads)
   extern __shared__ float4 shared[];
   const CudaBlock& b = t.blocks[blockIdx.x];
   const CudaBody& body = t.bodies[b.body];
-  bring_nodes<false, false>(t, b.first_slot, b.slots(), {}, state, state, nullptr, {},
-                            body.inv_cell_size, shared, nullptr);
+  bring_nodes<false, false, 4>(t, b.first_slot, b.slots(), {}, state, state, nullptr, {},
+                               body.inv_cell_size, shared, nullptr);
   __syncthreads();
   for_each_point(
       t, b, shared, [&](int lane, int s, int x, int y, int z, int, const HalfPlane(&h)[3]) {
@@ -220,8 +218,8 @@ __global__ void __launch_bounds__(kThreads)
   const CudaBlock& b = t.blocks[blockIdx.x];
   const CudaBody& body = t.bodies[b.body];
   if (body.tear_stretch == 0) return;
-  bring_nodes<false, false>(t, b.first_slot, b.slots(), {}, state, state, nullptr, {},
-                            body.inv_cell_size, shared, nullptr);
+  bring_nodes<false, false, 4>(t, b.first_slot, b.slots(), {}, state, state, nullptr, {},
+                               body.inv_cell_size, shared, nullptr);
   __syncthreads();
   const float s2 = body.tear_stretch * body.tear_stretch;
   for_each_point(t, b, shared,

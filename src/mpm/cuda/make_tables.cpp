@@ -107,9 +107,17 @@ void connect(std::size_t node_count, Cpu& cpu, HostTables& t) {
     is_owner[slot] = filled[n] == 0 ? 1 : 0;
     ++filled[n];
   });
-  for (std::size_t slot = 0; slot < slots; ++slot) {
-    if (is_owner[slot] == 0) t.slot_node[slot] = ~t.slot_node[slot];
-  }
+  t.first_parts.resize(slots);
+  cpu.for_each(
+      static_cast<int>(slots),
+      [&](int i) {
+        const std::uint32_t first = t.slot_parts[i] >> 6, count = t.slot_parts[i] & 63u;
+        const auto part = [&](std::uint32_t k) { return k < count ? t.parts[first + k] : 0u; };
+        t.first_parts[i] = {count == 0 ? static_cast<std::uint32_t>(i) : part(0), part(1), part(2),
+                            part(3)};
+        if (is_owner[i] == 0) t.slot_node[i] = ~t.slot_node[i];
+      },
+      4096);
 }
 
 /// The columns of the block that hold points, as if it were alone in its bundle.
@@ -129,7 +137,7 @@ std::vector<CudaColumn> columns_of(const CudaBlock& b, float cell_size, const Ho
     c.lane = b.first_lane + i;
     c.step = step;
     c.cell = b.first_lane / 8 + i;
-    c.place = i;
+    c.plane_slot = c.slot;
     c.middle[0] = b.origin[0] + cell_size * static_cast<float>(x + 1);
     c.middle[1] = b.origin[1] + cell_size * static_cast<float>(y + 1);
     c.middle[2] = b.origin[2] + cell_size;
@@ -198,16 +206,17 @@ void add_bundle(int first_block, int blocks, std::vector<std::vector<CudaColumn>
     const CudaBlock& b = t.blocks[i];
     for (CudaColumn& c : columns[i]) {
       c.slot += b.first_slot - bundle.first_slot;
-      c.place += bundle.places;
+      c.plane_slot += bundle.plane_slots;
       t.columns.push_back(c);
     }
     bundle.slots += b.slots();
-    bundle.places += b.nx * b.ny;
+    bundle.plane_slots += (b.nx + 2) * (b.ny + 2);
     bundle.nz = std::max(bundle.nz, b.nz);
     bundle.partial = bundle.partial | b.partial;
   }
   bundle.columns = static_cast<int>(t.columns.size()) - bundle.first_column;
   t.max_slots = std::max(t.max_slots, bundle.slots);
+  t.max_plane_slots = std::max(t.max_plane_slots, bundle.plane_slots);
   t.max_halves = std::max(t.max_halves, 2 * bundle.columns * bundle.nz);
   t.bundles.push_back(bundle);
 }
@@ -237,7 +246,7 @@ void make_tables(const MpmState& state, const std::vector<std::vector<int>>& bun
   });
   t.bundles.clear();
   t.columns.clear();
-  t.max_slots = t.max_halves = 0;
+  t.max_slots = t.max_plane_slots = t.max_halves = 0;
   int first = 0;
   for (const std::vector<int>& blocks : bundles) {
     add_bundle(first, static_cast<int>(blocks.size()), columns, t);

@@ -30,6 +30,7 @@ struct CudaMpmTissue::OnDevice {
   DeviceArray<CudaBody> bodies;
   DeviceArray<std::int32_t> slot_node, point, piece, place;
   DeviceArray<std::uint32_t> slot_parts, parts, near, colour;
+  DeviceArray<uint4> first_parts;
   DeviceArray<float> volume, partial, hold;
   DeviceArray<std::uint8_t> bonds, with, whole;
   int held_by = 0;  ///< CudaTables::held_by
@@ -65,6 +66,7 @@ struct CudaMpmTissue::OnDevice {
     t.bundle_count = static_cast<int>(bundles.size());
     t.slot_node = slot_node.data();
     t.slot_parts = slot_parts.data();
+    t.first_parts = first_parts.data();
     t.parts = parts.data();
     t.volume = volume.data();
     t.point = point.data();

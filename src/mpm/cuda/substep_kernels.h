@@ -9,20 +9,6 @@
 namespace tissue_sim {
 namespace {
 
-/// The shared memory of a thread block. Worked out anew where it is needed, so that the compiler
-/// knows it for shared memory and can use its faster loads.
-__device__ __forceinline__ BlockShared shared_of(int max_slots) {
-  extern __shared__ float4 shared[];
-  BlockShared s;
-  s.u = shared;
-  s.v = s.u + max_slots;
-  s.exchange = s.v + max_slots;
-  s.loads = reinterpret_cast<unsigned long long*>(s.exchange + 9 * blockDim.x);
-  s.colliders = reinterpret_cast<Collider*>(s.loads + 6 * kMaxColliders);
-  s.rounds = reinterpret_cast<FaceRounds*>(s.colliders + kMaxColliders);
-  return s;
-}
-
 /// Which laws a kernel can do; one that can do all has to hold more registers.
 enum class Laws { kFixedCorotated, kNeoHookean, kAny };
 
@@ -30,28 +16,48 @@ enum class Laws { kFixedCorotated, kNeoHookean, kAny };
 /// or all.
 enum class Can { kPlain, kTools, kFaces };
 
-template <Laws kLaws, bool kSpecial, bool kPartial>
+/// Whether a kernel never needs velocities in shared memory.
+constexpr bool no_velocities(Laws laws, Can can) {
+  return can == Can::kPlain && laws != Laws::kAny;
+}
+
+/// The shared memory of a thread block. Worked out anew where it is needed, so that the compiler
+/// knows it for shared memory and can use its faster loads.
+template <bool kVelocities>
+__device__ __forceinline__ BlockShared shared_of(const CudaLayout& layout) {
+  extern __shared__ float4 shared[];
+  BlockShared s;
+  s.u = shared;
+  s.v = s.u + (kVelocities ? layout.max_slots : 0);
+  s.exchange = s.v + layout.max_slots;
+  s.loads = reinterpret_cast<unsigned long long*>(s.exchange + layout.exchange);
+  s.colliders = reinterpret_cast<Collider*>(s.loads + 6 * kMaxColliders);
+  s.rounds = reinterpret_cast<FaceRounds*>(s.colliders + kMaxColliders);
+  return s;
+}
+
+template <Laws kLaws, bool kPairs, bool kSpecial, bool kPartial>
 __device__ __forceinline__ void forces(const CudaTables& t, const CudaBundle& w, const CudaBlock& b,
                                        const CudaBody& body, const BlockShared& s,
                                        const BlockStep& step) {
   if constexpr (kLaws == Laws::kFixedCorotated) {
-    block_forces<FixedCorotated, false, kSpecial, kPartial>(t, w, b, body, s, step);
+    block_forces<FixedCorotated, false, kSpecial, kPartial, kPairs>(t, w, b, body, s, step);
   } else if constexpr (kLaws == Laws::kNeoHookean) {
-    block_forces<NeoHookean, false, kSpecial, kPartial>(t, w, b, body, s, step);
+    block_forces<NeoHookean, false, kSpecial, kPartial, kPairs>(t, w, b, body, s, step);
   } else if (body.neo_hookean != 0) {
-    block_forces<NeoHookean, true, kSpecial, kPartial>(t, w, b, body, s, step);
+    block_forces<NeoHookean, true, kSpecial, kPartial, kPairs>(t, w, b, body, s, step);
   } else {
-    block_forces<FixedCorotated, true, kSpecial, kPartial>(t, w, b, body, s, step);
+    block_forces<FixedCorotated, true, kSpecial, kPartial, kPairs>(t, w, b, body, s, step);
   }
 }
 
 /// Out of line and with copies of its arguments, for the ordinary blocks to keep theirs in
 /// registers.
-template <Laws kLaws, bool kPartial>
+template <Laws kLaws, bool kPairs, bool kPartial>
 __device__ __noinline__ void special_forces(const CudaTables t, const CudaBundle w,
                                             const CudaBlock block, const CudaBody body,
-                                            int max_slots, const BlockStep step) {
-  forces<kLaws, true, kPartial>(t, w, block, body, shared_of(max_slots), step);
+                                            const CudaLayout layout, const BlockStep step) {
+  forces<kLaws, kPairs, true, kPartial>(t, w, block, body, shared_of<true>(layout), step);
 }
 
 /// A bundle with what belongs to it. Copies: through a reference they would be read again after
@@ -94,15 +100,19 @@ struct ColliderCopy {
   }
 };
 
-/// Forces of a bundle whose nodes are there, on its points and between them and the colliders.
-template <Laws kLaws, bool kPlain>
+/// Forces of a bundle whose nodes are there, on its points and between them and the colliders. The
+/// exchange is `clear` where the thread block has had no other bundle.
+template <Laws kLaws, Can kCan, bool kPairs>
 __device__ __forceinline__ void all_forces(const CudaTables& t, const CudaFrame& f,
-                                           const BundleAtWork& w, int substep, int max_slots,
-                                           float4* force) {
-  const BlockShared s = shared_of(max_slots);
-  if constexpr (kPlain) {
+                                           const BundleAtWork& w, int substep,
+                                           const CudaLayout& layout, bool clear, float4* force) {
+  const BlockShared s = shared_of<!no_velocities(kLaws, kCan)>(layout);
+  const int plane_slots = w.bundle.plane_slots;
+  if (!clear) clear_exchange(s.exchange, plane_slots, layout.two_planes);
+  if constexpr (kCan == Can::kPlain) {
     __syncthreads();
-    forces<kLaws, false, false>(t, w.bundle, w.block, w.body, s, {nullptr, 0, force});
+    forces<kLaws, kPairs, false, false>(t, w.bundle, w.block, w.body, s,
+                                        {nullptr, {}, force, layout.two_planes});
     return;
   }
   const int load_count = 6 * f.collider_count;
@@ -111,20 +121,22 @@ __device__ __forceinline__ void all_forces(const CudaTables& t, const CudaFrame&
   }
   __syncthreads();
   HalfPush* pushes = f.pushes + blockIdx.x * f.push_stride;
-  Touched touched = {0, false};
+  Touched touched = {};
   if (w.near != 0) {
     touched = find_pushes(t, w.bundle, w.block, w.body, s.u, s.v, s.exchange, s.colliders, w.near,
-                          s.loads, pushes);
+                          s.loads, pushes, static_cast<int>(threadIdx.x) / (kPairs ? 2 : 1));
+    clear_exchange(s.exchange, plane_slots, layout.two_planes);
+    __syncthreads();
   }
-  const BlockStep step{pushes, touched.halves, force};
+  const BlockStep step{pushes, touched, force, layout.two_planes};
   if (!touched.any && w.bundle.partial == 0 && w.bundle.blocks == 1) {
-    forces<kLaws, false, false>(t, w.bundle, w.block, w.body, s, step);
+    forces<kLaws, kPairs, false, false>(t, w.bundle, w.block, w.body, s, step);
     return;
   }
   if (w.bundle.partial != 0) {
-    special_forces<kLaws, true>(t, w.bundle, w.block, w.body, max_slots, step);
+    special_forces<kLaws, kPairs, true>(t, w.bundle, w.block, w.body, layout, step);
   } else {
-    special_forces<kLaws, false>(t, w.bundle, w.block, w.body, max_slots, step);
+    special_forces<kLaws, kPairs, false>(t, w.bundle, w.block, w.body, layout, step);
   }
   if (!touched.any) return;
   auto* loads = reinterpret_cast<unsigned long long*>(f.loads) + substep * load_count;
@@ -145,12 +157,14 @@ __device__ __forceinline__ PushedNodes pushed_nodes(const CudaFaces& f, int roun
 /// State and forces change places between two buffers. With kFaces, the thread block arrives at the
 /// second barrier when its last block's nodes are in place, so that the forces hide the wait for
 /// the others.
-template <Laws kLaws, bool kCached, Can kCan>
+template <Laws kLaws, bool kCached, bool kPairs, Can kCan>
 __device__ __forceinline__ void block_round(const CudaTables& t, const CudaFrame& f,
-                                            const BundleAtWork& w, int round, int max_slots,
-                                            const SlotCache& cache, bool last) {
+                                            const BundleAtWork& w, int round,
+                                            const CudaLayout& layout, const SlotCache& cache,
+                                            bool last) {
   constexpr bool kFaces = kCan == Can::kFaces, kPlain = kCan == Can::kPlain;
-  const BlockShared s = shared_of(max_slots);
+  constexpr int kHand = kCached && (kPairs || !kPlain) ? 2 : 4;  // as registers allow
+  const BlockShared s = shared_of<!no_velocities(kLaws, kCan)>(layout);
   const float scale = w.body.inv_cell_size;
   float4* v = (!kPlain && w.near != 0) || kLaws == Laws::kAny ? s.v : nullptr;
   // Not f.state[i]: parameters that a register indexes would be copied to local memory.
@@ -159,19 +173,20 @@ __device__ __forceinline__ void block_round(const CudaTables& t, const CudaFrame
   // Their way here takes as long as that of the nodes.
   const ColliderCopy colliders(f, kPlain ? 0 : w.near, round);
   if (round == 0) {
-    bring_nodes<false, kCached>(t, w.bundle.first_slot, w.bundle.slots, cache, from, from, nullptr,
-                                f.step, scale, s.u, v);
+    bring_nodes<false, kCached, kHand>(t, w.bundle.first_slot, w.bundle.slots, cache, from, from,
+                                       nullptr, f.step, scale, s.u, v);
   } else {
     PushedNodes pushed;
     if (kFaces) pushed = pushed_nodes(f.faces, round);
-    bring_nodes<true, kCached, kFaces>(t, w.bundle.first_slot, w.bundle.slots, cache, from, to,
-                                       odd_round ? f.force[0] : f.force[1], f.step, scale, s.u, v,
-                                       pushed);
+    bring_nodes<true, kCached, kHand, kFaces>(t, w.bundle.first_slot, w.bundle.slots, cache, from,
+                                              to, odd_round ? f.force[0] : f.force[1], f.step,
+                                              scale, s.u, v, pushed);
   }
   if (round == f.substeps) return;
   colliders.finish(f, round, s.colliders);
   if (kFaces && last) arrive(f.arrived + 1);
-  all_forces<kLaws, kPlain>(t, f, w, round, max_slots, odd_round ? f.force[1] : f.force[0]);
+  all_forces<kLaws, kCan, kPairs>(t, f, w, round, layout, kCached,
+                                  odd_round ? f.force[1] : f.force[0]);
 }
 
 /// Contacts of tissue with tissue, once all nodes are where the round brought them: a look when it
@@ -196,25 +211,28 @@ __device__ __forceinline__ void push_faces(const CudaFrame& f, int round, FaceRo
                 f.faces.force + f.faces.stride * (round % 3));
 }
 
-template <Laws kLaws, bool kCached, Can kCan, int kThreads, int kBlocksPerProcessor>
-__global__ void __launch_bounds__(kThreads, kBlocksPerProcessor)
-    mpm_substeps(const CudaTables t, const CudaFrame f, int max_slots, bool eight_parts) {
+template <Laws kLaws, bool kCached, bool kPairs, Can kCan>
+__global__ void __launch_bounds__(kMaxCudaThreads, 1)
+    mpm_substeps(const CudaTables t, const CudaFrame f, const CudaLayout layout) {
   constexpr bool kFaces = kCan == Can::kFaces;
-  const BlockShared s = shared_of(max_slots);
+  const BlockShared s = shared_of<!no_velocities(kLaws, kCan)>(layout);
+  const int max_slots = layout.max_slots;
   SlotCache cache;
   cache.parts = reinterpret_cast<uint4*>(s.rounds + 1);
-  cache.more = eight_parts ? cache.parts + max_slots : nullptr;
-  cache.node = reinterpret_cast<std::int32_t*>(cache.parts + (eight_parts ? 2 : 1) * max_slots);
+  cache.more = layout.eight_parts ? cache.parts + max_slots : nullptr;
+  cache.node =
+      reinterpret_cast<std::int32_t*>(cache.parts + (layout.eight_parts ? 2 : 1) * max_slots);
   cache.shared = reinterpret_cast<std::uint32_t*>(cache.node + max_slots);
   unsigned met = 0;
   if (kFaces && threadIdx.x == 0) s.rounds->begin(f.faces, f.step.dt);
   if constexpr (kCached) {
     const BundleAtWork mine(t, static_cast<int>(blockIdx.x));
     fill_cache(t, mine.bundle.first_slot, mine.bundle.slots, cache);
+    clear_exchange(s.exchange, mine.bundle.plane_slots, layout.two_planes);
     __syncthreads();
     for (int round = 0; round <= f.substeps; ++round) {
       if (round > 0) grid_barrier(f.arrived, static_cast<unsigned>(round));
-      block_round<kLaws, true, kCan>(t, f, mine, round, max_slots, cache, true);
+      block_round<kLaws, true, kPairs, kCan>(t, f, mine, round, layout, cache, true);
       if (kFaces) push_faces(f, round, *s.rounds, met);
     }
   } else {
@@ -222,29 +240,35 @@ __global__ void __launch_bounds__(kThreads, kBlocksPerProcessor)
       if (round > 0) grid_barrier(f.arrived, static_cast<unsigned>(round));
       for (int i = blockIdx.x; i < t.bundle_count; i += gridDim.x) {
         const bool last = i + static_cast<int>(gridDim.x) >= t.bundle_count;
-        block_round<kLaws, false, kCan>(t, f, BundleAtWork(t, i), round, max_slots, cache, last);
+        block_round<kLaws, false, kPairs, kCan>(t, f, BundleAtWork(t, i), round, layout, cache,
+                                                last);
+        __syncthreads();  // the next one clears the exchange
       }
       if (kFaces) push_faces(f, round, *s.rounds, met);
     }
   }
 }
 
-template <Can kCan, bool kCached, int kThreads, int kAtOnce>
+template <Laws kLaws, bool kPairs, Can kCan>
 CudaKernel kernel_for(const CudaPlan& plan) {
-  if (plan.viscous || (plan.neo_hookean && plan.fixed_corotated)) {
-    return mpm_substeps<Laws::kAny, kCached, kCan, kMaxCudaThreads, 1>;
-  }
-  return plan.neo_hookean ? mpm_substeps<Laws::kNeoHookean, kCached, kCan, kThreads, kAtOnce>
-                          : mpm_substeps<Laws::kFixedCorotated, kCached, kCan, kThreads, kAtOnce>;
+  return plan.cached ? mpm_substeps<kLaws, true, kPairs, kCan>
+                     : mpm_substeps<kLaws, false, kPairs, kCan>;
+}
+template <Laws kLaws, Can kCan>
+CudaKernel kernel_for(const CudaPlan& plan) {
+  return plan.small && plan.pairs ? kernel_for<kLaws, true, kCan>(plan)
+                                  : kernel_for<kLaws, false, kCan>(plan);
 }
 
-/// The kernel of small tissues has all registers for each thread; that of large ones holds so few
-/// that 384 threads run at once, of which some compute while others wait for memory.
+/// Small tissues are fastest with two threads to a column of cells, large ones with one, which has
+/// less to do in all. Viscosity, and with it kAny, is there for two alone.
 template <Can kCan>
 CudaKernel kernel_of(const CudaPlan& plan) {
-  if (plan.cached) return kernel_for<kCan, true, kMaxCudaThreads, 1>(plan);
-  return plan.threads > 192 ? kernel_for<kCan, false, kMaxCudaThreads, 1>(plan)
-                            : kernel_for<kCan, false, 192, 2>(plan);
+  if (plan.viscous || (plan.neo_hookean && plan.fixed_corotated)) {
+    return kernel_for<Laws::kAny, true, kCan>(plan);
+  }
+  return plan.neo_hookean ? kernel_for<Laws::kNeoHookean, kCan>(plan)
+                          : kernel_for<Laws::kFixedCorotated, kCan>(plan);
 }
 
 }  // namespace

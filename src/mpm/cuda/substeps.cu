@@ -14,10 +14,25 @@ const void* kernel(const CudaPlan& plan) {
                                                     : kernel_of<Can::kTools>(plan));
 }
 
+CudaLayout layout_of(const CudaPlan& plan) {
+  CudaLayout layout;
+  layout.max_slots = plan.max_slots;
+  layout.exchange = (plan.two_planes ? 18 : 9) * plan.max_plane_slots;
+  if (!plan.plain) {
+    const std::size_t lists = PushLists::bytes(plan.max_halves) / sizeof(float4) + 1;
+    layout.exchange = std::max(layout.exchange, static_cast<int>(lists));
+  }
+  layout.eight_parts = plan.eight_parts;
+  layout.two_planes = plan.two_planes;
+  return layout;
+}
+
 std::size_t shared_bytes(const CudaPlan& plan) {
-  const std::size_t of_slot = 2 * sizeof(float4) + (plan.cached ? sizeof(uint4) + 8 : 0) +
+  const bool velocities = !plan.plain || plan.viscous || (plan.neo_hookean && plan.fixed_corotated);
+  const std::size_t of_slot = (velocities ? 2 : 1) * sizeof(float4) +
+                              (plan.cached ? sizeof(uint4) + 8 : 0) +
                               (plan.eight_parts ? sizeof(uint4) : 0);
-  return of_slot * plan.max_slots + 9 * sizeof(float4) * plan.threads +
+  return of_slot * plan.max_slots + sizeof(float4) * layout_of(plan).exchange +
          kMaxColliders * (6 * sizeof(long long) + sizeof(Collider)) + sizeof(FaceRounds);
 }
 
@@ -45,21 +60,27 @@ int resident_of(const CudaPlan& plan) {
 }  // namespace
 
 int resident_blocks(CudaPlan& plan, int block_count) {
-  for (const bool eight : {true, false}) {
-    plan.cached = plan.small;
-    plan.eight_parts = plan.small && eight;
-    if (!plan.cached) break;
-    const int resident = resident_of(plan);
-    if (resident >= block_count) return resident;
+  plan.cached = plan.small;
+  for (const bool two : {true, false}) {
+    for (const bool eight : {true, false}) {
+      if (!plan.cached) continue;
+      plan.two_planes = two;
+      plan.eight_parts = eight;
+      const int resident = resident_of(plan);
+      if (resident >= block_count) return resident;
+    }
   }
-  plan.cached = plan.eight_parts = false;
-  return resident_of(plan);
+  plan.cached = plan.eight_parts = plan.two_planes = false;
+  const int resident = resident_of(plan);
+  plan.two_planes = true;
+  if (resident_of(plan) < resident) plan.two_planes = false;
+  return resident;
 }
 
 int most_at_once(const CudaPlan& plan) {
   CudaPlan most = plan;
   most.cached = plan.small;
-  most.eight_parts = false;
+  most.eight_parts = most.two_planes = false;
   return resident_of(most);
 }
 
@@ -74,9 +95,8 @@ void launch_substeps(const CudaPlan& plan, const CudaTables& tables, const CudaF
                      int resident, cudaStream_t stream) {
   CudaTables t = tables;
   CudaFrame f = frame;
-  int max_slots = plan.max_slots;
-  bool eight_parts = plan.eight_parts;
-  void* arguments[] = {&t, &f, &max_slots, &eight_parts};
+  CudaLayout layout = layout_of(plan);
+  void* arguments[] = {&t, &f, &layout};
   check_cuda(cudaMemsetAsync(f.arrived, 0, 2 * sizeof(unsigned), stream), "clear memory");
   check_cuda(cudaLaunchCooperativeKernel(kernel(plan), dim3(std::min(resident, t.bundle_count)),
                                          dim3(plan.threads), arguments, shared_bytes(plan), stream),

@@ -11,22 +11,33 @@ inline constexpr int kMaxCudaThreads = 256;  ///< of a thread block
 
 /// How a tissue's blocks are worked on.
 struct CudaPlan {
-  int threads = 64;          ///< of a thread block: at least 2 nx ny of each block
-  int max_slots = 0;         ///< of a block
-  bool small = true;         ///< to be cached, if all blocks run at once
+  int threads = 64;          ///< of a thread block: one or two for each column of a bundle
+  int max_slots = 0;         ///< of a bundle
+  int max_plane_slots = 0;   ///< the same of one plane
+  int max_halves = 0;        ///< HostTables::max_halves
+  bool pairs = true;         ///< there are two threads for each column
+  bool small = true;         ///< to be cached, if all bundles run at once
   bool cached = false;       ///< each thread block has one bundle only, whose tables it keeps
   bool eight_parts = false;  ///< of a node's force it keeps the places of eight, else of four
+  bool two_planes = false;   ///< the exchange holds two planes, and threads wait half as often
   bool plain = false;        ///< no contact, all cells full, each bundle one block
   bool faces = false;        ///< with contact of tissue with tissue
   bool neo_hookean = false, fixed_corotated = false, viscous = false;  ///< what there is
 };
 
-using CudaKernel = void (*)(CudaTables, CudaFrame, int, bool);
+/// How a thread block's shared memory is laid out.
+struct CudaLayout {
+  int max_slots;
+  int exchange;  ///< float4s
+  bool eight_parts, two_planes;
+};
+
+using CudaKernel = void (*)(CudaTables, CudaFrame, CudaLayout);
 CudaKernel kernel_with_faces(const CudaPlan& plan);
 CudaKernel plain_kernel(const CudaPlan& plan);
 
-/// Thread blocks that run at once; 0 where the plan does not fit the GPU. Sets CudaPlan::cached and
-/// eight_parts.
+/// Thread blocks that run at once; 0 where the plan does not fit the GPU. Sets CudaPlan::cached,
+/// eight_parts and two_planes.
 int resident_blocks(CudaPlan& plan, int block_count);
 
 /// Thread blocks that run at once, cached if the plan is small, and the most slots with which as

@@ -48,12 +48,12 @@ struct CudaBundle {
   int first_block, blocks;
   int first_slot, slots;
   int first_column, columns;  ///< those that hold points
-  int places;                 ///< columns of the blocks' boxes, with points or without
+  int plane_slots;            ///< of a plane of nodes of all its blocks
   int nz;                     ///< of the tallest block
   int partial;                ///< some cells have fewer than eight points
 };
 
-/// A column of cells, for the two threads that walk up it.
+/// A column of cells, for the one or two threads that walk up it.
 struct alignas(16) CudaColumn {
   int slot;          ///< of the lowest of its nodes, from the bundle's first slot on
   int pitch, plane;  ///< slots from a node to the next along y and z
@@ -61,7 +61,7 @@ struct alignas(16) CudaColumn {
   int lane;          ///< of sub-position 0 of its lowest cell
   int step;          ///< lanes from a sub-position to the next
   int cell;          ///< its lowest in CudaTables::partial
-  int place;         ///< of the bundle's
+  int plane_slot;    ///< the same within a plane, of the bundle's
   float middle[3];   ///< reference place of its lowest cell's middle [m]
   int whole;         ///< as CudaBlock::whole
 };
@@ -97,6 +97,7 @@ struct CudaTables {
   const std::uint32_t* slot_parts;  ///< 0: the slot has all of its node's force; else how many
                                     ///< slots share it + 64 * the first of them in `parts`; and
                                     ///< kPushed, where there is contact of tissue with tissue
+  const uint4* first_parts;         ///< the first four slots that share the slot's node, or itself
   const std::uint32_t* parts;
   const float* volume;        ///< per lane, 0 where there is no point [m^3]
   const std::int32_t* point;  ///< per lane, -1 where there is none

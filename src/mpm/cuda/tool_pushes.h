@@ -103,20 +103,22 @@ __device__ __forceinline__ void push_point(const CudaTables& t, const Collider* 
   }
 }
 
-/// Half cells of the thread, as bits, and whether any of the bundle's, that colliders push.
+/// Which cells of a thread's column have a lower and an upper half that colliders push, as bits,
+/// and whether any of the bundle's has.
 struct Touched {
-  std::uint32_t halves;
+  std::uint32_t cells[2];
   bool any;
 };
 
 /// Works out what the colliders push the points of a bundle with, into `pushes`. The nodes are in
 /// `u` and `v`, divided by the cell size; `shared` is room for the lists, `block` the bundle's
-/// first. Out of line, for the forces to keep their registers.
+/// first, `column` the thread's. Out of line, for the forces to keep their registers.
 inline __device__ __noinline__ Touched find_pushes(const CudaTables t, const CudaBundle w,
                                                    const CudaBlock block, const CudaBody body,
                                                    const float4* u, const float4* v, float4* shared,
                                                    const Collider* colliders, std::uint32_t near,
-                                                   unsigned long long* loads, HalfPush* pushes) {
+                                                   unsigned long long* loads, HalfPush* pushes,
+                                                   int column) {
   const PushLists lists(shared, w);
   list_touched(t, w, block, body, u, colliders, near, lists, pushes);
   const int thread = static_cast<int>(threadIdx.x), points = 4 * *lists.half_count;
@@ -136,8 +138,8 @@ inline __device__ __noinline__ Touched find_pushes(const CudaTables t, const Cud
       for (int a = 0; a < 3; ++a) x[a] = of_half.of[a][i % 4];
       p = t.point[lane];
       volume = c.whole != 0 ? body.point_volume : t.volume[lane];
-      held.load(t, p);
       point_velocity(v, c.slot + z * c.plane, c.pitch, c.plane, s, body.cell_size, velocity);
+      held.load(t, p);
     }
     push_point(t, colliders, near, touches ? half >> 17 : 0, p, held,
                {body.spring.stiffness * volume, body.spring.damping * volume}, x, velocity, loads,
@@ -148,7 +150,11 @@ inline __device__ __noinline__ Touched find_pushes(const CudaTables t, const Cud
     for (int a = 0; a < 3; ++a) of_half.of[a][i % 4] = push[a];
   }
   __syncthreads();
-  const Touched touched{lists.touched[thread], points > 0};
+  Touched touched = {{0, 0}, points > 0};
+  if (column < w.columns) {
+    touched.cells[0] = lists.touched[2 * column];
+    touched.cells[1] = lists.touched[2 * column + 1];
+  }
   __syncthreads();
   return touched;
 }

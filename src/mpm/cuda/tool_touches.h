@@ -69,10 +69,10 @@ __device__ __forceinline__ void point_velocity(const float4* v, int first, int p
   }
 }
 
-/// Lists of cells and of half cells, in the exchange's shared memory: room for kMaxLayers.
+/// Lists of cells and of half cells, in the exchange's shared memory: see bytes().
 struct PushLists {
   int *cell_count, *half_count;
-  std::uint32_t* touched;  ///< [threads], bit z: a point of the thread's half cell z is pushed
+  std::uint32_t* touched;  ///< [columns][2], bit z: a point of that half of cell z is pushed
   std::uint16_t* cells;    ///< column + (z << 8)
   /// column + (z << 8) + (half << 12) + (bits of its points << 13) + (kColliderBits << 17)
   std::uint32_t* halves;
@@ -81,9 +81,11 @@ struct PushLists {
     cell_count = reinterpret_cast<int*>(shared);
     half_count = cell_count + 1;
     touched = reinterpret_cast<std::uint32_t*>(cell_count + 4);
-    halves = touched + blockDim.x;
+    halves = touched + 2 * w.columns;
     cells = reinterpret_cast<std::uint16_t*>(halves + 2 * w.columns * w.nz);
   }
+  /// What they take for so many half cells, at most.
+  static std::size_t bytes(int halves) { return 16 + 9 * static_cast<std::size_t>(halves); }
 };
 
 /// Lists the half cells near `colliders` of which a point lies in one, and puts the places of such
@@ -95,12 +97,12 @@ __device__ __forceinline__ void list_touched(const CudaTables& t, const CudaBund
                                              std::uint32_t near, const PushLists& lists,
                                              HalfPush* places) {
   const int thread = static_cast<int>(threadIdx.x), threads = static_cast<int>(blockDim.x);
-  lists.touched[thread] = 0;
+  for (int i = thread; i < 2 * w.columns; i += threads) lists.touched[i] = 0;
   if (thread == 0) *lists.cell_count = *lists.half_count = 0;
   __syncthreads();
-  if (thread / 2 < w.columns) {
-    const CudaColumn c = column_of(t, w, block, body.cell_size, thread / 2);
-    for (int z = thread % 2; z < c.nz; z += 2) {
+  for (int i = thread; i < 2 * w.columns; i += threads) {
+    const CudaColumn c = column_of(t, w, block, body.cell_size, i / 2);
+    for (int z = i % 2; z < c.nz; z += 2) {
       // The cell's points lie within two cells of its middle, stretched as they may be.
       const float4 at = u[c.slot + (z + 1) * c.plane + c.pitch + 1];
       const float middle[3] = {c.middle[0] + body.cell_size * at.x,
@@ -111,8 +113,7 @@ __device__ __forceinline__ void list_touched(const CudaTables& t, const CudaBund
         close = may_touch(colliders[__ffs(static_cast<int>(left)) - 1], middle, 2 * body.cell_size);
       }
       if (!close) continue;
-      lists.cells[atomicAdd(lists.cell_count, 1)] =
-          static_cast<std::uint16_t>(thread / 2 + (z << 8));
+      lists.cells[atomicAdd(lists.cell_count, 1)] = static_cast<std::uint16_t>(i / 2 + (z << 8));
     }
   }
   __syncthreads();
@@ -124,12 +125,13 @@ __device__ __forceinline__ void list_touched(const CudaTables& t, const CudaBund
     bool holds[4];
 #pragma unroll
     for (int q = 0; q < 4; ++q) point[q] = t.point[c.lane + (z * 8 + 4 * sz + q) * c.step];
+    read_half(u + c.slot + z * c.plane, c.pitch, c.plane, sz == 0 ? -1.0f : 1.0f, h);
+    // After the nodes, which hide the points' way.
 #pragma unroll
     for (int q = 0; q < 4; ++q) {
       const std::uint8_t* with = t.with + point[q] * t.held_by;
       holds[q] = point[q] >= 0 && (with[0] | with[t.held_by - 1]) != 0;
     }
-    read_half(u + c.slot + z * c.plane, c.pitch, c.plane, HalfWeights(sz == 0 ? -1.0f : 1.0f), h);
     std::uint32_t pushed = 0, by = 0;
 #pragma unroll
     for (int q = 0; q < 4; ++q) {

@@ -88,11 +88,11 @@ struct FixedCorotated {
       cofactor(F[k], cof);
       right_cauchy_green(F[k], C);
       const T mu2 = mu[k] + mu[k];
-      // The moduli come last, so that no rounding of theirs is left where F = I: tissue at rest
-      // stays there without fused multiply-add, too.
+      // b + tr C is 6 and a is 3 where F = I: written so, all three numbers have the rounding of
+      // 3 fc there and cancel, without fused multiply-add too.
       const T fc = mu2 * s[k].inverse;
-      const T f = mu2 * (1.0f - s[k].inverse * (s[k].b + of[k].c1));
-      const T c = lambda[k] * (of[k].J - 1.0f) - mu2 * (s[k].inverse * s[k].a);
+      const T f = (mu2 - 4.0f * fc) - fc * (s[k].b + of[k].c1 - 4.0f);
+      const T c = lambda[k] * (of[k].J - 1.0f) - fc * s[k].a;
       // P = F (f I + fc C) + c cof F
       for (int i = 0; i < 6; ++i) C[i] = i < 3 ? fc * C[i] + f : fc * C[i];
       times_symmetric(F[k], C, FC);

@@ -31,7 +31,7 @@ float MpmTissue::substep_for(const FrameInput& input) {
     LinearisedMotion motion(*state_, blocks);
     return 2 / std::sqrt(largest_eigenvalue(motion, steps));
   };
-  return static_cast<float>(substep_.longest(*state_, input, stable_substep(), measure));
+  return static_cast<float>(substep_.longest(*state_, input, stiffening_, measure));
 }
 
 void MpmTissue::cut(const std::vector<BladePath>& paths, const Array<float>* u_before,

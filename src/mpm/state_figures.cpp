@@ -8,13 +8,16 @@ namespace tissue_sim {
 
 namespace {
 
-/// Viscosity over stiffness [s].
-double relaxation(const Material& m, double modulus) { return m.viscosity / modulus; }
+/// Viscosity over stiffness [s]. Viscous stress F S has F twice, outside and in dE/dt: it grows
+/// with the square of the largest stretch, which is at most that of the stiffening where J = 1.
+double relaxation(const Material& m, float stiffening) {
+  return m.viscosity * stiffening * stiffening / wave_modulus(m, stiffening);
+}
 
 double stable_substep(const Material& m, double cell_size, double cfl, float stiffening) {
   const double modulus = wave_modulus(m, stiffening);
   const double elastic = cfl * cell_size * std::sqrt(m.density / modulus);
-  return viscous_substep(elastic, relaxation(m, modulus));
+  return viscous_substep(elastic, relaxation(m, stiffening));
 }
 
 }  // namespace
@@ -32,11 +35,12 @@ double viscous_substep(double elastic, double relaxation) {
   return std::sqrt(t * t + elastic * elastic) - t;
 }
 
-double slowest_relaxation(const MpmState& state) {
+double slowest_relaxation(const MpmState& state, const Stiffening& stiffening) {
   double slowest = 0;
-  for (const LatticeBody& b : state.bodies) {
-    for (const Material& m : b.materials) {
-      slowest = std::max(slowest, relaxation(m, wave_modulus(m, 1)));
+  for (std::size_t i = 0; i < state.bodies.size(); ++i) {
+    const std::vector<Material>& materials = state.bodies[i].materials;
+    for (std::size_t m = 0; m < materials.size(); ++m) {
+      slowest = std::max(slowest, relaxation(materials[m], stiffening[i][m]));
     }
   }
   return slowest;

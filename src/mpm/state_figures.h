@@ -22,8 +22,8 @@ double wave_modulus(const Material& material, float stiffening);
 /// time of viscosity over stiffness [s]: dt^2 + 4 relaxation dt = elastic^2.
 double viscous_substep(double elastic, double relaxation);
 
-/// The largest viscosity over stiffness of all materials [s].
-double slowest_relaxation(const MpmState& state);
+/// The largest viscosity over stiffness of all materials, as they are deformed [s].
+double slowest_relaxation(const MpmState& state, const Stiffening& stiffening);
 
 /// The substep that is stable however the tissue is cut, by the scene's CFL number [s].
 float stable_substep(const MpmState& state, const Stiffening& stiffening);

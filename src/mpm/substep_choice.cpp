@@ -12,8 +12,7 @@ constexpr int kSteps = 12, kStepsAtCut = 4;
 constexpr int kLongestAge = 30;       // frames
 constexpr double kMostGrowth = 1.3;   // of the stiffness, until it is measured again
 constexpr double kMargin = 0.72;      // for springs of contact, and what stiffens within the frame
-constexpr double kViscousGrowth = 2;  // viscous stress grows with the stretch squared: up to 1.4
-constexpr double kFreeMotion = 0.25;   // of a tool in a frame [cells]; beyond it the margin grows
+constexpr double kFreeMotion = 0.25;  // of a tool in a frame [cells]; beyond it the margin grows
 
 /// Whether something tore within the last twentieth of a second: then more may soon, in pieces that
 /// nobody has measured.
@@ -83,8 +82,9 @@ void SubstepChoice::measure_if_due(MpmState& state, const MeasureLimit& measure)
   }
 }
 
-double SubstepChoice::longest(MpmState& state, const FrameInput& input, double cautious,
-                              const MeasureLimit& measure) {
+double SubstepChoice::longest(MpmState& state, const FrameInput& input,
+                              const Stiffening& stiffening, const MeasureLimit& measure) {
+  const double cautious = stable_substep(state, stiffening);
   if (!input.cuts.empty() || tears(state)) return cautious;
   measure_if_due(state, measure);
   if (limit_ == 0) return cautious;
@@ -92,7 +92,7 @@ double SubstepChoice::longest(MpmState& state, const FrameInput& input, double c
   const double margin = kMargin / (1 + std::max(0.0, motion - kFreeMotion));
   const double asked = std::min(1.0, state.scene.cfl / Scene().cfl);
   const double elastic = asked * margin * limit_ / std::sqrt(growth_ * trend_);
-  return std::max(cautious, viscous_substep(elastic, kViscousGrowth * slowest_relaxation(state)));
+  return std::max(cautious, viscous_substep(elastic, slowest_relaxation(state, stiffening)));
 }
 
 }  // namespace tissue_sim

@@ -23,8 +23,8 @@ class SubstepChoice {
   void follow(MpmState& state, const std::vector<float>& modulus);
 
   /// The longest substep for a frame with this input that is stable with a margin [s]: at least
-  /// `cautious`, and not more where something is cut before the first substep, or just tore.
-  double longest(MpmState& state, const FrameInput& input, double cautious,
+  /// stable_substep(), and not more where something is cut before the first substep, or just tore.
+  double longest(MpmState& state, const FrameInput& input, const Stiffening& stiffening,
                  const MeasureLimit& measure);
 
  private:

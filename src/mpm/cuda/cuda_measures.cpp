@@ -18,7 +18,7 @@ float CudaMpmTissue::substep_for(const FrameInput& input) {
   const auto measure = [this](const std::vector<std::uint8_t>&, int steps) {
     return measure_limit(steps);
   };
-  return static_cast<float>(substep_.longest(*state_, input, stable_substep(), measure));
+  return static_cast<float>(substep_.longest(*state_, input, stiffening_, measure));
 }
 
 double CudaMpmTissue::measure_limit(int steps) {

@@ -1,6 +1,6 @@
-// Stabilisation of cells that are not full.
+// Stabilisation of cells that hold few points.
 //
-// At the rim of a body and along a cut a cell may hold fewer than eight points, and nodes that one
+// At the rim of a body and along a cut a cell may hold fewer than seven points, and nodes that one
 // or two points see can then move without any strain at them: a point would hang loose from its
 // neighbours. Of the 27 numbers (A, d, B along each axis) that a component of the displacement has
 // in a cell, four belong to motions that vary linearly, and strain there is what the points resist.

@@ -1,4 +1,4 @@
-// Stabilisation of one cell that is not full (stabilisation.h) on the CPU: apart, for nvcc takes no
+// Stabilisation of one cell (stabilisation.h) on the CPU: apart, for nvcc takes no
 // vectors.
 #pragma once
 

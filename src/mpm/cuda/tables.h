@@ -36,7 +36,7 @@ struct alignas(16) CudaBlock {
   int first_lane;
   int body;         ///< its CudaBody: that of its points' material
   int whole;        ///< all points are there, with CudaBody::point_volume
-  int partial;      ///< some cells have fewer than eight points
+  int partial;      ///< some cells are stabilised
   float origin[3];  ///< reference place of local node 0 [m]
   TISSUE_SIM_INLINE int slots() const { return (nx + 2) * (ny + 2) * (nz + 2); }
 };
@@ -50,7 +50,7 @@ struct CudaBundle {
   int first_column, columns;  ///< those that hold points
   int plane_slots;            ///< of a plane of nodes of all its blocks
   int nz;                     ///< of the tallest block
-  int partial;                ///< some cells have fewer than eight points
+  int partial;                ///< some cells are stabilised
 };
 
 /// A column of cells, for the one or two threads that walk up it.
@@ -102,7 +102,7 @@ struct CudaTables {
   const float* volume;        ///< per lane, 0 where there is no point [m^3]
   const std::int32_t* point;  ///< per lane, -1 where there is none
   const float* partial;       ///< per cell (lane / 8): mu times volume of its points where they are
-                              ///< fewer than eight, else 0; see mpm/stabilisation.h [J]
+                              ///< fewer than seven, else 0; see mpm/stabilisation.h [J]
   const std::uint8_t* bonds;  ///< per point
   std::uint32_t* near;        ///< per block: bit c for a collider that it may meet this frame
   int held_by;                ///< colliders that a point may hold on to at a time: 0 to 2

@@ -2,9 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <tuple>
 
 #include "contact/facet_motion.h"
 #include "cutting/bonds.h"
+#include "mpm/cell_points.h"
 
 namespace tissue_sim {
 namespace {
@@ -18,25 +20,24 @@ ContactSpring unit_spring(const LatticeBody& body, int material) {
 }
 
 bool comes_before(const Touch& a, const Touch& b) {
-  return a.collider != b.collider ? a.collider < b.collider : a.lane < b.lane;
+  return std::tie(a.collider, a.cell, a.sub) < std::tie(b.collider, b.cell, b.sub);
 }
 
 bool overlap(const Box& a, const Box& b) {
   return (a.min.array() <= b.max.array()).all() && (b.min.array() <= a.max.array()).all();
 }
 
-/// Weights at each of a cell's eight sub-positions.
-struct SubWeights {
-  AxisWeights of[8];
-  SubWeights() {
-    for (int s = 0; s < 8; ++s) {
-      const float place[3] = {s & 1 ? 0.25f : -0.25f, s & 2 ? 0.25f : -0.25f,
-                              s & 4 ? 0.25f : -0.25f};
-      of[s] = AxisWeights(place);
-    }
-  }
-};
-const SubWeights kSubWeights;
+/// Substeps between two lists of the cells near colliders, and how much nearer than foreseen either
+/// may come in that time [cells].
+constexpr int kListLasts = 8;
+constexpr double kListMargin = 0.5;
+
+/// How fast any place of a collider moves at most [m/s].
+double speed(const Collider& c) {
+  const Vec3 velocity(c.velocity[0], c.velocity[1], c.velocity[2]);
+  const Vec3 spin(c.spin[0], c.spin[1], c.spin[2]);
+  return velocity.norm() + spin.norm() * Vec3(c.length, c.width, c.radius).norm();
+}
 
 }  // namespace
 
@@ -65,7 +66,9 @@ void find_near_colliders(MpmState& state, const std::vector<Box>& reach, double 
   Contacts& contacts = state.contacts;
   const int count = static_cast<int>(state.blocks.all.size());
   contacts.near.assign(count, {});
+  contacts.cells.assign(count, {});
   contacts.touching.resize(count);
+  contacts.until_list = 0;
   state.cpu->for_each(count, [&](int i) {
     Box box = state.motion[i].box;
     const double margin = state.motion[i].speed * duration + 0.5 * state.scene.cell_size;
@@ -83,6 +86,7 @@ void list_contacts(MpmState& state) {
   const std::vector<std::vector<Touch>> before = std::move(contacts.touching);
   contacts.touching.assign(state.blocks.all.size(), {});
   contacts.near.assign(state.blocks.all.size(), {});
+  contacts.cells.assign(state.blocks.all.size(), {});
   if (before.empty()) return;  // on a GPU
   std::vector<Touch> touches;
   for (std::size_t i = 0; i < state.blocks.all.size(); ++i) {
@@ -94,72 +98,130 @@ void list_contacts(MpmState& state) {
     if (touches.empty()) continue;
     std::sort(touches.begin(), touches.end(),
               [](const Touch& a, const Touch& b) { return a.point < b.point; });
-    const Array<std::int32_t>& points = state.blocks.all[i]->point;
-    for (std::size_t lane = 0; lane < points.size(); ++lane) {
+    const Block& block = *state.blocks.all[i];
+    const auto lanes = static_cast<std::int32_t>(block.lane_count());
+    for (std::int32_t lane = 0; lane < lanes; ++lane) {
+      const std::int32_t point = block.point[lane];
       auto touch =
-          std::lower_bound(touches.begin(), touches.end(), points[lane],
-                           [](const Touch& t, std::int32_t point) { return t.point < point; });
-      for (; touch != touches.end() && touch->point == points[lane]; ++touch) {
+          std::lower_bound(touches.begin(), touches.end(), point,
+                           [](const Touch& t, std::int32_t p) { return t.point < p; });
+      for (; touch != touches.end() && touch->point == point; ++touch) {
+        const int sub = lane / block.stride % 8;
         contacts.touching[i].push_back(*touch);
-        contacts.touching[i].back().lane = static_cast<std::int32_t>(lane);
+        contacts.touching[i].back().sub = static_cast<std::uint8_t>(sub);
+        contacts.touching[i].back().cell = lane - sub * block.stride;
       }
     }
     std::sort(contacts.touching[i].begin(), contacts.touching[i].end(), comes_before);
   }
 }
 
-void add_contact(MpmState& state, int index, float* force, std::vector<ColliderLoad>& loads) {
-  Contacts& contacts = state.contacts;
-  const std::vector<std::uint8_t>& near = contacts.near[index];
-  if (near.empty()) return;
+bool is_list_due(Contacts& contacts) {
+  const bool due = contacts.until_list == 0;
+  contacts.until_list = due ? kListLasts - 1 : contacts.until_list - 1;
+  return due;
+}
+
+void list_near_cells(MpmState& state, int index, float dt) {
+  std::vector<NearCell>& cells = state.contacts.cells[index];
+  cells.clear();
+  if (state.contacts.near[index].empty()) return;
   const Block& block = *state.blocks.all[index];
-  int material = std::max(0, block.material);
-  ContactSpring unit = unit_spring(state.bodies[block.body], material);
+  const LatticeBody& body = state.bodies[block.body];
   BlockScratch& scratch = state.scratch.local();
   const std::size_t lanes = block.lane_count();
   if (scratch.values.size() < 3 * lanes) scratch.values.resize(3 * lanes);
   if (scratch.lanes.size() < lanes) scratch.lanes.resize(lanes);
   float* x = scratch.values.data();
   state.kernels->positions(block, block_field(state, block), state.nodes.u, scratch, x);
-  const std::vector<Touch>& before = contacts.touching[index];
-  auto held = before.begin();
-  std::vector<Touch> touching;
-  for (const std::uint8_t c : near) {
+  std::vector<std::uint8_t> points(static_cast<std::size_t>(block.nz) * block.stride);  // of cells
+  for (const std::uint8_t c : state.contacts.near[index]) {
     const Collider& collider = state.colliders[c];
+    const double margin = kListMargin * state.scene.cell_size +
+                          (state.motion[index].speed + speed(collider)) * kListLasts * dt;
     const Box box = bounds(collider);
-    const float min[3] = {float(box.min[0]), float(box.min[1]), float(box.min[2])};
-    const float max[3] = {float(box.max[0]), float(box.max[1]), float(box.max[2])};
+    float min[3], max[3];
+    for (int a = 0; a < 3; ++a) {
+      min[a] = static_cast<float>(box.min[a] - margin);
+      max[a] = static_cast<float>(box.max[a] + margin);
+    }
+    std::fill(points.begin(), points.end(), std::uint8_t{0});
     const int found = state.kernels->lanes_in_box(x, lanes, min, max, scratch.lanes.data());
     for (int f = 0; f < found; ++f) {
       const int lane = scratch.lanes[f];
       const std::int32_t p = block.point[lane];
       if (p < 0) continue;
+      // The flats of a blade push where it has cut.
       if (collider.kind == Collider::kBlade && state.points.bonds[p] == kAllBonds) continue;
       const float at[3] = {x[lane], x[lanes + lane], x[2 * lanes + lane]};
+      // Where the flats of a blade end, its gap does: there the box must do.
+      if (collider.kind != Collider::kBlade && gap(collider, at).distance > margin) continue;
+      const int row = lane / block.stride;
+      points[row / 8 * block.stride + lane % block.stride] |= 1u << row % 8;
+    }
+    for (int z = 0, i = 0; z < block.nz; ++z) {
+      for (int lane = 0; lane < block.stride; ++lane, ++i) {
+        if (points[i] == 0) continue;
+        const int node = z * block.plane + block.cell[lane];
+        const Vec3 middle = reference_place(body, block, node, {});
+        cells.push_back({z * 8 * block.stride + lane,
+                         node,
+                         c,
+                         points[i],
+                         {static_cast<float>(middle[0]), static_cast<float>(middle[1]),
+                          static_cast<float>(middle[2])}});
+      }
+    }
+  }
+}
+
+void add_contact(MpmState& state, int index, float* force, std::vector<ColliderLoad>& loads) {
+  Contacts& contacts = state.contacts;
+  const Block& block = *state.blocks.all[index];
+  const LatticeBody& body = state.bodies[block.body];
+  const auto quarter = static_cast<float>(0.25 * body.cell_size);
+  int material = std::max(0, block.material);
+  ContactSpring unit = unit_spring(body, material);
+  auto held = contacts.touching[index].begin();
+  const auto held_end = contacts.touching[index].end();
+  std::vector<Touch> touching;
+  for (const NearCell& cell : contacts.cells[index]) {
+    const Collider& collider = state.colliders[cell.collider];
+    ColliderLoad& load = loads[cell.collider];
+    const CellNodes nodes(block, cell.node);
+    Vec<4> u[8], v[8], pushes[8];
+    values_at_points(state.nodes.u, nodes, u);
+    bool touches = false;
+    for (unsigned points = cell.points; points != 0; points &= points - 1) {
+      const int s = __builtin_ctz(points), lane = cell.lane + s * block.stride;
+      const float at[3] = {cell.middle[0] + (s & 1 ? quarter : -quarter) + u[s][0],
+                           cell.middle[1] + (s & 2 ? quarter : -quarter) + u[s][1],
+                           cell.middle[2] + (s & 4 ? quarter : -quarter) + u[s][2]};
       const Gap g = gap(collider, at);
       if (g.distance >= 0) continue;
-      const int sub = lane / block.stride % 8,
-                cell = lane / block.stride / 8 * block.plane + block.cell[lane % block.stride];
-      const AxisWeights& weights = kSubWeights.of[sub];
-      float v[3], push[3];
-      value_at(CellField{state.nodes.v, CellNodes(block, cell)}, weights, v);
-      Touch touch{lane, p, c, {}};
-      while (held != before.end() && comes_before(*held, touch)) ++held;
-      if (held != before.end() && !comes_before(touch, *held)) {
+      if (!touches) {
+        touches = true;
+        values_at_points(state.nodes.v, nodes, v);
+        std::fill_n(pushes, 8, Vec<4>{});
+      }
+      const std::int32_t p = block.point[lane];
+      Touch touch{cell.lane, p, static_cast<std::uint8_t>(s), cell.collider, {}};
+      while (held != held_end && comes_before(*held, touch)) ++held;
+      if (held != held_end && !comes_before(touch, *held)) {
         touch = *held;
       } else {
         to_local(collider, at, touch.hold);
       }
       if (state.points.material_of(p) != material) {
         material = state.points.material_of(p);
-        unit = unit_spring(state.bodies[block.body], material);
+        unit = unit_spring(body, material);
       }
-      const float volume = block.volume[lane];
-      contact_force(collider, g, {unit.stiffness * volume, unit.damping * volume}, at, v,
+      const float volume = block.volume[lane], velocity[3] = {v[s][0], v[s][1], v[s][2]};
+      float push[3];
+      contact_force(collider, g, {unit.stiffness * volume, unit.damping * volume}, at, velocity,
                     touch.hold, push);
       touching.push_back(touch);
-      spread(block, cell, weights, push, force);
-      ColliderLoad& load = loads[c];
+      pushes[s] = Vec<4>{push[0], push[1], push[2], 0.0f};
       double arm[3];
       for (int a = 0; a < 3; ++a) {
         load.force[a] -= push[a];
@@ -170,6 +232,7 @@ void add_contact(MpmState& state, int index, float* force, std::vector<ColliderL
         load.torque[a] -= arm[b] * push[d] - arm[d] * push[b];
       }
     }
+    if (touches) spread(block, cell.node, pushes, force);
   }
   // A point that no longer touches forgets where it was held.
   contacts.touching[index] = std::move(touching);

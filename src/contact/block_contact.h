@@ -18,6 +18,13 @@ void find_near_colliders(MpmState& state, const std::vector<Box>& reach, double 
 /// Makes the lists of points in contact anew after update_blocks(), with no collider near.
 void list_contacts(MpmState& state);
 
+/// Counts a substep. Returns whether cells near colliders must be listed anew before it.
+bool is_list_due(Contacts& contacts);
+
+/// Lists a block's cells that a collider may touch until the next list, with substeps of `dt`
+/// seconds.
+void list_near_cells(MpmState& state, int block, float dt);
+
 /// Adds contact forces to the block's part of the force buffer and sums the loads of the colliders.
 void add_contact(MpmState& state, int block, float* force, std::vector<ColliderLoad>& loads);
 

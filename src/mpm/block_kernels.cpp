@@ -10,6 +10,20 @@ namespace {
 
 using namespace kernels;  // NOLINT: this file is all about them
 
+/// Moves W nodes from `first` on, under the forces force[3][stride].
+template <int W>
+TISSUE_SIM_INLINE void move_nodes(int first, const float* force, int stride,
+                                  const UpdateNode& update) {
+  const Vec<W> mass = load<W>(update.mass + first), inv_mass = load<W>(update.inv_mass + first);
+  for (int c = 0; c < 3; ++c) {
+    float *to_u = update.u[c] + first, *to_v = update.v[c] + first;
+    Vec<W> u = load<W>(to_u), v = load<W>(to_v);
+    update.move(c, load<W>(force + c * stride), mass, inv_mass, u, v);
+    store<W>(to_u, u);
+    store<W>(to_v, v);
+  }
+}
+
 template <int W>
 TISSUE_SIM_INLINE void update_row(const NodeRow& row, const RowPart* parts, const float* force,
                                   const UpdateNode& update, BlockScratch& scratch) {
@@ -25,7 +39,10 @@ TISSUE_SIM_INLINE void update_row(const NodeRow& row, const RowPart* parts, cons
       for (int i = 0; i < part.count; ++i) to[i] += from[i];
     }
   }
-  for (int i = 0; i < row.count; ++i) {
+  int i = 0;
+  for (; i + W <= row.count; i += W) move_nodes<W>(row.first_node + i, sum + i, stride, update);
+  for (; i + 4 <= row.count; i += 4) move_nodes<4>(row.first_node + i, sum + i, stride, update);
+  for (; i < row.count; ++i) {
     update(row.first_node + i, sum[i], sum[i + stride], sum[i + 2 * stride]);
   }
 }

@@ -14,8 +14,9 @@ std::unique_ptr<MpmState> make_mpm_state(const Scene& scene, std::vector<std::st
   state->fields = std::make_unique<NodeFields>(state->bodies, state->points, state->nodes);
   state->blocks = make_blocks(state->bodies, state->points, *state->fields);
   state->force.resize(state->blocks.force_size);
-  state->contacts.touching.resize(state->blocks.all.size());
   state->contacts.near.resize(state->blocks.all.size());
+  state->contacts.cells.resize(state->blocks.all.size());
+  state->contacts.touching.resize(state->blocks.all.size());
   list_facets(*state);
   state->instructions = instruction_set();
   state->kernels = &block_kernels(state->instructions);
@@ -62,6 +63,7 @@ void substep(MpmState& state, float dt, std::vector<ColliderLoad>& loads) {
   const std::size_t collider_count = state.colliders.size();
   state.block_loads.resize(block_count);
   FaceContacts& faces = state.faces;
+  const bool list = is_list_due(state.contacts);
   state.cpu->for_each(
       static_cast<int>(faces.active.size()),
       [&](int i) { push_faces(state, faces.all[faces.active[i]], dt); }, 32);
@@ -70,6 +72,7 @@ void substep(MpmState& state, float dt, std::vector<ColliderLoad>& loads) {
     float* force = state.force.data() + block.force_offset;
     state.kernels->forces(block, block_field(state, block), state.scratch.local(), force);
     state.block_loads[i].assign(collider_count, {});
+    if (list) list_near_cells(state, i, dt);
     add_contact(state, i, force, state.block_loads[i]);
     if (!faces.active.empty()) add_face_contacts(state, i, force);
   });

@@ -22,16 +22,28 @@ namespace tissue_sim {
 
 /// A point that touches a collider.
 struct Touch {
-  std::int32_t lane;  ///< in its block
+  std::int32_t cell;  ///< lane of its cell's first point, in its block
   std::int32_t point;
+  std::uint8_t sub;  ///< which of the cell's eight points it is
   std::uint8_t collider;
   float hold[3];  ///< place that friction holds on to, in the collider's frame [m]
 };
 
+/// A cell of which a collider may touch points before such cells are listed anew.
+struct NearCell {
+  std::int32_t lane;  ///< of its first point, in its block
+  std::int32_t node;  ///< its lowest, in the block's nodes
+  std::uint8_t collider;
+  std::uint8_t points;  ///< bit s: that at sub-position s
+  float middle[3];  ///< reference place [m]
+};
+
 /// Contact of points with colliders, block by block.
 struct Contacts {
-  std::vector<std::vector<Touch>> touching;     ///< by collider, then lane
   std::vector<std::vector<std::uint8_t>> near;  ///< colliders that it may meet this frame
+  std::vector<std::vector<NearCell>> cells;     ///< by collider, then lane
+  std::vector<std::vector<Touch>> touching;     ///< by collider, cell and sub-position
+  int until_list = 0;                           ///< substeps until `cells` are listed anew
 };
 
 /// Force and moment (about the tip, world axes) of the tissue on each collider.

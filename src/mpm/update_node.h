@@ -12,11 +12,12 @@ struct NodeStep {
   float keep;        ///< share of the velocity that drag leaves in a substep
   float gravity[3];  ///< [m/s^2]
 
-  /// Moves the component `c` on: u [m], v [m/s], under the force f [N].
-  TISSUE_SIM_INLINE void move(int c, float f, float mass, float inv_mass, float& u,
-                              float& v) const {
-    const float dt_over_m = dt * inv_mass;
-    const float velocity = keep * v + dt_over_m * (f + mass * gravity[c]);
+  /// Moves the component `c` on: u [m], v [m/s], under the force f [N]; one node or a vector of
+  /// them.
+  template <class T>
+  TISSUE_SIM_INLINE void move(int c, T f, T mass, T inv_mass, T& u, T& v) const {
+    const T dt_over_m = dt * inv_mass;
+    const T velocity = keep * v + dt_over_m * (f + mass * gravity[c]);
     v = velocity;
     u += dt * velocity;
   }

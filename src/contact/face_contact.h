@@ -22,6 +22,7 @@ struct Pieces;
 struct FaceContact : FaceSpring {
   CellNodes nodes, other_nodes;
   AxisWeights weights, other_weights;  ///< at the facet's centre; at `hold`
+  double looked_at = 0, look_at = 0;   ///< last and next [s]
 };
 
 struct FaceContacts {
@@ -30,7 +31,6 @@ struct FaceContacts {
   std::vector<std::int32_t> block_of;     ///< per facet
   std::vector<FacetMotion> motion;        ///< per facet; up to date where a pair needs it
   std::vector<ListedFacet> listed;        ///< per facet; empty while there is no list
-  std::vector<std::int32_t> involved;     ///< facets in any pair
   std::vector<FaceContact> all;           ///< of each facet that is to touch others near it
   std::vector<std::int32_t> first_near;   ///< CSR over `all`: those others
   std::vector<std::int32_t> near;
@@ -39,7 +39,8 @@ struct FaceContacts {
   /// face.
   std::vector<std::int32_t> first_of_block, of_block;
   std::vector<KeptContact> kept;                            ///< sorted by point and direction
-  double until_search = 0, until_look = 0, since_look = 0;  ///< [s]
+  double until_search = 0, until_look = 0;                  ///< of any contact [s]
+  double since_look = 0;  ///< on a GPU, which looks at all together [s]
 };
 
 /// Before a substep of `dt` seconds: searches pairs, and looks at them, when it is time to.

@@ -88,36 +88,49 @@ std::vector<FacetPair> facing_pairs(const std::vector<FacetMotion>& facets,
   }
   // Chunks of buckets side by side; sorted, the pairs come in the same order for any number.
   constexpr int kChunks = 64;
-  std::vector<std::vector<FacetPair>> of_chunk(kChunks);
-  const auto visit_bucket = [&](std::uint32_t b, std::vector<FacetPair>& pairs) {
+  struct Member {  // of a bucket
+    float normal[3], x[3], reach;
+    const Entry* entry;
+  };
+  struct Chunk {
+    std::vector<Member> members;  // of the bucket at hand
+    std::vector<FacetPair> pairs;
+  };
+  std::vector<Chunk> chunks(kChunks);
+  const auto visit_bucket = [&](std::uint32_t b, Chunk& chunk) {
     NormalBox normals;
+    chunk.members.clear();
     for (std::int32_t i = first[b]; i < first[b + 1]; ++i) {
-      normals.take(facets[entries[i].facet].normal);
+      const FacetMotion& f = facets[entries[i].facet];
+      normals.take(f.normal);
+      chunk.members.push_back({{f.normal[0], f.normal[1], f.normal[2]},
+                               {f.x[0], f.x[1], f.x[2]},
+                               reach[entries[i].facet],
+                               &entries[i]});
     }
     if (!normals.may_face()) return;
-    for (std::int32_t i = first[b]; i < first[b + 1]; ++i) {
-      const Entry& e = entries[i];
-      const FacetMotion& f = facets[e.facet];
-      for (std::int32_t j = i + 1; j < first[b + 1]; ++j) {
-        const Entry& o = entries[j];
-        const FacetMotion& g = facets[o.facet];
-        if (f.normal[0] * g.normal[0] + f.normal[1] * g.normal[1] + f.normal[2] * g.normal[2] >
+    const Member* end = chunk.members.data() + chunk.members.size();
+    for (const Member* f = chunk.members.data(); f < end; ++f) {
+      for (const Member* g = f + 1; g < end; ++g) {
+        if (f->normal[0] * g->normal[0] + f->normal[1] * g->normal[1] +
+                f->normal[2] * g->normal[2] >
             kFacing) {
           continue;
         }
-        if (e.x != o.x || e.y != o.y || e.z != o.z) continue;
-        const float far = reach[e.facet] + reach[o.facet];
-        if (!(std::fabs(f.x[0] - g.x[0]) < far && std::fabs(f.x[1] - g.x[1]) < far &&
-              std::fabs(f.x[2] - g.x[2]) < far)) {
+        const float far = f->reach + g->reach;
+        if (!(std::fabs(f->x[0] - g->x[0]) < far && std::fabs(f->x[1] - g->x[1]) < far &&
+              std::fabs(f->x[2] - g->x[2]) < far)) {
           continue;
         }
+        const Entry &e = *f->entry, &o = *g->entry;
+        if (e.x != o.x || e.y != o.y || e.z != o.z) continue;
         // Of the grid cells that both boxes reach into, the lowest one says so.
         const GridBox &p = boxes[e.facet], &q = boxes[o.facet];
         if (e.x != std::max(p.min[0], q.min[0]) || e.y != std::max(p.min[1], q.min[1]) ||
             e.z != std::max(p.min[2], q.min[2])) {
           continue;
         }
-        pairs.emplace_back(std::min(e.facet, o.facet), std::max(e.facet, o.facet));
+        chunk.pairs.emplace_back(std::min(e.facet, o.facet), std::max(e.facet, o.facet));
       }
     }
   };
@@ -125,12 +138,10 @@ std::vector<FacetPair> facing_pairs(const std::vector<FacetMotion>& facets,
     const std::uint64_t buckets = std::uint64_t{mask} + 1;
     const auto begin = static_cast<std::uint32_t>(buckets * chunk / kChunks),
                end = static_cast<std::uint32_t>(buckets * (chunk + 1) / kChunks);
-    for (std::uint32_t b = begin; b < end; ++b) visit_bucket(b, of_chunk[chunk]);
+    for (std::uint32_t b = begin; b < end; ++b) visit_bucket(b, chunks[chunk]);
   });
   std::vector<FacetPair> pairs;
-  for (const std::vector<FacetPair>& chunk : of_chunk) {
-    pairs.insert(pairs.end(), chunk.begin(), chunk.end());
-  }
+  for (const Chunk& c : chunks) pairs.insert(pairs.end(), c.pairs.begin(), c.pairs.end());
   std::sort(pairs.begin(), pairs.end());
   return pairs;
 }

@@ -35,28 +35,43 @@ void list_active(MpmState& s) {
   }
 }
 
-void look_at_all(MpmState& s, double dt, bool moved) {
+/// Looks at the contacts that are due, `all` of them after a search, which knows where facets are.
+/// A few that move fast, crumbs for one, do not make the others be looked at as often.
+void look_at_due(MpmState& s, double dt, bool all) {
   FaceContacts& faces = s.faces;
-  if (moved) {
-    s.cpu->for_each(
-        static_cast<int>(faces.involved.size()),
-        [&](int i) { faces.motion[faces.involved[i]] = motion_of(s, faces.involved[i]); }, 32);
+  std::vector<std::int32_t> due, facets;
+  for (std::size_t i = 0; i < faces.all.size(); ++i) {
+    if (all || is_due(faces.all[i].look_at - s.time, dt)) due.push_back(static_cast<int>(i));
   }
-  const int count = static_cast<int>(faces.all.size());
-  std::vector<float> speed(count);
+  if (!all) {
+    for (const std::int32_t i : due) {
+      const FaceContact& c = faces.all[i];
+      facets.push_back(c.facet);
+      if (c.other >= 0) facets.push_back(c.other);
+      const auto near = faces.near.begin();
+      facets.insert(facets.end(), near + faces.first_near[i], near + faces.first_near[i + 1]);
+    }
+    std::sort(facets.begin(), facets.end());
+    facets.erase(std::unique(facets.begin(), facets.end()), facets.end());
+    s.cpu->for_each(
+        static_cast<int>(facets.size()),
+        [&](int i) { faces.motion[facets[i]] = motion_of(s, facets[i]); }, 32);
+  }
   s.cpu->for_each(
-      count,
+      static_cast<int>(due.size()),
       [&](int i) {
-        ContactFaces contact(s, i);
-        speed[i] = look(contact, faces.all[i], static_cast<float>(dt),
-                        static_cast<float>(faces.since_look));
+        ContactFaces contact(s, due[i]);
+        FaceContact& c = faces.all[due[i]];
+        const auto since = static_cast<float>(s.time - c.looked_at);
+        const float speed = look(contact, c, static_cast<float>(dt), since);
+        c.looked_at = s.time;
+        c.look_at = s.time + look_horizon(speed, s.scene.cell_size, dt);
       },
       32);
-  float fastest = 0;
-  for (const float v : speed) fastest = std::max(fastest, v);
   list_active(s);
-  faces.until_look = look_horizon(fastest, s.scene.cell_size, dt);
-  faces.since_look = 0;
+  double next = s.time + kLongestLook * dt;
+  for (const FaceContact& c : faces.all) next = std::min(next, c.look_at);
+  faces.until_look = next - s.time;
 }
 
 /// Whether two facets belong to the same bit of a piece, as at an edge of it or on the two sides of
@@ -187,18 +202,9 @@ bool search(MpmState& s, const Pieces& pieces) {
     return touches(PieceSize{p, size[p]}, PieceSize{q, size[q]});
   };
   std::vector<std::int32_t> count(facet_count, 0), contact(facet_count, -1);
-  std::vector<bool> involved(facet_count, false);
-  faces.involved.clear();
   for (const auto& [a, b] : pairs) {
     if (facet_touches(a, b)) ++count[a];
     if (facet_touches(b, a)) ++count[b];
-    involved[a] = involved[b] = true;
-  }
-  for (const FaceContact& c : faces.all) {
-    if (c.other >= 0) involved[c.other] = true;
-  }
-  for (std::int32_t f = 0; f < facet_count; ++f) {
-    if (involved[f]) faces.involved.push_back(f);
   }
   for (std::size_t i = 0; i < faces.all.size(); ++i) {
     contact[faces.all[i].facet] = static_cast<std::int32_t>(i);
@@ -214,6 +220,7 @@ bool search(MpmState& s, const Pieces& pieces) {
       all.back().facet = f;
       all.back().nodes = CellNodes(block_of(s, f), facet_of(s, f).cell);
       all.back().weights = AxisWeights(facet_of(s, f).center);
+      all.back().looked_at = s.time;
     }
     contact[f] = static_cast<std::int32_t>(all.size() - 1);
     faces.first_near.push_back(faces.first_near.back() + count[f]);
@@ -238,6 +245,7 @@ void take_up_kept(MpmState& s, double dt) {
     if (kept == nullptr) continue;
     ContactFaces contact(s, static_cast<int>(i));
     take_up(contact, faces.all[i], *kept, static_cast<float>(dt));
+    faces.all[i].looked_at = kept->looked_at;
   }
   faces.kept.clear();
 }
@@ -248,11 +256,12 @@ void find_face_contacts(MpmState& s, const Pieces& pieces, double dt) {
   FaceContacts& faces = s.faces;
   const bool searched = is_due(faces.until_search, dt);
   if (searched && search(s, pieces)) take_up_kept(s, dt);
-  if (!faces.all.empty() && (searched || faces.until_look <= 0)) look_at_all(s, dt, !searched);
+  if (!faces.all.empty() && (searched || is_due(faces.until_look, dt))) {
+    look_at_due(s, dt, searched);
+  }
   if (faces.all.empty()) faces.active.clear();
   faces.until_search -= dt;
   faces.until_look -= dt;
-  faces.since_look += dt;
 }
 
 void keep_face_contacts(MpmState& s) {
@@ -270,7 +279,8 @@ void keep_face_contacts(MpmState& s) {
                           c.depth,
                           c.begun,
                           c.stiffness,
-                          {c.apart[0], c.apart[1], c.apart[2]}});
+                          {c.apart[0], c.apart[1], c.apart[2]},
+                          c.looked_at});
   }
   std::sort(faces.kept.begin(), faces.kept.end(), [](const KeptContact& a, const KeptContact& b) {
     return a.is_before(b.point, b.direction);

@@ -15,6 +15,7 @@ struct KeptContact {
   std::int32_t other_body;
   double hold[3];  ///< reference place [m]
   float depth, begun, stiffness, apart[3];
+  double looked_at;  ///< on the CPU, when last [s]
 
   TISSUE_SIM_INLINE bool is_before(std::int32_t p, int d) const {
     return point != p ? point < p : direction < d;

@@ -102,6 +102,12 @@ TISSUE_SIM_INLINE PointBounds bounds(const Block& b, const BlockField& f, BlockS
   return result;
 }
 
+template <int W>
+TISSUE_SIM_INLINE Vec<W> larger(Vec<W> a, Vec<W> b) {
+  const Mask<W> is_b = bits<W>(a - b) >> 31;
+  return keep<W>(~is_b, a) + keep<W>(is_b, b);
+}
+
 template <int W, class Materials>
 TISSUE_SIM_INLINE BlockState state(const Block& b, const BlockField& f, BlockScratch& scratch,
                                    float* von_mises) {
@@ -111,45 +117,59 @@ TISSUE_SIM_INLINE BlockState state(const Block& b, const BlockField& f, BlockScr
   gather_nodes(b, f, f.nodes->u, 1.0f / f.cell_size, l, scratch.nodes.data());
   BlockState result;
   result.stiffening.assign(f.material_count, 1.0f);
-  result.elastic_energy = stabilise_cells(b, f, l, scratch.nodes.data(), nullptr);
+  double energy[W] = {};
+  float least = 1;  // of its materials' stiffenings so far
   for (int z = 0; z < 2; ++z) load_plane<W>(b, l, scratch.nodes.data(), z, scratch.in.data());
   for (int z = 0; z < b.nz; ++z) {
     load_plane<W>(b, l, scratch.nodes.data(), z + 2, scratch.in.data());
     for (int j = 0; j < l.stride; j += W) {
       Vec<W> G[8][9];
       gradients<W>(l, scratch.in.data(), z, j, G);
-      const std::size_t lane = static_cast<std::size_t>(z) * 8 * l.stride + j;
       for (int s = 0; s < 8; ++s) {
-        const float* volume = b.volume.data() + lane + s * l.stride;
-        const std::int32_t* point = b.point.data() + lane + s * l.stride;
-        Vec<W> cof[9], P[1][9];
-        auto k = Materials::template stiffness<1, W>(b, f, lane + s * l.stride);
-        k.mu[0] /= load<W>(volume);  // lanes without a point are passed over below
-        k.lambda[0] /= load<W>(volume);
+        const std::size_t lane = (static_cast<std::size_t>(z) * 8 + s) * l.stride + j;
+        const std::int32_t* point = b.point.data() + lane;
+        Mask<W> is_point;
+        std::memcpy(&is_point, point, sizeof(is_point));
+        is_point = ~(is_point >> 31);
+        Vec<W> cof[9];
+        const auto k = Materials::template stiffness<1, W>(b, f, lane);
         add_identity<W>(G[s]);
+        const Vec<W> of_lanes = keep<W>(is_point, Materials::template energy<W>(G[s], k));
+        for (int i = 0; i < W; ++i) energy[i] += of_lanes[i];
+        if (von_mises) {
+          Vec<W> P[1][9];
+          Materials::template stresses<1, W>(G + s, k, P);
+          const Vec<W> V = load<W>(b.volume.data() + lane);
+          const Vec<W> squared = von_mises_squared(G[s], P[0]) / (V * V);
+          for (int i = 0; i < W; ++i) von_mises[lane + i] = std::sqrt(squared[i]);
+        }
         cofactor(G[s], cof);
         const Vec<W> J = G[s][0] * cof[0] + G[s][1] * cof[1] + G[s][2] * cof[2];
-        const Vec<W> energy = Materials::template energy<W>(G[s], k);
         const Vec<W> cx = cof[0] * cof[0] + cof[3] * cof[3] + cof[6] * cof[6];
         const Vec<W> cy = cof[1] * cof[1] + cof[4] * cof[4] + cof[7] * cof[7];
         const Vec<W> cz = cof[2] * cof[2] + cof[5] * cof[5] + cof[8] * cof[8];
         const Vec<W> f2 = norm2(G[s]);
-        Materials::template stresses<1, W>(G + s, k, P);
-        const Vec<W> mises2 = von_mises_squared(G[s], P[0]);
+        // Few lanes are looked at one by one, for sqrt(x) <= (1 + x) / 2.
+        const Vec<W> at_most = larger<W>(cx, larger<W>(cy, cz)) +
+                               larger<W>(J - 1.0f, 1.0f - J) * (0.5f + (1.0f / 6) * f2);
+        if (!any_negative<W>(bits<W>(least - at_most) & is_point)) continue;
         for (int i = 0; i < W; ++i) {
-          const float v = volume[i];
-          if (v == 0) continue;
+          if (point[i] < 0) continue;
           const float stiffening =
               std::max(cx[i], std::max(cy[i], cz[i])) + std::fabs(J[i] - 1) * std::sqrt(f2[i] / 3);
-          if (!std::isfinite(energy[i] + stiffening)) result.finite = false;
-          result.elastic_energy += static_cast<double>(energy[i]) * v;
+          if (!std::isfinite(stiffening)) result.finite = false;
           const int material = f.material == nullptr ? 0 : f.material[point[i]];
           result.stiffening[material] = std::max(result.stiffening[material], stiffening);
-          if (von_mises) von_mises[lane + s * l.stride + i] = std::sqrt(mises2[i]);
         }
+        least = b.material != Block::kMixed
+                    ? result.stiffening[b.material]
+                    : *std::min_element(result.stiffening.begin(), result.stiffening.end());
       }
     }
   }
+  result.elastic_energy = stabilise_cells(b, f, l, scratch.nodes.data(), nullptr);
+  for (const double e : energy) result.elastic_energy += e;
+  result.finite = result.finite && std::isfinite(result.elastic_energy);
   return result;
 }
 

@@ -29,18 +29,19 @@ class LinearisedMotion {
   using Vector = Array<float>[3];
 
   void accelerations(Vector& out);
-  /// Sums f(component, node) over all nodes, in a fixed order.
+  /// Sums f(component, i) over all entries of a vector, in a fixed order.
   template <class F>
   double sum(const F& f);
-  /// Calls f(component, node) for all nodes.
+  /// Calls f(component, i) for all entries of a vector.
   template <class F>
   void for_each(const F& f);
 
   MpmState& state_;
-  std::vector<int> blocks_;
-  std::size_t count_;
-  Vector u_, rates_;  ///< what the state's nodes had
-  Vector at_rest_;    ///< accelerations without displacement [m/s^2]
+  std::vector<int> blocks_;          ///< that take part
+  std::vector<std::int32_t> nodes_;  ///< that those see: the vectors have an entry for each
+  Array<float> mass_;                ///< of these [kg]
+  Array<float> u_[3], rates_[3];     ///< what the state's nodes had
+  Vector at_rest_;                   ///< accelerations without displacement [m/s^2]
   Vector before_, v_, w_;
 };
 

@@ -30,7 +30,8 @@ bool is_near(const MpmState& state, const Box& box) {
   });
 }
 
-/// How far a tool that is near tissue goes in the frame at most, with both ends [m].
+/// How far a tool that is near tissue goes in the frame at most, with both ends, where it pushes [m]:
+/// a blade cuts its way along its plane.
 double farthest_motion(const MpmState& state, const FrameInput& input) {
   const Scene& scene = state.scene;
   const std::vector<Box> reach = collider_reach(scene, input, 1 / scene.frame_rate);
@@ -41,8 +42,11 @@ double farthest_motion(const MpmState& state, const FrameInput& input) {
     const Tool& tool = scene.tools[i];
     const double length = tool.type == ToolType::kProbe ? tool.length : tool.blade_length;
     const double turn = m.begin.orientation.angularDistance(m.end.orientation);
-    const double step = (m.end.position - m.begin.position).norm();
-    farthest = std::max(farthest, step + turn * length);
+    const Vec3 step = m.end.position - m.begin.position;
+    const double pushed = tool.type == ToolType::kScalpel
+                              ? std::fabs(step.dot(m.begin.orientation * Vec3::UnitY()))
+                              : step.norm();
+    farthest = std::max(farthest, pushed + turn * length);
   }
   return farthest;
 }

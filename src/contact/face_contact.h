@@ -18,11 +18,15 @@ namespace tissue_sim {
 struct MpmState;
 struct Pieces;
 
+inline constexpr double kNever = 1e30;  ///< [s]
+
 /// A facet against another, on the CPU.
 struct FaceContact : FaceSpring {
   CellNodes nodes, other_nodes;
   AxisWeights weights, other_weights;  ///< at the facet's centre; at `hold`
-  double looked_at = 0, look_at = 0;   ///< last and next [s]
+  bool is_small = false;     ///< of a small piece, which is looked at by itself as well:
+  double looked_at = 0;      ///< when last [s]
+  double look_at = kNever;   ///< when by itself next [s]
 };
 
 struct FaceContacts {
@@ -39,7 +43,8 @@ struct FaceContacts {
   /// face.
   std::vector<std::int32_t> first_of_block, of_block;
   std::vector<KeptContact> kept;                            ///< sorted by point and direction
-  double until_search = 0, until_look = 0;                  ///< of any contact [s]
+  double until_search = 0, until_look = 0;                  ///< at any contact [s]
+  double look_at = 0;                                       ///< at all of them, on the CPU [s]
   double since_look = 0;  ///< on a GPU, which looks at all together [s]
 };
 

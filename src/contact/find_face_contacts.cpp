@@ -36,12 +36,14 @@ void list_active(MpmState& s) {
 }
 
 /// Looks at the contacts that are due, `all` of them after a search, which knows where facets are.
-/// A few that move fast, crumbs for one, do not make the others be looked at as often.
+/// The fastest says when all are due again, but for those of small pieces: crumbs that rattle about
+/// are looked at by themselves in between.
 void look_at_due(MpmState& s, double dt, bool all) {
   FaceContacts& faces = s.faces;
+  const bool common = all || is_due(faces.look_at - s.time, dt);
   std::vector<std::int32_t> due, facets;
   for (std::size_t i = 0; i < faces.all.size(); ++i) {
-    if (all || is_due(faces.all[i].look_at - s.time, dt)) due.push_back(static_cast<int>(i));
+    if (common || is_due(faces.all[i].look_at - s.time, dt)) due.push_back(static_cast<int>(i));
   }
   if (!all) {
     for (const std::int32_t i : due) {
@@ -57,20 +59,32 @@ void look_at_due(MpmState& s, double dt, bool all) {
         static_cast<int>(facets.size()),
         [&](int i) { faces.motion[facets[i]] = motion_of(s, facets[i]); }, 32);
   }
+  std::vector<float> speed(due.size());
   s.cpu->for_each(
       static_cast<int>(due.size()),
       [&](int i) {
         ContactFaces contact(s, due[i]);
         FaceContact& c = faces.all[due[i]];
         const auto since = static_cast<float>(s.time - c.looked_at);
-        const float speed = look(contact, c, static_cast<float>(dt), since);
+        speed[i] = look(contact, c, static_cast<float>(dt), since);
         c.looked_at = s.time;
-        c.look_at = s.time + look_horizon(speed, s.scene.cell_size, dt);
       },
       32);
   list_active(s);
-  double next = s.time + kLongestLook * dt;
-  for (const FaceContact& c : faces.all) next = std::min(next, c.look_at);
+  float fastest = 0;
+  for (std::size_t i = 0; i < due.size(); ++i) {
+    FaceContact& c = faces.all[due[i]];
+    if (c.is_small) {
+      c.look_at = s.time + look_horizon(speed[i], s.scene.cell_size, dt);
+    } else {
+      fastest = std::max(fastest, speed[i]);
+    }
+  }
+  if (common) faces.look_at = s.time + look_horizon(fastest, s.scene.cell_size, dt);
+  double next = faces.look_at;
+  for (const FaceContact& c : faces.all) {
+    if (c.is_small) next = std::min(next, c.look_at);
+  }
   faces.until_look = next - s.time;
 }
 
@@ -221,6 +235,7 @@ bool search(MpmState& s, const Pieces& pieces) {
       all.back().nodes = CellNodes(block_of(s, f), facet_of(s, f).cell);
       all.back().weights = AxisWeights(facet_of(s, f).center);
       all.back().looked_at = s.time;
+      all.back().is_small = size[pieces.of_point[facet_of(s, f).point]] <= kMayFly;
     }
     contact[f] = static_cast<std::int32_t>(all.size() - 1);
     faces.first_near.push_back(faces.first_near.back() + count[f]);

@@ -14,6 +14,16 @@ struct SlotCache {
   uint4* more;            ///< the next four; null where there is no room
 };
 
+/// Marks a slot whose node contact may push.
+__device__ __forceinline__ void mark_slot(const std::int32_t* slot_node,
+                                          const std::uint32_t* slot_parts,
+                                          const std::uint8_t* marks, std::size_t slot,
+                                          std::uint32_t* pushed_parts) {
+  const std::int32_t entry = slot_node[slot];
+  const bool pushed = marks[entry < 0 ? ~entry : entry] != 0;
+  pushed_parts[slot] = slot_parts[slot] | (pushed ? kPushed : 0);
+}
+
 /// Slots 4 to 7 that share a node.
 __device__ __forceinline__ uint4 more_parts(const CudaTables& t, std::uint32_t shared) {
   const std::uint32_t *part = t.parts + (shared >> 6) + 4, count = shared & 63u;
@@ -33,13 +43,13 @@ __device__ __forceinline__ void fill_cache(const CudaTables& t, int first_slot, 
   }
 }
 
-/// Forces of contacts of tissue with tissue on the nodes, of the substep before and of the next.
+/// Sums of pushes on the nodes: that of the substep before and the one to clear.
 struct PushedNodes {
   const long long* force;
   long long* clear;
 };
 
-/// What contacts push a node with.
+/// What contact pushes a node with.
 struct Pushed {
   long long force[3];
 
@@ -89,8 +99,8 @@ struct SlotEntry {
 /// last substep, summed in the order of the slots; every block that has a node computes the same,
 /// and the one that owns it writes it down. Each thread has kHand nodes in hand, for all their
 /// loads to be under way at once; what the tables say of the next ones comes meanwhile. `pushed` is
-/// read with kFaces alone.
-template <bool kMove, bool kCached, int kHand, bool kFaces = false>
+/// read with kPushes alone.
+template <bool kMove, bool kCached, int kHand, bool kPushes = false>
 __device__ __forceinline__ void bring_nodes(const CudaTables& t, int first_slot, int count,
                                             const SlotCache& cache, const CudaNodes& from,
                                             const CudaNodes& to, const float4* force,
@@ -126,7 +136,7 @@ __device__ __forceinline__ void bring_nodes(const CudaTables& t, int first_slot,
       u[k] = __ldcg(from.u + node[k]);
       if (kMove || v_out != nullptr) v[k] = __ldcg(from.v + node[k]);
       if (!kMove) continue;
-      if (kFaces) {
+      if (kPushes) {
         push[k] = Pushed(pushed, (shared[k] & kPushed) != 0, owned[k], node[k]);
         shared[k] &= ~kPushed;
       }
@@ -158,7 +168,7 @@ __device__ __forceinline__ void bring_nodes(const CudaTables& t, int first_slot,
         for (int p = 8; p < part_count; ++p) {
           add(__ldcg(force + __ldg(t.parts + (shared[k] >> 6) + p)), f[k]);
         }
-        if (kFaces) add({push[k].of(0), push[k].of(1), push[k].of(2), 0}, f[k]);
+        if (kPushes) add({push[k].of(0), push[k].of(1), push[k].of(2), 0}, f[k]);
         step.move(0, f[k].x, u[k].w, v[k].w, u[k].x, v[k].x);
         step.move(1, f[k].y, u[k].w, v[k].w, u[k].y, v[k].y);
         step.move(2, f[k].z, u[k].w, v[k].w, u[k].z, v[k].z);

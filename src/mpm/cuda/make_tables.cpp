@@ -217,7 +217,6 @@ void add_bundle(int first_block, int blocks, std::vector<std::vector<CudaColumn>
   bundle.columns = static_cast<int>(t.columns.size()) - bundle.first_column;
   t.max_slots = std::max(t.max_slots, bundle.slots);
   t.max_plane_slots = std::max(t.max_plane_slots, bundle.plane_slots);
-  t.max_halves = std::max(t.max_halves, 2 * bundle.columns * bundle.nz);
   t.bundles.push_back(bundle);
 }
 
@@ -246,7 +245,7 @@ void make_tables(const MpmState& state, const std::vector<std::vector<int>>& bun
   });
   t.bundles.clear();
   t.columns.clear();
-  t.max_slots = t.max_plane_slots = t.max_halves = 0;
+  t.max_slots = t.max_plane_slots = 0;
   int first = 0;
   for (const std::vector<int>& blocks : bundles) {
     add_bundle(first, static_cast<int>(blocks.size()), columns, t);

@@ -98,14 +98,14 @@ struct SlotEntry {
 /// size, so that stencils give gradients). With `kMove` it first moves them on by the forces of the
 /// last substep, summed in the order of the slots; every block that has a node computes the same,
 /// and the one that owns it writes it down. Each thread has kHand nodes in hand, for all their
-/// loads to be under way at once; what the tables say of the next ones comes meanwhile. `pushed` is
+/// loads to be under way at once; what the tables say of the next ones comes meanwhile. `pushes` is
 /// read with kPushes alone.
 template <bool kMove, bool kCached, int kHand, bool kPushes = false>
 __device__ __forceinline__ void bring_nodes(const CudaTables& t, int first_slot, int count,
                                             const SlotCache& cache, const CudaNodes& from,
                                             const CudaNodes& to, const float4* force,
                                             const NodeStep& step, float scale, float4* u_out,
-                                            float4* v_out, const PushedNodes& pushed = {}) {
+                                            float4* v_out, const PushedNodes& pushes = {}) {
   const int threads = static_cast<int>(blockDim.x);
   SlotEntry<kMove> coming[kHand];
   const auto load_entries = [&](int i) {
@@ -128,6 +128,7 @@ __device__ __forceinline__ void bring_nodes(const CudaTables& t, int first_slot,
     float4 u[kHand], v[kHand], f[kHand], more[kHand][7] = {};
     uint4 next_parts[kHand];
     Pushed push[kHand];
+    bool pushed[kHand];
 #pragma unroll
     for (int k = 0; k < kHand; ++k) {
       owned[k] = coming[k].node >= 0;
@@ -137,7 +138,8 @@ __device__ __forceinline__ void bring_nodes(const CudaTables& t, int first_slot,
       if (kMove || v_out != nullptr) v[k] = __ldcg(from.v + node[k]);
       if (!kMove) continue;
       if (kPushes) {
-        push[k] = Pushed(pushed, (shared[k] & kPushed) != 0, owned[k], node[k]);
+        pushed[k] = (shared[k] & kPushed) != 0;
+        push[k] = Pushed(pushes, pushed[k], owned[k], node[k]);
         shared[k] &= ~kPushed;
       }
       f[k] = __ldcg(force + coming[k].parts.x);
@@ -168,7 +170,7 @@ __device__ __forceinline__ void bring_nodes(const CudaTables& t, int first_slot,
         for (int p = 8; p < part_count; ++p) {
           add(__ldcg(force + __ldg(t.parts + (shared[k] >> 6) + p)), f[k]);
         }
-        if (kPushes) add({push[k].of(0), push[k].of(1), push[k].of(2), 0}, f[k]);
+        if (kPushes && pushed[k]) add({push[k].of(0), push[k].of(1), push[k].of(2), 0}, f[k]);
         step.move(0, f[k].x, u[k].w, v[k].w, u[k].x, v[k].x);
         step.move(1, f[k].y, u[k].w, v[k].w, u[k].y, v[k].y);
         step.move(2, f[k].z, u[k].w, v[k].w, u[k].z, v[k].z);

@@ -235,20 +235,35 @@ __device__ __forceinline__ void push_cell(const CudaTables& t, const CudaNodes& 
   if (lane < 27) add_push(pushes.force + 3 * static_cast<std::size_t>(node), 1.0f, force);
 }
 
-/// The cells near colliders that the lanes of a warp look at, the first of them under way while
-/// other things are done. Warps `warp` of `warps` take part; cells side by side are of different
-/// warps.
+/// What lane `from` of a warp has of a cell.
+__device__ __forceinline__ NearCell cell_of_lane(const NearCell& mine, int from) {
+  const auto get = [from](auto value) { return __shfl_sync(0xffffffffu, value, from); };
+  NearCell cell;
+#pragma unroll
+  for (int a = 0; a < 3; ++a) cell.middle[a] = get(mine.middle[a]);
+  cell.near = get(mine.near);
+  cell.slot = get(mine.slot);
+  cell.pitch = get(mine.pitch);
+  cell.plane = get(mine.plane);
+  cell.lane = get(mine.lane);
+  cell.step = get(mine.step);
+  cell.body = get(mine.body);
+  return cell;
+}
+
+/// The cells near colliders that the lanes of a warp look at, each the next of its own under way
+/// while other things are done. Warps `warp` of `warps` take part; cells side by side are of
+/// different warps.
 struct NearSearch {
   const NearCell* cells;
   int count, i, step;
-  float4 middle;  // and the node there
-  std::uint32_t near;
+  NearCell next;
 
   __device__ __forceinline__ void load() {
-    near = 0;
     if (i >= count) return;
-    middle = __ldg(reinterpret_cast<const float4*>(cells + i));
-    near = __ldg(&cells[i].near);
+    int4* to = reinterpret_cast<int4*>(&next);
+#pragma unroll
+    for (int k = 0; k < 3; ++k) to[k] = __ldg(reinterpret_cast<const int4*>(cells + i) + k);
   }
   __device__ __forceinline__ NearSearch(const CudaFrame& f, int warp, int warps)
       : cells(f.near_cells),
@@ -261,20 +276,22 @@ struct NearSearch {
   __device__ __forceinline__ void push(const CudaTables& t, const CudaNodes& state, float reach,
                                        const ToolPushes& pushes, CellNodes& nodes) {
     while (__any_sync(0xffffffffu, i < count)) {
+      const NearCell cell = next;
+      const std::uint32_t near = i < count ? cell.near : 0;
       bool close = false;
+      float4 u;
+      if (near != 0) u = __ldcg(state.u + cell.node);
+      i += step;
+      load();
       if (near != 0) {
-        const float4 u = __ldcg(state.u + __float_as_int(middle.w));
-        const float x[3] = {middle.x + u.x, middle.y + u.y, middle.z + u.z};
+        const float x[3] = {cell.middle[0] + u.x, cell.middle[1] + u.y, cell.middle[2] + u.z};
         for (std::uint32_t left = near; left != 0 && !close; left &= left - 1) {
           close = may_touch(pushes.colliders[__ffs(static_cast<int>(left)) - 1], x, reach);
         }
       }
       for (unsigned left = __ballot_sync(0xffffffffu, close); left != 0; left &= left - 1) {
-        const int from = __ffs(static_cast<int>(left)) - 1;
-        push_cell(t, state, cells[__shfl_sync(0xffffffffu, i, from)], pushes, nodes);
+        push_cell(t, state, cell_of_lane(cell, __ffs(static_cast<int>(left)) - 1), pushes, nodes);
       }
-      i += step;
-      load();
     }
   }
 };

@@ -202,8 +202,7 @@ __device__ __forceinline__ void block_forces(const CudaTables& t, const CudaBund
   const int4 first{block.nx, block.ny, block.nz, block.first_slot};
   const int column = min(index, columns - 1);
   Walk walk{t, body, s};
-  walk.column = kSpecial ? column_of(t, w, block, body.cell_size, column)
-                         : column_of(block, body.cell_size, column);
+  walk.column = kSpecial ? column_of(t, w, block, column) : column_of(block, column);
 
   // Puts what the columns' cells give to plane z together and to the nodes.
   const auto finish_plane = [&](PlaneNumbers(&plane)[3], int z) {

@@ -186,7 +186,7 @@ __device__ __forceinline__ void bring_nodes(const CudaTables& t, int first_slot,
 }
 
 /// Column `index` of a block that is alone in its bundle, all of whose columns hold points.
-__device__ __forceinline__ CudaColumn column_of(const CudaBlock& b, float cell_size, int index) {
+__device__ __forceinline__ CudaColumn column_of(const CudaBlock& b, int index) {
   const int y = index / b.nx, x = index - y * b.nx;
   CudaColumn c;
   c.pitch = b.nx + 2;
@@ -197,18 +197,14 @@ __device__ __forceinline__ CudaColumn column_of(const CudaBlock& b, float cell_s
   c.step = b.nx * b.ny;
   c.cell = b.first_lane / 8 + index;
   c.plane_slot = c.slot;
-  c.middle[0] = b.origin[0] + cell_size * static_cast<float>(x + 1);
-  c.middle[1] = b.origin[1] + cell_size * static_cast<float>(y + 1);
-  c.middle[2] = b.origin[2] + cell_size;
   c.whole = b.whole;
   return c;
 }
 /// Column `index` of a bundle, `block` its first: from memory only where it must be.
 __device__ __forceinline__ CudaColumn column_of(const CudaTables& t, const CudaBundle& w,
-                                                const CudaBlock& block, float cell_size,
-                                                int index) {
+                                                const CudaBlock& block, int index) {
   if (w.blocks == 1 && w.columns == block.nx * block.ny) {
-    return column_of(block, cell_size, index);
+    return column_of(block, index);
   }
   return t.columns[w.first_column + index];
 }

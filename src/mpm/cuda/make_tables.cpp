@@ -121,7 +121,7 @@ void connect(std::size_t node_count, Cpu& cpu, HostTables& t) {
 }
 
 /// The columns of the block that hold points, as if it were alone in its bundle.
-std::vector<CudaColumn> columns_of(const CudaBlock& b, float cell_size, const HostTables& t) {
+std::vector<CudaColumn> columns_of(const CudaBlock& b, const HostTables& t) {
   std::vector<CudaColumn> columns;
   const int step = b.nx * b.ny;
   for (int i = 0; i < step; ++i) {
@@ -138,9 +138,6 @@ std::vector<CudaColumn> columns_of(const CudaBlock& b, float cell_size, const Ho
     c.step = step;
     c.cell = b.first_lane / 8 + i;
     c.plane_slot = c.slot;
-    c.middle[0] = b.origin[0] + cell_size * static_cast<float>(x + 1);
-    c.middle[1] = b.origin[1] + cell_size * static_cast<float>(y + 1);
-    c.middle[2] = b.origin[2] + cell_size;
     c.whole = b.whole;
     columns.push_back(c);
   }
@@ -241,7 +238,7 @@ void make_tables(const MpmState& state, const std::vector<std::vector<int>>& bun
     const CudaBody& body = t.bodies[block.body];
     fill_points(from, body.point_volume, block, t);
     fill_slots(from, block, t);
-    columns[i] = columns_of(block, body.cell_size, t);
+    columns[i] = columns_of(block, t);
   });
   t.bundles.clear();
   t.columns.clear();

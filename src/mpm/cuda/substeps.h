@@ -31,7 +31,7 @@ struct CudaPlan {
 /// How a thread block's shared memory is laid out.
 struct CudaLayout {
   int max_slots;
-  int node_room, exchange;  ///< float4s
+  int node_room, exchange;  ///< float4s: for a bundle's nodes, for what columns give to planes
   bool eight_parts, two_planes;
 };
 
@@ -48,8 +48,8 @@ int resident_blocks(CudaPlan& plan, int block_count);
 int most_at_once(const CudaPlan& plan);
 int most_slots(const CudaPlan& plan);
 
-/// Enqueues substeps as one kernel, with contact if the plan has it. The
-/// state is then in `state[(current + substeps) % 2]`.
+/// Enqueues substeps as one kernel, with contact if the plan has it. The state is then in
+/// `state[(current + substeps) % 2]`.
 void launch_substeps(const CudaPlan& plan, const CudaTables& tables, const CudaFrame& frame,
                      int resident, cudaStream_t stream);
 

@@ -62,7 +62,6 @@ struct alignas(16) CudaColumn {
   int step;          ///< lanes from a sub-position to the next
   int cell;          ///< its lowest in CudaTables::partial
   int plane_slot;    ///< the same within a plane, of the bundle's
-  float middle[3];   ///< reference place of its lowest cell's middle [m]
   int whole;         ///< as CudaBlock::whole
 };
 
@@ -82,9 +81,8 @@ struct alignas(16) NearCell {
   int unused;
 };
 
-/// Forces on the nodes of what is no tissue of their own: colliders and facets. [3][nodes][3], in
-/// units of kLoadUnit as integers: while one is summed up, that of the substep before is read and
-/// the third is cleared.
+/// Forces of colliders and facets on the nodes, [3][nodes][3], in units of kLoadUnit as integers:
+/// while one is summed up, that of the substep before is read and the third is cleared.
 struct NodePushes {
   long long* force = nullptr;
   std::size_t stride = 0;  ///< from one of the three to the next
@@ -140,8 +138,8 @@ struct CudaFrame {
   NodeStep step;
   const Collider* colliders;  ///< [substeps][collider_count]
   int collider_count;
-  long long* loads;  ///< [substeps][collider_count][6]
-  const NearCell* near_cells;
+  long long* loads;            ///< [substeps][collider_count][6]
+  const NearCell* near_cells;  ///< null where no collider comes near
   const int* near_count;
   float cell_size;  ///< the scene's [m]
   NodePushes pushes;

@@ -1,9 +1,9 @@
-// Force of a block's points on its nodes, and of colliders on its points. For .cu files.
+// Force of a block's points on its nodes. For .cu files.
 #pragma once
 
+#include "mpm/cuda/block_nodes.h"
 #include "mpm/cuda/cell_stabilisation.h"
 #include "mpm/cuda/half_forces.h"
-#include "mpm/cuda/tool_pushes.h"
 
 namespace tissue_sim {
 
@@ -11,34 +11,27 @@ struct FaceRounds;
 
 /// What a block's threads share, in shared memory.
 struct BlockShared {
-  float4* u;                  ///< [slots], divided by the cell size
-  float4* v;                  ///< [slots], the same; only where contact or viscosity needs it
-  float4* exchange;           ///< [1 or 2 planes][plane slots][9]
-  unsigned long long* loads;  ///< [kMaxColliders][6]
-  Collider* colliders;        ///< [kMaxColliders]
+  float4* u;            ///< [slots], divided by the cell size
+  float4* v;            ///< [slots], the same; only where viscosity needs it
+  float4* exchange;     ///< [1 or 2 planes][plane slots][9]
+  Collider* colliders;  ///< [kMaxColliders]
   FaceRounds* rounds;
 };
 
 /// What one substep of a bundle needs beside its nodes.
 struct BlockStep {
-  const HalfPush* pushes;  ///< of colliders, see find_pushes()
-  Touched touched;         ///< the half cells of the thread's column that they push
-  float4* force;           ///< of all slots
-  bool two_planes;         ///< CudaPlan::two_planes
+  float4* force;    ///< of all slots
+  bool two_planes;  ///< CudaPlan::two_planes
 };
 
 /// A column of a bundle and the thread that walks up it, alone or, with kPairs, with its neighbour
 /// in the warp: one has the lower, the other the upper halves of the cells.
-template <class LawOf, bool kViscous, bool kSpecial, bool kPartial, bool kPairs>
+template <class LawOf, bool kViscous, bool kPartial, bool kPairs>
 struct ColumnWalk {
-  static constexpr bool kValues = kSpecial || kPartial;
   const CudaTables& t;
-  const CudaBundle& w;
   const CudaBody& body;
   const BlockShared& s;
-  const BlockStep& step;
   CudaColumn column;
-  int index;
   PlaneNumbers center[3], below[3];  ///< of u, of the next cell's planes; not kPairs
   PlaneNumbers now[3], next[3] = {}, after[3] = {};  ///< what planes of nodes get
 
@@ -46,14 +39,6 @@ struct ColumnWalk {
     return kPairs ? thread / 2 : thread;
   }
 
-  /// Adds what colliders push the points of a half with to what it gives back.
-  __device__ __forceinline__ void push(int z, int sz, HalfPlane (&out)[3]) const {
-    if (!kSpecial || ((sz == 0 ? step.touched.cells[0] : step.touched.cells[1]) >> z & 1u) == 0)
-      return;
-    const HalfPush& push = step.pushes[2 * (z * w.columns + index) + sz];
-#pragma unroll
-    for (int c = 0; c < 3; ++c) add_forces(*reinterpret_cast<const float4*>(push.of[c]), out[c]);
-  }
   /// -kStabilisation mu V / cell size where the cell is not full, else 0.
   __device__ __forceinline__ float stiffness(int z) const {
     return -kStabilisation * body.inv_cell_size * __ldg(t.partial + column.cell + z * column.step);
@@ -75,16 +60,15 @@ struct ColumnWalk {
       viscous_stress(body, h, rate, side, volume, damping);
     }
     half_forces<LawOf, kViscous>(body, h, side, volume, damping, out);
-    push(z, sz, out);
     const GiveWeights k(side);
     const float extra = kPartial ? stiffness(z) : 0;
 #pragma unroll
     for (int c = 0; c < 3; ++c) {
       HalfBends bends;
       if (kPartial && extra != 0) stabilise_half(extra, side, h[c], bent[c], out[c], bends);
-      now[c] = plus<kValues>(next[c], out[c], k.below, k.slope_below);
-      next[c] = plus<kValues>(after[c], out[c], kAverageCenter, k.slope_center);
-      after[c] = plus<kValues>({}, out[c], k.above, k.slope_above);
+      now[c] = plus<kPartial>(next[c], out[c], k.below, k.slope_below);
+      next[c] = plus<kPartial>(after[c], out[c], kAverageCenter, k.slope_center);
+      after[c] = plus<kPartial>({}, out[c], k.above, k.slope_above);
       if (!kPartial || extra == 0) continue;
       now[c] = plus(now[c], bends, k.below, k.slope_below);
       next[c] = plus(next[c], bends, kAverageCenter, k.slope_center);
@@ -116,13 +100,12 @@ struct ColumnWalk {
         half_between(sz == 0 ? above[c] : below[c], center[c], sz == 0 ? below[c] : above[c], h[c]);
       }
       half_forces<LawOf, false>(body, h, side, half_volumes(t, column, body, z, sz), nullptr, out);
-      push(z, sz, out);
       const GiveWeights k(side);
 #pragma unroll
       for (int c = 0; c < 3; ++c) {
-        now[c] = plus<kValues>(now[c], out[c], k.below, k.slope_below);
-        next[c] = plus<kValues>(next[c], out[c], kAverageCenter, k.slope_center);
-        after[c] = plus<kValues>(after[c], out[c], k.above, k.slope_above);
+        now[c] = plus<kPartial>(now[c], out[c], k.below, k.slope_below);
+        next[c] = plus<kPartial>(next[c], out[c], kAverageCenter, k.slope_center);
+        after[c] = plus<kPartial>(after[c], out[c], k.above, k.slope_above);
       }
     }
     const float extra = kPartial ? stiffness(z) : 0;
@@ -204,23 +187,22 @@ __device__ __forceinline__ int4 block_size(const CudaTables& t, int block) {
 }
 
 /// Forces of a bundle. Each column of cells has a thread, or two, that walks up it with what the
-/// cells give to the next two node planes in registers. `block` is the bundle's first; contact and
-/// bundles of several blocks need kSpecial, cells that are not full kPartial.
+/// cells give to the next two node planes in registers. `block` is the bundle's first; bundles
+/// of several blocks need kSpecial, cells that are not full kPartial.
 template <class LawOf, bool kViscous, bool kSpecial, bool kPartial, bool kPairs>
 __device__ __forceinline__ void block_forces(const CudaTables& t, const CudaBundle& w,
                                              const CudaBlock& block, const CudaBody& body,
                                              const BlockShared& s, const BlockStep& step) {
-  using Walk = ColumnWalk<LawOf, kViscous, kSpecial, kPartial, kPairs>;
+  using Walk = ColumnWalk<LawOf, kViscous, kPartial, kPairs>;
   const int thread = static_cast<int>(threadIdx.x), index = Walk::index_of(thread);
   const int nz = kSpecial ? w.nz : block.nz;
   const int columns = kSpecial ? w.columns : block.nx * block.ny;
   // Threads beyond the last column do what the last one's do, if their warp has to anyway.
   const bool active = index < columns, warp_active = Walk::index_of(thread / 32 * 32) < columns;
   const int4 first{block.nx, block.ny, block.nz, block.first_slot};
-  Walk walk{t, w, body, s, step};
-  walk.index = min(index, columns - 1);
-  walk.column = kSpecial ? column_of(t, w, block, body.cell_size, walk.index)
-                         : column_of(block, body.cell_size, walk.index);
+  const int column = min(index, columns - 1);
+  Walk walk{t, body, s};
+  walk.column = kSpecial ? column_of(t, w, block, column) : column_of(block, column);
 
   // Puts what the columns' cells give to plane z together and to the nodes.
   const auto finish_plane = [&](PlaneNumbers(&plane)[3], int z) {

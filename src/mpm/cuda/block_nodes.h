@@ -14,6 +14,16 @@ struct SlotCache {
   uint4* more;            ///< the next four; null where there is no room
 };
 
+/// Marks a slot whose node contact may push.
+__device__ __forceinline__ void mark_slot(const std::int32_t* slot_node,
+                                          const std::uint32_t* slot_parts,
+                                          const std::uint8_t* marks, std::size_t slot,
+                                          std::uint32_t* pushed_parts) {
+  const std::int32_t entry = slot_node[slot];
+  const bool pushed = marks[entry < 0 ? ~entry : entry] != 0;
+  pushed_parts[slot] = slot_parts[slot] | (pushed ? kPushed : 0);
+}
+
 /// Slots 4 to 7 that share a node.
 __device__ __forceinline__ uint4 more_parts(const CudaTables& t, std::uint32_t shared) {
   const std::uint32_t *part = t.parts + (shared >> 6) + 4, count = shared & 63u;
@@ -33,13 +43,13 @@ __device__ __forceinline__ void fill_cache(const CudaTables& t, int first_slot, 
   }
 }
 
-/// Forces of contacts of tissue with tissue on the nodes, of the substep before and of the next.
+/// Sums of pushes on the nodes: that of the substep before and the one to clear.
 struct PushedNodes {
   const long long* force;
   long long* clear;
 };
 
-/// What contacts push a node with.
+/// What contact pushes a node with.
 struct Pushed {
   long long force[3];
 
@@ -88,14 +98,14 @@ struct SlotEntry {
 /// size, so that stencils give gradients). With `kMove` it first moves them on by the forces of the
 /// last substep, summed in the order of the slots; every block that has a node computes the same,
 /// and the one that owns it writes it down. Each thread has kHand nodes in hand, for all their
-/// loads to be under way at once; what the tables say of the next ones comes meanwhile. `pushed` is
-/// read with kFaces alone.
-template <bool kMove, bool kCached, int kHand, bool kFaces = false>
+/// loads to be under way at once; what the tables say of the next ones comes meanwhile. `pushes` is
+/// read with kPushes alone.
+template <bool kMove, bool kCached, int kHand, bool kPushes = false>
 __device__ __forceinline__ void bring_nodes(const CudaTables& t, int first_slot, int count,
                                             const SlotCache& cache, const CudaNodes& from,
                                             const CudaNodes& to, const float4* force,
                                             const NodeStep& step, float scale, float4* u_out,
-                                            float4* v_out, const PushedNodes& pushed = {}) {
+                                            float4* v_out, const PushedNodes& pushes = {}) {
   const int threads = static_cast<int>(blockDim.x);
   SlotEntry<kMove> coming[kHand];
   const auto load_entries = [&](int i) {
@@ -118,6 +128,7 @@ __device__ __forceinline__ void bring_nodes(const CudaTables& t, int first_slot,
     float4 u[kHand], v[kHand], f[kHand], more[kHand][7] = {};
     uint4 next_parts[kHand];
     Pushed push[kHand];
+    bool pushed[kHand];
 #pragma unroll
     for (int k = 0; k < kHand; ++k) {
       owned[k] = coming[k].node >= 0;
@@ -126,8 +137,9 @@ __device__ __forceinline__ void bring_nodes(const CudaTables& t, int first_slot,
       u[k] = __ldcg(from.u + node[k]);
       if (kMove || v_out != nullptr) v[k] = __ldcg(from.v + node[k]);
       if (!kMove) continue;
-      if (kFaces) {
-        push[k] = Pushed(pushed, (shared[k] & kPushed) != 0, owned[k], node[k]);
+      if (kPushes) {
+        pushed[k] = (shared[k] & kPushed) != 0;
+        push[k] = Pushed(pushes, pushed[k], owned[k], node[k]);
         shared[k] &= ~kPushed;
       }
       f[k] = __ldcg(force + coming[k].parts.x);
@@ -158,7 +170,7 @@ __device__ __forceinline__ void bring_nodes(const CudaTables& t, int first_slot,
         for (int p = 8; p < part_count; ++p) {
           add(__ldcg(force + __ldg(t.parts + (shared[k] >> 6) + p)), f[k]);
         }
-        if (kFaces) add({push[k].of(0), push[k].of(1), push[k].of(2), 0}, f[k]);
+        if (kPushes && pushed[k]) add({push[k].of(0), push[k].of(1), push[k].of(2), 0}, f[k]);
         step.move(0, f[k].x, u[k].w, v[k].w, u[k].x, v[k].x);
         step.move(1, f[k].y, u[k].w, v[k].w, u[k].y, v[k].y);
         step.move(2, f[k].z, u[k].w, v[k].w, u[k].z, v[k].z);
@@ -174,7 +186,7 @@ __device__ __forceinline__ void bring_nodes(const CudaTables& t, int first_slot,
 }
 
 /// Column `index` of a block that is alone in its bundle, all of whose columns hold points.
-__device__ __forceinline__ CudaColumn column_of(const CudaBlock& b, float cell_size, int index) {
+__device__ __forceinline__ CudaColumn column_of(const CudaBlock& b, int index) {
   const int y = index / b.nx, x = index - y * b.nx;
   CudaColumn c;
   c.pitch = b.nx + 2;
@@ -185,18 +197,14 @@ __device__ __forceinline__ CudaColumn column_of(const CudaBlock& b, float cell_s
   c.step = b.nx * b.ny;
   c.cell = b.first_lane / 8 + index;
   c.plane_slot = c.slot;
-  c.middle[0] = b.origin[0] + cell_size * static_cast<float>(x + 1);
-  c.middle[1] = b.origin[1] + cell_size * static_cast<float>(y + 1);
-  c.middle[2] = b.origin[2] + cell_size;
   c.whole = b.whole;
   return c;
 }
 /// Column `index` of a bundle, `block` its first: from memory only where it must be.
 __device__ __forceinline__ CudaColumn column_of(const CudaTables& t, const CudaBundle& w,
-                                                const CudaBlock& block, float cell_size,
-                                                int index) {
+                                                const CudaBlock& block, int index) {
   if (w.blocks == 1 && w.columns == block.nx * block.ny) {
-    return column_of(block, cell_size, index);
+    return column_of(block, index);
   }
   return t.columns[w.first_column + index];
 }

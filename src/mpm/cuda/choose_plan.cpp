@@ -22,9 +22,7 @@ double cycles(const std::vector<LatticeBody>& bodies, const CudaShape& s,
   const BlockShape& b = s.blocks;
   const bool pairs = s.small && s.pairs();
   const double plane_slots = (b.x + 2.0) * (b.y + 2), slots = plane_slots * (b.z + 2);
-  // The exchange, or the lists of what tools touch (PushLists).
-  const double exchange = std::max(144 * plane_slots, 18.0 * b.x * b.y * b.z + 16);
-  const double shared = (s.small ? 56 : 32) * slots + exchange + 5800;
+  const double shared = (s.small ? 56 : 32) * slots + 144 * plane_slots + 4300;
   if (shared > static_cast<double>(limits.shared_bytes)) return 1e30;
   double blocks = 0;
   int parts = 1;

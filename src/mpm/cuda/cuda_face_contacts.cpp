@@ -108,8 +108,6 @@ void CudaMpmTissue::upload_facets() {
   f.is_involved.resize(count);
   f.takes_part.resize(count);
   f.sorted.resize(count);
-  f.marks.resize(d.u[0].size());
-  f.pushed_parts.resize(d.slot_parts.size());
   if (f.figures.size() == 0) {
     f.figures.resize(1);
     f.figures.clear(d.stream);
@@ -149,10 +147,10 @@ CudaLooks CudaMpmTissue::looks() const {
   s.involved = f.involved.data();
   s.active = f.active.data();
   s.nodes = f.nodes.data();
-  s.marks = f.marks.data();
-  s.node_count = f.marks.size();
+  s.marks = d.marks.data();
+  s.node_count = d.marks.size();
   s.slot_parts = d.slot_parts.data();
-  s.pushed_parts = f.pushed_parts.data();
+  s.pushed_parts = d.pushed_parts.data();
   s.slot_count = d.slot_parts.size();
   s.figures = f.figures.data();
   return s;
@@ -191,7 +189,6 @@ void CudaMpmTissue::search_faces(float dt) {
   if (f.nodes.size() < static_cast<std::size_t>(figures.contacts)) {
     f.nodes.resize(static_cast<std::size_t>(figures.contacts) * 3 / 2);
   }
-  f.force.resize(3 * 3 * d.u[0].size());
   f.searched = true;
   if (!faces.kept.empty()) {
     f.kept.upload(faces.kept, d.stream);
@@ -210,9 +207,6 @@ CudaFaces CudaMpmTissue::faces_of_launch() {
   if (!out.any) return out;
   out.look_first = std::exchange(f.searched, false);
   out.looks = looks();
-  out.force = f.force.data();
-  out.stride = f.force.size() / 3;
-  f.force.clear(d.stream);
   return out;
 }
 

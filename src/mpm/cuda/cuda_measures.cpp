@@ -23,18 +23,10 @@ float CudaMpmTissue::substep_for(const FrameInput& input) {
 
 double CudaMpmTissue::measure_limit(int steps) {
   OnDevice& d = *device_;
-  CudaTables tables = d.tables();
-  DeviceArray<std::uint32_t> near_none;
-  near_none.resize(d.near.size());
-  near_none.clear(d.stream);
-  tables.near = near_none.data();
   CudaFrame frame{};
   for (int i = 0; i < 2; ++i) frame.force[i] = d.force[i].data();
   frame.substeps = 1;
   frame.step.dt = 1;
-  frame.loads = d.loads.data();
-  frame.pushes = d.pushes.data();
-  frame.push_stride = d.push_stride;
   frame.arrived = d.arrived.data();
   CudaLinearisedMotion motion(
       d.present(), d.nodes(1 - d.current), d.u[0].size(), state_->scene.cell_size,
@@ -42,9 +34,9 @@ double CudaMpmTissue::measure_limit(int steps) {
         frame.state[0] = from;
         frame.state[1] = to;
         if (d.all_plain) {
-          launch_substeps(d.plain_plan, tables, frame, d.plain_resident, d.stream);
+          launch_substeps(d.plain_plan, d.tables(), frame, d.plain_resident, d.stream);
         } else {
-          launch_substeps(d.plan, tables, frame, d.resident, d.stream);
+          launch_substeps(d.plan, d.tables(), frame, d.resident, d.stream);
         }
       },
       d.stream);

@@ -10,13 +10,13 @@ namespace tissue_sim {
 namespace {
 
 /// What the tables and the state take on the GPU; clouds and contacts between tissue come on top.
-std::size_t bytes_of(const HostTables& t, std::size_t nodes, std::size_t points, std::size_t pushes,
-                     int held_by) {
-  return t.blocks.size() * (sizeof(CudaBlock) + sizeof(CudaMeasure) + 4) +
+std::size_t bytes_of(const HostTables& t, std::size_t nodes, std::size_t points, int held_by) {
+  const std::size_t of_contact = 9 * sizeof(long long) * nodes + 6 * t.point.size();
+  return t.blocks.size() * (sizeof(CudaBlock) + sizeof(CudaMeasure)) +
          t.bundles.size() * sizeof(CudaBundle) + t.columns.size() * sizeof(CudaColumn) +
-         t.slot_node.size() * (8 + sizeof(uint4) + 2 * sizeof(float4)) + 4 * t.parts.size() +
-         8 * t.point.size() + 4 * t.partial.size() + 4 * sizeof(float4) * nodes +
-         (1 + 13 * held_by) * points + pushes * sizeof(HalfPush);
+         t.slot_node.size() * (12 + sizeof(uint4) + 2 * sizeof(float4)) + 4 * t.parts.size() +
+         8 * t.point.size() + 4 * t.partial.size() + (4 * sizeof(float4) + 1) * nodes +
+         (1 + 13 * held_by) * points + (held_by > 0 ? of_contact : 0);
 }
 
 /// Says how much memory the tissue takes, where the GPU has less.
@@ -34,10 +34,11 @@ void check_memory(std::size_t wanted, std::size_t held) {
 
 std::size_t CudaMpmTissue::device_bytes() const {
   const OnDevice& d = *device_;
-  std::size_t sum = d.blocks.bytes() + d.bundles.bytes() + d.columns.bytes() + d.pushes.bytes() +
-                    d.bodies.bytes() + d.slot_node.bytes() + d.point.bytes() + d.piece.bytes() +
-                    d.place.bytes() + d.slot_parts.bytes() + d.first_parts.bytes() +
-                    d.parts.bytes() + d.near.bytes() + d.colour.bytes() + d.volume.bytes() +
+  std::size_t sum = d.blocks.bytes() + d.bundles.bytes() + d.columns.bytes() +
+                    d.near_cells.bytes() + d.bodies.bytes() + d.slot_node.bytes() +
+                    d.point.bytes() + d.piece.bytes() + d.place.bytes() + d.slot_parts.bytes() +
+                    d.first_parts.bytes() + d.parts.bytes() + d.pushed_parts.bytes() +
+                    d.marks.bytes() + d.pushed.bytes() + d.colour.bytes() + d.volume.bytes() +
                     d.partial.bytes() + d.hold.bytes() + d.bonds.bytes() + d.with.bytes() +
                     d.whole.bytes() + d.u_before.bytes() + d.colliders.bytes() + d.loads.bytes() +
                     d.measures.bytes() + d.cloud.bytes() + d.stretched.bytes() + d.faces.bytes();
@@ -65,13 +66,12 @@ void CudaMpmTissue::plan_tables() {
   d.plan.threads = d.shape.threads;
   d.plan.small = d.shape.small;
   d.plan.pairs = d.shape.pairs();
-  d.plan.max_slots = d.plan.max_plane_slots = d.plan.max_halves = 0;
+  d.plan.max_slots = d.plan.max_plane_slots = 0;
   const std::vector<Block*>& blocks = state_->blocks.all;
   for (const Block* b : blocks) {
     const int plane = (b->nx + 2) * (b->ny + 2);
     d.plan.max_slots = std::max(d.plan.max_slots, plane * (b->nz + 2));
     d.plan.max_plane_slots = std::max(d.plan.max_plane_slots, plane);
-    d.plan.max_halves = std::max(d.plan.max_halves, 2 * b->nx * b->ny * b->nz);
   }
   for (const LatticeBody& b : state_->bodies) {
     for (const Material& m : b.materials) {
@@ -86,23 +86,23 @@ void CudaMpmTissue::plan_tables() {
     d.plain_plan = d.plan;
     d.plain_plan.plain = true;
     d.plain_resident = resident_blocks(d.plain_plan, static_cast<int>(count));
-    d.face_plan = d.plan;
-    d.face_plan.faces = true;
-    d.face_resident = resident_blocks(d.face_plan, static_cast<int>(count));
+    d.push_plan = d.plan;
+    d.push_plan.pushes = true;
+    d.push_resident = resident_blocks(d.push_plan, static_cast<int>(count));
   };
   choose(blocks.size());
   std::vector<std::vector<int>> bundles;
-  if (!(d.plan.cached && d.face_plan.cached)) {
+  if (!(d.plan.cached && d.push_plan.cached)) {
     // As many as whole tissue has, or, of a small one, as run at once.
     const auto at_once = static_cast<std::size_t>(
-        std::max(1, std::min(most_at_once(d.plan), most_at_once(d.face_plan))));
+        std::max(1, std::min(most_at_once(d.plan), most_at_once(d.push_plan))));
     const std::size_t rounds = (state_->blocks.regions.size() + at_once - 1) / at_once;
     const std::size_t wanted = d.plan.small ? at_once : rounds * at_once;
     if (blocks.size() > wanted) {
       // Two halves of a block that was cut have a rim more.
-      d.face_plan.max_plane_slots = 3 * d.plan.max_plane_slots / 2;
-      const BundleLimits limits = {d.shape.columns(), d.face_plan.max_plane_slots,
-                                   most_slots(d.face_plan)};
+      d.push_plan.max_plane_slots = 3 * d.plan.max_plane_slots / 2;
+      const BundleLimits limits = {d.shape.columns(), d.push_plan.max_plane_slots,
+                                   most_slots(d.push_plan)};
       bundles = bundle_blocks(blocks, wanted, limits, *state_->cpu);
     }
     if (bundles.empty() || bundles.size() > wanted) {
@@ -115,11 +115,10 @@ void CudaMpmTissue::plan_tables() {
   make_tables(*state_, bundles, t);
   d.plan.max_slots = t.max_slots;
   d.plan.max_plane_slots = t.max_plane_slots;
-  d.plan.max_halves = t.max_halves;
   choose(t.bundles.size());
   d.all_plain = std::all_of(t.bundles.begin(), t.bundles.end(),
                             [](const CudaBundle& b) { return b.blocks == 1 && b.partial == 0; });
-  if (d.resident == 0 || d.plain_resident == 0 || d.face_resident == 0) {
+  if (d.resident == 0 || d.plain_resident == 0 || d.push_resident == 0) {
     throw std::runtime_error("the GPU has too little shared memory");
   }
 }
@@ -132,17 +131,12 @@ void CudaMpmTissue::push() {
   const auto points = static_cast<std::size_t>(state_->points.size());
   const Scene& scene = state_->scene;
   const auto colliders = static_cast<int>(scene.tools.size()) + (scene.ground.enabled ? 1 : 0);
-  const std::size_t pushes =
-      colliders > 0 ? static_cast<std::size_t>(t.max_halves) * std::max(d.resident, d.face_resident)
-                    : 0;
   d.held_by = std::min(colliders, 2);
-  check_memory(bytes_of(t, n, points, pushes, d.held_by), device_bytes());
+  check_memory(bytes_of(t, n, points, d.held_by), device_bytes());
   check_cuda(cudaStreamSynchronize(d.stream), "finish a frame");
   d.blocks.upload(t.blocks, d.stream);
   d.bundles.upload(t.bundles, d.stream);
   d.columns.upload(t.columns, d.stream);
-  d.push_stride = t.max_halves;
-  d.pushes.resize(pushes);
   d.bodies.upload(t.bodies, d.stream);
   d.slot_node.upload(t.slot_node, d.stream);
   d.slot_parts.upload(t.slot_parts, d.stream);
@@ -151,8 +145,11 @@ void CudaMpmTissue::push() {
   d.volume.upload(t.volume, d.stream);
   d.partial.upload(t.partial, d.stream);
   d.point.upload(t.point, d.stream);
-  d.near.resize(t.blocks.size());
-  d.near.clear(d.stream);
+  d.pushed_parts.resize(t.slot_parts.size());
+  if (d.marks.size() != n) {
+    d.marks.resize(n);
+    d.marks.clear(d.stream);
+  }
   for (auto& force : d.force) {
     force.resize(t.slot_node.size());
     force.clear(d.stream);

@@ -147,8 +147,20 @@ void CudaMpmTissue::find_near(double duration) {
                          return meets;
                        });
   });
-  launch_near(d.tables(), d.measures.data(), d.reach.data(), static_cast<int>(d.host_reach.size()),
-              static_cast<float>(duration), static_cast<float>(0.5 * state_->scene.cell_size),
+  if (!d.may_meet) {
+    d.with.clear(d.stream);
+    return;
+  }
+  CudaReach swept{d.reach.data(), static_cast<int>(d.host_reach.size()), 0,
+                  static_cast<float>(duration), static_cast<float>(0.5 * cell)};
+  for (std::size_t i = 0; i < state_->scene.tools.size(); ++i) {
+    if (state_->scene.tools[i].type == ToolType::kScalpel) swept.blades |= 2u << i;
+  }
+  d.near_cells.resize(d.partial.size());
+  d.near_count.resize(1);
+  launch_near(d.tables(), d.present(), d.measures.data(), swept,
+              {d.near_cells.data(), d.near_count.data(), d.marks.data(), d.marks.size(),
+               d.pushed_parts.data(), d.pushed_parts.size()},
               d.stream);
 }
 
@@ -169,15 +181,19 @@ void CudaMpmTissue::launch(int begin, int end, float dt) {
   frame.colliders = d.colliders.data() + begin * collider_count;
   frame.collider_count = static_cast<int>(collider_count);
   frame.loads = d.loads.data() + 6 * begin * collider_count;
-  frame.pushes = d.pushes.data();
-  frame.push_stride = d.push_stride;
+  frame.near_cells = d.may_meet ? d.near_cells.data() : nullptr;
+  frame.near_count = d.near_count.data();
+  frame.cell_size = static_cast<float>(scene.cell_size);
   frame.arrived = d.arrived.data();
   frame.faces = faces_of_launch();
-  if (frame.faces.any) {
+  if (frame.faces.any || d.may_meet) {
+    d.pushed.resize(9 * d.u[0].size());
+    d.pushed.clear(d.stream);
+    frame.pushes = {d.pushed.data(), d.pushed.size() / 3};
     CudaTables tables = d.tables();
-    tables.slot_parts = frame.faces.looks.pushed_parts;
-    launch_substeps(d.face_plan, tables, frame, d.face_resident, d.stream);
-  } else if (d.all_plain && !d.may_meet) {
+    tables.slot_parts = d.pushed_parts.data();
+    launch_substeps(d.push_plan, tables, frame, d.push_resident, d.stream);
+  } else if (d.all_plain) {
     launch_substeps(d.plain_plan, d.tables(), frame, d.plain_resident, d.stream);
   } else {
     launch_substeps(d.plan, d.tables(), frame, d.resident, d.stream);

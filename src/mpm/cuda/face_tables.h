@@ -13,8 +13,11 @@
 
 namespace tissue_sim {
 
-/// Bit of CudaTables::slot_parts for a node that contact of tissue with tissue may push.
+/// Bit of CudaTables::slot_parts for a node that contact may push.
 inline constexpr std::uint32_t kPushed = 1u << 31;
+
+/// What may push a node: facets, colliders.
+inline constexpr std::uint8_t kMarkedByFaces = 1, kMarkedByTools = 2;
 
 /// A facet and where it is found.
 struct CudaFacet {
@@ -81,7 +84,7 @@ struct CudaLooks {
   std::uint8_t *is_involved, *takes_part;      ///< per facet: is in a list; in the search
   std::int32_t *contacts, *involved, *active;  ///< facets, in any order
   CudaContactNodes* nodes;                     ///< parallels `active`
-  std::uint8_t* marks;                         ///< per node: whether a contact may push it
+  std::uint8_t* marks;                         ///< per node: what may push it
   std::size_t node_count;
   const std::uint32_t* slot_parts;  ///< CudaTables::slot_parts without
   std::uint32_t* pushed_parts;      ///< and with kPushed
@@ -94,10 +97,6 @@ struct CudaFaces {
   bool any = false;  ///< else no more of this is read
   bool look_first;   ///< they were just searched
   CudaLooks looks;
-  /// Force on each node, [3][nodes][3], in units of kLoadUnit as integers: while one is summed up,
-  /// that of the substep before is read and the third is cleared.
-  long long* force;
-  std::size_t stride;  ///< from one of the three to the next
 };
 
 }  // namespace tissue_sim

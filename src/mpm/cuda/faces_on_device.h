@@ -14,8 +14,7 @@ struct FacesOnDevice {
   DeviceArray<ListedFacet> listed;
   DeviceArray<FaceSpring> springs;
   DeviceArray<std::int32_t> point_at, first_near, near_count, near, contacts, involved, active;
-  DeviceArray<std::uint8_t> is_involved, takes_part, marks;
-  DeviceArray<std::uint32_t> pushed_parts;
+  DeviceArray<std::uint8_t> is_involved, takes_part;
   DeviceArray<CudaContactNodes> nodes;
   DeviceArray<CudaFaceFigures> figures;
   PinnedArray<CudaFaceFigures> host_figures;  ///< as of the last search
@@ -24,7 +23,6 @@ struct FacesOnDevice {
   DeviceArray<std::int32_t> bucket_begin, bucket_count, rank;
   DeviceArray<CudaSeeker> sorted;
 
-  DeviceArray<long long> force;  ///< CudaFaces::force
   DeviceArray<KeptContact> kept;
   DeviceArray<FaceSpring> gathered;
   std::vector<CudaFacet> host_facets;
@@ -38,9 +36,9 @@ struct FacesOnDevice {
     return facets.bytes() + lattices.bytes() + motion.bytes() + listed.bytes() + springs.bytes() +
            point_at.bytes() + first_near.bytes() + near_count.bytes() + near.bytes() +
            contacts.bytes() + involved.bytes() + active.bytes() + is_involved.bytes() +
-           takes_part.bytes() + marks.bytes() + nodes.bytes() + pushed_parts.bytes() +
-           figures.bytes() + sums.bytes() + bucket_begin.bytes() + bucket_count.bytes() +
-           rank.bytes() + sorted.bytes() + force.bytes() + kept.bytes() + gathered.bytes();
+           takes_part.bytes() + nodes.bytes() + figures.bytes() + sums.bytes() +
+           bucket_begin.bytes() + bucket_count.bytes() + rank.bytes() + sorted.bytes() +
+           kept.bytes() + gathered.bytes();
   }
 };
 

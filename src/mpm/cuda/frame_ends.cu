@@ -12,36 +12,6 @@ namespace {
 
 constexpr int kThreads = 128;
 
-/// One thread block for each block.
-__global__ void find_near(const CudaTables t, const CudaMeasure* measures, const CudaBox* reach,
-                          int collider_count, float duration, float cell_margin) {
-  __shared__ unsigned near;
-  const int index = static_cast<int>(blockIdx.x), thread = static_cast<int>(threadIdx.x);
-  if (thread < 32) {
-    const CudaMeasure& m = measures[index];
-    const float margin = m.speed * duration + cell_margin;
-    bool meets = thread < collider_count;
-    if (meets) {
-      for (int a = 0; a < 3; ++a) {
-        meets = meets && m.min[a] - margin <= reach[thread].max[a] &&
-                reach[thread].min[a] <= m.max[a] + margin;
-      }
-    }
-    const unsigned met = __ballot_sync(0xffffffffu, meets);
-    if (thread == 0) t.near[index] = near = met;
-  }
-  __syncthreads();
-  if (t.held_by == 0) return;
-  const CudaBlock& b = t.blocks[index];
-  for (int i = thread; i < 8 * b.nx * b.ny * b.nz; i += static_cast<int>(blockDim.x)) {
-    const int p = t.point[b.first_lane + i];
-    for (int slot = 0; p >= 0 && slot < t.held_by; ++slot) {
-      std::uint8_t& with = t.with[p * t.held_by + slot];
-      if (with != 0 && (near >> (with - 1) & 1u) == 0) with = 0;
-    }
-  }
-}
-
 /// A point's deformation gradient and place, from its half plane.
 struct PointState {
   float F[9], x[3];
@@ -248,13 +218,6 @@ void allow(Kernel kernel, std::size_t bytes) {
 }
 
 }  // namespace
-
-void launch_near(const CudaTables& tables, const CudaMeasure* measures, const CudaBox* reach,
-                 int collider_count, float duration, float margin, cudaStream_t stream) {
-  find_near<<<tables.block_count, kThreads, 0, stream>>>(tables, measures, reach, collider_count,
-                                                         duration, margin);
-  check_cuda(cudaGetLastError(), "start a kernel");
-}
 
 void launch_measure(const CudaTables& tables, const CudaNodes& state, int max_slots,
                     CudaMeasure* measures, cudaStream_t stream) {

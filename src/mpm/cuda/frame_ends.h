@@ -1,5 +1,5 @@
-// What happens on the GPU between the substeps of two frames: what blocks may meet, how they stand,
-// and the clouds.
+// What happens on the GPU between the substeps of two frames: how blocks stand, and the
+// clouds.
 #pragma once
 
 #include <cuda_runtime_api.h>
@@ -9,16 +9,6 @@
 #include "tissue_sim/point.h"
 
 namespace tissue_sim {
-
-/// A box that a collider sweeps in a frame; empty where min > max [m].
-struct CudaBox {
-  float min[3], max[3];
-};
-
-/// Which colliders each block may meet in a frame: CudaTables::near, from where the blocks' points
-/// are, how fast they move and what the colliders sweep. Lets go of contacts out of reach.
-void launch_near(const CudaTables& tables, const CudaMeasure* measures, const CudaBox* reach,
-                 int collider_count, float duration, float margin, cudaStream_t stream);
 
 /// Energies, bounds and stiffness of each block in this state. `max_slots` of a block.
 void launch_measure(const CudaTables& tables, const CudaNodes& state, int max_slots,

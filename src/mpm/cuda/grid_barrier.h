@@ -4,9 +4,9 @@
 namespace tissue_sim {
 
 /// A thread block says that it has come to a barrier of the grid, and goes on.
-__device__ __forceinline__ void arrive(unsigned* arrived) {
+__device__ __forceinline__ void arrive(unsigned* arrived, unsigned thread = 0) {
   __syncthreads();
-  if (threadIdx.x == 0) {
+  if (threadIdx.x == thread) {
     asm volatile("red.release.gpu.global.add.u32 [%0], 1;" ::"l"(arrived) : "memory");
   }
 }

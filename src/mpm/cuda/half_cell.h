@@ -171,14 +171,4 @@ __device__ __forceinline__ void give_stress(const float (&P)[4][9], int c, HalfP
   h.sdd = zd1 - zd0;
 }
 
-/// Transpose of point_value() at all points of the half.
-__device__ __forceinline__ void add_forces(const float4& f, HalfPlane& h) {
-  const float s0 = 0.25f * (f.y + f.x), s1 = 0.25f * (f.w + f.z);
-  const float d0 = 0.25f * (f.y - f.x), d1 = 0.25f * (f.w - f.z);
-  h.wAA += s1 + s0;
-  h.wAd += s1 - s0;
-  h.wdA += d1 + d0;
-  h.wdd += d1 - d0;
-}
-
 }  // namespace tissue_sim

@@ -12,7 +12,7 @@ __global__ void clear_lists(const CudaLooks s, const CudaSearchRoom room) {
   if (!lists_wanted(s)) return;
   const int first = thread_index(), step = static_cast<int>(gridDim.x * blockDim.x);
   for (int i = first; i < room.buckets; i += step) room.count[i] = 0;
-  for (std::size_t i = first; i < s.node_count; i += step) s.marks[i] = 0;
+  for (std::size_t i = first; i < s.node_count; i += step) s.marks[i] &= kMarkedByTools;
   if (first != 0) return;
   CudaFaceFigures& figures = *s.figures;
   figures.largest_reach = 0;
@@ -189,7 +189,7 @@ __global__ void list_involved(const CudaLooks s) {
   for (int k = 0; k < 27; ++k) {
     const std::int32_t entry =
         s.slot_node[at.slot + k / 9 * at.plane + k / 3 % 3 * at.pitch + k % 3];
-    s.marks[entry < 0 ? ~entry : entry] = 1;
+    s.marks[entry < 0 ? ~entry : entry] |= kMarkedByFaces;
   }
 }
 
@@ -197,9 +197,7 @@ __global__ void list_involved(const CudaLooks s) {
 __global__ void mark_slots(const CudaLooks s) {
   const int slot = thread_index();
   if (slot >= s.slot_count || !lists_made(s)) return;
-  const std::int32_t entry = s.slot_node[slot];
-  const bool pushed = s.marks[entry < 0 ? ~entry : entry] != 0;
-  s.pushed_parts[slot] = s.slot_parts[slot] | (pushed ? kPushed : 0);
+  mark_slot(s.slot_node, s.slot_parts, s.marks, slot, s.pushed_parts);
 }
 
 }  // namespace

@@ -121,7 +121,7 @@ void connect(std::size_t node_count, Cpu& cpu, HostTables& t) {
 }
 
 /// The columns of the block that hold points, as if it were alone in its bundle.
-std::vector<CudaColumn> columns_of(const CudaBlock& b, float cell_size, const HostTables& t) {
+std::vector<CudaColumn> columns_of(const CudaBlock& b, const HostTables& t) {
   std::vector<CudaColumn> columns;
   const int step = b.nx * b.ny;
   for (int i = 0; i < step; ++i) {
@@ -138,9 +138,6 @@ std::vector<CudaColumn> columns_of(const CudaBlock& b, float cell_size, const Ho
     c.step = step;
     c.cell = b.first_lane / 8 + i;
     c.plane_slot = c.slot;
-    c.middle[0] = b.origin[0] + cell_size * static_cast<float>(x + 1);
-    c.middle[1] = b.origin[1] + cell_size * static_cast<float>(y + 1);
-    c.middle[2] = b.origin[2] + cell_size;
     c.whole = b.whole;
     columns.push_back(c);
   }
@@ -217,7 +214,6 @@ void add_bundle(int first_block, int blocks, std::vector<std::vector<CudaColumn>
   bundle.columns = static_cast<int>(t.columns.size()) - bundle.first_column;
   t.max_slots = std::max(t.max_slots, bundle.slots);
   t.max_plane_slots = std::max(t.max_plane_slots, bundle.plane_slots);
-  t.max_halves = std::max(t.max_halves, 2 * bundle.columns * bundle.nz);
   t.bundles.push_back(bundle);
 }
 
@@ -242,11 +238,11 @@ void make_tables(const MpmState& state, const std::vector<std::vector<int>>& bun
     const CudaBody& body = t.bodies[block.body];
     fill_points(from, body.point_volume, block, t);
     fill_slots(from, block, t);
-    columns[i] = columns_of(block, body.cell_size, t);
+    columns[i] = columns_of(block, t);
   });
   t.bundles.clear();
   t.columns.clear();
-  t.max_slots = t.max_plane_slots = t.max_halves = 0;
+  t.max_slots = t.max_plane_slots = 0;
   int first = 0;
   for (const std::vector<int>& blocks : bundles) {
     add_bundle(first, static_cast<int>(blocks.size()), columns, t);

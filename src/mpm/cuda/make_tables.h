@@ -25,7 +25,6 @@ struct HostTables {
   PinnedArray<std::int32_t> point;
   int max_slots = 0;        ///< of a bundle
   int max_plane_slots = 0;  ///< the same of one plane
-  int max_halves = 0;       ///< half cells of a bundle's columns, each as tall as the tallest
 };
 
 /// `bundles` are the blocks, by their places in Blocks::all, that share a thread block.

@@ -7,14 +7,15 @@
 #include "mpm/cuda/faces_on_device.h"
 #include "mpm/cuda/frame_ends.h"
 #include "mpm/cuda/make_tables.h"
+#include "mpm/cuda/near_cells.h"
 
 namespace tissue_sim {
 
 struct CudaMpmTissue::OnDevice {
   CudaShape shape;
-  /// Without contact of tissue with tissue, with it, and CudaPlan::plain.
-  CudaPlan plan, face_plan, plain_plan;
-  int resident = 0, face_resident = 0, plain_resident = 0;  ///< thread blocks that run at once
+  /// Without contact, with it, and CudaPlan::plain.
+  CudaPlan plan, push_plan, plain_plan;
+  int resident = 0, push_resident = 0, plain_resident = 0;  ///< thread blocks that run at once
   bool all_plain = true;  ///< all cells are full and each bundle is one block
   bool may_meet = true;   ///< whether any block may meet a collider in this frame
   int current = 0;        ///< which of the two states is the present one
@@ -25,11 +26,14 @@ struct CudaMpmTissue::OnDevice {
   HostTables host_tables;  ///< as they went up
   DeviceArray<CudaBundle> bundles;
   DeviceArray<CudaColumn> columns;
-  DeviceArray<HalfPush> pushes;  ///< CudaFrame::pushes
-  std::size_t push_stride = 0;
+  DeviceArray<NearCell> near_cells;
+  DeviceArray<int> near_count;
+  DeviceArray<std::uint8_t> marks;          ///< per node: what may push it
+  DeviceArray<std::uint32_t> pushed_parts;  ///< CudaTables::slot_parts with kPushed
+  DeviceArray<long long> pushed;            ///< NodePushes::force
   DeviceArray<CudaBody> bodies;
   DeviceArray<std::int32_t> slot_node, point, piece, place;
-  DeviceArray<std::uint32_t> slot_parts, parts, near, colour;
+  DeviceArray<std::uint32_t> slot_parts, parts, colour;
   DeviceArray<uint4> first_parts;
   DeviceArray<float> volume, partial, hold;
   DeviceArray<std::uint8_t> bonds, with, whole;
@@ -72,7 +76,6 @@ struct CudaMpmTissue::OnDevice {
     t.point = point.data();
     t.partial = partial.data();
     t.bonds = bonds.data();
-    t.near = near.data();
     t.held_by = held_by;
     t.with = with.data();
     t.hold = hold.data();

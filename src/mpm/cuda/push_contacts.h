@@ -2,20 +2,11 @@
 // files.
 #pragma once
 
+#include "mpm/cuda/add_push.h"
 #include "mpm/cuda/grid_barrier.h"
 #include "mpm/cuda/warp_faces.h"
 
 namespace tissue_sim {
-
-/// Adds a force [N] to the sum of a node.
-__device__ __forceinline__ void add_push(long long* sum, float weight, const float* force) {
-#pragma unroll
-  for (int c = 0; c < 3; ++c) {
-    const long long push = __float2ll_rn(weight * force[c] * static_cast<float>(1 / kLoadUnit));
-    atomicAdd(reinterpret_cast<unsigned long long*>(sum) + c,
-              static_cast<unsigned long long>(push));
-  }
-}
 
 /// What pushes need of CudaLooks.
 struct CudaPushes {

@@ -2,7 +2,7 @@
 #pragma once
 
 #include "compute/cuda_check.h"
-#include "mpm/cuda/tables.h"
+#include "mpm/cuda/block_nodes.h"
 
 namespace tissue_sim {
 

@@ -9,31 +9,32 @@ namespace tissue_sim {
 namespace {
 
 const void* kernel(const CudaPlan& plan) {
-  return reinterpret_cast<const void*>(plan.faces   ? kernel_with_faces(plan)
+  return reinterpret_cast<const void*>(plan.pushes  ? pushing_kernel(plan)
                                        : plan.plain ? plain_kernel(plan)
-                                                    : kernel_of<Can::kTools>(plan));
+                                                    : kernel_of<Can::kCuts>(plan));
 }
 
 CudaLayout layout_of(const CudaPlan& plan) {
   CudaLayout layout;
+  const bool velocities = plan.viscous || (plan.neo_hookean && plan.fixed_corotated);
   layout.max_slots = plan.max_slots;
-  layout.exchange = (plan.two_planes ? 18 : 9) * plan.max_plane_slots;
-  if (!plan.plain) {
-    const std::size_t lists = PushLists::bytes(plan.max_halves) / sizeof(float4) + 1;
-    layout.exchange = std::max(layout.exchange, static_cast<int>(lists));
+  layout.node_room = (velocities ? 2 : 1) * plan.max_slots;
+  if (plan.pushes) {  // cells that colliders push come where the nodes of the block were
+    const int cells = plan.threads / 32 * static_cast<int>(sizeof(CellNodes));
+    layout.node_room = std::max(layout.node_room, cells / 16 + 1);
   }
+  layout.exchange = (plan.two_planes ? 18 : 9) * plan.max_plane_slots;
   layout.eight_parts = plan.eight_parts;
   layout.two_planes = plan.two_planes;
   return layout;
 }
 
 std::size_t shared_bytes(const CudaPlan& plan) {
-  const bool velocities = !plan.plain || plan.viscous || (plan.neo_hookean && plan.fixed_corotated);
-  const std::size_t of_slot = (velocities ? 2 : 1) * sizeof(float4) +
-                              (plan.cached ? sizeof(uint4) + 8 : 0) +
-                              (plan.eight_parts ? sizeof(uint4) : 0);
-  return of_slot * plan.max_slots + sizeof(float4) * layout_of(plan).exchange +
-         kMaxColliders * (6 * sizeof(long long) + sizeof(Collider)) + sizeof(FaceRounds);
+  const CudaLayout layout = layout_of(plan);
+  const std::size_t of_slot =
+      (plan.cached ? sizeof(uint4) + 8 : 0) + (plan.eight_parts ? sizeof(uint4) : 0);
+  return of_slot * layout.max_slots + sizeof(float4) * (layout.node_room + layout.exchange) +
+         kMaxColliders * sizeof(Collider) + sizeof(FaceRounds);
 }
 
 int attribute(cudaDeviceAttr which) {
@@ -98,8 +99,9 @@ void launch_substeps(const CudaPlan& plan, const CudaTables& tables, const CudaF
   CudaLayout layout = layout_of(plan);
   void* arguments[] = {&t, &f, &layout};
   check_cuda(cudaMemsetAsync(f.arrived, 0, 2 * sizeof(unsigned), stream), "clear memory");
-  check_cuda(cudaLaunchCooperativeKernel(kernel(plan), dim3(std::min(resident, t.bundle_count)),
-                                         dim3(plan.threads), arguments, shared_bytes(plan), stream),
+  const int blocks = std::min(resident, t.bundle_count + (plan.pushes ? kMostHelpers : 0));
+  check_cuda(cudaLaunchCooperativeKernel(kernel(plan), dim3(blocks), dim3(plan.threads), arguments,
+                                         shared_bytes(plan), stream),
              "start the substeps");
 }
 

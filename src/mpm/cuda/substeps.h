@@ -9,31 +9,34 @@ namespace tissue_sim {
 
 inline constexpr int kMaxCudaThreads = 256;  ///< of a thread block
 
+/// Contact may have so many thread blocks without a bundle beside the others; from kEnoughHelpers
+/// on, large blocks leave colliders to them.
+inline constexpr int kMostHelpers = 32, kEnoughHelpers = 16;
+
 /// How a tissue's blocks are worked on.
 struct CudaPlan {
   int threads = 64;          ///< of a thread block: one or two for each column of a bundle
   int max_slots = 0;         ///< of a bundle
   int max_plane_slots = 0;   ///< the same of one plane
-  int max_halves = 0;        ///< HostTables::max_halves
   bool pairs = true;         ///< there are two threads for each column
   bool small = true;         ///< to be cached, if all bundles run at once
   bool cached = false;       ///< each thread block has one bundle only, whose tables it keeps
   bool eight_parts = false;  ///< of a node's force it keeps the places of eight, else of four
   bool two_planes = false;   ///< the exchange holds two planes, and threads wait half as often
   bool plain = false;        ///< no contact, all cells full, each bundle one block
-  bool faces = false;        ///< with contact of tissue with tissue
+  bool pushes = false;       ///< with contact
   bool neo_hookean = false, fixed_corotated = false, viscous = false;  ///< what there is
 };
 
 /// How a thread block's shared memory is laid out.
 struct CudaLayout {
   int max_slots;
-  int exchange;  ///< float4s
+  int node_room, exchange;  ///< float4s: for a bundle's nodes, for what columns give to planes
   bool eight_parts, two_planes;
 };
 
 using CudaKernel = void (*)(CudaTables, CudaFrame, CudaLayout);
-CudaKernel kernel_with_faces(const CudaPlan& plan);
+CudaKernel pushing_kernel(const CudaPlan& plan);
 CudaKernel plain_kernel(const CudaPlan& plan);
 
 /// Thread blocks that run at once; 0 where the plan does not fit the GPU. Sets CudaPlan::cached,
@@ -45,8 +48,8 @@ int resident_blocks(CudaPlan& plan, int block_count);
 int most_at_once(const CudaPlan& plan);
 int most_slots(const CudaPlan& plan);
 
-/// Enqueues substeps as one kernel, with contact of tissue with tissue if the plan has it. The
-/// state is then in `state[(current + substeps) % 2]`.
+/// Enqueues substeps as one kernel, with contact if the plan has it. The state is then in
+/// `state[(current + substeps) % 2]`.
 void launch_substeps(const CudaPlan& plan, const CudaTables& tables, const CudaFrame& frame,
                      int resident, cudaStream_t stream);
 

@@ -62,13 +62,30 @@ struct alignas(16) CudaColumn {
   int step;          ///< lanes from a sub-position to the next
   int cell;          ///< its lowest in CudaTables::partial
   int plane_slot;    ///< the same within a plane, of the bundle's
-  float middle[3];   ///< reference place of its lowest cell's middle [m]
   int whole;         ///< as CudaBlock::whole
 };
 
-/// What the colliders push the four points of half a cell with: component c of point q [N].
-struct alignas(16) HalfPush {
-  float of[3][4];
+/// The points of a cell lie within so many cells of the node at its middle, stretched as they may
+/// be.
+inline constexpr float kCellReach = 2;
+
+/// A cell that colliders may push in a frame.
+struct alignas(16) NearCell {
+  float middle[3];     ///< reference place of its middle [m]
+  int node;            ///< that is there
+  std::uint32_t near;  ///< bit c for a collider that it may meet
+  int slot;            ///< of the lowest of its nodes
+  int pitch, plane;    ///< slots from a node to the next along y and z
+  int lane, step;      ///< of sub-position 0; from a sub-position to the next
+  int body;            ///< its CudaBody
+  int unused;
+};
+
+/// Forces of colliders and facets on the nodes, [3][nodes][3], in units of kLoadUnit as integers:
+/// while one is summed up, that of the substep before is read and the third is cleared.
+struct NodePushes {
+  long long* force = nullptr;
+  std::size_t stride = 0;  ///< from one of the three to the next
 };
 
 /// State of a block at the end of a frame.
@@ -104,7 +121,6 @@ struct CudaTables {
   const float* partial;       ///< per cell (lane / 8): mu times volume of its points where they are
                               ///< fewer than seven, else 0; see mpm/stabilisation.h [J]
   const std::uint8_t* bonds;  ///< per point
-  std::uint32_t* near;        ///< per block: bit c for a collider that it may meet this frame
   int held_by;                ///< colliders that a point may hold on to at a time: 0 to 2
   std::uint8_t* with;         ///< [point][held_by]: 0, or 1 + index of a collider it touches
   float* hold;                ///< [point][held_by][3]: the place that friction holds on to
@@ -122,9 +138,11 @@ struct CudaFrame {
   NodeStep step;
   const Collider* colliders;  ///< [substeps][collider_count]
   int collider_count;
-  long long* loads;  ///< [substeps][collider_count][6]
-  HalfPush* pushes;  ///< [thread blocks][push_stride], of the half cells of the bundle at work
-  std::size_t push_stride;
+  long long* loads;            ///< [substeps][collider_count][6]
+  const NearCell* near_cells;  ///< null where no collider comes near
+  const int* near_count;
+  float cell_size;  ///< the scene's [m]
+  NodePushes pushes;
   unsigned* arrived;  ///< counters of the two barriers, 0 at the beginning
   CudaFaces faces;
 };

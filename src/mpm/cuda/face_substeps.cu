@@ -1,8 +1,0 @@
-// The kernels with contact of tissue with tissue, apart from the others to be compiled beside them.
-#include "mpm/cuda/substep_kernels.h"
-
-namespace tissue_sim {
-
-CudaKernel kernel_with_faces(const CudaPlan& plan) { return kernel_of<Can::kFaces>(plan); }
-
-}  // namespace tissue_sim

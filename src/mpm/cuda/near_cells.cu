@@ -1,0 +1,109 @@
+#include <cuda_runtime.h>
+
+#include "compute/cuda_check.h"
+#include "cutting/bonds.h"
+#include "mpm/cuda/block_nodes.h"
+#include "mpm/cuda/near_cells.h"
+
+namespace tissue_sim {
+namespace {
+
+constexpr int kThreads = 128;
+
+/// The colliders, as bits, that come within `margin` of the box from `min` to `max`; `among` those.
+__device__ __forceinline__ std::uint32_t met_by(const CudaReach& reach, std::uint32_t among,
+                                                const float* min, const float* max, float margin) {
+  std::uint32_t met = 0;
+  for (std::uint32_t left = among; left != 0; left &= left - 1) {
+    const CudaBox& swept = reach.swept[__ffs(static_cast<int>(left)) - 1];
+    bool meets = true;
+    for (int a = 0; a < 3; ++a) {
+      meets = meets && min[a] - margin <= swept.max[a] && swept.min[a] <= max[a] + margin;
+    }
+    if (meets) met |= left & (0u - left);
+  }
+  return met;
+}
+
+__global__ void unmark(const CudaNearCells out) {
+  const std::size_t i = static_cast<std::size_t>(blockIdx.x) * blockDim.x + threadIdx.x;
+  if (i == 0) *out.count = 0;
+  if (i < out.node_count) out.marks[i] &= kMarkedByFaces;
+}
+
+/// One thread block for each block.
+__global__ void list_cells(const CudaTables t, const CudaNodes state, const CudaMeasure* measures,
+                           const CudaReach reach, const CudaNearCells out) {
+  const CudaBlock b = t.blocks[blockIdx.x];
+  const CudaMeasure& m = measures[blockIdx.x];
+  const float cell_size = t.bodies[b.body].cell_size;
+  const float margin = m.speed * reach.duration + reach.margin;
+  const std::uint32_t all = reach.collider_count < 32 ? (1u << reach.collider_count) - 1 : ~0u;
+  const std::uint32_t block_near = met_by(reach, all, m.min, m.max, margin);
+  for (int i = static_cast<int>(threadIdx.x); i < b.nx * b.ny * b.nz; i += kThreads) {
+    const int x = i % b.nx, y = i / b.nx % b.ny, z = i / (b.nx * b.ny);
+    NearCell cell;
+    cell.pitch = b.nx + 2;
+    cell.plane = cell.pitch * (b.ny + 2);
+    cell.slot = b.first_slot + z * cell.plane + y * cell.pitch + x;
+    cell.lane = lane_of(b, x, y, z, 0);
+    cell.step = b.nx * b.ny;
+    cell.body = b.body;
+    bool has_points = false, is_cut = false;
+    for (int s = 0; s < 8; ++s) {
+      const int p = t.point[cell.lane + s * cell.step];
+      has_points = has_points || p >= 0;
+      is_cut = is_cut || (p >= 0 && t.bonds[p] != kAllBonds);
+    }
+    if (!has_points) continue;
+    const auto node_of = [&](int slot) {
+      const std::int32_t entry = t.slot_node[slot];
+      return entry < 0 ? ~entry : entry;
+    };
+    cell.near = block_near & (is_cut ? ~0u : ~reach.blades);
+    if (cell.near != 0) {
+      cell.node = node_of(cell.slot + cell.plane + cell.pitch + 1);
+      const float4 u = state.u[cell.node];
+      const float moved[3] = {u.x, u.y, u.z};
+      const int at[3] = {x, y, z};
+      float now[3];
+      for (int a = 0; a < 3; ++a) {
+        cell.middle[a] = b.origin[a] + cell_size * static_cast<float>(at[a] + 1);
+        now[a] = cell.middle[a] + moved[a];
+      }
+      cell.near = met_by(reach, cell.near, now, now, margin + kCellReach * cell_size);
+    }
+    for (int k = 0; k < 8 * t.held_by; ++k) {
+      const int p = t.point[cell.lane + k / t.held_by * cell.step];
+      if (p < 0) continue;
+      std::uint8_t& with = t.with[p * t.held_by + k % t.held_by];
+      if (with != 0 && (cell.near >> (with - 1) & 1u) == 0) with = 0;
+    }
+    if (cell.near == 0) continue;
+    out.cells[atomicAdd(out.count, 1)] = cell;
+    for (int k = 0; k < 27; ++k) {
+      const int n = node_of(cell.slot + k / 9 * cell.plane + k / 3 % 3 * cell.pitch + k % 3);
+      out.marks[n] |= kMarkedByTools;
+    }
+  }
+}
+
+__global__ void mark_slots(const CudaTables t, const CudaNearCells out) {
+  const std::size_t slot = static_cast<std::size_t>(blockIdx.x) * blockDim.x + threadIdx.x;
+  if (slot < out.slot_count)
+    mark_slot(t.slot_node, t.slot_parts, out.marks, slot, out.pushed_parts);
+}
+
+unsigned blocks_for(std::size_t n) { return static_cast<unsigned>((n + kThreads - 1) / kThreads); }
+
+}  // namespace
+
+void launch_near(const CudaTables& tables, const CudaNodes& state, const CudaMeasure* measures,
+                 const CudaReach& reach, const CudaNearCells& near, cudaStream_t stream) {
+  unmark<<<blocks_for(near.node_count), kThreads, 0, stream>>>(near);
+  list_cells<<<tables.block_count, kThreads, 0, stream>>>(tables, state, measures, reach, near);
+  mark_slots<<<blocks_for(near.slot_count), kThreads, 0, stream>>>(tables, near);
+  check_cuda(cudaGetLastError(), "start a kernel");
+}
+
+}  // namespace tissue_sim

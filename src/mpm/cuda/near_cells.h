@@ -1,0 +1,40 @@
+// Which cells colliders may push in a frame.
+#pragma once
+
+#include <cuda_runtime_api.h>
+
+#include "mpm/cuda/tables.h"
+
+namespace tissue_sim {
+
+/// A box that a collider sweeps in a frame; empty where min > max [m].
+struct CudaBox {
+  float min[3], max[3];
+};
+
+/// What the colliders of a frame sweep and how far tissue may go to meet them.
+struct CudaReach {
+  const CudaBox* swept;  ///< per collider
+  int collider_count;
+  std::uint32_t blades;  ///< bit c for a collider that pushes only points that have lost a bond
+  float duration;        ///< [s]
+  float margin;          ///< [m]
+};
+
+/// What is found. One entry of `marks` for each node, of `pushed_parts` for each slot.
+struct CudaNearCells {
+  NearCell* cells;  ///< in any order
+  int* count;
+  std::uint8_t* marks;
+  std::size_t node_count;
+  std::uint32_t* pushed_parts;  ///< CudaTables::slot_parts with kPushed
+  std::size_t slot_count;
+};
+
+/// Lists the cells that may meet a collider in a frame, from where they are, how fast the fastest
+/// point of their block moves and what the colliders sweep, and marks their nodes. Points beyond
+/// let go of what they touched.
+void launch_near(const CudaTables& tables, const CudaNodes& state, const CudaMeasure* measures,
+                 const CudaReach& reach, const CudaNearCells& near, cudaStream_t stream);
+
+}  // namespace tissue_sim

@@ -102,9 +102,8 @@ void list_contacts(MpmState& state) {
     const auto lanes = static_cast<std::int32_t>(block.lane_count());
     for (std::int32_t lane = 0; lane < lanes; ++lane) {
       const std::int32_t point = block.point[lane];
-      auto touch =
-          std::lower_bound(touches.begin(), touches.end(), point,
-                           [](const Touch& t, std::int32_t p) { return t.point < p; });
+      auto touch = std::lower_bound(touches.begin(), touches.end(), point,
+                                    [](const Touch& t, std::int32_t p) { return t.point < p; });
       for (; touch != touches.end() && touch->point == point; ++touch) {
         const int sub = lane / block.stride % 8;
         contacts.touching[i].push_back(*touch);

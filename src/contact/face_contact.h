@@ -24,9 +24,9 @@ inline constexpr double kNever = 1e30;  ///< [s]
 struct FaceContact : FaceSpring {
   CellNodes nodes, other_nodes;
   AxisWeights weights, other_weights;  ///< at the facet's centre; at `hold`
-  bool is_small = false;     ///< of a small piece, which is looked at by itself as well:
-  double looked_at = 0;      ///< when last [s]
-  double look_at = kNever;   ///< when by itself next [s]
+  bool is_small = false;               ///< of a small piece, which is looked at by itself as well:
+  double looked_at = 0;                ///< when last [s]
+  double look_at = kNever;             ///< when by itself next [s]
 };
 
 struct FaceContacts {
@@ -42,10 +42,10 @@ struct FaceContacts {
   /// Per block, CSR: active contacts, as 2 * contact, plus one where the block holds the other
   /// face.
   std::vector<std::int32_t> first_of_block, of_block;
-  std::vector<KeptContact> kept;                            ///< sorted by point and direction
-  double until_search = 0, until_look = 0;                  ///< at any contact [s]
-  double look_at = 0;                                       ///< at all of them, on the CPU [s]
-  double since_look = 0;  ///< on a GPU, which looks at all together [s]
+  std::vector<KeptContact> kept;            ///< sorted by point and direction
+  double until_search = 0, until_look = 0;  ///< at any contact [s]
+  double look_at = 0;                       ///< at all of them, on the CPU [s]
+  double since_look = 0;                    ///< on a GPU, which looks at all together [s]
 };
 
 /// Before a substep of `dt` seconds: searches pairs, and looks at them, when it is time to.

@@ -35,7 +35,7 @@ struct NearCell {
   std::int32_t node;  ///< its lowest, in the block's nodes
   std::uint8_t collider;
   std::uint8_t points;  ///< bit s: that at sub-position s
-  float middle[3];  ///< reference place [m]
+  float middle[3];      ///< reference place [m]
 };
 
 /// Contact of points with colliders, block by block.

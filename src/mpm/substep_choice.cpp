@@ -30,8 +30,8 @@ bool is_near(const MpmState& state, const Box& box) {
   });
 }
 
-/// How far a tool that is near tissue goes in the frame at most, with both ends, where it pushes [m]:
-/// a blade cuts its way along its plane.
+/// How far a tool that is near tissue goes in the frame at most, with both ends, where it pushes
+/// [m]: a blade cuts its way along its plane.
 double farthest_motion(const MpmState& state, const FrameInput& input) {
   const Scene& scene = state.scene;
   const std::vector<Box> reach = collider_reach(scene, input, 1 / scene.frame_rate);

@@ -42,7 +42,7 @@ __global__ void list_cells(const CudaTables t, const CudaNodes state, const Cuda
   const std::uint32_t block_near = met_by(reach, all, m.min, m.max, margin);
   for (int i = static_cast<int>(threadIdx.x); i < b.nx * b.ny * b.nz; i += kThreads) {
     const int x = i % b.nx, y = i / b.nx % b.ny, z = i / (b.nx * b.ny);
-    NearCell cell;
+    CudaNearCell cell;
     cell.pitch = b.nx + 2;
     cell.plane = cell.pitch * (b.ny + 2);
     cell.slot = b.first_slot + z * cell.plane + y * cell.pitch + x;

@@ -23,7 +23,7 @@ struct CudaReach {
 
 /// What is found. One entry of `marks` for each node, of `pushed_parts` for each slot.
 struct CudaNearCells {
-  NearCell* cells;  ///< in any order
+  CudaNearCell* cells;  ///< in any order
   int* count;
   std::uint8_t* marks;
   std::size_t node_count;

@@ -26,7 +26,7 @@ struct CudaMpmTissue::OnDevice {
   HostTables host_tables;  ///< as they went up
   DeviceArray<CudaBundle> bundles;
   DeviceArray<CudaColumn> columns;
-  DeviceArray<NearCell> near_cells;
+  DeviceArray<CudaNearCell> near_cells;
   DeviceArray<int> near_count;
   DeviceArray<std::uint8_t> marks;          ///< per node: what may push it
   DeviceArray<std::uint32_t> pushed_parts;  ///< CudaTables::slot_parts with kPushed

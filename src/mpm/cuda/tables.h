@@ -70,7 +70,7 @@ struct alignas(16) CudaColumn {
 inline constexpr float kCellReach = 2;
 
 /// A cell that colliders may push in a frame.
-struct alignas(16) NearCell {
+struct alignas(16) CudaNearCell {
   float middle[3];     ///< reference place of its middle [m]
   int node;            ///< that is there
   std::uint32_t near;  ///< bit c for a collider that it may meet
@@ -138,8 +138,8 @@ struct CudaFrame {
   NodeStep step;
   const Collider* colliders;  ///< [substeps][collider_count]
   int collider_count;
-  long long* loads;            ///< [substeps][collider_count][6]
-  const NearCell* near_cells;  ///< null where no collider comes near
+  long long* loads;                ///< [substeps][collider_count][6]
+  const CudaNearCell* near_cells;  ///< null where no collider comes near
   const int* near_count;
   float cell_size;  ///< the scene's [m]
   NodePushes pushes;

@@ -186,7 +186,7 @@ struct ToolPushes {
 /// warp have its points, the first 27 its nodes; of each component of a point's place and velocity
 /// another lane works out the sum.
 __device__ __forceinline__ void push_cell(const CudaTables& t, const CudaNodes& state,
-                                          const NearCell& cell, const ToolPushes& pushes,
+                                          const CudaNearCell& cell, const ToolPushes& pushes,
                                           CellNodes& nodes) {
   const int lane = static_cast<int>(threadIdx.x) % 32, k = min(lane, 26);
   const int s = lane % 8, component = min(lane / 8, 2);
@@ -236,9 +236,9 @@ __device__ __forceinline__ void push_cell(const CudaTables& t, const CudaNodes& 
 }
 
 /// What lane `from` of a warp has of a cell.
-__device__ __forceinline__ NearCell cell_of_lane(const NearCell& mine, int from) {
+__device__ __forceinline__ CudaNearCell cell_of_lane(const CudaNearCell& mine, int from) {
   const auto get = [from](auto value) { return __shfl_sync(0xffffffffu, value, from); };
-  NearCell cell;
+  CudaNearCell cell;
 #pragma unroll
   for (int a = 0; a < 3; ++a) cell.middle[a] = get(mine.middle[a]);
   cell.near = get(mine.near);
@@ -255,9 +255,9 @@ __device__ __forceinline__ NearCell cell_of_lane(const NearCell& mine, int from)
 /// while other things are done. Warps `warp` of `warps` take part; cells side by side are of
 /// different warps.
 struct NearSearch {
-  const NearCell* cells;
+  const CudaNearCell* cells;
   int count, i, step;
-  NearCell next;
+  CudaNearCell next;
 
   __device__ __forceinline__ void load() {
     if (i >= count) return;
@@ -276,7 +276,7 @@ struct NearSearch {
   __device__ __forceinline__ void push(const CudaTables& t, const CudaNodes& state, float reach,
                                        const ToolPushes& pushes, CellNodes& nodes) {
     while (__any_sync(0xffffffffu, i < count)) {
-      const NearCell cell = next;
+      const CudaNearCell cell = next;
       const std::uint32_t near = i < count ? cell.near : 0;
       bool close = false;
       float4 u;

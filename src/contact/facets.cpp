@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <optional>
 
 #include "contact/known_facets.h"
 #include "contact/surroundings.h"
@@ -123,13 +124,12 @@ unsigned add_crossed(const LatticeBody& body, const Points& points, int cell, co
     if ((members >> s & 1) == 0) continue;
     Place lower = {corner[0] + (s & 1), corner[1] + (s >> 1 & 1), corner[2] + (s >> 2)};
     if (side.sign < 0) --lower[side.axis];
-    const auto crossing =
-        points.crossings.find(crossing_key(body.point(lower[0], lower[1], lower[2]), side.axis));
-    if (crossing == points.crossings.end()) continue;
-    const Crossing& c = crossing->second;
-    normal[s] = Vec3(c.normal[0], c.normal[1], c.normal[2]);
+    const Crossing* crossing =
+        points.crossings.find(body.point(lower[0], lower[1], lower[2]), side.axis);
+    if (crossing == nullptr) continue;
+    normal[s] = Vec3(crossing->normal[0], crossing->normal[1], crossing->normal[2]);
     if (normal[s][side.axis] * side.sign < 0) normal[s] = -normal[s];
-    place[s] = c.place;
+    place[s] = crossing->place;
     left |= 1u << s;
   }
   const unsigned unknown = members & ~left;
@@ -210,17 +210,18 @@ std::vector<Facet> facets_of(const LatticeBody& body, const Points& points, cons
         };
         if (std::all_of(std::begin(around), std::end(around), is_whole)) continue;
         const Place corner = {2 * x, 2 * y, 2 * (block.z + z)};
-        const Surroundings surroundings(body, points, corner);
         unsigned missing[2][kBondCount] = {};  // the cell's points without a bond: cut, never had
         for (int s = 0; s < 8; ++s) {
           if (is_whole(around[s])) continue;
-          for (int k = 0; k < kBondCount; ++k) {
-            if ((points.bonds[around[s]] >> k & 1) != 0) continue;
+          const Points::Site& site = points.site[around[s]];
+          for (unsigned gone = kAllBonds & ~points.bonds[around[s]]; gone != 0; gone &= gone - 1) {
+            const int k = __builtin_ctz(gone);
             const BondOffset o = bond_offset(k);
-            const Place next = {(s & 1) + o.x, (s >> 1 & 1) + o.y, (s >> 2) + o.z};
-            missing[surroundings.has_point(next) ? 0 : 1][k] |= 1u << s;
+            const bool outer = body.point(site.x + o.x, site.y + o.y, site.z + o.z) < 0;
+            missing[outer ? 1 : 0][k] |= 1u << s;
           }
         }
+        std::optional<Surroundings> surroundings;  // where a plane is to be fitted
         const std::size_t first = facets.size();
         for (int j = 0; j < 4 * kBondCount; ++j) {
           const Side side(j / 4, j % 2);
@@ -230,9 +231,10 @@ std::vector<Facet> facets_of(const LatticeBody& body, const Points& points, cons
             members = add_crossed(body, points, cell, corner, side, around, members, facets);
           }
           if (members == 0) continue;
+          if (!surroundings) surroundings.emplace(body, points, corner);
           facets.push_back(make_facet(body.cell_size, cell, side, around, members,
                                       [&](const double(&middle)[2]) {
-                                        return fitted_plane(surroundings, side, how, middle);
+                                        return fitted_plane(*surroundings, side, how, middle);
                                       }));
         }
         merge(facets, first);

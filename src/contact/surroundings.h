@@ -34,8 +34,6 @@ class Surroundings {
     }
   }
 
-  bool has_point(const Place& at) const { return bonds_[index(at)] != kNoPoint; }
-
   /// How many sites above or below `lower` tissue ends next in that way, within two; 9 where it
   /// does not, or in both directions.
   int nearest_end(const Place& lower, int axis, End end) const {

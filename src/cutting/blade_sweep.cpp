@@ -6,7 +6,25 @@
 namespace tissue_sim {
 namespace {
 
-/// Roots in [0, 1] of c[0] + c[1] s + c[2] s^2 + c[3] s^3, by bisection between the turning points.
+/// c[0] + c[1] s + c[2] s^2 + c[3] s^3.
+double cubic(const double (&c)[4], double s) { return c[0] + s * (c[1] + s * (c[2] + s * c[3])); }
+
+/// The root between lo, where the cubic is flo, and hi, where it has the other sign: Newton's
+/// method, halving where that would leave the interval.
+double root_between(const double (&c)[4], double lo, double flo, double hi, double fhi) {
+  double s = lo - flo * (hi - lo) / (fhi - flo);
+  for (int k = 0; k < 100; ++k) {
+    const double f = cubic(c, s), slope = c[1] + s * (2 * c[2] + s * 3 * c[3]);
+    ((f < 0) == (flo < 0) ? lo : hi) = s;
+    double next = s - f / slope;
+    if (std::fabs(next - s) < 1e-16) return next;
+    if (!(next > lo && next < hi)) next = 0.5 * (lo + hi);
+    s = next;
+  }
+  return s;
+}
+
+/// Roots in [0, 1] of a cubic, each between two turning points.
 int cubic_roots(const double (&c)[4], double (&roots)[3]) {
   double cuts[4] = {0, 1, 1, 1};
   int n = 1;
@@ -25,25 +43,16 @@ int cubic_roots(const double (&c)[4], double (&roots)[3]) {
     if (turns[i] > 0 && turns[i] < 1) cuts[n++] = turns[i];
   }
   cuts[n] = 1;
-  const auto value = [&c](double s) { return c[0] + s * (c[1] + s * (c[2] + s * c[3])); };
   int count = 0;
+  double flo = cubic(c, 0);
   for (int i = 0; i < n; ++i) {
-    double lo = cuts[i], hi = cuts[i + 1], flo = value(lo);
-    const double fhi = value(hi);
-    if (flo == 0 || (flo < 0) != (fhi < 0) || (fhi == 0 && i == n - 1)) {
-      if (flo != 0) {
-        for (int k = 0; k < 60; ++k) {
-          const double mid = 0.5 * (lo + hi), f = value(mid);
-          if ((f < 0) == (flo < 0)) {
-            lo = mid;
-          } else {
-            hi = mid;
-          }
-        }
-        lo = 0.5 * (lo + hi);
-      }
+    const double lo = cuts[i], hi = cuts[i + 1], fhi = cubic(c, hi);
+    if (flo == 0) {
       roots[count++] = lo;
+    } else if ((flo < 0) != (fhi < 0) || (fhi == 0 && i == n - 1)) {
+      roots[count++] = root_between(c, lo, flo, hi, fhi);
     }
+    flo = fhi;
   }
   return count;
 }
@@ -77,15 +86,19 @@ Box box_of(const std::vector<SweptEdge>& segments) {
 SweptEdge swept(const MovingSegment& edge) {
   SweptEdge result;
   static_cast<MovingSegment&>(result) = edge;
-  const Vec3 normal = (edge.b1 - edge.a0).cross(edge.a1 - edge.b0);
-  if (normal.norm() > 0) result.normal = normal.normalized();
-  const Vec3 corners[4] = {edge.a0, edge.b0, edge.a1, edge.b1};
-  result.offset = result.normal.dot(corners[0] + corners[1] + corners[2] + corners[3]) / 4;
-  for (const Vec3& corner : corners) {
-    result.thickness =
-        std::max(result.thickness, std::fabs(result.normal.dot(corner) - result.offset));
+  const Vec3 normal = (edge.b1 - edge.a0).cross(edge.a1 - edge.b0).stableNormalized();
+  const Vec3 along = (edge.b0 - edge.a0 + edge.b1 - edge.a1).stableNormalized();
+  const Vec3 axes[3] = {normal, along, normal.cross(along)};
+  for (int i = 0; i < 3; ++i) {
+    Slab& slab = result.slabs[i];
+    slab.axis = axes[i];
+    for (const Vec3* corner : {&edge.a0, &edge.b0, &edge.a1, &edge.b1}) {
+      slab.low = std::min(slab.low, slab.axis.dot(*corner));
+      slab.high = std::max(slab.high, slab.axis.dot(*corner));
+    }
+    slab.low -= 1e-9;  // rounding
+    slab.high += 1e-9;
   }
-  result.thickness += 1e-9;  // rounding
   return result;
 }
 

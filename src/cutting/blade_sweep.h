@@ -15,19 +15,30 @@ struct MovingSegment {
   Vec3 a0, b0, a1, b1;
 };
 
-/// The surface that an edge sweeps lies within `thickness` of the plane normal . x = offset.
+/// Between two planes across an axis.
+struct Slab {
+  Vec3 axis = Vec3::Zero();         ///< unit; 0 where there is none
+  double low = 1e30, high = -1e30;  ///< of axis . x [m]
+};
+
+/// What an edge sweeps lies within three slabs: across its surface, along the edge, along its
+/// motion.
 struct SweptEdge : MovingSegment {
-  Vec3 normal = Vec3::Zero();
-  double offset = 0, thickness = 0;  ///< [m]
+  Slab slabs[3];
 };
 SweptEdge swept(const MovingSegment& edge);
 
-/// Whether all of the bond stays on one side of the swept surface: cheap, and true for most.
+/// Whether all of the bond stays outside of what the edge sweeps: cheap, and true for most.
 inline bool stays_aside(const SweptEdge& e, const MovingSegment& b) {
-  const double a0 = e.normal.dot(b.a0) - e.offset, b0 = e.normal.dot(b.b0) - e.offset;
-  const double a1 = e.normal.dot(b.a1) - e.offset, b1 = e.normal.dot(b.b1) - e.offset;
-  return std::min(std::min(a0, b0), std::min(a1, b1)) > e.thickness ||
-         std::max(std::max(a0, b0), std::max(a1, b1)) < -e.thickness;
+  for (const Slab& slab : e.slabs) {
+    const double a0 = slab.axis.dot(b.a0), b0 = slab.axis.dot(b.b0);
+    const double a1 = slab.axis.dot(b.a1), b1 = slab.axis.dot(b.b1);
+    if (std::min(std::min(a0, b0), std::min(a1, b1)) > slab.high ||
+        std::max(std::max(a0, b0), std::max(a1, b1)) < slab.low) {
+      return true;
+    }
+  }
+  return false;
 }
 
 /// Where an edge meets a bond.

@@ -12,15 +12,11 @@
 #include <vector>
 
 #include "compute/for_each.h"
+#include "cutting/node_box.h"
 #include "mpm/lattice_body.h"
 #include "mpm/nodes.h"
 
 namespace tissue_sim {
-
-/// Mass of a component at a node, and how much of it is anchored [kg].
-struct NodeShare {
-  double mass = 0, anchored_mass = 0;
-};
 
 class NodeFields {
  public:
@@ -33,9 +29,16 @@ class NodeFields {
   int node(const LatticeBody& body, const Points::Site& point, int k) const;
 
   struct Split {
-    std::uint8_t component[216];      ///< of each point of the support; 255 where there is none
+    std::vector<Planes> part;         ///< of the points around the node: its components
     std::vector<std::int32_t> field;  ///< node of each component
 
+    /// The node that the point at a place of the box sees.
+    std::int32_t field_at(int place) const { return field_at(place / 36, place % 36); }
+    std::int32_t field_at(int plane, int in_plane) const {
+      std::size_t i = part.size() - 1;
+      while (i > 0 && (part[i][plane] >> in_plane & 1) == 0) --i;
+      return field[i];
+    }
     /// The node that `point` sees, of the node of cell (x, y, z).
     int seen_by(const Points::Site& point, int x, int y, int z) const;
   };
@@ -55,13 +58,10 @@ class NodeFields {
                            const std::vector<std::int32_t>& changed, Nodes& nodes, Cpu& cpu);
 
  private:
-  /// Components of a node's points, as the bonds have them now.
-  struct Components {
-    std::uint8_t label[216];
-    std::vector<NodeShare> share;  ///< of each; empty if they are what they were
-  };
-  Components find_components(const LatticeBody& body, const Points& points, const Cell& cell) const;
-  void split_node(int lattice_node, const Components& components, Nodes& nodes);
+  /// Gives the components of a node fields: the first one that was part of a field keeps it, others
+  /// get new nodes from `node_count` on.
+  void list_fields(int lattice_node, std::vector<Planes>& parts,
+                   std::vector<std::int32_t>& parent_of_new, int node_count);
 
   std::vector<Split> splits_;
   std::vector<std::int32_t> split_of_;  ///< per lattice node, -1 where whole; empty before any cut

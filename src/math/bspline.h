@@ -8,7 +8,7 @@ namespace tissue_sim {
 
 /// Weight of the node at offset d - 1 (d = 0, 1, 2) for the point at s: 1/2 (3/2 - |r|)^2 or 3/4 -
 /// r^2.
-TISSUE_SIM_INLINE float lattice_weight(int s, int d) {
+TISSUE_SIM_INLINE constexpr float lattice_weight(int s, int d) {
   return d == 1 ? 0.6875f : ((d == 2) == (s == 1) ? 0.28125f : 0.03125f);
 }
 

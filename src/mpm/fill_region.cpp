@@ -59,20 +59,18 @@ Block make_block(const BlockRegion& r, const LatticeBody& b, const Points& point
     for (int i = 0; i < run.count; ++i) lane_of[run.y * block.nx + run.x + i] = run.lane + i;
   }
   for (const CellShare& c : sheet.cells) {
-    const int column = lane_of[(c.y - lo[1]) * block.nx + c.x - lo[0]];
+    const int column = lane_of[(c.y - lo[1]) * block.nx + c.x - lo[0]], z = c.z - lo[2];
+    double mu = 0;
     for (int s = 0; s < 8; ++s) {
       if (c.point[s] < 0) continue;
-      const std::size_t lane =
-          (static_cast<std::size_t>(c.z - lo[2]) * 8 + s) * block.stride + column;
+      const std::size_t lane = (static_cast<std::size_t>(z) * 8 + s) * block.stride + column;
       block.volume[lane] = elastic_volume(b, points, c.point[s]);
       block.point[lane] = c.point[s];
+      if (c.count < kSteadyCount) {
+        mu += lame_mu(b.material_of(points, c.point[s])) * block.volume[lane];
+      }
     }
     if (c.count >= kSteadyCount) continue;
-    double mu = 0;
-    for (const std::int32_t p : c.point) {
-      if (p >= 0) mu += lame_mu(b.material_of(points, p)) * elastic_volume(b, points, p);
-    }
-    const int z = c.z - lo[2];
     block.partial.push_back(
         {z * block.stride + column, z * block.plane + block.cell[column], static_cast<float>(mu)});
   }

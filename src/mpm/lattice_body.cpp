@@ -1,6 +1,7 @@
 #include "mpm/lattice_body.h"
 
 #include <algorithm>
+#include <cstring>
 #include <stdexcept>
 
 #include "cutting/bonds.h"
@@ -131,14 +132,19 @@ std::vector<LatticeBody> make_lattice_bodies(const Scene& scene, Points& points,
 
 void points_around(const LatticeBody& b, int x, int y, int z, std::int32_t (&around)[216]) {
   const int x0 = 2 * x - 2, y0 = 2 * y - 2, z0 = 2 * z - 2;
-  const bool inside = x0 >= 0 && x0 + 6 <= 2 * b.nx;
-  for (int n = 0; n < 216; n += 6) {
-    const int j = y0 + n / 6 % 6, k = z0 + n / 36;
-    if (inside && j >= 0 && j < 2 * b.ny && k >= 0 && k < 2 * b.nz) {
-      std::copy_n(&b.point_at[(static_cast<std::size_t>(k) * 2 * b.ny + j) * 2 * b.nx + x0], 6,
-                  around + n);
+  const int begin = std::max(0, -x0), end = std::min(6, 2 * b.nx - x0);
+  const bool inside = begin == 0 && end == 6;
+  for (int row = 0; row < 36; ++row) {
+    const int j = y0 + row % 6, k = z0 + row / 6;
+    std::int32_t* to = around + 6 * row;
+    const bool there = j >= 0 && j < 2 * b.ny && k >= 0 && k < 2 * b.nz;
+    if (!there || !inside) std::fill_n(to, 6, -1);
+    if (!there) continue;
+    const std::int32_t* from = &b.point_at[(static_cast<std::size_t>(k) * 2 * b.ny + j) * 2 * b.nx];
+    if (inside) {
+      std::memcpy(to, from + x0, 6 * sizeof(*to));
     } else {
-      for (int i = 0; i < 6; ++i) around[n + i] = b.point(x0 + i, j, k);
+      std::copy(from + (x0 + begin), from + (x0 + end), to + begin);
     }
   }
 }

@@ -1,9 +1,9 @@
 // The bodies of a scene on their lattices: which point sits where, and which node is whose.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <string>
-#include <unordered_map>
 #include <vector>
 
 #include "compute/array.h"
@@ -18,6 +18,30 @@ struct Crossing {
   float normal[3];  ///< of the cut in reference space, unit, to either side
 };
 
+/// Crossings of the bonds that point forward, by point and axis (0 x, 1 y, 2 z).
+class Crossings {
+ public:
+  void add(std::int32_t point, int axis, const Crossing& crossing) {
+    if (static_cast<std::size_t>(point) >= index_.size()) index_.resize(point + 1, -1);
+    if (index_[point] < 0) {
+      index_[point] = static_cast<std::int32_t>(of_point_.size());
+      of_point_.push_back({kNone, kNone, kNone});
+    }
+    of_point_[index_[point]][axis] = crossing;
+  }
+  /// Null where there is none.
+  const Crossing* find(std::int32_t point, int axis) const {
+    if (static_cast<std::size_t>(point) >= index_.size() || index_[point] < 0) return nullptr;
+    const Crossing& crossing = of_point_[index_[point]][axis];
+    return crossing.place < 0 ? nullptr : &crossing;
+  }
+
+ private:
+  static constexpr Crossing kNone = {-1, {}};
+  std::vector<std::int32_t> index_;  // per point, -1 where none was broken
+  std::vector<std::array<Crossing, 3>> of_point_;
+};
+
 /// Points of all bodies, numbered body after body in the order of Lattice::sites.
 struct Points {
   struct Site {
@@ -29,17 +53,11 @@ struct Points {
   Array<std::uint8_t> bonds;  ///< bit k: still bound to the neighbour of bond k (cutting/bonds.h)
   Array<std::uint8_t> anchored;  ///< lies in an anchored region
   Array<std::uint8_t> material;  ///< in LatticeBody::materials; empty where no body has inclusions
-  /// Of bonds that blades broke, by crossing_key(); a bond that tore has none.
-  std::unordered_map<std::int64_t, Crossing> crossings;
+  Crossings crossings;           ///< of the bonds that blades broke; one that tore has none
   int size() const { return static_cast<int>(site.size()); }
   /// Number of a point's material among those of its body.
   int material_of(std::int32_t point) const { return material.empty() ? 0 : material[point]; }
 };
-
-/// Key of the forward bond of a point along an axis (0 x, 1 y, 2 z).
-inline std::int64_t crossing_key(std::int32_t point, int axis) {
-  return 3 * std::int64_t{point} + axis;
-}
 
 struct LatticeBody {
   Body body;
@@ -60,6 +78,10 @@ struct LatticeBody {
   int point(int x, int y, int z) const {
     if (x < 0 || y < 0 || z < 0 || x >= 2 * nx || y >= 2 * ny || z >= 2 * nz) return -1;
     return point_at[(static_cast<std::size_t>(z) * 2 * ny + y) * 2 * nx + x];
+  }
+  /// The point after a site along an axis (0 x, 1 y, 2 z), -1 where there is none.
+  std::int32_t next_point(const Points::Site& s, int axis) const {
+    return point(s.x + (axis == 0), s.y + (axis == 1), s.z + (axis == 2));
   }
   /// Lattice node of cell (x, y, z), -1 .. n each.
   int node(int x, int y, int z) const {

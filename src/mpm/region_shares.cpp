@@ -1,0 +1,209 @@
+#include "mpm/region_shares.h"
+
+#include <algorithm>
+#include <iterator>
+
+namespace tissue_sim {
+namespace {
+
+/// Bonds that lead out of a cell from the point at sub-position s.
+constexpr unsigned leaving(int s) {
+  unsigned bonds = 0;
+  for (int a = 0; a < 3; ++a)
+    bonds |= 1u << ((s >> a & 1) != 0 ? kForwardBond + a : kForwardBond - 1 - a);
+  return bonds;
+}
+
+}  // namespace
+
+RegionShares::RegionShares(const BlockRegion& r, const LatticeBody& b, const Points& points,
+                           const NodeFields& fields)
+    : r_(r), points_(points) {
+  const int px = r.nx + 2, py = r.ny + 2, pz = r.nz + 2;
+  split_.resize(static_cast<std::size_t>(px) * py * pz);
+  std::size_t n = 0;
+  for (int z = 0; z < pz; ++z) {
+    for (int y = 0; y < py; ++y) {
+      const int row = b.node(r.x - 1, r.y + y - 1, r.z + z - 1);
+      for (int x = 0; x < px; ++x, ++n) {
+        split_[n] = fields.split(row + x);
+        any_split_ = any_split_ || split_[n] != nullptr;
+      }
+    }
+  }
+  split_in_row_.assign(n, 0);
+  for (std::size_t i = 0; any_split_ && i + 2 < n; ++i) {
+    split_in_row_[i] = split_[i] != nullptr || split_[i + 1] != nullptr || split_[i + 2] != nullptr;
+  }
+  cells_.resize(static_cast<std::size_t>(r.nx) * r.ny * r.nz);
+  all_.reserve(cells_.size());
+  const std::ptrdiff_t row = 2 * b.nx, plane = 2 * b.ny * row;
+  std::size_t cell = 0;
+  for (int z = 0; z < r.nz; ++z) {
+    for (int y = 0; y < r.ny; ++y) {
+      for (int x = 0; x < r.nx; ++x, ++cell) {
+        const std::int32_t* lowest =
+            b.point_at.data() + 2 * (r.z + z) * plane + 2 * (r.y + y) * row + 2 * (r.x + x);
+        std::int32_t point[8];
+        bool any = false;
+        for (int s = 0; s < 8; ++s) {
+          point[s] = lowest[(s >> 2) * plane + (s >> 1 & 1) * row + (s & 1)];
+          any = any || point[s] >= 0;
+        }
+        if (any) add_cell(x, y, z, point, cells_[cell]);
+      }
+    }
+  }
+}
+
+AllSeen RegionShares::seen(const Reached& r) const {
+  const CellShare& c = all_[r.share];
+  int s = 0;
+  while (c.point[s] < 0) ++s;
+  return seen(c.x, c.y, c.z, s, r.bond);
+}
+
+std::vector<RegionShares::Reached> RegionShares::connected(
+    std::int32_t start, std::vector<std::uint8_t>& reached) const {
+  std::vector<Reached> order{{start, kNoBond}};
+  reached[start] = 1;
+  const auto reach = [&](std::int32_t share, int bond) {
+    if (reached[share] != 0) return;
+    reached[share] = 1;
+    order.push_back({share, bond});
+  };
+  for (std::size_t next = 0; next < order.size(); ++next) {
+    const CellShare& c = all_[order[next].share];
+    const Cell* around[kBondCount];
+    if (has_even_faces(c, around)) {
+      // In the order of the points' bonds.
+      for (const int k : {0, 1, 2, 3, 4, 5}) {
+        if (around[k] != nullptr) reach(around[k]->first, k);
+      }
+      continue;
+    }
+    for (int s = 0; s < 8; ++s) {
+      if (c.point[s] < 0) continue;
+      // Points of a cell that are bound see the same fields: they are of one share.
+      for (unsigned bonds = points_.bonds[c.point[s]] & leaving(s); bonds != 0;
+           bonds &= bonds - 1) {
+        const int k = __builtin_ctz(bonds);
+        const Cell* other = next_cell(c, k);
+        if (other == nullptr) continue;
+        const int axis = k < 3 ? 2 - k : k - 3;
+        std::int32_t share = other->first;
+        while (all_[share].point[s ^ 1 << axis] < 0) ++share;
+        reach(share, k);
+      }
+    }
+  }
+  return order;
+}
+
+RegionShares::Cell RegionShares::cell_of(const Points& points, const std::int32_t (&point)[8]) {
+  Cell cell;
+  unsigned held = 0, missing = 0;
+  for (int s = 0; s < 8; ++s) {
+    if (point[s] < 0) {
+      cell.whole = false;
+      cell.faces = Cell::kUneven;
+      return cell;
+    }
+    const unsigned bonds = points.bonds[point[s]];
+    held |= bonds & leaving(s);
+    missing |= ~bonds & leaving(s);
+    cell.whole = cell.whole && (bonds | leaving(s)) == kAllBonds;
+  }
+  cell.faces = (held & missing) != 0 ? Cell::kUneven : static_cast<std::uint8_t>(held);
+  return cell;
+}
+
+void RegionShares::add_cell(int x, int y, int z, const std::int32_t (&point)[8], Cell& cell) {
+  cell = cell_of(points_, point);
+  cell.first = static_cast<std::int32_t>(all_.size());
+  const auto add = [&] {
+    all_.push_back({static_cast<std::int16_t>(x),
+                    static_cast<std::int16_t>(y),
+                    static_cast<std::int16_t>(z),
+                    0,
+                    {}});
+    ++cell.count;
+    return std::begin(all_.back().point);
+  };
+  // Points that hold on to each other see the same.
+  if (cell.whole || !near_split(x, y, z)) {
+    std::copy_n(point, 8, add());
+    return;
+  }
+  AllSeen seen_by[8];  // of each share
+  int share_of[8];
+  for (int s = 0; s < 8; ++s) {
+    if (point[s] < 0) continue;
+    int& i = share_of[s] = cell.count;
+    for (int a = 0; a < 3; ++a) {  // that of a point before it in the cell that it holds on to
+      if ((s >> a & 1) != 0 && (points_.bonds[point[s]] >> (2 - a) & 1) != 0) {
+        i = share_of[s ^ 1 << a];
+      }
+    }
+    if (i == cell.count) {
+      const AllSeen here = seen(x, y, z, s, kNoBond);
+      i = 0;
+      while (i < cell.count && !std::equal(here.begin(), here.end(), seen_by[i].begin())) ++i;
+      if (i == cell.count) {
+        seen_by[i] = here;
+        std::fill_n(add(), 8, -1);
+      }
+    }
+    all_[cell.first + i].point[s] = point[s];
+  }
+}
+
+bool RegionShares::near_split(int x, int y, int z) const {
+  bool any = false;
+  for (int row = 0; row < 9; ++row)
+    any = any || split_in_row_[node_at(x, y + row % 3, z + row / 3)] != 0;
+  return any;
+}
+
+AllSeen RegionShares::seen(int x, int y, int z, int s, int bond) const {
+  int first[3] = {0, 0, 0}, last[3] = {2, 2, 2};
+  if (bond != kNoBond) {
+    const int axis = bond < 3 ? 2 - bond : bond - 3;
+    first[axis] = last[axis] = bond < 3 ? 0 : 2;
+  }
+  AllSeen result;
+  for (int k = first[2]; k <= last[2]; ++k) {
+    for (int j = first[1]; j <= last[1]; ++j) {
+      const int n = node_at(x, y + j, z + k);
+      if (split_in_row_[n] == 0) continue;
+      // Its place in the 6 x 6 x 6 box of the row's first node (NodeFields::Split).
+      const int plane = (s >> 2) - 2 * k + 4;
+      const int in_plane = 6 * ((s >> 1 & 1) - 2 * j + 4) + (s & 1) + 4;
+      for (int i = first[0]; i <= last[0]; ++i) {
+        const NodeFields::Split* split = split_[n + i];
+        if (split == nullptr) continue;
+        result.of[result.count++] = {n + i, split->field_at(plane, in_plane - 2 * i)};
+      }
+    }
+  }
+  return result;
+}
+
+const RegionShares::Cell* RegionShares::next_cell(const CellShare& c, int bond) const {
+  const BondOffset o = bond_offset(bond);
+  const int x = c.x + o.x, y = c.y + o.y, z = c.z + o.z;
+  if (x < 0 || y < 0 || z < 0 || x >= r_.nx || y >= r_.ny || z >= r_.nz) return nullptr;
+  return &cells_[(z * r_.ny + y) * r_.nx + x];
+}
+
+bool RegionShares::has_even_faces(const CellShare& c, const Cell* (&around)[kBondCount]) const {
+  const Cell& cell = cells_[(c.z * r_.ny + c.y) * r_.nx + c.x];
+  if (cell.faces == Cell::kUneven || cell.count != 1) return false;
+  for (int k = 0; k < kBondCount; ++k) {
+    around[k] = (cell.faces >> k & 1) != 0 ? next_cell(c, k) : nullptr;
+    if (around[k] != nullptr && around[k]->count != 1) return false;
+  }
+  return true;
+}
+
+}  // namespace tissue_sim

@@ -1,0 +1,89 @@
+#include "contact/face_looks.h"
+
+#include <algorithm>
+
+#include "contact/face_places.h"
+
+namespace tissue_sim {
+namespace {
+
+/// Lists the contacts that may touch before the next look, and for each block those it is part of.
+void list_active(MpmState& s) {
+  FaceContacts& faces = s.faces;
+  faces.active.clear();
+  faces.first_of_block.assign(s.blocks.all.size() + 1, 0);
+  for (std::size_t i = 0; i < faces.all.size(); ++i) {
+    const FaceContact& c = faces.all[i];
+    if (!is_active(c)) continue;
+    faces.active.push_back(static_cast<std::int32_t>(i));
+    ++faces.first_of_block[faces.block_of[c.facet] + 1];
+    ++faces.first_of_block[faces.block_of[c.other] + 1];
+  }
+  for (std::size_t b = 1; b < faces.first_of_block.size(); ++b) {
+    faces.first_of_block[b] += faces.first_of_block[b - 1];
+  }
+  faces.of_block.resize(2 * faces.active.size());
+  std::vector<std::int32_t> next(faces.first_of_block.begin(), faces.first_of_block.end() - 1);
+  for (const std::int32_t i : faces.active) {
+    faces.of_block[next[faces.block_of[faces.all[i].facet]]++] = 2 * i;
+    faces.of_block[next[faces.block_of[faces.all[i].other]]++] = 2 * i + 1;
+  }
+}
+
+}  // namespace
+
+FacetMotion motion_of(const MpmState& s, std::int32_t facet) {
+  return facet_motion(body_of(s, facet), block_of(s, facet), facet_of(s, facet), s.nodes);
+}
+
+void look_at_due(MpmState& s, double dt, bool all) {
+  FaceContacts& faces = s.faces;
+  const bool common = all || is_due(faces.look_at - s.time, dt);
+  std::vector<std::int32_t> due, facets;
+  for (std::size_t i = 0; i < faces.all.size(); ++i) {
+    if (common || is_due(faces.all[i].look_at - s.time, dt)) due.push_back(static_cast<int>(i));
+  }
+  if (!all) {
+    for (const std::int32_t i : due) {
+      const FaceContact& c = faces.all[i];
+      facets.push_back(c.facet);
+      if (c.other >= 0) facets.push_back(c.other);
+      const auto near = faces.near.begin();
+      facets.insert(facets.end(), near + faces.first_near[i], near + faces.first_near[i + 1]);
+    }
+    std::sort(facets.begin(), facets.end());
+    facets.erase(std::unique(facets.begin(), facets.end()), facets.end());
+    s.cpu->for_each(
+        static_cast<int>(facets.size()),
+        [&](int i) { faces.motion[facets[i]] = motion_of(s, facets[i]); }, 32);
+  }
+  std::vector<float> speed(due.size());
+  s.cpu->for_each(
+      static_cast<int>(due.size()),
+      [&](int i) {
+        ContactFaces contact(s, due[i]);
+        FaceContact& c = faces.all[due[i]];
+        const auto since = static_cast<float>(s.time - c.looked_at);
+        speed[i] = look(contact, c, static_cast<float>(dt), since);
+        c.looked_at = s.time;
+      },
+      32);
+  list_active(s);
+  float fastest = 0;
+  for (std::size_t i = 0; i < due.size(); ++i) {
+    FaceContact& c = faces.all[due[i]];
+    if (c.is_small) {
+      c.look_at = s.time + look_horizon(speed[i], s.scene.cell_size, dt);
+    } else {
+      fastest = std::max(fastest, speed[i]);
+    }
+  }
+  if (common) faces.look_at = s.time + look_horizon(fastest, s.scene.cell_size, dt);
+  double next = faces.look_at;
+  for (const FaceContact& c : faces.all) {
+    if (c.is_small) next = std::min(next, c.look_at);
+  }
+  faces.until_look = next - s.time;
+}
+
+}  // namespace tissue_sim

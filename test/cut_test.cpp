@@ -238,6 +238,18 @@ TEST(BladeSweep, MeetsABondThatMovesThroughAnEdgeAtRest) {
   EXPECT_TRUE(edge_passes({a, b, a + 2 * ahead, b + 2 * ahead}, bond(0.1, 0.5)));
 }
 
+TEST(BladeSweep, OfAnEdgeThatIsHeldStaysWhereItIs) {
+  const Vec3 a(0.01, 0.02, 0), b(0.01, 0.02, 0.03);
+  const SweptEdge held = swept({a, b, a, b});
+  const Vec3 bond(0, 0, 0.001);
+  for (const Vec3& aside : {Vec3(0.002, 0, 0), Vec3(0, 0.002, 0), Vec3(-0.002, -0.002, 0)}) {
+    const Vec3 p = 0.5 * (a + b) + aside;
+    EXPECT_TRUE(stays_aside(held, {p, p + bond, p, p + bond})) << aside.transpose();
+  }
+  const Vec3 p = 0.5 * (a + b);
+  EXPECT_FALSE(stays_aside(held, {p, p + bond, p, p + bond}));
+}
+
 TEST(BladeSweep, AgreesWithFineSampling) {
   std::mt19937 random(11);
   std::uniform_real_distribution<double> u(-1, 1);

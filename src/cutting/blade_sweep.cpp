@@ -86,8 +86,9 @@ Box box_of(const std::vector<SweptEdge>& segments) {
 SweptEdge swept(const MovingSegment& edge) {
   SweptEdge result;
   static_cast<MovingSegment&>(result) = edge;
-  const Vec3 normal = (edge.b1 - edge.a0).cross(edge.a1 - edge.b0).stableNormalized();
   const Vec3 along = (edge.b0 - edge.a0 + edge.b1 - edge.a1).stableNormalized();
+  Vec3 normal = (edge.b1 - edge.a0).cross(edge.a1 - edge.b0).stableNormalized();
+  if (normal.isZero()) normal = along.unitOrthogonal();  // a blade that is held still
   const Vec3 axes[3] = {normal, along, normal.cross(along)};
   for (int i = 0; i < 3; ++i) {
     Slab& slab = result.slabs[i];

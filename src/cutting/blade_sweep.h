@@ -21,8 +21,8 @@ struct Slab {
   double low = 1e30, high = -1e30;  ///< of axis . x [m]
 };
 
-/// What an edge sweeps lies within three slabs: across its surface, along the edge, along its
-/// motion.
+/// What an edge sweeps lies within three slabs: across its surface (of an edge that is held still,
+/// any along it), along the edge, along its motion.
 struct SweptEdge : MovingSegment {
   Slab slabs[3];
 };

@@ -44,15 +44,18 @@ void look_at_due(MpmState& s, double dt, bool all) {
     if (common || is_due(faces.all[i].look_at - s.time, dt)) due.push_back(static_cast<int>(i));
   }
   if (!all) {
+    std::vector<std::uint8_t> is_needed(faces.motion.size(), 0);
     for (const std::int32_t i : due) {
       const FaceContact& c = faces.all[i];
-      facets.push_back(c.facet);
-      if (c.other >= 0) facets.push_back(c.other);
-      const auto near = faces.near.begin();
-      facets.insert(facets.end(), near + faces.first_near[i], near + faces.first_near[i + 1]);
+      is_needed[c.facet] = 1;
+      if (c.other >= 0) is_needed[c.other] = 1;
+      for (int n = faces.first_near[i]; n < faces.first_near[i + 1]; ++n) {
+        is_needed[faces.near[n]] = 1;
+      }
     }
-    std::sort(facets.begin(), facets.end());
-    facets.erase(std::unique(facets.begin(), facets.end()), facets.end());
+    for (std::size_t f = 0; f < is_needed.size(); ++f) {
+      if (is_needed[f] != 0) facets.push_back(static_cast<std::int32_t>(f));
+    }
     s.cpu->for_each(
         static_cast<int>(facets.size()),
         [&](int i) { faces.motion[facets[i]] = motion_of(s, facets[i]); }, 32);

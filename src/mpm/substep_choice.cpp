@@ -11,7 +11,7 @@ namespace {
 constexpr int kSteps = 12, kStepsAtCut = 4;
 constexpr int kLongestAge = 30;       // frames
 constexpr double kMostGrowth = 1.3;   // of the stiffness, until it is measured again
-constexpr double kMargin = 0.72;      // for springs of contact, and what stiffens within the frame
+constexpr double kMargin = 0.6;       // for springs of contact, and what stiffens within the frame
 constexpr double kFreeMotion = 0.25;  // of a tool in a frame [cells]; beyond it the margin grows
 
 /// Whether something tore within the last twentieth of a second: then more may soon, in pieces that

@@ -117,13 +117,9 @@ FrameReport Simulation::advance_frame() {
   report.input.frame = s.frame;
   report.input.tools = s.tools;
   report.input.cuts = std::exchange(s.cuts, {});
-  const double frame_time = 1.0 / s.scene.frame_rate;
-  const FrameInput input{report.input.tools, report.input.cuts};
-  report.substeps = static_cast<int>(std::ceil(frame_time / s.tissue->substep_for(input)));
-  report.substep = frame_time / report.substeps;
-  report.cfl = report.substep * s.wave_speed / s.scene.cell_size;
-  s.tissue->advance(report.substeps, static_cast<float>(report.substep), input);
+  s.tissue->advance(1.0 / s.scene.frame_rate, {report.input.tools, report.input.cuts});
   report.result = s.tissue->finish();
+  report.cfl = report.result.substep * s.wave_speed / s.scene.cell_size;
   s.blew_up = report.result.blew_up;
   for (ToolMotion& m : s.tools) {
     m.begin = m.end;

@@ -73,7 +73,7 @@ TEST_F(SubstepOnGpu, HoldsWhileTissueIsPressedAndCut) {
       const FrameReport report = simulation.advance_frame();
       ASSERT_FALSE(report.result.blew_up) << frame;
       energy[which] = report.result.elastic_energy;
-      gain[which] += report.substep / cautious / 90;
+      gain[which] += report.result.substep / cautious / 90;
     }
     EXPECT_GT(simulation.tissue().fragments().size(), 1u);
   }

@@ -80,9 +80,9 @@ TEST(SubstepChoice, HoldsWhileTissueIsPressedAndCut) {
     const double limit = stability_limit(tissue);
     const FrameReport report = simulation.advance_frame();
     ASSERT_FALSE(report.result.blew_up) << frame;
-    least = std::min(least, limit / report.substep);
-    least = std::min(least, stability_limit(tissue) / report.substep);  // how it ended
-    most_gain = std::max(most_gain, report.substep / cautious);
+    least = std::min(least, limit / report.result.substep);
+    least = std::min(least, stability_limit(tissue) / report.result.substep);  // how it ended
+    most_gain = std::max(most_gain, report.result.substep / cautious);
   }
   EXPECT_GT(tissue.fragments().size(), 1u);
   std::printf("limit over substep: %.2f at least; up to %.2f times the cautious substep\n", least,
@@ -116,7 +116,7 @@ TEST(SubstepChoice, IsCautiousWhereItCannotKnow) {
   ToolMotion fast;
   fast.present = true;
   fast.begin.position = Vec3(0, 0, 0.012);
-  fast.end.position = Vec3(0, 0, 0.002);  // five cells in a frame
+  fast.end.position = Vec3(0, 0, -0.018);  // fifteen cells in a frame
   EXPECT_EQ(pressed.substep_for({{&fast, 1}, {}}), cautious);
 }
 

@@ -27,9 +27,7 @@ struct AppliedInput {
 struct FrameReport {
   AppliedInput input;
   FrameResult result;
-  int substeps = 0;
-  double substep = 0;       ///< [s]
-  double cfl = 0;           ///< substep * wave speed / cell size
+  double cfl = 0;           ///< longest substep * wave speed / cell size
   double compute_time = 0;  ///< wall time that the frame took [s]
 };
 

@@ -27,24 +27,26 @@ struct FrameResult {
   std::vector<CutReport> cut_reports;  ///< parallels FrameInput::cuts
   CutReport blade_report;              ///< what the instruments' edges cut
   CutReport tear_report;               ///< what tore by itself (Material::tear_stretch)
-  double kinetic_energy = 0;           ///< [J]
-  double elastic_energy = 0;           ///< [J]
-  double max_speed = 0;                ///< of a point [m/s]
-  bool blew_up = false;                ///< something is not finite, or moves faster than it can
+  int substeps = 0;
+  double substep = 0;         ///< the longest of them [s]
+  double kinetic_energy = 0;  ///< [J]
+  double elastic_energy = 0;  ///< [J]
+  double max_speed = 0;       ///< of a point [m/s]
+  bool blew_up = false;       ///< something is not finite, or moves faster than it can
 };
 
 class Tissue {
  public:
   virtual ~Tissue() = default;
 
+  /// Advances by `duration` seconds, in substeps as long as the tissue was measured to bear, with a
+  /// margin; may only enqueue.
+  virtual void advance(double duration, const FrameInput& input) = 0;
+  /// Advances by `substeps` of `dt` seconds each; 0 only cuts.
+  virtual void advance(int substeps, float dt, const FrameInput& input) = 0;
   /// The substep that is stable in the present state however the tissue is cut: what a lone point
   /// bears, by the scene's CFL number [s].
   virtual float stable_substep() const = 0;
-  /// The substep for a frame with this input [s]: as long as the tissue, as it is cut, was measured
-  /// to bear with a margin, and stable_substep() at least. Measures where that is due.
-  virtual float substep_for(const FrameInput& input) = 0;
-  /// Advances by `substeps` of `dt` seconds each; may only enqueue.
-  virtual void advance(int substeps, float dt, const FrameInput& input) = 0;
   /// Waits for advance() and reports on it.
   virtual FrameResult finish() = 0;
 

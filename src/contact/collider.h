@@ -88,10 +88,9 @@ struct ContactSpring {
 };
 
 // Stiffness of a contact spring in units of the P-wave modulus over a point's edge: half of it
-// makes contact about as stiff as one layer of points, and adds less to the highest frequency than
-// tissue.
+// makes contact about as stiff as one layer of points. SubstepChoice counts both with tissue.
 inline constexpr float kContactStiffness = 0.5f;
-inline constexpr float kContactDamping = 0.3f;  ///< share of critical
+inline constexpr float kContactDamping = 0.1f;  ///< share of critical
 
 /// The spring of a point of `volume` [m^3], `edge` [m] apart from the next, in tissue of this
 /// P-wave modulus [Pa] and density [kg/m^3]. Both of its figures are in proportion to the volume.

@@ -49,7 +49,8 @@ struct alignas(16) FaceSpring {
     constexpr float kStable = 0.35f;  // stiffness * dt^2 / mass, at most; springs share nodes
     const float mass = 1 / (own_mobility + held_mobility + 1e-30f);
     stiffness = fminf(stiffness, kStable * mass / (dt * dt));
-    damping = 2 * kContactDamping * sqrtf(stiffness * mass);
+    constexpr float kDamping = 0.3f;  // share of critical
+    damping = 2 * kDamping * sqrtf(stiffness * mass);
   }
 
   /// Whether the place held is still on the other face: near its cell, and not far from the facet.

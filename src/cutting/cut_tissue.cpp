@@ -4,6 +4,7 @@
 
 #include "contact/block_contact.h"
 #include "contact/known_facets.h"
+#include "mpm/crumbs.h"
 
 namespace tissue_sim {
 namespace {
@@ -29,6 +30,7 @@ void take_apart(MpmState& state, const std::vector<std::int32_t>& changed) {
   if (changed.empty()) return;
   const std::vector<NodeFields::Cell> cells =
       state.fields->update(state.bodies, state.points, changed, state.nodes, *state.cpu);
+  settle_crumbs(state.bodies, state.points, *state.fields, changed, state.nodes);
   state.blocks.stale_facets.resize(lattice_node_count(state.bodies), 0);
   mark_stale_facets(state.bodies, state.points, changed, state.blocks.stale_facets);
   if (cells.empty()) return;

@@ -48,8 +48,9 @@ struct Block {
     Array<float> mu, lambda;          ///< [nz][8][stride], times the point's volume [J]
     Array<std::int32_t> neo_hookean;  ///< [nz][8][stride]: -1 for a point of that law, 0 for one of
                                       ///< the other; empty unless there are both
-    Array<float> viscosity;  ///< [nz][stride]: of a cell's points, times their volumes, summed
-                             ///< [J s]; empty where none is viscous
+    Array<float> viscosity;  ///< [nz][stride]: of a cell's points, times their volumes, summed,
+                             ///< times the share of the cell that they fill [J s]; empty where
+                             ///< none is viscous
   } mixture;
 
   Array<float> volume;        ///< [nz][8][stride]: elastic_volume(), 0 where there is no point

@@ -1,6 +1,7 @@
 #include "mpm/block_materials.h"
 
 #include <algorithm>
+#include <cmath>
 #include <vector>
 
 namespace tissue_sim {
@@ -38,6 +39,7 @@ void find_materials(Block& block, const LatticeBody& body, const Points& points)
   m.lambda.assign(block.lane_count(), 0.0f);
   if (of_law[0] > 0 && of_law[1] > 0) m.neo_hookean.assign(block.lane_count(), 0);
   if (viscous) m.viscosity.assign(static_cast<std::size_t>(block.nz) * block.stride, 0.0f);
+  std::vector<double> filled(m.viscosity.size(), 0);  // share of each cell
   for (std::size_t lane = 0; lane < block.lane_count(); ++lane) {
     if (block.point[lane] < 0) continue;
     const Material& material = body.material_of(points, block.point[lane]);
@@ -48,6 +50,10 @@ void find_materials(Block& block, const LatticeBody& body, const Points& points)
     if (!viscous) continue;
     const std::size_t cell = lane / block.stride / 8 * block.stride + lane % block.stride;
     m.viscosity[cell] += static_cast<float>(material.viscosity * volume);
+    filled[cell] += volume / std::pow(body.cell_size, 3);
+  }
+  for (std::size_t i = 0; i < m.viscosity.size(); ++i) {
+    m.viscosity[i] *= static_cast<float>(filled[i]);
   }
 }
 

@@ -1,7 +1,9 @@
 #include "mpm/crumbs.h"
 
+#include <Eigen/Dense>
 #include <algorithm>
 #include <cstring>
+#include <set>
 
 #include "cutting/bonds.h"
 
@@ -22,30 +24,117 @@ bool is_in_long_run(const Points& points, std::int32_t point) {
   return run_from(point) || run_from(point - kCrumbPoints);
 }
 
-/// Whether the bonds hold at most kCrumbPoints points together with this one.
-bool is_small(const LatticeBody& body, const Points& points, std::int32_t point) {
-  std::int32_t piece[kCrumbPoints] = {point};
-  int count = 1;
-  for (int i = 0; i < count; ++i) {
-    const Points::Site& s = points.site[piece[i]];
+/// The points that bonds hold together with this one; none if they are more than a crumb's.
+std::vector<std::int32_t> crumb_of(const LatticeBody& body, const Points& points,
+                                   std::int32_t point) {
+  const bool may_be = points.bonds[point] != kAllBonds && body.point_count > kCrumbPoints &&
+                      !is_in_long_run(points, point);
+  if (!may_be) return {};
+  std::vector<std::int32_t> piece = {point};
+  piece.reserve(kCrumbPoints);
+  for (std::size_t i = 0; i < piece.size(); ++i) {
+    const Points::Site s = points.site[piece[i]];
     for (int k = 0; k < kBondCount; ++k) {
       if ((points.bonds[piece[i]] >> k & 1) == 0) continue;
       const BondOffset o = bond_offset(k);
       const std::int32_t next = body.point(s.x + o.x, s.y + o.y, s.z + o.z);
-      if (std::find(piece, piece + count, next) != piece + count) continue;
-      if (count == kCrumbPoints) return false;
-      piece[count++] = next;
+      if (std::find(piece.begin(), piece.end(), next) != piece.end()) continue;
+      if (piece.size() == kCrumbPoints) return {};
+      piece.push_back(next);
     }
   }
-  return true;
+  return piece;
+}
+
+/// The nodes that a crumb's points see, and their reference places.
+struct CrumbNodes {
+  std::vector<int> node;
+  std::vector<Vec3> home;
+  CrumbNodes(const LatticeBody& body, const Points& points, const NodeFields& fields,
+             const std::vector<std::int32_t>& crumb) {
+    for (const std::int32_t p : crumb) {
+      const Points::Site& s = points.site[p];
+      for (int k = 0; k < 27; ++k) {
+        const int i = fields.node(body, s, k);
+        if (std::find(node.begin(), node.end(), i) != node.end()) continue;
+        node.push_back(i);
+        home.push_back(
+            body.node_position(s.x / 2 + k % 3 - 1, s.y / 2 + k / 3 % 3 - 1, s.z / 2 + k / 9 - 1));
+      }
+    }
+  }
+};
+
+/// The rotation that maps the places X best onto x, by their sum of mass times x X^T.
+Eigen::Matrix3d rotation_of(const Eigen::Matrix3d& x_X) {
+  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(x_X, Eigen::ComputeFullU | Eigen::ComputeFullV);
+  Eigen::Matrix3d U = svd.matrixU();
+  if ((U * svd.matrixV().transpose()).determinant() < 0) U.col(2) *= -1;
+  return U * svd.matrixV().transpose();
+}
+
+void make_rigid(const CrumbNodes& crumb, double fastest_spin, Nodes& nodes) {
+  const std::size_t count = crumb.node.size();
+  std::vector<Vec3> x(count), v(count);
+  double mass = 0;
+  Vec3 x_mean = Vec3::Zero(), X_mean = Vec3::Zero(), v_mean = Vec3::Zero();
+  for (std::size_t i = 0; i < count; ++i) {
+    const int n = crumb.node[i];
+    if (nodes.mass[n] > 0 && nodes.inv_mass[n] == 0) return;  // held fast
+    x[i] = crumb.home[i] + Vec3(nodes.u[0][n], nodes.u[1][n], nodes.u[2][n]);
+    v[i] = Vec3(nodes.v[0][n], nodes.v[1][n], nodes.v[2][n]);
+    mass += nodes.mass[n];
+    x_mean += nodes.mass[n] * x[i];
+    X_mean += nodes.mass[n] * crumb.home[i];
+    v_mean += nodes.mass[n] * v[i];
+  }
+  x_mean /= mass;
+  X_mean /= mass;
+  v_mean /= mass;
+  Eigen::Matrix3d x_X = Eigen::Matrix3d::Zero(), inertia = x_X;
+  Vec3 angular = Vec3::Zero();
+  for (std::size_t i = 0; i < count; ++i) {
+    const double m = nodes.mass[crumb.node[i]];
+    x_X += m * (x[i] - x_mean) * (crumb.home[i] - X_mean).transpose();
+    angular += m * (x[i] - x_mean).cross(v[i] - v_mean);
+  }
+  if (!x_X.allFinite() || !angular.allFinite()) return;  // as the end of the frame will say
+  const Eigen::Matrix3d R = rotation_of(x_X);
+  for (std::size_t i = 0; i < count; ++i) {
+    x[i] = R * (crumb.home[i] - X_mean);
+    const double m = nodes.mass[crumb.node[i]];
+    inertia += m * (x[i].squaredNorm() * Eigen::Matrix3d::Identity() - x[i] * x[i].transpose());
+  }
+  Vec3 spin = inertia.ldlt().solve(angular);
+  spin *= std::min(1.0, fastest_spin / (spin.norm() + 1e-30));
+  for (std::size_t i = 0; i < count; ++i) {
+    const Vec3 u = x_mean + x[i] - crumb.home[i], velocity = v_mean + spin.cross(x[i]);
+    for (int a = 0; a < 3; ++a) {
+      nodes.u[a][crumb.node[i]] = static_cast<float>(u[a]);
+      nodes.v[a][crumb.node[i]] = static_cast<float>(velocity[a]);
+    }
+  }
 }
 
 }  // namespace
 
 float elastic_volume(const LatticeBody& body, const Points& points, std::int32_t point) {
-  const bool crumb = points.bonds[point] != kAllBonds && body.point_count > kCrumbPoints &&
-                     !is_in_long_run(points, point) && is_small(body, points, point);
-  return (crumb ? kCrumbStiffness : 1.0f) * points.volume[point];
+  const bool is_crumb = !crumb_of(body, points, point).empty();
+  return (is_crumb ? kCrumbStiffness : 1.0f) * points.volume[point];
+}
+
+void settle_crumbs(const std::vector<LatticeBody>& bodies, const Points& points,
+                   const NodeFields& fields, const std::vector<std::int32_t>& changed,
+                   Nodes& nodes) {
+  std::set<std::int32_t> settled;  // the lowest point of each
+  for (const std::int32_t p : changed) {
+    const LatticeBody& body = bodies[points.site[p].body];
+    const std::vector<std::int32_t> crumb = crumb_of(body, points, p);
+    if (crumb.empty()) continue;
+    if (!settled.insert(*std::min_element(crumb.begin(), crumb.end())).second) continue;
+    const double spin = kCrumbSpin * wave_speed(body.material_of(points, p)) / body.cell_size;
+    make_rigid(CrumbNodes(body, points, fields, crumb), spin, nodes);
+  }
 }
 
 }  // namespace tissue_sim

@@ -3,8 +3,11 @@
 #pragma once
 
 #include <cstdint>
+#include <vector>
 
+#include "cutting/node_fields.h"
 #include "mpm/lattice_body.h"
+#include "mpm/nodes.h"
 
 namespace tissue_sim {
 
@@ -16,5 +19,13 @@ inline constexpr float kCrumbStiffness = 1.0f / 3;
 /// The volume by which a point resists strain [m^3]: its own, or less in a crumb. A point with all
 /// its bonds is never taken for one of a crumb.
 float elastic_volume(const LatticeBody& body, const Points& points, std::int32_t point);
+
+/// Lets the crumbs that a cut or tear made of the points `changed` move on as rigid bodies without
+/// strain. Their momentum stays, linear and angular; what else a torn thread left in their nodes, a
+/// swing of many times their size, goes. No crumb turns faster than kCrumbSpin wave speeds a cell.
+void settle_crumbs(const std::vector<LatticeBody>& bodies, const Points& points,
+                   const NodeFields& fields, const std::vector<std::int32_t>& changed,
+                   Nodes& nodes);
+inline constexpr double kCrumbSpin = 0.5;
 
 }  // namespace tissue_sim

@@ -40,13 +40,14 @@ struct OneMaterial {
   TISSUE_SIM_INLINE static Vec<W> energy(const Vec<W>* F, const Stiffness<1, W>& k) {
     return LawOf::energy(F, k.mu[0], k.lambda[0]);
   }
-  /// Viscosity of W cells in z-plane z times the volume of their points [J s].
+  /// What W cells in z-plane z damp: their viscosity times the volume V of their points, less where
+  /// V does not fill the cell, times V / h^3 [J s].
   template <int W>
   TISSUE_SIM_INLINE static Vec<W> viscosity(const Block& b, const BlockField& f, int z, int j) {
     const float* volume = b.volume.data() + static_cast<std::size_t>(z) * 8 * b.stride + j;
     Vec<W> V = load<W>(volume);
     for (int s = 1; s < 8; ++s) V += load<W>(volume + s * b.stride);
-    return f.viscosity * V;
+    return (f.viscosity / (f.cell_size * f.cell_size * f.cell_size)) * V * V;
   }
 };
 

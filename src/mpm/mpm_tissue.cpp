@@ -8,6 +8,7 @@
 #include "contact/frame_colliders.h"
 #include "cutting/cut_tissue.h"
 #include "cutting/tear.h"
+#include "cutting/threads.h"
 #include "fragments/piece_motion.h"
 #include "mpm/lanczos.h"
 #include "mpm/linearised_motion.h"
@@ -47,7 +48,7 @@ void MpmTissue::cut(const std::vector<BladePath>& paths, const Array<float>* u_b
   }
 }
 
-void MpmTissue::advance(int substeps, float dt, const FrameInput& input) {
+MpmTissue::Frame MpmTissue::begin(double duration, const FrameInput& input) {
   MpmState& s = *state_;
   result_ = {};
   result_.loads.resize(s.scene.tools.size());
@@ -59,48 +60,78 @@ void MpmTissue::advance(int substeps, float dt, const FrameInput& input) {
   if (blades) {
     for (int a = 0; a < 3; ++a) s.u_before[a] = s.nodes.u[a];
   }
-  const double duration = static_cast<double>(substeps) * dt;
-  const std::vector<Box> reach = collider_reach(s.scene, input, duration);
-  find_near_colliders(s, reach, duration);
+  Frame frame{input, duration, collider_reach(s.scene, input, duration), blades, 0, s.motion};
+  find_near_colliders(s, frame.reach, duration);
+  return frame;
+}
+
+void MpmTissue::run(Frame& frame, int substeps, float dt, double from, double to) {
+  MpmState& s = *state_;
   const int checks = can_tear(s) ? tear_checks(s, substeps, dt) : 0;
-  std::vector<BlockMotion> before = s.motion;  // when the blades were last looked at
-  double cut_to = 0;                           // share of the frame
-  const auto cut_by_blades = [&](double share) {
-    measure_motion(s);
-    const std::vector<BladePath> paths = blade_paths(s.scene, input, cut_to, share);
-    cut(paths, s.u_before, before, result_.blade_report);
-    cut_to = share;
-  };
   int check = 0;
+  result_.substeps += substeps;
+  result_.substep = std::max(result_.substep, static_cast<double>(dt));
   for (int i = 0; i < substeps; ++i) {
-    s.colliders = colliders_at(s.scene, input, (i + 1.0) / substeps, duration);
+    const double share = from + (to - from) * (i + 1) / substeps;
+    s.colliders = colliders_at(s.scene, frame.input, share, frame.duration);
     std::vector<ColliderLoad> loads(s.colliders.size());
     find_face_contacts(s, pieces_, dt);
     substep(s, dt, loads);
     s.time += dt;
+    const double weight = dt / frame.duration;
     for (std::size_t c = 1; c < loads.size(); ++c) {
       ToolLoad& load = result_.loads[c - 1];
       const Vec3 force(loads[c].force[0], loads[c].force[1], loads[c].force[2]);
-      load.mean.force += force / substeps;
-      load.mean.torque +=
-          Vec3(loads[c].torque[0], loads[c].torque[1], loads[c].torque[2]) / substeps;
+      load.mean.force += weight * force;
+      load.mean.torque += weight * Vec3(loads[c].torque[0], loads[c].torque[1], loads[c].torque[2]);
       load.peak_force = std::max(load.peak_force, force.norm());
     }
     if (checks == 0 || i + 1 != tear_check_at(check, checks, substeps)) continue;
     ++check;
     const std::vector<TearingPoint> tearing = find_tearing(s);
     if (tearing.empty()) continue;
-    if (blades) cut_by_blades((i + 1.0) / substeps);
-    if (!tear(tearing) && !blades) continue;
+    if (frame.blades) cut_by_blades(frame, share);
+    if (!tear(tearing) && !frame.blades) continue;
     measure_motion(s);
-    find_near_colliders(s, reach, duration);
-    before = s.motion;
-    for (int a = 0; blades && a < 3; ++a) s.u_before[a] = s.nodes.u[a];
+    find_near_colliders(s, frame.reach, frame.duration);
+    frame.before = s.motion;
+    for (int a = 0; frame.blades && a < 3; ++a) s.u_before[a] = s.nodes.u[a];
   }
-  cut_by_blades(1);
+}
+
+void MpmTissue::cut_by_blades(Frame& frame, double share) {
+  measure_motion(*state_);
+  const std::vector<BladePath> paths = blade_paths(state_->scene, frame.input, frame.cut_to, share);
+  cut(paths, state_->u_before, frame.before, result_.blade_report);
+  frame.cut_to = share;
+}
+
+void MpmTissue::end(Frame& frame) {
+  cut_by_blades(frame, 1);
   if (result_.tear_report.bonds_broken > 0) {
-    result_.tear_report.new_fragments = update_pieces(s.bodies, s.points, pieces_);
+    result_.tear_report.new_fragments = update_pieces(state_->bodies, state_->points, pieces_);
   }
+}
+
+void MpmTissue::advance(int substeps, float dt, const FrameInput& input) {
+  Frame frame = begin(static_cast<double>(substeps) * dt, input);
+  run(frame, substeps, dt, 0, 1);
+  end(frame);
+}
+
+void MpmTissue::advance(double duration, const FrameInput& input) {
+  Frame frame = begin(duration, input);
+  advance_in_parts(
+      duration, input, [this](const FrameInput& rest) { return substep_for(rest); },
+      [this](const FrameInput& rest, int left, double dt) {
+        return substep_.part(*state_, rest, left, dt);
+      },
+      [&](int substeps, float dt, double from, double to) { run(frame, substeps, dt, from, to); },
+      [this] {
+        measure();
+        return !result_.blew_up;
+      });
+  end(frame);
 }
 
 bool MpmTissue::tear(const std::vector<TearingPoint>& tearing) {
@@ -108,6 +139,18 @@ bool MpmTissue::tear(const std::vector<TearingPoint>& tearing) {
   tear_bonds(*state_, tearing, changed, result_.tear_report);
   take_apart(*state_, changed);
   return !changed.empty();
+}
+
+bool MpmTissue::tear_threads() {
+  std::vector<std::int32_t> changed;
+  if (result_.blew_up) return false;
+  tissue_sim::tear_threads(*state_, changed, result_.tear_report);
+  if (changed.empty()) return false;
+  take_apart(*state_, changed);
+  for (const int id : update_pieces(state_->bodies, state_->points, pieces_)) {
+    result_.tear_report.new_fragments.push_back(id);
+  }
+  return true;
 }
 
 void MpmTissue::measure() {
@@ -148,6 +191,7 @@ void MpmTissue::measure() {
 
 FrameResult MpmTissue::finish() {
   measure();
+  if (tear_threads()) measure();
   measure_pieces(*state_, pieces_);
   return result_;
 }

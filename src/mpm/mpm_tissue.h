@@ -17,9 +17,9 @@ class MpmTissue final : public Tissue {
   /// `notes` come before those of the scene.
   explicit MpmTissue(const Scene& scene, std::vector<std::string> notes = {});
 
-  float stable_substep() const override;
-  float substep_for(const FrameInput& input) override;
+  void advance(double duration, const FrameInput& input) override;
   void advance(int substeps, float dt, const FrameInput& input) override;
+  float stable_substep() const override;
   FrameResult finish() override;
   int point_count() const override { return state_->points.size(); }
   int read_points(const PointSelection& selection, std::vector<std::uint8_t>& cloud) override;
@@ -28,14 +28,32 @@ class MpmTissue final : public Tissue {
   std::string device_name() const override;
   const std::vector<std::string>& notes() const override { return notes_; }
 
+  // For tests and the benchmark.
+  /// The substep for the next part of a frame: SubstepChoice::longest().
+  float substep_for(const FrameInput& input);
   int fragment_of(int point) const { return pieces_.of_point[point]; }
   const Pieces& pieces() const { return pieces_; }
-  MpmState& state() { return *state_; }  ///< for tests and the benchmark
+  MpmState& state() { return *state_; }
 
  private:
+  /// The frame that is worked on.
+  struct Frame {
+    FrameInput input;
+    double duration;
+    std::vector<Box> reach;           ///< of the colliders
+    bool blades;                      ///< whether there are any
+    double cut_to = 0;                ///< share of the frame up to which they did
+    std::vector<BlockMotion> before;  ///< when they were last looked at
+  };
+
+  Frame begin(double duration, const FrameInput& input);
+  void run(Frame& frame, int substeps, float dt, double from, double to);
+  void cut_by_blades(Frame& frame, double share);
+  void end(Frame& frame);
   void cut(const std::vector<BladePath>& paths, const Array<float>* u_before,
            const std::vector<BlockMotion>& before, CutReport& report);
   bool tear(const std::vector<TearingPoint>& tearing);  ///< whether anything did
+  bool tear_threads();                                  ///< the same
   void measure();
 
   std::vector<std::string> notes_;

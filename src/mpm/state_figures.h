@@ -18,12 +18,13 @@ Stiffening even_stiffening(const MpmState& state, float stiffening);
 /// The largest P-wave modulus of deformed tissue [Pa], as its substep sees it.
 double wave_modulus(const Material& material, float stiffening);
 
-/// The substep that is as stable with viscosity as `elastic` is without [s], for a `relaxation`
-/// time of viscosity over stiffness [s]: dt^2 + 4 relaxation dt = elastic^2.
-double viscous_substep(double elastic, double relaxation);
+/// The substep that is as stable with viscosity as `elastic` is without [s], where it slows nodes
+/// at twice the rate `damping` [1/s]: (dt / elastic)^2 + damping dt = 1.
+double viscous_substep(double elastic, double damping);
 
-/// The largest viscosity over stiffness of all materials, as they are deformed [s].
-double slowest_relaxation(const MpmState& state, const Stiffening& stiffening);
+/// The largest such `damping` of all materials, as they are deformed and however they are cut
+/// [1/s].
+double fastest_damping(const MpmState& state, const Stiffening& stiffening);
 
 /// The substep that is stable however the tissue is cut, by the scene's CFL number [s].
 float stable_substep(const MpmState& state, const Stiffening& stiffening);

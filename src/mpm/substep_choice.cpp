@@ -9,10 +9,14 @@ namespace tissue_sim {
 namespace {
 
 constexpr int kSteps = 12, kStepsAtCut = 4;
-constexpr int kLongestAge = 30;       // frames
-constexpr double kMostGrowth = 1.3;   // of the stiffness, until it is measured again
-constexpr double kMargin = 0.6;       // for springs of contact, and what stiffens within the frame
-constexpr double kFreeMotion = 0.25;  // of a tool in a frame [cells]; beyond it the margin grows
+constexpr double kLongestAge = 0.5;   // of the measured limit [s]
+constexpr double kMostGrowth = 1.3;   // of the stiffness, until it is measured again ...
+constexpr double kYoungest = 0.015;   // ... unless that is not long ago [s]
+constexpr double kMargin = 0.72;      // for what stiffens within the part, and contact of faces
+constexpr double kFreeMotion = 0.25;  // of a tool in a part [cells]; beyond it the margin grows
+constexpr double kCalmTrend = 1.05;   // of the stiffness in a part: the next one is longer ...
+constexpr double kMostTrend = 1.1;    // ... or shorter
+constexpr int kShortestPart = 6;      // substeps
 
 /// Whether something tore within the last twentieth of a second: then more may soon, in pieces that
 /// nobody has measured.
@@ -55,22 +59,38 @@ double farthest_motion(const MpmState& state, const FrameInput& input) {
 
 void SubstepChoice::follow(MpmState& state, const std::vector<float>& modulus) {
   growth_ = trend_ = 1;
-  ++age_;
+  bool is_cut = false;
   for (std::size_t i = 0; i < modulus.size(); ++i) {
     Block::Modulus& m = state.blocks.all[i]->modulus;
     if (m.measured > 0) growth_ = std::max(growth_, static_cast<double>(modulus[i] / m.measured));
     if (m.last > 0) trend_ = std::max(trend_, static_cast<double>(modulus[i] / m.last));
+    is_cut = is_cut || m.last == 0;
     m.last = modulus[i];
   }
+  const double frame = 1 / state.scene.frame_rate, last = state.time - followed_at_;
+  part_ = trend_ > kMostTrend ? last / 2 : trend_ < kCalmTrend ? 2 * last : last;
+  part_ = std::min(part_, is_cut ? frame / 4 : frame);
+  if (state.time == 0) part_ = frame;
+  followed_at_ = state.time;
+}
+
+int SubstepChoice::part(const MpmState& state, const FrameInput& input, int left, double dt) const {
+  const double motion = farthest_motion(state, input) / state.scene.cell_size;
+  const double free = kFreeMotion / (std::max(motion, kFreeMotion) * state.scene.frame_rate);
+  const double time = input.cuts.empty() ? std::min(part_, free) : 0;
+  const int most = std::max(kShortestPart, static_cast<int>(time / dt + 0.5));
+  const int parts = (left + most - 1) / most;
+  return (left + parts - 1) / parts;
 }
 
 void SubstepChoice::measure_if_due(MpmState& state, const MeasureLimit& measure) {
   const std::vector<Block*>& blocks = state.blocks.all;
   std::vector<std::uint8_t> to_measure(blocks.size(), 1);
-  if (limit_ == 0 || age_ >= kLongestAge || growth_ > kMostGrowth) {
+  const double age = state.time - measured_at_;
+  if (limit_ == 0 || age > kLongestAge || (growth_ > kMostGrowth && age > kYoungest)) {
     limit_ = measure(to_measure, kSteps);
     growth_ = 1;
-    age_ = 0;
+    measured_at_ = state.time;
   } else {
     bool any = false;
     for (std::size_t i = 0; i < blocks.size(); ++i) {
@@ -92,11 +112,12 @@ double SubstepChoice::longest(MpmState& state, const FrameInput& input,
   if (!input.cuts.empty() || tears(state)) return cautious;
   measure_if_due(state, measure);
   if (limit_ == 0) return cautious;
-  const double motion = farthest_motion(state, input) / state.scene.cell_size;
-  const double margin = kMargin / (1 + std::max(0.0, motion - kFreeMotion));
   const double asked = std::min(1.0, state.scene.cfl / Scene().cfl);
-  const double elastic = asked * margin * limit_ / std::sqrt(growth_ * trend_);
-  return std::max(cautious, viscous_substep(elastic, slowest_relaxation(state, stiffening)));
+  const double elastic = asked * kMargin * limit_ / std::sqrt(growth_ * trend_);
+  const double chosen = viscous_substep(elastic, fastest_damping(state, stiffening));
+  const double motion = farthest_motion(state, input) / state.scene.cell_size;
+  const double in_part = motion * std::min(1.0, kShortestPart * chosen * state.scene.frame_rate);
+  return std::max(cautious, chosen / (1 + std::max(0.0, in_part - kFreeMotion)));
 }
 
 }  // namespace tissue_sim

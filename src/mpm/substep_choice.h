@@ -1,6 +1,8 @@
 // How long a substep may be: what any tissue bears, and what this one was measured to bear.
 #pragma once
 
+#include <algorithm>
+#include <cmath>
 #include <functional>
 #include <vector>
 
@@ -18,22 +20,50 @@ using MeasureLimit = std::function<double(const std::vector<std::uint8_t>& block
 /// then, and where a cut went at once; in between the stiffening of each block bounds how it grew.
 class SubstepChoice {
  public:
-  /// After a frame: `modulus` is of each block the largest P-wave modulus of its points, as they
-  /// are deformed [Pa].
+  /// After a part of a frame: `modulus` is of each block the largest P-wave modulus of its points,
+  /// as they are deformed [Pa].
   void follow(MpmState& state, const std::vector<float>& modulus);
 
-  /// The longest substep for a frame with this input that is stable with a margin [s]: at least
-  /// stable_substep(), and not more where something is cut before the first substep, or just tore.
+  /// The longest substep for the next part of a frame with this input that is stable with a margin
+  /// [s]: at least stable_substep(), and not more where something is cut before the first substep,
+  /// or just tore.
   double longest(MpmState& state, const FrameInput& input, const Stiffening& stiffening,
                  const MeasureLimit& measure);
+
+  /// How many of the `left` substeps of `dt` [s] of a frame with this input the next part is: all,
+  /// unless something stiffened fast, was cut, or is pushed by a fast tool.
+  int part(const MpmState& state, const FrameInput& input, int left, double dt) const;
 
  private:
   void measure_if_due(MpmState& state, const MeasureLimit& measure);
 
-  double limit_ = 0;   ///< when it was measured last [s]; 0 where it is not known
-  double growth_ = 1;  ///< of the stiffness since, at most
-  double trend_ = 1;   ///< of the stiffness in the last frame, at most
-  int age_ = 0;        ///< frames since all blocks were measured
+  double limit_ = 0;        ///< when it was measured last [s]; 0 where it is not known
+  double measured_at_ = 0;  ///< when that was of all blocks [s]
+  double growth_ = 1;       ///< of the stiffness since, at most
+  double trend_ = 1;        ///< of the stiffness in the last part, at most
+  double part_ = 0;         ///< how long the next part may be [s]
+  double followed_at_ = 0;  ///< [s]
 };
+
+/// Advances a frame of `duration` seconds in parts: a thread of tissue that snaps, or what a fast
+/// tool squeezes, may stiffen twofold within a frame.
+///   substep_for(input)            the longest that is stable [s]
+///   part(input, left, dt)         see SubstepChoice
+///   run(substeps, dt, from, to)   from and to: shares of the frame
+///   measure()                     whether it is worth going on
+template <class SubstepFor, class Part, class Run, class Measure>
+void advance_in_parts(double duration, FrameInput input, const SubstepFor& substep_for,
+                      const Part& part, const Run& run, const Measure& measure) {
+  for (double from = 0;;) {
+    const double time = duration * (1 - from);
+    const int left = std::max(1, static_cast<int>(std::ceil(time / substep_for(input))));
+    const int substeps = part(input, left, time / left);
+    const double to = substeps == left ? 1 : from + (1 - from) * substeps / left;
+    run(substeps, static_cast<float>(time / left), from, to);
+    if (to == 1 || !measure()) return;
+    from = to;
+    input.cuts = {};
+  }
+}
 
 }  // namespace tissue_sim

@@ -110,8 +110,8 @@ boost::shared_ptr<const SimulationState> Publications::state_message(Simulation&
   m->frame_rate = scene_.frame_rate;
   m->paused = run.paused;
   m->blew_up = run.blew_up;
-  m->substeps = report.substeps;
-  m->substep = report.substep;
+  m->substeps = report.result.substeps;
+  m->substep = report.result.substep;
   m->cfl = report.cfl;
   m->compute_time = report.compute_time;
   m->real_time_factor = run.real_time_factor;

@@ -187,8 +187,8 @@ void SimulationThread::update_status() {
   s.frame = session_.simulation->frame();
   s.time = session_.simulation->time();
   s.frame_rate = session_.simulation->scene().frame_rate;
-  s.substeps = report_.substeps;
-  s.substep = report_.substep;
+  s.substeps = report_.result.substeps;
+  s.substep = report_.result.substep;
   s.compute_time = report_.compute_time;
   s.particles = tissue.point_count();
   s.fragments = tissue.fragments().size();

@@ -109,7 +109,7 @@ void operate(benchmark::State& bench, const Liver& liver) {
   const auto start = std::chrono::steady_clock::now();
   for (auto _ : bench) {
     frame();
-    substeps += report.substeps;
+    substeps += report.result.substeps;
   }
   const std::chrono::duration<double, std::micro> took = std::chrono::steady_clock::now() - start;
   const double simulated = simulation.time() - begin;

@@ -147,19 +147,22 @@ inline std::vector<std::vector<std::pair<int, double>>> stabilising_rows(
 
 /// Adds Kelvin-Voigt stress at the middle of each cell, or of what a cut leaves of it: its
 /// gradients are the means over the eight places that points have in a cell, its viscosity times
-/// volume the sum of its points'.
+/// volume the sum of its points', times the share of the cell that they fill.
 inline void add_viscous_forces(const MpmState& s, const std::vector<double>& volume, Step& r) {
   for (const Block* block : s.blocks.all) {
     const LatticeBody& b = s.bodies[block->body];
     for (int i = 0; i < block->nz * block->stride; ++i) {
       const int z = i / block->stride, lane = i % block->stride;
-      double viscosity = 0;  // times volume
+      double viscosity = 0, filled = 0;  // times volume; share
       Vec3 slope[27];
       for (int k = 0; k < 27; ++k) slope[k] = Vec3::Zero();
       for (int sub = 0; sub < 8; ++sub) {
         const std::int32_t p =
             block->point[(static_cast<std::size_t>(z) * 8 + sub) * block->stride + lane];
-        if (p >= 0) viscosity += b.material_of(s.points, p).viscosity * volume[p];
+        if (p >= 0) {
+          viscosity += b.material_of(s.points, p).viscosity * volume[p];
+          filled += volume[p] / std::pow(b.cell_size, 3);
+        }
         double at[3];  // from the cell's node [cells]
         for (int a = 0; a < 3; ++a) at[a] = (sub >> a & 1) == 1 ? 0.25 : -0.25;
         for (int k = 0; k < 27; ++k) {
@@ -180,7 +183,7 @@ inline void add_viscous_forces(const MpmState& s, const std::vector<double>& vol
         F += r.u[at(k)] * slope[k].transpose();
         rate += r.v[at(k)] * slope[k].transpose();
       }
-      const Mat3 P = viscosity * F * (F.transpose() * rate + rate.transpose() * F);
+      const Mat3 P = viscosity * filled * F * (F.transpose() * rate + rate.transpose() * F);
       for (int k = 0; k < 27; ++k) r.force[at(k)] -= P * slope[k];
     }
   }

@@ -188,13 +188,13 @@ void CudaMpmTissue::cut(const std::vector<BladePath>& paths, const Array<float>*
   finish_measure();
 }
 
-void CudaMpmTissue::cut_by_blades(const std::vector<BlockMotion>& before) {
+void CudaMpmTissue::cut_by_blades() {
   const double reach = 4 * state_->scene.cell_size;  // a little more than sweep_bonds()
   bool meets = false;
   for (const BladePath& path : blades_) {
     for (const SweepPart& part : sweep_parts(path)) {
-      for (std::size_t i = 0; i < before.size() && !meets; ++i) {
-        const Box &a = before[i].box, &b = state_->motion[i].box;
+      for (std::size_t i = 0; i < motion_before_.size() && !meets; ++i) {
+        const Box &a = motion_before_[i].box, &b = state_->motion[i].box;
         meets = (a.min.cwiseMin(b.min).array() <= part.box.max.array() + reach).all() &&
                 (part.box.min.array() <= a.max.cwiseMax(b.max).array() + reach).all();
       }
@@ -208,7 +208,7 @@ void CudaMpmTissue::cut_by_blades(const std::vector<BlockMotion>& before) {
   check_cuda(cudaStreamSynchronize(d.stream), "send data");
   for (int a = 0; a < 3; ++a) state_->u_before[a].resize(n);
   unpack_field(d.host_nodes.data(), n, *state_->cpu, state_->u_before);
-  cut(blades_, state_->u_before, before, result_.blade_report);
+  cut(blades_, state_->u_before, motion_before_, result_.blade_report);
 }
 
 }  // namespace tissue_sim

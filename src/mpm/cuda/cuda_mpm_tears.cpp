@@ -4,6 +4,7 @@
 
 #include "cutting/cut_tissue.h"
 #include "cutting/tear.h"
+#include "cutting/threads.h"
 #include "mpm/cuda/on_device.h"
 #include "tools/tool_motion.h"
 
@@ -42,11 +43,10 @@ void CudaMpmTissue::tear(const std::vector<TearingPoint>& tearing, const FrameIn
                          double share) {
   const bool blades = !blades_.empty();
   if (blades) {  // what they have passed so far
-    const std::vector<BlockMotion> before = state_->motion;
     launch_measure();
     finish_measure();
     blades_ = blade_paths(state_->scene, input, cut_to_, share);
-    cut_by_blades(before);
+    cut_by_blades();
   }
   std::vector<std::int32_t> changed;
   tear_bonds(*state_, tearing, changed, result_.tear_report);
@@ -60,7 +60,30 @@ void CudaMpmTissue::tear(const std::vector<TearingPoint>& tearing, const FrameIn
   if (!blades) return;
   blades_ = blade_paths(state_->scene, input, share, 1);
   cut_to_ = share;
+  motion_before_ = state_->motion;
   keep_place_for_blades();
+}
+
+void CudaMpmTissue::tear_threads() {
+  const std::vector<Block*>& blocks = state_->blocks.all;
+  const bool may =
+      !result_.blew_up && std::any_of(blocks.begin(), blocks.end(), [&](const Block* b) {
+        return may_have_stretched_threads(*state_, *b);
+      });
+  if (!may) return;
+  pull();
+  std::vector<std::int32_t> changed;
+  tissue_sim::tear_threads(*state_, changed, result_.tear_report);
+  if (changed.empty()) return;
+  take_apart(*state_, changed);
+  for (const int id : update_pieces(state_->bodies, state_->points, pieces_)) {
+    result_.tear_report.new_fragments.push_back(id);
+  }
+  device_->faces.pieces_changed = true;
+  push();
+  launch_measure();
+  finish_measure();
+  substep_.follow(*state_, modulus_);
 }
 
 }  // namespace tissue_sim

@@ -71,10 +71,11 @@ CudaMpmTissue::~CudaMpmTissue() {
   if (device_->stream != nullptr) cudaStreamSynchronize(device_->stream);
 }
 
-void CudaMpmTissue::upload_colliders(int substeps, double duration, const FrameInput& input) {
+void CudaMpmTissue::upload_colliders(int substeps, const FrameInput& input, double from,
+                                     double to) {
   OnDevice& d = *device_;
   const Scene& scene = state_->scene;
-  const std::vector<Box> reach = collider_reach(scene, input, duration);
+  const std::vector<Box> reach = collider_reach(scene, input, duration_);
   d.host_reach.resize(reach.size());
   for (std::size_t c = 0; c < reach.size(); ++c) {
     for (int a = 0; a < 3; ++a) {
@@ -84,7 +85,8 @@ void CudaMpmTissue::upload_colliders(int substeps, double duration, const FrameI
   }
   d.host_colliders.resize(reach.size() * substeps);
   for (int i = 0; i < substeps; ++i) {
-    const std::vector<Collider> now = colliders_at(scene, input, (i + 1.0) / substeps, duration);
+    const double share = from + (to - from) * (i + 1) / substeps;
+    const std::vector<Collider> now = colliders_at(scene, input, share, duration_);
     std::copy(now.begin(), now.end(), d.host_colliders.data() + i * reach.size());
   }
   d.reach.upload(d.host_reach, d.stream);
@@ -93,42 +95,92 @@ void CudaMpmTissue::upload_colliders(int substeps, double duration, const FrameI
   d.loads.clear(d.stream);
 }
 
-void CudaMpmTissue::advance(int substeps, float dt, const FrameInput& input) {
-  OnDevice& d = *device_;
-  const Scene& scene = state_->scene;
+void CudaMpmTissue::begin(double duration, const FrameInput& input) {
   result_ = {};
-  result_.loads.resize(scene.tools.size());
+  result_.loads.resize(state_->scene.tools.size());
   if (!input.cuts.empty()) pull();
   for (const BladePath& path : input.cuts) {
     result_.cut_reports.emplace_back();
     cut({path}, state_->nodes.u, state_->motion, result_.cut_reports.back());
   }
-  blades_ = blade_paths(scene, input, 0, 1);
+  duration_ = duration;
+  blades_ = blade_paths(state_->scene, input, 0, 1);
   cut_to_ = 0;
+  motion_before_ = state_->motion;
   keep_place_for_blades();
+}
+
+void CudaMpmTissue::run(int substeps, float dt, const FrameInput& input, double from, double to) {
+  OnDevice& d = *device_;
   substeps_ = substeps;
-  if (substeps > 0) {
-    const double duration = static_cast<double>(substeps) * dt;
-    upload_colliders(substeps, duration, input);
-    find_near(duration);
-    const bool tears = can_tear(*state_);
-    const int checks = tears ? tear_checks(*state_, substeps, dt) : 1;
-    int begin = 0;
-    for (int check = 0; check < checks; ++check) {
-      const int end = tear_check_at(check, checks, substeps);
-      run_substeps(begin, end, dt);
-      begin = end;
-      if (!tears) continue;
-      const std::vector<TearingPoint> tearing = find_tearing();
-      if (tearing.empty()) continue;
-      tear(tearing, input, static_cast<double>(end) / substeps);
-      find_near(duration);
-    }
-    d.host_loads.resize(d.loads.size());
-    d.loads.download(d.host_loads.data(), d.loads.size(), d.stream);
+  dt_ = dt;
+  result_.substeps += substeps;
+  result_.substep = std::max(result_.substep, static_cast<double>(dt));
+  if (substeps == 0) return;
+  upload_colliders(substeps, input, from, to);
+  find_near(duration_);
+  const bool tears = can_tear(*state_);
+  const int checks = tears ? tear_checks(*state_, substeps, dt) : 1;
+  int begin = 0;
+  for (int check = 0; check < checks; ++check) {
+    const int end = tear_check_at(check, checks, substeps);
+    run_substeps(begin, end, dt);
+    begin = end;
+    if (!tears) continue;
+    const std::vector<TearingPoint> tearing = find_tearing();
+    if (tearing.empty()) continue;
+    tear(tearing, input, from + (to - from) * end / substeps);
+    find_near(duration_);
   }
+  d.host_loads.resize(d.loads.size());
+  d.loads.download(d.host_loads.data(), d.loads.size(), d.stream);
+}
+
+void CudaMpmTissue::sum_loads() {
+  const OnDevice& d = *device_;
+  if (substeps_ == 0) return;
+  const double weight = dt_ / duration_;
+  const std::size_t colliders = result_.loads.size() + 1;
+  for (int i = 0; i < substeps_; ++i) {
+    for (std::size_t c = 1; c < colliders && c < d.host_reach.size(); ++c) {
+      const long long* sum = d.host_loads.data() + 6 * (i * d.host_reach.size() + c);
+      const Vec3 force = kLoadUnit * Vec3(sum[0], sum[1], sum[2]);
+      ToolLoad& load = result_.loads[c - 1];
+      load.mean.force += weight * force;
+      load.mean.torque += weight * kLoadUnit * Vec3(sum[3], sum[4], sum[5]);
+      load.peak_force = std::max(load.peak_force, force.norm());
+    }
+  }
+  substeps_ = 0;
+}
+
+void CudaMpmTissue::end() {
   pieces_measured_ = false;
   launch_measure();
+}
+
+void CudaMpmTissue::advance(int substeps, float dt, const FrameInput& input) {
+  begin(static_cast<double>(substeps) * dt, input);
+  run(substeps, dt, input, 0, 1);
+  end();
+}
+
+void CudaMpmTissue::advance(double duration, const FrameInput& input) {
+  begin(duration, input);
+  advance_in_parts(
+      duration, input, [this](const FrameInput& rest) { return substep_for(rest); },
+      [this](const FrameInput& rest, int left, double dt) {
+        return substep_.part(*state_, rest, left, dt);
+      },
+      [&](int substeps, float dt, double from, double to) { run(substeps, dt, input, from, to); },
+      [this] {
+        launch_measure();
+        finish_measure();
+        sum_loads();
+        substep_.follow(*state_, modulus_);
+        return !result_.blew_up;
+      });
+  end();
 }
 
 void CudaMpmTissue::find_near(double duration) {
@@ -203,29 +255,17 @@ void CudaMpmTissue::launch(int begin, int end, float dt) {
 }
 
 FrameResult CudaMpmTissue::finish() {
-  const OnDevice& d = *device_;
-  const std::vector<BlockMotion> before = state_->motion;
   finish_measure();
-  const std::size_t colliders = result_.loads.size() + 1;
-  for (int i = 0; i < substeps_ && d.host_loads.size() > 0; ++i) {
-    for (std::size_t c = 1; c < colliders && c < d.host_reach.size(); ++c) {
-      const long long* sum = d.host_loads.data() + 6 * (i * d.host_reach.size() + c);
-      const Vec3 force = kLoadUnit * Vec3(sum[0], sum[1], sum[2]);
-      ToolLoad& load = result_.loads[c - 1];
-      load.mean.force += force / substeps_;
-      load.mean.torque += kLoadUnit * Vec3(sum[3], sum[4], sum[5]) / substeps_;
-      load.peak_force = std::max(load.peak_force, force.norm());
-    }
-  }
-  substeps_ = 0;
+  sum_loads();
   pieces_measured_ = false;
-  if (!blades_.empty() && !result_.blew_up) cut_by_blades(before);
+  if (!blades_.empty() && !result_.blew_up) cut_by_blades();
   blades_.clear();
   if (result_.tear_report.bonds_broken > 0) {
     result_.tear_report.new_fragments = update_pieces(state_->bodies, state_->points, pieces_);
     device_->points_changed = device_->faces.pieces_changed = true;
   }
   substep_.follow(*state_, modulus_);
+  tear_threads();
   return result_;
 }
 

@@ -23,9 +23,9 @@ class CudaMpmTissue final : public Tissue {
   explicit CudaMpmTissue(const Scene& scene);
   ~CudaMpmTissue() override;
 
-  float stable_substep() const override;
-  float substep_for(const FrameInput& input) override;
+  void advance(double duration, const FrameInput& input) override;
   void advance(int substeps, float dt, const FrameInput& input) override;
+  float stable_substep() const override;
   FrameResult finish() override;
   int point_count() const override { return state_->points.size(); }
   int read_points(const PointSelection& selection, std::vector<std::uint8_t>& cloud) override;
@@ -35,6 +35,7 @@ class CudaMpmTissue final : public Tissue {
   const std::vector<std::string>& notes() const override { return notes_; }
 
   // For tests and the benchmark.
+  float substep_for(const FrameInput& input);
   int fragment_of(int point) const { return pieces_.of_point[point]; }
   /// The host's copy, whose nodes and contacts are as pull() left them or later.
   MpmState& state() { return *state_; }
@@ -50,16 +51,22 @@ class CudaMpmTissue final : public Tissue {
  private:
   struct OnDevice;
 
+  void begin(double duration, const FrameInput& input);
+  /// Enqueues a part of the frame between two shares of it.
+  void run(int substeps, float dt, const FrameInput& input, double from, double to);
+  void sum_loads();  ///< of the part that was run last, once it is done
+  void end();
   void plan_tables();  ///< how the blocks are worked on, and the tables for it
   void cut(const std::vector<BladePath>& paths, const Array<float>* u_before,
            const std::vector<BlockMotion>& before, CutReport& report);
-  void cut_by_blades(const std::vector<BlockMotion>& before);
+  void cut_by_blades();
   void keep_place_for_blades();
   std::vector<TearingPoint> find_tearing();
   void tear(const std::vector<TearingPoint>& tearing, const FrameInput& input, double share);
+  void tear_threads();
   void upload_points();
   void find_near(double duration);
-  /// Enqueues the frame's substeps from `begin` up to `end`; waits for each search of faces.
+  /// Enqueues the part's substeps from `begin` up to `end`; waits for each search of faces.
   void run_substeps(int begin, int end, float dt);
   void launch(int begin, int end, float dt);
   /// Whether tissue can touch tissue. A body that is whole does not touch itself.
@@ -75,16 +82,19 @@ class CudaMpmTissue final : public Tissue {
   void launch_measure();
   void finish_measure();
   double measure_limit(int steps);  ///< see MeasureLimit; of all blocks
-  void upload_colliders(int substeps, double duration, const FrameInput& input);
+  void upload_colliders(int substeps, const FrameInput& input, double from, double to);
 
   std::vector<std::string> notes_;
   std::unique_ptr<MpmState> state_;
   Pieces pieces_;
   bool pieces_measured_ = false;  ///< whether they are where the frame left them
   std::unique_ptr<OnDevice> device_;
-  std::vector<BladePath> blades_;  ///< of the frame in flight, from `cut_to_` on
-  double cut_to_ = 0;              ///< share of the frame
-  int substeps_ = 0;
+  std::vector<BladePath> blades_;           ///< of the frame in flight, from `cut_to_` on
+  double cut_to_ = 0;                       ///< share of the frame
+  std::vector<BlockMotion> motion_before_;  ///< when the blades were last looked at
+  double duration_ = 0;                     ///< of the frame in flight [s]
+  int substeps_ = 0;  ///< of its last part, as long as their loads are not summed
+  float dt_ = 0;      ///< of these [s]
   Stiffening stiffening_;
   std::vector<float> modulus_;  ///< see SubstepChoice::follow()
   SubstepChoice substep_;

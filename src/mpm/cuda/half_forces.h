@@ -26,8 +26,8 @@ __device__ __forceinline__ void stress(float mu, float lambda, const float* damp
 }
 
 /// Kelvin-Voigt stress at the middle of the cell, from the mean gradients of its two halves, times
-/// -1 / cell size and an eighth of the volume of its points. The neighbouring thread has the other
-/// half.
+/// -1 / cell size, an eighth of the volume of its points and the share of the cell that they fill.
+/// The neighbouring thread has the other half.
 __device__ __forceinline__ void viscous_stress(const CudaBody& body, const HalfPlane (&u)[3],
                                                const HalfPlane (&v)[3], float side,
                                                const float4& volume, float (&P)[9]) {
@@ -45,10 +45,11 @@ __device__ __forceinline__ void viscous_stress(const CudaBody& body, const HalfP
     rate[3 * c + 2] = mean(-0.5f * k2 * side * v[c].sAA);
     F[4 * c] += 1.0f;
   }
-  const float half = (volume.x + volume.y) + (volume.z + volume.w);
+  const float half = mean((volume.x + volume.y) + (volume.z + volume.w));
+  const float filled = 2 * half * body.inv_cell_size * body.inv_cell_size * body.inv_cell_size;
 #pragma unroll
   for (int i = 0; i < 9; ++i) P[i] = 0;
-  add_viscous_stress(F, rate, -0.25f * body.inv_cell_size * body.viscosity * mean(half), P);
+  add_viscous_stress(F, rate, -0.25f * body.inv_cell_size * body.viscosity * half * filled, P);
 }
 
 /// From half a cell's numbers to what its stress gives back, for points of these volumes.

@@ -28,17 +28,26 @@ bool is_thread(const LatticeBody& body, const Points& points, std::int32_t point
   return true;
 }
 
+bool has_threads(const MpmState& state, const Block& block) {
+  const LatticeBody& body = state.bodies[block.body];
+  return std::any_of(block.point.begin(), block.point.end(), [&](std::int32_t p) {
+    for (int k = 0; p >= 0 && k < kBondCount; ++k) {
+      if (has(state.points.bonds[p], k) && is_thread(body, state.points, p, k)) return true;
+    }
+    return false;
+  });
+}
+
 }  // namespace
 
 bool may_have_stretched_threads(const MpmState& state, const Block& block) {
-  if (block.split_nodes.empty()) return false;
   double least = 1e30;
   const LatticeBody& body = state.bodies[block.body];
   for (std::size_t i = 0; i < body.materials.size(); ++i) {
     if (block.material != Block::kMixed && block.material != static_cast<int>(i)) continue;
     least = std::min(least, wave_modulus(body.materials[i], kLeastStiffening));
   }
-  return block.modulus.last >= least;
+  return block.modulus.last >= least && has_threads(state, block);
 }
 
 void tear_threads(MpmState& state, std::vector<std::int32_t>& changed, CutReport& report) {

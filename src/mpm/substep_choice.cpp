@@ -87,7 +87,8 @@ void SubstepChoice::measure_if_due(MpmState& state, const MeasureLimit& measure)
   const std::vector<Block*>& blocks = state.blocks.all;
   std::vector<std::uint8_t> to_measure(blocks.size(), 1);
   const double age = state.time - measured_at_;
-  if (limit_ == 0 || age > kLongestAge || (growth_ > kMostGrowth && age > kYoungest)) {
+  const bool just_measured = age > 0 && age < kYoungest;
+  if (limit_ == 0 || age > kLongestAge || (growth_ > kMostGrowth && !just_measured)) {
     limit_ = measure(to_measure, kSteps);
     growth_ = 1;
     measured_at_ = state.time;

@@ -144,7 +144,7 @@ TEST(RoughUse, CrumbsMoveOnAsRigidBodies) {
 /// Two halves that a thread one point thick still joins, and a bridge two points thick, are drawn
 /// apart.
 TEST(RoughUse, AThreadTearsAndARibbonHolds) {
-  MpmTissue tissue(free_box(Vec3(0.024, 0.012, 0.012), 0.003));
+  MpmTissue tissue(free_box(Vec3(0.024, 0.024, 0.024), 0.003));
   MpmState& s = tissue.state();
   const LatticeBody& body = s.bodies[0];
   std::vector<std::int32_t> changed;

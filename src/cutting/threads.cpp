@@ -41,6 +41,7 @@ bool has_threads(const MpmState& state, const Block& block) {
 }  // namespace
 
 bool may_have_stretched_threads(const MpmState& state, const Block& block) {
+  if (block.split_nodes.empty()) return false;
   double least = 1e30;
   const LatticeBody& body = state.bodies[block.body];
   for (std::size_t i = 0; i < body.materials.size(); ++i) {

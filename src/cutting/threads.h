@@ -14,7 +14,7 @@ namespace tissue_sim {
 /// would whirl about, too fast for any substep.
 inline constexpr float kThreadStretch = 1.5f;
 
-/// Whether a block has threads, and is deformed enough for them to tear as of Block::modulus.
+/// Whether a block in which nodes are split has threads, and is deformed enough for them to tear as of Block::modulus.
 bool may_have_stretched_threads(const MpmState& state, const Block& block);
 
 /// Tears the threads of such blocks. Appends the points that lost a bond to `changed`, by number,

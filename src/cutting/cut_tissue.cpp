@@ -4,6 +4,7 @@
 
 #include "contact/block_contact.h"
 #include "contact/known_facets.h"
+#include "cutting/threads.h"
 #include "mpm/crumbs.h"
 
 namespace tissue_sim {
@@ -28,6 +29,7 @@ void bound_motion(MpmState& state) {
 
 void take_apart(MpmState& state, const std::vector<std::int32_t>& changed) {
   if (changed.empty()) return;
+  list_threads(state, changed);
   const std::vector<NodeFields::Cell> cells =
       state.fields->update(state.bodies, state.points, changed, state.nodes, *state.cpu);
   settle_crumbs(state.bodies, state.points, *state.fields, changed, state.nodes);

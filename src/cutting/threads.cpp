@@ -1,79 +1,124 @@
 #include "cutting/threads.h"
 
+#include <Eigen/Dense>
 #include <algorithm>
+#include <cmath>
 
 #include "cutting/bonds.h"
+#include "math/bspline.h"
 #include "mpm/state_figures.h"
 
 namespace tissue_sim {
 namespace {
 
-constexpr float kLeastStiffening = 5;  // of a block that is looked at
-
 bool has(std::uint8_t bonds, int k) { return (bonds >> k & 1) != 0; }
 
-/// Whether bond `k` of a point is in no square of four bonds.
+std::int32_t next(const LatticeBody& body, const Points& points, std::int32_t point, int k) {
+  const Points::Site& s = points.site[point];
+  const BondOffset o = bond_offset(k);
+  return body.point(s.x + o.x, s.y + o.y, s.z + o.z);
+}
+
+/// Whether bond `k` of a point is there and in no square of four bonds.
 bool is_thread(const LatticeBody& body, const Points& points, std::int32_t point, int k) {
-  const auto next = [&](std::int32_t p, int bond) {
-    const Points::Site& s = points.site[p];
-    const BondOffset o = bond_offset(bond);
-    return body.point(s.x + o.x, s.y + o.y, s.z + o.z);
-  };
-  const std::int32_t other = next(point, k);
+  if (!has(points.bonds[point], k)) return false;
+  const std::int32_t other = next(body, points, point, k);
   for (int side = 0; side < kBondCount; ++side) {
     if (side == k || side == opposite_bond(k)) continue;
     if (!has(points.bonds[point], side) || !has(points.bonds[other], side)) continue;
-    if (has(points.bonds[next(point, side)], k)) return false;
+    if (has(points.bonds[next(body, points, point, side)], k)) return false;
   }
   return true;
 }
 
-bool has_threads(const MpmState& state, const Block& block) {
-  const LatticeBody& body = state.bodies[block.body];
-  return std::any_of(block.point.begin(), block.point.end(), [&](std::int32_t p) {
-    for (int k = 0; p >= 0 && k < kBondCount; ++k) {
-      if (has(state.points.bonds[p], k) && is_thread(body, state.points, p, k)) return true;
+bool ends_thread(const LatticeBody& body, const Points& points, std::int32_t point) {
+  for (int k = 0; k < kBondCount; ++k) {
+    if (is_thread(body, points, point, k)) return true;
+  }
+  return false;
+}
+
+Eigen::Matrix3d deformation_gradient(const MpmState& state, std::int32_t point) {
+  const Points::Site& s = state.points.site[point];
+  const LatticeBody& body = state.bodies[s.body];
+  const int at[3] = {s.x % 2, s.y % 2, s.z % 2};
+  Eigen::Matrix3d F = Eigen::Matrix3d::Identity();
+  for (int k = 0; k < 27; ++k) {
+    const int d[3] = {k % 3, k / 3 % 3, k / 9}, node = state.fields->node(body, s, k);
+    const Vec3 u(state.nodes.u[0][node], state.nodes.u[1][node], state.nodes.u[2][node]);
+    for (int a = 0; a < 3; ++a) {
+      const int b = (a + 1) % 3, c = (a + 2) % 3;
+      F.col(a) += lattice_slope(at[a], d[a]) * lattice_weight(at[b], d[b]) *
+                  lattice_weight(at[c], d[c]) / body.cell_size * u;
     }
-    return false;
-  });
+  }
+  return F;
+}
+
+bool is_stretched(const Eigen::Matrix3d& F) {
+  if (!F.allFinite()) return false;  // the frame's end will say
+  const double J = F.determinant();
+  const Eigen::Vector3d s = F.jacobiSvd().singularValues();
+  const double area = s[0] * s[1];  // the largest stretch of one, at least that of BlockState
+  return s[0] >= kThreadStretch &&
+         area * area + std::fabs(J - 1) * F.norm() / std::sqrt(3.0) >= kThreadStiffening;
 }
 
 }  // namespace
 
-bool may_have_stretched_threads(const MpmState& state, const Block& block) {
-  if (block.split_nodes.empty()) return false;
-  double least = 1e30;
-  const LatticeBody& body = state.bodies[block.body];
-  for (std::size_t i = 0; i < body.materials.size(); ++i) {
-    if (block.material != Block::kMixed && block.material != static_cast<int>(i)) continue;
-    least = std::min(least, wave_modulus(body.materials[i], kLeastStiffening));
+void list_threads(MpmState& state, const std::vector<std::int32_t>& changed) {
+  std::vector<std::int32_t>& threads = state.threads;
+  const auto add = [&](std::int32_t point) {
+    const LatticeBody& body = state.bodies[state.points.site[point].body];
+    if (ends_thread(body, state.points, point)) threads.push_back(point);
+  };
+  for (const std::int32_t p : changed) {
+    add(p);
+    // A square may have lost its far side.
+    const LatticeBody& body = state.bodies[state.points.site[p].body];
+    for (int k = 0; k < kBondCount; ++k) {
+      if (has(state.points.bonds[p], k)) add(next(body, state.points, p, k));
+    }
   }
-  return block.modulus.last >= least && has_threads(state, block);
+  std::sort(threads.begin(), threads.end());
+  threads.erase(std::unique(threads.begin(), threads.end()), threads.end());
+}
+
+bool may_tear_threads(const MpmState& state) {
+  return !state.threads.empty() &&
+         std::any_of(state.blocks.all.begin(), state.blocks.all.end(), [&](const Block* block) {
+           const LatticeBody& body = state.bodies[block->body];
+           double least = 1e30;
+           for (const Material& m : body.materials) {
+             least = std::min(least, wave_modulus(m, kThreadStiffening));
+           }
+           return block->modulus.last >= least;
+         });
 }
 
 void tear_threads(MpmState& state, std::vector<std::int32_t>& changed, CutReport& report) {
-  std::vector<StretchedPoint> stretched;
-  for (const Block* block : state.blocks.all) {
-    if (!may_have_stretched_threads(state, *block)) continue;
-    state.kernels->stretched(*block, block_field(state, *block), kThreadStretch,
-                             state.scratch.local(), stretched);
-  }
+  if (!may_tear_threads(state)) return;
   const std::size_t first = changed.size();
   Points& points = state.points;
-  for (const StretchedPoint& p : stretched) {
-    const Points::Site& s = points.site[p.point];
-    const LatticeBody& body = state.bodies[s.body];
+  std::vector<std::int32_t> left;
+  for (const std::int32_t p : state.threads) {
+    const LatticeBody& body = state.bodies[points.site[p].body];
+    if (!ends_thread(body, points, p)) continue;
+    if (!is_stretched(deformation_gradient(state, p))) {
+      left.push_back(p);
+      continue;
+    }
     for (int k = 0; k < kBondCount; ++k) {
-      if (!has(points.bonds[p.point], k) || !is_thread(body, points, p.point, k)) continue;
-      const BondOffset o = bond_offset(k);
-      const std::int32_t other = body.point(s.x + o.x, s.y + o.y, s.z + o.z);
-      points.bonds[p.point] &= static_cast<std::uint8_t>(~(1u << k));
+      if (!is_thread(body, points, p, k)) continue;
+      const std::int32_t other = next(body, points, p, k);
+      points.bonds[p] &= static_cast<std::uint8_t>(~(1u << k));
       points.bonds[other] &= static_cast<std::uint8_t>(~(1u << opposite_bond(k)));
-      changed.push_back(p.point);
+      changed.push_back(p);
       changed.push_back(other);
       ++report.bonds_broken;
     }
   }
+  state.threads = std::move(left);
   const auto begin = changed.begin() + static_cast<std::ptrdiff_t>(first);
   std::sort(begin, changed.end());
   changed.erase(std::unique(begin, changed.end()), changed.end());

@@ -9,16 +9,22 @@
 
 namespace tissue_sim {
 
-/// A thread tears where it is stretched so far, whatever its material: a bond that is in no square
-/// of four bonds. Between halves that part it would be drawn out without end, and what hangs on it
-/// would whirl about, too fast for any substep.
+/// A thread is a bond that is in no square of four bonds. It tears where it is stretched so far,
+/// whatever its material: between halves that part it would be drawn out without end, and what
+/// hangs on it would whirl about, too fast for any substep.
 inline constexpr float kThreadStretch = 1.5f;
+/// ... and its point has stiffened so much (see BlockState), for tissue may be stretched on
+/// purpose.
+inline constexpr float kThreadStiffening = 5;
 
-/// Whether a block in which nodes are split has threads, and is deformed enough for them to tear as of Block::modulus.
-bool may_have_stretched_threads(const MpmState& state, const Block& block);
+/// After the points `changed` lost bonds: adds the ends of new threads to MpmState::threads.
+void list_threads(MpmState& state, const std::vector<std::int32_t>& changed);
 
-/// Tears the threads of such blocks. Appends the points that lost a bond to `changed`, by number,
-/// and counts into `report`.
+/// Whether a thread may be stretched that far, as of Block::modulus.
+bool may_tear_threads(const MpmState& state);
+
+/// Tears threads. Appends the points that lost a bond to `changed`, by number, and counts into
+/// `report`.
 void tear_threads(MpmState& state, std::vector<std::int32_t>& changed, CutReport& report);
 
 }  // namespace tissue_sim

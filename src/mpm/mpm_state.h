@@ -67,9 +67,10 @@ struct MpmState {
   Array<float> force;        ///< of all blocks
   Array<float> u_before[3];  ///< displacements when the frame began, where a blade may cut [m]
   Array<float> places[2];    ///< of the points near a sweep, at its begin and end [m]
-  std::vector<BlockMotion> motion;  ///< per block; exact as of measure_motion()
-  double time = 0;                  ///< since the beginning [s]
-  std::vector<double> tore_at;      ///< per body: when a bond last tore [s]; empty while none did
+  std::vector<BlockMotion> motion;    ///< per block; exact as of measure_motion()
+  double time = 0;                    ///< since the beginning [s]
+  std::vector<double> tore_at;        ///< per body: when a bond last tore [s]; empty while none did
+  std::vector<std::int32_t> threads;  ///< points at their ends, by number: cutting/threads.h
   Contacts contacts;
   FaceContacts faces;
   std::vector<Collider> colliders;

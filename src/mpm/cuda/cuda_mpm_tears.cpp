@@ -65,12 +65,7 @@ void CudaMpmTissue::tear(const std::vector<TearingPoint>& tearing, const FrameIn
 }
 
 void CudaMpmTissue::tear_threads() {
-  const std::vector<Block*>& blocks = state_->blocks.all;
-  const bool may =
-      !result_.blew_up && std::any_of(blocks.begin(), blocks.end(), [&](const Block* b) {
-        return may_have_stretched_threads(*state_, *b);
-      });
-  if (!may) return;
+  if (result_.blew_up || !may_tear_threads(*state_)) return;
   pull();
   std::vector<std::int32_t> changed;
   tissue_sim::tear_threads(*state_, changed, result_.tear_report);

@@ -32,7 +32,7 @@ void take_apart(MpmState& state, const std::vector<std::int32_t>& changed) {
   list_threads(state, changed);
   const std::vector<NodeFields::Cell> cells =
       state.fields->update(state.bodies, state.points, changed, state.nodes, *state.cpu);
-  settle_crumbs(state.bodies, state.points, *state.fields, changed, state.nodes);
+  settle_crumbs(state.bodies, state.points, *state.fields, changed, state.crumbs, state.nodes);
   state.blocks.stale_facets.resize(lattice_node_count(state.bodies), 0);
   mark_stale_facets(state.bodies, state.points, changed, state.blocks.stale_facets);
   if (cells.empty()) return;

@@ -1,12 +1,9 @@
 #include "cutting/threads.h"
 
-#include <Eigen/Dense>
 #include <algorithm>
-#include <cmath>
 
 #include "cutting/bonds.h"
-#include "math/bspline.h"
-#include "mpm/state_figures.h"
+#include "mpm/deformation.h"
 
 namespace tissue_sim {
 namespace {
@@ -38,32 +35,6 @@ bool ends_thread(const LatticeBody& body, const Points& points, std::int32_t poi
   return false;
 }
 
-Eigen::Matrix3d deformation_gradient(const MpmState& state, std::int32_t point) {
-  const Points::Site& s = state.points.site[point];
-  const LatticeBody& body = state.bodies[s.body];
-  const int at[3] = {s.x % 2, s.y % 2, s.z % 2};
-  Eigen::Matrix3d F = Eigen::Matrix3d::Identity();
-  for (int k = 0; k < 27; ++k) {
-    const int d[3] = {k % 3, k / 3 % 3, k / 9}, node = state.fields->node(body, s, k);
-    const Vec3 u(state.nodes.u[0][node], state.nodes.u[1][node], state.nodes.u[2][node]);
-    for (int a = 0; a < 3; ++a) {
-      const int b = (a + 1) % 3, c = (a + 2) % 3;
-      F.col(a) += lattice_slope(at[a], d[a]) * lattice_weight(at[b], d[b]) *
-                  lattice_weight(at[c], d[c]) / body.cell_size * u;
-    }
-  }
-  return F;
-}
-
-bool is_stretched(const Eigen::Matrix3d& F) {
-  if (!F.allFinite()) return false;  // the frame's end will say
-  const double J = F.determinant();
-  const Eigen::Vector3d s = F.jacobiSvd().singularValues();
-  const double area = s[0] * s[1];  // the largest stretch of one, at least that of BlockState
-  return s[0] >= kThreadStretch &&
-         area * area + std::fabs(J - 1) * F.norm() / std::sqrt(3.0) >= kThreadStiffening;
-}
-
 }  // namespace
 
 void list_threads(MpmState& state, const std::vector<std::int32_t>& changed) {
@@ -84,27 +55,15 @@ void list_threads(MpmState& state, const std::vector<std::int32_t>& changed) {
   threads.erase(std::unique(threads.begin(), threads.end()), threads.end());
 }
 
-bool may_tear_threads(const MpmState& state) {
-  return !state.threads.empty() &&
-         std::any_of(state.blocks.all.begin(), state.blocks.all.end(), [&](const Block* block) {
-           const LatticeBody& body = state.bodies[block->body];
-           double least = 1e30;
-           for (const Material& m : body.materials) {
-             least = std::min(least, wave_modulus(m, kThreadStiffening));
-           }
-           return block->modulus.last >= least;
-         });
-}
-
 void tear_threads(MpmState& state, std::vector<std::int32_t>& changed, CutReport& report) {
-  if (!may_tear_threads(state)) return;
   const std::size_t first = changed.size();
   Points& points = state.points;
   std::vector<std::int32_t> left;
   for (const std::int32_t p : state.threads) {
     const LatticeBody& body = state.bodies[points.site[p].body];
     if (!ends_thread(body, points, p)) continue;
-    if (!is_stretched(deformation_gradient(state, p))) {
+    const Deformation d(body, points.site[p], *state.fields, state.nodes);
+    if (d.stretch < kThreadStretch || d.stiffening < kWildStiffening) {
       left.push_back(p);
       continue;
     }

@@ -3,9 +3,9 @@
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cstring>
-#include <set>
 
 #include "cutting/bonds.h"
+#include "mpm/deformation.h"
 
 namespace tissue_sim {
 namespace {
@@ -73,7 +73,11 @@ Eigen::Matrix3d rotation_of(const Eigen::Matrix3d& x_X) {
   return U * svd.matrixV().transpose();
 }
 
-void make_rigid(const CrumbNodes& crumb, double fastest_spin, Nodes& nodes) {
+void make_rigid(const LatticeBody& body, const Points& points, const NodeFields& fields,
+                const std::vector<std::int32_t>& of_crumb, Nodes& nodes) {
+  const CrumbNodes crumb(body, points, fields, of_crumb);
+  const Material& material = body.material_of(points, of_crumb[0]);
+  const double fastest_spin = kCrumbSpin * wave_speed(material) / body.cell_size;
   const std::size_t count = crumb.node.size();
   std::vector<Vec3> x(count), v(count);
   double mass = 0;
@@ -125,16 +129,34 @@ float elastic_volume(const LatticeBody& body, const Points& points, std::int32_t
 
 void settle_crumbs(const std::vector<LatticeBody>& bodies, const Points& points,
                    const NodeFields& fields, const std::vector<std::int32_t>& changed,
-                   Nodes& nodes) {
-  std::set<std::int32_t> settled;  // the lowest point of each
+                   std::set<std::int32_t>& crumbs, Nodes& nodes) {
+  std::set<std::int32_t> settled;
   for (const std::int32_t p : changed) {
     const LatticeBody& body = bodies[points.site[p].body];
     const std::vector<std::int32_t> crumb = crumb_of(body, points, p);
     if (crumb.empty()) continue;
-    if (!settled.insert(*std::min_element(crumb.begin(), crumb.end())).second) continue;
-    const double spin = kCrumbSpin * wave_speed(body.material_of(points, p)) / body.cell_size;
-    make_rigid(CrumbNodes(body, points, fields, crumb), spin, nodes);
+    const std::int32_t lowest = *std::min_element(crumb.begin(), crumb.end());
+    if (!settled.insert(lowest).second) continue;
+    make_rigid(body, points, fields, crumb, nodes);
   }
+  crumbs.insert(settled.begin(), settled.end());
+}
+
+bool settle_wild_crumbs(const std::vector<LatticeBody>& bodies, const Points& points,
+                        const NodeFields& fields, const std::set<std::int32_t>& crumbs,
+                        Nodes& nodes) {
+  bool any = false;
+  for (const std::int32_t lowest : crumbs) {
+    const LatticeBody& body = bodies[points.site[lowest].body];
+    const std::vector<std::int32_t> crumb = crumb_of(body, points, lowest);
+    const bool wild = std::any_of(crumb.begin(), crumb.end(), [&](std::int32_t p) {
+      return Deformation(body, points.site[p], fields, nodes).stiffening >= kWildStiffening;
+    });
+    if (!wild) continue;
+    make_rigid(body, points, fields, crumb, nodes);
+    any = true;
+  }
+  return any;
 }
 
 }  // namespace tissue_sim

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <set>
 #include <vector>
 
 #include "cutting/node_fields.h"
@@ -22,10 +23,15 @@ float elastic_volume(const LatticeBody& body, const Points& points, std::int32_t
 
 /// Lets the crumbs that a cut or tear made of the points `changed` move on as rigid bodies without
 /// strain. Their momentum stays, linear and angular; what else a torn thread left in their nodes, a
-/// swing of many times their size, goes. No crumb turns faster than kCrumbSpin wave speeds a cell.
+/// swing of many times their size, goes. Adds the lowest point of each to `crumbs`. No crumb turns
+/// faster than kCrumbSpin wave speeds a cell.
 void settle_crumbs(const std::vector<LatticeBody>& bodies, const Points& points,
                    const NodeFields& fields, const std::vector<std::int32_t>& changed,
-                   Nodes& nodes);
+                   std::set<std::int32_t>& crumbs, Nodes& nodes);
+/// The same for those that have become wild since (mpm/deformation.h). Returns whether any had.
+bool settle_wild_crumbs(const std::vector<LatticeBody>& bodies, const Points& points,
+                        const NodeFields& fields, const std::set<std::int32_t>& crumbs,
+                        Nodes& nodes);
 inline constexpr double kCrumbSpin = 0.5;
 
 }  // namespace tissue_sim

@@ -5,6 +5,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -71,6 +72,7 @@ struct MpmState {
   double time = 0;                    ///< since the beginning [s]
   std::vector<double> tore_at;        ///< per body: when a bond last tore [s]; empty while none did
   std::vector<std::int32_t> threads;  ///< points at their ends, by number: cutting/threads.h
+  std::set<std::int32_t> crumbs;      ///< the lowest point of each: mpm/crumbs.h
   Contacts contacts;
   FaceContacts faces;
   std::vector<Collider> colliders;

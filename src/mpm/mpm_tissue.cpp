@@ -10,6 +10,7 @@
 #include "cutting/tear.h"
 #include "cutting/threads.h"
 #include "fragments/piece_motion.h"
+#include "mpm/crumbs.h"
 #include "mpm/lanczos.h"
 #include "mpm/linearised_motion.h"
 #include "tools/tool_motion.h"
@@ -141,11 +142,13 @@ bool MpmTissue::tear(const std::vector<TearingPoint>& tearing) {
   return !changed.empty();
 }
 
-bool MpmTissue::tear_threads() {
+bool MpmTissue::tame() {
+  if (result_.blew_up || !may_be_wild(*state_)) return false;
+  MpmState& s = *state_;
+  const bool settled = settle_wild_crumbs(s.bodies, s.points, *s.fields, s.crumbs, s.nodes);
   std::vector<std::int32_t> changed;
-  if (result_.blew_up) return false;
-  tissue_sim::tear_threads(*state_, changed, result_.tear_report);
-  if (changed.empty()) return false;
+  tear_threads(s, changed, result_.tear_report);
+  if (changed.empty()) return settled;
   take_apart(*state_, changed);
   for (const int id : update_pieces(state_->bodies, state_->points, pieces_)) {
     result_.tear_report.new_fragments.push_back(id);
@@ -191,7 +194,7 @@ void MpmTissue::measure() {
 
 FrameResult MpmTissue::finish() {
   measure();
-  if (tear_threads()) measure();
+  if (tame()) measure();
   measure_pieces(*state_, pieces_);
   return result_;
 }

@@ -53,7 +53,7 @@ class MpmTissue final : public Tissue {
   void cut(const std::vector<BladePath>& paths, const Array<float>* u_before,
            const std::vector<BlockMotion>& before, CutReport& report);
   bool tear(const std::vector<TearingPoint>& tearing);  ///< whether anything did
-  bool tear_threads();                                  ///< the same
+  bool tame();  ///< what is wild (mpm/deformation.h), whether anything was
   void measure();
 
   std::vector<std::string> notes_;

@@ -162,6 +162,13 @@ void CudaMpmTissue::push() {
   }
   d.bonds.upload(state_->points.bonds, d.stream);
   d.arrived.resize(2);
+  push_nodes();
+  d.points_changed = true;
+}
+
+void CudaMpmTissue::push_nodes() {
+  OnDevice& d = *device_;
+  const std::size_t n = state_->nodes.size();
   d.host_nodes.resize(2 * n);
   pack_nodes(state_->nodes, *state_->cpu, d.host_nodes.data(), d.host_nodes.data() + n);
   d.u[d.current].upload(d.host_nodes.data(), n, d.stream);
@@ -170,7 +177,6 @@ void CudaMpmTissue::push() {
   d.u[1 - d.current].copy(d.u[d.current], d.stream);
   d.v[1 - d.current].copy(d.v[d.current], d.stream);
   check_cuda(cudaStreamSynchronize(d.stream), "receive data");
-  d.points_changed = true;
 }
 
 void CudaMpmTissue::cut(const std::vector<BladePath>& paths, const Array<float>* u_before,

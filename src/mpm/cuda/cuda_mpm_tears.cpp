@@ -5,6 +5,7 @@
 #include "cutting/cut_tissue.h"
 #include "cutting/tear.h"
 #include "cutting/threads.h"
+#include "mpm/crumbs.h"
 #include "mpm/cuda/on_device.h"
 #include "tools/tool_motion.h"
 
@@ -64,21 +65,27 @@ void CudaMpmTissue::tear(const std::vector<TearingPoint>& tearing, const FrameIn
   keep_place_for_blades();
 }
 
-void CudaMpmTissue::tear_threads() {
-  if (result_.blew_up || !may_tear_threads(*state_)) return;
+void CudaMpmTissue::tame() {
+  if (result_.blew_up || !may_be_wild(*state_)) return;
   pull();
+  MpmState& s = *state_;
+  const bool settled = settle_wild_crumbs(s.bodies, s.points, *s.fields, s.crumbs, s.nodes);
   std::vector<std::int32_t> changed;
-  tissue_sim::tear_threads(*state_, changed, result_.tear_report);
-  if (changed.empty()) return;
-  take_apart(*state_, changed);
-  for (const int id : update_pieces(state_->bodies, state_->points, pieces_)) {
-    result_.tear_report.new_fragments.push_back(id);
+  tear_threads(s, changed, result_.tear_report);
+  if (!settled && changed.empty()) return;
+  if (changed.empty()) {
+    push_nodes();
+  } else {
+    take_apart(s, changed);
+    for (const int id : update_pieces(s.bodies, s.points, pieces_)) {
+      result_.tear_report.new_fragments.push_back(id);
+    }
+    device_->faces.pieces_changed = true;
+    push();
   }
-  device_->faces.pieces_changed = true;
-  push();
   launch_measure();
   finish_measure();
-  substep_.follow(*state_, modulus_);
+  substep_.follow(s, modulus_);
 }
 
 }  // namespace tissue_sim

@@ -265,7 +265,7 @@ FrameResult CudaMpmTissue::finish() {
     device_->points_changed = device_->faces.pieces_changed = true;
   }
   substep_.follow(*state_, modulus_);
-  tear_threads();
+  tame();
   return result_;
 }
 

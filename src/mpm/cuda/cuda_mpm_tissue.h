@@ -63,7 +63,7 @@ class CudaMpmTissue final : public Tissue {
   void keep_place_for_blades();
   std::vector<TearingPoint> find_tearing();
   void tear(const std::vector<TearingPoint>& tearing, const FrameInput& input, double share);
-  void tear_threads();
+  void tame();  ///< see MpmTissue
   void upload_points();
   void find_near(double duration);
   /// Enqueues the part's substeps from `begin` up to `end`; waits for each search of faces.
@@ -78,6 +78,7 @@ class CudaMpmTissue final : public Tissue {
   CudaLooks looks() const;
   CudaFaces faces_of_launch();
   void pull_nodes();
+  void push_nodes();
   void pull_contacts();
   void launch_measure();
   void finish_measure();

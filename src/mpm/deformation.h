@@ -1,0 +1,21 @@
+// How much single points are deformed: a few that are looked at one by one.
+#pragma once
+
+#include "cutting/node_fields.h"
+#include "mpm/lattice_body.h"
+#include "mpm/nodes.h"
+
+namespace tissue_sim {
+
+/// What is deformed so that it has stiffened so much is wild, where it is smaller than the lattice
+/// tells: crumbs and threads.
+inline constexpr double kWildStiffening = 5;
+
+struct Deformation {
+  double stretch = 1;     ///< the largest
+  double stiffening = 1;  ///< at least that of BlockState; both 1 where they are not finite
+  Deformation(const LatticeBody& body, const Points::Site& point, const NodeFields& fields,
+              const Nodes& nodes);
+};
+
+}  // namespace tissue_sim

@@ -25,4 +25,10 @@ inline constexpr BondOffset bond_offset(int k) {
 inline constexpr int kForwardBond = 3;
 inline constexpr int opposite_bond(int k) { return kBondCount - 1 - k; }
 
+/// Clears bond `k` of a point, and the same bond of the other point.
+inline void break_bond(int k, std::uint8_t& of_point, std::uint8_t& of_other) {
+  of_point &= static_cast<std::uint8_t>(~(1u << k));
+  of_other &= static_cast<std::uint8_t>(~(1u << opposite_bond(k)));
+}
+
 }  // namespace tissue_sim

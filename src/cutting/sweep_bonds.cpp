@@ -205,8 +205,7 @@ void sweep_bonds(MpmState& state, const BladePath& path, const Array<float>* u_b
     for (const Sweep::Broken& b : of_block) {
       const Points::Site& s = points.site[b.point];
       const std::int32_t q = state.bodies[s.body].next_point(s, b.axis);
-      points.bonds[b.point] &= static_cast<std::uint8_t>(~(1u << (kForwardBond + b.axis)));
-      points.bonds[q] &= static_cast<std::uint8_t>(~(1u << opposite_bond(kForwardBond + b.axis)));
+      break_bond(kForwardBond + b.axis, points.bonds[b.point], points.bonds[q]);
       if (b.has_crossing) points.crossings.add(b.point, b.axis, b.crossing);
       for (const std::int32_t p : {b.point, q}) lost[p / 64] |= std::uint64_t{1} << (p % 64);
     }

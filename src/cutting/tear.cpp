@@ -216,8 +216,7 @@ void tear_bonds(MpmState& state, const std::vector<TearingPoint>& tearing,
     for (const std::int32_t end : {b.point, q}) {  // at a corner it may be the last
       if (__builtin_popcount(state.points.bonds[end]) == 1) return false;
     }
-    state.points.bonds[b.point] &= static_cast<std::uint8_t>(~(1u << b.bond));
-    state.points.bonds[q] &= static_cast<std::uint8_t>(~(1u << opposite_bond(b.bond)));
+    break_bond(b.bond, state.points.bonds[b.point], state.points.bonds[q]);
     changed.push_back(b.point);
     changed.push_back(q);
     ++report.bonds_broken;

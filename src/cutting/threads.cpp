@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "cutting/bonds.h"
+#include "cutting/crack.h"
 #include "mpm/deformation.h"
 
 namespace tissue_sim {
@@ -10,20 +11,14 @@ namespace {
 
 bool has(std::uint8_t bonds, int k) { return (bonds >> k & 1) != 0; }
 
-std::int32_t next(const LatticeBody& body, const Points& points, std::int32_t point, int k) {
-  const Points::Site& s = points.site[point];
-  const BondOffset o = bond_offset(k);
-  return body.point(s.x + o.x, s.y + o.y, s.z + o.z);
-}
-
 /// Whether bond `k` of a point is there and in no square of four bonds.
 bool is_thread(const LatticeBody& body, const Points& points, std::int32_t point, int k) {
   if (!has(points.bonds[point], k)) return false;
-  const std::int32_t other = next(body, points, point, k);
+  const std::int32_t other = neighbour(body, points.site[point], k);
   for (int side = 0; side < kBondCount; ++side) {
     if (side == k || side == opposite_bond(k)) continue;
     if (!has(points.bonds[point], side) || !has(points.bonds[other], side)) continue;
-    if (has(points.bonds[next(body, points, point, side)], k)) return false;
+    if (has(points.bonds[neighbour(body, points.site[point], side)], k)) return false;
   }
   return true;
 }
@@ -48,7 +43,7 @@ void list_threads(MpmState& state, const std::vector<std::int32_t>& changed) {
     // A square may have lost its far side.
     const LatticeBody& body = state.bodies[state.points.site[p].body];
     for (int k = 0; k < kBondCount; ++k) {
-      if (has(state.points.bonds[p], k)) add(next(body, state.points, p, k));
+      if (has(state.points.bonds[p], k)) add(neighbour(body, state.points.site[p], k));
     }
   }
   std::sort(threads.begin(), threads.end());
@@ -69,9 +64,8 @@ void tear_threads(MpmState& state, std::vector<std::int32_t>& changed, CutReport
     }
     for (int k = 0; k < kBondCount; ++k) {
       if (!is_thread(body, points, p, k)) continue;
-      const std::int32_t other = next(body, points, p, k);
-      points.bonds[p] &= static_cast<std::uint8_t>(~(1u << k));
-      points.bonds[other] &= static_cast<std::uint8_t>(~(1u << opposite_bond(k)));
+      const std::int32_t other = neighbour(body, points.site[p], k);
+      break_bond(k, points.bonds[p], points.bonds[other]);
       changed.push_back(p);
       changed.push_back(other);
       ++report.bonds_broken;

@@ -5,6 +5,7 @@
 #include <cstring>
 
 #include "cutting/bonds.h"
+#include "cutting/crack.h"
 #include "mpm/deformation.h"
 
 namespace tissue_sim {
@@ -25,33 +26,38 @@ bool is_in_long_run(const Points& points, std::int32_t point) {
 }
 
 /// The points that bonds hold together with this one; none if they are more than a crumb's.
-std::vector<std::int32_t> crumb_of(const LatticeBody& body, const Points& points,
-                                   std::int32_t point) {
-  const bool may_be = points.bonds[point] != kAllBonds && body.point_count > kCrumbPoints &&
-                      !is_in_long_run(points, point);
-  if (!may_be) return {};
-  std::vector<std::int32_t> piece = {point};
-  piece.reserve(kCrumbPoints);
-  for (std::size_t i = 0; i < piece.size(); ++i) {
-    const Points::Site s = points.site[piece[i]];
-    for (int k = 0; k < kBondCount; ++k) {
-      if ((points.bonds[piece[i]] >> k & 1) == 0) continue;
-      const BondOffset o = bond_offset(k);
-      const std::int32_t next = body.point(s.x + o.x, s.y + o.y, s.z + o.z);
-      if (std::find(piece.begin(), piece.end(), next) != piece.end()) continue;
-      if (piece.size() == kCrumbPoints) return {};
-      piece.push_back(next);
+struct Crumb {
+  std::int32_t point[kCrumbPoints];
+  int count = 0;
+  Crumb(const LatticeBody& body, const Points& points, std::int32_t first) {
+    const bool may_be = points.bonds[first] != kAllBonds && body.point_count > kCrumbPoints &&
+                        !is_in_long_run(points, first);
+    if (!may_be) return;
+    point[count++] = first;
+    for (int i = 0; i < count; ++i) {
+      const Points::Site& s = points.site[point[i]];
+      for (int k = 0; k < kBondCount; ++k) {
+        if ((points.bonds[point[i]] >> k & 1) == 0) continue;
+        const std::int32_t next = neighbour(body, s, k);
+        if (std::find(begin(), end(), next) != end()) continue;
+        if (count == kCrumbPoints) {
+          count = 0;
+          return;
+        }
+        point[count++] = next;
+      }
     }
   }
-  return piece;
-}
+  const std::int32_t* begin() const { return point; }
+  const std::int32_t* end() const { return point + count; }
+};
 
 /// The nodes that a crumb's points see, and their reference places.
 struct CrumbNodes {
   std::vector<int> node;
   std::vector<Vec3> home;
   CrumbNodes(const LatticeBody& body, const Points& points, const NodeFields& fields,
-             const std::vector<std::int32_t>& crumb) {
+             const Crumb& crumb) {
     for (const std::int32_t p : crumb) {
       const Points::Site& s = points.site[p];
       for (int k = 0; k < 27; ++k) {
@@ -74,9 +80,9 @@ Eigen::Matrix3d rotation_of(const Eigen::Matrix3d& x_X) {
 }
 
 void make_rigid(const LatticeBody& body, const Points& points, const NodeFields& fields,
-                const std::vector<std::int32_t>& of_crumb, Nodes& nodes) {
+                const Crumb& of_crumb, Nodes& nodes) {
   const CrumbNodes crumb(body, points, fields, of_crumb);
-  const Material& material = body.material_of(points, of_crumb[0]);
+  const Material& material = body.material_of(points, of_crumb.point[0]);
   const double fastest_spin = kCrumbSpin * wave_speed(material) / body.cell_size;
   const std::size_t count = crumb.node.size();
   std::vector<Vec3> x(count), v(count);
@@ -123,7 +129,7 @@ void make_rigid(const LatticeBody& body, const Points& points, const NodeFields&
 }  // namespace
 
 float elastic_volume(const LatticeBody& body, const Points& points, std::int32_t point) {
-  const bool is_crumb = !crumb_of(body, points, point).empty();
+  const bool is_crumb = Crumb(body, points, point).count > 0;
   return (is_crumb ? kCrumbStiffness : 1.0f) * points.volume[point];
 }
 
@@ -133,8 +139,8 @@ void settle_crumbs(const std::vector<LatticeBody>& bodies, const Points& points,
   std::set<std::int32_t> settled;
   for (const std::int32_t p : changed) {
     const LatticeBody& body = bodies[points.site[p].body];
-    const std::vector<std::int32_t> crumb = crumb_of(body, points, p);
-    if (crumb.empty()) continue;
+    const Crumb crumb(body, points, p);
+    if (crumb.count == 0) continue;
     const std::int32_t lowest = *std::min_element(crumb.begin(), crumb.end());
     if (!settled.insert(lowest).second) continue;
     make_rigid(body, points, fields, crumb, nodes);
@@ -148,7 +154,7 @@ bool settle_wild_crumbs(const std::vector<LatticeBody>& bodies, const Points& po
   bool any = false;
   for (const std::int32_t lowest : crumbs) {
     const LatticeBody& body = bodies[points.site[lowest].body];
-    const std::vector<std::int32_t> crumb = crumb_of(body, points, lowest);
+    const Crumb crumb(body, points, lowest);
     const bool wild = std::any_of(crumb.begin(), crumb.end(), [&](std::int32_t p) {
       return Deformation(body, points.site[p], fields, nodes).stiffening >= kWildStiffening;
     });

@@ -250,7 +250,7 @@ TEST_P(FaceContactOnGpu, SameBitsRunAfterRun) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Shapes, FaceContactOnGpu,
-                         testing::Values(nullptr, "4 4 4 32 0", "16 4 1 128 1"));
+                         testing::Values(nullptr, "4 4 4 32 0", "16 4 1 128 1", "6 5 8 32 2"));
 
 }  // namespace
 }  // namespace tissue_sim

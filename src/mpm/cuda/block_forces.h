@@ -25,8 +25,9 @@ struct BlockStep {
 };
 
 /// A column of a bundle and the thread that walks up it, alone or, with kPairs, with its neighbour
-/// in the warp: one has the lower, the other the upper halves of the cells.
-template <class LawOf, bool kViscous, bool kPartial, bool kPairs>
+/// in the warp: one has the lower, the other the upper halves of the cells. It works on the
+/// stresses of kTogether points side by side.
+template <class LawOf, bool kViscous, bool kPartial, bool kPairs, int kTogether = 1>
 struct ColumnWalk {
   const CudaTables& t;
   const CudaBody& body;
@@ -59,7 +60,7 @@ struct ColumnWalk {
       read_half(s.v + first, column.pitch, column.plane, side, rate);
       viscous_stress(body, h, rate, side, volume, damping);
     }
-    half_forces<LawOf, kViscous>(body, h, side, volume, damping, out);
+    half_forces<LawOf, kViscous, kTogether>(body, h, side, volume, damping, out);
     const GiveWeights k(side);
     const float extra = kPartial ? stiffness(z) : 0;
 #pragma unroll
@@ -76,15 +77,16 @@ struct ColumnWalk {
     }
   }
 
-  __device__ __forceinline__ void begin() {
+  /// Begins with the column's nodes of the lowest two planes.
+  __device__ __forceinline__ void begin(const float4* lowest, const float4* second) {
     if (kPairs) return;
-    read_plane<kPartial>(s.u + column.slot, column.pitch, below);
-    read_plane<kPartial>(s.u + column.slot + column.plane, column.pitch, center);
+    read_plane<kPartial>(lowest, column.pitch, below);
+    read_plane<kPartial>(second, column.pitch, center);
   }
-  /// All of cell z.
-  __device__ __forceinline__ void cell(int z) {
+  /// All of cell z, with the column's nodes of the plane above.
+  __device__ __forceinline__ void cell(int z, const float4* nodes) {
     PlaneNumbers above[3];
-    read_plane<kPartial>(s.u + column.slot + (z + 2) * column.plane, column.pitch, above);
+    read_plane<kPartial>(nodes, column.pitch, above);
 #pragma unroll
     for (int c = 0; c < 3; ++c) {
       now[c] = next[c];
@@ -99,7 +101,8 @@ struct ColumnWalk {
       for (int c = 0; c < 3; ++c) {
         half_between(sz == 0 ? above[c] : below[c], center[c], sz == 0 ? below[c] : above[c], h[c]);
       }
-      half_forces<LawOf, false>(body, h, side, half_volumes(t, column, body, z, sz), nullptr, out);
+      half_forces<LawOf, false, kTogether>(body, h, side, half_volumes(t, column, body, z, sz),
+                                           nullptr, out);
       const GiveWeights k(side);
 #pragma unroll
       for (int c = 0; c < 3; ++c) {
@@ -224,14 +227,15 @@ __device__ __forceinline__ void block_forces(const CudaTables& t, const CudaBund
     if (!step.two_planes) __syncthreads();
   };
 
-  if (warp_active) walk.begin();
+  const float4* nodes = s.u + walk.column.slot;
+  if (warp_active) walk.begin(nodes, nodes + walk.column.plane);
 #pragma unroll 1
   for (int z = 0; z < nz; ++z) {
     if (warp_active && (!kSpecial || z < walk.column.nz)) {
       if (kPairs) {
         walk.half(z);
       } else {
-        walk.cell(z);
+        walk.cell(z, nodes + (z + 2) * walk.column.plane);
       }
     } else if (kSpecial) {
       walk.rise();

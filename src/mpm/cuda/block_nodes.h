@@ -94,12 +94,12 @@ struct SlotEntry {
   }
 };
 
-/// Brings the nodes of `count` slots into `u` and, where `v` is not null, `v` (divided by the cell
-/// size, so that stencils give gradients). With `kMove` it first moves them on by the forces of the
-/// last substep, summed in the order of the slots; every block that has a node computes the same,
-/// and the one that owns it writes it down. Each thread has kHand nodes in hand, for all their
-/// loads to be under way at once; what the tables say of the next ones comes meanwhile. `pushes` is
-/// read with kPushes alone.
+/// Brings the nodes of `count` slots into `u_out` and `v_out`, where they are not null (divided by
+/// the cell size, so that stencils give gradients). With `kMove` it first moves them on by the
+/// forces of the last substep, summed in the order of the slots; every block that has a node
+/// computes the same, and the one that owns it writes it down. Each thread has kHand nodes in hand,
+/// for all their loads to be under way at once; what the tables say of the next ones comes
+/// meanwhile. `pushes` is read with kPushes alone.
 template <bool kMove, bool kCached, int kHand, bool kPushes = false>
 __device__ __forceinline__ void bring_nodes(const CudaTables& t, int first_slot, int count,
                                             const SlotCache& cache, const CudaNodes& from,
@@ -179,7 +179,7 @@ __device__ __forceinline__ void bring_nodes(const CudaTables& t, int first_slot,
           __stcg(to.v + node[k], v[k]);
         }
       }
-      u_out[at] = {scale * u[k].x, scale * u[k].y, scale * u[k].z, 0};
+      if (u_out != nullptr) u_out[at] = {scale * u[k].x, scale * u[k].y, scale * u[k].z, 0};
       if (v_out != nullptr) v_out[at] = {scale * v[k].x, scale * v[k].y, scale * v[k].z, 0};
     }
   }

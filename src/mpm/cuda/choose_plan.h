@@ -10,8 +10,9 @@ namespace tissue_sim {
 
 struct CudaShape {
   BlockShape blocks;
-  int threads = 64;   ///< see CudaPlan
-  bool small = true;  ///< the same
+  int threads = 64;      ///< see CudaPlan
+  bool small = true;     ///< the same
+  bool marches = false;  ///< the same
   /// CudaPlan::pairs, and the columns that a thread block can have.
   bool pairs() const { return 2 * blocks.x * blocks.y <= threads; }
   int columns() const { return pairs() ? threads / 2 : threads; }
@@ -23,9 +24,15 @@ struct CudaLimits {
   std::size_t shared_bytes;  ///< shared memory that a thread block can have
 };
 
-/// The shape for these bodies that a model of the substep's time finds fastest. The environment
-/// variable TISSUE_SIM_CUDA_SHAPE="x y z threads small" overrules it, for measurements.
-CudaShape choose_shape(const std::vector<LatticeBody>& bodies, const CudaLimits& limits);
+/// The shape for these bodies that a model of the substep's time finds fastest; one that marches
+/// only if they `may_march`: see can_march(). The environment variable TISSUE_SIM_CUDA_SHAPE="x y z
+/// threads way", way 0 for large, 1 for small, 2 for a shape that marches, overrules it, for
+/// measurements.
+CudaShape choose_shape(const std::vector<LatticeBody>& bodies, const CudaLimits& limits,
+                       bool may_march);
+
+/// Whether these are one body that fills a box, of one material that neither damps nor tears.
+bool can_march(const std::vector<LatticeBody>& bodies);
 
 /// What the blocks that share a thread block may have together.
 struct BundleLimits {

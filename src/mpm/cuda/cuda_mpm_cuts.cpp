@@ -65,6 +65,7 @@ void CudaMpmTissue::plan_tables() {
   OnDevice& d = *device_;
   d.plan.threads = d.shape.threads;
   d.plan.small = d.shape.small;
+  d.plan.marches = d.shape.marches;
   d.plan.pairs = d.shape.pairs();
   d.plan.max_slots = d.plan.max_plane_slots = 0;
   const std::vector<Block*>& blocks = state_->blocks.all;
@@ -179,13 +180,38 @@ void CudaMpmTissue::push_nodes() {
   check_cuda(cudaStreamSynchronize(d.stream), "receive data");
 }
 
+void CudaMpmTissue::make_blocks(bool may_march) {
+  OnDevice& d = *device_;
+  d.shape = choose_shape(state_->bodies, d.limits, may_march);
+  d.shape.blocks.one_material = true;
+  state_->blocks =
+      tissue_sim::make_blocks(state_->bodies, state_->points, *state_->fields, d.shape.blocks);
+  list_facets(*state_);
+}
+
+void CudaMpmTissue::stop_marching() {
+  make_blocks(false);
+  // Until they are measured, any block may be where any of the tissue is.
+  for (std::vector<BlockMotion>* motion : {&state_->motion, &motion_before_}) {
+    BlockMotion all;
+    for (const BlockMotion& m : *motion) {
+      all.box.min = all.box.min.cwiseMin(m.box.min);
+      all.box.max = all.box.max.cwiseMax(m.box.max);
+      if (!(m.speed <= all.speed)) all.speed = m.speed;
+    }
+    motion->assign(state_->blocks.all.size(), all);
+  }
+}
+
 void CudaMpmTissue::cut(const std::vector<BladePath>& paths, const Array<float>* u_before,
                         const std::vector<BlockMotion>& before, CutReport& report) {
+  const bool marched = device_->shape.marches;
+  if (marched) stop_marching();
   std::vector<std::int32_t> changed;
   for (const BladePath& path : paths) {
     sweep_bonds(*state_, path, u_before, state_->nodes.u, before, changed, report);
   }
-  if (changed.empty()) return;
+  if (changed.empty() && !marched) return;
   take_apart(*state_, changed);
   report.new_fragments = update_pieces(state_->bodies, state_->points, pieces_);
   if (!report.new_fragments.empty()) device_->faces.pieces_changed = true;

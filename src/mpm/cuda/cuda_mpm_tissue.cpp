@@ -14,17 +14,11 @@
 namespace tissue_sim {
 namespace {
 
-/// The state at rest, with blocks of the GPU's shape.
-std::unique_ptr<MpmState> make_state(const Scene& scene, std::vector<std::string>* notes,
-                                     const CudaLimits& limits, CudaShape& shape) {
+std::unique_ptr<MpmState> make_state(const Scene& scene, std::vector<std::string>* notes) {
   auto state = std::make_unique<MpmState>();
   state->scene = scene;
   state->bodies = make_lattice_bodies(scene, state->points, notes);
   state->fields = std::make_unique<NodeFields>(state->bodies, state->points, state->nodes);
-  shape = choose_shape(state->bodies, limits);
-  shape.blocks.one_material = true;
-  state->blocks = make_blocks(state->bodies, state->points, *state->fields, shape.blocks);
-  list_facets(*state);
   state->instructions = instruction_set();
   state->kernels = &block_kernels(state->instructions);
   state->cpu = std::make_unique<Cpu>(scene.threads);
@@ -53,10 +47,10 @@ CudaMpmTissue::CudaMpmTissue(const Scene& scene) : device_(std::make_unique<OnDe
   check_cuda(cudaGetDeviceProperties(&properties, 0), "be asked");
   d.gpu = properties.name;
   check_cuda(cudaStreamCreateWithFlags(&d.stream, cudaStreamNonBlocking), "make a stream");
-  const CudaLimits limits{
-      properties.multiProcessorCount,
-      static_cast<std::size_t>(attribute(cudaDevAttrMaxSharedMemoryPerBlockOptin))};
-  state_ = make_state(scene, &notes_, limits, d.shape);
+  d.limits = {properties.multiProcessorCount,
+              static_cast<std::size_t>(attribute(cudaDevAttrMaxSharedMemoryPerBlockOptin))};
+  state_ = make_state(scene, &notes_);
+  make_blocks(can_march(state_->bodies));
   pieces_ = whole_pieces(state_->bodies, state_->points);
   notes_.push_back("runs on the GPU (" + d.gpu +
                    "); cuts are made on the host between frames, and "

@@ -56,7 +56,9 @@ class CudaMpmTissue final : public Tissue {
   void run(int substeps, float dt, const FrameInput& input, double from, double to);
   void sum_loads();  ///< of the part that was run last, once it is done
   void end();
-  void plan_tables();  ///< how the blocks are worked on, and the tables for it
+  void make_blocks(bool may_march);
+  void stop_marching();  ///< blocks that march are too tall to be cut well
+  void plan_tables();    ///< how the blocks are worked on, and the tables for it
   void cut(const std::vector<BladePath>& paths, const Array<float>* u_before,
            const std::vector<BlockMotion>& before, CutReport& report);
   void cut_by_blades();

@@ -16,13 +16,18 @@ __device__ __forceinline__ float4 half_volumes(const CudaTables& t, const CudaCo
   return {v[0], v[c.step], v[2 * c.step], v[3 * c.step]};
 }
 
-/// F to the stress P times -volume / cell size, in place; `damping` is added.
-template <class LawOf, bool kViscous>
-__device__ __forceinline__ void stress(float mu, float lambda, const float* damping, float* F) {
-  float P[9];
-  tissue_sim::stress<LawOf>(F, mu, lambda, P);
+/// F of kTogether points, worked on side by side for none to wait for its own roots, to the stress
+/// P times -volume / cell size, in place; `damping` is added.
+template <class LawOf, bool kViscous, int kTogether>
+__device__ __forceinline__ void stresses(const float* mu, const float* lambda, const float* damping,
+                                         float (*F)[9]) {
+  float P[kTogether][9];
+  LawOf::template stresses<kTogether>(F, mu, lambda, P);
 #pragma unroll
-  for (int i = 0; i < 9; ++i) F[i] = kViscous ? P[i] + damping[i] : P[i];
+  for (int k = 0; k < kTogether; ++k) {
+#pragma unroll
+    for (int i = 0; i < 9; ++i) F[k][i] = kViscous ? P[k][i] + damping[i] : P[k][i];
+  }
 }
 
 /// Kelvin-Voigt stress at the middle of the cell, from the mean gradients of its two halves, times
@@ -53,7 +58,7 @@ __device__ __forceinline__ void viscous_stress(const CudaBody& body, const HalfP
 }
 
 /// From half a cell's numbers to what its stress gives back, for points of these volumes.
-template <class LawOf, bool kViscous>
+template <class LawOf, bool kViscous, int kTogether>
 __device__ __forceinline__ void half_forces(const CudaBody& body, const HalfPlane (&h)[3],
                                             float side, const float4& volume, const float* damping,
                                             HalfPlane (&out)[3]) {
@@ -72,10 +77,12 @@ __device__ __forceinline__ void half_forces(const CudaBody& body, const HalfPlan
     }
   }
   const float mu = -body.inv_cell_size * body.mu, lambda = -body.inv_cell_size * body.lambda;
-  stress<LawOf, kViscous>(mu * volume.x, lambda * volume.x, damping, F[0]);
-  stress<LawOf, kViscous>(mu * volume.y, lambda * volume.y, damping, F[1]);
-  stress<LawOf, kViscous>(mu * volume.z, lambda * volume.z, damping, F[2]);
-  stress<LawOf, kViscous>(mu * volume.w, lambda * volume.w, damping, F[3]);
+  const float m[4] = {mu * volume.x, mu * volume.y, mu * volume.z, mu * volume.w};
+  const float l[4] = {lambda * volume.x, lambda * volume.y, lambda * volume.z, lambda * volume.w};
+#pragma unroll
+  for (int k = 0; k < 4; k += kTogether) {
+    stresses<LawOf, kViscous, kTogether>(m + k, l + k, damping, F + k);
+  }
 #pragma unroll
   for (int c = 0; c < 3; ++c) give_stress(F, c, out[c]);
 }

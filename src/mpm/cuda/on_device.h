@@ -12,6 +12,7 @@
 namespace tissue_sim {
 
 struct CudaMpmTissue::OnDevice {
+  CudaLimits limits;
   CudaShape shape;
   /// Without contact, with it, and CudaPlan::plain.
   CudaPlan plan, push_plan, plain_plan;

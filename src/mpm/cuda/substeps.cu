@@ -3,33 +3,45 @@
 #include <algorithm>
 
 #include "compute/cuda_check.h"
+#include "mpm/cuda/moving_planes.h"
 #include "mpm/cuda/substep_kernels.h"
 
 namespace tissue_sim {
 namespace {
 
+bool does_march(const CudaPlan& plan) { return plan.marches && plan.plain; }
+
 const void* kernel(const CudaPlan& plan) {
-  return reinterpret_cast<const void*>(plan.pushes  ? pushing_kernel(plan)
-                                       : plan.plain ? plain_kernel(plan)
-                                                    : kernel_of<Can::kCuts>(plan));
+  return reinterpret_cast<const void*>(plan.pushes        ? pushing_kernel(plan)
+                                       : does_march(plan) ? marching_kernel(plan)
+                                       : plan.plain       ? plain_kernel(plan)
+                                                          : kernel_of<Can::kCuts>(plan));
 }
 
 CudaLayout layout_of(const CudaPlan& plan) {
   CudaLayout layout;
   const bool velocities = plan.viscous || (plan.neo_hookean && plan.fixed_corotated);
   layout.max_slots = plan.max_slots;
+  layout.max_plane_slots = plan.max_plane_slots;
   layout.node_room = (velocities ? 2 : 1) * plan.max_slots;
   if (plan.pushes) {  // cells that colliders push come where the nodes of the block were
     const int cells = plan.threads / 32 * static_cast<int>(sizeof(CellNodes));
     layout.node_room = std::max(layout.node_room, cells / 16 + 1);
   }
   layout.exchange = (plan.two_planes ? 18 : 9) * plan.max_plane_slots;
+  if (does_march(plan)) {
+    layout.node_room = kMovingPlaneRoom * plan.max_plane_slots;
+    layout.exchange = 18 * plan.max_plane_slots;
+  }
   layout.eight_parts = plan.eight_parts;
   layout.two_planes = plan.two_planes;
   return layout;
 }
 
+static_assert(kMarchBytes == (kMovingPlaneRoom + 18) * sizeof(float4));
+
 std::size_t shared_bytes(const CudaPlan& plan) {
+  if (does_march(plan)) return kMarchBytes * plan.max_plane_slots + kMarchBytesBeside;
   const CudaLayout layout = layout_of(plan);
   const std::size_t of_slot =
       (plan.cached ? sizeof(uint4) + 8 : 0) + (plan.eight_parts ? sizeof(uint4) : 0);

@@ -23,14 +23,18 @@ struct CudaPlan {
   bool cached = false;       ///< each thread block has one bundle only, whose tables it keeps
   bool eight_parts = false;  ///< of a node's force it keeps the places of eight, else of four
   bool two_planes = false;   ///< the exchange holds two planes, and threads wait half as often
+  bool marches = false;      ///< large, and nodes come plane by plane where it is plain
   bool plain = false;        ///< no contact, all cells full, each bundle one block
   bool pushes = false;       ///< with contact
   bool neo_hookean = false, fixed_corotated = false, viscous = false;  ///< what there is
 };
 
+/// Shared memory that a march takes for each slot of a plane, and beside.
+inline constexpr int kMarchBytes = 640, kMarchBytesBeside = 8;
+
 /// How a thread block's shared memory is laid out.
 struct CudaLayout {
-  int max_slots;
+  int max_slots, max_plane_slots;
   int node_room, exchange;  ///< float4s: for a bundle's nodes, for what columns give to planes
   bool eight_parts, two_planes;
 };
@@ -38,6 +42,7 @@ struct CudaLayout {
 using CudaKernel = void (*)(CudaTables, CudaFrame, CudaLayout);
 CudaKernel pushing_kernel(const CudaPlan& plan);
 CudaKernel plain_kernel(const CudaPlan& plan);
+CudaKernel marching_kernel(const CudaPlan& plan);
 
 /// Thread blocks that run at once; 0 where the plan does not fit the GPU. Sets CudaPlan::cached,
 /// eight_parts and two_planes.

@@ -36,7 +36,7 @@ Scene scene_of(const Case& c, Shape shape) {
 }
 
 void block_by_material(MpmState& s) {
-  s.blocks = make_blocks(s.bodies, s.points, *s.fields, {16, 4, 4, true});
+  s.blocks = make_blocks(s.bodies, s.points, *s.fields, {16, 4, 4, true}, *s.cpu);
   s.force.resize(s.blocks.force_size);
   s.contacts.touching.assign(s.blocks.all.size(), {});
   s.contacts.near.assign(s.blocks.all.size(), {});

@@ -118,7 +118,7 @@ void connect_forces(Blocks& blocks, const std::vector<LatticeBody>& bodies, int 
 }  // namespace
 
 Blocks make_blocks(const std::vector<LatticeBody>& bodies, const Points& points,
-                   const NodeFields& fields, const BlockShape& shape) {
+                   const NodeFields& fields, const BlockShape& shape, Cpu& cpu) {
   Blocks blocks;
   blocks.one_material = shape.one_material;
   for (std::size_t i = 0; i < bodies.size(); ++i) {
@@ -127,13 +127,14 @@ Blocks make_blocks(const std::vector<LatticeBody>& bodies, const Points& points,
       for (int y = 0; y < b.ny; y += shape.y) {
         const int ny = std::min(shape.y, b.ny - y), nz = std::min(shape.z, b.nz - z);
         for (const auto& [begin, end] : x_runs(b, y, ny, z, nz, shape.x)) {
-          BlockRegion r{static_cast<int>(i), begin, y, z, end - begin, ny, nz, {}};
-          fill_region(r, bodies, points, fields, shape.one_material, {});
-          blocks.regions.push_back(std::move(r));
+          blocks.regions.push_back({static_cast<int>(i), begin, y, z, end - begin, ny, nz, {}});
         }
       }
     }
   }
+  cpu.for_each(static_cast<int>(blocks.regions.size()), [&](int i) {
+    fill_region(blocks.regions[i], bodies, points, fields, shape.one_material, {});
+  });
   connect_forces(blocks, bodies, lattice_node_count(bodies));
   return blocks;
 }

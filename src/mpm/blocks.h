@@ -64,7 +64,7 @@ struct BlockShape {
 
 /// Cuts the bodies' lattices into regions and makes their blocks.
 Blocks make_blocks(const std::vector<LatticeBody>& bodies, const Points& points,
-                   const NodeFields& fields, const BlockShape& shape = {});
+                   const NodeFields& fields, const BlockShape& shape, Cpu& cpu);
 
 /// Makes the blocks anew of the regions that one of the `cells` touches, after their nodes' fields
 /// changed; `node_count` is the new number of nodes.

@@ -10,9 +10,10 @@ namespace tissue_sim {
 std::unique_ptr<MpmState> make_mpm_state(const Scene& scene, std::vector<std::string>* notes) {
   auto state = std::make_unique<MpmState>();
   state->scene = scene;
+  state->cpu = std::make_unique<Cpu>(scene.threads);
   state->bodies = make_lattice_bodies(scene, state->points, notes);
   state->fields = std::make_unique<NodeFields>(state->bodies, state->points, state->nodes);
-  state->blocks = make_blocks(state->bodies, state->points, *state->fields);
+  state->blocks = make_blocks(state->bodies, state->points, *state->fields, {}, *state->cpu);
   state->force.resize(state->blocks.force_size);
   state->contacts.near.resize(state->blocks.all.size());
   state->contacts.cells.resize(state->blocks.all.size());
@@ -20,7 +21,6 @@ std::unique_ptr<MpmState> make_mpm_state(const Scene& scene, std::vector<std::st
   list_facets(*state);
   state->instructions = instruction_set();
   state->kernels = &block_kernels(state->instructions);
-  state->cpu = std::make_unique<Cpu>(scene.threads);
   return state;
 }
 

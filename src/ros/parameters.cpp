@@ -10,6 +10,7 @@
 #include <set>
 #include <stdexcept>
 
+#include "geometry/chord.h"
 #include "geometry/mesh.h"
 #include "ros/xmlrpc_yaml.h"
 
@@ -130,6 +131,31 @@ void warn_of_unknown(const ros::NodeHandle& node) {
   }
 }
 
+/// Of a body, in world axes.
+Box box_of(const Body& body) {
+  if (body.shape != Shape::kMesh) return bounding_box(body);
+  Box box;
+  for (const Vec3& x : load_solid(body, nullptr).vertices) {
+    box.min = box.min.cwiseMin(x);
+    box.max = box.max.cwiseMax(x);
+  }
+  return box;
+}
+
+/// The region that is to the box `to` as `region` is to `from`.
+Region fitted(Region region, const Box& from, const Box& to) {
+  const Vec3 share = (to.max - to.min).cwiseQuotient(from.max - from.min);
+  const auto place = [&](const Vec3& x) {
+    return Vec3(to.min + (x - from.min).cwiseProduct(share));
+  };
+  region.min = place(region.min);
+  region.max = place(region.max);
+  region.center = place(region.center);
+  region.radius *= std::cbrt(share.prod());
+  region.z = place(Vec3(0, 0, region.z)).z();
+  return region;
+}
+
 }  // namespace
 
 RecordRequest record_request(const std::string& value) {
@@ -214,18 +240,21 @@ Scene read_scene_parameters(const ros::NodeHandle& node) {
 
 void put_mesh(Scene& scene, const std::string& mesh, double scale) {
   Body& body = scene.bodies.front();
+  const Box before = box_of(body);
   body.shape = Shape::kMesh;
   body.mesh = mesh;
   body.scale = scale;
   const Vec3 place = body.pose.position;
   body.pose.position = Vec3::Zero();
-  Box box;
-  for (const Vec3& x : load_solid(body, nullptr).vertices) {
-    box.min = box.min.cwiseMin(x);
-    box.max = box.max.cwiseMax(x);
-  }
+  Box box = box_of(body);
   body.pose.position = place - 0.5 * (box.min + box.max);
   if (scene.ground.enabled) body.pose.position.z() = scene.ground.z - box.min.z();
+  box.min += body.pose.position;
+  box.max += body.pose.position;
+  for (Region& anchor : body.anchors) anchor = fitted(anchor, before, box);
+  for (Inclusion& inclusion : body.inclusions) {
+    inclusion.region = fitted(inclusion.region, before, box);
+  }
   validate(scene);
 }
 

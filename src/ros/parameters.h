@@ -46,9 +46,9 @@ Parameters read_parameters(const ros::NodeHandle& node);
 /// parameters), with ~mesh and ~mesh_scale in place of the first body's shape.
 Scene read_scene_parameters(const ros::NodeHandle& node);
 
-/// Puts a mesh in the place of the scene's first body, which keeps its material, inclusions and
-/// anchors: its bounding box is centred where the body's centre was, seen from above, and rests on
-/// the ground (or, without one, is centred in z too).
+/// Puts a mesh in the place of the scene's first body: its bounding box is centred where the body's
+/// centre was, seen from above, and rests on the ground (or, without one, is centred in z too). The
+/// material stays; inclusions and anchors keep their place in proportion to the box.
 void put_mesh(Scene& scene, const std::string& mesh, double scale);
 
 /// A recording's name from a parameter or an argument: "", false: none; "true": "" (date and time).

@@ -1,5 +1,6 @@
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <fstream>
 
 #include "geometry/mesh.h"
@@ -52,6 +53,26 @@ TEST(PutMesh, RestsOnTheGroundWhereTheFirstBodyWas) {
   EXPECT_NEAR(box.max.z(), 0.24, 1e-9);
   EXPECT_NEAR(0.5 * (box.min.x() + box.max.x()), 0.5, 1e-9);
   EXPECT_NEAR(0.5 * (box.min.y() + box.max.y()), -0.1, 1e-9);
+}
+
+TEST(PutMesh, IsHeldWhereTheFirstBodyWas) {
+  const std::string path = testing::TempDir() + "/tissue_sim_tall_wedge.obj";
+  std::ofstream(path)
+      << "v 0 0 0\nv 60 0 0\nv 0 30 0\nv 0 0 90\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n";
+  Scene scene = scene_from_yaml(
+      "{cell_size: 0.003, materials: [{name: lump, young_modulus: 9000}], bodies: [{shape: "
+      "ellipsoid, radii: [0.03, 0.02, 0.01], pose: {position: [1, 0, 0.01]}, anchors: [{box: {min: "
+      "[0.96, -1, 0], max: [0.985, 1, 0.02]}}, {below: 0.002}], inclusions: [{material: lump, "
+      "region: {ball: {center: [1, 0.01, 0.005], radius: 0.004}}}]}]}");
+  put_mesh(scene, path, 0.001);  // 60 x 30 x 90 mm for 60 x 40 x 20, from (0.97, -0.015, 0) on
+  const Body& body = scene.bodies[0];
+  EXPECT_NEAR(body.anchors[0].min.x(), 0.96, 1e-9);
+  EXPECT_NEAR(body.anchors[0].max.x(), 0.985, 1e-9);
+  EXPECT_NEAR(body.anchors[0].max.z(), 0.09, 1e-9);
+  EXPECT_NEAR(body.anchors[1].z, 0.009, 1e-9);
+  const Region& lump = body.inclusions[0].region;
+  EXPECT_NEAR((lump.center - Vec3(1, 0.0075, 0.0225)).norm(), 0, 1e-9);
+  EXPECT_NEAR(lump.radius, 0.004 * std::cbrt(0.75 * 4.5), 1e-9);
 }
 
 TEST(RecordRequest, TrueIsANameByDate) {

@@ -9,8 +9,8 @@
 namespace tissue_sim {
 namespace {
 
-// A sweep looks at the bonds of points within this many cells, and brings points within twice as
-// many, so that a bond is seen as long as it is not stretched to three times its length.
+// A sweep looks at points within this many cells, and at blocks within twice as many, so that a
+// bond is seen as long as it is not stretched to three times its length.
 constexpr double kReach = 1.5;
 
 /// Whether a box comes near what an edge sweeps.
@@ -77,8 +77,7 @@ class Sweep {
     return result;
   }
 
-  /// Fills MpmState::places for those of a block's points that a bond near the sweep may end at,
-  /// and lists the lanes near it.
+  /// Fills MpmState::places for a block's points and lists the lanes near the sweep.
   void read_places(Passed& passed) const {
     const Block& block = *passed.block;
     BlockScratch& scratch = state_.scratch.local();
@@ -97,7 +96,7 @@ class Sweep {
     float *at_begin = state_.places[0].data(), *at_end = state_.places[1].data();
     for (std::size_t lane = 0; lane < lanes; ++lane) {
       const std::int32_t p = block.point[lane];
-      if (distance[lane] > 2 * reach || p < 0) continue;
+      if (p < 0) continue;
       for (int a = 0; a < 3; ++a) at_end[3 * std::size_t(p) + a] = end[a * lanes + lane];
       for (int a = 0; moves() && a < 3; ++a) {
         at_begin[3 * std::size_t(p) + a] = begin[a * lanes + lane];

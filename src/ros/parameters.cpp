@@ -240,7 +240,8 @@ Scene read_scene_parameters(const ros::NodeHandle& node) {
 
 void put_mesh(Scene& scene, const std::string& mesh, double scale) {
   Body& body = scene.bodies.front();
-  const Box before = box_of(body);
+  const bool has_regions = !body.anchors.empty() || !body.inclusions.empty();
+  const Box before = has_regions ? box_of(body) : Box();  // else its own mesh need not be there
   body.shape = Shape::kMesh;
   body.mesh = mesh;
   body.scale = scale;

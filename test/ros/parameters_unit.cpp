@@ -75,6 +75,15 @@ TEST(PutMesh, IsHeldWhereTheFirstBodyWas) {
   EXPECT_NEAR(lump.radius, 0.004 * std::cbrt(0.75 * 4.5), 1e-9);
 }
 
+TEST(PutMesh, NeedsNoMeshOfTheFirstBody) {
+  const std::string path = testing::TempDir() + "/tissue_sim_own_wedge.obj";
+  std::ofstream(path)
+      << "v 0 0 0\nv 60 0 0\nv 0 30 0\nv 0 0 90\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n";
+  Scene scene = scene_from_yaml("{bodies: [{shape: mesh, mesh: /not/there.stl}]}");
+  put_mesh(scene, path, 0.001);
+  EXPECT_EQ(scene.bodies[0].mesh, path);
+}
+
 TEST(RecordRequest, TrueIsANameByDate) {
   EXPECT_FALSE(record_request("").wanted);
   EXPECT_FALSE(record_request("false").wanted);

@@ -7,9 +7,9 @@
 
 namespace tissue_sim {
 
-inline constexpr int kPlanesInPlace = 4;  ///< all three of these are powers of two
-inline constexpr int kEntryPlanes = 4;
-inline constexpr int kRawPlanes = 2;
+/// Planes whose nodes are in place, whose entries of the tables and whose raw nodes there is room
+/// for.
+inline constexpr int kPlanesInPlace = 4, kEntryPlanes = 4, kRawPlanes = 2;
 inline constexpr int kPlaneParts = 4;             ///< of a node's force, in a raw plane
 inline constexpr int kRawNode = 2 + kPlaneParts;  ///< float4s: u, v and these parts
 

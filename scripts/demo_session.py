@@ -160,7 +160,7 @@ def has_service(name):
     try:
         rosgraph.Master("/demo_session").lookupService("/simulator/" + name)
         return True
-    except rosgraph.MasterException:
+    except (rosgraph.MasterException, OSError):  # the master is gone: wait_for() says so
         return False
 
 

@@ -183,11 +183,21 @@ TISSUE_SIM_HOST_DEVICE inline bool give_way(Faces& s, FaceSpring& c, float limit
   return stretch2(c) <= 1.01f * limit + kNothing * c.stiffness * c.sudden * c.sudden;
 }
 
+/// How far the place held lies below the other face [cells].
+template <class Faces>
+TISSUE_SIM_HOST_DEVICE inline float below(const Faces& s, const FaceSpring& c) {
+  const Facet& facet = s.facet(c.other);
+  float result = 0;
+  for (int a = 0; a < 3; ++a) result -= (c.hold[a] - facet.center[a]) * facet.normal[a];
+  return result;
+}
+
 /// Starts a contact with another facet that goes on from the material place that was held so far,
-/// at `held` in reference space [m], if that is on the new face, too.
+/// at `held` in reference space [m], if that is on the new face, too. It had sunk so far below
+/// where it began [cells]; that it may be deeper below the new face is no reason to lift it.
 template <class Faces>
 TISSUE_SIM_HOST_DEVICE inline void go_on(Faces& s, FaceSpring& c, int other,
-                                         const double (&held)[3], float dt) {
+                                         const double (&held)[3], float sunk, float dt) {
   const float limit = stretch2(c), stiffness = c.stiffness;
   double middle[3];
   s.middle(other, middle);
@@ -199,6 +209,7 @@ TISSUE_SIM_HOST_DEVICE inline void go_on(Faces& s, FaceSpring& c, int other,
   c.stiffness = stiffness;  // the same spring, unless substeps cannot follow
   c.soften(s.held_mobility(), dt);
   c.touching = give_way(s, c, limit) && c.holds();
+  c.begun = fmaxf(c.begun, below(s, c) - sunk);
 }
 
 /// Puts the place held by a contact that does not touch on the other face, below the facet, or,
@@ -221,8 +232,7 @@ TISSUE_SIM_HOST_DEVICE inline bool aim(Faces& s, FaceSpring& c, const Seen& seen
 template <class Faces>
 TISSUE_SIM_HOST_DEVICE inline void settle(Faces& s, FaceSpring& c, float dt, float since) {
   const Facet& facet = s.facet(c.other);
-  float lift = 0;
-  for (int a = 0; a < 3; ++a) lift -= (c.hold[a] - facet.center[a]) * facet.normal[a];
+  float lift = below(s, c);
   if (lift > 0) {
     lift = fmaxf(0.0f, lift - c.begun) * (1 - expf(-since / kSettle));
   } else {
@@ -257,7 +267,7 @@ TISSUE_SIM_HOST_DEVICE inline float look(Faces& s, FaceSpring& c, float dt, floa
     double held[3];
     s.middle(before, held);
     for (int a = 0; a < 3; ++a) held[a] += c.cell_size * c.hold[a];
-    looks::go_on(s, c, other, held, dt);
+    looks::go_on(s, c, other, held, fmaxf(0.0f, looks::below(s, c) - c.begun), dt);
   } else {
     looks::begin(s, c, other, seen.place, dt);
   }
@@ -283,7 +293,7 @@ TISSUE_SIM_HOST_DEVICE inline void take_up(Faces& s, FaceSpring& c, const KeptCo
   c.stiffness = kept.stiffness;
   for (int a = 0; a < 3; ++a) c.apart[a] = kept.apart[a];
   c.begun = kept.begun;
-  looks::go_on(s, c, other, kept.hold, dt);
+  looks::go_on(s, c, other, kept.hold, fmaxf(0.0f, kept.depth - kept.begun), dt);
 }
 
 }  // namespace tissue_sim

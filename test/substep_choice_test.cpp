@@ -10,6 +10,7 @@
 #include "mpm/crumbs.h"
 #include "mpm/lanczos.h"
 #include "mpm/linearised_motion.h"
+#include "reference/mpm_reference.h"
 #include "stability_limit.h"
 #include "test_scenes.h"
 #include "tissue_sim/simulation.h"
@@ -61,6 +62,25 @@ TEST(SubstepChoice, OnlyWhatTakesPartIsStiff) {
     limit[body] = 2 / std::sqrt(largest_eigenvalue(motion, 20));
   }
   EXPECT_NEAR(limit[0] / limit[1], 3, 0.1);
+}
+
+TEST(SubstepChoice, ASliceOnePointThickBearsNearlyWhatWholeTissueDoes) {
+  double limit[2];
+  for (const bool sliced : {false, true}) {
+    MpmTissue tissue(soft_body(0.45, Vec3(8, 8, 8)));
+    const double cell = tissue.state().scene.cell_size;
+    std::vector<BladePath> planes;
+    for (int i = 0; sliced && i < 2; ++i) {
+      planes.push_back(plane_cut((3.0 + i) * cell / 2 * Vec3::UnitX(), Vec3::UnitX()));
+    }
+    tissue.advance(0, 0, {{}, planes});
+    tissue.finish();
+    const std::vector<std::uint8_t> all(tissue.state().blocks.all.size(), 1);
+    LinearisedMotion motion(tissue.state(), all);
+    limit[sliced] = 2 / std::sqrt(largest_eigenvalue(motion, 12));
+    EXPECT_EQ(tissue.fragments().size(), sliced ? 3u : 1u);
+  }
+  EXPECT_GT(limit[1], 0.95 * limit[0]);
 }
 
 /// A body that a probe presses and a blade cuts through, and then the probe again.
@@ -120,13 +140,14 @@ TEST(SubstepChoice, IsCautiousWhereItCannotKnow) {
   EXPECT_EQ(pressed.substep_for({{&fast, 1}, {}}), cautious);
 }
 
-TEST(SubstepChoice, CrumbsAreSoft) {
+TEST(SubstepChoice, CrumbsAndSlicesAreSoft) {
   MpmTissue tissue(soft_body(0.45, Vec3(6, 6, 6)));
   const std::vector<BladePath> planes = random_planes(30, 0.012);
   tissue.advance(0, 0, {{}, planes});
   tissue.finish();
   const MpmState& s = tissue.state();
-  int crumbs = 0, others = 0;
+  const std::vector<double> expected = reference::elastic_volumes(s);
+  int crumbs = 0, slices = 0, others = 0;
   for (const Block* block : s.blocks.all) {
     for (std::size_t lane = 0; lane < block->lane_count(); ++lane) {
       const std::int32_t p = block->point[lane];
@@ -138,11 +159,15 @@ TEST(SubstepChoice, CrumbsAreSoft) {
       ASSERT_NE(piece, nullptr);
       const bool crumb = piece->point_count <= kCrumbPoints;
       const float share = block->volume[lane] / s.points.volume[p];
-      EXPECT_NEAR(share, crumb ? kCrumbStiffness : 1, 1e-6f) << piece->point_count;
-      ++(crumb ? crumbs : others);
+      const bool soft = share < 1;
+      EXPECT_NEAR(share, soft ? kSoftness : 1, 1e-6f) << piece->point_count;
+      EXPECT_TRUE(soft || !crumb) << piece->point_count;
+      EXPECT_NEAR(block->volume[lane], expected[p], 1e-6 * expected[p]) << piece->point_count;
+      ++(crumb ? crumbs : soft ? slices : others);
     }
   }
   EXPECT_GT(crumbs, 100);
+  EXPECT_GT(slices, 100);
   EXPECT_GT(others, 100);
 }
 

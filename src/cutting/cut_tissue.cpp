@@ -30,8 +30,12 @@ void bound_motion(MpmState& state) {
 void take_apart(MpmState& state, const std::vector<std::int32_t>& changed) {
   if (changed.empty()) return;
   list_threads(state, changed);
-  const std::vector<NodeFields::Cell> cells =
+  std::vector<NodeFields::Cell> cells =
       state.fields->update(state.bodies, state.points, changed, state.nodes, *state.cpu);
+  for (const std::int32_t p : soften(state.bodies, changed, state.points)) {  // blocks must know
+    const Points::Site& s = state.points.site[p];
+    cells.push_back({s.body, s.x / 2, s.y / 2, s.z / 2});
+  }
   settle_crumbs(state.bodies, state.points, *state.fields, changed, state.crumbs, state.nodes);
   state.blocks.stale_facets.resize(lattice_node_count(state.bodies), 0);
   mark_stale_facets(state.bodies, state.points, changed, state.blocks.stale_facets);

@@ -24,8 +24,9 @@ struct BlockField {
   float mu, lambda;      ///< [Pa]; not read in a mixed block
   float viscosity;       ///< [Pa s]; the same
   const std::uint8_t*
-      material;        ///< of each point, Points::material; null where none has inclusions
-  int material_count;  ///< of the body
+      material;              ///< of each point, Points::material; null where none has inclusions
+  const std::uint8_t* soft;  ///< of each point, Points::soft; null where none is
+  int material_count;        ///< of the body
 };
 
 /// The same block on a lattice of no size: positions() then gives values.
@@ -49,9 +50,10 @@ struct PointBounds {
 /// State of a block's points, from block_state().
 struct BlockState {
   double elastic_energy = 0;  ///< [J]
-  /// For each of the body's materials the largest squared column of cof F plus |J - 1| ||F||, 1 at
-  /// least: see stable_substep().
+  /// For each of the body's materials the largest squared column of cof F plus |J - 1| ||F||, of
+  /// soft points that times kSoftness, 1 at least: see stable_substep().
   std::vector<float> stiffening;
+  float wildest = 1;  ///< the largest of all points, soft ones not lessened
   bool finite = true;
 };
 

@@ -155,9 +155,11 @@ TISSUE_SIM_INLINE BlockState state(const Block& b, const BlockField& f, BlockScr
         if (!any_negative<W>(bits<W>(least - at_most) & is_point)) continue;
         for (int i = 0; i < W; ++i) {
           if (point[i] < 0) continue;
-          const float stiffening =
+          float stiffening =
               std::max(cx[i], std::max(cy[i], cz[i])) + std::fabs(J[i] - 1) * std::sqrt(f2[i] / 3);
           if (!std::isfinite(stiffening)) result.finite = false;
+          result.wildest = std::max(result.wildest, stiffening);
+          if (f.soft != nullptr && f.soft[point[i]] != 0) stiffening *= kSoftness;
           const int material = f.material == nullptr ? 0 : f.material[point[i]];
           result.stiffening[material] = std::max(result.stiffening[material], stiffening);
         }

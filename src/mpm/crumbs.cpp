@@ -2,6 +2,7 @@
 
 #include <Eigen/Dense>
 #include <algorithm>
+#include <array>
 #include <cstring>
 
 #include "cutting/bonds.h"
@@ -52,13 +53,25 @@ struct Crumb {
   const std::int32_t* end() const { return point + count; }
 };
 
-/// The nodes that a crumb's points see, and their reference places.
-struct CrumbNodes {
+/// Whether cuts took all bonds along an axis from a point that had both.
+bool is_in_slice(const LatticeBody& body, const Points& points, std::int32_t point) {
+  const unsigned bonds = points.bonds[point], whole = whole_bonds(body, points.site[point]);
+  for (int axis = 0; axis < 3; ++axis) {
+    const int k = kForwardBond + axis;
+    const unsigned both = 1u << k | 1u << opposite_bond(k);
+    if ((bonds & both) == 0 && (whole & both) == both) return true;
+  }
+  return false;
+}
+
+/// The nodes that some points see, and their reference places.
+struct NodesOf {
   std::vector<int> node;
   std::vector<Vec3> home;
-  CrumbNodes(const LatticeBody& body, const Points& points, const NodeFields& fields,
-             const Crumb& crumb) {
-    for (const std::int32_t p : crumb) {
+  template <class SomePoints>
+  NodesOf(const LatticeBody& body, const Points& points, const NodeFields& fields,
+          const SomePoints& some) {
+    for (const std::int32_t p : some) {
       const Points::Site& s = points.site[p];
       for (int k = 0; k < 27; ++k) {
         const int i = fields.node(body, s, k);
@@ -79,9 +92,58 @@ Eigen::Matrix3d rotation_of(const Eigen::Matrix3d& x_X) {
   return U * svd.matrixV().transpose();
 }
 
+/// The sum of m (x^2 - x x^T).
+template <class Mass>
+Eigen::Matrix3d inertia_of(const std::vector<Vec3>& x, const Mass& mass) {
+  Eigen::Matrix3d inertia = Eigen::Matrix3d::Zero();
+  for (std::size_t i = 0; i < x.size(); ++i) {
+    inertia +=
+        mass(i) * (x[i].squaredNorm() * Eigen::Matrix3d::Identity() - x[i] * x[i].transpose());
+  }
+  return inertia;
+}
+
+/// The nearest point beside a crumb, along the lattice, that is not soft; -1 if there is none.
+std::int32_t beside(const LatticeBody& body, const Points& points, const Crumb& crumb) {
+  constexpr int kFarthest = 4;
+  for (int steps = 1; steps <= kFarthest; ++steps) {
+    for (const std::int32_t p : crumb) {
+      for (int k = 0; k < kBondCount; ++k) {
+        const std::int32_t other = neighbour(body, points.site[p], k, steps);
+        if (other >= 0 && !points.is_soft(other)) return other;
+      }
+    }
+  }
+  return -1;
+}
+
+/// Sets the nodes of a point turning, so that they have so much more angular momentum.
+void turn(const LatticeBody& body, const Points& points, const NodeFields& fields,
+          std::int32_t point, const Vec3& angular, Nodes& nodes) {
+  const NodesOf around(body, points, fields, std::array<std::int32_t, 1>{point});
+  const auto mass = [&](std::size_t i) -> double { return nodes.mass[around.node[i]]; };
+  std::vector<Vec3> x(around.node.size());
+  double total = 0;
+  Vec3 mean = Vec3::Zero();
+  for (std::size_t i = 0; i < x.size(); ++i) {
+    const int n = around.node[i];
+    x[i] = around.home[i] + Vec3(nodes.u[0][n], nodes.u[1][n], nodes.u[2][n]);
+    total += mass(i);
+    mean += mass(i) * x[i];
+  }
+  for (Vec3& place : x) place -= mean / total;
+  const Vec3 spin = inertia_of(x, mass).ldlt().solve(angular);
+  for (std::size_t i = 0; i < x.size(); ++i) {
+    const int n = around.node[i];
+    if (nodes.inv_mass[n] == 0) continue;  // what holds it takes its share
+    const Vec3 v = spin.cross(x[i]);
+    for (int a = 0; a < 3; ++a) nodes.v[a][n] += static_cast<float>(v[a]);
+  }
+}
+
 void make_rigid(const LatticeBody& body, const Points& points, const NodeFields& fields,
                 const Crumb& of_crumb, Nodes& nodes) {
-  const CrumbNodes crumb(body, points, fields, of_crumb);
+  const NodesOf crumb(body, points, fields, of_crumb);
   const Material& material = body.material_of(points, of_crumb.point[0]);
   const double fastest_spin = kCrumbSpin * wave_speed(material) / body.cell_size;
   const std::size_t count = crumb.node.size();
@@ -101,7 +163,7 @@ void make_rigid(const LatticeBody& body, const Points& points, const NodeFields&
   x_mean /= mass;
   X_mean /= mass;
   v_mean /= mass;
-  Eigen::Matrix3d x_X = Eigen::Matrix3d::Zero(), inertia = x_X;
+  Eigen::Matrix3d x_X = Eigen::Matrix3d::Zero();
   Vec3 angular = Vec3::Zero();
   for (std::size_t i = 0; i < count; ++i) {
     const double m = nodes.mass[crumb.node[i]];
@@ -110,13 +172,15 @@ void make_rigid(const LatticeBody& body, const Points& points, const NodeFields&
   }
   if (!x_X.allFinite() || !angular.allFinite()) return;  // as the end of the frame will say
   const Eigen::Matrix3d R = rotation_of(x_X);
-  for (std::size_t i = 0; i < count; ++i) {
-    x[i] = R * (crumb.home[i] - X_mean);
-    const double m = nodes.mass[crumb.node[i]];
-    inertia += m * (x[i].squaredNorm() * Eigen::Matrix3d::Identity() - x[i] * x[i].transpose());
-  }
+  for (std::size_t i = 0; i < count; ++i) x[i] = R * (crumb.home[i] - X_mean);
+  const Eigen::Matrix3d inertia =
+      inertia_of(x, [&](std::size_t i) -> double { return nodes.mass[crumb.node[i]]; });
   Vec3 spin = inertia.ldlt().solve(angular);
-  spin *= std::min(1.0, fastest_spin / (spin.norm() + 1e-30));
+  if (spin.norm() > fastest_spin) {
+    spin *= fastest_spin / spin.norm();
+    const std::int32_t other = beside(body, points, of_crumb);
+    if (other >= 0) turn(body, points, fields, other, angular - inertia * spin, nodes);
+  }
   for (std::size_t i = 0; i < count; ++i) {
     const Vec3 u = x_mean + x[i] - crumb.home[i], velocity = v_mean + spin.cross(x[i]);
     for (int a = 0; a < 3; ++a) {
@@ -128,9 +192,20 @@ void make_rigid(const LatticeBody& body, const Points& points, const NodeFields&
 
 }  // namespace
 
-float elastic_volume(const LatticeBody& body, const Points& points, std::int32_t point) {
-  const bool is_crumb = Crumb(body, points, point).count > 0;
-  return (is_crumb ? kCrumbStiffness : 1.0f) * points.volume[point];
+std::vector<std::int32_t> soften(const std::vector<LatticeBody>& bodies,
+                                 const std::vector<std::int32_t>& changed, Points& points) {
+  std::vector<std::int32_t> softened;
+  const auto mark = [&](std::int32_t p) {
+    if (points.soft.empty()) points.soft.resize(points.size(), 0);
+    if (points.soft[p] == 0) softened.push_back(p);
+    points.soft[p] = 1;
+  };
+  for (const std::int32_t p : changed) {
+    const LatticeBody& body = bodies[points.site[p].body];
+    if (is_in_slice(body, points, p)) mark(p);
+    for (const std::int32_t of_crumb : Crumb(body, points, p)) mark(of_crumb);
+  }
+  return softened;
 }
 
 void settle_crumbs(const std::vector<LatticeBody>& bodies, const Points& points,

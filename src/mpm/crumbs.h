@@ -9,22 +9,27 @@
 #include "cutting/node_fields.h"
 #include "mpm/lattice_body.h"
 #include "mpm/nodes.h"
+#include "mpm/stabilisation.h"
 
 namespace tissue_sim {
 
-/// A piece that was cut off with at most this many points, a cell's worth, is a crumb ...
+/// A piece that was cut off with at most this many points, a cell's worth, is a crumb.
 inline constexpr int kCrumbPoints = 8;
-/// ... and keeps this share of its stiffness: its substep is then about that of whole tissue.
-inline constexpr float kCrumbStiffness = 1.0f / 3;
+/// Marks what became soft as the points `changed` lost bonds: those of crumbs, and of slices one
+/// point thick, which cuts parted from what there was on both sides of them along an axis of the
+/// lattice. They keep the share kSoftness of their stiffness. Returns them.
+std::vector<std::int32_t> soften(const std::vector<LatticeBody>& bodies,
+                                 const std::vector<std::int32_t>& changed, Points& points);
 
-/// The volume by which a point resists strain [m^3]: its own, or less in a crumb. A point with all
-/// its bonds is never taken for one of a crumb.
-float elastic_volume(const LatticeBody& body, const Points& points, std::int32_t point);
+/// The volume by which a point resists strain [m^3]: its own, or less where it is soft.
+inline float elastic_volume(const Points& points, std::int32_t point) {
+  return (points.is_soft(point) ? kSoftness : 1.0f) * points.volume[point];
+}
 
 /// Lets the crumbs that a cut or tear made of the points `changed` move on as rigid bodies without
 /// strain. Their momentum stays, linear and angular; what else a torn thread left in their nodes, a
 /// swing of many times their size, goes. Adds the lowest point of each to `crumbs`. No crumb turns
-/// faster than kCrumbSpin wave speeds a cell.
+/// faster than kCrumbSpin wave speeds a cell: the rest goes to the tissue beside it.
 void settle_crumbs(const std::vector<LatticeBody>& bodies, const Points& points,
                    const NodeFields& fields, const std::vector<std::int32_t>& changed,
                    std::set<std::int32_t>& crumbs, Nodes& nodes);

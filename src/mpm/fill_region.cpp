@@ -64,7 +64,7 @@ Block make_block(const BlockRegion& r, const LatticeBody& b, const Points& point
     for (int s = 0; s < 8; ++s) {
       if (c.point[s] < 0) continue;
       const std::size_t lane = (static_cast<std::size_t>(z) * 8 + s) * block.stride + column;
-      block.volume[lane] = elastic_volume(b, points, c.point[s]);
+      block.volume[lane] = elastic_volume(points, c.point[s]);
       block.point[lane] = c.point[s];
       if (c.count < kSteadyCount) {
         mu += lame_mu(b.material_of(points, c.point[s])) * block.volume[lane];

@@ -53,10 +53,12 @@ struct Points {
   Array<std::uint8_t> bonds;  ///< bit k: still bound to the neighbour of bond k (cutting/bonds.h)
   Array<std::uint8_t> anchored;  ///< lies in an anchored region
   Array<std::uint8_t> material;  ///< in LatticeBody::materials; empty where no body has inclusions
+  Array<std::uint8_t> soft;      ///< of a crumb or a slice: mpm/crumbs.h; empty before any is
   Crossings crossings;           ///< of the bonds that blades broke; one that tore has none
   int size() const { return static_cast<int>(site.size()); }
   /// Number of a point's material among those of its body.
   int material_of(std::int32_t point) const { return material.empty() ? 0 : material[point]; }
+  bool is_soft(std::int32_t point) const { return !soft.empty() && soft[point] != 0; }
 };
 
 struct LatticeBody {

@@ -41,6 +41,7 @@ BlockField block_field(const MpmState& state, const Block& block) {
   f.lambda = static_cast<float>(lame_lambda(m));
   f.viscosity = static_cast<float>(m.viscosity);
   f.material = state.points.material.empty() ? nullptr : state.points.material.data();
+  f.soft = state.points.soft.empty() ? nullptr : state.points.soft.data();
   f.material_count = static_cast<int>(b.materials.size());
   return f;
 }

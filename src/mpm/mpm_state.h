@@ -69,6 +69,7 @@ struct MpmState {
   Array<float> u_before[3];  ///< displacements when the frame began, where a blade may cut [m]
   Array<float> places[2];    ///< of the points near a sweep, at its begin and end [m]
   std::vector<BlockMotion> motion;    ///< per block; exact as of measure_motion()
+  float wildest = 1;                  ///< BlockState's, of all blocks
   double time = 0;                    ///< since the beginning [s]
   std::vector<double> tore_at;        ///< per body: when a bond last tore [s]; empty while none did
   std::vector<std::int32_t> threads;  ///< points at their ends, by number: cutting/threads.h

@@ -166,10 +166,12 @@ void MpmTissue::measure() {
   });
   stiffening_ = even_stiffening(s, 1);
   std::vector<float> modulus(count, 0.0f);
+  s.wildest = 1;
   result_.elastic_energy = result_.kinetic_energy = result_.max_speed = 0;
   for (int i = 0; i < count; ++i) {
     const BlockState& b = states[i];
     result_.elastic_energy += b.elastic_energy;
+    s.wildest = std::max(s.wildest, b.wildest);
     result_.blew_up = result_.blew_up || !b.finite;
     std::vector<float>& of_body = stiffening_[s.blocks.all[i]->body];
     for (std::size_t m = 0; m < of_body.size(); ++m) {

@@ -71,17 +71,7 @@ float stable_substep(const MpmState& state, const Stiffening& stiffening) {
 }
 
 bool may_be_wild(const MpmState& state) {
-  if (state.threads.empty() && state.crumbs.empty()) return false;
-  std::vector<double> wild;  // modulus, of each body
-  for (const LatticeBody& b : state.bodies) {
-    double least = 1e30;
-    for (const Material& m : b.materials) {
-      least = std::min(least, wave_modulus(m, kWildStiffening));
-    }
-    wild.push_back(least);
-  }
-  return std::any_of(state.blocks.all.begin(), state.blocks.all.end(),
-                     [&](const Block* b) { return b->modulus.last >= wild[b->body]; });
+  return !(state.threads.empty() && state.crumbs.empty()) && state.wildest >= kWildStiffening;
 }
 
 std::uint64_t checksum(const MpmState& state, const Pieces& pieces) {

@@ -26,32 +26,46 @@ inline double spline_slope(double r) {
 }
 
 /// The volume by which each point resists strain: a third of its own in a piece of at most eight
-/// points that was cut off. [m^3]
+/// points that was cut off, and in a slice: where cuts left it no bond along an axis along which
+/// the body went on to both sides. [m^3]
 inline std::vector<double> elastic_volumes(const MpmState& s) {
   const int count = s.points.size();
   std::vector<double> volume(s.points.volume.begin(), s.points.volume.end());
-  std::vector<bool> seen(count, false);
+  std::vector<bool> seen(count, false), soft(count, false);
+  const auto next = [&](int p, int k) {
+    const Points::Site at = s.points.site[p];
+    const int axis = k < 3 ? 2 - k : k - 3, step = k < 3 ? -1 : 1;
+    return s.bodies[at.body].point(at.x + (axis == 0 ? step : 0), at.y + (axis == 1 ? step : 0),
+                                   at.z + (axis == 2 ? step : 0));
+  };
+  const auto bound = [&](int p, int k) { return (s.points.bonds[p] >> k & 1) != 0; };
   for (int first = 0; first < count; ++first) {
-    if (seen[first]) continue;
-    const LatticeBody& b = s.bodies[s.points.site[first].body];
-    std::vector<int> piece = {first};
-    seen[first] = true;
-    for (std::size_t i = 0; i < piece.size(); ++i) {
-      const Points::Site at = s.points.site[piece[i]];
-      const int bonds = s.points.bonds[piece[i]];
-      for (int k = 0; k < 6; ++k) {
-        if ((bonds >> k & 1) == 0) continue;
-        const int axis = k < 3 ? 2 - k : k - 3, step = k < 3 ? -1 : 1;
-        const int next = b.point(at.x + (axis == 0 ? step : 0), at.y + (axis == 1 ? step : 0),
-                                 at.z + (axis == 2 ? step : 0));
-        if (!seen[next]) piece.push_back(next);
-        seen[next] = true;
+    for (int k = 0; k < 3; ++k) {
+      if (!bound(first, k) && !bound(first, 5 - k) && next(first, k) >= 0 &&
+          next(first, 5 - k) >= 0) {
+        soft[first] = true;
       }
     }
-    if (piece.size() > 8 || b.point_count <= 8) continue;
-    for (const int p : piece) {
-      if (s.points.bonds[p] != 0x3f) volume[p] /= 3;
+    if (seen[first]) continue;
+    std::vector<int> piece = {first};
+    seen[first] = true;
+    bool cut_off = false;
+    for (std::size_t i = 0; i < piece.size(); ++i) {
+      for (int k = 0; k < 6; ++k) {
+        const int other = next(piece[i], k);
+        if (!bound(piece[i], k)) {
+          cut_off = cut_off || other >= 0;
+          continue;
+        }
+        if (!seen[other]) piece.push_back(other);
+        seen[other] = true;
+      }
     }
+    if (piece.size() > 8 || !cut_off) continue;
+    for (const int p : piece) soft[p] = true;
+  }
+  for (int p = 0; p < count; ++p) {
+    if (soft[p]) volume[p] /= 3;
   }
   return volume;
 }

@@ -57,12 +57,14 @@ void CudaMpmTissue::finish_measure() {
   check_cuda(cudaStreamSynchronize(d.stream), "finish a frame");
   result_.elastic_energy = result_.kinetic_energy = result_.max_speed = 0;
   stiffening_ = even_stiffening(*state_, 1);
+  state_->wildest = 1;
   state_->motion.resize(d.blocks.size());
   modulus_.resize(d.blocks.size());
   for (std::size_t i = 0; i < d.blocks.size(); ++i) {
     const CudaMeasure& m = d.host_measures[i];
     result_.elastic_energy += m.elastic_energy;
     result_.kinetic_energy += m.kinetic_energy;
+    state_->wildest = std::max(state_->wildest, m.wildest);
     if (!(m.speed <= result_.max_speed)) result_.max_speed = m.speed;
     const Block& block = *state_->blocks.all[d.host_tables.of_host[i]];
     float& stiffening = stiffening_[block.body][block.material];

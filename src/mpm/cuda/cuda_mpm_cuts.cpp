@@ -34,14 +34,14 @@ void check_memory(std::size_t wanted, std::size_t held) {
 
 std::size_t CudaMpmTissue::device_bytes() const {
   const OnDevice& d = *device_;
-  std::size_t sum = d.blocks.bytes() + d.bundles.bytes() + d.columns.bytes() +
-                    d.near_cells.bytes() + d.bodies.bytes() + d.slot_node.bytes() +
-                    d.point.bytes() + d.piece.bytes() + d.place.bytes() + d.slot_parts.bytes() +
-                    d.first_parts.bytes() + d.parts.bytes() + d.pushed_parts.bytes() +
-                    d.marks.bytes() + d.pushed.bytes() + d.colour.bytes() + d.volume.bytes() +
-                    d.partial.bytes() + d.hold.bytes() + d.bonds.bytes() + d.with.bytes() +
-                    d.whole.bytes() + d.u_before.bytes() + d.colliders.bytes() + d.loads.bytes() +
-                    d.measures.bytes() + d.cloud.bytes() + d.stretched.bytes() + d.faces.bytes();
+  std::size_t sum =
+      d.blocks.bytes() + d.bundles.bytes() + d.columns.bytes() + d.near_cells.bytes() +
+      d.bodies.bytes() + d.slot_node.bytes() + d.point.bytes() + d.piece.bytes() + d.place.bytes() +
+      d.slot_parts.bytes() + d.first_parts.bytes() + d.parts.bytes() + d.pushed_parts.bytes() +
+      d.marks.bytes() + d.pushed.bytes() + d.colour.bytes() + d.volume.bytes() + d.partial.bytes() +
+      d.hold.bytes() + d.bonds.bytes() + d.soft.bytes() + d.with.bytes() + d.whole.bytes() +
+      d.u_before.bytes() + d.colliders.bytes() + d.loads.bytes() + d.measures.bytes() +
+      d.cloud.bytes() + d.stretched.bytes() + d.faces.bytes();
   for (int i = 0; i < 2; ++i) sum += d.u[i].bytes() + d.v[i].bytes() + d.force[i].bytes();
   return sum;
 }
@@ -162,6 +162,7 @@ void CudaMpmTissue::push() {
     d.hold.clear(d.stream);
   }
   d.bonds.upload(state_->points.bonds, d.stream);
+  if (!state_->points.soft.empty()) d.soft.upload(state_->points.soft, d.stream);
   d.arrived.resize(2);
   push_nodes();
   d.points_changed = true;

@@ -69,6 +69,7 @@ __device__ void reduce(CudaMeasure& m) {
     }
     if (!(b.speed <= a.speed)) a.speed = b.speed;  // NaN stays
     a.stiffening = fmaxf(a.stiffening, b.stiffening);
+    a.wildest = fmaxf(a.wildest, b.wildest);
     a.finite = a.finite & b.finite;
   }
   if (threadIdx.x == 0) m = all[0];
@@ -82,7 +83,7 @@ __global__ void __launch_bounds__(kThreads)
   float4 *u = shared, *v = shared + max_slots;
   bring_nodes<false, false, 4>(t, b.first_slot, b.slots(), {}, state, state, nullptr, {},
                                body.inv_cell_size, u, v);
-  CudaMeasure m = {0, 0, {1e30f, 1e30f, 1e30f}, {-1e30f, -1e30f, -1e30f}, 0, 1, 1, 0};
+  CudaMeasure m = {0, 0, {1e30f, 1e30f, 1e30f}, {-1e30f, -1e30f, -1e30f}, 0, 1, 1, 1};
   for (int i = threadIdx.x; i < b.slots(); i += blockDim.x) {
     const int node = t.slot_node[b.first_slot + i];
     if (node < 0) continue;
@@ -111,7 +112,9 @@ __global__ void __launch_bounds__(kThreads)
         if (!isfinite(energy + stiffening)) m.finite = 0;
         const float volume = b.whole != 0 ? body.point_volume : t.volume[lane];
         m.elastic_energy += static_cast<double>(energy) * volume;
-        m.stiffening = fmaxf(m.stiffening, stiffening);
+        m.wildest = fmaxf(m.wildest, stiffening);
+        const bool is_soft = t.soft != nullptr && t.soft[t.point[lane]] != 0;
+        m.stiffening = fmaxf(m.stiffening, is_soft ? kSoftness * stiffening : stiffening);
         // The velocity of a point is the value of the nodes' velocities there.
         float v2 = 0;
         for (int c = 0; c < 3; ++c) velocity[c] = 0;

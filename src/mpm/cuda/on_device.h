@@ -37,7 +37,7 @@ struct CudaMpmTissue::OnDevice {
   DeviceArray<std::uint32_t> slot_parts, parts, colour;
   DeviceArray<uint4> first_parts;
   DeviceArray<float> volume, partial, hold;
-  DeviceArray<std::uint8_t> bonds, with, whole;
+  DeviceArray<std::uint8_t> bonds, soft, with, whole;
   int held_by = 0;  ///< CudaTables::held_by
   DeviceArray<float4> u[2], v[2], force[2], u_before;
   DeviceArray<Collider> colliders;
@@ -77,6 +77,7 @@ struct CudaMpmTissue::OnDevice {
     t.point = point.data();
     t.partial = partial.data();
     t.bonds = bonds.data();
+    t.soft = soft.size() > 0 ? soft.data() : nullptr;
     t.held_by = held_by;
     t.with = with.data();
     t.hold = hold.data();

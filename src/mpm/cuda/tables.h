@@ -93,9 +93,8 @@ struct CudaMeasure {
   double elastic_energy, kinetic_energy;  ///< [J]
   float min[3], max[3];                   ///< of the points [m]
   float speed;                            ///< of the fastest point [m/s]
-  float stiffening;                       ///< see BlockState
+  float stiffening, wildest;              ///< see BlockState
   int finite;
-  int unused;
 };
 
 /// Displacement and mass, velocity and inverse mass of the nodes (nodes.h).
@@ -121,6 +120,7 @@ struct CudaTables {
   const float* partial;       ///< per cell (lane / 8): mu times volume of its points where they are
                               ///< fewer than seven, else 0; see mpm/stabilisation.h [J]
   const std::uint8_t* bonds;  ///< per point
+  const std::uint8_t* soft;   ///< per point, as Points::soft; null where none is
   int held_by;                ///< colliders that a point may hold on to at a time: 0 to 2
   std::uint8_t* with;         ///< [point][held_by]: 0, or 1 + index of a collider it touches
   float* hold;                ///< [point][held_by][3]: the place that friction holds on to

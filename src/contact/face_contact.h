@@ -45,7 +45,6 @@ struct FaceContacts {
   std::vector<KeptContact> kept;            ///< sorted by point and direction
   double until_search = 0, until_look = 0;  ///< at any contact [s]
   double look_at = 0;                       ///< at all of them, on the CPU [s]
-  double since_look = 0;                    ///< on a GPU, which looks at all together [s]
 };
 
 /// Before a substep of `dt` seconds: searches pairs, and looks at them, when it is time to.

@@ -240,13 +240,13 @@ void CudaMpmTissue::pull_contacts() {
     c.weights = AxisWeights(own.center);
     c.other_nodes = CellNodes(block_of(*state_, c.other), other.cell);
     c.other_weights = AxisWeights(c.hold);
+    c.looked_at = state_->time - f.host_figures[0].since_look;
     if (std::binary_search(active.begin(), active.end(), c.facet)) {
       faces.active.push_back(static_cast<std::int32_t>(faces.all.size()));
     }
     faces.all.push_back(c);
   }
   faces.until_look = f.host_figures[0].until_look;
-  faces.since_look = f.host_figures[0].since_look;
 }
 
 void CudaMpmTissue::search_anew() {

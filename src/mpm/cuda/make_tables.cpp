@@ -39,16 +39,17 @@ void fill_points(const Block& from, float whole_volume, CudaBlock& block, HostTa
   std::fill_n(point, 8 * cells, -1);
   std::fill_n(volume, 8 * cells, 0.0f);
   std::fill_n(partial, cells, 0.0f);
-  const auto column_of = [&](int lane) {
-    return from.cell[lane] / from.pitch * block.nx + from.cell[lane] % from.pitch;
-  };
+  std::vector<int> column_of(from.stride);
+  for (int lane = 0; lane < from.stride; ++lane) {
+    column_of[lane] = from.cell[lane] / from.pitch * block.nx + from.cell[lane] % from.pitch;
+  }
   for (int layer = 0; layer < 8 * block.nz; ++layer) {
     const std::size_t first = static_cast<std::size_t>(layer) * from.stride,
                       to = static_cast<std::size_t>(layer) * columns;
     for (int lane = 0; lane < from.stride; ++lane) {
       if (from.point[first + lane] < 0) continue;
-      point[to + column_of(lane)] = from.point[first + lane];
-      volume[to + column_of(lane)] = from.volume[first + lane];
+      point[to + column_of[lane]] = from.point[first + lane];
+      volume[to + column_of[lane]] = from.volume[first + lane];
     }
   }
   bool whole = true;
@@ -58,7 +59,7 @@ void fill_points(const Block& from, float whole_volume, CudaBlock& block, HostTa
   block.whole = whole ? 1 : 0;
   block.partial = from.partial.empty() ? 0 : 1;
   for (const Block::PartialCell& cell : from.partial) {
-    partial[cell.lane / from.stride * columns + column_of(cell.lane % from.stride)] = cell.mu;
+    partial[cell.lane / from.stride * columns + column_of[cell.lane % from.stride]] = cell.mu;
   }
 }
 

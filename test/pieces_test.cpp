@@ -141,5 +141,35 @@ TEST(Pieces, AreWhatAWalkOverTheBondsFinds) {
   }
 }
 
+/// Single bonds break at random until all has come to bits.
+TEST(Pieces, ComeApartOnlyWhereTheyMay) {
+  Points points;
+  const std::vector<LatticeBody> bodies =
+      make_lattice_bodies(free_box(Vec3(0.02, 0.016, 0.012), 0.002), points, nullptr);
+  Pieces pieces = whole_pieces(bodies, points);
+  std::mt19937 random(5);
+  int may = 0, parted = 0, rounds = 0;
+  for (; pieces.all.size() < 500; ++rounds) {
+    std::vector<std::int32_t> changed;
+    for (int i = 0; i < 12; ++i) {
+      const auto p = static_cast<std::int32_t>(random() % points.size());
+      const int k = kForwardBond + static_cast<int>(random() % 3);
+      if ((points.bonds[p] >> k & 1) == 0) continue;
+      const std::int32_t q = bodies[0].next_point(points.site[p], k - kForwardBond);
+      break_bond(k, points.bonds[p], points.bonds[q]);
+      changed.push_back(p);
+      changed.push_back(q);
+    }
+    const bool may_have = may_have_parted(bodies, points, changed);
+    const bool have = !update_pieces(bodies, points, pieces).empty();
+    EXPECT_TRUE(may_have || !have) << "round " << rounds;
+    may += may_have;
+    parted += have;
+  }
+  EXPECT_GT(parted, 50);
+  EXPECT_GE(may, parted);
+  EXPECT_GT(rounds, 2 * may) << "it is to spare work";
+}
+
 }  // namespace
 }  // namespace tissue_sim

@@ -6,6 +6,7 @@
 #include <numeric>
 
 #include "cutting/bonds.h"
+#include "cutting/node_box.h"
 
 namespace tissue_sim {
 namespace {
@@ -110,6 +111,36 @@ Pieces whole_pieces(const std::vector<LatticeBody>& bodies, const Points& points
   tell_loose(points, runs_of(points), pieces);
   update_pieces(bodies, points, pieces);  // a mesh may have parts that do not touch
   return pieces;
+}
+
+bool may_have_parted(const std::vector<LatticeBody>& bodies, const Points& points,
+                     const std::vector<std::int32_t>& changed) {
+  Planes components[216];
+  int count = 0;
+  Points::Site of{-1, -1, -1, -1};  // the cell that they are around
+  for (const std::int32_t p : changed) {
+    const Points::Site& s = points.site[p];
+    const LatticeBody& body = bodies[s.body];
+    if (s.x / 2 != of.x || s.y / 2 != of.y || s.z / 2 != of.z || s.body != of.body) {
+      of = {static_cast<std::int16_t>(s.x / 2), static_cast<std::int16_t>(s.y / 2),
+            static_cast<std::int16_t>(s.z / 2), s.body};
+      count = find_components(NodeBox(body, of.x, of.y, of.z), points, components);
+    }
+    const auto component_of = [&](int x, int y, int z) {
+      const int plane = z - 2 * of.z + 2, bit = 6 * (y - 2 * of.y + 2) + x - 2 * of.x + 2;
+      int i = 0;
+      while (i < count && (components[i][plane] >> bit & 1) == 0) ++i;
+      return i;
+    };
+    const int own = component_of(s.x, s.y, s.z);
+    for (int k = 0; k < kBondCount; ++k) {
+      if ((points.bonds[p] >> k & 1) != 0) continue;
+      const BondOffset o = bond_offset(k);
+      const int x = s.x + o.x, y = s.y + o.y, z = s.z + o.z;
+      if (body.point(x, y, z) >= 0 && component_of(x, y, z) != own) return true;
+    }
+  }
+  return false;
 }
 
 std::vector<int> update_pieces(const std::vector<LatticeBody>& bodies, const Points& points,

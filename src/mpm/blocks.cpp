@@ -46,12 +46,13 @@ void connect_forces(Blocks& blocks, const std::vector<LatticeBody>& bodies, int 
       blocks.all.push_back(&b);
     }
   }
+  blocks.first_split_node = lattice_node_count(bodies);
+  if (blocks.for_gpu) return;
   struct Entry {
     int row_node;  // first node of the lattice row
     RowPart part;
   };
   std::vector<Entry> entries;
-  blocks.first_split_node = lattice_node_count(bodies);
   std::vector<std::pair<int, SplitNodePart>> split;
   for (const Block* block : blocks.all) {
     const LatticeBody& b = bodies[block->body];
@@ -120,7 +121,7 @@ void connect_forces(Blocks& blocks, const std::vector<LatticeBody>& bodies, int 
 Blocks make_blocks(const std::vector<LatticeBody>& bodies, const Points& points,
                    const NodeFields& fields, const BlockShape& shape, Cpu& cpu) {
   Blocks blocks;
-  blocks.one_material = shape.one_material;
+  blocks.for_gpu = shape.for_gpu;
   for (std::size_t i = 0; i < bodies.size(); ++i) {
     const LatticeBody& b = bodies[i];
     for (int z = 0; z < b.nz; z += shape.z) {
@@ -133,7 +134,7 @@ Blocks make_blocks(const std::vector<LatticeBody>& bodies, const Points& points,
     }
   }
   cpu.for_each(static_cast<int>(blocks.regions.size()), [&](int i) {
-    fill_region(blocks.regions[i], bodies, points, fields, shape.one_material, {});
+    fill_region(blocks.regions[i], bodies, points, fields, shape.for_gpu, {});
   });
   connect_forces(blocks, bodies, lattice_node_count(bodies));
   return blocks;
@@ -142,18 +143,11 @@ Blocks make_blocks(const std::vector<LatticeBody>& bodies, const Points& points,
 void update_blocks(Blocks& blocks, const std::vector<LatticeBody>& bodies, const Points& points,
                    const NodeFields& fields, const std::vector<NodeFields::Cell>& cells,
                    int node_count, Cpu& cpu) {
-  std::vector<bool> split(lattice_node_count(bodies), false);
-  for (const NodeFields::Cell& c : cells) split[bodies[c.body].node(c.x, c.y, c.z)] = true;
-  const auto touched = [&](const BlockRegion& r) {
-    for (int z = r.z - 1; z <= r.z + r.nz; ++z) {
-      for (int y = r.y - 1; y <= r.y + r.ny; ++y) {
-        const int row = bodies[r.body].node(0, y, z);
-        for (int x = r.x - 1; x <= r.x + r.nx; ++x) {
-          if (split[row + x]) return true;
-        }
-      }
-    }
-    return false;
+  const auto touched = [&cells](const BlockRegion& r) {
+    return std::any_of(cells.begin(), cells.end(), [&r](const NodeFields::Cell& c) {
+      return c.body == r.body && c.x >= r.x - 1 && c.x <= r.x + r.nx && c.y >= r.y - 1 &&
+             c.y <= r.y + r.ny && c.z >= r.z - 1 && c.z <= r.z + r.nz;
+    });
   };
   std::vector<Blocks::Origin> before;  // blocks of each region
   for (const BlockRegion& r : blocks.regions) {
@@ -166,7 +160,7 @@ void update_blocks(Blocks& blocks, const std::vector<LatticeBody>& bodies, const
     if (!touched(r)) return;
     is_new[i] = 1;
     const LatticeBody& b = bodies[r.body];
-    fill_region(r, bodies, points, fields, blocks.one_material, {b, r, blocks.stale_facets});
+    fill_region(r, bodies, points, fields, blocks.for_gpu, {b, r, blocks.stale_facets});
     for (int z = r.z; z < r.z + r.nz; ++z) {
       for (int y = r.y; y < r.y + r.ny; ++y) {
         std::fill_n(blocks.stale_facets.begin() + b.node(r.x, y, z), r.nx, std::uint8_t{0});

@@ -44,6 +44,7 @@ void MpmTissue::cut(const std::vector<BladePath>& paths, const Array<float>* u_b
   }
   if (changed.empty()) return;
   take_apart(*state_, changed);
+  if (!may_have_parted(state_->bodies, state_->points, changed)) return;
   for (const int id : update_pieces(state_->bodies, state_->points, pieces_)) {
     report.new_fragments.push_back(id);
   }

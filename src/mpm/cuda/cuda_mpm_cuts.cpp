@@ -184,7 +184,7 @@ void CudaMpmTissue::push_nodes() {
 void CudaMpmTissue::make_blocks(bool may_march) {
   OnDevice& d = *device_;
   d.shape = choose_shape(state_->bodies, d.limits, may_march);
-  d.shape.blocks.one_material = true;
+  d.shape.blocks.for_gpu = true;
   state_->blocks = tissue_sim::make_blocks(state_->bodies, state_->points, *state_->fields,
                                            d.shape.blocks, *state_->cpu);
   list_facets(*state_);
@@ -214,7 +214,9 @@ void CudaMpmTissue::cut(const std::vector<BladePath>& paths, const Array<float>*
   }
   if (changed.empty() && !marched) return;
   take_apart(*state_, changed);
-  report.new_fragments = update_pieces(state_->bodies, state_->points, pieces_);
+  if (may_have_parted(state_->bodies, state_->points, changed)) {
+    report.new_fragments = update_pieces(state_->bodies, state_->points, pieces_);
+  }
   if (!report.new_fragments.empty()) device_->faces.pieces_changed = true;
   push();
   launch_measure();

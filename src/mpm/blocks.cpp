@@ -47,7 +47,7 @@ void connect_forces(Blocks& blocks, const std::vector<LatticeBody>& bodies, int 
     }
   }
   blocks.first_split_node = lattice_node_count(bodies);
-  if (blocks.for_gpu) return;
+  if (!blocks.has_rows) return;
   struct Entry {
     int row_node;  // first node of the lattice row
     RowPart part;
@@ -121,7 +121,8 @@ void connect_forces(Blocks& blocks, const std::vector<LatticeBody>& bodies, int 
 Blocks make_blocks(const std::vector<LatticeBody>& bodies, const Points& points,
                    const NodeFields& fields, const BlockShape& shape, Cpu& cpu) {
   Blocks blocks;
-  blocks.for_gpu = shape.for_gpu;
+  blocks.one_material = shape.one_material;
+  blocks.has_rows = shape.has_rows;
   for (std::size_t i = 0; i < bodies.size(); ++i) {
     const LatticeBody& b = bodies[i];
     for (int z = 0; z < b.nz; z += shape.z) {
@@ -134,7 +135,7 @@ Blocks make_blocks(const std::vector<LatticeBody>& bodies, const Points& points,
     }
   }
   cpu.for_each(static_cast<int>(blocks.regions.size()), [&](int i) {
-    fill_region(blocks.regions[i], bodies, points, fields, shape.for_gpu, {});
+    fill_region(blocks.regions[i], bodies, points, fields, shape.one_material, {});
   });
   connect_forces(blocks, bodies, lattice_node_count(bodies));
   return blocks;
@@ -160,7 +161,7 @@ void update_blocks(Blocks& blocks, const std::vector<LatticeBody>& bodies, const
     if (!touched(r)) return;
     is_new[i] = 1;
     const LatticeBody& b = bodies[r.body];
-    fill_region(r, bodies, points, fields, blocks.for_gpu, {b, r, blocks.stale_facets});
+    fill_region(r, bodies, points, fields, blocks.one_material, {b, r, blocks.stale_facets});
     for (int z = r.z; z < r.z + r.nz; ++z) {
       for (int y = r.y; y < r.y + r.ny; ++y) {
         std::fill_n(blocks.stale_facets.begin() + b.node(r.x, y, z), r.nx, std::uint8_t{0});

@@ -36,8 +36,8 @@ struct SplitNodePart {
 
 struct Blocks {
   std::vector<BlockRegion> regions;
-  std::vector<Block*> all;    ///< in a fixed order
-  bool for_gpu = false;       ///< see BlockShape
+  std::vector<Block*> all;                     ///< in a fixed order
+  bool one_material = false, has_rows = true;  ///< see BlockShape
   /// Of each, the blocks before the last update_blocks() that had its points.
   struct Origin {
     int begin, end;
@@ -59,9 +59,8 @@ struct Blocks {
 struct BlockShape {
   int x = 48;  ///< at most
   int y = 8, z = 4;
-  /// A block for each of the materials, for the GPU's kernels know one, and no rows or parts: it has
-  /// tables of its own for how forces come together.
-  bool for_gpu = false;
+  bool one_material = false;  ///< a block for each of the materials: the GPU's kernels know one
+  bool has_rows = true;       ///< and parts: the GPU has its own tables of how forces come together
 };
 
 /// Cuts the bodies' lattices into regions and makes their blocks.

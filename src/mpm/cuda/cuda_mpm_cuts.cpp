@@ -184,7 +184,8 @@ void CudaMpmTissue::push_nodes() {
 void CudaMpmTissue::make_blocks(bool may_march) {
   OnDevice& d = *device_;
   d.shape = choose_shape(state_->bodies, d.limits, may_march);
-  d.shape.blocks.for_gpu = true;
+  d.shape.blocks.one_material = true;
+  d.shape.blocks.has_rows = false;
   state_->blocks = tissue_sim::make_blocks(state_->bodies, state_->points, *state_->fields,
                                            d.shape.blocks, *state_->cpu);
   list_facets(*state_);

@@ -9,7 +9,9 @@ namespace tissue_sim {
 namespace {
 
 constexpr int kSteps = 12, kStepsAtCut = 4;
-constexpr double kLongestAge = 0.5;   // of the measured limit [s]
+constexpr double kLongestAge = 0.5;   // of the measured limit [s] ...
+constexpr double kFallenAge = 0.1;    // ... where it fell to less than this share: what made it
+constexpr double kFall = 0.9;         // fall may have passed, or be gone with the cut
 constexpr double kMostGrowth = 1.3;   // of the stiffness, until it is measured again ...
 constexpr double kYoungest = 0.015;   // ... unless that is not long ago [s]
 constexpr double kMargin = 0.72;      // for what stiffens within the part, and contact of faces
@@ -88,8 +90,10 @@ void SubstepChoice::measure_if_due(MpmState& state, const MeasureLimit& measure)
   std::vector<std::uint8_t> to_measure(blocks.size(), 1);
   const double age = state.time - measured_at_;
   const bool just_measured = age > 0 && age < kYoungest;
-  if (limit_ == 0 || age > kLongestAge || (growth_ > kMostGrowth && !just_measured)) {
+  const double before = limit_;
+  if (limit_ == 0 || age > longest_age_ || (growth_ > kMostGrowth && !just_measured)) {
     limit_ = measure(to_measure, kSteps);
+    longest_age_ = kLongestAge;
     growth_ = 1;
     measured_at_ = state.time;
   } else {
@@ -101,6 +105,7 @@ void SubstepChoice::measure_if_due(MpmState& state, const MeasureLimit& measure)
     if (!any) return;
     limit_ = std::min(limit_, measure(to_measure, kStepsAtCut));
   }
+  if (limit_ < kFall * before) longest_age_ = kFallenAge;
   if (!std::isfinite(limit_)) limit_ = 0;  // all is anchored
   for (std::size_t i = 0; i < blocks.size(); ++i) {
     if (to_measure[i] != 0) blocks[i]->modulus.measured = blocks[i]->modulus.last;

@@ -39,6 +39,7 @@ class SubstepChoice {
 
   double limit_ = 0;        ///< when it was measured last [s]; 0 where it is not known
   double measured_at_ = 0;  ///< when that was of all blocks [s]
+  double longest_age_ = 0;  ///< of limit_ [s]
   double growth_ = 1;       ///< of the stiffness since, at most
   double trend_ = 1;        ///< of the stiffness in the last part, at most
   double part_ = 0;         ///< how long the next part may be [s]

@@ -52,14 +52,23 @@ void CudaMpmTissue::pull() {
 }
 
 void CudaMpmTissue::pull_nodes() {
+  pull_displacements();
+  pull_velocities();
+}
+
+void CudaMpmTissue::pull_field(const float4* from, Array<float>* to) {
   OnDevice& d = *device_;
   const std::size_t n = d.u[0].size();
   d.host_nodes.resize(2 * n);
-  d.u[d.current].download(d.host_nodes.data(), n, d.stream);
-  d.v[d.current].download(d.host_nodes.data() + n, n, d.stream);
+  check_cuda(cudaMemcpyAsync(d.host_nodes.data(), from, n * sizeof(float4), cudaMemcpyDeviceToHost,
+                             d.stream),
+             "send data");
   check_cuda(cudaStreamSynchronize(d.stream), "finish a frame");
-  unpack_nodes(d.host_nodes.data(), d.host_nodes.data() + n, *state_->cpu, state_->nodes);
+  unpack_field(d.host_nodes.data(), n, *state_->cpu, to);
 }
+
+void CudaMpmTissue::pull_displacements() { pull_field(device_->present().u, state_->nodes.u); }
+void CudaMpmTissue::pull_velocities() { pull_field(device_->present().v, state_->nodes.v); }
 
 void CudaMpmTissue::plan_tables() {
   OnDevice& d = *device_;
@@ -214,6 +223,8 @@ void CudaMpmTissue::cut(const std::vector<BladePath>& paths, const Array<float>*
     sweep_bonds(*state_, path, u_before, state_->nodes.u, before, changed, report);
   }
   if (changed.empty() && !marched) return;
+  pull_velocities();
+  pull_contacts();
   take_apart(*state_, changed);
   if (may_have_parted(state_->bodies, state_->points, changed)) {
     report.new_fragments = update_pieces(state_->bodies, state_->points, pieces_);
@@ -238,12 +249,9 @@ void CudaMpmTissue::cut_by_blades() {
   }
   if (!meets) return;
   OnDevice& d = *device_;
-  pull();
-  const std::size_t n = d.u[0].size();
-  d.u_before.download(d.host_nodes.data(), n, d.stream);
-  check_cuda(cudaStreamSynchronize(d.stream), "send data");
-  for (int a = 0; a < 3; ++a) state_->u_before[a].resize(n);
-  unpack_field(d.host_nodes.data(), n, *state_->cpu, state_->u_before);
+  pull_displacements();
+  for (auto& component : state_->u_before) component.resize(d.u[0].size());
+  pull_field(d.u_before.data(), state_->u_before);
   cut(blades_, state_->u_before, motion_before_, result_.blade_report);
 }
 

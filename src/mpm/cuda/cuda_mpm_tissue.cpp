@@ -92,7 +92,7 @@ void CudaMpmTissue::upload_colliders(int substeps, const FrameInput& input, doub
 void CudaMpmTissue::begin(double duration, const FrameInput& input) {
   result_ = {};
   result_.loads.resize(state_->scene.tools.size());
-  if (!input.cuts.empty()) pull();
+  if (!input.cuts.empty()) pull_displacements();
   for (const BladePath& path : input.cuts) {
     result_.cut_reports.emplace_back();
     cut({path}, state_->nodes.u, state_->motion, result_.cut_reports.back());

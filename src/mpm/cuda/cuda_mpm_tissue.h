@@ -10,6 +10,8 @@
 #include "mpm/substep_choice.h"
 #include "tissue_sim/tissue.h"
 
+struct float4;  // CUDA's
+
 namespace tissue_sim {
 
 struct CudaFaces;
@@ -59,6 +61,7 @@ class CudaMpmTissue final : public Tissue {
   void make_blocks(bool may_march);
   void stop_marching();  ///< blocks that march are too tall to be cut well
   void plan_tables();    ///< how the blocks are worked on, and the tables for it
+  /// From displacements that are on the host; brings the rest where there is something to cut.
   void cut(const std::vector<BladePath>& paths, const Array<float>* u_before,
            const std::vector<BlockMotion>& before, CutReport& report);
   void cut_by_blades();
@@ -80,6 +83,9 @@ class CudaMpmTissue final : public Tissue {
   CudaLooks looks() const;
   CudaFaces faces_of_launch();
   void pull_nodes();
+  void pull_field(const float4* from, Array<float>* to);  ///< of the nodes
+  void pull_displacements();
+  void pull_velocities();
   void push_nodes();
   void pull_contacts();
   void launch_measure();

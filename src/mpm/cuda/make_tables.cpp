@@ -268,9 +268,4 @@ void unpack_field(const float4* from, std::size_t count, Cpu& cpu, Array<float>*
       [&](int i) { to[0][i] = from[i].x, to[1][i] = from[i].y, to[2][i] = from[i].z; }, 4096);
 }
 
-void unpack_nodes(const float4* u, const float4* v, Cpu& cpu, Nodes& n) {
-  unpack_field(u, n.size(), cpu, n.u);
-  unpack_field(v, n.size(), cpu, n.v);
-}
-
 }  // namespace tissue_sim

@@ -33,7 +33,6 @@ void make_tables(const MpmState& state, const std::vector<std::vector<int>>& bun
 
 /// The nodes as the GPU has them: u and mass, v and inverse mass.
 void pack_nodes(const Nodes& nodes, Cpu& cpu, float4* u, float4* v);
-void unpack_nodes(const float4* u, const float4* v, Cpu& cpu, Nodes& nodes);
 /// The components of `count` vectors.
 void unpack_field(const float4* from, std::size_t count, Cpu& cpu, Array<float>* to);
 

@@ -174,7 +174,6 @@ void CudaMpmTissue::push() {
   if (!state_->points.soft.empty()) d.soft.upload(state_->points.soft, d.stream);
   d.arrived.resize(2);
   push_nodes();
-  d.points_changed = true;
 }
 
 void CudaMpmTissue::push_nodes() {
@@ -228,6 +227,7 @@ void CudaMpmTissue::cut(const std::vector<BladePath>& paths, const Array<float>*
   take_apart(*state_, changed);
   if (may_have_parted(state_->bodies, state_->points, changed)) {
     report.new_fragments = update_pieces(state_->bodies, state_->points, pieces_);
+    device_->points_changed = true;
   }
   if (!report.new_fragments.empty()) device_->faces.pieces_changed = true;
   push();

@@ -80,7 +80,7 @@ void CudaMpmTissue::tame() {
     for (const int id : update_pieces(s.bodies, s.points, pieces_)) {
       result_.tear_report.new_fragments.push_back(id);
     }
-    device_->faces.pieces_changed = true;
+    device_->points_changed = device_->faces.pieces_changed = true;
     push();
   }
   launch_measure();

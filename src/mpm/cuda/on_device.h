@@ -56,7 +56,7 @@ struct CudaMpmTissue::OnDevice {
   PinnedArray<CudaMeasure> host_measures;
   PinnedArray<Point> host_cloud;
   PinnedArray<float4> host_nodes;  ///< u, then v
-  bool points_changed = true;      ///< bonds and pieces must be uploaded
+  bool points_changed = true;      ///< pieces must be uploaded
 
   ~OnDevice() {
     if (stream != nullptr) cudaStreamDestroy(stream);

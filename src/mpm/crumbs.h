@@ -15,6 +15,7 @@ namespace tissue_sim {
 
 /// A piece that was cut off with at most this many points, a cell's worth, is a crumb.
 inline constexpr int kCrumbPoints = 8;
+
 /// Marks what became soft as the points `changed` lost bonds: those of crumbs, and of slices one
 /// point thick, which cuts parted from what there was on both sides of them along an axis of the
 /// lattice. They keep the share kSoftness of their stiffness. Returns them.

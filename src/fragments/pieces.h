@@ -19,8 +19,8 @@ struct Pieces {
 /// One piece for each body.
 Pieces whole_pieces(const std::vector<LatticeBody>& bodies, const Points& points);
 
-/// Whether pieces may have come apart as the points `changed` lost bonds: false if near each of them
-/// other bonds still hold it together with the neighbours that it lost.
+/// Whether pieces may have come apart as the points `changed` lost bonds: false if near each of
+/// them other bonds still hold it together with the neighbours that it lost.
 bool may_have_parted(const std::vector<LatticeBody>& bodies, const Points& points,
                      const std::vector<std::int32_t>& changed);
 

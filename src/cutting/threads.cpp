@@ -58,7 +58,7 @@ void tear_threads(MpmState& state, std::vector<std::int32_t>& changed, CutReport
     const LatticeBody& body = state.bodies[points.site[p].body];
     if (!ends_thread(body, points, p)) continue;
     const Deformation d(body, points.site[p], *state.fields, state.nodes);
-    if (d.stretch < kThreadStretch || d.stiffening < kWildStiffening) {
+    if (d.stretch < kThreadStretch || d.stiffening < kThreadStiffening) {
       left.push_back(p);
       continue;
     }

@@ -10,9 +10,10 @@
 namespace tissue_sim {
 
 /// A thread is a bond that is in no square of four bonds. It tears where it is stretched so far,
-/// and is so wild (mpm/deformation.h), whatever its material: between halves that part it would be
-/// drawn out without end, and what hangs on it would whirl about, too fast for any substep.
-inline constexpr double kThreadStretch = 1.5;
+/// and has stiffened so much (mpm/deformation.h), whatever its material: between halves that part
+/// it would be drawn out without end, and what hangs on it would whirl about, too fast for any
+/// substep. One that swings stiffens twentyfold within a few substeps: it is not to get near that.
+inline constexpr double kThreadStretch = 1.5, kThreadStiffening = 3;
 
 /// After the points `changed` lost bonds: adds the ends of new threads to MpmState::threads.
 void list_threads(MpmState& state, const std::vector<std::int32_t>& changed);

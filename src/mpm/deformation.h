@@ -7,8 +7,7 @@
 
 namespace tissue_sim {
 
-/// What is deformed so that it has stiffened so much is wild, where it is smaller than the lattice
-/// tells: crumbs and threads.
+/// A crumb that is deformed so that it has stiffened so much is wild.
 inline constexpr double kWildStiffening = 5;
 
 struct Deformation {

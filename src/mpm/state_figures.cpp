@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstring>
 
+#include "cutting/threads.h"
 #include "mpm/deformation.h"
 
 namespace tissue_sim {
@@ -71,7 +72,8 @@ float stable_substep(const MpmState& state, const Stiffening& stiffening) {
 }
 
 bool may_be_wild(const MpmState& state) {
-  return !(state.threads.empty() && state.crumbs.empty()) && state.wildest >= kWildStiffening;
+  return (!state.threads.empty() && state.wildest >= kThreadStiffening) ||
+         (!state.crumbs.empty() && state.wildest >= kWildStiffening);
 }
 
 std::uint64_t checksum(const MpmState& state, const Pieces& pieces) {

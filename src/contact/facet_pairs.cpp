@@ -8,13 +8,15 @@
 namespace tissue_sim {
 namespace {
 
-struct GridBox {
+struct GridBox {  // empty for facets without reach
   int min[3], max[3];
 };
 
-/// std::floor() would be a call, for the oldest processors lack the instruction.
+/// std::floor() would be a call, for the oldest processors lack the instruction. What is farther
+/// than an int goes is all in one place.
 int floor_of(float x) {
-  const int toward_zero = static_cast<int>(x);
+  constexpr float kFarthest = 1e9f;
+  const int toward_zero = static_cast<int>(std::min(std::max(x, -kFarthest), kFarthest));
   return toward_zero - (x < static_cast<float>(toward_zero) ? 1 : 0);
 }
 
@@ -47,13 +49,14 @@ std::vector<FacetPair> facing_pairs(const std::vector<FacetMotion>& facets,
   std::vector<GridBox> boxes(count);
   std::size_t entry_count = 0;
   for (std::int32_t f = 0; f < count; ++f) {
-    std::size_t cells = 1;
+    std::size_t cells = reach[f] > 0 ? 1 : 0;
     for (int a = 0; a < 3; ++a) {
       boxes[f].min[a] = floor_of((facets[f].x[a] - reach[f]) * per_grid);
       boxes[f].max[a] = floor_of((facets[f].x[a] + reach[f]) * per_grid);
       cells *= boxes[f].max[a] - boxes[f].min[a] + 1;
     }
     entry_count += cells;
+    if (cells == 0) boxes[f].max[2] = boxes[f].min[2] - 1;
   }
   // Facets by bucket of a hash table of grid cells, counted first.
   struct Entry {

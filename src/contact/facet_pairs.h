@@ -13,7 +13,8 @@ namespace tissue_sim {
 using FacetPair = std::pair<std::int32_t, std::int32_t>;
 
 /// Pairs (lower number first, sorted) of facets that face one another and whose swept boxes of half
-/// size `reach` around their places overlap. `grid` is the hash grid's cell [m].
+/// size `reach` around their places overlap; none of those whose reach is 0. `grid` is the hash
+/// grid's cell [m].
 std::vector<FacetPair> facing_pairs(const std::vector<FacetMotion>& facets,
                                     const std::vector<float>& reach, float grid, Cpu& cpu);
 

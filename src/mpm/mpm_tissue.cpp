@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <utility>
 
 #include "contact/block_contact.h"
@@ -16,6 +17,11 @@
 #include "tools/tool_motion.h"
 
 namespace tissue_sim {
+namespace {
+
+constexpr float kInfinite = std::numeric_limits<float>::infinity();
+
+}  // namespace
 
 MpmTissue::MpmTissue(const Scene& scene, std::vector<std::string> notes)
     : notes_(std::move(notes)),
@@ -23,6 +29,8 @@ MpmTissue::MpmTissue(const Scene& scene, std::vector<std::string> notes)
       pieces_(whole_pieces(state_->bodies, state_->points)) {
   measure_motion(*state_);
   measure();
+  substep_.follow(*state_, modulus_);
+  measured_ = false;  // who holds the state may change it
   measure_pieces(*state_, pieces_);
 }
 
@@ -43,6 +51,7 @@ void MpmTissue::cut(const std::vector<BladePath>& paths, const Array<float>* u_b
     sweep_bonds(*state_, path, u_before, state_->nodes.u, before, changed, report);
   }
   if (changed.empty()) return;
+  measured_ = false;
   take_apart(*state_, changed);
   if (!may_have_parted(state_->bodies, state_->points, changed)) return;
   for (const int id : update_pieces(state_->bodies, state_->points, pieces_)) {
@@ -71,6 +80,7 @@ void MpmTissue::run(Frame& frame, int substeps, float dt, double from, double to
   MpmState& s = *state_;
   const int checks = can_tear(s) ? tear_checks(s, substeps, dt) : 0;
   int check = 0;
+  measured_ = false;
   result_.substeps += substeps;
   result_.substep = std::max(result_.substep, static_cast<double>(dt));
   for (int i = 0; i < substeps; ++i) {
@@ -101,6 +111,46 @@ void MpmTissue::run(Frame& frame, int substeps, float dt, double from, double to
   }
 }
 
+PartEnd MpmTissue::run_part(Frame& frame, int substeps, float dt, double from, double to) {
+  save_checkpoint();
+  run(frame, substeps, dt, from, to);
+  measure();
+  const bool may_go_back =
+      result_.tear_report.bonds_broken == checkpoint_.result.tear_report.bonds_broken &&
+      frame.cut_to <= from;
+  if (!substep_.is_borne(*state_, modulus_, stable_substep(), dt) && may_go_back) {
+    restore_checkpoint();
+    return PartEnd::kUndone;
+  }
+  substep_.follow(*state_, modulus_);
+  return result_.blew_up ? PartEnd::kBlewUp : PartEnd::kBorne;
+}
+
+void MpmTissue::save_checkpoint() {
+  const MpmState& s = *state_;
+  for (int a = 0; a < 3; ++a) {
+    checkpoint_.u[a] = s.nodes.u[a];
+    checkpoint_.v[a] = s.nodes.v[a];
+  }
+  checkpoint_.time = s.time;
+  checkpoint_.contacts = s.contacts;
+  checkpoint_.faces = s.faces;
+  checkpoint_.result = result_;
+}
+
+void MpmTissue::restore_checkpoint() {
+  MpmState& s = *state_;
+  for (int a = 0; a < 3; ++a) {
+    s.nodes.u[a] = checkpoint_.u[a];
+    s.nodes.v[a] = checkpoint_.v[a];
+  }
+  s.time = checkpoint_.time;
+  s.contacts = checkpoint_.contacts;
+  s.faces = checkpoint_.faces;
+  result_ = checkpoint_.result;
+  measure();
+}
+
 void MpmTissue::cut_by_blades(Frame& frame, double share) {
   measure_motion(*state_);
   const std::vector<BladePath> paths = blade_paths(state_->scene, frame.input, frame.cut_to, share);
@@ -128,10 +178,8 @@ void MpmTissue::advance(double duration, const FrameInput& input) {
       [this](const FrameInput& rest, int left, double dt) {
         return substep_.part(*state_, rest, left, dt);
       },
-      [&](int substeps, float dt, double from, double to) { run(frame, substeps, dt, from, to); },
-      [this] {
-        measure();
-        return !result_.blew_up;
+      [&](int substeps, float dt, double from, double to) {
+        return run_part(frame, substeps, dt, from, to);
       });
   end(frame);
 }
@@ -166,9 +214,9 @@ void MpmTissue::measure() {
     states[i] = s.kernels->state(block, block_field(s, block), s.scratch.local(), nullptr);
   });
   stiffening_ = even_stiffening(s, 1);
-  std::vector<float> modulus(count, 0.0f);
+  modulus_.assign(count, 0.0f);
   s.wildest = 1;
-  result_.elastic_energy = result_.kinetic_energy = result_.max_speed = 0;
+  result_.elastic_energy = result_.kinetic_energy = 0;
   for (int i = 0; i < count; ++i) {
     const BlockState& b = states[i];
     result_.elastic_energy += b.elastic_energy;
@@ -176,28 +224,34 @@ void MpmTissue::measure() {
     result_.blew_up = result_.blew_up || !b.finite;
     std::vector<float>& of_body = stiffening_[s.blocks.all[i]->body];
     for (std::size_t m = 0; m < of_body.size(); ++m) {
-      of_body[m] = std::max(of_body[m], b.stiffening[m]);
+      const float stiffening = b.finite ? b.stiffening[m] : kInfinite;
+      of_body[m] = std::max(of_body[m], stiffening);
       result_.blew_up = result_.blew_up || of_body[m] > 1e6f;
       const Material& material = s.bodies[s.blocks.all[i]->body].materials[m];
-      modulus[i] =
-          std::max(modulus[i], static_cast<float>(wave_modulus(material, b.stiffening[m])));
+      modulus_[i] = std::max(modulus_[i], static_cast<float>(wave_modulus(material, stiffening)));
     }
   }
-  substep_.follow(s, modulus);
   for (std::size_t i = 0; i < s.nodes.size(); ++i) {
     const double v2 = Vec3(s.nodes.v[0][i], s.nodes.v[1][i], s.nodes.v[2][i]).squaredNorm();
     result_.kinetic_energy += 0.5 * s.nodes.mass[i] * v2;
   }
-  for (const BlockMotion& m : s.motion) {
+  measured_ = true;
+}
+
+FrameResult MpmTissue::finish() {
+  const auto measure_and_follow = [this] {
+    measure();
+    substep_.follow(*state_, modulus_);
+  };
+  if (!measured_) measure_and_follow();
+  result_.max_speed = 0;
+  for (const BlockMotion& m : state_->motion) {
     if (!(m.speed <= result_.max_speed)) result_.max_speed = m.speed;
   }
   // Nothing that instruments do moves tissue at the speed of a bullet; what does is out of control.
   result_.blew_up = result_.blew_up || !(result_.max_speed < 300);
-}
-
-FrameResult MpmTissue::finish() {
-  measure();
-  if (tame()) measure();
+  if (tame()) measure_and_follow();
+  measured_ = false;
   measure_pieces(*state_, pieces_);
   return result_;
 }

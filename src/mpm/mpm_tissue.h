@@ -29,6 +29,8 @@ class MpmTissue final : public Tissue {
   const std::vector<std::string>& notes() const override { return notes_; }
 
   // For tests and the benchmark.
+  void save_checkpoint();  ///< of what a part of a frame changes, unless something is cut or tears
+  void restore_checkpoint();  ///< and measures it
   /// The substep for the next part of a frame: SubstepChoice::longest().
   float substep_for(const FrameInput& input);
   int fragment_of(int point) const { return pieces_.of_point[point]; }
@@ -46,7 +48,17 @@ class MpmTissue final : public Tissue {
     std::vector<BlockMotion> before;  ///< when they were last looked at
   };
 
+  /// What a part of a frame changes, unless something is cut or tears.
+  struct Checkpoint {
+    Array<float> u[3], v[3];
+    double time;
+    Contacts contacts;
+    FaceContacts faces;
+    FrameResult result;
+  };
+
   Frame begin(double duration, const FrameInput& input);
+  PartEnd run_part(Frame& frame, int substeps, float dt, double from, double to);
   void run(Frame& frame, int substeps, float dt, double from, double to);
   void cut_by_blades(Frame& frame, double share);
   void end(Frame& frame);
@@ -59,7 +71,10 @@ class MpmTissue final : public Tissue {
   std::vector<std::string> notes_;
   std::unique_ptr<MpmState> state_;
   Pieces pieces_;
+  Checkpoint checkpoint_;  ///< before the last part of a frame
   Stiffening stiffening_;
+  std::vector<float> modulus_;  ///< see SubstepChoice::follow()
+  bool measured_ = false;       ///< whether the state is as it was when it was measured
   SubstepChoice substep_;
   FrameResult result_;
 };

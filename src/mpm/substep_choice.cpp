@@ -8,17 +8,21 @@
 namespace tissue_sim {
 namespace {
 
-constexpr int kSteps = 12, kStepsAtCut = 4;
+constexpr int kSteps = 8, kStepsAtCut = 4;
 constexpr double kLongestAge = 0.5;   // of the measured limit [s] ...
 constexpr double kFallenAge = 0.1;    // ... where it fell to less than this share: what made it
 constexpr double kFall = 0.9;         // fall may have passed, or be gone with the cut
 constexpr double kMostGrowth = 1.3;   // of the stiffness, until it is measured again ...
 constexpr double kYoungest = 0.015;   // ... unless that is not long ago [s]
-constexpr double kMargin = 0.72;      // for what stiffens within the part, and contact of faces
+constexpr double kMargin = 0.76;      // for what stiffens within the part, and contact of faces
 constexpr double kFreeMotion = 0.25;  // of a tool in a part [cells]; beyond it the margin grows
 constexpr double kCalmTrend = 1.05;   // of the stiffness in a part: the next one is longer ...
 constexpr double kMostTrend = 1.1;    // ... or shorter
 constexpr int kShortestPart = 6;      // substeps
+constexpr double kBorne = 0.9;        // of the limit, at the end of a part: else it is undone, ...
+constexpr double kMostShortened = 0.25;  // ... and substeps made shorter by that at most ...
+constexpr double kLeastShortened = 0.7;  // ... and by that at least, ...
+constexpr double kShortest = 1e-3;       // ... until by that: then it is no use
 
 /// Whether something tore within the last twentieth of a second: then more may soon, in pieces that
 /// nobody has measured.
@@ -59,18 +63,38 @@ double farthest_motion(const MpmState& state, const FrameInput& input) {
 
 }  // namespace
 
+bool SubstepChoice::is_borne(const MpmState& state, const std::vector<float>& modulus,
+                             double cautious, double dt) {
+  double growth = 1;
+  for (std::size_t i = 0; i < modulus.size(); ++i) {
+    const float measured = state.blocks.all[i]->modulus.measured;
+    // not the other way round: it may be not finite
+    if (measured > 0 && !(modulus[i] <= growth * measured)) growth = modulus[i] / measured;
+  }
+  const double longest =
+      std::isfinite(growth) ? std::max(cautious / kMargin, limit_ / std::sqrt(growth)) : 0;
+  if (dt <= kBorne * longest || shortened_ < kShortest) return true;
+  const double wanted = kMargin * longest / dt;
+  shortened_ *= wanted > kMostShortened ? std::min(wanted, kLeastShortened) : kMostShortened;
+  return false;
+}
+
 void SubstepChoice::follow(MpmState& state, const std::vector<float>& modulus) {
-  growth_ = trend_ = 1;
+  growth_ = shortened_ = 1;
+  double trend = 1;
   bool is_cut = false;
   for (std::size_t i = 0; i < modulus.size(); ++i) {
     Block::Modulus& m = state.blocks.all[i]->modulus;
     if (m.measured > 0) growth_ = std::max(growth_, static_cast<double>(modulus[i] / m.measured));
-    if (m.last > 0) trend_ = std::max(trend_, static_cast<double>(modulus[i] / m.last));
+    if (m.last > 0) trend = std::max(trend, static_cast<double>(modulus[i] / m.last));
     is_cut = is_cut || m.last == 0;
     m.last = modulus[i];
   }
   const double frame = 1 / state.scene.frame_rate, last = state.time - followed_at_;
-  part_ = trend_ > kMostTrend ? last / 2 : trend_ < kCalmTrend ? 2 * last : last;
+  if (last > 0) {
+    trend_ = trend;
+    part_ = trend > kMostTrend ? last / 2 : trend < kCalmTrend ? 2 * last : last;
+  }
   part_ = std::min(part_, is_cut ? frame / 4 : frame);
   if (state.time == 0) part_ = frame;
   followed_at_ = state.time;
@@ -79,7 +103,8 @@ void SubstepChoice::follow(MpmState& state, const std::vector<float>& modulus) {
 int SubstepChoice::part(const MpmState& state, const FrameInput& input, int left, double dt) const {
   const double motion = farthest_motion(state, input) / state.scene.cell_size;
   const double free = kFreeMotion / (std::max(motion, kFreeMotion) * state.scene.frame_rate);
-  const double time = input.cuts.empty() ? std::min(part_, free) : 0;
+  const bool is_short = !input.cuts.empty() || shortened_ < 1;
+  const double time = is_short ? 0 : std::min(part_, free);
   const int most = std::max(kShortestPart, static_cast<int>(time / dt + 0.5));
   const int parts = (left + most - 1) / most;
   return (left + parts - 1) / parts;
@@ -115,6 +140,12 @@ void SubstepChoice::measure_if_due(MpmState& state, const MeasureLimit& measure)
 double SubstepChoice::longest(MpmState& state, const FrameInput& input,
                               const Stiffening& stiffening, const MeasureLimit& measure) {
   const double cautious = stable_substep(state, stiffening);
+  return shortened_ * longest_as_it_went(state, input, stiffening, cautious, measure);
+}
+
+double SubstepChoice::longest_as_it_went(MpmState& state, const FrameInput& input,
+                                         const Stiffening& stiffening, double cautious,
+                                         const MeasureLimit& measure) {
   if (!input.cuts.empty() || tears(state)) return cautious;
   measure_if_due(state, measure);
   if (limit_ == 0) return cautious;

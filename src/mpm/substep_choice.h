@@ -18,8 +18,17 @@ using MeasureLimit = std::function<double(const std::vector<std::uint8_t>& block
 /// The cautious substep, stable_substep(), is what a lone point bears that was cut off on all
 /// sides; whole tissue bears about twice as much. So the highest frequency is measured now and
 /// then, and where a cut went at once; in between the stiffening of each block bounds how it grew.
+///
+/// None of this knows what a part of a frame brings: a few points that swing may stiffen tenfold
+/// within six substeps. So a part that stiffened until its substeps were too long is undone, and
+/// done again with shorter ones.
 class SubstepChoice {
  public:
+  /// Whether tissue that ended a part of a frame with these moduli (see follow()) and this
+  /// stable_substep() could bear the part's substeps of `dt` [s]. If not, the next ones are
+  /// shorter: until one is borne, or they cannot be the reason.
+  bool is_borne(const MpmState& state, const std::vector<float>& modulus, double cautious,
+                double dt);
   /// After a part of a frame: `modulus` is of each block the largest P-wave modulus of its points,
   /// as they are deformed [Pa].
   void follow(MpmState& state, const std::vector<float>& modulus);
@@ -35,6 +44,8 @@ class SubstepChoice {
   int part(const MpmState& state, const FrameInput& input, int left, double dt) const;
 
  private:
+  double longest_as_it_went(MpmState& state, const FrameInput& input, const Stiffening& stiffening,
+                            double cautious, const MeasureLimit& measure);
   void measure_if_due(MpmState& state, const MeasureLimit& measure);
 
   double limit_ = 0;        ///< when it was measured last [s]; 0 where it is not known
@@ -44,24 +55,29 @@ class SubstepChoice {
   double trend_ = 1;        ///< of the stiffness in the last part, at most
   double part_ = 0;         ///< how long the next part may be [s]
   double followed_at_ = 0;  ///< [s]
+  double shortened_ = 1;    ///< how much substeps are shorter than they would be, after parts that
+                            ///< were not borne
 };
+
+/// How a part of a frame ended.
+enum class PartEnd { kBorne, kUndone, kBlewUp };
 
 /// Advances a frame of `duration` seconds in parts: a thread of tissue that snaps, or what a fast
 /// tool squeezes, may stiffen twofold within a frame.
 ///   substep_for(input)            the longest that is stable [s]
 ///   part(input, left, dt)         see SubstepChoice
-///   run(substeps, dt, from, to)   from and to: shares of the frame
-///   measure()                     whether it is worth going on
-template <class SubstepFor, class Part, class Run, class Measure>
+///   run(substeps, dt, from, to)   from and to: shares of the frame. Returns the PartEnd
+template <class SubstepFor, class Part, class Run>
 void advance_in_parts(double duration, FrameInput input, const SubstepFor& substep_for,
-                      const Part& part, const Run& run, const Measure& measure) {
-  for (double from = 0;;) {
+                      const Part& part, const Run& run) {
+  for (double from = 0; from < 1;) {
     const double time = duration * (1 - from);
     const int left = std::max(1, static_cast<int>(std::ceil(time / substep_for(input))));
     const int substeps = part(input, left, time / left);
     const double to = substeps == left ? 1 : from + (1 - from) * substeps / left;
-    run(substeps, static_cast<float>(time / left), from, to);
-    if (to == 1 || !measure()) return;
+    const PartEnd end = run(substeps, static_cast<float>(time / left), from, to);
+    if (end == PartEnd::kBlewUp) return;
+    if (end == PartEnd::kUndone) continue;
     from = to;
     input.cuts = {};
   }

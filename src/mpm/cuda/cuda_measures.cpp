@@ -2,6 +2,7 @@
 // substep that it bears.
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "mpm/cuda/cuda_linearised_motion.h"
 #include "mpm/cuda/on_device.h"
@@ -45,6 +46,7 @@ double CudaMpmTissue::measure_limit(int steps) {
 
 void CudaMpmTissue::launch_measure() {
   OnDevice& d = *device_;
+  measured_ = false;
   d.measures.resize(d.blocks.size());
   d.host_measures.resize(d.blocks.size());
   tissue_sim::launch_measure(d.tables(), d.present(), d.plan.max_slots, d.measures.data(),
@@ -68,15 +70,17 @@ void CudaMpmTissue::finish_measure() {
     if (!(m.speed <= result_.max_speed)) result_.max_speed = m.speed;
     const Block& block = *state_->blocks.all[d.host_tables.of_host[i]];
     float& stiffening = stiffening_[block.body][block.material];
-    stiffening = std::max(stiffening, m.stiffening);
+    const float now = m.finite != 0 ? m.stiffening : std::numeric_limits<float>::infinity();
+    stiffening = std::max(stiffening, now);
     const Material& material = state_->bodies[block.body].materials[block.material];
-    modulus_[d.host_tables.of_host[i]] = static_cast<float>(wave_modulus(material, m.stiffening));
-    result_.blew_up = result_.blew_up || m.finite == 0 || m.stiffening > 1e6f;
+    modulus_[d.host_tables.of_host[i]] = static_cast<float>(wave_modulus(material, now));
+    result_.blew_up = result_.blew_up || !(now <= 1e6f);
     state_->motion[d.host_tables.of_host[i]] = {
         {Vec3(m.min[0], m.min[1], m.min[2]), Vec3(m.max[0], m.max[1], m.max[2])}, m.speed};
   }
   // Nothing that instruments do moves tissue at the speed of a bullet; what does is out of control.
   result_.blew_up = result_.blew_up || !(result_.max_speed < 300);
+  measured_ = true;
 }
 
 }  // namespace tissue_sim

@@ -10,13 +10,16 @@ namespace tissue_sim {
 namespace {
 
 /// What the tables and the state take on the GPU; clouds and contacts between tissue come on top.
-std::size_t bytes_of(const HostTables& t, std::size_t nodes, std::size_t points, int held_by) {
+std::size_t bytes_of(const HostTables& t, std::size_t nodes, std::size_t points, int held_by,
+                     std::size_t most_held) {
   const std::size_t of_contact = 9 * sizeof(long long) * nodes + 6 * t.point.size();
+  constexpr std::size_t of_connecting = 16;  // two numbers a slot, and as much again to sort them
   return t.blocks.size() * (sizeof(CudaBlock) + sizeof(CudaMeasure)) +
          t.bundles.size() * sizeof(CudaBundle) + t.columns.size() * sizeof(CudaColumn) +
-         t.slot_node.size() * (12 + sizeof(uint4) + 2 * sizeof(float4)) + 4 * t.parts.size() +
-         8 * t.point.size() + 4 * t.partial.size() + (4 * sizeof(float4) + 1) * nodes +
-         (1 + 13 * held_by) * points + (held_by > 0 ? of_contact : 0);
+         t.slot_node.size() * (of_connecting + 16 + sizeof(uint4) + 2 * sizeof(float4)) +
+         8 * t.point.size() + 4 * t.partial.size() + (6 * sizeof(float4) + 1) * nodes +
+         (1 + 13 * held_by) * points + most_held * sizeof(HeldPoint) +
+         (held_by > 0 ? of_contact : 0);
 }
 
 /// Says how much memory the tissue takes, where the GPU has less.
@@ -34,14 +37,15 @@ void check_memory(std::size_t wanted, std::size_t held) {
 
 std::size_t CudaMpmTissue::device_bytes() const {
   const OnDevice& d = *device_;
-  std::size_t sum =
-      d.blocks.bytes() + d.bundles.bytes() + d.columns.bytes() + d.near_cells.bytes() +
-      d.bodies.bytes() + d.slot_node.bytes() + d.point.bytes() + d.piece.bytes() + d.place.bytes() +
-      d.slot_parts.bytes() + d.first_parts.bytes() + d.parts.bytes() + d.pushed_parts.bytes() +
-      d.marks.bytes() + d.pushed.bytes() + d.colour.bytes() + d.volume.bytes() + d.partial.bytes() +
-      d.hold.bytes() + d.bonds.bytes() + d.soft.bytes() + d.with.bytes() + d.whole.bytes() +
-      d.u_before.bytes() + d.colliders.bytes() + d.loads.bytes() + d.measures.bytes() +
-      d.cloud.bytes() + d.stretched.bytes() + d.faces.bytes();
+  std::size_t sum = d.blocks.bytes() + d.bundles.bytes() + d.columns.bytes() +
+                    d.near_cells.bytes() + d.bodies.bytes() + d.slot_node.bytes() +
+                    d.point.bytes() + d.piece.bytes() + d.place.bytes() + d.slot_parts.bytes() +
+                    d.first_parts.bytes() + d.parts.bytes() + d.pushed_parts.bytes() +
+                    d.marks.bytes() + d.pushed.bytes() + d.colour.bytes() + d.volume.bytes() +
+                    d.partial.bytes() + d.hold.bytes() + d.bonds.bytes() + d.soft.bytes() +
+                    d.with.bytes() + d.whole.bytes() + d.u_before.bytes() + d.connect_room.bytes() +
+                    d.colliders.bytes() + d.loads.bytes() + d.measures.bytes() + d.cloud.bytes() +
+                    d.stretched.bytes() + d.faces.bytes() + d.checkpoint.bytes();
   for (int i = 0; i < 2; ++i) sum += d.u[i].bytes() + d.v[i].bytes() + d.force[i].bytes();
   return sum;
 }
@@ -142,26 +146,32 @@ void CudaMpmTissue::push() {
   const Scene& scene = state_->scene;
   const auto colliders = static_cast<int>(scene.tools.size()) + (scene.ground.enabled ? 1 : 0);
   d.held_by = std::min(colliders, 2);
-  check_memory(bytes_of(t, n, points, d.held_by), device_bytes());
+  const std::size_t most_held = OnDevice::Checkpoint::most_held(d.held_by * points);
+  check_memory(bytes_of(t, n, points, d.held_by, most_held), device_bytes());
   check_cuda(cudaStreamSynchronize(d.stream), "finish a frame");
   d.blocks.upload(t.blocks, d.stream);
   d.bundles.upload(t.bundles, d.stream);
   d.columns.upload(t.columns, d.stream);
   d.bodies.upload(t.bodies, d.stream);
   d.slot_node.upload(t.slot_node, d.stream);
-  d.slot_parts.upload(t.slot_parts, d.stream);
-  d.first_parts.upload(t.first_parts, d.stream);
-  d.parts.upload(t.parts, d.stream);
+  const std::size_t slots = t.slot_node.size();
+  d.slot_parts.resize(slots);
+  d.first_parts.resize(slots);
+  d.parts.resize(slots);
+  d.most_sharing.resize(1);
+  connect_slots(
+      {d.slot_node.data(), d.slot_parts.data(), d.first_parts.data(), d.parts.data(), slots}, n,
+      d.connect_room, d.most_sharing.data(), d.stream);
   d.volume.upload(t.volume, d.stream);
   d.partial.upload(t.partial, d.stream);
   d.point.upload(t.point, d.stream);
-  d.pushed_parts.resize(t.slot_parts.size());
+  d.pushed_parts.resize(slots);
   if (d.marks.size() != n) {
     d.marks.resize(n);
     d.marks.clear(d.stream);
   }
   for (auto& force : d.force) {
-    force.resize(t.slot_node.size());
+    force.resize(slots);
     force.clear(d.stream);
   }
   if (d.with.size() != d.held_by * points) {
@@ -172,8 +182,13 @@ void CudaMpmTissue::push() {
   }
   d.bonds.upload(state_->points.bonds, d.stream);
   if (!state_->points.soft.empty()) d.soft.upload(state_->points.soft, d.stream);
+  d.checkpoint.resize(n, d.with.size());
   d.arrived.resize(2);
   push_nodes();
+  if (d.most_sharing[0] > kMostSharing) {
+    throw std::runtime_error("a node is shared by more than " + std::to_string(kMostSharing) +
+                             " blocks, as many as the GPU's tables hold: set device to cpu");
+  }
 }
 
 void CudaMpmTissue::push_nodes() {

@@ -148,33 +148,10 @@ void CudaMpmTissue::sum_loads() {
   substeps_ = 0;
 }
 
-void CudaMpmTissue::end() {
-  pieces_measured_ = false;
-  launch_measure();
-}
-
 void CudaMpmTissue::advance(int substeps, float dt, const FrameInput& input) {
   begin(static_cast<double>(substeps) * dt, input);
   run(substeps, dt, input, 0, 1);
-  end();
-}
-
-void CudaMpmTissue::advance(double duration, const FrameInput& input) {
-  begin(duration, input);
-  advance_in_parts(
-      duration, input, [this](const FrameInput& rest) { return substep_for(rest); },
-      [this](const FrameInput& rest, int left, double dt) {
-        return substep_.part(*state_, rest, left, dt);
-      },
-      [&](int substeps, float dt, double from, double to) { run(substeps, dt, input, from, to); },
-      [this] {
-        launch_measure();
-        finish_measure();
-        sum_loads();
-        substep_.follow(*state_, modulus_);
-        return !result_.blew_up;
-      });
-  end();
+  launch_measure();
 }
 
 void CudaMpmTissue::find_near(double duration) {
@@ -212,6 +189,7 @@ void CudaMpmTissue::find_near(double duration) {
 
 void CudaMpmTissue::launch(int begin, int end, float dt) {
   OnDevice& d = *device_;
+  measured_ = false;
   const Scene& scene = state_->scene;
   const std::size_t collider_count = d.host_reach.size();
   CudaFrame frame;
@@ -249,7 +227,7 @@ void CudaMpmTissue::launch(int begin, int end, float dt) {
 }
 
 FrameResult CudaMpmTissue::finish() {
-  finish_measure();
+  if (!measured_) finish_measure();
   sum_loads();
   pieces_measured_ = false;
   if (!blades_.empty() && !result_.blew_up) cut_by_blades();
@@ -260,6 +238,7 @@ FrameResult CudaMpmTissue::finish() {
   }
   substep_.follow(*state_, modulus_);
   tame();
+  measured_ = false;
   return result_;
 }
 

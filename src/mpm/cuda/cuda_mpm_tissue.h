@@ -37,6 +37,8 @@ class CudaMpmTissue final : public Tissue {
   const std::vector<std::string>& notes() const override { return notes_; }
 
   // For tests and the benchmark.
+  void save_checkpoint();  ///< of what a part of a frame changes, unless something is cut or tears
+  void restore_checkpoint();  ///< and measures it
   float substep_for(const FrameInput& input);
   int fragment_of(int point) const { return pieces_.of_point[point]; }
   /// The host's copy, whose nodes and contacts are as pull() left them or later.
@@ -57,7 +59,7 @@ class CudaMpmTissue final : public Tissue {
   /// Enqueues a part of the frame between two shares of it.
   void run(int substeps, float dt, const FrameInput& input, double from, double to);
   void sum_loads();  ///< of the part that was run last, once it is done
-  void end();
+  PartEnd run_part(int substeps, float dt, const FrameInput& input, double from, double to);
   void make_blocks(bool may_march);
   void stop_marching();  ///< blocks that march are too tall to be cut well
   void plan_tables();    ///< how the blocks are worked on, and the tables for it
@@ -102,8 +104,9 @@ class CudaMpmTissue final : public Tissue {
   double cut_to_ = 0;                       ///< share of the frame
   std::vector<BlockMotion> motion_before_;  ///< when the blades were last looked at
   double duration_ = 0;                     ///< of the frame in flight [s]
-  int substeps_ = 0;  ///< of its last part, as long as their loads are not summed
-  float dt_ = 0;      ///< of these [s]
+  int substeps_ = 0;       ///< of its last part, as long as their loads are not summed
+  float dt_ = 0;           ///< of these [s]
+  bool measured_ = false;  ///< whether finish_measure() saw it
   Stiffening stiffening_;
   std::vector<float> modulus_;  ///< see SubstepChoice::follow()
   SubstepChoice substep_;

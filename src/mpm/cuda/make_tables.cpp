@@ -1,7 +1,6 @@
 #include "mpm/cuda/make_tables.h"
 
 #include <algorithm>
-#include <stdexcept>
 
 #include "cutting/tear.h"
 
@@ -67,58 +66,6 @@ void fill_points(const Block& from, float whole_volume, CudaBlock& block, HostTa
 float common_volume(const MpmState& state, int body) {
   const LatticeBody& b = state.bodies[body];
   return b.point_count == 0 ? 0.0f : state.points.volume[b.first_point + b.point_count / 2];
-}
-
-/// Which slots share a node, and which of them owns it. Each chunk of nodes goes through all slots.
-void connect(std::size_t node_count, Cpu& cpu, HostTables& t) {
-  const std::size_t slots = t.slot_node.size();
-  const int chunks = cpu.threads();
-  const auto for_each_slot = [&](const auto& visit) {
-    cpu.for_each(chunks, [&](int c) {
-      const auto begin = static_cast<std::int32_t>(node_count * c / chunks),
-                 end = static_cast<std::int32_t>(node_count * (c + 1) / chunks);
-      for (std::size_t slot = 0; slot < slots; ++slot) {
-        const std::int32_t n = t.slot_node[slot];
-        if (n >= begin && n < end) visit(slot, n);
-      }
-    });
-  };
-  std::vector<std::uint32_t> begin(node_count + 1, 0);
-  for_each_slot([&](std::size_t, std::int32_t n) { ++begin[n + 1]; });
-  for (std::size_t n = 0; n < node_count; ++n) {
-    if (begin[n + 1] > 63) {
-      throw std::runtime_error("a node is shared by " + std::to_string(begin[n + 1]) +
-                               " blocks, more than the GPU's tables hold: set device to cpu");
-    }
-    if (begin[n + 1] == 1) begin[n + 1] = 0;  // needs no list
-    begin[n + 1] += begin[n];
-  }
-  if (begin.back() >= 1u << 25) {
-    throw std::runtime_error(
-        "the tissue has more shared nodes than the GPU's tables hold: raise "
-        "cell_size");
-  }
-  t.parts.resize(begin.back());
-  t.slot_parts.resize(slots);
-  std::vector<std::uint8_t> filled(node_count, 0), is_owner(slots, 0);
-  for_each_slot([&](std::size_t slot, std::int32_t n) {
-    const std::uint32_t count = begin[n + 1] - begin[n];
-    if (count > 0) t.parts[begin[n] + filled[n]] = static_cast<std::uint32_t>(slot);
-    t.slot_parts[slot] = count > 0 ? begin[n] << 6 | count : 0;
-    is_owner[slot] = filled[n] == 0 ? 1 : 0;
-    ++filled[n];
-  });
-  t.first_parts.resize(slots);
-  cpu.for_each(
-      static_cast<int>(slots),
-      [&](int i) {
-        const std::uint32_t first = t.slot_parts[i] >> 6, count = t.slot_parts[i] & 63u;
-        const auto part = [&](std::uint32_t k) { return k < count ? t.parts[first + k] : 0u; };
-        t.first_parts[i] = {count == 0 ? static_cast<std::uint32_t>(i) : part(0), part(1), part(2),
-                            part(3)};
-        if (is_owner[i] == 0) t.slot_node[i] = ~t.slot_node[i];
-      },
-      4096);
 }
 
 /// The columns of the block that hold points, as if it were alone in its bundle.
@@ -249,7 +196,6 @@ void make_tables(const MpmState& state, const std::vector<std::vector<int>>& bun
     add_bundle(first, static_cast<int>(blocks.size()), columns, t);
     first += static_cast<int>(blocks.size());
   }
-  connect(state.nodes.size(), *state.cpu, t);
 }
 
 void pack_nodes(const Nodes& n, Cpu& cpu, float4* u, float4* v) {

@@ -9,7 +9,8 @@
 
 namespace tissue_sim {
 
-/// See CudaTables. Kept from cut to cut, for its memory.
+/// See CudaTables; what slots share is found on the GPU (connect_slots.h). Kept from cut to cut,
+/// for its memory.
 struct HostTables {
   std::vector<CudaBody> bodies;     ///< of each body, its materials
   std::vector<int> first_material;  ///< of each body, in `bodies`
@@ -19,8 +20,6 @@ struct HostTables {
   std::vector<CudaBundle> bundles;
   std::vector<CudaColumn> columns;
   PinnedArray<std::int32_t> slot_node;
-  PinnedArray<std::uint32_t> slot_parts, parts;
-  PinnedArray<uint4> first_parts;
   PinnedArray<float> volume, partial;
   PinnedArray<std::int32_t> point;
   int max_slots = 0;        ///< of a bundle

@@ -1,11 +1,15 @@
 // What CudaMpmTissue keeps on the GPU.
 #pragma once
 
+#include <algorithm>
+
 #include "compute/device_array.h"
 #include "mpm/cuda/choose_plan.h"
+#include "mpm/cuda/connect_slots.h"
 #include "mpm/cuda/cuda_mpm_tissue.h"
 #include "mpm/cuda/faces_on_device.h"
 #include "mpm/cuda/frame_ends.h"
+#include "mpm/cuda/held_points.h"
 #include "mpm/cuda/make_tables.h"
 #include "mpm/cuda/near_cells.h"
 
@@ -36,6 +40,8 @@ struct CudaMpmTissue::OnDevice {
   DeviceArray<std::int32_t> slot_node, point, piece, place;
   DeviceArray<std::uint32_t> slot_parts, parts, colour;
   DeviceArray<uint4> first_parts;
+  ConnectRoom connect_room;
+  PinnedArray<int> most_sharing;
   DeviceArray<float> volume, partial, hold;
   DeviceArray<std::uint8_t> bonds, soft, with, whole;
   int held_by = 0;  ///< CudaTables::held_by
@@ -50,6 +56,33 @@ struct CudaMpmTissue::OnDevice {
   PinnedArray<int> host_stretched_count;
   DeviceArray<Point> cloud;
   FacesOnDevice faces;
+  /// What a part of a frame changes, unless something is cut or tears, as it was before the part.
+  struct Checkpoint {
+    DeviceArray<float4> u, v;
+    DeviceArray<HeldPoint> held;
+    DeviceArray<int> held_count;
+    PinnedArray<int> host_held_count;
+    DeviceArray<FaceSpring> springs;
+    DeviceArray<CudaFaceFigures> figures;
+    std::vector<KeptContact> kept;
+    bool new_facets = false;  ///< there were some that had not gone up
+    double time = 0;
+    FrameResult result;
+    /// `entries` of CudaTables::with, of which few are not 0.
+    static std::size_t most_held(std::size_t entries) {
+      return std::min(entries, 32768 + entries / 32);
+    }
+    void resize(std::size_t nodes, std::size_t entries) {
+      u.resize(nodes);
+      v.resize(nodes);
+      held.resize(most_held(entries));
+      held_count.resize(1);
+      host_held_count.resize(1);
+    }
+    std::size_t bytes() const {
+      return u.bytes() + v.bytes() + held.bytes() + springs.bytes() + figures.bytes();
+    }
+  } checkpoint;
   PinnedArray<Collider> host_colliders;
   PinnedArray<CudaBox> host_reach;
   PinnedArray<long long> host_loads;

@@ -1,0 +1,80 @@
+// Parts of a frame of tissue that lives on a GPU: a part that tissue could not bear is undone.
+#include "mpm/cuda/on_device.h"
+
+namespace tissue_sim {
+
+void CudaMpmTissue::advance(double duration, const FrameInput& input) {
+  begin(duration, input);
+  advance_in_parts(
+      duration, input, [this](const FrameInput& rest) { return substep_for(rest); },
+      [this](const FrameInput& rest, int left, double dt) {
+        return substep_.part(*state_, rest, left, dt);
+      },
+      [&](int substeps, float dt, double from, double to) {
+        return run_part(substeps, dt, input, from, to);
+      });
+}
+
+PartEnd CudaMpmTissue::run_part(int substeps, float dt, const FrameInput& input, double from,
+                                double to) {
+  save_checkpoint();
+  const int torn = result_.tear_report.bonds_broken;
+  run(substeps, dt, input, from, to);
+  launch_measure();
+  finish_measure();
+  const OnDevice::Checkpoint& saved = device_->checkpoint;
+  const bool may_go_back = result_.tear_report.bonds_broken == torn && cut_to_ <= from &&
+                           static_cast<std::size_t>(saved.host_held_count[0]) <= saved.held.size();
+  if (!substep_.is_borne(*state_, modulus_, stable_substep(), dt) && may_go_back) {
+    restore_checkpoint();
+    return PartEnd::kUndone;
+  }
+  sum_loads();
+  substep_.follow(*state_, modulus_);
+  return result_.blew_up ? PartEnd::kBlewUp : PartEnd::kBorne;
+}
+
+void CudaMpmTissue::save_checkpoint() {
+  OnDevice& d = *device_;
+  OnDevice::Checkpoint& saved = d.checkpoint;
+  const FacesOnDevice& f = d.faces;
+  saved.u.copy(d.u[d.current], d.stream);
+  saved.v.copy(d.v[d.current], d.stream);
+  launch_list_held(d.with.data(), d.hold.data(), static_cast<int>(d.with.size()), saved.held.data(),
+                   static_cast<int>(saved.held.size()), saved.held_count.data(), d.stream);
+  saved.held_count.download(saved.host_held_count.data(), 1, d.stream);
+  saved.new_facets = f.version != state_->faces.version;
+  if (!saved.new_facets) {
+    saved.springs.copy(f.springs, d.stream);
+    saved.figures.copy(f.figures, d.stream);
+  }
+  saved.kept = state_->faces.kept;
+  saved.time = state_->time;
+  saved.result = result_;
+}
+
+void CudaMpmTissue::restore_checkpoint() {
+  OnDevice& d = *device_;
+  const OnDevice::Checkpoint& saved = d.checkpoint;
+  FacesOnDevice& f = d.faces;
+  d.u[d.current].copy(saved.u, d.stream);
+  d.v[d.current].copy(saved.v, d.stream);
+  d.with.clear(d.stream);
+  launch_hold_again(saved.held.data(), saved.host_held_count[0], d.with.data(), d.hold.data(),
+                    d.stream);
+  if (saved.new_facets) {
+    f.version = -1;  // they go up again
+  } else {
+    f.springs.copy(saved.springs, d.stream);
+    f.figures.copy(saved.figures, d.stream);
+  }
+  state_->faces.kept = saved.kept;
+  search_anew();
+  state_->time = saved.time;
+  result_ = saved.result;
+  substeps_ = 0;
+  launch_measure();
+  finish_measure();
+}
+
+}  // namespace tissue_sim

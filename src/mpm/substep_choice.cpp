@@ -82,12 +82,10 @@ bool SubstepChoice::is_borne(const MpmState& state, const std::vector<float>& mo
 void SubstepChoice::follow(MpmState& state, const std::vector<float>& modulus) {
   growth_ = shortened_ = 1;
   double trend = 1;
-  bool is_cut = false;
   for (std::size_t i = 0; i < modulus.size(); ++i) {
     Block::Modulus& m = state.blocks.all[i]->modulus;
     if (m.measured > 0) growth_ = std::max(growth_, static_cast<double>(modulus[i] / m.measured));
     if (m.last > 0) trend = std::max(trend, static_cast<double>(modulus[i] / m.last));
-    is_cut = is_cut || m.last == 0;
     m.last = modulus[i];
   }
   const double frame = 1 / state.scene.frame_rate, last = state.time - followed_at_;
@@ -95,7 +93,7 @@ void SubstepChoice::follow(MpmState& state, const std::vector<float>& modulus) {
     trend_ = trend;
     part_ = trend > kMostTrend ? last / 2 : trend < kCalmTrend ? 2 * last : last;
   }
-  part_ = std::min(part_, is_cut ? frame / 4 : frame);
+  part_ = std::min(part_, frame);
   if (state.time == 0) part_ = frame;
   followed_at_ = state.time;
 }

@@ -36,8 +36,9 @@ TEST(SubstepChoice, LanczosFindsTheLimit) {
     for (MpmTissue* tissue : {&whole, &cut, &shattered, &bent}) {
       tissue->finish();
       const double limit = stability_limit(*tissue);
-      EXPECT_NEAR(measured_limit(*tissue, 12) / limit, 1, 0.12) << nu;
-      EXPECT_NEAR(measured_limit(*tissue, 40) / limit, 1, 0.04) << nu;
+      for (const int steps : {4, 8, 40, 200}) {  // those of the node, and what rounding would spoil
+        EXPECT_NEAR(measured_limit(*tissue, steps) / limit, 1, 0.04) << nu << ", " << steps;
+      }
     }
   }
 }
@@ -77,7 +78,7 @@ TEST(SubstepChoice, ASliceOnePointThickBearsNearlyWhatWholeTissueDoes) {
     tissue.finish();
     const std::vector<std::uint8_t> all(tissue.state().blocks.all.size(), 1);
     LinearisedMotion motion(tissue.state(), all);
-    limit[sliced] = 2 / std::sqrt(largest_eigenvalue(motion, 12));
+    limit[sliced] = 2 / std::sqrt(largest_eigenvalue(motion, 8));
     EXPECT_EQ(tissue.fragments().size(), sliced ? 3u : 1u);
   }
   EXPECT_GT(limit[1], 0.95 * limit[0]);

@@ -138,12 +138,12 @@ void SubstepChoice::measure_if_due(MpmState& state, const MeasureLimit& measure)
 double SubstepChoice::longest(MpmState& state, const FrameInput& input,
                               const Stiffening& stiffening, const MeasureLimit& measure) {
   const double cautious = stable_substep(state, stiffening);
-  return shortened_ * longest_as_it_went(state, input, stiffening, cautious, measure);
+  return shortened_ * longest_foreseen(state, input, stiffening, cautious, measure);
 }
 
-double SubstepChoice::longest_as_it_went(MpmState& state, const FrameInput& input,
-                                         const Stiffening& stiffening, double cautious,
-                                         const MeasureLimit& measure) {
+double SubstepChoice::longest_foreseen(MpmState& state, const FrameInput& input,
+                                       const Stiffening& stiffening, double cautious,
+                                       const MeasureLimit& measure) {
   if (!input.cuts.empty() || tears(state)) return cautious;
   measure_if_due(state, measure);
   if (limit_ == 0) return cautious;

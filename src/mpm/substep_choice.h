@@ -44,8 +44,9 @@ class SubstepChoice {
   int part(const MpmState& state, const FrameInput& input, int left, double dt) const;
 
  private:
-  double longest_as_it_went(MpmState& state, const FrameInput& input, const Stiffening& stiffening,
-                            double cautious, const MeasureLimit& measure);
+  /// longest() as long as no part had to be undone.
+  double longest_foreseen(MpmState& state, const FrameInput& input, const Stiffening& stiffening,
+                          double cautious, const MeasureLimit& measure);
   void measure_if_due(MpmState& state, const MeasureLimit& measure);
 
   double limit_ = 0;        ///< when it was measured last [s]; 0 where it is not known

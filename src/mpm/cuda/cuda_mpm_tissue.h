@@ -106,7 +106,7 @@ class CudaMpmTissue final : public Tissue {
   double duration_ = 0;                     ///< of the frame in flight [s]
   int substeps_ = 0;       ///< of its last part, as long as their loads are not summed
   float dt_ = 0;           ///< of these [s]
-  bool measured_ = false;  ///< whether finish_measure() saw it
+  bool measured_ = false;  ///< whether the state is as finish_measure() saw it
   Stiffening stiffening_;
   std::vector<float> modulus_;  ///< see SubstepChoice::follow()
   SubstepChoice substep_;

@@ -68,7 +68,8 @@ struct CudaMpmTissue::OnDevice {
     bool new_facets = false;  ///< there were some that had not gone up
     double time = 0;
     FrameResult result;
-    /// `entries` of CudaTables::with, of which few are not 0.
+    /// Room for those of `entries` of CudaTables::with that are not 0, which are few: where they
+    /// are more, a part is not undone.
     static std::size_t most_held(std::size_t entries) {
       return std::min(entries, 32768 + entries / 32);
     }

@@ -76,6 +76,12 @@ TISSUE_SIM_INLINE bool any_negative(Mask<W> m) {
   return (all & 0x8000000080000000) != 0;
 }
 
+/// Whether any lane is above 0, where none is below.
+template <int W>
+TISSUE_SIM_INLINE bool any_positive(Vec<W> v) {
+  return any_negative<W>(-bits<W>(v));
+}
+
 /// W floats from any address.
 template <int W>
 TISSUE_SIM_INLINE Vec<W> load(const float* p) {

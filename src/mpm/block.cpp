@@ -18,13 +18,29 @@ void lay_out(Block& block) {
   for (const Block::Run& run : block.runs) {
     for (int i = 0; i < run.count; ++i) block.cell[run.lane + i] = run.y * block.pitch + run.x + i;
     for (int y = run.y; y < run.y + 3; ++y) {
-      Block::NodeSpan& row = block.node_rows[y];
+      Block::Span& row = block.node_rows[y];
       row.begin = std::min(row.begin, run.x);
       row.end = std::max(row.end, run.x + run.count + 2);
     }
   }
   block.volume.assign(block.lane_count(), 0.0f);
   block.point.assign(block.lane_count(), -1);
+}
+
+void find_filled(Block& block) {
+  block.filled.assign(block.nz, {});
+  for (int z = 0; z < block.nz; ++z) {
+    const std::int32_t* points =
+        block.point.data() + static_cast<std::size_t>(z) * 8 * block.stride;
+    for (int j = 0; j < block.stride; ++j) {
+      int s = 0;
+      while (s < 8 && points[s * block.stride + j] < 0) ++s;
+      if (s == 8) continue;
+      std::vector<Block::Span>& spans = block.filled[z];
+      if (spans.empty() || spans.back().end < j) spans.push_back({j, j});
+      spans.back().end = j + 1;
+    }
+  }
 }
 
 }  // namespace tissue_sim

@@ -32,10 +32,11 @@ struct Block {
     int x, y, count, lane;
   };
   std::vector<Run> runs;
-  struct NodeSpan {
+  struct Span {
     int begin, end;
   };
-  std::vector<NodeSpan> node_rows;  ///< [ny + 2]: nodes of the row that the runs see
+  std::vector<Span> node_rows;            ///< [ny + 2]: nodes of the row that the runs see
+  std::vector<std::vector<Span>> filled;  ///< [nz]: lanes whose cells hold points, in order
   /// [stride]: lowest node of the lane's cell, y * pitch + x; 0 in padding. The node at dx, dy, dz
   /// (0..2) from it has the number z * plane + cell[lane] + dz * plane + dy * pitch + dx.
   std::vector<std::int32_t> cell;
@@ -91,5 +92,8 @@ struct Block {
 
 /// Sets all that follows from nx, ny, nz and the runs, and makes the arrays, without points.
 void lay_out(Block& block);
+
+/// Sets `filled`, when the points are there.
+void find_filled(Block& block);
 
 }  // namespace tissue_sim

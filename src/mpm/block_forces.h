@@ -67,7 +67,11 @@ TISSUE_SIM_INLINE void stress_lanes(const Block& b, const BlockField& f, const L
     Vec<W>(*F)[9] = G + first;
     for (int s = 0; s < kTogether; ++s) add_identity<W>(F[s]);
     const auto k = Materials::template stiffness<kTogether, W>(b, f, lane + first * l.stride);
-    Materials::template stresses<kTogether, W>(F, k, F);
+    if (any_positive<W>(k.mu[0] + k.mu[1] + k.mu[2] + k.mu[3])) {
+      Materials::template stresses<kTogether, W>(F, k, F);
+    } else {
+      std::fill_n(&F[0][0], kTogether * 9, Vec<W>{});
+    }
     for (int s = 0; viscous && s < kTogether; ++s) {
       for (int i = 0; i < 9; ++i) F[s][i] += damping[i];
     }
@@ -95,7 +99,7 @@ TISSUE_SIM_INLINE void forces(const Block& b, const BlockField& f, BlockScratch&
     gather_nodes(b, f, f.nodes->v, inv_h, l, scratch.velocities.data());
   }
   float* out = scratch.out.data();
-  std::fill_n(out, 2 * l.out_plane, 0.0f);  // the third is written before it is added to
+  std::fill_n(out, 2 * l.out_plane, 0.0f);
   for (int z = 0; z < 2; ++z) {
     load_plane<W>(b, l, scratch.nodes.data(), z, scratch.in.data());
     if (viscous) load_mean_plane<W>(b, l, scratch.velocities.data(), z, scratch.in_rate.data());
@@ -103,12 +107,16 @@ TISSUE_SIM_INLINE void forces(const Block& b, const BlockField& f, BlockScratch&
   const int lanes = b.runs.back().lane + b.runs.back().count;
   for (int z = 0; z < b.nz + 2; ++z) {
     if (z < b.nz) {
+      const std::vector<Block::Span>& filled = b.filled[z];
+      const bool all = filled.size() == 1 && filled[0].end - filled[0].begin == lanes;
+      // The uppermost plane is written, not added to, in the lanes that are filled.
+      if (!all) std::fill_n(out + kLanes + (z + 2) % 3 * l.out_plane, l.in_plane, 0.0f);
       load_plane<W>(b, l, scratch.nodes.data(), z + 2, scratch.in.data());
       if (viscous) {
         load_mean_plane<W>(b, l, scratch.velocities.data(), z + 2, scratch.in_rate.data());
       }
-      for_each_vector<W>(
-          lanes, [&](auto width, int j) __attribute__((always_inline)) {
+      for_each_filled<W>(
+          filled, [&](auto width, int j) __attribute__((always_inline)) {
             stress_lanes<width, Materials, viscous>(b, f, l, scratch.in.data(),
                                                     scratch.in_rate.data(), z, j, out);
           });

@@ -2,6 +2,7 @@
 // a node plane, then z between three planes, and the transpose for the forces. See docs/design.md.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <type_traits>
 
@@ -47,6 +48,28 @@ TISSUE_SIM_INLINE void for_each_vector(int count, const F& f) {
   int j = 0;
   for (; count - j > (W > 4 ? half : 0); j += W) f(std::integral_constant<int, W>(), j);
   if (j < count) f(std::integral_constant<int, half>(), j);
+}
+
+/// Calls f(width, j) for the steps that cover lanes in `spans`, in order, each lane once: W wide or
+/// half of it, from multiples of the half on. Lanes in none are left out where a step has no other.
+template <int W, class Spans, class F>
+TISSUE_SIM_INLINE void for_each_filled(const Spans& spans, const F& f) {
+  constexpr int half = W > 4 ? W / 2 : W;
+  int j = 0;
+  for (auto span = spans.begin(); span != spans.end(); ++span) {
+    for (j = std::max(j, span->begin / half * half); j < span->end;) {
+      const auto next = span + 1;
+      const bool wide = span->end > j + half ||
+                        (next != spans.end() && next->begin < j + W && next->end > j + half);
+      if (W > 4 && wide) {
+        f(std::integral_constant<int, W>(), j);
+        j += W;
+      } else {
+        f(std::integral_constant<int, half>(), j);
+        j += half;
+      }
+    }
+  }
 }
 
 /// x-y pass of one component for W cells: u, at the first one's lowest node of a node plane, ->

@@ -44,7 +44,7 @@ TISSUE_SIM_INLINE void gather_nodes(const Block& b, const BlockField& f, const A
       for (int y = 0; y < b.ny + 2; ++y) {
         const float* row = from + z * f.pitch_z + y * f.pitch_y;
         float* out_row = to + z * l.plane + y * l.pitch;
-        const Block::NodeSpan seen = b.node_rows[y];
+        const Block::Span seen = b.node_rows[y];
         for (int x = seen.begin; x < seen.end; ++x) out_row[x] = row[x] * scale;
       }
     }

@@ -63,7 +63,7 @@ void connect_forces(Blocks& blocks, const std::vector<LatticeBody>& bodies, int 
         const int local = z * block->plane + y * block->pitch;
         const int row = b.node(-1, block->y + y - 1, block->z + z - 1);
         // A row without the nodes that this block sees split: parts between them.
-        const Block::NodeSpan seen = block->node_rows[y];
+        const Block::Span seen = block->node_rows[y];
         int begin = seen.begin;
         const auto add = [&](int end) {
           if (end > begin) {

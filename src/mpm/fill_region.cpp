@@ -74,6 +74,7 @@ Block make_block(const BlockRegion& r, const LatticeBody& b, const Points& point
     block.partial.push_back(
         {z * block.stride + column, z * block.plane + block.cell[column], static_cast<float>(mu)});
   }
+  find_filled(block);
   std::sort(block.partial.begin(), block.partial.end(),
             [](const auto& p, const auto& q) { return p.lane < q.lane; });
   find_materials(block, b, points);

@@ -136,7 +136,7 @@ void stress_is_the_energys_gradient() {
       up.data()[k] += 1e-5;
       down.data()[k] -= 1e-5;
       slope.data()[k] =
-          (LawOf::energy(up.data(), kMu, kLambda) - LawOf::energy(down.data(), kMu, kLambda)) /
+          (energy<LawOf>(up.data(), kMu, kLambda) - energy<LawOf>(down.data(), kMu, kLambda)) /
           2e-5;
     }
     EXPECT_LT((slope - p).norm(), 1e-7 * (p.norm() + kMu)) << f;

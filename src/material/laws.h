@@ -49,20 +49,32 @@ TISSUE_SIM_INLINE void times_symmetric(const T* F, const T* S, T* FS) {
   }
 }
 
-/// Rotation of the polar decomposition F = R U (det R = 1).
+/// Rotations of the polar decompositions F = R U (det R = 1) of N points.
+template <int N, class T>
+TISSUE_SIM_INLINE void rotations(const T (*F)[9], T (*R)[9]) {
+  Invariants<T> of[N];
+  Stretch<T> s[N];
+  for (int k = 0; k < N; ++k) {
+    T cof[9];
+    cofactor(F[k], cof);
+    of[k] = {norm2(F[k]), norm2(cof), F[k][0] * cof[0] + F[k][1] * cof[1] + F[k][2] * cof[2]};
+  }
+  stretch<N>(of, s);
+  for (int k = 0; k < N; ++k) {
+    T cof[9], C[6], FC[9];
+    cofactor(F[k], cof);
+    right_cauchy_green(F[k], C);
+    times_symmetric(F[k], C, FC);
+    for (int i = 0; i < 9; ++i) {
+      R[k][i] = ((s[k].b + of[k].c1) * F[k][i] - FC[i] + s[k].a * cof[i]) * s[k].inverse;
+    }
+  }
+}
+
+/// That of one point: F[9] -> R[9].
 template <class T>
 TISSUE_SIM_INLINE void rotation(const T* F, T* R) {
-  T cof[9], C[6], FC[9];
-  cofactor(F, cof);
-  const T J = F[0] * cof[0] + F[1] * cof[1] + F[2] * cof[2];
-  const Invariants<T> of = {norm2(F), norm2(cof), J};
-  Stretch<T> s;
-  stretch<1>(&of, &s);
-  right_cauchy_green(F, C);
-  times_symmetric(F, C, FC);
-  for (int i = 0; i < 9; ++i) {
-    R[i] = ((s.b + of.c1) * F[i] - FC[i] + s.a * cof[i]) * s.inverse;
-  }
+  rotations<1>(reinterpret_cast<const T(*)[9]>(F), reinterpret_cast<T(*)[9]>(R));
 }
 
 /// Fixed corotated (Stomakhin et al. 2012): psi = mu ||F - R||^2 + lambda/2 (J - 1)^2.
@@ -100,15 +112,18 @@ struct FixedCorotated {
     }
   }
 
-  /// Energy per volume; ||F - R||^2 = tr C - 2 tr U + 3.
-  template <class T>
-  TISSUE_SIM_INLINE static T energy(const T* F, T mu, T lambda) {
-    T cof[9], R[9], d = mu * 0.0f;
-    cofactor(F, cof);
-    const T J = F[0] * cof[0] + F[1] * cof[1] + F[2] * cof[2];
-    rotation(F, R);
-    for (int i = 0; i < 9; ++i) d += (F[i] - R[i]) * (F[i] - R[i]);
-    return mu * d + 0.5f * lambda * (J - 1.0f) * (J - 1.0f);
+  /// Energies per volume of N points, with as many `mu` and `lambda`.
+  template <int N, class T>
+  TISSUE_SIM_INLINE static void energies(const T (*F)[9], const T* mu, const T* lambda, T* energy) {
+    T R[N][9];
+    rotations<N>(F, R);
+    for (int k = 0; k < N; ++k) {
+      T cof[9];
+      cofactor(F[k], cof);
+      const T J = F[k][0] * cof[0] + F[k][1] * cof[1] + F[k][2] * cof[2];
+      for (int i = 0; i < 9; ++i) R[k][i] = F[k][i] - R[k][i];
+      energy[k] = mu[k] * norm2(R[k]) + 0.5f * lambda[k] * (J - 1.0f) * (J - 1.0f);
+    }
   }
 };
 
@@ -127,13 +142,15 @@ struct NeoHookean {
     }
   }
 
-  template <class T>
-  TISSUE_SIM_INLINE static T energy(const T* F, T mu, T lambda) {
-    T cof[9];
-    cofactor(F, cof);
-    const T J = F[0] * cof[0] + F[1] * cof[1] + F[2] * cof[2];
-    return 0.5f * mu * (norm2(F) - 3.0f) - mu * (J - 1.0f) +
-           0.5f * (lambda + mu) * (J - 1.0f) * (J - 1.0f);
+  template <int N, class T>
+  TISSUE_SIM_INLINE static void energies(const T (*F)[9], const T* mu, const T* lambda, T* energy) {
+    for (int k = 0; k < N; ++k) {
+      T cof[9];
+      cofactor(F[k], cof);
+      const T J = F[k][0] * cof[0] + F[k][1] * cof[1] + F[k][2] * cof[2];
+      energy[k] = 0.5f * mu[k] * (norm2(F[k]) - 3.0f) - mu[k] * (J - 1.0f) +
+                  0.5f * (lambda[k] + mu[k]) * (J - 1.0f) * (J - 1.0f);
+    }
   }
 };
 
@@ -142,6 +159,14 @@ template <class LawOf, class T>
 TISSUE_SIM_INLINE void stress(const T* F, T mu, T lambda, T* P) {
   LawOf::template stresses<1>(reinterpret_cast<const T(*)[9]>(F), &mu, &lambda,
                               reinterpret_cast<T(*)[9]>(P));
+}
+
+/// energies() of one point.
+template <class LawOf, class T>
+TISSUE_SIM_INLINE T energy(const T* F, T mu, T lambda) {
+  T of_point;
+  LawOf::template energies<1>(reinterpret_cast<const T(*)[9]>(F), &mu, &lambda, &of_point);
+  return of_point;
 }
 
 /// Kelvin-Voigt viscosity: adds F S with S = 2 eta dE/dt, E Green's strain, to P.

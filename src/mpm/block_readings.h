@@ -108,6 +108,68 @@ TISSUE_SIM_INLINE Vec<W> larger(Vec<W> a, Vec<W> b) {
   return keep<W>(~is_b, a) + keep<W>(is_b, b);
 }
 
+/// What state() has read so far: `energy` lane by lane [J], `least` of the materials' stiffenings.
+struct Readings {
+  BlockState block;
+  double energy[kLanes] = {};
+  float least = 1;
+};
+
+/// Widens `stiffening` to a point's, whose squared columns of cof F, J and ||F||^2 are given.
+TISSUE_SIM_INLINE void stiffen(const Block& b, const BlockField& f, std::int32_t point,
+                               float column, float J, float f2, Readings& read) {
+  BlockState& r = read.block;
+  float stiffening = column + std::fabs(J - 1) * std::sqrt(f2 / 3);
+  if (!std::isfinite(stiffening)) r.finite = false;
+  r.wildest = std::max(r.wildest, stiffening);
+  if (f.soft != nullptr && f.soft[point] != 0) stiffening *= kSoftness;
+  const int material = f.material == nullptr ? 0 : f.material[point];
+  r.stiffening[material] = std::max(r.stiffening[material], stiffening);
+  read.least = b.material != Block::kMixed
+                   ? r.stiffening[b.material]
+                   : *std::min_element(r.stiffening.begin(), r.stiffening.end());
+}
+
+/// Reads N of the points of W cells, from `lane` on, which is of the first. G: their displacement
+/// gradients, to which I is added.
+template <int N, int W, class Materials>
+TISSUE_SIM_INLINE void read_states(const Block& b, const BlockField& f, std::size_t lane,
+                                   Vec<W> (*G)[9], Readings& read, float* von_mises) {
+  const auto k = Materials::template stiffness<N, W>(b, f, lane);
+  Vec<W> energy[N], P[N][9];
+  for (int s = 0; s < N; ++s) add_identity<W>(G[s]);
+  Materials::template energies<N, W>(G, k, energy);
+  if (von_mises) Materials::template stresses<N, W>(G, k, P);
+  for (int s = 0; s < N; ++s, lane += b.stride) {
+    const std::int32_t* point = b.point.data() + lane;
+    Mask<W> is_point;
+    std::memcpy(&is_point, point, sizeof(is_point));
+    is_point = ~(is_point >> 31);
+    energy[s] = keep<W>(is_point, energy[s]);
+    for (int i = 0; i < W; ++i) read.energy[i] += energy[s][i];
+    if (von_mises) {
+      const Vec<W> V = load<W>(b.volume.data() + lane);
+      const Vec<W> squared = von_mises_squared(G[s], P[s]) / (V * V);
+      for (int i = 0; i < W; ++i) von_mises[lane + i] = std::sqrt(squared[i]);
+    }
+    Vec<W> cof[9];
+    cofactor(G[s], cof);
+    const Vec<W> J = G[s][0] * cof[0] + G[s][1] * cof[1] + G[s][2] * cof[2];
+    const Vec<W> cx = cof[0] * cof[0] + cof[3] * cof[3] + cof[6] * cof[6];
+    const Vec<W> cy = cof[1] * cof[1] + cof[4] * cof[4] + cof[7] * cof[7];
+    const Vec<W> cz = cof[2] * cof[2] + cof[5] * cof[5] + cof[8] * cof[8];
+    const Vec<W> f2 = norm2(G[s]);
+    // Few lanes are looked at one by one, for sqrt(x) <= (1 + x) / 2.
+    const Vec<W> at_most =
+        larger<W>(cx, larger<W>(cy, cz)) + larger<W>(J - 1.0f, 1.0f - J) * (0.5f + (1.0f / 6) * f2);
+    if (!any_negative<W>(bits<W>(read.least - at_most) & is_point)) continue;
+    for (int i = 0; i < W; ++i) {
+      if (point[i] < 0) continue;
+      stiffen(b, f, point[i], std::max(cx[i], std::max(cy[i], cz[i])), J[i], f2[i], read);
+    }
+  }
+}
+
 template <int W, class Materials>
 TISSUE_SIM_INLINE BlockState state(const Block& b, const BlockField& f, BlockScratch& scratch,
                                    float* von_mises) {
@@ -115,62 +177,24 @@ TISSUE_SIM_INLINE BlockState state(const Block& b, const BlockField& f, BlockScr
   reserve(scratch.nodes, 3 * l.node_component);
   reserve(scratch.in, 3 * l.in_plane);
   gather_nodes(b, f, f.nodes->u, 1.0f / f.cell_size, l, scratch.nodes.data());
-  BlockState result;
-  result.stiffening.assign(f.material_count, 1.0f);
-  double energy[W] = {};
-  float least = 1;  // of its materials' stiffenings so far
+  Readings read;
+  read.block.stiffening.assign(f.material_count, 1.0f);
   for (int z = 0; z < 2; ++z) load_plane<W>(b, l, scratch.nodes.data(), z, scratch.in.data());
   for (int z = 0; z < b.nz; ++z) {
     load_plane<W>(b, l, scratch.nodes.data(), z + 2, scratch.in.data());
-    for (int j = 0; j < l.stride; j += W) {
-      Vec<W> G[8][9];
-      gradients<W>(l, scratch.in.data(), z, j, G);
-      for (int s = 0; s < 8; ++s) {
-        const std::size_t lane = (static_cast<std::size_t>(z) * 8 + s) * l.stride + j;
-        const std::int32_t* point = b.point.data() + lane;
-        Mask<W> is_point;
-        std::memcpy(&is_point, point, sizeof(is_point));
-        is_point = ~(is_point >> 31);
-        Vec<W> cof[9];
-        const auto k = Materials::template stiffness<1, W>(b, f, lane);
-        add_identity<W>(G[s]);
-        const Vec<W> of_lanes = keep<W>(is_point, Materials::template energy<W>(G[s], k));
-        for (int i = 0; i < W; ++i) energy[i] += of_lanes[i];
-        if (von_mises) {
-          Vec<W> P[1][9];
-          Materials::template stresses<1, W>(G + s, k, P);
-          const Vec<W> V = load<W>(b.volume.data() + lane);
-          const Vec<W> squared = von_mises_squared(G[s], P[0]) / (V * V);
-          for (int i = 0; i < W; ++i) von_mises[lane + i] = std::sqrt(squared[i]);
-        }
-        cofactor(G[s], cof);
-        const Vec<W> J = G[s][0] * cof[0] + G[s][1] * cof[1] + G[s][2] * cof[2];
-        const Vec<W> cx = cof[0] * cof[0] + cof[3] * cof[3] + cof[6] * cof[6];
-        const Vec<W> cy = cof[1] * cof[1] + cof[4] * cof[4] + cof[7] * cof[7];
-        const Vec<W> cz = cof[2] * cof[2] + cof[5] * cof[5] + cof[8] * cof[8];
-        const Vec<W> f2 = norm2(G[s]);
-        // Few lanes are looked at one by one, for sqrt(x) <= (1 + x) / 2.
-        const Vec<W> at_most = larger<W>(cx, larger<W>(cy, cz)) +
-                               larger<W>(J - 1.0f, 1.0f - J) * (0.5f + (1.0f / 6) * f2);
-        if (!any_negative<W>(bits<W>(least - at_most) & is_point)) continue;
-        for (int i = 0; i < W; ++i) {
-          if (point[i] < 0) continue;
-          float stiffening =
-              std::max(cx[i], std::max(cy[i], cz[i])) + std::fabs(J[i] - 1) * std::sqrt(f2[i] / 3);
-          if (!std::isfinite(stiffening)) result.finite = false;
-          result.wildest = std::max(result.wildest, stiffening);
-          if (f.soft != nullptr && f.soft[point[i]] != 0) stiffening *= kSoftness;
-          const int material = f.material == nullptr ? 0 : f.material[point[i]];
-          result.stiffening[material] = std::max(result.stiffening[material], stiffening);
-        }
-        least = b.material != Block::kMixed
-                    ? result.stiffening[b.material]
-                    : *std::min_element(result.stiffening.begin(), result.stiffening.end());
-      }
-    }
+    for_each_filled<W>(
+        b.filled[z], [&](auto width, int j) __attribute__((always_inline)) {
+          const std::size_t lane = static_cast<std::size_t>(z) * 8 * l.stride + j;
+          Vec<width> G[8][9];
+          gradients<width>(l, scratch.in.data(), z, j, G);
+          for (int s = 0; s < 8; s += 4) {
+            read_states<4, width, Materials>(b, f, lane + s * l.stride, G + s, read, von_mises);
+          }
+        });
   }
+  BlockState& result = read.block;
   result.elastic_energy = stabilise_cells(b, f, l, scratch.nodes.data(), nullptr);
-  for (const double e : energy) result.elastic_energy += e;
+  for (const double e : read.energy) result.elastic_energy += e;
   result.finite = result.finite && std::isfinite(result.elastic_energy);
   return result;
 }
@@ -197,27 +221,28 @@ TISSUE_SIM_INLINE void stretched(const Block& b, const BlockField& f, float stre
   for (int z = 0; z < 2; ++z) load_plane<W>(b, l, scratch.nodes.data(), z, scratch.in.data());
   for (int z = 0; z < b.nz; ++z) {
     load_plane<W>(b, l, scratch.nodes.data(), z + 2, scratch.in.data());
-    for (int j = 0; j < l.stride; j += W) {
-      Vec<W> G[8][9];
-      gradients<W>(l, scratch.in.data(), z, j, G);
-      for (int s = 0; s < 8; ++s) {
-        Vec<W> C[6];
-        add_identity<W>(G[s]);
-        right_cauchy_green(G[s], C);
-        const Vec<W> x = s2 - C[0], y = s2 - C[1], w = s2 - C[2];
-        const Vec<W> minor = x * y - C[3] * C[3];
-        const Vec<W> det =
-            w * minor - x * C[5] * C[5] - y * C[4] * C[4] - 2.0f * C[3] * C[4] * C[5];
-        const Mask<W> beyond = bits<W>(x) | bits<W>(minor) | bits<W>(det);
-        if (!any_negative<W>(beyond)) continue;
-        const std::int32_t* point =
-            b.point.data() + (static_cast<std::size_t>(z) * 8 + s) * l.stride + j;
-        for (int i = 0; i < W; ++i) {
-          if (beyond[i] >= 0 || point[i] < 0) continue;
-          found.push_back({point[i], {C[0][i], C[1][i], C[2][i], C[3][i], C[4][i], C[5][i]}});
-        }
-      }
-    }
+    for_each_filled<W>(
+        b.filled[z], [&](auto width, int j) __attribute__((always_inline)) {
+          using V = Vec<width>;
+          V G[8][9];
+          gradients<width>(l, scratch.in.data(), z, j, G);
+          for (int s = 0; s < 8; ++s) {
+            V C[6];
+            add_identity<width>(G[s]);
+            right_cauchy_green(G[s], C);
+            const V x = s2 - C[0], y = s2 - C[1], w = s2 - C[2];
+            const V minor = x * y - C[3] * C[3];
+            const V det = w * minor - x * C[5] * C[5] - y * C[4] * C[4] - 2.0f * C[3] * C[4] * C[5];
+            const Mask<width> beyond = bits<width>(x) | bits<width>(minor) | bits<width>(det);
+            if (!any_negative<width>(beyond)) continue;
+            const std::int32_t* point =
+                b.point.data() + (static_cast<std::size_t>(z) * 8 + s) * l.stride + j;
+            for (int i = 0; i < width; ++i) {
+              if (beyond[i] >= 0 || point[i] < 0) continue;
+              found.push_back({point[i], {C[0][i], C[1][i], C[2][i], C[3][i], C[4][i], C[5][i]}});
+            }
+          }
+        });
   }
 }
 

@@ -36,9 +36,10 @@ struct OneMaterial {
                                          Vec<W> (*P)[9]) {
     LawOf::template stresses<N>(F, k.mu, k.lambda, P);
   }
-  template <int W>
-  TISSUE_SIM_INLINE static Vec<W> energy(const Vec<W>* F, const Stiffness<1, W>& k) {
-    return LawOf::energy(F, k.mu[0], k.lambda[0]);
+  template <int N, int W>
+  TISSUE_SIM_INLINE static void energies(const Vec<W> (*F)[9], const Stiffness<N, W>& k,
+                                         Vec<W>* energy) {
+    LawOf::template energies<N>(F, k.mu, k.lambda, energy);
   }
   /// What W cells in z-plane z damp: their viscosity times the volume V of their points, less where
   /// V does not fill the cell, times V / h^3 [J s].
@@ -92,10 +93,13 @@ struct BothLaws : SeveralMaterials<FixedCorotated> {
       for (int i = 0; i < 9; ++i) P[s][i] = k.neo_hookean[s] ? other[s][i] : P[s][i];
     }
   }
-  template <int W>
-  TISSUE_SIM_INLINE static Vec<W> energy(const Vec<W>* F, const Stiffness<1, W>& k) {
-    return k.neo_hookean[0] ? NeoHookean::energy(F, k.mu[0], k.lambda[0])
-                            : FixedCorotated::energy(F, k.mu[0], k.lambda[0]);
+  template <int N, int W>
+  TISSUE_SIM_INLINE static void energies(const Vec<W> (*F)[9], const Stiffness<N, W>& k,
+                                         Vec<W>* energy) {
+    Vec<W> other[N];
+    NeoHookean::energies<N>(F, k.mu, k.lambda, other);
+    FixedCorotated::energies<N>(F, k.mu, k.lambda, energy);
+    for (int s = 0; s < N; ++s) energy[s] = k.neo_hookean[s] ? other[s] : energy[s];
   }
 };
 

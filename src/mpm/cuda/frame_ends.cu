@@ -122,16 +122,16 @@ __global__ void __launch_bounds__(kMostThreads)
     float cof[9];
     cofactor(p.F, cof);
     const float J = p.F[0] * cof[0] + p.F[1] * cof[1] + p.F[2] * cof[2];
-    const float energy = body.neo_hookean != 0 ? NeoHookean::energy(p.F, body.mu, body.lambda)
-                                               : FixedCorotated::energy(p.F, body.mu, body.lambda);
+    const float elastic = body.neo_hookean != 0 ? energy<NeoHookean>(p.F, body.mu, body.lambda)
+                                                : energy<FixedCorotated>(p.F, body.mu, body.lambda);
     float column = 0;
     for (int i = 0; i < 3; ++i) {
       column = fmaxf(column, cof[i] * cof[i] + cof[3 + i] * cof[3 + i] + cof[6 + i] * cof[6 + i]);
     }
     const float stiffening = column + fabsf(J - 1) * sqrtf(norm2(p.F) / 3);
-    if (!isfinite(energy + stiffening)) m.finite = 0;
+    if (!isfinite(elastic + stiffening)) m.finite = 0;
     const float volume = b.whole != 0 ? body.point_volume : t.volume[lane];
-    m.elastic_energy += static_cast<double>(energy) * volume;
+    m.elastic_energy += static_cast<double>(elastic) * volume;
     m.wildest = fmaxf(m.wildest, stiffening);
     const bool is_soft = t.soft != nullptr && t.soft[t.point[lane]] != 0;
     m.stiffening = fmaxf(m.stiffening, is_soft ? kSoftness * stiffening : stiffening);

@@ -53,7 +53,9 @@ class Tissue {
   virtual int point_count() const = 0;
   /// Replaces `cloud` with the selected points, as Point after Point. Returns their number.
   virtual int read_points(const PointSelection& selection, std::vector<std::uint8_t>& cloud) = 0;
-  /// All pieces, by id, as of the last finish().
+  /// Number of pieces, as of the last finish(). It grows whenever a piece comes apart.
+  virtual int fragment_count() const = 0;
+  /// All pieces, by id, as of the last finish(). The first call after that looks where they are.
   virtual Span<const Fragment> fragments() const = 0;
   /// Hash of the whole state: equal states, equal checksums.
   virtual std::uint64_t checksum() const = 0;

@@ -31,7 +31,6 @@ MpmTissue::MpmTissue(const Scene& scene, std::vector<std::string> notes)
   measure();
   substep_.follow(*state_, modulus_);
   measured_ = false;  // who holds the state may change it
-  measure_pieces(*state_, pieces_);
 }
 
 float MpmTissue::stable_substep() const { return tissue_sim::stable_substep(*state_, stiffening_); }
@@ -251,9 +250,17 @@ FrameResult MpmTissue::finish() {
   // Nothing that instruments do moves tissue at the speed of a bullet; what does is out of control.
   result_.blew_up = result_.blew_up || !(result_.max_speed < 300);
   if (tame()) measure_and_follow();
-  measured_ = false;
-  measure_pieces(*state_, pieces_);
+  measured_ = pieces_measured_ = false;
   return result_;
+}
+
+Span<const Fragment> MpmTissue::fragments() const {
+  if (!pieces_measured_) {
+    auto* self = const_cast<MpmTissue*>(this);  // only what was not looked at yet changes
+    measure_pieces(*self->state_, self->pieces_);
+    self->pieces_measured_ = true;
+  }
+  return pieces_.all;
 }
 
 std::uint64_t MpmTissue::checksum() const { return tissue_sim::checksum(*state_, pieces_); }

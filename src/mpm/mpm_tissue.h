@@ -23,7 +23,8 @@ class MpmTissue final : public Tissue {
   FrameResult finish() override;
   int point_count() const override { return state_->points.size(); }
   int read_points(const PointSelection& selection, std::vector<std::uint8_t>& cloud) override;
-  Span<const Fragment> fragments() const override { return pieces_.all; }
+  int fragment_count() const override { return static_cast<int>(pieces_.all.size()); }
+  Span<const Fragment> fragments() const override;
   std::uint64_t checksum() const override;
   std::string device_name() const override;
   const std::vector<std::string>& notes() const override { return notes_; }
@@ -73,8 +74,9 @@ class MpmTissue final : public Tissue {
   Pieces pieces_;
   Checkpoint checkpoint_;  ///< before the last part of a frame
   Stiffening stiffening_;
-  std::vector<float> modulus_;  ///< see SubstepChoice::follow()
-  bool measured_ = false;       ///< whether the state is as it was when it was measured
+  std::vector<float> modulus_;    ///< see SubstepChoice::follow()
+  bool measured_ = false;         ///< whether the state is as it was when it was measured
+  bool pieces_measured_ = false;  ///< whether they are where the frame left them
   SubstepChoice substep_;
   FrameResult result_;
 };

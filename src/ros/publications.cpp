@@ -39,6 +39,17 @@ std::set<std::string> Publications::topics() const {
   return names;
 }
 
+bool Publications::count_pieces(const Tissue& tissue) {
+  if (tissue.fragment_count() == pieces_.count) return false;
+  pieces_ = {};
+  for (const Fragment& f : tissue.fragments()) {
+    ++pieces_.count;
+    pieces_.loose += f.loose;
+    pieces_.volume += f.volume;
+  }
+  return true;
+}
+
 std_msgs::Header Publications::header(const ros::Time& stamp) const {
   std_msgs::Header h;
   h.stamp = stamp;
@@ -47,7 +58,7 @@ std_msgs::Header Publications::header(const ros::Time& stamp) const {
 }
 
 void Publications::announce() {
-  pieces_.clear();
+  pieces_ = {};
   scene_output_.publish(scene_text_, ros::Time::now(), true);
 }
 
@@ -62,6 +73,7 @@ void Publications::publish(Simulation& simulation, const FrameReport& report, co
     m->header = header(stamp);
     inputs_.publish(m, stamp, true);
   }
+  const bool came_apart = count_pieces(simulation.tissue());
   const bool state_due = state_due_.due(now) || all || run.blew_up;
   if (state_due && state_.wanted()) {
     state_.publish(state_message(simulation, report, run, stamp), stamp);
@@ -70,10 +82,7 @@ void Publications::publish(Simulation& simulation, const FrameReport& report, co
   if (run.blew_up) return;  // what follows may hold NaN
   publish_wrenches(report, stamp);
 
-  Pieces pieces;
-  for (const Fragment& f : simulation.tissue().fragments()) pieces.emplace_back(f.id, f.loose);
-  const bool changed = pieces != pieces_;
-  const bool fragments_due = fragments_due_.due(now) || all || changed;
+  const bool fragments_due = fragments_due_.due(now) || all || came_apart;
   if (fragments_due && fragments_.wanted()) {
     fragments_.publish(fragment_message(simulation, stamp), stamp);
   }
@@ -86,11 +95,11 @@ void Publications::publish(Simulation& simulation, const FrameReport& report, co
   if (markers_due && marker_output_.wanted()) {
     marker_output_.publish(marker_message(simulation, report, stamp), stamp);
   }
-  pieces_ = std::move(pieces);
 }
 
 void Publications::show(Simulation& simulation, const FrameReport& report, const RunState& run) {
   const ros::Time stamp = ros::Time::now();
+  count_pieces(simulation.tissue());
   if (state_.listened()) state_.show(state_message(simulation, report, run, stamp));
   if (run.blew_up) return;
   if (fragments_.listened()) fragments_.show(fragment_message(simulation, stamp));
@@ -116,11 +125,9 @@ boost::shared_ptr<const SimulationState> Publications::state_message(Simulation&
   m->compute_time = report.compute_time;
   m->real_time_factor = run.real_time_factor;
   m->particles = simulation.tissue().point_count();
-  for (const Fragment& f : simulation.tissue().fragments()) {
-    ++m->fragments;
-    m->loose_fragments += f.loose;
-    m->fragment_volume += f.volume;
-  }
+  m->fragments = pieces_.count;
+  m->loose_fragments = pieces_.loose;
+  m->fragment_volume = pieces_.volume;
   m->device = simulation.tissue().device_name();
   m->kinetic_energy = report.result.kinetic_energy;
   m->elastic_energy = report.result.elastic_energy;

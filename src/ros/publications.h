@@ -51,8 +51,12 @@ class Publications {
   struct ToolOutputs {
     Output<geometry_msgs::WrenchStamped> body, spatial;
   };
-  using Pieces = std::vector<std::pair<int, bool>>;  // id, loose
+  struct Pieces {
+    int count = 0, loose = 0;
+    double volume = 0;  // [m^3]
+  };
 
+  bool count_pieces(const Tissue& tissue);  ///< whether any came apart
   std_msgs::Header header(const ros::Time& stamp) const;
   boost::shared_ptr<const SimulationState> state_message(Simulation& simulation,
                                                          const FrameReport& report,

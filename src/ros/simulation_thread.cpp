@@ -191,7 +191,7 @@ void SimulationThread::update_status() {
   s.substep = report_.result.substep;
   s.compute_time = report_.compute_time;
   s.particles = tissue.point_count();
-  s.fragments = tissue.fragments().size();
+  s.fragments = tissue.fragment_count();
   s.device = tissue.device_name();
   const std::lock_guard<std::mutex> lock(mutex_);
   status_ = std::move(s);

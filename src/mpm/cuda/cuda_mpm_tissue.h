@@ -31,6 +31,7 @@ class CudaMpmTissue final : public Tissue {
   FrameResult finish() override;
   int point_count() const override { return state_->points.size(); }
   int read_points(const PointSelection& selection, std::vector<std::uint8_t>& cloud) override;
+  int fragment_count() const override { return static_cast<int>(pieces_.all.size()); }
   Span<const Fragment> fragments() const override;
   std::uint64_t checksum() const override;
   std::string device_name() const override;

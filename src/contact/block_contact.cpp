@@ -23,6 +23,18 @@ bool comes_before(const Touch& a, const Touch& b) {
   return std::tie(a.collider, a.cell, a.sub) < std::tie(b.collider, b.cell, b.sub);
 }
 
+/// Lane of the first point of the cell that holds a site, -1 where the block has no such cell.
+int first_lane(const Block& block, const Points::Site& site) {
+  const int x = site.x / 2 - block.x, y = site.y / 2 - block.y, z = site.z / 2 - block.z;
+  if (z < 0 || z >= block.nz) return -1;
+  for (const Block::Run& run : block.runs) {
+    if (run.y == y && x >= run.x && x < run.x + run.count) {
+      return 8 * z * block.stride + run.lane + x - run.x;
+    }
+  }
+  return -1;
+}
+
 bool overlap(const Box& a, const Box& b) {
   return (a.min.array() <= b.max.array()).all() && (b.min.array() <= a.max.array()).all();
 }
@@ -88,30 +100,20 @@ void list_contacts(MpmState& state) {
   contacts.near.assign(state.blocks.all.size(), {});
   contacts.cells.assign(state.blocks.all.size(), {});
   if (before.empty()) return;  // on a GPU
-  std::vector<Touch> touches;
   for (std::size_t i = 0; i < state.blocks.all.size(); ++i) {
-    const Blocks::Origin& origin = state.blocks.origin[i];
-    touches.clear();
-    for (int b = origin.begin; b < origin.end; ++b) {
-      touches.insert(touches.end(), before[b].begin(), before[b].end());
-    }
-    if (touches.empty()) continue;
-    std::sort(touches.begin(), touches.end(),
-              [](const Touch& a, const Touch& b) { return a.point < b.point; });
     const Block& block = *state.blocks.all[i];
-    const auto lanes = static_cast<std::int32_t>(block.lane_count());
-    for (std::int32_t lane = 0; lane < lanes; ++lane) {
-      const std::int32_t point = block.point[lane];
-      auto touch = std::lower_bound(touches.begin(), touches.end(), point,
-                                    [](const Touch& t, std::int32_t p) { return t.point < p; });
-      for (; touch != touches.end() && touch->point == point; ++touch) {
-        const int sub = lane / block.stride % 8;
-        contacts.touching[i].push_back(*touch);
-        contacts.touching[i].back().sub = static_cast<std::uint8_t>(sub);
-        contacts.touching[i].back().cell = lane - sub * block.stride;
+    std::vector<Touch>& touches = contacts.touching[i];
+    for (int b = state.blocks.origin[i].begin; b < state.blocks.origin[i].end; ++b) {
+      for (Touch touch : before[b]) {
+        const Points::Site& site = state.points.site[touch.point];
+        const int cell = first_lane(block, site);
+        touch.sub = static_cast<std::uint8_t>((site.x & 1) + 2 * (site.y & 1) + 4 * (site.z & 1));
+        if (cell < 0 || block.point[cell + touch.sub * block.stride] != touch.point) continue;
+        touch.cell = cell;
+        touches.push_back(touch);
       }
     }
-    std::sort(contacts.touching[i].begin(), contacts.touching[i].end(), comes_before);
+    std::sort(touches.begin(), touches.end(), comes_before);
   }
 }
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <tuple>
 
 #include "contact/facet_motion.h"
@@ -49,6 +50,12 @@ double speed(const Collider& c) {
   const Vec3 velocity(c.velocity[0], c.velocity[1], c.velocity[2]);
   const Vec3 spin(c.spin[0], c.spin[1], c.spin[2]);
   return velocity.norm() + spin.norm() * Vec3(c.length, c.width, c.radius).norm();
+}
+
+/// How much nearer a block's points and a collider may come in a substep [m].
+double approach(const MpmState& state, int block, const Collider& collider, float dt) {
+  return kListMargin * state.scene.cell_size / kListLasts +
+         (state.motion[block].speed + speed(collider)) * dt;
 }
 
 }  // namespace
@@ -138,8 +145,7 @@ void list_near_cells(MpmState& state, int index, float dt) {
   std::vector<std::uint8_t> points(static_cast<std::size_t>(block.nz) * block.stride);  // of cells
   for (const std::uint8_t c : state.contacts.near[index]) {
     const Collider& collider = state.colliders[c];
-    const double margin = kListMargin * state.scene.cell_size +
-                          (state.motion[index].speed + speed(collider)) * kListLasts * dt;
+    const double margin = kListLasts * approach(state, index, collider, dt);
     const Box box = bounds(collider);
     float min[3], max[3];
     for (int a = 0; a < 3; ++a) {
@@ -176,7 +182,8 @@ void list_near_cells(MpmState& state, int index, float dt) {
   }
 }
 
-void add_contact(MpmState& state, int index, float* force, std::vector<ColliderLoad>& loads) {
+void add_contact(MpmState& state, int index, float dt, float* force,
+                 std::vector<ColliderLoad>& loads) {
   Contacts& contacts = state.contacts;
   const Block& block = *state.blocks.all[index];
   const LatticeBody& body = state.bodies[block.body];
@@ -186,20 +193,28 @@ void add_contact(MpmState& state, int index, float* force, std::vector<ColliderL
   auto held = contacts.touching[index].begin();
   const auto held_end = contacts.touching[index].end();
   std::vector<Touch> touching;
-  for (const NearCell& cell : contacts.cells[index]) {
+  for (NearCell& cell : contacts.cells[index]) {
+    if (cell.clear > 0) {
+      --cell.clear;
+      continue;
+    }
     const Collider& collider = state.colliders[cell.collider];
     ColliderLoad& load = loads[cell.collider];
     const CellNodes nodes(block, cell.node);
     Vec<4> u[8], v[8], pushes[8];
     values_at_points(state.nodes.u, nodes, u);
     bool touches = false;
+    float clear = std::numeric_limits<float>::max();
     for (unsigned points = cell.points; points != 0; points &= points - 1) {
       const int s = __builtin_ctz(points), lane = cell.lane + s * block.stride;
       const float at[3] = {cell.middle[0] + (s & 1 ? quarter : -quarter) + u[s][0],
                            cell.middle[1] + (s & 2 ? quarter : -quarter) + u[s][1],
                            cell.middle[2] + (s & 4 ? quarter : -quarter) + u[s][2]};
       const Gap g = gap(collider, at);
-      if (g.distance >= 0) continue;
+      if (g.distance >= 0) {
+        clear = std::min(clear, clearance(collider, at));
+        continue;
+      }
       if (!touches) {
         touches = true;
         values_at_points(state.nodes.v, nodes, v);
@@ -233,7 +248,12 @@ void add_contact(MpmState& state, int index, float* force, std::vector<ColliderL
         load.torque[a] -= arm[b] * push[d] - arm[d] * push[b];
       }
     }
-    if (touches) spread(block, cell.node, pushes, force);
+    if (touches) {
+      spread(block, cell.node, pushes, force);
+    } else {
+      const double nearer = approach(state, index, collider, dt);
+      cell.clear = static_cast<std::uint8_t>(std::min<double>(kListLasts, clear / nearer));
+    }
   }
   // A point that no longer touches forgets where it was held.
   contacts.touching[index] = std::move(touching);

@@ -25,7 +25,9 @@ bool is_list_due(Contacts& contacts);
 /// seconds.
 void list_near_cells(MpmState& state, int block, float dt);
 
-/// Adds contact forces to the block's part of the force buffer and sums the loads of the colliders.
-void add_contact(MpmState& state, int block, float* force, std::vector<ColliderLoad>& loads);
+/// Adds contact forces to the block's part of the force buffer, before a substep of `dt` seconds,
+/// and sums the loads of the colliders.
+void add_contact(MpmState& state, int block, float dt, float* force,
+                 std::vector<ColliderLoad>& loads);
 
 }  // namespace tissue_sim

@@ -71,6 +71,15 @@ TISSUE_SIM_INLINE Gap gap(const Collider& c, const float* x) {
   return g;
 }
 
+/// How far a place must move at least until gap() tells that it touches [m].
+TISSUE_SIM_INLINE float clearance(const Collider& c, const float* x) {
+  if (c.kind != Collider::kBlade) return gap(c, x).distance;
+  float p[3];
+  to_local(c, x, p);
+  return fmaxf(fabsf(p[1]) - 0.5f * c.thickness,
+               fmaxf(fmaxf(p[0], -c.width - p[0]), fmaxf(p[2], -c.length - p[2])));
+}
+
 /// Velocity of the collider's material at x [m/s].
 TISSUE_SIM_INLINE void velocity_at(const Collider& c, const float* x, float* v) {
   const float d[3] = {x[0] - c.position[0], x[1] - c.position[1], x[2] - c.position[2]};

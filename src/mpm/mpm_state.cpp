@@ -74,7 +74,7 @@ void substep(MpmState& state, float dt, std::vector<ColliderLoad>& loads) {
     state.kernels->forces(block, block_field(state, block), state.scratch.local(), force);
     state.block_loads[i].assign(collider_count, {});
     if (list) list_near_cells(state, i, dt);
-    add_contact(state, i, force, state.block_loads[i]);
+    add_contact(state, i, dt, force, state.block_loads[i]);
     if (!faces.active.empty()) add_face_contacts(state, i, force);
   });
   for (const auto& of_block : state.block_loads) {

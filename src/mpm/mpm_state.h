@@ -35,8 +35,9 @@ struct NearCell {
   std::int32_t lane;  ///< of its first point, in its block
   std::int32_t node;  ///< its lowest, in the block's nodes
   std::uint8_t collider;
-  std::uint8_t points;  ///< bit s: that at sub-position s
-  float middle[3];      ///< reference place [m]
+  std::uint8_t points;     ///< bit s: that at sub-position s
+  float middle[3];         ///< reference place [m]
+  std::uint8_t clear = 0;  ///< substeps for which the collider cannot reach it
 };
 
 /// Contact of points with colliders, block by block.

@@ -131,13 +131,22 @@ void check_tool(const std::string& path, const Tool& tool, std::set<std::string>
            "must be a ROS name: a letter, then letters, digits and '_'");
   }
   check_enum(path + ".type", tool.type, kToolTypeNames);
-  if (tool.type == ToolType::kProbe) {
-    check_range(path + ".radius", tool.radius, 1e-4, 0.1, "m");
-    check_range(path + ".length", tool.length, 1e-3, 1, "m");
-  } else {
-    check_range(path + ".blade_length", tool.blade_length, 1e-3, 0.2, "m");
-    check_range(path + ".blade_width", tool.blade_width, 2e-4, 0.1, "m");
-    check_range(path + ".blade_thickness", tool.blade_thickness, 1e-5, 0.01, "m");
+  switch (tool.type) {
+    case ToolType::kScalpel:
+      check_range(path + ".blade_length", tool.blade_length, 1e-3, 0.2, "m");
+      check_range(path + ".blade_width", tool.blade_width, 2e-4, 0.1, "m");
+      check_range(path + ".blade_thickness", tool.blade_thickness, 1e-5, 0.01, "m");
+      break;
+    case ToolType::kProbe:
+      check_range(path + ".radius", tool.radius, 1e-4, 0.1, "m");
+      check_range(path + ".length", tool.length, 1e-3, 1, "m");
+      break;
+    case ToolType::kGrasper:
+      check_range(path + ".jaw_length", tool.jaw_length, 1e-3, 0.2, "m");
+      check_range(path + ".jaw_width", tool.jaw_width, 2e-4, 0.1, "m");
+      check_range(path + ".grip_pressure", tool.grip_pressure, 1, 1e7, "Pa");
+      check_range(path + ".cohesion", tool.cohesion, 0, 1e7, "Pa");
+      break;
   }
   check_friction(path + ".friction", tool.friction);
 }

@@ -50,6 +50,8 @@ std::vector<std::string> fields_of(ToolType type) {
       return {"blade_length", "blade_width", "blade_thickness"};
     case ToolType::kProbe:
       return {"radius", "length"};
+    case ToolType::kGrasper:
+      return {"jaw_length", "jaw_width", "grip_pressure", "cohesion"};
   }
   return {};
 }

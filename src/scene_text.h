@@ -31,7 +31,8 @@ inline constexpr Spelling<Shape> kShapeNames[] = {{Shape::kBox, "box"},
                                                   {Shape::kCylinder, "cylinder"},
                                                   {Shape::kMesh, "mesh"}};
 inline constexpr Spelling<ToolType> kToolTypeNames[] = {{ToolType::kScalpel, "scalpel"},
-                                                        {ToolType::kProbe, "probe"}};
+                                                        {ToolType::kProbe, "probe"},
+                                                        {ToolType::kGrasper, "grasper"}};
 
 /// The name of an enum's value; nullptr for a value that the enum does not have.
 template <class Enum, std::size_t N>

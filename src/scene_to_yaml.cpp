@@ -126,6 +126,10 @@ void write(YAML::Emitter& out, const Tool& tool) {
     if (field == "blade_length") write(out, "blade_length", tool.blade_length);
     if (field == "blade_width") write(out, "blade_width", tool.blade_width);
     if (field == "blade_thickness") write(out, "blade_thickness", tool.blade_thickness);
+    if (field == "jaw_length") write(out, "jaw_length", tool.jaw_length);
+    if (field == "jaw_width") write(out, "jaw_width", tool.jaw_width);
+    if (field == "grip_pressure") write(out, "grip_pressure", tool.grip_pressure);
+    if (field == "cohesion") write(out, "cohesion", tool.cohesion);
   }
   write(out, "friction", tool.friction);
   out << EndMap;

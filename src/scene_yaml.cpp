@@ -127,9 +127,10 @@ Body read_body(const YAML::Node& node, const std::string& path) {
 }
 
 Tool read_tool(const YAML::Node& node, const std::string& path) {
-  const YamlFields fields(node, path,
-                          {"name", "type", "radius", "length", "blade_length", "blade_width",
-                           "blade_thickness", "friction"});
+  const YamlFields fields(
+      node, path,
+      {"name", "type", "radius", "length", "blade_length", "blade_width", "blade_thickness",
+       "jaw_length", "jaw_width", "grip_pressure", "cohesion", "friction"});
   Tool tool;
   fields.read("name", tool.name);
   fields.read("type", tool.type, kToolTypeNames);
@@ -139,6 +140,10 @@ Tool read_tool(const YAML::Node& node, const std::string& path) {
   fields.read("blade_length", tool.blade_length);
   fields.read("blade_width", tool.blade_width);
   fields.read("blade_thickness", tool.blade_thickness);
+  fields.read("jaw_length", tool.jaw_length);
+  fields.read("jaw_width", tool.jaw_width);
+  fields.read("grip_pressure", tool.grip_pressure);
+  fields.read("cohesion", tool.cohesion);
   fields.read("friction", tool.friction);
   return tool;
 }

@@ -5,6 +5,8 @@
 #include <stdexcept>
 #include <utility>
 
+#include "tools/grip.h"
+
 namespace tissue_sim {
 namespace {
 
@@ -42,6 +44,7 @@ struct Simulation::State {
   std::int64_t frame = 0;
   std::vector<ToolMotion> tools;  // as they stand after the last frame, then as set for the next
   std::vector<BladePath> cuts;
+  std::vector<Grip> grips;  // of each tool
   double wave_speed = 0;
   bool blew_up = false;
 };
@@ -51,6 +54,7 @@ Simulation::Simulation(const Scene& scene) : state_(std::make_unique<State>()) {
   state_->scene = scene;
   state_->tissue = make_tissue(scene);
   state_->tools.resize(scene.tools.size());
+  state_->grips.resize(scene.tools.size());
   const auto note_speed = [this, &scene](const std::string& material) {
     state_->wave_speed =
         std::max(state_->wave_speed, tissue_sim::wave_speed(find_material(scene, material)));
@@ -113,6 +117,10 @@ FrameReport Simulation::advance_frame() {
     throw std::runtime_error("the simulation blew up and cannot go on: reset it");
   }
   const auto start = std::chrono::steady_clock::now();
+  for (std::size_t i = 0; i < s.tools.size(); ++i) {
+    if (s.scene.tools[i].type != ToolType::kGrasper) continue;
+    s.grips[i].limit(s.scene.tools[i].grip_pressure, 1 / s.scene.frame_rate, s.tools[i]);
+  }
   FrameReport report;
   report.input.frame = s.frame;
   report.input.tools = s.tools;
@@ -120,6 +128,10 @@ FrameReport Simulation::advance_frame() {
   s.tissue->advance(1.0 / s.scene.frame_rate, {report.input.tools, report.input.cuts});
   report.result = s.tissue->finish();
   report.cfl = report.result.substep * s.wave_speed / s.scene.cell_size;
+  for (std::size_t i = 0; i < s.tools.size(); ++i) {
+    const ToolLoad& load = report.result.loads[i];
+    s.grips[i].follow(s.tools[i], load.grip_area > 0 ? load.grip / load.grip_area : 0);
+  }
   s.blew_up = report.result.blew_up;
   for (ToolMotion& m : s.tools) {
     m.begin = m.end;

@@ -46,13 +46,18 @@ double distance(const Collider& c, const Vec3& place) {
     const Vec3 axis(0, 0, std::clamp<double>(at[2], -c.length, -c.radius));
     return (at - axis).norm() - c.radius;
   }
+  if (c.kind == Collider::kJaw) {  // at most on its face, where it is a strip with a round end
+    const Vec3 axis(0, 0, std::clamp<double>(at[2], -c.length, -c.radius));
+    if (at[0] <= 0) return (at - axis).norm() - c.radius;
+    return std::hypot(at[0], std::max(0.0, std::hypot(at[1], at[2] - axis[2]) - c.radius));
+  }
   const Vec3 lowest(-c.width, -0.5 * c.thickness, -c.length), highest(0, 0.5 * c.thickness, 0);
   return (at - at.cwiseMax(lowest).cwiseMin(highest)).norm();
 }
 
 /// A blade's is the largest of the distances along its three axes.
 TEST(Clearance, IsNoMoreThanTheDistanceAndNotMuchLess) {
-  for (const auto kind : {Collider::kPlane, Collider::kCapsule, Collider::kBlade}) {
+  for (const auto kind : {Collider::kPlane, Collider::kCapsule, Collider::kJaw, Collider::kBlade}) {
     int free = 0;
     for (int i = 0; i < 2000; ++i) {
       const Collider c = random_collider(kind);

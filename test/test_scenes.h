@@ -70,12 +70,16 @@ inline Scene full_scene() {
   s.bodies[0].inclusions[1].region = s.bodies[0].anchors[2];
   s.bodies[4].mesh = "package://some pack/kidney #1.stl";
   s.bodies[4].scale = 0.001;
-  s.tools.resize(2);
+  s.tools.resize(3);
   s.tools[0].name = "PSM1";
   s.tools[0].type = ToolType::kScalpel;
   s.tools[0].blade_width = 0.007;
   s.tools[1].name = "probe_2";
   s.tools[1].radius = 0.002;
+  s.tools[2].name = "PSM2";
+  s.tools[2].type = ToolType::kGrasper;
+  s.tools[2].jaw_length = 0.011;
+  s.tools[2].grip_pressure = 1e5 / 3;
   s.seed = 18446744073709551615ull;
   s.threads = 3;
   s.device = Device::kCuda;
@@ -140,6 +144,10 @@ inline const std::vector<NumberCase>& number_cases() {
       {"tools[0].friction", AT(tools[0].friction), 0, 2},
       {"tools[1].radius", AT(tools[1].radius), 1e-4, 0.1},
       {"tools[1].length", AT(tools[1].length), 1e-3, 1},
+      {"tools[2].jaw_length", AT(tools[2].jaw_length), 1e-3, 0.2},
+      {"tools[2].jaw_width", AT(tools[2].jaw_width), 2e-4, 0.1},
+      {"tools[2].grip_pressure", AT(tools[2].grip_pressure), 1, 1e7},
+      {"tools[2].cohesion", AT(tools[2].cohesion), 0, 1e7},
   };
 #undef AT
   return cases;

@@ -1,5 +1,7 @@
 // Instruments: what they are and how they move. A tool's frame has its origin at the tip and z
-// pointing out of the tip along the shaft (the dVRK convention), so the shaft lies at z < 0.
+// pointing out of the tip along the shaft (the dVRK convention), so the shaft lies at z < 0. The
+// jaws of a grasper open in its x-z plane, about a hinge at z = -jaw_length; closed, they meet at x
+// = 0.
 #pragma once
 
 #include <cstdint>
@@ -12,6 +14,7 @@ namespace tissue_sim {
 enum class ToolType {
   kScalpel,  ///< cuts where its edge sweeps; its flats push
   kProbe,    ///< a capsule that pushes
+  kGrasper,  ///< two jaws that hold what is between them
 };
 
 struct Tool {
@@ -22,20 +25,26 @@ struct Tool {
   double blade_length = 0.025;      ///< scalpel: edge from the tip to the heel, along -z [m]
   double blade_width = 0.006;       ///< scalpel: from the edge to the spine, along -x [m]
   double blade_thickness = 0.0004;  ///< scalpel: along y [m]
+  double jaw_length = 0.015;        ///< grasper: from the hinge to the tip, along z [m]
+  double jaw_width = 0.004;         ///< grasper: of a jaw, half round with a flat face, along y [m]
+  double grip_pressure = 3000;      ///< grasper: its jaws close until they press with it [Pa]
+  double cohesion = 10000;          ///< grasper: what its teeth hold beside friction [Pa]
   double friction = 0.3;            ///< Coulomb friction against tissue [-], 0 to 2
 };
 
-/// Motion of one tool over one frame: position linear, orientation slerp between the two.
+/// Motion of one tool over one frame: position and jaw linear, orientation slerp between the two.
 struct ToolMotion {
   bool present = false;  ///< false until the first pose came: the tool is not in the scene
   Pose begin, end;
-  float jaw_begin = 0, jaw_end = 0;  ///< [rad]
+  float jaw_begin = 0, jaw_end = 0;  ///< angle between the jaws, 0 closed, 0 to pi [rad]
 };
 
 /// What the tissue did to a tool during one frame, at the tool's tip, in world axes.
 struct ToolLoad {
   Wrench mean;            ///< mean over the substeps of the frame
   double peak_force = 0;  ///< largest force of a substep [N]
+  double grip = 0;        ///< grasper: what each jaw presses with, mean over the frame [N] ...
+  double grip_area = 0;   ///< ... and on which area of tissue [m^2]
 };
 
 }  // namespace tissue_sim

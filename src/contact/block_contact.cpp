@@ -68,7 +68,7 @@ Box bounds(const Collider& c) {
     return box;
   }
   const float x0 = c.kind == Collider::kBlade ? -c.width : -c.radius;
-  const float x1 = c.kind == Collider::kBlade ? 0 : c.radius;
+  const float x1 = c.kind == Collider::kCapsule ? c.radius : 0;
   const float y = c.kind == Collider::kBlade ? 0.5f * c.thickness : c.radius;
   for (int i = 0; i < 8; ++i) {
     const float corner[3] = {i & 1 ? x1 : x0, i & 2 ? y : -y, i & 4 ? 0 : -c.length};
@@ -238,6 +238,7 @@ void add_contact(MpmState& state, int index, float dt, float* force,
                     touch.hold, push);
       touching.push_back(touch);
       pushes[s] = Vec<4>{push[0], push[1], push[2], 0.0f};
+      load.points += 1;
       double arm[3];
       for (int a = 0; a < 3; ++a) {
         load.force[a] -= push[a];

@@ -8,17 +8,24 @@
 namespace tissue_sim {
 
 struct Collider {
-  enum Kind { kPlane, kCapsule, kBlade } kind = kPlane;
+  enum Kind { kPlane, kCapsule, kBlade, kJaw } kind = kPlane;
   float position[3] = {};                           ///< of the tip; of a point of the plane [m]
   float rotation[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1};  ///< local to world, row-major
   float velocity[3] = {};                           ///< of the tip [m/s]
   float spin[3] = {};                               ///< angular velocity, world axes [rad/s]
-  float length = 0;     ///< capsule, blade: along local -z from the tip [m]
-  float radius = 0;     ///< capsule [m]
+  float length = 0;     ///< capsule, blade, jaw: along local -z from the tip [m]
+  float radius = 0;     ///< capsule, jaw [m]
   float width = 0;      ///< blade: along local -x from the edge [m]
   float thickness = 0;  ///< blade: along local y [m]
   float friction = 0;   ///< Coulomb
+  float cohesion = 0;   ///< what holds a point beside friction: a jaw's teeth [N]
   int tool = -1;        ///< index into Scene::tools, -1 for the ground
+};
+
+/// What tissue does to a collider: force [N] and moment about its position [N m], world axes.
+struct ColliderLoad {
+  double force[3] = {}, torque[3] = {};
+  double points = 0;  ///< number of those that touch; on a GPU, of those that touch a jaw
 };
 
 /// Distance to the surface (negative inside) and the outward normal, world axes.
@@ -41,14 +48,15 @@ TISSUE_SIM_INLINE void to_world(const Collider& c, const float* local, float* x)
   }
 }
 
-/// The half space below the plane (normal local z); the capsule from the tip up the shaft; the two
-/// flats of the blade (its edge does not push: it cuts).
+/// The half space below the plane (normal local z); the capsule from the tip up the shaft; the half
+/// of such a capsule at local x < 0, which is a jaw; the two flats of the blade (its edge does not
+/// push: it cuts).
 TISSUE_SIM_INLINE Gap gap(const Collider& c, const float* x) {
   float p[3], n[3] = {0, 0, 1}, distance = 1e30f;
   to_local(c, x, p);
   if (c.kind == Collider::kPlane) {
     distance = p[2];
-  } else if (c.kind == Collider::kCapsule) {
+  } else if (c.kind != Collider::kBlade) {
     const float along = fminf(fmaxf(p[2], -c.length), -c.radius);
     const float d[3] = {p[0], p[1], p[2] - along};
     const float r = sqrtf(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]);
@@ -57,6 +65,10 @@ TISSUE_SIM_INLINE Gap gap(const Collider& c, const float* x) {
       for (int i = 0; i < 3; ++i) n[i] = d[i] / r;
     } else {
       n[0] = 1, n[2] = 0;
+    }
+    if (c.kind == Collider::kJaw && p[0] > distance) {
+      distance = p[0];
+      n[0] = 1, n[1] = n[2] = 0;
     }
   } else if (p[0] >= -c.width && p[0] <= 0 && p[2] >= -c.length && p[2] <= 0) {
     distance = fabsf(p[1]) - 0.5f * c.thickness;
@@ -90,7 +102,7 @@ TISSUE_SIM_INLINE void velocity_at(const Collider& c, const float* x, float* v) 
 
 /// What a point needs for its contact: a spring and a damper along the normal that only push, and a
 /// spring that holds the place where it first touched, within the friction cone (Cundall and Strack
-/// 1979).
+/// 1979), which cohesion makes wider.
 struct ContactSpring {
   float stiffness;  ///< [N/m]
   float damping;    ///< [N s/m]
@@ -131,7 +143,7 @@ TISSUE_SIM_INLINE void contact_force(const Collider& c, const Gap& g, const Cont
            spring.damping * (rel[i] - vn * g.normal[i]);
     t2 += t[i] * t[i];
   }
-  const float limit = c.friction * push;
+  const float limit = c.friction * push + c.cohesion;
   if (t2 > limit * limit) {
     const float scale = limit / sqrtf(t2);
     float moved[3];

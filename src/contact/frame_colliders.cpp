@@ -1,36 +1,84 @@
 #include "contact/frame_colliders.h"
 
+#include <algorithm>
+
 #include "contact/block_contact.h"
-#include "tools/tool_motion.h"
 
 namespace tissue_sim {
 
-std::vector<Collider> colliders_at(const Scene& scene, const FrameInput& input, double share,
-                                   double duration) {
-  std::vector<Collider> colliders(1);
-  colliders[0].position[2] = static_cast<float>(scene.ground.enabled ? scene.ground.z : -1e6);
-  colliders[0].friction = static_cast<float>(scene.ground.friction);
+int collider_count(const Scene& scene) {
+  int count = 1;
+  for (const Tool& tool : scene.tools) count += collider_count(tool.type);
+  return count;
+}
+
+FrameColliders::FrameColliders(const Scene& scene, const FrameInput& input, double duration)
+    : point_area_(0.25 * scene.cell_size * scene.cell_size) {
+  ground_.position[2] = static_cast<float>(scene.ground.enabled ? scene.ground.z : -1e6);
+  ground_.friction = static_cast<float>(scene.ground.friction);
+  tools_.reserve(input.tools.size());
   for (std::size_t i = 0; i < input.tools.size(); ++i) {
-    colliders.push_back(
-        tool_collider(scene.tools[i], static_cast<int>(i), input.tools[i], share, duration));
+    tools_.emplace_back(scene.tools[i], static_cast<int>(i), input.tools[i], duration, point_area_);
+    count_ += tools_.back().count();
   }
+}
+
+void FrameColliders::at(double share, Collider* out) const {
+  *out++ = ground_;
+  for (const ToolPath& tool : tools_) {
+    tool.at(share, out);
+    out += tool.count();
+  }
+}
+
+std::vector<Collider> FrameColliders::at(double share) const {
+  std::vector<Collider> colliders(count_);
+  at(share, colliders.data());
   return colliders;
 }
 
-std::vector<Box> collider_reach(const Scene& scene, const FrameInput& input, double duration) {
-  std::vector<Box> reach;
+std::vector<Box> FrameColliders::reach() const {
+  std::vector<Box> reach(count_);
   for (const double share : {0.0, 0.5, 1.0}) {
-    const std::vector<Collider> colliders = colliders_at(scene, input, share, duration);
-    reach.resize(colliders.size());
+    const std::vector<Collider> colliders = at(share);
     for (std::size_t c = 0; c < reach.size(); ++c) {
-      const bool absent = c > 0 && !input.tools[c - 1].present;
-      if (absent) continue;
+      if (c > 0 && !tools_[colliders[c].tool].is_present()) continue;
       const Box box = bounds(colliders[c]);
       reach[c].min = reach[c].min.cwiseMin(box.min);
       reach[c].max = reach[c].max.cwiseMax(box.max);
     }
   }
   return reach;
+}
+
+void FrameColliders::add_loads(double share, const Collider* now, const ColliderLoad* on,
+                               double weight, std::vector<ToolLoad>& loads) const {
+  int c = 1;
+  for (std::size_t i = 0; i < tools_.size(); ++i) {
+    const Vec3 tip = tools_[i].tip(share);
+    const int count = tools_[i].count();
+    Vec3 force = Vec3::Zero(), torque = Vec3::Zero();
+    double grip = 0, touching = 0;
+    for (const int end = c + count; c < end; ++c) {
+      const Collider& collider = now[c];
+      const Vec3 pushed(on[c].force[0], on[c].force[1], on[c].force[2]);
+      force += pushed;
+      torque += Vec3(on[c].torque[0], on[c].torque[1], on[c].torque[2]);
+      if (collider.kind != Collider::kJaw) continue;
+      // Its load's moment is about its own tip; it presses along its local x.
+      const Vec3 at(collider.position[0], collider.position[1], collider.position[2]);
+      const Vec3 facing(collider.rotation[0], collider.rotation[3], collider.rotation[6]);
+      torque += (at - tip).cross(pushed);
+      grip -= facing.dot(pushed) / count;
+      touching += on[c].points / count;
+    }
+    ToolLoad& load = loads[i];
+    load.mean.force += weight * force;
+    load.mean.torque += weight * torque;
+    load.peak_force = std::max(load.peak_force, force.norm());
+    load.grip += weight * grip;
+    load.grip_area += weight * touching * point_area_;
+  }
 }
 
 }  // namespace tissue_sim

@@ -83,6 +83,7 @@ void substep(MpmState& state, float dt, std::vector<ColliderLoad>& loads) {
         loads[c].force[a] += of_block[c].force[a];
         loads[c].torque[a] += of_block[c].torque[a];
       }
+      loads[c].points += of_block[c].points;
     }
   }
   NodeStep step;

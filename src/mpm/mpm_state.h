@@ -48,11 +48,6 @@ struct Contacts {
   int until_list = 0;                           ///< substeps until `cells` are listed anew
 };
 
-/// Force and moment (about the tip, world axes) of the tissue on each collider.
-struct ColliderLoad {
-  double force[3] = {}, torque[3] = {};
-};
-
 /// Within which box a block's points are, and how fast they move at most.
 struct BlockMotion {
   Box box;           ///< [m]

@@ -70,7 +70,8 @@ MpmTissue::Frame MpmTissue::begin(double duration, const FrameInput& input) {
   if (blades) {
     for (int a = 0; a < 3; ++a) s.u_before[a] = s.nodes.u[a];
   }
-  Frame frame{input, duration, collider_reach(s.scene, input, duration), blades, 0, s.motion};
+  const FrameColliders colliders(s.scene, input, duration);
+  Frame frame{input, duration, colliders, colliders.reach(), blades, 0, s.motion};
   find_near_colliders(s, frame.reach, duration);
   return frame;
 }
@@ -84,19 +85,13 @@ void MpmTissue::run(Frame& frame, int substeps, float dt, double from, double to
   result_.substep = std::max(result_.substep, static_cast<double>(dt));
   for (int i = 0; i < substeps; ++i) {
     const double share = from + (to - from) * (i + 1) / substeps;
-    s.colliders = colliders_at(s.scene, frame.input, share, frame.duration);
+    s.colliders = frame.colliders.at(share);
     std::vector<ColliderLoad> loads(s.colliders.size());
     find_face_contacts(s, pieces_, dt);
     substep(s, dt, loads);
     s.time += dt;
-    const double weight = dt / frame.duration;
-    for (std::size_t c = 1; c < loads.size(); ++c) {
-      ToolLoad& load = result_.loads[c - 1];
-      const Vec3 force(loads[c].force[0], loads[c].force[1], loads[c].force[2]);
-      load.mean.force += weight * force;
-      load.mean.torque += weight * Vec3(loads[c].torque[0], loads[c].torque[1], loads[c].torque[2]);
-      load.peak_force = std::max(load.peak_force, force.norm());
-    }
+    frame.colliders.add_loads(share, s.colliders.data(), loads.data(), dt / frame.duration,
+                              result_.loads);
     if (checks == 0 || i + 1 != tear_check_at(check, checks, substeps)) continue;
     ++check;
     const std::vector<TearingPoint> tearing = find_tearing(s);

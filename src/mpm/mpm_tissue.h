@@ -3,6 +3,7 @@
 
 #include <memory>
 
+#include "contact/frame_colliders.h"
 #include "cutting/tear.h"
 #include "fragments/pieces.h"
 #include "mpm/mpm_state.h"
@@ -43,6 +44,7 @@ class MpmTissue final : public Tissue {
   struct Frame {
     FrameInput input;
     double duration;
+    FrameColliders colliders;
     std::vector<Box> reach;           ///< of the colliders
     bool blades;                      ///< whether there are any
     double cut_to = 0;                ///< share of the frame up to which they did

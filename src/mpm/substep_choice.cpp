@@ -44,14 +44,17 @@ bool is_near(const MpmState& state, const Box& box) {
 /// [m]: a blade cuts its way along its plane.
 double farthest_motion(const MpmState& state, const FrameInput& input) {
   const Scene& scene = state.scene;
-  const std::vector<Box> reach = collider_reach(scene, input, 1 / scene.frame_rate);
+  const FrameColliders colliders(scene, input, 1 / scene.frame_rate);
+  const std::vector<Collider> shapes = colliders.at(1);
+  const std::vector<Box> reach = colliders.reach();
   double farthest = 0;
-  for (std::size_t i = 0; i < input.tools.size(); ++i) {
-    const ToolMotion& m = input.tools[i];
-    if (!m.present || !is_near(state, reach[1 + i])) continue;  // reach[0] is the ground
-    const Tool& tool = scene.tools[i];
-    const double length = tool.type == ToolType::kProbe ? tool.length : tool.blade_length;
-    const double turn = m.begin.orientation.angularDistance(m.end.orientation);
+  for (std::size_t c = 1; c < reach.size(); ++c) {  // the first is the ground
+    const Tool& tool = scene.tools[shapes[c].tool];
+    const ToolMotion& m = input.tools[shapes[c].tool];
+    if (!m.present || !is_near(state, reach[c])) continue;
+    const double length = shapes[c].length;
+    const double turn = m.begin.orientation.angularDistance(m.end.orientation) +
+                        0.5 * std::fabs(m.jaw_end - m.jaw_begin);
     const Vec3 step = m.end.position - m.begin.position;
     const double pushed = tool.type == ToolType::kScalpel
                               ? std::fabs(step.dot(m.begin.orientation * Vec3::UnitY()))

@@ -76,6 +76,19 @@ void add_tool(const MarkerInput& input, std::size_t i, MarkerArray& array) {
     array.markers.push_back(part(input, i, 1, Marker::CYLINDER, pose,
                                  Vec3(-w / 2, 0, -l - handle / 2), scale(w, w, handle),
                                  color(0.25f, 0.27f, 0.30f)));
+  } else if (tool.type == ToolType::kGrasper) {
+    const double jaw = input.tools[i].jaw_end, l = tool.jaw_length, w = tool.jaw_width;
+    for (int side = 0; side < 2; ++side) {
+      const double sign = side == 0 ? -1 : 1;
+      const Vec3 hinge(0, 0, -l);
+      const Quat swing(Eigen::AngleAxisd(0.5 * sign * jaw, Vec3::UnitY()));
+      const Pose open = {pose * hinge, pose.orientation * swing};
+      array.markers.push_back(part(input, i, side, Marker::CUBE, open,
+                                   Vec3(0.25 * sign * w, 0, l / 2), scale(w / 2, w, l), steel));
+    }
+    const double shaft = 0.1;
+    array.markers.push_back(part(input, i, 2, Marker::CYLINDER, pose, Vec3(0, 0, -l - shaft / 2),
+                                 scale(w, w, shaft), color(0.25f, 0.27f, 0.30f)));
   } else {  // the capsule that touches: its tip is the tool's origin
     const double r = tool.radius, l = std::max(tool.length, 2 * r);
     const geometry_msgs::Vector3 ball = scale(2 * r, 2 * r, 2 * r);

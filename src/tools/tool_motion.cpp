@@ -1,6 +1,17 @@
 #include "tools/tool_motion.h"
 
 namespace tissue_sim {
+namespace {
+
+void place(const Pose& pose, Collider& collider) {
+  const Eigen::Matrix3d r = pose.orientation.toRotationMatrix();
+  for (int i = 0; i < 3; ++i) {
+    collider.position[i] = static_cast<float>(pose.position[i]);
+    for (int k = 0; k < 3; ++k) collider.rotation[3 * i + k] = static_cast<float>(r(i, k));
+  }
+}
+
+}  // namespace
 
 Pose pose_at(const ToolMotion& m, double s) {
   if (s >= 1) return m.end;
@@ -8,29 +19,72 @@ Pose pose_at(const ToolMotion& m, double s) {
           m.begin.orientation.slerp(s, m.end.orientation)};
 }
 
-Collider tool_collider(const Tool& tool, int index, const ToolMotion& motion, double s,
-                       double duration) {
-  const Pose pose = pose_at(motion, s);
-  const Eigen::Matrix3d r = pose.orientation.toRotationMatrix();
+int collider_count(ToolType type) { return type == ToolType::kGrasper ? 2 : 1; }
+
+ToolPath::ToolPath(const Tool& tool, int index, const ToolMotion& motion, double duration,
+                   double point_area)
+    : tool_(&tool), motion_(motion) {
   const Eigen::AngleAxisd turn(motion.end.orientation * motion.begin.orientation.conjugate());
   const double angle = turn.angle() > M_PI ? turn.angle() - 2 * M_PI : turn.angle();
-  const Vec3 spin = turn.axis() * angle / duration;
-  Collider c;
-  c.kind = tool.type == ToolType::kScalpel ? Collider::kBlade : Collider::kCapsule;
+  spin_ = turn.axis() * angle / duration;
+  jaw_speed_ = (motion.jaw_end - motion.jaw_begin) / duration;
+  const Vec3 velocity = (motion.end.position - motion.begin.position) / duration;
   for (int i = 0; i < 3; ++i) {
-    c.position[i] = static_cast<float>(pose.position[i]);
-    c.velocity[i] =
-        static_cast<float>((motion.end.position[i] - motion.begin.position[i]) / duration);
-    c.spin[i] = static_cast<float>(spin[i]);
-    for (int k = 0; k < 3; ++k) c.rotation[3 * i + k] = static_cast<float>(r(i, k));
+    shape_.velocity[i] = static_cast<float>(velocity[i]);
+    shape_.spin[i] = static_cast<float>(spin_[i]);
   }
-  c.length = static_cast<float>(tool.type == ToolType::kScalpel ? tool.blade_length : tool.length);
-  c.radius = static_cast<float>(tool.radius);
-  c.width = static_cast<float>(tool.blade_width);
-  c.thickness = static_cast<float>(tool.blade_thickness);
-  c.friction = static_cast<float>(tool.friction);
-  c.tool = index;
-  return c;
+  switch (tool.type) {
+    case ToolType::kScalpel:
+      shape_.kind = Collider::kBlade;
+      shape_.length = static_cast<float>(tool.blade_length);
+      shape_.width = static_cast<float>(tool.blade_width);
+      shape_.thickness = static_cast<float>(tool.blade_thickness);
+      break;
+    case ToolType::kProbe:
+      shape_.kind = Collider::kCapsule;
+      shape_.length = static_cast<float>(tool.length);
+      shape_.radius = static_cast<float>(tool.radius);
+      break;
+    case ToolType::kGrasper:
+      shape_.kind = Collider::kJaw;
+      shape_.length = static_cast<float>(tool.jaw_length);
+      shape_.radius = static_cast<float>(0.5 * tool.jaw_width);
+      shape_.cohesion = static_cast<float>(tool.cohesion * point_area);
+      break;
+  }
+  shape_.friction = static_cast<float>(tool.friction);
+  shape_.tool = index;
+}
+
+Vec3 ToolPath::tip(double s) const { return pose_at(motion_, s).position; }
+
+void ToolPath::at(double s, Collider* out) const {
+  const Pose pose = pose_at(motion_, s);
+  if (tool_->type == ToolType::kGrasper) {
+    place_jaws(pose, s, out);
+    return;
+  }
+  *out = shape_;
+  place(pose, *out);
+}
+
+void ToolPath::place_jaws(const Pose& pose, double s, Collider* out) const {
+  const double half = 0.5 * ((1 - s) * motion_.jaw_begin + s * motion_.jaw_end);
+  const Vec3 hinge(0, 0, -tool_->jaw_length);
+  for (int side = 0; side < 2; ++side) {
+    const double sign = side == 0 ? -1 : 1;
+    const Quat swing(Eigen::AngleAxisd(sign * half, Vec3::UnitY()));
+    const Quat facing = side == 0 ? Quat::Identity() : Quat(0, 0, 0, 1);  // half a turn about z
+    const Vec3 tip = pose * (hinge - swing * hinge);
+    out[side] = shape_;
+    place({tip, pose.orientation * swing * facing}, out[side]);
+    const Vec3 jaw_spin = pose.orientation * Vec3(0, 0.5 * sign * jaw_speed_, 0);
+    const Vec3 more = spin_.cross(tip - pose.position) + jaw_spin.cross(tip - pose * hinge);
+    for (int a = 0; a < 3; ++a) {
+      out[side].velocity[a] += static_cast<float>(more[a]);
+      out[side].spin[a] += static_cast<float>(jaw_spin[a]);
+    }
+  }
 }
 
 BladePath blade_path(const Tool& tool, const ToolMotion& motion) {

@@ -14,9 +14,30 @@ namespace tissue_sim {
 /// Pose at the share `s` (0 to 1) of the frame.
 Pose pose_at(const ToolMotion& motion, double s);
 
-/// The tool's shape at the share `s` of a frame that lasts `duration` seconds.
-Collider tool_collider(const Tool& tool, int index, const ToolMotion& motion, double s,
-                       double duration);
+/// Number of colliders that a tool is made of: a grasper's jaws are two.
+int collider_count(ToolType type);
+
+/// The way of a tool's colliders through a frame that lasts `duration` seconds, in tissue whose
+/// points have a surface of `point_area` [m^2]; what does not change on it is worked out once.
+class ToolPath {
+ public:
+  ToolPath(const Tool& tool, int index, const ToolMotion& motion, double duration,
+           double point_area);
+  int count() const { return collider_count(tool_->type); }
+  bool is_present() const { return motion_.present; }
+  /// Where the tool's tip is at the share `s` (0 to 1) of the frame.
+  Vec3 tip(double s) const;
+  /// Writes the count() colliders as they are at the share `s` of the frame.
+  void at(double s, Collider* out) const;
+
+ private:
+  void place_jaws(const Pose& pose, double s, Collider* out) const;
+  const Tool* tool_;
+  ToolMotion motion_;
+  Vec3 spin_;         // [rad/s], world axes
+  double jaw_speed_;  // [rad/s]
+  Collider shape_;    // with all that the motion leaves as it is
+};
 
 /// The path of a scalpel's edge over the frame: down its front from the heel to the tip and along
 /// its lower end to the spine, so that it cuts when it is drawn and when it is stabbed.

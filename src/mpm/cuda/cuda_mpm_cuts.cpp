@@ -144,7 +144,7 @@ void CudaMpmTissue::push() {
   const std::size_t n = state_->nodes.size();
   const auto points = static_cast<std::size_t>(state_->points.size());
   const Scene& scene = state_->scene;
-  const auto colliders = static_cast<int>(scene.tools.size()) + (scene.ground.enabled ? 1 : 0);
+  const int colliders = collider_count(scene) - (scene.ground.enabled ? 0 : 1);
   d.held_by = std::min(colliders, 2);
   const std::size_t most_held = OnDevice::Checkpoint::most_held(d.held_by * points);
   check_memory(bytes_of(t, n, points, d.held_by, most_held), device_bytes());

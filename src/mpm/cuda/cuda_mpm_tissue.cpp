@@ -36,10 +36,11 @@ int attribute(cudaDeviceAttr which) {
 CudaMpmTissue::CudaMpmTissue(const Scene& scene) : device_(std::make_unique<OnDevice>()) {
   const std::string why = why_no_gpu();
   if (!why.empty()) throw std::runtime_error(why + "; set device to cpu");
-  if (scene.tools.size() + 1 > kMaxColliders) {
-    throw std::runtime_error("the scene has " + std::to_string(scene.tools.size()) +
-                             " tools: on the GPU at most " + std::to_string(kMaxColliders - 1) +
-                             "; set device to cpu");
+  if (const int count = collider_count(scene); count > kMaxColliders) {
+    throw std::runtime_error("the scene's tools have " + std::to_string(count - 1) +
+                             " parts that touch tissue (a grasper two, other tools one): on the "
+                             "GPU at most " +
+                             std::to_string(kMaxColliders - 1) + "; set device to cpu");
   }
   OnDevice& d = *device_;
   check_cuda(cudaSetDevice(0), "be chosen");
@@ -65,11 +66,9 @@ CudaMpmTissue::~CudaMpmTissue() {
   if (device_->stream != nullptr) cudaStreamSynchronize(device_->stream);
 }
 
-void CudaMpmTissue::upload_colliders(int substeps, const FrameInput& input, double from,
-                                     double to) {
+void CudaMpmTissue::upload_colliders() {
   OnDevice& d = *device_;
-  const Scene& scene = state_->scene;
-  const std::vector<Box> reach = collider_reach(scene, input, duration_);
+  const std::vector<Box> reach = colliders_->reach();
   d.host_reach.resize(reach.size());
   for (std::size_t c = 0; c < reach.size(); ++c) {
     for (int a = 0; a < 3; ++a) {
@@ -77,15 +76,13 @@ void CudaMpmTissue::upload_colliders(int substeps, const FrameInput& input, doub
       d.host_reach[c].max[a] = static_cast<float>(reach[c].max[a]);
     }
   }
-  d.host_colliders.resize(reach.size() * substeps);
-  for (int i = 0; i < substeps; ++i) {
-    const double share = from + (to - from) * (i + 1) / substeps;
-    const std::vector<Collider> now = colliders_at(scene, input, share, duration_);
-    std::copy(now.begin(), now.end(), d.host_colliders.data() + i * reach.size());
+  d.host_colliders.resize(reach.size() * substeps_);
+  for (int i = 0; i < substeps_; ++i) {
+    colliders_->at(share_of(i), d.host_colliders.data() + i * reach.size());
   }
   d.reach.upload(d.host_reach, d.stream);
   d.colliders.upload(d.host_colliders, d.stream);
-  d.loads.resize(6 * d.host_colliders.size());
+  d.loads.resize(kLoadSums * d.host_colliders.size());
   d.loads.clear(d.stream);
 }
 
@@ -98,6 +95,7 @@ void CudaMpmTissue::begin(double duration, const FrameInput& input) {
     cut({path}, state_->nodes.u, state_->motion, result_.cut_reports.back());
   }
   duration_ = duration;
+  colliders_.emplace(state_->scene, input, duration);
   blades_ = blade_paths(state_->scene, input, 0, 1);
   cut_to_ = 0;
   motion_before_ = state_->motion;
@@ -108,10 +106,12 @@ void CudaMpmTissue::run(int substeps, float dt, const FrameInput& input, double 
   OnDevice& d = *device_;
   substeps_ = substeps;
   dt_ = dt;
+  from_ = from;
+  to_ = to;
   result_.substeps += substeps;
   result_.substep = std::max(result_.substep, static_cast<double>(dt));
   if (substeps == 0) return;
-  upload_colliders(substeps, input, from, to);
+  upload_colliders();
   find_near(duration_);
   const bool tears = can_tear(*state_);
   const int checks = tears ? tear_checks(*state_, substeps, dt) : 1;
@@ -133,17 +133,20 @@ void CudaMpmTissue::run(int substeps, float dt, const FrameInput& input, double 
 void CudaMpmTissue::sum_loads() {
   const OnDevice& d = *device_;
   if (substeps_ == 0) return;
-  const double weight = dt_ / duration_;
-  const std::size_t colliders = result_.loads.size() + 1;
+  const std::size_t count = colliders_->count();
+  std::vector<ColliderLoad> on(count);
   for (int i = 0; i < substeps_; ++i) {
-    for (std::size_t c = 1; c < colliders && c < d.host_reach.size(); ++c) {
-      const long long* sum = d.host_loads.data() + 6 * (i * d.host_reach.size() + c);
-      const Vec3 force = kLoadUnit * Vec3(sum[0], sum[1], sum[2]);
-      ToolLoad& load = result_.loads[c - 1];
-      load.mean.force += weight * force;
-      load.mean.torque += weight * kLoadUnit * Vec3(sum[3], sum[4], sum[5]);
-      load.peak_force = std::max(load.peak_force, force.norm());
+    const long long* sum = d.host_loads.data() + kLoadSums * i * count;
+    for (ColliderLoad& load : on) {
+      for (int a = 0; a < 3; ++a) {
+        load.force[a] = kLoadUnit * static_cast<double>(sum[a]);
+        load.torque[a] = kLoadUnit * static_cast<double>(sum[3 + a]);
+      }
+      load.points = static_cast<double>(sum[6]);
+      sum += kLoadSums;
     }
+    colliders_->add_loads(share_of(i), d.host_colliders.data() + i * count, on.data(),
+                          dt_ / duration_, result_.loads);
   }
   substeps_ = 0;
 }
@@ -176,8 +179,8 @@ void CudaMpmTissue::find_near(double duration) {
   }
   CudaReach swept{d.reach.data(), static_cast<int>(d.host_reach.size()), 0,
                   static_cast<float>(duration), static_cast<float>(0.5 * cell)};
-  for (std::size_t i = 0; i < state_->scene.tools.size(); ++i) {
-    if (state_->scene.tools[i].type == ToolType::kScalpel) swept.blades |= 2u << i;
+  for (int c = 0; c < swept.collider_count; ++c) {
+    if (d.host_colliders[c].kind == Collider::kBlade) swept.blades |= 1u << c;
   }
   d.near_cells.resize(d.partial.size());
   d.near_count.resize(1);
@@ -204,7 +207,7 @@ void CudaMpmTissue::launch(int begin, int end, float dt) {
   for (int a = 0; a < 3; ++a) frame.step.gravity[a] = static_cast<float>(scene.gravity[a]);
   frame.colliders = d.colliders.data() + begin * collider_count;
   frame.collider_count = static_cast<int>(collider_count);
-  frame.loads = d.loads.data() + 6 * begin * collider_count;
+  frame.loads = d.loads.data() + kLoadSums * begin * collider_count;
   frame.near_cells = d.may_meet ? d.near_cells.data() : nullptr;
   frame.near_count = d.near_count.data();
   frame.cell_size = static_cast<float>(scene.cell_size);

@@ -2,7 +2,9 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 
+#include "contact/frame_colliders.h"
 #include "cutting/tear.h"
 #include "fragments/pieces.h"
 #include "mpm/mpm_state.h"
@@ -94,7 +96,9 @@ class CudaMpmTissue final : public Tissue {
   void launch_measure();
   void finish_measure();
   double measure_limit(int steps);  ///< see MeasureLimit; of all blocks
-  void upload_colliders(int substeps, const FrameInput& input, double from, double to);
+  void upload_colliders();
+  /// The share of the frame at the end of the part's substep `i`.
+  double share_of(int i) const { return from_ + (to_ - from_) * (i + 1) / substeps_; }
 
   std::vector<std::string> notes_;
   std::unique_ptr<MpmState> state_;
@@ -105,9 +109,11 @@ class CudaMpmTissue final : public Tissue {
   double cut_to_ = 0;                       ///< share of the frame
   std::vector<BlockMotion> motion_before_;  ///< when the blades were last looked at
   double duration_ = 0;                     ///< of the frame in flight [s]
-  int substeps_ = 0;       ///< of its last part, as long as their loads are not summed
-  float dt_ = 0;           ///< of these [s]
-  bool measured_ = false;  ///< whether the state is as finish_measure() saw it
+  int substeps_ = 0;          ///< of its last part, as long as their loads are not summed
+  float dt_ = 0;              ///< of these [s]
+  double from_ = 0, to_ = 0;  ///< shares of the frame where that part begins and ends
+  std::optional<FrameColliders> colliders_;  ///< of the frame
+  bool measured_ = false;                    ///< whether the state is as finish_measure() saw it
   Stiffening stiffening_;
   std::vector<float> modulus_;  ///< see SubstepChoice::follow()
   SubstepChoice substep_;

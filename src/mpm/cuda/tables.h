@@ -127,8 +127,9 @@ struct CudaTables {
 };
 
 /// Sums of what acts on a collider in one substep: force and moment in units of kLoadUnit, as
-/// integers, whose sum does not depend on the order.
+/// integers, whose sum does not depend on the order; and the number of points that touch a jaw.
 inline constexpr double kLoadUnit = 1.0 / (1ll << 38);
+inline constexpr int kLoadSums = 7;
 
 struct CudaFrame {
   CudaNodes state[2];
@@ -138,7 +139,7 @@ struct CudaFrame {
   NodeStep step;
   const Collider* colliders;  ///< [substeps][collider_count]
   int collider_count;
-  long long* loads;                ///< [substeps][collider_count][6]
+  long long* loads;                ///< [substeps][collider_count][kLoadSums]
   const CudaNearCell* near_cells;  ///< null where no collider comes near
   const int* near_count;
   float cell_size;  ///< the scene's [m]

@@ -17,9 +17,10 @@ __device__ __forceinline__ bool may_touch(const Collider& c, const float* x, flo
   float p[3];
   to_local(c, x, p);
   if (c.kind == Collider::kPlane) return p[2] < radius;
-  if (c.kind == Collider::kCapsule) {
+  if (c.kind != Collider::kBlade) {
     const float z = p[2] - fminf(fmaxf(p[2], -c.length), -c.radius), reach = c.radius + radius;
-    return p[0] * p[0] + p[1] * p[1] + z * z < reach * reach;
+    return p[0] * p[0] + p[1] * p[1] + z * z < reach * reach &&
+           (c.kind == Collider::kCapsule || p[0] < radius);
   }
   return p[2] < radius && p[2] > -c.length - radius && fabsf(p[1]) < radius + 0.5f * c.thickness &&
          p[0] < radius && p[0] > -c.width - radius;
@@ -95,11 +96,13 @@ __device__ __forceinline__ void push_point(const PushedPoint& point, const Colli
     const bool touches = point.touches(collider);
     if (__ballot_sync(0xffffffffu, touches) == 0) continue;
     float push[3] = {0, 0, 0};
+    bool pushes = false;
     if (touches) {
       const Gap g = gap(collider, point.x);
       const bool second =
           held_by == 2 && (held.with[1] == c + 1 || (held.with[0] != 0 && held.with[0] != c + 1));
-      if (g.distance < 0) {
+      pushes = g.distance < 0;
+      if (pushes) {
         float place[3];
 #pragma unroll
         for (int a = 0; a < 3; ++a) place[a] = second ? held.place[1][a] : held.place[0][a];
@@ -124,7 +127,11 @@ __device__ __forceinline__ void push_point(const PushedPoint& point, const Colli
       load[a] = -push[a];
       load[3 + a] = -(arm[b] * push[d] - arm[d] * push[b]);
     }
-    add_load(loads + 6 * c, load);
+    add_load(loads + kLoadSums * c, load);
+    if (collider.kind == Collider::kJaw) {
+      const unsigned pushed = __ballot_sync(0xffffffffu, pushes);
+      if (threadIdx.x % 32 == 0) atomicAdd(loads + kLoadSums * c + 6, 1ull * __popc(pushed));
+    }
   }
 #pragma unroll
   for (int slot = 0; slot < 2; ++slot) {

@@ -1,0 +1,24 @@
+// How far the jaws of a grasper close.
+#pragma once
+
+#include "tissue_sim/tool.h"
+
+namespace tissue_sim {
+
+/// Jaws follow the angle that is asked for, but press with no more than a given pressure: what
+/// an instrument's motor does, frame by frame. The next frame depends on what was pressed with in
+/// the last alone, so the same inputs bring the same jaws, also where they were limited already.
+class Grip {
+ public:
+  /// Limits the motion's jaws in the next frame, of `duration` seconds, to what presses with about
+  /// `pressure` [Pa] at most.
+  void limit(double pressure, double duration, ToolMotion& motion) const;
+  /// What the jaws pressed with in that frame [Pa], mean.
+  void follow(const ToolMotion& motion, double pressed);
+
+ private:
+  double pressed_ = 0;    // [Pa]
+  double stiffness_ = 0;  // growth of the pressure with the angle [Pa/rad]
+};
+
+}  // namespace tissue_sim

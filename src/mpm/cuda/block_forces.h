@@ -170,6 +170,7 @@ __device__ __forceinline__ void clear_exchange(float4* exchange, int plane_slots
 /// Goes on from `i`, and leaves it at what is left for the next block.
 __device__ __forceinline__ void sum_plane(int count, const float4* exchange, float4* force,
                                           int& i) {
+#pragma unroll 1
   for (; i < count; i += static_cast<int>(blockDim.x)) {
     float4 f[9];
 #pragma unroll

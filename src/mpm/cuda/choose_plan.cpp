@@ -8,6 +8,7 @@
 #include <string>
 
 #include "cutting/tear.h"
+#include "mpm/cuda/stacks.h"
 
 namespace tissue_sim {
 namespace {
@@ -25,12 +26,14 @@ double cycles_of_march(const LatticeBody& body, const CudaShape& s, const CudaLi
   // Room for one thread block only: several would be slower, and this is no model of them.
   const auto room = static_cast<double>(limits.shared_bytes);
   if (bytes + kMarchBytesBeside > room || 2 * bytes < room) return 1e30;
-  const double blocks =
-      static_cast<double>(parts_of(body.nx, b.x)) * parts_of(body.ny, b.y) * parts_of(body.nz, b.z);
+  const int columns = parts_of(body.nx, b.x) * parts_of(body.ny, b.y),
+            high = parts_of(body.nz, b.z), height = stack_height(columns, high, limits.processors);
+  const int rounds = parts_of(columns * parts_of(high, height), limits.processors);
   const double warps = std::ceil(b.x * b.y / 32.0) / 4;  // on each scheduler
   const double cell = 1950 * std::max(1.8, 1.3 * warps),
                plane = 200 + 450 * warps + 5 * plane_slots;
-  return std::ceil(blocks / limits.processors) * (5000 + cell * b.z + plane * (b.z + 2)) + 3000;
+  const double layers = height * b.z, of_block = 10;  // of equals, the tallest blocks
+  return rounds * (5000 + of_block * height + cell * layers + plane * (layers + 2)) + 3000;
 }
 
 /// Cycles of a substep as a small or as a large tissue (substeps.cu), 1e30 where that does not go.

@@ -35,7 +35,7 @@ double CudaMpmTissue::measure_limit(int steps) {
         frame.state[0] = from;
         frame.state[1] = to;
         if (d.all_plain) {
-          launch_substeps(d.plain_plan, d.tables(), frame, d.plain_resident, d.stream);
+          launch_substeps(d.plain_plan, d.plain_tables(), frame, d.plain_resident, d.stream);
         } else {
           launch_substeps(d.plan, d.tables(), frame, d.resident, d.stream);
         }

@@ -45,7 +45,7 @@ std::size_t CudaMpmTissue::device_bytes() const {
                     d.partial.bytes() + d.hold.bytes() + d.bonds.bytes() + d.soft.bytes() +
                     d.with.bytes() + d.whole.bytes() + d.u_before.bytes() + d.connect_room.bytes() +
                     d.colliders.bytes() + d.loads.bytes() + d.measures.bytes() + d.cloud.bytes() +
-                    d.stretched.bytes() + d.faces.bytes() + d.checkpoint.bytes();
+                    d.stretched.bytes() + d.faces.bytes() + d.checkpoint.bytes() + d.stacks.bytes();
   for (int i = 0; i < 2; ++i) sum += d.u[i].bytes() + d.v[i].bytes() + d.force[i].bytes();
   return sum;
 }
@@ -120,7 +120,9 @@ void CudaMpmTissue::plan_tables() {
       bundles = bundle_blocks(blocks, wanted, limits, *state_->cpu);
     }
     if (bundles.empty() || bundles.size() > wanted) {
-      bundles = single_blocks(blocks, d.plan.small ? at_once : blocks.size(), *state_->cpu);
+      bundles = d.plan.marches
+                    ? blocks_by_column(blocks)
+                    : single_blocks(blocks, d.plan.small ? at_once : blocks.size(), *state_->cpu);
     }
   } else {
     bundles = single_blocks(blocks, blocks.size(), *state_->cpu);
@@ -147,7 +149,9 @@ void CudaMpmTissue::push() {
   const int colliders = collider_count(scene) - (scene.ground.enabled ? 0 : 1);
   d.held_by = std::min(colliders, 2);
   const std::size_t most_held = OnDevice::Checkpoint::most_held(d.held_by * points);
-  check_memory(bytes_of(t, n, points, d.held_by, most_held), device_bytes());
+  const std::size_t of_stacks =
+      d.plan.marches ? Stacks::bytes_for(t, state_->blocks.all, d.plain_resident) : 0;
+  check_memory(bytes_of(t, n, points, d.held_by, most_held) + of_stacks, device_bytes());
   check_cuda(cudaStreamSynchronize(d.stream), "finish a frame");
   d.blocks.upload(t.blocks, d.stream);
   d.bundles.upload(t.bundles, d.stream);
@@ -159,6 +163,11 @@ void CudaMpmTissue::push() {
   d.first_parts.resize(slots);
   d.parts.resize(slots);
   d.most_sharing.resize(1);
+  d.stacks.clear();
+  if (d.plan.marches) {
+    d.stacks.make(t, state_->blocks.all, d.plain_resident, d.slot_node.data(), n, d.connect_room,
+                  d.most_sharing.data(), d.stream);
+  }
   connect_slots(
       {d.slot_node.data(), d.slot_parts.data(), d.first_parts.data(), d.parts.data(), slots}, n,
       d.connect_room, d.most_sharing.data(), d.stream);

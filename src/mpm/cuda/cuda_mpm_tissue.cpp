@@ -221,7 +221,7 @@ void CudaMpmTissue::launch(int begin, int end, float dt) {
     tables.slot_parts = d.pushed_parts.data();
     launch_substeps(d.push_plan, tables, frame, d.push_resident, d.stream);
   } else if (d.all_plain) {
-    launch_substeps(d.plain_plan, d.tables(), frame, d.plain_resident, d.stream);
+    launch_substeps(d.plain_plan, d.plain_tables(), frame, d.plain_resident, d.stream);
   } else {
     launch_substeps(d.plan, d.tables(), frame, d.resident, d.stream);
   }
@@ -268,7 +268,9 @@ std::string CudaMpmTissue::plan() const {
   return std::to_string(b.x) + " x " + std::to_string(b.y) + " x " + std::to_string(b.z) +
          " cells, " + std::to_string(d.plan.threads) + " a block, " +
          std::to_string(d.blocks.size()) + " blocks in " + std::to_string(d.bundles.size()) +
-         " bundles, " + std::to_string(d.resident) + " at once" + (d.plan.cached ? ", cached" : "");
+         " bundles, " + std::to_string(d.resident) + " at once" +
+         (d.plan.cached ? ", cached" : "") +
+         (d.stacks.count() > 0 ? ", in " + std::to_string(d.stacks.count()) + " stacks" : "");
 }
 
 }  // namespace tissue_sim

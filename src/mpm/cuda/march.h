@@ -8,20 +8,26 @@
 namespace tissue_sim {
 
 /// What block_forces() does for a block of full cells alone in its bundle, and the nodes' motion
-/// before it; planes.expect() was called. What cells
-/// give to a plane is summed up when the next cells are done: then all have arrived at the barrier
-/// between long ago, and nobody waits.
-template <class LawOf>
+/// before it; planes.expect() was called. What cells give to a plane is summed up when the next
+/// cells are done: then all have arrived at the barrier between long ago, and nobody waits.
+template <class LawOf, class Known>
 __device__ __forceinline__ void march(const CudaTables& t, const CudaBlock& block,
                                       const CudaBody& body, const BlockShared& s, int round,
-                                      float4* force, MovingPlanes planes, PlaneBarrier& barrier) {
-  const int thread = static_cast<int>(threadIdx.x), threads = static_cast<int>(blockDim.x);
-  const int columns = block.nx * block.ny;
-  const bool active = thread < columns, warp_active = thread / 32 * 32 < columns;
+                                      float4* force, MovingPlanes<Known> planes, const Known& known,
+                                      PlaneBarrier& barrier) {
+  const int thread = static_cast<int>(threadIdx.x), threads = known.threads;
+  const int columns = known.nx * known.ny;
+  const bool active = Known::kKnown || thread < columns, warp_active = thread / 32 * 32 < columns;
   ColumnWalk<LawOf, false, false, false, 2> walk{t, body, s};
   walk.column = column_of(block, min(thread, columns - 1));
+  if (Known::kKnown) {
+    walk.column.whole = 1;
+    walk.column.pitch = known.nx + 2;
+    walk.column.plane = known.room;
+    walk.column.plane_slot = thread + 2 * (thread / known.nx);
+  }
   const int plane_slots = walk.column.plane;
-  const auto exchange = [&](int z) { return s.exchange + z % 2 * 9 * plane_slots; };
+  const auto exchange = [&](int z) { return s.exchange + (z & 1) * 9 * plane_slots; };
   // As moves, sums begin with another thread in each plane.
   int begin = thread;
   const int turn_by = 96 % threads;

@@ -1,4 +1,6 @@
 // The kernels of large tissue that is whole and away from all tools: nodes come plane by plane.
+#include <type_traits>
+
 #include "mpm/cuda/grid_barrier.h"
 #include "mpm/cuda/march.h"
 #include "mpm/cuda/substeps.h"
@@ -20,13 +22,17 @@ __global__ void __launch_bounds__(kMaxCudaThreads, 1)
   // Copies: through a reference they would be read again after every store.
   CudaBlock block = {};
   CudaBody body = {};
-  const auto planes = [&] {
-    return MovingPlanes(t, f, block, body.inv_cell_size, shared, layout.max_plane_slots);
+  const auto planes = [&](const auto& known) {
+    return MovingPlanes<std::decay_t<decltype(known)>>(t, f, block, body.inv_cell_size, shared,
+                                                       known);
+  };
+  const auto any = [&] {
+    return AnyBlock{block.nx, block.ny, static_cast<int>(blockDim.x), layout.max_plane_slots};
   };
   const auto expect = [&](int bundle) {
     block = t.blocks[t.bundles[bundle].first_block];
     body = t.bodies[block.body];
-    planes().expect();
+    planes(any()).expect();
   };
   int cleared_nx = 0, cleared_ny = 0;  // blocks of this size find the exchange clear
   expect(mine);
@@ -40,8 +46,14 @@ __global__ void __launch_bounds__(kMaxCudaThreads, 1)
         cleared_ny = block.ny;
       }
       if (round < f.substeps) {
-        march<LawOf>(t, block, body, s, round, odd_round ? f.force[1] : f.force[0], planes(),
-                     barrier);
+        float4* force = odd_round ? f.force[1] : f.force[0];
+        if (KnownBlock::is(block, layout.max_plane_slots)) {
+          const KnownBlock known;
+          march<LawOf>(t, block, body, s, round, force, planes(known), known, barrier);
+        } else {
+          const AnyBlock known = any();
+          march<LawOf>(t, block, body, s, round, force, planes(known), known, barrier);
+        }
       } else {
         const CudaNodes &from = odd ? f.state[1] : f.state[0], &to = odd ? f.state[0] : f.state[1];
         bring_nodes<true, false, 4>(t, block.first_slot, block.slots(), {}, from, to,

@@ -17,21 +17,40 @@ inline constexpr int kRawNode = 2 + kPlaneParts;  ///< float4s: u, v and these p
 inline constexpr int kMovingPlaneRoom =
     kPlanesInPlace + kRawPlanes * kRawNode + kEntryPlanes + kEntryPlanes / 2;
 
+/// What a march knows of its block when it is compiled: nothing; or that it is one of 16 x 16
+/// columns of whole points for 256 threads, the shape that large tissue is given: then less has to
+/// be worked out of where a slot lies, and points have no volumes of their own. `room`: slots of a
+/// plane for which there is shared memory.
+struct AnyBlock {
+  static constexpr bool kKnown = false;
+  int nx, ny, threads, room;
+};
+struct KnownBlock {
+  static constexpr bool kKnown = true;
+  static constexpr int nx = 16, ny = 16, threads = 256, room = (nx + 2) * (ny + 2);
+  __device__ __forceinline__ static bool is(const CudaBlock& b, int room_of_plane) {
+    return b.nx == nx && b.ny == ny && b.whole != 0 && room_of_plane == room &&
+           static_cast<int>(blockDim.x) == threads;
+  }
+};
+
 /// The nodes that a bundle's cells need next, in shared memory. What the tables say of a plane's
 /// slots is on its way two planes ahead, nodes and the parts of their force one plane ahead, so
 /// that nobody waits for them but at the lowest planes. Each thread sends for, moves and puts in
 /// place the same slots of a plane.
+template <class Known>
 class MovingPlanes {
  public:
-  /// `room` has kMovingPlaneRoom for each of `plane_slots`; nodes are put in place times `scale`.
+  /// `room` has kMovingPlaneRoom for each of `known.room` slots; nodes are put in place times
+  /// `scale`.
   __device__ __forceinline__ MovingPlanes(const CudaTables& t, const CudaFrame& f,
                                           const CudaBlock& block, float scale, float4* room,
-                                          int plane_slots)
-      : t_(t), f_(f), block_(block), scale_(scale), room_(plane_slots), u_(room) {
-    raw_ = u_ + kPlanesInPlace * room_;
-    parts_ = reinterpret_cast<uint4*>(raw_ + kRawPlanes * kRawNode * room_);
-    node_ = reinterpret_cast<std::int32_t*>(parts_ + kEntryPlanes * room_);
-    shared_ = reinterpret_cast<std::uint32_t*>(node_ + kEntryPlanes * room_);
+                                          const Known& known)
+      : t_(t), f_(f), block_(block), known_(known), scale_(scale), u_(room) {
+    raw_ = u_ + kPlanesInPlace * known_.room;
+    parts_ = reinterpret_cast<uint4*>(raw_ + kRawPlanes * kRawNode * known_.room);
+    node_ = reinterpret_cast<std::int32_t*>(parts_ + kEntryPlanes * known_.room);
+    shared_ = reinterpret_cast<std::uint32_t*>(node_ + kEntryPlanes * known_.room);
   }
 
   /// Sends for the entries of the lowest planes: before begin(), as early as may be.
@@ -78,27 +97,28 @@ class MovingPlanes {
   }
   /// The column's nodes in plane z.
   __device__ __forceinline__ const float4* of(const CudaColumn& c, int z) const {
-    return u_ + z % kPlanesInPlace * room_ + c.plane_slot;
+    return u_ + (z & (kPlanesInPlace - 1)) * known_.room + c.plane_slot;
   }
 
  private:
   __device__ __forceinline__ int planes() const { return block_.nz + 2; }
-  __device__ __forceinline__ int plane_slots() const { return (block_.nx + 2) * (block_.ny + 2); }
+  __device__ __forceinline__ int plane_slots() const { return (known_.nx + 2) * (known_.ny + 2); }
   /// Planes begin with another thread each, for all warps to have as much to do.
   __device__ __forceinline__ int turned(int turn) const {
-    turn += turn_by_;
-    return turn < static_cast<int>(blockDim.x) ? turn : turn - static_cast<int>(blockDim.x);
+    turn += 96 % known_.threads;
+    return turn < known_.threads ? turn : turn - known_.threads;
   }
   __device__ __forceinline__ int first_of(int turn) const {
     const int i = static_cast<int>(threadIdx.x) + turn;
-    return i < static_cast<int>(blockDim.x) ? i : i - static_cast<int>(blockDim.x);
+    return i < known_.threads ? i : i - known_.threads;
   }
 
   __device__ __forceinline__ void fetch_entries(int z, int turn) {
     if (z >= planes()) return;
     const int count = plane_slots(), first = block_.first_slot + z * count;
-    const int to = z % kEntryPlanes * room_;
-    for (int i = first_of(turn); i < count; i += static_cast<int>(blockDim.x)) {
+    const int to = (z & (kEntryPlanes - 1)) * known_.room;
+#pragma unroll 1
+    for (int i = first_of(turn); i < count; i += known_.threads) {
       __pipeline_memcpy_async(node_ + to + i, t_.slot_node + first + i, 4);
       __pipeline_memcpy_async(shared_ + to + i, t_.slot_parts + first + i, 4);
       __pipeline_memcpy_async(parts_ + to + i, t_.first_parts + first + i, 16);
@@ -107,40 +127,42 @@ class MovingPlanes {
 
   __device__ __forceinline__ void fetch(int z, int turn) {
     if (z >= planes()) return;
-    const int count = plane_slots(), entry = z % kEntryPlanes * room_;
+    const int count = plane_slots(), entry = (z & (kEntryPlanes - 1)) * known_.room;
     const CudaNodes& from = odd_ ? f_.state[1] : f_.state[0];
     const float4* force = forces();
-    float4* to = raw_ + z % kRawPlanes * kRawNode * room_;
-    for (int i = first_of(turn); i < count; i += static_cast<int>(blockDim.x)) {
+    float4* to = raw_ + (z & (kRawPlanes - 1)) * kRawNode * known_.room;
+#pragma unroll 1
+    for (int i = first_of(turn); i < count; i += known_.threads) {
       const std::int32_t of_slot = node_[entry + i], node = of_slot < 0 ? ~of_slot : of_slot;
       __pipeline_memcpy_async(to + i, from.u + node, 16);
       if (!moves_) continue;
-      __pipeline_memcpy_async(to + room_ + i, from.v + node, 16);
+      __pipeline_memcpy_async(to + known_.room + i, from.v + node, 16);
       const std::uint32_t part_count = shared_[entry + i] & 63u;
       const uint4 part = parts_[entry + i];
-      __pipeline_memcpy_async(to + 2 * room_ + i, force + part.x, 16);
-      if (part_count > 1) __pipeline_memcpy_async(to + 3 * room_ + i, force + part.y, 16);
-      if (part_count > 2) __pipeline_memcpy_async(to + 4 * room_ + i, force + part.z, 16);
-      if (part_count > 3) __pipeline_memcpy_async(to + 5 * room_ + i, force + part.w, 16);
+      __pipeline_memcpy_async(to + 2 * known_.room + i, force + part.x, 16);
+      if (part_count > 1) __pipeline_memcpy_async(to + 3 * known_.room + i, force + part.y, 16);
+      if (part_count > 2) __pipeline_memcpy_async(to + 4 * known_.room + i, force + part.z, 16);
+      if (part_count > 3) __pipeline_memcpy_async(to + 5 * known_.room + i, force + part.w, 16);
     }
   }
 
   __device__ __forceinline__ void move(int z, int turn) {
     if (z >= planes()) return;
-    const int count = plane_slots(), entry = z % kEntryPlanes * room_;
+    const int count = plane_slots(), entry = (z & (kEntryPlanes - 1)) * known_.room;
     const CudaNodes& to = odd_ ? f_.state[0] : f_.state[1];
-    const float4* raw = raw_ + z % kRawPlanes * kRawNode * room_;
-    float4* out = u_ + z % kPlanesInPlace * room_;
-    for (int i = first_of(turn); i < count; i += static_cast<int>(blockDim.x)) {
+    const float4* raw = raw_ + (z & (kRawPlanes - 1)) * kRawNode * known_.room;
+    float4* out = u_ + (z & (kPlanesInPlace - 1)) * known_.room;
+#pragma unroll 1
+    for (int i = first_of(turn); i < count; i += known_.threads) {
       float4 u = raw[i];
       if (moves_) {
         const std::int32_t node = node_[entry + i];
         const std::uint32_t shared = shared_[entry + i];
         const int part_count = static_cast<int>(shared & 63u);
-        float4 v = raw[room_ + i], f = raw[2 * room_ + i];
+        float4 v = raw[known_.room + i], f = raw[2 * known_.room + i];
 #pragma unroll
         for (int p = 1; p < kPlaneParts; ++p) {
-          if (p < part_count) add(raw[(2 + p) * room_ + i], f);
+          if (p < part_count) add(raw[(2 + p) * known_.room + i], f);
         }
         if (part_count > kPlaneParts) add_more_parts(shared, f);
         f_.step.move(0, f.x, u.w, v.w, u.x, v.x);
@@ -178,8 +200,9 @@ class MovingPlanes {
   const CudaTables& t_;
   const CudaFrame& f_;
   const CudaBlock& block_;
+  Known known_;
   float scale_;
-  int room_, turn_ = 0, turn_by_ = 96 % static_cast<int>(blockDim.x), round_ = 0;
+  int turn_ = 0, round_ = 0;
   bool moves_ = false, odd_ = false;
   float4 *u_, *raw_;  ///< [kPlanesInPlace][room], [kRawPlanes][kRawNode][room]
   uint4* parts_;      ///< [kEntryPlanes][room], as are these two

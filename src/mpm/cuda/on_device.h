@@ -12,6 +12,7 @@
 #include "mpm/cuda/held_points.h"
 #include "mpm/cuda/make_tables.h"
 #include "mpm/cuda/near_cells.h"
+#include "mpm/cuda/stacks.h"
 
 namespace tissue_sim {
 
@@ -40,6 +41,7 @@ struct CudaMpmTissue::OnDevice {
   DeviceArray<std::int32_t> slot_node, point, piece, place;
   DeviceArray<std::uint32_t> slot_parts, parts, colour;
   DeviceArray<uint4> first_parts;
+  Stacks stacks;
   ConnectRoom connect_room;
   PinnedArray<int> most_sharing;
   DeviceArray<float> volume, partial, hold;
@@ -117,6 +119,8 @@ struct CudaMpmTissue::OnDevice {
     t.hold = hold.data();
     return t;
   }
+  /// Those for plain_plan.
+  CudaTables plain_tables() const { return stacks.of(tables()); }
   CudaNodes nodes(int which) const { return {u[which].data(), v[which].data()}; }
   CudaNodes present() const { return nodes(current); }
 };

@@ -33,7 +33,7 @@ class PlaneBarrier {
     unsigned done;
     do {
       asm volatile(
-          "{ .reg .pred done; mbarrier.test_wait.parity.shared.b64 done, [%1], %2; "
+          "{ .reg .pred done; mbarrier.try_wait.parity.shared.b64 done, [%1], %2; "
           "selp.u32 %0, 1, 0, done; }"
           : "=r"(done)
           : "r"(place_), "r"(parity_)

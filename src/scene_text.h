@@ -30,9 +30,8 @@ inline constexpr Spelling<Shape> kShapeNames[] = {{Shape::kBox, "box"},
                                                   {Shape::kEllipsoid, "ellipsoid"},
                                                   {Shape::kCylinder, "cylinder"},
                                                   {Shape::kMesh, "mesh"}};
-inline constexpr Spelling<ToolType> kToolTypeNames[] = {{ToolType::kScalpel, "scalpel"},
-                                                        {ToolType::kProbe, "probe"},
-                                                        {ToolType::kGrasper, "grasper"}};
+inline constexpr Spelling<ToolType> kToolTypeNames[] = {
+    {ToolType::kScalpel, "scalpel"}, {ToolType::kProbe, "probe"}, {ToolType::kGrasper, "grasper"}};
 
 /// The name of an enum's value; nullptr for a value that the enum does not have.
 template <class Enum, std::size_t N>

@@ -154,7 +154,8 @@ __device__ __forceinline__ void push_nodes(const CudaTables& t, const CudaFrame&
   if (f.near_cells != nullptr && block >= 0) {
     colliders.finish(s.colliders);
     __syncthreads();
-    auto* loads = reinterpret_cast<unsigned long long*>(f.loads) + kLoadSums * f.collider_count * round;
+    auto* loads =
+        reinterpret_cast<unsigned long long*>(f.loads) + kLoadSums * f.collider_count * round;
     near.push(t, state, kCellReach * f.cell_size, {s.colliders, loads, force},
               reinterpret_cast<CellNodes*>(s.u)[warp]);
   }

@@ -56,7 +56,9 @@ ToolPath::ToolPath(const Tool& tool, int index, const ToolMotion& motion, double
   shape_.tool = index;
 }
 
-Vec3 ToolPath::tip(double s) const { return pose_at(motion_, s).position; }
+Vec3 ToolPath::tip(double s) const {
+  return (1 - s) * motion_.begin.position + s * motion_.end.position;
+}
 
 void ToolPath::at(double s, Collider* out) const {
   const Pose pose = pose_at(motion_, s);

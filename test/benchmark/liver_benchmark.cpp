@@ -71,8 +71,9 @@ Scene liver_scene(const Liver& liver) {
   scene.tools.resize(2);
   scene.tools[0].name = liver.grasped ? "grasper" : "probe";
   scene.tools[0].type = liver.grasped ? ToolType::kGrasper : ToolType::kProbe;
-  scene.tools[0].grip_pressure = 0.6 * liver.young_modulus;
+  scene.tools[0].grip_pressure = liver.young_modulus;
   scene.tools[0].cohesion = 2 * liver.young_modulus;
+  if (liver.grasped) scene.tools[0].friction = 1;
   scene.tools[1].name = "scalpel";
   scene.tools[1].type = ToolType::kScalpel;
   scene.tools[1].blade_length = 0.03;
@@ -82,7 +83,7 @@ Scene liver_scene(const Liver& liver) {
 /// The jaws close about the upper edge at x = 0.1 m within 0.3 s, then pull it to and fro.
 void move_grasper(Simulation& simulation, double t) {
   const Vec3 edge(0.1, 0.03, 0.05), inward = Vec3(-1, 0, -1).normalized();
-  const double pulled = t > 0.33 ? 0.0025 * (1 - std::cos(5 * (t - 0.33))) : 0;
+  const double pulled = t > 0.33 ? 0.0015 * (1 - std::cos(5 * (t - 0.33))) : 0;
   Eigen::Matrix3d axes;
   axes.col(1) = Vec3::UnitY();
   axes.col(2) = inward;

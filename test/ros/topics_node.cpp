@@ -11,6 +11,7 @@
 #include <tf2_ros/transform_listener.h>
 #include <visualization_msgs/MarkerArray.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstring>
 #include <set>
@@ -106,7 +107,7 @@ TEST_F(Topics, FragmentsAndSceneAreThere) {
   ASSERT_TRUE(s);
   const Scene scene = scene_from_yaml(s->data);
   EXPECT_EQ(scene.name, "slab");
-  EXPECT_EQ(scene.tools.size(), 4u);
+  EXPECT_EQ(scene.tools.size(), 5u);
 }
 
 TEST_F(Topics, PosesInAnyFrameMoveTheTool) {
@@ -138,7 +139,7 @@ TEST_F(Topics, PosesInAnyFrameMoveTheTool) {
   arm.send({Vec3(0.26, 0, 0.1), turned}, "world");
   EXPECT_TRUE(wait_until(at(Vec3(0.26, 0, 0.1))));
   const auto m = inputs.last();
-  ASSERT_EQ(m->tools.size(), 4u);
+  ASSERT_EQ(m->tools.size(), 5u);
   EXPECT_EQ(m->tools[1].name, "probe");
 }
 
@@ -184,6 +185,39 @@ TEST_F(Topics, JawAnglesArePassedOn) {
     ros::WallDuration(0.02).sleep();
     const auto m = inputs.last();
     return m && std::fabs(m->tools[1].jaw_end - 0.25) < 1e-6;
+  }));
+}
+
+TEST_F(Topics, JawsOfAGrasperCloseAsFastAsAMotor) {
+  Topic<FrameInputMessage> inputs("/simulator/inputs");
+  Topic<visualization_msgs::MarkerArray> markers("/simulator/markers");
+  ros::NodeHandle node;
+  ros::Publisher jaws =
+      node.advertise<sensor_msgs::JointState>("/simulator/grasper/jaw/measured_js", 10);
+  ASSERT_TRUE(wait_until([&] { return jaws.getNumSubscribers() > 0; }));
+  Arm arm("grasper");
+  const auto jaw_is = [&](double angle) {
+    return wait_until([&] {
+      sensor_msgs::JointState jaw;
+      jaw.header.stamp = ros::Time::now();
+      jaw.position = {angle};
+      jaws.publish(jaw);
+      arm.send(pointing_down(-0.2, 0, 0.1));
+      ros::WallDuration(0.01).sleep();
+      const auto m = inputs.last();
+      if (m && m->tools[4].present) {
+        EXPECT_LT(std::fabs(m->tools[4].jaw_end - m->tools[4].jaw_begin), 3.0 / 60 + 1e-6);
+      }
+      return m && std::fabs(m->tools[4].jaw_end - angle) < 1e-6;
+    });
+  };
+  EXPECT_TRUE(jaw_is(0.9));
+  EXPECT_TRUE(jaw_is(0));
+  EXPECT_TRUE(wait_until([&] {
+    const auto array = markers.last();
+    return array && std::count_if(
+                        array->markers.begin(), array->markers.end(),
+                        [](const visualization_msgs::Marker& m) { return m.ns == "grasper"; }) == 3;
   }));
 }
 

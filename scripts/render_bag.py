@@ -85,7 +85,7 @@ class Recording:
             nearest[k] = off
             self.seconds[k] = (message.frame + 1) / self.scene.get("frame_rate", 60.0)
             present = [m for m in message.tools if m.present]
-            self.tools[k] = [(shape_of[m.name], vector(m.end.position),
+            self.tools[k] = [(dict(shape_of[m.name], jaw=m.jaw_end), vector(m.end.position),
                               rotation_of(m.end.orientation)) for m in present]
             self.moving[k] = any(np.linalg.norm(vector(m.end.position) - vector(m.begin.position)) >
                                  1e-5 for m in present)

@@ -83,8 +83,27 @@ def probe(radius, length):
     return [lathe(shaft, BLUE, 0.35), lathe(grip, GRIP, 0.2)]
 
 
+def grasper(length, width, angle):
+    """Two jaws with flat faces, open by `angle` about a hinge at z = -length, and a shaft."""
+    w, z = 0.5 * width, 0.15 * length
+    meshes = []
+    for side in (-1, 1):
+        jaw = plate([(0, -0.1 * z), (0, -length), (side * w, -length), (side * w, -z),
+                     (0.35 * side * w, 0)], [0.7 * w, w, w, w, 0.7 * w], STEEL, 1.0)
+        sine, cosine = np.sin(0.5 * side * angle), np.cos(0.5 * side * angle)
+        swing = np.array([[cosine, 0, sine], [0, 1, 0], [-sine, 0, cosine]])
+        hinge = np.array([0, 0, -length])
+        meshes.append(placed(jaw, hinge - swing @ hinge, swing))
+    shaft = [(1.15 * w, 0.08 * length - length), (1.3 * w, -length), (1.3 * w, -1.2 * length),
+             (1.3 * w, -0.1), (1.3 * w, -0.2)]
+    return meshes + [lathe(shaft, GRIP, 0.2)]
+
+
 def tool_meshes(tool):
-    """The meshes of one entry of the scene's `tools`, in the tool's frame."""
+    """The meshes of one entry of the scene's `tools`, in the tool's frame; `jaw` is its angle."""
+    if tool.get("type") == "grasper":
+        return grasper(tool.get("jaw_length", 0.015), tool.get("jaw_width", 0.004),
+                       tool.get("jaw", 0.0))
     if tool.get("type") == "scalpel":
         return scalpel(tool.get("blade_length", 0.025), tool.get("blade_width", 0.006),
                        tool.get("blade_thickness", 0.0004))

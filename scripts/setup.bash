@@ -18,11 +18,11 @@ debian_packages=(catkin ros-message-generation ros-message-runtime libroscpp-dev
   libsensor-msgs-dev libvisualization-msgs-dev rosout python3-roslaunch python3-rosbag
   python3-rostopic python3-rosservice python3-rosnode python3-rosparam python3-rostest python3-rospy
   python3-tf2-ros python3-std-msgs python3-std-srvs python3-geometry-msgs python3-sensor-msgs
-  python3-visualization-msgs python3-diagnostic-msgs)
+  python3-visualization-msgs python3-diagnostic-msgs rosbash)
 noetic_packages=(ros-noetic-{catkin,message-generation,message-runtime,roscpp,roslib,rospy,rostest}
   ros-noetic-{rosbag,rosbag-storage,roslaunch,rosout,rostopic,rosservice,rosnode,rosparam,tf2}
   ros-noetic-{tf2-ros,tf2-geometry-msgs,nodelet,pluginlib,diagnostic-updater,diagnostic-msgs}
-  ros-noetic-{std-msgs,std-srvs,geometry-msgs,sensor-msgs,visualization-msgs})
+  ros-noetic-{std-msgs,std-srvs,geometry-msgs,sensor-msgs,visualization-msgs,rosbash})
 
 say() { printf '\n== %s\n' "$*"; }
 fail() { printf '\nerror: %s\n' "$*" >&2; exit 1; }

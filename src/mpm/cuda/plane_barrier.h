@@ -3,6 +3,13 @@
 
 #include <cstdint>
 
+// From compute capability 9.0 on a thread may sleep while it waits.
+#if __CUDA_ARCH__ >= 900
+#define TISSUE_SIM_WAIT "try_wait"
+#else
+#define TISSUE_SIM_WAIT "test_wait"
+#endif
+
 namespace tissue_sim {
 
 /// All threads call arrive() and wait() in turn; what a thread wrote before it arrived is there for
@@ -33,7 +40,7 @@ class PlaneBarrier {
     unsigned done;
     do {
       asm volatile(
-          "{ .reg .pred done; mbarrier.try_wait.parity.shared.b64 done, [%1], %2; "
+          "{ .reg .pred done; mbarrier." TISSUE_SIM_WAIT ".parity.shared.b64 done, [%1], %2; "
           "selp.u32 %0, 1, 0, done; }"
           : "=r"(done)
           : "r"(place_), "r"(parity_)
@@ -51,3 +58,5 @@ class PlaneBarrier {
 };
 
 }  // namespace tissue_sim
+
+#undef TISSUE_SIM_WAIT

@@ -39,12 +39,12 @@ class PlaneBarrier {
 #if __CUDA_ARCH__ >= 800
     unsigned done;
     do {
-      asm volatile(
-          "{ .reg .pred done; mbarrier." TISSUE_SIM_WAIT ".parity.shared.b64 done, [%1], %2; "
-          "selp.u32 %0, 1, 0, done; }"
-          : "=r"(done)
-          : "r"(place_), "r"(parity_)
-          : "memory");
+      asm volatile("{ .reg .pred done; mbarrier." TISSUE_SIM_WAIT
+                   ".parity.shared.b64 done, [%1], %2; "
+                   "selp.u32 %0, 1, 0, done; }"
+                   : "=r"(done)
+                   : "r"(place_), "r"(parity_)
+                   : "memory");
     } while (done == 0);
     parity_ ^= 1;
 #else

@@ -6,8 +6,8 @@
 namespace tissue_sim {
 
 /// Jaws follow the angle that is asked for, but press with no more than a given pressure: what
-/// an instrument's motor does, frame by frame. The next frame depends on what was pressed with in
-/// the last alone, so the same inputs bring the same jaws, also where they were limited already.
+/// an instrument's motor does, frame by frame. The next frame depends on what they pressed with
+/// before alone, so the same inputs bring the same jaws, also where they were limited already.
 class Grip {
  public:
   /// Limits the motion's jaws in the next frame, of `duration` seconds, to what presses with about

@@ -2,9 +2,9 @@
 #pragma once
 
 #include "mpm/cuda/block_forces.h"
+#include "mpm/cuda/push_cells.h"
 #include "mpm/cuda/push_contacts.h"
 #include "mpm/cuda/substeps.h"
-#include "mpm/cuda/tool_pushes.h"
 
 namespace tissue_sim {
 namespace {
@@ -157,7 +157,7 @@ __device__ __forceinline__ void push_nodes(const CudaTables& t, const CudaFrame&
     auto* loads =
         reinterpret_cast<unsigned long long*>(f.loads) + kLoadSums * f.collider_count * round;
     near.push(t, state, kCellReach * f.cell_size, {s.colliders, loads, force},
-              reinterpret_cast<CellNodes*>(s.u)[warp]);
+              reinterpret_cast<WarpNodes*>(s.u)[warp]);
   }
   if (!f.faces.any) return;
   const CudaLooks& looks = f.faces.looks;

@@ -25,7 +25,7 @@ CudaLayout layout_of(const CudaPlan& plan) {
   layout.max_plane_slots = plan.max_plane_slots;
   layout.node_room = (velocities ? 2 : 1) * plan.max_slots;
   if (plan.pushes) {  // cells that colliders push come where the nodes of the block were
-    const int cells = plan.threads / 32 * static_cast<int>(sizeof(CellNodes));
+    const int cells = plan.threads / 32 * static_cast<int>(sizeof(WarpNodes));
     layout.node_room = std::max(layout.node_room, cells / 16 + 1);
   }
   layout.exchange = (plan.two_planes ? 18 : 9) * plan.max_plane_slots;

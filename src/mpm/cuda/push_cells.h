@@ -1,0 +1,158 @@
+// Which cells near colliders are pushed, and by whom. For .cu files.
+//
+// Few points are near a tool, and the slowest thread block decides how long a substep takes. So
+// cells near colliders are no work of the block that they are in: a warp of any thread block pushes
+// the points of one, once all nodes are in place.
+#pragma once
+
+#include "math/bspline.h"
+#include "mpm/cuda/add_push.h"
+#include "mpm/cuda/tool_pushes.h"
+
+namespace tissue_sim {
+
+/// Displacement [m] and velocity [m/s] of a cell's 27 nodes, which a warp brings for all its lanes.
+struct WarpNodes {
+  float u[27][3], v[27][3];
+};
+
+/// One component of what nodes have at the point at sub-position s.
+__device__ __forceinline__ float at_point(const float (&of)[27][3], int c, int s) {
+  float sum = 0;
+#pragma unroll
+  for (int z = 0; z < 3; ++z) {
+    float plane = 0;
+#pragma unroll
+    for (int y = 0; y < 3; ++y) {
+      float row = 0;
+#pragma unroll
+      for (int x = 0; x < 3; ++x) row += lattice_weight(s & 1, x) * of[9 * z + 3 * y + x][c];
+      plane += lattice_weight(s >> 1 & 1, y) * row;
+    }
+    sum += lattice_weight(s >> 2, z) * plane;
+  }
+  return sum;
+}
+
+/// What the colliders of one substep do to the nodes.
+struct ToolPushes {
+  const Collider* colliders;  ///< in shared memory
+  unsigned long long* loads;  ///< per collider
+  long long* force;           ///< per node, see NodePushes
+};
+
+/// Adds what colliders push the points of a cell with to its nodes. The first eight lanes of the
+/// warp have its points, the first 27 its nodes; of each component of a point's place and velocity
+/// another lane works out the sum.
+__device__ __forceinline__ void push_cell(const CudaTables& t, const CudaNodes& state,
+                                          const CudaNearCell& cell, const ToolPushes& pushes,
+                                          WarpNodes& nodes) {
+  const int lane = static_cast<int>(threadIdx.x) % 32, k = min(lane, 26);
+  const int s = lane % 8, component = min(lane / 8, 2);
+  const int at = cell.lane + s * cell.step;
+  const std::int32_t entry =
+      __ldg(t.slot_node + cell.slot + k / 9 * cell.plane + k / 3 % 3 * cell.pitch + k % 3);
+  const int p = __ldg(t.point + at), node = entry < 0 ? ~entry : entry;
+  const float volume = __ldg(t.volume + at);
+  const CudaBody& body = t.bodies[cell.body];
+  const float quarter = 0.25f * body.cell_size;
+  const float4 u = __ldcg(state.u + node), v = __ldcg(state.v + node);
+  Held held;
+  PushedPoint point;
+  point.index = lane < 8 ? p : -1;
+  if (point.index >= 0) {
+    held.load(t, p);
+    point.is_cut = t.bonds[p] != kAllBonds;
+  }
+  point.spring = {body.spring.stiffness * volume, body.spring.damping * volume};
+  __syncwarp();
+  nodes.u[k][0] = u.x, nodes.u[k][1] = u.y, nodes.u[k][2] = u.z;
+  nodes.v[k][0] = v.x, nodes.v[k][1] = v.y, nodes.v[k][2] = v.z;
+  __syncwarp();
+  const float x = at_point(nodes.u, component, s), velocity = at_point(nodes.v, component, s);
+#pragma unroll
+  for (int a = 0; a < 3; ++a) {
+    const float moved = __shfl_sync(0xffffffffu, x, s + 8 * a);
+    point.x[a] = cell.middle[a] + ((s >> a & 1) != 0 ? quarter : -quarter) + moved;
+    point.v[a] = __shfl_sync(0xffffffffu, velocity, s + 8 * a);
+  }
+  const bool held_before = (held.with[0] | held.with[1]) != 0;
+  float push[3] = {0, 0, 0};
+  push_point(point, pushes.colliders, cell.near, t.held_by, held, pushes.loads, push);
+  const bool holds = (held.with[0] | held.with[1]) != 0;
+  if (point.index >= 0 && (holds || held_before)) held.store(t, p);
+  unsigned left = __ballot_sync(0xffffffffu, holds);
+  if (left == 0) return;
+  float force[3] = {0, 0, 0};
+  for (; left != 0; left &= left - 1) {
+    const int from = __ffs(static_cast<int>(left)) - 1;
+    const float w = lattice_weight(from & 1, k % 3) * lattice_weight(from >> 1 & 1, k / 3 % 3) *
+                    lattice_weight(from >> 2, k / 9);
+#pragma unroll
+    for (int a = 0; a < 3; ++a) force[a] += w * __shfl_sync(0xffffffffu, push[a], from);
+  }
+  if (lane < 27) add_push(pushes.force + 3 * static_cast<std::size_t>(node), 1.0f, force);
+}
+
+/// What lane `from` of a warp has of a cell.
+__device__ __forceinline__ CudaNearCell cell_of_lane(const CudaNearCell& mine, int from) {
+  const auto get = [from](auto value) { return __shfl_sync(0xffffffffu, value, from); };
+  CudaNearCell cell;
+#pragma unroll
+  for (int a = 0; a < 3; ++a) cell.middle[a] = get(mine.middle[a]);
+  cell.near = get(mine.near);
+  cell.slot = get(mine.slot);
+  cell.pitch = get(mine.pitch);
+  cell.plane = get(mine.plane);
+  cell.lane = get(mine.lane);
+  cell.step = get(mine.step);
+  cell.body = get(mine.body);
+  return cell;
+}
+
+/// The cells near colliders that the lanes of a warp look at, each the next of its own under way
+/// while other things are done. Warps `warp` of `warps` take part; cells side by side are of
+/// different warps.
+struct NearSearch {
+  const CudaNearCell* cells;
+  int count, i, step;
+  CudaNearCell next;
+
+  __device__ __forceinline__ void load() {
+    if (i >= count) return;
+    int4* to = reinterpret_cast<int4*>(&next);
+#pragma unroll
+    for (int k = 0; k < 3; ++k) to[k] = __ldg(reinterpret_cast<const int4*>(cells + i) + k);
+  }
+  __device__ __forceinline__ NearSearch(const CudaFrame& f, int warp, int warps)
+      : cells(f.near_cells),
+        count(cells == nullptr ? 0 : __ldg(f.near_count)),
+        i(static_cast<int>(threadIdx.x) % 32 * warps + warp),
+        step(32 * warps) {
+    load();
+  }
+  /// Pushes the points of those that are close to a collider.
+  __device__ __forceinline__ void push(const CudaTables& t, const CudaNodes& state, float reach,
+                                       const ToolPushes& pushes, WarpNodes& nodes) {
+    while (__any_sync(0xffffffffu, i < count)) {
+      const CudaNearCell cell = next;
+      const std::uint32_t near = i < count ? cell.near : 0;
+      bool close = false;
+      float4 u;
+      if (near != 0) u = __ldcg(state.u + cell.node);
+      i += step;
+      load();
+      if (near != 0) {
+        const float x[3] = {cell.middle[0] + u.x, cell.middle[1] + u.y, cell.middle[2] + u.z};
+        for (std::uint32_t left = near; left != 0 && !close; left &= left - 1) {
+          close = may_touch(pushes.colliders[__ffs(static_cast<int>(left)) - 1], x, reach);
+        }
+      }
+      for (unsigned left = __ballot_sync(0xffffffffu, close); left != 0; left &= left - 1) {
+        push_cell(t, state, cell_of_lane(cell, __ffs(static_cast<int>(left)) - 1), pushes, nodes);
+      }
+    }
+  }
+};
+
+}  // namespace tissue_sim

@@ -65,8 +65,9 @@ TISSUE_SIM_INLINE void rotations(const T (*F)[9], T (*R)[9]) {
     cofactor(F[k], cof);
     right_cauchy_green(F[k], C);
     times_symmetric(F[k], C, FC);
+    const T two = s[k].inverse_slope + s[k].inverse_slope;
     for (int i = 0; i < 9; ++i) {
-      R[k][i] = ((s[k].b + of[k].c1) * F[k][i] - FC[i] + s[k].a * cof[i]) * s[k].inverse;
+      R[k][i] = ((s[k].b + of[k].c1) * F[k][i] - FC[i] + s[k].a * cof[i]) * two;
     }
   }
 }
@@ -89,20 +90,19 @@ struct FixedCorotated {
       T cof[9], C[6];
       cofactor(F[k], cof);
       right_cauchy_green(F[k], C);
-      of[k] = {
-          C[0] + C[1] + C[2],
-          (C[0] * C[1] - C[3] * C[3]) + (C[0] * C[2] - C[4] * C[4]) + (C[1] * C[2] - C[5] * C[5]),
-          F[k][0] * cof[0] + F[k][1] * cof[1] + F[k][2] * cof[2]};
+      of[k] = {C[0] + C[1] + C[2],
+               C[0] * (C[1] + C[2]) + (C[1] * C[2] - C[3] * C[3] - C[4] * C[4] - C[5] * C[5]),
+               F[k][0] * cof[0] + F[k][1] * cof[1] + F[k][2] * cof[2]};
     }
     stretch<N>(of, s);
     for (int k = 0; k < N; ++k) {  // cof F and C anew: to keep them for N points costs more
       T cof[9], C[6], FC[9];
       cofactor(F[k], cof);
       right_cauchy_green(F[k], C);
-      const T mu2 = mu[k] + mu[k];
+      const T mu2 = mu[k] + mu[k], mu4 = mu2 + mu2;
       // b + tr C is 6 and a is 3 where F = I: written so, all three numbers have the rounding of
       // 3 fc there and cancel, without fused multiply-add too.
-      const T fc = mu2 * s[k].inverse;
+      const T fc = mu4 * s[k].inverse_slope;
       const T f = (mu2 - 4.0f * fc) - fc * (s[k].b + of[k].c1 - 4.0f);
       const T c = lambda[k] * (of[k].J - 1.0f) - fc * s[k].a;
       // P = F (f I + fc C) + c cof F

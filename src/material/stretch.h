@@ -59,12 +59,12 @@ struct Invariants {
 };
 
 /// Invariants of the stretch U = sqrt(F^T F) of a deformation gradient, and what the rotation
-/// follows from: R = ((b + c1) F - F C + a cof F) * inverse.
+/// follows from: R = 2 ((b + c1) F - F C + a cof F) * inverse_slope.
 template <class T>
 struct Stretch {
-  T a;        ///< tr U (with the smallest stretch negative where det F < 0)
-  T b;        ///< second invariant of U
-  T inverse;  ///< 1 / (a b - J) = 1 / ((s1 + s2) (s2 + s3) (s3 + s1))
+  T a;              ///< tr U (with the smallest stretch negative where det F < 0)
+  T b;              ///< second invariant of U
+  T inverse_slope;  ///< 1 / (2 (a b - J)) = 1 / (2 (s1 + s2) (s2 + s3) (s3 + s1))
 };
 
 /// f(a) = (a^2 - tr C)^2 / 4 - ||cof F||^2 - 2 J a, of which tr U is the largest root (Franca
@@ -107,8 +107,7 @@ TISSUE_SIM_INLINE void stretch(const Invariants<T>* of, Stretch<T>* s) {
   }
   for (int k = 0; k < N; ++k) {
     const Quartic<T> f(of[k], a[k]);
-    r[k] = nearer_reciprocal(nearer_reciprocal(r[k], f.slope), f.slope);
-    s[k] = {a[k], 0.5f * f.p, r[k] + r[k]};
+    s[k] = {a[k], 0.5f * f.p, nearer_reciprocal(nearer_reciprocal(r[k], f.slope), f.slope)};
   }
 }
 
@@ -172,8 +171,7 @@ TISSUE_SIM_INLINE void stretch(const Invariants<float>* of, Stretch<float>* s) {
 #pragma unroll
   for (int k = 0; k < N; ++k) {
     // P cancels where there is little strain: this reciprocal must be right to the last bit.
-    const float r = nearer_reciprocal(b2[k], f1[k]);
-    s[k] = {a[k], 0.5f * p[k], r + r};
+    s[k] = {a[k], 0.5f * p[k], nearer_reciprocal(b2[k], f1[k])};
   }
 }
 #endif

@@ -3,11 +3,13 @@
 
 #include "mpm/cuda/block_nodes.h"
 #include "mpm/cuda/cell_stabilisation.h"
+#include "mpm/cuda/grid_barrier.h"
 #include "mpm/cuda/half_forces.h"
 
 namespace tissue_sim {
 
 struct FaceRounds;
+struct WarpNodes;
 
 /// What a block's threads share, in shared memory.
 struct BlockShared {
@@ -16,12 +18,14 @@ struct BlockShared {
   float4* exchange;     ///< [1 or 2 planes][plane slots][9]
   Collider* colliders;  ///< [kMaxColliders]
   FaceRounds* rounds;
+  WarpNodes* cells;  ///< one a warp
 };
 
 /// What one substep of a bundle needs beside its nodes.
 struct BlockStep {
   float4* force;    ///< of all slots
   bool two_planes;  ///< CudaPlan::two_planes
+  Workers workers;
 };
 
 /// A column of a bundle and the thread that walks up it, alone or, with kPairs, with its neighbour
@@ -67,9 +71,9 @@ struct ColumnWalk {
     for (int c = 0; c < 3; ++c) {
       HalfBends bends;
       if (kPartial && extra != 0) stabilise_half(extra, side, h[c], bent[c], out[c], bends);
-      now[c] = plus<kPartial>(next[c], out[c], k.below, k.slope_below);
-      next[c] = plus<kPartial>(after[c], out[c], kAverageCenter, k.slope_center);
-      after[c] = plus<kPartial>({}, out[c], k.above, k.slope_above);
+      now[c] = plus<kPartial, !kPairs>(next[c], out[c], k.below, k.slope_below);
+      next[c] = plus<kPartial, !kPairs>(after[c], out[c], kAverageCenter, k.slope_center);
+      after[c] = plus<kPartial, !kPairs>({}, out[c], k.above, k.slope_above);
       if (!kPartial || extra == 0) continue;
       now[c] = plus(now[c], bends, k.below, k.slope_below);
       next[c] = plus(next[c], bends, kAverageCenter, k.slope_center);
@@ -83,8 +87,9 @@ struct ColumnWalk {
     read_plane<kPartial>(lowest, column.pitch, below);
     read_plane<kPartial>(second, column.pitch, center);
   }
-  /// All of cell z, with the column's nodes of the plane above.
-  __device__ __forceinline__ void cell(int z, const float4* nodes) {
+  /// All of cell z, with the column's nodes of the plane above. Calls between() between its halves.
+  template <class Between>
+  __device__ __forceinline__ void cell(int z, const float4* nodes, const Between& between) {
     PlaneNumbers above[3];
     read_plane<kPartial>(nodes, column.pitch, above);
 #pragma unroll
@@ -95,6 +100,7 @@ struct ColumnWalk {
     }
 #pragma unroll
     for (int sz = 0; sz < 2; ++sz) {
+      if (sz == 1) between();
       const float side = sz == 0 ? -1.0f : 1.0f;
       HalfPlane h[3], out[3];
 #pragma unroll
@@ -106,9 +112,9 @@ struct ColumnWalk {
       const GiveWeights k(side);
 #pragma unroll
       for (int c = 0; c < 3; ++c) {
-        now[c] = plus<kPartial>(now[c], out[c], k.below, k.slope_below);
-        next[c] = plus<kPartial>(next[c], out[c], kAverageCenter, k.slope_center);
-        after[c] = plus<kPartial>(after[c], out[c], k.above, k.slope_above);
+        now[c] = plus<kPartial, !kPairs>(now[c], out[c], k.below, k.slope_below);
+        next[c] = plus<kPartial, !kPairs>(next[c], out[c], kAverageCenter, k.slope_center);
+        after[c] = plus<kPartial, !kPairs>(after[c], out[c], k.above, k.slope_above);
       }
     }
     const float extra = kPartial ? stiffness(z) : 0;
@@ -144,7 +150,7 @@ struct ColumnWalk {
           plane[c][i] += __shfl_xor_sync(0xffffffffu, plane[c][i], 1);
         }
       }
-      node_forces<kPartial>(plane[c], f[c]);
+      node_forces<kPartial, !kPairs>(plane[c], f[c]);
     }
     float4* to = exchange + 9 * column.plane_slot;
 #pragma unroll
@@ -167,11 +173,12 @@ __device__ __forceinline__ void clear_exchange(float4* exchange, int plane_slots
 }
 
 /// Sums what the cells give to `count` nodes of a plane, in a fixed order, and puts it to `force`.
-/// Goes on from `i`, and leaves it at what is left for the next block.
+/// Goes on from `i`, in steps of as many as there are threads, and leaves it at what is left for
+/// the next block.
 __device__ __forceinline__ void sum_plane(int count, const float4* exchange, float4* force,
-                                          int& i) {
+                                          int threads, int& i) {
 #pragma unroll 1
-  for (; i < count; i += static_cast<int>(blockDim.x)) {
+  for (; i < count; i += threads) {
     float4 f[9];
 #pragma unroll
     for (int k = 0; k < 9; ++k) f[k] = exchange[9 * i + k];
@@ -198,7 +205,8 @@ __device__ __forceinline__ void block_forces(const CudaTables& t, const CudaBund
                                              const CudaBlock& block, const CudaBody& body,
                                              const BlockShared& s, const BlockStep& step) {
   using Walk = ColumnWalk<LawOf, kViscous, kPartial, kPairs>;
-  const int thread = static_cast<int>(threadIdx.x), index = Walk::index_of(thread);
+  const int thread = static_cast<int>(threadIdx.x), threads = step.workers.size();
+  const int index = Walk::index_of(thread);
   const int nz = kSpecial ? w.nz : block.nz;
   const int columns = kSpecial ? w.columns : block.nx * block.ny;
   // Threads beyond the last column do what the last one's do, if their warp has to anyway.
@@ -212,20 +220,20 @@ __device__ __forceinline__ void block_forces(const CudaTables& t, const CudaBund
   const auto finish_plane = [&](PlaneNumbers(&plane)[3], int z) {
     float4* exchange = s.exchange + (step.two_planes && z % 2 != 0 ? 9 * w.plane_slots : 0);
     if (warp_active) walk.give(plane, exchange, active);
-    __syncthreads();
+    step.workers.sync();
     int i = thread;
     if constexpr (kSpecial) {
       for (int j = 0; j < w.blocks; ++j) {
         const int4 b = j == 0 ? first : block_size(t, w.first_block + j);
         const int slots = (b.x + 2) * (b.y + 2);
-        if (z < b.z + 2) sum_plane(slots, exchange, step.force + b.w + z * slots, i);
+        if (z < b.z + 2) sum_plane(slots, exchange, step.force + b.w + z * slots, threads, i);
         exchange += 9 * slots;
       }
     } else {
       const int slots = walk.column.plane;
-      sum_plane(slots, exchange, step.force + block.first_slot + z * slots, i);
+      sum_plane(slots, exchange, step.force + block.first_slot + z * slots, threads, i);
     }
-    if (!step.two_planes) __syncthreads();
+    if (!step.two_planes) step.workers.sync();
   };
 
   const float4* nodes = s.u + walk.column.slot;
@@ -236,7 +244,7 @@ __device__ __forceinline__ void block_forces(const CudaTables& t, const CudaBund
       if (kPairs) {
         walk.half(z);
       } else {
-        walk.cell(z, nodes + (z + 2) * walk.column.plane);
+        walk.cell(z, nodes + (z + 2) * walk.column.plane, [] {});
       }
     } else if (kSpecial) {
       walk.rise();

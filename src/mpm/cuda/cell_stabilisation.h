@@ -22,8 +22,8 @@ __device__ __forceinline__ float numbers_energy2(std::integer_sequence<int, kQua
   return (number_energy2<kQuantities>(q) + ...);
 }
 
-/// Twice the energy of what stabilises component c in a cell, over cell size squared. `node` is the
-/// lowest of its 27, `stiffness` kStabilisation mu V.
+/// Twice the energy of what stabilises component c in a cell. `node` is the lowest of its 27, times
+/// kPlacedScale, `stiffness` kStabilisation mu V.
 __device__ inline float stabilising_energy2(const float4* node, int pitch, int plane, int c,
                                             float stiffness) {
   float q[3][kXyCount];
@@ -43,7 +43,8 @@ __device__ inline float stabilising_energy2(const float4* node, int pitch, int p
     q[z][kdA] = b.A, q[z][kdd] = b.d, q[z][kdB] = b.B;
     q[z][kBA] = e.A, q[z][kBd] = e.d, q[z][kBB] = e.B;
   }
-  return stiffness * numbers_energy2(std::make_integer_sequence<int, kXyCount>(), q);
+  constexpr float kScale = 1 / (kPlacedScale * kPlacedScale);
+  return kScale * stiffness * numbers_energy2(std::make_integer_sequence<int, kXyCount>(), q);
 }
 
 /// Adds what one x-y quantity's value `w` and slope `s` on the half's plane of points give back to
@@ -53,7 +54,8 @@ template <int kQuantity>
 __device__ __forceinline__ void stabilise_number(float stiffness, float side, float w, float s,
                                                  float& to_w, float& to_s) {
   constexpr int kX = stabilisation::kKinds[kQuantity][0], kY = stabilisation::kKinds[kQuantity][1];
-  constexpr float kRead = read_scale((kX == 0 ? 1 : 0) + (kY == 0 ? 1 : 0)),
+  constexpr int kAverages = (kX == 0 ? 1 : 0) + (kY == 0 ? 1 : 0);
+  constexpr float kRead = read_scale(kAverages), kSlope = slope_scale(kAverages),
                   kGive = give_scale(kX, kY);
   constexpr float kA = 0.25f * stabilisation::weight2(kQuantity, 0),
                   kD = 16.0f * stabilisation::weight2(kQuantity, 1),
@@ -61,7 +63,7 @@ __device__ __forceinline__ void stabilise_number(float stiffness, float side, fl
   const unsigned pair = 3u << (threadIdx.x & 30u);
   // Slopes were read by -side / 2, and the other half's side is the other one.
   const float other_s = __shfl_xor_sync(pair, s, 1);
-  to_s += stiffness * side * (-2.0f * kB * kRead / kAverageCenter / kGive) * (s + other_s);
+  to_s += stiffness * side * (-2.0f * kB * kSlope / kGive) * (s + other_s);
   if (kA + kD == 0) return;
   const float other_w = __shfl_xor_sync(pair, w, 1);
   to_w += stiffness * (kRead / kGive) * ((kA + kD) * w + (kA - kD) * other_w);
@@ -91,8 +93,8 @@ __device__ __forceinline__ void stabilise_planes(float stiffness, const PlaneNum
                                                  const PlaneNumbers& above, PlaneNumbers& to_below,
                                                  PlaneNumbers& to_center, PlaneNumbers& to_above) {
   constexpr int kX = stabilisation::kKinds[kQuantity][0], kY = stabilisation::kKinds[kQuantity][1];
-  constexpr float kScale =
-      read_scale((kX == 0 ? 1 : 0) + (kY == 0 ? 1 : 0)) / kAverageCenter / give_scale(kX, kY);
+  constexpr float kScale = slope_scale((kX == 0 ? 1 : 0) + (kY == 0 ? 1 : 0)) / give_scale(kX, kY) *
+                           kNodeScale<kQuantity>;
   const Line<float> l(below[kQuantity], center[kQuantity], above[kQuantity]);
   float A = stiffness * (kScale * stabilisation::weight2(kQuantity, 0)) * l.A;
   float d = stiffness * (kScale * stabilisation::weight2(kQuantity, 1)) * l.d;

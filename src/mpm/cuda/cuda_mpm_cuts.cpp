@@ -131,6 +131,7 @@ void CudaMpmTissue::plan_tables() {
   make_tables(*state_, bundles, t);
   d.plan.max_slots = t.max_slots;
   d.plan.max_plane_slots = t.max_plane_slots;
+  d.plan.max_columns = t.max_columns;
   choose(t.bundles.size());
   d.all_plain = std::all_of(t.bundles.begin(), t.bundles.end(),
                             [](const CudaBundle& b) { return b.blocks == 1 && b.partial == 0; });

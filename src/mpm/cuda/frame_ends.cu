@@ -35,21 +35,23 @@ __device__ __forceinline__ PointState point_state(const CudaBlock& b, const Cuda
   return p;
 }
 
-/// Calls f(lane, s, x, y, z, half plane of the nodes' values) for each point of the block.
+/// Calls f(lane, s, x, y, z, half plane of the nodes' values) for each point of the block, for the
+/// four of a half cell in code of their own: so what they share is worked out once.
 template <class F>
 __device__ __forceinline__ void for_each_point(const CudaTables& t, const CudaBlock& b,
                                                const float4* nodes, const F& f) {
   const int pitch = b.nx + 2, plane = pitch * (b.ny + 2);
   const int halves = 2 * b.nx * b.ny * b.nz;
   for (int i = threadIdx.x; i < halves; i += blockDim.x) {
-    const int x = i % b.nx, y = i / b.nx % b.ny, z = i / b.nx / b.ny / 2;
-    const int sz = i / b.nx / b.ny % 2;
+    const int row = i / b.nx, x = i - row * b.nx, layer = row / b.ny, y = row - layer * b.ny;
+    const int z = layer / 2, sz = layer % 2;
     HalfPlane h[3];
     const int first = z * plane + y * pitch + x;
     read_half(nodes + first, pitch, plane, sz == 0 ? -1.0f : 1.0f, h);
+#pragma unroll
     for (int q = 0; q < 4; ++q) {
       const int lane = lane_of(b, x, y, z, 4 * sz + q);
-      if (t.point[lane] >= 0) f(lane, 4 * sz + q, x, y, z, h);
+      if (b.whole != 0 || t.point[lane] >= 0) f(lane, 4 * sz + q, x, y, z, h);
     }
   }
 }
@@ -98,23 +100,45 @@ __device__ __forceinline__ void reduce(CudaMeasure& m) {
   reduce_warp(m);
 }
 
+/// Of the nodes that the block owns, a thread's share.
+__device__ __forceinline__ double kinetic_energy(const CudaTables& t, const CudaBlock& b,
+                                                 const CudaNodes& state) {
+  constexpr int kHand = 4;
+  double sum = 0;
+  for (int i = threadIdx.x; i < b.slots(); i += kHand * blockDim.x) {
+    std::int32_t node[kHand];
+    float4 v[kHand];
+    float mass[kHand];
+#pragma unroll
+    for (int k = 0; k < kHand; ++k) {
+      const int slot = i + k * static_cast<int>(blockDim.x);
+      node[k] = slot < b.slots() ? __ldg(t.slot_node + b.first_slot + slot) : -1;
+    }
+#pragma unroll
+    for (int k = 0; k < kHand; ++k) {
+      const int owned = max(node[k], 0);
+      v[k] = __ldcg(state.v + owned);
+      mass[k] = node[k] < 0 ? 0 : __ldcg(&state.u[owned].w);
+    }
+#pragma unroll
+    for (int k = 0; k < kHand; ++k) {
+      const double x = v[k].x, y = v[k].y, z = v[k].z;
+      sum += 0.5 * mass[k] * (x * x + y * y + z * z);
+    }
+  }
+  return sum;
+}
+
 __global__ void __launch_bounds__(kMostThreads)
     measure_blocks(const CudaTables t, const CudaNodes state, int max_slots, CudaMeasure* out) {
   extern __shared__ float4 shared[];
-  const CudaBlock& b = t.blocks[blockIdx.x];
-  const CudaBody& body = t.bodies[b.body];
+  const CudaBlock b = t.blocks[blockIdx.x];
+  const CudaBody body = t.bodies[b.body];
   float4 *u = shared, *v = shared + max_slots;
   bring_nodes<false, false, 4>(t, b.first_slot, b.slots(), {}, state, state, nullptr, {},
-                               body.inv_cell_size, u, v);
+                               placed_scale(body), u, v);
   CudaMeasure m = of_nothing();
-  for (int i = threadIdx.x; i < b.slots(); i += blockDim.x) {
-    const int node = t.slot_node[b.first_slot + i];
-    if (node < 0) continue;
-    const float4 w = __ldcg(state.v + node);
-    const double v2 = static_cast<double>(w.x) * w.x + static_cast<double>(w.y) * w.y +
-                      static_cast<double>(w.z) * w.z;
-    m.kinetic_energy += 0.5 * __ldcg(state.u + node).w * v2;
-  }
+  m.kinetic_energy = kinetic_energy(t, b, state);
   __syncthreads();
   const int pitch = b.nx + 2, plane = pitch * (b.ny + 2);
   for_each_point(t, b, u, [&](int lane, int s, int x, int y, int z, const HalfPlane(&h)[3]) {
@@ -145,12 +169,12 @@ __global__ void __launch_bounds__(kMostThreads)
     float v2 = 0;
     for (int c = 0; c < 3; ++c) {
       const float sx = (s & 1) != 0 ? 1.0f : -1.0f, sy = (s & 2) != 0 ? 1.0f : -1.0f;
-      const float velocity = body.cell_size * point_value(h[c], sx, sy);
+      const float velocity = point_value(h[c], sx, sy);
       v2 += velocity * velocity;
     }
-    const float speed = sqrtf(v2);
-    if (!(speed <= m.speed)) m.speed = speed;
+    if (!(v2 <= m.speed)) m.speed = v2;
   });
+  m.speed = body.cell_size * sqrtf(m.speed);
   for (int i = threadIdx.x; b.partial != 0 && i < b.nx * b.ny * b.nz; i += blockDim.x) {
     const float mu = t.partial[b.first_lane / 8 + i];
     if (mu == 0) continue;
@@ -167,10 +191,10 @@ __global__ void __launch_bounds__(kMostThreads)
 __global__ void __launch_bounds__(kMostThreads)
     write_cloud(const CudaTables t, const CudaNodes state, const CudaCloud cloud) {
   extern __shared__ float4 shared[];
-  const CudaBlock& b = t.blocks[blockIdx.x];
-  const CudaBody& body = t.bodies[b.body];
+  const CudaBlock b = t.blocks[blockIdx.x];
+  const CudaBody body = t.bodies[b.body];
   bring_nodes<false, false, 4>(t, b.first_slot, b.slots(), {}, state, state, nullptr, {},
-                               body.inv_cell_size, shared, nullptr);
+                               placed_scale(body), shared, nullptr);
   __syncthreads();
   for_each_point(t, b, shared, [&](int lane, int s, int x, int y, int z, const HalfPlane(&h)[3]) {
     const int p = t.point[lane];
@@ -204,11 +228,11 @@ __global__ void __launch_bounds__(kMostThreads)
 __global__ void __launch_bounds__(kMostThreads)
     list_stretched(const CudaTables t, const CudaNodes state, StretchedPoint* found, int* count) {
   extern __shared__ float4 shared[];
-  const CudaBlock& b = t.blocks[blockIdx.x];
-  const CudaBody& body = t.bodies[b.body];
+  const CudaBlock b = t.blocks[blockIdx.x];
+  const CudaBody body = t.bodies[b.body];
   if (body.tear_stretch == 0) return;
   bring_nodes<false, false, 4>(t, b.first_slot, b.slots(), {}, state, state, nullptr, {},
-                               body.inv_cell_size, shared, nullptr);
+                               placed_scale(body), shared, nullptr);
   __syncthreads();
   const float s2 = body.tear_stretch * body.tear_stretch;
   for_each_point(t, b, shared, [&](int lane, int s, int x, int y, int z, const HalfPlane(&h)[3]) {

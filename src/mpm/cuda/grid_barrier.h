@@ -11,17 +11,43 @@ __device__ __forceinline__ void arrive(unsigned* arrived, unsigned thread = 0) {
   }
 }
 
+/// `count` threads of a thread block from `first` on, whole warps, that meet at barrier kBarrier
+/// (from 1 on); or all of them, where `count` is 0.
+template <int kBarrier>
+struct Team {
+  int first = 0, count = 0;
+
+  __device__ __forceinline__ bool is_all() const { return count == 0; }
+  __device__ __forceinline__ int size() const {
+    return is_all() ? static_cast<int>(blockDim.x) : count;
+  }
+  /// Its number of the calling thread; of a thread of the team below size().
+  __device__ __forceinline__ int me() const { return static_cast<int>(threadIdx.x) - first; }
+  __device__ __forceinline__ bool has_me() const { return me() >= 0 && me() < size(); }
+  __device__ __forceinline__ void sync() const {
+    if (is_all()) {
+      __syncthreads();
+    } else {
+      asm volatile("bar.sync %0, %1;" ::"n"(kBarrier), "r"(count) : "memory");
+    }
+  }
+};
+/// Those that work on forces, and those that meanwhile push.
+using Workers = Team<1>;
+using Pushers = Team<2>;
+
 /// Waits until all thread blocks have arrived `round` times; what they wrote before is then seen by
-/// all.
-__device__ __forceinline__ void wait(unsigned* arrived, unsigned round) {
-  if (threadIdx.x == 0) {
+/// all of the team.
+template <class TeamOf = Workers>
+__device__ __forceinline__ void wait(unsigned* arrived, unsigned round, const TeamOf& team = {}) {
+  if (team.me() == 0) {
     const unsigned wanted = round * gridDim.x;
     unsigned seen;
     do {
       asm volatile("ld.acquire.gpu.global.u32 %0, [%1];" : "=r"(seen) : "l"(arrived) : "memory");
     } while (seen < wanted);
   }
-  __syncthreads();
+  team.sync();
 }
 
 __device__ __forceinline__ void grid_barrier(unsigned* arrived, unsigned round) {

@@ -23,11 +23,19 @@ struct HalfBends {
   float wBB, sAB, sdB, sBA, sBd, sBB;
 };
 
-/// What a number that was read must be multiplied with, `averages` the letters A in its name;
-/// slopes by -side / 2 instead of the first factor.
-inline constexpr float read_scale(int averages) {
-  return averages == 0 ? kAverageCenter : kAverageCenter * read_scale(averages - 1);
+/// What displacements of nodes over the cell size are multiplied with where they are put for cells
+/// to read: so that the slopes and differences that most of F is need no factor any more.
+inline constexpr float kPlacedScale = 0.5f * kAverageCenter * kAverageCenter;
+/// The same of displacements in metres.
+__device__ __forceinline__ float placed_scale(const CudaBody& body) {
+  return kPlacedScale * body.inv_cell_size;
 }
+/// What a number that was read must be multiplied with, `averages` the letters A in its name.
+inline constexpr float read_scale(int averages) {
+  return averages == 0 ? kAverageCenter / kPlacedScale : kAverageCenter * read_scale(averages - 1);
+}
+/// The same of a slope, besides -side / 2.
+inline constexpr float slope_scale(int averages) { return read_scale(averages) / kAverageCenter; }
 /// What a number that is given back must be multiplied with, of the quantity that x and y (0 A, 1
 /// d, 2 B) name; slopes by a quarter of it.
 inline constexpr float give_scale(int x, int y) {
@@ -126,7 +134,7 @@ __device__ __forceinline__ void read_half(const float4* node, int pitch, int pla
 /// last, for small motions not to be rounded more than once at its size.
 __device__ __forceinline__ void row_of_F(const HalfPlane& h, int c, float side, float y,
                                          float (&low)[3], float (&high)[3]) {
-  constexpr float k0 = read_scale(0), k1 = read_scale(1), k2 = read_scale(2);
+  constexpr float k0 = read_scale(0), k1 = read_scale(1);
   // (wdA/2 + y wdd/16) + x/4 (wBA + y wBd/8)
   const float xd = 0.5f * k1 * h.wdA + 0.0625f * k0 * y * h.wdd,
               xb = h.wBA + 0.125f * k0 / k1 * y * h.wBd;
@@ -137,8 +145,9 @@ __device__ __forceinline__ void row_of_F(const HalfPlane& h, int c, float side, 
   low[1] = ya - 0.0625f * k0 * yd;
   high[1] = ya + 0.0625f * k0 * yd;
   // (sAA + y sAd/8) + x/8 (sdA + y sdd/8)
-  const float s1 = -0.5f * k2 / k0 * side, s0 = -0.0625f * k1 / k0 * side;
-  const float za = s1 * h.sAA + s0 * (y * h.sAd), zd = h.sdA + 0.125f / k0 * y * h.sdd;
+  constexpr float k = 0.125f * slope_scale(0) / slope_scale(1);
+  const float s1 = -0.5f * slope_scale(2) * side, s0 = -0.0625f * slope_scale(1) * side;
+  const float za = s1 * h.sAA + s0 * (y * h.sAd), zd = h.sdA + k * y * h.sdd;
   low[2] = za - s0 * zd;
   high[2] = za + s0 * zd;
   low[c] += 1.0f;

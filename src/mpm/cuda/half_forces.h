@@ -38,7 +38,7 @@ __device__ __forceinline__ void viscous_stress(const CudaBody& body, const HalfP
                                                const float4& volume, float (&P)[9]) {
   const unsigned pair = 3u << (threadIdx.x & 30u);
   const auto mean = [pair](float half) { return 0.5f * (half + __shfl_xor_sync(pair, half, 1)); };
-  constexpr float k1 = read_scale(1), k2 = read_scale(2) / read_scale(0);
+  constexpr float k1 = read_scale(1), k2 = slope_scale(2);
   float F[9], rate[9];
 #pragma unroll
   for (int c = 0; c < 3; ++c) {

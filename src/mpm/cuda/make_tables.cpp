@@ -160,6 +160,8 @@ void add_bundle(int first_block, int blocks, std::vector<std::vector<CudaColumn>
     bundle.partial = bundle.partial | b.partial;
   }
   bundle.columns = static_cast<int>(t.columns.size()) - bundle.first_column;
+  const CudaBlock& first = t.blocks[first_block];
+  t.max_columns = std::max(t.max_columns, blocks == 1 ? first.nx * first.ny : bundle.columns);
   t.max_slots = std::max(t.max_slots, bundle.slots);
   t.max_plane_slots = std::max(t.max_plane_slots, bundle.plane_slots);
   t.bundles.push_back(bundle);
@@ -190,7 +192,7 @@ void make_tables(const MpmState& state, const std::vector<std::vector<int>>& bun
   });
   t.bundles.clear();
   t.columns.clear();
-  t.max_slots = t.max_plane_slots = 0;
+  t.max_slots = t.max_plane_slots = t.max_columns = 0;
   int first = 0;
   for (const std::vector<int>& blocks : bundles) {
     add_bundle(first, static_cast<int>(blocks.size()), columns, t);

@@ -24,6 +24,7 @@ struct HostTables {
   PinnedArray<std::int32_t> point;
   int max_slots = 0;        ///< of a bundle
   int max_plane_slots = 0;  ///< the same of one plane
+  int max_columns = 0;      ///< of a bundle
 };
 
 /// `bundles` are the blocks, by their places in Blocks::all, that share a thread block.

@@ -8,8 +8,9 @@
 namespace tissue_sim {
 
 /// What block_forces() does for a block of full cells alone in its bundle, and the nodes' motion
-/// before it; planes.expect() was called. What cells give to a plane is summed up when the next
-/// cells are done: then all have arrived at the barrier between long ago, and nobody waits.
+/// before it; planes.expect() was called. What cells give to a plane is summed up between the two
+/// halves of the next cells: then all have arrived at the barrier between long ago, and nobody
+/// waits.
 template <class LawOf, class Known>
 __device__ __forceinline__ void march(const CudaTables& t, const CudaBlock& block,
                                       const CudaBody& body, const BlockShared& s, int round,
@@ -35,7 +36,7 @@ __device__ __forceinline__ void march(const CudaTables& t, const CudaBlock& bloc
     int i = begin;
     begin += turn_by;
     if (begin >= threads) begin -= threads;
-    sum_plane(plane_slots, exchange(z), force + block.first_slot + z * plane_slots, i);
+    sum_plane(plane_slots, exchange(z), force + block.first_slot + z * plane_slots, threads, i);
   };
 
   planes.begin(round);
@@ -43,10 +44,16 @@ __device__ __forceinline__ void march(const CudaTables& t, const CudaBlock& bloc
   barrier.arrive();
 #pragma unroll 1
   for (int z = 0; z < block.nz; ++z) {
-    if (warp_active) walk.cell(z, planes.of(walk.column, z + 2));
-    barrier.wait();
-    if (z > 0) sum(z - 1);
-    if (warp_active) walk.give(walk.now, exchange(z), active);
+    const auto between = [&] {
+      barrier.wait();
+      if (z > 0) sum(z - 1);
+    };
+    if (warp_active) {
+      walk.cell(z, planes.of(walk.column, z + 2), between);
+      walk.give(walk.now, exchange(z), active);
+    } else {
+      between();
+    }
     planes.next(z + kPlanesInPlace);
     barrier.arrive();
   }

@@ -23,7 +23,7 @@ __global__ void __launch_bounds__(kMaxCudaThreads, 1)
   CudaBlock block = {};
   CudaBody body = {};
   const auto planes = [&](const auto& known) {
-    return MovingPlanes<std::decay_t<decltype(known)>>(t, f, block, body.inv_cell_size, shared,
+    return MovingPlanes<std::decay_t<decltype(known)>>(t, f, block, placed_scale(body), shared,
                                                        known);
   };
   const auto any = [&] {

@@ -82,21 +82,31 @@ struct GiveWeights {
         slope_above(0.0625f * side + 0.125f) {}
 };
 
+/// What a quantity that was given back must be multiplied with for node_forces(); 1 without kApply.
+template <int kQuantity, bool kApply = true>
+inline constexpr float kNodeScale =
+    !kApply
+        ? 1.0f
+        : (stabilisation::kKinds[kQuantity][0] == 0 ? kAverageCenter : 1) *
+              (stabilisation::kKinds[kQuantity][1] == 0 ? kAverageCenter : 1) *
+              give_scale(stabilisation::kKinds[kQuantity][0], stabilisation::kKinds[kQuantity][1]);
+
 /// Transpose of the pass along z: `p` and what the plane that has these weights gets from a half;
-/// with kValues from wAA too, which stress gives nothing to.
-template <bool kValues>
+/// with kValues from wAA too, which stress gives nothing to; with kScaled times kNodeScale, which
+/// costs nothing where the compiler knows the weights.
+template <bool kValues, bool kScaled>
 __device__ __forceinline__ PlaneNumbers plus(const PlaneNumbers& p, const HalfPlane& h, float w,
                                              float s) {
   PlaneNumbers q;
-  q[kAA] = p[kAA] + s * h.sAA;
-  if (kValues) q[kAA] += w * h.wAA;
-  q[kAd] = p[kAd] + w * h.wAd + s * h.sAd;
-  q[kAB] = p[kAB] + w * h.wAB;
-  q[kdA] = p[kdA] + w * h.wdA + s * h.sdA;
-  q[kdd] = p[kdd] + w * h.wdd + s * h.sdd;
-  q[kdB] = p[kdB] + w * h.wdB;
-  q[kBA] = p[kBA] + w * h.wBA;
-  q[kBd] = p[kBd] + w * h.wBd;
+  q[kAA] = p[kAA] + kNodeScale<kAA, kScaled> * s * h.sAA;
+  if (kValues) q[kAA] += kNodeScale<kAA, kScaled> * w * h.wAA;
+  q[kAd] = p[kAd] + kNodeScale<kAd, kScaled> * w * h.wAd + kNodeScale<kAd, kScaled> * s * h.sAd;
+  q[kAB] = p[kAB] + kNodeScale<kAB, kScaled> * w * h.wAB;
+  q[kdA] = p[kdA] + kNodeScale<kdA, kScaled> * w * h.wdA + kNodeScale<kdA, kScaled> * s * h.sdA;
+  q[kdd] = p[kdd] + kNodeScale<kdd, kScaled> * w * h.wdd + kNodeScale<kdd, kScaled> * s * h.sdd;
+  q[kdB] = p[kdB] + kNodeScale<kdB, kScaled> * w * h.wdB;
+  q[kBA] = p[kBA] + kNodeScale<kBA, kScaled> * w * h.wBA;
+  q[kBd] = p[kBd] + kNodeScale<kBd, kScaled> * w * h.wBd;
   q[kBB] = p[kBB];
   return q;
 }
@@ -112,27 +122,27 @@ __device__ __forceinline__ PlaneNumbers plus(const PlaneNumbers& p, const HalfBe
 }
 
 /// Transpose of the passes along x and y: the force on the 3 x 3 nodes of a plane, f[y][x].
-template <bool kBendBend>
+/// kScaled: kNodeScale is in `p`.
+template <bool kBendBend, bool kScaled>
 __device__ __forceinline__ void node_forces(const PlaneNumbers& p, float (&f)[3][3]) {
-  constexpr float kS = kAverageSide, kC = kAverageCenter;
-  // A along x times kAverageCenter, for the middle of each row to take it as it is.
-  constexpr float kOfAA = kC * give_scale(0, 0), kOfAd = kC * give_scale(0, 1),
-                  kOfAB = kC * give_scale(0, 2);
-  const float A = kS * kOfAA * p[kAA] + kOfAB * p[kAB];
-  const float rA[3] = {A - kOfAd * p[kAd], kC * kOfAA * p[kAA] - 2.0f * kOfAB * p[kAB],
-                       A + kOfAd * p[kAd]};
-  constexpr float kOfdA = give_scale(1, 0), kOfdd = give_scale(1, 1), kOfdB = give_scale(1, 2);
-  const float d = kS * kOfdA * p[kdA] + kOfdB * p[kdB];
-  const float rd[3] = {d - kOfdd * p[kdd], kC * kOfdA * p[kdA] - 2.0f * kOfdB * p[kdB],
-                       d + kOfdd * p[kdd]};
-  constexpr float kOfBA = give_scale(2, 0), kOfBd = give_scale(2, 1), kOfBB = give_scale(2, 2);
-  float B = kS * kOfBA * p[kBA];
-  if (kBendBend) B += kOfBB * p[kBB];
-  float rB[3] = {B - kOfBd * p[kBd], kC * kOfBA * p[kBA], B + kOfBd * p[kBd]};
-  if (kBendBend) rB[1] -= 2.0f * kOfBB * p[kBB];
+  constexpr float kSide = kAverageSide / kAverageCenter;
+  constexpr bool k = !kScaled;
+  const float AA = kNodeScale<kAA, k> * p[kAA], A = fmaf(kSide, AA, kNodeScale<kAB, k> * p[kAB]);
+  const float rA[3] = {fmaf(-kNodeScale<kAd, k>, p[kAd], A),
+                       fmaf(-2.0f * kNodeScale<kAB, k>, p[kAB], AA),
+                       fmaf(kNodeScale<kAd, k>, p[kAd], A)};
+  const float dA = kNodeScale<kdA, k> * p[kdA], d = fmaf(kSide, dA, kNodeScale<kdB, k> * p[kdB]);
+  const float rd[3] = {fmaf(-kNodeScale<kdd, k>, p[kdd], d),
+                       fmaf(-2.0f * kNodeScale<kdB, k>, p[kdB], dA),
+                       fmaf(kNodeScale<kdd, k>, p[kdd], d)};
+  const float BA = kNodeScale<kBA, k> * p[kBA];
+  float B = kSide * BA;
+  if (kBendBend) B = fmaf(kNodeScale<kBB, k>, p[kBB], B);
+  float rB[3] = {fmaf(-kNodeScale<kBd, k>, p[kBd], B), BA, fmaf(kNodeScale<kBd, k>, p[kBd], B)};
+  if (kBendBend) rB[1] = fmaf(-2.0f * kNodeScale<kBB, k>, p[kBB], BA);
 #pragma unroll
   for (int y = 0; y < 3; ++y) {
-    const float sides = kS / kC * rA[y] + rB[y];
+    const float sides = kSide * rA[y] + rB[y];
     f[y][0] = sides - rd[y];
     f[y][1] = rA[y] - 2.0f * rB[y];
     f[y][2] = sides + rd[y];

@@ -26,6 +26,7 @@ __device__ __forceinline__ BlockShared shared_of(const CudaLayout& layout) {
   s.exchange = shared + layout.node_room;
   s.colliders = reinterpret_cast<Collider*>(s.exchange + layout.exchange);
   s.rounds = reinterpret_cast<FaceRounds*>(s.colliders + kMaxColliders);
+  s.cells = reinterpret_cast<WarpNodes*>(s.u + layout.cells);
   return s;
 }
 
@@ -70,11 +71,12 @@ struct BundleAtWork {
 /// no other bundle.
 template <Laws kLaws, Can kCan, bool kPairs>
 __device__ __forceinline__ void all_forces(const CudaTables& t, const BundleAtWork& w,
-                                           const CudaLayout& layout, bool clear, float4* force) {
+                                           const CudaLayout& layout, bool clear, float4* force,
+                                           const Workers& workers) {
   const BlockShared s = shared_of<kLaws == Laws::kAny>(layout);
   if (!clear) clear_exchange(s.exchange, w.bundle.plane_slots, layout.two_planes);
-  __syncthreads();
-  const BlockStep step{force, layout.two_planes};
+  if (kCan != Can::kPushes || !clear) __syncthreads();
+  const BlockStep step{force, layout.two_planes, workers};
   if (kCan == Can::kPlain || (w.bundle.partial == 0 && w.bundle.blocks == 1)) {
     forces<kLaws, kPairs, false, false>(t, w.bundle, w.block, w.body, s, step);
   } else if (w.bundle.partial != 0) {
@@ -105,11 +107,11 @@ template <Laws kLaws, bool kCached, bool kPairs, Can kCan>
 __device__ __forceinline__ void block_round(const CudaTables& t, const CudaFrame& f,
                                             const BundleAtWork& w, int round,
                                             const CudaLayout& layout, const SlotCache& cache,
-                                            bool last) {
+                                            const Workers& workers, bool last) {
   constexpr bool kPushes = kCan == Can::kPushes;
   constexpr int kHand = kCached && (kPairs || kCan != Can::kPlain) ? 2 : 4;  // as registers allow
   const BlockShared s = shared_of<kLaws == Laws::kAny>(layout);
-  const float scale = w.body.inv_cell_size;
+  const float scale = placed_scale(w.body);
   float4* v = kLaws == Laws::kAny ? s.v : nullptr;
   // Not f.state[i]: parameters that a register indexes would be copied to local memory.
   const bool odd = ((f.current + max(round - 1, 0)) & 1) != 0, odd_round = (round & 1) != 0;
@@ -126,15 +128,18 @@ __device__ __forceinline__ void block_round(const CudaTables& t, const CudaFrame
   }
   if (round == f.substeps) return;
   if (kPushes && last) nodes_are_there(f);
-  all_forces<kLaws, kCan, kPairs>(t, w, layout, kCached, odd_round ? f.force[1] : f.force[0]);
+  if (!workers.has_me()) return;
+  all_forces<kLaws, kCan, kPairs>(t, w, layout, kCached, odd_round ? f.force[1] : f.force[0],
+                                  workers);
 }
 
 /// Contact, once all nodes are where the round brought them: of tissue with colliders and of tissue
 /// with tissue. Thread blocks have `met` so often at their second barrier. Where there are thread
 /// blocks enough without a bundle (`helpers`), colliders are left to them.
 __device__ __forceinline__ void push_nodes(const CudaTables& t, const CudaFrame& f,
-                                           const BlockShared& s, int round, bool helpers,
-                                           unsigned& met) {
+                                           const BlockShared& s, int round, const Pushers& pushers,
+                                           bool helpers, unsigned& met) {
+  if (!pushers.has_me()) return;
   const float dt = f.step.dt;
   FaceRounds& rounds = *s.rounds;
   if (round == f.substeps) {
@@ -143,21 +148,19 @@ __device__ __forceinline__ void push_nodes(const CudaTables& t, const CudaFrame&
   }
   const int first = helpers ? t.bundle_count : 0, block = static_cast<int>(blockIdx.x) - first;
   if (block < 0 && !f.faces.any) return;
-  const int warp = static_cast<int>(threadIdx.x) / 32, blocks = static_cast<int>(gridDim.x) - first,
-            warps = blocks * static_cast<int>(blockDim.x) / 32;
-  const ColliderCopy colliders(f, round);
+  const int warp = pushers.me() / 32, blocks = static_cast<int>(gridDim.x) - first,
+            warps = blocks * pushers.size() / 32;
+  const ColliderCopy colliders(f, round, pushers);
   NearSearch near(f, warp * blocks + block, warps);
-  wait(f.arrived + 1, ++met);
+  colliders.finish(s.colliders);
+  wait(f.arrived + 1, ++met, pushers);
   const bool odd = ((f.current + round) & 1) != 0;
   const CudaNodes& state = odd ? f.state[1] : f.state[0];
   long long* force = f.pushes.force + f.pushes.stride * (round % 3);
   if (f.near_cells != nullptr && block >= 0) {
-    colliders.finish(s.colliders);
-    __syncthreads();
     auto* loads =
         reinterpret_cast<unsigned long long*>(f.loads) + kLoadSums * f.collider_count * round;
-    near.push(t, state, kCellReach * f.cell_size, {s.colliders, loads, force},
-              reinterpret_cast<WarpNodes*>(s.u)[warp]);
+    near.push(t, state, kCellReach * f.cell_size, {s.colliders, loads, force}, s.cells[warp]);
   }
   if (!f.faces.any) return;
   const CudaLooks& looks = f.faces.looks;
@@ -186,6 +189,15 @@ __global__ void __launch_bounds__(kMaxCudaThreads, 1)
   // Where columns have one thread, a round is long enough for few to push.
   const bool helpers =
       !kPairs && static_cast<int>(gridDim.x) - t.bundle_count >= kEnoughHelpers && !f.faces.any;
+  // Where some warps have no columns, they push while the others work on forces.
+  const bool apart =
+      kPushes && kCached && kPairs && !f.faces.any && layout.workers < static_cast<int>(blockDim.x);
+  Workers workers;
+  Pushers pushers;
+  if (apart) {
+    workers.count = pushers.first = layout.workers;
+    pushers.count = static_cast<int>(blockDim.x) - layout.workers;
+  }
   unsigned met = 0;
   if (kPushes && f.faces.any && threadIdx.x == 0) s.rounds->begin(f.faces, f.step.dt);
   const BundleAtWork kept(t, kCached && !idle ? mine : 0);
@@ -199,16 +211,16 @@ __global__ void __launch_bounds__(kMaxCudaThreads, 1)
     if (idle) {
       if (round < f.substeps) nodes_are_there(f);
     } else if constexpr (kCached) {
-      block_round<kLaws, true, kPairs, kCan>(t, f, kept, round, layout, cache, true);
+      block_round<kLaws, true, kPairs, kCan>(t, f, kept, round, layout, cache, workers, true);
     } else {
       for (int i = mine; i < t.bundle_count; i += gridDim.x) {
         const bool last = i + static_cast<int>(gridDim.x) >= t.bundle_count;
         block_round<kLaws, false, kPairs, kCan>(t, f, BundleAtWork(t, i), round, layout, cache,
-                                                last);
+                                                workers, last);
         __syncthreads();  // the next one clears the exchange
       }
     }
-    if constexpr (kPushes) push_nodes(t, f, s, round, helpers, met);
+    if constexpr (kPushes) push_nodes(t, f, s, round, pushers, helpers, met);
   }
 }
 

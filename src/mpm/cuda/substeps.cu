@@ -24,9 +24,19 @@ CudaLayout layout_of(const CudaPlan& plan) {
   layout.max_slots = plan.max_slots;
   layout.max_plane_slots = plan.max_plane_slots;
   layout.node_room = (velocities ? 2 : 1) * plan.max_slots;
-  if (plan.pushes) {  // cells that colliders push come where the nodes of the block were
-    const int cells = plan.threads / 32 * static_cast<int>(sizeof(WarpNodes));
-    layout.node_room = std::max(layout.node_room, cells / 16 + 1);
+  layout.cells = 0;
+  layout.workers = plan.threads;
+  if (plan.pushes) {
+    const int cells = plan.threads / 32 * static_cast<int>(sizeof(WarpNodes)) / 16 + 1;
+    if (plan.small && plan.pairs) {
+      layout.cells = layout.node_room;
+      layout.node_room += cells;
+      const int busy = std::max(2 * plan.max_columns, plan.max_plane_slots),
+                warps = (busy + 31) / 32;
+      if (plan.cached && 32 * (warps + kFewestPushers) <= plan.threads) layout.workers = 32 * warps;
+    } else {  // they come where the nodes of the block were
+      layout.node_room = std::max(layout.node_room, cells);
+    }
   }
   layout.exchange = (plan.two_planes ? 18 : 9) * plan.max_plane_slots;
   if (does_march(plan)) {

@@ -13,11 +13,16 @@ inline constexpr int kMaxCudaThreads = 256;  ///< of a thread block
 /// on, large blocks leave colliders to them.
 inline constexpr int kMostHelpers = 32, kEnoughHelpers = 16;
 
+/// Warps that a thread block must have left for some of them to push while the others work on
+/// forces.
+inline constexpr int kFewestPushers = 2;
+
 /// How a tissue's blocks are worked on.
 struct CudaPlan {
   int threads = 64;          ///< of a thread block: one or two for each column of a bundle
   int max_slots = 0;         ///< of a bundle
   int max_plane_slots = 0;   ///< the same of one plane
+  int max_columns = 0;       ///< of a bundle
   bool pairs = true;         ///< there are two threads for each column
   bool small = true;         ///< to be cached, if all bundles run at once
   bool cached = false;       ///< each thread block has one bundle only, whose tables it keeps
@@ -36,6 +41,8 @@ inline constexpr int kMarchBytes = 640, kMarchBytesBeside = 8;
 struct CudaLayout {
   int max_slots, max_plane_slots;
   int node_room, exchange;  ///< float4s: for a bundle's nodes, for what columns give to planes
+  int cells;                ///< where among the nodes' float4s cells near colliders come
+  int workers;              ///< the threads that work on forces; the others push meanwhile
   bool eight_parts, two_planes;
 };
 

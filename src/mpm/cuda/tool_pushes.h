@@ -2,6 +2,7 @@
 #pragma once
 
 #include "cutting/bonds.h"
+#include "mpm/cuda/grid_barrier.h"
 #include "mpm/cuda/tables.h"
 
 namespace tissue_sim {
@@ -138,19 +139,18 @@ __device__ __forceinline__ void push_point(const PushedPoint& point, const Colli
 /// while other things are done.
 struct ColliderCopy {
   const int* source;
-  int words, i, word;
-  __device__ __forceinline__ ColliderCopy(const CudaFrame& f, int substep)
+  int words, threads, i, word;
+  __device__ __forceinline__ ColliderCopy(const CudaFrame& f, int substep, const Pushers& team)
       : source(reinterpret_cast<const int*>(f.colliders + substep * f.collider_count)),
         words(static_cast<int>(sizeof(Collider) / sizeof(int)) * f.collider_count),
-        i(static_cast<int>(threadIdx.x)),
+        threads(team.size()),
+        i(team.me()),
         word(i < words ? __ldg(source + i) : 0) {}
   __device__ __forceinline__ void finish(Collider* to) const {
     if (i >= words) return;
     int* out = reinterpret_cast<int*>(to);
     out[i] = word;
-    for (int j = i + static_cast<int>(blockDim.x); j < words; j += static_cast<int>(blockDim.x)) {
-      out[j] = __ldg(source + j);
-    }
+    for (int j = i + threads; j < words; j += threads) out[j] = __ldg(source + j);
   }
 };
 

@@ -29,15 +29,16 @@ __global__ void __launch_bounds__(kMaxCudaThreads, 1)
   const auto any = [&] {
     return AnyBlock{block.nx, block.ny, static_cast<int>(blockDim.x), layout.max_plane_slots};
   };
-  const auto expect = [&](int bundle) {
+  const auto take = [&](int bundle, bool marches) {
     block = t.blocks[t.bundles[bundle].first_block];
     body = t.bodies[block.body];
-    planes(any()).expect();
+    if (marches) planes(any()).expect();
   };
   int cleared_nx = 0, cleared_ny = 0;  // blocks of this size find the exchange clear
-  expect(mine);
+  take(mine, true);
   __syncthreads();
   for (int round = 0;; ++round) {
+    const bool marches = round < f.substeps;
     const bool odd = ((f.current + max(round - 1, 0)) & 1) != 0, odd_round = (round & 1) != 0;
     for (int i = mine;;) {
       if (block.nx != cleared_nx || block.ny != cleared_ny) {
@@ -45,7 +46,7 @@ __global__ void __launch_bounds__(kMaxCudaThreads, 1)
         cleared_nx = block.nx;
         cleared_ny = block.ny;
       }
-      if (round < f.substeps) {
+      if (marches) {
         float4* force = odd_round ? f.force[1] : f.force[0];
         if (KnownBlock::is(block, layout.max_plane_slots)) {
           const KnownBlock known;
@@ -63,11 +64,11 @@ __global__ void __launch_bounds__(kMaxCudaThreads, 1)
       i += all;
       if (i >= t.bundle_count) break;
       __syncthreads();  // the next one takes the place of this one
-      expect(i);
+      take(i, marches);
     }
-    if (round == f.substeps) return;
+    if (!marches) return;
     arrive(f.arrived);
-    expect(mine);
+    take(mine, round + 1 < f.substeps);
     wait(f.arrived, static_cast<unsigned>(round + 1));
   }
 }

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "compute/simd.h"
 #include "contact/face_search.h"
 
 namespace tissue_sim {
@@ -39,6 +40,71 @@ struct NormalBox {
     return !(dot > kFacing);
   }
 };
+
+/// The facets of a bucket, side by side.
+class Members {
+ public:
+  void clear() { count_ = 0; }
+  void add(const FacetMotion& f, float reach, std::int32_t entry) {
+    const std::size_t end = count_ + 1 + kWidth;
+    if (entry_.size() < end) {
+      entry_.resize(2 * end);
+      for (auto& value : value_) value.resize(2 * end);
+    }
+    for (int a = 0; a < 3; ++a) {
+      value_[a][count_] = f.normal[a];
+      value_[3 + a][count_] = f.x[a];
+    }
+    value_[6][count_] = reach;
+    entry_[count_++] = entry;
+    for (int a = 0; a < 3; ++a) std::fill_n(value_[a].begin() + count_, kWidth, 0.0f);
+  }
+
+  /// Calls f(entry, other) for all that face one another and whose boxes overlap.
+  template <class F>
+  void for_each_pair(const F& f) const {
+    for (std::size_t i = 0; i < count_; ++i) {
+      for (std::size_t j = i + 1; j < count_; j += kWidth) {
+        const auto at = [this, j](int k) { return load<kWidth>(value_[k].data() + j); };
+        // What has no normal, behind the end, faces nothing.
+        Mask<kWidth> meets = ~bits<kWidth>(
+            kFacing - (value_[0][i] * at(0) + value_[1][i] * at(1) + value_[2][i] * at(2)));
+        const Vec<kWidth> far = value_[6][i] + at(6);
+        for (int a = 3; a < 6; ++a) {
+          const Mask<kWidth> apart = bits<kWidth>(value_[a][i] - at(a)) & 0x7fffffff;
+          meets &= bits<kWidth>(reinterpret_cast<Vec<kWidth>>(apart) - far);
+        }
+        if (!any_negative<kWidth>(meets)) continue;
+        for (int k = 0; k < kWidth; ++k) {
+          if (meets[k] < 0) f(entry_[i], entry_[j + k]);
+        }
+      }
+    }
+  }
+
+ private:
+  static constexpr int kWidth = 4;
+  std::size_t count_ = 0;
+  std::vector<float> value_[7];  // normal, place, reach
+  std::vector<std::int32_t> entry_;
+};
+
+/// Sorts pairs of so many facets.
+std::vector<FacetPair> sorted(const std::vector<std::vector<FacetPair>>& chunks, int count) {
+  std::vector<std::int32_t> end(count + 1, 0);
+  for (const auto& chunk : chunks) {
+    for (const FacetPair& pair : chunk) ++end[pair.first + 1];
+  }
+  for (int f = 0; f < count; ++f) end[f + 1] += end[f];
+  std::vector<FacetPair> pairs(end.back());
+  for (const auto& chunk : chunks) {
+    for (const FacetPair& pair : chunk) pairs[end[pair.first]++] = pair;
+  }
+  for (int f = 0, begin = 0; f < count; begin = end[f++]) {
+    std::sort(pairs.begin() + begin, pairs.begin() + end[f]);
+  }
+  return pairs;
+}
 
 }  // namespace
 
@@ -91,62 +157,36 @@ std::vector<FacetPair> facing_pairs(const std::vector<FacetMotion>& facets,
   }
   // Chunks of buckets side by side; sorted, the pairs come in the same order for any number.
   constexpr int kChunks = 64;
-  struct Member {  // of a bucket
-    float normal[3], x[3], reach;
-    const Entry* entry;
-  };
-  struct Chunk {
-    std::vector<Member> members;  // of the bucket at hand
-    std::vector<FacetPair> pairs;
-  };
-  std::vector<Chunk> chunks(kChunks);
-  const auto visit_bucket = [&](std::uint32_t b, Chunk& chunk) {
+  std::vector<std::vector<FacetPair>> chunks(kChunks);
+  const auto visit_bucket = [&](std::uint32_t b, Members& members, std::vector<FacetPair>& pairs) {
     NormalBox normals;
-    chunk.members.clear();
+    members.clear();
     for (std::int32_t i = first[b]; i < first[b + 1]; ++i) {
-      const FacetMotion& f = facets[entries[i].facet];
-      normals.take(f.normal);
-      chunk.members.push_back({{f.normal[0], f.normal[1], f.normal[2]},
-                               {f.x[0], f.x[1], f.x[2]},
-                               reach[entries[i].facet],
-                               &entries[i]});
+      const std::int32_t f = entries[i].facet;
+      normals.take(facets[f].normal);
+      members.add(facets[f], reach[f], i);
     }
     if (!normals.may_face()) return;
-    const Member* end = chunk.members.data() + chunk.members.size();
-    for (const Member* f = chunk.members.data(); f < end; ++f) {
-      for (const Member* g = f + 1; g < end; ++g) {
-        if (f->normal[0] * g->normal[0] + f->normal[1] * g->normal[1] +
-                f->normal[2] * g->normal[2] >
-            kFacing) {
-          continue;
-        }
-        const float far = f->reach + g->reach;
-        if (!(std::fabs(f->x[0] - g->x[0]) < far && std::fabs(f->x[1] - g->x[1]) < far &&
-              std::fabs(f->x[2] - g->x[2]) < far)) {
-          continue;
-        }
-        const Entry &e = *f->entry, &o = *g->entry;
-        if (e.x != o.x || e.y != o.y || e.z != o.z) continue;
-        // Of the grid cells that both boxes reach into, the lowest one says so.
-        const GridBox &p = boxes[e.facet], &q = boxes[o.facet];
-        if (e.x != std::max(p.min[0], q.min[0]) || e.y != std::max(p.min[1], q.min[1]) ||
-            e.z != std::max(p.min[2], q.min[2])) {
-          continue;
-        }
-        chunk.pairs.emplace_back(std::min(e.facet, o.facet), std::max(e.facet, o.facet));
+    members.for_each_pair([&](std::int32_t i, std::int32_t j) {
+      const Entry &e = entries[i], &o = entries[j];
+      if (e.x != o.x || e.y != o.y || e.z != o.z) return;
+      // Of the grid cells that both boxes reach into, the lowest one says so.
+      const GridBox &p = boxes[e.facet], &q = boxes[o.facet];
+      if (e.x != std::max(p.min[0], q.min[0]) || e.y != std::max(p.min[1], q.min[1]) ||
+          e.z != std::max(p.min[2], q.min[2])) {
+        return;
       }
-    }
+      pairs.emplace_back(std::min(e.facet, o.facet), std::max(e.facet, o.facet));
+    });
   };
   cpu.for_each(kChunks, [&](int chunk) {
     const std::uint64_t buckets = std::uint64_t{mask} + 1;
     const auto begin = static_cast<std::uint32_t>(buckets * chunk / kChunks),
                end = static_cast<std::uint32_t>(buckets * (chunk + 1) / kChunks);
-    for (std::uint32_t b = begin; b < end; ++b) visit_bucket(b, chunks[chunk]);
+    Members members;
+    for (std::uint32_t b = begin; b < end; ++b) visit_bucket(b, members, chunks[chunk]);
   });
-  std::vector<FacetPair> pairs;
-  for (const Chunk& c : chunks) pairs.insert(pairs.end(), c.pairs.begin(), c.pairs.end());
-  std::sort(pairs.begin(), pairs.end());
-  return pairs;
+  return sorted(chunks, count);
 }
 
 }  // namespace tissue_sim

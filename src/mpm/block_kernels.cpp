@@ -70,6 +70,9 @@ TISSUE_SIM_INLINE void update_row(const NodeRow& row, const RowPart* parts, cons
                                    float* von_mises) {                                            \
     return state_any<W>(b, f, s, von_mises);                                                      \
   }                                                                                               \
+  target BlockState stiffness_##suffix(const Block& b, const BlockField& f, BlockScratch& s) {    \
+    return stiffness<W>(b, f, s);                                                                 \
+  }                                                                                               \
   target void stretched_##suffix(const Block& b, const BlockField& f, float stretch,              \
                                  BlockScratch& s, std::vector<StretchedPoint>& found) {           \
     stretched<W>(b, f, stretch, s, found);                                                        \
@@ -86,14 +89,14 @@ TISSUE_SIM_KERNELS(avx512, 16, TISSUE_SIM_TARGET_AVX512)
 const BlockKernels& block_kernels(InstructionSet set) {
   static constexpr BlockKernels sse2 = {forces_sse2,       positions_sse2,  bounds_sse2,
                                         lanes_in_box_sse2, update_row_sse2, state_sse2,
-                                        stretched_sse2};
+                                        stiffness_sse2,    stretched_sse2};
 #if defined(__x86_64__)
   static constexpr BlockKernels avx2 = {forces_avx2,       positions_avx2,  bounds_avx2,
                                         lanes_in_box_avx2, update_row_avx2, state_avx2,
-                                        stretched_avx2};
+                                        stiffness_avx2,    stretched_avx2};
   static constexpr BlockKernels avx512 = {forces_avx512,       positions_avx512,  bounds_avx512,
                                           lanes_in_box_avx512, update_row_avx512, state_avx512,
-                                          stretched_avx512};
+                                          stiffness_avx512,    stretched_avx512};
   if (set == InstructionSet::kAvx512) return avx512;
   if (set == InstructionSet::kAvx2) return avx2;
 #endif

@@ -76,6 +76,8 @@ struct BlockKernels {
   /// Energy and stiffness of the block; with `von_mises` also each point's stress [Pa], one per
   /// lane.
   BlockState (*state)(const Block&, const BlockField&, BlockScratch&, float* von_mises);
+  /// The same without energy and stress.
+  BlockState (*stiffness)(const Block&, const BlockField&, BlockScratch&);
   /// Appends the points whose largest principal stretch is at least `stretch`, in a fixed order.
   void (*stretched)(const Block&, const BlockField&, float stretch, BlockScratch&,
                     std::vector<StretchedPoint>& found);

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 #include <utility>
 
 #include "mpm/small_motion.h"
@@ -11,30 +12,6 @@ namespace {
 
 constexpr int kChunk = 2048;
 }  // namespace
-
-LinearisedMotion::LinearisedMotion(MpmState& state, const std::vector<std::uint8_t>& takes_part)
-    : state_(state) {
-  Nodes& n = state.nodes;
-  std::vector<std::uint8_t> seen(n.size(), 0);
-  for (std::size_t i = 0; i < takes_part.size(); ++i) {
-    if (takes_part[i] == 0) continue;
-    blocks_.push_back(static_cast<int>(i));
-    for (const std::int32_t node : state.blocks.all[i]->node) seen[node] = 1;
-  }
-  for (std::size_t i = 0; i < seen.size(); ++i) {
-    if (seen[i] == 0 || n.inv_mass[i] == 0) continue;
-    nodes_.push_back(static_cast<std::int32_t>(i));
-    mass_.push_back(n.mass[i]);
-  }
-  for (int a = 0; a < 3; ++a) {
-    u_[a] = n.u[a];
-    rates_[a].assign(n.size(), 0.0f);
-    std::swap(rates_[a], n.v[a]);
-    for (Vector* x : {&at_rest_, &before_, &v_, &w_}) (*x)[a].assign(nodes_.size(), 0.0f);
-  }
-  std::fill(state.force.begin(), state.force.end(), 0.0f);
-  accelerations(at_rest_);
-}
 
 LinearisedMotion::~LinearisedMotion() {
   for (int a = 0; a < 3; ++a) {
@@ -68,7 +45,8 @@ void LinearisedMotion::for_each(const F& f) {
   });
 }
 
-void LinearisedMotion::accelerations(Vector& out) {
+template <class F>
+double LinearisedMotion::accelerations(const F& f) {
   state_.cpu->for_each(static_cast<int>(blocks_.size()), [&](int i) {
     const Block& block = *state_.blocks.all[blocks_[i]];
     state_.kernels->forces(block, block_field(state_, block), state_.scratch.local(),
@@ -77,10 +55,38 @@ void LinearisedMotion::accelerations(Vector& out) {
   NodeStep step{};
   step.dt = 1;  // from rest: rates are accelerations
   move_nodes(state_, step);
-  for_each([&](int a, int i) {
+  return sum([&](int a, int i) {
     float& v = state_.nodes.v[a][nodes_[i]];
-    out[a][i] = v;
+    const float x = v;
     v = 0;
+    return f(a, i, x);
+  });
+}
+
+LinearisedMotion::LinearisedMotion(MpmState& state, const std::vector<std::uint8_t>& takes_part)
+    : state_(state) {
+  Nodes& n = state.nodes;
+  std::vector<std::uint8_t> seen(n.size(), 0);
+  for (std::size_t i = 0; i < takes_part.size(); ++i) {
+    if (takes_part[i] == 0) continue;
+    blocks_.push_back(static_cast<int>(i));
+    for (const std::int32_t node : state.blocks.all[i]->node) seen[node] = 1;
+  }
+  for (std::size_t i = 0; i < seen.size(); ++i) {
+    if (seen[i] == 0 || n.inv_mass[i] == 0) continue;
+    nodes_.push_back(static_cast<std::int32_t>(i));
+    mass_.push_back(n.mass[i]);
+  }
+  for (int a = 0; a < 3; ++a) {
+    u_[a] = n.u[a];
+    rates_[a].assign(n.size(), 0.0f);
+    std::swap(rates_[a], n.v[a]);
+    for (Vector* x : {&at_rest_, &before_, &v_, &w_}) (*x)[a].assign(nodes_.size(), 0.0f);
+  }
+  std::fill(state.force.begin(), state.force.end(), 0.0f);
+  accelerations([this](int a, int i, float x) {
+    at_rest_[a][i] = x;
+    return 0.0;
   });
 }
 
@@ -96,20 +102,25 @@ void LinearisedMotion::start() {
 }
 
 double LinearisedMotion::apply() {
-  float largest = 0;
+  std::int32_t bits = 0;  // of the largest: as integers they compare side by side
   for (const auto& component : v_) {
-    for (const float x : component) largest = std::max(largest, std::fabs(x));
+    for (const float x : component) {
+      std::int32_t of_x;
+      std::memcpy(&of_x, &x, sizeof(x));
+      bits = std::max(bits, of_x & 0x7fffffff);
+    }
   }
+  float largest;
+  std::memcpy(&largest, &bits, sizeof(bits));
   if (!(largest > 0)) return 0;
   const auto scale = kSmallMotion * static_cast<float>(state_.scene.cell_size) / largest;
   for_each([&](int a, int i) {
     const std::int32_t node = nodes_[i];
     state_.nodes.u[a][node] = u_[a][node] + scale * v_[a][i];
   });
-  accelerations(w_);
   const float back = 1 / scale;
-  return sum([&](int a, int i) {
-    w_[a][i] = (at_rest_[a][i] - w_[a][i]) * back;
+  return accelerations([&](int a, int i, float x) {
+    w_[a][i] = (at_rest_[a][i] - x) * back;
     return static_cast<double>(mass_[i]) * w_[a][i] * v_[a][i];
   });
 }

@@ -28,7 +28,9 @@ class LinearisedMotion {
  private:
   using Vector = Array<float>[3];
 
-  void accelerations(Vector& out);
+  /// Sums f(component, i, acceleration) over all entries of a vector, for the nodes' displacements.
+  template <class F>
+  double accelerations(const F& f);
   /// Sums f(component, i) over all entries of a vector, in a fixed order.
   template <class F>
   double sum(const F& f);

@@ -28,7 +28,7 @@ MpmTissue::MpmTissue(const Scene& scene, std::vector<std::string> notes)
       state_(make_mpm_state(scene, &notes_)),
       pieces_(whole_pieces(state_->bodies, state_->points)) {
   measure_motion(*state_);
-  measure();
+  measure_stiffness();
   substep_.follow(*state_, modulus_);
   measured_ = false;  // who holds the state may change it
 }
@@ -108,7 +108,11 @@ void MpmTissue::run(Frame& frame, int substeps, float dt, double from, double to
 PartEnd MpmTissue::run_part(Frame& frame, int substeps, float dt, double from, double to) {
   save_checkpoint();
   run(frame, substeps, dt, from, to);
-  measure();
+  if (to < 1 || frame.blades) {
+    measure_stiffness();
+  } else {
+    measure_energies();
+  }
   const bool may_go_back =
       result_.tear_report.bonds_broken == checkpoint_.result.tear_report.bonds_broken &&
       frame.cut_to <= from;
@@ -142,7 +146,7 @@ void MpmTissue::restore_checkpoint() {
   s.contacts = checkpoint_.contacts;
   s.faces = checkpoint_.faces;
   result_ = checkpoint_.result;
-  measure();
+  measure_stiffness();
 }
 
 void MpmTissue::cut_by_blades(Frame& frame, double share) {
@@ -199,18 +203,20 @@ bool MpmTissue::tame() {
   return true;
 }
 
-void MpmTissue::measure() {
+template <class Read>
+void MpmTissue::measure(const Read& read) {
   MpmState& s = *state_;
   const int count = static_cast<int>(s.blocks.all.size());
   std::vector<BlockState> states(count);
   s.cpu->for_each(count, [&](int i) {
     const Block& block = *s.blocks.all[i];
-    states[i] = s.kernels->state(block, block_field(s, block), s.scratch.local(), nullptr);
+    const BlockField field = block_field(s, block);
+    states[i] = read(block, field, s.scratch.local());
   });
   stiffening_ = even_stiffening(s, 1);
   modulus_.assign(count, 0.0f);
   s.wildest = 1;
-  result_.elastic_energy = result_.kinetic_energy = 0;
+  result_.elastic_energy = 0;
   for (int i = 0; i < count; ++i) {
     const BlockState& b = states[i];
     result_.elastic_energy += b.elastic_energy;
@@ -225,19 +231,37 @@ void MpmTissue::measure() {
       modulus_[i] = std::max(modulus_[i], static_cast<float>(wave_modulus(material, stiffening)));
     }
   }
-  for (std::size_t i = 0; i < s.nodes.size(); ++i) {
-    const double v2 = Vec3(s.nodes.v[0][i], s.nodes.v[1][i], s.nodes.v[2][i]).squaredNorm();
-    result_.kinetic_energy += 0.5 * s.nodes.mass[i] * v2;
-  }
   measured_ = true;
+  has_energies_ = false;
+}
+
+void MpmTissue::measure_stiffness() {
+  const BlockKernels& kernels = *state_->kernels;
+  measure([&](auto&... block) { return kernels.stiffness(block...); });
+}
+
+void MpmTissue::measure_energies() {
+  const BlockKernels& kernels = *state_->kernels;
+  measure([&](auto&... block) { return kernels.state(block..., nullptr); });
+  const Nodes& n = state_->nodes;
+  result_.kinetic_energy = 0;
+  for (std::size_t i = 0; i < n.size(); ++i) {
+    const double v2 = Vec3(n.v[0][i], n.v[1][i], n.v[2][i]).squaredNorm();
+    result_.kinetic_energy += 0.5 * n.mass[i] * v2;
+  }
+  has_energies_ = true;
 }
 
 FrameResult MpmTissue::finish() {
   const auto measure_and_follow = [this] {
-    measure();
+    measure_energies();
     substep_.follow(*state_, modulus_);
   };
-  if (!measured_) measure_and_follow();
+  if (!measured_) {
+    measure_and_follow();
+  } else if (!has_energies_) {
+    measure_energies();
+  }
   result_.max_speed = 0;
   for (const BlockMotion& m : state_->motion) {
     if (!(m.speed <= result_.max_speed)) result_.max_speed = m.speed;

@@ -69,7 +69,11 @@ class MpmTissue final : public Tissue {
            const std::vector<BlockMotion>& before, CutReport& report);
   bool tear(const std::vector<TearingPoint>& tearing);  ///< whether anything did
   bool tame();  ///< what is wild (mpm/deformation.h), whether anything was
-  void measure();
+  /// Energies and how much the tissue has stiffened, from what `read` finds of each block.
+  template <class Read>
+  void measure(const Read& read);
+  void measure_stiffness();  ///< alone: half the work
+  void measure_energies();   ///< and stiffness
 
   std::vector<std::string> notes_;
   std::unique_ptr<MpmState> state_;
@@ -78,6 +82,7 @@ class MpmTissue final : public Tissue {
   Stiffening stiffening_;
   std::vector<float> modulus_;    ///< see SubstepChoice::follow()
   bool measured_ = false;         ///< whether the state is as it was when it was measured
+  bool has_energies_ = false;     ///< whether energies were, too
   bool pieces_measured_ = false;  ///< whether they are where the frame left them
   SubstepChoice substep_;
   FrameResult result_;

@@ -13,7 +13,7 @@ bool has(unsigned bonds, int k) { return (bonds >> k & 1) != 0; }
 /// The bonds of a point and of those that it holds on to.
 struct BondsAround {
   unsigned own;
-  unsigned of[kBondCount] = {};   ///< of the neighbour over each bond, none where that is gone
+  unsigned of[kBondCount] = {};    ///< of the neighbour over each bond, none where that is gone
   std::int32_t point[kBondCount];  ///< that neighbour
 
   BondsAround(const LatticeBody& body, const Points& points, std::int32_t p)

@@ -52,7 +52,7 @@ void MpmTissue::cut(const std::vector<BladePath>& paths, const Array<float>* u_b
   if (changed.empty()) return;
   measured_ = false;
   take_apart(*state_, changed);
-  if (!may_have_parted(state_->bodies, state_->points, changed)) return;
+  if (!may_have_parted(state_->bodies, state_->points, state_->fields->bonds(), changed)) return;
   for (const int id : update_pieces(state_->bodies, state_->points, pieces_)) {
     report.new_fragments.push_back(id);
   }

@@ -178,7 +178,7 @@ AllSeen RegionShares::seen(int x, int y, int z, int s, int bond) const {
       if (split_in_row_[n] == 0) continue;
       // Its place in the 6 x 6 x 6 box of the row's first node (NodeFields::Split).
       const int plane = (s >> 2) - 2 * k + 4;
-      const int in_plane = 6 * ((s >> 1 & 1) - 2 * j + 4) + (s & 1) + 4;
+      const int in_plane = bit_in_plane((s & 1) + 4, (s >> 1 & 1) - 2 * j + 4);
       for (int i = first[0]; i <= last[0]; ++i) {
         const NodeFields::Split* split = split_[n + i];
         if (split == nullptr) continue;

@@ -76,14 +76,19 @@ TISSUE_SIM_INLINE PointBounds bounds(const Block& b, const BlockField& f, BlockS
   const float *x = scratch.values.data(), *volume = b.volume.data();
   PointBounds result;
   positions<kWidth>(b, f, f.nodes->u, scratch, scratch.values.data());
+  Vec<W> min[3], max[3];  // side by side: each waits for what it was
   for (int a = 0; a < 3; ++a) {
-    Vec<W> min = Vec<W>{} + result.min[a], max = Vec<W>{} + result.max[a];
-    for (std::size_t j = 0; j < lanes; j += W) {
-      widen<W>(load<W>(volume + j) > 0.0f, load<W>(x + a * lanes + j), min, max);
-    }
+    min[a] = Vec<W>{} + result.min[a];
+    max[a] = Vec<W>{} + result.max[a];
+  }
+  for (std::size_t j = 0; j < lanes; j += W) {
+    const Mask<W> inside = load<W>(volume + j) > 0.0f;
+    for (int a = 0; a < 3; ++a) widen<W>(inside, load<W>(x + a * lanes + j), min[a], max[a]);
+  }
+  for (int a = 0; a < 3; ++a) {
     for (int i = 0; i < W; ++i) {
-      result.min[a] = std::min(result.min[a], min[i]);
-      result.max[a] = std::max(result.max[a], max[i]);
+      result.min[a] = std::min(result.min[a], min[a][i]);
+      result.max[a] = std::max(result.max[a], max[a][i]);
     }
   }
   positions<kWidth>(b, at_rest(f), f.nodes->v, scratch, scratch.values.data());

@@ -251,23 +251,5 @@ TISSUE_SIM_INLINE void stretched(const Block& b, const BlockField& f, float stre
   }
 }
 
-template <int W>
-TISSUE_SIM_INLINE int lanes_in_box(const float* x, std::size_t count, const float* min,
-                                   const float* max, std::int32_t* lanes) {
-  int found = 0;
-  for (std::size_t j = 0; j < count; j += W) {
-    Mask<W> outside = {};
-    for (int a = 0; a < 3; ++a) {
-      const Vec<W> v = load<W>(x + a * count + j);
-      outside |= bits<W>(v - min[a]) | bits<W>(max[a] - v);
-    }
-    if (!any_negative<W>(~outside)) continue;
-    for (int i = 0; i < W; ++i) {
-      if (outside[i] >= 0) lanes[found++] = static_cast<std::int32_t>(j) + i;
-    }
-  }
-  return found;
-}
-
 }  // namespace kernels
 }  // namespace tissue_sim

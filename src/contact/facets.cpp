@@ -224,9 +224,11 @@ std::vector<Facet> facets_of(const LatticeBody& body, const Points& points, cons
         std::optional<Surroundings> surroundings;  // where a plane is to be fitted
         const std::size_t first = facets.size();
         for (int j = 0; j < 4 * kBondCount; ++j) {
-          const Side side(j / 4, j % 2);
           const End how = j / 2 % 2 == 0 ? End::kCut : End::kOuter;
-          unsigned members = missing[how == End::kCut ? 0 : 1][side.direction] & side.points();
+          const unsigned gone = missing[how == End::kCut ? 0 : 1][j / 4];
+          if (gone == 0) continue;
+          const Side side(j / 4, j % 2);
+          unsigned members = gone & side.points();
           if (how == End::kCut && members != 0) {
             members = add_crossed(body, points, cell, corner, side, around, members, facets);
           }

@@ -122,10 +122,13 @@ unsigned add_crossed(const LatticeBody& body, const Points& points, int cell, co
   unsigned left = 0;
   for (int s = 0; s < 8; ++s) {
     if ((members >> s & 1) == 0) continue;
-    Place lower = {corner[0] + (s & 1), corner[1] + (s >> 1 & 1), corner[2] + (s >> 2)};
-    if (side.sign < 0) --lower[side.axis];
-    const Crossing* crossing =
-        points.crossings.find(body.point(lower[0], lower[1], lower[2]), side.axis);
+    std::int32_t lower = around[s];
+    if (side.sign < 0) {
+      Place place = {corner[0] + (s & 1), corner[1] + (s >> 1 & 1), corner[2] + (s >> 2)};
+      --place[side.axis];
+      lower = body.point(place[0], place[1], place[2]);
+    }
+    const Crossing* crossing = points.crossings.find(lower, side.axis);
     if (crossing == nullptr) continue;
     normal[s] = Vec3(crossing->normal[0], crossing->normal[1], crossing->normal[2]);
     if (normal[s][side.axis] * side.sign < 0) normal[s] = -normal[s];

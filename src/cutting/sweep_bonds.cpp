@@ -39,6 +39,7 @@ class Sweep {
         const Array<float>* u_end)
       : state_(state),
         parts_(sweep_parts(path)),
+        one_edge_(parts_.size() == 1 && parts_[0].edges.size() == 1),
         u_begin_(u_begin),
         u_end_(u_end),
         known_(state.points.size(), 0) {}
@@ -73,7 +74,6 @@ class Sweep {
     const BlockField field = block_field(state_, block);
     state_.kernels->positions(block, field, u_end_, scratch, end);
     if (moves()) state_.kernels->positions(block, field, u_begin_, scratch, begin);
-    const bool one_edge = parts_.size() == 1 && parts_[0].edges.size() == 1;
     const auto reach = static_cast<float>(kReach * state_.scene.cell_size);
     float *at_begin = state_.places[0].data(), *at_end = state_.places[1].data();
     for (const NearEdge& edge : passed.edges) {
@@ -94,7 +94,7 @@ class Sweep {
           if (moves()) at_begin[3 * std::size_t(p) + a] = begin[a * lanes + near.lane];
         }
         if (near.near && (known_[p] & kNear) == 0) passed.lanes.push_back(near.lane);
-        known_[p] |= kBrought | (near.near ? kNear : 0) | (one_edge ? near.outside : 0);
+        known_[p] |= kBrought | (near.near ? kNear : 0) | (one_edge_ ? near.outside : 0);
       }
     }
   }
@@ -111,16 +111,17 @@ class Sweep {
     std::vector<Broken> broken;
     const Block& block = *passed.block;
     const LatticeBody& body = state_.bodies[block.body];
+    const std::ptrdiff_t step[] = {1, 2 * body.nx, std::ptrdiff_t{4} * body.nx * body.ny};
     for (const std::int32_t lane : passed.lanes) {
       const std::int32_t p = block.point[lane];
       const Points::Site& s = state_.points.site[p];
-      const Vec3 p0 = place(0, p), p1 = place(1, p);
+      const std::int32_t* site = &body.point_at[s.z * step[2] + s.y * step[1] + s.x];
       for (int axis = 0; axis < 3; ++axis) {
         if ((state_.points.bonds[p] >> (kForwardBond + axis) & 1) == 0) continue;
-        const std::int32_t q = body.next_point(s, axis);
+        const std::int32_t q = site[step[axis]];
         if ((known_[p] & known_[q] & kOutside) != 0) continue;
         Meeting meeting;
-        if (passes(passed.edges, {p0, place(0, q), p1, place(1, q)}, meeting)) {
+        if (passes(passed.edges, {place(0, p), place(0, q), place(1, p), place(1, q)}, meeting)) {
           broken.push_back(broken_bond(block, lane, axis, meeting));
         }
       }
@@ -150,14 +151,15 @@ class Sweep {
   }
 
   /// Whether an edge passes a bond, and where the first one does.
-  static bool passes(const std::vector<NearEdge>& edges, const MovingSegment& bond,
-                     Meeting& meeting) {
+  bool passes(const std::vector<NearEdge>& edges, const MovingSegment& bond,
+              Meeting& meeting) const {
     const Vec3 a = bond.a1 - bond.a0, b = bond.b1 - bond.b0;
     return std::any_of(edges.begin(), edges.end(), [&](const NearEdge& near) {
       const double begin = near.part->begin, end = near.part->end;
       const MovingSegment then{bond.a0 + begin * a, bond.b0 + begin * b, bond.a0 + end * a,
                                bond.b0 + end * b};
-      return !stays_aside(*near.edge, then) && edge_passes(*near.edge, then, &meeting);
+      return (one_edge_ || !stays_aside(*near.edge, then)) &&
+             edge_passes(*near.edge, then, &meeting);
     });
   }
 
@@ -182,6 +184,7 @@ class Sweep {
 
   MpmState& state_;
   const std::vector<SweepPart> parts_;
+  const bool one_edge_;  // then NearLane::outside says what stays aside
   const Array<float>*u_begin_, *u_end_;
   std::vector<std::uint8_t> known_;  // of each point: kOutside, kBrought, kNear
 };

@@ -149,8 +149,7 @@ void RegionShares::add_cell(int x, int y, int z, const std::int32_t (&point)[8],
     std::copy_n(point, 8, add());
     return;
   }
-  AllSeen seen_by[8];  // of each share
-  int share_of[8];
+  int first_of[8], share_of[8];  // sub-position of each share's first point; share of each point
   for (int s = 0; s < 8; ++s) {
     if (point[s] < 0) continue;
     int& i = share_of[s] = cell.count;
@@ -160,16 +159,29 @@ void RegionShares::add_cell(int x, int y, int z, const std::int32_t (&point)[8],
       }
     }
     if (i == cell.count) {
-      const AllSeen here = seen(x, y, z, s, kNoBond);
       i = 0;
-      while (i < cell.count && !std::equal(here.begin(), here.end(), seen_by[i].begin())) ++i;
+      while (i < cell.count && !see_the_same(x, y, z, first_of[i], s)) ++i;
       if (i == cell.count) {
-        seen_by[i] = here;
+        first_of[i] = s;
         std::fill_n(add(), 8, -1);
       }
     }
     all_[cell.first + i].point[s] = point[s];
   }
+}
+
+bool RegionShares::see_the_same(int x, int y, int z, int s, int t) const {
+  constexpr int kMiddle = 13;  // where points differ the most
+  for (int i = 0; i < 27; ++i) {
+    const int k = (i + kMiddle) % 27, dx = k % 3, dy = k / 3 % 3, dz = k / 9;
+    const NodeFields::Split* split = split_[node_at(x + dx, y + dy, z + dz)];
+    const auto field = [&](int sub) {
+      return split->field_at((sub >> 2) - 2 * dz + 4,
+                             bit_in_plane((sub & 1) - 2 * dx + 4, (sub >> 1 & 1) - 2 * dy + 4));
+    };
+    if (split != nullptr && field(s) != field(t)) return false;
+  }
+  return true;
 }
 
 AllSeen RegionShares::seen(int x, int y, int z, int s, int bond) const {

@@ -67,6 +67,8 @@ class RegionShares {
   void add_cell(int x, int y, int z, const std::int32_t (&point)[8], Cell& cell);
   /// Number of the region's node that is lowest around a cell.
   int node_at(int x, int y, int z) const { return (z * (r_.ny + 2) + y) * (r_.nx + 2) + x; }
+  /// Whether the points at sub-positions s and t of a cell do.
+  bool see_the_same(int x, int y, int z, int s, int t) const;
   /// What the point at sub-position s of a cell sees at the split nodes around it.
   AllSeen seen(int x, int y, int z, int s, int bond) const;
   /// The region's cell next to a share's in the direction of a bond; null if that is outside.

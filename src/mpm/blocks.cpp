@@ -126,6 +126,27 @@ void connect_forces(Blocks& blocks, const std::vector<LatticeBody>& bodies, int 
   }
 }
 
+/// Makes the blocks of some regions anew, then block by block their facets.
+void fill_regions(Blocks& blocks, const std::vector<int>& some,
+                  const std::vector<LatticeBody>& bodies, const Points& points,
+                  const NodeFields& fields, Cpu& cpu) {
+  const int count = static_cast<int>(some.size());
+  std::vector<KnownFacets> known(count);
+  cpu.for_each(count, [&](int i) {
+    BlockRegion& r = blocks.regions[some[i]];
+    if (!r.blocks.empty()) known[i] = {bodies[r.body], r, blocks.stale_facets};
+    fill_region(r, bodies, points, fields, blocks.one_material);
+  });
+  std::vector<std::pair<Block*, const KnownFacets*>> made;
+  for (int i = 0; i < count; ++i) {
+    for (Block& b : blocks.regions[some[i]].blocks) made.emplace_back(&b, &known[i]);
+  }
+  cpu.for_each(static_cast<int>(made.size()), [&](int i) {
+    Block& b = *made[i].first;
+    b.facets = facets_of(bodies[b.body], points, b, *made[i].second);
+  });
+}
+
 }  // namespace
 
 Blocks make_blocks(const std::vector<LatticeBody>& bodies, const Points& points,
@@ -144,9 +165,9 @@ Blocks make_blocks(const std::vector<LatticeBody>& bodies, const Points& points,
       }
     }
   }
-  cpu.for_each(static_cast<int>(blocks.regions.size()), [&](int i) {
-    fill_region(blocks.regions[i], bodies, points, fields, shape.one_material, {});
-  });
+  std::vector<int> all(blocks.regions.size());
+  std::iota(all.begin(), all.end(), 0);
+  fill_regions(blocks, all, bodies, points, fields, cpu);
   connect_forces(blocks, bodies, lattice_node_count(bodies));
   return blocks;
 }
@@ -165,19 +186,22 @@ void update_blocks(Blocks& blocks, const std::vector<LatticeBody>& bodies, const
     const int first = before.empty() ? 0 : before.back().end;
     before.push_back({first, first + static_cast<int>(r.blocks.size())});
   }
+  std::vector<int> anew;
+  for (std::size_t i = 0; i < blocks.regions.size(); ++i) {
+    if (touched(blocks.regions[i])) anew.push_back(static_cast<int>(i));
+  }
+  fill_regions(blocks, anew, bodies, points, fields, cpu);
   std::vector<std::uint8_t> is_new(blocks.regions.size(), 0);
-  cpu.for_each(static_cast<int>(blocks.regions.size()), [&](int i) {
-    BlockRegion& r = blocks.regions[i];
-    if (!touched(r)) return;
+  for (const int i : anew) {
     is_new[i] = 1;
+    const BlockRegion& r = blocks.regions[i];
     const LatticeBody& b = bodies[r.body];
-    fill_region(r, bodies, points, fields, blocks.one_material, {b, r, blocks.stale_facets});
     for (int z = r.z; z < r.z + r.nz; ++z) {
       for (int y = r.y; y < r.y + r.ny; ++y) {
         std::fill_n(blocks.stale_facets.begin() + b.node(r.x, y, z), r.nx, std::uint8_t{0});
       }
     }
-  });
+  }
   blocks.origin.clear();
   for (std::size_t i = 0; i < blocks.regions.size(); ++i) {
     for (int b = 0; b < static_cast<int>(blocks.regions[i].blocks.size()); ++b) {

@@ -64,7 +64,8 @@ RegionShares::RegionShares(const BlockRegion& r, const LatticeBody& b, const Poi
 
 AllSeen RegionShares::seen(const Reached& r) const {
   const CellShare& c = all_[r.share];
-  if (near_split_[node_at(c.x, c.y, c.z)] == 0) return {};
+  AllSeen none;  // not {}, which would clear all of it
+  if (near_split_[node_at(c.x, c.y, c.z)] == 0) return none;
   int s = 0;
   while (c.point[s] < 0) ++s;
   return seen(c.x, c.y, c.z, s, r.bond);

@@ -1,5 +1,7 @@
 #include "cutting/node_box.h"
 
+#include <utility>
+
 #include "cutting/bonds.h"
 
 namespace tissue_sim {
@@ -38,23 +40,20 @@ struct BoxBonds {
 
 BondWindows::BondWindows(const std::vector<LatticeBody>& bodies, const Points& points) {
   for (const LatticeBody& b : bodies) {
-    OfBody of{2 * b.ny + 8, 2 * b.nz + 8, {}};
-    const std::size_t size = static_cast<std::size_t>(b.nx + 2) * of.rows_z * of.rows_y;
+    OfBody of{2 * (b.ny + kOutside), 2 * (b.nz + kOutside), {}};
+    const std::size_t size = of.at((b.nx + 1) / 2 + 1, -kOutside, -kOutside);
     for (std::vector<std::uint8_t>& window : of.window) window.assign(size + 2, 0);
     bodies_.push_back(std::move(of));
   }
   for (std::int32_t p = 0; p < points.size(); ++p) {
     const Points::Site& s = points.site[p];
     OfBody& of = bodies_[s.body];
-    for (int x = s.x / 2 - 1; x <= s.x / 2 + 1; ++x) {
-      const int place = s.x - 2 * x + 2;
-      const std::size_t at = of.at(x, s.y, s.z);
-      of.window[0][at] |= static_cast<std::uint8_t>(1u << place);
+    for_each_window(of, s, [&](std::size_t at, std::uint8_t bit) {
+      of.window[0][at] |= bit;
       for (int axis = 0; axis < 3; ++axis) {
-        const unsigned bond = points.bonds[p] >> (kForwardBond + axis) & 1;
-        of.window[1 + axis][at] |= static_cast<std::uint8_t>(bond << place);
+        if ((points.bonds[p] >> (kForwardBond + axis) & 1) != 0) of.window[1 + axis][at] |= bit;
       }
-    }
+    });
   }
 }
 
@@ -64,10 +63,9 @@ void BondWindows::update(const Points& points, const std::vector<std::int32_t>& 
     OfBody& of = bodies_[s.body];
     for (int axis = 0; axis < 3; ++axis) {
       if ((points.bonds[p] >> (kForwardBond + axis) & 1) != 0) continue;
-      for (int x = s.x / 2 - 1; x <= s.x / 2 + 1; ++x) {
-        of.window[1 + axis][of.at(x, s.y, s.z)] &=
-            static_cast<std::uint8_t>(~(1u << (s.x - 2 * x + 2)));
-      }
+      for_each_window(of, s, [&](std::size_t at, std::uint8_t bit) {
+        of.window[1 + axis][at] &= static_cast<std::uint8_t>(~bit);
+      });
     }
   }
 }

@@ -38,19 +38,20 @@ class NodeBox {
   std::int32_t copy_[216];
 };
 
-/// The bonds of all bodies, so that those of a node's box are at hand: for each column of nodes
-/// along z and each row of points a byte with its six places in the boxes of these nodes.
+/// The bonds of all bodies, so that those of a node's box are at hand: for each two columns of
+/// nodes along z and each row of points a byte with its places in the boxes of these nodes.
 class BondWindows {
   struct OfBody {
     int rows_y, rows_z;                   ///< of points, with those of boxes that reach outside
-    std::vector<std::uint8_t> window[4];  ///< [nx + 2][rows_z][rows_y]: points; their bonds forward
-                                          ///< along x, y and z
-    /// Where the windows at `x` (cells) of the row at y, z (half cells) are.
-    std::size_t at(int x, int y, int z) const {
-      constexpr int kOutside = 4;
-      return (static_cast<std::size_t>(x + 1) * rows_z + z + kOutside) * rows_y + y + kOutside;
+    std::vector<std::uint8_t> window[4];  ///< [(nx + 1) / 2 + 1][rows_z][rows_y]: points; their
+                                          ///< bonds forward along x, y and z
+    /// Window `column` of the row at y, z (half cells): it holds places 4 column - kOutside to
+    /// 4 column + 3.
+    std::size_t at(int column, int y, int z) const {
+      return (static_cast<std::size_t>(column) * rows_z + z + kOutside) * rows_y + y + kOutside;
     }
   };
+  static constexpr int kOutside = 4;  // how far boxes reach outside of the body
 
  public:
   BondWindows(const std::vector<LatticeBody>& bodies, const Points& points);
@@ -69,11 +70,20 @@ class BondWindows {
   /// One of the windows' kinds in a box, but for places not `within`.
   static Planes read(const OfBody& of, int kind, int x, int y, int z, std::uint64_t within) {
     Planes planes;
+    const int column = (x + 1) / 2, first = (x + 1) % 2 * 2;
     for (int k = 0; k < 6; ++k) {
-      std::memcpy(&planes[k], &of.window[kind][of.at(x, 2 * y - 2, 2 * z - 2 + k)], 8);
-      planes[k] &= within;
+      std::memcpy(&planes[k], &of.window[kind][of.at(column, 2 * y - 2, 2 * z - 2 + k)], 8);
+      planes[k] = planes[k] >> first & within;
     }
     return planes;
+  }
+  /// Calls f(index, bit) for each window that holds a point.
+  template <class F>
+  static void for_each_window(const OfBody& of, const Points::Site& s, const F& f) {
+    const int place = s.x + kOutside;
+    for (int column = place / 4 - 1; column <= place / 4; ++column) {
+      f(of.at(column, s.y, s.z), static_cast<std::uint8_t>(1u << (place - 4 * column)));
+    }
   }
 
   std::vector<OfBody> bodies_;

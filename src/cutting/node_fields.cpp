@@ -115,7 +115,7 @@ NodeFields::NodeFields(const std::vector<LatticeBody>& bodies, const Points& poi
         for (int x = -1; x <= b.nx; ++x) {
           const Cell cell{static_cast<int>(i), x, y, z};
           const int node = b.node(x, y, z);
-          mass_of_point_[node] = mass_of_point(b, points, cell);
+          mass_of_point_[node] = static_cast<float>(mass_of_point(b, points, cell));
           const Planes all = bonds_.points_in_box(cell.body, x, y, z);
           share_mass(b, points, cell, mass_of_point_[node], all, node, nodes);
         }

@@ -66,7 +66,7 @@ class NodeFields {
   BondWindows bonds_;
   /// Per lattice node: the mass of each of its points where it is the same for all and none is
   /// anchored, else 0 [kg].
-  std::vector<double> mass_of_point_;
+  std::vector<float> mass_of_point_;
   std::vector<Split> splits_;
   std::vector<std::int32_t> split_of_;  ///< per lattice node, -1 where whole; empty before any cut
 };

@@ -4,6 +4,7 @@
 
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
+#include <tbb/parallel_invoke.h>
 #include <tbb/task_arena.h>
 
 namespace tissue_sim {
@@ -28,6 +29,17 @@ class Cpu {
                           for (int i = r.begin(); i < r.end(); ++i) f(i);
                         });
     });
+  }
+  /// Calls f and g, side by side where there are threads: neither may write what the other one
+  /// reads.
+  template <class F, class G>
+  void both(const F& f, const G& g) {
+    if (threads() == 1) {
+      f();
+      g();
+      return;
+    }
+    arena_.execute([&] { tbb::parallel_invoke(f, g); });
   }
 
  private:

@@ -122,10 +122,13 @@ unsigned add_crossed(const LatticeBody& body, const Points& points, int cell, co
   unsigned left = 0;
   for (int s = 0; s < 8; ++s) {
     if ((members >> s & 1) == 0) continue;
-    Place lower = {corner[0] + (s & 1), corner[1] + (s >> 1 & 1), corner[2] + (s >> 2)};
-    if (side.sign < 0) --lower[side.axis];
-    const Crossing* crossing =
-        points.crossings.find(body.point(lower[0], lower[1], lower[2]), side.axis);
+    std::int32_t lower = around[s];
+    if (side.sign < 0) {
+      Place place = {corner[0] + (s & 1), corner[1] + (s >> 1 & 1), corner[2] + (s >> 2)};
+      --place[side.axis];
+      lower = body.point(place[0], place[1], place[2]);
+    }
+    const Crossing* crossing = points.crossings.find(lower, side.axis);
     if (crossing == nullptr) continue;
     normal[s] = Vec3(crossing->normal[0], crossing->normal[1], crossing->normal[2]);
     if (normal[s][side.axis] * side.sign < 0) normal[s] = -normal[s];
@@ -199,6 +202,7 @@ std::vector<Facet> facets_of(const LatticeBody& body, const Points& points, cons
       for (int i = 0; i < run.count; ++i) {
         const int lane = run.lane + i;
         const int x = block.x + run.x + i, y = block.y + run.y;
+        if (known.has_none(x, y, block.z + z)) continue;
         const int cell = z * block.plane + block.cell[lane];
         std::int32_t around[8];
         for (int s = 0; s < 8; ++s) {
@@ -224,9 +228,11 @@ std::vector<Facet> facets_of(const LatticeBody& body, const Points& points, cons
         std::optional<Surroundings> surroundings;  // where a plane is to be fitted
         const std::size_t first = facets.size();
         for (int j = 0; j < 4 * kBondCount; ++j) {
-          const Side side(j / 4, j % 2);
           const End how = j / 2 % 2 == 0 ? End::kCut : End::kOuter;
-          unsigned members = missing[how == End::kCut ? 0 : 1][side.direction] & side.points();
+          const unsigned gone = missing[how == End::kCut ? 0 : 1][j / 4];
+          if (gone == 0) continue;
+          const Side side(j / 4, j % 2);
+          unsigned members = gone & side.points();
           if (how == End::kCut && members != 0) {
             members = add_crossed(body, points, cell, corner, side, around, members, facets);
           }

@@ -1,6 +1,7 @@
 #include "contact/known_facets.h"
 
 #include <algorithm>
+#include <cstring>
 
 namespace tissue_sim {
 
@@ -58,9 +59,13 @@ void mark_stale_facets(const std::vector<LatticeBody>& bodies, const Points& poi
     const int x = std::max(s.x / 2 - kReach, 0), x_end = std::min(s.x / 2 + kReach + 1, b.nx);
     const int y_end = std::min(s.y / 2 + kReach + 1, b.ny);
     const int z_end = std::min(s.z / 2 + kReach + 1, b.nz);
+    const std::uint64_t marks = 0x0101010101010101 >> 8 * (8 - (x_end - x));
     for (int z = std::max(s.z / 2 - kReach, 0); z < z_end; ++z) {
       for (int y = std::max(s.y / 2 - kReach, 0); y < y_end; ++y) {
-        std::fill_n(stale.begin() + b.node(x, y, z), x_end - x, std::uint8_t{1});
+        std::uint64_t row;  // nodes outside of the body follow its cells: there are eight
+        std::memcpy(&row, &stale[b.node(x, y, z)], sizeof(row));
+        row |= marks;
+        std::memcpy(&stale[b.node(x, y, z)], &row, sizeof(row));
       }
     }
   }

@@ -1,9 +1,11 @@
 // What holds together around a cell.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <iterator>
 
 #include "cutting/bonds.h"
 #include "mpm/lattice_body.h"
@@ -21,14 +23,21 @@ class Surroundings {
  public:
   Surroundings(const LatticeBody& body, const Points& points, const Place& corner) {
     const int x = corner[0] + kFrom, sx = 2 * body.nx;
+    const int first = std::max(0, -x), last = std::min(kWidth, sx - x) - 1;  // within the body
+    std::fill(std::begin(bonds_), std::end(bonds_), kNoPoint);
     for (int k = 0, i = 0; k < kWidth; ++k) {
       for (int j = 0; j < kWidth; ++j, i += kWidth) {
         const int y = corner[1] + kFrom + j, z = corner[2] + kFrom + k;
-        const bool inside = y >= 0 && z >= 0 && y < 2 * body.ny && z < 2 * body.nz;
-        const std::ptrdiff_t row = (static_cast<std::ptrdiff_t>(z) * 2 * body.ny + y) * sx + x;
-        for (int n = 0; n < kWidth; ++n) {
-          const std::int32_t p = inside && x + n >= 0 && x + n < sx ? body.point_at[row + n] : -1;
-          bonds_[i + n] = p < 0 ? kNoPoint : points.bonds[p];
+        if (y < 0 || z < 0 || y >= 2 * body.ny || z >= 2 * body.nz) continue;
+        const std::int32_t* row =
+            &body.point_at[(static_cast<std::size_t>(z) * 2 * body.ny + y) * sx + x + first];
+        const int count = last - first + 1;
+        if (row[0] >= 0 && row[count - 1] == row[0] + count - 1) {  // points follow one another
+          std::copy_n(&points.bonds[row[0]], count, bonds_ + i + first);
+          continue;
+        }
+        for (int n = 0; n < count; ++n) {
+          if (row[n] >= 0) bonds_[i + first + n] = points.bonds[row[n]];
         }
       }
     }

@@ -27,26 +27,38 @@ void bound_motion(MpmState& state) {
 
 }  // namespace
 
-void take_apart(MpmState& state, const std::vector<std::int32_t>& changed) {
+void take_apart(MpmState& state, const std::vector<std::int32_t>& changed,
+                const std::function<void()>& meanwhile) {
   if (changed.empty()) return;
-  list_threads(state, changed);
-  std::vector<NodeFields::Cell> cells =
-      state.fields->update(state.bodies, state.points, changed, state.nodes, *state.cpu);
-  for (const std::int32_t p : soften(state.bodies, changed, state.points)) {  // blocks must know
+  std::vector<NodeFields::Cell> cells;
+  std::vector<std::int32_t> softened;
+  state.cpu->both(
+      [&] {
+        cells = state.fields->update(state.bodies, state.points, changed, state.nodes, *state.cpu);
+      },
+      [&] {
+        list_threads(state, changed);
+        softened = soften(state.bodies, changed, state.points);
+        state.blocks.stale_facets.resize(lattice_node_count(state.bodies), 0);
+        mark_stale_facets(state.bodies, state.points, changed, state.blocks.stale_facets);
+      });
+  for (const std::int32_t p : softened) {  // blocks must know
     const Points::Site& s = state.points.site[p];
     cells.push_back({s.body, s.x / 2, s.y / 2, s.z / 2});
   }
   settle_crumbs(state.bodies, state.points, *state.fields, changed, state.crumbs, state.nodes);
-  state.blocks.stale_facets.resize(lattice_node_count(state.bodies), 0);
-  mark_stale_facets(state.bodies, state.points, changed, state.blocks.stale_facets);
-  if (cells.empty()) return;
-  keep_face_contacts(state);
-  update_blocks(state.blocks, state.bodies, state.points, *state.fields, cells,
-                static_cast<int>(state.nodes.size()), *state.cpu);
-  state.force.resize(state.blocks.force_size);
-  bound_motion(state);
-  list_contacts(state);
-  list_facets(state);
+  state.cpu->both(
+      [&] {
+        if (cells.empty()) return;
+        keep_face_contacts(state);
+        update_blocks(state.blocks, state.bodies, state.points, *state.fields, cells,
+                      static_cast<int>(state.nodes.size()), *state.cpu);
+        state.force.resize(state.blocks.force_size);
+        bound_motion(state);
+        list_contacts(state);
+        list_facets(state);
+      },
+      meanwhile);
 }
 
 }  // namespace tissue_sim

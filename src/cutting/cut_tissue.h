@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <vector>
 
 #include "mpm/mpm_state.h"
@@ -16,7 +17,10 @@ void sweep_bonds(MpmState& state, const BladePath& path, const Array<float>* u_b
                  const Array<float>* u_end, const std::vector<BlockMotion>& before,
                  std::vector<std::int32_t>& changed, CutReport& report);
 
-/// Splits nodes and makes blocks anew after the points `changed` lost bonds.
-void take_apart(MpmState& state, const std::vector<std::int32_t>& changed);
+/// Splits nodes and makes blocks anew after the points `changed` lost bonds. `meanwhile` is called
+/// when nodes are split: it may not write what blocks are made of.
+void take_apart(
+    MpmState& state, const std::vector<std::int32_t>& changed,
+    const std::function<void()>& meanwhile = [] {});
 
 }  // namespace tissue_sim

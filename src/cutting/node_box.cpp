@@ -1,44 +1,15 @@
 #include "cutting/node_box.h"
 
-#include <cstring>
+#include <utility>
 
 #include "cutting/bonds.h"
 
 namespace tissue_sim {
 namespace {
 
-/// The lowest bits of a word's first six bytes.
-std::uint64_t row_bits(std::uint64_t bytes) { return (bytes * 0x0102040810204080) >> 56 & 0x3f; }
-
-/// The bonds within the box.
+/// The bonds within a box.
 struct BoxBonds {
-  Planes there = {}, x = {}, y = {}, z = {};  ///< points; their bonds to the next place
-
-  BoxBonds(const NodeBox& box, const Points& points) {
-    constexpr std::uint64_t kNotLastX = 0x7df7df7df, kNotLastY = 0x3fffffff, kAll = 0x010101010101;
-    for (int plane = 0, row = 0; plane < 6; ++plane) {
-      for (int shift = 0; shift < 36; shift += 6, ++row) {
-        const std::int32_t* p = box.row(row);
-        std::uint64_t bonds = 0, any = 0x3f;  // a byte of each point; a bit of each that there is
-        if (box.is_whole(row)) {
-          std::memcpy(&bonds, &points.bonds[p[0]], 6);
-        } else {
-          any = 0;
-          for (int i = 0; i < 6; ++i) {
-            if (p[i] < 0) continue;
-            bonds |= std::uint64_t(points.bonds[p[i]]) << (8 * i);
-            any |= std::uint64_t(1) << i;
-          }
-        }
-        there[plane] |= any << shift;
-        x[plane] |= row_bits(bonds >> kForwardBond & kAll) << shift;
-        y[plane] |= row_bits(bonds >> (kForwardBond + 1) & kAll) << shift;
-        z[plane] |= row_bits(bonds >> (kForwardBond + 2) & kAll) << shift;
-      }
-      x[plane] &= kNotLastX;
-      y[plane] &= kNotLastY;
-    }
-  }
+  Planes there, x, y, z;  ///< points; their bonds to the next place
 
   /// The places of a plane that bonds within it reach from those of m: all of them unless the bonds
   /// wind.
@@ -48,44 +19,74 @@ struct BoxBonds {
       m |= (m & along) << step | (m >> step & along);
       along &= along >> step;
     }
-    for (int step = 6; step <= 24; step *= 2) {
+    for (int step = 8; step <= 32; step *= 2) {
       m |= (m & across) << step | (m >> step & across);
       across &= across >> step;
     }
     return m;
   }
 
-  /// Whether no bond leads out of the places.
-  bool is_closed(const Planes& m) const {
-    std::uint64_t out = 0;
-    for (int i = 0; i < 6; ++i) {
-      out |= ((m[i] ^ m[i] >> 1) & x[i]) | ((m[i] ^ m[i] >> 6) & y[i]);
-      if (i < 5) out |= (m[i] ^ m[i + 1]) & z[i];
-    }
-    return out == 0;
+  /// Takes up more of a plane's places into m, and what bonds within the plane reach from them.
+  /// Returns whether there were any.
+  bool take(std::uint64_t more, std::uint64_t& m, int plane) const {
+    if ((more & ~m) == 0) return false;
+    m |= more;
+    while ((((m ^ m >> 1) & x[plane]) | ((m ^ m >> 8) & y[plane])) != 0) m = spread(m, plane);
+    return true;
   }
 };
 
 }  // namespace
 
-int find_components(const NodeBox& box, const Points& points, Planes (&found)[216]) {
-  const BoxBonds bonds(box, points);
+BondWindows::BondWindows(const std::vector<LatticeBody>& bodies, const Points& points) {
+  for (const LatticeBody& b : bodies) {
+    OfBody of{2 * (b.ny + kOutside), 2 * (b.nz + kOutside), {}};
+    const std::size_t size = of.at((b.nx + 1) / 2 + 1, -kOutside, -kOutside);
+    for (std::vector<std::uint8_t>& window : of.window) window.assign(size + 2, 0);
+    bodies_.push_back(std::move(of));
+  }
+  for (std::int32_t p = 0; p < points.size(); ++p) {
+    const Points::Site& s = points.site[p];
+    OfBody& of = bodies_[s.body];
+    for_each_window(of, s, [&](std::size_t at, std::uint8_t bit) {
+      of.window[0][at] |= bit;
+      for (int axis = 0; axis < 3; ++axis) {
+        if ((points.bonds[p] >> (kForwardBond + axis) & 1) != 0) of.window[1 + axis][at] |= bit;
+      }
+    });
+  }
+}
+
+void BondWindows::update(const Points& points, const std::vector<std::int32_t>& changed) {
+  for (const std::int32_t p : changed) {
+    const Points::Site& s = points.site[p];
+    OfBody& of = bodies_[s.body];
+    for (int axis = 0; axis < 3; ++axis) {
+      if ((points.bonds[p] >> (kForwardBond + axis) & 1) != 0) continue;
+      for_each_window(of, s, [&](std::size_t at, std::uint8_t bit) {
+        of.window[1 + axis][at] &= static_cast<std::uint8_t>(~bit);
+      });
+    }
+  }
+}
+
+int BondWindows::find_components(int body, int x, int y, int z, Planes (&found)[216]) const {
+  const OfBody& of = bodies_[body];
+  const BoxBonds bonds{read(of, 0, x, y, z, 0x3f3f3f3f3f3f), read(of, 1, x, y, z, 0x1f1f1f1f1f1f),
+                       read(of, 2, x, y, z, 0x003f3f3f3f3f), read(of, 3, x, y, z, 0x3f3f3f3f3f3f)};
   Planes left = bonds.there;
   int count = 0;
   for (int start = 0; start < 6; ++start) {
     while (left[start] != 0) {
       Planes& reached = found[count++];
       reached = {};
-      reached[start] = left[start] & -left[start];
-      do {
-        reached[0] = bonds.spread(reached[0], 0);
-        for (int z = 1; z < 6; ++z) {
-          reached[z] = bonds.spread(reached[z] | (reached[z - 1] & bonds.z[z - 1]), z);
-        }
-        for (int z = 4; z >= 0; --z) {
-          reached[z] = bonds.spread(reached[z] | (reached[z + 1] & bonds.z[z]), z);
-        }
-      } while (!bonds.is_closed(reached));
+      // Upwards, then downwards, until nothing more is reached.
+      bonds.take(left[start] & -left[start], reached[start], start);
+      for (bool more = true; more;) {
+        for (int z = 1; z < 6; ++z) bonds.take(reached[z - 1] & bonds.z[z - 1], reached[z], z);
+        more = false;
+        for (int z = 4; z >= 0; --z) more |= bonds.take(reached[z + 1] & bonds.z[z], reached[z], z);
+      }
       for (int z = 0; z < 6; ++z) left[z] &= ~reached[z];
     }
   }

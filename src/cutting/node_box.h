@@ -4,13 +4,17 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <cstring>
+#include <vector>
 
 #include "mpm/lattice_body.h"
 
 namespace tissue_sim {
 
-/// Places in the box, x fastest: 36 bits of each z-plane.
+/// Places in the box: for each z-plane a byte of each of its six rows, x fastest.
 using Planes = std::array<std::uint64_t, 6>;
+/// Bit of a place in its plane.
+constexpr int bit_in_plane(int x, int y) { return 8 * y + x; }
 
 /// The points around the node of cell (x, y, z), row by row along x.
 class NodeBox {
@@ -28,15 +32,61 @@ class NodeBox {
     }
   }
   const std::int32_t* row(int i) const { return row_[i]; }
-  /// Whether a row has all its points; then they follow one another.
-  bool is_whole(int i) const { return row_[i][0] >= 0 && row_[i][5] == row_[i][0] + 5; }
 
  private:
   const std::int32_t* row_[36];
   std::int32_t copy_[216];
 };
 
-/// Components of the bonds within the box, in the order of their first places; returns how many.
-int find_components(const NodeBox& box, const Points& points, Planes (&found)[216]);
+/// The bonds of all bodies, so that those of a node's box are at hand: for each two columns of
+/// nodes along z and each row of points a byte with its places in the boxes of these nodes.
+class BondWindows {
+  struct OfBody {
+    int rows_y, rows_z;                   ///< of points, with those of boxes that reach outside
+    std::vector<std::uint8_t> window[4];  ///< [(nx + 1) / 2 + 1][rows_z][rows_y]: points; their
+                                          ///< bonds forward along x, y and z
+    /// Window `column` of the row at y, z (half cells): it holds places 4 column - kOutside to
+    /// 4 column + 3.
+    std::size_t at(int column, int y, int z) const {
+      return (static_cast<std::size_t>(column) * rows_z + z + kOutside) * rows_y + y + kOutside;
+    }
+  };
+  static constexpr int kOutside = 4;  // how far boxes reach outside of the body
+
+ public:
+  BondWindows(const std::vector<LatticeBody>& bodies, const Points& points);
+  /// After the points `changed` lost bonds.
+  void update(const Points& points, const std::vector<std::int32_t>& changed);
+
+  /// The places of the box of the node of cell (x, y, z) where there are points.
+  Planes points_in_box(int body, int x, int y, int z) const {
+    return read(bodies_[body], 0, x, y, z, 0x3f3f3f3f3f3f);
+  }
+  /// Components of the bonds within the box of the node of cell (x, y, z), in the order of their
+  /// first places; returns how many.
+  int find_components(int body, int x, int y, int z, Planes (&found)[216]) const;
+
+ private:
+  /// One of the windows' kinds in a box, but for places not `within`.
+  static Planes read(const OfBody& of, int kind, int x, int y, int z, std::uint64_t within) {
+    Planes planes;
+    const int column = (x + 1) / 2, first = (x + 1) % 2 * 2;
+    for (int k = 0; k < 6; ++k) {
+      std::memcpy(&planes[k], &of.window[kind][of.at(column, 2 * y - 2, 2 * z - 2 + k)], 8);
+      planes[k] = planes[k] >> first & within;
+    }
+    return planes;
+  }
+  /// Calls f(index, bit) for each window that holds a point.
+  template <class F>
+  static void for_each_window(const OfBody& of, const Points::Site& s, const F& f) {
+    const int place = s.x + kOutside;
+    for (int column = place / 4 - 1; column <= place / 4; ++column) {
+      f(of.at(column, s.y, s.z), static_cast<std::uint8_t>(1u << (place - 4 * column)));
+    }
+  }
+
+  std::vector<OfBody> bodies_;
+};
 
 }  // namespace tissue_sim

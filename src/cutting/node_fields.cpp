@@ -1,8 +1,7 @@
 #include "cutting/node_fields.h"
 
 #include <algorithm>
-#include <array>
-#include <cstring>
+#include <utility>
 
 #include "cutting/bonds.h"
 #include "math/bspline.h"
@@ -10,69 +9,73 @@
 namespace tissue_sim {
 namespace {
 
-/// Place of a point in the 6 x 6 x 6 box of the node of cell (x, y, z).
-int place(const Points::Site& p, int x, int y, int z) {
-  return ((p.z - 2 * z + 2) * 6 + p.y - 2 * y + 2) * 6 + p.x - 2 * x + 2;
-}
-
 // A node is held when this share of its mass is anchored. Nodes held up to a place clamp a body as
 // a wall a quarter of a cell before it would; with this share that wall is within half a cell of
 // the region's end, on average at it (of a node half a cell outside 16 % of the mass is in the
 // region, of one a cell and a quarter outside 1.6 %).
 constexpr double kAnchoredShare = 0.05;
 
-/// Weights of the box's centre node at the places of one axis of the box; and for each choice of
-/// the six points of a row 1 for those of it, 0 for the others.
+/// Weights of the box's centre node at the places of one axis of the box, and their sum for each
+/// choice of the six points of a row.
 struct Tables {
-  double weight[6] = {}, chosen[64][6] = {};
+  double weight[6] = {}, chosen[64] = {};
   constexpr Tables() {
     for (int i = 0; i < 6; ++i) weight[i] = lattice_weight(i & 1, 2 - i / 2);
-    for (int i = 0; i < 64 * 6; ++i) chosen[i / 6][i % 6] = i / 6 >> i % 6 & 1;
+    for (int i = 0; i < 64 * 6; ++i) chosen[i / 6] += (i / 6 >> i % 6 & 1) * weight[i % 6];
   }
 };
 constexpr Tables kTables;
 
-/// Gives a node the mass of those points that are in the places `part`.
-void share_mass(const LatticeBody& body, const Points& points, const NodeBox& box,
-                const Planes& part, int node, Nodes& nodes) {
-  double mass[6] = {}, anchored[6] = {};  // by place along x
-  const bool one_material = body.materials.size() == 1;
-  for (int plane = 0, row = 0; plane < 6; ++plane) {
-    for (std::uint64_t bits = part[plane], y = 0; y < 6; bits >>= 6, ++y, ++row) {
-      if ((bits & 0x3f) == 0) continue;
-      const std::int32_t* p = box.row(row);
-      const double weight = kTables.weight[plane] * kTables.weight[y];
-      std::uint64_t held = 1;  // a byte of each point: whether it is anchored
-      if (one_material && box.is_whole(row)) {
-        held = 0;
-        std::memcpy(&held, &points.anchored[p[0]], 6);
-      }
-      if (held == 0) {
-        const double density = body.materials[0].density * weight;
-        const float* volume = &points.volume[p[0]];
-        const double* chosen = kTables.chosen[bits & 0x3f];
-        for (int x = 0; x < 6; ++x) mass[x] += volume[x] * (density * chosen[x]);
-        continue;
-      }
-      for (int x = 0; x < 6; ++x) {
-        if ((bits >> x & 1) == 0 || p[x] < 0) continue;
-        const double m = body.material_of(points, p[x]).density * weight * points.volume[p[x]];
-        mass[x] += m;
-        if (points.anchored[p[x]] != 0) anchored[x] += m;
+/// Gives a node the mass of those points that are in the places `part` of a box.
+void share_mass(const LatticeBody& body, const Points& points, const NodeFields::Cell& cell,
+                double mass_of_point, const Planes& part, int node, Nodes& nodes) {
+  double sum = 0, anchored = 0;
+  const auto for_each_row = [&](const auto& f) {
+    for (int plane = 0, row = 0; plane < 6; ++plane) {
+      for (std::uint64_t bits = part[plane], y = 0; y < 6; bits >>= 8, ++y, ++row) {
+        f(row, static_cast<unsigned>(bits & 0x3f), kTables.weight[plane] * kTables.weight[y]);
       }
     }
-  }
-  double sum = 0, sum_anchored = 0;
-  for (int x = 0; x < 6; ++x) {
-    sum += kTables.weight[x] * mass[x];
-    sum_anchored += kTables.weight[x] * anchored[x];
+  };
+  if (mass_of_point > 0) {
+    for_each_row([&](int, unsigned bits, double w) { sum += w * kTables.chosen[bits]; });
+    sum *= mass_of_point;
+  } else {
+    const NodeBox box(body, cell.x, cell.y, cell.z);
+    for_each_row([&](int row, unsigned bits, double w) {
+      for (; bits != 0; bits &= bits - 1) {
+        const int x = __builtin_ctz(bits);
+        const std::int32_t p = box.row(row)[x];
+        const double density = body.material_of(points, p).density;
+        const double mass = w * kTables.weight[x] * density * points.volume[p];
+        sum += mass;
+        if (points.anchored[p] != 0) anchored += mass;
+      }
+    });
   }
   nodes.mass[node] = static_cast<float>(sum);
-  const bool fast = sum_anchored > kAnchoredShare * sum || sum <= 0;
+  const bool fast = anchored > kAnchoredShare * sum || sum <= 0;
   nodes.inv_mass[node] = fast ? 0.0f : 1.0f / nodes.mass[node];
   if (fast) {
     for (int c = 0; c < 3; ++c) nodes.v[c][node] = 0;
   }
+}
+
+/// The mass of each point around the node of a cell if it is the same for all and none is anchored,
+/// else 0.
+double mass_of_point(const LatticeBody& body, const Points& points, const NodeFields::Cell& c) {
+  double mass = 0;
+  const NodeBox box(body, c.x, c.y, c.z);
+  for (int row = 0; row < 36; ++row) {
+    for (int x = 0; x < 6; ++x) {
+      const std::int32_t p = box.row(row)[x];
+      if (p < 0) continue;
+      const double m = body.material_of(points, p).density * points.volume[p];
+      if (points.anchored[p] != 0 || (mass != 0 && m != mass)) return 0;
+      mass = m;
+    }
+  }
+  return mass;
 }
 
 /// The cells whose nodes one of the points belongs to, in the order of these points.
@@ -101,15 +104,20 @@ std::vector<NodeFields::Cell> cells_around(const std::vector<LatticeBody>& bodie
 
 }  // namespace
 
-NodeFields::NodeFields(const std::vector<LatticeBody>& bodies, const Points& points, Nodes& nodes) {
+NodeFields::NodeFields(const std::vector<LatticeBody>& bodies, const Points& points, Nodes& nodes)
+    : bonds_(bodies, points) {
   nodes.resize(lattice_node_count(bodies));
-  Planes all;
-  all.fill(0xfffffffff);
-  for (const LatticeBody& b : bodies) {
+  mass_of_point_.resize(nodes.size());
+  for (std::size_t i = 0; i < bodies.size(); ++i) {
+    const LatticeBody& b = bodies[i];
     for (int z = -1; z <= b.nz; ++z) {
       for (int y = -1; y <= b.ny; ++y) {
         for (int x = -1; x <= b.nx; ++x) {
-          share_mass(b, points, {b, x, y, z}, all, b.node(x, y, z), nodes);
+          const Cell cell{static_cast<int>(i), x, y, z};
+          const int node = b.node(x, y, z);
+          mass_of_point_[node] = static_cast<float>(mass_of_point(b, points, cell));
+          const Planes all = bonds_.points_in_box(cell.body, x, y, z);
+          share_mass(b, points, cell, mass_of_point_[node], all, node, nodes);
         }
       }
     }
@@ -123,65 +131,63 @@ int NodeFields::node(const LatticeBody& body, const Points::Site& p, int x, int 
 }
 
 int NodeFields::Split::seen_by(const Points::Site& p, int x, int y, int z) const {
-  return field_at(place(p, x, y, z));
+  return field_at(p.z - 2 * z + 2, bit_in_plane(p.x - 2 * x + 2, p.y - 2 * y + 2));
 }
 
 int NodeFields::node(const LatticeBody& body, const Points::Site& p, int k) const {
   return node(body, p, p.x / 2 + k % 3 - 1, p.y / 2 + k / 3 % 3 - 1, p.z / 2 + k / 9 - 1);
 }
 
-void NodeFields::list_fields(int lattice_node, std::vector<Planes>& parts,
-                             std::vector<std::int32_t>& parent_of_new, int node_count) {
-  std::int32_t& index = split_of_[lattice_node];
-  if (index < 0) {
-    index = static_cast<std::int32_t>(splits_.size());
-    splits_.push_back({{{}}, {lattice_node}});
-  }
-  Split& split = splits_[index];
-  std::vector<std::int32_t> field;
-  field.reserve(parts.size());
-  for (const Planes& part : parts) {
+NodeFields::Split NodeFields::taken_apart(const LatticeBody& body, const Cell& c) const {
+  const int lattice_node = body.node(c.x, c.y, c.z);
+  const Split* before = split(lattice_node);
+  Planes found[216];
+  const int count = bonds_.find_components(c.body, c.x, c.y, c.z, found);
+  Split now;
+  // Components only come apart, so the same number means the same components.
+  if (count == (before == nullptr ? 1 : static_cast<int>(before->field.size()))) return now;
+  now.part.assign(found, found + count);
+  now.field.reserve(count);
+  for (const Planes& part : now.part) {
     int z = 0;
     while (part[z] == 0) ++z;
-    const std::int32_t parent = split.field_at(36 * z + __builtin_ctzll(part[z]));
-    if (std::find(field.begin(), field.end(), parent) == field.end()) {
-      field.push_back(parent);
-    } else {
-      field.push_back(node_count + static_cast<std::int32_t>(parent_of_new.size()));
-      parent_of_new.push_back(parent);
-    }
+    const std::int32_t parent =
+        before == nullptr ? lattice_node : before->field_at(z, __builtin_ctzll(part[z]));
+    const bool is_first = std::find(now.field.begin(), now.field.end(), parent) == now.field.end();
+    now.field.push_back(is_first ? parent : ~parent);
   }
-  split.field.swap(field);
-  split.part.swap(parts);
+  return now;
 }
 
 std::vector<NodeFields::Cell> NodeFields::update(const std::vector<LatticeBody>& bodies,
                                                  const Points& points,
                                                  const std::vector<std::int32_t>& changed,
                                                  Nodes& nodes, Cpu& cpu) {
+  bonds_.update(points, changed);
   const std::vector<Cell> cells = cells_around(bodies, points, changed);
   const auto node_of = [&](const Cell& c) { return bodies[c.body].node(c.x, c.y, c.z); };
   if (split_of_.empty()) split_of_.assign(lattice_node_count(bodies), -1);
-  std::vector<std::vector<Planes>> parts(cells.size());  // none where they are what they were
+  std::vector<Split> now(cells.size());
   cpu.for_each(
       static_cast<int>(cells.size()),
-      [&](int i) {
-        const Cell& c = cells[i];
-        Planes found[216];
-        const int count = find_components({bodies[c.body], c.x, c.y, c.z}, points, found);
-        const Split* before = split(node_of(c));
-        // Components only come apart, so the same number means the same components.
-        if (count == (before == nullptr ? 1 : static_cast<int>(before->field.size()))) return;
-        parts[i].assign(found, found + count);
-      },
-      32);
+      [&](int i) { now[i] = taken_apart(bodies[cells[i].body], cells[i]); }, 32);
   std::vector<Cell> apart;
   std::vector<std::int32_t> parent_of_new;  // the node that a new one was a part of
   const int node_count = static_cast<int>(nodes.size());
   for (std::size_t i = 0; i < cells.size(); ++i) {
-    if (parts[i].empty()) continue;
-    list_fields(node_of(cells[i]), parts[i], parent_of_new, node_count);
+    if (now[i].part.empty()) continue;
     apart.push_back(cells[i]);
+    for (std::int32_t& field : now[i].field) {
+      if (field >= 0) continue;
+      parent_of_new.push_back(~field);
+      field = node_count + static_cast<std::int32_t>(parent_of_new.size()) - 1;
+    }
+    std::int32_t& index = split_of_[node_of(cells[i])];
+    if (index < 0) {
+      index = static_cast<std::int32_t>(splits_.size());
+      splits_.emplace_back();
+    }
+    splits_[index] = std::move(now[i]);
   }
   nodes.resize(node_count + parent_of_new.size());
   for (std::size_t i = 0; i < parent_of_new.size(); ++i) {
@@ -195,9 +201,9 @@ std::vector<NodeFields::Cell> NodeFields::update(const std::vector<LatticeBody>&
       [&](int i) {
         const Cell& c = apart[i];
         const Split& s = *split(node_of(c));
-        const NodeBox box(bodies[c.body], c.x, c.y, c.z);
         for (std::size_t k = 0; k < s.part.size(); ++k) {
-          share_mass(bodies[c.body], points, box, s.part[k], s.field[k], nodes);
+          share_mass(bodies[c.body], points, c, mass_of_point_[node_of(c)], s.part[k], s.field[k],
+                     nodes);
         }
       },
       32);

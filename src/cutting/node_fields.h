@@ -20,6 +20,10 @@ namespace tissue_sim {
 
 class NodeFields {
  public:
+  struct Cell {
+    int body, x, y, z;
+  };
+
   /// Fills the nodes of all bodies: masses, anchors, at rest.
   NodeFields(const std::vector<LatticeBody>& bodies, const Points& points, Nodes& nodes);
 
@@ -32,8 +36,7 @@ class NodeFields {
     std::vector<Planes> part;         ///< of the points around the node: its components
     std::vector<std::int32_t> field;  ///< node of each component
 
-    /// The node that the point at a place of the box sees.
-    std::int32_t field_at(int place) const { return field_at(place / 36, place % 36); }
+    /// The node that the point at a place of the box sees: `in_plane` is bit_in_plane().
     std::int32_t field_at(int plane, int in_plane) const {
       std::size_t i = part.size() - 1;
       while (i > 0 && (part[i][plane] >> in_plane & 1) == 0) --i;
@@ -47,22 +50,23 @@ class NodeFields {
     if (split_of_.empty() || split_of_[lattice_node] < 0) return nullptr;
     return &splits_[split_of_[lattice_node]];
   }
+  const BondWindows& bonds() const { return bonds_; }
   std::size_t split_count() const { return splits_.size(); }
 
   /// Takes the nodes apart that the points `changed` (whose bonds broke) belong to; adds nodes with
   /// their parents' motion. Returns the cells whose node changed.
-  struct Cell {
-    int body, x, y, z;
-  };
   std::vector<Cell> update(const std::vector<LatticeBody>& bodies, const Points& points,
                            const std::vector<std::int32_t>& changed, Nodes& nodes, Cpu& cpu);
 
  private:
-  /// Gives the components of a node fields: the first one that was part of a field keeps it, others
-  /// get new nodes from `node_count` on.
-  void list_fields(int lattice_node, std::vector<Planes>& parts,
-                   std::vector<std::int32_t>& parent_of_new, int node_count);
+  /// How the node of a cell is split now, if otherwise than before, else nothing. The first
+  /// component that was part of a field keeps it; for others `field` is ~ their parent.
+  Split taken_apart(const LatticeBody& body, const Cell& cell) const;
 
+  BondWindows bonds_;
+  /// Per lattice node: the mass of each of its points where it is the same for all and none is
+  /// anchored, else 0 [kg].
+  std::vector<float> mass_of_point_;
   std::vector<Split> splits_;
   std::vector<std::int32_t> split_of_;  ///< per lattice node, -1 where whole; empty before any cut
 };

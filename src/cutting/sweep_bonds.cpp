@@ -9,8 +9,9 @@
 namespace tissue_sim {
 namespace {
 
-// A sweep looks at points within this many cells, and at blocks within twice as many, so that a
-// bond is seen as long as it is not stretched to three times its length.
+// A sweep looks at points within this many cells, so that a bond is seen as long as it is not
+// stretched to three times its length, and brings those within twice as many: few bonds of the
+// former end elsewhere.
 constexpr double kReach = 1.5;
 
 /// Whether a box comes near what an edge sweeps.
@@ -28,36 +29,20 @@ struct NearEdge {
   const SweptEdge* edge;
 };
 
-/// Lowers each lane's `distance` to that from what an edge sweeps, at least. `x` and `y` are its
-/// places at the beginning and the end, [3][lanes].
-void lower_distance(const SweptEdge& edge, const float* x, const float* y, std::size_t lanes,
-                    float* distance) {
-  struct {
-    float x, y, z, low, high;
-  } slabs[3];
-  for (int i = 0; i < 3; ++i) {
-    const Slab& s = edge.slabs[i];
-    slabs[i] = {float(s.axis[0]), float(s.axis[1]), float(s.axis[2]), float(s.low), float(s.high)};
-  }
-  for (std::size_t lane = 0; lane < lanes; ++lane) {
-    float farthest = 0;
-    for (const auto& s : slabs) {
-      const float a = s.x * x[lane] + s.y * x[lanes + lane] + s.z * x[2 * lanes + lane];
-      const float b = s.x * y[lane] + s.y * y[lanes + lane] + s.z * y[2 * lanes + lane];
-      const float below = s.low - (a > b ? a : b), above = (a > b ? b : a) - s.high;
-      farthest = below > farthest ? below : farthest;
-      farthest = above > farthest ? above : farthest;
-    }
-    distance[lane] = farthest < distance[lane] ? farthest : distance[lane];
-  }
-}
+/// What is known of where a point is: NearLane::outside, and whether it was brought and is near.
+constexpr unsigned kOutside = 0x3f, kBrought = 0x40, kNear = 0x80;
 
 /// Sweeps one path through one block at a time.
 class Sweep {
  public:
   Sweep(MpmState& state, const BladePath& path, const Array<float>* u_begin,
         const Array<float>* u_end)
-      : state_(state), parts_(sweep_parts(path)), u_begin_(u_begin), u_end_(u_end) {}
+      : state_(state),
+        parts_(sweep_parts(path)),
+        one_edge_(parts_.size() == 1 && parts_[0].edges.size() == 1),
+        u_begin_(u_begin),
+        u_end_(u_end),
+        known_(state.points.size(), 0) {}
 
   /// A block that is near edges of the path, and the lanes that are.
   struct Passed {
@@ -77,31 +62,40 @@ class Sweep {
     return result;
   }
 
-  /// Fills MpmState::places for a block's points and lists the lanes near the sweep.
-  void read_places(Passed& passed) const {
+  /// Fills MpmState::places and `known` for a block's points near the sweep and lists the lanes of
+  /// those that are nearest.
+  void read_places(Passed& passed) {
     const Block& block = *passed.block;
     BlockScratch& scratch = state_.scratch.local();
     const std::size_t lanes = block.lane_count();
-    if (scratch.values.size() < 7 * lanes) scratch.values.resize(7 * lanes);
-    float *end = scratch.values.data(), *begin = moves() ? end + 3 * lanes : end,
-          *distance = end + 6 * lanes;
+    if (scratch.values.size() < 6 * lanes) scratch.values.resize(6 * lanes);
+    if (scratch.near.size() < lanes) scratch.near.resize(lanes);
+    float *end = scratch.values.data(), *begin = moves() ? end + 3 * lanes : end;
     const BlockField field = block_field(state_, block);
     state_.kernels->positions(block, field, u_end_, scratch, end);
     if (moves()) state_.kernels->positions(block, field, u_begin_, scratch, begin);
-    std::fill_n(distance, lanes, 1e30f);
-    for (const NearEdge& near : passed.edges) {
-      lower_distance(*near.edge, begin, end, lanes, distance);
-    }
-    const float reach = static_cast<float>(kReach * state_.scene.cell_size);
+    const auto reach = static_cast<float>(kReach * state_.scene.cell_size);
     float *at_begin = state_.places[0].data(), *at_end = state_.places[1].data();
-    for (std::size_t lane = 0; lane < lanes; ++lane) {
-      const std::int32_t p = block.point[lane];
-      if (p < 0) continue;
-      for (int a = 0; a < 3; ++a) at_end[3 * std::size_t(p) + a] = end[a * lanes + lane];
-      for (int a = 0; moves() && a < 3; ++a) {
-        at_begin[3 * std::size_t(p) + a] = begin[a * lanes + lane];
+    for (const NearEdge& edge : passed.edges) {
+      LaneSlab slabs[3];
+      for (int i = 0; i < 3; ++i) {
+        const Slab& s = edge.edge->slabs[i];
+        slabs[i] = {
+            {float(s.axis[0]), float(s.axis[1]), float(s.axis[2])}, float(s.low), float(s.high)};
       }
-      if (distance[lane] <= reach) passed.lanes.push_back(static_cast<std::int32_t>(lane));
+      const int count = state_.kernels->lanes_near(slabs, {2 * reach, reach, 0.01f * reach}, begin,
+                                                   end, lanes, scratch.near.data());
+      for (int i = 0; i < count; ++i) {
+        const NearLane& near = scratch.near[i];
+        const std::int32_t p = block.point[near.lane];
+        if (p < 0) continue;
+        for (int a = 0; a < 3; ++a) {
+          at_end[3 * std::size_t(p) + a] = end[a * lanes + near.lane];
+          if (moves()) at_begin[3 * std::size_t(p) + a] = begin[a * lanes + near.lane];
+        }
+        if (near.near && (known_[p] & kNear) == 0) passed.lanes.push_back(near.lane);
+        known_[p] |= kBrought | (near.near ? kNear : 0) | (one_edge_ ? near.outside : 0);
+      }
     }
   }
 
@@ -117,15 +111,17 @@ class Sweep {
     std::vector<Broken> broken;
     const Block& block = *passed.block;
     const LatticeBody& body = state_.bodies[block.body];
+    const std::ptrdiff_t step[] = {1, 2 * body.nx, std::ptrdiff_t{4} * body.nx * body.ny};
     for (const std::int32_t lane : passed.lanes) {
       const std::int32_t p = block.point[lane];
       const Points::Site& s = state_.points.site[p];
-      const Vec3 p0 = place(0, p), p1 = place(1, p);
+      const std::int32_t* site = &body.point_at[s.z * step[2] + s.y * step[1] + s.x];
       for (int axis = 0; axis < 3; ++axis) {
         if ((state_.points.bonds[p] >> (kForwardBond + axis) & 1) == 0) continue;
-        const std::int32_t q = body.next_point(s, axis);
+        const std::int32_t q = site[step[axis]];
+        if ((known_[p] & known_[q] & kOutside) != 0) continue;
         Meeting meeting;
-        if (passes(passed.edges, {p0, place(0, q), p1, place(1, q)}, meeting)) {
+        if (passes(passed.edges, {place(0, p), place(0, q), place(1, p), place(1, q)}, meeting)) {
           broken.push_back(broken_bond(block, lane, axis, meeting));
         }
       }
@@ -138,19 +134,32 @@ class Sweep {
   /// Of a point at the beginning (0) or the end (1). Both ends of a bond must agree to the last bit
   /// on where a point is, or a cut exactly through it might miss the bonds on both sides.
   Vec3 place(int when, std::int32_t p) const {
+    if ((known_[p] & kBrought) == 0) return far_place(when == 0 ? u_begin_ : u_end_, p);
     const float* at = &state_.places[moves() ? when : 1][3 * std::size_t(p)];
     return {at[0], at[1], at[2]};
   }
+  /// Of a point that was not brought: nothing passes it.
+  Vec3 far_place(const Array<float>* u, std::int32_t p) const {
+    const Points::Site& s = state_.points.site[p];
+    const LatticeBody& body = state_.bodies[s.body];
+    Vec3 x = body.site_position(s.x, s.y, s.z);
+    for (int k = 0; k < 27; ++k) {
+      const int node = state_.fields->node(body, s, k);
+      x += site_weight(s, k) * Vec3(u[0][node], u[1][node], u[2][node]);
+    }
+    return x;
+  }
 
   /// Whether an edge passes a bond, and where the first one does.
-  static bool passes(const std::vector<NearEdge>& edges, const MovingSegment& bond,
-                     Meeting& meeting) {
+  bool passes(const std::vector<NearEdge>& edges, const MovingSegment& bond,
+              Meeting& meeting) const {
     const Vec3 a = bond.a1 - bond.a0, b = bond.b1 - bond.b0;
     return std::any_of(edges.begin(), edges.end(), [&](const NearEdge& near) {
       const double begin = near.part->begin, end = near.part->end;
       const MovingSegment then{bond.a0 + begin * a, bond.b0 + begin * b, bond.a0 + end * a,
                                bond.b0 + end * b};
-      return !stays_aside(*near.edge, then) && edge_passes(*near.edge, then, &meeting);
+      return (one_edge_ || !stays_aside(*near.edge, then)) &&
+             edge_passes(*near.edge, then, &meeting);
     });
   }
 
@@ -175,7 +184,9 @@ class Sweep {
 
   MpmState& state_;
   const std::vector<SweepPart> parts_;
+  const bool one_edge_;  // then NearLane::outside says what stays aside
   const Array<float>*u_begin_, *u_end_;
+  std::vector<std::uint8_t> known_;  // of each point: kOutside, kBrought, kNear
 };
 
 }  // namespace
@@ -183,7 +194,7 @@ class Sweep {
 void sweep_bonds(MpmState& state, const BladePath& path, const Array<float>* u_begin,
                  const Array<float>* u_end, const std::vector<BlockMotion>& before,
                  std::vector<std::int32_t>& changed, CutReport& report) {
-  const Sweep sweep(state, path, u_begin, u_end);
+  Sweep sweep(state, path, u_begin, u_end);
   std::vector<Sweep::Passed> passed;
   for (std::size_t i = 0; i < state.blocks.all.size(); ++i) {
     const Box& now = state.motion[i].box;

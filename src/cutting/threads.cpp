@@ -3,47 +3,78 @@
 #include <algorithm>
 
 #include "cutting/bonds.h"
-#include "cutting/crack.h"
 #include "mpm/deformation.h"
 
 namespace tissue_sim {
 namespace {
 
-bool has(std::uint8_t bonds, int k) { return (bonds >> k & 1) != 0; }
+bool has(unsigned bonds, int k) { return (bonds >> k & 1) != 0; }
 
-/// Whether bond `k` of a point is there and in no square of four bonds.
-bool is_thread(const LatticeBody& body, const Points& points, std::int32_t point, int k) {
-  if (!has(points.bonds[point], k)) return false;
-  const std::int32_t other = neighbour(body, points.site[point], k);
-  for (int side = 0; side < kBondCount; ++side) {
-    if (side == k || side == opposite_bond(k)) continue;
-    if (!has(points.bonds[point], side) || !has(points.bonds[other], side)) continue;
-    if (has(points.bonds[neighbour(body, points.site[point], side)], k)) return false;
-  }
-  return true;
-}
+/// The bonds of a point and of those that it holds on to.
+struct BondsAround {
+  unsigned own;
+  unsigned of[kBondCount] = {};    ///< of the neighbour over each bond, none where that is gone
+  std::int32_t point[kBondCount];  ///< that neighbour
 
-bool ends_thread(const LatticeBody& body, const Points& points, std::int32_t point) {
-  for (int k = 0; k < kBondCount; ++k) {
-    if (is_thread(body, points, point, k)) return true;
+  BondsAround(const LatticeBody& body, const Points& points, std::int32_t p)
+      : own(points.bonds[p]) {
+    const Points::Site& s = points.site[p];
+    const std::ptrdiff_t step[] = {1, 2 * body.nx, std::ptrdiff_t{4} * body.nx * body.ny};
+    const std::int32_t* at = &body.point_at[s.z * step[2] + s.y * step[1] + s.x];
+    for (int k = 0; k < kBondCount; ++k) {
+      if (!has(own, k)) continue;
+      point[k] = k < kForwardBond ? at[-step[2 - k]] : at[step[k - kForwardBond]];
+      of[k] = points.bonds[point[k]];
+    }
   }
-  return false;
-}
+  /// Whether bond `k` is there and in no square of four bonds.
+  bool is_thread(int k) const {
+    if (!has(own, k)) return false;
+    const unsigned sides = own & of[k] & ~(1u << k | 1u << opposite_bond(k));
+    for (int side = 0; side < kBondCount; ++side) {
+      if (has(sides, side) && has(of[side], k)) return false;
+    }
+    return true;
+  }
+  /// Whether any of the bonds is a thread.
+  bool end_thread() const {
+    for (int k = 0; k < kBondCount; ++k) {
+      if (is_thread(k)) return true;
+    }
+    return false;
+  }
+};
 
 }  // namespace
 
 void list_threads(MpmState& state, const std::vector<std::int32_t>& changed) {
-  std::vector<std::int32_t>& threads = state.threads;
-  const auto add = [&](std::int32_t point) {
-    const LatticeBody& body = state.bodies[state.points.site[point].body];
-    if (ends_thread(body, state.points, point)) threads.push_back(point);
+  const Points& points = state.points;
+  const int count = static_cast<int>(changed.size());
+  // Of each point: bit k for its neighbour over that bond (a square may have lost its far side),
+  // the last for itself.
+  std::vector<std::uint8_t> ends(count);
+  const auto neighbours = [&](int i) {
+    const std::int32_t p = changed[i];
+    return BondsAround(state.bodies[points.site[p].body], points, p);
   };
-  for (const std::int32_t p : changed) {
-    add(p);
-    // A square may have lost its far side.
-    const LatticeBody& body = state.bodies[state.points.site[p].body];
-    for (int k = 0; k < kBondCount; ++k) {
-      if (has(state.points.bonds[p], k)) add(neighbour(body, state.points.site[p], k));
+  state.cpu->for_each(
+      count,
+      [&](int i) {
+        const BondsAround around = neighbours(i);
+        unsigned found = around.end_thread() ? 1u << kBondCount : 0;
+        for (int k = 0; k < kBondCount; ++k) {
+          if (!has(around.own, k)) continue;
+          const LatticeBody& body = state.bodies[points.site[changed[i]].body];
+          if (BondsAround(body, points, around.point[k]).end_thread()) found |= 1u << k;
+        }
+        ends[i] = static_cast<std::uint8_t>(found);
+      },
+      128);
+  std::vector<std::int32_t>& threads = state.threads;
+  for (int i = 0; i < count; ++i) {
+    if (has(ends[i], kBondCount)) threads.push_back(changed[i]);
+    for (unsigned k = ends[i] & kAllBonds; k != 0; k &= k - 1) {
+      threads.push_back(neighbours(i).point[__builtin_ctz(k)]);
     }
   }
   std::sort(threads.begin(), threads.end());
@@ -56,15 +87,16 @@ void tear_threads(MpmState& state, std::vector<std::int32_t>& changed, CutReport
   std::vector<std::int32_t> left;
   for (const std::int32_t p : state.threads) {
     const LatticeBody& body = state.bodies[points.site[p].body];
-    if (!ends_thread(body, points, p)) continue;
+    if (!BondsAround(body, points, p).end_thread()) continue;
     const Deformation d(body, points.site[p], *state.fields, state.nodes);
     if (d.stretch < kThreadStretch || d.stiffening < kThreadStiffening) {
       left.push_back(p);
       continue;
     }
     for (int k = 0; k < kBondCount; ++k) {
-      if (!is_thread(body, points, p, k)) continue;
-      const std::int32_t other = neighbour(body, points.site[p], k);
+      const BondsAround around(body, points, p);  // as those before left it
+      if (!around.is_thread(k)) continue;
+      const std::int32_t other = around.point[k];
       break_bond(k, points.bonds[p], points.bonds[other]);
       changed.push_back(p);
       changed.push_back(other);

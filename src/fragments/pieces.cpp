@@ -73,7 +73,13 @@ std::vector<int> components(const std::vector<LatticeBody>& bodies, const Points
 }
 
 double volume_of(const Points& points, const Run& run) {
-  return std::accumulate(points.volume.begin() + run.begin, points.volume.begin() + run.end, 0.0);
+  double sum[4] = {};  // side by side: each waits for what it was
+  std::int32_t p = run.begin;
+  for (; p + 4 <= run.end; p += 4) {
+    for (int i = 0; i < 4; ++i) sum[i] += points.volume[p + i];
+  }
+  for (; p < run.end; ++p) sum[0] += points.volume[p];
+  return sum[0] + sum[1] + (sum[2] + sum[3]);
 }
 
 /// Loose is what came off something, or lies in a body that is held elsewhere, and is not held
@@ -114,7 +120,7 @@ Pieces whole_pieces(const std::vector<LatticeBody>& bodies, const Points& points
 }
 
 bool may_have_parted(const std::vector<LatticeBody>& bodies, const Points& points,
-                     const std::vector<std::int32_t>& changed) {
+                     const BondWindows& bonds, const std::vector<std::int32_t>& changed) {
   Planes components[216];
   int count = 0;
   Points::Site of{-1, -1, -1, -1};  // the cell that they are around
@@ -124,10 +130,10 @@ bool may_have_parted(const std::vector<LatticeBody>& bodies, const Points& point
     if (s.x / 2 != of.x || s.y / 2 != of.y || s.z / 2 != of.z || s.body != of.body) {
       of = {static_cast<std::int16_t>(s.x / 2), static_cast<std::int16_t>(s.y / 2),
             static_cast<std::int16_t>(s.z / 2), s.body};
-      count = find_components(NodeBox(body, of.x, of.y, of.z), points, components);
+      count = bonds.find_components(of.body, of.x, of.y, of.z, components);
     }
     const auto component_of = [&](int x, int y, int z) {
-      const int plane = z - 2 * of.z + 2, bit = 6 * (y - 2 * of.y + 2) + x - 2 * of.x + 2;
+      const int plane = z - 2 * of.z + 2, bit = bit_in_plane(x - 2 * of.x + 2, y - 2 * of.y + 2);
       int i = 0;
       while (i < count && (components[i][plane] >> bit & 1) == 0) ++i;
       return i;

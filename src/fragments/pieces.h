@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "cutting/node_box.h"
 #include "mpm/lattice_body.h"
 #include "tissue_sim/fragments.h"
 
@@ -22,7 +23,7 @@ Pieces whole_pieces(const std::vector<LatticeBody>& bodies, const Points& points
 /// Whether pieces may have come apart as the points `changed` lost bonds: false if near each of
 /// them other bonds still hold it together with the neighbours that it lost.
 bool may_have_parted(const std::vector<LatticeBody>& bodies, const Points& points,
-                     const std::vector<std::int32_t>& changed);
+                     const BondWindows& bonds, const std::vector<std::int32_t>& changed);
 
 /// Labels the points anew after bonds broke (union-find over runs of points along x). Returns the
 /// new ids.

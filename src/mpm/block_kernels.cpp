@@ -4,6 +4,7 @@
 
 #include "mpm/block_forces.h"
 #include "mpm/block_readings.h"
+#include "mpm/lane_lists.h"
 
 namespace tissue_sim {
 namespace {
@@ -62,6 +63,11 @@ TISSUE_SIM_INLINE void update_row(const NodeRow& row, const RowPart* parts, cons
                                    const float* max, std::int32_t* lanes) {                       \
     return lanes_in_box<W>(x, count, min, max, lanes);                                            \
   }                                                                                               \
+  target int lanes_near_##suffix(const LaneSlab(&slabs)[3], const LaneReach& reach,               \
+                                 const float* x, const float* y, std::size_t count,               \
+                                 NearLane* near) {                                                \
+    return lanes_near<W>(slabs, reach, x, y, count, near);                                        \
+  }                                                                                               \
   target void update_row_##suffix(const NodeRow& row, const RowPart* parts, const float* force,   \
                                   const UpdateNode& update, BlockScratch& s) {                    \
     update_row<W>(row, parts, force, update, s);                                                  \
@@ -88,15 +94,15 @@ TISSUE_SIM_KERNELS(avx512, 16, TISSUE_SIM_TARGET_AVX512)
 
 const BlockKernels& block_kernels(InstructionSet set) {
   static constexpr BlockKernels sse2 = {forces_sse2,       positions_sse2,  bounds_sse2,
-                                        lanes_in_box_sse2, update_row_sse2, state_sse2,
-                                        stiffness_sse2,    stretched_sse2};
+                                        lanes_in_box_sse2, lanes_near_sse2, update_row_sse2,
+                                        state_sse2,        stiffness_sse2,  stretched_sse2};
 #if defined(__x86_64__)
   static constexpr BlockKernels avx2 = {forces_avx2,       positions_avx2,  bounds_avx2,
-                                        lanes_in_box_avx2, update_row_avx2, state_avx2,
-                                        stiffness_avx2,    stretched_avx2};
+                                        lanes_in_box_avx2, lanes_near_avx2, update_row_avx2,
+                                        state_avx2,        stiffness_avx2,  stretched_avx2};
   static constexpr BlockKernels avx512 = {forces_avx512,       positions_avx512,  bounds_avx512,
-                                          lanes_in_box_avx512, update_row_avx512, state_avx512,
-                                          stiffness_avx512,    stretched_avx512};
+                                          lanes_in_box_avx512, lanes_near_avx512, update_row_avx512,
+                                          state_avx512,        stiffness_avx512,  stretched_avx512};
   if (set == InstructionSet::kAvx512) return avx512;
   if (set == InstructionSet::kAvx2) return avx2;
 #endif

@@ -35,10 +35,26 @@ inline BlockField at_rest(BlockField f) {
   return f;
 }
 
+/// What lies between two planes across an axis: `low` to `high` of axis . x [m].
+struct LaneSlab {
+  float axis[3], low, high;
+};
+/// How far away lanes are listed, count as near, and are surely outside [m].
+struct LaneReach {
+  float listed, near, outside;
+};
+/// A lane near three slabs.
+struct NearLane {
+  std::int32_t lane;
+  std::uint8_t outside;  ///< bits 2 i and 2 i + 1: surely below, above slab i, all the time
+  bool near;             ///< to all of them at some time
+};
+
 /// Working memory of one thread; grows to the largest block and is used again.
 struct BlockScratch {
   Array<float> nodes, velocities, in, in_rate, out, row, values;
   Array<std::int32_t> lanes;
+  std::vector<NearLane> near;
 };
 
 /// Where a block's points are [m], and how fast the fastest moves [m/s].
@@ -70,6 +86,10 @@ struct BlockKernels {
   /// Lanes of `positions` that lie within a box, in order, into `lanes`; returns their number.
   int (*lanes_in_box)(const float* positions, std::size_t lane_count, const float* min,
                       const float* max, std::int32_t* lanes);
+  /// Lists the lanes that come near all of three slabs while they move from `begin` to `end`, both
+  /// as `positions`; returns their number.
+  int (*lanes_near)(const LaneSlab (&slabs)[3], const LaneReach&, const float* begin,
+                    const float* end, std::size_t lane_count, NearLane* near);
   /// Sums the parts of a row's force and moves its nodes on.
   void (*update_row)(const NodeRow&, const RowPart* parts, const float* force, const UpdateNode&,
                      BlockScratch&);

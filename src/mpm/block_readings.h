@@ -76,14 +76,19 @@ TISSUE_SIM_INLINE PointBounds bounds(const Block& b, const BlockField& f, BlockS
   const float *x = scratch.values.data(), *volume = b.volume.data();
   PointBounds result;
   positions<kWidth>(b, f, f.nodes->u, scratch, scratch.values.data());
+  Vec<W> min[3], max[3];  // side by side: each waits for what it was
   for (int a = 0; a < 3; ++a) {
-    Vec<W> min = Vec<W>{} + result.min[a], max = Vec<W>{} + result.max[a];
-    for (std::size_t j = 0; j < lanes; j += W) {
-      widen<W>(load<W>(volume + j) > 0.0f, load<W>(x + a * lanes + j), min, max);
-    }
+    min[a] = Vec<W>{} + result.min[a];
+    max[a] = Vec<W>{} + result.max[a];
+  }
+  for (std::size_t j = 0; j < lanes; j += W) {
+    const Mask<W> inside = load<W>(volume + j) > 0.0f;
+    for (int a = 0; a < 3; ++a) widen<W>(inside, load<W>(x + a * lanes + j), min[a], max[a]);
+  }
+  for (int a = 0; a < 3; ++a) {
     for (int i = 0; i < W; ++i) {
-      result.min[a] = std::min(result.min[a], min[i]);
-      result.max[a] = std::max(result.max[a], max[i]);
+      result.min[a] = std::min(result.min[a], min[a][i]);
+      result.max[a] = std::max(result.max[a], max[a][i]);
     }
   }
   positions<kWidth>(b, at_rest(f), f.nodes->v, scratch, scratch.values.data());
@@ -274,24 +279,6 @@ TISSUE_SIM_INLINE void stretched(const Block& b, const BlockField& f, float stre
           }
         }
       });
-}
-
-template <int W>
-TISSUE_SIM_INLINE int lanes_in_box(const float* x, std::size_t count, const float* min,
-                                   const float* max, std::int32_t* lanes) {
-  int found = 0;
-  for (std::size_t j = 0; j < count; j += W) {
-    Mask<W> outside = {};
-    for (int a = 0; a < 3; ++a) {
-      const Vec<W> v = load<W>(x + a * count + j);
-      outside |= bits<W>(v - min[a]) | bits<W>(max[a] - v);
-    }
-    if (!any_negative<W>(~outside)) continue;
-    for (int i = 0; i < W; ++i) {
-      if (outside[i] >= 0) lanes[found++] = static_cast<std::int32_t>(j) + i;
-    }
-  }
-  return found;
 }
 
 }  // namespace kernels

@@ -78,6 +78,7 @@ std::vector<Sheet> sheets_of(const BlockRegion& r, const LatticeBody& b, const P
           return whole_part.add(shares.seen(r));
         })) {
       Sheet& sheet = sheet_for(whole_part.seen, 0, shares.node_count(), sheets);
+      sheet.cells.reserve(sheet.cells.size() + part.size());
       for (const RegionShares::Reached& r : part) sheet.cells.push_back(shares[r.share]);
       continue;
     }

@@ -1,6 +1,7 @@
 #include "mpm/blocks.h"
 
 #include <algorithm>
+#include <numeric>
 
 #include "contact/known_facets.h"
 #include "mpm/fill_region.h"
@@ -49,11 +50,17 @@ void connect_forces(Blocks& blocks, const std::vector<LatticeBody>& bodies, int 
   blocks.first_split_node = lattice_node_count(bodies);
   if (!blocks.has_rows) return;
   struct Entry {
-    int row_node;  // first node of the lattice row
+    int row;  // of lattice nodes, counted through all bodies
     RowPart part;
   };
   std::vector<Entry> entries;
   std::vector<std::pair<int, SplitNodePart>> split;
+  std::vector<int> first_row;  // of each body
+  int row_count = 0;
+  for (const LatticeBody& b : bodies) {
+    first_row.push_back(row_count);
+    row_count += b.node_count() / b.pitch_y;
+  }
   for (const Block* block : blocks.all) {
     const LatticeBody& b = bodies[block->body];
     const std::size_t component = block->node_count();
@@ -61,7 +68,8 @@ void connect_forces(Blocks& blocks, const std::vector<LatticeBody>& bodies, int 
     for (int z = 0; z < block->nz + 2; ++z) {
       for (int y = 0; y < block->ny + 2; ++y) {
         const int local = z * block->plane + y * block->pitch;
-        const int row = b.node(-1, block->y + y - 1, block->z + z - 1);
+        const int row_node = b.node(-1, block->y + y - 1, block->z + z - 1);
+        const int row = first_row[block->body] + (row_node - b.first_node) / b.pitch_y;
         // A row without the nodes that this block sees split: parts between them.
         const Block::Span seen = block->node_rows[y];
         int begin = seen.begin;
@@ -84,36 +92,59 @@ void connect_forces(Blocks& blocks, const std::vector<LatticeBody>& bodies, int 
       }
     }
   }
-  std::stable_sort(entries.begin(), entries.end(),
-                   [](const Entry& a, const Entry& b) { return a.row_node < b.row_node; });
+  // Those of a row one after the other, in the order of the blocks.
+  std::vector<int> end_of(row_count + 1, 0);  // first, then end of each row's
+  for (const Entry& e : entries) ++end_of[e.row + 1];
+  std::partial_sum(end_of.begin(), end_of.end(), end_of.begin());
+  blocks.row_parts.resize(entries.size());
+  for (const Entry& e : entries) blocks.row_parts[end_of[e.row]++] = e.part;
   blocks.rows.clear();
-  blocks.row_parts.clear();
-  for (std::size_t i = 0; i < entries.size();) {
-    std::size_t end = i;
-    int lo = 1 << 30, hi = 0;
-    for (; end < entries.size() && entries[end].row_node == entries[i].row_node; ++end) {
-      lo = std::min(lo, entries[end].part.begin);
-      hi = std::max(hi, entries[end].part.begin + entries[end].part.count);
-    }
-    blocks.rows.push_back({entries[i].row_node + lo, hi - lo,
-                           static_cast<int>(blocks.row_parts.size()), static_cast<int>(end - i)});
-    for (; i < end; ++i) {
-      blocks.row_parts.push_back(entries[i].part);
-      blocks.row_parts.back().begin -= lo;
+  int row = 0, begin = 0;
+  for (const LatticeBody& b : bodies) {
+    for (int node = b.first_node; node < b.first_node + b.node_count(); node += b.pitch_y, ++row) {
+      const int end = end_of[row];
+      int lo = 1 << 30, hi = 0;
+      for (int i = begin; i < end; ++i) {
+        const RowPart& part = blocks.row_parts[i];
+        lo = std::min(lo, part.begin);
+        hi = std::max(hi, part.begin + part.count);
+      }
+      for (int i = begin; i < end; ++i) blocks.row_parts[i].begin -= lo;
+      if (end > begin) blocks.rows.push_back({node + lo, hi - lo, begin, end - begin});
+      begin = end;
     }
   }
-  std::stable_sort(split.begin(), split.end(),
-                   [](const auto& a, const auto& b) { return a.first < b.first; });
-  blocks.split_node_parts.assign(node_count - blocks.first_split_node + 1, 0);
-  blocks.split_parts.clear();
+  // Parts of each node in the order of the blocks.
+  std::vector<int>& first = blocks.split_node_parts;
+  first.assign(node_count - blocks.first_split_node + 1, 0);
+  for (const auto& [node, part] : split) ++first[node - blocks.first_split_node + 1];
+  std::partial_sum(first.begin(), first.end(), first.begin());
+  std::vector<int> next(first.begin(), first.end() - 1);
+  blocks.split_parts.resize(split.size());
   for (const auto& [node, part] : split) {
-    if (node < blocks.first_split_node) continue;
-    ++blocks.split_node_parts[node - blocks.first_split_node + 1];
+    blocks.split_parts[next[node - blocks.first_split_node]++] = part;
   }
-  for (std::size_t i = 1; i < blocks.split_node_parts.size(); ++i) {
-    blocks.split_node_parts[i] += blocks.split_node_parts[i - 1];
+}
+
+/// Makes the blocks of some regions anew, then block by block their facets.
+void fill_regions(Blocks& blocks, const std::vector<int>& some,
+                  const std::vector<LatticeBody>& bodies, const Points& points,
+                  const NodeFields& fields, Cpu& cpu) {
+  const int count = static_cast<int>(some.size());
+  std::vector<KnownFacets> known(count);
+  cpu.for_each(count, [&](int i) {
+    BlockRegion& r = blocks.regions[some[i]];
+    if (!r.blocks.empty()) known[i] = {bodies[r.body], r, blocks.stale_facets};
+    fill_region(r, bodies, points, fields, blocks.one_material);
+  });
+  std::vector<std::pair<Block*, const KnownFacets*>> made;
+  for (int i = 0; i < count; ++i) {
+    for (Block& b : blocks.regions[some[i]].blocks) made.emplace_back(&b, &known[i]);
   }
-  for (const auto& entry : split) blocks.split_parts.push_back(entry.second);
+  cpu.for_each(static_cast<int>(made.size()), [&](int i) {
+    Block& b = *made[i].first;
+    b.facets = facets_of(bodies[b.body], points, b, *made[i].second);
+  });
 }
 
 }  // namespace
@@ -134,9 +165,9 @@ Blocks make_blocks(const std::vector<LatticeBody>& bodies, const Points& points,
       }
     }
   }
-  cpu.for_each(static_cast<int>(blocks.regions.size()), [&](int i) {
-    fill_region(blocks.regions[i], bodies, points, fields, shape.one_material, {});
-  });
+  std::vector<int> all(blocks.regions.size());
+  std::iota(all.begin(), all.end(), 0);
+  fill_regions(blocks, all, bodies, points, fields, cpu);
   connect_forces(blocks, bodies, lattice_node_count(bodies));
   return blocks;
 }
@@ -155,19 +186,22 @@ void update_blocks(Blocks& blocks, const std::vector<LatticeBody>& bodies, const
     const int first = before.empty() ? 0 : before.back().end;
     before.push_back({first, first + static_cast<int>(r.blocks.size())});
   }
+  std::vector<int> anew;
+  for (std::size_t i = 0; i < blocks.regions.size(); ++i) {
+    if (touched(blocks.regions[i])) anew.push_back(static_cast<int>(i));
+  }
+  fill_regions(blocks, anew, bodies, points, fields, cpu);
   std::vector<std::uint8_t> is_new(blocks.regions.size(), 0);
-  cpu.for_each(static_cast<int>(blocks.regions.size()), [&](int i) {
-    BlockRegion& r = blocks.regions[i];
-    if (!touched(r)) return;
+  for (const int i : anew) {
     is_new[i] = 1;
+    const BlockRegion& r = blocks.regions[i];
     const LatticeBody& b = bodies[r.body];
-    fill_region(r, bodies, points, fields, blocks.one_material, {b, r, blocks.stale_facets});
     for (int z = r.z; z < r.z + r.nz; ++z) {
       for (int y = r.y; y < r.y + r.ny; ++y) {
         std::fill_n(blocks.stale_facets.begin() + b.node(r.x, y, z), r.nx, std::uint8_t{0});
       }
     }
-  });
+  }
   blocks.origin.clear();
   for (std::size_t i = 0; i < blocks.regions.size(); ++i) {
     for (int b = 0; b < static_cast<int>(blocks.regions[i].blocks.size()); ++b) {

@@ -118,13 +118,11 @@ std::vector<Sheet> by_material(const Sheet& sheet, const LatticeBody& b, const P
 }  // namespace
 
 void fill_region(BlockRegion& r, const std::vector<LatticeBody>& bodies, const Points& points,
-                 const NodeFields& fields, bool one_material, const KnownFacets& known) {
+                 const NodeFields& fields, bool one_material) {
   r.blocks.clear();
   const LatticeBody& b = bodies[r.body];
   const auto add = [&](const Sheet& sheet) {
-    if (sheet.cells.empty()) return;
-    r.blocks.push_back(make_block(r, b, points, sheet));
-    r.blocks.back().facets = facets_of(b, points, r.blocks.back(), known);
+    if (!sheet.cells.empty()) r.blocks.push_back(make_block(r, b, points, sheet));
   };
   for (const Sheet& sheet : sheets_of(r, b, points, fields)) {
     if (!one_material || b.materials.size() == 1) {

@@ -51,11 +51,13 @@ void MpmTissue::cut(const std::vector<BladePath>& paths, const Array<float>* u_b
   }
   if (changed.empty()) return;
   measured_ = false;
-  take_apart(*state_, changed);
-  if (!may_have_parted(state_->bodies, state_->points, changed)) return;
-  for (const int id : update_pieces(state_->bodies, state_->points, pieces_)) {
-    report.new_fragments.push_back(id);
-  }
+  const MpmState& s = *state_;
+  take_apart(*state_, changed, [&] {
+    if (!may_have_parted(s.bodies, s.points, s.fields->bonds(), changed)) return;
+    for (const int id : update_pieces(s.bodies, s.points, pieces_)) {
+      report.new_fragments.push_back(id);
+    }
+  });
 }
 
 MpmTissue::Frame MpmTissue::begin(double duration, const FrameInput& input) {

@@ -18,7 +18,7 @@ constexpr unsigned leaving(int s) {
 
 RegionShares::RegionShares(const BlockRegion& r, const LatticeBody& b, const Points& points,
                            const NodeFields& fields)
-    : r_(r), points_(points) {
+    : r_(r), points_(points), step_{-r.nx * r.ny, -r.nx, -1, 1, r.nx, r.nx * r.ny} {
   const int px = r.nx + 2, py = r.ny + 2, pz = r.nz + 2;
   split_.resize(static_cast<std::size_t>(px) * py * pz);
   std::size_t n = 0;
@@ -34,6 +34,12 @@ RegionShares::RegionShares(const BlockRegion& r, const LatticeBody& b, const Poi
   split_in_row_.assign(n, 0);
   for (std::size_t i = 0; any_split_ && i + 2 < n; ++i) {
     split_in_row_[i] = split_[i] != nullptr || split_[i + 1] != nullptr || split_[i + 2] != nullptr;
+  }
+  near_split_ = split_in_row_;
+  for (const int step : {px, px * py}) {
+    for (std::size_t i = 0; any_split_ && i + 2 * step < n; ++i) {
+      near_split_[i] |= near_split_[i + step] | near_split_[i + 2 * step];
+    }
   }
   cells_.resize(static_cast<std::size_t>(r.nx) * r.ny * r.nz);
   all_.reserve(cells_.size());
@@ -58,6 +64,8 @@ RegionShares::RegionShares(const BlockRegion& r, const LatticeBody& b, const Poi
 
 AllSeen RegionShares::seen(const Reached& r) const {
   const CellShare& c = all_[r.share];
+  AllSeen none;  // not {}, which would clear all of it
+  if (near_split_[node_at(c.x, c.y, c.z)] == 0) return none;
   int s = 0;
   while (c.point[s] < 0) ++s;
   return seen(c.x, c.y, c.z, s, r.bond);
@@ -65,7 +73,9 @@ AllSeen RegionShares::seen(const Reached& r) const {
 
 std::vector<RegionShares::Reached> RegionShares::connected(
     std::int32_t start, std::vector<std::uint8_t>& reached) const {
-  std::vector<Reached> order{{start, kNoBond}};
+  std::vector<Reached> order;
+  order.reserve(count());
+  order.push_back({start, kNoBond});
   reached[start] = 1;
   const auto reach = [&](std::int32_t share, int bond) {
     if (reached[share] != 0) return;
@@ -74,11 +84,12 @@ std::vector<RegionShares::Reached> RegionShares::connected(
   };
   for (std::size_t next = 0; next < order.size(); ++next) {
     const CellShare& c = all_[order[next].share];
-    const Cell* around[kBondCount];
-    if (has_even_faces(c, around)) {
+    const Cell& cell = cells_[(c.z * r_.ny + c.y) * r_.nx + c.x];
+    if (has_even_faces(cell)) {
       // In the order of the points' bonds.
-      for (const int k : {0, 1, 2, 3, 4, 5}) {
-        if (around[k] != nullptr) reach(around[k]->first, k);
+      for (unsigned faces = cell.faces; faces != 0; faces &= faces - 1) {
+        const int k = __builtin_ctz(faces);
+        reach((&cell)[step_[k]].first, k);
       }
       continue;
     }
@@ -100,7 +111,8 @@ std::vector<RegionShares::Reached> RegionShares::connected(
   return order;
 }
 
-RegionShares::Cell RegionShares::cell_of(const Points& points, const std::int32_t (&point)[8]) {
+RegionShares::Cell RegionShares::cell_of(int x, int y, int z,
+                                         const std::int32_t (&point)[8]) const {
   Cell cell;
   unsigned held = 0, missing = 0;
   for (int s = 0; s < 8; ++s) {
@@ -109,17 +121,20 @@ RegionShares::Cell RegionShares::cell_of(const Points& points, const std::int32_
       cell.faces = Cell::kUneven;
       return cell;
     }
-    const unsigned bonds = points.bonds[point[s]];
+    const unsigned bonds = points_.bonds[point[s]];
     held |= bonds & leaving(s);
     missing |= ~bonds & leaving(s);
     cell.whole = cell.whole && (bonds | leaving(s)) == kAllBonds;
   }
+  const bool within[kBondCount] = {z > 0,         y > 0,         x > 0,
+                                   x + 1 < r_.nx, y + 1 < r_.ny, z + 1 < r_.nz};
+  for (int k = 0; k < kBondCount; ++k) held &= ~(within[k] ? 0 : 1u << k);
   cell.faces = (held & missing) != 0 ? Cell::kUneven : static_cast<std::uint8_t>(held);
   return cell;
 }
 
 void RegionShares::add_cell(int x, int y, int z, const std::int32_t (&point)[8], Cell& cell) {
-  cell = cell_of(points_, point);
+  cell = cell_of(x, y, z, point);
   cell.first = static_cast<std::int32_t>(all_.size());
   const auto add = [&] {
     all_.push_back({static_cast<std::int16_t>(x),
@@ -131,12 +146,11 @@ void RegionShares::add_cell(int x, int y, int z, const std::int32_t (&point)[8],
     return std::begin(all_.back().point);
   };
   // Points that hold on to each other see the same.
-  if (cell.whole || !near_split(x, y, z)) {
+  if (cell.whole || near_split_[node_at(x, y, z)] == 0) {
     std::copy_n(point, 8, add());
     return;
   }
-  AllSeen seen_by[8];  // of each share
-  int share_of[8];
+  int first_of[8], share_of[8];  // sub-position of each share's first point; share of each point
   for (int s = 0; s < 8; ++s) {
     if (point[s] < 0) continue;
     int& i = share_of[s] = cell.count;
@@ -146,11 +160,10 @@ void RegionShares::add_cell(int x, int y, int z, const std::int32_t (&point)[8],
       }
     }
     if (i == cell.count) {
-      const AllSeen here = seen(x, y, z, s, kNoBond);
       i = 0;
-      while (i < cell.count && !std::equal(here.begin(), here.end(), seen_by[i].begin())) ++i;
+      while (i < cell.count && !see_the_same(x, y, z, first_of[i], s)) ++i;
       if (i == cell.count) {
-        seen_by[i] = here;
+        first_of[i] = s;
         std::fill_n(add(), 8, -1);
       }
     }
@@ -158,11 +171,18 @@ void RegionShares::add_cell(int x, int y, int z, const std::int32_t (&point)[8],
   }
 }
 
-bool RegionShares::near_split(int x, int y, int z) const {
-  bool any = false;
-  for (int row = 0; row < 9; ++row)
-    any = any || split_in_row_[node_at(x, y + row % 3, z + row / 3)] != 0;
-  return any;
+bool RegionShares::see_the_same(int x, int y, int z, int s, int t) const {
+  constexpr int kMiddle = 13;  // where points differ the most
+  for (int i = 0; i < 27; ++i) {
+    const int k = (i + kMiddle) % 27, dx = k % 3, dy = k / 3 % 3, dz = k / 9;
+    const NodeFields::Split* split = split_[node_at(x + dx, y + dy, z + dz)];
+    const auto field = [&](int sub) {
+      return split->field_at((sub >> 2) - 2 * dz + 4,
+                             bit_in_plane((sub & 1) - 2 * dx + 4, (sub >> 1 & 1) - 2 * dy + 4));
+    };
+    if (split != nullptr && field(s) != field(t)) return false;
+  }
+  return true;
 }
 
 AllSeen RegionShares::seen(int x, int y, int z, int s, int bond) const {
@@ -178,7 +198,7 @@ AllSeen RegionShares::seen(int x, int y, int z, int s, int bond) const {
       if (split_in_row_[n] == 0) continue;
       // Its place in the 6 x 6 x 6 box of the row's first node (NodeFields::Split).
       const int plane = (s >> 2) - 2 * k + 4;
-      const int in_plane = 6 * ((s >> 1 & 1) - 2 * j + 4) + (s & 1) + 4;
+      const int in_plane = bit_in_plane((s & 1) + 4, (s >> 1 & 1) - 2 * j + 4);
       for (int i = first[0]; i <= last[0]; ++i) {
         const NodeFields::Split* split = split_[n + i];
         if (split == nullptr) continue;
@@ -196,12 +216,10 @@ const RegionShares::Cell* RegionShares::next_cell(const CellShare& c, int bond) 
   return &cells_[(z * r_.ny + y) * r_.nx + x];
 }
 
-bool RegionShares::has_even_faces(const CellShare& c, const Cell* (&around)[kBondCount]) const {
-  const Cell& cell = cells_[(c.z * r_.ny + c.y) * r_.nx + c.x];
+bool RegionShares::has_even_faces(const Cell& cell) const {
   if (cell.faces == Cell::kUneven || cell.count != 1) return false;
-  for (int k = 0; k < kBondCount; ++k) {
-    around[k] = (cell.faces >> k & 1) != 0 ? next_cell(c, k) : nullptr;
-    if (around[k] != nullptr && around[k]->count != 1) return false;
+  for (unsigned faces = cell.faces; faces != 0; faces &= faces - 1) {
+    if ((&cell)[step_[__builtin_ctz(faces)]].count != 1) return false;
   }
   return true;
 }

@@ -57,30 +57,33 @@ class RegionShares {
     static constexpr std::uint8_t kUneven = 0xff;
     std::int32_t first = 0, count = 0;  ///< its shares
     bool whole = true;                  ///< no bond between its points is missing, nor is a point
-    /// Directions in which all its points hold on to others outside of it, if none do in the rest.
+    /// Directions to cells of the region in which all its points hold on to others there, if none
+    /// do in the rest.
     std::uint8_t faces = 0;
   };
 
-  static Cell cell_of(const Points& points, const std::int32_t (&point)[8]);
+  Cell cell_of(int x, int y, int z, const std::int32_t (&point)[8]) const;
   /// Takes a cell's points apart into shares.
   void add_cell(int x, int y, int z, const std::int32_t (&point)[8], Cell& cell);
   /// Number of the region's node that is lowest around a cell.
   int node_at(int x, int y, int z) const { return (z * (r_.ny + 2) + y) * (r_.nx + 2) + x; }
-  bool near_split(int x, int y, int z) const;
+  /// Whether the points at sub-positions s and t of a cell do.
+  bool see_the_same(int x, int y, int z, int s, int t) const;
   /// What the point at sub-position s of a cell sees at the split nodes around it.
   AllSeen seen(int x, int y, int z, int s, int bond) const;
   /// The region's cell next to a share's in the direction of a bond; null if that is outside.
   const Cell* next_cell(const CellShare& c, int bond) const;
-  /// Whether all of the cell's points hold on to one share in each direction, or none do; fills in
-  /// the cells of these shares.
-  bool has_even_faces(const CellShare& c, const Cell* (&around)[kBondCount]) const;
+  /// Whether all of a cell's points hold on to one share in each direction, or none do.
+  bool has_even_faces(const Cell& cell) const;
 
   const BlockRegion& r_;
   const Points& points_;
+  const std::ptrdiff_t step_[kBondCount];  // in cells_, to the next one in the direction of a bond
   bool any_split_ = false;
   std::vector<const NodeFields::Split*> split_;  // per node of the region, null where it is whole
   std::vector<std::uint8_t> split_in_row_;       // this node or one of the next two is
-  std::vector<Cell> cells_;                      // [nz][ny][nx]
+  std::vector<std::uint8_t> near_split_;  // per node: a node is of the cell that it is lowest of
+  std::vector<Cell> cells_;               // [nz][ny][nx]
   std::vector<CellShare> all_;
 };
 

@@ -250,7 +250,7 @@ void CudaMpmTissue::cut(const std::vector<BladePath>& paths, const Array<float>*
   pull_velocities();
   pull_contacts();
   take_apart(*state_, changed);
-  if (may_have_parted(state_->bodies, state_->points, changed)) {
+  if (may_have_parted(state_->bodies, state_->points, state_->fields->bonds(), changed)) {
     report.new_fragments = update_pieces(state_->bodies, state_->points, pieces_);
     device_->points_changed = true;
   }

@@ -22,17 +22,14 @@ class PlaneBarrier {
       : place_(static_cast<unsigned>(__cvta_generic_to_shared(place))) {
 #if __CUDA_ARCH__ >= 800
     if (threadIdx.x == 0) {
-      asm volatile("mbarrier.init.shared.b64 [%0], %1;" ::"r"(place_), "r"(blockDim.x / 32));
+      asm volatile("mbarrier.init.shared.b64 [%0], %1;" ::"r"(place_), "r"(blockDim.x));
     }
 #endif
   }
   __device__ __forceinline__ void arrive() {
 #if __CUDA_ARCH__ >= 800
-    __syncwarp();
-    if (threadIdx.x % 32 == 0) {
-      asm volatile("{ .reg .b64 state; mbarrier.arrive.shared.b64 state, [%0]; }" ::"r"(place_)
-                   : "memory");
-    }
+    asm volatile("{ .reg .b64 state; mbarrier.arrive.shared.b64 state, [%0]; }" ::"r"(place_)
+                 : "memory");
 #endif
   }
   __device__ __forceinline__ void wait() {

@@ -18,11 +18,6 @@ class KnownFacets {
   KnownFacets(const LatticeBody& body, const BlockRegion& region,
               const std::vector<std::uint8_t>& stale);
 
-  /// Whether it is known that cell (x, y, z) has no facets.
-  bool has_none(int x, int y, int z) const {
-    const int i = index(x, y, z);
-    return !stale_.empty() && stale_[i] == 0 && first_[i] == first_[i + 1];
-  }
   /// Appends the facets of the points `around` of cell (x, y, z), as those of `cell` in their
   /// block. False where they must be made anew.
   bool take(int x, int y, int z, const std::int32_t (&around)[8], int cell,

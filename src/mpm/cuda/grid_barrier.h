@@ -1,4 +1,4 @@
-// Barriers of all thread blocks of a cooperative kernel. For .cu files.
+// Barriers of all thread blocks of a cooperative kernel, and of some of their warps. For .cu files.
 #pragma once
 
 namespace tissue_sim {
@@ -21,7 +21,7 @@ struct Team {
   __device__ __forceinline__ int size() const {
     return is_all() ? static_cast<int>(blockDim.x) : count;
   }
-  /// Its number of the calling thread; of a thread of the team below size().
+  /// The calling thread's number in the team: from 0 to size() - 1 where it is one of it.
   __device__ __forceinline__ int me() const { return static_cast<int>(threadIdx.x) - first; }
   __device__ __forceinline__ bool has_me() const { return me() >= 0 && me() < size(); }
   __device__ __forceinline__ void sync() const {

@@ -27,22 +27,22 @@ void bound_motion(MpmState& state) {
 
 }  // namespace
 
-void take_apart(MpmState& state, const std::vector<std::int32_t>& changed,
-                const std::function<void()>& meanwhile) {
-  if (changed.empty()) return;
+Apart take_apart(MpmState& state, const std::vector<std::int32_t>& changed,
+                 const std::function<void()>& meanwhile) {
+  Apart apart;
+  if (changed.empty()) return apart;
   std::vector<NodeFields::Cell> cells;
-  std::vector<std::int32_t> softened;
   state.cpu->both(
       [&] {
         cells = state.fields->update(state.bodies, state.points, changed, state.nodes, *state.cpu);
       },
       [&] {
         list_threads(state, changed);
-        softened = soften(state.bodies, changed, state.points);
+        apart.softened = soften(state.bodies, changed, state.points);
         state.blocks.stale_facets.resize(lattice_node_count(state.bodies), 0);
         mark_stale_facets(state.bodies, state.points, changed, state.blocks.stale_facets);
       });
-  for (const std::int32_t p : softened) {  // blocks must know
+  for (const std::int32_t p : apart.softened) {  // blocks must know
     const Points::Site& s = state.points.site[p];
     cells.push_back({s.body, s.x / 2, s.y / 2, s.z / 2});
   }
@@ -59,6 +59,8 @@ void take_apart(MpmState& state, const std::vector<std::int32_t>& changed,
         list_facets(state);
       },
       meanwhile);
+  apart.new_blocks = !cells.empty();
+  return apart;
 }
 
 }  // namespace tissue_sim

@@ -17,9 +17,27 @@ void sweep_bonds(MpmState& state, const BladePath& path, const Array<float>* u_b
                  const Array<float>* u_end, const std::vector<BlockMotion>& before,
                  std::vector<std::int32_t>& changed, CutReport& report);
 
+/// A bond that an edge passed, from its lower-numbered point along an axis (0 x, 1 y, 2 z), and
+/// where, if that can be said.
+struct BrokenBond {
+  std::int32_t point, other;
+  int axis;
+  bool has_crossing;
+  Crossing crossing;
+};
+/// Clears bonds that are still there, each named once. Appends and counts as sweep_bonds().
+void break_bonds(MpmState& state, const std::vector<BrokenBond>& broken,
+                 std::vector<std::int32_t>& changed, CutReport& report);
+
+/// What take_apart() did.
+struct Apart {
+  std::vector<std::int32_t> softened;  ///< points that became soft: mpm/crumbs.h
+  bool new_blocks = false;
+};
+
 /// Splits nodes and makes blocks anew after the points `changed` lost bonds. `meanwhile` is called
 /// when nodes are split: it may not write what blocks are made of.
-void take_apart(
+Apart take_apart(
     MpmState& state, const std::vector<std::int32_t>& changed,
     const std::function<void()>& meanwhile = [] {});
 

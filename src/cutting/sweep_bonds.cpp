@@ -99,16 +99,9 @@ class Sweep {
     }
   }
 
-  /// A forward bond that an edge passed, and where, if that can be said.
-  struct Broken {
-    std::int32_t point;
-    int axis;
-    bool has_crossing;
-    Crossing crossing;
-  };
   /// The bonds that point forward from the block's points and that the path passes.
-  std::vector<Broken> broken_bonds(const Passed& passed) const {
-    std::vector<Broken> broken;
+  std::vector<BrokenBond> broken_bonds(const Passed& passed) const {
+    std::vector<BrokenBond> broken;
     const Block& block = *passed.block;
     const LatticeBody& body = state_.bodies[block.body];
     const std::ptrdiff_t step[] = {1, 2 * body.nx, std::ptrdiff_t{4} * body.nx * body.ny};
@@ -122,7 +115,7 @@ class Sweep {
         if ((known_[p] & known_[q] & kOutside) != 0) continue;
         Meeting meeting;
         if (passes(passed.edges, {place(0, p), place(0, q), place(1, p), place(1, q)}, meeting)) {
-          broken.push_back(broken_bond(block, lane, axis, meeting));
+          broken.push_back(broken_bond(block, lane, q, axis, meeting));
         }
       }
     }
@@ -153,11 +146,8 @@ class Sweep {
   /// Whether an edge passes a bond, and where the first one does.
   bool passes(const std::vector<NearEdge>& edges, const MovingSegment& bond,
               Meeting& meeting) const {
-    const Vec3 a = bond.a1 - bond.a0, b = bond.b1 - bond.b0;
     return std::any_of(edges.begin(), edges.end(), [&](const NearEdge& near) {
-      const double begin = near.part->begin, end = near.part->end;
-      const MovingSegment then{bond.a0 + begin * a, bond.b0 + begin * b, bond.a0 + end * a,
-                               bond.b0 + end * b};
+      const MovingSegment then = bond.during(near.part->begin, near.part->end);
       return (one_edge_ || !stays_aside(*near.edge, then)) &&
              edge_passes(*near.edge, then, &meeting);
     });
@@ -165,12 +155,14 @@ class Sweep {
 
   /// The crossing in reference space, from where an edge met the bond in the world: a normal goes
   /// back by F^T.
-  Broken broken_bond(const Block& block, std::size_t lane, int axis, const Meeting& meeting) const {
+  BrokenBond broken_bond(const Block& block, std::size_t lane, std::int32_t other, int axis,
+                         const Meeting& meeting) const {
     const std::size_t column = lane % block.stride, sub = lane / block.stride % 8;
     const int cell = static_cast<int>(lane / block.stride / 8) * block.plane + block.cell[column];
     float at[3], F[9];
     for (int a = 0; a < 3; ++a) at[a] = (sub >> a & 1) != 0 ? 0.25f : -0.25f;
-    Broken broken{block.point[lane], axis, false, {static_cast<float>(meeting.place), {}}};
+    BrokenBond broken{
+        block.point[lane], other, axis, false, {static_cast<float>(meeting.place), {}}};
     at[axis] += 0.5f * broken.crossing.place;
     deformation_gradient_at(u_end_, CellNodes(block, cell), state_.bodies[block.body].cell_size, at,
                             F);
@@ -191,6 +183,25 @@ class Sweep {
 
 }  // namespace
 
+void break_bonds(MpmState& state, const std::vector<BrokenBond>& broken,
+                 std::vector<std::int32_t>& changed, CutReport& report) {
+  Points& points = state.points;
+  std::vector<std::uint64_t> lost(points.size() / 64 + 1, 0);  // a bit of each point
+  for (const BrokenBond& b : broken) {
+    break_bond(kForwardBond + b.axis, points.bonds[b.point], points.bonds[b.other]);
+    if (b.has_crossing) points.crossings.add(b.point, b.axis, b.crossing);
+    for (const std::int32_t p : {b.point, b.other}) lost[p / 64] |= std::uint64_t{1} << (p % 64);
+  }
+  report.bonds_broken += static_cast<int>(broken.size());
+  const std::size_t first = changed.size();
+  for (std::size_t i = 0; i < lost.size(); ++i) {
+    for (std::uint64_t m = lost[i]; m != 0; m &= m - 1) {
+      changed.push_back(static_cast<std::int32_t>(64 * i + __builtin_ctzll(m)));
+    }
+  }
+  report.points_separated += static_cast<int>(changed.size() - first);
+}
+
 void sweep_bonds(MpmState& state, const BladePath& path, const Array<float>* u_begin,
                  const Array<float>* u_end, const std::vector<BlockMotion>& before,
                  std::vector<std::int32_t>& changed, CutReport& report) {
@@ -208,27 +219,11 @@ void sweep_bonds(MpmState& state, const BladePath& path, const Array<float>* u_b
   state.places[1].resize(3 * point_count);
   if (u_begin != u_end) state.places[0].resize(3 * point_count);
   state.cpu->for_each(count, [&](int i) { sweep.read_places(passed[i]); });
-  std::vector<std::vector<Sweep::Broken>> broken(count);
-  state.cpu->for_each(count, [&](int i) { broken[i] = sweep.broken_bonds(passed[i]); });
-  Points& points = state.points;
-  std::vector<std::uint64_t> lost(points.size() / 64 + 1, 0);  // a bit of each point
-  for (const auto& of_block : broken) {
-    for (const Sweep::Broken& b : of_block) {
-      const Points::Site& s = points.site[b.point];
-      const std::int32_t q = state.bodies[s.body].next_point(s, b.axis);
-      break_bond(kForwardBond + b.axis, points.bonds[b.point], points.bonds[q]);
-      if (b.has_crossing) points.crossings.add(b.point, b.axis, b.crossing);
-      for (const std::int32_t p : {b.point, q}) lost[p / 64] |= std::uint64_t{1} << (p % 64);
-    }
-    report.bonds_broken += static_cast<int>(of_block.size());
-  }
-  const std::size_t first = changed.size();
-  for (std::size_t i = 0; i < lost.size(); ++i) {
-    for (std::uint64_t m = lost[i]; m != 0; m &= m - 1) {
-      changed.push_back(static_cast<std::int32_t>(64 * i + __builtin_ctzll(m)));
-    }
-  }
-  report.points_separated += static_cast<int>(changed.size() - first);
+  std::vector<std::vector<BrokenBond>> of_block(count);
+  state.cpu->for_each(count, [&](int i) { of_block[i] = sweep.broken_bonds(passed[i]); });
+  std::vector<BrokenBond> broken;
+  for (const auto& some : of_block) broken.insert(broken.end(), some.begin(), some.end());
+  break_bonds(state, broken, changed, report);
 }
 
 }  // namespace tissue_sim

@@ -64,6 +64,24 @@ class DeviceArray {
     check_cuda(cudaMemsetAsync(data_, 0, size_ * sizeof(T), stream), "clear memory");
   }
 
+  /// Grows to `n` elements and keeps what was in it.
+  void extend(std::size_t n, cudaStream_t stream) {
+    if (n > capacity_) {
+      DeviceArray larger;
+      larger.resize(n + n / 16);
+      larger.size_ = size_;
+      larger.copy(*this, stream);
+      check_cuda(cudaStreamSynchronize(stream), "copy");
+      swap(larger);
+    }
+    size_ = n;
+  }
+  void swap(DeviceArray& other) {
+    std::swap(data_, other.data_);
+    std::swap(size_, other.size_);
+    std::swap(capacity_, other.capacity_);
+  }
+
   T* data() const { return data_; }
   std::size_t size() const { return size_; }
   std::size_t bytes() const { return capacity_ * sizeof(T); }

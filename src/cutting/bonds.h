@@ -31,4 +31,19 @@ inline void break_bond(int k, std::uint8_t& of_point, std::uint8_t& of_other) {
   of_other &= static_cast<std::uint8_t>(~(1u << opposite_bond(k)));
 }
 
+/// Where a blade went through a bond.
+struct Crossing {
+  float place;      ///< along the bond, 0 at its lower-numbered point to 1
+  float normal[3];  ///< of the cut in reference space, unit, to either side
+};
+
+/// A bond that an edge passed, from its lower-numbered point along an axis (0 x, 1 y, 2 z), and
+/// where, if that can be said.
+struct BrokenBond {
+  std::int32_t point, other;
+  int axis;
+  bool has_crossing;
+  Crossing crossing;
+};
+
 }  // namespace tissue_sim

@@ -17,14 +17,10 @@ void sweep_bonds(MpmState& state, const BladePath& path, const Array<float>* u_b
                  const Array<float>* u_end, const std::vector<BlockMotion>& before,
                  std::vector<std::int32_t>& changed, CutReport& report);
 
-/// A bond that an edge passed, from its lower-numbered point along an axis (0 x, 1 y, 2 z), and
-/// where, if that can be said.
-struct BrokenBond {
-  std::int32_t point, other;
-  int axis;
-  bool has_crossing;
-  Crossing crossing;
-};
+/// A sweep looks at bonds of points within this many cells, so that a bond is seen as long as it is
+/// not stretched to three times its length.
+inline constexpr double kSweepReach = 1.5;
+
 /// Clears bonds that are still there, each named once. Appends and counts as sweep_bonds().
 void break_bonds(MpmState& state, const std::vector<BrokenBond>& broken,
                  std::vector<std::int32_t>& changed, CutReport& report);

@@ -9,10 +9,8 @@
 namespace tissue_sim {
 namespace {
 
-// A sweep looks at points within this many cells, so that a bond is seen as long as it is not
-// stretched to three times its length, and brings those within twice as many: few bonds of the
-// former end elsewhere.
-constexpr double kReach = 1.5;
+// Points within this many cells are brought: few bonds of those that are looked at end elsewhere.
+constexpr double kBringReach = 2 * kSweepReach;
 
 /// Whether a box comes near what an edge sweeps.
 bool is_near(const Box& box, const SweptEdge& edge, double reach) {
@@ -52,7 +50,7 @@ class Sweep {
   };
   /// `box` is the block's, from the beginning to the end.
   Passed passed(const Block& block, const Box& box) const {
-    const double reach = 2 * kReach * state_.scene.cell_size;
+    const double reach = kBringReach * state_.scene.cell_size;
     Passed result{&block, {}, {}};
     for (const SweepPart& part : parts_) {
       for (const SweptEdge& edge : part.edges) {
@@ -74,7 +72,7 @@ class Sweep {
     const BlockField field = block_field(state_, block);
     state_.kernels->positions(block, field, u_end_, scratch, end);
     if (moves()) state_.kernels->positions(block, field, u_begin_, scratch, begin);
-    const auto reach = static_cast<float>(kReach * state_.scene.cell_size);
+    const auto reach = static_cast<float>(kSweepReach * state_.scene.cell_size);
     float *at_begin = state_.places[0].data(), *at_end = state_.places[1].data();
     for (const NearEdge& edge : passed.edges) {
       LaneSlab slabs[3];

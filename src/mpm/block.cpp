@@ -43,4 +43,14 @@ void find_filled(Block& block) {
   }
 }
 
+std::vector<std::uint8_t> filled_columns(const Block& block) {
+  std::vector<std::uint8_t> filled(block.stride, 0);
+  for (const std::vector<Block::Span>& spans : block.filled) {
+    for (const Block::Span& s : spans) {
+      std::fill(filled.begin() + s.begin, filled.begin() + s.end, std::uint8_t{1});
+    }
+  }
+  return filled;
+}
+
 }  // namespace tissue_sim

@@ -84,6 +84,8 @@ struct Block {
     float measured = 0, last = 0;
   } modulus;
 
+  int number = -1;  ///< among all that its Blocks ever had
+
   std::size_t force_offset = 0;  ///< of this block's [3][nz + 2][plane] in the force buffer
 
   int node_count() const { return (nz + 2) * plane; }
@@ -95,5 +97,8 @@ void lay_out(Block& block);
 
 /// Sets `filled`, when the points are there.
 void find_filled(Block& block);
+
+/// [stride]: whether any cell of the lane, in one z-plane or another, is filled.
+std::vector<std::uint8_t> filled_columns(const Block& block);
 
 }  // namespace tissue_sim

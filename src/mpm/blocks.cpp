@@ -44,6 +44,7 @@ void connect_forces(Blocks& blocks, const std::vector<LatticeBody>& bodies, int 
     for (Block& b : r.blocks) {
       b.force_offset = blocks.force_size;
       blocks.force_size += static_cast<std::size_t>(3) * b.node_count();
+      if (b.number < 0) b.number = blocks.next_number++;
       blocks.all.push_back(&b);
     }
   }

@@ -44,6 +44,7 @@ struct Blocks {
   };
   std::vector<Origin> origin;
   std::size_t force_size = 0;
+  int next_number = 0;  ///< Block::number
   /// Per lattice node, of its cell: bonds broke near it since its region's blocks were made. Empty
   /// before any did.
   std::vector<std::uint8_t> stale_facets;

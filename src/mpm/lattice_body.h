@@ -7,16 +7,11 @@
 #include <vector>
 
 #include "compute/array.h"
+#include "cutting/bonds.h"
 #include "geometry/lattice.h"
 #include "tissue_sim/scene.h"
 
 namespace tissue_sim {
-
-/// Where a blade went through a bond.
-struct Crossing {
-  float place;      ///< along the bond, 0 at its lower-numbered point to 1
-  float normal[3];  ///< of the cut in reference space, unit, to either side
-};
 
 /// Crossings of the bonds that point forward, by point and axis (0 x, 1 y, 2 z).
 class Crossings {

@@ -72,15 +72,8 @@ double cycles(const std::vector<LatticeBody>& bodies, const CudaShape& s,
 
 /// Columns of the block that hold points.
 int columns_of(const Block& b) {
-  int count = 0;
-  for (int column = 0; column < b.stride; ++column) {
-    bool holds = false;
-    for (int k = 0; k < 8 * b.nz && !holds; ++k) {
-      holds = b.point[static_cast<std::size_t>(k) * b.stride + column] >= 0;
-    }
-    count += holds ? 1 : 0;
-  }
-  return count;
+  const std::vector<std::uint8_t> filled = filled_columns(b);
+  return static_cast<int>(std::count(filled.begin(), filled.end(), 1));
 }
 
 /// Whether each column of cells must have two threads.

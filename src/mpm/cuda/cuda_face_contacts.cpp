@@ -133,7 +133,7 @@ CudaLooks CudaMpmTissue::looks() const {
   s.lattices = f.lattices.data();
   s.point_at = f.point_at.data();
   s.bonds = d.bonds.data();
-  s.slot_node = d.slot_node.data();
+  s.slot_node = d.of_blocks.slot_node.data();
   s.motion = f.motion.data();
   s.listed = f.listed.data();
   s.springs = f.springs.data();

@@ -1,6 +1,8 @@
-// Cuts of tissue that lives on a GPU: between frames, on the host, then the tables go up anew.
+// Cuts of tissue that lives on a GPU: the blade's sweep runs there. What follows from the bonds
+// that it breaks, the fields of nodes around and the blocks there, the host works out; what it
+// needs of the nodes comes down, what changed goes up.
 #include <algorithm>
-#include <cmath>
+#include <tuple>
 
 #include "cutting/blade_sweep.h"
 #include "cutting/cut_tissue.h"
@@ -9,259 +11,140 @@
 namespace tissue_sim {
 namespace {
 
-/// What the tables and the state take on the GPU; clouds and contacts between tissue come on top.
-std::size_t bytes_of(const HostTables& t, std::size_t nodes, std::size_t points, int held_by,
-                     std::size_t most_held) {
-  const std::size_t of_contact = 9 * sizeof(long long) * nodes + 6 * t.point.size();
-  constexpr std::size_t of_connecting = 16;  // two numbers a slot, and as much again to sort them
-  return t.blocks.size() * (sizeof(CudaBlock) + sizeof(CudaMeasure)) +
-         t.bundles.size() * sizeof(CudaBundle) + t.columns.size() * sizeof(CudaColumn) +
-         t.slot_node.size() * (of_connecting + 16 + sizeof(uint4) + 2 * sizeof(float4)) +
-         8 * t.point.size() + 4 * t.partial.size() + (6 * sizeof(float4) + 1) * nodes +
-         (1 + 13 * held_by) * points + most_held * sizeof(HeldPoint) +
-         (held_by > 0 ? of_contact : 0);
-}
+Vector3 vector(const Vec3& v) { return {v[0], v[1], v[2]}; }
 
-/// Says how much memory the tissue takes, where the GPU has less.
-void check_memory(std::size_t wanted, std::size_t held) {
-  std::size_t free = 0, total = 0;
-  check_cuda(cudaMemGetInfo(&free, &total), "be asked");
-  if (wanted <= free + held) return;
-  const auto megabytes = DeviceArray<char>::megabytes;
-  throw std::runtime_error("the GPU's memory does not suffice: the scene needs " +
-                           megabytes(wanted) + ", " + megabytes(free + held) + " of " +
-                           megabytes(total) + " are free; raise cell_size or set device to cpu");
+std::vector<CudaSweptEdge> edges_of(const BladePath& path) {
+  std::vector<CudaSweptEdge> edges;
+  for (const SweepPart& part : sweep_parts(path)) {
+    for (const SweptEdge& e : part.edges) {
+      CudaSweptEdge edge;
+      edge.edge.a0 = vector(e.a0);
+      edge.edge.b0 = vector(e.b0);
+      edge.edge.a1 = vector(e.a1);
+      edge.edge.b1 = vector(e.b1);
+      for (int i = 0; i < 3; ++i) {
+        edge.edge.slabs[i] = {vector(e.slabs[i].axis), e.slabs[i].low, e.slabs[i].high};
+      }
+      edge.begin = part.begin;
+      edge.end = part.end;
+      edges.push_back(edge);
+    }
+  }
+  return edges;
 }
 
 }  // namespace
 
-std::size_t CudaMpmTissue::device_bytes() const {
-  const OnDevice& d = *device_;
-  std::size_t sum = d.blocks.bytes() + d.bundles.bytes() + d.columns.bytes() +
-                    d.near_cells.bytes() + d.bodies.bytes() + d.slot_node.bytes() +
-                    d.point.bytes() + d.piece.bytes() + d.place.bytes() + d.slot_parts.bytes() +
-                    d.first_parts.bytes() + d.parts.bytes() + d.pushed_parts.bytes() +
-                    d.marks.bytes() + d.pushed.bytes() + d.colour.bytes() + d.volume.bytes() +
-                    d.partial.bytes() + d.hold.bytes() + d.bonds.bytes() + d.soft.bytes() +
-                    d.with.bytes() + d.whole.bytes() + d.u_before.bytes() + d.connect_room.bytes() +
-                    d.colliders.bytes() + d.loads.bytes() + d.measures.bytes() + d.cloud.bytes() +
-                    d.stretched.bytes() + d.faces.bytes() + d.checkpoint.bytes() + d.stacks.bytes();
-  for (int i = 0; i < 2; ++i) sum += d.u[i].bytes() + d.v[i].bytes() + d.force[i].bytes();
-  return sum;
-}
-
-void CudaMpmTissue::pull() {
-  pull_nodes();
-  pull_contacts();
-}
-
-void CudaMpmTissue::pull_nodes() {
-  pull_displacements();
-  pull_velocities();
-}
-
-void CudaMpmTissue::pull_field(const float4* from, Array<float>* to) {
+std::vector<BrokenBond> CudaMpmTissue::sweep(const BladePath& path, bool moves) {
   OnDevice& d = *device_;
-  const std::size_t n = d.u[0].size();
-  d.host_nodes.resize(2 * n);
-  check_cuda(cudaMemcpyAsync(d.host_nodes.data(), from, n * sizeof(float4), cudaMemcpyDeviceToHost,
-                             d.stream),
-             "send data");
-  check_cuda(cudaStreamSynchronize(d.stream), "finish a frame");
-  unpack_field(d.host_nodes.data(), n, *state_->cpu, to);
-}
-
-void CudaMpmTissue::pull_displacements() { pull_field(device_->present().u, state_->nodes.u); }
-void CudaMpmTissue::pull_velocities() { pull_field(device_->present().v, state_->nodes.v); }
-
-void CudaMpmTissue::plan_tables() {
-  OnDevice& d = *device_;
-  d.plan.threads = d.shape.threads;
-  d.plan.small = d.shape.small;
-  d.plan.marches = d.shape.marches;
-  d.plan.pairs = d.shape.pairs();
-  d.plan.max_slots = d.plan.max_plane_slots = 0;
-  const std::vector<Block*>& blocks = state_->blocks.all;
-  for (const Block* b : blocks) {
-    const int plane = (b->nx + 2) * (b->ny + 2);
-    d.plan.max_slots = std::max(d.plan.max_slots, plane * (b->nz + 2));
-    d.plan.max_plane_slots = std::max(d.plan.max_plane_slots, plane);
-  }
-  for (const LatticeBody& b : state_->bodies) {
-    for (const Material& m : b.materials) {
-      const bool neo_hookean = m.law == Law::kNeoHookean;
-      d.plan.neo_hookean = d.plan.neo_hookean || neo_hookean;
-      d.plan.fixed_corotated = d.plan.fixed_corotated || !neo_hookean;
-      d.plan.viscous = d.plan.viscous || m.viscosity > 0;
-    }
-  }
-  const auto choose = [&d](std::size_t count) {
-    d.resident = resident_blocks(d.plan, static_cast<int>(count));
-    d.plain_plan = d.plan;
-    d.plain_plan.plain = true;
-    d.plain_resident = resident_blocks(d.plain_plan, static_cast<int>(count));
-    d.push_plan = d.plan;
-    d.push_plan.pushes = true;
-    d.push_resident = resident_blocks(d.push_plan, static_cast<int>(count));
+  SweepOnDevice& on = d.sweep;
+  const std::vector<CudaSweptEdge> edges = edges_of(path);
+  if (edges.empty()) return {};
+  on.edges.upload(edges, d.stream);
+  CudaSweep s;
+  s.edges = on.edges.data();
+  s.edge_count = static_cast<int>(edges.size());
+  s.reach = kSweepReach * state_->scene.cell_size;
+  s.cells = on.cells.data();
+  s.lattices = d.faces.lattices.data();
+  s.point_at = d.faces.point_at.data();
+  s.end = on.places[1].data();
+  s.begin = moves ? on.places[0].data() : s.end;
+  s.u = d.present().u;
+  on.count.resize(1);
+  on.host_count.resize(1);
+  on.broken.resize(std::max<std::size_t>(on.broken.size(), 16384));
+  const auto look = [&] {
+    s.broken = on.broken.data();
+    s.broken_count = on.count.data();
+    s.room = static_cast<int>(on.broken.size());
+    launch_sweep(d.tables(), s, d.stream);
+    on.count.download(on.host_count.data(), 1, d.stream);
+    check_cuda(cudaStreamSynchronize(d.stream), "sweep a blade through the tissue");
   };
-  choose(blocks.size());
-  std::vector<std::vector<int>> bundles;
-  if (!(d.plan.cached && d.push_plan.cached)) {
-    // As many as whole tissue has, or, of a small one, as run at once.
-    const auto at_once = static_cast<std::size_t>(
-        std::max(1, std::min(most_at_once(d.plan), most_at_once(d.push_plan))));
-    const std::size_t rounds = (state_->blocks.regions.size() + at_once - 1) / at_once;
-    const std::size_t wanted = d.plan.small ? at_once : rounds * at_once;
-    if (blocks.size() > wanted) {
-      // Two halves of a block that was cut have a rim more.
-      d.push_plan.max_plane_slots = 3 * d.plan.max_plane_slots / 2;
-      const BundleLimits limits = {d.shape.columns(), d.push_plan.max_plane_slots,
-                                   most_slots(d.push_plan)};
-      bundles = bundle_blocks(blocks, wanted, limits, *state_->cpu);
-    }
-    if (bundles.empty() || bundles.size() > wanted) {
-      bundles = d.plan.marches
-                    ? blocks_by_column(blocks)
-                    : single_blocks(blocks, d.plan.small ? at_once : blocks.size(), *state_->cpu);
-    }
-  } else {
-    bundles = single_blocks(blocks, blocks.size(), *state_->cpu);
+  look();
+  if (on.host_count[0] > s.room) {
+    on.broken.resize(on.host_count[0]);
+    look();
   }
-  HostTables& t = d.host_tables;
-  make_tables(*state_, bundles, t);
-  d.plan.max_slots = t.max_slots;
-  d.plan.max_plane_slots = t.max_plane_slots;
-  d.plan.max_columns = t.max_columns;
-  choose(t.bundles.size());
-  d.all_plain = std::all_of(t.bundles.begin(), t.bundles.end(),
-                            [](const CudaBundle& b) { return b.blocks == 1 && b.partial == 0; });
-  if (d.resident == 0 || d.plain_resident == 0 || d.push_resident == 0) {
-    throw std::runtime_error("the GPU has too little shared memory");
-  }
+  std::vector<BrokenBond> broken(on.host_count[0]);
+  on.broken.download(broken.data(), broken.size(), d.stream);
+  check_cuda(cudaStreamSynchronize(d.stream), "send data");
+  std::sort(broken.begin(), broken.end(), [](const BrokenBond& a, const BrokenBond& b) {
+    return std::tie(a.point, a.axis) < std::tie(b.point, b.axis);
+  });
+  return broken;
 }
 
-void CudaMpmTissue::push() {
+void CudaMpmTissue::read_places(const float4* u_before) {
   OnDevice& d = *device_;
-  plan_tables();
-  const HostTables& t = d.host_tables;
-  const std::size_t n = state_->nodes.size();
-  const auto points = static_cast<std::size_t>(state_->points.size());
-  const Scene& scene = state_->scene;
-  const int colliders = collider_count(scene) - (scene.ground.enabled ? 0 : 1);
-  d.held_by = std::min(colliders, 2);
-  const std::size_t most_held = OnDevice::Checkpoint::most_held(d.held_by * points);
-  const std::size_t of_stacks =
-      d.plan.marches ? Stacks::bytes_for(t, state_->blocks.all, d.plain_resident) : 0;
-  check_memory(bytes_of(t, n, points, d.held_by, most_held) + of_stacks, device_bytes());
-  check_cuda(cudaStreamSynchronize(d.stream), "finish a frame");
-  d.blocks.upload(t.blocks, d.stream);
-  d.bundles.upload(t.bundles, d.stream);
-  d.columns.upload(t.columns, d.stream);
-  d.bodies.upload(t.bodies, d.stream);
-  d.slot_node.upload(t.slot_node, d.stream);
-  const std::size_t slots = t.slot_node.size();
-  d.slot_parts.resize(slots);
-  d.first_parts.resize(slots);
-  d.parts.resize(slots);
-  d.most_sharing.resize(1);
-  d.stacks.clear();
-  if (d.plan.marches) {
-    d.stacks.make(t, state_->blocks.all, d.plain_resident, d.slot_node.data(), n, d.connect_room,
-                  d.most_sharing.data(), d.stream);
+  SweepOnDevice& on = d.sweep;
+  upload_lattices();
+  std::vector<CudaBlockCell> cells;
+  for (const int index : d.host_tables.of_host) {
+    const Block& b = *state_->blocks.all[index];
+    cells.push_back({b.x, b.y, b.z, b.body});
   }
-  connect_slots(
-      {d.slot_node.data(), d.slot_parts.data(), d.first_parts.data(), d.parts.data(), slots}, n,
-      d.connect_room, d.most_sharing.data(), d.stream);
-  d.volume.upload(t.volume, d.stream);
-  d.partial.upload(t.partial, d.stream);
-  d.point.upload(t.point, d.stream);
-  d.pushed_parts.resize(slots);
-  if (d.marks.size() != n) {
-    d.marks.resize(n);
-    d.marks.clear(d.stream);
-  }
-  for (auto& force : d.force) {
-    force.resize(slots);
-    force.clear(d.stream);
-  }
-  if (d.with.size() != d.held_by * points) {
-    d.with.resize(d.held_by * points);
-    d.with.clear(d.stream);
-    d.hold.resize(3 * d.held_by * points);
-    d.hold.clear(d.stream);
-  }
-  d.bonds.upload(state_->points.bonds, d.stream);
-  if (!state_->points.soft.empty()) d.soft.upload(state_->points.soft, d.stream);
-  d.checkpoint.resize(n, d.with.size());
-  d.arrived.resize(2);
-  push_nodes();
-  if (d.most_sharing[0] > kMostSharing) {
-    throw std::runtime_error("a node is shared by more than " + std::to_string(kMostSharing) +
-                             " blocks, as many as the GPU's tables hold: set device to cpu");
-  }
+  on.cells.upload(cells, d.stream);
+  const std::size_t count = 3 * static_cast<std::size_t>(state_->points.size());
+  on.places[1].resize(count);
+  launch_places(d.tables(), d.present().u, d.plan.max_slots, on.places[1].data(), d.stream);
+  if (u_before == nullptr) return;
+  on.places[0].resize(count);
+  launch_places(d.tables(), u_before, d.plan.max_slots, on.places[0].data(), d.stream);
 }
 
-void CudaMpmTissue::push_nodes() {
+void CudaMpmTissue::push_points(const std::vector<std::int32_t>& changed) {
   OnDevice& d = *device_;
-  const std::size_t n = state_->nodes.size();
-  d.host_nodes.resize(2 * n);
-  pack_nodes(state_->nodes, *state_->cpu, d.host_nodes.data(), d.host_nodes.data() + n);
-  d.u[d.current].upload(d.host_nodes.data(), n, d.stream);
-  d.v[d.current].upload(d.host_nodes.data() + n, n, d.stream);
-  // What no block moves, the other state has, too.
-  d.u[1 - d.current].copy(d.u[d.current], d.stream);
-  d.v[1 - d.current].copy(d.v[d.current], d.stream);
-  check_cuda(cudaStreamSynchronize(d.stream), "receive data");
+  const Points& points = state_->points;
+  if (!points.soft.empty() && d.soft.size() == 0) d.soft.upload(points.soft, d.stream);
+  std::vector<CudaPointChange> changes;
+  for (const std::int32_t p : changed) {
+    changes.push_back({p, points.bonds[p], static_cast<std::uint8_t>(points.is_soft(p) ? 1 : 0)});
+  }
+  d.sweep.changes.upload(changes, d.stream);
+  launch_change_points(d.sweep.changes.data(), static_cast<int>(changes.size()), d.bonds.data(),
+                       d.soft.size() > 0 ? d.soft.data() : nullptr, d.stream);
 }
 
-void CudaMpmTissue::make_blocks(bool may_march) {
+void CudaMpmTissue::take_apart(const std::vector<std::int32_t>& changed) {
   OnDevice& d = *device_;
-  d.shape = choose_shape(state_->bodies, d.limits, may_march);
-  d.shape.blocks.one_material = true;
-  d.shape.blocks.has_rows = false;
-  state_->blocks = tissue_sim::make_blocks(state_->bodies, state_->points, *state_->fields,
-                                           d.shape.blocks, *state_->cpu);
-  list_facets(*state_);
-}
-
-void CudaMpmTissue::stop_marching() {
-  make_blocks(false);
-  // Until they are measured, any block may be where any of the tissue is.
-  for (std::vector<BlockMotion>* motion : {&state_->motion, &motion_before_}) {
-    BlockMotion all;
-    for (const BlockMotion& m : *motion) {
-      all.box.min = all.box.min.cwiseMin(m.box.min);
-      all.box.max = all.box.max.cwiseMax(m.box.max);
-      if (!(m.speed <= all.speed)) all.speed = m.speed;
-    }
-    motion->assign(state_->blocks.all.size(), all);
-  }
-}
-
-void CudaMpmTissue::cut(const std::vector<BladePath>& paths, const Array<float>* u_before,
-                        const std::vector<BlockMotion>& before, CutReport& report) {
-  const bool marched = device_->shape.marches;
-  if (marched) stop_marching();
-  std::vector<std::int32_t> changed;
-  for (const BladePath& path : paths) {
-    sweep_bonds(*state_, path, u_before, state_->nodes.u, before, changed, report);
-  }
-  if (changed.empty() && !marched) return;
-  pull_velocities();
+  std::vector<std::int32_t> nodes = nodes_around(changed);
+  pull_some(nodes);
   pull_contacts();
-  take_apart(*state_, changed);
+  const auto known = static_cast<std::int32_t>(state_->nodes.size());
+  const Apart apart = tissue_sim::take_apart(*state_, changed);
+  for (auto n = known; n < static_cast<std::int32_t>(state_->nodes.size()); ++n) nodes.push_back(n);
+  push_some(nodes);
+  push_points(changed);
+  push_points(apart.softened);
+  if (apart.new_blocks || d.host_tables.number.empty()) push_tables();
+}
+
+void CudaMpmTissue::cut(const std::vector<BladePath>& paths, const float4* u_before,
+                        CutReport& report) {
+  std::vector<std::int32_t> changed;
+  read_places(u_before);
+  for (const BladePath& path : paths) {
+    std::vector<std::int32_t> by_this;
+    break_bonds(*state_, sweep(path, u_before != nullptr), by_this, report);
+    push_points(by_this);  // for the next
+    changed.insert(changed.end(), by_this.begin(), by_this.end());
+  }
+  if (changed.empty()) return;
+  if (device_->shape.marches) stop_marching();
+  take_apart(changed);
   if (may_have_parted(state_->bodies, state_->points, state_->fields->bonds(), changed)) {
     report.new_fragments = update_pieces(state_->bodies, state_->points, pieces_);
     device_->points_changed = true;
   }
   if (!report.new_fragments.empty()) device_->faces.pieces_changed = true;
-  push();
   launch_measure();
   finish_measure();
 }
 
 void CudaMpmTissue::cut_by_blades() {
-  const double reach = 4 * state_->scene.cell_size;  // a little more than sweep_bonds()
+  const double reach = 2 * kSweepReach * state_->scene.cell_size;
   bool meets = false;
   for (const BladePath& path : blades_) {
     for (const SweepPart& part : sweep_parts(path)) {
@@ -272,12 +155,7 @@ void CudaMpmTissue::cut_by_blades() {
       }
     }
   }
-  if (!meets) return;
-  OnDevice& d = *device_;
-  pull_displacements();
-  for (auto& component : state_->u_before) component.resize(d.u[0].size());
-  pull_field(d.u_before.data(), state_->u_before);
-  cut(blades_, state_->u_before, motion_before_, result_.blade_report);
+  if (meets) cut(blades_, device_->u_before.data(), result_.blade_report);
 }
 
 }  // namespace tissue_sim

@@ -52,9 +52,7 @@ void CudaMpmTissue::tear(const std::vector<TearingPoint>& tearing, const FrameIn
   std::vector<std::int32_t> changed;
   tear_bonds(*state_, tearing, changed, result_.tear_report);
   if (!changed.empty()) {
-    pull();
-    take_apart(*state_, changed);
-    push();
+    take_apart(changed);
     launch_measure();
     finish_measure();
   }
@@ -73,15 +71,13 @@ void CudaMpmTissue::tame() {
   std::vector<std::int32_t> changed;
   tear_threads(s, changed, result_.tear_report);
   if (!settled && changed.empty()) return;
-  if (changed.empty()) {
-    push_nodes();
-  } else {
-    take_apart(s, changed);
+  if (settled) push_nodes();
+  if (!changed.empty()) {
+    take_apart(changed);
     for (const int id : update_pieces(s.bodies, s.points, pieces_)) {
       result_.tear_report.new_fragments.push_back(id);
     }
     device_->points_changed = device_->faces.pieces_changed = true;
-    push();
   }
   launch_measure();
   finish_measure();

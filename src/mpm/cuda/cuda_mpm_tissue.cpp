@@ -54,8 +54,7 @@ CudaMpmTissue::CudaMpmTissue(const Scene& scene) : device_(std::make_unique<OnDe
   make_blocks(can_march(state_->bodies));
   pieces_ = whole_pieces(state_->bodies, state_->points);
   notes_.push_back("runs on the GPU (" + d.gpu +
-                   "); cuts are made on the host between frames, and "
-                   "a body that is whole does not touch itself");
+                   "); a body that is whole does not touch itself there");
   push();
   launch_measure();
   finish_measure();
@@ -89,10 +88,9 @@ void CudaMpmTissue::upload_colliders() {
 void CudaMpmTissue::begin(double duration, const FrameInput& input) {
   result_ = {};
   result_.loads.resize(state_->scene.tools.size());
-  if (!input.cuts.empty()) pull_displacements();
   for (const BladePath& path : input.cuts) {
     result_.cut_reports.emplace_back();
-    cut({path}, state_->nodes.u, state_->motion, result_.cut_reports.back());
+    cut({path}, nullptr, result_.cut_reports.back());
   }
   duration_ = duration;
   colliders_.emplace(state_->scene, input, duration);
@@ -182,7 +180,7 @@ void CudaMpmTissue::find_near(double duration) {
   for (int c = 0; c < swept.collider_count; ++c) {
     if (d.host_colliders[c].kind == Collider::kBlade) swept.blades |= 1u << c;
   }
-  d.near_cells.resize(d.partial.size());
+  d.near_cells.resize(d.of_blocks.partial.size());
   d.near_count.resize(1);
   launch_near(d.tables(), d.present(), d.measures.data(), swept,
               {d.near_cells.data(), d.near_count.data(), d.marks.data(), d.marks.size(),

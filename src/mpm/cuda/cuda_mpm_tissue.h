@@ -66,9 +66,12 @@ class CudaMpmTissue final : public Tissue {
   void make_blocks(bool may_march);
   void stop_marching();  ///< blocks that march are too tall to be cut well
   void plan_tables();    ///< how the blocks are worked on, and the tables for it
-  /// From displacements that are on the host; brings the rest where there is something to cut.
-  void cut(const std::vector<BladePath>& paths, const Array<float>* u_before,
-           const std::vector<BlockMotion>& before, CutReport& report);
+  /// While the tissue moves from `u_before` to where it is; null: it is at rest.
+  void cut(const std::vector<BladePath>& paths, const float4* u_before, CutReport& report);
+  void read_places(const float4* u_before);  ///< of points, at both times, for sweep()
+  std::vector<BrokenBond> sweep(const BladePath& path, bool moves);
+  /// What follows where points lost bonds; contacts come down and wait for the next search.
+  void take_apart(const std::vector<std::int32_t>& changed);
   void cut_by_blades();
   void keep_place_for_blades();
   std::vector<TearingPoint> find_tearing();
@@ -92,6 +95,12 @@ class CudaMpmTissue final : public Tissue {
   void pull_displacements();
   void pull_velocities();
   void push_nodes();
+  void push_tables();  ///< of blocks that are new; those that stay move on the GPU
+  void push_points(const std::vector<std::int32_t>& changed);  ///< their bonds, whether soft
+  /// The nodes that a cut of these points may change, or looks at.
+  std::vector<std::int32_t> nodes_around(const std::vector<std::int32_t>& points) const;
+  void pull_some(const std::vector<std::int32_t>& nodes);
+  void push_some(const std::vector<std::int32_t>& nodes);
   void pull_contacts();
   void launch_measure();
   void finish_measure();

@@ -6,12 +6,11 @@
 #include "mpm/cuda/cell_stabilisation.h"
 #include "mpm/cuda/frame_ends.h"
 #include "mpm/cuda/half_cell.h"
+#include "mpm/cuda/measure_sums.h"
 
 namespace tissue_sim {
 namespace {
 
-/// Of a thread block: a large block of tissue has one multiprocessor to itself.
-constexpr int kMostThreads = 512;
 int threads_for(int max_slots) { return max_slots > 1024 ? kMostThreads : 128; }
 
 /// A point's deformation gradient and place, from its half plane.
@@ -54,50 +53,6 @@ __device__ __forceinline__ void for_each_point(const CudaTables& t, const CudaBl
       if (b.whole != 0 || t.point[lane] >= 0) f(lane, 4 * sz + q, x, y, z, h);
     }
   }
-}
-
-__device__ __forceinline__ CudaMeasure of_nothing() {
-  return {0, 0, {1e30f, 1e30f, 1e30f}, {-1e30f, -1e30f, -1e30f}, 0, 1, 1, 1};
-}
-
-__device__ __forceinline__ void take(CudaMeasure& a, const CudaMeasure& b) {
-  a.elastic_energy += b.elastic_energy;
-  a.kinetic_energy += b.kinetic_energy;
-  for (int i = 0; i < 3; ++i) {
-    a.min[i] = fminf(a.min[i], b.min[i]);
-    a.max[i] = fmaxf(a.max[i], b.max[i]);
-  }
-  if (!(b.speed <= a.speed)) a.speed = b.speed;  // NaN stays
-  a.stiffening = fmaxf(a.stiffening, b.stiffening);
-  a.wildest = fmaxf(a.wildest, b.wildest);
-  a.finite = a.finite & b.finite;
-}
-
-/// Sums, least and largest over the lanes of a warp, in a fixed order, in its first lane.
-__device__ __forceinline__ void reduce_warp(CudaMeasure& m) {
-  for (int step = 16; step > 0; step /= 2) {
-    const auto far = [step](auto value) { return __shfl_down_sync(~0u, value, step); };
-    take(m, {far(m.elastic_energy),
-             far(m.kinetic_energy),
-             {far(m.min[0]), far(m.min[1]), far(m.min[2])},
-             {far(m.max[0]), far(m.max[1]), far(m.max[2])},
-             far(m.speed),
-             far(m.stiffening),
-             far(m.wildest),
-             far(m.finite)});
-  }
-}
-
-/// The same over the threads of a block, in its first thread.
-__device__ __forceinline__ void reduce(CudaMeasure& m) {
-  __shared__ CudaMeasure of_warp[kMostThreads / 32];
-  const int warp = static_cast<int>(threadIdx.x) / 32, lane = static_cast<int>(threadIdx.x) % 32;
-  reduce_warp(m);
-  if (lane == 0) of_warp[warp] = m;
-  __syncthreads();
-  if (warp != 0) return;
-  m = lane < static_cast<int>(blockDim.x) / 32 ? of_warp[lane] : of_nothing();
-  reduce_warp(m);
 }
 
 /// Of the nodes that the block owns, a thread's share.
@@ -188,14 +143,21 @@ __global__ void __launch_bounds__(kMostThreads)
   if (threadIdx.x == 0) out[blockIdx.x] = m;
 }
 
+/// The block of this thread block, whose displacements it brings.
+__device__ __forceinline__ CudaBlock bring_block(const CudaTables& t, const CudaNodes& state,
+                                                 float4* u) {
+  const CudaBlock b = t.blocks[blockIdx.x];
+  bring_nodes<false, false, 4>(t, b.first_slot, b.slots(), {}, state, state, nullptr, {},
+                               placed_scale(t.bodies[b.body]), u, nullptr);
+  __syncthreads();
+  return b;
+}
+
 __global__ void __launch_bounds__(kMostThreads)
     write_cloud(const CudaTables t, const CudaNodes state, const CudaCloud cloud) {
   extern __shared__ float4 shared[];
-  const CudaBlock b = t.blocks[blockIdx.x];
+  const CudaBlock b = bring_block(t, state, shared);
   const CudaBody body = t.bodies[b.body];
-  bring_nodes<false, false, 4>(t, b.first_slot, b.slots(), {}, state, state, nullptr, {},
-                               placed_scale(body), shared, nullptr);
-  __syncthreads();
   for_each_point(t, b, shared, [&](int lane, int s, int x, int y, int z, const HalfPlane(&h)[3]) {
     const int p = t.point[lane];
     const int place = cloud.place != nullptr  ? cloud.place[p]
@@ -224,16 +186,25 @@ __global__ void __launch_bounds__(kMostThreads)
   });
 }
 
+__global__ void __launch_bounds__(kMostThreads)
+    write_places(const CudaTables t, const CudaNodes state, float* places) {
+  extern __shared__ float4 shared[];
+  const CudaBlock b = bring_block(t, state, shared);
+  const CudaBody body = t.bodies[b.body];
+  for_each_point(t, b, shared, [&](int lane, int s, int x, int y, int z, const HalfPlane(&h)[3]) {
+    const PointState p = point_state(b, body, h, x, y, z, s);
+    float* place = places + 3 * static_cast<std::size_t>(t.point[lane]);
+    for (int a = 0; a < 3; ++a) place[a] = p.x[a];
+  });
+}
+
 /// The test of BlockKernels::stretched: s^2 I - C is not positive definite.
 __global__ void __launch_bounds__(kMostThreads)
     list_stretched(const CudaTables t, const CudaNodes state, StretchedPoint* found, int* count) {
   extern __shared__ float4 shared[];
-  const CudaBlock b = t.blocks[blockIdx.x];
+  const CudaBlock b = bring_block(t, state, shared);
   const CudaBody body = t.bodies[b.body];
   if (body.tear_stretch == 0) return;
-  bring_nodes<false, false, 4>(t, b.first_slot, b.slots(), {}, state, state, nullptr, {},
-                               placed_scale(body), shared, nullptr);
-  __syncthreads();
   const float s2 = body.tear_stretch * body.tear_stretch;
   for_each_point(t, b, shared, [&](int lane, int s, int x, int y, int z, const HalfPlane(&h)[3]) {
     const PointState p = point_state(b, body, h, x, y, z, s);
@@ -249,42 +220,42 @@ __global__ void __launch_bounds__(kMostThreads)
   });
 }
 
-/// Allows a kernel this much dynamic shared memory.
-template <class Kernel>
-void allow(Kernel kernel, std::size_t bytes) {
+/// Starts a kernel with one thread block for each block and room for so many numbers of each node.
+template <class... Parameters, class... Arguments>
+void launch(void (*kernel)(CudaTables, CudaNodes, Parameters...), int numbers, int max_slots,
+            const CudaTables& tables, const CudaNodes& state, cudaStream_t stream,
+            const Arguments&... arguments) {
+  const std::size_t bytes = numbers * sizeof(float) * max_slots;
   check_cuda(
       cudaFuncSetAttribute(reinterpret_cast<const void*>(kernel),
                            cudaFuncAttributeMaxDynamicSharedMemorySize, static_cast<int>(bytes)),
       "be set up");
+  kernel<<<tables.block_count, threads_for(max_slots), bytes, stream>>>(tables, state,
+                                                                        arguments...);
+  check_cuda(cudaGetLastError(), "start a kernel");
 }
 
 }  // namespace
 
 void launch_measure(const CudaTables& tables, const CudaNodes& state, int max_slots,
                     CudaMeasure* measures, cudaStream_t stream) {
-  const std::size_t bytes = 2 * sizeof(float4) * max_slots;
-  allow(measure_blocks, bytes);
-  measure_blocks<<<tables.block_count, threads_for(max_slots), bytes, stream>>>(
-      tables, state, max_slots, measures);
-  check_cuda(cudaGetLastError(), "start a kernel");
+  launch(measure_blocks, 8, max_slots, tables, state, stream, max_slots, measures);
 }
 
 void launch_stretched(const CudaTables& tables, const CudaNodes& state, int max_slots,
                       StretchedPoint* found, int* count, cudaStream_t stream) {
-  const std::size_t bytes = sizeof(float4) * max_slots;
-  allow(list_stretched, bytes);
   check_cuda(cudaMemsetAsync(count, 0, sizeof(int), stream), "clear memory");
-  list_stretched<<<tables.block_count, threads_for(max_slots), bytes, stream>>>(tables, state,
-                                                                                found, count);
-  check_cuda(cudaGetLastError(), "start a kernel");
+  launch(list_stretched, 4, max_slots, tables, state, stream, found, count);
+}
+
+void launch_places(const CudaTables& tables, const float4* u, int max_slots, float* places,
+                   cudaStream_t stream) {
+  launch(write_places, 4, max_slots, tables, {const_cast<float4*>(u), nullptr}, stream, places);
 }
 
 void launch_cloud(const CudaTables& tables, const CudaNodes& state, int max_slots,
                   const CudaCloud& cloud, cudaStream_t stream) {
-  const std::size_t bytes = sizeof(float4) * max_slots;
-  allow(write_cloud, bytes);
-  write_cloud<<<tables.block_count, threads_for(max_slots), bytes, stream>>>(tables, state, cloud);
-  check_cuda(cudaGetLastError(), "start a kernel");
+  launch(write_cloud, 4, max_slots, tables, state, stream, cloud);
 }
 
 }  // namespace tissue_sim

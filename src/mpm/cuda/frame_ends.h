@@ -19,6 +19,10 @@ void launch_measure(const CudaTables& tables, const CudaNodes& state, int max_sl
 void launch_stretched(const CudaTables& tables, const CudaNodes& state, int max_slots,
                       StretchedPoint* found, int* count, cudaStream_t stream);
 
+/// Writes where all points are, [points][3] [m].
+void launch_places(const CudaTables& tables, const float4* u, int max_slots, float* places,
+                   cudaStream_t stream);
+
 /// What clouds need to know of points beside where they are.
 struct CudaCloud {
   Point* points;                ///< where they go

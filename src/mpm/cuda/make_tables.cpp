@@ -1,6 +1,8 @@
 #include "mpm/cuda/make_tables.h"
 
 #include <algorithm>
+#include <unordered_map>
+#include <utility>
 
 #include "cutting/tear.h"
 
@@ -27,14 +29,15 @@ CudaBody body_of(const LatticeBody& b, const Material& m) {
   return body;
 }
 
-/// The block's points in the GPU's order, from the block's first lane on.
-void fill_points(const Block& from, float whole_volume, CudaBlock& block, HostTables& t) {
+/// The block's points in the GPU's order, into the tables from this lane on.
+void fill_points(const Block& from, float whole_volume, int first_lane, CudaBlock& block,
+                 HostTables& t) {
   // The GPU's lanes are all cells of the box, the CPU's those that hold points.
   const int columns = block.nx * block.ny;
   const std::size_t cells = static_cast<std::size_t>(block.nz) * columns;
-  std::int32_t* point = t.point.data() + block.first_lane;
-  float* volume = t.volume.data() + block.first_lane;
-  float* partial = t.partial.data() + block.first_lane / 8;
+  std::int32_t* point = t.made.point.data() + first_lane;
+  float* volume = t.made.volume.data() + first_lane;
+  float* partial = t.made.partial.data() + first_lane / 8;
   std::fill_n(point, 8 * cells, -1);
   std::fill_n(volume, 8 * cells, 0.0f);
   std::fill_n(partial, cells, 0.0f);
@@ -56,7 +59,6 @@ void fill_points(const Block& from, float whole_volume, CudaBlock& block, HostTa
     whole = whole && point[i] >= 0 && volume[i] == whole_volume;
   }
   block.whole = whole ? 1 : 0;
-  block.partial = from.partial.empty() ? 0 : 1;
   for (const Block::PartialCell& cell : from.partial) {
     partial[cell.lane / from.stride * columns + column_of[cell.lane % from.stride]] = cell.mu;
   }
@@ -69,16 +71,20 @@ float common_volume(const MpmState& state, int body) {
 }
 
 /// The columns of the block that hold points, as if it were alone in its bundle.
-std::vector<CudaColumn> columns_of(const CudaBlock& b, const HostTables& t) {
+std::vector<CudaColumn> columns_of(const Block& from, const CudaBlock& b) {
+  std::vector<std::uint8_t> holds(b.nx * b.ny, 0);
+  const std::vector<std::uint8_t> filled = filled_columns(from);
+  for (int lane = 0; lane < from.stride; ++lane) {
+    if (filled[lane] == 0) continue;
+    holds[from.cell[lane] / from.pitch * b.nx + from.cell[lane] % from.pitch] = 1;
+  }
   std::vector<CudaColumn> columns;
   const int step = b.nx * b.ny;
   for (int i = 0; i < step; ++i) {
-    CudaColumn c = {};
-    for (int k = 0; k < 8 * b.nz && c.nz == 0; ++k) {
-      if (t.point[b.first_lane + k * step + i] >= 0) c.nz = b.nz;
-    }
-    if (c.nz == 0) continue;
+    if (holds[i] == 0) continue;
     const int x = i % b.nx, y = i / b.nx;
+    CudaColumn c = {};
+    c.nz = b.nz;
     c.pitch = b.nx + 2;
     c.plane = c.pitch * (b.ny + 2);
     c.slot = y * c.pitch + x;
@@ -102,13 +108,13 @@ CudaBlock block_at(const MpmState& state, const Block& from, int first_slot, int
   block.nz = from.nz;
   block.first_slot = first_slot;
   block.first_lane = first_lane;
+  block.partial = from.partial.empty() ? 0 : 1;
   const Vec3 origin = state.bodies[from.body].node_position(from.x - 1, from.y - 1, from.z - 1);
   for (int a = 0; a < 3; ++a) block.origin[a] = static_cast<float>(origin[a]);
   return block;
 }
 
-void fill_slots(const Block& from, const CudaBlock& block, HostTables& t) {
-  std::int32_t* to = t.slot_node.data() + block.first_slot;
+void fill_slots(const Block& from, const CudaBlock& block, std::int32_t* to) {
   for (int z = 0; z < block.nz + 2; ++z) {
     for (int y = 0; y < block.ny + 2; ++y) {
       const int* row = from.node.data() + z * from.plane + y * from.pitch;
@@ -119,24 +125,42 @@ void fill_slots(const Block& from, const CudaBlock& block, HostTables& t) {
 
 /// Where each block has its slots and lanes, the bundles' one after the other.
 void lay_out(const MpmState& state, const std::vector<std::vector<int>>& bundles, HostTables& t) {
-  int slots = 0, lanes = 0;
+  std::unordered_map<int, int> before;  // place of each block in `t`, by its number
+  for (std::size_t i = 0; i < t.number.size(); ++i) before[t.number[i]] = static_cast<int>(i);
+  const std::vector<CudaBlock> blocks = std::move(t.blocks);
   t.blocks.clear();
   t.of_host.clear();
+  t.number.clear();
+  t.origin.clear();
   t.first_slot.resize(state.blocks.all.size());
-  for (const std::vector<int>& blocks : bundles) {
-    for (const int index : blocks) {
+  int slots = 0, lanes = 0, new_slots = 0, new_lanes = 0;
+  for (const std::vector<int>& bundle : bundles) {
+    for (const int index : bundle) {
       const Block& from = *state.blocks.all[index];
-      t.blocks.push_back(block_at(state, from, slots, lanes, t));
-      t.of_host.push_back(index);
+      CudaBlock b = block_at(state, from, slots, lanes, t);
+      const int block_lanes = 8 * b.nx * b.ny * b.nz;
       t.first_slot[index] = slots;
-      slots += t.blocks.back().slots();
-      lanes += 8 * from.nx * from.ny * from.nz;
+      slots += b.slots();
+      lanes += block_lanes;
+      const auto known = before.find(from.number);
+      if (known != before.end()) {
+        const CudaBlock& same = blocks[known->second];
+        b.whole = same.whole;
+        t.origin.push_back({same.first_slot, same.first_lane, 0});
+      } else {
+        t.origin.push_back({new_slots, new_lanes, 1});
+        new_slots += b.slots();
+        new_lanes += block_lanes;
+      }
+      t.blocks.push_back(b);
+      t.of_host.push_back(index);
+      t.number.push_back(from.number);
     }
   }
-  t.slot_node.resize(slots);
-  t.point.resize(lanes);
-  t.volume.resize(lanes);
-  t.partial.resize(lanes / 8);
+  t.slots = slots;
+  t.lanes = lanes;
+  t.all_new = new_slots == slots;
+  t.made.resize(new_slots, new_lanes);
 }
 
 void add_bundle(int first_block, int blocks, std::vector<std::vector<CudaColumn>>& columns,
@@ -184,11 +208,13 @@ void make_tables(const MpmState& state, const std::vector<std::vector<int>>& bun
   std::vector<std::vector<CudaColumn>> columns(t.blocks.size());
   state.cpu->for_each(static_cast<int>(t.blocks.size()), [&](int i) {
     const Block& from = *state.blocks.all[t.of_host[i]];
+    const CudaBlockOrigin& origin = t.origin[i];
     CudaBlock& block = t.blocks[i];
-    const CudaBody& body = t.bodies[block.body];
-    fill_points(from, body.point_volume, block, t);
-    fill_slots(from, block, t);
-    columns[i] = columns_of(block, t);
+    if (origin.is_new != 0) {
+      fill_points(from, t.bodies[block.body].point_volume, origin.first_lane, block, t);
+      fill_slots(from, block, t.made.slot_node.data() + origin.first_slot);
+    }
+    columns[i] = columns_of(from, block);
   });
   t.bundles.clear();
   t.columns.clear();

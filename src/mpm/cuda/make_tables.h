@@ -3,14 +3,12 @@
 
 #include <vector>
 
-#include "compute/device_array.h"
-#include "mpm/cuda/tables.h"
+#include "mpm/cuda/block_tables.h"
 #include "mpm/mpm_state.h"
 
 namespace tissue_sim {
 
-/// See CudaTables; what slots share is found on the GPU (connect_slots.h). Kept from cut to cut,
-/// for its memory.
+/// See CudaTables; what slots share is found on the GPU (connect_slots.h).
 struct HostTables {
   std::vector<CudaBody> bodies;     ///< of each body, its materials
   std::vector<int> first_material;  ///< of each body, in `bodies`
@@ -19,15 +17,18 @@ struct HostTables {
   std::vector<int> first_slot;  ///< of each of Blocks::all
   std::vector<CudaBundle> bundles;
   std::vector<CudaColumn> columns;
-  PinnedArray<std::int32_t> slot_node;
-  PinnedArray<float> volume, partial;
-  PinnedArray<std::int32_t> point;
-  int max_slots = 0;        ///< of a bundle
-  int max_plane_slots = 0;  ///< the same of one plane
-  int max_columns = 0;      ///< of a bundle
+  std::size_t slots = 0, lanes = 0;     ///< of all blocks
+  std::vector<int> number;              ///< Block::number of each
+  std::vector<CudaBlockOrigin> origin;  ///< of each
+  bool all_new = true;                  ///< all blocks are
+  BlockTablesIn<PinnedArray> made;      ///< of the new blocks alone, one after the other
+  int max_slots = 0;                    ///< of a bundle
+  int max_plane_slots = 0;              ///< the same of one plane
+  int max_columns = 0;                  ///< of a bundle
 };
 
-/// `bundles` are the blocks, by their places in Blocks::all, that share a thread block.
+/// Makes them anew; what blocks that were in `tables` before have there stays on the GPU. `bundles`
+/// are the blocks, by their places in Blocks::all, that share a thread block.
 void make_tables(const MpmState& state, const std::vector<std::vector<int>>& bundles,
                  HostTables& tables);
 

@@ -12,9 +12,27 @@
 #include "mpm/cuda/held_points.h"
 #include "mpm/cuda/make_tables.h"
 #include "mpm/cuda/near_cells.h"
+#include "mpm/cuda/some_nodes.h"
 #include "mpm/cuda/stacks.h"
+#include "mpm/cuda/sweep_blade.h"
 
 namespace tissue_sim {
+
+/// See CudaSweep.
+struct SweepOnDevice {
+  DeviceArray<CudaSweptEdge> edges;
+  DeviceArray<CudaBlockCell> cells;
+  DeviceArray<float> places[2];
+  DeviceArray<BrokenBond> broken;
+  DeviceArray<int> count;
+  PinnedArray<int> host_count;
+  DeviceArray<CudaPointChange> changes;
+
+  std::size_t bytes() const {
+    return edges.bytes() + cells.bytes() + places[0].bytes() + places[1].bytes() + broken.bytes() +
+           changes.bytes();
+  }
+};
 
 struct CudaMpmTissue::OnDevice {
   CudaLimits limits;
@@ -38,13 +56,16 @@ struct CudaMpmTissue::OnDevice {
   DeviceArray<std::uint32_t> pushed_parts;  ///< CudaTables::slot_parts with kPushed
   DeviceArray<long long> pushed;            ///< NodePushes::force
   DeviceArray<CudaBody> bodies;
-  DeviceArray<std::int32_t> slot_node, point, piece, place;
+  BlockTables of_blocks, made, spare;  ///< those that hold; of new blocks; room for the next
+  DeviceArray<CudaBlockOrigin> origins;
+  DeviceArray<std::int32_t> piece, place, some_nodes;
+  DeviceArray<float4> packed;  ///< of some nodes: u, then v
   DeviceArray<std::uint32_t> slot_parts, parts, colour;
   DeviceArray<uint4> first_parts;
   Stacks stacks;
   ConnectRoom connect_room;
   PinnedArray<int> most_sharing;
-  DeviceArray<float> volume, partial, hold;
+  DeviceArray<float> hold;
   DeviceArray<std::uint8_t> bonds, soft, with, whole;
   int held_by = 0;  ///< CudaTables::held_by
   DeviceArray<float4> u[2], v[2], force[2], u_before;
@@ -58,6 +79,7 @@ struct CudaMpmTissue::OnDevice {
   PinnedArray<int> host_stretched_count;
   DeviceArray<Point> cloud;
   FacesOnDevice faces;
+  SweepOnDevice sweep;
   /// What a part of a frame changes, unless something is cut or tears, as it was before the part.
   struct Checkpoint {
     DeviceArray<float4> u, v;
@@ -105,13 +127,13 @@ struct CudaMpmTissue::OnDevice {
     t.columns = columns.data();
     t.block_count = static_cast<int>(blocks.size());
     t.bundle_count = static_cast<int>(bundles.size());
-    t.slot_node = slot_node.data();
+    t.slot_node = of_blocks.slot_node.data();
     t.slot_parts = slot_parts.data();
     t.first_parts = first_parts.data();
     t.parts = parts.data();
-    t.volume = volume.data();
-    t.point = point.data();
-    t.partial = partial.data();
+    t.volume = of_blocks.volume.data();
+    t.point = of_blocks.point.data();
+    t.partial = of_blocks.partial.data();
     t.bonds = bonds.data();
     t.soft = soft.size() > 0 ? soft.data() : nullptr;
     t.held_by = held_by;

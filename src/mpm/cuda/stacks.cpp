@@ -56,7 +56,7 @@ void Stacks::make(const HostTables& t, const std::vector<Block*>& blocks, int at
 
   std::vector<CudaBlock> stacks;
   std::vector<CudaBundle> bundles;
-  slot_node_.resize(t.slot_node.size());
+  slot_node_.resize(t.slots);
   int slots = 0;
   for (int i = 0; i < static_cast<int>(t.blocks.size()); ++i) {
     const CudaBlock& b = t.blocks[i];
@@ -108,7 +108,7 @@ CudaTables Stacks::of(CudaTables t) const {
 
 std::size_t Stacks::bytes_for(const HostTables& t, const std::vector<Block*>& blocks, int at_once) {
   constexpr std::size_t of_slot = 3 * sizeof(std::int32_t) + sizeof(uint4);
-  return Heights(t, blocks, at_once).stack == 1 ? 0 : of_slot * t.slot_node.size();
+  return Heights(t, blocks, at_once).stack == 1 ? 0 : of_slot * t.slots;
 }
 
 std::size_t Stacks::bytes() const {

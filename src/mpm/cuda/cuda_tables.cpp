@@ -1,0 +1,215 @@
+// What goes to the GPU when tissue is new or was cut: tables, nodes, points.
+#include <algorithm>
+
+#include "mpm/cuda/on_device.h"
+
+namespace tissue_sim {
+namespace {
+
+/// What the tables and the state take on the GPU; clouds and contacts between tissue come on top.
+std::size_t bytes_of(const HostTables& t, std::size_t nodes, std::size_t points, int held_by,
+                     std::size_t most_held) {
+  const std::size_t of_contact = 9 * sizeof(long long) * nodes + 6 * t.lanes;
+  constexpr std::size_t of_connecting = 16;  // two numbers a slot, and as much again to sort them
+  return t.blocks.size() * (sizeof(CudaBlock) + sizeof(CudaMeasure)) +
+         t.bundles.size() * sizeof(CudaBundle) + t.columns.size() * sizeof(CudaColumn) +
+         t.slots * (of_connecting + 16 + sizeof(uint4) + 2 * sizeof(float4)) + 8 * t.lanes +
+         t.lanes / 2 + (6 * sizeof(float4) + 1) * nodes + (1 + 13 * held_by) * points +
+         most_held * sizeof(HeldPoint) + (held_by > 0 ? of_contact : 0);
+}
+
+/// Says how much memory the tissue takes, where the GPU has less.
+void check_memory(std::size_t wanted, std::size_t held) {
+  std::size_t free = 0, total = 0;
+  check_cuda(cudaMemGetInfo(&free, &total), "be asked");
+  if (wanted <= free + held) return;
+  const auto megabytes = DeviceArray<char>::megabytes;
+  throw std::runtime_error("the GPU's memory does not suffice: the scene needs " +
+                           megabytes(wanted) + ", " + megabytes(free + held) + " of " +
+                           megabytes(total) + " are free; raise cell_size or set device to cpu");
+}
+
+}  // namespace
+
+std::size_t CudaMpmTissue::device_bytes() const {
+  const OnDevice& d = *device_;
+  std::size_t sum = d.blocks.bytes() + d.bundles.bytes() + d.columns.bytes() +
+                    d.near_cells.bytes() + d.bodies.bytes() + d.of_blocks.bytes() + d.made.bytes() +
+                    d.spare.bytes() + d.origins.bytes() + d.sweep.bytes() + d.some_nodes.bytes() +
+                    d.packed.bytes() + d.piece.bytes() + d.place.bytes() + d.slot_parts.bytes() +
+                    d.first_parts.bytes() + d.parts.bytes() + d.pushed_parts.bytes() +
+                    d.marks.bytes() + d.pushed.bytes() + d.colour.bytes() + d.hold.bytes() +
+                    d.bonds.bytes() + d.soft.bytes() + d.with.bytes() + d.whole.bytes() +
+                    d.u_before.bytes() + d.connect_room.bytes() + d.colliders.bytes() +
+                    d.loads.bytes() + d.measures.bytes() + d.cloud.bytes() + d.stretched.bytes() +
+                    d.faces.bytes() + d.checkpoint.bytes() + d.stacks.bytes();
+  for (int i = 0; i < 2; ++i) sum += d.u[i].bytes() + d.v[i].bytes() + d.force[i].bytes();
+  return sum;
+}
+
+void CudaMpmTissue::plan_tables() {
+  OnDevice& d = *device_;
+  d.plan.threads = d.shape.threads;
+  d.plan.small = d.shape.small;
+  d.plan.marches = d.shape.marches;
+  d.plan.pairs = d.shape.pairs();
+  d.plan.max_slots = d.plan.max_plane_slots = 0;
+  const std::vector<Block*>& blocks = state_->blocks.all;
+  for (const Block* b : blocks) {
+    const int plane = (b->nx + 2) * (b->ny + 2);
+    d.plan.max_slots = std::max(d.plan.max_slots, plane * (b->nz + 2));
+    d.plan.max_plane_slots = std::max(d.plan.max_plane_slots, plane);
+  }
+  for (const LatticeBody& b : state_->bodies) {
+    for (const Material& m : b.materials) {
+      const bool neo_hookean = m.law == Law::kNeoHookean;
+      d.plan.neo_hookean = d.plan.neo_hookean || neo_hookean;
+      d.plan.fixed_corotated = d.plan.fixed_corotated || !neo_hookean;
+      d.plan.viscous = d.plan.viscous || m.viscosity > 0;
+    }
+  }
+  const auto choose = [&d](std::size_t count) {
+    d.resident = resident_blocks(d.plan, static_cast<int>(count));
+    d.plain_plan = d.plan;
+    d.plain_plan.plain = true;
+    d.plain_resident = resident_blocks(d.plain_plan, static_cast<int>(count));
+    d.push_plan = d.plan;
+    d.push_plan.pushes = true;
+    d.push_resident = resident_blocks(d.push_plan, static_cast<int>(count));
+  };
+  choose(blocks.size());
+  std::vector<std::vector<int>> bundles;
+  if (!(d.plan.cached && d.push_plan.cached)) {
+    // As many as whole tissue has, or, of a small one, as run at once.
+    const auto at_once = static_cast<std::size_t>(
+        std::max(1, std::min(most_at_once(d.plan), most_at_once(d.push_plan))));
+    const std::size_t rounds = (state_->blocks.regions.size() + at_once - 1) / at_once;
+    const std::size_t wanted = d.plan.small ? at_once : rounds * at_once;
+    if (blocks.size() > wanted) {
+      // Two halves of a block that was cut have a rim more.
+      d.push_plan.max_plane_slots = 3 * d.plan.max_plane_slots / 2;
+      const BundleLimits limits = {d.shape.columns(), d.push_plan.max_plane_slots,
+                                   most_slots(d.push_plan)};
+      bundles = bundle_blocks(blocks, wanted, limits, *state_->cpu);
+    }
+    if (bundles.empty() || bundles.size() > wanted) {
+      bundles = d.plan.marches
+                    ? blocks_by_column(blocks)
+                    : single_blocks(blocks, d.plan.small ? at_once : blocks.size(), *state_->cpu);
+    }
+  } else {
+    bundles = single_blocks(blocks, blocks.size(), *state_->cpu);
+  }
+  HostTables& t = d.host_tables;
+  make_tables(*state_, bundles, t);
+  d.plan.max_slots = t.max_slots;
+  d.plan.max_plane_slots = t.max_plane_slots;
+  d.plan.max_columns = t.max_columns;
+  choose(t.bundles.size());
+  d.all_plain = std::all_of(t.bundles.begin(), t.bundles.end(),
+                            [](const CudaBundle& b) { return b.blocks == 1 && b.partial == 0; });
+  if (d.resident == 0 || d.plain_resident == 0 || d.push_resident == 0) {
+    throw std::runtime_error("the GPU has too little shared memory");
+  }
+}
+
+void CudaMpmTissue::push() {
+  OnDevice& d = *device_;
+  d.host_tables.number.clear();  // all blocks are new
+  push_tables();
+  d.bonds.upload(state_->points.bonds, d.stream);
+  if (!state_->points.soft.empty()) d.soft.upload(state_->points.soft, d.stream);
+  push_nodes();
+}
+
+void CudaMpmTissue::push_tables() {
+  OnDevice& d = *device_;
+  plan_tables();
+  const HostTables& t = d.host_tables;
+  const std::size_t n = state_->nodes.size();
+  const auto points = static_cast<std::size_t>(state_->points.size());
+  const Scene& scene = state_->scene;
+  const int colliders = collider_count(scene) - (scene.ground.enabled ? 0 : 1);
+  d.held_by = std::min(colliders, 2);
+  const std::size_t most_held = OnDevice::Checkpoint::most_held(d.held_by * points);
+  const std::size_t of_stacks =
+      d.plan.marches ? Stacks::bytes_for(t, state_->blocks.all, d.plain_resident) : 0;
+  check_memory(bytes_of(t, n, points, d.held_by, most_held) + of_stacks, device_bytes());
+  check_cuda(cudaStreamSynchronize(d.stream), "finish a frame");
+  d.blocks.upload(t.blocks, d.stream);
+  d.bundles.upload(t.bundles, d.stream);
+  d.columns.upload(t.columns, d.stream);
+  d.bodies.upload(t.bodies, d.stream);
+  if (t.all_new) {
+    d.of_blocks.upload(t.made, d.stream);
+  } else {
+    d.made.upload(t.made, d.stream);
+    d.origins.upload(t.origin, d.stream);
+    d.spare.resize(t.slots, t.lanes);
+    launch_move_tables(d.blocks.data(), d.origins.data(), static_cast<int>(t.blocks.size()),
+                       d.of_blocks, d.made, d.spare, d.stream);
+    d.of_blocks.swap(d.spare);
+  }
+  const std::size_t slots = t.slots;
+  d.slot_parts.resize(slots);
+  d.first_parts.resize(slots);
+  d.parts.resize(slots);
+  d.most_sharing.resize(1);
+  d.stacks.clear();
+  if (d.plan.marches) {
+    d.stacks.make(t, state_->blocks.all, d.plain_resident, d.of_blocks.slot_node.data(), n,
+                  d.connect_room, d.most_sharing.data(), d.stream);
+  }
+  connect_slots({d.of_blocks.slot_node.data(), d.slot_parts.data(), d.first_parts.data(),
+                 d.parts.data(), slots},
+                n, d.connect_room, d.most_sharing.data(), d.stream);
+  d.pushed_parts.resize(slots);
+  if (d.marks.size() != n) {
+    d.marks.resize(n);
+    d.marks.clear(d.stream);
+  }
+  for (auto& force : d.force) {
+    force.resize(slots);
+    force.clear(d.stream);
+  }
+  if (d.with.size() != d.held_by * points) {
+    d.with.resize(d.held_by * points);
+    d.with.clear(d.stream);
+    d.hold.resize(3 * d.held_by * points);
+    d.hold.clear(d.stream);
+  }
+  d.checkpoint.resize(n, d.with.size());
+  d.arrived.resize(2);
+  check_cuda(cudaStreamSynchronize(d.stream), "receive data");
+  if (d.most_sharing[0] > kMostSharing) {
+    throw std::runtime_error("a node is shared by more than " + std::to_string(kMostSharing) +
+                             " blocks, as many as the GPU's tables hold: set device to cpu");
+  }
+}
+
+void CudaMpmTissue::make_blocks(bool may_march) {
+  OnDevice& d = *device_;
+  d.shape = choose_shape(state_->bodies, d.limits, may_march);
+  d.shape.blocks.one_material = true;
+  d.shape.blocks.has_rows = false;
+  state_->blocks = tissue_sim::make_blocks(state_->bodies, state_->points, *state_->fields,
+                                           d.shape.blocks, *state_->cpu);
+  d.host_tables.number.clear();
+  list_facets(*state_);
+}
+
+void CudaMpmTissue::stop_marching() {
+  make_blocks(false);
+  // Until they are measured, any block may be where any of the tissue is.
+  for (std::vector<BlockMotion>* motion : {&state_->motion, &motion_before_}) {
+    BlockMotion all;
+    for (const BlockMotion& m : *motion) {
+      all.box.min = all.box.min.cwiseMin(m.box.min);
+      all.box.max = all.box.max.cwiseMax(m.box.max);
+      if (!(m.speed <= all.speed)) all.speed = m.speed;
+    }
+    motion->assign(state_->blocks.all.size(), all);
+  }
+}
+
+}  // namespace tissue_sim

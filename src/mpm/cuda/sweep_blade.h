@@ -1,0 +1,47 @@
+// A blade's sweep through tissue that lives on a GPU.
+#pragma once
+
+#include "cutting/bonds.h"
+#include "cutting/edge_passes.h"
+#include "mpm/cuda/tables.h"
+
+namespace tissue_sim {
+
+/// An edge of a part of a path, and the share of the path's time that the part spans.
+struct CudaSweptEdge {
+  SweptEdgeOf<Vector3> edge;
+  double begin, end;
+};
+
+/// Where a block is: its lowest cell, in its body's lattice, and which that is.
+struct CudaBlockCell {
+  std::int32_t x, y, z, lattice;
+};
+
+struct CudaSweep {
+  const CudaSweptEdge* edges;
+  int edge_count;
+  double reach;  ///< bonds of points within this from what an edge sweeps are looked at [m]
+  const CudaBlockCell* cells;  ///< per block
+  const CudaLattice* lattices;
+  const std::int32_t* point_at;  ///< LatticeBody::point_at, body after body
+  const float *begin, *end;      ///< places of the points at both times, [points][3] [m]
+  const float4* u;               ///< displacements at the end
+  BrokenBond* broken;
+  int* broken_count;  ///< may become more than there is room for
+  int room;           ///< of `broken`
+};
+
+/// Lists the bonds that edges pass while the tissue moves from one of these places to the other.
+void launch_sweep(const CudaTables& tables, const CudaSweep& sweep, cudaStream_t stream);
+
+/// What cuts change of a point.
+struct CudaPointChange {
+  std::int32_t point;
+  std::uint8_t bonds, soft;
+};
+/// `soft` is null where no point is soft.
+void launch_change_points(const CudaPointChange* changes, int count, std::uint8_t* bonds,
+                          std::uint8_t* soft, cudaStream_t stream);
+
+}  // namespace tissue_sim

@@ -185,21 +185,6 @@ __device__ __forceinline__ void bring_nodes(const CudaTables& t, int first_slot,
   }
 }
 
-/// Column `index` of a block that is alone in its bundle, all of whose columns hold points.
-__device__ __forceinline__ CudaColumn column_of(const CudaBlock& b, int index) {
-  const int y = index / b.nx, x = index - y * b.nx;
-  CudaColumn c;
-  c.pitch = b.nx + 2;
-  c.plane = c.pitch * (b.ny + 2);
-  c.slot = y * c.pitch + x;
-  c.nz = b.nz;
-  c.lane = b.first_lane + index;
-  c.step = b.nx * b.ny;
-  c.cell = b.first_lane / 8 + index;
-  c.plane_slot = c.slot;
-  c.whole = b.whole;
-  return c;
-}
 /// Column `index` of a bundle, `block` its first: from memory only where it must be.
 __device__ __forceinline__ CudaColumn column_of(const CudaTables& t, const CudaBundle& w,
                                                 const CudaBlock& block, int index) {

@@ -222,12 +222,12 @@ void CudaMpmTissue::pull_contacts() {
   f.gathered.clear(d.stream);  // the same
   launch_gather_contacts(looks(), count, f.gathered.data(), d.stream);
   std::vector<FaceSpring> springs(count);
+  std::vector<std::int32_t> active(count);
   f.gathered.download(springs.data(), count, d.stream);
   f.figures.download(f.host_figures.data(), 1, d.stream);
+  f.active.download(active.data(), count, d.stream);
   check_cuda(cudaStreamSynchronize(d.stream), "send contacts");
-  std::vector<std::int32_t> active(f.host_figures[0].active);
-  f.active.download(active.data(), active.size(), d.stream);
-  check_cuda(cudaStreamSynchronize(d.stream), "send contacts");
+  active.resize(f.host_figures[0].active);
   std::sort(springs.begin(), springs.end(),
             [](const FaceSpring& a, const FaceSpring& b) { return a.facet < b.facet; });
   std::sort(active.begin(), active.end());

@@ -126,69 +126,73 @@ void launch(int count, int parts, const F& f, double2* sums, float* largest, cud
 
 CudaLinearisedMotion::CudaLinearisedMotion(const CudaNodes& present, const CudaNodes& scratch,
                                            std::size_t node_count, double cell_size,
-                                           Substep substep, cudaStream_t stream)
+                                           Substep substep, CudaMotionRoom& room,
+                                           cudaStream_t stream)
     : present_(present),
       scratch_(scratch),
       count_(static_cast<int>(node_count)),
       parts_((count_ + kThreads - 1) / kThreads),
       small_(kSmallMotion * static_cast<float>(cell_size)),
       substep_(std::move(substep)),
-      stream_(stream) {
-  for (DeviceArray<float4>* x : {&u_, &rates_, &at_rest_, &before_, &v_}) x->resize(node_count);
-  largest_.resize(1);
-  part_sum_.resize(parts_);
-  part_largest_.resize(parts_);
-  host_sum_.resize(parts_);
-  before_at_ = before_.data();
-  v_at_ = v_.data();
+      stream_(stream),
+      room_(room),
+      u_(room.fields[0]),
+      rates_(room.fields[1]),
+      at_rest_(room.fields[2]),
+      before_(room.fields[3]),
+      v_(room.fields[4]) {
+  room.largest.resize(1);
+  room.part_sum.resize(parts_);
+  room.part_largest.resize(parts_);
+  room.host_sum.resize(parts_);
 }
 
 double2 CudaLinearisedMotion::sum() {
-  part_sum_.download(host_sum_.data(), parts_, stream_);
+  room_.part_sum.download(room_.host_sum.data(), parts_, stream_);
   check_cuda(cudaStreamSynchronize(stream_), "measure its motion");
   double2 s{0, 0};
   for (int i = 0; i < parts_; ++i) {
-    s.x += host_sum_[i].x;
-    s.y += host_sum_[i].y;
+    s.x += room_.host_sum[i].x;
+    s.y += room_.host_sum[i].y;
   }
   return s;
 }
 
 void CudaLinearisedMotion::find_largest() {
-  largest_of<<<1, kThreads, 0, stream_>>>(part_largest_.data(), parts_, largest_.data());
+  largest_of<<<1, kThreads, 0, stream_>>>(room_.part_largest.data(), parts_, room_.largest.data());
   check_cuda(cudaGetLastError(), "start a kernel");
 }
 
 void CudaLinearisedMotion::accelerate() {
-  Gpu(stream_).for_each(count_, Displace{present_, v_at_, largest_.data(), small_, u_.data()});
-  substep_({u_.data(), rates_.data()}, scratch_);
+  Gpu(stream_).for_each(count_, Displace{present_, v_, room_.largest.data(), small_, u_});
+  substep_({u_, rates_}, scratch_);
 }
 
 void CudaLinearisedMotion::start() {
-  before_.clear(stream_);
-  largest_.clear(stream_);
-  launch(count_, parts_, Start{present_, rates_.data(), v_at_}, part_sum_.data(),
-         part_largest_.data(), stream_);
+  check_cuda(cudaMemsetAsync(before_, 0, count_ * sizeof(float4), stream_), "clear memory");
+  room_.largest.clear(stream_);
+  launch(count_, parts_, Start{present_, rates_, v_}, room_.part_sum.data(),
+         room_.part_largest.data(), stream_);
   const double square = sum().x;
   accelerate();  // by nothing, for the largest is not known yet
-  check_cuda(cudaMemcpyAsync(at_rest_.data(), scratch_.v, count_ * sizeof(float4),
+  check_cuda(cudaMemcpyAsync(at_rest_, scratch_.v, count_ * sizeof(float4),
                              cudaMemcpyDeviceToDevice, stream_),
              "copy data");
   // v / |v|: the vector before it is 0, so it changes places with v.
   w_square_ = along_v_ = along_before_ = 0;
   const auto scale = static_cast<float>(square > 0 ? 1 / std::sqrt(square) : 0);
-  launch(count_, parts_, Next{v_at_, before_at_, 0, 0, scale, before_at_}, part_sum_.data(),
-         part_largest_.data(), stream_);
+  launch(count_, parts_, Next{v_, before_, 0, 0, scale, before_}, room_.part_sum.data(),
+         room_.part_largest.data(), stream_);
   find_largest();
-  std::swap(before_at_, v_at_);
-  check_cuda(cudaMemsetAsync(before_at_, 0, count_ * sizeof(float4), stream_), "clear memory");
+  std::swap(before_, v_);
+  check_cuda(cudaMemsetAsync(before_, 0, count_ * sizeof(float4), stream_), "clear memory");
 }
 
 double CudaLinearisedMotion::apply() {
   accelerate();
   launch(count_, parts_,
-         Difference{present_, at_rest_.data(), v_at_, largest_.data(), small_, scratch_.v},
-         part_sum_.data(), part_largest_.data(), stream_);
+         Difference{present_, at_rest_, v_, room_.largest.data(), small_, scratch_.v},
+         room_.part_sum.data(), room_.part_largest.data(), stream_);
   const double2 sums = sum();
   w_square_ = sums.y;
   return sums.x;
@@ -203,11 +207,11 @@ double CudaLinearisedMotion::orthogonalise(double along_v, double along_before) 
 
 void CudaLinearisedMotion::next(double length) {
   launch(count_, parts_,
-         Next{scratch_.v, v_at_, static_cast<float>(along_v_), static_cast<float>(along_before_),
-              static_cast<float>(1 / length), before_at_},
-         part_sum_.data(), part_largest_.data(), stream_);
+         Next{scratch_.v, v_, static_cast<float>(along_v_), static_cast<float>(along_before_),
+              static_cast<float>(1 / length), before_},
+         room_.part_sum.data(), room_.part_largest.data(), stream_);
   find_largest();
-  std::swap(before_at_, v_at_);
+  std::swap(before_, v_);
 }
 
 }  // namespace tissue_sim

@@ -9,6 +9,16 @@
 
 namespace tissue_sim {
 
+/// What the linearised motion works in, kept from measure to measure.
+struct CudaMotionRoom {
+  static constexpr int kFields = 5;
+  float4* fields[kFields];     ///< of all nodes, that nobody else needs meanwhile
+  DeviceArray<float> largest;  ///< component of v
+  DeviceArray<double2> part_sum;
+  DeviceArray<float> part_largest;
+  PinnedArray<double2> host_sum;
+};
+
 /// For largest_eigenvalue(). Waits for the GPU once a step; gives the same bits each time.
 class CudaLinearisedMotion {
  public:
@@ -17,7 +27,8 @@ class CudaLinearisedMotion {
 
   /// About `present`; `scratch` is of the same size, and overwritten where nodes have mass.
   CudaLinearisedMotion(const CudaNodes& present, const CudaNodes& scratch, std::size_t node_count,
-                       double cell_size, Substep substep, cudaStream_t stream);
+                       double cell_size, Substep substep, CudaMotionRoom& room,
+                       cudaStream_t stream);
 
   void start();
   double apply();
@@ -37,13 +48,9 @@ class CudaLinearisedMotion {
   float small_;  ///< largest displacement [m]
   Substep substep_;
   cudaStream_t stream_;
-  DeviceArray<float4> u_, rates_, at_rest_, before_, v_;
-  float4 *before_at_, *v_at_;   ///< which of the two is which
-  DeviceArray<float> largest_;  ///< component of v
+  CudaMotionRoom& room_;
+  float4 *u_, *rates_, *at_rest_, *before_, *v_;
   double w_square_ = 0, along_v_ = 0, along_before_ = 0;
-  DeviceArray<double2> part_sum_;
-  DeviceArray<float> part_largest_;
-  PinnedArray<double2> host_sum_;
 };
 
 }  // namespace tissue_sim

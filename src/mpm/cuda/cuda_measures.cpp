@@ -29,6 +29,18 @@ double CudaMpmTissue::measure_limit(int steps) {
   frame.substeps = 1;
   frame.step.dt = 1;
   frame.arrived = d.arrived.data();
+  // Between two parts of a frame nobody needs the state before a part, nor what contact pushes
+  // with.
+  const std::size_t n = d.u[0].size();
+  DeviceArray<float4> more;
+  auto* fields = reinterpret_cast<float4*>(d.pushed.data());
+  if (d.pushed.size() * sizeof(long long) < 3 * n * sizeof(float4)) {
+    more.resize(3 * n);
+    fields = more.data();
+  }
+  float4* const room[] = {d.checkpoint.u.data(), d.checkpoint.v.data(), fields, fields + n,
+                          fields + 2 * n};
+  std::copy(std::begin(room), std::end(room), d.motion_room.fields);
   CudaLinearisedMotion motion(
       d.present(), d.nodes(1 - d.current), d.u[0].size(), state_->scene.cell_size,
       [&](const CudaNodes& from, const CudaNodes& to) {
@@ -40,7 +52,7 @@ double CudaMpmTissue::measure_limit(int steps) {
           launch_substeps(d.plan, d.tables(), frame, d.resident, d.stream);
         }
       },
-      d.stream);
+      d.motion_room, d.stream);
   return 2 / std::sqrt(largest_eigenvalue(motion, steps));
 }
 

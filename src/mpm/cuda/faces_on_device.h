@@ -25,7 +25,7 @@ struct FacesOnDevice {
 
   DeviceArray<KeptContact> kept;
   DeviceArray<FaceSpring> gathered;
-  std::vector<CudaFacet> host_facets;
+  PinnedArray<CudaFacet> host_facets;
   int version = -1;             ///< FaceContacts::version of the facets that are there
   bool pieces_changed = false;  ///< since they went up
   bool lists_hold = false;      ///< there are lists

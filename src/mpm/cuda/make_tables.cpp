@@ -70,30 +70,17 @@ float common_volume(const MpmState& state, int body) {
   return b.point_count == 0 ? 0.0f : state.points.volume[b.first_point + b.point_count / 2];
 }
 
-/// The columns of the block that hold points, as if it were alone in its bundle.
-std::vector<CudaColumn> columns_of(const Block& from, const CudaBlock& b) {
+/// The columns of a block that hold points.
+std::vector<int> filled_columns(const Block& from, const CudaBlock& b) {
   std::vector<std::uint8_t> holds(b.nx * b.ny, 0);
   const std::vector<std::uint8_t> filled = filled_columns(from);
   for (int lane = 0; lane < from.stride; ++lane) {
     if (filled[lane] == 0) continue;
     holds[from.cell[lane] / from.pitch * b.nx + from.cell[lane] % from.pitch] = 1;
   }
-  std::vector<CudaColumn> columns;
-  const int step = b.nx * b.ny;
-  for (int i = 0; i < step; ++i) {
-    if (holds[i] == 0) continue;
-    const int x = i % b.nx, y = i / b.nx;
-    CudaColumn c = {};
-    c.nz = b.nz;
-    c.pitch = b.nx + 2;
-    c.plane = c.pitch * (b.ny + 2);
-    c.slot = y * c.pitch + x;
-    c.lane = b.first_lane + i;
-    c.step = step;
-    c.cell = b.first_lane / 8 + i;
-    c.plane_slot = c.slot;
-    c.whole = b.whole;
-    columns.push_back(c);
+  std::vector<int> columns;
+  for (int i = 0; i < b.nx * b.ny; ++i) {
+    if (holds[i] != 0) columns.push_back(i);
   }
   return columns;
 }
@@ -163,17 +150,23 @@ void lay_out(const MpmState& state, const std::vector<std::vector<int>>& bundles
   t.made.resize(new_slots, new_lanes);
 }
 
-void add_bundle(int first_block, int blocks, std::vector<std::vector<CudaColumn>>& columns,
+/// Appends a bundle of `count` blocks from `first_block` on; `columns` of each block hold points.
+void add_bundle(int first_block, int count, const std::vector<std::vector<int>>& columns,
                 HostTables& t) {
+  const CudaBlock& first = t.blocks[first_block];
   CudaBundle bundle = {};
   bundle.first_block = first_block;
-  bundle.blocks = blocks;
-  bundle.first_slot = t.blocks[first_block].first_slot;
-  bundle.body = t.blocks[first_block].body;
+  bundle.blocks = count;
+  bundle.first_slot = first.first_slot;
+  bundle.body = first.body;
   bundle.first_column = static_cast<int>(t.columns.size());
-  for (int i = first_block; i < first_block + blocks; ++i) {
+  for (int i = first_block; i < first_block + count; ++i) {
     const CudaBlock& b = t.blocks[i];
-    for (CudaColumn& c : columns[i]) {
+    bundle.columns += static_cast<int>(columns[i].size());
+    // What a kernel knows by itself: column_of().
+    const bool all = count == 1 && bundle.columns == b.nx * b.ny;
+    for (const int column : all ? std::vector<int>() : columns[i]) {
+      CudaColumn c = column_of(b, column);
       c.slot += b.first_slot - bundle.first_slot;
       c.plane_slot += bundle.plane_slots;
       t.columns.push_back(c);
@@ -183,9 +176,7 @@ void add_bundle(int first_block, int blocks, std::vector<std::vector<CudaColumn>
     bundle.nz = std::max(bundle.nz, b.nz);
     bundle.partial = bundle.partial | b.partial;
   }
-  bundle.columns = static_cast<int>(t.columns.size()) - bundle.first_column;
-  const CudaBlock& first = t.blocks[first_block];
-  t.max_columns = std::max(t.max_columns, blocks == 1 ? first.nx * first.ny : bundle.columns);
+  t.max_columns = std::max(t.max_columns, count == 1 ? first.nx * first.ny : bundle.columns);
   t.max_slots = std::max(t.max_slots, bundle.slots);
   t.max_plane_slots = std::max(t.max_plane_slots, bundle.plane_slots);
   t.bundles.push_back(bundle);
@@ -205,16 +196,15 @@ void make_tables(const MpmState& state, const std::vector<std::vector<int>>& bun
     }
   }
   lay_out(state, bundles, t);
-  std::vector<std::vector<CudaColumn>> columns(t.blocks.size());
+  std::vector<std::vector<int>> columns(t.blocks.size());
   state.cpu->for_each(static_cast<int>(t.blocks.size()), [&](int i) {
     const Block& from = *state.blocks.all[t.of_host[i]];
     const CudaBlockOrigin& origin = t.origin[i];
     CudaBlock& block = t.blocks[i];
-    if (origin.is_new != 0) {
-      fill_points(from, t.bodies[block.body].point_volume, origin.first_lane, block, t);
-      fill_slots(from, block, t.made.slot_node.data() + origin.first_slot);
-    }
-    columns[i] = columns_of(from, block);
+    columns[i] = filled_columns(from, block);
+    if (origin.is_new == 0) return;
+    fill_points(from, t.bodies[block.body].point_volume, origin.first_lane, block, t);
+    fill_slots(from, block, t.made.slot_node.data() + origin.first_slot);
   });
   t.bundles.clear();
   t.columns.clear();

@@ -6,6 +6,7 @@
 #include "compute/device_array.h"
 #include "mpm/cuda/choose_plan.h"
 #include "mpm/cuda/connect_slots.h"
+#include "mpm/cuda/cuda_linearised_motion.h"
 #include "mpm/cuda/cuda_mpm_tissue.h"
 #include "mpm/cuda/faces_on_device.h"
 #include "mpm/cuda/frame_ends.h"
@@ -80,6 +81,7 @@ struct CudaMpmTissue::OnDevice {
   DeviceArray<Point> cloud;
   FacesOnDevice faces;
   SweepOnDevice sweep;
+  CudaMotionRoom motion_room;
   /// What a part of a frame changes, unless something is cut or tears, as it was before the part.
   struct Checkpoint {
     DeviceArray<float4> u, v;

@@ -91,12 +91,15 @@ struct Sweep {
   }
 };
 
-/// One thread block for each block.
+/// So many thread blocks for each block.
+constexpr int kShares = 16;
+
 __global__ void __launch_bounds__(kThreads) sweep_points(const CudaTables t, const CudaSweep s) {
   const CudaBlock b = t.blocks[blockIdx.x];
   const Sweep sweep{t, s, b, s.cells[blockIdx.x]};
   const int columns = b.nx * b.ny;
-  for (int i = static_cast<int>(threadIdx.x); i < 8 * columns * b.nz; i += kThreads) {
+  const int first = static_cast<int>(blockIdx.y * kThreads + threadIdx.x);
+  for (int i = first; i < 8 * columns * b.nz; i += kShares * kThreads) {
     const int column = i % columns, layer = i / columns;
     const SweptPoint p = {
         t.point[b.first_lane + i], {column % b.nx, column / b.nx, layer / 8}, layer % 8};
@@ -118,7 +121,7 @@ struct ChangePoints {
 
 void launch_sweep(const CudaTables& tables, const CudaSweep& sweep, cudaStream_t stream) {
   check_cuda(cudaMemsetAsync(sweep.broken_count, 0, sizeof(int), stream), "clear memory");
-  sweep_points<<<tables.block_count, kThreads, 0, stream>>>(tables, sweep);
+  sweep_points<<<dim3(tables.block_count, kShares), kThreads, 0, stream>>>(tables, sweep);
   check_cuda(cudaGetLastError(), "start a kernel");
 }
 

@@ -65,6 +65,22 @@ struct alignas(16) CudaColumn {
   int whole;         ///< as CudaBlock::whole
 };
 
+/// Column `index` of a block that is alone in its bundle, all of whose columns hold points.
+TISSUE_SIM_INLINE CudaColumn column_of(const CudaBlock& b, int index) {
+  const int y = index / b.nx, x = index - y * b.nx;
+  CudaColumn c;
+  c.pitch = b.nx + 2;
+  c.plane = c.pitch * (b.ny + 2);
+  c.slot = y * c.pitch + x;
+  c.nz = b.nz;
+  c.lane = b.first_lane + index;
+  c.step = b.nx * b.ny;
+  c.cell = b.first_lane / 8 + index;
+  c.plane_slot = c.slot;
+  c.whole = b.whole;
+  return c;
+}
+
 /// The points of a cell lie within so many cells of the node at its middle, stretched as they may
 /// be.
 inline constexpr float kCellReach = 2;

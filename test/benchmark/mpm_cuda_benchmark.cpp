@@ -17,7 +17,7 @@
 namespace tissue_sim {
 namespace {
 
-enum class Extra { kNone, kCut, kContact, kTools };
+enum class Extra { kNone, kCut, kContact, kTools, kAll };
 
 struct Size {
   int points;   // as the benchmark is called
@@ -98,6 +98,34 @@ double largest_strain(const MpmState& s) {
   return largest;
 }
 
+/// A second material, viscosity, a limit at which it tears, and a scalpel that is held in the cut.
+void add_options(Scene& scene, std::vector<ToolMotion>& motions) {
+  Material other = scene.materials[0];
+  other.name = "other";
+  other.young_modulus *= 1.5;
+  scene.materials.push_back(other);
+  for (Material& m : scene.materials) {
+    m.viscosity = 1;
+    m.tear_stretch = 50;
+  }
+  const Vec3 size = scene.bodies[0].size;
+  Inclusion ball;
+  ball.material = other.name;
+  ball.region.kind = Region::Kind::kBall;
+  ball.region.center = 0.5 * size;
+  ball.region.radius = 0.25 * size[0];
+  scene.bodies[0].inclusions.push_back(ball);
+  scene.tools.emplace_back();
+  scene.tools.back().name = "scalpel";
+  scene.tools.back().type = ToolType::kScalpel;
+  scene.tools.back().blade_length = 0.01;
+  motions.emplace_back();
+  ToolMotion& m = motions.back();
+  m.present = true;
+  m.begin.position = Vec3(0.6 * size[0], 0.5 * size[1], 0.5 * size[2]);
+  m.end = m.begin;
+}
+
 double difference(const MpmState& a, const MpmState& b, double& moved) {
   double worst = 0;
   moved = 0;
@@ -123,15 +151,17 @@ void run(benchmark::State& bench, const Size& size, Law law, Extra extra) {
   }
   Scene scene = cube(size, law);
   std::vector<ToolMotion> tools;
-  if (extra == Extra::kTools) add_probes(scene, tools);
+  if (extra == Extra::kTools || extra == Extra::kAll) add_probes(scene, tools);
+  if (extra == Extra::kAll) add_options(scene, tools);
   CudaMpmTissue tissue(scene);
   // Pressed flat, the two halves bulge against one another.
-  const double stretch = extra == Extra::kContact ? -0.15 : 0.15;
+  const bool in_contact = extra == Extra::kContact || extra == Extra::kAll;
+  const double stretch = in_contact ? -0.15 : 0.15;
   deform(tissue.state(), stretch);
   tissue.push();
   const float dt = 0.5f * tissue.stable_substep();
   std::vector<BladePath> cuts;
-  const bool is_cut = extra == Extra::kCut || extra == Extra::kContact;
+  const bool is_cut = extra == Extra::kCut || in_contact;
   if (is_cut) {
     BladePath path;
     path.edge = {Vec3(0, 0, -1), Vec3(0, 0, 1)};
@@ -160,7 +190,7 @@ void run(benchmark::State& bench, const Size& size, Law law, Extra extra) {
     bench.counters["v_error"] = worst / moved;
     // Faces of a fresh cut are zero deep in one another: whether one touches is a matter of
     // rounding, and light nodes show it.
-    const double bound = extra == Extra::kContact ? 2e-2 : 1e-3;
+    const double bound = in_contact ? 2e-2 : 1e-3;
     if (!(worst < bound * moved)) bench.SkipWithError("the GPU's velocities are not the CPU's");
   }
   constexpr int kSubsteps = 200;
@@ -183,15 +213,20 @@ void run(benchmark::State& bench, const Size& size, Law law, Extra extra) {
   bench.counters["us_per_substep"] = took.count() / updates;
   bench.counters["points"] = tissue.point_count();
   bench.counters["strain"] = strain;
-  if (extra == Extra::kContact) {
+  if (in_contact) {
     const FaceContacts& faces = tissue.state().faces;
     int touching = 0;
     for (const std::int32_t i : faces.active) touching += faces.all[i].touching ? 1 : 0;
     bench.counters["contacts"] = static_cast<double>(faces.active.size());
     bench.counters["touching"] = touching;
   }
-  bench.counters["bytes_per_point"] =
-      static_cast<double>(tissue.device_bytes()) / tissue.point_count();
+  const auto bytes_per_point = [&] {
+    return static_cast<double>(tissue.device_bytes()) / tissue.point_count();
+  };
+  bench.counters["bytes_per_point"] = bytes_per_point();
+  std::vector<std::uint8_t> cloud;
+  tissue.read_points({}, cloud);
+  bench.counters["bytes_with_cloud"] = bytes_per_point();
   bench.SetLabel(tissue.plan());
 }
 
@@ -235,6 +270,7 @@ int main(int argc, char** argv) {
     add("mpm/cuda/cut/", size, Law::kFixedCorotated, Extra::kCut);
     add("mpm/cuda/contact/", size, Law::kFixedCorotated, Extra::kContact);
     add("mpm/cuda/tools/", size, Law::kFixedCorotated, Extra::kTools);
+    add("mpm/cuda/all_options/", size, Law::kFixedCorotated, Extra::kAll);
   }
   for (const bool new_memory : {false, true}) {
     benchmark::RegisterBenchmark(

@@ -65,13 +65,16 @@ void CudaMpmTissue::tear(const std::vector<TearingPoint>& tearing, const FrameIn
 
 void CudaMpmTissue::tame() {
   if (result_.blew_up || !may_be_wild(*state_)) return;
-  pull();
   MpmState& s = *state_;
+  std::vector<std::int32_t> may_be(s.crumbs.begin(), s.crumbs.end());
+  may_be.insert(may_be.end(), s.threads.begin(), s.threads.end());
+  const std::vector<std::int32_t> nodes = nodes_around(may_be);
+  pull_some(nodes);
   const bool settled = settle_wild_crumbs(s.bodies, s.points, *s.fields, s.crumbs, s.nodes);
   std::vector<std::int32_t> changed;
   tear_threads(s, changed, result_.tear_report);
   if (!settled && changed.empty()) return;
-  if (settled) push_nodes();
+  if (settled) push_some(nodes);
   if (!changed.empty()) {
     take_apart(changed);
     for (const int id : update_pieces(s.bodies, s.points, pieces_)) {

@@ -4,6 +4,7 @@
 #include <cstring>
 #include <map>
 #include <numeric>
+#include <unordered_map>
 
 #include "cutting/bonds.h"
 #include "cutting/node_box.h"
@@ -72,7 +73,7 @@ std::vector<int> components(const std::vector<LatticeBody>& bodies, const Points
   return parent;
 }
 
-double volume_of(const Points& points, const Run& run) {
+double volume_of(const Points& points, const PartedRun& run) {
   double sum[4] = {};  // side by side: each waits for what it was
   std::int32_t p = run.begin;
   for (; p + 4 <= run.end; p += 4) {
@@ -84,14 +85,9 @@ double volume_of(const Points& points, const Run& run) {
 
 /// Loose is what came off something, or lies in a body that is held elsewhere, and is not held
 /// itself.
-void tell_loose(const Points& points, const std::vector<Run>& runs, Pieces& pieces) {
+void tell_loose(Pieces& pieces) {
   std::vector<bool> anchored(pieces.next_id, false), body_held(pieces.all.size(), false);
-  for (const Run& run : runs) {
-    const auto end = points.anchored.begin() + run.end;
-    if (std::find(points.anchored.begin() + run.begin, end, 1) != end) {
-      anchored[pieces.of_point[run.begin]] = true;
-    }
-  }
+  for (const std::int32_t p : pieces.anchored) anchored[pieces.of_point[p]] = true;
   for (const Fragment& f : pieces.all) body_held[f.body] = body_held[f.body] || anchored[f.id];
   for (Fragment& f : pieces.all) {
     f.loose = !anchored[f.id] && (f.parent >= 0 || body_held[f.body]);
@@ -110,11 +106,13 @@ Pieces whole_pieces(const std::vector<LatticeBody>& bodies, const Points& points
   pieces.next_id = static_cast<int>(bodies.size());
   for (std::int32_t p = 0; p < points.size(); ++p) {
     Fragment& f = pieces.all[points.site[p].body];
+    if (f.point_count == 0) pieces.lowest.push_back(p);
     pieces.of_point.push_back(f.id);
     ++f.point_count;
     f.volume += points.volume[p];
+    if (points.anchored[p] != 0) pieces.anchored.push_back(p);
   }
-  tell_loose(points, runs_of(points), pieces);
+  tell_loose(pieces);
   update_pieces(bodies, points, pieces);  // a mesh may have parts that do not touch
   return pieces;
 }
@@ -149,53 +147,81 @@ bool may_have_parted(const std::vector<LatticeBody>& bodies, const Points& point
   return false;
 }
 
-std::vector<int> update_pieces(const std::vector<LatticeBody>& bodies, const Points& points,
-                               Pieces& pieces) {
-  const std::vector<Run> runs = runs_of(points);
-  const std::vector<int> first_of = components(bodies, points, runs);
+std::vector<int> part_pieces(const Points& points, const std::vector<PartedRun>& parted,
+                             Pieces& pieces) {
   struct Part {
-    int first;  // run
-    int count;  // points
+    std::int32_t lowest;
+    int count;
+    double volume;
   };
-  std::vector<int> size(runs.size(), 0), id_of(runs.size(), -1), fresh;  // by first run
-  for (std::size_t i = 0; i < runs.size(); ++i) size[first_of[i]] += runs[i].end - runs[i].begin;
-  std::map<int, std::vector<Part>> parts_of;  // by piece, each in the order of its lowest point
-  for (int i = 0; i < static_cast<int>(runs.size()); ++i) {
-    if (first_of[i] == i) parts_of[pieces.of_point[runs[i].begin]].push_back({i, size[i]});
-  }
-  for (const auto& [id, parts] : parts_of) {
-    const auto largest = std::max_element(
-        parts.begin(), parts.end(), [](const Part& a, const Part& b) { return a.count < b.count; });
-    for (auto part = parts.begin(); part != parts.end(); ++part) {
-      id_of[part->first] = part == largest ? id : pieces.next_id;
-      if (part == largest) continue;
-      Fragment f;
-      f.id = pieces.next_id++;
-      f.parent = id;
-      f.body = points.site[runs[part->first].begin].body;
-      fresh.push_back(f.id);
-      pieces.all.push_back(f);
-    }
-  }
-  if (fresh.empty()) return fresh;
   std::vector<int> index(pieces.next_id, -1);  // of a piece in `all`
   for (std::size_t i = 0; i < pieces.all.size(); ++i) {
     index[pieces.all[i].id] = static_cast<int>(i);
   }
-  for (std::size_t i = 0; i < runs.size(); ++i) {
-    const Run& run = runs[i];
-    const int from = pieces.of_point[run.begin], to = id_of[first_of[i]];
-    if (from == to) continue;
-    Fragment &rest = pieces.all[index[from]], &part = pieces.all[index[to]];
+  // By piece, each in the order of its lowest point: first what is left of it.
+  std::map<int, std::vector<Part>> parts_of;
+  std::unordered_map<std::int32_t, int> place;  // of a part, by its lowest point
+  for (const PartedRun& run : parted) {
+    const int id = pieces.of_point[run.begin];
+    std::vector<Part>& parts = parts_of[id];
+    if (parts.empty()) {
+      const Fragment& piece = pieces.all[index[id]];
+      parts.push_back({pieces.lowest[id], piece.point_count, piece.volume});
+    }
+    const auto [at, is_new] = place.try_emplace(run.lowest, static_cast<int>(parts.size()));
+    if (is_new) parts.push_back({run.lowest, 0, 0});
     const double volume = volume_of(points, run);
-    part.point_count += run.end - run.begin;
-    rest.point_count -= run.end - run.begin;
-    part.volume += volume;
-    rest.volume -= volume;
-    std::fill(pieces.of_point.begin() + run.begin, pieces.of_point.begin() + run.end, to);
+    for (Part* part : {&parts[at->second], &parts[0]}) {
+      const int sign = part == &parts[0] ? -1 : 1;
+      part->count += sign * (run.end - run.begin);
+      part->volume += sign * volume;
+    }
   }
-  tell_loose(points, runs, pieces);
+  std::vector<int> fresh;
+  std::unordered_map<std::int32_t, int> id_of;  // of a part, by its lowest point
+  for (const auto& [id, parts] : parts_of) {
+    const auto largest = std::max_element(
+        parts.begin(), parts.end(), [](const Part& a, const Part& b) { return a.count < b.count; });
+    for (auto part = parts.begin(); part != parts.end(); ++part) {
+      const int own_id = part == largest ? id : pieces.next_id;
+      id_of[part->lowest] = own_id;
+      if (part != largest) {
+        Fragment f;
+        f.id = pieces.next_id++;
+        f.parent = id;
+        f.body = pieces.all[index[id]].body;
+        index.push_back(static_cast<int>(pieces.all.size()));
+        fresh.push_back(f.id);
+        pieces.all.push_back(f);
+        pieces.lowest.push_back(part->lowest);
+      }
+      Fragment& piece = pieces.all[index[own_id]];
+      piece.point_count = part->count;
+      piece.volume = part->volume;
+    }
+    pieces.lowest[id] = largest->lowest;
+    if (largest == parts.begin()) continue;
+    std::replace(pieces.of_point.begin(), pieces.of_point.end(), id, id_of[parts[0].lowest]);
+  }
+  for (const PartedRun& run : parted) {
+    std::fill(pieces.of_point.begin() + run.begin, pieces.of_point.begin() + run.end,
+              id_of[run.lowest]);
+  }
+  if (!fresh.empty()) tell_loose(pieces);
   return fresh;
+}
+
+std::vector<int> update_pieces(const std::vector<LatticeBody>& bodies, const Points& points,
+                               Pieces& pieces) {
+  const std::vector<Run> runs = runs_of(points);
+  const std::vector<int> first_of = components(bodies, points, runs);
+  std::vector<PartedRun> parted;
+  for (std::size_t i = 0; i < runs.size(); ++i) {
+    const std::int32_t lowest = runs[first_of[i]].begin;
+    if (pieces.lowest[pieces.of_point[runs[i].begin]] == lowest) continue;
+    parted.push_back({runs[i].begin, runs[i].end, lowest});
+  }
+  return part_pieces(points, parted, pieces);
 }
 
 }  // namespace tissue_sim

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "cutting/node_box.h"
+#include "fragments/parted_run.h"
 #include "mpm/lattice_body.h"
 #include "tissue_sim/fragments.h"
 
@@ -14,6 +15,8 @@ namespace tissue_sim {
 struct Pieces {
   std::vector<std::int32_t> of_point;  ///< Fragment::id
   std::vector<Fragment> all;           ///< by id; fragments/piece_motion.h says where they are
+  std::vector<std::int32_t> lowest;    ///< by id: the piece's lowest point
+  std::vector<std::int32_t> anchored;  ///< all points that are
   int next_id = 0;
 };
 
@@ -24,6 +27,11 @@ Pieces whole_pieces(const std::vector<LatticeBody>& bodies, const Points& points
 /// them other bonds still hold it together with the neighbours that it lost.
 bool may_have_parted(const std::vector<LatticeBody>& bodies, const Points& points,
                      const BondWindows& bonds, const std::vector<std::int32_t>& changed);
+
+/// Gives the parts of pieces their ids, of which `parted` are, in order, all runs that do not hold
+/// together with their piece's lowest point any more. Returns the new ids.
+std::vector<int> part_pieces(const Points& points, const std::vector<PartedRun>& parted,
+                             Pieces& pieces);
 
 /// Labels the points anew after bonds broke (union-find over runs of points along x). Returns the
 /// new ids.

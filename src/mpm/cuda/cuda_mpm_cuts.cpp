@@ -121,6 +121,28 @@ void CudaMpmTissue::take_apart(const std::vector<std::int32_t>& changed) {
   if (apart.new_blocks || d.host_tables.number.empty()) push_tables();
 }
 
+std::vector<int> CudaMpmTissue::label_pieces() {
+  OnDevice& d = *device_;
+  upload_lattices();
+  if (d.labels.empty()) {
+    std::vector<std::int32_t> lowest(pieces_.of_point.size());
+    state_->cpu->for_each(
+        static_cast<int>(lowest.size()),
+        [&](int p) { lowest[p] = pieces_.lowest[pieces_.of_point[p]]; }, 4096);
+    d.labels.upload(lowest, d.stream);
+  }
+  std::vector<SiteRows> sites;
+  const std::int32_t* point_at = d.faces.point_at.data();
+  for (const LatticeBody& b : state_->bodies) {
+    sites.push_back({point_at, 8 * b.nx * b.ny * b.nz, 2 * b.nx, 4 * b.nx * b.ny});
+    point_at += sites.back().count;
+  }
+  const std::vector<PartedRun> parted = d.labels.update(sites, d.bonds.data(), d.stream);
+  const std::vector<int> fresh = part_pieces(state_->points, parted, pieces_);
+  if (!fresh.empty()) d.points_changed = d.faces.pieces_changed = true;
+  return fresh;
+}
+
 void CudaMpmTissue::cut(const std::vector<BladePath>& paths, const float4* u_before,
                         CutReport& report) {
   std::vector<std::int32_t> changed;
@@ -135,10 +157,8 @@ void CudaMpmTissue::cut(const std::vector<BladePath>& paths, const float4* u_bef
   if (device_->shape.marches) stop_marching();
   take_apart(changed);
   if (may_have_parted(state_->bodies, state_->points, state_->fields->bonds(), changed)) {
-    report.new_fragments = update_pieces(state_->bodies, state_->points, pieces_);
-    device_->points_changed = true;
+    report.new_fragments = label_pieces();
   }
-  if (!report.new_fragments.empty()) device_->faces.pieces_changed = true;
   launch_measure();
   finish_measure();
 }

@@ -77,10 +77,7 @@ void CudaMpmTissue::tame() {
   if (settled) push_some(nodes);
   if (!changed.empty()) {
     take_apart(changed);
-    for (const int id : update_pieces(s.bodies, s.points, pieces_)) {
-      result_.tear_report.new_fragments.push_back(id);
-    }
-    device_->points_changed = device_->faces.pieces_changed = true;
+    for (const int id : label_pieces()) result_.tear_report.new_fragments.push_back(id);
   }
   launch_measure();
   finish_measure();

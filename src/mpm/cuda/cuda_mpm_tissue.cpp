@@ -234,8 +234,7 @@ FrameResult CudaMpmTissue::finish() {
   if (!blades_.empty() && !result_.blew_up) cut_by_blades();
   blades_.clear();
   if (result_.tear_report.bonds_broken > 0) {
-    result_.tear_report.new_fragments = update_pieces(state_->bodies, state_->points, pieces_);
-    device_->points_changed = device_->faces.pieces_changed = true;
+    result_.tear_report.new_fragments = label_pieces();
   }
   substep_.follow(*state_, modulus_);
   tame();

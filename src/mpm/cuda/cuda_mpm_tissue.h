@@ -72,6 +72,7 @@ class CudaMpmTissue final : public Tissue {
   std::vector<BrokenBond> sweep(const BladePath& path, bool moves);
   /// What follows where points lost bonds; contacts come down and wait for the next search.
   void take_apart(const std::vector<std::int32_t>& changed);
+  std::vector<int> label_pieces();  ///< after bonds broke; returns the new ids
   void cut_by_blades();
   void keep_place_for_blades();
   std::vector<TearingPoint> find_tearing();

@@ -11,6 +11,7 @@
 #include "mpm/cuda/faces_on_device.h"
 #include "mpm/cuda/frame_ends.h"
 #include "mpm/cuda/held_points.h"
+#include "mpm/cuda/label_pieces.h"
 #include "mpm/cuda/make_tables.h"
 #include "mpm/cuda/near_cells.h"
 #include "mpm/cuda/some_nodes.h"
@@ -81,6 +82,7 @@ struct CudaMpmTissue::OnDevice {
   DeviceArray<Point> cloud;
   FacesOnDevice faces;
   SweepOnDevice sweep;
+  PieceLabels labels;
   CudaMotionRoom motion_room;
   /// What a part of a frame changes, unless something is cut or tears, as it was before the part.
   struct Checkpoint {

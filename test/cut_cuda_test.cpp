@@ -1,0 +1,150 @@
+// Cuts on the GPU: its sweep and its labels against the CPU's, its tables against those made anew.
+// Skipped where there is no GPU.
+#include <gtest/gtest.h>
+
+#if defined(TISSUE_SIM_CUDA)
+#include "cut_kinds.h"
+#include "cutting/bonds.h"
+#include "either_device.h"
+#include "fragments/pieces.h"
+#include "mpm/cuda/cuda_mpm_tissue.h"
+#include "mpm/cuda/label_pieces.h"
+#include "mpm/mpm_tissue.h"
+
+namespace tissue_sim {
+namespace {
+
+class CutOnGpu : public OnEitherDevice<CudaMpmTissue> {};
+
+const Vec3 kSize(0.031, 0.029, 0.017);
+
+/// Of a deformed body; with `shaken`, each node is somewhere else.
+template <class T>
+void prepare(T& tissue, double shaken) {
+  deform(tissue.state());
+  shake(tissue.state(), 7, shaken);
+  push(tissue);
+}
+
+void expect_same_bonds(const MpmState& a, const MpmState& b) {
+  for (std::int32_t p = 0; p < a.points.size(); ++p) {
+    ASSERT_EQ(a.points.bonds[p], b.points.bonds[p]) << "point " << p;
+    for (int axis = 0; axis < 3; ++axis) {
+      const Crossing *x = a.points.crossings.find(p, axis), *y = b.points.crossings.find(p, axis);
+      ASSERT_EQ(x == nullptr, y == nullptr) << "point " << p << ", axis " << axis;
+      if (x == nullptr) continue;
+      EXPECT_NEAR(x->place, y->place, 1e-3);
+      for (int c = 0; c < 3; ++c) EXPECT_NEAR(x->normal[c], y->normal[c], 1e-3);
+    }
+  }
+}
+
+TEST_F(CutOnGpu, SweepsOfAnyKindBreakTheBondsThatTheCpuBreaks) {
+  const Scene scene = held_body(Law::kFixedCorotated, 0, Shape::kBox);
+  for (const CutKind& kind : cut_kinds(kSize)) {
+    SCOPED_TRACE(kind.name);
+    MpmTissue cpu(scene);
+    CudaMpmTissue gpu(scene);
+    prepare(cpu, 2e-5);
+    prepare(gpu, 2e-5);
+    int broken = 0;
+    for (const BladePath& path : kind.cuts) {
+      const CutReport on_cpu = cut_now(cpu, path), on_gpu = cut_now(gpu, path);
+      EXPECT_EQ(on_cpu.bonds_broken, on_gpu.bonds_broken);
+      EXPECT_EQ(on_cpu.points_separated, on_gpu.points_separated);
+      EXPECT_EQ(on_cpu.new_fragments, on_gpu.new_fragments);
+      broken += on_gpu.bonds_broken;
+    }
+    EXPECT_GT(broken, 0);
+    expect_same_bonds(cpu.state(), gpu.state());
+    for (int p = 0; p < cpu.point_count(); ++p) ASSERT_EQ(cpu.fragment_of(p), gpu.fragment_of(p));
+  }
+}
+
+TEST_F(CutOnGpu, TablesThatFollowAreThoseThatAreMadeAnew) {
+  const Scene scene = held_body(Law::kFixedCorotated, 0, Shape::kEllipsoid);
+  CudaMpmTissue follows(scene), anew(scene);
+  for (CudaMpmTissue* tissue : {&follows, &anew}) {
+    prepare(*tissue, 2e-5);
+    for (int cut = 0; cut < 4; ++cut) {
+      const Vec3 normal(1, 0.4 - 0.2 * cut, 0.3 * cut);
+      cut_now(*tissue, plane_cut(Vec3(0.006 + 0.006 * cut, 0.0145, 0.0085), normal));
+      tissue->state().faces.until_search = 1e9;  // faces pass: what they hold is not pushed
+      tissue->advance(10, 1e-5f, {});
+      tissue->finish();
+    }
+  }
+  anew.pull();
+  anew.push();
+  for (CudaMpmTissue* tissue : {&follows, &anew}) {
+    tissue->state().faces.until_search = 1e9;
+    tissue->advance(20, 1e-5f, {});
+    tissue->finish();
+  }
+  EXPECT_EQ(follows.fragment_count(), anew.fragment_count());
+  EXPECT_GT(follows.fragment_count(), 3);
+  EXPECT_EQ(follows.plan(), anew.plan());
+  EXPECT_EQ(follows.checksum(), anew.checksum());
+}
+
+TEST_F(CutOnGpu, LabelsAreThoseOfTheCpu) {
+  Scene scene = free_box(Vec3(0.03, 0.024, 0.02), 0.002);
+  scene.bodies.push_back(scene.bodies[0]);
+  scene.bodies[1].shape = Shape::kEllipsoid;
+  scene.bodies[1].radii = Vec3(0.012, 0.01, 0.015);
+  scene.bodies[1].pose.position = Vec3(0.1, 0, 0);
+  Points points;
+  const std::vector<LatticeBody> bodies = make_lattice_bodies(scene, points, nullptr);
+  std::vector<std::int32_t> point_at;
+  std::vector<int> first;
+  for (const LatticeBody& b : bodies) {
+    first.push_back(static_cast<int>(point_at.size()));
+    for (int z = 0; z < 2 * b.nz; ++z) {
+      for (int y = 0; y < 2 * b.ny; ++y) {
+        for (int x = 0; x < 2 * b.nx; ++x) point_at.push_back(b.point(x, y, z));
+      }
+    }
+  }
+  first.push_back(static_cast<int>(point_at.size()));
+  DeviceArray<std::int32_t> sites;
+  sites.upload(point_at, nullptr);
+  std::vector<SiteRows> rows;
+  for (std::size_t i = 0; i < bodies.size(); ++i) {
+    const LatticeBody& b = bodies[i];
+    rows.push_back({sites.data() + first[i], first[i + 1] - first[i], 2 * b.nx, 4 * b.nx * b.ny});
+  }
+  Pieces on_cpu = whole_pieces(bodies, points), on_gpu = on_cpu;
+  PieceLabels labels;
+  std::vector<std::int32_t> lowest;
+  for (const int id : on_gpu.of_point) lowest.push_back(on_gpu.lowest[id]);
+  labels.upload(lowest, nullptr);
+  DeviceArray<std::uint8_t> bonds;
+  std::mt19937 random(5);
+  for (int round = 0; on_cpu.all.size() < 3000; ++round) {
+    for (int i = 0; i < 2000; ++i) {
+      const auto p = static_cast<std::int32_t>(random() % points.size());
+      const int axis = static_cast<int>(random() % 3);
+      if ((points.bonds[p] >> (kForwardBond + axis) & 1) == 0) continue;
+      const std::int32_t q = bodies[points.site[p].body].next_point(points.site[p], axis);
+      break_bond(kForwardBond + axis, points.bonds[p], points.bonds[q]);
+    }
+    bonds.upload(points.bonds, nullptr);
+    const std::vector<int> fresh = update_pieces(bodies, points, on_cpu);
+    EXPECT_EQ(fresh, part_pieces(points, labels.update(rows, bonds.data(), nullptr), on_gpu));
+    ASSERT_EQ(on_cpu.of_point, on_gpu.of_point) << "round " << round;
+    EXPECT_EQ(on_cpu.lowest, on_gpu.lowest);
+    for (std::size_t i = 0; i < on_cpu.all.size(); ++i) {
+      const Fragment &a = on_cpu.all[i], &b = on_gpu.all[i];
+      EXPECT_EQ(a.id, b.id);
+      EXPECT_EQ(a.parent, b.parent);
+      EXPECT_EQ(a.point_count, b.point_count);
+      EXPECT_NEAR(a.volume, b.volume, 1e-9 * scene.bodies[0].size.prod());
+    }
+  }
+}
+
+}  // namespace
+}  // namespace tissue_sim
+#else
+TEST(CutOnGpu, NeedsABuildWithNvcc) { GTEST_SKIP() << "built without nvcc"; }
+#endif

@@ -112,8 +112,9 @@ void add_options(Scene& scene, std::vector<ToolMotion>& motions) {
   Inclusion ball;
   ball.material = other.name;
   ball.region.kind = Region::Kind::kBall;
-  ball.region.center = 0.5 * size;
-  ball.region.radius = 0.25 * size[0];
+  // Beside the cut: a facet of two materials is one on the CPU and two on the GPU.
+  ball.region.center = Vec3(0.5, 0.22, 0.5).cwiseProduct(size);
+  ball.region.radius = 0.15 * size[0];
   scene.bodies[0].inclusions.push_back(ball);
   scene.tools.emplace_back();
   scene.tools.back().name = "scalpel";

@@ -108,6 +108,7 @@ Pieces whole_pieces(const std::vector<LatticeBody>& bodies, const Points& points
     pieces.all.push_back(f);
   }
   pieces.next_id = static_cast<int>(bodies.size());
+  pieces.of_point.reserve(points.size());
   for (std::int32_t p = 0; p < points.size(); ++p) {
     Fragment& f = pieces.all[points.site[p].body];
     pieces.of_point.push_back(f.id);

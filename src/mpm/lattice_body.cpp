@@ -137,6 +137,10 @@ std::vector<LatticeBody> make_lattice_bodies(const Scene& scene, Points& points,
     b.first_node = first_node;
     b.nodes = nodes_of(b, range);
     first_node += b.nodes.count();
+    const std::size_t count = points.site.size() + lattice.sites.size();
+    points.site.reserve(count);
+    points.volume.reserve(count);
+    points.anchored.reserve(count);
     const auto index = static_cast<std::int16_t>(bodies.size());
     std::vector<int> anchored(body.anchors.size(), 0);
     for (const Lattice::Site& s : lattice.sites) {

@@ -59,9 +59,12 @@ TISSUE_SIM_INLINE void stress_lanes(const Block& b, const BlockField& f, const L
                                     const float* in, const float* in_rate, int z, int j,
                                     float* out) {
   Vec<W> G[8][9], damping[9];
+  const std::size_t lane = static_cast<std::size_t>(z) * 8 * l.stride + j;
+  // Eight streams, each too short for the processor to foresee: on their way while gradients are
+  // worked out.
+  for (int s = 0; s < 8; ++s) __builtin_prefetch(b.volume.data() + lane + s * l.stride);
   gradients<W>(l, in, z, j, G);
   if (viscous) viscous_stress<W, Materials>(b, f, l, in, in_rate, z, j, damping);
-  const std::size_t lane = static_cast<std::size_t>(z) * 8 * l.stride + j;
   constexpr int kTogether = 4;  // points whose stretch is worked out side by side
   for (int first = 0; first < 8; first += kTogether) {
     Vec<W>(*F)[9] = G + first;

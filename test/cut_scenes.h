@@ -93,13 +93,12 @@ inline BladePath plane_cut(const Vec3& place, const Vec3& normal) {
 /// Moves the nodes by a smooth field with stretches of some 20 %.
 inline void deform(MpmState& state) {
   for (const LatticeBody& b : state.bodies) {
-    for (int i = 0; i < b.node_count(); ++i) {
-      const double x = i % b.pitch_y * b.cell_size, y = i % b.pitch_z / b.pitch_y * b.cell_size;
-      const double z = i / b.pitch_z * b.cell_size;
+    b.for_each_node([&](int node, int i, int j, int k) {
+      const double x = (i + 1) * b.cell_size, y = (j + 1) * b.cell_size, z = (k + 1) * b.cell_size;
       const double u[3] = {0.2 * y + 0.002 * std::sin(60 * x), 0.15 * x - 0.2 * y,
                            0.2 * z + 0.1 * x};
-      for (int a = 0; a < 3; ++a) state.nodes.u[a][b.first_node + i] = static_cast<float>(u[a]);
-    }
+      for (int a = 0; a < 3; ++a) state.nodes.u[a][node] = static_cast<float>(u[a]);
+    });
   }
   measure_motion(state);
 }

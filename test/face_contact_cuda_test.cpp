@@ -29,19 +29,18 @@ void implode(CudaMpmTissue& tissue, const Vec3& middle, double rate) {
   tissue.pull();
   MpmState& s = tissue.state();
   for (const LatticeBody& b : s.bodies) {
-    for (int i = 0; i < b.node_count(); ++i) {
-      const Vec3 home =
-          b.node_position(i % b.pitch_y - 1, i % b.pitch_z / b.pitch_y - 1, i / b.pitch_z - 1);
+    b.for_each_node([&](int lattice_node, int x, int y, int z) {
+      const Vec3 home = b.node_position(x, y, z);
       const auto set = [&](int node) {
         for (int a = 0; a < 3; ++a) {
           s.nodes.v[a][node] = static_cast<float>(-rate * (home[a] - middle[a]));
         }
       };
-      set(b.first_node + i);
-      const NodeFields::Split* split = s.fields->split(b.first_node + i);
-      if (split == nullptr) continue;
+      set(lattice_node);
+      const NodeFields::Split* split = s.fields->split(lattice_node);
+      if (split == nullptr) return;
       for (const int field : split->field) set(field);
-    }
+    });
   }
   tissue.push();
 }

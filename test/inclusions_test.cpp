@@ -209,11 +209,11 @@ TEST(Inclusions, EachMaterialBoundsTheSubstepByWhatItsPointsStiffenedBy) {
   // What is measured: the upper half squeezed to two thirds.
   Nodes& n = tissue.state().nodes;
   const LatticeBody& b = state.bodies[0];
-  for (int i = 0; i < b.node_count(); ++i) {
-    const double z = (i / b.pitch_z - 0.5) * 0.002;
+  b.for_each_node([&](int i, int x, int, int cell_z) {
+    const double z = (cell_z + 0.5) * 0.002;
     n.u[2][i] = static_cast<float>(-0.3 * std::max(0.0, z - 0.012));
-    n.u[0][i] = static_cast<float>(0.6 * (i % b.pitch_y) * 0.002 * (z > 0.012 ? 1 : 0));
-  }
+    n.u[0][i] = static_cast<float>(0.6 * (x + 1) * 0.002 * (z > 0.012 ? 1 : 0));
+  });
   const float before = tissue.stable_substep();
   tissue.finish();
   EXPECT_EQ(tissue.stable_substep(), before);

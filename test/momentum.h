@@ -39,17 +39,12 @@ inline Momentum momentum(const MpmState& state, const std::vector<Vec3>& home) {
 inline std::vector<Vec3> homes(const MpmState& state) {
   std::vector<Vec3> home(state.nodes.size(), Vec3::Zero());
   for (const LatticeBody& b : state.bodies) {
-    for (int z = -1; z <= b.nz; ++z) {
-      for (int y = -1; y <= b.ny; ++y) {
-        for (int x = -1; x <= b.nx; ++x) {
-          const int node = b.node(x, y, z);
-          home[node] = b.node_position(x, y, z);
-          const NodeFields::Split* split = state.fields->split(node);
-          if (split == nullptr) continue;
-          for (const int field : split->field) home[field] = home[node];
-        }
-      }
-    }
+    b.for_each_node([&](int node, int x, int y, int z) {
+      home[node] = b.node_position(x, y, z);
+      const NodeFields::Split* split = state.fields->split(node);
+      if (split == nullptr) return;
+      for (const int field : split->field) home[field] = home[node];
+    });
   }
   return home;
 }

@@ -134,6 +134,7 @@ class Strip {
       for (int z = 0; z < b->nz + 2; ++z) {
         for (int i = 0; i < (b->ny + 2) * b->pitch; ++i) {
           const int local = z * b->plane + i;
+          if (b->node[local] < 0) continue;
           if ((home_[b->node[local]] - middle_).dot(axis_) <= 0) continue;
           for (int a = 0; a < 3; ++a) sum -= axis_[a] * f[a * b->node_count() + local];
         }

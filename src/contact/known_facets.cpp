@@ -1,7 +1,6 @@
 #include "contact/known_facets.h"
 
 #include <algorithm>
-#include <cstring>
 
 namespace tissue_sim {
 
@@ -9,10 +8,12 @@ KnownFacets::KnownFacets(const LatticeBody& body, const BlockRegion& region,
                          const std::vector<std::uint8_t>& stale)
     : x_(region.x), y_(region.y), z_(region.z), nx_(region.nx), ny_(region.ny) {
   const int count = region.nx * region.ny * region.nz;
-  stale_.resize(count);
-  for (int z = z_, i = 0; z < z_ + region.nz; ++z) {
+  stale_.assign(count, 0);
+  for (int z = z_; z < z_ + region.nz; ++z) {
     for (int y = y_; y < y_ + ny_; ++y) {
-      for (int x = x_; x < x_ + nx_; ++x) stale_[i++] = stale[body.node(x, y, z)];
+      body.for_each_node_in_row(x_, x_ + nx_, y, z, [&](int x, int node, int of_row, int) {
+        std::copy_n(stale.begin() + node, of_row, stale_.begin() + index(x, y, z));
+      });
     }
   }
   const auto cell_of = [this](const Block& b, const Facet& f) {
@@ -59,13 +60,11 @@ void mark_stale_facets(const std::vector<LatticeBody>& bodies, const Points& poi
     const int x = std::max(s.x / 2 - kReach, 0), x_end = std::min(s.x / 2 + kReach + 1, b.nx);
     const int y_end = std::min(s.y / 2 + kReach + 1, b.ny);
     const int z_end = std::min(s.z / 2 + kReach + 1, b.nz);
-    const std::uint64_t marks = 0x0101010101010101 >> 8 * (8 - (x_end - x));
     for (int z = std::max(s.z / 2 - kReach, 0); z < z_end; ++z) {
       for (int y = std::max(s.y / 2 - kReach, 0); y < y_end; ++y) {
-        std::uint64_t row;  // nodes outside of the body follow its cells: there are eight
-        std::memcpy(&row, &stale[b.node(x, y, z)], sizeof(row));
-        row |= marks;
-        std::memcpy(&stale[b.node(x, y, z)], &row, sizeof(row));
+        b.for_each_node_in_row(x, x_end, y, z, [&](int, int first, int count, int) {
+          std::fill_n(stale.begin() + first, count, std::uint8_t{1});
+        });
       }
     }
   }

@@ -22,23 +22,14 @@ enum class End { kNone, kCut, kOuter };
 class Surroundings {
  public:
   Surroundings(const LatticeBody& body, const Points& points, const Place& corner) {
-    const int x = corner[0] + kFrom, sx = 2 * body.nx;
-    const int first = std::max(0, -x), last = std::min(kWidth, sx - x) - 1;  // within the body
+    const int x0 = corner[0] + kFrom;
     std::fill(std::begin(bonds_), std::end(bonds_), kNoPoint);
     for (int k = 0, i = 0; k < kWidth; ++k) {
       for (int j = 0; j < kWidth; ++j, i += kWidth) {
-        const int y = corner[1] + kFrom + j, z = corner[2] + kFrom + k;
-        if (y < 0 || z < 0 || y >= 2 * body.ny || z >= 2 * body.nz) continue;
-        const std::int32_t* row =
-            &body.point_at[(static_cast<std::size_t>(z) * 2 * body.ny + y) * sx + x + first];
-        const int count = last - first + 1;
-        if (row[0] >= 0 && row[count - 1] == row[0] + count - 1) {  // points follow one another
-          std::copy_n(&points.bonds[row[0]], count, bonds_ + i + first);
-          continue;
-        }
-        for (int n = 0; n < count; ++n) {
-          if (row[n] >= 0) bonds_[i + first + n] = points.bonds[row[n]];
-        }
+        body.for_each_point_in_row(x0, x0 + kWidth, corner[1] + kFrom + j, corner[2] + kFrom + k,
+                                   [&](int x, int point, int count) {
+                                     std::copy_n(&points.bonds[point], count, bonds_ + i + x - x0);
+                                   });
       }
     }
   }

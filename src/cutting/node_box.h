@@ -16,28 +16,6 @@ using Planes = std::array<std::uint64_t, 6>;
 /// Bit of a place in its plane.
 constexpr int bit_in_plane(int x, int y) { return 8 * y + x; }
 
-/// The points around the node of cell (x, y, z), row by row along x.
-class NodeBox {
- public:
-  NodeBox(const LatticeBody& b, int x, int y, int z) {
-    const bool inside =
-        x >= 1 && y >= 1 && z >= 1 && x + 2 <= b.nx && y + 2 <= b.ny && z + 2 <= b.nz;
-    if (!inside) points_around(b, x, y, z, copy_);
-    for (int k = 0; k < 6; ++k) {
-      const std::int32_t* plane =
-          inside ? &b.point_at[((2 * z - 2 + k) * 2 * std::size_t(b.ny) + 2 * y - 2) * 2 * b.nx +
-                               2 * x - 2]
-                 : copy_ + 36 * k;
-      for (int j = 0; j < 6; ++j) row_[6 * k + j] = plane + j * (inside ? 2 * b.nx : 6);
-    }
-  }
-  const std::int32_t* row(int i) const { return row_[i]; }
-
- private:
-  const std::int32_t* row_[36];
-  std::int32_t copy_[216];
-};
-
 /// The bonds of all bodies, so that those of a node's box are at hand: for each two columns of
 /// nodes along z and each row of points a byte with its places in the boxes of these nodes.
 class BondWindows {

@@ -41,11 +41,12 @@ void share_mass(const LatticeBody& body, const Points& points, const NodeFields:
     for_each_row([&](int, unsigned bits, double w) { sum += w * kTables.chosen[bits]; });
     sum *= mass_of_point;
   } else {
-    const NodeBox box(body, cell.x, cell.y, cell.z);
+    std::int32_t around[216];
+    points_around(body, cell.x, cell.y, cell.z, around);
     for_each_row([&](int row, unsigned bits, double w) {
       for (; bits != 0; bits &= bits - 1) {
         const int x = __builtin_ctz(bits);
-        const std::int32_t p = box.row(row)[x];
+        const std::int32_t p = around[6 * row + x];
         const double density = body.material_of(points, p).density;
         const double mass = w * kTables.weight[x] * density * points.volume[p];
         sum += mass;
@@ -65,15 +66,13 @@ void share_mass(const LatticeBody& body, const Points& points, const NodeFields:
 /// else 0.
 double mass_of_point(const LatticeBody& body, const Points& points, const NodeFields::Cell& c) {
   double mass = 0;
-  const NodeBox box(body, c.x, c.y, c.z);
-  for (int row = 0; row < 36; ++row) {
-    for (int x = 0; x < 6; ++x) {
-      const std::int32_t p = box.row(row)[x];
-      if (p < 0) continue;
-      const double m = body.material_of(points, p).density * points.volume[p];
-      if (points.anchored[p] != 0 || (mass != 0 && m != mass)) return 0;
-      mass = m;
-    }
+  std::int32_t around[216];
+  points_around(body, c.x, c.y, c.z, around);
+  for (const std::int32_t p : around) {
+    if (p < 0) continue;
+    const double m = body.material_of(points, p).density * points.volume[p];
+    if (points.anchored[p] != 0 || (mass != 0 && m != mass)) return 0;
+    mass = m;
   }
   return mass;
 }
@@ -110,17 +109,12 @@ NodeFields::NodeFields(const std::vector<LatticeBody>& bodies, const Points& poi
   mass_of_point_.resize(nodes.size());
   for (std::size_t i = 0; i < bodies.size(); ++i) {
     const LatticeBody& b = bodies[i];
-    for (int z = -1; z <= b.nz; ++z) {
-      for (int y = -1; y <= b.ny; ++y) {
-        for (int x = -1; x <= b.nx; ++x) {
-          const Cell cell{static_cast<int>(i), x, y, z};
-          const int node = b.node(x, y, z);
-          mass_of_point_[node] = static_cast<float>(mass_of_point(b, points, cell));
-          const Planes all = bonds_.points_in_box(cell.body, x, y, z);
-          share_mass(b, points, cell, mass_of_point_[node], all, node, nodes);
-        }
-      }
-    }
+    b.for_each_node([&](int node, int x, int y, int z) {
+      const Cell cell{static_cast<int>(i), x, y, z};
+      mass_of_point_[node] = static_cast<float>(mass_of_point(b, points, cell));
+      const Planes all = bonds_.points_in_box(cell.body, x, y, z);
+      share_mass(b, points, cell, mass_of_point_[node], all, node, nodes);
+    });
   }
 }
 

@@ -102,14 +102,12 @@ class Sweep {
     std::vector<BrokenBond> broken;
     const Block& block = *passed.block;
     const LatticeBody& body = state_.bodies[block.body];
-    const std::ptrdiff_t step[] = {1, 2 * body.nx, std::ptrdiff_t{4} * body.nx * body.ny};
     for (const std::int32_t lane : passed.lanes) {
       const std::int32_t p = block.point[lane];
       const Points::Site& s = state_.points.site[p];
-      const std::int32_t* site = &body.point_at[s.z * step[2] + s.y * step[1] + s.x];
       for (int axis = 0; axis < 3; ++axis) {
         if ((state_.points.bonds[p] >> (kForwardBond + axis) & 1) == 0) continue;
-        const std::int32_t q = site[step[axis]];
+        const std::int32_t q = body.next_point(s, axis);
         if ((known_[p] & known_[q] & kOutside) != 0) continue;
         Meeting meeting;
         if (passes(passed.edges, {place(0, p), place(0, q), place(1, p), place(1, q)}, meeting)) {

@@ -19,11 +19,10 @@ struct BondsAround {
   BondsAround(const LatticeBody& body, const Points& points, std::int32_t p)
       : own(points.bonds[p]) {
     const Points::Site& s = points.site[p];
-    const std::ptrdiff_t step[] = {1, 2 * body.nx, std::ptrdiff_t{4} * body.nx * body.ny};
-    const std::int32_t* at = &body.point_at[s.z * step[2] + s.y * step[1] + s.x];
     for (int k = 0; k < kBondCount; ++k) {
       if (!has(own, k)) continue;
-      point[k] = k < kForwardBond ? at[-step[2 - k]] : at[step[k - kForwardBond]];
+      const BondOffset o = bond_offset(k);
+      point[k] = body.point(s.x + o.x, s.y + o.y, s.z + o.z);
       of[k] = points.bonds[point[k]];
     }
   }

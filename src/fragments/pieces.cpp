@@ -104,6 +104,7 @@ Pieces whole_pieces(const std::vector<LatticeBody>& bodies, const Points& points
     pieces.all.push_back(f);
   }
   pieces.next_id = static_cast<int>(bodies.size());
+  pieces.of_point.reserve(points.size());
   for (std::int32_t p = 0; p < points.size(); ++p) {
     Fragment& f = pieces.all[points.site[p].body];
     if (f.point_count == 0) pieces.lowest.push_back(p);

@@ -14,14 +14,8 @@ void lay_out(Block& block) {
   block.plane = padded((block.ny + 2) * block.pitch + 1);
   block.stride = padded(block.runs.back().lane + block.runs.back().count);
   block.cell.assign(block.stride, 0);
-  block.node_rows.assign(block.ny + 2, {block.pitch, 0});
   for (const Block::Run& run : block.runs) {
     for (int i = 0; i < run.count; ++i) block.cell[run.lane + i] = run.y * block.pitch + run.x + i;
-    for (int y = run.y; y < run.y + 3; ++y) {
-      Block::Span& row = block.node_rows[y];
-      row.begin = std::min(row.begin, run.x);
-      row.end = std::max(row.end, run.x + run.count + 2);
-    }
   }
   block.volume.assign(block.lane_count(), 0.0f);
   block.point.assign(block.lane_count(), -1);

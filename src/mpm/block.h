@@ -35,7 +35,13 @@ struct Block {
   struct Span {
     int begin, end;
   };
-  std::vector<Span> node_rows;            ///< [ny + 2]: nodes of the row that the runs see
+  /// Nodes that the runs see, in a row along x and numbered one after the other.
+  struct NodeRow {
+    int local, count;  ///< the first of them in the block's nodes: z * plane + y * pitch + x
+    int node;          ///< the same in Nodes (before any split), -1 where no point sees them
+    int stretch;       ///< of LatticeBody::nodes
+  };
+  std::vector<NodeRow> node_rows;         ///< in the order of the block's nodes
   std::vector<std::vector<Span>> filled;  ///< [nz]: lanes whose cells hold points, in order
   /// [stride]: lowest node of the lane's cell, y * pitch + x; 0 in padding. The node at dx, dy, dz
   /// (0..2) from it has the number z * plane + cell[lane] + dz * plane + dy * pitch + dx.
@@ -74,7 +80,7 @@ struct Block {
   std::vector<SplitNode> split_nodes;
 
   std::vector<std::int32_t>
-      node;  ///< [nz + 2][plane], in Nodes; split ones as this block sees them
+      node;  ///< [nz + 2][plane], in Nodes, -1 for none; split ones as this block sees them
 
   std::vector<Facet> facets;  ///< its surface and cut faces
 

@@ -16,13 +16,11 @@ namespace tissue_sim {
 /// What a block's kernel needs to know beside the block.
 struct BlockField {
   const Nodes* nodes;
-  int first_node;        ///< of the block: the node one below its first cell along each axis
-  int pitch_y, pitch_z;  ///< of the body's lattice
-  float cell_size;       ///< [m]
-  float origin[3];       ///< reference place of first_node [m]
-  Law law;               ///< of all the block's points; where they are mixed, Block::Mixture's
-  float mu, lambda;      ///< [Pa]; not read in a mixed block
-  float viscosity;       ///< [Pa s]; the same
+  float cell_size;   ///< [m]
+  float origin[3];   ///< reference place of the block's first node [m]
+  Law law;           ///< of all the block's points; where they are mixed, Block::Mixture's
+  float mu, lambda;  ///< [Pa]; not read in a mixed block
+  float viscosity;   ///< [Pa s]; the same
   const std::uint8_t*
       material;              ///< of each point, Points::material; null where none has inclusions
   const std::uint8_t* soft;  ///< of each point, Points::soft; null where none is

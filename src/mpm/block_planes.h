@@ -35,17 +35,16 @@ inline void reserve(Array<float>& a, std::size_t n) {
 }
 
 /// Copies the block's nodes of `field`, times `scale`, into [3][nz + 2][plane].
-TISSUE_SIM_INLINE void gather_nodes(const Block& b, const BlockField& f, const Array<float>* field,
+TISSUE_SIM_INLINE void gather_nodes(const Block& b, const Array<float>* field,
                                     float scale, const Layout& l, float* out) {
   for (int c = 0; c < 3; ++c) {
-    const float* from = field[c].data() + f.first_node;
+    const float* from = field[c].data();
     float* to = out + c * l.node_component;
-    for (int z = 0; z < b.nz + 2; ++z) {
-      for (int y = 0; y < b.ny + 2; ++y) {
-        const float* row = from + z * f.pitch_z + y * f.pitch_y;
-        float* out_row = to + z * l.plane + y * l.pitch;
-        const Block::Span seen = b.node_rows[y];
-        for (int x = seen.begin; x < seen.end; ++x) out_row[x] = row[x] * scale;
+    for (const Block::NodeRow& row : b.node_rows) {
+      if (row.node < 0) {
+        std::fill_n(to + row.local, row.count, 0.0f);
+      } else {
+        for (int x = 0; x < row.count; ++x) to[row.local + x] = from[row.node + x] * scale;
       }
     }
     for (const Block::SplitNode& s : b.split_nodes) to[s.local] = field[c][s.node] * scale;

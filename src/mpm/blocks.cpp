@@ -13,14 +13,16 @@ namespace {
 std::vector<std::pair<int, int>> x_runs(const LatticeBody& b, int y0, int ny, int z0, int nz,
                                         int longest) {
   std::vector<std::pair<int, int>> runs;
-  for (int x = 0; x < b.nx; ++x) {
-    bool any = false;
-    for (int z = 2 * z0; z < 2 * (z0 + nz) && !any; ++z) {
-      for (int y = 2 * y0; y < 2 * (y0 + ny) && !any; ++y) {
-        any = b.point(2 * x, y, z) >= 0 || b.point(2 * x + 1, y, z) >= 0;
-      }
+  std::vector<bool> any(b.nx, false);
+  for (int z = 2 * z0; z < 2 * (z0 + nz); ++z) {
+    for (int y = 2 * y0; y < 2 * (y0 + ny); ++y) {
+      b.for_each_point_in_row(0, 2 * b.nx, y, z, [&](int x, int, int count) {
+        std::fill(any.begin() + x / 2, any.begin() + (x + count + 1) / 2, true);
+      });
     }
-    if (!any) continue;
+  }
+  for (int x = 0; x < b.nx; ++x) {
+    if (!any[x]) continue;
     if (!runs.empty() && x - runs.back().second <= 2 * kGap) {
       runs.back().second = x + 1;
     } else {
@@ -56,41 +58,36 @@ void connect_forces(Blocks& blocks, const std::vector<LatticeBody>& bodies, int 
   };
   std::vector<Entry> entries;
   std::vector<std::pair<int, SplitNodePart>> split;
-  std::vector<int> first_row;  // of each body
+  std::vector<int> first_row;  // of each body: a row is a stretch of its nodes
   int row_count = 0;
   for (const LatticeBody& b : bodies) {
     first_row.push_back(row_count);
-    row_count += b.node_count() / b.pitch_y;
+    row_count += static_cast<int>(b.nodes.stretches().size());
   }
   for (const Block* block : blocks.all) {
     const LatticeBody& b = bodies[block->body];
     const std::size_t component = block->node_count();
     std::size_t next_split = 0;
-    for (int z = 0; z < block->nz + 2; ++z) {
-      for (int y = 0; y < block->ny + 2; ++y) {
-        const int local = z * block->plane + y * block->pitch;
-        const int row_node = b.node(-1, block->y + y - 1, block->z + z - 1);
-        const int row = first_row[block->body] + (row_node - b.first_node) / b.pitch_y;
-        // A row without the nodes that this block sees split: parts between them.
-        const Block::Span seen = block->node_rows[y];
-        int begin = seen.begin;
-        const auto add = [&](int end) {
-          if (end > begin) {
-            entries.push_back(
-                {row,
-                 {block->force_offset + local + begin, component, block->x + begin, end - begin}});
-          }
-        };
-        while (next_split < block->split_nodes.size() &&
-               block->split_nodes[next_split].local < local + block->pitch) {
-          const Block::SplitNode& s = block->split_nodes[next_split++];
-          if (s.local < local + seen.begin || s.local >= local + seen.end) continue;
-          add(s.local - local);
-          begin = s.local - local + 1;
-          split.push_back({s.node, {block->force_offset + s.local, component}});
-        }
-        add(seen.end);
+    for (const Block::NodeRow& r : block->node_rows) {
+      if (r.node < 0) continue;
+      // A row without the nodes that this block sees split: parts between them.
+      const int end = r.local + r.count;
+      const int to_row = r.node - b.first_node - b.nodes.stretches()[r.stretch].first - r.local;
+      int begin = r.local;
+      const auto add = [&](int up_to) {
+        if (up_to == begin) return;
+        entries.push_back({first_row[block->body] + r.stretch,
+                           {block->force_offset + begin, component, to_row + begin, up_to - begin}});
+      };
+      const auto& split_nodes = block->split_nodes;
+      for (; next_split < split_nodes.size() && split_nodes[next_split].local < end; ++next_split) {
+        const Block::SplitNode& s = split_nodes[next_split];
+        if (s.local < begin) continue;
+        add(s.local);
+        begin = s.local + 1;
+        split.push_back({s.node, {block->force_offset + s.local, component}});
       }
+      add(end);
     }
   }
   // Those of a row one after the other, in the order of the blocks.
@@ -102,7 +99,7 @@ void connect_forces(Blocks& blocks, const std::vector<LatticeBody>& bodies, int 
   blocks.rows.clear();
   int row = 0, begin = 0;
   for (const LatticeBody& b : bodies) {
-    for (int node = b.first_node; node < b.first_node + b.node_count(); node += b.pitch_y, ++row) {
+    for (const LatticeRows::Stretch& stretch : b.nodes.stretches()) {
       const int end = end_of[row];
       int lo = 1 << 30, hi = 0;
       for (int i = begin; i < end; ++i) {
@@ -111,8 +108,10 @@ void connect_forces(Blocks& blocks, const std::vector<LatticeBody>& bodies, int 
         hi = std::max(hi, part.begin + part.count);
       }
       for (int i = begin; i < end; ++i) blocks.row_parts[i].begin -= lo;
-      if (end > begin) blocks.rows.push_back({node + lo, hi - lo, begin, end - begin});
+      const int node = b.first_node + stretch.first + lo;
+      if (end > begin) blocks.rows.push_back({node, hi - lo, begin, end - begin});
       begin = end;
+      ++row;
     }
   }
   // Parts of each node in the order of the blocks.
@@ -199,7 +198,9 @@ void update_blocks(Blocks& blocks, const std::vector<LatticeBody>& bodies, const
     const LatticeBody& b = bodies[r.body];
     for (int z = r.z; z < r.z + r.nz; ++z) {
       for (int y = r.y; y < r.y + r.ny; ++y) {
-        std::fill_n(blocks.stale_facets.begin() + b.node(r.x, y, z), r.nx, std::uint8_t{0});
+        b.for_each_node_in_row(r.x, r.x + r.nx, y, z, [&](int, int first, int count, int) {
+          std::fill_n(blocks.stale_facets.begin() + first, count, std::uint8_t{0});
+        });
       }
     }
   }

@@ -1,6 +1,7 @@
 #include "mpm/fill_region.h"
 
 #include <algorithm>
+#include <numeric>
 #include <tuple>
 
 #include "mpm/block_materials.h"
@@ -29,6 +30,37 @@ std::vector<Block::Run> runs_of(const std::vector<bool>& holds, int nx, int ny) 
     }
   }
   return runs;
+}
+
+/// Fills the block's nodes and rows of them.
+void find_nodes(Block& block, const LatticeBody& b) {
+  std::vector<Block::Span> seen(block.ny + 2, {block.pitch, 0});  // by the runs, in each row
+  for (const Block::Run& run : block.runs) {
+    for (int y = run.y; y < run.y + 3; ++y) {
+      seen[y].begin = std::min(seen[y].begin, run.x);
+      seen[y].end = std::max(seen[y].end, run.x + run.count + 2);
+    }
+  }
+  block.node.assign(block.node_count(), -1);
+  for (int z = 0; z < block.nz + 2; ++z) {
+    for (int y = 0; y < block.ny + 2; ++y) {
+      const int row = z * block.plane + y * block.pitch, x0 = block.x - 1;
+      int next = seen[y].begin;
+      const auto add = [&](int end, int node, int stretch) {
+        if (end > next) block.node_rows.push_back({row + next, end - next, node, stretch});
+        next = std::max(next, end);
+      };
+      b.for_each_node_in_row(x0, x0 + block.pitch, block.y + y - 1, block.z + z - 1,
+                             [&](int x, int node, int count, int stretch) {
+                               const int begin = x - x0, end = begin + count;
+                               const auto to = block.node.begin() + row + begin;
+                               std::iota(to, to + count, node);
+                               add(std::min(begin, seen[y].end), -1, -1);
+                               add(std::min(end, seen[y].end), node + next - begin, stretch);
+                             });
+      add(seen[y].end, -1, -1);
+    }
+  }
 }
 
 /// The block of a sheet, no larger than its points need.
@@ -78,16 +110,13 @@ Block make_block(const BlockRegion& r, const LatticeBody& b, const Points& point
   std::sort(block.partial.begin(), block.partial.end(),
             [](const auto& p, const auto& q) { return p.lane < q.lane; });
   find_materials(block, b, points);
-  block.node.assign(block.node_count(), b.node(block.x - 1, block.y - 1, block.z - 1));
-  for (int z = 0; z < block.nz + 2; ++z) {
+  find_nodes(block, b);
+  for (int z = 0; z < block.nz + 2 && !sheet.node.empty(); ++z) {
     for (int y = 0; y < block.ny + 2; ++y) {
       for (int x = 0; x < block.pitch; ++x) {
         const int local = z * block.plane + y * block.pitch + x;
-        const int lattice_node = b.node(block.x + x - 1, block.y + y - 1, block.z + z - 1);
-        block.node[local] = lattice_node;
-        if (sheet.node.empty()) continue;
         const int n = ((lo[2] + z) * (r.ny + 2) + lo[1] + y) * (r.nx + 2) + lo[0] + x;
-        if (sheet.node[n] == -1 || sheet.node[n] == lattice_node) continue;
+        if (sheet.node[n] == -1 || sheet.node[n] == block.node[local]) continue;
         block.node[local] = sheet.node[n];
         block.split_nodes.push_back({local, sheet.node[n]});
       }

@@ -1,7 +1,7 @@
 #include "mpm/lattice_body.h"
 
 #include <algorithm>
-#include <cstring>
+#include <numeric>
 #include <stdexcept>
 
 #include "cutting/bonds.h"
@@ -69,6 +69,43 @@ void assign_materials(const Scene& scene, LatticeBody& b, Points& points) {
   for (auto m = first; m != points.material.end(); ++m) --*m;
 }
 
+LatticeRows rows_of(const Lattice& lattice) {
+  LatticeRows rows(0, 2 * lattice.ny);
+  auto site = lattice.sites.begin();  // x fastest
+  for (int z = 0; z < 2 * lattice.nz; ++z) {
+    for (int y = 0; y < 2 * lattice.ny; ++y) {
+      rows.start_row();
+      for (; site != lattice.sites.end() && site->y == y && site->z == z; ++site) {
+        rows.add(site->x, site->x + 1);
+      }
+    }
+  }
+  return rows;
+}
+
+/// Numbers the nodes of a body whose points are there.
+LatticeRows nodes_of(const LatticeBody& b, NodeRange range) {
+  LatticeRows nodes(-1, b.ny + 2);
+  std::vector<std::uint8_t> seen;  // by x + 1
+  for (int z = -1; z <= b.nz; ++z) {
+    for (int y = -1; y <= b.ny; ++y) {
+      nodes.start_row();
+      seen.assign(b.nx + 2, range == NodeRange::kBox ? 1 : 0);
+      for (int row = 0; row < 36; ++row) {
+        b.for_each_point_in_row(0, 2 * b.nx, 2 * y - 2 + row % 6, 2 * z - 2 + row / 6,
+                                [&](int x, int, int count) {
+                                  std::fill(seen.begin() + x / 2,
+                                            seen.begin() + (x + count - 1) / 2 + 3, 1);
+                                });
+      }
+      for (int x = -1; x <= b.nx; ++x) {
+        if (seen[x + 1] != 0) nodes.add(x, x + 1);
+      }
+    }
+  }
+  return nodes;
+}
+
 }  // namespace
 
 std::uint8_t whole_bonds(const LatticeBody& b, const Points::Site& s) {
@@ -81,7 +118,7 @@ std::uint8_t whole_bonds(const LatticeBody& b, const Points::Site& s) {
 }
 
 std::vector<LatticeBody> make_lattice_bodies(const Scene& scene, Points& points,
-                                             std::vector<std::string>* notes) {
+                                             std::vector<std::string>* notes, NodeRange range) {
   std::vector<LatticeBody> bodies;
   int first_node = 0;
   for (const Body& body : scene.bodies) {
@@ -94,17 +131,19 @@ std::vector<LatticeBody> make_lattice_bodies(const Scene& scene, Points& points,
     b.nx = lattice.nx;
     b.ny = lattice.ny;
     b.nz = lattice.nz;
-    b.pitch_y = b.nx + 2;
-    b.pitch_z = b.pitch_y * (b.ny + 2);
-    b.first_node = first_node;
-    first_node += b.node_count();
     b.first_point = points.size();
     b.point_count = static_cast<int>(lattice.sites.size());
-    b.point_at.assign(static_cast<std::size_t>(8) * b.nx * b.ny * b.nz, -1);
+    b.points = rows_of(lattice);
+    b.first_node = first_node;
+    b.nodes = nodes_of(b, range);
+    first_node += b.nodes.count();
+    const std::size_t count = points.site.size() + lattice.sites.size();
+    points.site.reserve(count);
+    points.volume.reserve(count);
+    points.anchored.reserve(count);
     const auto index = static_cast<std::int16_t>(bodies.size());
     std::vector<int> anchored(body.anchors.size(), 0);
     for (const Lattice::Site& s : lattice.sites) {
-      b.point_at[(static_cast<std::size_t>(s.z) * 2 * b.ny + s.y) * 2 * b.nx + s.x] = points.size();
       points.site.push_back({static_cast<std::int16_t>(s.x), static_cast<std::int16_t>(s.y),
                              static_cast<std::int16_t>(s.z), index});
       points.volume.push_back(s.volume);
@@ -131,21 +170,14 @@ std::vector<LatticeBody> make_lattice_bodies(const Scene& scene, Points& points,
 }
 
 void points_around(const LatticeBody& b, int x, int y, int z, std::int32_t (&around)[216]) {
-  const int x0 = 2 * x - 2, y0 = 2 * y - 2, z0 = 2 * z - 2;
-  const int begin = std::max(0, -x0), end = std::min(6, 2 * b.nx - x0);
-  const bool inside = begin == 0 && end == 6;
+  std::fill_n(around, 216, -1);
   for (int row = 0; row < 36; ++row) {
-    const int j = y0 + row % 6, k = z0 + row / 6;
-    std::int32_t* to = around + 6 * row;
-    const bool there = j >= 0 && j < 2 * b.ny && k >= 0 && k < 2 * b.nz;
-    if (!there || !inside) std::fill_n(to, 6, -1);
-    if (!there) continue;
-    const std::int32_t* from = &b.point_at[(static_cast<std::size_t>(k) * 2 * b.ny + j) * 2 * b.nx];
-    if (inside) {
-      std::memcpy(to, from + x0, 6 * sizeof(*to));
-    } else {
-      std::copy(from + (x0 + begin), from + (x0 + end), to + begin);
-    }
+    const int x0 = 2 * x - 2;
+    b.for_each_point_in_row(x0, x0 + 6, 2 * y - 2 + row % 6, 2 * z - 2 + row / 6,
+                            [&](int from, int point, int count) {
+                              std::iota(around + 6 * row + from - x0,
+                                        around + 6 * row + from - x0 + count, point);
+                            });
   }
 }
 

@@ -9,6 +9,7 @@
 #include "compute/array.h"
 #include "cutting/bonds.h"
 #include "geometry/lattice.h"
+#include "mpm/lattice_rows.h"
 #include "tissue_sim/scene.h"
 
 namespace tissue_sim {
@@ -62,27 +63,54 @@ struct LatticeBody {
   Vec3 origin = Vec3::Zero();       ///< lowest corner of cell (0, 0, 0) [m]
   double cell_size = 0;
   int nx = 0, ny = 0, nz = 0;  ///< cells
-  int first_node = 0;          ///< of its lattice nodes in Nodes; cell (0,0,0) has node (1,1,1)
-  int pitch_y = 0, pitch_z = 0;
+  int first_node = 0;          ///< of its lattice nodes in Nodes
   int first_point = 0, point_count = 0;
-  std::vector<std::int32_t> point_at;  ///< [2 nz][2 ny][2 nx], point number or -1
+  LatticeRows nodes;   ///< by the cells whose middle they are, -1 .. n each
+  LatticeRows points;  ///< by their sites
 
   const Material& material_of(const Points& points, std::int32_t point) const {
     return materials[points.material_of(point)];
   }
-  int node_count() const { return pitch_z * (nz + 2); }
   /// Point at a site, -1 where there is none or outside.
   int point(int x, int y, int z) const {
-    if (x < 0 || y < 0 || z < 0 || x >= 2 * nx || y >= 2 * ny || z >= 2 * nz) return -1;
-    return point_at[(static_cast<std::size_t>(z) * 2 * ny + y) * 2 * nx + x];
+    const int number = points.number(x, y, z);
+    return number < 0 ? -1 : first_point + number;
+  }
+  /// Calls f(x, point, count) for the points at x_begin .. x_end - 1 of a row of sites: `count` of
+  /// them from x on, numbered from `point` on.
+  template <class F>
+  void for_each_point_in_row(int x_begin, int x_end, int y, int z, const F& f) const {
+    points.for_each_in_row(x_begin, x_end, y, z, [&](int x, int number, int count, int) {
+      f(x, first_point + number, count);
+    });
   }
   /// The point after a site along an axis (0 x, 1 y, 2 z), -1 where there is none.
   std::int32_t next_point(const Points::Site& s, int axis) const {
     return point(s.x + (axis == 0), s.y + (axis == 1), s.z + (axis == 2));
   }
-  /// Lattice node of cell (x, y, z), -1 .. n each.
+  /// Lattice node of cell (x, y, z), -1 .. n each; -1 where there is none, for no point sees it.
   int node(int x, int y, int z) const {
-    return first_node + (z + 1) * pitch_z + (y + 1) * pitch_y + x + 1;
+    const int number = nodes.number(x, y, z);
+    return number < 0 ? -1 : first_node + number;
+  }
+  /// Calls f(x, node, count, stretch) for the nodes of the cells x_begin .. x_end - 1 of a row:
+  /// `count` of them from x on, numbered from `node` on, in that stretch of `nodes`.
+  template <class F>
+  void for_each_node_in_row(int x_begin, int x_end, int y, int z, const F& f) const {
+    nodes.for_each_in_row(x_begin, x_end, y, z, [&](int x, int number, int count, int stretch) {
+      f(x, first_node + number, count, stretch);
+    });
+  }
+  /// Calls f(node, x, y, z) for all lattice nodes, in order.
+  template <class F>
+  void for_each_node(const F& f) const {
+    for (int z = -1; z <= nz; ++z) {
+      for (int y = -1; y <= ny; ++y) {
+        for_each_node_in_row(-1, nx + 1, y, z, [&](int x, int node, int count, int) {
+          for (int i = 0; i < count; ++i) f(node + i, x + i, y, z);
+        });
+      }
+    }
   }
   Vec3 node_position(int x, int y, int z) const {
     return origin + cell_size * Vec3(x + 0.5, y + 0.5, z + 0.5);
@@ -94,13 +122,17 @@ struct LatticeBody {
 
 /// Nodes of all bodies' lattices; higher numbers are fields that cuts made.
 inline int lattice_node_count(const std::vector<LatticeBody>& bodies) {
-  return bodies.back().first_node + bodies.back().node_count();
+  return bodies.back().first_node + bodies.back().nodes.count();
 }
+
+/// Which nodes a lattice has: those that points see, or all around the cells of its box.
+enum class NodeRange { kSeen, kBox };
 
 /// Puts the bodies of a scene on their lattices and fills `points`, all bonds whole. Throws
 /// std::invalid_argument (a mesh that cannot be used, an anchor that holds nothing, ...).
 std::vector<LatticeBody> make_lattice_bodies(const Scene& scene, Points& points,
-                                             std::vector<std::string>* notes);
+                                             std::vector<std::string>* notes,
+                                             NodeRange range = NodeRange::kSeen);
 
 /// Points around lattice node (x, y, z) of `body` in the order of a 6 x 6 x 6 box, -1 where none:
 /// those whose stencils hold the node.

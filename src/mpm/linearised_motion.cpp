@@ -70,7 +70,9 @@ LinearisedMotion::LinearisedMotion(MpmState& state, const std::vector<std::uint8
   for (std::size_t i = 0; i < takes_part.size(); ++i) {
     if (takes_part[i] == 0) continue;
     blocks_.push_back(static_cast<int>(i));
-    for (const std::int32_t node : state.blocks.all[i]->node) seen[node] = 1;
+    for (const std::int32_t node : state.blocks.all[i]->node) {
+      if (node >= 0) seen[node] = 1;
+    }
   }
   for (std::size_t i = 0; i < seen.size(); ++i) {
     if (seen[i] == 0 || n.inv_mass[i] == 0) continue;

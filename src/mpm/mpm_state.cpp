@@ -29,9 +29,6 @@ BlockField block_field(const MpmState& state, const Block& block) {
   const Vec3 origin = b.node_position(block.x - 1, block.y - 1, block.z - 1);
   BlockField f;
   f.nodes = &state.nodes;
-  f.first_node = b.node(block.x - 1, block.y - 1, block.z - 1);
-  f.pitch_y = b.pitch_y;
-  f.pitch_z = b.pitch_z;
   f.cell_size = static_cast<float>(b.cell_size);
   for (int a = 0; a < 3; ++a) f.origin[a] = static_cast<float>(origin[a]);
   const bool mixed = block.material == Block::kMixed;

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <iterator>
+#include <numeric>
 
 namespace tissue_sim {
 namespace {
@@ -20,15 +21,19 @@ RegionShares::RegionShares(const BlockRegion& r, const LatticeBody& b, const Poi
                            const NodeFields& fields)
     : r_(r), points_(points), step_{-r.nx * r.ny, -r.nx, -1, 1, r.nx, r.nx * r.ny} {
   const int px = r.nx + 2, py = r.ny + 2, pz = r.nz + 2;
-  split_.resize(static_cast<std::size_t>(px) * py * pz);
-  std::size_t n = 0;
+  const std::size_t n = static_cast<std::size_t>(px) * py * pz;
+  split_.resize(n);
   for (int z = 0; z < pz; ++z) {
     for (int y = 0; y < py; ++y) {
-      const int row = b.node(r.x - 1, r.y + y - 1, r.z + z - 1);
-      for (int x = 0; x < px; ++x, ++n) {
-        split_[n] = fields.split(row + x);
-        any_split_ = any_split_ || split_[n] != nullptr;
-      }
+      const int row = (z * py + y) * px, x0 = r.x - 1;
+      b.for_each_node_in_row(x0, x0 + px, r.y + y - 1, r.z + z - 1,
+                             [&](int x, int node, int count, int) {
+                               for (int i = 0; i < count; ++i) {
+                                 const NodeFields::Split* split = fields.split(node + i);
+                                 split_[row + x - x0 + i] = split;
+                                 any_split_ = any_split_ || split != nullptr;
+                               }
+                             });
     }
   }
   split_in_row_.assign(n, 0);
@@ -43,13 +48,22 @@ RegionShares::RegionShares(const BlockRegion& r, const LatticeBody& b, const Poi
   }
   cells_.resize(static_cast<std::size_t>(r.nx) * r.ny * r.nz);
   all_.reserve(cells_.size());
-  const std::ptrdiff_t row = 2 * b.nx, plane = 2 * b.ny * row;
+  const int row = 2 * r.nx, plane = 2 * r.ny * row;
+  std::vector<std::int32_t> point_at(8 * cells_.size(), -1);
+  for (int z = 0; z < 2 * r.nz; ++z) {
+    for (int y = 0; y < 2 * r.ny; ++y) {
+      b.for_each_point_in_row(2 * r.x, 2 * r.x + row, 2 * r.y + y, 2 * r.z + z,
+                              [&](int x, int point, int count) {
+                                const auto to = point_at.begin() + z * plane + y * row + x - 2 * r.x;
+                                std::iota(to, to + count, point);
+                              });
+    }
+  }
   std::size_t cell = 0;
   for (int z = 0; z < r.nz; ++z) {
     for (int y = 0; y < r.ny; ++y) {
       for (int x = 0; x < r.nx; ++x, ++cell) {
-        const std::int32_t* lowest =
-            b.point_at.data() + 2 * (r.z + z) * plane + 2 * (r.y + y) * row + 2 * (r.x + x);
+        const std::int32_t* lowest = point_at.data() + 2 * z * plane + 2 * y * row + 2 * x;
         std::int32_t point[8];
         bool any = false;
         for (int s = 0; s < 8; ++s) {

@@ -50,13 +50,13 @@ Scene cube(const Size& size, Law law) {
 /// Stretch along z by this much and shear, and waves of some cells' length.
 void deform(MpmState& state, double stretch) {
   const LatticeBody& b = state.bodies[0];
-  for (int i = 0; i < b.node_count(); ++i) {
-    const double x = i % b.pitch_y, y = i % b.pitch_z / b.pitch_y, z = i / b.pitch_z;
+  b.for_each_node([&](int node, int i, int j, int k) {
+    const double x = i + 1, y = j + 1, z = k + 1;
     const double h = b.cell_size;
     const double u[3] = {h * (0.3 * z + 0.1 * std::sin(0.4 * y)), h * 0.1 * std::sin(0.5 * x + z),
                          h * (stretch * z + 0.1 * std::sin(0.3 * x))};
-    for (int a = 0; a < 3; ++a) state.nodes.u[a][i] = static_cast<float>(u[a]);
-  }
+    for (int a = 0; a < 3; ++a) state.nodes.u[a][node] = static_cast<float>(u[a]);
+  });
 }
 
 void add_probes(Scene& scene, std::vector<ToolMotion>& motions) {

@@ -64,7 +64,12 @@ void CudaMpmTissue::upload_lattices() {
     const Vec3 origin = b.node_position(0, 0, 0);
     lattices.push_back(
         {{origin[0], origin[1], origin[2]}, b.cell_size, 2 * b.nx, 2 * b.ny, point_at.size()});
-    point_at.insert(point_at.end(), b.point_at.begin(), b.point_at.end());
+    const std::size_t first = point_at.size();
+    point_at.resize(first + std::size_t{8} * b.nx * b.ny * b.nz, -1);
+    for (int p = b.first_point; p < b.first_point + b.point_count; ++p) {
+      const Points::Site& s = state_->points.site[p];
+      point_at[first + (std::size_t(s.z) * 2 * b.ny + s.y) * 2 * b.nx + s.x] = p;
+    }
   }
   f.lattices.upload(lattices, device_->stream);
   f.point_at.upload(point_at, device_->stream);

@@ -17,7 +17,7 @@ namespace {
 std::unique_ptr<MpmState> make_state(const Scene& scene, std::vector<std::string>* notes) {
   auto state = std::make_unique<MpmState>();
   state->scene = scene;
-  state->bodies = make_lattice_bodies(scene, state->points, notes);
+  state->bodies = make_lattice_bodies(scene, state->points, notes, NodeRange::kBox);
   state->fields = std::make_unique<NodeFields>(state->bodies, state->points, state->nodes);
   state->instructions = instruction_set();
   state->kernels = &block_kernels(state->instructions);

@@ -72,7 +72,7 @@ struct CudaLooks {
   float cell_size;  ///< the scene's [m]
   const CudaFacet* facets;
   const CudaLattice* lattices;
-  const std::int32_t* point_at;           ///< LatticeBody::point_at, body after body
+  const std::int32_t* point_at;           ///< [2 nz][2 ny][2 nx], -1 for none, body after body
   const std::uint8_t* bonds;              ///< per point
   const std::int32_t* slot_node;          ///< CudaTables::slot_node
   FacetMotion* motion;                    ///< per facet; up to date where a contact needs it

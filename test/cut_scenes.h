@@ -103,16 +103,28 @@ inline void deform(MpmState& state) {
   measure_motion(state);
 }
 
-/// Shakes each node, fields of a split one apart, by `size` [m] and gives it a velocity.
+/// Shakes each node, fields of a split one apart, by `size` [m] and gives it a velocity: nodes at
+/// one place the same, whatever their numbers.
 inline void shake(MpmState& state, unsigned seed, double size) {
   std::mt19937 random(seed);
   std::normal_distribution<float> normal;
-  for (std::size_t i = 0; i < state.nodes.size(); ++i) {
+  const auto shake_node = [&](int i) {
     for (int a = 0; a < 3; ++a) {
-      state.nodes.u[a][i] += static_cast<float>(size) * normal(random);
+      const float by = static_cast<float>(size) * normal(random);
+      if (i < 0) continue;
+      state.nodes.u[a][i] += by;
       state.nodes.v[a][i] = state.nodes.inv_mass[i] == 0 ? 0 : 0.1f * normal(random);
     }
+  };
+  for (const LatticeBody& b : state.bodies) {
+    for (int z = -1; z <= b.nz; ++z) {
+      for (int y = -1; y <= b.ny; ++y) {
+        for (int x = -1; x <= b.nx; ++x) shake_node(b.node(x, y, z));
+      }
+    }
   }
+  const int count = static_cast<int>(state.nodes.size());
+  for (int i = lattice_node_count(state.bodies); i < count; ++i) shake_node(i);
 }
 
 /// How many points each piece has, largest first.

@@ -48,8 +48,8 @@ std::vector<BrokenBond> CudaMpmTissue::sweep(const BladePath& path, bool moves) 
   s.cells = on.cells.data();
   s.lattices = d.faces.lattices.data();
   s.point_at = d.faces.point_at.data();
-  s.end = on.places[1].data();
-  s.begin = moves ? on.places[0].data() : s.end;
+  s.end = on.places[1];
+  s.begin = moves ? on.places[0] : s.end;
   s.u = d.present().u;
   on.count.resize(1);
   on.host_count.resize(1);
@@ -86,12 +86,15 @@ void CudaMpmTissue::read_places(const float4* u_before) {
     cells.push_back({b.x, b.y, b.z, b.body});
   }
   on.cells.upload(cells, d.stream);
-  const std::size_t count = 3 * static_cast<std::size_t>(state_->points.size());
-  on.places[1].resize(count);
-  launch_places(d.tables(), d.present().u, d.plan.max_slots, on.places[1].data(), d.stream);
+  // Where clouds are written when they are read.
+  static_assert(sizeof(Point) >= 6 * sizeof(float), "room for two places of each point");
+  const auto count = static_cast<std::size_t>(state_->points.size());
+  d.cloud.resize(count);
+  on.places[1] = reinterpret_cast<float*>(d.cloud.data());
+  on.places[0] = on.places[1] + 3 * count;
+  launch_places(d.tables(), d.present().u, d.plan.max_slots, on.places[1], d.stream);
   if (u_before == nullptr) return;
-  on.places[0].resize(count);
-  launch_places(d.tables(), u_before, d.plan.max_slots, on.places[0].data(), d.stream);
+  launch_places(d.tables(), u_before, d.plan.max_slots, on.places[0], d.stream);
 }
 
 void CudaMpmTissue::push_points(const std::vector<std::int32_t>& changed) {

@@ -22,13 +22,21 @@ void CudaMpmTissue::keep_place_for_blades() {
 
 std::vector<TearingPoint> CudaMpmTissue::find_tearing() {
   OnDevice& d = *device_;
-  d.stretched.resize(state_->points.size());
   d.stretched_count.resize(1);
   d.host_stretched_count.resize(1);
-  launch_stretched(d.tables(), d.present(), d.plan.max_slots, d.stretched.data(),
-                   d.stretched_count.data(), d.stream);
-  d.stretched_count.download(d.host_stretched_count.data(), 1, d.stream);
-  check_cuda(cudaStreamSynchronize(d.stream), "look for tears");
+  d.stretched.resize(std::max<std::size_t>(d.stretched.size(), 4096));
+  const auto look = [&] {
+    const int room = static_cast<int>(d.stretched.size());
+    launch_stretched(d.tables(), d.present(), d.plan.max_slots, d.stretched.data(), room,
+                     d.stretched_count.data(), d.stream);
+    d.stretched_count.download(d.host_stretched_count.data(), 1, d.stream);
+    check_cuda(cudaStreamSynchronize(d.stream), "look for tears");
+    return d.host_stretched_count[0] <= room;
+  };
+  if (!look()) {
+    d.stretched.resize(d.host_stretched_count[0]);
+    look();
+  }
   std::vector<StretchedPoint> stretched(d.host_stretched_count[0]);
   if (stretched.empty()) return {};
   d.stretched.download(stretched.data(), stretched.size(), d.stream);

@@ -200,7 +200,8 @@ __global__ void __launch_bounds__(kMostThreads)
 
 /// The test of BlockKernels::stretched: s^2 I - C is not positive definite.
 __global__ void __launch_bounds__(kMostThreads)
-    list_stretched(const CudaTables t, const CudaNodes state, StretchedPoint* found, int* count) {
+    list_stretched(const CudaTables t, const CudaNodes state, StretchedPoint* found, int room,
+                   int* count) {
   extern __shared__ float4 shared[];
   const CudaBlock b = bring_block(t, state, shared);
   const CudaBody body = t.bodies[b.body];
@@ -216,7 +217,8 @@ __global__ void __launch_bounds__(kMostThreads)
     const float minor = m0 * m1 - C[3] * C[3];
     const float det = m2 * minor - m0 * C[5] * C[5] - m1 * C[4] * C[4] - 2.0f * C[3] * C[4] * C[5];
     if (m0 > 0 && minor > 0 && det > 0) return;
-    found[atomicAdd(count, 1)] = out;
+    const int i = atomicAdd(count, 1);
+    if (i < room) found[i] = out;
   });
 }
 
@@ -243,9 +245,9 @@ void launch_measure(const CudaTables& tables, const CudaNodes& state, int max_sl
 }
 
 void launch_stretched(const CudaTables& tables, const CudaNodes& state, int max_slots,
-                      StretchedPoint* found, int* count, cudaStream_t stream) {
+                      StretchedPoint* found, int room, int* count, cudaStream_t stream) {
   check_cuda(cudaMemsetAsync(count, 0, sizeof(int), stream), "clear memory");
-  launch(list_stretched, 4, max_slots, tables, state, stream, found, count);
+  launch(list_stretched, 4, max_slots, tables, state, stream, found, room, count);
 }
 
 void launch_places(const CudaTables& tables, const float4* u, int max_slots, float* places,

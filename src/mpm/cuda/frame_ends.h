@@ -15,9 +15,9 @@ void launch_measure(const CudaTables& tables, const CudaNodes& state, int max_sl
                     CudaMeasure* measures, cudaStream_t stream);
 
 /// Lists the points whose largest stretch reaches the tear_stretch of their body, in any order,
-/// into `found` (room for all points); `count`, one number, becomes how many they are.
+/// into `found`, which has room for so many; `count`, one number, becomes how many they are.
 void launch_stretched(const CudaTables& tables, const CudaNodes& state, int max_slots,
-                      StretchedPoint* found, int* count, cudaStream_t stream);
+                      StretchedPoint* found, int room, int* count, cudaStream_t stream);
 
 /// Writes where all points are, [points][3] [m].
 void launch_places(const CudaTables& tables, const float4* u, int max_slots, float* places,

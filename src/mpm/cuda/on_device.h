@@ -24,15 +24,14 @@ namespace tissue_sim {
 struct SweepOnDevice {
   DeviceArray<CudaSweptEdge> edges;
   DeviceArray<CudaBlockCell> cells;
-  DeviceArray<float> places[2];
+  float* places[2];
   DeviceArray<BrokenBond> broken;
   DeviceArray<int> count;
   PinnedArray<int> host_count;
   DeviceArray<CudaPointChange> changes;
 
   std::size_t bytes() const {
-    return edges.bytes() + cells.bytes() + places[0].bytes() + places[1].bytes() + broken.bytes() +
-           changes.bytes();
+    return edges.bytes() + cells.bytes() + broken.bytes() + changes.bytes();
   }
 };
 

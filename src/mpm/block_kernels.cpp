@@ -34,10 +34,13 @@ TISSUE_SIM_INLINE void update_row(const NodeRow& row, const RowPart* parts, cons
   std::fill_n(sum, 3 * stride, 0.0f);
   for (int p = 0; p < row.part_count; ++p) {
     const RowPart& part = parts[p];
-    for (int c = 0; c < 3; ++c) {
-      const float* from = force + part.force + c * part.component;
-      float* to = sum + c * stride + part.begin;
-      for (int i = 0; i < part.count; ++i) to[i] += from[i];
+    for (int i = 0; i < part.count; i += W) {  // rows are short: the last lanes count nothing
+      const Mask<W> counts = lanes_between<W>(0, part.count - i);
+      for (int c = 0; c < 3; ++c) {
+        float* to = sum + c * stride + part.begin + i;
+        const float* from = force + part.force + c * part.component + i;
+        store<W>(to, load<W>(to) + keep<W>(counts, load<W>(from)));
+      }
     }
   }
   int i = 0;

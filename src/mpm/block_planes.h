@@ -35,8 +35,8 @@ inline void reserve(Array<float>& a, std::size_t n) {
 }
 
 /// Copies the block's nodes of `field`, times `scale`, into [3][nz + 2][plane].
-TISSUE_SIM_INLINE void gather_nodes(const Block& b, const Array<float>* field,
-                                    float scale, const Layout& l, float* out) {
+TISSUE_SIM_INLINE void gather_nodes(const Block& b, const Array<float>* field, float scale,
+                                    const Layout& l, float* out) {
   for (int c = 0; c < 3; ++c) {
     const float* from = field[c].data();
     float* to = out + c * l.node_component;

@@ -50,6 +50,7 @@ void connect_forces(Blocks& blocks, const std::vector<LatticeBody>& bodies, int 
       blocks.all.push_back(&b);
     }
   }
+  blocks.force_size += kLanes;  // rows are read in whole vectors
   blocks.first_split_node = lattice_node_count(bodies);
   if (!blocks.has_rows) return;
   struct Entry {
@@ -76,8 +77,9 @@ void connect_forces(Blocks& blocks, const std::vector<LatticeBody>& bodies, int 
       int begin = r.local;
       const auto add = [&](int up_to) {
         if (up_to == begin) return;
-        entries.push_back({first_row[block->body] + r.stretch,
-                           {block->force_offset + begin, component, to_row + begin, up_to - begin}});
+        entries.push_back(
+            {first_row[block->body] + r.stretch,
+             {block->force_offset + begin, component, to_row + begin, up_to - begin}});
       };
       const auto& split_nodes = block->split_nodes;
       for (; next_split < split_nodes.size() && split_nodes[next_split].local < end; ++next_split) {

@@ -92,11 +92,10 @@ LatticeRows nodes_of(const LatticeBody& b, NodeRange range) {
       nodes.start_row();
       seen.assign(b.nx + 2, range == NodeRange::kBox ? 1 : 0);
       for (int row = 0; row < 36; ++row) {
-        b.for_each_point_in_row(0, 2 * b.nx, 2 * y - 2 + row % 6, 2 * z - 2 + row / 6,
-                                [&](int x, int, int count) {
-                                  std::fill(seen.begin() + x / 2,
-                                            seen.begin() + (x + count - 1) / 2 + 3, 1);
-                                });
+        b.for_each_point_in_row(
+            0, 2 * b.nx, 2 * y - 2 + row % 6, 2 * z - 2 + row / 6, [&](int x, int, int count) {
+              std::fill(seen.begin() + x / 2, seen.begin() + (x + count - 1) / 2 + 3, 1);
+            });
       }
       for (int x = -1; x <= b.nx; ++x) {
         if (seen[x + 1] != 0) nodes.add(x, x + 1);
@@ -173,11 +172,10 @@ void points_around(const LatticeBody& b, int x, int y, int z, std::int32_t (&aro
   std::fill_n(around, 216, -1);
   for (int row = 0; row < 36; ++row) {
     const int x0 = 2 * x - 2;
-    b.for_each_point_in_row(x0, x0 + 6, 2 * y - 2 + row % 6, 2 * z - 2 + row / 6,
-                            [&](int from, int point, int count) {
-                              std::iota(around + 6 * row + from - x0,
-                                        around + 6 * row + from - x0 + count, point);
-                            });
+    b.for_each_point_in_row(
+        x0, x0 + 6, 2 * y - 2 + row % 6, 2 * z - 2 + row / 6, [&](int from, int point, int count) {
+          std::iota(around + 6 * row + from - x0, around + 6 * row + from - x0 + count, point);
+        });
   }
 }
 

@@ -40,8 +40,8 @@ class LatticeRows {
     for_each_in_row(x, x + 1, y, z, [&](int, int number, int, int) { result = number; });
     return result;
   }
-  /// Calls f(x, number, count, stretch) for the places x_begin .. x_end - 1 of a row that are there:
-  /// `count` of them from x on, with numbers from `number` on, in that one of stretches().
+  /// Calls f(x, number, count, stretch) for the places x_begin .. x_end - 1 of a row that are
+  /// there: `count` of them from x on, with numbers from `number` on, in that one of stretches().
   template <class F>
   void for_each_in_row(int x_begin, int x_end, int y, int z, const F& f) const {
     y -= lowest_;

@@ -52,11 +52,11 @@ RegionShares::RegionShares(const BlockRegion& r, const LatticeBody& b, const Poi
   std::vector<std::int32_t> point_at(8 * cells_.size(), -1);
   for (int z = 0; z < 2 * r.nz; ++z) {
     for (int y = 0; y < 2 * r.ny; ++y) {
-      b.for_each_point_in_row(2 * r.x, 2 * r.x + row, 2 * r.y + y, 2 * r.z + z,
-                              [&](int x, int point, int count) {
-                                const auto to = point_at.begin() + z * plane + y * row + x - 2 * r.x;
-                                std::iota(to, to + count, point);
-                              });
+      b.for_each_point_in_row(
+          2 * r.x, 2 * r.x + row, 2 * r.y + y, 2 * r.z + z, [&](int x, int point, int count) {
+            const auto to = point_at.begin() + z * plane + y * row + x - 2 * r.x;
+            std::iota(to, to + count, point);
+          });
     }
   }
   std::size_t cell = 0;

@@ -78,25 +78,33 @@ double mass_of_point(const LatticeBody& body, const Points& points, const NodeFi
   return mass;
 }
 
-/// The cells whose nodes one of the points belongs to, in the order of these points.
+/// The cells whose nodes one of the points belongs to, in the order of their nodes: so the new
+/// nodes of a row follow one another.
 std::vector<NodeFields::Cell> cells_around(const std::vector<LatticeBody>& bodies,
                                            const Points& points,
                                            const std::vector<std::int32_t>& some) {
   constexpr std::uint8_t kListed = 1, kDone = 2;  // itself; all around it
   std::vector<std::uint8_t> state(lattice_node_count(bodies), 0);
-  std::vector<NodeFields::Cell> cells;
   for (const std::int32_t p : some) {
     const Points::Site& s = points.site[p];
     const LatticeBody& b = bodies[s.body];
-    std::uint8_t& middle = state[b.node(s.x / 2, s.y / 2, s.z / 2)];
-    if ((middle & kDone) != 0) continue;
-    middle |= kDone;
+    const int middle = b.node(s.x / 2, s.y / 2, s.z / 2);
+    if ((state[middle] & kDone) != 0) continue;
+    state[middle] |= kDone;
     for (int k = 0; k < 27; ++k) {
-      const NodeFields::Cell c{s.body, s.x / 2 + k % 3 - 1, s.y / 2 + k / 3 % 3 - 1,
-                               s.z / 2 + k / 9 - 1};
-      std::uint8_t& at = state[b.node(c.x, c.y, c.z)];
-      if ((at & kListed) == 0) cells.push_back(c);
-      at |= kListed;
+      state[middle + k % 3 - 1 + (k / 3 % 3 - 1) * b.pitch_y + (k / 9 - 1) * b.pitch_z] |= kListed;
+    }
+  }
+  std::vector<NodeFields::Cell> cells;
+  for (std::size_t i = 0; i < bodies.size(); ++i) {
+    const LatticeBody& b = bodies[i];
+    for (int z = -1; z <= b.nz; ++z) {
+      for (int y = -1; y <= b.ny; ++y) {
+        const std::uint8_t* row = state.data() + b.node(0, y, z);
+        for (int x = -1; x <= b.nx; ++x) {
+          if (row[x] != 0) cells.push_back({static_cast<int>(i), x, y, z});
+        }
+      }
     }
   }
   return cells;

@@ -37,7 +37,10 @@ TISSUE_SIM_INLINE void update_row(const NodeRow& row, const RowPart* parts, cons
     for (int c = 0; c < 3; ++c) {
       const float* from = force + part.force + c * part.component;
       float* to = sum + c * stride + part.begin;
-      for (int i = 0; i < part.count; ++i) to[i] += from[i];
+      for (int i = 0; i < part.count; i += W) {
+        const Mask<W> of_part = lanes_between<W>(0, part.count - i);
+        store<W>(to + i, load<W>(to + i) + keep<W>(of_part, load<W>(from + i)));
+      }
     }
   }
   int i = 0;

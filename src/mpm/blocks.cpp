@@ -47,19 +47,19 @@ void connect_forces(Blocks& blocks, const std::vector<LatticeBody>& bodies, int 
       blocks.all.push_back(&b);
     }
   }
+  blocks.force_size += kLanes;  // that vectors may read beyond the last
   blocks.first_split_node = lattice_node_count(bodies);
   if (!blocks.has_rows) return;
   struct Entry {
-    int row;  // of lattice nodes, counted through all bodies
+    int row;  // of lattice nodes, counted through all bodies; then of split ones
     RowPart part;
   };
   std::vector<Entry> entries;
-  std::vector<std::pair<int, SplitNodePart>> split;
   std::vector<int> first_row;  // of each body
-  int row_count = 0;
+  int split_row = 0;           // the first of split nodes
   for (const LatticeBody& b : bodies) {
-    first_row.push_back(row_count);
-    row_count += b.node_count() / b.pitch_y;
+    first_row.push_back(split_row);
+    split_row += b.node_count() / b.pitch_y;
   }
   for (const Block* block : blocks.all) {
     const LatticeBody& b = bodies[block->body];
@@ -70,60 +70,59 @@ void connect_forces(Blocks& blocks, const std::vector<LatticeBody>& bodies, int 
         const int local = z * block->plane + y * block->pitch;
         const int row_node = b.node(-1, block->y + y - 1, block->z + z - 1);
         const int row = first_row[block->body] + (row_node - b.first_node) / b.pitch_y;
-        // A row without the nodes that this block sees split: parts between them.
         const Block::Span seen = block->node_rows[y];
-        int begin = seen.begin;
-        const auto add = [&](int end) {
-          if (end > begin) {
-            entries.push_back(
-                {row,
-                 {block->force_offset + local + begin, component, block->x + begin, end - begin}});
-          }
+        const auto add = [&](int of_row, int begin, int x, int count) {
+          if (count <= 0) return;
+          entries.push_back({of_row, {block->force_offset + local + x, component, begin, count}});
         };
-        while (next_split < block->split_nodes.size() &&
-               block->split_nodes[next_split].local < local + block->pitch) {
-          const Block::SplitNode& s = block->split_nodes[next_split++];
-          if (s.local < local + seen.begin || s.local >= local + seen.end) continue;
-          add(s.local - local);
-          begin = s.local - local + 1;
-          split.push_back({s.node, {block->force_offset + s.local, component}});
+        // A row without the nodes that this block sees split: parts between them.
+        int x = seen.begin;
+        for (; next_split < block->split_nodes.size() &&
+               block->split_nodes[next_split].local < local + block->pitch;
+             ++next_split) {
+          const Block::SplitNodes& s = block->split_nodes[next_split];
+          const int first = std::max(seen.begin, s.local - local),
+                    end = std::min(seen.end, s.local - local + s.count);
+          if (first >= end) continue;
+          add(row, block->x + x, x, first - x);
+          for (x = first; x < end;) {
+            const int node = s.node + local + x - s.local - blocks.first_split_node;
+            const int begin = node % kSplitRow, count = std::min(end - x, kSplitRow - begin);
+            add(split_row + node / kSplitRow, begin, x, count);
+            x += count;
+          }
         }
-        add(seen.end);
+        add(row, block->x + x, x, seen.end - x);
       }
     }
   }
   // Those of a row one after the other, in the order of the blocks.
+  const int split_count = node_count - blocks.first_split_node;
+  const int row_count = split_row + (split_count + kSplitRow - 1) / kSplitRow;
   std::vector<int> end_of(row_count + 1, 0);  // first, then end of each row's
   for (const Entry& e : entries) ++end_of[e.row + 1];
   std::partial_sum(end_of.begin(), end_of.end(), end_of.begin());
   blocks.row_parts.resize(entries.size());
   for (const Entry& e : entries) blocks.row_parts[end_of[e.row]++] = e.part;
   blocks.rows.clear();
-  int row = 0, begin = 0;
-  for (const LatticeBody& b : bodies) {
-    for (int node = b.first_node; node < b.first_node + b.node_count(); node += b.pitch_y, ++row) {
-      const int end = end_of[row];
-      int lo = 1 << 30, hi = 0;
-      for (int i = begin; i < end; ++i) {
-        const RowPart& part = blocks.row_parts[i];
-        lo = std::min(lo, part.begin);
-        hi = std::max(hi, part.begin + part.count);
-      }
-      for (int i = begin; i < end; ++i) blocks.row_parts[i].begin -= lo;
-      if (end > begin) blocks.rows.push_back({node + lo, hi - lo, begin, end - begin});
-      begin = end;
+  int begin = 0;
+  const auto add_row = [&](int row, int first_node) {
+    const int end = end_of[row];
+    int lo = 1 << 30, hi = 0;
+    for (int i = begin; i < end; ++i) {
+      const RowPart& part = blocks.row_parts[i];
+      lo = std::min(lo, part.begin);
+      hi = std::max(hi, part.begin + part.count);
     }
+    for (int i = begin; i < end; ++i) blocks.row_parts[i].begin -= lo;
+    if (end > begin) blocks.rows.push_back({first_node + lo, hi - lo, begin, end - begin});
+    begin = end;
+  };
+  int row = 0;
+  for (const LatticeBody& b : bodies) {
+    for (int i = 0; i < b.node_count(); i += b.pitch_y) add_row(row++, b.first_node + i);
   }
-  // Parts of each node in the order of the blocks.
-  std::vector<int>& first = blocks.split_node_parts;
-  first.assign(node_count - blocks.first_split_node + 1, 0);
-  for (const auto& [node, part] : split) ++first[node - blocks.first_split_node + 1];
-  std::partial_sum(first.begin(), first.end(), first.begin());
-  std::vector<int> next(first.begin(), first.end() - 1);
-  blocks.split_parts.resize(split.size());
-  for (const auto& [node, part] : split) {
-    blocks.split_parts[next[node - blocks.first_split_node]++] = part;
-  }
+  for (int i = 0; i < split_count; i += kSplitRow) add_row(row++, blocks.first_split_node + i);
 }
 
 /// Makes the blocks of some regions anew, then block by block their facets.

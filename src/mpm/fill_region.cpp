@@ -81,6 +81,7 @@ Block make_block(const BlockRegion& r, const LatticeBody& b, const Points& point
   block.node.assign(block.node_count(), b.node(block.x - 1, block.y - 1, block.z - 1));
   for (int z = 0; z < block.nz + 2; ++z) {
     for (int y = 0; y < block.ny + 2; ++y) {
+      Block::SplitNodes* last = nullptr;  // of this row
       for (int x = 0; x < block.pitch; ++x) {
         const int local = z * block.plane + y * block.pitch + x;
         const int lattice_node = b.node(block.x + x - 1, block.y + y - 1, block.z + z - 1);
@@ -89,7 +90,13 @@ Block make_block(const BlockRegion& r, const LatticeBody& b, const Points& point
         const int n = ((lo[2] + z) * (r.ny + 2) + lo[1] + y) * (r.nx + 2) + lo[0] + x;
         if (sheet.node[n] == -1 || sheet.node[n] == lattice_node) continue;
         block.node[local] = sheet.node[n];
-        block.split_nodes.push_back({local, sheet.node[n]});
+        if (last != nullptr && last->local + last->count == local &&
+            last->node + last->count == sheet.node[n]) {
+          ++last->count;
+          continue;
+        }
+        block.split_nodes.push_back({local, sheet.node[n], 1});
+        last = &block.split_nodes.back();
       }
     }
   }

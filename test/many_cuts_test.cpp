@@ -23,7 +23,7 @@ long resident() {
 }
 
 struct Sizes {
-  std::size_t nodes, splits, blocks, pieces, force, rows, split_parts;
+  std::size_t nodes, splits, blocks, pieces, force, rows;
 
   explicit Sizes(MpmTissue& tissue) {
     const MpmState& s = tissue.state();
@@ -33,11 +33,10 @@ struct Sizes {
     pieces = tissue.fragments().size();
     force = s.force.size();
     rows = s.blocks.row_parts.size();
-    split_parts = s.blocks.split_parts.size();
   }
   bool operator==(const Sizes& o) const {
     return nodes == o.nodes && splits == o.splits && blocks == o.blocks && pieces == o.pieces &&
-           force == o.force && rows == o.rows && split_parts == o.split_parts;
+           force == o.force && rows == o.rows;
   }
 };
 

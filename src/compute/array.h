@@ -1,4 +1,5 @@
-// Array: a vector whose elements start on a cache line, as SIMD loads and the GPU like them.
+// Array: a vector whose elements start on a cache line, as SIMD loads and the GPU like them. There
+// is room for one more behind the last, which may be read.
 #pragma once
 
 #include <cstddef>
@@ -15,7 +16,7 @@ struct CacheLineAllocator {
   template <class U>
   CacheLineAllocator(const CacheLineAllocator<U>&) {}  // NOLINT: rebinding converts
   T* allocate(std::size_t n) {
-    void* p = std::aligned_alloc(64, (n * sizeof(T) + 63) / 64 * 64);
+    void* p = std::aligned_alloc(64, (n * sizeof(T) / 64 + 1) * 64);
     if (p == nullptr) throw std::bad_alloc();
     return static_cast<T*>(p);
   }

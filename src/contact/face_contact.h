@@ -23,10 +23,11 @@ inline constexpr double kNever = 1e30;  ///< [s]
 /// A facet against another, on the CPU.
 struct FaceContact : FaceSpring {
   CellNodes nodes, other_nodes;
-  AxisWeights weights, other_weights;  ///< at the facet's centre; at `hold`
-  bool is_small = false;               ///< of a small piece, which is looked at by itself as well:
-  double looked_at = 0;                ///< when last [s]
-  double look_at = kNever;             ///< when by itself next [s]
+  bool has_whole_rows = false, other_has_whole_rows = false;  ///< face_places.h, of these
+  AxisWeights weights, other_weights;                         ///< at the facet's centre; at `hold`
+  bool is_small = false;    ///< of a small piece, which is looked at by itself as well:
+  double looked_at = 0;     ///< when last [s]
+  double look_at = kNever;  ///< when by itself next [s]
 };
 
 struct FaceContacts {

@@ -1,6 +1,7 @@
 // Facets by their number, and the material places that contacts hold on to.
 #pragma once
 
+#include "compute/simd.h"
 #include "contact/face_contact.h"
 #include "mpm/mpm_state.h"
 
@@ -34,16 +35,50 @@ inline double mobility(const Nodes& nodes, const CellNodes& cell, const AxisWeig
   return sum;
 }
 
+/// Whether the three nodes of each row around a cell follow one another in Nodes.
+inline bool has_whole_rows(const CellNodes& cell) {
+  bool whole = true;
+  for (int row = 0; row < 9; ++row) {
+    const std::int32_t* n = cell.lowest + row / 3 * cell.plane + row % 3 * cell.pitch;
+    whole = whole && n[1] == n[0] + 1 && n[2] == n[0] + 2;
+  }
+  return whole;
+}
+
+/// Displacement of a place in a cell.
+inline void displacement_at(const Nodes& nodes, const CellNodes& cell, bool has_whole_rows,
+                            const AxisWeights& weights, float (&value)[3]) {
+  if (!has_whole_rows) {
+    value_at(CellField{nodes.u, cell}, weights, value);
+    return;
+  }
+  const float *wx = weights.of, *wy = wx + 3, *wz = wx + 6;
+  const float *ux = nodes.u[0].data(), *uy = nodes.u[1].data(), *uz = nodes.u[2].data();
+  // Sums over rows, each of three nodes and a fourth that does not count.
+  Vec<4> x = {}, y = {}, z = {};
+  for (int i = 0; i < 9; ++i) {
+    const std::int32_t n = cell.lowest[i / 3 * cell.plane + i % 3 * cell.pitch];
+    const float w = wz[i / 3] * wy[i % 3];
+    x += w * load<4>(ux + n);
+    y += w * load<4>(uy + n);
+    z += w * load<4>(uz + n);
+  }
+  value[0] = wx[0] * x[0] + wx[1] * x[1] + wx[2] * x[2];
+  value[1] = wx[0] * y[0] + wx[1] * y[1] + wx[2] * y[2];
+  value[2] = wx[0] * z[0] + wx[1] * z[1] + wx[2] * z[2];
+}
+
 /// The places of a contact on the CPU: see push_face().
 struct ContactPlaces {
   const Nodes& nodes;
   FaceContact& contact;
 
   void own(float (&value)[3]) const {
-    value_at(CellField{nodes.u, contact.nodes}, contact.weights, value);
+    displacement_at(nodes, contact.nodes, contact.has_whole_rows, contact.weights, value);
   }
   void held(float (&value)[3]) const {
-    value_at(CellField{nodes.u, contact.other_nodes}, contact.other_weights, value);
+    displacement_at(nodes, contact.other_nodes, contact.other_has_whole_rows, contact.other_weights,
+                    value);
   }
   void hold(const float (&place)[3]) { contact.other_weights = AxisWeights(place); }
   float own_mobility() const {
@@ -87,6 +122,7 @@ struct ContactFaces : ContactPlaces {
   static NearFacet nearest(const NearFacet& best) { return best; }
   void hold_in(std::int32_t f) const {
     contact.other_nodes = CellNodes(block_of(state, f), facet(f).cell);
+    contact.other_has_whole_rows = has_whole_rows(contact.other_nodes);
   }
 };
 

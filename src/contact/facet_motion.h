@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "compute/simd.h"
 #include "contact/facet_in_world.h"
 #include "mpm/block.h"
 #include "mpm/lattice_body.h"
@@ -38,14 +39,15 @@ struct CellField {
 inline void spread(const Block& block, int cell, const AxisWeights& weights, const float (&push)[3],
                    float* force) {
   const float *wx = weights.of, *wy = wx + 3, *wz = wx + 6;
+  const Vec<4> along_x = {wx[0], wx[1], wx[2], 0.0f};  // the fourth node stays as it is
   const int component = block.node_count();
-  for (int z = 0; z < 3; ++z) {
-    for (int y = 0; y < 3; ++y) {
-      float* to = force + cell + z * block.plane + y * block.pitch;
-      const float w = wz[z] * wy[y];
-      for (int c = 0; c < 3; ++c) {
-        const float p = w * push[c];
-        for (int x = 0; x < 3; ++x) to[c * component + x] += p * wx[x];
+  for (int c = 0; c < 3; ++c) {
+    const Vec<4> push_x = push[c] * along_x;
+    float* plane = force + cell + c * component;
+    for (int z = 0; z < 3; ++z, plane += block.plane) {
+      for (int y = 0; y < 3; ++y) {
+        float* to = plane + y * block.pitch;
+        store<4>(to, load<4>(to) + (wz[z] * wy[y]) * push_x);
       }
     }
   }

@@ -154,6 +154,7 @@ bool search(MpmState& s, const Pieces& pieces) {
       all.emplace_back();
       all.back().facet = f;
       all.back().nodes = CellNodes(block_of(s, f), facet_of(s, f).cell);
+      all.back().has_whole_rows = has_whole_rows(all.back().nodes);
       all.back().weights = AxisWeights(facet_of(s, f).center);
       all.back().looked_at = s.time;
       all.back().is_small = size[pieces.of_point[facet_of(s, f).point]] <= kMayFly;

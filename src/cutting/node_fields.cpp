@@ -77,26 +77,32 @@ double mass_of_point(const LatticeBody& body, const Points& points, const NodeFi
   return mass;
 }
 
-/// The cells whose nodes one of the points belongs to, in the order of these points.
+/// The cells whose nodes one of the points belongs to, in the order of their nodes: so the new
+/// nodes of a row follow one another.
 std::vector<NodeFields::Cell> cells_around(const std::vector<LatticeBody>& bodies,
                                            const Points& points,
                                            const std::vector<std::int32_t>& some) {
   constexpr std::uint8_t kListed = 1, kDone = 2;  // itself; all around it
   std::vector<std::uint8_t> state(lattice_node_count(bodies), 0);
-  std::vector<NodeFields::Cell> cells;
   for (const std::int32_t p : some) {
     const Points::Site& s = points.site[p];
     const LatticeBody& b = bodies[s.body];
-    std::uint8_t& middle = state[b.node(s.x / 2, s.y / 2, s.z / 2)];
+    const int x = s.x / 2, y = s.y / 2, z = s.z / 2;
+    std::uint8_t& middle = state[b.node(x, y, z)];
     if ((middle & kDone) != 0) continue;
     middle |= kDone;
-    for (int k = 0; k < 27; ++k) {
-      const NodeFields::Cell c{s.body, s.x / 2 + k % 3 - 1, s.y / 2 + k / 3 % 3 - 1,
-                               s.z / 2 + k / 9 - 1};
-      std::uint8_t& at = state[b.node(c.x, c.y, c.z)];
-      if ((at & kListed) == 0) cells.push_back(c);
-      at |= kListed;
+    for (int k = 0; k < 9; ++k) {
+      b.for_each_node_in_row(x - 1, x + 2, y + k % 3 - 1, z + k / 3 - 1,
+                             [&](int, int node, int count, int) {
+                               for (int i = 0; i < count; ++i) state[node + i] |= kListed;
+                             });
     }
+  }
+  std::vector<NodeFields::Cell> cells;
+  for (std::size_t i = 0; i < bodies.size(); ++i) {
+    bodies[i].for_each_node([&](int node, int x, int y, int z) {
+      if (state[node] != 0) cells.push_back({static_cast<int>(i), x, y, z});
+    });
   }
   return cells;
 }

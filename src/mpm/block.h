@@ -73,11 +73,12 @@ struct Block {
 
   /// Nodes of the block that are not the lattice's own, for the tissue is cut there: the field that
   /// this block's points see instead.
-  struct SplitNode {
-    int local;  ///< in the block's nodes: z * plane + y * pitch + x
+  struct SplitNodes {
+    int local;  ///< the first, in the block's nodes: z * plane + y * pitch + x
     int node;   ///< in Nodes
+    int count;  ///< of those that follow one another along x, in both
   };
-  std::vector<SplitNode> split_nodes;
+  std::vector<SplitNodes> split_nodes;  ///< by `local`
 
   std::vector<std::int32_t>
       node;  ///< [nz + 2][plane], in Nodes, -1 for none; split ones as this block sees them

@@ -95,11 +95,11 @@ TISSUE_SIM_INLINE void forces(const Block& b, const BlockField& f, BlockScratch&
   reserve(scratch.in, 3 * l.in_plane);
   reserve(scratch.out, 3 * l.out_plane + kLanes);
   reserve(scratch.row, 3 * l.sum_component);
-  gather_nodes(b, f.nodes->u, inv_h, l, scratch.nodes.data());
+  gather_nodes<W>(b, f.nodes->u, inv_h, l, scratch.nodes.data());
   if (viscous) {
     reserve(scratch.velocities, 3 * l.node_component);
     reserve(scratch.in_rate, 9 * kMeanXyCount * l.quantity);
-    gather_nodes(b, f.nodes->v, inv_h, l, scratch.velocities.data());
+    gather_nodes<W>(b, f.nodes->v, inv_h, l, scratch.velocities.data());
   }
   float* out = scratch.out.data();
   std::fill_n(out, 2 * l.out_plane, 0.0f);

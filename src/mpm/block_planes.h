@@ -34,7 +34,21 @@ inline void reserve(Array<float>& a, std::size_t n) {
   if (a.size() < n) a.resize(n);
 }
 
+/// `count` floats times `scale`, in vectors that overlap at the end.
+template <int W>
+TISSUE_SIM_INLINE void scale_row(const float* from, float scale, int count, float* to) {
+  if (count >= W) {
+    for (int i = 0; i + W < count; i += W) store<W>(to + i, scale * load<W>(from + i));
+    store<W>(to + count - W, scale * load<W>(from + count - W));
+  } else if constexpr (W > 4) {
+    scale_row<W / 2>(from, scale, count, to);
+  } else {
+    for (int i = 0; i < count; ++i) to[i] = scale * from[i];
+  }
+}
+
 /// Copies the block's nodes of `field`, times `scale`, into [3][nz + 2][plane].
+template <int W>
 TISSUE_SIM_INLINE void gather_nodes(const Block& b, const Array<float>* field, float scale,
                                     const Layout& l, float* out) {
   for (int c = 0; c < 3; ++c) {
@@ -44,10 +58,12 @@ TISSUE_SIM_INLINE void gather_nodes(const Block& b, const Array<float>* field, f
       if (row.node < 0) {
         std::fill_n(to + row.local, row.count, 0.0f);
       } else {
-        for (int x = 0; x < row.count; ++x) to[row.local + x] = from[row.node + x] * scale;
+        scale_row<W>(from + row.node, scale, row.count, to + row.local);
       }
     }
-    for (const Block::SplitNode& s : b.split_nodes) to[s.local] = field[c][s.node] * scale;
+    for (const Block::SplitNodes& s : b.split_nodes) {
+      scale_row<W>(field[c].data() + s.node, scale, s.count, to + s.local);
+    }
   }
 }
 

@@ -32,7 +32,7 @@ TISSUE_SIM_INLINE void positions(const Block& b, const BlockField& f, const Arra
   const Layout l(b);
   reserve(scratch.nodes, 3 * l.node_component);
   reserve(scratch.in, 3 * l.in_plane);
-  gather_nodes(b, u, 1.0f, l, scratch.nodes.data());
+  gather_nodes<W>(b, u, 1.0f, l, scratch.nodes.data());
   add_reference(b, f, l, scratch.nodes.data());
   const float* in = scratch.in.data();
   for (int z = 0; z < 2; ++z) load_plane<W>(b, l, scratch.nodes.data(), z, scratch.in.data());
@@ -198,7 +198,7 @@ TISSUE_SIM_INLINE void for_each_gradient(const Block& b, const BlockField& f, Bl
   const Layout l(b);
   reserve(scratch.nodes, 3 * l.node_component);
   reserve(scratch.in, 3 * l.in_plane);
-  gather_nodes(b, f.nodes->u, 1.0f / f.cell_size, l, scratch.nodes.data());
+  gather_nodes<W>(b, f.nodes->u, 1.0f / f.cell_size, l, scratch.nodes.data());
   for (int z = 0; z < 2; ++z) load_plane<W>(b, l, scratch.nodes.data(), z, scratch.in.data());
   for (int z = 0; z < b.nz; ++z) {
     load_plane<W>(b, l, scratch.nodes.data(), z + 2, scratch.in.data());

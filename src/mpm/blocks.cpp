@@ -54,78 +54,77 @@ void connect_forces(Blocks& blocks, const std::vector<LatticeBody>& bodies, int 
   blocks.first_split_node = lattice_node_count(bodies);
   if (!blocks.has_rows) return;
   struct Entry {
-    int row;  // of lattice nodes, counted through all bodies
+    int row;  // of lattice nodes, counted through all bodies; then of split ones
     RowPart part;
   };
   std::vector<Entry> entries;
-  std::vector<std::pair<int, SplitNodePart>> split;
   std::vector<int> first_row;  // of each body: a row is a stretch of its nodes
-  int row_count = 0;
+  int split_row = 0;           // the first of split nodes
   for (const LatticeBody& b : bodies) {
-    first_row.push_back(row_count);
-    row_count += static_cast<int>(b.nodes.stretches().size());
+    first_row.push_back(split_row);
+    split_row += static_cast<int>(b.nodes.stretches().size());
   }
   for (const Block* block : blocks.all) {
     const LatticeBody& b = bodies[block->body];
     const std::size_t component = block->node_count();
-    std::size_t next_split = 0;
+    const auto add = [&](int row, int begin, int local, int count) {
+      if (count <= 0) return;
+      entries.push_back({row, {block->force_offset + local, component, begin, count}});
+    };
+    const std::vector<Block::SplitNodes>& split = block->split_nodes;
+    std::size_t next = 0;
     for (const Block::NodeRow& r : block->node_rows) {
       if (r.node < 0) continue;
       // A row without the nodes that this block sees split: parts between them.
-      const int end = r.local + r.count;
+      const int row = first_row[block->body] + r.stretch, row_end = r.local + r.count;
       const int to_row = r.node - b.first_node - b.nodes.stretches()[r.stretch].first - r.local;
-      int begin = r.local;
-      const auto add = [&](int up_to) {
-        if (up_to == begin) return;
-        entries.push_back(
-            {first_row[block->body] + r.stretch,
-             {block->force_offset + begin, component, to_row + begin, up_to - begin}});
-      };
-      const auto& split_nodes = block->split_nodes;
-      for (; next_split < split_nodes.size() && split_nodes[next_split].local < end; ++next_split) {
-        const Block::SplitNode& s = split_nodes[next_split];
-        if (s.local < begin) continue;
-        add(s.local);
-        begin = s.local + 1;
-        split.push_back({s.node, {block->force_offset + s.local, component}});
+      int local = r.local;
+      for (; next < split.size() && split[next].local < row_end; ++next) {
+        const Block::SplitNodes& s = split[next];
+        const int first = std::max(local, s.local), end = std::min(row_end, s.local + s.count);
+        if (first < end) {
+          add(row, to_row + local, local, first - local);
+          for (local = first; local < end;) {
+            const int node = s.node + local - s.local - blocks.first_split_node;
+            const int begin = node % kSplitRow, count = std::min(end - local, kSplitRow - begin);
+            add(split_row + node / kSplitRow, begin, local, count);
+            local += count;
+          }
+        }
+        if (s.local + s.count > row_end) break;
       }
-      add(end);
+      add(row, to_row + local, local, row_end - local);
     }
   }
   // Those of a row one after the other, in the order of the blocks.
+  const int split_count = node_count - blocks.first_split_node;
+  const int row_count = split_row + (split_count + kSplitRow - 1) / kSplitRow;
   std::vector<int> end_of(row_count + 1, 0);  // first, then end of each row's
   for (const Entry& e : entries) ++end_of[e.row + 1];
   std::partial_sum(end_of.begin(), end_of.end(), end_of.begin());
   blocks.row_parts.resize(entries.size());
   for (const Entry& e : entries) blocks.row_parts[end_of[e.row]++] = e.part;
   blocks.rows.clear();
-  int row = 0, begin = 0;
+  int begin = 0;
+  const auto add_row = [&](int row, int first_node) {
+    const int end = end_of[row];
+    int lo = 1 << 30, hi = 0;
+    for (int i = begin; i < end; ++i) {
+      const RowPart& part = blocks.row_parts[i];
+      lo = std::min(lo, part.begin);
+      hi = std::max(hi, part.begin + part.count);
+    }
+    for (int i = begin; i < end; ++i) blocks.row_parts[i].begin -= lo;
+    if (end > begin) blocks.rows.push_back({first_node + lo, hi - lo, begin, end - begin});
+    begin = end;
+  };
+  int row = 0;
   for (const LatticeBody& b : bodies) {
     for (const LatticeRows::Stretch& stretch : b.nodes.stretches()) {
-      const int end = end_of[row];
-      int lo = 1 << 30, hi = 0;
-      for (int i = begin; i < end; ++i) {
-        const RowPart& part = blocks.row_parts[i];
-        lo = std::min(lo, part.begin);
-        hi = std::max(hi, part.begin + part.count);
-      }
-      for (int i = begin; i < end; ++i) blocks.row_parts[i].begin -= lo;
-      const int node = b.first_node + stretch.first + lo;
-      if (end > begin) blocks.rows.push_back({node, hi - lo, begin, end - begin});
-      begin = end;
-      ++row;
+      add_row(row++, b.first_node + stretch.first);
     }
   }
-  // Parts of each node in the order of the blocks.
-  std::vector<int>& first = blocks.split_node_parts;
-  first.assign(node_count - blocks.first_split_node + 1, 0);
-  for (const auto& [node, part] : split) ++first[node - blocks.first_split_node + 1];
-  std::partial_sum(first.begin(), first.end(), first.begin());
-  std::vector<int> next(first.begin(), first.end() - 1);
-  blocks.split_parts.resize(split.size());
-  for (const auto& [node, part] : split) {
-    blocks.split_parts[next[node - blocks.first_split_node]++] = part;
-  }
+  for (int i = 0; i < split_count; i += kSplitRow) add_row(row++, blocks.first_split_node + i);
 }
 
 /// Makes the blocks of some regions anew, then block by block their facets.

@@ -18,20 +18,17 @@ struct BlockRegion {
   std::vector<Block> blocks;
 };
 
-/// Forces on one row of lattice nodes: the sum of parts of the force buffer, in this order.
+/// Forces on one row of lattice nodes, or of kSplitRow nodes that cuts made: the sum of parts of
+/// the force buffer, in this order.
 struct NodeRow {
   int first_node, count;
   int first_part, part_count;
 };
+inline constexpr int kSplitRow = 32;
 struct RowPart {
   std::size_t force;      ///< offset of component x in the force buffer
   std::size_t component;  ///< offset to the next component
   int begin, count;       ///< nodes of the row
-};
-
-/// Force on a node that a cut made: the sum of parts, in this order.
-struct SplitNodePart {
-  std::size_t force, component;
 };
 
 struct Blocks {
@@ -51,9 +48,7 @@ struct Blocks {
 
   std::vector<NodeRow> rows;
   std::vector<RowPart> row_parts;
-  int first_split_node = 0;           ///< nodes from here on are fields that cuts made
-  std::vector<int> split_node_parts;  ///< CSR offsets, one per such node and one more
-  std::vector<SplitNodePart> split_parts;
+  int first_split_node = 0;  ///< nodes from here on are fields that cuts made
 };
 
 /// How large regions are, in cells; the default is the CPU's.

@@ -113,12 +113,19 @@ Block make_block(const BlockRegion& r, const LatticeBody& b, const Points& point
   find_nodes(block, b);
   for (int z = 0; z < block.nz + 2 && !sheet.node.empty(); ++z) {
     for (int y = 0; y < block.ny + 2; ++y) {
+      Block::SplitNodes* last = nullptr;  // of this row
       for (int x = 0; x < block.pitch; ++x) {
         const int local = z * block.plane + y * block.pitch + x;
         const int n = ((lo[2] + z) * (r.ny + 2) + lo[1] + y) * (r.nx + 2) + lo[0] + x;
         if (sheet.node[n] == -1 || sheet.node[n] == block.node[local]) continue;
         block.node[local] = sheet.node[n];
-        block.split_nodes.push_back({local, sheet.node[n]});
+        if (last != nullptr && last->local + last->count == local &&
+            last->node + last->count == sheet.node[n]) {
+          ++last->count;
+          continue;
+        }
+        block.split_nodes.push_back({local, sheet.node[n], 1});
+        last = &block.split_nodes.back();
       }
     }
   }

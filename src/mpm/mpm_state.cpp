@@ -107,18 +107,6 @@ void move_nodes(MpmState& state, const NodeStep& step) {
                                   update, state.scratch.local());
       },
       64);
-  const int split_count = static_cast<int>(n.size()) - blocks.first_split_node;
-  state.cpu->for_each(
-      split_count,
-      [&](int i) {
-        float f[3] = {};
-        for (int p = blocks.split_node_parts[i]; p < blocks.split_node_parts[i + 1]; ++p) {
-          const SplitNodePart& part = blocks.split_parts[p];
-          for (int a = 0; a < 3; ++a) f[a] += state.force[part.force + a * part.component];
-        }
-        update(blocks.first_split_node + i, f[0], f[1], f[2]);
-      },
-      256);
 }
 
 }  // namespace tissue_sim

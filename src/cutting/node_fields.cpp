@@ -1,5 +1,6 @@
 #include "cutting/node_fields.h"
 
+#include <Eigen/Core>
 #include <algorithm>
 #include <utility>
 
@@ -84,6 +85,10 @@ std::vector<NodeFields::Cell> cells_around(const std::vector<LatticeBody>& bodie
                                            const std::vector<std::int32_t>& some) {
   constexpr std::uint8_t kListed = 1, kDone = 2;  // itself; all around it
   std::vector<std::uint8_t> state(lattice_node_count(bodies), 0);
+  struct Range {
+    Eigen::Array3i low = Eigen::Array3i::Constant(1 << 30), high = -low;
+  };
+  std::vector<Range> ranges(bodies.size());
   for (const std::int32_t p : some) {
     const Points::Site& s = points.site[p];
     const LatticeBody& b = bodies[s.body];
@@ -91,6 +96,9 @@ std::vector<NodeFields::Cell> cells_around(const std::vector<LatticeBody>& bodie
     std::uint8_t& middle = state[b.node(x, y, z)];
     if ((middle & kDone) != 0) continue;
     middle |= kDone;
+    Range& range = ranges[s.body];
+    range.low = range.low.min(Eigen::Array3i(x - 1, y - 1, z - 1));
+    range.high = range.high.max(Eigen::Array3i(x + 1, y + 1, z + 1));
     for (int k = 0; k < 9; ++k) {
       b.for_each_node_in_row(x - 1, x + 2, y + k % 3 - 1, z + k / 3 - 1,
                              [&](int, int node, int count, int) {
@@ -100,9 +108,18 @@ std::vector<NodeFields::Cell> cells_around(const std::vector<LatticeBody>& bodie
   }
   std::vector<NodeFields::Cell> cells;
   for (std::size_t i = 0; i < bodies.size(); ++i) {
-    bodies[i].for_each_node([&](int node, int x, int y, int z) {
-      if (state[node] != 0) cells.push_back({static_cast<int>(i), x, y, z});
-    });
+    const Range& r = ranges[i];
+    for (int z = r.low[2]; z <= r.high[2]; ++z) {
+      for (int y = r.low[1]; y <= r.high[1]; ++y) {
+        bodies[i].for_each_node_in_row(r.low[0], r.high[0] + 1, y, z,
+                                       [&](int x, int node, int count, int) {
+                                         for (int n = 0; n < count; ++n) {
+                                           if (state[node + n] == 0) continue;
+                                           cells.push_back({static_cast<int>(i), x + n, y, z});
+                                         }
+                                       });
+      }
+    }
   }
   return cells;
 }

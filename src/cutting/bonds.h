@@ -38,11 +38,10 @@ struct Crossing {
 };
 
 /// A bond that an edge passed, from its lower-numbered point along an axis (0 x, 1 y, 2 z), and
-/// where, if that can be said.
+/// where: a negative place if that cannot be said.
 struct BrokenBond {
   std::int32_t point, other;
   int axis;
-  bool has_crossing;
   Crossing crossing;
 };
 

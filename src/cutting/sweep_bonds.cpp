@@ -157,16 +157,15 @@ class Sweep {
     const int cell = static_cast<int>(lane / block.stride / 8) * block.plane + block.cell[column];
     float at[3], F[9];
     for (int a = 0; a < 3; ++a) at[a] = (sub >> a & 1) != 0 ? 0.25f : -0.25f;
-    BrokenBond broken{
-        block.point[lane], other, axis, false, {static_cast<float>(meeting.place), {}}};
+    BrokenBond broken{block.point[lane], other, axis, {static_cast<float>(meeting.place), {}}};
     at[axis] += 0.5f * broken.crossing.place;
     deformation_gradient_at(u_end_, CellNodes(block, cell), state_.bodies[block.body].cell_size, at,
                             F);
     Vec3 normal = Vec3::Zero();
     for (int i = 0; i < 9; ++i) normal[i % 3] += F[i] * meeting.normal[i / 3];
     const double length = normal.norm();
-    broken.has_crossing = length > 0 && std::isfinite(length);
     for (int a = 0; a < 3; ++a) broken.crossing.normal[a] = static_cast<float>(normal[a] / length);
+    if (!(length > 0 && std::isfinite(length))) broken.crossing.place = -1;
     return broken;
   }
 
@@ -185,7 +184,7 @@ void break_bonds(MpmState& state, const std::vector<BrokenBond>& broken,
   std::vector<std::uint64_t> lost(points.size() / 64 + 1, 0);  // a bit of each point
   for (const BrokenBond& b : broken) {
     break_bond(kForwardBond + b.axis, points.bonds[b.point], points.bonds[b.other]);
-    if (b.has_crossing) points.crossings.add(b.point, b.axis, b.crossing);
+    if (b.crossing.place >= 0) points.crossings.add(b.point, b.axis, b.crossing);
     for (const std::int32_t p : {b.point, b.other}) lost[p / 64] |= std::uint64_t{1} << (p % 64);
   }
   report.bonds_broken += static_cast<int>(broken.size());

@@ -56,7 +56,7 @@ struct Sweep {
   /// See the host's, in cutting/sweep_bonds.cpp: a normal goes back by F^T.
   __device__ BrokenBond broken_bond(const SweptPoint& p, std::int32_t other, int axis,
                                     const MeetingOf<Vector3>& meeting) const {
-    BrokenBond broken = {p.point, other, axis, false, {static_cast<float>(meeting.place), {}}};
+    BrokenBond broken = {p.point, other, axis, {static_cast<float>(meeting.place), {}}};
     float place[3], F[9];
     for (int a = 0; a < 3; ++a) place[a] = (p.sub >> a & 1) != 0 ? 0.25f : -0.25f;
     place[axis] += 0.5f * broken.crossing.place;
@@ -68,8 +68,8 @@ struct Sweep {
     for (int i = 0; i < 9; ++i) normal[i % 3] += F[i] * meeting.normal[i / 3];
     for (const double n : normal) length += n * n;
     length = sqrt(length);
-    broken.has_crossing = length > 0 && isfinite(length);
     for (int a = 0; a < 3; ++a) broken.crossing.normal[a] = static_cast<float>(normal[a] / length);
+    if (!(length > 0 && isfinite(length))) broken.crossing.place = -1;
     return broken;
   }
 

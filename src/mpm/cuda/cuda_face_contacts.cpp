@@ -110,6 +110,7 @@ void CudaMpmTissue::upload_facets() {
        {&f.first_near, &f.near_count, &f.contacts, &f.involved, &f.active, &f.rank}) {
     of_facet->resize(count);
   }
+  f.active.clear(d.stream);  // it comes down as a whole
   f.is_involved.resize(count);
   f.takes_part.resize(count);
   f.sorted.resize(count);

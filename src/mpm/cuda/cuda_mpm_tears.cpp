@@ -1,5 +1,5 @@
-// Tears of tissue that lives on a GPU: found there every few substeps, made on the host as cuts
-// are.
+// Tears of tissue that lives on a GPU: found there every few substeps; bonds break on the host, and
+// what follows is that of cuts.
 #include <algorithm>
 
 #include "cutting/cut_tissue.h"

@@ -19,8 +19,8 @@ namespace tissue_sim {
 struct CudaFaces;
 struct CudaLooks;
 
-/// The nodes live on the GPU; lattice, bonds, blocks and pieces on the host too, where cuts are
-/// made between frames.
+/// The nodes live on the GPU; lattice, bonds, blocks and pieces on the host too, where nodes around
+/// a cut are taken apart between frames.
 class CudaMpmTissue final : public Tissue {
  public:
   /// Throws std::runtime_error where there is no GPU, or not enough memory on it.
@@ -93,8 +93,6 @@ class CudaMpmTissue final : public Tissue {
   CudaFaces faces_of_launch();
   void pull_nodes();
   void pull_field(const float4* from, Array<float>* to);  ///< of the nodes
-  void pull_displacements();
-  void pull_velocities();
   void push_nodes();
   void push_tables();  ///< of blocks that are new; those that stay move on the GPU
   void push_points(const std::vector<std::int32_t>& changed);  ///< their bonds, whether soft

@@ -11,8 +11,8 @@ void CudaMpmTissue::pull() {
 }
 
 void CudaMpmTissue::pull_nodes() {
-  pull_displacements();
-  pull_velocities();
+  pull_field(device_->present().u, state_->nodes.u);
+  pull_field(device_->present().v, state_->nodes.v);
 }
 
 void CudaMpmTissue::pull_field(const float4* from, Array<float>* to) {
@@ -25,9 +25,6 @@ void CudaMpmTissue::pull_field(const float4* from, Array<float>* to) {
   check_cuda(cudaStreamSynchronize(d.stream), "finish a frame");
   unpack_field(d.host_nodes.data(), n, *state_->cpu, to);
 }
-
-void CudaMpmTissue::pull_displacements() { pull_field(device_->present().u, state_->nodes.u); }
-void CudaMpmTissue::pull_velocities() { pull_field(device_->present().v, state_->nodes.v); }
 
 void CudaMpmTissue::push_nodes() {
   OnDevice& d = *device_;

@@ -1,4 +1,4 @@
-// What goes to the GPU when tissue is new or was cut: tables, nodes, points.
+// The tables of tissue that lives on a GPU, when it is new or was cut.
 #include <algorithm>
 
 #include "mpm/cuda/on_device.h"

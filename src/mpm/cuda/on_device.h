@@ -24,7 +24,7 @@ namespace tissue_sim {
 struct SweepOnDevice {
   DeviceArray<CudaSweptEdge> edges;
   DeviceArray<CudaBlockCell> cells;
-  float* places[2];
+  float* places[2];  ///< at the begin and the end, in OnDevice::cloud
   DeviceArray<BrokenBond> broken;
   DeviceArray<int> count;
   PinnedArray<int> host_count;

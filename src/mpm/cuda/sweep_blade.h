@@ -24,7 +24,7 @@ struct CudaSweep {
   double reach;  ///< bonds of points within this from what an edge sweeps are looked at [m]
   const CudaBlockCell* cells;  ///< per block
   const CudaLattice* lattices;
-  const std::int32_t* point_at;  ///< LatticeBody::point_at, body after body
+  const std::int32_t* point_at;  ///< as in CudaLooks
   const float *begin, *end;      ///< places of the points at both times, [points][3] [m]
   const float4* u;               ///< displacements at the end
   BrokenBond* broken;

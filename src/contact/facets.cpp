@@ -49,9 +49,7 @@ Plane fitted_plane(const Surroundings& around, const Side& side, End how,
                    const double (&middle)[2]) {
   Place lower = {};
   lower[side.axis] = side.sign > 0 ? side.level : side.level - 1;
-  Eigen::Matrix3d normal = Eigen::Matrix3d::Zero();
-  Eigen::Vector3d right = Eigen::Vector3d::Zero();
-  normal(1, 1) = normal(2, 2) = 1e-2;  // a row of columns is level across
+  int count = 0, first[2] = {}, second[3] = {}, ends[3] = {};  // sums, of quarters of a cell
   for (int b = -1; b <= 2; ++b) {
     for (int a = -1; a <= 2; ++a) {
       Place column = lower;
@@ -59,12 +57,23 @@ Plane fitted_plane(const Surroundings& around, const Side& side, End how,
       column[side.lateral[1]] += b;
       const int end = around.nearest_end(column, side.axis, how);
       if (end == 9) continue;
-      const Eigen::Vector3d row(1, 0.5 * (a - 0.5), 0.5 * (b - 0.5));
-      normal += row * row.transpose();
-      right += 0.5 * end * row;
+      const int at[2] = {2 * a - 1, 2 * b - 1};
+      ++count;
+      for (int l = 0; l < 2; ++l) {
+        first[l] += at[l];
+        second[l] += at[l] * at[l];
+        ends[1 + l] += end * at[l];
+      }
+      second[2] += at[0] * at[1];
+      ends[0] += end;
     }
   }
-  const Eigen::Vector3d c = normal.ldlt().solve(right);
+  Eigen::Matrix3d normal;  // a row of columns is level across
+  normal << count, first[0] / 4.0, first[1] / 4.0,                          //
+      first[0] / 4.0, second[0] / 16.0 + 1e-2, second[2] / 16.0,            //
+      first[1] / 4.0, second[2] / 16.0, second[1] / 16.0 + 1e-2;
+  const Eigen::Vector3d c =
+      normal.ldlt().solve(Eigen::Vector3d(ends[0] / 2.0, ends[1] / 8.0, ends[2] / 8.0));
   Plane plane{c[0], Vec3::Zero()};
   plane.normal[side.axis] = side.sign;
   for (int l = 0; l < 2; ++l) {

@@ -50,13 +50,13 @@ void mark_stale_facets(const std::vector<LatticeBody>& bodies, const Points& poi
   // A facet is fitted to bonds up to two cells away, and what is bound within two cells decides
   // which of a cell's points are in one block.
   constexpr int kReach = 2;
-  int last = -1;
+  std::vector<bool> done(stale.size(), false);  // of cells: all around
   for (const std::int32_t p : changed) {
     const Points::Site& s = points.site[p];
     const LatticeBody& b = bodies[s.body];
     const int node = b.node(s.x / 2, s.y / 2, s.z / 2);
-    if (node == last) continue;
-    last = node;
+    if (done[node]) continue;
+    done[node] = true;
     const int x = std::max(s.x / 2 - kReach, 0), x_end = std::min(s.x / 2 + kReach + 1, b.nx);
     const int y_end = std::min(s.y / 2 + kReach + 1, b.ny);
     const int z_end = std::min(s.z / 2 + kReach + 1, b.nz);

@@ -37,7 +37,6 @@ Apart take_apart(MpmState& state, const std::vector<std::int32_t>& changed,
         cells = state.fields->update(state.bodies, state.points, changed, state.nodes, *state.cpu);
       },
       [&] {
-        list_threads(state, changed);
         apart.softened = soften(state.bodies, changed, state.points);
         state.blocks.stale_facets.resize(lattice_node_count(state.bodies), 0);
         mark_stale_facets(state.bodies, state.points, changed, state.blocks.stale_facets);
@@ -58,7 +57,10 @@ Apart take_apart(MpmState& state, const std::vector<std::int32_t>& changed,
         list_contacts(state);
         list_facets(state);
       },
-      meanwhile);
+      [&] {
+        list_threads(state, changed);
+        meanwhile();
+      });
   apart.new_blocks = !cells.empty();
   return apart;
 }

@@ -67,8 +67,9 @@ TISSUE_SIM_INLINE bool stays_aside(const SweptEdgeOf<V>& e, const SegmentOf<V>& 
   for (const SlabOf<V>& slab : e.slabs) {
     const double a0 = slab.axis.dot(b.a0), b0 = slab.axis.dot(b.b0);
     const double a1 = slab.axis.dot(b.a1), b1 = slab.axis.dot(b.b1);
-    if (fmin(fmin(a0, b0), fmin(a1, b1)) > slab.high + by ||
-        fmax(fmax(a0, b0), fmax(a1, b1)) < slab.low - by) {
+    const double high = slab.high + by, low = slab.low - by;
+    if ((a0 > high && b0 > high && a1 > high && b1 > high) ||
+        (a0 < low && b0 < low && a1 < low && b1 < low)) {
       return true;
     }
   }

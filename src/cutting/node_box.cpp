@@ -5,38 +5,30 @@
 #include "cutting/bonds.h"
 
 namespace tissue_sim {
-namespace {
 
-/// The bonds within a box.
-struct BoxBonds {
-  Planes there, x, y, z;  ///< points; their bonds to the next place
-
-  /// The places of a plane that bonds within it reach from those of m: all of them unless the bonds
-  /// wind.
-  std::uint64_t spread(std::uint64_t m, int plane) const {
-    std::uint64_t along = x[plane], across = y[plane];  // bonds of 1, then 2 and 4 places in a row
-    for (int step = 1; step <= 4; step *= 2) {
-      m |= (m & along) << step | (m >> step & along);
-      along &= along >> step;
-    }
-    for (int step = 8; step <= 32; step *= 2) {
-      m |= (m & across) << step | (m >> step & across);
-      across &= across >> step;
-    }
-    return m;
+/// The places of a plane that bonds within it reach from those of m: all of them unless the bonds
+/// wind.
+inline std::uint64_t BondWindows::BoxBonds::spread(std::uint64_t m, int plane) const {
+  std::uint64_t along = x[plane], across = y[plane];  // bonds of 1, then 2 and 4 places in a row
+  for (int step = 1; step <= 4; step *= 2) {
+    m |= (m & along) << step | (m >> step & along);
+    along &= along >> step;
   }
-
-  /// Takes up more of a plane's places into m, and what bonds within the plane reach from them.
-  /// Returns whether there were any.
-  bool take(std::uint64_t more, std::uint64_t& m, int plane) const {
-    if ((more & ~m) == 0) return false;
-    m |= more;
-    while ((((m ^ m >> 1) & x[plane]) | ((m ^ m >> 8) & y[plane])) != 0) m = spread(m, plane);
-    return true;
+  for (int step = 8; step <= 32; step *= 2) {
+    m |= (m & across) << step | (m >> step & across);
+    across &= across >> step;
   }
-};
+  return m;
+}
 
-}  // namespace
+/// Takes up more of a plane's places into m, and what bonds within the plane reach from them.
+/// Returns whether there were any.
+inline bool BondWindows::BoxBonds::take(std::uint64_t more, std::uint64_t& m, int plane) const {
+  if ((more & ~m) == 0) return false;
+  m |= more;
+  while ((((m ^ m >> 1) & x[plane]) | ((m ^ m >> 8) & y[plane])) != 0) m = spread(m, plane);
+  return true;
+}
 
 BondWindows::BondWindows(const std::vector<LatticeBody>& bodies, const Points& points) {
   for (const LatticeBody& b : bodies) {
@@ -71,9 +63,7 @@ void BondWindows::update(const Points& points, const std::vector<std::int32_t>& 
 }
 
 int BondWindows::find_components(int body, int x, int y, int z, Planes (&found)[216]) const {
-  const OfBody& of = bodies_[body];
-  const BoxBonds bonds{read(of, 0, x, y, z, 0x3f3f3f3f3f3f), read(of, 1, x, y, z, 0x1f1f1f1f1f1f),
-                       read(of, 2, x, y, z, 0x003f3f3f3f3f), read(of, 3, x, y, z, 0x3f3f3f3f3f3f)};
+  const BoxBonds bonds = bonds_in_box(body, x, y, z);
   Planes left = bonds.there;
   int count = 0;
   for (int start = 0; start < 6; ++start) {
@@ -91,6 +81,32 @@ int BondWindows::find_components(int body, int x, int y, int z, Planes (&found)[
     }
   }
   return count;
+}
+
+Planes BondWindows::thread_ends(int body, int x, int y, int z) const {
+  const BoxBonds b = bonds_in_box(body, x, y, z);
+  Planes in_x{}, in_y{}, in_z{};  // bonds that are in a square
+  for (int k = 0; k < 6; ++k) {
+    const std::uint64_t xy = b.x[k] & b.x[k] >> 8 & b.y[k] & b.y[k] >> 1;  // by its first place
+    in_x[k] |= xy | xy << 8;
+    in_y[k] |= xy | xy << 1;
+    if (k == 5) break;
+    const std::uint64_t xz = b.x[k] & b.x[k + 1] & b.z[k] & b.z[k] >> 1;
+    const std::uint64_t yz = b.y[k] & b.y[k + 1] & b.z[k] & b.z[k] >> 8;
+    in_x[k] |= xz;
+    in_x[k + 1] |= xz;
+    in_y[k] |= yz;
+    in_y[k + 1] |= yz;
+    in_z[k] = xz | xz << 1 | yz | yz << 8;
+  }
+  constexpr std::uint64_t kInner = 0x1e1e1e1e00;
+  Planes ends{};
+  for (int k = 1; k < 5; ++k) {
+    const std::uint64_t along_x = b.x[k] & ~in_x[k], along_y = b.y[k] & ~in_y[k];
+    const std::uint64_t along_z = b.z[k] & ~in_z[k], below = b.z[k - 1] & ~in_z[k - 1];
+    ends[k] = (along_x | along_x << 1 | along_y | along_y << 8 | along_z | below) & kInner;
+  }
+  return ends;
 }
 
 }  // namespace tissue_sim

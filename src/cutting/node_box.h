@@ -43,8 +43,23 @@ class BondWindows {
   /// Components of the bonds within the box of the node of cell (x, y, z), in the order of their
   /// first places; returns how many.
   int find_components(int body, int x, int y, int z, Planes (&found)[216]) const;
+  /// Of the 4 x 4 x 4 places around the node of cell (x, y, z), those with a bond that is in no
+  /// square of four bonds.
+  Planes thread_ends(int body, int x, int y, int z) const;
 
  private:
+  /// The bonds within a box.
+  struct BoxBonds {
+    Planes there, x, y, z;  ///< points; their bonds to the next place
+    std::uint64_t spread(std::uint64_t m, int plane) const;
+    bool take(std::uint64_t more, std::uint64_t& m, int plane) const;
+  };
+  BoxBonds bonds_in_box(int body, int x, int y, int z) const {
+    const OfBody& of = bodies_[body];
+    return {read(of, 0, x, y, z, 0x3f3f3f3f3f3f), read(of, 1, x, y, z, 0x1f1f1f1f1f1f),
+            read(of, 2, x, y, z, 0x003f3f3f3f3f), read(of, 3, x, y, z, 0x3f3f3f3f3f3f)};
+  }
+
   /// One of the windows' kinds in a box, but for places not `within`.
   static Planes read(const OfBody& of, int kind, int x, int y, int z, std::uint64_t within) {
     Planes planes;

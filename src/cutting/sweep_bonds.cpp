@@ -101,13 +101,12 @@ class Sweep {
   std::vector<BrokenBond> broken_bonds(const Passed& passed) const {
     std::vector<BrokenBond> broken;
     const Block& block = *passed.block;
-    const LatticeBody& body = state_.bodies[block.body];
     for (const std::int32_t lane : passed.lanes) {
       const std::int32_t p = block.point[lane];
       const Points::Site& s = state_.points.site[p];
       for (int axis = 0; axis < 3; ++axis) {
         if ((state_.points.bonds[p] >> (kForwardBond + axis) & 1) == 0) continue;
-        const std::int32_t q = body.next_point(s, axis);
+        const std::int32_t q = next_point(block, lane, s, axis);
         if ((known_[p] & known_[q] & kOutside) != 0) continue;
         Meeting meeting;
         if (passes(passed.edges, {place(0, p), place(0, q), place(1, p), place(1, q)}, meeting)) {
@@ -119,6 +118,14 @@ class Sweep {
   }
 
  private:
+  /// The point that the one in a lane holds on to along an axis.
+  std::int32_t next_point(const Block& block, std::int32_t lane, const Points::Site& s,
+                          int axis) const {
+    if (axis == 0) return block.point[lane] + 1;  // points are numbered along x
+    const int at[3] = {s.x, s.y, s.z};
+    if (at[axis] % 2 == 0) return block.point[lane + (block.stride << axis)];  // in its cell
+    return state_.bodies[block.body].next_point(s, axis);
+  }
   bool moves() const { return u_begin_ != u_end_; }
   /// Of a point at the beginning (0) or the end (1). Both ends of a bond must agree to the last bit
   /// on where a point is, or a cut exactly through it might miss the bonds on both sides.

@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "cutting/bonds.h"
+#include "cutting/crack.h"
 #include "mpm/deformation.h"
 
 namespace tissue_sim {
@@ -48,32 +49,25 @@ struct BondsAround {
 
 void list_threads(MpmState& state, const std::vector<std::int32_t>& changed) {
   const Points& points = state.points;
-  const int count = static_cast<int>(changed.size());
-  // Of each point: bit k for its neighbour over that bond (a square may have lost its far side),
-  // the last for itself.
-  std::vector<std::uint8_t> ends(count);
-  const auto neighbours = [&](int i) {
-    const std::int32_t p = changed[i];
-    return BondsAround(state.bodies[points.site[p].body], points, p);
-  };
-  state.cpu->for_each(
-      count,
-      [&](int i) {
-        const BondsAround around = neighbours(i);
-        unsigned found = around.end_thread() ? 1u << kBondCount : 0;
-        for (int k = 0; k < kBondCount; ++k) {
-          if (!has(around.own, k)) continue;
-          const LatticeBody& body = state.bodies[points.site[changed[i]].body];
-          if (BondsAround(body, points, around.point[k]).end_thread()) found |= 1u << k;
-        }
-        ends[i] = static_cast<std::uint8_t>(found);
-      },
-      128);
   std::vector<std::int32_t>& threads = state.threads;
-  for (int i = 0; i < count; ++i) {
-    if (has(ends[i], kBondCount)) threads.push_back(changed[i]);
-    for (unsigned k = ends[i] & kAllBonds; k != 0; k &= k - 1) {
-      threads.push_back(neighbours(i).point[__builtin_ctz(k)]);
+  Planes ends{};
+  Points::Site of{-1, -1, -1, -1};  // the cell that they are around
+  for (const std::int32_t p : changed) {
+    const Points::Site& s = points.site[p];
+    if (s.x / 2 != of.x || s.y / 2 != of.y || s.z / 2 != of.z || s.body != of.body) {
+      of = {static_cast<std::int16_t>(s.x / 2), static_cast<std::int16_t>(s.y / 2),
+            static_cast<std::int16_t>(s.z / 2), s.body};
+      ends = state.fields->bonds().thread_ends(of.body, of.x, of.y, of.z);
+    }
+    const auto ends_one = [&](const BondOffset& o) {
+      const int x = s.x + o.x, y = s.y + o.y, z = s.z + o.z;
+      return (ends[z - 2 * of.z + 2] >> bit_in_plane(x - 2 * of.x + 2, y - 2 * of.y + 2) & 1) != 0;
+    };
+    if (ends_one({0, 0, 0})) threads.push_back(p);
+    // A square may have lost its far side.
+    for (unsigned bonds = points.bonds[p]; bonds != 0; bonds &= bonds - 1) {
+      const int k = __builtin_ctz(bonds);
+      if (ends_one(bond_offset(k))) threads.push_back(neighbour(state.bodies[s.body], s, k));
     }
   }
   std::sort(threads.begin(), threads.end());

@@ -55,11 +55,12 @@ struct Crumb {
 
 /// Whether cuts took all bonds along an axis from a point that had both.
 bool is_in_slice(const LatticeBody& body, const Points& points, std::int32_t point) {
-  const unsigned bonds = points.bonds[point], whole = whole_bonds(body, points.site[point]);
+  const unsigned bonds = points.bonds[point];
   for (int axis = 0; axis < 3; ++axis) {
     const int k = kForwardBond + axis;
     const unsigned both = 1u << k | 1u << opposite_bond(k);
-    if ((bonds & both) == 0 && (whole & both) == both) return true;
+    if ((bonds & both) != 0) continue;
+    if ((whole_bonds(body, points.site[point]) & both) == both) return true;
   }
   return false;
 }

@@ -165,6 +165,25 @@ unsigned add_crossed(const LatticeBody& body, const Points& points, int cell, co
   return unknown;
 }
 
+/// Whether the points `around` are all that the cell has, and bonds of the uncut cell hold them
+/// together: then they always were of one block.
+bool is_one_part(const LatticeBody& body, const Place& corner, const std::int32_t (&around)[8]) {
+  unsigned all = 0;
+  for (int s = 0; s < 8; ++s) all |= around[s] >= 0 ? 1u << s : 0u;
+  unsigned part = all & -all;
+  for (int axis : {0, 1, 2, 0, 1, 2}) {
+    constexpr unsigned kLower[3] = {0x55, 0x33, 0x0f};
+    const int step = 1 << axis;
+    part |= ((part & kLower[axis]) << step | (part >> step & kLower[axis])) & all;
+  }
+  int count = 0;
+  for (int k = 0; k < 4; ++k) {
+    body.for_each_point_in_row(corner[0], corner[0] + 2, corner[1] + k % 2, corner[2] + k / 2,
+                               [&count](int, int, int of_row) { count += of_row; });
+  }
+  return part == all && count == __builtin_popcount(all);
+}
+
 /// Takes the facets of one cell that belong to one face together, from `first` on.
 void merge(std::vector<Facet>& facets, std::size_t first) {
   constexpr float kOneLayer = 0.25f;  // [cells] along the normal; points are half a cell apart
@@ -216,13 +235,17 @@ std::vector<Facet> facets_of(const LatticeBody& body, const Points& points, cons
         for (int s = 0; s < 8; ++s) {
           around[s] = block.point[(static_cast<std::size_t>(z) * 8 + s) * block.stride + lane];
         }
-        if (known.take(x, y, block.z + z, around, cell, facets)) continue;
+        if (!known.is_stale(x, y, block.z + z)) {
+          known.take(x, y, block.z + z, around, cell, facets);
+          continue;
+        }
         const auto is_whole = [&points](std::int32_t p) {
           return p < 0 || points.bonds[p] == kAllBonds;
         };
         if (std::all_of(std::begin(around), std::end(around), is_whole)) continue;
         const Place corner = {2 * x, 2 * y, 2 * (block.z + z)};
         unsigned missing[2][kBondCount] = {};  // the cell's points without a bond: cut, never had
+        bool is_cut = false;
         for (int s = 0; s < 8; ++s) {
           if (is_whole(around[s])) continue;
           const Points::Site& site = points.site[around[s]];
@@ -231,7 +254,12 @@ std::vector<Facet> facets_of(const LatticeBody& body, const Points& points, cons
             const BondOffset o = bond_offset(k);
             const bool outer = body.point(site.x + o.x, site.y + o.y, site.z + o.z) < 0;
             missing[outer ? 1 : 0][k] |= 1u << s;
+            is_cut = is_cut || !outer;
           }
+        }
+        if (!is_cut && !known.none() && is_one_part(body, corner, around)) {
+          known.take(x, y, block.z + z, around, cell, facets);
+          continue;
         }
         std::optional<Surroundings> surroundings;  // where a plane is to be fitted
         const std::size_t first = facets.size();

@@ -32,9 +32,8 @@ KnownFacets::KnownFacets(const LatticeBody& body, const BlockRegion& region,
   }
 }
 
-bool KnownFacets::take(int x, int y, int z, const std::int32_t (&around)[8], int cell,
+void KnownFacets::take(int x, int y, int z, const std::int32_t (&around)[8], int cell,
                        std::vector<Facet>& facets) const {
-  if (stale_.empty() || stale_[index(x, y, z)] != 0) return false;
   const int i = index(x, y, z);
   for (int f = first_[i]; f < first_[i + 1]; ++f) {
     const auto end = std::end(around);
@@ -42,7 +41,6 @@ bool KnownFacets::take(int x, int y, int z, const std::int32_t (&around)[8], int
     facets.push_back(facets_[f]);
     facets.back().cell = cell;
   }
-  return true;
 }
 
 void mark_stale_facets(const std::vector<LatticeBody>& bodies, const Points& points,

@@ -18,9 +18,12 @@ class KnownFacets {
   KnownFacets(const LatticeBody& body, const BlockRegion& region,
               const std::vector<std::uint8_t>& stale);
 
+  /// Whether facets of cell (x, y, z) may have changed since; if there are none, all have.
+  bool is_stale(int x, int y, int z) const { return none() || stale_[index(x, y, z)] != 0; }
+  bool none() const { return stale_.empty(); }
   /// Appends the facets of the points `around` of cell (x, y, z), as those of `cell` in their
-  /// block. False where they must be made anew.
-  bool take(int x, int y, int z, const std::int32_t (&around)[8], int cell,
+  /// block.
+  void take(int x, int y, int z, const std::int32_t (&around)[8], int cell,
             std::vector<Facet>& facets) const;
 
  private:

@@ -153,14 +153,16 @@ TISSUE_SIM_INLINE bool segments_cross(const V& a, const V& b, const V& p, const 
   return u >= -1e-9 && u <= 1 + 1e-9 && t >= 0 && t <= 1;
 }
 
+TISSUE_SIM_INLINE double lesser(double a, double b) { return a < b ? a : b; }
+TISSUE_SIM_INLINE double larger(double a, double b) { return a > b ? a : b; }
 /// Least and largest coordinate of a segment over the interval.
 template <class V>
 TISSUE_SIM_INLINE double least(const SegmentOf<V>& s, int i) {
-  return fmin(fmin(s.a0[i], s.b0[i]), fmin(s.a1[i], s.b1[i]));
+  return lesser(lesser(s.a0[i], s.b0[i]), lesser(s.a1[i], s.b1[i]));
 }
 template <class V>
 TISSUE_SIM_INLINE double largest(const SegmentOf<V>& s, int i) {
-  return fmax(fmax(s.a0[i], s.b0[i]), fmax(s.a1[i], s.b1[i]));
+  return larger(larger(s.a0[i], s.b0[i]), larger(s.a1[i], s.b1[i]));
 }
 
 }  // namespace sweep

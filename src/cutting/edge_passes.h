@@ -99,7 +99,7 @@ TISSUE_SIM_HOST_DEVICE inline double root_between(const double (&c)[4], double l
     const double f = cubic(c, s), slope = c[1] + s * (2 * c[2] + s * 3 * c[3]);
     ((f < 0) == (flo < 0) ? lo : hi) = s;
     double next = s - f / slope;
-    if (fabs(next - s) < 1e-16) return next;
+    if (fabs(next - s) < 1e-12) return next;  // as near as rounding allows: steps fall by squares
     if (!(next > lo && next < hi)) next = 0.5 * (lo + hi);
     s = next;
   }

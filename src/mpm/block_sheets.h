@@ -9,10 +9,11 @@
 namespace tissue_sim {
 
 /// Points of one cell that see the same fields at all 27 nodes: those of a cell are one such share,
-/// or several where a cut goes through it.
+/// or several where a cut goes through it. Away from cuts, those of a run of whole cells are.
 struct CellShare {
-  std::int16_t x, y, z;   ///< cell in the region
-  std::int16_t count;     ///< of its points, whatever they are of
+  std::int16_t x, y, z;   ///< cell in the region; of a run, the first
+  std::int16_t cells;     ///< from there on along x: each one's points are two further on
+  std::int16_t count;     ///< of a cell's points, whatever they are of
   std::int32_t point[8];  ///< by sub-position sx + 2 sy + 4 sz, -1 where it has none
 };
 

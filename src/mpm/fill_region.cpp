@@ -68,10 +68,10 @@ Block make_block(const BlockRegion& r, const LatticeBody& b, const Points& point
                  const Sheet& sheet) {
   int lo[3] = {1 << 30, 1 << 30, 1 << 30}, hi[3] = {-1, -1, -1};
   for (const CellShare& c : sheet.cells) {
-    const int at[3] = {c.x, c.y, c.z};
+    const int first[3] = {c.x, c.y, c.z}, last[3] = {c.x + c.cells - 1, c.y, c.z};
     for (int a = 0; a < 3; ++a) {
-      lo[a] = std::min(lo[a], at[a]);
-      hi[a] = std::max(hi[a], at[a]);
+      lo[a] = std::min(lo[a], first[a]);
+      hi[a] = std::max(hi[a], last[a]);
     }
   }
   Block block;
@@ -83,7 +83,9 @@ Block make_block(const BlockRegion& r, const LatticeBody& b, const Points& point
   block.ny = hi[1] - lo[1] + 1;
   block.nz = hi[2] - lo[2] + 1;
   std::vector<bool> holds(block.nx * block.ny, false);
-  for (const CellShare& c : sheet.cells) holds[(c.y - lo[1]) * block.nx + c.x - lo[0]] = true;
+  for (const CellShare& c : sheet.cells) {
+    std::fill_n(holds.begin() + (c.y - lo[1]) * block.nx + c.x - lo[0], c.cells, true);
+  }
   block.runs = runs_of(holds, block.nx, block.ny);
   lay_out(block);
   std::vector<int> lane_of(block.nx * block.ny, -1);
@@ -96,8 +98,10 @@ Block make_block(const BlockRegion& r, const LatticeBody& b, const Points& point
     for (int s = 0; s < 8; ++s) {
       if (c.point[s] < 0) continue;
       const std::size_t lane = (static_cast<std::size_t>(z) * 8 + s) * block.stride + column;
-      block.volume[lane] = elastic_volume(points, c.point[s]);
-      block.point[lane] = c.point[s];
+      for (int i = 0; i < c.cells; ++i) {
+        block.volume[lane + i] = elastic_volume(points, c.point[s] + 2 * i);
+        block.point[lane + i] = c.point[s] + 2 * i;
+      }
       if (c.count < kSteadyCount) {
         mu += lame_mu(b.material_of(points, c.point[s])) * block.volume[lane];
       }
@@ -135,16 +139,22 @@ Block make_block(const BlockRegion& r, const LatticeBody& b, const Points& point
 /// A sheet's points by their materials, in the order of these.
 std::vector<Sheet> by_material(const Sheet& sheet, const LatticeBody& b, const Points& points) {
   std::vector<Sheet> parts(b.materials.size());
-  for (const CellShare& c : sheet.cells) {
-    for (int s = 0; s < 8; ++s) {
-      if (c.point[s] < 0) continue;
-      std::vector<CellShare>& cells = parts[points.material_of(c.point[s])].cells;
-      if (cells.empty() ||
-          std::tie(cells.back().x, cells.back().y, cells.back().z) != std::tie(c.x, c.y, c.z)) {
-        cells.push_back(c);
-        std::fill_n(cells.back().point, 8, -1);
+  for (const CellShare& of_run : sheet.cells) {
+    for (int i = 0; i < of_run.cells; ++i) {
+      CellShare c = of_run;
+      c.cells = 1;
+      c.x = static_cast<std::int16_t>(c.x + i);
+      for (int s = 0; s < 8; ++s) {
+        if (c.point[s] < 0) continue;
+        const std::int32_t p = c.point[s] + 2 * i;
+        std::vector<CellShare>& cells = parts[points.material_of(p)].cells;
+        if (cells.empty() ||
+            std::tie(cells.back().x, cells.back().y, cells.back().z) != std::tie(c.x, c.y, c.z)) {
+          cells.push_back(c);
+          std::fill_n(cells.back().point, 8, -1);
+        }
+        cells.back().point[s] = p;
       }
-      cells.back().point[s] = c.point[s];
     }
   }
   for (Sheet& part : parts) part.node = sheet.node;

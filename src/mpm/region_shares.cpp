@@ -1,19 +1,36 @@
 #include "mpm/region_shares.h"
 
 #include <algorithm>
+#include <array>
 #include <iterator>
 #include <numeric>
 
 namespace tissue_sim {
 namespace {
 
+constexpr int axis_of(int bond) { return bond < 3 ? 2 - bond : bond - 3; }
+
 /// Bonds that lead out of a cell from the point at sub-position s.
-constexpr unsigned leaving(int s) {
-  unsigned bonds = 0;
-  for (int a = 0; a < 3; ++a)
-    bonds |= 1u << ((s >> a & 1) != 0 ? kForwardBond + a : kForwardBond - 1 - a);
+constexpr auto kLeaving = [] {
+  std::array<unsigned, 8> bonds{};
+  for (int i = 0; i < 8 * 3; ++i) {
+    const int s = i / 3, a = i % 3;
+    bonds[s] |= 1u << ((s >> a & 1) != 0 ? kForwardBond + a : kForwardBond - 1 - a);
+  }
   return bonds;
+}();
+
+/// All bonds between a cell's points, a byte for each; with those that lead on along x.
+constexpr std::uint64_t bonds_within(bool along_x) {
+  std::uint64_t all = 0;
+  for (int s = 0; s < 8; ++s) {
+    std::uint64_t bonds = kAllBonds & ~kLeaving[s];
+    if (along_x) bonds |= 1u << kForwardBond | 1u << opposite_bond(kForwardBond);
+    all |= bonds << 8 * s;
+  }
+  return all;
 }
+constexpr std::uint64_t kWithin = bonds_within(false), kWithinRun = bonds_within(true);
 
 }  // namespace
 
@@ -48,29 +65,42 @@ RegionShares::RegionShares(const BlockRegion& r, const LatticeBody& b, const Poi
   }
   cells_.resize(static_cast<std::size_t>(r.nx) * r.ny * r.nz);
   all_.reserve(cells_.size());
-  const int row = 2 * r.nx, plane = 2 * r.ny * row;
-  std::vector<std::int32_t> point_at(8 * cells_.size(), -1);
-  for (int z = 0; z < 2 * r.nz; ++z) {
-    for (int y = 0; y < 2 * r.ny; ++y) {
-      b.for_each_point_in_row(
-          2 * r.x, 2 * r.x + row, 2 * r.y + y, 2 * r.z + z, [&](int x, int point, int count) {
-            const auto to = point_at.begin() + z * plane + y * row + x - 2 * r.x;
-            std::iota(to, to + count, point);
-          });
-    }
-  }
-  std::size_t cell = 0;
+  // The four rows of points through a row of cells, and their bonds.
+  const int length = 2 * r.nx;
+  std::vector<std::int32_t> point_at(4 * length);
+  std::vector<std::uint8_t> bonds_at(4 * length);
+  std::size_t i = 0;
   for (int z = 0; z < r.nz; ++z) {
     for (int y = 0; y < r.ny; ++y) {
-      for (int x = 0; x < r.nx; ++x, ++cell) {
-        const std::int32_t* lowest = point_at.data() + 2 * z * plane + 2 * y * row + 2 * x;
-        std::int32_t point[8];
-        bool any = false;
+      std::fill(point_at.begin(), point_at.end(), -1);
+      std::fill(bonds_at.begin(), bonds_at.end(), kNoPoint);
+      for (int k = 0; k < 4; ++k) {
+        b.for_each_point_in_row(2 * r.x, 2 * r.x + length, 2 * (r.y + y) + k % 2,
+                                2 * (r.z + z) + k / 2, [&](int x, int point, int count) {
+                                  const int at = k * length + x - 2 * r.x;
+                                  std::iota(&point_at[at], &point_at[at] + count, point);
+                                  std::copy_n(&points.bonds[point], count, &bonds_at[at]);
+                                });
+      }
+      CellBonds of_run = 0;  // of each of the cells in the last share, if that may go on
+      for (int x = 0; x < r.nx; ++x, ++i) {
+        CellBonds bonds = 0;
         for (int s = 0; s < 8; ++s) {
-          point[s] = lowest[(s >> 2) * plane + (s >> 1 & 1) * row + (s & 1)];
-          any = any || point[s] >= 0;
+          bonds |= CellBonds{bonds_at[(s >> 1) * length + 2 * x + (s & 1)]} << 8 * s;
         }
-        if (any) add_cell(x, y, z, point, cells_[cell]);
+        const bool near_split = near_split_[node_at(x, y, z)] != 0;
+        if (bonds == of_run && !near_split) {
+          ++all_.back().cells;
+          cells_[i] = cells_[i - 1];
+          continue;
+        }
+        of_run = 0;
+        if (bonds == ~CellBonds{0}) continue;  // no points
+        std::int32_t point[8];
+        for (int s = 0; s < 8; ++s) point[s] = point_at[(s >> 1) * length + 2 * x + (s & 1)];
+        add_cell(x, y, z, point, bonds, cells_[i]);
+        const bool may_go_on = (bonds & kWithinRun) == kWithinRun && !near_split;
+        if (may_go_on && cells_[i].faces != Cell::kUneven) of_run = bonds;
       }
     }
   }
@@ -97,63 +127,72 @@ std::vector<RegionShares::Reached> RegionShares::connected(
     order.push_back({share, bond});
   };
   for (std::size_t next = 0; next < order.size(); ++next) {
-    const CellShare& c = all_[order[next].share];
-    const Cell& cell = cells_[(c.z * r_.ny + c.y) * r_.nx + c.x];
-    if (has_even_faces(cell)) {
-      // In the order of the points' bonds.
-      for (unsigned faces = cell.faces; faces != 0; faces &= faces - 1) {
+    const CellShare c = all_[order[next].share];
+    const Cell* cell = &cells_[(c.z * r_.ny + c.y) * r_.nx + c.x];
+    const bool within[kBondCount] = {c.z > 0,
+                                     c.y > 0,
+                                     c.x > 0,
+                                     c.x + c.cells < r_.nx,
+                                     c.y + 1 < r_.ny,
+                                     c.z + 1 < r_.nz};
+    if (cell->count == 1 && cell->faces != Cell::kUneven) {
+      for (unsigned faces = cell->faces; faces != 0; faces &= faces - 1) {
         const int k = __builtin_ctz(faces);
-        reach((&cell)[step_[k]].first, k);
+        if (!within[k]) continue;
+        const bool along_x = axis_of(k) == 0;
+        const Cell* other = k == kForwardBond ? cell + c.cells : cell + step_[k];
+        for (int i = 0; i < (along_x ? 1 : c.cells); ++i, ++other) {
+          if (other->count == 1) {
+            reach(other->first, k);
+            continue;
+          }
+          for (int s = 0; s < 8; ++s) {
+            if ((kLeaving[s] >> opposite_bond(k) & 1) != 0) reach(share_with(*other, s), k);
+          }
+        }
       }
       continue;
     }
     for (int s = 0; s < 8; ++s) {
       if (c.point[s] < 0) continue;
       // Points of a cell that are bound see the same fields: they are of one share.
-      for (unsigned bonds = points_.bonds[c.point[s]] & leaving(s); bonds != 0;
+      for (unsigned bonds = points_.bonds[c.point[s]] & kLeaving[s]; bonds != 0;
            bonds &= bonds - 1) {
         const int k = __builtin_ctz(bonds);
-        const Cell* other = next_cell(c, k);
-        if (other == nullptr) continue;
-        const int axis = k < 3 ? 2 - k : k - 3;
-        std::int32_t share = other->first;
-        while (all_[share].point[s ^ 1 << axis] < 0) ++share;
-        reach(share, k);
+        if (within[k]) reach(share_with(cell[step_[k]], s ^ 1 << axis_of(k)), k);
       }
     }
   }
   return order;
 }
 
-RegionShares::Cell RegionShares::cell_of(int x, int y, int z,
-                                         const std::int32_t (&point)[8]) const {
+RegionShares::Cell RegionShares::cell_of(CellBonds of_points) {
   Cell cell;
   unsigned held = 0, missing = 0;
   for (int s = 0; s < 8; ++s) {
-    if (point[s] < 0) {
+    const unsigned bonds = of_points >> 8 * s & 0xff;
+    if (bonds == kNoPoint) {
       cell.whole = false;
       cell.faces = Cell::kUneven;
       return cell;
     }
-    const unsigned bonds = points_.bonds[point[s]];
-    held |= bonds & leaving(s);
-    missing |= ~bonds & leaving(s);
-    cell.whole = cell.whole && (bonds | leaving(s)) == kAllBonds;
+    held |= bonds & kLeaving[s];
+    missing |= ~bonds & kLeaving[s];
   }
-  const bool within[kBondCount] = {z > 0,         y > 0,         x > 0,
-                                   x + 1 < r_.nx, y + 1 < r_.ny, z + 1 < r_.nz};
-  for (int k = 0; k < kBondCount; ++k) held &= ~(within[k] ? 0 : 1u << k);
+  cell.whole = (of_points & kWithin) == kWithin;
   cell.faces = (held & missing) != 0 ? Cell::kUneven : static_cast<std::uint8_t>(held);
   return cell;
 }
 
-void RegionShares::add_cell(int x, int y, int z, const std::int32_t (&point)[8], Cell& cell) {
-  cell = cell_of(x, y, z, point);
+void RegionShares::add_cell(int x, int y, int z, const std::int32_t (&point)[8], CellBonds bonds,
+                            Cell& cell) {
+  cell = cell_of(bonds);
   cell.first = static_cast<std::int32_t>(all_.size());
   const auto add = [&] {
     all_.push_back({static_cast<std::int16_t>(x),
                     static_cast<std::int16_t>(y),
                     static_cast<std::int16_t>(z),
+                    1,
                     0,
                     {}});
     ++cell.count;
@@ -221,21 +260,6 @@ AllSeen RegionShares::seen(int x, int y, int z, int s, int bond) const {
     }
   }
   return result;
-}
-
-const RegionShares::Cell* RegionShares::next_cell(const CellShare& c, int bond) const {
-  const BondOffset o = bond_offset(bond);
-  const int x = c.x + o.x, y = c.y + o.y, z = c.z + o.z;
-  if (x < 0 || y < 0 || z < 0 || x >= r_.nx || y >= r_.ny || z >= r_.nz) return nullptr;
-  return &cells_[(z * r_.ny + y) * r_.nx + x];
-}
-
-bool RegionShares::has_even_faces(const Cell& cell) const {
-  if (cell.faces == Cell::kUneven || cell.count != 1) return false;
-  for (unsigned faces = cell.faces; faces != 0; faces &= faces - 1) {
-    if ((&cell)[step_[__builtin_ctz(faces)]].count != 1) return false;
-  }
-  return true;
 }
 
 }  // namespace tissue_sim

@@ -57,24 +57,29 @@ class RegionShares {
     static constexpr std::uint8_t kUneven = 0xff;
     std::int32_t first = 0, count = 0;  ///< its shares
     bool whole = true;                  ///< no bond between its points is missing, nor is a point
-    /// Directions to cells of the region in which all its points hold on to others there, if none
-    /// do in the rest.
+    /// Directions in which all its points hold on to others outside of the cell, if none do in the
+    /// rest.
     std::uint8_t faces = 0;
   };
+  /// A byte for each of its points: the bonds, or kNoPoint.
+  using CellBonds = std::uint64_t;
+  static constexpr std::uint8_t kNoPoint = 0xff;
 
-  Cell cell_of(int x, int y, int z, const std::int32_t (&point)[8]) const;
+  static Cell cell_of(CellBonds bonds);
   /// Takes a cell's points apart into shares.
-  void add_cell(int x, int y, int z, const std::int32_t (&point)[8], Cell& cell);
+  void add_cell(int x, int y, int z, const std::int32_t (&point)[8], CellBonds bonds, Cell& cell);
   /// Number of the region's node that is lowest around a cell.
   int node_at(int x, int y, int z) const { return (z * (r_.ny + 2) + y) * (r_.nx + 2) + x; }
   /// Whether the points at sub-positions s and t of a cell do.
   bool see_the_same(int x, int y, int z, int s, int t) const;
   /// What the point at sub-position s of a cell sees at the split nodes around it.
   AllSeen seen(int x, int y, int z, int s, int bond) const;
-  /// The region's cell next to a share's in the direction of a bond; null if that is outside.
-  const Cell* next_cell(const CellShare& c, int bond) const;
-  /// Whether all of a cell's points hold on to one share in each direction, or none do.
-  bool has_even_faces(const Cell& cell) const;
+  /// That share of a cell which has the point at sub-position s.
+  std::int32_t share_with(const Cell& cell, int s) const {
+    std::int32_t share = cell.first;
+    while (all_[share].point[s] < 0) ++share;
+    return share;
+  }
 
   const BlockRegion& r_;
   const Points& points_;

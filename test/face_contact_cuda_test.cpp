@@ -39,7 +39,7 @@ void implode(CudaMpmTissue& tissue, const Vec3& middle, double rate) {
       set(lattice_node);
       const NodeFields::Split* split = s.fields->split(lattice_node);
       if (split == nullptr) return;
-      for (const int field : split->field) set(field);
+      for (const auto& field : split->fields) set(field.node);
     });
   }
   tissue.push();

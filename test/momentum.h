@@ -43,7 +43,7 @@ inline std::vector<Vec3> homes(const MpmState& state) {
       home[node] = b.node_position(x, y, z);
       const NodeFields::Split* split = state.fields->split(node);
       if (split == nullptr) return;
-      for (const int field : split->field) home[field] = home[node];
+      for (const auto& field : split->fields) home[field.node] = home[node];
     });
   }
   return home;

@@ -71,11 +71,15 @@ void deform(MpmTissue& tissue, const Eigen::Matrix3d& f) {
     for (int y = -1; y <= b.ny; ++y) {
       for (int x = -1; x <= b.nx; ++x) {
         const Vec3 place = b.node_position(x, y, z), u = f * place - place;
-        std::vector<int> fields = {b.node(x, y, z)};
-        const NodeFields::Split* split = state.fields->split(fields[0]);
-        if (split != nullptr) fields = {split->field.begin(), split->field.end()};
-        for (const int node : fields) {
+        const auto set = [&](int node) {
           for (int c = 0; c < 3; ++c) state.nodes.u[c][node] = static_cast<float>(u[c]);
+        };
+        const int lattice_node = b.node(x, y, z);
+        const NodeFields::Split* split = state.fields->split(lattice_node);
+        if (split == nullptr) {
+          set(lattice_node);
+        } else {
+          for (const auto& field : split->fields) set(field.node);
         }
       }
     }

@@ -162,16 +162,18 @@ NodeFields::Split NodeFields::taken_apart(const LatticeBody& body, const Cell& c
   const int count = bonds_.find_components(c.body, c.x, c.y, c.z, found);
   Split now;
   // Components only come apart, so the same number means the same components.
-  if (count == (before == nullptr ? 1 : static_cast<int>(before->field.size()))) return now;
-  now.part.assign(found, found + count);
-  now.field.reserve(count);
-  for (const Planes& part : now.part) {
+  if (count == (before == nullptr ? 1 : static_cast<int>(before->fields.size()))) return now;
+  now.fields.reserve(count);
+  for (int i = 0; i < count; ++i) {
+    const Planes& points = found[i];
     int z = 0;
-    while (part[z] == 0) ++z;
+    while (points[z] == 0) ++z;
     const std::int32_t parent =
-        before == nullptr ? lattice_node : before->field_at(z, __builtin_ctzll(part[z]));
-    const bool is_first = std::find(now.field.begin(), now.field.end(), parent) == now.field.end();
-    now.field.push_back(is_first ? parent : ~parent);
+        before == nullptr ? lattice_node : before->field_at(z, __builtin_ctzll(points[z]));
+    const bool is_first =
+        std::none_of(now.fields.begin(), now.fields.end(),
+                     [parent](const Split::Field& f) { return f.node == parent; });
+    now.fields.push_back({points, is_first ? parent : ~parent});
   }
   return now;
 }
@@ -192,12 +194,12 @@ std::vector<NodeFields::Cell> NodeFields::update(const std::vector<LatticeBody>&
   std::vector<std::int32_t> parent_of_new;  // the node that a new one was a part of
   const int node_count = static_cast<int>(nodes.size());
   for (std::size_t i = 0; i < cells.size(); ++i) {
-    if (now[i].part.empty()) continue;
+    if (now[i].fields.empty()) continue;
     apart.push_back(cells[i]);
-    for (std::int32_t& field : now[i].field) {
-      if (field >= 0) continue;
-      parent_of_new.push_back(~field);
-      field = node_count + static_cast<std::int32_t>(parent_of_new.size()) - 1;
+    for (Split::Field& f : now[i].fields) {
+      if (f.node >= 0) continue;
+      parent_of_new.push_back(~f.node);
+      f.node = node_count + static_cast<std::int32_t>(parent_of_new.size()) - 1;
     }
     std::int32_t& index = split_of_[node_of(cells[i])];
     if (index < 0) {
@@ -217,9 +219,8 @@ std::vector<NodeFields::Cell> NodeFields::update(const std::vector<LatticeBody>&
       static_cast<int>(apart.size()),
       [&](int i) {
         const Cell& c = apart[i];
-        const Split& s = *split(node_of(c));
-        for (std::size_t k = 0; k < s.part.size(); ++k) {
-          share_mass(bodies[c.body], points, c, mass_of_point_[node_of(c)], s.part[k], s.field[k],
+        for (const Split::Field& f : split(node_of(c))->fields) {
+          share_mass(bodies[c.body], points, c, mass_of_point_[node_of(c)], f.points, f.node,
                      nodes);
         }
       },

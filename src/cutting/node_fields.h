@@ -33,14 +33,17 @@ class NodeFields {
   int node(const LatticeBody& body, const Points::Site& point, int k) const;
 
   struct Split {
-    std::vector<Planes> part;         ///< of the points around the node: its components
-    std::vector<std::int32_t> field;  ///< node of each component
+    struct Field {
+      Planes points;  ///< around the node: a component
+      std::int32_t node;
+    };
+    std::vector<Field> fields;
 
     /// The node that the point at a place of the box sees: `in_plane` is bit_in_plane().
     std::int32_t field_at(int plane, int in_plane) const {
-      std::size_t i = part.size() - 1;
-      while (i > 0 && (part[i][plane] >> in_plane & 1) == 0) --i;
-      return field[i];
+      std::size_t i = fields.size() - 1;
+      while (i > 0 && (fields[i].points[plane] >> in_plane & 1) == 0) --i;
+      return fields[i].node;
     }
     /// The node that `point` sees, of the node of cell (x, y, z).
     int seen_by(const Points::Site& point, int x, int y, int z) const;
@@ -60,7 +63,7 @@ class NodeFields {
 
  private:
   /// How the node of a cell is split now, if otherwise than before, else nothing. The first
-  /// component that was part of a field keeps it; for others `field` is ~ their parent.
+  /// component that was part of a field keeps it; for others `node` is ~ their parent.
   Split taken_apart(const LatticeBody& body, const Cell& cell) const;
 
   BondWindows bonds_;

@@ -127,7 +127,7 @@ std::vector<RegionShares::Reached> RegionShares::connected(
     order.push_back({share, bond});
   };
   for (std::size_t next = 0; next < order.size(); ++next) {
-    const CellShare c = all_[order[next].share];
+    const CellShare& c = all_[order[next].share];
     const Cell* cell = &cells_[(c.z * r_.ny + c.y) * r_.nx + c.x];
     const bool within[kBondCount] = {c.z > 0,
                                      c.y > 0,

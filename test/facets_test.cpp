@@ -2,9 +2,12 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <random>
+#include <tuple>
 
 #include "contact/face_places.h"
 #include "contact/facet_motion.h"
+#include "contact/known_facets.h"
 #include "cut_scenes.h"
 
 namespace tissue_sim {
@@ -82,6 +85,41 @@ TEST(Facets, LieInThePlaneOfACutThroughDeformedTissue) {
   EXPECT_GT(m.count, 100);
   EXPECT_LT(m.off, 2e-3);
   EXPECT_LT(m.angle, 2e-3);
+}
+
+/// Cut after cut through an ellipsoid, whose rim has cells of all shapes: what is kept of the
+/// facets from one cut to the next is what would be made anew.
+TEST(Facets, AreKeptOnlyWhereTheyWouldBeTheSame) {
+  for (const bool with_inclusions : {false, true}) {
+    Scene scene = held_body(Law::kFixedCorotated, 0, Shape::kEllipsoid);
+    if (with_inclusions) add_inclusions(scene, true);
+    MpmTissue tissue(scene);
+    const MpmState& s = tissue.state();
+    const Vec3 middle = scene.bodies[0].pose.position;
+    std::mt19937 random(7);
+    std::uniform_real_distribution<double> within(-1, 1);
+    std::size_t count = 0;
+    for (int i = 0; i < 8; ++i) {
+      const Vec3 normal(within(random), within(random), within(random));
+      const Vec3 off(within(random), within(random), within(random));
+      cut_now(tissue, plane_cut(middle + 0.004 * off, normal));
+      for (const Block* block : s.blocks.all) {
+        const std::vector<Facet> anew = facets_of(s.bodies[0], s.points, *block, KnownFacets());
+        ASSERT_EQ(block->facets.size(), anew.size()) << "cut " << i;
+        count += anew.size();
+        for (std::size_t k = 0; k < anew.size(); ++k) {
+          const Facet &a = block->facets[k], &b = anew[k];
+          EXPECT_EQ(std::tie(a.point, a.cell, a.direction, a.area),
+                    std::tie(b.point, b.cell, b.direction, b.area));
+          for (int c = 0; c < 3; ++c) {
+            EXPECT_EQ(std::tie(a.center[c], a.normal[c], a.extent[c]),
+                      std::tie(b.center[c], b.normal[c], b.extent[c]));
+          }
+        }
+      }
+    }
+    EXPECT_GT(count, 1000u);
+  }
 }
 
 }  // namespace

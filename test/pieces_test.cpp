@@ -173,5 +173,65 @@ TEST(Pieces, ComeApartOnlyWhereTheyMay) {
   EXPECT_GT(rounds, 2 * may) << "it is to spare work";
 }
 
+/// A bond that is in no square of four bonds is a thread: the places at its ends, by walking around
+/// each bond, while bonds break at random.
+TEST(Threads, AreBondsInNoSquare) {
+  Points points;
+  const std::vector<LatticeBody> bodies =
+      make_lattice_bodies(free_box(Vec3(0.012, 0.01, 0.008), 0.002), points, nullptr);
+  const LatticeBody& body = bodies[0];
+  BondWindows bonds(bodies, points);
+  const auto next = [&](std::int32_t p, int k) {  // over bond k, -1 where there is none
+    const BondOffset o = bond_offset(k);
+    const Points::Site& s = points.site[p];
+    return p >= 0 && (points.bonds[p] >> k & 1) != 0 ? body.point(s.x + o.x, s.y + o.y, s.z + o.z)
+                                                     : -1;
+  };
+  const auto ends_thread = [&](std::int32_t p) {
+    for (int k = 0; k < kBondCount; ++k) {
+      if (p < 0 || next(p, k) < 0) continue;
+      bool in_square = false;
+      for (int side = 0; side < kBondCount; ++side) {
+        if (side == k || side == opposite_bond(k) || next(p, side) < 0) continue;
+        const std::int32_t corner = next(next(p, side), k);
+        in_square = in_square || (corner >= 0 && next(next(p, k), side) == corner);
+      }
+      if (!in_square) return true;
+    }
+    return false;
+  };
+  std::mt19937 random(11);
+  int found = 0;
+  for (int round = 0; round < 30; ++round) {
+    std::vector<std::int32_t> changed;
+    for (int i = 0; i < 40; ++i) {
+      const auto p = static_cast<std::int32_t>(random() % points.size());
+      const int axis = static_cast<int>(random() % 3), k = kForwardBond + axis;
+      if ((points.bonds[p] >> k & 1) == 0) continue;
+      const std::int32_t q = body.next_point(points.site[p], axis);
+      break_bond(k, points.bonds[p], points.bonds[q]);
+      changed.push_back(p);
+      changed.push_back(q);
+    }
+    bonds.update(points, changed);
+    for (int z = 0; z < body.nz; ++z) {
+      for (int y = 0; y < body.ny; ++y) {
+        for (int x = 0; x < body.nx; ++x) {
+          const Planes ends = bonds.thread_ends(0, x, y, z);
+          for (int i = 0; i < 64; ++i) {  // the places around the node
+            const int at[3] = {1 + i % 4, 1 + i / 4 % 4, 1 + i / 16};
+            const std::int32_t p =
+                body.point(2 * x - 2 + at[0], 2 * y - 2 + at[1], 2 * z - 2 + at[2]);
+            const bool is_end = (ends[at[2]] >> bit_in_plane(at[0], at[1]) & 1) != 0;
+            ASSERT_EQ(is_end, ends_thread(p)) << "round " << round << ", point " << p;
+            found += is_end;
+          }
+        }
+      }
+    }
+  }
+  EXPECT_GT(found, 1000);
+}
+
 }  // namespace
 }  // namespace tissue_sim

@@ -68,9 +68,9 @@ Plane fitted_plane(const Surroundings& around, const Side& side, End how,
       ends[0] += end;
     }
   }
-  Eigen::Matrix3d normal;  // a row of columns is level across
-  normal << count, first[0] / 4.0, first[1] / 4.0,                          //
-      first[0] / 4.0, second[0] / 16.0 + 1e-2, second[2] / 16.0,            //
+  Eigen::Matrix3d normal;                           // a row of columns is level across
+  normal << count, first[0] / 4.0, first[1] / 4.0,  //
+      first[0] / 4.0, second[0] / 16.0 + 1e-2, second[2] / 16.0,  //
       first[1] / 4.0, second[2] / 16.0, second[1] / 16.0 + 1e-2;
   const Eigen::Vector3d c =
       normal.ldlt().solve(Eigen::Vector3d(ends[0] / 2.0, ends[1] / 8.0, ends[2] / 8.0));

@@ -123,8 +123,9 @@ class Sweep {
                           int axis) const {
     if (axis == 0) return block.point[lane] + 1;  // points are numbered along x
     const int at[3] = {s.x, s.y, s.z};
-    if (at[axis] % 2 == 0) return block.point[lane + (block.stride << axis)];  // in its cell
-    return state_.bodies[block.body].next_point(s, axis);
+    const std::int32_t in_cell =
+        at[axis] % 2 == 0 ? block.point[lane + (block.stride << axis)] : -1;
+    return in_cell >= 0 ? in_cell : state_.bodies[block.body].next_point(s, axis);
   }
   bool moves() const { return u_begin_ != u_end_; }
   /// Of a point at the beginning (0) or the end (1). Both ends of a bond must agree to the last bit

@@ -129,12 +129,8 @@ std::vector<RegionShares::Reached> RegionShares::connected(
   for (std::size_t next = 0; next < order.size(); ++next) {
     const CellShare& c = all_[order[next].share];
     const Cell* cell = &cells_[(c.z * r_.ny + c.y) * r_.nx + c.x];
-    const bool within[kBondCount] = {c.z > 0,
-                                     c.y > 0,
-                                     c.x > 0,
-                                     c.x + c.cells < r_.nx,
-                                     c.y + 1 < r_.ny,
-                                     c.z + 1 < r_.nz};
+    const bool within[kBondCount] = {
+        c.z > 0, c.y > 0, c.x > 0, c.x + c.cells < r_.nx, c.y + 1 < r_.ny, c.z + 1 < r_.nz};
     if (cell->count == 1 && cell->faces != Cell::kUneven) {
       for (unsigned faces = cell->faces; faces != 0; faces &= faces - 1) {
         const int k = __builtin_ctz(faces);

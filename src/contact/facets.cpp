@@ -121,23 +121,40 @@ Facet make_facet(double cell_size, int cell, const Side& side, const std::int32_
   return f;
 }
 
+/// The bonds that points of a cell miss.
+struct Missing {
+  unsigned cut[kBondCount] = {}, outer[kBondCount] = {};  ///< points whose bond broke, never was
+  std::int32_t beyond[kBondCount][8];                     ///< where it broke: the other point
+  bool any_cut = false;
+
+  Missing(const LatticeBody& body, const Points& points, const std::int32_t (&around)[8]) {
+    for (int s = 0; s < 8; ++s) {
+      if (around[s] < 0 || points.bonds[around[s]] == kAllBonds) continue;
+      const Points::Site& site = points.site[around[s]];
+      for (unsigned gone = kAllBonds & ~points.bonds[around[s]]; gone != 0; gone &= gone - 1) {
+        const int k = __builtin_ctz(gone);
+        const BondOffset o = bond_offset(k);
+        beyond[k][s] = body.point(site.x + o.x, site.y + o.y, site.z + o.z);
+        const bool is_cut = beyond[k][s] >= 0;
+        (is_cut ? cut : outer)[k] |= 1u << s;
+        any_cut = any_cut || is_cut;
+      }
+    }
+  }
+};
+
 /// Appends the facets of the points `members`, whose bonds blades went through: one for each of
 /// their cuts. Returns those whose bonds have no crossing.
-unsigned add_crossed(const LatticeBody& body, const Points& points, int cell, const Place& corner,
-                     const Side& side, const std::int32_t (&around)[8], unsigned members,
-                     std::vector<Facet>& facets) {
+unsigned add_crossed(const LatticeBody& body, const Points& points, int cell, const Side& side,
+                     const std::int32_t (&around)[8], const std::int32_t (&beyond)[8],
+                     unsigned members, std::vector<Facet>& facets) {
   Vec3 normal[8];
   double place[8];
   unsigned left = 0;
   for (int s = 0; s < 8; ++s) {
     if ((members >> s & 1) == 0) continue;
-    std::int32_t lower = around[s];
-    if (side.sign < 0) {
-      Place place = {corner[0] + (s & 1), corner[1] + (s >> 1 & 1), corner[2] + (s >> 2)};
-      --place[side.axis];
-      lower = body.point(place[0], place[1], place[2]);
-    }
-    const Crossing* crossing = points.crossings.find(lower, side.axis);
+    const Crossing* crossing =
+        points.crossings.find(side.sign > 0 ? around[s] : beyond[s], side.axis);
     if (crossing == nullptr) continue;
     normal[s] = Vec3(crossing->normal[0], crossing->normal[1], crossing->normal[2]);
     if (normal[s][side.axis] * side.sign < 0) normal[s] = -normal[s];
@@ -244,20 +261,8 @@ std::vector<Facet> facets_of(const LatticeBody& body, const Points& points, cons
         };
         if (std::all_of(std::begin(around), std::end(around), is_whole)) continue;
         const Place corner = {2 * x, 2 * y, 2 * (block.z + z)};
-        unsigned missing[2][kBondCount] = {};  // the cell's points without a bond: cut, never had
-        bool is_cut = false;
-        for (int s = 0; s < 8; ++s) {
-          if (is_whole(around[s])) continue;
-          const Points::Site& site = points.site[around[s]];
-          for (unsigned gone = kAllBonds & ~points.bonds[around[s]]; gone != 0; gone &= gone - 1) {
-            const int k = __builtin_ctz(gone);
-            const BondOffset o = bond_offset(k);
-            const bool outer = body.point(site.x + o.x, site.y + o.y, site.z + o.z) < 0;
-            missing[outer ? 1 : 0][k] |= 1u << s;
-            is_cut = is_cut || !outer;
-          }
-        }
-        if (!is_cut && !known.none() && is_one_part(body, corner, around)) {
+        const Missing missing(body, points, around);
+        if (!missing.any_cut && !known.none() && is_one_part(body, corner, around)) {
           known.take(x, y, block.z + z, around, cell, facets);
           continue;
         }
@@ -265,12 +270,13 @@ std::vector<Facet> facets_of(const LatticeBody& body, const Points& points, cons
         const std::size_t first = facets.size();
         for (int j = 0; j < 4 * kBondCount; ++j) {
           const End how = j / 2 % 2 == 0 ? End::kCut : End::kOuter;
-          const unsigned gone = missing[how == End::kCut ? 0 : 1][j / 4];
+          const unsigned gone = (how == End::kCut ? missing.cut : missing.outer)[j / 4];
           if (gone == 0) continue;
           const Side side(j / 4, j % 2);
           unsigned members = gone & side.points();
           if (how == End::kCut && members != 0) {
-            members = add_crossed(body, points, cell, corner, side, around, members, facets);
+            members = add_crossed(body, points, cell, side, around, missing.beyond[side.direction],
+                                  members, facets);
           }
           if (members == 0) continue;
           if (!surroundings) surroundings.emplace(body, points, corner);

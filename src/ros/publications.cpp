@@ -148,9 +148,11 @@ boost::shared_ptr<const FragmentArray> Publications::fragment_message(
   return m;
 }
 
-boost::shared_ptr<const sensor_msgs::PointCloud2> Publications::cloud(
-    Simulation& simulation, bool loose_only, const ros::Time& stamp) const {
-  auto m = boost::make_shared<sensor_msgs::PointCloud2>();
+boost::shared_ptr<const sensor_msgs::PointCloud2> Publications::cloud(Simulation& simulation,
+                                                                      bool loose_only,
+                                                                      const ros::Time& stamp) {
+  boost::shared_ptr<sensor_msgs::PointCloud2>& m = clouds_[next_cloud_++ % clouds_.size()];
+  if (m.use_count() != 1) m = boost::make_shared<sensor_msgs::PointCloud2>();
   m->header = header(stamp);
   PointSelection selection;
   selection.stride = parameters_.cloud_stride;

@@ -8,11 +8,14 @@
 #include <tf2_msgs/TFMessage.h>
 #include <visualization_msgs/MarkerArray.h>
 
+#include <array>
+#include <cstddef>
 #include <set>
 #include <string>
 #include <utility>
 #include <vector>
 
+#include "ros/cloud_memory.h"
 #include "ros/markers.h"
 #include "ros/messages.h"
 #include "ros/output.h"
@@ -65,7 +68,7 @@ class Publications {
   boost::shared_ptr<const FragmentArray> fragment_message(Simulation& simulation,
                                                           const ros::Time& stamp) const;
   boost::shared_ptr<const sensor_msgs::PointCloud2> cloud(Simulation& simulation, bool loose_only,
-                                                          const ros::Time& stamp) const;
+                                                          const ros::Time& stamp);
   boost::shared_ptr<const visualization_msgs::MarkerArray> marker_message(Simulation& simulation,
                                                                           const FrameReport& report,
                                                                           const ros::Time& stamp);
@@ -87,6 +90,9 @@ class Publications {
   std::vector<ToolOutputs> tools_;
 
   Throttle state_due_, fragments_due_, clouds_due_, markers_due_;
+  /// The last clouds, to be filled again when nobody else holds them: see ros/cloud_memory.h.
+  std::array<boost::shared_ptr<sensor_msgs::PointCloud2>, 4> clouds_;
+  std::size_t next_cloud_ = 0;
   Pieces pieces_;
   ros::Time tf_stamp_;
 };

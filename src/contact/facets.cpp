@@ -247,6 +247,7 @@ std::vector<Facet> facets_of(const LatticeBody& body, const Points& points, cons
       for (int i = 0; i < run.count; ++i) {
         const int lane = run.lane + i;
         const int x = block.x + run.x + i, y = block.y + run.y;
+        if (known.is_bare(x, y, block.z + z)) continue;
         const int cell = z * block.plane + block.cell[lane];
         std::int32_t around[8];
         for (int s = 0; s < 8; ++s) {

@@ -21,6 +21,11 @@ class KnownFacets {
   /// Whether facets of cell (x, y, z) may have changed since; if there are none, all have.
   bool is_stale(int x, int y, int z) const { return none() || stale_[index(x, y, z)] != 0; }
   bool none() const { return stale_.empty(); }
+  /// Whether the cell still has none.
+  bool is_bare(int x, int y, int z) const {
+    const int i = index(x, y, z);
+    return !none() && stale_[i] == 0 && first_[i] == first_[i + 1];
+  }
   /// Appends the facets of the points `around` of cell (x, y, z), as those of `cell` in their
   /// block.
   void take(int x, int y, int z, const std::int32_t (&around)[8], int cell,

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cstring>
 #include <iterator>
 #include <numeric>
 
@@ -32,6 +33,16 @@ constexpr std::uint64_t bonds_within(bool along_x) {
 }
 constexpr std::uint64_t kWithin = bonds_within(false), kWithinRun = bonds_within(true);
 
+/// Sets to[i] where from[i], or the one a step or two further on, is set.
+void spread_back(const std::vector<std::uint8_t>& from, std::size_t step,
+                 std::vector<std::uint8_t>& to) {
+  const std::uint8_t* of = from.data();
+  std::uint8_t* out = to.data();
+  for (std::size_t i = 0; i + 2 * step < from.size(); ++i) {
+    out[i] = of[i] | of[i + step] | of[i + 2 * step];
+  }
+}
+
 }  // namespace
 
 RegionShares::RegionShares(const BlockRegion& r, const LatticeBody& b, const Points& points,
@@ -40,6 +51,7 @@ RegionShares::RegionShares(const BlockRegion& r, const LatticeBody& b, const Poi
   const int px = r.nx + 2, py = r.ny + 2, pz = r.nz + 2;
   const std::size_t n = static_cast<std::size_t>(px) * py * pz;
   split_.resize(n);
+  std::vector<std::uint8_t> is_split(n, 0);
   for (int z = 0; z < pz; ++z) {
     for (int y = 0; y < py; ++y) {
       const int row = (z * py + y) * px, x0 = r.x - 1;
@@ -48,20 +60,18 @@ RegionShares::RegionShares(const BlockRegion& r, const LatticeBody& b, const Poi
                                for (int i = 0; i < count; ++i) {
                                  const NodeFields::Split* split = fields.split(node + i);
                                  split_[row + x - x0 + i] = split;
+                                 is_split[row + x - x0 + i] = split != nullptr;
                                  any_split_ = any_split_ || split != nullptr;
                                }
                              });
     }
   }
   split_in_row_.assign(n, 0);
-  for (std::size_t i = 0; any_split_ && i + 2 < n; ++i) {
-    split_in_row_[i] = split_[i] != nullptr || split_[i + 1] != nullptr || split_[i + 2] != nullptr;
-  }
   near_split_ = split_in_row_;
-  for (const int step : {px, px * py}) {
-    for (std::size_t i = 0; any_split_ && i + 2 * step < n; ++i) {
-      near_split_[i] |= near_split_[i + step] | near_split_[i + 2 * step];
-    }
+  if (any_split_) {
+    spread_back(is_split, 1, split_in_row_);
+    spread_back(split_in_row_, px, is_split);
+    spread_back(is_split, px * py, near_split_);
   }
   cells_.resize(static_cast<std::size_t>(r.nx) * r.ny * r.nz);
   all_.reserve(cells_.size());
@@ -85,8 +95,10 @@ RegionShares::RegionShares(const BlockRegion& r, const LatticeBody& b, const Poi
       CellBonds of_run = 0;  // of each of the cells in the last share, if that may go on
       for (int x = 0; x < r.nx; ++x, ++i) {
         CellBonds bonds = 0;
-        for (int s = 0; s < 8; ++s) {
-          bonds |= CellBonds{bonds_at[(s >> 1) * length + 2 * x + (s & 1)]} << 8 * s;
+        for (int k = 0; k < 4; ++k) {
+          std::uint16_t pair;  // of points along x
+          std::memcpy(&pair, &bonds_at[k * length + 2 * x], sizeof(pair));
+          bonds |= CellBonds{pair} << 16 * k;
         }
         const bool near_split = near_split_[node_at(x, y, z)] != 0;
         if (bonds == of_run && !near_split) {

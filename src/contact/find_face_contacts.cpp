@@ -122,7 +122,7 @@ bool search(MpmState& s, const Pieces& pieces) {
     listed.skin = travel[f] < 0 ? -1 : travel[f] + kSkin * cell;
     reach[f] = travel[f] < 0 ? 0 : kSearchReach * cell + listed.skin;
   }
-  auto pairs = facing_pairs(faces.motion, reach, 3 * cell, *s.cpu);
+  auto pairs = facing_pairs(faces.motion, reach, faces.first_facet, 4 * cell, *s.cpu);
   std::vector<std::uint8_t> one(pairs.size());
   s.cpu->for_each(
       static_cast<int>(pairs.size()),

@@ -12,21 +12,20 @@ namespace {
 constexpr int kWidth = 4;
 using Lanes = Vec<kWidth>;
 
+Lanes lesser(Lanes a, Lanes b) { return a < b ? a : b; }
+Lanes greater(Lanes a, Lanes b) { return a < b ? b : a; }
+
 /// A box, of places or of normals. The fourth lane is 0.
 struct VectorBox {
   Lanes min = {1e30f, 1e30f, 1e30f, 0}, max = {-1e30f, -1e30f, -1e30f, 0};
 
-  void take(const float (&x)[3], float margin) {
-    for (int a = 0; a < 3; ++a) {
-      min[a] = std::min(min[a], x[a] - margin);
-      max[a] = std::max(max[a], x[a] + margin);
-    }
-  }
   void take(const VectorBox& other) {
-    for (int a = 0; a < 3; ++a) {
-      min[a] = std::min(min[a], other.min[a]);
-      max[a] = std::max(max[a], other.max[a]);
-    }
+    min = lesser(min, other.min);
+    max = greater(max, other.max);
+  }
+  void take(const float (&x)[3], float margin) {
+    const Lanes place = {x[0], x[1], x[2], 0}, around = {margin, margin, margin, 0};
+    take({place - around, place + around});
   }
   bool meets(const VectorBox& other) const {
     return !any_negative<kWidth>(bits<kWidth>(other.max - min) | bits<kWidth>(max - other.min));
@@ -36,12 +35,9 @@ struct VectorBox {
 /// Whether two normals, of a box each, may face each other.
 bool may_face(const VectorBox& a, const VectorBox& b) {
   constexpr float kRounding = 1e-4f;
-  float dot = 0;  // at least
-  for (int i = 0; i < 3; ++i) {
-    dot += std::min(std::min(a.min[i] * b.min[i], a.min[i] * b.max[i]),
-                    std::min(a.max[i] * b.min[i], a.max[i] * b.max[i]));
-  }
-  return !(dot > kFacing + kRounding);
+  const Lanes least =
+      lesser(lesser(a.min * b.min, a.min * b.max), lesser(a.max * b.min, a.max * b.max));
+  return !(least[0] + least[1] + least[2] > kFacing + kRounding);
 }
 
 /// Facets of a block that lie near one another and face the same way, side by side.
@@ -135,21 +131,15 @@ int side_of(const FacetMotion& f) {
   return 2 * axis + (n[axis] < 0 ? 1 : 0);
 }
 
-/// Sorts pairs of so many facets.
-std::vector<FacetPair> sorted(const std::vector<std::vector<FacetPair>>& chunks, int count) {
-  std::vector<std::int32_t> end(count + 1, 0);
-  for (const auto& chunk : chunks) {
-    for (const FacetPair& pair : chunk) ++end[pair.first + 1];
-  }
-  for (int f = 0; f < count; ++f) end[f + 1] += end[f];
-  std::vector<FacetPair> pairs(end.back());
-  for (const auto& chunk : chunks) {
-    for (const FacetPair& pair : chunk) pairs[end[pair.first]++] = pair;
-  }
-  for (int f = 0, begin = 0; f < count; begin = end[f++]) {
-    std::sort(pairs.begin() + begin, pairs.begin() + end[f]);
-  }
-  return pairs;
+/// Sorts pairs by one of their two facets, of so many, by counting; what is equal stays in order.
+template <class Key>
+std::vector<FacetPair> sorted(const std::vector<FacetPair>& pairs, int count, const Key& key) {
+  std::vector<std::int32_t> next(count + 1, 0);
+  for (const FacetPair& pair : pairs) ++next[key(pair) + 1];
+  for (int f = 0; f < count; ++f) next[f + 1] += next[f];
+  std::vector<FacetPair> result(pairs.size());
+  for (const FacetPair& pair : pairs) result[next[key(pair)]++] = pair;
+  return result;
 }
 
 }  // namespace
@@ -184,7 +174,11 @@ std::vector<FacetPair> facing_pairs(const std::vector<FacetMotion>& facets,
       }
     }
   });
-  return sorted(chunks, static_cast<int>(facets.size()));
+  std::vector<FacetPair> pairs;
+  for (const auto& chunk : chunks) pairs.insert(pairs.end(), chunk.begin(), chunk.end());
+  const auto facet_count = static_cast<int>(facets.size());
+  pairs = sorted(pairs, facet_count, [](const FacetPair& pair) { return pair.second; });
+  return sorted(pairs, facet_count, [](const FacetPair& pair) { return pair.first; });
 }
 
 }  // namespace tissue_sim

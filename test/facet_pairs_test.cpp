@@ -1,4 +1,4 @@
-// Facets that may meet: the grid finds the pairs that a look at all of them finds.
+// Facets that may meet: the search by patches finds the pairs that a look at all of them finds.
 #include "contact/facet_pairs.h"
 
 #include <gtest/gtest.h>
@@ -28,14 +28,13 @@ std::vector<FacetPair> by_looking_at_all(const std::vector<FacetMotion>& facets,
   return pairs;
 }
 
-/// Facets all over a box; some take no part; some, of crumbs that whirled off, are farther away
-/// than there are cells of the grid.
-TEST(FacetPairs, AreThoseThatALookAtAllOfThemFinds) {
+/// Facets all over a box; some take no part; some, of crumbs that whirled off, are far away.
+std::vector<FacetMotion> scattered_facets(std::vector<float>& reach) {
   std::mt19937 random(5);
   std::uniform_real_distribution<float> place(-0.02f, 0.02f), direction(-1, 1),
       size(0.0005f, 0.004f);
   std::vector<FacetMotion> facets(600);
-  std::vector<float> reach(facets.size());
+  reach.resize(facets.size());
   for (std::size_t i = 0; i < facets.size(); ++i) {
     FacetMotion& f = facets[i];
     float length = 0;
@@ -49,10 +48,54 @@ TEST(FacetPairs, AreThoseThatALookAtAllOfThemFinds) {
     if (i % 50 == 1) f.x[i / 50 % 3] = (i % 100 == 1 ? 1 : -1) * std::pow(10.0f, 4.0f + i / 25.0f);
     if (i % 100 == 1) reach[i] = 0;
   }
+  return facets;
+}
+
+TEST(FacetPairs, AreThoseThatALookAtAllOfThemFinds) {
+  std::vector<float> reach;
+  const auto facets = scattered_facets(reach);
+  std::vector<std::int32_t> first_of_block;
+  for (int f = 0; f <= 600; f += 40) first_of_block.push_back(f);
+  first_of_block.push_back(600);  // one block has none
   Cpu cpu(2);
-  const auto pairs = facing_pairs(facets, reach, 0.006f, cpu);
+  for (const float patch : {0.001f, 0.012f, 0.1f}) {
+    const auto pairs = facing_pairs(facets, reach, first_of_block, patch, cpu);
+    EXPECT_EQ(pairs, by_looking_at_all(facets, reach));
+    EXPECT_GT(pairs.size(), 100u);
+  }
+}
+
+/// Two rough sheets over one another, as the faces of a cut, in blocks of their own: patches are
+/// full, and most of them face one other patch alone.
+TEST(FacetPairs, AreFoundBetweenTheFacesOfACut) {
+  std::mt19937 random(7);
+  std::normal_distribution<float> normal(0, 1);
+  constexpr int kAcross = 24;
+  constexpr float kCell = 0.003f;
+  std::vector<FacetMotion> facets;
+  std::vector<float> reach;
+  std::vector<std::int32_t> first_of_block = {0};
+  for (int i = 0; i < 2 * kAcross * kAcross; ++i) {
+    const int x = i % kAcross, y = i / kAcross % kAcross, side = i / kAcross / kAcross;
+    FacetMotion f = {};
+    const float at[3] = {static_cast<float>(x), static_cast<float>(y),
+                         side + 0.1f * x + std::sin(0.5f * y)};
+    float length = 0;
+    const float upward[3] = {-0.1f, -0.5f * std::cos(0.5f * y), 1};
+    for (int a = 0; a < 3; ++a) {
+      f.x[a] = kCell * (at[a] + 0.2f * normal(random));
+      f.normal[a] = (side == 0 ? 1 : -1) * upward[a] + 0.2f * normal(random);
+      length += f.normal[a] * f.normal[a];
+    }
+    for (float& n : f.normal) n /= std::sqrt(length);
+    facets.push_back(f);
+    reach.push_back(kCell * (0.9f + 0.5f * std::fabs(normal(random))));
+    if ((i + 1) % 96 == 0) first_of_block.push_back(i + 1);
+  }
+  Cpu cpu(2);
+  const auto pairs = facing_pairs(facets, reach, first_of_block, 4 * kCell, cpu);
   EXPECT_EQ(pairs, by_looking_at_all(facets, reach));
-  EXPECT_GT(pairs.size(), 100u);
+  EXPECT_GT(pairs.size(), 5000u);
 }
 
 }  // namespace

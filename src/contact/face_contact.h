@@ -18,16 +18,12 @@ namespace tissue_sim {
 struct MpmState;
 struct Pieces;
 
-inline constexpr double kNever = 1e30;  ///< [s]
-
 /// A facet against another, on the CPU.
 struct FaceContact : FaceSpring {
   CellNodes nodes, other_nodes;
   bool has_whole_rows = false, other_has_whole_rows = false;  ///< face_places.h, of these
   AxisWeights weights, other_weights;                         ///< at the facet's centre; at `hold`
-  bool is_small = false;    ///< of a small piece, which is looked at by itself as well:
-  double looked_at = 0;     ///< when last [s]
-  double look_at = kNever;  ///< when by itself next [s]
+  double looked_at = 0, look_at = 0;                          ///< when last, when next at last [s]
 };
 
 struct FaceContacts {
@@ -45,7 +41,6 @@ struct FaceContacts {
   std::vector<std::int32_t> first_of_block, of_block;
   std::vector<KeptContact> kept;            ///< sorted by point and direction
   double until_search = 0, until_look = 0;  ///< at any contact [s]
-  double look_at = 0;                       ///< at all of them, on the CPU [s]
 };
 
 /// Before a substep of `dt` seconds: searches pairs, and looks at them, when it is time to.

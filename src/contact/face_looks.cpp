@@ -7,6 +7,8 @@
 namespace tissue_sim {
 namespace {
 
+constexpr float kFarOff = 0.2f;  // of the fastest one's speed counts for what is near no face
+
 /// Lists the contacts that may touch before the next look, and for each block those it is part of.
 void list_active(MpmState& s) {
   FaceContacts& faces = s.faces;
@@ -38,10 +40,12 @@ FacetMotion motion_of(const MpmState& s, std::int32_t facet) {
 
 void look_at_due(MpmState& s, double dt, bool all) {
   FaceContacts& faces = s.faces;
-  const bool common = all || is_due(faces.look_at - s.time, dt);
+  // What is half way to its next look is looked at now, too.
   std::vector<std::int32_t> due, facets;
   for (std::size_t i = 0; i < faces.all.size(); ++i) {
-    if (common || is_due(faces.all[i].look_at - s.time, dt)) due.push_back(static_cast<int>(i));
+    const FaceContact& c = faces.all[i];
+    const double half_way = 0.5 * (c.looked_at + c.look_at);
+    if (all || is_due(half_way - s.time, dt)) due.push_back(static_cast<std::int32_t>(i));
   }
   if (!all) {
     std::vector<std::uint8_t> is_needed(faces.motion.size(), 0);
@@ -73,19 +77,15 @@ void look_at_due(MpmState& s, double dt, bool all) {
       32);
   list_active(s);
   float fastest = 0;
+  for (const float v : speed) fastest = std::max(fastest, v);
   for (std::size_t i = 0; i < due.size(); ++i) {
     FaceContact& c = faces.all[due[i]];
-    if (c.is_small) {
-      c.look_at = s.time + look_horizon(speed[i], s.scene.cell_size, dt);
-    } else {
-      fastest = std::max(fastest, speed[i]);
-    }
+    // What is near no face is a cell away at least, ten times what may be moved between looks.
+    const float v = c.other < 0 ? kFarOff * fastest : speed[i];
+    c.look_at = s.time + look_horizon(v, s.scene.cell_size, dt);
   }
-  if (common) faces.look_at = s.time + look_horizon(fastest, s.scene.cell_size, dt);
-  double next = faces.look_at;
-  for (const FaceContact& c : faces.all) {
-    if (c.is_small) next = std::min(next, c.look_at);
-  }
+  double next = s.time + kLongestLook * dt;
+  for (const FaceContact& c : faces.all) next = std::min(next, c.look_at);
   faces.until_look = next - s.time;
 }
 

@@ -96,7 +96,7 @@ TISSUE_SIM_HOST_DEVICE inline bool are_bound(const int (&from)[3], const int (&t
     if (length[a] > kFar) return false;
   }
   std::uint32_t reached = 1, above = 0;  // of this layer and the next: bit y * kRow + x
-  for (int z = 0; z <= length[2]; ++z, reached = above, above = 0) {
+  for (int z = 0; z <= length[2] && reached != 0; ++z, reached = above, above = 0) {
     for (int y = 0; y <= length[1]; ++y) {
       for (int x = 0; x <= length[0]; ++x) {
         const int at = y * kRow + x;

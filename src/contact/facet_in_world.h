@@ -25,6 +25,15 @@ struct AxisWeights {
   }
 };
 
+/// Slopes of these weights [1/cell].
+TISSUE_SIM_INLINE void slopes_at(const float (&place)[3], float (&slope)[9]) {
+  for (int a = 0; a < 3; ++a) {
+    slope[3 * a] = place[a] - 0.5f;
+    slope[3 * a + 1] = -2 * place[a];
+    slope[3 * a + 2] = place[a] + 0.5f;
+  }
+}
+
 /// How a facet stands.
 struct FacetMotion {
   float x[3], v[3];       ///< of its centre [m], [m/s]
@@ -57,11 +66,7 @@ TISSUE_SIM_INLINE void deformation_gradient(const Field& field, double cell_size
                                             const float (&place)[3], float (&F)[9]) {
   const AxisWeights w(place);
   float slope[9];
-  for (int a = 0; a < 3; ++a) {
-    slope[3 * a] = place[a] - 0.5f;
-    slope[3 * a + 1] = -2 * place[a];
-    slope[3 * a + 2] = place[a] + 0.5f;
-  }
+  slopes_at(place, slope);
   for (float& f : F) f = 0;  // first the gradient of the displacement, times the cell size
   for (int z = 0; z < 3; ++z) {
     for (int y = 0; y < 3; ++y) {
@@ -81,20 +86,16 @@ TISSUE_SIM_INLINE void deformation_gradient(const Field& field, double cell_size
   for (int i = 0; i < 9; ++i) F[i] = F[i] * per_cell + (i % 4 == 0 ? 1.0f : 0.0f);
 }
 
-/// How a facet stands whose centre has the reference place `place` [m], from the fields of
-/// displacements and velocities.
-template <class Field>
+/// How a facet stands whose centre has the reference place `place` [m], the displacement u, the
+/// velocity v and the deformation gradient F there.
 TISSUE_SIM_INLINE FacetMotion facet_motion(const Facet& facet, const double (&place)[3],
-                                           double cell_size, const Field& displacement,
-                                           const Field& velocity) {
+                                           const float (&u)[3], const float (&v)[3],
+                                           const float (&F)[9]) {
   FacetMotion m;
-  const AxisWeights weights(facet.center);
-  float u[3];
-  value_at(displacement, weights, u);
-  value_at(velocity, weights, m.v);
-  for (int a = 0; a < 3; ++a) m.x[a] = static_cast<float>(place[a] + u[a]);
-  float F[9];
-  deformation_gradient(displacement, cell_size, facet.center, F);
+  for (int a = 0; a < 3; ++a) {
+    m.x[a] = static_cast<float>(place[a] + u[a]);
+    m.v[a] = v[a];
+  }
   // cof F = J F^-T carries normals; its transpose over J is the inverse.
   float cof[9];
   for (int i = 0; i < 3; ++i) {
@@ -115,6 +116,19 @@ TISSUE_SIM_INLINE FacetMotion facet_motion(const Facet& facet, const double (&pl
   const float scale = 1 / sqrtf(fmaxf(length, 1e-20f));
   for (float& n : m.normal) n *= scale;
   return m;
+}
+
+/// The same from the fields of displacements and velocities.
+template <class Field>
+TISSUE_SIM_INLINE FacetMotion facet_motion(const Facet& facet, const double (&place)[3],
+                                           double cell_size, const Field& displacement,
+                                           const Field& velocity) {
+  const AxisWeights weights(facet.center);
+  float u[3], v[3], F[9];
+  value_at(displacement, weights, u);
+  value_at(velocity, weights, v);
+  deformation_gradient(displacement, cell_size, facet.center, F);
+  return facet_motion(facet, place, u, v, F);
 }
 
 }  // namespace tissue_sim

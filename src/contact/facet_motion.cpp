@@ -1,5 +1,7 @@
 #include "contact/facet_motion.h"
 
+#include "compute/simd.h"
+
 namespace tissue_sim {
 
 void deformation_gradient_at(const Array<float>* u, const CellNodes& nodes, double cell_size,
@@ -15,12 +17,49 @@ Vec3 reference_place(const LatticeBody& body, const Block& block, int cell,
          body.cell_size * Vec3(place[0], place[1], place[2]);
 }
 
+// As facet_motion() of two fields, but the three nodes of a row side by side: what is summed over
+// rows waits for the weights along x until the end.
 FacetMotion facet_motion(const LatticeBody& body, const Block& block, const Facet& facet,
                          const Nodes& nodes) {
   const CellNodes cell(block, facet.cell);
+  const AxisWeights weights(facet.center);
+  float slopes[9];
+  slopes_at(facet.center, slopes);
+  const float *wx = weights.of, *wy = wx + 3, *wz = wx + 6;
+  Vec<4> sum[3] = {}, along_y[3] = {}, along_z[3] = {}, velocity[3] = {};
+  for (int z = 0; z < 3; ++z) {
+    for (int y = 0; y < 3; ++y) {
+      const std::int32_t* row = cell.lowest + z * cell.plane + y * cell.pitch;
+      const bool is_whole = row[1] == row[0] + 1 && row[2] == row[0] + 2;
+      const auto of_row = [row, is_whole](const Array<float>& field) {
+        const float* f = field.data();
+        return is_whole ? load<4>(f + row[0]) : Vec<4>{f[row[0]], f[row[1]], f[row[2]], 0.0f};
+      };
+      const float w = wz[z] * wy[y], dy = wz[z] * slopes[3 + y], dz = slopes[6 + z] * wy[y];
+      for (int c = 0; c < 3; ++c) {
+        const Vec<4> u = of_row(nodes.u[c]);
+        sum[c] += w * u;
+        along_y[c] += dy * u;
+        along_z[c] += dz * u;
+        velocity[c] += w * of_row(nodes.v[c]);
+      }
+    }
+  }
+  const auto per_cell = static_cast<float>(1 / body.cell_size);
+  const auto along_x = [](const float* w, const Vec<4>& of) {
+    return w[0] * of[0] + w[1] * of[1] + w[2] * of[2];
+  };
+  float u[3], v[3], F[9];
+  for (int c = 0; c < 3; ++c) {
+    u[c] = along_x(wx, sum[c]);
+    v[c] = along_x(wx, velocity[c]);
+    F[3 * c] = per_cell * along_x(slopes, sum[c]);
+    F[3 * c + 1] = per_cell * along_x(wx, along_y[c]);
+    F[3 * c + 2] = per_cell * along_x(wx, along_z[c]);
+    F[4 * c] += 1;
+  }
   const Vec3 place = reference_place(body, block, facet.cell, facet.center);
-  return facet_motion(facet, {place[0], place[1], place[2]}, body.cell_size,
-                      CellField{nodes.u, cell}, CellField{nodes.v, cell});
+  return facet_motion(facet, {place[0], place[1], place[2]}, u, v, F);
 }
 
 }  // namespace tissue_sim

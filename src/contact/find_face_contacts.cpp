@@ -9,12 +9,11 @@
 namespace tissue_sim {
 namespace {
 
-/// Whether two facets belong to the same bit of a piece, as at an edge of it or on the two sides of
-/// a slice.
-bool are_one(const MpmState& s, const Pieces& pieces, std::int32_t a, std::int32_t b) {
-  const std::int32_t p = facet_of(s, a).point, q = facet_of(s, b).point;
-  if (pieces.of_point[p] != pieces.of_point[q]) return false;
-  const Points::Site &from = s.points.site[p], &to = s.points.site[q];
+/// Whether two facets of a piece belong to the same bit of it, as at an edge of it or on the two
+/// sides of a slice.
+bool are_one(const MpmState& s, std::int32_t a, std::int32_t b) {
+  const Points::Site &from = s.points.site[facet_of(s, a).point],
+                     &to = s.points.site[facet_of(s, b).point];
   const LatticeBody& body = s.bodies[from.body];
   return are_bound({from.x, from.y, from.z}, {to.x, to.y, to.z},
                    [&](int x, int y, int z) { return s.points.bonds[body.point(x, y, z)]; });
@@ -46,7 +45,7 @@ bool pairs_last(const FaceContacts& faces, const std::vector<float>& travel) {
 }
 
 /// How fast facets move against their mean [m/s]; -1 for those that fly and take no part.
-std::vector<float> speeds(const MpmState& s, const Pieces& pieces, const std::vector<int>& size) {
+std::vector<float> speeds(const MpmState& s, const std::vector<PieceSize>& piece) {
   const FaceContacts& faces = s.faces;
   const std::size_t count = faces.motion.size();
   const double cell = s.scene.cell_size;
@@ -56,9 +55,8 @@ std::vector<float> speeds(const MpmState& s, const Pieces& pieces, const std::ve
   std::fill_n(others.max, 3, -1e30f);
   for (std::size_t f = 0; f < count; ++f) {
     const FacetMotion& m = faces.motion[f];
-    const int points = size[pieces.of_point[facet_of(s, static_cast<std::int32_t>(f)).point]];
     const SweptBox box(m, cell);
-    if (flies(m, points, cell)) {
+    if (flies(m, piece[f].points, cell)) {
       speed[f] = -1;
       continue;
     }
@@ -89,14 +87,18 @@ bool search(MpmState& s, const Pieces& pieces) {
   FaceContacts& faces = s.faces;
   const int block_count = static_cast<int>(s.blocks.all.size());
   const auto facet_count = static_cast<std::int32_t>(faces.block_of.size());
+  std::vector<int> size(pieces.next_id, 0);
+  for (const Fragment& f : pieces.all) size[f.id] = f.point_count;
+  std::vector<PieceSize> piece(facet_count);
   s.cpu->for_each(block_count, [&](int b) {
     for (std::int32_t f = faces.first_facet[b]; f < faces.first_facet[b + 1]; ++f) {
+      const int id =
+          pieces.all.size() == 1 ? pieces.all[0].id : pieces.of_point[facet_of(s, f).point];
+      piece[f] = {id, size[id]};
       faces.motion[f] = motion_of(s, f);
     }
   });
-  std::vector<int> size(pieces.next_id, 0);
-  for (const Fragment& f : pieces.all) size[f.id] = f.point_count;
-  std::vector<float> travel = speeds(s, pieces, size);  // until the next search; first in a second
+  std::vector<float> travel = speeds(s, piece);  // until the next search; first in a second
   double fastest = 0;
   bool finite = true;
   for (const float t : travel) {
@@ -122,19 +124,22 @@ bool search(MpmState& s, const Pieces& pieces) {
     listed.skin = travel[f] < 0 ? -1 : travel[f] + kSkin * cell;
     reach[f] = travel[f] < 0 ? 0 : kSearchReach * cell + listed.skin;
   }
-  auto pairs = facing_pairs(faces.motion, reach, 3 * cell, *s.cpu);
+  auto pairs = facing_pairs(faces.motion, reach, faces.first_facet, 6 * cell, *s.cpu);
   std::vector<std::uint8_t> one(pairs.size());
   s.cpu->for_each(
       static_cast<int>(pairs.size()),
-      [&](int i) { one[i] = are_one(s, pieces, pairs[i].first, pairs[i].second); }, 64);
+      [&](int i) {
+        const auto& [a, b] = pairs[i];
+        one[i] = piece[a].id == piece[b].id && are_one(s, a, b);
+      },
+      64);
   std::size_t left = 0;
   for (std::size_t i = 0; i < pairs.size(); ++i) {
     if (one[i] == 0) pairs[left++] = pairs[i];
   }
   pairs.resize(left);
-  const auto facet_touches = [&](std::int32_t a, std::int32_t b) {
-    const int p = pieces.of_point[facet_of(s, a).point], q = pieces.of_point[facet_of(s, b).point];
-    return touches(PieceSize{p, size[p]}, PieceSize{q, size[q]});
+  const auto facet_touches = [&piece](std::int32_t a, std::int32_t b) {
+    return touches(piece[a], piece[b]);
   };
   std::vector<std::int32_t> count(facet_count, 0), contact(facet_count, -1);
   for (const auto& [a, b] : pairs) {
@@ -145,6 +150,7 @@ bool search(MpmState& s, const Pieces& pieces) {
     contact[faces.all[i].facet] = static_cast<std::int32_t>(i);
   }
   std::vector<FaceContact> all;
+  all.reserve(facet_count - std::count(count.begin(), count.end(), 0));
   faces.first_near.assign(1, 0);
   for (std::int32_t f = 0; f < facet_count; ++f) {
     if (count[f] == 0) continue;
@@ -157,7 +163,6 @@ bool search(MpmState& s, const Pieces& pieces) {
       all.back().has_whole_rows = has_whole_rows(all.back().nodes);
       all.back().weights = AxisWeights(facet_of(s, f).center);
       all.back().looked_at = s.time;
-      all.back().is_small = size[pieces.of_point[facet_of(s, f).point]] <= kMayFly;
     }
     contact[f] = static_cast<std::int32_t>(all.size() - 1);
     faces.first_near.push_back(faces.first_near.back() + count[f]);

@@ -1,30 +1,25 @@
 #include "contact/facet_motion.h"
 
+#include <algorithm>
+
 #include "compute/simd.h"
 
 namespace tissue_sim {
 
-void deformation_gradient_at(const Array<float>* u, const CellNodes& nodes, double cell_size,
-                             const float (&place)[3], float (&F)[9]) {
-  deformation_gradient(CellField{u, nodes}, cell_size, place, F);
-}
+namespace {
 
-Vec3 reference_place(const LatticeBody& body, const Block& block, int cell,
-                     const float (&place)[3]) {
-  const int z = cell / block.plane, y = cell % block.plane / block.pitch,
-            x = cell % block.plane % block.pitch;
-  return body.node_position(block.x + x, block.y + y, block.z + z) +
-         body.cell_size * Vec3(place[0], place[1], place[2]);
-}
+/// How a place in a cell stands.
+struct PlaceMotion {
+  float u[3], v[3] = {}, F[9];
+};
 
-// As facet_motion() of two fields, but the three nodes of a row side by side: what is summed over
-// rows waits for the weights along x until the end.
-FacetMotion facet_motion(const LatticeBody& body, const Block& block, const Facet& facet,
-                         const Nodes& nodes) {
-  const CellNodes cell(block, facet.cell);
-  const AxisWeights weights(facet.center);
+/// The three nodes of a row side by side: what is summed over rows waits for the weights along x
+/// until the end. Without velocities if `v` is null.
+PlaceMotion motion_at(const Array<float>* u, const Array<float>* v, const CellNodes& cell,
+                      double cell_size, const float (&place)[3]) {
+  const AxisWeights weights(place);
   float slopes[9];
-  slopes_at(facet.center, slopes);
+  slopes_at(place, slopes);
   const float *wx = weights.of, *wy = wx + 3, *wz = wx + 6;
   Vec<4> sum[3] = {}, along_y[3] = {}, along_z[3] = {}, velocity[3] = {};
   for (int z = 0; z < 3; ++z) {
@@ -37,29 +32,51 @@ FacetMotion facet_motion(const LatticeBody& body, const Block& block, const Face
       };
       const float w = wz[z] * wy[y], dy = wz[z] * slopes[3 + y], dz = slopes[6 + z] * wy[y];
       for (int c = 0; c < 3; ++c) {
-        const Vec<4> u = of_row(nodes.u[c]);
-        sum[c] += w * u;
-        along_y[c] += dy * u;
-        along_z[c] += dz * u;
-        velocity[c] += w * of_row(nodes.v[c]);
+        const Vec<4> of_u = of_row(u[c]);
+        sum[c] += w * of_u;
+        along_y[c] += dy * of_u;
+        along_z[c] += dz * of_u;
+        if (v != nullptr) velocity[c] += w * of_row(v[c]);
       }
     }
   }
-  const auto per_cell = static_cast<float>(1 / body.cell_size);
+  const auto per_cell = static_cast<float>(1 / cell_size);
   const auto along_x = [](const float* w, const Vec<4>& of) {
     return w[0] * of[0] + w[1] * of[1] + w[2] * of[2];
   };
-  float u[3], v[3], F[9];
+  PlaceMotion m;
   for (int c = 0; c < 3; ++c) {
-    u[c] = along_x(wx, sum[c]);
-    v[c] = along_x(wx, velocity[c]);
-    F[3 * c] = per_cell * along_x(slopes, sum[c]);
-    F[3 * c + 1] = per_cell * along_x(wx, along_y[c]);
-    F[3 * c + 2] = per_cell * along_x(wx, along_z[c]);
-    F[4 * c] += 1;
+    m.u[c] = along_x(wx, sum[c]);
+    m.v[c] = along_x(wx, velocity[c]);
+    m.F[3 * c] = per_cell * along_x(slopes, sum[c]);
+    m.F[3 * c + 1] = per_cell * along_x(wx, along_y[c]);
+    m.F[3 * c + 2] = per_cell * along_x(wx, along_z[c]);
+    m.F[4 * c] += 1;
   }
+  return m;
+}
+
+}  // namespace
+
+void deformation_gradient_at(const Array<float>* u, const CellNodes& nodes, double cell_size,
+                             const float (&place)[3], float (&F)[9]) {
+  std::copy_n(motion_at(u, nullptr, nodes, cell_size, place).F, 9, F);
+}
+
+Vec3 reference_place(const LatticeBody& body, const Block& block, int cell,
+                     const float (&place)[3]) {
+  const int z = cell / block.plane, y = cell % block.plane / block.pitch,
+            x = cell % block.plane % block.pitch;
+  return body.node_position(block.x + x, block.y + y, block.z + z) +
+         body.cell_size * Vec3(place[0], place[1], place[2]);
+}
+
+FacetMotion facet_motion(const LatticeBody& body, const Block& block, const Facet& facet,
+                         const Nodes& nodes) {
+  const PlaceMotion m =
+      motion_at(nodes.u, nodes.v, CellNodes(block, facet.cell), body.cell_size, facet.center);
   const Vec3 place = reference_place(body, block, facet.cell, facet.center);
-  return facet_motion(facet, {place[0], place[1], place[2]}, u, v, F);
+  return facet_motion(facet, {place[0], place[1], place[2]}, m.u, m.v, m.F);
 }
 
 }  // namespace tissue_sim

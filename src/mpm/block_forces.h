@@ -114,9 +114,10 @@ TISSUE_SIM_INLINE void forces(const Block& b, const BlockField& f, BlockScratch&
   for (int z = 0; z < b.nz + 2; ++z) {
     if (z < b.nz) {
       const std::vector<Block::Span>& filled = b.filled[z];
-      const bool all = filled.size() == 1 && filled[0].end - filled[0].begin == lanes;
-      // The uppermost plane is written, not added to, in the lanes that are filled.
-      if (!all) std::fill_n(out + kLanes + (z + 2) % 3 * l.out_plane, l.in_plane, 0.0f);
+      // The uppermost plane is written, not added to, in the lanes that are gone through.
+      if (!covers_all<W>(filled, lanes)) {
+        std::fill_n(out + kLanes + (z + 2) % 3 * l.out_plane, l.in_plane, 0.0f);
+      }
       load_plane<W>(b, l, scratch.nodes.data(), z + 2, scratch.in.data());
       if (viscous) {
         load_mean_plane<W>(b, l, scratch.velocities.data(), z + 2, scratch.in_rate.data());

@@ -12,15 +12,18 @@ namespace kernels {
 
 /// Adds the force that stabilises the block's partial cells to `force` where there is one. Returns
 /// the energy. `nodes` are displacements over cell size.
+template <int W>
 TISSUE_SIM_INLINE double stabilise_cells(const Block& b, const BlockField& f, const Layout& l,
                                          const float* nodes, float* force) {
+  constexpr int width = W == 16 ? 16 : 4, together = W == 16 ? 3 : 1;  // components side by side
   const float scale = force != nullptr ? -1.0f / f.cell_size : 1.0f;
   double twice_energy = 0;
   for (const Block::PartialCell& cell : b.partial) {
-    for (int c = 0; c < 3; ++c) {
+    for (int c = 0; c < 3; c += together) {
       float* to = force != nullptr ? force + c * b.node_count() + cell.node : nullptr;
-      twice_energy += stabilise(kStabilisation * cell.mu * scale,
-                                nodes + c * l.node_component + cell.node, l.pitch, l.plane, to);
+      twice_energy += stabilise<width>(kStabilisation * cell.mu * scale,
+                                       nodes + c * l.node_component + cell.node, l.node_component,
+                                       l.pitch, l.plane, to, b.node_count());
     }
   }
   return 0.5 * twice_energy;
@@ -111,9 +114,10 @@ TISSUE_SIM_INLINE void forces(const Block& b, const BlockField& f, BlockScratch&
   for (int z = 0; z < b.nz + 2; ++z) {
     if (z < b.nz) {
       const std::vector<Block::Span>& filled = b.filled[z];
-      const bool all = filled.size() == 1 && filled[0].end - filled[0].begin == lanes;
-      // The uppermost plane is written, not added to, in the lanes that are filled.
-      if (!all) std::fill_n(out + kLanes + (z + 2) % 3 * l.out_plane, l.in_plane, 0.0f);
+      // The uppermost plane is written, not added to, in the lanes that are gone through.
+      if (!covers_all<W>(filled, lanes)) {
+        std::fill_n(out + kLanes + (z + 2) % 3 * l.out_plane, l.in_plane, 0.0f);
+      }
       load_plane<W>(b, l, scratch.nodes.data(), z + 2, scratch.in.data());
       if (viscous) {
         load_mean_plane<W>(b, l, scratch.velocities.data(), z + 2, scratch.in_rate.data());
@@ -126,7 +130,7 @@ TISSUE_SIM_INLINE void forces(const Block& b, const BlockField& f, BlockScratch&
     }
     store_plane<W>(b, l, out, z, -inv_h, scratch.row.data(), force);
   }
-  stabilise_cells(b, f, l, scratch.nodes.data(), force);
+  stabilise_cells<W>(b, f, l, scratch.nodes.data(), force);
 }
 
 template <int W>

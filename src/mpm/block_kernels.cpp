@@ -34,6 +34,18 @@ TISSUE_SIM_INLINE void update_row(const NodeRow& row, const RowPart* parts, cons
   std::fill_n(sum, 3 * stride, 0.0f);
   for (int p = 0; p < row.part_count; ++p) {
     const RowPart& part = parts[p];
+    // A vector that the last one overlaps waits until that is in the cache: not for a node or two.
+    const int shortest = 4;
+    if (part.count < shortest) {
+      for (int c = 0; c < 3; ++c) {
+        float* to = sum + c * stride + part.begin;
+        const float* from = force + part.force + c * part.component;
+        for (int i = 0; i < shortest - 1; ++i) {
+          if (i < part.count) to[i] += from[i];
+        }
+      }
+      continue;
+    }
     for (int i = 0; i < part.count; i += W) {  // rows are short: the last lanes count nothing
       const Mask<W> counts = lanes_between<W>(0, part.count - i);
       for (int c = 0; c < 3; ++c) {

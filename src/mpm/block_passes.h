@@ -72,6 +72,18 @@ TISSUE_SIM_INLINE void for_each_filled(const Spans& spans, const F& f) {
   }
 }
 
+/// Whether these steps cover the lanes 0 .. count - 1.
+template <int W, class Spans>
+TISSUE_SIM_INLINE bool covers_all(const Spans& spans, int count) {
+  int end = 0;
+  bool any_gap = false;
+  for_each_filled<W>(spans, [&](auto width, int j) {
+    any_gap = any_gap || j != end;
+    end = j + width;
+  });
+  return !any_gap && end >= count;
+}
+
 /// x-y pass of one component for W cells: u, at the first one's lowest node of a node plane, ->
 /// q[kStressXyCount][stride].
 template <int W>
@@ -238,15 +250,20 @@ TISSUE_SIM_INLINE void xy_transpose(const float* q, int stride, int count, int m
                                     float* force) {
   const Mask<W> mask[3] = {lanes_between<W>(-m, count - m), lanes_between<W>(1 - m, count + 1 - m),
                            lanes_between<W>(2 - m, count + 2 - m)};
-  const auto at = [q, stride, m, &mask](XyQuantity k, int back) {
-    return keep<W>(mask[back], load<W>(q + k * stride + m - back));
+  const auto at = [q, stride, m](XyQuantity k, int back) {
+    return load<W>(q + k * stride + m - back);
   };
-  const Vec<W> A = kAverageSide * (at(kAA, 0) + at(kAA, 2)) + kAverageCenter * at(kAA, 1) +
-                   (at(kdA, 2) - at(kdA, 0)) + (at(kBA, 0) + at(kBA, 2)) - 2.0f * at(kBA, 1);
-  const Vec<W> d = kAverageSide * (at(kAd, 0) + at(kAd, 2)) + kAverageCenter * at(kAd, 1) +
-                   (at(kdd, 2) - at(kdd, 0)) + (at(kBd, 0) + at(kBd, 2)) - 2.0f * at(kBd, 1);
-  const Vec<W> B = kAverageSide * (at(kAB, 0) + at(kAB, 2)) + kAverageCenter * at(kAB, 1) +
-                   (at(kdB, 2) - at(kdB, 0));
+  const auto sum = [&mask](Vec<W> first, Vec<W> middle, Vec<W> last) {
+    return keep<W>(mask[0], first) + keep<W>(mask[1], middle) + keep<W>(mask[2], last);
+  };
+  const Vec<W> A = sum(kAverageSide * at(kAA, 0) - at(kdA, 0) + at(kBA, 0),
+                       kAverageCenter * at(kAA, 1) - 2.0f * at(kBA, 1),
+                       kAverageSide * at(kAA, 2) + at(kdA, 2) + at(kBA, 2));
+  const Vec<W> d = sum(kAverageSide * at(kAd, 0) - at(kdd, 0) + at(kBd, 0),
+                       kAverageCenter * at(kAd, 1) - 2.0f * at(kBd, 1),
+                       kAverageSide * at(kAd, 2) + at(kdd, 2) + at(kBd, 2));
+  const Vec<W> B = sum(kAverageSide * at(kAB, 0) - at(kdB, 0), kAverageCenter * at(kAB, 1),
+                       kAverageSide * at(kAB, 2) + at(kdB, 2));
   const Vec<W> sides = kAverageSide * A + B;
   float* row = force + m;
   store<W>(row, load<W>(row) + (sides - d));

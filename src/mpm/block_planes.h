@@ -17,6 +17,8 @@ struct Layout {
   int quantity;        ///< floats of one x-y quantity: the lanes and room for what overruns them
   int in_plane;        ///< x-y quantities of one node plane, all components
   int out_plane;       ///< the same of outgoing ones, kLanes in front
+  int sum_pitch;       ///< of the forces on a node plane: rows in whole vectors, for a vector that
+                       ///< overlaps one just stored must wait for it
   int sum_component;   ///< floats of one component of the forces on a node plane
 
   explicit Layout(const Block& b)
@@ -27,7 +29,8 @@ struct Layout {
         quantity(b.stride + kLanes),
         in_plane(3 * kStressXyCount * quantity),
         out_plane(in_plane + kLanes),
-        sum_component(b.plane + kLanes) {}
+        sum_pitch((b.pitch + kLanes - 1) / kLanes * kLanes),
+        sum_component((b.ny + 2) * sum_pitch + kLanes) {}
 };
 
 inline void reserve(Array<float>& a, std::size_t n) {
@@ -51,18 +54,20 @@ TISSUE_SIM_INLINE void scale_row(const float* from, float scale, int count, floa
 template <int W>
 TISSUE_SIM_INLINE void gather_nodes(const Block& b, const Array<float>* field, float scale,
                                     const Layout& l, float* out) {
-  for (int c = 0; c < 3; ++c) {
-    const float* from = field[c].data();
-    float* to = out + c * l.node_component;
-    for (const Block::NodeRow& row : b.node_rows) {
+  const float* from[3] = {field[0].data(), field[1].data(), field[2].data()};
+  for (const Block::NodeRow& row : b.node_rows) {
+    for (int c = 0; c < 3; ++c) {
+      float* to = out + c * l.node_component + row.local;
       if (row.node < 0) {
-        std::fill_n(to + row.local, row.count, 0.0f);
+        std::fill_n(to, row.count, 0.0f);
       } else {
-        scale_row<W>(from + row.node, scale, row.count, to + row.local);
+        scale_row<W>(from[c] + row.node, scale, row.count, to);
       }
     }
-    for (const Block::SplitNodes& s : b.split_nodes) {
-      scale_row<W>(field[c].data() + s.node, scale, s.count, to + s.local);
+  }
+  for (const Block::SplitNodes& s : b.split_nodes) {
+    for (int c = 0; c < 3; ++c) {
+      scale_row<W>(from[c] + s.node, scale, s.count, out + c * l.node_component + s.local);
     }
   }
 }
@@ -105,22 +110,25 @@ TISSUE_SIM_INLINE void load_mean_plane(const Block& b, const Layout& l, const fl
 template <int W>
 TISSUE_SIM_INLINE void store_plane(const Block& b, const Layout& l, const float* out, int z,
                                    float scale, float* sums, float* force) {
-  std::fill_n(sums, 3 * l.sum_component, 0.0f);
+  for (int c = 0; c < 3; ++c) std::fill_n(sums + c * l.sum_component, l.sum_component, 0.0f);
   for (const Block::Run& run : b.runs) {
     const float* from = out + (z % 3) * l.out_plane + kLanes + run.lane;
-    float* to = sums + run.y * l.pitch + run.x;
+    float* to = sums + run.y * l.sum_pitch + run.x;
     for_each_vector<W>(
         run.count + 2, [&](auto width, int m) __attribute__((always_inline)) {
           for (int c = 0; c < 3; ++c) {
             xy_transpose<width>(from + c * kStressXyCount * l.quantity, l.quantity, run.count, m,
-                                l.pitch, to + c * l.sum_component);
+                                l.sum_pitch, to + c * l.sum_component);
           }
         });
   }
   for (int c = 0; c < 3; ++c) {
     const float* from = sums + c * l.sum_component;
     float* to = force + (c * (b.nz + 2) + z) * l.plane;
-    for (int i = 0; i < l.plane; ++i) to[i] = scale * from[i];
+    for (int y = 0; y < b.ny + 2; ++y) {
+      scale_row<W>(from + y * l.sum_pitch, scale, l.pitch, to + y * l.pitch);
+    }
+    std::fill(to + (b.ny + 2) * l.pitch, to + l.plane, 0.0f);
   }
 }
 

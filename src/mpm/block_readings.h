@@ -223,7 +223,7 @@ TISSUE_SIM_INLINE BlockState state(const Block& b, const BlockField& f, BlockScr
         }
       });
   BlockState& result = read.block;
-  result.elastic_energy = stabilise_cells(b, f, Layout(b), scratch.nodes.data(), nullptr);
+  result.elastic_energy = stabilise_cells<W>(b, f, Layout(b), scratch.nodes.data(), nullptr);
   for (const double e : read.energy) result.elastic_energy += e;
   result.finite = result.finite && std::isfinite(result.elastic_energy);
   return result;

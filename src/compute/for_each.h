@@ -7,6 +7,8 @@
 #include <tbb/parallel_invoke.h>
 #include <tbb/task_arena.h>
 
+#include "compute/flush_denormals.h"
+
 namespace tissue_sim {
 
 /// The CPU with a number of threads (0 for all that the process may use).
@@ -16,16 +18,18 @@ class Cpu {
   int threads() { return arena_.max_concurrency(); }
 
   /// Calls f(i) for each i in [0, n), `grain` at a time on a thread. Which thread does what is
-  /// open: for the same bits, f(i) writes only what is i's.
+  /// open: for the same bits, f(i) writes only what is i's. Denormal numbers count as zero.
   template <class F>
   void for_each(int n, const F& f, int grain = 1) {
     if (threads() == 1) {
+      const FlushDenormals flush;
       for (int i = 0; i < n; ++i) f(i);
       return;
     }
     arena_.execute([&] {
       tbb::parallel_for(tbb::blocked_range<int>(0, n, grain),
                         [&](const tbb::blocked_range<int>& r) {
+                          const FlushDenormals flush;
                           for (int i = r.begin(); i < r.end(); ++i) f(i);
                         });
     });

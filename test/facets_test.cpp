@@ -28,7 +28,7 @@ Misfit misfit(const MpmState& s, const std::vector<Vec3>& normals, const Vec3& p
   for (const Block* block : s.blocks.all) {
     const LatticeBody& body = s.bodies[block->body];
     for (const Facet& facet : block->facets) {
-      const int x = block->x + facet.cell % block->plane % block->pitch,
+      const int x = block->cell_x(facet.cell % block->plane % block->pitch),
                 y = block->y + facet.cell % block->plane / block->pitch,
                 z = block->z + facet.cell / block->plane;
       if (x == 0 || y == 0 || z == 0 || x + 1 == body.nx || y + 1 == body.ny || z + 1 == body.nz) {

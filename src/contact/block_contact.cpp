@@ -24,13 +24,20 @@ bool comes_before(const Touch& a, const Touch& b) {
   return std::tie(a.collider, a.cell, a.sub) < std::tie(b.collider, b.cell, b.sub);
 }
 
-/// Lane of the first point of the cell that holds a site, -1 where the block has no such cell.
-int first_lane(const Block& block, const Points::Site& site) {
-  const int x = site.x / 2 - block.x, y = site.y / 2 - block.y, z = site.z / 2 - block.z;
+/// The place of a point in its cell: x + 2 y + 4 z.
+int sub_position(const Points::Site& site) {
+  return (site.x & 1) + 2 * (site.y & 1) + 4 * (site.z & 1);
+}
+
+/// Lane of the first point of the cell in which the block has a point, -1 where it has it not.
+int first_lane(const Block& block, std::int32_t point, const Points::Site& site) {
+  const int y = site.y / 2 - block.y, z = site.z / 2 - block.z;
   if (z < 0 || z >= block.nz) return -1;
   for (const Block::Run& run : block.runs) {
-    if (run.y == y && x >= run.x && x < run.x + run.count) {
-      return 8 * z * block.stride + run.lane + x - run.x;
+    const int i = site.x / 2 - block.cell_x(run.x), lane = 8 * z * block.stride + run.lane + i;
+    if (run.y == y && i >= 0 && i < run.count &&
+        block.point[lane + sub_position(site) * block.stride] == point) {
+      return lane;
     }
   }
   return -1;
@@ -113,10 +120,9 @@ void list_contacts(MpmState& state) {
     for (int b = state.blocks.origin[i].begin; b < state.blocks.origin[i].end; ++b) {
       for (Touch touch : before[b]) {
         const Points::Site& site = state.points.site[touch.point];
-        const int cell = first_lane(block, site);
-        touch.sub = static_cast<std::uint8_t>((site.x & 1) + 2 * (site.y & 1) + 4 * (site.z & 1));
-        if (cell < 0 || block.point[cell + touch.sub * block.stride] != touch.point) continue;
-        touch.cell = cell;
+        touch.cell = first_lane(block, touch.point, site);
+        if (touch.cell < 0) continue;
+        touch.sub = static_cast<std::uint8_t>(sub_position(site));
         touches.push_back(touch);
       }
     }

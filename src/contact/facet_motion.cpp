@@ -67,7 +67,7 @@ Vec3 reference_place(const LatticeBody& body, const Block& block, int cell,
                      const float (&place)[3]) {
   const int z = cell / block.plane, y = cell % block.plane / block.pitch,
             x = cell % block.plane % block.pitch;
-  return body.node_position(block.x + x, block.y + y, block.z + z) +
+  return body.node_position(block.cell_x(x), block.y + y, block.z + z) +
          body.cell_size * Vec3(place[0], place[1], place[2]);
 }
 

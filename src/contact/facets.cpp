@@ -246,7 +246,7 @@ std::vector<Facet> facets_of(const LatticeBody& body, const Points& points, cons
     for (const Block::Run& run : block.runs) {
       for (int i = 0; i < run.count; ++i) {
         const int lane = run.lane + i;
-        const int x = block.x + run.x + i, y = block.y + run.y;
+        const int x = block.cell_x(run.x) + i, y = block.y + run.y;
         if (known.is_bare(x, y, block.z + z)) continue;
         const int cell = z * block.plane + block.cell[lane];
         std::int32_t around[8];

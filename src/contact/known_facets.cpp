@@ -17,7 +17,7 @@ KnownFacets::KnownFacets(const LatticeBody& body, const BlockRegion& region,
     }
   }
   const auto cell_of = [this](const Block& b, const Facet& f) {
-    return index(b.x + f.cell % b.plane % b.pitch, b.y + f.cell % b.plane / b.pitch,
+    return index(b.cell_x(f.cell % b.plane % b.pitch), b.y + f.cell % b.plane / b.pitch,
                  b.z + f.cell / b.plane);
   };
   first_.assign(count + 1, 0);

@@ -5,6 +5,7 @@
 // or the side of an oblique cut, costs the cells that it has.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <vector>
 
@@ -19,15 +20,23 @@ inline constexpr int kLanes = 16;  ///< rows are padded for the widest instructi
 struct Block {
   int body = 0;
   int x = 0, y = 0, z = 0;     ///< first cell, in cells of the body's lattice
-  int nx = 0, ny = 0, nz = 0;  ///< cells
+  int nx = 0, ny = 0, nz = 0;  ///< cells; nx: columns of nodes but two
+
+  /// Tissue on one side of a cut, or a piece of it. Sides that are worked on together have columns
+  /// of nodes of their own, side by side along x.
+  struct Side {
+    int column;  ///< the first
+    int x;       ///< the cell whose lowest nodes are there, in cells of the body's lattice
+  };
+  std::vector<Side> sides;  ///< by `column`; the first is 0, and its cell x
 
   int pitch = 0;   ///< nx + 2
   int stride = 0;  ///< lanes of one z-plane of cells: those of the runs, padded to whole kLanes
   int plane =
       0;  ///< nodes of one z-plane, (ny + 2) * pitch, one that is none and some to fill lanes
 
-  /// Cells (x .. x + count - 1, y), in the lanes from `lane` on; the same in each z-plane. In order
-  /// of lanes, rows and cells.
+  /// Cells of one side with their lowest nodes in the columns x .. x + count - 1 of row y, in the
+  /// lanes from `lane` on; the same in each z-plane. In order of lanes, rows and columns.
   struct Run {
     int x, y, count, lane;
   };
@@ -96,6 +105,17 @@ struct Block {
   std::size_t force_offset = 0;  ///< of this block's [3][nz + 2][plane] in the force buffer
 
   int node_count() const { return (nz + 2) * plane; }
+  /// That of `sides` which has a column of nodes.
+  const Side& side_at(int column) const {
+    return *(std::upper_bound(sides.begin() + 1, sides.end(), column,
+                              [](int c, const Side& side) { return c < side.column; }) -
+             1);
+  }
+  /// The cell whose lowest nodes are in a column, in cells of the body's lattice along x.
+  int cell_x(int column) const {
+    const Side& side = side_at(column);
+    return side.x + column - side.column;
+  }
   std::size_t lane_count() const { return static_cast<std::size_t>(nz) * 8 * stride; }
 };
 

@@ -136,7 +136,7 @@ void fill_regions(Blocks& blocks, const std::vector<int>& some,
   cpu.for_each(count, [&](int i) {
     BlockRegion& r = blocks.regions[some[i]];
     if (!r.blocks.empty()) known[i] = {bodies[r.body], r, blocks.stale_facets};
-    fill_region(r, bodies, points, fields, blocks.one_material);
+    fill_region(r, bodies, points, fields, blocks.uniform);
   });
   std::vector<std::pair<Block*, const KnownFacets*>> made;
   for (int i = 0; i < count; ++i) {
@@ -153,7 +153,7 @@ void fill_regions(Blocks& blocks, const std::vector<int>& some,
 Blocks make_blocks(const std::vector<LatticeBody>& bodies, const Points& points,
                    const NodeFields& fields, const BlockShape& shape, Cpu& cpu) {
   Blocks blocks;
-  blocks.one_material = shape.one_material;
+  blocks.uniform = shape.uniform;
   blocks.has_rows = shape.has_rows;
   for (std::size_t i = 0; i < bodies.size(); ++i) {
     const LatticeBody& b = bodies[i];

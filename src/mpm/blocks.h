@@ -33,8 +33,8 @@ struct RowPart {
 
 struct Blocks {
   std::vector<BlockRegion> regions;
-  std::vector<Block*> all;                     ///< in a fixed order
-  bool one_material = false, has_rows = true;  ///< see BlockShape
+  std::vector<Block*> all;                ///< in a fixed order
+  bool uniform = false, has_rows = true;  ///< see BlockShape
   /// Of each, the blocks before the last update_blocks() that had its points.
   struct Origin {
     int begin, end;
@@ -55,8 +55,9 @@ struct Blocks {
 struct BlockShape {
   int x = 48;  ///< at most
   int y = 8, z = 4;
-  bool one_material = false;  ///< a block for each of the materials: the GPU's kernels know one
-  bool has_rows = true;       ///< and parts: the GPU has its own tables of how forces come together
+  bool uniform = false;  ///< a block for each side of a cut and each material: the GPU's kernels
+                         ///< know one of both
+  bool has_rows = true;  ///< and parts: the GPU has its own tables of how forces come together
 };
 
 /// Cuts the bodies' lattices into regions and makes their blocks.

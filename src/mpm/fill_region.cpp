@@ -12,16 +12,33 @@
 namespace tissue_sim {
 namespace {
 
-/// Runs of the cells that hold points in any z-plane, gaps of up to kGap cells bridged.
-/// `holds` is [ny][nx].
-std::vector<Block::Run> runs_of(const std::vector<bool>& holds, int nx, int ny) {
+/// A sheet and the region's cells that it needs.
+struct Part {
+  const Sheet* sheet;
+  int lo[3] = {1 << 30, 1 << 30, 1 << 30}, hi[3] = {-1, -1, -1};
+
+  explicit Part(const Sheet& of) : sheet(&of) {
+    for (const CellShare& c : of.cells) {
+      const int first[3] = {c.x, c.y, c.z}, last[3] = {c.x + c.cells - 1, c.y, c.z};
+      for (int a = 0; a < 3; ++a) {
+        lo[a] = std::min(lo[a], first[a]);
+        hi[a] = std::max(hi[a], last[a]);
+      }
+    }
+  }
+};
+
+/// Runs of the cells that hold points in any z-plane, gaps of up to kGap cells bridged where they
+/// are of one side. `holds` is [ny][nx].
+std::vector<Block::Run> runs_of(const Block& block, const std::vector<bool>& holds) {
   std::vector<Block::Run> runs;
   int lane = 0;
-  for (int y = 0; y < ny; ++y) {
-    for (int x = 0; x < nx; ++x) {
-      if (!holds[y * nx + x]) continue;
+  for (int y = 0; y < block.ny; ++y) {
+    for (int x = 0; x < block.nx; ++x) {
+      if (!holds[y * block.nx + x]) continue;
       Block::Run* last = runs.empty() || runs.back().y != y ? nullptr : &runs.back();
-      if (last == nullptr || x - (last->x + last->count) > kGap) {
+      if (last == nullptr || x - (last->x + last->count) > kGap ||
+          &block.side_at(x) != &block.side_at(last->x)) {
         runs.push_back({x, y, 0, lane});
         last = &runs.back();
       }
@@ -34,66 +51,46 @@ std::vector<Block::Run> runs_of(const std::vector<bool>& holds, int nx, int ny) 
 
 /// Fills the block's nodes and rows of them.
 void find_nodes(Block& block, const LatticeBody& b) {
-  std::vector<Block::Span> seen(block.ny + 2, {block.pitch, 0});  // by the runs, in each row
+  const std::size_t sides = block.sides.size();
+  std::vector<Block::Span> seen((block.ny + 2) * sides, {block.pitch, 0});  // by the runs
   for (const Block::Run& run : block.runs) {
+    const auto side = static_cast<std::size_t>(&block.side_at(run.x) - block.sides.data());
     for (int y = run.y; y < run.y + 3; ++y) {
-      seen[y].begin = std::min(seen[y].begin, run.x);
-      seen[y].end = std::max(seen[y].end, run.x + run.count + 2);
+      Block::Span& s = seen[y * sides + side];
+      s = {std::min(s.begin, run.x), std::max(s.end, run.x + run.count + 2)};
     }
   }
   block.node.assign(block.node_count(), -1);
   for (int z = 0; z < block.nz + 2; ++z) {
-    for (int y = 0; y < block.ny + 2; ++y) {
-      const int row = z * block.plane + y * block.pitch, x0 = block.x - 1;
-      int next = seen[y].begin;
+    for (int i = 0; i < (block.ny + 2) * static_cast<int>(sides); ++i) {
+      const int y = i / static_cast<int>(sides), row = z * block.plane + y * block.pitch;
+      const Block::Side& side = block.sides[i % sides];
+      const int end_of_side = i % sides + 1 < sides ? (&side)[1].column : block.pitch;
+      const int x0 = side.x - 1 - side.column;
+      int next = seen[i].begin;
       const auto add = [&](int end, int node, int stretch) {
         if (end > next) block.node_rows.push_back({row + next, end - next, node, stretch});
         next = std::max(next, end);
       };
-      b.for_each_node_in_row(x0, x0 + block.pitch, block.y + y - 1, block.z + z - 1,
+      b.for_each_node_in_row(x0 + side.column, x0 + end_of_side, block.y + y - 1, block.z + z - 1,
                              [&](int x, int node, int count, int stretch) {
                                const int begin = x - x0, end = begin + count;
                                const auto to = block.node.begin() + row + begin;
                                std::iota(to, to + count, node);
-                               add(std::min(begin, seen[y].end), -1, -1);
-                               add(std::min(end, seen[y].end), node + next - begin, stretch);
+                               add(std::min(begin, seen[i].end), -1, -1);
+                               add(std::min(end, seen[i].end), node + next - begin, stretch);
                              });
-      add(seen[y].end, -1, -1);
+      add(seen[i].end, -1, -1);
     }
   }
 }
 
-/// The block of a sheet, no larger than its points need.
-Block make_block(const BlockRegion& r, const LatticeBody& b, const Points& points,
-                 const Sheet& sheet) {
-  int lo[3] = {1 << 30, 1 << 30, 1 << 30}, hi[3] = {-1, -1, -1};
-  for (const CellShare& c : sheet.cells) {
-    const int first[3] = {c.x, c.y, c.z}, last[3] = {c.x + c.cells - 1, c.y, c.z};
-    for (int a = 0; a < 3; ++a) {
-      lo[a] = std::min(lo[a], first[a]);
-      hi[a] = std::max(hi[a], last[a]);
-    }
-  }
-  Block block;
-  block.body = r.body;
-  block.x = r.x + lo[0];
-  block.y = r.y + lo[1];
-  block.z = r.z + lo[2];
-  block.nx = hi[0] - lo[0] + 1;
-  block.ny = hi[1] - lo[1] + 1;
-  block.nz = hi[2] - lo[2] + 1;
-  std::vector<bool> holds(block.nx * block.ny, false);
-  for (const CellShare& c : sheet.cells) {
-    std::fill_n(holds.begin() + (c.y - lo[1]) * block.nx + c.x - lo[0], c.cells, true);
-  }
-  block.runs = runs_of(holds, block.nx, block.ny);
-  lay_out(block);
-  std::vector<int> lane_of(block.nx * block.ny, -1);
-  for (const Block::Run& run : block.runs) {
-    for (int i = 0; i < run.count; ++i) lane_of[run.y * block.nx + run.x + i] = run.lane + i;
-  }
-  for (const CellShare& c : sheet.cells) {
-    const int column = lane_of[(c.y - lo[1]) * block.nx + c.x - lo[0]], z = c.z - lo[2];
+/// Puts the part's points into the lanes of the block, lane_of[ny][nx].
+void fill_side(Block& block, const LatticeBody& b, const Points& points, const Part& part,
+               const Block::Side& side, int first_y, const std::vector<int>& lane_of) {
+  for (const CellShare& c : part.sheet->cells) {
+    const int x = side.column + c.x - part.lo[0], z = c.z - part.lo[2];
+    const int column = lane_of[(c.y - first_y) * block.nx + x];
     double mu = 0;
     for (int s = 0; s < 8; ++s) {
       if (c.point[s] < 0) continue;
@@ -110,26 +107,72 @@ Block make_block(const BlockRegion& r, const LatticeBody& b, const Points& point
     block.partial.push_back(
         {z * block.stride + column, z * block.plane + block.cell[column], static_cast<float>(mu)});
   }
+}
+
+/// The nodes of row y of z-plane z that are split, as a side sees them.
+void split_row(Block& block, const BlockRegion& r, const Part& part, const Block::Side& side, int y,
+               int z) {
+  const std::vector<std::int32_t>& field = part.sheet->node;
+  if (field.empty()) return;
+  const int first = ((part.lo[2] + z) * (r.ny + 2) + block.y - r.y + y) * (r.nx + 2) + part.lo[0];
+  Block::SplitNodes* last = nullptr;
+  for (int x = 0; x < part.hi[0] - part.lo[0] + 3; ++x) {
+    const int local = z * block.plane + y * block.pitch + side.column + x;
+    const std::int32_t node = field[first + x];
+    if (node == -1 || node == block.node[local]) continue;
+    block.node[local] = node;
+    if (last != nullptr && last->local + last->count == local && last->node + last->count == node) {
+      ++last->count;
+      continue;
+    }
+    block.split_nodes.push_back({local, node, 1});
+    last = &block.split_nodes.back();
+  }
+}
+
+/// The block of parts between the same z-planes, no larger than their points need.
+Block make_block(const BlockRegion& r, const LatticeBody& b, const Points& points,
+                 const std::vector<Part>& parts) {
+  int first_y = 1 << 30, last_y = -1, columns = 0;
+  Block block;
+  block.body = r.body;
+  for (const Part& part : parts) {
+    first_y = std::min(first_y, part.lo[1]);
+    last_y = std::max(last_y, part.hi[1]);
+    block.sides.push_back({columns, r.x + part.lo[0]});
+    columns += part.hi[0] - part.lo[0] + 3;
+  }
+  block.x = block.sides[0].x;
+  block.y = r.y + first_y;
+  block.z = r.z + parts[0].lo[2];
+  block.nx = columns - 2;
+  block.ny = last_y - first_y + 1;
+  block.nz = parts[0].hi[2] - parts[0].lo[2] + 1;
+  std::vector<bool> holds(block.nx * block.ny, false);
+  for (std::size_t i = 0; i < parts.size(); ++i) {
+    for (const CellShare& c : parts[i].sheet->cells) {
+      const int x = block.sides[i].column + c.x - parts[i].lo[0];
+      std::fill_n(holds.begin() + (c.y - first_y) * block.nx + x, c.cells, true);
+    }
+  }
+  block.runs = runs_of(block, holds);
+  lay_out(block);
+  std::vector<int> lane_of(block.nx * block.ny, -1);
+  for (const Block::Run& run : block.runs) {
+    for (int i = 0; i < run.count; ++i) lane_of[run.y * block.nx + run.x + i] = run.lane + i;
+  }
+  for (std::size_t i = 0; i < parts.size(); ++i) {
+    fill_side(block, b, points, parts[i], block.sides[i], first_y, lane_of);
+  }
   find_filled(block);
   std::sort(block.partial.begin(), block.partial.end(),
             [](const auto& p, const auto& q) { return p.lane < q.lane; });
   find_materials(block, b, points);
   find_nodes(block, b);
-  for (int z = 0; z < block.nz + 2 && !sheet.node.empty(); ++z) {
+  for (int z = 0; z < block.nz + 2; ++z) {
     for (int y = 0; y < block.ny + 2; ++y) {
-      Block::SplitNodes* last = nullptr;  // of this row
-      for (int x = 0; x < block.pitch; ++x) {
-        const int local = z * block.plane + y * block.pitch + x;
-        const int n = ((lo[2] + z) * (r.ny + 2) + lo[1] + y) * (r.nx + 2) + lo[0] + x;
-        if (sheet.node[n] == -1 || sheet.node[n] == block.node[local]) continue;
-        block.node[local] = sheet.node[n];
-        if (last != nullptr && last->local + last->count == local &&
-            last->node + last->count == sheet.node[n]) {
-          ++last->count;
-          continue;
-        }
-        block.split_nodes.push_back({local, sheet.node[n], 1});
-        last = &block.split_nodes.back();
+      for (std::size_t i = 0; i < parts.size(); ++i) {
+        split_row(block, r, parts[i], block.sides[i], y, z);
       }
     }
   }
@@ -164,18 +207,33 @@ std::vector<Sheet> by_material(const Sheet& sheet, const LatticeBody& b, const P
 }  // namespace
 
 void fill_region(BlockRegion& r, const std::vector<LatticeBody>& bodies, const Points& points,
-                 const NodeFields& fields, bool one_material) {
+                 const NodeFields& fields, bool uniform) {
   r.blocks.clear();
   const LatticeBody& b = bodies[r.body];
+  std::vector<std::vector<Part>> together;
   const auto add = [&](const Sheet& sheet) {
-    if (!sheet.cells.empty()) r.blocks.push_back(make_block(r, b, points, sheet));
-  };
-  for (const Sheet& sheet : sheets_of(r, b, points, fields)) {
-    if (!one_material || b.materials.size() == 1) {
-      add(sheet);
-      continue;
+    if (sheet.cells.empty()) return;
+    const Part part(sheet);
+    const auto same = std::find_if(together.begin(), together.end(), [&](const auto& parts) {
+      return !uniform && parts[0].lo[2] == part.lo[2] && parts[0].hi[2] == part.hi[2];
+    });
+    if (same != together.end()) {
+      same->push_back(part);
+    } else {
+      together.push_back({part});
     }
-    for (const Sheet& part : by_material(sheet, b, points)) add(part);
+  };
+  std::vector<Sheet> sheets = sheets_of(r, b, points, fields);
+  if (uniform && b.materials.size() > 1) {
+    std::vector<Sheet> of_one;
+    for (const Sheet& sheet : sheets) {
+      for (Sheet& part : by_material(sheet, b, points)) of_one.push_back(std::move(part));
+    }
+    sheets = std::move(of_one);
+  }
+  for (const Sheet& sheet : sheets) add(sheet);
+  for (const std::vector<Part>& parts : together) {
+    r.blocks.push_back(make_block(r, b, points, parts));
   }
 }
 

@@ -7,9 +7,9 @@ namespace tissue_sim {
 
 inline constexpr int kGap = 2;  ///< cells: a new run costs about as much as so many
 
-/// Makes the region's blocks, each no larger than its points need, without facets; with
-/// `one_material`, one for each of the materials of a mixed one.
+/// Makes the region's blocks, without facets: one for the sides of cuts that reach from the same
+/// z-plane to the same, or with `uniform` one for each side and material.
 void fill_region(BlockRegion& r, const std::vector<LatticeBody>& bodies, const Points& points,
-                 const NodeFields& fields, bool one_material);
+                 const NodeFields& fields, bool uniform);
 
 }  // namespace tissue_sim

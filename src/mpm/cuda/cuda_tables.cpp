@@ -190,7 +190,7 @@ void CudaMpmTissue::push_tables() {
 void CudaMpmTissue::make_blocks(bool may_march) {
   OnDevice& d = *device_;
   d.shape = choose_shape(state_->bodies, d.limits, may_march);
-  d.shape.blocks.one_material = true;
+  d.shape.blocks.uniform = true;
   d.shape.blocks.has_rows = false;
   state_->blocks = tissue_sim::make_blocks(state_->bodies, state_->points, *state_->fields,
                                            d.shape.blocks, *state_->cpu);

@@ -16,7 +16,7 @@ struct Case {
   int cuts;
   const char* instruction_set;
   enum { kOne, kOneLaw, kBothLaws } materials = kOne;
-  bool by_material = false;  // in blocks of one material, as the GPU has them
+  bool uniform = false;  // blocks of one side and material, as the GPU has them
 };
 
 std::ostream& operator<<(std::ostream& out, const Case& c) {
@@ -35,7 +35,7 @@ Scene scene_of(const Case& c, Shape shape) {
   return scene;
 }
 
-void block_by_material(MpmState& s) {
+void make_uniform_blocks(MpmState& s) {
   s.blocks = make_blocks(s.bodies, s.points, *s.fields, {16, 4, 4, true}, *s.cpu);
   s.force.resize(s.blocks.force_size);
   s.contacts.touching.assign(s.blocks.all.size(), {});
@@ -48,7 +48,7 @@ TEST_P(Substep, AgreesWithBruteForce) {
   for (const Shape shape : {Shape::kBox, Shape::kEllipsoid}) {
     MpmTissue tissue(scene_of(GetParam(), shape));
     MpmState& state = tissue.state();
-    if (GetParam().by_material) block_by_material(state);
+    if (GetParam().uniform) make_uniform_blocks(state);
     deform(state);
     const Vec3 middle(0.0155, 0.0145, 0.0085);
     if (GetParam().cuts > 0) {

@@ -25,8 +25,8 @@ struct Block {
   /// Tissue on one side of a cut, or a piece of it. Sides that are worked on together have columns
   /// of nodes of their own, side by side along x.
   struct Side {
-    int column;  ///< the first
-    int x;       ///< the cell whose lowest nodes are there, in cells of the body's lattice
+    int column, count;
+    int x;  ///< the cell with its lowest nodes in the first, in cells of the body's lattice
   };
   std::vector<Side> sides;  ///< by `column`; the first is 0, and its cell x
 

@@ -17,10 +17,11 @@ TISSUE_SIM_INLINE void add_reference(const Block& b, const BlockField& f, const 
   for (int z = 0; z < b.nz + 2; ++z) {
     for (int y = 0; y < b.ny + 2; ++y) {
       float* row = nodes + z * l.plane + y * l.pitch;
-      for (std::size_t s = 0; s < b.sides.size(); ++s) {
-        const int column = b.sides[s].column, from_first = b.sides[s].x - b.x - column;
-        const int end = s + 1 < b.sides.size() ? b.sides[s + 1].column : l.pitch;
-        for (int x = column; x < end; ++x) row[x] += f.origin[0] + (from_first + x) * f.cell_size;
+      for (const Block::Side& side : b.sides) {
+        const int first = side.x - b.x;
+        for (int x = 0; x < side.count; ++x) {
+          row[side.column + x] += f.origin[0] + (first + x) * f.cell_size;
+        }
       }
       for (int x = 0; x < l.pitch; ++x) {
         row[x + l.node_component] += f.origin[1] + y * f.cell_size;

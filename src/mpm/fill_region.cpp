@@ -54,7 +54,7 @@ void find_nodes(Block& block, const LatticeBody& b) {
   const std::size_t sides = block.sides.size();
   std::vector<Block::Span> seen((block.ny + 2) * sides, {block.pitch, 0});  // by the runs
   for (const Block::Run& run : block.runs) {
-    const auto side = static_cast<std::size_t>(&block.side_at(run.x) - block.sides.data());
+    const std::ptrdiff_t side = &block.side_at(run.x) - block.sides.data();
     for (int y = run.y; y < run.y + 3; ++y) {
       Block::Span& s = seen[y * sides + side];
       s = {std::min(s.begin, run.x), std::max(s.end, run.x + run.count + 2)};
@@ -62,17 +62,16 @@ void find_nodes(Block& block, const LatticeBody& b) {
   }
   block.node.assign(block.node_count(), -1);
   for (int z = 0; z < block.nz + 2; ++z) {
-    for (int i = 0; i < (block.ny + 2) * static_cast<int>(sides); ++i) {
-      const int y = i / static_cast<int>(sides), row = z * block.plane + y * block.pitch;
+    for (std::size_t i = 0; i < seen.size(); ++i) {
+      const int y = static_cast<int>(i / sides), row = z * block.plane + y * block.pitch;
       const Block::Side& side = block.sides[i % sides];
-      const int end_of_side = i % sides + 1 < sides ? (&side)[1].column : block.pitch;
       const int x0 = side.x - 1 - side.column;
       int next = seen[i].begin;
       const auto add = [&](int end, int node, int stretch) {
         if (end > next) block.node_rows.push_back({row + next, end - next, node, stretch});
         next = std::max(next, end);
       };
-      b.for_each_node_in_row(x0 + side.column, x0 + end_of_side, block.y + y - 1, block.z + z - 1,
+      b.for_each_node_in_row(side.x - 1, side.x - 1 + side.count, block.y + y - 1, block.z + z - 1,
                              [&](int x, int node, int count, int stretch) {
                                const int begin = x - x0, end = begin + count;
                                const auto to = block.node.begin() + row + begin;
@@ -116,7 +115,7 @@ void split_row(Block& block, const BlockRegion& r, const Part& part, const Block
   if (field.empty()) return;
   const int first = ((part.lo[2] + z) * (r.ny + 2) + block.y - r.y + y) * (r.nx + 2) + part.lo[0];
   Block::SplitNodes* last = nullptr;
-  for (int x = 0; x < part.hi[0] - part.lo[0] + 3; ++x) {
+  for (int x = 0; x < side.count; ++x) {
     const int local = z * block.plane + y * block.pitch + side.column + x;
     const std::int32_t node = field[first + x];
     if (node == -1 || node == block.node[local]) continue;
@@ -139,8 +138,8 @@ Block make_block(const BlockRegion& r, const LatticeBody& b, const Points& point
   for (const Part& part : parts) {
     first_y = std::min(first_y, part.lo[1]);
     last_y = std::max(last_y, part.hi[1]);
-    block.sides.push_back({columns, r.x + part.lo[0]});
-    columns += part.hi[0] - part.lo[0] + 3;
+    block.sides.push_back({columns, part.hi[0] - part.lo[0] + 3, r.x + part.lo[0]});
+    columns += block.sides.back().count;
   }
   block.x = block.sides[0].x;
   block.y = r.y + first_y;

@@ -105,7 +105,7 @@ def follow(session, seconds, launch):
         elif time.monotonic() - moved > PATIENCE:
             raise Failure("the simulation stands still at %.2f s" % last)
         show(session, seconds)
-        time.sleep(pause)
+        time.sleep(min(pause, max(0.05, seconds - session.state.time)))
     show(session, seconds)
     print()
 

@@ -7,6 +7,9 @@
 #include <tbb/parallel_invoke.h>
 #include <tbb/task_arena.h>
 
+#include <atomic>
+#include <thread>
+
 #include "compute/flush_denormals.h"
 
 namespace tissue_sim {
@@ -34,6 +37,19 @@ class Cpu {
                         });
     });
   }
+  /// Calls f() on each thread: see SharedWork.
+  template <class F>
+  void on_each_thread(const F& f) {
+    const auto flushed = [&f](int) {
+      const FlushDenormals flush;
+      f();
+    };
+    if (threads() == 1) {
+      flushed(0);
+      return;
+    }
+    arena_.execute([&] { tbb::parallel_for(0, threads(), flushed, tbb::static_partitioner()); });
+  }
   /// Calls f and g, side by side where there are threads: neither may write what the other one
   /// reads.
   template <class F, class G>
@@ -48,6 +64,30 @@ class Cpu {
 
  private:
   tbb::task_arena arena_;
+};
+
+/// f(i) for each i in [0, n), which threads take one after the other, `grain` at a time. One such
+/// work may follow another without a barrier between them.
+class SharedWork {
+ public:
+  SharedWork(int n, int grain) : n_(n), grain_(grain) {}
+  /// Calls f(i) for what no thread has begun.
+  template <class F>
+  void help(const F& f) {
+    for (int begin; (begin = begun_.fetch_add(grain_)) < n_;) {
+      const int end = begin + grain_ < n_ ? begin + grain_ : n_;
+      for (int i = begin; i < end; ++i) f(i);
+      done_.fetch_add(end - begin, std::memory_order_release);
+    }
+  }
+  /// After help(): until other threads are done with what they began.
+  void wait() const {
+    while (done_.load(std::memory_order_acquire) < n_) std::this_thread::yield();
+  }
+
+ private:
+  const int n_, grain_;
+  std::atomic<int> begun_{0}, done_{0};
 };
 
 }  // namespace tissue_sim

@@ -16,9 +16,10 @@ void add_face_contacts(const MpmState& state, int index, float* force) {
     const FaceContact& c = faces.all[faces.of_block[i] / 2];
     if (!c.touching) continue;
     const bool other = faces.of_block[i] % 2 == 1;
-    const Facet& facet = facet_of(state, other ? c.other : c.facet);
+    const CellNodes& nodes = other ? c.other_nodes : c.nodes;
+    const auto cell = static_cast<int>(nodes.lowest - block.node.data());
     const float sign = other ? -1.0f : 1.0f;
-    spread(block, facet.cell, other ? c.other_weights : c.weights,
+    spread(block, cell, other ? c.other_weights : c.weights,
            {sign * c.force[0], sign * c.force[1], sign * c.force[2]}, force);
   }
 }

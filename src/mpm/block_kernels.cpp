@@ -11,55 +11,52 @@ namespace {
 
 using namespace kernels;  // NOLINT: this file is all about them
 
-/// Moves W nodes from `first` on, under the forces force[3][stride].
+/// Moves W nodes from `first` on, under the components of their forces.
 template <int W>
-TISSUE_SIM_INLINE void move_nodes(int first, const float* force, int stride,
-                                  const UpdateNode& update) {
+TISSUE_SIM_INLINE void move_nodes(int first, const Vec<W> (&force)[3], const UpdateNode& update) {
   const Vec<W> mass = load<W>(update.mass + first), inv_mass = load<W>(update.inv_mass + first);
   for (int c = 0; c < 3; ++c) {
     float *to_u = update.u[c] + first, *to_v = update.v[c] + first;
     Vec<W> u = load<W>(to_u), v = load<W>(to_v);
-    update.move(c, load<W>(force + c * stride), mass, inv_mass, u, v);
+    update.move(c, force[c], mass, inv_mass, u, v);
     store<W>(to_u, u);
     store<W>(to_v, v);
   }
 }
 
+/// The same for fewer than W.
+template <int W>
+TISSUE_SIM_INLINE void move_rest(int first, int count, const Vec<W> (&force)[3],
+                                 const UpdateNode& update) {
+  float of[3][W];
+  for (int c = 0; c < 3; ++c) store<W>(of[c], force[c]);
+  int i = 0;
+  for (; i + 4 <= count; i += 4) {
+    move_nodes<4>(first + i, {load<4>(of[0] + i), load<4>(of[1] + i), load<4>(of[2] + i)}, update);
+  }
+  for (; i < count; ++i) update(first + i, of[0][i], of[1][i], of[2][i]);
+}
+
 template <int W>
 TISSUE_SIM_INLINE void update_row(const NodeRow& row, const RowPart* parts, const float* force,
-                                  const UpdateNode& update, BlockScratch& scratch) {
-  const int stride = row.count + W;
-  reserve(scratch.row, 3 * stride);
-  float* sum = scratch.row.data();
-  std::fill_n(sum, 3 * stride, 0.0f);
-  for (int p = 0; p < row.part_count; ++p) {
-    const RowPart& part = parts[p];
-    // A vector that the last one overlaps waits until that is in the cache: not for a node or two.
-    const int shortest = 4;
-    if (part.count < shortest) {
+                                  const UpdateNode& update) {
+  for (int i = 0; i < row.count; i += W) {
+    Vec<W> sum[3] = {};
+    for (int p = 0; p < row.part_count; ++p) {
+      const int begin = parts[p].begin - i, end = begin + parts[p].count;
+      if (begin >= W || end <= 0) continue;
+      const Mask<W> counts = lanes_between<W>(begin, end);
+      const float* from = force + parts[p].force - begin;
       for (int c = 0; c < 3; ++c) {
-        float* to = sum + c * stride + part.begin;
-        const float* from = force + part.force + c * part.component;
-        for (int i = 0; i < shortest - 1; ++i) {
-          if (i < part.count) to[i] += from[i];
-        }
-      }
-      continue;
-    }
-    for (int i = 0; i < part.count; i += W) {  // rows are short: the last lanes count nothing
-      const Mask<W> counts = lanes_between<W>(0, part.count - i);
-      for (int c = 0; c < 3; ++c) {
-        float* to = sum + c * stride + part.begin + i;
-        const float* from = force + part.force + c * part.component + i;
-        store<W>(to, load<W>(to) + keep<W>(counts, load<W>(from)));
+        sum[c] += keep<W>(counts, load<W>(from + c * parts[p].component));
       }
     }
-  }
-  int i = 0;
-  for (; i + W <= row.count; i += W) move_nodes<W>(row.first_node + i, sum + i, stride, update);
-  for (; i + 4 <= row.count; i += 4) move_nodes<4>(row.first_node + i, sum + i, stride, update);
-  for (; i < row.count; ++i) {
-    update(row.first_node + i, sum[i], sum[i + stride], sum[i + 2 * stride]);
+    const int first = row.first_node + i, count = row.count - i;
+    if (count >= W) {
+      move_nodes<W>(first, sum, update);
+    } else {
+      move_rest<W>(first, count, sum, update);
+    }
   }
 }
 
@@ -84,8 +81,8 @@ TISSUE_SIM_INLINE void update_row(const NodeRow& row, const RowPart* parts, cons
     return lanes_near<W>(slabs, reach, x, y, count, near);                                        \
   }                                                                                               \
   target void update_row_##suffix(const NodeRow& row, const RowPart* parts, const float* force,   \
-                                  const UpdateNode& update, BlockScratch& s) {                    \
-    update_row<W>(row, parts, force, update, s);                                                  \
+                                  const UpdateNode& update) {                                     \
+    update_row<W>(row, parts, force, update);                                                     \
   }                                                                                               \
   target BlockState state_##suffix(const Block& b, const BlockField& f, BlockScratch& s,          \
                                    float* von_mises) {                                            \

@@ -89,8 +89,7 @@ struct BlockKernels {
   int (*lanes_near)(const LaneSlab (&slabs)[3], const LaneReach&, const float* begin,
                     const float* end, std::size_t lane_count, NearLane* near);
   /// Sums the parts of a row's force and moves its nodes on.
-  void (*update_row)(const NodeRow&, const RowPart* parts, const float* force, const UpdateNode&,
-                     BlockScratch&);
+  void (*update_row)(const NodeRow&, const RowPart* parts, const float* force, const UpdateNode&);
   /// Energy and stiffness of the block; with `von_mises` also each point's stress [Pa], one per
   /// lane.
   BlockState (*state)(const Block&, const BlockField&, BlockScratch&, float* von_mises);

@@ -39,9 +39,23 @@ std::vector<std::pair<int, int>> x_runs(const LatticeBody& b, int y0, int ny, in
   return parts;
 }
 
+void list_by_cost(Blocks& blocks) {
+  std::vector<std::size_t> cost;  // in cells; one that is stabilised counts twice
+  for (const Block* block : blocks.all) {
+    cost.push_back(block->partial.size());
+    for (const auto& plane : block->filled) {
+      for (const Block::Span& span : plane) cost.back() += span.end - span.begin;
+    }
+  }
+  blocks.by_cost.resize(cost.size());
+  std::iota(blocks.by_cost.begin(), blocks.by_cost.end(), 0);
+  std::stable_sort(blocks.by_cost.begin(), blocks.by_cost.end(),
+                   [&cost](int a, int b) { return cost[a] > cost[b]; });
+}
+
 void connect_forces(Blocks& blocks, const std::vector<LatticeBody>& bodies, int node_count) {
   blocks.all.clear();
-  blocks.force_size = 0;
+  blocks.force_size = kLanes;  // rows are read in whole vectors, which reach beyond either end
   for (BlockRegion& r : blocks.regions) {
     for (Block& b : r.blocks) {
       b.force_offset = blocks.force_size;
@@ -50,9 +64,10 @@ void connect_forces(Blocks& blocks, const std::vector<LatticeBody>& bodies, int 
       blocks.all.push_back(&b);
     }
   }
-  blocks.force_size += kLanes;  // rows are read in whole vectors
+  blocks.force_size += kLanes;
   blocks.first_split_node = lattice_node_count(bodies);
   if (!blocks.has_rows) return;
+  list_by_cost(blocks);
   struct Entry {
     int row;  // of lattice nodes, counted through all bodies; then of split ones
     RowPart part;

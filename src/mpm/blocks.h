@@ -46,6 +46,7 @@ struct Blocks {
   /// before any did.
   std::vector<std::uint8_t> stale_facets;
 
+  std::vector<int> by_cost;  ///< `all`, the largest first, so that threads end together
   std::vector<NodeRow> rows;
   std::vector<RowPart> row_parts;
   int first_split_node = 0;  ///< nodes from here on are fields that cuts made

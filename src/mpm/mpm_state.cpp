@@ -62,17 +62,21 @@ void substep(MpmState& state, float dt, std::vector<ColliderLoad>& loads) {
   state.block_loads.resize(block_count);
   FaceContacts& faces = state.faces;
   const bool list = is_list_due(state.contacts);
-  state.cpu->for_each(
-      static_cast<int>(faces.active.size()),
-      [&](int i) { push_faces(state, faces.all[faces.active[i]], dt); }, 32);
-  state.cpu->for_each(block_count, [&](int i) {
+  SharedWork pushes(static_cast<int>(faces.active.size()), 32), work(block_count, 1);
+  const auto work_on_block = [&](int i) {
     const Block& block = *blocks.all[i];
     float* force = state.force.data() + block.force_offset;
     state.kernels->forces(block, block_field(state, block), state.scratch.local(), force);
     state.block_loads[i].assign(collider_count, {});
     if (list) list_near_cells(state, i, dt);
     add_contact(state, i, dt, force, state.block_loads[i]);
-    if (!faces.active.empty()) add_face_contacts(state, i, force);
+    if (faces.active.empty()) return;
+    pushes.wait();
+    add_face_contacts(state, i, force);
+  };
+  state.cpu->on_each_thread([&] {
+    pushes.help([&](int i) { push_faces(state, faces.all[faces.active[i]], dt); });
+    work.help([&](int i) { work_on_block(blocks.by_cost[i]); });
   });
   for (const auto& of_block : state.block_loads) {
     for (std::size_t c = 0; c < of_block.size(); ++c) {
@@ -104,7 +108,7 @@ void move_nodes(MpmState& state, const NodeStep& step) {
       [&](int r) {
         const NodeRow& row = blocks.rows[r];
         state.kernels->update_row(row, blocks.row_parts.data() + row.first_part, state.force.data(),
-                                  update, state.scratch.local());
+                                  update);
       },
       64);
 }

@@ -55,6 +55,33 @@ void measure_motion(MpmState& state) {
   });
 }
 
+namespace {
+
+constexpr int kRows = 32;  // moved at a time
+
+/// Moves the nodes of a row on.
+class MoveRow {
+ public:
+  MoveRow(MpmState& state, const NodeStep& step)
+      : state_(state), update_{step, {}, {}, state.nodes.mass.data(), state.nodes.inv_mass.data()} {
+    for (int a = 0; a < 3; ++a) {
+      update_.u[a] = state.nodes.u[a].data();
+      update_.v[a] = state.nodes.v[a].data();
+    }
+  }
+  void operator()(int i) const {
+    const NodeRow& row = state_.blocks.rows[i];
+    state_.kernels->update_row(row, state_.blocks.row_parts.data() + row.first_part,
+                               state_.force.data(), update_);
+  }
+
+ private:
+  const MpmState& state_;
+  UpdateNode update_;
+};
+
+}  // namespace
+
 void substep(MpmState& state, float dt, std::vector<ColliderLoad>& loads) {
   Blocks& blocks = state.blocks;
   const int block_count = static_cast<int>(blocks.all.size());
@@ -62,7 +89,13 @@ void substep(MpmState& state, float dt, std::vector<ColliderLoad>& loads) {
   state.block_loads.resize(block_count);
   FaceContacts& faces = state.faces;
   const bool list = is_list_due(state.contacts);
-  SharedWork pushes(static_cast<int>(faces.active.size()), 32), work(block_count, 1);
+  NodeStep step;
+  step.dt = dt;
+  step.keep = static_cast<float>(std::exp(-state.scene.damping * dt));
+  for (int a = 0; a < 3; ++a) step.gravity[a] = static_cast<float>(state.scene.gravity[a]);
+  const MoveRow move_row(state, step);
+  SharedWork pushes(static_cast<int>(faces.active.size()), 32), work(block_count, 1),
+      moves(static_cast<int>(blocks.rows.size()), kRows);
   const auto work_on_block = [&](int i) {
     const Block& block = *blocks.all[i];
     float* force = state.force.data() + block.force_offset;
@@ -77,6 +110,8 @@ void substep(MpmState& state, float dt, std::vector<ColliderLoad>& loads) {
   state.cpu->on_each_thread([&] {
     pushes.help([&](int i) { push_faces(state, faces.all[faces.active[i]], dt); });
     work.help([&](int i) { work_on_block(blocks.by_cost[i]); });
+    work.wait();
+    moves.help(move_row);
   });
   for (const auto& of_block : state.block_loads) {
     for (std::size_t c = 0; c < of_block.size(); ++c) {
@@ -87,30 +122,10 @@ void substep(MpmState& state, float dt, std::vector<ColliderLoad>& loads) {
       loads[c].points += of_block[c].points;
     }
   }
-  NodeStep step;
-  step.dt = dt;
-  step.keep = static_cast<float>(std::exp(-state.scene.damping * dt));
-  for (int a = 0; a < 3; ++a) step.gravity[a] = static_cast<float>(state.scene.gravity[a]);
-  move_nodes(state, step);
 }
 
 void move_nodes(MpmState& state, const NodeStep& step) {
-  const Blocks& blocks = state.blocks;
-  Nodes& n = state.nodes;
-  UpdateNode update{step, {}, {}, n.mass.data(), n.inv_mass.data()};
-  for (int a = 0; a < 3; ++a) {
-    update.u[a] = n.u[a].data();
-    update.v[a] = n.v[a].data();
-  }
-  const int row_count = static_cast<int>(blocks.rows.size());
-  state.cpu->for_each(
-      row_count,
-      [&](int r) {
-        const NodeRow& row = blocks.rows[r];
-        state.kernels->update_row(row, blocks.row_parts.data() + row.first_part, state.force.data(),
-                                  update);
-      },
-      64);
+  state.cpu->for_each(static_cast<int>(state.blocks.rows.size()), MoveRow(state, step), kRows);
 }
 
 }  // namespace tissue_sim

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <new>
 #include <vector>
 
 namespace tissue_sim {
@@ -24,6 +25,21 @@ TEST_P(SharedWorkOn, IsDoneOnceAndBeforeWhatWaitsForIt) {
       EXPECT_EQ(second, std::vector<int>(n, 1)) << n << " by " << grain;
     }
   }
+}
+
+TEST_P(SharedWorkOn, LeavesNobodyWaitingForWhatThrew) {
+  Cpu cpu(GetParam());
+  SharedWork one(100, 1), other(100, 1);
+  const auto run = [&] {
+    cpu.on_each_thread([&] {
+      one.help([](int i) {
+        if (i == 50) throw std::bad_alloc();
+      });
+      one.wait();
+      other.help([](int) {});
+    });
+  };
+  EXPECT_THROW(run(), std::bad_alloc);
 }
 
 INSTANTIATE_TEST_SUITE_P(Threads, SharedWorkOn, ::testing::Values(1, 2, 5));

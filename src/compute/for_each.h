@@ -67,7 +67,7 @@ class Cpu {
 };
 
 /// f(i) for each i in [0, n), which threads take one after the other, `grain` at a time. One such
-/// work may follow another without a barrier between them.
+/// work may follow another without a barrier between them. What f throws leaves on_each_thread().
 class SharedWork {
  public:
   SharedWork(int n, int grain) : n_(n), grain_(grain) {}
@@ -76,8 +76,8 @@ class SharedWork {
   void help(const F& f) {
     for (int begin; (begin = begun_.fetch_add(grain_)) < n_;) {
       const int end = begin + grain_ < n_ ? begin + grain_ : n_;
+      const Part part{done_, end - begin};
       for (int i = begin; i < end; ++i) f(i);
-      done_.fetch_add(end - begin, std::memory_order_release);
     }
   }
   /// After help(): until other threads are done with what they began.
@@ -86,6 +86,12 @@ class SharedWork {
   }
 
  private:
+  /// Is done with at its end, however it ends: nobody waits for what was thrown out of it.
+  struct Part {
+    std::atomic<int>& done;
+    const int count;
+    ~Part() { done.fetch_add(count, std::memory_order_release); }
+  };
   const int n_, grain_;
   std::atomic<int> begun_{0}, done_{0};
 };

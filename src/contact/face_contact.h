@@ -35,12 +35,18 @@ struct FaceContacts {
   std::vector<FaceContact> all;           ///< of each facet that is to touch others near it
   std::vector<std::int32_t> first_near;   ///< CSR over `all`: those others
   std::vector<std::int32_t> near;
-  std::vector<std::int32_t> active;  ///< contacts that touch, or may before the next look
+  std::vector<std::int32_t> active;   ///< contacts that touch, or may before the next look
+  std::vector<std::int32_t> between;  ///< those of them whose facets are of two blocks
   /// Per block, CSR: active contacts, as 2 * contact, plus one where the block holds the other
   /// face.
   std::vector<std::int32_t> first_of_block, of_block;
   std::vector<KeptContact> kept;            ///< sorted by point and direction
   double until_search = 0, until_look = 0;  ///< at any contact [s]
+
+  void forget_active() {
+    active.clear();
+    between.clear();
+  }
 };
 
 /// Before a substep of `dt` seconds: searches pairs, and looks at them, when it is time to.
@@ -54,7 +60,8 @@ void list_facets(MpmState& state);
 /// Works out the force of a contact after a substep of `dt` seconds, and lets it slide.
 void push_faces(const MpmState& state, FaceContact& contact, float dt);
 
-/// Adds the contacts of a block to its part of the force buffer.
-void add_face_contacts(const MpmState& state, int block, float* force);
+/// Works out the forces of a block's contacts with itself, and adds them and those of its contacts
+/// with other blocks, which must be there, to its part of the force buffer.
+void add_face_contacts(MpmState& state, int block, float dt, float* force);
 
 }  // namespace tissue_sim

@@ -12,14 +12,16 @@ constexpr float kFarOff = 0.2f;  // of the fastest one's speed counts for what i
 /// Lists the contacts that may touch before the next look, and for each block those it is part of.
 void list_active(MpmState& s) {
   FaceContacts& faces = s.faces;
-  faces.active.clear();
+  faces.forget_active();
   faces.first_of_block.assign(s.blocks.all.size() + 1, 0);
   for (std::size_t i = 0; i < faces.all.size(); ++i) {
     const FaceContact& c = faces.all[i];
     if (!is_active(c)) continue;
+    const std::int32_t own = faces.block_of[c.facet], other = faces.block_of[c.other];
     faces.active.push_back(static_cast<std::int32_t>(i));
-    ++faces.first_of_block[faces.block_of[c.facet] + 1];
-    ++faces.first_of_block[faces.block_of[c.other] + 1];
+    if (own != other) faces.between.push_back(static_cast<std::int32_t>(i));
+    ++faces.first_of_block[own + 1];
+    ++faces.first_of_block[other + 1];
   }
   for (std::size_t b = 1; b < faces.first_of_block.size(); ++b) {
     faces.first_of_block[b] += faces.first_of_block[b - 1];

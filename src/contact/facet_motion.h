@@ -20,6 +20,8 @@ struct CellNodes {
   CellNodes() = default;
   CellNodes(const Block& block, int cell)
       : lowest(block.node.data() + cell), pitch(block.pitch), plane(block.plane) {}
+  /// Three nodes along x.
+  const std::int32_t* row(int y, int z) const { return lowest + z * plane + y * pitch; }
 };
 
 /// A node field around a cell: see contact/facet_in_world.h.
@@ -28,7 +30,7 @@ struct CellField {
   CellNodes nodes;
 
   TISSUE_SIM_INLINE void row(int y, int z, float (&u)[3][3]) const {
-    const std::int32_t* n = nodes.lowest + z * nodes.plane + y * nodes.pitch;
+    const std::int32_t* n = nodes.row(y, z);
     for (int c = 0; c < 3; ++c) {
       for (int x = 0; x < 3; ++x) u[c][x] = of[c][n[x]];
     }
@@ -40,15 +42,13 @@ inline void spread(const Block& block, int cell, const AxisWeights& weights, con
                    float* force) {
   const float *wx = weights.of, *wy = wx + 3, *wz = wx + 6;
   const Vec<4> along_x = {wx[0], wx[1], wx[2], 0.0f};  // the fourth node stays as it is
-  const int component = block.node_count();
-  for (int c = 0; c < 3; ++c) {
-    const Vec<4> push_x = push[c] * along_x;
-    float* plane = force + cell + c * component;
-    for (int z = 0; z < 3; ++z, plane += block.plane) {
-      for (int y = 0; y < 3; ++y) {
-        float* to = plane + y * block.pitch;
-        store<4>(to, load<4>(to) + (wz[z] * wy[y]) * push_x);
-      }
+  const Vec<4> push_x[3] = {push[0] * along_x, push[1] * along_x, push[2] * along_x};
+  const int component = block.node_count(), pitch = block.pitch, plane = block.plane;
+  for (int z = 0; z < 3; ++z) {
+    for (int y = 0; y < 3; ++y) {
+      float* to = force + cell + z * plane + y * pitch;
+      const float w = wz[z] * wy[y];
+      for (int c = 0; c < 3; ++c, to += component) store<4>(to, load<4>(to) + w * push_x[c]);
     }
   }
 }

@@ -201,7 +201,7 @@ void find_face_contacts(MpmState& s, const Pieces& pieces, double dt) {
   if (!faces.all.empty() && (searched || is_due(faces.until_look, dt))) {
     look_at_due(s, dt, searched);
   }
-  if (faces.all.empty()) faces.active.clear();
+  if (faces.all.empty()) faces.forget_active();
   faces.until_search -= dt;
   faces.until_look -= dt;
 }
@@ -242,7 +242,7 @@ void list_facets(MpmState& s) {
   faces.motion.resize(faces.block_of.size());
   faces.listed.clear();
   faces.all.clear();
-  faces.active.clear();
+  faces.forget_active();
   faces.until_search = 0;
 }
 

@@ -94,7 +94,7 @@ void substep(MpmState& state, float dt, std::vector<ColliderLoad>& loads) {
   step.keep = static_cast<float>(std::exp(-state.scene.damping * dt));
   for (int a = 0; a < 3; ++a) step.gravity[a] = static_cast<float>(state.scene.gravity[a]);
   const MoveRow move_row(state, step);
-  SharedWork pushes(static_cast<int>(faces.active.size()), 32), work(block_count, 1),
+  SharedWork pushes(static_cast<int>(faces.between.size()), 32), work(block_count, 1),
       moves(static_cast<int>(blocks.rows.size()), kRows);
   const auto work_on_block = [&](int i) {
     const Block& block = *blocks.all[i];
@@ -105,10 +105,10 @@ void substep(MpmState& state, float dt, std::vector<ColliderLoad>& loads) {
     add_contact(state, i, dt, force, state.block_loads[i]);
     if (faces.active.empty()) return;
     pushes.wait();
-    add_face_contacts(state, i, force);
+    add_face_contacts(state, i, dt, force);
   };
   state.cpu->on_each_thread([&] {
-    pushes.help([&](int i) { push_faces(state, faces.all[faces.active[i]], dt); });
+    pushes.help([&](int i) { push_faces(state, faces.all[faces.between[i]], dt); });
     work.help([&](int i) { work_on_block(blocks.by_cost[i]); });
     work.wait();
     moves.help(move_row);

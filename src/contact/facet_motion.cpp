@@ -24,7 +24,7 @@ PlaceMotion motion_at(const Array<float>* u, const Array<float>* v, const CellNo
   Vec<4> sum[3] = {}, along_y[3] = {}, along_z[3] = {}, velocity[3] = {};
   for (int z = 0; z < 3; ++z) {
     for (int y = 0; y < 3; ++y) {
-      const std::int32_t* row = cell.lowest + z * cell.plane + y * cell.pitch;
+      const std::int32_t* row = cell.row(y, z);
       const bool is_whole = row[1] == row[0] + 1 && row[2] == row[0] + 2;
       const auto of_row = [row, is_whole](const Array<float>& field) {
         const float* f = field.data();

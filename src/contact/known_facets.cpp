@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "cutting/changed_cells.h"
+
 namespace tissue_sim {
 
 KnownFacets::KnownFacets(const LatticeBody& body, const BlockRegion& region,
@@ -48,23 +50,11 @@ void mark_stale_facets(const std::vector<LatticeBody>& bodies, const Points& poi
   // A facet is fitted to bonds up to two cells away, and what is bound within two cells decides
   // which of a cell's points are in one block.
   constexpr int kReach = 2;
-  std::vector<bool> done(stale.size(), false);  // of cells: all around
-  for (const std::int32_t p : changed) {
-    const Points::Site& s = points.site[p];
-    const LatticeBody& b = bodies[s.body];
-    const int node = b.node(s.x / 2, s.y / 2, s.z / 2);
-    if (done[node]) continue;
-    done[node] = true;
-    const int x = std::max(s.x / 2 - kReach, 0), x_end = std::min(s.x / 2 + kReach + 1, b.nx);
-    const int y_end = std::min(s.y / 2 + kReach + 1, b.ny);
-    const int z_end = std::min(s.z / 2 + kReach + 1, b.nz);
-    for (int z = std::max(s.z / 2 - kReach, 0); z < z_end; ++z) {
-      for (int y = std::max(s.y / 2 - kReach, 0); y < y_end; ++y) {
-        b.for_each_node_in_row(x, x_end, y, z, [&](int, int first, int count, int) {
-          std::fill_n(stale.begin() + first, count, std::uint8_t{1});
-        });
-      }
-    }
+  for (const LatticeBody& body : bodies) {
+    const CellsAround cells(body, kReach, points, changed);
+    cells.for_each_row([&](int, int, int, int node, const std::uint8_t* near, int count) {
+      for (int i = 0; i < count; ++i) stale[node + i] |= near[i];
+    });
   }
 }
 

@@ -1,10 +1,10 @@
 #include "cutting/node_fields.h"
 
-#include <Eigen/Core>
 #include <algorithm>
 #include <utility>
 
 #include "cutting/bonds.h"
+#include "cutting/changed_cells.h"
 #include "math/bspline.h"
 
 namespace tissue_sim {
@@ -83,43 +83,14 @@ double mass_of_point(const LatticeBody& body, const Points& points, const NodeFi
 std::vector<NodeFields::Cell> cells_around(const std::vector<LatticeBody>& bodies,
                                            const Points& points,
                                            const std::vector<std::int32_t>& some) {
-  constexpr std::uint8_t kListed = 1, kDone = 2;  // itself; all around it
-  std::vector<std::uint8_t> state(lattice_node_count(bodies), 0);
-  struct Range {
-    Eigen::Array3i low = Eigen::Array3i::Constant(1 << 30), high = -low;
-  };
-  std::vector<Range> ranges(bodies.size());
-  for (const std::int32_t p : some) {
-    const Points::Site& s = points.site[p];
-    const LatticeBody& b = bodies[s.body];
-    const int x = s.x / 2, y = s.y / 2, z = s.z / 2;
-    std::uint8_t& middle = state[b.node(x, y, z)];
-    if ((middle & kDone) != 0) continue;
-    middle |= kDone;
-    Range& range = ranges[s.body];
-    range.low = range.low.min(Eigen::Array3i(x - 1, y - 1, z - 1));
-    range.high = range.high.max(Eigen::Array3i(x + 1, y + 1, z + 1));
-    for (int k = 0; k < 9; ++k) {
-      b.for_each_node_in_row(x - 1, x + 2, y + k % 3 - 1, z + k / 3 - 1,
-                             [&](int, int node, int count, int) {
-                               for (int i = 0; i < count; ++i) state[node + i] |= kListed;
-                             });
-    }
-  }
   std::vector<NodeFields::Cell> cells;
   for (std::size_t i = 0; i < bodies.size(); ++i) {
-    const Range& r = ranges[i];
-    for (int z = r.low[2]; z <= r.high[2]; ++z) {
-      for (int y = r.low[1]; y <= r.high[1]; ++y) {
-        bodies[i].for_each_node_in_row(r.low[0], r.high[0] + 1, y, z,
-                                       [&](int x, int node, int count, int) {
-                                         for (int n = 0; n < count; ++n) {
-                                           if (state[node + n] == 0) continue;
-                                           cells.push_back({static_cast<int>(i), x + n, y, z});
-                                         }
-                                       });
+    const CellsAround around(bodies[i], 1, points, some);
+    around.for_each_row([&](int x, int y, int z, int, const std::uint8_t* near, int count) {
+      for (int n = 0; n < count; ++n) {
+        if (near[n] != 0) cells.push_back({static_cast<int>(i), x + n, y, z});
       }
-    }
+    });
   }
   return cells;
 }

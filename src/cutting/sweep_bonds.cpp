@@ -1,5 +1,7 @@
 #include <algorithm>
 #include <cmath>
+#include <cstring>
+#include <utility>
 
 #include "contact/facet_motion.h"
 #include "cutting/blade_sweep.h"
@@ -12,127 +14,213 @@ namespace {
 // Points within this many cells are brought: few bonds of those that are looked at end elsewhere.
 constexpr double kBringReach = 2 * kSweepReach;
 
-/// Whether a box comes near what an edge sweeps.
-bool is_near(const Box& box, const SweptEdge& edge, double reach) {
+// Of a path of so many edges it is noted what is outside of each of them; a scalpel has two.
+constexpr std::size_t kNotedEdges = 4;
+
+/// On which sides of what an edge sweeps all of a box is, by more than `reach` [m]: NearLane's
+/// `outside`, 0 where it comes near.
+unsigned outside_of(const SweptEdge& edge, const Box& box, double reach) {
   const Vec3 middle = 0.5 * (box.min + box.max), half = 0.5 * (box.max - box.min);
-  return std::all_of(std::begin(edge.slabs), std::end(edge.slabs), [&](const Slab& slab) {
+  unsigned outside = 0;
+  for (int i = 0; i < 3; ++i) {
+    const Slab& slab = edge.slabs[i];
     const double at = slab.axis.dot(middle), extent = slab.axis.cwiseAbs().dot(half) + reach;
-    return at - extent <= slab.high && at + extent >= slab.low;
-  });
+    if (at + extent < slab.low) outside |= 1u << 2 * i;
+    if (at - extent > slab.high) outside |= 2u << 2 * i;
+  }
+  return outside;
 }
 
-/// An edge of a part of the path.
-struct NearEdge {
-  const SweepPart* part;
-  const SweptEdge* edge;
+/// A point near the sweep: its lane in its block, and where it is at the beginning and the end [m].
+struct NearPoint {
+  std::int32_t lane;
+  float at[2][3];
 };
 
-/// What is known of where a point is: NearLane::outside, and whether it was brought and is near.
-constexpr unsigned kOutside = 0x3f, kBrought = 0x40, kNear = 0x80;
+/// The same of a point.
+std::uint8_t outside_of(const SweptEdge& edge, const NearPoint& point, double by) {
+  unsigned outside = 0;
+  for (int i = 0; i < 3; ++i) {
+    const Slab& slab = edge.slabs[i];
+    const auto at = [&](const float(&x)[3]) { return slab.axis.dot(Vec3(x[0], x[1], x[2])); };
+    const auto [low, high] = std::minmax({at(point.at[0]), at(point.at[1])});
+    if (high < slab.low - by) outside |= 1u << 2 * i;
+    if (low > slab.high + by) outside |= 2u << 2 * i;
+  }
+  return static_cast<std::uint8_t>(outside);
+}
 
-/// Sweeps one path through one block at a time.
+/// An edge of a part of the path, and its number in all of it.
+struct PathEdge {
+  const SweepPart* part;
+  const SweptEdge* swept;
+  std::size_t number;
+};
+
+/// What is known of where a point is: whether it was brought, and whether it is near an edge.
+constexpr unsigned kBrought = 0x40, kNear = 0x80;
+
+/// The same byte eight times.
+constexpr std::uint64_t eight(std::uint64_t byte) { return byte * 0x0101010101010101; }
+/// The bytes of up to eight points, the first one lowest.
+std::uint64_t bytes_of(const std::uint8_t* points, int count) {
+  std::uint64_t bytes = 0;
+  count >= 8 ? std::memcpy(&bytes, points, 8) : std::memcpy(&bytes, points, count);
+  return bytes;
+}
+
+/// Sweeps one path through all tissue.
 class Sweep {
  public:
   Sweep(MpmState& state, const BladePath& path, const Array<float>* u_begin,
         const Array<float>* u_end)
-      : state_(state),
-        parts_(sweep_parts(path)),
-        one_edge_(parts_.size() == 1 && parts_[0].edges.size() == 1),
-        u_begin_(u_begin),
-        u_end_(u_end),
-        known_(state.points.size(), 0) {}
-
-  /// A block that is near edges of the path, and the lanes that are.
-  struct Passed {
-    const Block* block;
-    std::vector<NearEdge> edges;
-    std::vector<std::int32_t> lanes;
-  };
-  /// `box` is the block's, from the beginning to the end.
-  Passed passed(const Block& block, const Box& box) const {
-    const double reach = kBringReach * state_.scene.cell_size;
-    Passed result{&block, {}, {}};
+      : state_(state), parts_(sweep_parts(path)), u_begin_(u_begin), u_end_(u_end) {
     for (const SweepPart& part : parts_) {
-      for (const SweptEdge& edge : part.edges) {
-        if (is_near(box, edge, reach)) result.edges.push_back({&part, &edge});
-      }
+      for (const SweptEdge& edge : part.edges) edges_.push_back({&part, &edge, edges_.size()});
     }
-    return result;
   }
 
-  /// Fills MpmState::places and `known` for a block's points near the sweep and lists the lanes of
-  /// those that are nearest.
-  void read_places(Passed& passed) {
+  /// Lists the blocks that the path passes; `before` as in sweep_bonds(). Returns how many.
+  int list_blocks(const std::vector<BlockMotion>& before) {
+    const double reach = kBringReach * state_.scene.cell_size;
+    for (std::size_t i = 0; i < state_.blocks.all.size(); ++i) {
+      const Box& now = state_.motion[i].box;
+      const Box box{now.min.cwiseMin(before[i].box.min), now.max.cwiseMax(before[i].box.max)};
+      PassedBlock passed{state_.blocks.all[i], {}, {}, {}};
+      for (const PathEdge& edge : edges_) {
+        const unsigned outside = outside_of(*edge.swept, box, reach);
+        if (outside == 0) passed.edges.push_back(edge);
+        if (edge.number < kNotedEdges) {
+          passed.outside[edge.number] = static_cast<std::uint8_t>(outside);
+        }
+      }
+      if (!passed.edges.empty()) passed_.push_back(std::move(passed));
+    }
+    if (!passed_.empty()) {
+      known_.assign(state_.points.size(), 0);
+      if (edges_.size() <= kNotedEdges) outside_.assign(edges_.size(), known_);
+      state_.swept.resize(state_.points.size());
+    }
+    return static_cast<int>(passed_.size());
+  }
+
+  /// Finds out where the points of the i-th of these blocks are.
+  void read_places(int i) {
+    PassedBlock& passed = passed_[i];
     const Block& block = *passed.block;
     BlockScratch& scratch = state_.scratch.local();
     const std::size_t lanes = block.lane_count();
     if (scratch.values.size() < 6 * lanes) scratch.values.resize(6 * lanes);
     if (scratch.near.size() < lanes) scratch.near.resize(lanes);
-    float *end = scratch.values.data(), *begin = moves() ? end + 3 * lanes : end;
+    float *end = scratch.values.data(), *begin = u_begin_ != u_end_ ? end + 3 * lanes : end;
     const BlockField field = block_field(state_, block);
     state_.kernels->positions(block, field, u_end_, scratch, end);
-    if (moves()) state_.kernels->positions(block, field, u_begin_, scratch, begin);
+    if (begin != end) state_.kernels->positions(block, field, u_begin_, scratch, begin);
     const auto reach = static_cast<float>(kSweepReach * state_.scene.cell_size);
-    float *at_begin = state_.places[0].data(), *at_end = state_.places[1].data();
-    for (const NearEdge& edge : passed.edges) {
+    for (const PathEdge& edge : passed.edges) {
       LaneSlab slabs[3];
-      for (int i = 0; i < 3; ++i) {
-        const Slab& s = edge.edge->slabs[i];
-        slabs[i] = {
+      for (int k = 0; k < 3; ++k) {
+        const Slab& s = edge.swept->slabs[k];
+        slabs[k] = {
             {float(s.axis[0]), float(s.axis[1]), float(s.axis[2])}, float(s.low), float(s.high)};
       }
+      // Bonds from points that are near an edge lead to points that are not far.
+      const bool alone = passed.edges.size() == 1 && !outside_.empty();
       const int count = state_.kernels->lanes_near(slabs, {2 * reach, reach, 0.01f * reach}, begin,
                                                    end, lanes, scratch.near.data());
-      for (int i = 0; i < count; ++i) {
-        const NearLane& near = scratch.near[i];
+      passed.points.reserve(count);
+      for (int k = 0; k < count; ++k) {
+        const NearLane& near = scratch.near[k];
         const std::int32_t p = block.point[near.lane];
         if (p < 0) continue;
-        for (int a = 0; a < 3; ++a) {
-          at_end[3 * std::size_t(p) + a] = end[a * lanes + near.lane];
-          if (moves()) at_begin[3 * std::size_t(p) + a] = begin[a * lanes + near.lane];
+        std::uint8_t& known = known_[p];
+        known |= near.near ? kNear : 0;
+        for (std::size_t e = 0; e < outside_.size(); ++e) {
+          outside_[e][p] = e == edge.number ? near.outside : passed.outside[e];
         }
-        if (near.near && (known_[p] & kNear) == 0) passed.lanes.push_back(near.lane);
-        known_[p] |= kBrought | (near.near ? kNear : 0) | (one_edge_ ? near.outside : 0);
+        if ((known & kBrought) != 0 || (alone && !near.near)) continue;
+        known |= kBrought;
+        state_.swept[p] = {i, static_cast<std::int32_t>(passed.points.size())};
+        const float *b = begin + near.lane, *e = end + near.lane;
+        passed.points.push_back(
+            {near.lane, {{b[0], b[lanes], b[2 * lanes]}, {e[0], e[lanes], e[2 * lanes]}}});
+      }
+    }
+    if (passed.edges.size() == 1 || outside_.empty()) return;
+    for (const NearPoint& point : passed.points) {
+      for (const PathEdge& edge : passed.edges) {
+        outside_[edge.number][block.point[point.lane]] =
+            outside_of(*edge.swept, point, 0.01 * reach);
       }
     }
   }
 
-  /// The bonds that point forward from the block's points and that the path passes.
-  std::vector<BrokenBond> broken_bonds(const Passed& passed) const {
+  /// The bonds that point forward from the points of a layer across z and that the path passes.
+  std::vector<BrokenBond> broken_bonds(const LatticeBody& body, int z) const {
     std::vector<BrokenBond> broken;
-    const Block& block = *passed.block;
-    for (const std::int32_t lane : passed.lanes) {
-      const std::int32_t p = block.point[lane];
-      const Points::Site& s = state_.points.site[p];
-      for (int axis = 0; axis < 3; ++axis) {
-        if ((state_.points.bonds[p] >> (kForwardBond + axis) & 1) == 0) continue;
-        const std::int32_t q = next_point(block, lane, s, axis);
-        if ((known_[p] & known_[q] & kOutside) != 0) continue;
-        Meeting meeting;
-        if (passes(passed.edges, {place(0, p), place(0, q), place(1, p), place(1, q)}, meeting)) {
-          broken.push_back(broken_bond(block, lane, q, axis, meeting));
+    for (int y = 0; y < 2 * body.ny; ++y) {
+      body.for_each_point_in_row(0, 2 * body.nx, y, z, [&](int x, int point, int count) {
+        if (!any_near(point, count)) return;
+        add_broken(point, point + 1, count - 1, 0, broken);
+        for (int axis = 1; axis < 3; ++axis) {
+          body.for_each_point_in_row(x, x + count, y + (axis == 1), z + (axis == 2),
+                                     [&](int beside, int other, int n) {
+                                       add_broken(point + beside - x, other, n, axis, broken);
+                                     });
         }
-      }
+      });
     }
     return broken;
   }
 
  private:
-  /// The point that the one in a lane holds on to along an axis.
-  std::int32_t next_point(const Block& block, std::int32_t lane, const Points::Site& s,
-                          int axis) const {
-    if (axis == 0) return block.point[lane] + 1;  // points are numbered along x
-    const int at[3] = {s.x, s.y, s.z};
-    const std::int32_t in_cell =
-        at[axis] % 2 == 0 ? block.point[lane + (block.stride << axis)] : -1;
-    return in_cell >= 0 ? in_cell : state_.bodies[block.body].next_point(s, axis);
+  /// A block that is near edges of the path, its points that are, and where it lies beside others.
+  struct PassedBlock {
+    const Block* block;
+    std::vector<PathEdge> edges;
+    std::vector<NearPoint> points;
+    std::uint8_t outside[kNotedEdges];
+  };
+
+  bool any_near(std::int32_t point, int count) const {
+    std::uint64_t near = 0;
+    for (int i = 0; i < count; i += 8) near |= bytes_of(&known_[point + i], count - i);
+    return (near & eight(kNear)) != 0;
   }
-  bool moves() const { return u_begin_ != u_end_; }
+  /// Adds those bonds from `count` points to as many others, neighbours along an axis, that the
+  /// path passes. Eight at a time: whether the first is near and they are not both to one side.
+  void add_broken(std::int32_t point, std::int32_t other, int count, int axis,
+                  std::vector<BrokenBond>& broken) const {
+    for (int i = 0; i < count; i += 8) {
+      const auto bytes = [i, count](const auto& of, std::int32_t first) {
+        return bytes_of(of.data() + first + i, count - i);
+      };
+      std::uint64_t left = bytes(known_, point) & eight(kNear);
+      if (left == 0) continue;
+      left &= bytes(state_.points.bonds, point) << (7 - kForwardBond - axis);
+      std::uint64_t aside = outside_.empty() ? 0 : left;  // of all edges
+      for (const std::vector<std::uint8_t>& outside : outside_) {
+        aside &= (bytes(outside, point) & bytes(outside, other)) + eight(0x7f);
+      }
+      left &= ~aside;
+      for (; left != 0; left &= left - 1) {
+        const std::int32_t p = point + i + __builtin_ctzll(left) / 8, q = p + other - point;
+        const PassedBlock& passed = passed_[state_.swept[p].block];
+        Meeting meeting;
+        if (passes(passed.edges, {place(0, p), place(0, q), place(1, p), place(1, q)}, meeting)) {
+          const std::int32_t lane = passed.points[state_.swept[p].index].lane;
+          broken.push_back(broken_bond(*passed.block, lane, q, axis, meeting));
+        }
+      }
+    }
+  }
+
   /// Of a point at the beginning (0) or the end (1). Both ends of a bond must agree to the last bit
   /// on where a point is, or a cut exactly through it might miss the bonds on both sides.
   Vec3 place(int when, std::int32_t p) const {
     if ((known_[p] & kBrought) == 0) return far_place(when == 0 ? u_begin_ : u_end_, p);
-    const float* at = &state_.places[moves() ? when : 1][3 * std::size_t(p)];
+    const SweptPoint& swept = state_.swept[p];
+    const float* at = passed_[swept.block].points[swept.index].at[when];
     return {at[0], at[1], at[2]};
   }
   /// Of a point that was not brought: nothing passes it.
@@ -148,12 +236,11 @@ class Sweep {
   }
 
   /// Whether an edge passes a bond, and where the first one does.
-  bool passes(const std::vector<NearEdge>& edges, const MovingSegment& bond,
-              Meeting& meeting) const {
-    return std::any_of(edges.begin(), edges.end(), [&](const NearEdge& near) {
-      const MovingSegment then = bond.during(near.part->begin, near.part->end);
-      return (one_edge_ || !stays_aside(*near.edge, then)) &&
-             edge_passes(*near.edge, then, &meeting);
+  static bool passes(const std::vector<PathEdge>& edges, const MovingSegment& bond,
+                     Meeting& meeting) {
+    return std::any_of(edges.begin(), edges.end(), [&](const PathEdge& edge) {
+      const MovingSegment then = bond.during(edge.part->begin, edge.part->end);
+      return !stays_aside(*edge.swept, then) && edge_passes(*edge.swept, then, &meeting);
     });
   }
 
@@ -179,53 +266,33 @@ class Sweep {
 
   MpmState& state_;
   const std::vector<SweepPart> parts_;
-  const bool one_edge_;  // then NearLane::outside says what stays aside
+  std::vector<PathEdge> edges_;
   const Array<float>*u_begin_, *u_end_;
-  std::vector<std::uint8_t> known_;  // of each point: kOutside, kBrought, kNear
+  std::vector<PassedBlock> passed_;
+  std::vector<std::uint8_t> known_;  // of each point: kBrought, kNear
+  // Of each edge and point NearLane's `outside`, as far as points are brought; empty of many edges.
+  std::vector<std::vector<std::uint8_t>> outside_;
 };
 
 }  // namespace
-
-void break_bonds(MpmState& state, const std::vector<BrokenBond>& broken,
-                 std::vector<std::int32_t>& changed, CutReport& report) {
-  Points& points = state.points;
-  std::vector<std::uint64_t> lost(points.size() / 64 + 1, 0);  // a bit of each point
-  for (const BrokenBond& b : broken) {
-    break_bond(kForwardBond + b.axis, points.bonds[b.point], points.bonds[b.other]);
-    if (b.crossing.place >= 0) points.crossings.add(b.point, b.axis, b.crossing);
-    for (const std::int32_t p : {b.point, b.other}) lost[p / 64] |= std::uint64_t{1} << (p % 64);
-  }
-  report.bonds_broken += static_cast<int>(broken.size());
-  const std::size_t first = changed.size();
-  for (std::size_t i = 0; i < lost.size(); ++i) {
-    for (std::uint64_t m = lost[i]; m != 0; m &= m - 1) {
-      changed.push_back(static_cast<std::int32_t>(64 * i + __builtin_ctzll(m)));
-    }
-  }
-  report.points_separated += static_cast<int>(changed.size() - first);
-}
 
 void sweep_bonds(MpmState& state, const BladePath& path, const Array<float>* u_begin,
                  const Array<float>* u_end, const std::vector<BlockMotion>& before,
                  std::vector<std::int32_t>& changed, CutReport& report) {
   Sweep sweep(state, path, u_begin, u_end);
-  std::vector<Sweep::Passed> passed;
-  for (std::size_t i = 0; i < state.blocks.all.size(); ++i) {
-    const Box& now = state.motion[i].box;
-    passed.push_back(sweep.passed(*state.blocks.all[i], {now.min.cwiseMin(before[i].box.min),
-                                                         now.max.cwiseMax(before[i].box.max)}));
-    if (passed.back().edges.empty()) passed.pop_back();
+  const int passed = sweep.list_blocks(before);
+  if (passed == 0) return;
+  state.cpu->for_each(passed, [&](int i) { sweep.read_places(i); });
+  std::vector<std::pair<const LatticeBody*, int>> layers;
+  for (const LatticeBody& b : state.bodies) {
+    for (int z = 0; z < 2 * b.nz; ++z) layers.emplace_back(&b, z);
   }
-  const int count = static_cast<int>(passed.size());
-  if (count == 0) return;
-  const auto point_count = static_cast<std::size_t>(state.points.size());
-  state.places[1].resize(3 * point_count);
-  if (u_begin != u_end) state.places[0].resize(3 * point_count);
-  state.cpu->for_each(count, [&](int i) { sweep.read_places(passed[i]); });
-  std::vector<std::vector<BrokenBond>> of_block(count);
-  state.cpu->for_each(count, [&](int i) { of_block[i] = sweep.broken_bonds(passed[i]); });
+  std::vector<std::vector<BrokenBond>> of_layer(layers.size());
+  state.cpu->for_each(static_cast<int>(layers.size()), [&](int i) {
+    of_layer[i] = sweep.broken_bonds(*layers[i].first, layers[i].second);
+  });
   std::vector<BrokenBond> broken;
-  for (const auto& some : of_block) broken.insert(broken.end(), some.begin(), some.end());
+  for (const auto& some : of_layer) broken.insert(broken.end(), some.begin(), some.end());
   break_bonds(state, broken, changed, report);
 }
 

@@ -17,8 +17,9 @@ namespace tissue_sim {
 /// Crossings of the bonds that point forward, by point and axis (0 x, 1 y, 2 z).
 class Crossings {
  public:
+  /// Makes room for those of so many points, which add() needs.
+  void reserve(std::size_t point_count) { index_.resize(point_count, -1); }
   void add(std::int32_t point, int axis, const Crossing& crossing) {
-    if (static_cast<std::size_t>(point) >= index_.size()) index_.resize(point + 1, -1);
     if (index_[point] < 0) {
       index_[point] = static_cast<std::int32_t>(of_point_.size());
       of_point_.push_back({kNone, kNone, kNone});

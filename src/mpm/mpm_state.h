@@ -54,6 +54,11 @@ struct BlockMotion {
   double speed = 0;  ///< [m/s]
 };
 
+/// Where a sweep keeps what it knows of a point: cutting/sweep_bonds.cpp.
+struct SweptPoint {
+  std::int32_t block, index;
+};
+
 struct MpmState {
   Scene scene;
   std::vector<LatticeBody> bodies;
@@ -63,7 +68,7 @@ struct MpmState {
   Blocks blocks;
   Array<float> force;        ///< of all blocks
   Array<float> u_before[3];  ///< displacements when the frame began, where a blade may cut [m]
-  Array<float> places[2];    ///< of the points near a sweep, at its begin and end [m]
+  Array<SweptPoint> swept;   ///< of the points near a sweep, while it breaks bonds
   std::vector<BlockMotion> motion;    ///< per block; exact as of measure_motion()
   float wildest = 1;                  ///< BlockState's, of all blocks
   double time = 0;                    ///< since the beginning [s]

@@ -24,7 +24,7 @@ struct NodeRow {
   int first_node, count;
   int first_part, part_count;
 };
-inline constexpr int kSplitRow = 32;
+inline constexpr int kSplitRow = 16;
 struct RowPart {
   std::size_t force;      ///< offset of component x in the force buffer
   std::size_t component;  ///< offset to the next component

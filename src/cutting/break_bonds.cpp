@@ -10,8 +10,9 @@ void break_bonds(MpmState& state, const std::vector<BrokenBond>& broken,
   Points& points = state.points;
   std::vector<std::uint64_t> lost(points.size() / 64 + 1, 0);  // a bit of each point
   const auto is_crossed = [](const BrokenBond& b) { return b.crossing.place >= 0; };
-  if (std::any_of(broken.begin(), broken.end(), is_crossed))
+  if (std::any_of(broken.begin(), broken.end(), is_crossed)) {
     points.crossings.reserve(points.size());
+  }
   for (const BrokenBond& b : broken) {
     break_bond(kForwardBond + b.axis, points.bonds[b.point], points.bonds[b.other]);
     if (is_crossed(b)) points.crossings.add(b.point, b.axis, b.crossing);

@@ -42,6 +42,7 @@ struct FaceContacts {
   std::vector<std::int32_t> first_of_block, of_block;
   std::vector<KeptContact> kept;            ///< sorted by point and direction
   double until_search = 0, until_look = 0;  ///< at any contact [s]
+  double dt = 0;                            ///< of the last substep [s]
 
   void forget_active() {
     active.clear();

@@ -202,6 +202,12 @@ void find_face_contacts(MpmState& s, const Pieces& pieces, double dt) {
     look_at_due(s, dt, searched);
   }
   if (faces.all.empty()) faces.forget_active();
+  if (dt > faces.dt) {  // springs were made soft for a shorter substep
+    for (const std::int32_t i : faces.active) {
+      faces.all[i].soften(ContactFaces(s, i).held_mobility(), static_cast<float>(dt));
+    }
+  }
+  faces.dt = dt;
   faces.until_search -= dt;
   faces.until_look -= dt;
 }

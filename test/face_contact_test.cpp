@@ -93,6 +93,41 @@ TYPED_TEST(FaceContactOf, KeepsMomentumAndMakesNoEnergyWherePiecesCollideAndScra
   EXPECT_LT(energy, 0.9 * first) << "and scrape";
 }
 
+/// The largest k dt^2 / m of all springs, m being the mass that each moves.
+double stiffest(const MpmState& s, float dt) {
+  double largest = 0;
+  for (const FaceContact& c : s.faces.all) {
+    if (c.other < 0) continue;
+    const double moves =
+        mobility(s.nodes, c.nodes, c.weights) + mobility(s.nodes, c.other_nodes, c.other_weights);
+    largest = std::max(largest, c.stiffness * double(dt) * dt * moves);
+  }
+  return largest;
+}
+
+TYPED_TEST(FaceContactOf, SpringsAreSoftEnoughForSubstepsThatGrowLonger) {
+  for (const int before : {40, 43, 46, 49, 52}) {  // where looks are due, and between two
+    TypeParam tissue(free_box(Vec3(0.03, 0.02, 0.02), 0.002));
+    cut_now(tissue, plane_cut(Vec3(0.0151, 0.01, 0.01), Vec3(1, 0.3, 0.1)));
+    const bool first_is_left =
+        tissue.fragments()[0].centroid[0] < tissue.fragments()[1].centroid[0];
+    std::vector<Vec3> velocity = {Vec3(0.1, 0, 0), Vec3(-0.1, 0, 0)};
+    if (!first_is_left) std::swap(velocity[0], velocity[1]);
+    throw_pieces(tissue, velocity, Vec3::Zero());
+    const float dt = tissue.stable_substep(), shorter = dt / 8;
+    tissue.advance(before, shorter, {});
+    tissue.finish();
+    pull(tissue);
+    EXPECT_GT(touching(tissue.state()), 20);
+    EXPECT_LT(stiffest(tissue.state(), shorter), 0.4);
+    EXPECT_GT(stiffest(tissue.state(), dt), 0.5) << "else nothing is seen";
+    tissue.advance(1, dt, {});
+    tissue.finish();
+    pull(tissue);
+    EXPECT_LT(stiffest(tissue.state(), dt), 0.4) << "after " << before;
+  }
+}
+
 TYPED_TEST(FaceContactOf, NeverPulls) {
   TypeParam tissue(free_box(Vec3(0.03, 0.02, 0.02), 0.002));
   cut_now(tissue, plane_cut(Vec3(0.0151, 0.01, 0.01), Vec3::UnitX()));

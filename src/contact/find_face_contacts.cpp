@@ -192,6 +192,15 @@ void take_up_kept(MpmState& s, double dt) {
   faces.kept.clear();
 }
 
+/// Springs were made soft for a shorter substep.
+void soften_all(MpmState& s, double dt) {
+  for (std::size_t i = 0; i < s.faces.all.size(); ++i) {
+    FaceContact& c = s.faces.all[i];
+    if (c.other < 0) continue;
+    c.soften(ContactFaces(s, static_cast<int>(i)).held_mobility(), static_cast<float>(dt));
+  }
+}
+
 }  // namespace
 
 void find_face_contacts(MpmState& s, const Pieces& pieces, double dt) {
@@ -202,11 +211,7 @@ void find_face_contacts(MpmState& s, const Pieces& pieces, double dt) {
     look_at_due(s, dt, searched);
   }
   if (faces.all.empty()) faces.forget_active();
-  if (dt > faces.dt) {  // springs were made soft for a shorter substep
-    for (const std::int32_t i : faces.active) {
-      faces.all[i].soften(ContactFaces(s, i).held_mobility(), static_cast<float>(dt));
-    }
-  }
+  if (dt > faces.dt) soften_all(s, dt);
   faces.dt = dt;
   faces.until_search -= dt;
   faces.until_look -= dt;

@@ -49,6 +49,7 @@ struct CudaFaceFigures {
   double horizon;           ///< until the next search [s]
   double until_look;        ///< as of the last substep [s]
   float since_look;         ///< the same
+  float dt;                 ///< of the last substep [s]
   unsigned fastest;         ///< facet against the mean [m/s]
   unsigned largest_reach;   ///< [m]
   unsigned fastest_pair;    ///< of the last look [m/s]

@@ -54,13 +54,14 @@ inline __device__ __noinline__ void push_contacts(const CudaPushes c, const Cuda
   }
 }
 
-/// Looks at all contacts, whose last look was `since` seconds ago. Thread blocks meet twice at
-/// `arrived`, where they have met `met` times.
+/// Looks at all contacts, whose last look was `since` seconds ago. Springs made soft for a shorter
+/// substep are made softer. Thread blocks meet twice at `arrived`, where they have met `met` times.
 inline __device__ __noinline__ void look_at_contacts(const CudaLooks s, const CudaNodes state,
                                                      float dt, float since, unsigned* arrived,
                                                      unsigned met) {
   CudaFaceFigures& figures = *s.figures;
   const int involved = figures.involved, contacts = figures.contacts;
+  const bool longer = dt > figures.dt;
   if (blockIdx.x == 0 && threadIdx.x == 0) {
     figures.active = 0;
     figures.fastest_pair = 0;
@@ -77,6 +78,7 @@ inline __device__ __noinline__ void look_at_contacts(const CudaLooks s, const Cu
     FaceSpring spring = at;
     WarpFaces faces(s, state, spring);
     fastest = fmaxf(fastest, look(faces, spring, dt, since));
+    if (longer && spring.other >= 0) spring.soften(faces.held_mobility(), dt);
     __syncwarp();
     if (lane == 0) at = spring;
     if (!is_active(spring)) continue;
@@ -106,7 +108,8 @@ struct FaceRounds {
 
   __device__ __forceinline__ void begin(const CudaFaces& f, float dt) {
     const CudaFaceFigures& figures = *f.looks.figures;
-    next = f.look_first || figures.until_look <= 0 ? 0 : rounds_in(figures.until_look, dt);
+    const bool now = f.look_first || figures.until_look <= 0 || dt > figures.dt;
+    next = now ? 0 : rounds_in(figures.until_look, dt);
     last = 0;
     since = figures.since_look;
   }
@@ -122,6 +125,7 @@ struct FaceRounds {
   __device__ __forceinline__ void end(const CudaFaces& f, int round, float dt) const {
     f.looks.figures->until_look = (next - round) * static_cast<double>(dt);
     f.looks.figures->since_look = since_look(round, dt);
+    f.looks.figures->dt = dt;
   }
 
  private:

@@ -264,7 +264,7 @@ std::vector<std::vector<std::int32_t>> CudaMpmTissue::near_facets() const {
   const OnDevice& d = *device_;
   const FacesOnDevice& f = d.faces;
   const std::size_t count = f.facets.size();
-  std::vector<std::int32_t> first(count), size(count), near(f.near.size());
+  std::vector<std::int32_t> first(count), size(count), near(f.host_figures[0].near);
   f.first_near.download(first.data(), count, d.stream);
   f.near_count.download(size.data(), count, d.stream);
   f.near.download(near.data(), near.size(), d.stream);

@@ -153,6 +153,39 @@ TYPED_TEST(FaceContactOf, NeverPulls) {
   EXPECT_GT(std::fabs(pieces[0].velocity[0] - pieces[1].velocity[0]), 0.05);
 }
 
+/// Cells between two pieces see nodes of both, and a law may make no number of how far apart they
+/// are.
+TYPED_TEST(FaceContactOf, PiecesFarApartAreNoMatter) {
+  TypeParam tissue(free_box(Vec3(0.03, 0.03, 0.03), 0.0015));
+  cut_now(tissue, plane_cut(Vec3(0.0151, 0.0151, 0.0151), Vec3(1, 0.6, 0.3)));
+  ASSERT_EQ(tissue.fragments().size(), 2u);
+  pull(tissue);
+  MpmState& s = tissue.state();
+  const std::vector<Vec3> home = homes(s);
+  std::mt19937 random(1);
+  std::normal_distribution<double> normal;
+  std::uniform_real_distribution<double> size(-1, 3);
+  for (int i = 0; i < 200; ++i) {
+    const auto any = [&] { return Vec3(normal(random), normal(random), normal(random)); };
+    const Vec3 apart = std::pow(10, size(random)) * any().normalized();  // [m]
+    const Quat turn(Eigen::AngleAxisd(normal(random), any().normalized()));
+    for (int a = 0; a < 3; ++a) std::fill(s.nodes.v[a].begin(), s.nodes.v[a].end(), 0.0f);
+    for (int p = 0; p < s.points.size(); ++p) {
+      for (int k = 0; k < 27; ++k) {
+        const int node = s.fields->node(s.bodies[0], s.points.site[p], k);
+        const Vec3 u = turn * home[node] - home[node] + apart;
+        for (int a = 0; a < 3 && tissue.fragment_of(p) != 0; ++a) {
+          s.nodes.u[a][node] = static_cast<float>(u[a]);
+        }
+      }
+    }
+    push(tissue);
+    tissue.advance(1, 1e-6f, {});
+    const FrameResult r = tissue.finish();
+    ASSERT_TRUE(std::isfinite(r.kinetic_energy)) << apart.transpose();
+  }
+}
+
 TYPED_TEST(FaceContactOf, PiecesPressedTogetherPartWithoutResistance) {
   TypeParam tissue(free_box(Vec3(0.03, 0.02, 0.02), 0.002));
   cut_now(tissue, plane_cut(Vec3(0.0151, 0.01, 0.01), Vec3(1, 0.2, 0)));

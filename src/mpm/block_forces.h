@@ -56,6 +56,20 @@ TISSUE_SIM_INLINE void viscous_stress(const Block& b, const BlockField& f, const
   add_viscous_stress(F, rate, 0.125f * viscosity, P);
 }
 
+/// Leaves displacement gradients of 0 where there is no point: lanes between two pieces see nodes
+/// of both, and of what they are apart a law may make what is no number, which times a volume of 0
+/// stays none.
+template <int N, int W>
+TISSUE_SIM_INLINE void clear_empty(const Stiffness<N, W>& k, Vec<W> (*G)[9]) {
+  Mask<W> empty = {};  // negative where a lane is
+  for (int s = 0; s < N; ++s) empty |= bits<W>(k.mu[s]) - 1;
+  if (!any_negative<W>(empty)) return;
+  for (int s = 0; s < N; ++s) {
+    const Mask<W> is_point = ~((bits<W>(k.mu[s]) - 1) >> 31);
+    for (int i = 0; i < 9; ++i) G[s][i] = keep<W>(is_point, G[s][i]);
+  }
+}
+
 /// Stress of the cells in W lanes, from the incoming x-y quantities to the outgoing ones.
 template <int W, class Materials, bool viscous>
 TISSUE_SIM_INLINE void stress_lanes(const Block& b, const BlockField& f, const Layout& l,
@@ -71,9 +85,10 @@ TISSUE_SIM_INLINE void stress_lanes(const Block& b, const BlockField& f, const L
   constexpr int kTogether = 4;  // points whose stretch is worked out side by side
   for (int first = 0; first < 8; first += kTogether) {
     Vec<W>(*F)[9] = G + first;
-    for (int s = 0; s < kTogether; ++s) add_identity<W>(F[s]);
     const auto k = Materials::template stiffness<kTogether, W>(b, f, lane + first * l.stride);
     if (any_positive<W>(k.mu[0] + k.mu[1] + k.mu[2] + k.mu[3])) {
+      clear_empty(k, F);
+      for (int s = 0; s < kTogether; ++s) add_identity<W>(F[s]);
       Materials::template stresses<kTogether, W>(F, k, F);
     } else {
       std::fill_n(&F[0][0], kTogether * 9, Vec<W>{});

@@ -146,7 +146,8 @@ void make_rigid(const LatticeBody& body, const Points& points, const NodeFields&
                 const Crumb& of_crumb, Nodes& nodes) {
   const NodesOf crumb(body, points, fields, of_crumb);
   const Material& material = body.material_of(points, of_crumb.point[0]);
-  const double fastest_spin = kCrumbSpin * wave_speed(material) / body.cell_size;
+  const double fastest_spin =
+      kCrumbSpin * std::sqrt(material.young_modulus / material.density) / body.cell_size;
   const std::size_t count = crumb.node.size();
   std::vector<Vec3> x(count), v(count);
   double mass = 0;

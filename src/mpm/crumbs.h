@@ -30,7 +30,8 @@ inline float elastic_volume(const Points& points, std::int32_t point) {
 /// Lets the crumbs that a cut or tear made of the points `changed` move on as rigid bodies without
 /// strain. Their momentum stays, linear and angular; what else a torn thread left in their nodes, a
 /// swing of many times their size, goes. Adds the lowest point of each to `crumbs`. No crumb turns
-/// faster than kCrumbSpin wave speeds a cell: the rest goes to the tissue beside it.
+/// faster than kCrumbSpin times the speed of sound in a rod a cell, which strains it by a tenth or
+/// two: the rest goes to the tissue beside it.
 void settle_crumbs(const std::vector<LatticeBody>& bodies, const Points& points,
                    const NodeFields& fields, const std::vector<std::int32_t>& changed,
                    std::set<std::int32_t>& crumbs, Nodes& nodes);

@@ -78,15 +78,15 @@ MpmTissue::Frame MpmTissue::begin(double duration, const FrameInput& input) {
   return frame;
 }
 
-void MpmTissue::run(Frame& frame, int substeps, float dt, double from, double to) {
+int MpmTissue::run(Frame& frame, int substeps, float dt, double from, double to,
+                   std::vector<TearingPoint>& tearing) {
   MpmState& s = *state_;
   const int checks = can_tear(s) ? tear_checks(s, substeps, dt) : 0;
-  int check = 0;
   measured_ = false;
-  result_.substeps += substeps;
   result_.substep = std::max(result_.substep, static_cast<double>(dt));
-  for (int i = 0; i < substeps; ++i) {
-    const double share = from + (to - from) * (i + 1) / substeps;
+  int done = 0;
+  for (int check = 0; done < substeps && tearing.empty(); ++done) {
+    const double share = from + (to - from) * (done + 1) / substeps;
     s.colliders = frame.colliders.at(share);
     std::vector<ColliderLoad> loads(s.colliders.size());
     find_face_contacts(s, pieces_, dt);
@@ -94,61 +94,29 @@ void MpmTissue::run(Frame& frame, int substeps, float dt, double from, double to
     s.time += dt;
     frame.colliders.add_loads(share, s.colliders.data(), loads.data(), dt / frame.duration,
                               result_.loads);
-    if (checks == 0 || i + 1 != tear_check_at(check, checks, substeps)) continue;
+    if (checks == 0 || done + 1 != tear_check_at(check, checks, substeps)) continue;
     ++check;
-    const std::vector<TearingPoint> tearing = find_tearing(s);
-    if (tearing.empty()) continue;
-    if (frame.blades) cut_by_blades(frame, share);
-    if (!tear(tearing) && !frame.blades) continue;
-    measure_motion(s);
-    find_near_colliders(s, frame.reach, frame.duration);
-    frame.before = s.motion;
-    for (int a = 0; frame.blades && a < 3; ++a) s.u_before[a] = s.nodes.u[a];
+    tearing = find_tearing(s);
   }
+  result_.substeps += done;
+  return done;
 }
 
-PartEnd MpmTissue::run_part(Frame& frame, int substeps, float dt, double from, double to) {
-  save_checkpoint();
-  run(frame, substeps, dt, from, to);
-  if (to < 1 || frame.blades) {
-    measure_stiffness();
-  } else {
-    measure_energies();
-  }
-  const bool may_go_back =
-      result_.tear_report.bonds_broken == checkpoint_.result.tear_report.bonds_broken &&
-      frame.cut_to <= from;
-  if (!substep_.is_borne(*state_, modulus_, stable_substep(), dt) && may_go_back) {
-    restore_checkpoint();
-    return PartEnd::kUndone;
-  }
-  substep_.follow(*state_, modulus_);
-  return result_.blew_up ? PartEnd::kBlewUp : PartEnd::kBorne;
-}
-
-void MpmTissue::save_checkpoint() {
-  const MpmState& s = *state_;
-  for (int a = 0; a < 3; ++a) {
-    checkpoint_.u[a] = s.nodes.u[a];
-    checkpoint_.v[a] = s.nodes.v[a];
-  }
-  checkpoint_.time = s.time;
-  checkpoint_.contacts = s.contacts;
-  checkpoint_.faces = s.faces;
-  checkpoint_.result = result_;
-}
-
-void MpmTissue::restore_checkpoint() {
+void MpmTissue::tear(Frame& frame, const std::vector<TearingPoint>& tearing, double share) {
   MpmState& s = *state_;
-  for (int a = 0; a < 3; ++a) {
-    s.nodes.u[a] = checkpoint_.u[a];
-    s.nodes.v[a] = checkpoint_.v[a];
-  }
-  s.time = checkpoint_.time;
-  s.contacts = checkpoint_.contacts;
-  s.faces = checkpoint_.faces;
-  result_ = checkpoint_.result;
-  measure_stiffness();
+  const bool threads = share < 1 && may_be_wild(s) && !s.threads.empty();  // at 1, finish() does
+  if (tearing.empty() && !threads) return;
+  if (frame.blades) cut_by_blades(frame, share);
+  std::vector<std::int32_t> changed;
+  tear_bonds(s, tearing, changed, result_.tear_report);
+  if (threads) tear_threads(s, changed, result_.tear_report);
+  if (changed.empty() && !frame.blades) return;
+  take_apart(s, changed);
+  measured_ = false;
+  measure_motion(s);
+  find_near_colliders(s, frame.reach, frame.duration);
+  frame.before = s.motion;
+  for (int a = 0; frame.blades && a < 3; ++a) s.u_before[a] = s.nodes.u[a];
 }
 
 void MpmTissue::cut_by_blades(Frame& frame, double share) {
@@ -167,34 +135,24 @@ void MpmTissue::end(Frame& frame) {
 
 void MpmTissue::advance(int substeps, float dt, const FrameInput& input) {
   Frame frame = begin(static_cast<double>(substeps) * dt, input);
-  run(frame, substeps, dt, 0, 1);
+  for (int done = 0; done < substeps;) {
+    std::vector<TearingPoint> tearing;
+    done += run(frame, substeps - done, dt, static_cast<double>(done) / substeps, 1, tearing);
+    tear(frame, tearing, static_cast<double>(done) / substeps);
+  }
   end(frame);
 }
 
-void MpmTissue::advance(double duration, const FrameInput& input) {
-  Frame frame = begin(duration, input);
-  advance_in_parts(
-      duration, input, [this](const FrameInput& rest) { return substep_for(rest); },
-      [this](const FrameInput& rest, int left, double dt) {
-        return substep_.part(*state_, rest, left, dt);
-      },
-      [&](int substeps, float dt, double from, double to) {
-        return run_part(frame, substeps, dt, from, to);
-      });
-  end(frame);
-}
-
-bool MpmTissue::tear(const std::vector<TearingPoint>& tearing) {
-  std::vector<std::int32_t> changed;
-  tear_bonds(*state_, tearing, changed, result_.tear_report);
-  take_apart(*state_, changed);
-  return !changed.empty();
+bool MpmTissue::settle_wild_crumbs() {
+  MpmState& s = *state_;
+  return may_be_wild(s) &&
+         tissue_sim::settle_wild_crumbs(s.bodies, s.points, *s.fields, s.crumbs, s.nodes);
 }
 
 bool MpmTissue::tame() {
   if (result_.blew_up || !may_be_wild(*state_)) return false;
   MpmState& s = *state_;
-  const bool settled = settle_wild_crumbs(s.bodies, s.points, *s.fields, s.crumbs, s.nodes);
+  const bool settled = settle_wild_crumbs();
   std::vector<std::int32_t> changed;
   tear_threads(s, changed, result_.tear_report);
   if (changed.empty()) return settled;

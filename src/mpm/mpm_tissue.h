@@ -31,7 +31,7 @@ class MpmTissue final : public Tissue {
   const std::vector<std::string>& notes() const override { return notes_; }
 
   // For tests and the benchmark.
-  void save_checkpoint();  ///< of what a part of a frame changes, unless something is cut or tears
+  void save_checkpoint();     ///< of what a part of a frame changes until something is cut or tears
   void restore_checkpoint();  ///< and measures it
   /// The substep for the next part of a frame: SubstepChoice::longest().
   float substep_for(const FrameInput& input);
@@ -51,7 +51,7 @@ class MpmTissue final : public Tissue {
     std::vector<BlockMotion> before;  ///< when they were last looked at
   };
 
-  /// What a part of a frame changes, unless something is cut or tears.
+  /// What a part of a frame changes until something is cut or tears.
   struct Checkpoint {
     Array<float> u[3], v[3];
     double time;
@@ -61,14 +61,18 @@ class MpmTissue final : public Tissue {
   };
 
   Frame begin(double duration, const FrameInput& input);
-  PartEnd run_part(Frame& frame, int substeps, float dt, double from, double to);
-  void run(Frame& frame, int substeps, float dt, double from, double to);
+  PartRun run_part(Frame& frame, int substeps, float dt, double from, double to);
+  /// Advances by as many substeps, or until points are past their limit: these. Returns how many.
+  int run(Frame& frame, int substeps, float dt, double from, double to,
+          std::vector<TearingPoint>& tearing);
+  /// At this share of the frame; blades have cut their way before.
+  void tear(Frame& frame, const std::vector<TearingPoint>& tearing, double share);
   void cut_by_blades(Frame& frame, double share);
   void end(Frame& frame);
   void cut(const std::vector<BladePath>& paths, const Array<float>* u_before,
            const std::vector<BlockMotion>& before, CutReport& report);
-  bool tear(const std::vector<TearingPoint>& tearing);  ///< whether anything did
-  bool tame();  ///< what is wild (mpm/deformation.h), whether anything was
+  bool tame();                ///< what is wild (mpm/deformation.h), whether anything was
+  bool settle_wild_crumbs();  ///< of that, crumbs
   /// Energies and how much the tissue has stiffened, from what `read` finds of each block.
   template <class Read>
   void measure(const Read& read);

@@ -60,14 +60,18 @@ class SubstepChoice {
                             ///< were not borne
 };
 
-/// How a part of a frame ended.
+/// How a part of a frame ended, and at which share of the frame: where something tears, early.
 enum class PartEnd { kBorne, kUndone, kBlewUp };
+struct PartRun {
+  PartEnd end;
+  double reached;
+};
 
 /// Advances a frame of `duration` seconds in parts: a thread of tissue that snaps, or what a fast
 /// tool squeezes, may stiffen twofold within a frame.
 ///   substep_for(input)            the longest that is stable [s]
 ///   part(input, left, dt)         see SubstepChoice
-///   run(substeps, dt, from, to)   from and to: shares of the frame. Returns the PartEnd
+///   run(substeps, dt, from, to)   from and to: shares of the frame. Returns the PartRun
 template <class SubstepFor, class Part, class Run>
 void advance_in_parts(double duration, FrameInput input, const SubstepFor& substep_for,
                       const Part& part, const Run& run) {
@@ -76,10 +80,10 @@ void advance_in_parts(double duration, FrameInput input, const SubstepFor& subst
     const int left = std::max(1, static_cast<int>(std::ceil(time / substep_for(input))));
     const int substeps = part(input, left, time / left);
     const double to = substeps == left ? 1 : from + (1 - from) * substeps / left;
-    const PartEnd end = run(substeps, static_cast<float>(time / left), from, to);
-    if (end == PartEnd::kBlewUp) return;
-    if (end == PartEnd::kUndone) continue;
-    from = to;
+    const PartRun part_run = run(substeps, static_cast<float>(time / left), from, to);
+    if (part_run.end == PartEnd::kBlewUp) return;
+    if (part_run.end == PartEnd::kUndone) continue;
+    from = part_run.reached;
     input.cuts = {};
   }
 }

@@ -64,7 +64,7 @@ struct ColumnWalk {
       read_half(s.v + first, column.pitch, column.plane, side, rate);
       viscous_stress(body, h, rate, side, volume, damping);
     }
-    half_forces<LawOf, kViscous, kTogether>(body, h, side, volume, damping, out);
+    half_forces<LawOf, kViscous, kTogether>(body, h, side, volume, column.whole != 0, damping, out);
     const GiveWeights k(side);
     const float extra = kPartial ? stiffness(z) : 0;
 #pragma unroll
@@ -108,7 +108,7 @@ struct ColumnWalk {
         half_between(sz == 0 ? above[c] : below[c], center[c], sz == 0 ? below[c] : above[c], h[c]);
       }
       half_forces<LawOf, false, kTogether>(body, h, side, half_volumes(t, column, body, z, sz),
-                                           nullptr, out);
+                                           column.whole != 0, nullptr, out);
       const GiveWeights k(side);
 #pragma unroll
       for (int c = 0; c < 3; ++c) {

@@ -48,8 +48,11 @@ std::vector<TearingPoint> CudaMpmTissue::find_tearing() {
   return tearing;
 }
 
-void CudaMpmTissue::tear(const std::vector<TearingPoint>& tearing, const FrameInput& input,
+bool CudaMpmTissue::tear(const std::vector<TearingPoint>& tearing, const FrameInput& input,
                          double share) {
+  MpmState& s = *state_;
+  const bool threads = share < 1 && may_be_wild(s) && !s.threads.empty();  // at 1, finish() does
+  if (tearing.empty() && !threads) return false;
   const bool blades = !blades_.empty();
   if (blades) {  // what they have passed so far
     launch_measure();
@@ -58,31 +61,46 @@ void CudaMpmTissue::tear(const std::vector<TearingPoint>& tearing, const FrameIn
     cut_by_blades();
   }
   std::vector<std::int32_t> changed;
-  tear_bonds(*state_, tearing, changed, result_.tear_report);
-  if (!changed.empty()) {
-    take_apart(changed);
-    launch_measure();
-    finish_measure();
+  tear_bonds(s, tearing, changed, result_.tear_report);
+  if (threads) {
+    pull_some(nodes_around(s.threads));
+    tear_threads(s, changed, result_.tear_report);
   }
-  if (!blades) return;
-  blades_ = blade_paths(state_->scene, input, share, 1);
-  cut_to_ = share;
-  motion_before_ = state_->motion;
-  keep_place_for_blades();
+  if (changed.empty() && !blades) return false;
+  if (!changed.empty()) take_apart(changed);
+  launch_measure();
+  finish_measure();
+  if (blades) {
+    blades_ = blade_paths(state_->scene, input, share, 1);
+    cut_to_ = share;
+    motion_before_ = state_->motion;
+    keep_place_for_blades();
+  }
+  return true;
+}
+
+bool CudaMpmTissue::settle_wild_crumbs() {
+  MpmState& s = *state_;
+  if (s.crumbs.empty() || !may_be_wild(s)) return false;
+  const std::vector<std::int32_t> nodes = nodes_around({s.crumbs.begin(), s.crumbs.end()});
+  pull_some(nodes);
+  if (!tissue_sim::settle_wild_crumbs(s.bodies, s.points, *s.fields, s.crumbs, s.nodes)) {
+    return false;
+  }
+  push_some(nodes);
+  return true;
 }
 
 void CudaMpmTissue::tame() {
   if (result_.blew_up || !may_be_wild(*state_)) return;
   MpmState& s = *state_;
-  std::vector<std::int32_t> may_be(s.crumbs.begin(), s.crumbs.end());
-  may_be.insert(may_be.end(), s.threads.begin(), s.threads.end());
-  const std::vector<std::int32_t> nodes = nodes_around(may_be);
-  pull_some(nodes);
-  const bool settled = settle_wild_crumbs(s.bodies, s.points, *s.fields, s.crumbs, s.nodes);
+  const bool settled = settle_wild_crumbs();
   std::vector<std::int32_t> changed;
-  tear_threads(s, changed, result_.tear_report);
+  if (!s.threads.empty()) {
+    pull_some(nodes_around(s.threads));
+    tear_threads(s, changed, result_.tear_report);
+  }
   if (!settled && changed.empty()) return;
-  if (settled) push_some(nodes);
   if (!changed.empty()) {
     take_apart(changed);
     for (const int id : label_pieces()) result_.tear_report.new_fragments.push_back(id);

@@ -100,32 +100,32 @@ void CudaMpmTissue::begin(double duration, const FrameInput& input) {
   keep_place_for_blades();
 }
 
-void CudaMpmTissue::run(int substeps, float dt, const FrameInput& input, double from, double to) {
+int CudaMpmTissue::run(int substeps, float dt, double from, double to,
+                       std::vector<TearingPoint>& tearing) {
   OnDevice& d = *device_;
   substeps_ = substeps;
   dt_ = dt;
   from_ = from;
   to_ = to;
-  result_.substeps += substeps;
   result_.substep = std::max(result_.substep, static_cast<double>(dt));
-  if (substeps == 0) return;
+  if (substeps == 0) return 0;
   upload_colliders();
   find_near(duration_);
   const bool tears = can_tear(*state_);
   const int checks = tears ? tear_checks(*state_, substeps, dt) : 1;
-  int begin = 0;
-  for (int check = 0; check < checks; ++check) {
+  int done = 0;
+  for (int check = 0; done < substeps && tearing.empty(); ++check) {
     const int end = tear_check_at(check, checks, substeps);
-    run_substeps(begin, end, dt);
-    begin = end;
-    if (!tears) continue;
-    const std::vector<TearingPoint> tearing = find_tearing();
-    if (tearing.empty()) continue;
-    tear(tearing, input, from + (to - from) * end / substeps);
-    find_near(duration_);
+    run_substeps(done, end, dt);
+    done = end;
+    if (tears) tearing = find_tearing();
   }
+  to_ = share_of(done - 1);
+  substeps_ = done;
+  result_.substeps += done;
   d.host_loads.resize(d.loads.size());
   d.loads.download(d.host_loads.data(), d.loads.size(), d.stream);
+  return done;
 }
 
 void CudaMpmTissue::sum_loads() {
@@ -151,7 +151,14 @@ void CudaMpmTissue::sum_loads() {
 
 void CudaMpmTissue::advance(int substeps, float dt, const FrameInput& input) {
   begin(static_cast<double>(substeps) * dt, input);
-  run(substeps, dt, input, 0, 1);
+  for (int done = 0; done < substeps;) {
+    std::vector<TearingPoint> tearing;
+    done += run(substeps - done, dt, static_cast<double>(done) / substeps, 1, tearing);
+    if (done == substeps && tearing.empty()) break;  // all may be under way
+    check_cuda(cudaStreamSynchronize(device_->stream), "advance");
+    sum_loads();
+    tear(tearing, input, static_cast<double>(done) / substeps);
+  }
   launch_measure();
 }
 

@@ -40,7 +40,7 @@ class CudaMpmTissue final : public Tissue {
   const std::vector<std::string>& notes() const override { return notes_; }
 
   // For tests and the benchmark.
-  void save_checkpoint();  ///< of what a part of a frame changes, unless something is cut or tears
+  void save_checkpoint();     ///< of what a part of a frame changes until something is cut or tears
   void restore_checkpoint();  ///< and measures it
   float substep_for(const FrameInput& input);
   int fragment_of(int point) const { return pieces_.of_point[point]; }
@@ -60,9 +60,10 @@ class CudaMpmTissue final : public Tissue {
 
   void begin(double duration, const FrameInput& input);
   /// Enqueues a part of the frame between two shares of it.
-  void run(int substeps, float dt, const FrameInput& input, double from, double to);
+  /// Until points are past their limit at most: these. Returns how many substeps.
+  int run(int substeps, float dt, double from, double to, std::vector<TearingPoint>& tearing);
   void sum_loads();  ///< of the part that was run last, once it is done
-  PartEnd run_part(int substeps, float dt, const FrameInput& input, double from, double to);
+  PartRun run_part(int substeps, float dt, const FrameInput& input, double from, double to);
   void make_blocks(bool may_march);
   void stop_marching();  ///< blocks that march are too tall to be cut well
   void plan_tables();    ///< how the blocks are worked on, and the tables for it
@@ -76,8 +77,10 @@ class CudaMpmTissue final : public Tissue {
   void cut_by_blades();
   void keep_place_for_blades();
   std::vector<TearingPoint> find_tearing();
-  void tear(const std::vector<TearingPoint>& tearing, const FrameInput& input, double share);
-  void tame();  ///< see MpmTissue
+  /// At this share of the frame; blades have cut their way before. Returns whether any tears.
+  bool tear(const std::vector<TearingPoint>& tearing, const FrameInput& input, double share);
+  void tame();                ///< see MpmTissue
+  bool settle_wild_crumbs();  ///< the same
   void upload_points();
   void find_near(double duration);
   /// Enqueues the part's substeps from `begin` up to `end`; waits for each search of faces.

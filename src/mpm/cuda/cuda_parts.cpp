@@ -15,23 +15,31 @@ void CudaMpmTissue::advance(double duration, const FrameInput& input) {
       });
 }
 
-PartEnd CudaMpmTissue::run_part(int substeps, float dt, const FrameInput& input, double from,
+PartRun CudaMpmTissue::run_part(int substeps, float dt, const FrameInput& input, double from,
                                 double to) {
   save_checkpoint();
-  const int torn = result_.tear_report.bonds_broken;
-  run(substeps, dt, input, from, to);
+  std::vector<TearingPoint> tearing;
+  const int done = run(substeps, dt, from, to, tearing);
+  const double reached = done == substeps ? to : to_;
   launch_measure();
   finish_measure();
   const OnDevice::Checkpoint& saved = device_->checkpoint;
-  const bool may_go_back = result_.tear_report.bonds_broken == torn && cut_to_ <= from &&
-                           static_cast<std::size_t>(saved.host_held_count[0]) <= saved.held.size();
+  const bool may_go_back = static_cast<std::size_t>(saved.host_held_count[0]) <= saved.held.size();
   if (!substep_.is_borne(*state_, modulus_, stable_substep(), dt) && may_go_back) {
     restore_checkpoint();
-    return PartEnd::kUndone;
+    return {PartEnd::kUndone, from};
   }
   sum_loads();
   substep_.follow(*state_, modulus_);
-  return result_.blew_up ? PartEnd::kBlewUp : PartEnd::kBorne;
+  if (result_.blew_up) return {PartEnd::kBlewUp, reached};
+  const bool tore = tear(tearing, input, reached);
+  const bool settled = reached < 1 && settle_wild_crumbs();
+  if (settled) {
+    launch_measure();
+    finish_measure();
+  }
+  if (tore || settled) substep_.follow(*state_, modulus_);
+  return {PartEnd::kBorne, reached};
 }
 
 void CudaMpmTissue::save_checkpoint() {

@@ -83,7 +83,7 @@ struct CudaMpmTissue::OnDevice {
   SweepOnDevice sweep;
   PieceLabels labels;
   CudaMotionRoom motion_room;
-  /// What a part of a frame changes, unless something is cut or tears, as it was before the part.
+  /// What a part of a frame changes until something is cut or tears, as it was before the part.
   struct Checkpoint {
     DeviceArray<float4> u, v;
     DeviceArray<HeldPoint> held;

@@ -1,0 +1,70 @@
+// Parts of a frame: one that tissue could not bear is undone.
+#include "cutting/tear.h"
+#include "mpm/mpm_tissue.h"
+
+namespace tissue_sim {
+
+void MpmTissue::advance(double duration, const FrameInput& input) {
+  Frame frame = begin(duration, input);
+  advance_in_parts(
+      duration, input, [this](const FrameInput& rest) { return substep_for(rest); },
+      [this](const FrameInput& rest, int left, double dt) {
+        return substep_.part(*state_, rest, left, dt);
+      },
+      [&](int substeps, float dt, double from, double to) {
+        return run_part(frame, substeps, dt, from, to);
+      });
+  end(frame);
+}
+
+PartRun MpmTissue::run_part(Frame& frame, int substeps, float dt, double from, double to) {
+  save_checkpoint();
+  std::vector<TearingPoint> tearing;
+  const int done = run(frame, substeps, dt, from, to, tearing);
+  const double reached = done == substeps ? to : from + (to - from) * done / substeps;
+  if (reached < 1 || frame.blades) {
+    measure_stiffness();
+  } else {
+    measure_energies();
+  }
+  if (!substep_.is_borne(*state_, modulus_, stable_substep(), dt)) {
+    restore_checkpoint();
+    return {PartEnd::kUndone, from};
+  }
+  substep_.follow(*state_, modulus_);
+  if (result_.blew_up) return {PartEnd::kBlewUp, reached};
+  tear(frame, tearing, reached);
+  if (reached < 1 && settle_wild_crumbs()) measured_ = false;
+  if (!measured_) {
+    measure_stiffness();
+    substep_.follow(*state_, modulus_);
+  }
+  return {PartEnd::kBorne, reached};
+}
+
+void MpmTissue::save_checkpoint() {
+  const MpmState& s = *state_;
+  for (int a = 0; a < 3; ++a) {
+    checkpoint_.u[a] = s.nodes.u[a];
+    checkpoint_.v[a] = s.nodes.v[a];
+  }
+  checkpoint_.time = s.time;
+  checkpoint_.contacts = s.contacts;
+  checkpoint_.faces = s.faces;
+  checkpoint_.result = result_;
+}
+
+void MpmTissue::restore_checkpoint() {
+  MpmState& s = *state_;
+  for (int a = 0; a < 3; ++a) {
+    s.nodes.u[a] = checkpoint_.u[a];
+    s.nodes.v[a] = checkpoint_.v[a];
+  }
+  s.time = checkpoint_.time;
+  s.contacts = checkpoint_.contacts;
+  s.faces = checkpoint_.faces;
+  result_ = checkpoint_.result;
+  measure_stiffness();
+}
+
+}  // namespace tissue_sim

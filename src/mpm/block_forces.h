@@ -56,24 +56,24 @@ TISSUE_SIM_INLINE void viscous_stress(const Block& b, const BlockField& f, const
   add_viscous_stress(F, rate, 0.125f * viscosity, P);
 }
 
-/// Leaves displacement gradients of 0 where there is no point: lanes between two pieces see nodes
-/// of both, and of what they are apart a law may make what is no number, which times a volume of 0
-/// stays none.
-template <int N, int W>
-TISSUE_SIM_INLINE void clear_empty(const Stiffness<N, W>& k, Vec<W> (*G)[9]) {
-  Mask<W> empty = {};  // negative where a lane is
-  for (int s = 0; s < N; ++s) empty |= bits<W>(k.mu[s]) - 1;
-  if (!any_negative<W>(empty)) return;
-  for (int s = 0; s < N; ++s) {
-    const Mask<W> is_point = ~((bits<W>(k.mu[s]) - 1) >> 31);
-    for (int i = 0; i < 9; ++i) G[s][i] = keep<W>(is_point, G[s][i]);
+/// Leaves displacement gradients of 0 in lanes whose cells hold no point. Between two pieces they
+/// see nodes of both, and of how far apart these are a law may make what is no number: times a
+/// volume of 0 it stays none.
+template <int W>
+TISSUE_SIM_INLINE void clear_empty(const float* volume, int stride, Vec<W> (&G)[8][9]) {
+  Vec<W> filled = load<W>(volume);
+  for (int s = 1; s < 8; ++s) filled += load<W>(volume + s * stride);
+  const Mask<W> holds = -bits<W>(filled) >> 31;
+  for (Vec<W>(&of_point)[9] : G) {
+    for (Vec<W>& g : of_point) g = keep<W>(holds, g);
   }
 }
 
-/// Stress of the cells in W lanes, from the incoming x-y quantities to the outgoing ones.
+/// Stress of the cells in W lanes, `whole` if all of them hold points, from the incoming x-y
+/// quantities to the outgoing ones.
 template <int W, class Materials, bool viscous>
 TISSUE_SIM_INLINE void stress_lanes(const Block& b, const BlockField& f, const Layout& l,
-                                    const float* in, const float* in_rate, int z, int j,
+                                    const float* in, const float* in_rate, int z, int j, bool whole,
                                     float* out) {
   Vec<W> G[8][9], damping[9];
   const std::size_t lane = static_cast<std::size_t>(z) * 8 * l.stride + j;
@@ -81,14 +81,14 @@ TISSUE_SIM_INLINE void stress_lanes(const Block& b, const BlockField& f, const L
   // worked out.
   for (int s = 0; s < 8; ++s) __builtin_prefetch(b.volume.data() + lane + s * l.stride);
   gradients<W>(l, in, z, j, G);
+  if (!whole) clear_empty<W>(b.volume.data() + lane, l.stride, G);
   if (viscous) viscous_stress<W, Materials>(b, f, l, in, in_rate, z, j, damping);
   constexpr int kTogether = 4;  // points whose stretch is worked out side by side
   for (int first = 0; first < 8; first += kTogether) {
     Vec<W>(*F)[9] = G + first;
+    for (int s = 0; s < kTogether; ++s) add_identity<W>(F[s]);
     const auto k = Materials::template stiffness<kTogether, W>(b, f, lane + first * l.stride);
     if (any_positive<W>(k.mu[0] + k.mu[1] + k.mu[2] + k.mu[3])) {
-      clear_empty(k, F);
-      for (int s = 0; s < kTogether; ++s) add_identity<W>(F[s]);
       Materials::template stresses<kTogether, W>(F, k, F);
     } else {
       std::fill_n(&F[0][0], kTogether * 9, Vec<W>{});
@@ -138,9 +138,9 @@ TISSUE_SIM_INLINE void forces(const Block& b, const BlockField& f, BlockScratch&
         load_mean_plane<W>(b, l, scratch.velocities.data(), z + 2, scratch.in_rate.data());
       }
       for_each_filled<W>(
-          filled, [&](auto width, int j) __attribute__((always_inline)) {
+          filled, [&](auto width, int j, bool whole) __attribute__((always_inline)) {
             stress_lanes<width, Materials, viscous>(b, f, l, scratch.in.data(),
-                                                    scratch.in_rate.data(), z, j, out);
+                                                    scratch.in_rate.data(), z, j, whole, out);
           });
     }
     store_plane<W>(b, l, out, z, -inv_h, scratch.row.data(), force);

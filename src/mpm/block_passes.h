@@ -50,8 +50,9 @@ TISSUE_SIM_INLINE void for_each_vector(int count, const F& f) {
   if (j < count) f(std::integral_constant<int, half>(), j);
 }
 
-/// Calls f(width, j) for the steps that cover lanes in `spans`, in order, each lane once: W wide or
-/// half of it, from multiples of the half on. Lanes in none are left out where a step has no other.
+/// Calls f(width, j, whole) for the steps that cover lanes in `spans`, in order, each lane once: W
+/// wide or half of it, from multiples of the half on. Lanes in none are left out where a step has
+/// no other: `whole` says that it has none of them.
 template <int W, class Spans, class F>
 TISSUE_SIM_INLINE void for_each_filled(const Spans& spans, const F& f) {
   constexpr int half = W > 4 ? W / 2 : W;
@@ -62,10 +63,10 @@ TISSUE_SIM_INLINE void for_each_filled(const Spans& spans, const F& f) {
       const bool wide = span->end > j + half ||
                         (next != spans.end() && next->begin < j + W && next->end > j + half);
       if (W > 4 && wide) {
-        f(std::integral_constant<int, W>(), j);
+        f(std::integral_constant<int, W>(), j, span->begin <= j && j + W <= span->end);
         j += W;
       } else {
-        f(std::integral_constant<int, half>(), j);
+        f(std::integral_constant<int, half>(), j, span->begin <= j && j + half <= span->end);
         j += half;
       }
     }
@@ -77,7 +78,7 @@ template <int W, class Spans>
 TISSUE_SIM_INLINE bool covers_all(const Spans& spans, int count) {
   int end = 0;
   bool any_gap = false;
-  for_each_filled<W>(spans, [&](auto width, int j) {
+  for_each_filled<W>(spans, [&](auto width, int j, bool) {
     any_gap = any_gap || j != end;
     end = j + width;
   });

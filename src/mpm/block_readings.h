@@ -208,7 +208,7 @@ TISSUE_SIM_INLINE void for_each_gradient(const Block& b, const BlockField& f, Bl
   for (int z = 0; z < b.nz; ++z) {
     load_plane<W>(b, l, scratch.nodes.data(), z + 2, scratch.in.data());
     for_each_filled<W>(
-        b.filled[z], [&](auto width, int j) __attribute__((always_inline)) {
+        b.filled[z], [&](auto width, int j, bool) __attribute__((always_inline)) {
           Vec<width> G[8][9];
           gradients<width>(l, scratch.in.data(), z, j, G);
           visit(width, static_cast<std::size_t>(z) * 8 * l.stride + j, G);

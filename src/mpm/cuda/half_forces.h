@@ -57,8 +57,8 @@ __device__ __forceinline__ void viscous_stress(const CudaBody& body, const HalfP
   add_viscous_stress(F, rate, -0.25f * body.inv_cell_size * body.viscosity * half * filled, P);
 }
 
-/// From half a cell's numbers to what its stress gives back, for points of these volumes, of which
-/// none is 0 in a `whole` column.
+/// From half a cell's numbers to what its stress gives back, for points of these volumes, none
+/// of which is 0 in a `whole` column.
 template <class LawOf, bool kViscous, int kTogether>
 __device__ __forceinline__ void half_forces(const CudaBody& body, const HalfPlane (&h)[3],
                                             float side, const float4& volume, bool whole,
@@ -80,12 +80,11 @@ __device__ __forceinline__ void half_forces(const CudaBody& body, const HalfPlan
   const float mu = -body.inv_cell_size * body.mu, lambda = -body.inv_cell_size * body.lambda;
   const float m[4] = {mu * volume.x, mu * volume.y, mu * volume.z, mu * volume.w};
   const float l[4] = {lambda * volume.x, lambda * volume.y, lambda * volume.z, lambda * volume.w};
-  if (!whole) {
-    // Where there is no point, nodes may be of pieces far apart, of which a law may make what is no
-    // number: times a volume of 0 it stays none.
+  if (!whole && (volume.x + volume.y) + (volume.z + volume.w) == 0) {
+    // Nodes may be of pieces far apart, and of how far a law may make what is no number: times a
+    // volume of 0 it stays none.
 #pragma unroll
     for (int k = 0; k < 4; ++k) {
-      if (m[k] != 0) continue;
 #pragma unroll
       for (int i = 0; i < 9; ++i) F[k][i] = i % 4 == 0 ? 1.0f : 0.0f;
     }

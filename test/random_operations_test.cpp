@@ -1,7 +1,6 @@
-// Random scenes under clumsy instruments: they wander about at up to half a metre a second, crush,
-// cut, grasp and drag what they meet, and their poses come late. Tissue may be hurt, but must not
-// blow up. TISSUE_SIM_OPERATIONS=<first seed>:<count> runs others than the
-// three that are here, which did before they were found so.
+// Random scenes under clumsy instruments, which wander about at up to half a metre a second, crush,
+// cut, grasp and drag what they meet, and whose poses come late. Tissue may be hurt, but must not
+// blow up. The three seeds here once did; TISSUE_SIM_OPERATIONS=<first seed>:<count> runs others.
 #include <gtest/gtest.h>
 
 #include <algorithm>

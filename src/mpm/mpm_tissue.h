@@ -62,7 +62,8 @@ class MpmTissue final : public Tissue {
 
   Frame begin(double duration, const FrameInput& input);
   PartRun run_part(Frame& frame, int substeps, float dt, double from, double to);
-  /// Advances by as many substeps, or until points are past their limit: these. Returns how many.
+  /// Advances by a part of the frame between two shares of it, which ends when points are past
+  /// their limit: these. Returns after how many substeps.
   int run(Frame& frame, int substeps, float dt, double from, double to,
           std::vector<TearingPoint>& tearing);
   /// At this share of the frame; blades have cut their way before.

@@ -59,8 +59,8 @@ class CudaMpmTissue final : public Tissue {
   struct OnDevice;
 
   void begin(double duration, const FrameInput& input);
-  /// Enqueues a part of the frame between two shares of it.
-  /// Until points are past their limit at most: these. Returns how many substeps.
+  /// Enqueues a part of the frame between two shares of it; where tissue can tear it waits, and
+  /// ends when points are past their limit: these. Returns after how many substeps.
   int run(int substeps, float dt, double from, double to, std::vector<TearingPoint>& tearing);
   void sum_loads();  ///< of the part that was run last, once it is done
   PartRun run_part(int substeps, float dt, const FrameInput& input, double from, double to);

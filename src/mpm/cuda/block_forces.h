@@ -204,7 +204,9 @@ template <class LawOf, bool kViscous, bool kSpecial, bool kPartial, bool kPairs>
 __device__ __forceinline__ void block_forces(const CudaTables& t, const CudaBundle& w,
                                              const CudaBlock& block, const CudaBody& body,
                                              const BlockShared& s, const BlockStep& step) {
-  using Walk = ColumnWalk<LawOf, kViscous, kPartial, kPairs>;
+  // All others wait for the special ones; two points at once there take a fortieth off them.
+  constexpr int kTogether = kSpecial && !kPairs ? 2 : 1;
+  using Walk = ColumnWalk<LawOf, kViscous, kPartial, kPairs, kTogether>;
   const int thread = static_cast<int>(threadIdx.x), threads = step.workers.size();
   const int index = Walk::index_of(thread);
   const int nz = kSpecial ? w.nz : block.nz;

@@ -80,18 +80,19 @@ __device__ __forceinline__ void half_forces(const CudaBody& body, const HalfPlan
   const float mu = -body.inv_cell_size * body.mu, lambda = -body.inv_cell_size * body.lambda;
   const float m[4] = {mu * volume.x, mu * volume.y, mu * volume.z, mu * volume.w};
   const float l[4] = {lambda * volume.x, lambda * volume.y, lambda * volume.z, lambda * volume.w};
-  if (!whole && (volume.x + volume.y) + (volume.z + volume.w) == 0) {
+  if (whole || (volume.x + volume.y) + (volume.z + volume.w) != 0) {
+#pragma unroll
+    for (int k = 0; k < 4; k += kTogether) {
+      stresses<LawOf, kViscous, kTogether>(m + k, l + k, damping, F + k);
+    }
+  } else {
     // Nodes may be of pieces far apart, and of how far a law may make what is no number: times a
     // volume of 0 it stays none.
 #pragma unroll
     for (int k = 0; k < 4; ++k) {
 #pragma unroll
-      for (int i = 0; i < 9; ++i) F[k][i] = i % 4 == 0 ? 1.0f : 0.0f;
+      for (int i = 0; i < 9; ++i) F[k][i] = kViscous ? damping[i] : 0;
     }
-  }
-#pragma unroll
-  for (int k = 0; k < 4; k += kTogether) {
-    stresses<LawOf, kViscous, kTogether>(m + k, l + k, damping, F + k);
   }
 #pragma unroll
   for (int c = 0; c < 3; ++c) give_stress(F, c, out[c]);

@@ -144,12 +144,12 @@ TEST(SubstepChoice, IsCautiousWhereItCannotKnow) {
 TEST(SubstepChoice, StaysWhereItHardlyGrows) {
   SubstepChoice choice;
   EXPECT_EQ(choice.count(1, 0.09), 12);
-  EXPECT_EQ(choice.count(1, 0.097), 12);      // eleven would do
-  EXPECT_EQ(choice.count(0.75, 0.097), 9);    // the rest of a frame, after three
-  EXPECT_EQ(choice.count(0.7, 0.097), 8);     // 8.4 of them
-  EXPECT_EQ(choice.count(0.7, 0.0875), 8);    // rounding aside, the longest
-  EXPECT_EQ(choice.count(0.7, 0.08), 9);      // too long now
-  EXPECT_EQ(choice.count(0.7, 0.2), 4);       // much longer now
+  EXPECT_EQ(choice.count(1, 0.097), 12);    // eleven would do
+  EXPECT_EQ(choice.count(0.75, 0.097), 9);  // the rest of a frame, after three
+  EXPECT_EQ(choice.count(0.7, 0.097), 8);   // 8.4 of them
+  EXPECT_EQ(choice.count(0.7, 0.0875), 8);  // rounding aside, the longest
+  EXPECT_EQ(choice.count(0.7, 0.08), 9);    // too long now
+  EXPECT_EQ(choice.count(0.7, 0.2), 4);     // much longer now
 }
 
 TEST(SubstepChoice, CrumbsAndSlicesAreSoft) {

@@ -40,8 +40,8 @@ class SubstepChoice {
                  const MeasureLimit& measure);
 
   /// How many substeps of at most `longest` [s] the rest of a frame, `time` [s], takes. Those that
-  /// were, again, as long as they are hardly shorter: a swing near the limit gains or loses whenever
-  /// substeps change, and where they change often it gains.
+  /// were, again, as long as they are hardly shorter: a swing near the limit gains or loses
+  /// whenever substeps change, and where they change often it gains.
   int count(double time, double longest);
 
   /// How many of the `left` substeps of `dt` [s] of a frame with this input the next part is: all,

@@ -86,7 +86,8 @@ __device__ __forceinline__ void stabilise_half(float stiffness, float side, cons
   stabilise_number<kBB>(stiffness, side, b.wBB, b.sBB, bends_out.wBB, bends_out.sBB);
 }
 
-/// Adds what stabilises one x-y quantity to what its three planes get.
+/// Adds what stabilises one x-y quantity to what its three planes get: the pass along z, the
+/// weights and the pass back in one.
 template <int kQuantity>
 __device__ __forceinline__ void stabilise_planes(float stiffness, const PlaneNumbers& below,
                                                  const PlaneNumbers& center,
@@ -95,14 +96,23 @@ __device__ __forceinline__ void stabilise_planes(float stiffness, const PlaneNum
   constexpr int kX = stabilisation::kKinds[kQuantity][0], kY = stabilisation::kKinds[kQuantity][1];
   constexpr float kScale = slope_scale((kX == 0 ? 1 : 0) + (kY == 0 ? 1 : 0)) / give_scale(kX, kY) *
                            kNodeScale<kQuantity>;
-  const Line<float> l(below[kQuantity], center[kQuantity], above[kQuantity]);
-  float A = stiffness * (kScale * stabilisation::weight2(kQuantity, 0)) * l.A;
-  float d = stiffness * (kScale * stabilisation::weight2(kQuantity, 1)) * l.d;
-  float B = stiffness * (kScale * stabilisation::weight2(kQuantity, 2)) * l.B;
-  from_line(A, d, B);
-  to_below[kQuantity] += A;
-  to_center[kQuantity] += d;
-  to_above[kQuantity] += B;
+  constexpr float kA = kScale * stabilisation::weight2(kQuantity, 0),
+                  kD = kScale * stabilisation::weight2(kQuantity, 1),
+                  kB = kScale * stabilisation::weight2(kQuantity, 2);
+  const float sum = above[kQuantity] + below[kQuantity], middle = center[kQuantity];
+  float to_middle, to_side;
+  if (kA == 0) {  // exactly nothing for tissue that moved far
+    to_side = kB * (sum - 2.0f * middle);
+    to_middle = -2.0f * to_side;
+  } else {
+    constexpr float kBoth = kAverageSide * kAverageCenter * kA - 2 * kB;
+    to_side = (kAverageSide * kAverageSide * kA + kB) * sum + kBoth * middle;
+    to_middle = kBoth * sum + (kAverageCenter * kAverageCenter * kA + 4 * kB) * middle;
+  }
+  const float slope = kD == 0 ? 0 : kD * (above[kQuantity] - below[kQuantity]);
+  to_below[kQuantity] += stiffness * (to_side - slope);
+  to_center[kQuantity] += stiffness * to_middle;
+  to_above[kQuantity] += stiffness * (to_side + slope);
 }
 template <int... kQuantities>
 __device__ __forceinline__ void stabilise_cell(std::integer_sequence<int, kQuantities...>,

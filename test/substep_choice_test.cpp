@@ -152,6 +152,31 @@ TEST(SubstepChoice, StaysWhereItHardlyGrows) {
   EXPECT_EQ(choice.count(0.7, 0.2), 4);     // much longer now
 }
 
+TEST(SubstepChoice, UndoesWhatHasEnergyFromNowhere) {
+  const auto borne = [](float wildest, double given, double gravity) {
+    Scene scene = soft_body(0.45, Vec3(4, 4, 4));
+    scene.gravity = Vec3(0, 0, -gravity);
+    MpmTissue tissue(scene);
+    MpmState& s = tissue.state();
+    s.wildest = wildest;
+    const std::vector<float> modulus(s.blocks.all.size(), 1e4f);
+    const double dt = tissue.stable_substep(), mass = 1060 * std::pow(4 * s.scene.cell_size, 3);
+    SubstepChoice choice;
+    EXPECT_TRUE(choice.is_borne(s, modulus, dt, dt, {1, 1, 0, 0.1}));  // the first that is known
+    EXPECT_TRUE(choice.is_borne(s, modulus, dt, dt, {1.02, 1.02, 0, 0.1}));
+    EXPECT_TRUE(choice.is_borne(s, modulus, dt, dt, {0.5, 0.5, 0, 0.1}));
+    // Falling at the speed that so much kinetic energy is.
+    const double fall = 0.1 * gravity * std::sqrt(2 * 0.6 * mass);
+    return choice.is_borne(s, modulus, dt, dt, {0.6, 0.5 + 0.9 * fall, given, 0.1});
+  };
+  EXPECT_FALSE(borne(10, 0, 0));
+  EXPECT_FALSE(borne(10, 0.05, 0));
+  EXPECT_TRUE(borne(10, 0.08, 0));   // an instrument did it
+  EXPECT_TRUE(borne(10, 0.08, 20));  // or gravity
+  EXPECT_FALSE(borne(10, 0, 20));
+  EXPECT_TRUE(borne(2, 0, 0));  // nobody watches where tissue is hardly strained
+}
+
 TEST(SubstepChoice, CrumbsAndSlicesAreSoft) {
   MpmTissue tissue(soft_body(0.45, Vec3(6, 6, 6)));
   const std::vector<BladePath> planes = random_planes(30, 0.012);

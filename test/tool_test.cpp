@@ -1,6 +1,7 @@
 // Instruments and the ground against tissue: pushes, friction, wrenches, cuts by motion.
 #include <gtest/gtest.h>
 
+#include "contact/frame_colliders.h"
 #include "cut_scenes.h"
 
 namespace tissue_sim {
@@ -57,6 +58,23 @@ TEST(Probe, FeelsTheOppositeOfWhatItGives) {
   EXPECT_LT(p[2], -1e-5) << "pushed down";
   EXPECT_LT((impulse + p).norm(), 1e-3 * p.norm());
   EXPECT_GE(peak, longest);
+}
+
+TEST(FrameColliders, PowerIsForceTimesVelocityAndMomentTimesSpin) {
+  Scene scene = free_box(Vec3(0.03, 0.03, 0.02), 0.003);
+  scene.tools.emplace_back();
+  ToolMotion motion;
+  motion.present = true;
+  motion.begin = pointing_down(Vec3(0.015, 0.012, 0.03));
+  motion.end = {motion.begin.position + Vec3(0.01, 0, 0),
+                Quat(Eigen::AngleAxisd(0.2, Vec3::UnitZ())) * motion.begin.orientation};
+  const FrameColliders colliders(scene, {{&motion, 1}, {}}, 0.1);
+  std::vector<ColliderLoad> on(colliders.count());
+  on[0].force[2] = -5;  // the ground is still
+  on[1].force[0] = -2;
+  on[1].torque[2] = -3;
+  const std::vector<Collider> now = colliders.at(0.5);
+  EXPECT_NEAR(colliders.power(now.data(), on.data()), 2 * 0.1 + 3 * 2, 1e-4);
 }
 
 TEST(Probe, LeavesTissueAloneThatItDoesNotTouch) {

@@ -81,4 +81,14 @@ void FrameColliders::add_loads(double share, const Collider* now, const Collider
   }
 }
 
+double FrameColliders::power(const Collider* now, const ColliderLoad* on) const {
+  double power = 0;
+  for (int c = 0; c < count_; ++c) {
+    for (int a = 0; a < 3; ++a) {
+      power -= on[c].force[a] * now[c].velocity[a] + on[c].torque[a] * now[c].spin[a];
+    }
+  }
+  return power;
+}
+
 }  // namespace tissue_sim

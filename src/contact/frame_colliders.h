@@ -27,6 +27,8 @@ class FrameColliders {
   /// the loads of their tools; `weight` is the substep's part of the frame.
   void add_loads(double share, const Collider* now, const ColliderLoad* on, double weight,
                  std::vector<ToolLoad>& loads) const;
+  /// What the colliders `now` do to tissue while this acts on them [W].
+  double power(const Collider* now, const ColliderLoad* on) const;
 
  private:
   double point_area_;  // [m^2]

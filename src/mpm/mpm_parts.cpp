@@ -23,14 +23,18 @@ void MpmTissue::advance(double duration, const FrameInput& input) {
 PartRun MpmTissue::run_part(Frame& frame, int substeps, float dt, double from, double to) {
   save_checkpoint();
   std::vector<TearingPoint> tearing;
+  const bool watched = SubstepChoice::watches_energy(*state_);
+  work_ = 0;
   const int done = run(frame, substeps, dt, from, to, tearing);
   const double reached = done == substeps ? to : from + (to - from) * done / substeps;
-  if (reached < 1 || frame.blades) {
+  PartEnergy energy;
+  if (!watched && (reached < 1 || frame.blades)) {
     measure_stiffness();
   } else {
     measure_energies();
+    energy = {result_.kinetic_energy, result_.elastic_energy, work_, done * dt};
   }
-  if (!substep_.is_borne(*state_, modulus_, stable_substep(), dt)) {
+  if (!substep_.is_borne(*state_, modulus_, stable_substep(), dt, energy)) {
     restore_checkpoint();
     return {PartEnd::kUndone, from};
   }

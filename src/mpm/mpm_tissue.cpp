@@ -94,6 +94,7 @@ int MpmTissue::run(Frame& frame, int substeps, float dt, double from, double to,
     s.time += dt;
     frame.colliders.add_loads(share, s.colliders.data(), loads.data(), dt / frame.duration,
                               result_.loads);
+    work_ += frame.colliders.power(s.colliders.data(), loads.data()) * dt;
     if (checks == 0 || done + 1 != tear_check_at(check, checks, substeps)) continue;
     ++check;
     tearing = find_tearing(s);

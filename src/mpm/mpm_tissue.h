@@ -88,6 +88,7 @@ class MpmTissue final : public Tissue {
   std::vector<float> modulus_;    ///< see SubstepChoice::follow()
   bool measured_ = false;         ///< whether the state is as it was when it was measured
   bool has_energies_ = false;     ///< whether energies were, too
+  double work_ = 0;               ///< of instruments in the last part of a frame [J]
   bool pieces_measured_ = false;  ///< whether they are where the frame left them
   SubstepChoice substep_;
   FrameResult result_;

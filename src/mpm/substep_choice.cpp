@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 #include "contact/frame_colliders.h"
 
@@ -24,12 +25,21 @@ constexpr double kBorne = 0.9;  // of the limit, at the end of a part: else it i
 constexpr double kMostShortened = 0.25;  // ... and substeps made shorter by that at most ...
 constexpr double kLeastShortened = 0.7;  // ... and by that at least, ...
 constexpr double kShortest = 1e-3;       // ... until by that: then it is no use
+constexpr float kStrained = 8;           // BlockState::wildest, from which on energy is watched:
+constexpr double kMostGain = 1.03;       // a part that grows it by more than was given is undone,
+constexpr double kHalf = 0.5;            // and done again with substeps half as long
 
 /// Whether something tore within the last twentieth of a second: then more may soon, in pieces that
 /// nobody has measured.
 bool tears(const MpmState& state) {
   return std::any_of(state.tore_at.begin(), state.tore_at.end(),
                      [&](double time) { return state.time - time < 0.05; });
+}
+
+/// What gravity may have done in a part, at the most [J].
+double by_gravity(const MpmState& state, const PartEnergy& e) {
+  const double mass = std::accumulate(state.nodes.mass.begin(), state.nodes.mass.end(), 0.0);
+  return state.scene.gravity.norm() * e.time * std::sqrt(2 * mass * e.kinetic);
 }
 
 /// Whether tissue is within two cells of a box.
@@ -67,8 +77,10 @@ double farthest_motion(const MpmState& state, const FrameInput& input) {
 
 }  // namespace
 
+bool SubstepChoice::watches_energy(const MpmState& state) { return state.wildest > kStrained; }
+
 bool SubstepChoice::is_borne(const MpmState& state, const std::vector<float>& modulus,
-                             double cautious, double dt) {
+                             double cautious, double dt, const PartEnergy& energy) {
   double growth = 1;
   for (std::size_t i = 0; i < modulus.size(); ++i) {
     const float measured = state.blocks.all[i]->modulus.measured;
@@ -77,8 +89,14 @@ bool SubstepChoice::is_borne(const MpmState& state, const std::vector<float>& mo
   }
   const double longest =
       std::isfinite(growth) ? std::max(cautious / kMargin, limit_ / std::sqrt(growth)) : 0;
-  if (dt <= kBorne * longest || shortened_ < kShortest) return true;
-  const double wanted = kMargin * longest / dt;
+  const double now = energy.kinetic + energy.elastic;
+  const bool grew = watches_energy(state) && now > kMostGain * energy_ + energy.given &&
+                    now > kMostGain * energy_ + energy.given + by_gravity(state, energy);
+  if ((dt <= kBorne * longest && !grew) || shortened_ < kShortest) {
+    energy_ = now;
+    return true;
+  }
+  const double wanted = grew ? kHalf : kMargin * longest / dt;
   shortened_ *= wanted > kMostShortened ? std::min(wanted, kLeastShortened) : kMostShortened;
   return false;
 }

@@ -15,6 +15,13 @@ namespace tissue_sim {
 /// flag is set, with `steps` steps of largest_eigenvalue().
 using MeasureLimit = std::function<double(const std::vector<std::uint8_t>& blocks, int steps)>;
 
+/// What a part of a frame left and brought [J].
+struct PartEnergy {
+  double kinetic = NAN, elastic = NAN;  ///< at its end; NAN where they were not measured
+  double given = 0;                     ///< by instruments
+  double time = 0;                      ///< that it took [s]
+};
+
 /// The cautious substep, stable_substep(), is what a lone point bears that was cut off on all
 /// sides; whole tissue bears about twice as much. So the highest frequency is measured now and
 /// then, and where a cut went at once; in between the stiffening of each block bounds how it grew.
@@ -25,10 +32,13 @@ using MeasureLimit = std::function<double(const std::vector<std::uint8_t>& block
 class SubstepChoice {
  public:
   /// Whether tissue that ended a part of a frame with these moduli (see follow()) and this
-  /// stable_substep() could bear the part's substeps of `dt` [s]. If not, the next ones are
-  /// shorter: until one is borne, or they cannot be the reason.
+  /// stable_substep() could bear the part's substeps of `dt` [s], and has no energy from nowhere.
+  /// If not, the next ones are shorter: until one is borne, or they cannot be the reason.
   bool is_borne(const MpmState& state, const std::vector<float>& modulus, double cautious,
-                double dt);
+                double dt, const PartEnergy& energy);
+  /// Whether tissue is so strained that stiffness alone may not tell how it fares: then the energy
+  /// must be measured at the end of the next part.
+  static bool watches_energy(const MpmState& state);
   /// After a part of a frame: `modulus` is of each block the largest P-wave modulus of its points,
   /// as they are deformed [Pa].
   void follow(MpmState& state, const std::vector<float>& modulus);
@@ -61,6 +71,7 @@ class SubstepChoice {
   double trend_ = 1;        ///< of the stiffness in the last part, at most
   double part_ = 0;         ///< how long the next part may be [s]
   double followed_at_ = 0;  ///< [s]
+  double energy_ = NAN;     ///< after the last part that was borne [J]
   double last_ = 0;         ///< the substep that was chosen last [s]
   double shortened_ = 1;    ///< how much substeps are shorter than they would be, after parts that
                             ///< were not borne

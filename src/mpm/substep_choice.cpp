@@ -21,7 +21,7 @@ constexpr double kCalmTrend = 1.2;       // of the stiffness in a part: the next
 constexpr double kMostTrend = 1.3;       // ... or shorter
 constexpr double kHardlyShorter = 0.85;  // than the longest substep
 constexpr int kShortestPart = 6;         // substeps
-constexpr double kBorne = 0.9;  // of the limit, at the end of a part: else it is undone, ...
+constexpr double kBorne = 0.9;           // of the limit at the end of a part: else it is undone ...
 constexpr double kMostShortened = 0.25;  // ... and substeps made shorter by that at most ...
 constexpr double kLeastShortened = 0.7;  // ... and by that at least, ...
 constexpr double kShortest = 1e-3;       // ... until by that: then it is no use
@@ -90,13 +90,14 @@ bool SubstepChoice::is_borne(const MpmState& state, const std::vector<float>& mo
   const double longest =
       std::isfinite(growth) ? std::max(cautious / kMargin, limit_ / std::sqrt(growth)) : 0;
   const double now = energy.kinetic + energy.elastic;
-  const bool grew = watches_energy(state) && now > kMostGain * energy_ + energy.given &&
-                    now > kMostGain * energy_ + energy.given + by_gravity(state, energy);
+  const double explained = kMostGain * energy_ + std::max(0.0, energy.given);
+  const bool grew =
+      watches_energy(state) && now > explained && now > explained + by_gravity(state, energy);
   if ((dt <= kBorne * longest && !grew) || shortened_ < kShortest) {
     energy_ = now;
     return true;
   }
-  const double wanted = grew ? kHalf : kMargin * longest / dt;
+  const double wanted = std::min(kMargin * longest / dt, grew ? kHalf : 1.0);
   shortened_ *= wanted > kMostShortened ? std::min(wanted, kLeastShortened) : kMostShortened;
   return false;
 }

@@ -130,6 +130,7 @@ int CudaMpmTissue::run(int substeps, float dt, double from, double to,
 
 void CudaMpmTissue::sum_loads() {
   const OnDevice& d = *device_;
+  work_ = 0;
   if (substeps_ == 0) return;
   const std::size_t count = colliders_->count();
   std::vector<ColliderLoad> on(count);
@@ -145,6 +146,7 @@ void CudaMpmTissue::sum_loads() {
     }
     colliders_->add_loads(share_of(i), d.host_colliders.data() + i * count, on.data(),
                           dt_ / duration_, result_.loads);
+    work_ += colliders_->power(d.host_colliders.data() + i * count, on.data()) * dt_;
   }
   substeps_ = 0;
 }

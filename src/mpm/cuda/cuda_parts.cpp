@@ -26,15 +26,14 @@ PartRun CudaMpmTissue::run_part(int substeps, float dt, const FrameInput& input,
   const double reached = done == substeps ? to : to_;
   launch_measure();
   finish_measure();
+  sum_loads();
+  const PartEnergy energy{result_.kinetic_energy, result_.elastic_energy, work_, done * dt};
   const OnDevice::Checkpoint& saved = device_->checkpoint;
   const bool may_go_back = static_cast<std::size_t>(saved.host_held_count[0]) <= saved.held.size();
-  // Energy is not watched here yet.
-  const PartEnergy unknown;
-  if (!substep_.is_borne(*state_, modulus_, stable_substep(), dt, unknown) && may_go_back) {
+  if (!substep_.is_borne(*state_, modulus_, stable_substep(), dt, energy) && may_go_back) {
     restore_checkpoint();
     return {PartEnd::kUndone, from};
   }
-  sum_loads();
   substep_.follow(*state_, modulus_);
   if (result_.blew_up) return {PartEnd::kBlewUp, reached};
   const bool tore = tear(tearing, input, reached);

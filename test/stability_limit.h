@@ -3,6 +3,7 @@
 
 #include <cmath>
 #include <random>
+#include <utility>
 #include <vector>
 
 #include "contact/block_contact.h"
@@ -21,7 +22,9 @@ inline std::vector<double> accelerations(MpmState& state, const std::vector<floa
     n.v[i / count][i % count] = 0;
   }
   std::vector<ColliderLoad> loads;
+  const float dt = std::exchange(state.dt, 0.0f);
   substep(state, 1.0f, loads);
+  state.dt = dt;
   std::vector<double> a(3 * count);
   for (std::size_t i = 0; i < 3 * count; ++i) a[i] = n.v[i / count][i % count];
   return a;

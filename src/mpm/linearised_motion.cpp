@@ -53,7 +53,7 @@ double LinearisedMotion::accelerations(const F& f) {
                            state_.force.data() + block.force_offset);
   });
   NodeStep step{};
-  step.dt = 1;  // from rest: rates are accelerations
+  step.dt = step.kick = 1;  // from rest: rates are accelerations
   move_nodes(state_, step);
   return sum([&](int a, int i) {
     float& v = state_.nodes.v[a][nodes_[i]];

@@ -23,7 +23,7 @@ void MpmTissue::advance(double duration, const FrameInput& input) {
 PartRun MpmTissue::run_part(Frame& frame, int substeps, float dt, double from, double to) {
   save_checkpoint();
   std::vector<TearingPoint> tearing;
-  const bool watched = SubstepChoice::watches_energy(*state_);
+  const bool watched = SubstepChoice::is_strained(*state_);
   work_ = 0;
   const int done = run(frame, substeps, dt, from, to, tearing);
   const double reached = done == substeps ? to : from + (to - from) * done / substeps;
@@ -56,6 +56,7 @@ void MpmTissue::save_checkpoint() {
     checkpoint_.v[a] = s.nodes.v[a];
   }
   checkpoint_.time = s.time;
+  checkpoint_.dt = s.dt;
   checkpoint_.contacts = s.contacts;
   checkpoint_.faces = s.faces;
   checkpoint_.result = result_;
@@ -68,6 +69,7 @@ void MpmTissue::restore_checkpoint() {
     s.nodes.v[a] = checkpoint_.v[a];
   }
   s.time = checkpoint_.time;
+  s.dt = checkpoint_.dt;
   s.contacts = checkpoint_.contacts;
   s.faces = checkpoint_.faces;
   result_ = checkpoint_.result;

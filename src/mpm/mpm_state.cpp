@@ -82,7 +82,7 @@ class MoveRow {
 
 }  // namespace
 
-void substep(MpmState& state, float dt, std::vector<ColliderLoad>& loads) {
+float substep(MpmState& state, float dt, std::vector<ColliderLoad>& loads) {
   Blocks& blocks = state.blocks;
   const int block_count = static_cast<int>(blocks.all.size());
   const std::size_t collider_count = state.colliders.size();
@@ -91,7 +91,8 @@ void substep(MpmState& state, float dt, std::vector<ColliderLoad>& loads) {
   const bool list = is_list_due(state.contacts);
   NodeStep step;
   step.dt = dt;
-  step.keep = static_cast<float>(std::exp(-state.scene.damping * dt));
+  step.kick = kick_of(state.dt, dt);
+  step.keep = static_cast<float>(std::exp(-state.scene.damping * step.kick));
   for (int a = 0; a < 3; ++a) step.gravity[a] = static_cast<float>(state.scene.gravity[a]);
   const MoveRow move_row(state, step);
   SharedWork pushes(static_cast<int>(faces.between.size()), 32), work(block_count, 1),
@@ -122,6 +123,8 @@ void substep(MpmState& state, float dt, std::vector<ColliderLoad>& loads) {
       loads[c].points += of_block[c].points;
     }
   }
+  state.dt = dt;
+  return step.kick;
 }
 
 void move_nodes(MpmState& state, const NodeStep& step) {

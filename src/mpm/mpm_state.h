@@ -72,6 +72,7 @@ struct MpmState {
   std::vector<BlockMotion> motion;    ///< per block; exact as of measure_motion()
   float wildest = 1;                  ///< BlockState's, of all blocks
   double time = 0;                    ///< since the beginning [s]
+  float dt = 0;                       ///< the last substep, 0 before the first [s]
   std::vector<double> tore_at;        ///< per body: when a bond last tore [s]; empty while none did
   std::vector<std::int32_t> threads;  ///< points at their ends, by number: cutting/threads.h
   std::set<std::int32_t> crumbs;      ///< the lowest point of each: mpm/crumbs.h
@@ -96,8 +97,8 @@ BlockField block_field(const MpmState& state, const Block& block);
 void measure_motion(MpmState& state);
 
 /// One substep: forces of all blocks with contact at the colliders' present places, then the nodes.
-/// Adds what acts on the colliders to `loads`.
-void substep(MpmState& state, float dt, std::vector<ColliderLoad>& loads);
+/// Adds what acts on the colliders to `loads`. Returns how long it acted: kick_of() [s].
+float substep(MpmState& state, float dt, std::vector<ColliderLoad>& loads);
 
 /// The part of it that moves all nodes, under the forces that the blocks left in `force`.
 void move_nodes(MpmState& state, const NodeStep& step);

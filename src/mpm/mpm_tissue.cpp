@@ -90,11 +90,11 @@ int MpmTissue::run(Frame& frame, int substeps, float dt, double from, double to,
     s.colliders = frame.colliders.at(share);
     std::vector<ColliderLoad> loads(s.colliders.size());
     find_face_contacts(s, pieces_, dt);
-    substep(s, dt, loads);
+    const float acted = substep(s, dt, loads);
     s.time += dt;
-    frame.colliders.add_loads(share, s.colliders.data(), loads.data(), dt / frame.duration,
+    frame.colliders.add_loads(share, s.colliders.data(), loads.data(), acted / frame.duration,
                               result_.loads);
-    work_ += frame.colliders.power(s.colliders.data(), loads.data()) * dt;
+    work_ += frame.colliders.power(s.colliders.data(), loads.data()) * acted;
     if (checks == 0 || done + 1 != tear_check_at(check, checks, substeps)) continue;
     ++check;
     tearing = find_tearing(s);

@@ -55,6 +55,7 @@ class MpmTissue final : public Tissue {
   struct Checkpoint {
     Array<float> u[3], v[3];
     double time;
+    float dt;
     Contacts contacts;
     FaceContacts faces;
     FrameResult result;

@@ -25,7 +25,8 @@ constexpr double kBorne = 0.9;           // of the limit at the end of a part: e
 constexpr double kMostShortened = 0.25;  // ... and substeps made shorter by that at most ...
 constexpr double kLeastShortened = 0.7;  // ... and by that at least, ...
 constexpr double kShortest = 1e-3;       // ... until by that: then it is no use
-constexpr float kStrained = 8;           // BlockState::wildest, from which on energy is watched:
+constexpr float kStrained = 8;           // BlockState::wildest, from which on the margin grows
+constexpr double kStrainedMargin = 0.7;  // by that, and energy is watched:
 constexpr double kMostGain = 1.03;       // a part that grows it by more than was given is undone,
 constexpr double kHalf = 0.5;            // and done again with substeps half as long
 
@@ -77,7 +78,7 @@ double farthest_motion(const MpmState& state, const FrameInput& input) {
 
 }  // namespace
 
-bool SubstepChoice::watches_energy(const MpmState& state) { return state.wildest > kStrained; }
+bool SubstepChoice::is_strained(const MpmState& state) { return state.wildest > kStrained; }
 
 bool SubstepChoice::is_borne(const MpmState& state, const std::vector<float>& modulus,
                              double cautious, double dt, const PartEnergy& energy) {
@@ -92,7 +93,7 @@ bool SubstepChoice::is_borne(const MpmState& state, const std::vector<float>& mo
   const double now = energy.kinetic + energy.elastic;
   const double explained = kMostGain * energy_ + std::max(0.0, energy.given);
   const bool grew =
-      watches_energy(state) && now > explained && now > explained + by_gravity(state, energy);
+      is_strained(state) && now > explained && now > explained + by_gravity(state, energy);
   if ((dt <= kBorne * longest && !grew) || shortened_ < kShortest) {
     energy_ = now;
     return true;
@@ -181,7 +182,8 @@ double SubstepChoice::longest_foreseen(MpmState& state, const FrameInput& input,
   measure_if_due(state, measure);
   if (limit_ == 0) return cautious;
   const double asked = std::min(1.0, state.scene.cfl / Scene().cfl);
-  const double elastic = asked * kMargin * limit_ / std::sqrt(growth_ * trend_);
+  const double margin = kMargin * (is_strained(state) ? kStrainedMargin : 1);
+  const double elastic = asked * margin * limit_ / std::sqrt(growth_ * trend_);
   const double chosen = viscous_substep(elastic, fastest_damping(state, stiffening));
   const double motion = farthest_motion(state, input) / state.scene.cell_size;
   const double in_part = motion * std::min(1.0, kShortestPart * chosen * state.scene.frame_rate);

@@ -42,7 +42,8 @@ bool CudaMpmTissue::faces_may_meet() const {
 
 void CudaMpmTissue::run_substeps(int begin, int end, float dt) {
   while (begin < end) {
-    int count = end - begin;
+    // The frame's substeps are alike, but for the kick of the first.
+    int count = kick_of(state_->dt, dt) == dt ? end - begin : 1;
     if (faces_may_meet()) {
       FaceContacts& faces = state_->faces;
       if (is_due(faces.until_search, dt)) search_faces(dt);

@@ -27,7 +27,7 @@ double CudaMpmTissue::measure_limit(int steps) {
   CudaFrame frame{};
   for (int i = 0; i < 2; ++i) frame.force[i] = d.force[i].data();
   frame.substeps = 1;
-  frame.step.dt = 1;
+  frame.step.dt = frame.step.kick = 1;
   frame.arrived = d.arrived.data();
   // Between two parts of a frame nobody needs the state before a part, nor what contact pushes
   // with.

@@ -105,6 +105,7 @@ int CudaMpmTissue::run(int substeps, float dt, double from, double to,
   OnDevice& d = *device_;
   substeps_ = substeps;
   dt_ = dt;
+  kick_ = kick_of(state_->dt, dt);
   from_ = from;
   to_ = to;
   result_.substep = std::max(result_.substep, static_cast<double>(dt));
@@ -144,9 +145,10 @@ void CudaMpmTissue::sum_loads() {
       load.points = static_cast<double>(sum[6]);
       sum += kLoadSums;
     }
+    const float acted = i == 0 ? kick_ : dt_;
     colliders_->add_loads(share_of(i), d.host_colliders.data() + i * count, on.data(),
-                          dt_ / duration_, result_.loads);
-    work_ += colliders_->power(d.host_colliders.data() + i * count, on.data()) * dt_;
+                          acted / duration_, result_.loads);
+    work_ += colliders_->power(d.host_colliders.data() + i * count, on.data()) * acted;
   }
   substeps_ = 0;
 }
@@ -210,7 +212,8 @@ void CudaMpmTissue::launch(int begin, int end, float dt) {
   frame.current = d.current;
   frame.substeps = end - begin;
   frame.step.dt = dt;
-  frame.step.keep = static_cast<float>(std::exp(-scene.damping * dt));
+  frame.step.kick = kick_of(state_->dt, dt);
+  frame.step.keep = static_cast<float>(std::exp(-scene.damping * frame.step.kick));
   for (int a = 0; a < 3; ++a) frame.step.gravity[a] = static_cast<float>(scene.gravity[a]);
   frame.colliders = d.colliders.data() + begin * collider_count;
   frame.collider_count = static_cast<int>(collider_count);
@@ -234,6 +237,7 @@ void CudaMpmTissue::launch(int begin, int end, float dt) {
   }
   d.current = (d.current + end - begin) % 2;
   state_->time += static_cast<double>(end - begin) * dt;
+  state_->dt = dt;
 }
 
 FrameResult CudaMpmTissue::finish() {

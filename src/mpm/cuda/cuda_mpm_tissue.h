@@ -122,6 +122,7 @@ class CudaMpmTissue final : public Tissue {
   double duration_ = 0;                     ///< of the frame in flight [s]
   int substeps_ = 0;          ///< of its last part, as long as their loads are not summed
   float dt_ = 0;              ///< of these [s]
+  float kick_ = 0;            ///< kick_of() the first of them [s]
   double work_ = 0;           ///< of instruments in it [J]
   double from_ = 0, to_ = 0;  ///< shares of the frame where that part begins and ends
   std::optional<FrameColliders> colliders_;  ///< of the frame

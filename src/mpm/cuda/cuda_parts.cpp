@@ -62,6 +62,7 @@ void CudaMpmTissue::save_checkpoint() {
   }
   saved.kept = state_->faces.kept;
   saved.time = state_->time;
+  saved.dt = state_->dt;
   saved.result = result_;
 }
 
@@ -83,6 +84,7 @@ void CudaMpmTissue::restore_checkpoint() {
   state_->faces.kept = saved.kept;
   search_anew();
   state_->time = saved.time;
+  state_->dt = saved.dt;
   result_ = saved.result;
   substeps_ = 0;
   launch_measure();

@@ -94,6 +94,7 @@ struct CudaMpmTissue::OnDevice {
     std::vector<KeptContact> kept;
     bool new_facets = false;  ///< there were some that had not gone up
     double time = 0;
+    float dt = 0;
     FrameResult result;
     /// Room for those of `entries` of CudaTables::with that are not 0, which are few: where they
     /// are more, a part is not undone.

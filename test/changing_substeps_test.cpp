@@ -1,0 +1,84 @@
+// What holds while substeps change in length: tissue that swings widely stiffens and softens many
+// times a second, and its substeps follow.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+#include "either_device.h"
+#include "momentum.h"
+#include "stability_limit.h"
+
+namespace tissue_sim {
+namespace {
+
+template <class T>
+class ChangingSubsteps : public OnEitherDevice<T> {};
+TYPED_TEST_SUITE(ChangingSubsteps, Tissues, DeviceName);
+
+/// A free block, twisted and bent at `speed` [m/s].
+template <class T>
+void swing(T& tissue, double speed) {
+  pull(tissue);
+  MpmState& s = tissue.state();
+  const std::vector<Vec3> home = homes(s);
+  for (std::size_t i = 0; i < home.size(); ++i) {
+    const Vec3 x = home[i] / 0.01;
+    const Vec3 v = speed * Vec3(std::sin(1.7 * x[1]) * std::cos(x[2]), -std::sin(1.3 * x[2]),
+                                std::sin(2.1 * x[0]));
+    for (int a = 0; a < 3; ++a) s.nodes.v[a][i] = static_cast<float>(v[a]);
+  }
+  push(tissue);
+}
+
+TYPED_TEST(ChangingSubsteps, GiveNoEnergy) {
+  for (const Law law : {Law::kNeoHookean, Law::kFixedCorotated}) {
+    Scene scene = soft_body(0.45, Vec3(10, 8, 6), law);
+    scene.damping = scene.materials[0].viscosity = 0;
+    TypeParam tissue(scene);
+    swing(tissue, 2);
+    double start = 0, most = 0, shortest = 1, longest = 0;
+    for (int frame = 0; frame < 90; ++frame) {
+      tissue.advance(kFrame, {});
+      const FrameResult r = tissue.finish();
+      const double energy = r.kinetic_energy + r.elastic_energy;
+      if (frame == 0) start = energy;
+      most = std::max(most, energy);
+      shortest = std::min(shortest, r.substep);
+      longest = std::max(longest, r.substep);
+    }
+    std::printf("energy at most %.4f of what it was; substeps of %.0f to %.0f us\n", most / start,
+                1e6 * shortest, 1e6 * longest);
+    EXPECT_LT(most, 1.03 * start);
+    EXPECT_GT(longest, 1.5 * shortest);
+  }
+}
+
+TYPED_TEST(ChangingSubsteps, LeaveWhatToolsReportExact) {
+  Scene scene = soft_body(0.45, Vec3(8, 8, 8));
+  scene.tools.resize(1);
+  scene.tools[0].radius = 0.003;
+  TypeParam tissue(scene);
+  const std::vector<Vec3> home = homes(tissue.state());
+  const float longest = 0.7f * tissue.stable_substep();
+  Vec3 given = Vec3::Zero();
+  for (int frame = 0; frame < 8; ++frame) {
+    ToolMotion m;
+    m.present = true;
+    const double z = 0.01 - 0.0005 * frame;
+    m.begin.position = Vec3(0.001, 0, z);
+    m.end.position = Vec3(0.001, 0, z - 0.0005);
+    const int substeps = 20;
+    const float dt = frame % 2 == 0 ? longest : 0.4f * longest;
+    tissue.advance(substeps, dt, {{&m, 1}, {}});
+    given -= substeps * static_cast<double>(dt) * tissue.finish().loads[0].mean.force;
+  }
+  pull(tissue);
+  const Vec3 gained = momentum(tissue.state(), home).linear;
+  EXPECT_GT(gained.norm(), 1e-4);
+  EXPECT_LT((gained - given).norm() / gained.norm(), 3e-5);
+}
+
+}  // namespace
+}  // namespace tissue_sim

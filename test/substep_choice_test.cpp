@@ -141,17 +141,6 @@ TEST(SubstepChoice, IsCautiousWhereItCannotKnow) {
   EXPECT_EQ(pressed.substep_for({{&fast, 1}, {}}), cautious);
 }
 
-TEST(SubstepChoice, StaysWhereItHardlyGrows) {
-  SubstepChoice choice;
-  EXPECT_EQ(choice.count(1, 0.09), 12);
-  EXPECT_EQ(choice.count(1, 0.097), 12);    // eleven would do
-  EXPECT_EQ(choice.count(0.75, 0.097), 9);  // the rest of a frame, after three
-  EXPECT_EQ(choice.count(0.7, 0.097), 8);   // 8.4 of them
-  EXPECT_EQ(choice.count(0.7, 0.0875), 8);  // rounding aside, the longest
-  EXPECT_EQ(choice.count(0.7, 0.08), 9);    // too long now
-  EXPECT_EQ(choice.count(0.7, 0.2), 4);     // much longer now
-}
-
 TEST(SubstepChoice, UndoesWhatHasEnergyFromNowhere) {
   const auto borne = [](float wildest, double given, double gravity) {
     Scene scene = soft_body(0.45, Vec3(4, 4, 4));

@@ -7,10 +7,7 @@ namespace tissue_sim {
 void MpmTissue::advance(double duration, const FrameInput& input) {
   Frame frame = begin(duration, input);
   advance_in_parts(
-      duration, input,
-      [this](double time, const FrameInput& rest) {
-        return substep_.count(time, substep_for(rest));
-      },
+      duration, input, [this](const FrameInput& rest) { return substep_for(rest); },
       [this](const FrameInput& rest, int left, double dt) {
         return substep_.part(*state_, rest, left, dt);
       },

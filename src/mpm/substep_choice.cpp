@@ -19,7 +19,6 @@ constexpr double kMargin = 0.76;         // for what stiffens within the part, a
 constexpr double kFreeMotion = 0.25;     // of a tool in a part [cells]; beyond it the margin grows
 constexpr double kCalmTrend = 1.2;       // of the stiffness in a part: the next one is longer ...
 constexpr double kMostTrend = 1.3;       // ... or shorter
-constexpr double kHardlyShorter = 0.85;  // than the longest substep
 constexpr int kShortestPart = 6;         // substeps
 constexpr double kBorne = 0.9;           // of the limit at the end of a part: else it is undone ...
 constexpr double kMostShortened = 0.25;  // ... and substeps made shorter by that at most ...
@@ -120,16 +119,6 @@ void SubstepChoice::follow(MpmState& state, const std::vector<float>& modulus) {
   part_ = std::min(part_, frame);
   if (state.time == 0) part_ = frame;
   followed_at_ = state.time;
-}
-
-int SubstepChoice::count(double time, double longest) {
-  double count = std::max(1.0, std::ceil(time / longest));
-  if (last_ > kHardlyShorter * longest && last_ < 1.000001 * longest) {
-    const double again = std::round(time / last_);
-    if (std::fabs(time - again * last_) < 1e-3 * last_) count = again;
-  }
-  last_ = time / count;
-  return static_cast<int>(count);
 }
 
 int SubstepChoice::part(const MpmState& state, const FrameInput& input, int left, double dt) const {

@@ -49,11 +49,6 @@ class SubstepChoice {
   double longest(MpmState& state, const FrameInput& input, const Stiffening& stiffening,
                  const MeasureLimit& measure);
 
-  /// How many substeps of at most `longest` [s] the rest of a frame, `time` [s], takes. Those that
-  /// were, again, as long as they are hardly shorter: a swing near the limit gains or loses
-  /// whenever substeps change, and where they change often it gains.
-  int count(double time, double longest);
-
   /// How many of the `left` substeps of `dt` [s] of a frame with this input the next part is: all,
   /// unless something stiffened fast, was cut, or is pushed by a fast tool.
   int part(const MpmState& state, const FrameInput& input, int left, double dt) const;
@@ -72,7 +67,6 @@ class SubstepChoice {
   double part_ = 0;         ///< how long the next part may be [s]
   double followed_at_ = 0;  ///< [s]
   double energy_ = NAN;     ///< after the last part that was borne [J]
-  double last_ = 0;         ///< the substep that was chosen last [s]
   double shortened_ = 1;    ///< how much substeps are shorter than they would be, after parts that
                             ///< were not borne
 };
@@ -86,15 +80,15 @@ struct PartRun {
 
 /// Advances a frame of `duration` seconds in parts: a thread of tissue that snaps, or what a fast
 /// tool squeezes, may stiffen twofold within a frame.
-///   count(time, input)            see SubstepChoice
+///   substep_for(input)            the longest that is stable [s]
 ///   part(input, left, dt)         see SubstepChoice
 ///   run(substeps, dt, from, to)   from and to: shares of the frame. Returns the PartRun
-template <class Count, class Part, class Run>
-void advance_in_parts(double duration, FrameInput input, const Count& count, const Part& part,
-                      const Run& run) {
+template <class SubstepFor, class Part, class Run>
+void advance_in_parts(double duration, FrameInput input, const SubstepFor& substep_for,
+                      const Part& part, const Run& run) {
   for (double from = 0; from < 1;) {
     const double time = duration * (1 - from);
-    const int left = count(time, input);
+    const int left = std::max(1, static_cast<int>(std::ceil(time / substep_for(input))));
     const int substeps = part(input, left, time / left);
     const double to = substeps == left ? 1 : from + (1 - from) * substeps / left;
     const PartRun part_run = run(substeps, static_cast<float>(time / left), from, to);

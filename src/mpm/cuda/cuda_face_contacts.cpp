@@ -42,7 +42,7 @@ bool CudaMpmTissue::faces_may_meet() const {
 
 void CudaMpmTissue::run_substeps(int begin, int end, float dt) {
   while (begin < end) {
-    // The frame's substeps are alike, but for the kick of the first.
+    // Substeps of a launch have one kick: the first after a change is a launch of its own.
     int count = kick_of(state_->dt, dt) == dt ? end - begin : 1;
     if (faces_may_meet()) {
       FaceContacts& faces = state_->faces;

@@ -32,20 +32,22 @@ Apart take_apart(MpmState& state, const std::vector<std::int32_t>& changed,
   Apart apart;
   if (changed.empty()) return apart;
   std::vector<NodeFields::Cell> cells;
+  Softened softened;
   state.cpu->both(
       [&] {
         cells = state.fields->update(state.bodies, state.points, changed, state.nodes, *state.cpu);
       },
       [&] {
-        apart.softened = soften(state.bodies, changed, state.points);
+        softened = soften(state.bodies, changed, state.points);
         state.blocks.stale_facets.resize(lattice_node_count(state.bodies), 0);
         mark_stale_facets(state.bodies, state.points, changed, state.blocks.stale_facets);
       });
-  for (const std::int32_t p : apart.softened) {  // blocks must know
+  for (const std::int32_t p : softened.points) {  // blocks must know
     const Points::Site& s = state.points.site[p];
     cells.push_back({s.body, s.x / 2, s.y / 2, s.z / 2});
   }
-  settle_crumbs(state.bodies, state.points, *state.fields, changed, state.crumbs, state.nodes);
+  settle_crumbs(state.bodies, state.points, *state.fields, softened.crumbs, state.nodes);
+  state.crumbs.insert(softened.crumbs.begin(), softened.crumbs.end());
   state.cpu->both(
       [&] {
         if (cells.empty()) return;
@@ -61,6 +63,7 @@ Apart take_apart(MpmState& state, const std::vector<std::int32_t>& changed,
         list_threads(state, changed);
         meanwhile();
       });
+  apart.softened = std::move(softened.points);
   apart.new_blocks = !cells.empty();
   return apart;
 }

@@ -179,13 +179,13 @@ std::vector<NodeFields::Cell> NodeFields::update(const std::vector<LatticeBody>&
     }
     splits_[index] = std::move(now[i]);
   }
-  nodes.resize(node_count + parent_of_new.size());
-  for (std::size_t i = 0; i < parent_of_new.size(); ++i) {
-    for (int c = 0; c < 3; ++c) {
-      nodes.u[c][node_count + i] = nodes.u[c][parent_of_new[i]];
-      nodes.v[c][node_count + i] = nodes.v[c][parent_of_new[i]];
-    }
-  }
+  Array<float>* const fields[] = {&nodes.u[0], &nodes.u[1], &nodes.u[2], &nodes.v[0],
+                                  &nodes.v[1], &nodes.v[2], &nodes.mass, &nodes.inv_mass};
+  cpu.for_each(8, [&](int k) {
+    Array<float>& of = *fields[k];
+    of.resize(node_count + parent_of_new.size());
+    for (std::size_t i = 0; i < parent_of_new.size(); ++i) of[node_count + i] = of[parent_of_new[i]];
+  });
   cpu.for_each(
       static_cast<int>(apart.size()),
       [&](int i) {

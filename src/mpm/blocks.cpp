@@ -142,10 +142,11 @@ void connect_forces(Blocks& blocks, const std::vector<LatticeBody>& bodies, int 
   for (int i = 0; i < split_count; i += kSplitRow) add_row(row++, blocks.first_split_node + i);
 }
 
-/// Makes the blocks of some regions anew, then block by block their facets.
+/// Makes the blocks of some regions anew, then block by block their facets; meanwhile connects the
+/// forces of all blocks.
 void fill_regions(Blocks& blocks, const std::vector<int>& some,
                   const std::vector<LatticeBody>& bodies, const Points& points,
-                  const NodeFields& fields, Cpu& cpu) {
+                  const NodeFields& fields, int node_count, Cpu& cpu) {
   const int count = static_cast<int>(some.size());
   std::vector<KnownFacets> known(count);
   cpu.for_each(count, [&](int i) {
@@ -157,10 +158,13 @@ void fill_regions(Blocks& blocks, const std::vector<int>& some,
   for (int i = 0; i < count; ++i) {
     for (Block& b : blocks.regions[some[i]].blocks) made.emplace_back(&b, &known[i]);
   }
-  cpu.for_each(static_cast<int>(made.size()), [&](int i) {
-    Block& b = *made[i].first;
-    b.facets = facets_of(bodies[b.body], points, b, *made[i].second);
-  });
+  cpu.both([&] { connect_forces(blocks, bodies, node_count); },
+           [&] {
+             cpu.for_each(static_cast<int>(made.size()), [&](int i) {
+               Block& b = *made[i].first;
+               b.facets = facets_of(bodies[b.body], points, b, *made[i].second);
+             });
+           });
 }
 
 }  // namespace
@@ -183,8 +187,7 @@ Blocks make_blocks(const std::vector<LatticeBody>& bodies, const Points& points,
   }
   std::vector<int> all(blocks.regions.size());
   std::iota(all.begin(), all.end(), 0);
-  fill_regions(blocks, all, bodies, points, fields, cpu);
-  connect_forces(blocks, bodies, lattice_node_count(bodies));
+  fill_regions(blocks, all, bodies, points, fields, lattice_node_count(bodies), cpu);
   return blocks;
 }
 
@@ -206,7 +209,7 @@ void update_blocks(Blocks& blocks, const std::vector<LatticeBody>& bodies, const
   for (std::size_t i = 0; i < blocks.regions.size(); ++i) {
     if (touched(blocks.regions[i])) anew.push_back(static_cast<int>(i));
   }
-  fill_regions(blocks, anew, bodies, points, fields, cpu);
+  fill_regions(blocks, anew, bodies, points, fields, node_count, cpu);
   std::vector<std::uint8_t> is_new(blocks.regions.size(), 0);
   for (const int i : anew) {
     is_new[i] = 1;
@@ -227,7 +230,6 @@ void update_blocks(Blocks& blocks, const std::vector<LatticeBody>& bodies, const
       blocks.origin.push_back(is_new[i] != 0 ? before[i] : Blocks::Origin{same, same + 1});
     }
   }
-  connect_forces(blocks, bodies, node_count);
 }
 
 }  // namespace tissue_sim

@@ -194,35 +194,34 @@ void make_rigid(const LatticeBody& body, const Points& points, const NodeFields&
 
 }  // namespace
 
-std::vector<std::int32_t> soften(const std::vector<LatticeBody>& bodies,
-                                 const std::vector<std::int32_t>& changed, Points& points) {
-  std::vector<std::int32_t> softened;
+Softened soften(const std::vector<LatticeBody>& bodies, const std::vector<std::int32_t>& changed,
+                Points& points) {
+  Softened softened;
+  std::set<std::int32_t> seen;  // crumbs, by their lowest points
   const auto mark = [&](std::int32_t p) {
     if (points.soft.empty()) points.soft.resize(points.size(), 0);
-    if (points.soft[p] == 0) softened.push_back(p);
+    if (points.soft[p] == 0) softened.points.push_back(p);
     points.soft[p] = 1;
   };
   for (const std::int32_t p : changed) {
     const LatticeBody& body = bodies[points.site[p].body];
     if (is_in_slice(body, points, p)) mark(p);
-    for (const std::int32_t of_crumb : Crumb(body, points, p)) mark(of_crumb);
+    const Crumb crumb(body, points, p);
+    if (crumb.count == 0) continue;
+    for (const std::int32_t of_crumb : crumb) mark(of_crumb);
+    const std::int32_t lowest = *std::min_element(crumb.begin(), crumb.end());
+    if (seen.insert(lowest).second) softened.crumbs.push_back(lowest);
   }
   return softened;
 }
 
 void settle_crumbs(const std::vector<LatticeBody>& bodies, const Points& points,
-                   const NodeFields& fields, const std::vector<std::int32_t>& changed,
-                   std::set<std::int32_t>& crumbs, Nodes& nodes) {
-  std::set<std::int32_t> settled;
-  for (const std::int32_t p : changed) {
-    const LatticeBody& body = bodies[points.site[p].body];
-    const Crumb crumb(body, points, p);
-    if (crumb.count == 0) continue;
-    const std::int32_t lowest = *std::min_element(crumb.begin(), crumb.end());
-    if (!settled.insert(lowest).second) continue;
-    make_rigid(body, points, fields, crumb, nodes);
+                   const NodeFields& fields, const std::vector<std::int32_t>& crumbs,
+                   Nodes& nodes) {
+  for (const std::int32_t lowest : crumbs) {
+    const LatticeBody& body = bodies[points.site[lowest].body];
+    make_rigid(body, points, fields, Crumb(body, points, lowest), nodes);
   }
-  crumbs.insert(settled.begin(), settled.end());
 }
 
 bool settle_wild_crumbs(const std::vector<LatticeBody>& bodies, const Points& points,

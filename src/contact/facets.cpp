@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <limits>
 #include <optional>
 
 #include "contact/known_facets.h"
@@ -17,6 +16,8 @@ namespace tissue_sim {
 namespace {
 
 constexpr float kOneFace = 0.5f;  // cosine between normals
+
+constexpr unsigned kUpper[3] = {0xaa, 0xcc, 0xf0};  // a cell's upper points along each axis, a bit each
 
 /// Bonds of a cell's points that are gone in one direction, on one level of the cell.
 struct Side {
@@ -32,7 +33,6 @@ struct Side {
   }
   /// The points of the level, a bit each.
   unsigned points() const {
-    constexpr unsigned kUpper[3] = {0xaa, 0xcc, 0xf0};
     return level == 1 ? kUpper[axis] : 0xff & ~kUpper[axis];
   }
 };
@@ -90,26 +90,16 @@ template <class PlaneAt>
 Facet make_facet(double cell_size, int cell, const Side& side, const std::int32_t (&around)[8],
                  unsigned members, const PlaneAt& plane_at) {
   Facet f;
-  f.point = std::numeric_limits<std::int32_t>::max();
+  f.point = around[__builtin_ctz(members)];  // numbered along x, then y, then z
   f.cell = cell;
   f.direction = static_cast<std::uint8_t>(side.direction);
-  double low[2] = {1, 1}, high[2] = {-1, -1}, middle[2] = {};
-  int count = 0;
-  for (int s = 0; s < 8; ++s) {
-    if ((members >> s & 1) == 0) continue;
-    f.point = std::min(f.point, around[s]);
-    ++count;
-    for (int l = 0; l < 2; ++l) {
-      const double at = s >> side.lateral[l] & 1 ? 0.25 : -0.25;
-      low[l] = std::min(low[l], at - 0.25);
-      high[l] = std::max(high[l], at + 0.25);
-      middle[l] += at;
-    }
-  }
+  const int count = __builtin_popcount(members);
+  double middle[2];
   for (int l = 0; l < 2; ++l) {
-    middle[l] /= count;
+    const int upper = __builtin_popcount(members & kUpper[side.lateral[l]]);
+    middle[l] = 0.25 * (2 * upper - count) / count;
     f.center[side.lateral[l]] = static_cast<float>(middle[l]);
-    f.extent[side.lateral[l]] = static_cast<float>(0.5 * (high[l] - low[l]));
+    f.extent[side.lateral[l]] = upper == 0 || upper == count ? 0.25f : 0.5f;
   }
   const Plane plane = plane_at(middle);
   const double face = 0.5 * (side.level - 1) + (side.sign > 0 ? 0.5 : 0.0);
@@ -127,14 +117,15 @@ struct Missing {
   std::int32_t beyond[kBondCount][8];                     ///< where it broke: the other point
   bool any_cut = false;
 
-  Missing(const LatticeBody& body, const Points& points, const std::int32_t (&around)[8]) {
+  Missing(const LatticeBody& body, const Points& points, const Place& corner,
+          const std::int32_t (&around)[8]) {
     for (int s = 0; s < 8; ++s) {
-      if (around[s] < 0 || points.bonds[around[s]] == kAllBonds) continue;
-      const Points::Site& site = points.site[around[s]];
+      if (around[s] < 0) continue;
       for (unsigned gone = kAllBonds & ~points.bonds[around[s]]; gone != 0; gone &= gone - 1) {
         const int k = __builtin_ctz(gone);
         const BondOffset o = bond_offset(k);
-        beyond[k][s] = body.point(site.x + o.x, site.y + o.y, site.z + o.z);
+        beyond[k][s] = body.point(corner[0] + (s & 1) + o.x, corner[1] + (s >> 1 & 1) + o.y,
+                                  corner[2] + (s >> 2) + o.z);
         const bool is_cut = beyond[k][s] >= 0;
         (is_cut ? cut : outer)[k] |= 1u << s;
         any_cut = any_cut || is_cut;
@@ -262,7 +253,7 @@ std::vector<Facet> facets_of(const LatticeBody& body, const Points& points, cons
         };
         if (std::all_of(std::begin(around), std::end(around), is_whole)) continue;
         const Place corner = {2 * x, 2 * y, 2 * (block.z + z)};
-        const Missing missing(body, points, around);
+        const Missing missing(body, points, corner, around);
         if (!missing.any_cut && !known.none() && is_one_part(body, corner, around)) {
           known.take(x, y, block.z + z, around, cell, facets);
           continue;

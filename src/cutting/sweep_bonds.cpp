@@ -62,10 +62,18 @@ constexpr unsigned kBrought = 0x40, kNear = 0x80;
 
 /// The same byte eight times.
 constexpr std::uint64_t eight(std::uint64_t byte) { return byte * 0x0101010101010101; }
-/// The bytes of up to eight points, the first one lowest.
-std::uint64_t bytes_of(const std::uint8_t* points, int count) {
+/// The bytes of up to eight points from `first` on, that one's lowest.
+template <class Bytes>
+std::uint64_t bytes_of(const Bytes& points, std::int32_t first, int count) {
   std::uint64_t bytes = 0;
-  count >= 8 ? std::memcpy(&bytes, points, 8) : std::memcpy(&bytes, points, count);
+  if (count >= 8) {
+    std::memcpy(&bytes, &points[first], 8);
+  } else if (first + count >= 8) {  // a copy of so many bytes would be a call
+    std::memcpy(&bytes, &points[first + count - 8], 8);
+    bytes >>= 8 * (8 - count);
+  } else {
+    std::memcpy(&bytes, &points[first], count);
+  }
   return bytes;
 }
 
@@ -184,7 +192,7 @@ class Sweep {
 
   bool any_near(std::int32_t point, int count) const {
     std::uint64_t near = 0;
-    for (int i = 0; i < count; i += 8) near |= bytes_of(&known_[point + i], count - i);
+    for (int i = 0; i < count; i += 8) near |= bytes_of(known_, point + i, count - i);
     return (near & eight(kNear)) != 0;
   }
   /// Adds those bonds from `count` points to as many others, neighbours along an axis, that the
@@ -193,7 +201,7 @@ class Sweep {
                   std::vector<BrokenBond>& broken) const {
     for (int i = 0; i < count; i += 8) {
       const auto bytes = [i, count](const auto& of, std::int32_t first) {
-        return bytes_of(of.data() + first + i, count - i);
+        return bytes_of(of, first + i, count - i);
       };
       std::uint64_t left = bytes(known_, point) & eight(kNear);
       if (left == 0) continue;

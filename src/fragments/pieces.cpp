@@ -24,14 +24,15 @@ std::vector<Run> runs_of(const Points& points) {
   for (std::int32_t p = 0; p < count;) {
     std::uint64_t bonds = 0;  // of eight points
     std::memcpy(&bonds, &points.bonds[p], std::min(8, count - p));
-    if ((bonds & kBackInX) == kBackInX) {
+    const std::uint64_t gone = ~bonds & kBackInX;
+    if (gone == 0) {
       p += 8;
       continue;
     }
-    if ((bonds & kBackInX & 0xff) == 0) {
-      if (!runs.empty()) runs.back().end = p;
-      runs.push_back({p, count});
-    }
+    p += __builtin_ctzll(gone) / 8;
+    if (p >= count) break;
+    if (!runs.empty()) runs.back().end = p;
+    runs.push_back({p, count});
     ++p;
   }
   return runs;

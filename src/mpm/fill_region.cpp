@@ -94,9 +94,14 @@ void fill_side(Block& block, const LatticeBody& b, const Points& points, const P
     for (int s = 0; s < 8; ++s) {
       if (c.point[s] < 0) continue;
       const std::size_t lane = (static_cast<std::size_t>(z) * 8 + s) * block.stride + column;
+      float* const volume = &block.volume[lane];
+      std::int32_t* const point = &block.point[lane];
       for (int i = 0; i < c.cells; ++i) {
-        block.volume[lane + i] = elastic_volume(points, c.point[s] + 2 * i);
-        block.point[lane + i] = c.point[s] + 2 * i;
+        point[i] = c.point[s] + 2 * i;
+        volume[i] = points.volume[point[i]];
+      }
+      if (!points.soft.empty()) {
+        for (int i = 0; i < c.cells; ++i) volume[i] = elastic_volume(points, point[i]);
       }
       if (c.count < kSteadyCount) {
         mu += lame_mu(b.material_of(points, c.point[s])) * block.volume[lane];

@@ -147,9 +147,9 @@ std::vector<RegionShares::Reached> RegionShares::connected(
       for (unsigned faces = cell->faces; faces != 0; faces &= faces - 1) {
         const int k = __builtin_ctz(faces);
         if (!within[k]) continue;
-        const bool along_x = axis_of(k) == 0;
         const Cell* other = k == kForwardBond ? cell + c.cells : cell + step_[k];
-        for (int i = 0; i < (along_x ? 1 : c.cells); ++i, ++other) {
+        const Cell* const end = other + (axis_of(k) == 0 ? 1 : c.cells);
+        for (; other < end; ++other) {
           if (other->count == 1) {
             reach(other->first, k);
             continue;
@@ -161,13 +161,23 @@ std::vector<RegionShares::Reached> RegionShares::connected(
       }
       continue;
     }
+    unsigned leaving[kBondCount] = {};  // in each direction: points that hold on to others there
     for (int s = 0; s < 8; ++s) {
       if (c.point[s] < 0) continue;
-      // Points of a cell that are bound see the same fields: they are of one share.
       for (unsigned bonds = points_.bonds[c.point[s]] & kLeaving[s]; bonds != 0;
            bonds &= bonds - 1) {
-        const int k = __builtin_ctz(bonds);
-        if (within[k]) reach(share_with(cell[step_[k]], s ^ 1 << axis_of(k)), k);
+        leaving[__builtin_ctz(bonds)] |= 1u << s;
+      }
+    }
+    for (int k = 0; k < kBondCount; ++k) {
+      if (!within[k] || leaving[k] == 0) continue;
+      const Cell& other = cell[step_[k]];
+      if (other.count == 1) {
+        reach(other.first, k);
+        continue;
+      }
+      for (unsigned points = leaving[k]; points != 0; points &= points - 1) {
+        reach(share_with(other, __builtin_ctz(points) ^ 1 << axis_of(k)), k);
       }
     }
   }
@@ -233,15 +243,22 @@ void RegionShares::add_cell(int x, int y, int z, const std::int32_t (&point)[8],
 }
 
 bool RegionShares::see_the_same(int x, int y, int z, int s, int t) const {
-  constexpr int kMiddle = 13;  // where points differ the most
-  for (int i = 0; i < 27; ++i) {
-    const int k = (i + kMiddle) % 27, dx = k % 3, dy = k / 3 % 3, dz = k / 9;
+  const auto same_at = [&](int dx, int dy, int dz) {
     const NodeFields::Split* split = split_[node_at(x + dx, y + dy, z + dz)];
     const auto field = [&](int sub) {
       return split->field_at((sub >> 2) - 2 * dz + 4,
                              bit_in_plane((sub & 1) - 2 * dx + 4, (sub >> 1 & 1) - 2 * dy + 4));
     };
-    if (split != nullptr && field(s) != field(t)) return false;
+    return split == nullptr || field(s) == field(t);
+  };
+  if (!same_at(1, 1, 1)) return false;  // where points differ the most
+  for (int dz = 0; dz < 3; ++dz) {
+    for (int dy = 0; dy < 3; ++dy) {
+      if (split_in_row_[node_at(x, y + dy, z + dz)] == 0) continue;
+      for (int dx = 0; dx < 3; ++dx) {
+        if (!same_at(dx, dy, dz)) return false;
+      }
+    }
   }
   return true;
 }

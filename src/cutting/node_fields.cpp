@@ -78,17 +78,21 @@ double mass_of_point(const LatticeBody& body, const Points& points, const NodeFi
   return mass;
 }
 
+/// A cell and its lattice node.
+struct CellNode {
+  NodeFields::Cell cell;
+  int node;
+};
 /// The cells whose nodes one of the points belongs to, in the order of their nodes: so the new
 /// nodes of a row follow one another.
-std::vector<NodeFields::Cell> cells_around(const std::vector<LatticeBody>& bodies,
-                                           const Points& points,
-                                           const std::vector<std::int32_t>& some) {
-  std::vector<NodeFields::Cell> cells;
+std::vector<CellNode> cells_around(const std::vector<LatticeBody>& bodies, const Points& points,
+                                   const std::vector<std::int32_t>& some) {
+  std::vector<CellNode> cells;
   for (std::size_t i = 0; i < bodies.size(); ++i) {
     const CellsAround around(bodies[i], 1, points, some);
-    around.for_each_row([&](int x, int y, int z, int, const std::uint8_t* near, int count) {
+    around.for_each_row([&](int x, int y, int z, int node, const std::uint8_t* near, int count) {
       for (int n = 0; n < count; ++n) {
-        if (near[n] != 0) cells.push_back({static_cast<int>(i), x + n, y, z});
+        if (near[n] != 0) cells.push_back({{static_cast<int>(i), x + n, y, z}, node + n});
       }
     });
   }
@@ -126,8 +130,7 @@ int NodeFields::node(const LatticeBody& body, const Points::Site& p, int k) cons
   return node(body, p, p.x / 2 + k % 3 - 1, p.y / 2 + k / 3 % 3 - 1, p.z / 2 + k / 9 - 1);
 }
 
-NodeFields::Split NodeFields::taken_apart(const LatticeBody& body, const Cell& c) const {
-  const int lattice_node = body.node(c.x, c.y, c.z);
+NodeFields::Split NodeFields::taken_apart(const Cell& c, int lattice_node) const {
   const Split* before = split(lattice_node);
   Planes found[216];
   const int count = bonds_.find_components(c.body, c.x, c.y, c.z, found);
@@ -154,14 +157,13 @@ std::vector<NodeFields::Cell> NodeFields::update(const std::vector<LatticeBody>&
                                                  const std::vector<std::int32_t>& changed,
                                                  Nodes& nodes, Cpu& cpu) {
   bonds_.update(points, changed);
-  const std::vector<Cell> cells = cells_around(bodies, points, changed);
-  const auto node_of = [&](const Cell& c) { return bodies[c.body].node(c.x, c.y, c.z); };
+  const std::vector<CellNode> cells = cells_around(bodies, points, changed);
   if (split_of_.empty()) split_of_.assign(lattice_node_count(bodies), -1);
   std::vector<Split> now(cells.size());
   cpu.for_each(
       static_cast<int>(cells.size()),
-      [&](int i) { now[i] = taken_apart(bodies[cells[i].body], cells[i]); }, 32);
-  std::vector<Cell> apart;
+      [&](int i) { now[i] = taken_apart(cells[i].cell, cells[i].node); }, 32);
+  std::vector<CellNode> apart;
   std::vector<std::int32_t> parent_of_new;  // the node that a new one was a part of
   const int node_count = static_cast<int>(nodes.size());
   for (std::size_t i = 0; i < cells.size(); ++i) {
@@ -172,7 +174,7 @@ std::vector<NodeFields::Cell> NodeFields::update(const std::vector<LatticeBody>&
       parent_of_new.push_back(~f.node);
       f.node = node_count + static_cast<std::int32_t>(parent_of_new.size()) - 1;
     }
-    std::int32_t& index = split_of_[node_of(cells[i])];
+    std::int32_t& index = split_of_[cells[i].node];
     if (index < 0) {
       index = static_cast<std::int32_t>(splits_.size());
       splits_.emplace_back();
@@ -189,14 +191,17 @@ std::vector<NodeFields::Cell> NodeFields::update(const std::vector<LatticeBody>&
   cpu.for_each(
       static_cast<int>(apart.size()),
       [&](int i) {
-        const Cell& c = apart[i];
-        for (const Split::Field& f : split(node_of(c))->fields) {
-          share_mass(bodies[c.body], points, c, mass_of_point_[node_of(c)], f.points, f.node,
+        const auto& [cell, node] = apart[i];
+        for (const Split::Field& f : split(node)->fields) {
+          share_mass(bodies[cell.body], points, cell, mass_of_point_[node], f.points, f.node,
                      nodes);
         }
       },
       32);
-  return apart;
+  std::vector<Cell> result;
+  result.reserve(apart.size());
+  for (const CellNode& a : apart) result.push_back(a.cell);
+  return result;
 }
 
 }  // namespace tissue_sim

@@ -64,7 +64,7 @@ class NodeFields {
  private:
   /// How the node of a cell is split now, if otherwise than before, else nothing. The first
   /// component that was part of a field keeps it; for others `node` is ~ their parent.
-  Split taken_apart(const LatticeBody& body, const Cell& cell) const;
+  Split taken_apart(const Cell& cell, int lattice_node) const;
 
   BondWindows bonds_;
   /// Per lattice node: the mass of each of its points where it is the same for all and none is

@@ -300,6 +300,9 @@ void sweep_bonds(MpmState& state, const BladePath& path, const Array<float>* u_b
     of_layer[i] = sweep.broken_bonds(*layers[i].first, layers[i].second);
   });
   std::vector<BrokenBond> broken;
+  std::size_t count = 0;
+  for (const auto& some : of_layer) count += some.size();
+  broken.reserve(count);
   for (const auto& some : of_layer) broken.insert(broken.end(), some.begin(), some.end());
   break_bonds(state, broken, changed, report);
 }

@@ -17,7 +17,8 @@ namespace {
 
 constexpr float kOneFace = 0.5f;  // cosine between normals
 
-constexpr unsigned kUpper[3] = {0xaa, 0xcc, 0xf0};  // a cell's upper points along each axis, a bit each
+constexpr unsigned kUpper[3] = {0xaa, 0xcc,
+                                0xf0};  // a cell's upper points along each axis, a bit each
 
 /// Bonds of a cell's points that are gone in one direction, on one level of the cell.
 struct Side {
@@ -32,9 +33,7 @@ struct Side {
     lateral[1] = (axis + 2) % 3;
   }
   /// The points of the level, a bit each.
-  unsigned points() const {
-    return level == 1 ? kUpper[axis] : 0xff & ~kUpper[axis];
-  }
+  unsigned points() const { return level == 1 ? kUpper[axis] : 0xff & ~kUpper[axis]; }
 };
 
 /// How a face lies where bonds are gone.

@@ -186,7 +186,8 @@ std::vector<NodeFields::Cell> NodeFields::update(const std::vector<LatticeBody>&
   cpu.for_each(8, [&](int k) {
     Array<float>& of = *fields[k];
     of.resize(node_count + parent_of_new.size());
-    for (std::size_t i = 0; i < parent_of_new.size(); ++i) of[node_count + i] = of[parent_of_new[i]];
+    for (std::size_t i = 0; i < parent_of_new.size(); ++i)
+      of[node_count + i] = of[parent_of_new[i]];
   });
   cpu.for_each(
       static_cast<int>(apart.size()),

@@ -31,10 +31,10 @@ inline float elastic_volume(const Points& points, std::int32_t point) {
   return (points.is_soft(point) ? kSoftness : 1.0f) * points.volume[point];
 }
 
-/// Lets crumbs, each given by its lowest point, move on as rigid bodies without strain. Their momentum stays, linear and angular; what else a torn thread left in their nodes, a
-/// swing of many times their size, goes. No crumb turns
-/// faster than kCrumbSpin times the speed of sound in a rod a cell, which strains it by a tenth or
-/// two: the rest goes to the tissue beside it.
+/// Lets crumbs, each given by its lowest point, move on as rigid bodies without strain. Their
+/// momentum stays, linear and angular; what else a torn thread left in their nodes, a swing of many
+/// times their size, goes. No crumb turns faster than kCrumbSpin times the speed of sound in a rod
+/// a cell, which strains it by a tenth or two: the rest goes to the tissue beside it.
 void settle_crumbs(const std::vector<LatticeBody>& bodies, const Points& points,
                    const NodeFields& fields, const std::vector<std::int32_t>& crumbs, Nodes& nodes);
 /// The same for those that have become wild since (mpm/deformation.h). Returns whether any had.

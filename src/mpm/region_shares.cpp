@@ -141,12 +141,13 @@ std::vector<RegionShares::Reached> RegionShares::connected(
   for (std::size_t next = 0; next < order.size(); ++next) {
     const CellShare& c = all_[order[next].share];
     const Cell* cell = &cells_[(c.z * r_.ny + c.y) * r_.nx + c.x];
-    const bool within[kBondCount] = {
-        c.z > 0, c.y > 0, c.x > 0, c.x + c.cells < r_.nx, c.y + 1 < r_.ny, c.z + 1 < r_.nz};
+    // Bonds that stay within the region, a bit each.
+    const unsigned within = unsigned{c.z > 0} | unsigned{c.y > 0} << 1 | unsigned{c.x > 0} << 2 |
+                            unsigned{c.x + c.cells < r_.nx} << 3 | unsigned{c.y + 1 < r_.ny} << 4 |
+                            unsigned{c.z + 1 < r_.nz} << 5;
     if (cell->count == 1 && cell->faces != Cell::kUneven) {
-      for (unsigned faces = cell->faces; faces != 0; faces &= faces - 1) {
+      for (unsigned faces = cell->faces & within; faces != 0; faces &= faces - 1) {
         const int k = __builtin_ctz(faces);
-        if (!within[k]) continue;
         const Cell* other = k == kForwardBond ? cell + c.cells : cell + step_[k];
         const Cell* const end = other + (axis_of(k) == 0 ? 1 : c.cells);
         for (; other < end; ++other) {
@@ -164,13 +165,13 @@ std::vector<RegionShares::Reached> RegionShares::connected(
     unsigned leaving[kBondCount] = {};  // in each direction: points that hold on to others there
     for (int s = 0; s < 8; ++s) {
       if (c.point[s] < 0) continue;
-      for (unsigned bonds = points_.bonds[c.point[s]] & kLeaving[s]; bonds != 0;
+      for (unsigned bonds = points_.bonds[c.point[s]] & kLeaving[s] & within; bonds != 0;
            bonds &= bonds - 1) {
         leaving[__builtin_ctz(bonds)] |= 1u << s;
       }
     }
     for (int k = 0; k < kBondCount; ++k) {
-      if (!within[k] || leaving[k] == 0) continue;
+      if (leaving[k] == 0) continue;
       const Cell& other = cell[step_[k]];
       if (other.count == 1) {
         reach(other.first, k);

@@ -7,31 +7,31 @@ namespace tissue_sim {
 void MpmTissue::advance(double duration, const FrameInput& input) {
   Frame frame = begin(duration, input);
   advance_in_parts(
-      duration, input, [this](const FrameInput& rest) { return substep_for(rest); },
-      [this](const FrameInput& rest, int left, double dt) {
-        return substep_.part(*state_, rest, left, dt);
+      duration, input,
+      [this](const FrameInput& rest, double time) {
+        return substep_.part(*state_, rest, time, substep_for(rest));
       },
-      [&](int substeps, float dt, double from, double to) {
-        return run_part(frame, substeps, dt, from, to);
+      [&](const PartSubsteps& substeps, double from, double to) {
+        return run_part(frame, substeps, from, to);
       });
   end(frame);
 }
 
-PartRun MpmTissue::run_part(Frame& frame, int substeps, float dt, double from, double to) {
+PartRun MpmTissue::run_part(Frame& frame, const PartSubsteps& substeps, double from, double to) {
   save_checkpoint();
   std::vector<TearingPoint> tearing;
   const bool watched = SubstepChoice::is_strained(*state_);
   work_ = 0;
-  const int done = run(frame, substeps, dt, from, to, tearing);
-  const double reached = done == substeps ? to : from + (to - from) * done / substeps;
+  const int done = run(frame, substeps, from, to, tearing);
+  const double reached = done == substeps.count ? to : substeps.share(done, from, to);
   PartEnergy energy;
   if (!watched && (reached < 1 || frame.blades)) {
     measure_stiffness();
   } else {
     measure_energies();
-    energy = {result_.kinetic_energy, result_.elastic_energy, work_, done * dt};
+    energy = {result_.kinetic_energy, result_.elastic_energy, work_, substeps.until(done)};
   }
-  if (!substep_.is_borne(*state_, modulus_, stable_substep(), dt, energy)) {
+  if (!substep_.is_borne(*state_, modulus_, stable_substep(), substeps.at(done - 1), energy)) {
     restore_checkpoint();
     return {PartEnd::kUndone, from};
   }

@@ -78,15 +78,16 @@ MpmTissue::Frame MpmTissue::begin(double duration, const FrameInput& input) {
   return frame;
 }
 
-int MpmTissue::run(Frame& frame, int substeps, float dt, double from, double to,
+int MpmTissue::run(Frame& frame, const PartSubsteps& substeps, double from, double to,
                    std::vector<TearingPoint>& tearing) {
   MpmState& s = *state_;
-  const int checks = can_tear(s) ? tear_checks(s, substeps, dt) : 0;
+  const int checks = can_tear(s) ? tear_checks(s, substeps.count, substeps.longest()) : 0;
   measured_ = false;
-  result_.substep = std::max(result_.substep, static_cast<double>(dt));
+  result_.substep = std::max<double>(result_.substep, substeps.longest());
   int done = 0;
-  for (int check = 0; done < substeps && tearing.empty(); ++done) {
-    const double share = from + (to - from) * (done + 1) / substeps;
+  for (int check = 0; done < substeps.count && tearing.empty(); ++done) {
+    const double share = substeps.share(done + 1, from, to);
+    const float dt = substeps.at(done);
     s.colliders = frame.colliders.at(share);
     std::vector<ColliderLoad> loads(s.colliders.size());
     find_face_contacts(s, pieces_, dt);
@@ -95,7 +96,7 @@ int MpmTissue::run(Frame& frame, int substeps, float dt, double from, double to,
     frame.colliders.add_loads(share, s.colliders.data(), loads.data(), acted / frame.duration,
                               result_.loads);
     work_ += frame.colliders.power(s.colliders.data(), loads.data()) * acted;
-    if (checks == 0 || done + 1 != tear_check_at(check, checks, substeps)) continue;
+    if (checks == 0 || done + 1 != tear_check_at(check, checks, substeps.count)) continue;
     ++check;
     tearing = find_tearing(s);
   }
@@ -138,7 +139,8 @@ void MpmTissue::advance(int substeps, float dt, const FrameInput& input) {
   Frame frame = begin(static_cast<double>(substeps) * dt, input);
   for (int done = 0; done < substeps;) {
     std::vector<TearingPoint> tearing;
-    done += run(frame, substeps - done, dt, static_cast<double>(done) / substeps, 1, tearing);
+    done += run(frame, even_substeps(substeps - done, dt), static_cast<double>(done) / substeps, 1,
+                tearing);
     tear(frame, tearing, static_cast<double>(done) / substeps);
   }
   end(frame);

@@ -62,10 +62,10 @@ class MpmTissue final : public Tissue {
   };
 
   Frame begin(double duration, const FrameInput& input);
-  PartRun run_part(Frame& frame, int substeps, float dt, double from, double to);
+  PartRun run_part(Frame& frame, const PartSubsteps& substeps, double from, double to);
   /// Advances by a part of the frame between two shares of it, which ends when points are past
   /// their limit: these. Returns after how many substeps.
-  int run(Frame& frame, int substeps, float dt, double from, double to,
+  int run(Frame& frame, const PartSubsteps& substeps, double from, double to,
           std::vector<TearingPoint>& tearing);
   /// At this share of the frame; blades have cut their way before.
   void tear(Frame& frame, const std::vector<TearingPoint>& tearing, double share);

@@ -20,6 +20,8 @@ constexpr double kFreeMotion = 0.25;     // of a tool in a part [cells]; beyond 
 constexpr double kCalmTrend = 1.2;       // of the stiffness in a part: the next one is longer ...
 constexpr double kMostTrend = 1.3;       // ... or shorter
 constexpr int kShortestPart = 6;         // substeps
+constexpr double kMostAbove = 1.1;       // the first substep over what all should come to: that, or
+                                         // what the trend, which is not there yet, takes from it
 constexpr double kBorne = 0.9;           // of the limit at the end of a part: else it is undone ...
 constexpr double kMostShortened = 0.25;  // ... and substeps made shorter by that at most ...
 constexpr double kLeastShortened = 0.7;  // ... and by that at least, ...
@@ -121,14 +123,17 @@ void SubstepChoice::follow(MpmState& state, const std::vector<float>& modulus) {
   followed_at_ = state.time;
 }
 
-int SubstepChoice::part(const MpmState& state, const FrameInput& input, int left, double dt) const {
+PartSubsteps SubstepChoice::part(const MpmState& state, const FrameInput& input, double time,
+                                 double longest) const {
   const double motion = farthest_motion(state, input) / state.scene.cell_size;
   const double free = kFreeMotion / (std::max(motion, kFreeMotion) * state.scene.frame_rate);
   const bool is_short = !input.cuts.empty() || shortened_ < 1;
-  const double time = is_short ? 0 : std::min(part_, free);
-  const int most = std::max(kShortestPart, static_cast<int>(time / dt + 0.5));
-  const int parts = (left + most - 1) / most;
-  return (left + parts - 1) / parts;
+  PartSubsteps part = substeps_for(time, longest, state.dt, most_);
+  const double wanted = is_short ? 0 : std::min(part_, free);
+  const int most = std::max(kShortestPart, static_cast<int>(wanted / part.last + 0.5));
+  const int parts = (part.count + most - 1) / most;
+  part.count = (part.count + parts - 1) / parts;
+  return part;
 }
 
 void SubstepChoice::measure_if_due(MpmState& state, const MeasureLimit& measure) {
@@ -161,7 +166,10 @@ void SubstepChoice::measure_if_due(MpmState& state, const MeasureLimit& measure)
 double SubstepChoice::longest(MpmState& state, const FrameInput& input,
                               const Stiffening& stiffening, const MeasureLimit& measure) {
   const double cautious = stable_substep(state, stiffening);
-  return shortened_ * longest_foreseen(state, input, stiffening, cautious, measure);
+  const double foreseen = longest_foreseen(state, input, stiffening, cautious, measure);
+  const bool at_once = shortened_ < 1 || foreseen <= cautious;
+  most_ = at_once ? 0 : std::max(kMostAbove, std::sqrt(trend_)) * foreseen;
+  return shortened_ * foreseen;
 }
 
 double SubstepChoice::longest_foreseen(MpmState& state, const FrameInput& input,

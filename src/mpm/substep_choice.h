@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "mpm/mpm_state.h"
+#include "mpm/part_substeps.h"
 #include "mpm/state_figures.h"
 
 namespace tissue_sim {
@@ -49,9 +50,10 @@ class SubstepChoice {
   double longest(MpmState& state, const FrameInput& input, const Stiffening& stiffening,
                  const MeasureLimit& measure);
 
-  /// How many of the `left` substeps of `dt` [s] of a frame with this input the next part is: all,
-  /// unless something stiffened fast, was cut, or is pushed by a fast tool.
-  int part(const MpmState& state, const FrameInput& input, int left, double dt) const;
+  /// The next part of a frame with this input of which `time` is left [s], after longest() said
+  /// `longest`: all of it, unless something stiffened fast, was cut, or is pushed by a fast tool.
+  PartSubsteps part(const MpmState& state, const FrameInput& input, double time,
+                    double longest) const;
 
  private:
   /// longest() as long as no part had to be undone.
@@ -64,7 +66,8 @@ class SubstepChoice {
   double longest_age_ = 0;  ///< of limit_ [s]
   double growth_ = 1;       ///< of the stiffness since, at most
   double trend_ = 1;        ///< of the stiffness in the last part, at most
-  double part_ = 0;         ///< how long the next part may be [s]
+  double part_ = 0;         ///< how long the next part may be [s], ...
+  double most_ = 0;  ///< ... and its first substep, until they are as short as they should be
   double followed_at_ = 0;  ///< [s]
   double energy_ = NAN;     ///< after the last part that was borne [J]
   double shortened_ = 1;    ///< how much substeps are shorter than they would be, after parts that
@@ -80,18 +83,16 @@ struct PartRun {
 
 /// Advances a frame of `duration` seconds in parts: a thread of tissue that snaps, or what a fast
 /// tool squeezes, may stiffen twofold within a frame.
-///   substep_for(input)            the longest that is stable [s]
-///   part(input, left, dt)         see SubstepChoice
-///   run(substeps, dt, from, to)   from and to: shares of the frame. Returns the PartRun
-template <class SubstepFor, class Part, class Run>
-void advance_in_parts(double duration, FrameInput input, const SubstepFor& substep_for,
-                      const Part& part, const Run& run) {
+///   part(input, time)          the part that is next, of the time that is left [s]: PartSubsteps
+///   run(substeps, from, to)    from and to: shares of the frame. Returns the PartRun
+template <class Part, class Run>
+void advance_in_parts(double duration, FrameInput input, const Part& part, const Run& run) {
   for (double from = 0; from < 1;) {
     const double time = duration * (1 - from);
-    const int left = std::max(1, static_cast<int>(std::ceil(time / substep_for(input))));
-    const int substeps = part(input, left, time / left);
-    const double to = substeps == left ? 1 : from + (1 - from) * substeps / left;
-    const PartRun part_run = run(substeps, static_cast<float>(time / left), from, to);
+    const PartSubsteps substeps = part(input, time);
+    const double taken = substeps.until(substeps.count) / time;
+    const double to = taken > 1 - 1e-9 ? 1 : from + (1 - from) * taken;
+    const PartRun part_run = run(substeps, from, to);
     if (part_run.end == PartEnd::kBlewUp) return;
     if (part_run.end == PartEnd::kUndone) continue;
     from = part_run.reached;

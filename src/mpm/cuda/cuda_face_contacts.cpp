@@ -40,10 +40,11 @@ bool CudaMpmTissue::faces_may_meet() const {
          static_cast<int>(state_->nodes.size()) > state_->blocks.first_split_node;
 }
 
-void CudaMpmTissue::run_substeps(int begin, int end, float dt) {
+void CudaMpmTissue::run_substeps(int begin, int end) {
   while (begin < end) {
-    // Substeps of a launch have one kick: the first after a change is a launch of its own.
-    int count = kick_of(state_->dt, dt) == dt ? end - begin : 1;
+    // Substeps of a launch have one length and one kick: one after a change is a launch of its own.
+    const float dt = part_.at(begin);
+    int count = part_.is_even_from(begin) && kick_of(state_->dt, dt) == dt ? end - begin : 1;
     if (faces_may_meet()) {
       FaceContacts& faces = state_->faces;
       if (is_due(faces.until_search, dt)) search_faces(dt);

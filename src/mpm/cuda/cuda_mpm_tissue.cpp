@@ -100,28 +100,27 @@ void CudaMpmTissue::begin(double duration, const FrameInput& input) {
   keep_place_for_blades();
 }
 
-int CudaMpmTissue::run(int substeps, float dt, double from, double to,
+int CudaMpmTissue::run(const PartSubsteps& part, double from, double to,
                        std::vector<TearingPoint>& tearing) {
   OnDevice& d = *device_;
-  substeps_ = substeps;
-  dt_ = dt;
-  kick_ = kick_of(state_->dt, dt);
+  const int substeps = substeps_ = part.count;
+  part_ = part;
+  before_ = state_->dt;
   from_ = from;
   to_ = to;
-  result_.substep = std::max(result_.substep, static_cast<double>(dt));
+  result_.substep = std::max<double>(result_.substep, part.longest());
   if (substeps == 0) return 0;
   upload_colliders();
   find_near(duration_);
   const bool tears = can_tear(*state_);
-  const int checks = tears ? tear_checks(*state_, substeps, dt) : 1;
+  const int checks = tears ? tear_checks(*state_, substeps, part.longest()) : 1;
   int done = 0;
   for (int check = 0; done < substeps && tearing.empty(); ++check) {
     const int end = tear_check_at(check, checks, substeps);
-    run_substeps(done, end, dt);
+    run_substeps(done, end);
     done = end;
     if (tears) tearing = find_tearing();
   }
-  to_ = share_of(done - 1);
   substeps_ = done;
   result_.substeps += done;
   d.host_loads.resize(d.loads.size());
@@ -145,7 +144,7 @@ void CudaMpmTissue::sum_loads() {
       load.points = static_cast<double>(sum[6]);
       sum += kLoadSums;
     }
-    const float acted = i == 0 ? kick_ : dt_;
+    const float acted = kick_of(i == 0 ? before_ : part_.at(i - 1), part_.at(i));
     colliders_->add_loads(share_of(i), d.host_colliders.data() + i * count, on.data(),
                           acted / duration_, result_.loads);
     work_ += colliders_->power(d.host_colliders.data() + i * count, on.data()) * acted;
@@ -157,7 +156,8 @@ void CudaMpmTissue::advance(int substeps, float dt, const FrameInput& input) {
   begin(static_cast<double>(substeps) * dt, input);
   for (int done = 0; done < substeps;) {
     std::vector<TearingPoint> tearing;
-    done += run(substeps - done, dt, static_cast<double>(done) / substeps, 1, tearing);
+    done +=
+        run(even_substeps(substeps - done, dt), static_cast<double>(done) / substeps, 1, tearing);
     if (done == substeps && tearing.empty()) break;  // all may be under way
     check_cuda(cudaStreamSynchronize(device_->stream), "advance");
     sum_loads();

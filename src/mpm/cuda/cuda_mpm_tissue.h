@@ -61,9 +61,9 @@ class CudaMpmTissue final : public Tissue {
   void begin(double duration, const FrameInput& input);
   /// Enqueues a part of the frame between two shares of it; where tissue can tear it waits, and
   /// ends when points are past their limit: these. Returns after how many substeps.
-  int run(int substeps, float dt, double from, double to, std::vector<TearingPoint>& tearing);
+  int run(const PartSubsteps& substeps, double from, double to, std::vector<TearingPoint>& tearing);
   void sum_loads();  ///< of the part that was run last, once it is done
-  PartRun run_part(int substeps, float dt, const FrameInput& input, double from, double to);
+  PartRun run_part(const PartSubsteps& substeps, const FrameInput& input, double from, double to);
   void make_blocks(bool may_march);
   void stop_marching();  ///< blocks that march are too tall to be cut well
   void plan_tables();    ///< how the blocks are worked on, and the tables for it
@@ -84,7 +84,7 @@ class CudaMpmTissue final : public Tissue {
   void upload_points();
   void find_near(double duration);
   /// Enqueues the part's substeps from `begin` up to `end`; waits for each search of faces.
-  void run_substeps(int begin, int end, float dt);
+  void run_substeps(int begin, int end);
   void launch(int begin, int end, float dt);
   /// Whether tissue can touch tissue. A body that is whole does not touch itself.
   bool faces_may_meet() const;
@@ -109,7 +109,7 @@ class CudaMpmTissue final : public Tissue {
   double measure_limit(int steps);  ///< see MeasureLimit; of all blocks
   void upload_colliders();
   /// The share of the frame at the end of the part's substep `i`.
-  double share_of(int i) const { return from_ + (to_ - from_) * (i + 1) / substeps_; }
+  double share_of(int i) const { return part_.share(i + 1, from_, to_); }
 
   std::vector<std::string> notes_;
   std::unique_ptr<MpmState> state_;
@@ -120,11 +120,11 @@ class CudaMpmTissue final : public Tissue {
   double cut_to_ = 0;                       ///< share of the frame
   std::vector<BlockMotion> motion_before_;  ///< when the blades were last looked at
   double duration_ = 0;                     ///< of the frame in flight [s]
-  int substeps_ = 0;          ///< of its last part, as long as their loads are not summed
-  float dt_ = 0;              ///< of these [s]
-  float kick_ = 0;            ///< kick_of() the first of them [s]
-  double work_ = 0;           ///< of instruments in it [J]
-  double from_ = 0, to_ = 0;  ///< shares of the frame where that part begins and ends
+  PartSubsteps part_;                       ///< of its last part, ...
+  int substeps_ = 0;                        ///< ... so many, as long as their loads are not summed
+  float before_ = 0;                        ///< the substep before these [s]
+  double work_ = 0;                         ///< of instruments in it [J]
+  double from_ = 0, to_ = 0;                ///< shares of the frame where that part begins and ends
   std::optional<FrameColliders> colliders_;  ///< of the frame
   bool measured_ = false;                    ///< whether the state is as finish_measure() saw it
   Stiffening stiffening_;

@@ -6,28 +6,30 @@ namespace tissue_sim {
 void CudaMpmTissue::advance(double duration, const FrameInput& input) {
   begin(duration, input);
   advance_in_parts(
-      duration, input, [this](const FrameInput& rest) { return substep_for(rest); },
-      [this](const FrameInput& rest, int left, double dt) {
-        return substep_.part(*state_, rest, left, dt);
+      duration, input,
+      [this](const FrameInput& rest, double time) {
+        return substep_.part(*state_, rest, time, substep_for(rest));
       },
-      [&](int substeps, float dt, double from, double to) {
-        return run_part(substeps, dt, input, from, to);
+      [&](const PartSubsteps& substeps, double from, double to) {
+        return run_part(substeps, input, from, to);
       });
 }
 
-PartRun CudaMpmTissue::run_part(int substeps, float dt, const FrameInput& input, double from,
+PartRun CudaMpmTissue::run_part(const PartSubsteps& substeps, const FrameInput& input, double from,
                                 double to) {
   save_checkpoint();
   std::vector<TearingPoint> tearing;
-  const int done = run(substeps, dt, from, to, tearing);
-  const double reached = done == substeps ? to : to_;
+  const int done = run(substeps, from, to, tearing);
+  const double reached = done == substeps.count ? to : substeps.share(done, from, to);
   launch_measure();
   finish_measure();
   sum_loads();
-  const PartEnergy energy{result_.kinetic_energy, result_.elastic_energy, work_, done * dt};
+  const PartEnergy energy{result_.kinetic_energy, result_.elastic_energy, work_,
+                          substeps.until(done)};
   const OnDevice::Checkpoint& saved = device_->checkpoint;
   const bool may_go_back = static_cast<std::size_t>(saved.host_held_count[0]) <= saved.held.size();
-  if (!substep_.is_borne(*state_, modulus_, stable_substep(), dt, energy) && may_go_back) {
+  if (!substep_.is_borne(*state_, modulus_, stable_substep(), substeps.at(done - 1), energy) &&
+      may_go_back) {
     restore_checkpoint();
     return {PartEnd::kUndone, from};
   }

@@ -32,19 +32,29 @@ void swing(T& tissue, double speed) {
   push(tissue);
 }
 
+Scene elastic_block(Law law) {
+  Scene scene = soft_body(0.45, Vec3(10, 8, 6), law);
+  scene.damping = scene.materials[0].viscosity = 0;
+  return scene;
+}
+
+template <class T>
+FrameResult next_frame(T& tissue) {
+  tissue.advance(kFrame, {});
+  return tissue.finish();
+}
+
+double energy(const FrameResult& r) { return r.kinetic_energy + r.elastic_energy; }
+
 TYPED_TEST(ChangingSubsteps, GiveNoEnergy) {
   for (const Law law : {Law::kNeoHookean, Law::kFixedCorotated}) {
-    Scene scene = soft_body(0.45, Vec3(10, 8, 6), law);
-    scene.damping = scene.materials[0].viscosity = 0;
-    TypeParam tissue(scene);
+    TypeParam tissue(elastic_block(law));
     swing(tissue, 2);
     double start = 0, most = 0, shortest = 1, longest = 0;
     for (int frame = 0; frame < 90; ++frame) {
-      tissue.advance(kFrame, {});
-      const FrameResult r = tissue.finish();
-      const double energy = r.kinetic_energy + r.elastic_energy;
-      if (frame == 0) start = energy;
-      most = std::max(most, energy);
+      const FrameResult r = next_frame(tissue);
+      if (frame == 0) start = energy(r);
+      most = std::max(most, energy(r));
       shortest = std::min(shortest, r.substep);
       longest = std::max(longest, r.substep);
     }
@@ -58,17 +68,11 @@ TYPED_TEST(ChangingSubsteps, GiveNoEnergy) {
 /// What swings less wildly goes on for longer: each second's mean beside the first's.
 TYPED_TEST(ChangingSubsteps, GiveNoEnergyInTheLongRun) {
   for (const Law law : {Law::kNeoHookean, Law::kFixedCorotated}) {
-    Scene scene = soft_body(0.45, Vec3(10, 8, 6), law);
-    scene.damping = scene.materials[0].viscosity = 0;
-    TypeParam tissue(scene);
+    TypeParam tissue(elastic_block(law));
     swing(tissue, 1);
     std::vector<double> means(8, 0.0);
     for (double& mean : means) {
-      for (int frame = 0; frame < 60; ++frame) {
-        tissue.advance(kFrame, {});
-        const FrameResult r = tissue.finish();
-        mean += (r.kinetic_energy + r.elastic_energy) / 60;
-      }
+      for (int frame = 0; frame < 60; ++frame) mean += energy(next_frame(tissue)) / 60;
     }
     const double growth = means.back() / means.front();
     std::printf("after %zu s the energy is %.4f of what it was\n", means.size() - 1, growth);

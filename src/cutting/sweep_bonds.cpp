@@ -1,8 +1,8 @@
 #include <algorithm>
 #include <cmath>
-#include <cstring>
 #include <utility>
 
+#include "compute/eight_bytes.h"
 #include "contact/facet_motion.h"
 #include "cutting/blade_sweep.h"
 #include "cutting/bonds.h"
@@ -59,23 +59,6 @@ struct PathEdge {
 
 /// What is known of where a point is: whether it was brought, and whether it is near an edge.
 constexpr unsigned kBrought = 0x40, kNear = 0x80;
-
-/// The same byte eight times.
-constexpr std::uint64_t eight(std::uint64_t byte) { return byte * 0x0101010101010101; }
-/// The bytes of up to eight points from `first` on, that one's lowest.
-template <class Bytes>
-std::uint64_t bytes_of(const Bytes& points, std::int32_t first, int count) {
-  std::uint64_t bytes = 0;
-  if (count >= 8) {
-    std::memcpy(&bytes, &points[first], 8);
-  } else if (first + count >= 8) {  // a copy of so many bytes would be a call
-    std::memcpy(&bytes, &points[first + count - 8], 8);
-    bytes >>= 8 * (8 - count);
-  } else {
-    std::memcpy(&bytes, &points[first], count);
-  }
-  return bytes;
-}
 
 /// Sweeps one path through all tissue.
 class Sweep {

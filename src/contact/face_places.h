@@ -73,6 +73,7 @@ struct ContactPlaces {
   const Nodes& nodes;
   FaceContact& contact;
 
+  static bool any(bool so) { return so; }
   void own(float (&value)[3]) const {
     displacement_at(nodes, contact.nodes, contact.has_whole_rows, contact.weights, value);
   }
@@ -99,7 +100,6 @@ struct ContactFaces : ContactPlaces {
 
   const Facet& facet(std::int32_t f) const { return facet_of(state, f); }
   const FacetMotion& motion(std::int32_t f) const { return state.faces.motion[f]; }
-  double cell_size(std::int32_t f) const { return body_of(state, f).cell_size; }
   int body(std::int32_t f) const { return block_of(state, f).body; }
   void middle(std::int32_t f, double (&place)[3]) const {
     const float zero[3] = {};
@@ -114,11 +114,14 @@ struct ContactFaces : ContactPlaces {
     return static_cast<float>(material_of(state, f).friction);
   }
   double cell_size() const { return state.scene.cell_size; }
-  int first_near() const { return state.faces.first_near[i]; }
-  int end_near() const { return state.faces.first_near[i + 1]; }
+  float per_cell() const { return static_cast<float>(1 / state.scene.cell_size); }
   std::int32_t near(int n) const { return state.faces.near[n]; }
-  static int lane() { return 0; }
-  static int lanes() { return 1; }
+  template <class Visit>
+  void for_each_near(const Visit& visit) const {
+    for (int n = state.faces.first_near[i]; n < state.faces.first_near[i + 1]; ++n) {
+      visit(n, near(n), motion(near(n)).x);
+    }
+  }
   static NearFacet nearest(const NearFacet& best) { return best; }
   void hold_in(std::int32_t f) const {
     contact.other_nodes = CellNodes(block_of(state, f), facet(f).cell);

@@ -64,9 +64,11 @@ struct alignas(16) FaceSpring {
 
 /// Works out the force of a contact after a substep of `dt` seconds, and lets it slide. `places`
 /// knows displacements [m]: places.own(u) of the facet's centre, places.held(u) of the place held,
-/// which places.hold(place) sets, and places.held_mobility() [1/kg].
+/// which places.hold(place) sets, and places.held_mobility() [1/kg]. Where several contacts are
+/// worked out in step, places.any(so) says whether it is so for any of them, and those that are not
+/// `active` come along.
 template <class Places>
-TISSUE_SIM_INLINE void push_face(FaceSpring& c, float dt, Places& places) {
+TISSUE_SIM_INLINE void push_face(FaceSpring& c, float dt, Places& places, bool active = true) {
   float own[3], held[3];
   const float depth_before = -dot(c.apart, c.normal);
   places.own(own);
@@ -78,30 +80,39 @@ TISSUE_SIM_INLINE void push_face(FaceSpring& c, float dt, Places& places) {
   c.force[0] = c.force[1] = c.force[2] = 0;
   // What comes out of the blue is for the next look to tell.
   const bool touched = c.touching, sudden = !touched && depth > c.sudden;
-  c.touching = depth > 0 && !sudden;
-  if (!c.touching) return;
+  c.touching = active && depth > 0 && !sudden;
+  if (!places.any(c.touching)) return;
   // The place held slides along the face, so that the spring stays in the friction cone.
   constexpr float kOnCone = 1.02f;
   float aside[3], slip = 0;
   for (int i = 0; i < 4; ++i) {
     for (int a = 0; a < 3; ++a) aside[a] = c.apart[a] + depth * c.normal[a];
     slip = sqrtf(dot(aside, aside));
-    if (slip <= kOnCone * c.friction * depth || i == 3) break;
-    const float share = 1 - c.friction * depth / slip;
-    float place[3];
-    for (int a = 0; a < 3; ++a) {
-      place[a] = c.hold[a] + share * dot(c.to_reference + 3 * a, aside);
+    const bool slides = c.touching && slip > kOnCone * c.friction * depth;
+    if (i == 3 || !places.any(slides)) break;
+    if (slides) {
+      const float share = 1 - c.friction * depth / slip;
+      float place[3];
+      for (int a = 0; a < 3; ++a) {
+        place[a] = c.hold[a] + share * dot(c.to_reference + 3 * a, aside);
+      }
+      c.hold_at(place);
+      places.hold(place);
     }
-    c.hold_at(place);
-    places.hold(place);
     places.held(held);
-    c.measure_apart(own, held);
-    depth = -dot(c.apart, c.normal);
-    // Not what it looked like, or beyond what is left of the face.
-    c.touching = depth > 0 && dot(c.apart, c.apart) <= length2 && c.holds();
-    if (!c.touching) return;
-    if (!touched) c.soften(places.held_mobility(), dt);
+    if (slides) {
+      c.measure_apart(own, held);
+      depth = -dot(c.apart, c.normal);
+      // Not what it looked like, or beyond what is left of the face.
+      c.touching = depth > 0 && dot(c.apart, c.apart) <= length2 && c.holds();
+    }
+    const bool begins = slides && c.touching && !touched;
+    if (places.any(begins)) {
+      const float mobility = places.held_mobility();
+      if (begins) c.soften(mobility, dt);
+    }
   }
+  if (!c.touching) return;
   // Along the line between the two material places, and only apart.
   const float push = fmaxf(0.0f, c.stiffness * depth + c.damping * closing);
   const float friction = fminf(1.0f, kOnCone * c.friction * depth / (slip + 1e-30f));

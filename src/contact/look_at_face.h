@@ -2,12 +2,12 @@
 // the CPU and on the GPU; what differs is how facets and nodes are reached, which a `Faces` knows.
 // It is of one contact and has
 //   facet(f), motion(f)        of a facet: what it is, how it stands
-//   cell_size(f), body(f)      of its lattice [m], which
+//   body(f)                    which
 //   middle(f, place)           reference place of the middle of its cell [m]
 //   modulus(f), friction(f)    of its tissue: P-wave modulus [Pa], Coulomb's
-//   cell_size()                the scene's [m]
-//   first_near(), end_near()   the facets near this one in its list, near(n),
-//   lane(), lanes()            of which this lane looks at every lanes()-th from its own on
+//   cell_size(), per_cell()    the scene's, and every lattice's [m], [1/m]
+//   near(n)                    the facets near this one, by their place in its list
+//   for_each_near(visit)       calls visit(n, near(n), its motion's x), for this lane's share
 //   nearest(best)              the best of all lanes
 //   hold_in(f), hold(place)    sets the cell and the place in it of the place held
 //   own(u), held(u)            displacements of the facet's centre and of the place held [m]
@@ -70,10 +70,9 @@ template <class Faces>
 TISSUE_SIM_HOST_DEVICE inline Seen seen_by(const Faces& s, const FacetMotion& f, int other) {
   const FacetMotion& o = s.motion(other);
   const Facet& facet = s.facet(other);
-  const auto per_cell = static_cast<float>(1 / s.cell_size(other));
   const float d[3] = {f.x[0] - o.x[0], f.x[1] - o.x[1], f.x[2] - o.x[2]};
   float from[3];
-  for (int a = 0; a < 3; ++a) from[a] = per_cell * dot(o.to_reference + 3 * a, d);
+  for (int a = 0; a < 3; ++a) from[a] = s.per_cell() * dot(o.to_reference + 3 * a, d);
   Seen seen;
   seen.depth = -dot(from, facet.normal);
   seen.beyond = -1;
@@ -97,16 +96,14 @@ TISSUE_SIM_HOST_DEVICE inline int choose_other(const Faces& s, const FaceSpring&
   }
   const auto far = static_cast<float>(kFarthest * s.cell_size());
   NearFacet best{kBeyond, INT_MAX};
-  for (int n = s.first_near() + s.lane(); n < s.end_near(); n += s.lanes()) {
-    const int other = s.near(n);
-    const float* y = s.motion(other).x;
+  s.for_each_near([&](int n, int other, const float* y) {
     const float d[3] = {own.x[0] - y[0], own.x[1] - y[1], own.x[2] - y[2]};
-    if (dot(d, d) > far * far) continue;
+    if (dot(d, d) > far * far) return;
     const Seen seen = seen_by(s, own, other);
     const float beyond = seen.beyond - (other == c.other ? kStay : 0);
-    if (seen.depth > deepest || seen.depth < -kSearchReach - kNearGap) continue;
+    if (seen.depth > deepest || seen.depth < -kSearchReach - kNearGap) return;
     if (beyond < best.beyond) best = {beyond, n};
-  }
+  });
   best = s.nearest(best);
   return best.at == INT_MAX ? -1 : s.near(best.at);
 }
@@ -129,9 +126,8 @@ TISSUE_SIM_HOST_DEVICE inline void measure_apart(const Faces& s, FaceSpring& c) 
 template <class Faces>
 TISSUE_SIM_HOST_DEVICE inline void take_normal(const Faces& s, FaceSpring& c) {
   const FacetMotion& o = s.motion(c.other);
-  const auto per_cell = static_cast<float>(1 / s.cell_size(c.other));
   for (int a = 0; a < 3; ++a) c.normal[a] = o.normal[a];
-  for (int k = 0; k < 9; ++k) c.to_reference[k] = o.to_reference[k] * per_cell;
+  for (int k = 0; k < 9; ++k) c.to_reference[k] = o.to_reference[k] * s.per_cell();
 }
 
 /// Starts a contact with another facet, at a place of its cell. The spring is a point's spring
@@ -141,7 +137,7 @@ template <class Faces>
 TISSUE_SIM_HOST_DEVICE inline void begin(Faces& s, FaceSpring& c, int other,
                                          const float (&place)[3], float dt) {
   const Facet& facet = s.facet(c.facet);
-  const double p = s.modulus(c.facet), q = s.modulus(other), own_size = s.cell_size(c.facet);
+  const double p = s.modulus(c.facet), q = s.modulus(other), own_size = s.cell_size();
   c.other = other;
   s.hold_in(other);
   take_normal(s, c);
@@ -151,7 +147,7 @@ TISSUE_SIM_HOST_DEVICE inline void begin(Faces& s, FaceSpring& c, int other,
   for (int a = 0; a < 3; ++a) {
     c.from_middle[a] = own[a] + own_size * facet.center[a] - middle[a];
   }
-  c.cell_size = s.cell_size(other);
+  c.cell_size = s.cell_size();
   hold_at(s, c, place);
   c.stiffness =
       static_cast<float>(kContactStiffness * 2 * p * q / (p + q) * facet.area / (0.5 * own_size));
@@ -203,7 +199,7 @@ TISSUE_SIM_HOST_DEVICE inline void go_on(Faces& s, FaceSpring& c, int other,
   s.middle(other, middle);
   float place[3];
   for (int a = 0; a < 3; ++a) {
-    place[a] = static_cast<float>((held[a] - middle[a]) / s.cell_size(other));
+    place[a] = static_cast<float>((held[a] - middle[a]) / s.cell_size());
   }
   begin(s, c, other, place, dt);
   c.stiffness = stiffness;  // the same spring, unless substeps cannot follow

@@ -5,8 +5,10 @@
 
 namespace tissue_sim {
 
-/// Adds a force [N] to the sum of a node.
-__device__ __forceinline__ void add_push(long long* sum, float weight, const float* force) {
+/// Adds a share of a force [N] to the sum of a node: see NodePushes.
+__device__ __forceinline__ void add_push(long long* sums, int node, float weight,
+                                         const float* force) {
+  long long* sum = sums + kPushStride * static_cast<std::size_t>(node);
 #pragma unroll
   for (int c = 0; c < 3; ++c) {
     const long long push = __float2ll_rn(weight * force[c] * static_cast<float>(1 / kLoadUnit));

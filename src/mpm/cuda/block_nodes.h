@@ -56,12 +56,14 @@ struct Pushed {
   __device__ __forceinline__ Pushed(const PushedNodes& pushed, bool marked, bool clear, int node) {
     force[0] = force[1] = force[2] = 0;
     if (!marked) return;
-    const std::size_t first = 3 * static_cast<std::size_t>(node);
-#pragma unroll
-    for (int c = 0; c < 3; ++c) force[c] = __ldcg(pushed.force + first + c);
+    const std::size_t first = kPushStride * static_cast<std::size_t>(node);
+    const longlong2 xy = __ldcg(reinterpret_cast<const longlong2*>(pushed.force + first));
+    force[0] = xy.x;
+    force[1] = xy.y;
+    force[2] = __ldcg(pushed.force + first + 2);
     if (!clear) return;
-#pragma unroll
-    for (int c = 0; c < 3; ++c) __stcg(pushed.clear + first + c, 0ll);
+    __stcg(reinterpret_cast<longlong2*>(pushed.clear + first), longlong2{0, 0});
+    __stcg(pushed.clear + first + 2, 0ll);
   }
   Pushed() = default;
   __device__ __forceinline__ float of(int c) const {

@@ -108,11 +108,9 @@ void CudaMpmTissue::upload_facets() {
   f.listed.resize(count);
   f.listed.clear(d.stream);
   f.springs.resize(count);
-  for (auto* of_facet :
-       {&f.first_near, &f.near_count, &f.contacts, &f.involved, &f.active, &f.rank}) {
+  for (auto* of_facet : {&f.first_near, &f.near_count, &f.contacts, &f.involved, &f.rank}) {
     of_facet->resize(count);
   }
-  f.active.clear(d.stream);  // it comes down as a whole
   f.is_involved.resize(count);
   f.takes_part.resize(count);
   f.sorted.resize(count);
@@ -136,7 +134,8 @@ CudaLooks CudaMpmTissue::looks() const {
   const FacesOnDevice& f = d.faces;
   CudaLooks s;
   s.facet_count = static_cast<int>(f.facets.size());
-  s.cell_size = static_cast<float>(state_->scene.cell_size);
+  s.cell_size = state_->scene.cell_size;
+  s.per_cell = static_cast<float>(1 / s.cell_size);
   s.facets = f.facets.data();
   s.lattices = f.lattices.data();
   s.point_at = f.point_at.data();
@@ -153,7 +152,6 @@ CudaLooks CudaMpmTissue::looks() const {
   s.takes_part = f.takes_part.data();
   s.contacts = f.contacts.data();
   s.involved = f.involved.data();
-  s.active = f.active.data();
   s.nodes = f.nodes.data();
   s.marks = d.marks.data();
   s.node_count = d.marks.size();
@@ -194,6 +192,7 @@ void CudaMpmTissue::search_faces(float dt) {
     read();
   }
   f.contacts_count = figures.contacts;
+  f.involved_count = figures.involved;
   if (f.nodes.size() < static_cast<std::size_t>(figures.contacts)) {
     f.nodes.resize(static_cast<std::size_t>(figures.contacts) * 3 / 2);
   }
@@ -207,15 +206,20 @@ void CudaMpmTissue::search_faces(float dt) {
   }
 }
 
-CudaFaces CudaMpmTissue::faces_of_launch() {
+const CudaFaces* CudaMpmTissue::faces_of_launch() {
   OnDevice& d = *device_;
   FacesOnDevice& f = d.faces;
-  CudaFaces out;
-  out.any = faces_may_meet() && f.contacts_count > 0 && f.version == state_->faces.version;
-  if (!out.any) return out;
-  out.look_first = std::exchange(f.searched, false);
-  out.looks = looks();
-  return out;
+  if (!faces_may_meet() || f.contacts_count == 0 || f.version != state_->faces.version) {
+    return nullptr;
+  }
+  const std::vector<CudaBundle>& bundles = d.host_tables.bundles;
+  const auto ranks = std::count_if(
+      bundles.begin(), bundles.begin() + std::min<std::ptrdiff_t>(d.push_resident, bundles.size()),
+      [](const CudaBundle& b) { return b.rank >= 0; });
+  const CudaFaces faces = {std::exchange(f.searched, false) ? 1 : 0, f.contacts_count,
+                           f.involved_count, static_cast<int>(ranks), looks()};
+  f.of_launch.upload(&faces, 1, d.stream);
+  return f.of_launch.data();
 }
 
 void CudaMpmTissue::pull_contacts() {
@@ -230,15 +234,11 @@ void CudaMpmTissue::pull_contacts() {
   f.gathered.clear(d.stream);  // the same
   launch_gather_contacts(looks(), count, f.gathered.data(), d.stream);
   std::vector<FaceSpring> springs(count);
-  std::vector<std::int32_t> active(count);
   f.gathered.download(springs.data(), count, d.stream);
   f.figures.download(f.host_figures.data(), 1, d.stream);
-  f.active.download(active.data(), count, d.stream);
   check_cuda(cudaStreamSynchronize(d.stream), "send contacts");
-  active.resize(f.host_figures[0].active);
   std::sort(springs.begin(), springs.end(),
             [](const FaceSpring& a, const FaceSpring& b) { return a.facet < b.facet; });
-  std::sort(active.begin(), active.end());
   for (const FaceSpring& spring : springs) {
     if (spring.other < 0) continue;
     FaceContact c;
@@ -249,7 +249,7 @@ void CudaMpmTissue::pull_contacts() {
     c.other_nodes = CellNodes(block_of(*state_, c.other), other.cell);
     c.other_weights = AxisWeights(c.hold);
     c.looked_at = state_->time - f.host_figures[0].since_look;
-    if (std::binary_search(active.begin(), active.end(), c.facet)) {
+    if (is_active(spring)) {
       faces.active.push_back(static_cast<std::int32_t>(faces.all.size()));
     }
     faces.all.push_back(c);

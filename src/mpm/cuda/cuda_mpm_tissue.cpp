@@ -223,8 +223,8 @@ void CudaMpmTissue::launch(int begin, int end, float dt) {
   frame.cell_size = static_cast<float>(scene.cell_size);
   frame.arrived = d.arrived.data();
   frame.faces = faces_of_launch();
-  if (frame.faces.any || d.may_meet) {
-    d.pushed.resize(9 * d.u[0].size());
+  if (frame.faces != nullptr || d.may_meet) {
+    d.pushed.resize(3 * kPushStride * d.u[0].size());
     d.pushed.clear(d.stream);
     frame.pushes = {d.pushed.data(), d.pushed.size() / 3};
     CudaTables tables = d.tables();

@@ -93,7 +93,7 @@ class CudaMpmTissue final : public Tissue {
   void search_faces(
       float dt);  ///< and says when the next search is due: FaceContacts::until_search
   CudaLooks looks() const;
-  CudaFaces faces_of_launch();
+  const CudaFaces* faces_of_launch();  ///< null where there are no contacts
   void pull_nodes();
   void pull_field(const float4* from, Array<float>* to);  ///< of the nodes
   void push_nodes();

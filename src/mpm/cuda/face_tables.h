@@ -43,21 +43,21 @@ struct CudaLattice {
 /// Figures of the search and of the looks; speeds and lengths that are never negative as the bits
 /// of a float, whose order is theirs.
 struct CudaFaceFigures {
-  unsigned box[6];          ///< SweptBox of what does not fly: -min, max as in_order() [m]
-  double mean_moved[3];     ///< of the facets that take part, since they were listed [m]
-  double mean_velocity[3];  ///< of the same [m/s]
-  double horizon;           ///< until the next search [s]
-  double until_look;        ///< as of the last substep [s]
-  float since_look;         ///< the same
-  float dt;                 ///< of the last substep [s]
-  unsigned fastest;         ///< facet against the mean [m/s]
-  unsigned largest_reach;   ///< [m]
-  unsigned fastest_pair;    ///< of the last look [m/s]
-  int listed_anew;          ///< whether the lists no longer held
-  int in_grid;              ///< facets there
-  int near;                 ///< places wanted in CudaLooks::near
-  int contacts, involved;   ///< facets with any in their list; these, and those in lists
-  int active;               ///< contacts that touch, or may before the next look
+  unsigned box[6];           ///< SweptBox of what does not fly: -min, max as in_order() [m]
+  double mean_moved[3];      ///< of the facets that take part, since they were listed [m]
+  double mean_velocity[3];   ///< of the same [m/s]
+  double horizon;            ///< until the next search [s]
+  double until_look;         ///< as of the last substep [s]
+  float since_look;          ///< the same
+  float dt;                  ///< of the last substep [s]
+  unsigned fastest;          ///< facet against the mean [m/s]
+  unsigned largest_reach;    ///< [m]
+  unsigned fastest_pair[2];  ///< of looks in turn [m/s]
+  int next_pair;             ///< which of them the next look takes
+  int listed_anew;           ///< whether the lists no longer held
+  int in_grid;               ///< facets there
+  int near;                  ///< places wanted in CudaLooks::near
+  int contacts, involved;    ///< facets with any in their list; these, and those in lists
 };
 
 /// Where a contact gets its displacements from and gives its force to.
@@ -70,7 +70,8 @@ struct CudaContactNodes {
 /// What the search and the looks work on. A contact has the number of its facet.
 struct CudaLooks {
   int facet_count;
-  float cell_size;  ///< the scene's [m]
+  float per_cell;    ///< [1/m]
+  double cell_size;  ///< the scene's, and of all lattices [m]
   const CudaFacet* facets;
   const CudaLattice* lattices;
   const std::int32_t* point_at;           ///< [2 nz][2 ny][2 nx], -1 for none, body after body
@@ -82,10 +83,10 @@ struct CudaLooks {
   std::int32_t *first_near, *near_count;  ///< per facet: the facets that it may touch, in `near`
   std::int32_t* near;                     ///< each list in order
   std::size_t near_capacity;
-  std::uint8_t *is_involved, *takes_part;      ///< per facet: is in a list; in the search
-  std::int32_t *contacts, *involved, *active;  ///< facets, in any order
-  CudaContactNodes* nodes;                     ///< parallels `active`
-  std::uint8_t* marks;                         ///< per node: what may push it
+  std::uint8_t *is_involved, *takes_part;  ///< per facet: is in a list; in the search
+  std::int32_t *contacts, *involved;       ///< facets, in any order
+  CudaContactNodes* nodes;                 ///< parallels `contacts`
+  std::uint8_t* marks;                     ///< per node: what may push it
   std::size_t node_count;
   const std::uint32_t* slot_parts;  ///< CudaTables::slot_parts without
   std::uint32_t* pushed_parts;      ///< and with kPushed
@@ -95,8 +96,9 @@ struct CudaLooks {
 
 /// Contacts of tissue with tissue of the substeps of one launch.
 struct CudaFaces {
-  bool any = false;  ///< else no more of this is read
-  bool look_first;   ///< they were just searched
+  int look_first;          ///< they were just searched
+  int contacts, involved;  ///< see CudaFaceFigures
+  int ranks;               ///< of the bundles that thread blocks begin with: CudaBundle::rank
   CudaLooks looks;
 };
 

@@ -13,7 +13,7 @@ struct FacesOnDevice {
   DeviceArray<FacetMotion> motion;
   DeviceArray<ListedFacet> listed;
   DeviceArray<FaceSpring> springs;
-  DeviceArray<std::int32_t> point_at, first_near, near_count, near, contacts, involved, active;
+  DeviceArray<std::int32_t> point_at, first_near, near_count, near, contacts, involved;
   DeviceArray<std::uint8_t> is_involved, takes_part;
   DeviceArray<CudaContactNodes> nodes;
   DeviceArray<CudaFaceFigures> figures;
@@ -23,22 +23,22 @@ struct FacesOnDevice {
   DeviceArray<std::int32_t> bucket_begin, bucket_count, rank;
   DeviceArray<CudaSeeker> sorted;
 
+  DeviceArray<CudaFaces> of_launch;
   DeviceArray<KeptContact> kept;
   DeviceArray<FaceSpring> gathered;
   PinnedArray<CudaFacet> host_facets;
   int version = -1;             ///< FaceContacts::version of the facets that are there
   bool pieces_changed = false;  ///< since they went up
   bool lists_hold = false;      ///< there are lists
-  int contacts_count = 0;       ///< CudaFaceFigures::contacts
-  bool searched = false;        ///< and not looked at since
+  int contacts_count = 0, involved_count = 0;  ///< see CudaFaceFigures
+  bool searched = false;                       ///< and not looked at since
 
   std::size_t bytes() const {
     return facets.bytes() + lattices.bytes() + motion.bytes() + listed.bytes() + springs.bytes() +
            point_at.bytes() + first_near.bytes() + near_count.bytes() + near.bytes() +
-           contacts.bytes() + involved.bytes() + active.bytes() + is_involved.bytes() +
-           takes_part.bytes() + nodes.bytes() + figures.bytes() + sums.bytes() +
-           bucket_begin.bytes() + bucket_count.bytes() + rank.bytes() + sorted.bytes() +
-           kept.bytes() + gathered.bytes();
+           contacts.bytes() + involved.bytes() + is_involved.bytes() + takes_part.bytes() +
+           nodes.bytes() + figures.bytes() + sums.bytes() + bucket_begin.bytes() +
+           bucket_count.bytes() + rank.bytes() + sorted.bytes() + kept.bytes() + gathered.bytes();
   }
 };
 

@@ -209,9 +209,11 @@ void make_tables(const MpmState& state, const std::vector<std::vector<int>>& bun
   t.bundles.clear();
   t.columns.clear();
   t.max_slots = t.max_plane_slots = t.max_columns = 0;
-  int first = 0;
+  int first = 0, rank = 0;
   for (const std::vector<int>& blocks : bundles) {
     add_bundle(first, static_cast<int>(blocks.size()), columns, t);
+    CudaBundle& bundle = t.bundles.back();
+    bundle.rank = bundle.partial != 0 ? -1 : rank++;
     first += static_cast<int>(blocks.size());
   }
 }

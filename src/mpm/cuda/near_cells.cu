@@ -8,7 +8,7 @@
 namespace tissue_sim {
 namespace {
 
-constexpr int kThreads = 128;
+constexpr int kThreads = 128, kCellThreads = 512;
 
 /// The colliders, as bits, that come within `margin` of the box from `min` to `max`; `among` those.
 __device__ __forceinline__ std::uint32_t met_by(const CudaReach& reach, std::uint32_t among,
@@ -32,15 +32,16 @@ __global__ void unmark(const CudaNearCells out) {
 }
 
 /// One thread block for each block.
-__global__ void list_cells(const CudaTables t, const CudaNodes state, const CudaMeasure* measures,
-                           const CudaReach reach, const CudaNearCells out) {
+__global__ void __launch_bounds__(kCellThreads)
+    list_cells(const CudaTables t, const CudaNodes state, const CudaMeasure* measures,
+               const CudaReach reach, const CudaNearCells out) {
   const CudaBlock b = t.blocks[blockIdx.x];
   const CudaMeasure& m = measures[blockIdx.x];
   const float cell_size = t.bodies[b.body].cell_size;
   const float margin = m.speed * reach.duration + reach.margin;
   const std::uint32_t all = reach.collider_count < 32 ? (1u << reach.collider_count) - 1 : ~0u;
   const std::uint32_t block_near = met_by(reach, all, m.min, m.max, margin);
-  for (int i = static_cast<int>(threadIdx.x); i < b.nx * b.ny * b.nz; i += kThreads) {
+  for (int i = static_cast<int>(threadIdx.x); i < b.nx * b.ny * b.nz; i += kCellThreads) {
     const int x = i % b.nx, y = i / b.nx % b.ny, z = i / (b.nx * b.ny);
     CudaNearCell cell;
     cell.pitch = b.nx + 2;
@@ -101,7 +102,7 @@ unsigned blocks_for(std::size_t n) { return static_cast<unsigned>((n + kThreads 
 void launch_near(const CudaTables& tables, const CudaNodes& state, const CudaMeasure* measures,
                  const CudaReach& reach, const CudaNearCells& near, cudaStream_t stream) {
   unmark<<<blocks_for(near.node_count), kThreads, 0, stream>>>(near);
-  list_cells<<<tables.block_count, kThreads, 0, stream>>>(tables, state, measures, reach, near);
+  list_cells<<<tables.block_count, kCellThreads, 0, stream>>>(tables, state, measures, reach, near);
   mark_slots<<<blocks_for(near.slot_count), kThreads, 0, stream>>>(tables, near);
   check_cuda(cudaGetLastError(), "start a kernel");
 }

@@ -91,7 +91,7 @@ __device__ __forceinline__ void push_cell(const CudaTables& t, const CudaNodes& 
 #pragma unroll
     for (int a = 0; a < 3; ++a) force[a] += w * __shfl_sync(0xffffffffu, push[a], from);
   }
-  if (lane < 27) add_push(pushes.force + 3 * static_cast<std::size_t>(node), 1.0f, force);
+  if (lane < 27) add_push(pushes.force, node, 1.0f, force);
 }
 
 /// What lane `from` of a warp has of a cell.

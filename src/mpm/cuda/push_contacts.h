@@ -1,137 +1,213 @@
-// Contacts of tissue with tissue within a substep and the looks at them, a warp for each. For .cu
-// files.
+// Contacts of tissue with tissue within a substep, and the looks at them, a few lanes for each. For
+// .cu files.
+//
+// A look takes two substeps, so that thread blocks need not wait for one another within one: in the
+// first, facets are brought to where they will be in the next; in the next, each contact is looked
+// at before it pushes. How fast the fastest pair is, and with it when the next look is due, is
+// known in the substep after.
 #pragma once
 
 #include "mpm/cuda/add_push.h"
+#include "mpm/cuda/contact_lanes.h"
 #include "mpm/cuda/grid_barrier.h"
-#include "mpm/cuda/warp_faces.h"
 
 namespace tissue_sim {
 
-/// What pushes need of CudaLooks.
-struct CudaPushes {
-  const std::int32_t* active;
-  const CudaContactNodes* nodes;
-  FaceSpring* springs;
-  const int* count;
+/// What a group of `lanes` lanes, or a thread, does of what is spread over several thread blocks.
+struct LaneShare {
+  int first, step;
+
+  /// Of the warps of a team in each of `blocks` thread blocks, of which this is number `rank` (< 0:
+  /// none). Different thread blocks come first, then different warps.
+  static __device__ __forceinline__ LaneShare of(int rank, int blocks, const Pushers& team,
+                                                 int lanes) {
+    constexpr int kNone = 1 << 30;
+    const int warp = team.me() / 32, warps = team.size() / 32,
+              in_warp = static_cast<int>(threadIdx.x) % 32 / lanes;
+    return {rank < 0 ? kNone : (in_warp * warps + warp) * blocks + rank,
+            blocks * team.size() / lanes};
+  }
 };
 
-/// The first contact of a warp, and how many it goes on by: warps of different thread blocks first,
-/// so that all multiprocessors have their share.
-__device__ __forceinline__ int first_of_warp() {
-  return static_cast<int>(threadIdx.x / 32 * gridDim.x + blockIdx.x);
-}
-__device__ __forceinline__ int warps_of_grid() {
-  return static_cast<int>(gridDim.x * blockDim.x) / 32;
-}
+/// What a substep does with contacts.
+struct ContactRound {
+  float dt;           ///< [s]
+  float since;        ///< the last look was so long ago [s]
+  bool look;          ///< they are looked at
+  bool fresh;         ///< for the first time since the search: their nodes are not known yet
+  bool soften;        ///< springs were made soft for a shorter substep
+  bool move;          ///< facets are brought to where the next substep will look at them
+  unsigned* fastest;  ///< pair of this look [m/s]
+};
 
-/// Works out all active contacts and adds their forces to `force`, of the nodes; out of line, for
-/// the blocks to keep their registers.
-inline __device__ __noinline__ void push_contacts(const CudaPushes c, const CudaNodes state,
-                                                  float dt, long long* force) {
-  const int lane = static_cast<int>(threadIdx.x) % 32, k = min(lane, 26);
-  const int count = __ldcg(c.count);
-  for (int i = first_of_warp(); i < count; i += warps_of_grid()) {
-    const CudaContactNodes& nodes = c.nodes[i];
-    FaceSpring& at = c.springs[c.active[i]];
-    WarpPlaces places;
-    places.k = lane;
-    places.v = state.v;
-    places.own_node = nodes.own[k];
-    places.other_node = nodes.other[k];
-    places.own_weight = lane < 27 ? nodes.weight[k] : 0.0f;
-    places.own_u = __ldcg(state.u + places.own_node);
-    places.other_u = __ldcg(state.u + places.other_node);
-    FaceSpring spring = at;
-    places.hold(spring.hold);
-    push_face(spring, dt, places);
-    __syncwarp();
-    if (lane == 0) at = spring;
-    if (!spring.touching || lane >= 27) continue;
-    add_push(force + 3 * static_cast<std::size_t>(places.own_node), places.own_weight,
-             spring.force);
-    add_push(force + 3 * static_cast<std::size_t>(places.other_node), -places.weight, spring.force);
+/// Adds the force of a contact to its nodes.
+template <class Places>
+__device__ __forceinline__ void add_pushes(const FaceSpring& c, const Places& places,
+                                           long long* force) {
+#pragma unroll
+  for (int j = 0; j < kLaneNodes; ++j) {
+    if (places.lanes.node(j) >= 27) break;
+    const auto &own = places.own_place, &other = places.other_place;
+    add_push(force, own.node[j], own.weight[j], c.force);
+    add_push(force, other.node[j], -other.weight[j], c.force);
   }
 }
 
-/// Looks at all contacts, whose last look was `since` seconds ago. Springs made soft for a shorter
-/// substep are made softer. Thread blocks meet twice at `arrived`, where they have met `met` times.
-inline __device__ __noinline__ void look_at_contacts(const CudaLooks s, const CudaNodes state,
-                                                     float dt, float since, unsigned* arrived,
-                                                     unsigned met) {
-  CudaFaceFigures& figures = *s.figures;
-  const int involved = figures.involved, contacts = figures.contacts;
-  const bool longer = dt > figures.dt;
-  if (blockIdx.x == 0 && threadIdx.x == 0) {
-    figures.active = 0;
-    figures.fastest_pair = 0;
-  }
-  const auto threads = static_cast<int>(gridDim.x * blockDim.x);
-  for (int i = static_cast<int>(threadIdx.x * gridDim.x + blockIdx.x); i < involved; i += threads) {
-    move_facet(s, state, s.involved[i]);
-  }
-  grid_barrier(arrived, met + 1);
-  float fastest = 0;
-  const int lane = static_cast<int>(threadIdx.x) % 32;
-  for (int i = first_of_warp(); i < contacts; i += warps_of_grid()) {
-    FaceSpring& at = s.springs[s.contacts[i]];
-    FaceSpring spring = at;
-    WarpFaces faces(s, state, spring);
-    fastest = fmaxf(fastest, look(faces, spring, dt, since));
-    if (longer && spring.other >= 0) spring.soften(faces.held_mobility(), dt);
-    __syncwarp();
-    if (lane == 0) at = spring;
-    if (!is_active(spring)) continue;
-    int place = 0;
-    if (lane == 0) {
-      place = atomicAdd(&figures.active, 1);
-      s.active[place] = spring.facet;
+/// Works out contacts and adds their forces to `force`, of the nodes. The groups of a warp go in
+/// step.
+__device__ __forceinline__ void push_contacts(const CudaFaces& f, const LaneShare& share,
+                                              const CudaNodes& state, const ContactRound& round,
+                                              long long* force) {
+  const CudaLooks& s = f.looks;
+  for (int i = share.first; __any_sync(0xffffffffu, i < f.contacts); i += share.step) {
+    const int at = min(i, f.contacts - 1);
+    FaceSpring& spring = s.springs[s.contacts[at]];
+    FaceSpring c = spring;
+    const bool is_one = i < f.contacts && c.other >= 0, active = is_one && is_active(c);
+    if (!__any_sync(0xffffffffu, active || (round.soften && is_one))) continue;
+    LanePlaces<false> places(state);
+    places.take(c, s.nodes[at]);
+    places.bring();
+    if (round.soften) {
+      const float mobility = places.held_mobility();
+      if (is_one) c.soften(mobility, round.dt);
     }
-    place = __shfl_sync(0xffffffffu, place, 0);
-    if (lane >= 27) continue;
-    CudaContactNodes& nodes = s.nodes[place];
-    nodes.own[lane] = faces.own_node;
-    nodes.other[lane] = faces.other_node;
-    nodes.weight[lane] = faces.own_weight;
+    if (__any_sync(0xffffffffu, active)) push_face(c, round.dt, places, active);
+    if (!active && !(round.soften && is_one)) continue;
+    if (places.lanes.lane == 0) spring = c;
+    if (active && c.touching) add_pushes(c, places, force);
   }
-  if (lane == 0 && fastest > 0) atomicMax(&figures.fastest_pair, __float_as_uint(fastest));
-  grid_barrier(arrived, met + 2);
 }
 
-/// When a thread block looks at contacts; in shared memory.
-struct FaceRounds {
-  int next;  ///< round of the next look
-  int last;  ///< of the last
-  float
-      since;  ///< seconds from the last look to round `last`: not 0 if that was before this launch
-  int unused;
+/// The same, and looks at all of them before; each group by itself.
+__device__ __forceinline__ void look_at_contacts(const CudaFaces& f, const LaneShare& share,
+                                                 const CudaNodes& state, const ContactRound& round,
+                                                 long long* force) {
+  const CudaLooks& s = f.looks;
+  float fastest = 0;
+  for (int i = share.first; i < f.contacts; i += share.step) {
+    FaceSpring c = s.springs[s.contacts[i]];
+    LaneFaces faces(s, state);
+    faces.index = c.facet;
+    if (round.fresh) {
+      faces.take(c);
+    } else {
+      faces.LanePlaces::take(c, s.nodes[i]);
+    }
+    faces.bring();
+    fastest = fmaxf(fastest, look(faces, c, round.dt, round.since));
+    CudaContactNodes& nodes = s.nodes[i];
+    if (round.fresh) {
+      faces.own_place.store_nodes(faces.lanes, nodes.own);
+      faces.own_place.store_weights(faces.lanes, nodes.weight);
+    }
+    faces.other_place.store_nodes(faces.lanes, nodes.other);
+    if (round.soften && c.other >= 0) c.soften(faces.held_mobility(), round.dt);
+    const bool active = is_active(c);
+    if (active) push_face(c, round.dt, faces);
+    __syncwarp(faces.lanes.mask);
+    if (faces.lanes.lane == 0) s.springs[c.facet] = c;
+    if (active && c.touching) add_pushes(c, faces, force);
+  }
+  __syncwarp();
+#pragma unroll
+  for (int step = kContactLanes; step < 32; step *= 2) {
+    fastest = fmaxf(fastest, __shfl_xor_sync(0xffffffffu, fastest, step));
+  }
+  if (threadIdx.x % 32 == 0 && fastest > 0) atomicMax(round.fastest, __float_as_uint(fastest));
+}
 
-  __device__ __forceinline__ void begin(const CudaFaces& f, float dt) {
+/// Brings facets, a thread for each, to where the next substep will look at them.
+__device__ __forceinline__ void move_facets(const CudaFaces& f, const LaneShare& share,
+                                            const CudaNodes& state, float dt) {
+  for (int i = share.first; i < f.involved; i += share.step) {
+    const int facet = f.looks.involved[i];
+    FacetMotion motion = motion_of(f.looks, state, f.looks.facets[facet]);
+    for (int a = 0; a < 3; ++a) motion.x[a] += dt * motion.v[a];
+    f.looks.motion[facet] = motion;
+  }
+}
+
+/// When a thread block looks at contacts; in shared memory, and changed by one thread between the
+/// barrier of the grid and the next of the thread block.
+struct alignas(16) FaceRounds {
+  int next;     ///< round of the next look
+  int last;     ///< of the last
+  float since;  ///< seconds from the last look to round `last`: not 0 if it was before this launch
+  int slot;     ///< of CudaFaceFigures::fastest_pair that the next look takes
+  int rank;     ///< CudaBundle::rank; thread blocks without a bundle come after those that have one
+  int ranks;    ///< that there are
+
+  __device__ __forceinline__ void begin(const CudaTables& t, const CudaFaces& f, float dt) {
+    const int mine = static_cast<int>(blockIdx.x), beside = mine - t.bundle_count;
+    rank = beside >= 0 ? f.ranks + beside : t.bundles[mine].rank;
+    ranks = f.ranks + max(static_cast<int>(gridDim.x) - t.bundle_count, 0);
     const CudaFaceFigures& figures = *f.looks.figures;
-    const bool now = f.look_first || figures.until_look <= 0 || dt > figures.dt;
-    next = now ? 0 : rounds_in(figures.until_look, dt);
+    // Where a look is due at once, facets were moved for it by the last substep.
+    next = f.look_first != 0 || figures.until_look <= 0 ? 0 : rounds_in(figures.until_look, dt);
     last = 0;
     since = figures.since_look;
+    slot = figures.next_pair;
   }
-  __device__ __forceinline__ float since_look(int round, float dt) const {
-    return since + static_cast<float>(round - last) * dt;
-  }
-  __device__ __forceinline__ void looked(const CudaFaces& f, int round, float dt) {
-    const float fastest = __uint_as_float(__ldcg(&f.looks.figures->fastest_pair));
-    next = round + rounds_in(look_horizon(fastest, f.looks.cell_size, dt), dt);
-    last = round;
+  /// At the beginning of a round: what the last one's look tells.
+  __device__ __forceinline__ void learn(const CudaFaces& f, int round, float dt) {
+    if (next != round - 1) return;
+    CudaFaceFigures& figures = *f.looks.figures;
+    const float fastest = __uint_as_float(__ldcg(figures.fastest_pair + slot));
+    last = next;
     since = 0;
+    next = last + max(2, rounds_in(look_horizon(fastest, f.looks.cell_size, dt), dt));
+    slot ^= 1;
+    if (blockIdx.x == 0) figures.fastest_pair[slot] = 0;
+  }
+  /// Contacts and facets are left to the thread blocks that have the least to do.
+  __device__ __forceinline__ LaneShare share(const Pushers& team, int lanes) const {
+    return ranks == 0 ? LaneShare::of(static_cast<int>(blockIdx.x), static_cast<int>(gridDim.x),
+                                      team, lanes)
+                      : LaneShare::of(rank, ranks, team, lanes);
+  }
+  __device__ __forceinline__ ContactRound at(const CudaFaces& f, int round, float dt) const {
+    ContactRound r;
+    r.dt = dt;
+    r.since = since_look(round, dt);
+    r.look = round == next;
+    r.fresh = round == 0 && f.look_first != 0;
+    r.soften = round == 0 && dt > f.looks.figures->dt;
+    r.move = round + 1 == next;
+    r.fastest = f.looks.figures->fastest_pair + slot;
+    return r;
   }
   __device__ __forceinline__ void end(const CudaFaces& f, int round, float dt) const {
-    f.looks.figures->until_look = (next - round) * static_cast<double>(dt);
-    f.looks.figures->since_look = since_look(round, dt);
-    f.looks.figures->dt = dt;
+    CudaFaceFigures& figures = *f.looks.figures;
+    figures.until_look = (next - round) * static_cast<double>(dt);
+    figures.since_look = since_look(round, dt);
+    figures.next_pair = slot;
+    figures.dt = dt;
   }
 
  private:
+  __device__ __forceinline__ float since_look(int round, float dt) const {
+    return since + static_cast<float>(round - last) * dt;
+  }
   static __device__ __forceinline__ int rounds_in(double time, float dt) {
     return max(1, static_cast<int>(ceil(time / dt)));
   }
 };
+
+/// Contact of tissue with tissue in a round, once all nodes are in place; adds the forces to
+/// `force`, of the nodes. Out of line, for the blocks to keep their registers.
+inline __device__ __noinline__ void touch_faces(const CudaFaces* faces, const FaceRounds* rounds,
+                                                int round, float dt, const CudaNodes state,
+                                                const Pushers team, long long* force) {
+  const CudaFaces& f = *faces;
+  const ContactRound now = rounds->at(f, round, dt);
+  const LaneShare share = rounds->share(team, kContactLanes);
+  if (now.look) {
+    look_at_contacts(f, share, state, now, force);
+  } else {
+    push_contacts(f, share, state, now, force);
+  }
+  if (now.move) move_facets(f, rounds->share(team, 1), state, dt);
+}
 
 }  // namespace tissue_sim

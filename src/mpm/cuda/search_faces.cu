@@ -1,8 +1,8 @@
 #include <cuda_runtime.h>
 
+#include "mpm/cuda/contact_lanes.h"
 #include "mpm/cuda/search_faces.h"
 #include "mpm/cuda/search_kernels.h"
-#include "mpm/cuda/warp_faces.h"
 
 namespace tissue_sim {
 namespace {
@@ -37,7 +37,7 @@ __global__ void __launch_bounds__(kThreads) move_facets(const CudaLooks s, const
   const int f = thread_index();
   unsigned box[6] = {};
   if (f < s.facet_count) {
-    move_facet(s, state, f);
+    s.motion[f] = motion_of(s, state, s.facets[f]);
     if (!flies(s, f)) {
       const SweptBox swept(s.motion[f], s.cell_size);
       for (int a = 0; a < 3; ++a) {
@@ -124,19 +124,22 @@ __global__ void begin_anew(const CudaLooks s) {
   s.springs[f] = c;
 }
 
-/// A warp for each contact.
+/// A group of lanes for each contact.
 __global__ void take_up_kept(const CudaLooks s, const CudaNodes state, const KeptContact* kept,
                              int kept_count, float dt) {
-  const int i = thread_index() / 32;
+  const int i = thread_index() / kContactLanes;
   if (i >= s.figures->contacts) return;
   FaceSpring& at = s.springs[s.contacts[i]];
   FaceSpring c = at;
   const KeptContact* before = find_kept(kept, kept_count, s.facets[c.facet].facet);
   if (before == nullptr) return;
-  WarpFaces faces(s, state, c);
+  LaneFaces faces(s, state);
+  faces.index = c.facet;
+  faces.take(c);
+  faces.bring();
   take_up(faces, c, *before, dt);
-  __syncwarp();
-  if (threadIdx.x % 32 == 0) at = c;
+  __syncwarp(faces.lanes.mask);
+  if (faces.lanes.lane == 0) at = c;
 }
 
 __global__ void gather_contacts(const CudaLooks s, int count, FaceSpring* out) {
@@ -172,8 +175,8 @@ void launch_search(const CudaLooks& looks, const CudaNodes& state, const CudaSea
 void launch_take_up(const CudaLooks& looks, const CudaNodes& state, const KeptContact* kept,
                     int kept_count, int contact_count, float dt, cudaStream_t stream) {
   if (contact_count == 0) return;
-  take_up_kept<<<blocks_for(32 * contact_count), kThreads, 0, stream>>>(looks, state, kept,
-                                                                        kept_count, dt);
+  take_up_kept<<<blocks_for(kContactLanes * contact_count), kThreads, 0, stream>>>(
+      looks, state, kept, kept_count, dt);
   check_launch();
 }
 

@@ -141,36 +141,23 @@ __device__ __forceinline__ void push_nodes(const CudaTables& t, const CudaFrame&
                                            bool helpers, unsigned& met) {
   if (!pushers.has_me()) return;
   const float dt = f.step.dt;
-  FaceRounds& rounds = *s.rounds;
-  if (round == f.substeps) {
-    if (f.faces.any && blockIdx.x == 0 && threadIdx.x == 0) rounds.end(f.faces, round, dt);
-    return;
-  }
   const int first = helpers ? t.bundle_count : 0, block = static_cast<int>(blockIdx.x) - first;
-  if (block < 0 && !f.faces.any) return;
+  if (block < 0 && f.faces == nullptr) return;
   const int warp = pushers.me() / 32, blocks = static_cast<int>(gridDim.x) - first,
             warps = blocks * pushers.size() / 32;
   const ColliderCopy colliders(f, round, pushers);
   NearSearch near(f, warp * blocks + block, warps);
   colliders.finish(s.colliders);
-  wait(f.arrived + 1, ++met, pushers);
   const bool odd = ((f.current + round) & 1) != 0;
   const CudaNodes& state = odd ? f.state[1] : f.state[0];
   long long* force = f.pushes.force + f.pushes.stride * (round % 3);
+  wait(f.arrived + 1, ++met, pushers);
   if (f.near_cells != nullptr && block >= 0) {
     auto* loads =
         reinterpret_cast<unsigned long long*>(f.loads) + kLoadSums * f.collider_count * round;
     near.push(t, state, kCellReach * f.cell_size, {s.colliders, loads, force}, s.cells[warp]);
   }
-  if (!f.faces.any) return;
-  const CudaLooks& looks = f.faces.looks;
-  if (round == rounds.next) {
-    look_at_contacts(looks, state, dt, rounds.since_look(round, dt), f.arrived + 1, met);
-    met += 2;
-    if (threadIdx.x == 0) rounds.looked(f.faces, round, dt);
-  }
-  push_contacts({looks.active, looks.nodes, looks.springs, &looks.figures->active}, state, dt,
-                force);
+  if (f.faces != nullptr) touch_faces(f.faces, s.rounds, round, dt, state, pushers, force);
 }
 
 template <Laws kLaws, bool kCached, bool kPairs, Can kCan>
@@ -187,11 +174,10 @@ __global__ void __launch_bounds__(kMaxCudaThreads, 1)
   cache.shared = reinterpret_cast<std::uint32_t*>(cache.node + max_slots);
   const bool idle = kPushes && mine >= t.bundle_count;
   // Where columns have one thread, a round is long enough for few to push.
-  const bool helpers =
-      !kPairs && static_cast<int>(gridDim.x) - t.bundle_count >= kEnoughHelpers && !f.faces.any;
+  const bool helpers = !kPairs && static_cast<int>(gridDim.x) - t.bundle_count >= kEnoughHelpers &&
+                       f.faces == nullptr;
   // Where some warps have no columns, they push while the others work on forces.
-  const bool apart =
-      kPushes && kCached && kPairs && !f.faces.any && layout.workers < static_cast<int>(blockDim.x);
+  const bool apart = kPushes && kCached && kPairs && layout.workers < static_cast<int>(blockDim.x);
   Workers workers;
   Pushers pushers;
   if (apart) {
@@ -199,7 +185,9 @@ __global__ void __launch_bounds__(kMaxCudaThreads, 1)
     pushers.count = static_cast<int>(blockDim.x) - layout.workers;
   }
   unsigned met = 0;
-  if (kPushes && f.faces.any && threadIdx.x == 0) s.rounds->begin(f.faces, f.step.dt);
+  if (kPushes && f.faces != nullptr && threadIdx.x == 0) {
+    s.rounds->begin(t, *f.faces, f.step.dt);
+  }
   const BundleAtWork kept(t, kCached && !idle ? mine : 0);
   if (kCached && !idle) {
     fill_cache(t, kept.bundle.first_slot, kept.bundle.slots, cache);
@@ -208,6 +196,10 @@ __global__ void __launch_bounds__(kMaxCudaThreads, 1)
   }
   for (int round = 0; round <= f.substeps; ++round) {
     if (round > 0) grid_barrier(f.arrived, static_cast<unsigned>(round));
+    if (kPushes && f.faces != nullptr && threadIdx.x == 0) {
+      s.rounds->learn(*f.faces, round, f.step.dt);
+      if (round == f.substeps && mine == 0) s.rounds->end(*f.faces, round, f.step.dt);
+    }
     if (idle) {
       if (round < f.substeps) nodes_are_there(f);
     } else if constexpr (kCached) {
@@ -220,7 +212,9 @@ __global__ void __launch_bounds__(kMaxCudaThreads, 1)
         __syncthreads();  // the next one clears the exchange
       }
     }
-    if constexpr (kPushes) push_nodes(t, f, s, round, pushers, helpers, met);
+    if constexpr (kPushes) {
+      if (round < f.substeps) push_nodes(t, f, s, round, pushers, helpers, met);
+    }
   }
 }
 

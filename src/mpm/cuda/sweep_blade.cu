@@ -3,8 +3,8 @@
 #include "compute/for_each_cuda.h"
 #include "contact/facet_in_world.h"
 #include "mpm/cuda/block_nodes.h"
+#include "mpm/cuda/contact_lanes.h"
 #include "mpm/cuda/sweep_blade.h"
-#include "mpm/cuda/warp_faces.h"
 
 namespace tissue_sim {
 namespace {

@@ -51,6 +51,7 @@ struct CudaBundle {
   int plane_slots;            ///< of a plane of nodes of all its blocks
   int nz;                     ///< of the tallest block
   int partial;                ///< some cells are stabilised
+  int rank;                   ///< among those without such cells, which take less time; else -1
 };
 
 /// A column of cells, for the one or two threads that walk up it.
@@ -97,8 +98,9 @@ struct alignas(16) CudaNearCell {
   int unused;
 };
 
-/// Forces of colliders and facets on the nodes, [3][nodes][3], in units of kLoadUnit as integers:
-/// while one is summed up, that of the substep before is read and the third is cleared.
+/// Forces of colliders and facets on the nodes, [3][nodes][kPushStride], in units of kLoadUnit as
+/// integers: while one is summed up, that of the substep before is read and the third is cleared.
+inline constexpr int kPushStride = 4;  ///< three components, and one to read them by twos
 struct NodePushes {
   long long* force = nullptr;
   std::size_t stride = 0;  ///< from one of the three to the next
@@ -160,8 +162,8 @@ struct CudaFrame {
   const int* near_count;
   float cell_size;  ///< the scene's [m]
   NodePushes pushes;
-  unsigned* arrived;  ///< counters of the two barriers, 0 at the beginning
-  CudaFaces faces;
+  unsigned* arrived;       ///< counters of the two barriers, 0 at the beginning
+  const CudaFaces* faces;  ///< null where no tissue touches tissue
 };
 
 }  // namespace tissue_sim

@@ -214,7 +214,7 @@ const CudaFaces* CudaMpmTissue::faces_of_launch() {
   }
   const std::vector<CudaBundle>& bundles = d.host_tables.bundles;
   const auto ranks = std::count_if(
-      bundles.begin(), bundles.begin() + std::min<std::ptrdiff_t>(d.push_resident, bundles.size()),
+      bundles.begin(), bundles.begin() + std::min<std::ptrdiff_t>(d.touch_resident, bundles.size()),
       [](const CudaBundle& b) { return b.rank >= 0; });
   const CudaFaces faces = {std::exchange(f.searched, false) ? 1 : 0, f.contacts_count,
                            f.involved_count, static_cast<int>(ranks), looks()};

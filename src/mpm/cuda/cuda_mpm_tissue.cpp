@@ -229,7 +229,11 @@ void CudaMpmTissue::launch(int begin, int end, float dt) {
     frame.pushes = {d.pushed.data(), d.pushed.size() / 3};
     CudaTables tables = d.tables();
     tables.slot_parts = d.pushed_parts.data();
-    launch_substeps(d.push_plan, tables, frame, d.push_resident, d.stream);
+    if (frame.faces != nullptr) {
+      launch_substeps(d.touch_plan, tables, frame, d.touch_resident, d.stream);
+    } else {
+      launch_substeps(d.push_plan, tables, frame, d.push_resident, d.stream);
+    }
   } else if (d.all_plain) {
     launch_substeps(d.plain_plan, d.plain_tables(), frame, d.plain_resident, d.stream);
   } else {

@@ -76,6 +76,9 @@ void CudaMpmTissue::plan_tables() {
     d.push_plan = d.plan;
     d.push_plan.pushes = true;
     d.push_resident = resident_blocks(d.push_plan, static_cast<int>(count));
+    d.touch_plan = d.push_plan;
+    d.touch_plan.touches = true;
+    d.touch_resident = resident_blocks(d.touch_plan, static_cast<int>(count));
   };
   choose(blocks.size());
   std::vector<std::vector<int>> bundles;
@@ -108,7 +111,7 @@ void CudaMpmTissue::plan_tables() {
   choose(t.bundles.size());
   d.all_plain = std::all_of(t.bundles.begin(), t.bundles.end(),
                             [](const CudaBundle& b) { return b.blocks == 1 && b.partial == 0; });
-  if (d.resident == 0 || d.plain_resident == 0 || d.push_resident == 0) {
+  if (d.resident == 0 || d.plain_resident == 0 || d.push_resident == 0 || d.touch_resident == 0) {
     throw std::runtime_error("the GPU has too little shared memory");
   }
 }

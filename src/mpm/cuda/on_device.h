@@ -38,9 +38,10 @@ struct SweepOnDevice {
 struct CudaMpmTissue::OnDevice {
   CudaLimits limits;
   CudaShape shape;
-  /// Without contact, with it, and CudaPlan::plain.
-  CudaPlan plan, push_plan, plain_plan;
-  int resident = 0, push_resident = 0, plain_resident = 0;  ///< thread blocks that run at once
+  /// Without contact, with tools, with contact of tissue too, and CudaPlan::plain.
+  CudaPlan plan, push_plan, touch_plan, plain_plan;
+  /// Thread blocks that run at once.
+  int resident = 0, push_resident = 0, touch_resident = 0, plain_resident = 0;
   bool all_plain = true;  ///< all cells are full and each bundle is one block
   bool may_meet = true;   ///< whether any block may meet a collider in this frame
   int current = 0;        ///< which of the two states is the present one

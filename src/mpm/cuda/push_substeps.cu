@@ -1,4 +1,4 @@
-// The kernels with contact, apart from the others to be compiled beside them.
+// The kernels with tools, apart from the others to be compiled beside them.
 #include "mpm/cuda/substep_kernels.h"
 
 namespace tissue_sim {

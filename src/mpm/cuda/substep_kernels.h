@@ -12,8 +12,10 @@ namespace {
 /// Which laws a kernel can do; one that can do all has to hold more registers.
 enum class Laws { kFixedCorotated, kNeoHookean, kAny };
 
-/// What a kernel can do: whole tissue (CudaPlan::plain), cut tissue too, or contact beside.
-enum class Can { kPlain, kCuts, kPushes };
+/// What a kernel can do: whole tissue (CudaPlan::plain), cut tissue too, contact with tools beside,
+/// or of tissue with tissue too.
+enum class Can { kPlain, kCuts, kPushes, kTouches };
+constexpr bool pushes(Can can) { return can == Can::kPushes || can == Can::kTouches; }
 
 /// The shared memory of a thread block. Worked out anew where it is needed, so that the compiler
 /// knows it for shared memory and can use its faster loads.
@@ -75,7 +77,7 @@ __device__ __forceinline__ void all_forces(const CudaTables& t, const BundleAtWo
                                            const Workers& workers) {
   const BlockShared s = shared_of<kLaws == Laws::kAny>(layout);
   if (!clear) clear_exchange(s.exchange, w.bundle.plane_slots, layout.two_planes);
-  if (kCan != Can::kPushes || !clear) __syncthreads();
+  if (!pushes(kCan) || !clear) __syncthreads();
   const BlockStep step{force, layout.two_planes, workers};
   if (kCan == Can::kPlain || (w.bundle.partial == 0 && w.bundle.blocks == 1)) {
     forces<kLaws, kPairs, false, false>(t, w.bundle, w.block, w.body, s, step);
@@ -108,7 +110,7 @@ __device__ __forceinline__ void block_round(const CudaTables& t, const CudaFrame
                                             const BundleAtWork& w, int round,
                                             const CudaLayout& layout, const SlotCache& cache,
                                             const Workers& workers, bool last) {
-  constexpr bool kPushes = kCan == Can::kPushes;
+  constexpr bool kPushes = pushes(kCan);
   constexpr int kHand = kCached && (kPairs || kCan != Can::kPlain) ? 2 : 4;  // as registers allow
   const BlockShared s = shared_of<kLaws == Laws::kAny>(layout);
   const float scale = placed_scale(w.body);
@@ -136,13 +138,14 @@ __device__ __forceinline__ void block_round(const CudaTables& t, const CudaFrame
 /// Contact, once all nodes are where the round brought them: of tissue with colliders and of tissue
 /// with tissue. Thread blocks have `met` so often at their second barrier. Where there are thread
 /// blocks enough without a bundle (`helpers`), colliders are left to them.
+template <bool kTouches>
 __device__ __forceinline__ void push_nodes(const CudaTables& t, const CudaFrame& f,
                                            const BlockShared& s, int round, const Pushers& pushers,
                                            bool helpers, unsigned& met) {
   if (!pushers.has_me()) return;
   const float dt = f.step.dt;
   const int first = helpers ? t.bundle_count : 0, block = static_cast<int>(blockIdx.x) - first;
-  if (block < 0 && f.faces == nullptr) return;
+  if (block < 0 && !kTouches) return;
   const int warp = pushers.me() / 32, blocks = static_cast<int>(gridDim.x) - first,
             warps = blocks * pushers.size() / 32;
   const ColliderCopy colliders(f, round, pushers);
@@ -157,13 +160,13 @@ __device__ __forceinline__ void push_nodes(const CudaTables& t, const CudaFrame&
         reinterpret_cast<unsigned long long*>(f.loads) + kLoadSums * f.collider_count * round;
     near.push(t, state, kCellReach * f.cell_size, {s.colliders, loads, force}, s.cells[warp]);
   }
-  if (f.faces != nullptr) touch_faces(f.faces, s.rounds, round, dt, state, pushers, force);
+  if constexpr (kTouches) touch_faces(f.faces, s.rounds, round, dt, state, pushers, force);
 }
 
 template <Laws kLaws, bool kCached, bool kPairs, Can kCan>
 __global__ void __launch_bounds__(kMaxCudaThreads, 1)
     mpm_substeps(const CudaTables t, const CudaFrame f, const CudaLayout layout) {
-  constexpr bool kPushes = kCan == Can::kPushes;
+  constexpr bool kPushes = pushes(kCan), kTouches = kCan == Can::kTouches;
   const BlockShared s = shared_of<kLaws == Laws::kAny>(layout);
   const int max_slots = layout.max_slots, mine = static_cast<int>(blockIdx.x);
   SlotCache cache;
@@ -174,8 +177,8 @@ __global__ void __launch_bounds__(kMaxCudaThreads, 1)
   cache.shared = reinterpret_cast<std::uint32_t*>(cache.node + max_slots);
   const bool idle = kPushes && mine >= t.bundle_count;
   // Where columns have one thread, a round is long enough for few to push.
-  const bool helpers = !kPairs && static_cast<int>(gridDim.x) - t.bundle_count >= kEnoughHelpers &&
-                       f.faces == nullptr;
+  const bool helpers =
+      !kPairs && static_cast<int>(gridDim.x) - t.bundle_count >= kEnoughHelpers && !kTouches;
   // Where some warps have no columns, they push while the others work on forces.
   const bool apart = kPushes && kCached && kPairs && layout.workers < static_cast<int>(blockDim.x);
   Workers workers;
@@ -185,7 +188,7 @@ __global__ void __launch_bounds__(kMaxCudaThreads, 1)
     pushers.count = static_cast<int>(blockDim.x) - layout.workers;
   }
   unsigned met = 0;
-  if (kPushes && f.faces != nullptr && threadIdx.x == 0) {
+  if (kTouches && threadIdx.x == 0) {
     s.rounds->begin(t, *f.faces, f.step.dt);
   }
   const BundleAtWork kept(t, kCached && !idle ? mine : 0);
@@ -196,7 +199,7 @@ __global__ void __launch_bounds__(kMaxCudaThreads, 1)
   }
   for (int round = 0; round <= f.substeps; ++round) {
     if (round > 0) grid_barrier(f.arrived, static_cast<unsigned>(round));
-    if (kPushes && f.faces != nullptr && threadIdx.x == 0) {
+    if (kTouches && threadIdx.x == 0) {
       s.rounds->learn(*f.faces, round, f.step.dt);
       if (round == f.substeps && mine == 0) s.rounds->end(*f.faces, round, f.step.dt);
     }
@@ -213,7 +216,7 @@ __global__ void __launch_bounds__(kMaxCudaThreads, 1)
       }
     }
     if constexpr (kPushes) {
-      if (round < f.substeps) push_nodes(t, f, s, round, pushers, helpers, met);
+      if (round < f.substeps) push_nodes<kTouches>(t, f, s, round, pushers, helpers, met);
     }
   }
 }

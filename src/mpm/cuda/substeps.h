@@ -30,7 +30,8 @@ struct CudaPlan {
   bool two_planes = false;   ///< the exchange holds two planes, and threads wait half as often
   bool marches = false;      ///< large, and nodes come plane by plane where it is plain
   bool plain = false;        ///< no contact, all cells full, each bundle one block
-  bool pushes = false;       ///< with contact
+  bool pushes = false;       ///< with contact, ...
+  bool touches = false;      ///< ... of tissue with tissue too
   bool neo_hookean = false, fixed_corotated = false, viscous = false;  ///< what there is
 };
 
@@ -48,6 +49,7 @@ struct CudaLayout {
 
 using CudaKernel = void (*)(CudaTables, CudaFrame, CudaLayout);
 CudaKernel pushing_kernel(const CudaPlan& plan);
+CudaKernel touching_kernel(const CudaPlan& plan);
 CudaKernel plain_kernel(const CudaPlan& plan);
 CudaKernel marching_kernel(const CudaPlan& plan);
 

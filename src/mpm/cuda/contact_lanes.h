@@ -1,4 +1,4 @@
-// A contact of tissue with tissue in the hands of eight lanes of a warp, which share the 27 nodes
+// A contact of tissue with tissue in the hands of some lanes of a warp, which share the 27 nodes
 // around either place. For .cu files.
 #pragma once
 

@@ -79,7 +79,8 @@ __global__ void fill_grid(const CudaLooks s, const CudaSearchRoom room) {
   const int f = thread_index();
   if (f >= s.facet_count || !lists_wanted(s) || s.takes_part[f] == 0) return;
   const float* x = s.motion[f].x;
-  CudaSeeker seeker = {{x[0], x[1], x[2]}, kSearchReach * s.cell_size + s.listed[f].skin, f};
+  const auto reach = static_cast<float>(kSearchReach * s.cell_size + s.listed[f].skin);
+  const CudaSeeker seeker = {{x[0], x[1], x[2]}, reach, f};
   room.sorted[room.begin[Grid(s, room).bucket_at(x)] + room.rank[f]] = seeker;
 }
 

@@ -66,6 +66,11 @@ template <int W>
 TISSUE_SIM_INLINE Mask<W> bits(Vec<W> v) {
   return reinterpret_cast<Mask<W>>(v);
 }
+/// v where the mask is set, else w.
+template <int W>
+TISSUE_SIM_INLINE Vec<W> either(Mask<W> mask, Vec<W> v, Vec<W> w) {
+  return reinterpret_cast<Vec<W>>((bits<W>(v) & mask) | (bits<W>(w) & ~mask));
+}
 /// Whether the highest bit of any lane is set. With it instead of comparisons, which GCC 12 takes
 /// apart lane by lane where vectors have 64 bytes.
 template <int W>

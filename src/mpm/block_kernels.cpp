@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "mpm/block_forces.h"
+#include "mpm/block_places.h"
 #include "mpm/block_readings.h"
 #include "mpm/lane_lists.h"
 

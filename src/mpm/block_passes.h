@@ -105,6 +105,24 @@ TISSUE_SIM_INLINE void xy_pass(const float* u, int pitch, int stride, float* q) 
   store<W>(q + kBd * stride, b.d);
 }
 
+/// What values at the points need of the x-y pass.
+enum ValueQuantity { kValueAA, kValueAd, kValuedA, kValuedd, kValueXyCount };
+
+/// The same for these quantities alone.
+template <int W>
+TISSUE_SIM_INLINE void value_xy_pass(const float* u, int pitch, int stride, float* q) {
+  const Line<Vec<W>> r0(load<W>(u), load<W>(u + 1), load<W>(u + 2));
+  u += pitch;
+  const Line<Vec<W>> r1(load<W>(u), load<W>(u + 1), load<W>(u + 2));
+  u += pitch;
+  const Line<Vec<W>> r2(load<W>(u), load<W>(u + 1), load<W>(u + 2));
+  const Line<Vec<W>> a(r0.A, r1.A, r2.A), d(r0.d, r1.d, r2.d);
+  store<W>(q + kValueAA * stride, a.A);
+  store<W>(q + kValueAd * stride, a.d);
+  store<W>(q + kValuedA * stride, d.A);
+  store<W>(q + kValuedd * stride, d.d);
+}
+
 /// What a cell's mean gradient needs of the x-y pass.
 enum MeanQuantity { kMeanAA, kMeanAd, kMeandA, kMeanXyCount };
 

@@ -72,38 +72,49 @@ TISSUE_SIM_INLINE void gather_nodes(const Block& b, const Array<float>* field, f
   }
 }
 
-/// The x-y quantities of node plane z, all components, into slot z % 3 of `in`.
-template <int W>
-TISSUE_SIM_INLINE void load_plane(const Block& b, const Layout& l, const float* nodes, int z,
-                                  float* in) {
+/// Some x-y quantities of node plane z, `count` of each component, into slot z % 3 of `in`;
+/// pass(width, from, pitch, stride, to) is their x-y pass of one component.
+template <int W, class Pass>
+TISSUE_SIM_INLINE void load_quantities(const Block& b, const Layout& l, const float* nodes, int z,
+                                       int count, float* in, const Pass& pass) {
   for (const Block::Run& run : b.runs) {
     const float* from = nodes + z * l.plane + run.y * l.pitch + run.x;
-    float* to = in + (z % 3) * l.in_plane + run.lane;
+    float* to = in + (z % 3) * 3 * count * l.quantity + run.lane;
     for_each_vector<W>(
         run.count, [&](auto width, int j) __attribute__((always_inline)) {
           for (int c = 0; c < 3; ++c) {
-            xy_pass<width>(from + c * l.node_component + j, l.pitch, l.quantity,
-                           to + c * kStressXyCount * l.quantity + j);
+            pass(width, from + c * l.node_component + j, l.pitch, l.quantity,
+                 to + c * count * l.quantity + j);
           }
         });
   }
 }
 
-/// The same for the mean gradients of cells.
+/// Those of the stress.
+template <int W>
+TISSUE_SIM_INLINE void load_plane(const Block& b, const Layout& l, const float* nodes, int z,
+                                  float* in) {
+  load_quantities<W>(
+      b, l, nodes, z, kStressXyCount, in,
+      [](auto width, auto... of) __attribute__((always_inline)) { xy_pass<width>(of...); });
+}
+
+/// Those of the mean gradients of cells.
 template <int W>
 TISSUE_SIM_INLINE void load_mean_plane(const Block& b, const Layout& l, const float* nodes, int z,
                                        float* in) {
-  for (const Block::Run& run : b.runs) {
-    const float* from = nodes + z * l.plane + run.y * l.pitch + run.x;
-    float* to = in + (z % 3) * 3 * kMeanXyCount * l.quantity + run.lane;
-    for_each_vector<W>(
-        run.count, [&](auto width, int j) __attribute__((always_inline)) {
-          for (int c = 0; c < 3; ++c) {
-            mean_xy_pass<width>(from + c * l.node_component + j, l.pitch, l.quantity,
-                                to + c * kMeanXyCount * l.quantity + j);
-          }
-        });
-  }
+  load_quantities<W>(
+      b, l, nodes, z, kMeanXyCount, in,
+      [](auto width, auto... of) __attribute__((always_inline)) { mean_xy_pass<width>(of...); });
+}
+
+/// Those of values at the points.
+template <int W>
+TISSUE_SIM_INLINE void load_values(const Block& b, const Layout& l, const float* nodes, int z,
+                                   float* in) {
+  load_quantities<W>(
+      b, l, nodes, z, kValueXyCount, in,
+      [](auto width, auto... of) __attribute__((always_inline)) { value_xy_pass<width>(of...); });
 }
 
 /// The forces on node plane z from its outgoing x-y quantities.

@@ -1,5 +1,4 @@
-// What is read off a block: places and values at its points, energy and stress. For
-// block_kernels.cpp alone.
+// What is read off a block: energy, stiffness and stress. For block_kernels.cpp alone.
 #pragma once
 
 #include <algorithm>
@@ -10,107 +9,6 @@
 
 namespace tissue_sim {
 namespace kernels {
-
-/// Adds the nodes' reference places to the displacements that gather_nodes() brought.
-TISSUE_SIM_INLINE void add_reference(const Block& b, const BlockField& f, const Layout& l,
-                                     float* nodes) {
-  for (int z = 0; z < b.nz + 2; ++z) {
-    for (int y = 0; y < b.ny + 2; ++y) {
-      float* row = nodes + z * l.plane + y * l.pitch;
-      for (const Block::Side& side : b.sides) {
-        const int first = side.x - b.x;
-        for (int x = 0; x < side.count; ++x) {
-          row[side.column + x] += f.origin[0] + (first + x) * f.cell_size;
-        }
-      }
-      for (int x = 0; x < l.pitch; ++x) {
-        row[x + l.node_component] += f.origin[1] + y * f.cell_size;
-        row[x + 2 * l.node_component] += f.origin[2] + z * f.cell_size;
-      }
-    }
-  }
-}
-
-template <int W>
-TISSUE_SIM_INLINE void positions(const Block& b, const BlockField& f, const Array<float>* u,
-                                 BlockScratch& scratch, float* out) {
-  const Layout l(b);
-  reserve(scratch.nodes, 3 * l.node_component);
-  reserve(scratch.in, 3 * l.in_plane);
-  gather_nodes<W>(b, u, 1.0f, l, scratch.nodes.data());
-  add_reference(b, f, l, scratch.nodes.data());
-  const float* in = scratch.in.data();
-  for (int z = 0; z < 2; ++z) load_plane<W>(b, l, scratch.nodes.data(), z, scratch.in.data());
-  for (int z = 0; z < b.nz; ++z) {
-    load_plane<W>(b, l, scratch.nodes.data(), z + 2, scratch.in.data());
-    for (int c = 0; c < 3; ++c) {
-      for (int j = 0; j < l.stride; j += W) {
-        constexpr XyQuantity kinds[4] = {kAA, kdA, kAd, kdd};
-        Vec<W> w[2][4];
-        for (int k = 0; k < 4; ++k) {
-          const float* q = in + (c * kStressXyCount + kinds[k]) * l.quantity + j;
-          const Line<Vec<W>> line(load<W>(q + (z % 3) * l.in_plane),
-                                  load<W>(q + ((z + 1) % 3) * l.in_plane),
-                                  load<W>(q + ((z + 2) % 3) * l.in_plane));
-          w[0][k] = line.A - 0.125f * line.d;
-          w[1][k] = line.A + 0.125f * line.d;
-        }
-        float* to = out + (static_cast<std::size_t>(c) * b.nz + z) * 8 * l.stride + j;
-        for (int s = 0; s < 8; ++s) {
-          const Vec<W>* v = w[s / 4];
-          const float x = s & 1 ? 0.125f : -0.125f, y = s & 2 ? 0.125f : -0.125f;
-          store<W>(to + s * l.stride, v[0] + x * v[1] + y * (v[2] + x * v[3]));
-        }
-      }
-    }
-  }
-}
-
-/// Smallest and largest of the values `inside`.
-template <int W>
-TISSUE_SIM_INLINE void widen(Mask<W> inside, Vec<W> v, Vec<W>& min, Vec<W>& max) {
-  min = (inside & (v < min)) ? v : min;
-  max = (inside & (v > max)) ? v : max;
-}
-
-template <int kWidth>
-TISSUE_SIM_INLINE PointBounds bounds(const Block& b, const BlockField& f, BlockScratch& scratch) {
-  constexpr int W = kWidth < 8 ? kWidth : 8;  // GCC 12 compares wider vectors lane by lane
-  const std::size_t lanes = b.lane_count();
-  reserve(scratch.values, 3 * lanes);
-  const float *x = scratch.values.data(), *volume = b.volume.data();
-  PointBounds result;
-  positions<kWidth>(b, f, f.nodes->u, scratch, scratch.values.data());
-  Vec<W> min[3], max[3];  // side by side: each waits for what it was
-  for (int a = 0; a < 3; ++a) {
-    min[a] = Vec<W>{} + result.min[a];
-    max[a] = Vec<W>{} + result.max[a];
-  }
-  for (std::size_t j = 0; j < lanes; j += W) {
-    const Mask<W> inside = load<W>(volume + j) > 0.0f;
-    for (int a = 0; a < 3; ++a) widen<W>(inside, load<W>(x + a * lanes + j), min[a], max[a]);
-  }
-  for (int a = 0; a < 3; ++a) {
-    for (int i = 0; i < W; ++i) {
-      result.min[a] = std::min(result.min[a], min[a][i]);
-      result.max[a] = std::max(result.max[a], max[a][i]);
-    }
-  }
-  positions<kWidth>(b, at_rest(f), f.nodes->v, scratch, scratch.values.data());
-  Vec<W> speed2 = {};
-  for (std::size_t j = 0; j < lanes; j += W) {
-    const Vec<W> vx = load<W>(x + j), vy = load<W>(x + lanes + j), vz = load<W>(x + 2 * lanes + j);
-    const Vec<W> v2 = vx * vx + vy * vy + vz * vz;
-    // Once it is no number it stays none.
-    const auto take = (load<W>(volume + j) > 0.0f) & (speed2 == speed2) & ~(v2 <= speed2);
-    speed2 = take ? v2 : speed2;
-  }
-  for (int i = 0; i < W; ++i) {
-    if (result.speed == result.speed && !(speed2[i] <= result.speed)) result.speed = speed2[i];
-  }
-  result.speed = std::sqrt(result.speed);
-  return result;
-}
 
 template <int W>
 TISSUE_SIM_INLINE Vec<W> larger(Vec<W> a, Vec<W> b) {

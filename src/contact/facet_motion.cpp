@@ -14,7 +14,8 @@ struct PlaceMotion {
 };
 
 /// The three nodes of a row side by side: what is summed over rows waits for the weights along x
-/// until the end. Without velocities if `v` is null.
+/// until the end. `kMoves`: with velocities.
+template <bool kMoves>
 PlaceMotion motion_at(const Array<float>* u, const Array<float>* v, const CellNodes& cell,
                       double cell_size, const float (&place)[3]) {
   const AxisWeights weights(place);
@@ -36,7 +37,7 @@ PlaceMotion motion_at(const Array<float>* u, const Array<float>* v, const CellNo
         sum[c] += w * of_u;
         along_y[c] += dy * of_u;
         along_z[c] += dz * of_u;
-        if (v != nullptr) velocity[c] += w * of_row(v[c]);
+        if (kMoves) velocity[c] += w * of_row(v[c]);
       }
     }
   }
@@ -60,7 +61,7 @@ PlaceMotion motion_at(const Array<float>* u, const Array<float>* v, const CellNo
 
 void deformation_gradient_at(const Array<float>* u, const CellNodes& nodes, double cell_size,
                              const float (&place)[3], float (&F)[9]) {
-  std::copy_n(motion_at(u, nullptr, nodes, cell_size, place).F, 9, F);
+  std::copy_n(motion_at<false>(u, nullptr, nodes, cell_size, place).F, 9, F);
 }
 
 Vec3 reference_place(const LatticeBody& body, const Block& block, int cell,
@@ -74,7 +75,7 @@ Vec3 reference_place(const LatticeBody& body, const Block& block, int cell,
 FacetMotion facet_motion(const LatticeBody& body, const Block& block, const Facet& facet,
                          const Nodes& nodes) {
   const PlaceMotion m =
-      motion_at(nodes.u, nodes.v, CellNodes(block, facet.cell), body.cell_size, facet.center);
+      motion_at<true>(nodes.u, nodes.v, CellNodes(block, facet.cell), body.cell_size, facet.center);
   const Vec3 place = reference_place(body, block, facet.cell, facet.center);
   return facet_motion(facet, {place[0], place[1], place[2]}, m.u, m.v, m.F);
 }

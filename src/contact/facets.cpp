@@ -234,9 +234,9 @@ std::vector<Facet> facets_of(const LatticeBody& body, const Points& points, cons
   std::vector<Facet> facets;
   for (int z = 0; z < block.nz; ++z) {
     for (const Block::Run& run : block.runs) {
+      const int first_x = block.cell_x(run.x), y = block.y + run.y;
       for (int i = 0; i < run.count; ++i) {
-        const int lane = run.lane + i;
-        const int x = block.cell_x(run.x) + i, y = block.y + run.y;
+        const int lane = run.lane + i, x = first_x + i;
         if (known.is_bare(x, y, block.z + z)) continue;
         const int cell = z * block.plane + block.cell[lane];
         std::int32_t around[8];
@@ -262,7 +262,10 @@ std::vector<Facet> facets_of(const LatticeBody& body, const Points& points, cons
         for (int j = 0; j < 4 * kBondCount; ++j) {
           const End how = j / 2 % 2 == 0 ? End::kCut : End::kOuter;
           const unsigned gone = (how == End::kCut ? missing.cut : missing.outer)[j / 4];
-          if (gone == 0) continue;
+          if (gone == 0) {
+            ++j;  // nor on the other level
+            continue;
+          }
           const Side side(j / 4, j % 2);
           unsigned members = gone & side.points();
           if (how == End::kCut && members != 0) {

@@ -50,15 +50,24 @@ struct BondsAround {
 void list_threads(MpmState& state, const std::vector<std::int32_t>& changed) {
   const Points& points = state.points;
   std::vector<std::int32_t>& threads = state.threads;
+  // Of each cell, by its node: no thread ends around it. Points come row by row, so that a cell
+  // comes up to four times.
+  std::vector<std::uint8_t> is_bare(lattice_node_count(state.bodies), 0);
   Planes ends{};
+  int node = -1;
   Points::Site of{-1, -1, -1, -1};  // the cell that they are around
   for (const std::int32_t p : changed) {
     const Points::Site& s = points.site[p];
     if (s.x / 2 != of.x || s.y / 2 != of.y || s.z / 2 != of.z || s.body != of.body) {
       of = {static_cast<std::int16_t>(s.x / 2), static_cast<std::int16_t>(s.y / 2),
             static_cast<std::int16_t>(s.z / 2), s.body};
-      ends = state.fields->bonds().thread_ends(of.body, of.x, of.y, of.z);
+      node = state.bodies[of.body].node(of.x, of.y, of.z);
+      if (is_bare[node] == 0) {
+        ends = state.fields->bonds().thread_ends(of.body, of.x, of.y, of.z);
+        is_bare[node] = ends == Planes{};
+      }
     }
+    if (is_bare[node] != 0) continue;
     const auto ends_one = [&](const BondOffset& o) {
       const int x = s.x + o.x, y = s.y + o.y, z = s.z + o.z;
       return (ends[z - 2 * of.z + 2] >> bit_in_plane(x - 2 * of.x + 2, y - 2 * of.y + 2) & 1) != 0;

@@ -203,7 +203,9 @@ std::vector<int> part_pieces(const Points& points, const std::vector<PartedRun>&
     }
     pieces.lowest[id] = largest->lowest;
     if (largest == parts.begin()) continue;
-    std::replace(pieces.of_point.begin(), pieces.of_point.end(), id, id_of[parts[0].lowest]);
+    const int now = id_of[parts[0].lowest];
+    // Written to whether or not it changes, as std::replace() is not: in vectors.
+    for (std::int32_t& piece : pieces.of_point) piece = piece == id ? now : piece;
   }
   for (const PartedRun& run : parted) {
     std::fill(pieces.of_point.begin() + run.begin, pieces.of_point.begin() + run.end,

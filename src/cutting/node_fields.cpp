@@ -163,37 +163,44 @@ std::vector<NodeFields::Cell> NodeFields::update(const std::vector<LatticeBody>&
   cpu.for_each(
       static_cast<int>(cells.size()),
       [&](int i) { now[i] = taken_apart(cells[i].cell, cells[i].node); }, 32);
-  std::vector<CellNode> apart;
-  std::vector<std::int32_t> parent_of_new;  // the node that a new one was a part of
-  const int node_count = static_cast<int>(nodes.size());
+  struct Part {
+    const CellNode* of;
+    Split* now;
+    int first_new;  // of its new nodes
+  };
+  std::vector<Part> apart;
+  apart.reserve(cells.size());
+  int node_count = static_cast<int>(nodes.size());
+  auto split_count = static_cast<std::int32_t>(splits_.size());
   for (std::size_t i = 0; i < cells.size(); ++i) {
     if (now[i].fields.empty()) continue;
-    apart.push_back(cells[i]);
-    for (Split::Field& f : now[i].fields) {
-      if (f.node >= 0) continue;
-      parent_of_new.push_back(~f.node);
-      f.node = node_count + static_cast<std::int32_t>(parent_of_new.size()) - 1;
-    }
+    apart.push_back({&cells[i], &now[i], node_count});
     std::int32_t& index = split_of_[cells[i].node];
-    if (index < 0) {
-      index = static_cast<std::int32_t>(splits_.size());
-      splits_.emplace_back();
-    }
-    splits_[index] = std::move(now[i]);
+    const std::size_t before = index < 0 ? 1 : splits_[index].fields.size();
+    node_count += static_cast<int>(now[i].fields.size() - before);
+    if (index < 0) index = split_count++;
   }
+  splits_.resize(split_count);
   Array<float>* const fields[] = {&nodes.u[0], &nodes.u[1], &nodes.u[2], &nodes.v[0],
                                   &nodes.v[1], &nodes.v[2], &nodes.mass, &nodes.inv_mass};
-  cpu.for_each(8, [&](int k) {
-    Array<float>& of = *fields[k];
-    of.resize(node_count + parent_of_new.size());
-    for (std::size_t i = 0; i < parent_of_new.size(); ++i)
-      of[node_count + i] = of[parent_of_new[i]];
-  });
+  cpu.for_each(8, [&](int k) { fields[k]->resize(node_count); });
   cpu.for_each(
       static_cast<int>(apart.size()),
       [&](int i) {
-        const auto& [cell, node] = apart[i];
-        for (const Split::Field& f : split(node)->fields) {
+        const auto& [cell, node] = *apart[i].of;
+        Split& split = splits_[split_of_[node]];
+        split = std::move(*apart[i].now);
+        int next = apart[i].first_new;
+        for (Split::Field& f : split.fields) {
+          if (f.node >= 0) continue;
+          const int parent = ~f.node;
+          f.node = next++;
+          for (int c = 0; c < 3; ++c) {
+            nodes.u[c][f.node] = nodes.u[c][parent];
+            nodes.v[c][f.node] = nodes.v[c][parent];
+          }
+        }
+        for (const Split::Field& f : split.fields) {
           share_mass(bodies[cell.body], points, cell, mass_of_point_[node], f.points, f.node,
                      nodes);
         }
@@ -201,7 +208,7 @@ std::vector<NodeFields::Cell> NodeFields::update(const std::vector<LatticeBody>&
       32);
   std::vector<Cell> result;
   result.reserve(apart.size());
-  for (const CellNode& a : apart) result.push_back(a.cell);
+  for (const Part& part : apart) result.push_back(part.of->cell);
   return result;
 }
 

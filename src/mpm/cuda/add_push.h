@@ -5,16 +5,18 @@
 
 namespace tissue_sim {
 
-/// Adds a share of a force [N] to the sum of a node: see NodePushes.
+/// Adds what pushes a node [N] to component c of its sum: see NodePushes.
+__device__ __forceinline__ void add_push(long long* sums, int node, int c, float push) {
+  const long long units = __float2ll_rn(push * static_cast<float>(1 / kLoadUnit));
+  long long* sum = sums + kPushStride * static_cast<std::size_t>(node) + c;
+  atomicAdd(reinterpret_cast<unsigned long long*>(sum), static_cast<unsigned long long>(units));
+}
+
+/// Adds a share of a force [N] to all of it.
 __device__ __forceinline__ void add_push(long long* sums, int node, float weight,
                                          const float* force) {
-  long long* sum = sums + kPushStride * static_cast<std::size_t>(node);
 #pragma unroll
-  for (int c = 0; c < 3; ++c) {
-    const long long push = __float2ll_rn(weight * force[c] * static_cast<float>(1 / kLoadUnit));
-    atomicAdd(reinterpret_cast<unsigned long long*>(sum) + c,
-              static_cast<unsigned long long>(push));
-  }
+  for (int c = 0; c < 3; ++c) add_push(sums, node, c, weight * force[c]);
 }
 
 }  // namespace tissue_sim

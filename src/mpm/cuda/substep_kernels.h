@@ -79,7 +79,11 @@ __device__ __forceinline__ void all_forces(const CudaTables& t, const BundleAtWo
   if (!clear) clear_exchange(s.exchange, w.bundle.plane_slots, layout.two_planes);
   if (!pushes(kCan) || !clear) __syncthreads();
   const BlockStep step{force, layout.two_planes, workers};
-  if (kCan == Can::kPlain || (w.bundle.partial == 0 && w.bundle.blocks == 1)) {
+  // Small tissue waits for instructions as often as it issues them, and those of two ways and of
+  // contact are more than the caches of the multiprocessors hold.
+  if (kCan == Can::kTouches && kPairs && !workers.is_all()) {
+    special_forces<kLaws, kPairs, true>(t, w.bundle, w.block, w.body, layout, step);
+  } else if (kCan == Can::kPlain || (w.bundle.partial == 0 && w.bundle.blocks == 1)) {
     forces<kLaws, kPairs, false, false>(t, w.bundle, w.block, w.body, s, step);
   } else if (w.bundle.partial != 0) {
     special_forces<kLaws, kPairs, true>(t, w.bundle, w.block, w.body, layout, step);
@@ -138,7 +142,7 @@ __device__ __forceinline__ void block_round(const CudaTables& t, const CudaFrame
 /// Contact, once all nodes are where the round brought them: of tissue with colliders and of tissue
 /// with tissue. Thread blocks have `met` so often at their second barrier. Where there are thread
 /// blocks enough without a bundle (`helpers`), colliders are left to them.
-template <bool kTouches>
+template <bool kTouches, bool kPairs>
 __device__ __forceinline__ void push_nodes(const CudaTables& t, const CudaFrame& f,
                                            const BlockShared& s, int round, const Pushers& pushers,
                                            bool helpers, unsigned& met) {
@@ -146,6 +150,7 @@ __device__ __forceinline__ void push_nodes(const CudaTables& t, const CudaFrame&
   const float dt = f.step.dt;
   const int first = helpers ? t.bundle_count : 0, block = static_cast<int>(blockIdx.x) - first;
   if (block < 0 && !kTouches) return;
+  if (kTouches && f.near_cells == nullptr && !s.rounds->has_share()) return;
   const int warp = pushers.me() / 32, blocks = static_cast<int>(gridDim.x) - first,
             warps = blocks * pushers.size() / 32;
   const ColliderCopy colliders(f, round, pushers);
@@ -160,7 +165,7 @@ __device__ __forceinline__ void push_nodes(const CudaTables& t, const CudaFrame&
         reinterpret_cast<unsigned long long*>(f.loads) + kLoadSums * f.collider_count * round;
     near.push(t, state, kCellReach * f.cell_size, {s.colliders, loads, force}, s.cells[warp]);
   }
-  if constexpr (kTouches) touch_faces(f.faces, s.rounds, round, dt, state, pushers, force);
+  if constexpr (kTouches) touch_faces<!kPairs>(f.faces, s.rounds, round, dt, state, pushers, force);
 }
 
 template <Laws kLaws, bool kCached, bool kPairs, Can kCan>
@@ -216,7 +221,7 @@ __global__ void __launch_bounds__(kMaxCudaThreads, 1)
       }
     }
     if constexpr (kPushes) {
-      if (round < f.substeps) push_nodes<kTouches>(t, f, s, round, pushers, helpers, met);
+      if (round < f.substeps) push_nodes<kTouches, kPairs>(t, f, s, round, pushers, helpers, met);
     }
   }
 }

@@ -79,12 +79,13 @@ __device__ __forceinline__ void add_pushes_together(const FaceSpring& c, bool on
 }
 
 /// Works out contacts and adds their forces to `force`, of the nodes. The groups of a warp go in
-/// step. `kMany`: all warps have contacts.
+/// step. `kMany`: all warps may have contacts.
 template <bool kMany>
 __device__ __forceinline__ void push_contacts(const CudaFaces& f, const LaneShare& share,
                                               const CudaNodes& state, const ContactRound& round,
                                               long long* force) {
   const CudaLooks& s = f.looks;
+  const bool many = kMany && f.contacts > share.step / (32 / kContactLanes);
   for (int i = share.first; __any_sync(0xffffffffu, i < f.contacts); i += share.step) {
     const int at = min(i, f.contacts - 1);
     FaceSpring& spring = s.springs[s.contacts[at]];
@@ -101,7 +102,7 @@ __device__ __forceinline__ void push_contacts(const CudaFaces& f, const LaneShar
     if (__any_sync(0xffffffffu, active)) push_face(c, round.dt, places, active);
     if (places.lanes.lane == 0 && (active || (round.soften && is_one))) spring = c;
     const bool pushes = active && c.touching;
-    if (!kMany) {
+    if (!many) {
       if (pushes) add_pushes(c, places, force);
     } else if (places.any(pushes)) {
       add_pushes_together(c, pushes, places, force);

@@ -1,60 +1,25 @@
 // Speed of the material point method on the CPU. One item is one point advanced by one substep,
 // everything included. Each run checks its last substep against the double-precision reference.
+// Rows `scalpel` are of a cut while it is made.
 #include <benchmark/benchmark.h>
 #include <malloc.h>
-#include <unistd.h>
 
+#include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
-#include <fstream>
 #include <map>
 #include <string>
 #include <vector>
 
-#include "cut_scenes.h"
 #include "cutting/tear.h"
+#include "deformed_body.h"
 #include "machine_rates.h"
 #include "reference/mpm_reference.h"
 
 namespace tissue_sim {
 namespace {
-
-struct Case {
-  int points;
-  Law law = Law::kFixedCorotated;
-  bool ground = false;
-  std::vector<Vec3> cuts = {};  ///< normals of planes through the middle
-  double viscosity = 0;
-  int threads = 0;
-  bool tears = false;  ///< looks for tears as often as a frame would, and finds none
-  int anchors = 0;     ///< regions that hold it
-  int materials = 1;   ///< spread through it in balls
-  bool both_laws = false;
-  bool ring = false;  ///< a slanting ring that fills a tenth of its box, not a cube
-};
-
-/// Fills the body with balls, four or five along each edge, of `count` materials in turn.
-void add_materials(const Case& c, double edge, Scene& scene) {
-  const int along = 2 * static_cast<int>(std::cbrt(c.materials)) + 1;
-  for (int i = 1; i < c.materials; ++i) {
-    Material m = scene.materials[0];
-    m.name += std::to_string(i);
-    m.young_modulus *= 1 + 0.1 * i;
-    m.density *= 1 + 0.02 * i;
-    if (c.both_laws && i % 2 == 1) m.law = Law::kNeoHookean;
-    scene.materials.push_back(m);
-  }
-  for (int i = 0; i < along * along * along; ++i) {
-    Inclusion ball;
-    ball.material = scene.materials[i % c.materials].name;
-    ball.region.kind = Region::Kind::kBall;
-    ball.region.center =
-        edge / along * Vec3(i % along + 0.5, i / along % along + 0.5, i / along / along + 0.5);
-    ball.region.radius = 0.55 * edge / along;
-    scene.bodies[0].inclusions.push_back(ball);
-  }
-}
 
 /// The heap in use [bytes], out of the XML that the C library writes: mallinfo counts in 32 bits,
 /// and mallinfo2 is newer than Ubuntu 20.04.
@@ -72,70 +37,6 @@ double heap_bytes() {
   };
   return size_of("<system type=\"current\"") + size_of("<total type=\"mmap\"") -
          size_of("<total type=\"fast\"") - size_of("<total type=\"rest\"");
-}
-
-/// Writes a ring of radius 1 and thickness 0.24 around the z axis; returns its path.
-std::string ring_mesh() {
-  const std::string path = "/tmp/tissue_sim_benchmark_" + std::to_string(getpid()) + ".obj";
-  std::ofstream file(path);
-  constexpr int kAround = 96, kAcross = 32;
-  for (int i = 0; i < kAround; ++i) {
-    for (int j = 0; j < kAcross; ++j) {
-      const double a = 2 * M_PI * i / kAround, b = 2 * M_PI * j / kAcross;
-      const double r = 1 + 0.24 * std::cos(b);
-      file << "v " << r * std::cos(a) << " " << r * std::sin(a) << " " << 0.24 * std::sin(b)
-           << "\n";
-    }
-  }
-  for (int i = 0; i < kAround; ++i) {
-    for (int j = 0; j < kAcross; ++j) {
-      const int k = (i + 1) % kAround, l = (j + 1) % kAcross;
-      file << "f " << i * kAcross + j + 1 << " " << k * kAcross + j + 1 << " "
-           << k * kAcross + l + 1 << "\nf " << i * kAcross + j + 1 << " " << k * kAcross + l + 1
-           << " " << i * kAcross + l + 1 << "\n";
-    }
-  }
-  return path;
-}
-
-/// A body of about so many points, eight a cell, sheared, twisted and shaken.
-std::unique_ptr<MpmTissue> deformed_body(const Case& c) {
-  const double h = 0.003;
-  const double edge = std::round(std::cbrt(c.points / 8.0)) * h;
-  Scene scene = free_box(Vec3::Constant(edge), h);
-  scene.threads = c.threads;
-  scene.ground.enabled = c.ground;
-  Material m;
-  m.name = "cube";
-  m.law = c.law;
-  m.viscosity = c.viscosity;
-  m.tear_stretch = c.tears ? 50 : 0;
-  scene.materials.push_back(m);
-  Body& body = scene.bodies[0];
-  body.material = "cube";
-  for (int i = 0; i < c.anchors; ++i) {
-    Region held;
-    held.kind = Region::Kind::kBall;
-    held.center = edge * Vec3(i % 10 / 9.0, i / 10 / 9.0, 0);
-    held.radius = 1.5 * h;
-    body.anchors.push_back(held);
-  }
-  if (c.materials > 1) add_materials(c, edge, scene);
-  if (c.ring) {
-    body.shape = Shape::kMesh;
-    body.mesh = ring_mesh();
-    body.scale = edge / std::cbrt(2 * M_PI * M_PI * 0.24 * 0.24);  // of the same volume
-    body.pose.orientation = Quat(Eigen::AngleAxisd(0.7, Vec3(1, 1, 0).normalized()));
-  }
-  auto tissue = std::make_unique<MpmTissue>(scene);
-  deform(tissue->state());
-  if (c.ring) std::remove(body.mesh.c_str());
-  for (const Vec3& normal : c.cuts) {
-    // Off the cells' faces, so that there are cells on both sides.
-    cut_now(*tissue, plane_cut(Vec3::Constant(0.5 * edge + 0.02 * h), normal));
-  }
-  shake(tissue->state(), 1, 0.01 * h);
-  return tissue;
 }
 
 /// Why the state's next substep is not what the reference says; empty if it is.
@@ -213,11 +114,42 @@ void run(benchmark::State& bench, const Case& c) {
   bench.SetLabel(tissue->device_name());
 }
 
+/// A scalpel goes through a whole body in one frame: what that takes before the frame's substeps,
+/// the shortest and the mean of bodies made anew.
+void run_scalpel(benchmark::State& bench, const Case& c) {
+  const double h = 0.003;
+  const Vec3 place = Vec3::Constant((0.5 * std::round(std::cbrt(c.points / 8.0)) + 0.02) * h);
+  const Quat turn = Quat::FromTwoVectors(Vec3::UnitY(), Vec3(1, 0.6, 0.3).normalized());
+  ToolMotion sweep;
+  sweep.present = true;
+  sweep.begin = {place + turn * Vec3(-0.2, 0, 0.1), turn};
+  sweep.end = {place + turn * Vec3(0.2, 0, 0.1), turn};
+  const ToolMotion away;
+  double shortest = 1e30;
+  for (auto _ : bench) {
+    const auto tissue = deformed_body(c);
+    tissue->advance(0, 1e-4f, {{&away, 1}, {}});
+    const auto begin = std::chrono::steady_clock::now();
+    tissue->advance(0, 1e-4f, {{&sweep, 1}, {}});
+    const std::chrono::duration<double> took = std::chrono::steady_clock::now() - begin;
+    bench.SetIterationTime(took.count());
+    shortest = std::min(shortest, took.count());
+    const int bonds = tissue->finish().blade_report.bonds_broken;
+    if (bonds == 0) bench.SkipWithError("no cut");
+    bench.counters["bonds"] = bonds;
+  }
+  bench.counters["shortest_ms"] = 1e3 * shortest;
+}
+
 void add(const std::string& name, const Case& c) {
-  benchmark::RegisterBenchmark(("mpm/cpu/" + name).c_str(), [c](benchmark::State& s) { run(s, c); })
-      ->Unit(benchmark::kMicrosecond)
-      ->UseRealTime()
-      ->MinTime(0.3);
+  benchmark::internal::Benchmark* row = benchmark::RegisterBenchmark(
+      ("mpm/cpu/" + name).c_str(),
+      [c](benchmark::State& s) { c.scalpel ? run_scalpel(s, c) : run(s, c); });
+  if (c.scalpel) {
+    row->Unit(benchmark::kMillisecond)->UseManualTime()->Iterations(30);
+  } else {
+    row->Unit(benchmark::kMicrosecond)->UseRealTime()->MinTime(0.3);
+  }
 }
 
 }  // namespace
@@ -258,6 +190,11 @@ int main(int argc, char** argv) {
       c.ground = true;
       c.anchors = 100;
       c.cuts = {{1, 0.6, 0.3}};
+    });
+    add("/scalpel", [](Case& c) { c.scalpel = true; });
+    add("/scalpel/threads:1", [](Case& c) {
+      c.scalpel = true;
+      c.threads = 1;
     });
   }
   benchmark::Initialize(&argc, argv);

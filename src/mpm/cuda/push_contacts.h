@@ -54,8 +54,8 @@ __device__ __forceinline__ void add_pushes(const FaceSpring& c, const Places& pl
 }
 
 /// The same, for a warp whose groups go in step, if the contact is `on`. Four lanes have a node,
-/// three of them a component each: what goes to a node goes there at once, which takes a third of
-/// the time where all warps add at once, and more instructions.
+/// three of them a component each: an instruction goes to a quarter of the places in memory, which
+/// is what counts where all warps add at once; otherwise there are more instructions.
 __device__ __forceinline__ void add_pushes_together(const FaceSpring& c, bool on,
                                                     const LanePlaces<false>& places,
                                                     long long* force) {

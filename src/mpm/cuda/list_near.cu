@@ -136,17 +136,37 @@ __device__ __forceinline__ void for_each_near(const CudaLooks& s, const CudaSear
   }
 }
 
-/// A warp for each facet: the facets that it may touch, and what becomes of its contact.
+/// Facets found for one, in shared memory, while there are so few; in any order.
+struct FoundFacets {
+  static constexpr int kMost = 128;
+  int count;
+  std::int32_t facet[kMost];
+};
+
+/// A warp for each facet: the facets that it may touch, and what becomes of its contact. They are
+/// looked for once, or, where they are more than FoundFacets holds, again to write them down.
 __global__ void __launch_bounds__(kThreads)
     find_near(const CudaLooks s, const CudaSearchRoom room) {
+  __shared__ FoundFacets of_warps[kThreads / 32];
   const int f = thread_index() / 32, lane = static_cast<int>(threadIdx.x) % 32;
   if (f >= s.facet_count || !lists_wanted(s)) return;
   const Grid grid(s, room);
-  int count = 0;
-  if (s.takes_part[f] != 0) for_each_near(s, room, grid, f, lane, [&](int) { ++count; });
-  const int end = sum_up_to(count, lane);  // of this lane's among all
-  const int all = __shfl_sync(0xffffffffu, end, 31);
-  if (lane == 0) s.near_count[f] = all;
+  FoundFacets& found = of_warps[threadIdx.x / 32];
+  if (lane == 0) found.count = 0;
+  __syncwarp();
+  if (s.takes_part[f] != 0) {
+    for_each_near(s, room, grid, f, lane, [&](int g) {
+      const int at = atomicAdd(&found.count, 1);
+      if (at < FoundFacets::kMost) found.facet[at] = g;
+    });
+  }
+  __syncwarp();
+  const int all = found.count;
+  int first = 0;
+  if (lane == 0) {
+    s.near_count[f] = all;
+    s.first_near[f] = 0;
+  }
   if (all == 0) {
     if (lane == 0) {
       s.springs[f].other = -1;
@@ -154,20 +174,25 @@ __global__ void __launch_bounds__(kThreads)
     }
     return;
   }
-  int first = 0;  // each list has twice the places, to be sorted in
+  const bool fits = all <= FoundFacets::kMost;
+  const int places = fits ? all : 2 * all;  // those that do not fit are sorted in twice the places
   if (lane == 0) {
-    first = atomicAdd(&s.figures->near, 2 * all);
+    first = atomicAdd(&s.figures->near, places);
     s.first_near[f] = first;
     s.contacts[atomicAdd(&s.figures->contacts, 1)] = f;
     s.is_involved[f] = 1;
     if (s.springs[f].other >= 0) s.is_involved[s.springs[f].other] = 1;
   }
   first = __shfl_sync(0xffffffffu, first, 0);
-  if (static_cast<std::size_t>(first) + 2 * all > s.near_capacity) return;
-  std::int32_t* unsorted = s.near + first + all;
-  int to = end - count;
-  for_each_near(s, room, grid, f, lane, [&](int g) { unsorted[to++] = g; });
-  __syncwarp();
+  if (static_cast<std::size_t>(first) + places > s.near_capacity) return;
+  std::int32_t* unsorted = fits ? found.facet : s.near + first + all;
+  if (!fits) {
+    __syncwarp();
+    if (lane == 0) found.count = 0;
+    __syncwarp();
+    for_each_near(s, room, grid, f, lane, [&](int g) { unsorted[atomicAdd(&found.count, 1)] = g; });
+    __syncwarp();
+  }
   for (int i = lane; i < all; i += 32) {
     int rank = 0;
     for (int j = 0; j < all; ++j) rank += unsorted[j] < unsorted[i] ? 1 : 0;

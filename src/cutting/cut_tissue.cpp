@@ -54,12 +54,15 @@ Apart take_apart(MpmState& state, const std::vector<std::int32_t>& changed,
         keep_face_contacts(state);
         update_blocks(state.blocks, state.bodies, state.points, *state.fields, cells,
                       static_cast<int>(state.nodes.size()), *state.cpu);
-        state.cpu->both([&] { state.force.resize(state.blocks.force_size); },
-                        [&] {
-                          bound_motion(state);
-                          list_contacts(state);
-                          list_facets(state);
-                        });
+        state.cpu->both(
+            [&] {
+              if (state.blocks.has_rows) state.force.resize(state.blocks.force_size);
+            },
+            [&] {
+              bound_motion(state);
+              list_contacts(state);
+              list_facets(state);
+            });
       },
       [&] {
         list_threads(state, changed);

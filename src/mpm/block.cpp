@@ -23,6 +23,7 @@ void lay_out(Block& block) {
 
 void find_filled(Block& block) {
   block.filled.assign(block.nz, {});
+  block.filled_columns.assign(block.stride, 0);
   for (int z = 0; z < block.nz; ++z) {
     const std::int32_t* points =
         block.point.data() + static_cast<std::size_t>(z) * 8 * block.stride;
@@ -30,21 +31,12 @@ void find_filled(Block& block) {
       int s = 0;
       while (s < 8 && points[s * block.stride + j] < 0) ++s;
       if (s == 8) continue;
+      block.filled_columns[j] = 1;
       std::vector<Block::Span>& spans = block.filled[z];
       if (spans.empty() || spans.back().end < j) spans.push_back({j, j});
       spans.back().end = j + 1;
     }
   }
-}
-
-std::vector<std::uint8_t> filled_columns(const Block& block) {
-  std::vector<std::uint8_t> filled(block.stride, 0);
-  for (const std::vector<Block::Span>& spans : block.filled) {
-    for (const Block::Span& s : spans) {
-      std::fill(filled.begin() + s.begin, filled.begin() + s.end, std::uint8_t{1});
-    }
-  }
-  return filled;
 }
 
 }  // namespace tissue_sim

@@ -52,6 +52,8 @@ struct Block {
   };
   std::vector<NodeRow> node_rows;         ///< in the order of the block's nodes
   std::vector<std::vector<Span>> filled;  ///< [nz]: lanes whose cells hold points, in order
+  std::vector<std::uint8_t>
+      filled_columns;  ///< [stride]: whether a lane's cell does in any z-plane
   /// [stride]: lowest node of the lane's cell, y * pitch + x; 0 in padding. The node at dx, dy, dz
   /// (0..2) from it has the number z * plane + cell[lane] + dz * plane + dy * pitch + dx.
   std::vector<std::int32_t> cell;
@@ -122,10 +124,7 @@ struct Block {
 /// Sets all that follows from nx, ny, nz and the runs, and makes the arrays, without points.
 void lay_out(Block& block);
 
-/// Sets `filled`, when the points are there.
+/// Sets `filled` and `filled_columns`, when the points are there.
 void find_filled(Block& block);
-
-/// [stride]: whether any cell of the lane, in one z-plane or another, is filled.
-std::vector<std::uint8_t> filled_columns(const Block& block);
 
 }  // namespace tissue_sim

@@ -72,8 +72,7 @@ double cycles(const std::vector<LatticeBody>& bodies, const CudaShape& s,
 
 /// Columns of the block that hold points.
 int columns_of(const Block& b) {
-  const std::vector<std::uint8_t> filled = filled_columns(b);
-  return static_cast<int>(std::count(filled.begin(), filled.end(), 1));
+  return static_cast<int>(std::count(b.filled_columns.begin(), b.filled_columns.end(), 1));
 }
 
 /// Whether each column of cells must have two threads.

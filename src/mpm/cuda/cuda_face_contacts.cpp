@@ -88,16 +88,17 @@ void CudaMpmTissue::upload_facets() {
   std::vector<int> size(pieces_.next_id, 0);
   for (const Fragment& piece : pieces_.all) size[piece.id] = piece.point_count;
   f.host_facets.resize(count);
-  state_->cpu->for_each(static_cast<int>(state_->blocks.all.size()), [&](int b) {
-    const Block& block = *state_->blocks.all[b];
-    CudaFacet* to = f.host_facets.data() + faces.first_facet[b];
-    for (const Facet& facet : block.facets) {
-      *to = facet_on_device(*state_, block, facet, d.host_tables.first_slot[b]);
-      const std::int32_t piece = pieces_.of_point[facet.point];
-      to->piece = {piece, size[piece]};
-      ++to;
-    }
-  });
+  state_->cpu->for_each(
+      static_cast<int>(count),
+      [&](int i) {
+        const Facet& facet = facet_of(*state_, i);
+        CudaFacet& to = f.host_facets[i];
+        to = facet_on_device(*state_, block_of(*state_, i), facet,
+                             d.host_tables.first_slot[faces.block_of[i]]);
+        const std::int32_t piece = pieces_.of_point[facet.point];
+        to.piece = {piece, size[piece]};
+      },
+      256);
   f.facets.upload(f.host_facets, d.stream);
   check_cuda(cudaStreamSynchronize(d.stream), "receive data");
   f.pieces_changed = false;

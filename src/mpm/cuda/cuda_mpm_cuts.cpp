@@ -110,18 +110,22 @@ void CudaMpmTissue::push_points(const std::vector<std::int32_t>& changed) {
                        d.soft.size() > 0 ? d.soft.data() : nullptr, d.stream);
 }
 
-void CudaMpmTissue::take_apart(const std::vector<std::int32_t>& changed) {
+bool CudaMpmTissue::take_apart(const std::vector<std::int32_t>& changed) {
   OnDevice& d = *device_;
   std::vector<std::int32_t> nodes = nodes_around(changed);
   pull_some(nodes);
   pull_contacts();
   const auto known = static_cast<std::int32_t>(state_->nodes.size());
-  const Apart apart = tissue_sim::take_apart(*state_, changed);
+  bool may_part = false;
+  const Apart apart = tissue_sim::take_apart(*state_, changed, [&] {
+    may_part = may_have_parted(state_->bodies, state_->points, state_->fields->bonds(), changed);
+  });
   for (auto n = known; n < static_cast<std::int32_t>(state_->nodes.size()); ++n) nodes.push_back(n);
   push_some(nodes);
   push_points(changed);
   push_points(apart.softened);
   if (apart.new_blocks || d.host_tables.number.empty()) push_tables();
+  return may_part;
 }
 
 std::vector<int> CudaMpmTissue::label_pieces() {
@@ -158,10 +162,7 @@ void CudaMpmTissue::cut(const std::vector<BladePath>& paths, const float4* u_bef
   }
   if (changed.empty()) return;
   if (device_->shape.marches) stop_marching();
-  take_apart(changed);
-  if (may_have_parted(state_->bodies, state_->points, state_->fields->bonds(), changed)) {
-    report.new_fragments = label_pieces();
-  }
+  if (take_apart(changed)) report.new_fragments = label_pieces();
   launch_measure();
   finish_measure();
 }

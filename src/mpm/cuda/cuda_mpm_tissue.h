@@ -71,8 +71,9 @@ class CudaMpmTissue final : public Tissue {
   void cut(const std::vector<BladePath>& paths, const float4* u_before, CutReport& report);
   void read_places(const float4* u_before);  ///< of points, at both times, for sweep()
   std::vector<BrokenBond> sweep(const BladePath& path, bool moves);
-  /// What follows where points lost bonds; contacts come down and wait for the next search.
-  void take_apart(const std::vector<std::int32_t>& changed);
+  /// What follows where points lost bonds; contacts come down and wait for the next search. Returns
+  /// whether pieces may have come apart.
+  bool take_apart(const std::vector<std::int32_t>& changed);
   std::vector<int> label_pieces();  ///< after bonds broke; returns the new ids
   void cut_by_blades();
   void keep_place_for_blades();

@@ -4,6 +4,11 @@
 #include "mpm/cuda/on_device.h"
 
 namespace tissue_sim {
+namespace {
+
+constexpr int kGrain = 1024;  // nodes that a thread takes at once
+
+}  // namespace
 
 void CudaMpmTissue::pull() {
   pull_nodes();
@@ -90,14 +95,15 @@ void CudaMpmTissue::pull_some(const std::vector<std::int32_t>& nodes) {
   d.packed.download(d.host_nodes.data(), 2 * count, d.stream);
   check_cuda(cudaStreamSynchronize(d.stream), "send data");
   Nodes& n = state_->nodes;
-  for (std::size_t i = 0; i < count; ++i) {
-    const float4 &u = d.host_nodes[i], &v = d.host_nodes[count + i];
-    const float values[2][3] = {{u.x, u.y, u.z}, {v.x, v.y, v.z}};
-    for (int c = 0; c < 3; ++c) {
-      n.u[c][nodes[i]] = values[0][c];
-      n.v[c][nodes[i]] = values[1][c];
-    }
-  }
+  state_->cpu->for_each(
+      static_cast<int>(count),
+      [&](int i) {
+        const float4 &u = d.host_nodes[i], &v = d.host_nodes[count + i];
+        const std::int32_t k = nodes[i];
+        n.u[0][k] = u.x, n.u[1][k] = u.y, n.u[2][k] = u.z;
+        n.v[0][k] = v.x, n.v[1][k] = v.y, n.v[2][k] = v.z;
+      },
+      kGrain);
 }
 
 void CudaMpmTissue::push_some(const std::vector<std::int32_t>& nodes) {
@@ -109,11 +115,14 @@ void CudaMpmTissue::push_some(const std::vector<std::int32_t>& nodes) {
   }
   d.host_nodes.resize(2 * count);
   const Nodes& n = state_->nodes;
-  for (std::size_t i = 0; i < count; ++i) {
-    const std::int32_t k = nodes[i];
-    d.host_nodes[i] = {n.u[0][k], n.u[1][k], n.u[2][k], n.mass[k]};
-    d.host_nodes[count + i] = {n.v[0][k], n.v[1][k], n.v[2][k], n.inv_mass[k]};
-  }
+  state_->cpu->for_each(
+      static_cast<int>(count),
+      [&](int i) {
+        const std::int32_t k = nodes[i];
+        d.host_nodes[i] = {n.u[0][k], n.u[1][k], n.u[2][k], n.mass[k]};
+        d.host_nodes[count + i] = {n.v[0][k], n.v[1][k], n.v[2][k], n.inv_mass[k]};
+      },
+      kGrain);
   d.some_nodes.upload(nodes, d.stream);
   d.packed.upload(d.host_nodes.data(), 2 * count, d.stream);
   launch_scatter(d.packed.data(), d.some_nodes.data(), static_cast<int>(count), d.present(),

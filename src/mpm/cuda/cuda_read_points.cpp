@@ -62,16 +62,31 @@ int CudaMpmTissue::read_points(const PointSelection& selection, std::vector<std:
   c.colour = d.colour.data();
   c.whole = d.whole.data();
   launch_cloud(d.tables(), d.present(), d.plan.max_slots, c, d.stream);
-  d.cloud.download(d.host_cloud.data(), count, d.stream);
+  // In parts: while one is under way, the host copies the one before.
+  const int parts = static_cast<int>(d.cloud_came.size());
+  const auto begin_of = [&](int part) {
+    return static_cast<int>(static_cast<std::int64_t>(count) * part / parts);
+  };
+  for (int i = 0; i < parts; ++i) {
+    const int first = begin_of(i);
+    check_cuda(cudaMemcpyAsync(d.host_cloud.data() + first, d.cloud.data() + first,
+                               (begin_of(i + 1) - first) * sizeof(Point), cudaMemcpyDeviceToHost,
+                               d.stream),
+               "send a cloud");
+    d.cloud_came[i].record(d.stream);
+  }
   // While the points are under way: the memory of a new message is touched for the first time.
   cloud.resize(static_cast<std::size_t>(count) * sizeof(Point));
-  check_cuda(cudaStreamSynchronize(d.stream), "send a cloud");
-  constexpr int kChunk = 16384;  // points, half a megabyte
-  state_->cpu->for_each((count + kChunk - 1) / kChunk, [&](int i) {
-    const int first = i * kChunk, n = std::min(kChunk, count - first);
-    std::memcpy(cloud.data() + static_cast<std::size_t>(first) * sizeof(Point),
-                d.host_cloud.data() + first, static_cast<std::size_t>(n) * sizeof(Point));
-  });
+  for (int i = 0; i < parts; ++i) {
+    d.cloud_came[i].wait();
+    const int part = begin_of(i), size = begin_of(i + 1) - part;
+    constexpr int kChunk = 4096;  // points, an eighth of a megabyte
+    state_->cpu->for_each((size + kChunk - 1) / kChunk, [&](int k) {
+      const int first = part + k * kChunk, n = std::min(kChunk, part + size - first);
+      std::memcpy(cloud.data() + static_cast<std::size_t>(first) * sizeof(Point),
+                  d.host_cloud.data() + first, static_cast<std::size_t>(n) * sizeof(Point));
+    });
+  }
   return count;
 }
 

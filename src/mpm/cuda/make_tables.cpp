@@ -29,38 +29,44 @@ CudaBody body_of(const LatticeBody& b, const Material& m) {
   return body;
 }
 
-/// The block's points in the GPU's order, into the tables from this lane on.
-void fill_points(const Block& from, float whole_volume, int first_lane, CudaBlock& block,
-                 HostTables& t) {
-  // The GPU's lanes are all cells of the box, the CPU's those that hold points.
-  const int columns = block.nx * block.ny;
-  const std::size_t cells = static_cast<std::size_t>(block.nz) * columns;
-  std::int32_t* point = t.made.point.data() + first_lane;
-  float* volume = t.made.volume.data() + first_lane;
-  float* partial = t.made.partial.data() + first_lane / 8;
-  std::fill_n(point, 8 * cells, -1);
-  std::fill_n(volume, 8 * cells, 0.0f);
-  std::fill_n(partial, cells, 0.0f);
-  std::vector<int> column_of(from.stride);
+/// The column of cells of a lane of the host's: the GPU's lanes are all cells of the box, the CPU's
+/// those that hold points.
+int column_of_lane(const Block& from, int lane) {
+  return from.cell[lane] / from.pitch * from.nx + from.cell[lane] % from.pitch;
+}
+
+/// A layer of the block's points in the GPU's order, into the tables; `first_lane` is the block's.
+/// Returns whether all of them are there, each of `whole_volume`.
+bool fill_layer(const Block& from, int z, float whole_volume, int first_lane, HostTables& t) {
+  const int columns = from.nx * from.ny, first = first_lane + z * 8 * columns;
+  std::int32_t* point = t.made.point.data() + first;
+  float* volume = t.made.volume.data() + first;
+  std::fill_n(point, 8 * columns, -1);
+  std::fill_n(volume, 8 * columns, 0.0f);
+  const std::size_t layer = static_cast<std::size_t>(z) * 8 * from.stride;
   for (int lane = 0; lane < from.stride; ++lane) {
-    column_of[lane] = from.cell[lane] / from.pitch * block.nx + from.cell[lane] % from.pitch;
-  }
-  for (int layer = 0; layer < 8 * block.nz; ++layer) {
-    const std::size_t first = static_cast<std::size_t>(layer) * from.stride,
-                      to = static_cast<std::size_t>(layer) * columns;
-    for (int lane = 0; lane < from.stride; ++lane) {
-      if (from.point[first + lane] < 0) continue;
-      point[to + column_of[lane]] = from.point[first + lane];
-      volume[to + column_of[lane]] = from.volume[first + lane];
+    const int column = column_of_lane(from, lane);
+    for (int s = 0; s < 8; ++s) {
+      const std::size_t i = layer + static_cast<std::size_t>(s) * from.stride + lane;
+      if (from.point[i] < 0) continue;
+      point[s * columns + column] = from.point[i];
+      volume[s * columns + column] = from.volume[i];
     }
   }
   bool whole = true;
-  for (std::size_t i = 0; i < 8 * cells; ++i) {
+  for (int i = 0; i < 8 * columns; ++i) {
     whole = whole && point[i] >= 0 && volume[i] == whole_volume;
   }
-  block.whole = whole ? 1 : 0;
+  return whole;
+}
+
+void fill_partial(const Block& from, int first_lane, HostTables& t) {
+  const int columns = from.nx * from.ny;
+  float* partial = t.made.partial.data() + first_lane / 8;
+  std::fill_n(partial, from.nz * columns, 0.0f);
   for (const Block::PartialCell& cell : from.partial) {
-    partial[cell.lane / from.stride * columns + column_of[cell.lane % from.stride]] = cell.mu;
+    partial[cell.lane / from.stride * columns + column_of_lane(from, cell.lane % from.stride)] =
+        cell.mu;
   }
 }
 
@@ -71,15 +77,13 @@ float common_volume(const MpmState& state, int body) {
 }
 
 /// The columns of a block that hold points.
-std::vector<int> filled_columns(const Block& from, const CudaBlock& b) {
-  std::vector<std::uint8_t> holds(b.nx * b.ny, 0);
-  const std::vector<std::uint8_t> filled = filled_columns(from);
+std::vector<int> filled_columns(const Block& from) {
+  std::vector<std::uint8_t> holds(from.nx * from.ny, 0);
   for (int lane = 0; lane < from.stride; ++lane) {
-    if (filled[lane] == 0) continue;
-    holds[from.cell[lane] / from.pitch * b.nx + from.cell[lane] % from.pitch] = 1;
+    if (from.filled_columns[lane] != 0) holds[column_of_lane(from, lane)] = 1;
   }
   std::vector<int> columns;
-  for (int i = 0; i < b.nx * b.ny; ++i) {
+  for (int i = 0; i < from.nx * from.ny; ++i) {
     if (holds[i] != 0) columns.push_back(i);
   }
   return columns;
@@ -197,14 +201,31 @@ void make_tables(const MpmState& state, const std::vector<std::vector<int>>& bun
   }
   lay_out(state, bundles, t);
   std::vector<std::vector<int>> columns(t.blocks.size());
+  struct Layer {
+    int block, z;
+  };
+  std::vector<Layer> layers;  // of new blocks
+  for (std::size_t i = 0; i < t.blocks.size(); ++i) {
+    CudaBlock& block = t.blocks[i];
+    if (t.origin[i].is_new == 0) continue;
+    block.whole = 1;
+    for (int z = 0; z < block.nz; ++z) layers.push_back({static_cast<int>(i), z});
+  }
+  std::vector<std::uint8_t> is_whole(layers.size());
+  state.cpu->for_each(static_cast<int>(layers.size()), [&](int i) {
+    const auto& [index, z] = layers[i];
+    const float volume = t.bodies[t.blocks[index].body].point_volume;
+    is_whole[i] =
+        fill_layer(*state.blocks.all[t.of_host[index]], z, volume, t.origin[index].first_lane, t);
+  });
+  for (std::size_t i = 0; i < layers.size(); ++i) t.blocks[layers[i].block].whole &= is_whole[i];
   state.cpu->for_each(static_cast<int>(t.blocks.size()), [&](int i) {
     const Block& from = *state.blocks.all[t.of_host[i]];
     const CudaBlockOrigin& origin = t.origin[i];
-    CudaBlock& block = t.blocks[i];
-    columns[i] = filled_columns(from, block);
+    columns[i] = filled_columns(from);
     if (origin.is_new == 0) return;
-    fill_points(from, t.bodies[block.body].point_volume, origin.first_lane, block, t);
-    fill_slots(from, block, t.made.slot_node.data() + origin.first_slot);
+    fill_partial(from, origin.first_lane, t);
+    fill_slots(from, t.blocks[i], t.made.slot_node.data() + origin.first_slot);
   });
   t.bundles.clear();
   t.columns.clear();

@@ -2,7 +2,9 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 
+#include "compute/cuda_event.h"
 #include "compute/device_array.h"
 #include "mpm/cuda/choose_plan.h"
 #include "mpm/cuda/connect_slots.h"
@@ -118,8 +120,9 @@ struct CudaMpmTissue::OnDevice {
   PinnedArray<long long> host_loads;
   PinnedArray<CudaMeasure> host_measures;
   PinnedArray<Point> host_cloud;
-  PinnedArray<float4> host_nodes;  ///< u, then v
-  bool points_changed = true;      ///< pieces must be uploaded
+  std::array<CudaEvent, 8> cloud_came;  ///< parts of it
+  PinnedArray<float4> host_nodes;       ///< u, then v
+  bool points_changed = true;           ///< pieces must be uploaded
 
   ~OnDevice() {
     if (stream != nullptr) cudaStreamDestroy(stream);

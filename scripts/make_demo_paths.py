@@ -101,8 +101,13 @@ def scalpel_path(cut, lo, hi, ground):
     return t, x, np.stack([forward, np.cross(z, forward), z], 2), times[4]
 
 
-def probe_path(cut, lo, hi, ground, radius, rounded, start, push=0.03):
+# How high the probe comes, of the body's height: an organ's loose piece sinks and tips over.
+TOUCH = {"box": 0.22, "mesh": 0.3}
+
+
+def probe_path(cut, lo, hi, ground, radius, shape, start, push=0.03):
     """Pushes the piece beyond the cut by `push` [m] towards -y, through its middle."""
+    rounded = shape != "box"
     gx, gy = np.meshgrid(np.linspace(lo[0], hi[0], 200), np.linspace(lo[1], hi[1], 200))
     s = (gy - cut.y) / cut.width
     piece = gx > cut.at(s.ravel())[0][:, 0].reshape(s.shape)
@@ -113,7 +118,7 @@ def probe_path(cut, lo, hi, ground, radius, rounded, start, push=0.03):
     direction /= np.linalg.norm(direction)
     center = np.array([gx[piece].mean(), gy[piece].mean()])
     edge = gy[piece & (np.abs(gx - center[0]) < 0.03 * half[0] * 2)].max()
-    height = ground + 0.22 * (hi[2] - ground) if not rounded else middle[2]
+    height = ground + TOUCH[shape] * (hi[2] - ground) if shape in TOUCH else middle[2]
     touch = center - direction * (edge - center[1]) / -direction[1]
     clear = cut.at(np.array([1.0]))[0][0, 0] + 1.5 * radius  # the probe passes beside the parent
     if not rounded:
@@ -140,7 +145,7 @@ def write_path(path, t, x, rotation):
 
 
 def box_of(body, folder):
-    """Lowest and highest corner of a body of a scene, and whether it is rounded."""
+    """Lowest and highest corner of a body of a scene, and its shape."""
     pose = body.get("pose", {})
     qx, qy, qz, qw = pose.get("orientation", [0, 0, 0, 1])
     v = np.array([qx, qy, qz])
@@ -156,7 +161,7 @@ def box_of(body, folder):
         points = np.array([[i, j, k] for i in (-1, 1) for j in (-1, 1) for k in (-1, 1)]) * half
     points = points + 2 * np.cross(v, np.cross(v, points) + qw * points)
     points = points + pose.get("position", [0, 0, 0])
-    return points.min(0), points.max(0), shape != "box"
+    return points.min(0), points.max(0), shape
 
 
 def scene_of_mesh(mesh, scale, cell_size):
@@ -212,7 +217,7 @@ def main():
         if args.cell_size:
             scene["cell_size"] = args.cell_size
     body = scene["bodies"][0]
-    lo, hi, rounded = box_of(body, folder)
+    lo, hi, shape = box_of(body, folder)
     ground = scene.get("ground", {}).get("z", 0.0)
     tools = {tool["name"]: tool for tool in scene.get("tools", [])}
     radius = tools.get("probe", {}).get("radius", 0.004)
@@ -226,7 +231,7 @@ def main():
     cut = Cut(lo, hi)
     t, x, rotation, cut_done = scalpel_path(cut, lo, hi, ground)
     write_path(os.path.join(args.out, "scalpel.csv"), t, x, rotation)
-    t, x, rotation = probe_path(cut, lo, hi, ground, radius, rounded, cut_done)
+    t, x, rotation = probe_path(cut, lo, hi, ground, radius, shape, cut_done)
     write_path(os.path.join(args.out, "probe.csv"), t, x, rotation)
     if not args.only_paths:
         if "mesh" in body and "://" not in body["mesh"]:

@@ -155,7 +155,8 @@ def main():
     if args.at:
         chosen = [int(np.argmin(np.abs(recording.seconds - float(s)))) for s in args.at.split(",")]
     moments = [recording.moment(k) for k in chosen]
-    camera = camera_for([(m.x.min(0), m.x.max(0)) for m in moments], size)
+    # All but a thousandth of the points: a crumb that flew off does not count.
+    camera = camera_for([np.percentile(m.x, (0.05, 99.95), axis=0) for m in moments], size)
     stress_end = max(recording.stress[k] for k in chosen)
     digits = 10 ** np.floor(np.log10(max(stress_end, 1.0)))
     stress_end = float(np.ceil(stress_end / digits * 2) * digits / 2)

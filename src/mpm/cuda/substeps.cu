@@ -109,10 +109,24 @@ int most_at_once(const CudaPlan& plan) {
 }
 
 int most_slots(const CudaPlan& plan) {
-  CudaPlan larger = plan;
-  const int resident = most_at_once(plan), step = 64;
-  while (resident > 0 && most_at_once(larger) == resident) larger.max_slots += step;
-  return std::max(plan.max_slots, larger.max_slots - step);
+  const int resident = most_at_once(plan);
+  if (resident == 0) return plan.max_slots;
+  const auto as_many = [&](int more) {
+    CudaPlan larger = plan;
+    larger.max_slots += more;
+    return most_at_once(larger) == resident;
+  };
+  constexpr int kStep = 64;
+  int least = 0, beyond = kStep;  // more slots with which as many run, and with which fewer do
+  while (as_many(beyond)) {
+    least = beyond;
+    beyond *= 2;
+  }
+  while (beyond - least > kStep) {
+    const int middle = least + (beyond - least) / (2 * kStep) * kStep;
+    (as_many(middle) ? least : beyond) = middle;
+  }
+  return plan.max_slots + least;
 }
 
 void launch_substeps(const CudaPlan& plan, const CudaTables& tables, const CudaFrame& frame,

@@ -4,14 +4,19 @@
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
+#include <map>
 #include <stdexcept>
 #include <string>
 
 #include "cutting/tear.h"
+#include "mpm/cuda/count_blocks.h"
 #include "mpm/cuda/stacks.h"
 
 namespace tissue_sim {
 namespace {
+
+// Shared memory of a slot, without and with what the tables say of it.
+constexpr int kSlot = 32, kCachedSlot = 56;
 
 int parts_of(int n, int size) { return (n + size - 1) / size; }
 
@@ -36,38 +41,89 @@ double cycles_of_march(const LatticeBody& body, const CudaShape& s, const CudaLi
   return rounds * (5000 + of_block * height + cell * layers + plane * (layers + 2)) + 3000;
 }
 
-/// Cycles of a substep as a small or as a large tissue (substeps.cu), 1e30 where that does not go.
-double cycles(const std::vector<LatticeBody>& bodies, const CudaShape& s,
-              const CudaLimits& limits) {
+/// Rounds of `at_once` thread blocks for the blocks of bodies of which some do not fill their
+/// boxes: blocks at a surface have few columns and share thread blocks. `blocks`, `columns`: how
+/// many.
+double rounds_of(const std::vector<BlockCounts>& counts, const CudaShape& s, double blocks,
+                 double columns, std::size_t at_once, std::size_t shared_bytes) {
+  const BlockShape& b = s.blocks;
+  const auto rounds = [at_once](double count) {
+    return std::ceil(count / static_cast<double>(at_once));
+  };
+  constexpr double kFew = 4;  // with more, one of them is no matter
+  const bool may_share = rounds(blocks) <= kFew && rounds(columns / s.columns()) < rounds(blocks) &&
+                         4 * b.x * b.y >= 3 * s.columns();  // thread blocks take no more of smaller
+  if (!may_share) return rounds(blocks);
+  std::vector<BlockToBundle> list;
+  for (std::size_t i = 0; i < counts.size(); ++i) {
+    counts[i].list(b.x, b.y, b.z, static_cast<int>(i), list);
+  }
+  const int plane_slots = most_plane_slots((b.x + 2) * (b.y + 2)),
+            slots = (static_cast<int>(shared_bytes) - 144 * plane_slots - 4300) /
+                    (s.small ? kCachedSlot : kSlot);
+  const auto bundles =
+      bundle_in_rounds(list, at_once, list.size(), {s.columns(), plane_slots, slots});
+  return rounds(bundles.empty() ? blocks : static_cast<double>(bundles.size()));
+}
+
+/// Cycles of a substep as a small or as a large tissue (substeps.cu), 1e30 where that does not go,
+/// or where it takes `least` or more. `counts`: of the bodies.
+double cycles(const std::vector<LatticeBody>& bodies, const std::vector<BlockCounts>& counts,
+              const CudaShape& s, const CudaLimits& limits, double least) {
   const BlockShape& b = s.blocks;
   const bool pairs = s.small && s.pairs();
   const double plane_slots = (b.x + 2.0) * (b.y + 2), slots = plane_slots * (b.z + 2);
-  const double shared = (s.small ? 56 : 32) * slots + 144 * plane_slots + 4300;
+  const double shared = (s.small ? kCachedSlot : kSlot) * slots + 144 * plane_slots + 4300;
   if (shared > static_cast<double>(limits.shared_bytes)) return 1e30;
-  double blocks = 0;
+  double blocks = 0, columns = 0;
+  bool fill_boxes = true;
   int parts = 1;
-  for (const LatticeBody& body : bodies) {
-    blocks += static_cast<double>(parts_of(body.nx, b.x)) * parts_of(body.ny, b.y) *
-              parts_of(body.nz, b.z);
+  for (std::size_t i = 0; i < bodies.size(); ++i) {
+    const LatticeBody& body = bodies[i];
+    const BlockCount count = counts[i].count(b.x, b.y, b.z);
+    blocks += count.blocks;
+    columns += count.columns;
+    fill_boxes = fill_boxes && counts[i].fills_box();
     parts = std::max(parts, sharers(body.nx, b.x) * sharers(body.ny, b.y) * sharers(body.nz, b.z));
   }
   const int by_registers = 256 / s.threads;
   const int by_shared = static_cast<int>(limits.shared_bytes / shared);
   const int each = std::max(1, std::min(by_registers, by_shared));
-  const double waves = std::ceil(blocks / (each * limits.processors));
+  const auto at_once = static_cast<std::size_t>(each) * limits.processors;
+  double waves = std::ceil(blocks / static_cast<double>(at_once));
+  bool share = false;  // blocks share thread blocks
+  if (!fill_boxes) {
+    if (each > 1 || b.y > b.x) return 1e30;  // no better where it was measured
+    // With as few rounds as the columns alone would fill, until it is known how many it takes.
+    const double fewest = std::ceil(columns / s.columns() / static_cast<double>(at_once));
+    share = fewest < waves;
+    waves = std::min(waves, fewest);
+  }
   if (s.small && waves > 1) return 1e30;
   // Cuts add blocks, and with one thread a column there is no room to bundle them.
-  if (s.small && !pairs && 1.2 * blocks > each * limits.processors) return 1e30;
+  if (s.small && !pairs && 1.2 * blocks > static_cast<double>(at_once)) return 1e30;
   const double together = std::min<double>(each, std::ceil(blocks / limits.processors));
   // Warps that compute, on each scheduler.
-  const double warps = together * (pairs ? b.x * b.y / 16.0 : std::ceil(b.x * b.y / 32.0)) / 4;
+  const double of_block = share   ? s.threads / 32.0
+                          : pairs ? b.x * b.y / 16.0
+                                  : std::ceil(b.x * b.y / 32.0);
+  const double warps = together * of_block / 4;
   const double cell = (pairs ? 1400 : 1950) * std::max(1.8, 1.3 * warps);
   const double plane = 400 + 250 * warps;
   const double nodes =
       std::ceil(slots / s.threads) * (s.small ? 250 + 120 * parts : 300 + 60 * together);
   const double wave = nodes + cell * b.z + plane * (b.z + 2);
   // One thread a column makes contact and cuts dearer.
-  return s.small ? wave + (pairs ? 3500 : 5500) : 1.5 * waves * wave + 5000;
+  const auto in_all = [&] {
+    return s.small ? wave + (pairs ? 3500 : 5500) : 1.5 * waves * wave + 5000;
+  };
+  if (fill_boxes) return in_all();
+  // Rims have cells that are not full and nodes of others.
+  const double rim = 1 + 0.15 * (plane_slots / (b.x * b.y) - 1) + (parts > 8 ? 0.2 : 0);
+  const auto with_surface = [&] { return rim * (in_all() + (s.small ? 0 : 10000 * waves)); };
+  if (!share || with_surface() >= least) return with_surface();
+  waves = rounds_of(counts, s, blocks, columns, at_once, limits.shared_bytes);
+  return s.small && waves > 1 ? 1e30 : with_surface();
 }
 
 /// Columns of the block that hold points.
@@ -120,6 +176,9 @@ CudaShape choose_shape(const std::vector<LatticeBody>& bodies, const CudaLimits&
   if (const char* text = std::getenv("TISSUE_SIM_CUDA_SHAPE")) {
     return shape_from(text, pairs, may_march);
   }
+  std::vector<BlockCounts> counts;
+  counts.reserve(bodies.size());
+  for (const LatticeBody& body : bodies) counts.emplace_back(body, kMaxCudaThreads, kMaxLayers);
   CudaShape best;
   best.blocks = {4, 4, 4};
   double least = 1e30;
@@ -136,8 +195,8 @@ CudaShape choose_shape(const std::vector<LatticeBody>& bodies, const CudaLimits&
             s.small = way == kSmall;
             s.marches = way == kMarch;
             if (pairs && !s.pairs()) continue;
-            const double c =
-                s.marches ? cycles_of_march(bodies[0], s, limits) : cycles(bodies, s, limits);
+            const double c = s.marches ? cycles_of_march(bodies[0], s, limits)
+                                       : cycles(bodies, counts, s, limits, least);
             if (c < least) {
               least = c;
               best = s;
@@ -164,46 +223,14 @@ std::vector<std::vector<int>> single_blocks(const std::vector<Block*>& blocks, s
   return bundles;
 }
 
-std::vector<std::vector<int>> bundle_blocks(const std::vector<Block*>& blocks, std::size_t wanted,
-                                            const BundleLimits& limits, Cpu& cpu) {
-  struct Filled {
-    int body, material;
-    BundleLimits has;
-    std::vector<int> blocks;
-  };
-  std::vector<Filled> single(blocks.size());
-  cpu.for_each(static_cast<int>(blocks.size()), [&](int i) {
-    const Block& b = *blocks[i];
-    single[i] = {b.body,
-                 b.material,
-                 {columns_of(b), (b.nx + 2) * (b.ny + 2), (b.nx + 2) * (b.ny + 2) * (b.nz + 2)},
-                 {i}};
-  });
-  std::stable_sort(single.begin(), single.end(),
-                   [](const Filled& a, const Filled& b) { return a.has.columns > b.has.columns; });
-  std::vector<Filled> bundles;
-  for (Filled& one : single) {
-    Filled* room = nullptr;
-    if (bundles.size() >= wanted) {
-      for (Filled& f : bundles) {
-        const bool fits = f.body == one.body && f.material == one.material &&
-                          f.has.columns + one.has.columns <= limits.columns &&
-                          f.has.plane_slots + one.has.plane_slots <= limits.plane_slots &&
-                          f.has.slots + one.has.slots <= limits.slots;
-        if (fits && (room == nullptr || f.has.columns < room->has.columns)) room = &f;
-      }
-    }
-    if (room == nullptr) {
-      bundles.push_back(std::move(one));
-      continue;
-    }
-    room->has.columns += one.has.columns;
-    room->has.plane_slots += one.has.plane_slots;
-    room->has.slots += one.has.slots;
-    room->blocks.push_back(one.blocks.front());
+std::vector<BlockToBundle> blocks_to_bundle(const std::vector<Block*>& blocks) {
+  std::map<std::pair<int, int>, int> kinds;  // of body and material
+  std::vector<BlockToBundle> result;
+  for (const Block* b : blocks) {
+    const int kind = kinds.try_emplace({b->body, b->material}, kinds.size()).first->second;
+    const int plane_slots = (b->nx + 2) * (b->ny + 2);
+    result.push_back({kind, {columns_of(*b), plane_slots, plane_slots * (b->nz + 2)}});
   }
-  std::vector<std::vector<int>> result;
-  for (Filled& f : bundles) result.push_back(std::move(f.blocks));
   return result;
 }
 

@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "mpm/blocks.h"
+#include "mpm/cuda/bundle_blocks.h"
 #include "mpm/cuda/substeps.h"
 
 namespace tissue_sim {
@@ -34,22 +35,15 @@ CudaShape choose_shape(const std::vector<LatticeBody>& bodies, const CudaLimits&
 /// Whether these are one body that fills a box, of one material that neither damps nor tears.
 bool can_march(const std::vector<LatticeBody>& bodies);
 
-/// What the blocks that share a thread block may have together.
-struct BundleLimits {
-  int columns;      ///< that hold points
-  int plane_slots;  ///< of one plane of nodes
-  int slots;
-};
-
 /// Each block alone: indices into Blocks::all. Where more than run at once, the smallest come last,
 /// and to the thread blocks that have the smallest of the others.
 std::vector<std::vector<int>> single_blocks(const std::vector<Block*>& blocks, std::size_t at_once,
                                             Cpu& cpu);
 
-/// Bundles, up to `wanted` of them: large blocks first, each of the others with those that have the
-/// fewest columns. Gives indices into `blocks`; more than `wanted` bundles where they do not fit
-/// into fewer.
-std::vector<std::vector<int>> bundle_blocks(const std::vector<Block*>& blocks, std::size_t wanted,
-                                            const BundleLimits& limits, Cpu& cpu);
+/// The blocks as bundle_blocks() takes them.
+std::vector<BlockToBundle> blocks_to_bundle(const std::vector<Block*>& blocks);
+
+/// Two halves of a block that was cut have a rim more.
+inline int most_plane_slots(int of_block) { return 3 * of_block / 2; }
 
 }  // namespace tissue_sim

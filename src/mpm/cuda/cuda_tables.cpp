@@ -84,19 +84,16 @@ void CudaMpmTissue::plan_tables() {
   choose(blocks.size());
   std::vector<std::vector<int>> bundles;
   if (!(d.plan.cached && d.push_plan.cached)) {
-    // As many as whole tissue has, or, of a small one, as run at once.
     const auto at_once = static_cast<std::size_t>(
         std::max(1, std::min(most_at_once(d.plan), most_at_once(d.push_plan))));
-    const std::size_t rounds = (state_->blocks.regions.size() + at_once - 1) / at_once;
-    const std::size_t wanted = d.plan.small ? at_once : rounds * at_once;
-    if (blocks.size() > wanted) {
-      // Two halves of a block that was cut have a rim more.
-      d.push_plan.max_plane_slots = 3 * d.plan.max_plane_slots / 2;
-      const BundleLimits limits = {d.shape.columns(), d.push_plan.max_plane_slots,
-                                   most_slots(d.push_plan)};
-      bundles = bundle_blocks(blocks, wanted, limits, *state_->cpu);
+    if (blocks.size() > at_once && !d.plan.marches) {
+      d.push_plan.max_plane_slots = most_plane_slots(d.plan.max_plane_slots);
+      const BundleSize limits = {d.shape.columns(), d.push_plan.max_plane_slots,
+                                 most_slots(d.push_plan)};
+      bundles = bundle_in_rounds(blocks_to_bundle(blocks), at_once,
+                                 d.plan.small ? at_once : blocks.size(), limits);
     }
-    if (bundles.empty() || bundles.size() > wanted) {
+    if (bundles.empty()) {
       bundles = d.plan.marches
                     ? blocks_by_column(blocks)
                     : single_blocks(blocks, d.plan.small ? at_once : blocks.size(), *state_->cpu);

@@ -54,12 +54,16 @@ Apart take_apart(MpmState& state, const std::vector<std::int32_t>& changed,
         keep_face_contacts(state);
         update_blocks(state.blocks, state.bodies, state.points, *state.fields, cells,
                       static_cast<int>(state.nodes.size()), *state.cpu);
-        state.cpu->both([&] { state.force.resize(state.blocks.force_size); },
-                        [&] {
-                          bound_motion(state);
-                          list_contacts(state);
-                          list_facets(state);
-                        });
+        state.cpu->both(
+            [&] {
+              state.force.clear();  // not to be moved to new room
+              state.force.resize(state.blocks.force_size);
+            },
+            [&] {
+              bound_motion(state);
+              list_contacts(state);
+              list_facets(state);
+            });
       },
       [&] {
         list_threads(state, changed);

@@ -90,7 +90,8 @@ class Sweep {
     if (!passed_.empty()) {
       known_.assign(state_.points.size(), 0);
       if (edges_.size() <= kNotedEdges) outside_.assign(edges_.size(), known_);
-      state_.swept.resize(state_.points.size());
+      // Without values: it is large, and most points are not near.
+      if (!state_.swept) state_.swept.reset(new SweptPoint[state_.points.size()]);
     }
     return static_cast<int>(passed_.size());
   }
@@ -278,15 +279,15 @@ void sweep_bonds(MpmState& state, const BladePath& path, const Array<float>* u_b
   for (const LatticeBody& b : state.bodies) {
     for (int z = 0; z < 2 * b.nz; ++z) layers.emplace_back(&b, z);
   }
-  std::vector<std::vector<BrokenBond>> of_layer(layers.size());
-  state.cpu->for_each(static_cast<int>(layers.size()), [&](int i) {
-    of_layer[i] = sweep.broken_bonds(*layers[i].first, layers[i].second);
+  const int count = static_cast<int>(layers.size());
+  std::vector<std::vector<BrokenBond>> broken(count);
+  state.cpu->for_each(count + 1, [&](int i) {
+    if (i < count) {
+      broken[i] = sweep.broken_bonds(*layers[i].first, layers[i].second);
+    } else {  // what a thread would be alone with when bonds break
+      state.points.crossings.reserve(state.points.size());
+    }
   });
-  std::vector<BrokenBond> broken;
-  std::size_t count = 0;
-  for (const auto& some : of_layer) count += some.size();
-  broken.reserve(count);
-  for (const auto& some : of_layer) broken.insert(broken.end(), some.begin(), some.end());
   break_bonds(state, broken, changed, report);
 }
 

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <optional>
 
+#include "compute/eight_bytes.h"
 #include "contact/known_facets.h"
 #include "contact/surroundings.h"
 #include "cutting/bonds.h"
@@ -17,8 +18,13 @@ namespace {
 
 constexpr float kOneFace = 0.5f;  // cosine between normals
 
-constexpr unsigned kUpper[3] = {0xaa, 0xcc,
-                                0xf0};  // a cell's upper points along each axis, a bit each
+// A cell's upper points along each axis, a bit each; how many bits are set, which would be a call.
+constexpr unsigned kUpper[3] = {0xaa, 0xcc, 0xf0};
+constexpr auto kCount = [] {
+  std::array<std::uint8_t, 256> count{};
+  for (int i = 1; i < 256; ++i) count[i] = static_cast<std::uint8_t>(count[i / 2] + i % 2);
+  return count;
+}();
 
 /// Bonds of a cell's points that are gone in one direction, on one level of the cell.
 struct Side {
@@ -92,16 +98,16 @@ Facet make_facet(double cell_size, int cell, const Side& side, const std::int32_
   f.point = around[__builtin_ctz(members)];  // numbered along x, then y, then z
   f.cell = cell;
   f.direction = static_cast<std::uint8_t>(side.direction);
-  const int count = __builtin_popcount(members);
+  const int count = kCount[members];
   double middle[2];
   for (int l = 0; l < 2; ++l) {
-    const int upper = __builtin_popcount(members & kUpper[side.lateral[l]]);
+    const int upper = kCount[members & kUpper[side.lateral[l]]];
     middle[l] = 0.25 * (2 * upper - count) / count;
     f.center[side.lateral[l]] = static_cast<float>(middle[l]);
-    f.extent[side.lateral[l]] = upper == 0 || upper == count ? 0.25f : 0.5f;
+    f.extent[side.lateral[l]] = 0.25f * (1 + static_cast<int>(upper > 0 && upper < count));
   }
   const Plane plane = plane_at(middle);
-  const double face = 0.5 * (side.level - 1) + (side.sign > 0 ? 0.5 : 0.0);
+  const double face = 0.5 * (side.level - static_cast<int>(side.sign < 0));
   f.center[side.axis] = static_cast<float>(face + std::clamp(plane.height, -0.4, 0.4));
   f.extent[side.axis] = 0;
   for (int a = 0; a < 3; ++a) f.normal[a] = static_cast<float>(plane.normal[a]);
@@ -112,25 +118,29 @@ Facet make_facet(double cell_size, int cell, const Side& side, const std::int32_
 
 /// The bonds that points of a cell miss.
 struct Missing {
-  unsigned cut[kBondCount] = {}, outer[kBondCount] = {};  ///< points whose bond broke, never was
-  std::int32_t beyond[kBondCount][8];                     ///< where it broke: the other point
-  bool any_cut = false;
+  unsigned points[2 * kBondCount];     ///< 2 k: whose bond k broke; 2 k + 1: that never had it
+  std::int32_t beyond[kBondCount][8];  ///< where it broke: the other point
+  unsigned any = 0;                    ///< which of `points` there are, a bit each
 
-  Missing(const LatticeBody& body, const Points& points, const Place& corner,
-          const std::int32_t (&around)[8]) {
-    for (int s = 0; s < 8; ++s) {
-      if (around[s] < 0) continue;
-      for (unsigned gone = kAllBonds & ~points.bonds[around[s]]; gone != 0; gone &= gone - 1) {
-        const int k = __builtin_ctz(gone);
-        const BondOffset o = bond_offset(k);
+  /// `gone`: a byte for each point.
+  Missing(const LatticeBody& body, const Place& corner, std::uint64_t gone) {
+    for (int k = 0; k < kBondCount; ++k) {
+      // The bytes' lowest bits, side by side.
+      const auto all = static_cast<unsigned>((gone >> k & eight(1)) * 0x0102040810204080 >> 56);
+      const BondOffset o = bond_offset(k);
+      unsigned cut = 0;
+      for (unsigned rest = all; rest != 0; rest &= rest - 1) {
+        const int s = __builtin_ctz(rest);
         beyond[k][s] = body.point(corner[0] + (s & 1) + o.x, corner[1] + (s >> 1 & 1) + o.y,
                                   corner[2] + (s >> 2) + o.z);
-        const bool is_cut = beyond[k][s] >= 0;
-        (is_cut ? cut : outer)[k] |= 1u << s;
-        any_cut = any_cut || is_cut;
+        cut |= unsigned{beyond[k][s] >= 0} << s;
       }
+      points[2 * k] = cut;
+      points[2 * k + 1] = all & ~cut;
+      any |= (unsigned{cut != 0} | unsigned{cut != all} << 1) << 2 * k;
     }
   }
+  bool any_cut() const { return (any & 0x555) != 0; }
 };
 
 /// Appends the facets of the points `members`, whose bonds blades went through: one for each of
@@ -141,8 +151,8 @@ unsigned add_crossed(const LatticeBody& body, const Points& points, int cell, co
   Vec3 normal[8];
   double place[8];
   unsigned left = 0;
-  for (int s = 0; s < 8; ++s) {
-    if ((members >> s & 1) == 0) continue;
+  for (unsigned rest = members; rest != 0; rest &= rest - 1) {
+    const int s = __builtin_ctz(rest);
     const Crossing* crossing =
         points.crossings.find(side.sign > 0 ? around[s] : beyond[s], side.axis);
     if (crossing == nullptr) continue;
@@ -163,7 +173,7 @@ unsigned add_crossed(const LatticeBody& body, const Points& points, int cell, co
       plane.height += 0.5 * (place[s] - 0.5);
       plane.normal += normal[s];
     }
-    plane.height /= __builtin_popcount(cut);
+    plane.height /= kCount[cut];
     plane.normal.normalize();
     facets.push_back(make_facet(body.cell_size, cell, side, around, cut,
                                 [&plane](const double(&)[2]) { return plane; }));
@@ -188,7 +198,7 @@ bool is_one_part(const LatticeBody& body, const Place& corner, const std::int32_
     body.for_each_point_in_row(corner[0], corner[0] + 2, corner[1] + k % 2, corner[2] + k / 2,
                                [&count](int, int, int of_row) { count += of_row; });
   }
-  return part == all && count == __builtin_popcount(all);
+  return part == all && count == kCount[all];
 }
 
 /// Takes the facets of one cell that belong to one face together, from `first` on.
@@ -247,37 +257,37 @@ std::vector<Facet> facets_of(const LatticeBody& body, const Points& points, cons
           known.take(x, y, block.z + z, around, cell, facets);
           continue;
         }
-        const auto is_whole = [&points](std::int32_t p) {
-          return p < 0 || points.bonds[p] == kAllBonds;
-        };
-        if (std::all_of(std::begin(around), std::end(around), is_whole)) continue;
+        std::uint64_t gone = 0;
+        for (int s = 0; s < 8; ++s) {
+          const unsigned bonds = points.bonds[std::max(around[s], 0)];
+          gone |= std::uint64_t{around[s] < 0 ? 0 : kAllBonds & ~bonds} << 8 * s;
+        }
+        if (gone == 0) continue;
         const Place corner = {2 * x, 2 * y, 2 * (block.z + z)};
-        const Missing missing(body, points, corner, around);
-        if (!missing.any_cut && !known.none() && is_one_part(body, corner, around)) {
+        const Missing missing(body, corner, gone);
+        if (!missing.any_cut() && !known.none() && is_one_part(body, corner, around)) {
           known.take(x, y, block.z + z, around, cell, facets);
           continue;
         }
         std::optional<Surroundings> surroundings;  // where a plane is to be fitted
         const std::size_t first = facets.size();
-        for (int j = 0; j < 4 * kBondCount; ++j) {
-          const End how = j / 2 % 2 == 0 ? End::kCut : End::kOuter;
-          const unsigned gone = (how == End::kCut ? missing.cut : missing.outer)[j / 4];
-          if (gone == 0) {
-            ++j;  // nor on the other level
-            continue;
+        for (unsigned any = missing.any; any != 0; any &= any - 1) {
+          const int j = __builtin_ctz(any);
+          const End how = j % 2 == 0 ? End::kCut : End::kOuter;
+          for (int level = 0; level < 2; ++level) {
+            const Side side(j / 2, level);
+            unsigned members = missing.points[j] & side.points();
+            if (how == End::kCut && members != 0) {
+              members = add_crossed(body, points, cell, side, around,
+                                    missing.beyond[side.direction], members, facets);
+            }
+            if (members == 0) continue;
+            if (!surroundings) surroundings.emplace(body, points, corner);
+            facets.push_back(make_facet(body.cell_size, cell, side, around, members,
+                                        [&](const double(&middle)[2]) {
+                                          return fitted_plane(*surroundings, side, how, middle);
+                                        }));
           }
-          const Side side(j / 4, j % 2);
-          unsigned members = gone & side.points();
-          if (how == End::kCut && members != 0) {
-            members = add_crossed(body, points, cell, side, around, missing.beyond[side.direction],
-                                  members, facets);
-          }
-          if (members == 0) continue;
-          if (!surroundings) surroundings.emplace(body, points, corner);
-          facets.push_back(make_facet(body.cell_size, cell, side, around, members,
-                                      [&](const double(&middle)[2]) {
-                                        return fitted_plane(*surroundings, side, how, middle);
-                                      }));
         }
         merge(facets, first);
       }

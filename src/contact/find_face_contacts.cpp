@@ -250,6 +250,7 @@ void list_facets(MpmState& s) {
     faces.block_of.insert(faces.block_of.end(), count, static_cast<std::int32_t>(b));
     faces.first_facet.push_back(static_cast<std::int32_t>(faces.block_of.size()));
   }
+  faces.motion.clear();  // not to be moved to new room
   faces.motion.resize(faces.block_of.size());
   faces.listed.clear();
   faces.all.clear();

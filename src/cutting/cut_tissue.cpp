@@ -56,7 +56,9 @@ Apart take_apart(MpmState& state, const std::vector<std::int32_t>& changed,
                       static_cast<int>(state.nodes.size()), *state.cpu);
         state.cpu->both(
             [&] {
-              if (state.blocks.has_rows) state.force.resize(state.blocks.force_size);
+              if (!state.blocks.has_rows) return;  // on a GPU
+              state.force.clear();                 // not to be moved to new room
+              state.force.resize(state.blocks.force_size);
             },
             [&] {
               bound_motion(state);

@@ -21,8 +21,9 @@ void sweep_bonds(MpmState& state, const BladePath& path, const Array<float>* u_b
 /// not stretched to three times its length.
 inline constexpr double kSweepReach = 1.5;
 
-/// Clears bonds that are still there, each named once. Appends and counts as sweep_bonds().
-void break_bonds(MpmState& state, const std::vector<BrokenBond>& broken,
+/// Clears bonds that are still there, each named once in one of some lists. Appends and counts as
+/// sweep_bonds().
+void break_bonds(MpmState& state, const std::vector<std::vector<BrokenBond>>& broken,
                  std::vector<std::int32_t>& changed, CutReport& report);
 
 /// What take_apart() did.

@@ -50,8 +50,7 @@ BondWindows::BondWindows(const std::vector<LatticeBody>& bodies, const Points& p
 }
 
 void BondWindows::update(const Points& points, const std::vector<std::int32_t>& changed) {
-  for (const std::int32_t p : changed) {
-    const Points::Site& s = points.site[p];
+  for_each_site(points, changed, [&](std::int32_t p, const Points::Site& s) {
     OfBody& of = bodies_[s.body];
     for (int axis = 0; axis < 3; ++axis) {
       if ((points.bonds[p] >> (kForwardBond + axis) & 1) != 0) continue;
@@ -59,7 +58,7 @@ void BondWindows::update(const Points& points, const std::vector<std::int32_t>& 
         of.window[1 + axis][at] &= static_cast<std::uint8_t>(~bit);
       });
     }
-  }
+  });
 }
 
 int BondWindows::find_components(int body, int x, int y, int z, Planes (&found)[216]) const {

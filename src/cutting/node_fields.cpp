@@ -103,7 +103,9 @@ std::vector<CellNode> cells_around(const std::vector<LatticeBody>& bodies, const
 
 NodeFields::NodeFields(const std::vector<LatticeBody>& bodies, const Points& points, Nodes& nodes)
     : bonds_(bodies, points) {
-  nodes.resize(lattice_node_count(bodies));
+  const int count = lattice_node_count(bodies);
+  nodes.reserve(count + count / 4);  // so that a cut does not move them all
+  nodes.resize(count);
   mass_of_point_.resize(nodes.size());
   for (std::size_t i = 0; i < bodies.size(); ++i) {
     const LatticeBody& b = bodies[i];

@@ -7,6 +7,7 @@
 #include "cutting/blade_sweep.h"
 #include "cutting/bonds.h"
 #include "cutting/cut_tissue.h"
+#include "cutting/near_sweep.h"
 
 namespace tissue_sim {
 namespace {
@@ -16,46 +17,6 @@ constexpr double kBringReach = 2 * kSweepReach;
 
 // Of a path of so many edges it is noted what is outside of each of them; a scalpel has two.
 constexpr std::size_t kNotedEdges = 4;
-
-/// On which sides of what an edge sweeps all of a box is, by more than `reach` [m]: NearLane's
-/// `outside`, 0 where it comes near.
-unsigned outside_of(const SweptEdge& edge, const Box& box, double reach) {
-  const Vec3 middle = 0.5 * (box.min + box.max), half = 0.5 * (box.max - box.min);
-  unsigned outside = 0;
-  for (int i = 0; i < 3; ++i) {
-    const Slab& slab = edge.slabs[i];
-    const double at = slab.axis.dot(middle), extent = slab.axis.cwiseAbs().dot(half) + reach;
-    if (at + extent < slab.low) outside |= 1u << 2 * i;
-    if (at - extent > slab.high) outside |= 2u << 2 * i;
-  }
-  return outside;
-}
-
-/// A point near the sweep: its lane in its block, and where it is at the beginning and the end [m].
-struct NearPoint {
-  std::int32_t lane;
-  float at[2][3];
-};
-
-/// The same of a point.
-std::uint8_t outside_of(const SweptEdge& edge, const NearPoint& point, double by) {
-  unsigned outside = 0;
-  for (int i = 0; i < 3; ++i) {
-    const Slab& slab = edge.slabs[i];
-    const auto at = [&](const float(&x)[3]) { return slab.axis.dot(Vec3(x[0], x[1], x[2])); };
-    const auto [low, high] = std::minmax({at(point.at[0]), at(point.at[1])});
-    if (high < slab.low - by) outside |= 1u << 2 * i;
-    if (low > slab.high + by) outside |= 2u << 2 * i;
-  }
-  return static_cast<std::uint8_t>(outside);
-}
-
-/// An edge of a part of the path, and its number in all of it.
-struct PathEdge {
-  const SweepPart* part;
-  const SweptEdge* swept;
-  std::size_t number;
-};
 
 /// What is known of where a point is: whether it was brought, and whether it is near an edge.
 constexpr unsigned kBrought = 0x40, kNear = 0x80;
@@ -90,7 +51,8 @@ class Sweep {
     if (!passed_.empty()) {
       known_.assign(state_.points.size(), 0);
       if (edges_.size() <= kNotedEdges) outside_.assign(edges_.size(), known_);
-      state_.swept.resize(state_.points.size());
+      // Without values: it is large, and most points are not near.
+      if (!state_.swept) state_.swept.reset(new SweptPoint[state_.points.size()]);
     }
     return static_cast<int>(passed_.size());
   }
@@ -148,18 +110,33 @@ class Sweep {
 
   /// The bonds that point forward from the points of a layer across z and that the path passes.
   std::vector<BrokenBond> broken_bonds(const LatticeBody& body, int z) const {
-    std::vector<BrokenBond> broken;
+    std::vector<Bond> bonds;
     for (int y = 0; y < 2 * body.ny; ++y) {
       body.for_each_point_in_row(0, 2 * body.nx, y, z, [&](int x, int point, int count) {
         if (!any_near(point, count)) return;
-        add_broken(point, point + 1, count - 1, 0, broken);
+        add_near(point, point + 1, count - 1, 0, bonds);
         for (int axis = 1; axis < 3; ++axis) {
           body.for_each_point_in_row(x, x + count, y + (axis == 1), z + (axis == 2),
                                      [&](int beside, int other, int n) {
-                                       add_broken(point + beside - x, other, n, axis, broken);
+                                       add_near(point + beside - x, other, n, axis, bonds);
                                      });
         }
       });
+    }
+    std::vector<BrokenBond> broken;
+    broken.reserve(bonds.size());
+    const std::size_t count = bonds.size();
+    for (std::size_t i = 0; i < count; ++i) {
+      // Places lie scattered and come from far: they are on their way while others are worked on.
+      if (i + 16 < count) {
+        __builtin_prefetch(&state_.swept[bonds[i + 16].point]);
+        __builtin_prefetch(&state_.swept[bonds[i + 16].other]);
+      }
+      if (i + 8 < count) {
+        prefetch_place(bonds[i + 8].point);
+        prefetch_place(bonds[i + 8].other);
+      }
+      add_broken(bonds[i], broken);
     }
     return broken;
   }
@@ -172,6 +149,11 @@ class Sweep {
     std::vector<NearPoint> points;
     std::uint8_t outside[kNotedEdges];
   };
+  /// From a point to its neighbour along an axis.
+  struct Bond {
+    std::int32_t point, other;
+    int axis;
+  };
 
   bool any_near(std::int32_t point, int count) const {
     std::uint64_t near = 0;
@@ -179,9 +161,9 @@ class Sweep {
     return (near & eight(kNear)) != 0;
   }
   /// Adds those bonds from `count` points to as many others, neighbours along an axis, that the
-  /// path passes. Eight at a time: whether the first is near and they are not both to one side.
-  void add_broken(std::int32_t point, std::int32_t other, int count, int axis,
-                  std::vector<BrokenBond>& broken) const {
+  /// path may pass. Eight at a time: whether the first is near and they are not both to one side.
+  void add_near(std::int32_t point, std::int32_t other, int count, int axis,
+                std::vector<Bond>& bonds) const {
     for (int i = 0; i < count; i += 8) {
       const auto bytes = [i, count](const auto& of, std::int32_t first) {
         return bytes_of(of, first + i, count - i);
@@ -195,15 +177,25 @@ class Sweep {
       }
       left &= ~aside;
       for (; left != 0; left &= left - 1) {
-        const std::int32_t p = point + i + __builtin_ctzll(left) / 8, q = p + other - point;
-        const PassedBlock& passed = passed_[state_.swept[p].block];
-        Meeting meeting;
-        if (passes(passed.edges, {place(0, p), place(0, q), place(1, p), place(1, q)}, meeting)) {
-          const std::int32_t lane = passed.points[state_.swept[p].index].lane;
-          broken.push_back(broken_bond(*passed.block, lane, q, axis, meeting));
-        }
+        const std::int32_t p = point + i + __builtin_ctzll(left) / 8;
+        bonds.push_back({p, p + other - point, axis});
       }
     }
+  }
+  void prefetch_place(std::int32_t p) const {
+    if ((known_[p] & kBrought) == 0) return;
+    const SweptPoint& swept = state_.swept[p];
+    __builtin_prefetch(&passed_[swept.block].points[swept.index]);
+  }
+  /// Adds a bond if the path passes it.
+  void add_broken(const Bond& bond, std::vector<BrokenBond>& broken) const {
+    const std::int32_t p = bond.point, q = bond.other;
+    const PassedBlock& passed = passed_[state_.swept[p].block];
+    Meeting meeting;
+    if (!passes(passed.edges, {place(0, p), place(0, q), place(1, p), place(1, q)}, meeting))
+      return;
+    const std::int32_t lane = passed.points[state_.swept[p].index].lane;
+    broken.push_back(broken_bond(*passed.block, lane, q, bond.axis, meeting));
   }
 
   /// Of a point at the beginning (0) or the end (1). Both ends of a bond must agree to the last bit
@@ -278,15 +270,15 @@ void sweep_bonds(MpmState& state, const BladePath& path, const Array<float>* u_b
   for (const LatticeBody& b : state.bodies) {
     for (int z = 0; z < 2 * b.nz; ++z) layers.emplace_back(&b, z);
   }
-  std::vector<std::vector<BrokenBond>> of_layer(layers.size());
-  state.cpu->for_each(static_cast<int>(layers.size()), [&](int i) {
-    of_layer[i] = sweep.broken_bonds(*layers[i].first, layers[i].second);
+  const int count = static_cast<int>(layers.size());
+  std::vector<std::vector<BrokenBond>> broken(count);
+  state.cpu->for_each(count + 1, [&](int i) {
+    if (i == 0) {  // what a thread would be alone with when bonds break
+      state.points.crossings.reserve(state.points.size());
+    } else {
+      broken[i - 1] = sweep.broken_bonds(*layers[i - 1].first, layers[i - 1].second);
+    }
   });
-  std::vector<BrokenBond> broken;
-  std::size_t count = 0;
-  for (const auto& some : of_layer) count += some.size();
-  broken.reserve(count);
-  for (const auto& some : of_layer) broken.insert(broken.end(), some.begin(), some.end());
   break_bonds(state, broken, changed, report);
 }
 

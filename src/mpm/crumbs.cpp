@@ -203,15 +203,15 @@ Softened soften(const std::vector<LatticeBody>& bodies, const std::vector<std::i
     if (points.soft[p] == 0) softened.points.push_back(p);
     points.soft[p] = 1;
   };
-  for (const std::int32_t p : changed) {
-    const LatticeBody& body = bodies[points.site[p].body];
+  for_each_site(points, changed, [&](std::int32_t p, const Points::Site& site) {
+    const LatticeBody& body = bodies[site.body];
     if (is_in_slice(body, points, p)) mark(p);
     const Crumb crumb(body, points, p);
-    if (crumb.count == 0) continue;
+    if (crumb.count == 0) return;
     for (const std::int32_t of_crumb : crumb) mark(of_crumb);
     const std::int32_t lowest = *std::min_element(crumb.begin(), crumb.end());
     if (seen.insert(lowest).second) softened.crumbs.push_back(lowest);
-  }
+  });
   return softened;
 }
 

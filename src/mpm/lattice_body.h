@@ -58,6 +58,17 @@ struct Points {
   bool is_soft(std::int32_t point) const { return !soft.empty() && soft[point] != 0; }
 };
 
+/// Calls f(point, site) for each of some points. Their sites lie scattered and come from far: those
+/// of later ones are on their way while f works on one.
+template <class F>
+void for_each_site(const Points& points, const std::vector<std::int32_t>& some, const F& f) {
+  constexpr std::size_t kAhead = 16;
+  for (std::size_t i = 0; i < some.size(); ++i) {
+    if (i + kAhead < some.size()) __builtin_prefetch(&points.site[some[i + kAhead]]);
+    f(some[i], points.site[some[i]]);
+  }
+}
+
 struct LatticeBody {
   Body body;
   std::vector<Material> materials;  ///< that its points are of: its own and its inclusions'

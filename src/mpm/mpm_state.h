@@ -68,7 +68,8 @@ struct MpmState {
   Blocks blocks;
   Array<float> force;        ///< of all blocks
   Array<float> u_before[3];  ///< displacements when the frame began, where a blade may cut [m]
-  Array<SweptPoint> swept;   ///< of the points near a sweep, while it breaks bonds
+  /// Of all points, filled for those near a sweep while it breaks bonds; null before any did.
+  std::unique_ptr<SweptPoint[]> swept;
   std::vector<BlockMotion> motion;    ///< per block; exact as of measure_motion()
   float wildest = 1;                  ///< BlockState's, of all blocks
   double time = 0;                    ///< since the beginning [s]

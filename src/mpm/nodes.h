@@ -15,6 +15,14 @@ struct Nodes {
   Array<float> mass;      ///< [kg], 0 where no point reaches
   Array<float> inv_mass;  ///< [1/kg], 0 where no point reaches and where the node is anchored
   std::size_t size() const { return mass.size(); }
+  void reserve(std::size_t n) {
+    for (int c = 0; c < 3; ++c) {
+      u[c].reserve(n);
+      v[c].reserve(n);
+    }
+    mass.reserve(n);
+    inv_mass.reserve(n);
+  }
   void resize(std::size_t n) {
     for (int c = 0; c < 3; ++c) {
       u[c].resize(n);

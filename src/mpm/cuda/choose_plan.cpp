@@ -118,8 +118,9 @@ double cycles(const std::vector<LatticeBody>& bodies, const std::vector<BlockCou
     return s.small ? wave + (pairs ? 3500 : 5500) : 1.5 * waves * wave + 5000;
   };
   if (fill_boxes) return in_all();
-  // Rims have cells that are not full and nodes of others.
-  const double rim = 1 + 0.15 * (plane_slots / (b.x * b.y) - 1) + (parts > 8 ? 0.2 : 0);
+  // Rims have cells that are not full and nodes of others; in a single layer most cells are of one.
+  const double rim =
+      1 + (b.z == 1 ? 0 : 0.15 * (plane_slots / (b.x * b.y) - 1)) + (parts > 8 ? 0.2 : 0);
   const auto with_surface = [&] { return rim * (in_all() + (s.small ? 0 : 10000 * waves)); };
   if (!share || with_surface() >= least) return with_surface();
   waves = rounds_of(counts, s, blocks, columns, at_once, limits.shared_bytes);

@@ -66,8 +66,8 @@ double rounds_of(const std::vector<BlockCounts>& counts, const CudaShape& s, dou
   return rounds(bundles.empty() ? blocks : static_cast<double>(bundles.size()));
 }
 
-/// Cycles of a substep as a small or as a large tissue (substeps.cu), 1e30 where that does not go,
-/// or where it takes `least` or more. `counts`: of the bodies.
+/// Cycles of a substep as a small or as a large tissue (substeps.cu), 1e30 where that does not go;
+/// where it takes `least` or more, it may take more than what is returned. `counts`: of the bodies.
 double cycles(const std::vector<LatticeBody>& bodies, const std::vector<BlockCounts>& counts,
               const CudaShape& s, const CudaLimits& limits, double least) {
   const BlockShape& b = s.blocks;

@@ -17,12 +17,12 @@ struct Divided {
   Points points;
   std::vector<LatticeBody> bodies;
 
-  explicit Divided(Shape shape) {
+  explicit Divided(Shape shape, const Vec3& size = Vec3(0.021, 0.017, 0.012)) {
     scene.cell_size = 0.001;
     scene.bodies.resize(1);
     Body& body = scene.bodies[0];
     body.shape = shape;
-    body.size = Vec3(0.021, 0.017, 0.012);
+    body.size = size;
     body.radii = Vec3(0.016, 0.011, 0.0075);
     std::vector<std::string> notes;
     bodies = make_lattice_bodies(scene, points, &notes, NodeRange::kBox);
@@ -109,6 +109,26 @@ TEST(ChooseShape, BlocksOfAnOrganRunAtOnceWhereTheyCan) {
                              most_plane_slots((shape.blocks.x + 2) * (shape.blocks.y + 2)), 2000};
   EXPECT_TRUE(blocks.size() <= 132 || !bundle_in_rounds(blocks, 132, 132, limits).empty());
   EXPECT_GE(blocks.size(), 60u);  // and enough of them have one
+}
+
+TEST(ChooseShape, LeavesRoomForBlocksThatCutsAdd) {
+  constexpr int kProcessors = 132;
+  int all_used = 0;
+  for (int x = 16; x <= 40; x += 4) {
+    for (int y = 8; y <= x; y += 4) {
+      Divided divided(Shape::kBox, 0.001 * Vec3(x, y, 12));
+      const auto count = [&](bool whole) {
+        const CudaShape shape = choose_shape(divided.bodies, {kProcessors, 232448}, whole);
+        EXPECT_FALSE(shape.marches);
+        return divided.blocks(shape.blocks.x, shape.blocks.y, shape.blocks.z).size();
+      };
+      // As long as it is whole a body may have all of them.
+      all_used += count(true) > kProcessors / 1.1 && count(true) <= kProcessors ? 1 : 0;
+      const std::size_t blocks = count(false);
+      EXPECT_TRUE(1.1 * blocks <= kProcessors || blocks > kProcessors) << x << " x " << y;
+    }
+  }
+  EXPECT_GT(all_used, 5);
 }
 
 }  // namespace

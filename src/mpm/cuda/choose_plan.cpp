@@ -67,9 +67,10 @@ double rounds_of(const std::vector<BlockCounts>& counts, const CudaShape& s, dou
 }
 
 /// Cycles of a substep as a small or as a large tissue (substeps.cu), 1e30 where that does not go;
-/// where it takes `least` or more, it may take more than what is returned. `counts`: of the bodies.
+/// where it takes `least` or more, it may take more than what is returned. `counts`: of the bodies;
+/// `whole`: see choose_shape().
 double cycles(const std::vector<LatticeBody>& bodies, const std::vector<BlockCounts>& counts,
-              const CudaShape& s, const CudaLimits& limits, double least) {
+              const CudaShape& s, const CudaLimits& limits, bool whole, double least) {
   const BlockShape& b = s.blocks;
   const bool pairs = s.small && s.pairs();
   const double plane_slots = (b.x + 2.0) * (b.y + 2), slots = plane_slots * (b.z + 2);
@@ -91,6 +92,8 @@ double cycles(const std::vector<LatticeBody>& bodies, const std::vector<BlockCou
   const int each = std::max(1, std::min(by_registers, by_shared));
   const auto at_once = static_cast<std::size_t>(each) * limits.processors;
   double waves = std::ceil(blocks / static_cast<double>(at_once));
+  // Cuts add blocks: no second round for a few of them. Other bodies bundle theirs anyway.
+  if (!whole && fill_boxes && waves == 1 && 1.1 * blocks > static_cast<double>(at_once)) waves = 2;
   bool share = false;  // blocks share thread blocks
   if (!fill_boxes) {
     if (each > 1 || b.y > b.x) return 1e30;  // no better where it was measured
@@ -172,7 +175,8 @@ bool can_march(const std::vector<LatticeBody>& bodies) {
 }
 
 CudaShape choose_shape(const std::vector<LatticeBody>& bodies, const CudaLimits& limits,
-                       bool may_march) {
+                       bool whole) {
+  const bool may_march = whole && can_march(bodies);
   const bool pairs = wants_pairs(bodies);
   if (const char* text = std::getenv("TISSUE_SIM_CUDA_SHAPE")) {
     return shape_from(text, pairs, may_march);
@@ -197,7 +201,7 @@ CudaShape choose_shape(const std::vector<LatticeBody>& bodies, const CudaLimits&
             s.marches = way == kMarch;
             if (pairs && !s.pairs()) continue;
             const double c = s.marches ? cycles_of_march(bodies[0], s, limits)
-                                       : cycles(bodies, counts, s, limits, least);
+                                       : cycles(bodies, counts, s, limits, whole, least);
             if (c < least) {
               least = c;
               best = s;

@@ -17,6 +17,10 @@ struct CudaShape {
   /// CudaPlan::pairs, and the columns that a thread block can have.
   bool pairs() const { return 2 * blocks.x * blocks.y <= threads; }
   int columns() const { return pairs() ? threads / 2 : threads; }
+  bool operator==(const CudaShape& s) const {
+    return blocks.x == s.blocks.x && blocks.y == s.blocks.y && blocks.z == s.blocks.z &&
+           threads == s.threads && small == s.small && marches == s.marches;
+  }
 };
 
 /// What the choice needs to know of a GPU.
@@ -25,12 +29,12 @@ struct CudaLimits {
   std::size_t shared_bytes;  ///< shared memory that a thread block can have
 };
 
-/// The shape for these bodies that a model of the substep's time finds fastest; one that marches
-/// only if they `may_march`: see can_march(). The environment variable TISSUE_SIM_CUDA_SHAPE="x y z
-/// threads way", way 0 for large, 1 for small, 2 for a shape that marches, overrules it, for
-/// measurements.
+/// The shape for these bodies that a model of the substep's time finds fastest: as long as they
+/// are `whole`, or when they are cut. Only what is whole can march, see can_march(), and cuts need
+/// room for the blocks that they add. The environment variable TISSUE_SIM_CUDA_SHAPE="x y z threads
+/// way", way 0 for large, 1 for small, 2 for a shape that marches, overrules it, for measurements.
 CudaShape choose_shape(const std::vector<LatticeBody>& bodies, const CudaLimits& limits,
-                       bool may_march);
+                       bool whole);
 
 /// Whether these are one body that fills a box, of one material that neither damps nor tears.
 bool can_march(const std::vector<LatticeBody>& bodies);

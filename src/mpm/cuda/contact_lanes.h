@@ -154,12 +154,11 @@ struct LanePlaces {
 
   __device__ __forceinline__ explicit LanePlaces(const CudaNodes& nodes) : state(nodes) {}
 
-  /// Takes a contact in hand whose nodes are known.
-  __device__ __forceinline__ void take(const FaceSpring& c, const CudaContactNodes& known) {
+  /// Takes a contact in hand whose nodes are known; the place held is still to be set.
+  __device__ __forceinline__ void take(const CudaContactNodes& known) {
     own_place.load_nodes(lanes, known.own);
     other_place.load_nodes(lanes, known.other);
     own_place.load_weights(lanes, known.weight);
-    hold(c.hold);
   }
   /// Brings displacements, once they are what they shall be.
   __device__ __forceinline__ void bring() {

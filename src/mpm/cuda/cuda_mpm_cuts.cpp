@@ -112,6 +112,7 @@ void CudaMpmTissue::push_points(const std::vector<std::int32_t>& changed) {
 
 bool CudaMpmTissue::take_apart(const std::vector<std::int32_t>& changed) {
   OnDevice& d = *device_;
+  make_room_for_cuts();
   std::vector<std::int32_t> nodes = nodes_around(changed);
   pull_some(nodes);
   pull_contacts();
@@ -161,7 +162,6 @@ void CudaMpmTissue::cut(const std::vector<BladePath>& paths, const float4* u_bef
     changed.insert(changed.end(), by_this.begin(), by_this.end());
   }
   if (changed.empty()) return;
-  if (device_->shape.marches) stop_marching();
   if (take_apart(changed)) report.new_fragments = label_pieces();
   launch_measure();
   finish_measure();

@@ -17,6 +17,7 @@ struct float4;  // CUDA's
 namespace tissue_sim {
 
 struct CudaFaces;
+struct CudaShape;
 struct CudaLooks;
 
 /// The nodes live on the GPU; lattice, bonds, blocks and pieces on the host too, where nodes around
@@ -64,9 +65,9 @@ class CudaMpmTissue final : public Tissue {
   int run(const PartSubsteps& substeps, double from, double to, std::vector<TearingPoint>& tearing);
   void sum_loads();  ///< of the part that was run last, once it is done
   PartRun run_part(const PartSubsteps& substeps, const FrameInput& input, double from, double to);
-  void make_blocks(bool may_march);
-  void stop_marching();  ///< blocks that march are too tall to be cut well
-  void plan_tables();    ///< how the blocks are worked on, and the tables for it
+  void make_blocks(const CudaShape& shape);
+  void make_room_for_cuts();  ///< makes blocks anew that are good for whole tissue alone
+  void plan_tables();         ///< how the blocks are worked on, and the tables for it
   /// While the tissue moves from `u_before` to where it is; null: it is at rest.
   void cut(const std::vector<BladePath>& paths, const float4* u_before, CutReport& report);
   void read_places(const float4* u_before);  ///< of points, at both times, for sweep()

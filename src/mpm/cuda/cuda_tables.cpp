@@ -188,9 +188,9 @@ void CudaMpmTissue::push_tables() {
   }
 }
 
-void CudaMpmTissue::make_blocks(bool may_march) {
+void CudaMpmTissue::make_blocks(const CudaShape& shape) {
   OnDevice& d = *device_;
-  d.shape = choose_shape(state_->bodies, d.limits, may_march);
+  d.shape = shape;
   d.shape.blocks.uniform = true;
   d.shape.blocks.has_rows = false;
   state_->blocks = tissue_sim::make_blocks(state_->bodies, state_->points, *state_->fields,
@@ -199,8 +199,9 @@ void CudaMpmTissue::make_blocks(bool may_march) {
   list_facets(*state_);
 }
 
-void CudaMpmTissue::stop_marching() {
-  make_blocks(false);
+void CudaMpmTissue::make_room_for_cuts() {
+  if (device_->shape == device_->cut_shape) return;
+  make_blocks(device_->cut_shape);
   // Until they are measured, any block may be where any of the tissue is.
   for (std::vector<BlockMotion>* motion : {&state_->motion, &motion_before_}) {
     BlockMotion all;

@@ -39,7 +39,7 @@ struct SweepOnDevice {
 
 struct CudaMpmTissue::OnDevice {
   CudaLimits limits;
-  CudaShape shape;
+  CudaShape shape, cut_shape;  ///< now, and once bonds broke
   /// Without contact, with tools, with contact of tissue too, and CudaPlan::plain.
   CudaPlan plan, push_plan, touch_plan, plain_plan;
   /// Thread blocks that run at once.

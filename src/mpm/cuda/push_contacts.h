@@ -84,17 +84,22 @@ template <bool kMany>
 __device__ __forceinline__ void push_contacts(const CudaFaces& f, const LaneShare& share,
                                               const CudaNodes& state, const ContactRound& round,
                                               long long* force) {
-  const CudaLooks& s = f.looks;
-  const bool many = kMany && f.contacts > share.step / (32 / kContactLanes);
-  for (int i = share.first; __any_sync(0xffffffffu, i < f.contacts); i += share.step) {
-    const int at = min(i, f.contacts - 1);
-    FaceSpring& spring = s.springs[s.contacts[at]];
-    FaceSpring c = spring;
-    const bool is_one = i < f.contacts && c.other >= 0, active = is_one && is_active(c);
-    if (!__any_sync(0xffffffffu, active || (round.soften && is_one))) continue;
+  // Copies: through a reference they would be read again after every store.
+  const std::int32_t* facets = f.looks.contacts;
+  const CudaContactNodes* nodes = f.looks.nodes;
+  FaceSpring* springs = f.looks.springs;
+  const int count = f.contacts;
+  const bool many = kMany && count > share.step / (32 / kContactLanes);
+  for (int i = share.first; __any_sync(0xffffffffu, i < count); i += share.step) {
+    const int at = min(i, count - 1);
+    FaceSpring& spring = springs[facets[at]];
     LanePlaces<false> places(state);
-    places.take(c, s.nodes[at]);
-    places.bring();
+    places.take(nodes[at]);
+    places.bring();  // on their way before it is known whether they are wanted
+    FaceSpring c = spring;
+    const bool is_one = i < count && c.other >= 0, active = is_one && is_active(c);
+    if (!__any_sync(0xffffffffu, active || (round.soften && is_one))) continue;
+    places.hold(c.hold);
     if (round.soften) {
       const float mobility = places.held_mobility();
       if (is_one) c.soften(mobility, round.dt);
@@ -114,16 +119,18 @@ __device__ __forceinline__ void push_contacts(const CudaFaces& f, const LaneShar
 __device__ __forceinline__ void look_at_contacts(const CudaFaces& f, const LaneShare& share,
                                                  const CudaNodes& state, const ContactRound& round,
                                                  long long* force) {
-  const CudaLooks& s = f.looks;
+  const CudaLooks s = f.looks;
+  const int count = f.contacts;
   float fastest = 0;
-  for (int i = share.first; i < f.contacts; i += share.step) {
+  for (int i = share.first; i < count; i += share.step) {
     FaceSpring c = s.springs[s.contacts[i]];
     LaneFaces faces(s, state);
     faces.index = c.facet;
     if (round.fresh) {
       faces.take(c);
     } else {
-      faces.LanePlaces::take(c, s.nodes[i]);
+      faces.LanePlaces::take(s.nodes[i]);
+      faces.hold(c.hold);
     }
     faces.bring();
     fastest = fmaxf(fastest, look(faces, c, round.dt, round.since));

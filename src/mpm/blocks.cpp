@@ -83,32 +83,21 @@ void connect_forces(Blocks& blocks, const std::vector<LatticeBody>& bodies, int 
     const LatticeBody& b = bodies[block->body];
     const std::size_t component = block->node_count();
     const auto add = [&](int row, int begin, int local, int count) {
-      if (count <= 0) return;
       entries.push_back({row, {block->force_offset + local, component, begin, count}});
     };
-    const std::vector<Block::SplitNodes>& split = block->split_nodes;
-    std::size_t next = 0;
     for (const Block::NodeRow& r : block->node_rows) {
       if (r.node < 0) continue;
-      // A row without the nodes that this block sees split: parts between them.
-      const int row = first_row[block->body] + r.stretch, row_end = r.local + r.count;
-      const int to_row = r.node - b.first_node - b.nodes.stretches()[r.stretch].first - r.local;
-      int local = r.local;
-      for (; next < split.size() && split[next].local < row_end; ++next) {
-        const Block::SplitNodes& s = split[next];
-        const int first = std::max(local, s.local), end = std::min(row_end, s.local + s.count);
-        if (first < end) {
-          add(row, to_row + local, local, first - local);
-          for (local = first; local < end;) {
-            const int node = s.node + local - s.local - blocks.first_split_node;
-            const int begin = node % kSplitRow, count = std::min(end - local, kSplitRow - begin);
-            add(split_row + node / kSplitRow, begin, local, count);
-            local += count;
-          }
-        }
-        if (s.local + s.count > row_end) break;
+      if (r.node < blocks.first_split_node) {
+        const int first = b.first_node + b.nodes.stretches()[r.stretch].first;
+        add(first_row[block->body] + r.stretch, r.node - first, r.local, r.count);
+        continue;
       }
-      add(row, to_row + local, local, row_end - local);
+      for (int i = 0; i < r.count;) {
+        const int node = r.node + i - blocks.first_split_node;
+        const int begin = node % kSplitRow, count = std::min(r.count - i, kSplitRow - begin);
+        add(split_row + node / kSplitRow, begin, r.local + i, count);
+        i += count;
+      }
     }
   }
   // Those of a row one after the other, in the order of the blocks.

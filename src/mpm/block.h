@@ -49,7 +49,6 @@ struct Block {
   struct NodeRow {
     int local, count;  ///< the first of them in the block's nodes: z * plane + y * pitch + x
     int node;          ///< the same in Nodes, -1 where no point sees them
-    int stretch;       ///< of LatticeBody::nodes, if they are of the lattice
   };
   std::vector<NodeRow> node_rows;         ///< in the order of the block's nodes
   std::vector<std::vector<Span>> filled;  ///< [nz]: lanes whose cells hold points, in order

@@ -67,19 +67,19 @@ void find_nodes(Block& block, const LatticeBody& b) {
       const Block::Side& side = block.sides[i % sides];
       const int x0 = side.x - 1 - side.column;
       int next = seen[i].begin;
-      const auto add = [&](int end, int node, int stretch) {
-        if (end > next) block.node_rows.push_back({row + next, end - next, node, stretch});
+      const auto add = [&](int end, int node) {
+        if (end > next) block.node_rows.push_back({row + next, end - next, node});
         next = std::max(next, end);
       };
       b.for_each_node_in_row(side.x - 1, side.x - 1 + side.count, block.y + y - 1, block.z + z - 1,
-                             [&](int x, int node, int count, int stretch) {
+                             [&](int x, int node, int count, int) {
                                const int begin = x - x0, end = begin + count;
                                const auto to = block.node.begin() + row + begin;
                                std::iota(to, to + count, node);
-                               add(std::min(begin, seen[i].end), -1, -1);
-                               add(std::min(end, seen[i].end), node + next - begin, stretch);
+                               add(std::min(begin, seen[i].end), -1);
+                               add(std::min(end, seen[i].end), node + next - begin);
                              });
-      add(seen[i].end, -1, -1);
+      add(seen[i].end, -1);
     }
   }
 }
@@ -129,7 +129,7 @@ void split_row(Block& block, const BlockRegion& r, const Part& part, const Block
       ++last->count;
       continue;
     }
-    split.push_back({local, 1, node, -1});
+    split.push_back({local, 1, node});
     last = &split.back();
   }
 }
@@ -141,7 +141,7 @@ std::vector<Block::NodeRow> with_split(const std::vector<Block::NodeRow>& rows,
   std::vector<Block::NodeRow> all;
   all.reserve(rows.size() + 2 * split.size());
   const auto add = [&all](const Block::NodeRow& r, int begin, int end) {
-    if (begin < end) all.push_back({begin, end - begin, r.node + begin - r.local, r.stretch});
+    if (begin < end) all.push_back({begin, end - begin, r.node + begin - r.local});
   };
   std::size_t next = 0;
   for (const Block::NodeRow& row : rows) {

@@ -1,5 +1,5 @@
 // Array: a vector whose elements start on a cache line, as SIMD loads and the GPU like them. There
-// is room for one more behind the last, which may be read.
+// is room for a cache line of them behind the last, which may be read.
 #pragma once
 
 #include <cstddef>
@@ -16,7 +16,7 @@ struct CacheLineAllocator {
   template <class U>
   CacheLineAllocator(const CacheLineAllocator<U>&) {}  // NOLINT: rebinding converts
   T* allocate(std::size_t n) {
-    void* p = std::aligned_alloc(64, (n * sizeof(T) / 64 + 1) * 64);
+    void* p = std::aligned_alloc(64, (n * sizeof(T) / 64 + 2) * 64);
     if (p == nullptr) throw std::bad_alloc();
     return static_cast<T*>(p);
   }

@@ -9,13 +9,22 @@ void push_faces(const MpmState& state, FaceContact& contact, float dt) {
   push_face(contact, dt, places);
 }
 
-void add_face_contacts(MpmState& state, int index, float dt, float* force) {
+void push_faces_within(MpmState& state, int index, float dt, const float* u) {
   FaceContacts& faces = state.faces;
   const Block& block = *state.blocks.all[index];
+  for (std::int32_t i = faces.first_within[index]; i < faces.first_within[index + 1]; ++i) {
+    FaceContact& contact = faces.all[faces.within[i]];
+    PlacesInBlock places{{state.nodes, contact}, block, u};
+    push_face(contact, dt, places);
+  }
+}
+
+void add_face_contacts(const MpmState& state, int index, float* force) {
+  const FaceContacts& faces = state.faces;
+  const Block& block = *state.blocks.all[index];
   for (std::int32_t i = faces.first_of_block[index]; i < faces.first_of_block[index + 1]; ++i) {
-    FaceContact& c = faces.all[faces.of_block[i] / 2];
+    const FaceContact& c = faces.all[faces.of_block[i] / 2];
     const bool other = faces.of_block[i] % 2 == 1;
-    if (!other && faces.block_of[c.other] == index) push_faces(state, c, dt);
     if (!c.touching) continue;
     const CellNodes& nodes = other ? c.other_nodes : c.nodes;
     const auto cell = static_cast<int>(nodes.lowest - block.node.data());

@@ -40,6 +40,8 @@ struct FaceContacts {
   /// Per block, CSR: active contacts, as 2 * contact, plus one where the block holds the other
   /// face.
   std::vector<std::int32_t> first_of_block, of_block;
+  /// The same: those of them that it has with itself.
+  std::vector<std::int32_t> first_within, within;
   std::vector<KeptContact> kept;            ///< sorted by point and direction
   double until_search = 0, until_look = 0;  ///< at any contact [s]
   double dt = 0;                            ///< of the last substep [s]
@@ -61,8 +63,11 @@ void list_facets(MpmState& state);
 /// Works out the force of a contact after a substep of `dt` seconds, and lets it slide.
 void push_faces(const MpmState& state, FaceContact& contact, float dt);
 
-/// Works out the forces of a block's contacts with itself, and adds them and those of its contacts
-/// with other blocks, which must be there, to its part of the force buffer.
-void add_face_contacts(MpmState& state, int block, float dt, float* force);
+/// The same for a block's contacts with itself. `u` are the displacements of its nodes, as
+/// BlockKernels::gather() copied them.
+void push_faces_within(MpmState& state, int block, float dt, const float* u);
+
+/// Adds the forces of a block's contacts, which must be there, to its part of the force buffer.
+void add_face_contacts(const MpmState& state, int block, float* force);
 
 }  // namespace tissue_sim

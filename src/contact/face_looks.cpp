@@ -14,23 +14,33 @@ void list_active(MpmState& s) {
   FaceContacts& faces = s.faces;
   faces.forget_active();
   faces.first_of_block.assign(s.blocks.all.size() + 1, 0);
+  faces.first_within = faces.first_of_block;
   for (std::size_t i = 0; i < faces.all.size(); ++i) {
     const FaceContact& c = faces.all[i];
     if (!is_active(c)) continue;
     const std::int32_t own = faces.block_of[c.facet], other = faces.block_of[c.other];
     faces.active.push_back(static_cast<std::int32_t>(i));
-    if (own != other) faces.between.push_back(static_cast<std::int32_t>(i));
+    if (own != other) {
+      faces.between.push_back(static_cast<std::int32_t>(i));
+    } else {
+      ++faces.first_within[own + 1];
+    }
     ++faces.first_of_block[own + 1];
     ++faces.first_of_block[other + 1];
   }
   for (std::size_t b = 1; b < faces.first_of_block.size(); ++b) {
     faces.first_of_block[b] += faces.first_of_block[b - 1];
+    faces.first_within[b] += faces.first_within[b - 1];
   }
   faces.of_block.resize(2 * faces.active.size());
-  std::vector<std::int32_t> next(faces.first_of_block.begin(), faces.first_of_block.end() - 1);
+  faces.within.resize(faces.first_within.back());
+  std::vector<std::int32_t> next = faces.first_of_block, next_within = faces.first_within;
   for (const std::int32_t i : faces.active) {
-    faces.of_block[next[faces.block_of[faces.all[i].facet]]++] = 2 * i;
-    faces.of_block[next[faces.block_of[faces.all[i].other]]++] = 2 * i + 1;
+    const std::int32_t own = faces.block_of[faces.all[i].facet];
+    const std::int32_t other = faces.block_of[faces.all[i].other];
+    faces.of_block[next[own]++] = 2 * i;
+    faces.of_block[next[other]++] = 2 * i + 1;
+    if (own == other) faces.within[next_within[own]++] = i;
   }
 }
 

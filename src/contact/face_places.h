@@ -45,27 +45,36 @@ inline bool has_whole_rows(const CellNodes& cell) {
   return whole;
 }
 
-/// Displacement of a place in a cell.
-inline void displacement_at(const Nodes& nodes, const CellNodes& cell, bool has_whole_rows,
-                            const AxisWeights& weights, float (&value)[3]) {
-  if (!has_whole_rows) {
-    value_at(CellField{nodes.u, cell}, weights, value);
-    return;
-  }
+/// Displacement of a place in a cell: row(i, c) is component c of the nodes of row y + 3 z, three
+/// and a fourth that does not count.
+template <class Row>
+TISSUE_SIM_INLINE void sum_rows(const AxisWeights& weights, float (&value)[3], const Row& row) {
   const float *wx = weights.of, *wy = wx + 3, *wz = wx + 6;
-  const float *ux = nodes.u[0].data(), *uy = nodes.u[1].data(), *uz = nodes.u[2].data();
-  // Sums over rows, each of three nodes and a fourth that does not count.
   Vec<4> x = {}, y = {}, z = {};
   for (int i = 0; i < 9; ++i) {
-    const std::int32_t n = cell.lowest[i / 3 * cell.plane + i % 3 * cell.pitch];
     const float w = wz[i / 3] * wy[i % 3];
-    x += w * load<4>(ux + n);
-    y += w * load<4>(uy + n);
-    z += w * load<4>(uz + n);
+    x += w * row(i, 0);
+    y += w * row(i, 1);
+    z += w * row(i, 2);
   }
   value[0] = wx[0] * x[0] + wx[1] * x[1] + wx[2] * x[2];
   value[1] = wx[0] * y[0] + wx[1] * y[1] + wx[2] * y[2];
   value[2] = wx[0] * z[0] + wx[1] * z[1] + wx[2] * z[2];
+}
+
+/// The same from the nodes themselves: all ways to get there have the same bits.
+inline void displacement_at(const Nodes& nodes, const CellNodes& cell, bool has_whole_rows,
+                            const AxisWeights& weights, float (&value)[3]) {
+  const float* const u[3] = {nodes.u[0].data(), nodes.u[1].data(), nodes.u[2].data()};
+  const auto first = [&cell](int i) { return cell.row(i % 3, i / 3); };
+  if (has_whole_rows) {
+    sum_rows(weights, value, [&](int i, int c) { return load<4>(u[c] + *first(i)); });
+  } else {
+    sum_rows(weights, value, [&](int i, int c) {
+      const std::int32_t* n = first(i);
+      return Vec<4>{u[c][n[0]], u[c][n[1]], u[c][n[2]], 0.0f};
+    });
+  }
 }
 
 /// The places of a contact on the CPU: see push_face().
@@ -87,6 +96,24 @@ struct ContactPlaces {
   }
   float held_mobility() const {
     return static_cast<float>(mobility(nodes, contact.other_nodes, contact.other_weights));
+  }
+};
+
+/// The same of a contact within a block, whose nodes BlockKernels::gather() copied.
+struct PlacesInBlock : ContactPlaces {
+  const Block& block;
+  const float* u;
+
+  void own(float (&value)[3]) const { displacement(contact.nodes, contact.weights, value); }
+  void held(float (&value)[3]) const {
+    displacement(contact.other_nodes, contact.other_weights, value);
+  }
+  void displacement(const CellNodes& cell, const AxisWeights& weights, float (&value)[3]) const {
+    const float* const lowest = u + (cell.lowest - block.node.data());
+    const int component = block.copied_component(), pitch = block.pitch, plane = block.plane;
+    sum_rows(weights, value, [=](int i, int c) {
+      return load<4>(lowest + c * component + i / 3 * plane + i % 3 * pitch);
+    });
   }
 };
 

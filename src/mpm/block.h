@@ -44,11 +44,11 @@ struct Block {
   struct Span {
     int begin, end;
   };
-  /// Nodes that the runs see, in a row along x and numbered one after the other.
+  /// Nodes that the runs see, in a row along x and numbered one after the other, as this block sees
+  /// them: lattice nodes, or fields of nodes that cuts made.
   struct NodeRow {
     int local, count;  ///< the first of them in the block's nodes: z * plane + y * pitch + x
-    int node;          ///< the same in Nodes (before any split), -1 where no point sees them
-    int stretch;       ///< of LatticeBody::nodes
+    int node;          ///< the same in Nodes, -1 where no point sees them
   };
   std::vector<NodeRow> node_rows;         ///< in the order of the block's nodes
   std::vector<std::vector<Span>> filled;  ///< [nz]: lanes whose cells hold points, in order
@@ -82,15 +82,6 @@ struct Block {
   };
   std::vector<PartialCell> partial;
 
-  /// Nodes of the block that are not the lattice's own, for the tissue is cut there: the field that
-  /// this block's points see instead.
-  struct SplitNodes {
-    int local;  ///< the first, in the block's nodes: z * plane + y * pitch + x
-    int node;   ///< in Nodes
-    int count;  ///< of those that follow one another along x, in both
-  };
-  std::vector<SplitNodes> split_nodes;  ///< by `local`
-
   std::vector<std::int32_t>
       node;  ///< [nz + 2][plane], in Nodes, -1 for none; split ones as this block sees them
 
@@ -107,6 +98,8 @@ struct Block {
   std::size_t force_offset = 0;  ///< of this block's [3][nz + 2][plane] in the force buffer
 
   int node_count() const { return (nz + 2) * plane; }
+  /// Floats of one component of its nodes where a kernel copied them: whole vectors reach beyond.
+  int copied_component() const { return node_count() + 2 * kLanes; }
   /// That of `sides` which has a column of nodes.
   const Side& side_at(int column) const {
     return *(std::upper_bound(sides.begin() + 1, sides.end(), column,

@@ -56,17 +56,12 @@ TISSUE_SIM_INLINE void viscous_stress(const Block& b, const BlockField& f, const
   add_viscous_stress(F, rate, 0.125f * viscosity, P);
 }
 
-/// Leaves displacement gradients of 0 in lanes whose cells hold no point. Between two pieces they
-/// see nodes of both, and of how far apart these are a law may make what is no number: times a
-/// volume of 0 it stays none.
+/// Which of W cells hold points.
 template <int W>
-TISSUE_SIM_INLINE void clear_empty(const float* volume, int stride, Vec<W> (&G)[8][9]) {
+TISSUE_SIM_INLINE Mask<W> filled_lanes(const float* volume, int stride) {
   Vec<W> filled = load<W>(volume);
   for (int s = 1; s < 8; ++s) filled += load<W>(volume + s * stride);
-  const Mask<W> holds = -bits<W>(filled) >> 31;
-  for (Vec<W>(&of_point)[9] : G) {
-    for (Vec<W>& g : of_point) g = keep<W>(holds, g);
-  }
+  return -bits<W>(filled) >> 31;
 }
 
 /// Stress of the cells in W lanes, `whole` if all of them hold points, from the incoming x-y
@@ -80,8 +75,13 @@ TISSUE_SIM_INLINE void stress_lanes(const Block& b, const BlockField& f, const L
   // Eight streams, each too short for the processor to foresee: on their way while gradients are
   // worked out.
   for (int s = 0; s < 8; ++s) __builtin_prefetch(b.volume.data() + lane + s * l.stride);
-  gradients<W>(l, in, z, j, G);
-  if (!whole) clear_empty<W>(b.volume.data() + lane, l.stride, G);
+  if (whole) {
+    gradients<W>(l, in, z, j, G);
+  } else {
+    // Between two pieces, lanes without a point see nodes of both, and of how far apart these are a
+    // law may make what is no number: times a volume of 0 it stays none.
+    gradients<W, true>(l, in, z, j, G, filled_lanes<W>(b.volume.data() + lane, l.stride));
+  }
   if (viscous) viscous_stress<W, Materials>(b, f, l, in, in_rate, z, j, damping);
   constexpr int kTogether = 4;  // points whose stretch is worked out side by side
   for (int first = 0; first < 8; first += kTogether) {
@@ -109,15 +109,20 @@ TISSUE_SIM_INLINE void forces(const Block& b, const BlockField& f, BlockScratch&
                               float* force) {
   const Layout l(b);
   const float inv_h = 1.0f / f.cell_size;
-  reserve(scratch.nodes, 3 * l.node_component);
   reserve(scratch.in, 3 * l.in_plane);
   reserve(scratch.out, 3 * l.out_plane + kLanes);
   reserve(scratch.row, 3 * l.sum_component);
-  gather_nodes<W>(b, f.nodes->u, inv_h, l, scratch.nodes.data());
+  if (f.has_nodes) {
+    float* const nodes = scratch.nodes.data();
+    for (int i = 0; i < 3 * l.node_component; i += W) {
+      store<W>(nodes + i, inv_h * load<W>(nodes + i));
+    }
+  } else {
+    gather_nodes<W>(b, f.nodes->u, inv_h, l, scratch.nodes);
+  }
   if (viscous) {
-    reserve(scratch.velocities, 3 * l.node_component);
     reserve(scratch.in_rate, 9 * kMeanXyCount * l.quantity);
-    gather_nodes<W>(b, f.nodes->v, inv_h, l, scratch.velocities.data());
+    gather_nodes<W>(b, f.nodes->v, inv_h, l, scratch.velocities);
   }
   float* out = scratch.out.data();
   std::fill_n(out, 2 * l.out_plane, 0.0f);

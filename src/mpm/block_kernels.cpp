@@ -62,6 +62,10 @@ TISSUE_SIM_INLINE void update_row(const NodeRow& row, const RowPart* parts, cons
 }
 
 #define TISSUE_SIM_KERNELS(suffix, W, target)                                                     \
+  target const float* gather_##suffix(const Block& b, const Array<float>* u, BlockScratch& s) {   \
+    gather_nodes<W>(b, u, 1.0f, Layout(b), s.nodes);                                              \
+    return s.nodes.data();                                                                        \
+  }                                                                                               \
   target void forces_##suffix(const Block& b, const BlockField& f, BlockScratch& s, float* out) { \
     forces_any<W>(b, f, s, out);                                                                  \
   }                                                                                               \
@@ -106,16 +110,16 @@ TISSUE_SIM_KERNELS(avx512, 16, TISSUE_SIM_TARGET_AVX512)
 }  // namespace
 
 const BlockKernels& block_kernels(InstructionSet set) {
-  static constexpr BlockKernels sse2 = {forces_sse2,       positions_sse2,  bounds_sse2,
-                                        lanes_in_box_sse2, lanes_near_sse2, update_row_sse2,
-                                        state_sse2,        stiffness_sse2,  stretched_sse2};
+  static constexpr BlockKernels sse2 = {
+      gather_sse2,     forces_sse2,     positions_sse2, bounds_sse2,    lanes_in_box_sse2,
+      lanes_near_sse2, update_row_sse2, state_sse2,     stiffness_sse2, stretched_sse2};
 #if defined(__x86_64__)
-  static constexpr BlockKernels avx2 = {forces_avx2,       positions_avx2,  bounds_avx2,
-                                        lanes_in_box_avx2, lanes_near_avx2, update_row_avx2,
-                                        state_avx2,        stiffness_avx2,  stretched_avx2};
-  static constexpr BlockKernels avx512 = {forces_avx512,       positions_avx512,  bounds_avx512,
-                                          lanes_in_box_avx512, lanes_near_avx512, update_row_avx512,
-                                          state_avx512,        stiffness_avx512,  stretched_avx512};
+  static constexpr BlockKernels avx2 = {
+      gather_avx2,     forces_avx2,     positions_avx2, bounds_avx2,    lanes_in_box_avx2,
+      lanes_near_avx2, update_row_avx2, state_avx2,     stiffness_avx2, stretched_avx2};
+  static constexpr BlockKernels avx512 = {
+      gather_avx512,     forces_avx512,     positions_avx512, bounds_avx512,    lanes_in_box_avx512,
+      lanes_near_avx512, update_row_avx512, state_avx512,     stiffness_avx512, stretched_avx512};
   if (set == InstructionSet::kAvx512) return avx512;
   if (set == InstructionSet::kAvx2) return avx2;
 #endif

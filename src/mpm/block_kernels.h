@@ -25,6 +25,7 @@ struct BlockField {
       material;              ///< of each point, Points::material; null where none has inclusions
   const std::uint8_t* soft;  ///< of each point, Points::soft; null where none is
   int material_count;        ///< of the body
+  bool has_nodes = false;    ///< whether the kernel finds what gather() left in its scratch
 };
 
 /// The same block on a lattice of no size: positions() then gives values.
@@ -72,6 +73,9 @@ struct BlockState {
 };
 
 struct BlockKernels {
+  /// Copies the displacements of the block's nodes into the scratch, where forces() can use them:
+  /// [3][nz + 2][plane], Block::copied_component() floats from one component to the next. [m]
+  const float* (*gather)(const Block&, const Array<float>* u, BlockScratch&);
   /// Internal force on the block's nodes, [3][nz + 2][plane] (components as planes of their own):
   /// f_i = -sum_p V_p P(F_p) grad w_ip. [N]
   void (*forces)(const Block&, const BlockField&, BlockScratch&, float* force);

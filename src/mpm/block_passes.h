@@ -158,16 +158,18 @@ TISSUE_SIM_INLINE void mean_gradient(const std::array<const float*, 3>& AA,
 
 /// z pass and points: gradient of one component at the 8 points of W cells. `q0`, `q1`, `q2` are
 /// the x-y quantities of the node planes below, at and above, `stride` floats apart. The result
-/// goes to G[point][9], rows `3 * component` on; point = sx + 2 sy + 4 sz.
-template <int W>
+/// goes to G[point][9], rows `3 * component` on; point = sx + 2 sy + 4 sz. With `some` it is 0 in
+/// lanes that do not hold points.
+template <int W, bool some = false>
 TISSUE_SIM_INLINE void gradient(const float* q0, const float* q1, const float* q2, int stride,
-                                int component, Vec<W> (*G)[9]) {
+                                int component, Vec<W> (*G)[9], Mask<W> holds = Mask<W>{}) {
   using V = Vec<W>;
   V w[2][kStressXyCount], s[2][kStressXyCount];  // values and slopes along z at the two points
   for (int k = 0; k < kStressXyCount; ++k) {
     const V minus = load<W>(q0 + k * stride), center = load<W>(q1 + k * stride),
             plus = load<W>(q2 + k * stride);
-    const Line<V> l(minus, center, plus);
+    Line<V> l(minus, center, plus);
+    if (some) l.A = keep<W>(holds, l.A), l.d = keep<W>(holds, l.d), l.B = keep<W>(holds, l.B);
     if (k != kAA) {
       w[0][k] = l.A - 0.125f * l.d;
       w[1][k] = l.A + 0.125f * l.d;

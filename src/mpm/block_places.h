@@ -36,9 +36,8 @@ template <int W, class F>
 TISSUE_SIM_INLINE void for_each_place(const Block& b, const BlockField& f, const Array<float>* u,
                                       BlockScratch& scratch, const F& visit) {
   const Layout l(b);
-  reserve(scratch.nodes, 3 * l.node_component);
   reserve(scratch.in, 3 * l.in_plane);
-  gather_nodes<W>(b, u, 1.0f, l, scratch.nodes.data());
+  gather_nodes<W>(b, u, 1.0f, l, scratch.nodes);
   add_reference(b, f, l, scratch.nodes.data());
   const int in_plane = 3 * kValueXyCount * l.quantity;
   const float* in = scratch.in.data();

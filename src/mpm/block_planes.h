@@ -25,7 +25,7 @@ struct Layout {
       : pitch(b.pitch),
         stride(b.stride),
         plane(b.plane),
-        node_component((b.nz + 2) * b.plane + 2 * kLanes),
+        node_component(b.copied_component()),
         quantity(b.stride + kLanes),
         in_plane(3 * kStressXyCount * quantity),
         out_plane(in_plane + kLanes),
@@ -50,24 +50,24 @@ TISSUE_SIM_INLINE void scale_row(const float* from, float scale, int count, floa
   }
 }
 
-/// Copies the block's nodes of `field`, times `scale`, into [3][nz + 2][plane].
+/// Copies the block's nodes of `field`, times `scale`, into `copy`: [3][nz + 2][plane]. In whole
+/// vectors, for many rows are shorter: what is behind a row is of one that follows, or of none.
 template <int W>
 TISSUE_SIM_INLINE void gather_nodes(const Block& b, const Array<float>* field, float scale,
-                                    const Layout& l, float* out) {
+                                    const Layout& l, Array<float>& copy) {
+  reserve(copy, 3 * l.node_component);
+  float* const out = copy.data();
   const float* from[3] = {field[0].data(), field[1].data(), field[2].data()};
   for (const Block::NodeRow& row : b.node_rows) {
-    for (int c = 0; c < 3; ++c) {
-      float* to = out + c * l.node_component + row.local;
-      if (row.node < 0) {
-        std::fill_n(to, row.count, 0.0f);
-      } else {
-        scale_row<W>(from[c] + row.node, scale, row.count, to);
-      }
+    float* to = out + row.local;
+    if (row.node < 0) {
+      for (int c = 0; c < 3; ++c) std::fill_n(to + c * l.node_component, row.count, 0.0f);
+      continue;
     }
-  }
-  for (const Block::SplitNodes& s : b.split_nodes) {
-    for (int c = 0; c < 3; ++c) {
-      scale_row<W>(from[c] + s.node, scale, s.count, out + c * l.node_component + s.local);
+    for (int i = 0; i < row.count; i += W) {
+      for (int c = 0; c < 3; ++c) {
+        store<W>(to + c * l.node_component + i, scale * load<W>(from[c] + row.node + i));
+      }
     }
   }
 }
@@ -143,12 +143,14 @@ TISSUE_SIM_INLINE void store_plane(const Block& b, const Layout& l, const float*
   }
 }
 
-template <int W>
-TISSUE_SIM_INLINE void gradients(const Layout& l, const float* in, int z, int j, Vec<W> (*G)[9]) {
+/// As gradient() has it, of all components.
+template <int W, bool some = false>
+TISSUE_SIM_INLINE void gradients(const Layout& l, const float* in, int z, int j, Vec<W> (*G)[9],
+                                 Mask<W> holds = Mask<W>{}) {
   for (int c = 0; c < 3; ++c) {
     const float* q = in + c * kStressXyCount * l.quantity + j;
-    gradient<W>(q + (z % 3) * l.in_plane, q + ((z + 1) % 3) * l.in_plane,
-                q + ((z + 2) % 3) * l.in_plane, l.quantity, c, G);
+    gradient<W, some>(q + (z % 3) * l.in_plane, q + ((z + 1) % 3) * l.in_plane,
+                      q + ((z + 2) % 3) * l.in_plane, l.quantity, c, G, holds);
   }
 }
 

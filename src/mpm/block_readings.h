@@ -99,9 +99,8 @@ template <int W, class F>
 TISSUE_SIM_INLINE void for_each_gradient(const Block& b, const BlockField& f, BlockScratch& scratch,
                                          const F& visit) {
   const Layout l(b);
-  reserve(scratch.nodes, 3 * l.node_component);
   reserve(scratch.in, 3 * l.in_plane);
-  gather_nodes<W>(b, f.nodes->u, 1.0f / f.cell_size, l, scratch.nodes.data());
+  gather_nodes<W>(b, f.nodes->u, 1.0f / f.cell_size, l, scratch.nodes);
   for (int z = 0; z < 2; ++z) load_plane<W>(b, l, scratch.nodes.data(), z, scratch.in.data());
   for (int z = 0; z < b.nz; ++z) {
     load_plane<W>(b, l, scratch.nodes.data(), z + 2, scratch.in.data());

@@ -69,77 +69,41 @@ void connect_forces(Blocks& blocks, const std::vector<LatticeBody>& bodies, int 
   if (!blocks.has_rows) return;
   list_by_cost(blocks);
   struct Entry {
-    int row;  // of lattice nodes, counted through all bodies; then of split ones
+    int row;
     RowPart part;
   };
   std::vector<Entry> entries;
-  std::vector<int> first_row;  // of each body: a row is a stretch of its nodes
-  int split_row = 0;           // the first of split nodes
-  for (const LatticeBody& b : bodies) {
-    first_row.push_back(split_row);
-    split_row += static_cast<int>(b.nodes.stretches().size());
-  }
   for (const Block* block : blocks.all) {
-    const LatticeBody& b = bodies[block->body];
     const std::size_t component = block->node_count();
-    const auto add = [&](int row, int begin, int local, int count) {
-      if (count <= 0) return;
-      entries.push_back({row, {block->force_offset + local, component, begin, count}});
-    };
-    const std::vector<Block::SplitNodes>& split = block->split_nodes;
-    std::size_t next = 0;
     for (const Block::NodeRow& r : block->node_rows) {
-      if (r.node < 0) continue;
-      // A row without the nodes that this block sees split: parts between them.
-      const int row = first_row[block->body] + r.stretch, row_end = r.local + r.count;
-      const int to_row = r.node - b.first_node - b.nodes.stretches()[r.stretch].first - r.local;
-      int local = r.local;
-      for (; next < split.size() && split[next].local < row_end; ++next) {
-        const Block::SplitNodes& s = split[next];
-        const int first = std::max(local, s.local), end = std::min(row_end, s.local + s.count);
-        if (first < end) {
-          add(row, to_row + local, local, first - local);
-          for (local = first; local < end;) {
-            const int node = s.node + local - s.local - blocks.first_split_node;
-            const int begin = node % kSplitRow, count = std::min(end - local, kSplitRow - begin);
-            add(split_row + node / kSplitRow, begin, local, count);
-            local += count;
-          }
-        }
-        if (s.local + s.count > row_end) break;
+      for (int i = 0; r.node >= 0 && i < r.count;) {
+        const int node = r.node + i, begin = node % kNodeRow;
+        const int count = std::min(r.count - i, kNodeRow - begin);
+        const std::size_t force = block->force_offset + r.local + i;
+        entries.push_back({node / kNodeRow, {force, component, begin, count}});
+        i += count;
       }
-      add(row, to_row + local, local, row_end - local);
     }
   }
   // Those of a row one after the other, in the order of the blocks.
-  const int split_count = node_count - blocks.first_split_node;
-  const int row_count = split_row + (split_count + kSplitRow - 1) / kSplitRow;
+  const int row_count = (node_count + kNodeRow - 1) / kNodeRow;
   std::vector<int> end_of(row_count + 1, 0);  // first, then end of each row's
   for (const Entry& e : entries) ++end_of[e.row + 1];
   std::partial_sum(end_of.begin(), end_of.end(), end_of.begin());
   blocks.row_parts.resize(entries.size());
   for (const Entry& e : entries) blocks.row_parts[end_of[e.row]++] = e.part;
   blocks.rows.clear();
-  int begin = 0;
-  const auto add_row = [&](int row, int first_node) {
+  for (int row = 0, begin = 0; row < row_count; begin = end_of[row++]) {
     const int end = end_of[row];
-    int lo = 1 << 30, hi = 0;
+    int lo = kNodeRow, hi = 0;
     for (int i = begin; i < end; ++i) {
       const RowPart& part = blocks.row_parts[i];
       lo = std::min(lo, part.begin);
       hi = std::max(hi, part.begin + part.count);
     }
     for (int i = begin; i < end; ++i) blocks.row_parts[i].begin -= lo;
-    if (end > begin) blocks.rows.push_back({first_node + lo, hi - lo, begin, end - begin});
-    begin = end;
-  };
-  int row = 0;
-  for (const LatticeBody& b : bodies) {
-    for (const LatticeRows::Stretch& stretch : b.nodes.stretches()) {
-      add_row(row++, b.first_node + stretch.first);
-    }
+    if (end > begin) blocks.rows.push_back({row * kNodeRow + lo, hi - lo, begin, end - begin});
   }
-  for (int i = 0; i < split_count; i += kSplitRow) add_row(row++, blocks.first_split_node + i);
 }
 
 /// Makes the blocks of some regions anew, then block by block their facets; meanwhile connects the

@@ -18,13 +18,13 @@ struct BlockRegion {
   std::vector<Block> blocks;
 };
 
-/// Forces on one row of lattice nodes, or of kSplitRow nodes that cuts made: the sum of parts of
-/// the force buffer, in this order.
+/// Forces on up to kNodeRow nodes that follow one another, a vector: the sum of parts of the force
+/// buffer, in this order.
 struct NodeRow {
   int first_node, count;
   int first_part, part_count;
 };
-inline constexpr int kSplitRow = 16;
+inline constexpr int kNodeRow = kLanes;  ///< from a multiple of it on
 struct RowPart {
   std::size_t force;      ///< offset of component x in the force buffer
   std::size_t component;  ///< offset to the next component

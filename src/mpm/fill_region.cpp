@@ -67,19 +67,19 @@ void find_nodes(Block& block, const LatticeBody& b) {
       const Block::Side& side = block.sides[i % sides];
       const int x0 = side.x - 1 - side.column;
       int next = seen[i].begin;
-      const auto add = [&](int end, int node, int stretch) {
-        if (end > next) block.node_rows.push_back({row + next, end - next, node, stretch});
+      const auto add = [&](int end, int node) {
+        if (end > next) block.node_rows.push_back({row + next, end - next, node});
         next = std::max(next, end);
       };
       b.for_each_node_in_row(side.x - 1, side.x - 1 + side.count, block.y + y - 1, block.z + z - 1,
-                             [&](int x, int node, int count, int stretch) {
+                             [&](int x, int node, int count, int) {
                                const int begin = x - x0, end = begin + count;
                                const auto to = block.node.begin() + row + begin;
                                std::iota(to, to + count, node);
-                               add(std::min(begin, seen[i].end), -1, -1);
-                               add(std::min(end, seen[i].end), node + next - begin, stretch);
+                               add(std::min(begin, seen[i].end), -1);
+                               add(std::min(end, seen[i].end), node + next - begin);
                              });
-      add(seen[i].end, -1, -1);
+      add(seen[i].end, -1);
     }
   }
 }
@@ -113,13 +113,13 @@ void fill_side(Block& block, const LatticeBody& b, const Points& points, const P
   }
 }
 
-/// The nodes of row y of z-plane z that are split, as a side sees them.
+/// Adds the nodes of row y of z-plane z that are split, as a side sees them, to `split`.
 void split_row(Block& block, const BlockRegion& r, const Part& part, const Block::Side& side, int y,
-               int z) {
+               int z, std::vector<Block::NodeRow>& split) {
   const std::vector<std::int32_t>& field = part.sheet->node;
   if (field.empty()) return;
   const int first = ((part.lo[2] + z) * (r.ny + 2) + block.y - r.y + y) * (r.nx + 2) + part.lo[0];
-  Block::SplitNodes* last = nullptr;
+  Block::NodeRow* last = nullptr;
   for (int x = 0; x < side.count; ++x) {
     const int local = z * block.plane + y * block.pitch + side.column + x;
     const std::int32_t node = field[first + x];
@@ -129,9 +129,41 @@ void split_row(Block& block, const BlockRegion& r, const Part& part, const Block
       ++last->count;
       continue;
     }
-    block.split_nodes.push_back({local, node, 1});
-    last = &block.split_nodes.back();
+    split.push_back({local, 1, node});
+    last = &split.back();
   }
+}
+
+/// The rows, but where nodes are `split` those that stand there instead. Both in the order of the
+/// block's nodes.
+std::vector<Block::NodeRow> with_split(const std::vector<Block::NodeRow>& rows,
+                                       const std::vector<Block::NodeRow>& split) {
+  std::vector<Block::NodeRow> all;
+  all.reserve(rows.size() + 2 * split.size());
+  const auto add = [&all](const Block::NodeRow& r, int begin, int end) {
+    if (begin < end) all.push_back({begin, end - begin, r.node + begin - r.local});
+  };
+  std::size_t next = 0;
+  for (const Block::NodeRow& row : rows) {
+    int local = row.local;
+    const int row_end = local + row.count;
+    if (row.node < 0) {
+      all.push_back(row);
+      continue;
+    }
+    for (; next < split.size() && split[next].local < row_end; ++next) {
+      const Block::NodeRow& s = split[next];
+      const int begin = std::max(local, s.local), end = std::min(row_end, s.local + s.count);
+      if (begin < end) {
+        add(row, local, begin);
+        add(s, begin, end);
+        local = end;
+      }
+      if (s.local + s.count > row_end) break;
+    }
+    add(row, local, row_end);
+  }
+  return all;
 }
 
 /// The block of parts between the same z-planes, no larger than their points need.
@@ -173,13 +205,15 @@ Block make_block(const BlockRegion& r, const LatticeBody& b, const Points& point
             [](const auto& p, const auto& q) { return p.lane < q.lane; });
   find_materials(block, b, points);
   find_nodes(block, b);
+  std::vector<Block::NodeRow> split;
   for (int z = 0; z < block.nz + 2; ++z) {
     for (int y = 0; y < block.ny + 2; ++y) {
       for (std::size_t i = 0; i < parts.size(); ++i) {
-        split_row(block, r, parts[i], block.sides[i], y, z);
+        split_row(block, r, parts[i], block.sides[i], y, z, split);
       }
     }
   }
+  if (!split.empty()) block.node_rows = with_split(block.node_rows, split);
   return block;
 }
 

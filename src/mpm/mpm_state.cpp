@@ -100,13 +100,19 @@ float substep(MpmState& state, float dt, std::vector<ColliderLoad>& loads) {
   const auto work_on_block = [&](int i) {
     const Block& block = *blocks.all[i];
     float* force = state.force.data() + block.force_offset;
-    state.kernels->forces(block, block_field(state, block), state.scratch.local(), force);
+    BlockField field = block_field(state, block);
+    BlockScratch& scratch = state.scratch.local();
+    if (!faces.active.empty() && faces.first_within[i] < faces.first_within[i + 1]) {
+      push_faces_within(state, i, dt, state.kernels->gather(block, state.nodes.u, scratch));
+      field.has_nodes = true;
+    }
+    state.kernels->forces(block, field, scratch, force);
     state.block_loads[i].assign(collider_count, {});
     if (list) list_near_cells(state, i, dt);
     add_contact(state, i, dt, force, state.block_loads[i]);
     if (faces.active.empty()) return;
     pushes.wait();
-    add_face_contacts(state, i, dt, force);
+    add_face_contacts(state, i, force);
   };
   state.cpu->on_each_thread([&] {
     pushes.help([&](int i) { push_faces(state, faces.all[faces.between[i]], dt); });

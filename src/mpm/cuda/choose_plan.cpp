@@ -92,8 +92,10 @@ double cycles(const std::vector<LatticeBody>& bodies, const std::vector<BlockCou
   const int each = std::max(1, std::min(by_registers, by_shared));
   const auto at_once = static_cast<std::size_t>(each) * limits.processors;
   double waves = std::ceil(blocks / static_cast<double>(at_once));
-  // Cuts add blocks: no second round for a few of them. Other bodies bundle theirs anyway.
-  if (!whole && fill_boxes && waves == 1 && 1.1 * blocks > static_cast<double>(at_once)) waves = 2;
+  // Cuts add blocks: no second round for a few of them. Large tissue has room to bundle more of
+  // them; bodies that do not fill their boxes bundle theirs anyway.
+  const double with_cuts = (s.small ? 1.1 : 1.05) * blocks;
+  if (!whole && fill_boxes && waves == 1 && with_cuts > static_cast<double>(at_once)) waves = 2;
   bool share = false;  // blocks share thread blocks
   if (!fill_boxes) {
     if (each > 1 || b.y > b.x) return 1e30;  // no better where it was measured

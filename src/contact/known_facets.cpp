@@ -13,7 +13,7 @@ KnownFacets::KnownFacets(const LatticeBody& body, const BlockRegion& region,
   stale_.assign(count, 0);
   for (int z = z_; z < z_ + region.nz; ++z) {
     for (int y = y_; y < y_ + ny_; ++y) {
-      body.for_each_node_in_row(x_, x_ + nx_, y, z, [&](int x, int node, int of_row, int) {
+      body.for_each_node_in_row(x_, x_ + nx_, y, z, [&](int x, int node, int of_row) {
         std::copy_n(stale.begin() + node, of_row, stale_.begin() + index(x, y, z));
       });
     }

@@ -23,7 +23,7 @@ class CellsAround {
       for (int y = 0; y < n_[1]; ++y) {
         const std::uint8_t* row = &near_[(static_cast<std::size_t>(z) * n_[1] + y) * n_[0]];
         body_.for_each_node_in_row(low_[0], low_[0] + n_[0], low_[1] + y, low_[2] + z,
-                                   [&](int x, int node, int count, int) {
+                                   [&](int x, int node, int count) {
                                      f(x, low_[1] + y, low_[2] + z, node, row + x - low_[0], count);
                                    });
       }

@@ -181,7 +181,7 @@ void update_blocks(Blocks& blocks, const std::vector<LatticeBody>& bodies, const
     const LatticeBody& b = bodies[r.body];
     for (int z = r.z; z < r.z + r.nz; ++z) {
       for (int y = r.y; y < r.y + r.ny; ++y) {
-        b.for_each_node_in_row(r.x, r.x + r.nx, y, z, [&](int, int first, int count, int) {
+        b.for_each_node_in_row(r.x, r.x + r.nx, y, z, [&](int, int first, int count) {
           std::fill_n(blocks.stale_facets.begin() + first, count, std::uint8_t{0});
         });
       }

@@ -72,7 +72,7 @@ void find_nodes(Block& block, const LatticeBody& b) {
         next = std::max(next, end);
       };
       b.for_each_node_in_row(side.x - 1, side.x - 1 + side.count, block.y + y - 1, block.z + z - 1,
-                             [&](int x, int node, int count, int) {
+                             [&](int x, int node, int count) {
                                const int begin = x - x0, end = begin + count;
                                const auto to = block.node.begin() + row + begin;
                                std::iota(to, to + count, node);

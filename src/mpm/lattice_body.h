@@ -92,7 +92,7 @@ struct LatticeBody {
   /// them from x on, numbered from `point` on.
   template <class F>
   void for_each_point_in_row(int x_begin, int x_end, int y, int z, const F& f) const {
-    points.for_each_in_row(x_begin, x_end, y, z, [&](int x, int number, int count, int) {
+    points.for_each_in_row(x_begin, x_end, y, z, [&](int x, int number, int count) {
       f(x, first_point + number, count);
     });
   }
@@ -105,20 +105,19 @@ struct LatticeBody {
     const int number = nodes.number(x, y, z);
     return number < 0 ? -1 : first_node + number;
   }
-  /// Calls f(x, node, count, stretch) for the nodes of the cells x_begin .. x_end - 1 of a row:
-  /// `count` of them from x on, numbered from `node` on, in that stretch of `nodes`.
+  /// Calls f(x, node, count) for the nodes of the cells x_begin .. x_end - 1 of a row: `count` of
+  /// them from x on, numbered from `node` on.
   template <class F>
   void for_each_node_in_row(int x_begin, int x_end, int y, int z, const F& f) const {
-    nodes.for_each_in_row(x_begin, x_end, y, z, [&](int x, int number, int count, int stretch) {
-      f(x, first_node + number, count, stretch);
-    });
+    nodes.for_each_in_row(x_begin, x_end, y, z,
+                          [&](int x, int number, int count) { f(x, first_node + number, count); });
   }
   /// Calls f(node, x, y, z) for all lattice nodes, in order.
   template <class F>
   void for_each_node(const F& f) const {
     for (int z = -1; z <= nz; ++z) {
       for (int y = -1; y <= ny; ++y) {
-        for_each_node_in_row(-1, nx + 1, y, z, [&](int x, int node, int count, int) {
+        for_each_node_in_row(-1, nx + 1, y, z, [&](int x, int node, int count) {
           for (int i = 0; i < count; ++i) f(node + i, x + i, y, z);
         });
       }

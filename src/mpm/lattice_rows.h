@@ -33,15 +33,14 @@ class LatticeRows {
   }
 
   int count() const { return count_; }
-  const std::vector<Stretch>& stretches() const { return stretches_; }
   /// Number of a place, -1 where there is none.
   int number(int x, int y, int z) const {
     int result = -1;
-    for_each_in_row(x, x + 1, y, z, [&](int, int number, int, int) { result = number; });
+    for_each_in_row(x, x + 1, y, z, [&](int, int number, int) { result = number; });
     return result;
   }
-  /// Calls f(x, number, count, stretch) for the places x_begin .. x_end - 1 of a row that are
-  /// there: `count` of them from x on, with numbers from `number` on, in that one of stretches().
+  /// Calls f(x, number, count) for the places x_begin .. x_end - 1 of a row that are there: `count`
+  /// of them from x on, with numbers from `number` on.
   template <class F>
   void for_each_in_row(int x_begin, int x_end, int y, int z, const F& f) const {
     y -= lowest_;
@@ -52,7 +51,7 @@ class LatticeRows {
     for (int i = first_[row]; i < first_[row + 1]; ++i) {
       const Stretch& s = stretches_[i];
       const int begin = std::max(x_begin, s.begin), end = std::min(x_end, s.end);
-      if (begin < end) f(begin, s.first + begin - s.begin, end - begin, i);
+      if (begin < end) f(begin, s.first + begin - s.begin, end - begin);
     }
   }
 

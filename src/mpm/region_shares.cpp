@@ -56,7 +56,7 @@ RegionShares::RegionShares(const BlockRegion& r, const LatticeBody& b, const Poi
     for (int y = 0; y < py; ++y) {
       const int row = (z * py + y) * px, x0 = r.x - 1;
       b.for_each_node_in_row(x0, x0 + px, r.y + y - 1, r.z + z - 1,
-                             [&](int x, int node, int count, int) {
+                             [&](int x, int node, int count) {
                                for (int i = 0; i < count; ++i) {
                                  const NodeFields::Split* split = fields.split(node + i);
                                  split_[row + x - x0 + i] = split;

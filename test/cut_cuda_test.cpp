@@ -93,6 +93,48 @@ TEST_F(CutOnGpu, TissueMovesOnAsBeforeWhereTheFirstCutDividesItAnew) {
   EXPECT_LT(worst, 1e-7);
 }
 
+TEST_F(CutOnGpu, TissueMovesOnAsBeforeWhereRegionsAreHalvedAndJoinedAgain) {
+  cudaDeviceProp gpu;
+  ASSERT_EQ(cudaGetDeviceProperties(&gpu, 0), cudaSuccess);
+  if (gpu.multiProcessorCount < 100) GTEST_SKIP() << "too few multiprocessors to halve regions";
+  Scene scene = held_body(Law::kFixedCorotated, 0, Shape::kBox);
+  scene.cell_size = 0.001;
+  scene.bodies[0].size = Vec3(0.040, 0.040, 0.018);
+  std::vector<bool> halved;
+  const auto run = [&](const char* shape) {
+    setenv("TISSUE_SIM_CUDA_SHAPE", shape, 1);
+    CudaMpmTissue tissue(scene);
+    prepare(tissue, 2e-5);
+    halved.clear();
+    const float dt = 0.2f * tissue.stable_substep();
+    for (int cut = 0; cut < 4; ++cut) {
+      const Vec3 normal = cut % 2 == 0 ? Vec3(0.1, 1, 0.2) : Vec3(1, 0.1, 0.2);
+      const double at = 0.005 + 0.01 * (cut / 2);
+      EXPECT_GT(cut_now(tissue, plane_cut(Vec3(at, at, 0.009), normal)).bonds_broken, 0);
+      tissue.advance(10, dt, {});
+      tissue.finish();
+      const std::vector<BlockRegion>& all = tissue.state().blocks.regions;
+      halved.push_back(
+          std::any_of(all.begin(), all.end(), [](const BlockRegion& r) { return r.half; }));
+    }
+    std::printf("%s\n", tissue.plan().c_str());
+    unsetenv("TISSUE_SIM_CUDA_SHAPE");
+    return positions(tissue);
+  };
+  const auto whole = run("6 5 4 96 0");  // more blocks than there are multiprocessors
+  EXPECT_EQ(std::count(halved.begin(), halved.end(), true), 0);
+  const auto halves = run("10 10 6 128 1");
+  EXPECT_TRUE(halved.front());
+  EXPECT_FALSE(halved.back());
+  ASSERT_EQ(whole.size(), halves.size());
+  double worst = 0;
+  for (std::size_t p = 0; p < whole.size(); ++p) {
+    worst = std::max(worst, (whole[p] - halves[p]).norm());
+  }
+  std::printf("at most %.1e m apart\n", worst);
+  EXPECT_LT(worst, 1e-6);
+}
+
 TEST_F(CutOnGpu, TablesThatFollowAreThoseThatAreMadeAnew) {
   const Scene scene = held_body(Law::kFixedCorotated, 0, Shape::kEllipsoid);
   CudaMpmTissue follows(scene), anew(scene);

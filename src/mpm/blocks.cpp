@@ -1,6 +1,7 @@
 #include "mpm/blocks.h"
 
 #include <algorithm>
+#include <memory>
 #include <numeric>
 
 #include "contact/known_facets.h"
@@ -106,21 +107,35 @@ void connect_forces(Blocks& blocks, const std::vector<LatticeBody>& bodies, int 
   }
 }
 
-/// Makes the blocks of some regions anew, then block by block their facets; meanwhile connects the
-/// forces of all blocks.
-void fill_regions(Blocks& blocks, const std::vector<int>& some,
+/// A region whose blocks are made anew, and the facets that it had; null until it is filled.
+struct NewRegion {
+  int index;
+  std::shared_ptr<const KnownFacets> known;
+};
+
+/// Makes their blocks, without facets.
+void fill_regions(Blocks& blocks, std::vector<NewRegion>& anew,
                   const std::vector<LatticeBody>& bodies, const Points& points,
-                  const NodeFields& fields, int node_count, Cpu& cpu) {
-  const int count = static_cast<int>(some.size());
-  std::vector<KnownFacets> known(count);
-  cpu.for_each(count, [&](int i) {
-    BlockRegion& r = blocks.regions[some[i]];
-    if (!r.blocks.empty()) known[i] = {bodies[r.body], r, blocks.stale_facets};
+                  const NodeFields& fields, Cpu& cpu) {
+  cpu.for_each(static_cast<int>(anew.size()), [&](int i) {
+    NewRegion& of = anew[i];
+    BlockRegion& r = blocks.regions[of.index];
+    if (of.known == nullptr) {
+      of.known = r.blocks.empty()
+                     ? std::make_shared<const KnownFacets>()
+                     : std::make_shared<const KnownFacets>(bodies[r.body], r, blocks.stale_facets);
+    }
     fill_region(r, bodies, points, fields, blocks.uniform);
   });
+}
+
+/// Block by block their facets; meanwhile connects the forces of all blocks.
+void finish_regions(Blocks& blocks, const std::vector<NewRegion>& anew,
+                    const std::vector<LatticeBody>& bodies, const Points& points, int node_count,
+                    Cpu& cpu) {
   std::vector<std::pair<Block*, const KnownFacets*>> made;
-  for (int i = 0; i < count; ++i) {
-    for (Block& b : blocks.regions[some[i]].blocks) made.emplace_back(&b, &known[i]);
+  for (const NewRegion& r : anew) {
+    for (Block& b : blocks.regions[r.index].blocks) made.emplace_back(&b, r.known.get());
   }
   cpu.both([&] { connect_forces(blocks, bodies, node_count); },
            [&] {
@@ -131,6 +146,66 @@ void fill_regions(Blocks& blocks, const std::vector<int>& some,
            });
 }
 
+/// Whether a block that a cut goes through is so tall that halves of its region have two layers.
+bool may_be_halved(const BlockRegion& r) {
+  return !r.half && std::any_of(r.blocks.begin(), r.blocks.end(),
+                                [](const Block& b) { return b.nz >= 4 && !b.partial.empty(); });
+}
+
+/// How much of thread blocks a region takes: two blocks of few columns can share one.
+double share_of(const BlockRegion& r) {
+  double sum = 0;
+  for (const Block& b : r.blocks) {
+    const auto columns = std::count(b.filled_columns.begin(), b.filled_columns.end(), 1);
+    sum += 2 * columns > r.nx * r.ny ? 1 : 0.5;
+  }
+  return sum;
+}
+
+/// See BlockShape::room. `before`: the blocks that each region had. Returns those of `anew` that
+/// are still to be filled.
+std::vector<NewRegion> halve_regions(Blocks& blocks, std::vector<NewRegion>& anew,
+                                     std::vector<Blocks::Origin>& before) {
+  if (blocks.room == 0) return {};
+  double wanted = 0;
+  for (const BlockRegion& r : blocks.regions) wanted += share_of(r);
+  std::vector<const NewRegion*> of(blocks.regions.size(), nullptr);
+  bool any = false;
+  for (const NewRegion& r : anew) {
+    of[r.index] = &r;
+    if (!may_be_halved(blocks.regions[r.index])) continue;
+    wanted += share_of(blocks.regions[r.index]);
+    any = true;
+  }
+  if (!any) return {};
+  if (wanted > blocks.room) {
+    blocks.room = 0;
+    return {};
+  }
+  std::vector<BlockRegion> regions;
+  std::vector<Blocks::Origin> origin;
+  std::vector<NewRegion> all_new, unfilled;
+  for (std::size_t i = 0; i < blocks.regions.size(); ++i) {
+    BlockRegion& r = blocks.regions[i];
+    const bool halve = of[i] != nullptr && may_be_halved(r);
+    for (int half = 0; halve && half < 2; ++half) {
+      const int begin = half * (r.nz / 2), end = half == 0 ? r.nz / 2 : r.nz;
+      all_new.push_back({static_cast<int>(regions.size()), of[i]->known});
+      unfilled.push_back(all_new.back());
+      regions.push_back({r.body, r.x, r.y, r.z + begin, r.nx, r.ny, end - begin, {}, true});
+      origin.push_back(before[i]);
+    }
+    if (halve) continue;
+    if (of[i] != nullptr) all_new.push_back({static_cast<int>(regions.size()), of[i]->known});
+    regions.push_back(std::move(r));
+    origin.push_back(before[i]);
+  }
+  blocks.regions = std::move(regions);
+  before = std::move(origin);
+  anew = std::move(all_new);
+  return unfilled;
+}
+
 }  // namespace
 
 Blocks make_blocks(const std::vector<LatticeBody>& bodies, const Points& points,
@@ -138,6 +213,7 @@ Blocks make_blocks(const std::vector<LatticeBody>& bodies, const Points& points,
   Blocks blocks;
   blocks.uniform = shape.uniform;
   blocks.has_rows = shape.has_rows;
+  blocks.room = shape.room;
   for (std::size_t i = 0; i < bodies.size(); ++i) {
     const LatticeBody& b = bodies[i];
     for (int z = 0; z < b.nz; z += shape.z) {
@@ -149,9 +225,12 @@ Blocks make_blocks(const std::vector<LatticeBody>& bodies, const Points& points,
       }
     }
   }
-  std::vector<int> all(blocks.regions.size());
-  std::iota(all.begin(), all.end(), 0);
-  fill_regions(blocks, all, bodies, points, fields, lattice_node_count(bodies), cpu);
+  std::vector<NewRegion> all;
+  for (std::size_t i = 0; i < blocks.regions.size(); ++i) {
+    all.push_back({static_cast<int>(i), nullptr});
+  }
+  fill_regions(blocks, all, bodies, points, fields, cpu);
+  finish_regions(blocks, all, bodies, points, lattice_node_count(bodies), cpu);
   return blocks;
 }
 
@@ -169,15 +248,18 @@ void update_blocks(Blocks& blocks, const std::vector<LatticeBody>& bodies, const
     const int first = before.empty() ? 0 : before.back().end;
     before.push_back({first, first + static_cast<int>(r.blocks.size())});
   }
-  std::vector<int> anew;
+  std::vector<NewRegion> anew;
   for (std::size_t i = 0; i < blocks.regions.size(); ++i) {
-    if (touched(blocks.regions[i])) anew.push_back(static_cast<int>(i));
+    if (touched(blocks.regions[i])) anew.push_back({static_cast<int>(i), nullptr});
   }
-  fill_regions(blocks, anew, bodies, points, fields, node_count, cpu);
+  fill_regions(blocks, anew, bodies, points, fields, cpu);
+  std::vector<NewRegion> unfilled = halve_regions(blocks, anew, before);
+  fill_regions(blocks, unfilled, bodies, points, fields, cpu);
+  finish_regions(blocks, anew, bodies, points, node_count, cpu);
   std::vector<std::uint8_t> is_new(blocks.regions.size(), 0);
-  for (const int i : anew) {
-    is_new[i] = 1;
-    const BlockRegion& r = blocks.regions[i];
+  for (const NewRegion& of : anew) {
+    is_new[of.index] = 1;
+    const BlockRegion& r = blocks.regions[of.index];
     const LatticeBody& b = bodies[r.body];
     for (int z = r.z; z < r.z + r.nz; ++z) {
       for (int y = r.y; y < r.y + r.ny; ++y) {

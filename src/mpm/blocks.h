@@ -16,6 +16,7 @@ struct BlockRegion {
   int body;
   int x, y, z, nx, ny, nz;  ///< cells
   std::vector<Block> blocks;
+  bool half = false;  ///< of one that a cut goes through: see BlockShape::room
 };
 
 /// Forces on up to kNodeRow nodes that follow one another, a vector: the sum of parts of the force
@@ -35,6 +36,7 @@ struct Blocks {
   std::vector<BlockRegion> regions;
   std::vector<Block*> all;                ///< in a fixed order
   bool uniform = false, has_rows = true;  ///< see BlockShape
+  int room = 0;                           ///< the same; 0 once there were too many
   /// Of each, the blocks before the last update_blocks() that had its points.
   struct Origin {
     int begin, end;
@@ -59,6 +61,9 @@ struct BlockShape {
   bool uniform = false;  ///< a block for each side of a cut and each material: the GPU's kernels
                          ///< know one of both
   bool has_rows = true;  ///< and parts: the GPU has its own tables of how forces come together
+  /// Regions that a cut goes through are halved along z as long as there are not more blocks than
+  /// this: where each has a multiprocessor, all others wait for those that are cut.
+  int room = 0;
 };
 
 /// Cuts the bodies' lattices into regions and makes their blocks.

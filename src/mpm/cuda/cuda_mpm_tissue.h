@@ -65,7 +65,8 @@ class CudaMpmTissue final : public Tissue {
   int run(const PartSubsteps& substeps, double from, double to, std::vector<TearingPoint>& tearing);
   void sum_loads();  ///< of the part that was run last, once it is done
   PartRun run_part(const PartSubsteps& substeps, const FrameInput& input, double from, double to);
-  void make_blocks(const CudaShape& shape);
+  void make_blocks(const CudaShape& shape, int room);  ///< BlockShape::room
+  void divide_anew(int room);                          ///< into blocks for what is cut
   void make_room_for_cuts();  ///< makes blocks anew that are good for whole tissue alone
   void plan_tables();         ///< how the blocks are worked on, and the tables for it
   /// While the tissue moves from `u_before` to where it is; null: it is at rest.

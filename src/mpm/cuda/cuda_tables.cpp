@@ -101,6 +101,14 @@ void CudaMpmTissue::plan_tables() {
   } else {
     bundles = single_blocks(blocks, blocks.size(), *state_->cpu);
   }
+  const auto processors = static_cast<std::size_t>(d.limits.processors);
+  const bool halved = std::any_of(state_->blocks.regions.begin(), state_->blocks.regions.end(),
+                                  [](const BlockRegion& r) { return r.half; });
+  if (halved && (state_->blocks.room == 0 || bundles.size() > processors)) {
+    divide_anew(0);  // all or none: there is no room for halves any more
+    plan_tables();
+    return;
+  }
   HostTables& t = d.host_tables;
   make_tables(*state_, bundles, t);
   d.plan.max_slots = t.max_slots;
@@ -180,7 +188,7 @@ void CudaMpmTissue::push_tables() {
     d.hold.clear(d.stream);
   }
   d.checkpoint.resize(n, d.with.size());
-  d.arrived.resize(2);
+  d.arrived.resize(kArrivedWords);
   check_cuda(cudaStreamSynchronize(d.stream), "receive data");
   if (d.most_sharing[0] > kMostSharing) {
     throw std::runtime_error("a node is shared by more than " + std::to_string(kMostSharing) +
@@ -188,20 +196,25 @@ void CudaMpmTissue::push_tables() {
   }
 }
 
-void CudaMpmTissue::make_blocks(const CudaShape& shape) {
+void CudaMpmTissue::make_blocks(const CudaShape& shape, int room) {
   OnDevice& d = *device_;
   d.shape = shape;
   d.shape.blocks.uniform = true;
   d.shape.blocks.has_rows = false;
+  d.shape.blocks.room = room;
   state_->blocks = tissue_sim::make_blocks(state_->bodies, state_->points, *state_->fields,
                                            d.shape.blocks, *state_->cpu);
+  // Where there are more, the first cuts take what is left.
+  constexpr double kFewRegions = 0.8;
+  if (static_cast<double>(state_->blocks.regions.size()) > kFewRegions * room) {
+    state_->blocks.room = 0;
+  }
   d.host_tables.number.clear();
   list_facets(*state_);
 }
 
-void CudaMpmTissue::make_room_for_cuts() {
-  if (device_->shape == device_->cut_shape) return;
-  make_blocks(device_->cut_shape);
+void CudaMpmTissue::divide_anew(int room) {
+  make_blocks(device_->cut_shape, room);
   // Until they are measured, any block may be where any of the tissue is.
   for (std::vector<BlockMotion>* motion : {&state_->motion, &motion_before_}) {
     BlockMotion all;
@@ -212,6 +225,11 @@ void CudaMpmTissue::make_room_for_cuts() {
     }
     motion->assign(state_->blocks.all.size(), all);
   }
+}
+
+void CudaMpmTissue::make_room_for_cuts() {
+  if (device_->shape == device_->cut_shape) return;
+  divide_anew(device_->limits.processors);
 }
 
 }  // namespace tissue_sim

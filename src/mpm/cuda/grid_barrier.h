@@ -1,7 +1,18 @@
 // Barriers of all thread blocks of a cooperative kernel, and of some of their warps. For .cu files.
 #pragma once
 
+#include "mpm/cuda/tables.h"
+
 namespace tissue_sim {
+
+/// Of CudaFrame::arrived, in a round: how many contacts and how many facets somebody has taken.
+__device__ __forceinline__ unsigned* turn_counters(unsigned* arrived, int round) {
+  return arrived + kFirstTurns + (round % 2) * 2;
+}
+/// For the round after this one: what they tell is of the last round, whose turns are all over.
+__device__ __forceinline__ void clear_next_turns(unsigned* arrived, int round) {
+  for (int i = 0; i < 2; ++i) __stcg(turn_counters(arrived, round + 1) + i, 0u);
+}
 
 /// A thread block says that it has come to a barrier of the grid, and goes on.
 __device__ __forceinline__ void arrive(unsigned* arrived, unsigned thread = 0) {
@@ -36,18 +47,25 @@ struct Team {
 using Workers = Team<1>;
 using Pushers = Team<2>;
 
-/// Waits until all thread blocks have arrived `round` times; what they wrote before is then seen by
-/// all of the team.
+/// A thread waits until all thread blocks have arrived `round` times.
+__device__ __forceinline__ void wait_for(unsigned* arrived, unsigned round) {
+  const unsigned wanted = round * gridDim.x;
+  unsigned seen;
+  do {
+    asm volatile("ld.acquire.gpu.global.u32 %0, [%1];" : "=r"(seen) : "l"(arrived) : "memory");
+  } while (seen < wanted);
+}
+/// What thread blocks wrote before they arrived is then seen by all of the team.
 template <class TeamOf = Workers>
 __device__ __forceinline__ void wait(unsigned* arrived, unsigned round, const TeamOf& team = {}) {
-  if (team.me() == 0) {
-    const unsigned wanted = round * gridDim.x;
-    unsigned seen;
-    do {
-      asm volatile("ld.acquire.gpu.global.u32 %0, [%1];" : "=r"(seen) : "l"(arrived) : "memory");
-    } while (seen < wanted);
-  }
+  if (team.me() == 0) wait_for(arrived, round);
   team.sync();
+}
+
+/// The same for a warp by itself.
+__device__ __forceinline__ void warp_wait(unsigned* arrived, unsigned round) {
+  if (threadIdx.x % 32 == 0) wait_for(arrived, round);
+  __syncwarp();
 }
 
 __device__ __forceinline__ void grid_barrier(unsigned* arrived, unsigned round) {

@@ -13,20 +13,42 @@
 
 namespace tissue_sim {
 
-/// What a group of `lanes` lanes, or a thread, does of what is spread over several thread blocks.
-struct LaneShare {
-  int first, step;
-
-  /// Of the warps of a team in each of `blocks` thread blocks, of which this is number `rank` (< 0:
-  /// none). Different thread blocks come first, then different warps.
-  static __device__ __forceinline__ LaneShare of(int rank, int blocks, const Pushers& team,
-                                                 int lanes) {
+/// What a warp takes of work that is spread over the grid, some pieces at a time: its own turns, or
+/// the next ones that nobody has.
+class WarpTurns {
+ public:
+  /// Those of the warps of a team in each of `blocks` thread blocks, of which this is number `rank`
+  /// (< 0: none). Different thread blocks come first, then different warps.
+  static __device__ __forceinline__ WarpTurns own(int each, int rank, int blocks,
+                                                  const Pushers& team) {
     constexpr int kNone = 1 << 30;
-    const int warp = team.me() / 32, warps = team.size() / 32,
-              in_warp = static_cast<int>(threadIdx.x) % 32 / lanes;
-    return {rank < 0 ? kNone : (in_warp * warps + warp) * blocks + rank,
-            blocks * team.size() / lanes};
+    const int warp = team.me() / 32, warps = team.size() / 32;
+    return {nullptr, rank < 0 ? kNone : each * (warp * blocks + rank), each * warps * blocks};
   }
+  /// Those that a counter, from 0 on, has left: who is free first takes most.
+  static __device__ __forceinline__ WarpTurns next_of(unsigned* counter, int each) {
+    WarpTurns turns(counter, 0, each);
+    turns.first_ = turns.after(0);
+    return turns;
+  }
+
+  /// The first piece of the first turn.
+  __device__ __forceinline__ int first() const { return known(first_); }
+  /// Asks for the turn after the one that begins with piece `first`: it is known() later.
+  __device__ __forceinline__ int after(int first) const {
+    if (counter_ == nullptr) return first + step_;
+    return threadIdx.x % 32 == 0 ? static_cast<int>(atomicAdd(counter_, step_)) : 0;
+  }
+  __device__ __forceinline__ int known(int first) const {
+    return counter_ == nullptr ? first : __shfl_sync(0xffffffffu, first, 0);
+  }
+
+ private:
+  __device__ __forceinline__ WarpTurns(unsigned* counter, int first, int step)
+      : counter_(counter), first_(first), step_(step) {}
+
+  unsigned* counter_;
+  int first_, step_;
 };
 
 /// What a substep does with contacts.
@@ -78,25 +100,30 @@ __device__ __forceinline__ void add_pushes_together(const FaceSpring& c, bool on
   }
 }
 
-/// Works out contacts and adds their forces to `force`, of the nodes. The groups of a warp go in
-/// step. `kMany`: all warps may have contacts.
-template <bool kMany>
-__device__ __forceinline__ void push_contacts(const CudaFaces& f, const LaneShare& share,
+/// Works out contacts, once `nodes_are_there()`, and adds their forces to `force`, of the nodes.
+/// The groups of a warp go in step. `kMany`: all warps may have contacts.
+template <bool kMany, class Wait>
+__device__ __forceinline__ void push_contacts(const CudaFaces& f, const WarpTurns& turns,
                                               const CudaNodes& state, const ContactRound& round,
-                                              long long* force) {
+                                              const Wait& nodes_are_there, long long* force) {
   // Copies: through a reference they would be read again after every store.
   const std::int32_t* facets = f.looks.contacts;
   const CudaContactNodes* nodes = f.looks.nodes;
   FaceSpring* springs = f.looks.springs;
   const int count = f.contacts;
-  const bool many = kMany && count > share.step / (32 / kContactLanes);
-  for (int i = share.first; __any_sync(0xffffffffu, i < count); i += share.step) {
+  const bool many = kMany && count > static_cast<int>(gridDim.x * blockDim.x) / 32;
+  bool waited = false;
+  for (int first = turns.first(), next; first < count; first = turns.known(next)) {
+    const int i = first + static_cast<int>(threadIdx.x) % 32 / kContactLanes;
     const int at = min(i, count - 1);
     FaceSpring& spring = springs[facets[at]];
     LanePlaces<false> places(state);
     places.take(nodes[at]);
-    places.bring();  // on their way before it is known whether they are wanted
     FaceSpring c = spring;
+    if (!waited) nodes_are_there();
+    waited = true;
+    places.bring();  // on their way before it is known whether they are wanted
+    next = turns.after(first);
     const bool is_one = i < count && c.other >= 0, active = is_one && is_active(c);
     if (!__any_sync(0xffffffffu, active || (round.soften && is_one))) continue;
     places.hold(c.hold);
@@ -116,13 +143,15 @@ __device__ __forceinline__ void push_contacts(const CudaFaces& f, const LaneShar
 }
 
 /// The same, and looks at all of them before; each group by itself.
-__device__ __forceinline__ void look_at_contacts(const CudaFaces& f, const LaneShare& share,
+__device__ __forceinline__ void look_at_contacts(const CudaFaces& f, const WarpTurns& turns,
                                                  const CudaNodes& state, const ContactRound& round,
                                                  long long* force) {
   const CudaLooks s = f.looks;
   const int count = f.contacts;
   float fastest = 0;
-  for (int i = share.first; i < count; i += share.step) {
+  for (int first = turns.first(); first < count; first = turns.known(turns.after(first))) {
+    const int i = first + static_cast<int>(threadIdx.x) % 32 / kContactLanes;
+    if (i >= count) continue;
     FaceSpring c = s.springs[s.contacts[i]];
     LaneFaces faces(s, state);
     faces.index = c.facet;
@@ -156,9 +185,12 @@ __device__ __forceinline__ void look_at_contacts(const CudaFaces& f, const LaneS
 }
 
 /// Brings facets, a thread for each, to where the next substep will look at them.
-__device__ __forceinline__ void move_facets(const CudaFaces& f, const LaneShare& share,
+__device__ __forceinline__ void move_facets(const CudaFaces& f, const WarpTurns& turns,
                                             const CudaNodes& state, float dt) {
-  for (int i = share.first; i < f.involved; i += share.step) {
+  const int count = f.involved;
+  for (int first = turns.first(); first < count; first = turns.known(turns.after(first))) {
+    const int i = first + static_cast<int>(threadIdx.x) % 32;
+    if (i >= count) continue;
     const int facet = f.looks.involved[i];
     FacetMotion motion = motion_of(f.looks, state, f.looks.facets[facet]);
     for (int a = 0; a < 3; ++a) motion.x[a] += dt * motion.v[a];
@@ -198,13 +230,13 @@ struct alignas(16) FaceRounds {
     slot ^= 1;
     if (blockIdx.x == 0) figures.fastest_pair[slot] = 0;
   }
-  /// Contacts and facets are left to the thread blocks that have the least to do; whether this is
-  /// one.
-  __device__ __forceinline__ bool has_share() const { return ranks == 0 || rank >= 0; }
-  __device__ __forceinline__ LaneShare share(const Pushers& team, int lanes) const {
-    return ranks == 0 ? LaneShare::of(static_cast<int>(blockIdx.x), static_cast<int>(gridDim.x),
-                                      team, lanes)
-                      : LaneShare::of(rank, ranks, team, lanes);
+  /// Where each warp has its own turns they are left to the thread blocks that have the least to
+  /// do; whether this is one.
+  __device__ __forceinline__ bool has_turns() const { return ranks == 0 || rank >= 0; }
+  __device__ __forceinline__ WarpTurns turns(const Pushers& team, int each) const {
+    return ranks == 0 ? WarpTurns::own(each, static_cast<int>(blockIdx.x),
+                                       static_cast<int>(gridDim.x), team)
+                      : WarpTurns::own(each, rank, ranks, team);
   }
   __device__ __forceinline__ ContactRound at(const CudaFaces& f, int round, float dt) const {
     ContactRound r;
@@ -234,21 +266,29 @@ struct alignas(16) FaceRounds {
   }
 };
 
-/// Contact of tissue with tissue in a round, once all nodes are in place; adds the forces to
-/// `force`, of the nodes. Out of line, for the blocks to keep their registers.
+/// Contact of tissue with tissue in a round; adds the forces to `force`, of the nodes. With kMany,
+/// where all warps come to it when their blocks' forces are done, they take contacts as they come.
+/// Out of line, for the blocks to keep their registers.
 template <bool kMany>
 __device__ __noinline__ void touch_faces(const CudaFaces* faces, const FaceRounds* rounds,
                                          int round, float dt, const CudaNodes state,
-                                         const Pushers team, long long* force) {
+                                         const Pushers team, unsigned* arrived, long long* force) {
   const CudaFaces& f = *faces;
+  if (!kMany && !rounds->has_turns()) return;
+  unsigned* counters = turn_counters(arrived, round);
+  const auto turns = [&](int of, int each) {
+    return kMany ? WarpTurns::next_of(counters + of, each) : rounds->turns(team, each);
+  };
+  const WarpTurns of_contacts = turns(0, 32 / kContactLanes);
+  const auto nodes_are_there = [&] { warp_wait(arrived + 1, round + 1); };
   const ContactRound now = rounds->at(f, round, dt);
-  const LaneShare share = rounds->share(team, kContactLanes);
+  if (now.look || now.move) nodes_are_there();
   if (now.look) {
-    look_at_contacts(f, share, state, now, force);
+    look_at_contacts(f, of_contacts, state, now, force);
   } else {
-    push_contacts<kMany>(f, share, state, now, force);
+    push_contacts<kMany>(f, of_contacts, state, now, nodes_are_there, force);
   }
-  if (now.move) move_facets(f, rounds->share(team, 1), state, dt);
+  if (now.move) move_facets(f, turns(1, 32), state, dt);
 }
 
 }  // namespace tissue_sim

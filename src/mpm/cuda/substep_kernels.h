@@ -150,22 +150,27 @@ __device__ __forceinline__ void push_nodes(const CudaTables& t, const CudaFrame&
   const float dt = f.step.dt;
   const int first = helpers ? t.bundle_count : 0, block = static_cast<int>(blockIdx.x) - first;
   if (block < 0 && !kTouches) return;
-  if (kTouches && f.near_cells == nullptr && !s.rounds->has_share()) return;
+  const bool odd = ((f.current + round) & 1) != 0;
+  const CudaNodes& state = odd ? f.state[1] : f.state[0];
+  long long* force = f.pushes.force + f.pushes.stride * (round % 3);
+  const auto touch = [&] {
+    if constexpr (kTouches) {
+      touch_faces<!kPairs>(f.faces, s.rounds, round, dt, state, pushers, f.arrived, force);
+    }
+  };
+  if (kTouches && f.near_cells == nullptr) return touch();
   const int warp = pushers.me() / 32, blocks = static_cast<int>(gridDim.x) - first,
             warps = blocks * pushers.size() / 32;
   const ColliderCopy colliders(f, round, pushers);
   NearSearch near(f, warp * blocks + block, warps);
   colliders.finish(s.colliders);
-  const bool odd = ((f.current + round) & 1) != 0;
-  const CudaNodes& state = odd ? f.state[1] : f.state[0];
-  long long* force = f.pushes.force + f.pushes.stride * (round % 3);
   wait(f.arrived + 1, ++met, pushers);
   if (f.near_cells != nullptr && block >= 0) {
     auto* loads =
         reinterpret_cast<unsigned long long*>(f.loads) + kLoadSums * f.collider_count * round;
     near.push(t, state, kCellReach * f.cell_size, {s.colliders, loads, force}, s.cells[warp]);
   }
-  if constexpr (kTouches) touch_faces<!kPairs>(f.faces, s.rounds, round, dt, state, pushers, force);
+  touch();
 }
 
 template <Laws kLaws, bool kCached, bool kPairs, Can kCan>
@@ -206,6 +211,7 @@ __global__ void __launch_bounds__(kMaxCudaThreads, 1)
     if (round > 0) grid_barrier(f.arrived, static_cast<unsigned>(round));
     if (kTouches && threadIdx.x == 0) {
       s.rounds->learn(*f.faces, round, f.step.dt);
+      if (mine == 0) clear_next_turns(f.arrived, round);
       if (round == f.substeps && mine == 0) s.rounds->end(*f.faces, round, f.step.dt);
     }
     if (idle) {

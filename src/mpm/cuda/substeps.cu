@@ -135,7 +135,8 @@ void launch_substeps(const CudaPlan& plan, const CudaTables& tables, const CudaF
   CudaFrame f = frame;
   CudaLayout layout = layout_of(plan);
   void* arguments[] = {&t, &f, &layout};
-  check_cuda(cudaMemsetAsync(f.arrived, 0, 2 * sizeof(unsigned), stream), "clear memory");
+  check_cuda(cudaMemsetAsync(f.arrived, 0, kArrivedWords * sizeof(unsigned), stream),
+             "clear memory");
   const int blocks = std::min(resident, t.bundle_count + (plan.pushes ? kMostHelpers : 0));
   check_cuda(cudaLaunchCooperativeKernel(kernel(plan), dim3(blocks), dim3(plan.threads), arguments,
                                          shared_bytes(plan), stream),

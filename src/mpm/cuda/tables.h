@@ -149,6 +149,9 @@ struct CudaTables {
 inline constexpr double kLoadUnit = 1.0 / (1ll << 38);
 inline constexpr int kLoadSums = 7;
 
+/// Words of CudaFrame::arrived, and where turn_counters() are: in a line of memory of their own.
+inline constexpr int kArrivedWords = 36, kFirstTurns = 32;
+
 struct CudaFrame {
   CudaNodes state[2];
   int current;       ///< which of them holds the state at the beginning
@@ -162,7 +165,8 @@ struct CudaFrame {
   const int* near_count;
   float cell_size;  ///< the scene's [m]
   NodePushes pushes;
-  unsigned* arrived;       ///< counters of the two barriers, 0 at the beginning
+  unsigned* arrived;       ///< counters of the two barriers, and turn_counters(); 0 at the
+                           ///< beginning
   const CudaFaces* faces;  ///< null where no tissue touches tissue
 };
 

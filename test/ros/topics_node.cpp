@@ -45,7 +45,9 @@ TEST_F(Topics, StateSaysHowTheSimulationStands) {
   EXPECT_EQ(s->loose_fragments, 0);
   EXPECT_NEAR(s->fragment_volume, 16e-6, 1e-9);
   EXPECT_GT(s->substeps, 0);
-  EXPECT_NEAR(s->substep * s->substeps, 1.0 / 60, 1e-9);
+  // The longest of substeps that may grow little by little within the frame.
+  EXPECT_GE(s->substep * s->substeps, 1.0 / 60 - 1e-9);
+  EXPECT_LE(s->substep * s->substeps, 1.5 / 60);
   EXPECT_NEAR(s->time, s->frame / 60.0, 1e-9);
   EXPECT_FALSE(s->device.empty());
   EXPECT_NE(s->checksum, 0u);

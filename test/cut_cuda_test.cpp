@@ -113,9 +113,7 @@ TEST_F(CutOnGpu, TissueMovesOnAsBeforeWhereRegionsAreHalvedAndJoinedAgain) {
       EXPECT_GT(cut_now(tissue, plane_cut(Vec3(at, at, 0.009), normal)).bonds_broken, 0);
       tissue.advance(10, dt, {});
       tissue.finish();
-      const std::vector<BlockRegion>& all = tissue.state().blocks.regions;
-      halved.push_back(
-          std::any_of(all.begin(), all.end(), [](const BlockRegion& r) { return r.half; }));
+      halved.push_back(tissue.state().blocks.has_halves());
     }
     std::printf("%s\n", tissue.plan().c_str());
     unsetenv("TISSUE_SIM_CUDA_SHAPE");

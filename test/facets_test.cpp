@@ -90,11 +90,12 @@ TEST(Facets, LieInThePlaneOfACutThroughDeformedTissue) {
 /// Cut after cut through an ellipsoid, whose rim has cells of all shapes: what is kept of the
 /// facets from one cut to the next is what would be made anew, where regions are halved, too.
 TEST(Facets, AreKeptOnlyWhereTheyWouldBeTheSame) {
-  for (const bool with_inclusions : {false, true}) {
+  for (const auto& [with_inclusions, room] :
+       {std::pair(false, 0), std::pair(true, 0), std::pair(false, 1000), std::pair(true, 1000)}) {
     Scene scene = held_body(Law::kFixedCorotated, 0, Shape::kEllipsoid);
     if (with_inclusions) add_inclusions(scene, true);
     MpmTissue tissue(scene);
-    tissue.state().blocks.room = with_inclusions ? 1000 : 0;
+    tissue.state().blocks.room = room;
     const MpmState& s = tissue.state();
     const Vec3 middle = scene.bodies[0].pose.position;
     std::mt19937 random(7);
@@ -120,6 +121,7 @@ TEST(Facets, AreKeptOnlyWhereTheyWouldBeTheSame) {
       }
     }
     EXPECT_GT(count, 1000u);
+    EXPECT_EQ(s.blocks.has_halves(), room > 0);
   }
 }
 

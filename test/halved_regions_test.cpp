@@ -1,19 +1,12 @@
 // Regions that a cut goes through, halved where there is room for their blocks.
 #include <gtest/gtest.h>
 
-#include <algorithm>
-
 #include "cut_kinds.h"
 
 namespace tissue_sim {
 namespace {
 
 const Vec3 kMiddle(0.0155, 0.0145, 0.0085);
-
-bool any_half(const MpmState& s) {
-  return std::any_of(s.blocks.regions.begin(), s.blocks.regions.end(),
-                     [](const BlockRegion& r) { return r.half; });
-}
 
 /// In how many blocks each point is.
 std::vector<int> count_points(const MpmState& s) {
@@ -35,7 +28,7 @@ TEST(HalvedRegions, HoldEachPointOnceAndOnlyWhereThereIsRoom) {
     tissue.state().blocks.room = room;
     for (const Vec3& normal : {Vec3(1, 0.6, 0.3), Vec3(0.2, 1, 0.1), Vec3(0.2, 0.1, 1)}) {
       EXPECT_GT(cut_now(tissue, plane_cut(kMiddle, normal)).bonds_broken, 0);
-      EXPECT_EQ(any_half(s), room == 1000);
+      EXPECT_EQ(s.blocks.has_halves(), room == 1000);
       for (const int count : count_points(s)) ASSERT_EQ(count, 1);
     }
   }
@@ -51,7 +44,7 @@ TEST(HalvedRegions, MoveAsWholeOnes) {
     EXPECT_GT(cut_now(tissue, plane_cut(kMiddle, Vec3(1, 0.6, 0.3))).bonds_broken, 0);
     tissue.advance(40, 0.3f * tissue.stable_substep(), {});
     tissue.finish();
-    EXPECT_EQ(any_half(tissue.state()), room > 0);
+    EXPECT_EQ(tissue.state().blocks.has_halves(), room > 0);
     return positions(tissue);
   };
   const auto whole = run(0), halved = run(1000);

@@ -187,15 +187,16 @@ std::vector<NewRegion> halve_regions(Blocks& blocks, std::vector<NewRegion>& ane
   std::vector<NewRegion> all_new, unfilled;
   for (std::size_t i = 0; i < blocks.regions.size(); ++i) {
     BlockRegion& r = blocks.regions[i];
-    const bool halve = of[i] != nullptr && may_be_halved(r);
-    for (int half = 0; halve && half < 2; ++half) {
-      const int begin = half * (r.nz / 2), end = half == 0 ? r.nz / 2 : r.nz;
-      all_new.push_back({static_cast<int>(regions.size()), of[i]->known});
-      unfilled.push_back(all_new.back());
-      regions.push_back({r.body, r.x, r.y, r.z + begin, r.nx, r.ny, end - begin, {}, true});
-      origin.push_back(before[i]);
+    if (of[i] != nullptr && may_be_halved(r)) {
+      const int below = r.nz / 2;
+      for (const auto& [z, nz] : {std::pair(r.z, below), std::pair(r.z + below, r.nz - below)}) {
+        all_new.push_back({static_cast<int>(regions.size()), of[i]->known});
+        unfilled.push_back(all_new.back());
+        regions.push_back({r.body, r.x, r.y, z, r.nx, r.ny, nz, {}, true});
+        origin.push_back(before[i]);
+      }
+      continue;
     }
-    if (halve) continue;
     if (of[i] != nullptr) all_new.push_back({static_cast<int>(regions.size()), of[i]->known});
     regions.push_back(std::move(r));
     origin.push_back(before[i]);

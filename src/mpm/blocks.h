@@ -1,6 +1,7 @@
 // Blocks of all bodies, and how their forces come together at the nodes in a fixed order.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <vector>
 
@@ -52,6 +53,10 @@ struct Blocks {
   std::vector<NodeRow> rows;
   std::vector<RowPart> row_parts;
   int first_split_node = 0;  ///< nodes from here on are fields that cuts made
+
+  bool has_halves() const {
+    return std::any_of(regions.begin(), regions.end(), [](const BlockRegion& r) { return r.half; });
+  }
 };
 
 /// How large regions are, in cells; the default is the CPU's.

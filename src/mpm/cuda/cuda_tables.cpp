@@ -102,9 +102,7 @@ void CudaMpmTissue::plan_tables() {
     bundles = single_blocks(blocks, blocks.size(), *state_->cpu);
   }
   const auto processors = static_cast<std::size_t>(d.limits.processors);
-  const bool halved = std::any_of(state_->blocks.regions.begin(), state_->blocks.regions.end(),
-                                  [](const BlockRegion& r) { return r.half; });
-  if (halved && (state_->blocks.room == 0 || bundles.size() > processors)) {
+  if (state_->blocks.has_halves() && (state_->blocks.room == 0 || bundles.size() > processors)) {
     divide_anew(0);  // all or none: there is no room for halves any more
     plan_tables();
     return;

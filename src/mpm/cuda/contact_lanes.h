@@ -8,18 +8,19 @@
 
 namespace tissue_sim {
 
-inline constexpr int kContactLanes = 16;  ///< that work together
-inline constexpr int kLaneNodes = 2;      ///< that each has in hand
+inline constexpr int kContactLanes = 16;  ///< that work together where nothing else is said
 
-/// The lanes of a warp that work together. All groups of a warp call what asks their lanes at once;
+/// kLanes of a warp that work together. All groups of a warp call what asks their lanes at once;
 /// or with kApart each for itself, which costs as many instructions again.
-template <bool kApart>
+template <int kLanes, bool kApart>
 struct LaneGroup {
-  int lane = static_cast<int>(threadIdx.x) % kContactLanes;
-  unsigned mask = kApart ? ((1u << kContactLanes) - 1) << (threadIdx.x % 32 - lane) : 0xffffffffu;
+  static constexpr int kNodes = (27 + kLanes - 1) / kLanes;  ///< that each has in hand
+
+  int lane = static_cast<int>(threadIdx.x) % kLanes;
+  unsigned mask = kApart ? ((1u << kLanes) - 1) << (threadIdx.x % 32 - lane) : 0xffffffffu;
 
   /// Which of 27 nodes the lane has as its j-th; from 27 on none.
-  __device__ __forceinline__ int node(int j) const { return lane + kContactLanes * j; }
+  __device__ __forceinline__ int node(int j) const { return lane + kLanes * j; }
   /// Whether it is so for any of those that call.
   __device__ __forceinline__ bool any(bool so) const {
     return kApart ? so : __any_sync(mask, so) != 0;
@@ -27,7 +28,7 @@ struct LaneGroup {
   /// Sum over the lanes, the same bits in each.
   __device__ __forceinline__ float sum(float value) const {
 #pragma unroll
-    for (int step = kContactLanes / 2; step > 0; step /= 2) {
+    for (int step = kLanes / 2; step > 0; step /= 2) {
       value += __shfl_xor_sync(mask, value, step);
     }
     return value;
@@ -47,6 +48,8 @@ __device__ __forceinline__ std::int32_t node_around(const CudaLooks& s, const Cu
 /// The nodes around a place, as the lanes of a group have them.
 template <class Group>
 struct LanePlace {
+  static constexpr int kLaneNodes = Group::kNodes;
+
   std::int32_t node[kLaneNodes];
   float4 u[kLaneNodes];      // displacement [m]
   float weight[kLaneNodes];  // 0 where there is no node
@@ -145,9 +148,9 @@ __device__ __forceinline__ FacetMotion motion_of(const CudaLooks& s, const CudaN
 }
 
 /// The two places of a contact, as a group of lanes reaches them: see push_face().
-template <bool kApart>
+template <int kLanes, bool kApart>
 struct LanePlaces {
-  using Group = LaneGroup<kApart>;
+  using Group = LaneGroup<kLanes, kApart>;
   Group lanes;
   CudaNodes state;
   LanePlace<Group> own_place, other_place;
@@ -184,7 +187,7 @@ struct LanePlaces {
 };
 
 /// Facets and nodes as a look at a contact reaches them: contact/look_at_face.h.
-struct LaneFaces : LanePlaces<true> {
+struct LaneFaces : LanePlaces<kContactLanes, true> {
   const CudaLooks& s;
   int index = 0;  // facet
 
@@ -213,7 +216,7 @@ struct LaneFaces : LanePlaces<true> {
   __device__ __forceinline__ double cell_size() const { return s.cell_size; }
   __device__ __forceinline__ float per_cell() const { return s.per_cell; }
   __device__ __forceinline__ int near(int n) const { return s.near[n]; }
-  /// Those near, each lane every eighth, some whose places are under way at once.
+  /// Those near, each lane every sixteenth, some whose places are under way at once.
   template <class Visit>
   __device__ __forceinline__ void for_each_near(const Visit& visit) const {
     constexpr int kTogether = 4;

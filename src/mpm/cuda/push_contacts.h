@@ -67,28 +67,28 @@ template <class Places>
 __device__ __forceinline__ void add_pushes(const FaceSpring& c, const Places& places,
                                            long long* force) {
 #pragma unroll
-  for (int j = 0; j < kLaneNodes; ++j) {
+  for (int j = 0; j < Places::Group::kNodes; ++j) {
     if (places.lanes.node(j) >= 27) break;
-    const auto &own = places.own_place, &other = places.other_place;
-    add_push(force, own.node[j], own.weight[j], c.force);
-    add_push(force, other.node[j], -other.weight[j], c.force);
+    add_push(force, places.own_place.node[j], places.own_place.weight[j], c.force);
+    add_push(force, places.other_place.node[j], -places.other_place.weight[j], c.force);
   }
 }
 
 /// The same, for a warp whose groups go in step, if the contact is `on`. Four lanes have a node,
 /// three of them a component each: an instruction goes to a quarter of the places in memory, which
-/// is what counts where all warps add at once; otherwise there are more instructions.
+/// is what counts where all warps add at once.
+template <int kLanes>
 __device__ __forceinline__ void add_pushes_together(const FaceSpring& c, bool on,
-                                                    const LanePlaces<false>& places,
+                                                    const LanePlaces<kLanes, false>& places,
                                                     long long* force) {
   const auto& lanes = places.lanes;
   const int component = lanes.lane % 4;
   const float push = component == 0 ? c.force[0] : component == 1 ? c.force[1] : c.force[2];
 #pragma unroll
-  for (int first = 0; first < 27; first += kContactLanes / 4) {
-    const int k = first + lanes.lane / 4, j = first / kContactLanes;
+  for (int first = 0; first < 27; first += kLanes / 4) {
+    const int k = first + lanes.lane / 4, j = first / kLanes;
     const auto of_node = [&](auto value) {
-      return __shfl_sync(lanes.mask, value, k % kContactLanes, kContactLanes);
+      return __shfl_sync(lanes.mask, value, k % kLanes, kLanes);
     };
     const auto add = [&](const auto& place, float sign) {
       const std::int32_t node = of_node(place.node[j]);
@@ -102,7 +102,7 @@ __device__ __forceinline__ void add_pushes_together(const FaceSpring& c, bool on
 
 /// Works out contacts, once `nodes_are_there()`, and adds their forces to `force`, of the nodes.
 /// The groups of a warp go in step. `kMany`: all warps may have contacts.
-template <bool kMany, class Wait>
+template <bool kMany, int kLanes, class Wait>
 __device__ __forceinline__ void push_contacts(const CudaFaces& f, const WarpTurns& turns,
                                               const CudaNodes& state, const ContactRound& round,
                                               const Wait& nodes_are_there, long long* force) {
@@ -111,33 +111,35 @@ __device__ __forceinline__ void push_contacts(const CudaFaces& f, const WarpTurn
   const CudaContactNodes* nodes = f.looks.nodes;
   FaceSpring* springs = f.looks.springs;
   const int count = f.contacts;
-  const bool many = kMany && count > static_cast<int>(gridDim.x * blockDim.x) / 32;
   bool waited = false;
   for (int first = turns.first(), next; first < count; first = turns.known(next)) {
-    const int i = first + static_cast<int>(threadIdx.x) % 32 / kContactLanes;
+    const int i = first + static_cast<int>(threadIdx.x) % 32 / kLanes;
     const int at = min(i, count - 1);
     FaceSpring& spring = springs[facets[at]];
-    LanePlaces<false> places(state);
+    LanePlaces<kLanes, false> places(state);
     places.take(nodes[at]);
     FaceSpring c = spring;
     if (!waited) nodes_are_there();
     waited = true;
     places.bring();  // on their way before it is known whether they are wanted
-    next = turns.after(first);
     const bool is_one = i < count && c.other >= 0, active = is_one && is_active(c);
-    if (!__any_sync(0xffffffffu, active || (round.soften && is_one))) continue;
+    if (!__any_sync(0xffffffffu, active || (round.soften && is_one))) {
+      next = turns.after(first);
+      continue;
+    }
     places.hold(c.hold);
     if (round.soften) {
       const float mobility = places.held_mobility();
       if (is_one) c.soften(mobility, round.dt);
     }
     if (__any_sync(0xffffffffu, active)) push_face(c, round.dt, places, active);
+    next = turns.after(first);  // no sooner: others may be free before
     if (places.lanes.lane == 0 && (active || (round.soften && is_one))) spring = c;
     const bool pushes = active && c.touching;
-    if (!many) {
-      if (pushes) add_pushes(c, places, force);
-    } else if (places.any(pushes)) {
-      add_pushes_together(c, pushes, places, force);
+    if constexpr (kMany) {
+      if (places.any(pushes)) add_pushes_together(c, pushes, places, force);
+    } else if (pushes) {
+      add_pushes(c, places, force);
     }
   }
 }
@@ -207,8 +209,10 @@ struct alignas(16) FaceRounds {
   int slot;     ///< of CudaFaceFigures::fastest_pair that the next look takes
   int rank;     ///< CudaBundle::rank; thread blocks without a bundle come after those that have one
   int ranks;    ///< that there are
+  CudaFaces faces;  ///< a copy
 
   __device__ __forceinline__ void begin(const CudaTables& t, const CudaFaces& f, float dt) {
+    faces = f;
     const int mine = static_cast<int>(blockIdx.x), beside = mine - t.bundle_count;
     rank = beside >= 0 ? f.ranks + beside : t.bundles[mine].rank;
     ranks = f.ranks + max(static_cast<int>(gridDim.x) - t.bundle_count, 0);
@@ -220,13 +224,13 @@ struct alignas(16) FaceRounds {
     slot = figures.next_pair;
   }
   /// At the beginning of a round: what the last one's look tells.
-  __device__ __forceinline__ void learn(const CudaFaces& f, int round, float dt) {
+  __device__ __forceinline__ void learn(int round, float dt) {
     if (next != round - 1) return;
-    CudaFaceFigures& figures = *f.looks.figures;
+    CudaFaceFigures& figures = *faces.looks.figures;
     const float fastest = __uint_as_float(__ldcg(figures.fastest_pair + slot));
     last = next;
     since = 0;
-    next = last + max(2, rounds_in(look_horizon(fastest, f.looks.cell_size, dt), dt));
+    next = last + max(2, rounds_in(look_horizon(fastest, faces.looks.cell_size, dt), dt));
     slot ^= 1;
     if (blockIdx.x == 0) figures.fastest_pair[slot] = 0;
   }
@@ -238,19 +242,19 @@ struct alignas(16) FaceRounds {
                                        static_cast<int>(gridDim.x), team)
                       : WarpTurns::own(each, rank, ranks, team);
   }
-  __device__ __forceinline__ ContactRound at(const CudaFaces& f, int round, float dt) const {
+  __device__ __forceinline__ ContactRound at(int round, float dt) const {
     ContactRound r;
     r.dt = dt;
     r.since = since_look(round, dt);
     r.look = round == next;
-    r.fresh = round == 0 && f.look_first != 0;
-    r.soften = round == 0 && dt > f.looks.figures->dt;
+    r.fresh = round == 0 && faces.look_first != 0;
+    r.soften = round == 0 && dt > faces.looks.figures->dt;
     r.move = round + 1 == next;
-    r.fastest = f.looks.figures->fastest_pair + slot;
+    r.fastest = faces.looks.figures->fastest_pair + slot;
     return r;
   }
-  __device__ __forceinline__ void end(const CudaFaces& f, int round, float dt) const {
-    CudaFaceFigures& figures = *f.looks.figures;
+  __device__ __forceinline__ void end(int round, float dt) const {
+    CudaFaceFigures& figures = *faces.looks.figures;
     figures.until_look = (next - round) * static_cast<double>(dt);
     figures.since_look = since_look(round, dt);
     figures.next_pair = slot;
@@ -266,29 +270,31 @@ struct alignas(16) FaceRounds {
   }
 };
 
-/// Contact of tissue with tissue in a round; adds the forces to `force`, of the nodes. With kMany,
-/// where all warps come to it when their blocks' forces are done, they take contacts as they come.
-/// Out of line, for the blocks to keep their registers.
+/// Contact of tissue with tissue in a round; adds the forces to `force`. With kMany, where all
+/// warps come when their forces are done, they take contacts as they come. Out of line, for the
+/// blocks to keep their registers.
 template <bool kMany>
-__device__ __noinline__ void touch_faces(const CudaFaces* faces, const FaceRounds* rounds,
-                                         int round, float dt, const CudaNodes state,
-                                         const Pushers team, unsigned* arrived, long long* force) {
-  const CudaFaces& f = *faces;
+__device__ __noinline__ void touch_faces(const FaceRounds* rounds, int round, float dt,
+                                         const CudaNodes state, const Pushers team,
+                                         unsigned* arrived, long long* force) {
+  const CudaFaces& f = rounds->faces;
   if (!kMany && !rounds->has_turns()) return;
   unsigned* counters = turn_counters(arrived, round);
   const auto turns = [&](int of, int each) {
     return kMany ? WarpTurns::next_of(counters + of, each) : rounds->turns(team, each);
   };
-  const WarpTurns of_contacts = turns(0, 32 / kContactLanes);
+  constexpr int kPushLanes = kMany ? kContactLanes / 2 : kContactLanes;  // much they do alike
+  const ContactRound now = rounds->at(round, dt);
   const auto nodes_are_there = [&] { warp_wait(arrived + 1, round + 1); };
-  const ContactRound now = rounds->at(f, round, dt);
   if (now.look || now.move) nodes_are_there();
+  // What takes a warp longest comes first, for the shortest to fill what is left until the barrier.
+  if (now.move) move_facets(f, turns(1, 32), state, dt);
+  const WarpTurns of_contacts = turns(0, 32 / (now.look ? kContactLanes : kPushLanes));
   if (now.look) {
     look_at_contacts(f, of_contacts, state, now, force);
   } else {
-    push_contacts<kMany>(f, of_contacts, state, now, nodes_are_there, force);
+    push_contacts<kMany, kPushLanes>(f, of_contacts, state, now, nodes_are_there, force);
   }
-  if (now.move) move_facets(f, turns(1, 32), state, dt);
 }
 
 }  // namespace tissue_sim

@@ -155,7 +155,7 @@ __device__ __forceinline__ void push_nodes(const CudaTables& t, const CudaFrame&
   long long* force = f.pushes.force + f.pushes.stride * (round % 3);
   const auto touch = [&] {
     if constexpr (kTouches) {
-      touch_faces<!kPairs>(f.faces, s.rounds, round, dt, state, pushers, f.arrived, force);
+      touch_faces<!kPairs>(s.rounds, round, dt, state, pushers, f.arrived, force);
     }
   };
   if (kTouches && f.near_cells == nullptr) return touch();
@@ -210,9 +210,9 @@ __global__ void __launch_bounds__(kMaxCudaThreads, 1)
   for (int round = 0; round <= f.substeps; ++round) {
     if (round > 0) grid_barrier(f.arrived, static_cast<unsigned>(round));
     if (kTouches && threadIdx.x == 0) {
-      s.rounds->learn(*f.faces, round, f.step.dt);
+      s.rounds->learn(round, f.step.dt);
       if (mine == 0) clear_next_turns(f.arrived, round);
-      if (round == f.substeps && mine == 0) s.rounds->end(*f.faces, round, f.step.dt);
+      if (round == f.substeps && mine == 0) s.rounds->end(round, f.step.dt);
     }
     if (idle) {
       if (round < f.substeps) nodes_are_there(f);

@@ -49,7 +49,6 @@ __device__ __forceinline__ std::int32_t node_around(const CudaLooks& s, const Cu
 template <class Group>
 struct LanePlace {
   static constexpr int kLaneNodes = Group::kNodes;
-
   std::int32_t node[kLaneNodes];
   float4 u[kLaneNodes];      // displacement [m]
   float weight[kLaneNodes];  // 0 where there is no node

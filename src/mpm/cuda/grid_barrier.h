@@ -5,15 +5,6 @@
 
 namespace tissue_sim {
 
-/// Of CudaFrame::arrived, in a round: how many contacts and how many facets somebody has taken.
-__device__ __forceinline__ unsigned* turn_counters(unsigned* arrived, int round) {
-  return arrived + kFirstTurns + (round % 2) * 2;
-}
-/// For the round after this one: what they tell is of the last round, whose turns are all over.
-__device__ __forceinline__ void clear_next_turns(unsigned* arrived, int round) {
-  for (int i = 0; i < 2; ++i) __stcg(turn_counters(arrived, round + 1) + i, 0u);
-}
-
 /// A thread block says that it has come to a barrier of the grid, and goes on.
 __device__ __forceinline__ void arrive(unsigned* arrived, unsigned thread = 0) {
   __syncthreads();

@@ -9,47 +9,9 @@
 
 #include "mpm/cuda/add_push.h"
 #include "mpm/cuda/contact_lanes.h"
-#include "mpm/cuda/grid_barrier.h"
+#include "mpm/cuda/warp_turns.h"
 
 namespace tissue_sim {
-
-/// What a warp takes of work that is spread over the grid, some pieces at a time: its own turns, or
-/// the next ones that nobody has.
-class WarpTurns {
- public:
-  /// Those of the warps of a team in each of `blocks` thread blocks, of which this is number `rank`
-  /// (< 0: none). Different thread blocks come first, then different warps.
-  static __device__ __forceinline__ WarpTurns own(int each, int rank, int blocks,
-                                                  const Pushers& team) {
-    constexpr int kNone = 1 << 30;
-    const int warp = team.me() / 32, warps = team.size() / 32;
-    return {nullptr, rank < 0 ? kNone : each * (warp * blocks + rank), each * warps * blocks};
-  }
-  /// Those that a counter, from 0 on, has left: who is free first takes most.
-  static __device__ __forceinline__ WarpTurns next_of(unsigned* counter, int each) {
-    WarpTurns turns(counter, 0, each);
-    turns.first_ = turns.after(0);
-    return turns;
-  }
-
-  /// The first piece of the first turn.
-  __device__ __forceinline__ int first() const { return known(first_); }
-  /// Asks for the turn after the one that begins with piece `first`: it is known() later.
-  __device__ __forceinline__ int after(int first) const {
-    if (counter_ == nullptr) return first + step_;
-    return threadIdx.x % 32 == 0 ? static_cast<int>(atomicAdd(counter_, step_)) : 0;
-  }
-  __device__ __forceinline__ int known(int first) const {
-    return counter_ == nullptr ? first : __shfl_sync(0xffffffffu, first, 0);
-  }
-
- private:
-  __device__ __forceinline__ WarpTurns(unsigned* counter, int first, int step)
-      : counter_(counter), first_(first), step_(step) {}
-
-  unsigned* counter_;
-  int first_, step_;
-};
 
 /// What a substep does with contacts.
 struct ContactRound {
@@ -209,7 +171,7 @@ struct alignas(16) FaceRounds {
   int slot;     ///< of CudaFaceFigures::fastest_pair that the next look takes
   int rank;     ///< CudaBundle::rank; thread blocks without a bundle come after those that have one
   int ranks;    ///< that there are
-  CudaFaces faces;  ///< a copy
+  CudaFaces faces;  ///< of the launch
 
   __device__ __forceinline__ void begin(const CudaTables& t, const CudaFaces& f, float dt) {
     faces = f;
@@ -283,7 +245,8 @@ __device__ __noinline__ void touch_faces(const FaceRounds* rounds, int round, fl
   const auto turns = [&](int of, int each) {
     return kMany ? WarpTurns::next_of(counters + of, each) : rounds->turns(team, each);
   };
-  constexpr int kPushLanes = kMany ? kContactLanes / 2 : kContactLanes;  // much they do alike
+  // Much of a push all lanes do alike: where there are many contacts, fewer lanes do more a warp.
+  constexpr int kPushLanes = kMany ? kContactLanes / 2 : kContactLanes;
   const ContactRound now = rounds->at(round, dt);
   const auto nodes_are_there = [&] { warp_wait(arrived + 1, round + 1); };
   if (now.look || now.move) nodes_are_there();

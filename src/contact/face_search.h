@@ -81,6 +81,29 @@ TISSUE_SIM_INLINE bool touches(const PieceSize& a, const PieceSize& b) {
   return a.points != b.points ? a.points < b.points : a.id > b.id;
 }
 
+/// Whether one of two facets of a piece lies so deep behind the other that they do not meet from
+/// the front before the next search: what is between them is tissue, as at a thin rim.
+TISSUE_SIM_INLINE bool are_back_to_back(const FacetMotion& a, const FacetMotion& b,
+                                        double cell_size) {
+  constexpr double kBehind = 1;  // [cells]; deeper than any contact holds
+  const float d[3] = {b.x[0] - a.x[0], b.x[1] - a.x[1], b.x[2] - a.x[2]};
+  const auto behind = static_cast<float>(-kBehind * cell_size);
+  return dot(d, a.normal) < behind || -dot(d, b.normal) < behind;
+}
+
+/// One over the time until two facets may be as near as those that are listed at rest [1/s], where
+/// the fastest of all moves at this speed against their mean [m/s].
+TISSUE_SIM_INLINE float rate_of_meeting(const FacetMotion& a, const FacetMotion& b, float fastest,
+                                        double cell_size) {
+  float far = 0, speed2 = 0;
+  for (int i = 0; i < 3; ++i) {
+    far = fmaxf(far, fabsf(a.x[i] - b.x[i]));
+    speed2 += (a.v[i] - b.v[i]) * (a.v[i] - b.v[i]);
+  }
+  const float gap = far - 2 * (kSearchReach + kSkin) * static_cast<float>(cell_size);
+  return gap > 0 ? (kForesight * sqrtf(speed2) + fastest) / gap : 1e30f;
+}
+
 /// Whether bonds lead from a point's site to another's close by, never away from it: then no cut
 /// parts them. `bonds_at(x, y, z)` are those of the point at a site.
 template <class Bonds>

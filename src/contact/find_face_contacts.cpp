@@ -130,7 +130,8 @@ bool search(MpmState& s, const Pieces& pieces) {
       static_cast<int>(pairs.size()),
       [&](int i) {
         const auto& [a, b] = pairs[i];
-        one[i] = piece[a].id == piece[b].id && are_one(s, a, b);
+        one[i] = piece[a].id == piece[b].id &&
+                 (are_back_to_back(faces.motion[a], faces.motion[b], cell) || are_one(s, a, b));
       },
       64);
   std::size_t left = 0;

@@ -35,23 +35,16 @@ CudaFacet facet_on_device(const MpmState& s, const Block& block, const Facet& fa
 
 }  // namespace
 
-bool CudaMpmTissue::faces_may_meet() const {
-  return pieces_.all.size() > 1 ||
-         static_cast<int>(state_->nodes.size()) > state_->blocks.first_split_node;
-}
-
 void CudaMpmTissue::run_substeps(int begin, int end) {
   while (begin < end) {
     // Substeps of a launch have one length and one kick: one after a change is a launch of its own.
     const float dt = part_.at(begin);
     int count = part_.is_even_from(begin) && kick_of(state_->dt, dt) == dt ? end - begin : 1;
-    if (faces_may_meet()) {
-      FaceContacts& faces = state_->faces;
-      if (is_due(faces.until_search, dt)) search_faces(dt);
-      const double last = std::ceil(faces.until_search / dt - 0.5);
-      count = std::max(1, static_cast<int>(std::min<double>(count, last)));
-      faces.until_search -= count * static_cast<double>(dt);
-    }
+    FaceContacts& faces = state_->faces;
+    if (is_due(faces.until_search, dt)) search_faces(dt);
+    const double last = std::ceil(faces.until_search / dt - 0.5);
+    count = std::max(1, static_cast<int>(std::min<double>(count, last)));
+    faces.until_search -= count * static_cast<double>(dt);
     launch(begin, begin + count, dt);
     begin += count;
   }
@@ -61,11 +54,21 @@ void CudaMpmTissue::upload_lattices() {
   FacesOnDevice& f = device_->faces;
   if (f.lattices.size() > 0) return;
   std::vector<CudaLattice> lattices;
-  std::vector<std::int32_t> point_at;
+  std::size_t sites = 0;
   for (const LatticeBody& b : state_->bodies) {
     const Vec3 origin = b.node_position(0, 0, 0);
-    lattices.push_back(
-        {{origin[0], origin[1], origin[2]}, b.cell_size, 2 * b.nx, 2 * b.ny, point_at.size()});
+    lattices.push_back({{origin[0], origin[1], origin[2]}, b.cell_size, 2 * b.nx, 2 * b.ny, sites});
+    sites += std::size_t{8} * b.nx * b.ny * b.nz;
+  }
+  f.lattices.upload(lattices, device_->stream);
+  check_cuda(cudaStreamSynchronize(device_->stream), "receive data");
+}
+
+void CudaMpmTissue::upload_sites() {
+  FacesOnDevice& f = device_->faces;
+  if (f.point_at.size() > 0) return;
+  std::vector<std::int32_t> point_at;
+  for (const LatticeBody& b : state_->bodies) {
     const std::size_t first = point_at.size();
     point_at.resize(first + std::size_t{8} * b.nx * b.ny * b.nz, -1);
     for (int p = b.first_point; p < b.first_point + b.point_count; ++p) {
@@ -73,7 +76,6 @@ void CudaMpmTissue::upload_lattices() {
       point_at[first + (std::size_t(s.z) * 2 * b.ny + s.y) * 2 * b.nx + s.x] = p;
     }
   }
-  f.lattices.upload(lattices, device_->stream);
   f.point_at.upload(point_at, device_->stream);
   check_cuda(cudaStreamSynchronize(device_->stream), "receive data");
 }
@@ -108,7 +110,6 @@ void CudaMpmTissue::upload_facets() {
   f.motion.resize(count);
   f.listed.resize(count);
   f.listed.clear(d.stream);
-  f.springs.resize(count);
   for (auto* of_facet : {&f.first_near, &f.near_count, &f.contacts, &f.involved, &f.rank}) {
     of_facet->resize(count);
   }
@@ -125,7 +126,15 @@ void CudaMpmTissue::upload_facets() {
   while (buckets < 2 * count) buckets *= 2;
   f.bucket_begin.resize(buckets);
   f.bucket_count.resize(buckets);
-  f.near.resize(std::max(f.near.size(), 8 * count));
+  if (f.springs.size() > 0) begin_contacts();
+}
+
+void CudaMpmTissue::begin_contacts() {
+  OnDevice& d = *device_;
+  FacesOnDevice& f = d.faces;
+  upload_sites();
+  f.near.resize(std::max(f.near.size(), 8 * f.facets.size()));
+  f.springs.resize(f.facets.size());
   f.springs.clear(d.stream);  // padding included: they are copied 16 bytes at a time
   launch_fresh_contacts(looks(), d.stream);
 }
@@ -171,6 +180,7 @@ void CudaMpmTissue::search_faces(float dt) {
   upload_facets();
   faces.until_search = kHorizon;
   f.contacts_count = 0;
+  f.may_meet = false;
   if (f.facets.size() == 0) return;
   const CudaSearchRoom room{f.sums.data(),         static_cast<std::int32_t>(f.bucket_count.size()),
                             f.bucket_begin.data(), f.bucket_count.data(),
@@ -188,10 +198,17 @@ void CudaMpmTissue::search_faces(float dt) {
   if (!f.lists_hold) return;  // as the end of the frame will say
   faces.until_search = figures.horizon;
   while (figures.listed_anew != 0 && static_cast<std::size_t>(figures.near) > f.near.size()) {
-    f.near.resize(static_cast<std::size_t>(figures.near) * 3 / 2);
+    if (f.springs.size() == 0) begin_contacts();
+    f.near.resize(std::max(f.near.size(), static_cast<std::size_t>(figures.near) * 3 / 2));
     launch_lists(looks(), room, d.stream);
     read();
   }
+  float meeting;
+  std::memcpy(&meeting, &figures.meeting, sizeof(meeting));
+  // While none can meet they cost nothing, but fewer substeps than so many are not worth a search.
+  constexpr double kFewSubsteps = 16;
+  f.may_meet = meeting * kFewSubsteps * dt > 1;
+  if (!f.may_meet) faces.until_search = std::min(faces.until_search, 1.0 / (meeting + 1e-9));
   f.contacts_count = figures.contacts;
   f.involved_count = figures.involved;
   if (f.nodes.size() < static_cast<std::size_t>(figures.contacts)) {
@@ -210,9 +227,7 @@ void CudaMpmTissue::search_faces(float dt) {
 const CudaFaces* CudaMpmTissue::faces_of_launch() {
   OnDevice& d = *device_;
   FacesOnDevice& f = d.faces;
-  if (!faces_may_meet() || f.contacts_count == 0 || f.version != state_->faces.version) {
-    return nullptr;
-  }
+  if (!f.may_meet || f.version != state_->faces.version) return nullptr;
   const std::vector<CudaBundle>& bundles = d.host_tables.bundles;
   const auto ranks = std::count_if(
       bundles.begin(), bundles.begin() + std::min<std::ptrdiff_t>(d.touch_resident, bundles.size()),

@@ -80,6 +80,7 @@ void CudaMpmTissue::read_places(const float4* u_before) {
   OnDevice& d = *device_;
   SweepOnDevice& on = d.sweep;
   upload_lattices();
+  upload_sites();
   std::vector<CudaBlockCell> cells;
   for (const int index : d.host_tables.of_host) {
     const Block& b = *state_->blocks.all[index];
@@ -131,7 +132,7 @@ bool CudaMpmTissue::take_apart(const std::vector<std::int32_t>& changed) {
 
 std::vector<int> CudaMpmTissue::label_pieces() {
   OnDevice& d = *device_;
-  upload_lattices();
+  upload_sites();
   if (d.labels.empty()) {
     std::vector<std::int32_t> lowest(pieces_.of_point.size());
     state_->cpu->for_each(

@@ -89,10 +89,10 @@ class CudaMpmTissue final : public Tissue {
   /// Enqueues the part's substeps from `begin` up to `end`; waits for each search of faces.
   void run_substeps(int begin, int end);
   void launch(int begin, int end, float dt);
-  /// Whether tissue can touch tissue. A body that is whole does not touch itself.
-  bool faces_may_meet() const;
   void upload_lattices();
+  void upload_sites();  ///< which point is where in the lattices
   void upload_facets();
+  void begin_contacts();  ///< all anew; until any facets may touch, they take no memory
   void search_faces(
       float dt);  ///< and says when the next search is due: FaceContacts::until_search
   CudaLooks looks() const;

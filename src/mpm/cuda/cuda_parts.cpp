@@ -54,7 +54,7 @@ void CudaMpmTissue::save_checkpoint() {
   launch_list_held(d.with.data(), d.hold.data(), static_cast<int>(d.with.size()), saved.held.data(),
                    static_cast<int>(saved.held.size()), saved.held_count.data(), d.stream);
   saved.held_count.download(saved.host_held_count.data(), 1, d.stream);
-  saved.new_facets = f.version != state_->faces.version;
+  saved.new_facets = f.version != state_->faces.version || f.springs.size() == 0;
   if (!saved.new_facets) {
     saved.springs.copy(f.springs, d.stream);
     saved.figures.copy(f.figures, d.stream);

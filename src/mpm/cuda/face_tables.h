@@ -52,6 +52,7 @@ struct CudaFaceFigures {
   float dt;                  ///< of the last substep [s]
   unsigned fastest;          ///< facet against the mean [m/s]
   unsigned largest_reach;    ///< [m]
+  unsigned meeting;          ///< rate_of_meeting() of the first two of the lists [1/s]
   unsigned fastest_pair[2];  ///< of looks in turn [m/s]
   int next_pair;             ///< which of them the next look takes
   int listed_anew;           ///< whether the lists no longer held
@@ -74,7 +75,7 @@ struct CudaLooks {
   double cell_size;  ///< the scene's, and of all lattices [m]
   const CudaFacet* facets;
   const CudaLattice* lattices;
-  const std::int32_t* point_at;           ///< [2 nz][2 ny][2 nx], -1 for none, body after body
+  const std::int32_t* point_at;           ///< [2 nz][2 ny][2 nx], -1: none, by bodies; or null
   const std::uint8_t* bonds;              ///< per point
   const std::int32_t* slot_node;          ///< CudaTables::slot_node
   FacetMotion* motion;                    ///< per facet; up to date where a contact needs it

@@ -84,12 +84,15 @@ __global__ void fill_grid(const CudaLooks s, const CudaSearchRoom room) {
   room.sorted[room.begin[Grid(s, room).bucket_at(x)] + room.rank[f]] = seeker;
 }
 
-/// Whether a facet touches another that may meet it: they face one another, and no bonds bind them.
+/// Whether a facet touches another that may meet it: they face one another, and no bonds bind them,
+/// as far as point_at is there to tell.
 __device__ __forceinline__ bool may_touch(const CudaLooks& s, int f, int g) {
   if (f == g || dot(s.motion[f].normal, s.motion[g].normal) > kFacing) return false;
   const CudaFacet &p = s.facets[f], &q = s.facets[g];
   if (!touches(p.piece, q.piece)) return false;
   if (p.piece.id != q.piece.id) return true;
+  if (are_back_to_back(s.motion[f], s.motion[g], s.cell_size)) return false;
+  if (s.point_at == nullptr) return true;
   const CudaLattice& lattice = s.lattices[p.body];
   return !are_bound({p.site[0], p.site[1], p.site[2]}, {q.site[0], q.site[1], q.site[2]},
                     [&](int x, int y, int z) {
@@ -168,7 +171,7 @@ __global__ void __launch_bounds__(kThreads)
     s.first_near[f] = 0;
   }
   if (all == 0) {
-    if (lane == 0) {
+    if (lane == 0 && s.springs != nullptr) {
       s.springs[f].other = -1;
       s.springs[f].touching = false;
     }
@@ -179,12 +182,14 @@ __global__ void __launch_bounds__(kThreads)
   if (lane == 0) {
     first = atomicAdd(&s.figures->near, places);
     s.first_near[f] = first;
+  }
+  first = __shfl_sync(0xffffffffu, first, 0);
+  if (static_cast<std::size_t>(first) + places > s.near_capacity) return;
+  if (lane == 0) {
     s.contacts[atomicAdd(&s.figures->contacts, 1)] = f;
     s.is_involved[f] = 1;
     if (s.springs[f].other >= 0) s.is_involved[s.springs[f].other] = 1;
   }
-  first = __shfl_sync(0xffffffffu, first, 0);
-  if (static_cast<std::size_t>(first) + places > s.near_capacity) return;
   std::int32_t* unsorted = fits ? found.facet : s.near + first + all;
   if (!fits) {
     __syncwarp();
@@ -201,9 +206,12 @@ __global__ void __launch_bounds__(kThreads)
   }
 }
 
-/// Whether lists were made.
+/// Whether there are lists, and whether they were made anew.
+__device__ __forceinline__ bool lists_fit(const CudaLooks& s) {
+  return !out_of_control(s) && static_cast<std::size_t>(s.figures->near) <= s.near_capacity;
+}
 __device__ __forceinline__ bool lists_made(const CudaLooks& s) {
-  return lists_wanted(s) && static_cast<std::size_t>(s.figures->near) <= s.near_capacity;
+  return lists_wanted(s) && lists_fit(s);
 }
 
 /// Facets that looks ask for, and the nodes that contacts may push.
@@ -222,8 +230,24 @@ __global__ void list_involved(const CudaLooks s) {
 /// The slots of these nodes.
 __global__ void mark_slots(const CudaLooks s) {
   const int slot = thread_index();
-  if (slot >= s.slot_count || !lists_made(s)) return;
+  if (slot >= s.slot_count || !lists_made(s) || s.figures->contacts == 0) return;
   mark_slot(s.slot_node, s.slot_parts, s.marks, slot, s.pushed_parts);
+}
+
+/// How soon the first two of the lists may meet.
+__global__ void find_meeting(const CudaLooks s) {
+  const int f = thread_index();
+  float rate = 0;
+  if (f < s.facet_count && lists_fit(s)) {
+    const float fastest = __uint_as_float(s.figures->fastest);
+    const std::int32_t* near = s.near + s.first_near[f];
+    for (int i = 0; i < s.near_count[f]; ++i) {
+      const FacetMotion& other = s.motion[near[i]];
+      rate = fmaxf(rate, rate_of_meeting(s.motion[f], other, fastest, s.cell_size));
+    }
+    if (s.near_count[f] > 0 && s.springs[f].touching) rate = 1e30f;
+  }
+  take_largest(__float_as_uint(rate), &s.figures->meeting);
 }
 
 }  // namespace
@@ -238,6 +262,7 @@ void launch_lists(const CudaLooks& looks, const CudaSearchRoom& room, cudaStream
   find_near<<<blocks_for(32 * looks.facet_count), kThreads, 0, stream>>>(looks, room);
   list_involved<<<blocks, kThreads, 0, stream>>>(looks);
   mark_slots<<<blocks_for(static_cast<int>(looks.slot_count)), kThreads, 0, stream>>>(looks);
+  find_meeting<<<blocks, kThreads, 0, stream>>>(looks);
   check_launch();
 }
 

@@ -95,7 +95,7 @@ struct CudaMpmTissue::OnDevice {
     DeviceArray<FaceSpring> springs;
     DeviceArray<CudaFaceFigures> figures;
     std::vector<KeptContact> kept;
-    bool new_facets = false;  ///< there were some that had not gone up
+    bool new_facets = false;  ///< there were some without a spring yet
     double time = 0;
     float dt = 0;
     FrameResult result;

@@ -90,7 +90,7 @@ __global__ void __launch_bounds__(kThreads)
     figures.mean_velocity[a] = all[0][a] / count;
     figures.mean_moved[a] = all[0][3 + a] / count;
   }
-  figures.fastest = 0;
+  figures.fastest = figures.meeting = 0;
   figures.listed_anew = anew ? 1 : 0;
 }
 

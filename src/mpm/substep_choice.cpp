@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
+#include <utility>
 
 #include "contact/frame_colliders.h"
 
@@ -20,6 +21,8 @@ constexpr double kFreeMotion = 0.25;     // of a tool in a part [cells]; beyond 
 constexpr double kCalmTrend = 1.2;       // of the stiffness in a part: the next one is longer ...
 constexpr double kMostTrend = 1.3;       // ... or shorter
 constexpr int kShortestPart = 6;         // substeps
+constexpr double kSwing = 0.06;          // [s]; where nothing damps substeps are as short as the
+constexpr double kLonger = 1.1;          // shortest of one or two, until all are longer by that
 constexpr double kMostAbove = 1.1;       // the first substep over what all should come to: that, or
                                          // what the trend, which is not there yet, takes from it
 constexpr double kBorne = 0.9;           // of the limit at the end of a part: else it is undone ...
@@ -36,6 +39,15 @@ constexpr double kHalf = 0.5;            // and done again with substeps half as
 bool tears(const MpmState& state) {
   return std::any_of(state.tore_at.begin(), state.tore_at.end(),
                      [&](double time) { return state.time - time < 0.05; });
+}
+
+/// Whether nothing takes energy from some of the tissue.
+bool conserves_energy(const MpmState& state) {
+  return state.scene.damping == 0 &&
+         std::any_of(state.bodies.begin(), state.bodies.end(), [](const LatticeBody& body) {
+           return std::any_of(body.materials.begin(), body.materials.end(),
+                              [](const Material& m) { return m.viscosity == 0; });
+         });
 }
 
 /// What gravity may have done in a part, at the most [J].
@@ -166,10 +178,22 @@ void SubstepChoice::measure_if_due(MpmState& state, const MeasureLimit& measure)
 double SubstepChoice::longest(MpmState& state, const FrameInput& input,
                               const Stiffening& stiffening, const MeasureLimit& measure) {
   const double cautious = stable_substep(state, stiffening);
-  const double foreseen = longest_foreseen(state, input, stiffening, cautious, measure);
+  double foreseen = longest_foreseen(state, input, stiffening, cautious, measure);
   const bool at_once = shortened_ < 1 || foreseen <= cautious;
+  if (!at_once && conserves_energy(state)) foreseen = held(state.time, foreseen);
   most_ = at_once ? 0 : std::max(kMostAbove, std::sqrt(trend_)) * foreseen;
   return shortened_ * foreseen;
+}
+
+double SubstepChoice::held(double time, double foreseen) {
+  if (time >= swing_end_) {
+    of_last_swing_ = std::exchange(of_swing_, INFINITY);
+    swing_end_ = time + kSwing;
+  }
+  of_swing_ = std::min(of_swing_, foreseen);
+  const double shortest = std::min(of_swing_, of_last_swing_);
+  if (shortest < held_ || shortest > kLonger * held_) held_ = shortest;
+  return held_;
 }
 
 double SubstepChoice::longest_foreseen(MpmState& state, const FrameInput& input,

@@ -59,6 +59,9 @@ class SubstepChoice {
   /// longest() as long as no part had to be undone.
   double longest_foreseen(MpmState& state, const FrameInput& input, const Stiffening& stiffening,
                           double cautious, const MeasureLimit& measure);
+  /// The same for tissue that nothing damps: it swings for long, and each change of its substeps
+  /// would add to its energy. They are as short as the shortest of a swing.
+  double held(double time, double foreseen);
   void measure_if_due(MpmState& state, const MeasureLimit& measure);
 
   double limit_ = 0;        ///< when it was measured last [s]; 0 where it is not known
@@ -68,10 +71,12 @@ class SubstepChoice {
   double trend_ = 1;        ///< of the stiffness in the last part, at most
   double part_ = 0;         ///< how long the next part may be [s], ...
   double most_ = 0;  ///< ... and its first substep, until they are as short as they should be
-  double followed_at_ = 0;  ///< [s]
-  double energy_ = NAN;     ///< after the last part that was borne [J]
-  double shortened_ = 1;    ///< how much substeps are shorter than they would be, after parts that
-                            ///< were not borne
+  double held_ = INFINITY;                                                 ///< see held() [s]
+  double of_swing_ = INFINITY, of_last_swing_ = INFINITY, swing_end_ = 0;  ///< the same
+  double followed_at_ = 0;                                                 ///< [s]
+  double energy_ = NAN;   ///< after the last part that was borne [J]
+  double shortened_ = 1;  ///< how much substeps are shorter than they would be, after parts that
+                          ///< were not borne
 };
 
 /// How a part of a frame ended, and at which share of the frame: where something tears, early.

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cstring>
 
+#include "contact/face_contact.h"
 #include "cut_scenes.h"
 #include "either_device.h"
 #include "momentum.h"
@@ -20,7 +21,8 @@ TYPED_TEST_SUITE(UndoneParts, Tissues, DeviceName);
 double energy(const FrameResult& r) { return r.kinetic_energy + r.elastic_energy; }
 
 /// A free body flies apart so fast that it stiffens manyfold before its first frame is over: the
-/// substep that it bore at rest is too long by then.
+/// substep that it bore at rest is too long by then. It then crumples; its faces pass through one
+/// another, for where they met they would take energy.
 TYPED_TEST(UndoneParts, TissueMayStiffenManyfoldWithinAFrame) {
   for (const float rate : {240.0f, 400.0f}) {  // [1/s]
     Scene scene = soft_body(0.3, Vec3(8, 8, 8));
@@ -28,6 +30,8 @@ TYPED_TEST(UndoneParts, TissueMayStiffenManyfoldWithinAFrame) {
     TypeParam tissue(scene);
     pull(tissue);
     MpmState& s = tissue.state();
+    for (Block* block : s.blocks.all) block->facets.clear();
+    list_facets(s);
     const std::vector<Vec3> home = homes(s);
     for (std::size_t i = 0; i < home.size(); ++i) {
       for (int a = 0; a < 3; ++a) s.nodes.v[a][i] = rate * static_cast<float>(home[i][a]);

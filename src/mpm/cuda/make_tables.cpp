@@ -230,13 +230,16 @@ void make_tables(const MpmState& state, const std::vector<std::vector<int>>& bun
   t.bundles.clear();
   t.columns.clear();
   t.max_slots = t.max_plane_slots = t.max_columns = 0;
-  int first = 0, rank = 0;
+  int first = 0, partial = 0, rank = 0;
   for (const std::vector<int>& blocks : bundles) {
     add_bundle(first, static_cast<int>(blocks.size()), columns, t);
-    CudaBundle& bundle = t.bundles.back();
-    bundle.rank = bundle.partial != 0 ? -1 : rank++;
+    partial += t.bundles.back().partial != 0 ? 1 : 0;
     first += static_cast<int>(blocks.size());
   }
+  // Those with partial cells take longer, and others push contacts for them; but of a body that
+  // does not fill its box most have some.
+  const bool most = 2 * partial > static_cast<int>(bundles.size());
+  for (CudaBundle& bundle : t.bundles) bundle.rank = bundle.partial != 0 && !most ? -1 : rank++;
 }
 
 void pack_nodes(const Nodes& n, Cpu& cpu, float4* u, float4* v) {

@@ -51,7 +51,7 @@ struct CudaBundle {
   int plane_slots;            ///< of a plane of nodes of all its blocks
   int nz;                     ///< of the tallest block
   int partial;                ///< some cells are stabilised
-  int rank;                   ///< among those without such cells, which take less time; else -1
+  int rank;                   ///< among those that push contacts as well; else -1
 };
 
 /// A column of cells, for the one or two threads that walk up it.

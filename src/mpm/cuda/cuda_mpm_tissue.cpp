@@ -57,7 +57,6 @@ CudaMpmTissue::CudaMpmTissue(const Scene& scene) : device_(std::make_unique<OnDe
       state_->bodies.size() > 1 ? d.cut_shape : choose_shape(state_->bodies, d.limits, true),
       d.limits.processors);
   pieces_ = whole_pieces(state_->bodies, state_->points);
-  notes_.push_back("runs on the GPU (" + d.gpu + ")");
   push();
   launch_measure();
   finish_measure();

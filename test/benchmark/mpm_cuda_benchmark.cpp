@@ -82,7 +82,7 @@ void run(benchmark::State& bench, const CubeSize& size, Law law, Extra extra) {
     bench.counters["v_error"] = worst / moved;
     // Faces of a fresh cut are zero deep in one another: whether one touches is a matter of
     // rounding, and light nodes show it.
-    const double bound = is_cut ? 2e-2 : 1e-3;
+    const double bound = in_contact ? 2e-2 : 1e-3;
     if (!(worst < bound * moved)) {
       const std::string by = std::to_string(worst / moved);
       bench.SkipWithError(("the GPU's velocities are not the CPU's, by " + by).c_str());

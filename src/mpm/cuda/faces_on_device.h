@@ -32,7 +32,7 @@ struct FacesOnDevice {
   bool lists_hold = false;      ///< there are lists
   int contacts_count = 0, involved_count = 0;  ///< see CudaFaceFigures
   bool searched = false;                       ///< and not looked at since
-  bool may_meet = false;                       ///< any two before the next search
+  bool may_meet = false;                       ///< whether any two may before the next search
 
   std::size_t bytes() const {
     return facets.bytes() + lattices.bytes() + motion.bytes() + listed.bytes() + springs.bytes() +

@@ -1,8 +1,10 @@
 // Contact of tissue with tissue where the tissue lives on a GPU: facets go up when there are new
-// ones, the search and the looks run there, and the host waits once in a search for its figures.
+// ones, the search and the looks run there. The host needs the figures of a search: those of one
+// that the end of a frame foresees come with the frame's, for one within a frame it waits.
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <utility>
 
 #include "contact/face_places.h"
 #include "mpm/cuda/on_device.h"
@@ -41,7 +43,11 @@ void CudaMpmTissue::run_substeps(int begin, int end) {
     const float dt = part_.at(begin);
     int count = part_.is_even_from(begin) && kick_of(state_->dt, dt) == dt ? end - begin : 1;
     FaceContacts& faces = state_->faces;
-    if (is_due(faces.until_search, dt)) search_faces(dt);
+    if (is_due(faces.until_search, dt)) {
+      begin_search();
+      check_cuda(cudaStreamSynchronize(device_->stream), "search contacts");
+      finish_search(dt);
+    }
     const double last = std::ceil(faces.until_search / dt - 0.5);
     count = std::max(1, static_cast<int>(std::min<double>(count, last)));
     faces.until_search -= count * static_cast<double>(dt);
@@ -172,26 +178,33 @@ CudaLooks CudaMpmTissue::looks() const {
   return s;
 }
 
-void CudaMpmTissue::search_faces(float dt) {
+void CudaMpmTissue::begin_search() {
+  OnDevice& d = *device_;
+  FacesOnDevice& f = d.faces;
+  upload_lattices();
+  upload_facets();
+  if (f.facets.size() == 0) return;
+  launch_search(looks(), d.present(), f.search_room(), !f.lists_hold, d.stream);
+  f.figures.download(f.host_figures.data(), 1, d.stream);
+  f.search_begun = true;
+}
+
+void CudaMpmTissue::search_ahead() {
+  const FacesOnDevice& f = device_->faces;
+  const FaceContacts& faces = state_->faces;
+  const bool same_facets = f.version == faces.version && !f.pieces_changed;
+  if (same_facets && blades_.empty() && is_due(faces.until_search, state_->dt)) begin_search();
+}
+
+void CudaMpmTissue::finish_search(float dt) {
   OnDevice& d = *device_;
   FacesOnDevice& f = d.faces;
   FaceContacts& faces = state_->faces;
-  upload_lattices();
-  upload_facets();
+  const CudaFaceFigures& figures = f.host_figures[0];
   faces.until_search = kHorizon;
   f.contacts_count = 0;
   f.may_meet = false;
-  if (f.facets.size() == 0) return;
-  const CudaSearchRoom room{f.sums.data(),         static_cast<std::int32_t>(f.bucket_count.size()),
-                            f.bucket_begin.data(), f.bucket_count.data(),
-                            f.rank.data(),         f.sorted.data()};
-  const CudaFaceFigures& figures = f.host_figures[0];
-  const auto read = [&] {
-    f.figures.download(f.host_figures.data(), 1, d.stream);
-    check_cuda(cudaStreamSynchronize(d.stream), "search contacts");
-  };
-  launch_search(looks(), d.present(), room, !f.lists_hold, d.stream);
-  read();
+  if (!std::exchange(f.search_begun, false)) return;
   float fastest;
   std::memcpy(&fastest, &figures.fastest, sizeof(fastest));
   f.lists_hold = fastest < kOutOfControl;
@@ -200,8 +213,9 @@ void CudaMpmTissue::search_faces(float dt) {
   while (figures.listed_anew != 0 && static_cast<std::size_t>(figures.near) > f.near.size()) {
     if (f.springs.size() == 0) begin_contacts();
     f.near.resize(std::max(f.near.size(), static_cast<std::size_t>(figures.near) * 3 / 2));
-    launch_lists(looks(), room, d.stream);
-    read();
+    launch_lists(looks(), f.search_room(), d.stream);
+    f.figures.download(f.host_figures.data(), 1, d.stream);
+    check_cuda(cudaStreamSynchronize(d.stream), "search contacts");
   }
   float meeting;
   std::memcpy(&meeting, &figures.meeting, sizeof(meeting));
@@ -244,7 +258,7 @@ void CudaMpmTissue::pull_contacts() {
   FaceContacts& faces = state_->faces;
   faces.all.clear();
   faces.active.clear();
-  if (f.version != faces.version || f.contacts_count == 0 || f.searched) return;
+  if (f.version != faces.version || f.contacts_count == 0) return;
   const int count = f.contacts_count;
   f.gathered.resize(count);
   f.gathered.clear(d.stream);  // the same

@@ -165,6 +165,7 @@ void CudaMpmTissue::advance(int substeps, float dt, const FrameInput& input) {
     sum_loads();
     tear(tearing, input, static_cast<double>(done) / substeps);
   }
+  search_ahead();
   launch_measure();
 }
 

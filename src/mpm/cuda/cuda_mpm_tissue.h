@@ -86,15 +86,20 @@ class CudaMpmTissue final : public Tissue {
   bool settle_wild_crumbs();  ///< the same
   void upload_points();
   void find_near(double duration);
-  /// Enqueues the part's substeps from `begin` up to `end`; waits for each search of faces.
+  /// Enqueues the part's substeps from `begin` up to `end`; waits for a search of faces that comes
+  /// due among them.
   void run_substeps(int begin, int end);
   void launch(int begin, int end, float dt);
   void upload_lattices();
   void upload_sites();  ///< which point is where in the lattices
   void upload_facets();
   void begin_contacts();  ///< all anew; until any facets may touch, they take no memory
-  void search_faces(
-      float dt);  ///< and says when the next search is due: FaceContacts::until_search
+  void begin_search();    ///< enqueues a search of faces, whose figures come to the host
+  /// Begins the search that the next substep would have to wait for, at the end of a frame whose
+  /// figures are waited for anyway.
+  void search_ahead();
+  /// Takes the figures that came, and says when the next search is due: FaceContacts::until_search.
+  void finish_search(float dt);
   CudaLooks looks() const;
   const CudaFaces* faces_of_launch();  ///< null where there are no contacts
   void pull_nodes();

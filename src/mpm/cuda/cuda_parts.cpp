@@ -20,6 +20,7 @@ PartRun CudaMpmTissue::run_part(const PartSubsteps& substeps, const FrameInput& 
   save_checkpoint();
   std::vector<TearingPoint> tearing;
   const int done = run(substeps, from, to, tearing);
+  if (tearing.empty()) search_ahead();
   const double reached = done == substeps.count ? to : substeps.share(done, from, to);
   launch_measure();
   finish_measure();

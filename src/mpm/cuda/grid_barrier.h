@@ -59,9 +59,16 @@ __device__ __forceinline__ void warp_wait(unsigned* arrived, unsigned round) {
   __syncwarp();
 }
 
-__device__ __forceinline__ void grid_barrier(unsigned* arrived, unsigned round) {
+/// All thread blocks meet; `before_it_ends` is the first thread's of each.
+template <class F>
+__device__ __forceinline__ void grid_barrier(unsigned* arrived, unsigned round,
+                                             const F& before_it_ends) {
   arrive(arrived);
-  wait(arrived, round);
+  if (threadIdx.x == 0) {
+    wait_for(arrived, round);
+    before_it_ends();
+  }
+  __syncthreads();
 }
 
 }  // namespace tissue_sim

@@ -162,8 +162,8 @@ __device__ __forceinline__ void move_facets(const CudaFaces& f, const WarpTurns&
   }
 }
 
-/// When a thread block looks at contacts; in shared memory, and changed by one thread between the
-/// barrier of the grid and the next of the thread block.
+/// When a thread block looks at contacts; in shared memory, and changed by one thread while the
+/// others wait for it at the barrier of the grid.
 struct alignas(16) FaceRounds {
   int next;     ///< round of the next look
   int last;     ///< of the last

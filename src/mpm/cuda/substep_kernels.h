@@ -200,6 +200,7 @@ __global__ void __launch_bounds__(kMaxCudaThreads, 1)
   unsigned met = 0;
   if (kTouches && threadIdx.x == 0) {
     s.rounds->begin(t, *f.faces, f.step.dt);
+    if (mine == 0) clear_next_turns(f.arrived, 0);
   }
   const BundleAtWork kept(t, kCached && !idle ? mine : 0);
   if (kCached && !idle) {
@@ -208,11 +209,14 @@ __global__ void __launch_bounds__(kMaxCudaThreads, 1)
     __syncthreads();
   }
   for (int round = 0; round <= f.substeps; ++round) {
-    if (round > 0) grid_barrier(f.arrived, static_cast<unsigned>(round));
-    if (kTouches && threadIdx.x == 0) {
-      s.rounds->learn(round, f.step.dt);
-      if (mine == 0) clear_next_turns(f.arrived, round);
-      if (round == f.substeps && mine == 0) s.rounds->end(round, f.step.dt);
+    if (round > 0) {
+      grid_barrier(f.arrived, static_cast<unsigned>(round), [&] {
+        if constexpr (kTouches) {
+          s.rounds->learn(round, f.step.dt);
+          if (mine == 0) clear_next_turns(f.arrived, round);
+          if (mine == 0 && round == f.substeps) s.rounds->end(round, f.step.dt);
+        }
+      });
     }
     if (idle) {
       if (round < f.substeps) nodes_are_there(f);

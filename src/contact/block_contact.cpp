@@ -88,7 +88,8 @@ Box bounds(const Collider& c) {
   return box;
 }
 
-void find_near_colliders(MpmState& state, const std::vector<Box>& reach, double duration) {
+void find_near_colliders(MpmState& state, const std::vector<Box>& reach, double duration,
+                         const std::vector<BlockMotion>& before) {
   Contacts& contacts = state.contacts;
   const int count = static_cast<int>(state.blocks.all.size());
   contacts.near.assign(count, {});
@@ -97,6 +98,10 @@ void find_near_colliders(MpmState& state, const std::vector<Box>& reach, double 
   contacts.until_list = 0;
   state.cpu->for_each(count, [&](int i) {
     Box box = state.motion[i].box;
+    if (!before.empty()) {
+      box.min = box.min.cwiseMin(before[i].box.min);
+      box.max = box.max.cwiseMax(before[i].box.max);
+    }
     const double margin = state.motion[i].speed * duration + 0.5 * state.scene.cell_size;
     box.min.array() -= margin;
     box.max.array() += margin;
@@ -105,6 +110,17 @@ void find_near_colliders(MpmState& state, const std::vector<Box>& reach, double 
     }
     if (contacts.near[i].empty()) contacts.touching[i].clear();
   });
+}
+
+bool came_unforeseen(const MpmState& state, const std::vector<Box>& reach) {
+  for (std::size_t i = 0; i < state.motion.size(); ++i) {
+    const std::vector<std::uint8_t>& near = state.contacts.near[i];
+    for (std::size_t c = 0; c < reach.size(); ++c) {
+      if (!overlap(state.motion[i].box, reach[c])) continue;
+      if (std::find(near.begin(), near.end(), c) == near.end()) return true;
+    }
+  }
+  return false;
 }
 
 void list_contacts(MpmState& state) {

@@ -12,8 +12,13 @@ Box bounds(const Collider& collider);
 
 /// Finds out which colliders each block may meet in a frame of `duration` seconds, from where its
 /// points are, how fast they move (MpmState::motion) and what each collider sweeps (`reach`); lets
-/// go of contacts that are out of reach.
-void find_near_colliders(MpmState& state, const std::vector<Box>& reach, double duration);
+/// go of contacts that are out of reach. `before`: where they were before, too.
+void find_near_colliders(MpmState& state, const std::vector<Box>& reach, double duration,
+                         const std::vector<BlockMotion>& before = {});
+
+/// Whether a block (MpmState::motion) has come to a collider that find_near_colliders() did not
+/// foresee, for it went faster later.
+bool came_unforeseen(const MpmState& state, const std::vector<Box>& reach);
 
 /// Makes the lists of points in contact anew after update_blocks(), with no collider near.
 void list_contacts(MpmState& state);

@@ -1,4 +1,8 @@
-// Parts of a frame: one that tissue could not bear is undone.
+// Parts of a frame: one that tissue could not bear is undone, and one in which it came to an
+// instrument unforeseen.
+#include <utility>
+
+#include "contact/block_contact.h"
 #include "cutting/tear.h"
 #include "mpm/mpm_tissue.h"
 
@@ -19,6 +23,7 @@ void MpmTissue::advance(double duration, const FrameInput& input) {
 
 PartRun MpmTissue::run_part(Frame& frame, const PartSubsteps& substeps, double from, double to) {
   save_checkpoint();
+  const std::vector<BlockMotion> begun = state_->motion;
   std::vector<TearingPoint> tearing;
   const bool watched = SubstepChoice::is_strained(*state_);
   work_ = 0;
@@ -31,8 +36,17 @@ PartRun MpmTissue::run_part(Frame& frame, const PartSubsteps& substeps, double f
     measure_energies();
     energy = {result_.kinetic_energy, result_.elastic_energy, work_, substeps.until(done)};
   }
+  const SubstepChoice before = substep_;
   if (!substep_.is_borne(*state_, modulus_, stable_substep(), substeps.at(done - 1), energy)) {
     restore_checkpoint();
+    return {PartEnd::kUndone, from};
+  }
+  measure_motion(*state_);
+  if (!std::exchange(frame.again, false) && came_unforeseen(*state_, frame.reach)) {
+    frame.again = true;
+    restore_checkpoint();
+    substep_ = before;
+    find_near_colliders(*state_, frame.reach, frame.duration, begun);
     return {PartEnd::kUndone, from};
   }
   substep_.follow(*state_, modulus_);

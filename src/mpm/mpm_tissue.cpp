@@ -108,7 +108,10 @@ void MpmTissue::tear(Frame& frame, const std::vector<TearingPoint>& tearing, dou
   MpmState& s = *state_;
   const bool threads = share < 1 && may_be_wild(s) && !s.threads.empty();  // at 1, finish() does
   if (tearing.empty() && !threads) return;
-  if (frame.blades) cut_by_blades(frame, share);
+  if (frame.blades) {
+    measure_motion(s);
+    cut_by_blades(frame, share);
+  }
   std::vector<std::int32_t> changed;
   tear_bonds(s, tearing, changed, result_.tear_report);
   if (threads) tear_threads(s, changed, result_.tear_report);
@@ -122,7 +125,6 @@ void MpmTissue::tear(Frame& frame, const std::vector<TearingPoint>& tearing, dou
 }
 
 void MpmTissue::cut_by_blades(Frame& frame, double share) {
-  measure_motion(*state_);
   const std::vector<BladePath> paths = blade_paths(state_->scene, frame.input, frame.cut_to, share);
   cut(paths, state_->u_before, frame.before, result_.blade_report);
   frame.cut_to = share;
@@ -143,6 +145,7 @@ void MpmTissue::advance(int substeps, float dt, const FrameInput& input) {
                 tearing);
     tear(frame, tearing, static_cast<double>(done) / substeps);
   }
+  measure_motion(*state_);
   end(frame);
 }
 

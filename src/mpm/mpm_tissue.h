@@ -49,6 +49,7 @@ class MpmTissue final : public Tissue {
     bool blades;                      ///< whether there are any
     double cut_to = 0;                ///< share of the frame up to which they did
     std::vector<BlockMotion> before;  ///< when they were last looked at
+    bool again = false;               ///< a part is done again: see came_unforeseen()
   };
 
   /// What a part of a frame changes until something is cut or tears.

@@ -68,7 +68,7 @@ inline void add_probes(Scene& scene, std::vector<ToolMotion>& motions) {
   motions.resize(3);
   for (int i = 0; i < 3; ++i) {
     scene.tools[i].name = "probe" + std::to_string(i);
-    // From the side: its tip a millimetre deep in the face y = 0.
+    // From the side: its tip one and a half millimetres deep in the face y = 0.
     ToolMotion& m = motions[i];
     m.present = true;
     m.begin.orientation = Quat::FromTwoVectors(Vec3::UnitZ(), Vec3::UnitY());

@@ -19,6 +19,7 @@ namespace tissue_sim {
 struct CudaFaces;
 struct CudaShape;
 struct CudaLooks;
+struct CudaReach;
 
 /// The nodes live on the GPU; lattice, bonds, blocks and pieces on the host too, where nodes around
 /// a cut are taken apart between frames.
@@ -85,7 +86,14 @@ class CudaMpmTissue final : public Tissue {
   void tame();                ///< see MpmTissue
   bool settle_wild_crumbs();  ///< the same
   void upload_points();
-  void find_near(double duration);
+  template <class Margin>
+  bool may_meet(const std::vector<BlockMotion>& motion, const Margin& margin) const;
+  CudaReach reach() const;     ///< of the frame's colliders
+  void find_near();            ///< lists the cells that they may meet
+  void look_for_unforeseen();  ///< enqueues what came_unforeseen() tells once it is done
+  /// Whether tissue has come to a collider that find_near() did not foresee, for it went faster
+  /// later.
+  bool came_unforeseen() const;
   /// Enqueues the part's substeps from `begin` up to `end`; waits for a search of faces that comes
   /// due among them.
   void run_substeps(int begin, int end);

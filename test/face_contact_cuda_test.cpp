@@ -3,10 +3,12 @@
 
 #if defined(TISSUE_SIM_CUDA)
 #include <algorithm>
+#include <cmath>
 #include <iterator>
 
 #include "compute/cuda_check.h"
 #include "contact/face_places.h"
+#include "contact/face_search.h"
 #include "cut_scenes.h"
 #include "mpm/cuda/cuda_mpm_tissue.h"
 #include "reference/mpm_reference.h"
@@ -246,6 +248,16 @@ TEST_P(FaceContactOnGpu, SameBitsRunAfterRun) {
   EXPECT_EQ(checksums[0], checksums[1]);
   EXPECT_GT(held[0].size(), 9u * 100);
   EXPECT_EQ(held[0], held[1]);
+}
+
+TEST_P(FaceContactOnGpu, TheEndOfAFrameSearchesForTheNext) {
+  CudaMpmTissue tissue(free_box(Vec3(0.031, 0.029, 0.017), 0.002));
+  const int n = static_cast<int>(std::ceil(kHorizon / tissue.stable_substep()));
+  for (int frame = 0; frame < 3; ++frame) {
+    tissue.advance(n, static_cast<float>(kHorizon / n), {});
+    EXPECT_FALSE(tissue.finish().blew_up);
+    EXPECT_NEAR(tissue.state().faces.until_search, kHorizon, 1e-5);
+  }
 }
 
 INSTANTIATE_TEST_SUITE_P(Shapes, FaceContactOnGpu,

@@ -1,39 +1,15 @@
 // Contact of tissue with tissue where the tissue lives on a GPU: facets go up when there are new
-// ones, the search and the looks run there, and the host waits once in a search for its figures.
+// ones, the search and the looks run there. The host needs the figures of a search: those of one
+// that the end of a frame foresees come with the frame's, for one within a frame it waits.
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <utility>
 
 #include "contact/face_places.h"
 #include "mpm/cuda/on_device.h"
 
 namespace tissue_sim {
-namespace {
-
-CudaFacet facet_on_device(const MpmState& s, const Block& block, const Facet& facet,
-                          int first_slot) {
-  CudaFacet f = {};
-  f.facet = facet;
-  f.pitch = block.nx + 2;
-  f.plane = f.pitch * (block.ny + 2);
-  const int z = facet.cell / block.plane, y = facet.cell % block.plane / block.pitch,
-            x = facet.cell % block.plane % block.pitch;
-  f.slot = first_slot + z * f.plane + y * f.pitch + x;
-  f.body = block.body;
-  const int cell[3] = {block.x + x, block.y + y, block.z + z};
-  const Points::Site& site = s.points.site[facet.point];
-  const std::int16_t at[3] = {site.x, site.y, site.z};
-  for (int a = 0; a < 3; ++a) {
-    f.cell[a] = static_cast<std::int16_t>(cell[a]);
-    f.site[a] = at[a];
-  }
-  const Material& m = s.bodies[block.body].material_of(s.points, facet.point);
-  f.friction = static_cast<float>(m.friction);
-  f.modulus = lame_lambda(m) + 2 * lame_mu(m);
-  return f;
-}
-
-}  // namespace
 
 void CudaMpmTissue::run_substeps(int begin, int end) {
   while (begin < end) {
@@ -41,92 +17,17 @@ void CudaMpmTissue::run_substeps(int begin, int end) {
     const float dt = part_.at(begin);
     int count = part_.is_even_from(begin) && kick_of(state_->dt, dt) == dt ? end - begin : 1;
     FaceContacts& faces = state_->faces;
-    if (is_due(faces.until_search, dt)) search_faces(dt);
+    if (is_due(faces.until_search, dt)) {
+      begin_search();
+      check_cuda(cudaStreamSynchronize(device_->stream), "search contacts");
+      finish_search(dt);
+    }
     const double last = std::ceil(faces.until_search / dt - 0.5);
     count = std::max(1, static_cast<int>(std::min<double>(count, last)));
     faces.until_search -= count * static_cast<double>(dt);
     launch(begin, begin + count, dt);
     begin += count;
   }
-}
-
-void CudaMpmTissue::upload_lattices() {
-  FacesOnDevice& f = device_->faces;
-  if (f.lattices.size() > 0) return;
-  std::vector<CudaLattice> lattices;
-  std::size_t sites = 0;
-  for (const LatticeBody& b : state_->bodies) {
-    const Vec3 origin = b.node_position(0, 0, 0);
-    lattices.push_back({{origin[0], origin[1], origin[2]}, b.cell_size, 2 * b.nx, 2 * b.ny, sites});
-    sites += std::size_t{8} * b.nx * b.ny * b.nz;
-  }
-  f.lattices.upload(lattices, device_->stream);
-  check_cuda(cudaStreamSynchronize(device_->stream), "receive data");
-}
-
-void CudaMpmTissue::upload_sites() {
-  FacesOnDevice& f = device_->faces;
-  if (f.point_at.size() > 0) return;
-  std::vector<std::int32_t> point_at;
-  for (const LatticeBody& b : state_->bodies) {
-    const std::size_t first = point_at.size();
-    point_at.resize(first + std::size_t{8} * b.nx * b.ny * b.nz, -1);
-    for (int p = b.first_point; p < b.first_point + b.point_count; ++p) {
-      const Points::Site& s = state_->points.site[p];
-      point_at[first + (std::size_t(s.z) * 2 * b.ny + s.y) * 2 * b.nx + s.x] = p;
-    }
-  }
-  f.point_at.upload(point_at, device_->stream);
-  check_cuda(cudaStreamSynchronize(device_->stream), "receive data");
-}
-
-void CudaMpmTissue::upload_facets() {
-  OnDevice& d = *device_;
-  FacesOnDevice& f = d.faces;
-  const FaceContacts& faces = state_->faces;
-  const bool renumbered = f.version != faces.version;
-  if (!renumbered && !f.pieces_changed) return;
-  const std::size_t count = faces.block_of.size();
-  std::vector<int> size(pieces_.next_id, 0);
-  for (const Fragment& piece : pieces_.all) size[piece.id] = piece.point_count;
-  f.host_facets.resize(count);
-  state_->cpu->for_each(
-      static_cast<int>(count),
-      [&](int i) {
-        const Facet& facet = facet_of(*state_, i);
-        CudaFacet& to = f.host_facets[i];
-        to = facet_on_device(*state_, block_of(*state_, i), facet,
-                             d.host_tables.first_slot[faces.block_of[i]]);
-        const std::int32_t piece = pieces_.of_point[facet.point];
-        to.piece = {piece, size[piece]};
-      },
-      256);
-  f.facets.upload(f.host_facets, d.stream);
-  check_cuda(cudaStreamSynchronize(d.stream), "receive data");
-  f.pieces_changed = false;
-  if (!renumbered) return;
-  f.version = faces.version;
-  f.lists_hold = false;
-  f.motion.resize(count);
-  f.listed.resize(count);
-  f.listed.clear(d.stream);
-  for (auto* of_facet : {&f.first_near, &f.near_count, &f.contacts, &f.involved, &f.rank}) {
-    of_facet->resize(count);
-  }
-  f.is_involved.resize(count);
-  f.takes_part.resize(count);
-  f.sorted.resize(count);
-  if (f.figures.size() == 0) {
-    f.figures.resize(1);
-    f.figures.clear(d.stream);
-  }
-  f.host_figures.resize(1);
-  f.sums.resize(search_sums(static_cast<int>(count)));
-  std::size_t buckets = 1024;
-  while (buckets < 2 * count) buckets *= 2;
-  f.bucket_begin.resize(buckets);
-  f.bucket_count.resize(buckets);
-  if (f.springs.size() > 0) begin_contacts();
 }
 
 void CudaMpmTissue::begin_contacts() {
@@ -172,26 +73,33 @@ CudaLooks CudaMpmTissue::looks() const {
   return s;
 }
 
-void CudaMpmTissue::search_faces(float dt) {
+void CudaMpmTissue::begin_search() {
+  OnDevice& d = *device_;
+  FacesOnDevice& f = d.faces;
+  upload_lattices();
+  upload_facets();
+  if (f.facets.size() == 0) return;
+  launch_search(looks(), d.present(), f.search_room(), !f.lists_hold, d.stream);
+  f.figures.download(f.host_figures.data(), 1, d.stream);
+  f.search_begun = true;
+}
+
+void CudaMpmTissue::search_ahead() {
+  const FacesOnDevice& f = device_->faces;
+  const FaceContacts& faces = state_->faces;
+  const bool same_facets = f.version == faces.version && !f.pieces_changed;
+  if (same_facets && blades_.empty() && is_due(faces.until_search, state_->dt)) begin_search();
+}
+
+void CudaMpmTissue::finish_search(float dt) {
   OnDevice& d = *device_;
   FacesOnDevice& f = d.faces;
   FaceContacts& faces = state_->faces;
-  upload_lattices();
-  upload_facets();
+  const CudaFaceFigures& figures = f.host_figures[0];
   faces.until_search = kHorizon;
   f.contacts_count = 0;
   f.may_meet = false;
-  if (f.facets.size() == 0) return;
-  const CudaSearchRoom room{f.sums.data(),         static_cast<std::int32_t>(f.bucket_count.size()),
-                            f.bucket_begin.data(), f.bucket_count.data(),
-                            f.rank.data(),         f.sorted.data()};
-  const CudaFaceFigures& figures = f.host_figures[0];
-  const auto read = [&] {
-    f.figures.download(f.host_figures.data(), 1, d.stream);
-    check_cuda(cudaStreamSynchronize(d.stream), "search contacts");
-  };
-  launch_search(looks(), d.present(), room, !f.lists_hold, d.stream);
-  read();
+  if (!std::exchange(f.search_begun, false)) return;
   float fastest;
   std::memcpy(&fastest, &figures.fastest, sizeof(fastest));
   f.lists_hold = fastest < kOutOfControl;
@@ -200,8 +108,9 @@ void CudaMpmTissue::search_faces(float dt) {
   while (figures.listed_anew != 0 && static_cast<std::size_t>(figures.near) > f.near.size()) {
     if (f.springs.size() == 0) begin_contacts();
     f.near.resize(std::max(f.near.size(), static_cast<std::size_t>(figures.near) * 3 / 2));
-    launch_lists(looks(), room, d.stream);
-    read();
+    launch_lists(looks(), f.search_room(), d.stream);
+    f.figures.download(f.host_figures.data(), 1, d.stream);
+    check_cuda(cudaStreamSynchronize(d.stream), "search contacts");
   }
   float meeting;
   std::memcpy(&meeting, &figures.meeting, sizeof(meeting));
@@ -244,7 +153,7 @@ void CudaMpmTissue::pull_contacts() {
   FaceContacts& faces = state_->faces;
   faces.all.clear();
   faces.active.clear();
-  if (f.version != faces.version || f.contacts_count == 0 || f.searched) return;
+  if (f.version != faces.version || f.contacts_count == 0) return;
   const int count = f.contacts_count;
   f.gathered.resize(count);
   f.gathered.clear(d.stream);  // the same

@@ -69,6 +69,7 @@ void CudaMpmTissue::launch_measure() {
 void CudaMpmTissue::finish_measure() {
   OnDevice& d = *device_;
   check_cuda(cudaStreamSynchronize(d.stream), "finish a frame");
+  if (d.faces.search_begun) finish_search(state_->dt);
   result_.elastic_energy = result_.kinetic_energy = result_.max_speed = 0;
   stiffening_ = even_stiffening(*state_, 1);
   state_->wildest = 1;

@@ -113,7 +113,7 @@ int CudaMpmTissue::run(const PartSubsteps& part, double from, double to,
   result_.substep = std::max<double>(result_.substep, part.longest());
   if (substeps == 0) return 0;
   upload_colliders();
-  find_near(duration_);
+  find_near();
   const bool tears = can_tear(*state_);
   const int checks = tears ? tear_checks(*state_, substeps, part.longest()) : 1;
   int done = 0;
@@ -165,40 +165,8 @@ void CudaMpmTissue::advance(int substeps, float dt, const FrameInput& input) {
     sum_loads();
     tear(tearing, input, static_cast<double>(done) / substeps);
   }
+  search_ahead();
   launch_measure();
-}
-
-void CudaMpmTissue::find_near(double duration) {
-  OnDevice& d = *device_;
-  // A little more than the GPU finds, for what it finds must be done.
-  const double cell = state_->scene.cell_size;
-  d.may_meet = std::any_of(state_->motion.begin(), state_->motion.end(), [&](const BlockMotion& m) {
-    const double margin = m.speed * duration + cell;
-    return std::any_of(d.host_reach.data(), d.host_reach.data() + d.host_reach.size(),
-                       [&](const CudaBox& reach) {
-                         bool meets = true;
-                         for (int a = 0; a < 3; ++a) {
-                           meets = meets && m.box.min[a] - margin <= reach.max[a] &&
-                                   reach.min[a] <= m.box.max[a] + margin;
-                         }
-                         return meets;
-                       });
-  });
-  if (!d.may_meet) {
-    d.with.clear(d.stream);
-    return;
-  }
-  CudaReach swept{d.reach.data(), static_cast<int>(d.host_reach.size()), 0,
-                  static_cast<float>(duration), static_cast<float>(0.5 * cell)};
-  for (int c = 0; c < swept.collider_count; ++c) {
-    if (d.host_colliders[c].kind == Collider::kBlade) swept.blades |= 1u << c;
-  }
-  d.near_cells.resize(d.of_blocks.partial.size());
-  d.near_count.resize(1);
-  launch_near(d.tables(), d.present(), d.measures.data(), swept,
-              {d.near_cells.data(), d.near_count.data(), d.marks.data(), d.marks.size(),
-               d.pushed_parts.data(), d.pushed_parts.size()},
-              d.stream);
 }
 
 void CudaMpmTissue::launch(int begin, int end, float dt) {

@@ -19,6 +19,7 @@ namespace tissue_sim {
 struct CudaFaces;
 struct CudaShape;
 struct CudaLooks;
+struct CudaReach;
 
 /// The nodes live on the GPU; lattice, bonds, blocks and pieces on the host too, where nodes around
 /// a cut are taken apart between frames.
@@ -85,16 +86,28 @@ class CudaMpmTissue final : public Tissue {
   void tame();                ///< see MpmTissue
   bool settle_wild_crumbs();  ///< the same
   void upload_points();
-  void find_near(double duration);
-  /// Enqueues the part's substeps from `begin` up to `end`; waits for each search of faces.
+  template <class Margin>
+  bool may_meet(const std::vector<BlockMotion>& motion, const Margin& margin) const;
+  CudaReach reach() const;     ///< of the frame's colliders
+  void find_near();            ///< lists the cells that they may meet
+  void look_for_unforeseen();  ///< enqueues what came_unforeseen() tells once it is done
+  /// Whether tissue has come to a collider that find_near() did not foresee, for it went faster
+  /// later.
+  bool came_unforeseen() const;
+  /// Enqueues the part's substeps from `begin` up to `end`; waits for a search of faces that comes
+  /// due among them.
   void run_substeps(int begin, int end);
   void launch(int begin, int end, float dt);
   void upload_lattices();
   void upload_sites();  ///< which point is where in the lattices
   void upload_facets();
   void begin_contacts();  ///< all anew; until any facets may touch, they take no memory
-  void search_faces(
-      float dt);  ///< and says when the next search is due: FaceContacts::until_search
+  void begin_search();    ///< enqueues a search of faces, whose figures come to the host
+  /// Begins the search that the next substep would have to wait for, at the end of a frame whose
+  /// figures are waited for anyway.
+  void search_ahead();
+  /// Takes the figures that came, and says when the next search is due: FaceContacts::until_search.
+  void finish_search(float dt);
   CudaLooks looks() const;
   const CudaFaces* faces_of_launch();  ///< null where there are no contacts
   void pull_nodes();

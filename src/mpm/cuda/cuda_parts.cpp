@@ -1,4 +1,5 @@
-// Parts of a frame of tissue that lives on a GPU: a part that tissue could not bear is undone.
+// Parts of a frame of tissue that lives on a GPU: a part that tissue could not bear is undone, and
+// one in which it came to an instrument unforeseen.
 #include "mpm/cuda/on_device.h"
 
 namespace tissue_sim {
@@ -17,20 +18,33 @@ void CudaMpmTissue::advance(double duration, const FrameInput& input) {
 
 PartRun CudaMpmTissue::run_part(const PartSubsteps& substeps, const FrameInput& input, double from,
                                 double to) {
+  OnDevice& d = *device_;
   save_checkpoint();
   std::vector<TearingPoint> tearing;
   const int done = run(substeps, from, to, tearing);
+  if (tearing.empty()) search_ahead();
   const double reached = done == substeps.count ? to : substeps.share(done, from, to);
   launch_measure();
+  look_for_unforeseen();
   finish_measure();
+  const bool unforeseen = d.went.empty() && came_unforeseen();
+  d.went.clear();
   sum_loads();
   const PartEnergy energy{result_.kinetic_energy, result_.elastic_energy, work_,
                           substeps.until(done)};
-  const OnDevice::Checkpoint& saved = device_->checkpoint;
+  const OnDevice::Checkpoint& saved = d.checkpoint;
   const bool may_go_back = static_cast<std::size_t>(saved.host_held_count[0]) <= saved.held.size();
+  const SubstepChoice before = substep_;
   if (!substep_.is_borne(*state_, modulus_, stable_substep(), substeps.at(done - 1), energy) &&
       may_go_back) {
     restore_checkpoint();
+    return {PartEnd::kUndone, from};
+  }
+  if (unforeseen && may_go_back) {
+    d.went = state_->motion;
+    d.u_went.copy(d.u[d.current], d.stream);
+    restore_checkpoint();
+    substep_ = before;
     return {PartEnd::kUndone, from};
   }
   substep_.follow(*state_, modulus_);

@@ -31,8 +31,15 @@ struct FacesOnDevice {
   bool pieces_changed = false;  ///< since they went up
   bool lists_hold = false;      ///< there are lists
   int contacts_count = 0, involved_count = 0;  ///< see CudaFaceFigures
+  bool search_begun = false;                   ///< its figures are on their way
   bool searched = false;                       ///< and not looked at since
   bool may_meet = false;                       ///< whether any two may before the next search
+
+  CudaSearchRoom search_room() {
+    return {sums.data(),         static_cast<std::int32_t>(bucket_count.size()),
+            bucket_begin.data(), bucket_count.data(),
+            rank.data(),         sorted.data()};
+  }
 
   std::size_t bytes() const {
     return facets.bytes() + lattices.bytes() + motion.bytes() + listed.bytes() + springs.bytes() +

@@ -25,6 +25,19 @@ __device__ __forceinline__ std::uint32_t met_by(const CudaReach& reach, std::uin
   return met;
 }
 
+__device__ __forceinline__ std::uint32_t all_of(const CudaReach& reach) {
+  return reach.collider_count < 32 ? (1u << reach.collider_count) - 1 : ~0u;
+}
+
+/// Reference place of the middle of a block's cell (x, y, z) [m].
+__device__ __forceinline__ void middle_of(const CudaBlock& b, float cell_size, int x, int y, int z,
+                                          float (&middle)[3]) {
+  const int at[3] = {x, y, z};
+  for (int a = 0; a < 3; ++a) {
+    middle[a] = b.origin[a] + cell_size * static_cast<float>(at[a] + 1);
+  }
+}
+
 __global__ void unmark(const CudaNearCells out) {
   const std::size_t i = static_cast<std::size_t>(blockIdx.x) * blockDim.x + threadIdx.x;
   if (i == 0) *out.count = 0;
@@ -39,8 +52,9 @@ __global__ void __launch_bounds__(kCellThreads)
   const CudaMeasure& m = measures[blockIdx.x];
   const float cell_size = t.bodies[b.body].cell_size;
   const float margin = m.speed * reach.duration + reach.margin;
-  const std::uint32_t all = reach.collider_count < 32 ? (1u << reach.collider_count) - 1 : ~0u;
-  const std::uint32_t block_near = met_by(reach, all, m.min, m.max, margin);
+  // Where cells go besides, their block is no guide.
+  const std::uint32_t block_near =
+      reach.went != nullptr ? all_of(reach) : met_by(reach, all_of(reach), m.min, m.max, margin);
   for (int i = static_cast<int>(threadIdx.x); i < b.nx * b.ny * b.nz; i += kCellThreads) {
     const int x = i % b.nx, y = i / b.nx % b.ny, z = i / (b.nx * b.ny);
     CudaNearCell cell;
@@ -64,15 +78,16 @@ __global__ void __launch_bounds__(kCellThreads)
     cell.near = block_near & (is_cut ? ~0u : ~reach.blades);
     if (cell.near != 0) {
       cell.node = node_of(cell.slot + cell.plane + cell.pitch + 1);
-      const float4 u = state.u[cell.node];
-      const float moved[3] = {u.x, u.y, u.z};
-      const int at[3] = {x, y, z};
-      float now[3];
+      const float4 u = state.u[cell.node], then = reach.went != nullptr ? reach.went[cell.node] : u;
+      const float moved[3] = {u.x, u.y, u.z}, moved_then[3] = {then.x, then.y, then.z};
+      float min[3], max[3];
+      middle_of(b, cell_size, x, y, z, cell.middle);
       for (int a = 0; a < 3; ++a) {
-        cell.middle[a] = b.origin[a] + cell_size * static_cast<float>(at[a] + 1);
-        now[a] = cell.middle[a] + moved[a];
+        min[a] = cell.middle[a] + fminf(moved[a], moved_then[a]);
+        max[a] = cell.middle[a] + fmaxf(moved[a], moved_then[a]);
       }
-      cell.near = met_by(reach, cell.near, now, now, margin + kCellReach * cell_size);
+      cell.near = met_by(reach, cell.near, min, max, margin + kCellReach * cell_size);
+      out.listed[b.first_lane / 8 + i] = cell.near;
     }
     for (int k = 0; k < 8 * t.held_by; ++k) {
       const int p = t.point[cell.lane + k / t.held_by * cell.step];
@@ -95,15 +110,54 @@ __global__ void mark_slots(const CudaTables t, const CudaNearCells out) {
     mark_slot(t.slot_node, t.slot_parts, out.marks, slot, out.pushed_parts);
 }
 
+/// One thread block for each block. Points lie within a cell's length of its middle, where it is
+/// not stretched much.
+__global__ void __launch_bounds__(kCellThreads)
+    find_unforeseen(const CudaTables t, const CudaNodes state, const CudaMeasure* measures,
+                    const CudaReach reach, const std::uint32_t* listed, int* unforeseen) {
+  const CudaBlock b = t.blocks[blockIdx.x];
+  const CudaMeasure& m = measures[blockIdx.x];
+  const float cell_size = t.bodies[b.body].cell_size;
+  const std::uint32_t near = met_by(reach, all_of(reach) & ~reach.blades, m.min, m.max, 0);
+  if (near == 0) return;
+  for (int i = static_cast<int>(threadIdx.x); i < b.nx * b.ny * b.nz; i += kCellThreads) {
+    const int x = i % b.nx, y = i / b.nx % b.ny, z = i / (b.nx * b.ny);
+    const int plane = (b.nx + 2) * (b.ny + 2);
+    const std::int32_t entry =
+        t.slot_node[b.first_slot + (z + 1) * plane + (y + 1) * (b.nx + 2) + x + 1];
+    const float4 u = state.u[entry < 0 ? ~entry : entry];
+    const float moved[3] = {u.x, u.y, u.z};
+    float now[3];
+    middle_of(b, cell_size, x, y, z, now);
+    for (int a = 0; a < 3; ++a) now[a] += moved[a];
+    const std::uint32_t met = met_by(reach, near, now, now, cell_size);
+    if ((met & ~listed[b.first_lane / 8 + i]) == 0) continue;
+    for (int s = 0; s < 8; ++s) {
+      if (t.point[lane_of(b, x, y, z, s)] >= 0) *unforeseen = 1;
+    }
+  }
+}
+
 unsigned blocks_for(std::size_t n) { return static_cast<unsigned>((n + kThreads - 1) / kThreads); }
 
 }  // namespace
 
 void launch_near(const CudaTables& tables, const CudaNodes& state, const CudaMeasure* measures,
                  const CudaReach& reach, const CudaNearCells& near, cudaStream_t stream) {
+  check_cuda(cudaMemsetAsync(near.listed, 0, near.cell_count * sizeof(std::uint32_t), stream),
+             "clear memory");
   unmark<<<blocks_for(near.node_count), kThreads, 0, stream>>>(near);
   list_cells<<<tables.block_count, kCellThreads, 0, stream>>>(tables, state, measures, reach, near);
   mark_slots<<<blocks_for(near.slot_count), kThreads, 0, stream>>>(tables, near);
+  check_cuda(cudaGetLastError(), "start a kernel");
+}
+
+void launch_unforeseen(const CudaTables& tables, const CudaNodes& state,
+                       const CudaMeasure* measures, const CudaReach& reach,
+                       const std::uint32_t* listed, int* unforeseen, cudaStream_t stream) {
+  check_cuda(cudaMemsetAsync(unforeseen, 0, sizeof(int), stream), "clear memory");
+  find_unforeseen<<<tables.block_count, kCellThreads, 0, stream>>>(tables, state, measures, reach,
+                                                                   listed, unforeseen);
   check_cuda(cudaGetLastError(), "start a kernel");
 }
 

@@ -19,12 +19,15 @@ struct CudaReach {
   std::uint32_t blades;  ///< bit c for a collider that pushes only points that have lost a bond
   float duration;        ///< [s]
   float margin;          ///< [m]
+  const float4* went;    ///< displacements of the nodes that cells go to besides; null: unknown
 };
 
 /// What is found. One entry of `marks` for each node, of `pushed_parts` for each slot.
 struct CudaNearCells {
   CudaNearCell* cells;  ///< in any order
   int* count;
+  std::uint32_t* listed;  ///< per cell (lane / 8): its CudaNearCell::near, or 0
+  std::size_t cell_count;
   std::uint8_t* marks;
   std::size_t node_count;
   std::uint32_t* pushed_parts;  ///< CudaTables::slot_parts with kPushed
@@ -36,5 +39,10 @@ struct CudaNearCells {
 /// let go of what they touched.
 void launch_near(const CudaTables& tables, const CudaNodes& state, const CudaMeasure* measures,
                  const CudaReach& reach, const CudaNearCells& near, cudaStream_t stream);
+
+/// Whether a cell has come to a collider that it is not `listed` with, for it went faster later.
+void launch_unforeseen(const CudaTables& tables, const CudaNodes& state,
+                       const CudaMeasure* measures, const CudaReach& reach,
+                       const std::uint32_t* listed, int* unforeseen, cudaStream_t stream);
 
 }  // namespace tissue_sim

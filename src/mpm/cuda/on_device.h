@@ -55,7 +55,8 @@ struct CudaMpmTissue::OnDevice {
   DeviceArray<CudaBundle> bundles;
   DeviceArray<CudaColumn> columns;
   DeviceArray<CudaNearCell> near_cells;
-  DeviceArray<int> near_count;
+  DeviceArray<int> near_count, unforeseen;
+  DeviceArray<std::uint32_t> near_listed;   ///< CudaNearCells::listed
   DeviceArray<std::uint8_t> marks;          ///< per node: what may push it
   DeviceArray<std::uint32_t> pushed_parts;  ///< CudaTables::slot_parts with kPushed
   DeviceArray<long long> pushed;            ///< NodePushes::force
@@ -73,6 +74,9 @@ struct CudaMpmTissue::OnDevice {
   DeviceArray<std::uint8_t> bonds, soft, with, whole;
   int held_by = 0;  ///< CudaTables::held_by
   DeviceArray<float4> u[2], v[2], force[2], u_before;
+  /// In a part that is done again: where blocks and nodes went before.
+  std::vector<BlockMotion> went;
+  DeviceArray<float4> u_went;
   DeviceArray<Collider> colliders;
   DeviceArray<long long> loads;
   DeviceArray<CudaBox> reach;
@@ -80,7 +84,7 @@ struct CudaMpmTissue::OnDevice {
   DeviceArray<unsigned> arrived;
   DeviceArray<StretchedPoint> stretched;
   DeviceArray<int> stretched_count;
-  PinnedArray<int> host_stretched_count;
+  PinnedArray<int> host_stretched_count, host_unforeseen;
   DeviceArray<Point> cloud;
   FacesOnDevice faces;
   SweepOnDevice sweep;

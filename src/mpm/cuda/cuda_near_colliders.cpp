@@ -1,0 +1,77 @@
+// Which tissue on a GPU instruments and the ground may meet in a part of a frame.
+#include <algorithm>
+
+#include "mpm/cuda/on_device.h"
+
+namespace tissue_sim {
+
+/// Whether any of these may be within its margin of what a collider sweeps.
+template <class Margin>
+bool CudaMpmTissue::may_meet(const std::vector<BlockMotion>& motion, const Margin& margin) const {
+  const OnDevice& d = *device_;
+  const auto meets = [](const BlockMotion& m, double far, const CudaBox& reach) {
+    bool meets = true;
+    for (int a = 0; a < 3; ++a) {
+      meets = meets && m.box.min[a] - far <= reach.max[a] && reach.min[a] <= m.box.max[a] + far;
+    }
+    return meets;
+  };
+  return std::any_of(motion.begin(), motion.end(), [&](const BlockMotion& m) {
+    const double far = margin(m);
+    return std::any_of(d.host_reach.data(), d.host_reach.data() + d.host_reach.size(),
+                       [&](const CudaBox& reach) { return meets(m, far, reach); });
+  });
+}
+
+CudaReach CudaMpmTissue::reach() const {
+  const OnDevice& d = *device_;
+  CudaReach reach{d.reach.data(),
+                  static_cast<int>(d.host_reach.size()),
+                  0,
+                  static_cast<float>(duration_),
+                  static_cast<float>(0.5 * state_->scene.cell_size),
+                  d.went.empty() ? nullptr : d.u_went.data()};
+  for (int c = 0; c < reach.collider_count; ++c) {
+    if (d.host_colliders[c].kind == Collider::kBlade) reach.blades |= 1u << c;
+  }
+  return reach;
+}
+
+void CudaMpmTissue::find_near() {
+  OnDevice& d = *device_;
+  // A little more than the GPU finds, for what it finds must be done.
+  const double cell = state_->scene.cell_size;
+  d.may_meet =
+      may_meet(state_->motion, [&](const BlockMotion& m) { return m.speed * duration_ + cell; }) ||
+      may_meet(d.went, [&](const BlockMotion&) { return cell; });
+  if (!d.may_meet) {
+    d.with.clear(d.stream);
+    return;
+  }
+  const std::size_t cells = d.of_blocks.partial.size();
+  d.near_cells.resize(cells);
+  d.near_listed.resize(cells);
+  d.near_count.resize(1);
+  launch_near(d.tables(), d.present(), d.measures.data(), reach(),
+              {d.near_cells.data(), d.near_count.data(), d.near_listed.data(), cells,
+               d.marks.data(), d.marks.size(), d.pushed_parts.data(), d.pushed_parts.size()},
+              d.stream);
+}
+
+void CudaMpmTissue::look_for_unforeseen() {
+  OnDevice& d = *device_;
+  if (!d.may_meet) return;
+  d.unforeseen.resize(1);
+  d.host_unforeseen.resize(1);
+  launch_unforeseen(d.tables(), d.present(), d.measures.data(), reach(), d.near_listed.data(),
+                    d.unforeseen.data(), d.stream);
+  d.unforeseen.download(d.host_unforeseen.data(), 1, d.stream);
+}
+
+bool CudaMpmTissue::came_unforeseen() const {
+  const OnDevice& d = *device_;
+  if (d.may_meet) return d.host_unforeseen[0] != 0;
+  return may_meet(state_->motion, [](const BlockMotion&) { return 0.0; });
+}
+
+}  // namespace tissue_sim

@@ -46,7 +46,8 @@ BlockCounts::BlockCounts(const LatticeBody& body, int max_y, int max_z)
 }
 
 void BlockCounts::find_layer(int z0, int z, std::vector<Extent>& layer) const {
-  layer.assign(ny_, Extent());
+  layer.assign(ny_, fills_box_ ? Extent{0, nx_} : Extent());
+  if (fills_box_) return;  // there are no rows_
   for (int k = z0; k < std::min(z0 + z, nz_); ++k) {
     for (int j = 0; j < ny_; ++j) layer[j].add(rows_[k * ny_ + j]);
   }

@@ -20,7 +20,7 @@ class BlockCounts {
   BlockCounts(const LatticeBody& body, int max_y, int max_z);
   /// Of blocks of at most x by y by z cells, as make_blocks() makes them of a body without holes.
   BlockCount count(int x, int y, int z) const;
-  /// These blocks one by one, of a body that does not fill its box; `kind` is what they are of.
+  /// These blocks one by one; `kind` is what they are of.
   void list(int x, int y, int z, int kind, std::vector<BlockToBundle>& blocks) const;
   bool fills_box() const { return fills_box_; }
 
@@ -39,7 +39,7 @@ class BlockCounts {
 
   int nx_, ny_, nz_;
   bool fills_box_;
-  std::vector<Extent> rows_;  // [nz][ny]
+  std::vector<Extent> rows_;  // [nz][ny]; empty for a body that fills its box
   /// Of blocks of y by z cells: how long each is along x before it is divided.
   struct Rods {
     std::vector<int> length;

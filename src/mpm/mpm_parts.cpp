@@ -46,6 +46,7 @@ PartRun MpmTissue::run_part(Frame& frame, const PartSubsteps& substeps, double f
     frame.again = true;
     restore_checkpoint();
     substep_ = before;
+    // From where blocks went, whose motion still stands, and from where they began.
     find_near_colliders(*state_, frame.reach, frame.duration, begun);
     return {PartEnd::kUndone, from};
   }

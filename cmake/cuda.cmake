@@ -47,8 +47,9 @@ if(tissue_sim_has_cuda)
     # tissue_sim_core was made before these were set.
     set_target_properties(tissue_sim_core PROPERTIES CUDA_STANDARD 17 CUDA_STANDARD_REQUIRED ON)
   endif()
-  file(GLOB cuda_sources CONFIGURE_DEPENDS src/compute/*.cu src/mpm/cuda/*.cu src/mpm/cuda/*.cpp)
-  target_sources(tissue_sim_core PRIVATE ${cuda_sources})
+  file(GLOB_RECURSE cuda_sources CONFIGURE_DEPENDS src/*.cu)
+  file(GLOB cuda_hosts CONFIGURE_DEPENDS src/*/cuda/*.cpp)
+  target_sources(tissue_sim_core PRIVATE ${cuda_sources} ${cuda_hosts})
   set_target_properties(tissue_sim_core PROPERTIES CUDA_ARCHITECTURES "${CMAKE_CUDA_ARCHITECTURES}"
                         CUDA_RUNTIME_LIBRARY Static)
   target_compile_definitions(tissue_sim_core PUBLIC TISSUE_SIM_CUDA)

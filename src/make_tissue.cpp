@@ -1,33 +1,61 @@
+#include <algorithm>
+#include <iterator>
 #include <stdexcept>
+#include <utility>
 
 #include "mpm/mpm_tissue.h"
 #include "tissue_sim/tissue.h"
 #if defined(TISSUE_SIM_CUDA)
-#include "compute/cuda_check.h"
 #include "mpm/cuda/cuda_mpm_tissue.h"
 #endif
 
 namespace tissue_sim {
+namespace {
+
+using Notes = std::vector<std::string>;
+
+/// Makes a tissue; its first notes are those given. Throws std::runtime_error where the device is
+/// not there.
+using Make = std::unique_ptr<Tissue> (*)(const Scene&, Notes);
+
+template <class T>
+std::unique_ptr<Tissue> make(const Scene& scene, Notes notes) {
+  return std::make_unique<T>(scene, std::move(notes));
+}
+
+/// A method's tissue on each device; null where there is none in this build.
+struct Makers {
+  Method method;
+  Make on_cpu, on_gpu;
+};
+
+#if defined(TISSUE_SIM_CUDA)
+constexpr Makers kMakers[] = {{Method::kMpm, make<MpmTissue>, make<CudaMpmTissue>}};
+#else
+constexpr Makers kMakers[] = {{Method::kMpm, make<MpmTissue>, nullptr}};
+#endif
+
+}  // namespace
 
 std::unique_ptr<Tissue> make_tissue(const Scene& scene) {
-  std::vector<std::string> notes;
-#if defined(TISSUE_SIM_CUDA)
-  if (scene.device == Device::kCuda) return std::make_unique<CudaMpmTissue>(scene);
-  if (scene.device == Device::kAuto) {
-    try {
-      return std::make_unique<CudaMpmTissue>(scene);
-    } catch (const std::runtime_error& e) {
-      notes.push_back(std::string("runs on the CPU: ") + e.what());
-    }
-  }
-#else
-  if (scene.device == Device::kCuda) {
+  const Makers* of = std::find_if(std::begin(kMakers), std::end(kMakers),
+                                  [&](const Makers& m) { return m.method == scene.method; });
+  if (of == std::end(kMakers)) throw std::invalid_argument("method is not in this build");
+  Notes notes;
+  if (scene.device == Device::kCpu) return of->on_cpu(scene, notes);
+  if (of->on_gpu == nullptr) {
+    if (scene.device == Device::kAuto) return of->on_cpu(scene, notes);
     throw std::runtime_error(
-        "device is cuda: this build has no GPU backend, for it was built without nvcc; set device "
-        "to auto or cpu");
+        "device is cuda: this build has no GPU backend for the scene's method; set device to auto "
+        "or cpu, or build where nvcc is found");
   }
-#endif
-  return std::make_unique<MpmTissue>(scene, notes);
+  try {
+    return of->on_gpu(scene, notes);
+  } catch (const std::runtime_error& e) {
+    if (scene.device == Device::kCuda) throw;
+    notes.push_back(std::string("runs on the CPU: ") + e.what());
+  }
+  return of->on_cpu(scene, notes);
 }
 
 }  // namespace tissue_sim

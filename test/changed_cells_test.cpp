@@ -1,5 +1,5 @@
 // The cells around points that lost bonds, against brute force.
-#include "cutting/changed_cells.h"
+#include "mpm/split/changed_cells.h"
 
 #include <gtest/gtest.h>
 

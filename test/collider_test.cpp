@@ -1,5 +1,5 @@
 // Colliders: how deep places lie in them, and how far from touching they are.
-#include "contact/collider.h"
+#include "tools/collider.h"
 
 #include <gtest/gtest.h>
 

@@ -4,11 +4,11 @@
 
 #if defined(TISSUE_SIM_CUDA)
 #include "cut_kinds.h"
-#include "cutting/bonds.h"
 #include "either_device.h"
 #include "fragments/pieces.h"
 #include "mpm/cuda/cuda_mpm_tissue.h"
 #include "mpm/cuda/label_pieces.h"
+#include "mpm/lattice/bonds.h"
 #include "mpm/mpm_tissue.h"
 
 namespace tissue_sim {

@@ -4,7 +4,7 @@
 #include <Eigen/Geometry>
 
 #include "cut_kinds.h"
-#include "cutting/bonds.h"
+#include "mpm/lattice/bonds.h"
 
 namespace tissue_sim {
 namespace {

@@ -5,7 +5,7 @@
 
 #include "cut_scenes.h"
 #include "cutting/blade_sweep.h"
-#include "cutting/bonds.h"
+#include "mpm/lattice/bonds.h"
 #include "rigid_modes.h"
 
 namespace tissue_sim {

@@ -7,9 +7,9 @@
 #include <iterator>
 
 #include "compute/cuda_check.h"
-#include "contact/face_places.h"
-#include "contact/face_search.h"
 #include "cut_scenes.h"
+#include "mpm/contact/face_places.h"
+#include "mpm/contact/face_search.h"
 #include "mpm/cuda/cuda_mpm_tissue.h"
 #include "reference/mpm_reference.h"
 

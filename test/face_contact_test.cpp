@@ -2,10 +2,10 @@
 // there is one, on the GPU.
 #include <gtest/gtest.h>
 
-#include "contact/face_places.h"
 #include "cut_scenes.h"
 #include "either_device.h"
 #include "momentum.h"
+#include "mpm/contact/face_places.h"
 
 namespace tissue_sim {
 namespace {

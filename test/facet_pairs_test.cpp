@@ -1,12 +1,11 @@
 // Facets that may meet: the search by patches finds the pairs that a look at all of them finds.
-#include "contact/facet_pairs.h"
-
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <random>
 
-#include "contact/face_search.h"
+#include "mpm/contact/broad_phase.h"
+#include "mpm/contact/face_search.h"
 
 namespace tissue_sim {
 namespace {

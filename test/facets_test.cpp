@@ -5,10 +5,10 @@
 #include <random>
 #include <tuple>
 
-#include "contact/face_places.h"
-#include "contact/facet_motion.h"
-#include "contact/known_facets.h"
 #include "cut_scenes.h"
+#include "mpm/contact/face_places.h"
+#include "mpm/contact/facet_motion.h"
+#include "mpm/contact/known_facets.h"
 
 namespace tissue_sim {
 namespace {

@@ -5,7 +5,7 @@
 
 #include "compute/device_array.h"
 #include "compute/for_each_cuda.h"
-#include "mpm/update_node.h"
+#include "mpm/blocks/update_node.h"
 
 namespace tissue_sim {
 namespace {

@@ -10,9 +10,9 @@
 #include <vector>
 
 #include "compute/simd.h"
-#include "contact/block_contact.h"
 #include "curve_file.h"
 #include "material/laws.h"
+#include "mpm/contact/block_contact.h"
 #include "mpm/mpm_tissue.h"
 
 namespace tissue_sim {

@@ -1,5 +1,5 @@
 // The lengths of a part's substeps: they take the time they should, and change little by little.
-#include "mpm/part_substeps.h"
+#include "frame/part_substeps.h"
 
 #include <gtest/gtest.h>
 

@@ -9,7 +9,7 @@
 #include <set>
 
 #include "cut_scenes.h"
-#include "cutting/bonds.h"
+#include "mpm/lattice/bonds.h"
 
 namespace tissue_sim {
 namespace {

@@ -6,10 +6,10 @@
 #include <vector>
 
 #include "cut_scenes.h"
-#include "cutting/cut_tissue.h"
 #include "momentum.h"
-#include "mpm/crumbs.h"
 #include "mpm/mpm_tissue.h"
+#include "mpm/split/cut_tissue.h"
+#include "mpm/tear/debris.h"
 #include "stability_limit.h"
 #include "tissue_sim/simulation.h"
 

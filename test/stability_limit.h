@@ -6,7 +6,7 @@
 #include <utility>
 #include <vector>
 
-#include "contact/block_contact.h"
+#include "mpm/contact/block_contact.h"
 #include "mpm/mpm_tissue.h"
 
 namespace tissue_sim {

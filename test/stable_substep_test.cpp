@@ -8,8 +8,8 @@
 
 #include "curve_file.h"
 #include "math/bspline.h"
+#include "mpm/blocks/stabilisation.h"
 #include "mpm/mpm_tissue.h"
-#include "mpm/stabilisation.h"
 #include "stability_limit.h"
 
 namespace tissue_sim {

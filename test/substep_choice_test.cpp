@@ -7,9 +7,9 @@
 #include <vector>
 
 #include "cut_scenes.h"
-#include "mpm/crumbs.h"
-#include "mpm/lanczos.h"
+#include "math/lanczos.h"
 #include "mpm/linearised_motion.h"
+#include "mpm/tear/debris.h"
 #include "reference/mpm_reference.h"
 #include "stability_limit.h"
 #include "test_scenes.h"

@@ -1,5 +1,5 @@
 // Tissue tears where it is stretched past what its material bears.
-#include "cutting/tear.h"
+#include "mpm/tear/tear.h"
 
 #include <gtest/gtest.h>
 #include <tbb/global_control.h>
@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "curve_file.h"
-#include "cutting/bonds.h"
+#include "mpm/lattice/bonds.h"
 #include "reference/mpm_reference.h"
 #include "tear_scenes.h"
 

@@ -4,10 +4,10 @@
 #include <algorithm>
 #include <cstring>
 
-#include "contact/face_contact.h"
 #include "cut_scenes.h"
 #include "either_device.h"
 #include "momentum.h"
+#include "mpm/contact/face_contact.h"
 #include "stability_limit.h"
 #include "test_scenes.h"
 

@@ -11,7 +11,11 @@
 
 namespace tissue_sim {
 
-enum class Method { kMpm };
+enum class Method {
+  kMpm,  ///< material point method
+  kMls,  ///< meshless, moving least squares
+  kPbd,  ///< position-based dynamics
+};
 enum class Device { kAuto, kCpu, kCuda };
 
 enum class Shape { kBox, kBall, kEllipsoid, kCylinder, kMesh };

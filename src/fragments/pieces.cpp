@@ -6,8 +6,8 @@
 #include <numeric>
 #include <unordered_map>
 
-#include "cutting/bonds.h"
-#include "cutting/node_box.h"
+#include "mpm/lattice/bonds.h"
+#include "mpm/split/node_box.h"
 
 namespace tissue_sim {
 namespace {

@@ -4,9 +4,9 @@
 #include <cstdint>
 #include <vector>
 
-#include "cutting/node_box.h"
 #include "fragments/parted_run.h"
-#include "mpm/lattice_body.h"
+#include "mpm/lattice/lattice_body.h"
+#include "mpm/split/node_box.h"
 #include "tissue_sim/fragments.h"
 
 namespace tissue_sim {
@@ -14,7 +14,7 @@ namespace tissue_sim {
 /// Which piece each point belongs to, over time.
 struct Pieces {
   std::vector<std::int32_t> of_point;  ///< Fragment::id
-  std::vector<Fragment> all;           ///< by id; fragments/piece_motion.h says where they are
+  std::vector<Fragment> all;           ///< by id; mpm/piece_motion.h says where they are
   std::vector<std::int32_t> lowest;    ///< by id: the piece's lowest point
   std::vector<std::int32_t> anchored;  ///< all points that are
   int next_id = 0;

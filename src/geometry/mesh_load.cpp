@@ -3,7 +3,7 @@
 #include <stdexcept>
 
 #include "geometry/mesh.h"
-#include "scene_text.h"
+#include "scene/scene_text.h"
 
 namespace tissue_sim {
 namespace {

@@ -7,7 +7,7 @@
 #include <tuple>
 
 #include "geometry/mesh.h"
-#include "scene_text.h"
+#include "scene/scene_text.h"
 
 namespace tissue_sim {
 namespace {

@@ -2,9 +2,9 @@
 // instrument unforeseen.
 #include <utility>
 
-#include "contact/block_contact.h"
-#include "cutting/tear.h"
+#include "mpm/contact/block_contact.h"
 #include "mpm/mpm_tissue.h"
+#include "mpm/tear/tear.h"
 
 namespace tissue_sim {
 

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "contact/block_contact.h"
+#include "mpm/contact/block_contact.h"
 
 namespace tissue_sim {
 

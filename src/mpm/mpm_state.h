@@ -10,14 +10,14 @@
 #include <vector>
 
 #include "compute/for_each.h"
-#include "contact/collider.h"
-#include "contact/face_contact.h"
-#include "cutting/node_fields.h"
-#include "mpm/block_kernels.h"
-#include "mpm/blocks.h"
-#include "mpm/lattice_body.h"
-#include "mpm/nodes.h"
+#include "mpm/blocks/block_kernels.h"
+#include "mpm/blocks/blocks.h"
+#include "mpm/contact/face_contact.h"
+#include "mpm/lattice/lattice_body.h"
+#include "mpm/lattice/nodes.h"
+#include "mpm/split/node_fields.h"
 #include "tissue_sim/tissue.h"
+#include "tools/collider.h"
 
 namespace tissue_sim {
 
@@ -54,7 +54,7 @@ struct BlockMotion {
   double speed = 0;  ///< [m/s]
 };
 
-/// Where a sweep keeps what it knows of a point: cutting/sweep_bonds.cpp.
+/// Where a sweep keeps what it knows of a point: mpm/split/sweep_bonds.cpp.
 struct SweptPoint {
   std::int32_t block, index;
 };
@@ -75,8 +75,8 @@ struct MpmState {
   double time = 0;                    ///< since the beginning [s]
   float dt = 0;                       ///< the last substep, 0 before the first [s]
   std::vector<double> tore_at;        ///< per body: when a bond last tore [s]; empty while none did
-  std::vector<std::int32_t> threads;  ///< points at their ends, by number: cutting/threads.h
-  std::set<std::int32_t> crumbs;      ///< the lowest point of each: mpm/crumbs.h
+  std::vector<std::int32_t> threads;  ///< points at their ends, by number: mpm/tear/bond_bridges.h
+  std::set<std::int32_t> crumbs;      ///< the lowest point of each: mpm/tear/debris.h
   Contacts contacts;
   FaceContacts faces;
   std::vector<Collider> colliders;

@@ -5,15 +5,15 @@
 #include <limits>
 #include <utility>
 
-#include "contact/block_contact.h"
-#include "contact/frame_colliders.h"
-#include "cutting/cut_tissue.h"
-#include "cutting/tear.h"
-#include "cutting/threads.h"
-#include "fragments/piece_motion.h"
-#include "mpm/crumbs.h"
-#include "mpm/lanczos.h"
+#include "math/lanczos.h"
+#include "mpm/contact/block_contact.h"
 #include "mpm/linearised_motion.h"
+#include "mpm/piece_motion.h"
+#include "mpm/split/cut_tissue.h"
+#include "mpm/tear/bond_bridges.h"
+#include "mpm/tear/debris.h"
+#include "mpm/tear/tear.h"
+#include "tools/frame_colliders.h"
 #include "tools/tool_motion.h"
 
 namespace tissue_sim {

@@ -3,13 +3,13 @@
 
 #include <memory>
 
-#include "contact/frame_colliders.h"
-#include "cutting/tear.h"
 #include "fragments/pieces.h"
 #include "mpm/mpm_state.h"
 #include "mpm/state_figures.h"
 #include "mpm/substep_choice.h"
+#include "mpm/tear/tear.h"
 #include "tissue_sim/tissue.h"
+#include "tools/frame_colliders.h"
 
 namespace tissue_sim {
 
@@ -74,7 +74,7 @@ class MpmTissue final : public Tissue {
   void end(Frame& frame);
   void cut(const std::vector<BladePath>& paths, const Array<float>* u_before,
            const std::vector<BlockMotion>& before, CutReport& report);
-  bool tame();                ///< what is wild (mpm/deformation.h), whether anything was
+  bool tame();                ///< what is wild (mpm/tear/deformation.h), whether anything was
   bool settle_wild_crumbs();  ///< of that, crumbs
   /// Energies and how much the tissue has stiffened, from what `read` finds of each block.
   template <class Read>

@@ -2,8 +2,8 @@
 #include <algorithm>
 #include <cstring>
 
-#include "cutting/bonds.h"
 #include "fragments/piece_colour.h"
+#include "mpm/lattice/bonds.h"
 #include "mpm/mpm_tissue.h"
 
 namespace tissue_sim {

@@ -4,8 +4,8 @@
 #include <cmath>
 #include <cstring>
 
-#include "cutting/threads.h"
-#include "mpm/deformation.h"
+#include "mpm/tear/bond_bridges.h"
+#include "mpm/tear/deformation.h"
 
 namespace tissue_sim {
 

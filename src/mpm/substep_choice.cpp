@@ -5,7 +5,7 @@
 #include <numeric>
 #include <utility>
 
-#include "contact/frame_colliders.h"
+#include "tools/frame_colliders.h"
 
 namespace tissue_sim {
 namespace {

@@ -6,8 +6,8 @@
 #include <functional>
 #include <vector>
 
+#include "frame/part_substeps.h"
 #include "mpm/mpm_state.h"
-#include "mpm/part_substeps.h"
 #include "mpm/state_figures.h"
 
 namespace tissue_sim {

@@ -3,11 +3,11 @@
 
 #include <vector>
 
-#include "contact/collider.h"
 #include "tissue_sim/cut.h"
 #include "tissue_sim/scene.h"
 #include "tissue_sim/tissue.h"
 #include "tissue_sim/tool.h"
+#include "tools/collider.h"
 
 namespace tissue_sim {
 

@@ -13,9 +13,9 @@
 #include <string>
 #include <vector>
 
-#include "cutting/tear.h"
 #include "deformed_body.h"
 #include "machine_rates.h"
+#include "mpm/tear/tear.h"
 #include "reference/mpm_reference.h"
 
 namespace tissue_sim {

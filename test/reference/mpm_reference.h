@@ -135,8 +135,8 @@ inline double cell_mu(const MpmState& s, const std::vector<double>& volume, cons
   return mu;
 }
 
-/// The stabilising numbers (mpm/stabilisation.h) of a block's cells, each as coefficients of nodes
-/// and times the root of its cell's stiffness: products of A, d, B along the axes, from their
+/// The stabilising numbers (mpm/blocks/stabilisation.h) of a block's cells, each as coefficients of
+/// nodes and times the root of its cell's stiffness: products of A, d, B along the axes, from their
 /// definition.
 inline std::vector<std::vector<std::pair<int, double>>> stabilising_rows(
     const MpmState& s, const std::vector<double>& volume, const Block& block) {

@@ -1,4 +1,4 @@
-// Stabilisation of one cell that is not full (mpm/stabilisation.h). For .cu files.
+// Stabilisation of one cell that is not full (mpm/blocks/stabilisation.h). For .cu files.
 #pragma once
 
 #include <utility>

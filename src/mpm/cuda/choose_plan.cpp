@@ -8,9 +8,9 @@
 #include <stdexcept>
 #include <string>
 
-#include "cutting/tear.h"
 #include "mpm/cuda/count_blocks.h"
 #include "mpm/cuda/stacks.h"
+#include "mpm/tear/tear.h"
 
 namespace tissue_sim {
 namespace {

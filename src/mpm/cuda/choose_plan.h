@@ -3,7 +3,7 @@
 
 #include <vector>
 
-#include "mpm/blocks.h"
+#include "mpm/blocks/blocks.h"
 #include "mpm/cuda/bundle_blocks.h"
 #include "mpm/cuda/substeps.h"
 

@@ -2,8 +2,8 @@
 // around either place. For .cu files.
 #pragma once
 
-#include "contact/look_at_face.h"
 #include "math/bspline.h"
+#include "mpm/contact/narrow_phase.h"
 #include "mpm/cuda/tables.h"
 
 namespace tissue_sim {
@@ -112,7 +112,7 @@ struct LanePlace {
   }
 };
 
-/// Node field around a facet's cell: contact/facet_in_world.h.
+/// Node field around a facet's cell: mpm/contact/facet_in_world.h.
 struct SlotField {
   const std::int32_t* slot_node;  // from the cell's lowest slot on
   int pitch, plane;
@@ -185,7 +185,7 @@ struct LanePlaces {
   }
 };
 
-/// Facets and nodes as a look at a contact reaches them: contact/look_at_face.h.
+/// Facets and nodes as a look at a contact reaches them: mpm/contact/narrow_phase.h.
 struct LaneFaces : LanePlaces<kContactLanes, true> {
   const CudaLooks& s;
   int index = 0;  // facet

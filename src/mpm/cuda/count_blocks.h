@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "mpm/cuda/bundle_blocks.h"
-#include "mpm/lattice_body.h"
+#include "mpm/lattice/lattice_body.h"
 
 namespace tissue_sim {
 

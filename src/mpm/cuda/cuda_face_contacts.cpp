@@ -6,7 +6,7 @@
 #include <cstring>
 #include <utility>
 
-#include "contact/face_places.h"
+#include "mpm/contact/face_places.h"
 #include "mpm/cuda/on_device.h"
 
 namespace tissue_sim {

@@ -1,5 +1,5 @@
 // Facets of tissue that lives on a GPU, and what tells which point is where, on their way up.
-#include "contact/face_places.h"
+#include "mpm/contact/face_places.h"
 #include "mpm/cuda/on_device.h"
 
 namespace tissue_sim {

@@ -4,9 +4,9 @@
 #include <cmath>
 #include <limits>
 
+#include "math/lanczos.h"
 #include "mpm/cuda/cuda_linearised_motion.h"
 #include "mpm/cuda/on_device.h"
-#include "mpm/lanczos.h"
 #include "mpm/state_figures.h"
 
 namespace tissue_sim {

@@ -5,8 +5,8 @@
 #include <tuple>
 
 #include "cutting/blade_sweep.h"
-#include "cutting/cut_tissue.h"
 #include "mpm/cuda/on_device.h"
+#include "mpm/split/cut_tissue.h"
 
 namespace tissue_sim {
 namespace {

@@ -2,11 +2,11 @@
 // what follows is that of cuts.
 #include <algorithm>
 
-#include "cutting/cut_tissue.h"
-#include "cutting/tear.h"
-#include "cutting/threads.h"
-#include "mpm/crumbs.h"
 #include "mpm/cuda/on_device.h"
+#include "mpm/split/cut_tissue.h"
+#include "mpm/tear/bond_bridges.h"
+#include "mpm/tear/debris.h"
+#include "mpm/tear/tear.h"
 #include "tools/tool_motion.h"
 
 namespace tissue_sim {

@@ -4,11 +4,11 @@
 #include <cmath>
 #include <stdexcept>
 
-#include "contact/frame_colliders.h"
-#include "cutting/cut_tissue.h"
-#include "fragments/piece_motion.h"
 #include "mpm/cuda/on_device.h"
+#include "mpm/piece_motion.h"
+#include "mpm/split/cut_tissue.h"
 #include "mpm/state_figures.h"
+#include "tools/frame_colliders.h"
 #include "tools/tool_motion.h"
 
 namespace tissue_sim {
@@ -33,7 +33,8 @@ int attribute(cudaDeviceAttr which) {
 
 }  // namespace
 
-CudaMpmTissue::CudaMpmTissue(const Scene& scene) : device_(std::make_unique<OnDevice>()) {
+CudaMpmTissue::CudaMpmTissue(const Scene& scene, std::vector<std::string> notes)
+    : notes_(std::move(notes)), device_(std::make_unique<OnDevice>()) {
   const std::string why = why_no_gpu();
   if (!why.empty()) throw std::runtime_error(why + "; set device to cpu");
   if (const int count = collider_count(scene); count > kMaxColliders) {

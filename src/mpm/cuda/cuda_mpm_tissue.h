@@ -4,13 +4,13 @@
 #include <memory>
 #include <optional>
 
-#include "contact/frame_colliders.h"
-#include "cutting/tear.h"
 #include "fragments/pieces.h"
 #include "mpm/mpm_state.h"
 #include "mpm/state_figures.h"
 #include "mpm/substep_choice.h"
+#include "mpm/tear/tear.h"
 #include "tissue_sim/tissue.h"
+#include "tools/frame_colliders.h"
 
 struct float4;  // CUDA's
 
@@ -26,7 +26,7 @@ struct CudaReach;
 class CudaMpmTissue final : public Tissue {
  public:
   /// Throws std::runtime_error where there is no GPU, or not enough memory on it.
-  explicit CudaMpmTissue(const Scene& scene);
+  explicit CudaMpmTissue(const Scene& scene, std::vector<std::string> notes = {});
   ~CudaMpmTissue() override;
 
   void advance(double duration, const FrameInput& input) override;

@@ -2,9 +2,9 @@
 #include <algorithm>
 #include <cstring>
 
-#include "cutting/bonds.h"
 #include "fragments/piece_colour.h"
 #include "mpm/cuda/on_device.h"
+#include "mpm/lattice/bonds.h"
 
 namespace tissue_sim {
 

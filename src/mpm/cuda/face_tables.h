@@ -1,4 +1,4 @@
-// What the GPU's kernels see of contact of tissue with tissue (contact/face_contact.h): plain
+// What the GPU's kernels see of contact of tissue with tissue (mpm/contact/face_contact.h): plain
 // structs with device pointers.
 #pragma once
 
@@ -7,9 +7,9 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "contact/face_search.h"
-#include "contact/face_spring.h"
-#include "contact/facet_in_world.h"
+#include "mpm/contact/face_search.h"
+#include "mpm/contact/face_spring.h"
+#include "mpm/contact/facet_in_world.h"
 
 namespace tissue_sim {
 

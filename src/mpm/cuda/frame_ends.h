@@ -5,7 +5,7 @@
 #include <cuda_runtime_api.h>
 
 #include "mpm/cuda/tables.h"
-#include "mpm/stretched_point.h"
+#include "mpm/tear/stretched_point.h"
 #include "tissue_sim/point.h"
 
 namespace tissue_sim {

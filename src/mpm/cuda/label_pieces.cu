@@ -1,8 +1,8 @@
 #include <algorithm>
 
 #include "compute/for_each_cuda.h"
-#include "cutting/bonds.h"
 #include "mpm/cuda/label_pieces.h"
+#include "mpm/lattice/bonds.h"
 
 namespace tissue_sim {
 namespace {

@@ -4,7 +4,8 @@
 #include <unordered_map>
 #include <utility>
 
-#include "cutting/tear.h"
+#include "contact/contact_spring.h"
+#include "mpm/tear/tear.h"
 
 namespace tissue_sim {
 namespace {

@@ -1,9 +1,9 @@
 #include <cuda_runtime.h>
 
 #include "compute/cuda_check.h"
-#include "cutting/bonds.h"
 #include "mpm/cuda/block_nodes.h"
 #include "mpm/cuda/near_cells.h"
+#include "mpm/lattice/bonds.h"
 
 namespace tissue_sim {
 namespace {

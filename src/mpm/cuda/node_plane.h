@@ -2,8 +2,8 @@
 // the transpose for the forces. For .cu files.
 #pragma once
 
+#include "mpm/blocks/stabilisation.h"
 #include "mpm/cuda/half_cell.h"
-#include "mpm/stabilisation.h"
 
 namespace tissue_sim {
 

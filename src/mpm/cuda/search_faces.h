@@ -3,7 +3,7 @@
 
 #include <cuda_runtime_api.h>
 
-#include "contact/look_at_face.h"
+#include "mpm/contact/narrow_phase.h"
 #include "mpm/cuda/tables.h"
 
 namespace tissue_sim {

@@ -1,7 +1,7 @@
 #include <cuda_runtime.h>
 
 #include "compute/for_each_cuda.h"
-#include "contact/facet_in_world.h"
+#include "mpm/contact/facet_in_world.h"
 #include "mpm/cuda/block_nodes.h"
 #include "mpm/cuda/contact_lanes.h"
 #include "mpm/cuda/sweep_blade.h"
@@ -53,7 +53,7 @@ struct Sweep {
     return false;
   }
 
-  /// See the host's, in cutting/sweep_bonds.cpp: a normal goes back by F^T.
+  /// See the host's, in mpm/split/sweep_bonds.cpp: a normal goes back by F^T.
   __device__ BrokenBond broken_bond(const SweptPoint& p, std::int32_t other, int axis,
                                     const MeetingOf<Vector3>& meeting) const {
     BrokenBond broken = {p.point, other, axis, {static_cast<float>(meeting.place), {}}};

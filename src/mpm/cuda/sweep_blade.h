@@ -1,9 +1,9 @@
 // A blade's sweep through tissue that lives on a GPU.
 #pragma once
 
-#include "cutting/bonds.h"
 #include "cutting/edge_passes.h"
 #include "mpm/cuda/tables.h"
+#include "mpm/lattice/bonds.h"
 
 namespace tissue_sim {
 

@@ -10,9 +10,9 @@
 
 #include <cstdint>
 
-#include "contact/collider.h"
+#include "contact/contact_spring.h"
+#include "mpm/blocks/update_node.h"
 #include "mpm/cuda/face_tables.h"
-#include "mpm/update_node.h"
 
 namespace tissue_sim {
 
@@ -136,7 +136,7 @@ struct CudaTables {
   const float* volume;        ///< per lane, 0 where there is no point [m^3]
   const std::int32_t* point;  ///< per lane, -1 where there is none
   const float* partial;       ///< per cell (lane / 8): mu times volume of its points where they are
-                              ///< fewer than seven, else 0; see mpm/stabilisation.h [J]
+                              ///< fewer than seven, else 0; see mpm/blocks/stabilisation.h [J]
   const std::uint8_t* bonds;  ///< per point
   const std::uint8_t* soft;   ///< per point, as Points::soft; null where none is
   int held_by;                ///< colliders that a point may hold on to at a time: 0 to 2

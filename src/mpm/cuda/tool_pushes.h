@@ -1,9 +1,10 @@
 // What colliders push a point with, and what that does to them. For .cu files.
 #pragma once
 
-#include "cutting/bonds.h"
+#include "contact/contact_spring.h"
 #include "mpm/cuda/grid_barrier.h"
 #include "mpm/cuda/tables.h"
+#include "mpm/lattice/bonds.h"
 
 namespace tissue_sim {
 

@@ -1,0 +1,73 @@
+// Contact of tissue with tissue: faces of cuts, pieces among themselves, folds.
+//
+// Each facet looks for a facet that faces it. A spring between the facet's centre and the material
+// place of the other face where they touched pushes them apart (penalty, as against tools:
+// tools/collider.h); where the friction cone is reached, that place slides. It is a force between
+// two material places along the line between them, so it keeps linear and angular momentum and,
+// while nothing slides, energy.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "mpm/contact/facet_motion.h"
+#include "mpm/contact/narrow_phase.h"
+
+namespace tissue_sim {
+
+struct MpmState;
+struct Pieces;
+
+/// A facet against another, on the CPU.
+struct FaceContact : FaceSpring {
+  CellNodes nodes, other_nodes;
+  bool has_whole_rows = false, other_has_whole_rows = false;  ///< face_places.h, of these
+  AxisWeights weights, other_weights;                         ///< at the facet's centre; at `hold`
+  double looked_at = 0, look_at = 0;                          ///< when last, when next at last [s]
+};
+
+struct FaceContacts {
+  int version = 0;                        ///< how often facets were numbered
+  std::vector<std::int32_t> first_facet;  ///< per block and one more
+  std::vector<std::int32_t> block_of;     ///< per facet
+  std::vector<FacetMotion> motion;        ///< per facet; up to date where a pair needs it
+  std::vector<ListedFacet> listed;        ///< per facet; empty while there is no list
+  std::vector<FaceContact> all;           ///< of each facet that is to touch others near it
+  std::vector<std::int32_t> first_near;   ///< CSR over `all`: those others
+  std::vector<std::int32_t> near;
+  std::vector<std::int32_t> active;   ///< contacts that touch, or may before the next look
+  std::vector<std::int32_t> between;  ///< those of them whose facets are of two blocks
+  /// Per block, CSR: active contacts, as 2 * contact, plus one where the block holds the other
+  /// face.
+  std::vector<std::int32_t> first_of_block, of_block;
+  /// The same: those of them that it has with itself.
+  std::vector<std::int32_t> first_within, within;
+  std::vector<KeptContact> kept;            ///< sorted by point and direction
+  double until_search = 0, until_look = 0;  ///< at any contact [s]
+  double dt = 0;                            ///< of the last substep [s]
+
+  void forget_active() {
+    active.clear();
+    between.clear();
+  }
+};
+
+/// Before a substep of `dt` seconds: searches pairs, and looks at them, when it is time to.
+void find_face_contacts(MpmState& state, const Pieces& pieces, double dt);
+
+/// Before blocks are made anew: remembers what touches.
+void keep_face_contacts(MpmState& state);
+/// After blocks were made: numbers their facets.
+void list_facets(MpmState& state);
+
+/// Works out the force of a contact after a substep of `dt` seconds, and lets it slide.
+void push_faces(const MpmState& state, FaceContact& contact, float dt);
+
+/// The same for a block's contacts with itself. `u` are the displacements of its nodes, as
+/// BlockKernels::gather() copied them.
+void push_faces_within(MpmState& state, int block, float dt, const float* u);
+
+/// Adds the forces of a block's contacts, which must be there, to its part of the force buffer.
+void add_face_contacts(const MpmState& state, int block, float* force);
+
+}  // namespace tissue_sim

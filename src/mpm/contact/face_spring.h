@@ -1,0 +1,122 @@
+// The spring between two faces that touch: what a contact is within a substep, on the CPU and on
+// the GPU.
+#pragma once
+
+#include <cmath>
+#include <cstdint>
+
+#include "compute/host_device.h"
+#include "contact/contact_spring.h"
+#include "mpm/contact/facet_in_world.h"
+
+namespace tissue_sim {
+
+/// A spring and a damper between the centre of a facet and a material place on another face.
+struct alignas(16) FaceSpring {
+  double from_middle[3];  ///< from the middle of the other's cell to the facet's centre, in
+                          ///< reference space [m]
+  double cell_size;       ///< of the other body [m]
+  float hold[3];          ///< place on the other face [cells, from the middle of its cell]
+  float between[3];       ///< from `hold` to the centre in reference space [m]
+  float apart[3];         ///< the same in the world, as of the last substep [m]
+  float normal[3];        ///< of the other face, in the world
+  float to_reference[9];  ///< inverse of its deformation gradient over the cell [1/m]
+  float stiffness, damping, friction;  ///< [N/m], [N s/m], [-]
+  float own_mobility;                  ///< sum of w^2 / m at the facet's centre [1/kg]
+  float sudden;                        ///< depth at which nothing can be from one substep [m]
+  float force[3];                      ///< on the facet [N]
+  bool touching = false;
+  std::int32_t facet = -1, other = -1;  ///< numbers over all blocks; other -1: nothing near
+  float depth = 0;  ///< of the facet's centre below the other face, as of the last look [cells]
+  float begun = 0;  ///< depth at which the place held may stay, for there it began [cells]
+
+  /// Sets the place on the other face that it holds on to.
+  TISSUE_SIM_INLINE void hold_at(const float (&place)[3]) {
+    for (int a = 0; a < 3; ++a) {
+      hold[a] = place[a];
+      between[a] = static_cast<float>(from_middle[a] - cell_size * place[a]);
+    }
+  }
+
+  /// Sets `apart`, from the displacements of the facet's centre and of the place held [m].
+  TISSUE_SIM_INLINE void measure_apart(const float (&own)[3], const float (&held)[3]) {
+    for (int a = 0; a < 3; ++a) apart[a] = between[a] + (own[a] - held[a]);
+  }
+
+  /// Makes the spring so soft that substeps of `dt` can follow what it moves, and the damper to it;
+  /// `held_mobility` is the sum of w^2 / m at the place held [1/kg].
+  TISSUE_SIM_INLINE void soften(float held_mobility, float dt) {
+    constexpr float kStable = 0.35f;  // stiffness * dt^2 / mass, at most; springs share nodes
+    const float mass = 1 / (own_mobility + held_mobility + 1e-30f);
+    stiffness = fminf(stiffness, kStable * mass / (dt * dt));
+    constexpr float kDamping = 0.3f;  // share of critical
+    damping = 2 * kDamping * sqrtf(stiffness * mass);
+  }
+
+  /// Whether the place held is still on the other face: near its cell, and not far from the facet.
+  TISSUE_SIM_INLINE bool holds() const {
+    constexpr float kFarthest = 1.25f;  // [cells]
+    const auto far = static_cast<float>(0.75 * cell_size);
+    return dot(apart, apart) < far * far && fabsf(hold[0]) < kFarthest &&
+           fabsf(hold[1]) < kFarthest && fabsf(hold[2]) < kFarthest;
+  }
+};
+
+/// Works out the force of a contact after a substep of `dt` seconds, and lets it slide. `places`
+/// knows displacements [m]: places.own(u) of the facet's centre, places.held(u) of the place held,
+/// which places.hold(place) sets, and places.held_mobility() [1/kg]. Where several contacts are
+/// worked out in step, places.any(so) says whether it is so for any of them, and those that are not
+/// `active` come along.
+template <class Places>
+TISSUE_SIM_INLINE void push_face(FaceSpring& c, float dt, Places& places, bool active = true) {
+  float own[3], held[3];
+  const float depth_before = -dot(c.apart, c.normal);
+  places.own(own);
+  places.held(held);
+  c.measure_apart(own, held);
+  float depth = -dot(c.apart, c.normal);
+  const float closing = (depth - depth_before) / dt;  // [m/s]
+  const float length2 = dot(c.apart, c.apart);
+  c.force[0] = c.force[1] = c.force[2] = 0;
+  // What comes out of the blue is for the next look to tell.
+  const bool touched = c.touching, sudden = !touched && depth > c.sudden;
+  c.touching = active && depth > 0 && !sudden;
+  if (!places.any(c.touching)) return;
+  // The place held slides along the face, so that the spring stays in the friction cone.
+  constexpr float kOnCone = 1.02f;
+  float aside[3], slip = 0;
+  for (int i = 0; i < 4; ++i) {
+    for (int a = 0; a < 3; ++a) aside[a] = c.apart[a] + depth * c.normal[a];
+    slip = sqrtf(dot(aside, aside));
+    const bool slides = c.touching && slip > kOnCone * c.friction * depth;
+    if (i == 3 || !places.any(slides)) break;
+    if (slides) {
+      const float share = 1 - c.friction * depth / slip;
+      float place[3];
+      for (int a = 0; a < 3; ++a) {
+        place[a] = c.hold[a] + share * dot(c.to_reference + 3 * a, aside);
+      }
+      c.hold_at(place);
+      places.hold(place);
+    }
+    places.held(held);
+    if (slides) {
+      c.measure_apart(own, held);
+      depth = -dot(c.apart, c.normal);
+      // Not what it looked like, or beyond what is left of the face.
+      c.touching = depth > 0 && dot(c.apart, c.apart) <= length2 && c.holds();
+    }
+    const bool begins = slides && c.touching && !touched;
+    if (places.any(begins)) {
+      const float mobility = places.held_mobility();
+      if (begins) c.soften(mobility, dt);
+    }
+  }
+  if (!c.touching) return;
+  // Along the line between the two material places, and only apart.
+  const float push = fmaxf(0.0f, c.stiffness * depth + c.damping * closing);
+  const float friction = fminf(1.0f, kOnCone * c.friction * depth / (slip + 1e-30f));
+  for (int a = 0; a < 3; ++a) c.force[a] = push * (c.normal[a] - friction / depth * aside[a]);
+}
+
+}  // namespace tissue_sim

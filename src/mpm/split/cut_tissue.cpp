@@ -1,0 +1,78 @@
+#include "mpm/split/cut_tissue.h"
+
+#include <utility>
+
+#include "mpm/contact/block_contact.h"
+#include "mpm/contact/known_facets.h"
+#include "mpm/tear/bond_bridges.h"
+#include "mpm/tear/debris.h"
+
+namespace tissue_sim {
+namespace {
+
+/// Bounds the motion of new blocks by that of those which had their points.
+void bound_motion(MpmState& state) {
+  std::vector<BlockMotion> motion(state.blocks.all.size());
+  for (std::size_t i = 0; i < motion.size(); ++i) {
+    const Blocks::Origin& origin = state.blocks.origin[i];
+    for (int b = origin.begin; b < origin.end; ++b) {
+      const BlockMotion& part = state.motion[b];
+      motion[i].box.min = motion[i].box.min.cwiseMin(part.box.min);
+      motion[i].box.max = motion[i].box.max.cwiseMax(part.box.max);
+      if (!(part.speed <= motion[i].speed)) motion[i].speed = part.speed;
+    }
+  }
+  state.motion = std::move(motion);
+}
+
+}  // namespace
+
+Apart take_apart(MpmState& state, const std::vector<std::int32_t>& changed,
+                 const std::function<void()>& meanwhile) {
+  Apart apart;
+  if (changed.empty()) return apart;
+  std::vector<NodeFields::Cell> cells;
+  Softened softened;
+  state.cpu->both(
+      [&] {
+        cells = state.fields->update(state.bodies, state.points, changed, state.nodes, *state.cpu);
+      },
+      [&] {
+        softened = soften(state.bodies, changed, state.points);
+        state.blocks.stale_facets.resize(lattice_node_count(state.bodies), 0);
+        mark_stale_facets(state.bodies, state.points, changed, state.blocks.stale_facets);
+      });
+  for (const std::int32_t p : softened.points) {  // blocks must know
+    const Points::Site& s = state.points.site[p];
+    cells.push_back({s.body, s.x / 2, s.y / 2, s.z / 2});
+  }
+  settle_crumbs(state.bodies, state.points, *state.fields, softened.crumbs, state.nodes);
+  state.crumbs.insert(softened.crumbs.begin(), softened.crumbs.end());
+  state.cpu->both(
+      [&] {
+        if (cells.empty()) return;
+        keep_face_contacts(state);
+        update_blocks(state.blocks, state.bodies, state.points, *state.fields, cells,
+                      static_cast<int>(state.nodes.size()), *state.cpu);
+        state.cpu->both(
+            [&] {
+              if (!state.blocks.has_rows) return;  // on a GPU
+              state.force.clear();                 // not to be moved to new room
+              state.force.resize(state.blocks.force_size);
+            },
+            [&] {
+              bound_motion(state);
+              list_contacts(state);
+              list_facets(state);
+            });
+      },
+      [&] {
+        list_threads(state, changed);
+        meanwhile();
+      });
+  apart.softened = std::move(softened.points);
+  apart.new_blocks = !cells.empty();
+  return apart;
+}
+
+}  // namespace tissue_sim

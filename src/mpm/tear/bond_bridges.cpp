@@ -1,0 +1,115 @@
+#include "mpm/tear/bond_bridges.h"
+
+#include <algorithm>
+
+#include "mpm/lattice/bonds.h"
+#include "mpm/tear/crack.h"
+#include "mpm/tear/deformation.h"
+
+namespace tissue_sim {
+namespace {
+
+bool has(unsigned bonds, int k) { return (bonds >> k & 1) != 0; }
+
+/// The bonds of a point and of those that it holds on to.
+struct BondsAround {
+  unsigned own;
+  unsigned of[kBondCount] = {};    ///< of the neighbour over each bond, none where that is gone
+  std::int32_t point[kBondCount];  ///< that neighbour
+
+  BondsAround(const LatticeBody& body, const Points& points, std::int32_t p)
+      : own(points.bonds[p]) {
+    const Points::Site& s = points.site[p];
+    for (int k = 0; k < kBondCount; ++k) {
+      if (!has(own, k)) continue;
+      const BondOffset o = bond_offset(k);
+      point[k] = body.point(s.x + o.x, s.y + o.y, s.z + o.z);
+      of[k] = points.bonds[point[k]];
+    }
+  }
+  /// Whether bond `k` is there and in no square of four bonds.
+  bool is_thread(int k) const {
+    if (!has(own, k)) return false;
+    const unsigned sides = own & of[k] & ~(1u << k | 1u << opposite_bond(k));
+    for (int side = 0; side < kBondCount; ++side) {
+      if (has(sides, side) && has(of[side], k)) return false;
+    }
+    return true;
+  }
+  /// Whether any of the bonds is a thread.
+  bool end_thread() const {
+    for (int k = 0; k < kBondCount; ++k) {
+      if (is_thread(k)) return true;
+    }
+    return false;
+  }
+};
+
+}  // namespace
+
+void list_threads(MpmState& state, const std::vector<std::int32_t>& changed) {
+  const Points& points = state.points;
+  std::vector<std::int32_t>& threads = state.threads;
+  // Of each cell, by its node: no thread ends around it. Points come row by row, so that a cell
+  // comes up to four times.
+  std::vector<std::uint8_t> is_bare(lattice_node_count(state.bodies), 0);
+  Planes ends{};
+  int node = -1;
+  Points::Site of{-1, -1, -1, -1};  // the cell that they are around
+  for (const std::int32_t p : changed) {
+    const Points::Site& s = points.site[p];
+    if (s.x / 2 != of.x || s.y / 2 != of.y || s.z / 2 != of.z || s.body != of.body) {
+      of = {static_cast<std::int16_t>(s.x / 2), static_cast<std::int16_t>(s.y / 2),
+            static_cast<std::int16_t>(s.z / 2), s.body};
+      node = state.bodies[of.body].node(of.x, of.y, of.z);
+      if (is_bare[node] == 0) {
+        ends = state.fields->bonds().thread_ends(of.body, of.x, of.y, of.z);
+        is_bare[node] = ends == Planes{};
+      }
+    }
+    if (is_bare[node] != 0) continue;
+    const auto ends_one = [&](const BondOffset& o) {
+      const int x = s.x + o.x, y = s.y + o.y, z = s.z + o.z;
+      return (ends[z - 2 * of.z + 2] >> bit_in_plane(x - 2 * of.x + 2, y - 2 * of.y + 2) & 1) != 0;
+    };
+    if (ends_one({0, 0, 0})) threads.push_back(p);
+    // A square may have lost its far side.
+    for (unsigned bonds = points.bonds[p]; bonds != 0; bonds &= bonds - 1) {
+      const int k = __builtin_ctz(bonds);
+      if (ends_one(bond_offset(k))) threads.push_back(neighbour(state.bodies[s.body], s, k));
+    }
+  }
+  std::sort(threads.begin(), threads.end());
+  threads.erase(std::unique(threads.begin(), threads.end()), threads.end());
+}
+
+void tear_threads(MpmState& state, std::vector<std::int32_t>& changed, CutReport& report) {
+  const std::size_t first = changed.size();
+  Points& points = state.points;
+  std::vector<std::int32_t> left;
+  for (const std::int32_t p : state.threads) {
+    const LatticeBody& body = state.bodies[points.site[p].body];
+    if (!BondsAround(body, points, p).end_thread()) continue;
+    const Deformation d(body, points.site[p], *state.fields, state.nodes);
+    if (d.stretch < kThreadStretch || d.stiffening < kThreadStiffening) {
+      left.push_back(p);
+      continue;
+    }
+    for (int k = 0; k < kBondCount; ++k) {
+      const BondsAround around(body, points, p);  // as those before left it
+      if (!around.is_thread(k)) continue;
+      const std::int32_t other = around.point[k];
+      break_bond(k, points.bonds[p], points.bonds[other]);
+      changed.push_back(p);
+      changed.push_back(other);
+      ++report.bonds_broken;
+    }
+  }
+  state.threads = std::move(left);
+  const auto begin = changed.begin() + static_cast<std::ptrdiff_t>(first);
+  std::sort(begin, changed.end());
+  changed.erase(std::unique(begin, changed.end()), changed.end());
+  report.points_separated += static_cast<int>(changed.size() - first);
+}
+
+}  // namespace tissue_sim

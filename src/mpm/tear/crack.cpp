@@ -1,0 +1,167 @@
+#include "mpm/tear/crack.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace tissue_sim {
+namespace {
+
+/// Bonds of an axis whose direction has less than this along n lie along a crack, not across.
+constexpr double kAcross = 0.5;
+
+/// From this excess on a bond between two points that lost bonds to each other's side breaks though
+/// another one broke on its line: a crack that turns may leave a thread behind.
+constexpr float kThread = 1.3f;
+
+Vec3 direction(int k) {
+  const BondOffset o = bond_offset(k);
+  return Vec3(o.x, o.y, o.z);
+}
+
+/// The crack that a point is at.
+struct CrackNearby {
+  bool any = false;           ///< within kReach
+  bool beside = false;        ///< so near that it may go on here
+  bool passed = false;        ///< it went through the point's line along n
+  double offset = 0;          ///< of its plane from the point along n [points]
+  Vec3 ahead = Vec3::Zero();  ///< the way it goes, in its plane; unit
+};
+
+CrackNearby crack_nearby(const MpmState& state, const TearingPoint& t) {
+  const Points::Site& s = state.points.site[t.point];
+  const LatticeBody& body = state.bodies[s.body];
+  CrackNearby crack;
+  double weights = 0, sum = 0;
+  for (int dz = -kReach; dz <= kReach; ++dz) {
+    for (int dy = -kReach; dy <= kReach; ++dy) {
+      for (int dx = -kReach; dx <= kReach; ++dx) {
+        const std::int32_t q = body.point(s.x + dx, s.y + dy, s.z + dz);
+        if (q < 0) continue;
+        const unsigned broken = broken_bonds(state, body, q);
+        for (unsigned left = broken >> kForwardBond; left != 0; left &= left - 1) {
+          const Vec3 along = direction(kForwardBond + __builtin_ctz(left));
+          if (std::fabs(along.dot(t.normal)) < kAcross) continue;
+          const Vec3 middle = Vec3(dx, dy, dz) + 0.5 * along;
+          const double offset = middle.dot(t.normal);
+          const double aside2 = middle.squaredNorm() - offset * offset;
+          crack.any = true;
+          crack.passed = crack.passed || aside2 < 0.6;
+          crack.beside = crack.beside || aside2 < 2.3;  // of the next column, or askew to it
+          const double weight = 1 / (0.1 + aside2 * aside2);
+          weights += weight;
+          sum += weight * offset;
+          crack.ahead -= weight * (middle - offset * t.normal);
+        }
+      }
+    }
+  }
+  if (crack.any) crack.offset = sum / weights;
+  if (crack.ahead.norm() > 0) crack.ahead.normalize();
+  return crack;
+}
+
+/// Side of the crack, 1 or -1, that a point is on by the bonds that it lost across n; 0 if it lost
+/// none.
+int side_by_own(const MpmState& state, const LatticeBody& body, std::int32_t p, const Vec3& n) {
+  double to_crack = 0;
+  for (unsigned left = broken_bonds(state, body, p); left != 0; left &= left - 1) {
+    const double across = direction(__builtin_ctz(left)).dot(n);
+    if (std::fabs(across) >= kAcross) to_crack += across;
+  }
+  return to_crack > 0 ? -1 : to_crack < 0 ? 1 : 0;
+}
+
+/// The same, else by the bonds that broke on its line along the axis nearest to n.
+int side_by_bonds(const MpmState& state, const LatticeBody& body, std::int32_t p, const Vec3& n) {
+  const int own = side_by_own(state, body, p, n);
+  if (own != 0) return own;
+  int axis = 0;
+  n.cwiseAbs().maxCoeff(&axis);
+  const int up = n[axis] > 0 ? kForwardBond + axis : opposite_bond(kForwardBond + axis);
+  for (int i = 1; i < kReach; ++i) {
+    for (const int k : {up, opposite_bond(up)}) {
+      const std::int32_t q = neighbour(body, state.points.site[p], k, i);
+      if (q >= 0 && (broken_bonds(state, body, q) >> k & 1) != 0) return k == up ? -1 : 1;
+    }
+  }
+  return 0;
+}
+
+}  // namespace
+
+unsigned broken_bonds(const MpmState& state, const LatticeBody& body, std::int32_t p) {
+  const std::uint8_t bonds = state.points.bonds[p];
+  return bonds == kAllBonds ? 0u : whole_bonds(body, state.points.site[p]) & ~unsigned{bonds};
+}
+
+std::int32_t neighbour(const LatticeBody& body, const Points::Site& s, int k, int steps) {
+  const BondOffset o = bond_offset(k);
+  return body.point(s.x + steps * o.x, s.y + steps * o.y, s.z + steps * o.z);
+}
+
+const TearingPoint* entry(const std::vector<TearingPoint>& tearing, std::int32_t point) {
+  const auto at =
+      std::lower_bound(tearing.begin(), tearing.end(), point,
+                       [](const TearingPoint& t, std::int32_t number) { return t.point < number; });
+  return at != tearing.end() && at->point == point ? &*at : nullptr;
+}
+
+bool broken_on_line(const MpmState& state, const LatticeBody& body, std::int32_t p, int k) {
+  for (int i = -kReach; i <= kReach; ++i) {
+    const std::int32_t q = neighbour(body, state.points.site[p], k, i);
+    if (q >= 0 && (broken_bonds(state, body, q) >> k & 1) != 0) return true;
+  }
+  return false;
+}
+
+/// Whether the tissue is past its limit up to tear_length ahead of the tip, or to where it ends.
+/// Nodes part 1.5 cells behind the last broken bond (half their support), and that is where the
+/// tissue's own tip is.
+static bool finds_enough(const MpmState& state, const TearingPoint& t, const CrackNearby& crack,
+                         const std::vector<TearingPoint>& tearing) {
+  const Points::Site& s = state.points.site[t.point];
+  const LatticeBody& body = state.bodies[s.body];
+  const double length =
+      2 * body.material_of(state.points, t.point).tear_length / body.cell_size - 3;  // [points]
+  std::int32_t last = t.point;
+  for (int i = 1; i <= std::lround(length); ++i) {
+    const Vec3 x = Vec3(s.x, s.y, s.z) + crack.offset * t.normal + i * crack.ahead;
+    const std::int32_t q =
+        body.point(static_cast<int>(std::lround(x[0])), static_cast<int>(std::lround(x[1])),
+                   static_cast<int>(std::lround(x[2])));
+    if (q < 0) break;
+    last = q;
+  }
+  return entry(tearing, last) != nullptr;
+}
+
+bool go_on(const MpmState& state, const TearingPoint& t, const std::vector<TearingPoint>& tearing,
+           std::vector<Bond>& bonds) {
+  const CrackNearby crack = crack_nearby(state, t);
+  if (!crack.beside || (!crack.passed && !finds_enough(state, t, crack, tearing))) {
+    return crack.any;
+  }
+  const Points::Site& s = state.points.site[t.point];
+  const LatticeBody& body = state.bodies[s.body];
+  const int known = side_by_bonds(state, body, t.point, t.normal);
+  // A tip bears the more, the finer the lattice is against tear_length.
+  const double thread_excess =
+      kThread *
+      std::max(1.0, body.material_of(state.points, t.point).tear_length / (1.5 * body.cell_size));
+  const int side = known != 0 ? known : crack.offset > 0 ? -1 : 1;
+  for (unsigned left = state.points.bonds[t.point]; left != 0; left &= left - 1) {
+    const int k = __builtin_ctz(left);
+    const std::int32_t q = neighbour(body, s, k);
+    const int other_known = side_by_bonds(state, body, q, t.normal);
+    const double across = direction(k).dot(t.normal);
+    const int other = other_known != 0 ? other_known : across < crack.offset ? -1 : 1;
+    if (side == other) continue;
+    const bool thread = t.excess > thread_excess &&
+                        side_by_own(state, body, t.point, t.normal) != 0 &&
+                        side_by_own(state, body, q, t.normal) != 0;
+    bonds.push_back({t.point, k, thread});
+  }
+  return true;
+}
+
+}  // namespace tissue_sim

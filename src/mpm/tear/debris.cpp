@@ -1,0 +1,244 @@
+#include "mpm/tear/debris.h"
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <array>
+#include <cstring>
+
+#include "mpm/lattice/bonds.h"
+#include "mpm/tear/crack.h"
+#include "mpm/tear/deformation.h"
+
+namespace tissue_sim {
+namespace {
+
+/// Whether bonds along x hold it together with kCrumbPoints others on one side: most points, seen
+/// at a glance. Points are numbered along x.
+bool is_in_long_run(const Points& points, std::int32_t point) {
+  static_assert(kCrumbPoints == sizeof(std::uint64_t), "a byte for each point");
+  constexpr std::uint64_t kForwardInX = 0x0101010101010101 << kForwardBond;
+  const auto run_from = [&](std::int32_t first) {
+    if (first < 0 || first + kCrumbPoints > points.size()) return false;
+    std::uint64_t bonds;
+    std::memcpy(&bonds, &points.bonds[first], sizeof(bonds));
+    return (bonds & kForwardInX) == kForwardInX;
+  };
+  return run_from(point) || run_from(point - kCrumbPoints);
+}
+
+/// The points that bonds hold together with this one; none if they are more than a crumb's.
+struct Crumb {
+  std::int32_t point[kCrumbPoints];
+  int count = 0;
+  Crumb(const LatticeBody& body, const Points& points, std::int32_t first) {
+    const bool may_be = points.bonds[first] != kAllBonds && body.point_count > kCrumbPoints &&
+                        !is_in_long_run(points, first);
+    if (!may_be) return;
+    point[count++] = first;
+    for (int i = 0; i < count; ++i) {
+      const Points::Site& s = points.site[point[i]];
+      for (int k = 0; k < kBondCount; ++k) {
+        if ((points.bonds[point[i]] >> k & 1) == 0) continue;
+        const std::int32_t next = neighbour(body, s, k);
+        if (std::find(begin(), end(), next) != end()) continue;
+        if (count == kCrumbPoints) {
+          count = 0;
+          return;
+        }
+        point[count++] = next;
+      }
+    }
+  }
+  const std::int32_t* begin() const { return point; }
+  const std::int32_t* end() const { return point + count; }
+};
+
+/// Whether cuts took all bonds along an axis from a point that had both.
+bool is_in_slice(const LatticeBody& body, const Points& points, std::int32_t point) {
+  const unsigned bonds = points.bonds[point];
+  for (int axis = 0; axis < 3; ++axis) {
+    const int k = kForwardBond + axis;
+    const unsigned both = 1u << k | 1u << opposite_bond(k);
+    if ((bonds & both) != 0) continue;
+    if ((whole_bonds(body, points.site[point]) & both) == both) return true;
+  }
+  return false;
+}
+
+/// The nodes that some points see, and their reference places.
+struct NodesOf {
+  std::vector<int> node;
+  std::vector<Vec3> home;
+  template <class SomePoints>
+  NodesOf(const LatticeBody& body, const Points& points, const NodeFields& fields,
+          const SomePoints& some) {
+    for (const std::int32_t p : some) {
+      const Points::Site& s = points.site[p];
+      for (int k = 0; k < 27; ++k) {
+        const int i = fields.node(body, s, k);
+        if (std::find(node.begin(), node.end(), i) != node.end()) continue;
+        node.push_back(i);
+        home.push_back(
+            body.node_position(s.x / 2 + k % 3 - 1, s.y / 2 + k / 3 % 3 - 1, s.z / 2 + k / 9 - 1));
+      }
+    }
+  }
+};
+
+/// The rotation that maps the places X best onto x, by their sum of mass times x X^T.
+Eigen::Matrix3d rotation_of(const Eigen::Matrix3d& x_X) {
+  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(x_X, Eigen::ComputeFullU | Eigen::ComputeFullV);
+  Eigen::Matrix3d U = svd.matrixU();
+  if ((U * svd.matrixV().transpose()).determinant() < 0) U.col(2) *= -1;
+  return U * svd.matrixV().transpose();
+}
+
+/// The sum of m (x^2 - x x^T).
+template <class Mass>
+Eigen::Matrix3d inertia_of(const std::vector<Vec3>& x, const Mass& mass) {
+  Eigen::Matrix3d inertia = Eigen::Matrix3d::Zero();
+  for (std::size_t i = 0; i < x.size(); ++i) {
+    inertia +=
+        mass(i) * (x[i].squaredNorm() * Eigen::Matrix3d::Identity() - x[i] * x[i].transpose());
+  }
+  return inertia;
+}
+
+/// The nearest point beside a crumb, along the lattice, that is not soft; -1 if there is none.
+std::int32_t beside(const LatticeBody& body, const Points& points, const Crumb& crumb) {
+  constexpr int kFarthest = 4;
+  for (int steps = 1; steps <= kFarthest; ++steps) {
+    for (const std::int32_t p : crumb) {
+      for (int k = 0; k < kBondCount; ++k) {
+        const std::int32_t other = neighbour(body, points.site[p], k, steps);
+        if (other >= 0 && !points.is_soft(other)) return other;
+      }
+    }
+  }
+  return -1;
+}
+
+/// Sets the nodes of a point turning, so that they have so much more angular momentum.
+void turn(const LatticeBody& body, const Points& points, const NodeFields& fields,
+          std::int32_t point, const Vec3& angular, Nodes& nodes) {
+  const NodesOf around(body, points, fields, std::array<std::int32_t, 1>{point});
+  const auto mass = [&](std::size_t i) -> double { return nodes.mass[around.node[i]]; };
+  std::vector<Vec3> x(around.node.size());
+  double total = 0;
+  Vec3 mean = Vec3::Zero();
+  for (std::size_t i = 0; i < x.size(); ++i) {
+    const int n = around.node[i];
+    x[i] = around.home[i] + Vec3(nodes.u[0][n], nodes.u[1][n], nodes.u[2][n]);
+    total += mass(i);
+    mean += mass(i) * x[i];
+  }
+  for (Vec3& place : x) place -= mean / total;
+  const Vec3 spin = inertia_of(x, mass).ldlt().solve(angular);
+  for (std::size_t i = 0; i < x.size(); ++i) {
+    const int n = around.node[i];
+    if (nodes.inv_mass[n] == 0) continue;  // what holds it takes its share
+    const Vec3 v = spin.cross(x[i]);
+    for (int a = 0; a < 3; ++a) nodes.v[a][n] += static_cast<float>(v[a]);
+  }
+}
+
+void make_rigid(const LatticeBody& body, const Points& points, const NodeFields& fields,
+                const Crumb& of_crumb, Nodes& nodes) {
+  const NodesOf crumb(body, points, fields, of_crumb);
+  const Material& material = body.material_of(points, of_crumb.point[0]);
+  const double fastest_spin =
+      kCrumbSpin * std::sqrt(material.young_modulus / material.density) / body.cell_size;
+  const std::size_t count = crumb.node.size();
+  std::vector<Vec3> x(count), v(count);
+  double mass = 0;
+  Vec3 x_mean = Vec3::Zero(), X_mean = Vec3::Zero(), v_mean = Vec3::Zero();
+  for (std::size_t i = 0; i < count; ++i) {
+    const int n = crumb.node[i];
+    if (nodes.mass[n] > 0 && nodes.inv_mass[n] == 0) return;  // held fast
+    x[i] = crumb.home[i] + Vec3(nodes.u[0][n], nodes.u[1][n], nodes.u[2][n]);
+    v[i] = Vec3(nodes.v[0][n], nodes.v[1][n], nodes.v[2][n]);
+    mass += nodes.mass[n];
+    x_mean += nodes.mass[n] * x[i];
+    X_mean += nodes.mass[n] * crumb.home[i];
+    v_mean += nodes.mass[n] * v[i];
+  }
+  x_mean /= mass;
+  X_mean /= mass;
+  v_mean /= mass;
+  Eigen::Matrix3d x_X = Eigen::Matrix3d::Zero();
+  Vec3 angular = Vec3::Zero();
+  for (std::size_t i = 0; i < count; ++i) {
+    const double m = nodes.mass[crumb.node[i]];
+    x_X += m * (x[i] - x_mean) * (crumb.home[i] - X_mean).transpose();
+    angular += m * (x[i] - x_mean).cross(v[i] - v_mean);
+  }
+  if (!x_X.allFinite() || !angular.allFinite()) return;  // as the end of the frame will say
+  const Eigen::Matrix3d R = rotation_of(x_X);
+  for (std::size_t i = 0; i < count; ++i) x[i] = R * (crumb.home[i] - X_mean);
+  const Eigen::Matrix3d inertia =
+      inertia_of(x, [&](std::size_t i) -> double { return nodes.mass[crumb.node[i]]; });
+  Vec3 spin = inertia.ldlt().solve(angular);
+  if (spin.norm() > fastest_spin) {
+    spin *= fastest_spin / spin.norm();
+    const std::int32_t other = beside(body, points, of_crumb);
+    if (other >= 0) turn(body, points, fields, other, angular - inertia * spin, nodes);
+  }
+  for (std::size_t i = 0; i < count; ++i) {
+    const Vec3 u = x_mean + x[i] - crumb.home[i], velocity = v_mean + spin.cross(x[i]);
+    for (int a = 0; a < 3; ++a) {
+      nodes.u[a][crumb.node[i]] = static_cast<float>(u[a]);
+      nodes.v[a][crumb.node[i]] = static_cast<float>(velocity[a]);
+    }
+  }
+}
+
+}  // namespace
+
+Softened soften(const std::vector<LatticeBody>& bodies, const std::vector<std::int32_t>& changed,
+                Points& points) {
+  Softened softened;
+  std::set<std::int32_t> seen;  // crumbs, by their lowest points
+  const auto mark = [&](std::int32_t p) {
+    if (points.soft.empty()) points.soft.resize(points.size(), 0);
+    if (points.soft[p] == 0) softened.points.push_back(p);
+    points.soft[p] = 1;
+  };
+  for_each_site(points, changed, [&](std::int32_t p, const Points::Site& site) {
+    const LatticeBody& body = bodies[site.body];
+    if (is_in_slice(body, points, p)) mark(p);
+    const Crumb crumb(body, points, p);
+    if (crumb.count == 0) return;
+    for (const std::int32_t of_crumb : crumb) mark(of_crumb);
+    const std::int32_t lowest = *std::min_element(crumb.begin(), crumb.end());
+    if (seen.insert(lowest).second) softened.crumbs.push_back(lowest);
+  });
+  return softened;
+}
+
+void settle_crumbs(const std::vector<LatticeBody>& bodies, const Points& points,
+                   const NodeFields& fields, const std::vector<std::int32_t>& crumbs,
+                   Nodes& nodes) {
+  for (const std::int32_t lowest : crumbs) {
+    const LatticeBody& body = bodies[points.site[lowest].body];
+    make_rigid(body, points, fields, Crumb(body, points, lowest), nodes);
+  }
+}
+
+bool settle_wild_crumbs(const std::vector<LatticeBody>& bodies, const Points& points,
+                        const NodeFields& fields, const std::set<std::int32_t>& crumbs,
+                        Nodes& nodes) {
+  bool any = false;
+  for (const std::int32_t lowest : crumbs) {
+    const LatticeBody& body = bodies[points.site[lowest].body];
+    const Crumb crumb(body, points, lowest);
+    const bool wild = std::any_of(crumb.begin(), crumb.end(), [&](std::int32_t p) {
+      return Deformation(body, points.site[p], fields, nodes).stiffening >= kWildStiffening;
+    });
+    if (!wild) continue;
+    make_rigid(body, points, fields, crumb, nodes);
+    any = true;
+  }
+  return any;
+}
+
+}  // namespace tissue_sim

@@ -1,0 +1,47 @@
+// Crumbs: pieces that are too small to be seen as bodies, but whose vibration would set the substep
+// of all the tissue.
+#pragma once
+
+#include <cstdint>
+#include <set>
+#include <vector>
+
+#include "mpm/blocks/stabilisation.h"
+#include "mpm/lattice/lattice_body.h"
+#include "mpm/lattice/nodes.h"
+#include "mpm/split/node_fields.h"
+
+namespace tissue_sim {
+
+/// A piece that was cut off with at most this many points, a cell's worth, is a crumb.
+inline constexpr int kCrumbPoints = 8;
+
+/// Marks what became soft as the points `changed` lost bonds: those of crumbs, and of slices one
+/// point thick, which cuts parted from what there was on both sides of them along an axis of the
+/// lattice. They keep the share kSoftness of their stiffness.
+struct Softened {
+  std::vector<std::int32_t> points;
+  std::vector<std::int32_t> crumbs;  ///< lowest point of each, whether it was one before or not
+};
+Softened soften(const std::vector<LatticeBody>& bodies, const std::vector<std::int32_t>& changed,
+                Points& points);
+
+/// The volume by which a point resists strain [m^3]: its own, or less where it is soft.
+inline float elastic_volume(const Points& points, std::int32_t point) {
+  return (points.is_soft(point) ? kSoftness : 1.0f) * points.volume[point];
+}
+
+/// Lets crumbs, each given by its lowest point, move on as rigid bodies without strain. Their
+/// momentum stays, linear and angular; what else a torn thread left in their nodes, a swing of many
+/// times their size, goes. No crumb turns faster than kCrumbSpin times the speed of sound in a rod
+/// a cell, which strains it by a tenth or two: the rest goes to the tissue beside it.
+void settle_crumbs(const std::vector<LatticeBody>& bodies, const Points& points,
+                   const NodeFields& fields, const std::vector<std::int32_t>& crumbs, Nodes& nodes);
+/// The same for those that have become wild since (mpm/tear/deformation.h). Returns whether any
+/// had.
+bool settle_wild_crumbs(const std::vector<LatticeBody>& bodies, const Points& points,
+                        const NodeFields& fields, const std::set<std::int32_t>& crumbs,
+                        Nodes& nodes);
+inline constexpr double kCrumbSpin = 0.5;
+
+}  // namespace tissue_sim

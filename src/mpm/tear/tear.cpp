@@ -1,0 +1,251 @@
+#include "mpm/tear/tear.h"
+
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+#include "mpm/lattice/bonds.h"
+#include "mpm/tear/crack.h"
+
+namespace tissue_sim {
+namespace {
+
+/// From this excess on a crack begins though another one may be about to relieve the place.
+constexpr float kPatience = 1.1f;
+
+/// The bond that a crack takes first.
+Bond begin(const MpmState& state, const TearingPoint& t, const std::vector<TearingPoint>& tearing) {
+  const Points::Site& s = state.points.site[t.point];
+  const LatticeBody& body = state.bodies[s.body];
+  int axis = 0;
+  t.normal.cwiseAbs().maxCoeff(&axis);
+  Bond best{t.point, -1, false};
+  float most = -1;
+  for (const int k : {kForwardBond + axis, opposite_bond(kForwardBond + axis)}) {
+    if ((state.points.bonds[t.point] >> k & 1) == 0) continue;
+    const std::int32_t q = neighbour(body, s, k);
+    const TearingPoint* far = entry(tearing, q);
+    const float excess = far != nullptr ? far->excess : 0.0f;
+    if (excess <= most) continue;
+    most = excess;
+    best.bond = k;
+  }
+  return best;
+}
+
+/// Whether what tore last had no time yet to relieve all of the point's body.
+bool being_relieved(const MpmState& state, std::int32_t point) {
+  const int body = state.points.site[point].body;
+  const LatticeBody& b = state.bodies[body];
+  const double extent = std::max({b.nx, b.ny, b.nz}) * b.cell_size;
+  return state.time - state.tore_at[body] < extent / wave_speed(b.material_of(state.points, point));
+}
+
+/// Regions of tissue past its limit: for each entry the lowest of those that bonds join it to.
+std::vector<int> regions(const MpmState& state, const std::vector<TearingPoint>& tearing) {
+  std::vector<int> parent(tearing.size());
+  std::iota(parent.begin(), parent.end(), 0);
+  const auto root = [&parent](int i) {
+    while (parent[i] != i) i = parent[i] = parent[parent[i]];
+    return i;
+  };
+  for (std::size_t i = 0; i < tearing.size(); ++i) {
+    const Points::Site& s = state.points.site[tearing[i].point];
+    const unsigned bonds = state.points.bonds[tearing[i].point];
+    for (unsigned forward = bonds >> kForwardBond; forward != 0; forward &= forward - 1) {
+      const int k = kForwardBond + __builtin_ctz(forward);
+      const TearingPoint* other = entry(tearing, neighbour(state.bodies[s.body], s, k));
+      if (other == nullptr) continue;
+      const int a = root(static_cast<int>(i)), b = root(static_cast<int>(other - tearing.data()));
+      parent[std::max(a, b)] = std::min(a, b);
+    }
+  }
+  for (std::size_t i = 0; i < tearing.size(); ++i) parent[i] = root(static_cast<int>(i));
+  return parent;
+}
+
+/// Whether a crack is so near that a point is past its limit because of it: strain is largest not
+/// ahead of a tip but aside, 1.7 times as far out as ahead.
+bool in_reach_of_crack(const MpmState& state, const TearingPoint& t) {
+  const Points::Site& s = state.points.site[t.point];
+  const LatticeBody& body = state.bodies[s.body];
+  const int reach = std::max(
+      2 * kReach,
+      static_cast<int>(4 * body.material_of(state.points, t.point).tear_length / body.cell_size));
+  for (int z = s.z - reach; z <= s.z + reach; ++z) {
+    for (int y = s.y - reach; y <= s.y + reach; ++y) {
+      for (int x = s.x - reach; x <= s.x + reach; ++x) {
+        const std::int32_t q = body.point(x, y, z);
+        if (q >= 0 && broken_bonds(state, body, q) != 0) return true;
+      }
+    }
+  }
+  return false;
+}
+
+/// Where cracks begin, `at_crack` telling which entries have one within kReach.
+std::vector<Bond> beginnings(const MpmState& state, const std::vector<TearingPoint>& tearing,
+                             const std::vector<std::uint8_t>& at_crack) {
+  const std::vector<int> region = regions(state, tearing);
+  std::vector<std::uint8_t> cracked(tearing.size(), 0);
+  for (std::size_t i = 0; i < tearing.size(); ++i) cracked[region[i]] |= at_crack[i];
+  std::vector<int> worst(tearing.size(), -1);  // of each region
+  for (std::size_t i = 0; i < tearing.size(); ++i) {
+    const TearingPoint& t = tearing[i];
+    if (t.excess < 1 || cracked[region[i]] != 0) continue;
+    if (t.excess < kPatience && being_relieved(state, t.point)) continue;
+    int& w = worst[region[i]];
+    if (w < 0 || t.excess > tearing[w].excess) w = static_cast<int>(i);
+  }
+  std::vector<int> first(state.bodies.size(), -1);  // of each body
+  for (const int i : worst) {
+    if (i < 0) continue;
+    int& f = first[state.points.site[tearing[i].point].body];
+    if (f >= 0 && tearing[i].excess <= tearing[f].excess) continue;
+    if (!in_reach_of_crack(state, tearing[i])) f = i;
+  }
+  std::vector<Bond> bonds;
+  for (const int i : first) {
+    if (i < 0) continue;
+    const Bond b = begin(state, tearing[i], tearing);
+    if (b.bond >= 0) bonds.push_back(b);
+  }
+  return bonds;
+}
+
+}  // namespace
+
+bool can_tear(const MpmState& state) {
+  return std::any_of(state.bodies.begin(), state.bodies.end(),
+                     [](const LatticeBody& b) { return least_tear_limit(b) > 0; });
+}
+
+int tear_checks(const MpmState& state, int substeps, float dt) {
+  double interval = 1e9;
+  for (const LatticeBody& b : state.bodies) {
+    for (const Material& m : b.materials) {
+      if (m.tear_stretch <= 0) continue;
+      interval = std::min(interval, kTearSteps * 0.5 * b.cell_size / wave_speed(m));
+    }
+  }
+  const double every = std::max(1.0, std::round(interval / dt));
+  return static_cast<int>(std::ceil(substeps / every));
+}
+
+float least_tear_limit(const Material& m) {
+  if (m.tear_stretch <= 0) return 0;
+  return static_cast<float>(1 + (m.tear_stretch - 1) * (1 - m.tear_scatter));
+}
+
+float least_tear_limit(const LatticeBody& body) {
+  float least = 0;
+  for (const Material& m : body.materials) {
+    const float limit = least_tear_limit(m);
+    if (limit > 0 && (least == 0 || limit < least)) least = limit;
+  }
+  return least;
+}
+
+float tear_limit(const MpmState& state, std::int32_t point) {
+  const Points::Site& s = state.points.site[point];
+  const Material& m = state.bodies[s.body].material_of(state.points, point);
+  // SplitMix64 of seed and place.
+  std::uint64_t x = state.scene.seed;
+  for (const std::int16_t part : {s.body, s.x, s.y, s.z}) {
+    x += 0x9e3779b97f4a7c15u + static_cast<std::uint16_t>(part);
+    x = (x ^ (x >> 30)) * 0xbf58476d1ce4e5b9u;
+    x = (x ^ (x >> 27)) * 0x94d049bb133111ebu;
+    x ^= x >> 31;
+  }
+  const double drawn = static_cast<double>(x >> 11) * 0x1p-52 - 1;  // -1 to 1
+  return static_cast<float>(1 + (m.tear_stretch - 1) * (1 + m.tear_scatter * drawn));
+}
+
+void add_tearing(const MpmState& state, const std::vector<StretchedPoint>& stretched,
+                 std::vector<TearingPoint>& tearing) {
+  for (const StretchedPoint& p : stretched) {
+    if (state.points.anchored[p.point] != 0) continue;  // held fast, it cannot come apart
+    const LatticeBody& body = state.bodies[state.points.site[p.point].body];
+    const float least = least_tear_limit(body.material_of(state.points, p.point));
+    if (least == 0) continue;
+    Eigen::Matrix3d C;
+    C << p.C[0], p.C[3], p.C[4], p.C[3], p.C[1], p.C[5], p.C[4], p.C[5], p.C[2];
+    if (!C.allFinite()) continue;  // the frame's end will find out
+    Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver;
+    solver.computeDirect(C);
+    const double stretch = std::sqrt(solver.eigenvalues()[2]);
+    if (stretch < least) continue;  // it was looked for by the limit of a weaker material
+    const double excess = (stretch - 1) / (tear_limit(state, p.point) - 1);
+    tearing.push_back({p.point, static_cast<float>(excess), solver.eigenvectors().col(2)});
+  }
+}
+
+std::vector<TearingPoint> find_tearing(MpmState& state) {
+  const int count = static_cast<int>(state.blocks.all.size());
+  std::vector<std::vector<TearingPoint>> of_block(count);
+  state.cpu->for_each(count, [&](int i) {
+    const Block& block = *state.blocks.all[i];
+    const LatticeBody& body = state.bodies[block.body];
+    const float limit = block.material == Block::kMixed
+                            ? least_tear_limit(body)
+                            : least_tear_limit(body.materials[block.material]);
+    if (limit == 0) return;
+    std::vector<StretchedPoint> stretched;
+    state.kernels->stretched(block, block_field(state, block), limit, state.scratch.local(),
+                             stretched);
+    add_tearing(state, stretched, of_block[i]);
+  });
+  std::vector<TearingPoint> tearing;
+  for (const auto& part : of_block) tearing.insert(tearing.end(), part.begin(), part.end());
+  std::sort(tearing.begin(), tearing.end(),
+            [](const TearingPoint& a, const TearingPoint& b) { return a.point < b.point; });
+  return tearing;
+}
+
+void tear_bonds(MpmState& state, const std::vector<TearingPoint>& tearing,
+                std::vector<std::int32_t>& changed, CutReport& report) {
+  state.tore_at.resize(state.bodies.size(), -1e9);
+  const std::size_t first = changed.size();
+  const auto tear = [&](const Bond& b) {
+    const Points::Site& s = state.points.site[b.point];
+    const LatticeBody& body = state.bodies[s.body];
+    if ((state.points.bonds[b.point] >> b.bond & 1) == 0) return false;
+    if (!b.thread && broken_on_line(state, body, b.point, b.bond)) return false;
+    const std::int32_t q = neighbour(body, s, b.bond);
+    for (const std::int32_t end : {b.point, q}) {  // at a corner it may be the last
+      if (__builtin_popcount(state.points.bonds[end]) == 1) return false;
+    }
+    break_bond(b.bond, state.points.bonds[b.point], state.points.bonds[q]);
+    changed.push_back(b.point);
+    changed.push_back(q);
+    ++report.bonds_broken;
+    state.tore_at[s.body] = state.time;
+    return true;
+  };
+  const int count = static_cast<int>(tearing.size());
+  std::vector<std::vector<Bond>> bonds(count);
+  std::vector<std::uint8_t> at_crack(count);
+  for (int step = 0; step < kTearSteps; ++step) {
+    state.cpu->for_each(
+        count,
+        [&](int i) {
+          bonds[i].clear();
+          at_crack[i] = go_on(state, tearing[i], tearing, bonds[i]);
+        },
+        64);
+    bool any = false;
+    for (const std::vector<Bond>& of_point : bonds) {
+      for (const Bond& b : of_point) any = tear(b) || any;
+    }
+    if (step == 0) {
+      for (const Bond& b : beginnings(state, tearing, at_crack)) any = tear(b) || any;
+    }
+    if (!any) break;
+  }
+  std::sort(changed.begin() + first, changed.end());
+  changed.erase(std::unique(changed.begin() + first, changed.end()), changed.end());
+  report.points_separated += static_cast<int>(changed.size() - first);
+}
+
+}  // namespace tissue_sim

@@ -1,0 +1,249 @@
+// Range checks of a scene: every number that YAML, a service or a program can put in it.
+#include "tissue_sim/scene.h"
+
+#include <cmath>
+#include <set>
+#include <stdexcept>
+
+#include "scene/scene_text.h"
+
+namespace tissue_sim {
+namespace {
+
+[[noreturn]] void refuse(const std::string& field, const std::string& value,
+                         const std::string& allowed) {
+  throw std::invalid_argument(field + " is " + value + ": " + allowed);
+}
+
+std::string quoted(const std::string& s) { return "\"" + s + "\""; }
+
+std::string range_text(double low, double high, const char* unit) {
+  std::string range = "between " + text(low) + " and " + text(high);
+  if (*unit) range += std::string(" ") + unit;
+  return range;
+}
+
+// Written so that NaN fails.
+void check_range(const std::string& field, double value, double low, double high,
+                 const char* unit = "") {
+  if (value >= low && value <= high) return;
+  refuse(field, text(value), "must lie " + range_text(low, high, unit));
+}
+
+void check_each(const std::string& field, const Vec3& v, double low, double high, const char* what,
+                const char* unit) {
+  if ((v.array() >= low).all() && (v.array() <= high).all()) return;
+  refuse(field, text(v), std::string("each ") + what + " must lie " + range_text(low, high, unit));
+}
+
+void check_position(const std::string& field, const Vec3& v) {
+  check_each(field, v, -100, 100, "coordinate", "m");
+}
+
+void check_friction(const std::string& field, double value) { check_range(field, value, 0, 2); }
+
+void check_name(const std::string& field, const std::string& name, std::set<std::string>& taken) {
+  if (name.empty()) refuse(field, quoted(name), "must not be empty");
+  if (!taken.insert(name).second) refuse(field, quoted(name), "must be unique in the scene");
+}
+
+template <class Enum, std::size_t N>
+void check_enum(const std::string& field, Enum value, const Spelling<Enum> (&names)[N]) {
+  if (!name_of(value, names))
+    refuse(field, std::to_string(static_cast<int>(value)), "no such value");
+}
+
+void check_pose(const std::string& path, const Pose& pose) {
+  check_position(path + ".position", pose.position);
+  const Quat& q = pose.orientation;
+  if (std::abs(q.norm() - 1) <= 1e-3) return;  // false for NaN
+  refuse(path + ".orientation",
+         "[" + text(q.x()) + ", " + text(q.y()) + ", " + text(q.z()) + ", " + text(q.w()) + "]",
+         "must be a unit quaternion [x, y, z, w], its norm within 0.001 of 1");
+}
+
+void check_region(const std::string& path, const Region& region) {
+  switch (region.kind) {
+    case Region::Kind::kBelow:
+      return check_range(path + ".below", region.z, -100, 100, "m");
+    case Region::Kind::kBox:
+      check_position(path + ".box.min", region.min);
+      check_position(path + ".box.max", region.max);
+      if ((region.min.array() >= region.max.array()).any()) {
+        refuse(path + ".box.max", text(region.max),
+               "each coordinate must be above that of min, " + text(region.min));
+      }
+      return;
+    case Region::Kind::kBall:
+      check_position(path + ".ball.center", region.center);
+      return check_range(path + ".ball.radius", region.radius, 1e-4, 100, "m");
+  }
+  refuse(path, "of kind " + std::to_string(static_cast<int>(region.kind)), "no such kind");
+}
+
+void check_material(const std::string& path, const Material& m, std::set<std::string>& names) {
+  check_name(path + ".name", m.name, names);
+  check_enum(path + ".law", m.law, kLawNames);
+  if (!(m.young_modulus > 0 && m.young_modulus <= 1e8)) {
+    refuse(path + ".young_modulus", text(m.young_modulus), "must lie above 0 and up to 1e+08 Pa");
+  }
+  check_range(path + ".poisson_ratio", m.poisson_ratio, 0, 0.49);
+  check_range(path + ".density", m.density, 100, 20000, "kg/m^3");
+  check_range(path + ".viscosity", m.viscosity, 0, 1000, "Pa s");
+  if (m.tear_stretch != 0 && !(m.tear_stretch >= 1.001 && m.tear_stretch <= 100)) {
+    refuse(path + ".tear_stretch", text(m.tear_stretch),
+           "must be 0 (never tears) or lie between 1.001 and 100");
+  }
+  check_range(path + ".tear_length", m.tear_length, 0, 1, "m");
+  check_range(path + ".tear_scatter", m.tear_scatter, 0, 0.9);
+  check_friction(path + ".friction", m.friction);
+}
+
+// Only the fields that belong to the shape: nobody reads the others.
+void check_shape(const std::string& path, const Body& body) {
+  constexpr double kSmallest = 1e-4, kLargest = 10;
+  switch (body.shape) {
+    case Shape::kBox:
+      return check_each(path + ".size", body.size, kSmallest, kLargest, "edge", "m");
+    case Shape::kBall:
+      return check_range(path + ".radius", body.radius, kSmallest, kLargest, "m");
+    case Shape::kEllipsoid:
+      return check_each(path + ".radii", body.radii, kSmallest, kLargest, "semi-axis", "m");
+    case Shape::kCylinder:
+      check_range(path + ".radius", body.radius, kSmallest, kLargest, "m");
+      return check_range(path + ".height", body.height, kSmallest, kLargest, "m");
+    case Shape::kMesh:
+      if (body.mesh.empty()) {
+        refuse(path + ".mesh", quoted(body.mesh),
+               "must be the path of a mesh file (plain, file:// or package://)");
+      }
+      return check_range(path + ".scale", body.scale, 1e-6, 1e3, "m per unit of the file");
+  }
+}
+
+void check_tool(const std::string& path, const Tool& tool, std::set<std::string>& names) {
+  check_name(path + ".name", tool.name, names);
+  const auto is_letter = [](char c) { return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z'); };
+  bool valid = is_letter(tool.name.front());  // becomes part of topic and parameter names
+  for (char c : tool.name) valid = valid && (is_letter(c) || (c >= '0' && c <= '9') || c == '_');
+  if (!valid) {
+    refuse(path + ".name", quoted(tool.name),
+           "must be a ROS name: a letter, then letters, digits and '_'");
+  }
+  check_enum(path + ".type", tool.type, kToolTypeNames);
+  switch (tool.type) {
+    case ToolType::kScalpel:
+      check_range(path + ".blade_length", tool.blade_length, 1e-3, 0.2, "m");
+      check_range(path + ".blade_width", tool.blade_width, 2e-4, 0.1, "m");
+      check_range(path + ".blade_thickness", tool.blade_thickness, 1e-5, 0.01, "m");
+      break;
+    case ToolType::kProbe:
+      check_range(path + ".radius", tool.radius, 1e-4, 0.1, "m");
+      check_range(path + ".length", tool.length, 1e-3, 1, "m");
+      break;
+    case ToolType::kGrasper:
+      check_range(path + ".jaw_length", tool.jaw_length, 1e-3, 0.2, "m");
+      check_range(path + ".jaw_width", tool.jaw_width, 2e-4, 0.1, "m");
+      check_range(path + ".grip_pressure", tool.grip_pressure, 1, 1e7, "Pa");
+      check_range(path + ".cohesion", tool.cohesion, 0, 1e7, "Pa");
+      break;
+  }
+  check_friction(path + ".friction", tool.friction);
+}
+
+std::string at(const char* list, std::size_t i) {
+  return std::string(list) + "[" + std::to_string(i) + "]";
+}
+
+// The material of that name, or nullptr.
+const Material* lookup(const Scene& scene, const std::string& name) {
+  for (const Material& m : scene.materials) {
+    if (m.name == name) return &m;
+  }
+  for (const Material& m : material_presets()) {
+    if (m.name == name) return &m;
+  }
+  return nullptr;
+}
+
+std::string known_materials(const Scene& scene) {
+  std::set<std::string> names;
+  for (const Material& m : scene.materials) names.insert(m.name);
+  for (const Material& m : material_presets()) names.insert(m.name);
+  std::string list;
+  for (const std::string& name : names) list += (list.empty() ? "" : ", ") + name;
+  return list;
+}
+
+void check_material_name(const std::string& field, const Scene& scene, const std::string& name) {
+  if (lookup(scene, name)) return;
+  refuse(field, quoted(name),
+         "must be one of " + known_materials(scene) + ", or be defined in materials");
+}
+
+}  // namespace
+
+bool Region::contains(const Vec3& x) const {
+  switch (kind) {
+    case Kind::kBox:
+      return (x.array() >= min.array()).all() && (x.array() <= max.array()).all();
+    case Kind::kBall:
+      return (x - center).squaredNorm() <= radius * radius;
+    case Kind::kBelow:
+      return x.z() < z;
+  }
+  return false;
+}
+
+void validate(const Scene& scene) {
+  if (scene.name.empty()) refuse("name", quoted(scene.name), "must not be empty");
+  check_enum("method", scene.method, kMethodNames);
+  check_enum("device", scene.device, kDeviceNames);
+  if (scene.threads < 0 || scene.threads > 1024) {
+    refuse("threads", std::to_string(scene.threads), "must lie between 0 (all) and 1024");
+  }
+  check_range("cell_size", scene.cell_size, 1e-5, 1, "m");
+  check_range("frame_rate", scene.frame_rate, 1, 2000, "Hz");
+  check_range("cfl", scene.cfl, 0.05, 0.9);
+  check_range("damping", scene.damping, 0, 1000);
+  check_each("gravity", scene.gravity, -1000, 1000, "component", "m/s^2");
+  check_range("ground.z", scene.ground.z, -100, 100, "m");
+  check_friction("ground.friction", scene.ground.friction);
+
+  std::set<std::string> material_names, body_names, tool_names;
+  for (std::size_t i = 0; i < scene.materials.size(); ++i) {
+    check_material(at("materials", i), scene.materials[i], material_names);
+  }
+  if (scene.bodies.empty()) refuse("bodies", "empty", "a scene needs at least one body");
+  for (std::size_t i = 0; i < scene.bodies.size(); ++i) {
+    const Body& body = scene.bodies[i];
+    const std::string path = at("bodies", i);
+    check_name(path + ".name", body.name, body_names);
+    check_enum(path + ".shape", body.shape, kShapeNames);
+    check_shape(path, body);
+    check_pose(path + ".pose", body.pose);
+    check_material_name(path + ".material", scene, body.material);
+    if (body.inclusions.size() > 255) {
+      refuse(path + ".inclusions", "a list of " + std::to_string(body.inclusions.size()),
+             "a body has at most 255");
+    }
+    for (std::size_t k = 0; k < body.inclusions.size(); ++k) {
+      const std::string inclusion = path + "." + at("inclusions", k);
+      check_material_name(inclusion + ".material", scene, body.inclusions[k].material);
+      check_region(inclusion + ".region", body.inclusions[k].region);
+    }
+    for (std::size_t k = 0; k < body.anchors.size(); ++k) {
+      check_region(path + "." + at("anchors", k), body.anchors[k]);
+    }
+  }
+  for (std::size_t i = 0; i < scene.tools.size(); ++i) {
+    check_tool(at("tools", i), scene.tools[i], tool_names);
+  }
+}
+
+const Material& find_material(const Scene& scene, const std::string& name) {
+  if (const Material* m = lookup(scene, name)) return *m;
+  refuse("material", quoted(name), "must be one of " + known_materials(scene));
+}
+
+}  // namespace tissue_sim

@@ -1,0 +1,173 @@
+// Scene -> YAML, defaults included; of a body or tool only the fields that belong to its kind.
+#include <yaml-cpp/yaml.h>
+
+#include <cctype>
+
+#include "scene/scene_text.h"
+#include "tissue_sim/scene.h"
+
+namespace tissue_sim {
+namespace {
+
+using YAML::BeginMap;
+using YAML::BeginSeq;
+using YAML::EndMap;
+using YAML::EndSeq;
+using YAML::Flow;
+using YAML::Key;
+using YAML::Value;
+
+void write(YAML::Emitter& out, const char* name, double value) {
+  out << Key << name << Value << text(value);
+}
+
+// Quoted unless it is plainly a word, so that no reader takes "null", "1e3" or "a: b" for its own.
+void write(YAML::Emitter& out, const char* name, const std::string& value) {
+  bool word = !value.empty() && std::isalpha(static_cast<unsigned char>(value.front()));
+  for (char c : value) {
+    word = word && (std::isalnum(static_cast<unsigned char>(c)) || c == '_');
+  }
+  for (const char* reserved : {"null", "Null", "NULL", "true", "True", "TRUE", "false", "False",
+                               "FALSE", "yes", "no", "on", "off", "y", "n"}) {
+    word = word && value != reserved;
+  }
+  out << Key << name << Value;
+  if (!word) out << YAML::DoubleQuoted;
+  out << value;
+}
+
+void write(YAML::Emitter& out, const char* name, const Vec3& v) {
+  out << Key << name << Value << Flow << BeginSeq;
+  out << text(v.x()) << text(v.y()) << text(v.z()) << EndSeq;
+}
+
+void write(YAML::Emitter& out, const char* name, const Quat& q) {
+  out << Key << name << Value << Flow << BeginSeq;
+  out << text(q.x()) << text(q.y()) << text(q.z()) << text(q.w()) << EndSeq;
+}
+
+void write(YAML::Emitter& out, const Region& region) {
+  out << Flow << BeginMap;
+  switch (region.kind) {
+    case Region::Kind::kBelow:
+      write(out, "below", region.z);
+      break;
+    case Region::Kind::kBox:
+      out << Key << "box" << Value << Flow << BeginMap;
+      write(out, "min", region.min);
+      write(out, "max", region.max);
+      out << EndMap;
+      break;
+    case Region::Kind::kBall:
+      out << Key << "ball" << Value << Flow << BeginMap;
+      write(out, "center", region.center);
+      write(out, "radius", region.radius);
+      out << EndMap;
+      break;
+  }
+  out << EndMap;
+}
+
+void write(YAML::Emitter& out, const Material& m) {
+  out << BeginMap;
+  write(out, "name", m.name);
+  write(out, "law", std::string(name_of(m.law, kLawNames)));
+  write(out, "young_modulus", m.young_modulus);
+  write(out, "poisson_ratio", m.poisson_ratio);
+  write(out, "density", m.density);
+  write(out, "viscosity", m.viscosity);
+  write(out, "tear_stretch", m.tear_stretch);
+  write(out, "tear_length", m.tear_length);
+  write(out, "tear_scatter", m.tear_scatter);
+  write(out, "friction", m.friction);
+  out << EndMap;
+}
+
+void write(YAML::Emitter& out, const Inclusion& inclusion) {
+  out << BeginMap;
+  write(out, "material", inclusion.material);
+  out << Key << "region" << Value;
+  write(out, inclusion.region);
+  out << EndMap;
+}
+
+void write(YAML::Emitter& out, const Body& body) {
+  out << BeginMap;
+  write(out, "name", body.name);
+  write(out, "shape", std::string(name_of(body.shape, kShapeNames)));
+  for (const std::string& field : fields_of(body.shape)) {
+    if (field == "size") write(out, "size", body.size);
+    if (field == "radius") write(out, "radius", body.radius);
+    if (field == "radii") write(out, "radii", body.radii);
+    if (field == "height") write(out, "height", body.height);
+    if (field == "mesh") write(out, "mesh", body.mesh);
+    if (field == "scale") write(out, "scale", body.scale);
+  }
+  out << Key << "pose" << Value << BeginMap;
+  write(out, "position", body.pose.position);
+  write(out, "orientation", body.pose.orientation);
+  out << EndMap;
+  write(out, "material", body.material);
+  out << Key << "inclusions" << Value << BeginSeq;
+  for (const Inclusion& inclusion : body.inclusions) write(out, inclusion);
+  out << EndSeq;
+  out << Key << "anchors" << Value << BeginSeq;
+  for (const Region& region : body.anchors) write(out, region);
+  out << EndSeq << EndMap;
+}
+
+void write(YAML::Emitter& out, const Tool& tool) {
+  out << BeginMap;
+  write(out, "name", tool.name);
+  write(out, "type", std::string(name_of(tool.type, kToolTypeNames)));
+  for (const std::string& field : fields_of(tool.type)) {
+    if (field == "radius") write(out, "radius", tool.radius);
+    if (field == "length") write(out, "length", tool.length);
+    if (field == "blade_length") write(out, "blade_length", tool.blade_length);
+    if (field == "blade_width") write(out, "blade_width", tool.blade_width);
+    if (field == "blade_thickness") write(out, "blade_thickness", tool.blade_thickness);
+    if (field == "jaw_length") write(out, "jaw_length", tool.jaw_length);
+    if (field == "jaw_width") write(out, "jaw_width", tool.jaw_width);
+    if (field == "grip_pressure") write(out, "grip_pressure", tool.grip_pressure);
+    if (field == "cohesion") write(out, "cohesion", tool.cohesion);
+  }
+  write(out, "friction", tool.friction);
+  out << EndMap;
+}
+
+template <class Item>
+void write_list(YAML::Emitter& out, const char* name, const std::vector<Item>& items) {
+  out << Key << name << Value << BeginSeq;
+  for (const Item& item : items) write(out, item);
+  out << EndSeq;
+}
+
+}  // namespace
+
+std::string scene_to_yaml(const Scene& scene) {
+  validate(scene);  // what could not be read back is not written
+  YAML::Emitter out;
+  out << BeginMap;
+  write(out, "name", scene.name);
+  write(out, "method", std::string(name_of(scene.method, kMethodNames)));
+  write(out, "device", std::string(name_of(scene.device, kDeviceNames)));
+  out << Key << "threads" << Value << scene.threads;
+  write(out, "cell_size", scene.cell_size);
+  write(out, "frame_rate", scene.frame_rate);
+  write(out, "cfl", scene.cfl);
+  write(out, "damping", scene.damping);
+  write(out, "gravity", scene.gravity);
+  out << Key << "seed" << Value << std::to_string(scene.seed);
+  out << Key << "ground" << Value << BeginMap;
+  out << Key << "enabled" << Value << scene.ground.enabled;
+  write(out, "z", scene.ground.z);
+  write(out, "friction", scene.ground.friction);
+  out << EndMap;
+  write_list(out, "materials", scene.materials);
+  write_list(out, "bodies", scene.bodies);
+  write_list(out, "tools", scene.tools);
+  out << EndMap;
+  return std::string(out.c_str()) + "\n";
+}
+
+}  // namespace tissue_sim

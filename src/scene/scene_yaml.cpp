@@ -1,0 +1,227 @@
+// YAML -> Scene. Types and names of fields are checked here, ranges in validate().
+#include <algorithm>
+#include <filesystem>
+#include <fstream>
+#include <sstream>
+#include <stdexcept>
+
+#include "scene/scene_text.h"
+#include "scene/yaml_fields.h"
+#include "tissue_sim/scene.h"
+
+namespace tissue_sim {
+namespace {
+
+using Words = std::vector<std::string>;
+
+// Refuses fields that exist, but for another shape or type than this one.
+template <class Enum, std::size_t N>
+void refuse_foreign(const YamlFields& fields, Enum value, const Spelling<Enum> (&names)[N]) {
+  const Words own = fields_of(value);
+  const std::string owner = name_of(value, names);
+  const bool vowel = std::string("aeiou").find(owner.front()) != std::string::npos;
+  for (const Spelling<Enum>& other : names) {
+    for (const std::string& field : fields_of(other.value)) {
+      if (!fields.has(field) || std::find(own.begin(), own.end(), field) != own.end()) continue;
+      fields.refuse(field,
+                    (vowel ? "an " : "a ") + owner + " has no " + field + ", only " + join(own));
+    }
+  }
+}
+
+Pose read_pose(const YAML::Node& node, const std::string& path) {
+  const YamlFields fields(node, path, {"position", "orientation"});
+  Pose pose;
+  fields.read("position", pose.position);
+  fields.read("orientation", pose.orientation);
+  return pose;
+}
+
+Region read_region(const YAML::Node& node, const std::string& path) {
+  const YamlFields fields(node, path, {"below", "box", "ball"});
+  if (node.size() != 1) {
+    throw std::invalid_argument(path + " is a map of " + std::to_string(node.size()) +
+                                " fields: must be one of {below: z}, {box: {min: [x, y, z], max: "
+                                "[x, y, z]}}, {ball: {center: [x, y, z], radius: r}}");
+  }
+  Region region;
+  if (fields.has("below")) {
+    region.kind = Region::Kind::kBelow;
+    fields.read("below", region.z);
+  }
+  fields.read_map("box", [&](const YAML::Node& box, const std::string& box_path) {
+    const YamlFields corners(box, box_path, {"min", "max"});
+    region.kind = Region::Kind::kBox;
+    corners.require("min", "a box needs its lowest corner, [x, y, z]");
+    corners.require("max", "a box needs its highest corner, [x, y, z]");
+    corners.read("min", region.min);
+    corners.read("max", region.max);
+  });
+  fields.read_map("ball", [&](const YAML::Node& ball, const std::string& ball_path) {
+    const YamlFields ball_fields(ball, ball_path, {"center", "radius"});
+    region.kind = Region::Kind::kBall;
+    ball_fields.require("center", "a ball needs its center, [x, y, z]");
+    ball_fields.require("radius", "a ball needs its radius");
+    ball_fields.read("center", region.center);
+    ball_fields.read("radius", region.radius);
+  });
+  return region;
+}
+
+Material read_material(const YAML::Node& node, const std::string& path) {
+  const YamlFields fields(node, path,
+                          {"name", "law", "young_modulus", "poisson_ratio", "density", "viscosity",
+                           "tear_stretch", "tear_length", "tear_scatter", "friction"});
+  fields.require("name", "bodies refer to a material by its name");
+  Material m;
+  fields.read("name", m.name);
+  fields.read("law", m.law, kLawNames);
+  fields.read("young_modulus", m.young_modulus);
+  fields.read("poisson_ratio", m.poisson_ratio);
+  fields.read("density", m.density);
+  fields.read("viscosity", m.viscosity);
+  fields.read("tear_stretch", m.tear_stretch);
+  fields.read("tear_length", m.tear_length);
+  fields.read("tear_scatter", m.tear_scatter);
+  fields.read("friction", m.friction);
+  return m;
+}
+
+Inclusion read_inclusion(const YAML::Node& node, const std::string& path) {
+  const YamlFields fields(node, path, {"material", "region"});
+  fields.require("material", "an inclusion is of a material of its own");
+  fields.require("region", "an inclusion needs the region that it fills");
+  Inclusion inclusion;
+  fields.read("material", inclusion.material);
+  fields.read_map("region", [&](const YAML::Node& region, const std::string& region_path) {
+    inclusion.region = read_region(region, region_path);
+  });
+  return inclusion;
+}
+
+Body read_body(const YAML::Node& node, const std::string& path) {
+  const YamlFields fields(node, path,
+                          {"name", "shape", "size", "radius", "radii", "height", "mesh", "scale",
+                           "pose", "material", "inclusions", "anchors"});
+  Body body;
+  fields.read("name", body.name);
+  fields.read("shape", body.shape, kShapeNames);
+  refuse_foreign(fields, body.shape, kShapeNames);
+  fields.read("size", body.size);
+  fields.read("radius", body.radius);
+  fields.read("radii", body.radii);
+  fields.read("height", body.height);
+  fields.read("mesh", body.mesh);
+  fields.read("scale", body.scale);
+  fields.read_map("pose", [&](const YAML::Node& pose, const std::string& pose_path) {
+    body.pose = read_pose(pose, pose_path);
+  });
+  fields.read("material", body.material);
+  fields.read_list("inclusions", [&](const YAML::Node& item, const std::string& item_path) {
+    body.inclusions.push_back(read_inclusion(item, item_path));
+  });
+  fields.read_list("anchors", [&](const YAML::Node& item, const std::string& item_path) {
+    body.anchors.push_back(read_region(item, item_path));
+  });
+  return body;
+}
+
+Tool read_tool(const YAML::Node& node, const std::string& path) {
+  const YamlFields fields(
+      node, path,
+      {"name", "type", "radius", "length", "blade_length", "blade_width", "blade_thickness",
+       "jaw_length", "jaw_width", "grip_pressure", "cohesion", "friction"});
+  Tool tool;
+  fields.read("name", tool.name);
+  fields.read("type", tool.type, kToolTypeNames);
+  refuse_foreign(fields, tool.type, kToolTypeNames);
+  fields.read("radius", tool.radius);
+  fields.read("length", tool.length);
+  fields.read("blade_length", tool.blade_length);
+  fields.read("blade_width", tool.blade_width);
+  fields.read("blade_thickness", tool.blade_thickness);
+  fields.read("jaw_length", tool.jaw_length);
+  fields.read("jaw_width", tool.jaw_width);
+  fields.read("grip_pressure", tool.grip_pressure);
+  fields.read("cohesion", tool.cohesion);
+  fields.read("friction", tool.friction);
+  return tool;
+}
+
+Scene read_scene(const YAML::Node& node) {
+  const YamlFields fields(node, "",
+                          {"name", "method", "device", "threads", "cell_size", "frame_rate", "cfl",
+                           "damping", "gravity", "seed", "ground", "materials", "bodies", "tools"});
+  Scene scene;
+  fields.read("name", scene.name);
+  fields.read("method", scene.method, kMethodNames);
+  fields.read("device", scene.device, kDeviceNames);
+  fields.read("threads", scene.threads);
+  fields.read("cell_size", scene.cell_size);
+  fields.read("frame_rate", scene.frame_rate);
+  fields.read("cfl", scene.cfl);
+  fields.read("damping", scene.damping);
+  fields.read("gravity", scene.gravity);
+  fields.read("seed", scene.seed);
+  fields.read_map("ground", [&](const YAML::Node& ground, const std::string& path) {
+    const YamlFields ground_fields(ground, path, {"enabled", "z", "friction"});
+    ground_fields.read("enabled", scene.ground.enabled);
+    ground_fields.read("z", scene.ground.z);
+    ground_fields.read("friction", scene.ground.friction);
+  });
+  fields.read_list("materials", [&](const YAML::Node& item, const std::string& path) {
+    scene.materials.push_back(read_material(item, path));
+  });
+  fields.read_list("bodies", [&](const YAML::Node& item, const std::string& path) {
+    scene.bodies.push_back(read_body(item, path));
+  });
+  fields.read_list("tools", [&](const YAML::Node& item, const std::string& path) {
+    scene.tools.push_back(read_tool(item, path));
+  });
+  return scene;
+}
+
+}  // namespace
+
+Scene scene_from_yaml(const std::string& text) {
+  YAML::Node node;
+  try {
+    node = YAML::Load(text);
+  } catch (const YAML::Exception& e) {
+    throw std::invalid_argument(std::string("the scene is no valid YAML: ") + e.what());
+  }
+  Scene scene = read_scene(node);
+  validate(scene);
+  return scene;
+}
+
+Scene load_scene(const std::string& path) {
+  namespace fs = std::filesystem;
+  std::error_code error;
+  if (fs::is_directory(path, error)) {
+    throw std::invalid_argument(path + ": is a folder, name a scene file in it");
+  }
+  std::ifstream file(path);
+  std::ostringstream text;
+  if (!file || !(text << file.rdbuf())) {  // an empty file fails here too
+    const bool there = fs::exists(path, error);
+    throw std::invalid_argument(path + (there ? ": cannot be read or is empty, give a scene"
+                                              : ": no such file, give the path of a scene"));
+  }
+  Scene scene;
+  try {
+    scene = scene_from_yaml(text.str());
+  } catch (const std::invalid_argument& e) {
+    throw std::invalid_argument(path + ": " + e.what());
+  }
+  // A node's working directory means nothing to who wrote the scene; the scene's own folder does.
+  for (Body& body : scene.bodies) {
+    const bool plain = body.mesh.find("://") == std::string::npos;
+    if (body.shape == Shape::kMesh && plain && fs::path(body.mesh).is_relative()) {
+      body.mesh = (fs::absolute(path).parent_path() / body.mesh).lexically_normal().string();
+    }
+  }
+  return scene;
+}
+
+}  // namespace tissue_sim

@@ -1,0 +1,103 @@
+// Colliders: rigid shapes that push tissue. Where they are, and how deep a place lies in them.
+#pragma once
+
+#include <cmath>
+
+#include "compute/host_device.h"
+
+namespace tissue_sim {
+
+struct Collider {
+  enum Kind { kPlane, kCapsule, kBlade, kJaw } kind = kPlane;
+  float position[3] = {};                           ///< of the tip; of a point of the plane [m]
+  float rotation[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1};  ///< local to world, row-major
+  float velocity[3] = {};                           ///< of the tip [m/s]
+  float spin[3] = {};                               ///< angular velocity, world axes [rad/s]
+  float length = 0;     ///< capsule, blade, jaw: along local -z from the tip [m]
+  float radius = 0;     ///< capsule, jaw [m]
+  float width = 0;      ///< blade: along local -x from the edge [m]
+  float thickness = 0;  ///< blade: along local y [m]
+  float friction = 0;   ///< Coulomb
+  float cohesion = 0;   ///< what holds a point beside friction: a jaw's teeth [N]
+  int tool = -1;        ///< index into Scene::tools, -1 for the ground
+};
+
+/// What tissue does to a collider: force [N] and moment about its position [N m], world axes.
+struct ColliderLoad {
+  double force[3] = {}, torque[3] = {};
+  double points = 0;  ///< number of those that touch; on a GPU, of those that touch a jaw
+};
+
+/// Distance to the surface (negative inside) and the outward normal, world axes.
+struct Gap {
+  float distance;
+  float normal[3];
+};
+
+TISSUE_SIM_INLINE void to_local(const Collider& c, const float* x, float* local) {
+  const float d[3] = {x[0] - c.position[0], x[1] - c.position[1], x[2] - c.position[2]};
+  for (int i = 0; i < 3; ++i) {
+    local[i] = c.rotation[i] * d[0] + c.rotation[3 + i] * d[1] + c.rotation[6 + i] * d[2];
+  }
+}
+
+TISSUE_SIM_INLINE void to_world(const Collider& c, const float* local, float* x) {
+  for (int i = 0; i < 3; ++i) {
+    x[i] = c.position[i] + c.rotation[3 * i] * local[0] + c.rotation[3 * i + 1] * local[1] +
+           c.rotation[3 * i + 2] * local[2];
+  }
+}
+
+/// The half space below the plane (normal local z); the capsule from the tip up the shaft; the half
+/// of such a capsule at local x < 0, which is a jaw; the two flats of the blade (its edge does not
+/// push: it cuts).
+TISSUE_SIM_INLINE Gap gap(const Collider& c, const float* x) {
+  float p[3], n[3] = {0, 0, 1}, distance = 1e30f;
+  to_local(c, x, p);
+  if (c.kind == Collider::kPlane) {
+    distance = p[2];
+  } else if (c.kind != Collider::kBlade) {
+    const float along = fminf(fmaxf(p[2], -c.length), -c.radius);
+    const float d[3] = {p[0], p[1], p[2] - along};
+    const float r = sqrtf(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]);
+    distance = r - c.radius;
+    if (r > 0) {
+      for (int i = 0; i < 3; ++i) n[i] = d[i] / r;
+    } else {
+      n[0] = 1, n[2] = 0;
+    }
+    if (c.kind == Collider::kJaw && p[0] > distance) {
+      distance = p[0];
+      n[0] = 1, n[1] = n[2] = 0;
+    }
+  } else if (p[0] >= -c.width && p[0] <= 0 && p[2] >= -c.length && p[2] <= 0) {
+    distance = fabsf(p[1]) - 0.5f * c.thickness;
+    n[1] = p[1] < 0 ? -1.0f : 1.0f;
+    n[2] = 0;
+  }
+  Gap g{distance, {0, 0, 0}};
+  for (int i = 0; i < 3; ++i) {
+    g.normal[i] =
+        c.rotation[3 * i] * n[0] + c.rotation[3 * i + 1] * n[1] + c.rotation[3 * i + 2] * n[2];
+  }
+  return g;
+}
+
+/// How far a place must move at least until gap() tells that it touches [m].
+TISSUE_SIM_INLINE float clearance(const Collider& c, const float* x) {
+  if (c.kind != Collider::kBlade) return gap(c, x).distance;
+  float p[3];
+  to_local(c, x, p);
+  return fmaxf(fabsf(p[1]) - 0.5f * c.thickness,
+               fmaxf(fmaxf(p[0], -c.width - p[0]), fmaxf(p[2], -c.length - p[2])));
+}
+
+/// Velocity of the collider's material at x [m/s].
+TISSUE_SIM_INLINE void velocity_at(const Collider& c, const float* x, float* v) {
+  const float d[3] = {x[0] - c.position[0], x[1] - c.position[1], x[2] - c.position[2]};
+  v[0] = c.velocity[0] + c.spin[1] * d[2] - c.spin[2] * d[1];
+  v[1] = c.velocity[1] + c.spin[2] * d[0] - c.spin[0] * d[2];
+  v[2] = c.velocity[2] + c.spin[0] * d[1] - c.spin[1] * d[0];
+}
+
+}  // namespace tissue_sim

@@ -1,0 +1,119 @@
+#include "tools/frame_colliders.h"
+
+#include <algorithm>
+
+namespace tissue_sim {
+
+Box bounds(const Collider& c) {
+  Box box;
+  if (c.kind == Collider::kPlane) {
+    box.min = Vec3::Constant(-1e6);
+    box.max = Vec3(1e6, 1e6, c.position[2]);
+    return box;
+  }
+  const float x0 = c.kind == Collider::kBlade ? -c.width : -c.radius;
+  const float x1 = c.kind == Collider::kCapsule ? c.radius : 0;
+  const float y = c.kind == Collider::kBlade ? 0.5f * c.thickness : c.radius;
+  for (int i = 0; i < 8; ++i) {
+    const float corner[3] = {i & 1 ? x1 : x0, i & 2 ? y : -y, i & 4 ? 0 : -c.length};
+    float world[3];
+    to_world(c, corner, world);
+    const Vec3 w(world[0], world[1], world[2]);
+    box.min = box.min.cwiseMin(w);
+    box.max = box.max.cwiseMax(w);
+  }
+  return box;
+}
+
+double speed(const Collider& c) {
+  const Vec3 velocity(c.velocity[0], c.velocity[1], c.velocity[2]);
+  const Vec3 spin(c.spin[0], c.spin[1], c.spin[2]);
+  return velocity.norm() + spin.norm() * Vec3(c.length, c.width, c.radius).norm();
+}
+
+int collider_count(const Scene& scene) {
+  int count = 1;
+  for (const Tool& tool : scene.tools) count += collider_count(tool.type);
+  return count;
+}
+
+FrameColliders::FrameColliders(const Scene& scene, const FrameInput& input, double duration)
+    : point_area_(0.25 * scene.cell_size * scene.cell_size) {
+  ground_.position[2] = static_cast<float>(scene.ground.enabled ? scene.ground.z : -1e6);
+  ground_.friction = static_cast<float>(scene.ground.friction);
+  tools_.reserve(input.tools.size());
+  for (std::size_t i = 0; i < input.tools.size(); ++i) {
+    tools_.emplace_back(scene.tools[i], static_cast<int>(i), input.tools[i], duration, point_area_);
+    count_ += tools_.back().count();
+  }
+}
+
+void FrameColliders::at(double share, Collider* out) const {
+  *out++ = ground_;
+  for (const ToolPath& tool : tools_) {
+    tool.at(share, out);
+    out += tool.count();
+  }
+}
+
+std::vector<Collider> FrameColliders::at(double share) const {
+  std::vector<Collider> colliders(count_);
+  at(share, colliders.data());
+  return colliders;
+}
+
+std::vector<Box> FrameColliders::reach() const {
+  std::vector<Box> reach(count_);
+  for (const double share : {0.0, 0.5, 1.0}) {
+    const std::vector<Collider> colliders = at(share);
+    for (std::size_t c = 0; c < reach.size(); ++c) {
+      if (c > 0 && !tools_[colliders[c].tool].is_present()) continue;
+      const Box box = bounds(colliders[c]);
+      reach[c].min = reach[c].min.cwiseMin(box.min);
+      reach[c].max = reach[c].max.cwiseMax(box.max);
+    }
+  }
+  return reach;
+}
+
+void FrameColliders::add_loads(double share, const Collider* now, const ColliderLoad* on,
+                               double weight, std::vector<ToolLoad>& loads) const {
+  int c = 1;
+  for (std::size_t i = 0; i < tools_.size(); ++i) {
+    const Vec3 tip = tools_[i].tip(share);
+    const int count = tools_[i].count();
+    Vec3 force = Vec3::Zero(), torque = Vec3::Zero();
+    double grip = 0, touching = 0;
+    for (const int end = c + count; c < end; ++c) {
+      const Collider& collider = now[c];
+      const Vec3 pushed(on[c].force[0], on[c].force[1], on[c].force[2]);
+      force += pushed;
+      torque += Vec3(on[c].torque[0], on[c].torque[1], on[c].torque[2]);
+      if (collider.kind != Collider::kJaw) continue;
+      // Its load's moment is about its own tip; it presses along its local x.
+      const Vec3 at(collider.position[0], collider.position[1], collider.position[2]);
+      const Vec3 facing(collider.rotation[0], collider.rotation[3], collider.rotation[6]);
+      torque += (at - tip).cross(pushed);
+      grip -= facing.dot(pushed) / count;
+      touching += on[c].points / count;
+    }
+    ToolLoad& load = loads[i];
+    load.mean.force += weight * force;
+    load.mean.torque += weight * torque;
+    load.peak_force = std::max(load.peak_force, force.norm());
+    load.grip += weight * grip;
+    load.grip_area += weight * touching * point_area_;
+  }
+}
+
+double FrameColliders::power(const Collider* now, const ColliderLoad* on) const {
+  double power = 0;
+  for (int c = 0; c < count_; ++c) {
+    for (int a = 0; a < 3; ++a) {
+      power -= on[c].force[a] * now[c].velocity[a] + on[c].torque[a] * now[c].spin[a];
+    }
+  }
+  return power;
+}
+
+}  // namespace tissue_sim

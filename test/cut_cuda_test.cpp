@@ -5,10 +5,10 @@
 #if defined(TISSUE_SIM_CUDA)
 #include "cut_kinds.h"
 #include "either_device.h"
-#include "fragments/pieces.h"
 #include "mpm/cuda/cuda_mpm_tissue.h"
 #include "mpm/cuda/label_pieces.h"
 #include "mpm/lattice/bonds.h"
+#include "mpm/lattice_pieces.h"
 #include "mpm/mpm_tissue.h"
 
 namespace tissue_sim {
@@ -202,7 +202,8 @@ TEST_F(CutOnGpu, LabelsAreThoseOfTheCpu) {
     }
     bonds.upload(points.bonds, nullptr);
     const std::vector<int> fresh = update_pieces(bodies, points, on_cpu);
-    EXPECT_EQ(fresh, part_pieces(points, labels.update(rows, bonds.data(), nullptr), on_gpu));
+    EXPECT_EQ(fresh, part_pieces(points.volume.data(), labels.update(rows, bonds.data(), nullptr),
+                                 on_gpu));
     ASSERT_EQ(on_cpu.of_point, on_gpu.of_point) << "round " << round;
     EXPECT_EQ(on_cpu.lowest, on_gpu.lowest);
     for (std::size_t i = 0; i < on_cpu.all.size(); ++i) {

@@ -143,7 +143,7 @@ inline std::vector<int> in_order(const std::vector<int>& labels) {
 }
 
 /// The piece of each point, by the program's labels.
-inline std::vector<int> labels(const MpmTissue& tissue) {
+inline std::vector<int> labels(MpmTissue& tissue) {
   std::vector<int> result;
   for (int p = 0; p < tissue.point_count(); ++p) result.push_back(tissue.fragment_of(p));
   return in_order(result);

@@ -128,7 +128,7 @@ inline void shake(MpmState& state, unsigned seed, double size) {
 }
 
 /// How many points each piece has, largest first.
-inline std::vector<int> piece_sizes(const Tissue& tissue) {
+inline std::vector<int> piece_sizes(Tissue& tissue) {
   std::vector<int> sizes;
   for (const Fragment& f : tissue.fragments()) sizes.push_back(f.point_count);
   std::sort(sizes.rbegin(), sizes.rend());
@@ -136,7 +136,8 @@ inline std::vector<int> piece_sizes(const Tissue& tissue) {
 }
 
 /// Cuts at once, without moving anything: zero substeps.
-inline CutReport cut_now(Tissue& tissue, const BladePath& path) {
+template <class T>
+CutReport cut_now(T& tissue, const BladePath& path) {
   tissue.advance(0, 1e-4f, {{}, {&path, 1}});
   return tissue.finish().cut_reports[0];
 }

@@ -15,7 +15,7 @@ const Vec3 kSize(0.04, 0.03, 0.02);
 const Vec3 kMiddle = 0.5 * kSize;
 
 /// Volumes of the pieces [mL], largest first.
-std::vector<double> volumes(const Tissue& tissue) {
+std::vector<double> volumes(Tissue& tissue) {
   std::vector<double> result;
   for (const Fragment& f : tissue.fragments()) result.push_back(f.volume * 1e6);
   std::sort(result.rbegin(), result.rend());

@@ -11,7 +11,7 @@ namespace {
 
 const Vec3 kSize(0.04, 0.02, 0.02);
 
-std::map<int, Fragment> by_id(const Tissue& tissue) {
+std::map<int, Fragment> by_id(Tissue& tissue) {
   std::map<int, Fragment> result;
   for (const Fragment& f : tissue.fragments()) {
     EXPECT_TRUE(result.emplace(f.id, f).second) << "id " << f.id << " twice";

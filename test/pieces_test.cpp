@@ -1,6 +1,4 @@
 // Pieces after cuts against those that a walk over the bonds finds.
-#include "fragments/pieces.h"
-
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -10,6 +8,7 @@
 
 #include "cut_scenes.h"
 #include "mpm/lattice/bonds.h"
+#include "mpm/lattice_pieces.h"
 
 namespace tissue_sim {
 namespace {

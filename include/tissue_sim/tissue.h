@@ -35,18 +35,20 @@ struct FrameResult {
   bool blew_up = false;       ///< something is not finite, or moves faster than it can
 };
 
+/// Of all tissue, in world axes.
+struct Momentum {
+  double mass = 0;              ///< [kg]
+  Vec3 centre = Vec3::Zero();   ///< of the mass [m]
+  Vec3 linear = Vec3::Zero();   ///< [kg m/s]
+  Vec3 angular = Vec3::Zero();  ///< about the centre of mass [kg m^2/s]
+};
+
 class Tissue {
  public:
   virtual ~Tissue() = default;
 
-  /// Advances by `duration` seconds, in substeps as long as the tissue was measured to bear, with a
-  /// margin; may only enqueue.
+  /// Advances by `duration` seconds, in as many substeps as the method takes; may only enqueue.
   virtual void advance(double duration, const FrameInput& input) = 0;
-  /// Advances by `substeps` of `dt` seconds each; 0 only cuts.
-  virtual void advance(int substeps, float dt, const FrameInput& input) = 0;
-  /// The substep that is stable in the present state however the tissue is cut: what a lone point
-  /// bears, by the scene's CFL number [s].
-  virtual float stable_substep() const = 0;
   /// Waits for advance() and reports on it.
   virtual FrameResult finish() = 0;
 
@@ -56,9 +58,11 @@ class Tissue {
   /// Number of pieces, as of the last finish(). It grows whenever a piece comes apart.
   virtual int fragment_count() const = 0;
   /// All pieces, by id, as of the last finish(). The first call after that looks where they are.
-  virtual Span<const Fragment> fragments() const = 0;
+  virtual Span<const Fragment> fragments() = 0;
   /// Hash of the whole state: equal states, equal checksums.
-  virtual std::uint64_t checksum() const = 0;
+  virtual std::uint64_t checksum() = 0;
+  /// As of the last finish().
+  virtual Momentum momentum() = 0;
   /// What was repaired or assumed when the scene was built (a mesh turned inside out, ...).
   virtual const std::vector<std::string>& notes() const = 0;
   /// Device and instruction set that do the work, as in "cpu (AVX-512, 2 threads)".

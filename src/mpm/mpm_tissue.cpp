@@ -7,6 +7,7 @@
 
 #include "math/lanczos.h"
 #include "mpm/contact/block_contact.h"
+#include "mpm/lattice_pieces.h"
 #include "mpm/linearised_motion.h"
 #include "mpm/piece_motion.h"
 #include "mpm/split/cut_tissue.h"
@@ -239,16 +240,15 @@ FrameResult MpmTissue::finish() {
   return result_;
 }
 
-Span<const Fragment> MpmTissue::fragments() const {
-  if (!pieces_measured_) {
-    auto* self = const_cast<MpmTissue*>(this);  // only what was not looked at yet changes
-    measure_pieces(*self->state_, self->pieces_);
-    self->pieces_measured_ = true;
-  }
+Span<const Fragment> MpmTissue::fragments() {
+  if (!pieces_measured_) measure_pieces(*state_, pieces_);
+  pieces_measured_ = true;
   return pieces_.all;
 }
 
-std::uint64_t MpmTissue::checksum() const { return tissue_sim::checksum(*state_, pieces_); }
+std::uint64_t MpmTissue::checksum() { return tissue_sim::checksum(*state_, pieces_); }
+
+Momentum MpmTissue::momentum() { return tissue_sim::momentum(*state_); }
 
 std::string MpmTissue::device_name() const {
   return std::string("cpu (") + name(state_->instructions) + ", " +

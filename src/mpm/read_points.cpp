@@ -3,6 +3,7 @@
 #include <cstring>
 
 #include "fragments/piece_colour.h"
+#include "frame/select_points.h"
 #include "mpm/lattice/bonds.h"
 #include "mpm/mpm_tissue.h"
 
@@ -10,17 +11,10 @@ namespace tissue_sim {
 
 int MpmTissue::read_points(const PointSelection& selection, std::vector<std::uint8_t>& cloud) {
   MpmState& s = *state_;
-  std::vector<const Fragment*> piece(pieces_.next_id, nullptr);
-  for (const Fragment& f : pieces_.all) piece[f.id] = &f;
-  // Where each selected point goes.
-  std::vector<std::int32_t> index(s.points.size(), -1);
-  const int stride = std::max(1, selection.stride);
+  const std::vector<const Fragment*> piece = pieces_by_id(pieces_);
   int count = 0;
-  for (std::int32_t p = 0; p < s.points.size(); p += stride) {
-    if (selection.surface_only && s.points.bonds[p] == kAllBonds) continue;
-    if (selection.loose_only && !piece[pieces_.of_point[p]]->loose) continue;
-    index[p] = count++;
-  }
+  const std::vector<std::int32_t> index = select_points(
+      selection, pieces_, [&](std::int32_t p) { return s.points.bonds[p] != kAllBonds; }, count);
   cloud.resize(static_cast<std::size_t>(count) * sizeof(Point));
   s.cpu->for_each(static_cast<int>(s.blocks.all.size()), [&](int i) {
     const Block& block = *s.blocks.all[i];

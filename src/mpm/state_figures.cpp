@@ -2,8 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstring>
 
+#include "frame/checksum.h"
 #include "mpm/tear/bond_bridges.h"
 #include "mpm/tear/deformation.h"
 
@@ -77,24 +77,43 @@ bool may_be_wild(const MpmState& state) {
 }
 
 std::uint64_t checksum(const MpmState& state, const Pieces& pieces) {
-  std::uint64_t hash = 0xcbf29ce484222325u;  // FNV-1a, over words and the bytes that are left
-  const auto add = [&hash](const auto& array) {
-    const auto* bytes = reinterpret_cast<const unsigned char*>(array.data());
-    const std::size_t size = array.size() * sizeof(array[0]);
-    for (std::size_t i = 0; i + 4 <= size; i += 4) {
-      std::uint32_t word;
-      std::memcpy(&word, bytes + i, 4);
-      hash = (hash ^ word) * 0x100000001b3u;
-    }
-    for (std::size_t i = size / 4 * 4; i < size; ++i) hash = (hash ^ bytes[i]) * 0x100000001b3u;
-  };
+  Checksum sum;
   for (int a = 0; a < 3; ++a) {
-    add(state.nodes.u[a]);
-    add(state.nodes.v[a]);
+    sum.add(state.nodes.u[a]);
+    sum.add(state.nodes.v[a]);
   }
-  add(state.points.bonds);
-  add(pieces.of_point);
-  return hash;
+  sum.add(state.points.bonds);
+  sum.add(pieces.of_point);
+  return sum.value();
+}
+
+Momentum momentum(const MpmState& state) {
+  const Nodes& n = state.nodes;
+  Momentum sum;
+  Vec3 about_origin = Vec3::Zero();
+  const auto add = [&](std::int32_t i, const Vec3& home) {
+    const double mass = n.mass[i];
+    const Vec3 x = home + Vec3(n.u[0][i], n.u[1][i], n.u[2][i]);
+    const Vec3 p = mass * Vec3(n.v[0][i], n.v[1][i], n.v[2][i]);
+    sum.mass += mass;
+    sum.centre += mass * x;
+    sum.linear += p;
+    about_origin += x.cross(p);
+  };
+  for (const LatticeBody& b : state.bodies) {
+    b.for_each_node([&](int node, int x, int y, int z) {
+      const Vec3 home = b.node_position(x, y, z);
+      add(node, home);
+      const NodeFields::Split* split = state.fields->split(node);
+      if (split == nullptr) return;
+      for (const auto& field : split->fields) {
+        if (field.node != node) add(field.node, home);
+      }
+    });
+  }
+  sum.centre /= sum.mass;
+  sum.angular = about_origin - sum.centre.cross(sum.linear);
+  return sum;
 }
 
 }  // namespace tissue_sim

@@ -35,4 +35,7 @@ bool may_be_wild(const MpmState& state);
 /// Hash of nodes, bonds and pieces.
 std::uint64_t checksum(const MpmState& state, const Pieces& pieces);
 
+/// Sums over the nodes, in double.
+Momentum momentum(const MpmState& state);
+
 }  // namespace tissue_sim

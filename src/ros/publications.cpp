@@ -39,7 +39,7 @@ std::set<std::string> Publications::topics() const {
   return names;
 }
 
-bool Publications::count_pieces(const Tissue& tissue) {
+bool Publications::count_pieces(Tissue& tissue) {
   if (tissue.fragment_count() == pieces_.count) return false;
   pieces_ = {};
   for (const Fragment& f : tissue.fragments()) {

@@ -59,7 +59,7 @@ class Publications {
     double volume = 0;  // [m^3]
   };
 
-  bool count_pieces(const Tissue& tissue);  ///< whether any came apart
+  bool count_pieces(Tissue& tissue);  ///< whether any came apart
   std_msgs::Header header(const ros::Time& stamp) const;
   boost::shared_ptr<const SimulationState> state_message(Simulation& simulation,
                                                          const FrameReport& report,

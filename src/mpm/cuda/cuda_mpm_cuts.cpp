@@ -6,6 +6,7 @@
 
 #include "cutting/blade_sweep.h"
 #include "mpm/cuda/on_device.h"
+#include "mpm/lattice_pieces.h"
 #include "mpm/split/cut_tissue.h"
 
 namespace tissue_sim {
@@ -147,7 +148,7 @@ std::vector<int> CudaMpmTissue::label_pieces() {
     point_at += sites.back().count;
   }
   const std::vector<PartedRun> parted = d.labels.update(sites, d.bonds.data(), d.stream);
-  const std::vector<int> fresh = part_pieces(state_->points, parted, pieces_);
+  const std::vector<int> fresh = part_pieces(state_->points.volume.data(), parted, pieces_);
   if (!fresh.empty()) d.points_changed = d.faces.pieces_changed = true;
   return fresh;
 }

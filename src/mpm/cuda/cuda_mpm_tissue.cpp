@@ -5,6 +5,7 @@
 #include <stdexcept>
 
 #include "mpm/cuda/on_device.h"
+#include "mpm/lattice_pieces.h"
 #include "mpm/piece_motion.h"
 #include "mpm/split/cut_tissue.h"
 #include "mpm/state_figures.h"
@@ -230,19 +231,23 @@ FrameResult CudaMpmTissue::finish() {
   return result_;
 }
 
-Span<const Fragment> CudaMpmTissue::fragments() const {
+Span<const Fragment> CudaMpmTissue::fragments() {
   if (!pieces_measured_) {
-    auto* self = const_cast<CudaMpmTissue*>(this);  // only what was not looked at yet changes
-    self->pull_nodes();
-    measure_pieces(*self->state_, self->pieces_);
-    self->pieces_measured_ = true;
+    pull_nodes();
+    measure_pieces(*state_, pieces_);
+    pieces_measured_ = true;
   }
   return pieces_.all;
 }
 
-std::uint64_t CudaMpmTissue::checksum() const {
-  const_cast<CudaMpmTissue*>(this)->pull_nodes();
+std::uint64_t CudaMpmTissue::checksum() {
+  pull_nodes();
   return tissue_sim::checksum(*state_, pieces_);
+}
+
+Momentum CudaMpmTissue::momentum() {
+  pull_nodes();
+  return tissue_sim::momentum(*state_);
 }
 
 std::string CudaMpmTissue::device_name() const { return "cuda (" + device_->gpu + ")"; }

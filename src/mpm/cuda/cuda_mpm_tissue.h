@@ -30,18 +30,22 @@ class CudaMpmTissue final : public Tissue {
   ~CudaMpmTissue() override;
 
   void advance(double duration, const FrameInput& input) override;
-  void advance(int substeps, float dt, const FrameInput& input) override;
-  float stable_substep() const override;
   FrameResult finish() override;
   int point_count() const override { return state_->points.size(); }
   int read_points(const PointSelection& selection, std::vector<std::uint8_t>& cloud) override;
   int fragment_count() const override { return static_cast<int>(pieces_.all.size()); }
-  Span<const Fragment> fragments() const override;
-  std::uint64_t checksum() const override;
+  Span<const Fragment> fragments() override;
+  std::uint64_t checksum() override;
+  Momentum momentum() override;
   std::string device_name() const override;
   const std::vector<std::string>& notes() const override { return notes_; }
 
   // For tests and the benchmark.
+  /// Advances by `substeps` of `dt` seconds each; 0 only cuts.
+  void advance(int substeps, float dt, const FrameInput& input);
+  /// The substep that is stable in the present state however the tissue is cut: what a lone point
+  /// bears, by the scene's CFL number [s].
+  float stable_substep() const;
   void save_checkpoint();     ///< of what a part of a frame changes until something is cut or tears
   void restore_checkpoint();  ///< and measures it
   float substep_for(const FrameInput& input);

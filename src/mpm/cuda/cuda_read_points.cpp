@@ -3,6 +3,7 @@
 #include <cstring>
 
 #include "fragments/piece_colour.h"
+#include "frame/select_points.h"
 #include "mpm/cuda/on_device.h"
 #include "mpm/lattice/bonds.h"
 
@@ -39,15 +40,8 @@ int CudaMpmTissue::read_points(const PointSelection& selection, std::vector<std:
   c.place = nullptr;
   std::vector<std::int32_t> place;
   if (selection.surface_only || selection.loose_only) {
-    std::vector<bool> loose(pieces_.next_id, false);
-    for (const Fragment& f : pieces_.all) loose[f.id] = f.loose;
-    place.assign(points.size(), -1);
-    count = 0;
-    for (std::int32_t p = 0; p < points.size(); p += stride) {
-      if (selection.surface_only && points.bonds[p] == kAllBonds) continue;
-      if (selection.loose_only && !loose[pieces_.of_point[p]]) continue;
-      place[p] = count++;
-    }
+    place = select_points(
+        selection, pieces_, [&](std::int32_t p) { return points.bonds[p] != kAllBonds; }, count);
     d.place.upload(place, d.stream);
     c.place = d.place.data();
   }

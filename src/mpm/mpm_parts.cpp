@@ -1,5 +1,4 @@
-// Parts of a frame: one that tissue could not bear is undone, and one in which it came to an
-// instrument unforeseen.
+// The steps of a frame: frame/run_frame.h says in which order.
 #include <utility>
 
 #include "mpm/contact/block_contact.h"
@@ -9,56 +8,64 @@
 namespace tissue_sim {
 
 void MpmTissue::advance(double duration, const FrameInput& input) {
-  Frame frame = begin(duration, input);
-  advance_in_parts(
-      duration, input,
-      [this](const FrameInput& rest, double time) {
-        return substep_.part(*state_, rest, time, substep_for(rest));
-      },
-      [&](const PartSubsteps& substeps, double from, double to) {
-        return run_part(frame, substeps, from, to);
-      });
-  end(frame);
+  run_frame(*this, duration, input);
 }
 
-PartRun MpmTissue::run_part(Frame& frame, const PartSubsteps& substeps, double from, double to) {
-  save_checkpoint();
-  const std::vector<BlockMotion> begun = state_->motion;
-  std::vector<TearingPoint> tearing;
-  const bool watched = SubstepChoice::is_strained(*state_);
+PartSubsteps MpmTissue::choose_substeps(const FrameInput& input, double time) {
+  return substep_.part(*state_, input, time, substep_for(input));
+}
+
+double MpmTissue::run_part(const FramePart& part) {
+  Frame& frame = *frame_;
+  frame.watched = SubstepChoice::is_strained(*state_);
   work_ = 0;
-  const int done = run(frame, substeps, from, to, tearing);
-  const double reached = done == substeps.count ? to : substeps.share(done, from, to);
+  frame.done = run(part);
+  return part.share_after(frame.done);
+}
+
+Verdict MpmTissue::judge_part(const FramePart& part) {
+  Frame& frame = *frame_;
   PartEnergy energy;
-  if (!watched && (reached < 1 || frame.blades)) {
+  if (!frame.watched && (part.share_after(frame.done) < 1 || frame.blades)) {
     measure_stiffness();
   } else {
     measure_energies();
-    energy = {result_.kinetic_energy, result_.elastic_energy, work_, substeps.until(done)};
+    energy = {result_.kinetic_energy, result_.elastic_energy, work_,
+              part.substeps.until(frame.done)};
   }
-  const SubstepChoice before = substep_;
-  if (!substep_.is_borne(*state_, modulus_, stable_substep(), substeps.at(done - 1), energy)) {
-    restore_checkpoint();
-    return {PartEnd::kUndone, from};
+  checkpoint_.substep = substep_;
+  const float last = part.substeps.at(frame.done - 1);
+  if (!substep_.is_borne(*state_, modulus_, stable_substep(), last, energy)) {
+    return Verdict::kTooLong;
   }
   measure_motion(*state_);
-  if (!std::exchange(frame.again, false) && came_unforeseen(*state_, frame.reach)) {
-    frame.again = true;
-    restore_checkpoint();
-    substep_ = before;
-    // From where blocks went, whose motion still stands, and from where they began.
-    find_near_colliders(*state_, frame.reach, frame.duration, begun);
-    return {PartEnd::kUndone, from};
+  if (std::exchange(frame.again, false) || !came_unforeseen(*state_, frame.reach)) {
+    return Verdict::kAccepted;
   }
+  return Verdict::kUnforeseen;
+}
+
+void MpmTissue::reject_part(Verdict verdict) {
+  restore_checkpoint();
+  if (verdict != Verdict::kUnforeseen) return;
+  Frame& frame = *frame_;
+  frame.again = true;
+  substep_ = checkpoint_.substep;
+  // From where blocks went, whose motion still stands, and from where they began.
+  find_near_colliders(*state_, frame.reach, frame.duration, checkpoint_.motion);
+}
+
+bool MpmTissue::accept_part() {
   substep_.follow(*state_, modulus_);
-  if (result_.blew_up) return {PartEnd::kBlewUp, reached};
-  tear(frame, tearing, reached);
-  if (reached < 1 && settle_wild_crumbs()) measured_ = false;
-  if (!measured_) {
-    measure_stiffness();
-    substep_.follow(*state_, modulus_);
-  }
-  return {PartEnd::kBorne, reached};
+  return !result_.blew_up;
+}
+
+void MpmTissue::break_bonds(double share) {
+  tear(share);
+  if (share < 1 && settle_wild_crumbs()) measured_ = false;
+  if (measured_) return;
+  measure_stiffness();
+  substep_.follow(*state_, modulus_);
 }
 
 void MpmTissue::save_checkpoint() {
@@ -67,6 +74,7 @@ void MpmTissue::save_checkpoint() {
     checkpoint_.u[a] = s.nodes.u[a];
     checkpoint_.v[a] = s.nodes.v[a];
   }
+  checkpoint_.motion = s.motion;
   checkpoint_.time = s.time;
   checkpoint_.dt = s.dt;
   checkpoint_.contacts = s.contacts;

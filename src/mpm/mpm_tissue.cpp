@@ -61,7 +61,7 @@ void MpmTissue::cut(const std::vector<BladePath>& paths, const Array<float>* u_b
   });
 }
 
-MpmTissue::Frame MpmTissue::begin(double duration, const FrameInput& input) {
+void MpmTissue::begin_frame(double duration, const FrameInput& input) {
   MpmState& s = *state_;
   result_ = {};
   result_.loads.resize(s.scene.tools.size());
@@ -74,20 +74,21 @@ MpmTissue::Frame MpmTissue::begin(double duration, const FrameInput& input) {
     for (int a = 0; a < 3; ++a) s.u_before[a] = s.nodes.u[a];
   }
   const FrameColliders colliders(s.scene, input, duration);
-  Frame frame{input, duration, colliders, colliders.reach(), blades, 0, s.motion};
-  find_near_colliders(s, frame.reach, duration);
-  return frame;
+  frame_ = Frame{input, duration, colliders, colliders.reach(), blades, 0, s.motion};
+  find_near_colliders(s, frame_->reach, duration);
 }
 
-int MpmTissue::run(Frame& frame, const PartSubsteps& substeps, double from, double to,
-                   std::vector<TearingPoint>& tearing) {
+int MpmTissue::run(const FramePart& part) {
   MpmState& s = *state_;
+  Frame& frame = *frame_;
+  const PartSubsteps& substeps = part.substeps;
   const int checks = can_tear(s) ? tear_checks(s, substeps.count, substeps.longest()) : 0;
   measured_ = false;
+  frame.tearing.clear();
   result_.substep = std::max<double>(result_.substep, substeps.longest());
   int done = 0;
-  for (int check = 0; done < substeps.count && tearing.empty(); ++done) {
-    const double share = substeps.share(done + 1, from, to);
+  for (int check = 0; done < substeps.count && frame.tearing.empty(); ++done) {
+    const double share = substeps.share(done + 1, part.from, part.to);
     const float dt = substeps.at(done);
     s.colliders = frame.colliders.at(share);
     std::vector<ColliderLoad> loads(s.colliders.size());
@@ -99,23 +100,24 @@ int MpmTissue::run(Frame& frame, const PartSubsteps& substeps, double from, doub
     work_ += frame.colliders.power(s.colliders.data(), loads.data()) * acted;
     if (checks == 0 || done + 1 != tear_check_at(check, checks, substeps.count)) continue;
     ++check;
-    tearing = find_tearing(s);
+    frame.tearing = find_tearing(s);
   }
   result_.substeps += done;
   return done;
 }
 
-void MpmTissue::tear(Frame& frame, const std::vector<TearingPoint>& tearing, double share) {
+void MpmTissue::tear(double share) {
   MpmState& s = *state_;
-  const bool threads = share < 1 && may_be_wild(s) && !s.threads.empty();  // at 1, finish() does
-  if (tearing.empty() && !threads) return;
+  Frame& frame = *frame_;
+  const bool bridges = share < 1 && may_be_wild(s) && !s.threads.empty();  // at 1, finish() does
+  if (frame.tearing.empty() && !bridges) return;
   if (frame.blades) {
     measure_motion(s);
-    cut_by_blades(frame, share);
+    cut_by_blades(share);
   }
   std::vector<std::int32_t> changed;
-  tear_bonds(s, tearing, changed, result_.tear_report);
-  if (threads) tear_threads(s, changed, result_.tear_report);
+  tear_bonds(s, frame.tearing, changed, result_.tear_report);
+  if (bridges) tear_threads(s, changed, result_.tear_report);
   if (changed.empty() && !frame.blades) return;
   take_apart(s, changed);
   measured_ = false;
@@ -125,29 +127,28 @@ void MpmTissue::tear(Frame& frame, const std::vector<TearingPoint>& tearing, dou
   for (int a = 0; frame.blades && a < 3; ++a) s.u_before[a] = s.nodes.u[a];
 }
 
-void MpmTissue::cut_by_blades(Frame& frame, double share) {
+void MpmTissue::cut_by_blades(double share) {
+  Frame& frame = *frame_;
   const std::vector<BladePath> paths = blade_paths(state_->scene, frame.input, frame.cut_to, share);
   cut(paths, state_->u_before, frame.before, result_.blade_report);
   frame.cut_to = share;
 }
 
-void MpmTissue::end(Frame& frame) {
-  cut_by_blades(frame, 1);
+void MpmTissue::end_frame() {
+  cut_by_blades(1);
   if (result_.tear_report.bonds_broken > 0) {
     result_.tear_report.new_fragments = update_pieces(state_->bodies, state_->points, pieces_);
   }
 }
 
 void MpmTissue::advance(int substeps, float dt, const FrameInput& input) {
-  Frame frame = begin(static_cast<double>(substeps) * dt, input);
+  begin_frame(static_cast<double>(substeps) * dt, input);
   for (int done = 0; done < substeps;) {
-    std::vector<TearingPoint> tearing;
-    done += run(frame, even_substeps(substeps - done, dt), static_cast<double>(done) / substeps, 1,
-                tearing);
-    tear(frame, tearing, static_cast<double>(done) / substeps);
+    done += run({even_substeps(substeps - done, dt), static_cast<double>(done) / substeps, 1});
+    tear(static_cast<double>(done) / substeps);
   }
   measure_motion(*state_);
-  end(frame);
+  end_frame();
 }
 
 bool MpmTissue::settle_wild_crumbs() {

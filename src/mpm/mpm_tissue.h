@@ -2,8 +2,10 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 
 #include "fragments/pieces.h"
+#include "frame/run_frame.h"
 #include "mpm/mpm_state.h"
 #include "mpm/state_figures.h"
 #include "mpm/substep_choice.h"
@@ -54,6 +56,10 @@ class MpmTissue final : public Tissue {
     double cut_to = 0;                ///< share of the frame up to which they did
     std::vector<BlockMotion> before;  ///< when they were last looked at
     bool again = false;               ///< a part is done again: see came_unforeseen()
+    std::vector<TearingPoint> tearing =
+        {};                ///< points past their limit at the end of the last part
+    int done = 0;          ///< substeps of it
+    bool watched = false;  ///< whether its energy was measured
   };
 
   /// What a part of a frame changes until something is cut or tears.
@@ -64,18 +70,26 @@ class MpmTissue final : public Tissue {
     Contacts contacts;
     FaceContacts faces;
     FrameResult result;
+    std::vector<BlockMotion> motion;  ///< run_frame()'s, as all that follows
+    SubstepChoice substep;
   };
 
-  Frame begin(double duration, const FrameInput& input);
-  PartRun run_part(Frame& frame, const PartSubsteps& substeps, double from, double to);
-  /// Advances by a part of the frame between two shares of it, which ends when points are past
-  /// their limit: these. Returns after how many substeps.
-  int run(Frame& frame, const PartSubsteps& substeps, double from, double to,
-          std::vector<TearingPoint>& tearing);
-  /// At this share of the frame; blades have cut their way before.
-  void tear(Frame& frame, const std::vector<TearingPoint>& tearing, double share);
-  void cut_by_blades(Frame& frame, double share);
-  void end(Frame& frame);
+  // The steps of run_frame().
+  friend void run_frame<MpmTissue>(MpmTissue& tissue, double duration, FrameInput input);
+  void begin_frame(double duration, const FrameInput& input);
+  PartSubsteps choose_substeps(const FrameInput& input, double time);
+  double run_part(const FramePart& part);
+  Verdict judge_part(const FramePart& part);
+  void reject_part(Verdict verdict);
+  bool accept_part();
+  void break_bonds(double share);
+  void end_frame();
+
+  /// The substeps of a part, until points are past their limit (`tearing_`). Returns how many.
+  int run(const FramePart& part);
+  /// What is past its limit, at this share of the frame; blades have cut their way before.
+  void tear(double share);
+  void cut_by_blades(double share);
   void cut(const std::vector<BladePath>& paths, const Array<float>* u_before,
            const std::vector<BlockMotion>& before, CutReport& report);
   bool tame();                ///< what is wild (mpm/tear/deformation.h), whether anything was
@@ -89,7 +103,8 @@ class MpmTissue final : public Tissue {
   std::vector<std::string> notes_;
   std::unique_ptr<MpmState> state_;
   Pieces pieces_;
-  Checkpoint checkpoint_;  ///< before the last part of a frame
+  std::optional<Frame> frame_;  ///< the one that is worked on
+  Checkpoint checkpoint_;       ///< before the last part of it
   Stiffening stiffening_;
   std::vector<float> modulus_;    ///< see SubstepChoice::follow()
   bool measured_ = false;         ///< whether the state is as it was when it was measured

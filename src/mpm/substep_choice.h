@@ -79,30 +79,4 @@ class SubstepChoice {
                           ///< were not borne
 };
 
-/// How a part of a frame ended, and at which share of the frame: where something tears, early.
-enum class PartEnd { kBorne, kUndone, kBlewUp };
-struct PartRun {
-  PartEnd end;
-  double reached;
-};
-
-/// Advances a frame of `duration` seconds in parts: a thread of tissue that snaps, or what a fast
-/// tool squeezes, may stiffen twofold within a frame.
-///   part(input, time)          the part that is next, of the time that is left [s]: PartSubsteps
-///   run(substeps, from, to)    from and to: shares of the frame. Returns the PartRun
-template <class Part, class Run>
-void advance_in_parts(double duration, FrameInput input, const Part& part, const Run& run) {
-  for (double from = 0; from < 1;) {
-    const double time = duration * (1 - from);
-    const PartSubsteps substeps = part(input, time);
-    const double taken = substeps.until(substeps.count) / time;
-    const double to = taken > 1 - 1e-9 ? 1 : from + (1 - from) * taken;
-    const PartRun part_run = run(substeps, from, to);
-    if (part_run.end == PartEnd::kBlewUp) return;
-    if (part_run.end == PartEnd::kUndone) continue;
-    from = part_run.reached;
-    input.cuts = {};
-  }
-}
-
 }  // namespace tissue_sim

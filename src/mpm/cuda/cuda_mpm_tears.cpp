@@ -48,20 +48,19 @@ std::vector<TearingPoint> CudaMpmTissue::find_tearing() {
   return tearing;
 }
 
-bool CudaMpmTissue::tear(const std::vector<TearingPoint>& tearing, const FrameInput& input,
-                         double share) {
+bool CudaMpmTissue::tear(double share) {
   MpmState& s = *state_;
   const bool threads = share < 1 && may_be_wild(s) && !s.threads.empty();  // at 1, finish() does
-  if (tearing.empty() && !threads) return false;
+  if (tearing_.empty() && !threads) return false;
   const bool blades = !blades_.empty();
   if (blades) {  // what they have passed so far
     launch_measure();
     finish_measure();
-    blades_ = blade_paths(state_->scene, input, cut_to_, share);
+    blades_ = blade_paths(state_->scene, input_, cut_to_, share);
     cut_by_blades();
   }
   std::vector<std::int32_t> changed;
-  tear_bonds(s, tearing, changed, result_.tear_report);
+  tear_bonds(s, tearing_, changed, result_.tear_report);
   if (threads) {
     pull_some(nodes_around(s.threads));
     tear_threads(s, changed, result_.tear_report);
@@ -71,7 +70,7 @@ bool CudaMpmTissue::tear(const std::vector<TearingPoint>& tearing, const FrameIn
   launch_measure();
   finish_measure();
   if (blades) {
-    blades_ = blade_paths(state_->scene, input, share, 1);
+    blades_ = blade_paths(state_->scene, input_, share, 1);
     cut_to_ = share;
     motion_before_ = state_->motion;
     keep_place_for_blades();

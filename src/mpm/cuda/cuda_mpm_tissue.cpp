@@ -89,7 +89,8 @@ void CudaMpmTissue::upload_colliders() {
   d.loads.clear(d.stream);
 }
 
-void CudaMpmTissue::begin(double duration, const FrameInput& input) {
+void CudaMpmTissue::begin_frame(double duration, const FrameInput& input) {
+  input_ = input;
   result_ = {};
   result_.loads.resize(state_->scene.tools.size());
   for (const BladePath& path : input.cuts) {
@@ -104,26 +105,24 @@ void CudaMpmTissue::begin(double duration, const FrameInput& input) {
   keep_place_for_blades();
 }
 
-int CudaMpmTissue::run(const PartSubsteps& part, double from, double to,
-                       std::vector<TearingPoint>& tearing) {
+int CudaMpmTissue::run(const FramePart& part) {
   OnDevice& d = *device_;
-  const int substeps = substeps_ = part.count;
+  const int substeps = substeps_ = part.substeps.count;
   part_ = part;
   before_ = state_->dt;
-  from_ = from;
-  to_ = to;
-  result_.substep = std::max<double>(result_.substep, part.longest());
+  tearing_.clear();
+  result_.substep = std::max<double>(result_.substep, part.substeps.longest());
   if (substeps == 0) return 0;
   upload_colliders();
   find_near();
   const bool tears = can_tear(*state_);
-  const int checks = tears ? tear_checks(*state_, substeps, part.longest()) : 1;
+  const int checks = tears ? tear_checks(*state_, substeps, part.substeps.longest()) : 1;
   int done = 0;
-  for (int check = 0; done < substeps && tearing.empty(); ++check) {
+  for (int check = 0; done < substeps && tearing_.empty(); ++check) {
     const int end = tear_check_at(check, checks, substeps);
     run_substeps(done, end);
     done = end;
-    if (tears) tearing = find_tearing();
+    if (tears) tearing_ = find_tearing();
   }
   substeps_ = done;
   result_.substeps += done;
@@ -148,7 +147,7 @@ void CudaMpmTissue::sum_loads() {
       load.points = static_cast<double>(sum[6]);
       sum += kLoadSums;
     }
-    const float acted = kick_of(i == 0 ? before_ : part_.at(i - 1), part_.at(i));
+    const float acted = kick_of(i == 0 ? before_ : part_.substeps.at(i - 1), part_.substeps.at(i));
     colliders_->add_loads(share_of(i), d.host_colliders.data() + i * count, on.data(),
                           acted / duration_, result_.loads);
     work_ += colliders_->power(d.host_colliders.data() + i * count, on.data()) * acted;
@@ -157,18 +156,19 @@ void CudaMpmTissue::sum_loads() {
 }
 
 void CudaMpmTissue::advance(int substeps, float dt, const FrameInput& input) {
-  begin(static_cast<double>(substeps) * dt, input);
+  begin_frame(static_cast<double>(substeps) * dt, input);
   for (int done = 0; done < substeps;) {
-    std::vector<TearingPoint> tearing;
-    done +=
-        run(even_substeps(substeps - done, dt), static_cast<double>(done) / substeps, 1, tearing);
-    if (done == substeps && tearing.empty()) break;  // all may be under way
+    done += run({even_substeps(substeps - done, dt), static_cast<double>(done) / substeps, 1});
+    if (done == substeps && tearing_.empty()) break;  // all may be under way
     check_cuda(cudaStreamSynchronize(device_->stream), "advance");
     sum_loads();
-    tear(tearing, input, static_cast<double>(done) / substeps);
+    tear(static_cast<double>(done) / substeps);
   }
   search_ahead();
   launch_measure();
+  finish_measure();
+  sum_loads();
+  if (!result_.blew_up) end_frame();
 }
 
 void CudaMpmTissue::launch(int begin, int end, float dt) {
@@ -217,14 +217,7 @@ void CudaMpmTissue::launch(int begin, int end, float dt) {
 }
 
 FrameResult CudaMpmTissue::finish() {
-  if (!measured_) finish_measure();
-  sum_loads();
   pieces_measured_ = false;
-  if (!blades_.empty() && !result_.blew_up) cut_by_blades();
-  blades_.clear();
-  if (result_.tear_report.bonds_broken > 0) {
-    result_.tear_report.new_fragments = label_pieces();
-  }
   substep_.follow(*state_, modulus_);
   tame();
   measured_ = false;

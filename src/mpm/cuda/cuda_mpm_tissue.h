@@ -5,6 +5,7 @@
 #include <optional>
 
 #include "fragments/pieces.h"
+#include "frame/run_frame.h"
 #include "mpm/mpm_state.h"
 #include "mpm/state_figures.h"
 #include "mpm/substep_choice.h"
@@ -64,12 +65,21 @@ class CudaMpmTissue final : public Tissue {
  private:
   struct OnDevice;
 
-  void begin(double duration, const FrameInput& input);
-  /// Enqueues a part of the frame between two shares of it; where tissue can tear it waits, and
-  /// ends when points are past their limit: these. Returns after how many substeps.
-  int run(const PartSubsteps& substeps, double from, double to, std::vector<TearingPoint>& tearing);
+  // The steps of run_frame().
+  friend void run_frame<CudaMpmTissue>(CudaMpmTissue& tissue, double duration, FrameInput input);
+  void begin_frame(double duration, const FrameInput& input);
+  PartSubsteps choose_substeps(const FrameInput& input, double time);
+  double run_part(const FramePart& part);
+  Verdict judge_part(const FramePart& part);
+  void reject_part(Verdict verdict);
+  bool accept_part();
+  void break_bonds(double share);
+  void end_frame();
+
+  /// Enqueues the substeps of a part; where tissue can tear it waits, and ends when points are past
+  /// their limit (`tearing_`). Returns after how many.
+  int run(const FramePart& part);
   void sum_loads();  ///< of the part that was run last, once it is done
-  PartRun run_part(const PartSubsteps& substeps, const FrameInput& input, double from, double to);
   void make_blocks(const CudaShape& shape, int room);  ///< BlockShape::room
   void divide_anew(int room);                          ///< into blocks for what is cut
   void make_room_for_cuts();  ///< makes blocks anew that are good for whole tissue alone
@@ -86,7 +96,7 @@ class CudaMpmTissue final : public Tissue {
   void keep_place_for_blades();
   std::vector<TearingPoint> find_tearing();
   /// At this share of the frame; blades have cut their way before. Returns whether any tears.
-  bool tear(const std::vector<TearingPoint>& tearing, const FrameInput& input, double share);
+  bool tear(double share);
   void tame();                ///< see MpmTissue
   bool settle_wild_crumbs();  ///< the same
   void upload_points();
@@ -129,22 +139,24 @@ class CudaMpmTissue final : public Tissue {
   double measure_limit(int steps);  ///< see MeasureLimit; of all blocks
   void upload_colliders();
   /// The share of the frame at the end of the part's substep `i`.
-  double share_of(int i) const { return part_.share(i + 1, from_, to_); }
+  double share_of(int i) const { return part_.substeps.share(i + 1, part_.from, part_.to); }
 
   std::vector<std::string> notes_;
   std::unique_ptr<MpmState> state_;
   Pieces pieces_;
   bool pieces_measured_ = false;  ///< whether they are where the frame left them
   std::unique_ptr<OnDevice> device_;
-  std::vector<BladePath> blades_;           ///< of the frame in flight, from `cut_to_` on
-  double cut_to_ = 0;                       ///< share of the frame
-  std::vector<BlockMotion> motion_before_;  ///< when the blades were last looked at
-  double duration_ = 0;                     ///< of the frame in flight [s]
-  PartSubsteps part_;                       ///< of its last part, ...
-  int substeps_ = 0;                        ///< ... so many, as long as their loads are not summed
-  float before_ = 0;                        ///< the substep before these [s]
-  double work_ = 0;                         ///< of instruments in it [J]
-  double from_ = 0, to_ = 0;                ///< shares of the frame where that part begins and ends
+  std::vector<BladePath> blades_;            ///< of the frame in flight, from `cut_to_` on
+  double cut_to_ = 0;                        ///< share of the frame
+  std::vector<BlockMotion> motion_before_;   ///< when the blades were last looked at
+  FrameInput input_;                         ///< of the frame in flight
+  double duration_ = 0;                      ///< of it [s]
+  FramePart part_;                           ///< its last part, ...
+  int done_ = 0;                             ///< ... the substeps that were done of it, ...
+  std::vector<TearingPoint> tearing_;        ///< ... and the points past their limit at its end
+  int substeps_ = 0;                         ///< ... so many, as long as their loads are not summed
+  float before_ = 0;                         ///< the substep before these [s]
+  double work_ = 0;                          ///< of instruments in it [J]
   std::optional<FrameColliders> colliders_;  ///< of the frame
   bool measured_ = false;                    ///< whether the state is as finish_measure() saw it
   Stiffening stiffening_;

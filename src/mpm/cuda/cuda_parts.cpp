@@ -1,29 +1,24 @@
-// Parts of a frame of tissue that lives on a GPU: a part that tissue could not bear is undone, and
-// one in which it came to an instrument unforeseen.
+// The steps of a frame of tissue that lives on a GPU: frame/run_frame.h says in which order.
 #include "mpm/cuda/on_device.h"
 
 namespace tissue_sim {
 
 void CudaMpmTissue::advance(double duration, const FrameInput& input) {
-  begin(duration, input);
-  advance_in_parts(
-      duration, input,
-      [this](const FrameInput& rest, double time) {
-        return substep_.part(*state_, rest, time, substep_for(rest));
-      },
-      [&](const PartSubsteps& substeps, double from, double to) {
-        return run_part(substeps, input, from, to);
-      });
+  run_frame(*this, duration, input);
 }
 
-PartRun CudaMpmTissue::run_part(const PartSubsteps& substeps, const FrameInput& input, double from,
-                                double to) {
+PartSubsteps CudaMpmTissue::choose_substeps(const FrameInput& input, double time) {
+  return substep_.part(*state_, input, time, substep_for(input));
+}
+
+double CudaMpmTissue::run_part(const FramePart& part) {
+  done_ = run(part);
+  if (tearing_.empty()) search_ahead();
+  return part.share_after(done_);
+}
+
+Verdict CudaMpmTissue::judge_part(const FramePart& part) {
   OnDevice& d = *device_;
-  save_checkpoint();
-  std::vector<TearingPoint> tearing;
-  const int done = run(substeps, from, to, tearing);
-  if (tearing.empty()) search_ahead();
-  const double reached = done == substeps.count ? to : substeps.share(done, from, to);
   launch_measure();
   look_for_unforeseen();
   finish_measure();
@@ -31,32 +26,49 @@ PartRun CudaMpmTissue::run_part(const PartSubsteps& substeps, const FrameInput& 
   d.went.clear();
   sum_loads();
   const PartEnergy energy{result_.kinetic_energy, result_.elastic_energy, work_,
-                          substeps.until(done)};
-  const OnDevice::Checkpoint& saved = d.checkpoint;
+                          part.substeps.until(done_)};
+  OnDevice::Checkpoint& saved = d.checkpoint;
   const bool may_go_back = static_cast<std::size_t>(saved.host_held_count[0]) <= saved.held.size();
-  const SubstepChoice before = substep_;
-  if (!substep_.is_borne(*state_, modulus_, stable_substep(), substeps.at(done - 1), energy) &&
-      may_go_back) {
-    restore_checkpoint();
-    return {PartEnd::kUndone, from};
+  saved.substep = substep_;
+  const float last = part.substeps.at(done_ - 1);
+  if (!substep_.is_borne(*state_, modulus_, stable_substep(), last, energy) && may_go_back) {
+    return Verdict::kTooLong;
   }
-  if (unforeseen && may_go_back) {
+  return unforeseen && may_go_back ? Verdict::kUnforeseen : Verdict::kAccepted;
+}
+
+void CudaMpmTissue::reject_part(Verdict verdict) {
+  OnDevice& d = *device_;
+  const bool unforeseen = verdict == Verdict::kUnforeseen;
+  if (unforeseen) {
     d.went = state_->motion;
     d.u_went.copy(d.u[d.current], d.stream);
-    restore_checkpoint();
-    substep_ = before;
-    return {PartEnd::kUndone, from};
   }
+  restore_checkpoint();
+  if (unforeseen) substep_ = d.checkpoint.substep;
+}
+
+bool CudaMpmTissue::accept_part() {
   substep_.follow(*state_, modulus_);
-  if (result_.blew_up) return {PartEnd::kBlewUp, reached};
-  const bool tore = tear(tearing, input, reached);
-  const bool settled = reached < 1 && settle_wild_crumbs();
+  return !result_.blew_up;
+}
+
+void CudaMpmTissue::break_bonds(double share) {
+  const bool tore = tear(share);
+  const bool settled = share < 1 && settle_wild_crumbs();
   if (settled) {
     launch_measure();
     finish_measure();
   }
   if (tore || settled) substep_.follow(*state_, modulus_);
-  return {PartEnd::kBorne, reached};
+}
+
+void CudaMpmTissue::end_frame() {
+  if (!blades_.empty()) cut_by_blades();
+  blades_.clear();
+  if (result_.tear_report.bonds_broken > 0) {
+    result_.tear_report.new_fragments = label_pieces();
+  }
 }
 
 void CudaMpmTissue::save_checkpoint() {

@@ -103,6 +103,7 @@ struct CudaMpmTissue::OnDevice {
     double time = 0;
     float dt = 0;
     FrameResult result;
+    SubstepChoice substep;  ///< run_frame()'s
     /// Room for those of `entries` of CudaTables::with that are not 0, which are few: where they
     /// are more, a part is not undone.
     static std::size_t most_held(std::size_t entries) {

@@ -1,0 +1,63 @@
+// The order of a frame of tissue that moves by adaptive explicit substeps, on any device.
+#pragma once
+
+#include "frame/part_substeps.h"
+#include "tissue_sim/tissue.h"
+
+namespace tissue_sim {
+
+/// Substeps that lead from one share (0 to 1) of a frame to another.
+struct FramePart {
+  PartSubsteps substeps;
+  double from = 0, to = 0;
+
+  double share_after(int substeps_done) const {
+    return substeps_done == substeps.count ? to : substeps.share(substeps_done, from, to);
+  }
+};
+
+/// What a part of a frame came to.
+enum class Verdict {
+  kAccepted,
+  kTooLong,     ///< its substeps were longer than what the tissue bore at its end
+  kUnforeseen,  ///< tissue came to an instrument that no list of contacts had foreseen
+};
+
+/// Runs a frame in parts: bonds that snap, or what a fast tool squeezes, may stiffen tissue twofold
+/// within a frame. What a backend does at each step:
+///   begin_frame(duration, input)  cuts of the service; colliders, and which tissue may meet them
+///   choose_substeps(input, time)  the substeps of the next part, of the time that is left [s]
+///   save_checkpoint()             of all that a part changes until something is cut or tears
+///   run_part(part)                the substeps, tools interpolated over them; ends early where
+///                                 tissue is past its limit. Returns the share reached
+///   judge_part(part)              measures what the part left
+///   reject_part(verdict)          back to the checkpoint; the next substeps are shorter
+///   accept_part()                 what was measured counts. False: the tissue blew up
+///   break_bonds(share)            blades cut their way so far, then what is past its limit tears
+///   end_frame()                   blades cut what is left of their way; pieces get their ids
+template <class Backend>
+void run_frame(Backend& tissue, double duration, FrameInput input) {
+  tissue.begin_frame(duration, input);
+  for (double from = 0; from < 1;) {
+    const double time = duration * (1 - from);
+    FramePart part;
+    part.substeps = tissue.choose_substeps(input, time);
+    part.from = from;
+    const double taken = part.substeps.until(part.substeps.count) / time;
+    part.to = taken > 1 - 1e-9 ? 1 : from + (1 - from) * taken;
+    tissue.save_checkpoint();
+    const double reached = tissue.run_part(part);
+    const Verdict verdict = tissue.judge_part(part);
+    if (verdict != Verdict::kAccepted) {
+      tissue.reject_part(verdict);
+      continue;
+    }
+    if (!tissue.accept_part()) return;
+    tissue.break_bonds(reached);
+    from = reached;
+    input.cuts = {};
+  }
+  tissue.end_frame();
+}
+
+}  // namespace tissue_sim

@@ -61,6 +61,28 @@ struct Ground {
   double friction = 0.3;  ///< Coulomb [-], 0 to 2
 };
 
+/// How the meshless method (`method: mls`) places its nodes.
+enum class MlsPlacement {
+  kRegular,   ///< on a lattice
+  kJittered,  ///< on a lattice, inner ones moved aside by up to a fifth of the spacing
+  kGraded,    ///< dense at the surface, sparse inside
+};
+/// What its moving least squares are made of; docs/mls.md says how they differ.
+enum class MlsBasis {
+  kLinear,    ///< the kernel's weights as they are (Altinkaynak et al. 2014)
+  kBalanced,  ///< weights nearest to these under which uniform stress leaves inner nodes in balance
+};
+
+/// What belongs to `method: mls` alone.
+struct MlsOptions {
+  double spacing = 0;   ///< between nodes, of graded ones at the surface [m]; 0 for half a cell
+  int neighbours = 18;  ///< that a node has within a regular lattice, 14 to 60: sets the supports
+  MlsBasis basis = MlsBasis::kBalanced;
+  MlsPlacement placement = MlsPlacement::kRegular;
+  double grading = 2;          ///< kGraded: spacing deep inside over that at the surface, 1 to 4
+  double stabilisation = 0.1;  ///< stiffness of what is not linear in a support, times E, 0 to 1
+};
+
 struct Scene {
   std::string name = "tissue";
   Method method = Method::kMpm;
@@ -75,6 +97,7 @@ struct Scene {
                          ///< exp(-damping t) [1/s], 0 to 1000
   Vec3 gravity = Vec3(0, 0, -9.81);  ///< [m/s^2]
   std::uint64_t seed = 0;
+  MlsOptions mls;
   Ground ground;
   std::vector<Material> materials;
   std::vector<Body> bodies;

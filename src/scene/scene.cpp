@@ -151,6 +151,17 @@ void check_tool(const std::string& path, const Tool& tool, std::set<std::string>
   check_friction(path + ".friction", tool.friction);
 }
 
+void check_mls(const MlsOptions& mls) {
+  if (mls.spacing != 0) check_range("mls.spacing", mls.spacing, 1e-5, 1, "m, or 0 for half a cell");
+  if (mls.neighbours < 14 || mls.neighbours > 60) {
+    refuse("mls.neighbours", std::to_string(mls.neighbours), "must lie between 14 and 60");
+  }
+  check_enum("mls.basis", mls.basis, kMlsBasisNames);
+  check_enum("mls.placement", mls.placement, kMlsPlacementNames);
+  check_range("mls.grading", mls.grading, 1, 4);
+  check_range("mls.stabilisation", mls.stabilisation, 0, 1);
+}
+
 std::string at(const char* list, std::size_t i) {
   return std::string(list) + "[" + std::to_string(i) + "]";
 }
@@ -207,6 +218,7 @@ void validate(const Scene& scene) {
   check_range("cfl", scene.cfl, 0.05, 0.9);
   check_range("damping", scene.damping, 0, 1000);
   check_each("gravity", scene.gravity, -1000, 1000, "component", "m/s^2");
+  check_mls(scene.mls);
   check_range("ground.z", scene.ground.z, -100, 100, "m");
   check_friction("ground.friction", scene.ground.friction);
 

@@ -142,6 +142,17 @@ void write_list(YAML::Emitter& out, const char* name, const std::vector<Item>& i
   out << EndSeq;
 }
 
+void write_mls(YAML::Emitter& out, const MlsOptions& mls) {
+  out << Key << "mls" << Value << BeginMap;
+  write(out, "spacing", mls.spacing);
+  out << Key << "neighbours" << Value << mls.neighbours;
+  write(out, "basis", std::string(name_of(mls.basis, kMlsBasisNames)));
+  write(out, "placement", std::string(name_of(mls.placement, kMlsPlacementNames)));
+  write(out, "grading", mls.grading);
+  write(out, "stabilisation", mls.stabilisation);
+  out << EndMap;
+}
+
 }  // namespace
 
 std::string scene_to_yaml(const Scene& scene) {
@@ -158,6 +169,7 @@ std::string scene_to_yaml(const Scene& scene) {
   write(out, "damping", scene.damping);
   write(out, "gravity", scene.gravity);
   out << Key << "seed" << Value << std::to_string(scene.seed);
+  if (scene.method == Method::kMls) write_mls(out, scene.mls);
   out << Key << "ground" << Value << BeginMap;
   out << Key << "enabled" << Value << scene.ground.enabled;
   write(out, "z", scene.ground.z);

@@ -151,7 +151,7 @@ Tool read_tool(const YAML::Node& node, const std::string& path) {
 Scene read_scene(const YAML::Node& node) {
   const YamlFields fields(node, "",
                           {"name", "method", "device", "threads", "cell_size", "frame_rate", "cfl",
-                           "damping", "gravity", "seed", "ground", "materials", "bodies", "tools"});
+                           "damping", "gravity", "seed", "mls", "ground", "materials", "bodies", "tools"});
   Scene scene;
   fields.read("name", scene.name);
   fields.read("method", scene.method, kMethodNames);
@@ -163,6 +163,17 @@ Scene read_scene(const YAML::Node& node) {
   fields.read("damping", scene.damping);
   fields.read("gravity", scene.gravity);
   fields.read("seed", scene.seed);
+  fields.read_map("mls", [&](const YAML::Node& mls, const std::string& path) {
+    const YamlFields of(mls, path,
+                        {"spacing", "neighbours", "basis", "placement", "grading",
+                         "stabilisation"});
+    of.read("spacing", scene.mls.spacing);
+    of.read("neighbours", scene.mls.neighbours);
+    of.read("basis", scene.mls.basis, kMlsBasisNames);
+    of.read("placement", scene.mls.placement, kMlsPlacementNames);
+    of.read("grading", scene.mls.grading);
+    of.read("stabilisation", scene.mls.stabilisation);
+  });
   fields.read_map("ground", [&](const YAML::Node& ground, const std::string& path) {
     const YamlFields ground_fields(ground, path, {"enabled", "z", "friction"});
     ground_fields.read("enabled", scene.ground.enabled);

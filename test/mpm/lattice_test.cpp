@@ -1,5 +1,5 @@
 // The points that bodies are made of: their places, order and volumes.
-#include "mpm/lattice/lattice.h"
+#include "geometry/lattice.h"
 
 #include <gtest/gtest.h>
 #include <tbb/task_arena.h>

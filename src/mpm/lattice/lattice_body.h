@@ -8,7 +8,7 @@
 
 #include "compute/array.h"
 #include "mpm/lattice/bonds.h"
-#include "mpm/lattice/lattice.h"
+#include "geometry/lattice.h"
 #include "mpm/lattice/lattice_rows.h"
 #include "tissue_sim/scene.h"
 

@@ -1,4 +1,4 @@
-#include "mpm/lattice/lattice.h"
+#include "geometry/lattice.h"
 
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>

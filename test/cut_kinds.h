@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "cut_scenes.h"
+#include "cut_paths.h"
 
 namespace tissue_sim {
 
@@ -142,13 +142,6 @@ inline std::vector<int> in_order(const std::vector<int>& labels) {
   return result;
 }
 
-/// The piece of each point, by the program's labels.
-inline std::vector<int> labels(MpmTissue& tissue) {
-  std::vector<int> result;
-  for (int p = 0; p < tissue.point_count(); ++p) result.push_back(tissue.fragment_of(p));
-  return in_order(result);
-}
-
 /// Where each point is now [m].
 inline std::vector<Vec3> positions(Tissue& tissue) {
   std::vector<std::uint8_t> cloud;
@@ -160,6 +153,19 @@ inline std::vector<Vec3> positions(Tissue& tissue) {
     result[p.id] = Vec3(p.x, p.y, p.z);
   }
   return result;
+}
+
+/// The piece of each point, by the program's labels.
+inline std::vector<int> labels(Tissue& tissue) {
+  std::vector<std::uint8_t> cloud;
+  tissue.read_points({}, cloud);
+  std::vector<int> result(tissue.point_count());
+  for (std::size_t i = 0; i < cloud.size(); i += sizeof(Point)) {
+    Point p;
+    std::memcpy(&p, &cloud[i], sizeof(Point));
+    result[p.id] = p.fragment;
+  }
+  return in_order(result);
 }
 
 }  // namespace tissue_sim

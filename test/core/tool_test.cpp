@@ -158,19 +158,6 @@ TEST(Ground, HoldsBelowTheFrictionAngleAndLetsSlideAbove) {
   EXPECT_NEAR(slide(0.35, 0.3), 9.81 * 0.05 / 5, 0.02);
 }
 
-TEST(Ground, CarriesTheWeight) {
-  Scene scene = free_box(Vec3(0.03, 0.03, 0.02), 0.003);
-  scene.ground.enabled = true;
-  scene.gravity = Vec3(0, 0, -9.81);
-  scene.damping = 10;
-  Simulation simulation(scene);
-  for (int f = 0; f < 120; ++f) simulation.advance_frame();
-  const Fragment& piece = simulation.tissue().fragments()[0];
-  EXPECT_NEAR(piece.velocity.norm(), 0, 1e-3);
-  EXPECT_GT(piece.box.min[2], -0.25 * 0.003);
-  EXPECT_NEAR(piece.centroid[2], 0.01, 0.001);
-}
-
 TEST(Scalpel, CutsWhereItIsDrawnAndOnlyThere) {
   Scene scene = free_box(Vec3(0.04, 0.03, 0.02), 0.002);
   Region floor;  // or the blade would push the body along

@@ -5,6 +5,7 @@
 #include <map>
 
 #include "cut_kinds.h"
+#include "cut_scenes.h"
 
 #ifdef TISSUE_SIM_HAS_PCL
 #include <pcl/point_types.h>

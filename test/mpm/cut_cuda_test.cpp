@@ -4,6 +4,7 @@
 
 #if defined(TISSUE_SIM_CUDA)
 #include "cut_kinds.h"
+#include "cut_scenes.h"
 #include "either_device.h"
 #include "mpm/cuda/cuda_mpm_tissue.h"
 #include "mpm/cuda/label_pieces.h"

@@ -4,6 +4,7 @@
 #include <Eigen/Geometry>
 
 #include "cut_kinds.h"
+#include "cut_scenes.h"
 #include "mpm/lattice/bonds.h"
 
 namespace tissue_sim {

@@ -5,6 +5,7 @@
 #include <map>
 
 #include "cut_kinds.h"
+#include "cut_scenes.h"
 
 namespace tissue_sim {
 namespace {

@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include "cut_kinds.h"
+#include "cut_scenes.h"
 
 namespace tissue_sim {
 namespace {

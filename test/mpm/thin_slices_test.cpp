@@ -4,6 +4,7 @@
 #include <random>
 
 #include "cut_kinds.h"
+#include "cut_scenes.h"
 #include "momentum.h"
 
 namespace tissue_sim {

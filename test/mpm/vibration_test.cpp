@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "beam_scene.h"
+#include "clamp_place.h"
 #include "curve_file.h"
 
 namespace tissue_sim {

@@ -11,8 +11,7 @@
 #include <random>
 #include <vector>
 
-#include "either_device.h"
-#include "tissue_sim/simulation.h"
+#include "tissue/each_method.h"
 
 namespace tissue_sim {
 namespace {
@@ -179,11 +178,12 @@ BladePath random_cut(Random& random, const Vec3& middle) {
 }
 
 /// Runs the operation of a seed. Returns the frame in which it blew up, -1 if it did not.
-int run_operation(int seed, Device device) {
+int run_operation(int seed, const MethodOnDevice& on) {
   Random random(seed);
   Vec3 middle;
   Scene scene = random_scene(random, middle);
-  scene.device = device;
+  scene.method = on.method;
+  scene.device = on.device;
   scene.seed = static_cast<std::uint64_t>(seed);
   Simulation simulation(scene);
   std::vector<Wanderer> tools(scene.tools.size());
@@ -221,11 +221,10 @@ int run_operation(int seed, Device device) {
   return -1;
 }
 
-template <class T>
-class RandomOperations : public OnEitherDevice<T> {};
-TYPED_TEST_SUITE(RandomOperations, Tissues, DeviceName);
+class RandomOperations : public EachMethod {};
+FOR_EACH_METHOD(RandomOperations);
 
-TYPED_TEST(RandomOperations, DoNotBlowUp) {
+TEST_P(RandomOperations, DoNotBlowUp) {
   std::vector<int> seeds = {13, 14, 103};
   if (const char* asked = std::getenv("TISSUE_SIM_OPERATIONS")) {
     int first, count;
@@ -233,9 +232,9 @@ TYPED_TEST(RandomOperations, DoNotBlowUp) {
     seeds.resize(count);
     std::iota(seeds.begin(), seeds.end(), first);
   }
-  const Device device = std::is_same<TypeParam, MpmTissue>::value ? Device::kCpu : Device::kCuda;
   for (const int seed : seeds) {
-    EXPECT_EQ(run_operation(seed, device), -1) << "the frame in which seed " << seed << " blew up";
+    EXPECT_EQ(run_operation(seed, GetParam()), -1)
+        << "the frame in which seed " << seed << " blew up";
   }
 }
 

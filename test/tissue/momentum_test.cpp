@@ -1,0 +1,199 @@
+// Linear and angular momentum of a body that a tool struck and that then flies freely, with and
+// without cuts on the way.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+#include <vector>
+
+#include "cut_paths.h"
+#include "tissue/each_method.h"
+
+namespace tissue_sim {
+namespace {
+
+const Vec3 kSize(0.04, 0.032, 0.024);
+constexpr int kStrike = 14, kFlight = 240;  // frames; some 10 000 substeps
+
+/// A block of liver in free space, and a probe that strikes it aside of its middle.
+Scene struck_block(Law law) {
+  Scene s = free_box(kSize, 0.004);
+  s.bodies[0].pose.position = Vec3::Zero();
+  s.materials.resize(1);
+  s.materials[0].law = law;
+  s.bodies[0].material = s.materials[0].name;
+  s.tools.resize(1);
+  s.tools[0].radius = 0.006;
+  s.tools[0].friction = 0.5;
+  return s;
+}
+
+/// The probe comes along x, goes 10 mm deep at half a metre a second, and leaves for good.
+Pose strike(int frame) {
+  const double x = frame < 4 ? -0.038 + 0.008 * frame : -0.014 - 0.008 * (frame - 3);
+  return {Vec3(x, 0.008, 0.006), Quat::FromTwoVectors(Vec3::UnitZ(), Vec3(1, 0.2, -0.1))};
+}
+
+/// About the centre of mass, which is that of the points of a body of one density.
+Vec3 spin_of(const Momentum& m, Simulation& simulation) {
+  Vec3 centroid = Vec3::Zero();
+  double volume = 0;
+  for (const Fragment& f : simulation.tissue().fragments()) {
+    centroid += f.volume * f.centroid;
+    volume += f.volume;
+  }
+  return m.angular - (centroid / volume).cross(m.linear);
+}
+
+struct Strike {
+  Vec3 impulse = Vec3::Zero(),
+       moment = Vec3::Zero();  ///< of the probe on the body, about the origin
+};
+
+Strike strike(Simulation& simulation) {
+  Strike sum;
+  const double frame = 1 / simulation.scene().frame_rate;
+  Pose before = strike(0);
+  for (int f = 0; f < kStrike; ++f) {
+    const Pose now = strike(f);
+    simulation.set_tool(0, now);
+    const Wrench felt = simulation.advance_frame().result.loads[0].mean;
+    const Vec3 tip = 0.5 * (before.position + now.position);
+    sum.impulse -= frame * felt.force;
+    sum.moment -= frame * (tip.cross(felt.force) + felt.torque);
+    before = now;
+  }
+  return sum;
+}
+
+class MomentumOf : public EachMethod {};
+FOR_EACH_METHOD(MomentumOf);
+
+TEST_P(MomentumOf, AStruckBodyIsWhatTheToolGaveIt) {
+  Simulation simulation(on_this(struck_block(Law::kFixedCorotated)));
+  EXPECT_NEAR(simulation.tissue().momentum().mass / (1060 * kSize.prod()), 1, 1e-5);
+  const Strike given = strike(simulation);
+  const FrameResult last = simulation.advance_frame().result;
+  EXPECT_EQ(last.loads[0].peak_force, 0) << "it still touches";
+  const Momentum m = simulation.tissue().momentum();
+  EXPECT_GT(m.linear[0], 1e-3);
+  EXPECT_GT(m.angular.norm(), 1e-5);
+  EXPECT_LT((m.linear - given.impulse).norm(), within().impulse * m.linear.norm());
+  EXPECT_LT((m.angular - given.moment).norm(), within().angular_impulse * m.angular.norm());
+}
+
+/// Cuts before a frame of the flight, about the centre of mass.
+struct CutInFlight {
+  int frame;
+  BladePath path;
+};
+
+struct Flight {
+  double linear = 0, angular = 0;  ///< largest change, relative
+  double elastic_share = 0;        ///< largest share of the energy that is elastic
+  double energy_gain = 0;          ///< largest, over what it had at the beginning, relative
+  std::size_t pieces = 0;
+};
+
+Flight fly(const Scene& scene, const std::vector<CutInFlight>& cuts) {
+  Simulation simulation(scene);
+  strike(simulation);
+  FrameResult r = simulation.advance_frame().result;
+  const double energy = r.kinetic_energy + r.elastic_energy;
+  const Momentum start = simulation.tissue().momentum();
+  const Vec3 spin = spin_of(start, simulation);
+  Flight flight;
+  for (int f = 0; f < kFlight; ++f) {
+    for (const CutInFlight& cut : cuts) {
+      if (cut.frame != f) continue;
+      Vec3 middle = Vec3::Zero();
+      for (const Fragment& piece : simulation.tissue().fragments()) {
+        middle += piece.volume / kSize.prod() * piece.centroid;
+      }
+      BladePath path = cut.path;
+      for (Pose& pose : path.poses) pose.position += middle;
+      simulation.cut(path);
+    }
+    r = simulation.advance_frame().result;
+    for (const CutReport& report : r.cut_reports) EXPECT_GT(report.bonds_broken, 0) << f;
+    const Momentum now = simulation.tissue().momentum();
+    flight.linear = std::max(flight.linear, (now.linear - start.linear).norm());
+    flight.angular = std::max(flight.angular, (spin_of(now, simulation) - spin).norm());
+    const double now_energy = r.kinetic_energy + r.elastic_energy;
+    flight.elastic_share = std::max(flight.elastic_share, r.elastic_energy / now_energy);
+    flight.energy_gain = std::max(flight.energy_gain, now_energy / energy - 1);
+  }
+  flight.linear /= start.linear.norm();
+  flight.angular /= spin.norm();
+  flight.pieces = simulation.tissue().fragments().size();
+  return flight;
+}
+
+BladePath stroke(const Vec3& a, const Vec3& b, const std::vector<Vec3>& places) {
+  BladePath path;
+  path.edge = {a, b};
+  for (const Vec3& place : places) path.poses.push_back({place, Quat::Identity()});
+  return path;
+}
+
+/// A plane through the middle, askew.
+BladePath in_two() {
+  return stroke(Vec3(0.02, -0.1, 0), Vec3(-0.02, 0.1, 0), {Vec3(0, 0, -0.1), Vec3(0, 0, 0.1)});
+}
+
+TEST_P(MomentumOf, FreeFlightStays) {
+  for (const Law law : {Law::kFixedCorotated, Law::kNeoHookean}) {
+    const Flight flight = fly(on_this(struck_block(law)), {});
+    EXPECT_EQ(flight.pieces, 1u);
+    EXPECT_LT(flight.linear, within().momentum);
+    EXPECT_LT(flight.angular, within().momentum);
+    EXPECT_GT(flight.elastic_share, 0.01);  // it rings
+    EXPECT_LT(flight.energy_gain, 0.03);
+  }
+}
+
+TEST_P(MomentumOf, FreeFlightStaysThroughCutsAsWithoutThem) {
+  const Vec3 up(0, 0, 0.1);
+  std::vector<Vec3> wave;
+  for (int i = 0; i <= 30; ++i) {
+    const double s = i / 30.0;
+    wave.push_back(Vec3(0.006 * std::sin(12 * s), 0.1 * (s - 0.5), 0));
+  }
+  const std::vector<CutInFlight> cuts = {
+      {20, stroke(-up, up, {Vec3(0.005, -0.1, 0), Vec3(0.005, 0, 0)})},  // ends inside
+      {50, stroke(-up, up, {Vec3(-0.01, 0, 0), Vec3(-0.002, 0, 0)})},    // begins inside, too
+      {80, stroke(-up, up, wave)},
+      {120, in_two()},
+      {121, stroke(Vec3(-0.1, 0, 0), Vec3(0.1, 0, 0), {Vec3(0, -0.1, 0.002), Vec3(0, 0.1, 0)})},
+  };
+  const Flight flight = fly(on_this(struck_block(Law::kFixedCorotated)), cuts);
+  EXPECT_GT(flight.pieces, 4u);
+  EXPECT_LT(flight.linear, within().momentum);
+  EXPECT_LT(flight.angular, within().momentum);
+  EXPECT_LT(flight.energy_gain, 0.03);
+}
+
+TEST_P(MomentumOf, WhatFallsGrowsByItsWeight) {
+  Scene scene = on_this(struck_block(Law::kFixedCorotated));
+  scene.gravity = Vec3(0.5, -0.3, -9.81);
+  Simulation simulation(scene);
+  strike(simulation);
+  simulation.advance_frame();
+  const Momentum start = simulation.tissue().momentum();
+  const Vec3 spin = spin_of(start, simulation);
+  const double began = simulation.time();
+  for (int f = 0; f < 60; ++f) {
+    const FrameResult r = simulation.advance_frame().result;
+    const Momentum now = simulation.tissue().momentum();
+    const Vec3 gained = now.linear - start.linear;
+    const Vec3 weight = now.mass * scene.gravity;
+    // Velocities may belong to the middles of substeps, whose lengths change.
+    EXPECT_LT((gained - weight * (simulation.time() - began)).norm(),
+              within().momentum * gained.norm() + 0.5 * r.substep * weight.norm());
+    EXPECT_LT((spin_of(now, simulation) - spin).norm(), 1e-3 * spin.norm());
+  }
+}
+
+}  // namespace
+}  // namespace tissue_sim

@@ -35,7 +35,7 @@ void throw_pieces(T& tissue, const std::vector<Vec3>& velocity, const Vec3& spin
 
 /// What each of two pieces gets, by number: the left one and the right one.
 template <class T>
-std::vector<Vec3> left_and_right(const T& tissue, const Vec3& left, const Vec3& right) {
+std::vector<Vec3> left_and_right(T& tissue, const Vec3& left, const Vec3& right) {
   const Span<const Fragment> pieces = tissue.fragments();
   if (pieces[0].centroid[0] < pieces[1].centroid[0]) return {left, right};
   return {right, left};

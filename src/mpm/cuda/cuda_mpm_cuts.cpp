@@ -159,7 +159,7 @@ void CudaMpmTissue::cut(const std::vector<BladePath>& paths, const float4* u_bef
   read_places(u_before);
   for (const BladePath& path : paths) {
     std::vector<std::int32_t> by_this;
-    break_bonds(*state_, {sweep(path, u_before != nullptr)}, by_this, report);
+    tissue_sim::break_bonds(*state_, {sweep(path, u_before != nullptr)}, by_this, report);
     push_points(by_this);  // for the next
     changed.insert(changed.end(), by_this.begin(), by_this.end());
   }

@@ -74,13 +74,14 @@ inline GoldenScene tears() {
   g.name = "tears";
   g.frames = 14;
   g.scene.cell_size = 0.002;
-  g.scene.gravity = Vec3(1, 2, -55);
+  g.scene.gravity = Vec3(0.3, 0.5, -22);
+  g.scene.damping = 20;
   g.scene.seed = 3;
   g.scene.ground.z = -0.05;
   Material& m = add_material(g.scene, "weak");
-  m.tear_stretch = 1.25;
+  m.tear_stretch = 1.3;
   m.tear_length = 0.0035;
-  m.tear_scatter = 0.1;
+  m.tear_scatter = 0.05;
   Body& b = add_box(g.scene, Vec3(0.014, 0.008, 0.044), Vec3::Zero());
   b.material = "weak";
   b.anchors = {box(Vec3(-1, -1, 0.018), Vec3(1, 1, 1))};
@@ -196,10 +197,10 @@ inline GoldenScene chain() {
   g.name = "chain";
   g.frames = 20;
   g.scene.cell_size = 0.002;
-  g.scene.gravity = Vec3(0, 1, -30);
+  g.scene.gravity = Vec3(0, 1, -16);
   g.scene.ground.z = -0.04;
   Material& m = add_material(g.scene, "brittle");
-  m.tear_stretch = 1.5;
+  m.tear_stretch = 1.55;
   m.tear_scatter = 0.2;
   m.law = Law::kNeoHookean;
   Body& b = add_box(g.scene, Vec3(0.012, 0.008, 0.044), Vec3::Zero());
@@ -216,7 +217,7 @@ inline GoldenScene chain() {
     }
     if (frame != 3) return;
     for (const BladePath& p :
-         random_cuts(14, Vec3(0, 0, -0.006), Vec3(0.006, 0.004, 0.003), 0.006)) {
+         random_cuts(7, Vec3(0, 0, -0.006), Vec3(0.006, 0.004, 0.003), 0.006)) {
       s.cut(p);
     }
   };

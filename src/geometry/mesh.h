@@ -16,9 +16,9 @@ struct TriangleMesh {
 
 /// The file that a plain path, a file:// or a package:// address means. Packages are looked for as
 /// rospack does, below the folders of ROS_PACKAGE_PATH, then in `share/<package>` of
-/// CMAKE_PREFIX_PATH. Throws std::invalid_argument for other addresses and unknown packages;
-/// whether the file exists is not asked.
-std::string resolve_mesh_path(const std::string& address);
+/// CMAKE_PREFIX_PATH. Throws std::invalid_argument for other addresses and unknown packages, with
+/// `kind` ("mesh", "scene") in front; whether the file exists is not asked.
+std::string resolve_path(const std::string& address, const std::string& kind);
 
 /// Reads an STL, OBJ, PLY or OFF file; vertices at the same place become one, triangles without
 /// area by that and vertices that no triangle uses are dropped. Throws std::invalid_argument for

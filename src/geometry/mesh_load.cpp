@@ -52,8 +52,15 @@ TriangleMesh load_solid(const Body& body, std::vector<std::string>* notes) {
   const std::string prefix = "body '" + body.name + "': ";
   std::string what = "mesh " + body.mesh;
   try {
-    const std::string path = std::filesystem::absolute(resolve_mesh_path(body.mesh)).string();
+    const std::filesystem::path given = resolve_path(body.mesh, "mesh");
+    const std::string path = std::filesystem::absolute(given).string();
     what = "mesh " + path;
+    std::error_code error;
+    if (given.is_relative() && !std::filesystem::exists(path, error)) {
+      throw std::invalid_argument(what + " does not exist (" + given.string() +
+                                  " is looked for in the folder that this program runs in): give "
+                                  "the full path");
+    }
     TriangleMesh mesh = read_mesh(path);
     Box box;
     for (const Vec3& v : mesh.vertices) {

@@ -102,12 +102,16 @@ show_progress() {
   fi
 }
 
+# is_configured FOLDER: whether CMake was there already, for this checkout.
+is_configured() {
+  grep -qxF "CMAKE_HOME_DIRECTORY:INTERNAL=$repo" "$1/CMakeCache.txt" 2>/dev/null
+}
+
 # configure FOLDER [cmake options]: a Release build of the package.
 configure() {
   local folder=$1
   shift
-  if [[ -e $folder/CMakeCache.txt ]] &&
-    ! grep -qxF "CMAKE_HOME_DIRECTORY:INTERNAL=$repo" "$folder/CMakeCache.txt"; then
+  if [[ -e $folder/CMakeCache.txt ]] && ! is_configured "$folder"; then
     rm -rf -- "$folder"  # made when the checkout was somewhere else: CMake would refuse it
   fi
   mkdir -p "$folder"
@@ -117,6 +121,35 @@ configure() {
     grep -A 12 'CMake Error' "$folder/build.log" >&2 || tail -20 "$folder/build.log" >&2
     fail "CMake could not configure: see $folder/build.log"
   }
+  sed -n '/tissue_sim: no GPU backend/,/^$/p' "$folder/build.log" | sed 's/^-- //; s/^ */   /'
+}
+
+# The GPUs of this machine by compute capability, as CMake names them: "86;90". "unknown" where the
+# driver does not tell; nothing where there is none that the GPU backend runs on.
+gpus_here() {
+  local smi capability
+  smi=$(PATH=$PATH:/usr/lib/wsl/lib command -v nvidia-smi) || return 0
+  "$smi" -L 2>/dev/null | grep -q '^GPU' || return 0
+  capability=$("$smi" --query-gpu=compute_cap --format=csv,noheader 2>/dev/null) || capability=unknown
+  if [[ $capability == unknown || $capability == *[!0-9.$'\n']* ]]; then echo unknown; return; fi
+  tr -d '. ' <<<"$capability" | awk '$1 >= 75' | sort -nu | paste -sd ';'
+}
+
+# choose_gpu FOLDER: sets gpu_options for a build that is to run here: CUDA takes half of the time to
+# compile, for nothing where there is no GPU. What an earlier build in the folder has stays in it.
+choose_gpu() {
+  local gpus
+  gpu_options=()
+  if is_configured "$1"; then return; fi
+  gpus=$(gpus_here)
+  case $gpus in
+    '')
+      gpu_options=(-DTISSUE_SIM_CUDA=OFF)
+      say "No NVIDIA GPU here: building for the CPU alone (with --cuda the GPU backend as well)"
+      ;;
+    unknown) gpu_options=(-DTISSUE_SIM_CUDA=ON) ;;
+    *) gpu_options=(-DTISSUE_SIM_CUDA=ON "-DCMAKE_CUDA_ARCHITECTURES=$gpus") ;;
+  esac
 }
 
 # compile FOLDER [cmake --build options]
@@ -148,14 +181,23 @@ prepare_folder() {
   build=$(cd -- "$build" && pwd)
 }
 
-# Builds node, core and, with ON, the tests; leaves the environment of the devel space.
+# build_ros_package ON|OFF [cmake options]: builds node, core and, with ON, the tests; leaves the
+# environment of the devel space.
 build_ros_package() {
+  local tests=$1 devel=$build/ros/devel
+  shift
+  # rosrun, and what it completes, passes over a package's own build folder.
+  if [[ $build == "$repo/build" ]]; then
+    devel=$repo/devel
+    rm -rf -- "$build/ros/devel"
+  fi
   if [[ -z ${CMAKE_PREFIX_PATH:-} && -e $noetic ]]; then source_setup "$noetic"; fi
-  configure "$build/ros" -DTISSUE_SIM_TESTS="$1" -DCATKIN_ENABLE_TESTING="$1"
+  configure "$build/ros" -DTISSUE_SIM_TESTS="$tests" -DCATKIN_ENABLE_TESTING="$tests" \
+    -DCATKIN_DEVEL_PREFIX="$devel" "$@"
   ! grep 'tissue_sim: the core only' "$build/ros/build.log" >&2 ||
     fail "CMake does not find all of ROS: see $build/ros/build.log"
   compile "$build/ros"
-  source_setup "$build/ros/devel/setup.bash"
+  source_setup "$devel/setup.bash"
   export PATH=/usr/bin:$PATH
 }
 

@@ -10,6 +10,7 @@
 #include <stdexcept>
 
 #include "geometry/chord.h"
+#include "mpm/lattice/thickness.h"
 #include "scene/scene_text.h"
 
 namespace tissue_sim {
@@ -164,9 +165,12 @@ Lattice make_lattice(const Body& body, double cell_size, std::vector<std::string
   const Solid solid(body);
   const Box box = is_mesh ? box_of(mesh) : bounding_box(body);
   const Vec3 size = box.max - box.min;
+  // Where a mesh is in another unit, no cell size is the answer.
+  std::string hint = is_mesh ? scale_hint(size.maxCoeff(), body.scale) : "";
+  if (!hint.empty()) hint += " Else ";
   const std::string too_many = "it takes more than " + std::to_string(max_points) +
                                " points at cell_size " + text(cell_size) + " m (it measures " +
-                               metres(size) + "): raise cell_size";
+                               metres(size) + "): " + hint + "raise cell_size";
   const double volume = is_mesh ? signed_volume(mesh) : exact_volume(body);
   if (volume / (half * half * half) > 1.01 * static_cast<double>(max_points)) {
     refuse(body, too_many);
@@ -219,12 +223,14 @@ Lattice make_lattice(const Body& body, double cell_size, std::vector<std::string
   }
   if (lattice.sites.empty()) {
     refuse(body, "no points at cell_size " + text(cell_size) + " m (it measures " + metres(size) +
-                     "): lower cell_size");
+                     "): " + hint + "lower cell_size");
   }
   if (dropped > 0) {
     const float share = static_cast<float>(total / (total - dropped));
     for (Lattice::Site& site : lattice.sites) site.volume *= share;
   }
+  const std::string thin = notes ? thickness_note(lattice) : "";
+  if (!thin.empty()) notes->push_back("body '" + body.name + "': " + thin);
   return lattice;
 }
 

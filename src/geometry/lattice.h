@@ -29,7 +29,8 @@ struct Lattice {
 /// their cube are dropped and their volume is given to the others in proportion, so that the total
 /// volume is the body's. For boxes without rotation the lattice starts at the box's lowest corner;
 /// for other shapes it is centred on the bounding box, each edge rounded up to whole half cells.
-/// `notes` receives a line for whatever was repaired on the way (a mesh turned inside out, ...).
+/// `notes` receives a line for whatever was repaired on the way (a mesh turned inside out, ...) and
+/// for a body with fewer than two points across.
 /// Throws std::invalid_argument with the reason and what to do: mesh missing, empty, open, of
 /// absurd size; body without points at this cell size; more than `max_points` points.
 Lattice make_lattice(const Body& body, double cell_size, std::vector<std::string>* notes,

@@ -16,27 +16,35 @@ struct TriangleMesh {
 
 /// The file that a plain path, a file:// or a package:// address means. Packages are looked for as
 /// rospack does, below the folders of ROS_PACKAGE_PATH, then in `share/<package>` of
-/// CMAKE_PREFIX_PATH. Throws std::invalid_argument for other addresses and unknown packages;
-/// whether the file exists is not asked.
-std::string resolve_mesh_path(const std::string& address);
+/// CMAKE_PREFIX_PATH. Throws std::invalid_argument for other addresses and unknown packages, with
+/// `kind` ("mesh", "scene") in front; whether the file exists is not asked.
+std::string resolve_path(const std::string& address, const std::string& kind);
 
 /// Reads an STL, OBJ, PLY or OFF file; vertices at the same place become one, triangles without
-/// area by that are dropped. Throws std::invalid_argument for what is missing, unreadable, without
-/// triangles, or has coordinates that are not finite.
+/// area by that and vertices that no triangle uses are dropped. Throws std::invalid_argument for
+/// what is missing, unreadable, without triangles, or has coordinates that are not finite.
 TriangleMesh read_mesh(const std::string& path);
 
 /// Merges vertices not farther apart than `distance` and drops the triangles that this collapses.
 void merge_vertices(TriangleMesh& mesh, double distance);
 
+/// Drops the vertices that no triangle uses: they would count in boxes.
+void drop_unused_vertices(TriangleMesh& mesh);
+
 /// Makes the mesh the boundary of a solid: winding number above 0 is inside. Repairs, with a note,
 /// what can be meant only one way: vertices that almost coincide, triangles given twice, single
-/// triangles or whole parts that face the wrong way. Parts may be apart, overlap (their union
-/// counts) or lie within each other (facing inwards: a void). Throws std::invalid_argument for a
-/// surface that is open or has no inside. Errors and notes start with a verb ("has 3 open edges").
+/// triangles or whole parts that face the wrong way, parts without volume (left out). Parts may be
+/// apart, overlap (their union counts) or lie within each other (facing inwards: a void). Throws
+/// std::invalid_argument for a surface that is open or has no inside. Errors and notes start with a
+/// verb ("has 3 open edges").
 void make_solid(TriangleMesh& mesh, std::vector<std::string>& notes);
 
 /// Volume that the surface encloses, by the divergence theorem; negative when inside out [m^3].
 double signed_volume(const TriangleMesh& mesh);
+
+/// "did you forget scale: 0.001?" for a mesh of `size` [m] at `scale` that no organ has, below 5 mm
+/// or above 2 m, where another unit makes it one; else "".
+std::string scale_hint(double size, double scale);
 
 /// The solid of a mesh body in world axes: resolved, read, scaled, checked, repaired, posed. Throws
 /// std::invalid_argument, also for a size (longest edge of the bounding box) below 1 mm or above

@@ -65,7 +65,8 @@ bool find_below(const fs::path& folder, const std::string& package, int depth, f
   return false;
 }
 
-fs::path find_package(const std::string& package, const std::string& address) {
+// `what` is what is looked for: "scene package://...".
+fs::path find_package(const std::string& package, const std::string& what) {
   std::error_code error;
   fs::path found;
   for (const fs::path& folder : folders_of("ROS_PACKAGE_PATH")) {
@@ -76,9 +77,8 @@ fs::path find_package(const std::string& package, const std::string& address) {
     const fs::path share = prefix / "share" / package;
     if (fs::is_directory(share, error)) return share;
   }
-  throw std::invalid_argument("mesh " + address + " is in package " + package +
-                              ", which was found neither in " + shown("ROS_PACKAGE_PATH") +
-                              " nor in " + shown("CMAKE_PREFIX_PATH") +
+  throw std::invalid_argument(what + " is in package " + package + ", which was found neither in " +
+                              shown("ROS_PACKAGE_PATH") + " nor in " + shown("CMAKE_PREFIX_PATH") +
                               ": source the setup.bash of its workspace");
 }
 
@@ -99,23 +99,22 @@ std::string decoded(const std::string& s) {
 
 }  // namespace
 
-std::string resolve_mesh_path(const std::string& address) {
-  const std::string file = "file://", package = "package://";
+std::string resolve_path(const std::string& address, const std::string& kind) {
+  const std::string file = "file://", package = "package://", what = kind + " " + address;
   if (address.empty() || address == file) {
-    throw std::invalid_argument("mesh '" + address + "' names no file: give a path");
+    throw std::invalid_argument(kind + " '" + address + "' names no file: give a path");
   }
   if (address.compare(0, file.size(), file) == 0) return decoded(address.substr(file.size()));
   if (address.compare(0, package.size(), package) == 0) {
     const std::string rest = decoded(address.substr(package.size()));
     const std::size_t slash = rest.find('/');
     if (slash == 0 || slash == std::string::npos || slash + 1 == rest.size()) {
-      throw std::invalid_argument("mesh " + address +
-                                  " names no file: write package://<package>/<file>");
+      throw std::invalid_argument(what + " names no file: write package://<package>/<file>");
     }
-    return (find_package(rest.substr(0, slash), address) / rest.substr(slash + 1)).string();
+    return (find_package(rest.substr(0, slash), what) / rest.substr(slash + 1)).string();
   }
   if (address.find("://") != std::string::npos) {
-    throw std::invalid_argument("mesh " + address +
+    throw std::invalid_argument(what +
                                 " cannot be fetched: give a plain path, file:// or package://");
   }
   return address;

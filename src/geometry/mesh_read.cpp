@@ -7,10 +7,13 @@
 #include <cmath>
 #include <cstdint>
 #include <filesystem>
+#include <fstream>
+#include <sstream>
 #include <stdexcept>
 #include <unordered_map>
 
 #include "geometry/mesh.h"
+#include "geometry/stl.h"
 
 namespace tissue_sim {
 namespace {
@@ -53,10 +56,37 @@ void append(const aiScene& scene, const aiNode& node, aiMatrix4x4 transform, Tri
   }
 }
 
-bool readable(const std::filesystem::path& path) {
+/// In small letters.
+std::string extension_of(const std::filesystem::path& path) {
   std::string extension = path.extension().string();
   for (char& c : extension) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+  return extension;
+}
+
+bool readable(const std::filesystem::path& path) {
+  const std::string extension = extension_of(path);
   return extension == ".stl" || extension == ".obj" || extension == ".ply" || extension == ".off";
+}
+
+TriangleMesh read_by_assimp(const std::string& path) {
+  Assimp::Importer importer;
+  const aiScene* scene = importer.ReadFile(path, aiProcess_Triangulate);
+  if (!scene || !scene->mRootNode) {
+    throw std::invalid_argument(std::string("cannot be read (") + importer.GetErrorString() +
+                                "): export it again as a binary STL");
+  }
+  TriangleMesh mesh;
+  append(*scene, *scene->mRootNode, aiMatrix4x4(), mesh);
+  return mesh;
+}
+
+std::string bytes_of(const std::string& path) {
+  std::ifstream file(path, std::ios::binary);
+  std::ostringstream bytes;
+  if (!file || !(bytes << file.rdbuf())) {
+    throw std::invalid_argument("cannot be read: check its permissions");
+  }
+  return bytes.str();
 }
 
 }  // namespace
@@ -103,6 +133,23 @@ void merge_vertices(TriangleMesh& mesh, double distance) {
   mesh.triangles.swap(triangles);
 }
 
+void drop_unused_vertices(TriangleMesh& mesh) {
+  std::vector<int> index(mesh.vertices.size(), -1);
+  for (const auto& t : mesh.triangles) {
+    for (int v : t) index[v] = 0;
+  }
+  int kept = 0;
+  for (std::size_t v = 0; v < mesh.vertices.size(); ++v) {
+    if (index[v] < 0) continue;
+    mesh.vertices[kept] = mesh.vertices[v];
+    index[v] = kept++;
+  }
+  mesh.vertices.resize(kept);
+  for (auto& t : mesh.triangles) {
+    for (int& v : t) v = index[v];
+  }
+}
+
 TriangleMesh read_mesh(const std::string& path) {
   const std::string what = "mesh " + path;
   std::error_code error;
@@ -118,20 +165,19 @@ TriangleMesh read_mesh(const std::string& path) {
   if (std::filesystem::file_size(path, error) == 0) {
     throw std::invalid_argument(what + " is empty: export it again");
   }
-  Assimp::Importer importer;
-  const aiScene* scene = importer.ReadFile(path, aiProcess_Triangulate);
-  if (!scene || !scene->mRootNode) {
-    throw std::invalid_argument(what + " cannot be read (" + importer.GetErrorString() +
-                                "): export it again as a binary STL");
-  }
   TriangleMesh mesh;
-  append(*scene, *scene->mRootNode, aiMatrix4x4(), mesh);
+  try {
+    mesh = extension_of(path) == ".stl" ? read_stl(bytes_of(path)) : read_by_assimp(path);
+  } catch (const std::invalid_argument& e) {
+    throw std::invalid_argument(what + " " + e.what());
+  }
   for (std::size_t v = 0; v < mesh.vertices.size(); ++v) {
     if (mesh.vertices[v].allFinite()) continue;
     throw std::invalid_argument(what + " has coordinates that are not finite (vertex " +
                                 std::to_string(v) + "): repair it");
   }
   merge_vertices(mesh, 0);
+  drop_unused_vertices(mesh);
   if (mesh.triangles.empty()) {
     throw std::invalid_argument(what + " has no triangles: export a surface");
   }

@@ -1,10 +1,12 @@
 #include "ros/markers.h"
 
 #include <algorithm>
-#include <array>
+#include <cstdint>
 #include <cstdio>
 
+#include "fragments/piece_colour.h"
 #include "ros/conversions.h"
+#include "ros/force_arrow.h"
 
 namespace tissue_sim {
 namespace {
@@ -21,18 +23,10 @@ std_msgs::ColorRGBA color(float r, float g, float b, float a = 1) {
   return c;
 }
 
-// A piece's colour, the same for ever; ids next to each other look different.
-std_msgs::ColorRGBA piece_color(int id, float alpha) {
-  static const std::array<std::array<float, 3>, 8> kPalette = {{{0.90f, 0.35f, 0.30f},
-                                                                {0.25f, 0.55f, 0.90f},
-                                                                {0.35f, 0.75f, 0.35f},
-                                                                {0.95f, 0.70f, 0.20f},
-                                                                {0.60f, 0.40f, 0.80f},
-                                                                {0.25f, 0.75f, 0.75f},
-                                                                {0.85f, 0.50f, 0.70f},
-                                                                {0.60f, 0.60f, 0.35f}}};
-  const std::array<float, 3>& c = kPalette[static_cast<std::size_t>(id) % kPalette.size()];
-  return color(c[0], c[1], c[2], alpha);
+std_msgs::ColorRGBA color(std::uint32_t rgb, float alpha) {
+  return color(static_cast<float>(rgb >> 16 & 0xff) / 255,
+               static_cast<float>(rgb >> 8 & 0xff) / 255, static_cast<float>(rgb & 0xff) / 255,
+               alpha);
 }
 
 Marker marker(const MarkerInput& input, const std::string& ns, int id, int type) {
@@ -101,23 +95,22 @@ void add_tool(const MarkerInput& input, std::size_t i, MarkerArray& array) {
 
 void add_force(const MarkerInput& input, std::size_t i, MarkerArray& array) {
   const std::string ns = input.scene.tools[i].name + "/force";
-  const Vec3 tip = input.tools[i].end.position;
   const Vec3 force = input.loads[i].mean.force;
-  const double length = force.norm() * input.force_scale;
-  if (!(length > 1e-3)) {
+  ForceArrow at;
+  if (!place_force_arrow(input.scene.tools[i], input.tools[i].end, force, input.force_scale,
+                         input.fragments, at)) {
     array.markers.push_back(deleted(input, ns, 0));
     array.markers.push_back(deleted(input, ns, 1));
     return;
   }
   Marker arrow = marker(input, ns, 0, Marker::ARROW);
-  arrow.points = {to_point(tip), to_point(tip + force * input.force_scale)};
-  const double shaft = std::min(0.003, 0.1 * length);
-  arrow.scale = scale(shaft, 2 * shaft, std::min(0.3 * length, 4 * shaft));
+  arrow.points = {to_point(at.start), to_point(at.end)};
+  arrow.scale = scale(0.6 * at.unit, 1.5 * at.unit, 1.8 * at.unit);  // shaft, head, its length
   arrow.color = color(1.0f, 0.85f, 0.1f);
   array.markers.push_back(arrow);
   Marker text = marker(input, ns, 1, Marker::TEXT_VIEW_FACING);
-  text.pose.position = to_point(tip + force * input.force_scale + Vec3(0, 0, 0.005));
-  text.scale.z = 0.006;
+  text.pose.position = to_point(at.label);
+  text.scale.z = at.text_height;
   char newton[32];
   std::snprintf(newton, sizeof newton, "%.2f N", force.norm());
   text.text = newton;
@@ -128,7 +121,8 @@ void add_force(const MarkerInput& input, std::size_t i, MarkerArray& array) {
 void add_fragment(const MarkerInput& input, const Fragment& f, int id, MarkerArray& array) {
   Marker box = marker(input, "fragments/box", id, Marker::LINE_LIST);
   box.scale.x = 0.0005;
-  box.color = piece_color(f.id, 0.8f);
+  const std::uint32_t colour = piece_colour(f);
+  box.color = color(colour, 0.8f);
   for (int corner = 0; corner < 8; ++corner) {
     const auto at = [&](int c) {
       return to_point(Vec3(c & 1 ? f.box.max.x() : f.box.min.x(),
@@ -149,7 +143,7 @@ void add_fragment(const MarkerInput& input, const Fragment& f, int id, MarkerArr
   std::snprintf(text, sizeof text, "%d: %.2f cm3%s", f.id, f.volume * 1e6,
                 f.loose ? ", loose" : "");
   label.text = text;
-  label.color = piece_color(f.id, 1);
+  label.color = color(tinted(colour, 0.4), 1);  // thin letters need more light than boxes
   array.markers.push_back(label);
 }
 

@@ -230,7 +230,7 @@ Scene read_scene_parameters(const ros::NodeHandle& node) {
   }
   const bool text = has_tree && tree.getType() == XmlRpcValue::TypeString;
   Scene scene = !file.empty()
-                    ? load_scene(resolve_mesh_path(file))
+                    ? load_scene(resolve_path(file, "scene"))
                     : scene_from_yaml(text ? static_cast<std::string&>(tree) : yaml_from(tree));
   read(node, "mesh", mesh, "must be the path of a mesh file");
   read(node, "mesh_scale", scale, 1e-9, 1e9);

@@ -187,7 +187,7 @@ bool Services::load_scene(LoadScene::Request& request, LoadScene::Response& resp
     }
     const std::lock_guard<std::mutex> lock(rebuilding_);
     const Scene scene = request.yaml.empty()
-                            ? tissue_sim::load_scene(resolve_mesh_path(request.path))
+                            ? tissue_sim::load_scene(resolve_path(request.path, "scene"))
                             : scene_from_yaml(request.yaml);
     simulation_.replace(make_session_(scene));
     scene_ = scene;

@@ -215,9 +215,15 @@ Scene load_scene(const std::string& path) {
   std::ifstream file(path);
   std::ostringstream text;
   if (!file || !(text << file.rdbuf())) {  // an empty file fails here too
-    const bool there = fs::exists(path, error);
-    throw std::invalid_argument(path + (there ? ": cannot be read or is empty, give a scene"
-                                              : ": no such file, give the path of a scene"));
+    if (fs::exists(path, error)) {
+      throw std::invalid_argument(path + ": cannot be read or is empty, give a scene");
+    }
+    if (fs::path(path)
+            .is_relative()) {  // launched nodes run in ~/.ros, whatever the caller's folder
+      throw std::invalid_argument(path + ": no such file in " + fs::current_path(error).string() +
+                                  ", the folder that this program runs in, give the full path");
+    }
+    throw std::invalid_argument(path + ": no such file, give the path of a scene");
   }
   Scene scene;
   try {

@@ -44,12 +44,25 @@ class Variable {
 };
 
 TEST(MeshAddress, PlainAndFile) {
-  EXPECT_EQ(resolve_mesh_path("/a/b c.stl"), "/a/b c.stl");
-  EXPECT_EQ(resolve_mesh_path("b%20c.stl"), "b%20c.stl");
-  EXPECT_EQ(resolve_mesh_path("file:///a/b%20c.stl"), "/a/b c.stl");
-  EXPECT_TRUE(contains(reason_of([] { resolve_mesh_path(""); }), "names no file"));
+  EXPECT_EQ(resolve_path("/a/b c.stl", "mesh"), "/a/b c.stl");
+  EXPECT_EQ(resolve_path("b%20c.stl", "mesh"), "b%20c.stl");
+  EXPECT_EQ(resolve_path("file:///a/b%20c.stl", "mesh"), "/a/b c.stl");
+  EXPECT_TRUE(contains(reason_of([] { resolve_path("", "mesh"); }), "names no file"));
   EXPECT_TRUE(
-      contains(reason_of([] { resolve_mesh_path("http://a/b.stl"); }), "cannot be fetched"));
+      contains(reason_of([] { resolve_path("http://a/b.stl", "mesh"); }), "cannot be fetched"));
+}
+
+TEST(MeshAddress, IsCalledWhatItIsOf) {
+  EXPECT_EQ(
+      reason_of([] {
+        resolve_path("package://nosuch/a.yaml", "scene");
+      }).rfind("scene package://nosuch/a.yaml is in package nosuch, which was found neither", 0),
+      0u);
+  EXPECT_EQ(reason_of([] {
+              resolve_path("http://a/b.yaml", "scene");
+            }).rfind("scene http://a/b.yaml cannot be fetched", 0),
+            0u);
+  EXPECT_EQ(reason_of([] { resolve_path("", "scene"); }).rfind("scene '' names no file", 0), 0u);
 }
 
 TEST(MeshAddress, PackagesAreFoundOnTheRosPackagePath) {
@@ -59,16 +72,17 @@ TEST(MeshAddress, PackagesAreFoundOnTheRosPackagePath) {
   const std::string found = folder.path() + "/src/repository/organs_folder/meshes/a.stl";
   {
     const Variable path("ROS_PACKAGE_PATH", "/not/there:" + folder.path() + "/src");
-    EXPECT_EQ(resolve_mesh_path("package://organs/meshes/a.stl"), found);
+    EXPECT_EQ(resolve_path("package://organs/meshes/a.stl", "mesh"), found);
   }
   {
     const Variable path("ROS_PACKAGE_PATH", folder.path() + "/src/repository/organs_folder");
-    EXPECT_EQ(resolve_mesh_path("package://organs/meshes/a.stl"), found);
-    const std::string reason = reason_of([] { resolve_mesh_path("package://other/a.stl"); });
+    EXPECT_EQ(resolve_path("package://organs/meshes/a.stl", "mesh"), found);
+    const std::string reason = reason_of([] { resolve_path("package://other/a.stl", "mesh"); });
     EXPECT_TRUE(contains(reason, "package other")) << reason;
     EXPECT_TRUE(contains(reason, "ROS_PACKAGE_PATH (" + folder.path())) << reason;
   }
-  EXPECT_TRUE(contains(reason_of([] { resolve_mesh_path("package://organs"); }), "names no file"));
+  EXPECT_TRUE(
+      contains(reason_of([] { resolve_path("package://organs", "mesh"); }), "names no file"));
 }
 
 TEST(MeshAddress, InstalledPackagesAreFoundOnTheCmakePrefixPath) {
@@ -76,7 +90,7 @@ TEST(MeshAddress, InstalledPackagesAreFoundOnTheCmakePrefixPath) {
   folder.write("share/organs/package.xml", "");
   const Variable ros("ROS_PACKAGE_PATH", "");
   const Variable cmake("CMAKE_PREFIX_PATH", "/not/there:" + folder.path());
-  EXPECT_EQ(resolve_mesh_path("package://organs/a.stl"), folder.path() + "/share/organs/a.stl");
+  EXPECT_EQ(resolve_path("package://organs/a.stl", "mesh"), folder.path() + "/share/organs/a.stl");
 }
 
 }  // namespace

@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <cctype>
 #include <functional>
 
 #include "temporary_folder.h"
@@ -80,6 +81,77 @@ TEST(MeshFile, IsRefusedWithItsPathAndReason) {
   }
 }
 
+TEST(MeshFile, StlIsReadWithBytesAfterItsLastTriangle) {
+  const TemporaryFolder folder;
+  const TriangleMesh box = box_mesh(kLow, kHigh);
+  std::string solid = binary_stl(box), streamed = binary_stl(box);
+  solid.replace(0, 12, "solid kidney");  // as many programs begin a binary one
+  streamed.replace(80, 4, 4, '\0');      // as those leave it that know the count at the end only
+  std::string text = stl_text(box);
+  for (char& c : text) c = static_cast<char>(std::toupper(static_cast<unsigned char>(c)));
+  std::string windows = "\xEF\xBB\xBF" + stl_text(box), normals = stl_text(box);
+  for (std::size_t at = 0; (at = windows.find('\n', at)) != std::string::npos; at += 2) {
+    windows.replace(at, 1, "\r\n");
+  }
+  for (std::size_t at = 0; (at = normals.find("normal 0 0 0", at)) != std::string::npos; ++at) {
+    normals.replace(at, 12, "normal -nan(ind) -nan(ind) nan");
+  }
+  std::string named = stl_text(box);
+  named.replace(0, 10, "solid vertex of a solid");
+  const std::string half = stl_text(box_mesh(kLow, kHigh / 2)), zeros(20, '\0');
+  const std::pair<const char*, std::string> cases[] = {
+      {"one byte", binary_stl(box) + '\0'},
+      {"a triangle's worth of bytes", binary_stl(box) + std::string(50, 'x')},
+      {"many bytes", binary_stl(box) + std::string(100000, '\1')},
+      {"header solid", solid},
+      {"header solid and bytes", solid + "signed by a program"},
+      {"no count", streamed},
+      {"capitals", text},
+      {"capitals, zeros after them", text + zeros},
+      {"Windows", windows},
+      {"normals that are none", normals},
+      {"a name of keywords", named},
+  };
+  for (const auto& c : cases) {
+    const TriangleMesh mesh = read_mesh(folder.write("a.stl", c.second));
+    EXPECT_EQ(mesh.vertices.size(), 8u) << c.first;
+    EXPECT_EQ(mesh.triangles.size(), 12u) << c.first;
+    EXPECT_NEAR(signed_volume(mesh), 0.006, 1e-8) << c.first;
+  }
+  EXPECT_EQ(read_mesh(folder.write("two.stl", text + half)).triangles.size(), 24u);
+}
+
+TEST(MeshFile, StlThatIsCutOffOrNoneSaysSo) {
+  const TemporaryFolder folder;
+  const std::string binary = binary_stl(box_mesh(kLow, kHigh));
+  const std::string text = stl_text(box_mesh(kLow, kHigh));
+  const std::size_t last = text.rfind("endloop");
+  const std::pair<std::string, const char*> cases[] = {
+      {binary.substr(0, 84 + 50 * 7 + 30), "ends after 7 of the 12 triangles"},
+      {"solid" + binary.substr(5, 84 + 50 * 7), "ends after 7 of the 12 triangles"},
+      {binary.substr(0, 80) + std::string(4, '\0'), "has no triangles"},
+      {text.substr(0, last), "ends within facet 12"},
+      {text.substr(0, last) + "vertex 0 0 0\n" + text.substr(last), "has 4 corners in facet 12"},
+      {"solid\nfacet\nouter loop\nvertex 0 0\nendloop", "has a vertex in facet 1"},
+      {"solid\nendsolid\n", "has no triangles"},
+      {std::string(200, 'x'), "is no STL file"},
+      {"ply", "is no STL file"},
+  };
+  for (const auto& c : cases) {
+    const std::string path = folder.write("a.stl", c.first);
+    const std::string reason = reason_of([&] { read_mesh(path); });
+    EXPECT_EQ(reason.rfind("mesh " + path + " " + c.second, 0), 0u) << reason;
+  }
+}
+
+TEST(MeshFile, HasNoVerticesThatNoTriangleUses) {
+  const TemporaryFolder folder;
+  const std::string path =
+      folder.write("a.obj", obj_text(box_mesh(kLow, kHigh)) + "v 1e6 0 0\np 9\n");
+  EXPECT_EQ(read_mesh(path).vertices.size(), 8u);
+  EXPECT_NO_THROW(load_solid(mesh_body(path), nullptr)) << "of absurd size";
+}
+
 TEST(MeshFile, IsNamedByItsFullPathWhenMissing) {
   const std::string reason = reason_of([] { load_solid(mesh_body("nowhere/a.stl"), nullptr); });
   EXPECT_TRUE(contains(reason, std::filesystem::current_path().string() + "/nowhere/a.stl"))
@@ -136,6 +208,28 @@ TEST(MakeSolid, KeepsVoids) {
   EXPECT_TRUE(contains(r.notes, "voids")) << r.notes;
   r = repaired(both(inner, outer));
   EXPECT_TRUE(contains(r.notes, "face outwards: they change nothing")) << r.notes;
+}
+
+TEST(MakeSolid, LeavesSliversOut) {
+  const TriangleMesh ball = icosphere(kLow, 0.1, 2);
+  const double volume = signed_volume(ball);
+  // A triangle and its back, a needle of single precision's thickness, inside out and within, and a
+  // crumb.
+  TriangleMesh back;
+  back.vertices = {Vec3(0.3, 0, 0), Vec3(0.4, 0, 0), Vec3(0.3, 0.1, 0)};
+  back.triangles = {{0, 1, 2}, {0, 2, 1}};
+  const TriangleMesh needle = inverted(box_mesh(Vec3(-0.01, -0.01, 0), Vec3(0.01, 0.01, 1e-8)));
+  const TriangleMesh crumb = icosphere(Vec3(0.2, 0, 0), 5e-5, 1);
+  const Repaired r = repaired(both(both(both(back, needle), ball), crumb));
+  EXPECT_EQ(r.notes, "had 3 slivers without volume: left out\n");
+  EXPECT_NEAR(signed_volume(r.mesh), volume, 1e-15);
+  EXPECT_EQ(r.mesh.triangles.size(), ball.triangles.size());
+  EXPECT_EQ(r.mesh.vertices.size(), ball.vertices.size());
+  // A thin sheet and a thin vessel are tissue.
+  EXPECT_EQ(repaired(both(ball, box_mesh(Vec3(0.3, 0, 0), Vec3(0.4, 0.1, 1e-4)))).notes,
+            "has 2 separate parts: all are taken\n");
+  EXPECT_EQ(repaired(both(ball, box_mesh(Vec3(0.3, 0, 0), Vec3(0.5, 2e-4, 2e-4)))).notes,
+            "has 2 separate parts: all are taken\n");
 }
 
 TEST(MakeSolid, RefusesOpenSurfacesWithTheNumberOfOpenEdges) {
@@ -241,6 +335,23 @@ TEST(LoadSolid, RefusesAbsurdSizesAndSuggestsAScale) {
   body.scale = 0.001;
   reason = reason_of([&] { load_solid(body, nullptr); });
   EXPECT_TRUE(contains(reason, "did you forget scale: 1?")) << reason;
+}
+
+// A mesh of 6.5 m is no organ at scale 1: loaded, for it may be meant, and said.
+TEST(LoadSolid, SaysWhereTheScaleMustBeWrong) {
+  const TemporaryFolder folder;
+  const auto notes_of = [&](double edge, double scale) {
+    Body body = mesh_body(folder.write("a.stl", stl_text(box_mesh(kLow, Vec3::Constant(edge)))));
+    body.scale = scale;
+    std::vector<std::string> notes;
+    load_solid(body, &notes);
+    return notes.empty() ? "" : notes[0].substr(notes[0].rfind(".stl ") + 5);
+  };
+  EXPECT_EQ(notes_of(6.5, 1), "is 6.5 m long at scale 1: did you forget scale: 0.01?");
+  EXPECT_EQ(notes_of(0.2, 0.01), "is 0.002 m long at scale 0.01: did you forget scale: 1?");
+  EXPECT_EQ(notes_of(1.9, 1), "");
+  EXPECT_EQ(notes_of(120, 0.001), "");
+  EXPECT_EQ(notes_of(4, 0.001), "is 0.004 m long at scale 0.001: did you forget scale: 0.01?");
 }
 
 TEST(LoadSolid, RefusesASheetWithoutVolume) {

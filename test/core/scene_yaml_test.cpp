@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <filesystem>
 
 #include "temporary_folder.h"
 #include "test_scenes.h"
@@ -179,6 +180,12 @@ TEST(LoadScene, PutsThePathInFront) {
             0u);
   EXPECT_NE(reason_of([&] { load_scene(folder.write("empty.yaml", "")); }).find("is empty"),
             std::string::npos);
+}
+
+TEST(LoadScene, SaysWhereARelativePathWasLookedFor) {
+  EXPECT_EQ(reason_of([] { load_scene("nowhere/scene.yaml"); }),
+            "nowhere/scene.yaml: no such file in " + std::filesystem::current_path().string() +
+                ", the folder that this program runs in, give the full path");
 }
 
 TEST(LoadScene, TakesMeshPathsRelativeToTheFile) {

@@ -264,5 +264,43 @@ TEST(Lattice, RefusesWhatHasNoOrTooManyPoints) {
             std::string::npos);
 }
 
+TEST(Lattice, SaysThatAMeshInAnotherUnitIsNoMatterOfCellSize) {
+  const TemporaryFolder folder;
+  Body body = shaped(Shape::kMesh);
+  body.mesh = folder.write("a.stl", stl_text(box_mesh(Vec3(0, 0, 0), Vec3(6.5, 6, 5))));
+  const std::string reason = reason_of([&] { make_lattice(body, 0.003, nullptr); });
+  EXPECT_NE(reason.find("did you forget scale: 0.01? Else raise cell_size"), std::string::npos)
+      << reason;
+}
+
+TEST(Lattice, WarnsOfABodyWithFewerThanTwoPointsAcross) {
+  const auto note = [](Body body, double cell_size) {
+    std::vector<std::string> notes;
+    make_lattice(body, cell_size, &notes);
+    return notes.empty() ? "" : notes.back();
+  };
+  Body sheet = shaped(Shape::kBox);
+  for (int axis = 0; axis < 3; ++axis) {
+    sheet.size = Vec3(0.06, 0.042, 0.03);
+    sheet.size[axis] = 0.0012;
+    const std::string said = note(sheet, 0.003);
+    EXPECT_EQ(said, std::string("body 'tissue': has fewer than two points across (0.8 along ") +
+                        "xyz"[axis] +
+                        " on the mean, 1.2 mm thick, at cell_size 0.003 m): it hardly resists "
+                        "bending; lower cell_size to 0.0012");
+    EXPECT_EQ(note(sheet, 0.0012), "") << "what it says to do";
+  }
+  sheet.pose.orientation = tilted();  // fewer than two points, whatever its slant
+  EXPECT_NE(note(sheet, 0.003), "");
+  Body ball = shaped(Shape::kBall);
+  ball.radius = 0.002;
+  EXPECT_NE(note(ball, 0.004), "") << "eight points that are not full";
+  EXPECT_EQ(note(ball, 0.002), "") << "four across";
+  EXPECT_EQ(note(shaped(Shape::kBall), 0.003), "");
+  Body plate = shaped(Shape::kCylinder);
+  plate.height = 0.0031;
+  EXPECT_EQ(note(plate, 0.003), "");
+}
+
 }  // namespace
 }  // namespace tissue_sim

@@ -1,0 +1,19 @@
+// The parts of a closed triangle mesh: what is connected across edges.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "geometry/mesh.h"
+
+namespace tissue_sim {
+
+/// Leaves parts without volume out, with a note, unless the mesh is nothing else: as parts, voids
+/// or parts inside out they would be counted, and mean nothing.
+void drop_slivers(TriangleMesh& mesh, std::vector<std::string>& notes);
+
+/// Turns parts that are inside out around, with a note: outermost ones must face outwards, and what
+/// lies in them turns with them. Notes, too, which parts are apart, voids, or without effect.
+void turn_outwards(TriangleMesh& mesh, std::vector<std::string>& notes);
+
+}  // namespace tissue_sim

@@ -106,4 +106,9 @@ struct BlockKernels {
 
 const BlockKernels& block_kernels(InstructionSet set);
 
+// One file each: block_kernels_*.cpp. Those of AVX only on x86-64.
+const BlockKernels& block_kernels_sse2();
+const BlockKernels& block_kernels_avx2();
+const BlockKernels& block_kernels_avx512();
+
 }  // namespace tissue_sim

@@ -77,7 +77,7 @@ class SimulationThread {
 
   RunStatus status() const;
   std::shared_ptr<ToolInputs> tools() const;
-  /// Names of the topics that a recording holds unless others are asked for: all but markers.
+  /// Names of the topics that a recording holds unless others are asked for: all.
   std::set<std::string> topics() const;
 
  private:

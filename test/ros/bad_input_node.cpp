@@ -115,6 +115,83 @@ TEST_F(Poses, JawThatIsNotFiniteIsRefused) {
   expect_refused("jaw angles refused", [&] { jaws.publish(sensor_msgs::JointState()); });
 }
 
+// The message of a part of the node in diagnostics.
+std::string said(const Topic<diagnostic_msgs::DiagnosticArray>& diagnostics,
+                 const std::string& part) {
+  const auto m = diagnostics.next();
+  for (const auto& s : m ? m->status : diagnostic_msgs::DiagnosticArray().status) {
+    if (s.name == "simulator: " + part) return (s.level == s.OK ? "OK: " : "WARN: ") + s.message;
+  }
+  return "";
+}
+
+TEST_F(Poses, DiagnosticsNamesTheTopicWhereNoneEverCame) {
+  const std::string text = said(diagnostics_, "tools");
+  EXPECT_EQ(text.find("WARN: "), 0u) << text;
+  EXPECT_NE(text.find("no pose ever came on /simulator/needle/measured_cp (0 publishers)"),
+            std::string::npos)
+      << text;
+  EXPECT_EQ(text.find("probe:"), std::string::npos) << "that one is driven; " << text;
+}
+
+TEST_F(Poses, DiagnosticsSaysThatAPublisherIsGone) {
+  ros::WallDuration(2.5).sleep();
+  EXPECT_TRUE(wait_until([&] {
+    return said(diagnostics_, "tools").find("probe: no pose on") != std::string::npos;
+  }));
+}
+
+TEST_F(Poses, DiagnosticsSaysThatPosesAreInMillimetres) {
+  EXPECT_TRUE(wait_until([&] {
+    probe_.send(at(10.0, 72.0));
+    ros::WallDuration(0.02).sleep();
+    return is_at(at(10.0, 72.0));
+  }));
+  EXPECT_TRUE(wait_until([&] {
+    probe_.send(at(10.0, 72.0));
+    const std::string text = said(diagnostics_, "tools");
+    return text.find("from all tissue; positions divided by 1000") != std::string::npos;
+  }));
+}
+
+TEST_F(Poses, AStampThatStaysTheSameIsBelieved) {
+  const ros::Time stamp = ros::Time::now() - ros::Duration(5);
+  const Pose away = at(0.12);
+  EXPECT_TRUE(wait_until(
+      [&] {
+        probe_.send(away, "", stamp);
+        ros::WallDuration(0.02).sleep();
+        return is_at(away);
+      },
+      3));
+}
+
+TEST_F(Poses, RoundedQuaternionsAreNormalised) {
+  const int before = refused("poses refused, no rotation");
+  const Pose away{at(0.13).position, Quat(0, 0.99, 0, 0)};
+  EXPECT_TRUE(wait_until(
+      [&] {
+        probe_.send(away);
+        ros::WallDuration(0.02).sleep();
+        return is_at(away);
+      },
+      3));
+  EXPECT_NEAR(from_message(inputs_.last()->tools[1].end).orientation.norm(), 1, 1e-9);
+  EXPECT_EQ(refused("poses refused, no rotation"), before);
+}
+
+TEST_F(Poses, JawInDegreesIsRefused) {
+  ros::NodeHandle node;
+  ros::Publisher jaws =
+      node.advertise<sensor_msgs::JointState>("/simulator/probe/jaw/measured_js", 10);
+  ASSERT_TRUE(wait_until([&] { return jaws.getNumSubscribers() > 0; }));
+  expect_refused("jaw angles refused", [&] {
+    sensor_msgs::JointState m;
+    m.position = {60};
+    jaws.publish(m);
+  });
+}
+
 TEST_F(Poses, AnArmThatStaysAtItsNewPlaceIsPlacedThereWithoutSweeping) {
   const Pose away = at(40.0);
   for (int i = 0; i < 30 && !is_at(away); ++i) {

@@ -46,7 +46,8 @@ class PoseCheck {
   /// A pose that is older than the last one or too far from it is refused. When kStay of them in a
   /// row, over kStayTime at least, agree among themselves, the arm really is there (its driver was
   /// started anew, somebody moved it while nobody looked): the tool is placed there. So it is at the
-  /// second old pose whose stamp goes on as time does: a bag that loops, a clock that was set back.
+  /// second old pose whose stamp goes on as time does: a bag that loops, at whatever rate
+  /// up to ten times, a clock that was set back.
   /// And so it is when nothing came for kSilence and the arm is now farther than it comes in one
   /// frame. Stamps may stay the same: then the time when poses came counts.
   Verdict check(Pose& pose, double stamp, double now);

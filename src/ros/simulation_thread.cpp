@@ -41,6 +41,7 @@ void SimulationThread::start_session() {
     cut.reply.set_value({false, "the simulation was started anew", {}});
   }
   motion_.assign(scene.tools.size(), ToolMotion());
+  entries_.assign(scene.tools.size(), ToolEntry());
   pace_.emplace(scene.frame_rate);
   pace_->restart(WallClock::now());
   real_time_factor_.restart();
@@ -104,10 +105,16 @@ void SimulationThread::move_tools(AppliedInput& input) {
     input.grip_pressures[i] = sample->grip_pressure;
     // What an arm did during a pause must not cut a straight line through the tissue now.
     const bool strayed = resumed_ && (m.end.position - m.begin.position).norm() > reach;
-    if (!m.present || sample->placed || strayed) {
-      m.begin = m.end;
+    const Scene& scene = session_.simulation->scene();
+    const bool placed = !m.present || sample->placed || strayed;
+    if (placed) {
+      const std::string note = entries_[i].place(scene.tools[i], m.end, m.jaw_end, scene.cell_size,
+                                                 session_.simulation->tissue());
+      if (!note.empty()) ROS_WARN("%s", note.c_str());
       m.jaw_begin = m.jaw_end;
     }
+    m.end = entries_[i].next(m.end, 1 / scene.frame_rate);
+    if (placed) m.begin = m.end;
     m.present = true;
   }
   resumed_ = false;

@@ -5,6 +5,7 @@
 #include <sensor_msgs/JointState.h>
 #include <sensor_msgs/PointCloud2.h>
 #include <sys/wait.h>
+#include <unistd.h>
 #include <tissue_sim/LoadScene.h>
 
 #include <algorithm>
@@ -281,11 +282,12 @@ struct Ended {
   std::string output;
 };
 
-// Runs a node that should end by itself; it lies where this test does.
-Ended run(const std::string& arguments) {
+// Runs a node that should end by itself, or until `seconds` have passed; it lies where this test does.
+Ended run(const std::string& arguments, int seconds = 20) {
   const std::string node =
       (std::filesystem::read_symlink("/proc/self/exe").parent_path() / "simulator_node").string();
-  const std::string command = "timeout 20 '" + node + "' __name:=broken " + arguments + " 2>&1";
+  const std::string command = "timeout -s INT " + std::to_string(seconds) + " '" + node +
+                              "' __name:=broken " + arguments + " 2>&1";
   FILE* pipe = popen(command.c_str(), "r");
   Ended ended{-1, ""};
   char part[256];
@@ -321,7 +323,23 @@ TEST(Start, BadParametersAreRefusedWithTheirName) {
   expect_cannot_start(scene + "_time:=lockstep", "~time is \"lockstep\": must be wall");
   expect_cannot_start(scene + "_paused:=2", "~paused is 2");
   expect_cannot_start(scene + "_scene_file:=/also.yaml", "both set");
+  expect_cannot_start(scene + "'_tools:={probe: {interpolate: cubic}}'",
+                      "~tools/probe/interpolate is \"cubic\": must be none or linear");
   expect_cannot_start(scene + "_mesh:=/nowhere.obj", "/nowhere.obj");
+}
+
+TEST(Start, WithoutAClockARecordingWaitsAndTheNextRunDoesNotInheritIt) {
+  namespace fs = std::filesystem;
+  const fs::path folder = fs::temp_directory_path() / ("no_clock_" + std::to_string(getpid()));
+  ros::param::set("/use_sim_time", true);
+  const Ended ended = run("'_scene:={cell_size: 0.005, bodies: [{shape: box}]}' _record:=true "
+                          "_recording_folder:=" + folder.string(), 6);
+  ros::param::del("/use_sim_time");
+  EXPECT_NE(ended.output.find("the recording waits"), std::string::npos) << ended.output;
+  EXPECT_TRUE(!fs::exists(folder) || fs::is_empty(folder)) << "nothing of 1970";
+  EXPECT_FALSE(ros::param::has("/broken/record"));
+  fs::remove_all(folder);
+  ros::param::del("/broken");
 }
 
 TEST(Start, BadTreesOfParametersAreRefusedLikeYaml) {

@@ -125,8 +125,9 @@ void Simulation::apply(const AppliedInput& input) {
   for (const BladePath& path : input.cuts) check(path);
   state_->tools = input.tools;
   if (!input.grip_pressures.empty() && input.grip_pressures.size() != input.tools.size()) {
-    throw std::invalid_argument("grip_pressures has " + std::to_string(input.grip_pressures.size()) +
-                                " values for " + std::to_string(input.tools.size()) + " tools");
+    throw std::invalid_argument("grip_pressures has " +
+                                std::to_string(input.grip_pressures.size()) + " values for " +
+                                std::to_string(input.tools.size()) + " tools");
   }
   for (const double pressure : input.grip_pressures) check_grip(pressure);
   state_->grip_pressures = input.grip_pressures;

@@ -44,9 +44,9 @@ class Frames {
   std::string world_;
   double tolerance_;
   tf2::BufferCore buffer_;
-  std::map<std::string, std::string> warned_;    // by child: of what
-  std::map<std::string, ros::Time> newest_;      // by child: stamp of what came last
-  ros::Time now_;                                // when something came last
+  std::map<std::string, std::string> warned_;  // by child: of what
+  std::map<std::string, ros::Time> newest_;    // by child: stamp of what came last
+  ros::Time now_;                              // when something came last
   ros::CallbackQueue queue_;
   ros::NodeHandle node_;
   ros::Subscriber moving_, static_;

@@ -67,8 +67,9 @@ void Node::record_from_start(const std::string& name) {
   const auto wait = [this, start](const ros::WallTimerEvent&) {
     if (clock_is_missing()) {
       if (waited_++ % 50 == 0) {
-        ROS_WARN("/use_sim_time is set and no /clock has come yet: the recording waits for it, and "
-                 "the simulation with it (rosbag play --clock, or unset /use_sim_time)");
+        ROS_WARN(
+            "/use_sim_time is set and no /clock has come yet: the recording waits for it, and "
+            "the simulation with it (rosbag play --clock, or unset /use_sim_time)");
       }
       return;
     }

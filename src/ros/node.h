@@ -26,8 +26,8 @@ class Node {
 
  private:
   Session make_session(const Scene& scene);
-  /// Starts the recording that the parameters ask for, and the simulation, which stood still so that
-  /// the bag holds frame 0. While there is no /clock it waits for one, and says so.
+  /// Starts the recording that the parameters ask for, and the simulation, which stood still so
+  /// that the bag holds frame 0. While there is no /clock it waits for one, and says so.
   void record_from_start(const std::string& name);
 
   // Queues of their own: a service that takes long does not hold up the poses.

@@ -213,7 +213,8 @@ Parameters read_parameters(const ros::NodeHandle& node) {
   XmlRpcValue tools;
   if (node.getParam("tools", tools)) {
     if (tools.getType() != XmlRpcValue::TypeStruct) {
-      refuse("tools", tools, "must be a map from a tool's name to pose_type, tf_frame and interpolate");
+      refuse("tools", tools,
+             "must be a map from a tool's name to pose_type, tf_frame and interpolate");
     }
     for (auto& tool : tools) p.tools[tool.first] = read_tool(tool.second, "tools/" + tool.first);
   }

@@ -91,8 +91,7 @@ PoseCheck::Verdict PoseCheck::check(Pose& pose, double stamp, double now) {
     // Where it was in the meantime nobody knows, so it must not cut a straight line from there.
     if (elapsed > kSilence && !reachable(last_->pose, pose, 0)) {
       verdict.placed = true;
-      verdict.text =
-          format("it is %.3f m away, after %.1f s without a pose", distance, elapsed, 0);
+      verdict.text = format("it is %.3f m away, after %.1f s without a pose", distance, elapsed, 0);
     }
     last_ = sample;
     candidate_.reset();

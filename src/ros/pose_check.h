@@ -37,7 +37,7 @@ class PoseCheck {
   struct Verdict {
     std::optional<Refusal> refusal;  ///< none: use it
     bool placed = false;  ///< used, but the tool did not come here on a path that it could sweep
-    std::string text;     ///< a sentence why it was refused or placed, with values; "" for the first
+    std::string text;  ///< a sentence why it was refused or placed, with values; "" for the first
   };
 
   /// `stamp` [s] is the pose's own, by whatever clock; `now` [s] when it came, by one that never
@@ -45,11 +45,11 @@ class PoseCheck {
   ///
   /// A pose that is older than the last one or too far from it is refused. When kStay of them in a
   /// row, over kStayTime at least, agree among themselves, the arm really is there (its driver was
-  /// started anew, somebody moved it while nobody looked): the tool is placed there. So it is at the
-  /// second old pose whose stamp goes on as time does: a bag that loops, at whatever rate
-  /// up to ten times, a clock that was set back.
-  /// And so it is when nothing came for kSilence and the arm is now farther than it comes in one
-  /// frame. Stamps may stay the same: then the time when poses came counts.
+  /// started anew, somebody moved it while nobody looked): the tool is placed there. So it is at
+  /// the second old pose whose stamp goes on as time does: a bag that loops, at whatever rate up to
+  /// ten times, a clock that was set back. And so it is when nothing came for kSilence and the arm
+  /// is now farther than it comes in one frame. Stamps may stay the same: then the time when poses
+  /// came counts.
   Verdict check(Pose& pose, double stamp, double now);
   /// Where the stamps are when poses come.
   Verdict check(Pose& pose, double time) { return check(pose, time, time); }
@@ -70,8 +70,8 @@ class PoseCheck {
   bool believed(const Timed& sample, Refusal refusal, std::string& text);
 
   PoseLimits limits_;
-  std::optional<Timed> last_;       // accepted
-  std::optional<Timed> candidate_;  // last of those refused since
+  std::optional<Timed> last_;          // accepted
+  std::optional<Timed> candidate_;     // last of those refused since
   Refusal refusal_ = Refusal::kOlder;  // why
   int stayed_ = 0;
   double since_ = 0;  // when the first of those came that stayed

@@ -5,9 +5,9 @@ namespace tissue_sim {
 std::vector<std::string> useless_remappings(const std::string& node,
                                             const std::set<std::string>& tools,
                                             const std::map<std::string, std::string>& remappings) {
-  static const std::set<std::string> kTopics = {
-      "measured_cp",         "jaw/measured_js", "body/measured_cf",
-      "spatial/measured_cf", "grip_pressure",   "grip"};
+  static const std::set<std::string> kTopics = {"measured_cp",      "jaw/measured_js",
+                                                "body/measured_cf", "spatial/measured_cf",
+                                                "grip_pressure",    "grip"};
   std::set<std::string> wrong;
   const std::string prefix = node + "/";
   for (const auto& remapping : remappings) {
@@ -22,9 +22,9 @@ std::vector<std::string> useless_remappings(const std::string& node,
   for (const std::string& tool : tools) known += (known.empty() ? "" : ", ") + tool;
   std::vector<std::string> warnings;
   for (const std::string& tool : wrong) {
-    warnings.push_back("topics of '" + tool + "' are remapped (tool_1, tool_2 of simulator.launch), " +
-                       "but the scene has no such tool; it has " +
-                       (known.empty() ? "none" : known));
+    warnings.push_back(
+        "topics of '" + tool + "' are remapped (tool_1, tool_2 of simulator.launch), " +
+        "but the scene has no such tool; it has " + (known.empty() ? "none" : known));
   }
   return warnings;
 }

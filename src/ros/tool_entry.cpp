@@ -25,7 +25,8 @@ std::string ToolEntry::place(const Tool& tool, const Pose& pose, double jaw, dou
   char text[200];
   if (left_ < 0) {
     left_ = 0;
-    return tool.name + " is placed within tissue and finds no way out along its shaft: its forces "
+    return tool.name +
+           " is placed within tissue and finds no way out along its shaft: its forces "
            "are those of a tool with tissue on all sides";
   }
   std::snprintf(text, sizeof text,

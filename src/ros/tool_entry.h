@@ -14,8 +14,8 @@ class ToolEntry {
   /// The tool is placed at this pose. Returns what there is to say of it, "" if it is free there.
   std::string place(const Tool& tool, const Pose& pose, double jaw, double cell_size,
                     Tissue& tissue);
-  /// Where the tool is that shall be at `pose`: drawn back by what is left of the way in, which grows
-  /// shorter by each call, one a frame of `frame_time` [s].
+  /// Where the tool is that shall be at `pose`: drawn back by what is left of the way in, which
+  /// grows shorter by each call, one a frame of `frame_time` [s].
   Pose next(const Pose& pose, double frame_time);
 
  private:

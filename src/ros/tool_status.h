@@ -20,13 +20,13 @@ struct PoseCounts {
 
 struct ToolStatus {
   std::string tool;
-  std::string source;      ///< "/probe/measured_cp", or the tf frame that it follows
+  std::string source;  ///< "/probe/measured_cp", or the tf frame that it follows
   bool follows_tf = false;
   std::uint32_t publishers = 0;  ///< of the topic
-  std::string waiting;     ///< why there is no transform of the frame that it follows; "" for none
-  bool came = false;       ///< a pose, of whatever quality; with tf a transform
-  double silent = 0;       ///< since the last one, or since the start [s]
-  std::string far;         ///< see distance_warning()
+  std::string waiting;  ///< why there is no transform of the frame that it follows; "" for none
+  bool came = false;    ///< a pose, of whatever quality; with tf a transform
+  double silent = 0;    ///< since the last one, or since the start [s]
+  std::string far;      ///< see distance_warning()
   PoseCounts counts;
 };
 
@@ -40,9 +40,9 @@ std::string warning(const ToolStatus& status);
 double distance(const Box& box, const Vec3& place);
 
 /// "72 m from all tissue", and whether positions a factor of 10 or 1000 smaller or larger would be
-/// near it (a scaled arm, millimetres); "" where the place is less than half a metre or three diagonals of the
-/// tissue's box from it, or there is no tissue. `in_frame` is the place in its own frame, which
-/// stands in the world as `frame` says.
+/// near it (a scaled arm, millimetres); "" where the place is less than half a metre or three
+/// diagonals of the tissue's box from it, or there is no tissue. `in_frame` is the place in its own
+/// frame, which stands in the world as `frame` says.
 std::string distance_warning(const Box& tissue, const Pose& frame, const Vec3& in_frame);
 
 }  // namespace tissue_sim

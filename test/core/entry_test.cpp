@@ -1,9 +1,9 @@
 // The way out of tissue for a tool that is placed in it.
+#include "tools/entry.h"
+
 #include <gtest/gtest.h>
 
 #include <vector>
-
-#include "tools/entry.h"
 
 namespace tissue_sim {
 namespace {
@@ -29,7 +29,9 @@ Tool tool(ToolType type) {
   return t;
 }
 
-Pose down(double z) { return {Vec3(0.0003, 0.0002, z), Quat(Eigen::AngleAxisd(M_PI, Vec3::UnitX()))}; }
+Pose down(double z) {
+  return {Vec3(0.0003, 0.0002, z), Quat(Eigen::AngleAxisd(M_PI, Vec3::UnitX()))};
+}
 
 TEST(WayOut, IsNoneWhereNothingIsInTheTool) {
   const std::vector<Point> points = block();

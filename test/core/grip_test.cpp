@@ -1,9 +1,10 @@
 // What a grasper presses with: squeezed, set while it runs, and run again.
+#include "tools/grip.h"
+
 #include <gtest/gtest.h>
 
 #include "cut_scenes.h"
 #include "tissue_sim/simulation.h"
-#include "tools/grip.h"
 
 namespace tissue_sim {
 namespace {

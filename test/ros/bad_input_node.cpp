@@ -5,8 +5,8 @@
 #include <sensor_msgs/JointState.h>
 #include <sensor_msgs/PointCloud2.h>
 #include <sys/wait.h>
-#include <unistd.h>
 #include <tissue_sim/LoadScene.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <cmath>
@@ -137,9 +137,8 @@ TEST_F(Poses, DiagnosticsNamesTheTopicWhereNoneEverCame) {
 
 TEST_F(Poses, DiagnosticsSaysThatAPublisherIsGone) {
   ros::WallDuration(2.5).sleep();
-  EXPECT_TRUE(wait_until([&] {
-    return said(diagnostics_, "tools").find("probe: no pose on") != std::string::npos;
-  }));
+  EXPECT_TRUE(wait_until(
+      [&] { return said(diagnostics_, "tools").find("probe: no pose on") != std::string::npos; }));
 }
 
 TEST_F(Poses, DiagnosticsSaysThatPosesAreInMillimetres) {
@@ -282,7 +281,8 @@ struct Ended {
   std::string output;
 };
 
-// Runs a node that should end by itself, or until `seconds` have passed; it lies where this test does.
+// Runs a node that should end by itself, or until `seconds` have passed; it lies where this test
+// does.
 Ended run(const std::string& arguments, int seconds = 20) {
   const std::string node =
       (std::filesystem::read_symlink("/proc/self/exe").parent_path() / "simulator_node").string();
@@ -332,8 +332,11 @@ TEST(Start, WithoutAClockARecordingWaitsAndTheNextRunDoesNotInheritIt) {
   namespace fs = std::filesystem;
   const fs::path folder = fs::temp_directory_path() / ("no_clock_" + std::to_string(getpid()));
   ros::param::set("/use_sim_time", true);
-  const Ended ended = run("'_scene:={cell_size: 0.005, bodies: [{shape: box}]}' _record:=true "
-                          "_recording_folder:=" + folder.string(), 6);
+  const Ended ended =
+      run("'_scene:={cell_size: 0.005, bodies: [{shape: box}]}' _record:=true "
+          "_recording_folder:=" +
+              folder.string(),
+          6);
   ros::param::del("/use_sim_time");
   EXPECT_NE(ended.output.find("the recording waits"), std::string::npos) << ended.output;
   EXPECT_TRUE(!fs::exists(folder) || fs::is_empty(folder)) << "nothing of 1970";

@@ -216,9 +216,11 @@ TEST_F(Tools, AfterAResetTheFirstPoseCountsWhateverItsStamp) {
   trigger("reset");
   const Pose begin = pointing_down(0.31, 0, 0.07);  // of a trajectory that begins anew
   arm.send(begin, "", ros::Time::now() - ros::Duration(100));
-  EXPECT_TRUE(wait_until([&] {
-    return (from_message(inputs.last()->tools[1].end).position - begin.position).norm() < 1e-9;
-  }, 3));
+  EXPECT_TRUE(wait_until(
+      [&] {
+        return (from_message(inputs.last()->tools[1].end).position - begin.position).norm() < 1e-9;
+      },
+      3));
 }
 
 TEST_F(Tools, GripIsSaidAndItsPressureSetWhileItRuns) {
@@ -229,8 +231,8 @@ TEST_F(Tools, GripIsSaidAndItsPressureSetWhileItRuns) {
       node.advertise<std_msgs::Float64>("/simulator/grasper/grip_pressure", 10);
   ros::Publisher jaws =
       node.advertise<sensor_msgs::JointState>("/simulator/grasper/jaw/measured_js", 10);
-  ASSERT_TRUE(wait_until(
-      [&] { return pressure.getNumSubscribers() > 0 && jaws.getNumSubscribers() > 0; }));
+  ASSERT_TRUE(
+      wait_until([&] { return pressure.getNumSubscribers() > 0 && jaws.getNumSubscribers() > 0; }));
   Arm arm("grasper");
   const auto limit_is = [&](double set, double jaw, double expected) {
     return wait_until([&] {

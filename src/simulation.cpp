@@ -21,6 +21,12 @@ void check(const Pose& pose, const std::string& what) {
   }
 }
 
+void check_grip(double pressure) {
+  if (pressure == 0 || (pressure >= 1 && pressure <= kMostSqueeze * 1e7)) return;
+  throw std::invalid_argument("grip_pressure is " + std::to_string(pressure) +
+                              ": must be from 1 to 1e7 [Pa], or 0 for the tool's own");
+}
+
 void check(const BladePath& path) {
   if (path.poses.size() < 2) {
     throw std::invalid_argument("a cut needs at least 2 poses, got " +
@@ -44,7 +50,8 @@ struct Simulation::State {
   std::int64_t frame = 0;
   std::vector<ToolMotion> tools;  // as they stand after the last frame, then as set for the next
   std::vector<BladePath> cuts;
-  std::vector<Grip> grips;  // of each tool
+  std::vector<Grip> grips;             // of each tool
+  std::vector<double> grip_pressures;  // of each tool, 0 for the scene's [Pa]
   double wave_speed = 0;
   bool blew_up = false;
 };
@@ -55,6 +62,7 @@ Simulation::Simulation(const Scene& scene) : state_(std::make_unique<State>()) {
   state_->tissue = make_tissue(scene);
   state_->tools.resize(scene.tools.size());
   state_->grips.resize(scene.tools.size());
+  state_->grip_pressures.resize(scene.tools.size());
   const auto note_speed = [this, &scene](const std::string& material) {
     state_->wave_speed =
         std::max(state_->wave_speed, tissue_sim::wave_speed(find_material(scene, material)));
@@ -90,6 +98,14 @@ void Simulation::set_tool(int tool, const Pose& pose, double jaw) {
   }
 }
 
+void Simulation::set_grip_pressure(int tool, double pressure) {
+  if (tool < 0 || tool >= static_cast<int>(state_->tools.size())) {
+    throw std::invalid_argument("tool " + std::to_string(tool) + " is not in the scene");
+  }
+  check_grip(pressure);
+  state_->grip_pressures[tool] = pressure;
+}
+
 void Simulation::cut(const BladePath& path) {
   check(path);
   state_->cuts.push_back(path);
@@ -108,6 +124,14 @@ void Simulation::apply(const AppliedInput& input) {
   }
   for (const BladePath& path : input.cuts) check(path);
   state_->tools = input.tools;
+  if (!input.grip_pressures.empty() && input.grip_pressures.size() != input.tools.size()) {
+    throw std::invalid_argument("grip_pressures has " +
+                                std::to_string(input.grip_pressures.size()) + " values for " +
+                                std::to_string(input.tools.size()) + " tools");
+  }
+  for (const double pressure : input.grip_pressures) check_grip(pressure);
+  state_->grip_pressures = input.grip_pressures;
+  state_->grip_pressures.resize(input.tools.size());
   state_->cuts = input.cuts;
 }
 
@@ -117,11 +141,16 @@ FrameReport Simulation::advance_frame() {
     throw std::runtime_error("the simulation blew up and cannot go on: reset it");
   }
   const auto start = std::chrono::steady_clock::now();
-  for (std::size_t i = 0; i < s.tools.size(); ++i) {
-    if (s.scene.tools[i].type != ToolType::kGrasper) continue;
-    s.grips[i].limit(s.scene.tools[i].grip_pressure, 1 / s.scene.frame_rate, s.tools[i]);
-  }
   FrameReport report;
+  report.input.grip_pressures.resize(s.tools.size());
+  for (std::size_t i = 0; i < s.tools.size(); ++i) {
+    const Tool& tool = s.scene.tools[i];
+    if (tool.type != ToolType::kGrasper) continue;
+    const double set = s.grip_pressures[i] > 0 ? s.grip_pressures[i] : tool.grip_pressure;
+    // Said as it comes out: a replay gets the jaws no longer as they were asked for.
+    report.input.grip_pressures[i] = squeezed(set, s.tools[i].jaw_end);
+    s.grips[i].limit(report.input.grip_pressures[i], 1 / s.scene.frame_rate, s.tools[i]);
+  }
   report.input.frame = s.frame;
   report.input.tools = s.tools;
   report.input.cuts = std::exchange(s.cuts, {});

@@ -21,6 +21,9 @@ namespace tissue_sim {
 struct AppliedInput {
   std::int64_t frame = 0;
   std::vector<ToolMotion> tools;  ///< parallels Scene::tools
+  /// What graspers' jaws press with at most, parallels `tools` [Pa]; 0, or none at all: the scene's
+  /// Tool::grip_pressure. A jaw_end below 0 squeezes with more: see tools/grip.h.
+  std::vector<double> grip_pressures;
   std::vector<BladePath> cuts;
 };
 
@@ -46,6 +49,10 @@ class Simulation {
   /// The tool shall be there at the end of the next frame. Its first pose places it without motion.
   /// Throws std::invalid_argument for an unknown tool or a pose that is not finite or no rotation.
   void set_tool(int tool, const Pose& pose, double jaw = 0);
+  /// What a grasper's jaws press with at most from the next frame on, in place of the scene's
+  /// grip_pressure; 0 for the scene's [Pa]. Throws std::invalid_argument for an unknown tool and
+  /// outside of 1 to 1e7.
+  void set_grip_pressure(int tool, double pressure);
   /// Cuts at the start of the next frame. Throws std::invalid_argument for less than two poses or
   /// edge points, or values that are not finite.
   void cut(const BladePath& path);

@@ -1,6 +1,9 @@
 #include "ros/conversions.h"
 
+#include <algorithm>
+#include <cinttypes>
 #include <cstddef>
+#include <cstdio>
 
 namespace tissue_sim {
 
@@ -84,6 +87,7 @@ FrameInputMessage to_message(const AppliedInput& input, const Scene& scene) {
     m.tools[i].end = to_pose(motion.end);
     m.tools[i].jaw_begin = motion.jaw_begin;
     m.tools[i].jaw_end = motion.jaw_end;
+    if (i < input.grip_pressures.size()) m.tools[i].grip_pressure = input.grip_pressures[i];
   }
   for (const BladePath& path : input.cuts) m.cuts.push_back(to_message(path));
   return m;
@@ -100,6 +104,7 @@ AppliedInput from_message(const FrameInputMessage& message) {
     motion.jaw_begin = m.jaw_begin;
     motion.jaw_end = m.jaw_end;
     input.tools.push_back(motion);
+    input.grip_pressures.push_back(m.grip_pressure);
   }
   for (const BladeSweep& m : message.cuts) {
     BladePath path;
@@ -108,6 +113,16 @@ AppliedInput from_message(const FrameInputMessage& message) {
     input.cuts.push_back(path);
   }
   return input;
+}
+
+JawGrip to_message(const ToolLoad& load, const ToolMotion& motion, double pressure_limit) {
+  JawGrip m;
+  m.jaw = motion.jaw_end;
+  m.force = load.grip;
+  m.area = load.grip_area;
+  m.pressure = load.grip_area > 0 ? load.grip / load.grip_area : 0;
+  m.pressure_limit = pressure_limit;
+  return m;
 }
 
 TissueFragment to_message(const Fragment& fragment, const Scene& scene) {
@@ -123,6 +138,17 @@ TissueFragment to_message(const Fragment& fragment, const Scene& scene) {
   m.box_min = to_point(fragment.box.min);
   m.box_max = to_point(fragment.box.max);
   return m;
+}
+
+std::string to_hex(std::uint64_t checksum) {
+  char text[17];
+  std::snprintf(text, sizeof text, "%016" PRIx64, checksum);
+  return text;
+}
+
+std::string without_commas(std::string text) {
+  std::replace(text.begin(), text.end(), ',', ';');
+  return text;
 }
 
 void describe_points(int count, sensor_msgs::PointCloud2& cloud) {

@@ -35,7 +35,15 @@ FrameInputMessage to_message(const AppliedInput& input, const Scene& scene);
 /// The way back, for replays; tools in the scene's order.
 AppliedInput from_message(const FrameInputMessage& message);
 
+/// Without its header.
+JawGrip to_message(const ToolLoad& load, const ToolMotion& motion, double pressure_limit);
+
 TissueFragment to_message(const Fragment& fragment, const Scene& scene);
+
+/// 16 hexadecimal digits: a number above 2^53 would be rounded by all that knows doubles alone.
+std::string to_hex(std::uint64_t checksum);
+/// Without commas, at which `rostopic echo -p` parts columns: "cpu (AVX-512; 2 threads)".
+std::string without_commas(std::string text);
 
 /// Fields, sizes and flags of a cloud of Point; `cloud.data` is filled already.
 void describe_points(int count, sensor_msgs::PointCloud2& cloud);

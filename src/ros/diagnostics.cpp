@@ -1,5 +1,7 @@
 #include "ros/diagnostics.h"
 
+#include <string>
+
 namespace tissue_sim {
 
 using diagnostic_msgs::DiagnosticStatus;
@@ -40,26 +42,36 @@ void Diagnostics::simulation(Status& status) {
 
 void Diagnostics::tools(Status& status) {
   std::uint64_t refused = 0;
+  std::string warnings;
   const std::shared_ptr<ToolInputs> tools = simulation_.tools();
   for (const auto& tool : *tools) {
-    const ToolInput::Counts counts = tool->counts();
+    const ToolStatus s = tool->status();
+    const PoseCounts& counts = s.counts;
+    const std::string said = warning(s);
+    if (!said.empty()) warnings += (warnings.empty() ? "" : "; ") + said;
     refused += counts.all_refused() + counts.jaws_refused;
-    status.add(tool->tool() + ": poses used", counts.accepted);
-    status.add(tool->tool() + ": placed anew", counts.placed);
+    status.add(s.tool + ": poses used", counts.accepted);
+    status.add(s.tool + ": placed anew", counts.placed);
     for (int i = 0; i < kRefusalCount; ++i) {
-      status.add(tool->tool() + ": poses refused, " + name_of(static_cast<Refusal>(i)),
+      status.add(s.tool + ": poses refused, " + name_of(static_cast<Refusal>(i)),
                  counts.refused[static_cast<std::size_t>(i)]);
     }
-    status.add(tool->tool() + ": jaw angles refused", counts.jaws_refused);
+    status.add(s.tool + ": jaw angles refused", counts.jaws_refused);
+    status.add(s.tool + (s.follows_tf ? ": tf frame" : ": topic"), s.source);
+    if (!s.follows_tf) status.add(s.tool + ": publishers", s.publishers);
+    if (s.came) status.add(s.tool + ": last pose came before [s]", s.silent);
   }
   // Another scene counts anew.
   const std::uint64_t since = refused >= refused_before_ ? refused - refused_before_ : refused;
   refused_before_ = refused;
   if (since > 0) {
-    status.summaryf(DiagnosticStatus::WARN, "%lu poses or jaw angles refused since the last report",
-                    static_cast<unsigned long>(since));
+    warnings = std::to_string(since) + " poses or jaw angles refused since the last report" +
+               (warnings.empty() ? "" : "; ") + warnings;
+  }
+  if (!warnings.empty()) {
+    status.summary(DiagnosticStatus::WARN, warnings);
   } else {
-    status.summary(DiagnosticStatus::OK, "all poses used");
+    status.summary(DiagnosticStatus::OK, tools->empty() ? "no tools" : "all poses used");
   }
 }
 

@@ -1,8 +1,11 @@
 #include "ros/frames.h"
 
+#include <ros/console.h>
+
 #include <cmath>
 
 #include "ros/conversions.h"
+#include "ros/pose_check.h"
 
 namespace tissue_sim {
 namespace {
@@ -14,26 +17,103 @@ std::string stripped(const std::string& frame) {
 
 }  // namespace
 
+std::string problem(const geometry_msgs::TransformStamped& transform) {
+  const Pose pose = from_message(transform.transform);
+  if (stripped(transform.child_frame_id).empty()) return "its child_frame_id is empty";
+  if (stripped(transform.header.frame_id).empty()) return "its frame_id (the parent) is empty";
+  if (stripped(transform.child_frame_id) == stripped(transform.header.frame_id)) {
+    return "it is its own parent";
+  }
+  if (!pose.position.allFinite() || !pose.orientation.coeffs().allFinite()) {
+    return "a value is NaN or infinite";
+  }
+  if (!is_rotation(pose.orientation)) {
+    return "its quaternion has norm " + std::to_string(pose.orientation.norm()) + ", must be 1";
+  }
+  return "";
+}
+
 Frames::Frames(std::string world, double tolerance)
-    : world_(std::move(world)), tolerance_(tolerance), listener_(buffer_) {}
+    : world_(std::move(world)), tolerance_(tolerance), spinner_(1, &queue_) {
+  node_.setCallbackQueue(&queue_);
+  using Event = ros::MessageEvent<const tf2_msgs::TFMessage>;
+  const auto listen = [this](const std::string& topic, bool is_static) {
+    return node_.subscribe<tf2_msgs::TFMessage>(
+        topic, 100, boost::function<void(const Event&)>([this, is_static](const Event& event) {
+          take(*event.getConstMessage(), event.getPublisherName(), is_static);
+        }));
+  };
+  moving_ = listen("/tf", false);
+  static_ = listen("/tf_static", true);
+  spinner_.start();
+}
+
+void Frames::take(const tf2_msgs::TFMessage& message, const std::string& sender, bool is_static) {
+  // A bag that loops with its /clock: what tf knew is of the future now.
+  const ros::Time now = ros::Time::now();
+  if (now + ros::Duration(0.1) < now_) {
+    ROS_WARN("time jumped back by %.1f s: tf begins anew", (now_ - now).toSec());
+    buffer_.clear();
+    newest_.clear();
+  }
+  now_ = now;
+  for (geometry_msgs::TransformStamped t : message.transforms) {
+    const std::string wrong = problem(t);
+    if (!wrong.empty()) {
+      std::string& warned = warned_[t.child_frame_id];
+      if (warned != wrong) {
+        ROS_WARN("tf: the transform of '%s' from %s is ignored: %s", t.child_frame_id.c_str(),
+                 sender.c_str(), wrong.c_str());
+      }
+      warned = wrong;
+      continue;
+    }
+    // The same stamp again says nothing new, and tf2 would write a line each time.
+    if (!is_static) {
+      const auto known = newest_.find(t.child_frame_id);
+      if (known != newest_.end() && known->second == t.header.stamp) continue;
+      newest_[t.child_frame_id] = t.header.stamp;
+    }
+    t.transform.rotation = to_quaternion(from_message(t.transform).orientation.normalized());
+    buffer_.setTransform(t, sender, is_static);
+  }
+}
+
+geometry_msgs::TransformStamped Frames::look_up(const std::string& frame,
+                                                const ros::Time& stamp) const {
+  const std::string name = stripped(frame);
+  const std::string from = "'" + name + "' to '" + world_ + "'";
+  const bool knows_frame = buffer_._frameExists(name), knows_world = buffer_._frameExists(world_);
+  if (!knows_frame || !knows_world) {
+    const std::string lacks = knows_world   ? "frame '" + name + "'"
+                              : knows_frame ? "frame '" + world_ + "' (world_frame)"
+                                            : "any of the two";
+    throw tf2::LookupException("no transform from " + from + ": tf does not know " + lacks);
+  }
+  try {
+    return buffer_.lookupTransform(world_, name, stamp);
+  } catch (const tf2::ExtrapolationException& e) {
+    throw tf2::ExtrapolationException("no transform from " + from + ": " + e.what());
+  } catch (const tf2::TransformException& e) {
+    throw tf2::ConnectivityException("no transform from " + from + ": " + e.what());
+  }
+}
 
 Pose Frames::in_world(const std::string& frame, const ros::Time& stamp) const {
   const std::string name = stripped(frame);
   if (name.empty() || name == world_) return Pose();
   try {
-    return from_message(buffer_.lookupTransform(world_, name, stamp).transform);
+    return from_message(look_up(name, stamp).transform);
   } catch (const tf2::ExtrapolationException&) {
     // Transforms come after the poses that need them: the newest will do, if it is new enough.
-    const geometry_msgs::TransformStamped newest =
-        buffer_.lookupTransform(world_, name, ros::Time(0));
+    const geometry_msgs::TransformStamped newest = look_up(name, ros::Time(0));
     if (std::fabs((stamp - newest.header.stamp).toSec()) > tolerance_) throw;
     return from_message(newest.transform);
   }
 }
 
 Pose Frames::newest(const std::string& frame, ros::Time& stamp) const {
-  const geometry_msgs::TransformStamped t =
-      buffer_.lookupTransform(world_, stripped(frame), ros::Time(0));
+  const geometry_msgs::TransformStamped t = look_up(frame, ros::Time(0));
   stamp = t.header.stamp;
   return from_message(t.transform);
 }

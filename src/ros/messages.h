@@ -8,4 +8,5 @@
 #undef FrameInput
 
 #include <tissue_sim/FragmentArray.h>
+#include <tissue_sim/JawGrip.h>
 #include <tissue_sim/SimulationState.h>

@@ -1,9 +1,13 @@
 #include "ros/node.h"
 
 #include <ros/console.h>
+#include <ros/names.h>
 #include <ros/time.h>
 
+#include <set>
 #include <string>
+
+#include "ros/remappings.h"
 
 namespace tissue_sim {
 namespace {
@@ -39,10 +43,7 @@ Node::Node(const ros::NodeHandle& node)
   services_ = std::make_unique<Services>(service_node_, scene, *simulation_, recorder_, frames_,
                                          [this](const Scene& s) { return make_session(s); });
   diagnostics_ = std::make_unique<Diagnostics>(service_node_, *simulation_, recorder_);
-  if (record.wanted) {
-    services_->start_recording(record.name, {});
-    simulation_->set_paused(parameters_.paused);
-  }
+  if (record.wanted) record_from_start(record.name);
   pose_spinner_.start();
   service_spinner_.start();
 }
@@ -54,6 +55,34 @@ Node::~Node() {
   pose_spinner_.stop();
 }
 
+void Node::record_from_start(const std::string& name) {
+  const auto start = [this, name] {
+    services_->start_recording(name, {});
+    simulation_->set_paused(parameters_.paused);
+  };
+  if (!clock_is_missing()) {
+    start();
+    return;
+  }
+  const auto wait = [this, start](const ros::WallTimerEvent&) {
+    if (clock_is_missing()) {
+      if (waited_++ % 50 == 0) {
+        ROS_WARN(
+            "/use_sim_time is set and no /clock has come yet: the recording waits for it, and "
+            "the simulation with it (rosbag play --clock, or unset /use_sim_time)");
+      }
+      return;
+    }
+    clock_timer_.stop();
+    try {
+      start();
+    } catch (const std::exception& e) {
+      ROS_ERROR("cannot record: %s; the simulation stays paused", e.what());
+    }
+  };
+  clock_timer_ = service_node_.createWallTimer(ros::WallDuration(0.1), wait);
+}
+
 Session Node::make_session(const Scene& scene) {
   Session session;
   session.simulation = std::make_unique<Simulation>(scene);
@@ -62,17 +91,27 @@ Session Node::make_session(const Scene& scene) {
   limits.speed = parameters_.max_tool_speed;
   limits.turn_rate = parameters_.max_tool_turn_rate;
   limits.frame_time = 1 / scene.frame_rate;
+  Box box;
+  for (const Fragment& piece : session.simulation->tissue().fragments()) {
+    box.min = box.min.cwiseMin(piece.box.min);
+    box.max = box.max.cwiseMax(piece.box.max);
+  }
+  std::set<std::string> names;
   for (const Tool& tool : scene.tools) {
+    names.insert(tool.name);
     const auto source = parameters_.tools.find(tool.name);
     session.tools->push_back(std::make_unique<ToolInput>(
-        pose_node_, tool.name,
-        source == parameters_.tools.end() ? ToolParameters() : source->second, limits, frames_,
-        recorder_));
+        pose_node_, tool, source == parameters_.tools.end() ? ToolParameters() : source->second,
+        limits, frames_, box, recorder_));
   }
   for (const auto& source : parameters_.tools) {
-    bool found = false;
-    for (const Tool& tool : scene.tools) found = found || tool.name == source.first;
-    if (!found) ROS_WARN("~tools/%s names no tool of the scene", source.first.c_str());
+    if (names.count(source.first) == 0) {
+      ROS_WARN("~tools/%s names no tool of the scene", source.first.c_str());
+    }
+  }
+  for (const std::string& warning :
+       useless_remappings(pose_node_.getNamespace(), names, ros::names::getRemappings())) {
+    ROS_WARN("%s", warning.c_str());
   }
   session.publications =
       std::make_shared<Publications>(service_node_, scene, parameters_, recorder_);

@@ -4,6 +4,7 @@
 #include <ros/callback_queue.h>
 #include <ros/node_handle.h>
 #include <ros/spinner.h>
+#include <ros/wall_timer.h>
 
 #include <memory>
 
@@ -25,6 +26,9 @@ class Node {
 
  private:
   Session make_session(const Scene& scene);
+  /// Starts the recording that the parameters ask for, and the simulation, which stood still so
+  /// that the bag holds frame 0. While there is no /clock it waits for one, and says so.
+  void record_from_start(const std::string& name);
 
   // Queues of their own: a service that takes long does not hold up the poses.
   ros::CallbackQueue pose_queue_, service_queue_;
@@ -35,6 +39,8 @@ class Node {
   std::unique_ptr<SimulationThread> simulation_;
   std::unique_ptr<Services> services_;
   std::unique_ptr<Diagnostics> diagnostics_;
+  ros::WallTimer clock_timer_;
+  int waited_ = 0;  // for /clock, a tenth of a second each
   ros::AsyncSpinner pose_spinner_, service_spinner_;
 };
 

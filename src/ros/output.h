@@ -31,6 +31,14 @@ class Output {
     publisher_.publish(message);
     recorder_->write(topic_, message, stamp, must_keep, latch_);
   }
+  /// Publishes what `make` makes, if anybody wants it; `into_bag`: else to those who listen alone.
+  template <class Make>
+  void send(bool into_bag, const ros::Time& stamp, Make make) const {
+    if (into_bag ? wanted() : listened()) {
+      const boost::shared_ptr<const M> message = make();
+      into_bag ? publish(message, stamp) : show(message);
+    }
+  }
   /// To those who listen now, but not into the bag.
   void show(const boost::shared_ptr<const M>& message) const { publisher_.publish(message); }
   /// Into the bag, but to nobody else.

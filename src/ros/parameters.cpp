@@ -92,7 +92,7 @@ std::string default_recording_folder() {
 ToolParameters read_tool(XmlRpcValue& group, const std::string& path) {
   ToolParameters tool;
   if (group.getType() != XmlRpcValue::TypeStruct) {
-    refuse(path, group, "must be a map of pose_type and tf_frame");
+    refuse(path, group, "must be a map of pose_type, tf_frame and interpolate");
   }
   for (auto& member : group) {
     const std::string name = path + "/" + member.first;
@@ -105,8 +105,13 @@ ToolParameters read_tool(XmlRpcValue& group, const std::string& path) {
     } else if (member.first == "tf_frame") {
       if (!text) refuse(name, member.second, "must be the name of a tf frame");
       tool.tf_frame = static_cast<std::string&>(member.second);
+    } else if (member.first == "interpolate") {
+      tool.interpolate = text ? static_cast<std::string&>(member.second) : "";
+      if (tool.interpolate != "none" && tool.interpolate != "linear") {
+        refuse(name, member.second, "must be none or linear");
+      }
     } else {
-      ROS_WARN("~%s is no parameter of this node: known here are pose_type and tf_frame",
+      ROS_WARN("~%s is no parameter of this node: known are pose_type, tf_frame and interpolate",
                name.c_str());
     }
   }
@@ -200,12 +205,16 @@ Parameters read_parameters(const ros::NodeHandle& node) {
   } else {
     read(node, "record", p.record, "must be true, false or a path inside recording_folder");
   }
+  // For this run alone: parameters outlive the node, and one started by itself must not record
+  // because the last launch did.
+  node.deleteParam("record");
   read(node, "recording_queue", p.recording_queue, 1, 1e6);
   read(node, "recording_reserve", p.recording_reserve, 1, 1e9);
   XmlRpcValue tools;
   if (node.getParam("tools", tools)) {
     if (tools.getType() != XmlRpcValue::TypeStruct) {
-      refuse("tools", tools, "must be a map from a tool's name to pose_type and tf_frame");
+      refuse("tools", tools,
+             "must be a map from a tool's name to pose_type, tf_frame and interpolate");
     }
     for (auto& tool : tools) p.tools[tool.first] = read_tool(tool.second, "tools/" + tool.first);
   }

@@ -16,6 +16,7 @@ namespace tissue_sim {
 struct ToolParameters {
   std::string pose_type = "PoseStamped";  ///< of measured_cp: PoseStamped or TransformStamped
   std::string tf_frame;                   ///< follow this tf frame instead of the topic
+  std::string interpolate = "none";       ///< between samples: none, or linear, one sample later
 };
 
 struct Parameters {

@@ -33,66 +33,102 @@ const char* name_of(Refusal refusal) {
   return "";
 }
 
-bool PoseCheck::reachable(const Timed& from, const Timed& to) const {
-  // Stamps may lie closer together than the poses were taken; nothing shorter than a frame is seen.
-  const double gap = std::min(std::max(to.time - from.time, limits_.frame_time), 1.0);
-  return (to.pose.position - from.pose.position).norm() <= limits_.speed * gap &&
-         turn(from.pose, to.pose) <= limits_.turn_rate * gap;
+bool is_rotation(const Quat& q) {
+  const double norm = q.norm();
+  return norm >= 0.9 && norm <= 1.1;
 }
 
-PoseCheck::Verdict PoseCheck::check(Pose& pose, double time) {
+bool is_rounded(const Quat& q) { return std::fabs(q.norm() - 1) > 0.01; }
+
+void PoseCheck::forget() {
+  last_.reset();
+  candidate_.reset();
+}
+
+double PoseCheck::gap(const Timed& from, const Timed& to) const {
+  const double gap = to.stamp - from.stamp;
+  return gap == 0 ? to.came - from.came : gap;
+}
+
+bool PoseCheck::reachable(const Pose& from, const Pose& to, double gap) const {
+  // Stamps may lie closer together than the poses were taken; nothing shorter than a frame is seen.
+  const double time = std::min(std::max(gap, limits_.frame_time), 1.0);
+  return (to.position - from.position).norm() <= limits_.speed * time &&
+         turn(from, to) <= limits_.turn_rate * time;
+}
+
+PoseCheck::Verdict PoseCheck::check(Pose& pose, double stamp, double now) {
   Verdict verdict;
   if (!pose.position.allFinite() || !pose.orientation.coeffs().allFinite()) {
     verdict.refusal = Refusal::kNotFinite;
     verdict.text = "a value is NaN or infinite";
     return verdict;
   }
-  const double norm = pose.orientation.norm();
-  if (std::fabs(norm - 1) > 0.01) {
+  if (!is_rotation(pose.orientation)) {
     verdict.refusal = Refusal::kNoRotation;
-    verdict.text = format("its quaternion has norm %.3g, must be 1 within 0.01", norm, 0, 0);
+    verdict.text = format("its quaternion has norm %.3g, must be 1 (0.9 to 1.1 is normalised)",
+                          pose.orientation.norm(), 0, 0);
     return verdict;
   }
   pose.orientation.normalize();
-  const Timed sample{pose, time};
+  const Timed sample{pose, stamp, now};
   if (!last_) {
     last_ = sample;
     verdict.placed = true;
     return verdict;
   }
 
-  const double gap = time - last_->time;
+  const double elapsed = gap(*last_, sample);
   const double distance = (pose.position - last_->pose.position).norm();
-  if (gap < 0) {
+  if (elapsed < 0) {
     verdict.refusal = Refusal::kOlder;
-    verdict.text = format("it is %.3f s older than the last one used", -gap, 0, 0);
-  } else if (!reachable(*last_, sample)) {
+    verdict.text = format("it is %.3f s older than the last one used", -elapsed, 0, 0);
+  } else if (!reachable(last_->pose, pose, elapsed)) {
     verdict.refusal = Refusal::kJump;
-    verdict.text = format("%.3f m and %.2f rad from the last one used, in %.3f s", distance,
-                          turn(last_->pose, pose), gap);
+    verdict.text = format("it is %.3f m and %.2f rad from the last one used, in %.3f s", distance,
+                          turn(last_->pose, pose), elapsed);
   } else {
     // Where it was in the meantime nobody knows, so it must not cut a straight line from there.
-    const bool far = !reachable(*last_, {pose, last_->time});
-    if (gap > kSilence && far) {
+    if (elapsed > kSilence && !reachable(last_->pose, pose, 0)) {
       verdict.placed = true;
-      verdict.text = format("after %.1f s without a pose it is %.3f m away", gap, distance, 0);
+      verdict.text = format("it is %.3f m away, after %.1f s without a pose", distance, elapsed, 0);
     }
     last_ = sample;
     candidate_.reset();
     return verdict;
   }
-
-  const bool stays = candidate_ && time > candidate_->time && reachable(*candidate_, sample);
-  stayed_ = stays ? stayed_ + 1 : 1;
-  candidate_ = sample;
-  if (stayed_ == kStay) {
-    verdict.text += ", and so were " + std::to_string(kStay - 1) + " before it";
+  if (believed(sample, *verdict.refusal, verdict.text)) {
     verdict.refusal.reset();
     verdict.placed = true;
     last_ = sample;
     candidate_.reset();
   }
   return verdict;
+}
+
+bool PoseCheck::believed(const Timed& sample, Refusal refusal, std::string& text) {
+  const std::optional<Timed> before = candidate_;
+  const bool again = before && refusal_ == refusal && refusal == Refusal::kOlder;
+  candidate_ = sample;
+  refusal_ = refusal;
+  const bool agrees = before && sample.stamp >= before->stamp &&
+                      reachable(before->pose, sample.pose, gap(*before, sample));
+  if (!agrees) {
+    stayed_ = 1;
+    since_ = sample.came;
+    return false;
+  }
+  ++stayed_;
+  const double stamps = sample.stamp - before->stamp, came = sample.came - before->came;
+  if (again && stamps > 0 && came >= 0.1 * stamps) {  // not all at once, as what was held up comes
+    text += ", and its clock goes on from there";
+    return true;
+  }
+  // Each of them stands for its share of the time.
+  const double stayed = (sample.came - since_) * stayed_ / (stayed_ - 1);
+  if (stayed_ < kStay || stayed < kStayTime - 1e-6) return false;
+  text += ", and so were " + std::to_string(stayed_ - 1) + " before it";
+  return true;
 }
 
 }  // namespace tissue_sim

@@ -17,6 +17,12 @@ constexpr int kRefusalCount = 5;
 /// As it stands in diagnostics: "not finite", "older than the last"...
 const char* name_of(Refusal refusal);
 
+/// Whether a quaternion can be meant as a rotation, whose digits somebody rounded by hand: its norm
+/// is from 0.9 to 1.1. It is to be normalised then.
+bool is_rotation(const Quat& q);
+/// Whether that is more than rounding: to be said.
+bool is_rounded(const Quat& q);
+
 struct PoseLimits {
   double speed = 5;              ///< [m/s]
   double turn_rate = 60;         ///< [rad/s]
@@ -31,31 +37,44 @@ class PoseCheck {
   struct Verdict {
     std::optional<Refusal> refusal;  ///< none: use it
     bool placed = false;  ///< used, but the tool did not come here on a path that it could sweep
-    std::string text;     ///< why it was refused or placed, with values
+    std::string text;  ///< a sentence why it was refused or placed, with values; "" for the first
   };
 
-  /// `time` [s] is the pose's own, by whatever clock. An accepted `pose` is normalised.
+  /// `stamp` [s] is the pose's own, by whatever clock; `now` [s] when it came, by one that never
+  /// goes back. An accepted `pose` is normalised.
   ///
   /// A pose that is older than the last one or too far from it is refused. When kStay of them in a
-  /// row are consistent among themselves, the arm really is there (its clock or its driver was
-  /// started anew, somebody moved it while nobody looked): the tool is placed there. So it is when
-  /// nothing came for kSilence and the arm is now farther than it comes in one frame.
-  Verdict check(Pose& pose, double time);
+  /// row, over kStayTime at least, agree among themselves, the arm really is there (its driver was
+  /// started anew, somebody moved it while nobody looked): the tool is placed there. So it is at
+  /// the second old pose whose stamp goes on as time does: a bag that loops, at whatever rate up to
+  /// ten times, a clock that was set back. And so it is when nothing came for kSilence and the arm
+  /// is now farther than it comes in one frame. Stamps may stay the same: then the time when poses
+  /// came counts.
+  Verdict check(Pose& pose, double stamp, double now);
+  /// Where the stamps are when poses come.
+  Verdict check(Pose& pose, double time) { return check(pose, time, time); }
+  /// Time begins anew: the next pose is the first.
+  void forget();
 
   static constexpr int kStay = 10;
-  static constexpr double kSilence = 0.5;  ///< [s]
+  static constexpr double kStayTime = 0.1;  ///< [s]
+  static constexpr double kSilence = 0.5;   ///< [s]
 
  private:
   struct Timed {
     Pose pose;
-    double time;
+    double stamp, came;
   };
-  bool reachable(const Timed& from, const Timed& to) const;
+  double gap(const Timed& from, const Timed& to) const;
+  bool reachable(const Pose& from, const Pose& to, double gap) const;
+  bool believed(const Timed& sample, Refusal refusal, std::string& text);
 
   PoseLimits limits_;
-  std::optional<Timed> last_;       // accepted
-  std::optional<Timed> candidate_;  // last of those refused since
+  std::optional<Timed> last_;          // accepted
+  std::optional<Timed> candidate_;     // last of those refused since
+  Refusal refusal_ = Refusal::kOlder;  // why
   int stayed_ = 0;
+  double since_ = 0;  // when the first of those came that stayed
 };
 
 }  // namespace tissue_sim

@@ -25,16 +25,21 @@ Publications::Publications(ros::NodeHandle& node, const Scene& scene, const Para
   scene_text_ = text;
   for (const Tool& tool : scene.tools) {
     tools_.push_back({{node, tool.name + "/body/measured_cf", 100, recorder},
-                      {node, tool.name + "/spatial/measured_cf", 100, recorder}});
+                      {node, tool.name + "/spatial/measured_cf", 100, recorder},
+                      {}});
+    if (tool.type == ToolType::kGrasper) {
+      tools_.back().grip.emplace(node, tool.name + "/grip", 100, recorder);
+    }
   }
 }
 
 std::set<std::string> Publications::topics() const {
-  std::set<std::string> names = {
-      scene_output_.topic(), state_.topic(),        inputs_.topic(), fragments_.topic(),
-      points_.topic(),       loose_points_.topic(), tf_.topic()};
+  std::set<std::string> names = {scene_output_.topic(),  state_.topic(),  inputs_.topic(),
+                                 fragments_.topic(),     points_.topic(), loose_points_.topic(),
+                                 marker_output_.topic(), tf_.topic()};
   for (const ToolOutputs& tool : tools_) {
     names.insert({tool.body.topic(), tool.spatial.topic()});
+    if (tool.grip) names.insert(tool.grip->topic());
   }
   return names;
 }
@@ -78,9 +83,9 @@ void Publications::publish(Simulation& simulation, const FrameReport& report, co
   if (state_due && state_.wanted()) {
     state_.publish(state_message(simulation, report, run, stamp), stamp);
   }
-  publish_tf(report, stamp);
+  publish_tf(report, stamp, true);
   if (run.blew_up) return;  // what follows may hold NaN
-  publish_wrenches(report, stamp);
+  publish_loads(report, stamp, true);
 
   const bool fragments_due = fragments_due_.due(now) || all || came_apart;
   if (fragments_due && fragments_.wanted()) {
@@ -95,6 +100,12 @@ void Publications::publish(Simulation& simulation, const FrameReport& report, co
   if (markers_due && marker_output_.wanted()) {
     marker_output_.publish(marker_message(simulation, report, stamp), stamp);
   }
+}
+
+void Publications::hold(const FrameReport& report, const RunState& run) {
+  const ros::Time stamp = ros::Time::now();
+  publish_tf(report, stamp, false);
+  if (!run.blew_up) publish_loads(report, stamp, false);
 }
 
 void Publications::show(Simulation& simulation, const FrameReport& report, const RunState& run) {
@@ -128,11 +139,11 @@ boost::shared_ptr<const SimulationState> Publications::state_message(Simulation&
   m->fragments = pieces_.count;
   m->loose_fragments = pieces_.loose;
   m->fragment_volume = pieces_.volume;
-  m->device = simulation.tissue().device_name();
+  m->device = without_commas(simulation.tissue().device_name());
   m->kinetic_energy = report.result.kinetic_energy;
   m->elastic_energy = report.result.elastic_energy;
   m->max_speed = report.result.max_speed;
-  if (parameters_.checksum) m->checksum = simulation.tissue().checksum();
+  if (parameters_.checksum) m->checksum = to_hex(simulation.tissue().checksum());
   return m;
 }
 
@@ -169,27 +180,36 @@ boost::shared_ptr<const visualization_msgs::MarkerArray> Publications::marker_me
        parameters_.world_frame, stamp, parameters_.force_scale}));
 }
 
-void Publications::publish_wrenches(const FrameReport& report, const ros::Time& stamp) const {
+void Publications::publish_loads(const FrameReport& report, const ros::Time& stamp,
+                                 bool into_bag) const {
   for (std::size_t i = 0; i < tools_.size() && i < report.result.loads.size(); ++i) {
-    if (!report.input.tools[i].present) continue;
-    const Wrench& wrench = report.result.loads[i].mean;
-    if (tools_[i].spatial.wanted()) {
-      auto m = boost::make_shared<geometry_msgs::WrenchStamped>();
-      m->header = header(stamp);
-      m->wrench = to_wrench(wrench);
-      tools_[i].spatial.publish(m, stamp);
-    }
-    if (tools_[i].body.wanted()) {
+    const ToolMotion& motion = report.input.tools[i];
+    if (!motion.present) continue;
+    const ToolLoad& load = report.result.loads[i];
+    const auto wrench = [&](const std::string& frame, const Wrench& value) {
       auto m = boost::make_shared<geometry_msgs::WrenchStamped>();
       m->header.stamp = stamp;
-      m->header.frame_id = scene_.tools[i].name;
-      m->wrench = to_wrench(in_axes(wrench, report.input.tools[i].end.orientation));
-      tools_[i].body.publish(m, stamp);
-    }
+      m->header.frame_id = frame;
+      m->wrench = to_wrench(value);
+      return m;
+    };
+    const std::string& name = scene_.tools[i].name;
+    tools_[i].spatial.send(into_bag, stamp,
+                           [&] { return wrench(parameters_.world_frame, load.mean); });
+    tools_[i].body.send(into_bag, stamp,
+                        [&] { return wrench(name, in_axes(load.mean, motion.end.orientation)); });
+    if (!tools_[i].grip) continue;
+    tools_[i].grip->send(into_bag, stamp, [&] {
+      auto m =
+          boost::make_shared<JawGrip>(to_message(load, motion, report.input.grip_pressures[i]));
+      m->header.stamp = stamp;
+      m->header.frame_id = name;
+      return m;
+    });
   }
 }
 
-void Publications::publish_tf(const FrameReport& report, const ros::Time& stamp) {
+void Publications::publish_tf(const FrameReport& report, const ros::Time& stamp, bool into_bag) {
   if (!parameters_.publish_tf || stamp == tf_stamp_) return;  // tf2 warns of repeated stamps
   auto m = boost::make_shared<tf2_msgs::TFMessage>();
   for (std::size_t i = 0; i < report.input.tools.size(); ++i) {
@@ -206,7 +226,7 @@ void Publications::publish_tf(const FrameReport& report, const ros::Time& stamp)
   }
   if (m->transforms.empty()) return;
   tf_stamp_ = stamp;
-  tf_.publish(m, stamp);
+  tf_.send(into_bag, stamp, [&] { return m; });
 }
 
 }  // namespace tissue_sim

@@ -10,6 +10,7 @@
 
 #include <array>
 #include <cstddef>
+#include <optional>
 #include <set>
 #include <string>
 #include <utility>
@@ -38,7 +39,7 @@ class Publications {
   Publications(ros::NodeHandle& node, const Scene& scene, const Parameters& parameters,
                Recorder& recorder);
 
-  /// Names of the topics as they are in bags, without markers.
+  /// Names of the topics as they are in bags.
   std::set<std::string> topics() const;
 
   /// The scene, latched: at the start and at every reset.
@@ -47,12 +48,15 @@ class Publications {
   void record_scene();
   /// A frame is done. `all`: also what has a rate and is not due yet.
   void publish(Simulation& simulation, const FrameReport& report, const RunState& run, bool all);
+  /// Forces and tf of a simulation that stands still: clients wait for them. Not into the bag.
+  void hold(const FrameReport& report, const RunState& run);
   /// For those who watch a simulation that stands still. Nothing goes into the bag.
   void show(Simulation& simulation, const FrameReport& report, const RunState& run);
 
  private:
   struct ToolOutputs {
     Output<geometry_msgs::WrenchStamped> body, spatial;
+    std::optional<Output<JawGrip>> grip;  // of a grasper
   };
   struct Pieces {
     int count = 0, loose = 0;
@@ -72,8 +76,9 @@ class Publications {
   boost::shared_ptr<const visualization_msgs::MarkerArray> marker_message(Simulation& simulation,
                                                                           const FrameReport& report,
                                                                           const ros::Time& stamp);
-  void publish_wrenches(const FrameReport& report, const ros::Time& stamp) const;
-  void publish_tf(const FrameReport& report, const ros::Time& stamp);
+  /// `into_bag`: else to those who listen alone.
+  void publish_loads(const FrameReport& report, const ros::Time& stamp, bool into_bag) const;
+  void publish_tf(const FrameReport& report, const ros::Time& stamp, bool into_bag);
 
   const Scene scene_;
   const Parameters parameters_;

@@ -75,10 +75,14 @@ BladePath Services::read_path(const Cut::Request& request) const {
     if (!pose.position.allFinite() || !pose.orientation.coeffs().allFinite()) {
       throw std::runtime_error(name + " is not finite");
     }
-    if (std::fabs(pose.orientation.norm() - 1) > 0.01) {
+    if (!is_rotation(pose.orientation)) {
       throw std::runtime_error(name + " has a quaternion of norm " +
                                std::to_string(pose.orientation.norm()) +
                                ": must be 1, or it is no rotation");
+    }
+    if (is_rounded(pose.orientation)) {
+      ROS_WARN("cut: %s has a quaternion of norm %.3g, is normalised", name.c_str(),
+               pose.orientation.norm());
     }
     pose.orientation.normalize();
     path.poses.push_back(frame * pose);
@@ -99,10 +103,7 @@ bool Services::cut(Cut::Request& request, Cut::Response& response) {
 
 std::set<std::string> Services::select(const std::vector<std::string>& topics) const {
   std::set<std::string> all = simulation_.topics();
-  if (topics.empty()) {
-    return all;
-  }
-  all.insert(node_.resolveName("markers"));
+  if (topics.empty()) return all;
   std::set<std::string> chosen;
   for (const std::string& topic : topics) {
     const std::string name = node_.resolveName(topic);
@@ -120,6 +121,11 @@ std::set<std::string> Services::select(const std::vector<std::string>& topics) c
 
 std::string Services::start_recording(const std::string& path,
                                       const std::vector<std::string>& topics) {
+  if (clock_is_missing()) {
+    throw std::runtime_error(
+        "/use_sim_time is set and no /clock has come yet: all would be recorded at the time 0; "
+        "start the clock (rosbag play --clock) or unset /use_sim_time");
+  }
   const std::string bag = recorder_.start(path, select(topics));
   simulation_.record_scene();
   ROS_INFO("recording %s", bag.c_str());

@@ -21,6 +21,9 @@
 
 namespace tissue_sim {
 
+/// Whether /use_sim_time is set, but no /clock came yet: nothing can be recorded.
+inline bool clock_is_missing() { return ros::Time::isSimTime() && ros::Time::now().isZero(); }
+
 class Services {
  public:
   /// Builds the connections to ROS of a scene; throws what Simulation's constructor throws.

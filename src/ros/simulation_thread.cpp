@@ -8,6 +8,7 @@ namespace tissue_sim {
 namespace {
 
 constexpr std::chrono::milliseconds kIdle(200);  // between two looks at a simulation at rest
+constexpr std::chrono::milliseconds kHold(20);   // between its forces and transforms
 
 }  // namespace
 
@@ -40,6 +41,7 @@ void SimulationThread::start_session() {
     cut.reply.set_value({false, "the simulation was started anew", {}});
   }
   motion_.assign(scene.tools.size(), ToolMotion());
+  entries_.assign(scene.tools.size(), ToolEntry());
   pace_.emplace(scene.frame_rate);
   pace_->restart(WallClock::now());
   real_time_factor_.restart();
@@ -52,8 +54,7 @@ void SimulationThread::start_session() {
   update_status();
   std::set<std::string> topics = session_.publications->topics();
   for (const auto& tool : *session_.tools) {
-    topics.insert(tool->jaw_topic());
-    if (!tool->pose_topic().empty()) topics.insert(tool->pose_topic());
+    topics.merge(tool->topics());
   }
   const std::lock_guard<std::mutex> lock(mutex_);
   tools_ = session_.tools;
@@ -70,7 +71,7 @@ void SimulationThread::run() {
     std::vector<std::function<void()>> work;
     {
       const WallTime now = WallClock::now();
-      const WallTime until = !active() ? now + kIdle : run_.paused ? now : pace_->due();
+      const WallTime until = !active() ? now + kHold : run_.paused ? now : pace_->due();
       std::unique_lock<std::mutex> lock(mutex_);
       wake_.wait_until(lock, until, [this] { return stop_ || !work_.empty(); });
       if (stop_) return;
@@ -80,10 +81,13 @@ void SimulationThread::run() {
     const WallTime now = WallClock::now();
     if (active()) {
       if (run_.paused || now >= pace_->due()) frame();
-    } else if (now - shown >= kIdle) {
-      shown = now;
-      run_.real_time_factor = 0;
-      session_.publications->show(*session_.simulation, report_, run_);
+    } else {
+      if (now - shown >= kIdle) {
+        shown = now;
+        run_.real_time_factor = 0;
+        session_.publications->show(*session_.simulation, report_, run_);
+      }
+      session_.publications->hold(report_, run_);
     }
   }
 }
@@ -91,18 +95,26 @@ void SimulationThread::run() {
 void SimulationThread::move_tools(AppliedInput& input) {
   const double reach = parameters_.max_tool_speed / session_.simulation->scene().frame_rate;
   input.tools = motion_;
+  input.grip_pressures.resize(motion_.size());
   for (std::size_t i = 0; i < input.tools.size(); ++i) {
     const std::optional<ToolInput::Sample> sample = (*session_.tools)[i]->take();
     if (!sample) continue;
     ToolMotion& m = input.tools[i];
     m.end = sample->pose;
     m.jaw_end = static_cast<float>(sample->jaw);
+    input.grip_pressures[i] = sample->grip_pressure;
     // What an arm did during a pause must not cut a straight line through the tissue now.
     const bool strayed = resumed_ && (m.end.position - m.begin.position).norm() > reach;
-    if (!m.present || sample->placed || strayed) {
-      m.begin = m.end;
+    const Scene& scene = session_.simulation->scene();
+    const bool placed = !m.present || sample->placed || strayed;
+    if (placed) {
+      const std::string note = entries_[i].place(scene.tools[i], m.end, m.jaw_end, scene.cell_size,
+                                                 session_.simulation->tissue());
+      if (!note.empty()) ROS_WARN("%s", note.c_str());
       m.jaw_begin = m.jaw_end;
     }
+    m.end = entries_[i].next(m.end, 1 / scene.frame_rate);
+    if (placed) m.begin = m.end;
     m.present = true;
   }
   resumed_ = false;

@@ -16,6 +16,7 @@
 #include "ros/pace.h"
 #include "ros/parameters.h"
 #include "ros/publications.h"
+#include "ros/tool_entry.h"
 #include "ros/tool_input.h"
 #include "tissue_sim/simulation.h"
 
@@ -77,7 +78,7 @@ class SimulationThread {
 
   RunStatus status() const;
   std::shared_ptr<ToolInputs> tools() const;
-  /// Names of the topics that a recording holds unless others are asked for: all but markers.
+  /// Names of the topics that a recording holds unless others are asked for: all.
   std::set<std::string> topics() const;
 
  private:
@@ -104,6 +105,7 @@ class SimulationThread {
   // Of the thread alone.
   Session session_;
   std::vector<ToolMotion> motion_;  // at rest where the last frame left them
+  std::vector<ToolEntry> entries_;  // of each tool
   std::optional<Pace> pace_;
   RealTimeFactor real_time_factor_;
   FrameReport report_;  // of the last frame

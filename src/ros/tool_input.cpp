@@ -3,40 +3,56 @@
 #include <ros/console.h>
 
 #include <cmath>
-#include <numeric>
 
 #include "ros/conversions.h"
+#include "ros/jaw_check.h"
 
 namespace tissue_sim {
+namespace {
 
-std::uint64_t ToolInput::Counts::all_refused() const {
-  return std::accumulate(refused.begin(), refused.end(), std::uint64_t{0});
+double wall_seconds(WallTime time) {
+  return std::chrono::duration<double>(time.time_since_epoch()).count();
 }
 
-ToolInput::ToolInput(const ros::NodeHandle& node, const std::string& tool,
-                     const ToolParameters& source, const PoseLimits& limits, const Frames& frames,
+}  // namespace
+
+ToolInput::ToolInput(const ros::NodeHandle& node, const Tool& tool, const ToolParameters& source,
+                     const PoseLimits& limits, const Frames& frames, const Box& tissue,
                      Recorder& recorder)
     : tool_(tool),
       tf_frame_(source.tf_frame),
+      interpolates_(source.interpolate == "linear"),
       frames_(frames),
+      tissue_(tissue),
       recorder_(recorder),
-      check_(limits) {
+      check_(limits),
+      last_came_(WallClock::now()) {
   ros::NodeHandle handle(node);
-  pose_topic_ = node.resolveName(tool + "/measured_cp");
-  jaw_topic_ = node.resolveName(tool + "/jaw/measured_js");
+  const std::string poses = tool.name + "/measured_cp", jaws = tool.name + "/jaw/measured_js";
+  pose_topic_ = node.resolveName(poses);
+  jaw_topic_ = node.resolveName(jaws);
   const ros::TransportHints hints = ros::TransportHints().tcpNoDelay();
   // Deep queues: only the newest pose moves the tool, but a recording wants them all.
   if (!tf_frame_.empty()) {
     pose_topic_.clear();
   } else if (source.pose_type == "TransformStamped") {
-    pose_subscriber_ =
-        handle.subscribe(tool + "/measured_cp", 1000, &ToolInput::on_transform, this, hints);
+    pose_subscriber_ = handle.subscribe(poses, 1000, &ToolInput::on_transform, this, hints);
   } else {
-    pose_subscriber_ =
-        handle.subscribe(tool + "/measured_cp", 1000, &ToolInput::on_pose, this, hints);
+    pose_subscriber_ = handle.subscribe(poses, 1000, &ToolInput::on_pose, this, hints);
   }
-  jaw_subscriber_ =
-      handle.subscribe(tool + "/jaw/measured_js", 1000, &ToolInput::on_jaw, this, hints);
+  jaw_subscriber_ = handle.subscribe(jaws, 1000, &ToolInput::on_jaw, this, hints);
+  if (tool.type == ToolType::kGrasper) {
+    const std::string pressure = tool.name + "/grip_pressure";
+    grip_topic_ = node.resolveName(pressure);
+    grip_subscriber_ = handle.subscribe(pressure, 100, &ToolInput::on_grip_pressure, this, hints);
+  }
+}
+
+std::set<std::string> ToolInput::topics() const {
+  std::set<std::string> topics = {jaw_topic_};
+  if (!pose_topic_.empty()) topics.insert(pose_topic_);
+  if (!grip_topic_.empty()) topics.insert(grip_topic_);
+  return topics;
 }
 
 void ToolInput::on_pose(const geometry_msgs::PoseStamped::ConstPtr& message) {
@@ -55,10 +71,12 @@ void ToolInput::accept(const std_msgs::Header& header, const Pose& in_frame) {
     frame = frames_.in_world(header.frame_id, header.stamp);
   } catch (const tf2::TransformException& e) {
     const std::lock_guard<std::mutex> lock(mutex_);
+    came_ = true;
+    last_came_ = WallClock::now();
     refuse(Refusal::kUnknownFrame, e.what());
     return;
   }
-  check(frame * in_frame, header.stamp.isZero() ? ros::Time::now() : header.stamp);
+  check(frame, in_frame, header.stamp.isZero() ? ros::Time::now() : header.stamp);
 }
 
 void ToolInput::follow_tf() {
@@ -68,76 +86,151 @@ void ToolInput::follow_tf() {
     pose = frames_.newest(tf_frame_, stamp);
   } catch (const tf2::TransformException& e) {
     const std::lock_guard<std::mutex> lock(mutex_);
-    refuse(Refusal::kUnknownFrame, e.what());
+    waiting_ = e.what();
+    if (may_warn()) ROS_WARN("%s waits for a transform: %s", tool().c_str(), e.what());
     return;
   }
   {
     const std::lock_guard<std::mutex> lock(mutex_);
+    waiting_.clear();
     if (sample_ && stamp == tf_stamp_ && !stamp.isZero()) return;  // nothing new
     tf_stamp_ = stamp;
   }
-  check(pose, stamp.isZero() ? ros::Time::now() : stamp);
+  check(pose, Pose(), stamp.isZero() ? ros::Time::now() : stamp);
 }
 
-void ToolInput::check(Pose pose, const ros::Time& stamp) {
+// Where /clock begins anew (a bag that loops) so do the stamps; the wall's is only corrected a bit.
+void ToolInput::forget_if_time_jumped_back() {
+  const ros::Time now = ros::Time::now();
+  if (now + ros::Duration(0.1) < newest_time_) check_.forget();
+  newest_time_ = now;
+}
+
+void ToolInput::check(const Pose& frame, const Pose& in_frame, const ros::Time& stamp) {
   const std::lock_guard<std::mutex> lock(mutex_);
-  const PoseCheck::Verdict verdict = check_.check(pose, stamp.toSec());
+  const WallTime now = WallClock::now();
+  came_ = true;
+  last_came_ = now;
+  forget_if_time_jumped_back();
+  if (is_rotation(in_frame.orientation) && is_rounded(in_frame.orientation) && !rounded_) {
+    rounded_ = true;
+    ROS_WARN("%s: a quaternion has norm %.3g, is normalised, and so are all from 0.9 to 1.1",
+             tool().c_str(), in_frame.orientation.norm());
+  }
+  Pose pose = frame * in_frame;
+  const PoseCheck::Verdict verdict = check_.check(pose, stamp.toSec(), wall_seconds(now));
   if (verdict.refusal) {
     refuse(*verdict.refusal, verdict.text);
     return;
   }
   ++counts_.accepted;
-  if (verdict.placed && sample_) {
+  far_ = distance_warning(tissue_, frame, in_frame.position);
+  if (!far_.empty() && !warned_of_distance_) {
+    warned_of_distance_ = true;
+    ROS_WARN("%s is %s", tool().c_str(), far_.c_str());
+  }
+  if (verdict.placed && sample_ && !verdict.text.empty()) {
     ++counts_.placed;
-    ROS_WARN("%s is placed anew, without moving there: its pose is %s", tool_.c_str(),
-             verdict.text.c_str());
+    if (may_warn()) {
+      ROS_WARN("%s is placed at its new pose, without moving there: %s", tool().c_str(),
+               verdict.text.c_str());
+    }
+  }
+  if (verdict.placed || !sample_) {
+    pose_track_.place(pose, wall_seconds(now));
+  } else {
+    pose_track_.add(pose, wall_seconds(now));
   }
   if (!sample_) sample_ = Sample();
   sample_->pose = pose;
-  sample_->placed = verdict.placed || (fresh_ && sample_->placed);
-  fresh_ = true;
+  // Until the placed one was taken, whatever comes after it is placed, too.
+  sample_->placed = sample_->placed || verdict.placed;
+  sample_->fresh = true;
 }
 
 void ToolInput::refuse(Refusal refusal, const std::string& text) {
-  ++counts_.refused[static_cast<int>(refusal)];
-  ROS_WARN_THROTTLE(1, "%s: pose refused (%s): %s; %lu refused so far", tool_.c_str(),
-                    name_of(refusal), text.c_str(),
-                    static_cast<unsigned long>(counts_.all_refused()));
+  ++counts_.refused[static_cast<std::size_t>(refusal)];
+  if (!may_warn()) return;
+  ROS_WARN("%s: pose refused (%s): %s; %lu refused so far", tool().c_str(), name_of(refusal),
+           text.c_str(), static_cast<unsigned long>(counts_.all_refused()));
+}
+
+bool ToolInput::may_warn() {
+  const WallTime now = WallClock::now();
+  if (last_warning_ != WallTime() && now - last_warning_ < std::chrono::seconds(1)) return false;
+  last_warning_ = now;
+  return true;
 }
 
 void ToolInput::on_jaw(const sensor_msgs::JointState::ConstPtr& message) {
   recorder_.write(jaw_topic_, message, ros::Time::now());
+  const JawAngle jaw = jaw_angle(*message);
   const std::lock_guard<std::mutex> lock(mutex_);
-  if (message->position.empty() || !std::isfinite(message->position.front())) {
+  if (!jaw.problem.empty()) {
     ++counts_.jaws_refused;
-    ROS_WARN_THROTTLE(1, "%s: jaw angle refused: %s", tool_.c_str(),
-                      message->position.empty() ? "the message has no position" : "not finite");
+    if (may_warn()) ROS_WARN("%s: jaw angle refused: %s", tool().c_str(), jaw.problem.c_str());
     return;
   }
-  jaw_ = message->position.front();
-  fresh_ = true;
+  const double now = wall_seconds(WallClock::now());
+  if (jaw_came_) {
+    jaw_track_.add(jaw.angle, now);
+  } else {
+    jaw_track_.place(jaw.angle, now);
+  }
+  jaw_came_ = true;
+  jaw_ = jaw.angle;
+  if (sample_) sample_->fresh = true;
+}
+
+void ToolInput::on_grip_pressure(const std_msgs::Float64::ConstPtr& message) {
+  recorder_.write(grip_topic_, message, ros::Time::now());
+  const std::lock_guard<std::mutex> lock(mutex_);
+  const double pressure = message->data;
+  if (pressure == 0 || (pressure >= 1 && pressure <= 1e7)) {
+    grip_pressure_ = pressure;
+  } else if (may_warn()) {
+    ROS_WARN("%s: grip_pressure %g refused: must be from 1 to 1e7 Pa, or 0 for the scene's",
+             tool().c_str(), pressure);
+  }
 }
 
 std::optional<ToolInput::Sample> ToolInput::take() {
   if (!tf_frame_.empty()) follow_tf();
   const std::lock_guard<std::mutex> lock(mutex_);
-  if (!fresh_ || !sample_) return std::nullopt;
+  if (!sample_) return std::nullopt;
   Sample sample = *sample_;
   sample.jaw = jaw_;
-  fresh_ = false;
-  sample_->placed = false;
+  sample.grip_pressure = grip_pressure_;
+  if (interpolates_) {
+    const double now = wall_seconds(WallClock::now());
+    sample.pose = pose_track_.at(now);
+    if (jaw_came_) sample.jaw = jaw_track_.at(now);
+  }
+  sample_->placed = sample_->fresh = false;
   return sample;
 }
 
 void ToolInput::rewind() {
   const std::lock_guard<std::mutex> lock(mutex_);
-  fresh_ = sample_.has_value();
-  if (sample_) sample_->placed = true;
+  check_.forget();
+  if (!sample_) return;
+  sample_->placed = sample_->fresh = true;
+  pose_track_.place(sample_->pose, wall_seconds(WallClock::now()));
 }
 
-ToolInput::Counts ToolInput::counts() const {
+ToolStatus ToolInput::status() const {
   const std::lock_guard<std::mutex> lock(mutex_);
-  return counts_;
+  ToolStatus s;
+  s.tool = tool();
+  s.follows_tf = !tf_frame_.empty();
+  s.source = s.follows_tf ? tf_frame_ : pose_topic_;
+  s.publishers = pose_subscriber_.getNumPublishers();
+  s.waiting = waiting_;
+  s.came = came_;
+  s.silent = std::chrono::duration<double>(WallClock::now() - last_came_).count();
+  s.far = far_;
+  s.counts = counts_;
+  return s;
 }
 
 }  // namespace tissue_sim

@@ -10,6 +10,8 @@
 #include <sstream>
 #include <stdexcept>
 
+#include "ros/pose_check.h"
+
 namespace tissue_sim {
 namespace {
 
@@ -42,9 +44,9 @@ void add(const Row& row, const std::string& where, std::vector<TimedSample>& tra
   for (const double x : row) {
     if (!std::isfinite(x)) refuse(where, "has a value that is not finite");
   }
-  const double norm = s.pose.orientation.norm();
-  if (std::fabs(norm - 1) > 0.01) {
-    refuse(where, "has a quaternion of norm " + std::to_string(norm) + ": must be 1 within 0.01");
+  if (!is_rotation(s.pose.orientation)) {
+    refuse(where, "has a quaternion of norm " + std::to_string(s.pose.orientation.norm()) +
+                      ": must be 1 (0.9 to 1.1 is normalised)");
   }
   s.pose.orientation.normalize();
   if (!trajectory.empty() && !(s.time > trajectory.back().time)) {

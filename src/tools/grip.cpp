@@ -12,6 +12,10 @@ constexpr double kForget = 0.8;    // of a stiffness that was felt, in a frame
 
 }  // namespace
 
+double squeezed(double pressure, double jaw) {
+  return pressure * (1 + (kMostSqueeze - 1) * std::clamp(-jaw / kFullSqueeze, 0.0, 1.0));
+}
+
 void Grip::limit(double pressure, double duration, ToolMotion& motion) const {
   const auto angle = [](double value) {
     return static_cast<float>(std::clamp<double>(value, 0, M_PI));

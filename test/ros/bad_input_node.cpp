@@ -6,6 +6,7 @@
 #include <sensor_msgs/PointCloud2.h>
 #include <sys/wait.h>
 #include <tissue_sim/LoadScene.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <cmath>
@@ -115,6 +116,82 @@ TEST_F(Poses, JawThatIsNotFiniteIsRefused) {
   expect_refused("jaw angles refused", [&] { jaws.publish(sensor_msgs::JointState()); });
 }
 
+// The message of a part of the node in diagnostics.
+std::string said(const Topic<diagnostic_msgs::DiagnosticArray>& diagnostics,
+                 const std::string& part) {
+  const auto m = diagnostics.next();
+  for (const auto& s : m ? m->status : diagnostic_msgs::DiagnosticArray().status) {
+    if (s.name == "simulator: " + part) return (s.level == s.OK ? "OK: " : "WARN: ") + s.message;
+  }
+  return "";
+}
+
+TEST_F(Poses, DiagnosticsNamesTheTopicWhereNoneEverCame) {
+  const std::string text = said(diagnostics_, "tools");
+  EXPECT_EQ(text.find("WARN: "), 0u) << text;
+  EXPECT_NE(text.find("no pose ever came on /simulator/needle/measured_cp (0 publishers)"),
+            std::string::npos)
+      << text;
+  EXPECT_EQ(text.find("probe:"), std::string::npos) << "that one is driven; " << text;
+}
+
+TEST_F(Poses, DiagnosticsSaysThatAPublisherIsGone) {
+  ros::WallDuration(2.5).sleep();
+  EXPECT_TRUE(wait_until(
+      [&] { return said(diagnostics_, "tools").find("probe: no pose on") != std::string::npos; }));
+}
+
+TEST_F(Poses, DiagnosticsSaysThatPosesAreInMillimetres) {
+  EXPECT_TRUE(wait_until([&] {
+    probe_.send(at(10.0, 72.0));
+    ros::WallDuration(0.02).sleep();
+    return is_at(at(10.0, 72.0));
+  }));
+  EXPECT_TRUE(wait_until([&] {
+    probe_.send(at(10.0, 72.0));
+    const std::string text = said(diagnostics_, "tools");
+    return text.find("from all tissue; positions divided by 1000") != std::string::npos;
+  }));
+}
+
+TEST_F(Poses, AStampThatStaysTheSameIsBelieved) {
+  const ros::Time stamp = ros::Time::now() - ros::Duration(5);
+  const Pose away = at(0.12);
+  EXPECT_TRUE(wait_until(
+      [&] {
+        probe_.send(away, "", stamp);
+        ros::WallDuration(0.02).sleep();
+        return is_at(away);
+      },
+      3));
+}
+
+TEST_F(Poses, RoundedQuaternionsAreNormalised) {
+  const int before = refused("poses refused, no rotation");
+  const Pose away{at(0.13).position, Quat(0, 0.99, 0, 0)};
+  EXPECT_TRUE(wait_until(
+      [&] {
+        probe_.send(away);
+        ros::WallDuration(0.02).sleep();
+        return is_at(away);
+      },
+      3));
+  EXPECT_NEAR(from_message(inputs_.last()->tools[1].end).orientation.norm(), 1, 1e-9);
+  EXPECT_EQ(refused("poses refused, no rotation"), before);
+}
+
+TEST_F(Poses, JawInDegreesIsRefused) {
+  ros::NodeHandle node;
+  ros::Publisher jaws =
+      node.advertise<sensor_msgs::JointState>("/simulator/probe/jaw/measured_js", 10);
+  ASSERT_TRUE(wait_until([&] { return jaws.getNumSubscribers() > 0; }));
+  expect_refused("jaw angles refused", [&] {
+    sensor_msgs::JointState m;
+    m.position = {60};
+    jaws.publish(m);
+  });
+}
+
 TEST_F(Poses, AnArmThatStaysAtItsNewPlaceIsPlacedThereWithoutSweeping) {
   const Pose away = at(40.0);
   for (int i = 0; i < 30 && !is_at(away); ++i) {
@@ -204,11 +281,13 @@ struct Ended {
   std::string output;
 };
 
-// Runs a node that should end by itself; it lies where this test does.
-Ended run(const std::string& arguments) {
+// Runs a node that should end by itself, or until `seconds` have passed; it lies where this test
+// does.
+Ended run(const std::string& arguments, int seconds = 20) {
   const std::string node =
       (std::filesystem::read_symlink("/proc/self/exe").parent_path() / "simulator_node").string();
-  const std::string command = "timeout 20 '" + node + "' __name:=broken " + arguments + " 2>&1";
+  const std::string command = "timeout -s INT " + std::to_string(seconds) + " '" + node +
+                              "' __name:=broken " + arguments + " 2>&1";
   FILE* pipe = popen(command.c_str(), "r");
   Ended ended{-1, ""};
   char part[256];
@@ -244,7 +323,26 @@ TEST(Start, BadParametersAreRefusedWithTheirName) {
   expect_cannot_start(scene + "_time:=lockstep", "~time is \"lockstep\": must be wall");
   expect_cannot_start(scene + "_paused:=2", "~paused is 2");
   expect_cannot_start(scene + "_scene_file:=/also.yaml", "both set");
+  expect_cannot_start(scene + "'_tools:={probe: {interpolate: cubic}}'",
+                      "~tools/probe/interpolate is \"cubic\": must be none or linear");
   expect_cannot_start(scene + "_mesh:=/nowhere.obj", "/nowhere.obj");
+}
+
+TEST(Start, WithoutAClockARecordingWaitsAndTheNextRunDoesNotInheritIt) {
+  namespace fs = std::filesystem;
+  const fs::path folder = fs::temp_directory_path() / ("no_clock_" + std::to_string(getpid()));
+  ros::param::set("/use_sim_time", true);
+  const Ended ended =
+      run("'_scene:={cell_size: 0.005, bodies: [{shape: box}]}' _record:=true "
+          "_recording_folder:=" +
+              folder.string(),
+          6);
+  ros::param::del("/use_sim_time");
+  EXPECT_NE(ended.output.find("the recording waits"), std::string::npos) << ended.output;
+  EXPECT_TRUE(!fs::exists(folder) || fs::is_empty(folder)) << "nothing of 1970";
+  EXPECT_FALSE(ros::param::has("/broken/record"));
+  fs::remove_all(folder);
+  ros::param::del("/broken");
 }
 
 TEST(Start, BadTreesOfParametersAreRefusedLikeYaml) {

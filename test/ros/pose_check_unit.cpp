@@ -1,6 +1,7 @@
 #include <gtest/gtest.h>
 
 #include <limits>
+#include <memory>
 
 #include "ros/pose_check.h"
 
@@ -26,6 +27,14 @@ TEST(PoseCheck, MakesAlmostUnitQuaternionsUnit) {
   Pose pose{Vec3::Zero(), Quat(0.707, 0, 0.707, 0)};
   EXPECT_FALSE(c.check(pose, 0).refusal);
   EXPECT_NEAR(pose.orientation.norm(), 1, 1e-15);
+  for (const double norm : {0.9001, 0.99, 1.0999}) {
+    c.forget();
+    Pose rounded{Vec3::Zero(), Quat(0, norm, 0, 0)};
+    EXPECT_FALSE(c.check(rounded, 0).refusal) << norm;
+    EXPECT_NEAR(rounded.orientation.norm(), 1, 1e-15);
+  }
+  EXPECT_FALSE(is_rounded(Quat(0.707, 0, 0.707, 0)));
+  EXPECT_TRUE(is_rounded(Quat(0.7, 0, 0.7, 0)));
 }
 
 TEST(PoseCheck, RefusesWithTheReason) {
@@ -34,7 +43,11 @@ TEST(PoseCheck, RefusesWithTheReason) {
   EXPECT_EQ(check(c, at(std::numeric_limits<double>::quiet_NaN()), 101).refusal,
             Refusal::kNotFinite);
   EXPECT_EQ(check(c, {Vec3::Zero(), Quat(0, 0, 0, 0)}, 101).refusal, Refusal::kNoRotation);
-  EXPECT_EQ(check(c, at(0), 99.9).refusal, Refusal::kOlder);
+  EXPECT_EQ(check(c, {Vec3::Zero(), Quat(0.89, 0, 0, 0)}, 101).refusal, Refusal::kNoRotation);
+  EXPECT_EQ(check(c, {Vec3::Zero(), Quat(1.11, 0, 0, 0)}, 101).refusal, Refusal::kNoRotation);
+  const PoseCheck::Verdict older = check(c, at(0), 99.9);
+  EXPECT_EQ(older.refusal, Refusal::kOlder);
+  EXPECT_EQ(older.text, "it is 0.100 s older than the last one used");
   EXPECT_EQ(check(c, at(0.3), 100.02).refusal, Refusal::kJump);
   EXPECT_FALSE(check(c, at(0.01), 100.1).refusal) << "the good ones go on";
 }
@@ -73,15 +86,61 @@ TEST(PoseCheck, DoesNotPlaceWhatFlickers) {
   }
 }
 
-TEST(PoseCheck, TakesAnArmWhoseClockWentBack) {
+TEST(PoseCheck, BelievesAClockThatWentBackAndGoesOn) {
+  for (const double rate : {0.25, 1.0, 4.0}) {  // of rosbag play
+    PoseCheck c{PoseLimits()};
+    c.check(*std::make_unique<Pose>(at(0)), 100, 1000);
+    int refused = 0;
+    for (int i = 0; i < 20; ++i) {  // a bag of 30 s that loops, the arm far from where it ended
+      Pose pose = at(2 + 0.001 * i);
+      refused += c.check(pose, 70 + 0.01 * i, 1000.01 + 0.01 / rate * i).refusal.has_value();
+    }
+    EXPECT_EQ(refused, 1) << rate;
+  }
+}
+
+TEST(PoseCheck, DoesNotBelieveOldPosesThatComeLateAndAllAtOnce) {
   PoseCheck c{PoseLimits()};
   check(c, at(0), 100);
+  for (int i = 0; i < 9; ++i) {
+    Pose pose = at(0.01 * i);
+    EXPECT_EQ(c.check(pose, 99 + 0.1 * i, 100.001).refusal, Refusal::kOlder);
+  }
+}
+
+TEST(PoseCheck, BelievesAStampThatStaysTheSame) {  // rostopic pub -r 50 -f pose.yaml
+  PoseCheck c{PoseLimits()};
+  c.check(*std::make_unique<Pose>(at(0)), 100, 1000);
   int refused = 0;
-  for (int i = 0; i < 20; ++i) refused += check(c, at(0), 50 + 0.01 * i).refusal.has_value();
+  for (int i = 1; i <= 355; ++i) {
+    Pose pose = at(0.02);
+    const PoseCheck::Verdict v = c.check(pose, 50, 1000 + 0.02 * i);
+    refused += v.refusal.has_value();
+    EXPECT_EQ(v.placed, i == PoseCheck::kStay);
+  }
   EXPECT_EQ(refused, PoseCheck::kStay - 1);
-  PoseCheck stuck{PoseLimits()};
-  check(stuck, at(0), 100);
-  for (int i = 0; i < 20; ++i) EXPECT_TRUE(check(stuck, at(0), 50).refusal) << "one old message";
+  Pose moved = at(0.12);
+  EXPECT_FALSE(c.check(moved, 50, 1000 + 0.02 * 357).refusal) << "may move as time goes on";
+  Pose far = at(3);
+  EXPECT_TRUE(c.check(far, 50, 1000 + 0.02 * 358).refusal) << "but no faster than an arm";
+}
+
+TEST(PoseCheck, BelievesNoneOfManyWithinATenthOfASecond) {  // at 1 kHz, ten times too large
+  PoseCheck c{PoseLimits()};
+  check(c, at(0.1), 100);
+  int refused = 0;
+  for (int i = 1; i <= 200; ++i) refused += check(c, at(1), 100 + 0.001 * i).refusal.has_value();
+  EXPECT_EQ(refused, 99);
+}
+
+TEST(PoseCheck, ForgetsWhereItWasWhenTimeBeginsAnew) {
+  PoseCheck c{PoseLimits()};
+  check(c, at(0), 100);
+  c.forget();
+  const PoseCheck::Verdict v = check(c, at(3), 0.5);
+  EXPECT_FALSE(v.refusal);
+  EXPECT_TRUE(v.placed);
+  EXPECT_TRUE(v.text.empty()) << "nothing to warn of";
 }
 
 TEST(PoseCheck, AfterASilenceAnArmIsPlacedAndSweepsNothing) {

@@ -39,7 +39,7 @@ TEST_F(Services, PausedItStandsStillAndStepsByFrames) {
 }
 
 TEST_F(Services, StepsFromTheStartGiveTheSameBits) {
-  std::vector<std::uint64_t> sums;
+  std::vector<std::string> sums;
   pause(true);
   Topic<SimulationState> state("/simulator/state");
   for (int run = 0; run < 2; ++run) {

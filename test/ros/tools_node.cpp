@@ -2,6 +2,8 @@
 #include <geometry_msgs/TransformStamped.h>
 #include <geometry_msgs/WrenchStamped.h>
 #include <sensor_msgs/JointState.h>
+#include <std_msgs/Float64.h>
+#include <tf2_msgs/TFMessage.h>
 #include <tf2_ros/buffer.h>
 #include <tf2_ros/static_transform_broadcaster.h>
 #include <tf2_ros/transform_broadcaster.h>
@@ -181,6 +183,80 @@ TEST_F(Tools, WrenchPushesBackAndTurnsWithTheTool) {
   EXPECT_TRUE(shown.count("probe/force"));
   EXPECT_TRUE(shown.count("fragments/box"));
   arm.sweep(pressed, above, 0.3);
+}
+
+TEST_F(Tools, ForcesAndTransformsGoOnWhilePaused) {
+  Topic<geometry_msgs::WrenchStamped> spatial("/simulator/probe/spatial/measured_cf");
+  Topic<tf2_msgs::TFMessage> tf("/tf");
+  Arm arm("probe");
+  ASSERT_TRUE(wait_until([&] {
+    arm.send(pointing_down(0.01, 0, 0.05));
+    ros::WallDuration(0.02).sleep();
+    return spatial.count() > 3 && tf.count() > 3;
+  }));
+  pause(true);
+  ros::WallDuration(0.1).sleep();  // what was under way
+  const auto last = spatial.last();
+  const std::size_t forces = spatial.count(), transforms = tf.count();
+  EXPECT_TRUE(wait_until([&] { return spatial.count() > forces + 10; }, 2));
+  EXPECT_TRUE(wait_until([&] { return tf.count() > transforms + 10; }, 2));
+  EXPECT_GT(spatial.last()->header.stamp, last->header.stamp);
+  EXPECT_EQ(spatial.last()->wrench.force.z, last->wrench.force.z);
+  pause(false);
+}
+
+TEST_F(Tools, AfterAResetTheFirstPoseCountsWhateverItsStamp) {
+  Topic<FrameInputMessage> inputs("/simulator/inputs");
+  Arm arm("probe");
+  ASSERT_TRUE(wait_until([&] {
+    arm.send(pointing_down(0.01, 0, 0.05));
+    ros::WallDuration(0.02).sleep();
+    return inputs.count() > 0 && inputs.last()->tools[1].present;
+  }));
+  trigger("reset");
+  const Pose begin = pointing_down(0.31, 0, 0.07);  // of a trajectory that begins anew
+  arm.send(begin, "", ros::Time::now() - ros::Duration(100));
+  EXPECT_TRUE(wait_until(
+      [&] {
+        return (from_message(inputs.last()->tools[1].end).position - begin.position).norm() < 1e-9;
+      },
+      3));
+}
+
+TEST_F(Tools, GripIsSaidAndItsPressureSetWhileItRuns) {
+  Topic<FrameInputMessage> inputs("/simulator/inputs");
+  Topic<JawGrip> grips("/simulator/grasper/grip");
+  ros::NodeHandle node;
+  ros::Publisher pressure =
+      node.advertise<std_msgs::Float64>("/simulator/grasper/grip_pressure", 10);
+  ros::Publisher jaws =
+      node.advertise<sensor_msgs::JointState>("/simulator/grasper/jaw/measured_js", 10);
+  ASSERT_TRUE(
+      wait_until([&] { return pressure.getNumSubscribers() > 0 && jaws.getNumSubscribers() > 0; }));
+  Arm arm("grasper");
+  const auto limit_is = [&](double set, double jaw, double expected) {
+    return wait_until([&] {
+      std_msgs::Float64 p;
+      p.data = set;
+      pressure.publish(p);
+      sensor_msgs::JointState j;
+      j.position = {jaw};
+      jaws.publish(j);
+      arm.send(pointing_down(0.2, 0.2, 0.1));
+      ros::WallDuration(0.02).sleep();
+      return grips.count() > 0 &&
+             std::fabs(grips.last()->pressure_limit - expected) < 1e-3 * expected &&
+             std::fabs(inputs.last()->tools[4].grip_pressure - expected) < 1e-3 * expected;
+    });
+  };
+  EXPECT_TRUE(limit_is(0, 0.3, 3000)) << "the scene's";
+  EXPECT_TRUE(limit_is(5000, 0.3, 5000));
+  EXPECT_TRUE(limit_is(5000, -0.175, 10000)) << "half squeezed";
+  EXPECT_TRUE(limit_is(5000, -2, 15000)) << "and no more than three times";
+  EXPECT_TRUE(limit_is(5000, 60, 15000)) << "degrees are refused";
+  EXPECT_EQ(grips.last()->header.frame_id, "grasper");
+  EXPECT_EQ(grips.last()->pressure, 0) << "in the air";
+  EXPECT_TRUE(limit_is(0, 0, 3000));
 }
 
 TEST_F(Tools, ToolsAreInTf) {

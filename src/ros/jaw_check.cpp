@@ -1,0 +1,35 @@
+#include "ros/jaw_check.h"
+
+#include <cmath>
+#include <cstdio>
+
+namespace tissue_sim {
+
+JawAngle jaw_angle(const sensor_msgs::JointState& message) {
+  JawAngle jaw;
+  if (message.position.empty()) {
+    jaw.problem = "the message has no position";
+    return jaw;
+  }
+  std::size_t joint = 0;
+  for (std::size_t i = 0; i < message.position.size() && i < message.name.size(); ++i) {
+    if (message.name[i].find("jaw") != std::string::npos) joint = i;
+  }
+  jaw.angle = message.position[joint];
+  char text[160];
+  if (!std::isfinite(jaw.angle)) {
+    jaw.problem = "not finite";
+  } else if (std::fabs(jaw.angle) > 1.001 * M_PI) {  // rounded by hand
+    const bool degrees = std::fabs(jaw.angle) <= 360;
+    std::snprintf(text, sizeof text, "%g rad is no angle between jaws (at most pi)", jaw.angle);
+    jaw.problem = text;
+    if (degrees) {
+      std::snprintf(text, sizeof text, ": is it in degrees? These are %.4g rad",
+                    jaw.angle * M_PI / 180);
+      jaw.problem += text;
+    }
+  }
+  return jaw;
+}
+
+}  // namespace tissue_sim

@@ -1,0 +1,20 @@
+// Which of the jaw angles that come in can be meant.
+#pragma once
+
+#include <sensor_msgs/JointState.h>
+
+#include <string>
+
+namespace tissue_sim {
+
+struct JawAngle {
+  double angle = 0;     ///< [rad], as it came; below 0 squeezes
+  std::string problem;  ///< why it cannot be used, with values and the guess; "" for none
+};
+
+/// The jaw's angle in a JointState: the position of the joint whose name holds "jaw", where names
+/// are given and several joints are in it, else the first. Refused: none, one not finite, and one
+/// beyond pi or below -pi, as nobody's jaws are: it is in degrees then.
+JawAngle jaw_angle(const sensor_msgs::JointState& message);
+
+}  // namespace tissue_sim

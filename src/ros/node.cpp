@@ -3,6 +3,7 @@
 #include <ros/console.h>
 #include <ros/names.h>
 #include <ros/time.h>
+#include <rosgraph_msgs/Clock.h>
 
 #include <set>
 #include <string>
@@ -32,14 +33,20 @@ Node::Node(const ros::NodeHandle& node)
       frames_(parameters_.world_frame, parameters_.tf_tolerance),
       pose_spinner_(1, &pose_queue_),
       service_spinner_(kServiceThreads, &service_queue_) {
-  if (ros::Time::isSimTime()) {
-    ROS_WARN("/use_sim_time is set: messages carry the time of /clock, frames keep to the wall's");
-  }
   const Scene scene = read_scene_parameters(node);
   Parameters first = parameters_;
   const RecordRequest record = record_request(parameters_.record);
   first.paused = parameters_.paused || record.wanted;  // so that the bag holds frame 0
-  simulation_ = std::make_unique<SimulationThread>(make_session(scene), first);
+  if (parameters_.publish_clock) {
+    clock_publisher_ = service_node_.advertise<rosgraph_msgs::Clock>("/clock", 10, true);
+  }
+  simulation_ = std::make_unique<SimulationThread>(make_session(scene), first,
+                                                   [this](const ros::Time& now) {
+                                                     rosgraph_msgs::Clock message;
+                                                     message.clock = now;
+                                                     clock_publisher_.publish(message);
+                                                   });
+  connect_clock();
   services_ = std::make_unique<Services>(service_node_, scene, *simulation_, recorder_, frames_,
                                          [this](const Scene& s) { return make_session(s); });
   diagnostics_ = std::make_unique<Diagnostics>(service_node_, *simulation_, recorder_);
@@ -82,6 +89,25 @@ void Node::record_from_start(const std::string& name) {
   clock_timer_ = service_node_.createWallTimer(ros::WallDuration(0.1), wait);
 }
 
+void Node::connect_clock() {
+  if (parameters_.publish_clock) {
+    if (!ros::Time::isSimTime()) {
+      ROS_WARN("this node publishes /clock, but nobody follows it: set /use_sim_time to true before "
+               "nodes start");
+    }
+    return;
+  }
+  if (!ros::Time::isSimTime()) return;
+  if (parameters_.time != TimeMode::kRos) {
+    ROS_WARN("/use_sim_time is set: messages carry the time of /clock, frames do not keep to it "
+             "(time: ros would)");
+  }
+  clock_subscriber_ = pose_node_.subscribe<rosgraph_msgs::Clock>(
+      "/clock", 100, [this](const rosgraph_msgs::Clock::ConstPtr& m) {
+        simulation_->on_clock(m->clock);
+      });
+}
+
 Session Node::make_session(const Scene& scene) {
   Session session;
   session.simulation = std::make_unique<Simulation>(scene);
@@ -96,12 +122,16 @@ Session Node::make_session(const Scene& scene) {
     box.max = box.max.cwiseMax(piece.box.max);
   }
   std::set<std::string> names;
+  std::function<void()> on_sample;
+  if (parameters_.time != TimeMode::kWall) {  // no callback runs before the spinners are started
+    on_sample = [this] { simulation_->on_sample(); };
+  }
   for (const Tool& tool : scene.tools) {
     names.insert(tool.name);
     const auto source = parameters_.tools.find(tool.name);
     session.tools->push_back(std::make_unique<ToolInput>(
         pose_node_, tool, source == parameters_.tools.end() ? ToolParameters() : source->second,
-        limits, frames_, box, recorder_));
+        limits, frames_, box, recorder_, on_sample));
   }
   for (const auto& source : parameters_.tools) {
     if (names.count(source.first) == 0) {

@@ -127,6 +127,7 @@ std::string Services::start_recording(const std::string& path,
         "start the clock (rosbag play --clock) or unset /use_sim_time");
   }
   const std::string bag = recorder_.start(path, select(topics));
+  records_all_ = topics.empty();
   simulation_.record_scene();
   ROS_INFO("recording %s", bag.c_str());
   const std::int64_t frame = simulation_.status().frame;
@@ -188,14 +189,13 @@ bool Services::load_scene(LoadScene::Request& request, LoadScene::Response& resp
       throw std::runtime_error("give one of path and yaml, not " +
                                std::string(request.path.empty() ? "none" : "both"));
     }
-    if (recorder_.status().recording) {
-      throw std::runtime_error("a recording is running, and a bag holds one scene: stop it first");
-    }
     const std::lock_guard<std::mutex> lock(rebuilding_);
     const Scene scene = request.yaml.empty()
                             ? tissue_sim::load_scene(resolve_mesh_path(request.path))
                             : scene_from_yaml(request.yaml);
-    simulation_.replace(make_session_(scene));
+    Session session = make_session_(scene);
+    if (records_all_) recorder_.add(topics_of(session));
+    simulation_.replace(std::move(session));
     scene_ = scene;
     return "frame 0 of scene '" + scene.name + "'";
   });

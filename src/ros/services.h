@@ -9,6 +9,7 @@
 #include <tissue_sim/StartRecording.h>
 #include <tissue_sim/Step.h>
 
+#include <atomic>
 #include <functional>
 #include <mutex>
 #include <set>
@@ -55,6 +56,7 @@ class Services {
   MakeSession make_session_;
   std::mutex rebuilding_;  // one at a time
   Scene scene_;
+  std::atomic<bool> records_all_{false};  // the recording that runs or ran last
   std::vector<ros::ServiceServer> servers_;  // last: end before what they call
 };
 

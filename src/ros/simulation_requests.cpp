@@ -50,7 +50,9 @@ StepReply SimulationThread::step(int frames) {
   std::future<StepReply> reply;
   call([&] {
     if (run_.blew_up) throw std::runtime_error(problem_);
-    if (!run_.paused) throw std::runtime_error("the simulation is running: pause it to step it");
+    if (!run_.paused && parameters_.time != TimeMode::kLockstep) {
+      throw std::runtime_error("the simulation is running: pause it to step it");
+    }
     if (steps_left_ > 0) {
       throw std::runtime_error("another step has " + std::to_string(steps_left_) +
                                " frames to go: wait for it");
@@ -74,7 +76,7 @@ void SimulationThread::set_paused(bool paused) {
     if (paused == run_.paused) return;
     run_.paused = paused;
     resumed_ = !paused;
-    pace_->restart(WallClock::now());
+    clock_.resume();
     real_time_factor_.restart();
     update_status();
   });
@@ -97,7 +99,26 @@ void SimulationThread::replace(Session session) {
 }
 
 void SimulationThread::record_scene() {
-  call([this] { session_.publications->record_scene(); });
+  call([this] { session_.publications->record_scene(clock_.stamp()); });
+}
+
+void SimulationThread::on_clock(const ros::Time& now) {
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    jumped_back_ = jumped_back_ || now < ros_time_;
+    ros_time_ = now;
+    woken_ = true;
+  }
+  wake_.notify_all();
+}
+
+void SimulationThread::on_sample() {
+  if (parameters_.time == TimeMode::kWall) return;
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    woken_ = true;
+  }
+  wake_.notify_all();
 }
 
 RunStatus SimulationThread::status() const {

@@ -22,8 +22,6 @@
 
 namespace tissue_sim {
 
-using ToolInputs = std::vector<std::unique_ptr<ToolInput>>;  // parallels Scene::tools
-
 /// One scene's simulation and its connections to ROS.
 struct Session {
   std::unique_ptr<Simulation> simulation;

@@ -59,6 +59,15 @@ class Simulation {
   /// Puts exactly these inputs into the next frame (replay), instead of what was set.
   void apply(const AppliedInput& input);
 
+  /// The whole state between two frames, with its scene, version and checksum: restore() of a new
+  /// Simulation of the same scene goes on from there with the same bits, in another process too, on
+  /// a device of the same kind. Throws std::runtime_error where the method cannot tell its state.
+  std::vector<std::uint8_t> save();
+  /// Throws std::runtime_error with the reason for what is cut short, damaged, of another version,
+  /// scene or device; then this simulation must not be used any more. A new one must not have
+  /// advanced before.
+  void restore(Span<const std::uint8_t> saved);
+
   /// Advances one frame. After a blow-up it throws std::runtime_error: build a new Simulation.
   FrameReport advance_frame();
 

@@ -75,6 +75,12 @@ class ArchiveFields {
     x.resize(self().count(x.size(), 1));
     self().raw(x.data(), x.size());
   }
+  template <class T, int Rows, int Columns, int Options>
+  void item(Eigen::Matrix<T, Rows, Columns, Options, Rows, Columns>& x) {
+    static_assert(Rows > 0 && Columns > 0, "of a size that is not fixed");
+    self().raw(x.data(), sizeof(T) * Rows * Columns);
+  }
+  void item(Quat& x) { self().raw(x.coeffs().data(), 4 * sizeof(double)); }
   template <class T>
   void item(std::set<T>& x) {
     std::vector<T> all(x.begin(), x.end());

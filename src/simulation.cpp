@@ -131,8 +131,9 @@ void Simulation::apply(const AppliedInput& input) {
   for (const BladePath& path : input.cuts) check(path);
   state_->tools = input.tools;
   if (!input.grip_pressures.empty() && input.grip_pressures.size() != input.tools.size()) {
-    throw std::invalid_argument("grip_pressures has " + std::to_string(input.grip_pressures.size()) +
-                                " values for " + std::to_string(input.tools.size()) + " tools");
+    throw std::invalid_argument("grip_pressures has " +
+                                std::to_string(input.grip_pressures.size()) + " values for " +
+                                std::to_string(input.tools.size()) + " tools");
   }
   for (const double pressure : input.grip_pressures) check_grip(pressure);
   state_->grip_pressures = input.grip_pressures;
@@ -142,7 +143,7 @@ void Simulation::apply(const AppliedInput& input) {
 
 template <class Archive>
 void Simulation::State::each_field(Archive& archive) {
-  archive(frame, tools, cuts, grips, blew_up);
+  archive(frame, tools, cuts, grips, grip_pressures, blew_up);
 }
 
 StateOrigin Simulation::State::origin() const {

@@ -36,9 +36,8 @@ std::string first_difference(const std::string& a, const std::string& b) {
   const auto line = [](const std::string& text, std::size_t at) {
     const std::size_t begin = at == 0 ? 0 : text.rfind('\n', at - 1) + 1;
     const std::string all = text.substr(std::min(begin, text.size()));
-    return all.substr(all.find_first_not_of(' ') == std::string::npos
-                          ? 0
-                          : all.find_first_not_of(' '))
+    return all
+        .substr(all.find_first_not_of(' ') == std::string::npos ? 0 : all.find_first_not_of(' '))
         .substr(0, 80);
   };
   const auto one = line(a, static_cast<std::size_t>(differ.first - a.begin()));

@@ -69,8 +69,8 @@ void fields(Archive& archive, Blocks& b) {
       for (std::size_t r = 0; r < b.regions.size(); ++r) {
         const std::vector<Block>& blocks = b.regions[r].blocks;
         if (blocks.empty() || block < &blocks.front() || block > &blocks.back()) continue;
-        all.push_back({static_cast<std::int32_t>(r),
-                       static_cast<std::int32_t>(block - blocks.data())});
+        all.push_back(
+            {static_cast<std::int32_t>(r), static_cast<std::int32_t>(block - blocks.data())});
       }
     }
   }
@@ -119,9 +119,8 @@ void fields(Archive& archive, FaceContacts& f, const Blocks& blocks) {
     archive(static_cast<FaceSpring&>(c), c.has_whole_rows, c.other_has_whole_rows, c.weights,
             c.other_weights, c.looked_at, c.look_at);
     const auto block_of = [&](std::int32_t facet) {
-      return facet < 0 || facet >= static_cast<std::int32_t>(f.block_of.size())
-                 ? -1
-                 : f.block_of[facet];
+      return facet < 0 || facet >= static_cast<std::int32_t>(f.block_of.size()) ? -1
+                                                                                : f.block_of[facet];
     };
     cell_nodes(archive, blocks, block_of(c.facet), c.nodes);
     cell_nodes(archive, blocks, block_of(c.other), c.other_nodes);

@@ -9,10 +9,10 @@
 namespace tissue_sim {
 namespace {
 
-constexpr std::int64_t kSecond = 1000000000;       // [ns]
-constexpr std::int64_t kStale = kSecond;           // poses that much older than the clock are kept ones
-constexpr std::int64_t kAhead = 10 * kSecond;      // no clock goes, and no pose is, so far ahead
-constexpr std::chrono::milliseconds kIdle(200);    // between two looks at a simulation at rest
+constexpr std::int64_t kSecond = 1000000000;   // [ns]
+constexpr std::int64_t kStale = kSecond;       // poses that much older than the clock are kept ones
+constexpr std::int64_t kAhead = 10 * kSecond;  // no clock goes, and no pose is, so far ahead
+constexpr std::chrono::milliseconds kIdle(200);  // between two looks at a simulation at rest
 
 std::int64_t nanoseconds(const ros::Time& t) { return static_cast<std::int64_t>(t.toNSec()); }
 ros::Time ros_time_of(std::int64_t t) {
@@ -48,8 +48,8 @@ void FrameClock::resume() {
 
 void FrameClock::set_ros_time(const ros::Time& now) {
   const ros::Duration step = now - ros_time_;
-  if (parameters_.time == TimeMode::kRos && !ros_time_.isZero() && step.toSec() * kSecond > kAhead &&
-      schedule_.begun()) {
+  if (parameters_.time == TimeMode::kRos && !ros_time_.isZero() &&
+      step.toSec() * kSecond > kAhead && schedule_.begun()) {
     ROS_WARN("/clock jumped ahead by %.1f s: the simulation goes on from there", step.toSec());
     schedule_.move(nanoseconds(now));
   }
@@ -164,7 +164,8 @@ FrameTime FrameClock::end_frame() {
   }
   switch (parameters_.time) {
     case TimeMode::kWall:
-      return {ros::Time::now(), parameters_.time_factor == 1 ? seconds(WallClock::now()) : elapsed_};
+      return {ros::Time::now(),
+              parameters_.time_factor == 1 ? seconds(WallClock::now()) : elapsed_};
     case TimeMode::kRos:
       return {frame_stamp_, elapsed_};
     case TimeMode::kLockstep:

@@ -99,7 +99,7 @@ class HeldSamples {
   std::deque<Item> all_;
   std::optional<std::size_t> jump_;  // the first one after it
   WallTime jumped_at_{};
-  bool taken_ = false;      // any
+  bool taken_ = false;       // any
   std::int64_t newest_ = 0;  // the last one taken [ns]
   std::int64_t taken_until_ = std::numeric_limits<std::int64_t>::min();
 };

@@ -40,12 +40,12 @@ Node::Node(const ros::NodeHandle& node)
   if (parameters_.publish_clock) {
     clock_publisher_ = service_node_.advertise<rosgraph_msgs::Clock>("/clock", 10, true);
   }
-  simulation_ = std::make_unique<SimulationThread>(make_session(scene), first,
-                                                   [this](const ros::Time& now) {
-                                                     rosgraph_msgs::Clock message;
-                                                     message.clock = now;
-                                                     clock_publisher_.publish(message);
-                                                   });
+  simulation_ =
+      std::make_unique<SimulationThread>(make_session(scene), first, [this](const ros::Time& now) {
+        rosgraph_msgs::Clock message;
+        message.clock = now;
+        clock_publisher_.publish(message);
+      });
   connect_clock();
   services_ = std::make_unique<Services>(service_node_, scene, *simulation_, recorder_, frames_,
                                          [this](const Scene& s) { return make_session(s); });
@@ -74,8 +74,9 @@ void Node::record_from_start(const std::string& name) {
   const auto wait = [this, start](const ros::WallTimerEvent&) {
     if (clock_is_missing()) {
       if (waited_++ % 50 == 0) {
-        ROS_WARN("/use_sim_time is set and no /clock has come yet: the recording waits for it, and "
-                 "the simulation with it (rosbag play --clock, or unset /use_sim_time)");
+        ROS_WARN(
+            "/use_sim_time is set and no /clock has come yet: the recording waits for it, and "
+            "the simulation with it (rosbag play --clock, or unset /use_sim_time)");
       }
       return;
     }
@@ -92,20 +93,21 @@ void Node::record_from_start(const std::string& name) {
 void Node::connect_clock() {
   if (parameters_.publish_clock) {
     if (!ros::Time::isSimTime()) {
-      ROS_WARN("this node publishes /clock, but nobody follows it: set /use_sim_time to true before "
-               "nodes start");
+      ROS_WARN(
+          "this node publishes /clock, but nobody follows it: set /use_sim_time to true before "
+          "nodes start");
     }
     return;
   }
   if (!ros::Time::isSimTime()) return;
   if (parameters_.time != TimeMode::kRos) {
-    ROS_WARN("/use_sim_time is set: messages carry the time of /clock, frames do not keep to it "
-             "(time: ros would)");
+    ROS_WARN(
+        "/use_sim_time is set: messages carry the time of /clock, frames do not keep to it "
+        "(time: ros would)");
   }
   clock_subscriber_ = pose_node_.subscribe<rosgraph_msgs::Clock>(
-      "/clock", 100, [this](const rosgraph_msgs::Clock::ConstPtr& m) {
-        simulation_->on_clock(m->clock);
-      });
+      "/clock", 100,
+      [this](const rosgraph_msgs::Clock::ConstPtr& m) { simulation_->on_clock(m->clock); });
 }
 
 Session Node::make_session(const Scene& scene) {

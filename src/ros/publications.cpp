@@ -34,9 +34,9 @@ Publications::Publications(ros::NodeHandle& node, const Scene& scene, const Para
 }
 
 std::set<std::string> Publications::topics() const {
-  std::set<std::string> names = {
-      scene_output_.topic(), state_.topic(),        inputs_.topic(),        fragments_.topic(),
-      points_.topic(),       loose_points_.topic(), marker_output_.topic(), tf_.topic()};
+  std::set<std::string> names = {scene_output_.topic(),  state_.topic(),  inputs_.topic(),
+                                 fragments_.topic(),     points_.topic(), loose_points_.topic(),
+                                 marker_output_.topic(), tf_.topic()};
   for (const ToolOutputs& tool : tools_) {
     names.insert({tool.body.topic(), tool.spatial.topic()});
     if (tool.grip) names.insert(tool.grip->topic());
@@ -168,12 +168,12 @@ void Publications::publish_loads(const FrameReport& report, const ros::Time& sta
     const std::string& name = scene_.tools[i].name;
     tools_[i].spatial.send(into_bag, stamp,
                            [&] { return wrench(parameters_.world_frame, load.mean); });
-    tools_[i].body.send(into_bag, stamp, [&] {
-      return wrench(name, in_axes(load.mean, motion.end.orientation));
-    });
+    tools_[i].body.send(into_bag, stamp,
+                        [&] { return wrench(name, in_axes(load.mean, motion.end.orientation)); });
     if (!tools_[i].grip) continue;
     tools_[i].grip->send(into_bag, stamp, [&] {
-      auto m = boost::make_shared<JawGrip>(to_message(load, motion, report.input.grip_pressures[i]));
+      auto m =
+          boost::make_shared<JawGrip>(to_message(load, motion, report.input.grip_pressures[i]));
       m->header.stamp = stamp;
       m->header.frame_id = name;
       return m;

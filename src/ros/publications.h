@@ -62,8 +62,7 @@ class Publications {
   };
   std_msgs::Header header(const ros::Time& stamp) const;
   boost::shared_ptr<const SimulationState> state(Simulation& simulation, const FrameReport& report,
-                                                 const RunState& run,
-                                                 const ros::Time& stamp) const;
+                                                 const RunState& run, const ros::Time& stamp) const;
   boost::shared_ptr<const FragmentArray> fragment_message(Simulation& simulation,
                                                           const ros::Time& stamp) const;
   boost::shared_ptr<const sensor_msgs::PointCloud2> cloud(Simulation& simulation, bool loose_only,

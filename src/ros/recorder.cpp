@@ -32,7 +32,8 @@ constexpr std::int64_t kJump = 100000000;  // what no two threads' times are apa
 }  // namespace
 
 ros::Time BagTime::next(const ros::Time& time) {
-  std::int64_t at = static_cast<std::int64_t>(std::max<ros::Time>(time, ros::TIME_MIN).toNSec()) + shift_;
+  std::int64_t at =
+      static_cast<std::int64_t>(std::max<ros::Time>(time, ros::TIME_MIN).toNSec()) + shift_;
   if (at < last_ - kJump) {
     shift_ += last_ - at;
     at = last_;

@@ -27,10 +27,10 @@ struct RecorderStatus {
   std::string error;                             ///< what ended the recording before it was stopped
 };
 
-/// Times of the messages in a bag. Who reads a bag gets its messages in the order of their times, so
-/// those of one that was written later are later, also where a clock stands still (/clock, between
-/// two of its messages) or jumps back (a bag that is played in a loop): from there on they go on
-/// from where they were.
+/// Times of the messages in a bag. Who reads a bag gets its messages in the order of their times,
+/// so those of one that was written later are later, also where a clock stands still (/clock,
+/// between two of its messages) or jumps back (a bag that is played in a loop): from there on they
+/// go on from where they were.
 class BagTime {
  public:
   ros::Time next(const ros::Time& time);

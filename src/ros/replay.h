@@ -26,13 +26,13 @@ struct RecordedTopics {
 RecordedTopics recorded_topics(const rosbag::Bag& bag, const std::string& node);
 
 struct ReplayReport {
-  int runs = 0;                ///< from a frame 0 on: the start, each reset, each scene
-  std::int64_t frames = 0;     ///< run again
-  std::int64_t compared = 0;   ///< of them, with a `state`
-  std::int64_t checksums = 0;  ///< of these, with a checksum
-  std::int64_t left_out = 0;   ///< frames of a run whose beginning is not in the bag
-  std::int64_t differing = 0;  ///< frames of which anything differs
-  std::string first;           ///< the first of them, and in what; empty: all are the same
+  int runs = 0;                     ///< from a frame 0 on: the start, each reset, each scene
+  std::int64_t frames = 0;          ///< run again
+  std::int64_t compared = 0;        ///< of them, with a `state`
+  std::int64_t checksums = 0;       ///< of these, with a checksum
+  std::int64_t left_out = 0;        ///< frames of a run whose beginning is not in the bag
+  std::int64_t differing = 0;       ///< frames of which anything differs
+  std::string first;                ///< the first of them, and in what; empty: all are the same
   std::string recorded_on, run_on;  ///< devices
 };
 

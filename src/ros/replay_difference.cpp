@@ -1,7 +1,6 @@
 // How what was recorded of a frame differs from what comes out when it is run again.
 #include <ros/serialization.h>
 
-#include <cinttypes>
 #include <cstdio>
 #include <cstring>
 
@@ -17,11 +16,6 @@ std::string text(double x) {
 }
 std::string text(std::int32_t x) { return std::to_string(x); }
 std::string text(std::uint8_t x) { return x ? "true" : "false"; }
-std::string text(std::uint64_t x) {  // a checksum
-  char line[24];
-  std::snprintf(line, sizeof line, "%016" PRIx64, x);
-  return line;
-}
 std::string text(const std::string& x) { return x; }
 
 // Of values that are both NaN as well.
@@ -52,14 +46,11 @@ bool same_bytes(const M& a, const M& b) {
   return x.num_bytes == y.num_bytes && std::memcmp(x.buf.get(), y.buf.get(), x.num_bytes) == 0;
 }
 
-bool is_given(const std::string& checksum) { return !checksum.empty(); }
-bool is_given(std::uint64_t checksum) { return checksum != 0; }
-
 }  // namespace
 
 std::string difference(const SimulationState& recorded, const SimulationState& run) {
   Differences d;
-  if (is_given(recorded.checksum)) d.add("checksum", recorded.checksum, run.checksum);
+  if (!recorded.checksum.empty()) d.add("checksum", recorded.checksum, run.checksum);
   d.add("pieces", recorded.fragments, run.fragments);
   d.add("loose pieces", recorded.loose_fragments, run.loose_fragments);
   d.add("their volume", recorded.fragment_volume, run.fragment_volume);

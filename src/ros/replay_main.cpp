@@ -48,9 +48,9 @@ struct Options {
 
 Options read_options(int argc, char** argv) {
   Options o;
-  const option known[] = {{"node", 1, nullptr, 'n'},   {"device", 1, nullptr, 'd'},
-                          {"to", 1, nullptr, 't'},     {"publish", 0, nullptr, 'p'},
-                          {"speed", 1, nullptr, 's'},  {"folder", 1, nullptr, 'f'},
+  const option known[] = {{"node", 1, nullptr, 'n'},  {"device", 1, nullptr, 'd'},
+                          {"to", 1, nullptr, 't'},    {"publish", 0, nullptr, 'p'},
+                          {"speed", 1, nullptr, 's'}, {"folder", 1, nullptr, 'f'},
                           {nullptr, 0, nullptr, 0}};
   for (int c = 0; (c = getopt_long(argc, argv, "", known, nullptr)) != -1;) {
     if (c == 'n') o.node = optarg;
@@ -61,7 +61,8 @@ Options read_options(int argc, char** argv) {
     if (c == 'f') o.folder = optarg;
     if (c == '?') throw std::invalid_argument(std::string("usage: ") + kUsage);
   }
-  if (optind + 1 != argc) throw std::invalid_argument(std::string("give one bag; usage: ") + kUsage);
+  if (optind + 1 != argc)
+    throw std::invalid_argument(std::string("give one bag; usage: ") + kUsage);
   o.bag = argv[optind];
   if (!(o.speed >= 0 && o.speed <= 1000)) throw std::invalid_argument("speed must be 0 to 1000");
   const auto resolved = [&](const std::string& path) {
@@ -81,9 +82,9 @@ class Output {
       : topics_(topics), parameters_(read_parameters(ros::NodeHandle("~"))) {
     parameters_.world_frame = world;
     std::filesystem::path to(options.to);
-    recorder_ = std::make_unique<Recorder>(to.parent_path().string(),
-                                           parameters_.recording_queue * 1048576,
-                                           parameters_.recording_reserve * 1048576);
+    recorder_ =
+        std::make_unique<Recorder>(to.parent_path().string(), parameters_.recording_queue * 1048576,
+                                   parameters_.recording_reserve * 1048576);
     to_ = to.filename().string();
   }
 
@@ -177,8 +178,9 @@ int replay(const Options& options) {
   std::optional<ros::AsyncSpinner> spinner;
   if (options.publish || !options.to.empty()) {
     if (!ros::master::check()) {
-      throw std::runtime_error("there is no ROS master, which --to and --publish need: use "
-                               "'roslaunch tissue_sim replay.launch' or start roscore");
+      throw std::runtime_error(
+          "there is no ROS master, which --to and --publish need: use "
+          "'roslaunch tissue_sim replay.launch' or start roscore");
     }
     output.emplace(options, topics, world_of(bag, topics));
     spinner.emplace(1);
@@ -200,9 +202,9 @@ int replay(const Options& options) {
     ++frames;
     simulated += 1 / simulation.scene().frame_rate;
     if (options.speed > 0) {
-      std::this_thread::sleep_until(
-          start + std::chrono::duration_cast<WallClock::duration>(
-                      std::chrono::duration<double>(simulated / options.speed)));
+      std::this_thread::sleep_until(start +
+                                    std::chrono::duration_cast<WallClock::duration>(
+                                        std::chrono::duration<double>(simulated / options.speed)));
     }
     if (WallClock::now() - said < std::chrono::seconds(2)) return;
     said = WallClock::now();
@@ -219,7 +221,8 @@ int replay(const Options& options) {
   }
   if (ros::isShuttingDown()) throw std::runtime_error("stopped before the bag's end");
   if (report.compared == 0) {
-    throw std::runtime_error("the bag holds no state of the frames that were run: nothing compared");
+    throw std::runtime_error(
+        "the bag holds no state of the frames that were run: nothing compared");
   }
   if (report.first.empty()) std::printf("the same\n");
   return report.first.empty() ? kSame : kDiffers;

@@ -1,5 +1,5 @@
-// SimulationThread: owns the simulation and advances it, frame by frame as FrameClock says. Everything
-// else talks to it between two frames, so nothing that is slow ever stops it.
+// SimulationThread: owns the simulation and advances it, frame by frame as FrameClock says.
+// Everything else talks to it between two frames, so nothing that is slow ever stops it.
 #pragma once
 
 #include <condition_variable>
@@ -39,7 +39,7 @@ struct RunStatus {
   std::int64_t frame = 0;
   double time = 0, frame_rate = 0;
   double aimed_factor = 0;  ///< real-time factor that is to be reached, 0 for none
-  double behind = 0;   ///< of ROS time, where frames keep to it [s]
+  double behind = 0;        ///< of ROS time, where frames keep to it [s]
   int substeps = 0;
   double substep = 0, compute_time = 0;
   int particles = 0;

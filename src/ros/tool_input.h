@@ -31,8 +31,8 @@ namespace tissue_sim {
 /// Thread-safe. Callbacks come on the node handle's queue.
 class ToolInput {
  public:
-  /// `tissue` is the box of all tissue as it is at the start [m]. With `on_sample`, samples are held
-  /// until they are taken by stamp or one by one, and it is called for each.
+  /// `tissue` is the box of all tissue as it is at the start [m]. With `on_sample`, samples are
+  /// held until they are taken by stamp or one by one, and it is called for each.
   ToolInput(const ros::NodeHandle& node, const Tool& tool, const ToolParameters& source,
             const PoseLimits& limits, const Frames& frames, const Box& tissue, Recorder& recorder,
             std::function<void()> on_sample);
@@ -55,7 +55,7 @@ class ToolInput {
   std::optional<Sample> take_until(const ros::Time& until);
   /// The same one by one: the oldest pose that is held, with the oldest jaw angle.
   std::optional<Sample> take_next();
-  bool has_next();  ///< a pose and, of a grasper whose jaws are connected, an angle
+  bool has_next();         ///< a pose and, of a grasper whose jaws are connected, an angle
   bool connected() const;  ///< somebody publishes its poses
   /// Stamp of the oldest pose that is held [ns].
   std::optional<std::int64_t> first_held();
@@ -94,7 +94,8 @@ class ToolInput {
   void check(const Pose& frame, const Pose& in_frame, const ros::Time& stamp);
   void refuse(Refusal refusal, const std::string& text);
   void forget_if_time_jumped_back();
-  /// By what samples follow one another [s]: when they come, or by the stamps of those that are held.
+  /// By what samples follow one another [s]: when they come, or by the stamps of those that are
+  /// held.
   double now() const;
   /// Whether a warning is due again, once a second by the wall's clock.
   bool may_warn();

@@ -9,8 +9,8 @@
 
 #include <cstdio>
 #include <cstdlib>
-#include <fstream>
 #include <filesystem>
+#include <fstream>
 #include <map>
 
 #include "simulator_client.h"
@@ -98,7 +98,8 @@ void record_session(const std::string& name) {
   step(5);
   LoadScene::Request scene;
   scene.yaml =
-      "{name: other, cell_size: 0.005, bodies: [{shape: ball, radius: 0.012, pose: {position: [0, 0, "
+      "{name: other, cell_size: 0.005, bodies: [{shape: ball, radius: 0.012, pose: {position: [0, "
+      "0, "
       "0.02]}}], tools: [{name: hook, type: probe}]}";
   const auto loaded = call<LoadScene>("load_scene", scene);
   EXPECT_TRUE(loaded.success) << loaded.message;
@@ -118,9 +119,8 @@ TEST(ReplayNode, AWholeSessionComesOutBitForBit) {
   // Recorded anew with all topics, through the launch file; and that bag is one of the node's own.
   std::string launch_file;
   ASSERT_TRUE(ros::param::get("~launch_file", launch_file));
-  const Ended launched =
-      run("cd " + folder() + " && roslaunch " + launch_file +
-          " bag:=session.bag to:=again.bag cloud_rate:=60 cloud_stride:=2");
+  const Ended launched = run("cd " + folder() + " && roslaunch " + launch_file +
+                             " bag:=session.bag to:=again.bag cloud_rate:=60 cloud_stride:=2");
   EXPECT_NE(launched.said.find("the same"), std::string::npos) << launched.said;
   const auto before = counts(bag), after = counts(folder() + "/again.bag");
   EXPECT_EQ(before.count("/simulator/tissue/points"), 0u);

@@ -16,7 +16,8 @@ Span<const std::uint8_t> view(const Bytes& bytes) { return {bytes.data(), bytes.
 
 class SavedState : public EachMethod {
  protected:
-  /// Liver that a scalpel cuts through, a probe pushes and a grasper pinches; and a ball that falls.
+  /// Liver that a scalpel cuts through, a probe pushes and a grasper pinches; and a ball that
+  /// falls.
   Scene operation() const {
     Scene s = on_this(operation_scene(Vec3(0.08, 0.048, 0.028), Vec3(0, 0, 0.015)));
     Tool grasper;
@@ -104,8 +105,8 @@ TEST_P(SavedState, WhatIsNoSuchStateIsRefusedWithTheReason) {
   frame(simulation);
   const Bytes whole = save(simulation);
   if (whole.empty()) GTEST_SKIP() << "states of this method cannot be saved yet";
-  for (const std::size_t size : {std::size_t(20), std::size_t(100), whole.size() / 2,
-                                 whole.size() - 1}) {
+  for (const std::size_t size :
+       {std::size_t(20), std::size_t(100), whole.size() / 2, whole.size() - 1}) {
     expect_refused(operation(), Bytes(whole.begin(), whole.begin() + size), "cut short");
   }
   expect_refused(operation(), {}, "no state");

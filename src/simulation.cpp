@@ -84,6 +84,7 @@ Simulation::~Simulation() = default;
 const Scene& Simulation::scene() const { return state_->scene; }
 Tissue& Simulation::tissue() { return *state_->tissue; }
 std::int64_t Simulation::frame() const { return state_->frame; }
+const std::vector<ToolMotion>& Simulation::tools() const { return state_->tools; }
 double Simulation::time() const { return state_->frame / state_->scene.frame_rate; }
 
 void Simulation::set_tool(int tool, const Pose& pose, double jaw) {

@@ -45,6 +45,8 @@ class Simulation {
   Tissue& tissue();
   std::int64_t frame() const;  ///< frames completed
   double time() const;         ///< simulated time [s]
+  /// As they stand after the last frame, and as they were set for the next.
+  const std::vector<ToolMotion>& tools() const;
 
   /// The tool shall be there at the end of the next frame. Its first pose places it without motion.
   /// Throws std::invalid_argument for an unknown tool or a pose that is not finite or no rotation.

@@ -11,6 +11,7 @@ Publications::Publications(ros::NodeHandle& node, const Scene& scene, const Para
       scene_output_(node, "scene", 1, recorder, true),
       state_(node, "state", 100, recorder),
       inputs_(node, "inputs", 1000, recorder),
+      saved_state_(node, "saved_state", 1, recorder),
       fragments_(node, "fragments", 10, recorder),
       points_(node, "tissue/points", 2, recorder),
       loose_points_(node, "fragments/points", 2, recorder),
@@ -34,9 +35,9 @@ Publications::Publications(ros::NodeHandle& node, const Scene& scene, const Para
 }
 
 std::set<std::string> Publications::topics() const {
-  std::set<std::string> names = {scene_output_.topic(),  state_.topic(),  inputs_.topic(),
-                                 fragments_.topic(),     points_.topic(), loose_points_.topic(),
-                                 marker_output_.topic(), tf_.topic()};
+  std::set<std::string> names = {scene_output_.topic(), saved_state_.topic(),   state_.topic(),
+                                 inputs_.topic(),       fragments_.topic(),     points_.topic(),
+                                 loose_points_.topic(), marker_output_.topic(), tf_.topic()};
   for (const ToolOutputs& tool : tools_) {
     names.insert({tool.body.topic(), tool.spatial.topic()});
     if (tool.grip) names.insert(tool.grip->topic());
@@ -58,6 +59,15 @@ void Publications::announce(const ros::Time& stamp) {
 
 void Publications::record_scene(const ros::Time& stamp) {
   scene_output_.record(scene_text_, stamp);
+}
+
+void Publications::record_state(const Simulation& simulation,
+                                const std::vector<std::uint8_t>& state, const ros::Time& stamp) {
+  auto m = boost::make_shared<SavedState>();
+  m->header = header(stamp);
+  m->frame = simulation.frame();
+  m->state = state;
+  saved_state_.record(m, stamp);
 }
 
 void Publications::publish(Simulation& simulation, const FrameReport& report, const RunState& run,

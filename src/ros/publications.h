@@ -46,6 +46,9 @@ class Publications {
   void announce(const ros::Time& stamp);
   /// The scene into a recording that has just begun.
   void record_scene(const ros::Time& stamp);
+  /// The state that a run in the bag goes on from.
+  void record_state(const Simulation& simulation, const std::vector<std::uint8_t>& state,
+                    const ros::Time& stamp);
   /// A frame is done. `all`: also what has a rate and is not due yet.
   void publish(Simulation& simulation, const FrameReport& report, const RunState& run,
                const FrameTime& time, bool all);
@@ -82,6 +85,7 @@ class Publications {
   Output<std_msgs::String> scene_output_;
   Output<SimulationState> state_;
   Output<FrameInputMessage> inputs_;
+  Output<SavedState> saved_state_;
   Output<FragmentArray> fragments_;
   Output<sensor_msgs::PointCloud2> points_, loose_points_;
   Output<visualization_msgs::MarkerArray> marker_output_;

@@ -56,6 +56,7 @@ class Recorder {
   /// if the recording had ended before because of an error.
   RecorderStatus stop();
   RecorderStatus status() const;
+  const std::string& folder() const { return folder_; }
 
   /// Whether messages of this topic are recorded now: nobody else may be listening.
   bool wants(const std::string& topic) const;

@@ -3,6 +3,7 @@
 #include <rosbag/view.h>
 #include <std_msgs/String.h>
 
+#include <cstdio>
 #include <set>
 #include <stdexcept>
 
@@ -63,6 +64,7 @@ RecordedTopics recorded_topics(const rosbag::Bag& bag, const std::string& node) 
   topics.scene = topics.node + "/scene";
   topics.inputs = topics.node + suffix;
   topics.state = topics.node + "/state";
+  topics.saved_state = topics.node + "/saved_state";
   if (names.count(topics.scene) == 0) {
     throw std::runtime_error("the bag holds no " + topics.scene +
                              ": without its scene it cannot be run again");
@@ -75,14 +77,16 @@ Replay::Replay(ReplayObserver observer, std::function<void(Scene&)> change)
     : observer_(std::move(observer)), change_(std::move(change)) {}
 
 ReplayReport Replay::run(rosbag::Bag& bag, const RecordedTopics& topics) {
-  rosbag::View view(
-      bag, rosbag::TopicQuery(std::vector<std::string>{topics.scene, topics.inputs, topics.state}));
+  rosbag::View view(bag, rosbag::TopicQuery(std::vector<std::string>{
+                             topics.scene, topics.inputs, topics.state, topics.saved_state}));
   for (const rosbag::MessageInstance& m : view) {
     if (m.getTopic() == topics.scene) {
       scene_text_ = read<std_msgs::String>(m)->data;
     } else if (m.getTopic() == topics.inputs) {
       if (observer_.goes_on && !observer_.goes_on()) break;
       on_input(*read<FrameInputMessage>(m));
+    } else if (m.getTopic() == topics.saved_state) {
+      on_saved_state(*read<SavedState>(m));
     } else {
       on_state(*read<SimulationState>(m));
     }
@@ -112,6 +116,19 @@ void Replay::begin_run(const ros::Time& stamp) {
   run_ = {};
   pieces_ = {};
   if (observer_.begin) observer_.begin(scene, stamp);
+}
+
+void Replay::on_saved_state(const SavedState& saved) {
+  begin_run(saved.header.stamp);
+  try {
+    simulation_->restore({saved.state.data(), saved.state.size()});
+  } catch (const std::exception& e) {  // of another device: its frames are left out
+    std::fprintf(stderr, "from frame %lld: %s\n", static_cast<long long>(saved.frame), e.what());
+    simulation_.reset();
+    --report_.runs;
+    return;
+  }
+  if (observer_.restored) observer_.restored(*simulation_, saved.state, saved.header.stamp);
 }
 
 void Replay::on_input(const FrameInputMessage& input) {

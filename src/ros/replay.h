@@ -17,7 +17,7 @@ namespace tissue_sim {
 /// The resolved names of one node's topics in a bag.
 struct RecordedTopics {
   std::string node;  ///< its namespace, as in "/simulator"
-  std::string scene, inputs, state;
+  std::string scene, inputs, state, saved_state;
   std::vector<std::string> all;  ///< every topic of the bag
 };
 
@@ -26,7 +26,7 @@ struct RecordedTopics {
 RecordedTopics recorded_topics(const rosbag::Bag& bag, const std::string& node);
 
 struct ReplayReport {
-  int runs = 0;                     ///< from a frame 0 on: the start, each reset, each scene
+  int runs = 0;                     ///< from a frame 0 or a saved state on
   std::int64_t frames = 0;          ///< run again
   std::int64_t compared = 0;        ///< of them, with a `state`
   std::int64_t checksums = 0;       ///< of these, with a checksum
@@ -39,6 +39,9 @@ struct ReplayReport {
 /// What somebody may want to do with the new run. Stamps are those of the recorded one.
 struct ReplayObserver {
   std::function<void(const Scene&, const ros::Time&)> begin;  ///< of a run
+  /// The run goes on from this state instead of from frame 0.
+  std::function<void(const Simulation&, const std::vector<std::uint8_t>&, const ros::Time&)>
+      restored;
   std::function<void(Simulation&, const FrameReport&, const RunState&, const ros::Time&)> frame;
   std::function<bool()> goes_on;  ///< asked before each frame
 };
@@ -54,6 +57,7 @@ class Replay {
  private:
   void on_input(const FrameInputMessage& input);
   void on_state(const SimulationState& recorded);
+  void on_saved_state(const SavedState& saved);
   void begin_run(const ros::Time& stamp);
   void differs(std::int64_t frame, const std::string& text);
 

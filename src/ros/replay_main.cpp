@@ -101,6 +101,10 @@ class Output {
              const ros::Time& stamp) {
     publications_->publish(simulation, report, run, {stamp, simulation.time()}, false);
   }
+  void restored(const Simulation& simulation, const std::vector<std::uint8_t>& state,
+                const ros::Time& stamp) {
+    publications_->record_state(simulation, state, stamp);
+  }
   /// What there is to say of the new bag.
   std::string close() {
     if (to_.empty()) return "";
@@ -195,6 +199,10 @@ int replay(const Options& options) {
   observer.goes_on = [] { return !ros::isShuttingDown(); };
   observer.begin = [&](const Scene& scene, const ros::Time& stamp) {
     if (output) output->begin(scene, stamp);
+  };
+  observer.restored = [&](const Simulation& simulation, const std::vector<std::uint8_t>& state,
+                          const ros::Time& stamp) {
+    if (output) output->restored(simulation, state, stamp);
   };
   observer.frame = [&](Simulation& simulation, const FrameReport& report, const RunState& run,
                        const ros::Time& stamp) {

@@ -6,6 +6,8 @@
 #include <std_srvs/Trigger.h>
 #include <tissue_sim/Cut.h>
 #include <tissue_sim/LoadScene.h>
+#include <tissue_sim/RestoreState.h>
+#include <tissue_sim/SaveState.h>
 #include <tissue_sim/StartRecording.h>
 #include <tissue_sim/Step.h>
 
@@ -45,6 +47,8 @@ class Services {
   bool pause(std_srvs::SetBool::Request& request, std_srvs::SetBool::Response& response);
   bool step(Step::Request& request, Step::Response& response);
   bool load_scene(LoadScene::Request& request, LoadScene::Response& response);
+  bool save_state(SaveState::Request& request, SaveState::Response& response);
+  bool restore_state(RestoreState::Request& request, RestoreState::Response& response);
 
   BladePath read_path(const Cut::Request& request) const;
   std::set<std::string> select(const std::vector<std::string>& topics) const;

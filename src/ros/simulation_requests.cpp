@@ -1,4 +1,6 @@
 // What other threads ask of the simulation's thread.
+#include <ros/console.h>
+
 #include <stdexcept>
 #include <utility>
 
@@ -96,6 +98,41 @@ void SimulationThread::replace(Session session) {
     std::swap(session_, session);
     start_session();
   });
+}
+
+SavedFrame SimulationThread::save() {
+  SavedFrame saved;
+  call([&] {
+    if (run_.blew_up) throw std::runtime_error(problem_);
+    saved = {session_.simulation->frame(), session_.simulation->save()};
+  });
+  return saved;
+}
+
+void SimulationThread::restore(std::unique_ptr<Simulation> simulation,
+                               const std::vector<std::uint8_t>& state) {
+  call([&] {
+    std::swap(session_.simulation, simulation);
+    for (const auto& tool : *session_.tools) tool->rewind();
+    start_session();
+    session_.publications->record_state(*session_.simulation, state, clock_.stamp());
+  });
+}
+
+std::int64_t SimulationThread::record_state() {
+  std::int64_t frame = -1;
+  call([&] {
+    frame = session_.simulation->frame();
+    if (frame == 0) return;
+    try {
+      session_.publications->record_state(*session_.simulation, session_.simulation->save(),
+                                          clock_.stamp());
+    } catch (const std::exception& e) {
+      ROS_WARN("the recording begins without a state: %s", e.what());
+      frame = -1;
+    }
+  });
+  return frame;
 }
 
 void SimulationThread::record_scene() {

@@ -51,7 +51,7 @@ void SimulationThread::start_session() {
   for (PendingCut& cut : std::exchange(cuts_, {})) {
     cut.reply.set_value({false, "the simulation was started anew", {}});
   }
-  motion_.assign(scene.tools.size(), ToolMotion());
+  motion_ = session_.simulation->tools();
   clock_.restart(scene.frame_rate);
   for (const auto& tool : *session_.tools) tool->begin();
   real_time_factor_.restart();

@@ -53,6 +53,11 @@ struct CutReply {
   CutReport report;
 };
 
+struct SavedFrame {
+  std::int64_t frame = 0;
+  std::vector<std::uint8_t> state;
+};
+
 struct StepReply {
   bool success = false;
   std::string message;
@@ -84,7 +89,13 @@ class SimulationThread {
   /// Frame 0 of the same scene; the tools stay where they are.
   void reset(std::unique_ptr<Simulation> simulation);
   void replace(Session session);
+  SavedFrame save();
+  /// Goes on from what `simulation` was restored to, out of `state`.
+  void restore(std::unique_ptr<Simulation> simulation, const std::vector<std::uint8_t>& state);
   void record_scene();
+  /// The state, where frames were done, into a recording that has just begun. Returns the frame, or
+  /// -1 where the method cannot tell its state.
+  std::int64_t record_state();
 
   RunStatus status() const;
   std::shared_ptr<ToolInputs> tools() const;

@@ -33,7 +33,8 @@ Node::Node(const ros::NodeHandle& node)
       frames_(parameters_.world_frame, parameters_.tf_tolerance),
       pose_spinner_(1, &pose_queue_),
       service_spinner_(kServiceThreads, &service_queue_) {
-  const Scene scene = read_scene_parameters(node);
+  Session session = make_session(read_scene_parameters(node));
+  const Scene scene = session.simulation->scene();
   Parameters first = parameters_;
   const RecordRequest record = record_request(parameters_.record);
   first.paused = parameters_.paused || record.wanted;  // so that the bag holds frame 0
@@ -41,7 +42,7 @@ Node::Node(const ros::NodeHandle& node)
     clock_publisher_ = service_node_.advertise<rosgraph_msgs::Clock>("/clock", 10, true);
   }
   simulation_ =
-      std::make_unique<SimulationThread>(make_session(scene), first, [this](const ros::Time& now) {
+      std::make_unique<SimulationThread>(std::move(session), first, [this](const ros::Time& now) {
         rosgraph_msgs::Clock message;
         message.clock = now;
         clock_publisher_.publish(message);
@@ -110,8 +111,16 @@ void Node::connect_clock() {
       [this](const rosgraph_msgs::Clock::ConstPtr& m) { simulation_->on_clock(m->clock); });
 }
 
-Session Node::make_session(const Scene& scene) {
+Session Node::make_session(const Scene& asked) {
   Session session;
+  // A force for hands comes more often by shorter frames: with them poses are taken as often, and
+  // nothing is felt that a replay would not compute. What is for eyes keeps its own rate.
+  Scene scene = asked;
+  Parameters parameters = parameters_;
+  if (parameters.wrench_rate > scene.frame_rate) {
+    if (parameters.state_rate == 0) parameters.state_rate = scene.frame_rate;
+    scene.frame_rate = parameters.wrench_rate;
+  }
   session.simulation = std::make_unique<Simulation>(scene);
   session.tools = std::make_shared<ToolInputs>();
   PoseLimits limits;
@@ -145,7 +154,7 @@ Session Node::make_session(const Scene& scene) {
     ROS_WARN("%s", warning.c_str());
   }
   session.publications =
-      std::make_shared<Publications>(service_node_, scene, parameters_, recorder_);
+      std::make_shared<Publications>(service_node_, scene, parameters, recorder_);
   Tissue& tissue = session.simulation->tissue();
   for (const std::string& note : tissue.notes()) ROS_WARN("%s", note.c_str());
   ROS_INFO("scene '%s': %d particles, cells of %g mm, %zu tools, on %s", scene.name.c_str(),

@@ -25,7 +25,7 @@ class Node {
   ~Node();
 
  private:
-  Session make_session(const Scene& scene);
+  Session make_session(const Scene& asked);
   /// Starts the recording that the parameters ask for, and the simulation, which stood still so that
   /// the bag holds frame 0. While there is no /clock it waits for one, and says so.
   void record_from_start(const std::string& name);

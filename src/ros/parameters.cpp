@@ -22,7 +22,7 @@ using XmlRpc::XmlRpcValue;
 const std::set<std::string> kKnown = {
     "scene", "scene_file", "mesh", "mesh_scale", "world_frame", "time", "pose_delay",
     "time_factor", "publish_clock", "lockstep_tools", "paused", "cloud_rate",
-    "cloud_stride", "cloud_surface_only", "fragment_rate", "state_rate", "marker_rate", "checksum",
+    "cloud_stride", "cloud_surface_only", "fragment_rate", "state_rate", "wrench_rate", "marker_rate", "checksum",
     "force_scale", "publish_tf", "max_tool_speed", "max_tool_turn_rate", "tf_tolerance",
     "recording_folder", "record", "recording_queue", "recording_reserve", "tools",
     // of diagnostic_updater
@@ -214,6 +214,7 @@ Parameters read_parameters(const ros::NodeHandle& node) {
   read(node, "cloud_surface_only", p.cloud_surface_only);
   read(node, "fragment_rate", p.fragment_rate, 0.01, 2000);
   read(node, "state_rate", p.state_rate, 0, 2000);
+  read(node, "wrench_rate", p.wrench_rate, 0, 2000);
   read(node, "marker_rate", p.marker_rate, 0.01, 2000);
   read(node, "checksum", p.checksum);
   read(node, "force_scale", p.force_scale, 1e-6, 100);

@@ -39,7 +39,8 @@ struct Parameters {
   int cloud_stride = 1;    ///< every n-th point
   bool cloud_surface_only = false;
   double fragment_rate = 10;       ///< [Hz], and whenever the pieces change
-  double state_rate = 0;           ///< [Hz], 0 for every frame
+  double state_rate = 0;           ///< [Hz], 0 for every frame of the scene's frame_rate
+  double wrench_rate = 0;          ///< [Hz]: frames are as short as it asks; 0: the scene's
   double marker_rate = 15;         ///< [Hz]
   bool checksum = true;            ///< in each state
   double force_scale = 0.02;       ///< length of the force arrows [m/N]

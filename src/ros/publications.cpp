@@ -79,15 +79,14 @@ void Publications::publish(Simulation& simulation, const FrameReport& report, co
     m->header = header(stamp);
     inputs_.publish(m, stamp, true);
   }
+  if (!run.blew_up) publish_loads(report, stamp, true);  // first: hands wait for them
   const bool came_apart = pieces_.follow(simulation.tissue());
   const bool state_due = state_due_.due(now) || all || run.blew_up;
+  if (state_due) publish_tf(report, stamp, true);
   if (state_due && state_.wanted()) {
     state_.publish(state(simulation, report, run, stamp), stamp);
   }
-  publish_tf(report, stamp, true);
   if (run.blew_up) return;  // what follows may hold NaN
-  publish_loads(report, stamp, true);
-
   const bool fragments_due = fragments_due_.due(now) || all || came_apart;
   if (fragments_due && fragments_.wanted()) {
     fragments_.publish(fragment_message(simulation, stamp), stamp);

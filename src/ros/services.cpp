@@ -183,8 +183,8 @@ bool Services::load_scene(LoadScene::Request& request, LoadScene::Response& resp
                             : scene_from_yaml(request.yaml);
     Session session = make_session_(scene);
     if (records_all_) recorder_.add(topics_of(session));
+    scene_ = session.simulation->scene();
     simulation_.replace(std::move(session));
-    scene_ = scene;
     return "frame 0 of scene '" + scene.name + "'";
   });
 }

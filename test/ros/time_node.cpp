@@ -93,8 +93,9 @@ class Clock {
  public:
   Clock() {
     publisher_ = node_.advertise<rosgraph_msgs::Clock>("/clock", 1000);
-    EXPECT_TRUE(wait_until([&] { return publisher_.getNumSubscribers() >= 2; }));
-    ros::WallDuration(0.1).sleep();
+    // The simulator twice (roscpp and its own), this test, and where it runs rosout.
+    wait_until([&] { return publisher_.getNumSubscribers() >= 4; }, 5);
+    ros::WallDuration(0.2).sleep();
   }
   void set(double time) {
     rosgraph_msgs::Clock m;

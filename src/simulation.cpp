@@ -5,6 +5,8 @@
 #include <stdexcept>
 #include <utility>
 
+#include "frame/sealed_state.h"
+#include "frame/state_fields.h"
 #include "tools/grip.h"
 
 namespace tissue_sim {
@@ -54,6 +56,10 @@ struct Simulation::State {
   std::vector<double> grip_pressures;  // of each tool, 0 for the scene's [Pa]
   double wave_speed = 0;
   bool blew_up = false;
+
+  template <class Archive>
+  void each_field(Archive& archive);
+  StateOrigin origin() const;
 };
 
 Simulation::Simulation(const Scene& scene) : state_(std::make_unique<State>()) {
@@ -78,6 +84,7 @@ Simulation::~Simulation() = default;
 const Scene& Simulation::scene() const { return state_->scene; }
 Tissue& Simulation::tissue() { return *state_->tissue; }
 std::int64_t Simulation::frame() const { return state_->frame; }
+const std::vector<ToolMotion>& Simulation::tools() const { return state_->tools; }
 double Simulation::time() const { return state_->frame / state_->scene.frame_rate; }
 
 void Simulation::set_tool(int tool, const Pose& pose, double jaw) {
@@ -133,6 +140,43 @@ void Simulation::apply(const AppliedInput& input) {
   state_->grip_pressures = input.grip_pressures;
   state_->grip_pressures.resize(input.tools.size());
   state_->cuts = input.cuts;
+}
+
+template <class Archive>
+void Simulation::State::each_field(Archive& archive) {
+  archive(frame, tools, cuts, grips, grip_pressures, blew_up);
+}
+
+StateOrigin Simulation::State::origin() const {
+  Scene same = scene;  // but for what does not change a bit
+  same.threads = 0;
+  same.device = Device::kAuto;
+  std::string device = tissue->device_name();
+  return {scene_to_yaml(same), device.substr(0, device.find(' '))};
+}
+
+std::vector<std::uint8_t> Simulation::save() {
+  ArchiveWriter out;
+  std::uint64_t checksum = state_->tissue->checksum();
+  std::vector<std::uint8_t> tissue = state_->tissue->save();
+  state_->each_field(out);
+  out(checksum, tissue);
+  return seal_state(state_->origin(), out.bytes());
+}
+
+void Simulation::restore(Span<const std::uint8_t> saved) {
+  if (state_->frame != 0) throw std::runtime_error("only a new simulation can be restored");
+  ArchiveReader in(open_state(saved, state_->origin()));
+  std::uint64_t checksum = 0;
+  std::vector<std::uint8_t> tissue;
+  state_->each_field(in);
+  in(checksum, tissue);
+  state_->tissue->restore({tissue.data(), tissue.size()});
+  if (state_->tissue->checksum() != checksum) {
+    throw std::runtime_error(
+        "the state cannot be restored: what was read of it has another checksum, so another build "
+        "wrote it");
+  }
 }
 
 FrameReport Simulation::advance_frame() {

@@ -45,6 +45,8 @@ class Simulation {
   Tissue& tissue();
   std::int64_t frame() const;  ///< frames completed
   double time() const;         ///< simulated time [s]
+  /// As they stand after the last frame, and as they were set for the next.
+  const std::vector<ToolMotion>& tools() const;
 
   /// The tool shall be there at the end of the next frame. Its first pose places it without motion.
   /// Throws std::invalid_argument for an unknown tool or a pose that is not finite or no rotation.
@@ -58,6 +60,15 @@ class Simulation {
   void cut(const BladePath& path);
   /// Puts exactly these inputs into the next frame (replay), instead of what was set.
   void apply(const AppliedInput& input);
+
+  /// The whole state between two frames, with its scene, version and checksum: restore() of a new
+  /// Simulation of the same scene goes on from there with the same bits, in another process too, on
+  /// a device of the same kind. Throws std::runtime_error where the method cannot tell its state.
+  std::vector<std::uint8_t> save();
+  /// Throws std::runtime_error with the reason for what is cut short, damaged, of another version,
+  /// scene or device; then this simulation must not be used any more. A new one must not have
+  /// advanced before.
+  void restore(Span<const std::uint8_t> saved);
 
   /// Advances one frame. After a blow-up it throws std::runtime_error: build a new Simulation.
   FrameReport advance_frame();

@@ -29,6 +29,8 @@ class MpmTissue final : public Tissue {
   std::uint64_t checksum() override;
   Momentum momentum() override;
   std::string device_name() const override;
+  std::vector<std::uint8_t> save() override;
+  void restore(Span<const std::uint8_t> saved) override;
   const std::vector<std::string>& notes() const override { return notes_; }
 
   // For tests and the benchmark.
@@ -46,6 +48,9 @@ class MpmTissue final : public Tissue {
   MpmState& state() { return *state_; }
 
  private:
+  template <class Archive>
+  void each_field(Archive& archive);
+
   /// The frame that is worked on.
   struct Frame {
     FrameInput input;

@@ -23,12 +23,18 @@ void Diagnostics::simulation(Status& status) {
     status.summary(DiagnosticStatus::ERROR, s.problem);
   } else if (s.run.paused) {
     status.summary(DiagnosticStatus::OK, "paused");
-  } else if (s.run.real_time_factor > 0 && s.run.real_time_factor < 0.9) {
-    status.summary(DiagnosticStatus::WARN, "slower than real time: use larger cells");
+  } else if (s.behind > 0.1) {
+    status.summaryf(DiagnosticStatus::WARN,
+                    "%.1f s behind /clock: play it slower, or use larger cells", s.behind);
+  } else if (s.run.real_time_factor > 0 && s.run.real_time_factor < 0.9 * s.aimed_factor) {
+    status.summary(DiagnosticStatus::WARN, s.aimed_factor == 1
+                                               ? "slower than real time: use larger cells"
+                                               : "slower than time_factor: use larger cells");
   } else {
     status.summary(DiagnosticStatus::OK, "running");
   }
   status.add("real-time factor", s.run.real_time_factor);
+  status.add("behind /clock [s]", s.behind);
   status.add("frame", s.frame);
   status.add("simulated time [s]", s.time);
   status.add("frame rate [Hz]", s.frame_rate);

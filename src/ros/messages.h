@@ -9,4 +9,5 @@
 
 #include <tissue_sim/FragmentArray.h>
 #include <tissue_sim/JawGrip.h>
+#include <tissue_sim/SavedState.h>
 #include <tissue_sim/SimulationState.h>

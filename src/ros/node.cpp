@@ -3,6 +3,7 @@
 #include <ros/console.h>
 #include <ros/names.h>
 #include <ros/time.h>
+#include <rosgraph_msgs/Clock.h>
 
 #include <set>
 #include <string>
@@ -32,14 +33,21 @@ Node::Node(const ros::NodeHandle& node)
       frames_(parameters_.world_frame, parameters_.tf_tolerance),
       pose_spinner_(1, &pose_queue_),
       service_spinner_(kServiceThreads, &service_queue_) {
-  if (ros::Time::isSimTime()) {
-    ROS_WARN("/use_sim_time is set: messages carry the time of /clock, frames keep to the wall's");
-  }
-  const Scene scene = read_scene_parameters(node);
+  Session session = make_session(read_scene_parameters(node));
+  const Scene scene = session.simulation->scene();
   Parameters first = parameters_;
   const RecordRequest record = record_request(parameters_.record);
   first.paused = parameters_.paused || record.wanted;  // so that the bag holds frame 0
-  simulation_ = std::make_unique<SimulationThread>(make_session(scene), first);
+  if (parameters_.publish_clock) {
+    clock_publisher_ = service_node_.advertise<rosgraph_msgs::Clock>("/clock", 10, true);
+  }
+  simulation_ =
+      std::make_unique<SimulationThread>(std::move(session), first, [this](const ros::Time& now) {
+        rosgraph_msgs::Clock message;
+        message.clock = now;
+        clock_publisher_.publish(message);
+      });
+  connect_clock();
   services_ = std::make_unique<Services>(service_node_, scene, *simulation_, recorder_, frames_,
                                          [this](const Scene& s) { return make_session(s); });
   diagnostics_ = std::make_unique<Diagnostics>(service_node_, *simulation_, recorder_);
@@ -83,8 +91,36 @@ void Node::record_from_start(const std::string& name) {
   clock_timer_ = service_node_.createWallTimer(ros::WallDuration(0.1), wait);
 }
 
-Session Node::make_session(const Scene& scene) {
+void Node::connect_clock() {
+  if (parameters_.publish_clock) {
+    if (!ros::Time::isSimTime()) {
+      ROS_WARN(
+          "this node publishes /clock, but nobody follows it: set /use_sim_time to true before "
+          "nodes start");
+    }
+    return;
+  }
+  if (!ros::Time::isSimTime()) return;
+  if (parameters_.time != TimeMode::kRos) {
+    ROS_WARN(
+        "/use_sim_time is set: messages carry the time of /clock, frames do not keep to it "
+        "(time: ros would)");
+  }
+  clock_subscriber_ = pose_node_.subscribe<rosgraph_msgs::Clock>(
+      "/clock", 100,
+      [this](const rosgraph_msgs::Clock::ConstPtr& m) { simulation_->on_clock(m->clock); });
+}
+
+Session Node::make_session(const Scene& asked) {
   Session session;
+  // A force for hands comes more often by shorter frames: with them poses are taken as often, and
+  // nothing is felt that a replay would not compute. What is for eyes keeps its own rate.
+  Scene scene = asked;
+  Parameters parameters = parameters_;
+  if (parameters.wrench_rate > scene.frame_rate) {
+    if (parameters.state_rate == 0) parameters.state_rate = scene.frame_rate;
+    scene.frame_rate = parameters.wrench_rate;
+  }
   session.simulation = std::make_unique<Simulation>(scene);
   session.tools = std::make_shared<ToolInputs>();
   PoseLimits limits;
@@ -97,12 +133,16 @@ Session Node::make_session(const Scene& scene) {
     box.max = box.max.cwiseMax(piece.box.max);
   }
   std::set<std::string> names;
+  std::function<void()> on_sample;
+  if (parameters_.time != TimeMode::kWall) {  // no callback runs before the spinners are started
+    on_sample = [this] { simulation_->on_sample(); };
+  }
   for (const Tool& tool : scene.tools) {
     names.insert(tool.name);
     const auto source = parameters_.tools.find(tool.name);
     session.tools->push_back(std::make_unique<ToolInput>(
         pose_node_, tool, source == parameters_.tools.end() ? ToolParameters() : source->second,
-        limits, frames_, box, recorder_));
+        limits, frames_, box, recorder_, on_sample));
   }
   for (const auto& source : parameters_.tools) {
     if (names.count(source.first) == 0) {
@@ -114,7 +154,7 @@ Session Node::make_session(const Scene& scene) {
     ROS_WARN("%s", warning.c_str());
   }
   session.publications =
-      std::make_shared<Publications>(service_node_, scene, parameters_, recorder_);
+      std::make_shared<Publications>(service_node_, scene, parameters, recorder_);
   Tissue& tissue = session.simulation->tissue();
   for (const std::string& note : tissue.notes()) ROS_WARN("%s", note.c_str());
   ROS_INFO("scene '%s': %d particles, cells of %g mm, %zu tools, on %s", scene.name.c_str(),

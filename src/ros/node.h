@@ -25,10 +25,11 @@ class Node {
   ~Node();
 
  private:
-  Session make_session(const Scene& scene);
+  Session make_session(const Scene& asked);
   /// Starts the recording that the parameters ask for, and the simulation, which stood still so
   /// that the bag holds frame 0. While there is no /clock it waits for one, and says so.
   void record_from_start(const std::string& name);
+  void connect_clock();
 
   // Queues of their own: a service that takes long does not hold up the poses.
   ros::CallbackQueue pose_queue_, service_queue_;
@@ -36,11 +37,13 @@ class Node {
   const Parameters parameters_;
   Recorder recorder_;
   Frames frames_;
+  ros::Publisher clock_publisher_;
   std::unique_ptr<SimulationThread> simulation_;
   std::unique_ptr<Services> services_;
   std::unique_ptr<Diagnostics> diagnostics_;
   ros::WallTimer clock_timer_;
   int waited_ = 0;  // for /clock, a tenth of a second each
+  ros::Subscriber clock_subscriber_;
   ros::AsyncSpinner pose_spinner_, service_spinner_;
 };
 

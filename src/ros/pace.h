@@ -10,6 +10,10 @@ namespace tissue_sim {
 using WallClock = std::chrono::steady_clock;
 using WallTime = WallClock::time_point;
 
+inline double seconds(WallTime t) {
+  return std::chrono::duration<double>(t.time_since_epoch()).count();
+}
+
 /// When each frame is due: frame n at start + n * period. Where the simulation is late by more than
 /// a frame it drops behind, and the schedule starts anew from there: no burst ever catches up.
 class Pace {
@@ -57,7 +61,7 @@ class RealTimeFactor {
   std::deque<Sample> samples_;
 };
 
-/// Lets through about `rate` frames a second of wall time, as evenly as whole frames allow.
+/// Lets through about `rate` frames a second, as evenly as whole frames allow.
 class Throttle {
  public:
   /// A rate of 0 or of at least the frame rate lets every frame through.
@@ -66,9 +70,10 @@ class Throttle {
         period_(1.0 / (all_ ? frame_rate : rate)),
         slack_(0.5 / frame_rate) {}
 
-  bool due(WallTime now) {
+  /// `t` is by whatever clock the rate is of; one that goes back starts anew [s].
+  bool due(double t) {
     if (all_) return true;
-    const double t = std::chrono::duration<double>(now.time_since_epoch()).count();
+    if (t + 2 * period_ < next_) next_ = t;
     if (t + slack_ < next_) return false;
     next_ = t > next_ + period_ ? t + period_ : next_ + period_;
     return true;

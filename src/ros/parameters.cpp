@@ -20,10 +20,11 @@ namespace {
 using XmlRpc::XmlRpcValue;
 
 const std::set<std::string> kKnown = {
-    "scene", "scene_file", "mesh", "mesh_scale", "world_frame", "time", "paused", "cloud_rate",
-    "cloud_stride", "cloud_surface_only", "fragment_rate", "state_rate", "marker_rate", "checksum",
-    "force_scale", "publish_tf", "max_tool_speed", "max_tool_turn_rate", "tf_tolerance",
-    "recording_folder", "record", "recording_queue", "recording_reserve", "tools",
+    "scene", "scene_file", "mesh", "mesh_scale", "world_frame", "time", "pose_delay", "time_factor",
+    "publish_clock", "lockstep_tools", "paused", "cloud_rate", "cloud_stride", "cloud_surface_only",
+    "fragment_rate", "state_rate", "wrench_rate", "marker_rate", "checksum", "force_scale",
+    "publish_tf", "max_tool_speed", "max_tool_turn_rate", "tf_tolerance", "recording_folder",
+    "record", "recording_queue", "recording_reserve", "tools",
     // of diagnostic_updater
     "diagnostic_period", "diagnostic_updater_use_fqn"};
 
@@ -161,6 +162,35 @@ Region fitted(Region region, const Box& from, const Box& to) {
   return region;
 }
 
+void read_time(const ros::NodeHandle& node, Parameters& p) {
+  const char* const allowed = "must be wall, ros or lockstep";
+  std::string time = "wall";
+  read(node, "time", time, allowed);
+  XmlRpcValue given(time);
+  if (time == "ros") {
+    p.time = TimeMode::kRos;
+  } else if (time == "lockstep") {
+    p.time = TimeMode::kLockstep;
+    p.time_factor = 0;
+  } else if (time != "wall") {
+    refuse("time", given, allowed);
+  }
+  read(node, "pose_delay", p.pose_delay, 0, 10);
+  read(node, "time_factor", p.time_factor, 0, 1000);
+  read(node, "publish_clock", p.publish_clock);
+  if (p.time == TimeMode::kRos && p.publish_clock) {
+    refuse("time", given, "must be wall or lockstep where the node is the clock (publish_clock)");
+  }
+  XmlRpcValue tools;
+  if (!node.getParam("lockstep_tools", tools)) return;
+  const char* const names = "must be a list of tools' names";
+  if (tools.getType() != XmlRpcValue::TypeArray) refuse("lockstep_tools", tools, names);
+  for (int i = 0; i < tools.size(); ++i) {
+    if (tools[i].getType() != XmlRpcValue::TypeString) refuse("lockstep_tools", tools, names);
+    p.lockstep_tools.push_back(static_cast<std::string&>(tools[i]));
+  }
+}
+
 }  // namespace
 
 RecordRequest record_request(const std::string& value) {
@@ -171,12 +201,7 @@ RecordRequest record_request(const std::string& value) {
 Parameters read_parameters(const ros::NodeHandle& node) {
   warn_of_unknown(node);
   Parameters p;
-  std::string time = "wall";
-  read(node, "time", time, "must be wall");
-  if (time != "wall") {
-    XmlRpcValue v(time);
-    refuse("time", v, "must be wall, the only time that this version offers");
-  }
+  read_time(node, p);
   read(node, "world_frame", p.world_frame, "must be the name of a tf frame");
   if (!p.world_frame.empty() && p.world_frame.front() == '/') p.world_frame.erase(0, 1);
   if (p.world_frame.empty()) {
@@ -189,6 +214,7 @@ Parameters read_parameters(const ros::NodeHandle& node) {
   read(node, "cloud_surface_only", p.cloud_surface_only);
   read(node, "fragment_rate", p.fragment_rate, 0.01, 2000);
   read(node, "state_rate", p.state_rate, 0, 2000);
+  read(node, "wrench_rate", p.wrench_rate, 0, 2000);
   read(node, "marker_rate", p.marker_rate, 0.01, 2000);
   read(node, "checksum", p.checksum);
   read(node, "force_scale", p.force_scale, 1e-6, 100);

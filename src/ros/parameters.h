@@ -6,6 +6,7 @@
 
 #include <map>
 #include <string>
+#include <vector>
 
 #include "ros/pose_check.h"
 #include "tissue_sim/scene.h"
@@ -19,14 +20,27 @@ struct ToolParameters {
   std::string interpolate = "none";       ///< between samples: none, or linear, one sample later
 };
 
+/// What frames keep to.
+enum class TimeMode {
+  kWall,      ///< the wall clock, dropping behind where they are late
+  kRos,       ///< ROS time: /clock, with poses by their stamps
+  kLockstep,  ///< the instruments: one frame for each sample of all of them, or by step
+};
+
 struct Parameters {
+  TimeMode time = TimeMode::kWall;
+  double pose_delay = 0.02;    ///< kRos: the frame at t uses poses stamped up to t less this [s]
+  double time_factor = 1;      ///< but kRos: simulated over wall time, 0: as fast as it goes
+  bool publish_clock = false;  ///< but kRos: /clock
+  std::vector<std::string> lockstep_tools;  ///< that are waited for; empty: who is connected
   std::string world_frame = "world";
   bool paused = false;     ///< at the start
   double cloud_rate = 30;  ///< [Hz] of wall time
   int cloud_stride = 1;    ///< every n-th point
   bool cloud_surface_only = false;
   double fragment_rate = 10;       ///< [Hz], and whenever the pieces change
-  double state_rate = 0;           ///< [Hz], 0 for every frame
+  double state_rate = 0;           ///< [Hz], 0 for every frame of the scene's frame_rate
+  double wrench_rate = 0;          ///< [Hz]: frames are as short as it asks; 0: the scene's
   double marker_rate = 15;         ///< [Hz]
   bool checksum = true;            ///< in each state
   double force_scale = 0.02;       ///< length of the force arrows [m/N]

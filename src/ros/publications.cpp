@@ -11,6 +11,7 @@ Publications::Publications(ros::NodeHandle& node, const Scene& scene, const Para
       scene_output_(node, "scene", 1, recorder, true),
       state_(node, "state", 100, recorder),
       inputs_(node, "inputs", 1000, recorder),
+      saved_state_(node, "saved_state", 1, recorder),
       fragments_(node, "fragments", 10, recorder),
       points_(node, "tissue/points", 2, recorder),
       loose_points_(node, "fragments/points", 2, recorder),
@@ -34,25 +35,14 @@ Publications::Publications(ros::NodeHandle& node, const Scene& scene, const Para
 }
 
 std::set<std::string> Publications::topics() const {
-  std::set<std::string> names = {scene_output_.topic(),  state_.topic(),  inputs_.topic(),
-                                 fragments_.topic(),     points_.topic(), loose_points_.topic(),
-                                 marker_output_.topic(), tf_.topic()};
+  std::set<std::string> names = {scene_output_.topic(), saved_state_.topic(),   state_.topic(),
+                                 inputs_.topic(),       fragments_.topic(),     points_.topic(),
+                                 loose_points_.topic(), marker_output_.topic(), tf_.topic()};
   for (const ToolOutputs& tool : tools_) {
     names.insert({tool.body.topic(), tool.spatial.topic()});
     if (tool.grip) names.insert(tool.grip->topic());
   }
   return names;
-}
-
-bool Publications::count_pieces(Tissue& tissue) {
-  if (tissue.fragment_count() == pieces_.count) return false;
-  pieces_ = {};
-  for (const Fragment& f : tissue.fragments()) {
-    ++pieces_.count;
-    pieces_.loose += f.loose;
-    pieces_.volume += f.volume;
-  }
-  return true;
 }
 
 std_msgs::Header Publications::header(const ros::Time& stamp) const {
@@ -62,31 +52,41 @@ std_msgs::Header Publications::header(const ros::Time& stamp) const {
   return h;
 }
 
-void Publications::announce() {
+void Publications::announce(const ros::Time& stamp) {
   pieces_ = {};
-  scene_output_.publish(scene_text_, ros::Time::now(), true);
+  scene_output_.publish(scene_text_, stamp, true);
 }
 
-void Publications::record_scene() { scene_output_.record(scene_text_, ros::Time::now()); }
+void Publications::record_scene(const ros::Time& stamp) {
+  scene_output_.record(scene_text_, stamp);
+}
+
+void Publications::record_state(const Simulation& simulation,
+                                const std::vector<std::uint8_t>& state, const ros::Time& stamp) {
+  auto m = boost::make_shared<SavedState>();
+  m->header = header(stamp);
+  m->frame = simulation.frame();
+  m->state = state;
+  saved_state_.record(m, stamp);
+}
 
 void Publications::publish(Simulation& simulation, const FrameReport& report, const RunState& run,
-                           bool all) {
-  const ros::Time stamp = ros::Time::now();
-  const WallTime now = WallClock::now();
+                           const FrameTime& time, bool all) {
+  const ros::Time& stamp = time.stamp;
+  const double now = time.elapsed;
   if (inputs_.wanted()) {
     auto m = boost::make_shared<FrameInputMessage>(to_message(report.input, scene_));
     m->header = header(stamp);
     inputs_.publish(m, stamp, true);
   }
-  const bool came_apart = count_pieces(simulation.tissue());
+  if (!run.blew_up) publish_loads(report, stamp, true);  // first: hands wait for them
+  const bool came_apart = pieces_.follow(simulation.tissue());
   const bool state_due = state_due_.due(now) || all || run.blew_up;
+  if (state_due) publish_tf(report, stamp, true);
   if (state_due && state_.wanted()) {
-    state_.publish(state_message(simulation, report, run, stamp), stamp);
+    state_.publish(state(simulation, report, run, stamp), stamp);
   }
-  publish_tf(report, stamp, true);
   if (run.blew_up) return;  // what follows may hold NaN
-  publish_loads(report, stamp, true);
-
   const bool fragments_due = fragments_due_.due(now) || all || came_apart;
   if (fragments_due && fragments_.wanted()) {
     fragments_.publish(fragment_message(simulation, stamp), stamp);
@@ -102,16 +102,15 @@ void Publications::publish(Simulation& simulation, const FrameReport& report, co
   }
 }
 
-void Publications::hold(const FrameReport& report, const RunState& run) {
-  const ros::Time stamp = ros::Time::now();
+void Publications::hold(const FrameReport& report, const RunState& run, const ros::Time& stamp) {
   publish_tf(report, stamp, false);
   if (!run.blew_up) publish_loads(report, stamp, false);
 }
 
-void Publications::show(Simulation& simulation, const FrameReport& report, const RunState& run) {
-  const ros::Time stamp = ros::Time::now();
-  count_pieces(simulation.tissue());
-  if (state_.listened()) state_.show(state_message(simulation, report, run, stamp));
+void Publications::show(Simulation& simulation, const FrameReport& report, const RunState& run,
+                        const ros::Time& stamp) {
+  pieces_.follow(simulation.tissue());
+  if (state_.listened()) state_.show(state(simulation, report, run, stamp));
   if (run.blew_up) return;
   if (fragments_.listened()) fragments_.show(fragment_message(simulation, stamp));
   if (points_.listened()) points_.show(cloud(simulation, false, stamp));
@@ -119,31 +118,13 @@ void Publications::show(Simulation& simulation, const FrameReport& report, const
   if (marker_output_.listened()) marker_output_.show(marker_message(simulation, report, stamp));
 }
 
-boost::shared_ptr<const SimulationState> Publications::state_message(Simulation& simulation,
-                                                                     const FrameReport& report,
-                                                                     const RunState& run,
-                                                                     const ros::Time& stamp) const {
-  auto m = boost::make_shared<SimulationState>();
+boost::shared_ptr<const SimulationState> Publications::state(Simulation& simulation,
+                                                             const FrameReport& report,
+                                                             const RunState& run,
+                                                             const ros::Time& stamp) const {
+  auto m = boost::make_shared<SimulationState>(
+      state_message(simulation, report, run, pieces_, parameters_.checksum));
   m->header = header(stamp);
-  m->frame = simulation.frame();
-  m->time = simulation.time();
-  m->frame_rate = scene_.frame_rate;
-  m->paused = run.paused;
-  m->blew_up = run.blew_up;
-  m->substeps = report.result.substeps;
-  m->substep = report.result.substep;
-  m->cfl = report.cfl;
-  m->compute_time = report.compute_time;
-  m->real_time_factor = run.real_time_factor;
-  m->particles = simulation.tissue().point_count();
-  m->fragments = pieces_.count;
-  m->loose_fragments = pieces_.loose;
-  m->fragment_volume = pieces_.volume;
-  m->device = without_commas(simulation.tissue().device_name());
-  m->kinetic_energy = report.result.kinetic_energy;
-  m->elastic_energy = report.result.elastic_energy;
-  m->max_speed = report.result.max_speed;
-  if (parameters_.checksum) m->checksum = to_hex(simulation.tissue().checksum());
   return m;
 }
 

@@ -22,15 +22,15 @@
 #include "ros/output.h"
 #include "ros/pace.h"
 #include "ros/parameters.h"
+#include "ros/state_message.h"
 #include "tissue_sim/simulation.h"
 
 namespace tissue_sim {
 
-/// How the simulation stands, besides what the frame's report says.
-struct RunState {
-  bool paused = false;
-  bool blew_up = false;
-  double real_time_factor = 0;
+/// When a frame is done.
+struct FrameTime {
+  ros::Time stamp;     ///< of its messages
+  double elapsed = 0;  ///< by the clock that rates of topics are of [s]
 };
 
 /// Belongs to the simulation's thread, but for the constructor and topics().
@@ -43,32 +43,29 @@ class Publications {
   std::set<std::string> topics() const;
 
   /// The scene, latched: at the start and at every reset.
-  void announce();
+  void announce(const ros::Time& stamp);
   /// The scene into a recording that has just begun.
-  void record_scene();
+  void record_scene(const ros::Time& stamp);
+  /// The state that a run in the bag goes on from.
+  void record_state(const Simulation& simulation, const std::vector<std::uint8_t>& state,
+                    const ros::Time& stamp);
   /// A frame is done. `all`: also what has a rate and is not due yet.
-  void publish(Simulation& simulation, const FrameReport& report, const RunState& run, bool all);
+  void publish(Simulation& simulation, const FrameReport& report, const RunState& run,
+               const FrameTime& time, bool all);
   /// Forces and tf of a simulation that stands still: clients wait for them. Not into the bag.
-  void hold(const FrameReport& report, const RunState& run);
+  void hold(const FrameReport& report, const RunState& run, const ros::Time& stamp);
   /// For those who watch a simulation that stands still. Nothing goes into the bag.
-  void show(Simulation& simulation, const FrameReport& report, const RunState& run);
+  void show(Simulation& simulation, const FrameReport& report, const RunState& run,
+            const ros::Time& stamp);
 
  private:
   struct ToolOutputs {
     Output<geometry_msgs::WrenchStamped> body, spatial;
     std::optional<Output<JawGrip>> grip;  // of a grasper
   };
-  struct Pieces {
-    int count = 0, loose = 0;
-    double volume = 0;  // [m^3]
-  };
-
-  bool count_pieces(Tissue& tissue);  ///< whether any came apart
   std_msgs::Header header(const ros::Time& stamp) const;
-  boost::shared_ptr<const SimulationState> state_message(Simulation& simulation,
-                                                         const FrameReport& report,
-                                                         const RunState& run,
-                                                         const ros::Time& stamp) const;
+  boost::shared_ptr<const SimulationState> state(Simulation& simulation, const FrameReport& report,
+                                                 const RunState& run, const ros::Time& stamp) const;
   boost::shared_ptr<const FragmentArray> fragment_message(Simulation& simulation,
                                                           const ros::Time& stamp) const;
   boost::shared_ptr<const sensor_msgs::PointCloud2> cloud(Simulation& simulation, bool loose_only,
@@ -88,6 +85,7 @@ class Publications {
   Output<std_msgs::String> scene_output_;
   Output<SimulationState> state_;
   Output<FrameInputMessage> inputs_;
+  Output<SavedState> saved_state_;
   Output<FragmentArray> fragments_;
   Output<sensor_msgs::PointCloud2> points_, loose_points_;
   Output<visualization_msgs::MarkerArray> marker_output_;
@@ -98,7 +96,7 @@ class Publications {
   /// The last clouds, to be filled again when nobody else holds them: see ros/cloud_memory.h.
   std::array<boost::shared_ptr<sensor_msgs::PointCloud2>, 4> clouds_;
   std::size_t next_cloud_ = 0;
-  Pieces pieces_;
+  PieceCount pieces_;
   ros::Time tf_stamp_;
 };
 

@@ -27,7 +27,20 @@ void create_new(const std::string& path) {
   ::close(file);
 }
 
+constexpr std::int64_t kJump = 100000000;  // what no two threads' times are apart [ns]
+
 }  // namespace
+
+ros::Time BagTime::next(const ros::Time& time) {
+  std::int64_t at =
+      static_cast<std::int64_t>(std::max<ros::Time>(time, ros::TIME_MIN).toNSec()) + shift_;
+  if (at < last_ - kJump) {
+    shift_ += last_ - at;
+    at = last_;
+  }
+  last_ = std::max(at, last_ + 1);
+  return ros::Time().fromNSec(static_cast<std::uint64_t>(last_));
+}
 
 Recorder::Recorder(std::string folder, double queue, double reserve)
     : folder_(std::move(folder)), queue_limit_(queue), reserve_(reserve) {}
@@ -69,8 +82,14 @@ std::string Recorder::start(const std::string& name, std::set<std::string> topic
   topics_ = std::move(topics);
   queue_.clear();
   stopping_ = false;
+  time_ = {};
   thread_ = std::thread(&Recorder::run, this);
   return path;
+}
+
+void Recorder::add(const std::set<std::string>& topics) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  if (status_.recording && !stopping_) topics_.insert(topics.begin(), topics.end());
 }
 
 RecorderStatus Recorder::stop() {
@@ -108,6 +127,7 @@ void Recorder::push(Item item, bool must_keep) {
       dropped = item.topic;
     } else {
       status_.queued += item.bytes;
+      item.time = time_.next(item.time);
       queue_.push_back(std::move(item));
     }
   }
@@ -140,7 +160,7 @@ void Recorder::write_all() {
         throw std::runtime_error("the disk is full up to recording_reserve");
       }
     }
-    item.write(*bag_);
+    item.write(*bag_, item.time);
     lock.lock();
     status_.queued -= item.bytes;
     ++status_.messages;

@@ -27,6 +27,18 @@ struct RecorderStatus {
   std::string error;                             ///< what ended the recording before it was stopped
 };
 
+/// Times of the messages in a bag. Who reads a bag gets its messages in the order of their times,
+/// so those of one that was written later are later, also where a clock stands still (/clock,
+/// between two of its messages) or jumps back (a bag that is played in a loop): from there on they
+/// go on from where they were.
+class BagTime {
+ public:
+  ros::Time next(const ros::Time& time);
+
+ private:
+  std::int64_t last_ = 0, shift_ = 0;  // [ns]
+};
+
 /// Thread-safe. Nothing but start() and stop() ever waits for the disk.
 class Recorder {
  public:
@@ -38,10 +50,13 @@ class Recorder {
   /// Starts `<folder>/<name>.bag` (see recording_path()), under the name `.bag.active` until it is
   /// closed. Returns its full path; throws std::runtime_error.
   std::string start(const std::string& name, std::set<std::string> topics);
+  /// Topics that a recording which runs shall hold, too; nothing if none does.
+  void add(const std::set<std::string>& topics);
   /// Writes what is queued and closes the bag; throws std::runtime_error if nothing is recorded, or
   /// if the recording had ended before because of an error.
   RecorderStatus stop();
   RecorderStatus status() const;
+  const std::string& folder() const { return folder_; }
 
   /// Whether messages of this topic are recorded now: nobody else may be listening.
   bool wants(const std::string& topic) const;
@@ -61,10 +76,8 @@ class Recorder {
       (*header)["message_definition"] = ros::message_traits::definition(*message);
       (*header)["latching"] = "1";
     }
-    push({topic, bytes,
-          [=](rosbag::Bag& bag) {
-            bag.write(topic, std::max<ros::Time>(time, ros::TIME_MIN), message, header);
-          }},
+    push({topic, bytes, time,
+          [=](rosbag::Bag& bag, const ros::Time& at) { bag.write(topic, at, message, header); }},
          must_keep);
   }
 
@@ -72,7 +85,8 @@ class Recorder {
   struct Item {
     std::string topic;
     std::uint64_t bytes;
-    std::function<void(rosbag::Bag&)> write;
+    ros::Time time;
+    std::function<void(rosbag::Bag&, const ros::Time&)> write;
   };
   void push(Item item, bool must_keep);
   void run();        // the thread
@@ -92,6 +106,7 @@ class Recorder {
   std::deque<Item> queue_;
   std::set<std::string> topics_;
   bool stopping_ = false;
+  BagTime time_;
   RecorderStatus status_;
 };
 

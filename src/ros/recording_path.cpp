@@ -49,13 +49,15 @@ void check_name(const std::string& name) {
   for (const fs::path& part : path) {
     refuse(part == "..", name, "contains '..', which may leave the recording folder");
   }
-  refuse(path.filename().empty() || path.filename() == "." || path.filename() == ".bag", name,
-         "names no file");
+  refuse(path.filename().empty() || path.filename() == "." || path.filename() == ".bag" ||
+             path.filename() == ".state",
+         name, "names no file");
 }
 
 }  // namespace
 
-std::string recording_path(const std::string& folder, const std::string& name) {
+std::string recording_path(const std::string& folder, const std::string& name,
+                           const std::string& extension) {
   check_name(name.empty() ? "bag" : name);
   std::error_code error;
   fs::create_directories(folder, error);
@@ -66,11 +68,11 @@ std::string recording_path(const std::string& folder, const std::string& name) {
   }
 
   fs::path bag = root / (name.empty() ? date_and_time() : name);
-  if (bag.extension() != ".bag") bag += ".bag";
+  if (bag.extension() != extension) bag += extension;
   if (name.empty()) {  // two in the same second
     const std::string stem = bag.stem().string();
     for (int i = 2; there(bag) || there(bag.string() + ".active"); ++i) {
-      bag = root / (stem + "-" + std::to_string(i) + ".bag");
+      bag = root / (stem + "-" + std::to_string(i) + extension);
     }
   }
   // Links are followed before anything is made, so that no folder appears outside either.
@@ -86,6 +88,21 @@ std::string recording_path(const std::string& folder, const std::string& name) {
       there(bag.string() + ".active"), name,
       "is being recorded, or was left unfinished, as " + bag.string() + ".active: choose another");
   return bag.string();
+}
+
+std::string recorded_path(const std::string& folder, const std::string& name,
+                          const std::string& extension) {
+  check_name(name);
+  std::error_code error;
+  const fs::path root = fs::canonical(folder, error);
+  fs::path path = root / name;
+  if (path.extension() != extension) path += extension;
+  refuse(error || !fs::is_regular_file(path, error), name,
+         "names no file in " + folder + " (parameter recording_folder)");
+  path = fs::canonical(path, error);
+  refuse(error || !inside(root, path), name,
+         "leaves the recording folder " + root.string() + " through a link");
+  return path.string();
 }
 
 double free_space(const std::string& path) {

@@ -7,25 +7,9 @@
 
 #include "geometry/mesh.h"
 #include "ros/conversions.h"
+#include "ros/service_answer.h"
 
 namespace tissue_sim {
-namespace {
-
-// What goes wrong becomes the answer.
-template <class Response, class Work>
-bool answer(Response& response, const char* service, Work work) {
-  try {
-    response.message = work();
-    response.success = true;
-  } catch (const std::exception& e) {
-    response.message = e.what();
-    response.success = false;
-  }
-  if (!response.success) ROS_WARN("%s refused: %s", service, response.message.c_str());
-  return true;
-}
-
-}  // namespace
 
 Services::Services(ros::NodeHandle& node, const Scene& scene, SimulationThread& simulation,
                    Recorder& recorder, const Frames& frames, MakeSession make_session)
@@ -41,6 +25,8 @@ Services::Services(ros::NodeHandle& node, const Scene& scene, SimulationThread& 
   servers_.push_back(node.advertiseService("pause", &Services::pause, this));
   servers_.push_back(node.advertiseService("step", &Services::step, this));
   servers_.push_back(node.advertiseService("load_scene", &Services::load_scene, this));
+  servers_.push_back(node.advertiseService("save_state", &Services::save_state, this));
+  servers_.push_back(node.advertiseService("restore_state", &Services::restore_state, this));
   bool (Services::*start)(StartRecording::Request&, StartRecording::Response&) =
       &Services::start_recording;
   servers_.push_back(node.advertiseService("start_recording", start, this));
@@ -115,7 +101,8 @@ std::set<std::string> Services::select(const std::vector<std::string>& topics) c
     chosen.insert(name);
   }
   // Without these a bag cannot be run again.
-  chosen.insert({node_.resolveName("scene"), node_.resolveName("inputs")});
+  chosen.insert(
+      {node_.resolveName("scene"), node_.resolveName("inputs"), node_.resolveName("saved_state")});
   return chosen;
 }
 
@@ -127,12 +114,14 @@ std::string Services::start_recording(const std::string& path,
         "start the clock (rosbag play --clock) or unset /use_sim_time");
   }
   const std::string bag = recorder_.start(path, select(topics));
+  records_all_ = topics.empty();
   simulation_.record_scene();
   ROS_INFO("recording %s", bag.c_str());
-  const std::int64_t frame = simulation_.status().frame;
-  return bag + (frame == 0 ? ""
-                           : " (from frame " + std::to_string(frame) +
-                                 " on; reset to have a run from its start in it)");
+  const std::int64_t frame = simulation_.record_state();
+  return bag + (frame >= 0
+                    ? ""
+                    : " (without the beginning of the present run, so it can be run again from "
+                      "the next reset on only)");
 }
 
 bool Services::start_recording(StartRecording::Request& request,
@@ -188,15 +177,14 @@ bool Services::load_scene(LoadScene::Request& request, LoadScene::Response& resp
       throw std::runtime_error("give one of path and yaml, not " +
                                std::string(request.path.empty() ? "none" : "both"));
     }
-    if (recorder_.status().recording) {
-      throw std::runtime_error("a recording is running, and a bag holds one scene: stop it first");
-    }
     const std::lock_guard<std::mutex> lock(rebuilding_);
     const Scene scene = request.yaml.empty()
                             ? tissue_sim::load_scene(resolve_path(request.path, "scene"))
                             : scene_from_yaml(request.yaml);
-    simulation_.replace(make_session_(scene));
-    scene_ = scene;
+    Session session = make_session_(scene);
+    if (records_all_) recorder_.add(topics_of(session));
+    scene_ = session.simulation->scene();
+    simulation_.replace(std::move(session));
     return "frame 0 of scene '" + scene.name + "'";
   });
 }

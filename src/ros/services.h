@@ -6,9 +6,12 @@
 #include <std_srvs/Trigger.h>
 #include <tissue_sim/Cut.h>
 #include <tissue_sim/LoadScene.h>
+#include <tissue_sim/RestoreState.h>
+#include <tissue_sim/SaveState.h>
 #include <tissue_sim/StartRecording.h>
 #include <tissue_sim/Step.h>
 
+#include <atomic>
 #include <functional>
 #include <mutex>
 #include <set>
@@ -44,6 +47,8 @@ class Services {
   bool pause(std_srvs::SetBool::Request& request, std_srvs::SetBool::Response& response);
   bool step(Step::Request& request, Step::Response& response);
   bool load_scene(LoadScene::Request& request, LoadScene::Response& response);
+  bool save_state(SaveState::Request& request, SaveState::Response& response);
+  bool restore_state(RestoreState::Request& request, RestoreState::Response& response);
 
   BladePath read_path(const Cut::Request& request) const;
   std::set<std::string> select(const std::vector<std::string>& topics) const;
@@ -55,6 +60,7 @@ class Services {
   MakeSession make_session_;
   std::mutex rebuilding_;  // one at a time
   Scene scene_;
+  std::atomic<bool> records_all_{false};     // the recording that runs or ran last
   std::vector<ros::ServiceServer> servers_;  // last: end before what they call
 };
 

@@ -1,4 +1,6 @@
 // What other threads ask of the simulation's thread.
+#include <ros/console.h>
+
 #include <stdexcept>
 #include <utility>
 
@@ -50,7 +52,9 @@ StepReply SimulationThread::step(int frames) {
   std::future<StepReply> reply;
   call([&] {
     if (run_.blew_up) throw std::runtime_error(problem_);
-    if (!run_.paused) throw std::runtime_error("the simulation is running: pause it to step it");
+    if (!run_.paused && parameters_.time != TimeMode::kLockstep) {
+      throw std::runtime_error("the simulation is running: pause it to step it");
+    }
     if (steps_left_ > 0) {
       throw std::runtime_error("another step has " + std::to_string(steps_left_) +
                                " frames to go: wait for it");
@@ -74,7 +78,7 @@ void SimulationThread::set_paused(bool paused) {
     if (paused == run_.paused) return;
     run_.paused = paused;
     resumed_ = !paused;
-    pace_->restart(WallClock::now());
+    clock_.resume();
     real_time_factor_.restart();
     update_status();
   });
@@ -96,8 +100,62 @@ void SimulationThread::replace(Session session) {
   });
 }
 
+SavedFrame SimulationThread::save() {
+  SavedFrame saved;
+  call([&] {
+    if (run_.blew_up) throw std::runtime_error(problem_);
+    saved = {session_.simulation->frame(), session_.simulation->save()};
+  });
+  return saved;
+}
+
+void SimulationThread::restore(std::unique_ptr<Simulation> simulation,
+                               const std::vector<std::uint8_t>& state) {
+  call([&] {
+    std::swap(session_.simulation, simulation);
+    for (const auto& tool : *session_.tools) tool->rewind();
+    start_session();
+    session_.publications->record_state(*session_.simulation, state, clock_.stamp());
+  });
+}
+
+std::int64_t SimulationThread::record_state() {
+  std::int64_t frame = -1;
+  call([&] {
+    frame = session_.simulation->frame();
+    if (frame == 0) return;
+    try {
+      session_.publications->record_state(*session_.simulation, session_.simulation->save(),
+                                          clock_.stamp());
+    } catch (const std::exception& e) {
+      ROS_WARN("the recording begins without a state: %s", e.what());
+      frame = -1;
+    }
+  });
+  return frame;
+}
+
 void SimulationThread::record_scene() {
-  call([this] { session_.publications->record_scene(); });
+  call([this] { session_.publications->record_scene(clock_.stamp()); });
+}
+
+void SimulationThread::on_clock(const ros::Time& now) {
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    jumped_back_ = jumped_back_ || now < ros_time_;
+    ros_time_ = now;
+    woken_ = true;
+  }
+  wake_.notify_all();
+}
+
+void SimulationThread::on_sample() {
+  if (parameters_.time == TimeMode::kWall) return;
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    woken_ = true;
+  }
+  wake_.notify_all();
 }
 
 RunStatus SimulationThread::status() const {

@@ -12,10 +12,21 @@ constexpr std::chrono::milliseconds kHold(20);   // between its forces and trans
 
 }  // namespace
 
-SimulationThread::SimulationThread(Session session, const Parameters& parameters)
-    : parameters_(parameters), session_(std::move(session)) {
+std::set<std::string> topics_of(const Session& session) {
+  std::set<std::string> topics = session.publications->topics();
+  for (const auto& tool : *session.tools) topics.merge(tool->topics());
+  return topics;
+}
+
+SimulationThread::SimulationThread(Session session, const Parameters& parameters,
+                                   std::function<void(const ros::Time&)> say_time)
+    : parameters_(parameters),
+      say_time_(std::move(say_time)),
+      session_(std::move(session)),
+      clock_(parameters) {
   run_.paused = parameters.paused;
   start_session();
+  if (parameters_.publish_clock) say_time_(clock_.stamp());
   thread_ = std::thread(&SimulationThread::run, this);
 }
 
@@ -40,22 +51,19 @@ void SimulationThread::start_session() {
   for (PendingCut& cut : std::exchange(cuts_, {})) {
     cut.reply.set_value({false, "the simulation was started anew", {}});
   }
-  motion_.assign(scene.tools.size(), ToolMotion());
+  motion_ = session_.simulation->tools();
   entries_.assign(scene.tools.size(), ToolEntry());
-  pace_.emplace(scene.frame_rate);
-  pace_->restart(WallClock::now());
+  clock_.restart(scene.frame_rate);
+  for (const auto& tool : *session_.tools) tool->begin();
   real_time_factor_.restart();
   report_ = FrameReport();
   report_.input.tools = motion_;
   run_.blew_up = false;
   run_.real_time_factor = 0;
   problem_.clear();
-  session_.publications->announce();
+  session_.publications->announce(clock_.stamp());
   update_status();
-  std::set<std::string> topics = session_.publications->topics();
-  for (const auto& tool : *session_.tools) {
-    topics.merge(tool->topics());
-  }
+  std::set<std::string> topics = topics_of(session_);
   const std::lock_guard<std::mutex> lock(mutex_);
   tools_ = session_.tools;
   topics_ = std::move(topics);
@@ -65,39 +73,69 @@ bool SimulationThread::active() const {
   return !run_.blew_up && (!run_.paused || steps_left_ > 0 || !cuts_.empty());
 }
 
+bool SimulationThread::frame_due() {
+  if (!active()) return false;
+  // What somebody waits for does not wait for a clock or an instrument that stands still.
+  const bool stepped = parameters_.time == TimeMode::kLockstep && !cuts_.empty();
+  return steps_left_ > 0 || run_.paused || stepped || clock_.due(*session_.tools);
+}
+
 void SimulationThread::run() {
   WallTime shown = WallClock::now();
   for (;;) {
     std::vector<std::function<void()>> work;
+    bool jumped_back = false;
     {
       const WallTime now = WallClock::now();
-      const WallTime until = !active() ? now + kHold : run_.paused ? now : pace_->due();
+      const WallTime until = frame_due() ? now : active() ? clock_.wake() : now + kHold;
       std::unique_lock<std::mutex> lock(mutex_);
-      wake_.wait_until(lock, until, [this] { return stop_ || !work_.empty(); });
+      wake_.wait_until(lock, until, [this] { return stop_ || woken_ || !work_.empty(); });
       if (stop_) return;
       work.swap(work_);
+      woken_ = false;
+      jumped_back = std::exchange(jumped_back_, false);
+      clock_.set_ros_time(ros_time_);
     }
+    if (jumped_back) start_anew(clock_.ros_time());
     for (const std::function<void()>& each : work) each();
     const WallTime now = WallClock::now();
-    if (active()) {
-      if (run_.paused || now >= pace_->due()) frame();
-    } else {
+    if (frame_due()) {
+      frame();
+      if (active()) shown = now;
+    } else if (!active() || parameters_.time != TimeMode::kWall) {
       if (now - shown >= kIdle) {
         shown = now;
         run_.real_time_factor = 0;
-        session_.publications->show(*session_.simulation, report_, run_);
+        session_.publications->show(*session_.simulation, report_, run_, clock_.stamp());
+        if (active()) update_status();
       }
-      session_.publications->hold(report_, run_);
+      if (!active()) session_.publications->hold(report_, run_, clock_.stamp());
     }
   }
+}
+
+void SimulationThread::start_anew(const ros::Time& now) {
+  ROS_WARN("/clock jumped back to %.3f s: the scene starts anew", now.toSec());
+  for (const auto& tool : *session_.tools) tool->restart(now);
+  const Scene scene = session_.simulation->scene();
+  try {
+    session_.simulation.reset();  // its memory, before the next one's
+    session_.simulation = std::make_unique<Simulation>(scene);
+  } catch (const std::exception& e) {
+    ROS_FATAL("the scene cannot be built again: %s", e.what());
+    throw;
+  }
+  start_session();
 }
 
 void SimulationThread::move_tools(AppliedInput& input) {
   const double reach = parameters_.max_tool_speed / session_.simulation->scene().frame_rate;
   input.tools = motion_;
   input.grip_pressures.resize(motion_.size());
+  const bool in_turn = !run_.paused && steps_left_ == 0;
+  const auto samples = clock_.begin_frame(*session_.tools, in_turn, run_.paused);
   for (std::size_t i = 0; i < input.tools.size(); ++i) {
-    const std::optional<ToolInput::Sample> sample = (*session_.tools)[i]->take();
+    const std::optional<ToolInput::Sample>& sample = samples[i];
     if (!sample) continue;
     ToolMotion& m = input.tools[i];
     m.end = sample->pose;
@@ -124,7 +162,6 @@ void SimulationThread::frame() {
   Simulation& simulation = *session_.simulation;
   std::vector<PendingCut> cuts = std::exchange(cuts_, {});
   try {
-    pace_->begin_frame(WallClock::now());
     AppliedInput input;
     input.frame = simulation.frame();
     move_tools(input);
@@ -149,7 +186,10 @@ void SimulationThread::frame() {
                " and stands still: reset it";
   }
   const bool last_step = steps_left_ == 1 || (run_.paused && steps_left_ == 0);
-  session_.publications->publish(simulation, report_, run_, last_step);
+  run_.late_samples = 0;
+  for (const auto& tool : *session_.tools) run_.late_samples += tool->late();
+  session_.publications->publish(simulation, report_, run_, clock_.end_frame(), last_step);
+  if (parameters_.publish_clock) say_time_(clock_.stamp());
   answer_cuts(cuts, report_);
   if (run_.blew_up) {
     fail(problem_);
@@ -199,6 +239,8 @@ void SimulationThread::update_status() {
   s.frame = session_.simulation->frame();
   s.time = session_.simulation->time();
   s.frame_rate = session_.simulation->scene().frame_rate;
+  s.aimed_factor = parameters_.time == TimeMode::kWall ? parameters_.time_factor : 0;
+  s.behind = clock_.behind();
   s.substeps = report_.result.substeps;
   s.substep = report_.result.substep;
   s.compute_time = report_.compute_time;

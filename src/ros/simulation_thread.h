@@ -1,5 +1,5 @@
-// SimulationThread: owns the simulation and advances it against the wall clock. Everything else
-// talks to it between two frames, so nothing that is slow ever stops it.
+// SimulationThread: owns the simulation and advances it, frame by frame as FrameClock says.
+// Everything else talks to it between two frames, so nothing that is slow ever stops it.
 #pragma once
 
 #include <condition_variable>
@@ -13,6 +13,7 @@
 #include <thread>
 #include <vector>
 
+#include "ros/frame_clock.h"
 #include "ros/pace.h"
 #include "ros/parameters.h"
 #include "ros/publications.h"
@@ -22,8 +23,6 @@
 
 namespace tissue_sim {
 
-using ToolInputs = std::vector<std::unique_ptr<ToolInput>>;  // parallels Scene::tools
-
 /// One scene's simulation and its connections to ROS.
 struct Session {
   std::unique_ptr<Simulation> simulation;
@@ -31,12 +30,17 @@ struct Session {
   std::shared_ptr<Publications> publications;
 };
 
+/// Names of the topics that a recording of it holds unless others are asked for: all but markers.
+std::set<std::string> topics_of(const Session& session);
+
 /// What diagnostics says.
 struct RunStatus {
   RunState run;
   std::string problem;  ///< why it stands still, if it blew up
   std::int64_t frame = 0;
   double time = 0, frame_rate = 0;
+  double aimed_factor = 0;  ///< real-time factor that is to be reached, 0 for none
+  double behind = 0;        ///< of ROS time, where frames keep to it [s]
   int substeps = 0;
   double substep = 0, compute_time = 0;
   int particles = 0;
@@ -50,6 +54,11 @@ struct CutReply {
   CutReport report;
 };
 
+struct SavedFrame {
+  std::int64_t frame = 0;
+  std::vector<std::uint8_t> state;
+};
+
 struct StepReply {
   bool success = false;
   std::string message;
@@ -61,24 +70,37 @@ struct StepReply {
 /// what they ask, and throw std::runtime_error with the reason if it does not.
 class SimulationThread {
  public:
-  SimulationThread(Session session, const Parameters& parameters);
+  /// `say_time` is called with the time that it is after each frame, where this node is the clock.
+  SimulationThread(Session session, const Parameters& parameters,
+                   std::function<void(const ros::Time&)> say_time);
   ~SimulationThread();
   /// Ends the thread; who waits for an answer gets an exception.
   void stop();
 
   /// In the next frame, which is advanced even while paused.
   CutReply cut(const BladePath& path);
+  /// What /clock says. Where it jumps back the scene starts anew; tools keep what is latched.
+  void on_clock(const ros::Time& now);
+  /// A sample of an instrument came.
+  void on_sample();
+
   /// `frames` frames as fast as they go.
   StepReply step(int frames);
   void set_paused(bool paused);
   /// Frame 0 of the same scene; the tools stay where they are.
   void reset(std::unique_ptr<Simulation> simulation);
   void replace(Session session);
+  SavedFrame save();
+  /// Goes on from what `simulation` was restored to, out of `state`.
+  void restore(std::unique_ptr<Simulation> simulation, const std::vector<std::uint8_t>& state);
   void record_scene();
+  /// The state, where frames were done, into a recording that has just begun. Returns the frame, or
+  /// -1 where the method cannot tell its state.
+  std::int64_t record_state();
 
   RunStatus status() const;
   std::shared_ptr<ToolInputs> tools() const;
-  /// Names of the topics that a recording holds unless others are asked for: all.
+  /// topics_of() the present session: what a recording holds unless others are asked for.
   std::set<std::string> topics() const;
 
  private:
@@ -89,7 +111,9 @@ class SimulationThread {
 
   void run();
   void frame();
+  bool frame_due();
   void move_tools(AppliedInput& input);
+  void start_anew(const ros::Time& now);
   void answer_cuts(std::vector<PendingCut>& cuts, const FrameReport& report);
   void answer_step(const char* interrupted);
   void fail(const std::string& problem);
@@ -101,12 +125,13 @@ class SimulationThread {
   void post(std::function<void()> work);
 
   const Parameters parameters_;
+  const std::function<void(const ros::Time&)> say_time_;
 
   // Of the thread alone.
   Session session_;
   std::vector<ToolMotion> motion_;  // at rest where the last frame left them
   std::vector<ToolEntry> entries_;  // of each tool
-  std::optional<Pace> pace_;
+  FrameClock clock_;
   RealTimeFactor real_time_factor_;
   FrameReport report_;  // of the last frame
   RunState run_;
@@ -120,6 +145,9 @@ class SimulationThread {
   std::condition_variable wake_;
   std::vector<std::function<void()>> work_;
   bool stop_ = false;
+  bool woken_ = false;        // by a sample or /clock
+  bool jumped_back_ = false;  // /clock did
+  ros::Time ros_time_;        // what it says
   RunStatus status_;
   std::shared_ptr<ToolInputs> tools_;
   std::set<std::string> topics_;

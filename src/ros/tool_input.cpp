@@ -10,21 +10,25 @@
 namespace tissue_sim {
 namespace {
 
-double wall_seconds(WallTime time) {
-  return std::chrono::duration<double>(time.time_since_epoch()).count();
+template <class M>
+bool is_latched(const ros::MessageEvent<M>& event) {
+  const ros::M_string& header = event.getConnectionHeader();
+  const auto latching = header.find("latching");
+  return latching != header.end() && latching->second == "1";
 }
 
 }  // namespace
 
 ToolInput::ToolInput(const ros::NodeHandle& node, const Tool& tool, const ToolParameters& source,
                      const PoseLimits& limits, const Frames& frames, const Box& tissue,
-                     Recorder& recorder)
+                     Recorder& recorder, std::function<void()> on_sample)
     : tool_(tool),
       tf_frame_(source.tf_frame),
       interpolates_(source.interpolate == "linear"),
       frames_(frames),
       tissue_(tissue),
       recorder_(recorder),
+      on_sample_(std::move(on_sample)),
       check_(limits),
       last_came_(WallClock::now()) {
   ros::NodeHandle handle(node);
@@ -55,14 +59,27 @@ std::set<std::string> ToolInput::topics() const {
   return topics;
 }
 
-void ToolInput::on_pose(const geometry_msgs::PoseStamped::ConstPtr& message) {
+double ToolInput::now() const { return on_sample_ ? held_now_ : seconds(WallClock::now()); }
+
+void ToolInput::on_pose(const ros::MessageEvent<const geometry_msgs::PoseStamped>& event) {
+  const geometry_msgs::PoseStamped::ConstPtr message = event.getConstMessage();
   recorder_.write(pose_topic_, message, ros::Time::now());
-  accept(message->header, from_message(message->pose));
+  const bool latched = is_latched(event);
+  hold(held_poses_, message->header.stamp, [this, message, latched] {
+    pose_latched_ = latched;
+    accept(message->header, from_message(message->pose));
+  });
 }
 
-void ToolInput::on_transform(const geometry_msgs::TransformStamped::ConstPtr& message) {
+void ToolInput::on_transform(
+    const ros::MessageEvent<const geometry_msgs::TransformStamped>& event) {
+  const geometry_msgs::TransformStamped::ConstPtr message = event.getConstMessage();
   recorder_.write(pose_topic_, message, ros::Time::now());
-  accept(message->header, from_message(message->transform));
+  const bool latched = is_latched(event);
+  hold(held_poses_, message->header.stamp, [this, message, latched] {
+    pose_latched_ = latched;
+    accept(message->header, from_message(message->transform));
+  });
 }
 
 void ToolInput::accept(const std_msgs::Header& header, const Pose& in_frame) {
@@ -101,6 +118,7 @@ void ToolInput::follow_tf() {
 
 // Where /clock begins anew (a bag that loops) so do the stamps; the wall's is only corrected a bit.
 void ToolInput::forget_if_time_jumped_back() {
+  if (on_sample_) return;  // restart() says so
   const ros::Time now = ros::Time::now();
   if (now + ros::Duration(0.1) < newest_time_) check_.forget();
   newest_time_ = now;
@@ -108,9 +126,8 @@ void ToolInput::forget_if_time_jumped_back() {
 
 void ToolInput::check(const Pose& frame, const Pose& in_frame, const ros::Time& stamp) {
   const std::lock_guard<std::mutex> lock(mutex_);
-  const WallTime now = WallClock::now();
   came_ = true;
-  last_came_ = now;
+  last_came_ = WallClock::now();
   forget_if_time_jumped_back();
   if (is_rotation(in_frame.orientation) && is_rounded(in_frame.orientation) && !rounded_) {
     rounded_ = true;
@@ -118,7 +135,7 @@ void ToolInput::check(const Pose& frame, const Pose& in_frame, const ros::Time& 
              tool().c_str(), in_frame.orientation.norm());
   }
   Pose pose = frame * in_frame;
-  const PoseCheck::Verdict verdict = check_.check(pose, stamp.toSec(), wall_seconds(now));
+  const PoseCheck::Verdict verdict = check_.check(pose, stamp.toSec(), now());
   if (verdict.refusal) {
     refuse(*verdict.refusal, verdict.text);
     return;
@@ -137,9 +154,9 @@ void ToolInput::check(const Pose& frame, const Pose& in_frame, const ros::Time& 
     }
   }
   if (verdict.placed || !sample_) {
-    pose_track_.place(pose, wall_seconds(now));
+    pose_track_.place(pose, now());
   } else {
-    pose_track_.add(pose, wall_seconds(now));
+    pose_track_.add(pose, now());
   }
   if (!sample_) sample_ = Sample();
   sample_->pose = pose;
@@ -162,20 +179,28 @@ bool ToolInput::may_warn() {
   return true;
 }
 
-void ToolInput::on_jaw(const sensor_msgs::JointState::ConstPtr& message) {
+void ToolInput::on_jaw(const ros::MessageEvent<const sensor_msgs::JointState>& event) {
+  const sensor_msgs::JointState::ConstPtr message = event.getConstMessage();
   recorder_.write(jaw_topic_, message, ros::Time::now());
-  const JawAngle jaw = jaw_angle(*message);
+  const bool latched = is_latched(event);
+  hold(held_jaws_, message->header.stamp, [this, message, latched] {
+    jaw_latched_ = latched;
+    accept_jaw(*message);
+  });
+}
+
+void ToolInput::accept_jaw(const sensor_msgs::JointState& message) {
+  const JawAngle jaw = jaw_angle(message);
   const std::lock_guard<std::mutex> lock(mutex_);
   if (!jaw.problem.empty()) {
     ++counts_.jaws_refused;
     if (may_warn()) ROS_WARN("%s: jaw angle refused: %s", tool().c_str(), jaw.problem.c_str());
     return;
   }
-  const double now = wall_seconds(WallClock::now());
   if (jaw_came_) {
-    jaw_track_.add(jaw.angle, now);
+    jaw_track_.add(jaw.angle, now());
   } else {
-    jaw_track_.place(jaw.angle, now);
+    jaw_track_.place(jaw.angle, now());
   }
   jaw_came_ = true;
   jaw_ = jaw.angle;
@@ -195,6 +220,11 @@ void ToolInput::on_grip_pressure(const std_msgs::Float64::ConstPtr& message) {
 }
 
 std::optional<ToolInput::Sample> ToolInput::take() {
+  release(Held::kAll);
+  return take_released();
+}
+
+std::optional<ToolInput::Sample> ToolInput::take_released() {
   if (!tf_frame_.empty()) follow_tf();
   const std::lock_guard<std::mutex> lock(mutex_);
   if (!sample_) return std::nullopt;
@@ -202,9 +232,8 @@ std::optional<ToolInput::Sample> ToolInput::take() {
   sample.jaw = jaw_;
   sample.grip_pressure = grip_pressure_;
   if (interpolates_) {
-    const double now = wall_seconds(WallClock::now());
-    sample.pose = pose_track_.at(now);
-    if (jaw_came_) sample.jaw = jaw_track_.at(now);
+    sample.pose = pose_track_.at(now());
+    if (jaw_came_) sample.jaw = jaw_track_.at(now());
   }
   sample_->placed = sample_->fresh = false;
   return sample;
@@ -215,7 +244,7 @@ void ToolInput::rewind() {
   check_.forget();
   if (!sample_) return;
   sample_->placed = sample_->fresh = true;
-  pose_track_.place(sample_->pose, wall_seconds(WallClock::now()));
+  pose_track_.place(sample_->pose, now());
 }
 
 ToolStatus ToolInput::status() const {

@@ -7,12 +7,17 @@
 #include <sensor_msgs/JointState.h>
 #include <std_msgs/Float64.h>
 
+#include <cstdint>
+#include <functional>
+#include <memory>
 #include <mutex>
 #include <optional>
 #include <set>
 #include <string>
+#include <vector>
 
 #include "ros/frames.h"
+#include "ros/held_samples.h"
 #include "ros/pace.h"
 #include "ros/parameters.h"
 #include "ros/pose_check.h"
@@ -26,9 +31,11 @@ namespace tissue_sim {
 /// Thread-safe. Callbacks come on the node handle's queue.
 class ToolInput {
  public:
-  /// `tissue` is the box of all tissue as it is at the start [m].
+  /// `tissue` is the box of all tissue as it is at the start [m]. With `on_sample`, samples are
+  /// held until they are taken by stamp or one by one, and it is called for each.
   ToolInput(const ros::NodeHandle& node, const Tool& tool, const ToolParameters& source,
-            const PoseLimits& limits, const Frames& frames, const Box& tissue, Recorder& recorder);
+            const PoseLimits& limits, const Frames& frames, const Box& tissue, Recorder& recorder,
+            std::function<void()> on_sample);
 
   struct Sample {
     Pose pose;                 ///< world frame
@@ -44,21 +51,52 @@ class ToolInput {
   /// simulation that starts anew, and its instruments' time with it.
   void rewind();
 
+  /// The same by ROS time: the newest of those stamped up to `until`.
+  std::optional<Sample> take_until(const ros::Time& until);
+  /// The same one by one: the oldest pose that is held, with the oldest jaw angle.
+  std::optional<Sample> take_next();
+  bool has_next();         ///< a pose and, of a grasper whose jaws are connected, an angle
+  bool connected() const;  ///< somebody publishes its poses
+  /// Stamp of the oldest pose that is held [ns].
+  std::optional<std::int64_t> first_held();
+  /// Somebody publishes its poses, but none has come since the start.
+  bool awaited() const;
+
+  /// A scene starts at its frame 0.
+  void begin();
+  /// Time has jumped back to `now`: what came before is forgotten but for what is latched, which
+  /// will not come again.
+  void restart(const ros::Time& now);
+  /// Samples that came after the frame that they were for had begun, since begin(); and those that
+  /// were held in vain, for too many others came.
+  std::uint64_t late() const;
+
   ToolStatus status() const;
   const std::string& tool() const { return tool_.name; }
   /// What it listens to, for a recording.
   std::set<std::string> topics() const;
 
  private:
-  void on_pose(const geometry_msgs::PoseStamped::ConstPtr& message);
-  void on_transform(const geometry_msgs::TransformStamped::ConstPtr& message);
-  void on_jaw(const sensor_msgs::JointState::ConstPtr& message);
+  using Held = HeldSamples<std::function<void()>>;
+
+  void on_pose(const ros::MessageEvent<const geometry_msgs::PoseStamped>& event);
+  void on_transform(const ros::MessageEvent<const geometry_msgs::TransformStamped>& event);
+  void on_jaw(const ros::MessageEvent<const sensor_msgs::JointState>& event);
+  void accept_jaw(const sensor_msgs::JointState& message);
+  /// Calls `accept` now, or when the sample is taken.
+  void hold(Held& held, const ros::Time& stamp, std::function<void()> accept);
+  /// Calls what is held up to `until`.
+  void release(std::int64_t until);
+  std::optional<Sample> take_released();
   void on_grip_pressure(const std_msgs::Float64::ConstPtr& message);
   void follow_tf();
   void accept(const std_msgs::Header& header, const Pose& in_frame);
   void check(const Pose& frame, const Pose& in_frame, const ros::Time& stamp);
   void refuse(Refusal refusal, const std::string& text);
   void forget_if_time_jumped_back();
+  /// By what samples follow one another [s]: when they come, or by the stamps of those that are
+  /// held.
+  double now() const;
   /// Whether a warning is due again, once a second by the wall's clock.
   bool may_warn();
 
@@ -69,6 +107,14 @@ class ToolInput {
   const Box tissue_;
   Recorder& recorder_;
   std::string pose_topic_, jaw_topic_, grip_topic_;  // resolved
+
+  const std::function<void()> on_sample_;
+  mutable std::mutex held_mutex_;  // of what follows
+  Held held_poses_, held_jaws_;
+  std::uint64_t late_ = 0;
+  bool pose_latched_ = false, jaw_latched_ = false;  // the newest is
+  bool came_since_ = false;                          // a pose since the start
+  double held_now_ = 0;                              // [s]
 
   mutable std::mutex mutex_;  // of what follows
   PoseCheck check_;
@@ -85,5 +131,7 @@ class ToolInput {
 
   ros::Subscriber pose_subscriber_, jaw_subscriber_, grip_subscriber_;  // last: end before the rest
 };
+
+using ToolInputs = std::vector<std::unique_ptr<ToolInput>>;  // parallels Scene::tools
 
 }  // namespace tissue_sim

@@ -34,6 +34,9 @@ class Crossings {
   }
 
  private:
+  template <class Archive>
+  friend void fields(Archive& archive, Crossings& x);  // mpm/mpm_fields.h
+
   static constexpr Crossing kNone = {-1, {}};
   std::vector<std::int32_t> index_;  // per point, -1 where none was broken
   std::vector<std::array<Crossing, 3>> of_point_;

@@ -62,6 +62,9 @@ class NodeFields {
                            const std::vector<std::int32_t>& changed, Nodes& nodes, Cpu& cpu);
 
  private:
+  template <class Archive>
+  friend void fields(Archive& archive, NodeFields& x);  // mpm/mpm_fields.h
+
   /// How the node of a cell is split now, if otherwise than before, else nothing. The first
   /// component that was part of a field keeps it; for others `node` is ~ their parent.
   Split taken_apart(const Cell& cell, int lattice_node) const;

@@ -1,0 +1,177 @@
+#include "ros/frame_clock.h"
+
+#include <ros/console.h>
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+
+namespace tissue_sim {
+namespace {
+
+constexpr std::int64_t kSecond = 1000000000;   // [ns]
+constexpr std::int64_t kStale = kSecond;       // poses that much older than the clock are kept ones
+constexpr std::int64_t kAhead = 10 * kSecond;  // no clock goes, and no pose is, so far ahead
+constexpr std::chrono::milliseconds kIdle(200);  // between two looks at a simulation at rest
+
+std::int64_t nanoseconds(const ros::Time& t) { return static_cast<std::int64_t>(t.toNSec()); }
+ros::Time ros_time_of(std::int64_t t) {
+  return ros::Time().fromNSec(static_cast<std::uint64_t>(std::max<std::int64_t>(t, 0)));
+}
+
+WallClock::duration wall_duration(double s) {
+  return std::chrono::duration_cast<WallClock::duration>(std::chrono::duration<double>(s));
+}
+
+}  // namespace
+
+FrameClock::FrameClock(const Parameters& parameters) : parameters_(parameters) {
+  if (own_clock()) own_ = ros::TIME_MIN + ros::Duration(1);  // 0 stands for no time
+}
+
+std::int64_t FrameClock::delay() const {
+  return static_cast<std::int64_t>(std::llround(parameters_.pose_delay * 1e9));
+}
+
+void FrameClock::restart(double frame_rate) {
+  frame_rate_ = frame_rate;
+  pace_ = Pace(frame_rate * std::max(parameters_.time_factor, 1e-3));
+  pace_.restart(WallClock::now());
+  schedule_ = RosSchedule(frame_rate);
+  first_time_.reset();
+}
+
+void FrameClock::resume() {
+  pace_.restart(WallClock::now());
+  if (schedule_.begun()) schedule_.move(nanoseconds(ros_time()));
+}
+
+void FrameClock::set_ros_time(const ros::Time& now) {
+  const ros::Duration step = now - ros_time_;
+  if (parameters_.time == TimeMode::kRos && !ros_time_.isZero() &&
+      step.toSec() * kSecond > kAhead && schedule_.begun()) {
+    ROS_WARN("/clock jumped ahead by %.1f s: the simulation goes on from there", step.toSec());
+    schedule_.move(nanoseconds(now));
+  }
+  ros_time_ = now;
+}
+
+ros::Time FrameClock::ros_time() const {
+  return ros::Time::isSimTime() && !own_clock() ? ros_time_ : ros::Time::now();
+}
+
+ros::Time FrameClock::stamp() const {
+  if (own_clock()) return own_;
+  return parameters_.time == TimeMode::kRos ? ros_time() : ros::Time::now();
+}
+
+double FrameClock::behind() const {
+  if (parameters_.time != TimeMode::kRos || !schedule_.begun()) return 0;
+  return std::max(0.0, (nanoseconds(ros_time()) - schedule_.due()) * 1e-9);
+}
+
+bool FrameClock::ros_due(const ToolInputs& tools) {
+  const ros::Time time = ros_time();
+  if (time.isZero()) return false;
+  if (!first_time_) first_time_ = time;
+  const std::int64_t now = nanoseconds(time), begin = nanoseconds(*first_time_);
+  if (!schedule_.begun()) {
+    // The first pose's stamp decides when frame 0 is, not when somebody happened to look: so the
+    // same poses meet the same frames at every rate at which a bag is played.
+    std::optional<std::int64_t> first;
+    bool awaited = false;
+    for (const auto& tool : tools) {
+      const std::optional<std::int64_t> stamp = tool->first_held();
+      if (stamp && *stamp > begin - kStale && *stamp < now + kAhead) {
+        first = std::min(first.value_or(*stamp), *stamp);
+      } else {
+        awaited = awaited || (!stamp && tool->awaited());
+      }
+    }
+    if (!first && awaited) return false;
+    schedule_.start(first ? *first + delay() : begin);
+  }
+  return now >= schedule_.due();
+}
+
+bool FrameClock::all_sampled(const ToolInputs& tools) const {
+  const auto& named = parameters_.lockstep_tools;
+  bool any = false;
+  for (const auto& tool : tools) {
+    const bool wanted = named.empty()
+                            ? tool->connected() || tool->has_next()
+                            : std::find(named.begin(), named.end(), tool->tool()) != named.end();
+    if (!wanted) continue;
+    if (!tool->has_next()) return false;
+    any = true;
+  }
+  return any;
+}
+
+bool FrameClock::due(const ToolInputs& tools) {
+  const bool paced = parameters_.time_factor > 0;
+  switch (parameters_.time) {
+    case TimeMode::kWall:
+      return !paced || WallClock::now() >= pace_.due();
+    case TimeMode::kRos:
+      return ros_due(tools);
+    case TimeMode::kLockstep:
+      return all_sampled(tools) && (!paced || WallClock::now() >= pace_.due());
+  }
+  return false;
+}
+
+WallTime FrameClock::wake() const {
+  const WallTime now = WallClock::now();
+  if (parameters_.time == TimeMode::kRos) {
+    if (ros::Time::isSimTime()) return now + kIdle;  // /clock wakes
+    const double left = (schedule_.due() - nanoseconds(ros::Time::now())) * 1e-9;
+    return now + std::min<WallClock::duration>(kIdle, wall_duration(std::max(left, 0.0)));
+  }
+  if (parameters_.time == TimeMode::kLockstep && pace_.due() <= now) return now + kIdle;
+  return std::min<WallTime>(pace_.due(), now + std::chrono::seconds(1));
+}
+
+std::vector<std::optional<ToolInput::Sample>> FrameClock::begin_frame(const ToolInputs& tools,
+                                                                      bool in_turn, bool paused) {
+  std::vector<std::optional<ToolInput::Sample>> samples;
+  pace_.begin_frame(WallClock::now());
+  frame_stamp_ = stamp();
+  const bool by_stamp = parameters_.time == TimeMode::kRos && in_turn;
+  if (by_stamp) frame_stamp_ = ros_time_of(schedule_.due());
+  const ros::Time until = ros_time_of(schedule_.due() - delay());
+  for (const auto& tool : tools) {
+    if (by_stamp) {
+      samples.push_back(tool->take_until(until));
+    } else if (parameters_.time == TimeMode::kLockstep && !paused) {
+      samples.push_back(tool->take_next());
+    } else {
+      samples.push_back(tool->take());
+    }
+  }
+  if (by_stamp) schedule_.next();
+  return samples;
+}
+
+FrameTime FrameClock::end_frame() {
+  elapsed_ += 1 / frame_rate_;
+  if (own_clock()) {
+    own_rest_ += 1e9 / frame_rate_;
+    const double whole = std::floor(own_rest_ + 1e-6);
+    own_rest_ -= whole;
+    own_ += ros::Duration().fromNSec(static_cast<std::int64_t>(whole));
+    return {own_, elapsed_};
+  }
+  switch (parameters_.time) {
+    case TimeMode::kWall:
+      return {ros::Time::now(),
+              parameters_.time_factor == 1 ? seconds(WallClock::now()) : elapsed_};
+    case TimeMode::kRos:
+      return {frame_stamp_, elapsed_};
+    case TimeMode::kLockstep:
+      return {ros::Time::now(), elapsed_};
+  }
+  return {};
+}
+
+}  // namespace tissue_sim

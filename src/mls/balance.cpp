@@ -152,7 +152,10 @@ class Balance {
     Vectors x(n_, Vec3::Zero()), rest(n_), z(n_), p(n_), q(n_);
     for (std::int32_t i = 0; i < n_; ++i) rest[i] = -residual_[i];
     const auto precondition = [&] {
-      for (std::int32_t i = 0; i < n_; ++i) z[i] = free_[i] ? rest[i] / diagonal_[i] : Vec3::Zero();
+      for (std::int32_t i = 0; i < n_; ++i) {
+        z[i] = Vec3::Zero();
+        if (free_[i] != 0) z[i] = rest[i] / diagonal_[i];
+      }
     };
     precondition();
     p = z;

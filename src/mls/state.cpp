@@ -58,7 +58,8 @@ void remake_node(MlsState& s, std::int32_t i) {
   eigen.computeDirect(m, Eigen::EigenvaluesOnly);
   const double least = eigen.eigenvalues()[0], largest = eigen.eigenvalues()[2];
   const bool spans = largest > 0 && least > kSpans * largest;
-  const Eigen::Matrix3d inverse = spans ? m.inverse() : Eigen::Matrix3d::Zero();
+  Eigen::Matrix3d inverse = Eigen::Matrix3d::Zero();
+  if (spans) inverse = m.inverse();
   for (int k = 0; k < 6; ++k) {
     constexpr int kRow[] = {0, 1, 2, 0, 0, 1}, kColumn[] = {0, 1, 2, 1, 2, 2};
     s.inverse_moment[k][i] = static_cast<float>(inverse(kRow[k], kColumn[k]));

@@ -63,21 +63,21 @@ CutReport MlsTissue::cut_now(const BladePath& path) {
   return report;
 }
 
-void MlsTissue::run(const FrameColliders& colliders, const PartSubsteps& substeps, double duration,
-                    double from, double to) {
+void MlsTissue::begin_frame(double duration, const FrameInput& input) {
   MlsState& s = *state_;
-  for (int i = 0; i < substeps.count; ++i) {
-    const double share = substeps.share(i + 1, from, to);
-    s.colliders = colliders.at(share);
-    std::vector<ColliderLoad> loads(s.colliders.size());
-    const float acted = substep(s, substeps.at(i), loads);
-    colliders.add_loads(share, s.colliders.data(), loads.data(), acted / duration, result_.loads);
+  result_ = {};
+  result_.loads.resize(s.scene.tools.size());
+  for (const BladePath& path : input.cuts) {
+    result_.cut_reports.emplace_back();
+    cut(path, s.u.data(), result_.cut_reports.back());
   }
-  result_.substep = std::max<double>(result_.substep, substeps.longest());
-  result_.substeps += substeps.count;
+  const bool blades = !blade_paths(s.scene, input, 0, 1).empty();
+  frame_.emplace(Frame{input, duration, FrameColliders(s.scene, input, duration),
+                       blades ? s.u : Array<float>(), 0});
+  s.until_list = 0;
 }
 
-void MlsTissue::save() {
+void MlsTissue::save_checkpoint() {
   const MlsState& s = *state_;
   checkpoint_.u = s.u;
   checkpoint_.v = s.v;
@@ -88,7 +88,30 @@ void MlsTissue::save() {
   checkpoint_.result = result_;
 }
 
-void MlsTissue::restore() {
+double MlsTissue::run_part(const FramePart& part) {
+  MlsState& s = *state_;
+  const Frame& frame = *frame_;
+  for (int i = 0; i < part.substeps.count; ++i) {
+    const double share = part.substeps.share(i + 1, part.from, part.to);
+    s.colliders = frame.colliders.at(share);
+    std::vector<ColliderLoad> loads(s.colliders.size());
+    const float acted = substep(s, part.substeps.at(i), loads);
+    frame.colliders.add_loads(share, s.colliders.data(), loads.data(), acted / frame.duration,
+                              result_.loads);
+  }
+  result_.substep = std::max<double>(result_.substep, part.substeps.longest());
+  result_.substeps += part.substeps.count;
+  return part.to;
+}
+
+Verdict MlsTissue::judge_part(const FramePart& part) {
+  const bool finite = measure(nullptr);
+  if (!substeps_.is_borne(*state_, stiffening_, part.substeps.longest())) return Verdict::kTooLong;
+  result_.blew_up = !finite;
+  return Verdict::kAccepted;
+}
+
+void MlsTissue::reject_part(Verdict) {
   MlsState& s = *state_;
   s.u = checkpoint_.u;
   s.v = checkpoint_.v;
@@ -97,6 +120,15 @@ void MlsTissue::restore() {
   s.time = checkpoint_.time;
   s.until_list = checkpoint_.until_list;
   result_ = checkpoint_.result;
+}
+
+void MlsTissue::break_bonds(double share) {
+  Frame& frame = *frame_;
+  if (frame.u_before.empty() || share < 1) return;
+  for (const BladePath& path : blade_paths(state_->scene, frame.input, frame.cut_to, share)) {
+    cut(path, frame.u_before.data(), result_.blade_report);
+  }
+  frame.cut_to = share;
 }
 
 bool MlsTissue::measure(double* elastic) {
@@ -120,33 +152,7 @@ bool MlsTissue::measure(double* elastic) {
 }
 
 void MlsTissue::advance(double duration, const FrameInput& input) {
-  MlsState& s = *state_;
-  result_ = {};
-  result_.loads.resize(s.scene.tools.size());
-  for (const BladePath& path : input.cuts) {
-    result_.cut_reports.emplace_back();
-    cut(path, s.u.data(), result_.cut_reports.back());
-  }
-  const std::vector<BladePath> blades = blade_paths(s.scene, input, 0, 1);
-  const Array<float> u_before = blades.empty() ? Array<float>() : s.u;
-  const FrameColliders colliders(s.scene, input, duration);
-  s.until_list = 0;
-  double time = 0;  // of the frame
-  while (time < duration * (1 - 1e-9) && !result_.blew_up) {
-    const PartSubsteps part = substeps_.part(s, duration - time);
-    const double until = std::min(duration, time + part.until(part.count));
-    save();
-    run(colliders, part, duration, time / duration, until / duration);
-    const bool finite = measure(nullptr);
-    if (!substeps_.is_borne(s, stiffening_, part.longest())) {
-      restore();
-      continue;
-    }
-    result_.blew_up = !finite;
-    time = until;
-  }
-  for (const BladePath& path : blades) cut(path, u_before.data(), result_.blade_report);
-  pieces_measured_ = false;
+  run_frame(*this, duration, input);
 }
 
 FrameResult MlsTissue::finish() {

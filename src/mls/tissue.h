@@ -2,10 +2,12 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "fragments/pieces.h"
+#include "frame/run_frame.h"
 #include "mls/state.h"
 #include "mls/substep_choice.h"
 #include "tissue_sim/tissue.h"
@@ -29,6 +31,19 @@ class MlsTissue final : public Tissue {
   const std::vector<std::string>& notes() const override { return notes_; }
   std::string device_name() const override;
 
+  // What run_frame() calls.
+  void begin_frame(double duration, const FrameInput& input);
+  PartSubsteps choose_substeps(const FrameInput&, double time) {
+    return substeps_.part(*state_, time);
+  }
+  void save_checkpoint();
+  double run_part(const FramePart& part);
+  Verdict judge_part(const FramePart& part);
+  void reject_part(Verdict verdict);
+  bool accept_part() { return !result_.blew_up; }
+  void break_bonds(double share);
+  void end_frame() {}
+
   // For tests and the benchmark.
   MlsState& state() { return *state_; }
   int fragment_of(int point) const { return pieces_.of_point[point]; }
@@ -36,6 +51,15 @@ class MlsTissue final : public Tissue {
   CutReport cut_now(const BladePath& path);
 
  private:
+  /// The frame that is worked on.
+  struct Frame {
+    FrameInput input;
+    double duration;
+    FrameColliders colliders;
+    Array<float> u_before;  ///< displacements when blades last cut; empty without any
+    double cut_to = 0;      ///< share of the frame up to which they did
+  };
+
   struct Checkpoint {
     Array<float> u, v;
     std::vector<MlsGroupContact> contact;
@@ -48,16 +72,13 @@ class MlsTissue final : public Tissue {
   void cut(const BladePath& path, const float* u_begin, CutReport& report);
   /// Pieces anew, after these nodes lost pairs.
   void part(const std::vector<std::int32_t>& changed, CutReport& report);
-  void run(const FrameColliders& colliders, const PartSubsteps& substeps, double duration,
-           double from, double to);
-  void save();
-  void restore();
   /// How much each node has stiffened, into stiffening_; whether all is finite.
   bool measure(double* elastic);
 
   std::vector<std::string> notes_;
   std::unique_ptr<MlsState> state_;
   Pieces pieces_;
+  std::optional<Frame> frame_;
   Checkpoint checkpoint_;
   MlsSubsteps substeps_;
   std::vector<float> stiffening_;

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "cut_paths.h"
+#include "material/laws.h"
 #include "mls/tissue.h"
 
 namespace tissue_sim {
@@ -59,7 +60,7 @@ inline std::vector<Eigen::Matrix3d> mls_gradients(const MlsState& s) {
 
 /// Elastic energy with the penalty at displacements `u` [4 n], by its definition.
 inline double mls_energy(const MlsState& s, const std::vector<double>& u) {
-  double energy = 0;
+  double sum = 0;
   for (int i = 0; i < s.count(); ++i) {
     Eigen::Matrix3d M = Eigen::Matrix3d::Zero(), N = M;
     const auto pair = [&](int e, Vec3& r, Vec3& d) {
@@ -83,7 +84,7 @@ inline double mls_energy(const MlsState& s, const std::vector<double>& u) {
       for (int e = s.pairs.begin[i]; e < s.pairs.begin[i + 1]; ++e) {
         pair(e, r, d);
         const double stretch = (r + d).norm() - r.norm();
-        energy += 0.5 * m.young_modulus * volume * s.pairs.weight[e] / trace * stretch * stretch;
+        sum += 0.5 * m.young_modulus * volume * s.pairs.weight[e] / trace * stretch * stretch;
       }
       continue;
     }
@@ -91,16 +92,16 @@ inline double mls_energy(const MlsState& s, const std::vector<double>& u) {
     double F[9];
     for (int k = 0; k < 9; ++k) F[k] = H(k / 3, k % 3) + (k % 4 == 0);
     const double mu = lame_mu(m), lambda = lame_lambda(m);
-    energy += volume * (m.law == Law::kNeoHookean
+    sum += volume * (m.law == Law::kNeoHookean
                             ? tissue_sim::energy<NeoHookean>(F, mu, lambda)
                             : tissue_sim::energy<FixedCorotated>(F, mu, lambda));
     const double kappa = s.scene.mls.stabilisation * m.young_modulus * volume / trace;
     for (int e = s.pairs.begin[i]; e < s.pairs.begin[i + 1]; ++e) {
       pair(e, r, d);
-      energy += 0.5 * kappa * s.pairs.weight[e] * (d - H * r).squaredNorm();
+      sum += 0.5 * kappa * s.pairs.weight[e] * (d - H * r).squaredNorm();
     }
   }
-  return energy;
+  return sum;
 }
 
 /// Forces on all nodes by the formula of the passes, in double.

@@ -92,9 +92,8 @@ inline double mls_energy(const MlsState& s, const std::vector<double>& u) {
     double F[9];
     for (int k = 0; k < 9; ++k) F[k] = H(k / 3, k % 3) + (k % 4 == 0);
     const double mu = lame_mu(m), lambda = lame_lambda(m);
-    sum += volume * (m.law == Law::kNeoHookean
-                            ? tissue_sim::energy<NeoHookean>(F, mu, lambda)
-                            : tissue_sim::energy<FixedCorotated>(F, mu, lambda));
+    sum += volume * (m.law == Law::kNeoHookean ? tissue_sim::energy<NeoHookean>(F, mu, lambda)
+                                               : tissue_sim::energy<FixedCorotated>(F, mu, lambda));
     const double kappa = s.scene.mls.stabilisation * m.young_modulus * volume / trace;
     for (int e = s.pairs.begin[i]; e < s.pairs.begin[i + 1]; ++e) {
       pair(e, r, d);
@@ -123,9 +122,8 @@ inline std::vector<Vec3> mls_forces(const MlsState& s) {
   for (int i = 0; i < s.count(); ++i) {
     if (s.thread[i] != 0) continue;
     Eigen::Matrix3d M = Eigen::Matrix3d::Zero();
-    for_each_pair(i, [&](int, int, double w, const Vec3& r, const Vec3&) {
-      M += w * r * r.transpose();
-    });
+    for_each_pair(
+        i, [&](int, int, double w, const Vec3& r, const Vec3&) { M += w * r * r.transpose(); });
     const Material& m = s.nodes.material_of(i);
     const double volume = s.nodes.volume[i];
     double F[9], P[9];

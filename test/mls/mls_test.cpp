@@ -36,8 +36,7 @@ TEST(MlsNodes, SharesAddUpToTheBody) {
       double sum = 0;
       for (const float v : nodes.volume) sum += v;
       const double exact[] = {0.02 * 0.016 * 0.012, 4 / 3.0 * M_PI * std::pow(0.008, 3),
-                              4 / 3.0 * M_PI * 0.01 * 0.008 * 0.006,
-                              M_PI * 0.008 * 0.008 * 0.015};
+                              4 / 3.0 * M_PI * 0.01 * 0.008 * 0.006, M_PI * 0.008 * 0.008 * 0.015};
       EXPECT_NEAR(sum / exact[static_cast<int>(shape)], 1, 1e-6);
     }
   }
@@ -230,11 +229,11 @@ TEST(MlsCut, RemnantsBearRotationsWithoutForce) {
   MlsTissue tissue(mls_box(Vec3(0.006, 0.006, 0.006), 0.001));
   MlsState& s = tissue.state();
   const Vec3 eps(1e-5, 2e-5, 3e-5);
-  tissue.cut_now(plane_cut(Vec3(0, 0, 0.001) + eps, Vec3::UnitZ()));   // a sheet below
-  tissue.cut_now(plane_cut(Vec3(0, 0, 0.002) + eps, Vec3::UnitZ()));   // another one, ...
-  tissue.cut_now(plane_cut(Vec3(0.001, 0, 0) + eps, Vec3::UnitX()));   // of which chains,
-  tissue.cut_now(plane_cut(Vec3(0, 0.002, 0) + eps, Vec3::UnitY()));   // pairs,
-  tissue.cut_now(plane_cut(Vec3(0, 0.003, 0) + eps, Vec3::UnitY()));   // and lone nodes
+  tissue.cut_now(plane_cut(Vec3(0, 0, 0.001) + eps, Vec3::UnitZ()));  // a sheet below
+  tissue.cut_now(plane_cut(Vec3(0, 0, 0.002) + eps, Vec3::UnitZ()));  // another one, ...
+  tissue.cut_now(plane_cut(Vec3(0.001, 0, 0) + eps, Vec3::UnitX()));  // of which chains,
+  tissue.cut_now(plane_cut(Vec3(0, 0.002, 0) + eps, Vec3::UnitY()));  // pairs,
+  tissue.cut_now(plane_cut(Vec3(0, 0.003, 0) + eps, Vec3::UnitY()));  // and lone nodes
   EXPECT_GT(std::count(s.thread.begin(), s.thread.begin() + s.count(), 1), 40);
   const Eigen::Matrix3d R =
       Eigen::AngleAxisd(M_PI / 2, Vec3(1, 2, -0.5).normalized()).toRotationMatrix();
@@ -286,7 +285,7 @@ TEST(MlsCut, SlowEqualsFastAndItsRimMovesOn) {
       ASSERT_LE(slow.state().pairs.weight[e], before[e]);
     }
   }
-  const Array<float> &f = fast.state().pairs.weight, &g = slow.state().pairs.weight;
+  const Array<float>&f = fast.state().pairs.weight, &g = slow.state().pairs.weight;
   const Array<float>& whole = fast.state().pairs.whole;
   int gone = 0, fading = 0;
   for (std::size_t e = 0; e < f.size(); ++e) {

@@ -31,7 +31,7 @@ struct MlsPairs {
 double support_factor(int neighbours);
 
 /// Pairs nodes of one body that are nearer than the mean of their supports. The weight is the
-/// kernel (h^2 - r^2)^3 of Altinkaynak et al. 2014, eq. 11, of that mean, times both volumes:
+/// kernel (h^2 - r^2)^3 of Aras, Shen, Audette 2014, eq. 11, of that mean, times both volumes:
 /// symmetric, so that forces are. Throws std::invalid_argument for nodes at one place.
 MlsPairs make_pairs(const MlsNodes& nodes, int neighbours, Cpu& cpu);
 

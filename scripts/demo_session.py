@@ -180,11 +180,13 @@ def main():
     for option in ("--scene", "--paths", "--out"):
         parser.add_argument(option, required=True)
     parser.add_argument("--rviz", default="false")
+    parser.add_argument("--method", default="", help="in place of the scene's")
     args = parser.parse_args()
     log = os.path.join(args.out, "roslaunch.log")
     port = os.environ["ROS_MASTER_URI"].rsplit(":", 1)[1].strip("/")
     command = ["/usr/bin/python3", find_roslaunch(), "-p", port, "tissue_sim", "demo.launch",
-               "scene:=" + args.scene, "paths:=" + args.paths, "rviz:=" + args.rviz,
+               "scene:=" + args.scene, "paths:=" + args.paths, "method:=" + args.method,
+               "rviz:=" + args.rviz,
                "recording_folder:=" + args.out, "cloud_rate:=" + ("20" if args.rviz == "true" else "5")]
     print("   To look on: export ROS_MASTER_URI=%s; rostopic echo /simulator/state" %
           os.environ["ROS_MASTER_URI"], flush=True)

@@ -3,6 +3,7 @@
 #include <stdexcept>
 #include <utility>
 
+#include "mls/tissue.h"
 #include "mpm/mpm_tissue.h"
 #include "tissue_sim/tissue.h"
 #if defined(TISSUE_SIM_CUDA)
@@ -30,9 +31,11 @@ struct Makers {
 };
 
 #if defined(TISSUE_SIM_CUDA)
-constexpr Makers kMakers[] = {{Method::kMpm, make<MpmTissue>, make<CudaMpmTissue>}};
+constexpr Makers kMakers[] = {{Method::kMpm, make<MpmTissue>, make<CudaMpmTissue>},
+                              {Method::kMls, make<MlsTissue>, nullptr}};
 #else
-constexpr Makers kMakers[] = {{Method::kMpm, make<MpmTissue>, nullptr}};
+constexpr Makers kMakers[] = {{Method::kMpm, make<MpmTissue>, nullptr},
+                              {Method::kMls, make<MlsTissue>, nullptr}};
 #endif
 
 }  // namespace

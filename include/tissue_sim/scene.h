@@ -69,7 +69,7 @@ enum class MlsPlacement {
 };
 /// What its moving least squares are made of; docs/mls.md says how they differ.
 enum class MlsBasis {
-  kLinear,    ///< the kernel's weights as they are (Altinkaynak et al. 2014)
+  kLinear,    ///< the kernel's weights as they are (Aras, Shen, Audette 2014)
   kBalanced,  ///< weights nearest to these under which uniform stress leaves inner nodes in balance
 };
 

@@ -13,6 +13,7 @@
 #include "geometry/chord.h"
 #include "geometry/mesh.h"
 #include "ros/xmlrpc_yaml.h"
+#include "scene/scene_text.h"
 
 namespace tissue_sim {
 namespace {
@@ -20,11 +21,11 @@ namespace {
 using XmlRpc::XmlRpcValue;
 
 const std::set<std::string> kKnown = {
-    "scene", "scene_file", "mesh", "mesh_scale", "world_frame", "time", "pose_delay", "time_factor",
-    "publish_clock", "lockstep_tools", "paused", "cloud_rate", "cloud_stride", "cloud_surface_only",
-    "fragment_rate", "state_rate", "wrench_rate", "marker_rate", "checksum", "force_scale",
-    "publish_tf", "max_tool_speed", "max_tool_turn_rate", "tf_tolerance", "recording_folder",
-    "record", "recording_queue", "recording_reserve", "tools",
+    "scene", "scene_file", "method", "mesh", "mesh_scale", "world_frame", "time", "pose_delay",
+    "time_factor", "publish_clock", "lockstep_tools", "paused", "cloud_rate", "cloud_stride",
+    "cloud_surface_only", "fragment_rate", "state_rate", "wrench_rate", "marker_rate", "checksum",
+    "force_scale", "publish_tf", "max_tool_speed", "max_tool_turn_rate", "tf_tolerance",
+    "recording_folder", "record", "recording_queue", "recording_reserve", "tools",
     // of diagnostic_updater
     "diagnostic_period", "diagnostic_updater_use_fqn"};
 
@@ -248,7 +249,7 @@ Parameters read_parameters(const ros::NodeHandle& node) {
 }
 
 Scene read_scene_parameters(const ros::NodeHandle& node) {
-  std::string file, mesh;
+  std::string file, mesh, method;
   double scale = 1;
   XmlRpcValue tree;
   read(node, "scene_file", file, "must be the path of a scene file");
@@ -267,6 +268,13 @@ Scene read_scene_parameters(const ros::NodeHandle& node) {
   Scene scene = !file.empty()
                     ? load_scene(resolve_path(file, "scene"))
                     : scene_from_yaml(text ? static_cast<std::string&>(tree) : yaml_from(tree));
+  const std::string methods =
+      "must be " + spellings(kMethodNames) + ", or empty for the scene's own";
+  read(node, "method", method, methods.c_str());
+  if (!method.empty() && !value_of(method, kMethodNames, scene.method)) {
+    XmlRpcValue asked(method);
+    refuse("method", asked, methods);
+  }
   read(node, "mesh", mesh, "must be the path of a mesh file");
   read(node, "mesh_scale", scale, 1e-9, 1e9);
   if (!mesh.empty()) put_mesh(scene, mesh, scale);

@@ -58,7 +58,7 @@ struct Parameters {
 Parameters read_parameters(const ros::NodeHandle& node);
 
 /// The scene that the parameters ask for: ~scene_file, or ~scene (YAML text or a tree of
-/// parameters), with ~mesh and ~mesh_scale in place of the first body's shape.
+/// parameters), by ~method if that is set, with ~mesh and ~mesh_scale in place of the first body's shape.
 Scene read_scene_parameters(const ros::NodeHandle& node);
 
 /// Puts a mesh in the place of the scene's first body: its bounding box is centred where the body's

@@ -48,6 +48,27 @@ const char* name_of(Enum value, const Spelling<Enum> (&names)[N]) {
   return nullptr;
 }
 
+/// Finds the value of that name; false where there is none.
+template <class Enum, std::size_t N>
+bool value_of(const std::string& name, const Spelling<Enum> (&names)[N], Enum& value) {
+  for (const Spelling<Enum>& s : names) {
+    if (name != s.name) continue;
+    value = s.value;
+    return true;
+  }
+  return false;
+}
+
+/// "a, b or c"
+template <class Enum, std::size_t N>
+std::string spellings(const Spelling<Enum> (&names)[N]) {
+  std::string list;
+  for (std::size_t i = 0; i < N; ++i) {
+    list += (i == 0 ? "" : i + 1 == N ? " or " : ", ") + std::string(names[i].name);
+  }
+  return list;
+}
+
 /// The fields that belong to a shape or a tool type only, in the order in which they are written.
 std::vector<std::string> fields_of(Shape shape);
 std::vector<std::string> fields_of(ToolType type);

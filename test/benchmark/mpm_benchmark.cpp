@@ -15,6 +15,7 @@
 
 #include "deformed_body.h"
 #include "machine_rates.h"
+#include "mls_benchmark.h"
 #include "mpm/tear/tear.h"
 #include "reference/mpm_reference.h"
 
@@ -197,6 +198,7 @@ int main(int argc, char** argv) {
       c.threads = 1;
     });
   }
+  tissue_sim::add_mls_rows();
   benchmark::Initialize(&argc, argv);
   if (benchmark::ReportUnrecognizedArguments(argc, argv)) return 1;
   benchmark::RunSpecifiedBenchmarks();

@@ -59,6 +59,21 @@ inline Tolerances tolerances(Method method) {
       t.clamp = -0.25;  // derived in test/mpm/clamp_place.h
       t.beam_convergence = 3.4;
       return t;
+    case Method::kMls:
+      t.rest_speed = 0;
+      t.rest_energy = 0;
+      t.weight = 0.01;
+      t.moment = 0.01;
+      t.misplaced = 0;
+      t.volume = 0.03;
+      t.momentum = 3e-5;
+      t.impulse = 1e-3;
+      t.angular_impulse = 0.02;
+      t.beam = 0.03;
+      t.beam_no_locking = 0.05;
+      t.clamp = -0.25;  // half way between the last node that is held and the first that is not
+      t.beam_convergence = 1.8;
+      return t;
     default:
       throw std::logic_error("say in each_method.h what this method must reach");
   }

@@ -1,0 +1,86 @@
+#include "mls/nodes.h"
+
+#include <algorithm>
+#include <stdexcept>
+
+#include "mls/placement.h"
+#include "scene/scene_text.h"
+
+namespace tissue_sim {
+namespace {
+
+[[noreturn]] void refuse_region(const char* list, std::size_t index, double spacing,
+                                const std::string& body, const char* what) {
+  throw std::invalid_argument(
+      std::string(list) + "[" + std::to_string(index) + "] of body '" + body +
+      "' holds no node of it" + what +
+      ": a region is in world coordinates and must reach at least a spacing of nodes (" +
+      text(spacing) + " m) into the body");
+}
+
+/// Puts a material into the list unless it is there; returns its number.
+std::uint8_t number_of(std::vector<Material>& materials, const Material& m) {
+  const auto same = [&m](const Material& other) { return other.name == m.name; };
+  const auto at = std::find_if(materials.begin(), materials.end(), same);
+  const auto number = at - materials.begin();
+  if (number > 255) throw std::invalid_argument("materials: a scene uses at most 256 of them");
+  if (at == materials.end()) materials.push_back(m);
+  return static_cast<std::uint8_t>(number);
+}
+
+/// The last of the regions that holds the place, -1 for none.
+template <class Regions, class RegionOf>
+int last_that_holds(const Regions& regions, const Vec3& x, const RegionOf& region) {
+  for (std::size_t i = regions.size(); i-- > 0;) {
+    if (region(regions[i]).contains(x)) return static_cast<int>(i);
+  }
+  return -1;
+}
+
+}  // namespace
+
+double mls_spacing(const Scene& scene) {
+  return scene.mls.spacing > 0 ? scene.mls.spacing : 0.5 * scene.cell_size;
+}
+
+MlsNodes make_mls_nodes(const Scene& scene, std::vector<std::string>* notes) {
+  const double spacing = mls_spacing(scene);
+  MlsNodes nodes;
+  for (std::size_t b = 0; b < scene.bodies.size(); ++b) {
+    const Body& body = scene.bodies[b];
+    const std::uint8_t own = number_of(nodes.materials, find_material(scene, body.material));
+    std::vector<std::uint8_t> number;
+    for (const Inclusion& i : body.inclusions) {
+      number.push_back(number_of(nodes.materials, find_material(scene, i.material)));
+    }
+    std::vector<int> held(body.inclusions.size(), 0), anchored(body.anchors.size(), 0);
+    for (const PlacedNode& n : place_nodes(body, scene.mls, spacing, scene.seed + b, notes)) {
+      nodes.place.push_back(n.place);
+      nodes.volume.push_back(static_cast<float>(n.volume));
+      nodes.body.push_back(static_cast<std::int16_t>(b));
+      nodes.surface.push_back(n.surface ? 1 : 0);
+      const int inclusion = last_that_holds(
+          body.inclusions, n.place, [](const Inclusion& i) -> const Region& { return i.region; });
+      nodes.material.push_back(inclusion < 0 ? own : number[inclusion]);
+      if (inclusion >= 0) ++held[inclusion];
+      std::uint8_t is_held = 0;
+      for (std::size_t r = 0; r < body.anchors.size(); ++r) {
+        if (!body.anchors[r].contains(n.place)) continue;
+        ++anchored[r];
+        is_held = 1;
+      }
+      nodes.anchored.push_back(is_held);
+    }
+    for (std::size_t r = 0; r < anchored.size(); ++r) {
+      if (anchored[r] == 0) refuse_region("anchors", r, spacing, body.name, "");
+    }
+    for (std::size_t i = 0; i < held.size(); ++i) {
+      if (held[i] == 0) {
+        refuse_region("inclusions", i, spacing, body.name, " that no later one holds");
+      }
+    }
+  }
+  return nodes;
+}
+
+}  // namespace tissue_sim

@@ -1,0 +1,34 @@
+// The nodes of the meshless method: where they are in reference space, and what each stands for.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "compute/array.h"
+#include "tissue_sim/scene.h"
+
+namespace tissue_sim {
+
+/// Nodes of all bodies, body after body.
+struct MlsNodes {
+  std::vector<Vec3> place;             ///< reference [m]
+  Array<float> volume;                 ///< its share of the body: all that is nearest to it [m^3]
+  std::vector<std::int16_t> body;      ///< index into Scene::bodies
+  std::vector<std::uint8_t> material;  ///< index into `materials`
+  Array<std::uint8_t> anchored;        ///< lies in an anchored region
+  std::vector<std::uint8_t> surface;   ///< its share reaches the surface of the body
+  std::vector<Material> materials;     ///< of all bodies and inclusions
+
+  std::int32_t count() const { return static_cast<std::int32_t>(place.size()); }
+  const Material& material_of(std::int32_t node) const { return materials[material[node]]; }
+};
+
+/// Spacing of nodes, of graded ones at the surface [m].
+double mls_spacing(const Scene& scene);
+
+/// Places the nodes of a valid scene. The shares add up to each body's volume. Throws
+/// std::invalid_argument where a body cannot be sampled or a region holds no node of its body.
+MlsNodes make_mls_nodes(const Scene& scene, std::vector<std::string>* notes);
+
+}  // namespace tissue_sim

@@ -1,0 +1,45 @@
+// Pairs of neighbours and their weights: all that moving least squares know of the body's shape.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "compute/array.h"
+#include "compute/for_each.h"
+#include "mls/nodes.h"
+
+namespace tissue_sim {
+
+/// Each pair stands twice, once with each of its nodes: entries begin[i] .. begin[i + 1] - 1 are
+/// those of node i, by rising neighbour. What both entries of a pair hold is the same.
+struct MlsPairs {
+  Array<std::int32_t> begin;    ///< per node, and one more
+  Array<std::int32_t> other;    ///< the neighbour
+  Array<std::int32_t> twin;     ///< the pair's entry with the neighbour
+  Array<float> whole;           ///< weight while nothing is cut, in units of the mean
+  Array<float> weight;          ///< the same times what cuts leave of it, 1 to 0
+  Array<std::uint8_t> crossed;  ///< whether a cut passes between the two
+  std::vector<double> support;  ///< radius of each node's kernel [m]
+
+  std::int32_t nodes() const { return static_cast<std::int32_t>(begin.size()) - 1; }
+  /// Entry of the pair, -1 where they are no neighbours.
+  std::int32_t find(std::int32_t node, std::int32_t neighbour) const;
+};
+
+/// Radius of the support over the mean distance to the six nearest, so that a node within a regular
+/// lattice has as many neighbours.
+double support_factor(int neighbours);
+
+/// Pairs nodes of one body that are nearer than the mean of their supports. The weight is the
+/// kernel (h^2 - r^2)^3 of Aras, Shen, Audette 2014, eq. 11, of that mean, times both volumes:
+/// symmetric, so that forces are. Throws std::invalid_argument for nodes at one place.
+MlsPairs make_pairs(const MlsNodes& nodes, int neighbours, Cpu& cpu);
+
+/// Changes the weights as little as needed (each in proportion to itself) for uniform stress to
+/// leave all nodes but those at the surface in balance:
+///   sum_j w_ij (N_i + N_j) r_ij = 0,   N_i = V_i M_i^-1,   M_i = sum_j w_ij r_ij r_ij^T,
+/// by Newton's method, where each step is the one of least sum dw^2 / w. All stay positive. Returns
+/// the largest part of the sum that is left, over the sum of the lengths of its terms.
+double balance(const MlsNodes& nodes, Cpu& cpu, MlsPairs& pairs);
+
+}  // namespace tissue_sim

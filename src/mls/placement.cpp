@@ -1,0 +1,212 @@
+#include "mls/placement.h"
+
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+#include <unordered_map>
+
+#include "geometry/chord.h"
+#include "geometry/lattice.h"
+#include "geometry/nearest.h"
+
+namespace tissue_sim {
+namespace {
+
+constexpr int kSamples = 3;      // along each axis, within a spacing
+constexpr double kJitter = 0.2;  // of the spacing, along each axis
+constexpr double kGrowth = 0.3;  // of the spacing of graded nodes, for each one from the surface
+constexpr double kApart = 0.9;   // least distance of graded nodes at first, in spacings
+constexpr int kLloydSteps = 8;
+
+/// A number in [0, 1) that hangs on nothing but the arguments (splitmix64).
+double draw(std::uint64_t seed, std::uint64_t index, std::uint64_t which) {
+  std::uint64_t z = seed + 0x9e3779b97f4a7c15u * (3 * index + which + 1);
+  z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9u;
+  z = (z ^ (z >> 27)) * 0x94d049bb133111ebu;
+  return static_cast<double>((z ^ (z >> 31)) >> 11) * 0x1p-53;
+}
+
+/// The body in small cubes.
+std::vector<PlacedNode> cubes_of(const Body& body, double edge, std::vector<std::string>* notes) {
+  const Lattice lattice = make_lattice(body, 2 * edge, notes);
+  double scale = 1;
+  if (body.shape != Shape::kMesh) {
+    double sum = 0;
+    for (const Lattice::Site& s : lattice.sites) sum += s.volume;
+    scale = exact_volume(body) / sum;
+  }
+  const double cube = edge * edge * edge;
+  std::vector<PlacedNode> cubes;
+  cubes.reserve(lattice.sites.size());
+  // Sites come by z, y, x: a neighbour is found among them.
+  const auto key = [](std::int64_t x, std::int64_t y, std::int64_t z) {
+    return ((z + 1) << 42) + ((y + 1) << 21) + (x + 1);
+  };
+  std::vector<std::int64_t> keys;
+  keys.reserve(lattice.sites.size());
+  for (const Lattice::Site& s : lattice.sites) keys.push_back(key(s.x, s.y, s.z));
+  const auto is_there = [&](std::int64_t k) {
+    return std::binary_search(keys.begin(), keys.end(), k);
+  };
+  for (const Lattice::Site& s : lattice.sites) {
+    PlacedNode c;
+    c.place = lattice.origin + edge * Vec3(s.x + 0.5, s.y + 0.5, s.z + 0.5);
+    c.volume = scale * s.volume;
+    c.surface = s.volume < 0.999 * cube;
+    for (int i = -1; i <= 1 && !c.surface; i += 2) {
+      c.surface = !is_there(key(s.x + i, s.y, s.z)) || !is_there(key(s.x, s.y + i, s.z)) ||
+                  !is_there(key(s.x, s.y, s.z + i));
+    }
+    cubes.push_back(c);
+  }
+  return cubes;
+}
+
+std::vector<Vec3> places_of(const std::vector<PlacedNode>& nodes) {
+  std::vector<Vec3> places;
+  places.reserve(nodes.size());
+  for (const PlacedNode& n : nodes) places.push_back(n.place);
+  return places;
+}
+
+/// The node that is nearest to each cube.
+std::vector<std::int32_t> owners(const std::vector<PlacedNode>& cubes,
+                                 const std::vector<Vec3>& places) {
+  const NearestPoints tree(places);
+  std::vector<std::int32_t> owner(cubes.size());
+  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, cubes.size(), 1024),
+                    [&](const tbb::blocked_range<std::size_t>& range) {
+                      std::vector<Neighbour> found;
+                      for (std::size_t i = range.begin(); i < range.end(); ++i) {
+                        tree.nearest(cubes[i].place, 1, found);
+                        owner[i] = found[0].index;
+                      }
+                    });
+  return owner;
+}
+
+/// Gives each node all cubes that it is nearest to; nodes without any go.
+void share_out(const std::vector<PlacedNode>& cubes, std::vector<PlacedNode>& nodes) {
+  const std::vector<std::int32_t> owner = owners(cubes, places_of(nodes));
+  for (PlacedNode& n : nodes) n.volume = n.surface = 0;
+  for (std::size_t i = 0; i < cubes.size(); ++i) {
+    nodes[owner[i]].volume += cubes[i].volume;
+    nodes[owner[i]].surface = nodes[owner[i]].surface || cubes[i].surface;
+  }
+  nodes.erase(std::remove_if(nodes.begin(), nodes.end(),
+                             [](const PlacedNode& n) { return !(n.volume > 0); }),
+              nodes.end());
+}
+
+/// Nodes that keep their distance from those that come before them, in a random order (Cook 1986).
+std::vector<PlacedNode> scatter(const std::vector<PlacedNode>& cubes,
+                                const std::vector<double>& spacing, std::uint64_t seed) {
+  std::vector<std::int32_t> order(cubes.size());
+  std::iota(order.begin(), order.end(), 0);
+  std::sort(order.begin(), order.end(), [&](std::int32_t a, std::int32_t b) {
+    return std::make_pair(draw(seed, a, 0), a) < std::make_pair(draw(seed, b, 0), b);
+  });
+  const double cell = *std::min_element(spacing.begin(), spacing.end());
+  std::unordered_map<std::int64_t, std::vector<std::int32_t>> taken;
+  const auto cell_at = [cell](const Vec3& x, int a) {
+    return static_cast<std::int64_t>(std::floor(x[a] / cell));
+  };
+  const auto key = [](std::int64_t x, std::int64_t y, std::int64_t z) {
+    constexpr std::int64_t kMiddle = 1 << 20;
+    return ((z + kMiddle) << 42) + ((y + kMiddle) << 21) + (x + kMiddle);
+  };
+  std::vector<std::int32_t> nodes;
+  for (const std::int32_t i : order) {
+    const Vec3& x = cubes[i].place;
+    const double apart = kApart * spacing[i];
+    const auto reach = static_cast<std::int64_t>(std::ceil(apart / cell));
+    const std::int64_t at[3] = {cell_at(x, 0), cell_at(x, 1), cell_at(x, 2)};
+    bool is_free = true;
+    for (std::int64_t dz = -reach; dz <= reach && is_free; ++dz) {
+      for (std::int64_t dy = -reach; dy <= reach && is_free; ++dy) {
+        for (std::int64_t dx = -reach; dx <= reach && is_free; ++dx) {
+          const auto there = taken.find(key(at[0] + dx, at[1] + dy, at[2] + dz));
+          if (there == taken.end()) continue;
+          for (const std::int32_t n : there->second) {
+            if ((cubes[n].place - x).norm() < apart) is_free = false;
+          }
+        }
+      }
+    }
+    if (!is_free) continue;
+    taken[key(at[0], at[1], at[2])].push_back(i);
+    nodes.push_back(i);
+  }
+  std::sort(nodes.begin(), nodes.end());
+  std::vector<PlacedNode> placed;
+  for (const std::int32_t i : nodes) placed.push_back(cubes[i]);
+  return placed;
+}
+
+/// Moves each node to the centre of its share a few times (Lloyd), weighted so that the spacing
+/// stays: of a density s^-5 (Du, Faber, Gunzburger 1999).
+void even_out(const std::vector<PlacedNode>& cubes, const std::vector<double>& spacing,
+              std::vector<PlacedNode>& nodes) {
+  for (int step = 0; step < kLloydSteps; ++step) {
+    const std::vector<std::int32_t> owner = owners(cubes, places_of(nodes));
+    std::vector<Vec3> sum(nodes.size(), Vec3::Zero());
+    std::vector<double> weight(nodes.size(), 0.0);
+    for (std::size_t i = 0; i < cubes.size(); ++i) {
+      const double w = cubes[i].volume * std::pow(spacing[i] / spacing[0], -5);
+      sum[owner[i]] += w * cubes[i].place;
+      weight[owner[i]] += w;
+    }
+    for (std::size_t n = 0; n < nodes.size(); ++n) {
+      if (weight[n] > 0) nodes[n].place = sum[n] / weight[n];
+    }
+  }
+}
+
+std::vector<PlacedNode> graded(const std::vector<PlacedNode>& cubes, double grading, double spacing,
+                               std::uint64_t seed) {
+  std::vector<Vec3> surface;
+  for (const PlacedNode& c : cubes) {
+    if (c.surface) surface.push_back(c.place);
+  }
+  const NearestPoints tree(surface);
+  std::vector<double> wanted(cubes.size());
+  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, cubes.size(), 1024),
+                    [&](const tbb::blocked_range<std::size_t>& range) {
+                      std::vector<Neighbour> found;
+                      for (std::size_t i = range.begin(); i < range.end(); ++i) {
+                        tree.nearest(cubes[i].place, 1, found);
+                        const double depth = std::sqrt(found[0].distance2);
+                        wanted[i] = std::min(grading * spacing, spacing + kGrowth * depth);
+                      }
+                    });
+  std::vector<PlacedNode> nodes = scatter(cubes, wanted, seed);
+  even_out(cubes, wanted, nodes);
+  return nodes;
+}
+
+}  // namespace
+
+std::vector<PlacedNode> place_nodes(const Body& body, const MlsOptions& options, double spacing,
+                                    std::uint64_t seed, std::vector<std::string>* notes) {
+  if (options.placement == MlsPlacement::kRegular) return cubes_of(body, spacing, notes);
+  const std::vector<PlacedNode> cubes = cubes_of(body, spacing / kSamples, notes);
+  std::vector<PlacedNode> nodes;
+  if (options.placement == MlsPlacement::kGraded) {
+    nodes = graded(cubes, options.grading, spacing, seed);
+  } else {
+    nodes = cubes_of(body, spacing, nullptr);
+    for (std::size_t i = 0; i < nodes.size(); ++i) {
+      if (nodes[i].surface) continue;
+      for (int a = 0; a < 3; ++a) {
+        nodes[i].place[a] += kJitter * spacing * (2 * draw(seed, i, a) - 1);
+      }
+    }
+  }
+  share_out(cubes, nodes);
+  return nodes;
+}
+
+}  // namespace tissue_sim

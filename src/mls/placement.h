@@ -1,0 +1,23 @@
+// Where the nodes of one body go.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "tissue_sim/scene.h"
+
+namespace tissue_sim {
+
+struct PlacedNode {
+  Vec3 place;            ///< [m]
+  double volume = 0;     ///< its share of the body [m^3]
+  bool surface = false;  ///< whether that reaches the body's surface
+};
+
+/// Nodes `spacing` apart, on a lattice or graded, as the options say; `seed` moves them aside.
+/// Throws what make_lattice() throws.
+std::vector<PlacedNode> place_nodes(const Body& body, const MlsOptions& options, double spacing,
+                                    std::uint64_t seed, std::vector<std::string>* notes);
+
+}  // namespace tissue_sim

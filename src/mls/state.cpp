@@ -1,0 +1,233 @@
+#include "mls/state.h"
+
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <cmath>
+
+#include "frame/leapfrog.h"
+#include "mls/contact.h"
+
+namespace tissue_sim {
+namespace {
+
+/// Least eigenvalue of a moment matrix over its largest, below which a support spans no space: a
+/// sheet, a chain, a pair or nothing. The paper's matrix is never regularised: with the identity
+/// left for what it does not see, a rotation would be a strain.
+constexpr double kSpans = 0.02;
+
+template <class T>
+void resize_padded(Array<T>& array, int count, int per_node) {
+  const int chunks = (count + kMlsChunk - 1) / kMlsChunk;
+  array.assign(static_cast<std::size_t>(chunks) * kMlsChunk * per_node, T{});
+}
+
+Eigen::Matrix3d moment_of(const MlsState& s, std::int32_t i) {
+  Eigen::Matrix3d m = Eigen::Matrix3d::Zero();
+  const float* xi = &s.place[4 * i];
+  for (std::int32_t e = s.pairs.begin[i]; e < s.pairs.begin[i + 1]; ++e) {
+    const float* xj = &s.place[4 * s.pairs.other[e]];
+    const Vec3 r(xj[0] - xi[0], xj[1] - xi[1], xj[2] - xi[2]);  // in float, as the passes
+    m += s.pairs.weight[e] * r * r.transpose();
+  }
+  return m;
+}
+
+/// Springs from a thread to its neighbours: each carries its share of what a bar through the
+/// node's volume would.
+void make_springs(MlsState& s, std::int32_t i) {
+  if (s.spring.empty()) s.spring.assign(s.pairs.other.size(), 0.0f);
+  double sum = 0;
+  const auto r2 = [&](std::int32_t e) {
+    return (s.nodes.place[s.pairs.other[e]] - s.nodes.place[i]).squaredNorm();
+  };
+  for (std::int32_t e = s.pairs.begin[i]; e < s.pairs.begin[i + 1]; ++e) {
+    sum += s.pairs.weight[e] * r2(e);
+  }
+  const double stiffness = s.nodes.material_of(i).young_modulus * s.nodes.volume[i];
+  for (std::int32_t e = s.pairs.begin[i]; e < s.pairs.begin[i + 1]; ++e) {
+    s.spring[e] =
+        s.pairs.weight[e] > 0 ? static_cast<float>(stiffness * s.pairs.weight[e] / sum) : 0.0f;
+    s.any_thread[s.pairs.other[e] / kMlsChunk] = 1;
+  }
+  s.any_thread[i / kMlsChunk] = 1;
+}
+
+void remake_node(MlsState& s, std::int32_t i) {
+  const Eigen::Matrix3d m = moment_of(s, i);
+  Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen;
+  eigen.computeDirect(m, Eigen::EigenvaluesOnly);
+  const double least = eigen.eigenvalues()[0], largest = eigen.eigenvalues()[2];
+  const bool spans = largest > 0 && least > kSpans * largest;
+  Eigen::Matrix3d inverse = Eigen::Matrix3d::Zero();
+  if (spans) inverse = m.inverse();
+  for (int k = 0; k < 6; ++k) {
+    constexpr int kRow[] = {0, 1, 2, 0, 0, 1}, kColumn[] = {0, 1, 2, 1, 2, 2};
+    s.inverse_moment[k][i] = static_cast<float>(inverse(kRow[k], kColumn[k]));
+  }
+  const Material& material = s.nodes.material_of(i);
+  s.kappa[i] = spans ? static_cast<float>(s.scene.mls.stabilisation * material.young_modulus *
+                                          s.nodes.volume[i] / m.trace())
+                     : 0.0f;
+  s.thread[i] = spans ? 0 : 1;
+}
+
+/// Forces of the springs of threads on node i.
+void add_springs(const MlsState& s, const float* u, std::int32_t i, float* force) {
+  for (std::int32_t e = s.pairs.begin[i]; e < s.pairs.begin[i + 1]; ++e) {
+    const std::int32_t j = s.pairs.other[e];
+    const float k = s.spring[e] + s.spring[s.pairs.twin[e]];
+    if (!(k > 0)) continue;
+    float r2 = 0, x2 = 0, x[3];
+    for (int a = 0; a < 3; ++a) {
+      const float r = s.place[4 * j + a] - s.place[4 * i + a];
+      x[a] = r + (u[4 * j + a] - u[4 * i + a]);
+      r2 += r * r;
+      x2 += x[a] * x[a];
+    }
+    const float length = std::sqrt(x2);
+    const float scale = k * (length - std::sqrt(r2)) / std::max(length, 1e-12f);
+    for (int a = 0; a < 3; ++a) force[a] += scale * x[a];
+  }
+}
+
+}  // namespace
+
+std::unique_ptr<MlsState> make_mls_state(const Scene& scene, std::vector<std::string>* notes) {
+  auto state = std::make_unique<MlsState>();
+  MlsState& s = *state;
+  s.scene = scene;
+  s.cpu = std::make_unique<Cpu>(scene.threads);
+  s.nodes = make_mls_nodes(scene, notes);
+  s.pairs = make_pairs(s.nodes, scene.mls.neighbours, *s.cpu);
+  if (scene.mls.basis == MlsBasis::kBalanced) balance(s.nodes, *s.cpu, s.pairs);
+  const int n = s.count();
+  for (Array<float>* a : {&s.place, &s.u, &s.v, &s.u_next}) resize_padded(*a, n, 4);
+  for (Array<float>* a :
+       {&s.mass, &s.inv_mass, &s.volume_mu, &s.volume_lambda, &s.volume_eta, &s.kappa, &s.edge,
+        &s.inverse_moment[0], &s.inverse_moment[1], &s.inverse_moment[2], &s.inverse_moment[3],
+        &s.inverse_moment[4], &s.inverse_moment[5]}) {
+    resize_padded(*a, n, 1);
+  }
+  resize_padded(s.stress, n, 16);
+  resize_padded(s.neo_hookean, n, 1);
+  resize_padded(s.thread, n, 1);
+  resize_padded(s.outer, n, 1);
+  s.any_thread.assign(s.chunks(), 0);
+  s.contact.resize(s.groups());
+  const double factor = support_factor(scene.mls.neighbours);
+  std::vector<std::int32_t> all(n);
+  for (std::int32_t i = 0; i < n; ++i) {
+    const Material& m = s.nodes.material_of(i);
+    const float volume = s.nodes.volume[i];
+    for (int a = 0; a < 3; ++a) s.place[4 * i + a] = static_cast<float>(s.nodes.place[i][a]);
+    s.mass[i] = static_cast<float>(m.density) * volume;
+    s.inv_mass[i] = s.nodes.anchored[i] != 0 ? 0 : 1 / s.mass[i];
+    s.volume_mu[i] = static_cast<float>(lame_mu(m)) * volume;
+    s.volume_lambda[i] = static_cast<float>(lame_lambda(m)) * volume;
+    s.volume_eta[i] = static_cast<float>(m.viscosity) * volume;
+    s.viscous = s.viscous || m.viscosity > 0;
+    s.neo_hookean[i] = m.law == Law::kNeoHookean ? 1 : 0;
+    s.edge[i] = static_cast<float>(s.pairs.support[i] / factor);
+    if (s.edge[i] == 0) s.edge[i] = static_cast<float>(mls_spacing(scene));
+    s.outer[i] = s.nodes.surface[i];
+    all[i] = i;
+  }
+  s.instructions = instruction_set();
+  s.kernels = &mls_kernels(s.instructions);
+  remake(s, all);
+  return state;
+}
+
+void remake(MlsState& s, const std::vector<std::int32_t>& nodes) {
+  s.cpu->for_each(
+      static_cast<int>(nodes.size()), [&](int k) { remake_node(s, nodes[k]); }, 64);
+  for (const std::int32_t i : nodes) {
+    if (s.thread[i] != 0) make_springs(s, i);
+  }
+}
+
+MlsField field_of(const MlsState& s) {
+  MlsField f;
+  f.count = s.count();
+  f.place = s.place.data();
+  f.u = s.u.data();
+  f.v = s.v.data();
+  f.begin = s.pairs.begin.data();
+  f.other = s.pairs.other.data();
+  f.weight = s.pairs.weight.data();
+  for (int k = 0; k < 6; ++k) f.inverse_moment[k] = s.inverse_moment[k].data();
+  f.volume_mu = s.volume_mu.data();
+  f.volume_lambda = s.volume_lambda.data();
+  f.volume_eta = s.volume_eta.data();
+  f.kappa = s.kappa.data();
+  f.neo_hookean = s.neo_hookean.data();
+  f.stress = const_cast<float*>(s.stress.data());
+  f.viscous = s.viscous;
+  return f;
+}
+
+float substep(MlsState& s, float dt, std::vector<ColliderLoad>& loads) {
+  const MlsField field = field_of(s);
+  const bool list = is_list_due(s);
+  const float kick = kick_of(s.dt, dt);
+  const auto keep = static_cast<float>(std::exp(-s.scene.damping * kick));
+  float gravity[3];
+  for (int a = 0; a < 3; ++a) gravity[a] = static_cast<float>(s.scene.gravity[a]);
+  const auto move_group = [&](int group) {
+    const int first = group * kMlsGroup, last = std::min(s.count(), first + kMlsGroup);
+    alignas(64) float force[4 * kMlsGroup];
+    for (int i = first; i < last; ++i) {
+      s.kernels->force(field, i, force + 4 * (i - first));
+      if (s.any_thread[i / kMlsChunk] != 0) {
+        add_springs(s, s.u.data(), i, force + 4 * (i - first));
+      }
+    }
+    if (list) list_near(s, group, dt);
+    add_contact(s, group, force);
+    for (int i = first; i < last; ++i) {
+      const float inv_mass = s.inv_mass[i];
+      for (int a = 0; a < 3; ++a) {
+        float& v = s.v[4 * i + a];
+        v = inv_mass > 0 ? keep * v + kick * (force[4 * (i - first) + a] * inv_mass + gravity[a])
+                         : 0.0f;
+        s.u_next[4 * i + a] = s.u[4 * i + a] + dt * v;
+      }
+    }
+  };
+  SharedWork stresses(s.chunks(), 4), moves(s.groups(), 1);
+  s.cpu->on_each_thread([&] {
+    stresses.help([&](int chunk) { s.kernels->stresses(field, chunk); });
+    stresses.wait();
+    moves.help(move_group);
+  });
+  s.u.swap(s.u_next);
+  for (const MlsGroupContact& group : s.contact) {
+    for (std::size_t c = 0; c < group.loads.size(); ++c) {
+      for (int a = 0; a < 3; ++a) {
+        loads[c].force[a] += group.loads[c].force[a];
+        loads[c].torque[a] += group.loads[c].torque[a];
+      }
+      loads[c].points += group.loads[c].points;
+    }
+  }
+  s.dt = dt;
+  s.time += dt;
+  return kick;
+}
+
+void internal_forces(MlsState& s, const float* u, float* force) {
+  MlsField field = field_of(s);
+  field.u = u;
+  field.viscous = false;
+  s.cpu->for_each(
+      s.chunks(), [&](int chunk) { s.kernels->stresses(field, chunk); }, 4);
+  s.cpu->for_each(
+      s.count(),
+      [&](int i) {
+        s.kernels->force(field, i, force + 4 * i);
+        if (s.any_thread[i / kMlsChunk] != 0) add_springs(s, u, i, force + 4 * i);
+      },
+      kMlsGroup);
+}
+
+}  // namespace tissue_sim

@@ -1,0 +1,97 @@
+// All that the meshless method keeps on the CPU, and the functions that work on it.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "compute/array.h"
+#include "compute/for_each.h"
+#include "compute/simd.h"
+#include "mls/kernels.h"
+#include "mls/nodes.h"
+#include "mls/pairs.h"
+#include "tissue_sim/scene.h"
+#include "tools/collider.h"
+
+namespace tissue_sim {
+
+/// Nodes that a thread works on at a time, which share a list of colliders that are near.
+inline constexpr int kMlsGroup = 64;
+static_assert(kMlsGroup % kMlsChunk == 0, "groups are whole chunks");
+
+/// A node that touches a collider.
+struct MlsTouch {
+  std::int32_t node;
+  std::int32_t collider;
+  float hold[3];  ///< place that friction holds on to, in the collider's frame [m]
+};
+
+/// Contact of a group's nodes with tools and the ground.
+struct MlsGroupContact {
+  std::vector<std::uint8_t> near;   ///< colliders that it may meet until they are listed anew
+  std::vector<MlsTouch> touching;   ///< by node, then collider
+  std::vector<ColliderLoad> loads;  ///< of the last substep, per collider; empty for none
+};
+
+struct MlsState {
+  Scene scene;
+  MlsNodes nodes;
+  MlsPairs pairs;
+
+  // Per node, padded to whole chunks. Vectors are (x, y, z, 0).
+  Array<float> place, u, v;                           ///< [m], [m], [m/s]
+  Array<float> u_next;                                ///< where a substep writes displacements
+  Array<float> mass, inv_mass;                        ///< [kg]; inv_mass 0 where held
+  Array<float> inverse_moment[6];                     ///< of M_i: 00 11 22 01 02 12
+  Array<float> volume_mu, volume_lambda, volume_eta;  ///< [N m], [N m s]
+  Array<float> kappa;                                 ///< of the pair penalty
+  Array<std::uint8_t> neo_hookean;                    ///< law of each node
+  Array<float> stress;                                ///< see MlsField
+  Array<float> edge;                                  ///< distance to its neighbours [m]
+  Array<std::uint8_t> outer;                          ///< at the surface, or a cut passes beside it
+  Array<std::uint8_t> thread;      ///< its support spans no space: springs to its neighbours do
+  Array<std::uint8_t> any_thread;  ///< per chunk: a thread, or the neighbour of one
+  Array<float> spring;             ///< per entry: that of a thread's end [N/m]; empty without any
+  bool viscous = false;            ///< whether any material is
+
+  std::vector<Collider> colliders;       ///< at the present substep
+  std::vector<MlsGroupContact> contact;  ///< per group
+  int until_list = 0;                    ///< substeps until colliders near groups are listed anew
+  float dt = 0;                          ///< the last substep, 0 before the first [s]
+  double time = 0;                       ///< [s]
+
+  InstructionSet instructions = InstructionSet::kSse2;
+  const MlsKernels* kernels = nullptr;
+  std::unique_ptr<Cpu> cpu;
+
+  int count() const { return nodes.count(); }
+  int groups() const { return (count() + kMlsGroup - 1) / kMlsGroup; }
+  int chunks() const { return (count() + kMlsChunk - 1) / kMlsChunk; }
+  Vec3 position(std::int32_t node) const {
+    return Vec3(place[4 * node], place[4 * node + 1], place[4 * node + 2]) +
+           Vec3(u[4 * node], u[4 * node + 1], u[4 * node + 2]);
+  }
+  Vec3 velocity(std::int32_t node) const {
+    return Vec3(v[4 * node], v[4 * node + 1], v[4 * node + 2]);
+  }
+};
+
+/// Builds the state of a valid scene at rest. Throws what make_mls_nodes() throws.
+std::unique_ptr<MlsState> make_mls_state(const Scene& scene, std::vector<std::string>* notes);
+
+/// Makes moments, penalty and springs of these nodes anew, after weights of their entries changed.
+void remake(MlsState& state, const std::vector<std::int32_t>& nodes);
+
+MlsField field_of(const MlsState& state);
+
+/// One substep: stress of all nodes, forces with contact at the colliders' present places, motion.
+/// Adds what acts on the colliders to `loads`. Returns how long it acted [s].
+float substep(MlsState& state, float dt, std::vector<ColliderLoad>& loads);
+
+/// Internal forces of all nodes at displacements `u` [4 n], into `force` [4 n]: for tests and for
+/// the measure of the highest frequency. Without viscosity and contact.
+void internal_forces(MlsState& state, const float* u, float* force);
+
+}  // namespace tissue_sim

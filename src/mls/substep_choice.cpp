@@ -1,0 +1,95 @@
+#include "mls/substep_choice.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "mls/linearised_motion.h"
+
+namespace tissue_sim {
+namespace {
+
+constexpr int kSteps = 8;               // of Lanczos' method
+constexpr double kMargin = 0.76;        // of the limit: the rest is for contact and what stiffens
+constexpr double kLongestAge = 0.5;     // of the measured limit [s]
+constexpr double kMostGrowth = 1.3;     // of the stiffness, until the limit is measured again
+constexpr double kBorne = 0.9;          // of the limit at the end of a part: else it is undone ...
+constexpr double kShorter = 0.6;        // ... and substeps made shorter by that
+constexpr double kShortest = 1e-3;      // until by that: then it is no use
+constexpr double kMostAbove = 1.1;      // the first substep over what all should come to
+constexpr int kFewest = 6, kMost = 64;  // substeps of a part
+
+/// P-wave modulus of a node whose cofactor's columns grew to `stiffening`, squared [Pa].
+double modulus(const Material& m, double stiffening) {
+  const double mu = lame_mu(m), lambda = lame_lambda(m);
+  const double volumetric = m.law == Law::kNeoHookean ? lambda + mu : lambda;
+  return lambda + 2 * mu + volumetric * std::max(0.0, stiffening - 1);
+}
+
+/// Shortens an elastic limit for viscosity, whose fastest rate is that of the mode of the highest
+/// frequency: c = 2 eta / (lambda + 2 mu) omega^2, growing with the square of the stretch.
+double with_viscosity(const MlsState& s, double limit, double stiffening) {
+  double shortest = limit;
+  const double omega = 2 / limit;
+  for (const Material& m : s.nodes.materials) {
+    if (m.viscosity == 0) continue;
+    const double rate =
+        2 * m.viscosity / (lame_lambda(m) + 2 * lame_mu(m)) * omega * omega * stiffening;
+    const double b = 0.25 * rate * limit * limit;
+    shortest = std::min(shortest, std::sqrt(b * b + limit * limit) - b);
+  }
+  return shortest;
+}
+
+}  // namespace
+
+double MlsSubsteps::growth(const MlsState& s, const std::vector<float>& stiffening) const {
+  double most = 1;
+  for (int i = 0; i < s.count(); ++i) {
+    const Material& m = s.nodes.material_of(i);
+    const double g = modulus(m, stiffening[i]) / modulus(m, measured_.empty() ? 1 : measured_[i]);
+    if (!(g <= most)) most = g;
+  }
+  return most;
+}
+
+PartSubsteps MlsSubsteps::part(MlsState& s, double time) {
+  const bool is_old = s.time - measured_at_ > kLongestAge;
+  const bool is_new = limit_ == 0;
+  if (is_new || is_old || (growth_ > kMostGrowth && s.time > measured_at_)) {
+    limit_ = measured_limit(s, kSteps);
+    if (!std::isfinite(limit_)) limit_ = 1;  // all is held
+    measured_ = now_;
+    measured_at_ = s.time;
+    growth_ = 1;
+  }
+  double stretch = 1;
+  for (const float x : now_) stretch = std::max<double>(stretch, x);
+  const double elastic = limit_ / std::sqrt(growth_ * trend_);
+  const double asked = std::min(1.0, s.scene.cfl / Scene().cfl);
+  const double longest = shortened_ * asked * kMargin * with_viscosity(s, elastic, stretch);
+  const bool at_once = is_new || shortened_ < 1;
+  PartSubsteps part = substeps_for(time, longest, s.dt, at_once ? 0 : kMostAbove * longest);
+  const int most = shortened_ < 1 ? kFewest : count_;
+  const int parts = (part.count + most - 1) / most;
+  part.count = (part.count + parts - 1) / parts;
+  return part;
+}
+
+bool MlsSubsteps::is_borne(const MlsState& s, const std::vector<float>& stiffening, double dt) {
+  const double now = growth(s, stiffening);
+  const double longest = std::isfinite(now) ? limit_ / std::sqrt(now) : 0;
+  if (dt > kBorne * longest && shortened_ > kShortest) {
+    shortened_ *= kShorter;
+    return false;
+  }
+  trend_ = std::min(4.0, std::max(1.0, now / growth_));
+  growth_ = now;
+  now_ = stiffening;
+  shortened_ = 1;
+  count_ = trend_ > 1.3   ? std::max(kFewest, count_ / 2)
+           : trend_ < 1.2 ? std::min(kMost, 2 * count_)
+                          : count_;
+  return true;
+}
+
+}  // namespace tissue_sim

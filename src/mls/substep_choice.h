@@ -1,0 +1,39 @@
+// How long a substep of the meshless method may be.
+#pragma once
+
+#include <vector>
+
+#include "frame/part_substeps.h"
+#include "mls/state.h"
+
+namespace tissue_sim {
+
+/// The limit of stability is measured (Lanczos' method) when something was cut, when a node
+/// stiffened by a third, and every half second; in between the largest growth of any node's modulus
+/// shortens the substep. A part of a frame that stiffened until its substeps were too long is
+/// undone and done again with shorter ones.
+class MlsSubsteps {
+ public:
+  /// The next part of a frame of which `time` is left [s].
+  PartSubsteps part(MlsState& state, double time);
+  /// After a part: `stiffening` of each node (MlsKernels::measure), whether its substeps of `dt`
+  /// were borne. If not, the next ones are shorter.
+  bool is_borne(const MlsState& state, const std::vector<float>& stiffening, double dt);
+  /// A cut made the limit void.
+  void forget() { limit_ = 0; }
+
+ private:
+  /// Largest growth of a node's modulus since the limit was measured.
+  double growth(const MlsState& state, const std::vector<float>& stiffening) const;
+
+  std::vector<float> measured_;  ///< stiffening of each node when the limit was measured
+  std::vector<float> now_;       ///< after the last part
+  double limit_ = 0;             ///< [s]; 0: not known
+  double measured_at_ = 0;       ///< [s]
+  double growth_ = 1;            ///< after the last part
+  double trend_ = 1;             ///< growth in the last part
+  int count_ = 64;               ///< substeps of a part at most
+  double shortened_ = 1;         ///< after parts that were not borne
+};
+
+}  // namespace tissue_sim

@@ -1,0 +1,265 @@
+#include "mls/tissue.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <utility>
+
+#include "fragments/piece_colour.h"
+#include "fragments/piece_sums.h"
+#include "frame/checksum.h"
+#include "frame/select_points.h"
+#include "mls/cut.h"
+
+namespace tissue_sim {
+
+MlsTissue::MlsTissue(const Scene& scene, std::vector<std::string> notes)
+    : notes_(std::move(notes)), state_(make_mls_state(scene, &notes_)) {
+  const MlsNodes& nodes = state_->nodes;
+  const PiecePoints points{nodes.count(), [&](std::int32_t i) { return nodes.body[i]; },
+                           nodes.volume.data(), nodes.anchored.data()};
+  pieces_ = one_piece_a_body(static_cast<int>(scene.bodies.size()), points);
+  std::vector<std::int32_t> all(nodes.count());
+  for (std::int32_t i = 0; i < nodes.count(); ++i) all[i] = i;
+  CutReport ignored;
+  part(all, ignored);  // a mesh may have parts that do not touch
+  stiffening_.assign(state_->chunks() * kMlsChunk, 1.0f);
+}
+
+void MlsTissue::part(const std::vector<std::int32_t>& changed, CutReport& report) {
+  const MlsState& s = *state_;
+  const MlsPairs& p = s.pairs;
+  // Where a pair keeps some weight there is a way around the cut.
+  const bool may_have = std::any_of(changed.begin(), changed.end(), [&](std::int32_t i) {
+    for (std::int32_t e = p.begin[i]; e < p.begin[i + 1]; ++e) {
+      if (p.crossed[e] != 0 && p.weight[e] == 0) return true;
+    }
+    return p.begin[i] == p.begin[i + 1] || changed.size() == s.nodes.place.size();
+  });
+  if (!may_have) return;
+  UnionFind linked(s.count());
+  for (std::int32_t i = 0; i < s.count(); ++i) {
+    for (std::int32_t e = p.begin[i]; e < p.begin[i + 1]; ++e) {
+      if (p.other[e] > i && p.crossed[e] == 0) linked.join(i, p.other[e]);
+    }
+  }
+  for (const int id : update_pieces(s.nodes.volume.data(), linked, pieces_)) {
+    report.new_fragments.push_back(id);
+  }
+}
+
+void MlsTissue::cut(const BladePath& path, const float* u_begin, CutReport& report) {
+  std::vector<std::int32_t> changed;
+  cross_pairs(*state_, path, u_begin, state_->u.data(), changed, report);
+  if (changed.empty()) return;
+  substeps_.forget();
+  pieces_measured_ = false;
+  part(changed, report);
+}
+
+CutReport MlsTissue::cut_now(const BladePath& path) {
+  CutReport report;
+  cut(path, state_->u.data(), report);
+  return report;
+}
+
+void MlsTissue::begin_frame(double duration, const FrameInput& input) {
+  MlsState& s = *state_;
+  result_ = {};
+  result_.loads.resize(s.scene.tools.size());
+  for (const BladePath& path : input.cuts) {
+    result_.cut_reports.emplace_back();
+    cut(path, s.u.data(), result_.cut_reports.back());
+  }
+  const bool blades = !blade_paths(s.scene, input, 0, 1).empty();
+  frame_.emplace(Frame{input, duration, FrameColliders(s.scene, input, duration),
+                       blades ? s.u : Array<float>(), 0});
+  s.until_list = 0;
+}
+
+void MlsTissue::save_checkpoint() {
+  const MlsState& s = *state_;
+  checkpoint_.u = s.u;
+  checkpoint_.v = s.v;
+  checkpoint_.contact = s.contact;
+  checkpoint_.dt = s.dt;
+  checkpoint_.time = s.time;
+  checkpoint_.until_list = s.until_list;
+  checkpoint_.result = result_;
+}
+
+double MlsTissue::run_part(const FramePart& part) {
+  MlsState& s = *state_;
+  const Frame& frame = *frame_;
+  for (int i = 0; i < part.substeps.count; ++i) {
+    const double share = part.substeps.share(i + 1, part.from, part.to);
+    s.colliders = frame.colliders.at(share);
+    std::vector<ColliderLoad> loads(s.colliders.size());
+    const float acted = substep(s, part.substeps.at(i), loads);
+    frame.colliders.add_loads(share, s.colliders.data(), loads.data(), acted / frame.duration,
+                              result_.loads);
+  }
+  result_.substep = std::max<double>(result_.substep, part.substeps.longest());
+  result_.substeps += part.substeps.count;
+  return part.to;
+}
+
+Verdict MlsTissue::judge_part(const FramePart& part) {
+  const bool finite = measure(nullptr);
+  if (!substeps_.is_borne(*state_, stiffening_, part.substeps.longest())) return Verdict::kTooLong;
+  result_.blew_up = !finite;
+  return Verdict::kAccepted;
+}
+
+void MlsTissue::reject_part(Verdict) {
+  MlsState& s = *state_;
+  s.u = checkpoint_.u;
+  s.v = checkpoint_.v;
+  s.contact = checkpoint_.contact;
+  s.dt = checkpoint_.dt;
+  s.time = checkpoint_.time;
+  s.until_list = checkpoint_.until_list;
+  result_ = checkpoint_.result;
+}
+
+void MlsTissue::break_bonds(double share) {
+  Frame& frame = *frame_;
+  if (frame.u_before.empty() || share < 1) return;
+  for (const BladePath& path : blade_paths(state_->scene, frame.input, frame.cut_to, share)) {
+    cut(path, frame.u_before.data(), result_.blade_report);
+  }
+  frame.cut_to = share;
+}
+
+bool MlsTissue::measure(double* elastic) {
+  MlsState& s = *state_;
+  const MlsField field = field_of(s);
+  std::vector<MlsMeasure> of(s.chunks());
+  s.cpu->for_each(
+      s.chunks(),
+      [&](int chunk) {
+        of[chunk] = s.kernels->measure(field, chunk, nullptr, &stiffening_[chunk * kMlsChunk]);
+      },
+      4);
+  double sum = 0;
+  bool finite = true;
+  for (const MlsMeasure& m : of) {
+    sum += m.elastic;
+    finite = finite && m.finite;
+  }
+  if (elastic != nullptr) *elastic = sum;
+  return finite;
+}
+
+void MlsTissue::advance(double duration, const FrameInput& input) {
+  run_frame(*this, duration, input);
+}
+
+FrameResult MlsTissue::finish() {
+  const MlsState& s = *state_;
+  const bool finite = measure(&result_.elastic_energy);
+  double fastest2 = 0;
+  result_.kinetic_energy = 0;
+  for (int i = 0; i < s.count(); ++i) {
+    const double v2 = s.velocity(i).squaredNorm();
+    result_.kinetic_energy += 0.5 * s.mass[i] * v2;
+    if (!(v2 <= fastest2)) fastest2 = v2;
+  }
+  result_.max_speed = std::sqrt(fastest2);
+  // Nothing that instruments do moves tissue at the speed of a bullet; what does is out of control.
+  result_.blew_up = result_.blew_up || !finite || !(result_.max_speed < 300);
+  return result_;
+}
+
+int MlsTissue::read_points(const PointSelection& selection, std::vector<std::uint8_t>& cloud) {
+  const MlsState& s = *state_;
+  const std::vector<const Fragment*> piece = pieces_by_id(pieces_);
+  int count = 0;
+  const std::vector<std::int32_t> place = select_points(
+      selection, pieces_, [&](std::int32_t i) { return s.outer[i] != 0; }, count);
+  cloud.resize(static_cast<std::size_t>(count) * sizeof(Point));
+  const MlsField field = field_of(s);
+  state_->cpu->for_each(
+      s.chunks(),
+      [&](int chunk) {
+        float mises[kMlsChunk];
+        s.kernels->measure(field, chunk, mises, nullptr);
+        const int first = chunk * kMlsChunk, last = std::min(s.count(), first + kMlsChunk);
+        for (int i = first; i < last; ++i) {
+          if (place[i] < 0) continue;
+          const Fragment& f = *piece[pieces_.of_point[i]];
+          const Vec3 x = s.position(i);
+          int crossed = 0;
+          for (std::int32_t e = s.pairs.begin[i]; e < s.pairs.begin[i + 1]; ++e) {
+            crossed += s.pairs.crossed[e];
+          }
+          Point out;
+          out.x = static_cast<float>(x[0]);
+          out.y = static_cast<float>(x[1]);
+          out.z = static_cast<float>(x[2]);
+          out.rgb = piece_colour(f);
+          out.id = static_cast<std::uint32_t>(i);
+          out.fragment = f.id;
+          out.stress = mises[i - first] * static_cast<float>(lame_mu(s.nodes.material_of(i)));
+          const int pairs = s.pairs.begin[i + 1] - s.pairs.begin[i];
+          out.damage = pairs > 0 ? static_cast<float>(crossed) / pairs : 0.0f;
+          std::memcpy(cloud.data() + static_cast<std::size_t>(place[i]) * sizeof(Point), &out,
+                      sizeof(Point));
+        }
+      },
+      4);
+  return count;
+}
+
+Span<const Fragment> MlsTissue::fragments() {
+  if (!pieces_measured_) {
+    const MlsState& s = *state_;
+    std::vector<SumsByPiece> of_group(s.groups());
+    state_->cpu->for_each(
+        s.groups(),
+        [&](int group) {
+          const int first = group * kMlsGroup, last = std::min(s.count(), first + kMlsGroup);
+          for (int i = first; i < last; ++i) {
+            of_group[group]
+                .of(pieces_.of_point[i])
+                .add(s.nodes.volume[i], s.position(i), s.velocity(i));
+          }
+        },
+        4);
+    set_motion(of_group, pieces_);
+  }
+  pieces_measured_ = true;
+  return pieces_.all;
+}
+
+std::uint64_t MlsTissue::checksum() {
+  Checksum sum;
+  sum.add(state_->u);
+  sum.add(state_->v);
+  sum.add(state_->pairs.crossed);
+  sum.add(pieces_.of_point);
+  return sum.value();
+}
+
+Momentum MlsTissue::momentum() {
+  const MlsState& s = *state_;
+  Momentum sum;
+  Vec3 about_origin = Vec3::Zero();
+  for (int i = 0; i < s.count(); ++i) {
+    const Vec3 x = s.position(i), p = s.mass[i] * s.velocity(i);
+    sum.mass += s.mass[i];
+    sum.centre += s.mass[i] * x;
+    sum.linear += p;
+    about_origin += x.cross(p);
+  }
+  sum.centre /= sum.mass;
+  sum.angular = about_origin - sum.centre.cross(sum.linear);
+  return sum;
+}
+
+std::string MlsTissue::device_name() const {
+  return std::string("cpu (") + name(state_->instructions) + ", " +
+         std::to_string(state_->cpu->threads()) + " threads)";
+}
+
+}  // namespace tissue_sim

@@ -1,0 +1,89 @@
+// Tissue by moving least squares on nodes without a mesh, on the CPU.
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "fragments/pieces.h"
+#include "frame/run_frame.h"
+#include "mls/state.h"
+#include "mls/substep_choice.h"
+#include "tissue_sim/tissue.h"
+#include "tools/frame_colliders.h"
+
+namespace tissue_sim {
+
+class MlsTissue final : public Tissue {
+ public:
+  /// `notes` come before those of the scene.
+  explicit MlsTissue(const Scene& scene, std::vector<std::string> notes = {});
+
+  void advance(double duration, const FrameInput& input) override;
+  FrameResult finish() override;
+  int point_count() const override { return state_->count(); }
+  int read_points(const PointSelection& selection, std::vector<std::uint8_t>& cloud) override;
+  int fragment_count() const override { return static_cast<int>(pieces_.all.size()); }
+  Span<const Fragment> fragments() override;
+  std::uint64_t checksum() override;
+  Momentum momentum() override;
+  const std::vector<std::string>& notes() const override { return notes_; }
+  std::string device_name() const override;
+
+  // What run_frame() calls.
+  void begin_frame(double duration, const FrameInput& input);
+  PartSubsteps choose_substeps(const FrameInput&, double time) {
+    return substeps_.part(*state_, time);
+  }
+  void save_checkpoint();
+  double run_part(const FramePart& part);
+  Verdict judge_part(const FramePart& part);
+  void reject_part(Verdict verdict);
+  bool accept_part() { return !result_.blew_up; }
+  void break_bonds(double share);
+  void end_frame() {}
+
+  // For tests and the benchmark.
+  MlsState& state() { return *state_; }
+  int fragment_of(int point) const { return pieces_.of_point[point]; }
+  /// Cuts at once, without moving anything.
+  CutReport cut_now(const BladePath& path);
+
+ private:
+  /// The frame that is worked on.
+  struct Frame {
+    FrameInput input;
+    double duration;
+    FrameColliders colliders;
+    Array<float> u_before;  ///< displacements when blades last cut; empty without any
+    double cut_to = 0;      ///< share of the frame up to which they did
+  };
+
+  struct Checkpoint {
+    Array<float> u, v;
+    std::vector<MlsGroupContact> contact;
+    float dt;
+    double time;
+    int until_list;
+    FrameResult result;
+  };
+
+  void cut(const BladePath& path, const float* u_begin, CutReport& report);
+  /// Pieces anew, after these nodes lost pairs.
+  void part(const std::vector<std::int32_t>& changed, CutReport& report);
+  /// How much each node has stiffened, into stiffening_; whether all is finite.
+  bool measure(double* elastic);
+
+  std::vector<std::string> notes_;
+  std::unique_ptr<MlsState> state_;
+  Pieces pieces_;
+  std::optional<Frame> frame_;
+  Checkpoint checkpoint_;
+  MlsSubsteps substeps_;
+  std::vector<float> stiffening_;
+  bool pieces_measured_ = false;
+  FrameResult result_;
+};
+
+}  // namespace tissue_sim

@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "mpm/mpm_tissue.h"
+#include "pbd/pbd_tissue.h"
 #include "tissue_sim/tissue.h"
 #if defined(TISSUE_SIM_CUDA)
 #include "mpm/cuda/cuda_mpm_tissue.h"
@@ -30,9 +31,11 @@ struct Makers {
 };
 
 #if defined(TISSUE_SIM_CUDA)
-constexpr Makers kMakers[] = {{Method::kMpm, make<MpmTissue>, make<CudaMpmTissue>}};
+constexpr Makers kMakers[] = {{Method::kMpm, make<MpmTissue>, make<CudaMpmTissue>},
+                                {Method::kPbd, make<PbdTissue>, nullptr}};
 #else
-constexpr Makers kMakers[] = {{Method::kMpm, make<MpmTissue>, nullptr}};
+constexpr Makers kMakers[] = {{Method::kMpm, make<MpmTissue>, nullptr},
+                                {Method::kPbd, make<PbdTissue>, nullptr}};
 #endif
 
 }  // namespace

@@ -9,7 +9,7 @@ namespace tissue_sim {
 namespace pbd {
 namespace {
 
-constexpr int kVerticesOfPart = 1024;
+constexpr int kContactsOfPart = 1024;
 /// What lies deep in a tool that has just appeared comes out at this speed, and no faster [m/s].
 constexpr float kWayOut = 1;
 
@@ -87,11 +87,11 @@ void project_contacts(State& s, float h, std::vector<ColliderLoad>& loads) {
   for (const Collider& c : s.colliders) boxes.push_back(bounds(c));
   const Contacts contacts{s.colliders.data(), boxes.data(), count, h, s.vertices.x.data(),
                           s.vertices.predicted.data(), s.vertices.v.data(), s.vertices.mass};
-  const int n = s.vertices.size(), parts = (n + kVerticesOfPart - 1) / kVerticesOfPart;
+  const int n = s.vertices.size(), parts = (n + kContactsOfPart - 1) / kContactsOfPart;
   std::vector<ColliderLoad> of_parts(static_cast<std::size_t>(parts) * count);
   s.cpu.for_each(parts, [&](int part) {
-    const int end = std::min(n, (part + 1) * kVerticesOfPart);
-    for (int i = part * kVerticesOfPart; i < end; ++i) {
+    const int end = std::min(n, (part + 1) * kContactsOfPart);
+    for (int i = part * kContactsOfPart; i < end; ++i) {
       contacts.project(i, &of_parts[static_cast<std::size_t>(part) * count]);
     }
   });

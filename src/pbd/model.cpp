@@ -100,6 +100,12 @@ std::unique_ptr<State> make_state(const Scene& scene, std::vector<std::string>* 
     }
   }
   hold_anchored(*s, notes);
+  for (const Triangle& t : s->triangles) {
+    for (int i = 0; i < 3; ++i) {
+      const Vec3 e = s->vertices.reference[t[i]] - s->vertices.reference[t[(i + 1) % 3]];
+      s->mean_edge += e.norm() / (3.0 * static_cast<double>(s->triangles.size()));
+    }
+  }
   share_out_mass(*s);
   make_surface_constraints(*s);
   make_tet_constraints(*s);

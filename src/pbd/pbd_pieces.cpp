@@ -7,7 +7,6 @@
 
 namespace tissue_sim {
 namespace pbd {
-namespace {
 
 UnionFind joined(const State& s) {
   UnionFind linked(s.vertices.size());
@@ -21,6 +20,8 @@ UnionFind joined(const State& s) {
   for (const InternalPair& p : s.internal) linked.join(p.a, p.b);
   return linked;
 }
+
+namespace {
 
 std::vector<float> volumes(const State& s) {
   return {s.vertices.volume.begin(), s.vertices.volume.end()};

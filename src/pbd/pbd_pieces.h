@@ -9,6 +9,9 @@
 namespace tissue_sim {
 namespace pbd {
 
+/// What hangs together.
+UnionFind joined(const State& s);
+
 /// One piece a body, and more for a mesh in parts.
 Pieces whole_pieces(const State& s);
 

@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cstdint>
+#include <set>
 #include <string>
 #include <utility>
 #include <vector>
@@ -47,6 +48,13 @@ struct InternalPair {
   double area;        ///< of the column of tissue that it stands for [m^2]
 };
 
+/// A face that two tetrahedra share, and which of their corners lie opposite to it.
+struct InnerFace {
+  std::int32_t tetrahedron[2];
+  std::int8_t opposite[2];
+  bool is_cut;
+};
+
 struct State {
   Scene scene;
   Cpu cpu;
@@ -67,6 +75,14 @@ struct State {
   ConstraintSet<Strain> strains;      ///< one for each tetrahedron, ...
   ConstraintSet<Elastic> elastics;    ///< ... or these
   std::vector<double> volume_of_body;  ///< [m^3]
+
+  // What cuts remember. Of each vertex: which stroke it lies on (-1: none), the blade's normal there
+  // in reference space, and the vertex that it is a copy of.
+  std::vector<std::int32_t> stroke, copy_of;
+  std::vector<Vec3> blade_normal;
+  std::set<std::pair<std::int32_t, std::int32_t>> cut_edges;  ///< of the surface, lower vertex first
+  std::vector<InnerFace> faces;                               ///< between tetrahedra
+  double mean_edge = 0;  ///< of the surface when it was made [m]
 
   std::vector<Collider> colliders;  ///< of this step
 

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "frame/checksum.h"
+#include "pbd/cut.h"
 #include "pbd/model.h"
 #include "tools/frame_colliders.h"
 #include "tools/tool_motion.h"
@@ -13,9 +14,25 @@ namespace tissue_sim {
 PbdTissue::PbdTissue(const Scene& scene, std::vector<std::string> notes)
     : notes_(std::move(notes)), state_(pbd::make_state(scene, &notes_)) {
   pieces_ = pbd::whole_pieces(*state_);
+  next_stroke_ = static_cast<int>(scene.tools.size());
 }
 
-void PbdTissue::cut(const std::vector<BladePath>&, const Array<float>&, CutReport&) {}
+Array<float> PbdTissue::places() const {
+  const Array<float>& x = state_->vertices.x;
+  return {x.begin(), x.begin() + 4 * static_cast<std::ptrdiff_t>(state_->vertices.size())};
+}
+
+void PbdTissue::cut(const BladePath& path, int stroke, const Array<float>& before,
+                    CutReport& report) {
+  pbd::State& s = *state_;
+  std::vector<std::int32_t> origin;
+  const bool changed = s.tetrahedra.empty()
+                           ? pbd::cut_surface(s, path, before, stroke, origin, report)
+                           : pbd::cut_tetrahedra(s, path, before, origin, report);
+  if (!changed) return;
+  pbd::after_cut(s, origin);
+  for (const int id : pbd::update_pieces(s, origin, pieces_)) report.new_fragments.push_back(id);
+}
 
 void PbdTissue::advance(double duration, const FrameInput& input) {
   pbd::State& s = *state_;
@@ -25,11 +42,12 @@ void PbdTissue::advance(double duration, const FrameInput& input) {
   result_.loads.resize(s.scene.tools.size());
   for (const BladePath& path : input.cuts) {
     result_.cut_reports.emplace_back();
-    cut({path}, s.vertices.x, result_.cut_reports.back());
+    const Array<float> still = places();
+    cut(path, next_stroke_++, still, result_.cut_reports.back());
   }
   const FrameColliders colliders(s.scene, input, duration);
   const std::vector<BladePath> blades = blade_paths(s.scene, input, 0, 1);
-  const Array<float> before = blades.empty() ? Array<float>() : s.vertices.x;
+  const Array<float> before = blades.empty() ? Array<float>() : places();
   for (int i = 0; i < substeps; ++i) {
     const double share = (i + 1.0) / substeps;
     s.colliders = colliders.at(share);
@@ -39,7 +57,9 @@ void PbdTissue::advance(double duration, const FrameInput& input) {
   }
   result_.substeps = substeps;
   result_.substep = dt;
-  cut(blades, before, result_.blade_report);
+  for (std::size_t i = 0; i < blades.size(); ++i) {
+    cut(blades[i], static_cast<int>(i), before, result_.blade_report);
+  }
 }
 
 FrameResult PbdTissue::finish() {

@@ -30,11 +30,14 @@ class PbdTissue final : public Tissue {
   const Pieces& pieces() const { return pieces_; }
 
  private:
-  void cut(const std::vector<BladePath>& paths, const Array<float>& before, CutReport& report);
+  /// While vertices move from `before` to where they are; a stroke is what one blade does.
+  Array<float> places() const;  // without padding
+  void cut(const BladePath& path, int stroke, const Array<float>& before, CutReport& report);
 
   std::vector<std::string> notes_;
   std::unique_ptr<pbd::State> state_;
   Pieces pieces_;
+  int next_stroke_ = 0;  // the first ones are the tools'
   bool pieces_measured_ = false;
   FrameResult result_;
 };

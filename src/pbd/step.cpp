@@ -118,6 +118,10 @@ int add_vertex(State& s, const Vec3& reference, int body) {
   v.surface.push_back(0);
   v.cut_links.push_back(0);
   v.whole_links.push_back(0);
+  s.half_depth.push_back(0);
+  s.stroke.push_back(-1);
+  s.copy_of.push_back(index);
+  s.blade_normal.push_back(Vec3::Zero());
   for (Array<float>* of : {&v.x, &v.predicted, &v.v}) of->resize(4 * (index + 1));  // cuts padding
   for (int a = 0; a < 3; ++a) {
     v.x[4 * index + a] = v.predicted[4 * index + a] = static_cast<float>(reference[a]);

@@ -155,7 +155,6 @@ void make_surface_constraints(State& s) {
 
 int add_internal_links(State& s, int b, const std::vector<int>& starts) {
   const std::vector<InternalLink> found = find_internal_links(reference_surface(s, b), starts);
-  s.half_depth.resize(s.vertices.size(), 0.0);
   std::vector<double> area(s.vertices.size(), 0.0);
   std::unordered_map<std::uint64_t, int> edges;
   for (const Triangle& t : s.triangles) {

@@ -27,7 +27,6 @@ void add_tet_body(State& s, int b, std::vector<std::string>* notes) {
     s.triangles.push_back({index[t[0]], index[t[1]], index[t[2]]});
     for (const int v : t) s.vertices.surface[index[v]] = 1;
   }
-  s.half_depth.resize(s.vertices.size(), 0.0);
   s.volume_of_body.push_back(volume(mesh));
 }
 

@@ -191,6 +191,7 @@ Scene read_scene(const YAML::Node& node) {
     of.read("placement", scene.mls.placement, kMlsPlacementNames);
     of.read("grading", scene.mls.grading);
     of.read("stabilisation", scene.mls.stabilisation);
+  });
   fields.read_map("pbd", [&](const YAML::Node& pbd, const std::string& path) {
     scene.pbd = read_pbd(pbd, path);
   });

@@ -5,6 +5,7 @@
 
 #include "mls/tissue.h"
 #include "mpm/mpm_tissue.h"
+#include "pbd/pbd_tissue.h"
 #include "tissue_sim/tissue.h"
 #if defined(TISSUE_SIM_CUDA)
 #include "mpm/cuda/cuda_mpm_tissue.h"
@@ -30,13 +31,15 @@ struct Makers {
   Make on_cpu, on_gpu;
 };
 
+constexpr Makers kMakers[] = {
 #if defined(TISSUE_SIM_CUDA)
-constexpr Makers kMakers[] = {{Method::kMpm, make<MpmTissue>, make<CudaMpmTissue>},
-                              {Method::kMls, make<MlsTissue>, nullptr}};
+    {Method::kMpm, make<MpmTissue>, make<CudaMpmTissue>},
 #else
-constexpr Makers kMakers[] = {{Method::kMpm, make<MpmTissue>, nullptr},
-                              {Method::kMls, make<MlsTissue>, nullptr}};
+    {Method::kMpm, make<MpmTissue>, nullptr},
 #endif
+    {Method::kMls, make<MlsTissue>, nullptr},
+    {Method::kPbd, make<PbdTissue>, nullptr},
+};
 
 }  // namespace
 

@@ -83,12 +83,36 @@ struct MlsOptions {
   double stabilisation = 0.1;  ///< stiffness of what is not linear in a support, times E, 0 to 1
 };
 
+enum class PbdModel {
+  kSurface,     ///< triangles, with internal shape-preserving constraints
+  kTetrahedra,  ///< tetrahedra
+};
+enum class PbdElasticity {
+  kMaterial,  ///< deviatoric and hydrostatic constraints with the material's E and nu
+  kStrain,    ///< stretch and shear strain constraints, with distance and bending: no material
+};
+
+/// Method pbd: what it is made of and how it is solved. Other methods do not read it.
+struct PbdOptions {
+  PbdModel model = PbdModel::kSurface;
+  PbdElasticity elasticity = PbdElasticity::kMaterial;  ///< of tetrahedra
+  int steps = 20;      ///< of a frame, 1 to 1000
+  int iterations = 1;  ///< of a step, 1 to 100
+  /// Stiffness of the surface model's constraints as a multiple of what Young's modulus gives each
+  /// (src/pbd/stiffness.h), 0 to 1e6; 0 leaves the constraint out. `edge` and `bending` are the
+  /// kStrain model's, too.
+  double edge = 1, bending = 1, internal = 1;
+  /// kStrain: share of an error of strain that a projection takes away, 0 to 1.
+  double stretch = 1, shear = 1;
+};
+
 struct Scene {
   std::string name = "tissue";
   Method method = Method::kMpm;
   Device device = Device::kAuto;
   int threads = 0;           ///< CPU threads, 0 for all
-  double cell_size = 0.003;  ///< grid spacing [m]; two points a cell along each axis
+  double cell_size = 0.003;  ///< grid spacing [m]; two points a cell along each axis. pbd: edge of
+                             ///< the triangles and tetrahedra that the package makes itself
   double frame_rate = 60.0;  ///< frames a second of simulated time [Hz], 1 to 2000
   double cfl = 0.5;      ///< substep * wave speed / cell size, 0.05 to 0.9, of tissue that may be
                          ///< cut or torn at once: up to 0.55 any cut is stable. Substeps are longer
@@ -98,6 +122,7 @@ struct Scene {
   Vec3 gravity = Vec3(0, 0, -9.81);  ///< [m/s^2]
   std::uint64_t seed = 0;
   MlsOptions mls;
+  PbdOptions pbd;
   Ground ground;
   std::vector<Material> materials;
   std::vector<Body> bodies;

@@ -43,6 +43,12 @@ struct Momentum {
   Vec3 angular = Vec3::Zero();  ///< about the centre of mass [kg m^2/s]
 };
 
+/// The triangles of a surface, counter-clockwise seen from outside.
+struct SurfaceTriangles {
+  std::vector<float> corners;           ///< nine coordinates a triangle [m], world frame
+  std::vector<std::int32_t> fragment;   ///< Fragment::id of each triangle
+};
+
 class Tissue {
  public:
   virtual ~Tissue() = default;
@@ -55,6 +61,9 @@ class Tissue {
   virtual int point_count() const = 0;
   /// Replaces `cloud` with the selected points, as Point after Point. Returns their number.
   virtual int read_points(const PointSelection& selection, std::vector<std::uint8_t>& cloud) = 0;
+  /// Replaces `surface` with the tissue's, as of the last finish(); leaves it empty for a method
+  /// whose points no triangles join.
+  virtual void read_surface(SurfaceTriangles& surface) { surface = {}; }
   /// Number of pieces, as of the last finish(). It grows whenever a piece comes apart.
   virtual int fragment_count() const = 0;
   /// All pieces, by id, as of the last finish(). The first call after that looks where they are.

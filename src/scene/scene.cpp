@@ -162,6 +162,23 @@ void check_mls(const MlsOptions& mls) {
   check_range("mls.stabilisation", mls.stabilisation, 0, 1);
 }
 
+void check_count(const std::string& field, int value, int high) {
+  if (value >= 1 && value <= high) return;
+  refuse(field, std::to_string(value), "must lie between 1 and " + std::to_string(high));
+}
+
+void check_pbd(const PbdOptions& pbd) {
+  check_enum("pbd.model", pbd.model, kPbdModelNames);
+  check_enum("pbd.elasticity", pbd.elasticity, kPbdElasticityNames);
+  check_count("pbd.steps", pbd.steps, 1000);
+  check_count("pbd.iterations", pbd.iterations, 100);
+  check_range("pbd.edge", pbd.edge, 0, 1e6);
+  check_range("pbd.bending", pbd.bending, 0, 1e6);
+  check_range("pbd.internal", pbd.internal, 0, 1e6);
+  check_range("pbd.stretch", pbd.stretch, 0, 1);
+  check_range("pbd.shear", pbd.shear, 0, 1);
+}
+
 std::string at(const char* list, std::size_t i) {
   return std::string(list) + "[" + std::to_string(i) + "]";
 }
@@ -219,6 +236,7 @@ void validate(const Scene& scene) {
   check_range("damping", scene.damping, 0, 1000);
   check_each("gravity", scene.gravity, -1000, 1000, "component", "m/s^2");
   check_mls(scene.mls);
+  check_pbd(scene.pbd);
   check_range("ground.z", scene.ground.z, -100, 100, "m");
   check_friction("ground.friction", scene.ground.friction);
 

@@ -20,13 +20,18 @@ struct Spelling {
   const char* name;
 };
 
-inline constexpr Spelling<Method> kMethodNames[] = {{Method::kMpm, "mpm"}, {Method::kMls, "mls"}};
+inline constexpr Spelling<Method> kMethodNames[] = {
+    {Method::kMpm, "mpm"}, {Method::kMls, "mls"}, {Method::kPbd, "pbd"}};
 inline constexpr Spelling<MlsPlacement> kMlsPlacementNames[] = {
     {MlsPlacement::kRegular, "regular"},
     {MlsPlacement::kJittered, "jittered"},
     {MlsPlacement::kGraded, "graded"}};
 inline constexpr Spelling<MlsBasis> kMlsBasisNames[] = {{MlsBasis::kLinear, "linear"},
                                                         {MlsBasis::kBalanced, "balanced"}};
+inline constexpr Spelling<PbdModel> kPbdModelNames[] = {{PbdModel::kSurface, "surface"},
+                                                        {PbdModel::kTetrahedra, "tetrahedra"}};
+inline constexpr Spelling<PbdElasticity> kPbdElasticityNames[] = {
+    {PbdElasticity::kMaterial, "material"}, {PbdElasticity::kStrain, "strain"}};
 inline constexpr Spelling<Device> kDeviceNames[] = {
     {Device::kAuto, "auto"}, {Device::kCpu, "cpu"}, {Device::kCuda, "cuda"}};
 inline constexpr Spelling<Law> kLawNames[] = {{Law::kFixedCorotated, "fixed_corotated"},

@@ -135,6 +135,20 @@ void write(YAML::Emitter& out, const Tool& tool) {
   out << EndMap;
 }
 
+void write(YAML::Emitter& out, const PbdOptions& pbd) {
+  out << BeginMap;
+  write(out, "model", std::string(name_of(pbd.model, kPbdModelNames)));
+  write(out, "elasticity", std::string(name_of(pbd.elasticity, kPbdElasticityNames)));
+  out << Key << "steps" << Value << pbd.steps;
+  out << Key << "iterations" << Value << pbd.iterations;
+  write(out, "edge", pbd.edge);
+  write(out, "bending", pbd.bending);
+  write(out, "internal", pbd.internal);
+  write(out, "stretch", pbd.stretch);
+  write(out, "shear", pbd.shear);
+  out << EndMap;
+}
+
 template <class Item>
 void write_list(YAML::Emitter& out, const char* name, const std::vector<Item>& items) {
   out << Key << name << Value << BeginSeq;
@@ -170,6 +184,10 @@ std::string scene_to_yaml(const Scene& scene) {
   write(out, "gravity", scene.gravity);
   out << Key << "seed" << Value << std::to_string(scene.seed);
   if (scene.method == Method::kMls) write_mls(out, scene.mls);
+  if (scene.method == Method::kPbd) {
+    out << Key << "pbd" << Value;
+    write(out, scene.pbd);
+  }
   out << Key << "ground" << Value << BeginMap;
   out << Key << "enabled" << Value << scene.ground.enabled;
   write(out, "z", scene.ground.z);

@@ -148,10 +148,28 @@ Tool read_tool(const YAML::Node& node, const std::string& path) {
   return tool;
 }
 
+PbdOptions read_pbd(const YAML::Node& node, const std::string& path) {
+  const YamlFields fields(node, path,
+                          {"model", "elasticity", "steps", "iterations", "edge", "bending",
+                           "internal", "stretch", "shear"});
+  PbdOptions pbd;
+  fields.read("model", pbd.model, kPbdModelNames);
+  fields.read("elasticity", pbd.elasticity, kPbdElasticityNames);
+  fields.read("steps", pbd.steps);
+  fields.read("iterations", pbd.iterations);
+  fields.read("edge", pbd.edge);
+  fields.read("bending", pbd.bending);
+  fields.read("internal", pbd.internal);
+  fields.read("stretch", pbd.stretch);
+  fields.read("shear", pbd.shear);
+  return pbd;
+}
+
 Scene read_scene(const YAML::Node& node) {
   const YamlFields fields(node, "",
                           {"name", "method", "device", "threads", "cell_size", "frame_rate", "cfl",
-                           "damping", "gravity", "seed", "mls", "ground", "materials", "bodies", "tools"});
+                           "damping", "gravity", "seed", "mls", "pbd", "ground", "materials",
+                           "bodies", "tools"});
   Scene scene;
   fields.read("name", scene.name);
   fields.read("method", scene.method, kMethodNames);
@@ -173,6 +191,9 @@ Scene read_scene(const YAML::Node& node) {
     of.read("placement", scene.mls.placement, kMlsPlacementNames);
     of.read("grading", scene.mls.grading);
     of.read("stabilisation", scene.mls.stabilisation);
+  });
+  fields.read_map("pbd", [&](const YAML::Node& pbd, const std::string& path) {
+    scene.pbd = read_pbd(pbd, path);
   });
   fields.read_map("ground", [&](const YAML::Node& ground, const std::string& path) {
     const YamlFields ground_fields(ground, path, {"enabled", "z", "friction"});

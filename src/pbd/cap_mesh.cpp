@@ -1,0 +1,171 @@
+#include "pbd/cap_mesh.h"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+
+namespace tissue_sim {
+namespace pbd {
+namespace {
+
+using Place = Eigen::Vector2d;
+
+double turn(const Place& a, const Place& b, const Place& c) {
+  return (b.x() - a.x()) * (c.y() - a.y()) - (b.y() - a.y()) * (c.x() - a.x());
+}
+
+bool holds(const Place& a, const Place& b, const Place& c, const Place& p) {
+  return turn(a, b, p) >= 0 && turn(b, c, p) >= 0 && turn(c, a, p) >= 0;
+}
+
+/// Smallest angle's sine, roughly: which ear is the better one.
+double shape(const Place& a, const Place& b, const Place& c) {
+  const double l = std::max({(a - b).squaredNorm(), (b - c).squaredNorm(), (c - a).squaredNorm()});
+  return turn(a, b, c) / l;
+}
+
+/// Empty where there is no ear any more.
+std::vector<std::array<int, 3>> clip_ears(const std::vector<Place>& at) {
+  std::vector<int> left;
+  for (std::size_t i = 0; i < at.size(); ++i) left.push_back(static_cast<int>(i));
+  std::vector<std::array<int, 3>> triangles;
+  while (left.size() > 3) {
+    const int n = static_cast<int>(left.size());
+    int best = -1;
+    double most = 0;
+    for (int i = 0; i < n; ++i) {
+      const int a = left[(i + n - 1) % n], b = left[i], c = left[(i + 1) % n];
+      const double quality = shape(at[a], at[b], at[c]);
+      if (!(quality > most)) continue;
+      bool is_ear = true;
+      for (const int p : left) {
+        if (p != a && p != b && p != c && holds(at[a], at[b], at[c], at[p])) is_ear = false;
+      }
+      if (!is_ear) continue;
+      most = quality;
+      best = i;
+    }
+    if (best < 0) return {};
+    triangles.push_back({left[(best + n - 1) % n], left[best], left[(best + 1) % n]});
+    left.erase(left.begin() + best);
+  }
+  if (!(turn(at[left[0]], at[left[1]], at[left[2]]) > 0)) return {};
+  triangles.push_back({left[0], left[1], left[2]});
+  return triangles;
+}
+
+/// Lawson's flips; edges of the loop are in one triangle only and stay.
+void flip_to_delaunay(const std::vector<Place>& at, std::vector<std::array<int, 3>>& triangles) {
+  for (int round = 0; round < 100; ++round) {
+    std::map<std::pair<int, int>, int> side;  // triangle that has the edge in this sense
+    for (std::size_t t = 0; t < triangles.size(); ++t) {
+      for (int i = 0; i < 3; ++i) {
+        side[{triangles[t][i], triangles[t][(i + 1) % 3]}] = static_cast<int>(t);
+      }
+    }
+    std::vector<bool> touched(triangles.size(), false);
+    bool flipped = false;
+    for (const auto& [e, t] : side) {
+      if (e.first > e.second) continue;
+      const auto other = side.find({e.second, e.first});
+      if (other == side.end()) continue;
+      const int u = other->second;
+      if (touched[t] || touched[u]) continue;
+      const int a = e.first, b = e.second;
+      const int c = triangles[t][0] + triangles[t][1] + triangles[t][2] - a - b;
+      const int d = triangles[u][0] + triangles[u][1] + triangles[u][2] - a - b;
+      const Place ca = at[a] - at[c], cb = at[b] - at[c], da = at[a] - at[d], db = at[b] - at[d];
+      const double cos1 = ca.dot(cb) / (ca.norm() * cb.norm() + 1e-300);
+      const double cos2 = da.dot(db) / (da.norm() * db.norm() + 1e-300);
+      if (cos1 + cos2 >= -1e-9) continue;  // opposite angles below pi together
+      if (!(turn(at[c], at[a], at[d]) > 0) || !(turn(at[d], at[b], at[c]) > 0)) continue;
+      triangles[t] = {c, a, d};
+      triangles[u] = {d, b, c};
+      touched[t] = touched[u] = flipped = true;
+    }
+    if (!flipped) return;
+  }
+}
+
+/// Mean value coordinates of a place within a polygon.
+std::vector<double> mean_values(const std::vector<Place>& loop, std::size_t n, const Place& p) {
+  std::vector<double> tangent(n), w(n);
+  for (std::size_t i = 0; i < n; ++i) {
+    const Place a = loop[i] - p, b = loop[(i + 1) % n] - p;
+    const double cross = a.x() * b.y() - a.y() * b.x(), lengths = a.norm() * b.norm();
+    tangent[i] = std::fabs(cross) > 1e-30 ? (lengths - a.dot(b)) / cross : 0;
+  }
+  double sum = 0;
+  for (std::size_t i = 0; i < n; ++i) {
+    w[i] = (tangent[(i + n - 1) % n] + tangent[i]) / ((loop[i] - p).norm() + 1e-30);
+    sum += w[i];
+  }
+  for (double& v : w) v /= sum;
+  return w;
+}
+
+double distance_to(const Place& a, const Place& b, const Place& p) {
+  const double s = std::max(0.0, std::min(1.0, (p - a).dot(b - a) / ((b - a).squaredNorm() + 1e-300)));
+  return (a + s * (b - a) - p).norm();
+}
+
+}  // namespace
+
+CapMesh fill_loop(const std::vector<Vec3>& loop, double edge) {
+  const std::size_t n = loop.size();
+  Vec3 normal = Vec3::Zero(), middle = Vec3::Zero();
+  for (std::size_t i = 0; i < n; ++i) {
+    normal += (loop[i] - loop[0]).cross(loop[(i + 1) % n] - loop[0]);
+    middle += loop[i] / static_cast<double>(n);
+  }
+  CapMesh cap;
+  if (!(normal.norm() > 1e-3 * edge * edge)) return cap;
+  normal.normalize();
+  const Vec3 u = normal.unitOrthogonal(), v = normal.cross(u);
+  std::vector<Place> at;
+  std::vector<double> height;
+  Place low(1e300, 1e300), high(-1e300, -1e300);
+  for (const Vec3& x : loop) {
+    at.emplace_back(u.dot(x - middle), v.dot(x - middle));
+    height.push_back(normal.dot(x - middle));
+    low = low.cwiseMin(at.back());
+    high = high.cwiseMax(at.back());
+  }
+  cap.triangles = clip_ears(at);
+  if (cap.triangles.empty()) return cap;
+  // Inner vertices on a triangular lattice, off the loop.
+  const double row = std::sqrt(0.75) * edge;
+  int odd = 0;
+  for (double y = low.y() + 0.5 * row; y < high.y(); y += row, odd ^= 1) {
+    for (double x = low.x() + (odd != 0 ? 0.75 : 0.25) * edge; x < high.x(); x += edge) {
+      const Place p(x, y);
+      bool is_far = true;
+      for (std::size_t i = 0; i < n && is_far; ++i) {
+        is_far = distance_to(at[i], at[(i + 1) % n], p) > 0.55 * edge;
+      }
+      if (!is_far) continue;
+      for (std::size_t t = 0; t < cap.triangles.size(); ++t) {
+        const std::array<int, 3> c = cap.triangles[t];
+        if (!holds(at[c[0]], at[c[1]], at[c[2]], p)) continue;
+        const int k = static_cast<int>(at.size());
+        at.push_back(p);
+        cap.triangles[t] = {c[0], c[1], k};
+        cap.triangles.push_back({c[1], c[2], k});
+        cap.triangles.push_back({c[2], c[0], k});
+        flip_to_delaunay(at, cap.triangles);
+        break;
+      }
+    }
+  }
+  flip_to_delaunay(at, cap.triangles);
+  for (std::size_t i = n; i < at.size(); ++i) {
+    cap.weights.push_back(mean_values(at, n, at[i]));
+    double rise = 0;
+    for (std::size_t k = 0; k < n; ++k) rise += cap.weights.back()[k] * height[k];
+    cap.inner.push_back(middle + at[i].x() * u + at[i].y() * v + rise * normal);
+  }
+  return cap;
+}
+
+}  // namespace pbd
+}  // namespace tissue_sim

@@ -1,0 +1,26 @@
+// A surface across a loop in space: what closes a wound.
+#pragma once
+
+#include <array>
+#include <vector>
+
+#include "tissue_sim/types.h"
+
+namespace tissue_sim {
+namespace pbd {
+
+struct CapMesh {
+  std::vector<Vec3> inner;  ///< vertices within, [m]; those of the loop come before them
+  std::vector<std::array<int, 3>> triangles;  ///< in the loop's sense
+  /// Of each inner vertex, the shares of the loop's vertices in it (mean value coordinates, Floater
+  /// 2003): sum to 1.
+  std::vector<std::vector<double>> weights;
+};
+
+/// Triangulates a simple loop seen along its mean normal (ears, then flips to Delaunay), with inner
+/// vertices about `edge` apart. The inside rises and falls with the loop. No triangles where the
+/// loop crosses itself or has no area.
+CapMesh fill_loop(const std::vector<Vec3>& loop, double edge);
+
+}  // namespace pbd
+}  // namespace tissue_sim

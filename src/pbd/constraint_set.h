@@ -1,0 +1,100 @@
+// All constraints of one kind: as a list, which cuts change, and packed for the kernels.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include "compute/array.h"
+#include "pbd/colouring.h"
+
+namespace tissue_sim {
+namespace pbd {
+
+constexpr int kLanes = 16;  ///< constraints of a block: those of the widest vector
+
+/// Sixteen constraints of one colour, side by side. Lanes without one mean padding: vertices behind
+/// all others (state.h) that nothing moves.
+template <class Kind>
+struct alignas(64) ConstraintBlock {
+  std::int32_t vertex[Kind::kVertices][kLanes];
+  float number[Kind::kNumbers][kLanes];
+};
+
+template <class Kind>
+struct ConstraintSet {
+  using Vertices = std::array<std::int32_t, Kind::kVertices>;
+  using Numbers = std::array<float, Kind::kNumbers>;
+  using Block = ConstraintBlock<Kind>;
+  static constexpr int kMultipliers = Kind::kMultipliers > 0 ? Kind::kMultipliers : 1;
+
+  std::vector<Vertices> vertices;
+  std::vector<Numbers> numbers;
+  std::vector<std::int16_t> colour;
+
+  std::vector<Block, CacheLineAllocator<Block>> blocks;  ///< by colour
+  std::vector<std::int32_t> begin;  ///< first block of each colour, and the number of blocks
+  Array<float> multipliers;         ///< kMultipliers x kLanes for each block
+
+  int size() const { return static_cast<int>(vertices.size()); }
+  void add(const Vertices& v, const Numbers& n) {
+    vertices.push_back(v);
+    numbers.push_back(n);
+    colour.push_back(-1);
+  }
+  /// Leaves out those for which it is true.
+  template <class F>
+  int remove_if(const F& gone) {
+    int kept = 0;
+    for (int c = 0; c < size(); ++c) {
+      if (gone(c)) continue;
+      vertices[kept] = vertices[c];
+      numbers[kept] = numbers[c];
+      colour[kept++] = colour[c];
+    }
+    const int removed = size() - kept;
+    vertices.resize(kept);
+    numbers.resize(kept);
+    colour.resize(kept);
+    return removed;
+  }
+  void pack(int vertex_count);
+};
+
+template <class Kind>
+void ConstraintSet<Kind>::pack(int vertex_count) {
+  constexpr int kVertices = Kind::kVertices;
+  std::vector<std::int32_t> flat(vertices.size() * kVertices);
+  for (std::size_t c = 0; c < vertices.size(); ++c) {
+    std::copy(vertices[c].begin(), vertices[c].end(), flat.begin() + c * kVertices);
+  }
+  const int colours = find_colours(flat, kVertices, vertex_count, colour);
+  std::vector<std::vector<std::int32_t>> of(colours);
+  for (int c = 0; c < size(); ++c) of[colour[c]].push_back(c);
+  blocks.clear();
+  begin.assign(1, 0);
+  for (std::vector<std::int32_t>& list : of) {
+    // Side by side in memory what lies side by side in space, for vertices are numbered so.
+    std::stable_sort(list.begin(), list.end(), [this](std::int32_t a, std::int32_t b) {
+      return vertices[a] < vertices[b];
+    });
+    for (std::size_t first = 0; first < list.size(); first += kLanes) {
+      Block block;
+      for (int lane = 0; lane < kLanes; ++lane) {
+        const bool is_there = first + lane < list.size();
+        const std::int32_t c = is_there ? list[first + lane] : list.back();
+        for (int i = 0; i < kVertices; ++i) {
+          block.vertex[i][lane] = is_there ? vertices[c][i] : vertex_count + 4 * lane + i;
+        }
+        for (int i = 0; i < Kind::kNumbers; ++i) block.number[i][lane] = numbers[c][i];
+      }
+      blocks.push_back(block);
+    }
+    begin.push_back(static_cast<std::int32_t>(blocks.size()));
+  }
+  multipliers.assign(blocks.size() * kMultipliers * kLanes, 0.0f);
+}
+
+}  // namespace pbd
+}  // namespace tissue_sim

@@ -1,0 +1,140 @@
+// The constraints: what each asks for and how a projection moves its vertices. XPBD (Macklin,
+// Mueller, Chentanez 2016): a constraint C of compliance alpha [1 / stiffness] is worth the energy
+// C^2 / (2 alpha); in a step of h seconds a projection adds
+//   dlambda = -(C + a lambda) / (sum_i w_i |grad_i C|^2 + a),  a = alpha / h^2
+// to its multiplier and w_i grad_i C dlambda to its vertices. The same for V = float and for lanes,
+// on the CPU and on the GPU. Equations by number: Lee et al. 2022.
+#pragma once
+
+#include "pbd/lanes.h"
+
+namespace tissue_sim {
+namespace pbd {
+
+template <class V>
+struct Vector {
+  V x, y, z;
+};
+template <class V>
+TISSUE_SIM_INLINE Vector<V> operator+(const Vector<V>& a, const Vector<V>& b) {
+  return {a.x + b.x, a.y + b.y, a.z + b.z};
+}
+template <class V>
+TISSUE_SIM_INLINE Vector<V> operator-(const Vector<V>& a, const Vector<V>& b) {
+  return {a.x - b.x, a.y - b.y, a.z - b.z};
+}
+template <class V>
+TISSUE_SIM_INLINE Vector<V> operator*(V s, const Vector<V>& a) {
+  return {s * a.x, s * a.y, s * a.z};
+}
+template <class V>
+TISSUE_SIM_INLINE V dot(const Vector<V>& a, const Vector<V>& b) {
+  return a.x * b.x + a.y * b.y + a.z * b.z;
+}
+template <class V>
+TISSUE_SIM_INLINE Vector<V> cross(const Vector<V>& a, const Vector<V>& b) {
+  return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
+}
+/// From b to a.
+template <class V>
+TISSUE_SIM_INLINE Vector<V> between(const Vertex<V>& a, const Vertex<V>& b) {
+  return {a.x - b.x, a.y - b.y, a.z - b.z};
+}
+template <class V>
+TISSUE_SIM_INLINE void move(Vertex<V>& a, V scale, const Vector<V>& along) {
+  const V s = a.w * scale;
+  a.x += s * along.x;
+  a.y += s * along.y;
+  a.z += s * along.z;
+}
+
+/// Keeps what has no mass to move, or no length, finite.
+constexpr float kTiny = 1e-30f;
+
+/// Two vertices at a distance (eqs. 1 to 3; edges, and internal shape-preserving constraints).
+struct Distance {
+  static constexpr int kVertices = 2, kNumbers = 2, kMultipliers = 1;
+  /// number: length at rest [m], compliance [m/N]. Returns C [m].
+  template <class V>
+  static TISSUE_SIM_INLINE V value(const Vertex<V> (&v)[2], const V (&number)[2]) {
+    const Vector<V> d = between(v[1], v[0]);
+    return root(dot(d, d)) - number[0];
+  }
+  template <class V>
+  static TISSUE_SIM_INLINE void project(Vertex<V> (&v)[2], const V (&number)[2], V inverse_h2,
+                                        V (&lambda)[1]) {
+    const V a = number[1] * inverse_h2;
+    const Vector<V> d = between(v[1], v[0]);
+    const V length = root(dot(d, d) + kTiny);
+    const V change = (number[0] - length - a * lambda[0]) / (v[0].w + v[1].w + a + kTiny);
+    lambda[0] += change;
+    const V scale = change / length;
+    move(v[0], -scale, d);
+    move(v[1], scale, d);
+  }
+};
+
+/// The angle between two triangles that share the edge from vertex 2 to vertex 3, opposite to which
+/// lie 0 and 1 (eq. 4; signed, where arccos knows no side and has no slope where the triangles are
+/// flat; gradients: Bridson et al. 2003).
+struct Bending {
+  static constexpr int kVertices = 4, kNumbers = 2, kMultipliers = 1;
+  template <class V>
+  struct Parts {
+    Vector<V> e, n0, n1;
+    V length;
+    V angle;  ///< 0 where the triangles are flat, -pi to pi
+  };
+  template <class V>
+  static TISSUE_SIM_INLINE Parts<V> parts(const Vertex<V> (&v)[4]) {
+    Parts<V> p;
+    p.e = between(v[3], v[2]);
+    p.n0 = cross(between(v[0], v[2]), between(v[0], v[3]));
+    p.n1 = cross(between(v[1], v[3]), between(v[1], v[2]));
+    p.length = root(dot(p.e, p.e) + kTiny);
+    p.angle = angle_of(dot(cross(p.n0, p.n1), p.e), p.length * dot(p.n0, p.n1));
+    return p;
+  }
+  /// An angle's excess over another one, within half a turn.
+  template <class V>
+  static TISSUE_SIM_INLINE V excess(V angle, V rest) {
+    constexpr float kPi = 3.14159265359f;
+    V d = angle - rest;
+    d = where_negative(kPi - d, d - 2 * kPi, d);
+    return where_negative(d + kPi, d + 2 * kPi, d);
+  }
+  /// number: angle at rest [rad], compliance [rad/(N m)]. Returns C [rad].
+  template <class V>
+  static TISSUE_SIM_INLINE V value(const Vertex<V> (&v)[4], const V (&number)[2]) {
+    return excess(parts(v).angle, number[0]);
+  }
+  template <class V>
+  static TISSUE_SIM_INLINE void project(Vertex<V> (&v)[4], const V (&number)[2], V inverse_h2,
+                                        V (&lambda)[1]) {
+    const V a = number[1] * inverse_h2;
+    const Parts<V> p = parts(v);
+    // A triangle that has collapsed would turn about its edge in no time.
+    const V least = 1e-3f * p.length * p.length * p.length * p.length + kTiny;
+    const V one = 1.0f / (p.length * greater(dot(p.n0, p.n0), least));
+    const V other = 1.0f / (p.length * greater(dot(p.n1, p.n1), least));
+    const Vector<V> m0 = one * p.n0, m1 = other * p.n1;
+    const V e2 = p.length * p.length;
+    const V s0 = dot(between(v[0], v[3]), p.e), s1 = dot(between(v[1], v[3]), p.e);
+    const V t0 = dot(between(v[0], v[2]), p.e), t1 = dot(between(v[1], v[2]), p.e);
+    const Vector<V> g0 = e2 * m0, g1 = e2 * m1;
+    const Vector<V> g2 = s0 * m0 + s1 * m1;
+    const Vector<V> g3 = (-t0) * m0 + (-t1) * m1;
+    const V sum = v[0].w * dot(g0, g0) + v[1].w * dot(g1, g1) + v[2].w * dot(g2, g2) +
+                  v[3].w * dot(g3, g3);
+    const V c = excess(p.angle, number[0]);
+    const V change = -(c + a * lambda[0]) / (sum + a + kTiny);
+    lambda[0] += change;
+    move(v[0], change, g0);
+    move(v[1], change, g1);
+    move(v[2], change, g2);
+    move(v[3], change, g3);
+  }
+};
+
+}  // namespace pbd
+}  // namespace tissue_sim

@@ -1,0 +1,111 @@
+// Contact with the ground and with tools: a constraint for each vertex that lies in one, inelastic,
+// with Coulomb friction; what acts on the tool is what its multipliers say.
+#include <cmath>
+
+#include "pbd/pbd_state.h"
+#include "tools/frame_colliders.h"
+
+namespace tissue_sim {
+namespace pbd {
+namespace {
+
+constexpr int kContactsOfPart = 1024;
+/// What lies deep in a tool that has just appeared comes out at this speed, and no faster [m/s].
+constexpr float kWayOut = 1;
+
+struct Contacts {
+  const Collider* colliders;
+  const Box* boxes;
+  int count;
+  float h;
+  float* x;
+  const float *predicted, *v;
+  const std::vector<double>& mass;
+
+  void project(int i, ColliderLoad* loads) const {
+    float* at = x + 4 * i;
+    if (at[3] == 0) return;
+    for (int c = 0; c < count; ++c) {
+      const Collider& collider = colliders[c];
+      if (collider.kind == Collider::kPlane) {
+        if (at[2] >= collider.position[2]) continue;
+      } else {
+        const Box& box = boxes[c];
+        if (at[0] < box.min.x() || at[0] > box.max.x() || at[1] < box.min.y() ||
+            at[1] > box.max.y() || at[2] < box.min.z() || at[2] > box.max.z()) {
+          continue;
+        }
+      }
+      const Gap g = gap(collider, at);
+      if (g.distance < 0) push(i, collider, g, loads[c]);
+    }
+  }
+
+  void push(int i, const Collider& collider, const Gap& g, ColliderLoad& load) const {
+    float* at = x + 4 * i;
+    float carried[3];  // with the collider's material, in this step
+    velocity_at(collider, at, carried);
+    float slid[3], normal_way = 0, approach = 0;
+    for (int a = 0; a < 3; ++a) {
+      carried[a] *= h;
+      const float start = predicted[4 * i + a] - h * v[4 * i + a];
+      slid[a] = at[a] - start - carried[a];
+      normal_way += slid[a] * g.normal[a];
+    }
+    approach = fmaxf(0.0f, -normal_way);
+    const float out = fminf(-g.distance, approach + h * kWayOut);
+    float s2 = 0;
+    for (int a = 0; a < 3; ++a) {
+      slid[a] -= normal_way * g.normal[a];
+      s2 += slid[a] * slid[a];
+    }
+    // Friction takes back what slid, up to its share of the push; teeth hold with a force.
+    const float hold = collider.friction * out + collider.cohesion * h * h * at[3];
+    const float back = s2 > hold * hold ? hold / sqrtf(s2) : 1.0f;
+    const double weight = mass[i] / (static_cast<double>(h) * h);
+    double force[3], arm[3];
+    for (int a = 0; a < 3; ++a) {
+      const float moved = out * g.normal[a] - back * slid[a];
+      at[a] += moved;
+      force[a] = -weight * moved;
+      arm[a] = at[a] - collider.position[a];
+      load.force[a] += force[a];
+    }
+    load.torque[0] += arm[1] * force[2] - arm[2] * force[1];
+    load.torque[1] += arm[2] * force[0] - arm[0] * force[2];
+    load.torque[2] += arm[0] * force[1] - arm[1] * force[0];
+    load.points += 1;
+  }
+};
+
+}  // namespace
+
+void project_contacts(State& s, float h, std::vector<ColliderLoad>& loads) {
+  const int count = static_cast<int>(s.colliders.size());
+  if (count == 0) return;
+  std::vector<Box> boxes;
+  for (const Collider& c : s.colliders) boxes.push_back(bounds(c));
+  const Contacts contacts{s.colliders.data(), boxes.data(), count, h, s.vertices.x.data(),
+                          s.vertices.predicted.data(), s.vertices.v.data(), s.vertices.mass};
+  const int n = s.vertices.size(), parts = (n + kContactsOfPart - 1) / kContactsOfPart;
+  std::vector<ColliderLoad> of_parts(static_cast<std::size_t>(parts) * count);
+  s.cpu.for_each(parts, [&](int part) {
+    const int end = std::min(n, (part + 1) * kContactsOfPart);
+    for (int i = part * kContactsOfPart; i < end; ++i) {
+      contacts.project(i, &of_parts[static_cast<std::size_t>(part) * count]);
+    }
+  });
+  for (int part = 0; part < parts; ++part) {
+    for (int c = 0; c < count; ++c) {
+      const ColliderLoad& from = of_parts[static_cast<std::size_t>(part) * count + c];
+      for (int a = 0; a < 3; ++a) {
+        loads[c].force[a] += from.force[a];
+        loads[c].torque[a] += from.torque[a];
+      }
+      loads[c].points += from.points / s.scene.pbd.iterations;
+    }
+  }
+}
+
+}  // namespace pbd
+}  // namespace tissue_sim

@@ -1,0 +1,40 @@
+// Cuts of meshes: what a blade's sweep does to triangles and tetrahedra.
+#pragma once
+
+#include <vector>
+
+#include "cutting/blade_sweep.h"
+#include "pbd/pbd_state.h"
+#include "tissue_sim/cut.h"
+
+namespace tissue_sim {
+namespace pbd {
+
+/// Where a vertex stood before, by an array without padding: those made since stood where they are.
+inline Vec3 place_before(const State& s, const Array<float>& before, std::int32_t v) {
+  if (4 * static_cast<std::size_t>(v) >= before.size()) return s.vertices.position(v);
+  return Vec3(before[4 * v], before[4 * v + 1], before[4 * v + 2]);
+}
+
+/// Cuts along a blade's path, while vertices move from `before` to where they are. `stroke` is the
+/// same for all that one blade does. Appends to `origin` the vertex that each new one came from.
+/// Returns whether anything changed; constraints, masses and colours are to be made anew then
+/// (after_cut).
+bool cut_surface(State& s, const BladePath& path, const Array<float>& before, int stroke,
+                 std::vector<std::int32_t>& origin, CutReport& report);
+bool cut_tetrahedra(State& s, const BladePath& path, const Array<float>& before,
+                    std::vector<std::int32_t>& origin, CutReport& report);
+
+/// Closes the wounds of pieces that came apart (surface model), then makes constraints, masses and
+/// colours anew. Linear and angular momentum of each body stay.
+void after_cut(State& s, std::vector<std::int32_t>& origin);
+
+/// Closes each loop of cut edges between two pieces by a surface of triangles about as large as
+/// those around (cut_caps.cpp). Returns the vertices that need internal constraints anew.
+std::vector<std::int32_t> close_wounds(State& s, std::vector<std::int32_t>& origin);
+
+/// A copy of a vertex, at the same place, with the same velocity.
+int copy_vertex(State& s, int of, std::vector<std::int32_t>& origin);
+
+}  // namespace pbd
+}  // namespace tissue_sim

@@ -1,0 +1,298 @@
+// Cuts of tetrahedra. The links that a blade breaks lead from centre to centre of neighbours, as
+// bonds lead from point to point: whatever the path, partial, hooked, crossing, in pieces, each
+// link is broken or not. Faces whose link is broken part; vertices come apart into the groups of
+// tetrahedra around them that still hang together. Vertices of parted faces first move onto the
+// blade's surface, in reference space, as far as the tetrahedra around them bear it.
+#include <algorithm>
+#include <cmath>
+#include <map>
+
+#include "pbd/cut.h"
+
+namespace tissue_sim {
+namespace pbd {
+namespace {
+
+/// No tetrahedron shrinks to less than this share of what it was before vertices moved, ...
+constexpr double kLeastVolume = 0.3;
+/// ... and 6 V / L^3, 0.71 of a regular one, stays above this.
+constexpr double kLeastQuality = 0.06;
+
+void find_faces(State& s) {
+  std::map<std::array<std::int32_t, 3>, std::pair<std::int32_t, std::int8_t>> first;
+  for (std::size_t t = 0; t < s.tetrahedra.size(); ++t) {
+    for (std::int8_t k = 0; k < 4; ++k) {
+      std::array<std::int32_t, 3> key;
+      for (int i = 0, j = 0; i < 4; ++i) {
+        if (i != k) key[j++] = s.tetrahedra[t][i];
+      }
+      std::sort(key.begin(), key.end());
+      const auto [at, is_new] = first.try_emplace(key, static_cast<std::int32_t>(t), k);
+      if (!is_new) {
+        s.faces.push_back({{at->second.first, static_cast<std::int32_t>(t)}, {at->second.second, k}, false});
+      }
+    }
+  }
+}
+
+Vec3 centre(const State& s, const Array<float>& x, std::int32_t t) {
+  Vec3 sum = Vec3::Zero();
+  for (const std::int32_t v : s.tetrahedra[t]) sum += place_before(s, x, v);
+  return 0.25 * sum;
+}
+
+Eigen::Matrix3d gradient(const State& s, std::int32_t t) {
+  Eigen::Matrix3d p, q;
+  const Tetrahedron& c = s.tetrahedra[t];
+  for (int i = 0; i < 3; ++i) {
+    p.col(i) = s.vertices.position(c[i + 1]) - s.vertices.position(c[0]);
+    q.col(i) = s.vertices.reference[c[i + 1]] - s.vertices.reference[c[0]];
+  }
+  return p * q.inverse();
+}
+
+double six_volumes(const State& s, const Tetrahedron& c) {
+  const auto& x = s.vertices.reference;
+  return (x[c[1]] - x[c[0]]).cross(x[c[2]] - x[c[0]]).dot(x[c[3]] - x[c[0]]);
+}
+
+double quality(const State& s, const Tetrahedron& c) {
+  double longest = 0;
+  for (int i = 0; i < 4; ++i) {
+    for (int j = i + 1; j < 4; ++j) {
+      longest = std::max(longest, (s.vertices.reference[c[i]] - s.vertices.reference[c[j]]).norm());
+    }
+  }
+  return six_volumes(s, c) / (longest * longest * longest);
+}
+
+/// What the blade left at a vertex, in reference space: the mean of where it met links, and their
+/// normals.
+struct Plane {
+  Vec3 point = Vec3::Zero(), normal = Vec3::Zero();
+  int count = 0;
+};
+
+struct Broken {
+  int face;
+  double place;
+  Vec3 normal;
+};
+
+std::vector<std::int32_t> face_corners(const State& s, const InnerFace& f) {
+  std::vector<std::int32_t> v;
+  for (int i = 0; i < 4; ++i) {
+    if (i != f.opposite[0]) v.push_back(s.tetrahedra[f.tetrahedron[0]][i]);
+  }
+  return v;
+}
+
+class TetCut {
+ public:
+  TetCut(State& s, const std::vector<Broken>& broken) : s_(s), broken_(broken) {
+    around_.resize(s.vertices.size());
+    for (std::size_t t = 0; t < s.tetrahedra.size(); ++t) {
+      for (const std::int32_t v : s.tetrahedra[t]) around_[v].push_back(static_cast<std::int32_t>(t));
+    }
+  }
+
+  void move_onto_blade() {
+    std::map<std::int32_t, Plane> planes;
+    for (const Broken& b : broken_) {
+      const InnerFace& f = s_.faces[b.face];
+      const Vec3 c0 = reference_centre(f.tetrahedron[0]), c1 = reference_centre(f.tetrahedron[1]);
+      const Eigen::Matrix3d g = 0.5 * (gradient(s_, f.tetrahedron[0]) + gradient(s_, f.tetrahedron[1]));
+      Vec3 n = (g.transpose() * b.normal).stableNormalized();
+      if (n.isZero()) continue;
+      for (const std::int32_t v : face_corners(s_, f)) {
+        Plane& p = planes[v];
+        p.normal += p.normal.dot(n) < 0 ? Vec3(-n) : n;
+        p.point += c0 + b.place * (c1 - c0);
+        ++p.count;
+      }
+    }
+    for (const auto& [v, plane] : planes) {
+      if (s_.vertices.anchored[v] == 0) move(v, plane);
+    }
+  }
+
+  /// Gives each group of tetrahedra that hang together around a vertex one of its own.
+  void part(std::vector<std::int32_t>& origin, CutReport& report) {
+    std::map<std::int32_t, std::vector<int>> faces_at;
+    for (std::size_t i = 0; i < s_.faces.size(); ++i) {
+      if (!s_.faces[i].is_cut) {
+        for (const std::int32_t v : face_corners(s_, s_.faces[i])) faces_at[v].push_back(static_cast<int>(i));
+      }
+    }
+    std::set<std::int32_t> touched;
+    for (const Broken& b : broken_) {
+      const InnerFace& f = s_.faces[b.face];
+      const std::vector<std::int32_t> corners = face_corners(s_, f);
+      touched.insert(corners.begin(), corners.end());
+      for (const std::int32_t v : corners) ++s_.vertices.cut_links[v];
+      Triangle t = {corners[0], corners[1], corners[2]};
+      open_.push_back({b.face, t});
+    }
+    report.points_separated += static_cast<int>(touched.size());
+    for (const std::int32_t v : touched) part_vertex(v, faces_at[v], origin);
+    add_cut_triangles();
+  }
+
+ private:
+  Vec3 reference_centre(std::int32_t t) const {
+    Vec3 sum = Vec3::Zero();
+    for (const std::int32_t v : s_.tetrahedra[t]) sum += s_.vertices.reference[v];
+    return 0.25 * sum;
+  }
+
+  /// Along the outer surface where the vertex is on it; not at all at its edges and corners.
+  void move(std::int32_t v, const Plane& plane) {
+    const Vec3 n = plane.normal.stableNormalized();
+    Vec3& x = s_.vertices.reference[v];
+    const double off = n.dot(plane.point / plane.count - x);
+    Vec3 way = off * n;
+    if (s_.vertices.surface[v] != 0) {
+      Vec3 outer = Vec3::Zero();
+      std::vector<Vec3> normals;
+      for (const Triangle& t : s_.triangles) {
+        if (t[0] != v && t[1] != v && t[2] != v) continue;
+        const auto& r = s_.vertices.reference;
+        normals.push_back((r[t[1]] - r[t[0]]).cross(r[t[2]] - r[t[0]]));
+        outer += normals.back();
+      }
+      outer = outer.stableNormalized();
+      for (const Vec3& m : normals) {
+        if (m.stableNormalized().dot(outer) < 0.9) return;
+      }
+      const Vec3 along = n - n.dot(outer) * outer;
+      const double share = n.dot(along);
+      if (share < 0.25) return;
+      way = off / share * along;
+    }
+    Eigen::Matrix3d g = Eigen::Matrix3d::Zero();
+    std::vector<double> least;
+    for (const std::int32_t t : around_[v]) {
+      g += gradient(s_, t) / static_cast<double>(around_[v].size());
+      least.push_back(kLeastVolume * six_volumes(s_, s_.tetrahedra[t]));
+    }
+    const Vec3 from = x;
+    for (double share = 1; share > 0.2; share *= 0.7) {
+      x = from + share * way;
+      bool good = true;
+      for (std::size_t i = 0; i < least.size() && good; ++i) {
+        const Tetrahedron& c = s_.tetrahedra[around_[v][i]];
+        good = six_volumes(s_, c) >= least[i] && quality(s_, c) >= kLeastQuality;
+      }
+      if (good) {
+        const Vec3 moved = g * (x - from);
+        for (int a = 0; a < 3; ++a) s_.vertices.x[4 * v + a] += static_cast<float>(moved[a]);
+        return;
+      }
+    }
+    x = from;
+  }
+
+  void part_vertex(std::int32_t v, const std::vector<int>& faces, std::vector<std::int32_t>& origin) {
+    const std::vector<std::int32_t>& tets = around_[v];
+    std::map<std::int32_t, std::int32_t> group;
+    for (const std::int32_t t : tets) group[t] = t;
+    for (bool again = true; again;) {
+      again = false;
+      for (const int i : faces) {
+        std::int32_t &a = group[s_.faces[i].tetrahedron[0]], &b = group[s_.faces[i].tetrahedron[1]];
+        if (a == b) continue;
+        a = b = std::min(a, b);
+        again = true;
+      }
+    }
+    std::map<std::int32_t, std::int32_t> vertex;  // of each group; the lowest keeps v
+    for (const std::int32_t t : tets) {
+      const auto [at, is_new] = vertex.try_emplace(group[t], v);
+      if (is_new && vertex.size() > 1) at->second = copy_vertex(s_, v, origin);
+      if (at->second == v) continue;
+      for (std::int32_t& c : s_.tetrahedra[t]) c = c == v ? at->second : c;
+    }
+    if (vertex.size() < 2) return;
+    for (std::size_t i = 0; i < s_.triangles.size(); ++i) rename(s_.triangles[i], v, tets, vertex);
+  }
+
+  /// A triangle of the outer surface belongs to the tetrahedron around v that has all its corners.
+  void rename(Triangle& triangle, std::int32_t v, const std::vector<std::int32_t>& tets,
+              const std::map<std::int32_t, std::int32_t>& vertex) {
+    if (std::find(triangle.begin(), triangle.end(), v) == triangle.end()) return;
+    for (const std::int32_t t : tets) {
+      for (const auto& [group, w] : vertex) {
+        const Tetrahedron& c = s_.tetrahedra[t];
+        int found = 0;
+        for (const std::int32_t corner : triangle) {
+          found += std::find(c.begin(), c.end(), corner == v ? w : corner) != c.end() ? 1 : 0;
+        }
+        if (found < 3) continue;
+        for (std::int32_t& corner : triangle) corner = corner == v ? w : corner;
+        return;
+      }
+    }
+  }
+
+  void add_cut_triangles() {
+    constexpr int kFace[4][3] = {{1, 2, 3}, {0, 3, 2}, {0, 1, 3}, {0, 2, 1}};
+    for (const auto& [index, corners] : open_) {
+      const InnerFace& f = s_.faces[index];
+      for (int side = 0; side < 2; ++side) {
+        const Tetrahedron& c = s_.tetrahedra[f.tetrahedron[side]];
+        const int* k = kFace[f.opposite[side]];
+        s_.triangles.push_back({c[k[0]], c[k[1]], c[k[2]]});
+        for (const std::int32_t v : s_.triangles.back()) s_.vertices.surface[v] = 1;
+      }
+    }
+  }
+
+  State& s_;
+  const std::vector<Broken>& broken_;
+  std::vector<std::vector<std::int32_t>> around_;  // tetrahedra of each vertex
+  std::vector<std::pair<int, Triangle>> open_;
+};
+
+}  // namespace
+
+bool cut_tetrahedra(State& s, const BladePath& path, const Array<float>& before,
+                    std::vector<std::int32_t>& origin, CutReport& report) {
+  if (s.faces.empty()) find_faces(s);
+  const int count = static_cast<int>(s.tetrahedra.size());
+  std::vector<Vec3> from(count), to(count);
+  for (int t = 0; t < count; ++t) {
+    from[t] = centre(s, before, t);
+    to[t] = centre(s, s.vertices.x, t);
+  }
+  std::vector<Broken> broken;
+  for (const SweepPart& part : sweep_parts(path)) {
+    for (std::size_t i = 0; i < s.faces.size(); ++i) {
+      InnerFace& f = s.faces[i];
+      if (f.is_cut) continue;
+      const std::int32_t a = f.tetrahedron[0], b = f.tetrahedron[1];
+      const MovingSegment whole = {from[a], from[b], to[a], to[b]};
+      bool aside = false;
+      for (int k = 0; k < 3 && !aside; ++k) {
+        aside = sweep::largest(whole, k) < part.box.min[k] || sweep::least(whole, k) > part.box.max[k];
+      }
+      if (aside) continue;
+      const MovingSegment link = whole.during(part.begin, part.end);
+      for (const SweptEdge& edge : part.edges) {
+        Meeting meeting;
+        if (stays_aside(edge, link) || !edge_passes<Vec3>(edge, link, &meeting)) continue;
+        f.is_cut = true;
+        broken.push_back({static_cast<int>(i), meeting.place, meeting.normal});
+        break;
+      }
+    }
+  }
+  if (broken.empty()) return false;
+  report.bonds_broken += static_cast<std::int64_t>(broken.size());
+  TetCut cut(s, broken);
+  cut.move_onto_blade();
+  cut.part(origin, report);
+  return true;
+}
+
+}  // namespace pbd
+}  // namespace tissue_sim

@@ -1,0 +1,147 @@
+// Real numbers of constraints: a float, or the W lanes of a vector. What the functions of
+// constraints.h need of either, and how W vertices come into lanes and go back.
+#pragma once
+
+#include <cmath>
+#include <cstdint>
+
+#include "compute/simd.h"
+
+namespace tissue_sim {
+namespace pbd {
+
+TISSUE_SIM_INLINE float root(float v) { return sqrtf(v); }
+TISSUE_SIM_INLINE float magnitude(float v) { return fabsf(v); }
+/// a where v is negative (its sign bit set), else b.
+TISSUE_SIM_INLINE float where_negative(float v, float a, float b) { return v < 0 ? a : b; }
+
+#define TISSUE_SIM_LANES(W)                                                             \
+  TISSUE_SIM_INLINE Vec<W> root(Vec<W> v) {                                             \
+    Vec<W> r;                                                                           \
+    for (int i = 0; i < W; ++i) r[i] = __builtin_sqrtf(v[i]);                           \
+    return r;                                                                           \
+  }                                                                                     \
+  TISSUE_SIM_INLINE Vec<W> magnitude(Vec<W> v) {                                        \
+    return reinterpret_cast<Vec<W>>(bits<W>(v) & 0x7fffffff);                           \
+  }                                                                                     \
+  TISSUE_SIM_INLINE Vec<W> where_negative(Vec<W> v, Vec<W> a, Vec<W> b) {               \
+    return either<W>(bits<W>(v) >> 31, a, b);                                           \
+  }
+#if !defined(__CUDACC__)
+TISSUE_SIM_LANES(4)
+TISSUE_SIM_LANES(8)
+TISSUE_SIM_LANES(16)
+#endif
+#undef TISSUE_SIM_LANES
+
+template <class V>
+TISSUE_SIM_INLINE V greater(V a, V b) {
+  return where_negative(a - b, b, a);
+}
+template <class V>
+TISSUE_SIM_INLINE V lesser(V a, V b) {
+  return where_negative(a - b, a, b);
+}
+
+/// Angle of (x, y) to the x axis, -pi to pi, within 4e-6 (Hastings' polynomial, refined). 0 at
+/// (0, 0).
+template <class V>
+TISSUE_SIM_INLINE V angle_of(V y, V x) {
+  const V ax = magnitude(x), ay = magnitude(y);
+  const V t = lesser(ax, ay) / (greater(ax, ay) + 1e-30f), t2 = t * t;
+  V r = t * (0.99997726f +
+             t2 * (-0.33262347f +
+                   t2 * (0.19354346f + t2 * (-0.11643287f + t2 * (0.05265332f - 0.01172120f * t2)))));
+  r = where_negative(ax - ay, 1.57079632679f - r, r);
+  r = where_negative(x, 3.14159265359f - r, r);
+  return where_negative(y, -r, r);
+}
+
+/// A vertex in each lane: where it is [m] and its inverse mass [1/kg].
+template <class V>
+struct Vertex {
+  V x, y, z, w;
+};
+
+#if !defined(__CUDACC__)
+/// Rows of vertices and columns of coordinates change places, in each 16 bytes.
+template <int W>
+TISSUE_SIM_INLINE void transpose(Vec<W> (&r)[4]) {
+  Mask<W> low, high, first, second;
+  for (int i = 0; i < W; i += 4) {
+    low[i] = i, low[i + 1] = i + W, low[i + 2] = i + 1, low[i + 3] = i + 1 + W;
+    high[i] = i + 2, high[i + 1] = i + 2 + W, high[i + 2] = i + 3, high[i + 3] = i + 3 + W;
+    first[i] = i, first[i + 1] = i + 1, first[i + 2] = i + W, first[i + 3] = i + 1 + W;
+    second[i] = i + 2, second[i + 1] = i + 3, second[i + 2] = i + 2 + W, second[i + 3] = i + 3 + W;
+  }
+  const Vec<W> a = __builtin_shuffle(r[0], r[1], low), b = __builtin_shuffle(r[0], r[1], high);
+  const Vec<W> c = __builtin_shuffle(r[2], r[3], low), d = __builtin_shuffle(r[2], r[3], high);
+  r[0] = __builtin_shuffle(a, c, first);
+  r[1] = __builtin_shuffle(a, c, second);
+  r[2] = __builtin_shuffle(b, d, first);
+  r[3] = __builtin_shuffle(b, d, second);
+}
+
+/// The 16 bytes of W / 4 vertices side by side: i, i + 4, i + 8, i + 12. By instructions, for GCC
+/// makes longer vectors of shorter ones number by number.
+template <int W>
+TISSUE_SIM_INLINE Vec<W> load_row(const float* x, const std::int32_t* index, int i) {
+  const auto at = [x, index](int k) -> const Vec<4>& {
+    return *reinterpret_cast<const Vec<4>*>(x + 4 * static_cast<std::ptrdiff_t>(index[k]));
+  };
+  Vec<W> row;
+  if constexpr (W == 4) {
+    row = at(i);
+#if defined(__x86_64__)
+  } else if constexpr (W == 8) {
+    asm("vbroadcastf128 %1, %0" : "=x"(row) : "m"(at(i)));
+    asm("vinsertf128 $1, %1, %0, %0" : "+x"(row) : "m"(at(i + 4)));
+  } else {
+    asm("vbroadcastf32x4 %1, %0" : "=v"(row) : "m"(at(i)));
+    asm("vinsertf32x4 $1, %1, %0, %0" : "+v"(row) : "m"(at(i + 4)));
+    asm("vinsertf32x4 $2, %1, %0, %0" : "+v"(row) : "m"(at(i + 8)));
+    asm("vinsertf32x4 $3, %1, %0, %0" : "+v"(row) : "m"(at(i + 12)));
+#endif
+  }
+  return row;
+}
+
+template <int W>
+TISSUE_SIM_INLINE void store_row(float* x, const std::int32_t* index, int i, Vec<W> row) {
+  const auto at = [x, index](int k) -> Vec<4>& {
+    return *reinterpret_cast<Vec<4>*>(x + 4 * static_cast<std::ptrdiff_t>(index[k]));
+  };
+  if constexpr (W == 4) {
+    at(i) = row;
+#if defined(__x86_64__)
+  } else if constexpr (W == 8) {
+    asm("vextractf128 $0, %1, %0" : "=m"(at(i)) : "x"(row));
+    asm("vextractf128 $1, %1, %0" : "=m"(at(i + 4)) : "x"(row));
+  } else {
+    asm("vextractf32x4 $0, %1, %0" : "=m"(at(i)) : "v"(row));
+    asm("vextractf32x4 $1, %1, %0" : "=m"(at(i + 4)) : "v"(row));
+    asm("vextractf32x4 $2, %1, %0" : "=m"(at(i + 8)) : "v"(row));
+    asm("vextractf32x4 $3, %1, %0" : "=m"(at(i + 12)) : "v"(row));
+#endif
+  }
+}
+
+/// Vertices index[0 .. W - 1]; x holds four floats each, aligned.
+template <int W>
+TISSUE_SIM_INLINE Vertex<Vec<W>> gather(const float* x, const std::int32_t* index) {
+  Vec<W> r[4];
+  for (int i = 0; i < 4; ++i) r[i] = load_row<W>(x, index, i);
+  transpose<W>(r);
+  return {r[0], r[1], r[2], r[3]};
+}
+
+template <int W>
+TISSUE_SIM_INLINE void scatter(float* x, const std::int32_t* index, const Vertex<Vec<W>>& v) {
+  Vec<W> r[4] = {v.x, v.y, v.z, v.w};
+  transpose<W>(r);
+  for (int i = 0; i < 4; ++i) store_row<W>(x, index, i, r[i]);
+}
+#endif
+
+}  // namespace pbd
+}  // namespace tissue_sim

@@ -1,0 +1,42 @@
+// From a scene to vertices, triangles, tetrahedra and their constraints.
+#pragma once
+
+#include <memory>
+
+#include "pbd/pbd_state.h"
+
+namespace tissue_sim {
+namespace pbd {
+
+/// Builds all bodies of a scene. Notes say what was found and left out. Throws
+/// std::invalid_argument for what cannot be built.
+std::unique_ptr<State> make_state(const Scene& scene, std::vector<std::string>* notes);
+
+/// Material of a body at a place of the reference space.
+const Material& material_at(const Scene& scene, const Body& body, const Vec3& x);
+
+/// Numbers that bring neighbours in space near each other in memory (Morton's curve): entry k is
+/// the index of the one that comes k-th.
+std::vector<int> morton_order(const std::vector<Vec3>& places);
+
+/// Makes distance and bending constraints anew from the triangles, tetrahedra and internal links
+/// that there are; those that were there before keep their colours (surface_model.cpp).
+void make_surface_constraints(State& s);
+/// One constraint for each tetrahedron, likewise (tet_model.cpp).
+void make_tet_constraints(State& s);
+/// Volumes and masses of the surface model's vertices from the triangles (surface_model.cpp) and of
+/// the tetrahedral model's from the tetrahedra. Held to the bodies' whole volumes.
+void share_out_mass(State& s);
+/// Joins vertices across the inside of body `b` by rays from `starts`; returns how many met
+/// nothing.
+int add_internal_links(State& s, int b, const std::vector<int>& starts);
+
+/// The parts of make_state(): each adds the vertices and faces of body `b`.
+void add_surface_body(State& s, int b, std::vector<std::string>* notes);
+void add_tet_body(State& s, int b, std::vector<std::string>* notes);
+
+/// The triangles of one body as a mesh in reference space, with all vertices.
+TriangleMesh reference_surface(const State& s, int b);
+
+}  // namespace pbd
+}  // namespace tissue_sim

@@ -1,0 +1,107 @@
+// All that a step of position-based dynamics reads and writes.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <set>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "compute/array.h"
+#include "compute/for_each.h"
+#include "geometry/mesh.h"
+#include "pbd/constraint_set.h"
+#include "pbd/project.h"
+#include "tissue_sim/scene.h"
+#include "tools/collider.h"
+
+namespace tissue_sim {
+namespace pbd {
+
+/// Vertices behind the last one that lanes without a constraint mean: a tetrahedron for each lane.
+constexpr int kPadding = 4 * kLanes;
+
+/// Four floats a vertex. New vertices come last: an index means the same vertex for ever.
+struct Vertices {
+  Array<float> x;          ///< where they are [m], and 1 / mass [1/kg], 0 where held
+  Array<float> predicted;  ///< where they would be without constraints [m]
+  Array<float> v;          ///< [m/s]
+  std::vector<Vec3> reference;          ///< [m]
+  std::vector<double> mass, volume;     ///< [kg], [m^3]
+  std::vector<std::int16_t> body;
+  std::vector<std::uint8_t> anchored;
+  std::vector<std::uint8_t> surface;    ///< whether a triangle has it
+  std::vector<std::int32_t> cut_links, whole_links;  ///< constraints lost, and had
+
+  int size() const { return static_cast<int>(reference.size()); }
+  Vec3 position(int i) const { return Vec3(x[4 * i], x[4 * i + 1], x[4 * i + 2]); }
+  Vec3 velocity(int i) const { return Vec3(v[4 * i], v[4 * i + 1], v[4 * i + 2]); }
+};
+
+using Triangle = std::array<std::int32_t, 3>;
+using Tetrahedron = std::array<std::int32_t, 4>;
+
+/// A vertex pair that an internal shape-preserving constraint joins.
+struct InternalPair {
+  std::int32_t a, b;  ///< a < b
+  double area;        ///< of the column of tissue that it stands for [m^2]
+};
+
+/// A face that two tetrahedra share, and which of their corners lie opposite to it.
+struct InnerFace {
+  std::int32_t tetrahedron[2];
+  std::int8_t opposite[2];
+  bool is_cut;
+};
+
+struct State {
+  Scene scene;
+  Cpu cpu;
+  InstructionSet instructions = instruction_set();
+  const Projections* project = &projections(instructions);
+
+  Vertices vertices;
+  std::vector<Triangle> triangles;  ///< of the surface, counter-clockwise from outside
+  std::vector<Tetrahedron> tetrahedra;
+  std::vector<std::int16_t> body_of_tetrahedron;
+
+  std::vector<InternalPair> internal;      ///< by a, then b
+  std::vector<double> half_depth;          ///< of each vertex: to the middle of the body [m]
+
+  ConstraintSet<Distance> links;  ///< edges, then internal links
+  int edge_count = 0;             ///< of links: those that are edges
+  ConstraintSet<Bending> bends;
+  ConstraintSet<Strain> strains;      ///< one for each tetrahedron, ...
+  ConstraintSet<Elastic> elastics;    ///< ... or these
+  std::vector<double> volume_of_body;  ///< [m^3]
+
+  // What cuts remember. Of each vertex: which stroke it lies on (-1: none), the blade's normal there
+  // in reference space, and the vertex that it is a copy of.
+  std::vector<std::int32_t> stroke, copy_of;
+  std::vector<Vec3> blade_normal;
+  std::set<std::pair<std::int32_t, std::int32_t>> cut_edges;  ///< of the surface, lower vertex first
+  std::vector<InnerFace> faces;                               ///< between tetrahedra
+  double mean_edge = 0;  ///< of the surface when it was made [m]
+
+  std::vector<Collider> colliders;  ///< of this step
+
+  explicit State(const Scene& s) : scene(s), cpu(s.threads) {}
+};
+
+/// Adds a vertex at rest; mass and volume come later. Returns its index.
+int add_vertex(State& s, const Vec3& reference, int body);
+/// After vertices or constraints came or went: padding, 1 / mass, colours.
+void pack(State& s);
+
+/// Advances by one step of `h` seconds; adds what acted on each of the colliders, mean force over
+/// the step, to `loads`, which parallels them.
+void step(State& s, float h, std::vector<ColliderLoad>& loads);
+/// Pushes vertices out of the colliders, with friction; adds what that takes (contact.cpp).
+void project_contacts(State& s, float h, std::vector<ColliderLoad>& loads);
+
+/// Elastic energy of all constraints that have a compliance [J].
+double elastic_energy(const State& s);
+
+}  // namespace pbd
+}  // namespace tissue_sim

@@ -1,0 +1,125 @@
+#include "pbd/pbd_tissue.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "frame/checksum.h"
+#include "pbd/cut.h"
+#include "pbd/model.h"
+#include "tools/frame_colliders.h"
+#include "tools/tool_motion.h"
+
+namespace tissue_sim {
+
+PbdTissue::PbdTissue(const Scene& scene, std::vector<std::string> notes)
+    : notes_(std::move(notes)), state_(pbd::make_state(scene, &notes_)) {
+  pieces_ = pbd::whole_pieces(*state_);
+  next_stroke_ = static_cast<int>(scene.tools.size());
+}
+
+Array<float> PbdTissue::places() const {
+  const Array<float>& x = state_->vertices.x;
+  return {x.begin(), x.begin() + 4 * static_cast<std::ptrdiff_t>(state_->vertices.size())};
+}
+
+void PbdTissue::cut(const BladePath& path, int stroke, const Array<float>& before,
+                    CutReport& report) {
+  pbd::State& s = *state_;
+  std::vector<std::int32_t> origin;
+  const bool changed = s.tetrahedra.empty()
+                           ? pbd::cut_surface(s, path, before, stroke, origin, report)
+                           : pbd::cut_tetrahedra(s, path, before, origin, report);
+  if (!changed) return;
+  pbd::after_cut(s, origin);
+  for (const int id : pbd::update_pieces(s, origin, pieces_)) report.new_fragments.push_back(id);
+}
+
+void PbdTissue::advance(double duration, const FrameInput& input) {
+  pbd::State& s = *state_;
+  const int substeps = s.scene.pbd.steps;
+  const float dt = static_cast<float>(duration / substeps);
+  result_ = {};
+  result_.loads.resize(s.scene.tools.size());
+  for (const BladePath& path : input.cuts) {
+    result_.cut_reports.emplace_back();
+    const Array<float> still = places();
+    cut(path, next_stroke_++, still, result_.cut_reports.back());
+  }
+  const FrameColliders colliders(s.scene, input, duration);
+  const std::vector<BladePath> blades = blade_paths(s.scene, input, 0, 1);
+  const Array<float> before = blades.empty() ? Array<float>() : places();
+  for (int i = 0; i < substeps; ++i) {
+    const double share = (i + 1.0) / substeps;
+    s.colliders = colliders.at(share);
+    std::vector<ColliderLoad> loads(s.colliders.size());
+    pbd::step(s, dt, loads);
+    colliders.add_loads(share, s.colliders.data(), loads.data(), 1.0 / substeps, result_.loads);
+  }
+  result_.substeps = substeps;
+  result_.substep = dt;
+  for (std::size_t i = 0; i < blades.size(); ++i) {
+    cut(blades[i], static_cast<int>(i), before, result_.blade_report);
+  }
+}
+
+FrameResult PbdTissue::finish() {
+  const pbd::State& s = *state_;
+  const pbd::Vertices& v = s.vertices;
+  result_.kinetic_energy = result_.max_speed = 0;
+  for (int i = 0; i < v.size(); ++i) {
+    const double speed2 = v.velocity(i).squaredNorm();
+    if (!(speed2 <= result_.max_speed)) result_.max_speed = speed2;
+    result_.kinetic_energy += 0.5 * v.mass[i] * speed2;
+    result_.blew_up = result_.blew_up || !v.position(i).allFinite();
+  }
+  result_.max_speed = std::sqrt(result_.max_speed);
+  result_.elastic_energy = pbd::elastic_energy(s);
+  // Nothing that instruments do moves tissue at the speed of a bullet; what does is out of control.
+  result_.blew_up = result_.blew_up || !(result_.max_speed < 300);
+  pieces_measured_ = false;
+  return result_;
+}
+
+Span<const Fragment> PbdTissue::fragments() {
+  if (!pieces_measured_) {
+    pbd::measure_pieces(*state_, pieces_);
+    pieces_measured_ = true;
+  }
+  return pieces_.all;
+}
+
+Momentum PbdTissue::momentum() {
+  const pbd::Vertices& v = state_->vertices;
+  Momentum m;
+  for (int i = 0; i < v.size(); ++i) {
+    m.mass += v.mass[i];
+    m.centre += v.mass[i] * v.position(i);
+    m.linear += v.mass[i] * v.velocity(i);
+  }
+  m.centre /= m.mass;
+  for (int i = 0; i < v.size(); ++i) {
+    m.angular += v.mass[i] * (v.position(i) - m.centre).cross(v.velocity(i));
+  }
+  return m;
+}
+
+std::uint64_t PbdTissue::checksum() {
+  const pbd::State& s = *state_;
+  Checksum sum;
+  sum.add(s.vertices.x);
+  sum.add(s.vertices.v);
+  sum.add(pieces_.of_point);
+  std::vector<std::int32_t> joined;
+  for (const pbd::InternalPair& p : s.internal) joined.insert(joined.end(), {p.a, p.b});
+  for (const pbd::Triangle& t : s.triangles) joined.insert(joined.end(), t.begin(), t.end());
+  for (const pbd::Tetrahedron& t : s.tetrahedra) joined.insert(joined.end(), t.begin(), t.end());
+  sum.add(joined);
+  return sum.value();
+}
+
+std::string PbdTissue::device_name() const {
+  return std::string("cpu (") + name(state_->instructions) + ", " +
+         std::to_string(state_->cpu.threads()) + " threads)";
+}
+
+}  // namespace tissue_sim

@@ -1,0 +1,45 @@
+// Tissue by position-based dynamics on the CPU.
+#pragma once
+
+#include <memory>
+
+#include "pbd/pbd_pieces.h"
+#include "pbd/pbd_state.h"
+#include "tissue_sim/tissue.h"
+
+namespace tissue_sim {
+
+class PbdTissue final : public Tissue {
+ public:
+  /// `notes` come before those of the scene.
+  explicit PbdTissue(const Scene& scene, std::vector<std::string> notes = {});
+
+  void advance(double duration, const FrameInput& input) override;
+  FrameResult finish() override;
+  int point_count() const override { return state_->vertices.size(); }
+  int read_points(const PointSelection& selection, std::vector<std::uint8_t>& cloud) override;
+  void read_surface(SurfaceTriangles& surface) override;
+  int fragment_count() const override { return static_cast<int>(pieces_.all.size()); }
+  Span<const Fragment> fragments() override;
+  std::uint64_t checksum() override;
+  Momentum momentum() override;
+  std::string device_name() const override;
+  const std::vector<std::string>& notes() const override { return notes_; }
+
+  pbd::State& state() { return *state_; }
+  const Pieces& pieces() const { return pieces_; }
+
+ private:
+  /// While vertices move from `before` to where they are; a stroke is what one blade does.
+  Array<float> places() const;  // without padding
+  void cut(const BladePath& path, int stroke, const Array<float>& before, CutReport& report);
+
+  std::vector<std::string> notes_;
+  std::unique_ptr<pbd::State> state_;
+  Pieces pieces_;
+  int next_stroke_ = 0;  // the first ones are the tools'
+  bool pieces_measured_ = false;
+  FrameResult result_;
+};
+
+}  // namespace tissue_sim

@@ -1,0 +1,192 @@
+// One step: predict, project, take velocities from where vertices are.
+#include <cmath>
+
+#include "pbd/pbd_state.h"
+
+namespace tissue_sim {
+namespace pbd {
+namespace {
+
+constexpr int kVerticesOfPart = 2048;
+
+struct Predict {
+  float *x, *predicted, *v;
+  float h, decay, gravity[3];
+  TISSUE_SIM_INLINE void operator()(int i) const {
+    const bool held = x[4 * i + 3] == 0;
+    for (int a = 0; a < 3; ++a) {
+      float& speed = v[4 * i + a];
+      speed = held ? 0 : decay * (speed + h * gravity[a]);
+      x[4 * i + a] += h * speed;
+      predicted[4 * i + a] = x[4 * i + a];
+    }
+  }
+};
+
+/// v += (x - predicted) / h: what no constraint moved keeps its velocity to the bit, which
+/// differences of positions would round.
+struct Follow {
+  const float *x, *predicted;
+  float* v;
+  float inverse_h;
+  TISSUE_SIM_INLINE void operator()(int i) const {
+    for (int a = 0; a < 3; ++a) {
+      v[4 * i + a] += inverse_h * (x[4 * i + a] - predicted[4 * i + a]);
+    }
+  }
+};
+
+template <class F>
+void for_vertices(State& s, const F& f) {
+  const int n = s.vertices.size();
+  s.cpu.for_each((n + kVerticesOfPart - 1) / kVerticesOfPart, [&](int part) {
+    const int end = std::min(n, (part + 1) * kVerticesOfPart);
+    for (int i = part * kVerticesOfPart; i < end; ++i) f(i);
+  });
+}
+
+/// One colour after the other. `blocks_of_part` are worth handing to another thread.
+template <class Kind>
+void project_all(State& s, ConstraintSet<Kind>& set, Project<Kind> project, int blocks_of_part,
+                 float inverse_h2, bool keep) {
+  float* x = s.vertices.x.data();
+  for (std::size_t c = 0; c + 1 < set.begin.size(); ++c) {
+    const int begin = set.begin[c], count = set.begin[c + 1] - begin;
+    const auto run = [&](int first, int n) {
+      float* multipliers = nullptr;
+      if (keep && Kind::kMultipliers > 0) {
+        multipliers = set.multipliers.data() +
+                      static_cast<std::size_t>(first) * ConstraintSet<Kind>::kMultipliers * kLanes;
+      }
+      project(set.blocks.data() + first, n, inverse_h2, x, multipliers);
+    };
+    if (count < 2 * blocks_of_part) {
+      const FlushDenormals flush;
+      run(begin, count);
+      continue;
+    }
+    s.cpu.for_each((count + blocks_of_part - 1) / blocks_of_part, [&](int part) {
+      const int first = part * blocks_of_part;
+      run(begin + first, std::min(blocks_of_part, count - first));
+    });
+  }
+}
+
+template <class Kind>
+void forget(ConstraintSet<Kind>& set) {
+  std::fill(set.multipliers.begin(), set.multipliers.end(), 0.0f);
+}
+
+}  // namespace
+
+void step(State& s, float h, std::vector<ColliderLoad>& loads) {
+  Vertices& vertices = s.vertices;
+  const Vec3& g = s.scene.gravity;
+  for_vertices(s, Predict{vertices.x.data(),
+                          vertices.predicted.data(),
+                          vertices.v.data(),
+                          h,
+                          static_cast<float>(std::exp(-s.scene.damping * h)),
+                          {static_cast<float>(g.x()), static_cast<float>(g.y()),
+                           static_cast<float>(g.z())}});
+  const int iterations = s.scene.pbd.iterations;
+  const bool keep = iterations > 1;
+  if (keep) {
+    forget(s.links);
+    forget(s.bends);
+    forget(s.elastics);
+  }
+  const float inverse_h2 = 1 / (h * h);
+  for (int i = 0; i < iterations; ++i) {
+    project_all(s, s.elastics, s.project->elastic, 32, inverse_h2, keep);
+    project_all(s, s.strains, s.project->strain, 32, inverse_h2, false);
+    project_all(s, s.links, s.project->distance, 128, inverse_h2, keep);
+    project_all(s, s.bends, s.project->bending, 32, inverse_h2, keep);
+    project_contacts(s, h, loads);
+  }
+  for_vertices(s, Follow{vertices.x.data(), vertices.predicted.data(), vertices.v.data(), 1 / h});
+}
+
+int add_vertex(State& s, const Vec3& reference, int body) {
+  Vertices& v = s.vertices;
+  const int index = v.size();
+  v.reference.push_back(reference);
+  v.mass.push_back(0);
+  v.volume.push_back(0);
+  v.body.push_back(static_cast<std::int16_t>(body));
+  v.anchored.push_back(0);
+  v.surface.push_back(0);
+  v.cut_links.push_back(0);
+  v.whole_links.push_back(0);
+  s.half_depth.push_back(0);
+  s.stroke.push_back(-1);
+  s.copy_of.push_back(index);
+  s.blade_normal.push_back(Vec3::Zero());
+  for (Array<float>* of : {&v.x, &v.predicted, &v.v}) of->resize(4 * (index + 1));  // cuts padding
+  for (int a = 0; a < 3; ++a) {
+    v.x[4 * index + a] = v.predicted[4 * index + a] = static_cast<float>(reference[a]);
+  }
+  return index;
+}
+
+void pack(State& s) {
+  Vertices& v = s.vertices;
+  const int n = v.size();
+  for (Array<float>* of : {&v.x, &v.predicted, &v.v}) {
+    of->resize(4 * n);
+    of->resize(4 * (n + kPadding), 0.0f);
+  }
+  for (int i = 0; i < n; ++i) {
+    v.x[4 * i + 3] = v.anchored[i] != 0 ? 0.0f : static_cast<float>(1 / v.mass[i]);
+  }
+  for (int lane = 0; lane < kLanes; ++lane) {  // the corners of a tetrahedron: nothing is 0 / 0
+    for (int k = 1; k < 4; ++k) v.x[4 * (n + 4 * lane + k) + k - 1] = 1;
+  }
+  s.links.pack(n);
+  s.bends.pack(n);
+  s.strains.pack(n);
+  s.elastics.pack(n);
+}
+
+namespace {
+
+template <class Kind, class F>
+double sum_energy(const State& s, const ConstraintSet<Kind>& set, const F& energy) {
+  double sum = 0;
+  for (int c = 0; c < set.size(); ++c) {
+    Vertex<float> v[Kind::kVertices];
+    for (int i = 0; i < Kind::kVertices; ++i) {
+      const float* x = &s.vertices.x[4 * static_cast<std::size_t>(set.vertices[c][i])];
+      v[i] = {x[0], x[1], x[2], x[3]};
+    }
+    float number[Kind::kNumbers];
+    std::copy(set.numbers[c].begin(), set.numbers[c].end(), number);
+    sum += energy(v, number);
+  }
+  return sum;
+}
+
+}  // namespace
+
+double elastic_energy(const State& s) {
+  const auto by_value = [](auto& v, auto& number, float c) {
+    (void)v;
+    return number[1] > 0 ? 0.5 * c * c / number[1] : 0.0;
+  };
+  double sum = sum_energy(s, s.links, [&](auto& v, auto& number) {
+    return by_value(v, number, Distance::value(v, number));
+  });
+  sum += sum_energy(s, s.bends, [&](auto& v, auto& number) {
+    return by_value(v, number, Bending::value(v, number));
+  });
+  sum += sum_energy(s, s.elastics, [&](auto& v, auto& number) {
+    const auto r = Elastic::parts(v, number);
+    const double d = r.norm, h = static_cast<double>(r.det) - number[11];
+    const double rest = number[11] - 1.0;  // what both are worth at rest
+    return 0.5 * ((d * d - 3) / number[9] + (h * h - rest * rest) / number[10]);
+  });
+  return sum;
+}
+
+}  // namespace pbd
+}  // namespace tissue_sim

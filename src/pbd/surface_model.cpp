@@ -1,0 +1,244 @@
+// The surface model: vertices of a triangle mesh, held together by its edges (distance), the angles
+// at them (bending) and pairs of vertices across the inside (internal shape-preserving).
+//
+// Their stiffness follows from Young's modulus E:
+//   internal: E A / d, the column of area A between the two vertices, d apart. Squeezed between two
+//     plates a slab resists with E.
+//   edge: E t (A1 + A2) / L^2, the spring of a membrane of triangles A1 and A2 (Van Gelder 1998) as
+//     thick, t, as half the body is deep below it. Pulled along, a slab resists with E.
+//   bending: 3 D L^2 / (A1 + A2) with the stiffness D = E L^3 / (12 (1 - nu^2)) of a plate as thick
+//     as the edge is long (Grinspun et al. 2003).
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <unordered_map>
+
+#include "geometry/surface.h"
+#include "pbd/internal_links.h"
+#include "pbd/model.h"
+
+namespace tissue_sim {
+namespace pbd {
+namespace {
+
+double area_of(const State& s, const Triangle& t) {
+  const auto& x = s.vertices.reference;
+  return 0.5 * (x[t[1]] - x[t[0]]).cross(x[t[2]] - x[t[0]]).norm();
+}
+
+std::uint64_t pair_key(std::int32_t a, std::int32_t b) {
+  return static_cast<std::uint64_t>(std::min(a, b)) << 32 | static_cast<std::uint32_t>(std::max(a, b));
+}
+
+/// Colours of constraints by what they join, to be given to those made anew.
+template <class Kind>
+class OldColours {
+ public:
+  explicit OldColours(ConstraintSet<Kind>& set) {
+    for (int c = 0; c < set.size(); ++c) colours_.emplace(set.vertices[c], set.colour[c]);
+    set.vertices.clear();
+    set.numbers.clear();
+    set.colour.clear();
+  }
+  void restore(ConstraintSet<Kind>& set) const {
+    for (int c = 0; c < set.size(); ++c) {
+      const auto at = colours_.find(set.vertices[c]);
+      if (at != colours_.end()) set.colour[c] = at->second;
+    }
+  }
+
+ private:
+  std::map<typename ConstraintSet<Kind>::Vertices, std::int16_t> colours_;
+};
+
+struct MeshEdge {
+  std::int32_t a, b;      ///< a < b
+  std::int32_t left, right;  ///< vertices opposite, -1 for none
+  int count;              ///< of triangles
+  double area;            ///< of them [m^2]
+};
+
+/// By a, then b.
+std::vector<MeshEdge> mesh_edges(const State& s) {
+  struct Half {
+    std::uint64_t key;
+    std::int32_t opposite;
+    double area;
+  };
+  std::vector<Half> halves;
+  halves.reserve(3 * s.triangles.size());
+  for (const Triangle& t : s.triangles) {
+    const double area = area_of(s, t);
+    for (int i = 0; i < 3; ++i) halves.push_back({pair_key(t[i], t[(i + 1) % 3]), t[(i + 2) % 3], area});
+  }
+  std::stable_sort(halves.begin(), halves.end(),
+                   [](const Half& p, const Half& q) { return p.key < q.key; });
+  std::vector<MeshEdge> edges;
+  for (const Half& h : halves) {
+    const auto a = static_cast<std::int32_t>(h.key >> 32), b = static_cast<std::int32_t>(h.key);
+    if (edges.empty() || edges.back().a != a || edges.back().b != b) {
+      edges.push_back({a, b, h.opposite, -1, 1, h.area});
+    } else {
+      if (++edges.back().count == 2) edges.back().right = h.opposite;
+      edges.back().area += h.area;
+    }
+  }
+  return edges;
+}
+
+void add_link(State& s, std::int32_t a, std::int32_t b, double stiffness) {
+  if (!(stiffness > 0)) return;
+  const double length = (s.vertices.reference[a] - s.vertices.reference[b]).norm();
+  s.links.add({a, b}, {static_cast<float>(length), static_cast<float>(1 / stiffness)});
+}
+
+void add_bend(State& s, const MeshEdge& e, double stiffness) {
+  if (!(stiffness > 0)) return;
+  const std::array<std::int32_t, 4> at = {e.left, e.right, e.a, e.b};
+  Vertex<float> v[4];
+  const Vec3& origin = s.vertices.reference[e.a];
+  for (int i = 0; i < 4; ++i) {
+    const Vec3 x = s.vertices.reference[at[i]] - origin;
+    v[i] = {static_cast<float>(x.x()), static_cast<float>(x.y()), static_cast<float>(x.z()), 1};
+  }
+  s.bends.add(at, {Bending::parts(v).angle, static_cast<float>(1 / stiffness)});
+}
+
+}  // namespace
+
+void make_surface_constraints(State& s) {
+  const OldColours<Distance> links(s.links);
+  const OldColours<Bending> bends(s.bends);
+  const PbdOptions& pbd = s.scene.pbd;
+  const bool tets = pbd.model == PbdModel::kTetrahedra;
+  if (tets && pbd.elasticity == PbdElasticity::kMaterial) return;
+  const auto& x = s.vertices.reference;
+  std::map<std::pair<std::int32_t, std::int32_t>, double> inner;  // volume around a tet's edge
+  for (const Tetrahedron& t : s.tetrahedra) {
+    const double volume = std::fabs((x[t[1]] - x[t[0]]).cross(x[t[2]] - x[t[0]]).dot(x[t[3]] - x[t[0]])) / 6;
+    for (int i = 0; i < 4; ++i) {
+      for (int j = i + 1; j < 4; ++j) inner[{std::min(t[i], t[j]), std::max(t[i], t[j])}] += volume;
+    }
+  }
+  const auto material = [&s, &x](std::int32_t a, std::int32_t b) -> const Material& {
+    return material_at(s.scene, s.scene.bodies[s.vertices.body[a]], 0.5 * (x[a] + x[b]));
+  };
+  for (const auto& [e, volume] : inner) {
+    const double l2 = (x[e.first] - x[e.second]).squaredNorm();
+    add_link(s, e.first, e.second,
+             pbd.edge * material(e.first, e.second).young_modulus * volume / l2);
+  }
+  for (const MeshEdge& e : mesh_edges(s)) {
+    const double l2 = (x[e.a] - x[e.b]).squaredNorm();
+    const Material& m = material(e.a, e.b);
+    if (!tets) {
+      const double thick = 0.5 * (s.half_depth[e.a] + s.half_depth[e.b]);
+      add_link(s, e.a, e.b, pbd.edge * m.young_modulus * thick * e.area / l2);
+    }
+    if (e.count != 2) continue;
+    const double plate = m.young_modulus * l2 * std::sqrt(l2) /
+                         (12 * (1 - m.poisson_ratio * m.poisson_ratio));
+    add_bend(s, e, pbd.bending * 3 * plate * l2 / e.area);
+  }
+  s.edge_count = s.links.size();
+  for (const InternalPair& p : s.internal) {
+    add_link(s, p.a, p.b,
+             pbd.internal * material(p.a, p.b).young_modulus * p.area / (x[p.a] - x[p.b]).norm());
+  }
+  links.restore(s.links);
+  bends.restore(s.bends);
+  for (int i = 0; i < s.vertices.size(); ++i) s.vertices.whole_links[i] = 0;
+  for (const auto& l : s.links.vertices) {
+    for (const std::int32_t v : l) ++s.vertices.whole_links[v];
+  }
+}
+
+int add_internal_links(State& s, int b, const std::vector<int>& starts) {
+  const std::vector<InternalLink> found = find_internal_links(reference_surface(s, b), starts);
+  std::vector<double> area(s.vertices.size(), 0.0);
+  std::unordered_map<std::uint64_t, int> edges;
+  for (const Triangle& t : s.triangles) {
+    for (int i = 0; i < 3; ++i) {
+      area[t[i]] += area_of(s, t) / 3;
+      edges[pair_key(t[i], t[(i + 1) % 3])] = 1;
+    }
+  }
+  std::map<std::pair<std::int32_t, std::int32_t>, double> pairs;
+  for (const InternalPair& p : s.internal) pairs[{p.a, p.b}] = p.area;
+  for (const InternalLink& link : found) {
+    s.half_depth[link.from] = 0.5 * link.length;
+    if (edges.count(pair_key(link.from, link.to)) != 0) continue;
+    pairs[{std::min(link.from, link.to), std::max(link.from, link.to)}] += 0.5 * area[link.from];
+  }
+  s.internal.clear();
+  for (const auto& [p, a] : pairs) s.internal.push_back({p.first, p.second, a});
+  // Where no ray meets anything the body is taken to be as deep as it is on the mean.
+  double depth = 0;
+  int met = 0;
+  for (const int v : starts) {
+    depth += s.half_depth[v];
+    met += s.half_depth[v] > 0 ? 1 : 0;
+  }
+  double mean = met > 0 ? depth / met : s.scene.cell_size;
+  for (const int v : starts) {
+    if (s.half_depth[v] <= 0) s.half_depth[v] = mean;
+  }
+  return static_cast<int>(starts.size()) - met;
+}
+
+void add_surface_body(State& s, int b, std::vector<std::string>* notes) {
+  const Body& body = s.scene.bodies[b];
+  SurfaceKind kind;
+  TriangleMesh mesh = body.shape == Shape::kMesh ? load_surface(body, kind, notes)
+                                                 : triangulate(body, s.scene.cell_size);
+  const std::vector<int> order = morton_order(mesh.vertices);
+  std::vector<int> index(order.size());
+  std::vector<int> starts;
+  for (const int v : order) {
+    index[v] = add_vertex(s, mesh.vertices[v], b);
+    starts.push_back(index[v]);
+    s.vertices.surface[index[v]] = 1;
+  }
+  for (const auto& t : mesh.triangles) s.triangles.push_back({index[t[0]], index[t[1]], index[t[2]]});
+  const int missed = add_internal_links(s, b, starts);
+  double volume = signed_volume(mesh);
+  if (!kind.is_closed()) {
+    volume = 0;  // no inside: columns below the vertices
+    for (const Triangle& t : s.triangles) {
+      if (s.vertices.body[t[0]] != b) continue;
+      for (const std::int32_t v : t) volume += area_of(s, t) / 3 * s.half_depth[v];
+    }
+  }
+  s.volume_of_body.push_back(volume);
+  if (missed > 0 && notes != nullptr) {
+    notes->push_back("body '" + body.name + "': " + std::to_string(missed) + " of " +
+                     std::to_string(starts.size()) +
+                     " vertices have no internal constraint: what is opposite is open");
+  }
+}
+
+void share_out_mass(State& s) {
+  Vertices& v = s.vertices;
+  std::fill(v.volume.begin(), v.volume.end(), 0.0);
+  for (const Tetrahedron& t : s.tetrahedra) {
+    const auto& x = v.reference;
+    const double sixth = std::fabs((x[t[1]] - x[t[0]]).cross(x[t[2]] - x[t[0]]).dot(x[t[3]] - x[t[0]])) / 6;
+    for (const std::int32_t i : t) v.volume[i] += sixth / 4;
+  }
+  if (s.tetrahedra.empty()) {
+    for (const Triangle& t : s.triangles) {
+      const double third = area_of(s, t) / 3;
+      for (const std::int32_t i : t) v.volume[i] += third * s.half_depth[i];
+    }
+  }
+  std::vector<double> whole(s.scene.bodies.size(), 0.0);
+  for (int i = 0; i < v.size(); ++i) whole[v.body[i]] += v.volume[i];
+  for (int i = 0; i < v.size(); ++i) {
+    const int b = v.body[i];
+    v.volume[i] *= s.volume_of_body[b] / whole[b];
+    v.mass[i] = v.volume[i] * material_at(s.scene, s.scene.bodies[b], v.reference[i]).density;
+  }
+}
+
+}  // namespace pbd
+}  // namespace tissue_sim

@@ -10,7 +10,7 @@
 #include <stdexcept>
 
 #include "geometry/chord.h"
-#include "mpm/lattice/thickness.h"
+#include "geometry/thickness.h"
 #include "scene/scene_text.h"
 
 namespace tissue_sim {

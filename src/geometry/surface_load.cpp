@@ -57,7 +57,8 @@ void drop_triangles(TriangleMesh& mesh, std::vector<std::string>& notes) {
     kept.push_back(t);
   }
   mesh.triangles.swap(kept);
-  if (flat > 0) notes.push_back("left out " + count(flat, "triangle", "triangles") + " without area");
+  if (flat > 0)
+    notes.push_back("left out " + count(flat, "triangle", "triangles") + " without area");
   if (twice > 0) {
     notes.push_back("left out " + count(twice, "triangle", "triangles") + " given twice");
   }
@@ -79,7 +80,8 @@ void drop_triangles(TriangleMesh& mesh, std::vector<std::string>& notes) {
   mesh.vertices.swap(used);
 }
 
-/// Turns triangles so that those that share an edge by two face the same way, then regions outwards.
+/// Turns triangles so that those that share an edge by two face the same way, then regions
+/// outwards.
 int turn_triangles(TriangleMesh& mesh, const EdgeTriangles& edges) {
   const int n = static_cast<int>(mesh.triangles.size());
   std::vector<int> region(n, -1);
@@ -181,7 +183,7 @@ TriangleMesh load_surface(const Body& body, SurfaceKind& kind, std::vector<std::
   const std::string prefix = "body '" + body.name + "': ";
   std::string what = "mesh " + body.mesh;
   try {
-    const std::string path = std::filesystem::absolute(resolve_mesh_path(body.mesh)).string();
+    const std::string path = std::filesystem::absolute(resolve_path(body.mesh, "mesh")).string();
     what = "mesh " + path;
     TriangleMesh mesh = read_mesh(path);
     Box box;
@@ -191,9 +193,9 @@ TriangleMesh load_surface(const Body& body, SurfaceKind& kind, std::vector<std::
     }
     const double size = body.scale * (box.max - box.min).maxCoeff();
     if (!(size >= 1e-3 && size <= 10)) {
-      throw std::invalid_argument(what + " is " + text(size) + " m long at scale " +
-                                  text(body.scale) +
-                                  " (a body must be between 1 mm and 10 m): set scale, in m per unit");
+      throw std::invalid_argument(
+          what + " is " + text(size) + " m long at scale " + text(body.scale) +
+          " (a body must be between 1 mm and 10 m): set scale, in m per unit");
     }
     std::vector<std::string> found;
     try {

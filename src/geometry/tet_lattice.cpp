@@ -81,7 +81,8 @@ class Stuffing {
     for (int a = 0; a < 3; ++a) {
       const double cubes = std::ceil((box.max[a] + 0.51 * edge - origin[a]) / edge);
       if (!(cubes < 1000)) {
-        throw std::invalid_argument("is more than 1000 cells of cell_size long: make cell_size larger");
+        throw std::invalid_argument(
+            "is more than 1000 cells of cell_size long: make cell_size larger");
       }
       cubes_.n[a] = static_cast<int>(cubes);
     }
@@ -158,7 +159,8 @@ class Stuffing {
 
   int cut_vertex(int a, int b) {
     const Edge e = edge_of(a, b);
-    const auto [at, is_new] = vertex_of_cut_.try_emplace(e, static_cast<int>(mesh_.vertices.size()));
+    const auto [at, is_new] =
+        vertex_of_cut_.try_emplace(e, static_cast<int>(mesh_.vertices.size()));
     if (is_new) mesh_.vertices.push_back(cuts_.at(e));
     return at->second;
   }

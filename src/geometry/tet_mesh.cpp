@@ -126,8 +126,8 @@ TetMesh load_tets(const Body& body, double edge, std::vector<std::string>* notes
   if (body.shape == Shape::kBox) {
     mesh = tetrahedralize_box(body.size, edge);
   } else if (!is_file) {
-    const TriangleMesh surface = body.shape == Shape::kMesh ? load_solid(body, notes)
-                                                            : triangulate(body, 0.5 * edge);
+    const TriangleMesh surface =
+        body.shape == Shape::kMesh ? load_solid(body, notes) : triangulate(body, 0.5 * edge);
     try {
       return stuff_surface(surface, edge);
     } catch (const std::invalid_argument& e) {
@@ -136,7 +136,7 @@ TetMesh load_tets(const Body& body, double edge, std::vector<std::string>* notes
   } else {
     const std::string prefix = "body '" + body.name + "': ";
     try {
-      const std::string path = std::filesystem::absolute(resolve_mesh_path(body.mesh)).string();
+      const std::string path = std::filesystem::absolute(resolve_path(body.mesh, "mesh")).string();
       mesh = read_tets(path);
       std::vector<std::string> found;
       try {

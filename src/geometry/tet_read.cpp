@@ -29,8 +29,9 @@ class Words {
     std::ostringstream all;
     if (!file || !(all << file.rdbuf())) {
       std::error_code error;
-      refuse(path, std::filesystem::exists(path, error) ? "is empty or cannot be read: export it again"
-                                                        : "does not exist: check the path");
+      refuse(path, std::filesystem::exists(path, error)
+                       ? "is empty or cannot be read: export it again"
+                       : "does not exist: check the path");
     }
     std::istringstream lines(all.str());
     std::ostringstream kept;
@@ -43,7 +44,8 @@ class Words {
   bool word(std::string& w) { return static_cast<bool>(in_ >> w); }
   double number(const char* what) {
     double v = 0;
-    if (!(in_ >> v)) refuse(path_, std::string("ends, or has no number, where ") + what + " should be");
+    if (!(in_ >> v))
+      refuse(path_, std::string("ends, or has no number, where ") + what + " should be");
     return v;
   }
   int count(const char* what) {
@@ -73,7 +75,8 @@ TetMesh read_tetgen(const std::string& path) {
   Words nodes(stem.string() + ".node");
   const int n = nodes.count("the number of vertices");
   const int dimension = nodes.count("the dimension");
-  if (dimension != 3) refuse(path, "has vertices of " + std::to_string(dimension) + " coordinates: 3 are needed");
+  if (dimension != 3)
+    refuse(path, "has vertices of " + std::to_string(dimension) + " coordinates: 3 are needed");
   const int more = nodes.count("the number of attributes") + nodes.count("the number of markers");
   int first = 0;
   for (int i = 0; i < n; ++i) {
@@ -201,14 +204,15 @@ TetMesh read_tets(const std::string& path) {
   if (mesh.tetrahedra.empty()) refuse(path, "has no tetrahedra: export a volume mesh");
   for (std::size_t v = 0; v < mesh.vertices.size(); ++v) {
     if (mesh.vertices[v].allFinite()) continue;
-    refuse(path, "has coordinates that are not finite (vertex " + std::to_string(v) + "): repair it");
+    refuse(path,
+           "has coordinates that are not finite (vertex " + std::to_string(v) + "): repair it");
   }
   const int n = static_cast<int>(mesh.vertices.size());
   for (std::size_t t = 0; t < mesh.tetrahedra.size(); ++t) {
     for (const int v : mesh.tetrahedra[t]) {
       if (v >= 0 && v < n) continue;
-      refuse(path, "has a vertex in tetrahedron " + std::to_string(t) + " that is not there: there are " +
-                       std::to_string(n));
+      refuse(path, "has a vertex in tetrahedron " + std::to_string(t) +
+                       " that is not there: there are " + std::to_string(n));
     }
   }
   return mesh;

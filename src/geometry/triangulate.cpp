@@ -69,8 +69,8 @@ TriangleMesh triangulate(const Body& body, double edge) {
   TriangleMesh mesh;
   switch (body.shape) {
     case Shape::kBox:
-      mesh = cube({cells(body.size.x(), edge), cells(body.size.y(), edge),
-                   cells(body.size.z(), edge)});
+      mesh = cube(
+          {cells(body.size.x(), edge), cells(body.size.y(), edge), cells(body.size.z(), edge)});
       for (Vec3& x : mesh.vertices) x = 0.5 * x.cwiseProduct(body.size);
       break;
     case Shape::kBall:

@@ -3,7 +3,7 @@
 
 #include <string>
 
-#include "mpm/lattice/lattice.h"
+#include "geometry/lattice.h"
 
 namespace tissue_sim {
 

@@ -1,4 +1,4 @@
-#include "mpm/lattice/thickness.h"
+#include "geometry/thickness.h"
 
 #include <array>
 #include <cmath>

@@ -28,6 +28,8 @@ struct MethodOnDevice {
 struct Tolerances {
   double rest_speed;        ///< of tissue that nothing pushes [m/s] ...
   double rest_energy;       ///< ... and what it has of elastic energy [J]
+  double cut_speed;         ///< of tissue at rest that was cut, rounding alone [m/s] ...
+  double cut_energy;        ///< ... and what it has of elastic energy [J]
   double weight;            ///< force of what rests, of m g
   double moment;            ///< moment of what rests, of m g and the body's length
   double misplaced;         ///< points on the wrong side of a cut's surface, of all
@@ -47,6 +49,8 @@ inline Tolerances tolerances(Method method) {
     case Method::kMpm:
       t.rest_speed = 0;
       t.rest_energy = 0;
+      t.cut_speed = 5e-6;    // read: 9e-7
+      t.cut_energy = 1e-14;  // read: 4e-16, of 0.1 J for a strain of 1
       t.weight = 0.01;
       t.moment = 0.01;
       t.misplaced = 0;

@@ -1,5 +1,5 @@
 // The transfers between the nodes and the points of a block, direction by direction: x and y within
-// a node plane, then z between three planes, and the transpose for the forces. See docs/design.md.
+// a node plane, then z between three planes, and the transpose for the forces. See docs/mpm.md.
 #pragma once
 
 #include <algorithm>

@@ -36,16 +36,19 @@ Vec3 across(const Vec3& axis) {
   return axis.unitOrthogonal();
 }
 
-/// How far one must go from `x` along `direction` to be out of the box; 0 outside [m].
-double way_out(const Vec3& x, const Vec3& direction, const Box& box) {
-  double way = 1e300;
-  for (int a = 0; a < 3; ++a) {
-    if (x[a] <= box.min[a] || x[a] >= box.max[a]) return 0;
-    if (direction[a] == 0) continue;
-    const double side = direction[a] > 0 ? box.max[a] : box.min[a];
-    way = std::min(way, (side - x[a]) / direction[a]);
+/// Whether the line from `a` to `b` passes through the box, by the share of it within each slab.
+bool meets(const Vec3& a, const Vec3& b, const Box& box) {
+  double begin = 0, end = 1;
+  for (int k = 0; k < 3; ++k) {
+    const double way = b[k] - a[k], low = box.min[k] - a[k], high = box.max[k] - a[k];
+    if (way == 0) {
+      if (low > 0 || high < 0) return false;
+      continue;
+    }
+    begin = std::max(begin, std::min(low / way, high / way));
+    end = std::min(end, std::max(low / way, high / way));
   }
-  return way;
+  return begin <= end;
 }
 
 }  // namespace
@@ -59,30 +62,24 @@ bool place_force_arrow(const Tool& tool, const Pose& pose, const Vec3& force, do
   arrow.text_height = 2 * arrow.unit;
   const Vec3 back = pose.orientation * Vec3(0, 0, -1), side = across(back);
   const Vec3 foot = pose * shaft.axis + (shaft.radius + arrow.unit) * side;
+  // Whichever way it points, it keeps on its side of the shaft.
+  const Vec3 way = (4 * arrow.unit / newtons + scale) * force;
+  const Vec3 first =
+      foot + std::max(0.0, -way.dot(back)) * back + std::max(0.0, -way.dot(side)) * side;
+  const auto in_tissue = [&](double along) {
+    const Vec3 start = first + along * back;
+    return std::any_of(pieces.begin(), pieces.end(), [&](const Fragment& piece) {
+      return meets(start, start + way,
+                   {piece.box.min.array() - arrow.unit, piece.box.max.array() + arrow.unit});
+    });
+  };
   double along = shaft.first;
-  for (std::size_t i = 0; i <= pieces.size(); ++i) {  // out of one may be into another
-    double further = 0;
-    for (const Fragment& piece : pieces) {
-      const Box around = {piece.box.min.array() - arrow.unit, piece.box.max.array() + arrow.unit};
-      further = std::max(further, way_out(foot + along * back, back, around));
-    }
-    if (further == 0) break;
-    along += further + 1e-9;
-    if (along > shaft.last) break;
-  }
-  along = std::min(along, shaft.last);
-
-  // Whichever way it points, it keeps on its side of the shaft and comes no nearer to the tissue.
-  const double length = 4 * arrow.unit + scale * newtons;
-  const Vec3 way = length / newtons * force;
-  arrow.start =
-      foot + (along + std::max(0.0, -way.dot(back))) * back + std::max(0.0, -way.dot(side)) * side;
+  while (along < shaft.last && in_tissue(along)) along += 0.5 * arrow.unit;
+  arrow.start = first + std::min(along, shaft.last) * back;
   arrow.end = arrow.start + way;
-  // Beside an arrow along the shaft, above one across it; "0.00 N" is 3.6 times as wide as high.
-  const double sideways = std::abs(way.dot(side)) / length;
-  arrow.label = (arrow.start + arrow.end) / 2 +
-                (1 - sideways) * (1.8 * arrow.text_height + 1.5 * arrow.unit) * side +
-                sideways * (0.5 * arrow.text_height + 1.5 * arrow.unit) * back;
+  // "0.00 N" is 3.6 times as wide as it is high.
+  arrow.label = arrow.start + way / 2 +
+                (std::abs(way.dot(side)) / 2 + 1.8 * arrow.text_height + arrow.unit) * side;
   return true;
 }
 

@@ -156,10 +156,8 @@ std::vector<std::optional<ToolInput::Sample>> FrameClock::begin_frame(const Tool
 FrameTime FrameClock::end_frame() {
   elapsed_ += 1 / frame_rate_;
   if (own_clock()) {
-    own_rest_ += 1e9 / frame_rate_;
-    const double whole = std::floor(own_rest_ + 1e-6);
-    own_rest_ -= whole;
-    own_ += ros::Duration().fromNSec(static_cast<std::int64_t>(whole));
+    // Rounded as by ros::Rate: a client that sleeps for as long must wake when the frame is done.
+    own_ += ros::Duration(1 / frame_rate_);
     return {own_, elapsed_};
   }
   switch (parameters_.time) {

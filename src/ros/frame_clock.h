@@ -76,7 +76,6 @@ class FrameClock {
   ros::Time ros_time_;
   ros::Time own_;  // of the clock that this node is
   ros::Time frame_stamp_;
-  double own_rest_ = 0;  // of it, below a nanosecond [ns]
   double elapsed_ = 0;   // simulated over all scenes [s]
 };
 

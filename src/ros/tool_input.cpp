@@ -96,11 +96,15 @@ void ToolInput::accept(const std_msgs::Header& header, const Pose& in_frame) {
   check(frame, in_frame, header.stamp.isZero() ? ros::Time::now() : header.stamp);
 }
 
-void ToolInput::follow_tf() {
-  ros::Time stamp;
+void ToolInput::follow_tf(const ros::Time& at) {
+  ros::Time stamp = at;
   Pose pose;
   try {
-    pose = frames_.newest(tf_frame_, stamp);
+    try {
+      pose = at.isZero() ? frames_.newest(tf_frame_, stamp) : frames_.in_world(tf_frame_, at);
+    } catch (const tf2::ExtrapolationException&) {
+      pose = frames_.newest(tf_frame_, stamp);
+    }
   } catch (const tf2::TransformException& e) {
     const std::lock_guard<std::mutex> lock(mutex_);
     waiting_ = e.what();
@@ -221,11 +225,11 @@ void ToolInput::on_grip_pressure(const std_msgs::Float64::ConstPtr& message) {
 
 std::optional<ToolInput::Sample> ToolInput::take() {
   release(Held::kAll);
-  return take_released();
+  return take_released(ros::Time());
 }
 
-std::optional<ToolInput::Sample> ToolInput::take_released() {
-  if (!tf_frame_.empty()) follow_tf();
+std::optional<ToolInput::Sample> ToolInput::take_released(const ros::Time& at) {
+  if (!tf_frame_.empty()) follow_tf(at);
   const std::lock_guard<std::mutex> lock(mutex_);
   if (!sample_) return std::nullopt;
   Sample sample = *sample_;

@@ -87,9 +87,10 @@ class ToolInput {
   void hold(Held& held, const ros::Time& stamp, std::function<void()> accept);
   /// Calls what is held up to `until`.
   void release(std::int64_t until);
-  std::optional<Sample> take_released();
+  /// Where the tool follows tf: where it was at that time; 0: the newest.
+  std::optional<Sample> take_released(const ros::Time& at);
   void on_grip_pressure(const std_msgs::Float64::ConstPtr& message);
-  void follow_tf();
+  void follow_tf(const ros::Time& at);
   void accept(const std_msgs::Header& header, const Pose& in_frame);
   void check(const Pose& frame, const Pose& in_frame, const ros::Time& stamp);
   void refuse(Refusal refusal, const std::string& text);

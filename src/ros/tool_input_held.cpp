@@ -47,7 +47,7 @@ void ToolInput::release(std::int64_t until) {
 std::optional<ToolInput::Sample> ToolInput::take_until(const ros::Time& until) {
   release(nanoseconds(until));
   held_now_ = until.toSec();
-  return take_released();
+  return take_released(until);
 }
 
 std::optional<ToolInput::Sample> ToolInput::take_next() {
@@ -61,7 +61,7 @@ std::optional<ToolInput::Sample> ToolInput::take_next() {
       sample->second();
     }
   }
-  return take_released();
+  return take_released(ros::Time());
 }
 
 bool ToolInput::has_next() {

@@ -23,6 +23,9 @@ class MlsSubsteps {
   void forget() { limit_ = 0; }
 
  private:
+  template <class Archive>
+  friend void fields(Archive& archive, MlsSubsteps& substeps);
+
   /// Largest growth of a node's modulus since the limit was measured.
   double growth(const MlsState& state, const std::vector<float>& stiffening) const;
 

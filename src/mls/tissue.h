@@ -28,6 +28,8 @@ class MlsTissue final : public Tissue {
   Span<const Fragment> fragments() override;
   std::uint64_t checksum() override;
   Momentum momentum() override;
+  std::vector<std::uint8_t> save() override;
+  void restore(Span<const std::uint8_t> saved) override;
   const std::vector<std::string>& notes() const override { return notes_; }
   std::string device_name() const override;
 
@@ -51,6 +53,9 @@ class MlsTissue final : public Tissue {
   CutReport cut_now(const BladePath& path);
 
  private:
+  template <class Archive>
+  void each_field(Archive& archive);
+
   /// The frame that is worked on.
   struct Frame {
     FrameInput input;

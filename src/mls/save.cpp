@@ -1,0 +1,45 @@
+// The state of tissue as bytes. What follows from the scene alone (nodes, pairs and their whole
+// weights) is not in it, nor what each substep writes before it reads it.
+#include <stdexcept>
+
+#include "compute/archive.h"
+#include "frame/state_fields.h"
+#include "mls/tissue.h"
+
+namespace tissue_sim {
+
+template <class Archive>
+void fields(Archive& archive, MlsGroupContact& c) {
+  archive(c.near, c.touching, c.loads);
+}
+
+template <class Archive>
+void fields(Archive& archive, MlsState& s) {
+  archive(s.pairs.crossed, s.pairs.weight, s.u, s.v, s.inverse_moment, s.kappa, s.outer, s.thread,
+          s.any_thread, s.spring, s.contact, s.until_list, s.dt, s.time);
+}
+
+template <class Archive>
+void fields(Archive& archive, MlsSubsteps& s) {
+  archive(s.measured_, s.now_, s.limit_, s.measured_at_, s.growth_, s.trend_, s.count_,
+          s.shortened_);
+}
+
+template <class Archive>
+void MlsTissue::each_field(Archive& archive) {
+  archive(*state_, pieces_, substeps_, stiffening_, pieces_measured_);
+}
+
+std::vector<std::uint8_t> MlsTissue::save() {
+  ArchiveWriter out;
+  each_field(out);
+  return out.take();
+}
+
+void MlsTissue::restore(Span<const std::uint8_t> saved) {
+  ArchiveReader in(saved);
+  each_field(in);
+  if (in.left() > 0) throw std::runtime_error("the state has more to it than this version knows");
+}
+
+}  // namespace tissue_sim

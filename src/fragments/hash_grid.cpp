@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cstring>
 
+#include "compute/simd.h"
+
 namespace tissue_sim {
 namespace {
 
@@ -24,16 +26,77 @@ std::uint64_t take_bits(std::uint8_t* bytes) {
   return bits;
 }
 
-/// Runs of cells that hold points, of which none goes on from one word to the next.
-std::int32_t count_runs(const std::uint64_t* begin, const std::uint64_t* end) {
-  std::int32_t runs = 0;
-  for (const std::uint64_t* w = begin; w != end; ++w) {
-    if (*w != 0) runs += __builtin_popcountll(*w & ~(*w << 1));
+/// Where a run of cells that hold points begins, of which none goes on from word to word.
+TISSUE_SIM_INLINE std::uint64_t starts(std::uint64_t word) { return word & ~(word << 1); }
+
+/// What a row's words tell of its runs.
+struct RowOfRuns {
+  const std::uint64_t* words;
+  const std::int32_t* first;  ///< number of each word's first run
+
+  /// Number of the run that a cell is in.
+  TISSUE_SIM_INLINE std::int32_t at(std::size_t word, int bit) const {
+    const std::uint64_t up_to = ~std::uint64_t{0} >> (63 - bit);
+    return first[word] + __builtin_popcountll(starts(words[word]) & up_to) - 1;
   }
-  return runs;
+};
+
+/// Numbers the runs of some words from `run` on. Returns the number after the last.
+TISSUE_SIM_INLINE std::int32_t number(const std::uint64_t* words, std::size_t count,
+                                      std::int32_t run, std::int32_t* first) {
+  for (std::size_t w = 0; w < count; ++w) {
+    first[w] = run;
+    if (words[w] != 0) run += __builtin_popcountll(starts(words[w]));
+  }
+  return run;
 }
 
-constexpr auto same = [](std::int32_t run) { return run; };
+/// Joins the runs of two words that lie side by side.
+TISSUE_SIM_INLINE void join_words(const RowOfRuns& before, std::size_t w, const RowOfRuns& own,
+                                  std::size_t v, UnionFind& runs) {
+  for (std::uint64_t left = starts(before.words[w] & own.words[v]); left != 0; left &= left - 1) {
+    const int bit = __builtin_ctzll(left);
+    runs.join(before.at(w, bit), own.at(v, bit));
+  }
+}
+
+TISSUE_SIM_INLINE void join_rows(const RowOfRuns& before, const RowOfRuns& own, std::size_t words,
+                                 UnionFind& runs) {
+  for (std::size_t w = 0; w < words; ++w) join_words(before, w, own, w, runs);
+}
+
+// Both with the processor's own count of bits, where it has one.
+struct Passes {
+  std::int32_t (*number)(const std::uint64_t*, std::size_t, std::int32_t, std::int32_t*);
+  void (*join_rows)(const RowOfRuns&, const RowOfRuns&, std::size_t, UnionFind&);
+};
+std::int32_t number_sse2(const std::uint64_t* words, std::size_t count, std::int32_t run,
+                         std::int32_t* first) {
+  return number(words, count, run, first);
+}
+void join_rows_sse2(const RowOfRuns& before, const RowOfRuns& own, std::size_t words,
+                    UnionFind& runs) {
+  join_rows(before, own, words, runs);
+}
+#if defined(__x86_64__)
+TISSUE_SIM_TARGET_AVX2 std::int32_t number_avx2(const std::uint64_t* words, std::size_t count,
+                                                std::int32_t run, std::int32_t* first) {
+  return number(words, count, run, first);
+}
+TISSUE_SIM_TARGET_AVX2 void join_rows_avx2(const RowOfRuns& before, const RowOfRuns& own,
+                                           std::size_t words, UnionFind& runs) {
+  join_rows(before, own, words, runs);
+}
+#endif
+const Passes& passes() {
+#if defined(__x86_64__)
+  static const bool avx2 = instruction_set() >= InstructionSet::kAvx2;
+  static constexpr Passes kAvx2 = {number_avx2, join_rows_avx2};
+  if (avx2) return kAvx2;
+#endif
+  static constexpr Passes kSse2 = {number_sse2, join_rows_sse2};
+  return kSse2;
+}
 
 std::int64_t words_in_row(const CellBox& box) { return (box.n[0] + kBits - 1) / kBits; }
 
@@ -44,34 +107,6 @@ bool is_dense(const PointPlaces& places, const CellBox& box) {
 }
 
 }  // namespace
-
-void HashGrid::join_along(std::size_t before, std::size_t word) {
-  if ((words_[before] >> 63 & words_[word] & 1) == 0) return;
-  runs_.join(label_[kBits * before + kBits - 1], label_[kBits * word]);
-}
-
-void HashGrid::join_across(std::size_t before, std::size_t word) {
-  const std::uint64_t both = words_[before] & words_[word];
-  for (std::uint64_t left = both & ~(both << 1); left != 0; left &= left - 1) {
-    const int bit = __builtin_ctzll(left);
-    runs_.join(label_[kBits * before + bit], label_[kBits * word + bit]);
-  }
-}
-
-template <class LabelOf>
-void HashGrid::label_runs(const WordShare& share, const LabelOf& label_of) {
-  std::int32_t* label = label_.data() + kBits * share.begin;
-  std::int32_t run = share.first_run;
-  for (std::size_t w = share.begin; w < share.end; ++w, label += kBits) {
-    for (std::uint64_t held = words_[w]; held != 0; ++run) {
-      const int from = __builtin_ctzll(held);
-      const std::uint64_t gap = ~(held >> from);  // its lowest bit: where the run ends
-      const int length = gap == 0 ? kBits : __builtin_ctzll(gap);
-      std::fill_n(label + from, length, label_of(run));
-      held = from + length >= kBits ? 0 : held & ~std::uint64_t{0} << (from + length);
-    }
-  }
-}
 
 void HashGrid::mark_all(const PointPlaces& places, const CellBox& box, Cpu& cpu) {
   const auto row = static_cast<std::int32_t>(kBits * words_in_row(box));
@@ -98,29 +133,40 @@ void HashGrid::join_all(Cpu& cpu) {
   const int rows = box.n[1] * box.n[2], to_plane = box.n[1];
   const int shares = std::min(rows, cpu.threads()), rows_in_share = (rows + shares - 1) / shares;
   shares_.resize(shares);
+  first_.resize(words_.size());
+  const Passes& pass = passes();
   cpu.for_each(shares, [&](int i) {
-    shares_[i].begin = std::min(i * rows_in_share, rows) * in_row;
-    shares_[i].end = std::min((i + 1) * rows_in_share, rows) * in_row;
-    shares_[i].runs = count_runs(&words_[0] + shares_[i].begin, &words_[0] + shares_[i].end);
+    WordShare& share = shares_[i];
+    share.begin = std::min(i * rows_in_share, rows) * in_row;
+    share.end = std::min((i + 1) * rows_in_share, rows) * in_row;
+    share.runs = pass.number(words_.data() + share.begin, share.end - share.begin, 0,
+                             first_.data() + share.begin);
   });
-  number_runs();
+  std::int32_t runs = 0;
+  for (WordShare& share : shares_) {
+    share.first_run = runs;
+    runs += share.runs;
+  }
+  runs_ = UnionFind(runs);
   // Rows of one share are joined with one another, then those that another share is before.
   const auto join_rows = [&](int other, int row) {
-    for (std::size_t i = 0; i < in_row; ++i) join_across(other * in_row + i, row * in_row + i);
+    pass.join_rows({words_.data() + other * in_row, first_.data() + other * in_row},
+                   {words_.data() + row * in_row, first_.data() + row * in_row}, in_row, runs_);
   };
-  cpu.for_each(shares, [&](int share) {
-    label_runs(shares_[share], same);
-    const int begin = static_cast<int>(shares_[share].begin / in_row),
-              end = static_cast<int>(shares_[share].end / in_row);
+  cpu.for_each(shares, [&](int i) {
+    const WordShare& share = shares_[i];
+    for (std::size_t w = share.begin; i > 0 && w < share.end; ++w) first_[w] += share.first_run;
+    const int begin = static_cast<int>(share.begin / in_row),
+              end = static_cast<int>(share.end / in_row);
     for (int row = begin; row < end; ++row) {
-      for (std::size_t i = 1; i < in_row; ++i) join_along(row * in_row + i - 1, row * in_row + i);
+      for (std::size_t w = row * in_row + 1; w < (row + 1) * in_row; ++w) join_along(w - 1, w);
       if (row % to_plane != 0 && row - 1 >= begin) join_rows(row - 1, row);
       if (row - to_plane >= begin) join_rows(row - to_plane, row);
     }
   });
-  for (int share = 1; share < shares; ++share) {
-    const int begin = static_cast<int>(shares_[share].begin / in_row),
-              end = static_cast<int>(shares_[share].end / in_row);
+  for (int i = 1; i < shares; ++i) {
+    const int begin = static_cast<int>(shares_[i].begin / in_row),
+              end = static_cast<int>(shares_[i].end / in_row);
     if (begin < end && begin % to_plane != 0) join_rows(begin - 1, begin);
     for (int row = std::max(begin, to_plane); row < std::min(end, begin + to_plane); ++row) {
       join_rows(row - to_plane, row);
@@ -128,13 +174,11 @@ void HashGrid::join_all(Cpu& cpu) {
   }
 }
 
-void HashGrid::number_runs() {
-  std::int32_t first = 0;
-  for (WordShare& share : shares_) {
-    share.first_run = first;
-    first += share.runs;
-  }
-  runs_ = UnionFind(first);
+/// Of a word and the one before it along x.
+void HashGrid::join_along(std::size_t before, std::size_t word) {
+  if ((words_[before] >> 63 & words_[word] & 1) == 0) return;
+  const RowOfRuns runs{words_.data(), first_.data()};
+  runs_.join(runs.at(before, kBits - 1), first_[word]);
 }
 
 void HashGrid::mark_scattered(const PointPlaces& places, const CellBox& box) {
@@ -192,9 +236,11 @@ std::size_t HashGrid::place_of(std::int64_t key) const {
 }
 
 void HashGrid::join_scattered() {
-  shares_ = {{0, words_.size(), 0, count_runs(words_.data(), words_.data() + words_.size())}};
-  number_runs();
-  label_runs(shares_[0], same);
+  first_.resize(words_.size());
+  const std::int32_t runs = passes().number(words_.data(), words_.size(), 0, first_.data());
+  shares_ = {{0, words_.size(), 0, runs}};
+  runs_ = UnionFind(runs);
+  const RowOfRuns all{words_.data(), first_.data()};
   const std::int64_t row = words_in_row(box_), plane = row * box_.n[1];
   for (std::size_t w = 0; w < words_.size(); ++w) {
     const std::int64_t key = key_of_word_[w];
@@ -204,18 +250,31 @@ void HashGrid::join_scattered() {
     };
     if (const int other = key % row != 0 ? before(1) : -1; other >= 0) join_along(other, w);
     if (const int other = key / row % box_.n[1] != 0 ? before(row) : -1; other >= 0) {
-      join_across(other, w);
+      join_words(all, other, all, w, runs_);
     }
-    if (const int other = key >= plane ? before(plane) : -1; other >= 0) join_across(other, w);
+    if (const int other = key >= plane ? before(plane) : -1; other >= 0)
+      join_words(all, other, all, w, runs_);
   }
 }
 
 void HashGrid::label_roots(Cpu& cpu) {
-  std::vector<std::int32_t> root(runs_.size());
-  for (std::size_t i = 0; i < root.size(); ++i) root[i] = runs_.root(static_cast<std::int32_t>(i));
+  root_.resize(runs_.size());
+  for (std::size_t i = 0; i < root_.size(); ++i) {
+    root_[i] = runs_.root(static_cast<std::int32_t>(i));
+  }
   cpu.for_each(static_cast<int>(shares_.size()), [&](int i) {
     const WordShare& share = shares_[i];
-    label_runs(share, [&](std::int32_t run) { return root[run]; });
+    const std::int32_t* root = root_.data() + share.first_run;
+    std::int32_t* label = label_.data() + kBits * share.begin;
+    for (std::size_t w = share.begin; w < share.end; ++w, label += kBits) {
+      for (std::uint64_t held = words_[w]; held != 0; ++root) {
+        const int from = __builtin_ctzll(held);
+        const std::uint64_t gap = ~(held >> from);  // its lowest bit: where the run ends
+        const int length = gap == 0 ? kBits : __builtin_ctzll(gap);
+        std::fill_n(label + from, length, *root);
+        held = from + length >= kBits ? 0 : held & ~std::uint64_t{0} << (from + length);
+      }
+    }
   });
 }
 

@@ -42,12 +42,8 @@ class HashGrid {
   void join_scattered();
   /// Of a key in the table, or where it would be.
   std::size_t place_of(std::int64_t key) const;
-  void number_runs();
-  template <class LabelOf>
-  void label_runs(const WordShare& share, const LabelOf& label_of);
   void label_roots(Cpu& cpu);
   void join_along(std::size_t before, std::size_t word);
-  void join_across(std::size_t before, std::size_t word);
 
   CellBox box_;
   bool dense_ = true;               ///< whether each cell of the box has memory of its own
@@ -55,8 +51,10 @@ class HashGrid {
   std::vector<std::uint8_t> held_;  ///< of each cell: 1 where it holds points
   bool held_is_clear_ = true;
   std::vector<std::uint64_t> words_;  ///< 64 cells of a row each: bits of those that hold points
-  std::vector<std::int32_t> label_;   ///< of each cell that holds points: its run
+  std::vector<std::int32_t> label_;   ///< of each cell that holds points: its run's root
+  std::vector<std::int32_t> first_;   ///< of each word: number of its first run of such cells
   UnionFind runs_{0};
+  std::vector<std::int32_t> root_;  ///< of each run
   std::vector<WordShare> shares_;
   GroupReader reader_;
   PointGroups groups_;

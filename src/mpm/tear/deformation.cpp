@@ -7,8 +7,8 @@
 
 namespace tissue_sim {
 
-Deformation::Deformation(const LatticeBody& body, const Points::Site& point,
-                         const NodeFields& fields, const Nodes& nodes) {
+Eigen::Matrix3d deformation_gradient(const LatticeBody& body, const Points::Site& point,
+                                     const NodeFields& fields, const Nodes& nodes) {
   const int at[3] = {point.x % 2, point.y % 2, point.z % 2};
   Eigen::Matrix3d F = Eigen::Matrix3d::Identity();
   for (int k = 0; k < 27; ++k) {
@@ -20,6 +20,12 @@ Deformation::Deformation(const LatticeBody& body, const Points::Site& point,
                   lattice_weight(at[c], d[c]) / body.cell_size * u;
     }
   }
+  return F;
+}
+
+Deformation::Deformation(const LatticeBody& body, const Points::Site& point,
+                         const NodeFields& fields, const Nodes& nodes) {
+  const Eigen::Matrix3d F = deformation_gradient(body, point, fields, nodes);
   if (!F.allFinite()) return;
   const Eigen::Vector3d s = F.jacobiSvd().singularValues();
   stretch = s[0];

@@ -10,6 +10,10 @@ namespace tissue_sim {
 /// A crumb that is deformed so that it has stiffened so much is wild.
 inline constexpr double kWildStiffening = 5;
 
+/// Deformation gradient at a point.
+Eigen::Matrix3d deformation_gradient(const LatticeBody& body, const Points::Site& point,
+                                     const NodeFields& fields, const Nodes& nodes);
+
 struct Deformation {
   double stretch = 1;     ///< the largest
   double stiffening = 1;  ///< at least that of BlockState; both 1 where they are not finite

@@ -1,0 +1,193 @@
+#include "dataset/dataset_run.h"
+
+#include <algorithm>
+#include <cmath>
+#include <random>
+
+#include "mpm/fragment_features.h"
+#include "mpm/tear/deformation.h"
+
+namespace tissue_sim {
+namespace {
+
+/// One frame on; false where it blew up.
+bool advance(MpmTissue& tissue, const DatasetScene& scene, int frame) {
+  FrameInput input;
+  if (frame == 0) input.cuts = {scene.cuts.data(), scene.cuts.size()};
+  tissue.advance(1 / scene.scene.frame_rate, input);
+  return !tissue.finish().blew_up;
+}
+
+double loose_share(const MpmTissue& tissue, double coarse_cell) {
+  const std::vector<std::uint8_t> fragment = fragments_of(tissue, coarse_cell);
+  double all = 0, loose = 0;
+  for (const Fragment& f : tissue.pieces().all) {
+    all += f.volume;
+    if (fragment[f.id] != 0) loose += f.volume;
+  }
+  return loose / all;
+}
+
+/// The fine points within each coarse one, by reference place.
+std::vector<std::vector<std::int32_t>> children(const MpmState& coarse, const MpmState& fine) {
+  std::vector<std::vector<std::int32_t>> of(coarse.points.size());
+  for (std::int32_t p = 0; p < fine.points.size(); ++p) {
+    const Points::Site& s = fine.points.site[p];
+    const LatticeBody& body = coarse.bodies[s.body];
+    const Vec3 at =
+        (fine.bodies[s.body].site_position(s.x, s.y, s.z) - body.origin) * 2 / body.cell_size;
+    const auto in = [&](int a) { return static_cast<int>(std::floor(at[a])); };
+    const std::int32_t parent = body.point(in(0), in(1), in(2));
+    if (parent >= 0) of[parent].push_back(p);
+  }
+  return of;
+}
+
+/// A sample that waits for its label.
+struct Waiting {
+  std::int32_t point;
+  int row;  ///< in the samples
+};
+
+}  // namespace
+
+std::unique_ptr<MpmTissue> begin_run(const DatasetScene& scene, int level) {
+  auto tissue = std::make_unique<MpmTissue>(finer(scene, level));
+  MpmState& s = tissue->state();
+  for (const LatticeBody& b : s.bodies) {
+    b.for_each_node([&](int node, int i, int j, int k) {
+      if (s.nodes.inv_mass[node] == 0) return;
+      const Vec3 v = scene.velocity(b.node_position(i, j, k));
+      for (int a = 0; a < 3; ++a) s.nodes.v[a][node] = static_cast<float>(v[a]);
+    });
+  }
+  measure_motion(s);
+  return tissue;
+}
+
+std::vector<std::uint8_t> fragments_of(const MpmTissue& tissue, double coarse_cell) {
+  const Pieces& pieces = tissue.pieces();
+  std::vector<std::uint8_t> fragment(pieces.next_id, 0);
+  double all = 0;
+  for (const Fragment& f : pieces.all) all += f.volume;
+  const double least = 0.5 * coarse_cell * coarse_cell * coarse_cell;
+  for (const Fragment& f : pieces.all) {
+    fragment[f.id] = f.loose && f.volume >= least && f.volume <= 0.5 * all;
+  }
+  return fragment;
+}
+
+DatasetSamples run_dataset_scene(const DatasetScene& scene, const DatasetOptions& options) {
+  DatasetSamples samples;
+  const double h = scene.scene.cell_size;
+  std::mt19937_64 random(scene.seed);
+  const auto coarse = begin_run(scene, 1);
+  std::vector<std::vector<Waiting>> of_frame(options.frames + 1);  // by when their label is known
+  int frames = 0;
+  for (int frame = 0; frame < options.frames; ++frame, ++frames) {
+    MpmState& s = coarse->state();
+    if (frame > 0 && frame + options.horizon <= options.frames) {
+      std::vector<std::int32_t> points = fragment_candidates(s, coarse->pieces(), options.share);
+      for (std::size_t i = 0; i < points.size(); ++i) {  // the first are drawn evenly from all
+        if (static_cast<int>(i) == options.per_frame) break;
+        std::swap(points[i], points[i + random() % (points.size() - i)]);
+      }
+      points.resize(std::min<std::size_t>(points.size(), options.per_frame));
+      std::sort(points.begin(), points.end());
+      for (const std::int32_t p : points) {
+        const int row = static_cast<int>(samples.x.size()) / kFeatureCount;
+        samples.x.resize(samples.x.size() + kFeatureCount);
+        fragment_features(s, p, &samples.x[static_cast<std::size_t>(row) * kFeatureCount]);
+        const auto limit = static_cast<float>(scene.scene.materials[0].tear_stretch);
+        samples.about.insert(samples.about.end(),
+                             {static_cast<float>(frame), limit, static_cast<float>(h)});
+        of_frame[frame + options.horizon].push_back({p, row});
+      }
+      samples.plain.resize(samples.x.size() / kFeatureCount, 0);
+    }
+    if (!advance(*coarse, scene, frame)) {
+      samples.blew_up = true;
+      break;
+    }
+    const std::vector<std::uint8_t> fragment = fragments_of(*coarse, h);
+    for (const Waiting& w : of_frame[frame + 1]) {
+      samples.plain[w.row] = fragment[coarse->fragment_of(w.point)];
+    }
+  }
+  samples.coarse_loose = loose_share(*coarse, h);
+  samples.coarse_points = coarse->point_count();
+
+  const auto fine = begin_run(scene, options.level);
+  samples.true_points = fine->point_count();
+  const auto within = children(coarse->state(), fine->state());
+  const std::size_t rows = samples.x.size() / kFeatureCount;
+  samples.q.resize(rows, 0);
+  samples.df.resize(9 * rows, 0);
+  std::size_t known = 0;  // rows come in order of time
+  for (int frame = 0; frame < frames; ++frame) {
+    if (!advance(*fine, scene, frame)) {
+      samples.blew_up = true;
+      break;
+    }
+    const MpmState& s = fine->state();
+    const std::vector<std::uint8_t> fragment = fragments_of(*fine, h);
+    for (const Waiting& w : of_frame[frame + 1]) {
+      double volume = 0, loose = 0;
+      Eigen::Matrix3d F = Eigen::Matrix3d::Zero();
+      for (const std::int32_t p : within[w.point]) {
+        const Points::Site& site = s.points.site[p];
+        const double own = s.points.volume[p];
+        volume += own;
+        if (fragment[fine->fragment_of(p)] != 0) loose += own;
+        F += own * deformation_gradient(s.bodies[site.body], site, *s.fields, s.nodes);
+      }
+      if (volume == 0) continue;
+      samples.q[w.row] = loose >= 0.5 * volume;
+      for (int i = 0; i < 9; ++i) {
+        samples.df[9 * w.row + i] = static_cast<float>(F(i / 3, i % 3) / volume) -
+                                    samples.x[static_cast<std::size_t>(w.row) * kFeatureCount + i];
+      }
+      known = std::max(known, static_cast<std::size_t>(w.row) + 1);
+    }
+  }
+  samples.true_loose = loose_share(*fine, h);
+  samples.x.resize(known * kFeatureCount);
+  samples.q.resize(known);
+  samples.plain.resize(known);
+  samples.df.resize(9 * known);
+  samples.about.resize(3 * known);
+  return samples;
+}
+
+Outcome run_outcome(const DatasetScene& scene, int level, int frames) {
+  Outcome outcome;
+  const auto tissue = begin_run(scene, level);
+  outcome.points = tissue->point_count();
+  for (int frame = 0; frame < frames; ++frame) {
+    if (!advance(*tissue, scene, frame)) {
+      outcome.blew_up = true;
+      break;
+    }
+    const Span<const Fragment> pieces = tissue->fragments();
+    const std::vector<std::uint8_t> fragment = fragments_of(*tissue, scene.scene.cell_size);
+    double all = 0, loose = 0;
+    outcome.fragments = 0;
+    outcome.largest_share = 0;
+    for (const Fragment& f : pieces) {
+      all += f.volume;
+      if (fragment[f.id] == 0) continue;
+      ++outcome.fragments;
+      loose += f.volume;
+      outcome.largest_share = std::max(outcome.largest_share, f.volume);
+      outcome.peak_speed = std::max(outcome.peak_speed, f.velocity.norm());
+    }
+    outcome.loose_share = loose / all;
+    outcome.largest_share /= all;
+    if (outcome.fragments > 0 && outcome.first_time < 0) {
+      outcome.first_time = (frame + 1) / scene.scene.frame_rate;
+    }
+  }
+  return outcome;
+}
+
+}  // namespace tissue_sim

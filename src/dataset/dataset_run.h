@@ -1,0 +1,55 @@
+// Runs of a scene that tears, and what is learnt from them.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+#include "dataset/dataset_scene.h"
+#include "mpm/mpm_tissue.h"
+
+namespace tissue_sim {
+
+/// What is asked for.
+struct DatasetOptions {
+  int frames = 24;      ///< of each run
+  int horizon = 4;      ///< frames ahead that labels are for
+  int per_frame = 200;  ///< samples of a frame at most
+  int level = 3;        ///< how many times finer the truth is
+  double share = 0.7;   ///< of the limit's strain from which on a point is a candidate
+};
+
+/// Samples of one scene, in order of time.
+struct DatasetSamples {
+  std::vector<float> x;             ///< [n, 70]: fragments/features.h
+  std::vector<std::uint8_t> q;      ///< [n]: part of a fragment `horizon` later, in the truth
+  std::vector<float> df;            ///< [n, 9]: F then, in the truth, less that of the cell now
+  std::vector<std::uint8_t> plain;  ///< [n]: part of a fragment then, in the coarse run itself
+  std::vector<float> about;         ///< [n, 3]: frame, tear_stretch, cell size [m]
+  double coarse_loose = 0, true_loose = 0;  ///< share of the volume that came loose
+  int coarse_points = 0, true_points = 0;
+  bool blew_up = false;  ///< one of the runs, which ended there
+};
+
+/// A tissue of the scene, `level` times finer, that was set going.
+std::unique_ptr<MpmTissue> begin_run(const DatasetScene& scene, int level);
+
+/// A fragment is a loose piece of at least half a coarse cell and at most half of all bodies.
+/// Returns which pieces are, by id.
+std::vector<std::uint8_t> fragments_of(const MpmTissue& tissue, double coarse_cell);
+
+/// Runs the scene twice. What the coarse run shows is labelled by what the truth comes to.
+DatasetSamples run_dataset_scene(const DatasetScene& scene, const DatasetOptions& options);
+
+/// How a run came out: for the convergence of the truth.
+struct Outcome {
+  int points = 0, fragments = 0;
+  double loose_share = 0;    ///< of the volume, in fragments
+  double largest_share = 0;  ///< of the volume, in the largest
+  double first_time = -1;    ///< when the first came off [s]
+  double peak_speed = 0;     ///< of a fragment's centre [m/s]
+  bool blew_up = false;
+};
+Outcome run_outcome(const DatasetScene& scene, int level, int frames);
+
+}  // namespace tissue_sim

@@ -1,0 +1,231 @@
+// tissue_sim_dataset: runs scenes that tear and writes what the fragment network learns from.
+#include <sys/mman.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <atomic>
+#include <chrono>
+#include <cstdio>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <functional>
+#include <new>
+#include <sstream>
+#include <stdexcept>
+#include <string>
+#include <thread>
+
+#include "dataset/dataset_run.h"
+#include "dataset/npy.h"
+#include "fragments/features.h"
+
+namespace tissue_sim {
+namespace {
+
+constexpr char kUsage[] =
+    R"(usage: tissue_sim_dataset --out FOLDER [options]
+  --scenes N       how many (60)
+  --first N        number of the first (0)
+  --seed N         of all that is drawn (1)
+  --kinds A,B      of tension, fall, compression, cut, blow, in turn (all)
+  --level N        how many times finer the truth is (3)
+  --frames N       of each run, 1/240 s each (24)
+  --horizon N      frames ahead that labels are for (4)
+  --per-frame N    samples of a frame at most (200)
+  --processes N    that work side by side (all processors)
+  --converge N     no data: runs each scene with cells 1, 2 .. N times finer, and writes how each
+                   comes out into FOLDER/convergence.csv
+Scenes that are in FOLDER are left alone: the same command goes on with what is missing.
+)";
+
+struct Arguments {
+  std::string out;
+  std::vector<std::string> kinds = dataset_kinds();
+  int scenes = 60, first = 0, processes = 0, converge = 0;
+  std::uint64_t seed = 1;
+  DatasetOptions options;
+};
+
+Arguments read_arguments(int argc, char** argv) {
+  Arguments a;
+  for (int i = 1; i < argc; ++i) {
+    const std::string name = argv[i];
+    if (name == "--help") {
+      std::fputs(kUsage, stdout);
+      std::exit(0);
+    }
+    if (i + 1 == argc) throw std::invalid_argument(name + " needs a value");
+    const std::string value = argv[++i];
+    const auto number = [&](int least) {
+      std::size_t used = 0;
+      int n = 0;
+      try {
+        n = std::stoi(value, &used);
+      } catch (const std::exception&) {
+        used = 0;
+      }
+      if (used != value.size() || n < least) {
+        throw std::invalid_argument(name + " is " + value + ": it must be a whole number from " +
+                                    std::to_string(least) + " on");
+      }
+      return n;
+    };
+    if (name == "--out") {
+      a.out = value;
+    } else if (name == "--scenes") {
+      a.scenes = number(1);
+    } else if (name == "--first") {
+      a.first = number(0);
+    } else if (name == "--seed") {
+      a.seed = number(0);
+    } else if (name == "--level") {
+      a.options.level = number(1);
+    } else if (name == "--frames") {
+      a.options.frames = number(2);
+    } else if (name == "--horizon") {
+      a.options.horizon = number(1);
+    } else if (name == "--per-frame") {
+      a.options.per_frame = number(1);
+    } else if (name == "--processes") {
+      a.processes = number(1);
+    } else if (name == "--converge") {
+      a.converge = number(2);
+    } else if (name == "--kinds") {
+      a.kinds.clear();
+      std::istringstream list(value);
+      for (std::string kind; std::getline(list, kind, ',');) {
+        a.kinds.push_back(kind);
+        make_dataset_scene(0, 0, {kind});  // throws for one that there is not
+      }
+      if (a.kinds.empty()) throw std::invalid_argument("--kinds names none");
+    } else {
+      throw std::invalid_argument("there is no option " + name);
+    }
+  }
+  if (a.out.empty()) throw std::invalid_argument("--out is missing: a folder for the data");
+  if (a.processes == 0) a.processes = std::max(1u, std::thread::hardware_concurrency());
+  return a;
+}
+
+std::string path_of(const Arguments& a, int index, const std::string& what) {
+  char number[16];
+  std::snprintf(number, sizeof number, "%06d", index);
+  return a.out + "/" + number + what;
+}
+
+/// What is known of a scene, as JSON: held-out scenes are chosen by it.
+std::string describe(const DatasetScene& d, const DatasetSamples& samples, double seconds) {
+  const Scene& s = d.scene;
+  const Material& m = s.materials[0];
+  const char* shapes[] = {"box", "ball", "ellipsoid", "cylinder", "mesh"};
+  std::ostringstream out;
+  out.precision(9);
+  out << "{\"index\": " << d.index << ", \"kind\": \"" << d.kind << "\", \"shape\": \""
+      << shapes[static_cast<int>(s.bodies[0].shape)] << "\", \"cell_size\": " << s.cell_size
+      << ", \"young_modulus\": " << m.young_modulus << ", \"poisson_ratio\": " << m.poisson_ratio
+      << ", \"viscosity\": " << m.viscosity << ", \"tear_stretch\": " << m.tear_stretch
+      << ", \"tear_length\": " << m.tear_length << ", \"speed\": " << d.speed
+      << ", \"coarse_points\": " << samples.coarse_points
+      << ", \"true_points\": " << samples.true_points << ", \"samples\": " << samples.q.size()
+      << ", \"coarse_loose\": " << samples.coarse_loose
+      << ", \"true_loose\": " << samples.true_loose
+      << ", \"blew_up\": " << (samples.blew_up ? "true" : "false") << ", \"seconds\": " << seconds
+      << "}\n";
+  return out.str();
+}
+
+void write_scene(const Arguments& a, int index) {
+  if (std::filesystem::exists(path_of(a, index, ".json"))) return;
+  const auto begin = std::chrono::steady_clock::now();
+  const DatasetScene scene = make_dataset_scene(a.seed, index, a.kinds);
+  const DatasetSamples samples = run_dataset_scene(scene, a.options);
+  const std::chrono::duration<double> took = std::chrono::steady_clock::now() - begin;
+  write_npy(path_of(a, index, "_x.npy"), samples.x, kFeatureCount);
+  write_npy(path_of(a, index, "_q.npy"), samples.q, 0);
+  write_npy(path_of(a, index, "_df.npy"), samples.df, 9);
+  write_npy(path_of(a, index, "_plain.npy"), samples.plain, 0);
+  write_npy(path_of(a, index, "_about.npy"), samples.about, 3);
+  // Last, and whole at once: where it is, the others are.
+  const std::string text = describe(scene, samples, took.count());
+  const std::string path = path_of(a, index, ".json"), unfinished = path + ".part";
+  std::ofstream(unfinished) << text;
+  std::filesystem::rename(unfinished, path);
+  std::size_t fragments = 0;
+  for (const std::uint8_t q : samples.q) fragments += q;
+  std::printf("scene %d of %d, %s: %zu samples, %zu of fragments, %.1f s%s\n", index - a.first + 1,
+              a.scenes, scene.kind.c_str(), samples.q.size(), fragments, took.count(),
+              samples.blew_up ? " (blew up)" : "");
+  std::fflush(stdout);
+}
+
+void write_outcomes(const Arguments& a, int index) {
+  const DatasetScene scene = make_dataset_scene(a.seed, index, a.kinds);
+  std::ostringstream lines;
+  for (int level = 1; level <= a.converge; ++level) {
+    const Outcome o = run_outcome(scene, level, a.options.frames);
+    lines << index << "," << scene.kind << "," << level << "," << o.points << "," << o.fragments
+          << "," << o.loose_share << "," << o.largest_share << "," << o.first_time << ","
+          << o.peak_speed << "," << o.blew_up << "\n";
+  }
+  std::ofstream(path_of(a, index, ".csv")) << lines.str();
+  std::fputs(lines.str().c_str(), stdout);
+  std::fflush(stdout);
+}
+
+/// Calls work(index) for all scenes, each in one of some processes. Returns how many failed.
+int share_out(const Arguments& a, const std::function<void(int)>& work) {
+  void* shared = mmap(nullptr, sizeof(std::atomic<int>), PROT_READ | PROT_WRITE,
+                      MAP_SHARED | MAP_ANONYMOUS, -1, 0);
+  if (shared == MAP_FAILED) throw std::runtime_error("no memory that processes share");
+  auto* next = new (shared) std::atomic<int>(0);
+  int failed = 0, children = 0;
+  for (int i = 0; i < std::min(a.processes, a.scenes); ++i) {
+    const pid_t child = fork();
+    if (child < 0) break;  // fewer do it as well
+    ++children;
+    if (child > 0) continue;
+    int status = 0;
+    for (int scene; (scene = next->fetch_add(1)) < a.scenes;) {
+      try {
+        work(a.first + scene);
+      } catch (const std::exception& e) {
+        std::fprintf(stderr, "scene %d: %s\n", a.first + scene, e.what());
+        status = 1;
+      }
+    }
+    _exit(status);
+  }
+  if (children == 0) throw std::runtime_error("no process could be started");
+  for (int status; wait(&status) > 0;) failed += status != 0;
+  return failed;
+}
+
+int run(int argc, char** argv) {
+  const Arguments a = read_arguments(argc, argv);
+  std::filesystem::create_directories(a.out);
+  if (a.converge == 0) return share_out(a, [&](int index) { write_scene(a, index); });
+  const int failed = share_out(a, [&](int index) { write_outcomes(a, index); });
+  std::ofstream all(a.out + "/convergence.csv");
+  all << "scene,kind,level,points,fragments,loose_share,largest_share,first_time,peak_speed,"
+         "blew_up\n";
+  for (int i = a.first; i < a.first + a.scenes; ++i) {
+    const std::string path = path_of(a, i, ".csv");
+    std::ifstream part(path);
+    if (part.peek() != EOF) all << part.rdbuf();
+    std::filesystem::remove(path);
+  }
+  return failed;
+}
+
+}  // namespace
+}  // namespace tissue_sim
+
+int main(int argc, char** argv) {
+  try {
+    return tissue_sim::run(argc, argv) == 0 ? 0 : 1;
+  } catch (const std::exception& e) {
+    std::fprintf(stderr, "tissue_sim_dataset: %s (--help tells the options)\n", e.what());
+    return 2;
+  }
+}

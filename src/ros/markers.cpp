@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cstdint>
 #include <cstdio>
+#include <map>
 
 #include "fragments/piece_colour.h"
 #include "ros/conversions.h"
@@ -177,6 +178,32 @@ MarkerArray Markers::make(const MarkerInput& input) {
   }
   fragments_shown_ = shown;
   return array;
+}
+
+Marker to_marker(const SurfaceTriangles& surface, Span<const Fragment> fragments) {
+  Marker m;
+  m.ns = "surface";
+  m.type = Marker::TRIANGLE_LIST;
+  m.pose.orientation.w = 1;
+  m.scale = scale(1, 1, 1);
+  m.color = color(1, 1, 1);
+  m.action = surface.fragment.empty() ? Marker::DELETE : Marker::ADD;
+  std::map<int, std_msgs::ColorRGBA> colours;
+  for (const Fragment& f : fragments) {
+    const std::uint32_t rgb = piece_colour(f);
+    colours[f.id] = color(static_cast<float>(rgb >> 16 & 255) / 255,
+                          static_cast<float>(rgb >> 8 & 255) / 255,
+                          static_cast<float>(rgb & 255) / 255);
+  }
+  m.points.resize(3 * surface.fragment.size());
+  m.colors.resize(m.points.size());
+  for (std::size_t i = 0; i < m.points.size(); ++i) {
+    m.points[i].x = surface.corners[3 * i];
+    m.points[i].y = surface.corners[3 * i + 1];
+    m.points[i].z = surface.corners[3 * i + 2];
+    m.colors[i] = colours[surface.fragment[i / 3]];
+  }
+  return m;
 }
 
 }  // namespace tissue_sim

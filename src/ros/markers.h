@@ -1,6 +1,7 @@
 // What RViz shows besides the clouds: tools, forces, pieces.
 #pragma once
 
+#include <visualization_msgs/Marker.h>
 #include <visualization_msgs/MarkerArray.h>
 
 #include <string>
@@ -20,6 +21,11 @@ struct MarkerInput {
   ros::Time stamp;
   double force_scale;  ///< [m/N]
 };
+
+/// The tissue's surface as a list of triangles, in the colours of its pieces' points. Without
+/// triangles a marker that deletes itself. The header is left to the caller.
+visualization_msgs::Marker to_marker(const SurfaceTriangles& surface,
+                                     Span<const Fragment> fragments);
 
 /// Makes the markers of one frame after another: what is gone is deleted.
 class Markers {

@@ -15,6 +15,7 @@ Publications::Publications(ros::NodeHandle& node, const Scene& scene, const Para
       fragments_(node, "fragments", 10, recorder),
       points_(node, "tissue/points", 2, recorder),
       loose_points_(node, "fragments/points", 2, recorder),
+      surface_(node, "surface", 2, recorder),
       marker_output_(node, "markers", 2, recorder),
       tf_(node, "/tf", 100, recorder),
       state_due_(parameters.state_rate, scene.frame_rate),
@@ -97,6 +98,7 @@ void Publications::publish(Simulation& simulation, const FrameReport& report, co
     loose_points_.publish(cloud(simulation, true, stamp), stamp);
   }
   const bool markers_due = markers_due_.due(now) || all;
+  if (markers_due && surface_.wanted()) surface_.publish(surface_message(simulation, stamp), stamp);
   if (markers_due && marker_output_.wanted()) {
     marker_output_.publish(marker_message(simulation, report, stamp), stamp);
   }
@@ -115,6 +117,7 @@ void Publications::show(Simulation& simulation, const FrameReport& report, const
   if (fragments_.listened()) fragments_.show(fragment_message(simulation, stamp));
   if (points_.listened()) points_.show(cloud(simulation, false, stamp));
   if (loose_points_.listened()) loose_points_.show(cloud(simulation, true, stamp));
+  if (surface_.listened()) surface_.show(surface_message(simulation, stamp));
   if (marker_output_.listened()) marker_output_.show(marker_message(simulation, report, stamp));
 }
 
@@ -159,6 +162,15 @@ boost::shared_ptr<const visualization_msgs::MarkerArray> Publications::marker_me
   return boost::make_shared<visualization_msgs::MarkerArray>(markers_.make(
       {scene_, report.input.tools, report.result.loads, simulation.tissue().fragments(),
        parameters_.world_frame, stamp, parameters_.force_scale}));
+}
+
+boost::shared_ptr<const visualization_msgs::Marker> Publications::surface_message(
+    Simulation& simulation, const ros::Time& stamp) {
+  simulation.tissue().read_surface(surface_triangles_);
+  auto m = boost::make_shared<visualization_msgs::Marker>(
+      to_marker(surface_triangles_, simulation.tissue().fragments()));
+  m->header = header(stamp);
+  return m;
 }
 
 void Publications::publish_loads(const FrameReport& report, const ros::Time& stamp,

@@ -73,6 +73,8 @@ class Publications {
   boost::shared_ptr<const visualization_msgs::MarkerArray> marker_message(Simulation& simulation,
                                                                           const FrameReport& report,
                                                                           const ros::Time& stamp);
+  boost::shared_ptr<const visualization_msgs::Marker> surface_message(Simulation& simulation,
+                                                                      const ros::Time& stamp);
   /// `into_bag`: else to those who listen alone.
   void publish_loads(const FrameReport& report, const ros::Time& stamp, bool into_bag) const;
   void publish_tf(const FrameReport& report, const ros::Time& stamp, bool into_bag);
@@ -88,10 +90,12 @@ class Publications {
   Output<SavedState> saved_state_;
   Output<FragmentArray> fragments_;
   Output<sensor_msgs::PointCloud2> points_, loose_points_;
+  Output<visualization_msgs::Marker> surface_;
   Output<visualization_msgs::MarkerArray> marker_output_;
   Output<tf2_msgs::TFMessage> tf_;
   std::vector<ToolOutputs> tools_;
 
+  SurfaceTriangles surface_triangles_;  ///< kept for their memory
   Throttle state_due_, fragments_due_, clouds_due_, markers_due_;
   /// The last clouds, to be filled again when nobody else holds them: see ros/cloud_memory.h.
   std::array<boost::shared_ptr<sensor_msgs::PointCloud2>, 4> clouds_;

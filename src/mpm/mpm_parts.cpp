@@ -80,6 +80,8 @@ void MpmTissue::save_checkpoint() {
   checkpoint_.contacts = s.contacts;
   checkpoint_.faces = s.faces;
   checkpoint_.result = result_;
+  checkpoint_.impulse = s.anchors.impulse;
+  checkpoint_.anchors = s.anchors.now;
 }
 
 void MpmTissue::restore_checkpoint() {
@@ -93,6 +95,8 @@ void MpmTissue::restore_checkpoint() {
   s.contacts = checkpoint_.contacts;
   s.faces = checkpoint_.faces;
   result_ = checkpoint_.result;
+  s.anchors.impulse = checkpoint_.impulse;
+  s.anchors.now = checkpoint_.anchors;
   measure_stiffness();
 }
 

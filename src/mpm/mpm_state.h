@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "compute/for_each.h"
+#include "mpm/anchors/anchor_faces.h"
 #include "mpm/blocks/block_kernels.h"
 #include "mpm/blocks/blocks.h"
 #include "mpm/contact/face_contact.h"
@@ -65,6 +66,7 @@ struct MpmState {
   Points points;
   Nodes nodes;
   std::unique_ptr<NodeFields> fields;
+  AnchorFaces anchors;
   Blocks blocks;
   Array<float> force;        ///< of all blocks
   Array<float> u_before[3];  ///< displacements when the frame began, where a blade may cut [m]
@@ -98,8 +100,10 @@ BlockField block_field(const MpmState& state, const Block& block);
 void measure_motion(MpmState& state);
 
 /// One substep: forces of all blocks with contact at the colliders' present places, then the nodes.
-/// Adds what acts on the colliders to `loads`. Returns how long it acted: kick_of() [s].
-float substep(MpmState& state, float dt, std::vector<ColliderLoad>& loads);
+/// Adds what acts on the colliders to `loads`. Returns how long it acted: kick_of() [s]. `anchors`
+/// are where they will be at its end, empty if they stay.
+float substep(MpmState& state, float dt, std::vector<ColliderLoad>& loads,
+              const std::vector<RigidMotion>& anchors = {});
 
 /// The part of it that moves all nodes, under the forces that the blocks left in `force`.
 void move_nodes(MpmState& state, const NodeStep& step);

@@ -51,7 +51,7 @@ struct Block {
     int node;          ///< the same in Nodes, -1 where no point sees them
   };
   std::vector<NodeRow> node_rows;         ///< in the order of the block's nodes
-  std::vector<std::vector<Span>> filled;  ///< [nz]: lanes whose cells hold points, in order
+  std::vector<std::vector<Span>> filled;  ///< [nz]: lanes whose cells hold points that move
   std::vector<std::uint8_t>
       filled_columns;  ///< [stride]: whether a lane's cell does in any z-plane
   /// [stride]: lowest node of the lane's cell, y * pitch + x; 0 in padding. The node at dx, dy, dz

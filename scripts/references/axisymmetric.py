@@ -59,15 +59,19 @@ def indent(level, radius, height, punch, contact, depths, young, poisson):
     N = np.array([top.basis[k][0].value for k in range(top.Nbfun)])
     dA = top.dx * 2 * np.pi * X[0]
     smooth = 2e-3 * young  # rounds off the corner of max(0, p), so that Newton's method does not cycle
-    stiff = 30 * (lam + 2 * mu) / contact
+    stiff = 10 * (lam + 2 * mu) / contact
     fixed = np.unique(np.concatenate([basis.get_dofs(lambda x: x[1] < -height + 1e-9).all(),
                                       basis.get_dofs(lambda x: x[0] < 1e-12).all(['u^1'])]))
     free = np.setdiff1d(np.arange(basis.N), fixed)
     u = np.zeros(basis.N)
     result, pressure, tip = [], np.zeros_like(dA), 0.0
-    steps = np.unique(np.concatenate([np.linspace(0, max(depths), 17)[1:], depths]))
+    steps = np.unique(np.concatenate([np.linspace(0, max(depths), 21)[1:], depths]))
+    before, last = np.zeros_like(u), 0.0
     for depth in steps:
         tip = -depth
+        if last > 0:  # goes on as it did
+            u, before = u + (u - before) * (depth - last) / (last - earlier), u
+        earlier, last = last, depth
 
         def contact_terms(u):
             x = X + np.einsum('kieq,ke->ieq', N, u[dofs])
@@ -92,7 +96,7 @@ def indent(level, radius, height, punch, contact, depths, young, poisson):
                                                    (basis.N, basis.N)).tocsc()
 
         scale = young * contact ** 2
-        for _ in range(6 if depth in depths else 1):  # augmented Lagrangian: what the penalty hides goes
+        for _ in range(8 if depth in depths else 1):  # augmented Lagrangian: what the penalty hides goes
             u = newton(forces, stiffness, u, free, scale)
             pressure, n, _, _ = contact_terms(u)
         if depth in depths:

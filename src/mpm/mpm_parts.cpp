@@ -92,7 +92,9 @@ void MpmTissue::restore_checkpoint() {
   }
   s.time = checkpoint_.time;
   s.dt = checkpoint_.dt;
+  for (const InertialNode& n : s.contacts.inertia.nodes) s.inertial_index[n.node] = -1;
   s.contacts = checkpoint_.contacts;
+  index_inertia(s);
   s.faces = checkpoint_.faces;
   result_ = checkpoint_.result;
   s.anchors.impulse = checkpoint_.impulse;

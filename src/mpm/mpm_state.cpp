@@ -5,6 +5,7 @@
 
 #include "mpm/anchors/anchored_share.h"
 #include "mpm/contact/block_contact.h"
+#include "mpm/contact/surface_places.h"
 
 namespace tissue_sim {
 
@@ -14,6 +15,7 @@ std::unique_ptr<MpmState> make_mpm_state(const Scene& scene, std::vector<std::st
   state->cpu = std::make_unique<Cpu>(scene.threads);
   state->bodies = make_lattice_bodies(scene, state->points, notes);
   find_free_volumes(state->bodies, state->points);
+  state->points.outer = find_outer_places(state->bodies, state->points);
   state->fields = std::make_unique<NodeFields>(state->bodies, state->points, state->nodes);
   find_anchor_faces(scene, state->bodies, state->points, *state->fields, state->nodes,
                     state->anchors);
@@ -25,7 +27,9 @@ std::unique_ptr<MpmState> make_mpm_state(const Scene& scene, std::vector<std::st
   state->contacts.near.resize(state->blocks.all.size());
   state->contacts.cells.resize(state->blocks.all.size());
   state->contacts.touching.resize(state->blocks.all.size());
+  state->contacts.changes.resize(state->blocks.all.size());
   list_facets(*state);
+  index_inertia(*state);
   state->instructions = instruction_set();
   state->kernels = &block_kernels(state->instructions);
   return state;
@@ -115,6 +119,8 @@ float substep(MpmState& state, float dt, std::vector<ColliderLoad>& loads,
   state.block_loads.resize(block_count);
   FaceContacts& faces = state.faces;
   const bool list = is_list_due(state.contacts);
+  if (list) tidy_inertia(state, false);
+  fit_inertia(state, dt);
   NodeStep step;
   step.dt = dt;
   step.kick = kick_of(state.dt, dt);
@@ -123,7 +129,17 @@ float substep(MpmState& state, float dt, std::vector<ColliderLoad>& loads,
   const MoveRow move_row(state, step);
   SharedWork pushes(static_cast<int>(faces.between.size()), 32), work(block_count, 1),
       moves(static_cast<int>(blocks.rows.size()), kRows),
-      holds(static_cast<int>(state.anchors.groups.size()), 64);
+      holds(static_cast<int>(state.anchors.groups.size()), 64), changes(1, 1);
+  std::vector<InertialNode>& inertial = state.contacts.inertia.nodes;
+  // How many there are shows as late as after the changes.
+  const auto part = [&](int i) {
+    constexpr int kParts = 16;
+    const std::size_t count = inertial.size();
+    for (std::size_t n = count * i / kParts; n < count * (i + 1) / kParts; ++n) {
+      resist_acceleration(inertial[n], step.keep, dt, state.nodes);
+    }
+  };
+  SharedWork resists(16, 1);
   const RigidMotion* const before = anchors.empty() ? nullptr : state.anchors.now.data();
   const RigidMotion* const after = anchors.empty() ? nullptr : anchors.data();
   const auto work_on_block = [&](int i) {
@@ -147,15 +163,21 @@ float substep(MpmState& state, float dt, std::vector<ColliderLoad>& loads,
     pushes.help([&](int i) { push_faces(state, faces.all[faces.between[i]], dt); });
     work.help([&](int i) { work_on_block(blocks.by_cost[i]); });
     work.wait();
+    changes.help([&](int) { change_inertia(state); });
+    changes.wait();
     moves.help(move_row);
-    if (state.anchors.groups.empty()) return;
+    if (state.anchors.groups.empty() && inertial.empty()) return;
     moves.wait();
+    resists.help(part);
+    if (state.anchors.groups.empty()) return;
+    resists.wait();
     holds.help([&](int i) { hold_group(state.anchors, i, dt, before, after, state.nodes); });
   });
   if (after != nullptr) {
     move_held(state.anchors, dt, before, after, state.nodes);
     state.anchors.now = anchors;
   }
+  add_inertial_loads(state, step.kick, loads);
   for (const auto& of_block : state.block_loads) {
     for (std::size_t c = 0; c < of_block.size(); ++c) {
       for (int a = 0; a < 3; ++a) {

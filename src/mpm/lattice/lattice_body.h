@@ -9,6 +9,7 @@
 #include "compute/array.h"
 #include "mpm/lattice/bonds.h"
 #include "geometry/lattice.h"
+#include "mpm/contact/surface_place.h"
 #include "mpm/lattice/lattice_rows.h"
 #include "tissue_sim/scene.h"
 
@@ -60,6 +61,7 @@ struct Points {
   static constexpr std::uint8_t kAtAnchor = 2;  ///< the face of one holds it
   Array<std::uint8_t> material;  ///< in LatticeBody::materials; empty where no body has inclusions
   Array<std::uint8_t> soft;      ///< of a crumb or a slice: mpm/tear/debris.h; empty before any is
+  std::vector<OuterPlace> outer;  ///< true surface of the whole bodies; empty on a GPU
   Crossings crossings;           ///< of the bonds that blades broke; one that tore has none
   int size() const { return static_cast<int>(site.size()); }
   /// Number of a point's material among those of its body.

@@ -6,6 +6,7 @@
 #include "frame/select_points.h"
 #include "mpm/lattice/bonds.h"
 #include "mpm/mpm_tissue.h"
+#include "mpm/point_fields.h"
 
 namespace tissue_sim {
 
@@ -48,6 +49,7 @@ int MpmTissue::read_points(const PointSelection& selection, std::vector<std::uin
                   sizeof(Point));
     }
   });
+  if (selection.fields != 0) add_point_fields(s, selection, index, count, cloud);
   return count;
 }
 

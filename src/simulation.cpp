@@ -56,10 +56,10 @@ struct Simulation::State {
   std::vector<BladePath> cuts;
   std::vector<Grip> grips;             // of each tool
   std::vector<double> grip_pressures;  // of each tool, 0 for the scene's [Pa]
-  std::vector<const Anchor*> anchors;         // of all bodies
-  std::vector<AnchorMotion> anchor_motion;    // of each; empty while none moved
-  Vec3 gravity = Vec3::Zero();                // as of the next frame
-  double damping = 0;
+  std::vector<const Anchor*> anchors;       // of all bodies
+  std::vector<AnchorMotion> anchor_motion;  // of each; empty while none moved
+  Vec3 gravity = Vec3::Zero();              // as of the next frame [m/s^2]
+  double damping = 0;                       // the same [1/s]
   double wave_speed = 0;
   bool blew_up = false;
 
@@ -200,7 +200,7 @@ void Simulation::apply(const AppliedInput& input) {
 
 template <class Archive>
 void Simulation::State::each_field(Archive& archive) {
-  archive(frame, tools, cuts, grips, grip_pressures, blew_up);
+  archive(frame, tools, cuts, grips, grip_pressures, anchor_motion, gravity, damping, blew_up);
 }
 
 StateOrigin Simulation::State::origin() const {

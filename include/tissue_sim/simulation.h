@@ -27,8 +27,8 @@ struct AppliedInput {
   std::vector<double> grip_pressures;
   std::vector<BladePath> cuts;
   std::vector<AnchorMotion> anchors;  ///< in the order of the scene; empty while none moved
-  std::optional<Vec3> gravity;    ///< from this frame on, if given [m/s^2]
-  std::optional<double> damping;  ///< the same [1/s]
+  std::optional<Vec3> gravity;         ///< from this frame on, if given [m/s^2]
+  std::optional<double> damping;       ///< the same [1/s]
 };
 
 /// When tissue counts as being at rest, and how long to wait for it.

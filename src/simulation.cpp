@@ -1,7 +1,9 @@
 #include "tissue_sim/simulation.h"
 
+#include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <limits>
 #include <stdexcept>
 #include <utility>
 
@@ -54,6 +56,10 @@ struct Simulation::State {
   std::vector<BladePath> cuts;
   std::vector<Grip> grips;             // of each tool
   std::vector<double> grip_pressures;  // of each tool, 0 for the scene's [Pa]
+  std::vector<const Anchor*> anchors;       // of all bodies
+  std::vector<AnchorMotion> anchor_motion;  // of each; empty while none moved
+  Vec3 gravity = Vec3::Zero();              // as of the next frame [m/s^2]
+  double damping = 0;                       // the same [1/s]
   double wave_speed = 0;
   bool blew_up = false;
 
@@ -69,6 +75,11 @@ Simulation::Simulation(const Scene& scene) : state_(std::make_unique<State>()) {
   state_->tools.resize(scene.tools.size());
   state_->grips.resize(scene.tools.size());
   state_->grip_pressures.resize(scene.tools.size());
+  for (const Body& b : state_->scene.bodies) {
+    for (const Anchor& anchor : b.anchors) state_->anchors.push_back(&anchor);
+  }
+  state_->gravity = scene.gravity;
+  state_->damping = scene.damping;
   const auto note_speed = [this, &scene](const std::string& material) {
     state_->wave_speed =
         std::max(state_->wave_speed, tissue_sim::wave_speed(find_material(scene, material)));
@@ -119,6 +130,39 @@ void Simulation::cut(const BladePath& path) {
   for (Pose& pose : state_->cuts.back().poses) pose.orientation.normalize();
 }
 
+void Simulation::set_anchor(int anchor, const Pose& pose) {
+  State& s = *state_;
+  if (anchor < 0 || anchor >= static_cast<int>(s.anchors.size())) {
+    throw std::invalid_argument("anchor " + std::to_string(anchor) +
+                                " is not in the scene, which has " +
+                                std::to_string(s.anchors.size()));
+  }
+  check(pose, "the pose of anchor '" + s.anchors[anchor]->name + "'");
+  if (s.anchor_motion.empty()) {
+    for (const Anchor* a : s.anchors) {
+      const Pose rest{a->origin(), Quat::Identity()};
+      s.anchor_motion.push_back({rest, rest});
+    }
+  }
+  s.anchor_motion[anchor].end = {pose.position, pose.orientation.normalized()};
+}
+
+void Simulation::set_gravity(const Vec3& gravity) {
+  Scene changed;
+  changed.bodies.resize(1);
+  changed.gravity = gravity;
+  validate(changed);
+  state_->gravity = gravity;
+}
+
+void Simulation::set_damping(double damping) {
+  Scene changed;
+  changed.bodies.resize(1);
+  changed.damping = damping;
+  validate(changed);
+  state_->damping = damping;
+}
+
 void Simulation::apply(const AppliedInput& input) {
   if (input.tools.size() != state_->tools.size()) {
     throw std::invalid_argument("the input moves " + std::to_string(input.tools.size()) +
@@ -140,11 +184,23 @@ void Simulation::apply(const AppliedInput& input) {
   state_->grip_pressures = input.grip_pressures;
   state_->grip_pressures.resize(input.tools.size());
   state_->cuts = input.cuts;
+  if (!input.anchors.empty() && input.anchors.size() != state_->anchors.size()) {
+    throw std::invalid_argument("the input moves " + std::to_string(input.anchors.size()) +
+                                " anchors, the scene has " +
+                                std::to_string(state_->anchors.size()));
+  }
+  for (const AnchorMotion& m : input.anchors) {
+    check(m.begin, "an anchor's pose");
+    check(m.end, "an anchor's pose");
+  }
+  if (input.gravity) set_gravity(*input.gravity);
+  if (input.damping) set_damping(*input.damping);
+  state_->anchor_motion = input.anchors;
 }
 
 template <class Archive>
 void Simulation::State::each_field(Archive& archive) {
-  archive(frame, tools, cuts, grips, grip_pressures, blew_up);
+  archive(frame, tools, cuts, grips, grip_pressures, anchor_motion, gravity, damping, blew_up);
 }
 
 StateOrigin Simulation::State::origin() const {
@@ -198,7 +254,12 @@ FrameReport Simulation::advance_frame() {
   report.input.frame = s.frame;
   report.input.tools = s.tools;
   report.input.cuts = std::exchange(s.cuts, {});
-  s.tissue->advance(1.0 / s.scene.frame_rate, {report.input.tools, report.input.cuts});
+  report.input.anchors = s.anchor_motion;
+  report.input.gravity = s.gravity;
+  report.input.damping = s.damping;
+  s.tissue->advance(1.0 / s.scene.frame_rate,
+                    {report.input.tools, report.input.cuts, report.input.anchors,
+                     &*report.input.gravity, &*report.input.damping});
   report.result = s.tissue->finish();
   report.cfl = report.result.substep * s.wave_speed / s.scene.cell_size;
   for (std::size_t i = 0; i < s.tools.size(); ++i) {
@@ -210,9 +271,36 @@ FrameReport Simulation::advance_frame() {
     m.begin = m.end;
     m.jaw_begin = m.jaw_end;
   }
+  for (AnchorMotion& m : s.anchor_motion) m.begin = m.end;
   ++s.frame;
   report.compute_time =
       std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  return report;
+}
+
+SettleReport Simulation::settle(const SettleLimits& limits) {
+  State& s = *state_;
+  const double damping = s.damping;
+  if (limits.damping >= 0) set_damping(limits.damping);
+  const int window = std::max(1, static_cast<int>(std::ceil(0.1 * s.scene.frame_rate)));
+  const auto most = static_cast<std::int64_t>(std::ceil(limits.time * s.scene.frame_rate));
+  SettleReport report;
+  std::vector<double> speeds(window, std::numeric_limits<double>::infinity());
+  std::int64_t frames = 0;
+  try {
+    while (!report.at_rest && frames < most) {
+      const FrameReport frame = advance_frame();
+      if (frame.result.blew_up) break;
+      speeds[frames++ % window] = frame.result.max_speed;
+      report.speed = *std::max_element(speeds.begin(), speeds.end());
+      report.at_rest = report.speed < limits.speed;
+    }
+  } catch (...) {
+    s.damping = damping;
+    throw;
+  }
+  s.damping = damping;
+  report.time = frames / s.scene.frame_rate;
   return report;
 }
 

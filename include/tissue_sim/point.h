@@ -1,6 +1,7 @@
 // The point that clouds are made of, in the layout of sensor_msgs/PointCloud2.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 
 namespace tissue_sim {
@@ -16,11 +17,29 @@ struct Point {
 };
 static_assert(sizeof(Point) == 32, "the layout that read_points() and PointCloud2 promise");
 
-/// Which points a cloud holds.
+/// What a point of a cloud can carry behind its Point, in this order, each as 4-byte floats.
+enum PointField : unsigned {
+  kRestPosition = 1,   ///< 3: where it was in the undeformed body [m]
+  kDisplacement = 2,   ///< 3: from there [m]
+  kVelocity = 4,       ///< 3: [m/s]
+  kVolume = 8,         ///< 1: its share of the undeformed body [m^3]
+  kStressTensor = 16,  ///< 6: Cauchy stress xx yy zz xy yz zx, without viscosity [Pa]
+};
+
+/// Which points a cloud holds, and what of each.
 struct PointSelection {
   int stride = 1;             ///< every stride-th id
   bool surface_only = false;  ///< only points on the outer surface or on a cut face
   bool loose_only = false;    ///< only points of loose fragments
+  unsigned fields = 0;        ///< PointFields that each carries behind its Point
+
+  /// Bytes of one point.
+  std::size_t point_size() const {
+    constexpr int kFloats[] = {3, 3, 3, 1, 6};
+    std::size_t size = sizeof(Point);
+    for (int i = 0; i < 5; ++i) size += (fields >> i & 1) * kFloats[i] * sizeof(float);
+    return size;
+  }
 };
 
 }  // namespace tissue_sim

@@ -31,6 +31,18 @@ struct Region {
   bool contains(const Vec3& x) const;
 };
 
+/// What holds a body: tissue in the region is held fast, and the body is held at the region's face,
+/// exactly there, wherever it lies in a cell. Where the face is the body's own, it is glued there.
+/// The anchor moves where Simulation::set_anchor() says, and says what it carries.
+struct Anchor : Region {
+  std::string name;  ///< a ROS name, unique in the scene, or empty: then nothing can address it
+
+  Anchor() = default;
+  Anchor(const Region& region) : Region(region) {}  // NOLINT: an anchor without a name
+  /// What its pose is about: the middle of a box or ball, (0, 0, z) below a plane [m].
+  Vec3 origin() const;
+};
+
 /// A part of a body that is of a material of its own: a tumour, a vessel, a layer of skin.
 struct Inclusion {
   std::string material = "liver";  ///< a name in Scene::materials or a preset
@@ -51,7 +63,7 @@ struct Body {
   /// A point of the body is of the material of the last of these that holds it, else of `material`;
   /// at most 255, and each must be the last one for a point at least.
   std::vector<Inclusion> inclusions;
-  std::vector<Region> anchors;  ///< what lies in them is held fast
+  std::vector<Anchor> anchors;  ///< what holds it
 };
 
 /// A horizontal plane that carries what falls on it.

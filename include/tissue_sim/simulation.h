@@ -9,6 +9,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -25,6 +26,21 @@ struct AppliedInput {
   /// Tool::grip_pressure. A jaw_end below 0 squeezes with more: see tools/grip.h.
   std::vector<double> grip_pressures;
   std::vector<BladePath> cuts;
+  std::vector<AnchorMotion> anchors;  ///< in the order of the scene; empty while none moved
+  std::optional<Vec3> gravity;         ///< from this frame on, if given [m/s^2]
+  std::optional<double> damping;       ///< the same [1/s]
+};
+
+/// When tissue counts as being at rest, and how long to wait for it.
+struct SettleLimits {
+  double speed = 1e-4;    ///< no point was faster for a tenth of a second [m/s]
+  double time = 10;       ///< simulated at most [s]
+  double damping = -1;    ///< meanwhile, instead of the scene's [1/s]; negative: the scene's
+};
+struct SettleReport {
+  bool at_rest = false;
+  double time = 0;   ///< that it took [s]
+  double speed = 0;  ///< of the fastest point in the last tenth of a second [m/s]
 };
 
 struct FrameReport {
@@ -58,6 +74,14 @@ class Simulation {
   /// Cuts at the start of the next frame. Throws std::invalid_argument for less than two poses or
   /// edge points, or values that are not finite.
   void cut(const BladePath& path);
+  /// The anchor, by its number in the order of the scene, shall be there at the end of the next
+  /// frame: what it holds moves as a rigid body from Anchor::origin(). Throws
+  /// std::invalid_argument for an anchor that is not there or a pose that is not finite or no
+  /// rotation.
+  void set_anchor(int anchor, const Pose& pose);
+  /// From the next frame on. Throw std::invalid_argument out of the scene's ranges.
+  void set_gravity(const Vec3& gravity);
+  void set_damping(double damping);
   /// Puts exactly these inputs into the next frame (replay), instead of what was set.
   void apply(const AppliedInput& input);
 
@@ -72,6 +96,8 @@ class Simulation {
 
   /// Advances one frame. After a blow-up it throws std::runtime_error: build a new Simulation.
   FrameReport advance_frame();
+  /// Advances frames until all is at rest or the time is over; tools stay where they are.
+  SettleReport settle(const SettleLimits& limits = {});
 
  private:
   struct State;

@@ -15,16 +15,28 @@
 
 namespace tissue_sim {
 
+/// Motion of an anchor over one frame, about Anchor::origin(): position linear, orientation slerp.
+/// At rest it is at its origin, without rotation.
+struct AnchorMotion {
+  Pose begin, end;
+};
+
 /// What happens during one frame; `tools` parallels Scene::tools.
 struct FrameInput {
   Span<const ToolMotion> tools;
   Span<const BladePath> cuts;  ///< applied at the start of the frame, before the first substep
+  /// Of all bodies' anchors, in the order of the scene; empty where none ever moved.
+  Span<const AnchorMotion> anchors = {};
+  const Vec3* gravity = nullptr;    ///< from this frame on, if given [m/s^2]
+  const double* damping = nullptr;  ///< the same [1/s]
 };
 
 /// What one frame brought.
 struct FrameResult {
   std::vector<ToolLoad> loads;         ///< parallels Scene::tools
   std::vector<CutReport> cut_reports;  ///< parallels FrameInput::cuts
+  std::vector<Wrench> anchor_loads;    ///< of the tissue on each anchor, mean of the frame, about
+                                       ///< its origin where it is now; in the order of the scene
   CutReport blade_report;              ///< what the instruments' edges cut
   CutReport tear_report;               ///< what tore by itself (Material::tear_stretch)
   int substeps = 0;

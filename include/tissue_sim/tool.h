@@ -15,13 +15,19 @@ enum class ToolType {
   kScalpel,  ///< cuts where its edge sweeps; its flats push
   kProbe,    ///< a capsule that pushes
   kGrasper,  ///< two jaws that hold what is between them
+  kBall,     ///< a ball that pushes; the tip is its lowest place
+  kPunch,    ///< a cylinder along z whose flat end, with a rounded rim, pushes
+  kPlate,    ///< a rectangular plate across z with rounded edges; the tip is the middle of its face
 };
 
 struct Tool {
   std::string name = "probe";  ///< a ROS name: letters, digits, '_'; unique in the scene
   ToolType type = ToolType::kProbe;
-  double radius = 0.003;            ///< probe: of the capsule [m]
-  double length = 0.10;             ///< probe: of the shaft that touches tissue [m]
+  double radius = 0.003;            ///< probe: of the capsule; ball; punch: of the cylinder [m]
+  double length = 0.10;             ///< probe, punch: of the shaft that touches tissue [m]
+  double edge_radius = 0.0005;      ///< punch, plate: of the rounded edge, at most half of what is
+                                    ///< rounded [m]
+  Vec3 size = Vec3(0.05, 0.05, 0.004);  ///< plate: along x, y and z, its face at z = 0 [m]
   double blade_length = 0.025;      ///< scalpel: edge from the tip to the heel, along -z [m]
   double blade_width = 0.006;       ///< scalpel: from the edge to the spine, along -x [m]
   double blade_thickness = 0.0004;  ///< scalpel: along y [m]

@@ -25,6 +25,11 @@ void fields(Archive& archive, ToolMotion& m) {
 }
 
 template <class Archive>
+void fields(Archive& archive, AnchorMotion& m) {
+  archive(m.begin, m.end);
+}
+
+template <class Archive>
 void fields(Archive& archive, BladePath& p) {
   archive(p.edge, p.poses);
 }

@@ -48,7 +48,7 @@ template <class Archive>
 void fields(Archive& archive, Block& b) {
   archive(b.body, b.x, b.y, b.z, b.nx, b.ny, b.nz, b.sides, b.pitch, b.stride, b.plane, b.runs,
           b.node_rows, b.filled, b.filled_columns, b.cell, b.material, b.mixture, b.volume, b.point,
-          b.partial, b.node, b.facets, b.modulus, b.number, b.force_offset);
+          b.partial, b.node, b.facets, b.surface, b.modulus, b.number, b.force_offset);
 }
 
 template <class Archive>
@@ -87,8 +87,18 @@ void fields(Archive& archive, BlockMotion& m) {
 }
 
 template <class Archive>
+void fields(Archive& archive, RigidMotion& m) {
+  archive(m.rotation, m.translation);
+}
+
+template <class Archive>
+void fields(Archive& archive, AnchorFaces& a) {
+  archive(a.rows, a.groups, a.inverse, a.impulse, a.held, a.now, a.moves);
+}
+
+template <class Archive>
 void fields(Archive& archive, Contacts& c) {
-  archive(c.near, c.cells, c.touching, c.until_list);
+  archive(c.near, c.cells, c.touching, c.changes, c.inertia.nodes, c.inertia.dt, c.until_list);
 }
 
 /// The nodes around a cell of a block, -1 for none: they are addresses in it.
@@ -130,7 +140,7 @@ void fields(Archive& archive, FaceContacts& f, const Blocks& blocks) {
 template <class Archive>
 void fields(Archive& archive, MpmState& s) {
   archive(s.points, s.nodes, *s.fields, s.blocks, s.motion, s.wildest, s.time, s.dt, s.tore_at,
-          s.threads, s.crumbs, s.contacts);
+          s.threads, s.crumbs, s.contacts, s.anchors, s.scene.gravity, s.scene.damping);
   fields(archive, s.faces, s.blocks);
 }
 

@@ -80,6 +80,8 @@ void MpmTissue::save_checkpoint() {
   checkpoint_.contacts = s.contacts;
   checkpoint_.faces = s.faces;
   checkpoint_.result = result_;
+  checkpoint_.impulse = s.anchors.impulse;
+  checkpoint_.anchors = s.anchors.now;
 }
 
 void MpmTissue::restore_checkpoint() {
@@ -90,9 +92,13 @@ void MpmTissue::restore_checkpoint() {
   }
   s.time = checkpoint_.time;
   s.dt = checkpoint_.dt;
+  for (const InertialNode& n : s.contacts.inertia.nodes) s.inertial_index[n.node] = -1;
   s.contacts = checkpoint_.contacts;
+  index_inertia(s);
   s.faces = checkpoint_.faces;
   result_ = checkpoint_.result;
+  s.anchors.impulse = checkpoint_.impulse;
+  s.anchors.now = checkpoint_.anchors;
   measure_stiffness();
 }
 

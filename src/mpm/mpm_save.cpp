@@ -22,6 +22,8 @@ void MpmTissue::restore(Span<const std::uint8_t> saved) {
   ArchiveReader in(saved);
   each_field(in);
   if (in.left() > 0) throw std::runtime_error("the state has more to it than this version knows");
+  state_->inertial_index.assign(state_->nodes.size(), -1);
+  index_inertia(*state_);
   state_->force.clear();
   state_->force.resize(state_->blocks.force_size);
 }

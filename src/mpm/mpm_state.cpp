@@ -3,7 +3,9 @@
 #include <algorithm>
 #include <cmath>
 
+#include "mpm/anchors/anchored_share.h"
 #include "mpm/contact/block_contact.h"
+#include "mpm/contact/surface_places.h"
 
 namespace tissue_sim {
 
@@ -12,13 +14,22 @@ std::unique_ptr<MpmState> make_mpm_state(const Scene& scene, std::vector<std::st
   state->scene = scene;
   state->cpu = std::make_unique<Cpu>(scene.threads);
   state->bodies = make_lattice_bodies(scene, state->points, notes);
+  find_free_volumes(state->bodies, state->points);
+  state->points.outer = find_outer_places(state->bodies, state->points);
   state->fields = std::make_unique<NodeFields>(state->bodies, state->points, state->nodes);
+  find_anchor_faces(scene, state->bodies, state->points, *state->fields, state->nodes,
+                    state->anchors);
+  for (const std::int32_t p : state->anchors.points) {
+    if (state->points.anchored[p] == 0) state->points.anchored[p] = Points::kAtAnchor;
+  }
   state->blocks = make_blocks(state->bodies, state->points, *state->fields, {}, *state->cpu);
   state->force.resize(state->blocks.force_size);
   state->contacts.near.resize(state->blocks.all.size());
   state->contacts.cells.resize(state->blocks.all.size());
   state->contacts.touching.resize(state->blocks.all.size());
+  state->contacts.changes.resize(state->blocks.all.size());
   list_facets(*state);
+  index_inertia(*state);
   state->instructions = instruction_set();
   state->kernels = &block_kernels(state->instructions);
   return state;
@@ -43,6 +54,23 @@ BlockField block_field(const MpmState& state, const Block& block) {
   return f;
 }
 
+namespace {
+
+/// Widens a block's box to its points without free volume, which move with their anchors.
+void add_held(const MpmState& state, const Block& block, Box& box) {
+  const LatticeBody& b = state.bodies[block.body];
+  for (const std::int32_t p : block.point) {
+    if (p < 0 || state.points.free_volume[p] > 0) continue;
+    const Points::Site& s = state.points.site[p];
+    Vec3 x = b.site_position(s.x, s.y, s.z);
+    if (state.anchors.moves) x = state.anchors.place_of_held(b.body, block.body, x);
+    box.min = box.min.cwiseMin(x);
+    box.max = box.max.cwiseMax(x);
+  }
+}
+
+}  // namespace
+
 void measure_motion(MpmState& state) {
   const int count = static_cast<int>(state.blocks.all.size());
   state.motion.resize(count);
@@ -52,6 +80,7 @@ void measure_motion(MpmState& state) {
         state.kernels->bounds(block, block_field(state, block), state.scratch.local());
     state.motion[i] = {{Vec3(b.min[0], b.min[1], b.min[2]), Vec3(b.max[0], b.max[1], b.max[2])},
                        b.speed};
+    if (!state.points.free_volume.empty()) add_held(state, block, state.motion[i].box);
   });
 }
 
@@ -82,13 +111,16 @@ class MoveRow {
 
 }  // namespace
 
-float substep(MpmState& state, float dt, std::vector<ColliderLoad>& loads) {
+float substep(MpmState& state, float dt, std::vector<ColliderLoad>& loads,
+              const std::vector<RigidMotion>& anchors) {
   Blocks& blocks = state.blocks;
   const int block_count = static_cast<int>(blocks.all.size());
   const std::size_t collider_count = state.colliders.size();
   state.block_loads.resize(block_count);
   FaceContacts& faces = state.faces;
   const bool list = is_list_due(state.contacts);
+  if (list) tidy_inertia(state, false);
+  fit_inertia(state, dt);
   NodeStep step;
   step.dt = dt;
   step.kick = kick_of(state.dt, dt);
@@ -96,7 +128,20 @@ float substep(MpmState& state, float dt, std::vector<ColliderLoad>& loads) {
   for (int a = 0; a < 3; ++a) step.gravity[a] = static_cast<float>(state.scene.gravity[a]);
   const MoveRow move_row(state, step);
   SharedWork pushes(static_cast<int>(faces.between.size()), 32), work(block_count, 1),
-      moves(static_cast<int>(blocks.rows.size()), kRows);
+      moves(static_cast<int>(blocks.rows.size()), kRows),
+      holds(static_cast<int>(state.anchors.groups.size()), 64), changes(1, 1);
+  std::vector<InertialNode>& inertial = state.contacts.inertia.nodes;
+  // How many there are shows as late as after the changes.
+  const auto part = [&](int i) {
+    constexpr int kParts = 16;
+    const std::size_t count = inertial.size();
+    for (std::size_t n = count * i / kParts; n < count * (i + 1) / kParts; ++n) {
+      resist_acceleration(inertial[n], step.keep, dt, state.nodes);
+    }
+  };
+  SharedWork resists(16, 1);
+  const RigidMotion* const before = anchors.empty() ? nullptr : state.anchors.now.data();
+  const RigidMotion* const after = anchors.empty() ? nullptr : anchors.data();
   const auto work_on_block = [&](int i) {
     const Block& block = *blocks.all[i];
     float* force = state.force.data() + block.force_offset;
@@ -118,8 +163,21 @@ float substep(MpmState& state, float dt, std::vector<ColliderLoad>& loads) {
     pushes.help([&](int i) { push_faces(state, faces.all[faces.between[i]], dt); });
     work.help([&](int i) { work_on_block(blocks.by_cost[i]); });
     work.wait();
+    changes.help([&](int) { change_inertia(state); });
+    changes.wait();
     moves.help(move_row);
+    if (state.anchors.groups.empty() && inertial.empty()) return;
+    moves.wait();
+    resists.help(part);
+    if (state.anchors.groups.empty()) return;
+    resists.wait();
+    holds.help([&](int i) { hold_group(state.anchors, i, dt, before, after, state.nodes); });
   });
+  if (after != nullptr) {
+    move_held(state.anchors, dt, before, after, state.nodes);
+    state.anchors.now = anchors;
+  }
+  add_inertial_loads(state, step.kick, loads);
   for (const auto& of_block : state.block_loads) {
     for (std::size_t c = 0; c < of_block.size(); ++c) {
       for (int a = 0; a < 3; ++a) {

@@ -10,8 +10,10 @@
 #include <vector>
 
 #include "compute/for_each.h"
+#include "mpm/anchors/anchor_faces.h"
 #include "mpm/blocks/block_kernels.h"
 #include "mpm/blocks/blocks.h"
+#include "mpm/contact/contact_inertia.h"
 #include "mpm/contact/face_contact.h"
 #include "mpm/lattice/lattice_body.h"
 #include "mpm/lattice/nodes.h"
@@ -25,9 +27,11 @@ namespace tissue_sim {
 struct Touch {
   std::int32_t cell;  ///< lane of its cell's first point, in its block
   std::int32_t point;
-  std::uint8_t sub;  ///< which of the cell's eight points it is
+  std::uint8_t key;  ///< SurfacePlace::key, or below 8: which of the cell's eight points
   std::uint8_t collider;
-  float hold[3];  ///< place that friction holds on to, in the collider's frame [m]
+  float hold[3];       ///< place that friction holds on to, in the collider's frame [m]
+  float along[3];      ///< normal of its inerter (mpm/contact/contact_inertia.h)
+  float inertia = 0;   ///< of that [kg]
 };
 
 /// A cell of which a collider may touch points before such cells are listed anew.
@@ -35,7 +39,8 @@ struct NearCell {
   std::int32_t lane;  ///< of its first point, in its block
   std::int32_t node;  ///< its lowest, in the block's nodes
   std::uint8_t collider;
-  std::uint8_t points;     ///< bit s: that at sub-position s
+  std::uint8_t points;     ///< bit s: that at sub-position s, in the body or for a blade
+  std::int32_t first_place, place_count;  ///< in Block::surface
   float middle[3];         ///< reference place [m]
   std::uint8_t clear = 0;  ///< substeps for which the collider cannot reach it
 };
@@ -44,7 +49,9 @@ struct NearCell {
 struct Contacts {
   std::vector<std::vector<std::uint8_t>> near;  ///< colliders that it may meet this frame
   std::vector<std::vector<NearCell>> cells;     ///< by collider, then lane
-  std::vector<std::vector<Touch>> touching;     ///< by collider, cell and sub-position
+  std::vector<std::vector<Touch>> touching;     ///< by collider, cell and key
+  std::vector<std::vector<InertiaChange>> changes;  ///< of the substep
+  ContactInertia inertia;
   int until_list = 0;                           ///< substeps until `cells` are listed anew
 };
 
@@ -65,6 +72,7 @@ struct MpmState {
   Points points;
   Nodes nodes;
   std::unique_ptr<NodeFields> fields;
+  AnchorFaces anchors;
   Blocks blocks;
   Array<float> force;        ///< of all blocks
   Array<float> u_before[3];  ///< displacements when the frame began, where a blade may cut [m]
@@ -80,6 +88,7 @@ struct MpmState {
   Contacts contacts;
   FaceContacts faces;
   std::vector<Collider> colliders;
+  std::vector<std::int32_t> inertial_index;  ///< per node, in ContactInertia; -1 for none
   std::vector<std::vector<ColliderLoad>> block_loads;  ///< per block, per collider
 
   const BlockKernels* kernels = nullptr;
@@ -98,8 +107,10 @@ BlockField block_field(const MpmState& state, const Block& block);
 void measure_motion(MpmState& state);
 
 /// One substep: forces of all blocks with contact at the colliders' present places, then the nodes.
-/// Adds what acts on the colliders to `loads`. Returns how long it acted: kick_of() [s].
-float substep(MpmState& state, float dt, std::vector<ColliderLoad>& loads);
+/// Adds what acts on the colliders to `loads`. Returns how long it acted: kick_of() [s]. `anchors`
+/// are where they will be at its end, empty if they stay.
+float substep(MpmState& state, float dt, std::vector<ColliderLoad>& loads,
+              const std::vector<RigidMotion>& anchors = {});
 
 /// The part of it that moves all nodes, under the forces that the blocks left in `force`.
 void move_nodes(MpmState& state, const NodeStep& step);

@@ -65,6 +65,10 @@ void MpmTissue::begin_frame(double duration, const FrameInput& input) {
   MpmState& s = *state_;
   result_ = {};
   result_.loads.resize(s.scene.tools.size());
+  if (input.gravity != nullptr) s.scene.gravity = *input.gravity;
+  if (input.damping != nullptr) s.scene.damping = *input.damping;
+  s.anchors.impulse.assign(s.anchors.rows.size(), {});
+  s.anchors.moves = s.anchors.moves || !input.anchors.empty();
   for (const BladePath& path : input.cuts) {
     result_.cut_reports.emplace_back();
     cut({path}, s.nodes.u, s.motion, result_.cut_reports.back());
@@ -93,7 +97,7 @@ int MpmTissue::run(const FramePart& part) {
     s.colliders = frame.colliders.at(share);
     std::vector<ColliderLoad> loads(s.colliders.size());
     find_face_contacts(s, pieces_, dt);
-    const float acted = substep(s, dt, loads);
+    const float acted = substep(s, dt, loads, anchors_at(s.anchors, frame.input, share));
     s.time += dt;
     frame.colliders.add_loads(share, s.colliders.data(), loads.data(), acted / frame.duration,
                               result_.loads);
@@ -135,6 +139,7 @@ void MpmTissue::cut_by_blades(double share) {
 }
 
 void MpmTissue::end_frame() {
+  result_.anchor_loads = anchor_loads(state_->anchors, frame_->duration);
   cut_by_blades(1);
   if (result_.tear_report.bonds_broken > 0) {
     result_.tear_report.new_fragments = update_pieces(state_->bodies, state_->points, pieces_);

@@ -1,6 +1,7 @@
 // Tissue by the material point method in total Lagrangian form, on the CPU.
 #pragma once
 
+#include <array>
 #include <memory>
 #include <optional>
 
@@ -77,6 +78,8 @@ class MpmTissue final : public Tissue {
     FrameResult result;
     std::vector<BlockMotion> motion;  ///< run_frame()'s, as all that follows
     SubstepChoice substep;
+    std::vector<std::array<double, 3>> impulse;  ///< AnchorFaces::impulse
+    std::vector<RigidMotion> anchors;            ///< AnchorFaces::now
   };
 
   // The steps of run_frame().

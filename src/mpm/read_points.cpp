@@ -6,6 +6,7 @@
 #include "frame/select_points.h"
 #include "mpm/lattice/bonds.h"
 #include "mpm/mpm_tissue.h"
+#include "mpm/point_fields.h"
 
 namespace tissue_sim {
 
@@ -40,7 +41,7 @@ int MpmTissue::read_points(const PointSelection& selection, std::vector<std::uin
       out.rgb = piece_colour(f);
       out.id = static_cast<std::uint32_t>(p);
       out.fragment = f.id;
-      out.stress = stress[lane];
+      out.stress = block.volume[lane] > 0 ? stress[lane] : 0;  // what an anchor holds has none
       const int whole = __builtin_popcount(whole_bonds(body, s.points.site[p]));
       const int left = __builtin_popcount(s.points.bonds[p]);
       out.damage = whole > 0 ? 1.0f - static_cast<float>(left) / whole : 0.0f;
@@ -48,6 +49,7 @@ int MpmTissue::read_points(const PointSelection& selection, std::vector<std::uin
                   sizeof(Point));
     }
   });
+  if (selection.fields != 0) add_point_fields(s, selection, index, count, cloud);
   return count;
 }
 

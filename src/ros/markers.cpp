@@ -84,6 +84,18 @@ void add_tool(const MarkerInput& input, std::size_t i, MarkerArray& array) {
     const double shaft = 0.1;
     array.markers.push_back(part(input, i, 2, Marker::CYLINDER, pose, Vec3(0, 0, -l - shaft / 2),
                                  scale(w, w, shaft), color(0.25f, 0.27f, 0.30f)));
+  } else if (tool.type == ToolType::kBall) {
+    const double d = 2 * tool.radius;
+    array.markers.push_back(
+        part(input, i, 0, Marker::SPHERE, pose, Vec3(0, 0, -d / 2), scale(d, d, d), steel));
+  } else if (tool.type == ToolType::kPunch) {
+    const double d = 2 * tool.radius, l = tool.length;
+    array.markers.push_back(
+        part(input, i, 0, Marker::CYLINDER, pose, Vec3(0, 0, -l / 2), scale(d, d, l), steel));
+  } else if (tool.type == ToolType::kPlate) {
+    const Vec3& s = tool.size;
+    array.markers.push_back(part(input, i, 0, Marker::CUBE, pose, Vec3(0, 0, -s.z() / 2),
+                                 scale(s.x(), s.y(), s.z()), steel));
   } else {  // the capsule that touches: its tip is the tool's origin
     const double r = tool.radius, l = std::max(tool.length, 2 * r);
     const geometry_msgs::Vector3 ball = scale(2 * r, 2 * r, 2 * r);

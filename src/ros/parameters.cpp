@@ -295,7 +295,9 @@ void put_mesh(Scene& scene, const std::string& mesh, double scale) {
   if (scene.ground.enabled) body.pose.position.z() = scene.ground.z - box.min.z();
   box.min += body.pose.position;
   box.max += body.pose.position;
-  for (Region& anchor : body.anchors) anchor = fitted(anchor, before, box);
+  for (Anchor& anchor : body.anchors) {
+    static_cast<Region&>(anchor) = fitted(anchor, before, box);
+  }
   for (Inclusion& inclusion : body.inclusions) {
     inclusion.region = fitted(inclusion.region, before, box);
   }

@@ -1,6 +1,7 @@
 // Range checks of a scene: every number that YAML, a service or a program can put in it.
 #include "tissue_sim/scene.h"
 
+#include <algorithm>
 #include <cmath>
 #include <set>
 #include <stdexcept>
@@ -121,15 +122,18 @@ void check_shape(const std::string& path, const Body& body) {
   }
 }
 
+// Becomes part of topic and parameter names.
+void check_ros_name(const std::string& field, const std::string& name) {
+  const auto is_letter = [](char c) { return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z'); };
+  bool valid = !name.empty() && is_letter(name.front());
+  for (char c : name) valid = valid && (is_letter(c) || (c >= '0' && c <= '9') || c == '_');
+  if (valid) return;
+  refuse(field, quoted(name), "must be a ROS name: a letter, then letters, digits and '_'");
+}
+
 void check_tool(const std::string& path, const Tool& tool, std::set<std::string>& names) {
   check_name(path + ".name", tool.name, names);
-  const auto is_letter = [](char c) { return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z'); };
-  bool valid = is_letter(tool.name.front());  // becomes part of topic and parameter names
-  for (char c : tool.name) valid = valid && (is_letter(c) || (c >= '0' && c <= '9') || c == '_');
-  if (!valid) {
-    refuse(path + ".name", quoted(tool.name),
-           "must be a ROS name: a letter, then letters, digits and '_'");
-  }
+  check_ros_name(path + ".name", tool.name);
   check_enum(path + ".type", tool.type, kToolTypeNames);
   switch (tool.type) {
     case ToolType::kScalpel:
@@ -146,6 +150,19 @@ void check_tool(const std::string& path, const Tool& tool, std::set<std::string>
       check_range(path + ".jaw_width", tool.jaw_width, 2e-4, 0.1, "m");
       check_range(path + ".grip_pressure", tool.grip_pressure, 1, 1e7, "Pa");
       check_range(path + ".cohesion", tool.cohesion, 0, 1e7, "Pa");
+      break;
+    case ToolType::kBall:
+      check_range(path + ".radius", tool.radius, 1e-4, 0.1, "m");
+      break;
+    case ToolType::kPunch:
+      check_range(path + ".radius", tool.radius, 1e-4, 0.1, "m");
+      check_range(path + ".length", tool.length, 1e-3, 1, "m");
+      check_range(path + ".edge_radius", tool.edge_radius, 1e-5,
+                  std::min(tool.radius, tool.length / 2), "m");
+      break;
+    case ToolType::kPlate:
+      check_each(path + ".size", tool.size, 1e-4, 1, "edge", "m");
+      check_range(path + ".edge_radius", tool.edge_radius, 1e-5, tool.size.minCoeff() / 2, "m");
       break;
   }
   check_friction(path + ".friction", tool.friction);
@@ -211,6 +228,18 @@ void check_material_name(const std::string& field, const Scene& scene, const std
 
 }  // namespace
 
+Vec3 Anchor::origin() const {
+  switch (kind) {
+    case Kind::kBox:
+      return (min + max) / 2;
+    case Kind::kBall:
+      return center;
+    case Kind::kBelow:
+      break;
+  }
+  return {0, 0, z};
+}
+
 bool Region::contains(const Vec3& x) const {
   switch (kind) {
     case Kind::kBox:
@@ -240,7 +269,7 @@ void validate(const Scene& scene) {
   check_range("ground.z", scene.ground.z, -100, 100, "m");
   check_friction("ground.friction", scene.ground.friction);
 
-  std::set<std::string> material_names, body_names, tool_names;
+  std::set<std::string> material_names, body_names, tool_names, anchor_names;
   for (std::size_t i = 0; i < scene.materials.size(); ++i) {
     check_material(at("materials", i), scene.materials[i], material_names);
   }
@@ -263,7 +292,11 @@ void validate(const Scene& scene) {
       check_region(inclusion + ".region", body.inclusions[k].region);
     }
     for (std::size_t k = 0; k < body.anchors.size(); ++k) {
-      check_region(path + "." + at("anchors", k), body.anchors[k]);
+      const std::string anchor = path + "." + at("anchors", k), &name = body.anchors[k].name;
+      check_region(anchor, body.anchors[k]);
+      if (name.empty()) continue;
+      check_ros_name(anchor + ".name", name);
+      check_name(anchor + ".name", name, anchor_names);
     }
   }
   for (std::size_t i = 0; i < scene.tools.size(); ++i) {

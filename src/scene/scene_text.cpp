@@ -52,6 +52,12 @@ std::vector<std::string> fields_of(ToolType type) {
       return {"radius", "length"};
     case ToolType::kGrasper:
       return {"jaw_length", "jaw_width", "grip_pressure", "cohesion"};
+    case ToolType::kBall:
+      return {"radius"};
+    case ToolType::kPunch:
+      return {"radius", "length", "edge_radius"};
+    case ToolType::kPlate:
+      return {"size", "edge_radius"};
   }
   return {};
 }

@@ -42,7 +42,8 @@ inline constexpr Spelling<Shape> kShapeNames[] = {{Shape::kBox, "box"},
                                                   {Shape::kCylinder, "cylinder"},
                                                   {Shape::kMesh, "mesh"}};
 inline constexpr Spelling<ToolType> kToolTypeNames[] = {
-    {ToolType::kScalpel, "scalpel"}, {ToolType::kProbe, "probe"}, {ToolType::kGrasper, "grasper"}};
+    {ToolType::kScalpel, "scalpel"}, {ToolType::kProbe, "probe"}, {ToolType::kGrasper, "grasper"},
+    {ToolType::kBall, "ball"},       {ToolType::kPunch, "punch"}, {ToolType::kPlate, "plate"}};
 
 /// The name of an enum's value; nullptr for a value that the enum does not have.
 template <class Enum, std::size_t N>

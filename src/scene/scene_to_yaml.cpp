@@ -46,8 +46,9 @@ void write(YAML::Emitter& out, const char* name, const Quat& q) {
   out << text(q.x()) << text(q.y()) << text(q.z()) << text(q.w()) << EndSeq;
 }
 
-void write(YAML::Emitter& out, const Region& region) {
+void write(YAML::Emitter& out, const Region& region, const std::string& name_of_anchor = "") {
   out << Flow << BeginMap;
+  if (!name_of_anchor.empty()) write(out, "name", name_of_anchor);
   switch (region.kind) {
     case Region::Kind::kBelow:
       write(out, "below", region.z);
@@ -112,7 +113,7 @@ void write(YAML::Emitter& out, const Body& body) {
   for (const Inclusion& inclusion : body.inclusions) write(out, inclusion);
   out << EndSeq;
   out << Key << "anchors" << Value << BeginSeq;
-  for (const Region& region : body.anchors) write(out, region);
+  for (const Anchor& anchor : body.anchors) write(out, anchor, anchor.name);
   out << EndSeq << EndMap;
 }
 
@@ -123,6 +124,8 @@ void write(YAML::Emitter& out, const Tool& tool) {
   for (const std::string& field : fields_of(tool.type)) {
     if (field == "radius") write(out, "radius", tool.radius);
     if (field == "length") write(out, "length", tool.length);
+    if (field == "edge_radius") write(out, "edge_radius", tool.edge_radius);
+    if (field == "size") write(out, "size", tool.size);
     if (field == "blade_length") write(out, "blade_length", tool.blade_length);
     if (field == "blade_width") write(out, "blade_width", tool.blade_width);
     if (field == "blade_thickness") write(out, "blade_thickness", tool.blade_thickness);

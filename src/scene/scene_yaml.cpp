@@ -68,6 +68,19 @@ Region read_region(const YAML::Node& node, const std::string& path) {
   return region;
 }
 
+Anchor read_anchor(const YAML::Node& node, const std::string& path) {
+  if (!node.IsMap() || !node["name"]) return read_region(node, path);
+  YAML::Node region(YAML::NodeType::Map);
+  for (const auto& field : node) {
+    if (field.first.as<std::string>() != "name") region[field.first] = field.second;
+  }
+  Anchor anchor = read_region(region, path);
+  YAML::Node named(YAML::NodeType::Map);
+  named["name"] = node["name"];
+  YamlFields(named, path, {"name"}).read("name", anchor.name);
+  return anchor;
+}
+
 Material read_material(const YAML::Node& node, const std::string& path) {
   const YamlFields fields(node, path,
                           {"name", "law", "young_modulus", "poisson_ratio", "density", "viscosity",
@@ -121,7 +134,7 @@ Body read_body(const YAML::Node& node, const std::string& path) {
     body.inclusions.push_back(read_inclusion(item, item_path));
   });
   fields.read_list("anchors", [&](const YAML::Node& item, const std::string& item_path) {
-    body.anchors.push_back(read_region(item, item_path));
+    body.anchors.push_back(read_anchor(item, item_path));
   });
   return body;
 }
@@ -129,7 +142,7 @@ Body read_body(const YAML::Node& node, const std::string& path) {
 Tool read_tool(const YAML::Node& node, const std::string& path) {
   const YamlFields fields(
       node, path,
-      {"name", "type", "radius", "length", "blade_length", "blade_width", "blade_thickness",
+      {"name", "type", "radius", "length", "edge_radius", "size", "blade_length", "blade_width", "blade_thickness",
        "jaw_length", "jaw_width", "grip_pressure", "cohesion", "friction"});
   Tool tool;
   fields.read("name", tool.name);
@@ -137,6 +150,8 @@ Tool read_tool(const YAML::Node& node, const std::string& path) {
   refuse_foreign(fields, tool.type, kToolTypeNames);
   fields.read("radius", tool.radius);
   fields.read("length", tool.length);
+  fields.read("edge_radius", tool.edge_radius);
+  fields.read("size", tool.size);
   fields.read("blade_length", tool.blade_length);
   fields.read("blade_width", tool.blade_width);
   fields.read("blade_thickness", tool.blade_thickness);

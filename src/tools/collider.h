@@ -8,15 +8,16 @@
 namespace tissue_sim {
 
 struct Collider {
-  enum Kind { kPlane, kCapsule, kBlade, kJaw } kind = kPlane;
+  enum Kind { kPlane, kCapsule, kBlade, kJaw, kPunch, kPlate } kind = kPlane;
   float position[3] = {};                           ///< of the tip; of a point of the plane [m]
   float rotation[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1};  ///< local to world, row-major
   float velocity[3] = {};                           ///< of the tip [m/s]
   float spin[3] = {};                               ///< angular velocity, world axes [rad/s]
-  float length = 0;     ///< capsule, blade, jaw: along local -z from the tip [m]
-  float radius = 0;     ///< capsule, jaw [m]
-  float width = 0;      ///< blade: along local -x from the edge [m]
-  float thickness = 0;  ///< blade: along local y [m]
+  float length = 0;     ///< along local -z from the tip [m]
+  float radius = 0;     ///< capsule, jaw, punch [m]
+  float width = 0;      ///< blade: along local -x from the edge; plate: along local x [m]
+  float thickness = 0;  ///< blade, plate: along local y [m]
+  float edge = 0;       ///< punch, plate: radius of the rounded edge [m]
   float friction = 0;   ///< Coulomb
   float cohesion = 0;   ///< what holds a point beside friction: a jaw's teeth [N]
   int tool = -1;        ///< index into Scene::tools, -1 for the ground
@@ -48,14 +49,55 @@ TISSUE_SIM_INLINE void to_world(const Collider& c, const float* local, float* x)
   }
 }
 
+/// Distance of p from a box about the origin with these half edges, negative inside, and the unit
+/// normal there; with `axes` = 2 from a rectangle.
+TISSUE_SIM_INLINE float box_distance(const float* p, const float* half, int axes, float* n) {
+  float outside2 = 0, inside = -1e30f;
+  int nearest = 0;
+  for (int i = 0; i < axes; ++i) {
+    const float d = fabsf(p[i]) - half[i];
+    n[i] = d > 0 ? copysignf(d, p[i]) : 0;
+    outside2 += n[i] * n[i];
+    if (d > inside) inside = d, nearest = i;
+  }
+  if (outside2 > 0) {
+    const float outside = sqrtf(outside2);
+    for (int i = 0; i < axes; ++i) n[i] /= outside;
+    return outside;
+  }
+  n[nearest] = copysignf(1.0f, p[nearest]);
+  return inside;
+}
+
+/// The cylinder up the shaft from the tip, or the box, with rounded edges: p is local.
+TISSUE_SIM_INLINE float rounded_distance(const Collider& c, const float* p, float* n) {
+  if (c.kind == Collider::kPlate) {
+    const float half[3] = {0.5f * c.width - c.edge, 0.5f * c.thickness - c.edge,
+                           0.5f * c.length - c.edge};
+    const float q[3] = {p[0], p[1], p[2] + 0.5f * c.length};
+    return box_distance(q, half, 3, n) - c.edge;
+  }
+  const float s = sqrtf(p[0] * p[0] + p[1] * p[1]);
+  const float q[2] = {s, p[2] + 0.5f * c.length};
+  const float half[2] = {c.radius - c.edge, 0.5f * c.length - c.edge};
+  float m[2];
+  const float distance = box_distance(q, half, 2, m) - c.edge;
+  n[0] = s > 0 ? m[0] * p[0] / s : m[0];
+  n[1] = s > 0 ? m[0] * p[1] / s : 0;
+  n[2] = m[1];
+  return distance;
+}
+
 /// The half space below the plane (normal local z); the capsule from the tip up the shaft; the half
 /// of such a capsule at local x < 0, which is a jaw; the two flats of the blade (its edge does not
-/// push: it cuts).
+/// push: it cuts); the punch and the plate with their edges rounded.
 TISSUE_SIM_INLINE Gap gap(const Collider& c, const float* x) {
   float p[3], n[3] = {0, 0, 1}, distance = 1e30f;
   to_local(c, x, p);
   if (c.kind == Collider::kPlane) {
     distance = p[2];
+  } else if (c.kind >= Collider::kPunch) {
+    distance = rounded_distance(c, p, n);
   } else if (c.kind != Collider::kBlade) {
     const float along = fminf(fmaxf(p[2], -c.length), -c.radius);
     const float d[3] = {p[0], p[1], p[2] - along};

@@ -11,11 +11,14 @@ Box bounds(const Collider& c) {
     box.max = Vec3(1e6, 1e6, c.position[2]);
     return box;
   }
-  const float x0 = c.kind == Collider::kBlade ? -c.width : -c.radius;
-  const float x1 = c.kind == Collider::kCapsule ? c.radius : 0;
-  const float y = c.kind == Collider::kBlade ? 0.5f * c.thickness : c.radius;
+  const bool is_plate = c.kind == Collider::kPlate, is_blade = c.kind == Collider::kBlade;
+  const float x0 = is_plate ? -0.5f * c.width : is_blade ? -c.width : -c.radius;
+  const float x1 = is_plate ? -x0 : c.kind == Collider::kJaw || is_blade ? 0 : c.radius;
+  const float y = is_plate || is_blade ? 0.5f * c.thickness : c.radius;
+  // A capsule whose shaft is shorter than its ball reaches beyond its length.
+  const float low = c.kind == Collider::kCapsule ? -fmaxf(c.length, c.radius) - c.radius : -c.length;
   for (int i = 0; i < 8; ++i) {
-    const float corner[3] = {i & 1 ? x1 : x0, i & 2 ? y : -y, i & 4 ? 0 : -c.length};
+    const float corner[3] = {i & 1 ? x1 : x0, i & 2 ? y : -y, i & 4 ? 0 : low};
     float world[3];
     to_world(c, corner, world);
     const Vec3 w(world[0], world[1], world[2]);

@@ -51,6 +51,23 @@ ToolPath::ToolPath(const Tool& tool, int index, const ToolMotion& motion, double
       shape_.radius = static_cast<float>(0.5 * tool.jaw_width);
       shape_.cohesion = static_cast<float>(tool.cohesion * point_area);
       break;
+    case ToolType::kBall:
+      shape_.kind = Collider::kCapsule;
+      shape_.length = shape_.radius = static_cast<float>(tool.radius);
+      break;
+    case ToolType::kPunch:
+      shape_.kind = Collider::kPunch;
+      shape_.length = static_cast<float>(tool.length);
+      shape_.radius = static_cast<float>(tool.radius);
+      shape_.edge = static_cast<float>(tool.edge_radius);
+      break;
+    case ToolType::kPlate:
+      shape_.kind = Collider::kPlate;
+      shape_.width = static_cast<float>(tool.size.x());
+      shape_.thickness = static_cast<float>(tool.size.y());
+      shape_.length = static_cast<float>(tool.size.z());
+      shape_.edge = static_cast<float>(tool.edge_radius);
+      break;
   }
   shape_.friction = static_cast<float>(tool.friction);
   shape_.tool = index;

@@ -25,11 +25,10 @@ void find_filled(Block& block) {
   block.filled.assign(block.nz, {});
   block.filled_columns.assign(block.stride, 0);
   for (int z = 0; z < block.nz; ++z) {
-    const std::int32_t* points =
-        block.point.data() + static_cast<std::size_t>(z) * 8 * block.stride;
+    const float* volume = block.volume.data() + static_cast<std::size_t>(z) * 8 * block.stride;
     for (int j = 0; j < block.stride; ++j) {
       int s = 0;
-      while (s < 8 && points[s * block.stride + j] < 0) ++s;
+      while (s < 8 && volume[s * block.stride + j] <= 0) ++s;
       if (s == 8) continue;
       block.filled_columns[j] = 1;
       std::vector<Block::Span>& spans = block.filled[z];

@@ -11,6 +11,7 @@
 
 #include "compute/array.h"
 #include "mpm/contact/facets.h"
+#include "mpm/contact/surface_place.h"
 #include "tissue_sim/material.h"
 
 namespace tissue_sim {
@@ -51,7 +52,7 @@ struct Block {
     int node;          ///< the same in Nodes, -1 where no point sees them
   };
   std::vector<NodeRow> node_rows;         ///< in the order of the block's nodes
-  std::vector<std::vector<Span>> filled;  ///< [nz]: lanes whose cells hold points, in order
+  std::vector<std::vector<Span>> filled;  ///< [nz]: lanes whose cells hold points that move
   std::vector<std::uint8_t>
       filled_columns;  ///< [stride]: whether a lane's cell does in any z-plane
   /// [stride]: lowest node of the lane's cell, y * pitch + x; 0 in padding. The node at dx, dy, dz
@@ -86,6 +87,7 @@ struct Block {
       node;  ///< [nz + 2][plane], in Nodes, -1 for none; split ones as this block sees them
 
   std::vector<Facet> facets;  ///< its surface and cut faces
+  std::vector<SurfacePlace> surface;  ///< where tools touch these
 
   /// The largest P-wave modulus of its points, as they are deformed [Pa]: when the limit of the
   /// substep was measured last, and after the last frame; 0 before. See SubstepChoice.

@@ -6,6 +6,7 @@
 
 #include "mpm/blocks/fill_region.h"
 #include "mpm/contact/known_facets.h"
+#include "mpm/contact/surface_places.h"
 
 namespace tissue_sim {
 namespace {
@@ -142,6 +143,7 @@ void finish_regions(Blocks& blocks, const std::vector<NewRegion>& anew,
              cpu.for_each(static_cast<int>(made.size()), [&](int i) {
                Block& b = *made[i].first;
                b.facets = facets_of(bodies[b.body], points, b, *made[i].second);
+               if (blocks.has_rows) b.surface = surface_places_of(bodies[b.body], points, b);
              });
            });
 }

@@ -90,7 +90,8 @@ void fill_side(Block& block, const LatticeBody& b, const Points& points, const P
   for (const CellShare& c : part.sheet->cells) {
     const int x = side.column + c.x - part.lo[0], z = c.z - part.lo[2];
     const int column = lane_of[(c.y - first_y) * block.nx + x];
-    double mu = 0;
+    std::vector<double> mu(c.cells, 0.0);
+    std::vector<int> count(c.cells, points.free_volume.empty() ? c.count : 0);
     for (int s = 0; s < 8; ++s) {
       if (c.point[s] < 0) continue;
       const std::size_t lane = (static_cast<std::size_t>(z) * 8 + s) * block.stride + column;
@@ -100,16 +101,19 @@ void fill_side(Block& block, const LatticeBody& b, const Points& points, const P
         point[i] = c.point[s] + 2 * i;
         volume[i] = points.volume[point[i]];
       }
-      if (!points.soft.empty()) {
+      if (!points.soft.empty() || !points.free_volume.empty()) {
         for (int i = 0; i < c.cells; ++i) volume[i] = elastic_volume(points, point[i]);
       }
-      if (c.count < kSteadyCount) {
-        mu += lame_mu(b.material_of(points, c.point[s])) * block.volume[lane];
+      for (int i = 0; i < c.cells; ++i) {
+        mu[i] += lame_mu(b.material_of(points, point[i])) * volume[i];
+        if (!points.free_volume.empty() && volume[i] > 0) ++count[i];
       }
     }
-    if (c.count >= kSteadyCount) continue;
-    block.partial.push_back(
-        {z * block.stride + column, z * block.plane + block.cell[column], static_cast<float>(mu)});
+    for (int i = 0; i < c.cells; ++i) {
+      if (count[i] >= kSteadyCount || count[i] == 0) continue;
+      block.partial.push_back({z * block.stride + column + i,
+                               z * block.plane + block.cell[column + i], static_cast<float>(mu[i])});
+    }
   }
 }
 

@@ -6,6 +6,8 @@
 #include <tuple>
 
 #include "contact/contact_spring.h"
+#include "contact/surface_spring.h"
+#include "mpm/contact/face_places.h"
 #include "mpm/contact/facet_motion.h"
 #include "mpm/lattice/bonds.h"
 #include "mpm/lattice/cell_points.h"
@@ -23,7 +25,19 @@ ContactSpring unit_spring(const LatticeBody& body, int material) {
 }
 
 bool comes_before(const Touch& a, const Touch& b) {
-  return std::tie(a.collider, a.cell, a.sub) < std::tie(b.collider, b.cell, b.sub);
+  return std::tie(a.collider, a.cell, a.key) < std::tie(b.collider, b.cell, b.key);
+}
+
+/// cof F n, which carries normals.
+void cofactor_times(const float (&F)[9], const float (&n)[3], float (&to)[3]) {
+  for (int i = 0; i < 3; ++i) {
+    const int i1 = (i + 1) % 3, i2 = (i + 2) % 3;
+    to[i] = 0;
+    for (int j = 0; j < 3; ++j) {
+      const int j1 = (j + 1) % 3, j2 = (j + 2) % 3;
+      to[i] += (F[3 * i1 + j1] * F[3 * i2 + j2] - F[3 * i1 + j2] * F[3 * i2 + j1]) * n[j];
+    }
+  }
 }
 
 /// The place of a point in its cell: x + 2 y + 4 z.
@@ -53,6 +67,8 @@ bool overlap(const Box& a, const Box& b) {
 /// may come in that time [cells].
 constexpr int kListLasts = 8;
 constexpr double kListMargin = 0.5;
+/// How far from the points of a cell its surface may be [cells].
+constexpr double kSurfaceReach = 0.5;
 
 /// How much nearer a block's points and a collider may come in a substep [m].
 double approach(const MpmState& state, int block, const Collider& collider, float dt) {
@@ -76,7 +92,8 @@ void find_near_colliders(MpmState& state, const std::vector<Box>& reach, double 
       box.min = box.min.cwiseMin(before[i].box.min);
       box.max = box.max.cwiseMax(before[i].box.max);
     }
-    const double margin = state.motion[i].speed * duration + 0.5 * state.scene.cell_size;
+    const double margin =
+        state.motion[i].speed * duration + (0.5 + kSurfaceReach) * state.scene.cell_size;
     box.min.array() -= margin;
     box.max.array() += margin;
     for (std::size_t c = 0; c < reach.size(); ++c) {
@@ -89,8 +106,11 @@ void find_near_colliders(MpmState& state, const std::vector<Box>& reach, double 
 bool came_unforeseen(const MpmState& state, const std::vector<Box>& reach) {
   for (std::size_t i = 0; i < state.motion.size(); ++i) {
     const std::vector<std::uint8_t>& near = state.contacts.near[i];
+    Box box = state.motion[i].box;
+    box.min.array() -= kSurfaceReach * state.scene.cell_size;
+    box.max.array() += kSurfaceReach * state.scene.cell_size;
     for (std::size_t c = 0; c < reach.size(); ++c) {
-      if (!overlap(state.motion[i].box, reach[c])) continue;
+      if (!overlap(box, reach[c])) continue;
       if (std::find(near.begin(), near.end(), c) == near.end()) return true;
     }
   }
@@ -103,6 +123,7 @@ void list_contacts(MpmState& state) {
   contacts.touching.assign(state.blocks.all.size(), {});
   contacts.near.assign(state.blocks.all.size(), {});
   contacts.cells.assign(state.blocks.all.size(), {});
+  contacts.changes.assign(state.blocks.all.size(), {});
   if (before.empty()) return;  // on a GPU
   for (std::size_t i = 0; i < state.blocks.all.size(); ++i) {
     const Block& block = *state.blocks.all[i];
@@ -112,12 +133,14 @@ void list_contacts(MpmState& state) {
         const Points::Site& site = state.points.site[touch.point];
         touch.cell = first_lane(block, touch.point, site);
         if (touch.cell < 0) continue;
-        touch.sub = static_cast<std::uint8_t>(sub_position(site));
+        const int sub = sub_position(site);
+        touch.key = static_cast<std::uint8_t>(touch.key < 8 ? sub : 8 * (sub + 1) + touch.key % 8);
         touches.push_back(touch);
       }
     }
     std::sort(touches.begin(), touches.end(), comes_before);
   }
+  tidy_inertia(state, true);
 }
 
 bool is_list_due(Contacts& contacts) {
@@ -139,9 +162,12 @@ void list_near_cells(MpmState& state, int index, float dt) {
   float* x = scratch.values.data();
   state.kernels->positions(block, block_field(state, block), state.nodes.u, scratch, x);
   std::vector<std::uint8_t> points(static_cast<std::size_t>(block.nz) * block.stride);  // of cells
+  std::vector<std::uint8_t> near(points.size());
   for (const std::uint8_t c : state.contacts.near[index]) {
     const Collider& collider = state.colliders[c];
-    const double margin = kListLasts * approach(state, index, collider, dt);
+    const bool is_blade = collider.kind == Collider::kBlade;
+    const double margin = kListLasts * approach(state, index, collider, dt) +
+                          (is_blade ? 0 : kSurfaceReach * body.cell_size);
     const Box box = bounds(collider);
     float min[3], max[3];
     for (int a = 0; a < 3; ++a) {
@@ -149,28 +175,41 @@ void list_near_cells(MpmState& state, int index, float dt) {
       max[a] = static_cast<float>(box.max[a] + margin);
     }
     std::fill(points.begin(), points.end(), std::uint8_t{0});
+    std::fill(near.begin(), near.end(), std::uint8_t{0});
     const int found = state.kernels->lanes_in_box(x, lanes, min, max, scratch.lanes.data());
     for (int f = 0; f < found; ++f) {
       const int lane = scratch.lanes[f];
       const std::int32_t p = block.point[lane];
       if (p < 0) continue;
       // The flats of a blade push where it has cut.
-      if (collider.kind == Collider::kBlade && state.points.bonds[p] == kAllBonds) continue;
+      const bool in_body = state.points.bonds[p] == kAllBonds;
+      if (is_blade && in_body) continue;
       const float at[3] = {x[lane], x[lanes + lane], x[2 * lanes + lane]};
       // Where the flats of a blade end, its gap does: there the box must do.
-      if (collider.kind != Collider::kBlade && gap(collider, at).distance > margin) continue;
-      const int row = lane / block.stride;
-      points[row / 8 * block.stride + lane % block.stride] |= 1u << row % 8;
+      if (!is_blade && gap(collider, at).distance > margin) continue;
+      const int row = lane / block.stride, cell = row / 8 * block.stride + lane % block.stride;
+      near[cell] = 1;
+      // Others touch over their places on the surface.
+      if (is_blade || in_body) points[cell] |= 1u << row % 8;
     }
+    auto place = block.surface.begin();
     for (int z = 0, i = 0; z < block.nz; ++z) {
       for (int lane = 0; lane < block.stride; ++lane, ++i) {
-        if (points[i] == 0) continue;
+        if (near[i] == 0) continue;
+        const std::int32_t cell = z * 8 * block.stride + lane;
+        while (place != block.surface.end() && place->cell < cell) ++place;
+        const auto first = place;
+        while (place != block.surface.end() && place->cell == cell) ++place;
+        const int count = is_blade ? 0 : static_cast<int>(place - first);
+        if (points[i] == 0 && count == 0) continue;
         const int node = z * block.plane + block.cell[lane];
         const Vec3 middle = reference_place(body, block, node, {});
-        cells.push_back({z * 8 * block.stride + lane,
+        cells.push_back({cell,
                          node,
                          c,
                          points[i],
+                         static_cast<std::int32_t>(first - block.surface.begin()),
+                         count,
                          {static_cast<float>(middle[0]), static_cast<float>(middle[1]),
                           static_cast<float>(middle[2])}});
       }
@@ -178,17 +217,198 @@ void list_near_cells(MpmState& state, int index, float dt) {
   }
 }
 
+namespace {
+
+/// What one block's contact adds up to.
+struct BlockPush {
+  MpmState& state;
+  const Block& block;
+  const LatticeBody& body;
+  float dt;
+  float* force;
+  std::vector<Touch>::const_iterator held, held_end;
+  std::vector<InertiaChange>& changes;
+  std::vector<Touch> touching = {};
+
+  /// What the point had before, if it touched the collider then.
+  bool find_held(Touch& touch) {
+    while (held != held_end && comes_before(*held, touch)) let_go(*held++);
+    if (held == held_end || comes_before(touch, *held)) return false;
+    touch = *held++;
+    return true;
+  }
+  void let_go_of_rest() {
+    while (held != held_end) let_go(*held++);
+  }
+  void let_go(const Touch& touch) {
+    if (touch.inertia == 0) return;
+    const auto place = std::lower_bound(
+        block.surface.begin(), block.surface.end(), touch, [](const SurfacePlace& p, const Touch& t) {
+          return std::tie(p.cell, p.key) < std::tie(t.cell, t.key);
+        });
+    change(-1, false, *place, touch, nullptr);
+  }
+  void change(float sign, bool begins, const SurfacePlace& place, const Touch& touch,
+              const float* velocity) {
+    InertiaChange c{sign, begins, place.node, touch.collider, {}, {}, touch.inertia, {}};
+    for (int a = 0; a < 3; ++a) {
+      c.place[a] = place.place[a];
+      c.normal[a] = touch.along[a];
+      if (velocity != nullptr) c.velocity[a] = velocity[a];
+    }
+    changes.push_back(c);
+  }
+};
+
+void add_load(const Collider& collider, const float* at, const float* push, double points,
+              ColliderLoad& load) {
+  load.points += points;
+  double arm[3];
+  for (int a = 0; a < 3; ++a) {
+    load.force[a] -= push[a];
+    arm[a] = static_cast<double>(at[a]) - collider.position[a];
+  }
+  for (int a = 0; a < 3; ++a) {
+    const int b = (a + 1) % 3, d = (a + 2) % 3;
+    load.torque[a] -= arm[b] * push[d] - arm[d] * push[b];
+  }
+}
+
+/// Pushes on the points of a cell that are within the body, where a tool is so thin that it came
+/// between places of the surface; and a blade's on all. Returns whether any touches; else `clear`
+/// becomes the distance of the nearest.
+bool push_points(BlockPush& b, const NearCell& cell, const Collider& collider, ColliderLoad& load,
+                 float& clear) {
+  const auto quarter = static_cast<float>(0.25 * b.body.cell_size);
+  const CellNodes nodes(b.block, cell.node);
+  Vec<4> u[8], v[8], pushes[8];
+  values_at_points(b.state.nodes.u, nodes, u);
+  bool touches = false;
+  for (unsigned points = cell.points; points != 0; points &= points - 1) {
+    const int s = __builtin_ctz(points), lane = cell.lane + s * b.block.stride;
+    const float at[3] = {cell.middle[0] + (s & 1 ? quarter : -quarter) + u[s][0],
+                         cell.middle[1] + (s & 2 ? quarter : -quarter) + u[s][1],
+                         cell.middle[2] + (s & 4 ? quarter : -quarter) + u[s][2]};
+    const Gap g = gap(collider, at);
+    if (g.distance >= 0) {
+      clear = std::min(clear, clearance(collider, at));
+      continue;
+    }
+    if (!touches) {
+      touches = true;
+      values_at_points(b.state.nodes.v, nodes, v);
+      std::fill_n(pushes, 8, Vec<4>{});
+    }
+    const std::int32_t p = b.block.point[lane];
+    Touch touch{cell.lane, p, static_cast<std::uint8_t>(s), cell.collider, {}, {}};
+    if (!b.find_held(touch)) to_local(collider, at, touch.hold);
+    const ContactSpring unit = unit_spring(b.body, b.state.points.material_of(p));
+    const float volume = b.state.points.volume[p], velocity[3] = {v[s][0], v[s][1], v[s][2]};
+    float push[3];
+    contact_force(collider, g, {unit.stiffness * volume, unit.damping * volume}, at, velocity,
+                  touch.hold, push);
+    b.touching.push_back(touch);
+    if (b.block.volume[lane] > 0) pushes[s] = Vec<4>{push[0], push[1], push[2], 0.0f};
+    add_load(collider, at, push, 1, load);
+  }
+  if (touches) spread(b.block, cell.node, pushes, b.force);
+  return touches;
+}
+
+/// A node field at a place in a cell.
+void value_at(const Array<float>* field, const CellNodes& cell, bool has_whole_rows,
+              const AxisWeights& weights, float (&value)[3]) {
+  const float* const f[3] = {field[0].data(), field[1].data(), field[2].data()};
+  const auto first = [&cell](int i) { return cell.row(i % 3, i / 3); };
+  if (has_whole_rows) {
+    sum_rows(weights, value, [&](int i, int c) { return load<4>(f[c] + *first(i)); });
+  } else {
+    sum_rows(weights, value, [&](int i, int c) {
+      const std::int32_t* n = first(i);
+      return Vec<4>{f[c][n[0]], f[c][n[1]], f[c][n[2]], 0.0f};
+    });
+  }
+}
+
+/// The same on its places on the surface.
+bool push_surface(BlockPush& b, const NearCell& cell, const Collider& collider, ColliderLoad& load,
+                  float& clear) {
+  constexpr float kFacing = -0.1f, kTurned = 0.98f;  // cosines: of a surface that faces the tool,
+                                                     // and of an inerter that still fits
+  const CellNodes nodes(b.block, cell.node);
+  const bool whole_rows = has_whole_rows(nodes);
+  const auto h = static_cast<float>(b.body.cell_size);
+  const float unit_area = 0.25f * h * h;
+  const float dt2 = b.state.contacts.inertia.dt * b.state.contacts.inertia.dt;
+  bool touches = false;
+  for (int i = 0; i < cell.place_count; ++i) {
+    const SurfacePlace& place = b.block.surface[cell.first_place + i];
+    const AxisWeights weights(place.place);
+    float u[3], at[3];
+    value_at(b.state.nodes.u, nodes, whole_rows, weights, u);
+    for (int a = 0; a < 3; ++a) at[a] = cell.middle[a] + place.place[a] * h + u[a];
+    const Gap g = gap(collider, at);
+    if (g.distance >= 0) {
+      clear = std::min(clear, g.distance);
+      continue;
+    }
+    Touch touch{cell.lane, place.point, place.key, cell.collider, {}, {}};
+    const bool is_held = b.find_held(touch);
+    if (!is_held) {
+      float F[9], n[3], along = 0, length = 0;
+      deformation_gradient_at(b.state.nodes.u, nodes, b.body.cell_size, place.place, F);
+      cofactor_times(F, place.normal, n);
+      for (int a = 0; a < 3; ++a) {
+        along += n[a] * g.normal[a];
+        length += n[a] * n[a];
+      }
+      if (along > kFacing * std::sqrt(length)) continue;  // the far side of something thin
+      to_local(collider, at, touch.hold);
+    }
+    touches = true;
+    const bool is_free = b.state.points.free_volume_of(place.point) > 0;
+    const Material& m = b.body.material_of(b.state.points, place.point);
+    SurfaceSpring spring =
+        surface_spring(static_cast<float>(lame_lambda(m) + 2 * lame_mu(m)),
+                       static_cast<float>(m.density), h, place.area, b.dt);
+    spring.cohesion = collider.cohesion * place.area / unit_area;
+    float velocity[3], push[3], of_collider[3];
+    value_at(b.state.nodes.v, nodes, whole_rows, weights, velocity);
+    surface_force(collider, g, spring, at, velocity, touch.hold, push);
+    if (is_free) {
+      spread(b.block, cell.node, weights, push, b.force);
+      float along = 0;
+      for (int a = 0; a < 3; ++a) along += touch.along[a] * g.normal[a];
+      if (touch.inertia == 0 || along < kTurned) {
+        if (touch.inertia > 0) b.change(-1, false, place, touch, nullptr);
+        const bool begins = !is_held;
+        touch.inertia = kInertia * spring.across * dt2;
+        std::copy_n(g.normal, 3, touch.along);
+        velocity_at(collider, at, of_collider);
+        b.change(1, begins, place, touch, of_collider);
+      }
+    }
+    b.touching.push_back(touch);
+    add_load(collider, at, push, place.area / unit_area, load);
+  }
+  return touches;
+}
+
+}  // namespace
+
 void add_contact(MpmState& state, int index, float dt, float* force,
                  std::vector<ColliderLoad>& loads) {
   Contacts& contacts = state.contacts;
   const Block& block = *state.blocks.all[index];
-  const LatticeBody& body = state.bodies[block.body];
-  const auto quarter = static_cast<float>(0.25 * body.cell_size);
-  int material = std::max(0, block.material);
-  ContactSpring unit = unit_spring(body, material);
-  auto held = contacts.touching[index].begin();
-  const auto held_end = contacts.touching[index].end();
-  std::vector<Touch> touching;
+  contacts.changes[index].clear();
+  BlockPush b{state,
+              block,
+              state.bodies[block.body],
+              dt,
+              force,
+              contacts.touching[index].cbegin(),
+              contacts.touching[index].cend(),
+              contacts.changes[index]};
   for (NearCell& cell : contacts.cells[index]) {
     if (cell.clear > 0) {
       --cell.clear;
@@ -196,64 +416,16 @@ void add_contact(MpmState& state, int index, float dt, float* force,
     }
     const Collider& collider = state.colliders[cell.collider];
     ColliderLoad& load = loads[cell.collider];
-    const CellNodes nodes(block, cell.node);
-    Vec<4> u[8], v[8], pushes[8];
-    values_at_points(state.nodes.u, nodes, u);
-    bool touches = false;
     float clear = std::numeric_limits<float>::max();
-    for (unsigned points = cell.points; points != 0; points &= points - 1) {
-      const int s = __builtin_ctz(points), lane = cell.lane + s * block.stride;
-      const float at[3] = {cell.middle[0] + (s & 1 ? quarter : -quarter) + u[s][0],
-                           cell.middle[1] + (s & 2 ? quarter : -quarter) + u[s][1],
-                           cell.middle[2] + (s & 4 ? quarter : -quarter) + u[s][2]};
-      const Gap g = gap(collider, at);
-      if (g.distance >= 0) {
-        clear = std::min(clear, clearance(collider, at));
-        continue;
-      }
-      if (!touches) {
-        touches = true;
-        values_at_points(state.nodes.v, nodes, v);
-        std::fill_n(pushes, 8, Vec<4>{});
-      }
-      const std::int32_t p = block.point[lane];
-      Touch touch{cell.lane, p, static_cast<std::uint8_t>(s), cell.collider, {}};
-      while (held != held_end && comes_before(*held, touch)) ++held;
-      if (held != held_end && !comes_before(touch, *held)) {
-        touch = *held;
-      } else {
-        to_local(collider, at, touch.hold);
-      }
-      if (state.points.material_of(p) != material) {
-        material = state.points.material_of(p);
-        unit = unit_spring(body, material);
-      }
-      const float volume = block.volume[lane], velocity[3] = {v[s][0], v[s][1], v[s][2]};
-      float push[3];
-      contact_force(collider, g, {unit.stiffness * volume, unit.damping * volume}, at, velocity,
-                    touch.hold, push);
-      touching.push_back(touch);
-      pushes[s] = Vec<4>{push[0], push[1], push[2], 0.0f};
-      load.points += 1;
-      double arm[3];
-      for (int a = 0; a < 3; ++a) {
-        load.force[a] -= push[a];
-        arm[a] = static_cast<double>(at[a]) - collider.position[a];
-      }
-      for (int a = 0; a < 3; ++a) {
-        const int b = (a + 1) % 3, d = (a + 2) % 3;
-        load.torque[a] -= arm[b] * push[d] - arm[d] * push[b];
-      }
-    }
-    if (touches) {
-      spread(block, cell.node, pushes, force);
-    } else {
-      const double nearer = approach(state, index, collider, dt);
-      cell.clear = static_cast<std::uint8_t>(std::min<double>(kListLasts, clear / nearer));
-    }
+    bool touches = cell.points != 0 && push_points(b, cell, collider, load, clear);
+    touches = (cell.place_count > 0 && push_surface(b, cell, collider, load, clear)) || touches;
+    if (touches) continue;
+    const double nearer = approach(state, index, collider, dt);
+    cell.clear = static_cast<std::uint8_t>(std::min<double>(kListLasts, clear / nearer));
   }
   // A point that no longer touches forgets where it was held.
-  contacts.touching[index] = std::move(touching);
+  b.let_go_of_rest();
+  contacts.touching[index] = std::move(b.touching);
 }
 
 }  // namespace tissue_sim

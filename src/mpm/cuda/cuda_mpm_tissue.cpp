@@ -26,6 +26,22 @@ std::unique_ptr<MpmState> make_state(const Scene& scene, std::vector<std::string
   return state;
 }
 
+/// What the CPU does where the scene says so, and this does at the lattice.
+void note_what_differs(const Scene& scene, std::vector<std::string>& notes) {
+  const bool anchors = std::any_of(scene.bodies.begin(), scene.bodies.end(),
+                                   [](const Body& b) { return !b.anchors.empty(); });
+  if (anchors) {
+    notes.emplace_back(
+        "on a GPU anchors hold nodes of the lattice, up to half a cell from their faces, and "
+        "report no loads; device cpu holds tissue at the faces themselves");
+  }
+  if (!scene.tools.empty()) {
+    notes.emplace_back(
+        "on a GPU tools touch the points of tissue, a quarter of a cell or so below its surface, "
+        "with a soft spring; device cpu touches the surface itself");
+  }
+}
+
 int attribute(cudaDeviceAttr which) {
   int value = 0;
   check_cuda(cudaDeviceGetAttribute(&value, which, 0), "be asked");
@@ -53,6 +69,7 @@ CudaMpmTissue::CudaMpmTissue(const Scene& scene, std::vector<std::string> notes)
   d.limits = {properties.multiProcessorCount,
               static_cast<std::size_t>(attribute(cudaDevAttrMaxSharedMemoryPerBlockOptin))};
   state_ = make_state(scene, &notes_);
+  note_what_differs(scene, notes_);
   d.cut_shape = choose_shape(state_->bodies, d.limits, false);
   // What touches other tissue keeps its blocks, which know the contacts.
   make_blocks(
@@ -90,6 +107,13 @@ void CudaMpmTissue::upload_colliders() {
 }
 
 void CudaMpmTissue::begin_frame(double duration, const FrameInput& input) {
+  if (!input.anchors.empty()) {
+    throw std::runtime_error(
+        "anchors do not move on a GPU yet (they hold nodes of the lattice there): set device to "
+        "cpu");
+  }
+  if (input.gravity != nullptr) state_->scene.gravity = *input.gravity;
+  if (input.damping != nullptr) state_->scene.damping = *input.damping;
   input_ = input;
   result_ = {};
   result_.loads.resize(state_->scene.tools.size());

@@ -6,6 +6,7 @@
 #include "frame/select_points.h"
 #include "mpm/cuda/on_device.h"
 #include "mpm/lattice/bonds.h"
+#include "mpm/point_fields.h"
 
 namespace tissue_sim {
 
@@ -39,7 +40,7 @@ int CudaMpmTissue::read_points(const PointSelection& selection, std::vector<std:
   c.stride = stride;
   c.place = nullptr;
   std::vector<std::int32_t> place;
-  if (selection.surface_only || selection.loose_only) {
+  if (selection.surface_only || selection.loose_only || selection.fields != 0) {
     place = select_points(
         selection, pieces_, [&](std::int32_t p) { return points.bonds[p] != kAllBonds; }, count);
     d.place.upload(place, d.stream);
@@ -80,6 +81,10 @@ int CudaMpmTissue::read_points(const PointSelection& selection, std::vector<std:
       std::memcpy(cloud.data() + static_cast<std::size_t>(first) * sizeof(Point),
                   d.host_cloud.data() + first, static_cast<std::size_t>(n) * sizeof(Point));
     });
+  }
+  if (selection.fields != 0) {
+    pull_nodes();
+    add_point_fields(*state_, selection, place, count, cloud);
   }
   return count;
 }

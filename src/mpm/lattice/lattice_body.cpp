@@ -153,9 +153,10 @@ std::vector<LatticeBody> make_lattice_bodies(const Scene& scene, Points& points,
           held = 1;
         }
       }
-      points.anchored.push_back(held);
+      points.anchored.push_back(held == 0 ? 0 : Points::kInAnchor);
     }
-    for (std::size_t r = 0; r < anchored.size(); ++r) {
+    // Where anchors act at their faces, one that lies at the body's own holds it without a point.
+    for (std::size_t r = 0; r < anchored.size() && range == NodeRange::kBox; ++r) {
       if (anchored[r] == 0) refuse_region("anchors", r, scene, body.name, "");
     }
     assign_materials(scene, b, points);

@@ -9,6 +9,7 @@
 #include "compute/array.h"
 #include "mpm/lattice/bonds.h"
 #include "geometry/lattice.h"
+#include "mpm/contact/surface_place.h"
 #include "mpm/lattice/lattice_rows.h"
 #include "tissue_sim/scene.h"
 
@@ -52,13 +53,23 @@ struct Points {
   Array<float> volume;  ///< [m^3]
   Array<std::uint8_t>
       bonds;  ///< bit k: still bound to the neighbour of bond k (mpm/lattice/bonds.h)
-  Array<std::uint8_t> anchored;  ///< lies in an anchored region
+  /// Outside its body's anchors, where it moves, shared with neighbours so that first moments are
+  /// right (mpm/anchors/); empty where there are no anchors, or where they act at nodes [m^3].
+  Array<float> free_volume;
+  Array<std::uint8_t> anchored;  ///< kInAnchor, kAtAnchor or 0
+  static constexpr std::uint8_t kInAnchor = 1;  ///< its place is in an anchor
+  static constexpr std::uint8_t kAtAnchor = 2;  ///< the face of one holds it
   Array<std::uint8_t> material;  ///< in LatticeBody::materials; empty where no body has inclusions
   Array<std::uint8_t> soft;      ///< of a crumb or a slice: mpm/tear/debris.h; empty before any is
+  std::vector<OuterPlace> outer;  ///< true surface of the whole bodies; empty on a GPU
   Crossings crossings;           ///< of the bonds that blades broke; one that tore has none
   int size() const { return static_cast<int>(site.size()); }
   /// Number of a point's material among those of its body.
   int material_of(std::int32_t point) const { return material.empty() ? 0 : material[point]; }
+  /// Volume that moves [m^3].
+  float free_volume_of(std::int32_t point) const {
+    return free_volume.empty() ? volume[point] : free_volume[point];
+  }
   bool is_soft(std::int32_t point) const { return !soft.empty() && soft[point] != 0; }
 };
 

@@ -10,7 +10,7 @@
 namespace tissue_sim {
 namespace {
 
-// A node is held when this share of its mass is anchored. Nodes held up to a place clamp a body as
+// Where anchors do not act at their faces (on a GPU): a node is held when this share of its mass is anchored. Nodes held up to a place clamp a body as
 // a wall a quarter of a cell before it would; with this share that wall is within half a cell of
 // the region's end, on average at it (of a node half a cell outside 16 % of the mass is in the
 // region, of one a cell and a quarter outside 1.6 %).
@@ -49,9 +49,9 @@ void share_mass(const LatticeBody& body, const Points& points, const NodeFields:
         const int x = __builtin_ctz(bits);
         const std::int32_t p = around[6 * row + x];
         const double density = body.material_of(points, p).density;
-        const double mass = w * kTables.weight[x] * density * points.volume[p];
+        const double mass = w * kTables.weight[x] * density * points.free_volume_of(p);
         sum += mass;
-        if (points.anchored[p] != 0) anchored += mass;
+        if (points.free_volume.empty() && points.anchored[p] != 0) anchored += mass;
       }
     });
   }
@@ -71,8 +71,8 @@ double mass_of_point(const LatticeBody& body, const Points& points, const NodeFi
   points_around(body, c.x, c.y, c.z, around);
   for (const std::int32_t p : around) {
     if (p < 0) continue;
-    const double m = body.material_of(points, p).density * points.volume[p];
-    if (points.anchored[p] != 0 || (mass != 0 && m != mass)) return 0;
+    const double m = body.material_of(points, p).density * points.free_volume_of(p);
+    if (points.anchored[p] == Points::kInAnchor || (mass != 0 && m != mass)) return 0;
     mass = m;
   }
   return mass;

@@ -144,6 +144,8 @@ void turn(const LatticeBody& body, const Points& points, const NodeFields& field
 
 void make_rigid(const LatticeBody& body, const Points& points, const NodeFields& fields,
                 const Crumb& of_crumb, Nodes& nodes) {
+  const auto held = [&](std::int32_t p) { return points.anchored[p] != 0; };
+  if (std::any_of(of_crumb.begin(), of_crumb.end(), held)) return;
   const NodesOf crumb(body, points, fields, of_crumb);
   const Material& material = body.material_of(points, of_crumb.point[0]);
   const double fastest_spin =

@@ -28,7 +28,7 @@ Softened soften(const std::vector<LatticeBody>& bodies, const std::vector<std::i
 
 /// The volume by which a point resists strain [m^3]: its own, or less where it is soft.
 inline float elastic_volume(const Points& points, std::int32_t point) {
-  return (points.is_soft(point) ? kSoftness : 1.0f) * points.volume[point];
+  return (points.is_soft(point) ? kSoftness : 1.0f) * points.free_volume_of(point);
 }
 
 /// Lets crumbs, each given by its lowest point, move on as rigid bodies without strain. Their

@@ -1,0 +1,62 @@
+"""Blocks in three dimensions, quadratic elements: sag, pull and vibration of clamped ones."""
+import numpy as np
+import skfem
+from scipy.sparse.linalg import eigsh, splu
+
+from references.neo_hookean import Solid, lame, newton
+
+
+def nodes(length, count, low, high):
+    """`count` elements on [0, length], crowded towards an end where it is flagged."""
+    t = np.linspace(0, 1, count + 1)
+    if low and high:
+        t = 0.5 * (1 - np.cos(np.pi * t)) * 0.6 + 0.4 * t
+    elif low:
+        t = 0.6 * t ** 1.8 + 0.4 * t
+    elif high:
+        t = 1 - (0.6 * (1 - t) ** 1.8 + 0.4 * (1 - t))
+    return length * t
+
+
+class Block:
+    """[x, y, z] in given node planes; `held` are (axis, place, components) that do not move."""
+
+    def __init__(self, planes, young, poisson, held, body_force=None):
+        self.lam, self.mu = lame(young, poisson)
+        self.mesh = skfem.MeshHex.init_tensor(*planes)
+        self.basis = skfem.Basis(self.mesh, skfem.ElementVector(skfem.ElementHex2()), intorder=4)
+        self.solid = Solid(self.basis, lambda x, g, v: g, lambda x: 1.0, self.lam, self.mu, body_force)
+        fixed = [self.dofs(axis, at, components) for axis, at, components in held]
+        self.free = np.setdiff1d(np.arange(self.basis.N), np.concatenate(fixed))
+        self.u = np.zeros(self.basis.N)
+
+    def dofs(self, axis, at, components):
+        d = self.basis.get_dofs(lambda x: np.abs(x[axis] - at) < 1e-9)
+        return np.concatenate([d.all(['u^%d' % (c + 1)]) for c in components])
+
+    def value(self, place, component):
+        """Displacement of a corner or middle of an element [m]."""
+        near = np.linalg.norm(self.basis.doflocs.T - np.asarray(place), axis=1) < 1e-9
+        own = self.basis.get_dofs(elements=np.arange(self.mesh.nelements)).all(['u^%d' % (component + 1)])
+        return float(self.u[np.intersect1d(np.nonzero(near)[0], own)[0]])
+
+    def solve(self, load_steps=1, prescribe=None):
+        full = self.solid.load.copy()
+        scale = max(np.abs(full).sum(), self.mu * 1e-4)
+        for step in range(1, load_steps + 1):
+            self.solid.load = full * step / load_steps
+            if prescribe is not None:
+                dofs, value = prescribe
+                move = np.zeros(self.basis.N)
+                move[dofs] = value * step / load_steps - self.u[dofs]
+                K = self.solid.stiffness(self.u)  # the rest follows at first as if it were linear
+                move[self.free] = splu(K[self.free][:, self.free].tocsc()).solve(-(K @ move)[self.free])
+                self.u += move
+            self.u = newton(self.solid.forces, self.solid.stiffness, self.u, self.free, scale)
+        return self
+
+    def frequencies(self, density, count=1):
+        K = self.solid.stiffness(0 * self.u)[self.free][:, self.free]
+        M = self.solid.mass(density)[self.free][:, self.free]
+        values = eigsh(K, k=count, M=M, sigma=0, which='LM', return_eigenvectors=False)
+        return sorted(float(f) for f in np.sqrt(values) / (2 * np.pi))

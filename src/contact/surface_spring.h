@@ -1,0 +1,68 @@
+// The springs between a place on the surface of tissue and a collider.
+#pragma once
+
+#include <cmath>
+
+#include "compute/host_device.h"
+#include "tools/collider.h"
+
+namespace tissue_sim {
+
+/// Across the surface a stiff one, which hides little of how deep a tool presses; along it one that
+/// holds the place where it first touched, within the friction cone (Cundall and Strack 1979).
+struct SurfaceSpring {
+  float across, along;                  ///< [N/m]
+  float damping_across, damping_along;  ///< [N s/m]
+  float cohesion;                       ///< what it holds beside friction [N]
+};
+
+/// In units of the P-wave modulus over the cell size, for a unit of area. The stiff spring alone
+/// would be too fast for the substeps of tissue: contact_inertia.h slows it down.
+inline constexpr float kAcross = 8, kAlong = 0.5f;
+inline constexpr float kDampingAcross = 0.1f;  ///< times the substep, of the stiffness
+inline constexpr float kDampingAlong = 0.1f;   ///< share of critical
+
+/// Of a place that stands for `area` [m^2] of tissue with this P-wave modulus [Pa] and density
+/// [kg/m^3], on a lattice of this cell size [m], for substeps of dt [s].
+TISSUE_SIM_INLINE SurfaceSpring surface_spring(float modulus, float density, float cell_size,
+                                               float area, float dt) {
+  const float k = modulus * area / cell_size, along = kAlong * k;
+  const float mass = 0.5f * cell_size * density * area;  // of a layer of points
+  return {kAcross * k, along, kDampingAcross * dt * kAcross * k,
+          2 * kDampingAlong * sqrtf(along * mass), 0};
+}
+
+/// Force on the place at x with velocity v, in contact (`g.distance` < 0). `hold` is the place, in
+/// the collider's frame, that friction holds on to; it slides with x where the cone is reached.
+TISSUE_SIM_INLINE void surface_force(const Collider& c, const Gap& g, const SurfaceSpring& spring,
+                                     const float* x, const float* v, float* hold, float* force) {
+  float vc[3], held[3], rel[3];
+  velocity_at(c, x, vc);
+  to_world(c, hold, held);
+  float vn = 0, sn = 0;
+  for (int i = 0; i < 3; ++i) {
+    rel[i] = v[i] - vc[i];
+    vn += rel[i] * g.normal[i];
+    sn += (x[i] - held[i]) * g.normal[i];
+  }
+  const float push = fmaxf(0.0f, -spring.across * g.distance - spring.damping_across * vn);
+  float t[3], t2 = 0;
+  for (int i = 0; i < 3; ++i) {
+    t[i] = -spring.along * (x[i] - held[i] - sn * g.normal[i]) -
+           spring.damping_along * (rel[i] - vn * g.normal[i]);
+    t2 += t[i] * t[i];
+  }
+  const float limit = c.friction * push + spring.cohesion;
+  if (t2 > limit * limit) {
+    const float scale = limit / sqrtf(t2);
+    float moved[3];
+    for (int i = 0; i < 3; ++i) {
+      t[i] *= scale;
+      moved[i] = x[i] + t[i] / spring.along;
+    }
+    to_local(c, moved, hold);
+  }
+  for (int i = 0; i < 3; ++i) force[i] = push * g.normal[i] + t[i];
+}
+
+}  // namespace tissue_sim

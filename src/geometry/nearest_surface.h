@@ -1,0 +1,34 @@
+// The place on a body's true surface that is nearest to another place.
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include "geometry/mesh.h"
+#include "tissue_sim/scene.h"
+
+namespace tissue_sim {
+
+struct SurfacePoint {
+  Vec3 place;   ///< [m], world axes, as the body is at rest
+  Vec3 normal;  ///< unit, outward
+};
+
+/// Prepared for many places that lie near the surface.
+class NearestSurface {
+ public:
+  /// `reach`: how far from the surface places will be at most [m]. Throws what load_solid() throws.
+  NearestSurface(const Body& body, double reach);
+  ~NearestSurface();
+  /// False where no surface is within reach (meshes alone say so). Of faces equally near, the one
+  /// that looks along `towards` counts.
+  bool find(const Vec3& x, const Vec3& towards, SurfacePoint& found) const;
+
+ private:
+  class Triangles;
+  Body body_;
+  Eigen::Matrix3d to_local_;
+  std::unique_ptr<Triangles> triangles_;
+};
+
+}  // namespace tissue_sim

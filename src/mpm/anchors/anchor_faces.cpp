@@ -1,0 +1,390 @@
+#include "mpm/anchors/anchor_faces.h"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <array>
+#include <map>
+#include <numeric>
+#include <stdexcept>
+#include <string>
+
+#include "math/bspline.h"
+
+namespace tissue_sim {
+namespace {
+
+constexpr float kDrift = 0.1f;  // of what rounding left of a face, mended in a substep
+constexpr int kLargestGroup = 64;
+constexpr double kNearestAxis = 0.9;  // a row goes through a face where its axis is that close to
+                                      // the one that is closest to the normal
+
+int anchor_at(const std::vector<Anchor>& anchors, const Vec3& x) {
+  for (std::size_t i = 0; i < anchors.size(); ++i) {
+    if (anchors[i].contains(x)) return static_cast<int>(i);
+  }
+  return -1;
+}
+
+/// Normal of a region's face at a place on it, by size of the components.
+Vec3 normal_at(const Region& r, const Vec3& x) {
+  if (r.kind == Region::Kind::kBelow) return Vec3::UnitZ();
+  if (r.kind == Region::Kind::kBall) return (x - r.center).cwiseAbs();
+  int nearest = 0;
+  double distance = 1e30;
+  for (int a = 0; a < 3; ++a) {
+    const double d = std::min(std::abs(x[a] - r.min[a]), std::abs(x[a] - r.max[a]));
+    if (d < distance) distance = d, nearest = a;
+  }
+  return Vec3::Unit(nearest);
+}
+
+struct Crossing1 {
+  double t;     // along the link, 0 at its lower node to 1
+  int anchor;   // of the body
+  bool inside_low;  // whether the inside is at the lower end
+};
+
+/// Where a link between two nodes goes through a face of the anchors.
+std::vector<Crossing1> crossings(const std::vector<Anchor>& anchors, const Vec3& a, const Vec3& b) {
+  constexpr int kParts = 4;
+  std::vector<Crossing1> found;
+  const auto at = [&](double t) { return anchor_at(anchors, a + t * (b - a)); };
+  int before = at(0);
+  for (int i = 1; i <= kParts; ++i) {
+    const int now = at(double(i) / kParts);
+    if ((before >= 0) != (now >= 0)) {
+      double low = double(i - 1) / kParts, high = double(i) / kParts;
+      const bool inside_low = before >= 0;
+      int anchor = inside_low ? before : now;
+      for (int k = 0; k < 48; ++k) {
+        const double middle = 0.5 * (low + high);
+        const int in = at(middle);
+        if (in >= 0) anchor = in;
+        (in >= 0) == inside_low ? low = middle : high = middle;
+      }
+      found.push_back({0.5 * (low + high), anchor, inside_low});
+    }
+    before = now;
+  }
+  return found;
+}
+
+class FindRows {
+ public:
+  FindRows(const LatticeBody& body, const Points& points, const NodeFields& fields,
+           const Nodes& nodes, int first_anchor, std::vector<FaceRow>& rows,
+           std::vector<int>& row_count, std::vector<std::int32_t>& near_points)
+      : b_(body),
+        points_(points),
+        fields_(fields),
+        nodes_(nodes),
+        first_anchor_(first_anchor),
+        rows_(rows),
+        row_count_(row_count),
+        near_points_(near_points) {}
+
+  void all() {
+    b_.for_each_node([&](int, int x, int y, int z) {
+      for (int axis = 0; axis < 3; ++axis) link({x, y, z}, axis);
+    });
+  }
+
+ private:
+  using Cell = std::array<int, 3>;
+
+  void link(const Cell& low, int axis) {
+    Cell high = low;
+    ++high[axis];
+    const Vec3 a = b_.node_position(low[0], low[1], low[2]);
+    const Vec3 b = b_.node_position(high[0], high[1], high[2]);
+    for (const Crossing1& c : crossings(b_.body.anchors, a, b)) {
+      const Vec3 x = a + c.t * (b - a);
+      const Vec3 normal = normal_at(b_.body.anchors[c.anchor], x);
+      if (normal[axis] < kNearestAxis * normal.maxCoeff()) continue;
+      // The face lies in this cell; between two in the one with tissue outside.
+      const bool lower = std::abs(c.t - 0.5) < 1e-6 ? !c.inside_low : c.t < 0.5;
+      Cell cell = lower ? low : high;
+      const auto place = static_cast<float>(lower ? c.t : c.t - 1);
+      add(cell, axis, place, c.anchor, x);
+    }
+  }
+
+  /// A row for each choice of fields that points around see there.
+  void add(const Cell& cell, int axis, float place, int anchor, const Vec3& x) {
+    std::vector<std::array<int, 3>> found;
+    bool near = false;
+    // Where the face is, in half cells.
+    const double at = 2 * (cell[axis] + 0.5 + place);
+    const int u = (axis + 1) % 3, v = (axis + 2) % 3;
+    for (int i = 2 * cell[axis]; i < 2 * cell[axis] + 2; ++i) {
+      for (int j = 0; j < 36; ++j) {
+        Cell site;
+        site[axis] = i;
+        site[u] = 2 * cell[u] - 2 + j % 6;
+        site[v] = 2 * cell[v] - 2 + j / 6;
+        const int p = b_.point(site[0], site[1], site[2]);
+        if (p < 0) continue;
+        if (at > i - 1e-3 && at < i + 1 + 1e-3) {
+          near = true;
+          near_points_.push_back(p);
+        }
+        std::array<int, 3> of;
+        for (int k = 0; k < 3; ++k) {
+          Cell n = cell;
+          n[axis] += k - 1;
+          of[k] = fields_.node(b_, points_.site[p], n[0], n[1], n[2]);
+        }
+        if (std::find(found.begin(), found.end(), of) == found.end()) found.push_back(of);
+      }
+    }
+    if (!near) return;
+    for (const std::array<int, 3>& of : found) {
+      FaceRow row{};
+      double mobility = 0;
+      for (int k = 0; k < 3; ++k) {
+        const float w = cell_weight(place, k);
+        if (of[k] < 0 || w == 0) continue;
+        row.node[k] = of[k];
+        row.weight[k] = w;
+        row.share[k] = w * nodes_.inv_mass[of[k]];
+        mobility += w * row.share[k];
+      }
+      ++row_count_[first_anchor_ + anchor];
+      if (mobility == 0) continue;
+      row.anchor = first_anchor_ + anchor;
+      for (int a = 0; a < 3; ++a) row.place[a] = static_cast<float>(x[a]);
+      rows_.push_back(row);
+    }
+  }
+
+  const LatticeBody& b_;
+  const Points& points_;
+  const NodeFields& fields_;
+  const Nodes& nodes_;
+  const int first_anchor_;
+  std::vector<FaceRow>& rows_;
+  std::vector<int>& row_count_;
+  std::vector<std::int32_t>& near_points_;
+};
+
+/// Puts rows with nodes in common side by side, and works out how they are held.
+void make_groups(AnchorFaces& faces) {
+  const int count = static_cast<int>(faces.rows.size());
+  std::vector<int> parent(count);
+  std::iota(parent.begin(), parent.end(), 0);
+  const auto root = [&](int i) {
+    while (parent[i] != i) i = parent[i] = parent[parent[i]];
+    return i;
+  };
+  std::map<std::int32_t, int> first_of;  // row of each node
+  for (int i = 0; i < count; ++i) {
+    for (int k = 0; k < 3; ++k) {
+      if (faces.rows[i].share[k] == 0) continue;
+      const auto [at, is_new] = first_of.emplace(faces.rows[i].node[k], i);
+      if (is_new) continue;
+      const int a = root(i), b = root(at->second);
+      parent[std::max(a, b)] = std::min(a, b);
+    }
+  }
+  std::vector<std::vector<int>> members(count);
+  for (int i = 0; i < count; ++i) members[root(i)].push_back(i);
+  std::vector<FaceRow> rows;
+  faces.groups.clear();
+  faces.inverse.clear();
+  for (std::vector<int>& m : members) {
+    if (m.empty()) continue;
+    if (m.size() > kLargestGroup) m.resize(kLargestGroup);
+    const int n = static_cast<int>(m.size());
+    Eigen::MatrixXd A = Eigen::MatrixXd::Zero(n, n);
+    for (int i = 0; i < n; ++i) {
+      for (int j = 0; j < n; ++j) {
+        const FaceRow &r = faces.rows[m[i]], &s = faces.rows[m[j]];
+        for (int k = 0; k < 9; ++k) {
+          if (r.node[k / 3] == s.node[k % 3] && s.weight[k % 3] != 0) {
+            A(i, j) += static_cast<double>(r.share[k / 3]) * s.weight[k % 3];
+          }
+        }
+      }
+    }
+    // Rows that say the same twice share what holds them.
+    if (n > 1) A.diagonal() *= 1 + 1e-4;
+    const Eigen::MatrixXd inverse = A.ldlt().solve(Eigen::MatrixXd::Identity(n, n));
+    faces.groups.push_back({static_cast<int>(rows.size()), n, static_cast<int>(faces.inverse.size())});
+    for (int i = 0; i < n * n; ++i) faces.inverse.push_back(static_cast<float>(inverse(i / n, i % n)));
+    for (const int i : m) rows.push_back(faces.rows[i]);
+  }
+  faces.rows = std::move(rows);
+}
+
+void find_held_nodes(const LatticeBody& b, const Points& points, const NodeFields& fields,
+                     const Nodes& nodes, int first_anchor, std::vector<AnchorFaces::HeldNode>& held,
+                     std::vector<int>& held_count) {
+  std::map<int, int> anchor_of;
+  for (int p = b.first_point; p < b.first_point + b.point_count; ++p) {
+    if (points.anchored[p] != Points::kInAnchor) continue;
+    const Points::Site& s = points.site[p];
+    const int anchor = first_anchor + anchor_at(b.body.anchors, b.site_position(s.x, s.y, s.z));
+    ++held_count[anchor];
+    for (int k = 0; k < 27; ++k) {
+      const int node = fields.node(b, s, k);
+      if (nodes.inv_mass[node] != 0 || !anchor_of.emplace(node, anchor).second) continue;
+      const Vec3 x = b.node_position(s.x / 2 + k % 3 - 1, s.y / 2 + k / 3 % 3 - 1, s.z / 2 + k / 9 - 1);
+      held.push_back({node, anchor,
+                      {static_cast<float>(x[0]), static_cast<float>(x[1]), static_cast<float>(x[2])}});
+    }
+  }
+}
+
+RigidMotion motion_of(const Pose& pose, const Vec3& origin) {
+  RigidMotion m;
+  m.rotation = pose.orientation.toRotationMatrix();
+  m.translation = pose.position - m.rotation * origin;
+  return m;
+}
+
+}  // namespace
+
+void find_anchor_faces(const Scene& scene, const std::vector<LatticeBody>& bodies,
+                       const Points& points, const NodeFields& fields, const Nodes& nodes,
+                       AnchorFaces& faces) {
+  const bool first = faces.origin.empty();
+  if (first) {
+    for (const LatticeBody& b : bodies) {
+      for (const Anchor& a : b.body.anchors) faces.origin.push_back(a.origin());
+    }
+    faces.now.resize(faces.origin.size());
+  }
+  if (faces.origin.empty()) return;
+  // What was there before is in the loads of the frame: of its rows the impulses go to the new ones
+  // of the same place, or to any of the same anchor.
+  std::vector<FaceRow> old_rows = std::move(faces.rows);
+  std::vector<std::array<double, 3>> old_impulse = std::move(faces.impulse);
+  faces.rows.clear();
+  faces.held.clear();
+  std::vector<int> holds(faces.origin.size(), 0);
+  int first_anchor = 0;
+  faces.points.clear();
+  faces.first_of_body.clear();
+  for (const LatticeBody& b : bodies) {
+    faces.first_of_body.push_back(first_anchor);
+    if (b.body.anchors.empty()) continue;
+    FindRows(b, points, fields, nodes, first_anchor, faces.rows, holds, faces.points).all();
+    find_held_nodes(b, points, fields, nodes, first_anchor, faces.held, holds);
+    if (first) {
+      for (std::size_t i = 0; i < b.body.anchors.size(); ++i) {
+        if (holds[first_anchor + i] > 0) continue;
+        throw std::invalid_argument(
+            "anchors[" + std::to_string(i) + "] of body '" + b.body.name +
+            "' holds no point of it: a region is in world coordinates as of time zero, and must "
+            "reach into the body or end at its surface (cell_size is " +
+            std::to_string(scene.cell_size) + " m)");
+      }
+    }
+    first_anchor += static_cast<int>(b.body.anchors.size());
+  }
+  make_groups(faces);
+  faces.impulse.assign(faces.rows.size(), {});
+  if (old_rows.empty()) return;
+  std::map<std::array<float, 3>, std::size_t> at;
+  for (std::size_t i = 0; i < faces.rows.size(); ++i) {
+    const float* x = faces.rows[i].place;
+    at.emplace(std::array<float, 3>{x[0], x[1], x[2]}, i);
+  }
+  for (std::size_t i = 0; i < old_rows.size(); ++i) {
+    const float* x = old_rows[i].place;
+    const auto same = at.find({x[0], x[1], x[2]});
+    if (same == at.end()) continue;
+    for (int a = 0; a < 3; ++a) faces.impulse[same->second][a] += old_impulse[i][a];
+  }
+}
+
+Vec3 AnchorFaces::place_of_held(const Body& body, int body_number, const Vec3& X) const {
+  const int anchor = anchor_at(body.anchors, X);
+  if (anchor < 0) return X;
+  const RigidMotion& m = now[first_of_body[body_number] + anchor];
+  return m.rotation * X + m.translation;
+}
+
+std::vector<RigidMotion> anchors_at(const AnchorFaces& faces, const FrameInput& input,
+                                    double share) {
+  std::vector<RigidMotion> at;
+  for (std::size_t i = 0; i < input.anchors.size(); ++i) {
+    const AnchorMotion& m = input.anchors[i];
+    const Pose pose{(1 - share) * m.begin.position + share * m.end.position,
+                    m.begin.orientation.slerp(share, m.end.orientation)};
+    at.push_back(motion_of(share >= 1 ? m.end : pose, faces.origin[i]));
+  }
+  return at;
+}
+
+void hold_group(AnchorFaces& faces, int index, float dt, const RigidMotion* before,
+                const RigidMotion* after, Nodes& nodes) {
+  const FaceGroup& g = faces.groups[index];
+  float left[kLargestGroup][3];
+  for (int i = 0; i < g.count; ++i) {
+    const FaceRow& r = faces.rows[g.first + i];
+    float target[3] = {}, shift[3] = {};
+    if (after != nullptr) {
+      const Vec3 from = before[r.anchor].displacement(r.place);
+      const Vec3 to = after[r.anchor].displacement(r.place);
+      for (int a = 0; a < 3; ++a) {
+        target[a] = static_cast<float>(to[a]);
+        shift[a] = static_cast<float>((to[a] - from[a]) / dt);
+      }
+    }
+    for (int a = 0; a < 3; ++a) {
+      float v = 0, u = 0;
+      for (int k = 0; k < 3; ++k) {
+        v += r.weight[k] * nodes.v[a][r.node[k]];
+        u += r.weight[k] * nodes.u[a][r.node[k]];
+      }
+      // u has moved by dt v already: what it was off before.
+      const float off = target[a] - shift[a] * dt - (u - dt * v);
+      left[i][a] = shift[a] - v + kDrift * off / dt;
+    }
+  }
+  for (int i = 0; i < g.count; ++i) {
+    const FaceRow& r = faces.rows[g.first + i];
+    const float* inverse = faces.inverse.data() + g.inverse + i * g.count;
+    for (int a = 0; a < 3; ++a) {
+      float impulse = 0;
+      for (int j = 0; j < g.count; ++j) impulse += inverse[j] * left[j][a];
+      faces.impulse[g.first + i][a] += impulse;
+      for (int k = 0; k < 3; ++k) {
+        const float dv = r.share[k] * impulse;
+        nodes.v[a][r.node[k]] += dv;
+        nodes.u[a][r.node[k]] += dt * dv;
+      }
+    }
+  }
+}
+
+void move_held(const AnchorFaces& faces, float dt, const RigidMotion* before,
+               const RigidMotion* after, Nodes& nodes) {
+  for (const AnchorFaces::HeldNode& h : faces.held) {
+    const Vec3 from = before[h.anchor].displacement(h.place);
+    const Vec3 to = after[h.anchor].displacement(h.place);
+    for (int a = 0; a < 3; ++a) {
+      nodes.u[a][h.node] = static_cast<float>(to[a]);
+      nodes.v[a][h.node] = static_cast<float>((to[a] - from[a]) / dt);
+    }
+  }
+}
+
+std::vector<Wrench> anchor_loads(const AnchorFaces& faces, double duration) {
+  std::vector<Wrench> loads(faces.origin.size());
+  if (!(duration > 0)) return loads;
+  for (std::size_t i = 0; i < faces.rows.size(); ++i) {
+    const FaceRow& r = faces.rows[i];
+    const RigidMotion& m = faces.now[r.anchor];
+    const Vec3 X(r.place[0], r.place[1], r.place[2]);
+    const Vec3 arm = m.rotation * (X - faces.origin[r.anchor]);
+    const auto& J = faces.impulse[i];
+    const Vec3 force = -Vec3(J[0], J[1], J[2]) / duration;
+    loads[r.anchor].force += force;
+    loads[r.anchor].torque += arm.cross(force);
+  }
+  return loads;
+}
+
+}  // namespace tissue_sim

@@ -1,0 +1,93 @@
+// Anchors act at their faces: the field of displacements is what the anchor says there, wherever
+// the face lies in a cell.
+//
+// Tissue inside an anchor is rigid: it has neither stress nor mass (Points::free_volume), so the
+// body ends at the face as it would at a surface of its own. Along each row of nodes that goes
+// through a face, in the direction closest to its normal, the field of these nodes,
+//   sum_i w_i u_i = what the anchor says,
+// is held at the place of the face by an impulse that shares out among the row's three nodes as
+// 1 / m_i does: velocities are projected in the metric of mass. On a face across an axis these
+// conditions are exactly that the field is held all over it; on an oblique one they are exact for
+// linear fields. Frequencies only fall, the substep stays, and the impulse is the reaction.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include "compute/for_each.h"
+#include "mpm/lattice/lattice_body.h"
+#include "mpm/lattice/nodes.h"
+#include "mpm/split/node_fields.h"
+#include "tissue_sim/tissue.h"
+
+namespace tissue_sim {
+
+/// The field of a row of nodes at a face.
+struct FaceRow {
+  std::int32_t node[3];  ///< in Nodes; 0 with weight 0 for none
+  float weight[3];
+  float share[3];    ///< weight / m: of an impulse to velocity [1/kg]
+  std::int32_t anchor;  ///< in the order of the scene
+  float place[3];    ///< on the face, in reference space [m]
+};
+
+/// Rows that have nodes in common are held together.
+struct FaceGroup {
+  std::int32_t first, count;  ///< of its rows
+  std::int32_t inverse;       ///< of count x count [kg]: from velocities to impulses
+};
+
+/// A rigid motion from reference space: x = R X + t.
+struct RigidMotion {
+  Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();
+  Vec3 translation = Vec3::Zero();
+
+  Vec3 displacement(const float* X) const {
+    const Vec3 place(X[0], X[1], X[2]);
+    return rotation * place + translation - place;
+  }
+};
+
+struct AnchorFaces {
+  /// Where a place in an anchor of a body is now [m].
+  Vec3 place_of_held(const Body& body, int body_number, const Vec3& X) const;
+
+  std::vector<Vec3> origin;  ///< of the anchors, in the order of the scene [m]
+  std::vector<FaceRow> rows;
+  std::vector<FaceGroup> groups;
+  std::vector<float> inverse;
+  std::vector<std::array<double, 3>> impulse;  ///< on tissue, by row, since the frame began [N s]
+  struct HeldNode {
+    std::int32_t node, anchor;
+    float place[3];  ///< [m]
+  };
+  std::vector<HeldNode> held;       ///< nodes that only tissue inside sees
+  std::vector<RigidMotion> now;     ///< of each anchor, at the end of the last substep
+  bool moves = false;               ///< whether any has moved ever
+  std::vector<std::int32_t> points;  ///< in or beside whose cubes faces lie, when the scene is built
+  std::vector<int> first_of_body;    ///< anchors, by body
+};
+
+/// Finds rows and held nodes anew: when a scene is built, and after nodes were split. Throws
+/// std::invalid_argument for an anchor that neither holds points nor has a face at its body.
+void find_anchor_faces(const Scene& scene, const std::vector<LatticeBody>& bodies,
+                       const Points& points, const NodeFields& fields, const Nodes& nodes,
+                       AnchorFaces& faces);
+
+/// Where the anchors are at the share (0 to 1) of a frame; empty where none moves in it.
+std::vector<RigidMotion> anchors_at(const AnchorFaces& faces, const FrameInput& input,
+                                    double share);
+
+/// After nodes moved through a substep of `dt`: holds group `i`. `before`, `after`: where the
+/// anchors were and are, null where they stay.
+void hold_group(AnchorFaces& faces, int i, float dt, const RigidMotion* before,
+                const RigidMotion* after, Nodes& nodes);
+/// Moves the nodes inside with their anchors.
+void move_held(const AnchorFaces& faces, float dt, const RigidMotion* before,
+               const RigidMotion* after, Nodes& nodes);
+
+/// Mean loads on the anchors over a frame of `duration`, about their origins where these are now.
+std::vector<Wrench> anchor_loads(const AnchorFaces& faces, double duration);
+
+}  // namespace tissue_sim

@@ -1,0 +1,71 @@
+// What lets the stiff springs of contact keep the substeps of tissue.
+//
+// A spring k between a surface and a collider would swing faster than any substep. Beside it stands
+// an inerter b = k dt^2 / 2: it resists, with b times it, the acceleration of the surface towards
+// or away from the collider. With M + B for the mass of the nodes and K + K_c for the stiffness,
+//   x (K + K_c) x / x (M + B) x <= max(x K x / x M x, x K_c x / x B x),
+// so the two together swing no faster than tissue alone or sqrt(2) / dt. B is taken node by node,
+// which is not less than the inerters' own matrix, and acts along the contact's normal alone. What
+// is at rest or moves with the tool does not feel it; when contact begins the nodes lose what of
+// their speed towards the collider the inerter takes up, and it never gives energy back.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "compute/array.h"
+#include "mpm/lattice/nodes.h"
+#include "tools/collider.h"
+
+namespace tissue_sim {
+
+inline constexpr float kInertia = 0.5f;  ///< b / (k dt^2)
+
+/// A node with inerters. Matrices are xx yy zz xy yz zx.
+struct InertialNode {
+  std::int32_t node;
+  std::int32_t uses;      ///< places that it belongs to
+  bool changed;           ///< since `share` was worked out
+  std::int32_t collider;  ///< the last of them
+  float place[3];         ///< in reference space [m]
+  float mass;             ///< [kg]
+  float inertia[6];       ///< B [kg]
+  float share[6];         ///< (m I + B)^-1 B: of an acceleration, which does not happen
+  float before[3];        ///< velocity before the substep [m/s]
+  float impulse[3];       ///< on the node in the substep [N s]
+};
+
+/// Contact that begins (`sign` 1), ends (-1) or whose normal turned (both).
+struct InertiaChange {
+  float sign;
+  bool begins;        ///< not merely turned
+  std::int32_t node;  ///< lowest of the cell, in the block's nodes
+  std::int32_t collider;
+  float place[3];     ///< in cells, from the middle of the cell
+  float normal[3];
+  float inertia;      ///< b [kg]
+  float velocity[3];  ///< of the collider there [m/s]
+};
+
+struct ContactInertia {
+  std::vector<InertialNode> nodes;
+  float dt = 0;  ///< the substep that the inerters are for [s]
+};
+
+struct MpmState;
+
+/// Before a substep of dt: makes the inerters those for it, where they are not.
+void fit_inertia(MpmState& state, float dt);
+/// Before the nodes move: takes in the changes of all blocks, in a fixed order, and notes how fast
+/// the nodes are.
+void change_inertia(MpmState& state);
+/// After they moved: takes away what of the acceleration does not happen.
+void resist_acceleration(InertialNode& node, float keep, float dt, Nodes& nodes);
+/// Adds the impulses of a substep of `kick` seconds to the loads of the colliders.
+void add_inertial_loads(const MpmState& state, float kick, std::vector<ColliderLoad>& loads);
+/// Forgets nodes without places. After blocks were made anew `all`: they begin anew.
+void tidy_inertia(MpmState& state, bool all);
+/// After a checkpoint was restored.
+void index_inertia(MpmState& state);
+
+}  // namespace tissue_sim

@@ -1,0 +1,27 @@
+// A place on the surface of a body: see mpm/contact/surface_places.h.
+#pragma once
+
+#include <cstdint>
+
+namespace tissue_sim {
+
+/// Of the outer surface of a whole body.
+struct OuterPlace {
+  std::int32_t point;
+  std::uint8_t bond;  ///< that it has not: mpm/lattice/bonds.h
+  float place[3];     ///< in cells, from the middle of the point's cell
+  float normal[3];    ///< unit, outward, in reference space
+};
+
+/// In a block.
+struct SurfacePlace {
+  std::int32_t cell;  ///< lane of its cell's first point
+  std::int32_t node;  ///< lowest of that cell, in the block's nodes
+  std::int32_t point;
+  std::uint8_t key;  ///< 8 times 1 plus the point's place in the cell (x + 2 y + 4 z), plus the bond
+  float place[3];    ///< in cells, from the middle of the cell
+  float normal[3];   ///< unit, outward, in reference space
+  float area;        ///< [m^2]
+};
+
+}  // namespace tissue_sim

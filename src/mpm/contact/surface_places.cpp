@@ -1,0 +1,109 @@
+#include "mpm/contact/surface_places.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "geometry/nearest_surface.h"
+#include "mpm/blocks/block.h"
+#include "mpm/lattice/bonds.h"
+
+namespace tissue_sim {
+namespace {
+
+constexpr double kFarthest = 1.0;  // from the side of its cube to a place [point distances]
+
+Vec3 direction_of(int bond) {
+  const BondOffset o = bond_offset(bond);
+  return {double(o.x), double(o.y), double(o.z)};
+}
+
+}  // namespace
+
+std::vector<OuterPlace> find_outer_places(const std::vector<LatticeBody>& bodies,
+                                          const Points& points) {
+  std::vector<OuterPlace> places;
+  for (const LatticeBody& b : bodies) {
+    const double edge = b.cell_size / 2;
+    const NearestSurface surface(b.body, 2 * edge);
+    for (int p = b.first_point; p < b.first_point + b.point_count; ++p) {
+      if (points.bonds[p] == kAllBonds) continue;
+      const Points::Site& s = points.site[p];
+      const Vec3 middle = b.node_position(s.x / 2, s.y / 2, s.z / 2);
+      for (int k = 0; k < kBondCount; ++k) {
+        if ((points.bonds[p] >> k & 1) != 0) continue;
+        const Vec3 out = direction_of(k), side = b.site_position(s.x, s.y, s.z) + edge / 2 * out;
+        SurfacePoint found;
+        const bool any = surface.find(side, out, found);
+        if (!any || (found.place - side).norm() > kFarthest * edge) found = {side, out};
+        const Vec3 place = (found.place - middle) / b.cell_size;
+        OuterPlace o{p, static_cast<std::uint8_t>(k), {}, {}};
+        for (int a = 0; a < 3; ++a) {
+          o.place[a] = static_cast<float>(place[a]);
+          o.normal[a] = static_cast<float>(found.normal[a]);
+        }
+        places.push_back(o);
+      }
+    }
+  }
+  return places;
+}
+
+std::vector<SurfacePlace> surface_places_of(const LatticeBody& b, const Points& points,
+                                            const Block& block) {
+  std::vector<SurfacePlace> places;
+  const auto edge = static_cast<float>(b.cell_size / 2);
+  const auto add = [&](SurfacePlace place, const BondOffset& o) {
+    // Of a plane, bonds along each axis are so many as its normal has of it: so areas add up.
+    const float along = place.normal[0] * o.x + place.normal[1] * o.y + place.normal[2] * o.z;
+    place.area = edge * edge * along;
+    if (along > 0.05f) places.push_back(place);
+  };
+  for (int z = 0; z < block.nz; ++z) {
+    for (int j = 0; j < block.stride; ++j) {
+      const std::int32_t cell = z * 8 * block.stride + j, node = z * block.plane + block.cell[j];
+      for (int sub = 0; sub < 8; ++sub) {
+        const std::int32_t p = block.point[cell + sub * block.stride];
+        if (p < 0 || points.bonds[p] == kAllBonds) continue;
+        const std::uint8_t whole = whole_bonds(b, points.site[p]);
+        auto outer = std::lower_bound(
+            points.outer.begin(), points.outer.end(), p,
+            [](const OuterPlace& o, std::int32_t point) { return o.point < point; });
+        for (int k = 0; k < kBondCount; ++k) {
+          if ((points.bonds[p] >> k & 1) != 0) continue;
+          SurfacePlace place{cell, node, p, static_cast<std::uint8_t>(8 * (sub + 1) + k), {}, {}, 0};
+          const BondOffset o = bond_offset(k);
+          if ((whole >> k & 1) == 0) {
+            while (outer != points.outer.end() && outer->point == p && outer->bond < k) ++outer;
+            if (outer == points.outer.end() || outer->point != p || outer->bond != k) continue;
+            std::copy_n(outer->place, 3, place.place);
+            std::copy_n(outer->normal, 3, place.normal);
+            add(place, o);
+            continue;
+          }
+          const int axis = k < kForwardBond ? 2 - k : k - kForwardBond;
+          const bool forward = k >= kForwardBond;
+          const std::int32_t lower =
+              forward ? p
+                      : b.point(points.site[p].x + o.x, points.site[p].y + o.y,
+                                points.site[p].z + o.z);
+          const Crossing* crossing = points.crossings.find(lower, axis);
+          const float at = crossing == nullptr ? 0.5f : crossing->place;  // torn: between the two
+          for (int a = 0; a < 3; ++a) place.place[a] = (sub >> a & 1) != 0 ? 0.25f : -0.25f;
+          place.place[axis] += 0.5f * (forward ? at : at - 1);
+          if (crossing == nullptr) {
+            place.normal[axis] = forward ? 1 : -1;
+          } else {
+            const bool turned = (crossing->normal[axis] > 0) != forward;
+            for (int a = 0; a < 3; ++a) {
+              place.normal[a] = turned ? -crossing->normal[a] : crossing->normal[a];
+            }
+          }
+          add(place, o);
+        }
+      }
+    }
+  }
+  return places;
+}
+
+}  // namespace tissue_sim

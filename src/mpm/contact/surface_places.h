@@ -1,0 +1,28 @@
+// Places on the true surface of a body: where tools and the ground touch it.
+//
+// Points lie inside their body, a quarter of a cell or so below its surface. Each bond that a point
+// misses towards the outside, or that a cut broke, stands for a piece of the surface: the place on
+// the body's own surface (shape or mesh) that is nearest to the middle of that side of the point's
+// cube, or where the blade went. It moves with the nodes around by their weights at that very
+// place, and what pushes there goes to them by the same weights.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "mpm/contact/surface_place.h"
+#include "mpm/lattice/lattice_body.h"
+
+namespace tissue_sim {
+
+struct Block;
+
+/// Of all bodies, while they are whole: by point, then bond. Throws what NearestSurface throws.
+std::vector<OuterPlace> find_outer_places(const std::vector<LatticeBody>& bodies,
+                                          const Points& points);
+
+/// Those of a block, in the order of cells and keys; those of cuts among them.
+std::vector<SurfacePlace> surface_places_of(const LatticeBody& body, const Points& points,
+                                            const Block& block);
+
+}  // namespace tissue_sim

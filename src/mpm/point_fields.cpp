@@ -1,0 +1,101 @@
+#include "mpm/point_fields.h"
+
+#include <algorithm>
+#include <cstring>
+
+#include "material/laws.h"
+#include "math/bspline.h"
+
+namespace tissue_sim {
+namespace {
+
+/// Displacement, velocity and displacement gradient of a point.
+struct PointMotion {
+  float u[3] = {}, v[3] = {}, F[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1};
+
+  PointMotion(const LatticeBody& body, const Points::Site& site, const NodeFields& fields,
+              const Nodes& nodes) {
+    const auto per_cell = static_cast<float>(1 / body.cell_size);
+    const int s[3] = {site.x & 1, site.y & 1, site.z & 1};
+    for (int k = 0; k < 27; ++k) {
+      const int d[3] = {k % 3, k / 3 % 3, k / 9};
+      const int node = fields.node(body, site, k);
+      const float w[3] = {lattice_weight(s[0], d[0]), lattice_weight(s[1], d[1]),
+                          lattice_weight(s[2], d[2])};
+      const float slope[3] = {lattice_slope(s[0], d[0]) * w[1] * w[2] * per_cell,
+                              w[0] * lattice_slope(s[1], d[1]) * w[2] * per_cell,
+                              w[0] * w[1] * lattice_slope(s[2], d[2]) * per_cell};
+      for (int a = 0; a < 3; ++a) {
+        const float of_node = nodes.u[a][node];
+        u[a] += w[0] * w[1] * w[2] * of_node;
+        v[a] += w[0] * w[1] * w[2] * nodes.v[a][node];
+        for (int b = 0; b < 3; ++b) F[3 * a + b] += slope[b] * of_node;
+      }
+    }
+  }
+};
+
+/// Cauchy stress xx yy zz xy yz zx [Pa].
+void cauchy_stress(const Material& m, const float (&F)[9], float* to) {
+  const auto mu = static_cast<float>(lame_mu(m)), lambda = static_cast<float>(lame_lambda(m));
+  float P[9], cof[9];
+  if (m.law == Law::kNeoHookean) {
+    stress<NeoHookean>(F, mu, lambda, P);
+  } else {
+    stress<FixedCorotated>(F, mu, lambda, P);
+  }
+  cofactor(F, cof);
+  const float J = F[0] * cof[0] + F[1] * cof[1] + F[2] * cof[2];
+  const auto at = [&](int i, int j) {
+    return (P[3 * i] * F[3 * j] + P[3 * i + 1] * F[3 * j + 1] + P[3 * i + 2] * F[3 * j + 2]) / J;
+  };
+  for (int a = 0; a < 3; ++a) {
+    to[a] = at(a, a);
+    to[3 + a] = at(a, (a + 1) % 3);
+  }
+}
+
+}  // namespace
+
+void add_point_fields(MpmState& state, const PointSelection& selection,
+                      const std::vector<std::int32_t>& place, int count,
+                      std::vector<std::uint8_t>& cloud) {
+  const std::size_t size = selection.point_size();
+  cloud.resize(size * count);
+  for (int i = count; i-- > 0;) {  // from the end: what is to move is not overwritten
+    std::memmove(cloud.data() + size * i, cloud.data() + sizeof(Point) * i, sizeof(Point));
+  }
+  const unsigned fields = selection.fields;
+  state.cpu->for_each(
+      static_cast<int>(place.size()),
+      [&](int p) {
+        if (place[p] < 0) return;
+        const Points::Site& site = state.points.site[p];
+        const LatticeBody& body = state.bodies[site.body];
+        const PointMotion motion(body, site, *state.fields, state.nodes);
+        float values[16];
+        int n = 0;
+        if ((fields & kRestPosition) != 0) {
+          const Vec3 x = body.site_position(site.x, site.y, site.z);
+          for (int a = 0; a < 3; ++a) values[n++] = static_cast<float>(x[a]);
+        }
+        if ((fields & kDisplacement) != 0) {
+          for (const float x : motion.u) values[n++] = x;
+        }
+        if ((fields & kVelocity) != 0) {
+          for (const float x : motion.v) values[n++] = x;
+        }
+        if ((fields & kVolume) != 0) values[n++] = state.points.volume[p];
+        if ((fields & kStressTensor) != 0) {
+          std::fill_n(values + n, 6, 0.0f);  // what an anchor holds has none
+          if (state.points.free_volume_of(p) > 0) {
+            cauchy_stress(body.material_of(state.points, p), motion.F, values + n);
+          }
+          n += 6;
+        }
+        std::memcpy(cloud.data() + size * place[p] + sizeof(Point), values, n * sizeof(float));
+      },
+      256);
+}
+
+}  // namespace tissue_sim

@@ -1,0 +1,18 @@
+// What a cloud's points carry behind their Point, from the nodes on the host.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "mpm/mpm_state.h"
+#include "tissue_sim/point.h"
+
+namespace tissue_sim {
+
+/// Makes room for the selection's fields in a cloud of Points, and fills them: `place` is where in
+/// the cloud each point goes, -1 for none (select_points()).
+void add_point_fields(MpmState& state, const PointSelection& selection,
+                      const std::vector<std::int32_t>& place, int count,
+                      std::vector<std::uint8_t>& cloud);
+
+}  // namespace tissue_sim

@@ -10,6 +10,7 @@
 #include "frame/checksum.h"
 #include "frame/select_points.h"
 #include "mls/cut.h"
+#include "mls/tear.h"
 
 namespace tissue_sim {
 
@@ -24,6 +25,11 @@ MlsTissue::MlsTissue(const Scene& scene, std::vector<std::string> notes)
   CutReport ignored;
   part(all, ignored);  // a mesh may have parts that do not touch
   stiffening_.assign(state_->chunks() * kMlsChunk, 1.0f);
+  for (const Material& m : nodes.materials) {
+    if (m.tear_stretch == 0 || m.tear_length == 0) continue;
+    notes_.push_back("material '" + m.name +
+                     "': tear_length does nothing, a tip bears what its pairs of nodes do");
+  }
 }
 
 void MlsTissue::part(const std::vector<std::int32_t>& changed, CutReport& report) {
@@ -123,12 +129,23 @@ void MlsTissue::reject_part(Verdict) {
 }
 
 void MlsTissue::break_bonds(double share) {
+  MlsState& s = *state_;
   Frame& frame = *frame_;
-  if (frame.u_before.empty() || share < 1) return;
-  for (const BladePath& path : blade_paths(state_->scene, frame.input, frame.cut_to, share)) {
-    cut(path, frame.u_before.data(), result_.blade_report);
+  const std::vector<std::int32_t> tearing =
+      can_tear(s) ? find_tearing(s) : std::vector<std::int32_t>();
+  if (!frame.u_before.empty() && (share == 1 || !tearing.empty())) {
+    for (const BladePath& path : blade_paths(s.scene, frame.input, frame.cut_to, share)) {
+      cut(path, frame.u_before.data(), result_.blade_report);
+    }
+    frame.u_before = s.u;
+    frame.cut_to = share;
   }
-  frame.cut_to = share;
+  if (tearing.empty()) return;
+  std::vector<std::int32_t> changed;
+  cross_entries(s, tearing, changed, result_.tear_report);
+  substeps_.forget();
+  pieces_measured_ = false;
+  part(changed, result_.tear_report);
 }
 
 bool MlsTissue::measure(double* elastic) {

@@ -1,0 +1,71 @@
+#include "mls/tear.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace tissue_sim {
+namespace {
+
+/// A number in [-1, 1) that hangs on seed and node alone (splitmix64).
+float draw(std::uint64_t seed, std::int32_t node) {
+  std::uint64_t z = seed + 0x9e3779b97f4a7c15u * (static_cast<std::uint64_t>(node) + 1);
+  z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9u;
+  z = (z ^ (z >> 27)) * 0x94d049bb133111ebu;
+  return static_cast<float>((z ^ (z >> 31)) >> 40) * 0x1p-23f - 1;
+}
+
+/// Largest stretch that a node bears; 0 where it bears any.
+float limit_of(const MlsState& s, std::int32_t i) {
+  const Material& m = s.nodes.material_of(i);
+  if (m.tear_stretch == 0 || s.inv_mass[i] == 0) return 0;
+  const double scatter = m.tear_scatter * draw(s.scene.seed, i);
+  return static_cast<float>(1 + (m.tear_stretch - 1) * (1 + scatter));
+}
+
+struct Furthest {
+  float past = 1;  ///< stretch over its limit
+  std::int32_t entry = -1;
+};
+
+}  // namespace
+
+bool can_tear(const MlsState& s) {
+  return std::any_of(s.nodes.materials.begin(), s.nodes.materials.end(),
+                     [](const Material& m) { return m.tear_stretch > 0; });
+}
+
+std::vector<std::int32_t> find_tearing(MlsState& s) {
+  const MlsPairs& p = s.pairs;
+  std::vector<Furthest> furthest(s.count());
+  s.cpu->for_each(
+      s.count(),
+      [&](int i) {
+        const float own = limit_of(s, i);
+        if (own == 0) return;
+        for (std::int32_t e = p.begin[i]; e < p.begin[i + 1]; ++e) {
+          if (p.crossed[e] != 0) continue;
+          const std::int32_t j = p.other[e];
+          const float other = limit_of(s, j);
+          if (other == 0) continue;
+          float r2 = 0, x2 = 0;
+          for (int a = 0; a < 3; ++a) {
+            const float r = s.place[4 * j + a] - s.place[4 * i + a];
+            const float x = r + (s.u[4 * j + a] - s.u[4 * i + a]);
+            r2 += r * r;
+            x2 += x * x;
+          }
+          const float past = std::sqrt(x2 / r2) / (0.5f * (own + other));
+          if (past > furthest[i].past) furthest[i] = {past, e};
+        }
+      },
+      kMlsGroup);
+  std::vector<std::int32_t> entries;
+  for (std::int32_t i = 0; i < s.count(); ++i) {
+    const std::int32_t e = furthest[i].entry;
+    if (e < 0 || p.other[e] < i) continue;
+    if (furthest[p.other[e]].entry == p.twin[e]) entries.push_back(e);
+  }
+  return entries;
+}
+
+}  // namespace tissue_sim

@@ -92,7 +92,7 @@ struct MlsOptions {
   MlsBasis basis = MlsBasis::kBalanced;
   MlsPlacement placement = MlsPlacement::kRegular;
   double grading = 2;          ///< kGraded: spacing deep inside over that at the surface, 1 to 4
-  double stabilisation = 0.1;  ///< stiffness of what is not linear in a support, times E, 0 to 1
+  double stabilisation = 0.3;  ///< stiffness of what is not linear in a support, times E, 0 to 1
 };
 
 enum class PbdModel {

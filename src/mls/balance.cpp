@@ -11,132 +11,137 @@
 namespace tissue_sim {
 namespace {
 
-using Matrix = Eigen::Matrix3d;
-using Vectors = std::vector<Vec3>;
+using Vector = Eigen::Vector3f;
+using Matrix = Eigen::Matrix3f;
+using Vectors = std::vector<Vector>;
 
 constexpr int kSteps = 12;           // of Newton's method, at most
 constexpr int kIterations = 60;      // of conjugate gradients, at most
-constexpr double kEnough = 1e-6;     // out of balance, relative
-constexpr double kReduction = 0.03;  // of the residual by conjugate gradients
-constexpr double kLargestStep = 1;   // of the logarithm of a weight
+constexpr float kEnough = 1e-5f;     // out of balance, relative
+constexpr float kReduction = 0.05f;  // of the residual by conjugate gradients
+constexpr float kLargestStep = 1;    // of the logarithm of a weight
 constexpr int kGrain = 256;
 
+/// In units of the mean spacing, so that single precision does.
 class Balance {
  public:
   Balance(const MlsNodes& nodes, Cpu& cpu, MlsPairs& pairs)
-      : nodes_(nodes), cpu_(cpu), pairs_(pairs), n_(nodes.count()) {
-    weight_.assign(pairs.whole.begin(), pairs.whole.end());
+      : cpu_(cpu), pairs_(pairs), n_(nodes.count()), weight_(pairs.whole), r_(weight_.size()) {
+    double support = 0, volume = 0;
+    for (std::int32_t i = 0; i < n_; ++i) {
+      support += pairs.support[i] / n_;
+      volume += nodes.volume[i] / n_;
+    }
+    for (std::int32_t i = 0; i < n_; ++i) {
+      volume_.push_back(static_cast<float>(nodes.volume[i] / volume));
+      free_.push_back(nodes.surface[i] == 0);
+      for (std::int32_t e = pairs.begin[i]; e < pairs.begin[i + 1]; ++e) {
+        r_[e] = ((nodes.place[pairs.other[e]] - nodes.place[i]) / support).cast<float>();
+      }
+    }
+    g_.resize(r_.size());
+    step_.resize(r_.size());
     normal_.resize(n_);
     inverse_.resize(n_);
     change_.resize(n_);
-    change_of_weight_.resize(weight_.size());
-    free_.resize(n_);
-    for (std::int32_t i = 0; i < n_; ++i) free_[i] = nodes.surface[i] == 0;
   }
 
   double run() {
-    double left = prepare();
+    float left = prepare();
     for (int step = 0; step < kSteps && left > kEnough; ++step) {
-      const Vectors lambda = solve();
-      times_transpose(lambda);
-      cpu_.for_each(
-          static_cast<int>(weight_.size()),
-          [&](int e) {
-            const double d = std::min(kLargestStep, std::max(-kLargestStep, change_of_weight_[e]));
-            weight_[e] *= std::exp(d);
-          },
-          4096);
+      times_transpose(solve());
+      for_each_entry([&](std::int32_t, std::int32_t e) {
+        weight_[e] *= std::exp(std::min(kLargestStep, std::max(-kLargestStep, step_[e])));
+      });
       left = prepare();
     }
-    for (std::size_t e = 0; e < weight_.size(); ++e) {
-      pairs_.whole[e] = static_cast<float>(weight_[e]);
-    }
-    pairs_.weight = pairs_.whole;
+    pairs_.whole = weight_;
+    pairs_.weight = weight_;
     return left;
   }
 
  private:
-  Vec3 r(std::int32_t i, std::int32_t e) const {
-    return nodes_.place[pairs_.other[e]] - nodes_.place[i];
-  }
-  Vec3 g(std::int32_t i, std::int32_t e, const Vec3& r) const {
-    return (normal_[i] + normal_[pairs_.other[e]]) * r;
-  }
   template <class F>
   void for_each_node(const F& f) {
     cpu_.for_each(n_, f, kGrain);
   }
+  template <class F>
+  void for_each_entry(const F& f) {
+    for_each_node([&](int i) {
+      for (std::int32_t e = pairs_.begin[i]; e < pairs_.begin[i + 1]; ++e) f(i, e);
+    });
+  }
 
   /// N_i and what is out of balance, with these weights; the largest of it, relative.
-  double prepare() {
+  float prepare() {
     for_each_node([&](int i) {
-      Matrix moment = Matrix::Zero();
+      Eigen::Matrix3d moment = Eigen::Matrix3d::Zero();
       for (std::int32_t e = pairs_.begin[i]; e < pairs_.begin[i + 1]; ++e) {
-        const Vec3 d = r(i, e);
-        moment += weight_[e] * d * d.transpose();
+        const Vec3 r = r_[e].cast<double>();
+        moment += static_cast<double>(weight_[e]) * r * r.transpose();
       }
-      inverse_[i] = moment.inverse();
-      if (!inverse_[i].allFinite()) {  // a support that spans no space: surface, and left alone
+      const Eigen::Matrix3d inverse = moment.inverse();
+      inverse_[i] = inverse.cast<float>();
+      if (!inverse_[i].allFinite()) {  // a support that spans no space: left as it is
         inverse_[i].setZero();
-        free_[i] = false;
+        free_[i] = 0;
       }
-      normal_[i] = static_cast<double>(nodes_.volume[i]) * inverse_[i];
+      normal_[i] = volume_[i] * inverse_[i];
     });
-    residual_.assign(n_, Vec3::Zero());
-    diagonal_.assign(n_, 1.0);
-    std::vector<double> relative(n_, 0.0);
+    for_each_entry([&](std::int32_t i, std::int32_t e) {
+      g_[e] = (normal_[i] + normal_[pairs_.other[e]]) * r_[e];
+    });
+    residual_.assign(n_, Vector::Zero());
+    diagonal_.assign(n_, 1.0f);
+    std::vector<float> relative(n_, 0.0f);
     for_each_node([&](int i) {
-      if (!free_[i]) return;
-      double lengths = 0, diagonal = 0;
+      if (free_[i] == 0) return;
+      float lengths = 0, diagonal = 0;
       for (std::int32_t e = pairs_.begin[i]; e < pairs_.begin[i + 1]; ++e) {
-        const Vec3 term = g(i, e, r(i, e));
-        residual_[i] += weight_[e] * term;
-        lengths += weight_[e] * term.norm();
-        diagonal += weight_[e] * term.squaredNorm();
+        residual_[i] += weight_[e] * g_[e];
+        lengths += weight_[e] * g_[e].norm();
+        diagonal += weight_[e] * g_[e].squaredNorm();
       }
-      diagonal_[i] = std::max(diagonal, 1e-300);
-      relative[i] = residual_[i].norm() / std::max(lengths, 1e-300);
+      if (lengths == 0) return;
+      diagonal_[i] = diagonal;
+      relative[i] = residual_[i].norm() / lengths;
     });
     return n_ == 0 ? 0 : *std::max_element(relative.begin(), relative.end());
   }
 
-  /// change_of_weight_ = J^T lambda, per entry: dw = w times it is the step.
+  /// step_ = J^T lambda, of each weight's logarithm.
   void times_transpose(const Vectors& lambda) {
     for_each_node([&](int i) {
       Matrix& y = change_[i];
       y.setZero();
       for (std::int32_t e = pairs_.begin[i]; e < pairs_.begin[i + 1]; ++e) {
-        y += weight_[e] * (lambda[i] - lambda[pairs_.other[e]]) * r(i, e).transpose();
+        const Vector d = weight_[e] * (lambda[i] - lambda[pairs_.other[e]]);
+        y += d * r_[e].transpose();
       }
+      y = volume_[i] * (inverse_[i] * y * inverse_[i]).eval();
     });
-    for_each_node([&](int i) {
-      for (std::int32_t e = pairs_.begin[i]; e < pairs_.begin[i + 1]; ++e) {
-        const std::int32_t j = pairs_.other[e];
-        const Vec3 d = r(i, e), a = inverse_[i] * d, b = inverse_[j] * d;
-        const double by_moments = static_cast<double>(nodes_.volume[i]) * a.dot(change_[i] * a) +
-                                  static_cast<double>(nodes_.volume[j]) * b.dot(change_[j] * b);
-        change_of_weight_[e] = g(i, e, d).dot(lambda[i] - lambda[j]) - by_moments;
-      }
+    for_each_entry([&](std::int32_t i, std::int32_t e) {
+      const std::int32_t j = pairs_.other[e];
+      const Matrix by_moments = change_[i] + change_[j];
+      step_[e] = g_[e].dot(lambda[i] - lambda[j]) - r_[e].dot(by_moments * r_[e]);
     });
   }
 
-  /// out = J (w change_of_weight_), 0 at nodes that are not free.
+  /// out = J (w step_), 0 at nodes that are not free.
   void times(Vectors& out) {
     for_each_node([&](int i) {
       Matrix moment = Matrix::Zero();
       for (std::int32_t e = pairs_.begin[i]; e < pairs_.begin[i + 1]; ++e) {
-        const Vec3 d = r(i, e);
-        moment += weight_[e] * change_of_weight_[e] * d * d.transpose();
+        moment += weight_[e] * step_[e] * r_[e] * r_[e].transpose();
       }
-      change_[i] = -static_cast<double>(nodes_.volume[i]) * (inverse_[i] * moment * inverse_[i]);
+      change_[i] = -volume_[i] * (inverse_[i] * moment * inverse_[i]);
     });
     for_each_node([&](int i) {
       out[i].setZero();
-      if (!free_[i]) return;
+      if (free_[i] == 0) return;
       for (std::int32_t e = pairs_.begin[i]; e < pairs_.begin[i + 1]; ++e) {
-        const Vec3 d = r(i, e);
-        out[i] += weight_[e] *
-                  (change_of_weight_[e] * g(i, e, d) + (change_[i] + change_[pairs_.other[e]]) * d);
+        const Matrix change = change_[i] + change_[pairs_.other[e]];
+        out[i] += weight_[e] * (step_[e] * g_[e] + change * r_[e]);
       }
     });
   }
@@ -149,13 +154,10 @@ class Balance {
 
   /// J S J^T lambda = -residual.
   Vectors solve() {
-    Vectors x(n_, Vec3::Zero()), rest(n_), z(n_), p(n_), q(n_);
+    Vectors x(n_, Vector::Zero()), rest(n_), z(n_), p(n_), q(n_);
     for (std::int32_t i = 0; i < n_; ++i) rest[i] = -residual_[i];
     const auto precondition = [&] {
-      for (std::int32_t i = 0; i < n_; ++i) {
-        z[i] = Vec3::Zero();
-        if (free_[i] != 0) z[i] = rest[i] / diagonal_[i];
-      }
+      for (std::int32_t i = 0; i < n_; ++i) z[i] = rest[i] * (free_[i] / diagonal_[i]);
     };
     precondition();
     p = z;
@@ -166,26 +168,29 @@ class Balance {
       times(q);
       const double curvature = dot(p, q);
       if (!(curvature > 0)) break;
-      const double alpha = rz / curvature;
+      const auto alpha = static_cast<float>(rz / curvature);
       for (std::int32_t i = 0; i < n_; ++i) {
         x[i] += alpha * p[i];
         rest[i] -= alpha * q[i];
       }
       precondition();
       const double next = dot(rest, z);
-      for (std::int32_t i = 0; i < n_; ++i) p[i] = z[i] + next / rz * p[i];
+      for (std::int32_t i = 0; i < n_; ++i) p[i] = z[i] + static_cast<float>(next / rz) * p[i];
       rz = next;
     }
     return x;
   }
 
-  const MlsNodes& nodes_;
   Cpu& cpu_;
   MlsPairs& pairs_;
   const std::int32_t n_;
-  std::vector<double> weight_, change_of_weight_, diagonal_;
-  std::vector<Matrix> normal_, inverse_, change_;
+  Array<float> weight_;
+  Vectors r_, g_;              // of each entry
+  std::vector<float> step_;    // of each entry
+  std::vector<float> volume_;  // of each node, as all below
   std::vector<char> free_;
+  std::vector<Matrix> normal_, inverse_, change_;
+  std::vector<float> diagonal_;
   Vectors residual_;
 };
 

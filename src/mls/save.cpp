@@ -14,9 +14,14 @@ void fields(Archive& archive, MlsGroupContact& c) {
 }
 
 template <class Archive>
+void fields(Archive& archive, MlsNodeContacts& c) {
+  archive(c.begin, c.other, c.rest, c.until_search);
+}
+
+template <class Archive>
 void fields(Archive& archive, MlsState& s) {
   archive(s.pairs.crossed, s.pairs.weight, s.u, s.v, s.inverse_moment, s.kappa, s.outer, s.thread,
-          s.any_thread, s.spring, s.contact, s.until_list, s.dt, s.time);
+          s.any_thread, s.spring, s.contact, s.node_contacts, s.until_list, s.dt, s.time);
 }
 
 template <class Archive>
@@ -27,7 +32,7 @@ void fields(Archive& archive, MlsSubsteps& s) {
 
 template <class Archive>
 void MlsTissue::each_field(Archive& archive) {
-  archive(*state_, pieces_, substeps_, stiffening_, pieces_measured_);
+  archive(*state_, pieces_, substeps_, stiffening_, pieces_measured_, may_touch_);
 }
 
 std::vector<std::uint8_t> MlsTissue::save() {

@@ -6,6 +6,7 @@
 
 #include "frame/leapfrog.h"
 #include "mls/contact.h"
+#include "mls/node_contact.h"
 
 namespace tissue_sim {
 namespace {
@@ -101,7 +102,7 @@ std::unique_ptr<MlsState> make_mls_state(const Scene& scene, std::vector<std::st
   s.pairs = make_pairs(s.nodes, scene.mls.neighbours, *s.cpu);
   if (scene.mls.basis == MlsBasis::kBalanced) balance(s.nodes, *s.cpu, s.pairs);
   const int n = s.count();
-  for (Array<float>* a : {&s.place, &s.u, &s.v, &s.u_next}) resize_padded(*a, n, 4);
+  for (Array<float>* a : {&s.place, &s.u, &s.v, &s.u_next, &s.v_next}) resize_padded(*a, n, 4);
   for (Array<float>* a :
        {&s.mass, &s.inv_mass, &s.volume_mu, &s.volume_lambda, &s.volume_eta, &s.kappa, &s.edge,
         &s.inverse_moment[0], &s.inverse_moment[1], &s.inverse_moment[2], &s.inverse_moment[3],
@@ -181,15 +182,17 @@ float substep(MlsState& s, float dt, std::vector<ColliderLoad>& loads) {
       if (s.any_thread[i / kMlsChunk] != 0) {
         add_springs(s, s.u.data(), i, force + 4 * (i - first));
       }
+      if (!s.node_contacts.begin.empty()) add_node_contact(s, i, force + 4 * (i - first));
     }
     if (list) list_near(s, group, dt);
     add_contact(s, group, force);
     for (int i = first; i < last; ++i) {
       const float inv_mass = s.inv_mass[i];
       for (int a = 0; a < 3; ++a) {
-        float& v = s.v[4 * i + a];
-        v = inv_mass > 0 ? keep * v + kick * (force[4 * (i - first) + a] * inv_mass + gravity[a])
-                         : 0.0f;
+        const float f = force[4 * (i - first) + a];
+        const float v =
+            inv_mass > 0 ? keep * s.v[4 * i + a] + kick * (f * inv_mass + gravity[a]) : 0.0f;
+        s.v_next[4 * i + a] = v;
         s.u_next[4 * i + a] = s.u[4 * i + a] + dt * v;
       }
     }
@@ -201,6 +204,7 @@ float substep(MlsState& s, float dt, std::vector<ColliderLoad>& loads) {
     moves.help(move_group);
   });
   s.u.swap(s.u_next);
+  s.v.swap(s.v_next);
   for (const MlsGroupContact& group : s.contact) {
     for (std::size_t c = 0; c < group.loads.size(); ++c) {
       for (int a = 0; a < 3; ++a) {

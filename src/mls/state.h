@@ -35,6 +35,14 @@ struct MlsGroupContact {
   std::vector<ColliderLoad> loads;  ///< of the last substep, per collider; empty for none
 };
 
+/// Nodes that may touch one another until they are looked for anew; each pair stands twice.
+struct MlsNodeContacts {
+  std::vector<std::int32_t> begin;  ///< per node, and one more; empty where nothing was looked for
+  std::vector<std::int32_t> other;
+  std::vector<float> rest;  ///< distance below which they push [m]
+  int until_search = 0;     ///< substeps
+};
+
 struct MlsState {
   Scene scene;
   MlsNodes nodes;
@@ -42,7 +50,7 @@ struct MlsState {
 
   // Per node, padded to whole chunks. Vectors are (x, y, z, 0).
   Array<float> place, u, v;                           ///< [m], [m], [m/s]
-  Array<float> u_next;                                ///< where a substep writes displacements
+  Array<float> u_next, v_next;                        ///< where a substep writes them
   Array<float> mass, inv_mass;                        ///< [kg]; inv_mass 0 where held
   Array<float> inverse_moment[6];                     ///< of M_i: 00 11 22 01 02 12
   Array<float> volume_mu, volume_lambda, volume_eta;  ///< [N m], [N m s]
@@ -58,9 +66,10 @@ struct MlsState {
 
   std::vector<Collider> colliders;       ///< at the present substep
   std::vector<MlsGroupContact> contact;  ///< per group
-  int until_list = 0;                    ///< substeps until colliders near groups are listed anew
-  float dt = 0;                          ///< the last substep, 0 before the first [s]
-  double time = 0;                       ///< [s]
+  MlsNodeContacts node_contacts;
+  int until_list = 0;  ///< substeps until colliders near groups are listed anew
+  float dt = 0;        ///< the last substep, 0 before the first [s]
+  double time = 0;     ///< [s]
 
   InstructionSet instructions = InstructionSet::kSse2;
   const MlsKernels* kernels = nullptr;

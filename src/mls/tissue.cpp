@@ -10,6 +10,7 @@
 #include "frame/checksum.h"
 #include "frame/select_points.h"
 #include "mls/cut.h"
+#include "mls/node_contact.h"
 #include "mls/tear.h"
 
 namespace tissue_sim {
@@ -24,6 +25,7 @@ MlsTissue::MlsTissue(const Scene& scene, std::vector<std::string> notes)
   for (std::int32_t i = 0; i < nodes.count(); ++i) all[i] = i;
   CutReport ignored;
   part(all, ignored);  // a mesh may have parts that do not touch
+  may_touch_ = pieces_.all.size() > 1;
   stiffening_.assign(state_->chunks() * kMlsChunk, 1.0f);
   for (const Material& m : nodes.materials) {
     if (m.tear_stretch == 0 || m.tear_length == 0) continue;
@@ -58,9 +60,15 @@ void MlsTissue::cut(const BladePath& path, const float* u_begin, CutReport& repo
   std::vector<std::int32_t> changed;
   cross_pairs(*state_, path, u_begin, state_->u.data(), changed, report);
   if (changed.empty()) return;
+  forget();
+  part(changed, report);
+}
+
+void MlsTissue::forget() {
   substeps_.forget();
   pieces_measured_ = false;
-  part(changed, report);
+  may_touch_ = true;
+  state_->node_contacts.until_search = 0;
 }
 
 CutReport MlsTissue::cut_now(const BladePath& path) {
@@ -88,6 +96,7 @@ void MlsTissue::save_checkpoint() {
   checkpoint_.u = s.u;
   checkpoint_.v = s.v;
   checkpoint_.contact = s.contact;
+  checkpoint_.node_contacts = s.node_contacts;
   checkpoint_.dt = s.dt;
   checkpoint_.time = s.time;
   checkpoint_.until_list = s.until_list;
@@ -101,6 +110,9 @@ double MlsTissue::run_part(const FramePart& part) {
     const double share = part.substeps.share(i + 1, part.from, part.to);
     s.colliders = frame.colliders.at(share);
     std::vector<ColliderLoad> loads(s.colliders.size());
+    if (may_touch_ && s.node_contacts.until_search-- <= 0) {
+      find_node_contacts(s, pieces_.of_point, part.substeps.at(i));
+    }
     const float acted = substep(s, part.substeps.at(i), loads);
     frame.colliders.add_loads(share, s.colliders.data(), loads.data(), acted / frame.duration,
                               result_.loads);
@@ -122,6 +134,7 @@ void MlsTissue::reject_part(Verdict) {
   s.u = checkpoint_.u;
   s.v = checkpoint_.v;
   s.contact = checkpoint_.contact;
+  s.node_contacts = checkpoint_.node_contacts;
   s.dt = checkpoint_.dt;
   s.time = checkpoint_.time;
   s.until_list = checkpoint_.until_list;
@@ -143,8 +156,7 @@ void MlsTissue::break_bonds(double share) {
   if (tearing.empty()) return;
   std::vector<std::int32_t> changed;
   cross_entries(s, tearing, changed, result_.tear_report);
-  substeps_.forget();
-  pieces_measured_ = false;
+  forget();
   part(changed, result_.tear_report);
 }
 
@@ -183,6 +195,7 @@ FrameResult MlsTissue::finish() {
     if (!(v2 <= fastest2)) fastest2 = v2;
   }
   result_.max_speed = std::sqrt(fastest2);
+  pieces_measured_ = false;
   // Nothing that instruments do moves tissue at the speed of a bullet; what does is out of control.
   result_.blew_up = result_.blew_up || !finite || !(result_.max_speed < 300);
   return result_;

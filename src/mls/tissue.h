@@ -68,6 +68,7 @@ class MlsTissue final : public Tissue {
   struct Checkpoint {
     Array<float> u, v;
     std::vector<MlsGroupContact> contact;
+    MlsNodeContacts node_contacts;
     float dt;
     double time;
     int until_list;
@@ -75,6 +76,7 @@ class MlsTissue final : public Tissue {
   };
 
   void cut(const BladePath& path, const float* u_begin, CutReport& report);
+  void forget();  ///< what a cut or a tear makes void
   /// Pieces anew, after these nodes lost pairs.
   void part(const std::vector<std::int32_t>& changed, CutReport& report);
   /// How much each node has stiffened, into stiffening_; whether all is finite.
@@ -88,6 +90,7 @@ class MlsTissue final : public Tissue {
   MlsSubsteps substeps_;
   std::vector<float> stiffening_;
   bool pieces_measured_ = false;
+  bool may_touch_ = false;  ///< whether tissue may touch tissue: there are pieces, or cuts
   FrameResult result_;
 };
 

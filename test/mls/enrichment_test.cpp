@@ -96,7 +96,7 @@ TEST(MlsEnrichment, ProductsAreWrongBehindCornersAndTheExtendedFormIsNot) {
                    "x [m],y [m],multiplied [-],extended [-],region [-]");
     CurveFile corners("enrichment_cut_" + std::to_string(c), "x [m],y [m]");
     for (const Vec2& x : kChains[c]) corners.add({x.x(), x.y()});
-    const Vec2 node(0, 0.6);
+    const Vec2 node(0.05, 0.6);
     ASSERT_EQ(true_side(cuts, extended.angle(), node), 1);
     const double own_product = multiplied_enrichment(cuts, node), own = extended(node);
     int places = 0, wrong_product = 0, wrong_extended = 0;

@@ -138,10 +138,22 @@ inline std::vector<Vec3> mls_forces(const MlsState& s) {
     kappa[i] = s.scene.mls.stabilisation * m.young_modulus * volume / M.trace();
     Q[i] = volume * stress_of * M.inverse() - kappa[i] * H[i];
   }
+  // Springs of supports that span no space.
+  const auto share = [&](int i, double w) {
+    if (s.thread[i] == 0) return 0.0;
+    double trace = 0;
+    for_each_pair(i, [&](int, int, double weight, const Vec3& r, const Vec3&) {
+      trace += weight * r.squaredNorm();
+    });
+    return w > 0 ? s.nodes.material_of(i).young_modulus * s.nodes.volume[i] * w / trace : 0.0;
+  };
   std::vector<Vec3> force(s.count(), Vec3::Zero());
   for (int i = 0; i < s.count(); ++i) {
     for_each_pair(i, [&](int, int j, double w, const Vec3& r, const Vec3& d) {
       force[i] += w * ((Q[i] + Q[j]) * r + (kappa[i] + kappa[j]) * d);
+      const double k = share(i, w) + share(j, w);
+      const Vec3 x = r + d;
+      force[i] += k * (x.norm() - r.norm()) * x.normalized();
     });
   }
   return force;

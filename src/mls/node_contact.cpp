@@ -1,0 +1,123 @@
+#include "mls/node_contact.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "contact/contact_spring.h"
+#include "geometry/nearest.h"
+
+namespace tissue_sim {
+namespace {
+
+constexpr double kSkin = 0.5;    // of an edge: how much farther than they touch nodes are listed
+constexpr double kFar = 2.5;     // reference distance from which a piece may touch itself [edges]
+constexpr double kFaster = 1.5;  // than at the search
+constexpr int kMostSubsteps = 200;  // between two searches
+
+ContactSpring spring_of(const MlsState& s, std::int32_t i) {
+  const Material& m = s.nodes.material_of(i);
+  return contact_spring(static_cast<float>(lame_lambda(m) + 2 * lame_mu(m)),
+                        static_cast<float>(m.density), s.edge[i], s.nodes.volume[i]);
+}
+
+bool may_touch(const MlsState& s, const std::vector<std::int32_t>& piece, std::int32_t i,
+               std::int32_t j) {
+  const std::int32_t e = s.pairs.find(i, j);
+  if (e >= 0) return s.pairs.crossed[e] != 0;
+  if (piece[i] != piece[j]) return true;
+  const double far = kFar * 0.5 * (s.edge[i] + s.edge[j]);
+  return (s.nodes.place[i] - s.nodes.place[j]).squaredNorm() > far * far;
+}
+
+}  // namespace
+
+void find_node_contacts(MlsState& s, const std::vector<std::int32_t>& piece, float dt) {
+  MlsNodeContacts& contacts = s.node_contacts;
+  std::vector<std::int32_t> outer;
+  std::vector<Vec3> places;
+  double fastest2 = 0, widest = 0, least = 1e300;
+  for (std::int32_t i = 0; i < s.count(); ++i) {
+    if (s.outer[i] == 0) continue;
+    outer.push_back(i);
+    places.push_back(s.position(i));
+    fastest2 = std::max(fastest2, s.velocity(i).squaredNorm());
+    widest = std::max<double>(widest, s.edge[i]);
+    least = std::min<double>(least, s.edge[i]);
+  }
+  const MlsNodeContacts before = std::move(contacts);
+  contacts = {};
+  contacts.begin.assign(s.count() + 1, 0);
+  contacts.until_search = kMostSubsteps;
+  if (outer.empty()) return;
+  const double step = 2 * kFaster * std::sqrt(fastest2) * dt;  // both may move
+  if (step > 0) {
+    contacts.until_search =
+        static_cast<int>(std::min<double>(kMostSubsteps, std::max(1.0, kSkin * least / step)));
+  }
+  const NearestPoints tree(places);
+  struct Found {
+    std::int32_t other;
+    float rest;
+  };
+  std::vector<std::vector<Found>> of(outer.size());
+  s.cpu->for_each(
+      static_cast<int>(outer.size()),
+      [&](int k) {
+        const std::int32_t i = outer[k];
+        std::vector<Neighbour> near;
+        tree.within(places[k], (1 + kSkin) * widest, near);
+        for (const Neighbour& n : near) {
+          const std::int32_t j = outer[n.index];
+          const float edge = 0.5f * (s.edge[i] + s.edge[j]);
+          const auto distance = static_cast<float>(std::sqrt(n.distance2));
+          if (j == i || distance > (1 + static_cast<float>(kSkin)) * edge) continue;
+          if (!may_touch(s, piece, i, j)) continue;
+          float rest = std::min(edge, distance);
+          if (!before.begin.empty()) {
+            const auto first = before.other.begin() + before.begin[i],
+                       last = before.other.begin() + before.begin[i + 1];
+            const auto at = std::lower_bound(first, last, j);
+            if (at != last && *at == j) {
+              rest = std::max(rest, before.rest[at - before.other.begin()]);
+            }
+          }
+          of[k].push_back({j, rest});
+        }
+      },
+      16);
+  for (std::size_t k = 0; k < outer.size(); ++k) {
+    contacts.begin[outer[k] + 1] = static_cast<std::int32_t>(of[k].size());
+  }
+  for (std::int32_t i = 0; i < s.count(); ++i) contacts.begin[i + 1] += contacts.begin[i];
+  for (const auto& some : of) {
+    for (const Found& f : some) {
+      contacts.other.push_back(f.other);
+      contacts.rest.push_back(f.rest);
+    }
+  }
+}
+
+void add_node_contact(const MlsState& s, std::int32_t i, float* force) {
+  const MlsNodeContacts& contacts = s.node_contacts;
+  for (std::int32_t c = contacts.begin[i]; c < contacts.begin[i + 1]; ++c) {
+    const std::int32_t j = contacts.other[c];
+    float d[3], d2 = 0;
+    for (int a = 0; a < 3; ++a) {
+      d[a] = (s.place[4 * j + a] - s.place[4 * i + a]) + (s.u[4 * j + a] - s.u[4 * i + a]);
+      d2 += d[a] * d[a];
+    }
+    const float rest = contacts.rest[c];
+    if (d2 >= rest * rest) continue;
+    const float distance = std::max(std::sqrt(d2), 1e-12f);
+    float approach = 0;
+    for (int a = 0; a < 3; ++a) approach += (s.v[4 * j + a] - s.v[4 * i + a]) * d[a];
+    approach /= -distance;
+    const ContactSpring own = spring_of(s, i), other = spring_of(s, j);
+    const float k = own.stiffness * other.stiffness / (own.stiffness + other.stiffness);
+    const float c_both = own.damping * other.damping / (own.damping + other.damping);
+    const float push = std::max(0.0f, k * (rest - distance) + c_both * approach);
+    for (int a = 0; a < 3; ++a) force[a] -= push * d[a] / distance;
+  }
+}
+
+}  // namespace tissue_sim

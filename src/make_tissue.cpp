@@ -8,6 +8,7 @@
 #include "pbd/pbd_tissue.h"
 #include "tissue_sim/tissue.h"
 #if defined(TISSUE_SIM_CUDA)
+#include "mls/cuda/cuda_mls_tissue.h"
 #include "mpm/cuda/cuda_mpm_tissue.h"
 #endif
 
@@ -34,10 +35,11 @@ struct Makers {
 constexpr Makers kMakers[] = {
 #if defined(TISSUE_SIM_CUDA)
     {Method::kMpm, make<MpmTissue>, make<CudaMpmTissue>},
+    {Method::kMls, make<MlsTissue>, make<CudaMlsTissue>},
 #else
     {Method::kMpm, make<MpmTissue>, nullptr},
-#endif
     {Method::kMls, make<MlsTissue>, nullptr},
+#endif
     {Method::kPbd, make<PbdTissue>, nullptr},
 };
 

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <tuple>
 
-#include "contact/contact_spring.h"
+#include "mls/node_contact.h"
 #include "tools/frame_colliders.h"
 
 namespace tissue_sim {
@@ -82,10 +82,7 @@ void add_contact(MlsState& state, int group, float* force) {
       } else {
         to_local(collider, x, touch.hold);
       }
-      const Material& m = state.nodes.material_of(i);
-      const ContactSpring spring =
-          contact_spring(static_cast<float>(lame_lambda(m) + 2 * lame_mu(m)),
-                         static_cast<float>(m.density), state.edge[i], state.nodes.volume[i]);
+      const ContactSpring spring = node_spring(state, i);
       float push[3];
       contact_force(collider, g, spring, x, &state.v[4 * i], touch.hold, push);
       touching.push_back(touch);

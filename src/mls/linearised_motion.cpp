@@ -3,12 +3,14 @@
 #include <algorithm>
 #include <cmath>
 #include <random>
+#include <utility>
 
 #include "math/lanczos.h"
 
 namespace tissue_sim {
 
-MlsLinearisedMotion::MlsLinearisedMotion(MlsState& state) : s_(state) {
+MlsLinearisedMotion::MlsLinearisedMotion(const MlsState& state, MlsForces forces)
+    : s_(state), forces_(std::move(forces)) {
   const std::size_t n = state.count();
   for (Array<float>* a : {&at_rest_, &force_, &u_}) a->assign(state.u.size(), 0.0f);
   for (std::vector<double>* a : {&v_, &w_, &before_}) a->assign(4 * n, 0.0);
@@ -19,7 +21,7 @@ MlsLinearisedMotion::MlsLinearisedMotion(MlsState& state) : s_(state) {
     least = std::min(least, state.edge[i]);
   }
   step_ = least / 64.0;
-  internal_forces(state, state.u.data(), at_rest_.data());
+  forces_(state.u.data(), at_rest_.data());
 }
 
 void MlsLinearisedMotion::start() {
@@ -42,7 +44,7 @@ double MlsLinearisedMotion::apply() {
   for (std::size_t k = 0; k < v_.size(); ++k) {
     u_[k] = s_.u[k] + static_cast<float>(scale * v_[k] * root_[k / 4]);
   }
-  internal_forces(s_, u_.data(), force_.data());
+  forces_(u_.data(), force_.data());
   double product = 0;
   for (std::size_t k = 0; k < v_.size(); ++k) {
     w_[k] = -root_[k / 4] * (static_cast<double>(force_[k]) - at_rest_[k]) / scale;
@@ -65,8 +67,8 @@ void MlsLinearisedMotion::next(double b) {
   for (std::size_t k = 0; k < v_.size(); ++k) v_[k] = w_[k] / b;
 }
 
-double measured_limit(MlsState& state, int steps) {
-  MlsLinearisedMotion motion(state);
+double measured_limit(const MlsState& state, const MlsForces& forces, int steps) {
+  MlsLinearisedMotion motion(state, forces);
   return 2 / std::sqrt(largest_eigenvalue(motion, steps));
 }
 

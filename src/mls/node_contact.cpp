@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "contact/contact_spring.h"
 #include "geometry/nearest.h"
 
 namespace tissue_sim {
@@ -13,12 +12,6 @@ constexpr double kSkin = 0.5;    // of an edge: how much farther than they touch
 constexpr double kFar = 2.5;     // reference distance from which a piece may touch itself [edges]
 constexpr double kFaster = 1.5;  // than at the search
 constexpr int kMostSubsteps = 200;  // between two searches
-
-ContactSpring spring_of(const MlsState& s, std::int32_t i) {
-  const Material& m = s.nodes.material_of(i);
-  return contact_spring(static_cast<float>(lame_lambda(m) + 2 * lame_mu(m)),
-                        static_cast<float>(m.density), s.edge[i], s.nodes.volume[i]);
-}
 
 bool may_touch(const MlsState& s, const std::vector<std::int32_t>& piece, std::int32_t i,
                std::int32_t j) {
@@ -30,6 +23,12 @@ bool may_touch(const MlsState& s, const std::vector<std::int32_t>& piece, std::i
 }
 
 }  // namespace
+
+ContactSpring node_spring(const MlsState& s, std::int32_t i) {
+  const Material& m = s.nodes.material_of(i);
+  return contact_spring(static_cast<float>(lame_lambda(m) + 2 * lame_mu(m)),
+                        static_cast<float>(m.density), s.edge[i], s.nodes.volume[i]);
+}
 
 void find_node_contacts(MlsState& s, const std::vector<std::int32_t>& piece, float dt) {
   MlsNodeContacts& contacts = s.node_contacts;
@@ -112,7 +111,7 @@ void add_node_contact(const MlsState& s, std::int32_t i, float* force) {
     float approach = 0;
     for (int a = 0; a < 3; ++a) approach += (s.v[4 * j + a] - s.v[4 * i + a]) * d[a];
     approach /= -distance;
-    const ContactSpring own = spring_of(s, i), other = spring_of(s, j);
+    const ContactSpring own = node_spring(s, i), other = node_spring(s, j);
     const float k = own.stiffness * other.stiffness / (own.stiffness + other.stiffness);
     const float c_both = own.damping * other.damping / (own.damping + other.damping);
     const float push = std::max(0.0f, k * (rest - distance) + c_both * approach);

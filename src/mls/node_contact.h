@@ -4,9 +4,13 @@
 #include <cstdint>
 #include <vector>
 
+#include "contact/contact_spring.h"
 #include "mls/state.h"
 
 namespace tissue_sim {
+
+/// What a node touches anything with.
+ContactSpring node_spring(const MlsState& state, std::int32_t i);
 
 /// Finds the nodes that may touch before this is called again: of different pieces, or across a
 /// cut, or far apart in their piece; `piece` is of each node. Two that are found keep the distance

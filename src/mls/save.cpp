@@ -27,7 +27,7 @@ void fields(Archive& archive, MlsState& s) {
 template <class Archive>
 void fields(Archive& archive, MlsSubsteps& s) {
   archive(s.measured_, s.now_, s.limit_, s.measured_at_, s.growth_, s.trend_, s.count_,
-          s.shortened_);
+          s.shortened_, s.is_new_);
 }
 
 template <class Archive>

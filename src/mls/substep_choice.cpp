@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "mls/linearised_motion.h"
 
@@ -52,16 +53,22 @@ double MlsSubsteps::growth(const MlsState& s, const std::vector<float>& stiffeni
   return most;
 }
 
-PartSubsteps MlsSubsteps::part(MlsState& s, double time) {
-  const bool is_old = s.time - measured_at_ > kLongestAge;
-  const bool is_new = limit_ == 0;
-  if (is_new || is_old || (growth_ > kMostGrowth && s.time > measured_at_)) {
-    limit_ = measured_limit(s, kSteps);
-    if (!std::isfinite(limit_)) limit_ = 1;  // all is held
-    measured_ = now_;
-    measured_at_ = s.time;
-    growth_ = 1;
-  }
+bool MlsSubsteps::is_due(const MlsState& s) const {
+  return limit_ == 0 || s.time - measured_at_ > kLongestAge ||
+         (growth_ > kMostGrowth && s.time > measured_at_);
+}
+
+void MlsSubsteps::measure(const MlsState& s, const MlsForces& forces) {
+  is_new_ = limit_ == 0;
+  limit_ = measured_limit(s, forces, kSteps);
+  if (!std::isfinite(limit_)) limit_ = 1;  // all is held
+  measured_ = now_;
+  measured_at_ = s.time;
+  growth_ = 1;
+}
+
+PartSubsteps MlsSubsteps::part(const MlsState& s, double time) {
+  const bool is_new = std::exchange(is_new_, false);
   double stretch = 1;
   for (const float x : now_) stretch = std::max<double>(stretch, x);
   const double elastic = limit_ / std::sqrt(growth_ * trend_);

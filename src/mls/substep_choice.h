@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "frame/part_substeps.h"
+#include "mls/linearised_motion.h"
 #include "mls/state.h"
 
 namespace tissue_sim {
@@ -14,8 +15,12 @@ namespace tissue_sim {
 /// undone and done again with shorter ones.
 class MlsSubsteps {
  public:
+  /// Whether measure() is due before the next part.
+  bool is_due(const MlsState& state) const;
+  /// Measures the limit.
+  void measure(const MlsState& state, const MlsForces& forces);
   /// The next part of a frame of which `time` is left [s].
-  PartSubsteps part(MlsState& state, double time);
+  PartSubsteps part(const MlsState& state, double time);
   /// After a part: `stiffening` of each node (MlsKernels::measure), whether its substeps of `dt`
   /// were borne. If not, the next ones are shorter.
   bool is_borne(const MlsState& state, const std::vector<float>& stiffening, double dt);
@@ -37,6 +42,7 @@ class MlsSubsteps {
   double trend_ = 1;             ///< growth in the last part
   int count_ = 64;               ///< substeps of a part at most
   double shortened_ = 1;         ///< after parts that were not borne
+  bool is_new_ = true;           ///< the limit was not known before it was measured last
 };
 
 }  // namespace tissue_sim

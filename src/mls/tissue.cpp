@@ -58,8 +58,10 @@ void MlsTissue::part(const std::vector<std::int32_t>& changed, CutReport& report
 
 void MlsTissue::cut(const BladePath& path, const float* u_begin, CutReport& report) {
   std::vector<std::int32_t> changed;
+  pull();
   cross_pairs(*state_, path, u_begin, state_->u.data(), changed, report);
   if (changed.empty()) return;
+  pairs_changed();
   forget();
   part(changed, report);
 }
@@ -86,9 +88,18 @@ void MlsTissue::begin_frame(double duration, const FrameInput& input) {
     cut(path, s.u.data(), result_.cut_reports.back());
   }
   const bool blades = !blade_paths(s.scene, input, 0, 1).empty();
+  if (blades) pull();
   frame_.emplace(Frame{input, duration, FrameColliders(s.scene, input, duration),
                        blades ? s.u : Array<float>(), 0});
   s.until_list = 0;
+}
+
+PartSubsteps MlsTissue::choose_substeps(const FrameInput&, double time) {
+  if (substeps_.is_due(*state_)) {
+    pull();
+    substeps_.measure(*state_, [this](const float* u, float* force) { forces_at(u, force); });
+  }
+  return substeps_.part(*state_, time);
 }
 
 void MlsTissue::save_checkpoint() {
@@ -123,7 +134,7 @@ double MlsTissue::run_part(const FramePart& part) {
 }
 
 Verdict MlsTissue::judge_part(const FramePart& part) {
-  const bool finite = measure(nullptr);
+  const bool finite = measure().finite;
   if (!substeps_.is_borne(*state_, stiffening_, part.substeps.longest())) return Verdict::kTooLong;
   result_.blew_up = !finite;
   return Verdict::kAccepted;
@@ -144,6 +155,7 @@ void MlsTissue::reject_part(Verdict) {
 void MlsTissue::break_bonds(double share) {
   MlsState& s = *state_;
   Frame& frame = *frame_;
+  if (can_tear(s)) pull();
   const std::vector<std::int32_t> tearing =
       can_tear(s) ? find_tearing(s) : std::vector<std::int32_t>();
   if (!frame.u_before.empty() && (share == 1 || !tearing.empty())) {
@@ -156,11 +168,12 @@ void MlsTissue::break_bonds(double share) {
   if (tearing.empty()) return;
   std::vector<std::int32_t> changed;
   cross_entries(s, tearing, changed, result_.tear_report);
+  pairs_changed();
   forget();
   part(changed, result_.tear_report);
 }
 
-bool MlsTissue::measure(double* elastic) {
+MlsTissue::Figures MlsTissue::measure() {
   MlsState& s = *state_;
   const MlsField field = field_of(s);
   std::vector<MlsMeasure> of(s.chunks());
@@ -170,34 +183,45 @@ bool MlsTissue::measure(double* elastic) {
         of[chunk] = s.kernels->measure(field, chunk, nullptr, &stiffening_[chunk * kMlsChunk]);
       },
       4);
-  double sum = 0;
-  bool finite = true;
+  Figures sum;
   for (const MlsMeasure& m : of) {
-    sum += m.elastic;
-    finite = finite && m.finite;
+    sum.elastic += m.elastic;
+    sum.finite = sum.finite && m.finite;
   }
-  if (elastic != nullptr) *elastic = sum;
-  return finite;
+  double fastest2 = 0;
+  for (int i = 0; i < s.count(); ++i) {
+    const double v2 = s.velocity(i).squaredNorm();
+    sum.kinetic += 0.5 * s.mass[i] * v2;
+    if (!(v2 <= fastest2)) fastest2 = v2;
+  }
+  sum.speed = std::sqrt(fastest2);
+  return sum;
 }
+
+void MlsTissue::measure_stress(std::vector<float>& of_node) {
+  const MlsState& s = *state_;
+  const MlsField field = field_of(s);
+  of_node.resize(static_cast<std::size_t>(s.chunks()) * kMlsChunk);
+  state_->cpu->for_each(
+      s.chunks(),
+      [&](int chunk) { s.kernels->measure(field, chunk, &of_node[chunk * kMlsChunk], nullptr); },
+      4);
+}
+
+void MlsTissue::forces_at(const float* u, float* force) { internal_forces(*state_, u, force); }
 
 void MlsTissue::advance(double duration, const FrameInput& input) {
   run_frame(*this, duration, input);
 }
 
 FrameResult MlsTissue::finish() {
-  const MlsState& s = *state_;
-  const bool finite = measure(&result_.elastic_energy);
-  double fastest2 = 0;
-  result_.kinetic_energy = 0;
-  for (int i = 0; i < s.count(); ++i) {
-    const double v2 = s.velocity(i).squaredNorm();
-    result_.kinetic_energy += 0.5 * s.mass[i] * v2;
-    if (!(v2 <= fastest2)) fastest2 = v2;
-  }
-  result_.max_speed = std::sqrt(fastest2);
+  const Figures figures = measure();
+  result_.elastic_energy = figures.elastic;
+  result_.kinetic_energy = figures.kinetic;
+  result_.max_speed = figures.speed;
   pieces_measured_ = false;
   // Nothing that instruments do moves tissue at the speed of a bullet; what does is out of control.
-  result_.blew_up = result_.blew_up || !finite || !(result_.max_speed < 300);
+  result_.blew_up = result_.blew_up || !figures.finite || !(result_.max_speed < 300);
   return result_;
 }
 
@@ -208,12 +232,12 @@ int MlsTissue::read_points(const PointSelection& selection, std::vector<std::uin
   const std::vector<std::int32_t> place = select_points(
       selection, pieces_, [&](std::int32_t i) { return s.outer[i] != 0; }, count);
   cloud.resize(static_cast<std::size_t>(count) * sizeof(Point));
-  const MlsField field = field_of(s);
+  pull();
+  std::vector<float> mises;
+  measure_stress(mises);
   state_->cpu->for_each(
       s.chunks(),
       [&](int chunk) {
-        float mises[kMlsChunk];
-        s.kernels->measure(field, chunk, mises, nullptr);
         const int first = chunk * kMlsChunk, last = std::min(s.count(), first + kMlsChunk);
         for (int i = first; i < last; ++i) {
           if (place[i] < 0) continue;
@@ -230,7 +254,7 @@ int MlsTissue::read_points(const PointSelection& selection, std::vector<std::uin
           out.rgb = piece_colour(f);
           out.id = static_cast<std::uint32_t>(i);
           out.fragment = f.id;
-          out.stress = mises[i - first] * static_cast<float>(lame_mu(s.nodes.material_of(i)));
+          out.stress = mises[i] * static_cast<float>(lame_mu(s.nodes.material_of(i)));
           const int pairs = s.pairs.begin[i + 1] - s.pairs.begin[i];
           out.damage = pairs > 0 ? static_cast<float>(crossed) / pairs : 0.0f;
           std::memcpy(cloud.data() + static_cast<std::size_t>(place[i]) * sizeof(Point), &out,
@@ -243,6 +267,7 @@ int MlsTissue::read_points(const PointSelection& selection, std::vector<std::uin
 
 Span<const Fragment> MlsTissue::fragments() {
   if (!pieces_measured_) {
+    pull();
     const MlsState& s = *state_;
     std::vector<SumsByPiece> of_group(s.groups());
     state_->cpu->for_each(
@@ -263,6 +288,7 @@ Span<const Fragment> MlsTissue::fragments() {
 }
 
 std::uint64_t MlsTissue::checksum() {
+  pull();
   Checksum sum;
   sum.add(state_->u);
   sum.add(state_->v);
@@ -272,6 +298,7 @@ std::uint64_t MlsTissue::checksum() {
 }
 
 Momentum MlsTissue::momentum() {
+  pull();
   const MlsState& s = *state_;
   Momentum sum;
   Vec3 about_origin = Vec3::Zero();

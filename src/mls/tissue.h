@@ -1,4 +1,5 @@
-// Tissue by moving least squares on nodes without a mesh, on the CPU.
+// Tissue by moving least squares on nodes without a mesh, on the CPU; on a GPU with what is virtual
+// here done there (mls/cuda/cuda_mls_tissue.h).
 #pragma once
 
 #include <memory>
@@ -15,7 +16,7 @@
 
 namespace tissue_sim {
 
-class MlsTissue final : public Tissue {
+class MlsTissue : public Tissue {
  public:
   /// `notes` come before those of the scene.
   explicit MlsTissue(const Scene& scene, std::vector<std::string> notes = {});
@@ -35,13 +36,11 @@ class MlsTissue final : public Tissue {
 
   // What run_frame() calls.
   void begin_frame(double duration, const FrameInput& input);
-  PartSubsteps choose_substeps(const FrameInput&, double time) {
-    return substeps_.part(*state_, time);
-  }
-  void save_checkpoint();
-  double run_part(const FramePart& part);
+  PartSubsteps choose_substeps(const FrameInput& input, double time);
+  virtual void save_checkpoint();
+  virtual double run_part(const FramePart& part);
   Verdict judge_part(const FramePart& part);
-  void reject_part(Verdict verdict);
+  virtual void reject_part(Verdict verdict);
   bool accept_part() { return !result_.blew_up; }
   void break_bonds(double share);
   void end_frame() {}
@@ -52,7 +51,24 @@ class MlsTissue final : public Tissue {
   /// Cuts at once, without moving anything.
   CutReport cut_now(const BladePath& path);
 
- private:
+ protected:
+  /// What is measured of all nodes.
+  struct Figures {
+    double elastic = 0, kinetic = 0;  ///< [J]
+    double speed = 0;                 ///< of the fastest [m/s]
+    bool finite = true;
+  };
+  /// Brings the motion of the nodes to state_.
+  virtual void pull() {}
+  /// Weights, moments or springs changed.
+  virtual void pairs_changed() {}
+  /// And how much each node has stiffened, into stiffening_.
+  virtual Figures measure();
+  /// Von Mises stress of each node over its shear modulus.
+  virtual void measure_stress(std::vector<float>& of_node);
+  /// Internal forces at displacements `u`: [4 nodes] both.
+  virtual void forces_at(const float* u, float* force);
+
   template <class Archive>
   void each_field(Archive& archive);
 
@@ -79,8 +95,6 @@ class MlsTissue final : public Tissue {
   void forget();  ///< what a cut or a tear makes void
   /// Pieces anew, after these nodes lost pairs.
   void part(const std::vector<std::int32_t>& changed, CutReport& report);
-  /// How much each node has stiffened, into stiffening_; whether all is finite.
-  bool measure(double* elastic);
 
   std::vector<std::string> notes_;
   std::unique_ptr<MlsState> state_;

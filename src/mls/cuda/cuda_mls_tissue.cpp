@@ -1,0 +1,357 @@
+#include "mls/cuda/cuda_mls_tissue.h"
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+
+#include "frame/leapfrog.h"
+#include "mls/cuda/on_device.h"
+#include "mls/node_contact.h"
+
+namespace tissue_sim {
+namespace {
+
+/// Four floats a node.
+void upload(const Array<float>& from, int count, DeviceArray<float4>& to, cudaStream_t stream) {
+  to.upload(reinterpret_cast<const float4*>(from.data()), count, stream);
+}
+
+}  // namespace
+
+CudaMlsTissue::CudaMlsTissue(const Scene& scene, std::vector<std::string> notes)
+    : MlsTissue(scene, std::move(notes)), device_(std::make_unique<OnDevice>()) {
+  const std::string why = why_no_gpu();
+  if (!why.empty()) throw std::runtime_error(why + "; set device to cpu");
+  OnDevice& d = *device_;
+  check_cuda(cudaSetDevice(0), "be chosen");
+  cudaDeviceProp properties;
+  check_cuda(cudaGetDeviceProperties(&properties, 0), "be asked");
+  d.gpu = properties.name;
+  check_cuda(cudaStreamCreateWithFlags(&d.stream, cudaStreamNonBlocking), "make a stream");
+  d.collider_count = collider_count(scene);
+  if (d.collider_count > kMlsMostColliders) {
+    throw std::runtime_error("the scene's tools have " + std::to_string(d.collider_count - 1) +
+                             " parts that touch tissue: on the GPU at most " +
+                             std::to_string(kMlsMostColliders - 1) + "; set device to cpu");
+  }
+  upload_nodes();
+  push();
+  pairs_changed();
+  measure();
+}
+
+CudaMlsTissue::~CudaMlsTissue() {
+  if (device_->stream != nullptr) cudaStreamSynchronize(device_->stream);
+}
+
+void CudaMlsTissue::upload_nodes() {
+  OnDevice& d = *device_;
+  const MlsState& s = *state_;
+  const int n = d.count = s.count();
+  const auto count = static_cast<std::size_t>(n);
+  upload(s.place, n, d.place, d.stream);
+  d.volume_mu.upload(s.volume_mu.data(), n, d.stream);
+  d.volume_lambda.upload(s.volume_lambda.data(), n, d.stream);
+  d.volume_eta.upload(s.volume_eta.data(), n, d.stream);
+  d.mass.upload(s.mass.data(), n, d.stream);
+  d.inv_mass.upload(s.inv_mass.data(), n, d.stream);
+  d.neo_hookean.upload(s.neo_hookean.data(), n, d.stream);
+  d.viscous = s.viscous;
+  std::vector<ContactSpring> springs(count);
+  for (int i = 0; i < n; ++i) springs[i] = node_spring(s, i);
+  d.contact.upload(springs, d.stream);
+  const int slices = (n + kMlsSlice - 1) / kMlsSlice;
+  d.host_offset.assign(slices + 1, 0);
+  for (int slice = 0; slice < slices; ++slice) {
+    std::int32_t widest = 0;
+    for (int i = slice * kMlsSlice; i < std::min(n, (slice + 1) * kMlsSlice); ++i) {
+      widest = std::max(widest, s.pairs.begin[i + 1] - s.pairs.begin[i]);
+    }
+    d.host_offset[slice + 1] = d.host_offset[slice] + widest * kMlsSlice;
+  }
+  d.offset.upload(d.host_offset, d.stream);
+  std::vector<std::int32_t> other(d.host_offset.back());
+  for (int slice = 0; slice < slices; ++slice) {
+    for (std::int32_t at = d.host_offset[slice]; at < d.host_offset[slice + 1]; ++at) {
+      const int i = slice * kMlsSlice + (at - d.host_offset[slice]) % kMlsSlice;
+      const int k = (at - d.host_offset[slice]) / kMlsSlice;
+      const bool is = i < n && k < s.pairs.begin[i + 1] - s.pairs.begin[i];
+      other[at] = is ? s.pairs.other[s.pairs.begin[i] + k] : std::min(i, n - 1);
+    }
+  }
+  d.other.upload(other, d.stream);
+  d.stress.resize(3 * count);
+  d.force.resize(count);
+  for (int which = 0; which < 2; ++which) {
+    d.u[which].resize(count);
+    d.v[which].resize(count);
+  }
+  d.touching.resize(count);
+  d.touching.clear(d.stream);
+  d.hold.resize(count * d.collider_count);
+  d.of_node.resize(count);
+  d.measures.resize((count + kMlsThreads - 1) / kMlsThreads);
+  d.wait("receive data");
+}
+
+void CudaMlsTissue::pairs_changed() {
+  OnDevice& d = *device_;
+  const MlsState& s = *state_;
+  const int n = s.count();
+  std::vector<float> weight(d.host_offset.back(), 0.0f), spring;
+  d.has_springs = !s.spring.empty();
+  if (d.has_springs) spring.assign(weight.size(), 0.0f);
+  for (int i = 0; i < n; ++i) {
+    std::int32_t at = d.host_offset[i / kMlsSlice] + i % kMlsSlice;
+    for (std::int32_t e = s.pairs.begin[i]; e < s.pairs.begin[i + 1]; ++e, at += kMlsSlice) {
+      weight[at] = s.pairs.weight[e];
+      if (d.has_springs) spring[at] = s.spring[e] + s.spring[s.pairs.twin[e]];
+    }
+  }
+  d.weight.upload(weight, d.stream);
+  d.spring.upload(spring, d.stream);
+  std::vector<float> moments(6 * static_cast<std::size_t>(n));
+  for (int k = 0; k < 6; ++k) {
+    std::copy_n(s.inverse_moment[k].begin(), n, moments.begin() + static_cast<std::size_t>(k) * n);
+  }
+  d.inverse_moment.upload(moments, d.stream);
+  d.kappa.upload(s.kappa.data(), n, d.stream);
+  d.outer.upload(s.outer.data(), n, d.stream);
+  d.wait("receive data");
+}
+
+void CudaMlsTissue::push() {
+  OnDevice& d = *device_;
+  d.current = 0;
+  upload(state_->u, d.count, d.u[0], d.stream);
+  upload(state_->v, d.count, d.v[0], d.stream);
+  push_contact();
+  d.wait("receive data");
+  d.host_is_current = true;
+}
+
+void CudaMlsTissue::pull() {
+  OnDevice& d = *device_;
+  if (d.host_is_current) return;
+  d.u[d.current].download(reinterpret_cast<float4*>(state_->u.data()), d.count, d.stream);
+  d.v[d.current].download(reinterpret_cast<float4*>(state_->v.data()), d.count, d.stream);
+  d.wait("send data");
+  d.host_is_current = true;
+}
+
+void CudaMlsTissue::pull_contact() {
+  OnDevice& d = *device_;
+  MlsState& s = *state_;
+  std::vector<std::uint32_t> touching(d.count);
+  std::vector<float4> hold(d.hold.size());
+  d.touching.download(touching.data(), touching.size(), d.stream);
+  d.hold.download(hold.data(), hold.size(), d.stream);
+  d.wait("send data");
+  for (MlsGroupContact& group : s.contact) group.touching.clear();
+  for (std::int32_t i = 0; i < d.count; ++i) {
+    for (int c = 0; c < d.collider_count; ++c) {
+      if ((touching[i] >> c & 1) == 0) continue;
+      const float4& h = hold[static_cast<std::size_t>(c) * d.count + i];
+      s.contact[i / kMlsGroup].touching.push_back({i, c, {h.x, h.y, h.z}});
+    }
+  }
+}
+
+void CudaMlsTissue::push_contact() {
+  OnDevice& d = *device_;
+  std::vector<std::uint32_t> touching(d.count, 0);
+  std::vector<float4> hold(d.hold.size());
+  for (const MlsGroupContact& group : state_->contact) {
+    for (const MlsTouch& t : group.touching) {
+      touching[t.node] |= 1u << t.collider;
+      hold[static_cast<std::size_t>(t.collider) * d.count + t.node] = {t.hold[0], t.hold[1],
+                                                                       t.hold[2], 0};
+    }
+  }
+  d.touching.upload(touching, d.stream);
+  d.hold.upload(hold, d.stream);
+  d.wait("receive data");
+}
+
+void CudaMlsTissue::search_contacts(float dt) {
+  OnDevice& d = *device_;
+  pull();
+  find_node_contacts(*state_, pieces_.of_point, dt);
+  const MlsNodeContacts& contacts = state_->node_contacts;
+  d.contact_begin.upload(contacts.begin, d.stream);
+  d.contact_other.upload(contacts.other, d.stream);
+  d.contact_rest.upload(contacts.rest, d.stream);
+  d.may_touch = !contacts.other.empty();
+  d.wait("receive data");
+}
+
+void CudaMlsTissue::upload_colliders(const FramePart& part) {
+  OnDevice& d = *device_;
+  const int substeps = part.substeps.count, count = d.collider_count;
+  d.host_colliders.resize(static_cast<std::size_t>(substeps) * count);
+  for (int i = 0; i < substeps; ++i) {
+    frame_->colliders.at(part.substeps.share(i + 1, part.from, part.to),
+                         d.host_colliders.data() + static_cast<std::size_t>(i) * count);
+  }
+  d.colliders.upload(d.host_colliders, d.stream);
+  d.loads.resize(d.host_colliders.size() * kMlsLoadSums);
+  d.loads.clear(d.stream);
+}
+
+double CudaMlsTissue::run_part(const FramePart& part) {
+  OnDevice& d = *device_;
+  MlsState& s = *state_;
+  const CudaMlsField field = d.field();
+  upload_colliders(part);
+  const float before = s.dt;
+  const std::vector<Box> reach = frame_->colliders.reach();
+  // Tissue gets faster within a part: what it may come to is listed widely, for it costs little.
+  const double time = part.substeps.until(part.substeps.count);
+  const double margin = mls_spacing(s.scene) + 4 * (d.speed + s.scene.gravity.norm() * time) * time;
+  std::uint32_t near = 0;
+  for (std::size_t c = 0; c < reach.size(); ++c) {
+    const bool meets = (d.box.min.array() - margin <= reach[c].max.array()).all() &&
+                       (reach[c].min.array() <= d.box.max.array() + margin).all();
+    if (meets) near |= 1u << c;
+  }
+  for (int i = 0; i < part.substeps.count; ++i) {
+    const float dt = part.substeps.at(i);
+    if (may_touch_ && s.node_contacts.until_search-- <= 0) search_contacts(dt);
+    CudaMlsStep step;
+    step.dt = dt;
+    step.kick = kick_of(s.dt, dt);
+    step.keep = static_cast<float>(std::exp(-s.scene.damping * step.kick));
+    for (int a = 0; a < 3; ++a) step.gravity[a] = static_cast<float>(s.scene.gravity[a]);
+    const std::size_t first = static_cast<std::size_t>(i) * d.collider_count;
+    const CudaMlsColliders colliders{
+        d.colliders.data() + first, d.collider_count, near,
+        d.touching.data(),          d.hold.data(),    d.loads.data() + kMlsLoadSums * first};
+    CudaMlsNodeContacts contacts;
+    if (may_touch_ && d.may_touch) {
+      contacts = {d.contact_begin.data(), d.contact_other.data(), d.contact_rest.data()};
+    }
+    launch_mls_stresses(field, d.present(), d.stream);
+    launch_mls_moves(field, d.present(), d.motion(1 - d.current), step, colliders, contacts,
+                     d.stream);
+    d.current = 1 - d.current;
+    d.host_is_current = false;
+    s.dt = dt;
+    s.time += dt;
+  }
+  sum_loads(part, before);
+  result_.substep = std::max<double>(result_.substep, part.substeps.longest());
+  result_.substeps += part.substeps.count;
+  return part.to;
+}
+
+void CudaMlsTissue::sum_loads(const FramePart& part, float before) {
+  OnDevice& d = *device_;
+  d.host_loads.resize(d.loads.size());
+  d.loads.download(d.host_loads.data(), d.host_loads.size(), d.stream);
+  d.wait("advance");
+  std::vector<ColliderLoad> on(d.collider_count);
+  const unsigned long long* sum = d.host_loads.data();
+  for (int i = 0; i < part.substeps.count; ++i) {
+    for (ColliderLoad& load : on) {
+      for (int a = 0; a < 3; ++a) {
+        load.force[a] = kMlsLoadUnit * static_cast<double>(static_cast<long long>(sum[a]));
+        load.torque[a] = kMlsLoadUnit * static_cast<double>(static_cast<long long>(sum[3 + a]));
+      }
+      load.points = static_cast<double>(sum[6]);
+      sum += kMlsLoadSums;
+    }
+    const float acted = kick_of(i == 0 ? before : part.substeps.at(i - 1), part.substeps.at(i));
+    frame_->colliders.add_loads(part.substeps.share(i + 1, part.from, part.to),
+                                d.host_colliders.data() + static_cast<std::size_t>(i) * on.size(),
+                                on.data(), acted / frame_->duration, result_.loads);
+  }
+}
+
+void CudaMlsTissue::save_checkpoint() {
+  OnDevice& d = *device_;
+  OnDevice::Checkpoint& saved = d.checkpoint;
+  saved.u.copy(d.u[d.current], d.stream);
+  saved.v.copy(d.v[d.current], d.stream);
+  saved.hold.copy(d.hold, d.stream);
+  saved.touching.copy(d.touching, d.stream);
+  saved.node_contacts = state_->node_contacts;
+  saved.dt = state_->dt;
+  saved.time = state_->time;
+  saved.result = result_;
+}
+
+void CudaMlsTissue::reject_part(Verdict) {
+  OnDevice& d = *device_;
+  const OnDevice::Checkpoint& saved = d.checkpoint;
+  d.u[d.current].copy(saved.u, d.stream);
+  d.v[d.current].copy(saved.v, d.stream);
+  d.hold.copy(saved.hold, d.stream);
+  d.touching.copy(saved.touching, d.stream);
+  d.host_is_current = false;
+  state_->node_contacts = saved.node_contacts;
+  state_->node_contacts.until_search = 0;  // what is on the GPU may be newer
+  state_->dt = saved.dt;
+  state_->time = saved.time;
+  result_ = saved.result;
+}
+
+MlsTissue::Figures CudaMlsTissue::measure() {
+  OnDevice& d = *device_;
+  launch_mls_measure(d.field(), d.present(), d.measures.data(), d.of_node.data(), nullptr,
+                     d.stream);
+  d.host_measures.resize(d.measures.size());
+  d.measures.download(d.host_measures.data(), d.host_measures.size(), d.stream);
+  d.of_node.download(stiffening_.data(), d.count, d.stream);
+  d.wait("finish a part of a frame");
+  Figures sum;
+  d.box = Box();
+  for (const CudaMlsMeasure& m : d.host_measures) {
+    sum.elastic += m.elastic;
+    sum.kinetic += m.kinetic;
+    if (!(m.speed <= sum.speed)) sum.speed = m.speed;
+    sum.finite = sum.finite && m.finite != 0;
+    d.box.min = d.box.min.cwiseMin(Vec3(m.min[0], m.min[1], m.min[2]));
+    d.box.max = d.box.max.cwiseMax(Vec3(m.max[0], m.max[1], m.max[2]));
+  }
+  d.speed = sum.speed;
+  return sum;
+}
+
+void CudaMlsTissue::measure_stress(std::vector<float>& of_node) {
+  OnDevice& d = *device_;
+  of_node.resize(d.count);
+  launch_mls_measure(d.field(), d.present(), d.measures.data(), nullptr, d.of_node.data(),
+                     d.stream);
+  d.of_node.download(of_node.data(), of_node.size(), d.stream);
+  d.wait("measure stress");
+}
+
+void CudaMlsTissue::forces_at(const float* u, float* force) {
+  OnDevice& d = *device_;
+  CudaMlsField field = d.field();
+  field.viscous = false;
+  const CudaMlsMotion at = d.motion(1 - d.current);  // not in use between two parts
+  d.u[1 - d.current].upload(reinterpret_cast<const float4*>(u), d.count, d.stream);
+  launch_mls_stresses(field, at, d.stream);
+  launch_mls_forces(field, at.u, d.force.data(), d.stream);
+  d.force.download(reinterpret_cast<float4*>(force), d.count, d.stream);
+  d.wait("sum forces");
+}
+
+std::vector<std::uint8_t> CudaMlsTissue::save() {
+  pull();
+  pull_contact();
+  return MlsTissue::save();
+}
+
+void CudaMlsTissue::restore(Span<const std::uint8_t> saved) {
+  MlsTissue::restore(saved);
+  push();
+  pairs_changed();
+  state_->node_contacts.until_search = 0;
+  measure();
+}
+
+std::string CudaMlsTissue::device_name() const { return "cuda (" + device_->gpu + ")"; }
+
+}  // namespace tissue_sim

@@ -1,0 +1,49 @@
+// Tissue by moving least squares that lives on an NVIDIA GPU.
+#pragma once
+
+#include <memory>
+
+#include "mls/tissue.h"
+
+namespace tissue_sim {
+
+/// Motion lives on the GPU, and comes to the host where something asks for it. Pairs, cuts and
+/// pieces are the host's, as on the CPU: what a cut changes goes up.
+class CudaMlsTissue final : public MlsTissue {
+ public:
+  /// Throws std::runtime_error where there is no GPU, or not enough memory on it.
+  explicit CudaMlsTissue(const Scene& scene, std::vector<std::string> notes = {});
+  ~CudaMlsTissue() override;
+
+  std::string device_name() const override;
+  std::vector<std::uint8_t> save() override;
+  void restore(Span<const std::uint8_t> saved) override;
+
+  void save_checkpoint() override;
+  double run_part(const FramePart& part) override;
+  void reject_part(Verdict verdict) override;
+
+  // For tests and the benchmark.
+  void pull() override;
+  void push();  ///< motion and contact to the GPU
+
+ protected:
+  void pairs_changed() override;
+  Figures measure() override;
+  void measure_stress(std::vector<float>& of_node) override;
+  void forces_at(const float* u, float* force) override;
+
+ private:
+  struct OnDevice;
+
+  void upload_nodes();
+  void upload_colliders(const FramePart& part);
+  void pull_contact();
+  void push_contact();
+  void search_contacts(float dt);
+  void sum_loads(const FramePart& part, float before);
+
+  std::unique_ptr<OnDevice> device_;
+};
+
+}  // namespace tissue_sim

@@ -1,0 +1,92 @@
+// What lives on the GPU of meshless tissue, and what its kernels are launched with.
+#pragma once
+
+#include <cstdint>
+
+#include "compute/device_array.h"
+#include "contact/contact_spring.h"
+
+namespace tissue_sim {
+
+/// Nodes whose pairs are kept side by side: entry k of node i is at offset[i / 32] + 32 k + i % 32.
+inline constexpr int kMlsSlice = 32;
+
+/// Sums of what acts on a collider in a substep: force and moment in units of kMlsLoadUnit, as
+/// integers, whose sum does not depend on the order, and the number of nodes that touch it.
+inline constexpr double kMlsLoadUnit = 1.0 / (1ll << 38);
+inline constexpr int kMlsLoadSums = 7;
+inline constexpr int kMlsMostColliders = 32;  ///< a node keeps those that it touches as bits
+
+/// Motion of the nodes: displacement [m] and velocity [m/s], the fourth components 0.
+struct CudaMlsMotion {
+  float4* u;
+  float4* v;
+};
+
+struct CudaMlsField {
+  int count = 0;
+  const float4* place;          ///< reference [m]
+  const std::int32_t* offset;   ///< per slice, and one more
+  const std::int32_t* other;    ///< per entry; the node itself where there is none
+  const float* weight;          ///< 0 where there is none
+  const float* spring;          ///< per entry: of both ends of a thread [N/m]; null without any
+  const float* inverse_moment;  ///< [6][count]: 00 11 22 01 02 12
+  const float* volume_mu;       ///< [N m], as the next two
+  const float* volume_lambda;
+  const float* volume_eta;
+  const float* kappa;  ///< of the pair penalty
+  const std::uint8_t* neo_hookean;
+  const float* mass;             ///< [kg]
+  const float* inv_mass;         ///< 0 where held
+  const ContactSpring* contact;  ///< per node
+  const std::uint8_t* outer;     ///< at the surface, or a cut passes beside it
+  float4* stress;                ///< [3 count]: columns of Q_i, kappa_i in the fourth place
+  bool viscous = false;
+};
+
+/// Colliders of one substep.
+struct CudaMlsColliders {
+  const Collider* all;
+  int count = 0;
+  std::uint32_t near = 0;     ///< bits: those that tissue may meet in this part of the frame
+  std::uint32_t* touching;    ///< per node: bits of those that it touches
+  float4* hold;               ///< [count][nodes]: place that friction holds on to
+  unsigned long long* loads;  ///< [count][kMlsLoadSums]
+};
+
+/// Nodes that may touch one another; null where none may.
+struct CudaMlsNodeContacts {
+  const std::int32_t* begin = nullptr;
+  const std::int32_t* other = nullptr;
+  const float* rest = nullptr;
+};
+
+struct CudaMlsStep {
+  float dt, kick, keep;
+  float gravity[3];
+};
+
+/// What a block of threads measured.
+struct CudaMlsMeasure {
+  double elastic, kinetic;  ///< [J]
+  float min[3], max[3];     ///< of the nodes [m]
+  float speed;              ///< of the fastest [m/s]; NaN stays
+  int finite;
+};
+inline constexpr int kMlsThreads = 128;  ///< of a block; a node each
+
+void launch_mls_stresses(const CudaMlsField& field, const CudaMlsMotion& at, cudaStream_t stream);
+/// The rest of a substep, after the stresses: forces with contact, and the motion into `to`.
+void launch_mls_moves(const CudaMlsField& field, const CudaMlsMotion& at, const CudaMlsMotion& to,
+                      const CudaMlsStep& step, const CudaMlsColliders& colliders,
+                      const CudaMlsNodeContacts& contacts, cudaStream_t stream);
+/// Internal forces alone [4 count], after the stresses.
+void launch_mls_forces(const CudaMlsField& field, const float4* u, float4* force,
+                       cudaStream_t stream);
+/// Figures of each block of threads; how much each node has stiffened (MlsMeasure) and its von
+/// Mises stress [Pa], where not null.
+void launch_mls_measure(const CudaMlsField& field, const CudaMlsMotion& at,
+                        CudaMlsMeasure* measures, float* stiffening, float* von_mises,
+                        cudaStream_t stream);
+
+}  // namespace tissue_sim

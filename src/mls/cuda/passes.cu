@@ -1,0 +1,310 @@
+// The passes over pairs on the GPU: mls/passes.h says what they compute. A thread works on a node,
+// whose sums run over its pairs in their order: the same bits run after run.
+#include <cmath>
+
+#include "material/laws.h"
+#include "mls/cuda/device_state.h"
+
+namespace tissue_sim {
+namespace {
+
+struct Entries {
+  int first, count;
+};
+
+__device__ __forceinline__ Entries entries_of(const CudaMlsField& f, int i) {
+  const int slice = i / kMlsSlice, offset = __ldg(f.offset + slice);
+  return {offset + i % kMlsSlice, (__ldg(f.offset + slice + 1) - offset) / kMlsSlice};
+}
+
+/// sum_j w_ij (a_j - a_i) (x) r_ij: A[3 * component of a + component of r].
+__device__ __forceinline__ void moments_of(const CudaMlsField& f, int i, const float4* a,
+                                           float (&A)[9]) {
+  const Entries e = entries_of(f, i);
+  const float4 xi = __ldg(f.place + i), ai = __ldg(a + i);
+#pragma unroll
+  for (int k = 0; k < 9; ++k) A[k] = 0;
+  for (int k = 0, at = e.first; k < e.count; ++k, at += kMlsSlice) {
+    const int j = __ldg(f.other + at);
+    const float w = __ldg(f.weight + at);
+    const float4 xj = __ldg(f.place + j), aj = __ldg(a + j);
+    const float r[3] = {w * (xj.x - xi.x), w * (xj.y - xi.y), w * (xj.z - xi.z)};
+    const float d[3] = {aj.x - ai.x, aj.y - ai.y, aj.z - ai.z};
+#pragma unroll
+    for (int p = 0; p < 3; ++p) {
+#pragma unroll
+      for (int q = 0; q < 3; ++q) A[3 * p + q] += d[p] * r[q];
+    }
+  }
+}
+
+__device__ __forceinline__ void inverse_moment(const CudaMlsField& f, int i, float (&M)[6]) {
+#pragma unroll
+  for (int k = 0; k < 6; ++k) M[k] = __ldg(f.inverse_moment + k * f.count + i);
+}
+
+__device__ __forceinline__ void stress_of(const CudaMlsField& f, int i, const float (&F)[9],
+                                          float (&P)[9]) {
+  const float mu = __ldg(f.volume_mu + i), lambda = __ldg(f.volume_lambda + i);
+  if (__ldg(f.neo_hookean + i) != 0) {
+    stress<NeoHookean>(F, mu, lambda, P);
+  } else {
+    stress<FixedCorotated>(F, mu, lambda, P);
+  }
+}
+
+__global__ void __launch_bounds__(kMlsThreads) mls_stresses(CudaMlsField f, CudaMlsMotion at) {
+  const int i = static_cast<int>(blockIdx.x * blockDim.x + threadIdx.x);
+  if (i >= f.count) return;
+  float A[9], M[6], H[9], F[9], P[9], Q[9];
+  moments_of(f, i, at.u, A);
+  inverse_moment(f, i, M);
+  times_symmetric(A, M, H);
+#pragma unroll
+  for (int k = 0; k < 9; ++k) F[k] = k % 4 == 0 ? H[k] + 1.0f : H[k];
+  stress_of(f, i, F, P);
+  if (f.viscous) {
+    float rate[9];
+    moments_of(f, i, at.v, A);
+    times_symmetric(A, M, rate);
+    add_viscous_stress(F, rate, __ldg(f.volume_eta + i), P);
+  }
+  times_symmetric(P, M, Q);
+  const float kappa = __ldg(f.kappa + i);
+#pragma unroll
+  for (int k = 0; k < 9; ++k) Q[k] -= kappa * H[k];
+  f.stress[3 * i] = {Q[0], Q[3], Q[6], kappa};
+  f.stress[3 * i + 1] = {Q[1], Q[4], Q[7], 0};
+  f.stress[3 * i + 2] = {Q[2], Q[5], Q[8], 0};
+}
+
+__device__ __forceinline__ void add(float (&sum)[3], float w, const float4& a) {
+  sum[0] += w * a.x;
+  sum[1] += w * a.y;
+  sum[2] += w * a.z;
+}
+
+/// Force of its pairs on node i.
+__device__ __forceinline__ void pair_forces(const CudaMlsField& f, const float4* u, int i,
+                                            float (&sum)[3]) {
+  const Entries e = entries_of(f, i);
+  const float4 xi = __ldg(f.place + i), ui = __ldg(u + i);
+  const float4 q0 = f.stress[3 * i], q1 = f.stress[3 * i + 1], q2 = f.stress[3 * i + 2];
+  for (int k = 0, at = e.first; k < e.count; ++k, at += kMlsSlice) {
+    const int j = __ldg(f.other + at);
+    const float w = __ldg(f.weight + at);
+    const float4 xj = __ldg(f.place + j), uj = __ldg(u + j);
+    const float4 p0 = f.stress[3 * j], p1 = f.stress[3 * j + 1], p2 = f.stress[3 * j + 2];
+    const float r[3] = {xj.x - xi.x, xj.y - xi.y, xj.z - xi.z};
+    const float d[3] = {uj.x - ui.x, uj.y - ui.y, uj.z - ui.z};
+    add(sum, w * r[0], {q0.x + p0.x, q0.y + p0.y, q0.z + p0.z, 0});
+    add(sum, w * r[1], {q1.x + p1.x, q1.y + p1.y, q1.z + p1.z, 0});
+    add(sum, w * r[2], {q2.x + p2.x, q2.y + p2.y, q2.z + p2.z, 0});
+    add(sum, w * (q0.w + p0.w), {d[0], d[1], d[2], 0});
+    if (f.spring == nullptr) continue;
+    const float s = __ldg(f.spring + at);
+    if (!(s > 0)) continue;
+    const float x[3] = {r[0] + d[0], r[1] + d[1], r[2] + d[2]};
+    const float length = sqrtf(x[0] * x[0] + x[1] * x[1] + x[2] * x[2]);
+    const float rest = sqrtf(r[0] * r[0] + r[1] * r[1] + r[2] * r[2]);
+    add(sum, s * (length - rest) / fmaxf(length, 1e-12f), {x[0], x[1], x[2], 0});
+  }
+}
+
+__device__ __forceinline__ void add_load(unsigned long long* load, double value) {
+  atomicAdd(load, static_cast<unsigned long long>(__double2ll_rn(value * (1 / kMlsLoadUnit))));
+}
+
+__device__ __forceinline__ void collider_forces(const CudaMlsField& f, const CudaMlsColliders& c,
+                                                int i, const float (&x)[3], const float (&v)[3],
+                                                float (&sum)[3]) {
+  const std::uint32_t touched = c.touching[i];
+  std::uint32_t touches = 0;
+  for (std::uint32_t left = c.near; left != 0; left &= left - 1) {
+    const int k = __ffs(static_cast<int>(left)) - 1;
+    const Collider& collider = c.all[k];
+    if (collider.kind == Collider::kBlade && f.outer[i] == 0) continue;
+    const Gap g = gap(collider, x);
+    if (!(g.distance < 0)) continue;
+    float4* held = c.hold + static_cast<std::size_t>(k) * f.count + i;
+    float place[3], push[3];
+    if ((touched >> k & 1) != 0) {
+      place[0] = held->x, place[1] = held->y, place[2] = held->z;
+    } else {
+      to_local(collider, x, place);
+    }
+    contact_force(collider, g, f.contact[i], x, v, place, push);
+    *held = {place[0], place[1], place[2], 0};
+    touches |= 1u << k;
+    unsigned long long* load = c.loads + kMlsLoadSums * k;
+    double arm[3];
+#pragma unroll
+    for (int a = 0; a < 3; ++a) {
+      sum[a] += push[a];
+      arm[a] = static_cast<double>(x[a]) - collider.position[a];
+    }
+#pragma unroll
+    for (int a = 0; a < 3; ++a) {
+      const int b = (a + 1) % 3, d = (a + 2) % 3;
+      add_load(load + a, -push[a]);
+      add_load(load + 3 + a, -(arm[b] * push[d] - arm[d] * push[b]));
+    }
+    atomicAdd(load + 6, 1ull);
+  }
+  if (touches != touched) c.touching[i] = touches;
+}
+
+/// What nodes of other pieces push it with: mls/node_contact.h.
+__device__ __forceinline__ void node_forces(const CudaMlsField& f, const CudaMlsMotion& at,
+                                            const CudaMlsNodeContacts& contacts, int i,
+                                            float (&sum)[3]) {
+  const int end = __ldg(contacts.begin + i + 1);
+  for (int c = __ldg(contacts.begin + i); c < end; ++c) {
+    const int j = __ldg(contacts.other + c);
+    const float4 xi = __ldg(f.place + i), xj = __ldg(f.place + j), ui = at.u[i], uj = at.u[j];
+    const float d[3] = {(xj.x - xi.x) + (uj.x - ui.x), (xj.y - xi.y) + (uj.y - ui.y),
+                        (xj.z - xi.z) + (uj.z - ui.z)};
+    const float d2 = d[0] * d[0] + d[1] * d[1] + d[2] * d[2], rest = __ldg(contacts.rest + c);
+    if (d2 >= rest * rest) continue;
+    const float distance = fmaxf(sqrtf(d2), 1e-12f);
+    const float4 vi = at.v[i], vj = at.v[j];
+    const float approach =
+        ((vj.x - vi.x) * d[0] + (vj.y - vi.y) * d[1] + (vj.z - vi.z) * d[2]) / -distance;
+    const ContactSpring own = f.contact[i], other = f.contact[j];
+    const float k = own.stiffness * other.stiffness / (own.stiffness + other.stiffness);
+    const float damping = own.damping * other.damping / (own.damping + other.damping);
+    const float push = fmaxf(0.0f, k * (rest - distance) + damping * approach);
+#pragma unroll
+    for (int a = 0; a < 3; ++a) sum[a] -= push * d[a] / distance;
+  }
+}
+
+__global__ void __launch_bounds__(kMlsThreads)
+    mls_moves(CudaMlsField f, CudaMlsMotion at, CudaMlsMotion to, CudaMlsStep step,
+              CudaMlsColliders colliders, CudaMlsNodeContacts contacts) {
+  const int i = static_cast<int>(blockIdx.x * blockDim.x + threadIdx.x);
+  if (i >= f.count) return;
+  float sum[3] = {0, 0, 0};
+  pair_forces(f, at.u, i, sum);
+  if (contacts.begin != nullptr) node_forces(f, at, contacts, i, sum);
+  const float4 u = at.u[i], v = at.v[i];
+  if (colliders.near != 0) {
+    const float4 X = __ldg(f.place + i);
+    const float x[3] = {X.x + u.x, X.y + u.y, X.z + u.z}, speed[3] = {v.x, v.y, v.z};
+    collider_forces(f, colliders, i, x, speed, sum);
+  }
+  const float inv_mass = __ldg(f.inv_mass + i);
+  const float velocity[3] = {v.x, v.y, v.z}, displacement[3] = {u.x, u.y, u.z};
+  float next_v[3], next_u[3];
+#pragma unroll
+  for (int a = 0; a < 3; ++a) {
+    next_v[a] = inv_mass > 0
+                    ? step.keep * velocity[a] + step.kick * (sum[a] * inv_mass + step.gravity[a])
+                    : 0.0f;
+    next_u[a] = displacement[a] + step.dt * next_v[a];
+  }
+  to.v[i] = {next_v[0], next_v[1], next_v[2], 0};
+  to.u[i] = {next_u[0], next_u[1], next_u[2], 0};
+}
+
+__global__ void __launch_bounds__(kMlsThreads)
+    mls_forces(CudaMlsField f, const float4* u, float4* force) {
+  const int i = static_cast<int>(blockIdx.x * blockDim.x + threadIdx.x);
+  if (i >= f.count) return;
+  float sum[3] = {0, 0, 0};
+  pair_forces(f, u, i, sum);
+  force[i] = {sum[0], sum[1], sum[2], 0};
+}
+
+__device__ __forceinline__ void take(CudaMlsMeasure& a, const CudaMlsMeasure& b) {
+  a.elastic += b.elastic;
+  a.kinetic += b.kinetic;
+#pragma unroll
+  for (int k = 0; k < 3; ++k) {
+    a.min[k] = fminf(a.min[k], b.min[k]);
+    a.max[k] = fmaxf(a.max[k], b.max[k]);
+  }
+  if (!(b.speed <= a.speed)) a.speed = b.speed;
+  a.finite &= b.finite;
+}
+
+__global__ void __launch_bounds__(kMlsThreads)
+    mls_measure(CudaMlsField f, CudaMlsMotion at, CudaMlsMeasure* measures, float* stiffening,
+                float* von_mises) {
+  __shared__ CudaMlsMeasure of_thread[kMlsThreads];
+  const int i = static_cast<int>(blockIdx.x * blockDim.x + threadIdx.x);
+  CudaMlsMeasure m{0, 0, {1e30f, 1e30f, 1e30f}, {-1e30f, -1e30f, -1e30f}, 0, 1};
+  if (i < f.count) {
+    float A[9], M[6], H[9], F[9], cof[9];
+    moments_of(f, i, at.u, A);
+    inverse_moment(f, i, M);
+    times_symmetric(A, M, H);
+#pragma unroll
+    for (int k = 0; k < 9; ++k) F[k] = k % 4 == 0 ? H[k] + 1.0f : H[k];
+    const float mu = __ldg(f.volume_mu + i), lambda = __ldg(f.volume_lambda + i);
+    const float e = f.neo_hookean[i] != 0 ? energy<NeoHookean>(F, mu, lambda)
+                                          : energy<FixedCorotated>(F, mu, lambda);
+    cofactor(F, cof);
+    float most = 1;
+    float columns = 0;
+#pragma unroll
+    for (int k = 0; k < 3; ++k) {
+      const float c = cof[k] * cof[k] + cof[3 + k] * cof[3 + k] + cof[6 + k] * cof[6 + k];
+      columns += c;
+      most = fmaxf(most, c);
+    }
+    m.finite = isfinite(e) && isfinite(columns) ? 1 : 0;
+    if (stiffening != nullptr) stiffening[i] = m.finite != 0 ? most : INFINITY;
+    if (von_mises != nullptr) {
+      float P[9];
+      stress_of(f, i, F, P);
+      const float mises = sqrtf(fmaxf(0.0f, von_mises_squared(F, P)));
+      von_mises[i] = mu > 0 ? mises / mu : 0.0f;
+    }
+    const float4 X = __ldg(f.place + i), u = at.u[i], v = at.v[i];
+    const float x[3] = {X.x + u.x, X.y + u.y, X.z + u.z};
+#pragma unroll
+    for (int a = 0; a < 3; ++a) m.min[a] = m.max[a] = x[a];
+    const float v2 = v.x * v.x + v.y * v.y + v.z * v.z;
+    m.speed = sqrtf(v2);
+    m.elastic = e;
+    m.kinetic = 0.5 * __ldg(f.mass + i) * v2;
+  }
+  of_thread[threadIdx.x] = m;
+  for (unsigned step = kMlsThreads / 2; step > 0; step /= 2) {
+    __syncthreads();
+    if (threadIdx.x < step) take(of_thread[threadIdx.x], of_thread[threadIdx.x + step]);
+  }
+  if (threadIdx.x == 0) measures[blockIdx.x] = of_thread[0];
+}
+
+int blocks_of(const CudaMlsField& f) { return (f.count + kMlsThreads - 1) / kMlsThreads; }
+
+}  // namespace
+
+void launch_mls_stresses(const CudaMlsField& field, const CudaMlsMotion& at, cudaStream_t stream) {
+  mls_stresses<<<blocks_of(field), kMlsThreads, 0, stream>>>(field, at);
+}
+
+void launch_mls_moves(const CudaMlsField& field, const CudaMlsMotion& at, const CudaMlsMotion& to,
+                      const CudaMlsStep& step, const CudaMlsColliders& colliders,
+                      const CudaMlsNodeContacts& contacts, cudaStream_t stream) {
+  mls_moves<<<blocks_of(field), kMlsThreads, 0, stream>>>(field, at, to, step, colliders, contacts);
+  check_cuda(cudaGetLastError(), "move nodes");
+}
+
+void launch_mls_forces(const CudaMlsField& field, const float4* u, float4* force,
+                       cudaStream_t stream) {
+  mls_forces<<<blocks_of(field), kMlsThreads, 0, stream>>>(field, u, force);
+  check_cuda(cudaGetLastError(), "sum forces");
+}
+
+void launch_mls_measure(const CudaMlsField& field, const CudaMlsMotion& at,
+                        CudaMlsMeasure* measures, float* stiffening, float* von_mises,
+                        cudaStream_t stream) {
+  mls_measure<<<blocks_of(field), kMlsThreads, 0, stream>>>(field, at, measures, stiffening,
+                                                            von_mises);
+  check_cuda(cudaGetLastError(), "measure");
+}
+
+}  // namespace tissue_sim

@@ -6,14 +6,40 @@
 #include <algorithm>
 #include <cmath>
 
+#include "compute/simd.h"
 #include "mls/pairs.h"
 
 namespace tissue_sim {
 namespace {
 
-using Vector = Eigen::Vector3f;
-using Matrix = Eigen::Matrix3f;
-using Vectors = std::vector<Vector>;
+using Vector = Vec<4>;  // (x, y, z, 0)
+using Vectors = Array<Vector>;
+
+/// By columns.
+struct Matrix {
+  Vector column[3] = {};
+};
+
+inline Vector times(const Matrix& m, Vector v) {
+  return m.column[0] * v[0] + m.column[1] * v[1] + m.column[2] * v[2];
+}
+inline float dot(Vector a, Vector b) {
+  const Vector p = a * b;
+  return p[0] + p[1] + p[2];
+}
+inline Vector sum_times(const Matrix& a, const Matrix& b, Vector v) {  // (a + b) v
+  return (a.column[0] + b.column[0]) * v[0] + (a.column[1] + b.column[1]) * v[1] +
+         (a.column[2] + b.column[2]) * v[2];
+}
+inline void add_product(Matrix& m, Vector a, Vector b) {  // m += a b^T
+  for (int k = 0; k < 3; ++k) m.column[k] += a * b[k];
+}
+/// scale * a m a for a symmetric a.
+inline Matrix between(float scale, const Matrix& a, const Matrix& m) {
+  Matrix result;
+  for (int k = 0; k < 3; ++k) result.column[k] = scale * times(a, times(m, a.column[k]));
+  return result;
+}
 
 constexpr int kSteps = 12;           // of Newton's method, at most
 constexpr int kIterations = 60;      // of conjugate gradients, at most
@@ -22,7 +48,7 @@ constexpr float kReduction = 0.05f;  // of the residual by conjugate gradients
 constexpr float kLargestStep = 1;    // of the logarithm of a weight
 constexpr int kGrain = 256;
 
-/// In units of the mean spacing, so that single precision does.
+/// In units of the mean support, so that single precision does.
 class Balance {
  public:
   Balance(const MlsNodes& nodes, Cpu& cpu, MlsPairs& pairs)
@@ -34,9 +60,10 @@ class Balance {
     }
     for (std::int32_t i = 0; i < n_; ++i) {
       volume_.push_back(static_cast<float>(nodes.volume[i] / volume));
-      free_.push_back(nodes.surface[i] == 0);
+      free_.push_back(nodes.surface[i] == 0 ? 1.0f : 0.0f);
       for (std::int32_t e = pairs.begin[i]; e < pairs.begin[i + 1]; ++e) {
-        r_[e] = ((nodes.place[pairs.other[e]] - nodes.place[i]) / support).cast<float>();
+        const Vec3 r = (nodes.place[pairs.other[e]] - nodes.place[i]) / support;
+        r_[e] = Vector{float(r[0]), float(r[1]), float(r[2]), 0};
       }
     }
     g_.resize(r_.size());
@@ -77,34 +104,38 @@ class Balance {
     for_each_node([&](int i) {
       Eigen::Matrix3d moment = Eigen::Matrix3d::Zero();
       for (std::int32_t e = pairs_.begin[i]; e < pairs_.begin[i + 1]; ++e) {
-        const Vec3 r = r_[e].cast<double>();
+        const Vec3 r(r_[e][0], r_[e][1], r_[e][2]);
         moment += static_cast<double>(weight_[e]) * r * r.transpose();
       }
-      const Eigen::Matrix3d inverse = moment.inverse();
-      inverse_[i] = inverse.cast<float>();
-      if (!inverse_[i].allFinite()) {  // a support that spans no space: left as it is
-        inverse_[i].setZero();
+      Eigen::Matrix3d inverse = moment.inverse();
+      if (!inverse.allFinite()) {  // a support that spans no space: left as it is
+        inverse.setZero();
         free_[i] = 0;
       }
-      normal_[i] = volume_[i] * inverse_[i];
+      for (int k = 0; k < 3; ++k) {
+        inverse_[i].column[k] =
+            Vector{float(inverse(0, k)), float(inverse(1, k)), float(inverse(2, k)), 0};
+        normal_[i].column[k] = volume_[i] * inverse_[i].column[k];
+      }
     });
     for_each_entry([&](std::int32_t i, std::int32_t e) {
-      g_[e] = (normal_[i] + normal_[pairs_.other[e]]) * r_[e];
+      g_[e] = sum_times(normal_[i], normal_[pairs_.other[e]], r_[e]);
     });
-    residual_.assign(n_, Vector::Zero());
+    residual_.assign(n_, Vector{});
     diagonal_.assign(n_, 1.0f);
     std::vector<float> relative(n_, 0.0f);
     for_each_node([&](int i) {
       if (free_[i] == 0) return;
       float lengths = 0, diagonal = 0;
       for (std::int32_t e = pairs_.begin[i]; e < pairs_.begin[i + 1]; ++e) {
+        const float g2 = dot(g_[e], g_[e]);
         residual_[i] += weight_[e] * g_[e];
-        lengths += weight_[e] * g_[e].norm();
-        diagonal += weight_[e] * g_[e].squaredNorm();
+        lengths += weight_[e] * std::sqrt(g2);
+        diagonal += weight_[e] * g2;
       }
       if (lengths == 0) return;
       diagonal_[i] = diagonal;
-      relative[i] = residual_[i].norm() / lengths;
+      relative[i] = std::sqrt(dot(residual_[i], residual_[i])) / lengths;
     });
     return n_ == 0 ? 0 : *std::max_element(relative.begin(), relative.end());
   }
@@ -112,61 +143,61 @@ class Balance {
   /// step_ = J^T lambda, of each weight's logarithm.
   void times_transpose(const Vectors& lambda) {
     for_each_node([&](int i) {
-      Matrix& y = change_[i];
-      y.setZero();
+      Matrix y;
       for (std::int32_t e = pairs_.begin[i]; e < pairs_.begin[i + 1]; ++e) {
-        const Vector d = weight_[e] * (lambda[i] - lambda[pairs_.other[e]]);
-        y += d * r_[e].transpose();
+        add_product(y, weight_[e] * (lambda[i] - lambda[pairs_.other[e]]), r_[e]);
       }
-      y = volume_[i] * (inverse_[i] * y * inverse_[i]).eval();
+      change_[i] = between(volume_[i], inverse_[i], y);
     });
     for_each_entry([&](std::int32_t i, std::int32_t e) {
       const std::int32_t j = pairs_.other[e];
-      const Matrix by_moments = change_[i] + change_[j];
-      step_[e] = g_[e].dot(lambda[i] - lambda[j]) - r_[e].dot(by_moments * r_[e]);
+      step_[e] =
+          dot(g_[e], lambda[i] - lambda[j]) - dot(r_[e], sum_times(change_[i], change_[j], r_[e]));
     });
   }
 
   /// out = J (w step_), 0 at nodes that are not free.
-  void times(Vectors& out) {
+  void times_weights(Vectors& out) {
     for_each_node([&](int i) {
-      Matrix moment = Matrix::Zero();
+      Matrix moment;
       for (std::int32_t e = pairs_.begin[i]; e < pairs_.begin[i + 1]; ++e) {
-        moment += weight_[e] * step_[e] * r_[e] * r_[e].transpose();
+        add_product(moment, weight_[e] * step_[e] * r_[e], r_[e]);
       }
-      change_[i] = -volume_[i] * (inverse_[i] * moment * inverse_[i]);
+      change_[i] = between(-volume_[i], inverse_[i], moment);
     });
     for_each_node([&](int i) {
-      out[i].setZero();
-      if (free_[i] == 0) return;
-      for (std::int32_t e = pairs_.begin[i]; e < pairs_.begin[i + 1]; ++e) {
-        const Matrix change = change_[i] + change_[pairs_.other[e]];
-        out[i] += weight_[e] * (step_[e] * g_[e] + change * r_[e]);
+      Vector sum{};
+      if (free_[i] != 0) {
+        for (std::int32_t e = pairs_.begin[i]; e < pairs_.begin[i + 1]; ++e) {
+          sum += weight_[e] *
+                 (step_[e] * g_[e] + sum_times(change_[i], change_[pairs_.other[e]], r_[e]));
+        }
       }
+      out[i] = sum;
     });
   }
 
-  double dot(const Vectors& a, const Vectors& b) const {
+  double product(const Vectors& a, const Vectors& b) const {
     double sum = 0;
-    for (std::int32_t i = 0; i < n_; ++i) sum += a[i].dot(b[i]);
+    for (std::int32_t i = 0; i < n_; ++i) sum += dot(a[i], b[i]);
     return sum;
   }
 
   /// J S J^T lambda = -residual.
   Vectors solve() {
-    Vectors x(n_, Vector::Zero()), rest(n_), z(n_), p(n_), q(n_);
+    Vectors x(n_, Vector{}), rest(n_), z(n_), p(n_), q(n_);
     for (std::int32_t i = 0; i < n_; ++i) rest[i] = -residual_[i];
     const auto precondition = [&] {
       for (std::int32_t i = 0; i < n_; ++i) z[i] = rest[i] * (free_[i] / diagonal_[i]);
     };
     precondition();
     p = z;
-    double rz = dot(rest, z);
+    double rz = product(rest, z);
     const double enough = kReduction * kReduction * rz;
     for (int k = 0; k < kIterations && rz > enough && rz > 0; ++k) {
       times_transpose(p);
-      times(q);
-      const double curvature = dot(p, q);
+      times_weights(q);
+      const double curvature = product(p, q);
       if (!(curvature > 0)) break;
       const auto alpha = static_cast<float>(rz / curvature);
       for (std::int32_t i = 0; i < n_; ++i) {
@@ -174,7 +205,7 @@ class Balance {
         rest[i] -= alpha * q[i];
       }
       precondition();
-      const double next = dot(rest, z);
+      const double next = product(rest, z);
       for (std::int32_t i = 0; i < n_; ++i) p[i] = z[i] + static_cast<float>(next / rz) * p[i];
       rz = next;
     }
@@ -185,11 +216,10 @@ class Balance {
   MlsPairs& pairs_;
   const std::int32_t n_;
   Array<float> weight_;
-  Vectors r_, g_;              // of each entry
-  std::vector<float> step_;    // of each entry
-  std::vector<float> volume_;  // of each node, as all below
-  std::vector<char> free_;
-  std::vector<Matrix> normal_, inverse_, change_;
+  Vectors r_, g_;                     // of each entry
+  std::vector<float> step_;           // of each entry
+  std::vector<float> volume_, free_;  // of each node, as all below; free_: 1 or 0
+  Array<Matrix> normal_, inverse_, change_;
   std::vector<float> diagonal_;
   Vectors residual_;
 };

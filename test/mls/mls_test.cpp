@@ -43,19 +43,19 @@ TEST(MlsNodes, SharesAddUpToTheBody) {
 }
 
 TEST(MlsNodes, GradedOnesAreSparseInside) {
-  Scene scene = mls_box(Vec3::Constant(0.03), 0.001, MlsPlacement::kGraded);
+  Scene scene = mls_box(Vec3::Constant(0.02), 0.001, MlsPlacement::kGraded);
   scene.mls.grading = 2;
   const MlsNodes nodes = make_mls_nodes(scene, nullptr);
   double inner = 0, outer = 0;
   int inner_count = 0, outer_count = 0;
   for (int i = 0; i < nodes.count(); ++i) {
-    const double depth = std::min(nodes.place[i].minCoeff(), 0.03 - nodes.place[i].maxCoeff());
-    if (depth > 0.01) inner += nodes.volume[i], ++inner_count;
+    const double depth = std::min(nodes.place[i].minCoeff(), 0.02 - nodes.place[i].maxCoeff());
+    if (depth > 0.006) inner += nodes.volume[i], ++inner_count;
     if (depth < 0.001) outer += nodes.volume[i], ++outer_count;
   }
   const double ratio = std::cbrt(inner / inner_count / (outer / outer_count));
-  EXPECT_GT(ratio, 1.6);
-  EXPECT_LT(nodes.count(), 27000 * 0.5);
+  EXPECT_GT(ratio, 1.5);
+  EXPECT_LT(nodes.count(), 8000 * 0.7);
 }
 
 TEST(MlsPairs, AreSymmetricAndSorted) {

@@ -132,6 +132,10 @@ class EachMethod : public testing::TestWithParam<MethodOnDevice> {
   Scene on_this(Scene scene) const {
     scene.method = GetParam().method;
     scene.device = GetParam().device;
+    // A node a cell: as the resolution of a test is meant, and quick.
+    if (scene.method == Method::kMls && scene.mls.spacing == 0) {
+      scene.mls.spacing = scene.cell_size;
+    }
     return scene;
   }
   Tolerances within() const { return tolerances(GetParam().method); }

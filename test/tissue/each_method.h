@@ -69,6 +69,13 @@ inline Tolerances tolerances(Method method) {
       t.beam_convergence = 3.4;
       return t;
     case Method::kMls:
+      t.measured = true;
+      t.rest_speed = t.cut_speed = 0;
+      t.rest_energy = t.cut_energy = 0;
+      t.misplaced = 0;
+      t.clamp = -0.25;  // half way between the last node that is held and the first that is not
+      t.beam_convergence = 1.8;
+      return t;
     case Method::kPbd:
       t.measured = false;
       t.rest_speed = t.cut_speed = 1e-5;

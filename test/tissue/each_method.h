@@ -65,10 +65,17 @@ inline Tolerances tolerances(Method method) {
       t.cut_speed = 5e-6;    // read: 9e-7
       t.cut_energy = 1e-14;  // read: 4e-16, of 0.1 J for a strain of 1
       t.misplaced = 0;
-      t.clamp = -0.25;  // derived in test/mpm/clamp_place.h
+      t.clamp = 0.25;  // derived in test/mpm/clamp_place.h
       t.beam_convergence = 3.4;
       return t;
     case Method::kMls:
+      t.measured = true;
+      t.rest_speed = t.cut_speed = 0;
+      t.rest_energy = t.cut_energy = 0;
+      t.misplaced = 0;
+      t.clamp = -0.25;  // half way between the last node that is held and the first that is not
+      t.beam_convergence = 1.8;
+      return t;
     case Method::kPbd:
       t.measured = false;
       t.rest_speed = t.cut_speed = 1e-5;

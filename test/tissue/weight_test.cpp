@@ -60,7 +60,7 @@ TEST_P(Weight, OfABodyOnRodsIsWhatTheRodsFeel) {
   for (std::size_t i = 0; i < rods.size(); ++i) simulation.set_tool(static_cast<int>(i), rods[i]);
   for (int f = 0; f < 150; ++f) simulation.advance_frame();
   const Wrench felt = carried(simulation, rods);
-  const Fragment& piece = simulation.tissue().fragments()[0];
+  const Fragment piece = simulation.tissue().fragments()[0];
   ASSERT_LT(piece.velocity.norm(), 2e-4) << "it is not at rest";
   const Vec3 weight(0, 0, -kWeight);
   EXPECT_LT((felt.force - weight).norm(), within().weight * kWeight) << felt.force.transpose();
@@ -98,7 +98,7 @@ TEST_P(Weight, IsCarriedByTheGround) {
   scene.ground.enabled = true;
   Simulation simulation(scene);
   for (int f = 0; f < 120; ++f) simulation.advance_frame();
-  const Fragment& piece = simulation.tissue().fragments()[0];
+  const Fragment piece = simulation.tissue().fragments()[0];
   EXPECT_NEAR(piece.velocity.norm(), 0, 1e-3);
   EXPECT_GT(piece.box.min[2], -0.25 * scene.cell_size);
   EXPECT_NEAR(piece.centroid[2], 0.5 * kSize[2], 0.001);

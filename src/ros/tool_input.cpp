@@ -259,6 +259,7 @@ ToolStatus ToolInput::status() const {
   s.source = s.follows_tf ? tf_frame_ : pose_topic_;
   s.publishers = pose_subscriber_.getNumPublishers();
   s.waiting = waiting_;
+  s.latched = pose_latched_;
   s.came = came_;
   s.silent = std::chrono::duration<double>(WallClock::now() - last_came_).count();
   s.far = far_;

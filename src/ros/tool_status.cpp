@@ -24,7 +24,7 @@ std::string warning(const ToolStatus& s) {
   } else if (!s.came) {
     return s.tool + ": no pose ever came on " + s.source + " (" + publishers + ")" +
            (s.publishers == 0 ? ": nobody publishes there, remap it to the arm's topic" : "");
-  } else if (s.silent > kSilentWarning) {
+  } else if (s.silent > kSilentWarning && !(s.latched && s.publishers > 0)) {
     return s.tool + ": no pose on " + s.source + " for " + time + " (" + publishers + ")";
   }
   if (s.came && s.counts.accepted == 0 && s.counts.all_refused() > 0) {

@@ -38,6 +38,11 @@ TEST(ToolStatus, SaysForHowLongNothingCame) {
   s.silent = 5;
   s.publishers = 0;
   EXPECT_TRUE(has(warning(s), "for 5.0 s (0 publishers)")) << warning(s);
+  s.latched = true;
+  EXPECT_TRUE(has(warning(s), "for 5.0 s")) << "its publisher is gone all the same";
+  s.publishers = 1;
+  EXPECT_EQ(warning(s), "") << "rostopic pub latches one pose for ever";
+  s.latched = false;
   s.silent = 1;
   EXPECT_EQ(warning(s), "");
 }

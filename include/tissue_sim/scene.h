@@ -133,6 +133,9 @@ struct Scene {
                          ///< exp(-damping t) [1/s], 0 to 1000
   Vec3 gravity = Vec3(0, 0, -9.81);  ///< [m/s^2]
   std::uint64_t seed = 0;
+  /// Method mpm: file of a fragment network (scripts/train_fragments) that says each frame which
+  /// points of tissue that tears will be part of fragments; `off` for none.
+  std::string fragment_network = "off";
   MlsOptions mls;
   PbdOptions pbd;
   Ground ground;

@@ -41,6 +41,8 @@ struct FrameResult {
   CutReport tear_report;               ///< what tore by itself (Material::tear_stretch)
   int substeps = 0;
   double substep = 0;         ///< the longest of them [s]
+  int fragment_candidates = 0;  ///< points that the fragment network looked at
+  int fragment_points = 0;      ///< of these, those that it expects to be part of fragments
   double kinetic_energy = 0;  ///< [J]
   double elastic_energy = 0;  ///< [J]
   double max_speed = 0;       ///< of a point [m/s]

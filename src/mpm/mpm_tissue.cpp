@@ -5,6 +5,7 @@
 #include <limits>
 #include <utility>
 
+#include "geometry/mesh.h"
 #include "math/lanczos.h"
 #include "mpm/contact/block_contact.h"
 #include "mpm/lattice_pieces.h"
@@ -32,6 +33,10 @@ MpmTissue::MpmTissue(const Scene& scene, std::vector<std::string> notes)
   measure_stiffness();
   substep_.follow(*state_, modulus_);
   measured_ = false;  // who holds the state may change it
+  if (scene.fragment_network != "off") {
+    network_ = std::make_unique<FragmentNetwork>(
+        resolve_path(scene.fragment_network, "fragment network"));
+  }
 }
 
 float MpmTissue::stable_substep() const { return tissue_sim::stable_substep(*state_, stiffening_); }
@@ -242,6 +247,13 @@ FrameResult MpmTissue::finish() {
   // Nothing that instruments do moves tissue at the speed of a bullet; what does is out of control.
   result_.blew_up = result_.blew_up || !(result_.max_speed < 300);
   if (tame()) measure_and_follow();
+  if (network_ != nullptr && !result_.blew_up) {
+    forecast_ = forecast_fragments(*state_, pieces_, *network_);
+    result_.fragment_candidates = static_cast<int>(forecast_.size());
+    result_.fragment_points = static_cast<int>(
+        std::count_if(forecast_.begin(), forecast_.end(),
+                      [](const FragmentChance& c) { return c.probability >= 0.5f; }));
+  }
   measured_ = pieces_measured_ = false;
   return result_;
 }

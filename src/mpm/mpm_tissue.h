@@ -7,6 +7,7 @@
 
 #include "fragments/pieces.h"
 #include "frame/run_frame.h"
+#include "mpm/fragment_forecast.h"
 #include "mpm/mpm_state.h"
 #include "mpm/state_figures.h"
 #include "mpm/substep_choice.h"
@@ -47,6 +48,8 @@ class MpmTissue final : public Tissue {
   int fragment_of(int point) const { return pieces_.of_point[point]; }
   const Pieces& pieces() const { return pieces_; }
   MpmState& state() { return *state_; }
+  /// What the fragment network said at the end of the last frame; nothing without one.
+  const std::vector<FragmentChance>& forecast() const { return forecast_; }
 
  private:
   template <class Archive>
@@ -111,6 +114,8 @@ class MpmTissue final : public Tissue {
   std::vector<std::string> notes_;
   std::unique_ptr<MpmState> state_;
   Pieces pieces_;
+  std::unique_ptr<FragmentNetwork> network_;  ///< null without one
+  std::vector<FragmentChance> forecast_;
   std::optional<Frame> frame_;  ///< the one that is worked on
   Checkpoint checkpoint_;       ///< before the last part of it
   Stiffening stiffening_;

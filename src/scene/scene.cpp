@@ -264,6 +264,11 @@ void validate(const Scene& scene) {
   check_range("cfl", scene.cfl, 0.05, 0.9);
   check_range("damping", scene.damping, 0, 1000);
   check_each("gravity", scene.gravity, -1000, 1000, "component", "m/s^2");
+  if (scene.fragment_network.empty() ||
+      (scene.fragment_network != "off" && scene.method != Method::kMpm)) {
+    refuse("fragment_network", quoted(scene.fragment_network),
+           "must be off or, with method mpm, the file of a network");
+  }
   check_mls(scene.mls);
   check_pbd(scene.pbd);
   check_range("ground.z", scene.ground.z, -100, 100, "m");

@@ -186,6 +186,7 @@ std::string scene_to_yaml(const Scene& scene) {
   write(out, "damping", scene.damping);
   write(out, "gravity", scene.gravity);
   out << Key << "seed" << Value << std::to_string(scene.seed);
+  write(out, "fragment_network", scene.fragment_network);
   if (scene.method == Method::kMls) write_mls(out, scene.mls);
   if (scene.method == Method::kPbd) {
     out << Key << "pbd" << Value;

@@ -183,7 +183,7 @@ PbdOptions read_pbd(const YAML::Node& node, const std::string& path) {
 Scene read_scene(const YAML::Node& node) {
   const YamlFields fields(node, "",
                           {"name", "method", "device", "threads", "cell_size", "frame_rate", "cfl",
-                           "damping", "gravity", "seed", "mls", "pbd", "ground", "materials",
+                           "damping", "gravity", "seed", "fragment_network", "mls", "pbd", "ground", "materials",
                            "bodies", "tools"});
   Scene scene;
   fields.read("name", scene.name);
@@ -196,6 +196,7 @@ Scene read_scene(const YAML::Node& node) {
   fields.read("damping", scene.damping);
   fields.read("gravity", scene.gravity);
   fields.read("seed", scene.seed);
+  fields.read("fragment_network", scene.fragment_network);
   fields.read_map("mls", [&](const YAML::Node& mls, const std::string& path) {
     const YamlFields of(mls, path,
                         {"spacing", "neighbours", "basis", "placement", "grading",
@@ -268,12 +269,14 @@ Scene load_scene(const std::string& path) {
     throw std::invalid_argument(path + ": " + e.what());
   }
   // A node's working directory means nothing to who wrote the scene; the scene's own folder does.
+  const auto make_absolute = [&path](std::string& file) {
+    if (file.find("://") != std::string::npos || !fs::path(file).is_relative()) return;
+    file = (fs::absolute(path).parent_path() / file).lexically_normal().string();
+  };
   for (Body& body : scene.bodies) {
-    const bool plain = body.mesh.find("://") == std::string::npos;
-    if (body.shape == Shape::kMesh && plain && fs::path(body.mesh).is_relative()) {
-      body.mesh = (fs::absolute(path).parent_path() / body.mesh).lexically_normal().string();
-    }
+    if (body.shape == Shape::kMesh) make_absolute(body.mesh);
   }
+  if (scene.fragment_network != "off") make_absolute(scene.fragment_network);
   return scene;
 }
 

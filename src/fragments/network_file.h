@@ -1,0 +1,37 @@
+// Files of the fragment network's weights, as scripts/train_fragments writes them.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "fragments/network.h"
+
+namespace tissue_sim {
+
+/// Both networks, as read from a file.
+class FragmentNetwork {
+ public:
+  /// Reads a file (YAML). Throws std::invalid_argument with the path in front: no such file, no
+  /// version 1, a shape that is not 70 x 105 x 2 and 18, numbers missing or not finite, a checksum
+  /// that is not theirs.
+  explicit FragmentNetwork(const std::string& path);
+
+  NetworkWeights classifier() const { return classifier_.view(); }
+  NetworkWeights modifier() const { return modifier_.view(); }
+  /// How far ahead it looks [s].
+  double horizon() const { return horizon_; }
+
+ private:
+  struct Layers {
+    std::vector<float> hidden_weights, hidden_biases, output_weights, output_biases;
+    NetworkWeights view() const {
+      return {hidden_weights.data(), hidden_biases.data(), output_weights.data(),
+              output_biases.data()};
+    }
+  };
+
+  Layers classifier_, modifier_;
+  double horizon_ = 0;
+};
+
+}  // namespace tissue_sim

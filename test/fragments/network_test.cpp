@@ -1,0 +1,224 @@
+// The fragment network says what NumPy says of the same weights, and refuses files that are not
+// whole.
+#include <gtest/gtest.h>
+#include <yaml-cpp/yaml.h>
+
+#include <cmath>
+#include <fstream>
+#include <random>
+#include <sstream>
+
+#include "cut_scenes.h"
+#include "fragments/network_file.h"
+#include "mpm/fragment_features.h"
+#include "temporary_folder.h"
+
+#ifndef TISSUE_SIM_SOURCE_DIR
+#define TISSUE_SIM_SOURCE_DIR "."
+#endif
+
+namespace tissue_sim {
+namespace {
+
+const std::string kShipped = TISSUE_SIM_SOURCE_DIR "/config/networks/fragments.yaml";
+
+template <int kOutputs>
+void expect_sines(const NetworkWeights& weights, const YAML::Node& expected) {
+  float x[kFeatureCount], out[kOutputs];
+  for (int i = 0; i < kFeatureCount; ++i) x[i] = static_cast<float>(std::sin(i));
+  run_network(weights, x, out);
+  ASSERT_EQ(expected.size(), static_cast<std::size_t>(kOutputs));
+  for (int o = 0; o < kOutputs; ++o) {
+    const double e = expected[o].as<double>();
+    EXPECT_NEAR(out[o], e, 2e-5 * (1 + std::fabs(e))) << o;
+  }
+}
+
+TEST(FragmentNetwork, SaysWhatNumpySays) {
+  const FragmentNetwork network(kShipped);
+  const YAML::Node file = YAML::LoadFile(kShipped);
+  expect_sines<kClassifierOutputs>(network.classifier(), file["classifier"]["of_sines"]);
+  expect_sines<kModifierOutputs>(network.modifier(), file["modifier"]["of_sines"]);
+  EXPECT_NEAR(network.horizon(), 1.0 / 60, 1e-6);
+}
+
+TEST(FragmentNetwork, TanhIsTanh) {
+  for (double x = -12; x <= 12; x += 0.001) {
+    EXPECT_NEAR(hidden_tanh(static_cast<float>(x)), std::tanh(static_cast<float>(x)), 4e-7) << x;
+  }
+}
+
+std::string shipped_text() {
+  std::ifstream file(kShipped);
+  std::ostringstream text;
+  text << file.rdbuf();
+  return text.str();
+}
+
+std::string why_refused(const std::string& text) {
+  const TemporaryFolder folder;
+  const std::string path = folder.path() + "/network.yaml";
+  std::ofstream(path) << text;
+  try {
+    FragmentNetwork network(path);
+  } catch (const std::invalid_argument& e) {
+    EXPECT_EQ(std::string(e.what()).find(path), 0u) << "names the file";
+    return e.what();
+  }
+  return "";
+}
+
+TEST(FragmentNetwork, RefusesFilesThatAreNotWhole) {
+  const std::string whole = shipped_text();
+  EXPECT_EQ(why_refused(whole), "");
+  const auto changed = [&](const std::string& from, const std::string& to) {
+    std::string text = whole;
+    text.replace(text.find(from), from.size(), to);
+    return why_refused(text);
+  };
+  const auto says = [](const std::string& why, const char* what) {
+    EXPECT_NE(why.find(what), std::string::npos) << why;
+  };
+  says(changed("version: 1", "version: 2"), "version 1");
+  says(changed("shape: [70, 105, 2]", "shape: [70, 100, 2]"), "shape");
+  says(changed("hidden_weights: [", "hidden_weights: [0.5, "), "it must be 7350");
+  says(changed("hidden_biases: [\n    ", "hidden_biases: [\n    1"), "checksum");
+  says(changed("modifier:", "other:"), "modifier is missing");
+  says(why_refused(""), "version 1");
+  says(why_refused("[1, 2"), "no fragment network");
+  EXPECT_THROW(FragmentNetwork("/no/such/file"), std::invalid_argument);
+}
+
+/// A body whose nodes follow u = (A - 1) X.
+void stretch(MpmTissue& tissue, const Eigen::Matrix3d& A) {
+  MpmState& s = tissue.state();
+  for (const LatticeBody& b : s.bodies) {
+    b.for_each_node([&](int node, int i, int j, int k) {
+      const Vec3 u = (A - Eigen::Matrix3d::Identity()) * b.node_position(i, j, k);
+      for (int a = 0; a < 3; ++a) s.nodes.u[a][node] = static_cast<float>(u[a]);
+    });
+  }
+  measure_motion(s);
+}
+
+Scene tearing_box() {
+  Scene scene = free_box(Vec3(0.016, 0.012, 0.008), 0.002);
+  Material m;
+  m.name = "torn";
+  m.tear_stretch = 1.3;
+  scene.materials = {m};
+  scene.bodies[0].material = "torn";
+  return scene;
+}
+
+TEST(FragmentFeatures, AreGradientAndMassOfSevenCells) {
+  MpmTissue tissue(tearing_box());
+  Eigen::Matrix3d A;
+  A << 1.2, 0.1, -0.05, 0.02, 0.9, 0.07, -0.03, 0.04, 1.1;
+  stretch(tissue, A);
+  const LatticeBody& body = tissue.state().bodies[0];
+  for (const auto& [x, expected] : std::vector<std::pair<int, double>>{{8, 1}, {0, 0}}) {
+    float f[kFeatureCount];
+    fragment_features(tissue.state(), body.point(x, 6, 4), f);
+    for (int cell = 0; cell < kFeatureCells; ++cell) {
+      const bool missing = cell == 1 && expected == 0;  // beyond the body's end
+      for (int i = 0; i < 9; ++i) {
+        const double F = missing ? i % 4 == 0 : A(i / 3, i % 3);
+        EXPECT_NEAR(f[10 * cell + i], F, 2e-5) << x << " " << cell << " " << i;
+      }
+      EXPECT_NEAR(f[10 * cell + 9], missing ? 0 : 1, 1e-5) << x << " " << cell;
+    }
+  }
+}
+
+TEST(FragmentFeatures, SeeNothingAcrossACut) {
+  MpmTissue tissue(tearing_box());
+  cut_now(tissue, plane_cut(Vec3(0.008, 0.006, 0.004), Vec3(1, 0, 0)));
+  const LatticeBody& body = tissue.state().bodies[0];
+  float f[kFeatureCount];
+  fragment_features(tissue.state(), body.point(8, 6, 4), f);
+  EXPECT_EQ(f[19], 0);          // at -x, where the cut is
+  EXPECT_NEAR(f[29], 1, 1e-5);  // at +x
+}
+
+TEST(FragmentFeatures, CandidatesAreStretchedOrBesideBrokenBonds) {
+  MpmTissue tissue(tearing_box());
+  EXPECT_TRUE(fragment_candidates(tissue.state(), tissue.pieces(), 0.7).empty());
+  Eigen::Matrix3d A = Eigen::Matrix3d::Identity();
+  A(0, 0) = 1.22;  // 0.73 of the limit's strain
+  stretch(tissue, A);
+  EXPECT_EQ(fragment_candidates(tissue.state(), tissue.pieces(), 0.7).size(),
+            static_cast<std::size_t>(tissue.point_count()));
+  EXPECT_TRUE(fragment_candidates(tissue.state(), tissue.pieces(), 0.8).empty());
+  MpmTissue notched(tearing_box());
+  cut_now(notched, upright_blade({{0.0081, -0.01, 0}, {0.0081, 0.006, 0}}));
+  const auto beside = fragment_candidates(notched.state(), notched.pieces(), 0.7);
+  EXPECT_GT(beside.size(), 20u);
+  for (const std::int32_t p : beside) {
+    EXPECT_NE(notched.state().points.bonds[p],
+              whole_bonds(notched.state().bodies[0], notched.state().points.site[p]));
+  }
+}
+
+struct ReportedRun {
+  std::vector<std::uint64_t> checksums;
+  std::vector<float> chances;
+  int candidates = 0, points = 0;
+};
+
+ReportedRun run_reported(const std::string& network, int threads) {
+  Scene scene = tearing_box();
+  scene.device = Device::kCpu;
+  scene.fragment_network = network;
+  scene.threads = threads;
+  Simulation simulation(scene);
+  auto& tissue = dynamic_cast<MpmTissue&>(simulation.tissue());
+  MpmState& s = tissue.state();
+  for (const LatticeBody& b : s.bodies) {
+    b.for_each_node([&](int node, int i, int j, int k) {
+      s.nodes.v[0][node] = static_cast<float>(120 * (b.node_position(i, j, k).x() - 0.008));
+    });
+  }
+  ReportedRun run;
+  for (int frame = 0; frame < 4; ++frame) {
+    const FrameReport report = simulation.advance_frame();
+    run.candidates += report.result.fragment_candidates;
+    run.points += report.result.fragment_points;
+    run.checksums.push_back(tissue.checksum());
+    for (const FragmentChance& c : tissue.forecast()) run.chances.push_back(c.probability);
+  }
+  return run;
+}
+
+TEST(FragmentNetwork, ReportsAndChangesNoBits) {
+  const ReportedRun with = run_reported(kShipped, 1), two_threads = run_reported(kShipped, 2),
+                    without = run_reported("off", 1);
+  EXPECT_GT(with.candidates, 0);
+  EXPECT_LE(with.points, with.candidates);
+  EXPECT_EQ(with.chances.size(), static_cast<std::size_t>(with.candidates));
+  for (const float p : with.chances) EXPECT_TRUE(p >= 0 && p <= 1) << p;
+  EXPECT_EQ(with.chances, two_threads.chances);
+  EXPECT_EQ(with.checksums, two_threads.checksums);
+  EXPECT_EQ(with.checksums, without.checksums);
+  EXPECT_EQ(without.candidates, 0);
+  EXPECT_TRUE(without.chances.empty());
+}
+
+TEST(FragmentNetwork, IsRefusedWhereItCannotBe) {
+  Scene scene = tearing_box();
+  scene.fragment_network = "/no/such/file.yaml";
+  EXPECT_THROW(Simulation{scene}, std::invalid_argument);
+  scene.fragment_network = kShipped;
+  scene.device = Device::kCuda;
+  EXPECT_THROW(Simulation{scene}, std::runtime_error);
+  scene.device = Device::kAuto;
+  EXPECT_NO_THROW(Simulation{scene});
+  scene.method = Method::kMls;
+  EXPECT_THROW(Simulation{scene}, std::invalid_argument);
+  scene.method = Method::kMpm;
+  scene.fragment_network = "";
+  EXPECT_THROW(Simulation{scene}, std::invalid_argument);
+}
+
+}  // namespace
+}  // namespace tissue_sim

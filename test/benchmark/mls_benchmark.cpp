@@ -1,7 +1,7 @@
 // Speed of the meshless method on the CPU. One item is one node advanced by one substep, everything
 // included: fixed corotated stress, penalty, contact with the ground and a probe that is far away.
 // Each run checks forces against the double-precision reference on the deformed body.
-#include "mls_benchmark.h"
+#include "benchmark/mls_benchmark.h"
 
 #include <benchmark/benchmark.h>
 

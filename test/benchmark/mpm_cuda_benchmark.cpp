@@ -10,6 +10,7 @@
 
 #include "benchmark/cuda_bodies.h"
 #include "benchmark/liver_benchmark.h"
+#include "benchmark/mls_benchmark.h"
 #include "compute/cuda_check.h"
 #include "mpm/cuda/cuda_mpm_tissue.h"
 #include "mpm/mpm_tissue.h"
@@ -189,6 +190,7 @@ int main(int argc, char** argv) {
         ->Unit(benchmark::kMillisecond);
   }
   add_liver_benchmarks();
+  add_mls_cuda_rows();
   benchmark::Initialize(&argc, argv);
   benchmark::RunSpecifiedBenchmarks();
   return 0;

@@ -26,12 +26,12 @@ class CudaMlsTissue final : public MlsTissue {
   // For tests and the benchmark.
   void pull() override;
   void push();  ///< motion and contact to the GPU
+  void forces_at(const float* u, float* force) override;
 
  protected:
   void pairs_changed() override;
   Figures measure() override;
   void measure_stress(std::vector<float>& of_node) override;
-  void forces_at(const float* u, float* force) override;
 
  private:
   struct OnDevice;

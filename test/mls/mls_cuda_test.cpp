@@ -140,7 +140,8 @@ TEST_F(MlsOnGpu, AStateGoesOnWithTheSameBits) {
   };
   Simulation whole(pressed_slab(Device::kCuda)), other(pressed_slab(Device::kCuda));
   run(whole, 0, 5);
-  other.restore(whole.save());
+  const std::vector<std::uint8_t> saved = whole.save();
+  other.restore(saved);
   EXPECT_EQ(run(whole, 5, 9), run(other, 5, 9));
 }
 

@@ -92,7 +92,7 @@ struct Bending {
     p.n0 = cross(between(v[0], v[2]), between(v[0], v[3]));
     p.n1 = cross(between(v[1], v[3]), between(v[1], v[2]));
     p.length = root(dot(p.e, p.e) + kTiny);
-    p.angle = angle_of(dot(cross(p.n0, p.n1), p.e), p.length * dot(p.n0, p.n1));
+    p.angle = angle_of(dot(cross(p.n1, p.n0), p.e), p.length * dot(p.n0, p.n1));
     return p;
   }
   /// An angle's excess over another one, within half a turn.

@@ -76,11 +76,11 @@ struct State {
   ConstraintSet<Elastic> elastics;    ///< ... or these
   std::vector<double> volume_of_body;  ///< [m^3]
 
-  // What cuts remember. Of each vertex: which stroke it lies on (-1: none), the blade's normal there
-  // in reference space, and the vertex that it is a copy of.
+  // What cuts remember. Of each vertex: which stroke it lies on (-1: none), where the blade passed
+  // there and its normal, in reference space, and the vertex that it is a copy of.
   std::vector<std::int32_t> stroke, copy_of;
-  std::vector<Vec3> blade_normal;
-  std::set<std::pair<std::int32_t, std::int32_t>> cut_edges;  ///< of the surface, lower vertex first
+  std::vector<Vec3> blade_normal, blade_point;
+  std::set<std::array<std::int32_t, 2>> cut_edges;  ///< of the surface, lower vertex first
   std::vector<InnerFace> faces;                               ///< between tetrahedra
   double mean_edge = 0;  ///< of the surface when it was made [m]
 
@@ -97,6 +97,9 @@ void pack(State& s);
 /// Advances by one step of `h` seconds; adds what acted on each of the colliders, mean force over
 /// the step, to `loads`, which parallels them.
 void step(State& s, float h, std::vector<ColliderLoad>& loads);
+/// Projects each constraint once, one colour after the other. `keep`: multipliers grow over the
+/// iterations of a step; else they count as zero.
+void project_constraints(State& s, float h, bool keep);
 /// Pushes vertices out of the colliders, with friction; adds what that takes (contact.cpp).
 void project_contacts(State& s, float h, std::vector<ColliderLoad>& loads);
 

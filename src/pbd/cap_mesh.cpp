@@ -105,7 +105,8 @@ std::vector<double> mean_values(const std::vector<Place>& loop, std::size_t n, c
 }
 
 double distance_to(const Place& a, const Place& b, const Place& p) {
-  const double s = std::max(0.0, std::min(1.0, (p - a).dot(b - a) / ((b - a).squaredNorm() + 1e-300)));
+  const double s =
+      std::max(0.0, std::min(1.0, (p - a).dot(b - a) / ((b - a).squaredNorm() + 1e-300)));
   return (a + s * (b - a) - p).norm();
 }
 

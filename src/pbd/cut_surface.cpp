@@ -1,5 +1,5 @@
-// Cuts of the surface model. Where a blade passes an edge the edge gets a vertex there, and both its
-// triangles are split: the cut runs along edges. Edges between two places of a stroke, or whose
+// Cuts of the surface model. Where a blade passes an edge the edge gets a vertex there, and both
+// its triangles are split: the cut runs along edges. Edges between two places of a stroke, or whose
 // triangles the blade parts, are cut; vertices come apart into the groups of triangles around them
 // that still hang together. Internal constraints that the blade passes go.
 #include <algorithm>
@@ -110,16 +110,15 @@ class SurfaceCut {
   MovingSegment segment(std::int32_t a, std::int32_t b) const {
     return {at_before(a), at_before(b), s_.vertices.position(a), s_.vertices.position(b)};
   }
-  Vec3 at_before(std::int32_t v) const {
-    return place_before(s_, before_, v);
-  }
+  Vec3 at_before(std::int32_t v) const { return place_before(s_, before_, v); }
   Vec3 middle_before(int t) const {
     const Triangle& c = s_.triangles[t];
     return (at_before(c[0]) + at_before(c[1]) + at_before(c[2])) / 3;
   }
   Vec3 middle(int t) const {
     const Triangle& c = s_.triangles[t];
-    return (s_.vertices.position(c[0]) + s_.vertices.position(c[1]) + s_.vertices.position(c[2])) / 3;
+    return (s_.vertices.position(c[0]) + s_.vertices.position(c[1]) + s_.vertices.position(c[2])) /
+           3;
   }
 
   static bool passes(const SweepPart& part, const MovingSegment& whole, Meeting* meeting) {
@@ -183,7 +182,8 @@ class SurfaceCut {
     origin_.push_back(place < 0.5 ? a : b);
     const auto mix = static_cast<float>(place);
     for (Array<float>* x : {&v.x, &v.predicted, &v.v}) {
-      for (int i = 0; i < 3; ++i) (*x)[4 * n + i] = (1 - mix) * (*x)[4 * a + i] + mix * (*x)[4 * b + i];
+      for (int i = 0; i < 3; ++i)
+        (*x)[4 * n + i] = (1 - mix) * (*x)[4 * a + i] + mix * (*x)[4 * b + i];
     }
     v.anchored[n] = v.anchored[a] != 0 && v.anchored[b] != 0 ? 1 : 0;
     v.surface[n] = 1;
@@ -226,7 +226,8 @@ class SurfaceCut {
   void mark_edges(const SweepPart& part) {
     for (const auto& [e, of] : edges_.all()) {
       if (of.size() != 2 || s_.cut_edges.count(e) != 0) continue;
-      const MovingSegment link = {middle_before(of[0]), middle_before(of[1]), middle(of[0]), middle(of[1])};
+      const MovingSegment link = {middle_before(of[0]), middle_before(of[1]), middle(of[0]),
+                                  middle(of[1])};
       if (!is_between(e, of) && !passes(part, link, nullptr)) continue;
       s_.cut_edges.insert(e);
       fresh_.push_back(e);

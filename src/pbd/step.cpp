@@ -184,9 +184,8 @@ double elastic_energy(const State& s) {
   sum += sum_energy(s, s.bends, [&](auto& v, auto& number) {
     return by_value(v, number, Bending::value(v, number));
   });
-  sum += sum_energy(s, s.elastics, [&](auto& v, auto& number) {
-    return Elastic::energy(v, number);
-  });
+  sum +=
+      sum_energy(s, s.elastics, [&](auto& v, auto& number) { return Elastic::energy(v, number); });
   return sum;
 }
 

@@ -34,7 +34,8 @@ struct Strain {
     return i == j ? s - 1.0f : s;
   }
   template <class V>
-  static TISSUE_SIM_INLINE void project_one(Vertex<V> (&v)[4], const V (&number)[11], int i, int j) {
+  static TISSUE_SIM_INLINE void project_one(Vertex<V> (&v)[4], const V (&number)[11], int i,
+                                            int j) {
     Vector<V> p[3];
     edges_of(v, p);
     const Vector<V> fi = column(p, number, i), fj = column(p, number, j);
@@ -54,8 +55,7 @@ struct Strain {
   }
   /// number: Q^-1, stretch, shear.
   template <class V>
-  static TISSUE_SIM_INLINE void project(Vertex<V> (&v)[4], const V (&number)[11], V,
-                                        V (&)[1]) {
+  static TISSUE_SIM_INLINE void project(Vertex<V> (&v)[4], const V (&number)[11], V, V (&)[1]) {
     project_one(v, number, 0, 0);
     project_one(v, number, 1, 1);
     project_one(v, number, 2, 2);
@@ -88,8 +88,8 @@ struct Elastic {
     V sum = c * 0.0f;
     g[0] = {sum, sum, sum};
     for (int k = 0; k < 3; ++k) {
-      g[k + 1] = number[3 * k] * along[0] + number[3 * k + 1] * along[1] +
-                 number[3 * k + 2] * along[2];
+      g[k + 1] =
+          number[3 * k] * along[0] + number[3 * k + 1] * along[1] + number[3 * k + 2] * along[2];
       g[0] = g[0] - g[k + 1];
       sum += v[k + 1].w * dot(g[k + 1], g[k + 1]);
     }

@@ -59,7 +59,8 @@ std::unique_ptr<State> links_of_lattice(int n, int threads) {
   }
   const std::vector<int> index = add_shuffled(*s, places);
   const auto at = [&](int i, int j, int k) { return index[(k * n + j) * n + i]; };
-  constexpr int kTo[7][3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}, {1, 1, 0}, {1, 0, 1}, {0, 1, 1}, {1, 1, 1}};
+  constexpr int kTo[7][3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}, {1, 1, 0},
+                             {1, 0, 1}, {0, 1, 1}, {1, 1, 1}};
   std::vector<std::array<std::int32_t, 2>> pairs;
   for (int k = 0; k < n; ++k) {
     for (int j = 0; j < n; ++j) {
@@ -111,11 +112,12 @@ void run(benchmark::State& bench, State& s) {
 template <class Make>
 void add(const std::string& name, const Make& make) {
   for (const int threads : {1, 2}) {
-    benchmark::RegisterBenchmark(("pbd/cpu/" + name + "/threads:" + std::to_string(threads)).c_str(),
-                                 [make, threads](benchmark::State& bench) {
-                                   const auto s = make(threads);
-                                   run(bench, *s);
-                                 })
+    benchmark::RegisterBenchmark(
+        ("pbd/cpu/" + name + "/threads:" + std::to_string(threads)).c_str(),
+        [make, threads](benchmark::State& bench) {
+          const auto s = make(threads);
+          run(bench, *s);
+        })
         ->Unit(benchmark::kMicrosecond)
         ->UseRealTime()
         ->MinTime(0.3);

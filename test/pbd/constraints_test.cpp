@@ -33,7 +33,8 @@ float& coordinate(Vertex<float> (&v)[N], int i, int a) {
 /// A projection moves vertices by w grad C dlambda: what it moves, over w, against the difference
 /// quotient of C, up to one factor; and with the factor that XPBD asks for.
 template <class Kind, class Value>
-void expect_gradient(const float (&number)[Kind::kNumbers], const Value& value, double factor_within) {
+void expect_gradient(const float (&number)[Kind::kNumbers], const Value& value,
+                     double factor_within) {
   std::mt19937 random(7);
   for (int round = 0; round < 50; ++round) {
     Vertex<float> v[Kind::kVertices];
@@ -72,13 +73,13 @@ void expect_gradient(const float (&number)[Kind::kNumbers], const Value& value, 
 TEST(Constraint, DistanceFollowsItsGradient) {
   const float number[2] = {0.8f, 0.05f};
   expect_gradient<Distance>(
-      number, [&](const Vertex<float> (&v)[2]) { return Distance::value(v, number); }, 1e-3);
+      number, [&](const Vertex<float>(&v)[2]) { return Distance::value(v, number); }, 1e-3);
 }
 
 TEST(Constraint, BendingFollowsItsGradient) {
   const float number[2] = {0.3f, 0.05f};
   expect_gradient<Bending>(
-      number, [&](const Vertex<float> (&v)[4]) { return Bending::value(v, number); }, 3e-3);
+      number, [&](const Vertex<float>(&v)[4]) { return Bending::value(v, number); }, 3e-3);
 }
 
 TEST(Constraint, BendingIsTheArccosOfThePaper) {
@@ -148,7 +149,7 @@ TEST(Constraint, ElasticForcesAreTheEnergysSlope) {
   const double mu = 2, bulk = 9;
   number[9] = static_cast<float>(1 / mu);
   number[10] = static_cast<float>(1 / bulk);
-  const auto energy = [&](const Vertex<float> (&v)[4]) {
+  const auto energy = [&](const Vertex<float>(&v)[4]) {
     Eigen::Matrix3d f;
     for (int i = 0; i < 3; ++i) {
       f.col(i) = Vec3(v[i + 1].x - v[0].x, v[i + 1].y - v[0].y, v[i + 1].z - v[0].z);
@@ -173,7 +174,8 @@ TEST(Constraint, ElasticForcesAreTheEnergysSlope) {
         const double down = energy(v);
         coordinate(v, i, a) = at;
         const double force = -(up - down) / (2 * kStep);
-        const double moved_by = (coordinate(moved, i, a) - coordinate(v, i, a)) / v[i].w * kInverseH2;
+        const double moved_by =
+            (coordinate(moved, i, a) - coordinate(v, i, a)) / v[i].w * kInverseH2;
         EXPECT_NEAR(moved_by, force, 0.02 * std::fabs(force) + 0.05);
       }
     }

@@ -87,13 +87,15 @@ TEST(Tetrahedra, AreReadFromEachFormat) {
   };
   write("a.node", "# a comment\n4 3 0 0\n1 0 0 0\n2 1 0 0 # here too\n3 0 1 0\n4 0 0 2\n");
   const std::string tetgen = write("a.ele", "1 4 0\n1 1 2 3 4\n");
-  const std::string medit = write("a.mesh",
-                                  "MeshVersionFormatted 1\nDimension 3\nVertices\n4\n0 0 0 1\n1 0 0 1\n"
-                                  "0 1 0 1\n0 0 2 1\nTriangles\n1\n1 2 3 1\nTetrahedra\n1\n1 2 3 4 1\nEnd\n");
-  const std::string vtk = write("a.vtk",
-                                "# vtk DataFile Version 2.0\nt\nASCII\nDATASET UNSTRUCTURED_GRID\n"
-                                "POINTS 4 float\n0 0 0 1 0 0 0 1 0 0 0 2\nCELLS 2 9\n4 0 1 2 3\n3 0 1 2\n"
-                                "CELL_TYPES 2\n10\n5\n");
+  const std::string medit =
+      write("a.mesh",
+            "MeshVersionFormatted 1\nDimension 3\nVertices\n4\n0 0 0 1\n1 0 0 1\n"
+            "0 1 0 1\n0 0 2 1\nTriangles\n1\n1 2 3 1\nTetrahedra\n1\n1 2 3 4 1\nEnd\n");
+  const std::string vtk =
+      write("a.vtk",
+            "# vtk DataFile Version 2.0\nt\nASCII\nDATASET UNSTRUCTURED_GRID\n"
+            "POINTS 4 float\n0 0 0 1 0 0 0 1 0 0 0 2\nCELLS 2 9\n4 0 1 2 3\n3 0 1 2\n"
+            "CELL_TYPES 2\n10\n5\n");
   for (const std::string& path : {tetgen, medit, vtk}) {
     const TetMesh mesh = read_tets(path);
     ASSERT_EQ(mesh.tetrahedra.size(), 1u) << path;
@@ -128,7 +130,8 @@ TEST(Rays, MeetWhatABruteForceSearchMeets) {
   std::mt19937 random(2);
   std::normal_distribution<double> normal;
   for (int i = 0; i < 300; ++i) {
-    const Vec3 origin = Vec3(0.01, -0.02, 0.03) + 0.02 * Vec3(normal(random), normal(random), normal(random));
+    const Vec3 origin =
+        Vec3(0.01, -0.02, 0.03) + 0.02 * Vec3(normal(random), normal(random), normal(random));
     const Vec3 direction = Vec3(normal(random), normal(random), normal(random)).normalized();
     double nearest = 1e300;
     int winding = 0;
@@ -173,11 +176,11 @@ TEST(Surface, SaysWhatItFoundAndLeftOut) {
   ball.shape = Shape::kBall;
   TriangleMesh mesh = triangulate(ball, 0.008);
   const std::size_t whole = mesh.triangles.size();
-  std::swap(mesh.triangles[5][0], mesh.triangles[5][1]);    // faces inwards
-  mesh.triangles.push_back(mesh.triangles[9]);              // twice
-  mesh.triangles.push_back({0, 1, 1});                      // no area
-  mesh.vertices.push_back(Vec3(1, 1, 1));                   // of no triangle
-  mesh.triangles.erase(mesh.triangles.begin() + 20);        // a hole
+  std::swap(mesh.triangles[5][0], mesh.triangles[5][1]);  // faces inwards
+  mesh.triangles.push_back(mesh.triangles[9]);            // twice
+  mesh.triangles.push_back({0, 1, 1});                    // no area
+  mesh.vertices.push_back(Vec3(1, 1, 1));                 // of no triangle
+  mesh.triangles.erase(mesh.triangles.begin() + 20);      // a hole
   std::vector<std::string> notes;
   const SurfaceKind kind = tidy_surface(mesh, notes);
   EXPECT_EQ(mesh.triangles.size(), whole - 1);

@@ -15,9 +15,9 @@ TriangleMesh triangulate(const Body& body, double edge);
 
 /// What a surface is like.
 struct SurfaceKind {
-  int open_edges = 0;       ///< of one triangle only
-  int crowded_edges = 0;    ///< of more than two
-  int parts = 0;            ///< that share no vertex
+  int open_edges = 0;     ///< of one triangle only
+  int crowded_edges = 0;  ///< of more than two
+  int parts = 0;          ///< that share no vertex
   bool is_closed() const { return open_edges == 0 && crowded_edges == 0; }
 };
 

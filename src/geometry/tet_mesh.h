@@ -10,8 +10,8 @@
 namespace tissue_sim {
 
 struct TetMesh {
-  std::vector<Vec3> vertices;                   ///< [m]
-  std::vector<std::array<int, 4>> tetrahedra;   ///< positive: (b - a) x (c - a) . (d - a) > 0
+  std::vector<Vec3> vertices;                  ///< [m]
+  std::vector<std::array<int, 4>> tetrahedra;  ///< positive: (b - a) x (c - a) . (d - a) > 0
 };
 
 /// Whether a path's extension is that of a tetrahedral mesh: .node, .ele, .mesh or .vtk.

@@ -56,7 +56,7 @@ std::vector<std::array<int, 3>> clip_ears(const std::vector<Place>& at) {
 
 /// Lawson's flips; edges of the loop are in one triangle only and stay.
 void flip_to_delaunay(const std::vector<Place>& at, std::vector<std::array<int, 3>>& triangles) {
-  for (int round = 0; round < 100; ++round) {
+  for (int round = 0; round < 3000; ++round) {
     std::map<std::pair<int, int>, int> side;  // triangle that has the edge in this sense
     for (std::size_t t = 0; t < triangles.size(); ++t) {
       for (int i = 0; i < 3; ++i) {
@@ -105,7 +105,8 @@ std::vector<double> mean_values(const std::vector<Place>& loop, std::size_t n, c
 }
 
 double distance_to(const Place& a, const Place& b, const Place& p) {
-  const double s = std::max(0.0, std::min(1.0, (p - a).dot(b - a) / ((b - a).squaredNorm() + 1e-300)));
+  const double s =
+      std::max(0.0, std::min(1.0, (p - a).dot(b - a) / ((b - a).squaredNorm() + 1e-300)));
   return (a + s * (b - a) - p).norm();
 }
 
@@ -152,7 +153,6 @@ CapMesh fill_loop(const std::vector<Vec3>& loop, double edge) {
         cap.triangles[t] = {c[0], c[1], k};
         cap.triangles.push_back({c[1], c[2], k});
         cap.triangles.push_back({c[2], c[0], k});
-        flip_to_delaunay(at, cap.triangles);
         break;
       }
     }

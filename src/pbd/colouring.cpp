@@ -13,7 +13,8 @@ class Taken {
   explicit Taken(int vertices) : count_(vertices), bits_(vertices) {}
   void take(std::int32_t vertex, int colour) {
     while (colour >= 64 * words_) grow();
-    bits_[static_cast<std::size_t>(vertex) * words_ + colour / 64] |= std::uint64_t{1} << colour % 64;
+    bits_[static_cast<std::size_t>(vertex) * words_ + colour / 64] |= std::uint64_t{1}
+                                                                      << colour % 64;
   }
   int first_free(const std::int32_t* vertices, int n) const {
     for (int w = 0; w < words_; ++w) {

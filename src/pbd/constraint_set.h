@@ -76,9 +76,8 @@ void ConstraintSet<Kind>::pack(int vertex_count) {
   begin.assign(1, 0);
   for (std::vector<std::int32_t>& list : of) {
     // Side by side in memory what lies side by side in space, for vertices are numbered so.
-    std::stable_sort(list.begin(), list.end(), [this](std::int32_t a, std::int32_t b) {
-      return vertices[a] < vertices[b];
-    });
+    std::stable_sort(list.begin(), list.end(),
+                     [this](std::int32_t a, std::int32_t b) { return vertices[a] < vertices[b]; });
     for (std::size_t first = 0; first < list.size(); first += kLanes) {
       Block block;
       for (int lane = 0; lane < kLanes; ++lane) {

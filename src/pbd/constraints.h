@@ -92,7 +92,7 @@ struct Bending {
     p.n0 = cross(between(v[0], v[2]), between(v[0], v[3]));
     p.n1 = cross(between(v[1], v[3]), between(v[1], v[2]));
     p.length = root(dot(p.e, p.e) + kTiny);
-    p.angle = angle_of(dot(cross(p.n0, p.n1), p.e), p.length * dot(p.n0, p.n1));
+    p.angle = angle_of(dot(cross(p.n1, p.n0), p.e), p.length * dot(p.n0, p.n1));
     return p;
   }
   /// An angle's excess over another one, within half a turn.
@@ -124,8 +124,8 @@ struct Bending {
     const Vector<V> g0 = e2 * m0, g1 = e2 * m1;
     const Vector<V> g2 = s0 * m0 + s1 * m1;
     const Vector<V> g3 = (-t0) * m0 + (-t1) * m1;
-    const V sum = v[0].w * dot(g0, g0) + v[1].w * dot(g1, g1) + v[2].w * dot(g2, g2) +
-                  v[3].w * dot(g3, g3);
+    const V sum =
+        v[0].w * dot(g0, g0) + v[1].w * dot(g1, g1) + v[2].w * dot(g2, g2) + v[3].w * dot(g3, g3);
     const V c = excess(p.angle, number[0]);
     const V change = -(c + a * lambda[0]) / (sum + a + kTiny);
     lambda[0] += change;

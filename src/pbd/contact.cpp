@@ -85,8 +85,9 @@ void project_contacts(State& s, float h, std::vector<ColliderLoad>& loads) {
   if (count == 0) return;
   std::vector<Box> boxes;
   for (const Collider& c : s.colliders) boxes.push_back(bounds(c));
-  const Contacts contacts{s.colliders.data(), boxes.data(), count, h, s.vertices.x.data(),
-                          s.vertices.predicted.data(), s.vertices.v.data(), s.vertices.mass};
+  const Contacts contacts{
+      s.colliders.data(),          boxes.data(),        count,          h, s.vertices.x.data(),
+      s.vertices.predicted.data(), s.vertices.v.data(), s.vertices.mass};
   const int n = s.vertices.size(), parts = (n + kContactsOfPart - 1) / kContactsOfPart;
   std::vector<ColliderLoad> of_parts(static_cast<std::size_t>(parts) * count);
   s.cpu.for_each(parts, [&](int part) {

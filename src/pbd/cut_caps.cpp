@@ -102,7 +102,8 @@ std::vector<std::int32_t> close_wounds(State& s, std::vector<std::int32_t>& orig
       }
       index.push_back(n);
     }
-    for (const auto& t : cap.triangles) s.triangles.push_back({index[t[0]], index[t[1]], index[t[2]]});
+    for (const auto& t : cap.triangles)
+      s.triangles.push_back({index[t[0]], index[t[1]], index[t[2]]});
     starts.insert(starts.end(), index.begin(), index.end());
   }
   return starts;

@@ -1,5 +1,5 @@
-// Cuts of the surface model. Where a blade passes an edge the edge gets a vertex there, and both its
-// triangles are split: the cut runs along edges. Edges between two places of a stroke, or whose
+// Cuts of the surface model. Where a blade passes an edge the edge gets a vertex there, and both
+// its triangles are split: the cut runs along edges. Edges between two places of a stroke, or whose
 // triangles the blade parts, are cut; vertices come apart into the groups of triangles around them
 // that still hang together. Internal constraints that the blade passes go.
 #include <algorithm>
@@ -12,7 +12,7 @@ namespace tissue_sim {
 namespace pbd {
 namespace {
 
-using Edge = std::pair<std::int32_t, std::int32_t>;
+using Edge = std::array<std::int32_t, 2>;
 Edge edge_of(std::int32_t a, std::int32_t b) { return {std::min(a, b), std::max(a, b)}; }
 
 /// A new vertex keeps this share of the mesh's mean edge, and of its own edge, off the ends; nearer
@@ -90,8 +90,8 @@ class SurfaceCut {
   int part_vertices() {
     std::map<std::int32_t, std::vector<int>> around;
     for (const Edge& e : fresh_) {
-      around[e.first];
-      around[e.second];
+      around[e[0]];
+      around[e[1]];
     }
     for (std::size_t t = 0; t < s_.triangles.size(); ++t) {
       for (const std::int32_t v : s_.triangles[t]) {
@@ -110,16 +110,15 @@ class SurfaceCut {
   MovingSegment segment(std::int32_t a, std::int32_t b) const {
     return {at_before(a), at_before(b), s_.vertices.position(a), s_.vertices.position(b)};
   }
-  Vec3 at_before(std::int32_t v) const {
-    return place_before(s_, before_, v);
-  }
+  Vec3 at_before(std::int32_t v) const { return place_before(s_, before_, v); }
   Vec3 middle_before(int t) const {
     const Triangle& c = s_.triangles[t];
     return (at_before(c[0]) + at_before(c[1]) + at_before(c[2])) / 3;
   }
   Vec3 middle(int t) const {
     const Triangle& c = s_.triangles[t];
-    return (s_.vertices.position(c[0]) + s_.vertices.position(c[1]) + s_.vertices.position(c[2])) / 3;
+    return (s_.vertices.position(c[0]) + s_.vertices.position(c[1]) + s_.vertices.position(c[2])) /
+           3;
   }
 
   static bool passes(const SweepPart& part, const MovingSegment& whole, Meeting* meeting) {
@@ -140,7 +139,7 @@ class SurfaceCut {
     for (const auto& [e, of] : edges_.all()) {
       if (of.empty()) continue;
       Meeting meeting;
-      if (passes(part, segment(e.first, e.second), &meeting)) {
+      if (passes(part, segment(e[0], e[1]), &meeting)) {
         passed.push_back({e, meeting.place, meeting.normal});
       }
     }
@@ -166,11 +165,14 @@ class SurfaceCut {
     const Vec3 normal = to_reference(of[0], p.normal);
     const auto [a, b] = p.edge;
     const double length = (s_.vertices.reference[a] - s_.vertices.reference[b]).norm();
+    const Vec3 point =
+        (1 - p.place) * s_.vertices.reference[a] + p.place * s_.vertices.reference[b];
     const double off = std::max(kLeastShare, kLeastLength * s_.mean_edge / length);
     std::int32_t v = p.place < 0.5 ? a : b;
     if (std::min(p.place, 1 - p.place) >= off) v = split(a, b, p.place, of);
     s_.stroke[v] = stroke_;
     s_.blade_normal[v] = normal;
+    s_.blade_point[v] = point;
   }
 
   std::int32_t split(std::int32_t a, std::int32_t b, double place, const std::vector<int>& of) {
@@ -180,7 +182,8 @@ class SurfaceCut {
     origin_.push_back(place < 0.5 ? a : b);
     const auto mix = static_cast<float>(place);
     for (Array<float>* x : {&v.x, &v.predicted, &v.v}) {
-      for (int i = 0; i < 3; ++i) (*x)[4 * n + i] = (1 - mix) * (*x)[4 * a + i] + mix * (*x)[4 * b + i];
+      for (int i = 0; i < 3; ++i)
+        (*x)[4 * n + i] = (1 - mix) * (*x)[4 * a + i] + mix * (*x)[4 * b + i];
     }
     v.anchored[n] = v.anchored[a] != 0 && v.anchored[b] != 0 ? 1 : 0;
     v.surface[n] = 1;
@@ -202,31 +205,37 @@ class SurfaceCut {
     return n;
   }
 
+  /// Whether the two triangles lie on either side of where the stroke went through between a and b.
   bool is_between(const Edge& e, const std::vector<int>& of) const {
     const auto [a, b] = e;
     if (s_.stroke[a] != stroke_ || s_.stroke[b] != stroke_) return false;
-    const Vec3 &na = s_.blade_normal[a], &nb = s_.blade_normal[b];
-    if (na.dot(nb) < 0.3) return false;
-    const Vec3 n = na + nb;
+    if (s_.blade_normal[a].dot(s_.blade_normal[b]) < 0.3) return false;
+    const Vec3 n = s_.blade_normal[a] + s_.blade_normal[b];
+    const Vec3 at = 0.5 * (s_.blade_point[a] + s_.blade_point[b]);
     double side[2];
     for (int k = 0; k < 2; ++k) {
       const Triangle& c = s_.triangles[of[k]];
-      const std::int32_t far = c[0] + c[1] + c[2] - a - b;
-      side[k] = n.dot(s_.vertices.reference[far] -
-                      0.5 * (s_.vertices.reference[a] + s_.vertices.reference[b]));
+      const auto& x = s_.vertices.reference;
+      side[k] = n.dot((x[c[0]] + x[c[1]] + x[c[2]]) / 3 - at);
     }
     return side[0] * side[1] < 0;
   }
 
+  /// Edges whose triangles the blade parts: their centres hang together by a link as points do by
+  /// bonds. What a stroke passed before triangles were split, its places on both ends tell.
   void mark_edges(const SweepPart& part) {
     for (const auto& [e, of] : edges_.all()) {
-      if (of.size() != 2 || s_.stroke[e.first] < 0 || s_.stroke[e.second] < 0) continue;
-      if (s_.cut_edges.count(e) != 0) continue;
-      const MovingSegment link = {middle_before(of[0]), middle_before(of[1]), middle(of[0]), middle(of[1])};
+      if (of.size() != 2 || s_.cut_edges.count(e) != 0) continue;
+      const MovingSegment link = {middle_before(of[0]), middle_before(of[1]), middle(of[0]),
+                                  middle(of[1])};
       if (!is_between(e, of) && !passes(part, link, nullptr)) continue;
       s_.cut_edges.insert(e);
       fresh_.push_back(e);
-      for (const std::int32_t v : {e.first, e.second}) {
+      for (const std::int32_t v : {e[0], e[1]}) {
+        if (s_.stroke[v] < 0) {  // a step of the cut, where no vertex could be put on the blade
+          s_.stroke[v] = stroke_;
+          s_.blade_point[v] = s_.vertices.reference[v];
+        }
         ++s_.vertices.cut_links[v];
         touched_.insert(v);
       }
@@ -293,6 +302,7 @@ int copy_vertex(State& s, int of, std::vector<std::int32_t>& origin) {
   s.half_depth[n] = s.half_depth[of];
   s.stroke[n] = s.stroke[of];
   s.blade_normal[n] = s.blade_normal[of];
+  s.blade_point[n] = s.blade_point[of];
   s.copy_of[n] = s.copy_of[of];
   origin.push_back(of);
   return n;

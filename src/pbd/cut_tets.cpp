@@ -29,7 +29,8 @@ void find_faces(State& s) {
       std::sort(key.begin(), key.end());
       const auto [at, is_new] = first.try_emplace(key, static_cast<std::int32_t>(t), k);
       if (!is_new) {
-        s.faces.push_back({{at->second.first, static_cast<std::int32_t>(t)}, {at->second.second, k}, false});
+        s.faces.push_back(
+            {{at->second.first, static_cast<std::int32_t>(t)}, {at->second.second, k}, false});
       }
     }
   }
@@ -92,7 +93,8 @@ class TetCut {
   TetCut(State& s, const std::vector<Broken>& broken) : s_(s), broken_(broken) {
     around_.resize(s.vertices.size());
     for (std::size_t t = 0; t < s.tetrahedra.size(); ++t) {
-      for (const std::int32_t v : s.tetrahedra[t]) around_[v].push_back(static_cast<std::int32_t>(t));
+      for (const std::int32_t v : s.tetrahedra[t])
+        around_[v].push_back(static_cast<std::int32_t>(t));
     }
   }
 
@@ -101,7 +103,8 @@ class TetCut {
     for (const Broken& b : broken_) {
       const InnerFace& f = s_.faces[b.face];
       const Vec3 c0 = reference_centre(f.tetrahedron[0]), c1 = reference_centre(f.tetrahedron[1]);
-      const Eigen::Matrix3d g = 0.5 * (gradient(s_, f.tetrahedron[0]) + gradient(s_, f.tetrahedron[1]));
+      const Eigen::Matrix3d g =
+          0.5 * (gradient(s_, f.tetrahedron[0]) + gradient(s_, f.tetrahedron[1]));
       Vec3 n = (g.transpose() * b.normal).stableNormalized();
       if (n.isZero()) continue;
       for (const std::int32_t v : face_corners(s_, f)) {
@@ -121,7 +124,8 @@ class TetCut {
     std::map<std::int32_t, std::vector<int>> faces_at;
     for (std::size_t i = 0; i < s_.faces.size(); ++i) {
       if (!s_.faces[i].is_cut) {
-        for (const std::int32_t v : face_corners(s_, s_.faces[i])) faces_at[v].push_back(static_cast<int>(i));
+        for (const std::int32_t v : face_corners(s_, s_.faces[i]))
+          faces_at[v].push_back(static_cast<int>(i));
       }
     }
     std::set<std::int32_t> touched;
@@ -192,7 +196,8 @@ class TetCut {
     x = from;
   }
 
-  void part_vertex(std::int32_t v, const std::vector<int>& faces, std::vector<std::int32_t>& origin) {
+  void part_vertex(std::int32_t v, const std::vector<int>& faces,
+                   std::vector<std::int32_t>& origin) {
     const std::vector<std::int32_t>& tets = around_[v];
     std::map<std::int32_t, std::int32_t> group;
     for (const std::int32_t t : tets) group[t] = t;
@@ -273,7 +278,8 @@ bool cut_tetrahedra(State& s, const BladePath& path, const Array<float>& before,
       const MovingSegment whole = {from[a], from[b], to[a], to[b]};
       bool aside = false;
       for (int k = 0; k < 3 && !aside; ++k) {
-        aside = sweep::largest(whole, k) < part.box.min[k] || sweep::least(whole, k) > part.box.max[k];
+        aside =
+            sweep::largest(whole, k) < part.box.min[k] || sweep::least(whole, k) > part.box.max[k];
       }
       if (aside) continue;
       const MovingSegment link = whole.during(part.begin, part.end);

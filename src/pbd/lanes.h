@@ -15,17 +15,17 @@ TISSUE_SIM_INLINE float magnitude(float v) { return fabsf(v); }
 /// a where v is negative (its sign bit set), else b.
 TISSUE_SIM_INLINE float where_negative(float v, float a, float b) { return v < 0 ? a : b; }
 
-#define TISSUE_SIM_LANES(W)                                                             \
-  TISSUE_SIM_INLINE Vec<W> root(Vec<W> v) {                                             \
-    Vec<W> r;                                                                           \
-    for (int i = 0; i < W; ++i) r[i] = __builtin_sqrtf(v[i]);                           \
-    return r;                                                                           \
-  }                                                                                     \
-  TISSUE_SIM_INLINE Vec<W> magnitude(Vec<W> v) {                                        \
-    return reinterpret_cast<Vec<W>>(bits<W>(v) & 0x7fffffff);                           \
-  }                                                                                     \
-  TISSUE_SIM_INLINE Vec<W> where_negative(Vec<W> v, Vec<W> a, Vec<W> b) {               \
-    return either<W>(bits<W>(v) >> 31, a, b);                                           \
+#define TISSUE_SIM_LANES(W)                                               \
+  TISSUE_SIM_INLINE Vec<W> root(Vec<W> v) {                               \
+    Vec<W> r;                                                             \
+    for (int i = 0; i < W; ++i) r[i] = __builtin_sqrtf(v[i]);             \
+    return r;                                                             \
+  }                                                                       \
+  TISSUE_SIM_INLINE Vec<W> magnitude(Vec<W> v) {                          \
+    return reinterpret_cast<Vec<W>>(bits<W>(v) & 0x7fffffff);             \
+  }                                                                       \
+  TISSUE_SIM_INLINE Vec<W> where_negative(Vec<W> v, Vec<W> a, Vec<W> b) { \
+    return either<W>(bits<W>(v) >> 31, a, b);                             \
   }
 #if !defined(__CUDACC__)
 TISSUE_SIM_LANES(4)
@@ -49,9 +49,10 @@ template <class V>
 TISSUE_SIM_INLINE V angle_of(V y, V x) {
   const V ax = magnitude(x), ay = magnitude(y);
   const V t = lesser(ax, ay) / (greater(ax, ay) + 1e-30f), t2 = t * t;
-  V r = t * (0.99997726f +
-             t2 * (-0.33262347f +
-                   t2 * (0.19354346f + t2 * (-0.11643287f + t2 * (0.05265332f - 0.01172120f * t2)))));
+  V r =
+      t * (0.99997726f +
+           t2 * (-0.33262347f +
+                 t2 * (0.19354346f + t2 * (-0.11643287f + t2 * (0.05265332f - 0.01172120f * t2)))));
   r = where_negative(ax - ay, 1.57079632679f - r, r);
   r = where_negative(x, 3.14159265359f - r, r);
   return where_negative(y, -r, r);

@@ -24,14 +24,14 @@ constexpr int kPadding = 4 * kLanes;
 
 /// Four floats a vertex. New vertices come last: an index means the same vertex for ever.
 struct Vertices {
-  Array<float> x;          ///< where they are [m], and 1 / mass [1/kg], 0 where held
-  Array<float> predicted;  ///< where they would be without constraints [m]
-  Array<float> v;          ///< [m/s]
-  std::vector<Vec3> reference;          ///< [m]
-  std::vector<double> mass, volume;     ///< [kg], [m^3]
+  Array<float> x;                    ///< where they are [m], and 1 / mass [1/kg], 0 where held
+  Array<float> predicted;            ///< where they would be without constraints [m]
+  Array<float> v;                    ///< [m/s]
+  std::vector<Vec3> reference;       ///< [m]
+  std::vector<double> mass, volume;  ///< [kg], [m^3]
   std::vector<std::int16_t> body;
   std::vector<std::uint8_t> anchored;
-  std::vector<std::uint8_t> surface;    ///< whether a triangle has it
+  std::vector<std::uint8_t> surface;                 ///< whether a triangle has it
   std::vector<std::int32_t> cut_links, whole_links;  ///< constraints lost, and had
 
   int size() const { return static_cast<int>(reference.size()); }
@@ -66,23 +66,23 @@ struct State {
   std::vector<Tetrahedron> tetrahedra;
   std::vector<std::int16_t> body_of_tetrahedron;
 
-  std::vector<InternalPair> internal;      ///< by a, then b
-  std::vector<double> half_depth;          ///< of each vertex: to the middle of the body [m]
+  std::vector<InternalPair> internal;  ///< by a, then b
+  std::vector<double> half_depth;      ///< of each vertex: to the middle of the body [m]
 
   ConstraintSet<Distance> links;  ///< edges, then internal links
   int edge_count = 0;             ///< of links: those that are edges
   ConstraintSet<Bending> bends;
-  ConstraintSet<Strain> strains;      ///< one for each tetrahedron, ...
-  ConstraintSet<Elastic> elastics;    ///< ... or these
+  ConstraintSet<Strain> strains;       ///< one for each tetrahedron, ...
+  ConstraintSet<Elastic> elastics;     ///< ... or these
   std::vector<double> volume_of_body;  ///< [m^3]
 
-  // What cuts remember. Of each vertex: which stroke it lies on (-1: none), the blade's normal there
-  // in reference space, and the vertex that it is a copy of.
+  // What cuts remember. Of each vertex: which stroke it lies on (-1: none), where the blade passed
+  // there and its normal, in reference space, and the vertex that it is a copy of.
   std::vector<std::int32_t> stroke, copy_of;
-  std::vector<Vec3> blade_normal;
-  std::set<std::pair<std::int32_t, std::int32_t>> cut_edges;  ///< of the surface, lower vertex first
-  std::vector<InnerFace> faces;                               ///< between tetrahedra
-  double mean_edge = 0;  ///< of the surface when it was made [m]
+  std::vector<Vec3> blade_normal, blade_point;
+  std::set<std::array<std::int32_t, 2>> cut_edges;  ///< of the surface, lower vertex first
+  std::vector<InnerFace> faces;                     ///< between tetrahedra
+  double mean_edge = 0;                             ///< of the surface when it was made [m]
 
   std::vector<Collider> colliders;  ///< of this step
 
@@ -97,6 +97,9 @@ void pack(State& s);
 /// Advances by one step of `h` seconds; adds what acted on each of the colliders, mean force over
 /// the step, to `loads`, which parallels them.
 void step(State& s, float h, std::vector<ColliderLoad>& loads);
+/// Projects each constraint once, one colour after the other. `keep`: multipliers grow over the
+/// iterations of a step; else they count as zero.
+void project_constraints(State& s, float h, bool keep);
 /// Pushes vertices out of the colliders, with friction; adds what that takes (contact.cpp).
 void project_contacts(State& s, float h, std::vector<ColliderLoad>& loads);
 

@@ -23,6 +23,8 @@ class PbdTissue final : public Tissue {
   Span<const Fragment> fragments() override;
   std::uint64_t checksum() override;
   Momentum momentum() override;
+  std::vector<std::uint8_t> save() override;
+  void restore(Span<const std::uint8_t> saved) override;
   std::string device_name() const override;
   const std::vector<std::string>& notes() const override { return notes_; }
 
@@ -31,6 +33,8 @@ class PbdTissue final : public Tissue {
 
  private:
   /// While vertices move from `before` to where they are; a stroke is what one blade does.
+  template <class Archive>
+  void each_field(Archive& archive);
   Array<float> places() const;  // without padding
   void cut(const BladePath& path, int stroke, const Array<float>& before, CutReport& report);
 

@@ -44,11 +44,11 @@ TISSUE_SIM_INLINE void project_blocks(const ConstraintBlock<Kind>* blocks, int c
   }
 }
 
-#define TISSUE_SIM_PROJECTION(name, Kind, W, target)                                        \
-  target void name(const ConstraintBlock<Kind>* b, int n, float h, float* x, float* m) {    \
-    project_blocks<W, Kind>(b, n, h, x, m);                                                 \
+#define TISSUE_SIM_PROJECTION(name, Kind, W, target)                                     \
+  target void name(const ConstraintBlock<Kind>* b, int n, float h, float* x, float* m) { \
+    project_blocks<W, Kind>(b, n, h, x, m);                                              \
   }
-#define TISSUE_SIM_PROJECTIONS(suffix, W, target)            \
+#define TISSUE_SIM_PROJECTIONS(suffix, W, target)               \
   TISSUE_SIM_PROJECTION(distance_##suffix, Distance, W, target) \
   TISSUE_SIM_PROJECTION(bending_##suffix, Bending, W, target)   \
   TISSUE_SIM_PROJECTION(strain_##suffix, Strain, W, target)     \

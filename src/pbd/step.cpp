@@ -79,6 +79,14 @@ void forget(ConstraintSet<Kind>& set) {
 
 }  // namespace
 
+void project_constraints(State& s, float h, bool keep) {
+  const float inverse_h2 = 1 / (h * h);
+  project_all(s, s.elastics, s.project->elastic, 32, inverse_h2, keep);
+  project_all(s, s.strains, s.project->strain, 32, inverse_h2, false);
+  project_all(s, s.links, s.project->distance, 128, inverse_h2, keep);
+  project_all(s, s.bends, s.project->bending, 32, inverse_h2, keep);
+}
+
 void step(State& s, float h, std::vector<ColliderLoad>& loads) {
   Vertices& vertices = s.vertices;
   const Vec3& g = s.scene.gravity;
@@ -96,12 +104,8 @@ void step(State& s, float h, std::vector<ColliderLoad>& loads) {
     forget(s.bends);
     forget(s.elastics);
   }
-  const float inverse_h2 = 1 / (h * h);
   for (int i = 0; i < iterations; ++i) {
-    project_all(s, s.elastics, s.project->elastic, 32, inverse_h2, keep);
-    project_all(s, s.strains, s.project->strain, 32, inverse_h2, false);
-    project_all(s, s.links, s.project->distance, 128, inverse_h2, keep);
-    project_all(s, s.bends, s.project->bending, 32, inverse_h2, keep);
+    project_constraints(s, h, keep);
     project_contacts(s, h, loads);
   }
   for_vertices(s, Follow{vertices.x.data(), vertices.predicted.data(), vertices.v.data(), 1 / h});
@@ -122,6 +126,7 @@ int add_vertex(State& s, const Vec3& reference, int body) {
   s.stroke.push_back(-1);
   s.copy_of.push_back(index);
   s.blade_normal.push_back(Vec3::Zero());
+  s.blade_point.push_back(reference);
   for (Array<float>* of : {&v.x, &v.predicted, &v.v}) of->resize(4 * (index + 1));  // cuts padding
   for (int a = 0; a < 3; ++a) {
     v.x[4 * index + a] = v.predicted[4 * index + a] = static_cast<float>(reference[a]);
@@ -179,12 +184,8 @@ double elastic_energy(const State& s) {
   sum += sum_energy(s, s.bends, [&](auto& v, auto& number) {
     return by_value(v, number, Bending::value(v, number));
   });
-  sum += sum_energy(s, s.elastics, [&](auto& v, auto& number) {
-    const auto r = Elastic::parts(v, number);
-    const double d = r.norm, h = static_cast<double>(r.det) - number[11];
-    const double rest = number[11] - 1.0;  // what both are worth at rest
-    return 0.5 * ((d * d - 3) / number[9] + (h * h - rest * rest) / number[10]);
-  });
+  sum +=
+      sum_energy(s, s.elastics, [&](auto& v, auto& number) { return Elastic::energy(v, number); });
   return sum;
 }
 

@@ -27,7 +27,8 @@ double area_of(const State& s, const Triangle& t) {
 }
 
 std::uint64_t pair_key(std::int32_t a, std::int32_t b) {
-  return static_cast<std::uint64_t>(std::min(a, b)) << 32 | static_cast<std::uint32_t>(std::max(a, b));
+  return static_cast<std::uint64_t>(std::min(a, b)) << 32 |
+         static_cast<std::uint32_t>(std::max(a, b));
 }
 
 /// Colours of constraints by what they join, to be given to those made anew.
@@ -52,10 +53,10 @@ class OldColours {
 };
 
 struct MeshEdge {
-  std::int32_t a, b;      ///< a < b
+  std::int32_t a, b;         ///< a < b
   std::int32_t left, right;  ///< vertices opposite, -1 for none
-  int count;              ///< of triangles
-  double area;            ///< of them [m^2]
+  int count;                 ///< of triangles
+  double area;               ///< of them [m^2]
 };
 
 /// By a, then b.
@@ -69,7 +70,8 @@ std::vector<MeshEdge> mesh_edges(const State& s) {
   halves.reserve(3 * s.triangles.size());
   for (const Triangle& t : s.triangles) {
     const double area = area_of(s, t);
-    for (int i = 0; i < 3; ++i) halves.push_back({pair_key(t[i], t[(i + 1) % 3]), t[(i + 2) % 3], area});
+    for (int i = 0; i < 3; ++i)
+      halves.push_back({pair_key(t[i], t[(i + 1) % 3]), t[(i + 2) % 3], area});
   }
   std::stable_sort(halves.begin(), halves.end(),
                    [](const Half& p, const Half& q) { return p.key < q.key; });
@@ -115,7 +117,8 @@ void make_surface_constraints(State& s) {
   const auto& x = s.vertices.reference;
   std::map<std::pair<std::int32_t, std::int32_t>, double> inner;  // volume around a tet's edge
   for (const Tetrahedron& t : s.tetrahedra) {
-    const double volume = std::fabs((x[t[1]] - x[t[0]]).cross(x[t[2]] - x[t[0]]).dot(x[t[3]] - x[t[0]])) / 6;
+    const double volume =
+        std::fabs((x[t[1]] - x[t[0]]).cross(x[t[2]] - x[t[0]]).dot(x[t[3]] - x[t[0]])) / 6;
     for (int i = 0; i < 4; ++i) {
       for (int j = i + 1; j < 4; ++j) inner[{std::min(t[i], t[j]), std::max(t[i], t[j])}] += volume;
     }
@@ -136,8 +139,8 @@ void make_surface_constraints(State& s) {
       add_link(s, e.a, e.b, pbd.edge * m.young_modulus * thick * e.area / l2);
     }
     if (e.count != 2) continue;
-    const double plate = m.young_modulus * l2 * std::sqrt(l2) /
-                         (12 * (1 - m.poisson_ratio * m.poisson_ratio));
+    const double plate =
+        m.young_modulus * l2 * std::sqrt(l2) / (12 * (1 - m.poisson_ratio * m.poisson_ratio));
     add_bend(s, e, pbd.bending * 3 * plate * l2 / e.area);
   }
   s.edge_count = s.links.size();
@@ -199,7 +202,8 @@ void add_surface_body(State& s, int b, std::vector<std::string>* notes) {
     starts.push_back(index[v]);
     s.vertices.surface[index[v]] = 1;
   }
-  for (const auto& t : mesh.triangles) s.triangles.push_back({index[t[0]], index[t[1]], index[t[2]]});
+  for (const auto& t : mesh.triangles)
+    s.triangles.push_back({index[t[0]], index[t[1]], index[t[2]]});
   const int missed = add_internal_links(s, b, starts);
   double volume = signed_volume(mesh);
   if (!kind.is_closed()) {
@@ -222,7 +226,8 @@ void share_out_mass(State& s) {
   std::fill(v.volume.begin(), v.volume.end(), 0.0);
   for (const Tetrahedron& t : s.tetrahedra) {
     const auto& x = v.reference;
-    const double sixth = std::fabs((x[t[1]] - x[t[0]]).cross(x[t[2]] - x[t[0]]).dot(x[t[3]] - x[t[0]])) / 6;
+    const double sixth =
+        std::fabs((x[t[1]] - x[t[0]]).cross(x[t[2]] - x[t[0]]).dot(x[t[3]] - x[t[0]])) / 6;
     for (const std::int32_t i : t) v.volume[i] += sixth / 4;
   }
   if (s.tetrahedra.empty()) {

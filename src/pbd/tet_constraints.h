@@ -1,6 +1,8 @@
 // Constraints of a tetrahedron: strain as the paper prints it, and a material. See constraints.h.
 #pragma once
 
+#include <cmath>
+
 #include "pbd/constraints.h"
 
 namespace tissue_sim {
@@ -32,7 +34,8 @@ struct Strain {
     return i == j ? s - 1.0f : s;
   }
   template <class V>
-  static TISSUE_SIM_INLINE void project_one(Vertex<V> (&v)[4], const V (&number)[11], int i, int j) {
+  static TISSUE_SIM_INLINE void project_one(Vertex<V> (&v)[4], const V (&number)[11], int i,
+                                            int j) {
     Vector<V> p[3];
     edges_of(v, p);
     const Vector<V> fi = column(p, number, i), fj = column(p, number, j);
@@ -52,8 +55,7 @@ struct Strain {
   }
   /// number: Q^-1, stretch, shear.
   template <class V>
-  static TISSUE_SIM_INLINE void project(Vertex<V> (&v)[4], const V (&number)[11], V,
-                                        V (&)[1]) {
+  static TISSUE_SIM_INLINE void project(Vertex<V> (&v)[4], const V (&number)[11], V, V (&)[1]) {
     project_one(v, number, 0, 0);
     project_one(v, number, 1, 1);
     project_one(v, number, 2, 2);
@@ -63,65 +65,86 @@ struct Strain {
   }
 };
 
-/// Stable neo-Hookean tetrahedron (Macklin and Mueller 2021): deviatoric C_D = sqrt(tr F^T F) of
-/// compliance 1 / (mu V), hydrostatic C_H = det F - 1 - mu / lambda of compliance 1 / (lambda V).
-/// Both at once, by the 2 x 2 system of their multipliers: one after the other they pull a
-/// tetrahedron at rest to and fro, for only their sum is at rest there.
+/// v^(-1/3) for v between 0.1 and 4, by Newton's method.
+template <class V>
+TISSUE_SIM_INLINE V inverse_cube_root(V v) {
+  V y = 1.6f / (0.6f + v);
+  for (int i = 0; i < 6; ++i) y = y * (4.0f - v * y * y * y) * (1.0f / 3);
+  return y;
+}
+
+/// Neo-Hookean tetrahedron by a deviatoric and a hydrostatic constraint, as Macklin and Mueller
+/// (2021) have them with their compliances, 1 / (mu V) and 1 / (K V). Theirs, sqrt(tr F^T F) and
+/// det F - 1 - mu / lambda, are at rest only as a sum: solved one after the other they pull
+/// tissue at rest to and fro, solved together they are explicit in shear, and blow up with small
+/// tetrahedra. Here each is 0 at rest: C_D^2 = tr F^T F - 3 J^(2/3), C_H = J - 1.
 struct Elastic {
-  static constexpr int kVertices = 4, kNumbers = 12, kMultipliers = 2;
+  static constexpr int kVertices = 4, kNumbers = 11, kMultipliers = 2;
+
   template <class V>
-  struct Parts {
-    Vector<V> f[3];    ///< columns of F
-    Vector<V> cof[3];  ///< columns of its cofactors
-    V norm, det;
-  };
-  template <class V>
-  static TISSUE_SIM_INLINE Parts<V> parts(const Vertex<V> (&v)[4], const V (&number)[12]) {
-    Vector<V> p[3];
-    edges_of(v, p);
-    Parts<V> r;
-    for (int j = 0; j < 3; ++j) r.f[j] = column(p, number, j);
-    for (int j = 0; j < 3; ++j) r.cof[j] = cross(r.f[(j + 1) % 3], r.f[(j + 2) % 3]);
-    r.norm = root(dot(r.f[0], r.f[0]) + dot(r.f[1], r.f[1]) + dot(r.f[2], r.f[2]) + kTiny);
-    r.det = dot(r.f[0], r.cof[0]);
-    return r;
-  }
-  /// number: Q^-1, both compliances [1/(N m)], and 1 + mu / lambda.
-  template <class V>
-  static TISSUE_SIM_INLINE void project(Vertex<V> (&v)[4], const V (&number)[12], V inverse_h2,
-                                        V (&lambda)[2]) {
-    const Parts<V> r = parts(v, number);
-    const V over = 1.0f / r.norm;
-    Vector<V> gd[4], gh[4];
-    V add = v[0].w * 0.0f, ahh = add, adh = add;
-    gd[0] = gh[0] = {add, add, add};
+  static TISSUE_SIM_INLINE void project_along(Vertex<V> (&v)[4], const V* number,
+                                              const Vector<V> (&along)[3], V c, V a, V& lambda) {
+    Vector<V> g[4];
+    V sum = c * 0.0f;
+    g[0] = {sum, sum, sum};
     for (int k = 0; k < 3; ++k) {
-      gd[k + 1] = over * (number[3 * k] * r.f[0] + number[3 * k + 1] * r.f[1] +
-                          number[3 * k + 2] * r.f[2]);
-      gh[k + 1] = number[3 * k] * r.cof[0] + number[3 * k + 1] * r.cof[1] +
-                  number[3 * k + 2] * r.cof[2];
-      gd[0] = gd[0] - gd[k + 1];
-      gh[0] = gh[0] - gh[k + 1];
+      g[k + 1] =
+          number[3 * k] * along[0] + number[3 * k + 1] * along[1] + number[3 * k + 2] * along[2];
+      g[0] = g[0] - g[k + 1];
+      sum += v[k + 1].w * dot(g[k + 1], g[k + 1]);
     }
-    for (int k = 0; k < 4; ++k) {
-      add += v[k].w * dot(gd[k], gd[k]);
-      ahh += v[k].w * dot(gh[k], gh[k]);
-      adh += v[k].w * dot(gd[k], gh[k]);
+    sum += v[0].w * dot(g[0], g[0]);
+    const V change = -(c + a * lambda) / (sum + a + kTiny);
+    lambda += change;
+    for (int k = 0; k < 4; ++k) move(v[k], change, g[k]);
+  }
+  template <class V>
+  static TISSUE_SIM_INLINE void cofactors(const Vector<V> (&f)[3], Vector<V> (&cof)[3]) {
+    for (int j = 0; j < 3; ++j) cof[j] = cross(f[(j + 1) % 3], f[(j + 2) % 3]);
+  }
+  /// number: Q^-1, both compliances [1/(N m)].
+  template <class V>
+  static TISSUE_SIM_INLINE void project(Vertex<V> (&v)[4], const V (&number)[11], V inverse_h2,
+                                        V (&lambda)[2]) {
+    Vector<V> p[3], f[3], cof[3], h[3];
+    edges_of(v, p);
+    for (int j = 0; j < 3; ++j) f[j] = column(p, number, j);
+    cofactors(f, cof);
+    V det = dot(f[0], cof[0]);
+    det = lesser(greater(det, det * 0.0f + 0.1f), det * 0.0f + 4.0f);
+    const V root3 = inverse_cube_root(det);
+    // C_D grad C_D = H = F - J^(-1/3) cof F. As differences C_D^2 would lose half its digits; of
+    // small strains it is |H|^2 / 2, and with that for all, and H / C_D for the slope, the force
+    // that the multiplier means stays exactly that of the energy.
+    V h2 = det * 0.0f;
+    for (int j = 0; j < 3; ++j) {
+      h[j] = f[j] - root3 * cof[j];
+      h2 += dot(h[j], h[j]);
     }
-    const V a = number[9] * inverse_h2, b = number[10] * inverse_h2;
-    const V cd = -(r.norm + a * lambda[0]), ch = -(r.det - number[11] + b * lambda[1]);
-    // The determinant without the difference of what is nearly equal: what both gradients have in
-    // common where the tetrahedron is at rest leaves add ahh - adh^2 = 0, and compliance the rest.
-    const V apart = greater(add * ahh - adh * adh, 1e-6f * add * ahh);
-    const V over_det = 1.0f / (apart + a * ahh + b * add + a * b + kTiny);
-    const V ld = ((ahh + b) * cd - adh * ch) * over_det;
-    const V lh = ((add + a) * ch - adh * cd) * over_det;
-    lambda[0] += ld;
-    lambda[1] += lh;
-    for (int k = 0; k < 4; ++k) {
-      move(v[k], ld, gd[k]);
-      move(v[k], lh, gh[k]);
+    const V cd = root(0.5f * h2 + 1e-20f);
+    const V over = 1.0f / cd;
+    for (int j = 0; j < 3; ++j) h[j] = over * h[j];
+    project_along(v, number, h, cd, number[9] * inverse_h2, lambda[0]);
+    edges_of(v, p);
+    for (int j = 0; j < 3; ++j) f[j] = column(p, number, j);
+    cofactors(f, cof);
+    project_along(v, number, cof, dot(f[0], cof[0]) - 1.0f, number[10] * inverse_h2, lambda[1]);
+  }
+  /// Energy of the two [J].
+  static double energy(const Vertex<float> (&v)[4], const float (&number)[11]) {
+    Vector<float> p[3];
+    edges_of(v, p);
+    double f[3][3], f2 = 0;
+    for (int j = 0; j < 3; ++j) {
+      const Vector<float> c = column(p, number, j);
+      f[j][0] = c.x, f[j][1] = c.y, f[j][2] = c.z;
+      for (const double x : f[j]) f2 += x * x;
     }
+    const double det = f[0][0] * (f[1][1] * f[2][2] - f[1][2] * f[2][1]) +
+                       f[0][1] * (f[1][2] * f[2][0] - f[1][0] * f[2][2]) +
+                       f[0][2] * (f[1][0] * f[2][1] - f[1][1] * f[2][0]);
+    const double root3 = std::cbrt(det);
+    return 0.5 * ((f2 - 3 * root3 * root3) / number[9] + (det - 1) * (det - 1) / number[10]);
   }
 };
 

@@ -73,13 +73,12 @@ void make_tet_constraints(State& s) {
     }
     const Material& m = material_at(s.scene, s.scene.bodies[s.vertices.body[t[0]]], centre);
     const double volume = q.determinant() / 6;
-    // Of small strains the two are worth mu |e|^2 + (lambda - mu) / 2 (tr e)^2.
-    const double mu = lame_mu(m), lambda = lame_lambda(m) + mu;
+    // Of small strains the two are worth mu |dev e|^2 + K / 2 (tr e)^2.
+    const double mu = lame_mu(m), bulk = lame_lambda(m) + 2 * mu / 3;
     std::array<float, Elastic::kNumbers> number;
     fill(number);
     number[9] = static_cast<float>(1 / (mu * volume));
-    number[10] = static_cast<float>(1 / (lambda * volume));
-    number[11] = static_cast<float>(1 + mu / lambda);
+    number[10] = static_cast<float>(1 / (bulk * volume));
     if (again) {
       s.elastics.numbers[i] = number;
     } else {

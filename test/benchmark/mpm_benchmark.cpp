@@ -17,6 +17,7 @@
 #include "machine_rates.h"
 #include "mls_benchmark.h"
 #include "mpm/tear/tear.h"
+#include "pbd_benchmark.h"
 #include "reference/mpm_reference.h"
 
 namespace tissue_sim {
@@ -199,6 +200,7 @@ int main(int argc, char** argv) {
     });
   }
   tissue_sim::add_mls_rows();
+  tissue_sim::add_pbd_rows();
   benchmark::Initialize(&argc, argv);
   if (benchmark::ReportUnrecognizedArguments(argc, argv)) return 1;
   benchmark::RunSpecifiedBenchmarks();

@@ -143,6 +143,8 @@ class EachMethod : public testing::TestWithParam<MethodOnDevice> {
     if (scene.method == Method::kMls && scene.mls.spacing == 0) {
       scene.mls.spacing = scene.cell_size;
     }
+    // What has E and nu.
+    if (scene.method == Method::kPbd) scene.pbd.model = PbdModel::kTetrahedra;
     return scene;
   }
   Tolerances within() const { return tolerances(GetParam().method); }

@@ -1,0 +1,205 @@
+// Cuts of meshes: what comes apart, volumes, momentum, and how thin triangles get.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <random>
+#include <string>
+#include <vector>
+
+#include "pbd/pbd_tissue.h"
+#include "tissue_sim/simulation.h"
+
+namespace tissue_sim {
+namespace {
+
+/// An ellipsoid about the origin in free space.
+Scene lobe(PbdModel model) {
+  Scene scene;
+  scene.method = Method::kPbd;
+  scene.pbd.model = model;
+  scene.cell_size = model == PbdModel::kSurface ? 0.003 : 0.005;
+  scene.gravity = Vec3::Zero();
+  scene.ground.enabled = false;
+  scene.bodies.resize(1);
+  scene.bodies[0].shape = Shape::kEllipsoid;
+  scene.bodies[0].radii = Vec3(0.055, 0.031, 0.020);
+  return scene;
+}
+
+BladePath stroke(const Vec3& a, const Vec3& b, const std::vector<Vec3>& places) {
+  BladePath path;
+  path.edge = {a, b};
+  for (const Vec3& place : places) path.poses.push_back({place, Quat::Identity()});
+  return path;
+}
+
+const Vec3 kUp(0, 0, 0.1);
+
+BladePath plane_at(double x) { return stroke(-kUp, kUp, {Vec3(x, -0.1, 0), Vec3(x, 0.1, 0)}); }
+
+/// Share of the lobe beyond x.
+double share_beyond(double x) {
+  const double s = x / 0.055;
+  return (2 - 3 * s + s * s * s) / 4;
+}
+
+double whole_volume(Tissue& tissue) {
+  double sum = 0;
+  for (const Fragment& f : tissue.fragments()) sum += f.volume;
+  return sum;
+}
+
+struct Thinnest {
+  double edge = 1e9, angle = 4;  ///< [m], [rad]
+};
+
+Thinnest thinnest(const pbd::State& s) {
+  Thinnest least;
+  for (const pbd::Triangle& t : s.triangles) {
+    for (int i = 0; i < 3; ++i) {
+      const Vec3& x = s.vertices.reference[t[i]];
+      const Vec3 a = s.vertices.reference[t[(i + 1) % 3]] - x;
+      const Vec3 b = s.vertices.reference[t[(i + 2) % 3]] - x;
+      least.edge = std::min(least.edge, a.norm());
+      least.angle = std::min(least.angle, std::acos(std::max(-1.0, std::min(1.0, a.normalized().dot(b.normalized())))));
+    }
+  }
+  return least;
+}
+
+class CutMeshes : public testing::TestWithParam<PbdModel> {
+ protected:
+  void expect_sound(Simulation& simulation, double volume) {
+    auto& tissue = static_cast<PbdTissue&>(simulation.tissue());
+    EXPECT_NEAR(whole_volume(tissue) / volume, 1, 0.01);
+    for (int f = 0; f < 30; ++f) {
+      const FrameResult r = simulation.advance_frame().result;
+      ASSERT_FALSE(r.blew_up);
+      EXPECT_LT(r.max_speed, 1e-3);
+    }
+    EXPECT_LT(tissue.momentum().linear.norm(), 1e-5 * tissue.momentum().mass);
+  }
+};
+
+TEST_P(CutMeshes, APlanePartsInTwo) {
+  Simulation simulation(lobe(GetParam()));
+  const double volume = whole_volume(simulation.tissue());
+  simulation.cut(plane_at(0.0151));
+  const CutReport report = simulation.advance_frame().result.cut_reports[0];
+  EXPECT_EQ(report.new_fragments.size(), 1u);
+  ASSERT_EQ(simulation.tissue().fragments().size(), 2u);
+  EXPECT_NEAR(simulation.tissue().fragments()[1].volume / volume, share_beyond(0.0151), 0.01);
+  expect_sound(simulation, volume);
+}
+
+TEST_P(CutMeshes, HalfACutPartsNothingAndTheOtherHalfDoes) {
+  Simulation simulation(lobe(GetParam()));
+  const double volume = whole_volume(simulation.tissue());
+  simulation.cut(stroke(-kUp, kUp, {Vec3(-0.01, -0.1, 0), Vec3(-0.01, 0.001, 0)}));
+  EXPECT_GT(simulation.advance_frame().result.cut_reports[0].bonds_broken, 0);
+  EXPECT_EQ(simulation.tissue().fragments().size(), 1u);
+  simulation.cut(stroke(-kUp, kUp, {Vec3(-0.01, 0, 0), Vec3(-0.01, 0.1, 0)}));
+  simulation.advance_frame();
+  ASSERT_EQ(simulation.tissue().fragments().size(), 2u);
+  EXPECT_NEAR(simulation.tissue().fragments()[1].volume / volume, share_beyond(0.01), 0.02);
+  expect_sound(simulation, volume);
+}
+
+TEST_P(CutMeshes, AWaveAndALevelCutMakeFour) {
+  Simulation simulation(lobe(GetParam()));
+  const double volume = whole_volume(simulation.tissue());
+  std::vector<Vec3> wave;
+  for (int i = 0; i <= 30; ++i) {
+    const double u = i / 30.0;
+    wave.push_back(Vec3(0.006 * std::sin(12 * u), 0.1 * (u - 0.5), 0));
+  }
+  simulation.cut(stroke(-kUp, kUp, wave));
+  simulation.advance_frame();
+  EXPECT_EQ(simulation.tissue().fragments().size(), 2u);
+  simulation.cut(stroke(Vec3(-0.1, 0, 0), Vec3(0.1, 0, 0), {Vec3(0, -0.1, 0.002), Vec3(0, 0.1, 0)}));
+  simulation.advance_frame();
+  EXPECT_EQ(simulation.tissue().fragments().size(), 4u);
+  expect_sound(simulation, volume);
+}
+
+// An instrument's blade: two millimetres a frame, and it waits on its way.
+TEST_P(CutMeshes, AScalpelThatStopsAndGoesOnPartsInTwo) {
+  Scene scene = lobe(GetParam());
+  scene.tools.resize(1);
+  scene.tools[0].type = ToolType::kScalpel;
+  scene.tools[0].blade_length = 0.09;
+  Simulation simulation(scene);
+  const double volume = whole_volume(simulation.tissue());
+  const Quat cutting_along_y(Eigen::AngleAxisd(std::acos(-1) / 2, Vec3::UnitZ()));
+  for (int f = 0; f <= 50; ++f) {
+    const double y = -0.045 + 0.002 * (f < 20 ? f : f < 28 ? 20 : f - 8);
+    simulation.set_tool(0, {Vec3(0.02, y, 0.045), cutting_along_y});
+    ASSERT_FALSE(simulation.advance_frame().result.blew_up);
+  }
+  double largest_new = 0;
+  for (const Fragment& f : simulation.tissue().fragments()) {
+    if (f.parent >= 0) largest_new = std::max(largest_new, f.volume);
+  }
+  EXPECT_NEAR(largest_new / volume, share_beyond(0.02), 0.03);
+  EXPECT_NEAR(whole_volume(simulation.tissue()) / volume, 1, 0.01);
+}
+
+TEST_P(CutMeshes, CutsAtRandomNeitherBlowUpNorMakeSlivers) {
+  Simulation simulation(lobe(GetParam()));
+  auto& tissue = static_cast<PbdTissue&>(simulation.tissue());
+  const double volume = whole_volume(tissue), mass = tissue.momentum().mass;
+  std::mt19937 random(4);
+  std::uniform_real_distribution<double> at(-1, 1);
+  for (int i = 0; i < 40; ++i) {
+    const Vec3 from(0.05 * at(random), 0.03 * at(random), 0.02 * at(random));
+    const Vec3 way = 0.03 * Vec3(at(random), at(random), at(random));
+    const Vec3 edge = 0.02 * Vec3(at(random), at(random), at(random));
+    simulation.cut(stroke(-edge, edge, {from, from + way}));
+    const FrameResult r = simulation.advance_frame().result;
+    ASSERT_FALSE(r.blew_up) << "cut " << i;
+    EXPECT_LT(r.max_speed, 0.5) << "cut " << i;
+  }
+  const Thinnest least = thinnest(tissue.state());
+  std::printf("   %zu pieces, volume %.4f, smallest edge %.2e m, angle %.2f degrees\n",
+              tissue.fragments().size(), whole_volume(tissue) / volume, least.edge,
+              least.angle * 57.29578);
+  EXPECT_NEAR(tissue.momentum().mass / mass, 1, 1e-6);
+  EXPECT_GT(least.edge, 0.1 * tissue.state().mean_edge);
+  EXPECT_GT(least.angle * 57.29578, 0.5);
+}
+
+TEST_P(CutMeshes, AreTheSameBitsWithAnyNumberOfThreadsAndAfterRestoring) {
+  std::uint64_t sums[3];
+  std::vector<std::uint8_t> saved;
+  for (int run = 0; run < 3; ++run) {
+    Scene scene = lobe(GetParam());
+    scene.threads = run == 0 ? 1 : 3;
+    scene.gravity = Vec3(0, 0, -9.81);
+    scene.ground.enabled = true;
+    scene.ground.z = -0.021;
+    Simulation simulation(scene);
+    if (run < 2) {
+      for (int f = 0; f < 10; ++f) {
+        if (f == 4) simulation.cut(plane_at(0.0151));
+        simulation.advance_frame();
+      }
+      if (run == 1) saved = simulation.tissue().save();
+    } else {
+      simulation.tissue().restore(saved);
+    }
+    for (int f = 0; f < 5; ++f) simulation.advance_frame();
+    sums[run] = simulation.tissue().checksum();
+  }
+  EXPECT_EQ(sums[0], sums[1]);
+  EXPECT_EQ(sums[1], sums[2]);
+}
+
+INSTANTIATE_TEST_SUITE_P(Models, CutMeshes,
+                         testing::Values(PbdModel::kSurface, PbdModel::kTetrahedra),
+                         [](const auto& info) {
+                           return info.param == PbdModel::kSurface ? "surface" : "tetrahedra";
+                         });
+
+}  // namespace
+}  // namespace tissue_sim

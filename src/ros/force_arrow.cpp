@@ -27,10 +27,10 @@ Shaft shaft_of(const Tool& tool) {
   return {Vec3::Zero(), tool.radius, 0, tool.length};
 }
 
-/// A direction across `axis`: to the right and to the front as RViz looks first.
+/// A direction across `axis`: to the right and a little to the front as RViz looks first.
 Vec3 across(const Vec3& axis) {
-  for (const Vec3& wanted : {Vec3(1, -1, 0), Vec3(0, 0, 1)}) {
-    const Vec3 part = wanted.normalized() - wanted.normalized().dot(axis) * axis;
+  for (const Vec3& wanted : {Vec3(1, 0, 0), Vec3(0, 0, 1)}) {
+    const Vec3 part = wanted - wanted.dot(axis) * axis;
     if (part.norm() > 0.3) return part.normalized();
   }
   return axis.unitOrthogonal();
@@ -77,9 +77,9 @@ bool place_force_arrow(const Tool& tool, const Pose& pose, const Vec3& force, do
   while (along < shaft.last && in_tissue(along)) along += 0.5 * arrow.unit;
   arrow.start = first + std::min(along, shaft.last) * back;
   arrow.end = arrow.start + way;
-  // "0.00 N" is 3.6 times as wide as it is high.
+  // "0.00 N" is 4.4 times as wide as it is high.
   arrow.label = arrow.start + way / 2 +
-                (std::abs(way.dot(side)) / 2 + 1.8 * arrow.text_height + arrow.unit) * side;
+                (std::abs(way.dot(side)) / 2 + 2.6 * arrow.text_height + arrow.unit) * side;
   return true;
 }
 

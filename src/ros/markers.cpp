@@ -150,11 +150,13 @@ void add_fragment(const MarkerInput& input, const Fragment& f, int id, MarkerArr
   }
   array.markers.push_back(box);
   Marker label = marker(input, "fragments/label", id, Marker::TEXT_VIEW_FACING);
-  label.pose.position = to_point(Vec3(f.centroid.x(), f.centroid.y(), f.box.max.z() + 0.006));
-  label.scale.z = 0.006;
+  // No larger than the piece, so that those of crumbs that lie together can be read.
+  const Vec3 size = f.box.max - f.box.min;
+  label.scale.z = std::max(0.002, std::min(0.006, 0.25 * std::max(size.x(), size.y())));
+  label.pose.position =
+      to_point(Vec3(f.centroid.x(), f.centroid.y(), f.box.max.z() + label.scale.z));
   char text[64];
-  std::snprintf(text, sizeof text, "%d: %.2f cm3%s", f.id, f.volume * 1e6,
-                f.loose ? ", loose" : "");
+  std::snprintf(text, sizeof text, "%d: %.2f cm3", f.id, f.volume * 1e6);
   label.text = text;
   label.color = color(tinted(colour, 0.4), 1);  // thin letters need more light than boxes
   array.markers.push_back(label);
@@ -202,10 +204,7 @@ Marker to_marker(const SurfaceTriangles& surface, Span<const Fragment> fragments
   m.action = surface.fragment.empty() ? Marker::DELETE : Marker::ADD;
   std::map<int, std_msgs::ColorRGBA> colours;
   for (const Fragment& f : fragments) {
-    const std::uint32_t rgb = piece_colour(f);
-    colours[f.id] = color(static_cast<float>(rgb >> 16 & 255) / 255,
-                          static_cast<float>(rgb >> 8 & 255) / 255,
-                          static_cast<float>(rgb & 255) / 255);
+    colours[f.id] = color(piece_colour(f), 1);
   }
   m.points.resize(3 * surface.fragment.size());
   m.colors.resize(m.points.size());

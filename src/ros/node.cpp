@@ -13,7 +13,7 @@
 namespace tissue_sim {
 namespace {
 
-constexpr double kMiB = 1024.0 * 1024.0;
+constexpr double kMebibyte = 1024.0 * 1024.0;
 constexpr int kServiceThreads = 4;  // a long step, and still pause and stop_recording are answered
 
 ros::NodeHandle with_queue(const ros::NodeHandle& node, ros::CallbackQueue& queue) {
@@ -28,8 +28,8 @@ Node::Node(const ros::NodeHandle& node)
     : pose_node_(with_queue(node, pose_queue_)),
       service_node_(with_queue(node, service_queue_)),
       parameters_(read_parameters(node)),
-      recorder_(parameters_.recording_folder, parameters_.recording_queue * kMiB,
-                parameters_.recording_reserve * kMiB),
+      recorder_(parameters_.recording_folder, parameters_.recording_queue * kMebibyte,
+                parameters_.recording_reserve * kMebibyte),
       frames_(parameters_.world_frame, parameters_.tf_tolerance),
       pose_spinner_(1, &pose_queue_),
       service_spinner_(kServiceThreads, &service_queue_) {

@@ -7,7 +7,7 @@ namespace tissue_sim {
 namespace {
 
 // Double-quoted, so that no text is taken for a number or a boolean.
-std::string quoted(const std::string& s) {
+std::string in_quotes(const std::string& s) {
   std::string result = "\"";
   for (const char c : s) {
     char escaped[8];
@@ -38,13 +38,14 @@ std::string yaml_from(XmlRpc::XmlRpcValue& value) {
       std::snprintf(number, sizeof number, "%.17g", static_cast<double&>(value));
       return number;
     case XmlRpc::XmlRpcValue::TypeString:
-      return quoted(static_cast<std::string&>(value));
+      return in_quotes(static_cast<std::string&>(value));
     case XmlRpc::XmlRpcValue::TypeArray:
       for (int i = 0; i < value.size(); ++i) list += (i ? ", " : "") + yaml_from(value[i]);
       return "[" + list + "]";
     case XmlRpc::XmlRpcValue::TypeStruct:
       for (auto& member : value) {
-        list += (list.empty() ? "" : ", ") + quoted(member.first) + ": " + yaml_from(member.second);
+        list +=
+            (list.empty() ? "" : ", ") + in_quotes(member.first) + ": " + yaml_from(member.second);
       }
       return "{" + list + "}";
     default:

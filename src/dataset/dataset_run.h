@@ -12,9 +12,9 @@ namespace tissue_sim {
 
 /// What is asked for.
 struct DatasetOptions {
-  int frames = 24;      ///< of each run
-  int horizon = 4;      ///< frames ahead that labels are for
-  int per_frame = 200;  ///< samples of a frame at most
+  int frames = 40;      ///< of each run
+  int horizon = 8;      ///< frames ahead that labels are for
+  int per_frame = 100;  ///< samples of a frame at most
   int level = 3;        ///< how many times finer the truth is
   double share = 0.7;   ///< of the limit's strain from which on a point is a candidate
 };

@@ -30,9 +30,9 @@ constexpr char kUsage[] =
   --seed N         of all that is drawn (1)
   --kinds A,B      of tension, fall, compression, cut, blow, in turn (all)
   --level N        how many times finer the truth is (3)
-  --frames N       of each run, 1/240 s each (24)
-  --horizon N      frames ahead that labels are for (4)
-  --per-frame N    samples of a frame at most (200)
+  --frames N       of each run, 1/960 s each (40)
+  --horizon N      frames ahead that labels are for (8)
+  --per-frame N    samples of a frame at most (100)
   --processes N    that work side by side (all processors)
   --converge N     no data: runs each scene with cells 1, 2 .. N times finer, and writes how each
                    comes out into FOLDER/convergence.csv
@@ -115,7 +115,8 @@ std::string path_of(const Arguments& a, int index, const std::string& what) {
 }
 
 /// What is known of a scene, as JSON: held-out scenes are chosen by it.
-std::string describe(const DatasetScene& d, const DatasetSamples& samples, double seconds) {
+std::string describe(const DatasetScene& d, const DatasetSamples& samples, double horizon,
+                     double seconds) {
   const Scene& s = d.scene;
   const Material& m = s.materials[0];
   const char* shapes[] = {"box", "ball", "ellipsoid", "cylinder", "mesh"};
@@ -126,7 +127,7 @@ std::string describe(const DatasetScene& d, const DatasetSamples& samples, doubl
       << ", \"young_modulus\": " << m.young_modulus << ", \"poisson_ratio\": " << m.poisson_ratio
       << ", \"viscosity\": " << m.viscosity << ", \"tear_stretch\": " << m.tear_stretch
       << ", \"tear_length\": " << m.tear_length << ", \"speed\": " << d.speed
-      << ", \"coarse_points\": " << samples.coarse_points
+      << ", \"horizon\": " << horizon << ", \"coarse_points\": " << samples.coarse_points
       << ", \"true_points\": " << samples.true_points << ", \"samples\": " << samples.q.size()
       << ", \"coarse_loose\": " << samples.coarse_loose
       << ", \"true_loose\": " << samples.true_loose
@@ -147,7 +148,8 @@ void write_scene(const Arguments& a, int index) {
   write_npy(path_of(a, index, "_plain.npy"), samples.plain, 0);
   write_npy(path_of(a, index, "_about.npy"), samples.about, 3);
   // Last, and whole at once: where it is, the others are.
-  const std::string text = describe(scene, samples, took.count());
+  const std::string text =
+      describe(scene, samples, a.options.horizon / scene.scene.frame_rate, took.count());
   const std::string path = path_of(a, index, ".json"), unfinished = path + ".part";
   std::ofstream(unfinished) << text;
   std::filesystem::rename(unfinished, path);

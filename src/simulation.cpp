@@ -155,6 +155,8 @@ void Simulation::set_gravity(const Vec3& gravity) {
   state_->gravity = gravity;
 }
 
+double Simulation::damping() const { return state_->damping; }
+
 void Simulation::set_damping(double damping) {
   Scene changed;
   changed.bodies.resize(1);
@@ -195,7 +197,7 @@ void Simulation::apply(const AppliedInput& input) {
   }
   if (input.gravity) set_gravity(*input.gravity);
   if (input.damping) set_damping(*input.damping);
-  state_->anchor_motion = input.anchors;
+  if (!input.anchors.empty()) state_->anchor_motion = input.anchors;
 }
 
 template <class Archive>

@@ -26,7 +26,7 @@ struct AppliedInput {
   /// Tool::grip_pressure. A jaw_end below 0 squeezes with more: see tools/grip.h.
   std::vector<double> grip_pressures;
   std::vector<BladePath> cuts;
-  std::vector<AnchorMotion> anchors;  ///< in the order of the scene; empty while none moved
+  std::vector<AnchorMotion> anchors;  ///< in the order of the scene; empty: they stay
   std::optional<Vec3> gravity;         ///< from this frame on, if given [m/s^2]
   std::optional<double> damping;       ///< the same [1/s]
 };
@@ -82,6 +82,7 @@ class Simulation {
   /// From the next frame on. Throw std::invalid_argument out of the scene's ranges.
   void set_gravity(const Vec3& gravity);
   void set_damping(double damping);
+  double damping() const;  ///< as of the next frame [1/s]
   /// Puts exactly these inputs into the next frame (replay), instead of what was set.
   void apply(const AppliedInput& input);
 

@@ -17,8 +17,8 @@ std::unique_ptr<MpmState> make_mpm_state(const Scene& scene, std::vector<std::st
   find_free_volumes(state->bodies, state->points);
   state->points.outer = find_outer_places(state->bodies, state->points);
   state->fields = std::make_unique<NodeFields>(state->bodies, state->points, state->nodes);
-  find_anchor_faces(scene, state->bodies, state->points, *state->fields, state->nodes,
-                    state->anchors);
+  find_face_links(scene, state->bodies, state->points, state->anchors);
+  find_face_rows(state->bodies, state->points, *state->fields, state->nodes, state->anchors);
   for (const std::int32_t p : state->anchors.points) {
     if (state->points.anchored[p] == 0) state->points.anchored[p] = Points::kAtAnchor;
   }

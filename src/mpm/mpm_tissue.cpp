@@ -73,7 +73,10 @@ void MpmTissue::begin_frame(double duration, const FrameInput& input) {
   if (input.gravity != nullptr) s.scene.gravity = *input.gravity;
   if (input.damping != nullptr) s.scene.damping = *input.damping;
   s.anchors.impulse.assign(s.anchors.rows.size(), {});
-  s.anchors.moves = s.anchors.moves || !input.anchors.empty();
+  if (!s.anchors.moves && !input.anchors.empty()) {
+    s.anchors.moves = true;
+    find_held_nodes(s.bodies, s.points, *s.fields, s.nodes, s.anchors);
+  }
   for (const BladePath& path : input.cuts) {
     result_.cut_reports.emplace_back();
     cut({path}, s.nodes.u, s.motion, result_.cut_reports.back());

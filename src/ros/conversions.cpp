@@ -90,6 +90,19 @@ FrameInputMessage to_message(const AppliedInput& input, const Scene& scene) {
     if (i < input.grip_pressures.size()) m.tools[i].grip_pressure = input.grip_pressures[i];
   }
   for (const BladePath& path : input.cuts) m.cuts.push_back(to_message(path));
+  std::size_t anchor = 0;
+  for (const Body& body : scene.bodies) {
+    for (const Anchor& a : body.anchors) {
+      if (anchor == input.anchors.size()) break;
+      AnchorPath path;
+      path.name = a.name;
+      path.begin = to_pose(input.anchors[anchor].begin);
+      path.end = to_pose(input.anchors[anchor++].end);
+      m.anchors.push_back(path);
+    }
+  }
+  if (input.gravity) m.gravity = to_vector3(*input.gravity);
+  m.damping = input.damping.value_or(-1);
   return m;
 }
 
@@ -111,6 +124,13 @@ AppliedInput from_message(const FrameInputMessage& message) {
     for (const geometry_msgs::Point& x : m.edge) path.edge.push_back(from_message(x));
     for (const geometry_msgs::Pose& pose : m.poses) path.poses.push_back(from_message(pose));
     input.cuts.push_back(path);
+  }
+  for (const AnchorPath& m : message.anchors) {
+    input.anchors.push_back({from_message(m.begin), from_message(m.end)});
+  }
+  if (message.damping >= 0) {
+    input.damping = message.damping;
+    input.gravity = Vec3(message.gravity.x, message.gravity.y, message.gravity.z);
   }
   return input;
 }
@@ -151,7 +171,7 @@ std::string without_commas(std::string text) {
   return text;
 }
 
-void describe_points(int count, sensor_msgs::PointCloud2& cloud) {
+void describe_points(int count, unsigned fields, sensor_msgs::PointCloud2& cloud) {
   using sensor_msgs::PointField;
   const auto add = [&](const char* name, std::size_t offset, std::uint8_t type) {
     PointField field;
@@ -170,9 +190,20 @@ void describe_points(int count, sensor_msgs::PointCloud2& cloud) {
   add("fragment", offsetof(Point, fragment), PointField::INT32);
   add("stress", offsetof(Point, stress), PointField::FLOAT32);
   add("damage", offsetof(Point, damage), PointField::FLOAT32);
+  PointSelection carried;  // what comes behind the Point
+  for (const CloudField& field : kCloudFields) {
+    if ((fields & field.flag) == 0) continue;
+    std::size_t offset = carried.point_size();
+    for (const char* name : field.components) {
+      if (name == nullptr) break;
+      add(name, offset, PointField::FLOAT32);
+      offset += sizeof(float);
+    }
+    carried.fields |= field.flag;
+  }
   cloud.height = 1;
   cloud.width = static_cast<std::uint32_t>(count);
-  cloud.point_step = sizeof(Point);
+  cloud.point_step = static_cast<std::uint32_t>(carried.point_size());
   cloud.row_step = cloud.point_step * cloud.width;
   cloud.is_bigendian = false;
   cloud.is_dense = true;

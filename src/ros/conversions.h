@@ -45,7 +45,21 @@ std::string to_hex(std::uint64_t checksum);
 /// Without commas, at which `rostopic echo -p` parts columns: "cpu (AVX-512; 2 threads)".
 std::string without_commas(std::string text);
 
-/// Fields, sizes and flags of a cloud of Point; `cloud.data` is filled already.
-void describe_points(int count, sensor_msgs::PointCloud2& cloud);
+/// What points of a cloud can carry, as parameters and clouds call it.
+struct CloudField {
+  const char* name;
+  PointField flag;
+  const char* components[6];
+};
+inline constexpr CloudField kCloudFields[] = {
+    {"rest", kRestPosition, {"rest_x", "rest_y", "rest_z"}},
+    {"displacement", kDisplacement, {"ux", "uy", "uz"}},
+    {"velocity", kVelocity, {"vx", "vy", "vz"}},
+    {"volume", kVolume, {"volume"}},
+    {"stress_tensor", kStressTensor, {"sxx", "syy", "szz", "sxy", "syz", "szx"}}};
+
+/// Fields, sizes and flags of a cloud of Point with these PointFields behind it; `cloud.data` is
+/// filled already.
+void describe_points(int count, unsigned fields, sensor_msgs::PointCloud2& cloud);
 
 }  // namespace tissue_sim

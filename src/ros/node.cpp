@@ -153,6 +153,8 @@ Session Node::make_session(const Scene& asked) {
        useless_remappings(pose_node_.getNamespace(), names, ros::names::getRemappings())) {
     ROS_WARN("%s", warning.c_str());
   }
+  session.scene_input =
+      std::make_shared<SceneInput>(pose_node_, scene, frames_, parameters_.max_tool_speed);
   session.publications =
       std::make_shared<Publications>(service_node_, scene, parameters, recorder_);
   Tissue& tissue = session.simulation->tissue();

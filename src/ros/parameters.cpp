@@ -12,6 +12,7 @@
 
 #include "geometry/chord.h"
 #include "geometry/mesh.h"
+#include "ros/conversions.h"
 #include "ros/xmlrpc_yaml.h"
 #include "scene/scene_text.h"
 
@@ -23,7 +24,7 @@ using XmlRpc::XmlRpcValue;
 const std::set<std::string> kKnown = {
     "scene", "scene_file", "method", "mesh", "mesh_scale", "world_frame", "time", "pose_delay",
     "time_factor", "publish_clock", "lockstep_tools", "paused", "cloud_rate", "cloud_stride",
-    "cloud_surface_only", "fragment_rate", "state_rate", "wrench_rate", "marker_rate", "checksum",
+    "cloud_surface_only", "cloud_fields", "fragment_rate", "state_rate", "wrench_rate", "marker_rate", "checksum",
     "force_scale", "publish_tf", "max_tool_speed", "max_tool_turn_rate", "tf_tolerance",
     "recording_folder", "record", "recording_queue", "recording_reserve", "tools",
     // of diagnostic_updater
@@ -163,6 +164,23 @@ Region fitted(Region region, const Box& from, const Box& to) {
   return region;
 }
 
+void read_cloud_fields(const ros::NodeHandle& node, Parameters& p) {
+  XmlRpcValue fields;
+  if (!node.getParam("cloud_fields", fields)) return;
+  std::string known;
+  for (const CloudField& f : kCloudFields) known += (known.empty() ? "" : ", ") + std::string(f.name);
+  const std::string allowed = "must be a list of " + known;
+  if (fields.getType() != XmlRpcValue::TypeArray) refuse("cloud_fields", fields, allowed);
+  for (int i = 0; i < fields.size(); ++i) {
+    const bool text = fields[i].getType() == XmlRpcValue::TypeString;
+    const std::string name = text ? static_cast<std::string&>(fields[i]) : "";
+    unsigned flag = 0;
+    for (const CloudField& f : kCloudFields) flag |= name == f.name ? f.flag : 0u;
+    if (flag == 0) refuse("cloud_fields", fields, allowed);
+    p.cloud_fields |= flag;
+  }
+}
+
 void read_time(const ros::NodeHandle& node, Parameters& p) {
   const char* const allowed = "must be wall, ros or lockstep";
   std::string time = "wall";
@@ -213,6 +231,7 @@ Parameters read_parameters(const ros::NodeHandle& node) {
   read(node, "cloud_rate", p.cloud_rate, 0.01, 2000);
   read(node, "cloud_stride", p.cloud_stride, 1, 1000000);
   read(node, "cloud_surface_only", p.cloud_surface_only);
+  read_cloud_fields(node, p);
   read(node, "fragment_rate", p.fragment_rate, 0.01, 2000);
   read(node, "state_rate", p.state_rate, 0, 2000);
   read(node, "wrench_rate", p.wrench_rate, 0, 2000);

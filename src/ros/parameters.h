@@ -38,6 +38,7 @@ struct Parameters {
   double cloud_rate = 30;  ///< [Hz] of wall time
   int cloud_stride = 1;    ///< every n-th point
   bool cloud_surface_only = false;
+  unsigned cloud_fields = 0;  ///< PointFields that clouds carry, too
   double fragment_rate = 10;       ///< [Hz], and whenever the pieces change
   double state_rate = 0;           ///< [Hz], 0 for every frame of the scene's frame_rate
   double wrench_rate = 0;          ///< [Hz]: frames are as short as it asks; 0: the scene's

@@ -33,6 +33,16 @@ Publications::Publications(ros::NodeHandle& node, const Scene& scene, const Para
       tools_.back().grip.emplace(node, tool.name + "/grip", 100, recorder);
     }
   }
+  std::size_t number = 0;
+  for (const Body& body : scene.bodies) {
+    for (const Anchor& anchor : body.anchors) {
+      if (!anchor.name.empty()) {
+        anchors_.push_back(
+            {number, {node, "anchors/" + anchor.name + "/spatial/measured_cf", 100, recorder}});
+      }
+      ++number;
+    }
+  }
 }
 
 std::set<std::string> Publications::topics() const {
@@ -43,6 +53,7 @@ std::set<std::string> Publications::topics() const {
     names.insert({tool.body.topic(), tool.spatial.topic()});
     if (tool.grip) names.insert(tool.grip->topic());
   }
+  for (const AnchorOutput& anchor : anchors_) names.insert(anchor.spatial.topic());
   return names;
 }
 
@@ -153,7 +164,8 @@ boost::shared_ptr<const sensor_msgs::PointCloud2> Publications::cloud(Simulation
   selection.stride = parameters_.cloud_stride;
   selection.surface_only = parameters_.cloud_surface_only;
   selection.loose_only = loose_only;
-  describe_points(simulation.tissue().read_points(selection, m->data), *m);
+  selection.fields = parameters_.cloud_fields;
+  describe_points(simulation.tissue().read_points(selection, m->data), selection.fields, *m);
   return m;
 }
 
@@ -175,6 +187,15 @@ boost::shared_ptr<const visualization_msgs::Marker> Publications::surface_messag
 
 void Publications::publish_loads(const FrameReport& report, const ros::Time& stamp,
                                  bool into_bag) const {
+  for (const AnchorOutput& anchor : anchors_) {
+    if (anchor.number >= report.result.anchor_loads.size()) break;  // a device that knows none
+    anchor.spatial.send(into_bag, stamp, [&] {
+      auto m = boost::make_shared<geometry_msgs::WrenchStamped>();
+      m->header = header(stamp);
+      m->wrench = to_wrench(report.result.anchor_loads[anchor.number]);
+      return m;
+    });
+  }
   for (std::size_t i = 0; i < tools_.size() && i < report.result.loads.size(); ++i) {
     const ToolMotion& motion = report.input.tools[i];
     if (!motion.present) continue;

@@ -63,6 +63,10 @@ class Publications {
     Output<geometry_msgs::WrenchStamped> body, spatial;
     std::optional<Output<JawGrip>> grip;  // of a grasper
   };
+  struct AnchorOutput {
+    std::size_t number;  // in the order of the scene
+    Output<geometry_msgs::WrenchStamped> spatial;
+  };
   std_msgs::Header header(const ros::Time& stamp) const;
   boost::shared_ptr<const SimulationState> state(Simulation& simulation, const FrameReport& report,
                                                  const RunState& run, const ros::Time& stamp) const;
@@ -94,6 +98,7 @@ class Publications {
   Output<visualization_msgs::MarkerArray> marker_output_;
   Output<tf2_msgs::TFMessage> tf_;
   std::vector<ToolOutputs> tools_;
+  std::vector<AnchorOutput> anchors_;  ///< those that have names
 
   SurfaceTriangles surface_triangles_;  ///< kept for their memory
   Throttle state_due_, fragments_due_, clouds_due_, markers_due_;

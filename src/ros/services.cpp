@@ -24,6 +24,7 @@ Services::Services(ros::NodeHandle& node, const Scene& scene, SimulationThread& 
   servers_.push_back(node.advertiseService("reset", &Services::reset, this));
   servers_.push_back(node.advertiseService("pause", &Services::pause, this));
   servers_.push_back(node.advertiseService("step", &Services::step, this));
+  servers_.push_back(node.advertiseService("settle", &Services::settle, this));
   servers_.push_back(node.advertiseService("load_scene", &Services::load_scene, this));
   servers_.push_back(node.advertiseService("save_state", &Services::save_state, this));
   servers_.push_back(node.advertiseService("restore_state", &Services::restore_state, this));
@@ -168,6 +169,30 @@ bool Services::step(Step::Request& request, Step::Response& response) {
     response.time = reply.time;
     if (!reply.success) throw std::runtime_error(reply.message);
     return std::to_string(request.frames) + " frames done";
+  });
+}
+
+bool Services::settle(Settle::Request& request, Settle::Response& response) {
+  return answer(response, "settle", [&] {
+    SettleLimits limits;
+    const auto read = [](const char* name, double asked, double most, double& value) {
+      if (asked == 0) return;
+      if (!(asked > 0 && asked <= most)) {
+        throw std::runtime_error(std::string(name) + " is " + std::to_string(asked) +
+                                 ": must lie above 0 and up to " + std::to_string(most) +
+                                 ", or be 0 for the default");
+      }
+      value = asked;
+    };
+    read("speed", request.speed, 100, limits.speed);
+    read("time", request.time, 3600, limits.time);
+    read("damping", request.damping, 1000, limits.damping);
+    const StepReply reply = simulation_.settle(limits);
+    if (!reply.success) throw std::runtime_error(reply.message);
+    response.at_rest = reply.settled.at_rest;
+    response.took = reply.settled.time;
+    response.fastest = reply.settled.speed;
+    return std::string(response.at_rest ? "at rest" : "not at rest when the time was over");
   });
 }
 

@@ -8,6 +8,7 @@
 #include <tissue_sim/LoadScene.h>
 #include <tissue_sim/RestoreState.h>
 #include <tissue_sim/SaveState.h>
+#include <tissue_sim/Settle.h>
 #include <tissue_sim/StartRecording.h>
 #include <tissue_sim/Step.h>
 
@@ -46,6 +47,7 @@ class Services {
   bool reset(std_srvs::Trigger::Request&, std_srvs::Trigger::Response& response);
   bool pause(std_srvs::SetBool::Request& request, std_srvs::SetBool::Response& response);
   bool step(Step::Request& request, Step::Response& response);
+  bool settle(Settle::Request& request, Settle::Response& response);
   bool load_scene(LoadScene::Request& request, LoadScene::Response& response);
   bool save_state(SaveState::Request& request, SaveState::Response& response);
   bool restore_state(RestoreState::Request& request, RestoreState::Response& response);

@@ -1,6 +1,8 @@
 // What other threads ask of the simulation's thread.
 #include <ros/console.h>
 
+#include <algorithm>
+#include <cmath>
 #include <stdexcept>
 #include <utility>
 
@@ -60,6 +62,31 @@ StepReply SimulationThread::step(int frames) {
                                " frames to go: wait for it");
     }
     steps_left_ = frames;
+    step_reply_ = {};
+    reply = step_reply_.get_future();
+    real_time_factor_.restart();
+  });
+  try {
+    return reply.get();
+  } catch (const std::future_error&) {
+    throw ended();
+  }
+}
+
+StepReply SimulationThread::settle(const SettleLimits& limits) {
+  std::future<StepReply> reply;
+  call([&] {
+    if (run_.blew_up) throw std::runtime_error(problem_);
+    if (steps_left_ > 0) {
+      throw std::runtime_error("another step has " + std::to_string(steps_left_) +
+                               " frames to go: wait for it");
+    }
+    Simulation& simulation = *session_.simulation;
+    const double rate = simulation.scene().frame_rate;
+    const auto window = static_cast<std::size_t>(std::max(1.0, std::ceil(0.1 * rate)));
+    settling_ = Settling{limits, simulation.damping(), std::vector<double>(window, INFINITY), 0};
+    if (limits.damping >= 0) simulation.set_damping(limits.damping);
+    steps_left_ = static_cast<int>(std::max(1.0, std::ceil(limits.time * rate)));
     step_reply_ = {};
     reply = step_reply_.get_future();
     real_time_factor_.restart();

@@ -2,6 +2,7 @@
 
 #include <ros/console.h>
 
+#include <algorithm>
 #include <utility>
 
 namespace tissue_sim {
@@ -47,6 +48,7 @@ void SimulationThread::stop() {
 
 void SimulationThread::start_session() {
   const Scene& scene = session_.simulation->scene();
+  settling_.reset();  // the scene's own damping holds
   answer_step("the simulation was started anew");
   for (PendingCut& cut : std::exchange(cuts_, {})) {
     cut.reply.set_value({false, "the simulation was started anew", {}});
@@ -167,6 +169,7 @@ void SimulationThread::frame() {
     move_tools(input);
     for (const PendingCut& cut : cuts) input.cuts.push_back(cut.path);
     simulation.apply(input);
+    session_.scene_input->apply(simulation);
     report_ = simulation.advance_frame();
   } catch (const std::exception& e) {
     for (PendingCut& cut : cuts) cut.reply.set_value({false, e.what(), {}});
@@ -196,9 +199,32 @@ void SimulationThread::frame() {
     return;
   }
   update_status();
+  if (steps_left_ > 0 && has_settled()) steps_left_ = 1;
   if (steps_left_ > 0 && --steps_left_ == 0) {
-    step_reply_.set_value({true, "", simulation.frame(), simulation.time()});
+    StepReply reply{true, "", simulation.frame(), simulation.time(), {}};
+    if (settling_) {
+      reply.settled.time = settling_->frames / simulation.scene().frame_rate;
+      reply.settled.speed =
+          *std::max_element(settling_->speeds.begin(), settling_->speeds.end());
+      reply.settled.at_rest = reply.settled.speed < settling_->limits.speed;
+    }
+    end_settling();
+    step_reply_.set_value(reply);
   }
+}
+
+bool SimulationThread::has_settled() {
+  if (!settling_) return false;
+  Settling& s = *settling_;
+  s.speeds[s.frames++ % s.speeds.size()] = report_.result.max_speed;
+  return *std::max_element(s.speeds.begin(), s.speeds.end()) < s.limits.speed;
+}
+
+void SimulationThread::end_settling() {
+  if (settling_ && settling_->limits.damping >= 0) {
+    session_.simulation->set_damping(settling_->damping);
+  }
+  settling_.reset();
 }
 
 void SimulationThread::answer_cuts(std::vector<PendingCut>& cuts, const FrameReport& report) {
@@ -219,8 +245,9 @@ void SimulationThread::answer_cuts(std::vector<PendingCut>& cuts, const FrameRep
 
 void SimulationThread::answer_step(const char* interrupted) {
   if (std::exchange(steps_left_, 0) == 0) return;
+  end_settling();
   step_reply_.set_value(
-      {false, interrupted, session_.simulation->frame(), session_.simulation->time()});
+      {false, interrupted, session_.simulation->frame(), session_.simulation->time(), {}});
 }
 
 void SimulationThread::fail(const std::string& problem) {

@@ -17,6 +17,7 @@
 #include "ros/pace.h"
 #include "ros/parameters.h"
 #include "ros/publications.h"
+#include "ros/scene_input.h"
 #include "ros/tool_entry.h"
 #include "ros/tool_input.h"
 #include "tissue_sim/simulation.h"
@@ -28,6 +29,7 @@ struct Session {
   std::unique_ptr<Simulation> simulation;
   std::shared_ptr<ToolInputs> tools;
   std::shared_ptr<Publications> publications;
+  std::shared_ptr<SceneInput> scene_input;
 };
 
 /// Names of the topics that a recording of it holds unless others are asked for: all but markers.
@@ -64,6 +66,7 @@ struct StepReply {
   std::string message;
   std::int64_t frame = 0;
   double time = 0;
+  SettleReport settled;  ///< of settle()
 };
 
 /// The public functions are for other threads. They wait until the simulation's thread has done
@@ -86,6 +89,8 @@ class SimulationThread {
 
   /// `frames` frames as fast as they go.
   StepReply step(int frames);
+  /// As many as it takes until all is at rest, within the limits.
+  StepReply settle(const SettleLimits& limits);
   void set_paused(bool paused);
   /// Frame 0 of the same scene; the tools stay where they are.
   void reset(std::unique_ptr<Simulation> simulation);
@@ -116,6 +121,9 @@ class SimulationThread {
   void start_anew(const ros::Time& now);
   void answer_cuts(std::vector<PendingCut>& cuts, const FrameReport& report);
   void answer_step(const char* interrupted);
+  /// Whether it is over, after a frame.
+  bool has_settled();
+  void end_settling();
   void fail(const std::string& problem);
   void start_session();
   void update_status();
@@ -140,6 +148,13 @@ class SimulationThread {
   std::vector<PendingCut> cuts_;
   int steps_left_ = 0;
   std::promise<StepReply> step_reply_;
+  struct Settling {
+    SettleLimits limits;
+    double damping;              // before
+    std::vector<double> speeds;  // of the last frames [m/s]
+    std::size_t frames = 0;
+  };
+  std::optional<Settling> settling_;
 
   mutable std::mutex mutex_;  // of what follows
   std::condition_variable wake_;

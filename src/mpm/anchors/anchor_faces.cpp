@@ -38,16 +38,16 @@ Vec3 normal_at(const Region& r, const Vec3& x) {
   return Vec3::Unit(nearest);
 }
 
-struct Crossing1 {
-  double t;     // along the link, 0 at its lower node to 1
-  int anchor;   // of the body
+struct FaceCrossing {
+  double t;         // along the link, 0 at its lower node to 1
+  int anchor;       // of the body
   bool inside_low;  // whether the inside is at the lower end
 };
 
 /// Where a link between two nodes goes through a face of the anchors.
-std::vector<Crossing1> crossings(const std::vector<Anchor>& anchors, const Vec3& a, const Vec3& b) {
+std::vector<FaceCrossing> crossings(const std::vector<Anchor>& anchors, const Vec3& a, const Vec3& b) {
   constexpr int kParts = 4;
-  std::vector<Crossing1> found;
+  std::vector<FaceCrossing> found;
   const auto at = [&](double t) { return anchor_at(anchors, a + t * (b - a)); };
   int before = at(0);
   for (int i = 1; i <= kParts; ++i) {
@@ -69,103 +69,94 @@ std::vector<Crossing1> crossings(const std::vector<Anchor>& anchors, const Vec3&
   return found;
 }
 
-class FindRows {
- public:
-  FindRows(const LatticeBody& body, const Points& points, const NodeFields& fields,
-           const Nodes& nodes, int first_anchor, std::vector<FaceRow>& rows,
-           std::vector<int>& row_count, std::vector<std::int32_t>& near_points)
-      : b_(body),
-        points_(points),
-        fields_(fields),
-        nodes_(nodes),
-        first_anchor_(first_anchor),
-        rows_(rows),
-        row_count_(row_count),
-        near_points_(near_points) {}
+/// Calls f(point) for the points that see all three nodes of a row.
+template <class F>
+void for_each_point_of_row(const LatticeBody& b, const std::int32_t (&cell)[3], int axis,
+                           const F& f) {
+  const int u = (axis + 1) % 3, v = (axis + 2) % 3;
+  for (int i = 2 * cell[axis]; i < 2 * cell[axis] + 2; ++i) {
+    for (int j = 0; j < 36; ++j) {
+      int site[3];
+      site[axis] = i;
+      site[u] = 2 * cell[u] - 2 + j % 6;
+      site[v] = 2 * cell[v] - 2 + j / 6;
+      const int p = b.point(site[0], site[1], site[2]);
+      if (p >= 0) f(p, i);
+    }
+  }
+}
 
-  void all() {
-    b_.for_each_node([&](int, int x, int y, int z) {
-      for (int axis = 0; axis < 3; ++axis) link({x, y, z}, axis);
+/// Adds where faces go through the link from a node to the next along an axis.
+void add_links(const std::vector<LatticeBody>& bodies, int body, int first_anchor,
+               const std::array<int, 3>& low, int axis, AnchorFaces& faces) {
+  const LatticeBody& b = bodies[body];
+  std::array<int, 3> high = low;
+  ++high[axis];
+  const Vec3 begin = b.node_position(low[0], low[1], low[2]);
+  const Vec3 end = b.node_position(high[0], high[1], high[2]);
+  for (const FaceCrossing& c : crossings(b.body.anchors, begin, end)) {
+    const Vec3 x = begin + c.t * (end - begin);
+    const Vec3 normal = normal_at(b.body.anchors[c.anchor], x);
+    if (normal[axis] < kNearestAxis * normal.maxCoeff()) continue;
+    // The face lies in this cell; between two in the one with tissue outside.
+    const bool lower = std::abs(c.t - 0.5) < 1e-6 ? !c.inside_low : c.t < 0.5;
+    FaceLink link{body, first_anchor + c.anchor, {}, axis, 0, {}};
+    for (int a = 0; a < 3; ++a) {
+      link.cell[a] = lower ? low[a] : high[a];
+      link.place[a] = static_cast<float>(x[a]);
+    }
+    link.at = static_cast<float>(lower ? c.t : c.t - 1);
+    // In half cells: it counts where it goes through the cube of a point, or along it.
+    const double at = 2 * (link.cell[axis] + 0.5 + link.at);
+    bool near = false;
+    for_each_point_of_row(b, link.cell, axis, [&](int p, int i) {
+      if (at < i - 1e-3 || at > i + 1 + 1e-3) return;
+      near = true;
+      faces.points.push_back(p);
+    });
+    if (near) faces.links.push_back(link);
+  }
+}
+
+/// The rows of a link, one for each choice of fields that points around see there.
+void add_rows(const LatticeBody& b, const Points& points, const NodeFields& fields,
+              const Nodes& nodes, const FaceLink& link, std::vector<FaceRow>& rows) {
+  std::vector<std::array<std::int32_t, 3>> found(1);
+  std::int32_t n[3][3];
+  bool split = false;
+  for (int k = 0; k < 3; ++k) {
+    for (int a = 0; a < 3; ++a) n[k][a] = link.cell[a] + (a == link.axis ? k - 1 : 0);
+    const int node = b.node(n[k][0], n[k][1], n[k][2]);
+    found[0][k] = node;
+    split = split || (node >= 0 && fields.split(node) != nullptr);
+  }
+  if (split) {
+    found.clear();
+    for_each_point_of_row(b, link.cell, link.axis, [&](int p, int) {
+      std::array<std::int32_t, 3> of;
+      for (int k = 0; k < 3; ++k) {
+        of[k] = fields.node(b, points.site[p], n[k][0], n[k][1], n[k][2]);
+      }
+      if (std::find(found.begin(), found.end(), of) == found.end()) found.push_back(of);
     });
   }
-
- private:
-  using Cell = std::array<int, 3>;
-
-  void link(const Cell& low, int axis) {
-    Cell high = low;
-    ++high[axis];
-    const Vec3 a = b_.node_position(low[0], low[1], low[2]);
-    const Vec3 b = b_.node_position(high[0], high[1], high[2]);
-    for (const Crossing1& c : crossings(b_.body.anchors, a, b)) {
-      const Vec3 x = a + c.t * (b - a);
-      const Vec3 normal = normal_at(b_.body.anchors[c.anchor], x);
-      if (normal[axis] < kNearestAxis * normal.maxCoeff()) continue;
-      // The face lies in this cell; between two in the one with tissue outside.
-      const bool lower = std::abs(c.t - 0.5) < 1e-6 ? !c.inside_low : c.t < 0.5;
-      Cell cell = lower ? low : high;
-      const auto place = static_cast<float>(lower ? c.t : c.t - 1);
-      add(cell, axis, place, c.anchor, x);
+  for (const auto& of : found) {
+    FaceRow row{};
+    float mobility = 0;
+    for (int k = 0; k < 3; ++k) {
+      const float w = cell_weight(link.at, k);
+      if (of[k] < 0 || w == 0) continue;
+      row.node[k] = of[k];
+      row.weight[k] = w;
+      row.share[k] = w * nodes.inv_mass[of[k]];
+      mobility += w * row.share[k];
     }
+    if (!(mobility > 0)) continue;  // all is inside
+    row.anchor = link.anchor;
+    std::copy_n(link.place, 3, row.place);
+    rows.push_back(row);
   }
-
-  /// A row for each choice of fields that points around see there.
-  void add(const Cell& cell, int axis, float place, int anchor, const Vec3& x) {
-    std::vector<std::array<int, 3>> found;
-    bool near = false;
-    // Where the face is, in half cells.
-    const double at = 2 * (cell[axis] + 0.5 + place);
-    const int u = (axis + 1) % 3, v = (axis + 2) % 3;
-    for (int i = 2 * cell[axis]; i < 2 * cell[axis] + 2; ++i) {
-      for (int j = 0; j < 36; ++j) {
-        Cell site;
-        site[axis] = i;
-        site[u] = 2 * cell[u] - 2 + j % 6;
-        site[v] = 2 * cell[v] - 2 + j / 6;
-        const int p = b_.point(site[0], site[1], site[2]);
-        if (p < 0) continue;
-        if (at > i - 1e-3 && at < i + 1 + 1e-3) {
-          near = true;
-          near_points_.push_back(p);
-        }
-        std::array<int, 3> of;
-        for (int k = 0; k < 3; ++k) {
-          Cell n = cell;
-          n[axis] += k - 1;
-          of[k] = fields_.node(b_, points_.site[p], n[0], n[1], n[2]);
-        }
-        if (std::find(found.begin(), found.end(), of) == found.end()) found.push_back(of);
-      }
-    }
-    if (!near) return;
-    for (const std::array<int, 3>& of : found) {
-      FaceRow row{};
-      double mobility = 0;
-      for (int k = 0; k < 3; ++k) {
-        const float w = cell_weight(place, k);
-        if (of[k] < 0 || w == 0) continue;
-        row.node[k] = of[k];
-        row.weight[k] = w;
-        row.share[k] = w * nodes_.inv_mass[of[k]];
-        mobility += w * row.share[k];
-      }
-      ++row_count_[first_anchor_ + anchor];
-      if (mobility == 0) continue;
-      row.anchor = first_anchor_ + anchor;
-      for (int a = 0; a < 3; ++a) row.place[a] = static_cast<float>(x[a]);
-      rows_.push_back(row);
-    }
-  }
-
-  const LatticeBody& b_;
-  const Points& points_;
-  const NodeFields& fields_;
-  const Nodes& nodes_;
-  const int first_anchor_;
-  std::vector<FaceRow>& rows_;
-  std::vector<int>& row_count_;
-  std::vector<std::int32_t>& near_points_;
-};
+}
 
 /// Puts rows with nodes in common side by side, and works out how they are held.
 void make_groups(AnchorFaces& faces) {
@@ -216,25 +207,6 @@ void make_groups(AnchorFaces& faces) {
   faces.rows = std::move(rows);
 }
 
-void find_held_nodes(const LatticeBody& b, const Points& points, const NodeFields& fields,
-                     const Nodes& nodes, int first_anchor, std::vector<AnchorFaces::HeldNode>& held,
-                     std::vector<int>& held_count) {
-  std::map<int, int> anchor_of;
-  for (int p = b.first_point; p < b.first_point + b.point_count; ++p) {
-    if (points.anchored[p] != Points::kInAnchor) continue;
-    const Points::Site& s = points.site[p];
-    const int anchor = first_anchor + anchor_at(b.body.anchors, b.site_position(s.x, s.y, s.z));
-    ++held_count[anchor];
-    for (int k = 0; k < 27; ++k) {
-      const int node = fields.node(b, s, k);
-      if (nodes.inv_mass[node] != 0 || !anchor_of.emplace(node, anchor).second) continue;
-      const Vec3 x = b.node_position(s.x / 2 + k % 3 - 1, s.y / 2 + k / 3 % 3 - 1, s.z / 2 + k / 9 - 1);
-      held.push_back({node, anchor,
-                      {static_cast<float>(x[0]), static_cast<float>(x[1]), static_cast<float>(x[2])}});
-    }
-  }
-}
-
 RigidMotion motion_of(const Pose& pose, const Vec3& origin) {
   RigidMotion m;
   m.rotation = pose.orientation.toRotationMatrix();
@@ -244,49 +216,56 @@ RigidMotion motion_of(const Pose& pose, const Vec3& origin) {
 
 }  // namespace
 
-void find_anchor_faces(const Scene& scene, const std::vector<LatticeBody>& bodies,
-                       const Points& points, const NodeFields& fields, const Nodes& nodes,
-                       AnchorFaces& faces) {
-  const bool first = faces.origin.empty();
-  if (first) {
-    for (const LatticeBody& b : bodies) {
-      for (const Anchor& a : b.body.anchors) faces.origin.push_back(a.origin());
-    }
-    faces.now.resize(faces.origin.size());
-  }
-  if (faces.origin.empty()) return;
-  // What was there before is in the loads of the frame: of its rows the impulses go to the new ones
-  // of the same place, or to any of the same anchor.
-  std::vector<FaceRow> old_rows = std::move(faces.rows);
-  std::vector<std::array<double, 3>> old_impulse = std::move(faces.impulse);
-  faces.rows.clear();
-  faces.held.clear();
-  std::vector<int> holds(faces.origin.size(), 0);
+void find_face_links(const Scene& scene, const std::vector<LatticeBody>& bodies,
+                     const Points& points, AnchorFaces& faces) {
   int first_anchor = 0;
-  faces.points.clear();
-  faces.first_of_body.clear();
-  for (const LatticeBody& b : bodies) {
+  for (std::size_t i = 0; i < bodies.size(); ++i) {
+    const LatticeBody& b = bodies[i];
     faces.first_of_body.push_back(first_anchor);
     if (b.body.anchors.empty()) continue;
-    FindRows(b, points, fields, nodes, first_anchor, faces.rows, holds, faces.points).all();
-    find_held_nodes(b, points, fields, nodes, first_anchor, faces.held, holds);
-    if (first) {
-      for (std::size_t i = 0; i < b.body.anchors.size(); ++i) {
-        if (holds[first_anchor + i] > 0) continue;
-        throw std::invalid_argument(
-            "anchors[" + std::to_string(i) + "] of body '" + b.body.name +
-            "' holds no point of it: a region is in world coordinates as of time zero, and must "
-            "reach into the body or end at its surface (cell_size is " +
-            std::to_string(scene.cell_size) + " m)");
+    for (const Anchor& a : b.body.anchors) faces.origin.push_back(a.origin());
+    b.for_each_node([&](int, int x, int y, int z) {
+      for (int axis = 0; axis < 3; ++axis) {
+        add_links(bodies, static_cast<int>(i), first_anchor, {x, y, z}, axis, faces);
       }
+    });
+    std::vector<int> holds(b.body.anchors.size(), 0);
+    for (const FaceLink& link : faces.links) {
+      if (link.body == static_cast<int>(i)) ++holds[link.anchor - first_anchor];
+    }
+    for (int p = b.first_point; p < b.first_point + b.point_count; ++p) {
+      if (points.anchored[p] != Points::kInAnchor) continue;
+      const Points::Site& s = points.site[p];
+      const Vec3 x = b.site_position(s.x, s.y, s.z);
+      for (std::size_t a = 0; a < holds.size(); ++a) holds[a] += b.body.anchors[a].contains(x);
+    }
+    for (std::size_t a = 0; a < holds.size(); ++a) {
+      if (holds[a] > 0) continue;
+      throw std::invalid_argument(
+          "anchors[" + std::to_string(a) + "] of body '" + b.body.name +
+          "' holds no point of it: a region is in world coordinates and must reach into the body, "
+          "or end at its surface (cell_size is " +
+          std::to_string(scene.cell_size) + " m)");
     }
     first_anchor += static_cast<int>(b.body.anchors.size());
   }
+  faces.now.resize(faces.origin.size());
+}
+
+void find_face_rows(const std::vector<LatticeBody>& bodies, const Points& points,
+                    const NodeFields& fields, const Nodes& nodes, AnchorFaces& faces) {
+  if (faces.links.empty()) return;
+  const std::vector<FaceRow> old_rows = std::move(faces.rows);
+  const std::vector<std::array<double, 3>> old_impulse = std::move(faces.impulse);
+  faces.rows.clear();
+  for (const FaceLink& link : faces.links) {
+    add_rows(bodies[link.body], points, fields, nodes, link, faces.rows);
+  }
   make_groups(faces);
   faces.impulse.assign(faces.rows.size(), {});
-  if (old_rows.empty()) return;
+  // What was carried before, in a frame, goes to rows at the same places.
   std::map<std::array<float, 3>, std::size_t> at;
-  for (std::size_t i = 0; i < faces.rows.size(); ++i) {
+  for (std::size_t i = 0; i < faces.rows.size() && !old_rows.empty(); ++i) {
     const float* x = faces.rows[i].place;
     at.emplace(std::array<float, 3>{x[0], x[1], x[2]}, i);
   }
@@ -295,6 +274,31 @@ void find_anchor_faces(const Scene& scene, const std::vector<LatticeBody>& bodie
     const auto same = at.find({x[0], x[1], x[2]});
     if (same == at.end()) continue;
     for (int a = 0; a < 3; ++a) faces.impulse[same->second][a] += old_impulse[i][a];
+  }
+}
+
+void find_held_nodes(const std::vector<LatticeBody>& bodies, const Points& points,
+                     const NodeFields& fields, const Nodes& nodes, AnchorFaces& faces) {
+  faces.held.clear();
+  std::vector<std::uint8_t> seen(nodes.size(), 0);
+  for (std::size_t i = 0; i < bodies.size(); ++i) {
+    const LatticeBody& b = bodies[i];
+    if (b.body.anchors.empty()) continue;
+    for (int p = b.first_point; p < b.first_point + b.point_count; ++p) {
+      if (points.anchored[p] != Points::kInAnchor) continue;
+      const Points::Site& s = points.site[p];
+      const int anchor = anchor_at(b.body.anchors, b.site_position(s.x, s.y, s.z));
+      for (int k = 0; k < 27; ++k) {
+        const int node = fields.node(b, s, k);
+        if (nodes.inv_mass[node] != 0 || seen[node] != 0) continue;
+        seen[node] = 1;
+        const Vec3 x = b.node_position(s.x / 2 + k % 3 - 1, s.y / 2 + k / 3 % 3 - 1,
+                                       s.z / 2 + k / 9 - 1);
+        faces.held.push_back({node, faces.first_of_body[i] + anchor,
+                              {static_cast<float>(x[0]), static_cast<float>(x[1]),
+                               static_cast<float>(x[2])}});
+      }
+    }
   }
 }
 

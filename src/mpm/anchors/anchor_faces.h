@@ -32,6 +32,15 @@ struct FaceRow {
   float place[3];    ///< on the face, in reference space [m]
 };
 
+/// Where a face goes through a row of nodes: of the whole lattice.
+struct FaceLink {
+  std::int32_t body, anchor;  ///< the anchor in the order of the scene
+  std::int32_t cell[3];       ///< in whose middle the row's second node is
+  std::int32_t axis;          ///< of the row
+  float at;                   ///< place of the face, in cells from the middle of the cell
+  float place[3];             ///< the same in reference space [m]
+};
+
 /// Rows that have nodes in common are held together.
 struct FaceGroup {
   std::int32_t first, count;  ///< of its rows
@@ -54,6 +63,7 @@ struct AnchorFaces {
   Vec3 place_of_held(const Body& body, int body_number, const Vec3& X) const;
 
   std::vector<Vec3> origin;  ///< of the anchors, in the order of the scene [m]
+  std::vector<FaceLink> links;
   std::vector<FaceRow> rows;
   std::vector<FaceGroup> groups;
   std::vector<float> inverse;
@@ -62,18 +72,24 @@ struct AnchorFaces {
     std::int32_t node, anchor;
     float place[3];  ///< [m]
   };
-  std::vector<HeldNode> held;       ///< nodes that only tissue inside sees
+  std::vector<HeldNode> held;       ///< nodes that only tissue inside sees; found once any moves
   std::vector<RigidMotion> now;     ///< of each anchor, at the end of the last substep
   bool moves = false;               ///< whether any has moved ever
   std::vector<std::int32_t> points;  ///< in or beside whose cubes faces lie, when the scene is built
   std::vector<int> first_of_body;    ///< anchors, by body
 };
 
-/// Finds rows and held nodes anew: when a scene is built, and after nodes were split. Throws
-/// std::invalid_argument for an anchor that neither holds points nor has a face at its body.
-void find_anchor_faces(const Scene& scene, const std::vector<LatticeBody>& bodies,
-                       const Points& points, const NodeFields& fields, const Nodes& nodes,
-                       AnchorFaces& faces);
+/// Finds where the faces are, of bodies that are whole, and which points they touch
+/// (AnchorFaces::points). Throws std::invalid_argument for an anchor that neither holds points nor
+/// has a face at its body.
+void find_face_links(const Scene& scene, const std::vector<LatticeBody>& bodies,
+                     const Points& points, AnchorFaces& faces);
+/// Makes the rows anew: at the beginning, and after nodes were split.
+void find_face_rows(const std::vector<LatticeBody>& bodies, const Points& points,
+                    const NodeFields& fields, const Nodes& nodes, AnchorFaces& faces);
+/// Finds AnchorFaces::held: before any anchor moves, and after nodes were split.
+void find_held_nodes(const std::vector<LatticeBody>& bodies, const Points& points,
+                     const NodeFields& fields, const Nodes& nodes, AnchorFaces& faces);
 
 /// Where the anchors are at the share (0 to 1) of a frame; empty where none moves in it.
 std::vector<RigidMotion> anchors_at(const AnchorFaces& faces, const FrameInput& input,

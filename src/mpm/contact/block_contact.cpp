@@ -99,7 +99,6 @@ void find_near_colliders(MpmState& state, const std::vector<Box>& reach, double 
     for (std::size_t c = 0; c < reach.size(); ++c) {
       if (overlap(box, reach[c])) contacts.near[i].push_back(static_cast<std::uint8_t>(c));
     }
-    if (contacts.near[i].empty()) contacts.touching[i].clear();
   });
 }
 

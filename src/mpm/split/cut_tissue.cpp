@@ -49,8 +49,10 @@ Apart take_apart(MpmState& state, const std::vector<std::int32_t>& changed,
   settle_crumbs(state.bodies, state.points, *state.fields, softened.crumbs, state.nodes);
   state.crumbs.insert(softened.crumbs.begin(), softened.crumbs.end());
   if (!state.points.free_volume.empty() && !cells.empty()) {
-    find_anchor_faces(state.scene, state.bodies, state.points, *state.fields, state.nodes,
-                      state.anchors);
+    find_face_rows(state.bodies, state.points, *state.fields, state.nodes, state.anchors);
+    if (state.anchors.moves) {
+      find_held_nodes(state.bodies, state.points, *state.fields, state.nodes, state.anchors);
+    }
   }
   state.cpu->both(
       [&] {

@@ -1,0 +1,93 @@
+#include "ros/scene_input.h"
+
+#include <ros/console.h>
+
+#include <cmath>
+#include <stdexcept>
+#include <utility>
+
+#include "ros/conversions.h"
+
+namespace tissue_sim {
+
+SceneInput::SceneInput(ros::NodeHandle node, const Scene& scene, const Frames& frames,
+                       double fastest)
+    : frames_(frames), farthest_(fastest / scene.frame_rate) {
+  for (const Body& body : scene.bodies) {
+    for (const Anchor& anchor : body.anchors) {
+      const int i = static_cast<int>(names_.size());
+      names_.push_back(anchor.name);
+      poses_.emplace_back();
+      last_.push_back(anchor.origin());
+      if (anchor.name.empty()) continue;
+      subscribers_.push_back(node.subscribe<geometry_msgs::PoseStamped>(
+          "anchors/" + anchor.name + "/measured_cp", 10,
+          [this, i](const geometry_msgs::PoseStamped::ConstPtr& m) { on_pose(i, *m); }));
+    }
+  }
+  subscribers_.push_back(node.subscribe<geometry_msgs::Vector3>(
+      "gravity", 10, [this](const geometry_msgs::Vector3::ConstPtr& m) { on_gravity(*m); }));
+  subscribers_.push_back(node.subscribe<std_msgs::Float64>(
+      "damping", 10, [this](const std_msgs::Float64::ConstPtr& m) { on_damping(*m); }));
+}
+
+void SceneInput::on_pose(int anchor, const geometry_msgs::PoseStamped& message) {
+  const char* name = names_[anchor].c_str();
+  Pose pose = from_message(message.pose);
+  const double norm = pose.orientation.norm();
+  if (!pose.position.allFinite() || !(std::fabs(norm - 1) < 1e-2)) {
+    ROS_WARN_THROTTLE(1, "anchor %s: a pose is not finite or its quaternion no rotation (norm %g)",
+                      name, norm);
+    return;
+  }
+  pose.orientation.normalize();
+  try {
+    pose = frames_.in_world(message.header.frame_id, message.header.stamp) * pose;
+  } catch (const tf2::TransformException& e) {
+    ROS_WARN_THROTTLE(1, "anchor %s: %s", name, e.what());
+    return;
+  }
+  const std::lock_guard<std::mutex> lock(mutex_);
+  const double step = (pose.position - last_[anchor]).norm();
+  if (step > farthest_) {
+    ROS_WARN_THROTTLE(1,
+                      "anchor %s: a pose is %g m from where it is; in a frame it moves by %g m at "
+                      "most (max_tool_speed)",
+                      name, step, farthest_);
+    return;
+  }
+  poses_[anchor] = pose;
+}
+
+void SceneInput::on_gravity(const geometry_msgs::Vector3& message) {
+  const Vec3 gravity(message.x, message.y, message.z);
+  if (!gravity.allFinite() || gravity.cwiseAbs().maxCoeff() > 1000) {
+    ROS_WARN_THROTTLE(1, "gravity: each component must lie between -1000 and 1000 m/s^2");
+    return;
+  }
+  const std::lock_guard<std::mutex> lock(mutex_);
+  gravity_ = gravity;
+}
+
+void SceneInput::on_damping(const std_msgs::Float64& message) {
+  if (!(message.data >= 0 && message.data <= 1000)) {
+    ROS_WARN_THROTTLE(1, "damping is %g: must lie between 0 and 1000", message.data);
+    return;
+  }
+  const std::lock_guard<std::mutex> lock(mutex_);
+  damping_ = message.data;
+}
+
+void SceneInput::apply(Simulation& simulation) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  for (std::size_t i = 0; i < poses_.size(); ++i) {
+    if (!poses_[i]) continue;
+    simulation.set_anchor(static_cast<int>(i), *poses_[i]);
+    last_[i] = poses_[i]->position;
+    poses_[i].reset();
+  }
+  if (gravity_) simulation.set_gravity(*std::exchange(gravity_, std::nullopt));
+  if (damping_) simulation.set_damping(*std::exchange(damping_, std::nullopt));
+}
+
+}  // namespace tissue_sim

@@ -22,6 +22,9 @@ Shaft shaft_of(const Tool& tool) {
     case ToolType::kGrasper:  // above the jaws, which open
       return {Vec3::Zero(), tool.jaw_width / 2, tool.jaw_length, tool.jaw_length + kHandle};
     case ToolType::kProbe:
+    case ToolType::kBall:
+    case ToolType::kPunch:
+    case ToolType::kPlate:
       break;
   }
   return {Vec3::Zero(), tool.radius, 0, tool.length};

@@ -73,7 +73,8 @@ struct CudaMlsMeasure {
   float speed;              ///< of the fastest [m/s]; NaN stays
   int finite;
 };
-inline constexpr int kMlsThreads = 128;  ///< of a block; a node each
+inline constexpr int kMlsThreads =
+    64;  ///< of a block; a node each: few nodes, too, shall use all multiprocessors
 
 void launch_mls_stresses(const CudaMlsField& field, const CudaMlsMotion& at, cudaStream_t stream);
 /// The rest of a substep, after the stresses: forces with contact, and the motion into `to`.

@@ -24,6 +24,7 @@ __device__ __forceinline__ void moments_of(const CudaMlsField& f, int i, const f
   const float4 xi = __ldg(f.place + i), ai = __ldg(a + i);
 #pragma unroll
   for (int k = 0; k < 9; ++k) A[k] = 0;
+#pragma unroll 4  // loads of several pairs are under way at once
   for (int k = 0, at = e.first; k < e.count; ++k, at += kMlsSlice) {
     const int j = __ldg(f.other + at);
     const float w = __ldg(f.weight + at);
@@ -90,6 +91,7 @@ __device__ __forceinline__ void pair_forces(const CudaMlsField& f, const float4*
   const Entries e = entries_of(f, i);
   const float4 xi = __ldg(f.place + i), ui = __ldg(u + i);
   const float4 q0 = f.stress[3 * i], q1 = f.stress[3 * i + 1], q2 = f.stress[3 * i + 2];
+#pragma unroll 4
   for (int k = 0, at = e.first; k < e.count; ++k, at += kMlsSlice) {
     const int j = __ldg(f.other + at);
     const float w = __ldg(f.weight + at);
@@ -101,8 +103,7 @@ __device__ __forceinline__ void pair_forces(const CudaMlsField& f, const float4*
     add(sum, w * r[1], {q1.x + p1.x, q1.y + p1.y, q1.z + p1.z, 0});
     add(sum, w * r[2], {q2.x + p2.x, q2.y + p2.y, q2.z + p2.z, 0});
     add(sum, w * (q0.w + p0.w), {d[0], d[1], d[2], 0});
-    if (f.spring == nullptr) continue;
-    const float s = __ldg(f.spring + at);
+    const float s = f.spring == nullptr ? 0.0f : __ldg(f.spring + at);
     if (!(s > 0)) continue;
     const float x[3] = {r[0] + d[0], r[1] + d[1], r[2] + d[2]};
     const float length = sqrtf(x[0] * x[0] + x[1] * x[1] + x[2] * x[2]);

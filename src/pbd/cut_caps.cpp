@@ -165,6 +165,8 @@ void after_cut(State& s, std::vector<std::int32_t>& origin) {
     for (int v = s.vertices.size() - static_cast<int>(origin.size()); v < s.vertices.size(); ++v) {
       starts.push_back(v);
     }
+    starts.insert(starts.end(), s.bare.begin(), s.bare.end());
+    s.bare.clear();
     std::sort(starts.begin(), starts.end());
     starts.erase(std::unique(starts.begin(), starts.end()), starts.end());
     for (int b = 0; b < bodies; ++b) {

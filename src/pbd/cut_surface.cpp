@@ -100,6 +100,13 @@ class SurfaceCut {
       }
     }
     for (const auto& [v, triangles] : around) part_vertex(v, triangles);
+    // Which side the internal constraints of a vertex that came apart belong to, new rays tell.
+    std::vector<InternalPair> kept;
+    for (const InternalPair& p : s_.internal) {
+      if (parted_.count(p.a) == 0 && parted_.count(p.b) == 0) kept.push_back(p);
+    }
+    s_.internal.swap(kept);
+    s_.bare.insert(s_.bare.end(), parted_.begin(), parted_.end());
     return static_cast<int>(fresh_.size());
   }
 
@@ -221,6 +228,16 @@ class SurfaceCut {
     return side[0] * side[1] < 0;
   }
 
+  /// Whether a triangle hangs on by this edge alone: it stays with the neighbour there.
+  bool would_be_alone(int t, const Edge& last) const {
+    const Triangle& c = s_.triangles[t];
+    for (int i = 0; i < 3; ++i) {
+      const Edge e = edge_of(c[i], c[(i + 1) % 3]);
+      if (e != last && s_.cut_edges.count(e) == 0 && edges_.of(e).size() > 1) return false;
+    }
+    return true;
+  }
+
   /// Edges whose triangles the blade parts: their centres hang together by a link as points do by
   /// bonds. What a stroke passed before triangles were split, its places on both ends tell.
   void mark_edges(const SweepPart& part) {
@@ -229,6 +246,7 @@ class SurfaceCut {
       const MovingSegment link = {middle_before(of[0]), middle_before(of[1]), middle(of[0]),
                                   middle(of[1])};
       if (!is_between(e, of) && !passes(part, link, nullptr)) continue;
+      if (would_be_alone(of[0], e) || would_be_alone(of[1], e)) continue;
       s_.cut_edges.insert(e);
       fresh_.push_back(e);
       for (const std::int32_t v : {e[0], e[1]}) {
@@ -274,7 +292,9 @@ class SurfaceCut {
       }
       for (std::int32_t& c : s_.triangles[t]) c = c == v ? w : c;
     }
-    changed_ = changed_ || vertex.size() > 1;
+    if (vertex.size() < 2) return;
+    changed_ = true;
+    parted_.insert(v);
   }
 
   State& s_;
@@ -283,7 +303,7 @@ class SurfaceCut {
   std::vector<std::int32_t>& origin_;
   EdgeMap edges_;
   std::vector<Edge> fresh_;
-  std::set<std::int32_t> touched_;
+  std::set<std::int32_t> touched_, parted_;
   bool changed_ = false;
 };
 

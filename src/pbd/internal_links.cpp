@@ -17,15 +17,18 @@ std::vector<Vec3> vertex_normals(const TriangleMesh& mesh) {
 }
 
 std::vector<InternalLink> find_internal_links(const TriangleMesh& mesh,
-                                              const std::vector<int>& starts) {
+                                              const std::vector<int>& starts,
+                                              const std::vector<Vec3>& lean) {
   const std::vector<Vec3> normals = vertex_normals(mesh);
   const RayTree tree(mesh);
   std::vector<InternalLink> links;
-  for (const int v : starts) {
+  for (std::size_t i = 0; i < starts.size(); ++i) {
+    const int v = starts[i];
     if (normals[v].isZero()) continue;
-    const RayHit hit = tree.first_exit(mesh.vertices[v], -normals[v], v, 0);
+    const Vec3 way = lean.empty() ? Vec3(-normals[v]) : Vec3((lean[i] - normals[v]).normalized());
+    const RayHit hit = tree.first_exit(mesh.vertices[v], way, v, 0);
     if (hit.triangle < 0) continue;
-    const Vec3 place = mesh.vertices[v] - hit.along * normals[v];
+    const Vec3 place = mesh.vertices[v] + hit.along * way;
     int nearest = -1;
     double least = 1e300;
     for (const int corner : mesh.triangles[hit.triangle]) {

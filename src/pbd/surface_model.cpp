@@ -106,6 +106,33 @@ void add_bend(State& s, const MeshEdge& e, double stiffness) {
   s.bends.add(at, {Bending::parts(v).angle, static_cast<float>(1 / stiffness)});
 }
 
+/// For vertices beside a wound, towards the triangles that they have: their rays leave the blade's
+/// surface and stay on their side.
+std::vector<Vec3> away_from_wounds(const State& s, const TriangleMesh& mesh,
+                                   const std::vector<int>& starts) {
+  constexpr double kLean = 0.2;
+  const std::vector<Vec3> normals = vertex_normals(mesh);
+  std::map<int, Vec3> to;
+  for (const int v : starts) {
+    if (s.stroke[v] >= 0) to[v] = Vec3::Zero();
+  }
+  for (const auto& t : mesh.triangles) {
+    const Vec3 sum = mesh.vertices[t[0]] + mesh.vertices[t[1]] + mesh.vertices[t[2]];
+    for (const int v : t) {
+      const auto at = to.find(v);
+      if (at != to.end()) at->second += sum - 3 * mesh.vertices[v];
+    }
+  }
+  std::vector<Vec3> lean;
+  for (const int v : starts) {
+    const auto at = to.find(v);
+    Vec3 way = at == to.end() ? Vec3(Vec3::Zero()) : at->second;
+    way -= way.dot(normals[v]) * normals[v];
+    lean.push_back(kLean * way.stableNormalized());
+  }
+  return lean;
+}
+
 }  // namespace
 
 void make_surface_constraints(State& s) {
@@ -157,7 +184,9 @@ void make_surface_constraints(State& s) {
 }
 
 int add_internal_links(State& s, int b, const std::vector<int>& starts) {
-  const std::vector<InternalLink> found = find_internal_links(reference_surface(s, b), starts);
+  const TriangleMesh mesh = reference_surface(s, b);
+  const std::vector<InternalLink> found =
+      find_internal_links(mesh, starts, away_from_wounds(s, mesh, starts));
   std::vector<double> area(s.vertices.size(), 0.0);
   std::unordered_map<std::uint64_t, int> edges;
   for (const Triangle& t : s.triangles) {

@@ -54,8 +54,8 @@ struct Simulation::State {
   std::int64_t frame = 0;
   std::vector<ToolMotion> tools;  // as they stand after the last frame, then as set for the next
   std::vector<BladePath> cuts;
-  std::vector<Grip> grips;             // of each tool
-  std::vector<double> grip_pressures;  // of each tool, 0 for the scene's [Pa]
+  std::vector<Grip> grips;                  // of each tool
+  std::vector<double> grip_pressures;       // of each tool, 0 for the scene's [Pa]
   std::vector<const Anchor*> anchors;       // of all bodies
   std::vector<AnchorMotion> anchor_motion;  // of each; empty while none moved
   Vec3 gravity = Vec3::Zero();              // as of the next frame [m/s^2]

@@ -1,4 +1,5 @@
-// Bodies of which test/data/references.yaml knows what finite elements say (scripts/make_references).
+// Bodies of which test/data/references.yaml knows what finite elements say
+// (scripts/make_references).
 #pragma once
 
 #include <yaml-cpp/yaml.h>
@@ -110,7 +111,8 @@ inline double surface_displacement(Tissue& tissue, int side, double at, int axis
     float f[6];
     std::memcpy(f, &cloud[selection.point_size() * i + sizeof(Point)], sizeof f);
     bool counts = f[side] > at - 1.5 * around;
-    for (int a = 0; a < 3; ++a) counts = counts && (a == side || std::fabs(f[a] - middle[a]) < around);
+    for (int a = 0; a < 3; ++a)
+      counts = counts && (a == side || std::fabs(f[a] - middle[a]) < around);
     if (!counts) continue;
     const double x = f[side] - at, y = f[3 + axis];
     n += 1, sx += x, sy += y, sxx += x * x, sxy += x * y;

@@ -42,6 +42,7 @@ class Strip {
   static Scene scene_of(const StripOf& of) {
     Scene s = free_box(Vec3(kLength, kWidth, kThickness), of.cell_size);
     s.threads = of.threads;
+    s.mpm.boundary = MpmBoundary::kLattice;  // whose held nodes are moved
     s.damping = 200;
     s.seed = of.seed;
     Material m;

@@ -104,12 +104,22 @@ enum class PbdElasticity {
   kStrain,    ///< stretch and shear strain constraints, with distance and bending: no material
 };
 
+/// Where the material point method has the boundary of a body.
+enum class MpmBoundary {
+  kSurface,  ///< tools and the ground touch its true surface, anchors hold it at their faces
+  kLattice,  ///< both act at the lattice's points and nodes, up to half a cell off: all that a GPU
+             ///< has so far
+};
+struct MpmOptions {
+  MpmBoundary boundary = MpmBoundary::kLattice;
+};
+
 /// Method pbd: what it is made of and how it is solved. Other methods do not read it.
 struct PbdOptions {
   PbdModel model = PbdModel::kSurface;
   PbdElasticity elasticity = PbdElasticity::kMaterial;  ///< of tetrahedra
-  int steps = 20;      ///< of a frame, 1 to 1000
-  int iterations = 1;  ///< of a step, 1 to 100
+  int steps = 20;                                       ///< of a frame, 1 to 1000
+  int iterations = 1;                                   ///< of a step, 1 to 100
   /// Stiffness of the surface model's constraints as a multiple of what Young's modulus gives each
   /// (src/pbd/stiffness.h), 0 to 1e6; 0 leaves the constraint out. `edge` and `bending` are the
   /// kStrain model's, too.
@@ -136,6 +146,7 @@ struct Scene {
   /// Method mpm: file of a fragment network (scripts/train_fragments) that says each frame which
   /// points of tissue that tears will be part of fragments; `off` for none.
   std::string fragment_network = "off";
+  MpmOptions mpm;
   MlsOptions mls;
   PbdOptions pbd;
   Ground ground;

@@ -27,15 +27,15 @@ struct AppliedInput {
   std::vector<double> grip_pressures;
   std::vector<BladePath> cuts;
   std::vector<AnchorMotion> anchors;  ///< in the order of the scene; empty: they stay
-  std::optional<Vec3> gravity;         ///< from this frame on, if given [m/s^2]
-  std::optional<double> damping;       ///< the same [1/s]
+  std::optional<Vec3> gravity;        ///< from this frame on, if given [m/s^2]
+  std::optional<double> damping;      ///< the same [1/s]
 };
 
 /// When tissue counts as being at rest, and how long to wait for it.
 struct SettleLimits {
-  double speed = 1e-4;    ///< no point was faster for a tenth of a second [m/s]
-  double time = 10;       ///< simulated at most [s]
-  double damping = -1;    ///< meanwhile, instead of the scene's [1/s]; negative: the scene's
+  double speed = 1e-4;  ///< no point was faster for a tenth of a second [m/s]
+  double time = 10;     ///< simulated at most [s]
+  double damping = -1;  ///< meanwhile, instead of the scene's [1/s]; negative: the scene's
 };
 struct SettleReport {
   bool at_rest = false;

@@ -40,13 +40,13 @@ struct FrameResult {
   CutReport blade_report;              ///< what the instruments' edges cut
   CutReport tear_report;               ///< what tore by itself (Material::tear_stretch)
   int substeps = 0;
-  double substep = 0;         ///< the longest of them [s]
+  double substep = 0;           ///< the longest of them [s]
   int fragment_candidates = 0;  ///< points that the fragment network looked at
   int fragment_points = 0;      ///< of these, those that it expects to be part of fragments
-  double kinetic_energy = 0;  ///< [J]
-  double elastic_energy = 0;  ///< [J]
-  double max_speed = 0;       ///< of a point [m/s]
-  bool blew_up = false;       ///< something is not finite, or moves faster than it can
+  double kinetic_energy = 0;    ///< [J]
+  double elastic_energy = 0;    ///< [J]
+  double max_speed = 0;         ///< of a point [m/s]
+  bool blew_up = false;         ///< something is not finite, or moves faster than it can
 };
 
 /// Of all tissue, in world axes.
@@ -59,8 +59,8 @@ struct Momentum {
 
 /// The triangles of a surface, counter-clockwise seen from outside.
 struct SurfaceTriangles {
-  std::vector<float> corners;           ///< nine coordinates a triangle [m], world frame
-  std::vector<std::int32_t> fragment;   ///< Fragment::id of each triangle
+  std::vector<float> corners;          ///< nine coordinates a triangle [m], world frame
+  std::vector<std::int32_t> fragment;  ///< Fragment::id of each triangle
 };
 
 class Tissue {

@@ -23,19 +23,19 @@ enum class ToolType {
 struct Tool {
   std::string name = "probe";  ///< a ROS name: letters, digits, '_'; unique in the scene
   ToolType type = ToolType::kProbe;
-  double radius = 0.003;            ///< probe: of the capsule; ball; punch: of the cylinder [m]
-  double length = 0.10;             ///< probe, punch: of the shaft that touches tissue [m]
-  double edge_radius = 0.0005;      ///< punch, plate: of the rounded edge, at most half of what is
-                                    ///< rounded [m]
+  double radius = 0.003;        ///< probe: of the capsule; ball; punch: of the cylinder [m]
+  double length = 0.10;         ///< probe, punch: of the shaft that touches tissue [m]
+  double edge_radius = 0.0005;  ///< punch, plate: of the rounded edge, at most half of what is
+                                ///< rounded [m]
   Vec3 size = Vec3(0.05, 0.05, 0.004);  ///< plate: along x, y and z, its face at z = 0 [m]
-  double blade_length = 0.025;      ///< scalpel: edge from the tip to the heel, along -z [m]
-  double blade_width = 0.006;       ///< scalpel: from the edge to the spine, along -x [m]
-  double blade_thickness = 0.0004;  ///< scalpel: along y [m]
-  double jaw_length = 0.015;        ///< grasper: from the hinge to the tip, along z [m]
-  double jaw_width = 0.004;         ///< grasper: of a jaw, half round with a flat face, along y [m]
-  double grip_pressure = 3000;      ///< grasper: its jaws close until they press with it [Pa]
-  double cohesion = 10000;          ///< grasper: what its teeth hold beside friction [Pa]
-  double friction = 0.3;            ///< Coulomb friction against tissue [-], 0 to 2
+  double blade_length = 0.025;          ///< scalpel: edge from the tip to the heel, along -z [m]
+  double blade_width = 0.006;           ///< scalpel: from the edge to the spine, along -x [m]
+  double blade_thickness = 0.0004;      ///< scalpel: along y [m]
+  double jaw_length = 0.015;            ///< grasper: from the hinge to the tip, along z [m]
+  double jaw_width = 0.004;     ///< grasper: of a jaw, half round with a flat face, along y [m]
+  double grip_pressure = 3000;  ///< grasper: its jaws close until they press with it [Pa]
+  double cohesion = 10000;      ///< grasper: what its teeth hold beside friction [Pa]
+  double friction = 0.3;        ///< Coulomb friction against tissue [-], 0 to 2
 };
 
 /// Motion of one tool over one frame: position and jaw linear, orientation slerp between the two.

@@ -14,10 +14,13 @@ std::unique_ptr<MpmState> make_mpm_state(const Scene& scene, std::vector<std::st
   state->scene = scene;
   state->cpu = std::make_unique<Cpu>(scene.threads);
   state->bodies = make_lattice_bodies(scene, state->points, notes);
-  find_free_volumes(state->bodies, state->points);
-  state->points.outer = find_outer_places(state->bodies, state->points);
+  const bool at_surface = scene.mpm.boundary == MpmBoundary::kSurface;
+  if (at_surface) {
+    find_free_volumes(state->bodies, state->points);
+    state->points.outer = find_outer_places(state->bodies, state->points);
+  }
   state->fields = std::make_unique<NodeFields>(state->bodies, state->points, state->nodes);
-  find_face_links(scene, state->bodies, state->points, state->anchors);
+  if (at_surface) find_face_links(scene, state->bodies, state->points, state->anchors);
   find_face_rows(state->bodies, state->points, *state->fields, state->nodes, state->anchors);
   for (const std::int32_t p : state->anchors.points) {
     if (state->points.anchored[p] == 0) state->points.anchored[p] = Points::kAtAnchor;

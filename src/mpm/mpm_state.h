@@ -29,9 +29,9 @@ struct Touch {
   std::int32_t point;
   std::uint8_t key;  ///< SurfacePlace::key, or below 8: which of the cell's eight points
   std::uint8_t collider;
-  float hold[3];       ///< place that friction holds on to, in the collider's frame [m]
-  float along[3];      ///< normal of its inerter (mpm/contact/contact_inertia.h)
-  float inertia = 0;   ///< of that [kg]
+  float hold[3];      ///< place that friction holds on to, in the collider's frame [m]
+  float along[3];     ///< normal of its inerter (mpm/contact/contact_inertia.h)
+  float inertia = 0;  ///< of that [kg]
 };
 
 /// A cell of which a collider may touch points before such cells are listed anew.
@@ -39,20 +39,20 @@ struct NearCell {
   std::int32_t lane;  ///< of its first point, in its block
   std::int32_t node;  ///< its lowest, in the block's nodes
   std::uint8_t collider;
-  std::uint8_t points;     ///< bit s: that at sub-position s, in the body or for a blade
+  std::uint8_t points;  ///< bit s: that at sub-position s, in the body or for a blade
   std::int32_t first_place, place_count;  ///< in Block::surface
-  float middle[3];         ///< reference place [m]
-  std::uint8_t clear = 0;  ///< substeps for which the collider cannot reach it
+  float middle[3];                        ///< reference place [m]
+  std::uint8_t clear = 0;                 ///< substeps for which the collider cannot reach it
 };
 
 /// Contact of points with colliders, block by block.
 struct Contacts {
-  std::vector<std::vector<std::uint8_t>> near;  ///< colliders that it may meet this frame
-  std::vector<std::vector<NearCell>> cells;     ///< by collider, then lane
-  std::vector<std::vector<Touch>> touching;     ///< by collider, cell and key
+  std::vector<std::vector<std::uint8_t>> near;      ///< colliders that it may meet this frame
+  std::vector<std::vector<NearCell>> cells;         ///< by collider, then lane
+  std::vector<std::vector<Touch>> touching;         ///< by collider, cell and key
   std::vector<std::vector<InertiaChange>> changes;  ///< of the substep
   ContactInertia inertia;
-  int until_list = 0;                           ///< substeps until `cells` are listed anew
+  int until_list = 0;  ///< substeps until `cells` are listed anew
 };
 
 /// Within which box a block's points are, and how fast they move at most.
@@ -88,7 +88,7 @@ struct MpmState {
   Contacts contacts;
   FaceContacts faces;
   std::vector<Collider> colliders;
-  std::vector<std::int32_t> inertial_index;  ///< per node, in ContactInertia; -1 for none
+  std::vector<std::int32_t> inertial_index;            ///< per node, in ContactInertia; -1 for none
   std::vector<std::vector<ColliderLoad>> block_loads;  ///< per block, per collider
 
   const BlockKernels* kernels = nullptr;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <stdexcept>
 #include <utility>
 
 #include "geometry/mesh.h"
@@ -34,8 +35,8 @@ MpmTissue::MpmTissue(const Scene& scene, std::vector<std::string> notes)
   substep_.follow(*state_, modulus_);
   measured_ = false;  // who holds the state may change it
   if (scene.fragment_network != "off") {
-    network_ = std::make_unique<FragmentNetwork>(
-        resolve_path(scene.fragment_network, "fragment network"));
+    network_ =
+        std::make_unique<FragmentNetwork>(resolve_path(scene.fragment_network, "fragment network"));
   }
 }
 
@@ -73,6 +74,10 @@ void MpmTissue::begin_frame(double duration, const FrameInput& input) {
   if (input.gravity != nullptr) s.scene.gravity = *input.gravity;
   if (input.damping != nullptr) s.scene.damping = *input.damping;
   s.anchors.impulse.assign(s.anchors.rows.size(), {});
+  if (!input.anchors.empty() && s.anchors.origin.empty()) {
+    throw std::runtime_error(
+        "anchors do not move where the boundary is the lattice's: set mpm.boundary to surface");
+  }
   if (!s.anchors.moves && !input.anchors.empty()) {
     s.anchors.moves = true;
     find_held_nodes(s.bodies, s.points, *s.fields, s.nodes, s.anchors);

@@ -82,8 +82,8 @@ struct State {
   std::vector<Vec3> blade_normal, blade_point;
   std::set<std::array<std::int32_t, 2>> cut_edges;  ///< of the surface, lower vertex first
   std::vector<std::int32_t> bare;  ///< vertices that a cut took the internal constraints of
-  std::vector<InnerFace> faces;                     ///< between tetrahedra
-  double mean_edge = 0;                             ///< of the surface when it was made [m]
+  std::vector<InnerFace> faces;    ///< between tetrahedra
+  double mean_edge = 0;            ///< of the surface when it was made [m]
 
   std::vector<Collider> colliders;  ///< of this step
 

@@ -76,7 +76,7 @@ class FrameClock {
   ros::Time ros_time_;
   ros::Time own_;  // of the clock that this node is
   ros::Time frame_stamp_;
-  double elapsed_ = 0;   // simulated over all scenes [s]
+  double elapsed_ = 0;  // simulated over all scenes [s]
 };
 
 }  // namespace tissue_sim

@@ -24,9 +24,9 @@ using XmlRpc::XmlRpcValue;
 const std::set<std::string> kKnown = {
     "scene", "scene_file", "method", "mesh", "mesh_scale", "world_frame", "time", "pose_delay",
     "time_factor", "publish_clock", "lockstep_tools", "paused", "cloud_rate", "cloud_stride",
-    "cloud_surface_only", "cloud_fields", "fragment_rate", "state_rate", "wrench_rate", "marker_rate", "checksum",
-    "force_scale", "publish_tf", "max_tool_speed", "max_tool_turn_rate", "tf_tolerance",
-    "recording_folder", "record", "recording_queue", "recording_reserve", "tools",
+    "cloud_surface_only", "cloud_fields", "fragment_rate", "state_rate", "wrench_rate",
+    "marker_rate", "checksum", "force_scale", "publish_tf", "max_tool_speed", "max_tool_turn_rate",
+    "tf_tolerance", "recording_folder", "record", "recording_queue", "recording_reserve", "tools",
     // of diagnostic_updater
     "diagnostic_period", "diagnostic_updater_use_fqn"};
 
@@ -168,7 +168,8 @@ void read_cloud_fields(const ros::NodeHandle& node, Parameters& p) {
   XmlRpcValue fields;
   if (!node.getParam("cloud_fields", fields)) return;
   std::string known;
-  for (const CloudField& f : kCloudFields) known += (known.empty() ? "" : ", ") + std::string(f.name);
+  for (const CloudField& f : kCloudFields)
+    known += (known.empty() ? "" : ", ") + std::string(f.name);
   const std::string allowed = "must be a list of " + known;
   if (fields.getType() != XmlRpcValue::TypeArray) refuse("cloud_fields", fields, allowed);
   for (int i = 0; i < fields.size(); ++i) {

@@ -38,7 +38,7 @@ struct Parameters {
   double cloud_rate = 30;  ///< [Hz] of wall time
   int cloud_stride = 1;    ///< every n-th point
   bool cloud_surface_only = false;
-  unsigned cloud_fields = 0;  ///< PointFields that clouds carry, too
+  unsigned cloud_fields = 0;       ///< PointFields that clouds carry, too
   double fragment_rate = 10;       ///< [Hz], and whenever the pieces change
   double state_rate = 0;           ///< [Hz], 0 for every frame of the scene's frame_rate
   double wrench_rate = 0;          ///< [Hz]: frames are as short as it asks; 0: the scene's
@@ -59,7 +59,8 @@ struct Parameters {
 Parameters read_parameters(const ros::NodeHandle& node);
 
 /// The scene that the parameters ask for: ~scene_file, or ~scene (YAML text or a tree of
-/// parameters), by ~method if that is set, with ~mesh and ~mesh_scale in place of the first body's shape.
+/// parameters), by ~method if that is set, with ~mesh and ~mesh_scale in place of the first body's
+/// shape.
 Scene read_scene_parameters(const ros::NodeHandle& node);
 
 /// Puts a mesh in the place of the scene's first body: its bounding box is centred where the body's

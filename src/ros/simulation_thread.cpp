@@ -204,8 +204,7 @@ void SimulationThread::frame() {
     StepReply reply{true, "", simulation.frame(), simulation.time(), {}};
     if (settling_) {
       reply.settled.time = settling_->frames / simulation.scene().frame_rate;
-      reply.settled.speed =
-          *std::max_element(settling_->speeds.begin(), settling_->speeds.end());
+      reply.settled.speed = *std::max_element(settling_->speeds.begin(), settling_->speeds.end());
       reply.settled.at_rest = reply.settled.speed < settling_->limits.speed;
     }
     end_settling();

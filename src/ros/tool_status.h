@@ -23,11 +23,11 @@ struct ToolStatus {
   std::string source;  ///< "/probe/measured_cp", or the tf frame that it follows
   bool follows_tf = false;
   std::uint32_t publishers = 0;  ///< of the topic
-  std::string waiting;  ///< why there is no transform of the frame that it follows; "" for none
-  bool latched = false;   ///< the last pose: it holds until the next
-  bool came = false;    ///< a pose, of whatever quality; with tf a transform
-  double silent = 0;    ///< since the last one, or since the start [s]
-  std::string far;      ///< see distance_warning()
+  std::string waiting;   ///< why there is no transform of the frame that it follows; "" for none
+  bool latched = false;  ///< the last pose: it holds until the next
+  bool came = false;     ///< a pose, of whatever quality; with tf a transform
+  double silent = 0;     ///< since the last one, or since the start [s]
+  std::string far;       ///< see distance_warning()
   PoseCounts counts;
 };
 

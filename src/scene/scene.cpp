@@ -259,6 +259,7 @@ void validate(const Scene& scene) {
   if (scene.threads < 0 || scene.threads > 1024) {
     refuse("threads", std::to_string(scene.threads), "must lie between 0 (all) and 1024");
   }
+  check_enum("mpm.boundary", scene.mpm.boundary, kMpmBoundaryNames);
   check_range("cell_size", scene.cell_size, 1e-5, 1, "m");
   check_range("frame_rate", scene.frame_rate, 1, 2000, "Hz");
   check_range("cfl", scene.cfl, 0.05, 0.9);

@@ -187,6 +187,9 @@ std::string scene_to_yaml(const Scene& scene) {
   write(out, "gravity", scene.gravity);
   out << Key << "seed" << Value << std::to_string(scene.seed);
   write(out, "fragment_network", scene.fragment_network);
+  out << Key << "mpm" << Value << BeginMap;
+  write(out, "boundary", std::string(name_of(scene.mpm.boundary, kMpmBoundaryNames)));
+  out << EndMap;
   if (scene.method == Method::kMls) write_mls(out, scene.mls);
   if (scene.method == Method::kPbd) {
     out << Key << "pbd" << Value;

@@ -142,8 +142,8 @@ Body read_body(const YAML::Node& node, const std::string& path) {
 Tool read_tool(const YAML::Node& node, const std::string& path) {
   const YamlFields fields(
       node, path,
-      {"name", "type", "radius", "length", "edge_radius", "size", "blade_length", "blade_width", "blade_thickness",
-       "jaw_length", "jaw_width", "grip_pressure", "cohesion", "friction"});
+      {"name", "type", "radius", "length", "edge_radius", "size", "blade_length", "blade_width",
+       "blade_thickness", "jaw_length", "jaw_width", "grip_pressure", "cohesion", "friction"});
   Tool tool;
   fields.read("name", tool.name);
   fields.read("type", tool.type, kToolTypeNames);
@@ -183,8 +183,8 @@ PbdOptions read_pbd(const YAML::Node& node, const std::string& path) {
 Scene read_scene(const YAML::Node& node) {
   const YamlFields fields(node, "",
                           {"name", "method", "device", "threads", "cell_size", "frame_rate", "cfl",
-                           "damping", "gravity", "seed", "fragment_network", "mls", "pbd", "ground", "materials",
-                           "bodies", "tools"});
+                           "damping", "gravity", "seed", "fragment_network", "mpm", "mls", "pbd",
+                           "ground", "materials", "bodies", "tools"});
   Scene scene;
   fields.read("name", scene.name);
   fields.read("method", scene.method, kMethodNames);
@@ -197,10 +197,12 @@ Scene read_scene(const YAML::Node& node) {
   fields.read("gravity", scene.gravity);
   fields.read("seed", scene.seed);
   fields.read("fragment_network", scene.fragment_network);
+  fields.read_map("mpm", [&](const YAML::Node& mpm, const std::string& path) {
+    YamlFields(mpm, path, {"boundary"}).read("boundary", scene.mpm.boundary, kMpmBoundaryNames);
+  });
   fields.read_map("mls", [&](const YAML::Node& mls, const std::string& path) {
-    const YamlFields of(mls, path,
-                        {"spacing", "neighbours", "basis", "placement", "grading",
-                         "stabilisation"});
+    const YamlFields of(
+        mls, path, {"spacing", "neighbours", "basis", "placement", "grading", "stabilisation"});
     of.read("spacing", scene.mls.spacing);
     of.read("neighbours", scene.mls.neighbours);
     of.read("basis", scene.mls.basis, kMlsBasisNames);

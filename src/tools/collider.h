@@ -13,8 +13,8 @@ struct Collider {
   float rotation[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1};  ///< local to world, row-major
   float velocity[3] = {};                           ///< of the tip [m/s]
   float spin[3] = {};                               ///< angular velocity, world axes [rad/s]
-  float length = 0;     ///< along local -z from the tip [m]
-  float radius = 0;     ///< capsule, jaw, punch [m]
+  float length = 0;                                 ///< along local -z from the tip [m]
+  float radius = 0;                                 ///< capsule, jaw, punch [m]
   float width = 0;      ///< blade: along local -x from the edge; plate: along local x [m]
   float thickness = 0;  ///< blade, plate: along local y [m]
   float edge = 0;       ///< punch, plate: radius of the rounded edge [m]

@@ -16,7 +16,8 @@ Box bounds(const Collider& c) {
   const float x1 = is_plate ? -x0 : c.kind == Collider::kJaw || is_blade ? 0 : c.radius;
   const float y = is_plate || is_blade ? 0.5f * c.thickness : c.radius;
   // A capsule whose shaft is shorter than its ball reaches beyond its length.
-  const float low = c.kind == Collider::kCapsule ? -fmaxf(c.length, c.radius) - c.radius : -c.length;
+  const float low =
+      c.kind == Collider::kCapsule ? -fmaxf(c.length, c.radius) - c.radius : -c.length;
   for (int i = 0; i < 8; ++i) {
     const float corner[3] = {i & 1 ? x1 : x0, i & 2 ? y : -y, i & 4 ? 0 : low};
     float world[3];

@@ -88,7 +88,7 @@ TEST(SceneYaml, NamesWhatItRefuses) {
   const std::pair<const char*, const char*> cases[] = {
       {"colour: red\nbodies: [{}]", "colour is red: unknown field, known here are name, method, "},
       {"bodies: [{colour: red}]", "bodies[0].colour is red: unknown field"},
-      {"bodies: [{}]\ntools: [{size: 1}]", "tools[0].size is 1: unknown field"},
+      {"bodies: [{}]\ntools: [{weight: 1}]", "tools[0].weight is 1: unknown field"},
       {"bodies: [{}]\nground: {y: 1}", "ground.y is 1: unknown field"},
       {"bodies: [{pose: {xyz: [1, 2, 3]}}]", "bodies[0].pose.xyz is [1, 2, 3]: unknown field"},
       {"materials: [{name: a, young: 1}]", "materials[0].young is 1: unknown field"},

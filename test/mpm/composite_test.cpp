@@ -24,6 +24,7 @@ Inclusion box_of(const std::string& material, const Vec3& min, const Vec3& max) 
 /// A block with its lowest corner at the origin, of a soft material and, in a box, a stiff one.
 Scene layered(const Vec3& size, double nu, const Vec3& min, const Vec3& max) {
   Scene s = free_box(size, 0.002);
+  s.mpm.boundary = MpmBoundary::kLattice;  // whose held nodes are moved
   s.damping = 60;
   s.materials.resize(2);
   for (int i = 0; i < 2; ++i) {

@@ -12,14 +12,16 @@ namespace {
 
 Bend sag(double nu, int cells, const std::string& curve = "") {
   const Beam beam = soft_beam(8, nu);
-  const Scene scene = beam_scene(beam, cells, true);
+  Scene scene = beam_scene(beam, cells, true);
+  scene.mpm.boundary = MpmBoundary::kLattice;
   MpmTissue tissue(scene);
   return bend(scene, beam, clamp_place(tissue.state()), curve);
 }
 
 TEST(LatticeCantilever, IsClampedWhereTheTableOfTolerancesHasIt) {
   for (const int cells : {4, 6, 8}) {
-    const Scene scene = beam_scene(soft_beam(8, 0.3), cells, true);
+    Scene scene = beam_scene(soft_beam(8, 0.3), cells, true);
+    scene.mpm.boundary = MpmBoundary::kLattice;
     MpmTissue tissue(scene);
     EXPECT_NEAR(clamp_place(tissue.state()) / scene.cell_size, tolerances(Method::kMpm).clamp,
                 1e-6);

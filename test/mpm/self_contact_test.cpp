@@ -23,6 +23,7 @@ Scene bar() {
   held.min = Vec3(kLong / 2 - kBend - kCell, -1, -1);
   held.max = Vec3(kLong / 2 + kBend + kCell, 1, 1);
   scene.bodies[0].anchors = {held};
+  scene.mpm.boundary = MpmBoundary::kLattice;  // whose held nodes are bent
   return scene;
 }
 

@@ -62,7 +62,9 @@ Thinnest thinnest(const pbd::State& s) {
       const Vec3 a = s.vertices.reference[t[(i + 1) % 3]] - x;
       const Vec3 b = s.vertices.reference[t[(i + 2) % 3]] - x;
       least.edge = std::min(least.edge, a.norm());
-      least.angle = std::min(least.angle, std::acos(std::max(-1.0, std::min(1.0, a.normalized().dot(b.normalized())))));
+      least.angle =
+          std::min(least.angle,
+                   std::acos(std::max(-1.0, std::min(1.0, a.normalized().dot(b.normalized())))));
     }
   }
   return least;
@@ -117,7 +119,8 @@ TEST_P(CutMeshes, AWaveAndALevelCutMakeFour) {
   simulation.cut(stroke(-kUp, kUp, wave));
   simulation.advance_frame();
   EXPECT_EQ(simulation.tissue().fragments().size(), 2u);
-  simulation.cut(stroke(Vec3(-0.1, 0, 0), Vec3(0.1, 0, 0), {Vec3(0, -0.1, 0.002), Vec3(0, 0.1, 0)}));
+  simulation.cut(
+      stroke(Vec3(-0.1, 0, 0), Vec3(0.1, 0, 0), {Vec3(0, -0.1, 0.002), Vec3(0, 0.1, 0)}));
   simulation.advance_frame();
   EXPECT_EQ(simulation.tissue().fragments().size(), 4u);
   expect_sound(simulation, volume);

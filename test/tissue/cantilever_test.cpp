@@ -17,7 +17,8 @@ class Cantilever : public EachMethod {
  protected:
   Bend sag(double nu, int cells) const {
     const Beam beam = soft_beam(8, nu);
-    // Nodes without a mesh: as many over the height as another method has cells, two to a cell here.
+    // Nodes without a mesh: as many over the height as another method has cells, two to a cell
+    // here.
     if (GetParam().method == Method::kMls) cells /= 2;
     Scene scene = on_this(beam_scene(beam, cells, true));
     scene.mls.spacing = 0;

@@ -45,7 +45,8 @@ struct FaceCrossing {
 };
 
 /// Where a link between two nodes goes through a face of the anchors.
-std::vector<FaceCrossing> crossings(const std::vector<Anchor>& anchors, const Vec3& a, const Vec3& b) {
+std::vector<FaceCrossing> crossings(const std::vector<Anchor>& anchors, const Vec3& a,
+                                    const Vec3& b) {
   constexpr int kParts = 4;
   std::vector<FaceCrossing> found;
   const auto at = [&](double t) { return anchor_at(anchors, a + t * (b - a)); };
@@ -200,8 +201,10 @@ void make_groups(AnchorFaces& faces) {
     // Rows that say the same twice share what holds them.
     if (n > 1) A.diagonal() *= 1 + 1e-4;
     const Eigen::MatrixXd inverse = A.ldlt().solve(Eigen::MatrixXd::Identity(n, n));
-    faces.groups.push_back({static_cast<int>(rows.size()), n, static_cast<int>(faces.inverse.size())});
-    for (int i = 0; i < n * n; ++i) faces.inverse.push_back(static_cast<float>(inverse(i / n, i % n)));
+    faces.groups.push_back(
+        {static_cast<int>(rows.size()), n, static_cast<int>(faces.inverse.size())});
+    for (int i = 0; i < n * n; ++i)
+      faces.inverse.push_back(static_cast<float>(inverse(i / n, i % n)));
     for (const int i : m) rows.push_back(faces.rows[i]);
   }
   faces.rows = std::move(rows);
@@ -292,11 +295,12 @@ void find_held_nodes(const std::vector<LatticeBody>& bodies, const Points& point
         const int node = fields.node(b, s, k);
         if (nodes.inv_mass[node] != 0 || seen[node] != 0) continue;
         seen[node] = 1;
-        const Vec3 x = b.node_position(s.x / 2 + k % 3 - 1, s.y / 2 + k / 3 % 3 - 1,
-                                       s.z / 2 + k / 9 - 1);
-        faces.held.push_back({node, faces.first_of_body[i] + anchor,
-                              {static_cast<float>(x[0]), static_cast<float>(x[1]),
-                               static_cast<float>(x[2])}});
+        const Vec3 x =
+            b.node_position(s.x / 2 + k % 3 - 1, s.y / 2 + k / 3 % 3 - 1, s.z / 2 + k / 9 - 1);
+        faces.held.push_back(
+            {node,
+             faces.first_of_body[i] + anchor,
+             {static_cast<float>(x[0]), static_cast<float>(x[1]), static_cast<float>(x[2])}});
       }
     }
   }

@@ -27,9 +27,9 @@ namespace tissue_sim {
 struct FaceRow {
   std::int32_t node[3];  ///< in Nodes; 0 with weight 0 for none
   float weight[3];
-  float share[3];    ///< weight / m: of an impulse to velocity [1/kg]
+  float share[3];       ///< weight / m: of an impulse to velocity [1/kg]
   std::int32_t anchor;  ///< in the order of the scene
-  float place[3];    ///< on the face, in reference space [m]
+  float place[3];       ///< on the face, in reference space [m]
 };
 
 /// Where a face goes through a row of nodes: of the whole lattice.
@@ -72,11 +72,12 @@ struct AnchorFaces {
     std::int32_t node, anchor;
     float place[3];  ///< [m]
   };
-  std::vector<HeldNode> held;       ///< nodes that only tissue inside sees; found once any moves
-  std::vector<RigidMotion> now;     ///< of each anchor, at the end of the last substep
-  bool moves = false;               ///< whether any has moved ever
-  std::vector<std::int32_t> points;  ///< in or beside whose cubes faces lie, when the scene is built
-  std::vector<int> first_of_body;    ///< anchors, by body
+  std::vector<HeldNode> held;    ///< nodes that only tissue inside sees; found once any moves
+  std::vector<RigidMotion> now;  ///< of each anchor, at the end of the last substep
+  bool moves = false;            ///< whether any has moved ever
+  std::vector<std::int32_t>
+      points;                      ///< in or beside whose cubes faces lie, when the scene is built
+  std::vector<int> first_of_body;  ///< anchors, by body
 };
 
 /// Finds where the faces are, of bodies that are whole, and which points they touch

@@ -6,7 +6,7 @@
 namespace tissue_sim {
 namespace {
 
-constexpr int kLines = 8;             // along y and z, where it is not exact
+constexpr int kLines = 8;               // along y and z, where it is not exact
 constexpr double kSmallest = 1.0 / 32;  // as of the body's own surface (mpm/lattice/lattice.cpp)
 
 /// What a region covers of a line along x at y, z; false for nothing.

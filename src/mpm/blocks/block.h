@@ -86,7 +86,7 @@ struct Block {
   std::vector<std::int32_t>
       node;  ///< [nz + 2][plane], in Nodes, -1 for none; split ones as this block sees them
 
-  std::vector<Facet> facets;  ///< its surface and cut faces
+  std::vector<Facet> facets;          ///< its surface and cut faces
   std::vector<SurfacePlace> surface;  ///< where tools touch these
 
   /// The largest P-wave modulus of its points, as they are deformed [Pa]: when the limit of the

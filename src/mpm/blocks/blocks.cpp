@@ -143,7 +143,7 @@ void finish_regions(Blocks& blocks, const std::vector<NewRegion>& anew,
              cpu.for_each(static_cast<int>(made.size()), [&](int i) {
                Block& b = *made[i].first;
                b.facets = facets_of(bodies[b.body], points, b, *made[i].second);
-               if (blocks.has_rows) b.surface = surface_places_of(bodies[b.body], points, b);
+               if (!points.outer.empty()) b.surface = surface_places_of(bodies[b.body], points, b);
              });
            });
 }

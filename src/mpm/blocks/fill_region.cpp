@@ -112,7 +112,8 @@ void fill_side(Block& block, const LatticeBody& b, const Points& points, const P
     for (int i = 0; i < c.cells; ++i) {
       if (count[i] >= kSteadyCount || count[i] == 0) continue;
       block.partial.push_back({z * block.stride + column + i,
-                               z * block.plane + block.cell[column + i], static_cast<float>(mu[i])});
+                               z * block.plane + block.cell[column + i],
+                               static_cast<float>(mu[i])});
     }
   }
 }

@@ -162,6 +162,7 @@ void list_near_cells(MpmState& state, int index, float dt) {
   state.kernels->positions(block, block_field(state, block), state.nodes.u, scratch, x);
   std::vector<std::uint8_t> points(static_cast<std::size_t>(block.nz) * block.stride);  // of cells
   std::vector<std::uint8_t> near(points.size());
+  const bool at_points = state.points.outer.empty();  // MpmBoundary::kLattice
   for (const std::uint8_t c : state.contacts.near[index]) {
     const Collider& collider = state.colliders[c];
     const bool is_blade = collider.kind == Collider::kBlade;
@@ -189,7 +190,7 @@ void list_near_cells(MpmState& state, int index, float dt) {
       const int row = lane / block.stride, cell = row / 8 * block.stride + lane % block.stride;
       near[cell] = 1;
       // Others touch over their places on the surface.
-      if (is_blade || in_body) points[cell] |= 1u << row % 8;
+      if (is_blade || in_body || at_points) points[cell] |= 1u << row % 8;
     }
     auto place = block.surface.begin();
     for (int z = 0, i = 0; z < block.nz; ++z) {
@@ -241,10 +242,10 @@ struct BlockPush {
   }
   void let_go(const Touch& touch) {
     if (touch.inertia == 0) return;
-    const auto place = std::lower_bound(
-        block.surface.begin(), block.surface.end(), touch, [](const SurfacePlace& p, const Touch& t) {
-          return std::tie(p.cell, p.key) < std::tie(t.cell, t.key);
-        });
+    const auto place = std::lower_bound(block.surface.begin(), block.surface.end(), touch,
+                                        [](const SurfacePlace& p, const Touch& t) {
+                                          return std::tie(p.cell, p.key) < std::tie(t.cell, t.key);
+                                        });
     change(-1, false, *place, touch, nullptr);
   }
   void change(float sign, bool begins, const SurfacePlace& place, const Touch& touch,
@@ -367,9 +368,8 @@ bool push_surface(BlockPush& b, const NearCell& cell, const Collider& collider, 
     touches = true;
     const bool is_free = b.state.points.free_volume_of(place.point) > 0;
     const Material& m = b.body.material_of(b.state.points, place.point);
-    SurfaceSpring spring =
-        surface_spring(static_cast<float>(lame_lambda(m) + 2 * lame_mu(m)),
-                       static_cast<float>(m.density), h, place.area, b.dt);
+    SurfaceSpring spring = surface_spring(static_cast<float>(lame_lambda(m) + 2 * lame_mu(m)),
+                                          static_cast<float>(m.density), h, place.area, b.dt);
     spring.cohesion = collider.cohesion * place.area / unit_area;
     float velocity[3], push[3], of_collider[3];
     value_at(b.state.nodes.v, nodes, whole_rows, weights, velocity);

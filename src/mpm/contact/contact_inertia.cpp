@@ -89,9 +89,8 @@ void change_inertia(MpmState& state) {
           InertialNode n{};
           n.node = node;
           n.mass = nodes.mass[node];
-          const Vec3 X =
-              body.node_position(block.cell_x(x0) + k % 3 - 1, block.y + y0 + k / 3 % 3 - 1,
-                                 block.z + z0 + k / 9 - 1);
+          const Vec3 X = body.node_position(block.cell_x(x0) + k % 3 - 1,
+                                            block.y + y0 + k / 3 % 3 - 1, block.z + z0 + k / 9 - 1);
           for (int a = 0; a < 3; ++a) n.place[a] = static_cast<float>(X[a]);
           inertia.nodes.push_back(n);
           begun.emplace_back();
@@ -124,8 +123,8 @@ void change_inertia(MpmState& state) {
         float taken[3], all[3];
         times(of.inertia, v, taken);
         const Eigen::Matrix3d A = matrix(n.inertia) + n.mass * Eigen::Matrix3d::Identity();
-        const Vec3 change = A.ldlt().solve(Vec3(of.momentum[0] - taken[0], of.momentum[1] - taken[1],
-                                                of.momentum[2] - taken[2]));
+        const Vec3 change = A.ldlt().solve(
+            Vec3(of.momentum[0] - taken[0], of.momentum[1] - taken[1], of.momentum[2] - taken[2]));
         for (int a = 0; a < 3; ++a) {
           all[a] = static_cast<float>(change[a]);
           v[a] += all[a];

@@ -41,7 +41,7 @@ struct InertiaChange {
   bool begins;        ///< not merely turned
   std::int32_t node;  ///< lowest of the cell, in the block's nodes
   std::int32_t collider;
-  float place[3];     ///< in cells, from the middle of the cell
+  float place[3];  ///< in cells, from the middle of the cell
   float normal[3];
   float inertia;      ///< b [kg]
   float velocity[3];  ///< of the collider there [m/s]

@@ -70,7 +70,8 @@ std::vector<SurfacePlace> surface_places_of(const LatticeBody& b, const Points& 
             [](const OuterPlace& o, std::int32_t point) { return o.point < point; });
         for (int k = 0; k < kBondCount; ++k) {
           if ((points.bonds[p] >> k & 1) != 0) continue;
-          SurfacePlace place{cell, node, p, static_cast<std::uint8_t>(8 * (sub + 1) + k), {}, {}, 0};
+          SurfacePlace place{cell, node, p, static_cast<std::uint8_t>(8 * (sub + 1) + k),
+                             {},   {},   0};
           const BondOffset o = bond_offset(k);
           if ((whole >> k & 1) == 0) {
             while (outer != points.outer.end() && outer->point == p && outer->bond < k) ++outer;
@@ -83,9 +84,9 @@ std::vector<SurfacePlace> surface_places_of(const LatticeBody& b, const Points& 
           const int axis = k < kForwardBond ? 2 - k : k - kForwardBond;
           const bool forward = k >= kForwardBond;
           const std::int32_t lower =
-              forward ? p
-                      : b.point(points.site[p].x + o.x, points.site[p].y + o.y,
-                                points.site[p].z + o.z);
+              forward
+                  ? p
+                  : b.point(points.site[p].x + o.x, points.site[p].y + o.y, points.site[p].z + o.z);
           const Crossing* crossing = points.crossings.find(lower, axis);
           const float at = crossing == nullptr ? 0.5f : crossing->place;  // torn: between the two
           for (int a = 0; a < 3; ++a) place.place[a] = (sub >> a & 1) != 0 ? 0.25f : -0.25f;

@@ -15,7 +15,8 @@ void CudaMpmTissue::run_substeps(int begin, int end) {
   while (begin < end) {
     // Substeps of a launch have one length and one kick: one after a change is a launch of its own.
     const float dt = part_.substeps.at(begin);
-    int count = part_.substeps.is_even_from(begin) && kick_of(state_->dt, dt) == dt ? end - begin : 1;
+    int count =
+        part_.substeps.is_even_from(begin) && kick_of(state_->dt, dt) == dt ? end - begin : 1;
     FaceContacts& faces = state_->faces;
     if (is_due(faces.until_search, dt)) {
       begin_search();

@@ -7,9 +7,9 @@
 #include <vector>
 
 #include "compute/array.h"
-#include "mpm/lattice/bonds.h"
 #include "geometry/lattice.h"
 #include "mpm/contact/surface_place.h"
+#include "mpm/lattice/bonds.h"
 #include "mpm/lattice/lattice_rows.h"
 #include "tissue_sim/scene.h"
 
@@ -56,13 +56,13 @@ struct Points {
   /// Outside its body's anchors, where it moves, shared with neighbours so that first moments are
   /// right (mpm/anchors/); empty where there are no anchors, or where they act at nodes [m^3].
   Array<float> free_volume;
-  Array<std::uint8_t> anchored;  ///< kInAnchor, kAtAnchor or 0
+  Array<std::uint8_t> anchored;                 ///< kInAnchor, kAtAnchor or 0
   static constexpr std::uint8_t kInAnchor = 1;  ///< its place is in an anchor
   static constexpr std::uint8_t kAtAnchor = 2;  ///< the face of one holds it
-  Array<std::uint8_t> material;  ///< in LatticeBody::materials; empty where no body has inclusions
-  Array<std::uint8_t> soft;      ///< of a crumb or a slice: mpm/tear/debris.h; empty before any is
+  Array<std::uint8_t> material;   ///< in LatticeBody::materials; empty where no body has inclusions
+  Array<std::uint8_t> soft;       ///< of a crumb or a slice: mpm/tear/debris.h; empty before any is
   std::vector<OuterPlace> outer;  ///< true surface of the whole bodies; empty on a GPU
-  Crossings crossings;           ///< of the bonds that blades broke; one that tore has none
+  Crossings crossings;            ///< of the bonds that blades broke; one that tore has none
   int size() const { return static_cast<int>(site.size()); }
   /// Number of a point's material among those of its body.
   int material_of(std::int32_t point) const { return material.empty() ? 0 : material[point]; }

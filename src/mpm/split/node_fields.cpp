@@ -10,10 +10,11 @@
 namespace tissue_sim {
 namespace {
 
-// Where anchors do not act at their faces (on a GPU): a node is held when this share of its mass is anchored. Nodes held up to a place clamp a body as
-// a wall a quarter of a cell before it would; with this share that wall is within half a cell of
-// the region's end, on average at it (of a node half a cell outside 16 % of the mass is in the
-// region, of one a cell and a quarter outside 1.6 %).
+// Where anchors do not act at their faces (on a GPU): a node is held when this share of its mass is
+// anchored. Nodes held up to a place clamp a body as a wall a quarter of a cell before it would;
+// with this share that wall is within half a cell of the region's end, on average at it (of a node
+// half a cell outside 16 % of the mass is in the region, of one a cell and a quarter outside 1.6
+// %).
 constexpr double kAnchoredShare = 0.05;
 
 /// Weights of the box's centre node at the places of one axis of the box, and their sum for each

@@ -165,7 +165,8 @@ float tear_limit(const MpmState& state, std::int32_t point) {
 void add_tearing(const MpmState& state, const std::vector<StretchedPoint>& stretched,
                  std::vector<TearingPoint>& tearing) {
   for (const StretchedPoint& p : stretched) {
-    if (state.points.anchored[p.point] == Points::kInAnchor) continue;  // held fast, it cannot come apart
+    if (state.points.anchored[p.point] == Points::kInAnchor)
+      continue;  // held fast, it cannot come apart
     const LatticeBody& body = state.bodies[state.points.site[p.point].body];
     const float least = least_tear_limit(body.material_of(state.points, p.point));
     if (least == 0) continue;

@@ -48,7 +48,7 @@ std::string distance_warning(const Box& tissue, const Pose& frame, const Vec3& i
   for (const int factor : {10, 1000, -10, -1000}) {  // the least that will do
     const Vec3 scaled = factor > 0 ? Vec3(in_frame / factor) : Vec3(in_frame * -factor);
     const double then = distance(tissue, frame * scaled);
-    if (then > size) continue;
+    if (then > std::max(0.25, 1.5 * size)) continue;  // an arm near it
     std::snprintf(text, sizeof text, "; positions %s by %d would be %s%s",
                   factor > 0 ? "divided" : "multiplied", std::abs(factor),
                   then > 0 ? "near it" : "within it",

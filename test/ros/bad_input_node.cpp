@@ -323,7 +323,7 @@ TEST(Start, BadParametersAreRefusedWithTheirName) {
   expect_cannot_start(scene + "_time:=lockstep", "~time is \"lockstep\": must be wall");
   expect_cannot_start(scene + "_paused:=2", "~paused is 2");
   expect_cannot_start(scene + "_scene_file:=/also.yaml", "both set");
-  expect_cannot_start(scene + "'_tools:={probe: {interpolate: cubic}}'",
+  expect_cannot_start(scene + "_tools/probe/interpolate:=cubic",
                       "~tools/probe/interpolate is \"cubic\": must be none or linear");
   expect_cannot_start(scene + "_mesh:=/nowhere.obj", "/nowhere.obj");
 }

@@ -81,6 +81,7 @@ TEST_F(Distance, IsSaidWithAGuessOfTheUnit) {
   EXPECT_TRUE(has(far(Vec3(30, 20, 60)), "divided by 1000")) << far(Vec3(30, 20, 60));
   EXPECT_TRUE(has(far(Vec3(30, 20, 60)), "millimetres"));
   EXPECT_TRUE(has(far(Vec3(0.6, 0.2, 0.5)), "divided by 10 ")) << far(Vec3(0.6, 0.2, 0.5));
+  EXPECT_TRUE(has(far(Vec3(1.29, 0, 1.0)), "divided by 10 ")) << far(Vec3(1.29, 0, 1.0));
   EXPECT_FALSE(has(far(Vec3(1e6, 0, 0)), "divided")) << far(Vec3(1e6, 0, 0));
 }
 

@@ -320,7 +320,9 @@ TEST(Start, BadParametersAreRefusedWithTheirName) {
   const std::string scene = "'_scene:={cell_size: 0.005, bodies: [{shape: box}]}' ";
   expect_cannot_start(scene + "_cloud_rate:=fast", "~cloud_rate is \"fast\"");
   expect_cannot_start(scene + "_cloud_stride:=0", "~cloud_stride is 0");
-  expect_cannot_start(scene + "_time:=lockstep", "~time is \"lockstep\": must be wall");
+  expect_cannot_start(scene + "_time:=sundial",
+                      "~time is \"sundial\": must be wall, ros or lockstep");
+  expect_cannot_start(scene + "_time:=ros _publish_clock:=true", "must be wall or lockstep");
   expect_cannot_start(scene + "_paused:=2", "~paused is 2");
   expect_cannot_start(scene + "_scene_file:=/also.yaml", "both set");
   expect_cannot_start(scene + "_tools/probe/interpolate:=cubic",

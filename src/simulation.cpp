@@ -137,6 +137,11 @@ void Simulation::set_anchor(int anchor, const Pose& pose) {
                                 " is not in the scene, which has " +
                                 std::to_string(s.anchors.size()));
   }
+  if (!s.tissue->moves_anchors()) {
+    throw std::invalid_argument(
+        "anchors do not move with this method and device: on a CPU they do with method mpm and "
+        "mpm.boundary: surface");
+  }
   check(pose, "the pose of anchor '" + s.anchors[anchor]->name + "'");
   if (s.anchor_motion.empty()) {
     for (const Anchor* a : s.anchors) {
@@ -190,6 +195,9 @@ void Simulation::apply(const AppliedInput& input) {
     throw std::invalid_argument("the input moves " + std::to_string(input.anchors.size()) +
                                 " anchors, the scene has " +
                                 std::to_string(state_->anchors.size()));
+  }
+  if (!input.anchors.empty() && !state_->tissue->moves_anchors()) {
+    throw std::invalid_argument("the input moves anchors, which this method and device do not");
   }
   for (const AnchorMotion& m : input.anchors) {
     check(m.begin, "an anchor's pose");

@@ -31,6 +31,12 @@ struct FrameInput {
   const double* damping = nullptr;  ///< the same [1/s]
 };
 
+/// Gravity and damping that a frame changes.
+inline void follow(const FrameInput& input, Scene& scene) {
+  if (input.gravity != nullptr) scene.gravity = *input.gravity;
+  if (input.damping != nullptr) scene.damping = *input.damping;
+}
+
 /// What one frame brought.
 struct FrameResult {
   std::vector<ToolLoad> loads;         ///< parallels Scene::tools
@@ -78,6 +84,8 @@ class Tissue {
   /// Replaces `surface` with the tissue's, as of the last finish(); leaves it empty for a method
   /// whose points no triangles join.
   virtual void read_surface(SurfaceTriangles& surface) { surface = {}; }
+  /// Whether FrameInput::anchors move what they hold, and FrameResult has their loads.
+  virtual bool moves_anchors() const { return false; }
   /// Number of pieces, as of the last finish(). It grows whenever a piece comes apart.
   virtual int fragment_count() const = 0;
   /// All pieces, by id, as of the last finish(). The first call after that looks where they are.

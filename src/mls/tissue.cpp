@@ -80,6 +80,7 @@ CutReport MlsTissue::cut_now(const BladePath& path) {
 }
 
 void MlsTissue::begin_frame(double duration, const FrameInput& input) {
+  follow(input, state_->scene);
   MlsState& s = *state_;
   result_ = {};
   result_.loads.resize(s.scene.tools.size());

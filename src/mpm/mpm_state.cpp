@@ -122,8 +122,8 @@ float substep(MpmState& state, float dt, std::vector<ColliderLoad>& loads,
   state.block_loads.resize(block_count);
   FaceContacts& faces = state.faces;
   const bool list = is_list_due(state.contacts);
-  if (list) tidy_inertia(state, false);
-  fit_inertia(state, dt);
+  if (list && !state.contacts.inertia.nodes.empty()) tidy_inertia(state, false);
+  if (!state.points.outer.empty()) fit_inertia(state, dt);
   NodeStep step;
   step.dt = dt;
   step.kick = kick_of(state.dt, dt);

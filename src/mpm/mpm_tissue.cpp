@@ -71,8 +71,7 @@ void MpmTissue::begin_frame(double duration, const FrameInput& input) {
   MpmState& s = *state_;
   result_ = {};
   result_.loads.resize(s.scene.tools.size());
-  if (input.gravity != nullptr) s.scene.gravity = *input.gravity;
-  if (input.damping != nullptr) s.scene.damping = *input.damping;
+  follow(input, s.scene);
   s.anchors.impulse.assign(s.anchors.rows.size(), {});
   if (!input.anchors.empty() && s.anchors.origin.empty()) {
     throw std::runtime_error(

@@ -26,6 +26,9 @@ class MpmTissue final : public Tissue {
   FrameResult finish() override;
   int point_count() const override { return state_->points.size(); }
   int read_points(const PointSelection& selection, std::vector<std::uint8_t>& cloud) override;
+  bool moves_anchors() const override {
+    return state_->scene.mpm.boundary == MpmBoundary::kSurface;
+  }
   int fragment_count() const override { return static_cast<int>(pieces_.all.size()); }
   Span<const Fragment> fragments() override;
   std::uint64_t checksum() override;

@@ -36,6 +36,7 @@ void PbdTissue::cut(const BladePath& path, int stroke, const Array<float>& befor
 
 void PbdTissue::advance(double duration, const FrameInput& input) {
   pbd::State& s = *state_;
+  follow(input, s.scene);
   const int substeps = s.scene.pbd.steps;
   const float dt = static_cast<float>(duration / substeps);
   result_ = {};

@@ -9,6 +9,7 @@
 #include <string>
 
 #include "ros/remappings.h"
+#include "scene/scene_text.h"
 
 namespace tissue_sim {
 namespace {
@@ -152,6 +153,10 @@ Session Node::make_session(const Scene& asked) {
   for (const std::string& warning :
        useless_remappings(pose_node_.getNamespace(), names, ros::names::getRemappings())) {
     ROS_WARN("%s", warning.c_str());
+  }
+  if (parameters.cloud_fields != 0 && scene.method != Method::kMpm) {
+    ROS_WARN("~cloud_fields: clouds of method %s have none of these",
+             name_of(scene.method, kMethodNames));
   }
   session.scene_input =
       std::make_shared<SceneInput>(pose_node_, scene, frames_, parameters_.max_tool_speed);

@@ -164,7 +164,7 @@ boost::shared_ptr<const sensor_msgs::PointCloud2> Publications::cloud(Simulation
   selection.stride = parameters_.cloud_stride;
   selection.surface_only = parameters_.cloud_surface_only;
   selection.loose_only = loose_only;
-  selection.fields = parameters_.cloud_fields;
+  selection.fields = scene_.method == Method::kMpm ? parameters_.cloud_fields : 0;
   describe_points(simulation.tissue().read_points(selection, m->data), selection.fields, *m);
   return m;
 }

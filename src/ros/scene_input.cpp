@@ -82,8 +82,12 @@ void SceneInput::apply(Simulation& simulation) {
   const std::lock_guard<std::mutex> lock(mutex_);
   for (std::size_t i = 0; i < poses_.size(); ++i) {
     if (!poses_[i]) continue;
-    simulation.set_anchor(static_cast<int>(i), *poses_[i]);
-    last_[i] = poses_[i]->position;
+    try {
+      simulation.set_anchor(static_cast<int>(i), *poses_[i]);
+      last_[i] = poses_[i]->position;
+    } catch (const std::invalid_argument& e) {
+      ROS_WARN_THROTTLE(10, "anchor %s: %s", names_[i].c_str(), e.what());
+    }
     poses_[i].reset();
   }
   if (gravity_) simulation.set_gravity(*std::exchange(gravity_, std::nullopt));

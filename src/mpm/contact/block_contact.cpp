@@ -68,7 +68,7 @@ bool overlap(const Box& a, const Box& b) {
 constexpr int kListLasts = 8;
 constexpr double kListMargin = 0.5;
 /// How far from the points of a cell its surface may be [cells].
-constexpr double kSurfaceReach = 0.5;
+double surface_reach(const MpmState& state) { return state.points.outer.empty() ? 0 : 0.5; }
 
 /// How much nearer a block's points and a collider may come in a substep [m].
 double approach(const MpmState& state, int block, const Collider& collider, float dt) {
@@ -93,7 +93,7 @@ void find_near_colliders(MpmState& state, const std::vector<Box>& reach, double 
       box.max = box.max.cwiseMax(before[i].box.max);
     }
     const double margin =
-        state.motion[i].speed * duration + (0.5 + kSurfaceReach) * state.scene.cell_size;
+        state.motion[i].speed * duration + (0.5 + surface_reach(state)) * state.scene.cell_size;
     box.min.array() -= margin;
     box.max.array() += margin;
     for (std::size_t c = 0; c < reach.size(); ++c) {
@@ -106,8 +106,8 @@ bool came_unforeseen(const MpmState& state, const std::vector<Box>& reach) {
   for (std::size_t i = 0; i < state.motion.size(); ++i) {
     const std::vector<std::uint8_t>& near = state.contacts.near[i];
     Box box = state.motion[i].box;
-    box.min.array() -= kSurfaceReach * state.scene.cell_size;
-    box.max.array() += kSurfaceReach * state.scene.cell_size;
+    box.min.array() -= surface_reach(state) * state.scene.cell_size;
+    box.max.array() += surface_reach(state) * state.scene.cell_size;
     for (std::size_t c = 0; c < reach.size(); ++c) {
       if (!overlap(box, reach[c])) continue;
       if (std::find(near.begin(), near.end(), c) == near.end()) return true;
@@ -167,7 +167,7 @@ void list_near_cells(MpmState& state, int index, float dt) {
     const Collider& collider = state.colliders[c];
     const bool is_blade = collider.kind == Collider::kBlade;
     const double margin = kListLasts * approach(state, index, collider, dt) +
-                          (is_blade ? 0 : kSurfaceReach * body.cell_size);
+                          (is_blade ? 0 : surface_reach(state) * body.cell_size);
     const Box box = bounds(collider);
     float min[3], max[3];
     for (int a = 0; a < 3; ++a) {
@@ -303,12 +303,14 @@ bool push_points(BlockPush& b, const NearCell& cell, const Collider& collider, C
     Touch touch{cell.lane, p, static_cast<std::uint8_t>(s), cell.collider, {}, {}};
     if (!b.find_held(touch)) to_local(collider, at, touch.hold);
     const ContactSpring unit = unit_spring(b.body, b.state.points.material_of(p));
-    const float volume = b.state.points.volume[p], velocity[3] = {v[s][0], v[s][1], v[s][2]};
+    const float moves = b.block.volume[lane];  // none of what an anchor holds does
+    const float volume = moves > 0 ? moves : b.state.points.volume[p];
+    const float velocity[3] = {v[s][0], v[s][1], v[s][2]};
     float push[3];
     contact_force(collider, g, {unit.stiffness * volume, unit.damping * volume}, at, velocity,
                   touch.hold, push);
     b.touching.push_back(touch);
-    if (b.block.volume[lane] > 0) pushes[s] = Vec<4>{push[0], push[1], push[2], 0.0f};
+    if (moves > 0) pushes[s] = Vec<4>{push[0], push[1], push[2], 0.0f};
     add_load(collider, at, push, 1, load);
   }
   if (touches) spread(b.block, cell.node, pushes, b.force);

@@ -26,8 +26,9 @@ std::unique_ptr<MpmState> make_state(const Scene& scene, std::vector<std::string
   return state;
 }
 
-/// What the CPU does where the scene says so, and this does at the lattice.
+/// What the CPU does at the true surface where the scene says so, and this does at the lattice.
 void note_what_differs(const Scene& scene, std::vector<std::string>& notes) {
+  if (scene.mpm.boundary != MpmBoundary::kSurface) return;
   const bool anchors = std::any_of(scene.bodies.begin(), scene.bodies.end(),
                                    [](const Body& b) { return !b.anchors.empty(); });
   if (anchors) {
@@ -112,8 +113,7 @@ void CudaMpmTissue::begin_frame(double duration, const FrameInput& input) {
         "anchors do not move on a GPU yet (they hold nodes of the lattice there): set device to "
         "cpu");
   }
-  if (input.gravity != nullptr) state_->scene.gravity = *input.gravity;
-  if (input.damping != nullptr) state_->scene.damping = *input.damping;
+  follow(input, state_->scene);
   input_ = input;
   result_ = {};
   result_.loads.resize(state_->scene.tools.size());

@@ -6,28 +6,37 @@
 namespace tissue_sim {
 namespace {
 
-/// A tool's shaft: a cylinder along -z of its frame.
+/// What an arrow stands beside: a cylinder along -z of the tool's frame.
 struct Shaft {
   Vec3 axis = Vec3::Zero();    ///< a place on its middle line, in the tool's frame [m]
   double radius = 0;           ///< [m]
-  double first = 0, last = 0;  ///< from where to where it is free for an arrow, from the tip [m]
+  double unit = 0;             ///< what sizes go by [m]
+  double first = 0, last = 0;  ///< from where to where an arrow may stand, from the tip [m]
 };
 
 Shaft shaft_of(const Tool& tool) {
-  constexpr double kHandle = 0.1;  // as it is drawn
+  constexpr double kHandle = 0.1;  // as it is drawn; for tools without one as far
+  const double r = tool.radius;
   switch (tool.type) {
-    case ToolType::kScalpel:
-      return {Vec3(-tool.blade_width / 2, 0, 0), tool.blade_width / 2, 0,
-              tool.blade_length + kHandle};
-    case ToolType::kGrasper:  // above the jaws, which open
-      return {Vec3::Zero(), tool.jaw_width / 2, tool.jaw_length, tool.jaw_length + kHandle};
-    case ToolType::kProbe:
+    case ToolType::kScalpel: {
+      const double half = tool.blade_width / 2;
+      return {Vec3(-half, 0, 0), half, half, 0, tool.blade_length + kHandle};
+    }
+    case ToolType::kGrasper: {  // above the jaws, which open
+      const double half = tool.jaw_width / 2, l = tool.jaw_length;
+      return {Vec3::Zero(), half, half, l, l + kHandle};
+    }
     case ToolType::kBall:
+      return {Vec3::Zero(), r, r, 0, 2 * r + kHandle};
+    case ToolType::kPlate: {  // on its back
+      const double thick = tool.size.z();
+      return {Vec3::Zero(), 0, thick, 2 * thick, thick + kHandle};
+    }
+    case ToolType::kProbe:
     case ToolType::kPunch:
-    case ToolType::kPlate:
       break;
   }
-  return {Vec3::Zero(), tool.radius, 0, tool.length};
+  return {Vec3::Zero(), r, r, 0, std::max(tool.length, 2 * r)};
 }
 
 /// A direction across `axis`: to the right and a little to the front as RViz looks first.
@@ -61,7 +70,7 @@ bool place_force_arrow(const Tool& tool, const Pose& pose, const Vec3& force, do
   const double newtons = force.norm();
   if (!(newtons >= 0.005)) return false;
   const Shaft shaft = shaft_of(tool);
-  arrow.unit = std::max(0.0005, std::min(0.02, shaft.radius));
+  arrow.unit = std::max(0.0005, std::min(0.005, shaft.unit));
   arrow.text_height = 2 * arrow.unit;
   const Vec3 back = pose.orientation * Vec3(0, 0, -1), side = across(back);
   const Vec3 foot = pose * shaft.axis + (shaft.radius + arrow.unit) * side;

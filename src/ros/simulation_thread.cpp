@@ -8,8 +8,8 @@
 namespace tissue_sim {
 namespace {
 
-constexpr std::chrono::milliseconds kIdle(200);  // between two looks at a simulation at rest
-constexpr std::chrono::milliseconds kHold(20);   // between its forces and transforms
+constexpr std::chrono::milliseconds kShownAtRest(200);  // between two looks at a simulation at rest
+constexpr std::chrono::milliseconds kHold(20);          // between its forces and transforms
 
 }  // namespace
 
@@ -105,7 +105,7 @@ void SimulationThread::run() {
       frame();
       if (active()) shown = now;
     } else if (!active() || parameters_.time != TimeMode::kWall) {
-      if (now - shown >= kIdle) {
+      if (now - shown >= kShownAtRest) {
         shown = now;
         run_.real_time_factor = 0;
         session_.publications->show(*session_.simulation, report_, run_, clock_.stamp());

@@ -6,7 +6,7 @@
 namespace tissue_sim {
 namespace {
 
-std::int64_t nanoseconds(const ros::Time& t) { return static_cast<std::int64_t>(t.toNSec()); }
+std::int64_t in_nanoseconds(const ros::Time& t) { return static_cast<std::int64_t>(t.toNSec()); }
 
 }  // namespace
 
@@ -20,7 +20,7 @@ void ToolInput::hold(Held& held, const ros::Time& stamp, std::function<void()> a
   {
     const std::lock_guard<std::mutex> lock(held_mutex_);
     const ros::Time time = stamp.isZero() ? ros::Time::now() : stamp;
-    dropped = held.add(nanoseconds(time), std::move(accept), WallClock::now());
+    dropped = held.add(in_nanoseconds(time), std::move(accept), WallClock::now());
     late_ += dropped;
     came_since_ = came_since_ || &held == &held_poses_;
   }
@@ -45,7 +45,7 @@ void ToolInput::release(std::int64_t until) {
 }
 
 std::optional<ToolInput::Sample> ToolInput::take_until(const ros::Time& until) {
-  release(nanoseconds(until));
+  release(in_nanoseconds(until));
   held_now_ = until.toSec();
   return take_released(until);
 }
@@ -92,8 +92,8 @@ void ToolInput::begin() {
 
 void ToolInput::restart(const ros::Time& now) {
   const std::lock_guard<std::mutex> held_lock(held_mutex_);
-  held_poses_.restart(nanoseconds(now));
-  held_jaws_.restart(nanoseconds(now));
+  held_poses_.restart(in_nanoseconds(now));
+  held_jaws_.restart(in_nanoseconds(now));
   const std::lock_guard<std::mutex> lock(mutex_);
   came_since_ = held_poses_.first(WallClock::now()).has_value();
   check_.forget();

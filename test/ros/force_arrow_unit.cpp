@@ -75,6 +75,21 @@ TEST(ForceArrow, OfASmallForceIsLongAndOfALargerOneLonger) {
       place_force_arrow(tool, pose, Vec3(0, 0, 0.004), 0.02, Span<const Fragment>(), none));
 }
 
+TEST(ForceArrow, StandsOnAPlateAndBesideABall) {
+  Tool tool;
+  tool.type = ToolType::kPlate;
+  Pose pose;
+  pose.orientation = Quat(0, 1, 0, 0);
+  ForceArrow arrow;
+  ASSERT_TRUE(place_force_arrow(tool, pose, Vec3(0, 0, 1), 0.02, Span<const Fragment>(), arrow));
+  EXPECT_GT(arrow.start.z(), tool.size.z() + 0.9 * arrow.unit);
+  tool.type = ToolType::kBall;
+  tool.radius = 0.012;
+  ASSERT_TRUE(place_force_arrow(tool, pose, Vec3(1, 0, 0), 0.02, Span<const Fragment>(), arrow));
+  EXPECT_GT(arrow.start.x(), tool.radius + 0.9 * arrow.unit);
+  EXPECT_EQ(arrow.text_height, 0.01) << "not as large as the tool";
+}
+
 TEST(ForceArrow, StaysAtTheShaftWhereTissueIsHigherThanThat) {
   Tool tool;
   tool.length = 0.05;

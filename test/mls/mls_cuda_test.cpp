@@ -98,7 +98,9 @@ Pressed press(Device device) {
     const FrameReport report = simulation.advance_frame();
     EXPECT_FALSE(report.result.blew_up);
     result.force = std::max(result.force, report.result.loads[0].mean.force.norm());
-    if (frame == 4) EXPECT_EQ(report.result.cut_reports[0].new_fragments.size(), 1u);
+    if (frame == 4) {
+      EXPECT_EQ(report.result.cut_reports[0].new_fragments.size(), 1u);
+    }
   }
   std::vector<std::uint8_t> cloud;
   const int count = simulation.tissue().read_points({}, cloud);

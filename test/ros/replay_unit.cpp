@@ -160,10 +160,10 @@ TEST_F(ReplayTest, AnotherForceIsFoundByTheChecksum) {
   Writer w(path_);
   w.begin(slab());
   for (int i = 0; i < 8; ++i) {  // what is recorded is a hair beside what was done
-    w.simulation->set_tool(0, {Vec3(0.012, 0, 0.022 - 0.001 * i), kDown});
+    w.simulation->set_tool(0, {Vec3(0.012, 0, 0.020 - 0.001 * i), kDown});
     w.frame([&](FrameInputMessage& m) {
-      if (i == 4) m.tools[0].end.position.z += 1e-7;
-      if (i == 5) m.tools[0].begin.position.z += 1e-7;
+      if (i == 4) m.tools[0].end.position.z += 1e-6;
+      if (i == 5) m.tools[0].begin.position.z += 1e-6;
     });
   }
   w.close();
@@ -177,7 +177,11 @@ TEST_F(ReplayTest, WithAnotherSceneAllIsOther) {
   w.begin(slab());
   for (int i = 0; i < 3; ++i) w.frame();
   w.close();
-  const ReplayReport r = replay([](Scene& scene) { scene.gravity *= 1.01; });
+  const ReplayReport r = replay([](Scene& scene) {  // gravity and damping are inputs
+    Material stiffer = find_material(scene, scene.bodies[0].material);
+    stiffer.young_modulus *= 1.1;
+    scene.materials.push_back(stiffer);
+  });
   EXPECT_EQ(r.differing, 3);
   EXPECT_EQ(r.first.find("frame 0: "), 0u) << r.first;
   EXPECT_EQ(replay([](Scene& scene) { scene.threads = 1; }).first, "");

@@ -50,7 +50,8 @@ std::string write_bag(double begin) {
 }
 
 void play(const std::string& bag, const std::string& options) {
-  ASSERT_EQ(std::system(("rosbag play --quiet --clock --hz 200 " + options + " " + bag).c_str()),
+  ASSERT_EQ(std::system(
+                ("rosbag play --quiet --clock --hz 200 --delay 1 " + options + " " + bag).c_str()),
             0);
   ros::WallDuration(0.3).sleep();  // what is under way still comes
 }

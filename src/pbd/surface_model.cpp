@@ -16,6 +16,7 @@
 #include "geometry/surface.h"
 #include "pbd/internal_links.h"
 #include "pbd/model.h"
+#include "pbd/pbd_pieces.h"
 
 namespace tissue_sim {
 namespace pbd {
@@ -184,9 +185,24 @@ void make_surface_constraints(State& s) {
 }
 
 int add_internal_links(State& s, int b, const std::vector<int>& starts) {
-  const TriangleMesh mesh = reference_surface(s, b);
-  const std::vector<InternalLink> found =
-      find_internal_links(mesh, starts, away_from_wounds(s, mesh, starts));
+  // Within each piece: the walls of a wound lie on one another, and a ray would end where it
+  // begins.
+  UnionFind linked = joined(s);
+  std::map<std::int32_t, std::pair<TriangleMesh, std::vector<int>>> pieces;
+  for (const int v : starts) pieces[linked.root(v)].second.push_back(v);
+  for (const auto& t : reference_surface(s, b).triangles) {
+    const auto piece = pieces.find(linked.root(t[0]));
+    if (piece != pieces.end()) piece->second.first.triangles.push_back(t);
+  }
+  std::vector<InternalLink> found;
+  for (auto& [root, piece] : pieces) {
+    auto& [mesh, own] = piece;
+    mesh.vertices = s.vertices.reference;
+    for (const InternalLink& link :
+         find_internal_links(mesh, own, away_from_wounds(s, mesh, own))) {
+      found.push_back(link);
+    }
+  }
   std::vector<double> area(s.vertices.size(), 0.0);
   std::unordered_map<std::uint64_t, int> edges;
   for (const Triangle& t : s.triangles) {

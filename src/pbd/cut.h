@@ -22,7 +22,9 @@ inline Vec3 place_before(const State& s, const Array<float>& before, std::int32_
 /// (after_cut).
 bool cut_surface(State& s, const BladePath& path, const Array<float>& before, int stroke,
                  std::vector<std::int32_t>& origin, CutReport& report);
-bool cut_tetrahedra(State& s, const BladePath& path, const Array<float>& before,
+/// `smooth`: vertices move onto the blade's surface first; not for a path that goes on, for what
+/// moves there might step across the edge.
+bool cut_tetrahedra(State& s, const BladePath& path, const Array<float>& before, bool smooth,
                     std::vector<std::int32_t>& origin, CutReport& report);
 
 /// Closes the wounds of pieces that came apart (surface model), then makes constraints, masses and

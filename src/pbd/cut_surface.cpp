@@ -110,6 +110,19 @@ class SurfaceCut {
     return static_cast<int>(fresh_.size());
   }
 
+  /// Keeps what the blade swept, as far as the tissue around has moved back.
+  void remember(const std::vector<SweepPart>& parts) {
+    Vec3 moved = Vec3::Zero();
+    for (const std::int32_t v : touched_)
+      moved += s_.vertices.position(v) - s_.vertices.reference[v];
+    if (!touched_.empty()) moved /= static_cast<double>(touched_.size());
+    for (const SweepPart& part : parts) {
+      for (const SweptEdge& e : part.edges) {
+        s_.wounds.push_back({e.a0 - moved, e.b0 - moved, e.a1 - moved, e.b1 - moved});
+      }
+    }
+  }
+
   int touched() const { return static_cast<int>(touched_.size()); }
   bool changed() const { return changed_ || !fresh_.empty(); }
 
@@ -337,7 +350,9 @@ bool cut_surface(State& s, const BladePath& path, const Array<float>& before, in
   const int edges = cut.part_vertices();
   report.bonds_broken += internal + edges;
   report.points_separated += cut.touched();
-  return internal > 0 || cut.changed();
+  if (internal == 0 && !cut.changed()) return false;
+  cut.remember(parts);
+  return true;
 }
 
 }  // namespace pbd

@@ -260,7 +260,7 @@ class TetCut {
 
 }  // namespace
 
-bool cut_tetrahedra(State& s, const BladePath& path, const Array<float>& before,
+bool cut_tetrahedra(State& s, const BladePath& path, const Array<float>& before, bool smooth,
                     std::vector<std::int32_t>& origin, CutReport& report) {
   if (s.faces.empty()) find_faces(s);
   const int count = static_cast<int>(s.tetrahedra.size());
@@ -295,7 +295,7 @@ bool cut_tetrahedra(State& s, const BladePath& path, const Array<float>& before,
   if (broken.empty()) return false;
   report.bonds_broken += static_cast<std::int64_t>(broken.size());
   TetCut cut(s, broken);
-  cut.move_onto_blade();
+  if (smooth) cut.move_onto_blade();
   cut.part(origin, report);
   return true;
 }

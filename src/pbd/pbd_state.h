@@ -81,6 +81,8 @@ struct State {
   std::vector<std::int32_t> stroke, copy_of;
   std::vector<Vec3> blade_normal, blade_point;
   std::set<std::array<std::int32_t, 2>> cut_edges;  ///< of the surface, lower vertex first
+  /// What blades swept, in reference space: edges (a, b) at the beginning and at the end of a part.
+  std::vector<std::array<Vec3, 4>> wounds;
   std::vector<std::int32_t> bare;  ///< vertices that a cut took the internal constraints of
   std::vector<InnerFace> faces;    ///< between tetrahedra
   double mean_edge = 0;            ///< of the surface when it was made [m]

@@ -26,9 +26,10 @@ void PbdTissue::cut(const BladePath& path, int stroke, const Array<float>& befor
                     CutReport& report) {
   pbd::State& s = *state_;
   std::vector<std::int32_t> origin;
+  const bool is_whole = stroke >= static_cast<int>(s.scene.tools.size());  // no instrument's
   const bool changed = s.tetrahedra.empty()
                            ? pbd::cut_surface(s, path, before, stroke, origin, report)
-                           : pbd::cut_tetrahedra(s, path, before, origin, report);
+                           : pbd::cut_tetrahedra(s, path, before, is_whole, origin, report);
   if (!changed) return;
   pbd::after_cut(s, origin);
   for (const int id : pbd::update_pieces(s, origin, pieces_)) report.new_fragments.push_back(id);

@@ -13,6 +13,7 @@
 #include <map>
 #include <unordered_map>
 
+#include "cutting/blade_sweep.h"
 #include "geometry/surface.h"
 #include "pbd/internal_links.h"
 #include "pbd/model.h"
@@ -184,6 +185,17 @@ void make_surface_constraints(State& s) {
   }
 }
 
+/// Whether a blade went between two vertices; not beside them, for they may lie on the wound.
+static bool is_parted(const State& s, const InternalLink& link) {
+  const Vec3 &a = s.vertices.reference[link.from], &b = s.vertices.reference[link.to];
+  const Vec3 from = a + 0.02 * (b - a), to = b - 0.02 * (b - a);
+  const MovingSegment segment = {from, to, from, to};
+  for (const auto& w : s.wounds) {
+    if (edge_passes<Vec3>(MovingSegment{w[0], w[1], w[2], w[3]}, segment)) return true;
+  }
+  return false;
+}
+
 int add_internal_links(State& s, int b, const std::vector<int>& starts) {
   // Within each piece: the walls of a wound lie on one another, and a ray would end where it
   // begins.
@@ -215,7 +227,7 @@ int add_internal_links(State& s, int b, const std::vector<int>& starts) {
   for (const InternalPair& p : s.internal) pairs[{p.a, p.b}] = p.area;
   for (const InternalLink& link : found) {
     s.half_depth[link.from] = 0.5 * link.length;
-    if (edges.count(pair_key(link.from, link.to)) != 0) continue;
+    if (edges.count(pair_key(link.from, link.to)) != 0 || is_parted(s, link)) continue;
     pairs[{std::min(link.from, link.to), std::max(link.from, link.to)}] += 0.5 * area[link.from];
   }
   s.internal.clear();

@@ -161,6 +161,12 @@ void after_cut(State& s, std::vector<std::int32_t>& origin) {
   std::vector<Motion> before;
   for (int b = 0; b < bodies; ++b) before.push_back(motion_of(s, b, nullptr));
   if (s.tetrahedra.empty()) {
+    UnionFind skin = skins(s);  // those found while the skin still hung together go when it parts
+    s.internal.erase(std::remove_if(s.internal.begin(), s.internal.end(),
+                                    [&skin](const InternalPair& p) {
+                                      return p.is_late && skin.root(p.a) != skin.root(p.b);
+                                    }),
+                     s.internal.end());
     std::vector<std::int32_t> starts = close_wounds(s, origin);
     for (int v = s.vertices.size() - static_cast<int>(origin.size()); v < s.vertices.size(); ++v) {
       starts.push_back(v);

@@ -8,12 +8,17 @@
 namespace tissue_sim {
 namespace pbd {
 
-UnionFind joined(const State& s) {
+UnionFind skins(const State& s) {
   UnionFind linked(s.vertices.size());
   for (const Triangle& t : s.triangles) {
     linked.join(t[0], t[1]);
     linked.join(t[0], t[2]);
   }
+  return linked;
+}
+
+UnionFind joined(const State& s) {
+  UnionFind linked = skins(s);
   for (const Tetrahedron& t : s.tetrahedra) {
     for (int i = 1; i < 4; ++i) linked.join(t[0], t[i]);
   }

@@ -12,6 +12,9 @@ namespace pbd {
 /// What hangs together.
 UnionFind joined(const State& s);
 
+/// What hangs together by triangles alone.
+UnionFind skins(const State& s);
+
 /// One piece a body, and more for a mesh in parts.
 Pieces whole_pieces(const State& s);
 

@@ -46,6 +46,7 @@ using Tetrahedron = std::array<std::int32_t, 4>;
 struct InternalPair {
   std::int32_t a, b;  ///< a < b
   double area;        ///< of the column of tissue that it stands for [m^2]
+  bool is_late;       ///< found after a cut: joins vertices of one skin only
 };
 
 /// A face that two tetrahedra share, and which of their corners lie opposite to it.

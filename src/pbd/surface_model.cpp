@@ -108,31 +108,50 @@ void add_bend(State& s, const MeshEdge& e, double stiffness) {
   s.bends.add(at, {Bending::parts(v).angle, static_cast<float>(1 / stiffness)});
 }
 
-/// For vertices beside a wound, towards the triangles that they have: their rays leave the blade's
-/// surface and stay on their side.
-std::vector<Vec3> away_from_wounds(const State& s, const TriangleMesh& mesh,
-                                   const std::vector<int>& starts) {
-  constexpr double kLean = 0.2;
-  const std::vector<Vec3> normals = vertex_normals(mesh);
-  std::map<int, Vec3> to;
-  for (const int v : starts) {
-    if (s.stroke[v] >= 0) to[v] = Vec3::Zero();
-  }
+/// Of each vertex beside a wound: the blade's normal there, or the way along the surface where that
+/// is not known, towards the triangles that the vertex has.
+std::map<int, Vec3> own_sides(const State& s, const TriangleMesh& mesh,
+                              const std::vector<Vec3>& normals) {
+  std::map<int, Vec3> side;
   for (const auto& t : mesh.triangles) {
     const Vec3 sum = mesh.vertices[t[0]] + mesh.vertices[t[1]] + mesh.vertices[t[2]];
     for (const int v : t) {
-      const auto at = to.find(v);
-      if (at != to.end()) at->second += sum - 3 * mesh.vertices[v];
+      if (s.stroke[v] >= 0)
+        side.try_emplace(v, Vec3::Zero()).first->second += sum - 3 * mesh.vertices[v];
     }
   }
+  for (auto& [v, way] : side) {
+    const Vec3& blade = s.blade_normal[v];
+    way -= way.dot(normals[v]) * normals[v];
+    way = blade.isZero() ? Vec3(way.stableNormalized()) : way.dot(blade) < 0 ? Vec3(-blade) : blade;
+  }
+  return side;
+}
+
+/// How rays must lean, against the normal alone they may run into the wound that they begin at.
+std::vector<Vec3> away_from_wounds(const std::map<int, Vec3>& sides,
+                                   const std::vector<Vec3>& normals,
+                                   const std::vector<int>& starts) {
+  constexpr double kLean = 0.2;
   std::vector<Vec3> lean;
   for (const int v : starts) {
-    const auto at = to.find(v);
-    Vec3 way = at == to.end() ? Vec3(Vec3::Zero()) : at->second;
-    way -= way.dot(normals[v]) * normals[v];
-    lean.push_back(kLean * way.stableNormalized());
+    const auto at = sides.find(v);
+    if (at == sides.end()) {
+      lean.push_back(Vec3::Zero());
+    } else {
+      lean.push_back(std::max(0.0, kLean + normals[v].dot(at->second)) * at->second);
+    }
   }
   return lean;
+}
+
+/// Whether a link leaves each of its ends towards that one's own side of the wound there.
+bool stays_on_its_side(const TriangleMesh& mesh, const std::map<int, Vec3>& sides,
+                       const InternalLink& link) {
+  const Vec3 way = mesh.vertices[link.to] - mesh.vertices[link.from];
+  const auto from = sides.find(link.from), to = sides.find(link.to);
+  return (from == sides.end() || from->second.dot(way) > 0) &&
+         (to == sides.end() || to->second.dot(way) < 0);
 }
 
 }  // namespace
@@ -206,12 +225,16 @@ int add_internal_links(State& s, int b, const std::vector<int>& starts) {
     const auto piece = pieces.find(linked.root(t[0]));
     if (piece != pieces.end()) piece->second.first.triangles.push_back(t);
   }
+  const bool late = !s.cut_edges.empty();
   std::vector<InternalLink> found;
   for (auto& [root, piece] : pieces) {
     auto& [mesh, own] = piece;
     mesh.vertices = s.vertices.reference;
+    const std::vector<Vec3> normals = vertex_normals(mesh);
+    const std::map<int, Vec3> sides = own_sides(s, mesh, normals);
     for (const InternalLink& link :
-         find_internal_links(mesh, own, away_from_wounds(s, mesh, own))) {
+         find_internal_links(mesh, own, away_from_wounds(sides, normals, own))) {
+      if (!stays_on_its_side(mesh, sides, link)) continue;
       found.push_back(link);
     }
   }
@@ -223,15 +246,18 @@ int add_internal_links(State& s, int b, const std::vector<int>& starts) {
       edges[pair_key(t[i], t[(i + 1) % 3])] = 1;
     }
   }
-  std::map<std::pair<std::int32_t, std::int32_t>, double> pairs;
-  for (const InternalPair& p : s.internal) pairs[{p.a, p.b}] = p.area;
+  std::map<std::pair<std::int32_t, std::int32_t>, InternalPair> pairs;
+  for (const InternalPair& p : s.internal) pairs[{p.a, p.b}] = p;
   for (const InternalLink& link : found) {
     s.half_depth[link.from] = 0.5 * link.length;
     if (edges.count(pair_key(link.from, link.to)) != 0 || is_parted(s, link)) continue;
-    pairs[{std::min(link.from, link.to), std::max(link.from, link.to)}] += 0.5 * area[link.from];
+    const std::int32_t low = std::min(link.from, link.to), high = std::max(link.from, link.to);
+    InternalPair& pair =
+        pairs.try_emplace({low, high}, InternalPair{low, high, 0, late}).first->second;
+    pair.area += 0.5 * area[link.from];
   }
   s.internal.clear();
-  for (const auto& [p, a] : pairs) s.internal.push_back({p.first, p.second, a});
+  for (const auto& [key, pair] : pairs) s.internal.push_back(pair);
   // Where no ray meets anything the body is taken to be as deep as it is on the mean.
   double depth = 0;
   int met = 0;

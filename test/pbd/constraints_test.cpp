@@ -3,12 +3,14 @@
 
 #include <gtest/gtest.h>
 
+#include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
 #include <random>
 
 #include "compute/simd.h"
 #include "pbd/project.h"
+#include "tissue_sim/types.h"
 
 namespace tissue_sim {
 namespace pbd {

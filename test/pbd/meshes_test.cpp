@@ -147,7 +147,9 @@ TEST(Rays, MeetWhatABruteForceSearchMeets) {
     }
     const RayHit hit = tree.first_exit(origin, direction, -1, 0);
     EXPECT_EQ(hit.triangle >= 0, nearest < 1e299);
-    if (hit.triangle >= 0) EXPECT_NEAR(hit.along, nearest, 1e-9);
+    if (hit.triangle >= 0) {
+      EXPECT_NEAR(hit.along, nearest, 1e-9);
+    }
     EXPECT_EQ(tree.winding(origin, direction), winding);
   }
 }

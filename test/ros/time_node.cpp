@@ -43,7 +43,7 @@ std::string write_bag(double begin) {
   for (int i = 0; i < 130; ++i) {
     geometry_msgs::PoseStamped m;
     m.header.stamp = ros::Time(begin + 0.01 * i);
-    m.pose = to_pose(above(i < 100 ? 0.025 - 0.0001 * i : 0.015));
+    m.pose = to_pose(above(i < 100 ? 0.025 - 0.00015 * i : 0.01));
     bag.write("/simulator/probe/measured_cp", m.header.stamp + ros::Duration(0.003), m);
   }
   return path;

@@ -184,6 +184,7 @@ int run_operation(int seed, const MethodOnDevice& on) {
   Scene scene = random_scene(random, middle);
   scene.method = on.method;
   scene.device = on.device;
+  if (on.method == Method::kMls) scene.mls.spacing = scene.cell_size;  // an eighth of the nodes
   scene.seed = static_cast<std::uint64_t>(seed);
   Simulation simulation(scene);
   std::vector<Wanderer> tools(scene.tools.size());
@@ -226,6 +227,7 @@ FOR_EACH_METHOD(RandomOperations);
 
 TEST_P(RandomOperations, DoNotBlowUp) {
   std::vector<int> seeds = {13, 14, 103};
+  if (GetParam().method == Method::kMls) seeds = {14};  // it searches contacts for minutes
   if (const char* asked = std::getenv("TISSUE_SIM_OPERATIONS")) {
     int first, count;
     ASSERT_EQ(std::sscanf(asked, "%d:%d", &first, &count), 2) << "<first seed>:<count>";

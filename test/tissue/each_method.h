@@ -100,6 +100,8 @@ inline constexpr Shortfall kShortfalls[] = {
     {Method::kMls, "SagsAsTimoshenkoSays", "off by 3.8 to 7 %, for 3 %"},
     {Method::kMls, "AStruckBodyIsWhatTheToolGaveIt",
      "the strike gives too little: 0.7 g m/s, for 1"},
+    {Method::kMls, "IsCarriedByTheGround",
+     "rests 1.7 mm too low: its outermost nodes touch, half a spacing inside"},
     {Method::kMls, "FreeFlightStaysThroughCutsAsWithoutThem",
      "9 % of energy gained by five cuts, for 3"},
 };

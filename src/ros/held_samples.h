@@ -16,6 +16,7 @@ namespace tissue_sim {
 /// In the order in which they came. A stamp that goes back by more than a second is of a time that
 /// has jumped back, which the clock's own message may say only later: what comes from there on is
 /// not taken before restart(), or the arm's own clock was set back and nobody restarts anything.
+/// What the clock said as each came (`clock`, ns) tells which came before a jump of the clock.
 template <class T>
 class HeldSamples {
  public:
@@ -26,7 +27,7 @@ class HeldSamples {
   static constexpr std::int64_t kAll = std::numeric_limits<std::int64_t>::max();
 
   /// Returns whether an old one was dropped for it.
-  bool add(std::int64_t stamp, T sample, WallTime now) {
+  bool add(std::int64_t stamp, T sample, WallTime now, std::int64_t clock) {
     if (!all_.empty() || taken_) {
       const std::int64_t before = all_.empty() ? newest_ : all_.back().stamp;
       if (stamp < before - kBack && !jump_) {
@@ -34,7 +35,7 @@ class HeldSamples {
         jumped_at_ = now;
       }
     }
-    all_.push_back({stamp, std::move(sample)});
+    all_.push_back({stamp, std::move(sample), clock});
     if (all_.size() <= kMost) return false;
     all_.pop_front();
     if (jump_ && *jump_ > 0) --*jump_;
@@ -63,12 +64,14 @@ class HeldSamples {
     return all_.front().stamp;
   }
 
-  /// Time has jumped back to `now`: forgets what was stamped before it did.
-  void restart(std::int64_t now) {
+  /// The clock has jumped back from `before` to `now`: forgets what came before it did.
+  void restart(std::int64_t before, std::int64_t now) {
     if (jump_) {
       all_.erase(all_.begin(), all_.begin() + static_cast<std::ptrdiff_t>(*jump_));
     } else {
-      while (!all_.empty() && all_.front().stamp > now + kBack) all_.pop_front();
+      // Half of the jump: another thread's clock may be some milliseconds ahead of `now`.
+      const std::int64_t half = now + (before - now) / 2;
+      while (!all_.empty() && all_.front().clock > half) all_.pop_front();
     }
     jump_.reset();
     taken_ = false;
@@ -81,6 +84,7 @@ class HeldSamples {
   struct Item {
     std::int64_t stamp;
     T sample;
+    std::int64_t clock;
   };
 
   bool open(WallTime now) {

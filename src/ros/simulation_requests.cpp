@@ -169,7 +169,7 @@ void SimulationThread::record_scene() {
 void SimulationThread::on_clock(const ros::Time& now) {
   {
     const std::lock_guard<std::mutex> lock(mutex_);
-    jumped_back_ = jumped_back_ || now < ros_time_;
+    if (now < ros_time_) jumped_from_ = std::max(ros_time_, jumped_from_.value_or(ros_time_));
     ros_time_ = now;
     woken_ = true;
   }

@@ -86,7 +86,7 @@ void SimulationThread::run() {
   WallTime shown = WallClock::now();
   for (;;) {
     std::vector<std::function<void()>> work;
-    bool jumped_back = false;
+    std::optional<ros::Time> jumped_from;
     {
       const WallTime now = WallClock::now();
       const WallTime until = frame_due() ? now : active() ? clock_.wake() : now + kHold;
@@ -95,10 +95,10 @@ void SimulationThread::run() {
       if (stop_) return;
       work.swap(work_);
       woken_ = false;
-      jumped_back = std::exchange(jumped_back_, false);
+      jumped_from = std::exchange(jumped_from_, std::nullopt);
       clock_.set_ros_time(ros_time_);
     }
-    if (jumped_back) start_anew(clock_.ros_time());
+    if (jumped_from) start_anew(*jumped_from, clock_.ros_time());
     for (const std::function<void()>& each : work) each();
     const WallTime now = WallClock::now();
     if (frame_due()) {
@@ -116,9 +116,9 @@ void SimulationThread::run() {
   }
 }
 
-void SimulationThread::start_anew(const ros::Time& now) {
+void SimulationThread::start_anew(const ros::Time& before, const ros::Time& now) {
   ROS_WARN("/clock jumped back to %.3f s: the scene starts anew", now.toSec());
-  for (const auto& tool : *session_.tools) tool->restart(now);
+  for (const auto& tool : *session_.tools) tool->restart(before, now);
   const Scene scene = session_.simulation->scene();
   try {
     session_.simulation.reset();  // its memory, before the next one's

@@ -118,7 +118,7 @@ class SimulationThread {
   void frame();
   bool frame_due();
   void move_tools(AppliedInput& input);
-  void start_anew(const ros::Time& now);
+  void start_anew(const ros::Time& before, const ros::Time& now);
   void answer_cuts(std::vector<PendingCut>& cuts, const FrameReport& report);
   void answer_step(const char* interrupted);
   /// Whether it is over, after a frame.
@@ -160,9 +160,9 @@ class SimulationThread {
   std::condition_variable wake_;
   std::vector<std::function<void()>> work_;
   bool stop_ = false;
-  bool woken_ = false;        // by a sample or /clock
-  bool jumped_back_ = false;  // /clock did
-  ros::Time ros_time_;        // what it says
+  bool woken_ = false;                    // by a sample or /clock
+  std::optional<ros::Time> jumped_from_;  // /clock did, back
+  ros::Time ros_time_;                    // what it says
   RunStatus status_;
   std::shared_ptr<ToolInputs> tools_;
   std::set<std::string> topics_;

@@ -66,7 +66,7 @@ class ToolInput {
   void begin();
   /// Time has jumped back to `now`: what came before is forgotten but for what is latched, which
   /// will not come again.
-  void restart(const ros::Time& now);
+  void restart(const ros::Time& before, const ros::Time& now);
   /// Samples that came after the frame that they were for had begun, since begin(); and those that
   /// were held in vain, for too many others came.
   std::uint64_t late() const;

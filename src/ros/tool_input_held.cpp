@@ -20,7 +20,8 @@ void ToolInput::hold(Held& held, const ros::Time& stamp, std::function<void()> a
   {
     const std::lock_guard<std::mutex> lock(held_mutex_);
     const ros::Time time = stamp.isZero() ? ros::Time::now() : stamp;
-    dropped = held.add(in_nanoseconds(time), std::move(accept), WallClock::now());
+    dropped = held.add(in_nanoseconds(time), std::move(accept), WallClock::now(),
+                       in_nanoseconds(ros::Time::now()));
     late_ += dropped;
     came_since_ = came_since_ || &held == &held_poses_;
   }
@@ -90,10 +91,10 @@ void ToolInput::begin() {
   late_ = 0;
 }
 
-void ToolInput::restart(const ros::Time& now) {
+void ToolInput::restart(const ros::Time& before, const ros::Time& now) {
   const std::lock_guard<std::mutex> held_lock(held_mutex_);
-  held_poses_.restart(in_nanoseconds(now));
-  held_jaws_.restart(in_nanoseconds(now));
+  held_poses_.restart(in_nanoseconds(before), in_nanoseconds(now));
+  held_jaws_.restart(in_nanoseconds(before), in_nanoseconds(now));
   const std::lock_guard<std::mutex> lock(mutex_);
   came_since_ = held_poses_.first(WallClock::now()).has_value();
   check_.forget();

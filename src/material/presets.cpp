@@ -3,7 +3,14 @@
 //
 // Where a source gives a shear modulus, E = 3 mu. Common to all presets, and choices rather than
 // measurements: Poisson's ratio 0.45 (soft tissue is nearer 0.5; 0.45 keeps substeps long),
-// friction 0.3, no viscosity (published ones hold for one frequency band only).
+// friction 0.3.
+//
+// Viscosity, 1 Pa s of organs and 2 of gelatine, is chosen so that a body of some centimetres that
+// was let go comes to rest within three seconds, at little cost in substeps (docs/experiments.md):
+// of a mode of wave number k it takes exp(-eta k^2 t / (2 rho)), whatever the stiffness, and
+// nothing of free fall and of rigid turning. Shear waves of some hundred hertz give as much: 0.6
+// to 1.1 Pa s in gelatine of 3 % without and with oil (Nguyen et al., Ultrasound Med. Biol. 40:168,
+// 2014).
 //
 // Densities, unless stated: table 3 of Mech. Mater. 44:174 (2012),
 // doi:10.1016/j.mechmat.2011.08.007, collected there from Goss et al., Mast and others.
@@ -14,12 +21,13 @@
 namespace tissue_sim {
 namespace {
 
-Material preset(const char* name, double young_modulus, double density) {
+Material preset(const char* name, double young_modulus, double density, double viscosity = 1) {
   Material m;
   m.name = name;
   m.young_modulus = young_modulus;
   m.poisson_ratio = 0.45;
   m.density = density;
+  m.viscosity = viscosity;
   return m;
 }
 
@@ -59,7 +67,7 @@ const std::vector<Material>& material_presets() {
       // Gelatine phantom, one part powder to ten of water, from the power law between 4.34 kPa at
       // 20:1 and 277 kPa at 2:1 (Bonavia, arXiv:2512.20502, 2025, instantaneous stiffness): 15 kPa.
       // Density: that of the mixture, gelatine at about 1.35 g/mL.
-      preset("gelatine", 15e3, 1020),
+      preset("gelatine", 15e3, 1020, 2),
   };
   return presets;
 }

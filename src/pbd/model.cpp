@@ -81,7 +81,10 @@ std::unique_ptr<State> make_state(const Scene& scene, std::vector<std::string>* 
     const auto tell = [&](const std::string& material) {
       const Material& m = find_material(scene, material);
       if (notes == nullptr) return;
-      if (m.viscosity > 0) {
+      const bool stated =  // a preset's is nobody's wish
+          std::any_of(scene.materials.begin(), scene.materials.end(),
+                      [&](const Material& own) { return own.name == material; });
+      if (m.viscosity > 0 && stated) {
         notes->push_back("material '" + m.name +
                          "': method pbd has no viscosity; it damps by its steps alone");
       }

@@ -11,6 +11,7 @@
 #include <stdexcept>
 
 #include "ros/recording_path.h"
+#include "ros/warn_seldom.h"
 
 namespace tissue_sim {
 namespace {
@@ -134,10 +135,10 @@ void Recorder::push(Item item, bool must_keep) {
   if (dropped.empty()) {
     wake_.notify_one();
   } else {
-    ROS_WARN_THROTTLE(1,
-                      "The disk is too slow for the recording: a message of %s is lost (see "
-                      "diagnostics). Record fewer points (cloud_rate, cloud_stride) or topics.",
-                      dropped.c_str());
+    WARN_SELDOM(1,
+                "The disk is too slow for the recording: a message of %s is lost (see "
+                "diagnostics). Record fewer points (cloud_rate, cloud_stride) or topics.",
+                dropped.c_str());
   }
 }
 

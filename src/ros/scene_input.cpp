@@ -1,12 +1,11 @@
 #include "ros/scene_input.h"
 
-#include <ros/console.h>
-
-#include <cmath>
 #include <stdexcept>
 #include <utility>
 
 #include "ros/conversions.h"
+#include "ros/pose_check.h"
+#include "ros/warn_seldom.h"
 
 namespace tissue_sim {
 
@@ -35,25 +34,27 @@ void SceneInput::on_pose(int anchor, const geometry_msgs::PoseStamped& message) 
   const char* name = names_[anchor].c_str();
   Pose pose = from_message(message.pose);
   const double norm = pose.orientation.norm();
-  if (!pose.position.allFinite() || !(std::fabs(norm - 1) < 1e-2)) {
-    ROS_WARN_THROTTLE(1, "anchor %s: a pose is not finite or its quaternion no rotation (norm %g)",
-                      name, norm);
+  if (!pose.position.allFinite() || !is_rotation(pose.orientation)) {
+    WARN_SELDOM(1,
+                "anchor %s: a pose is not finite, or its quaternion has norm %.3g, must be 1 (0.9 "
+                "to 1.1 is normalised)",
+                name, norm);
     return;
   }
   pose.orientation.normalize();
   try {
     pose = frames_.in_world(message.header.frame_id, message.header.stamp) * pose;
   } catch (const tf2::TransformException& e) {
-    ROS_WARN_THROTTLE(1, "anchor %s: %s", name, e.what());
+    WARN_SELDOM(1, "anchor %s: %s", name, e.what());
     return;
   }
   const std::lock_guard<std::mutex> lock(mutex_);
   const double step = (pose.position - last_[anchor]).norm();
   if (step > farthest_) {
-    ROS_WARN_THROTTLE(1,
-                      "anchor %s: a pose is %g m from where it is; in a frame it moves by %g m at "
-                      "most (max_tool_speed)",
-                      name, step, farthest_);
+    WARN_SELDOM(1,
+                "anchor %s: a pose is %g m from where it is; in a frame it moves by %g m at "
+                "most (max_tool_speed)",
+                name, step, farthest_);
     return;
   }
   poses_[anchor] = pose;
@@ -62,7 +63,7 @@ void SceneInput::on_pose(int anchor, const geometry_msgs::PoseStamped& message) 
 void SceneInput::on_gravity(const geometry_msgs::Vector3& message) {
   const Vec3 gravity(message.x, message.y, message.z);
   if (!gravity.allFinite() || gravity.cwiseAbs().maxCoeff() > 1000) {
-    ROS_WARN_THROTTLE(1, "gravity: each component must lie between -1000 and 1000 m/s^2");
+    WARN_SELDOM(1, "gravity: each component must lie between -1000 and 1000 m/s^2");
     return;
   }
   const std::lock_guard<std::mutex> lock(mutex_);
@@ -71,7 +72,7 @@ void SceneInput::on_gravity(const geometry_msgs::Vector3& message) {
 
 void SceneInput::on_damping(const std_msgs::Float64& message) {
   if (!(message.data >= 0 && message.data <= 1000)) {
-    ROS_WARN_THROTTLE(1, "damping is %g: must lie between 0 and 1000", message.data);
+    WARN_SELDOM(1, "damping is %g: must lie between 0 and 1000", message.data);
     return;
   }
   const std::lock_guard<std::mutex> lock(mutex_);
@@ -86,7 +87,7 @@ void SceneInput::apply(Simulation& simulation) {
       simulation.set_anchor(static_cast<int>(i), *poses_[i]);
       last_[i] = poses_[i]->position;
     } catch (const std::invalid_argument& e) {
-      ROS_WARN_THROTTLE(10, "anchor %s: %s", names_[i].c_str(), e.what());
+      WARN_SELDOM(10, "anchor %s: %s", names_[i].c_str(), e.what());
     }
     poses_[i].reset();
   }

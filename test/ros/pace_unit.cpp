@@ -1,6 +1,7 @@
 #include <gtest/gtest.h>
 
 #include "ros/pace.h"
+#include "ros/warn_seldom.h"
 
 namespace tissue_sim {
 namespace {
@@ -23,6 +24,14 @@ TEST(Pace, NeverCatchesUp) {
   pace.restart(kStart);
   pace.begin_frame(kStart + milliseconds(500));
   EXPECT_EQ(pace.due(), kStart + milliseconds(510));
+}
+
+TEST(Seldom, IsDueAtFirstAndThenOnceAPeriod) {
+  Seldom seldom(1);
+  EXPECT_TRUE(seldom.due(kStart));
+  EXPECT_FALSE(seldom.due(kStart + milliseconds(999)));
+  EXPECT_TRUE(seldom.due(kStart + milliseconds(1000)));
+  EXPECT_FALSE(seldom.due(kStart + milliseconds(1001)));
 }
 
 TEST(RealTimeFactor, LooksAtTheLastSecond) {

@@ -1,35 +1,20 @@
 // How long a substep may be: what any tissue bears, and what this one was measured to bear.
 #pragma once
 
-#include <algorithm>
-#include <cmath>
-#include <functional>
 #include <vector>
 
-#include "frame/part_substeps.h"
+#include "frame/stability_limit.h"
+#include "frame/step_acceptance.h"
+#include "frame/step_length.h"
 #include "mpm/mpm_state.h"
 #include "mpm/state_figures.h"
 
 namespace tissue_sim {
 
-/// Measures the limit of stability of the linearised motion [s]: of the blocks of the state whose
-/// flag is set, with `steps` steps of largest_eigenvalue().
-using MeasureLimit = std::function<double(const std::vector<std::uint8_t>& blocks, int steps)>;
-
-/// What a part of a frame left and brought [J].
-struct PartEnergy {
-  double kinetic = NAN, elastic = NAN;  ///< at its end; NAN where they were not measured
-  double given = 0;                     ///< by instruments
-  double time = 0;                      ///< that it took [s]
-};
-
 /// The cautious substep, stable_substep(), is what a lone point bears that was cut off on all
-/// sides; whole tissue bears about twice as much. So the highest frequency is measured now and
-/// then, and where a cut went at once; in between the stiffening of each block bounds how it grew.
-///
-/// None of this knows what a part of a frame brings: a few points that swing may stiffen tenfold
-/// within six substeps. So a part that stiffened until its substeps were too long is undone, and
-/// done again with shorter ones.
+/// sides; whole tissue bears about twice as much. So the limit is measured, substeps are chosen by
+/// it, and a part of a frame that went beyond it is rejected: StabilityLimit, StepLength,
+/// StepAcceptance, here with what the lattice knows of cuts, tears and tools.
 class SubstepChoice {
  public:
   /// Whether tissue that ended a part of a frame with these moduli (see follow()) and this
@@ -56,27 +41,13 @@ class SubstepChoice {
                     double longest) const;
 
  private:
-  /// longest() as long as no part had to be undone.
+  /// longest() as long as no part was rejected.
   double longest_foreseen(MpmState& state, const FrameInput& input, const Stiffening& stiffening,
                           double cautious, const MeasureLimit& measure);
-  /// The same for tissue that nothing damps: it swings for long, and each change of its substeps
-  /// would add to its energy. They are as short as the shortest of a swing.
-  double held(double time, double foreseen);
-  void measure_if_due(MpmState& state, const MeasureLimit& measure);
 
-  double limit_ = 0;        ///< when it was measured last [s]; 0 where it is not known
-  double measured_at_ = 0;  ///< when that was of all blocks [s]
-  double longest_age_ = 0;  ///< of limit_ [s]
-  double growth_ = 1;       ///< of the stiffness since, at most
-  double trend_ = 1;        ///< of the stiffness in the last part, at most
-  double part_ = 0;         ///< how long the next part may be [s], ...
-  double most_ = 0;  ///< ... and its first substep, until they are as short as they should be
-  double held_ = INFINITY;                                                 ///< see held() [s]
-  double of_swing_ = INFINITY, of_last_swing_ = INFINITY, swing_end_ = 0;  ///< the same
-  double followed_at_ = 0;                                                 ///< [s]
-  double energy_ = NAN;   ///< after the last part that was borne [J]
-  double shortened_ = 1;  ///< how much substeps are shorter than they would be, after parts that
-                          ///< were not borne
+  StabilityLimit limit_;
+  StepLength length_;
+  StepAcceptance acceptance_;
 };
 
 }  // namespace tissue_sim

@@ -15,6 +15,7 @@
 
 #include "ros/conversions.h"
 #include "ros/messages.h"
+#include "ros/programs.h"
 #include "ros/trajectory.h"
 
 namespace tissue_sim {
@@ -118,16 +119,17 @@ class Player {
 };
 
 }  // namespace
-}  // namespace tissue_sim
 
-int main(int argc, char** argv) {
+int play_instrument(int argc, char** argv) {
   ros::init(argc, argv, "play_instrument");
   ros::NodeHandle own("~");
   try {
-    tissue_sim::Player(own).play();
+    Player(own).play();
   } catch (const std::exception& e) {
     ROS_FATAL("cannot play: %s", e.what());
     return 1;
   }
   return 0;
 }
+
+}  // namespace tissue_sim

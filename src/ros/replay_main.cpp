@@ -22,6 +22,7 @@
 #include <stdexcept>
 #include <thread>
 
+#include "ros/programs.h"
 #include "ros/publications.h"
 #include "ros/replay.h"
 #include "scene/scene_text.h"
@@ -237,16 +238,17 @@ int replay(const Options& options) {
 }
 
 }  // namespace
-}  // namespace tissue_sim
 
-int main(int argc, char** argv) {
+int replay(int argc, char** argv) {
   ros::init(argc, argv, "replay", ros::init_options::AnonymousName);
   ros::Time::init();
   try {
-    return tissue_sim::replay(tissue_sim::read_options(argc, argv));
+    return replay(read_options(argc, argv));
   } catch (const std::exception& e) {
     std::fflush(stdout);
     std::fprintf(stderr, "cannot replay: %s\n", e.what());
-    return tissue_sim::kCannot;
+    return kCannot;
   }
 }
+
+}  // namespace tissue_sim

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "compute/array.h"
+#include "frame/stability_limit.h"
 #include "mpm/contact/facets.h"
 #include "mpm/contact/surface_place.h"
 #include "tissue_sim/material.h"
@@ -89,11 +90,7 @@ struct Block {
   std::vector<Facet> facets;          ///< its surface and cut faces
   std::vector<SurfacePlace> surface;  ///< where tools touch these
 
-  /// The largest P-wave modulus of its points, as they are deformed [Pa]: when the limit of the
-  /// substep was measured last, and after the last frame; 0 before. See SubstepChoice.
-  struct Modulus {
-    float measured = 0, last = 0;
-  } modulus;
+  Stiffness modulus;  ///< of its points
 
   int number = -1;  ///< among all that its Blocks ever had
 

@@ -9,15 +9,18 @@
 #include <memory>
 
 #include "ros/node.h"
+#include "ros/programs.h"
 
-int main(int argc, char** argv) {
+namespace tissue_sim {
+
+int run_simulator(int argc, char** argv) {
   ros::init(argc, argv, "simulator");
   ros::NodeHandle node("~");
   // As SIGINT does in roscpp: a recording is closed before the program ends.
   std::signal(SIGTERM, [](int) { ros::requestShutdown(); });
-  std::unique_ptr<tissue_sim::Node> simulator;
+  std::unique_ptr<Node> simulator;
   try {
-    simulator = std::make_unique<tissue_sim::Node>(node);
+    simulator = std::make_unique<Node>(node);
   } catch (const std::exception& e) {
     ROS_FATAL("cannot start: %s", e.what());
     return 1;
@@ -25,3 +28,5 @@ int main(int argc, char** argv) {
   ros::spin();
   return 0;
 }
+
+}  // namespace tissue_sim

@@ -1,0 +1,3 @@
+#include "ros/programs.h"
+
+int main(int argc, char** argv) { return tissue_sim::replay(argc, argv); }

@@ -66,9 +66,10 @@ struct Distance {
     const V a = number[1] * inverse_h2;
     const Vector<V> d = between(v[1], v[0]);
     const V length = root(dot(d, d) + kTiny);
-    const V change = (number[0] - length - a * lambda[0]) / (v[0].w + v[1].w + a + kTiny);
-    lambda[0] += change;
-    const V scale = change / length;
+    // One division, for it takes a quarter of the time.
+    const V scale =
+        (number[0] - length - a * lambda[0]) / ((v[0].w + v[1].w + a + 1e-20f) * length);
+    lambda[0] += scale * length;
     move(v[0], -scale, d);
     move(v[1], scale, d);
   }

@@ -21,6 +21,7 @@ struct Contacts {
   float* x;
   const float *predicted, *v;
   const std::vector<double>& mass;
+  std::uint8_t* pushed;
 
   void project(int i, ColliderLoad* loads) const {
     float* at = x + 4 * i;
@@ -37,7 +38,9 @@ struct Contacts {
         }
       }
       const Gap g = gap(collider, at);
-      if (g.distance < 0) push(i, collider, g, loads[c]);
+      if (!(g.distance < 0)) continue;
+      push(i, collider, g, loads[c]);
+      pushed[i] = 1;
     }
   }
 
@@ -66,8 +69,9 @@ struct Contacts {
     double force[3], arm[3];
     for (int a = 0; a < 3; ++a) {
       const float moved = out * g.normal[a] - back * slid[a];
+      const float was = at[a];
       at[a] += moved;
-      force[a] = -weight * moved;
+      force[a] = -weight * (at[a] - was);  // as it was rounded: that is what the vertex gets
       arm[a] = at[a] - collider.position[a];
       load.force[a] += force[a];
     }
@@ -85,9 +89,15 @@ void project_contacts(State& s, float h, std::vector<ColliderLoad>& loads) {
   if (count == 0) return;
   std::vector<Box> boxes;
   for (const Collider& c : s.colliders) boxes.push_back(bounds(c));
-  const Contacts contacts{
-      s.colliders.data(),          boxes.data(),        count,          h, s.vertices.x.data(),
-      s.vertices.predicted.data(), s.vertices.v.data(), s.vertices.mass};
+  const Contacts contacts{s.colliders.data(),
+                          boxes.data(),
+                          count,
+                          h,
+                          s.vertices.x.data(),
+                          s.vertices.predicted.data(),
+                          s.vertices.v.data(),
+                          s.vertices.mass,
+                          s.pushed.data()};
   const int n = s.vertices.size(), parts = (n + kContactsOfPart - 1) / kContactsOfPart;
   std::vector<ColliderLoad> of_parts(static_cast<std::size_t>(parts) * count);
   s.cpu.for_each(parts, [&](int part) {

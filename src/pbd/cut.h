@@ -18,18 +18,29 @@ inline Vec3 place_before(const State& s, const Array<float>& before, std::int32_
 
 /// Cuts along a blade's path, while vertices move from `before` to where they are. `stroke` is the
 /// same for all that one blade does. Appends to `origin` the vertex that each new one came from.
-/// Returns whether anything changed; constraints, masses and colours are to be made anew then
-/// (after_cut).
+/// Returns whether anything changed; masses (after_cut), constraints and colours (after_cuts) are
+/// to be made anew then.
 bool cut_surface(State& s, const BladePath& path, const Array<float>& before, int stroke,
                  std::vector<std::int32_t>& origin, CutReport& report);
-/// `smooth`: vertices move onto the blade's surface first; not for a path that goes on, for what
-/// moves there might step across the edge.
+/// `smooth`: vertices move onto the blade's surface first; not for a path that goes on, for in
+/// tissue that is strained what moves there may step across the edge.
 bool cut_tetrahedra(State& s, const BladePath& path, const Array<float>& before, bool smooth,
                     std::vector<std::int32_t>& origin, CutReport& report);
 
-/// Closes the wounds of pieces that came apart (surface model), then makes constraints, masses and
-/// colours anew. Linear and angular momentum of each body stay.
+/// Momentum of a body's free vertices.
+struct Motion {
+  double mass = 0;  ///< [kg]
+  Vec3 centre = Vec3::Zero(), linear = Vec3::Zero(), angular = Vec3::Zero();
+  Eigen::Matrix3d inertia = Eigen::Matrix3d::Zero();
+};
+/// Of each body, angular momentum about its centre of mass.
+std::vector<Motion> motions(const State& s);
+
+/// Closes the wounds of pieces that came apart (surface model) and shares out masses.
 void after_cut(State& s, std::vector<std::int32_t>& origin);
+/// Makes constraints and colours anew. Linear and angular momentum of each body are what they were
+/// before the cuts.
+void after_cuts(State& s, const std::vector<Motion>& before);
 
 /// Closes each loop of cut edges between two pieces by a surface of triangles about as large as
 /// those around (cut_caps.cpp). Returns the vertices that need internal constraints anew.

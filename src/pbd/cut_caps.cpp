@@ -111,13 +111,6 @@ std::vector<std::int32_t> close_wounds(State& s, std::vector<std::int32_t>& orig
 
 namespace {
 
-/// Momentum of a body's free vertices.
-struct Motion {
-  double mass = 0;
-  Vec3 centre = Vec3::Zero(), linear = Vec3::Zero(), angular = Vec3::Zero();
-  Eigen::Matrix3d inertia = Eigen::Matrix3d::Zero();
-};
-
 Motion motion_of(const State& s, int body, const Vec3* about) {
   const Vertices& v = s.vertices;
   Motion m;
@@ -156,10 +149,16 @@ void restore(State& s, int body, const Motion& before) {
 
 }  // namespace
 
+std::vector<Motion> motions(const State& s) {
+  std::vector<Motion> of;
+  for (std::size_t b = 0; b < s.scene.bodies.size(); ++b) {
+    of.push_back(motion_of(s, static_cast<int>(b), nullptr));
+  }
+  return of;
+}
+
 void after_cut(State& s, std::vector<std::int32_t>& origin) {
   const int bodies = static_cast<int>(s.scene.bodies.size());
-  std::vector<Motion> before;
-  for (int b = 0; b < bodies; ++b) before.push_back(motion_of(s, b, nullptr));
   if (s.tetrahedra.empty()) {
     UnionFind skin = skins(s);  // those found while the skin still hung together go when it parts
     s.internal.erase(std::remove_if(s.internal.begin(), s.internal.end(),
@@ -184,10 +183,13 @@ void after_cut(State& s, std::vector<std::int32_t>& origin) {
     }
   }
   share_out_mass(s);
+}
+
+void after_cuts(State& s, const std::vector<Motion>& before) {
   make_surface_constraints(s);
   make_tet_constraints(s);
   pack(s);
-  for (int b = 0; b < bodies; ++b) restore(s, b, before[b]);
+  for (std::size_t b = 0; b < before.size(); ++b) restore(s, static_cast<int>(b), before[b]);
 }
 
 }  // namespace pbd

@@ -38,8 +38,26 @@ void find_faces(State& s) {
 
 Vec3 centre(const State& s, const Array<float>& x, std::int32_t t) {
   Vec3 sum = Vec3::Zero();
-  for (const std::int32_t v : s.tetrahedra[t]) sum += place_before(s, x, v);
-  return 0.25 * sum;
+  for (int i = 0; i < 4; ++i) sum += s.centres[t][i] * place_before(s, x, s.tetrahedra[t][i]);
+  return sum;
+}
+
+Vec3 reference_centre(const State& s, std::int32_t t) {
+  Vec3 sum = Vec3::Zero();
+  for (int i = 0; i < 4; ++i) {
+    sum += s.centres[t][i] * s.vertices.reference[s.tetrahedra[t][i]];
+  }
+  return sum;
+}
+
+/// Shares of the corners in a place of reference space.
+std::array<double, 4> shares(const State& s, std::int32_t t, const Vec3& place) {
+  const Tetrahedron& c = s.tetrahedra[t];
+  Eigen::Matrix3d q;
+  for (int i = 0; i < 3; ++i)
+    q.col(i) = s.vertices.reference[c[i + 1]] - s.vertices.reference[c[0]];
+  const Vec3 w = q.inverse() * (place - s.vertices.reference[c[0]]);
+  return {1 - w.sum(), w[0], w[1], w[2]};
 }
 
 Eigen::Matrix3d gradient(const State& s, std::int32_t t) {
@@ -102,7 +120,8 @@ class TetCut {
     std::map<std::int32_t, Plane> planes;
     for (const Broken& b : broken_) {
       const InnerFace& f = s_.faces[b.face];
-      const Vec3 c0 = reference_centre(f.tetrahedron[0]), c1 = reference_centre(f.tetrahedron[1]);
+      const Vec3 c0 = reference_centre(s_, f.tetrahedron[0]);
+      const Vec3 c1 = reference_centre(s_, f.tetrahedron[1]);
       const Eigen::Matrix3d g =
           0.5 * (gradient(s_, f.tetrahedron[0]) + gradient(s_, f.tetrahedron[1]));
       Vec3 n = (g.transpose() * b.normal).stableNormalized();
@@ -121,21 +140,28 @@ class TetCut {
 
   /// Gives each group of tetrahedra that hang together around a vertex one of its own.
   void part(std::vector<std::int32_t>& origin, CutReport& report) {
-    std::map<std::int32_t, std::vector<int>> faces_at;
-    for (std::size_t i = 0; i < s_.faces.size(); ++i) {
-      if (!s_.faces[i].is_cut) {
-        for (const std::int32_t v : face_corners(s_, s_.faces[i]))
-          faces_at[v].push_back(static_cast<int>(i));
-      }
-    }
+    std::map<std::int32_t, std::vector<int>> faces_at;  // that hold, of vertices beside the cut
+    std::vector<std::uint8_t> is_beside(s_.vertices.size(), 0);
     std::set<std::int32_t> touched;
     for (const Broken& b : broken_) {
       const InnerFace& f = s_.faces[b.face];
       const std::vector<std::int32_t> corners = face_corners(s_, f);
       touched.insert(corners.begin(), corners.end());
-      for (const std::int32_t v : corners) ++s_.vertices.cut_links[v];
-      Triangle t = {corners[0], corners[1], corners[2]};
-      open_.push_back({b.face, t});
+      for (const std::int32_t v : corners) {
+        ++s_.vertices.cut_links[v];
+        is_beside[v] = 1;
+      }
+      open_.push_back({b.face, {corners[0], corners[1], corners[2]}});
+    }
+    for (std::size_t i = 0; i < s_.faces.size(); ++i) {
+      const InnerFace& f = s_.faces[i];
+      if (f.is_cut) continue;
+      const Tetrahedron& t = s_.tetrahedra[f.tetrahedron[0]];
+      for (int k = 0; k < 4; ++k) {
+        if (k != f.opposite[0] && is_beside[t[k]] != 0) {
+          faces_at[t[k]].push_back(static_cast<int>(i));
+        }
+      }
     }
     report.points_separated += static_cast<int>(touched.size());
     for (const std::int32_t v : touched) part_vertex(v, faces_at[v], origin);
@@ -143,12 +169,6 @@ class TetCut {
   }
 
  private:
-  Vec3 reference_centre(std::int32_t t) const {
-    Vec3 sum = Vec3::Zero();
-    for (const std::int32_t v : s_.tetrahedra[t]) sum += s_.vertices.reference[v];
-    return 0.25 * sum;
-  }
-
   /// Along the outer surface where the vertex is on it; not at all at its edges and corners.
   void move(std::int32_t v, const Plane& plane) {
     const Vec3 n = plane.normal.stableNormalized();
@@ -180,6 +200,8 @@ class TetCut {
       least.push_back(kLeastVolume * six_volumes(s_, s_.tetrahedra[t]));
     }
     const Vec3 from = x;
+    std::vector<Vec3> centres;
+    for (const std::int32_t t : around_[v]) centres.push_back(reference_centre(s_, t));
     for (double share = 1; share > 0.2; share *= 0.7) {
       x = from + share * way;
       bool good = true;
@@ -190,6 +212,9 @@ class TetCut {
       if (good) {
         const Vec3 moved = g * (x - from);
         for (int a = 0; a < 3; ++a) s_.vertices.x[4 * v + a] += static_cast<float>(moved[a]);
+        for (std::size_t i = 0; i < centres.size(); ++i) {
+          s_.centres[around_[v][i]] = shares(s_, around_[v][i], centres[i]);
+        }
         return;
       }
     }
@@ -263,6 +288,7 @@ class TetCut {
 bool cut_tetrahedra(State& s, const BladePath& path, const Array<float>& before, bool smooth,
                     std::vector<std::int32_t>& origin, CutReport& report) {
   if (s.faces.empty()) find_faces(s);
+  s.centres.resize(s.tetrahedra.size(), {0.25, 0.25, 0.25, 0.25});
   const int count = static_cast<int>(s.tetrahedra.size());
   std::vector<Vec3> from(count), to(count);
   for (int t = 0; t < count; ++t) {

@@ -1,7 +1,6 @@
 #include "pbd/pbd_pieces.h"
 
 #include <algorithm>
-#include <map>
 
 #include "fragments/piece_sums.h"
 
@@ -65,26 +64,43 @@ std::vector<int> update_pieces(const State& s, const std::vector<std::int32_t>& 
 }
 
 std::vector<double> piece_volumes(const State& s, const Pieces& pieces) {
-  std::vector<double> columns(pieces.next_id, 0.0), enclosed(pieces.next_id, 0.0);
+  std::vector<double> columns(pieces.next_id, 0.0);
+  std::vector<int> body(pieces.next_id, 0);
   for (int i = 0; i < s.vertices.size(); ++i) {
     columns[pieces.of_point[i]] += s.vertices.volume[i];
+    body[pieces.of_point[i]] = s.vertices.body[i];
   }
   if (!s.tetrahedra.empty()) return columns;
-  std::map<std::pair<std::int32_t, std::int32_t>, int> turns;  // along each edge, from low to high
+  struct Skin {
+    Vec3 first = Vec3::Zero(), normal = Vec3::Zero();  // twice the sum of area times normal
+    double area = 0, six_volumes = 0;
+  };
+  std::vector<Skin> skins(pieces.next_id);
   for (const Triangle& t : s.triangles) {
     const auto& x = s.vertices.reference;
-    enclosed[pieces.of_point[t[0]]] += x[t[0]].cross(x[t[1]]).dot(x[t[2]]) / 6;
-    for (int k = 0; k < 3; ++k) {
-      const std::int32_t a = t[k], b = t[(k + 1) % 3];
-      turns[{std::min(a, b), std::max(a, b)}] += a < b ? 1 : -1;
-    }
+    Skin& skin = skins[pieces.of_point[t[0]]];
+    if (skin.area == 0) skin.first = x[t[0]];
+    const Vec3 n = (x[t[1]] - x[t[0]]).cross(x[t[2]] - x[t[0]]);
+    skin.normal += n;
+    skin.area += n.norm();
+    skin.six_volumes += n.dot(x[t[0]] - skin.first);
   }
-  std::vector<bool> open(pieces.next_id, false);
-  for (const auto& [edge, sum] : turns) {
-    if (sum != 0) open[pieces.of_point[edge.first]] = true;
+  // The lips of a slit lie on one another: together they are closed.
+  std::vector<double> left = s.volume_of_body, open(s.volume_of_body.size(), 0.0);
+  const auto is_closed = [&](int id) {
+    return s.closed_body[body[id]] != 0 && skins[id].six_volumes > 0 &&
+           skins[id].normal.norm() < 1e-3 * skins[id].area;
+  };
+  for (int id = 0; id < pieces.next_id; ++id) {
+    if (is_closed(id)) left[body[id]] -= skins[id].six_volumes / 6;
+    if (!is_closed(id)) open[body[id]] += columns[id];
   }
   for (int id = 0; id < pieces.next_id; ++id) {
-    if (!open[id] && enclosed[id] > 0) columns[id] = enclosed[id];
+    if (is_closed(id)) {
+      columns[id] = skins[id].six_volumes / 6;
+    } else if (columns[id] > 0 && left[body[id]] > 0) {  // what the closed ones leave
+      columns[id] *= left[body[id]] / open[body[id]];
+    }
   }
   return columns;
 }

@@ -73,24 +73,38 @@ struct State {
   ConstraintSet<Distance> links;  ///< edges, then internal links
   int edge_count = 0;             ///< of links: those that are edges
   ConstraintSet<Bending> bends;
-  ConstraintSet<Strain> strains;       ///< one for each tetrahedron, ...
-  ConstraintSet<Elastic> elastics;     ///< ... or these
-  std::vector<double> volume_of_body;  ///< [m^3]
+  ConstraintSet<Strain> strains;          ///< one for each tetrahedron, ...
+  ConstraintSet<Elastic> elastics;        ///< ... or these
+  std::vector<double> volume_of_body;     ///< [m^3]
+  std::vector<std::uint8_t> closed_body;  ///< whether the surface that it was made of is closed
 
   // What cuts remember. Of each vertex: which stroke it lies on (-1: none), where the blade passed
   // there and its normal, in reference space, and the vertex that it is a copy of.
   std::vector<std::int32_t> stroke, copy_of;
   std::vector<Vec3> blade_normal, blade_point;
   std::set<std::array<std::int32_t, 2>> cut_edges;  ///< of the surface, lower vertex first
+  /// Of the line that each tool's blade cuts, and of one that a whole path does: the vertices where
+  /// it ends now, and those where it began.
+  std::vector<std::set<std::int32_t>> fronts, starts;
   /// What blades swept, in reference space: edges (a, b) at the beginning and at the end of a part.
   std::vector<std::array<Vec3, 4>> wounds;
   std::vector<std::int32_t> bare;  ///< vertices that a cut took the internal constraints of
   std::vector<InnerFace> faces;    ///< between tetrahedra
-  double mean_edge = 0;            ///< of the surface when it was made [m]
+  /// Of each tetrahedron, the shares of its corners in the place that its links lead from: its
+  /// centre when it was made. It stays with the tissue when vertices move onto a blade's surface,
+  /// so that what a blade parts does not hang on where vertices are.
+  std::vector<std::array<double, 4>> centres;
+  double mean_edge = 0;  ///< of the surface when it was made [m]
 
   std::vector<Collider> colliders;  ///< of this step
 
-  explicit State(const Scene& s) : scene(s), cpu(s.threads) {}
+  // Made anew by pack(): what hangs together, by number.
+  std::vector<std::int32_t> component;
+  int components = 0;
+  std::vector<std::uint8_t> pushed;  ///< of each vertex: whether a collider pushed it in this frame
+
+  explicit State(const Scene& s)
+      : scene(s), cpu(s.threads), fronts(s.tools.size() + 1), starts(s.tools.size() + 1) {}
 };
 
 /// Adds a vertex at rest; mass and volume come later. Returns its index.

@@ -5,6 +5,7 @@
 
 #include "frame/checksum.h"
 #include "pbd/cut.h"
+#include "pbd/free_flight.h"
 #include "pbd/model.h"
 #include "tools/frame_colliders.h"
 #include "tools/tool_motion.h"
@@ -22,7 +23,7 @@ Array<float> PbdTissue::places() const {
   return {x.begin(), x.begin() + 4 * static_cast<std::ptrdiff_t>(state_->vertices.size())};
 }
 
-void PbdTissue::cut(const BladePath& path, int stroke, const Array<float>& before,
+bool PbdTissue::cut(const BladePath& path, int stroke, const Array<float>& before,
                     CutReport& report) {
   pbd::State& s = *state_;
   std::vector<std::int32_t> origin;
@@ -30,9 +31,10 @@ void PbdTissue::cut(const BladePath& path, int stroke, const Array<float>& befor
   const bool changed = s.tetrahedra.empty()
                            ? pbd::cut_surface(s, path, before, stroke, origin, report)
                            : pbd::cut_tetrahedra(s, path, before, is_whole, origin, report);
-  if (!changed) return;
+  if (!changed) return false;
   pbd::after_cut(s, origin);
   for (const int id : pbd::update_pieces(s, origin, pieces_)) report.new_fragments.push_back(id);
+  return true;
 }
 
 void PbdTissue::advance(double duration, const FrameInput& input) {
@@ -42,14 +44,20 @@ void PbdTissue::advance(double duration, const FrameInput& input) {
   const float dt = static_cast<float>(duration / substeps);
   result_ = {};
   result_.loads.resize(s.scene.tools.size());
+  bool changed = false;
+  std::vector<pbd::Motion> motions;
+  if (!input.cuts.empty()) motions = pbd::motions(s);
   for (const BladePath& path : input.cuts) {
     result_.cut_reports.emplace_back();
     const Array<float> still = places();
-    cut(path, next_stroke_++, still, result_.cut_reports.back());
+    changed = cut(path, next_stroke_++, still, result_.cut_reports.back()) || changed;
   }
+  if (changed) pbd::after_cuts(s, motions);
   const FrameColliders colliders(s.scene, input, duration);
   const std::vector<BladePath> blades = blade_paths(s.scene, input, 0, 1);
   const Array<float> before = blades.empty() ? Array<float>() : places();
+  const std::vector<pbd::Flight> flights = pbd::flights(s);
+  std::fill(s.pushed.begin(), s.pushed.end(), std::uint8_t{0});
   for (int i = 0; i < substeps; ++i) {
     const double share = (i + 1.0) / substeps;
     s.colliders = colliders.at(share);
@@ -57,11 +65,16 @@ void PbdTissue::advance(double duration, const FrameInput& input) {
     pbd::step(s, dt, loads);
     colliders.add_loads(share, s.colliders.data(), loads.data(), 1.0 / substeps, result_.loads);
   }
+  pbd::keep_momentum(s, flights, substeps, dt);
   result_.substeps = substeps;
   result_.substep = dt;
+  if (blades.empty()) return;
+  motions = pbd::motions(s);
+  changed = false;
   for (std::size_t i = 0; i < blades.size(); ++i) {
-    cut(blades[i], static_cast<int>(i), before, result_.blade_report);
+    changed = cut(blades[i], static_cast<int>(i), before, result_.blade_report) || changed;
   }
+  if (changed) pbd::after_cuts(s, motions);
 }
 
 FrameResult PbdTissue::finish() {

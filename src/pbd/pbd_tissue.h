@@ -36,7 +36,8 @@ class PbdTissue final : public Tissue {
   template <class Archive>
   void each_field(Archive& archive);
   Array<float> places() const;  // without padding
-  void cut(const BladePath& path, int stroke, const Array<float>& before, CutReport& report);
+  /// Whether it changed anything: constraints are to be made anew then.
+  bool cut(const BladePath& path, int stroke, const Array<float>& before, CutReport& report);
 
   std::vector<std::string> notes_;
   std::unique_ptr<pbd::State> state_;

@@ -1,7 +1,8 @@
 // One step: predict, project, take velocities from where vertices are.
 #include <cmath>
+#include <map>
 
-#include "pbd/pbd_state.h"
+#include "pbd/pbd_pieces.h"
 
 namespace tissue_sim {
 namespace pbd {
@@ -16,7 +17,7 @@ struct Predict {
     const bool held = x[4 * i + 3] == 0;
     for (int a = 0; a < 3; ++a) {
       float& speed = v[4 * i + a];
-      speed = held ? 0 : decay * (speed + h * gravity[a]);
+      speed = held ? 0 : decay * speed + h * gravity[a];  // drag takes nothing off the weight
       x[4 * i + a] += h * speed;
       predicted[4 * i + a] = x[4 * i + a];
     }
@@ -147,6 +148,15 @@ void pack(State& s) {
   for (int lane = 0; lane < kLanes; ++lane) {  // the corners of a tetrahedron: nothing is 0 / 0
     for (int k = 1; k < 4; ++k) v.x[4 * (n + 4 * lane + k) + k - 1] = 1;
   }
+  UnionFind linked = joined(s);
+  std::map<std::int32_t, std::int32_t> number;
+  s.component.resize(n);
+  s.pushed.assign(n, 0);
+  for (int i = 0; i < n; ++i) {
+    const auto next = static_cast<std::int32_t>(number.size());
+    s.component[i] = number.try_emplace(linked.root(i), next).first->second;
+  }
+  s.components = static_cast<int>(number.size());
   s.links.pack(n);
   s.bends.pack(n);
   s.strains.pack(n);

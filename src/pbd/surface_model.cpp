@@ -297,6 +297,7 @@ void add_surface_body(State& s, int b, std::vector<std::string>* notes) {
     }
   }
   s.volume_of_body.push_back(volume);
+  s.closed_body.push_back(kind.is_closed() ? 1 : 0);
   if (missed > 0 && notes != nullptr) {
     notes->push_back("body '" + body.name + "': " + std::to_string(missed) + " of " +
                      std::to_string(starts.size()) +

@@ -12,8 +12,29 @@ namespace {
 
 const Vec3 kSize(0.04, 0.03, 0.02);
 
-class CutKinds : public EachMethod {};
+class CutKinds : public EachMethod {
+ protected:
+  /// Which of the first `count` points tell what is parted: all, but of a mesh not the vertices on
+  /// the wound. They belong to both sides, and move onto it.
+  std::vector<bool> telling(Tissue& tissue, std::size_t count) const {
+    std::vector<bool> tell(count, true);
+    if (GetParam().method != Method::kPbd) return tell;
+    for (const Point& p : points_of(tissue)) {
+      if (p.id < count && p.damage > 0) tell[p.id] = false;
+    }
+    return tell;
+  }
+};
 FOR_EACH_METHOD(CutKinds);
+
+template <class T>
+std::vector<T> those(const std::vector<T>& all, const std::vector<bool>& which) {
+  std::vector<T> kept;
+  for (std::size_t i = 0; i < which.size(); ++i) {
+    if (which[i]) kept.push_back(all[i]);
+  }
+  return kept;
+}
 
 /// All cuts at the beginning of one frame, of a body at rest.
 FrameResult cut(Simulation& simulation, const std::vector<BladePath>& paths) {
@@ -62,7 +83,8 @@ TEST_P(CutKinds, PartWhatTheirSurfacesPart) {
     EXPECT_GT(result.cut_reports[0].points_separated, 0);
     const std::vector<int> pieces = labels(simulation.tissue());
     EXPECT_EQ(1 + *std::max_element(pieces.begin(), pieces.end()), kind.pieces);
-    EXPECT_LE(misplaced(pieces, in_order(parts)), within().misplaced);
+    const std::vector<bool> tell = telling(simulation.tissue(), parts.size());
+    EXPECT_LE(misplaced(those(pieces, tell), in_order(those(parts, tell))), within().misplaced);
 
     std::vector<double> sizes;
     int points = 0;
@@ -89,6 +111,7 @@ TEST_P(CutKinds, SlowPartsWhatFastParts) {
     SCOPED_TRACE(kind.name);
     constexpr int kSteps = 8;
     Simulation fast(on_this(free_box(kSize, 0.002))), slow(on_this(free_box(kSize, 0.002)));
+    const int points = fast.tissue().point_count();
     cut(fast, kind.cuts);
     for (const BladePath& path : kind.cuts) {
       for (std::size_t i = 0; i + 1 < path.poses.size(); ++i) {
@@ -106,7 +129,10 @@ TEST_P(CutKinds, SlowPartsWhatFastParts) {
       }
     }
     slow.advance_frame();
-    EXPECT_EQ(labels(slow.tissue()), labels(fast.tissue()));
+    const std::vector<bool> tell = telling(fast.tissue(), points);
+    EXPECT_EQ(tell, telling(slow.tissue(), points));
+    EXPECT_EQ(in_order(those(labels(slow.tissue()), tell)),
+              in_order(those(labels(fast.tissue()), tell)));
     EXPECT_EQ(static_cast<int>(slow.tissue().fragments().size()), kind.pieces);
   }
 }
@@ -123,7 +149,9 @@ TEST_P(CutKinds, MoveNothing) {
     EXPECT_LE(result.elastic_energy, within().cut_energy);
     double moved = 0;
     const std::vector<Vec3> after = positions(simulation.tissue());
+    const std::vector<bool> tell = telling(simulation.tissue(), before.size());
     for (std::size_t i = 0; i < before.size(); ++i) {
+      if (!tell[i]) continue;
       moved = std::max(moved, (after[i] - before[i]).norm());
     }
     EXPECT_LE(moved, 1e-7);

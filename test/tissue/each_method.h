@@ -78,10 +78,13 @@ inline Tolerances tolerances(Method method) {
       t.beam_convergence = 1.8;
       return t;
     case Method::kPbd:
-      t.measured = false;
-      t.rest_speed = t.cut_speed = 1e-5;
+      t.measured = true;
+      t.rest_speed = 1e-5;
+      t.cut_speed = 5e-5;  // read: 1.3e-5, of positions in single precision, over a step
       t.rest_energy = t.cut_energy = 1e-12;
-      t.misplaced = 0.01;
+      t.misplaced = 0;
+      t.momentum = 1e-4;
+      t.impulse = 5e-3;  // read: 2.3e-3: each projection rounds positions
       t.clamp = 0;
       t.beam_convergence = 1.2;
       return t;

@@ -1,0 +1,62 @@
+#include "pbd/free_flight.h"
+
+#include <cmath>
+
+namespace tissue_sim {
+namespace pbd {
+
+std::vector<Flight> flights(const State& s) {
+  const Vertices& v = s.vertices;
+  std::vector<Flight> of(s.components);
+  for (int i = 0; i < v.size(); ++i) {
+    Flight& f = of[s.component[i]];
+    f.mass += v.mass[i];
+    f.centre += v.mass[i] * v.position(i);
+    f.linear += v.mass[i] * v.velocity(i);
+    f.is_free = f.is_free && v.anchored[i] == 0;
+  }
+  for (Flight& f : of) f.centre /= f.mass;
+  for (int i = 0; i < v.size(); ++i) {
+    Flight& f = of[s.component[i]];
+    if (!f.is_free) continue;
+    const Vec3 r = v.position(i) - f.centre;
+    f.angular += v.mass[i] * r.cross(v.velocity(i));
+    f.inertia += v.mass[i] * (r.squaredNorm() * Eigen::Matrix3d::Identity() - r * r.transpose());
+  }
+  return of;
+}
+
+void keep_momentum(State& s, const std::vector<Flight>& before, int steps, float h) {
+  Vertices& v = s.vertices;
+  std::vector<Flight> now = flights(s);
+  for (int i = 0; i < v.size(); ++i) {
+    if (s.pushed[i] != 0) now[s.component[i]].is_free = false;
+  }
+  const double decay = static_cast<float>(std::exp(-s.scene.damping * h));
+  struct Change {
+    Vec3 linear = Vec3::Zero(), spin = Vec3::Zero();
+  };
+  std::vector<Change> changes(now.size());
+  for (std::size_t c = 0; c < now.size(); ++c) {
+    if (!now[c].is_free) continue;
+    Vec3 speed = before[c].linear / before[c].mass, angular = before[c].angular;
+    for (int i = 0; i < steps; ++i) {
+      speed = decay * speed + h * s.scene.gravity;
+      angular *= decay;
+    }
+    changes[c].linear = speed - now[c].linear / now[c].mass;
+    // A piece of few vertices may have no inertia about one of its axes.
+    Eigen::Matrix3d inertia = now[c].inertia;
+    inertia.diagonal().array() += 1e-9 * inertia.trace() + 1e-30;
+    changes[c].spin = inertia.ldlt().solve(Vec3(angular - now[c].angular));
+  }
+  for (int i = 0; i < v.size(); ++i) {
+    const int c = s.component[i];
+    if (!now[c].is_free) continue;
+    const Vec3 add = changes[c].linear + changes[c].spin.cross(v.position(i) - now[c].centre);
+    for (int a = 0; a < 3; ++a) v.v[4 * i + a] += static_cast<float>(add[a]);
+  }
+}
+
+}  // namespace pbd
+}  // namespace tissue_sim

@@ -52,11 +52,14 @@ inline Bend bend(Scene scene, const Beam& beam, double clamp, const std::string&
   for (double x = -beam.height; x < end - h / 4; x += h / 2) {
     file.add({x + h / 4, sunk(rest, now, x, x + h / 2)});
   }
+  const double theory = tip_deflection(acting, gravity), nominal = tip_deflection(beam, gravity);
+  if (scene.method == Method::kPbd) {  // vertices lie at the end itself
+    return {sunk(rest, now, end - h / 4, end + h / 4), theory, nominal};
+  }
   // The last two layers of points lie 1/4 and 3/4 of a cell before the free end.
   const double last = sunk(rest, now, end - h / 2, end),
                other = sunk(rest, now, end - h, end - h / 2);
-  return {last + (last - other) / 2, tip_deflection(acting, gravity),
-          tip_deflection(beam, gravity)};
+  return {last + (last - other) / 2, theory, nominal};
 }
 
 }  // namespace tissue_sim

@@ -137,9 +137,8 @@ void restore(State& s, int body, const Motion& before) {
   const Motion now = motion_of(s, body, nullptr);
   if (!(now.mass > 0)) return;
   const Vec3 add = (before.linear - now.linear) / now.mass;
-  // About one place for both: that of the mass now.
-  const Vec3 wanted = before.angular + (before.centre - now.centre).cross(before.linear);
-  const Vec3 spin = now.inertia.fullPivLu().solve(Vec3(wanted - now.angular));
+  // Each about its own centre, which masses that change places move: nothing else moved.
+  const Vec3 spin = now.inertia.fullPivLu().solve(Vec3(before.angular - now.angular));
   for (int i = 0; i < v.size(); ++i) {
     if (v.body[i] != body || v.anchored[i] != 0) continue;
     const Vec3 change = add + spin.cross(v.position(i) - now.centre);

@@ -1,5 +1,6 @@
 #include "pbd/free_flight.h"
 
+#include <Eigen/Eigenvalues>
 #include <cmath>
 
 namespace tissue_sim {
@@ -45,10 +46,14 @@ void keep_momentum(State& s, const std::vector<Flight>& before, int steps, float
       angular *= decay;
     }
     changes[c].linear = speed - now[c].linear / now[c].mass;
-    // A piece of few vertices may have no inertia about one of its axes.
-    Eigen::Matrix3d inertia = now[c].inertia;
-    inertia.diagonal().array() += 1e-9 * inertia.trace() + 1e-30;
-    changes[c].spin = inertia.ldlt().solve(Vec3(angular - now[c].angular));
+    // A piece of few vertices may have no inertia about one of its axes: it has no spin there.
+    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes(now[c].inertia);
+    const Vec3 missing = axes.eigenvectors().transpose() * (angular - now[c].angular);
+    for (int a = 0; a < 3; ++a) {
+      const double moment = axes.eigenvalues()[a];
+      if (!(moment > 1e-3 * axes.eigenvalues()[2])) continue;
+      changes[c].spin += missing[a] / moment * axes.eigenvectors().col(a);
+    }
   }
   for (int i = 0; i < v.size(); ++i) {
     const int c = s.component[i];

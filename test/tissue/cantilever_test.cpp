@@ -26,7 +26,7 @@ class Cantilever : public EachMethod {
       // What one projection a step leaves undone falls with the square of the step (docs/pbd.md).
       const double speed = std::sqrt(beam.young_modulus / beam.density);
       const double frame = 1 / (4 * bending_frequency(beam, Ends::kClampedFree));
-      scene.pbd.steps = static_cast<int>(std::ceil(frame * speed / (0.2 * scene.cell_size)));
+      scene.pbd.steps = static_cast<int>(std::ceil(frame * speed / (0.4 * scene.cell_size)));
     }
     return bend(scene, beam, within().clamp * beam.height / cells);
   }

@@ -109,6 +109,8 @@ inline constexpr Shortfall kShortfalls[] = {
      "9 % of energy gained by five cuts, for 3"},
     {Method::kPbd, "SagsAsTimoshenkoSays",
      "too stiff by 5 % with a Poisson's ratio of 0, by 16 % with 0.3: linear tetrahedra lock"},
+    {Method::kPbd, "FreeFlightStaysThroughCutsAsWithoutThem",
+     "angular momentum of all pieces 6e-4 off after five cuts, for 1e-4: places are rounded"},
     {Method::kPbd, "NearlyIncompressible", "too stiff by 25 %, for 5: linear tetrahedra lock"},
 };
 

@@ -7,6 +7,7 @@
 #include <chrono>
 #include <cstdio>
 #include <cstdlib>
+#include <stdexcept>
 #include <string>
 
 #include "geometry/mesh.h"
@@ -73,13 +74,19 @@ Scene scene_of(const std::string& model, const std::string& mesh) {
   if (model == "strain") scene.pbd.elasticity = PbdElasticity::kStrain;
   // Its size in the file's units is not known before it was read.
   scene.gravity = Vec3::Zero();
-  Simulation once(scene);
-  const Extent e = extent(state(once));
-  const double scale = kSize / (e.max - e.min).maxCoeff();
-  scene.bodies[0].scale = scale;
+  Extent e;
+  try {
+    Simulation once(scene);
+    e = extent(state(once));
+  } catch (const std::invalid_argument&) {  // larger than 10 m
+    scene.bodies[0].scale = 0.01;
+    Simulation once(scene);
+    e = extent(state(once));
+  }
+  const double more = kSize / (e.max - e.min).maxCoeff();
+  scene.bodies[0].scale *= more;
   const Vec3 middle = 0.5 * (e.min + e.max);
-  scene.bodies[0].pose.position =
-      Vec3(-scale * middle.x(), -scale * middle.y(), -scale * e.min.z());
+  scene.bodies[0].pose.position = Vec3(-more * middle.x(), -more * middle.y(), -more * e.min.z());
   scene.gravity = Vec3(0, 0, -9.81);
   scene.damping = 1;
   scene.ground.friction = 0.5;

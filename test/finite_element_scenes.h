@@ -24,6 +24,7 @@ inline Scene reference_scene(double cell_size) {
   Scene s;
   s.device = Device::kCpu;
   s.cell_size = cell_size;
+  s.mpm.boundary = MpmBoundary::kSurface;
   s.ground.enabled = false;
   s.materials.resize(1);
   s.materials[0].name = "phantom";
@@ -99,8 +100,8 @@ inline double indentation_force(Simulation& simulation, double depth) {
   return simulation.advance_frame().result.loads[0].mean.force.z();
 }
 
-/// Displacement along an axis at a place in the middle of a box's side, where the axis `side` leaves
-/// it [m]: of the points within `around` of it, fitted by a polynomial of second degree.
+/// Displacement along an axis at a place in the middle of a box's side, where the axis `side`
+/// leaves it [m]: of the points within `around` of it, fitted by a polynomial of second degree.
 inline double surface_displacement(Tissue& tissue, int side, const Vec3& place, int axis,
                                    double around) {
   std::vector<std::uint8_t> cloud;

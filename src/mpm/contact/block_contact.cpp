@@ -337,6 +337,7 @@ bool push_surface(BlockPush& b, const NearCell& cell, const Collider& collider, 
                   float& clear) {
   constexpr float kFacing = -0.1f, kTurned = 0.98f;  // cosines: of a surface that faces the tool,
                                                      // and of an inerter that still fits
+  constexpr float kAlongBorne = 0.1f;  // of a place's springs along it, times dt^2 / m
   constexpr float kBeside = 0.25f;  // how close to a jaw tissue takes part of what it presses with
                                     // [cells]: places are no denser than to say that
   const CellNodes nodes(b.block, cell.node);
@@ -380,6 +381,14 @@ bool push_surface(BlockPush& b, const NearCell& cell, const Collider& collider, 
     SurfaceSpring spring = surface_spring(static_cast<float>(lame_lambda(m) + 2 * lame_mu(m)),
                                           static_cast<float>(m.density), h, place.area, b.dt);
     spring.cohesion = collider.cohesion * place.area / unit_area;
+    // Along the surface no inerter helps: at rims and on crumbs, whose nodes are light, the spring
+    // is what the substep bears.
+    const auto light = static_cast<float>(mobility(b.state.nodes, nodes, weights)) * b.dt * b.dt;
+    if (spring.along * light > kAlongBorne) {
+      const float share = kAlongBorne / (spring.along * light);
+      spring.along *= share;
+      spring.damping_along *= share;
+    }
     float velocity[3], push[3], of_collider[3];
     value_at(b.state.nodes.v, nodes, whole_rows, weights, velocity);
     surface_force(collider, g, spring, at, velocity, touch.hold, push);

@@ -4,6 +4,7 @@
 
 #include <yaml-cpp/yaml.h>
 
+#include <Eigen/Cholesky>
 #include <cmath>
 #include <cstring>
 #include <string>
@@ -23,6 +24,7 @@ inline Scene reference_scene(double cell_size) {
   Scene s;
   s.device = Device::kCpu;
   s.cell_size = cell_size;
+  s.mpm.boundary = MpmBoundary::kSurface;
   s.ground.enabled = false;
   s.materials.resize(1);
   s.materials[0].name = "phantom";
@@ -98,27 +100,29 @@ inline double indentation_force(Simulation& simulation, double depth) {
   return simulation.advance_frame().result.loads[0].mean.force.z();
 }
 
-/// Displacement along an axis of the surface of a box at its middle, where the axis `side` leaves
-/// it: of the two layers of points below, extrapolated to the place `at` of the surface [m].
-inline double surface_displacement(Tissue& tissue, int side, double at, int axis,
-                                   const Vec3& middle, double around) {
+/// Displacement along an axis at a place in the middle of a box's side, where the axis `side`
+/// leaves it [m]: of the points within `around` of it, fitted by a polynomial of second degree.
+inline double surface_displacement(Tissue& tissue, int side, const Vec3& place, int axis,
+                                   double around) {
   std::vector<std::uint8_t> cloud;
   PointSelection selection;
   selection.fields = kRestPosition | kDisplacement;
   const int count = tissue.read_points(selection, cloud);
-  double n = 0, sx = 0, sy = 0, sxx = 0, sxy = 0;
+  constexpr int kTerms = 9;
+  Eigen::Matrix<double, kTerms, kTerms> A = Eigen::Matrix<double, kTerms, kTerms>::Zero();
+  Eigen::Matrix<double, kTerms, 1> b = Eigen::Matrix<double, kTerms, 1>::Zero();
   for (int i = 0; i < count; ++i) {
     float f[6];
     std::memcpy(f, &cloud[selection.point_size() * i + sizeof(Point)], sizeof f);
-    bool counts = f[side] > at - 1.5 * around;
-    for (int a = 0; a < 3; ++a)
-      counts = counts && (a == side || std::fabs(f[a] - middle[a]) < around);
-    if (!counts) continue;
-    const double x = f[side] - at, y = f[3 + axis];
-    n += 1, sx += x, sy += y, sxx += x * x, sxy += x * y;
+    const Vec3 d = (Vec3(f[0], f[1], f[2]) - place) / around;
+    if (d.cwiseAbs().maxCoeff() > 1) continue;
+    const double s = d[side], t = d[(side + 1) % 3], u = d[(side + 2) % 3];
+    Eigen::Matrix<double, kTerms, 1> row;
+    row << 1, s, t, u, s * s, t * t, u * u, s * t, s * u;
+    A += row * row.transpose();
+    b += row * static_cast<double>(f[3 + axis]);
   }
-  const double slope = (n * sxy - sx * sy) / (n * sxx - sx * sx);
-  return (sy - slope * sx) / n;
+  return A.ldlt().solve(b)[0];
 }
 
 /// Frequency of a body that was bent by `gravity` and is let go [Hz]: from when the displacement of

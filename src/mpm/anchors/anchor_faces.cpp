@@ -8,7 +8,7 @@
 #include <stdexcept>
 #include <string>
 
-#include "math/bspline.h"
+#include "mpm/anchors/anchored_share.h"
 
 namespace tissue_sim {
 namespace {
@@ -43,6 +43,29 @@ struct FaceCrossing {
   int anchor;       // of the body
   bool inside_low;  // whether the inside is at the lower end
 };
+
+/// What each node of a row counts for in what is held at a place of its cell, in cells from the
+/// cell's middle towards the outside; nodes in that order, the last one is outside of the cell.
+///
+/// It is what a uniform stress of the points outside leaves unbalanced at the node. So such a
+/// stress is borne exactly wherever the face lies, and, by virtual work, the field that is held has
+/// its zero at the face. Where the last one is not to be had, `has_last` false, the spline has to
+/// do.
+void row_weights(float place, bool has_last, float (&weight)[kRowNodes]) {
+  constexpr float kEnds[3][3] = {{0.5f, 0.5f, 0}, {0.125f, 0.75f, 0.125f}, {0, 0.5f, 0.5f}};
+  const float at = std::min(std::max(2 * place + 1, 0.0f), 2.0f);
+  const int half = at < 1 ? 0 : 1;
+  const float inside = at - half;  // share of the half cell in which the face is
+  // In proportion to the volume there, at whose ends it is the spline; and what find_free_volumes()
+  // gives to the next point.
+  const auto moved = static_cast<float>(kShift) * 0.5f * inside * (1 - inside);
+  constexpr float kMoved[2][kRowNodes] = {{-0.25f, 0.5f, -0.25f, 0},
+                                          {-0.125f, 0.125f, 0.125f, -0.125f}};
+  for (int d = 0; d < kRowNodes; ++d) {
+    const float low = d < 3 ? kEnds[half][d] : 0, high = d < 3 ? kEnds[half + 1][d] : 0;
+    weight[d] = low + inside * (high - low) + moved * kMoved[has_last ? half : 0][d];
+  }
+}
 
 /// Where a link between two nodes goes through a face of the anchors.
 std::vector<FaceCrossing> crossings(const std::vector<Anchor>& anchors, const Vec3& a,
@@ -101,14 +124,16 @@ void add_links(const std::vector<LatticeBody>& bodies, int body, int first_ancho
     if (normal[axis] < kNearestAxis * normal.maxCoeff()) continue;
     // The face lies in this cell; between two in the one with tissue outside.
     const bool lower = std::abs(c.t - 0.5) < 1e-6 ? !c.inside_low : c.t < 0.5;
-    FaceLink link{body, first_anchor + c.anchor, {}, axis, 0, {}};
+    FaceLink link{body, first_anchor + c.anchor, {}, axis, 0, false, {}};
     for (int a = 0; a < 3; ++a) {
       link.cell[a] = lower ? low[a] : high[a];
       link.place[a] = static_cast<float>(x[a]);
     }
-    link.at = static_cast<float>(lower ? c.t : c.t - 1);
+    const double place = lower ? c.t : c.t - 1;
+    link.outside = c.inside_low;
+    link.at = static_cast<float>(link.outside ? place : -place);
     // In half cells: it counts where it goes through the cube of a point, or along it.
-    const double at = 2 * (link.cell[axis] + 0.5 + link.at);
+    const double at = 2 * (link.cell[axis] + 0.5 + place);
     bool near = false;
     for_each_point_of_row(b, link.cell, axis, [&](int p, int i) {
       if (at < i - 1e-3 || at > i + 1 + 1e-3) return;
@@ -122,11 +147,14 @@ void add_links(const std::vector<LatticeBody>& bodies, int body, int first_ancho
 /// The rows of a link, one for each choice of fields that points around see there.
 void add_rows(const LatticeBody& b, const Points& points, const NodeFields& fields,
               const Nodes& nodes, const FaceLink& link, std::vector<FaceRow>& rows) {
-  std::vector<std::array<std::int32_t, 3>> found(1);
-  std::int32_t n[3][3];
+  using Found = std::array<std::int32_t, kRowNodes>;
+  std::vector<Found> found(1);
+  std::int32_t n[kRowNodes][3];
   bool split = false;
-  for (int k = 0; k < 3; ++k) {
-    for (int a = 0; a < 3; ++a) n[k][a] = link.cell[a] + (a == link.axis ? k - 1 : 0);
+  for (int k = 0; k < kRowNodes; ++k) {
+    for (int a = 0; a < 3; ++a) {
+      n[k][a] = link.cell[a] + (a == link.axis ? (link.outside ? k - 1 : 1 - k) : 0);
+    }
     const int node = b.node(n[k][0], n[k][1], n[k][2]);
     found[0][k] = node;
     split = split || (node >= 0 && fields.split(node) != nullptr);
@@ -134,18 +162,20 @@ void add_rows(const LatticeBody& b, const Points& points, const NodeFields& fiel
   if (split) {
     found.clear();
     for_each_point_of_row(b, link.cell, link.axis, [&](int p, int) {
-      std::array<std::int32_t, 3> of;
+      Found of;
       for (int k = 0; k < 3; ++k) {
         of[k] = fields.node(b, points.site[p], n[k][0], n[k][1], n[k][2]);
       }
+      of[3] = -1;  // the cell's points do not see it
       if (std::find(found.begin(), found.end(), of) == found.end()) found.push_back(of);
     });
   }
   for (const auto& of : found) {
     FaceRow row{};
-    float mobility = 0;
-    for (int k = 0; k < 3; ++k) {
-      const float w = cell_weight(link.at, k);
+    float mobility = 0, weight[kRowNodes];
+    row_weights(link.at, of[3] >= 0, weight);
+    for (int k = 0; k < kRowNodes; ++k) {
+      const float w = weight[k];
       if (of[k] < 0 || w == 0) continue;
       row.node[k] = of[k];
       row.weight[k] = w;
@@ -170,7 +200,7 @@ void make_groups(AnchorFaces& faces) {
   };
   std::map<std::int32_t, int> first_of;  // row of each node
   for (int i = 0; i < count; ++i) {
-    for (int k = 0; k < 3; ++k) {
+    for (int k = 0; k < kRowNodes; ++k) {
       if (faces.rows[i].share[k] == 0) continue;
       const auto [at, is_new] = first_of.emplace(faces.rows[i].node[k], i);
       if (is_new) continue;
@@ -191,9 +221,10 @@ void make_groups(AnchorFaces& faces) {
     for (int i = 0; i < n; ++i) {
       for (int j = 0; j < n; ++j) {
         const FaceRow &r = faces.rows[m[i]], &s = faces.rows[m[j]];
-        for (int k = 0; k < 9; ++k) {
-          if (r.node[k / 3] == s.node[k % 3] && s.weight[k % 3] != 0) {
-            A(i, j) += static_cast<double>(r.share[k / 3]) * s.weight[k % 3];
+        for (int k = 0; k < kRowNodes * kRowNodes; ++k) {
+          const int l = k / kRowNodes, m = k % kRowNodes;
+          if (r.node[l] == s.node[m] && s.weight[m] != 0) {
+            A(i, j) += static_cast<double>(r.share[l]) * s.weight[m];
           }
         }
       }
@@ -342,7 +373,7 @@ void hold_group(AnchorFaces& faces, int index, float dt, const RigidMotion* befo
     }
     for (int a = 0; a < 3; ++a) {
       float v = 0, u = 0;
-      for (int k = 0; k < 3; ++k) {
+      for (int k = 0; k < kRowNodes; ++k) {
         v += r.weight[k] * nodes.v[a][r.node[k]];
         u += r.weight[k] * nodes.u[a][r.node[k]];
       }
@@ -358,7 +389,7 @@ void hold_group(AnchorFaces& faces, int index, float dt, const RigidMotion* befo
       float impulse = 0;
       for (int j = 0; j < g.count; ++j) impulse += inverse[j] * left[j][a];
       faces.impulse[g.first + i][a] += impulse;
-      for (int k = 0; k < 3; ++k) {
+      for (int k = 0; k < kRowNodes; ++k) {
         const float dv = r.share[k] * impulse;
         nodes.v[a][r.node[k]] += dv;
         nodes.u[a][r.node[k]] += dt * dv;

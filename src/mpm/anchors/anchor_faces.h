@@ -23,13 +23,16 @@
 
 namespace tissue_sim {
 
+/// A row has the three nodes that the cell sees in which its face is, and one more outside.
+inline constexpr int kRowNodes = 4;
+
 /// The field of a row of nodes at a face.
 struct FaceRow {
-  std::int32_t node[3];  ///< in Nodes; 0 with weight 0 for none
-  float weight[3];
-  float share[3];       ///< weight / m: of an impulse to velocity [1/kg]
-  std::int32_t anchor;  ///< in the order of the scene
-  float place[3];       ///< on the face, in reference space [m]
+  std::int32_t node[kRowNodes];  ///< in Nodes; 0 with weight 0 for none
+  float weight[kRowNodes];
+  float share[kRowNodes];  ///< weight / m: of an impulse to velocity [1/kg]
+  std::int32_t anchor;     ///< in the order of the scene
+  float place[3];          ///< on the face, in reference space [m]
 };
 
 /// Where a face goes through a row of nodes: of the whole lattice.
@@ -37,8 +40,9 @@ struct FaceLink {
   std::int32_t body, anchor;  ///< the anchor in the order of the scene
   std::int32_t cell[3];       ///< in whose middle the row's second node is
   std::int32_t axis;          ///< of the row
-  float at;                   ///< place of the face, in cells from the middle of the cell
-  float place[3];             ///< the same in reference space [m]
+  float at;        ///< place of the face, in cells from the middle of the cell, towards the outside
+  bool outside;    ///< whether the outside is above
+  float place[3];  ///< the same in reference space [m]
 };
 
 /// Rows that have nodes in common are held together.

@@ -6,8 +6,9 @@
 namespace tissue_sim {
 namespace {
 
-constexpr int kLines = 8;               // along y and z, where it is not exact
-constexpr double kSmallest = 1.0 / 32;  // as of the body's own surface (mpm/lattice/lattice.cpp)
+constexpr int kLines = 8;           // along y and z, where it is not exact
+constexpr double kSmallest = 1e-3;  // share of a point below which it is none: its anchor is off
+                                    // by less than that of its cube then
 
 /// What a region covers of a line along x at y, z; false for nothing.
 bool covered(const Region& r, double y, double z, double& begin, double& end) {
@@ -128,9 +129,10 @@ void find_free_volumes(const std::vector<LatticeBody>& bodies, Points& points) {
         double weight = o.share;
         int to[3] = {s.x, s.y, s.z};
         for (int a = 0; a < 3; ++a) {
-          const double off = std::abs(o.middle[a]);
+          const int next = to[a] + (o.middle[a] < 0 ? -1 : 1);
+          const double off = kShift * std::abs(o.middle[a]);
           weight *= k >> a & 1 ? off : 1 - off;
-          if (k >> a & 1) to[a] += o.middle[a] < 0 ? -1 : 1;
+          if (k >> a & 1) to[a] = next;
         }
         if (weight == 0) continue;
         const int other = b.point(to[0], to[1], to[2]);

@@ -13,8 +13,14 @@ struct OutsideShare {
 };
 OutsideShare share_outside(const std::vector<Anchor>& anchors, const Vec3& center, double edge);
 
-/// Fills Points::free_volume: of each point the volume outside the anchors, so that the sum and the
-/// first moments are those of the tissue there. Empty where no body has anchors.
+/// What of a half cell's share goes to the next point along an axis, of how far the share's middle
+/// is off the point [half cells]. With 1 the first moment would stay. Points that lie behind the
+/// face see a strain that is not that of the tissue before it and count for less so: the sag of a
+/// clamped block changes by 1.2 % with the place of the plane in a cell, by 2.3 % with 1 (8 cells).
+inline constexpr double kShift = 1.6;
+
+/// Fills Points::free_volume: of each point the volume outside the anchors, some of it shared with
+/// its neighbours. Empty where no body has anchors.
 void find_free_volumes(const std::vector<LatticeBody>& bodies, Points& points);
 
 }  // namespace tissue_sim

@@ -337,12 +337,26 @@ bool push_surface(BlockPush& b, const NearCell& cell, const Collider& collider, 
                   float& clear) {
   constexpr float kFacing = -0.1f, kTurned = 0.98f;  // cosines: of a surface that faces the tool,
                                                      // and of an inerter that still fits
+  constexpr float kAlongBorne = 0.1f;  // of a place's springs along it, times dt^2 / m
+  constexpr float kBeside = 0.25f;  // how close to a jaw tissue takes part of what it presses with
+                                    // [cells]: places are no denser than to say that
   const CellNodes nodes(b.block, cell.node);
   const bool whole_rows = has_whole_rows(nodes);
   const auto h = static_cast<float>(b.body.cell_size);
   const float unit_area = 0.25f * h * h;
   const float dt2 = b.state.contacts.inertia.dt * b.state.contacts.inertia.dt;
+  const float beside = collider.kind == Collider::kJaw ? kBeside * h : 0;
   bool touches = false;
+  const auto faces_away = [&](const SurfacePlace& place, const Gap& g) {
+    float F[9], n[3], along = 0, length = 0;
+    deformation_gradient_at(b.state.nodes.u, nodes, b.body.cell_size, place.place, F);
+    cofactor_times(F, place.normal, n);
+    for (int a = 0; a < 3; ++a) {
+      along += n[a] * g.normal[a];
+      length += n[a] * n[a];
+    }
+    return along > kFacing * std::sqrt(length);
+  };
   for (int i = 0; i < cell.place_count; ++i) {
     const SurfacePlace& place = b.block.surface[cell.first_place + i];
     const AxisWeights weights(place.place);
@@ -351,20 +365,14 @@ bool push_surface(BlockPush& b, const NearCell& cell, const Collider& collider, 
     for (int a = 0; a < 3; ++a) at[a] = cell.middle[a] + place.place[a] * h + u[a];
     const Gap g = gap(collider, at);
     if (g.distance >= 0) {
-      clear = std::min(clear, g.distance);
+      clear = std::min(clear, std::max(0.0f, g.distance - beside));
+      if (g.distance < beside && !faces_away(place, g)) load.points += place.area / unit_area;
       continue;
     }
     Touch touch{cell.lane, place.point, place.key, cell.collider, {}, {}};
     const bool is_held = b.find_held(touch);
     if (!is_held) {
-      float F[9], n[3], along = 0, length = 0;
-      deformation_gradient_at(b.state.nodes.u, nodes, b.body.cell_size, place.place, F);
-      cofactor_times(F, place.normal, n);
-      for (int a = 0; a < 3; ++a) {
-        along += n[a] * g.normal[a];
-        length += n[a] * n[a];
-      }
-      if (along > kFacing * std::sqrt(length)) continue;  // the far side of something thin
+      if (faces_away(place, g)) continue;  // the far side of something thin
       to_local(collider, at, touch.hold);
     }
     touches = true;
@@ -373,6 +381,14 @@ bool push_surface(BlockPush& b, const NearCell& cell, const Collider& collider, 
     SurfaceSpring spring = surface_spring(static_cast<float>(lame_lambda(m) + 2 * lame_mu(m)),
                                           static_cast<float>(m.density), h, place.area, b.dt);
     spring.cohesion = collider.cohesion * place.area / unit_area;
+    // Along the surface no inerter helps: at rims and on crumbs, whose nodes are light, the spring
+    // is what the substep bears.
+    const auto light = static_cast<float>(mobility(b.state.nodes, nodes, weights)) * b.dt * b.dt;
+    if (spring.along * light > kAlongBorne) {
+      const float share = kAlongBorne / (spring.along * light);
+      spring.along *= share;
+      spring.damping_along *= share;
+    }
     float velocity[3], push[3], of_collider[3];
     value_at(b.state.nodes.v, nodes, whole_rows, weights, velocity);
     surface_force(collider, g, spring, at, velocity, touch.hold, push);

@@ -53,8 +53,8 @@ struct Points {
   Array<float> volume;  ///< [m^3]
   Array<std::uint8_t>
       bonds;  ///< bit k: still bound to the neighbour of bond k (mpm/lattice/bonds.h)
-  /// Outside its body's anchors, where it moves, shared with neighbours so that first moments are
-  /// right (mpm/anchors/); empty where there are no anchors, or where they act at nodes [m^3].
+  /// Outside its body's anchors, where it moves, some of it given to neighbours
+  /// (mpm/anchors/); empty where there are no anchors, or where they act at nodes [m^3].
   Array<float> free_volume;
   Array<std::uint8_t> anchored;                 ///< kInAnchor, kAtAnchor or 0
   static constexpr std::uint8_t kInAnchor = 1;  ///< its place is in an anchor

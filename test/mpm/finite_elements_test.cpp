@@ -1,0 +1,125 @@
+// Forces, clamps and frequencies against finite elements (test/data/references.yaml), set up as a
+// user does: cell sizes that do not divide the body, planes anywhere in a cell. The true surface is
+// the boundary (`mpm: {boundary: surface}`); docs/validation.md has finer cells and the lattice's.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+
+#include "finite_element_scenes.h"
+#include "tissue_sim/simulation.h"
+
+namespace tissue_sim {
+namespace {
+
+const char* const kData = TISSUE_SIM_TEST_DATA;
+
+/// A value over that of finite elements, less 1.
+double error(double value, const char* body, const char* name) {
+  return value / reference(kData, body, name) - 1;
+}
+
+Tool ball(double radius) {
+  Tool t;
+  t.name = "ball";
+  t.type = ToolType::kBall;
+  t.radius = radius;
+  t.friction = 0;
+  return t;
+}
+
+Tool punch() {
+  Tool t;
+  t.name = "punch";
+  t.type = ToolType::kPunch;
+  t.radius = 0.006;
+  t.edge_radius = 0.001;
+  t.length = 0.05;
+  t.friction = 0;
+  return t;
+}
+
+double force_error(double cell_size, const Tool& tool, double depth, const char* body,
+                   const char* name) {
+  Simulation simulation(indented_cylinder(cell_size, 0, tool));
+  return error(indentation_force(simulation, depth), body, name);
+}
+
+/// How far the middle of the top sinks, and what the clamp carries.
+double sag_error(double cell_size, double held) {
+  Simulation simulation(clamped_block(cell_size, held));
+  EXPECT_TRUE(simulation.settle({1e-4, 3, 20}).at_rest) << held;
+  const Vec3 top(0, 0, 0.032);
+  const double sag = -surface_displacement(simulation.tissue(), 2, top, 2, 0.002 + 1.5 * cell_size);
+  const double weight = 9.81 * 1000 * 0.04 * 0.04 * 0.032;
+  const Vec3 force = simulation.advance_frame().result.anchor_loads[0].force;
+  EXPECT_LT((force + Vec3(0, 0, weight)).norm(), 0.01 * weight) << held;
+  return error(sag, "block", "sag");
+}
+
+// A round tip that is pressed in: 1.8 cells in the contact's radius, then three.
+TEST(FiniteElements, ForceOnARoundTool) {
+  EXPECT_NEAR(force_error(0.0025, ball(0.01), 0.002, "ball", "force_2mm"), 0, 0.04);
+  EXPECT_NEAR(force_error(0.0025, ball(0.01), 0.006, "ball", "force_6mm"), 0, 0.04);
+}
+
+TEST(FiniteElements, ForceOnAToolAsLargeAsACell) {
+  EXPECT_NEAR(force_error(0.003, ball(0.003), 0.002, "small_ball", "force_2mm"), 0, 0.2);
+}
+
+TEST(FiniteElements, ForceOnAFlatTool) {
+  const double coarse = force_error(0.003, punch(), 0.001, "punch", "force_1mm");
+  const double fine = force_error(0.002, punch(), 0.001, "punch", "force_1mm");
+  EXPECT_NEAR(coarse, 0, 0.08);
+  EXPECT_NEAR(fine, 0, 0.03);
+  EXPECT_GT(std::fabs(coarse / fine), std::pow(1.5, 1.3));
+}
+
+TEST(FiniteElements, SagOfAClampedBlockWhereverThePlaneLiesInACell) {
+  double least = 1, most = -1;
+  for (const double held : {0.0, 0.001, 0.0041, 0.0087, 0.0099, 0.01, 0.0111}) {
+    const double e = sag_error(0.004, held);
+    EXPECT_NEAR(e, 0, 0.015) << held;
+    least = std::min(least, e);
+    most = std::max(most, e);
+  }
+  EXPECT_LT(most - least, 0.015);
+  EXPECT_NEAR(sag_error(0.0037, 0.0083), 0, 0.015) << "cells that do not divide the block";
+  EXPECT_GT(std::fabs(sag_error(0.008, 0) / sag_error(0.004, 0)), std::pow(2, 1.3));
+}
+
+TEST(FiniteElements, FrequencyOfAClampedBlock) {
+  for (const bool sideways : {true, false}) {
+    Scene scene = clamped_block(0.004, 0.009);
+    scene.frame_rate = 400;
+    Simulation simulation(scene);
+    const int axis = sideways ? 0 : 2;
+    const Vec3 top(0, 0, 0.032);
+    const double frequency = frequency_of(
+        simulation, (sideways ? 0.3 : 1.0) * Vec3::Unit(axis), 3,
+        [&] { return surface_displacement(simulation.tissue(), 2, top, axis, 0.008); });
+    const char* name = sideways ? "frequency_sideways" : "frequency_upright";
+    EXPECT_NEAR(error(frequency, "block", name), 0, 0.015) << name;
+  }
+}
+
+// Anchors that move, and what they carry.
+TEST(FiniteElements, ReactionOfABarThatIsPulled) {
+  for (const auto& [cell_size, held] : {std::pair{0.002, 0.0047}, {0.0023, 0.005}, {0.003, 0.0}}) {
+    Simulation simulation(pulled_bar(cell_size, held));
+    const std::vector<Anchor>& anchors = simulation.scene().bodies[0].anchors;
+    constexpr int kFrames = 30;
+    for (int i = 1; i <= kFrames; ++i) {
+      const Vec3 by(0.004 * i / kFrames, 0, 0);
+      simulation.set_anchor(0, {anchors[0].origin() - by, Quat::Identity()});
+      simulation.set_anchor(1, {anchors[1].origin() + by, Quat::Identity()});
+      simulation.advance_frame();
+    }
+    EXPECT_TRUE(simulation.settle({1e-4, 2, 30}).at_rest);
+    const std::vector<Wrench> loads = simulation.advance_frame().result.anchor_loads;
+    EXPECT_NEAR(error(loads[0].force.x(), "bar", "reaction_20_percent"), 0, 0.01) << cell_size;
+    EXPECT_NEAR(error(-loads[1].force.x(), "bar", "reaction_20_percent"), 0, 0.01) << cell_size;
+  }
+}
+
+}  // namespace
+}  // namespace tissue_sim

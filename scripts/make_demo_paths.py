@@ -186,7 +186,8 @@ def scene_of_mesh(mesh, scale, cell_size):
     body = {"name": "organ", "shape": "mesh", "mesh": os.path.abspath(mesh), "scale": scale,
             "pose": {"position": position, "orientation": q}, "material": "liver",
             "anchors": [{"box": anchor}]}
-    return {"name": "organ", "cell_size": cell_size, "damping": 2.0, "bodies": [body]}
+    return {"name": "organ", "cell_size": cell_size, "damping": 2.0, "bodies": [body],
+            "mls": {"spacing": cell_size}}
 
 
 def plain(x):
@@ -203,7 +204,7 @@ def main():
     parser.add_argument("--scene", help="scene file whose first body is to be cut")
     parser.add_argument("--mesh", help="mesh file to make a scene of instead")
     parser.add_argument("--scale", type=float, default=1.0, help="metres per unit of the mesh")
-    parser.add_argument("--cell-size", type=float, help="grid spacing [m]")
+    parser.add_argument("--cell-size", type=float, help="spacing of the grid, or of nodes [m]")
     parser.add_argument("--only-paths", action="store_true", help="write no scene.yaml")
     parser.add_argument("--out", required=True, help="folder to write into")
     args = parser.parse_args()
@@ -216,6 +217,7 @@ def main():
         folder = os.path.dirname(os.path.abspath(args.scene))
         if args.cell_size:
             scene["cell_size"] = args.cell_size
+            scene["mls"] = {**scene.get("mls", {}), "spacing": args.cell_size}
     body = scene["bodies"][0]
     lo, hi, shape = box_of(body, folder)
     ground = scene.get("ground", {}).get("z", 0.0)

@@ -33,20 +33,21 @@ bool is_list_due(MlsState& state) {
 void list_near(MlsState& state, int group, float dt) {
   const int first = group * kMlsGroup, last = std::min(state.count(), first + kMlsGroup);
   Box box;
-  double speed2 = 0, edge = 0;
+  double speed2 = 0, edge = 0, depth = 0;
   for (int i = first; i < last; ++i) {
     const Vec3 x = state.position(i);
     box.min = box.min.cwiseMin(x);
     box.max = box.max.cwiseMax(x);
     speed2 = std::max(speed2, state.velocity(i).squaredNorm());
     edge = std::max<double>(edge, state.edge[i]);
+    depth = std::max<double>(depth, state.place[4 * i + 3]);
   }
   MlsGroupContact& contact = state.contact[group];
   contact.near.clear();
   for (std::size_t c = 0; c < state.colliders.size(); ++c) {
     const Collider& collider = state.colliders[c];
-    const double margin =
-        kListMargin * edge + kListLasts * kFaster * dt * (std::sqrt(speed2) + speed(collider));
+    const double margin = depth + kListMargin * edge +
+                          kListLasts * kFaster * dt * (std::sqrt(speed2) + speed(collider));
     Box wide = bounds(collider);
     wide.min.array() -= margin;
     wide.max.array() += margin;
@@ -72,8 +73,11 @@ void add_contact(MlsState& state, int group, float* force) {
     for (const std::uint8_t c : contact.near) {
       const Collider& collider = state.colliders[c];
       // The flats of a blade push where it has cut.
-      if (collider.kind == Collider::kBlade && state.outer[i] == 0) continue;
-      const Gap g = gap(collider, x);
+      const bool blade = collider.kind == Collider::kBlade;
+      if (blade && state.outer[i] == 0) continue;
+      Gap g = gap(collider, x);
+      // Nodes of a fresh cut lie at any distance from the blade: it does not push them apart.
+      if (!blade) g.distance -= state.place[4 * i + 3];
       if (g.distance >= 0) continue;
       MlsTouch touch{i, c, {}};
       while (held != contact.touching.end() && comes_before(*held, touch)) ++held;

@@ -77,7 +77,7 @@ void cross_entries(MlsState& s, const std::vector<std::int32_t>& entries,
       static_cast<int>(touched.size()),
       [&](int k) {
         const std::int32_t i = touched[k];
-        s.outer[i] = 1;
+        expose(s, i);
         for (std::int32_t e = p.begin[i]; e < p.begin[i + 1]; ++e) {
           if (p.crossed[e] == 0) continue;
           const std::int32_t j = p.other[e];
@@ -89,6 +89,8 @@ void cross_entries(MlsState& s, const std::vector<std::int32_t>& entries,
           const float weight = left * p.whole[e];
           if (weight == p.weight[e]) continue;
           p.weight[e] = p.weight[p.twin[e]] = weight;
+          put_weight(p, e, s.lanes);
+          put_weight(p, p.twin[e], s.lanes);
           fallen[k].push_back(i);
           fallen[k].push_back(j);
         }

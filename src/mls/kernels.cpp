@@ -5,16 +5,17 @@
 namespace tissue_sim {
 namespace {
 
-#define TISSUE_SIM_MLS_KERNELS(suffix, W, target)                                    \
-  target void stresses_##suffix(const MlsField& f, int chunk) {                      \
-    mls_passes::stresses<W>(f, chunk);                                               \
-  }                                                                                  \
-  target void force_##suffix(const MlsField& f, int node, float* out) {              \
-    mls_passes::force(f, node, out);                                                 \
-  }                                                                                  \
-  target MlsMeasure measure_##suffix(const MlsField& f, int chunk, float* von_mises, \
-                                     float* stiffening) {                            \
-    return mls_passes::measure<W>(f, chunk, von_mises, stiffening);                  \
+#define TISSUE_SIM_MLS_KERNELS(suffix, W, target)                                             \
+  target void spread_##suffix(const MlsField& f, int chunk) { mls_passes::spread(f, chunk); } \
+  target void stresses_##suffix(const MlsField& f, int chunk) {                               \
+    mls_passes::stresses<W>(f, chunk);                                                        \
+  }                                                                                           \
+  target void forces_##suffix(const MlsField& f, int chunk, float* out) {                     \
+    mls_passes::forces<W>(f, chunk, out);                                                     \
+  }                                                                                           \
+  target MlsMeasure measure_##suffix(const MlsField& f, int chunk, float* von_mises,          \
+                                     float* stiffening) {                                     \
+    return mls_passes::measure<W>(f, chunk, von_mises, stiffening);                           \
   }
 
 TISSUE_SIM_MLS_KERNELS(sse2, 4, )
@@ -26,10 +27,11 @@ TISSUE_SIM_MLS_KERNELS(avx512, 16, TISSUE_SIM_TARGET_AVX512)
 }  // namespace
 
 const MlsKernels& mls_kernels(InstructionSet set) {
-  static constexpr MlsKernels sse2 = {stresses_sse2, force_sse2, measure_sse2};
+  static constexpr MlsKernels sse2 = {spread_sse2, stresses_sse2, forces_sse2, measure_sse2};
 #if defined(__x86_64__)
-  static constexpr MlsKernels avx2 = {stresses_avx2, force_avx2, measure_avx2};
-  static constexpr MlsKernels avx512 = {stresses_avx512, force_avx512, measure_avx512};
+  static constexpr MlsKernels avx2 = {spread_avx2, stresses_avx2, forces_avx2, measure_avx2};
+  static constexpr MlsKernels avx512 = {spread_avx512, stresses_avx512, forces_avx512,
+                                        measure_avx512};
   if (set == InstructionSet::kAvx512) return avx512;
   if (set == InstructionSet::kAvx2) return avx2;
 #endif

@@ -10,8 +10,9 @@ namespace {
 
 constexpr double kSkin = 0.5;    // of an edge: how much farther than they touch nodes are listed
 constexpr double kFar = 2.5;     // reference distance from which a piece may touch itself [edges]
-constexpr double kFaster = 1.5;  // than at the search
-constexpr int kMostSubsteps = 200;  // between two searches
+constexpr double kFaster = 1.5;  // than when that was seen last
+constexpr int kMostSubsteps = 200;  // until it is seen again how far nodes moved
+constexpr int kFewestSubsteps = 4;  // else they are looked for at once
 
 bool may_touch(const MlsState& s, const std::vector<std::int32_t>& piece, std::int32_t i,
                std::int32_t j) {
@@ -22,36 +23,55 @@ bool may_touch(const MlsState& s, const std::vector<std::int32_t>& piece, std::i
   return (s.nodes.place[i] - s.nodes.place[j]).squaredNorm() > far * far;
 }
 
-}  // namespace
+/// Of the nodes that may touch.
+struct Motion {
+  double moved = 0;    ///< how far any did since the search [m]
+  double fastest = 0;  ///< [m/s]
+};
 
-ContactSpring node_spring(const MlsState& s, std::int32_t i) {
-  const Material& m = s.nodes.material_of(i);
-  return contact_spring(static_cast<float>(lame_lambda(m) + 2 * lame_mu(m)),
-                        static_cast<float>(m.density), s.edge[i], s.nodes.volume[i]);
+Motion motion_of(const MlsState& s) {
+  Motion most;
+  const float* from = s.node_contacts.u_found.data();
+  for (std::int32_t i = 0; i < s.count(); ++i) {
+    if (s.outer[i] == 0) continue;
+    double d2 = 0, v2 = 0;
+    for (int a = 0; a < 3; ++a) {
+      const double d = static_cast<double>(s.u[4 * i + a]) - *from++;
+      d2 += d * d;
+      v2 += static_cast<double>(s.v[4 * i + a]) * s.v[4 * i + a];
+    }
+    most.moved = std::max(most.moved, d2);
+    most.fastest = std::max(most.fastest, v2);
+  }
+  return {std::sqrt(most.moved), std::sqrt(most.fastest)};
 }
 
-void find_node_contacts(MlsState& s, const std::vector<std::int32_t>& piece, float dt) {
+/// Substeps for which a list lasts at least of whose skin so much is left.
+int lasts(double left, double fastest, float dt) {
+  const double step = kFaster * fastest * dt;
+  return static_cast<int>(std::min<double>(kMostSubsteps, step > 0 ? left / step : 1e9));
+}
+
+void find_node_contacts(MlsState& s, const std::vector<std::int32_t>& piece) {
   MlsNodeContacts& contacts = s.node_contacts;
   std::vector<std::int32_t> outer;
   std::vector<Vec3> places;
-  double fastest2 = 0, widest = 0, least = 1e300;
+  double widest = 0, least = 1e300;
   for (std::int32_t i = 0; i < s.count(); ++i) {
     if (s.outer[i] == 0) continue;
     outer.push_back(i);
     places.push_back(s.position(i));
-    fastest2 = std::max(fastest2, s.velocity(i).squaredNorm());
     widest = std::max<double>(widest, s.edge[i]);
     least = std::min<double>(least, s.edge[i]);
   }
   const MlsNodeContacts before = std::move(contacts);
   contacts = {};
   contacts.begin.assign(s.count() + 1, 0);
-  contacts.until_search = kMostSubsteps;
   if (outer.empty()) return;
-  const double step = 2 * kFaster * std::sqrt(fastest2) * dt;  // both may move
-  if (step > 0) {
-    contacts.until_search =
-        static_cast<int>(std::min<double>(kMostSubsteps, std::max(1.0, kSkin * least / step)));
+  contacts.skin = static_cast<float>(0.5 * kSkin * least);
+  contacts.u_found.reserve(3 * outer.size());
+  for (const std::int32_t i : outer) {
+    contacts.u_found.insert(contacts.u_found.end(), &s.u[4 * i], &s.u[4 * i] + 3);
   }
   const NearestPoints tree(places);
   struct Found {
@@ -94,6 +114,21 @@ void find_node_contacts(MlsState& s, const std::vector<std::int32_t>& piece, flo
       contacts.rest.push_back(f.rest);
     }
   }
+}
+
+}  // namespace
+
+bool update_node_contacts(MlsState& s, const std::vector<std::int32_t>& piece, float dt) {
+  MlsNodeContacts& contacts = s.node_contacts;
+  if (contacts.until_look-- > 0) return false;
+  if (!contacts.u_found.empty() && !contacts.begin.empty()) {
+    const Motion motion = motion_of(s);
+    contacts.until_look = lasts(contacts.skin - motion.moved, motion.fastest, dt);
+    if (contacts.until_look >= kFewestSubsteps) return false;
+  }
+  find_node_contacts(s, piece);
+  contacts.until_look = lasts(contacts.skin, motion_of(s).fastest, dt);
+  return true;
 }
 
 void add_node_contact(const MlsState& s, std::int32_t i, float* force) {

@@ -1,8 +1,10 @@
 #include "mls/nodes.h"
 
 #include <algorithm>
+#include <cmath>
 #include <stdexcept>
 
+#include "geometry/nearest_surface.h"
 #include "mls/placement.h"
 #include "scene/scene_text.h"
 
@@ -26,6 +28,32 @@ std::uint8_t number_of(std::vector<Material>& materials, const Material& m) {
   if (number > 255) throw std::invalid_argument("materials: a scene uses at most 256 of them");
   if (at == materials.end()) materials.push_back(m);
   return static_cast<std::uint8_t>(number);
+}
+
+/// A clamp acts behind the last node that is held, for what lies between that and the first free
+/// node bends more softly than the rest: under a strain e links between nodes have e (1 + a z^k)
+/// with z = sqrt(3) - 2, a = -z, so 0.21 spacings behind it; the last node within a region lies
+/// half a spacing behind its face in the mean. So nodes so near to it are held, too. [spacings]
+constexpr double kHoldsAround = 0.71;
+
+bool is_within(const Region& region, const Vec3& x, double margin) {
+  switch (region.kind) {
+    case Region::Kind::kBox:
+      return (x.array() >= region.min.array() - margin).all() &&
+             (x.array() <= region.max.array() + margin).all();
+    case Region::Kind::kBall:
+      return (x - region.center).norm() <= region.radius + margin;
+    case Region::Kind::kBelow:
+      return x.z() < region.z + margin;
+  }
+  return false;
+}
+
+/// How far below the surface a node lies [m]; less than 0 above it, as nodes at curved ones may.
+float depth_of(const NearestSurface& surface, const Vec3& x, const Vec3& middle, double spacing) {
+  SurfacePoint nearest;
+  if (!surface.find(x, x - middle, nearest)) return static_cast<float>(0.5 * spacing);
+  return static_cast<float>((nearest.place - x).dot(nearest.normal));
 }
 
 /// The last of the regions that holds the place, -1 for none.
@@ -54,18 +82,23 @@ MlsNodes make_mls_nodes(const Scene& scene, std::vector<std::string>* notes) {
       number.push_back(number_of(nodes.materials, find_material(scene, i.material)));
     }
     std::vector<int> held(body.inclusions.size(), 0), anchored(body.anchors.size(), 0);
+    const double widest = scene.mls.placement == MlsPlacement::kGraded ? scene.mls.grading : 1;
+    const NearestSurface surface(body, 2 * widest * spacing);
     for (const PlacedNode& n : place_nodes(body, scene.mls, spacing, scene.seed + b, notes)) {
       nodes.place.push_back(n.place);
       nodes.volume.push_back(static_cast<float>(n.volume));
       nodes.body.push_back(static_cast<std::int16_t>(b));
       nodes.surface.push_back(n.surface ? 1 : 0);
+      nodes.depth.push_back(n.surface ? depth_of(surface, n.place, body.pose.position, spacing)
+                                      : 0.0f);
       const int inclusion = last_that_holds(
           body.inclusions, n.place, [](const Inclusion& i) -> const Region& { return i.region; });
       nodes.material.push_back(inclusion < 0 ? own : number[inclusion]);
       if (inclusion >= 0) ++held[inclusion];
       std::uint8_t is_held = 0;
       for (std::size_t r = 0; r < body.anchors.size(); ++r) {
-        if (!body.anchors[r].contains(n.place)) continue;
+        const double own = std::max(spacing, std::cbrt(n.volume));
+        if (!is_within(body.anchors[r], n.place, kHoldsAround * own)) continue;
         ++anchored[r];
         is_held = 1;
       }

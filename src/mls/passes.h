@@ -14,14 +14,14 @@
 
 #include "material/laws.h"
 #include "mls/kernels.h"
+#include "mls/slot_passes.h"
 
 namespace tissue_sim {
 namespace mls_passes {
 
 /// sum_j w_ij (a_j - a_i) (x) r_ij of a chunk's nodes, into lanes: out[3 a + k] [kMlsChunk].
-template <int W>
-TISSUE_SIM_INLINE void moments_of(const MlsField& f, const float* a, int chunk,
-                                  float (&out)[9][kMlsChunk]) {
+TISSUE_SIM_INLINE void moments_of_entries(const MlsField& f, const float* a, int chunk,
+                                          float (&out)[9][kMlsChunk]) {
   const int first = chunk * kMlsChunk;
   for (int lane = 0; lane < kMlsChunk; ++lane) {
     const int i = first + lane;
@@ -42,6 +42,17 @@ TISSUE_SIM_INLINE void moments_of(const MlsField& f, const float* a, int chunk,
       out[3 * k + 1][lane] = c1[k];
       out[3 * k + 2][lane] = c2[k];
     }
+  }
+}
+
+/// Of displacements or velocities: `a` is [4 nodes], `row` the first of the rows that hold it.
+template <int W>
+TISSUE_SIM_INLINE void moments_of(const MlsField& f, const float* a, int row, int chunk,
+                                  float (&out)[9][kMlsChunk]) {
+  if (goes_by_slots(f, chunk)) {
+    moments_of_slots<W>(f, row, chunk, out);
+  } else {
+    moments_of_entries(f, a, chunk, out);
   }
 }
 
@@ -93,8 +104,8 @@ TISSUE_SIM_INLINE void stress_of(const MlsField& f, int node, const Vec<W> (&F)[
 template <int W>
 TISSUE_SIM_INLINE void stresses(const MlsField& f, int chunk) {
   alignas(64) float moments[9][kMlsChunk], rates[9][kMlsChunk];
-  moments_of<W>(f, f.u, chunk, moments);
-  if (f.viscous) moments_of<W>(f, f.v, chunk, rates);
+  moments_of<W>(f, f.u, kMlsURow, chunk, moments);
+  if (f.viscous) moments_of<W>(f, f.v, kMlsVRow, chunk, rates);
   for (int lane = 0; lane < kMlsChunk; lane += W) {
     const int node = chunk * kMlsChunk + lane;
     Vec<W> H[9], F[9], P[9], Q[9];
@@ -111,9 +122,11 @@ TISSUE_SIM_INLINE void stresses(const MlsField& f, int chunk) {
     alignas(64) float lanes[9][W];
     for (int k = 0; k < 9; ++k) {
       const Vec<W> q = Q[k] - kappa * H[k];
+      if (f.any_slots) store<W>(f.rows + (kMlsStressRow + k) * f.stride + node, q);
       store<W>(lanes[k], q);
     }
-    for (int l = 0; l < W; ++l) {
+    if (f.any_slots) store<W>(f.rows + kMlsKappaRow * f.stride + node, kappa);
+    for (int l = 0; l < W && f.any_entries; ++l) {
       float* out = f.stress + 16 * static_cast<std::size_t>(node + l);
       for (int k = 0; k < 3; ++k) {  // columns
         const Vec<4> column = {lanes[k][l], lanes[3 + k][l], lanes[6 + k][l],
@@ -141,16 +154,60 @@ TISSUE_SIM_INLINE void force(const MlsField& f, int i, float* out) {
 }
 
 template <int W>
+TISSUE_SIM_INLINE void forces(const MlsField& f, int chunk, float* out) {
+  if (goes_by_slots(f, chunk)) {
+    forces_of_slots<W>(f, chunk, out);
+    return;
+  }
+  const int first = chunk * kMlsChunk;
+  for (int lane = 0; lane < kMlsChunk; ++lane) {
+    if (first + lane < f.count) force(f, first + lane, out + 4 * lane);
+  }
+}
+
+TISSUE_SIM_INLINE void residuals_of_entries(const MlsField& f, int chunk,
+                                            const float (&H)[9][kMlsChunk],
+                                            float (&out)[kMlsChunk]) {
+  for (int lane = 0; lane < kMlsChunk; ++lane) {
+    const int i = chunk * kMlsChunk + lane;
+    out[lane] = 0;
+    if (i >= f.count) continue;
+    const Vec<4> h0 = {H[0][lane], H[3][lane], H[6][lane], 0},
+                 h1 = {H[1][lane], H[4][lane], H[7][lane], 0},
+                 h2 = {H[2][lane], H[5][lane], H[8][lane], 0};
+    const Vec<4> xi = load<4>(f.place + 4 * i), ui = load<4>(f.u + 4 * i);
+    for (std::int32_t e = f.begin[i], end = f.begin[i + 1]; e < end; ++e) {
+      const std::int32_t j = f.other[e];
+      const Vec<4> r = load<4>(f.place + 4 * j) - xi;
+      const Vec<4> d = load<4>(f.u + 4 * j) - ui - (h0 * r[0] + h1 * r[1] + h2 * r[2]);
+      out[lane] += f.weight[e] * (d[0] * d[0] + d[1] * d[1] + d[2] * d[2]);
+    }
+  }
+}
+
+template <int W>
 TISSUE_SIM_INLINE MlsMeasure measure(const MlsField& f, int chunk, float* von_mises,
                                      float* stiffening) {
-  alignas(64) float moments[9][kMlsChunk];
-  moments_of<W>(f, f.u, chunk, moments);
+  alignas(64) float moments[9][kMlsChunk], fits[9][kMlsChunk], residuals[kMlsChunk];
+  moments_of<W>(f, f.u, kMlsURow, chunk, moments);
+  for (int lane = 0; lane < kMlsChunk; lane += W) {
+    Vec<W> H[9];
+    gradients<W>(f, chunk * kMlsChunk + lane, moments, lane, H);
+    for (int k = 0; k < 9; ++k) store<W>(&fits[k][lane], H[k]);
+  }
+  if (goes_by_slots(f, chunk)) {
+    residuals_of_slots<W>(f, chunk, fits, residuals);
+  } else {
+    residuals_of_entries(f, chunk, fits, residuals);
+  }
   MlsMeasure result;
   for (int lane = 0; lane < kMlsChunk; lane += W) {
     const int node = chunk * kMlsChunk + lane;
-    Vec<W> H[9], F[9], cof[9];
-    gradients<W>(f, node, moments, lane, H);
-    for (int k = 0; k < 9; ++k) F[k] = k % 4 == 0 ? H[k] + 1.0f : H[k];
+    Vec<W> F[9], cof[9];
+    for (int k = 0; k < 9; ++k) {
+      F[k] = load<W>(&fits[k][lane]);
+      if (k % 4 == 0) F[k] += 1.0f;
+    }
     const Vec<W> mu = load<W>(f.volume_mu + node), lambda = load<W>(f.volume_lambda + node);
     Vec<W> fixed = energy<FixedCorotated>(F, mu, lambda);
     const Vec<W> neo = energy<NeoHookean>(F, mu, lambda);
@@ -166,7 +223,7 @@ TISSUE_SIM_INLINE MlsMeasure measure(const MlsField& f, int chunk, float* von_mi
     }
     for (int l = 0; l < W && node + l < f.count; ++l) {
       const double e = f.neo_hookean[node + l] != 0 ? neo[l] : fixed[l];
-      result.elastic += e;
+      result.elastic += e + 0.5 * f.kappa[node + l] * residuals[lane + l];
       const float most = fmaxf(1.0f, fmaxf(columns[0][l], fmaxf(columns[1][l], columns[2][l])));
       const bool finite =
           std::isfinite(e) && std::isfinite(columns[0][l] + columns[1][l] + columns[2][l]);

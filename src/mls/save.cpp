@@ -15,7 +15,7 @@ void fields(Archive& archive, MlsGroupContact& c) {
 
 template <class Archive>
 void fields(Archive& archive, MlsNodeContacts& c) {
-  archive(c.begin, c.other, c.rest, c.until_search);
+  archive(c.begin, c.other, c.rest, c.u_found, c.skin, c.until_look);
 }
 
 template <class Archive>
@@ -44,6 +44,12 @@ std::vector<std::uint8_t> MlsTissue::save() {
 void MlsTissue::restore(Span<const std::uint8_t> saved) {
   ArchiveReader in(saved);
   each_field(in);
+  MlsState& s = *state_;
+  put_weights(s.pairs, s.lanes);
+  for (std::int32_t i = 0; i < s.count(); ++i) {
+    const bool cut = s.outer[i] != 0 && s.nodes.surface[i] == 0;
+    s.place[4 * i + 3] = cut ? 0.5f * s.edge[i] : s.nodes.depth[i];
+  }
   if (in.left() > 0) throw std::runtime_error("the state has more to it than this version knows");
 }
 

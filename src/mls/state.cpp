@@ -59,6 +59,11 @@ void remake_node(MlsState& s, std::int32_t i) {
   eigen.computeDirect(m, Eigen::EigenvaluesOnly);
   const double least = eigen.eigenvalues()[0], largest = eigen.eigenvalues()[2];
   const bool spans = largest > 0 && least > kSpans * largest;
+  double whole = 0;  // trace of the moments while nothing was cut
+  for (std::int32_t e = s.pairs.begin[i]; e < s.pairs.begin[i + 1]; ++e) {
+    const std::int32_t j = s.pairs.other[e];
+    whole += s.pairs.whole[e] * (s.nodes.place[j] - s.nodes.place[i]).squaredNorm();
+  }
   Eigen::Matrix3d inverse = Eigen::Matrix3d::Zero();
   if (spans) inverse = m.inverse();
   for (int k = 0; k < 6; ++k) {
@@ -66,8 +71,8 @@ void remake_node(MlsState& s, std::int32_t i) {
     s.inverse_moment[k][i] = static_cast<float>(inverse(kRow[k], kColumn[k]));
   }
   const Material& material = s.nodes.material_of(i);
-  s.kappa[i] = spans ? static_cast<float>(s.scene.mls.stabilisation * material.young_modulus *
-                                          s.nodes.volume[i] / m.trace())
+  s.kappa[i] = spans ? static_cast<float>(3 * s.scene.mls.stabilisation * material.young_modulus *
+                                          s.nodes.volume[i] / whole)
                      : 0.0f;
   s.thread[i] = spans ? 0 : 1;
 }
@@ -105,8 +110,8 @@ std::unique_ptr<MlsState> make_mls_state(const Scene& scene, std::vector<std::st
   for (Array<float>* a : {&s.place, &s.u, &s.v, &s.u_next, &s.v_next}) resize_padded(*a, n, 4);
   for (Array<float>* a :
        {&s.mass, &s.inv_mass, &s.volume_mu, &s.volume_lambda, &s.volume_eta, &s.kappa, &s.edge,
-        &s.inverse_moment[0], &s.inverse_moment[1], &s.inverse_moment[2], &s.inverse_moment[3],
-        &s.inverse_moment[4], &s.inverse_moment[5]}) {
+        &s.contact_stiffness, &s.contact_damping, &s.inverse_moment[0], &s.inverse_moment[1],
+        &s.inverse_moment[2], &s.inverse_moment[3], &s.inverse_moment[4], &s.inverse_moment[5]}) {
     resize_padded(*a, n, 1);
   }
   resize_padded(s.stress, n, 16);
@@ -121,6 +126,7 @@ std::unique_ptr<MlsState> make_mls_state(const Scene& scene, std::vector<std::st
     const Material& m = s.nodes.material_of(i);
     const float volume = s.nodes.volume[i];
     for (int a = 0; a < 3; ++a) s.place[4 * i + a] = static_cast<float>(s.nodes.place[i][a]);
+    s.place[4 * i + 3] = s.nodes.depth[i];
     s.mass[i] = static_cast<float>(m.density) * volume;
     s.inv_mass[i] = s.nodes.anchored[i] != 0 ? 0 : 1 / s.mass[i];
     s.volume_mu[i] = static_cast<float>(lame_mu(m)) * volume;
@@ -130,11 +136,16 @@ std::unique_ptr<MlsState> make_mls_state(const Scene& scene, std::vector<std::st
     s.neo_hookean[i] = m.law == Law::kNeoHookean ? 1 : 0;
     s.edge[i] = static_cast<float>(s.pairs.support[i] / factor);
     if (s.edge[i] == 0) s.edge[i] = static_cast<float>(mls_spacing(scene));
+    const ContactSpring spring = contact_spring(static_cast<float>(lame_lambda(m) + 2 * lame_mu(m)),
+                                                static_cast<float>(m.density), s.edge[i], volume);
+    s.contact_stiffness[i] = spring.stiffness;
+    s.contact_damping[i] = spring.damping;
     s.outer[i] = s.nodes.surface[i];
     all[i] = i;
   }
   s.instructions = instruction_set();
   s.kernels = &mls_kernels(s.instructions);
+  s.lanes = make_lanes(s.pairs, s.place);
   remake(s, all);
   return state;
 }
@@ -147,12 +158,21 @@ void remake(MlsState& s, const std::vector<std::int32_t>& nodes) {
   }
 }
 
-MlsField field_of(const MlsState& s) {
+MlsField field_of(const MlsState& s) { return field_of(s, s.u.data(), s.v.data()); }
+
+MlsField field_of(const MlsState& s, const float* u, const float* v) {
   MlsField f;
   f.count = s.count();
   f.place = s.place.data();
-  f.u = s.u.data();
-  f.v = s.v.data();
+  f.u = u;
+  f.v = v;
+  f.rows = s.lanes.row(0);
+  f.stride = s.lanes.stride;
+  f.slots = s.lanes.of_chunk.data();
+  f.slot_first = s.lanes.first.data();
+  f.slot_weight = s.lanes.weight.data();
+  f.any_slots = s.lanes.any_slots;
+  f.any_entries = s.lanes.any_entries;
   f.begin = s.pairs.begin.data();
   f.other = s.pairs.other.data();
   f.weight = s.pairs.weight.data();
@@ -163,7 +183,9 @@ MlsField field_of(const MlsState& s) {
   f.kappa = s.kappa.data();
   f.neo_hookean = s.neo_hookean.data();
   f.stress = const_cast<float*>(s.stress.data());
-  f.viscous = s.viscous;
+  f.viscous = s.viscous && v != nullptr;
+  s.cpu->for_each(
+      s.chunks(), [&](int chunk) { s.kernels->spread(f, chunk); }, 64);
   return f;
 }
 
@@ -172,13 +194,15 @@ float substep(MlsState& s, float dt, std::vector<ColliderLoad>& loads) {
   const bool list = is_list_due(s);
   const float kick = kick_of(s.dt, dt);
   const auto keep = static_cast<float>(std::exp(-s.scene.damping * kick));
-  float gravity[3];
+  Vec<4> gravity{};
   for (int a = 0; a < 3; ++a) gravity[a] = static_cast<float>(s.scene.gravity[a]);
   const auto move_group = [&](int group) {
     const int first = group * kMlsGroup, last = std::min(s.count(), first + kMlsGroup);
     alignas(64) float force[4 * kMlsGroup];
+    for (int i = first; i < last; i += kMlsChunk) {
+      s.kernels->forces(field, i / kMlsChunk, force + 4 * (i - first));
+    }
     for (int i = first; i < last; ++i) {
-      s.kernels->force(field, i, force + 4 * (i - first));
       if (s.any_thread[i / kMlsChunk] != 0) {
         add_springs(s, s.u.data(), i, force + 4 * (i - first));
       }
@@ -188,13 +212,13 @@ float substep(MlsState& s, float dt, std::vector<ColliderLoad>& loads) {
     add_contact(s, group, force);
     for (int i = first; i < last; ++i) {
       const float inv_mass = s.inv_mass[i];
-      for (int a = 0; a < 3; ++a) {
-        const float f = force[4 * (i - first) + a];
-        const float v =
-            inv_mass > 0 ? keep * s.v[4 * i + a] + kick * (f * inv_mass + gravity[a]) : 0.0f;
-        s.v_next[4 * i + a] = v;
-        s.u_next[4 * i + a] = s.u[4 * i + a] + dt * v;
+      Vec<4> v{};
+      if (inv_mass > 0) {
+        v = keep * load<4>(&s.v[4 * i]) +
+            kick * (load<4>(force + 4 * (i - first)) * inv_mass + gravity);
       }
+      store<4>(&s.v_next[4 * i], v);
+      store<4>(&s.u_next[4 * i], load<4>(&s.u[4 * i]) + dt * v);
     }
   };
   SharedWork stresses(s.chunks(), 4), moves(s.groups(), 1);
@@ -220,18 +244,20 @@ float substep(MlsState& s, float dt, std::vector<ColliderLoad>& loads) {
 }
 
 void internal_forces(MlsState& s, const float* u, float* force) {
-  MlsField field = field_of(s);
-  field.u = u;
-  field.viscous = false;
+  const MlsField field = field_of(s, u, nullptr);
   s.cpu->for_each(
       s.chunks(), [&](int chunk) { s.kernels->stresses(field, chunk); }, 4);
   s.cpu->for_each(
-      s.count(),
-      [&](int i) {
-        s.kernels->force(field, i, force + 4 * i);
-        if (s.any_thread[i / kMlsChunk] != 0) add_springs(s, u, i, force + 4 * i);
+      s.chunks(),
+      [&](int chunk) {
+        const int first = chunk * kMlsChunk;
+        s.kernels->forces(field, chunk, force + 4 * first);
+        if (s.any_thread[chunk] == 0) return;
+        for (int i = first; i < std::min(s.count(), first + kMlsChunk); ++i) {
+          add_springs(s, u, i, force + 4 * i);
+        }
       },
-      kMlsGroup);
+      4);
 }
 
 }  // namespace tissue_sim

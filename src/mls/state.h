@@ -10,6 +10,7 @@
 #include "compute/for_each.h"
 #include "compute/simd.h"
 #include "mls/kernels.h"
+#include "mls/lanes.h"
 #include "mls/nodes.h"
 #include "mls/pairs.h"
 #include "tissue_sim/scene.h"
@@ -40,15 +41,20 @@ struct MlsNodeContacts {
   std::vector<std::int32_t> begin;  ///< per node, and one more; empty where nothing was looked for
   std::vector<std::int32_t> other;
   std::vector<float> rest;  ///< distance below which they push [m]
-  int until_search = 0;     ///< substeps
+  std::vector<float>
+      u_found;         ///< displacements of the nodes at the search that may touch, by number
+  float skin = 0;      ///< how far each may move until they are looked for anew [m]
+  int until_look = 0;  ///< substeps until it is seen how far they moved
 };
 
 struct MlsState {
   Scene scene;
   MlsNodes nodes;
   MlsPairs pairs;
+  mutable MlsLanes lanes;  ///< its rows are scratch
 
-  // Per node, padded to whole chunks. Vectors are (x, y, z, 0).
+  // Per node, padded to whole chunks. Vectors are (x, y, z, 0), but for the fourth of `place`: how
+  // far outside of the node tissue ends that tools and the ground may touch [m].
   Array<float> place, u, v;                           ///< [m], [m], [m/s]
   Array<float> u_next, v_next;                        ///< where a substep writes them
   Array<float> mass, inv_mass;                        ///< [kg]; inv_mass 0 where held
@@ -58,6 +64,7 @@ struct MlsState {
   Array<std::uint8_t> neo_hookean;                    ///< law of each node
   Array<float> stress;                                ///< see MlsField
   Array<float> edge;                                  ///< distance to its neighbours [m]
+  Array<float> contact_stiffness, contact_damping;    ///< node_spring() [N/m], [N s/m]
   Array<std::uint8_t> outer;                          ///< at the surface, or a cut passes beside it
   Array<std::uint8_t> thread;      ///< its support spans no space: springs to its neighbours do
   Array<std::uint8_t> any_thread;  ///< per chunk: a thread, or the neighbour of one
@@ -90,10 +97,19 @@ struct MlsState {
 /// Builds the state of a valid scene at rest. Throws what make_mls_nodes() throws.
 std::unique_ptr<MlsState> make_mls_state(const Scene& scene, std::vector<std::string>* notes);
 
+/// Marks a node beside which a cut passes: tissue now ends half a spacing from it.
+inline void expose(MlsState& state, std::int32_t node) {
+  if (state.outer[node] == 0) state.place[4 * node + 3] = 0.5f * state.edge[node];
+  state.outer[node] = 1;
+}
+
 /// Makes moments, penalty and springs of these nodes anew, after weights of their entries changed.
 void remake(MlsState& state, const std::vector<std::int32_t>& nodes);
 
-MlsField field_of(const MlsState& state);
+/// What the passes work on, at displacements `u` and velocities `v`, [4 n] each. Spreads them (see
+/// MlsKernels), so no two fields are in use at a time.
+MlsField field_of(const MlsState& state, const float* u, const float* v);
+MlsField field_of(const MlsState& state);  ///< at the present ones
 
 /// One substep: stress of all nodes, forces with contact at the colliders' present places, motion.
 /// Adds what acts on the colliders to `loads`. Returns how long it acted [s].

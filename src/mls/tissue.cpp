@@ -45,12 +45,21 @@ void MlsTissue::part(const std::vector<std::int32_t>& changed, CutReport& report
     return p.begin[i] == p.begin[i + 1] || changed.size() == s.nodes.place.size();
   });
   if (!may_have) return;
+  // Within blocks side by side, which touch nothing of one another; then between them. The root of
+  // a component is its lowest node whatever the order.
+  constexpr std::int32_t kBlock = 2048;
   UnionFind linked(s.count());
-  for (std::int32_t i = 0; i < s.count(); ++i) {
-    for (std::int32_t e = p.begin[i]; e < p.begin[i + 1]; ++e) {
-      if (p.other[e] > i && p.crossed[e] == 0) linked.join(i, p.other[e]);
+  const int blocks = (s.count() + kBlock - 1) / kBlock;
+  const auto join = [&](int block, bool within) {
+    const std::int32_t first = block * kBlock, last = std::min(s.count(), first + kBlock);
+    for (std::int32_t i = first; i < last; ++i) {
+      for (std::int32_t e = p.begin[i + 1]; e-- > p.begin[i] && p.other[e] > i;) {
+        if ((p.other[e] < last) == within && p.crossed[e] == 0) linked.join(i, p.other[e]);
+      }
     }
-  }
+  };
+  state_->cpu->for_each(blocks, [&](int block) { join(block, true); });
+  for (int block = 0; block < blocks; ++block) join(block, false);
   for (const int id : update_pieces(s.nodes.volume.data(), linked, pieces_)) {
     report.new_fragments.push_back(id);
   }
@@ -70,7 +79,7 @@ void MlsTissue::forget() {
   substeps_.forget();
   pieces_measured_ = false;
   may_touch_ = true;
-  state_->node_contacts.until_search = 0;
+  search_node_contacts(*state_);
 }
 
 CutReport MlsTissue::cut_now(const BladePath& path) {
@@ -122,9 +131,7 @@ double MlsTissue::run_part(const FramePart& part) {
     const double share = part.substeps.share(i + 1, part.from, part.to);
     s.colliders = frame.colliders.at(share);
     std::vector<ColliderLoad> loads(s.colliders.size());
-    if (may_touch_ && s.node_contacts.until_search-- <= 0) {
-      find_node_contacts(s, pieces_.of_point, part.substeps.at(i));
-    }
+    if (may_touch_) update_node_contacts(s, pieces_.of_point, part.substeps.at(i));
     const float acted = substep(s, part.substeps.at(i), loads);
     frame.colliders.add_loads(share, s.colliders.data(), loads.data(), acted / frame.duration,
                               result_.loads);

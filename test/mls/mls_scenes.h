@@ -71,12 +71,13 @@ inline double mls_energy(const MlsState& s, const std::vector<double>& u) {
       }
     };
     Vec3 r, d;
-    double trace = 0;
+    double trace = 0, whole = 0;
     for (int e = s.pairs.begin[i]; e < s.pairs.begin[i + 1]; ++e) {
       pair(e, r, d);
       M += s.pairs.weight[e] * r * r.transpose();
       N += s.pairs.weight[e] * d * r.transpose();
       trace += s.pairs.weight[e] * r.squaredNorm();
+      whole += s.pairs.whole[e] * r.squaredNorm();
     }
     const Material& m = s.nodes.material_of(i);
     const double volume = s.nodes.volume[i];
@@ -94,7 +95,7 @@ inline double mls_energy(const MlsState& s, const std::vector<double>& u) {
     const double mu = lame_mu(m), lambda = lame_lambda(m);
     sum += volume * (m.law == Law::kNeoHookean ? tissue_sim::energy<NeoHookean>(F, mu, lambda)
                                                : tissue_sim::energy<FixedCorotated>(F, mu, lambda));
-    const double kappa = s.scene.mls.stabilisation * m.young_modulus * volume / trace;
+    const double kappa = 3 * s.scene.mls.stabilisation * m.young_modulus * volume / whole;
     for (int e = s.pairs.begin[i]; e < s.pairs.begin[i + 1]; ++e) {
       pair(e, r, d);
       sum += 0.5 * kappa * s.pairs.weight[e] * (d - H * r).squaredNorm();
@@ -122,8 +123,11 @@ inline std::vector<Vec3> mls_forces(const MlsState& s) {
   for (int i = 0; i < s.count(); ++i) {
     if (s.thread[i] != 0) continue;
     Eigen::Matrix3d M = Eigen::Matrix3d::Zero();
-    for_each_pair(
-        i, [&](int, int, double w, const Vec3& r, const Vec3&) { M += w * r * r.transpose(); });
+    double whole = 0;
+    for_each_pair(i, [&](int e, int, double w, const Vec3& r, const Vec3&) {
+      M += w * r * r.transpose();
+      whole += s.pairs.whole[e] * r.squaredNorm();
+    });
     const Material& m = s.nodes.material_of(i);
     const double volume = s.nodes.volume[i];
     double F[9], P[9];
@@ -135,7 +139,7 @@ inline std::vector<Vec3> mls_forces(const MlsState& s) {
     }
     Eigen::Matrix3d stress_of;
     for (int k = 0; k < 9; ++k) stress_of(k / 3, k % 3) = P[k];
-    kappa[i] = s.scene.mls.stabilisation * m.young_modulus * volume / M.trace();
+    kappa[i] = 3 * s.scene.mls.stabilisation * m.young_modulus * volume / whole;
     Q[i] = volume * stress_of * M.inverse() - kappa[i] * H[i];
   }
   // Springs of supports that span no space.

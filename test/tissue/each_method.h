@@ -74,7 +74,7 @@ inline Tolerances tolerances(Method method) {
       t.rest_speed = t.cut_speed = 0;
       t.rest_energy = t.cut_energy = 0;
       t.misplaced = 0;
-      t.clamp = -0.25;  // half way between the last node that is held and the first that is not
+      t.clamp = 0;  // the region's face in the mean: src/mls/nodes.cpp
       t.beam_convergence = 1.8;
       return t;
     case Method::kPbd:

@@ -49,7 +49,6 @@ void CudaMlsTissue::upload_nodes() {
   const MlsState& s = *state_;
   const int n = d.count = s.count();
   const auto count = static_cast<std::size_t>(n);
-  upload(s.place, n, d.place, d.stream);
   d.volume_mu.upload(s.volume_mu.data(), n, d.stream);
   d.volume_lambda.upload(s.volume_lambda.data(), n, d.stream);
   d.volume_eta.upload(s.volume_eta.data(), n, d.stream);
@@ -117,6 +116,7 @@ void CudaMlsTissue::pairs_changed() {
   d.inverse_moment.upload(moments, d.stream);
   d.kappa.upload(s.kappa.data(), n, d.stream);
   d.outer.upload(s.outer.data(), n, d.stream);
+  upload(s.place, n, d.place, d.stream);  // cuts move where tissue ends
   d.wait("receive data");
 }
 
@@ -175,8 +175,12 @@ void CudaMlsTissue::push_contact() {
 
 void CudaMlsTissue::search_contacts(float dt) {
   OnDevice& d = *device_;
+  if (state_->node_contacts.until_look > 0) {
+    --state_->node_contacts.until_look;
+    return;
+  }
   pull();
-  find_node_contacts(*state_, pieces_.of_point, dt);
+  if (!update_node_contacts(*state_, pieces_.of_point, dt)) return;
   const MlsNodeContacts& contacts = state_->node_contacts;
   d.contact_begin.upload(contacts.begin, d.stream);
   d.contact_other.upload(contacts.other, d.stream);
@@ -207,7 +211,8 @@ double CudaMlsTissue::run_part(const FramePart& part) {
   const std::vector<Box> reach = frame_->colliders.reach();
   // Tissue gets faster within a part: what it may come to is listed widely, for it costs little.
   const double time = part.substeps.until(part.substeps.count);
-  const double margin = mls_spacing(s.scene) + 4 * (d.speed + s.scene.gravity.norm() * time) * time;
+  const double margin =
+      2 * mls_spacing(s.scene) + 4 * (d.speed + s.scene.gravity.norm() * time) * time;
   std::uint32_t near = 0;
   for (std::size_t c = 0; c < reach.size(); ++c) {
     const bool meets = (d.box.min.array() - margin <= reach[c].max.array()).all() &&
@@ -216,7 +221,7 @@ double CudaMlsTissue::run_part(const FramePart& part) {
   }
   for (int i = 0; i < part.substeps.count; ++i) {
     const float dt = part.substeps.at(i);
-    if (may_touch_ && s.node_contacts.until_search-- <= 0) search_contacts(dt);
+    if (may_touch_) search_contacts(dt);
     CudaMlsStep step;
     step.dt = dt;
     step.kick = kick_of(s.dt, dt);
@@ -289,7 +294,7 @@ void CudaMlsTissue::reject_part(Verdict) {
   d.touching.copy(saved.touching, d.stream);
   d.host_is_current = false;
   state_->node_contacts = saved.node_contacts;
-  state_->node_contacts.until_search = 0;  // what is on the GPU may be newer
+  search_node_contacts(*state_);  // what is on the GPU may be newer
   state_->dt = saved.dt;
   state_->time = saved.time;
   result_ = saved.result;
@@ -348,7 +353,7 @@ void CudaMlsTissue::restore(Span<const std::uint8_t> saved) {
   MlsTissue::restore(saved);
   push();
   pairs_changed();
-  state_->node_contacts.until_search = 0;
+  search_node_contacts(*state_);
   measure();
 }
 

@@ -25,7 +25,7 @@ struct CudaMlsMotion {
 
 struct CudaMlsField {
   int count = 0;
-  const float4* place;          ///< reference [m]
+  const float4* place;          ///< reference, and how far outside of it tissue ends [m]
   const std::int32_t* offset;   ///< per slice, and one more
   const std::int32_t* other;    ///< per entry; the node itself where there is none
   const float* weight;          ///< 0 where there is none

@@ -124,8 +124,10 @@ __device__ __forceinline__ void collider_forces(const CudaMlsField& f, const Cud
   for (std::uint32_t left = c.near; left != 0; left &= left - 1) {
     const int k = __ffs(static_cast<int>(left)) - 1;
     const Collider& collider = c.all[k];
-    if (collider.kind == Collider::kBlade && f.outer[i] == 0) continue;
-    const Gap g = gap(collider, x);
+    const bool blade = collider.kind == Collider::kBlade;
+    if (blade && f.outer[i] == 0) continue;
+    Gap g = gap(collider, x);
+    if (!blade) g.distance -= __ldg(f.place + i).w;  // as mls/contact.cpp
     if (!(g.distance < 0)) continue;
     float4* held = c.hold + static_cast<std::size_t>(k) * f.count + i;
     float place[3], push[3];

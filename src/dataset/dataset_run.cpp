@@ -10,12 +10,18 @@
 namespace tissue_sim {
 namespace {
 
-/// One frame on; false where it blew up.
+/// Tissue that takes so many substeps a frame, several times what stiff and whole tissue does, or
+/// is in so many pieces is crushed: nothing is learnt from it from then on.
+constexpr int kMostSubsteps = 250, kMostPieces = 60;
+
+/// One frame on; false where it blew up or was crushed.
 bool advance(MpmTissue& tissue, const DatasetScene& scene, int frame) {
   FrameInput input;
   if (frame == 0) input.cuts = {scene.cuts.data(), scene.cuts.size()};
   tissue.advance(1 / scene.scene.frame_rate, input);
-  return !tissue.finish().blew_up;
+  const FrameResult result = tissue.finish();
+  return !result.blew_up && result.substeps <= kMostSubsteps &&
+         tissue.fragment_count() <= kMostPieces;
 }
 
 double loose_share(const MpmTissue& tissue, double coarse_cell) {

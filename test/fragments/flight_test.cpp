@@ -79,7 +79,9 @@ TEST(FragmentFlight, TakesOffWithTheDeformationAndKeepsMomentum) {
   EXPECT_GT(points, 50);
   ASSERT_EQ(s.flights.size(), 1u);
   for (std::size_t n = 0; n < other.size(); ++n) {  // nobody else moves
-    if (s.flight_of_node[n] < 0) EXPECT_EQ(s.nodes.u[1][n], other[n]);
+    if (s.flight_of_node[n] < 0) {
+      EXPECT_EQ(s.nodes.u[1][n], other[n]);
+    }
   }
 }
 

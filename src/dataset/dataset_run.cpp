@@ -12,7 +12,7 @@ namespace {
 
 /// Tissue that takes so many substeps a frame, several times what stiff and whole tissue does, or
 /// is in so many pieces is crushed: nothing is learnt from it from then on.
-constexpr int kMostSubsteps = 250, kMostPieces = 60;
+constexpr int kMostSubsteps = 250, kMostPieces = 40;
 
 double loose_share(const MpmTissue& tissue, double coarse_cell) {
   const std::vector<std::uint8_t> fragment = fragments_of(tissue, coarse_cell);
@@ -78,7 +78,7 @@ std::vector<std::uint8_t> fragments_of(const MpmTissue& tissue, double coarse_ce
   for (const Fragment& f : pieces.all) all += f.volume;
   const double least = 0.5 * coarse_cell * coarse_cell * coarse_cell;
   for (const Fragment& f : pieces.all) {
-    fragment[f.id] = f.loose && f.volume >= least && f.volume <= 0.5 * all;
+    fragment[f.id] = f.loose && f.volume >= least && f.volume <= 0.4 * all;
   }
   return fragment;
 }

@@ -38,7 +38,8 @@ std::unique_ptr<MpmTissue> begin_run(const DatasetScene& scene, int level);
 bool advance_frame(MpmTissue& tissue, const DatasetScene& scene, int frame,
                    FrameResult* result = nullptr);
 
-/// A fragment is a loose piece of at least half a coarse cell and at most half of all bodies.
+/// A fragment is a loose piece of at least half a coarse cell and at most 0.4 of all bodies: of two
+/// halves it would be chance which is one.
 /// Returns which pieces are, by id.
 std::vector<std::uint8_t> fragments_of(const MpmTissue& tissue, double coarse_cell);
 

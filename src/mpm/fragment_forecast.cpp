@@ -96,7 +96,7 @@ bool draw_deformation(const MpmState& state, const Pieces& pieces, int piece,
   for (const Fragment& f : pieces.all) of_body += f.body == own->body ? f.volume : 0;
   const LatticeBody& body = state.bodies[own->body];
   const double cell = body.cell_size * body.cell_size * body.cell_size;
-  if (own->volume < 0.5 * cell || own->volume > 0.5 * of_body) return false;
+  if (own->volume < 0.5 * cell || own->volume > 0.4 * of_body) return false;
   int looked_at = 0, expected = 0;
   double probability = 0;
   Eigen::Matrix3d mean = Eigen::Matrix3d::Zero(), deviation = mean;

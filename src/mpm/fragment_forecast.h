@@ -41,7 +41,7 @@ std::vector<FragmentChance> forecast_fragments(MpmState& state, const Pieces& pi
 void remember(const std::vector<FragmentChance>& now, double since,
               std::vector<FragmentChance>& before);
 
-/// Whether a piece that has come off is a fragment (loose, half a cell to half of its body) that
+/// Whether a piece that has come off is a fragment (loose, half a cell to 0.4 of its body) that
 /// was foreseen: points of it were looked at, and it was more probable than not, on average. `F` is
 /// then drawn from what was said of those expected to be part of one: the mean over them, and one
 /// draw of a normal distribution for each component (what is wrong for one point is for its

@@ -199,7 +199,7 @@ TEST(FragmentFlight, NumbersAreNormal) {
 const TemporaryFolder folder;
 const std::string kNetwork = folder.write("network.yaml", network_text());
 
-/// A bar that its own motion tears.
+/// A bar that its own motion tears, off its middle.
 Scene torn_bar() {
   Scene scene = free_box(Vec3(0.020, 0.008, 0.008), 0.002);
   Material m;
@@ -220,7 +220,7 @@ void set_going(MpmTissue& tissue) {
   for (const LatticeBody& b : s.bodies) {
     b.for_each_node([&](int node, int i, int j, int k) {
       const Vec3 x = b.node_position(i, j, k);
-      s.nodes.v[0][node] = static_cast<float>(150 * (x.x() - 0.010));
+      s.nodes.v[0][node] = static_cast<float>(1.5 * std::tanh((x.x() - 0.014) / 0.003));
       s.nodes.v[1][node] = static_cast<float>(20 * (x.x() - 0.007));
     });
   }

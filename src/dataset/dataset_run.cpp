@@ -10,13 +10,9 @@
 namespace tissue_sim {
 namespace {
 
-/// One frame on; false where it blew up.
-bool advance(MpmTissue& tissue, const DatasetScene& scene, int frame) {
-  FrameInput input;
-  if (frame == 0) input.cuts = {scene.cuts.data(), scene.cuts.size()};
-  tissue.advance(1 / scene.scene.frame_rate, input);
-  return !tissue.finish().blew_up;
-}
+/// Tissue that takes so many substeps a frame, several times what stiff and whole tissue does, or
+/// is in so many pieces is crushed: nothing is learnt from it from then on.
+constexpr int kMostSubsteps = 250, kMostPieces = 40;
 
 double loose_share(const MpmTissue& tissue, double coarse_cell) {
   const std::vector<std::uint8_t> fragment = fragments_of(tissue, coarse_cell);
@@ -51,6 +47,16 @@ struct Waiting {
 
 }  // namespace
 
+bool advance_frame(MpmTissue& tissue, const DatasetScene& scene, int frame, FrameResult* result) {
+  FrameInput input;
+  if (frame == 0) input.cuts = {scene.cuts.data(), scene.cuts.size()};
+  tissue.advance(1 / scene.scene.frame_rate, input);
+  const FrameResult of_frame = tissue.finish();
+  if (result != nullptr) *result = of_frame;
+  return !of_frame.blew_up && of_frame.substeps <= kMostSubsteps &&
+         tissue.fragment_count() <= kMostPieces;
+}
+
 std::unique_ptr<MpmTissue> begin_run(const DatasetScene& scene, int level) {
   auto tissue = std::make_unique<MpmTissue>(finer(scene, level));
   MpmState& s = tissue->state();
@@ -72,7 +78,7 @@ std::vector<std::uint8_t> fragments_of(const MpmTissue& tissue, double coarse_ce
   for (const Fragment& f : pieces.all) all += f.volume;
   const double least = 0.5 * coarse_cell * coarse_cell * coarse_cell;
   for (const Fragment& f : pieces.all) {
-    fragment[f.id] = f.loose && f.volume >= least && f.volume <= 0.5 * all;
+    fragment[f.id] = f.loose && f.volume >= least && f.volume <= 0.4 * all;
   }
   return fragment;
 }
@@ -105,7 +111,7 @@ DatasetSamples run_dataset_scene(const DatasetScene& scene, const DatasetOptions
       }
       samples.plain.resize(samples.x.size() / kFeatureCount, 0);
     }
-    if (!advance(*coarse, scene, frame)) {
+    if (!advance_frame(*coarse, scene, frame)) {
       samples.blew_up = true;
       break;
     }
@@ -125,7 +131,7 @@ DatasetSamples run_dataset_scene(const DatasetScene& scene, const DatasetOptions
   samples.df.resize(9 * rows, 0);
   std::size_t known = 0;  // rows come in order of time
   for (int frame = 0; frame < frames; ++frame) {
-    if (!advance(*fine, scene, frame)) {
+    if (!advance_frame(*fine, scene, frame)) {
       samples.blew_up = true;
       break;
     }
@@ -157,37 +163,6 @@ DatasetSamples run_dataset_scene(const DatasetScene& scene, const DatasetOptions
   samples.df.resize(9 * known);
   samples.about.resize(3 * known);
   return samples;
-}
-
-Outcome run_outcome(const DatasetScene& scene, int level, int frames) {
-  Outcome outcome;
-  const auto tissue = begin_run(scene, level);
-  outcome.points = tissue->point_count();
-  for (int frame = 0; frame < frames; ++frame) {
-    if (!advance(*tissue, scene, frame)) {
-      outcome.blew_up = true;
-      break;
-    }
-    const Span<const Fragment> pieces = tissue->fragments();
-    const std::vector<std::uint8_t> fragment = fragments_of(*tissue, scene.scene.cell_size);
-    double all = 0, loose = 0;
-    outcome.fragments = 0;
-    outcome.largest_share = 0;
-    for (const Fragment& f : pieces) {
-      all += f.volume;
-      if (fragment[f.id] == 0) continue;
-      ++outcome.fragments;
-      loose += f.volume;
-      outcome.largest_share = std::max(outcome.largest_share, f.volume);
-      outcome.peak_speed = std::max(outcome.peak_speed, f.velocity.norm());
-    }
-    outcome.loose_share = loose / all;
-    outcome.largest_share /= all;
-    if (outcome.fragments > 0 && outcome.first_time < 0) {
-      outcome.first_time = (frame + 1) / scene.scene.frame_rate;
-    }
-  }
-  return outcome;
 }
 
 }  // namespace tissue_sim

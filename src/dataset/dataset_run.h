@@ -34,22 +34,16 @@ struct DatasetSamples {
 /// A tissue of the scene, `level` times finer, that was set going.
 std::unique_ptr<MpmTissue> begin_run(const DatasetScene& scene, int level);
 
-/// A fragment is a loose piece of at least half a coarse cell and at most half of all bodies.
+/// One frame on, with the scene's cuts in the first; false where it blew up or was crushed.
+bool advance_frame(MpmTissue& tissue, const DatasetScene& scene, int frame,
+                   FrameResult* result = nullptr);
+
+/// A fragment is a loose piece of at least half a coarse cell and at most 0.4 of all bodies: of two
+/// halves it would be chance which is one.
 /// Returns which pieces are, by id.
 std::vector<std::uint8_t> fragments_of(const MpmTissue& tissue, double coarse_cell);
 
 /// Runs the scene twice. What the coarse run shows is labelled by what the truth comes to.
 DatasetSamples run_dataset_scene(const DatasetScene& scene, const DatasetOptions& options);
-
-/// How a run came out: for the convergence of the truth.
-struct Outcome {
-  int points = 0, fragments = 0;
-  double loose_share = 0;    ///< of the volume, in fragments
-  double largest_share = 0;  ///< of the volume, in the largest
-  double first_time = -1;    ///< when the first came off [s]
-  double peak_speed = 0;     ///< of a fragment's centre [m/s]
-  bool blew_up = false;
-};
-Outcome run_outcome(const DatasetScene& scene, int level, int frames);
 
 }  // namespace tissue_sim

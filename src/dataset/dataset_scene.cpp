@@ -70,17 +70,17 @@ DatasetScene make_dataset_scene(std::uint64_t seed, int index,
 
   Material m;
   m.name = "torn";
-  m.young_modulus = draw.log_even(2000, 30000);
-  m.poisson_ratio = draw.even(0.3, 0.45);
+  m.young_modulus = draw.log_even(1500, 5000);
+  m.poisson_ratio = draw.even(0.3, 0.42);
   m.viscosity = draw.even(0, 0.3);
-  m.tear_stretch = draw.even(1.15, 1.6);
-  m.tear_length = draw.even(1.5, 2.5) * h;  // of the coarse cells, in all runs: toughness is one
+  m.tear_stretch = draw.even(1.15, 1.45);
+  m.tear_length = draw.even(1.5, 2.0) * h;  // of the coarse cells, in all runs: toughness is one
   s.materials = {m};
 
   Body b;
   b.name = "torn";
   b.material = m.name;
-  Vec3 size(h * draw.whole(8, 13), h * draw.whole(5, 7), h * draw.whole(4, 6));
+  Vec3 size(h * draw.whole(8, 12), h * draw.whole(3, 4), h * draw.whole(3, 4));
   switch (draw.whole(0, 2)) {
     case 0:
       b.shape = Shape::kBox;
@@ -107,12 +107,13 @@ DatasetScene make_dataset_scene(std::uint64_t seed, int index,
   const Vec3 middle = b.pose.position;
   int along = 0;
   size.maxCoeff(&along);
-  d.speed = draw.even(1.0, 8.0);
+  d.speed = draw.even(2.0, 5.0);
   const double v = d.speed * strain * c;
+  std::function<Vec3(const Vec3&)> own;  // the kind's
   if (d.kind == "tension" || d.kind == "cut") {
     const double rate = v / (0.5 * size[along]), spin = draw.even(-0.2, 0.2) * rate;
     const int across = (along + 1) % 3;
-    d.velocity = [=](const Vec3& x) {
+    own = [=](const Vec3& x) {
       Vec3 velocity = Vec3::Zero();
       velocity[along] = rate * (x[along] - middle[along]);
       velocity[across] = spin * (x[along] - middle[along]);
@@ -126,23 +127,39 @@ DatasetScene make_dataset_scene(std::uint64_t seed, int index,
       }
     }
   } else if (d.kind == "fall") {
-    const double down = 2 * v, sideways = draw.even(-0.5, 0.5) * down;
-    d.velocity = [=](const Vec3&) { return Vec3(sideways, 0, -down); };
+    const double down = v, sideways = draw.even(-0.5, 0.5) * down;
+    own = [=](const Vec3&) { return Vec3(sideways, 0, -down); };
   } else if (d.kind == "compression") {
     const double rate = 2 * v / size.z();
-    d.velocity = [=](const Vec3& x) { return Vec3(0, 0, -rate * (x.z() - gap)); };
+    own = [=](const Vec3& x) { return Vec3(0, 0, -rate * (x.z() - gap)); };
   } else if (d.kind == "blow") {
     // At a place of the surface, into the body or out of it.
     const Vec3 way = draw.direction(), at = middle + 0.5 * way.cwiseProduct(size);
-    const double width = draw.even(0.2, 0.45) * size.minCoeff(), sign = draw.whole(0, 1) * 2 - 1;
-    d.velocity = [=](const Vec3& x) {
+    const double width = draw.even(0.4, 0.9) * size.minCoeff(), sign = draw.whole(0, 1) * 2 - 1;
+    own = [=](const Vec3& x) {
       const double r = (x - at).norm() / width;
-      return Vec3(3 * sign * v * std::exp(-r * r) * way);
+      return Vec3(2 * sign * v * std::exp(-r * r) * way);
     };
   } else {
     throw std::invalid_argument("there is no kind of scene '" + d.kind +
                                 "': it must be tension, fall, compression, cut or blow");
   }
+  // Waves on top of it: tissue that is torn evenly comes apart in its middle, whatever the cells.
+  struct Wave {
+    Vec3 along, way;  // [1/m], [m/s]
+    double phase;
+  };
+  std::vector<Wave> waves(3);
+  for (Wave& w : waves) {
+    w.along = draw.direction() * draw.even(2, 7) / size.maxCoeff();
+    w.way = draw.direction() * draw.even(0, 0.4) * v;
+    w.phase = draw.even(0, 6.283185307179586);
+  }
+  d.velocity = [=](const Vec3& x) {
+    Vec3 velocity = own(x);
+    for (const Wave& w : waves) velocity += std::sin(w.along.dot(x - middle) + w.phase) * w.way;
+    return velocity;
+  };
   return d;
 }
 

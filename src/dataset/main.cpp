@@ -18,6 +18,7 @@
 
 #include "dataset/dataset_run.h"
 #include "dataset/npy.h"
+#include "dataset/outcome.h"
 #include "fragments/features.h"
 
 namespace tissue_sim {
@@ -36,11 +37,15 @@ constexpr char kUsage[] =
   --processes N    that work side by side (all processors)
   --converge N     no data: runs each scene with cells 1, 2 .. N times finer, and writes how each
                    comes out into FOLDER/convergence.csv
+  --compare FILE   no data: runs each scene plain, with fragment networks, with cells half as large
+                   and as the truth, and writes how each comes out into FOLDER/comparison.csv. FILE
+                   is the network's
+  --baselines FILE of threshold and logistic regression for that
 Scenes that are in FOLDER are left alone: the same command goes on with what is missing.
 )";
 
 struct Arguments {
-  std::string out;
+  std::string out, network, baselines;
   std::vector<std::string> kinds = dataset_kinds();
   int scenes = 60, first = 0, processes = 0, converge = 0;
   std::uint64_t seed = 1;
@@ -91,6 +96,10 @@ Arguments read_arguments(int argc, char** argv) {
       a.processes = number(1);
     } else if (name == "--converge") {
       a.converge = number(2);
+    } else if (name == "--compare") {
+      a.network = std::filesystem::absolute(value);
+    } else if (name == "--baselines") {
+      a.baselines = value;
     } else if (name == "--kinds") {
       a.kinds.clear();
       std::istringstream list(value);
@@ -161,17 +170,20 @@ void write_scene(const Arguments& a, int index) {
   std::fflush(stdout);
 }
 
-void write_outcomes(const Arguments& a, int index) {
+/// How all runs of a scene come out; those that are there are left alone.
+void write_outcomes(const Arguments& a, int index, const std::vector<RunKind>& kinds) {
+  const std::string path = path_of(a, index, ".csv"), unfinished = path + ".part";
+  if (std::filesystem::exists(path)) return;
   const DatasetScene scene = make_dataset_scene(a.seed, index, a.kinds);
-  std::ostringstream lines;
-  for (int level = 1; level <= a.converge; ++level) {
-    const Outcome o = run_outcome(scene, level, a.options.frames);
-    lines << index << "," << scene.kind << "," << level << "," << o.points << "," << o.fragments
-          << "," << o.loose_share << "," << o.largest_share << "," << o.first_time << ","
-          << o.peak_speed << "," << o.blew_up << "\n";
+  std::string lines;
+  for (const RunKind& kind : kinds) {
+    const Outcome o = run_outcome(scene, kind, a.options.frames);
+    lines += outcome_line(scene, kind, o);
+    if (a.converge == 0) write_npy(path_of(a, index, "_" + kind.name + ".npy"), o.cloud, 4);
   }
-  std::ofstream(path_of(a, index, ".csv")) << lines.str();
-  std::fputs(lines.str().c_str(), stdout);
+  std::ofstream(unfinished) << lines;
+  std::filesystem::rename(unfinished, path);
+  std::fputs(lines.c_str(), stdout);
   std::fflush(stdout);
 }
 
@@ -206,16 +218,20 @@ int share_out(const Arguments& a, const std::function<void(int)>& work) {
 int run(int argc, char** argv) {
   const Arguments a = read_arguments(argc, argv);
   std::filesystem::create_directories(a.out);
-  if (a.converge == 0) return share_out(a, [&](int index) { write_scene(a, index); });
-  const int failed = share_out(a, [&](int index) { write_outcomes(a, index); });
-  std::ofstream all(a.out + "/convergence.csv");
-  all << "scene,kind,level,points,fragments,loose_share,largest_share,first_time,peak_speed,"
-         "blew_up\n";
+  std::vector<RunKind> kinds;
+  if (!a.network.empty()) {
+    kinds = compared_runs(a.network, a.baselines, a.options.level);
+  } else if (a.converge > 0) {
+    for (int level = 1; level <= a.converge; ++level) kinds.push_back({"level", level, "", {}});
+  } else {
+    return share_out(a, [&](int index) { write_scene(a, index); });
+  }
+  const int failed = share_out(a, [&](int index) { write_outcomes(a, index, kinds); });
+  std::ofstream all(a.out + (a.converge > 0 ? "/convergence.csv" : "/comparison.csv"));
+  all << kOutcomeColumns;
   for (int i = a.first; i < a.first + a.scenes; ++i) {
-    const std::string path = path_of(a, i, ".csv");
-    std::ifstream part(path);
+    std::ifstream part(path_of(a, i, ".csv"));
     if (part.peek() != EOF) all << part.rdbuf();
-    std::filesystem::remove(path);
   }
   return failed;
 }

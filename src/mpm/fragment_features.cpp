@@ -95,9 +95,7 @@ std::vector<std::int32_t> fragment_candidates(MpmState& state, const Pieces& pie
     for (const StretchedPoint& p : stretched) of_block[i].push_back(p.point);
     for (const std::int32_t p : block.point) {
       if (p < 0) continue;
-      if (state.points.bonds[p] == kAllBonds) continue;
-      if (state.points.bonds[p] != whole_bonds(body, state.points.site[p]))
-        of_block[i].push_back(p);
+      if (state.points.bonds[p] != state.whole_bonds[p]) of_block[i].push_back(p);
     }
   });
   std::vector<std::int32_t> candidates;

@@ -138,9 +138,15 @@ void fields(Archive& archive, FaceContacts& f, const Blocks& blocks) {
 }
 
 template <class Archive>
+void fields(Archive& archive, FragmentFlight& f) {
+  archive(f.piece, f.nodes, f.home, f.from_centre, f.inertia, f.rotation, f.centre, f.velocity,
+          f.angular);
+}
+
+template <class Archive>
 void fields(Archive& archive, MpmState& s) {
   archive(s.points, s.nodes, *s.fields, s.blocks, s.motion, s.wildest, s.time, s.dt, s.tore_at,
-          s.threads, s.crumbs, s.contacts, s.anchors, s.scene.gravity, s.scene.damping);
+          s.threads, s.crumbs, s.contacts, s.anchors, s.scene.gravity, s.scene.damping, s.flights);
   fields(archive, s.faces, s.blocks);
 }
 

@@ -82,6 +82,7 @@ void MpmTissue::save_checkpoint() {
   checkpoint_.result = result_;
   checkpoint_.impulse = s.anchors.impulse;
   checkpoint_.anchors = s.anchors.now;
+  checkpoint_.flights = s.flights;
 }
 
 void MpmTissue::restore_checkpoint() {
@@ -99,6 +100,8 @@ void MpmTissue::restore_checkpoint() {
   result_ = checkpoint_.result;
   s.anchors.impulse = checkpoint_.impulse;
   s.anchors.now = checkpoint_.anchors;
+  s.flights = checkpoint_.flights;
+  index_flights(s);
   measure_stiffness();
 }
 

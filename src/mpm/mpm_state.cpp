@@ -14,6 +14,7 @@ std::unique_ptr<MpmState> make_mpm_state(const Scene& scene, std::vector<std::st
   state->scene = scene;
   state->cpu = std::make_unique<Cpu>(scene.threads);
   state->bodies = make_lattice_bodies(scene, state->points, notes);
+  state->whole_bonds = state->points.bonds;
   const bool at_surface = scene.mpm.boundary == MpmBoundary::kSurface;
   if (at_surface) {
     find_free_volumes(state->bodies, state->points);
@@ -180,6 +181,7 @@ float substep(MpmState& state, float dt, std::vector<ColliderLoad>& loads,
     move_held(state.anchors, dt, before, after, state.nodes);
     state.anchors.now = anchors;
   }
+  fly(state, step);
   add_inertial_loads(state, step.kick, loads);
   for (const auto& of_block : state.block_loads) {
     for (std::size_t c = 0; c < of_block.size(); ++c) {

@@ -15,6 +15,7 @@
 #include "mpm/blocks/blocks.h"
 #include "mpm/contact/contact_inertia.h"
 #include "mpm/contact/face_contact.h"
+#include "mpm/fragment_flight.h"
 #include "mpm/lattice/lattice_body.h"
 #include "mpm/lattice/nodes.h"
 #include "mpm/split/node_fields.h"
@@ -95,6 +96,10 @@ struct MpmState {
   InstructionSet instructions = InstructionSet::kSse2;
   std::unique_ptr<Cpu> cpu;
   tbb::enumerable_thread_specific<BlockScratch> scratch;
+
+  Array<std::uint8_t> whole_bonds;           ///< per point: its bonds before any broke
+  std::vector<FragmentFlight> flights;       ///< pieces that fly
+  std::vector<std::int32_t> flight_of_node;  ///< -1 for none; empty while none flies
 };
 
 /// Builds the state of a valid scene at rest. Throws what make_lattice_bodies() throws.

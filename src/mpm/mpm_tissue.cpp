@@ -188,6 +188,24 @@ bool MpmTissue::tame() {
   return true;
 }
 
+bool MpmTissue::let_fly() {
+  std::vector<int> parted = result_.tear_report.new_fragments;
+  const auto add = [&](const CutReport& report) {
+    parted.insert(parted.end(), report.new_fragments.begin(), report.new_fragments.end());
+  };
+  add(result_.blade_report);
+  for (const CutReport& report : result_.cut_reports) add(report);
+  int fly = 0;
+  for (const int id : parted) {
+    Eigen::Matrix3d F;
+    if (draw_deformation(*state_, pieces_, id, said_, F) && take_off(*state_, pieces_, id, F))
+      ++fly;
+  }
+  flown_ += fly;
+  if (fly > 0) measure_motion(*state_);
+  return fly > 0;
+}
+
 template <class Read>
 void MpmTissue::measure(const Read& read) {
   MpmState& s = *state_;
@@ -255,7 +273,11 @@ FrameResult MpmTissue::finish() {
   result_.blew_up = result_.blew_up || !(result_.max_speed < 300);
   if (tame()) measure_and_follow();
   if (network_ != nullptr && !result_.blew_up) {
-    forecast_ = forecast_fragments(*state_, pieces_, *network_);
+    if (let_fly()) measure_and_follow();
+    forecast_ = forecast_fragments(*state_, pieces_, *network_, classifier_);
+    // A piece that comes off in a frame was foreseen at the end of one before, however long it is.
+    const double longest = std::max(network_->horizon(), frame_ ? frame_->duration : 0.0);
+    remember(forecast_, state_->time - 1.001 * longest, said_);
     result_.fragment_candidates = static_cast<int>(forecast_.size());
     result_.fragment_points = static_cast<int>(
         std::count_if(forecast_.begin(), forecast_.end(),

@@ -149,6 +149,7 @@ TEST(FragmentFeatures, CandidatesAreStretchedOrBesideBrokenBonds) {
 struct ReportedRun {
   std::vector<std::uint64_t> checksums;
   std::vector<float> chances;
+  std::vector<int> flown;
   int candidates = 0, points = 0;
 };
 
@@ -171,12 +172,13 @@ ReportedRun run_reported(const std::string& network, int threads) {
     run.candidates += report.result.fragment_candidates;
     run.points += report.result.fragment_points;
     run.checksums.push_back(tissue.checksum());
+    run.flown.push_back(tissue.flown());
     for (const FragmentChance& c : tissue.forecast()) run.chances.push_back(c.probability);
   }
   return run;
 }
 
-TEST(FragmentNetwork, ReportsAndChangesNoBits) {
+TEST(FragmentNetwork, ReportsAndChangesNoBitsUntilWhatItForesawComesOff) {
   const ReportedRun with = run_reported(kFile, 1), two_threads = run_reported(kFile, 2),
                     without = run_reported("off", 1);
   EXPECT_GT(with.candidates, 0);
@@ -185,7 +187,12 @@ TEST(FragmentNetwork, ReportsAndChangesNoBits) {
   for (const float p : with.chances) EXPECT_TRUE(p >= 0 && p <= 1) << p;
   EXPECT_EQ(with.chances, two_threads.chances);
   EXPECT_EQ(with.checksums, two_threads.checksums);
-  EXPECT_EQ(with.checksums, without.checksums);
+  EXPECT_EQ(with.flown.front(), 0);
+  for (std::size_t i = 0; i < with.checksums.size(); ++i) {
+    if (with.flown[i] == 0) {
+      EXPECT_EQ(with.checksums[i], without.checksums[i]) << i;
+    }
+  }
   EXPECT_EQ(without.candidates, 0);
   EXPECT_TRUE(without.chances.empty());
 }

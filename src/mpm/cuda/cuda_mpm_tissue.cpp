@@ -19,6 +19,7 @@ std::unique_ptr<MpmState> make_state(const Scene& scene, std::vector<std::string
   auto state = std::make_unique<MpmState>();
   state->scene = scene;
   state->bodies = make_lattice_bodies(scene, state->points, notes, NodeRange::kBox);
+  state->whole_bonds = state->points.bonds;
   state->fields = std::make_unique<NodeFields>(state->bodies, state->points, state->nodes);
   state->instructions = instruction_set();
   state->kernels = &block_kernels(state->instructions);

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 
 namespace tissue_sim {
 namespace {
@@ -32,27 +33,35 @@ CrackNearby crack_nearby(const MpmState& state, const TearingPoint& t) {
   const LatticeBody& body = state.bodies[s.body];
   CrackNearby crack;
   double weights = 0, sum = 0;
+  const auto add = [&](int dx, int dy, int dz, unsigned broken) {
+    for (unsigned left = broken >> kForwardBond; left != 0; left &= left - 1) {
+      const Vec3 along = direction(kForwardBond + __builtin_ctz(left));
+      if (std::fabs(along.dot(t.normal)) < kAcross) continue;
+      const Vec3 middle = Vec3(dx, dy, dz) + 0.5 * along;
+      const double offset = middle.dot(t.normal);
+      const double aside2 = middle.squaredNorm() - offset * offset;
+      crack.any = true;
+      crack.passed = crack.passed || aside2 < 0.6;
+      crack.beside = crack.beside || aside2 < 2.3;  // of the next column, or askew to it
+      const double weight = 1 / (0.1 + aside2 * aside2);
+      weights += weight;
+      sum += weight * offset;
+      crack.ahead -= weight * (middle - offset * t.normal);
+    }
+  };
+  static_assert(2 * kReach + 1 < 8, "bonds of a row are read as eight bytes");
   for (int dz = -kReach; dz <= kReach; ++dz) {
     for (int dy = -kReach; dy <= kReach; ++dy) {
-      for (int dx = -kReach; dx <= kReach; ++dx) {
-        const std::int32_t q = body.point(s.x + dx, s.y + dy, s.z + dz);
-        if (q < 0) continue;
-        const unsigned broken = broken_bonds(state, body, q);
-        for (unsigned left = broken >> kForwardBond; left != 0; left &= left - 1) {
-          const Vec3 along = direction(kForwardBond + __builtin_ctz(left));
-          if (std::fabs(along.dot(t.normal)) < kAcross) continue;
-          const Vec3 middle = Vec3(dx, dy, dz) + 0.5 * along;
-          const double offset = middle.dot(t.normal);
-          const double aside2 = middle.squaredNorm() - offset * offset;
-          crack.any = true;
-          crack.passed = crack.passed || aside2 < 0.6;
-          crack.beside = crack.beside || aside2 < 2.3;  // of the next column, or askew to it
-          const double weight = 1 / (0.1 + aside2 * aside2);
-          weights += weight;
-          sum += weight * offset;
-          crack.ahead -= weight * (middle - offset * t.normal);
-        }
-      }
+      body.for_each_point_in_row(
+          s.x - kReach, s.x + kReach + 1, s.y + dy, s.z + dz, [&](int x, int point, int count) {
+            std::uint64_t whole, bonds;  // most rows have lost none
+            std::memcpy(&whole, &state.whole_bonds[point], 8);
+            std::memcpy(&bonds, &state.points.bonds[point], 8);
+            std::uint64_t broken = whole & ~bonds & ~(~std::uint64_t{0} << 8 * count);
+            for (int i = 0; broken != 0; broken >>= 8, ++i) {
+              add(x + i - s.x, dy, dz, static_cast<unsigned>(broken & 0xff));
+            }
+          });
     }
   }
   if (crack.any) crack.offset = sum / weights;
@@ -62,9 +71,9 @@ CrackNearby crack_nearby(const MpmState& state, const TearingPoint& t) {
 
 /// Side of the crack, 1 or -1, that a point is on by the bonds that it lost across n; 0 if it lost
 /// none.
-int side_by_own(const MpmState& state, const LatticeBody& body, std::int32_t p, const Vec3& n) {
+int side_by_own(const MpmState& state, std::int32_t p, const Vec3& n) {
   double to_crack = 0;
-  for (unsigned left = broken_bonds(state, body, p); left != 0; left &= left - 1) {
+  for (unsigned left = broken_bonds(state, p); left != 0; left &= left - 1) {
     const double across = direction(__builtin_ctz(left)).dot(n);
     if (std::fabs(across) >= kAcross) to_crack += across;
   }
@@ -73,7 +82,7 @@ int side_by_own(const MpmState& state, const LatticeBody& body, std::int32_t p, 
 
 /// The same, else by the bonds that broke on its line along the axis nearest to n.
 int side_by_bonds(const MpmState& state, const LatticeBody& body, std::int32_t p, const Vec3& n) {
-  const int own = side_by_own(state, body, p, n);
+  const int own = side_by_own(state, p, n);
   if (own != 0) return own;
   int axis = 0;
   n.cwiseAbs().maxCoeff(&axis);
@@ -81,7 +90,7 @@ int side_by_bonds(const MpmState& state, const LatticeBody& body, std::int32_t p
   for (int i = 1; i < kReach; ++i) {
     for (const int k : {up, opposite_bond(up)}) {
       const std::int32_t q = neighbour(body, state.points.site[p], k, i);
-      if (q >= 0 && (broken_bonds(state, body, q) >> k & 1) != 0) return k == up ? -1 : 1;
+      if (q >= 0 && (broken_bonds(state, q) >> k & 1) != 0) return k == up ? -1 : 1;
     }
   }
   return 0;
@@ -89,9 +98,8 @@ int side_by_bonds(const MpmState& state, const LatticeBody& body, std::int32_t p
 
 }  // namespace
 
-unsigned broken_bonds(const MpmState& state, const LatticeBody& body, std::int32_t p) {
-  const std::uint8_t bonds = state.points.bonds[p];
-  return bonds == kAllBonds ? 0u : whole_bonds(body, state.points.site[p]) & ~unsigned{bonds};
+unsigned broken_bonds(const MpmState& state, std::int32_t p) {
+  return state.whole_bonds[p] & ~unsigned{state.points.bonds[p]};
 }
 
 std::int32_t neighbour(const LatticeBody& body, const Points::Site& s, int k, int steps) {
@@ -109,7 +117,7 @@ const TearingPoint* entry(const std::vector<TearingPoint>& tearing, std::int32_t
 bool broken_on_line(const MpmState& state, const LatticeBody& body, std::int32_t p, int k) {
   for (int i = -kReach; i <= kReach; ++i) {
     const std::int32_t q = neighbour(body, state.points.site[p], k, i);
-    if (q >= 0 && (broken_bonds(state, body, q) >> k & 1) != 0) return true;
+    if (q >= 0 && (broken_bonds(state, q) >> k & 1) != 0) return true;
   }
   return false;
 }
@@ -156,9 +164,8 @@ bool go_on(const MpmState& state, const TearingPoint& t, const std::vector<Teari
     const double across = direction(k).dot(t.normal);
     const int other = other_known != 0 ? other_known : across < crack.offset ? -1 : 1;
     if (side == other) continue;
-    const bool thread = t.excess > thread_excess &&
-                        side_by_own(state, body, t.point, t.normal) != 0 &&
-                        side_by_own(state, body, q, t.normal) != 0;
+    const bool thread = t.excess > thread_excess && side_by_own(state, t.point, t.normal) != 0 &&
+                        side_by_own(state, q, t.normal) != 0;
     bonds.push_back({t.point, k, thread});
   }
   return true;

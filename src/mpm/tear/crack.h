@@ -12,7 +12,7 @@ namespace tissue_sim {
 inline constexpr int kReach = 3;  ///< half the support of a node [points]
 
 /// Bonds that the point had and lost.
-unsigned broken_bonds(const MpmState& state, const LatticeBody& body, std::int32_t p);
+unsigned broken_bonds(const MpmState& state, std::int32_t p);
 
 /// The point that is `steps` on from a site in the direction of bond `k`, -1 where there is none.
 std::int32_t neighbour(const LatticeBody& body, const Points::Site& s, int k, int steps = 1);

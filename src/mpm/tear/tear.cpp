@@ -73,13 +73,15 @@ bool in_reach_of_crack(const MpmState& state, const TearingPoint& t) {
   const int reach = std::max(
       2 * kReach,
       static_cast<int>(4 * body.material_of(state.points, t.point).tear_length / body.cell_size));
+  bool found = false;
   for (int z = s.z - reach; z <= s.z + reach; ++z) {
     for (int y = s.y - reach; y <= s.y + reach; ++y) {
-      for (int x = s.x - reach; x <= s.x + reach; ++x) {
-        const std::int32_t q = body.point(x, y, z);
-        if (q >= 0 && broken_bonds(state, body, q) != 0) return true;
-      }
+      body.for_each_point_in_row(s.x - reach, s.x + reach + 1, y, z, [&](int, int from, int count) {
+        const std::uint8_t* const bonds = &state.points.bonds[from];
+        found = found || !std::equal(bonds, bonds + count, &state.whole_bonds[from]);
+      });
     }
+    if (found) return true;
   }
   return false;
 }

@@ -1,0 +1,48 @@
+// How a run of a scene that tears comes out: for the convergence of the truth, and for what the
+// fragment network is worth beside other ways to the same time.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "dataset/dataset_run.h"
+
+namespace tissue_sim {
+
+/// What a run is done by.
+struct RunKind {
+  std::string name;               ///< plain, stretch, logistic, network, finer, truth
+  int level = 1;                  ///< how many times finer its cells are
+  std::string network;            ///< file of the fragment network, empty for none
+  FragmentClassifier classifier;  ///< in the place of the network's, if any
+};
+
+/// The ways that are compared with the truth, which is `level` times finer: the plain coarse run;
+/// with the modifier of the network and, as the classifier, a threshold on the largest principal
+/// stretch, logistic regression, and its own; and cells half as large. `baselines` is what
+/// scripts/train_fragments --baselines wrote. Throws std::invalid_argument for a file that is not.
+std::vector<RunKind> compared_runs(const std::string& network, const std::string& baselines,
+                                   int level);
+
+struct Outcome {
+  int points = 0, flown = 0;
+  std::vector<double> sizes;  ///< of the fragments at the end, as shares of all, largest first
+  double first_time = -1;     ///< when the first came off [s]
+  double peak_speed = 0;      ///< of a fragment's centre, ever [m/s]
+  double peak_spin = 0;       ///< of a fragment, ever [1/s]
+  double momentum_drift = 0;  ///< largest change, over the mass times the speed at first [-]
+  double angular_drift = 0;   ///< the same, times the body's extent [-]
+  double energy_rise = 0;     ///< most energy over that at first, less 1 [-]
+  double seconds = 0;         ///< of the processor
+  bool blew_up = false;       ///< or was crushed; it ended there
+  std::vector<float> cloud;   ///< [points, 4] at the end: place [m], and which fragment, 0 none
+};
+
+/// Drifts are 0 where there is ground, which takes momentum up.
+Outcome run_outcome(const DatasetScene& scene, const RunKind& kind, int frames);
+
+/// The columns of a table of outcomes, and a line of it.
+extern const char* const kOutcomeColumns;
+std::string outcome_line(const DatasetScene& scene, const RunKind& kind, const Outcome& outcome);
+
+}  // namespace tissue_sim

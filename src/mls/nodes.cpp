@@ -1,7 +1,6 @@
 #include "mls/nodes.h"
 
 #include <algorithm>
-#include <cmath>
 #include <stdexcept>
 
 #include "geometry/nearest_surface.h"
@@ -28,25 +27,6 @@ std::uint8_t number_of(std::vector<Material>& materials, const Material& m) {
   if (number > 255) throw std::invalid_argument("materials: a scene uses at most 256 of them");
   if (at == materials.end()) materials.push_back(m);
   return static_cast<std::uint8_t>(number);
-}
-
-/// A clamp acts behind the last node that is held, for what lies between that and the first free
-/// node bends more softly than the rest: under a strain e links between nodes have e (1 + a z^k)
-/// with z = sqrt(3) - 2, a = -z, so 0.21 spacings behind it; the last node within a region lies
-/// half a spacing behind its face in the mean. So nodes so near to it are held, too. [spacings]
-constexpr double kHoldsAround = 0.71;
-
-bool is_within(const Region& region, const Vec3& x, double margin) {
-  switch (region.kind) {
-    case Region::Kind::kBox:
-      return (x.array() >= region.min.array() - margin).all() &&
-             (x.array() <= region.max.array() + margin).all();
-    case Region::Kind::kBall:
-      return (x - region.center).norm() <= region.radius + margin;
-    case Region::Kind::kBelow:
-      return x.z() < region.z + margin;
-  }
-  return false;
 }
 
 /// How far below the surface a node lies [m]; less than 0 above it, as nodes at curved ones may.
@@ -97,8 +77,7 @@ MlsNodes make_mls_nodes(const Scene& scene, std::vector<std::string>* notes) {
       if (inclusion >= 0) ++held[inclusion];
       std::uint8_t is_held = 0;
       for (std::size_t r = 0; r < body.anchors.size(); ++r) {
-        const double own = std::max(spacing, std::cbrt(n.volume));
-        if (!is_within(body.anchors[r], n.place, kHoldsAround * own)) continue;
+        if (!body.anchors[r].contains(n.place)) continue;
         ++anchored[r];
         is_held = 1;
       }

@@ -16,7 +16,7 @@ struct MlsNodes {
   Array<float> volume;                 ///< its share of the body: all that is nearest to it [m^3]
   std::vector<std::int16_t> body;      ///< index into Scene::bodies
   std::vector<std::uint8_t> material;  ///< index into `materials`
-  Array<std::uint8_t> anchored;        ///< is held
+  Array<std::uint8_t> anchored;        ///< lies in an anchored region
   std::vector<std::uint8_t> surface;   ///< its share reaches the surface of the body
   std::vector<float> depth;            ///< of those at the surface, below it; 0 of all others [m]
   std::vector<Material> materials;     ///< of all bodies and inclusions

@@ -100,7 +100,8 @@ struct Shortfall {
   const char* read;
 };
 inline constexpr Shortfall kShortfalls[] = {
-    {Method::kMls, "SagsAsTimoshenkoSays", "off by 3.4 % with a Poisson's ratio of 0.3, by 4.8 % with 0, for 3 %"},
+    {Method::kMls, "SagsAsTimoshenkoSays",
+     "off by 3.4 % with a Poisson's ratio of 0.3, by 4.8 % with 0, for 3 %"},
     {Method::kPbd, "SagsAsTimoshenkoSays",
      "too stiff by 5 % with a Poisson's ratio of 0, by 16 % with 0.3: linear tetrahedra lock"},
     {Method::kPbd, "FreeFlightStaysThroughCutsAsWithoutThem",

@@ -31,8 +31,10 @@ void expect_deformation(const NetworkWeights& modifier, const float* x, Fragment
 Eigen::Matrix3d within(const Eigen::Matrix3d& F, double most) {
   const Eigen::JacobiSVD<Eigen::Matrix3d> svd(F, Eigen::ComputeFullU | Eigen::ComputeFullV);
   Eigen::Matrix3d U = svd.matrixU();
+  // GCC 12 takes singularValues() for uninitialised here.
+  const Vec3 stretches = (U.transpose() * F * svd.matrixV()).diagonal();
+  const Vec3 s = stretches.cwiseMin(most).cwiseMax(1 / most);
   if ((U * svd.matrixV().transpose()).determinant() < 0) U.col(2) *= -1;
-  const Vec3 s = svd.singularValues().cwiseMin(most).cwiseMax(1 / most);
   return U * s.asDiagonal() * svd.matrixV().transpose();
 }
 

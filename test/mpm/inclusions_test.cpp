@@ -199,6 +199,10 @@ TEST(Inclusions, EachMaterialBoundsTheSubstepByWhatItsPointsStiffenedBy) {
   Scene s = free_box(Vec3(0.016, 0.016, 0.016), 0.002);
   s.bodies[0].material = "fat";
   s.bodies[0].inclusions = {below("skin", 0.008)};
+  for (const char* name : {"fat", "skin"}) {
+    s.materials.push_back(find_material(s, name));
+    s.materials.back().viscosity = 0;  // which shortens substeps, too
+  }
   MpmTissue tissue(s);
   const MpmState& state = tissue.state();
   const Material skin = find_material(s, "skin"), fat = find_material(s, "fat");

@@ -390,6 +390,7 @@ void hold_group(AnchorFaces& faces, int index, float dt, const RigidMotion* befo
       for (int j = 0; j < g.count; ++j) impulse += inverse[j] * left[j][a];
       faces.impulse[g.first + i][a] += impulse;
       for (int k = 0; k < kRowNodes; ++k) {
+        if (r.share[k] == 0) continue;  // of a node that another group may hold just now, or none
         const float dv = r.share[k] * impulse;
         nodes.v[a][r.node[k]] += dv;
         nodes.u[a][r.node[k]] += dt * dv;

@@ -72,6 +72,7 @@ if(tissue_sim_has_cuda)
   file(GLOB_RECURSE cuda_sources CONFIGURE_DEPENDS src/*.cu)
   file(GLOB cuda_hosts CONFIGURE_DEPENDS src/*/cuda/*.cpp)
   target_sources(tissue_sim_core PRIVATE ${cuda_sources} ${cuda_hosts})
+  set_source_files_properties(${cuda_sources} ${cuda_hosts} PROPERTIES SKIP_UNITY_BUILD_INCLUSION ON)
   set_target_properties(tissue_sim_core PROPERTIES CUDA_ARCHITECTURES "${CMAKE_CUDA_ARCHITECTURES}"
                         CUDA_RUNTIME_LIBRARY Static)
   target_compile_definitions(tissue_sim_core PUBLIC TISSUE_SIM_CUDA)

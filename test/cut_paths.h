@@ -20,6 +20,14 @@ inline Scene free_box(const Vec3& size, double cell_size) {
   return scene;
 }
 
+/// The same without viscosity, which shortens substeps and, on the GPU, asks for a second column of
+/// threads: for what is about the shapes of thread blocks, or whose substeps are given.
+inline Scene inviscid(Scene scene) {
+  scene.materials = {find_material(scene, scene.bodies[0].material)};
+  scene.materials[0].viscosity = 0;
+  return scene;
+}
+
 /// A blade whose edge stands along z from -0.1 to 0.1 m, moved through `places` (their z counts
 /// too).
 inline BladePath upright_blade(const std::vector<Vec3>& places) {

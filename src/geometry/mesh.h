@@ -39,6 +39,11 @@ void drop_unused_vertices(TriangleMesh& mesh);
 /// verb ("has 3 open edges").
 void make_solid(TriangleMesh& mesh, std::vector<std::string>& notes);
 
+/// Six times the volume between a triangle and a place, above 0 where the triangle faces away from
+/// it.
+double six_volumes(const TriangleMesh& mesh, const std::array<int, 3>& triangle,
+                   const Vec3& origin);
+
 /// Volume that the surface encloses, by the divergence theorem; negative when inside out [m^3].
 double signed_volume(const TriangleMesh& mesh);
 

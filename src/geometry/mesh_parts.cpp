@@ -16,11 +16,6 @@ struct Part {
   Box box;
 };
 
-double six_volumes(const TriangleMesh& mesh, const std::array<int, 3>& t, const Vec3& origin) {
-  return (mesh.vertices[t[0]] - origin)
-      .dot((mesh.vertices[t[1]] - origin).cross(mesh.vertices[t[2]] - origin));
-}
-
 // Parts are connected across edges; largest box first, so that what contains comes first.
 std::vector<Part> parts_of(const TriangleMesh& mesh) {
   std::vector<int> root(mesh.triangles.size());

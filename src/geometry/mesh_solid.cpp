@@ -77,12 +77,12 @@ int make_agree(TriangleMesh& mesh) {
   return turned;
 }
 
+}  // namespace
+
 double six_volumes(const TriangleMesh& mesh, const std::array<int, 3>& t, const Vec3& origin) {
   return (mesh.vertices[t[0]] - origin)
       .dot((mesh.vertices[t[1]] - origin).cross(mesh.vertices[t[2]] - origin));
 }
-
-}  // namespace
 
 double signed_volume(const TriangleMesh& mesh) {
   if (mesh.triangles.empty()) return 0;

@@ -8,18 +8,6 @@
 namespace tissue_sim {
 namespace {
 
-struct Points {
-  const std::vector<Vec3>& all;
-  std::size_t kdtree_get_point_count() const { return all.size(); }
-  double kdtree_get_pt(std::size_t i, std::size_t axis) const {
-    return all[i][static_cast<int>(axis)];
-  }
-  template <class Box>
-  bool kdtree_get_bbox(Box&) const {
-    return false;
-  }
-};
-
 bool comes_before(const Neighbour& a, const Neighbour& b) {
   return std::tie(a.distance2, a.index) < std::tie(b.distance2, b.index);
 }
@@ -73,6 +61,17 @@ class WithinSet {
 }  // namespace
 
 struct NearestPoints::Tree {
+  struct Points {
+    const std::vector<Vec3>& all;
+    std::size_t kdtree_get_point_count() const { return all.size(); }
+    double kdtree_get_pt(std::size_t i, std::size_t axis) const {
+      return all[i][static_cast<int>(axis)];
+    }
+    template <class Box>
+    bool kdtree_get_bbox(Box&) const {
+      return false;
+    }
+  };
   explicit Tree(const std::vector<Vec3>& points)
       : of{points}, index(3, of, nanoflann::KDTreeSingleIndexAdaptorParams(10)) {
     index.buildIndex();

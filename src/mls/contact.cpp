@@ -10,9 +10,9 @@
 namespace tissue_sim {
 namespace {
 
-constexpr int kListLasts = 8;        // substeps
-constexpr double kListMargin = 0.5;  // how much nearer than foreseen either may come [edges]
-constexpr double kFaster = 1.5;      // than when it was listed
+constexpr int kListLasts = 8;              // substeps
+constexpr double kListMargin = 0.5;        // how much nearer than foreseen either may come [edges]
+constexpr double kFasterThanListed = 1.5;  // than when it was listed
 
 bool comes_before(const MlsTouch& a, const MlsTouch& b) {
   return std::tie(a.node, a.collider) < std::tie(b.node, b.collider);
@@ -46,8 +46,9 @@ void list_near(MlsState& state, int group, float dt) {
   contact.near.clear();
   for (std::size_t c = 0; c < state.colliders.size(); ++c) {
     const Collider& collider = state.colliders[c];
-    const double margin = depth + kListMargin * edge +
-                          kListLasts * kFaster * dt * (std::sqrt(speed2) + speed(collider));
+    const double margin =
+        depth + kListMargin * edge +
+        kListLasts * kFasterThanListed * dt * (std::sqrt(speed2) + speed(collider));
     Box wide = bounds(collider);
     wide.min.array() -= margin;
     wide.max.array() += margin;

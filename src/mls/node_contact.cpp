@@ -8,11 +8,11 @@
 namespace tissue_sim {
 namespace {
 
-constexpr double kSkin = 0.5;    // of an edge: how much farther than they touch nodes are listed
-constexpr double kFar = 2.5;     // reference distance from which a piece may touch itself [edges]
-constexpr double kFaster = 1.5;  // than when that was seen last
-constexpr int kMostSubsteps = 200;  // until it is seen again how far nodes moved
-constexpr int kFewestSubsteps = 4;  // else they are looked for at once
+constexpr double kSkin = 0.5;  // of an edge: how much farther than they touch nodes are listed
+constexpr double kFar = 2.5;   // reference distance from which a piece may touch itself [edges]
+constexpr double kFasterThanSeen = 1.5;  // than when that was seen last
+constexpr int kMostSubsteps = 200;       // until it is seen again how far nodes moved
+constexpr int kFewestSubsteps = 4;       // else they are looked for at once
 
 bool may_touch(const MlsState& s, const std::vector<std::int32_t>& piece, std::int32_t i,
                std::int32_t j) {
@@ -48,7 +48,7 @@ Motion motion_of(const MlsState& s) {
 
 /// Substeps for which a list lasts at least of whose skin so much is left.
 int lasts(double left, double fastest, float dt) {
-  const double step = kFaster * fastest * dt;
+  const double step = kFasterThanSeen * fastest * dt;
   return static_cast<int>(std::min<double>(kMostSubsteps, step > 0 ? left / step : 1e9));
 }
 

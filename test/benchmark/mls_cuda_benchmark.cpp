@@ -23,7 +23,7 @@ void run(benchmark::State& bench, int nodes, bool is_cut) {
     return;
   }
   const double edge = std::round(std::cbrt(nodes)) * kSpacing;
-  Scene scene = mls_box(Vec3::Constant(edge), kSpacing);
+  Scene scene = inviscid(mls_box(Vec3::Constant(edge), kSpacing));
   scene.ground.enabled = true;
   scene.ground.z = -0.1;
   scene.tools.resize(1);

@@ -65,7 +65,7 @@ void press(CudaMpmTissue& tissue, float dt) {
 }
 
 TEST_P(FaceContactOnGpu, OneSubstepAgreesWithTheCpusContactsAndBruteForce) {
-  CudaMpmTissue tissue(free_box(Vec3(0.031, 0.029, 0.017), 0.002));
+  CudaMpmTissue tissue(inviscid(free_box(Vec3(0.031, 0.029, 0.017), 0.002)));
   const float dt = 0.5f * tissue.stable_substep();
   press(tissue, dt);
   if (HasFatalFailure()) return;
@@ -156,7 +156,7 @@ std::size_t difference(const Near& a, const Near& b) {
 }
 
 TEST_P(FaceContactOnGpu, ASearchAndALookAgreeWithTheCpus) {
-  CudaMpmTissue tissue(free_box(Vec3(0.031, 0.029, 0.017), 0.002));
+  CudaMpmTissue tissue(inviscid(free_box(Vec3(0.031, 0.029, 0.017), 0.002)));
   const float dt = 0.5f * tissue.stable_substep();
   press(tissue, dt);
   if (HasFatalFailure()) return;
@@ -232,7 +232,7 @@ TEST_P(FaceContactOnGpu, SameBitsRunAfterRun) {
   std::vector<std::uint64_t> checksums[2];
   std::vector<float> held[2];
   for (int run = 0; run < 2; ++run) {
-    CudaMpmTissue tissue(free_box(Vec3(0.031, 0.029, 0.017), 0.002));
+    CudaMpmTissue tissue(inviscid(free_box(Vec3(0.031, 0.029, 0.017), 0.002)));
     const float dt = 0.5f * tissue.stable_substep();
     press(tissue, dt);
     if (HasFatalFailure()) return;
@@ -251,7 +251,7 @@ TEST_P(FaceContactOnGpu, SameBitsRunAfterRun) {
 }
 
 TEST_P(FaceContactOnGpu, TheEndOfAFrameSearchesForTheNext) {
-  CudaMpmTissue tissue(free_box(Vec3(0.031, 0.029, 0.017), 0.002));
+  CudaMpmTissue tissue(inviscid(free_box(Vec3(0.031, 0.029, 0.017), 0.002)));
   const int n = static_cast<int>(std::ceil(kHorizon / tissue.stable_substep()));
   for (int frame = 0; frame < 3; ++frame) {
     tissue.advance(n, static_cast<float>(kHorizon / n), {});

@@ -37,7 +37,7 @@ struct Operation {
   std::vector<ToolMotion> tools;
 
   Operation() {
-    scene = free_box(Vec3(0.06, 0.04, 0.024), 0.002);
+    scene = inviscid(free_box(Vec3(0.06, 0.04, 0.024), 0.002));
     scene.mpm.boundary = MpmBoundary::kLattice;  // all that the GPU has
     scene.gravity = Vec3(0, 0, -9.81);
     scene.ground.enabled = true;

@@ -17,7 +17,7 @@ constexpr double kGap = 2 * kRadius - kThick;
 
 /// A bar that lies along x, whose middle is held.
 Scene bar() {
-  Scene scene = free_box(Vec3(kLong, kThick, 6 * kCell), kCell);
+  Scene scene = inviscid(free_box(Vec3(kLong, kThick, 6 * kCell), kCell));
   Region held;
   held.kind = Region::Kind::kBox;
   held.min = Vec3(kLong / 2 - kBend - kCell, -1, -1);

@@ -180,7 +180,11 @@ void CudaMlsTissue::search_contacts(float dt) {
     return;
   }
   pull();
-  if (!update_node_contacts(*state_, pieces_.of_point, dt)) return;
+  if (update_node_contacts(*state_, pieces_.of_point, dt)) push_node_contacts();
+}
+
+void CudaMlsTissue::push_node_contacts() {
+  OnDevice& d = *device_;
   const MlsNodeContacts& contacts = state_->node_contacts;
   d.contact_begin.upload(contacts.begin, d.stream);
   d.contact_other.upload(contacts.other, d.stream);
@@ -294,7 +298,7 @@ void CudaMlsTissue::reject_part(Verdict) {
   d.touching.copy(saved.touching, d.stream);
   d.host_is_current = false;
   state_->node_contacts = saved.node_contacts;
-  search_node_contacts(*state_);  // what is on the GPU may be newer
+  push_node_contacts();
   state_->dt = saved.dt;
   state_->time = saved.time;
   result_ = saved.result;
@@ -353,7 +357,7 @@ void CudaMlsTissue::restore(Span<const std::uint8_t> saved) {
   MlsTissue::restore(saved);
   push();
   pairs_changed();
-  search_node_contacts(*state_);
+  push_node_contacts();
   measure();
 }
 

@@ -41,6 +41,7 @@ class CudaMlsTissue final : public MlsTissue {
   void pull_contact();
   void push_contact();
   void search_contacts(float dt);
+  void push_node_contacts();
   void sum_loads(const FramePart& part, float before);
 
   std::unique_ptr<OnDevice> device_;

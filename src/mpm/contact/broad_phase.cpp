@@ -95,7 +95,7 @@ class Patch {
 };
 
 /// The facets of a block that face most along one axis, up or down.
-struct Side {
+struct CandidateSide {
   std::vector<Patch> patches;
   VectorBox box, normals;  ///< of them all
 
@@ -109,7 +109,7 @@ struct Side {
       normals.take(p.normals);
     }
   }
-  void add_pairs(const Side& other, std::vector<FacetPair>& pairs) const {
+  void add_pairs(const CandidateSide& other, std::vector<FacetPair>& pairs) const {
     for (std::size_t i = 0; i < patches.size(); ++i) {
       const Patch& p = patches[i];
       if (!p.box.meets(other.box)) continue;
@@ -149,25 +149,25 @@ std::vector<FacetPair> facing_pairs(const std::vector<FacetMotion>& facets,
                                     const std::vector<std::int32_t>& first_of_block, float patch,
                                     Cpu& cpu) {
   const int count = static_cast<int>(first_of_block.size()) - 1;
-  std::vector<Side> sides(static_cast<std::size_t>(kSides) * count);
+  std::vector<CandidateSide> sides(static_cast<std::size_t>(kSides) * count);
   cpu.for_each(count, [&](int b) {
-    Side* of_block = &sides[static_cast<std::size_t>(kSides) * b];
+    CandidateSide* of_block = &sides[static_cast<std::size_t>(kSides) * b];
     for (std::int32_t f = first_of_block[b]; f < first_of_block[b + 1]; ++f) {
       if (reach[f] > 0) of_block[side_of(facets[f])].add(facets[f], reach[f], f, patch);
     }
     for (int i = 0; i < kSides; ++i) of_block[i].measure();
   });
-  std::vector<const Side*> order;  // of those that have any, along x
-  for (const Side& side : sides) {
+  std::vector<const CandidateSide*> order;  // of those that have any, along x
+  for (const CandidateSide& side : sides) {
     if (!side.patches.empty()) order.push_back(&side);
   }
   std::sort(order.begin(), order.end(),
-            [](const Side* a, const Side* b) { return a->box.min[0] < b->box.min[0]; });
+            [](const CandidateSide* a, const CandidateSide* b) { return a->box.min[0] < b->box.min[0]; });
   std::vector<std::vector<FacetPair>> chunks(order.size());
   cpu.for_each(static_cast<int>(order.size()), [&](int i) {
-    const Side& side = *order[i];
+    const CandidateSide& side = *order[i];
     for (std::size_t j = i; j < order.size(); ++j) {
-      const Side& other = *order[j];
+      const CandidateSide& other = *order[j];
       if (other.box.min[0] > side.box.max[0]) break;
       if (side.box.meets(other.box) && may_face(side.normals, other.normals)) {
         side.add_pairs(other, chunks[i]);

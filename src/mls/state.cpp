@@ -154,7 +154,11 @@ void remake(MlsState& s, const std::vector<std::int32_t>& nodes) {
   s.cpu->for_each(
       static_cast<int>(nodes.size()), [&](int k) { remake_node(s, nodes[k]); }, 64);
   for (const std::int32_t i : nodes) {
-    if (s.thread[i] != 0) make_springs(s, i);
+    if (s.thread[i] != 0) {
+      make_springs(s, i);
+    } else if (!s.spring.empty()) {  // what it had as a thread
+      std::fill(&s.spring[s.pairs.begin[i]], s.spring.data() + s.pairs.begin[i + 1], 0.0f);
+    }
   }
 }
 

@@ -268,6 +268,17 @@ Parameters read_parameters(const ros::NodeHandle& node) {
   return p;
 }
 
+namespace {
+
+/// One word or path that ends as scene files do.
+bool looks_like_a_path(const std::string& text) {
+  const auto dot = text.rfind('.');
+  return dot != std::string::npos && text.find('\n') == std::string::npos &&
+         (text.substr(dot) == ".yaml" || text.substr(dot) == ".yml");
+}
+
+}  // namespace
+
 Scene read_scene_parameters(const ros::NodeHandle& node) {
   std::string file, mesh, method;
   double scale = 1;
@@ -285,6 +296,9 @@ Scene read_scene_parameters(const ros::NodeHandle& node) {
         "tree of parameters");
   }
   const bool text = has_tree && tree.getType() == XmlRpcValue::TypeString;
+  if (text && looks_like_a_path(static_cast<std::string&>(tree))) {
+    refuse("scene", tree, "must be YAML text or a tree of parameters; for a path set ~scene_file");
+  }
   Scene scene = !file.empty()
                     ? load_scene(resolve_path(file, "scene"))
                     : scene_from_yaml(text ? static_cast<std::string&>(tree) : yaml_from(tree));

@@ -30,7 +30,7 @@ constexpr double kSpacing = 0.0015;
 
 std::unique_ptr<MlsTissue> deformed_nodes(const MlsCase& c) {
   const double edge = std::round(std::cbrt(c.nodes)) * kSpacing;
-  Scene scene = inviscid(mls_box(Vec3::Constant(edge), kSpacing));
+  Scene scene = mls_box(Vec3::Constant(edge), kSpacing);
   scene.threads = c.threads;
   scene.mls.neighbours = c.neighbours;
   scene.mls.basis = c.basis;

@@ -308,6 +308,10 @@ void expect_cannot_start(const std::string& arguments, const std::string& reason
 
 TEST(Start, WithoutASceneItSaysWhatToSet) { expect_cannot_start("", "there is no scene"); }
 
+TEST(Start, APathGivenAsTheSceneIsNamed) {
+  expect_cannot_start("_scene:=/nowhere.yaml", "for a path set ~scene_file");
+}
+
 TEST(Start, BadScenesAreRefusedWithTheField) {
   expect_cannot_start("'_scene:={bodies: [{shape: box, size: [0.04, -1, 0.02]}]}'",
                       "bodies[0].size is [0.04, -1, 0.02]");

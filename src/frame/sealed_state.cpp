@@ -61,9 +61,9 @@ std::vector<std::uint8_t> seal_state(const StateOrigin& origin,
   head.size = bytes.size();
   head.checksum = checksum_of(Span<const std::uint8_t>(bytes.data(), bytes.size()));
   static_assert(std::has_unique_object_representations_v<Head>);
-  std::vector<std::uint8_t> sealed(sizeof head);
+  std::vector<std::uint8_t> sealed(sizeof head + bytes.size());
   std::memcpy(sealed.data(), &head, sizeof head);
-  sealed.insert(sealed.end(), bytes.begin(), bytes.end());
+  std::copy(bytes.begin(), bytes.end(), sealed.begin() + sizeof head);
   return sealed;
 }
 

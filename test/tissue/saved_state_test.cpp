@@ -2,9 +2,14 @@
 // refused with the reason.
 #include <gtest/gtest.h>
 
-#include <functional>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <sstream>
 
 #include "cut_paths.h"
+#include "temporary_folder.h"
 #include "test_scenes.h"
 #include "tissue/each_method.h"
 #include "tissue/saved_states.h"
@@ -97,6 +102,51 @@ TEST_P(SavedState, GoesOnWhileItTears) {
   const auto whole = go_on_from_states({scene, [](Simulation&, std::int64_t) {}, 24, 6});
   if (whole == nullptr) GTEST_SKIP() << "states of this method cannot be saved yet";
   EXPECT_GT(whole->tissue().fragment_count(), 1);
+}
+
+// This program again, which finds the state where the environment says and leaves checksums there.
+TEST_P(SavedState, GoesOnInAnotherProcess) {
+  constexpr const char* kVariable = "TISSUE_SIM_TEST_STATE";
+  const auto go_on = [](Simulation& simulation, std::ostream& checksums) {
+    while (simulation.frame() < 16) {
+      move(simulation, simulation.frame());
+      simulation.advance_frame();
+      checksums << simulation.frame() << ' ' << simulation.tissue().checksum() << '\n';
+    }
+  };
+  if (const char* path = std::getenv(kVariable)) {
+    std::ifstream file(path, std::ios::binary);
+    const Bytes bytes((std::istreambuf_iterator<char>(file)), std::istreambuf_iterator<char>());
+    Simulation simulation(operation());
+    simulation.restore(view(bytes));
+    std::ofstream checksums(std::string(path) + ".checksums");
+    go_on(simulation, checksums);
+    return;
+  }
+  Simulation simulation(operation());
+  for (int i = 0; i < 10; ++i) {
+    move(simulation, i);
+    simulation.advance_frame();
+  }
+  const Bytes bytes = save(simulation);
+  if (bytes.empty()) GTEST_SKIP() << "states of this method cannot be saved yet";
+  const TemporaryFolder folder;
+  const std::string path = folder.path() + "/state";
+  std::ofstream(path, std::ios::binary)
+      .write(reinterpret_cast<const char*>(bytes.data()),
+             static_cast<std::streamsize>(bytes.size()));
+  setenv(kVariable, path.c_str(), 1);
+  const auto* const test = testing::UnitTest::GetInstance()->current_test_info();
+  const int ended =
+      std::system((std::filesystem::read_symlink("/proc/self/exe").string() +
+                   " --gtest_filter=" + test->test_suite_name() + "." + test->name() + " >&2")
+                      .c_str());
+  unsetenv(kVariable);
+  EXPECT_EQ(ended, 0);
+  std::ostringstream here;
+  go_on(simulation, here);
+  std::ifstream checksums(path + ".checksums");
+  EXPECT_EQ(std::string(std::istreambuf_iterator<char>(checksums), {}), here.str());
 }
 
 TEST_P(SavedState, WhatIsNoSuchStateIsRefusedWithTheReason) {

@@ -38,34 +38,43 @@ class SavedStateOnGpu : public OnEitherDevice<CudaMpmTissue> {
     };
     return run;
   }
-  static std::string plan(Simulation& simulation) {
-    return dynamic_cast<CudaMpmTissue&>(simulation.tissue()).plan();
+  static CudaMpmTissue& tissue_of(Simulation& simulation) {
+    return dynamic_cast<CudaMpmTissue&>(simulation.tissue());
   }
-  static void goes_on(const SavedRun& run, bool divided_anew) {
+  /// Returns the simulation at the end of the run.
+  static std::unique_ptr<Simulation> goes_on(const SavedRun& run) {
+    auto whole = go_on_from_states(run);
+    EXPECT_NE(whole, nullptr);
+    if (whole != nullptr) {
+      EXPECT_GE(whole->tissue().fragment_count(), 4);
+    }
+    return whole;
+  }
+  static void goes_on_divided_anew(const SavedRun& run) {
+    cudaDeviceProp gpu;
+    ASSERT_EQ(cudaGetDeviceProperties(&gpu, 0), cudaSuccess);
+    if (gpu.multiProcessorCount != 132) GTEST_SKIP() << "the size is for 132 multiprocessors";
     Simulation before(run.scene);
-    const auto whole = go_on_from_states(run);
+    const auto whole = goes_on(run);
     ASSERT_NE(whole, nullptr);
-    EXPECT_GE(whole->tissue().fragment_count(), 4);
-    std::printf("%s\n then %s\n", plan(before).c_str(), plan(*whole).c_str());
-    const auto shape = [](const std::string& plan) { return plan.substr(0, plan.find(" cells")); };
-    EXPECT_EQ(shape(plan(before)) != shape(plan(*whole)), divided_anew);
+    const auto cells = [](const std::string& plan) { return plan.substr(0, plan.find(" cells")); };
+    EXPECT_NE(cells(tissue_of(before).plan()), cells(tissue_of(*whole).plan()));
   }
 };
 
 TEST_F(SavedStateOnGpu, GoesOnWhereTheFirstCutDividesTissueAnew) {
-  cudaDeviceProp gpu;
-  ASSERT_EQ(cudaGetDeviceProperties(&gpu, 0), cudaSuccess);
-  if (gpu.multiProcessorCount != 132) GTEST_SKIP() << "the size is for 132 multiprocessors";
-  goes_on(run_of(Vec3(0.040, 0.040, 0.018), 0.002, 12), true);
+  goes_on_divided_anew(run_of(Vec3(0.040, 0.040, 0.018), 0.002, 12));
+}
+
+TEST_F(SavedStateOnGpu, GoesOnWhereTissueMarchesUntilTheFirstCut) {
+  goes_on_divided_anew(run_of(Vec3(0.08, 0.06, 0.05), 0.00125, 8));
 }
 
 TEST_F(SavedStateOnGpu, GoesOnWhereRegionsAreHalved) {
   setenv("TISSUE_SIM_CUDA_SHAPE", "6 5 4 96 0", 1);
-  goes_on(run_of(Vec3(0.031, 0.029, 0.017), 0.002, 12), false);
-}
-
-TEST_F(SavedStateOnGpu, GoesOnWhereTissueIsLarge) {
-  goes_on(run_of(Vec3(0.1, 0.08, 0.06), 0.00125, 8), true);
+  const auto whole = goes_on(run_of(Vec3(0.031, 0.029, 0.017), 0.002, 12));
+  ASSERT_NE(whole, nullptr);
+  EXPECT_TRUE(tissue_of(*whole).state().blocks.has_halves());
 }
 
 }  // namespace

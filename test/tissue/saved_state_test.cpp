@@ -99,7 +99,7 @@ TEST_P(SavedState, GoesOnWhileItTears) {
   held.min = Vec3(-1, -1, -1);
   held.max = Vec3(0.01, 1, 1);
   scene.bodies[0].anchors = {held};
-  const auto whole = go_on_from_states({scene, [](Simulation&, std::int64_t) {}, 24, 6});
+  const auto whole = go_on_from_states({scene, [](Simulation&, std::int64_t) {}, 15, 4});
   if (whole == nullptr) GTEST_SKIP() << "states of this method cannot be saved yet";
   EXPECT_GT(whole->tissue().fragment_count(), 1);
 }

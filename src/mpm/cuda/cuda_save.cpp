@@ -150,9 +150,9 @@ void CudaMpmTissue::send_faces(const FacesOnHost& from) {
       send(from.near_count, f.near_count, count, d.stream);
       send(first, f.first_near, count, d.stream);
       send(from.near, f.near, from.near.size(), d.stream);
+      f.nodes.resize(from.contacts.size());  // the next look fills them, if none has yet
       if (!from.searched) {
         is(from.nodes.size(), from.contacts.size());
-        f.nodes.resize(from.nodes.size());
         send(from.nodes, f.nodes, from.nodes.size(), d.stream);
       }
     }

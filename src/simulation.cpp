@@ -218,7 +218,9 @@ StateOrigin Simulation::State::origin() const {
   same.threads = 0;
   same.device = Device::kAuto;
   std::string device = tissue->device_name();
-  return {scene_to_yaml(same), device.substr(0, device.find(' '))};
+  // Another model of GPU divides tissue otherwise.
+  if (device.compare(0, 4, "cuda") != 0) device.resize(std::min(device.size(), device.find(' ')));
+  return {scene_to_yaml(same), device};
 }
 
 std::vector<std::uint8_t> Simulation::save() {

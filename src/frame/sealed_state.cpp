@@ -11,7 +11,7 @@ namespace {
 
 constexpr char kMagic[16] = "tissue_sim\nstat";
 /// Of all that is written in a state. Whoever changes what a `fields()` lists counts on.
-constexpr std::uint32_t kVersion = 1;
+constexpr std::uint32_t kVersion = 2;
 
 struct Head {
   char magic[16];
@@ -60,10 +60,10 @@ std::vector<std::uint8_t> seal_state(const StateOrigin& origin,
   head.version = kVersion;
   head.size = bytes.size();
   head.checksum = checksum_of(Span<const std::uint8_t>(bytes.data(), bytes.size()));
-  ArchiveWriter out;
-  out(head);
-  std::vector<std::uint8_t> sealed = out.take();
-  sealed.insert(sealed.end(), bytes.begin(), bytes.end());
+  static_assert(std::has_unique_object_representations_v<Head>);
+  std::vector<std::uint8_t> sealed(sizeof head + bytes.size());
+  std::memcpy(sealed.data(), &head, sizeof head);
+  std::copy(bytes.begin(), bytes.end(), sealed.begin() + sizeof head);
   return sealed;
 }
 

@@ -41,6 +41,9 @@ class StabilityLimit {
   double trend() const { return trend_; }
 
  private:
+  template <class Archive>
+  friend void fields(Archive& archive, StabilityLimit& x);  // frame/state_fields.h
+
   double limit_ = 0;        ///< when it was measured last [s]; 0 where it is not known
   double measured_at_ = 0;  ///< when that was of all elements [s]
   double longest_age_ = 0;  ///< of limit_ [s]

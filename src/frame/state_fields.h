@@ -3,9 +3,14 @@
 
 #include "compute/archive.h"
 #include "fragments/pieces.h"
+#include "frame/stability_limit.h"
+#include "frame/step_acceptance.h"
+#include "frame/step_length.h"
 #include "tissue_sim/cut.h"
 #include "tissue_sim/tissue.h"
 #include "tissue_sim/tool.h"
+#include "tools/collider.h"
+#include "tools/grip.h"
 
 namespace tissue_sim {
 
@@ -25,6 +30,16 @@ void fields(Archive& archive, ToolMotion& m) {
 }
 
 template <class Archive>
+void fields(Archive& archive, ColliderLoad& l) {
+  archive(l.force, l.torque, l.points);
+}
+
+template <class Archive>
+void fields(Archive& archive, Grip& g) {
+  archive(g.pressed_, g.stiffness_);
+}
+
+template <class Archive>
 void fields(Archive& archive, AnchorMotion& m) {
   archive(m.begin, m.end);
 }
@@ -37,6 +52,21 @@ void fields(Archive& archive, BladePath& p) {
 template <class Archive>
 void fields(Archive& archive, Fragment& f) {
   archive(f.id, f.parent, f.body, f.loose, f.point_count, f.volume, f.centroid, f.velocity, f.box);
+}
+
+template <class Archive>
+void fields(Archive& archive, StabilityLimit& x) {
+  archive(x.limit_, x.measured_at_, x.longest_age_, x.growth_, x.trend_, x.followed_at_);
+}
+
+template <class Archive>
+void fields(Archive& archive, StepLength& x) {
+  archive(x.part_, x.most_, x.held_, x.of_swing_, x.of_last_swing_, x.swing_end_);
+}
+
+template <class Archive>
+void fields(Archive& archive, StepAcceptance& x) {
+  archive(x.energy_, x.shortened_);
 }
 
 template <class Archive>

@@ -30,6 +30,9 @@ class StepAcceptance {
   double shortened() const { return shortened_; }
 
  private:
+  template <class Archive>
+  friend void fields(Archive& archive, StepAcceptance& x);  // frame/state_fields.h
+
   double energy_ = NAN;  ///< after the last part that was accepted [J]
   double shortened_ = 1;
 };

@@ -23,6 +23,9 @@ class StepLength {
   PartSubsteps part(double time, double longest, double before, double most) const;
 
  private:
+  template <class Archive>
+  friend void fields(Archive& archive, StepLength& x);  // frame/state_fields.h
+
   double held(double time, double foreseen);
 
   double part_ = INFINITY;  ///< how long the next part may be [s], ...

@@ -9,6 +9,11 @@
 namespace tissue_sim {
 
 template <class Archive>
+void fields(Archive& archive, MlsTouch& t) {
+  archive(t.node, t.collider, t.hold);
+}
+
+template <class Archive>
 void fields(Archive& archive, MlsGroupContact& c) {
   archive(c.near, c.touching, c.loads);
 }
@@ -32,7 +37,9 @@ void fields(Archive& archive, MlsSubsteps& s) {
 
 template <class Archive>
 void MlsTissue::each_field(Archive& archive) {
-  archive(*state_, pieces_, substeps_, stiffening_, pieces_measured_, may_touch_);
+  archive.part("state", *state_);
+  archive.part("pieces", pieces_, pieces_measured_);
+  archive.part("substeps", substeps_, stiffening_, may_touch_);
 }
 
 std::vector<std::uint8_t> MlsTissue::save() {

@@ -5,9 +5,16 @@
 
 #include "compute/archive.h"
 #include "frame/state_fields.h"
+#include "mpm/fragment_forecast.h"
 #include "mpm/mpm_state.h"
+#include "mpm/substep_choice.h"
 
 namespace tissue_sim {
+
+template <class Archive>
+void fields(Archive& archive, Crossing& x) {
+  archive(x.place, x.normal);
+}
 
 template <class Archive>
 void fields(Archive& archive, Crossings& x) {
@@ -20,13 +27,13 @@ void fields(Archive& archive, Points& p) {
 }
 
 template <class Archive>
-void fields(Archive& archive, Nodes& n) {
-  archive(n.u, n.v, n.mass, n.inv_mass);
+void fields(Archive& archive, BondWindows& x) {
+  for (auto& of : x.bodies_) archive(of.window);
 }
 
 template <class Archive>
-void fields(Archive& archive, BondWindows& x) {
-  for (auto& of : x.bodies_) archive(of.window);
+void fields(Archive& archive, NodeFields::Split::Field& f) {
+  archive(f.points, f.node);
 }
 
 template <class Archive>
@@ -42,6 +49,26 @@ void fields(Archive& archive, NodeFields& x) {
 template <class Archive>
 void fields(Archive& archive, Block::Mixture& m) {
   archive(m.law, m.mu, m.lambda, m.neo_hookean, m.viscosity);
+}
+
+template <class Archive>
+void fields(Archive& archive, Block::PartialCell& c) {
+  archive(c.lane, c.node, c.mu);
+}
+
+template <class Archive>
+void fields(Archive& archive, Facet& f) {
+  archive(f.point, f.cell, f.direction, f.center, f.normal, f.extent, f.area);
+}
+
+template <class Archive>
+void fields(Archive& archive, SurfacePlace& p) {
+  archive(p.cell, p.node, p.point, p.key, p.place, p.normal, p.area);
+}
+
+template <class Archive>
+void fields(Archive& archive, Stiffness& s) {
+  archive(s.measured, s.last);
 }
 
 template <class Archive>
@@ -92,49 +119,44 @@ void fields(Archive& archive, RigidMotion& m) {
 }
 
 template <class Archive>
+void fields(Archive& archive, FaceRow& r) {
+  archive(r.node, r.weight, r.share, r.anchor, r.place);
+}
+
+template <class Archive>
+void fields(Archive& archive, AnchorFaces::HeldNode& n) {
+  archive(n.node, n.anchor, n.place);
+}
+
+template <class Archive>
 void fields(Archive& archive, AnchorFaces& a) {
   archive(a.rows, a.groups, a.inverse, a.impulse, a.held, a.now, a.moves);
 }
 
 template <class Archive>
+void fields(Archive& archive, Touch& t) {
+  archive(t.cell, t.point, t.key, t.collider, t.hold, t.along, t.inertia);
+}
+
+template <class Archive>
+void fields(Archive& archive, NearCell& c) {
+  archive(c.lane, c.node, c.collider, c.points, c.first_place, c.place_count, c.middle, c.clear);
+}
+
+template <class Archive>
+void fields(Archive& archive, InertialNode& n) {
+  archive(n.node, n.uses, n.changed, n.collider, n.place, n.mass, n.inertia, n.share, n.before,
+          n.impulse);
+}
+
+template <class Archive>
+void fields(Archive& archive, InertiaChange& c) {
+  archive(c.sign, c.begins, c.node, c.collider, c.place, c.normal, c.inertia, c.velocity);
+}
+
+template <class Archive>
 void fields(Archive& archive, Contacts& c) {
   archive(c.near, c.cells, c.touching, c.changes, c.inertia.nodes, c.inertia.dt, c.until_list);
-}
-
-/// The nodes around a cell of a block, -1 for none: they are addresses in it.
-template <class Archive>
-void cell_nodes(Archive& archive, const Blocks& blocks, std::int32_t number, CellNodes& nodes) {
-  std::int64_t cell = -1;
-  const Block* const block = number < 0 ? nullptr : blocks.all.at(number);
-  if constexpr (!Archive::kReads) {
-    if (block != nullptr && !block->node.empty() && nodes.lowest >= block->node.data() &&
-        nodes.lowest <= &block->node.back()) {
-      cell = nodes.lowest - block->node.data();
-    }
-  }
-  archive(cell);
-  if constexpr (Archive::kReads) {
-    nodes = {};
-    if (cell >= 0 && block != nullptr) nodes = CellNodes(*block, static_cast<int>(cell));
-  }
-}
-
-template <class Archive>
-void fields(Archive& archive, FaceContacts& f, const Blocks& blocks) {
-  archive(f.version, f.first_facet, f.block_of, f.motion, f.listed, f.first_near, f.near, f.active,
-          f.between, f.first_of_block, f.of_block, f.first_within, f.within, f.kept, f.until_search,
-          f.until_look, f.dt);
-  f.all.resize(archive.count(f.all.size(), sizeof(FaceSpring)));
-  for (FaceContact& c : f.all) {
-    archive(static_cast<FaceSpring&>(c), c.has_whole_rows, c.other_has_whole_rows, c.weights,
-            c.other_weights, c.looked_at, c.look_at);
-    const auto block_of = [&](std::int32_t facet) {
-      return facet < 0 || facet >= static_cast<std::int32_t>(f.block_of.size()) ? -1
-                                                                                : f.block_of[facet];
-    };
-    cell_nodes(archive, blocks, block_of(c.facet), c.nodes);
-    cell_nodes(archive, blocks, block_of(c.other), c.other_nodes);
-  }
 }
 
 template <class Archive>
@@ -144,10 +166,31 @@ void fields(Archive& archive, FragmentFlight& f) {
 }
 
 template <class Archive>
-void fields(Archive& archive, MpmState& s) {
-  archive(s.points, s.nodes, *s.fields, s.blocks, s.motion, s.wildest, s.time, s.dt, s.tore_at,
-          s.threads, s.crumbs, s.contacts, s.anchors, s.scene.gravity, s.scene.damping, s.flights);
-  fields(archive, s.faces, s.blocks);
+void fields(Archive& archive, SubstepChoice& x) {
+  archive(x.limit_, x.length_, x.acceptance_);
+}
+
+template <class Archive>
+void fields(Archive& archive, FragmentChance& c) {
+  archive(c.point, c.time, c.probability, c.F, c.deviation);
+}
+
+/// All but contact of tissue with tissue: mpm/contact/face_fields.h.
+template <class Archive>
+void tissue_fields(Archive& archive, MpmState& s) {
+  archive.part("time", s.time, s.dt);
+  archive.part("scene", s.scene.gravity, s.scene.damping);
+  archive.part("u", s.nodes.u);
+  archive.part("v", s.nodes.v);
+  archive.part("mass", s.nodes.mass, s.nodes.inv_mass);
+  archive.part("points", s.points);
+  archive.part("node fields", *s.fields);
+  archive.part("blocks", s.blocks);
+  archive.part("motion", s.motion, s.wildest);
+  archive.part("tears", s.tore_at, s.threads, s.crumbs);
+  archive.part("contacts", s.contacts);
+  archive.part("anchors", s.anchors);
+  archive.part("flights", s.flights);
 }
 
 }  // namespace tissue_sim

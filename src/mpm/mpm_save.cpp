@@ -1,6 +1,7 @@
 // The state of tissue as bytes.
 #include <stdexcept>
 
+#include "mpm/contact/face_fields.h"
 #include "mpm/mpm_fields.h"
 #include "mpm/mpm_tissue.h"
 
@@ -8,8 +9,14 @@ namespace tissue_sim {
 
 template <class Archive>
 void MpmTissue::each_field(Archive& archive) {
-  archive(*state_, pieces_, stiffening_, modulus_, measured_, has_energies_, work_,
-          pieces_measured_, substep_, said_, flown_);
+  tissue_fields(archive, *state_);
+  archive.begin_part("faces");
+  fields(archive, state_->faces, state_->blocks);
+  archive.end_part("faces");
+  archive.part("pieces", pieces_, pieces_measured_);
+  archive.part("substeps", stiffening_, modulus_, substep_);
+  archive.part("measures", measured_, has_energies_, work_);
+  archive.part("forecast", said_, flown_);
 }
 
 std::vector<std::uint8_t> MpmTissue::save() {

@@ -41,6 +41,9 @@ class SubstepChoice {
                     double longest) const;
 
  private:
+  template <class Archive>
+  friend void fields(Archive& archive, SubstepChoice& x);  // mpm/mpm_fields.h
+
   /// longest() as long as no part was rejected.
   double longest_foreseen(MpmState& state, const FrameInput& input, const Stiffening& stiffening,
                           double cautious, const MeasureLimit& measure);

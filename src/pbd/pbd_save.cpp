@@ -19,6 +19,16 @@ void fields(Archive& archive, Vertices& v) {
 }
 
 template <class Archive>
+void fields(Archive& archive, InternalPair& p) {
+  archive(p.a, p.b, p.area, p.is_late);
+}
+
+template <class Archive>
+void fields(Archive& archive, InnerFace& f) {
+  archive(f.tetrahedron, f.opposite, f.is_cut);
+}
+
+template <class Archive>
 void fields(Archive& archive, State& s) {
   archive(s.vertices, s.triangles, s.tetrahedra, s.internal, s.half_depth, s.links, s.edge_count,
           s.bends, s.strains, s.elastics, s.volume_of_body, s.stroke, s.copy_of, s.blade_normal,
@@ -30,7 +40,8 @@ void fields(Archive& archive, State& s) {
 
 template <class Archive>
 void PbdTissue::each_field(Archive& archive) {
-  archive(*state_, pieces_, next_stroke_);
+  archive.part("state", *state_, next_stroke_);
+  archive.part("pieces", pieces_);
 }
 
 std::vector<std::uint8_t> PbdTissue::save() {

@@ -27,6 +27,9 @@ class Grip {
   void follow(const ToolMotion& motion, double pressed);
 
  private:
+  template <class Archive>
+  friend void fields(Archive& archive, Grip& grip);  // frame/state_fields.h
+
   double pressed_ = 0;    // [Pa]
   double stiffness_ = 0;  // growth of the pressure with the angle [Pa/rad]
 };

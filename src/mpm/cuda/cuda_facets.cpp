@@ -60,12 +60,10 @@ void CudaMpmTissue::upload_sites() {
   check_cuda(cudaStreamSynchronize(device_->stream), "receive data");
 }
 
-void CudaMpmTissue::upload_facets() {
+void CudaMpmTissue::send_facets() {
   OnDevice& d = *device_;
   FacesOnDevice& f = d.faces;
   const FaceContacts& faces = state_->faces;
-  const bool renumbered = f.version != faces.version;
-  if (!renumbered && !f.pieces_changed) return;
   const std::size_t count = faces.block_of.size();
   std::vector<int> size(pieces_.next_id, 0);
   for (const Fragment& piece : pieces_.all) size[piece.id] = piece.point_count;
@@ -83,13 +81,14 @@ void CudaMpmTissue::upload_facets() {
       256);
   f.facets.upload(f.host_facets, d.stream);
   check_cuda(cudaStreamSynchronize(d.stream), "receive data");
-  f.pieces_changed = false;
-  if (!renumbered) return;
-  f.version = faces.version;
-  f.lists_hold = false;
+}
+
+void CudaMpmTissue::make_room_for_facets() {
+  OnDevice& d = *device_;
+  FacesOnDevice& f = d.faces;
+  const std::size_t count = f.facets.size();
   f.motion.resize(count);
   f.listed.resize(count);
-  f.listed.clear(d.stream);
   for (auto* of_facet : {&f.first_near, &f.near_count, &f.contacts, &f.involved, &f.rank}) {
     of_facet->resize(count);
   }
@@ -106,6 +105,19 @@ void CudaMpmTissue::upload_facets() {
   while (buckets < 2 * count) buckets *= 2;
   f.bucket_begin.resize(buckets);
   f.bucket_count.resize(buckets);
+}
+
+void CudaMpmTissue::upload_facets() {
+  FacesOnDevice& f = device_->faces;
+  const bool renumbered = f.version != state_->faces.version;
+  if (!renumbered && !f.pieces_changed) return;
+  send_facets();
+  f.pieces_changed = false;
+  if (!renumbered) return;
+  f.version = state_->faces.version;
+  f.lists_hold = false;
+  make_room_for_facets();
+  f.listed.clear(device_->stream);
   if (f.springs.size() > 0) begin_contacts();
 }
 

@@ -21,6 +21,8 @@ struct CudaFaces;
 struct CudaShape;
 struct CudaLooks;
 struct CudaReach;
+struct FacesOnHost;
+struct StateOnHost;
 
 /// The nodes live on the GPU; lattice, bonds, blocks and pieces on the host too, where nodes around
 /// a cut are taken apart between frames.
@@ -39,6 +41,8 @@ class CudaMpmTissue final : public Tissue {
   std::uint64_t checksum() override;
   Momentum momentum() override;
   std::string device_name() const override;
+  std::vector<std::uint8_t> save() override;
+  void restore(Span<const std::uint8_t> saved) override;
   const std::vector<std::string>& notes() const override { return notes_; }
 
   // For tests and the benchmark.
@@ -113,8 +117,10 @@ class CudaMpmTissue final : public Tissue {
   void run_substeps(int begin, int end);
   void launch(int begin, int end, float dt);
   void upload_lattices();
-  void upload_sites();  ///< which point is where in the lattices
-  void upload_facets();
+  void upload_sites();   ///< which point is where in the lattices
+  void upload_facets();  ///< where there are new ones, or pieces
+  void send_facets();
+  void make_room_for_facets();
   void begin_contacts();  ///< all anew; until any facets may touch, they take no memory
   void begin_search();    ///< enqueues a search of faces, whose figures come to the host
   /// Begins the search that the next substep would have to wait for, at the end of a frame whose
@@ -138,6 +144,10 @@ class CudaMpmTissue final : public Tissue {
   void finish_measure();
   double measure_limit(int steps);  ///< see MeasureLimit; of all blocks
   void upload_colliders();
+  template <class Archive>
+  void each_field(Archive& archive, StateOnHost& of_device);
+  void bring_faces(FacesOnHost& to) const;
+  void send_faces(const FacesOnHost& from);
   /// The share of the frame at the end of the part's substep `i`.
   double share_of(int i) const { return part_.substeps.share(i + 1, part_.from, part_.to); }
 

@@ -104,10 +104,10 @@ __global__ void __launch_bounds__(kCellThreads)
   }
 }
 
-__global__ void mark_slots(const CudaTables t, const CudaNearCells out) {
+__global__ void mark_slots(const CudaTables t, const std::uint8_t* marks,
+                           std::uint32_t* pushed_parts, std::size_t slot_count) {
   const std::size_t slot = static_cast<std::size_t>(blockIdx.x) * blockDim.x + threadIdx.x;
-  if (slot < out.slot_count)
-    mark_slot(t.slot_node, t.slot_parts, out.marks, slot, out.pushed_parts);
+  if (slot < slot_count) mark_slot(t.slot_node, t.slot_parts, marks, slot, pushed_parts);
 }
 
 /// One thread block for each block. Points lie within a cell's length of its middle, where it is
@@ -148,7 +148,13 @@ void launch_near(const CudaTables& tables, const CudaNodes& state, const CudaMea
              "clear memory");
   unmark<<<blocks_for(near.node_count), kThreads, 0, stream>>>(near);
   list_cells<<<tables.block_count, kCellThreads, 0, stream>>>(tables, state, measures, reach, near);
-  mark_slots<<<blocks_for(near.slot_count), kThreads, 0, stream>>>(tables, near);
+  launch_mark_slots(tables, near.marks, near.pushed_parts, near.slot_count, stream);
+}
+
+void launch_mark_slots(const CudaTables& tables, const std::uint8_t* marks,
+                       std::uint32_t* pushed_parts, std::size_t slot_count, cudaStream_t stream) {
+  mark_slots<<<blocks_for(slot_count), kThreads, 0, stream>>>(tables, marks, pushed_parts,
+                                                              slot_count);
   check_cuda(cudaGetLastError(), "start a kernel");
 }
 

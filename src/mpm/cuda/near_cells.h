@@ -40,6 +40,10 @@ struct CudaNearCells {
 void launch_near(const CudaTables& tables, const CudaNodes& state, const CudaMeasure* measures,
                  const CudaReach& reach, const CudaNearCells& near, cudaStream_t stream);
 
+/// Marks the slots whose nodes contact may push: `pushed_parts`, one for each, follows `marks`.
+void launch_mark_slots(const CudaTables& tables, const std::uint8_t* marks,
+                       std::uint32_t* pushed_parts, std::size_t slot_count, cudaStream_t stream);
+
 /// Whether a cell has come to a collider that it is not `listed` with, for it went faster later.
 void launch_unforeseen(const CudaTables& tables, const CudaNodes& state,
                        const CudaMeasure* measures, const CudaReach& reach,

@@ -96,7 +96,14 @@ __device__ __forceinline__ void push_contacts(const CudaFaces& f, const WarpTurn
     }
     if (__any_sync(0xffffffffu, active)) push_face(c, round.dt, places, active);
     next = turns.after(first);  // no sooner: others may be free before
-    if (places.lanes.lane == 0 && (active || (round.soften && is_one))) spring = c;
+    if (places.lanes.lane == 0) {
+      if (active) {
+        spring = c;
+      } else if (round.soften && is_one) {  // what else it came along for depends on its warp
+        spring.stiffness = c.stiffness;
+        spring.damping = c.damping;
+      }
+    }
     const bool pushes = active && c.touching;
     if constexpr (kMany) {
       if (places.any(pushes)) add_pushes_together(c, pushes, places, force);

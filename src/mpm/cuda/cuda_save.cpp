@@ -1,0 +1,211 @@
+// The state of tissue that lives on a GPU as bytes. Between two frames nothing is under way: what
+// the end of a frame began, it has waited for. Saving changes nothing; restoring puts everything
+// where it was, lists and divisions too that a new tissue would make otherwise.
+#include <algorithm>
+#include <stdexcept>
+
+#include "mpm/cuda/on_device.h"
+#include "mpm/cuda/state_on_host.h"
+#include "mpm/mpm_fields.h"
+
+namespace tissue_sim {
+namespace {
+
+template <class T>
+std::vector<T> bring(const DeviceArray<T>& from, std::size_t count, cudaStream_t stream) {
+  std::vector<T> to(count);
+  from.download(to.data(), count, stream);
+  check_cuda(cudaStreamSynchronize(stream), "send a state");
+  return to;
+}
+
+/// The first `count`, of as many or more.
+template <class T>
+void send(const std::vector<T>& from, const DeviceArray<T>& to, std::size_t count,
+          cudaStream_t stream) {
+  if (count == 0) return;
+  check_cuda(
+      cudaMemcpyAsync(to.data(), from.data(), count * sizeof(T), cudaMemcpyHostToDevice, stream),
+      "receive data");
+  check_cuda(cudaStreamSynchronize(stream), "receive a state");
+}
+
+std::vector<HeldPoint> bring_held(const DeviceArray<std::uint8_t>& with,
+                                  const DeviceArray<float>& hold, cudaStream_t stream) {
+  const std::vector<std::uint8_t> held_with = bring(with, with.size(), stream);
+  const std::vector<float> held_at = bring(hold, hold.size(), stream);
+  std::vector<HeldPoint> held;
+  for (std::size_t i = 0; i < held_with.size(); ++i) {
+    if (held_with[i] == 0) continue;
+    const float* at = held_at.data() + 3 * i;
+    held.push_back({static_cast<std::int32_t>(i), held_with[i], {at[0], at[1], at[2]}});
+  }
+  return held;
+}
+
+[[noreturn]] void refuse() {
+  throw std::runtime_error("the state does not fit this scene's tissue: another build wrote it");
+}
+
+}  // namespace
+
+template <class Archive>
+void CudaMpmTissue::each_field(Archive& archive, StateOnHost& of_device) {
+  OnDevice& d = *device_;
+  FaceContacts& faces = state_->faces;
+  tissue_fields(archive, *state_);
+  archive.part("facets", faces.version, faces.first_facet, faces.block_of);
+  archive.part("kept contacts", faces.kept, faces.until_search);
+  archive.part("pieces", pieces_, pieces_measured_);
+  archive.part("substeps", stiffening_, modulus_, substep_);
+  archive.part("shape", d.shape, d.cut_shape);
+  each_part(archive, of_device);
+}
+
+void CudaMpmTissue::bring_faces(FacesOnHost& to) const {
+  const OnDevice& d = *device_;
+  const FacesOnDevice& f = d.faces;
+  to.version = f.version;
+  to.is_current = f.version == state_->faces.version;
+  to.pieces_changed = f.pieces_changed;
+  to.lists_hold = f.lists_hold;
+  to.searched = f.searched;
+  to.may_meet = f.may_meet;
+  to.has_sites = f.point_at.size() > 0;
+  to.has_figures = f.figures.size() > 0;
+  to.contacts_count = f.contacts_count;
+  to.involved_count = f.involved_count;
+  to.spring_room = f.springs.size();
+  to.near_room = f.near.size();
+  if (to.has_figures) to.figures = bring(f.figures, 1, d.stream)[0];
+  const std::size_t count = f.facets.size();
+  if (!to.is_current || count == 0) return;
+  to.motion = bring(f.motion, count, d.stream);
+  to.listed = bring(f.listed, count, d.stream);
+  if (f.springs.size() > 0) to.springs = bring(f.springs, count, d.stream);
+  if (f.contacts_count == 0) return;
+  // In the order of facets: on the GPU they are in any.
+  const auto contacts = bring(f.contacts, f.contacts_count, d.stream);
+  to.contacts = contacts;
+  std::sort(to.contacts.begin(), to.contacts.end());
+  to.involved = bring(f.involved, f.involved_count, d.stream);
+  std::sort(to.involved.begin(), to.involved.end());
+  const auto first = bring(f.first_near, count, d.stream);
+  to.near_count = bring(f.near_count, count, d.stream);
+  const auto near = bring(f.near, std::min<std::size_t>(to.figures.near, f.near.size()), d.stream);
+  for (std::size_t i = 0; i < count; ++i) {
+    to.near.insert(to.near.end(), near.begin() + first[i],
+                   near.begin() + first[i] + to.near_count[i]);
+  }
+  if (f.searched) return;  // their nodes are found by the next look, which is due at once
+  const auto nodes = bring(f.nodes, contacts.size(), d.stream);
+  std::vector<std::size_t> at(count, 0);
+  for (std::size_t i = 0; i < contacts.size(); ++i) at[contacts[i]] = i;
+  for (const std::int32_t facet : to.contacts) to.nodes.push_back(nodes[at[facet]]);
+}
+
+void CudaMpmTissue::send_faces(const FacesOnHost& from) {
+  OnDevice& d = *device_;
+  FacesOnDevice& f = d.faces;
+  if (from.has_sites) upload_sites();
+  f.version = from.version;
+  f.pieces_changed = from.pieces_changed;
+  f.lists_hold = from.lists_hold;
+  f.searched = from.searched;
+  f.may_meet = from.may_meet;
+  f.contacts_count = from.contacts_count;
+  f.involved_count = from.involved_count;
+  f.springs.resize(from.spring_room);
+  f.springs.clear(d.stream);  // padding included: they are copied 16 bytes at a time
+  f.near.resize(from.near_room);
+  const std::size_t count = state_->faces.block_of.size();
+  const auto is = [](std::size_t size, std::size_t wanted) {
+    if (size != wanted) refuse();
+  };
+  if (from.is_current && count > 0) {
+    is(from.motion.size(), count);
+    is(from.listed.size(), count);
+    upload_lattices();
+    send_facets();
+    make_room_for_facets();
+    send(from.motion, f.motion, count, d.stream);
+    send(from.listed, f.listed, count, d.stream);
+    if (from.spring_room > 0) {
+      is(from.springs.size(), count);
+      is(from.spring_room, count);
+      send(from.springs, f.springs, count, d.stream);
+    }
+    f.near_count.clear(d.stream);
+    f.first_near.clear(d.stream);
+    if (from.contacts_count > 0) {
+      is(from.contacts.size(), from.contacts_count);
+      is(from.involved.size(), from.involved_count);
+      is(from.near_count.size(), count);
+      if (from.near.size() > from.near_room) refuse();
+      std::vector<std::int32_t> first(count, 0);
+      for (std::size_t i = 1; i < count; ++i) first[i] = first[i - 1] + from.near_count[i - 1];
+      is(from.near.size(), first.back() + from.near_count.back());
+      send(from.contacts, f.contacts, from.contacts.size(), d.stream);
+      send(from.involved, f.involved, from.involved.size(), d.stream);
+      send(from.near_count, f.near_count, count, d.stream);
+      send(first, f.first_near, count, d.stream);
+      send(from.near, f.near, from.near.size(), d.stream);
+      f.nodes.resize(from.contacts.size());  // the next look fills them, if none has yet
+      if (!from.searched) {
+        is(from.nodes.size(), from.contacts.size());
+        send(from.nodes, f.nodes, from.nodes.size(), d.stream);
+      }
+    }
+  }
+  if (!from.has_figures) return;
+  f.figures.resize(1);
+  f.host_figures.resize(1);
+  f.host_figures[0] = from.figures;
+  f.figures.upload(f.host_figures, d.stream);
+  check_cuda(cudaStreamSynchronize(d.stream), "receive a state");
+}
+
+std::vector<std::uint8_t> CudaMpmTissue::save() {
+  const OnDevice& d = *device_;
+  pull_nodes();
+  StateOnHost of_device;
+  of_device.held = bring_held(d.with, d.hold, d.stream);
+  of_device.marks = bring(d.marks, d.marks.size(), d.stream);
+  bring_faces(of_device.faces);
+  ArchiveWriter out;
+  each_field(out, of_device);
+  return out.take();
+}
+
+void CudaMpmTissue::restore(Span<const std::uint8_t> saved) {
+  OnDevice& d = *device_;
+  StateOnHost of_device;
+  ArchiveReader in(saved);
+  each_field(in, of_device);
+  if (in.left() > 0) throw std::runtime_error("the state has more to it than this version knows");
+  FaceContacts& faces = state_->faces;
+  faces.motion.assign(faces.block_of.size(), {});
+  faces.listed.clear();
+  faces.all.clear();
+  faces.forget_active();
+  push();
+  std::vector<std::uint8_t> with(d.with.size(), 0);
+  std::vector<float> hold(d.hold.size(), 0.0f);
+  for (const HeldPoint& p : of_device.held) {
+    if (p.entry < 0 || static_cast<std::size_t>(p.entry) >= with.size()) refuse();
+    with[p.entry] = p.with;
+    std::copy_n(p.hold, 3, hold.begin() + 3 * static_cast<std::ptrdiff_t>(p.entry));
+  }
+  send(with, d.with, with.size(), d.stream);
+  send(hold, d.hold, hold.size(), d.stream);
+  if (of_device.marks.size() != d.marks.size()) refuse();
+  send(of_device.marks, d.marks, d.marks.size(), d.stream);
+  send_faces(of_device.faces);
+  launch_mark_slots(d.tables(), d.marks.data(), d.pushed_parts.data(), d.pushed_parts.size(),
+                    d.stream);
+  d.points_changed = true;
+  launch_measure();  // that of each block is known there, too
+  check_cuda(cudaStreamSynchronize(d.stream), "receive a state");
+}
+
+}  // namespace tissue_sim

@@ -313,7 +313,7 @@ std::vector<std::uint8_t> CudaPbdTissue::save() {
   return PbdTissue::save();
 }
 
-void CudaPbdTissue::project(float h) {
+void CudaPbdTissue::project(float h, int times) {
   OnDevice& d = *device_;
   const pbd::CudaPbdFrame frame{pbd::step_numbers(state_->scene, h), 0};
   d.frame.upload(&frame, 1, d.stream);
@@ -321,7 +321,7 @@ void CudaPbdTissue::project(float h) {
     d.projections.record(
         d.stream, [&] { launch_pbd_projections(d.field(), colours(*state_), false, d.stream); });
   }
-  d.projections.launch(d.stream);
+  for (int i = 0; i < times; ++i) d.projections.launch(d.stream);
   d.host_is_current = false;
 }
 

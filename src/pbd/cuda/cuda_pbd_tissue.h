@@ -31,8 +31,8 @@ class CudaPbdTissue final : public PbdTissue {
   void push_all();    ///< and constraints, after a change of them
   void set_way(Way);  ///< throws std::runtime_error where vertices are too many for one block
   Way way() const;    ///< one of the two
-  /// As pbd::project_constraints() without multipliers; only enqueues.
-  void project(float h);
+  /// As pbd::project_constraints() without multipliers, so many times; only enqueues.
+  void project(float h, int times = 1);
   void wait();
 
  protected:

@@ -138,12 +138,16 @@ void CudaPbdTissue::choose_way() {
     d.way = d.wanted;
     return;
   }
-  // On an H100, in us; what a launch takes within a graph is 1.6.
-  const int threads = s.elastics.blocks.empty() && s.strains.blocks.empty() ? 1024 : 512;
+  // On an H100, in us; what a launch takes within a graph is 1.6, and each further colour that it
+  // is of 0.8.
+  const bool is_surface = s.elastics.blocks.empty() && s.strains.blocks.empty();
+  const int threads = is_surface ? 1024 : 512;
   const double one_block =
       time_of(s.elastics.begin, threads, 1.2, 0.8) + time_of(s.strains.begin, threads, 1.5, 0.9) +
       time_of(s.links.begin, threads, 0.2, 0.2) + time_of(s.bends.begin, threads, 0.3, 0.7);
-  const double launches = 1.6 * (3 + pbd::pbd_projection_launches(colours(s)));
+  const int count = pbd::pbd_projection_launches(colours(s));
+  const int all = d.elastics.colours + d.strains.colours + d.links.colours + d.bends.colours;
+  const double launches = 1.6 * (3 + count) + 0.8 * (all - count);
   d.way = fits && one_block < launches ? Way::kOneBlock : Way::kLaunches;
 }
 

@@ -77,20 +77,22 @@ void CudaPbdTissue::push_all() {
   d.mass.upload(v.mass, d.stream);
   d.pushed.resize(d.count);
   d.pushed.clear(d.stream);
+  choose_way();
   upload_constraints();
   upload_chunks();
   push();
-  d.step_graph.clear();
-  d.projections.clear();
-  choose_way();
 }
 
 void CudaPbdTissue::upload_constraints() {
   OnDevice& d = *device_;
-  d.elastics.upload(state_->elastics, d.stream);
-  d.strains.upload(state_->strains, d.stream);
-  d.links.upload(state_->links, d.stream);
-  d.bends.upload(state_->bends, d.stream);
+  const bool spread = d.way == Way::kOneBlock;
+  d.elastics.upload(state_->elastics, spread, d.stream);
+  d.strains.upload(state_->strains, spread, d.stream);
+  d.links.upload(state_->links, spread, d.stream);
+  d.bends.upload(state_->bends, spread, d.stream);
+  d.wait("receive data");
+  d.step_graph.clear();
+  d.projections.clear();
 }
 
 void CudaPbdTissue::upload_chunks() {
@@ -146,7 +148,9 @@ void CudaPbdTissue::choose_way() {
       time_of(s.elastics.begin, threads, 1.2, 0.8) + time_of(s.strains.begin, threads, 1.5, 0.9) +
       time_of(s.links.begin, threads, 0.2, 0.2) + time_of(s.bends.begin, threads, 0.3, 0.7);
   const int count = pbd::pbd_projection_launches(colours(s));
-  const int all = d.elastics.colours + d.strains.colours + d.links.colours + d.bends.colours;
+  const int all = static_cast<int>(s.elastics.begin.size() + s.strains.begin.size() +
+                                   s.links.begin.size() + s.bends.begin.size()) -
+                  4;
   const double launches = 1.6 * (3 + count) + 0.8 * (all - count);
   d.way = fits && one_block < launches ? Way::kOneBlock : Way::kLaunches;
 }
@@ -154,6 +158,7 @@ void CudaPbdTissue::choose_way() {
 void CudaPbdTissue::set_way(Way way) {
   device_->wanted = way;
   choose_way();
+  upload_constraints();
 }
 
 CudaPbdTissue::Way CudaPbdTissue::way() const { return device_->way; }
@@ -168,10 +173,10 @@ void CudaPbdTissue::pull() {
   d.host_is_current = true;
 }
 
-void CudaPbdTissue::upload_frame(const FrameColliders& colliders, int steps, float h) {
+void CudaPbdTissue::upload_frame(const FrameColliders& colliders, int steps,
+                                 const pbd::CudaPbdFrame& frame) {
   OnDevice& d = *device_;
   const std::size_t count = colliders.count();
-  const pbd::CudaPbdFrame frame{pbd::step_numbers(state_->scene, h), colliders.count()};
   d.host_colliders.resize(steps * count);
   d.boxed.resize(steps * count);
   for (int i = 0; i < steps; ++i) {
@@ -185,23 +190,25 @@ void CudaPbdTissue::upload_frame(const FrameColliders& colliders, int steps, flo
       d.boxed[k].max[a] = static_cast<float>(box.max[a]);
     }
   }
-  d.frame.upload(&frame, 1, d.stream);
+  if (d.way == Way::kLaunches) {
+    d.frame.upload(&frame, 1, d.stream);
+    d.step.clear(d.stream);
+  }
   d.colliders.upload(d.boxed, d.stream);
   d.loads.resize(d.boxed.size() * pbd::kPbdLoadSums);
   d.loads.clear(d.stream);
-  d.step.clear(d.stream);
   d.pushed.clear(d.stream);
 }
 
 void CudaPbdTissue::run_steps(const FrameColliders& colliders, int steps, float h) {
   OnDevice& d = *device_;
-  upload_frame(colliders, steps, h);
+  const pbd::CudaPbdFrame frame{pbd::step_numbers(state_->scene, h), colliders.count()};
+  upload_frame(colliders, steps, frame);
   const pbd::CudaPbdField field = d.field();
   const int chunks = static_cast<int>(d.component_of_chunk.size());
   const pbd::CudaPbdFlights flights{d.chunks.data(), chunks, d.order.data()};
   launch_pbd_flights(field, flights, d.flights.data(), d.stream);
   if (d.way == Way::kOneBlock) {
-    const pbd::CudaPbdFrame frame{pbd::step_numbers(state_->scene, h), colliders.count()};
     launch_pbd_steps(field, frame, steps, d.stream);
   } else {
     if (d.step_graph.is_empty()) {
@@ -290,7 +297,6 @@ void CudaPbdTissue::keep_momentum(int steps, float h) {
   if (!any) return;
   d.changes.upload(packed, d.stream);
   launch_pbd_changes(d.field(), d.component.data(), d.changes.data(), d.stream);
-  d.wait("keep momentum");
 }
 
 PbdTissue::Figures CudaPbdTissue::measure() {

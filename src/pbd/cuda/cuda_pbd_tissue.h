@@ -7,6 +7,10 @@
 
 namespace tissue_sim {
 
+namespace pbd {
+struct CudaPbdFrame;
+}
+
 /// Motion lives on the GPU, and comes to the host where something asks for it. Meshes, constraints,
 /// their colours, cuts and pieces are the host's, as on the CPU: what a cut changes goes up.
 class CudaPbdTissue final : public PbdTissue {
@@ -46,7 +50,7 @@ class CudaPbdTissue final : public PbdTissue {
   void upload_constraints();
   void upload_chunks();
   void choose_way();
-  void upload_frame(const FrameColliders& colliders, int steps, float h);
+  void upload_frame(const FrameColliders& colliders, int steps, const pbd::CudaPbdFrame& frame);
   void take_loads(const FrameColliders& colliders, int steps);
   void keep_momentum(int steps, float h);
 

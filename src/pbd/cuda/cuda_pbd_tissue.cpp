@@ -77,8 +77,8 @@ void CudaPbdTissue::push_all() {
   d.mass.upload(v.mass, d.stream);
   d.pushed.resize(d.count);
   d.pushed.clear(d.stream);
-  choose_way();
   upload_constraints();
+  choose_way();
   upload_chunks();
   push();
 }
@@ -130,6 +130,7 @@ void CudaPbdTissue::upload_chunks() {
 
 void CudaPbdTissue::choose_way() {
   OnDevice& d = *device_;
+  const Way was = d.way;
   const pbd::State& s = *state_;
   const bool fits = pbd::fits_pbd_block(d.field());
   if (d.wanted != Way::kFaster) {
@@ -138,6 +139,7 @@ void CudaPbdTissue::choose_way() {
                                " vertices; let the tissue choose");
     }
     d.way = d.wanted;
+    if (d.way != was) upload_constraints();  // in another order
     return;
   }
   // On an H100, in us; what a launch takes within a graph is 1.6, and each further colour that it
@@ -153,12 +155,12 @@ void CudaPbdTissue::choose_way() {
                   4;
   const double launches = 1.6 * (3 + count) + 0.8 * (all - count);
   d.way = fits && one_block < launches ? Way::kOneBlock : Way::kLaunches;
+  if (d.way != was) upload_constraints();  // in another order
 }
 
 void CudaPbdTissue::set_way(Way way) {
   device_->wanted = way;
   choose_way();
-  upload_constraints();
 }
 
 CudaPbdTissue::Way CudaPbdTissue::way() const { return device_->way; }

@@ -27,6 +27,8 @@ struct CudaPbdSet {
   float* multipliers;
   const std::int32_t* begin;  ///< first block of each colour, and the number of blocks
   int colours = 0;
+  int tail = 0;         ///< from this colour on each is of a warp's lanes at most
+  int tail_blocks = 0;  ///< how many those are
 };
 
 /// A collider of a step and the box that it fills [m].

@@ -26,6 +26,19 @@ __device__ __forceinline__ Item<Kind> load_item(const ConstraintBlock<Kind>* blo
   return result;
 }
 
+/// From shared memory.
+template <class Kind>
+__device__ __forceinline__ Item<Kind> load_staged(const ConstraintBlock<Kind>* blocks, int item) {
+  const ConstraintBlock<Kind>& block = blocks[item / kLanes];
+  const int lane = item % kLanes;
+  Item<Kind> result;
+#pragma unroll
+  for (int i = 0; i < Kind::kVertices; ++i) result.vertex[i] = block.vertex[i][lane];
+#pragma unroll
+  for (int i = 0; i < Kind::kNumbers; ++i) result.number[i] = block.number[i][lane];
+  return result;
+}
+
 template <class Kind, bool kKeep>
 __device__ __forceinline__ void project_item(const Item<Kind>& item, float inverse_h2, float4* x,
                                              float* multipliers, int index) {
@@ -53,22 +66,31 @@ __device__ __forceinline__ void project_item(const Item<Kind>& item, float inver
 }
 
 /// The colours from `first` to before `last` by one block of threads, all threads together; leaves
-/// them in step.
-template <class Kind, bool kKeep>
+/// them in step. Reads ahead what each thread takes first of the next colour, kRounds times.
+template <class Kind, bool kKeep, int kRounds = 1>
 __device__ __forceinline__ void project_colours(const CudaPbdSet<Kind>& set, int first, int last,
                                                 float inverse_h2, float4* x) {
   if (first >= last) return;
   const int threads = static_cast<int>(blockDim.x), thread = static_cast<int>(threadIdx.x);
   int item = set.begin[first] * kLanes + thread, end = set.begin[first + 1] * kLanes;
-  Item<Kind> ahead;
-  if (item < end) ahead = load_item(set.blocks, item);
+  Item<Kind> ahead[kRounds], now[kRounds];
+#pragma unroll
+  for (int r = 0; r < kRounds; ++r) {
+    if (item + r * threads < end) ahead[r] = load_item(set.blocks, item + r * threads);
+  }
   for (int colour = first; colour < last; ++colour) {
-    const Item<Kind> now = ahead;
     const int next = end + thread;
     const int next_end = colour + 1 < last ? set.begin[colour + 2] * kLanes : end;
-    if (next < next_end) ahead = load_item(set.blocks, next);
-    if (item < end) project_item<Kind, kKeep>(now, inverse_h2, x, set.multipliers, item);
-    for (item += threads; item < end; item += threads) {
+#pragma unroll
+    for (int r = 0; r < kRounds; ++r) {
+      now[r] = ahead[r];
+      if (next + r * threads < next_end) ahead[r] = load_item(set.blocks, next + r * threads);
+    }
+#pragma unroll
+    for (int r = 0; r < kRounds; ++r, item += threads) {
+      if (item < end) project_item<Kind, kKeep>(now[r], inverse_h2, x, set.multipliers, item);
+    }
+    for (; item < end; item += threads) {
       project_item<Kind, kKeep>(load_item(set.blocks, item), inverse_h2, x, set.multipliers, item);
     }
     __syncthreads();

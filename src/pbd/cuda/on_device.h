@@ -18,7 +18,7 @@ struct CudaPbdTissue::OnDevice {
     DeviceArray<pbd::ConstraintBlock<Kind>> blocks;
     DeviceArray<float> multipliers;
     DeviceArray<std::int32_t> begin;
-    int colours = 0;
+    int colours = 0, tail = 0, tail_blocks = 0;
 
     /// `spread`: in the order that reads shared memory fastest.
     void upload(const pbd::ConstraintSet<Kind>& set, bool spread, cudaStream_t stream) {
@@ -30,9 +30,12 @@ struct CudaPbdTissue::OnDevice {
       multipliers.upload(set.multipliers, stream);
       begin.upload(set.begin, stream);
       colours = static_cast<int>(set.begin.size()) - 1;
+      tail = colours;
+      while (tail > 0 && set.begin[tail] - set.begin[tail - 1] <= 32 / pbd::kLanes) --tail;
+      tail_blocks = set.begin[colours] - set.begin[tail];
     }
     pbd::CudaPbdSet<Kind> set() const {
-      return {blocks.data(), multipliers.data(), begin.data(), colours};
+      return {blocks.data(), multipliers.data(), begin.data(), colours, tail, tail_blocks};
     }
   };
 

@@ -16,6 +16,58 @@ __device__ __forceinline__ void forget_multipliers(const CudaPbdSet<Kind>& set) 
   }
 }
 
+/// What of a set is in shared memory: where colours begin, and the constraints of the tail, colours
+/// of which one warp takes one after the other, for waiting for other warps and for memory would
+/// take longer.
+template <class Kind>
+struct Staged {
+  const std::int32_t* begin;
+  const ConstraintBlock<Kind>* tail;
+};
+
+template <class Kind>
+__host__ __device__ int staged_words(const CudaPbdSet<Kind>& set) {
+  const int begin = (set.colours + 1 + 3) / 4 * 4;
+  return begin + set.tail_blocks * static_cast<int>(sizeof(ConstraintBlock<Kind>) / 4);
+}
+
+/// Copies to `words`, and moves it on.
+template <class Kind>
+__device__ __forceinline__ Staged<Kind> stage(const CudaPbdSet<Kind>& set, std::int32_t*& words) {
+  const int thread = static_cast<int>(threadIdx.x), threads = static_cast<int>(blockDim.x);
+  const int tail = (set.colours + 1 + 3) / 4 * 4;
+  for (int i = thread; i <= set.colours; i += threads) words[i] = set.begin[i];
+  if (set.tail_blocks > 0) {
+    const auto* from = reinterpret_cast<const std::int32_t*>(set.blocks + set.begin[set.tail]);
+    const int count = set.tail_blocks * static_cast<int>(sizeof(ConstraintBlock<Kind>) / 4);
+    for (int i = thread; i < count; i += threads) words[tail + i] = from[i];
+  }
+  const Staged<Kind> staged = {words, reinterpret_cast<const ConstraintBlock<Kind>*>(words + tail)};
+  words += staged_words(set);
+  return staged;
+}
+
+template <class Kind, bool kKeep, int kRounds>
+__device__ __forceinline__ void project_set(const CudaPbdSet<Kind>& set, const Staged<Kind>& staged,
+                                            float inverse_h2, float4* x) {
+  CudaPbdSet<Kind> of = set;
+  of.begin = staged.begin;
+  project_colours<Kind, kKeep, kRounds>(of, 0, set.tail, inverse_h2, x);
+  if (set.tail >= set.colours) return;
+  if (threadIdx.x < 32) {
+    const int first = staged.begin[set.tail] * kLanes;
+    for (int colour = set.tail; colour < set.colours; ++colour) {
+      const int item = staged.begin[colour] * kLanes + static_cast<int>(threadIdx.x);
+      if (item < staged.begin[colour + 1] * kLanes) {
+        project_item<Kind, kKeep>(load_staged(staged.tail, item - first), inverse_h2, x,
+                                  set.multipliers, item);
+      }
+      __syncwarp();
+    }
+  }
+  __syncthreads();
+}
+
 /// Threads of a block: tetrahedra take twice the registers.
 template <bool kTets>
 constexpr int kThreads = kTets ? 512 : 1024;
@@ -26,6 +78,11 @@ __global__ void __launch_bounds__(kThreads<kTets>, 1)
   extern __shared__ float4 places[];
   const int thread = static_cast<int>(threadIdx.x), threads = static_cast<int>(blockDim.x);
   for (int i = thread; i < f.count + 4 * kLanes; i += threads) places[i] = f.x[i];
+  auto* words = reinterpret_cast<std::int32_t*>(places + f.count + 4 * kLanes);
+  const Staged<Distance> links = stage(f.links, words);
+  const Staged<Bending> bends = stage(f.bends, words);
+  const Staged<Elastic> elastics = stage(f.elastics, words);
+  const Staged<Strain> strains = stage(f.strains, words);
   const StepNumbers& step = frame.step;
   const float inverse_h2 = step.inverse_h2;
   for (int s = 0; s < steps; ++s) {
@@ -38,11 +95,11 @@ __global__ void __launch_bounds__(kThreads<kTets>, 1)
     __syncthreads();
     for (int iteration = 0; iteration < f.iterations; ++iteration) {
       if (kTets) {
-        project_colours<Elastic, kKeep>(f.elastics, 0, f.elastics.colours, inverse_h2, places);
-        project_colours<Strain, false>(f.strains, 0, f.strains.colours, inverse_h2, places);
+        project_set<Elastic, kKeep, 1>(f.elastics, elastics, inverse_h2, places);
+        project_set<Strain, false, 1>(f.strains, strains, inverse_h2, places);
       }
-      project_colours<Distance, kKeep>(f.links, 0, f.links.colours, inverse_h2, places);
-      project_colours<Bending, kKeep>(f.bends, 0, f.bends.colours, inverse_h2, places);
+      project_set<Distance, kKeep, 2>(f.links, links, inverse_h2, places);
+      project_set<Bending, kKeep, 1>(f.bends, bends, inverse_h2, places);
       const std::size_t first = static_cast<std::size_t>(s) * frame.colliders;
       for (int i = thread; i < f.count; i += threads) {
         touch_vertex(f, step.h, f.colliders + first, frame.colliders,
@@ -56,7 +113,10 @@ __global__ void __launch_bounds__(kThreads<kTets>, 1)
 }
 
 std::size_t shared_bytes(const CudaPbdField& field) {
-  return (static_cast<std::size_t>(field.count) + 4 * kLanes) * sizeof(float4);
+  const int words = staged_words(field.links) + staged_words(field.bends) +
+                    staged_words(field.elastics) + staged_words(field.strains);
+  return (static_cast<std::size_t>(field.count) + 4 * kLanes) * sizeof(float4) +
+         static_cast<std::size_t>(words) * 4;
 }
 
 template <bool kTets, bool kKeep>

@@ -26,7 +26,7 @@ std::vector<ConstraintBlock<Kind>> spread_banks(const ConstraintSet<Kind>& set) 
     const std::int32_t begin = set.begin[colour] * kLanes, end = set.begin[colour + 1] * kLanes;
     left.clear();
     for (std::int32_t k = end; k > begin; --k) left.push_back(k - 1);  // the first one last
-    int taken[Kind::kVertices][kBanks], most[Kind::kVertices];
+    int taken[Kind::kVertices][kBanks] = {}, most[Kind::kVertices] = {};
     for (std::int32_t to = begin; to < end; ++to) {
       if (to % kBanks == 0) {
         for (int i = 0; i < Kind::kVertices; ++i) {

@@ -109,7 +109,7 @@ struct State {
 };
 
 /// Adds a vertex at rest; mass and volume come later. Returns its index.
-int add_vertex(State& s, const Vec3& reference, int body);
+int add_vertex(State& s, Vec3 reference, int body);
 /// After vertices or constraints came or went: padding, 1 / mass, colours.
 void pack(State& s);
 

@@ -89,7 +89,7 @@ void step(State& s, float h, std::vector<ColliderLoad>& loads) {
   for_vertices(s, [&](int i) { take_velocity(numbers, x + 4 * i, predicted + 4 * i, v + 4 * i); });
 }
 
-int add_vertex(State& s, const Vec3& reference, int body) {
+int add_vertex(State& s, Vec3 reference, int body) {
   Vertices& v = s.vertices;
   const int index = v.size();
   v.reference.push_back(reference);

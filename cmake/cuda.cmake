@@ -73,6 +73,10 @@ if(tissue_sim_has_cuda)
   file(GLOB cuda_hosts CONFIGURE_DEPENDS src/*/cuda/*.cpp)
   target_sources(tissue_sim_core PRIVATE ${cuda_sources} ${cuda_hosts})
   set_source_files_properties(${cuda_sources} ${cuda_hosts} PROPERTIES SKIP_UNITY_BUILD_INCLUSION ON)
+  # Waiting for divisions and roots of a colour is what a colour takes; two units in the last place
+  # off they take a third. Denormals are flushed as on the CPU.
+  set_source_files_properties(src/pbd/cuda/launches.cu src/pbd/cuda/one_block.cu PROPERTIES
+                              COMPILE_OPTIONS "--ftz=true;--prec-div=false;--prec-sqrt=false")
   set_target_properties(tissue_sim_core PROPERTIES CUDA_ARCHITECTURES "${CMAKE_CUDA_ARCHITECTURES}"
                         CUDA_RUNTIME_LIBRARY Static)
   target_compile_definitions(tissue_sim_core PUBLIC TISSUE_SIM_CUDA)

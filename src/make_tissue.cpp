@@ -10,6 +10,7 @@
 #if defined(TISSUE_SIM_CUDA)
 #include "mls/cuda/cuda_mls_tissue.h"
 #include "mpm/cuda/cuda_mpm_tissue.h"
+#include "pbd/cuda/cuda_pbd_tissue.h"
 #endif
 
 namespace tissue_sim {
@@ -36,11 +37,12 @@ constexpr Makers kMakers[] = {
 #if defined(TISSUE_SIM_CUDA)
     {Method::kMpm, make<MpmTissue>, make<CudaMpmTissue>},
     {Method::kMls, make<MlsTissue>, make<CudaMlsTissue>},
+    {Method::kPbd, make<PbdTissue>, make<CudaPbdTissue>},
 #else
     {Method::kMpm, make<MpmTissue>, nullptr},
     {Method::kMls, make<MlsTissue>, nullptr},
-#endif
     {Method::kPbd, make<PbdTissue>, nullptr},
+#endif
 };
 
 }  // namespace

@@ -60,6 +60,11 @@ struct Distance {
     const Vector<V> d = between(v[1], v[0]);
     return root(dot(d, d)) - number[0];
   }
+  /// Energy [J].
+  static TISSUE_SIM_INLINE double energy(const Vertex<float> (&v)[2], const float (&number)[2]) {
+    const float c = value(v, number);
+    return number[1] > 0 ? 0.5 * c * c / number[1] : 0.0;
+  }
   template <class V>
   static TISSUE_SIM_INLINE void project(Vertex<V> (&v)[2], const V (&number)[2], V inverse_h2,
                                         V (&lambda)[1]) {
@@ -108,6 +113,11 @@ struct Bending {
   template <class V>
   static TISSUE_SIM_INLINE V value(const Vertex<V> (&v)[4], const V (&number)[2]) {
     return excess(parts(v).angle, number[0]);
+  }
+  /// Energy [J].
+  static TISSUE_SIM_INLINE double energy(const Vertex<float> (&v)[4], const float (&number)[2]) {
+    const float c = value(v, number);
+    return number[1] > 0 ? 0.5 * c * c / number[1] : 0.0;
   }
   template <class V>
   static TISSUE_SIM_INLINE void project(Vertex<V> (&v)[4], const V (&number)[2], V inverse_h2,

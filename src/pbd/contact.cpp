@@ -1,6 +1,6 @@
 // Contact with the ground and with tools: a constraint for each vertex that lies in one, inelastic,
 // with Coulomb friction; what acts on the tool is what its multipliers say.
-#include <cmath>
+#include "pbd/contact.h"
 
 #include "pbd/pbd_state.h"
 #include "tools/frame_colliders.h"
@@ -10,8 +10,6 @@ namespace pbd {
 namespace {
 
 constexpr int kContactsOfPart = 1024;
-/// What lies deep in a tool that has just appeared comes out at this speed, and no faster [m/s].
-constexpr float kWayOut = 1;
 
 struct Contacts {
   const Collider* colliders;
@@ -45,39 +43,12 @@ struct Contacts {
   }
 
   void push(int i, const Collider& collider, const Gap& g, ColliderLoad& load) const {
-    float* at = x + 4 * i;
-    float carried[3];  // with the collider's material, in this step
-    velocity_at(collider, at, carried);
-    float slid[3], normal_way = 0, approach = 0;
+    const ContactPush push =
+        push_out(collider, g, h, mass[i], predicted + 4 * i, v + 4 * i, x + 4 * i);
     for (int a = 0; a < 3; ++a) {
-      carried[a] *= h;
-      const float start = predicted[4 * i + a] - h * v[4 * i + a];
-      slid[a] = at[a] - start - carried[a];
-      normal_way += slid[a] * g.normal[a];
+      load.force[a] += push.force[a];
+      load.torque[a] += push.torque[a];
     }
-    approach = fmaxf(0.0f, -normal_way);
-    const float out = fminf(-g.distance, approach + h * kWayOut);
-    float s2 = 0;
-    for (int a = 0; a < 3; ++a) {
-      slid[a] -= normal_way * g.normal[a];
-      s2 += slid[a] * slid[a];
-    }
-    // Friction takes back what slid, up to its share of the push; teeth hold with a force.
-    const float hold = collider.friction * out + collider.cohesion * h * h * at[3];
-    const float back = s2 > hold * hold ? hold / sqrtf(s2) : 1.0f;
-    const double weight = mass[i] / (static_cast<double>(h) * h);
-    double force[3], arm[3];
-    for (int a = 0; a < 3; ++a) {
-      const float moved = out * g.normal[a] - back * slid[a];
-      const float was = at[a];
-      at[a] += moved;
-      force[a] = -weight * (at[a] - was);  // as it was rounded: that is what the vertex gets
-      arm[a] = at[a] - collider.position[a];
-      load.force[a] += force[a];
-    }
-    load.torque[0] += arm[1] * force[2] - arm[2] * force[1];
-    load.torque[1] += arm[2] * force[0] - arm[0] * force[2];
-    load.torque[2] += arm[0] * force[1] - arm[1] * force[0];
     load.points += 1;
   }
 };

@@ -27,22 +27,17 @@ std::vector<Flight> flights(const State& s) {
   return of;
 }
 
-void keep_momentum(State& s, const std::vector<Flight>& before, int steps, float h) {
-  Vertices& v = s.vertices;
-  std::vector<Flight> now = flights(s);
-  for (int i = 0; i < v.size(); ++i) {
-    if (s.pushed[i] != 0) now[s.component[i]].is_free = false;
-  }
-  const double decay = static_cast<float>(std::exp(-s.scene.damping * h));
-  struct Change {
-    Vec3 linear = Vec3::Zero(), spin = Vec3::Zero();
-  };
-  std::vector<Change> changes(now.size());
+std::vector<RigidChange> missing_motion(const Scene& scene, const std::vector<Flight>& before,
+                                        const std::vector<Flight>& now, int steps, float h) {
+  const double decay = static_cast<float>(std::exp(-scene.damping * h));
+  std::vector<RigidChange> changes(now.size());
   for (std::size_t c = 0; c < now.size(); ++c) {
     if (!now[c].is_free) continue;
+    changes[c].is_free = true;
+    changes[c].centre = now[c].centre;
     Vec3 speed = before[c].linear / before[c].mass, angular = before[c].angular;
     for (int i = 0; i < steps; ++i) {
-      speed = decay * speed + h * s.scene.gravity;
+      speed = decay * speed + h * scene.gravity;
       angular *= decay;
     }
     changes[c].linear = speed - now[c].linear / now[c].mass;
@@ -55,10 +50,20 @@ void keep_momentum(State& s, const std::vector<Flight>& before, int steps, float
       changes[c].spin += missing[a] / moment * axes.eigenvectors().col(a);
     }
   }
+  return changes;
+}
+
+void keep_momentum(State& s, const std::vector<Flight>& before, int steps, float h) {
+  Vertices& v = s.vertices;
+  std::vector<Flight> now = flights(s);
   for (int i = 0; i < v.size(); ++i) {
-    const int c = s.component[i];
-    if (!now[c].is_free) continue;
-    const Vec3 add = changes[c].linear + changes[c].spin.cross(v.position(i) - now[c].centre);
+    if (s.pushed[i] != 0) now[s.component[i]].is_free = false;
+  }
+  const std::vector<RigidChange> changes = missing_motion(s.scene, before, now, steps, h);
+  for (int i = 0; i < v.size(); ++i) {
+    const RigidChange& change = changes[s.component[i]];
+    if (!change.is_free) continue;
+    const Vec3 add = change.linear + change.spin.cross(v.position(i) - change.centre);
     for (int a = 0; a < 3; ++a) v.v[4 * i + a] += static_cast<float>(add[a]);
   }
 }

@@ -45,6 +45,7 @@ void PbdTissue::each_field(Archive& archive) {
 }
 
 std::vector<std::uint8_t> PbdTissue::save() {
+  pull();
   ArchiveWriter out;
   each_field(out);
   return out.take();
@@ -56,6 +57,7 @@ void PbdTissue::restore(Span<const std::uint8_t> saved) {
   if (in.left() > 0) throw std::runtime_error("the state has more to it than this version knows");
   pbd::pack(*state_);
   pieces_measured_ = false;
+  state_changed();
 }
 
 }  // namespace tissue_sim

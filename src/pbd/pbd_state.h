@@ -12,6 +12,7 @@
 #include "compute/for_each.h"
 #include "geometry/mesh.h"
 #include "pbd/constraint_set.h"
+#include "pbd/motion.h"
 #include "pbd/project.h"
 #include "tissue_sim/scene.h"
 #include "tools/collider.h"
@@ -108,10 +109,11 @@ struct State {
 };
 
 /// Adds a vertex at rest; mass and volume come later. Returns its index.
-int add_vertex(State& s, const Vec3& reference, int body);
+int add_vertex(State& s, Vec3 reference, int body);
 /// After vertices or constraints came or went: padding, 1 / mass, colours.
 void pack(State& s);
 
+StepNumbers step_numbers(const Scene& scene, float h);
 /// Advances by one step of `h` seconds; adds what acted on each of the colliders, mean force over
 /// the step, to `loads`, which parallels them.
 void step(State& s, float h, std::vector<ColliderLoad>& loads);

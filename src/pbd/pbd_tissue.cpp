@@ -46,57 +46,83 @@ void PbdTissue::advance(double duration, const FrameInput& input) {
   result_.loads.resize(s.scene.tools.size());
   bool changed = false;
   std::vector<pbd::Motion> motions;
-  if (!input.cuts.empty()) motions = pbd::motions(s);
+  if (!input.cuts.empty()) {
+    pull();
+    motions = pbd::motions(s);
+  }
   for (const BladePath& path : input.cuts) {
     result_.cut_reports.emplace_back();
     const Array<float> still = places();
     changed = cut(path, next_stroke_++, still, result_.cut_reports.back()) || changed;
   }
-  if (changed) pbd::after_cuts(s, motions);
+  if (changed) {
+    pbd::after_cuts(s, motions);
+    state_changed();
+  }
   const FrameColliders colliders(s.scene, input, duration);
   const std::vector<BladePath> blades = blade_paths(s.scene, input, 0, 1);
-  const Array<float> before = blades.empty() ? Array<float>() : places();
-  const std::vector<pbd::Flight> flights = pbd::flights(s);
-  std::fill(s.pushed.begin(), s.pushed.end(), std::uint8_t{0});
-  for (int i = 0; i < substeps; ++i) {
-    const double share = (i + 1.0) / substeps;
-    s.colliders = colliders.at(share);
-    std::vector<ColliderLoad> loads(s.colliders.size());
-    pbd::step(s, dt, loads);
-    colliders.add_loads(share, s.colliders.data(), loads.data(), 1.0 / substeps, result_.loads);
+  Array<float> before;
+  if (!blades.empty()) {
+    pull();
+    before = places();
   }
-  pbd::keep_momentum(s, flights, substeps, dt);
+  run_steps(colliders, substeps, dt);
   result_.substeps = substeps;
   result_.substep = dt;
   if (blades.empty()) return;
+  pull();
   motions = pbd::motions(s);
   changed = false;
   for (std::size_t i = 0; i < blades.size(); ++i) {
     changed = cut(blades[i], static_cast<int>(i), before, result_.blade_report) || changed;
   }
-  if (changed) pbd::after_cuts(s, motions);
+  if (changed) {
+    pbd::after_cuts(s, motions);
+    state_changed();
+  }
+}
+
+void PbdTissue::run_steps(const FrameColliders& colliders, int steps, float h) {
+  pbd::State& s = *state_;
+  const std::vector<pbd::Flight> flights = pbd::flights(s);
+  std::fill(s.pushed.begin(), s.pushed.end(), std::uint8_t{0});
+  for (int i = 0; i < steps; ++i) {
+    const double share = (i + 1.0) / steps;
+    s.colliders = colliders.at(share);
+    std::vector<ColliderLoad> loads(s.colliders.size());
+    pbd::step(s, h, loads);
+    colliders.add_loads(share, s.colliders.data(), loads.data(), 1.0 / steps, result_.loads);
+  }
+  pbd::keep_momentum(s, flights, steps, h);
+}
+
+PbdTissue::Figures PbdTissue::measure() {
+  const pbd::Vertices& v = state_->vertices;
+  Figures sum;
+  for (int i = 0; i < v.size(); ++i) {
+    const double speed2 = v.velocity(i).squaredNorm();
+    if (!(speed2 <= sum.speed2)) sum.speed2 = speed2;
+    sum.kinetic += 0.5 * v.mass[i] * speed2;
+    sum.finite = sum.finite && v.position(i).allFinite();
+  }
+  sum.elastic = pbd::elastic_energy(*state_);
+  return sum;
 }
 
 FrameResult PbdTissue::finish() {
-  const pbd::State& s = *state_;
-  const pbd::Vertices& v = s.vertices;
-  result_.kinetic_energy = result_.max_speed = 0;
-  for (int i = 0; i < v.size(); ++i) {
-    const double speed2 = v.velocity(i).squaredNorm();
-    if (!(speed2 <= result_.max_speed)) result_.max_speed = speed2;
-    result_.kinetic_energy += 0.5 * v.mass[i] * speed2;
-    result_.blew_up = result_.blew_up || !v.position(i).allFinite();
-  }
-  result_.max_speed = std::sqrt(result_.max_speed);
-  result_.elastic_energy = pbd::elastic_energy(s);
+  const Figures sum = measure();
+  result_.kinetic_energy = sum.kinetic;
+  result_.elastic_energy = sum.elastic;
+  result_.max_speed = std::sqrt(sum.speed2);
   // Nothing that instruments do moves tissue at the speed of a bullet; what does is out of control.
-  result_.blew_up = result_.blew_up || !(result_.max_speed < 300);
+  result_.blew_up = result_.blew_up || !sum.finite || !(result_.max_speed < 300);
   pieces_measured_ = false;
   return result_;
 }
 
 Span<const Fragment> PbdTissue::fragments() {
   if (!pieces_measured_) {
+    pull();
     pbd::measure_pieces(*state_, pieces_);
     pieces_measured_ = true;
   }
@@ -104,6 +130,7 @@ Span<const Fragment> PbdTissue::fragments() {
 }
 
 Momentum PbdTissue::momentum() {
+  pull();
   const pbd::Vertices& v = state_->vertices;
   Momentum m;
   for (int i = 0; i < v.size(); ++i) {
@@ -119,6 +146,7 @@ Momentum PbdTissue::momentum() {
 }
 
 std::uint64_t PbdTissue::checksum() {
+  pull();
   const pbd::State& s = *state_;
   Checksum sum;
   sum.add(s.vertices.x);

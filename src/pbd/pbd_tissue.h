@@ -1,4 +1,5 @@
-// Tissue by position-based dynamics on the CPU.
+// Tissue by position-based dynamics on the CPU; on a GPU with what is virtual here done there
+// (pbd/cuda/cuda_pbd_tissue.h).
 #pragma once
 
 #include <memory>
@@ -6,10 +7,11 @@
 #include "pbd/pbd_pieces.h"
 #include "pbd/pbd_state.h"
 #include "tissue_sim/tissue.h"
+#include "tools/frame_colliders.h"
 
 namespace tissue_sim {
 
-class PbdTissue final : public Tissue {
+class PbdTissue : public Tissue {
  public:
   /// `notes` come before those of the scene.
   explicit PbdTissue(const Scene& scene, std::vector<std::string> notes = {});
@@ -28,10 +30,28 @@ class PbdTissue final : public Tissue {
   std::string device_name() const override;
   const std::vector<std::string>& notes() const override { return notes_; }
 
-  pbd::State& state() { return *state_; }
+  /// As it is now; on a GPU what is written to it stays unknown there (CudaPbdTissue::push()).
+  pbd::State& state() {
+    pull();
+    return *state_;
+  }
   const Pieces& pieces() const { return pieces_; }
 
- private:
+ protected:
+  /// What is measured of all vertices and constraints.
+  struct Figures {
+    double elastic = 0, kinetic = 0;  ///< [J]
+    double speed2 = 0;                ///< of the fastest, squared [m^2/s^2]
+    bool finite = true;               ///< places
+  };
+  /// Brings the motion of the vertices to state_.
+  virtual void pull() {}
+  /// A cut or a restored state changed vertices and constraints.
+  virtual void state_changed() {}
+  /// The steps of a frame, of h seconds each; adds what acts on tools to result_.
+  virtual void run_steps(const FrameColliders& colliders, int steps, float h);
+  virtual Figures measure();
+
   /// While vertices move from `before` to where they are; a stroke is what one blade does.
   template <class Archive>
   void each_field(Archive& archive);

@@ -60,6 +60,7 @@ std::vector<float> stresses(const State& s) {
 }  // namespace
 
 int PbdTissue::read_points(const PointSelection& selection, std::vector<std::uint8_t>& cloud) {
+  pull();
   const State& s = *state_;
   const std::vector<float> stress = stresses(s);
   int count = 0;
@@ -87,6 +88,7 @@ int PbdTissue::read_points(const PointSelection& selection, std::vector<std::uin
 }
 
 void PbdTissue::read_surface(SurfaceTriangles& surface) {
+  pull();
   const State& s = *state_;
   surface.corners.clear();
   surface.fragment.clear();

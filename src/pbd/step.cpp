@@ -10,33 +10,6 @@ namespace {
 
 constexpr int kVerticesOfPart = 2048;
 
-struct Predict {
-  float *x, *predicted, *v;
-  float h, decay, gravity[3];
-  TISSUE_SIM_INLINE void operator()(int i) const {
-    const bool held = x[4 * i + 3] == 0;
-    for (int a = 0; a < 3; ++a) {
-      float& speed = v[4 * i + a];
-      speed = held ? 0 : decay * speed + h * gravity[a];  // drag takes nothing off the weight
-      x[4 * i + a] += h * speed;
-      predicted[4 * i + a] = x[4 * i + a];
-    }
-  }
-};
-
-/// v += (x - predicted) / h: what no constraint moved keeps its velocity to the bit, which
-/// differences of positions would round.
-struct Follow {
-  const float *x, *predicted;
-  float* v;
-  float inverse_h;
-  TISSUE_SIM_INLINE void operator()(int i) const {
-    for (int a = 0; a < 3; ++a) {
-      v[4 * i + a] += inverse_h * (x[4 * i + a] - predicted[4 * i + a]);
-    }
-  }
-};
-
 template <class F>
 void for_vertices(State& s, const F& f) {
   const int n = s.vertices.size();
@@ -80,6 +53,15 @@ void forget(ConstraintSet<Kind>& set) {
 
 }  // namespace
 
+StepNumbers step_numbers(const Scene& scene, float h) {
+  const Vec3& g = scene.gravity;
+  return {h,
+          1 / h,
+          1 / (h * h),
+          static_cast<float>(std::exp(-scene.damping * h)),
+          {static_cast<float>(g.x()), static_cast<float>(g.y()), static_cast<float>(g.z())}};
+}
+
 void project_constraints(State& s, float h, bool keep) {
   const float inverse_h2 = 1 / (h * h);
   project_all(s, s.elastics, s.project->elastic, 32, inverse_h2, keep);
@@ -90,14 +72,9 @@ void project_constraints(State& s, float h, bool keep) {
 
 void step(State& s, float h, std::vector<ColliderLoad>& loads) {
   Vertices& vertices = s.vertices;
-  const Vec3& g = s.scene.gravity;
-  for_vertices(s, Predict{vertices.x.data(),
-                          vertices.predicted.data(),
-                          vertices.v.data(),
-                          h,
-                          static_cast<float>(std::exp(-s.scene.damping * h)),
-                          {static_cast<float>(g.x()), static_cast<float>(g.y()),
-                           static_cast<float>(g.z())}});
+  float *x = vertices.x.data(), *predicted = vertices.predicted.data(), *v = vertices.v.data();
+  const StepNumbers numbers = step_numbers(s.scene, h);
+  for_vertices(s, [&](int i) { predict(numbers, x + 4 * i, predicted + 4 * i, v + 4 * i); });
   const int iterations = s.scene.pbd.iterations;
   const bool keep = iterations > 1;
   if (keep) {
@@ -109,10 +86,10 @@ void step(State& s, float h, std::vector<ColliderLoad>& loads) {
     project_constraints(s, h, keep);
     project_contacts(s, h, loads);
   }
-  for_vertices(s, Follow{vertices.x.data(), vertices.predicted.data(), vertices.v.data(), 1 / h});
+  for_vertices(s, [&](int i) { take_velocity(numbers, x + 4 * i, predicted + 4 * i, v + 4 * i); });
 }
 
-int add_vertex(State& s, const Vec3& reference, int body) {
+int add_vertex(State& s, Vec3 reference, int body) {
   Vertices& v = s.vertices;
   const int index = v.size();
   v.reference.push_back(reference);
@@ -165,8 +142,8 @@ void pack(State& s) {
 
 namespace {
 
-template <class Kind, class F>
-double sum_energy(const State& s, const ConstraintSet<Kind>& set, const F& energy) {
+template <class Kind>
+double sum_energy(const State& s, const ConstraintSet<Kind>& set) {
   double sum = 0;
   for (int c = 0; c < set.size(); ++c) {
     Vertex<float> v[Kind::kVertices];
@@ -176,7 +153,7 @@ double sum_energy(const State& s, const ConstraintSet<Kind>& set, const F& energ
     }
     float number[Kind::kNumbers];
     std::copy(set.numbers[c].begin(), set.numbers[c].end(), number);
-    sum += energy(v, number);
+    sum += Kind::energy(v, number);
   }
   return sum;
 }
@@ -184,18 +161,9 @@ double sum_energy(const State& s, const ConstraintSet<Kind>& set, const F& energ
 }  // namespace
 
 double elastic_energy(const State& s) {
-  const auto by_value = [](auto& v, auto& number, float c) {
-    (void)v;
-    return number[1] > 0 ? 0.5 * c * c / number[1] : 0.0;
-  };
-  double sum = sum_energy(s, s.links, [&](auto& v, auto& number) {
-    return by_value(v, number, Distance::value(v, number));
-  });
-  sum += sum_energy(s, s.bends, [&](auto& v, auto& number) {
-    return by_value(v, number, Bending::value(v, number));
-  });
-  sum +=
-      sum_energy(s, s.elastics, [&](auto& v, auto& number) { return Elastic::energy(v, number); });
+  double sum = sum_energy(s, s.links);
+  sum += sum_energy(s, s.bends);
+  sum += sum_energy(s, s.elastics);
   return sum;
 }
 

@@ -131,19 +131,19 @@ struct Elastic {
     project_along(v, number, cof, dot(f[0], cof[0]) - 1.0f, number[10] * inverse_h2, lambda[1]);
   }
   /// Energy of the two [J].
-  static double energy(const Vertex<float> (&v)[4], const float (&number)[11]) {
+  static TISSUE_SIM_INLINE double energy(const Vertex<float> (&v)[4], const float (&number)[11]) {
     Vector<float> p[3];
     edges_of(v, p);
     double f[3][3], f2 = 0;
     for (int j = 0; j < 3; ++j) {
       const Vector<float> c = column(p, number, j);
       f[j][0] = c.x, f[j][1] = c.y, f[j][2] = c.z;
-      for (const double x : f[j]) f2 += x * x;
+      for (int i = 0; i < 3; ++i) f2 += f[j][i] * f[j][i];
     }
     const double det = f[0][0] * (f[1][1] * f[2][2] - f[1][2] * f[2][1]) +
                        f[0][1] * (f[1][2] * f[2][0] - f[1][0] * f[2][2]) +
                        f[0][2] * (f[1][0] * f[2][1] - f[1][1] * f[2][0]);
-    const double root3 = std::cbrt(det);
+    const double root3 = cbrt(det);
     return 0.5 * ((f2 - 3 * root3 * root3) / number[9] + (det - 1) * (det - 1) / number[10]);
   }
 };

@@ -11,6 +11,7 @@
 #include "benchmark/cuda_bodies.h"
 #include "benchmark/liver_benchmark.h"
 #include "benchmark/mls_benchmark.h"
+#include "benchmark/pbd_benchmark.h"
 #include "compute/cuda_check.h"
 #include "mpm/cuda/cuda_mpm_tissue.h"
 #include "mpm/mpm_tissue.h"
@@ -191,6 +192,7 @@ int main(int argc, char** argv) {
   }
   add_liver_benchmarks();
   add_mls_cuda_rows();
+  add_pbd_cuda_rows();
   benchmark::Initialize(&argc, argv);
   benchmark::RunSpecifiedBenchmarks();
   return 0;

@@ -1,0 +1,102 @@
+// Momentum of what flies freely (free_flight.h), summed up on the GPU by chunks.
+#include <algorithm>
+
+#include "pbd/cuda/on_device.h"
+
+namespace tissue_sim {
+namespace {
+
+/// Vertices of a chunk at most: what a block of threads sums up for keep_momentum().
+constexpr int kChunk = 1024;
+
+}  // namespace
+
+void CudaPbdTissue::upload_chunks() {
+  OnDevice& d = *device_;
+  const pbd::State& s = *state_;
+  std::vector<std::vector<std::int32_t>> of(s.components);
+  std::vector<bool> is_free(s.components, true);
+  d.component_mass.assign(s.components, 0);
+  for (int i = 0; i < d.count; ++i) {
+    const std::int32_t c = s.component[i];
+    of[c].push_back(i);
+    d.component_mass[c] += s.vertices.mass[i];
+    if (s.vertices.anchored[i] != 0) is_free[c] = false;
+  }
+  std::vector<std::int32_t> order;
+  std::vector<pbd::CudaPbdChunk> chunks;
+  d.component_of_chunk.clear();
+  for (std::int32_t c = 0; c < s.components; ++c) {
+    if (!is_free[c]) continue;
+    const auto begin = static_cast<std::int32_t>(order.size());
+    order.insert(order.end(), of[c].begin(), of[c].end());
+    const auto end = static_cast<std::int32_t>(order.size());
+    for (std::int32_t at = begin; at < end; at += kChunk) {
+      chunks.push_back({at, std::min(end, at + kChunk), of[c].front()});
+      d.component_of_chunk.push_back(c);
+    }
+  }
+  d.order.upload(order, d.stream);
+  d.chunks.upload(chunks, d.stream);
+  d.component.upload(s.component, d.stream);
+  d.flights.resize(2 * chunks.size());
+  d.host_flights.resize(2 * chunks.size());
+  d.wait("receive data");
+}
+
+void CudaPbdTissue::keep_momentum(int steps, float h) {
+  OnDevice& d = *device_;
+  const std::size_t chunks = d.component_of_chunk.size();
+  std::vector<pbd::Flight> of[2];  // before the steps, and after them
+  for (int when = 0; when < 2; ++when) {
+    of[when].resize(d.component_mass.size());
+    for (pbd::Flight& f : of[when]) f.is_free = false;
+    std::vector<Eigen::Matrix3d> second(of[when].size(), Eigen::Matrix3d::Zero());
+    std::vector<Vec3> moment(of[when].size(), Vec3::Zero());
+    std::vector<bool> pushed(of[when].size(), false);
+    for (std::size_t k = 0; k < chunks; ++k) {
+      const pbd::CudaPbdFlight& sum = d.host_flights[when * chunks + k];
+      const std::int32_t c = d.component_of_chunk[k];
+      pbd::Flight& f = of[when][c];
+      f.is_free = true;
+      f.centre = Vec3(sum.origin);  // the same of all its chunks, until all are summed up
+      moment[c] += Vec3(sum.moment);
+      f.linear += Vec3(sum.linear);
+      f.angular += Vec3(sum.angular);
+      const double* q = sum.second;
+      Eigen::Matrix3d m;
+      m << q[0], q[3], q[4], q[3], q[1], q[5], q[4], q[5], q[2];
+      second[c] += m;
+      pushed[c] = pushed[c] || sum.pushed != 0;
+    }
+    for (std::size_t c = 0; c < of[when].size(); ++c) {
+      pbd::Flight& f = of[when][c];
+      f.mass = d.component_mass[c];
+      if (!f.is_free) continue;
+      const Vec3 from_origin = moment[c] / f.mass;
+      f.centre += from_origin;
+      f.angular -= from_origin.cross(f.linear);
+      second[c] -= f.mass * from_origin * from_origin.transpose();
+      f.inertia = second[c].trace() * Eigen::Matrix3d::Identity() - second[c];
+      f.is_free = when == 0 || !pushed[c];
+    }
+  }
+  const std::vector<pbd::RigidChange> changes =
+      pbd::missing_motion(state_->scene, of[0], of[1], steps, h);
+  std::vector<pbd::CudaPbdChange> packed(changes.size());
+  bool any = false;
+  for (std::size_t c = 0; c < changes.size(); ++c) {
+    packed[c].is_free = changes[c].is_free ? 1 : 0;
+    any = any || changes[c].is_free;
+    for (int a = 0; a < 3; ++a) {
+      packed[c].centre[a] = changes[c].centre[a];
+      packed[c].linear[a] = changes[c].linear[a];
+      packed[c].spin[a] = changes[c].spin[a];
+    }
+  }
+  if (!any) return;
+  d.changes.upload(packed, d.stream);
+  launch_pbd_changes(d.field(), d.component.data(), d.changes.data(), d.stream);
+}
+
+}  // namespace tissue_sim

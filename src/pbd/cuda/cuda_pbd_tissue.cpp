@@ -1,0 +1,253 @@
+#include "pbd/cuda/cuda_pbd_tissue.h"
+
+#include <algorithm>
+#include <stdexcept>
+
+#include "pbd/cuda/on_device.h"
+
+namespace tissue_sim {
+namespace {
+
+/// Four floats a vertex.
+void upload(const Array<float>& from, std::size_t count, DeviceArray<float4>& to,
+            cudaStream_t stream) {
+  to.upload(reinterpret_cast<const float4*>(from.data()), count, stream);
+}
+
+pbd::CudaPbdColours colours(const pbd::State& s) {
+  return {s.elastics.begin, s.strains.begin, s.links.begin, s.bends.begin};
+}
+
+/// Time that one block of threads takes for all colours once [us]: `colour` for each colour, and
+/// `round` for each time that its threads have a constraint each.
+double time_of(const std::vector<std::int32_t>& begin, int threads, double colour, double round) {
+  double sum = 0;
+  for (std::size_t c = 0; c + 1 < begin.size(); ++c) {
+    const int lanes = (begin[c + 1] - begin[c]) * pbd::kLanes;
+    sum += colour + round * ((lanes + threads - 1) / threads);
+  }
+  return sum;
+}
+
+}  // namespace
+
+CudaPbdTissue::CudaPbdTissue(const Scene& scene, std::vector<std::string> notes)
+    : PbdTissue(scene, std::move(notes)), device_(std::make_unique<OnDevice>()) {
+  const std::string why = why_no_gpu();
+  if (!why.empty()) throw std::runtime_error(why + "; set device to cpu");
+  OnDevice& d = *device_;
+  check_cuda(cudaSetDevice(0), "be chosen");
+  cudaDeviceProp properties;
+  check_cuda(cudaGetDeviceProperties(&properties, 0), "be asked");
+  d.gpu = properties.name;
+  check_cuda(cudaStreamCreateWithFlags(&d.stream, cudaStreamNonBlocking), "make a stream");
+  d.iterations = scene.pbd.iterations;
+  const auto colliders = static_cast<std::size_t>(scene.pbd.steps) * collider_count(scene);
+  d.frame.resize(1);
+  d.colliders.resize(colliders);
+  d.loads.resize(colliders * pbd::kPbdLoadSums);
+  d.host_loads.resize(d.loads.size());
+  d.step.resize(1);
+  d.measures.resize(pbd::kPbdMeasures);
+  d.host_measures.resize(pbd::kPbdMeasures);
+  push_all();
+}
+
+CudaPbdTissue::~CudaPbdTissue() {
+  if (device_->stream != nullptr) cudaStreamSynchronize(device_->stream);
+}
+
+void CudaPbdTissue::push() {
+  OnDevice& d = *device_;
+  const pbd::Vertices& v = state_->vertices;
+  upload(v.x, v.x.size() / 4, d.x, d.stream);
+  upload(v.predicted, v.size(), d.predicted, d.stream);
+  upload(v.v, v.size(), d.v, d.stream);
+  d.wait("receive data");
+  d.host_is_current = true;
+}
+
+void CudaPbdTissue::push_all() {
+  OnDevice& d = *device_;
+  const pbd::Vertices& v = state_->vertices;
+  d.count = v.size();
+  d.mass.upload(v.mass, d.stream);
+  d.pushed.resize(d.count);
+  d.pushed.clear(d.stream);
+  upload_constraints();
+  choose_way();
+  upload_chunks();
+  push();
+}
+
+void CudaPbdTissue::upload_constraints() {
+  OnDevice& d = *device_;
+  const bool spread = d.way == Way::kOneBlock;
+  d.elastics.upload(state_->elastics, spread, d.stream);
+  d.strains.upload(state_->strains, spread, d.stream);
+  d.links.upload(state_->links, spread, d.stream);
+  d.bends.upload(state_->bends, spread, d.stream);
+  d.wait("receive data");
+  d.step_graph.clear();
+  d.projections.clear();
+}
+
+void CudaPbdTissue::choose_way() {
+  OnDevice& d = *device_;
+  const Way was = d.way;
+  const pbd::State& s = *state_;
+  const bool fits = pbd::fits_pbd_block(d.field());
+  if (d.wanted != Way::kFaster) {
+    if (d.wanted == Way::kOneBlock && !fits) {
+      throw std::runtime_error("one block of threads has no room for " + std::to_string(d.count) +
+                               " vertices; let the tissue choose");
+    }
+    d.way = d.wanted;
+    if (d.way != was) upload_constraints();  // in another order
+    return;
+  }
+  // On an H100, in us; what a launch takes within a graph is 1.6, and each further colour that it
+  // is of 0.8.
+  const bool is_surface = s.elastics.blocks.empty() && s.strains.blocks.empty();
+  const int threads = is_surface ? 1024 : 512;
+  const double one_block =
+      time_of(s.elastics.begin, threads, 1.2, 0.8) + time_of(s.strains.begin, threads, 1.5, 0.9) +
+      time_of(s.links.begin, threads, 0.2, 0.2) + time_of(s.bends.begin, threads, 0.3, 0.7);
+  const int count = pbd::pbd_projection_launches(colours(s));
+  const int all = static_cast<int>(s.elastics.begin.size() + s.strains.begin.size() +
+                                   s.links.begin.size() + s.bends.begin.size()) -
+                  4;
+  const double launches = 1.6 * (3 + count) + 0.8 * (all - count);
+  d.way = fits && one_block < launches ? Way::kOneBlock : Way::kLaunches;
+  if (d.way != was) upload_constraints();  // in another order
+}
+
+void CudaPbdTissue::set_way(Way way) {
+  device_->wanted = way;
+  choose_way();
+}
+
+CudaPbdTissue::Way CudaPbdTissue::way() const { return device_->way; }
+
+void CudaPbdTissue::pull() {
+  OnDevice& d = *device_;
+  if (d.host_is_current) return;
+  pbd::Vertices& v = state_->vertices;
+  d.x.download(reinterpret_cast<float4*>(v.x.data()), d.count, d.stream);
+  d.v.download(reinterpret_cast<float4*>(v.v.data()), d.count, d.stream);
+  d.wait("send data");
+  d.host_is_current = true;
+}
+
+void CudaPbdTissue::upload_frame(const FrameColliders& colliders, int steps,
+                                 const pbd::CudaPbdFrame& frame) {
+  OnDevice& d = *device_;
+  const std::size_t count = colliders.count();
+  d.host_colliders.resize(steps * count);
+  d.boxed.resize(steps * count);
+  for (int i = 0; i < steps; ++i) {
+    colliders.at((i + 1.0) / steps, d.host_colliders.data() + i * count);
+  }
+  for (std::size_t k = 0; k < d.boxed.size(); ++k) {
+    const Box box = bounds(d.host_colliders[k]);
+    d.boxed[k].shape = d.host_colliders[k];
+    for (int a = 0; a < 3; ++a) {
+      d.boxed[k].min[a] = static_cast<float>(box.min[a]);
+      d.boxed[k].max[a] = static_cast<float>(box.max[a]);
+    }
+  }
+  if (d.way == Way::kLaunches) {
+    d.frame.upload(&frame, 1, d.stream);
+    d.step.clear(d.stream);
+  }
+  d.colliders.upload(d.boxed, d.stream);
+  d.loads.resize(d.boxed.size() * pbd::kPbdLoadSums);
+  d.loads.clear(d.stream);
+  d.pushed.clear(d.stream);
+}
+
+void CudaPbdTissue::run_steps(const FrameColliders& colliders, int steps, float h) {
+  OnDevice& d = *device_;
+  const pbd::CudaPbdFrame frame{pbd::step_numbers(state_->scene, h), colliders.count()};
+  upload_frame(colliders, steps, frame);
+  const pbd::CudaPbdField field = d.field();
+  const int chunks = static_cast<int>(d.component_of_chunk.size());
+  const pbd::CudaPbdFlights flights{d.chunks.data(), chunks, d.order.data()};
+  launch_pbd_flights(field, flights, d.flights.data(), d.stream);
+  if (d.way == Way::kOneBlock) {
+    launch_pbd_steps(field, frame, steps, d.stream);
+  } else {
+    if (d.step_graph.is_empty()) {
+      d.step_graph.record(d.stream, [&] { launch_pbd_step(field, colours(*state_), d.stream); });
+    }
+    for (int i = 0; i < steps; ++i) d.step_graph.launch(d.stream);
+  }
+  d.host_is_current = false;
+  launch_pbd_flights(field, flights, d.flights.data() + chunks, d.stream);
+  d.loads.download(d.host_loads.data(), d.loads.size(), d.stream);
+  d.flights.download(d.host_flights.data(), d.flights.size(), d.stream);
+  d.wait("advance");
+  take_loads(colliders, steps);
+  if (chunks > 0) keep_momentum(steps, h);
+}
+
+void CudaPbdTissue::take_loads(const FrameColliders& colliders, int steps) {
+  OnDevice& d = *device_;
+  std::vector<ColliderLoad> on(colliders.count());
+  const unsigned long long* sum = d.host_loads.data();
+  for (int i = 0; i < steps; ++i) {
+    for (ColliderLoad& load : on) {
+      for (int a = 0; a < 3; ++a) {
+        load.force[a] = pbd::kPbdLoadUnit * static_cast<double>(static_cast<long long>(sum[a]));
+        load.torque[a] =
+            pbd::kPbdLoadUnit * static_cast<double>(static_cast<long long>(sum[3 + a]));
+      }
+      load.points = static_cast<double>(sum[6]) / d.iterations;
+      sum += pbd::kPbdLoadSums;
+    }
+    colliders.add_loads((i + 1.0) / steps, d.host_colliders.data() + i * on.size(), on.data(),
+                        1.0 / steps, result_.loads);
+  }
+}
+
+PbdTissue::Figures CudaPbdTissue::measure() {
+  OnDevice& d = *device_;
+  launch_pbd_measure(d.field(), d.measures.data(), d.stream);
+  d.measures.download(d.host_measures.data(), d.measures.size(), d.stream);
+  d.wait("measure");
+  Figures sum;
+  for (std::size_t k = 0; k < d.host_measures.size(); ++k) {
+    const pbd::CudaPbdMeasure& m = d.host_measures[k];
+    sum.elastic += m.elastic;
+    sum.kinetic += m.kinetic;
+    if (!(m.speed2 <= sum.speed2)) sum.speed2 = m.speed2;
+    sum.finite = sum.finite && m.finite != 0;
+  }
+  return sum;
+}
+
+std::vector<std::uint8_t> CudaPbdTissue::save() {
+  OnDevice& d = *device_;
+  d.predicted.download(reinterpret_cast<float4*>(state_->vertices.predicted.data()), d.count,
+                       d.stream);
+  d.wait("send data");
+  return PbdTissue::save();
+}
+
+void CudaPbdTissue::project(float h, int times) {
+  OnDevice& d = *device_;
+  const pbd::CudaPbdFrame frame{pbd::step_numbers(state_->scene, h), 0};
+  d.frame.upload(&frame, 1, d.stream);
+  if (d.projections.is_empty()) {
+    d.projections.record(
+        d.stream, [&] { launch_pbd_projections(d.field(), colours(*state_), false, d.stream); });
+  }
+  for (int i = 0; i < times; ++i) d.projections.launch(d.stream);
+  d.host_is_current = false;
+}
+
+void CudaPbdTissue::wait() { device_->wait("advance"); }
+
+std::string CudaPbdTissue::device_name() const { return "cuda (" + device_->gpu + ")"; }
+
+}  // namespace tissue_sim

@@ -1,0 +1,60 @@
+// Tissue by position-based dynamics that lives on an NVIDIA GPU.
+#pragma once
+
+#include <memory>
+
+#include "pbd/pbd_tissue.h"
+
+namespace tissue_sim {
+
+namespace pbd {
+struct CudaPbdFrame;
+}
+
+/// Motion lives on the GPU, and comes to the host where something asks for it. Meshes, constraints,
+/// their colours, cuts and pieces are the host's, as on the CPU: what a cut changes goes up.
+class CudaPbdTissue final : public PbdTissue {
+ public:
+  /// How the steps of a frame are launched.
+  enum class Way {
+    kFaster,    ///< of the two below, the one that is thought to be
+    kLaunches,  ///< colour by colour, for many constraints
+    kOneBlock,  ///< all by one block of threads, for few
+  };
+
+  /// Throws std::runtime_error where there is no GPU, or not enough memory on it.
+  explicit CudaPbdTissue(const Scene& scene, std::vector<std::string> notes = {});
+  ~CudaPbdTissue() override;
+
+  std::string device_name() const override;
+  std::vector<std::uint8_t> save() override;
+
+  // For tests and the benchmark.
+  void pull() override;
+  void push();        ///< motion to the GPU
+  void push_all();    ///< and constraints, after a change of them
+  void set_way(Way);  ///< throws std::runtime_error where vertices are too many for one block
+  Way way() const;    ///< one of the two
+  /// As pbd::project_constraints() without multipliers, so many times; only enqueues.
+  void project(float h, int times = 1);
+  void wait();
+
+ protected:
+  void state_changed() override { push_all(); }
+  void run_steps(const FrameColliders& colliders, int steps, float h) override;
+  Figures measure() override;
+
+ private:
+  struct OnDevice;
+
+  void upload_constraints();
+  void upload_chunks();
+  void choose_way();
+  void upload_frame(const FrameColliders& colliders, int steps, const pbd::CudaPbdFrame& frame);
+  void take_loads(const FrameColliders& colliders, int steps);
+  void keep_momentum(int steps, float h);
+
+  std::unique_ptr<OnDevice> device_;
+};
+
+}  // namespace tissue_sim

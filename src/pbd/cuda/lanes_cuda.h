@@ -1,0 +1,162 @@
+// A thread's constraint on the GPU, and a vertex's part of a step. For .cu files.
+#pragma once
+
+#include "pbd/contact.h"
+#include "pbd/cuda/device_state.h"
+
+namespace tissue_sim {
+namespace pbd {
+
+/// A constraint read ahead of its turn: it does not depend on where vertices are.
+template <class Kind>
+struct Item {
+  std::int32_t vertex[Kind::kVertices];
+  float number[Kind::kNumbers];
+};
+
+template <class Kind>
+__device__ __forceinline__ Item<Kind> load_item(const ConstraintBlock<Kind>* blocks, int item) {
+  const ConstraintBlock<Kind>& block = blocks[item / kLanes];
+  const int lane = item % kLanes;
+  Item<Kind> result;
+#pragma unroll
+  for (int i = 0; i < Kind::kVertices; ++i) result.vertex[i] = __ldg(&block.vertex[i][lane]);
+#pragma unroll
+  for (int i = 0; i < Kind::kNumbers; ++i) result.number[i] = __ldg(&block.number[i][lane]);
+  return result;
+}
+
+/// From shared memory.
+template <class Kind>
+__device__ __forceinline__ Item<Kind> load_staged(const ConstraintBlock<Kind>* blocks, int item) {
+  const ConstraintBlock<Kind>& block = blocks[item / kLanes];
+  const int lane = item % kLanes;
+  Item<Kind> result;
+#pragma unroll
+  for (int i = 0; i < Kind::kVertices; ++i) result.vertex[i] = block.vertex[i][lane];
+#pragma unroll
+  for (int i = 0; i < Kind::kNumbers; ++i) result.number[i] = block.number[i][lane];
+  return result;
+}
+
+template <class Kind, bool kKeep>
+__device__ __forceinline__ void project_item(const Item<Kind>& item, float inverse_h2, float4* x,
+                                             float* multipliers, int index) {
+  constexpr int kMultipliers = ConstraintSet<Kind>::kMultipliers;
+  constexpr bool kKept = kKeep && Kind::kMultipliers > 0;
+  Vertex<float> v[Kind::kVertices];
+#pragma unroll
+  for (int i = 0; i < Kind::kVertices; ++i) {
+    const float4 at = x[item.vertex[i]];
+    v[i] = {at.x, at.y, at.z, at.w};
+  }
+  float lambda[kMultipliers];
+  float* kept = multipliers + (index / kLanes) * (kMultipliers * kLanes) + index % kLanes;
+#pragma unroll
+  for (int i = 0; i < kMultipliers; ++i) lambda[i] = kKept ? kept[i * kLanes] : 0.0f;
+  Kind::project(v, item.number, inverse_h2, lambda);
+#pragma unroll
+  for (int i = 0; i < kMultipliers; ++i) {
+    if (kKept) kept[i * kLanes] = lambda[i];
+  }
+#pragma unroll
+  for (int i = 0; i < Kind::kVertices; ++i) {
+    x[item.vertex[i]] = make_float4(v[i].x, v[i].y, v[i].z, v[i].w);
+  }
+}
+
+/// The colours from `first` to before `last` by one block of threads, all threads together; leaves
+/// them in step. Reads ahead what each thread takes first of the next colour, kRounds times.
+template <class Kind, bool kKeep, int kRounds = 1>
+__device__ __forceinline__ void project_colours(const CudaPbdSet<Kind>& set, int first, int last,
+                                                float inverse_h2, float4* x) {
+  if (first >= last) return;
+  const int threads = static_cast<int>(blockDim.x), thread = static_cast<int>(threadIdx.x);
+  int item = set.begin[first] * kLanes + thread, end = set.begin[first + 1] * kLanes;
+  Item<Kind> ahead[kRounds], now[kRounds];
+#pragma unroll
+  for (int r = 0; r < kRounds; ++r) {
+    if (item + r * threads < end) ahead[r] = load_item(set.blocks, item + r * threads);
+  }
+  for (int colour = first; colour < last; ++colour) {
+    const int next = end + thread;
+    const int next_end = colour + 1 < last ? set.begin[colour + 2] * kLanes : end;
+#pragma unroll
+    for (int r = 0; r < kRounds; ++r) {
+      now[r] = ahead[r];
+      if (next + r * threads < next_end) ahead[r] = load_item(set.blocks, next + r * threads);
+    }
+#pragma unroll
+    for (int r = 0; r < kRounds; ++r, item += threads) {
+      if (item < end) project_item<Kind, kKeep>(now[r], inverse_h2, x, set.multipliers, item);
+    }
+    for (; item < end; item += threads) {
+      project_item<Kind, kKeep>(load_item(set.blocks, item), inverse_h2, x, set.multipliers, item);
+    }
+    __syncthreads();
+    item = next;
+    end = next_end;
+  }
+}
+
+__device__ __forceinline__ void predict_vertex(const CudaPbdField& f, const StepNumbers& step,
+                                               int i, float4* place) {
+  const float4 x4 = *place, v4 = f.v[i];
+  float x[4] = {x4.x, x4.y, x4.z, x4.w}, v[3] = {v4.x, v4.y, v4.z}, predicted[3];
+  predict(step, x, predicted, v);
+  *place = make_float4(x[0], x[1], x[2], x[3]);
+  f.predicted[i] = make_float4(predicted[0], predicted[1], predicted[2], 0);
+  f.v[i] = make_float4(v[0], v[1], v[2], 0);
+}
+
+__device__ __forceinline__ void take_velocity_of(const CudaPbdField& f, const StepNumbers& step,
+                                                 int i, const float4& place) {
+  const float4 p4 = f.predicted[i], v4 = f.v[i];
+  const float x[3] = {place.x, place.y, place.z}, predicted[3] = {p4.x, p4.y, p4.z};
+  float v[3] = {v4.x, v4.y, v4.z};
+  take_velocity(step, x, predicted, v);
+  f.v[i] = make_float4(v[0], v[1], v[2], 0);
+}
+
+__device__ __forceinline__ void add_load(unsigned long long* load, double value) {
+  atomicAdd(load, static_cast<unsigned long long>(__double2ll_rn(value * (1 / kPbdLoadUnit))));
+}
+
+/// Pushes a vertex out of the colliders of this step, one after the other: contact.cpp.
+__device__ __forceinline__ void touch_vertex(const CudaPbdField& f, float h,
+                                             const CudaPbdCollider* colliders, int count,
+                                             unsigned long long* loads, int i, float4* place) {
+  const float4 x4 = *place;
+  if (x4.w == 0) return;
+  float x[4] = {x4.x, x4.y, x4.z, x4.w};
+  bool touches = false;
+  for (int c = 0; c < count; ++c) {
+    const CudaPbdCollider& collider = colliders[c];
+    if (collider.shape.kind == Collider::kPlane) {
+      if (x[2] >= collider.shape.position[2]) continue;
+    } else if (x[0] < collider.min[0] || x[0] > collider.max[0] || x[1] < collider.min[1] ||
+               x[1] > collider.max[1] || x[2] < collider.min[2] || x[2] > collider.max[2]) {
+      continue;
+    }
+    const Gap g = gap(collider.shape, x);
+    if (!(g.distance < 0)) continue;
+    const float4 p4 = f.predicted[i], v4 = f.v[i];
+    const float predicted[3] = {p4.x, p4.y, p4.z}, v[3] = {v4.x, v4.y, v4.z};
+    const ContactPush push = push_out(collider.shape, g, h, f.mass[i], predicted, v, x);
+    touches = true;
+    if (collider.shape.tool < 0) continue;  // nobody asks what the ground carries
+    unsigned long long* load = loads + kPbdLoadSums * c;
+#pragma unroll
+    for (int a = 0; a < 3; ++a) {
+      add_load(load + a, push.force[a]);
+      add_load(load + 3 + a, push.torque[a]);
+    }
+    atomicAdd(load + 6, 1ull);
+  }
+  if (!touches) return;
+  f.pushed[i] = 1;
+  *place = make_float4(x[0], x[1], x[2], x[3]);
+}
+
+}  // namespace pbd
+}  // namespace tissue_sim

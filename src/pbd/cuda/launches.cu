@@ -1,0 +1,138 @@
+// Steps by launches: for tissue of many constraints. A launch is a colour, so its end is the
+// barrier that the next colour needs; small colours that follow one another share a launch of one
+// block of threads.
+#include "pbd/cuda/lanes_cuda.h"
+
+namespace tissue_sim {
+namespace pbd {
+namespace {
+
+constexpr int kThreads = 128;
+constexpr int kThreadsOfFew = 512;
+constexpr int kFewBlocks = kThreadsOfFew / kLanes;  ///< of constraints: one for each thread
+
+template <class Kind, bool kKeep>
+__global__ void __launch_bounds__(kThreads)
+    pbd_project_colour(const ConstraintBlock<Kind>* blocks, int count, float* multipliers,
+                       const CudaPbdFrame* frame, float4* x) {
+  const int item = static_cast<int>(blockIdx.x * blockDim.x + threadIdx.x);
+  if (item >= count * kLanes) return;
+  const float inverse_h2 = frame->step.inverse_h2;
+  project_item<Kind, kKeep>(load_item(blocks, item), inverse_h2, x, multipliers, item);
+}
+
+template <class Kind, bool kKeep>
+__global__ void __launch_bounds__(kThreadsOfFew)
+    pbd_project_few(CudaPbdSet<Kind> set, int first, int last, const CudaPbdFrame* frame,
+                    float4* x) {
+  project_colours<Kind, kKeep>(set, first, last, frame->step.inverse_h2, x);
+}
+
+__global__ void __launch_bounds__(kThreads) pbd_predict(CudaPbdField f) {
+  const int i = static_cast<int>(blockIdx.x * blockDim.x + threadIdx.x);
+  if (i < f.count) predict_vertex(f, f.frame->step, i, f.x + i);
+}
+
+__global__ void __launch_bounds__(kThreads) pbd_touch(CudaPbdField f) {
+  const int i = static_cast<int>(blockIdx.x * blockDim.x + threadIdx.x);
+  if (i >= f.count) return;
+  const int count = f.frame->colliders, step = *f.step;
+  touch_vertex(f, f.frame->step.h, f.colliders + static_cast<std::size_t>(step) * count, count,
+               f.loads + static_cast<std::size_t>(step) * count * kPbdLoadSums, i, f.x + i);
+}
+
+__global__ void __launch_bounds__(kThreads) pbd_take_velocities(CudaPbdField f) {
+  const int i = static_cast<int>(blockIdx.x * blockDim.x + threadIdx.x);
+  if (i == 0) *f.step += 1;
+  if (i < f.count) take_velocity_of(f, f.frame->step, i, f.x[i]);
+}
+
+/// Calls of(first, last) with the colours of each launch.
+template <class F>
+void each_launch(const std::vector<std::int32_t>& begin, const F& of) {
+  const int colours = static_cast<int>(begin.size()) - 1;
+  for (int first = 0; first < colours;) {
+    int last = first + 1;
+    if (begin[last] - begin[first] <= kFewBlocks) {
+      while (last < colours && begin[last + 1] - begin[last] <= kFewBlocks) ++last;
+    }
+    of(first, last);
+    first = last;
+  }
+}
+
+template <class Kind, bool kKeep>
+void launch_set(const CudaPbdField& field, const CudaPbdSet<Kind>& set,
+                const std::vector<std::int32_t>& begin, cudaStream_t stream) {
+  each_launch(begin, [&](int first, int last) {
+    const int count = begin[first + 1] - begin[first];
+    if (count <= kFewBlocks) {
+      pbd_project_few<Kind, kKeep>
+          <<<1, kThreadsOfFew, 0, stream>>>(set, first, last, field.frame, field.x);
+    } else {
+      const int blocks = (count * kLanes + kThreads - 1) / kThreads;
+      float* multipliers = set.multipliers + static_cast<std::ptrdiff_t>(begin[first]) *
+                                                 (ConstraintSet<Kind>::kMultipliers * kLanes);
+      pbd_project_colour<Kind, kKeep><<<blocks, kThreads, 0, stream>>>(
+          set.blocks + begin[first], count, multipliers, field.frame, field.x);
+    }
+  });
+}
+
+template <bool kKeep>
+void launch_sets(const CudaPbdField& f, const CudaPbdColours& colours, cudaStream_t stream) {
+  launch_set<Elastic, kKeep>(f, f.elastics, colours.elastics, stream);
+  launch_set<Strain, false>(f, f.strains, colours.strains, stream);
+  launch_set<Distance, kKeep>(f, f.links, colours.links, stream);
+  launch_set<Bending, kKeep>(f, f.bends, colours.bends, stream);
+  check_cuda(cudaGetLastError(), "project constraints");
+}
+
+template <class Kind>
+void forget(const CudaPbdSet<Kind>& set, const std::vector<std::int32_t>& begin,
+            cudaStream_t stream) {
+  const std::size_t floats =
+      static_cast<std::size_t>(begin.back()) * (ConstraintSet<Kind>::kMultipliers * kLanes);
+  if (floats == 0) return;
+  check_cuda(cudaMemsetAsync(set.multipliers, 0, floats * sizeof(float), stream), "clear memory");
+}
+
+}  // namespace
+
+int pbd_projection_launches(const CudaPbdColours& colours) {
+  int count = 0;
+  for (const auto* begin : {&colours.elastics, &colours.strains, &colours.links, &colours.bends}) {
+    each_launch(*begin, [&](int, int) { ++count; });
+  }
+  return count;
+}
+
+void launch_pbd_projections(const CudaPbdField& field, const CudaPbdColours& colours, bool keep,
+                            cudaStream_t stream) {
+  if (keep) {
+    launch_sets<true>(field, colours, stream);
+  } else {
+    launch_sets<false>(field, colours, stream);
+  }
+}
+
+void launch_pbd_step(const CudaPbdField& field, const CudaPbdColours& colours,
+                     cudaStream_t stream) {
+  const int blocks = (field.count + kThreads - 1) / kThreads;
+  const bool keep = field.iterations > 1;
+  pbd_predict<<<blocks, kThreads, 0, stream>>>(field);
+  if (keep) {
+    forget(field.elastics, colours.elastics, stream);
+    forget(field.links, colours.links, stream);
+    forget(field.bends, colours.bends, stream);
+  }
+  for (int i = 0; i < field.iterations; ++i) {
+    launch_pbd_projections(field, colours, keep, stream);
+    pbd_touch<<<blocks, kThreads, 0, stream>>>(field);
+  }
+  pbd_take_velocities<<<blocks, kThreads, 0, stream>>>(field);
+  check_cuda(cudaGetLastError(), "take a step");
+}
+
+}  // namespace pbd
+}  // namespace tissue_sim

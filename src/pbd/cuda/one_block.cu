@@ -1,0 +1,154 @@
+// All steps of a frame by one block of threads: for tissue of few constraints, where what takes the
+// time is to wait between colours. Within a block of threads that is a hundredth of a launch, and
+// places are in its shared memory.
+#include "pbd/cuda/lanes_cuda.h"
+
+namespace tissue_sim {
+namespace pbd {
+namespace {
+
+template <class Kind>
+__device__ __forceinline__ void forget_multipliers(const CudaPbdSet<Kind>& set) {
+  if (set.colours == 0) return;
+  const int count = set.begin[set.colours] * (ConstraintSet<Kind>::kMultipliers * kLanes);
+  for (int i = static_cast<int>(threadIdx.x); i < count; i += static_cast<int>(blockDim.x)) {
+    set.multipliers[i] = 0;
+  }
+}
+
+/// What of a set is in shared memory: where colours begin, and the constraints of the tail, colours
+/// of which one warp takes one after the other, for waiting for other warps and for memory would
+/// take longer.
+template <class Kind>
+struct Staged {
+  const std::int32_t* begin;
+  const ConstraintBlock<Kind>* tail;
+};
+
+template <class Kind>
+__host__ __device__ int staged_words(const CudaPbdSet<Kind>& set) {
+  const int begin = (set.colours + 1 + 3) / 4 * 4;
+  return begin + set.tail_blocks * static_cast<int>(sizeof(ConstraintBlock<Kind>) / 4);
+}
+
+/// Copies to `words`, and moves it on.
+template <class Kind>
+__device__ __forceinline__ Staged<Kind> stage(const CudaPbdSet<Kind>& set, std::int32_t*& words) {
+  const int thread = static_cast<int>(threadIdx.x), threads = static_cast<int>(blockDim.x);
+  const int tail = (set.colours + 1 + 3) / 4 * 4;
+  for (int i = thread; i <= set.colours; i += threads) words[i] = set.begin[i];
+  if (set.tail_blocks > 0) {
+    const auto* from = reinterpret_cast<const std::int32_t*>(set.blocks + set.begin[set.tail]);
+    const int count = set.tail_blocks * static_cast<int>(sizeof(ConstraintBlock<Kind>) / 4);
+    for (int i = thread; i < count; i += threads) words[tail + i] = from[i];
+  }
+  const Staged<Kind> staged = {words, reinterpret_cast<const ConstraintBlock<Kind>*>(words + tail)};
+  words += staged_words(set);
+  return staged;
+}
+
+template <class Kind, bool kKeep, int kRounds>
+__device__ __forceinline__ void project_set(const CudaPbdSet<Kind>& set, const Staged<Kind>& staged,
+                                            float inverse_h2, float4* x) {
+  CudaPbdSet<Kind> of = set;
+  of.begin = staged.begin;
+  project_colours<Kind, kKeep, kRounds>(of, 0, set.tail, inverse_h2, x);
+  if (set.tail >= set.colours) return;
+  if (threadIdx.x < 32) {
+    const int first = staged.begin[set.tail] * kLanes;
+    for (int colour = set.tail; colour < set.colours; ++colour) {
+      const int item = staged.begin[colour] * kLanes + static_cast<int>(threadIdx.x);
+      if (item < staged.begin[colour + 1] * kLanes) {
+        project_item<Kind, kKeep>(load_staged(staged.tail, item - first), inverse_h2, x,
+                                  set.multipliers, item);
+      }
+      __syncwarp();
+    }
+  }
+  __syncthreads();
+}
+
+/// Threads of a block: tetrahedra take twice the registers.
+template <bool kTets>
+constexpr int kThreads = kTets ? 512 : 1024;
+
+template <bool kTets, bool kKeep>
+__global__ void __launch_bounds__(kThreads<kTets>, 1)
+    pbd_steps(CudaPbdField f, CudaPbdFrame frame, int steps) {
+  extern __shared__ float4 places[];
+  const int thread = static_cast<int>(threadIdx.x), threads = static_cast<int>(blockDim.x);
+  for (int i = thread; i < f.count + 4 * kLanes; i += threads) places[i] = f.x[i];
+  auto* words = reinterpret_cast<std::int32_t*>(places + f.count + 4 * kLanes);
+  const Staged<Distance> links = stage(f.links, words);
+  const Staged<Bending> bends = stage(f.bends, words);
+  const Staged<Elastic> elastics = stage(f.elastics, words);
+  const Staged<Strain> strains = stage(f.strains, words);
+  const StepNumbers& step = frame.step;
+  const float inverse_h2 = step.inverse_h2;
+  for (int s = 0; s < steps; ++s) {
+    if (kKeep) {
+      if (kTets) forget_multipliers(f.elastics);
+      forget_multipliers(f.links);
+      forget_multipliers(f.bends);
+    }
+    for (int i = thread; i < f.count; i += threads) predict_vertex(f, step, i, places + i);
+    __syncthreads();
+    for (int iteration = 0; iteration < f.iterations; ++iteration) {
+      if (kTets) {
+        project_set<Elastic, kKeep, 1>(f.elastics, elastics, inverse_h2, places);
+        project_set<Strain, false, 1>(f.strains, strains, inverse_h2, places);
+      }
+      project_set<Distance, kKeep, 2>(f.links, links, inverse_h2, places);
+      project_set<Bending, kKeep, 1>(f.bends, bends, inverse_h2, places);
+      const std::size_t first = static_cast<std::size_t>(s) * frame.colliders;
+      for (int i = thread; i < f.count; i += threads) {
+        touch_vertex(f, step.h, f.colliders + first, frame.colliders,
+                     f.loads + first * kPbdLoadSums, i, places + i);
+      }
+      __syncthreads();
+    }
+    for (int i = thread; i < f.count; i += threads) take_velocity_of(f, step, i, places[i]);
+  }
+  for (int i = thread; i < f.count; i += threads) f.x[i] = places[i];
+}
+
+std::size_t shared_bytes(const CudaPbdField& field) {
+  const int words = staged_words(field.links) + staged_words(field.bends) +
+                    staged_words(field.elastics) + staged_words(field.strains);
+  return (static_cast<std::size_t>(field.count) + 4 * kLanes) * sizeof(float4) +
+         static_cast<std::size_t>(words) * 4;
+}
+
+template <bool kTets, bool kKeep>
+void launch(const CudaPbdField& field, const CudaPbdFrame& frame, int steps, cudaStream_t stream) {
+  const std::size_t bytes = shared_bytes(field);
+  check_cuda(
+      cudaFuncSetAttribute(pbd_steps<kTets, kKeep>, cudaFuncAttributeMaxDynamicSharedMemorySize,
+                           static_cast<int>(bytes)),
+      "set shared memory apart");
+  pbd_steps<kTets, kKeep><<<1, kThreads<kTets>, bytes, stream>>>(field, frame, steps);
+  check_cuda(cudaGetLastError(), "take the steps of a frame");
+}
+
+}  // namespace
+
+bool fits_pbd_block(const CudaPbdField& field) {
+  int most = 0;
+  check_cuda(cudaDeviceGetAttribute(&most, cudaDevAttrMaxSharedMemoryPerBlockOptin, 0), "be asked");
+  return shared_bytes(field) <= static_cast<std::size_t>(most);
+}
+
+void launch_pbd_steps(const CudaPbdField& field, const CudaPbdFrame& frame, int steps,
+                      cudaStream_t stream) {
+  const bool tets = field.elastics.colours + field.strains.colours > 0;
+  if (field.iterations > 1) {
+    tets ? launch<true, true>(field, frame, steps, stream)
+         : launch<false, true>(field, frame, steps, stream);
+  } else {
+    tets ? launch<true, false>(field, frame, steps, stream)
+         : launch<false, false>(field, frame, steps, stream);
+  }
+}
+
+}  // namespace pbd
+}  // namespace tissue_sim

@@ -174,7 +174,6 @@ void CudaMlsTissue::push_contact() {
 }
 
 void CudaMlsTissue::search_contacts(float dt) {
-  OnDevice& d = *device_;
   if (state_->node_contacts.until_look > 0) {
     --state_->node_contacts.until_look;
     return;

@@ -38,7 +38,7 @@ Ended run(const std::string& command) {
 
 // Beside this test, in the devel space.
 Ended replay(const std::string& arguments) {
-  return run((fs::read_symlink("/proc/self/exe").parent_path() / "replay").string() + " " +
+  return run("'" + (fs::read_symlink("/proc/self/exe").parent_path() / "replay").string() + "' " +
              arguments);
 }
 

@@ -121,8 +121,8 @@ TEST(ReplayNode, AWholeSessionComesOutBitForBit) {
   // Recorded anew with all topics, through the launch file; and that bag is one of the node's own.
   std::string launch_file;
   ASSERT_TRUE(ros::param::get("~launch_file", launch_file));
-  const Ended launched = run("cd " + folder() + " && roslaunch " + launch_file +
-                             " bag:=session.bag to:=again.bag cloud_rate:=60 cloud_stride:=2");
+  const Ended launched = run("cd " + folder() + " && roslaunch '" + launch_file +
+                             "' bag:=session.bag to:=again.bag cloud_rate:=60 cloud_stride:=2");
   EXPECT_NE(launched.said.find("the same"), std::string::npos) << launched.said;
   const auto before = counts(bag), after = counts(folder() + "/again.bag");
   EXPECT_EQ(before.count("/simulator/tissue/points"), 0u);

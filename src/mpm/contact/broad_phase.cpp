@@ -161,8 +161,9 @@ std::vector<FacetPair> facing_pairs(const std::vector<FacetMotion>& facets,
   for (const CandidateSide& side : sides) {
     if (!side.patches.empty()) order.push_back(&side);
   }
-  std::sort(order.begin(), order.end(),
-            [](const CandidateSide* a, const CandidateSide* b) { return a->box.min[0] < b->box.min[0]; });
+  std::sort(order.begin(), order.end(), [](const CandidateSide* a, const CandidateSide* b) {
+    return a->box.min[0] < b->box.min[0];
+  });
   std::vector<std::vector<FacetPair>> chunks(order.size());
   cpu.for_each(static_cast<int>(order.size()), [&](int i) {
     const CandidateSide& side = *order[i];

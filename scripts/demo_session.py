@@ -164,6 +164,11 @@ def has_service(name):
         return False
 
 
+def telling(lines):
+    """What errors a log has, or its end where it has none."""
+    return [line for line in lines if "[FATAL]" in line or "[ERROR]" in line] or lines[-12:]
+
+
 def stop(launch):
     """Ends roslaunch and all that it started."""
     for kind, patience in ((signal.SIGINT, 20), (signal.SIGTERM, 5), (signal.SIGKILL, 5)):
@@ -198,7 +203,7 @@ def main():
         run(args, launch)
     except Failure as e:
         with open(log) as file:
-            print("\n".join("   | " + line.rstrip() for line in file.readlines()[-12:]))
+            print("\n".join("   | " + line.rstrip() for line in telling(file.readlines())))
         sys.exit("error: %s: see %s" % (e, log))
     except KeyboardInterrupt:
         sys.exit("\nstopped; what was recorded so far is in %s" % args.out)

@@ -66,11 +66,11 @@ TISSUE_SIM_INLINE Mask<W> filled_lanes(const float* volume, int stride) {
 
 /// Stress of the cells in W lanes, `whole` if all of them hold points, from the incoming x-y
 /// quantities to the outgoing ones.
-template <int W, class Materials, bool viscous>
+template <int W, class Materials>
 TISSUE_SIM_INLINE void stress_lanes(const Block& b, const BlockField& f, const Layout& l,
                                     const float* in, const float* in_rate, int z, int j, bool whole,
-                                    float* out) {
-  Vec<W> G[8][9], damping[9];
+                                    bool viscous, float* out) {
+  Vec<W> G[8][9];
   const std::size_t lane = static_cast<std::size_t>(z) * 8 * l.stride + j;
   // Eight streams, each too short for the processor to foresee: on their way while gradients are
   // worked out.
@@ -82,7 +82,6 @@ TISSUE_SIM_INLINE void stress_lanes(const Block& b, const BlockField& f, const L
     // law may make what is no number: times a volume of 0 it stays none.
     gradients<W, true>(l, in, z, j, G, filled_lanes<W>(b.volume.data() + lane, l.stride));
   }
-  if (viscous) viscous_stress<W, Materials>(b, f, l, in, in_rate, z, j, damping);
   constexpr int kTogether = 4;  // points whose stretch is worked out side by side
   for (int first = 0; first < 8; first += kTogether) {
     Vec<W>(*F)[9] = G + first;
@@ -93,8 +92,12 @@ TISSUE_SIM_INLINE void stress_lanes(const Block& b, const BlockField& f, const L
     } else {
       std::fill_n(&F[0][0], kTogether * 9, Vec<W>{});
     }
-    for (int s = 0; viscous && s < kTogether; ++s) {
-      for (int i = 0; i < 9; ++i) F[s][i] += damping[i];
+  }
+  if (viscous) {
+    Vec<W> damping[9];
+    viscous_stress<W, Materials>(b, f, l, in, in_rate, z, j, damping);
+    for (int s = 0; s < 8; ++s) {
+      for (int i = 0; i < 9; ++i) G[s][i] += damping[i];
     }
   }
   for (int c = 0; c < 3; ++c) {
@@ -104,9 +107,11 @@ TISSUE_SIM_INLINE void stress_lanes(const Block& b, const BlockField& f, const L
   }
 }
 
-template <int W, class Materials, bool viscous>
+template <int W, class Materials>
 TISSUE_SIM_INLINE void forces(const Block& b, const BlockField& f, BlockScratch& scratch,
                               float* force) {
+  // Asked as it runs: compiled for each answer, these kernels would take a compiler twice as long.
+  const bool viscous = b.material == Block::kMixed ? !b.mixture.viscosity.empty() : f.viscosity > 0;
   const Layout l(b);
   const float inv_h = 1.0f / f.cell_size;
   reserve(scratch.in, 3 * l.in_plane);
@@ -144,8 +149,8 @@ TISSUE_SIM_INLINE void forces(const Block& b, const BlockField& f, BlockScratch&
       }
       for_each_filled<W>(
           filled, [&](auto width, int j, bool whole) __attribute__((always_inline)) {
-            stress_lanes<width, Materials, viscous>(b, f, l, scratch.in.data(),
-                                                    scratch.in_rate.data(), z, j, whole, out);
+            stress_lanes<width, Materials>(b, f, l, scratch.in.data(), scratch.in_rate.data(), z, j,
+                                           whole, viscous, out);
           });
     }
     store_plane<W>(b, l, out, z, -inv_h, scratch.row.data(), force);
@@ -156,12 +161,9 @@ TISSUE_SIM_INLINE void forces(const Block& b, const BlockField& f, BlockScratch&
 template <int W>
 TISSUE_SIM_INLINE void forces_any(const Block& b, const BlockField& f, BlockScratch& s,
                                   float* out) {
-  const bool viscous = b.material == Block::kMixed ? !b.mixture.viscosity.empty() : f.viscosity > 0;
   with_materials(
       b, f, [&](auto materials) __attribute__((always_inline)) {
-        using Materials = decltype(materials);
-        viscous ? forces<W, Materials, true>(b, f, s, out)
-                : forces<W, Materials, false>(b, f, s, out);
+        forces<W, decltype(materials)>(b, f, s, out);
       });
 }
 

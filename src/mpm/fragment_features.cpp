@@ -90,7 +90,7 @@ std::vector<std::int32_t> fragment_candidates(MpmState& state, const Pieces& pie
     if (limit == 0) return;
     const auto near = static_cast<float>(1 + share * (limit - 1));
     std::vector<StretchedPoint> stretched;
-    state.kernels->stretched(block, block_field(state, block), near, state.scratch.local(),
+    state.kernels->stretched(block, block_field(state, block), near, state.work.scratch.local(),
                              stretched);
     for (const StretchedPoint& p : stretched) of_block[i].push_back(p.point);
     for (const std::int32_t p : block.point) {

@@ -49,8 +49,8 @@ template <class F>
 double LinearisedMotion::accelerations(const F& f) {
   state_.cpu->for_each(static_cast<int>(blocks_.size()), [&](int i) {
     const Block& block = *state_.blocks.all[blocks_[i]];
-    state_.kernels->forces(block, block_field(state_, block), state_.scratch.local(),
-                           state_.force.data() + block.force_offset);
+    state_.kernels->forces(block, block_field(state_, block), state_.work.scratch.local(),
+                           state_.work.force.data() + block.force_offset);
   });
   NodeStep step{};
   step.dt = step.kick = 1;  // from rest: rates are accelerations
@@ -85,7 +85,7 @@ LinearisedMotion::LinearisedMotion(MpmState& state, const std::vector<std::uint8
     std::swap(rates_[a], n.v[a]);
     for (Vector* x : {&at_rest_, &before_, &v_, &w_}) (*x)[a].assign(nodes_.size(), 0.0f);
   }
-  std::fill(state.force.begin(), state.force.end(), 0.0f);
+  std::fill(state.work.force.begin(), state.work.force.end(), 0.0f);
   accelerations([this](int a, int i, float x) {
     at_rest_[a][i] = x;
     return 0.0;

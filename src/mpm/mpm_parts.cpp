@@ -93,7 +93,7 @@ void MpmTissue::restore_checkpoint() {
   }
   s.time = checkpoint_.time;
   s.dt = checkpoint_.dt;
-  for (const InertialNode& n : s.contacts.inertia.nodes) s.inertial_index[n.node] = -1;
+  for (const InertialNode& n : s.contacts.inertia.nodes) s.work.inertial_index[n.node] = -1;
   s.contacts = checkpoint_.contacts;
   index_inertia(s);
   s.faces = checkpoint_.faces;

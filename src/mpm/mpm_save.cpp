@@ -29,11 +29,11 @@ void MpmTissue::restore(Span<const std::uint8_t> saved) {
   ArchiveReader in(saved);
   each_field(in);
   if (in.left() > 0) throw std::runtime_error("the state has more to it than this version knows");
-  state_->inertial_index.assign(state_->nodes.size(), -1);
+  state_->work.inertial_index.assign(state_->nodes.size(), -1);
   index_inertia(*state_);
   index_flights(*state_);
-  state_->force.clear();
-  state_->force.resize(state_->blocks.force_size);
+  state_->work.force.clear();
+  state_->work.force.resize(state_->blocks.force_size);
 }
 
 }  // namespace tissue_sim

@@ -17,17 +17,17 @@ std::unique_ptr<MpmState> make_mpm_state(const Scene& scene, std::vector<std::st
   state->whole_bonds = state->points.bonds;
   const bool at_surface = scene.mpm.boundary == MpmBoundary::kSurface;
   if (at_surface) {
-    find_free_volumes(state->bodies, state->points);
-    state->points.outer = find_outer_places(state->bodies, state->points);
+    find_free_volumes(*state);
+    state->points.outer = find_outer_places(*state);
   }
   state->fields = std::make_unique<NodeFields>(state->bodies, state->points, state->nodes);
-  if (at_surface) find_face_links(scene, state->bodies, state->points, state->anchors);
-  find_face_rows(state->bodies, state->points, *state->fields, state->nodes, state->anchors);
+  if (at_surface) find_face_links(scene, *state, state->anchors);
+  find_face_rows(*state, state->anchors);
   for (const std::int32_t p : state->anchors.points) {
     if (state->points.anchored[p] == 0) state->points.anchored[p] = Points::kAtAnchor;
   }
-  state->blocks = make_blocks(state->bodies, state->points, *state->fields, {}, *state->cpu);
-  state->force.resize(state->blocks.force_size);
+  state->blocks = make_blocks(*state, {}, *state->cpu);
+  state->work.force.resize(state->blocks.force_size);
   state->contacts.near.resize(state->blocks.all.size());
   state->contacts.cells.resize(state->blocks.all.size());
   state->contacts.touching.resize(state->blocks.all.size());
@@ -81,7 +81,7 @@ void measure_motion(MpmState& state) {
   state.cpu->for_each(count, [&](int i) {
     const Block& block = *state.blocks.all[i];
     const PointBounds b =
-        state.kernels->bounds(block, block_field(state, block), state.scratch.local());
+        state.kernels->bounds(block, block_field(state, block), state.work.scratch.local());
     state.motion[i] = {{Vec3(b.min[0], b.min[1], b.min[2]), Vec3(b.max[0], b.max[1], b.max[2])},
                        b.speed};
     if (!state.points.free_volume.empty()) add_held(state, block, state.motion[i].box);
@@ -105,7 +105,7 @@ class MoveRow {
   void operator()(int i) const {
     const NodeRow& row = state_.blocks.rows[i];
     state_.kernels->update_row(row, state_.blocks.row_parts.data() + row.first_part,
-                               state_.force.data(), update_);
+                               state_.work.force.data(), update_);
   }
 
  private:
@@ -120,7 +120,7 @@ float substep(MpmState& state, float dt, std::vector<ColliderLoad>& loads,
   Blocks& blocks = state.blocks;
   const int block_count = static_cast<int>(blocks.all.size());
   const std::size_t collider_count = state.colliders.size();
-  state.block_loads.resize(block_count);
+  state.work.block_loads.resize(block_count);
   FaceContacts& faces = state.faces;
   const bool list = is_list_due(state.contacts);
   if (list && !state.contacts.inertia.nodes.empty()) tidy_inertia(state, false);
@@ -148,17 +148,17 @@ float substep(MpmState& state, float dt, std::vector<ColliderLoad>& loads,
   const RigidMotion* const after = anchors.empty() ? nullptr : anchors.data();
   const auto work_on_block = [&](int i) {
     const Block& block = *blocks.all[i];
-    float* force = state.force.data() + block.force_offset;
+    float* force = state.work.force.data() + block.force_offset;
     BlockField field = block_field(state, block);
-    BlockScratch& scratch = state.scratch.local();
+    BlockScratch& scratch = state.work.scratch.local();
     if (!faces.active.empty() && faces.first_within[i] < faces.first_within[i + 1]) {
       push_faces_within(state, i, dt, state.kernels->gather(block, state.nodes.u, scratch));
       field.has_nodes = true;
     }
     state.kernels->forces(block, field, scratch, force);
-    state.block_loads[i].assign(collider_count, {});
+    state.work.block_loads[i].assign(collider_count, {});
     if (list) list_near_cells(state, i, dt);
-    add_contact(state, i, dt, force, state.block_loads[i]);
+    add_contact(state, i, dt, force, state.work.block_loads[i]);
     if (faces.active.empty()) return;
     pushes.wait();
     add_face_contacts(state, i, force);
@@ -183,7 +183,7 @@ float substep(MpmState& state, float dt, std::vector<ColliderLoad>& loads,
   }
   fly(state, step);
   add_inertial_loads(state, step.kick, loads);
-  for (const auto& of_block : state.block_loads) {
+  for (const auto& of_block : state.work.block_loads) {
     for (std::size_t c = 0; c < of_block.size(); ++c) {
       for (int a = 0; a < 3; ++a) {
         loads[c].force[a] += of_block[c].force[a];

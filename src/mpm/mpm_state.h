@@ -1,4 +1,4 @@
-// All that the material point method keeps on the CPU, and the functions that work on it.
+// The state of the material point method on the host, and a substep of it on the CPU.
 #pragma once
 
 #include <tbb/enumerable_thread_specific.h>
@@ -16,9 +16,7 @@
 #include "mpm/contact/contact_inertia.h"
 #include "mpm/contact/face_contact.h"
 #include "mpm/fragment_flight.h"
-#include "mpm/lattice/lattice_body.h"
-#include "mpm/lattice/nodes.h"
-#include "mpm/split/node_fields.h"
+#include "mpm/lattice_tissue.h"
 #include "tissue_sim/tissue.h"
 #include "tools/collider.h"
 
@@ -67,18 +65,22 @@ struct SweptPoint {
   std::int32_t block, index;
 };
 
-struct MpmState {
-  Scene scene;
-  std::vector<LatticeBody> bodies;
-  Points points;
-  Nodes nodes;
-  std::unique_ptr<NodeFields> fields;
-  AnchorFaces anchors;
-  Blocks blocks;
+/// What working on blocks here needs beside the state; empty where that is done on a GPU.
+struct BlockWork {
   Array<float> force;        ///< of all blocks
   Array<float> u_before[3];  ///< displacements when the frame began, where a blade may cut [m]
   /// Of all points, filled for those near a sweep while it breaks bonds; null before any did.
   std::unique_ptr<SweptPoint[]> swept;
+  std::vector<std::int32_t> inertial_index;            ///< per node, in ContactInertia; -1 for none
+  std::vector<std::vector<ColliderLoad>> block_loads;  ///< per block, per collider
+  tbb::enumerable_thread_specific<BlockScratch> scratch;
+};
+
+/// The state of the tissue, and how it is worked on.
+struct MpmState : LatticeTissue {
+  Scene scene;
+  AnchorFaces anchors;
+  Blocks blocks;
   std::vector<BlockMotion> motion;    ///< per block; exact as of measure_motion()
   float wildest = 1;                  ///< BlockState's, of all blocks
   double time = 0;                    ///< since the beginning [s]
@@ -89,17 +91,14 @@ struct MpmState {
   Contacts contacts;
   FaceContacts faces;
   std::vector<Collider> colliders;
-  std::vector<std::int32_t> inertial_index;            ///< per node, in ContactInertia; -1 for none
-  std::vector<std::vector<ColliderLoad>> block_loads;  ///< per block, per collider
+  Array<std::uint8_t> whole_bonds;           ///< per point: its bonds before any broke
+  std::vector<FragmentFlight> flights;       ///< pieces that fly
+  std::vector<std::int32_t> flight_of_node;  ///< -1 for none; empty while none flies
 
   const BlockKernels* kernels = nullptr;
   InstructionSet instructions = InstructionSet::kSse2;
   std::unique_ptr<Cpu> cpu;
-  tbb::enumerable_thread_specific<BlockScratch> scratch;
-
-  Array<std::uint8_t> whole_bonds;           ///< per point: its bonds before any broke
-  std::vector<FragmentFlight> flights;       ///< pieces that fly
-  std::vector<std::int32_t> flight_of_node;  ///< -1 for none; empty while none flies
+  BlockWork work;
 };
 
 /// Builds the state of a valid scene at rest. Throws what make_lattice_bodies() throws.

@@ -29,7 +29,7 @@ constexpr float kInfinite = std::numeric_limits<float>::infinity();
 MpmTissue::MpmTissue(const Scene& scene, std::vector<std::string> notes)
     : notes_(std::move(notes)),
       state_(make_mpm_state(scene, &notes_)),
-      pieces_(whole_pieces(state_->bodies, state_->points)) {
+      pieces_(whole_pieces(*state_)) {
   measure_motion(*state_);
   measure_stiffness();
   substep_.follow(*state_, modulus_);
@@ -60,8 +60,8 @@ void MpmTissue::cut(const std::vector<BladePath>& paths, const Array<float>* u_b
   measured_ = false;
   const MpmState& s = *state_;
   take_apart(*state_, changed, [&] {
-    if (!may_have_parted(s.bodies, s.points, s.fields->bonds(), changed)) return;
-    for (const int id : update_pieces(s.bodies, s.points, pieces_)) {
+    if (!may_have_parted(s, changed)) return;
+    for (const int id : update_pieces(s, pieces_)) {
       report.new_fragments.push_back(id);
     }
   });
@@ -79,7 +79,7 @@ void MpmTissue::begin_frame(double duration, const FrameInput& input) {
   }
   if (!s.anchors.moves && !input.anchors.empty()) {
     s.anchors.moves = true;
-    find_held_nodes(s.bodies, s.points, *s.fields, s.nodes, s.anchors);
+    find_held_nodes(s, s.anchors);
   }
   for (const BladePath& path : input.cuts) {
     result_.cut_reports.emplace_back();
@@ -87,7 +87,7 @@ void MpmTissue::begin_frame(double duration, const FrameInput& input) {
   }
   const bool blades = !blade_paths(s.scene, input, 0, 1).empty();
   if (blades) {
-    for (int a = 0; a < 3; ++a) s.u_before[a] = s.nodes.u[a];
+    for (int a = 0; a < 3; ++a) s.work.u_before[a] = s.nodes.u[a];
   }
   const FrameColliders colliders(s.scene, input, duration);
   frame_ = Frame{input, duration, colliders, colliders.reach(), blades, 0, s.motion};
@@ -140,13 +140,13 @@ void MpmTissue::tear(double share) {
   measure_motion(s);
   find_near_colliders(s, frame.reach, frame.duration);
   frame.before = s.motion;
-  for (int a = 0; frame.blades && a < 3; ++a) s.u_before[a] = s.nodes.u[a];
+  for (int a = 0; frame.blades && a < 3; ++a) s.work.u_before[a] = s.nodes.u[a];
 }
 
 void MpmTissue::cut_by_blades(double share) {
   Frame& frame = *frame_;
   const std::vector<BladePath> paths = blade_paths(state_->scene, frame.input, frame.cut_to, share);
-  cut(paths, state_->u_before, frame.before, result_.blade_report);
+  cut(paths, state_->work.u_before, frame.before, result_.blade_report);
   frame.cut_to = share;
 }
 
@@ -154,7 +154,7 @@ void MpmTissue::end_frame() {
   result_.anchor_loads = anchor_loads(state_->anchors, frame_->duration);
   cut_by_blades(1);
   if (result_.tear_report.bonds_broken > 0) {
-    result_.tear_report.new_fragments = update_pieces(state_->bodies, state_->points, pieces_);
+    result_.tear_report.new_fragments = update_pieces(*state_, pieces_);
   }
 }
 
@@ -170,8 +170,7 @@ void MpmTissue::advance(int substeps, float dt, const FrameInput& input) {
 
 bool MpmTissue::settle_wild_crumbs() {
   MpmState& s = *state_;
-  return may_be_wild(s) &&
-         tissue_sim::settle_wild_crumbs(s.bodies, s.points, *s.fields, s.crumbs, s.nodes);
+  return may_be_wild(s) && tissue_sim::settle_wild_crumbs(s, s.crumbs);
 }
 
 bool MpmTissue::tame() {
@@ -182,7 +181,7 @@ bool MpmTissue::tame() {
   tear_threads(s, changed, result_.tear_report);
   if (changed.empty()) return settled;
   take_apart(*state_, changed);
-  for (const int id : update_pieces(state_->bodies, state_->points, pieces_)) {
+  for (const int id : update_pieces(*state_, pieces_)) {
     result_.tear_report.new_fragments.push_back(id);
   }
   return true;
@@ -214,7 +213,7 @@ void MpmTissue::measure(const Read& read) {
   s.cpu->for_each(count, [&](int i) {
     const Block& block = *s.blocks.all[i];
     const BlockField field = block_field(s, block);
-    states[i] = read(block, field, s.scratch.local());
+    states[i] = read(block, field, s.work.scratch.local());
   });
   stiffening_ = even_stiffening(s, 1);
   modulus_.assign(count, 0.0f);

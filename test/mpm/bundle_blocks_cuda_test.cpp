@@ -12,10 +12,8 @@ namespace tissue_sim {
 namespace {
 
 /// A body on its lattice, and the blocks that it is divided into.
-struct Divided {
+struct Divided : LatticeTissue {
   Scene scene;
-  Points points;
-  std::vector<LatticeBody> bodies;
 
   explicit Divided(Shape shape, const Vec3& size = Vec3(0.021, 0.017, 0.012)) {
     scene.cell_size = 0.001;
@@ -26,16 +24,15 @@ struct Divided {
     body.radii = Vec3(0.016, 0.011, 0.0075);
     std::vector<std::string> notes;
     bodies = make_lattice_bodies(scene, points, &notes, NodeRange::kBox);
+    fields = std::make_unique<NodeFields>(bodies, points, nodes);
   }
   std::vector<BlockToBundle> blocks(int x, int y, int z) {
-    Nodes nodes;
-    const NodeFields fields(bodies, points, nodes);
     Cpu cpu(1);
     BlockShape of;
     of.x = x, of.y = y, of.z = z;
     of.uniform = true;
     of.has_rows = false;
-    const Blocks all = make_blocks(bodies, points, fields, of, cpu);
+    const Blocks all = make_blocks(*this, of, cpu);
     return blocks_to_bundle(all.all);
   }
 };

@@ -166,8 +166,10 @@ TEST_F(CutOnGpu, LabelsAreThoseOfTheCpu) {
   scene.bodies[1].shape = Shape::kEllipsoid;
   scene.bodies[1].radii = Vec3(0.012, 0.01, 0.015);
   scene.bodies[1].pose.position = Vec3(0.1, 0, 0);
-  Points points;
-  const std::vector<LatticeBody> bodies = make_lattice_bodies(scene, points, nullptr);
+  LatticeTissue tissue;
+  Points& points = tissue.points;
+  tissue.bodies = make_lattice_bodies(scene, points, nullptr);
+  const std::vector<LatticeBody>& bodies = tissue.bodies;
   std::vector<std::int32_t> point_at;
   std::vector<int> first;
   for (const LatticeBody& b : bodies) {
@@ -186,7 +188,7 @@ TEST_F(CutOnGpu, LabelsAreThoseOfTheCpu) {
     const LatticeBody& b = bodies[i];
     rows.push_back({sites.data() + first[i], first[i + 1] - first[i], 2 * b.nx, 4 * b.nx * b.ny});
   }
-  Pieces on_cpu = whole_pieces(bodies, points), on_gpu = on_cpu;
+  Pieces on_cpu = whole_pieces(tissue), on_gpu = on_cpu;
   PieceLabels labels;
   std::vector<std::int32_t> lowest;
   for (const int id : on_gpu.of_point) lowest.push_back(on_gpu.lowest[id]);
@@ -202,7 +204,7 @@ TEST_F(CutOnGpu, LabelsAreThoseOfTheCpu) {
       break_bond(kForwardBond + axis, points.bonds[p], points.bonds[q]);
     }
     bonds.upload(points.bonds, nullptr);
-    const std::vector<int> fresh = update_pieces(bodies, points, on_cpu);
+    const std::vector<int> fresh = update_pieces(tissue, on_cpu);
     EXPECT_EQ(fresh, part_pieces(points.volume.data(), labels.update(rows, bonds.data(), nullptr),
                                  on_gpu));
     ASSERT_EQ(on_cpu.of_point, on_gpu.of_point) << "round " << round;

@@ -31,7 +31,7 @@ struct Sizes {
     splits = s.fields->split_count();
     blocks = s.blocks.all.size();
     pieces = tissue.fragments().size();
-    force = s.force.size();
+    force = s.work.force.size();
     rows = s.blocks.row_parts.size();
   }
   bool operator==(const Sizes& o) const {

@@ -97,6 +97,13 @@ void expect_right(const Points& points, const std::vector<std::int32_t>& compone
   }
 }
 
+LatticeTissue whole_tissue(const Scene& scene) {
+  LatticeTissue tissue;
+  tissue.bodies = make_lattice_bodies(scene, tissue.points, nullptr);
+  tissue.fields = std::make_unique<NodeFields>(tissue.bodies, tissue.points, tissue.nodes);
+  return tissue;
+}
+
 TEST(Pieces, AreWhatAWalkOverTheBondsFinds) {
   for (const bool anchored : {false, true}) {
     Scene scene = free_box(Vec3(0.03, 0.024, 0.02), 0.002);
@@ -105,10 +112,10 @@ TEST(Pieces, AreWhatAWalkOverTheBondsFinds) {
       below.z = 0.005;
       scene.bodies[0].anchors = {below};
     }
-    Points points;
-    const std::vector<LatticeBody> bodies = make_lattice_bodies(scene, points, nullptr);
-    const LatticeBody& body = bodies[0];
-    Pieces pieces = whole_pieces(bodies, points);
+    LatticeTissue tissue = whole_tissue(scene);
+    Points& points = tissue.points;
+    const LatticeBody& body = tissue.bodies[0];
+    Pieces pieces = whole_pieces(tissue);
     expect_right(points, walk_bonds(body, points), pieces, pieces, {});
     std::mt19937 random(3);
     const auto upto = [&](int n) { return static_cast<int>(random() % n); };
@@ -128,7 +135,7 @@ TEST(Pieces, AreWhatAWalkOverTheBondsFinds) {
       }
       cut_out(body, points, low, high);
       const Pieces before = pieces;
-      const std::vector<int> fresh = update_pieces(bodies, points, pieces);
+      const std::vector<int> fresh = update_pieces(tissue, pieces);
       crumbs += static_cast<int>(fresh.size());
       expect_right(points, walk_bonds(body, points), before, pieces, fresh);
       if (HasFatalFailure()) FAIL() << "cut " << cut;
@@ -142,11 +149,10 @@ TEST(Pieces, AreWhatAWalkOverTheBondsFinds) {
 
 /// Single bonds break at random until all has come to bits.
 TEST(Pieces, ComeApartOnlyWhereTheyMay) {
-  Points points;
-  const std::vector<LatticeBody> bodies =
-      make_lattice_bodies(free_box(Vec3(0.02, 0.016, 0.012), 0.002), points, nullptr);
-  Pieces pieces = whole_pieces(bodies, points);
-  BondWindows bonds(bodies, points);
+  LatticeTissue tissue = whole_tissue(free_box(Vec3(0.02, 0.016, 0.012), 0.002));
+  Points& points = tissue.points;
+  Pieces pieces = whole_pieces(tissue);
+  Cpu cpu(1);
   std::mt19937 random(5);
   int may = 0, parted = 0, rounds = 0;
   for (; pieces.all.size() < 500; ++rounds) {
@@ -155,14 +161,14 @@ TEST(Pieces, ComeApartOnlyWhereTheyMay) {
       const auto p = static_cast<std::int32_t>(random() % points.size());
       const int k = kForwardBond + static_cast<int>(random() % 3);
       if ((points.bonds[p] >> k & 1) == 0) continue;
-      const std::int32_t q = bodies[0].next_point(points.site[p], k - kForwardBond);
+      const std::int32_t q = tissue.bodies[0].next_point(points.site[p], k - kForwardBond);
       break_bond(k, points.bonds[p], points.bonds[q]);
       changed.push_back(p);
       changed.push_back(q);
     }
-    bonds.update(points, changed);
-    const bool may_have = may_have_parted(bodies, points, bonds, changed);
-    const bool have = !update_pieces(bodies, points, pieces).empty();
+    tissue.fields->update(tissue.bodies, points, changed, tissue.nodes, cpu);
+    const bool may_have = may_have_parted(tissue, changed);
+    const bool have = !update_pieces(tissue, pieces).empty();
     EXPECT_TRUE(may_have || !have) << "round " << rounds;
     may += may_have;
     parted += have;

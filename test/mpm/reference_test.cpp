@@ -36,8 +36,8 @@ Scene scene_of(const Case& c, Shape shape) {
 }
 
 void make_uniform_blocks(MpmState& s) {
-  s.blocks = make_blocks(s.bodies, s.points, *s.fields, {16, 4, 4, true}, *s.cpu);
-  s.force.resize(s.blocks.force_size);
+  s.blocks = make_blocks(s, {16, 4, 4, true}, *s.cpu);
+  s.work.force.resize(s.blocks.force_size);
   s.contacts.touching.assign(s.blocks.all.size(), {});
   s.contacts.near.assign(s.blocks.all.size(), {});
   list_facets(s);

@@ -250,17 +250,16 @@ RigidMotion motion_of(const Pose& pose, const Vec3& origin) {
 
 }  // namespace
 
-void find_face_links(const Scene& scene, const std::vector<LatticeBody>& bodies,
-                     const Points& points, AnchorFaces& faces) {
+void find_face_links(const Scene& scene, const LatticeTissue& tissue, AnchorFaces& faces) {
   int first_anchor = 0;
-  for (std::size_t i = 0; i < bodies.size(); ++i) {
-    const LatticeBody& b = bodies[i];
+  for (std::size_t i = 0; i < tissue.bodies.size(); ++i) {
+    const LatticeBody& b = tissue.bodies[i];
     faces.first_of_body.push_back(first_anchor);
     if (b.body.anchors.empty()) continue;
     for (const Anchor& a : b.body.anchors) faces.origin.push_back(a.origin());
     b.for_each_node([&](int, int x, int y, int z) {
       for (int axis = 0; axis < 3; ++axis) {
-        add_links(bodies, static_cast<int>(i), first_anchor, {x, y, z}, axis, faces);
+        add_links(tissue.bodies, static_cast<int>(i), first_anchor, {x, y, z}, axis, faces);
       }
     });
     std::vector<int> holds(b.body.anchors.size(), 0);
@@ -268,8 +267,8 @@ void find_face_links(const Scene& scene, const std::vector<LatticeBody>& bodies,
       if (link.body == static_cast<int>(i)) ++holds[link.anchor - first_anchor];
     }
     for (int p = b.first_point; p < b.first_point + b.point_count; ++p) {
-      if (points.anchored[p] != Points::kInAnchor) continue;
-      const Points::Site& s = points.site[p];
+      if (tissue.points.anchored[p] != Points::kInAnchor) continue;
+      const Points::Site& s = tissue.points.site[p];
       const Vec3 x = b.site_position(s.x, s.y, s.z);
       for (std::size_t a = 0; a < holds.size(); ++a) holds[a] += b.body.anchors[a].contains(x);
     }
@@ -286,14 +285,14 @@ void find_face_links(const Scene& scene, const std::vector<LatticeBody>& bodies,
   faces.now.resize(faces.origin.size());
 }
 
-void find_face_rows(const std::vector<LatticeBody>& bodies, const Points& points,
-                    const NodeFields& fields, const Nodes& nodes, AnchorFaces& faces) {
+void find_face_rows(const LatticeTissue& tissue, AnchorFaces& faces) {
   if (faces.links.empty()) return;
   const std::vector<FaceRow> old_rows = std::move(faces.rows);
   const std::vector<std::array<double, 3>> old_impulse = std::move(faces.impulse);
   faces.rows.clear();
   for (const FaceLink& link : faces.links) {
-    add_rows(bodies[link.body], points, fields, nodes, link, faces.rows);
+    add_rows(tissue.bodies[link.body], tissue.points, *tissue.fields, tissue.nodes, link,
+             faces.rows);
   }
   make_groups(faces);
   faces.impulse.assign(faces.rows.size(), {});
@@ -311,20 +310,19 @@ void find_face_rows(const std::vector<LatticeBody>& bodies, const Points& points
   }
 }
 
-void find_held_nodes(const std::vector<LatticeBody>& bodies, const Points& points,
-                     const NodeFields& fields, const Nodes& nodes, AnchorFaces& faces) {
+void find_held_nodes(const LatticeTissue& tissue, AnchorFaces& faces) {
   faces.held.clear();
-  std::vector<std::uint8_t> seen(nodes.size(), 0);
-  for (std::size_t i = 0; i < bodies.size(); ++i) {
-    const LatticeBody& b = bodies[i];
+  std::vector<std::uint8_t> seen(tissue.nodes.size(), 0);
+  for (std::size_t i = 0; i < tissue.bodies.size(); ++i) {
+    const LatticeBody& b = tissue.bodies[i];
     if (b.body.anchors.empty()) continue;
     for (int p = b.first_point; p < b.first_point + b.point_count; ++p) {
-      if (points.anchored[p] != Points::kInAnchor) continue;
-      const Points::Site& s = points.site[p];
+      if (tissue.points.anchored[p] != Points::kInAnchor) continue;
+      const Points::Site& s = tissue.points.site[p];
       const int anchor = anchor_at(b.body.anchors, b.site_position(s.x, s.y, s.z));
       for (int k = 0; k < 27; ++k) {
-        const int node = fields.node(b, s, k);
-        if (nodes.inv_mass[node] != 0 || seen[node] != 0) continue;
+        const int node = tissue.fields->node(b, s, k);
+        if (tissue.nodes.inv_mass[node] != 0 || seen[node] != 0) continue;
         seen[node] = 1;
         const Vec3 x =
             b.node_position(s.x / 2 + k % 3 - 1, s.y / 2 + k / 3 % 3 - 1, s.z / 2 + k / 9 - 1);

@@ -16,9 +16,7 @@
 #include <vector>
 
 #include "compute/for_each.h"
-#include "mpm/lattice/lattice_body.h"
-#include "mpm/lattice/nodes.h"
-#include "mpm/split/node_fields.h"
+#include "mpm/lattice_tissue.h"
 #include "tissue_sim/tissue.h"
 
 namespace tissue_sim {
@@ -87,14 +85,11 @@ struct AnchorFaces {
 /// Finds where the faces are, of bodies that are whole, and which points they touch
 /// (AnchorFaces::points). Throws std::invalid_argument for an anchor that neither holds points nor
 /// has a face at its body.
-void find_face_links(const Scene& scene, const std::vector<LatticeBody>& bodies,
-                     const Points& points, AnchorFaces& faces);
+void find_face_links(const Scene& scene, const LatticeTissue& tissue, AnchorFaces& faces);
 /// Makes the rows anew: at the beginning, and after nodes were split.
-void find_face_rows(const std::vector<LatticeBody>& bodies, const Points& points,
-                    const NodeFields& fields, const Nodes& nodes, AnchorFaces& faces);
+void find_face_rows(const LatticeTissue& tissue, AnchorFaces& faces);
 /// Finds AnchorFaces::held: before any anchor moves, and after nodes were split.
-void find_held_nodes(const std::vector<LatticeBody>& bodies, const Points& points,
-                     const NodeFields& fields, const Nodes& nodes, AnchorFaces& faces);
+void find_held_nodes(const LatticeTissue& tissue, AnchorFaces& faces);
 
 /// Where the anchors are at the share (0 to 1) of a frame; empty where none moves in it.
 std::vector<RigidMotion> anchors_at(const AnchorFaces& faces, const FrameInput& input,

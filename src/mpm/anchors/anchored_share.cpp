@@ -113,14 +113,14 @@ OutsideShare share_outside(const std::vector<Anchor>& anchors, const Vec3& cente
   return result;
 }
 
-void find_free_volumes(const std::vector<LatticeBody>& bodies, Points& points) {
-  const bool any = std::any_of(bodies.begin(), bodies.end(),
+void find_free_volumes(LatticeTissue& tissue) {
+  const bool any = std::any_of(tissue.bodies.begin(), tissue.bodies.end(),
                                [](const LatticeBody& b) { return !b.body.anchors.empty(); });
   if (!any) return;
-  points.free_volume.assign(points.size(), 0.0f);
-  for (const LatticeBody& b : bodies) {
+  tissue.points.free_volume.assign(tissue.points.size(), 0.0f);
+  for (const LatticeBody& b : tissue.bodies) {
     for (int p = b.first_point; p < b.first_point + b.point_count; ++p) {
-      const Points::Site& s = points.site[p];
+      const Points::Site& s = tissue.points.site[p];
       const OutsideShare o =
           share_outside(b.body.anchors, b.site_position(s.x, s.y, s.z), b.cell_size / 2);
       if (o.share < kSmallest) continue;
@@ -136,7 +136,8 @@ void find_free_volumes(const std::vector<LatticeBody>& bodies, Points& points) {
         }
         if (weight == 0) continue;
         const int other = b.point(to[0], to[1], to[2]);
-        points.free_volume[other < 0 ? p : other] += static_cast<float>(weight) * points.volume[p];
+        tissue.points.free_volume[other < 0 ? p : other] +=
+            static_cast<float>(weight) * tissue.points.volume[p];
       }
     }
   }

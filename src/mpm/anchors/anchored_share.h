@@ -1,7 +1,7 @@
 // How much of each point's volume lies outside its body's anchors: tissue inside is rigid.
 #pragma once
 
-#include "mpm/lattice/lattice_body.h"
+#include "mpm/lattice_tissue.h"
 
 namespace tissue_sim {
 
@@ -21,6 +21,6 @@ inline constexpr double kShift = 1.6;
 
 /// Fills Points::free_volume: of each point the volume outside the anchors, some of it shared with
 /// its neighbours. Empty where no body has anchors.
-void find_free_volumes(const std::vector<LatticeBody>& bodies, Points& points);
+void find_free_volumes(LatticeTissue& tissue);
 
 }  // namespace tissue_sim

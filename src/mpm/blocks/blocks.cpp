@@ -115,35 +115,34 @@ struct NewRegion {
 };
 
 /// Makes their blocks, without facets.
-void fill_regions(Blocks& blocks, std::vector<NewRegion>& anew,
-                  const std::vector<LatticeBody>& bodies, const Points& points,
-                  const NodeFields& fields, Cpu& cpu) {
+void fill_regions(Blocks& blocks, std::vector<NewRegion>& anew, const LatticeTissue& tissue,
+                  Cpu& cpu) {
   cpu.for_each(static_cast<int>(anew.size()), [&](int i) {
     NewRegion& of = anew[i];
     BlockRegion& r = blocks.regions[of.index];
     if (of.known == nullptr) {
-      of.known = r.blocks.empty()
-                     ? std::make_shared<const KnownFacets>()
-                     : std::make_shared<const KnownFacets>(bodies[r.body], r, blocks.stale_facets);
+      of.known = r.blocks.empty() ? std::make_shared<const KnownFacets>()
+                                  : std::make_shared<const KnownFacets>(tissue.bodies[r.body], r,
+                                                                        blocks.stale_facets);
     }
-    fill_region(r, bodies, points, fields, blocks.uniform);
+    fill_region(r, tissue, blocks.uniform);
   });
 }
 
 /// Block by block their facets; meanwhile connects the forces of all blocks.
-void finish_regions(Blocks& blocks, const std::vector<NewRegion>& anew,
-                    const std::vector<LatticeBody>& bodies, const Points& points, int node_count,
-                    Cpu& cpu) {
+void finish_regions(Blocks& blocks, const std::vector<NewRegion>& anew, const LatticeTissue& tissue,
+                    int node_count, Cpu& cpu) {
   std::vector<std::pair<Block*, const KnownFacets*>> made;
   for (const NewRegion& r : anew) {
     for (Block& b : blocks.regions[r.index].blocks) made.emplace_back(&b, r.known.get());
   }
-  cpu.both([&] { connect_forces(blocks, bodies, node_count); },
+  cpu.both([&] { connect_forces(blocks, tissue.bodies, node_count); },
            [&] {
              cpu.for_each(static_cast<int>(made.size()), [&](int i) {
                Block& b = *made[i].first;
-               b.facets = facets_of(bodies[b.body], points, b, *made[i].second);
-               if (!points.outer.empty()) b.surface = surface_places_of(bodies[b.body], points, b);
+               b.facets = facets_of(tissue.bodies[b.body], tissue.points, b, *made[i].second);
+               if (!tissue.points.outer.empty())
+                 b.surface = surface_places_of(tissue.bodies[b.body], tissue.points, b);
              });
            });
 }
@@ -211,14 +210,13 @@ std::vector<NewRegion> halve_regions(Blocks& blocks, std::vector<NewRegion>& ane
 
 }  // namespace
 
-Blocks make_blocks(const std::vector<LatticeBody>& bodies, const Points& points,
-                   const NodeFields& fields, const BlockShape& shape, Cpu& cpu) {
+Blocks make_blocks(const LatticeTissue& tissue, const BlockShape& shape, Cpu& cpu) {
   Blocks blocks;
   blocks.uniform = shape.uniform;
   blocks.has_rows = shape.has_rows;
   blocks.room = shape.room;
-  for (std::size_t i = 0; i < bodies.size(); ++i) {
-    const LatticeBody& b = bodies[i];
+  for (std::size_t i = 0; i < tissue.bodies.size(); ++i) {
+    const LatticeBody& b = tissue.bodies[i];
     for (int z = 0; z < b.nz; z += shape.z) {
       for (int y = 0; y < b.ny; y += shape.y) {
         const int ny = std::min(shape.y, b.ny - y), nz = std::min(shape.z, b.nz - z);
@@ -232,14 +230,13 @@ Blocks make_blocks(const std::vector<LatticeBody>& bodies, const Points& points,
   for (std::size_t i = 0; i < blocks.regions.size(); ++i) {
     all.push_back({static_cast<int>(i), nullptr});
   }
-  fill_regions(blocks, all, bodies, points, fields, cpu);
-  finish_regions(blocks, all, bodies, points, lattice_node_count(bodies), cpu);
+  fill_regions(blocks, all, tissue, cpu);
+  finish_regions(blocks, all, tissue, lattice_node_count(tissue.bodies), cpu);
   return blocks;
 }
 
-void update_blocks(Blocks& blocks, const std::vector<LatticeBody>& bodies, const Points& points,
-                   const NodeFields& fields, const std::vector<NodeFields::Cell>& cells,
-                   int node_count, Cpu& cpu) {
+void update_blocks(Blocks& blocks, const LatticeTissue& tissue,
+                   const std::vector<NodeFields::Cell>& cells, Cpu& cpu) {
   const auto touched = [&cells](const BlockRegion& r) {
     return std::any_of(cells.begin(), cells.end(), [&r](const NodeFields::Cell& c) {
       return c.body == r.body && c.x >= r.x - 1 && c.x <= r.x + r.nx && c.y >= r.y - 1 &&
@@ -255,15 +252,15 @@ void update_blocks(Blocks& blocks, const std::vector<LatticeBody>& bodies, const
   for (std::size_t i = 0; i < blocks.regions.size(); ++i) {
     if (touched(blocks.regions[i])) anew.push_back({static_cast<int>(i), nullptr});
   }
-  fill_regions(blocks, anew, bodies, points, fields, cpu);
+  fill_regions(blocks, anew, tissue, cpu);
   std::vector<NewRegion> unfilled = halve_regions(blocks, anew, before);
-  fill_regions(blocks, unfilled, bodies, points, fields, cpu);
-  finish_regions(blocks, anew, bodies, points, node_count, cpu);
+  fill_regions(blocks, unfilled, tissue, cpu);
+  finish_regions(blocks, anew, tissue, static_cast<int>(tissue.nodes.size()), cpu);
   std::vector<std::uint8_t> is_new(blocks.regions.size(), 0);
   for (const NewRegion& of : anew) {
     is_new[of.index] = 1;
     const BlockRegion& r = blocks.regions[of.index];
-    const LatticeBody& b = bodies[r.body];
+    const LatticeBody& b = tissue.bodies[r.body];
     for (int z = r.z; z < r.z + r.nz; ++z) {
       for (int y = r.y; y < r.y + r.ny; ++y) {
         b.for_each_node_in_row(r.x, r.x + r.nx, y, z, [&](int, int first, int count) {

@@ -6,8 +6,7 @@
 #include <vector>
 
 #include "mpm/blocks/block.h"
-#include "mpm/lattice/lattice_body.h"
-#include "mpm/split/node_fields.h"
+#include "mpm/lattice_tissue.h"
 
 namespace tissue_sim {
 
@@ -72,13 +71,11 @@ struct BlockShape {
 };
 
 /// Cuts the bodies' lattices into regions and makes their blocks.
-Blocks make_blocks(const std::vector<LatticeBody>& bodies, const Points& points,
-                   const NodeFields& fields, const BlockShape& shape, Cpu& cpu);
+Blocks make_blocks(const LatticeTissue& tissue, const BlockShape& shape, Cpu& cpu);
 
 /// Makes the blocks anew of the regions that one of the `cells` touches, after their nodes' fields
-/// changed; `node_count` is the new number of nodes.
-void update_blocks(Blocks& blocks, const std::vector<LatticeBody>& bodies, const Points& points,
-                   const NodeFields& fields, const std::vector<NodeFields::Cell>& cells,
-                   int node_count, Cpu& cpu);
+/// changed.
+void update_blocks(Blocks& blocks, const LatticeTissue& tissue,
+                   const std::vector<NodeFields::Cell>& cells, Cpu& cpu);
 
 }  // namespace tissue_sim

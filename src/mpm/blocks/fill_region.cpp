@@ -249,10 +249,9 @@ std::vector<Sheet> by_material(const Sheet& sheet, const LatticeBody& b, const P
 
 }  // namespace
 
-void fill_region(BlockRegion& r, const std::vector<LatticeBody>& bodies, const Points& points,
-                 const NodeFields& fields, bool uniform) {
+void fill_region(BlockRegion& r, const LatticeTissue& tissue, bool uniform) {
   r.blocks.clear();
-  const LatticeBody& b = bodies[r.body];
+  const LatticeBody& b = tissue.bodies[r.body];
   std::vector<std::vector<Part>> together;
   const auto add = [&](const Sheet& sheet) {
     if (sheet.cells.empty()) return;
@@ -266,17 +265,17 @@ void fill_region(BlockRegion& r, const std::vector<LatticeBody>& bodies, const P
       together.push_back({part});
     }
   };
-  std::vector<Sheet> sheets = sheets_of(r, b, points, fields);
+  std::vector<Sheet> sheets = sheets_of(r, b, tissue.points, *tissue.fields);
   if (uniform && b.materials.size() > 1) {
     std::vector<Sheet> of_one;
     for (const Sheet& sheet : sheets) {
-      for (Sheet& part : by_material(sheet, b, points)) of_one.push_back(std::move(part));
+      for (Sheet& part : by_material(sheet, b, tissue.points)) of_one.push_back(std::move(part));
     }
     sheets = std::move(of_one);
   }
   for (const Sheet& sheet : sheets) add(sheet);
   for (const std::vector<Part>& parts : together) {
-    r.blocks.push_back(make_block(r, b, points, parts));
+    r.blocks.push_back(make_block(r, b, tissue.points, parts));
   }
 }
 

@@ -9,7 +9,6 @@ inline constexpr int kGap = 2;  ///< cells: a new run costs about as much as so 
 
 /// Makes the region's blocks, without facets: one for the sides of cuts that reach from the same
 /// z-plane to the same, or with `uniform` one for each side and material.
-void fill_region(BlockRegion& r, const std::vector<LatticeBody>& bodies, const Points& points,
-                 const NodeFields& fields, bool uniform);
+void fill_region(BlockRegion& r, const LatticeTissue& tissue, bool uniform);
 
 }  // namespace tissue_sim

@@ -154,7 +154,7 @@ void list_near_cells(MpmState& state, int index, float dt) {
   if (state.contacts.near[index].empty()) return;
   const Block& block = *state.blocks.all[index];
   const LatticeBody& body = state.bodies[block.body];
-  BlockScratch& scratch = state.scratch.local();
+  BlockScratch& scratch = state.work.scratch.local();
   const std::size_t lanes = block.lane_count();
   if (scratch.values.size() < 3 * lanes) scratch.values.resize(3 * lanes);
   if (scratch.lanes.size() < lanes) scratch.lanes.resize(lanes);

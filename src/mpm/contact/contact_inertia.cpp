@@ -83,7 +83,7 @@ void change_inertia(MpmState& state) {
         const float weight = std::fabs(w.of[k % 3] * w.of[3 + k / 3 % 3] * w.of[6 + k / 9]);
         const std::int32_t node = cell.row(k / 3 % 3, k / 9)[k % 3];
         if (weight < kNegligible || node < 0 || nodes.inv_mass[node] == 0) continue;
-        std::int32_t& index = state.inertial_index[node];
+        std::int32_t& index = state.work.inertial_index[node];
         if (index < 0) {
           index = static_cast<std::int32_t>(inertia.nodes.size());
           InertialNode n{};
@@ -167,7 +167,7 @@ void add_inertial_loads(const MpmState& state, float kick, std::vector<ColliderL
 
 void tidy_inertia(MpmState& state, bool all) {
   ContactInertia& inertia = state.contacts.inertia;
-  for (const InertialNode& n : inertia.nodes) state.inertial_index[n.node] = -1;
+  for (const InertialNode& n : inertia.nodes) state.work.inertial_index[n.node] = -1;
   if (all) {
     inertia.nodes.clear();
     for (auto& touches : state.contacts.touching) {
@@ -181,9 +181,9 @@ void tidy_inertia(MpmState& state, bool all) {
 }
 
 void index_inertia(MpmState& state) {
-  state.inertial_index.resize(state.nodes.size(), -1);
+  state.work.inertial_index.resize(state.nodes.size(), -1);
   for (std::size_t i = 0; i < state.contacts.inertia.nodes.size(); ++i) {
-    state.inertial_index[state.contacts.inertia.nodes[i].node] = static_cast<std::int32_t>(i);
+    state.work.inertial_index[state.contacts.inertia.nodes[i].node] = static_cast<std::int32_t>(i);
   }
 }
 

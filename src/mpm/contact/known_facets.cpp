@@ -45,13 +45,13 @@ void KnownFacets::take(int x, int y, int z, const std::int32_t (&around)[8], int
   }
 }
 
-void mark_stale_facets(const std::vector<LatticeBody>& bodies, const Points& points,
-                       const std::vector<std::int32_t>& changed, std::vector<std::uint8_t>& stale) {
+void mark_stale_facets(const LatticeTissue& tissue, const std::vector<std::int32_t>& changed,
+                       std::vector<std::uint8_t>& stale) {
   // A facet is fitted to bonds up to two cells away, and what is bound within two cells decides
   // which of a cell's points are in one block.
   constexpr int kReach = 2;
-  for (const LatticeBody& body : bodies) {
-    const CellsAround cells(body, kReach, points, changed);
+  for (const LatticeBody& body : tissue.bodies) {
+    const CellsAround cells(body, kReach, tissue.points, changed);
     cells.for_each_row([&](int, int, int, int node, const std::uint8_t* near, int count) {
       for (int i = 0; i < count; ++i) stale[node + i] |= near[i];
     });

@@ -6,7 +6,7 @@
 
 #include "mpm/blocks/blocks.h"
 #include "mpm/contact/facets.h"
-#include "mpm/lattice/lattice_body.h"
+#include "mpm/lattice_tissue.h"
 
 namespace tissue_sim {
 
@@ -42,7 +42,7 @@ class KnownFacets {
 
 /// Marks the cells (per lattice node) whose facets may change where the points `changed` lost
 /// bonds.
-void mark_stale_facets(const std::vector<LatticeBody>& bodies, const Points& points,
-                       const std::vector<std::int32_t>& changed, std::vector<std::uint8_t>& stale);
+void mark_stale_facets(const LatticeTissue& tissue, const std::vector<std::int32_t>& changed,
+                       std::vector<std::uint8_t>& stale);
 
 }  // namespace tissue_sim

@@ -19,18 +19,17 @@ Vec3 direction_of(int bond) {
 
 }  // namespace
 
-std::vector<OuterPlace> find_outer_places(const std::vector<LatticeBody>& bodies,
-                                          const Points& points) {
+std::vector<OuterPlace> find_outer_places(const LatticeTissue& tissue) {
   std::vector<OuterPlace> places;
-  for (const LatticeBody& b : bodies) {
+  for (const LatticeBody& b : tissue.bodies) {
     const double edge = b.cell_size / 2;
     const NearestSurface surface(b.body, 2 * edge);
     for (int p = b.first_point; p < b.first_point + b.point_count; ++p) {
-      if (points.bonds[p] == kAllBonds) continue;
-      const Points::Site& s = points.site[p];
+      if (tissue.points.bonds[p] == kAllBonds) continue;
+      const Points::Site& s = tissue.points.site[p];
       const Vec3 middle = b.node_position(s.x / 2, s.y / 2, s.z / 2);
       for (int k = 0; k < kBondCount; ++k) {
-        if ((points.bonds[p] >> k & 1) != 0) continue;
+        if ((tissue.points.bonds[p] >> k & 1) != 0) continue;
         const Vec3 out = direction_of(k), side = b.site_position(s.x, s.y, s.z) + edge / 2 * out;
         SurfacePoint found;
         const bool any = surface.find(side, out, found);

@@ -11,15 +11,14 @@
 #include <vector>
 
 #include "mpm/contact/surface_place.h"
-#include "mpm/lattice/lattice_body.h"
+#include "mpm/lattice_tissue.h"
 
 namespace tissue_sim {
 
 struct Block;
 
 /// Of all bodies, while they are whole: by point, then bond. Throws what NearestSurface throws.
-std::vector<OuterPlace> find_outer_places(const std::vector<LatticeBody>& bodies,
-                                          const Points& points);
+std::vector<OuterPlace> find_outer_places(const LatticeTissue& tissue);
 
 /// Those of a block, in the order of cells and keys; those of cuts among them.
 std::vector<SurfacePlace> surface_places_of(const LatticeBody& body, const Points& points,

@@ -120,9 +120,8 @@ bool CudaMpmTissue::take_apart(const std::vector<std::int32_t>& changed) {
   pull_contacts();
   const auto known = static_cast<std::int32_t>(state_->nodes.size());
   bool may_part = false;
-  const Apart apart = tissue_sim::take_apart(*state_, changed, [&] {
-    may_part = may_have_parted(state_->bodies, state_->points, state_->fields->bonds(), changed);
-  });
+  const Apart apart = tissue_sim::take_apart(*state_, changed,
+                                             [&] { may_part = may_have_parted(*state_, changed); });
   for (auto n = known; n < static_cast<std::int32_t>(state_->nodes.size()); ++n) nodes.push_back(n);
   push_some(nodes);
   push_points(changed);

@@ -77,7 +77,7 @@ CudaMpmTissue::CudaMpmTissue(const Scene& scene, std::vector<std::string> notes)
   make_blocks(
       state_->bodies.size() > 1 ? d.cut_shape : choose_shape(state_->bodies, d.limits, true),
       d.limits.processors);
-  pieces_ = whole_pieces(state_->bodies, state_->points);
+  pieces_ = whole_pieces(*state_);
   push();
   launch_measure();
   finish_measure();

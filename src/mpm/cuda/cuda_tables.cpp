@@ -201,8 +201,7 @@ void CudaMpmTissue::make_blocks(const CudaShape& shape, int room) {
   d.shape.blocks.uniform = true;
   d.shape.blocks.has_rows = false;
   d.shape.blocks.room = room;
-  state_->blocks = tissue_sim::make_blocks(state_->bodies, state_->points, *state_->fields,
-                                           d.shape.blocks, *state_->cpu);
+  state_->blocks = tissue_sim::make_blocks(*state_, d.shape.blocks, *state_->cpu);
   // Where there are more, the first cuts take what is left.
   constexpr double kFewRegions = 0.8;
   if (static_cast<double>(state_->blocks.regions.size()) > kFewRegions * room) {

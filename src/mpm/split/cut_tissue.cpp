@@ -39,33 +39,32 @@ Apart take_apart(MpmState& state, const std::vector<std::int32_t>& changed,
         cells = state.fields->update(state.bodies, state.points, changed, state.nodes, *state.cpu);
       },
       [&] {
-        softened = soften(state.bodies, changed, state.points);
+        softened = soften(state, changed);
         state.blocks.stale_facets.resize(lattice_node_count(state.bodies), 0);
-        mark_stale_facets(state.bodies, state.points, changed, state.blocks.stale_facets);
+        mark_stale_facets(state, changed, state.blocks.stale_facets);
       });
   for (const std::int32_t p : softened.points) {  // blocks must know
     const Points::Site& s = state.points.site[p];
     cells.push_back({s.body, s.x / 2, s.y / 2, s.z / 2});
   }
-  settle_crumbs(state.bodies, state.points, *state.fields, softened.crumbs, state.nodes);
+  settle_crumbs(state, softened.crumbs);
   state.crumbs.insert(softened.crumbs.begin(), softened.crumbs.end());
   if (!state.points.free_volume.empty() && !cells.empty()) {
-    find_face_rows(state.bodies, state.points, *state.fields, state.nodes, state.anchors);
+    find_face_rows(state, state.anchors);
     if (state.anchors.moves) {
-      find_held_nodes(state.bodies, state.points, *state.fields, state.nodes, state.anchors);
+      find_held_nodes(state, state.anchors);
     }
   }
   state.cpu->both(
       [&] {
         if (cells.empty()) return;
         keep_face_contacts(state);
-        update_blocks(state.blocks, state.bodies, state.points, *state.fields, cells,
-                      static_cast<int>(state.nodes.size()), *state.cpu);
+        update_blocks(state.blocks, state, cells, *state.cpu);
         state.cpu->both(
             [&] {
-              if (!state.blocks.has_rows) return;  // on a GPU
-              state.force.clear();                 // not to be moved to new room
-              state.force.resize(state.blocks.force_size);
+              if (state.work.force.empty()) return;  // blocks are not worked on here
+              state.work.force.clear();              // not to be moved to new room
+              state.work.force.resize(state.blocks.force_size);
             },
             [&] {
               bound_motion(state);

@@ -52,7 +52,7 @@ class Sweep {
       known_.assign(state_.points.size(), 0);
       if (edges_.size() <= kNotedEdges) outside_.assign(edges_.size(), known_);
       // Without values: it is large, and most points are not near.
-      if (!state_.swept) state_.swept.reset(new SweptPoint[state_.points.size()]);
+      if (!state_.work.swept) state_.work.swept.reset(new SweptPoint[state_.points.size()]);
     }
     return static_cast<int>(passed_.size());
   }
@@ -61,7 +61,7 @@ class Sweep {
   void read_places(int i) {
     PassedBlock& passed = passed_[i];
     const Block& block = *passed.block;
-    BlockScratch& scratch = state_.scratch.local();
+    BlockScratch& scratch = state_.work.scratch.local();
     const std::size_t lanes = block.lane_count();
     if (scratch.values.size() < 6 * lanes) scratch.values.resize(6 * lanes);
     if (scratch.near.size() < lanes) scratch.near.resize(lanes);
@@ -93,7 +93,7 @@ class Sweep {
         }
         if ((known & kBrought) != 0 || (alone && !near.near)) continue;
         known |= kBrought;
-        state_.swept[p] = {i, static_cast<std::int32_t>(passed.points.size())};
+        state_.work.swept[p] = {i, static_cast<std::int32_t>(passed.points.size())};
         const float *b = begin + near.lane, *e = end + near.lane;
         passed.points.push_back(
             {near.lane, {{b[0], b[lanes], b[2 * lanes]}, {e[0], e[lanes], e[2 * lanes]}}});
@@ -129,8 +129,8 @@ class Sweep {
     for (std::size_t i = 0; i < count; ++i) {
       // Places lie scattered and come from far: they are on their way while others are worked on.
       if (i + 16 < count) {
-        __builtin_prefetch(&state_.swept[bonds[i + 16].point]);
-        __builtin_prefetch(&state_.swept[bonds[i + 16].other]);
+        __builtin_prefetch(&state_.work.swept[bonds[i + 16].point]);
+        __builtin_prefetch(&state_.work.swept[bonds[i + 16].other]);
       }
       if (i + 8 < count) {
         prefetch_place(bonds[i + 8].point);
@@ -184,17 +184,17 @@ class Sweep {
   }
   void prefetch_place(std::int32_t p) const {
     if ((known_[p] & kBrought) == 0) return;
-    const SweptPoint& swept = state_.swept[p];
+    const SweptPoint& swept = state_.work.swept[p];
     __builtin_prefetch(&passed_[swept.block].points[swept.index]);
   }
   /// Adds a bond if the path passes it.
   void add_broken(const Bond& bond, std::vector<BrokenBond>& broken) const {
     const std::int32_t p = bond.point, q = bond.other;
-    const PassedBlock& passed = passed_[state_.swept[p].block];
+    const PassedBlock& passed = passed_[state_.work.swept[p].block];
     Meeting meeting;
     if (!passes(passed.edges, {place(0, p), place(0, q), place(1, p), place(1, q)}, meeting))
       return;
-    const std::int32_t lane = passed.points[state_.swept[p].index].lane;
+    const std::int32_t lane = passed.points[state_.work.swept[p].index].lane;
     broken.push_back(broken_bond(*passed.block, lane, q, bond.axis, meeting));
   }
 
@@ -202,7 +202,7 @@ class Sweep {
   /// on where a point is, or a cut exactly through it might miss the bonds on both sides.
   Vec3 place(int when, std::int32_t p) const {
     if ((known_[p] & kBrought) == 0) return far_place(when == 0 ? u_begin_ : u_end_, p);
-    const SweptPoint& swept = state_.swept[p];
+    const SweptPoint& swept = state_.work.swept[p];
     const float* at = passed_[swept.block].points[swept.index].at[when];
     return {at[0], at[1], at[2]};
   }

@@ -196,19 +196,18 @@ void make_rigid(const LatticeBody& body, const Points& points, const NodeFields&
 
 }  // namespace
 
-Softened soften(const std::vector<LatticeBody>& bodies, const std::vector<std::int32_t>& changed,
-                Points& points) {
+Softened soften(LatticeTissue& tissue, const std::vector<std::int32_t>& changed) {
   Softened softened;
   std::set<std::int32_t> seen;  // crumbs, by their lowest points
   const auto mark = [&](std::int32_t p) {
-    if (points.soft.empty()) points.soft.resize(points.size(), 0);
-    if (points.soft[p] == 0) softened.points.push_back(p);
-    points.soft[p] = 1;
+    if (tissue.points.soft.empty()) tissue.points.soft.resize(tissue.points.size(), 0);
+    if (tissue.points.soft[p] == 0) softened.points.push_back(p);
+    tissue.points.soft[p] = 1;
   };
-  for_each_site(points, changed, [&](std::int32_t p, const Points::Site& site) {
-    const LatticeBody& body = bodies[site.body];
-    if (is_in_slice(body, points, p)) mark(p);
-    const Crumb crumb(body, points, p);
+  for_each_site(tissue.points, changed, [&](std::int32_t p, const Points::Site& site) {
+    const LatticeBody& body = tissue.bodies[site.body];
+    if (is_in_slice(body, tissue.points, p)) mark(p);
+    const Crumb crumb(body, tissue.points, p);
     if (crumb.count == 0) return;
     for (const std::int32_t of_crumb : crumb) mark(of_crumb);
     const std::int32_t lowest = *std::min_element(crumb.begin(), crumb.end());
@@ -217,27 +216,25 @@ Softened soften(const std::vector<LatticeBody>& bodies, const std::vector<std::i
   return softened;
 }
 
-void settle_crumbs(const std::vector<LatticeBody>& bodies, const Points& points,
-                   const NodeFields& fields, const std::vector<std::int32_t>& crumbs,
-                   Nodes& nodes) {
+void settle_crumbs(LatticeTissue& tissue, const std::vector<std::int32_t>& crumbs) {
   for (const std::int32_t lowest : crumbs) {
-    const LatticeBody& body = bodies[points.site[lowest].body];
-    make_rigid(body, points, fields, Crumb(body, points, lowest), nodes);
+    const LatticeBody& body = tissue.bodies[tissue.points.site[lowest].body];
+    make_rigid(body, tissue.points, *tissue.fields, Crumb(body, tissue.points, lowest),
+               tissue.nodes);
   }
 }
 
-bool settle_wild_crumbs(const std::vector<LatticeBody>& bodies, const Points& points,
-                        const NodeFields& fields, const std::set<std::int32_t>& crumbs,
-                        Nodes& nodes) {
+bool settle_wild_crumbs(LatticeTissue& tissue, const std::set<std::int32_t>& crumbs) {
   bool any = false;
   for (const std::int32_t lowest : crumbs) {
-    const LatticeBody& body = bodies[points.site[lowest].body];
-    const Crumb crumb(body, points, lowest);
+    const LatticeBody& body = tissue.bodies[tissue.points.site[lowest].body];
+    const Crumb crumb(body, tissue.points, lowest);
     const bool wild = std::any_of(crumb.begin(), crumb.end(), [&](std::int32_t p) {
-      return Deformation(body, points.site[p], fields, nodes).stiffening >= kWildStiffening;
+      return Deformation(body, tissue.points.site[p], *tissue.fields, tissue.nodes).stiffening >=
+             kWildStiffening;
     });
     if (!wild) continue;
-    make_rigid(body, points, fields, crumb, nodes);
+    make_rigid(body, tissue.points, *tissue.fields, crumb, tissue.nodes);
     any = true;
   }
   return any;

@@ -7,9 +7,7 @@
 #include <vector>
 
 #include "mpm/blocks/stabilisation.h"
-#include "mpm/lattice/lattice_body.h"
-#include "mpm/lattice/nodes.h"
-#include "mpm/split/node_fields.h"
+#include "mpm/lattice_tissue.h"
 
 namespace tissue_sim {
 
@@ -23,8 +21,7 @@ struct Softened {
   std::vector<std::int32_t> points;
   std::vector<std::int32_t> crumbs;  ///< lowest point of each, whether it was one before or not
 };
-Softened soften(const std::vector<LatticeBody>& bodies, const std::vector<std::int32_t>& changed,
-                Points& points);
+Softened soften(LatticeTissue& tissue, const std::vector<std::int32_t>& changed);
 
 /// The volume by which a point resists strain [m^3]: its own, or less where it is soft.
 inline float elastic_volume(const Points& points, std::int32_t point) {
@@ -35,13 +32,10 @@ inline float elastic_volume(const Points& points, std::int32_t point) {
 /// momentum stays, linear and angular; what else a torn thread left in their nodes, a swing of many
 /// times their size, goes. No crumb turns faster than kCrumbSpin times the speed of sound in a rod
 /// a cell, which strains it by a tenth or two: the rest goes to the tissue beside it.
-void settle_crumbs(const std::vector<LatticeBody>& bodies, const Points& points,
-                   const NodeFields& fields, const std::vector<std::int32_t>& crumbs, Nodes& nodes);
+void settle_crumbs(LatticeTissue& tissue, const std::vector<std::int32_t>& crumbs);
 /// The same for those that have become wild since (mpm/tear/deformation.h). Returns whether any
 /// had.
-bool settle_wild_crumbs(const std::vector<LatticeBody>& bodies, const Points& points,
-                        const NodeFields& fields, const std::set<std::int32_t>& crumbs,
-                        Nodes& nodes);
+bool settle_wild_crumbs(LatticeTissue& tissue, const std::set<std::int32_t>& crumbs);
 inline constexpr double kCrumbSpin = 0.5;
 
 }  // namespace tissue_sim

@@ -195,7 +195,7 @@ std::vector<TearingPoint> find_tearing(MpmState& state) {
                             : least_tear_limit(body.materials[block.material]);
     if (limit == 0) return;
     std::vector<StretchedPoint> stretched;
-    state.kernels->stretched(block, block_field(state, block), limit, state.scratch.local(),
+    state.kernels->stretched(block, block_field(state, block), limit, state.work.scratch.local(),
                              stretched);
     add_tearing(state, stretched, of_block[i]);
   });

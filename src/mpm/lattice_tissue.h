@@ -1,0 +1,20 @@
+// LatticeTissue: the tissue of a scene on its lattices, whatever works on it.
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include "mpm/lattice/lattice_body.h"
+#include "mpm/lattice/nodes.h"
+#include "mpm/split/node_fields.h"
+
+namespace tissue_sim {
+
+struct LatticeTissue {
+  std::vector<LatticeBody> bodies;     ///< never change
+  Points points;                       ///< their bonds go as tissue is cut and tears
+  Nodes nodes;                         ///< move; there are more behind cuts
+  std::unique_ptr<NodeFields> fields;  ///< which of the nodes a point sees
+};
+
+}  // namespace tissue_sim

@@ -138,7 +138,8 @@ TEST_P(SavedState, GoesOnInAnotherProcess) {
   setenv(kVariable, path.c_str(), 1);
   const auto* const test = testing::UnitTest::GetInstance()->current_test_info();
   const int ended =
-      std::system(("'" + std::filesystem::read_symlink("/proc/self/exe").string() +
+      std::system(("env -u GTEST_TOTAL_SHARDS -u GTEST_SHARD_INDEX '" +
+                   std::filesystem::read_symlink("/proc/self/exe").string() +
                    "' --gtest_filter=" + test->test_suite_name() + "." + test->name() + " >&2")
                       .c_str());
   unsetenv(kVariable);

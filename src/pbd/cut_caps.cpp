@@ -126,7 +126,9 @@ std::vector<std::int32_t> close_wounds(State& s, std::vector<std::int32_t>& orig
       corners.push_back(s.vertices.reference[loop[i]]);
       edge += (corners[i] - s.vertices.reference[loop[(i + 1) % loop.size()]]).norm() / loop.size();
     }
-    const CapMesh cap = fill_loop(corners, std::max(edge, 0.8 * s.mean_edge));
+    const double size = std::max(edge, 0.8 * s.mean_edge);
+    CapMesh cap = fill_loop(corners, size, s.wounds);
+    if (!is_sound(s, corners, cap)) cap = fill_loop(corners, size);
     if (!is_sound(s, corners, cap)) continue;
     std::vector<std::int32_t> index = loop;
     for (std::size_t i = 0; i < cap.inner.size(); ++i) {

@@ -101,7 +101,7 @@ struct State {
 
   /// Vertices of a chunk of each level, by which constraints are packed (ConstraintSet): what the
   /// first cache of a processor holds, and its second. Empty on a GPU.
-  std::vector<std::int32_t> levels = {1024, 16384};
+  std::vector<std::int32_t> levels = {4096, 32768};
 
   // Made anew by pack(): what hangs together, by number.
   std::vector<std::int32_t> component;

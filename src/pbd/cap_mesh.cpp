@@ -110,9 +110,69 @@ double distance_to(const Place& a, const Place& b, const Place& p) {
   return (a + s * (b - a) - p).norm();
 }
 
+/// Axes of the plane that a loop is seen in.
+struct View {
+  Vec3 middle, u, v, normal;
+  Place place(const Vec3& x) const { return Place(u.dot(x - middle), v.dot(x - middle)); }
+  double height(const Vec3& x) const { return normal.dot(x - middle); }
+};
+
+/// Sheets as triangles over the plane.
+class Relief {
+ public:
+  Relief(const std::vector<std::array<Vec3, 4>>& sheets, const View& view, const Place& low,
+         const Place& high) {
+    for (const auto& w : sheets) {
+      for (const auto& t : {std::array<int, 3>{0, 1, 3}, std::array<int, 3>{0, 3, 2}}) {
+        Facet f;
+        Place least(1e300, 1e300), most(-1e300, -1e300);
+        for (int i = 0; i < 3; ++i) {
+          f.at[i] = view.place(w[t[i]]);
+          f.height[i] = view.height(w[t[i]]);
+          least = least.cwiseMin(f.at[i]);
+          most = most.cwiseMax(f.at[i]);
+        }
+        f.area2 = turn(f.at[0], f.at[1], f.at[2]);
+        if (f.area2 == 0 || (least - high).maxCoeff() > 0 || (low - most).maxCoeff() > 0) continue;
+        facets_.push_back(f);
+      }
+    }
+  }
+  /// Adds to `height` what leads to the sheet that is nearest above or below, no further than
+  /// `most`. Between sheets that do not quite meet the one that is nearer goes on.
+  bool find(const Place& p, double most, double& height) const {
+    double best_inside = kBeside, best = most, found = 0;
+    bool any = false;
+    for (const Facet& f : facets_) {
+      const double w0 = turn(p, f.at[1], f.at[2]) / f.area2;
+      const double w1 = turn(f.at[0], p, f.at[2]) / f.area2;
+      const double inside = std::min(0.0, std::min({w0, w1, 1 - w0 - w1}) + 1e-6);
+      if (!(inside >= best_inside)) continue;
+      const double h = w0 * f.height[0] + w1 * f.height[1] + (1 - w0 - w1) * f.height[2];
+      const double off = std::fabs(h - height);
+      if (off > most || (inside == best_inside && off >= best)) continue;
+      best_inside = inside;
+      best = off;
+      found = h;
+      any = true;
+    }
+    if (any) height = found;
+    return any;
+  }
+
+ private:
+  static constexpr double kBeside = -1;  ///< of a facet's size
+  struct Facet {
+    Place at[3];
+    double height[3], area2;
+  };
+  std::vector<Facet> facets_;
+};
+
 }  // namespace
 
-CapMesh fill_loop(const std::vector<Vec3>& loop, double edge) {
+CapMesh fill_loop(const std::vector<Vec3>& loop, double edge,
+                  const std::vector<std::array<Vec3, 4>>& sheets) {
   const std::size_t n = loop.size();
   Vec3 normal = Vec3::Zero(), middle = Vec3::Zero();
   for (std::size_t i = 0; i < n; ++i) {
@@ -158,10 +218,28 @@ CapMesh fill_loop(const std::vector<Vec3>& loop, double edge) {
     }
   }
   flip_to_delaunay(at, cap.triangles);
+  const View view = {middle, u, v, normal};
+  const Relief relief(sheets, view, low, high);
+  const double most = 0.25 * (high - low).norm();
+  // What the loop is off the sheets, for they are not quite where the tissue is.
+  std::vector<double> off(n, 0.0);
+  std::vector<bool> is_met(n, false);
+  for (std::size_t k = 0; k < n; ++k) {
+    double h = height[k];
+    is_met[k] = relief.find(at[k], most, h);
+    off[k] = height[k] - h;
+  }
   for (std::size_t i = n; i < at.size(); ++i) {
     cap.weights.push_back(mean_values(at, n, at[i]));
-    double rise = 0;
-    for (std::size_t k = 0; k < n; ++k) rise += cap.weights.back()[k] * height[k];
+    double rise = 0, share = 0, aside = 0;
+    for (std::size_t k = 0; k < n; ++k) {
+      const double w = cap.weights.back()[k];
+      rise += w * height[k];
+      if (is_met[k]) share += w;
+      if (is_met[k]) aside += w * off[k];
+    }
+    double of_sheet = rise;
+    if (share > 0.5 && relief.find(at[i], most, of_sheet)) rise = of_sheet + aside / share;
     cap.inner.push_back(middle + at[i].x() * u + at[i].y() * v + rise * normal);
   }
   return cap;

@@ -18,9 +18,11 @@ struct CapMesh {
 };
 
 /// Triangulates a simple loop seen along its mean normal (ears, then flips to Delaunay), with inner
-/// vertices about `edge` apart. The inside rises and falls with the loop. No triangles where the
-/// loop crosses itself or has no area.
-CapMesh fill_loop(const std::vector<Vec3>& loop, double edge);
+/// vertices about `edge` apart. The inside follows the `sheets` that a blade left, edges (a, b) at
+/// the beginning and at the end of each; where there are none it rises and falls with the loop. No
+/// triangles where the loop crosses itself or has no area.
+CapMesh fill_loop(const std::vector<Vec3>& loop, double edge,
+                  const std::vector<std::array<Vec3, 4>>& sheets = {});
 
 }  // namespace pbd
 }  // namespace tissue_sim

@@ -33,9 +33,14 @@ struct ConstraintSet {
   std::vector<Numbers> numbers;
   std::vector<std::int16_t> colour;
 
-  std::vector<Block, CacheLineAllocator<Block>> blocks;  ///< by colour
-  std::vector<std::int32_t> begin;  ///< first block of each colour, and the number of blocks
-  Array<float> multipliers;         ///< kMultipliers x kLanes for each block
+  /// By level, then by chunk, then by colour. What lies within one chunk of a level, and in none of
+  /// the levels before, is that chunk's: chunks of a level share no vertex, and a thread that
+  /// projects all colours of one finds its vertices in the cache. The last level is all vertices.
+  std::vector<Block, CacheLineAllocator<Block>> blocks;
+  std::vector<std::int32_t> begin;  ///< first block of each of these, and the number of blocks
+  int colours = 0;
+  std::vector<std::int32_t> chunks;  ///< of each level
+  Array<float> multipliers;          ///< kMultipliers x kLanes for each block
 
   int size() const { return static_cast<int>(vertices.size()); }
   void add(const Vertices& v, const Numbers& n) {
@@ -59,19 +64,37 @@ struct ConstraintSet {
     colour.resize(kept);
     return removed;
   }
-  void pack(int vertex_count);
+  /// `levels`: vertices of a chunk, ascending; without any there is one chunk, and so one list of
+  /// colours.
+  void pack(int vertex_count, const std::vector<std::int32_t>& levels = {});
 };
 
 template <class Kind>
-void ConstraintSet<Kind>::pack(int vertex_count) {
+void ConstraintSet<Kind>::pack(int vertex_count, const std::vector<std::int32_t>& levels) {
   constexpr int kVertices = Kind::kVertices;
   std::vector<std::int32_t> flat(vertices.size() * kVertices);
   for (std::size_t c = 0; c < vertices.size(); ++c) {
     std::copy(vertices[c].begin(), vertices[c].end(), flat.begin() + c * kVertices);
   }
-  const int colours = find_colours(flat, kVertices, vertex_count, colour);
-  std::vector<std::vector<std::int32_t>> of(colours);
-  for (int c = 0; c < size(); ++c) of[colour[c]].push_back(c);
+  colours = find_colours(flat, kVertices, vertex_count, colour);
+  chunks.clear();
+  int count = 0;
+  for (const std::int32_t vertices_of_chunk : levels) {
+    chunks.push_back((vertex_count + vertices_of_chunk - 1) / vertices_of_chunk);
+    count += chunks.back();
+  }
+  chunks.push_back(1);
+  std::vector<std::vector<std::int32_t>> of(static_cast<std::size_t>(count + 1) * colours);
+  for (int c = 0; c < size(); ++c) {
+    const auto [low, high] = std::minmax_element(vertices[c].begin(), vertices[c].end());
+    int chunk = 0;
+    std::size_t level = 0;
+    for (; level < levels.size() && *low / levels[level] != *high / levels[level]; ++level) {
+      chunk += chunks[level];
+    }
+    if (level < levels.size()) chunk += *low / levels[level];
+    of[static_cast<std::size_t>(chunk) * colours + colour[c]].push_back(c);
+  }
   blocks.clear();
   begin.assign(1, 0);
   for (std::vector<std::int32_t>& list : of) {

@@ -124,11 +124,13 @@ struct Bending {
                                         V (&lambda)[1]) {
     const V a = number[1] * inverse_h2;
     const Parts<V> p = parts(v);
-    // A triangle that has collapsed would turn about its edge in no time.
+    // A triangle that has collapsed would turn about its edge in no time: then all of the
+    // constraint counts for less, for a part of it alone would turn what it belongs to.
     const V least = 1e-3f * p.length * p.length * p.length * p.length + kTiny;
-    const V one = 1.0f / (p.length * greater(dot(p.n0, p.n0), least));
-    const V other = 1.0f / (p.length * greater(dot(p.n1, p.n1), least));
-    const Vector<V> m0 = one * p.n0, m1 = other * p.n1;
+    const V one = dot(p.n0, p.n0) + kTiny, other = dot(p.n1, p.n1) + kTiny;
+    const V share = lesser(lesser(one, other), least) / least;
+    const Vector<V> m0 = (share / (p.length * one)) * p.n0,
+                    m1 = (share / (p.length * other)) * p.n1;
     const V e2 = p.length * p.length;
     const V s0 = dot(between(v[0], v[3]), p.e), s1 = dot(between(v[1], v[3]), p.e);
     const V t0 = dot(between(v[0], v[2]), p.e), t1 = dot(between(v[1], v[2]), p.e);
@@ -137,7 +139,7 @@ struct Bending {
     const Vector<V> g3 = (-t0) * m0 + (-t1) * m1;
     const V sum =
         v[0].w * dot(g0, g0) + v[1].w * dot(g1, g1) + v[2].w * dot(g2, g2) + v[3].w * dot(g3, g3);
-    const V c = excess(p.angle, number[0]);
+    const V c = share * excess(p.angle, number[0]);
     const V change = -(c + a * lambda[0]) / (sum + a + kTiny);
     lambda[0] += change;
     move(v[0], change, g0);

@@ -84,7 +84,7 @@ void project_contacts(State& s, float h, std::vector<ColliderLoad>& loads) {
         loads[c].force[a] += from.force[a];
         loads[c].torque[a] += from.torque[a];
       }
-      loads[c].points += from.points / s.scene.pbd.iterations;
+      loads[c].points += from.points;
     }
   }
 }

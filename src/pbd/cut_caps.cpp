@@ -9,6 +9,7 @@
 #include "pbd/cut.h"
 #include "pbd/model.h"
 #include "pbd/pbd_pieces.h"
+#include "pbd/surface_mesh.h"
 
 namespace tissue_sim {
 namespace pbd {
@@ -59,6 +60,48 @@ std::vector<std::vector<std::int32_t>> open_loops(const State& s) {
   return loops;
 }
 
+/// A loop that comes back to the same place goes around a slit there, whose lips lie on one
+/// another, or is two loops that touch: each part by itself, without what has no area.
+std::vector<std::vector<std::int32_t>> simple_loops(const State& s,
+                                                    const std::vector<std::int32_t>& loop) {
+  const double same = 0.1 * s.mean_edge;
+  std::vector<std::vector<std::int32_t>> simple;
+  std::vector<std::int32_t> way;
+  for (const std::int32_t v : loop) {
+    const Vec3& x = s.vertices.reference[v];
+    std::size_t from = 0;
+    while (from < way.size() && (s.vertices.reference[way[from]] - x).norm() > same) ++from;
+    if (from == way.size()) {
+      way.push_back(v);
+      continue;
+    }
+    if (way.size() - from >= 3) simple.emplace_back(way.begin() + from, way.end());
+    way.resize(from + 1);
+  }
+  if (way.size() >= 3) simple.push_back(way);
+  return simple;
+}
+
+/// Whether a wound may be closed so: what makes slivers leaves it open.
+bool is_sound(const State& s, const std::vector<Vec3>& corners, const CapMesh& cap) {
+  constexpr double kLeastAngle = 0.05;  // [rad], 3 degrees
+  std::vector<Vec3> x = corners;
+  x.insert(x.end(), cap.inner.begin(), cap.inner.end());
+  for (const auto& t : cap.triangles) {
+    // Not a number is no more than anything.
+    if (!(smallest_angle(x[t[0]], x[t[1]], x[t[2]]) > kLeastAngle)) return false;
+    for (int i = 0; i < 3; ++i) {
+      if (!((x[t[i]] - x[t[(i + 1) % 3]]).norm() > 0.05 * s.mean_edge)) return false;
+    }
+  }
+  for (const std::vector<double>& of : cap.weights) {
+    for (const double w : of) {
+      if (!std::isfinite(w)) return false;
+    }
+  }
+  return !cap.triangles.empty();
+}
+
 }  // namespace
 
 std::vector<std::int32_t> close_wounds(State& s, std::vector<std::int32_t>& origin) {
@@ -69,7 +112,11 @@ std::vector<std::int32_t> close_wounds(State& s, std::vector<std::int32_t>& orig
     if (s.stroke[v] >= 0) of_copies[s.copy_of[v]].insert(linked.root(v));
   }
   std::vector<std::int32_t> starts;
+  std::vector<std::vector<std::int32_t>> loops;
   for (const std::vector<std::int32_t>& loop : open_loops(s)) {
+    for (std::vector<std::int32_t>& part : simple_loops(s, loop)) loops.push_back(std::move(part));
+  }
+  for (const std::vector<std::int32_t>& loop : loops) {
     int between = 0;
     for (const std::int32_t v : loop) between += of_copies[s.copy_of[v]].size() > 1 ? 1 : 0;
     if (2 * between < static_cast<int>(loop.size())) continue;
@@ -79,8 +126,10 @@ std::vector<std::int32_t> close_wounds(State& s, std::vector<std::int32_t>& orig
       corners.push_back(s.vertices.reference[loop[i]]);
       edge += (corners[i] - s.vertices.reference[loop[(i + 1) % loop.size()]]).norm() / loop.size();
     }
-    const CapMesh cap = fill_loop(corners, std::max(edge, 0.8 * s.mean_edge));
-    if (cap.triangles.empty()) continue;
+    const double size = std::max(edge, 0.8 * s.mean_edge);
+    CapMesh cap = fill_loop(corners, size, s.wounds);
+    if (!is_sound(s, corners, cap)) cap = fill_loop(corners, size);
+    if (!is_sound(s, corners, cap)) continue;
     std::vector<std::int32_t> index = loop;
     for (std::size_t i = 0; i < cap.inner.size(); ++i) {
       const std::int32_t n = add_vertex(s, cap.inner[i], s.vertices.body[loop[0]]);

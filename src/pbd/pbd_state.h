@@ -99,6 +99,10 @@ struct State {
 
   std::vector<Collider> colliders;  ///< of this step
 
+  /// Vertices of a chunk of each level, by which constraints are packed (ConstraintSet): what the
+  /// first cache of a processor holds, and its second. Empty on a GPU.
+  std::vector<std::int32_t> levels = {4096, 32768};
+
   // Made anew by pack(): what hangs together, by number.
   std::vector<std::int32_t> component;
   int components = 0;
@@ -114,12 +118,19 @@ int add_vertex(State& s, Vec3 reference, int body);
 void pack(State& s);
 
 StepNumbers step_numbers(const Scene& scene, float h);
+/// How often a step projects all constraints: PbdOptions::iterations, and an even number on a
+/// surface that was cut. Every other sweep goes backward. One sweep, or two in the same order, are
+/// no symmetric operation, and what follows from velocities that such positions give may grow:
+/// slivers and thin pieces shook at metres a second. Forward and backward it cannot (linear theory:
+/// with eigenvalues p between 0 and 1 a step multiplies its modes by sqrt(p)).
+int sweeps_of_step(const State& s);
 /// Advances by one step of `h` seconds; adds what acted on each of the colliders, mean force over
-/// the step, to `loads`, which parallels them.
+/// the step, to `loads`, which parallels them. Contacts come once, after the last sweep: friction's
+/// share is of the whole push.
 void step(State& s, float h, std::vector<ColliderLoad>& loads);
-/// Projects each constraint once, one colour after the other. `keep`: multipliers grow over the
-/// iterations of a step; else they count as zero.
-void project_constraints(State& s, float h, bool keep);
+/// Projects each constraint once, one colour after the other, or in the opposite order. `keep`:
+/// multipliers grow over the sweeps of a step; else they count as zero.
+void project_constraints(State& s, float h, bool keep, bool backward = false);
 /// Pushes vertices out of the colliders, with friction; adds what that takes (contact.cpp).
 void project_contacts(State& s, float h, std::vector<ColliderLoad>& loads);
 

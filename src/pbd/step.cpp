@@ -9,6 +9,8 @@ namespace pbd {
 namespace {
 
 constexpr int kVerticesOfPart = 2048;
+/// Fewer vertices than this are in a processor's cache anyway.
+constexpr int kLeastChunked = 8192;
 
 template <class F>
 void for_vertices(State& s, const F& f) {
@@ -19,31 +21,49 @@ void for_vertices(State& s, const F& f) {
   });
 }
 
-/// One colour after the other. `blocks_of_part` are worth handing to another thread.
+/// One colour after the other, or `backward`: chunks of a level side by side, and of the last
+/// level, which is one chunk, `blocks_of_part` of a colour.
 template <class Kind>
 void project_all(State& s, ConstraintSet<Kind>& set, Project<Kind> project, int blocks_of_part,
-                 float inverse_h2, bool keep) {
+                 float inverse_h2, bool keep, bool backward) {
+  if (set.blocks.empty()) return;
   float* x = s.vertices.x.data();
-  for (std::size_t c = 0; c + 1 < set.begin.size(); ++c) {
-    const int begin = set.begin[c], count = set.begin[c + 1] - begin;
-    const auto run = [&](int first, int n) {
-      float* multipliers = nullptr;
-      if (keep && Kind::kMultipliers > 0) {
-        multipliers = set.multipliers.data() +
-                      static_cast<std::size_t>(first) * ConstraintSet<Kind>::kMultipliers * kLanes;
-      }
-      project(set.blocks.data() + first, n, inverse_h2, x, multipliers);
-    };
-    if (count < 2 * blocks_of_part) {
-      const FlushDenormals flush;
-      run(begin, count);
-      continue;
+  const auto run = [&](int first, int n) {
+    float* multipliers = nullptr;
+    if (keep && Kind::kMultipliers > 0) {
+      multipliers = set.multipliers.data() +
+                    static_cast<std::size_t>(first) * ConstraintSet<Kind>::kMultipliers * kLanes;
     }
-    s.cpu.for_each((count + blocks_of_part - 1) / blocks_of_part, [&](int part) {
-      const int first = part * blocks_of_part;
-      run(begin + first, std::min(blocks_of_part, count - first));
-    });
-  }
+    project(set.blocks.data() + first, n, inverse_h2, x, multipliers);
+  };
+  const int levels = static_cast<int>(set.chunks.size());
+  const auto project_level = [&](int level) {
+    const std::int32_t* begin = set.begin.data();
+    for (int l = 0; l < level; ++l) begin += set.chunks[l] * set.colours;
+    if (level + 1 < levels) {
+      s.cpu.for_each(set.chunks[level], [&](int chunk) {
+        const std::int32_t* of = begin + chunk * set.colours;
+        for (int k = 0; k < set.colours; ++k) {
+          const int c = backward ? set.colours - 1 - k : k;
+          if (of[c + 1] > of[c]) run(of[c], of[c + 1] - of[c]);
+        }
+      });
+      return;
+    }
+    for (int k = 0; k < set.colours; ++k) {
+      const int c = backward ? set.colours - 1 - k : k, count = begin[c + 1] - begin[c];
+      if (count < 2 * blocks_of_part) {
+        const FlushDenormals flush;
+        run(begin[c], count);
+        continue;
+      }
+      s.cpu.for_each((count + blocks_of_part - 1) / blocks_of_part, [&](int part) {
+        const int first = part * blocks_of_part;
+        run(begin[c] + first, std::min(blocks_of_part, count - first));
+      });
+    }
+  };
+  for (int l = 0; l < levels; ++l) project_level(backward ? levels - 1 - l : l);
 }
 
 template <class Kind>
@@ -62,12 +82,23 @@ StepNumbers step_numbers(const Scene& scene, float h) {
           {static_cast<float>(g.x()), static_cast<float>(g.y()), static_cast<float>(g.z())}};
 }
 
-void project_constraints(State& s, float h, bool keep) {
+void project_constraints(State& s, float h, bool keep, bool backward) {
   const float inverse_h2 = 1 / (h * h);
-  project_all(s, s.elastics, s.project->elastic, 32, inverse_h2, keep);
-  project_all(s, s.strains, s.project->strain, 32, inverse_h2, false);
-  project_all(s, s.links, s.project->distance, 128, inverse_h2, keep);
-  project_all(s, s.bends, s.project->bending, 32, inverse_h2, keep);
+  const auto tetrahedra = [&] {
+    project_all(s, s.elastics, s.project->elastic, 32, inverse_h2, keep, backward);
+    project_all(s, s.strains, s.project->strain, 32, inverse_h2, false, backward);
+  };
+  if (!backward) tetrahedra();
+  if (!backward) project_all(s, s.links, s.project->distance, 128, inverse_h2, keep, false);
+  project_all(s, s.bends, s.project->bending, 32, inverse_h2, keep, backward);
+  if (backward) project_all(s, s.links, s.project->distance, 128, inverse_h2, keep, true);
+  if (backward) tetrahedra();
+}
+
+int sweeps_of_step(const State& s) {
+  const int asked = s.scene.pbd.iterations;
+  const bool is_cut_surface = s.tetrahedra.empty() && !s.wounds.empty();
+  return is_cut_surface ? asked + asked % 2 : asked;
 }
 
 void step(State& s, float h, std::vector<ColliderLoad>& loads) {
@@ -75,17 +106,15 @@ void step(State& s, float h, std::vector<ColliderLoad>& loads) {
   float *x = vertices.x.data(), *predicted = vertices.predicted.data(), *v = vertices.v.data();
   const StepNumbers numbers = step_numbers(s.scene, h);
   for_vertices(s, [&](int i) { predict(numbers, x + 4 * i, predicted + 4 * i, v + 4 * i); });
-  const int iterations = s.scene.pbd.iterations;
-  const bool keep = iterations > 1;
+  const int sweeps = sweeps_of_step(s);
+  const bool keep = sweeps > 1;
   if (keep) {
     forget(s.links);
     forget(s.bends);
     forget(s.elastics);
   }
-  for (int i = 0; i < iterations; ++i) {
-    project_constraints(s, h, keep);
-    project_contacts(s, h, loads);
-  }
+  for (int i = 0; i < sweeps; ++i) project_constraints(s, h, keep, i % 2 == 1);
+  project_contacts(s, h, loads);
   for_vertices(s, [&](int i) { take_velocity(numbers, x + 4 * i, predicted + 4 * i, v + 4 * i); });
 }
 
@@ -134,10 +163,12 @@ void pack(State& s) {
     s.component[i] = number.try_emplace(linked.root(i), next).first->second;
   }
   s.components = static_cast<int>(number.size());
-  s.links.pack(n);
-  s.bends.pack(n);
-  s.strains.pack(n);
-  s.elastics.pack(n);
+  const std::vector<std::int32_t> levels =
+      n < kLeastChunked ? std::vector<std::int32_t>() : s.levels;
+  s.links.pack(n, levels);
+  s.bends.pack(n, levels);
+  s.strains.pack(n, levels);
+  s.elastics.pack(n, levels);
 }
 
 namespace {

@@ -320,7 +320,18 @@ void share_out_mass(State& s) {
       for (const std::int32_t i : t) v.volume[i] += third * s.half_depth[i];
     }
   }
-  std::vector<double> whole(s.scene.bodies.size(), 0.0);
+  std::vector<double> whole(s.scene.bodies.size(), 0.0), count = whole;
+  for (int i = 0; i < v.size(); ++i) {
+    whole[v.body[i]] += v.volume[i];
+    count[v.body[i]] += 1;
+  }
+  // Next to nothing would fly at the least push, and single precision holds no such ratios.
+  constexpr double kLeastShare = 1e-3;
+  for (int i = 0; s.tetrahedra.empty() && i < v.size(); ++i) {
+    const double least = kLeastShare * whole[v.body[i]] / count[v.body[i]];
+    if (v.volume[i] < least) v.volume[i] = least;
+  }
+  std::fill(whole.begin(), whole.end(), 0.0);
   for (int i = 0; i < v.size(); ++i) whole[v.body[i]] += v.volume[i];
   for (int i = 0; i < v.size(); ++i) {
     const int b = v.body[i];

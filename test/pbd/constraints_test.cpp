@@ -187,11 +187,11 @@ TEST(Constraint, ElasticForcesAreTheEnergysSlope) {
 TEST(Colours, NeighboursDiffer) {
   std::mt19937 random(1);
   std::vector<std::int32_t> vertices;
-  for (int i = 0; i < 4000; ++i) vertices.push_back(static_cast<std::int32_t>(random() % 90));
+  for (int i = 0; i < 4000; ++i) vertices.push_back(static_cast<std::int32_t>(random() % 70));
   std::vector<std::int16_t> colour(1000, -1);
-  const int count = find_colours(vertices, 4, 90, colour);
+  const int count = find_colours(vertices, 4, 70, colour);
   EXPECT_GT(count, 64);  // more than a word of bits
-  std::vector<std::vector<bool>> taken(count, std::vector<bool>(90, false));
+  std::vector<std::vector<bool>> taken(count, std::vector<bool>(70, false));
   for (int c = 0; c < 1000; ++c) {
     std::vector<std::int32_t> own(vertices.begin() + 4 * c, vertices.begin() + 4 * c + 4);
     std::sort(own.begin(), own.end());

@@ -159,7 +159,7 @@ TEST_P(CutMeshes, CutsAtRandomNeitherBlowUpNorMakeSlivers) {
   const double volume = whole_volume(tissue), mass = tissue.momentum().mass;
   std::mt19937 random(4);
   std::uniform_real_distribution<double> at(-1, 1);
-  int cuts = 40;
+  int cuts = GetParam() == PbdModel::kSurface ? 100 : 40;  // surfaces shook from some 80 on
   if (const char* asked = std::getenv("TISSUE_SIM_CUTS")) cuts = std::atoi(asked);
   for (int i = 0; i < cuts; ++i) {
     const Vec3 from(0.05 * at(random), 0.03 * at(random), 0.02 * at(random));
@@ -168,7 +168,7 @@ TEST_P(CutMeshes, CutsAtRandomNeitherBlowUpNorMakeSlivers) {
     simulation.cut(stroke(-edge, edge, {from, from + way}));
     const FrameResult r = simulation.advance_frame().result;
     ASSERT_FALSE(r.blew_up) << "cut " << i;
-    EXPECT_LT(r.max_speed, 0.5) << "cut " << i;
+    EXPECT_LT(r.max_speed, 0.01) << "cut " << i;  // read: 5e-4 of surfaces, 8e-4 of tetrahedra
   }
   const Thinnest least = thinnest(tissue.state());
   std::printf("   %zu pieces, volume %.4f, smallest edge %.2e m, angle %.2f degrees\n",
@@ -176,8 +176,8 @@ TEST_P(CutMeshes, CutsAtRandomNeitherBlowUpNorMakeSlivers) {
               least.angle * 57.29578);
   EXPECT_NEAR(whole_volume(tissue) / volume, 1, 0.01);
   EXPECT_NEAR(tissue.momentum().mass / mass, 1, 1e-6);
-  EXPECT_GT(least.edge, 0.02 * tissue.state().mean_edge);
-  EXPECT_GT(least.angle * 57.29578, 0.5);
+  EXPECT_GT(least.edge, 0.1 * tissue.state().mean_edge);
+  EXPECT_GT(least.angle * 57.29578, 2.8);
 }
 
 TEST_P(CutMeshes, AreTheSameBitsWithAnyNumberOfThreadsAndAfterRestoring) {

@@ -75,14 +75,15 @@ inline Eigen::Matrix3d deformation(const Corners& at, const Eigen::Matrix3d& q) 
   return p * q;
 }
 
-/// Calls project(c, lambdas of c) in the order of colours.
+/// Calls project(c, lambdas of c) in the order of colours, or backward.
 template <class Kind, class F>
 void each_constraint(const pbd::ConstraintSet<Kind>& set, std::vector<std::array<double, 2>>& all,
-                     const F& project) {
+                     bool backward, const F& project) {
   all.resize(set.size(), {0, 0});
   int colours = 0;
   for (const auto c : set.colour) colours = std::max<int>(colours, c + 1);
-  for (int colour = 0; colour < colours; ++colour) {
+  for (int k = 0; k < colours; ++k) {
+    const int colour = backward ? colours - 1 - k : k;
     for (int c = 0; c < set.size(); ++c) {
       if (set.colour[c] == colour) project(c, all[c]);
     }
@@ -94,69 +95,90 @@ struct PbdMultipliers {
   std::vector<std::array<double, 2>> elastics, strains, links, bends;
 };
 
-inline void project_constraints(const pbd::State& s, double h, PbdPlaces& p, PbdMultipliers& m) {
+inline void project_constraints(const pbd::State& s, double h, PbdPlaces& p, PbdMultipliers& m,
+                                bool backward = false) {
   const double inverse_h2 = 1 / (h * h);
-  each_constraint(s.elastics, m.elastics, [&](int c, std::array<double, 2>& lambda) {
-    const auto& vertices = s.elastics.vertices[c];
-    const auto& n = s.elastics.numbers[c];
-    const Eigen::Matrix3d q = inverse_rest(n);
-    Eigen::Matrix3d f = deformation(corners_of(p, vertices), q);
-    const double j = std::min(4.0, std::max(0.1, f.determinant()));
-    Eigen::Matrix3d cof;
-    for (int k = 0; k < 3; ++k) cof.col(k) = f.col((k + 1) % 3).cross(f.col((k + 2) % 3));
-    const Eigen::Matrix3d along = f - cof / std::cbrt(j);
-    const double cd = std::sqrt(0.5 * along.squaredNorm() + 1e-20);
-    const Eigen::Matrix3d of_edges = along / cd * q.transpose();
-    project(p, vertices, cd,
-            {-of_edges.rowwise().sum(), of_edges.col(0), of_edges.col(1), of_edges.col(2)},
-            n[9] * inverse_h2, 1, lambda[0]);
-    const Constraint volume = [&](const Corners& at) {
-      return deformation(at, q).determinant() - 1;
-    };
-    const Corners at = corners_of(p, vertices);
-    project(p, vertices, volume(at), gradient(volume, at, 1e-8), n[10] * inverse_h2, 1, lambda[1]);
-  });
-  each_constraint(s.strains, m.strains, [&](int c, std::array<double, 2>&) {
-    const auto& vertices = s.strains.vertices[c];
-    const auto& n = s.strains.numbers[c];
-    const Eigen::Matrix3d q = inverse_rest(n);
-    constexpr int kPairs[6][2] = {{0, 0}, {1, 1}, {2, 2}, {0, 1}, {0, 2}, {1, 2}};
-    for (const auto& ij : kPairs) {
-      const bool is_stretch = ij[0] == ij[1];
-      const Constraint strain = [&](const Corners& at) {
-        const Eigen::Matrix3d f = deformation(at, q);
-        return f.col(ij[0]).dot(f.col(ij[1])) - (is_stretch ? 1 : 0);
+  const auto elastics = [&] {
+    each_constraint(s.elastics, m.elastics, backward, [&](int c, std::array<double, 2>& lambda) {
+      const auto& vertices = s.elastics.vertices[c];
+      const auto& n = s.elastics.numbers[c];
+      const Eigen::Matrix3d q = inverse_rest(n);
+      Eigen::Matrix3d f = deformation(corners_of(p, vertices), q);
+      const double j = std::min(4.0, std::max(0.1, f.determinant()));
+      Eigen::Matrix3d cof;
+      for (int k = 0; k < 3; ++k) cof.col(k) = f.col((k + 1) % 3).cross(f.col((k + 2) % 3));
+      const Eigen::Matrix3d along = f - cof / std::cbrt(j);
+      const double cd = std::sqrt(0.5 * along.squaredNorm() + 1e-20);
+      const Eigen::Matrix3d of_edges = along / cd * q.transpose();
+      project(p, vertices, cd,
+              {-of_edges.rowwise().sum(), of_edges.col(0), of_edges.col(1), of_edges.col(2)},
+              n[9] * inverse_h2, 1, lambda[0]);
+      const Constraint volume = [&](const Corners& at) {
+        return deformation(at, q).determinant() - 1;
       };
       const Corners at = corners_of(p, vertices);
-      double none = 0;
-      project(p, vertices, strain(at), gradient(strain, at, 1e-8), 0, is_stretch ? n[9] : n[10],
-              none);
-    }
-  });
-  each_constraint(s.links, m.links, [&](int c, std::array<double, 2>& lambda) {
-    const auto& vertices = s.links.vertices[c];
-    const auto& n = s.links.numbers[c];
-    const Corners at = corners_of(p, vertices);
-    const Vec3 way = (at[1] - at[0]).normalized();
-    project(p, vertices, (at[1] - at[0]).norm() - n[0], {-way, way}, n[1] * inverse_h2, 1,
-            lambda[0]);
-  });
-  each_constraint(s.bends, m.bends, [&](int c, std::array<double, 2>& lambda) {
-    const auto& vertices = s.bends.vertices[c];
-    const auto& n = s.bends.numbers[c];
-    const Constraint angle = [&](const Corners& at) {
-      const Vec3 e = (at[3] - at[2]).normalized();
-      const Vec3 n0 = (at[0] - at[2]).cross(at[0] - at[3]);
-      const Vec3 n1 = (at[1] - at[3]).cross(at[1] - at[2]);
-      const double is = std::atan2(n1.cross(n0).dot(e), n0.dot(n1));
-      return std::remainder(is - n[0], 2 * M_PI);
-    };
-    const Corners at = corners_of(p, vertices);
-    project(p, vertices, angle(at), gradient(angle, at, 1e-8), n[1] * inverse_h2, 1, lambda[0]);
-  });
+      project(p, vertices, volume(at), gradient(volume, at, 1e-8), n[10] * inverse_h2, 1,
+              lambda[1]);
+    });
+  };
+  const auto strains = [&] {
+    each_constraint(s.strains, m.strains, backward, [&](int c, std::array<double, 2>&) {
+      const auto& vertices = s.strains.vertices[c];
+      const auto& n = s.strains.numbers[c];
+      const Eigen::Matrix3d q = inverse_rest(n);
+      constexpr int kPairs[6][2] = {{0, 0}, {1, 1}, {2, 2}, {0, 1}, {0, 2}, {1, 2}};
+      for (const auto& ij : kPairs) {
+        const bool is_stretch = ij[0] == ij[1];
+        const Constraint strain = [&](const Corners& at) {
+          const Eigen::Matrix3d f = deformation(at, q);
+          return f.col(ij[0]).dot(f.col(ij[1])) - (is_stretch ? 1 : 0);
+        };
+        const Corners at = corners_of(p, vertices);
+        double none = 0;
+        project(p, vertices, strain(at), gradient(strain, at, 1e-8), 0, is_stretch ? n[9] : n[10],
+                none);
+      }
+    });
+  };
+  const auto links = [&] {
+    each_constraint(s.links, m.links, backward, [&](int c, std::array<double, 2>& lambda) {
+      const auto& vertices = s.links.vertices[c];
+      const auto& n = s.links.numbers[c];
+      const Corners at = corners_of(p, vertices);
+      const Vec3 way = (at[1] - at[0]).normalized();
+      project(p, vertices, (at[1] - at[0]).norm() - n[0], {-way, way}, n[1] * inverse_h2, 1,
+              lambda[0]);
+    });
+  };
+  const auto bends = [&] {
+    each_constraint(s.bends, m.bends, backward, [&](int c, std::array<double, 2>& lambda) {
+      const auto& vertices = s.bends.vertices[c];
+      const auto& n = s.bends.numbers[c];
+      const Constraint angle = [&](const Corners& at) {
+        const Vec3 e = (at[3] - at[2]).normalized();
+        const Vec3 n0 = (at[0] - at[2]).cross(at[0] - at[3]);
+        const Vec3 n1 = (at[1] - at[3]).cross(at[1] - at[2]);
+        const double is = std::atan2(n1.cross(n0).dot(e), n0.dot(n1));
+        return std::remainder(is - n[0], 2 * M_PI);
+      };
+      const Corners at = corners_of(p, vertices);
+      project(p, vertices, angle(at), gradient(angle, at, 1e-8), n[1] * inverse_h2, 1, lambda[0]);
+    });
+  };
+  if (backward) {
+    bends();
+    links();
+    strains();
+    elastics();
+  } else {
+    elastics();
+    strains();
+    links();
+    bends();
+  }
 }
 
-/// A step without contact: where vertices are afterwards.
+/// A step without contact, every other sweep backward: where vertices are afterwards.
 inline PbdPlaces step(const pbd::State& s, double h) {
   PbdPlaces p = pbd_places(s);
   for (std::size_t i = 0; i < p.x.size(); ++i) {
@@ -166,7 +188,9 @@ inline PbdPlaces step(const pbd::State& s, double h) {
     }
   }
   PbdMultipliers multipliers;
-  for (int i = 0; i < s.scene.pbd.iterations; ++i) project_constraints(s, h, p, multipliers);
+  for (int i = 0; i < pbd::sweeps_of_step(s); ++i) {
+    project_constraints(s, h, p, multipliers, i % 2 == 1);
+  }
   return p;
 }
 

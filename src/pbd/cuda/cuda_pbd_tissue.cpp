@@ -41,7 +41,6 @@ CudaPbdTissue::CudaPbdTissue(const Scene& scene, std::vector<std::string> notes)
   check_cuda(cudaGetDeviceProperties(&properties, 0), "be asked");
   d.gpu = properties.name;
   check_cuda(cudaStreamCreateWithFlags(&d.stream, cudaStreamNonBlocking), "make a stream");
-  d.iterations = scene.pbd.iterations;
   const auto colliders = static_cast<std::size_t>(scene.pbd.steps) * collider_count(scene);
   d.frame.resize(1);
   d.colliders.resize(colliders);
@@ -50,6 +49,8 @@ CudaPbdTissue::CudaPbdTissue(const Scene& scene, std::vector<std::string> notes)
   d.step.resize(1);
   d.measures.resize(pbd::kPbdMeasures);
   d.host_measures.resize(pbd::kPbdMeasures);
+  state_->levels.clear();  // colours are of all vertices here
+  pbd::pack(*state_);
   push_all();
 }
 
@@ -83,6 +84,7 @@ void CudaPbdTissue::push_all() {
 void CudaPbdTissue::upload_constraints() {
   OnDevice& d = *device_;
   const bool spread = d.way == Way::kOneBlock;
+  d.sweeps = pbd::sweeps_of_step(*state_);
   d.elastics.upload(state_->elastics, spread, d.stream);
   d.strains.upload(state_->strains, spread, d.stream);
   d.links.upload(state_->links, spread, d.stream);
@@ -106,8 +108,8 @@ void CudaPbdTissue::choose_way() {
     if (d.way != was) upload_constraints();  // in another order
     return;
   }
-  // On an H100, in us; what a launch takes within a graph is 1.6, and each further colour that it
-  // is of 0.8.
+  // On an H100, in us; what a launch takes within a graph is 1.6, of tetrahedra 2.2, and each
+  // further colour that it is of 0.8.
   const bool is_surface = s.elastics.blocks.empty() && s.strains.blocks.empty();
   const int threads = is_surface ? 1024 : 512;
   const double one_block =
@@ -117,7 +119,7 @@ void CudaPbdTissue::choose_way() {
   const int all = static_cast<int>(s.elastics.begin.size() + s.strains.begin.size() +
                                    s.links.begin.size() + s.bends.begin.size()) -
                   4;
-  const double launches = 1.6 * (3 + count) + 0.8 * (all - count);
+  const double launches = (is_surface ? 1.6 : 2.2) * (3 + count) + 0.8 * (all - count);
   d.way = fits && one_block < launches ? Way::kOneBlock : Way::kLaunches;
   if (d.way != was) upload_constraints();  // in another order
 }
@@ -202,7 +204,7 @@ void CudaPbdTissue::take_loads(const FrameColliders& colliders, int steps) {
         load.torque[a] =
             pbd::kPbdLoadUnit * static_cast<double>(static_cast<long long>(sum[3 + a]));
       }
-      load.points = static_cast<double>(sum[6]) / d.iterations;
+      load.points = static_cast<double>(sum[6]);
       sum += pbd::kPbdLoadSums;
     }
     colliders.add_loads((i + 1.0) / steps, d.host_colliders.data() + i * on.size(), on.data(),
@@ -239,8 +241,9 @@ void CudaPbdTissue::project(float h, int times) {
   const pbd::CudaPbdFrame frame{pbd::step_numbers(state_->scene, h), 0};
   d.frame.upload(&frame, 1, d.stream);
   if (d.projections.is_empty()) {
-    d.projections.record(
-        d.stream, [&] { launch_pbd_projections(d.field(), colours(*state_), false, d.stream); });
+    d.projections.record(d.stream, [&] {
+      launch_pbd_projections(d.field(), colours(*state_), false, false, d.stream);
+    });
   }
   for (int i = 0; i < times; ++i) d.projections.launch(d.stream);
   d.host_is_current = false;

@@ -54,7 +54,7 @@ struct CudaPbdField {
   CudaPbdSet<Strain> strains;
   CudaPbdSet<Distance> links;
   CudaPbdSet<Bending> bends;
-  int iterations = 1;
+  int sweeps = 1;  ///< sweeps_of_step()
   const CudaPbdFrame* frame;
   const CudaPbdCollider* colliders;  ///< [steps][frame->colliders]
   unsigned long long* loads;         ///< [steps][frame->colliders][kPbdLoadSums]
@@ -100,9 +100,9 @@ struct CudaPbdColours {
 };
 
 /// Each constraint projected once, colour by colour: a launch for each colour, or for several small
-/// ones. `keep` as in project_constraints().
+/// ones. `keep` and `backward` as in project_constraints().
 void launch_pbd_projections(const CudaPbdField& field, const CudaPbdColours& colours, bool keep,
-                            cudaStream_t stream);
+                            bool backward, cudaStream_t stream);
 /// How many launches that takes.
 int pbd_projection_launches(const CudaPbdColours& colours);
 /// One step by launches: the one that *field.step says, which is then the next.

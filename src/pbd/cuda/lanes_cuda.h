@@ -65,22 +65,28 @@ __device__ __forceinline__ void project_item(const Item<Kind>& item, float inver
   }
 }
 
-/// The colours from `first` to before `last` by one block of threads, all threads together; leaves
-/// them in step. Reads ahead what each thread takes first of the next colour, kRounds times.
+/// The colours from `first` to before `last`, or `backward`, by one block of threads, all threads
+/// together; leaves them in step. Reads ahead what each thread takes first of the next colour,
+/// kRounds times.
 template <class Kind, bool kKeep, int kRounds = 1>
 __device__ __forceinline__ void project_colours(const CudaPbdSet<Kind>& set, int first, int last,
-                                                float inverse_h2, float4* x) {
+                                                bool backward, float inverse_h2, float4* x) {
   if (first >= last) return;
   const int threads = static_cast<int>(blockDim.x), thread = static_cast<int>(threadIdx.x);
-  int item = set.begin[first] * kLanes + thread, end = set.begin[first + 1] * kLanes;
+  int colour = backward ? last - 1 : first;
+  int item = set.begin[colour] * kLanes + thread, end = set.begin[colour + 1] * kLanes;
   Item<Kind> ahead[kRounds], now[kRounds];
 #pragma unroll
   for (int r = 0; r < kRounds; ++r) {
     if (item + r * threads < end) ahead[r] = load_item(set.blocks, item + r * threads);
   }
-  for (int colour = first; colour < last; ++colour) {
-    const int next = end + thread;
-    const int next_end = colour + 1 < last ? set.begin[colour + 2] * kLanes : end;
+  for (int left = last - first - 1; left >= 0; --left) {
+    int next = thread, next_end = 0;
+    if (left > 0) {
+      colour += backward ? -1 : 1;
+      next = set.begin[colour] * kLanes + thread;
+      next_end = set.begin[colour + 1] * kLanes;
+    }
 #pragma unroll
     for (int r = 0; r < kRounds; ++r) {
       now[r] = ahead[r];

@@ -1,6 +1,10 @@
 // Steps by launches: for tissue of many constraints. A launch is a colour, so its end is the
 // barrier that the next colour needs; small colours that follow one another share a launch of one
 // block of threads.
+#include <algorithm>
+#include <utility>
+#include <vector>
+
 #include "pbd/cuda/lanes_cuda.h"
 
 namespace tissue_sim {
@@ -23,9 +27,9 @@ __global__ void __launch_bounds__(kThreads)
 
 template <class Kind, bool kKeep>
 __global__ void __launch_bounds__(kThreadsOfFew)
-    pbd_project_few(CudaPbdSet<Kind> set, int first, int last, const CudaPbdFrame* frame,
-                    float4* x) {
-  project_colours<Kind, kKeep>(set, first, last, frame->step.inverse_h2, x);
+    pbd_project_few(CudaPbdSet<Kind> set, int first, int last, bool backward,
+                    const CudaPbdFrame* frame, float4* x) {
+  project_colours<Kind, kKeep>(set, first, last, backward, frame->step.inverse_h2, x);
 }
 
 __global__ void __launch_bounds__(kThreads) pbd_predict(CudaPbdField f) {
@@ -47,28 +51,31 @@ __global__ void __launch_bounds__(kThreads) pbd_take_velocities(CudaPbdField f) 
   if (i < f.count) take_velocity_of(f, f.frame->step, i, f.x[i]);
 }
 
-/// Calls of(first, last) with the colours of each launch.
+/// Calls of(first, last) with the colours of each launch, or `backward`.
 template <class F>
-void each_launch(const std::vector<std::int32_t>& begin, const F& of) {
+void each_launch(const std::vector<std::int32_t>& begin, bool backward, const F& of) {
   const int colours = static_cast<int>(begin.size()) - 1;
+  std::vector<std::pair<int, int>> launches;
   for (int first = 0; first < colours;) {
     int last = first + 1;
     if (begin[last] - begin[first] <= kFewBlocks) {
       while (last < colours && begin[last + 1] - begin[last] <= kFewBlocks) ++last;
     }
-    of(first, last);
+    launches.emplace_back(first, last);
     first = last;
   }
+  if (backward) std::reverse(launches.begin(), launches.end());
+  for (const auto& l : launches) of(l.first, l.second);
 }
 
 template <class Kind, bool kKeep>
 void launch_set(const CudaPbdField& field, const CudaPbdSet<Kind>& set,
-                const std::vector<std::int32_t>& begin, cudaStream_t stream) {
-  each_launch(begin, [&](int first, int last) {
+                const std::vector<std::int32_t>& begin, bool backward, cudaStream_t stream) {
+  each_launch(begin, backward, [&](int first, int last) {
     const int count = begin[first + 1] - begin[first];
     if (count <= kFewBlocks) {
       pbd_project_few<Kind, kKeep>
-          <<<1, kThreadsOfFew, 0, stream>>>(set, first, last, field.frame, field.x);
+          <<<1, kThreadsOfFew, 0, stream>>>(set, first, last, backward, field.frame, field.x);
     } else {
       const int blocks = (count * kLanes + kThreads - 1) / kThreads;
       float* multipliers = set.multipliers + static_cast<std::ptrdiff_t>(begin[first]) *
@@ -80,11 +87,23 @@ void launch_set(const CudaPbdField& field, const CudaPbdSet<Kind>& set,
 }
 
 template <bool kKeep>
-void launch_sets(const CudaPbdField& f, const CudaPbdColours& colours, cudaStream_t stream) {
-  launch_set<Elastic, kKeep>(f, f.elastics, colours.elastics, stream);
-  launch_set<Strain, false>(f, f.strains, colours.strains, stream);
-  launch_set<Distance, kKeep>(f, f.links, colours.links, stream);
-  launch_set<Bending, kKeep>(f, f.bends, colours.bends, stream);
+void launch_sets(const CudaPbdField& f, const CudaPbdColours& colours, bool backward,
+                 cudaStream_t stream) {
+  const auto tetrahedra = [&](bool elastic) {
+    if (elastic) launch_set<Elastic, kKeep>(f, f.elastics, colours.elastics, backward, stream);
+    if (!elastic) launch_set<Strain, false>(f, f.strains, colours.strains, backward, stream);
+  };
+  if (!backward) {
+    tetrahedra(true);
+    tetrahedra(false);
+    launch_set<Distance, kKeep>(f, f.links, colours.links, false, stream);
+  }
+  launch_set<Bending, kKeep>(f, f.bends, colours.bends, backward, stream);
+  if (backward) {
+    launch_set<Distance, kKeep>(f, f.links, colours.links, true, stream);
+    tetrahedra(false);
+    tetrahedra(true);
+  }
   check_cuda(cudaGetLastError(), "project constraints");
 }
 
@@ -102,34 +121,34 @@ void forget(const CudaPbdSet<Kind>& set, const std::vector<std::int32_t>& begin,
 int pbd_projection_launches(const CudaPbdColours& colours) {
   int count = 0;
   for (const auto* begin : {&colours.elastics, &colours.strains, &colours.links, &colours.bends}) {
-    each_launch(*begin, [&](int, int) { ++count; });
+    each_launch(*begin, false, [&](int, int) { ++count; });
   }
   return count;
 }
 
 void launch_pbd_projections(const CudaPbdField& field, const CudaPbdColours& colours, bool keep,
-                            cudaStream_t stream) {
+                            bool backward, cudaStream_t stream) {
   if (keep) {
-    launch_sets<true>(field, colours, stream);
+    launch_sets<true>(field, colours, backward, stream);
   } else {
-    launch_sets<false>(field, colours, stream);
+    launch_sets<false>(field, colours, backward, stream);
   }
 }
 
 void launch_pbd_step(const CudaPbdField& field, const CudaPbdColours& colours,
                      cudaStream_t stream) {
   const int blocks = (field.count + kThreads - 1) / kThreads;
-  const bool keep = field.iterations > 1;
+  const bool keep = field.sweeps > 1;
   pbd_predict<<<blocks, kThreads, 0, stream>>>(field);
   if (keep) {
     forget(field.elastics, colours.elastics, stream);
     forget(field.links, colours.links, stream);
     forget(field.bends, colours.bends, stream);
   }
-  for (int i = 0; i < field.iterations; ++i) {
-    launch_pbd_projections(field, colours, keep, stream);
-    pbd_touch<<<blocks, kThreads, 0, stream>>>(field);
+  for (int i = 0; i < field.sweeps; ++i) {
+    launch_pbd_projections(field, colours, keep, i % 2 == 1, stream);
   }
+  pbd_touch<<<blocks, kThreads, 0, stream>>>(field);
   pbd_take_velocities<<<blocks, kThreads, 0, stream>>>(field);
   check_cuda(cudaGetLastError(), "take a step");
 }

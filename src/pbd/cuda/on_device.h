@@ -51,7 +51,7 @@ struct CudaPbdTissue::OnDevice {
   Set<pbd::Strain> strains;
   Set<pbd::Distance> links;
   Set<pbd::Bending> bends;
-  int iterations = 1;
+  int sweeps = 1;  ///< of a step
   Way wanted = Way::kFaster, way = Way::kLaunches;
   CudaGraph step_graph, projections;
 
@@ -90,7 +90,7 @@ struct CudaPbdTissue::OnDevice {
     f.strains = strains.set();
     f.links = links.set();
     f.bends = bends.set();
-    f.iterations = iterations;
+    f.sweeps = sweeps;
     f.frame = frame.data();
     f.colliders = colliders.data();
     f.loads = loads.data();

@@ -47,16 +47,15 @@ __device__ __forceinline__ Staged<Kind> stage(const CudaPbdSet<Kind>& set, std::
   return staged;
 }
 
-template <class Kind, bool kKeep, int kRounds>
-__device__ __forceinline__ void project_set(const CudaPbdSet<Kind>& set, const Staged<Kind>& staged,
-                                            float inverse_h2, float4* x) {
-  CudaPbdSet<Kind> of = set;
-  of.begin = staged.begin;
-  project_colours<Kind, kKeep, kRounds>(of, 0, set.tail, inverse_h2, x);
+template <class Kind, bool kKeep>
+__device__ __forceinline__ void project_tail(const CudaPbdSet<Kind>& set,
+                                             const Staged<Kind>& staged, bool backward,
+                                             float inverse_h2, float4* x) {
   if (set.tail >= set.colours) return;
   if (threadIdx.x < 32) {
     const int first = staged.begin[set.tail] * kLanes;
-    for (int colour = set.tail; colour < set.colours; ++colour) {
+    int colour = backward ? set.colours - 1 : set.tail;
+    for (int left = set.colours - set.tail; left > 0; --left, colour += backward ? -1 : 1) {
       const int item = staged.begin[colour] * kLanes + static_cast<int>(threadIdx.x);
       if (item < staged.begin[colour + 1] * kLanes) {
         project_item<Kind, kKeep>(load_staged(staged.tail, item - first), inverse_h2, x,
@@ -66,6 +65,16 @@ __device__ __forceinline__ void project_set(const CudaPbdSet<Kind>& set, const S
     }
   }
   __syncthreads();
+}
+
+template <class Kind, bool kKeep, int kRounds>
+__device__ __forceinline__ void project_set(const CudaPbdSet<Kind>& set, const Staged<Kind>& staged,
+                                            bool backward, float inverse_h2, float4* x) {
+  CudaPbdSet<Kind> of = set;
+  of.begin = staged.begin;
+  if (backward) project_tail<Kind, kKeep>(set, staged, true, inverse_h2, x);
+  project_colours<Kind, kKeep, kRounds>(of, 0, set.tail, backward, inverse_h2, x);
+  if (!backward) project_tail<Kind, kKeep>(set, staged, false, inverse_h2, x);
 }
 
 /// Threads of a block: tetrahedra take twice the registers.
@@ -93,20 +102,28 @@ __global__ void __launch_bounds__(kThreads<kTets>, 1)
     }
     for (int i = thread; i < f.count; i += threads) predict_vertex(f, step, i, places + i);
     __syncthreads();
-    for (int iteration = 0; iteration < f.iterations; ++iteration) {
+    for (int sweep = 0; sweep < f.sweeps; ++sweep) {
+      const bool backward = kKeep && sweep % 2 == 1;  // a step of one sweep has none
+      if (backward) {
+        project_set<Bending, kKeep, 1>(f.bends, bends, true, inverse_h2, places);
+        project_set<Distance, kKeep, 2>(f.links, links, true, inverse_h2, places);
+      }
       if (kTets) {
-        project_set<Elastic, kKeep, 1>(f.elastics, elastics, inverse_h2, places);
-        project_set<Strain, false, 1>(f.strains, strains, inverse_h2, places);
+        if (backward) project_set<Strain, false, 1>(f.strains, strains, true, inverse_h2, places);
+        project_set<Elastic, kKeep, 1>(f.elastics, elastics, backward, inverse_h2, places);
+        if (!backward) project_set<Strain, false, 1>(f.strains, strains, false, inverse_h2, places);
       }
-      project_set<Distance, kKeep, 2>(f.links, links, inverse_h2, places);
-      project_set<Bending, kKeep, 1>(f.bends, bends, inverse_h2, places);
-      const std::size_t first = static_cast<std::size_t>(s) * frame.colliders;
-      for (int i = thread; i < f.count; i += threads) {
-        touch_vertex(f, step.h, f.colliders + first, frame.colliders,
-                     f.loads + first * kPbdLoadSums, i, places + i);
+      if (!backward) {
+        project_set<Distance, kKeep, 2>(f.links, links, false, inverse_h2, places);
+        project_set<Bending, kKeep, 1>(f.bends, bends, false, inverse_h2, places);
       }
-      __syncthreads();
     }
+    const std::size_t first = static_cast<std::size_t>(s) * frame.colliders;
+    for (int i = thread; i < f.count; i += threads) {
+      touch_vertex(f, step.h, f.colliders + first, frame.colliders, f.loads + first * kPbdLoadSums,
+                   i, places + i);
+    }
+    __syncthreads();
     for (int i = thread; i < f.count; i += threads) take_velocity_of(f, step, i, places[i]);
   }
   for (int i = thread; i < f.count; i += threads) f.x[i] = places[i];
@@ -141,7 +158,7 @@ bool fits_pbd_block(const CudaPbdField& field) {
 void launch_pbd_steps(const CudaPbdField& field, const CudaPbdFrame& frame, int steps,
                       cudaStream_t stream) {
   const bool tets = field.elastics.colours + field.strains.colours > 0;
-  if (field.iterations > 1) {
+  if (field.sweeps > 1) {
     tets ? launch<true, true>(field, frame, steps, stream)
          : launch<false, true>(field, frame, steps, stream);
   } else {

@@ -1,5 +1,6 @@
 // The state of tissue as bytes. What follows from the scene alone (nodes, pairs and their whole
 // weights) is not in it, nor what each substep writes before it reads it.
+#include <algorithm>
 #include <stdexcept>
 
 #include "compute/archive.h"
@@ -32,7 +33,7 @@ void fields(Archive& archive, MlsState& s) {
 template <class Archive>
 void fields(Archive& archive, MlsSubsteps& s) {
   archive(s.measured_, s.now_, s.limit_, s.measured_at_, s.growth_, s.trend_, s.count_,
-          s.shortened_, s.is_new_);
+          s.shortened_, s.is_new_, s.was_cut_, s.most_rate_);
 }
 
 template <class Archive>
@@ -54,8 +55,11 @@ void MlsTissue::restore(Span<const std::uint8_t> saved) {
   MlsState& s = *state_;
   put_weights(s.pairs, s.lanes);
   for (std::int32_t i = 0; i < s.count(); ++i) {
-    const bool cut = s.outer[i] != 0 && s.nodes.surface[i] == 0;
-    s.place[4 * i + 3] = cut ? 0.5f * s.edge[i] : s.nodes.depth[i];
+    const auto first = s.pairs.crossed.begin() + s.pairs.begin[i],
+               last = s.pairs.crossed.begin() + s.pairs.begin[i + 1];
+    s.cut[i] = std::any_of(first, last, [](std::uint8_t crossed) { return crossed != 0; }) ? 1 : 0;
+    const bool exposed = s.outer[i] != 0 && s.nodes.surface[i] == 0;
+    s.place[4 * i + 3] = exposed ? 0.5f * s.edge[i] : s.nodes.depth[i];
   }
   if (in.left() > 0) throw std::runtime_error("the state has more to it than this version knows");
 }

@@ -23,14 +23,43 @@ void resize_padded(Array<T>& array, int count, int per_node) {
 }
 
 Eigen::Matrix3d moment_of(const MlsState& s, std::int32_t i) {
-  Eigen::Matrix3d m = Eigen::Matrix3d::Zero();
+  double m[6] = {};
   const float* xi = &s.place[4 * i];
   for (std::int32_t e = s.pairs.begin[i]; e < s.pairs.begin[i + 1]; ++e) {
     const float* xj = &s.place[4 * s.pairs.other[e]];
-    const Vec3 r(xj[0] - xi[0], xj[1] - xi[1], xj[2] - xi[2]);  // in float, as the passes
-    m += s.pairs.weight[e] * r * r.transpose();
+    const double w = s.pairs.weight[e];
+    const double x = xj[0] - xi[0], y = xj[1] - xi[1], z = xj[2] - xi[2];  // in float, as passes do
+    m[0] += w * x * x;
+    m[1] += w * y * y;
+    m[2] += w * z * z;
+    m[3] += w * x * y;
+    m[4] += w * x * z;
+    m[5] += w * y * z;
   }
-  return m;
+  Eigen::Matrix3d result;
+  result << m[0], m[3], m[4], m[3], m[1], m[5], m[4], m[5], m[2];
+  return result;
+}
+
+bool spans_space(const Eigen::Matrix3d& m) {
+  // Of eigenvalues a <= b <= c, a / c >= abc / c^3: for most that tells.
+  const double trace = m.trace();
+  if (m.determinant() > kSpans * trace * trace * trace) return true;
+  Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen;
+  eigen.computeDirect(m, Eigen::EigenvaluesOnly);
+  const double least = eigen.eigenvalues()[0], largest = eigen.eigenvalues()[2];
+  return largest > 0 && least > kSpans * largest;
+}
+
+/// kappa of the penalty while nothing is cut.
+float whole_kappa(const MlsState& s, std::int32_t i) {
+  double trace = 0;  // of the moments
+  for (std::int32_t e = s.pairs.begin[i]; e < s.pairs.begin[i + 1]; ++e) {
+    const std::int32_t j = s.pairs.other[e];
+    trace += s.pairs.whole[e] * (s.nodes.place[j] - s.nodes.place[i]).squaredNorm();
+  }
+  const double stiffness = s.nodes.material_of(i).young_modulus * s.nodes.volume[i];
+  return trace > 0 ? static_cast<float>(3 * s.scene.mls.stabilisation * stiffness / trace) : 0.0f;
 }
 
 /// Springs from a thread to its neighbours: each carries its share of what a bar through the
@@ -55,25 +84,14 @@ void make_springs(MlsState& s, std::int32_t i) {
 
 void remake_node(MlsState& s, std::int32_t i) {
   const Eigen::Matrix3d m = moment_of(s, i);
-  Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen;
-  eigen.computeDirect(m, Eigen::EigenvaluesOnly);
-  const double least = eigen.eigenvalues()[0], largest = eigen.eigenvalues()[2];
-  const bool spans = largest > 0 && least > kSpans * largest;
-  double whole = 0;  // trace of the moments while nothing was cut
-  for (std::int32_t e = s.pairs.begin[i]; e < s.pairs.begin[i + 1]; ++e) {
-    const std::int32_t j = s.pairs.other[e];
-    whole += s.pairs.whole[e] * (s.nodes.place[j] - s.nodes.place[i]).squaredNorm();
-  }
+  const bool spans = spans_space(m);
   Eigen::Matrix3d inverse = Eigen::Matrix3d::Zero();
   if (spans) inverse = m.inverse();
   for (int k = 0; k < 6; ++k) {
     constexpr int kRow[] = {0, 1, 2, 0, 0, 1}, kColumn[] = {0, 1, 2, 1, 2, 2};
     s.inverse_moment[k][i] = static_cast<float>(inverse(kRow[k], kColumn[k]));
   }
-  const Material& material = s.nodes.material_of(i);
-  s.kappa[i] = spans ? static_cast<float>(3 * s.scene.mls.stabilisation * material.young_modulus *
-                                          s.nodes.volume[i] / whole)
-                     : 0.0f;
+  s.kappa[i] = spans ? s.whole_kappa[i] : 0.0f;
   s.thread[i] = spans ? 0 : 1;
 }
 
@@ -109,15 +127,17 @@ std::unique_ptr<MlsState> make_mls_state(const Scene& scene, std::vector<std::st
   const int n = s.count();
   for (Array<float>* a : {&s.place, &s.u, &s.v, &s.u_next, &s.v_next}) resize_padded(*a, n, 4);
   for (Array<float>* a :
-       {&s.mass, &s.inv_mass, &s.volume_mu, &s.volume_lambda, &s.volume_eta, &s.kappa, &s.edge,
-        &s.contact_stiffness, &s.contact_damping, &s.inverse_moment[0], &s.inverse_moment[1],
-        &s.inverse_moment[2], &s.inverse_moment[3], &s.inverse_moment[4], &s.inverse_moment[5]}) {
+       {&s.mass, &s.inv_mass, &s.volume_mu, &s.volume_lambda, &s.volume_eta, &s.kappa,
+        &s.whole_kappa, &s.edge, &s.contact_stiffness, &s.contact_damping, &s.inverse_moment[0],
+        &s.inverse_moment[1], &s.inverse_moment[2], &s.inverse_moment[3], &s.inverse_moment[4],
+        &s.inverse_moment[5]}) {
     resize_padded(*a, n, 1);
   }
   resize_padded(s.stress, n, 16);
   resize_padded(s.neo_hookean, n, 1);
   resize_padded(s.thread, n, 1);
   resize_padded(s.outer, n, 1);
+  resize_padded(s.cut, n, 1);
   s.any_thread.assign(s.chunks(), 0);
   s.contact.resize(s.groups());
   const double factor = support_factor(scene.mls.neighbours);
@@ -141,11 +161,13 @@ std::unique_ptr<MlsState> make_mls_state(const Scene& scene, std::vector<std::st
     s.contact_stiffness[i] = spring.stiffness;
     s.contact_damping[i] = spring.damping;
     s.outer[i] = s.nodes.surface[i];
+    s.whole_kappa[i] = whole_kappa(s, i);
     all[i] = i;
   }
   s.instructions = instruction_set();
   s.kernels = &mls_kernels(s.instructions);
   s.lanes = make_lanes(s.pairs, s.place);
+  s.spanner = make_spanner(s.nodes, s.pairs);
   remake(s, all);
   return state;
 }

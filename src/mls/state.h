@@ -13,6 +13,7 @@
 #include "mls/lanes.h"
 #include "mls/nodes.h"
 #include "mls/pairs.h"
+#include "mls/spanner.h"
 #include "tissue_sim/scene.h"
 #include "tools/collider.h"
 
@@ -42,15 +43,16 @@ struct MlsNodeContacts {
   std::vector<std::int32_t> other;
   std::vector<float> rest;  ///< distance below which they push [m]
   std::vector<float>
-      u_found;         ///< displacements of the nodes at the search that may touch, by number
-  float skin = 0;      ///< how far each may move until they are looked for anew [m]
-  int until_look = 0;  ///< substeps until it is seen how far they moved
+      u_found;              ///< displacements of the nodes at the search that may touch, by number
+  std::vector<float> skin;  ///< how far each may move until they are looked for anew [m]
+  int until_look = 0;       ///< substeps until it is seen how far they moved
 };
 
 struct MlsState {
   Scene scene;
   MlsNodes nodes;
   MlsPairs pairs;
+  MlsSpanner spanner;
   mutable MlsLanes lanes;  ///< its rows are scratch
 
   // Per node, padded to whole chunks. Vectors are (x, y, z, 0), but for the fourth of `place`: how
@@ -60,12 +62,13 @@ struct MlsState {
   Array<float> mass, inv_mass;                        ///< [kg]; inv_mass 0 where held
   Array<float> inverse_moment[6];                     ///< of M_i: 00 11 22 01 02 12
   Array<float> volume_mu, volume_lambda, volume_eta;  ///< [N m], [N m s]
-  Array<float> kappa;                                 ///< of the pair penalty
+  Array<float> kappa, whole_kappa;                    ///< of the pair penalty, now and uncut
   Array<std::uint8_t> neo_hookean;                    ///< law of each node
   Array<float> stress;                                ///< see MlsField
   Array<float> edge;                                  ///< distance to its neighbours [m]
   Array<float> contact_stiffness, contact_damping;    ///< node_spring() [N/m], [N s/m]
   Array<std::uint8_t> outer;                          ///< at the surface, or a cut passes beside it
+  Array<std::uint8_t> cut;                            ///< a pair of it is crossed
   Array<std::uint8_t> thread;      ///< its support spans no space: springs to its neighbours do
   Array<std::uint8_t> any_thread;  ///< per chunk: a thread, or the neighbour of one
   Array<float> spring;             ///< per entry: that of a thread's end [N/m]; empty without any
@@ -100,7 +103,7 @@ std::unique_ptr<MlsState> make_mls_state(const Scene& scene, std::vector<std::st
 /// Marks a node beside which a cut passes: tissue now ends half a spacing from it.
 inline void expose(MlsState& state, std::int32_t node) {
   if (state.outer[node] == 0) state.place[4 * node + 3] = 0.5f * state.edge[node];
-  state.outer[node] = 1;
+  state.outer[node] = state.cut[node] = 1;
 }
 
 /// Makes moments, penalty and springs of these nodes anew, after weights of their entries changed.

@@ -12,6 +12,8 @@ namespace {
 constexpr int kSteps = 8;               // of Lanczos' method
 constexpr double kMargin = 0.76;        // of the limit: the rest is for contact and what stiffens
 constexpr double kLongestAge = 0.5;     // of the measured limit [s]
+constexpr double kLongestAgeCut = 0.1;  // the same while something is cut [s]
+constexpr double kMostRate = 1.2;       // growth of the fastest node's rate by a cut, until then
 constexpr double kMostGrowth = 1.3;     // of the stiffness, until the limit is measured again
 constexpr double kBorne = 0.9;          // of the limit at the end of a part: else it is undone ...
 constexpr double kShorter = 0.6;        // ... and substeps made shorter by that
@@ -54,7 +56,7 @@ double MlsSubsteps::growth(const MlsState& s, const std::vector<float>& stiffeni
 }
 
 bool MlsSubsteps::is_due(const MlsState& s) const {
-  return limit_ == 0 || s.time - measured_at_ > kLongestAge ||
+  return limit_ == 0 || s.time - measured_at_ > (was_cut_ ? kLongestAgeCut : kLongestAge) ||
          (growth_ > kMostGrowth && s.time > measured_at_);
 }
 
@@ -65,6 +67,48 @@ void MlsSubsteps::measure(const MlsState& s, const MlsForces& forces) {
   measured_ = now_;
   measured_at_ = s.time;
   growth_ = 1;
+  was_cut_ = false;
+  std::vector<double> of_group(s.groups(), 0.0);
+  s.cpu->for_each(s.groups(), [&](int group) {
+    const int first = group * kMlsGroup, last = std::min(s.count(), first + kMlsGroup);
+    for (int i = first; i < last; ++i) of_group[group] = std::max(of_group[group], own_rate(s, i));
+  });
+  most_rate_ = of_group.empty() ? 0 : *std::max_element(of_group.begin(), of_group.end());
+}
+
+void MlsSubsteps::cut(const MlsState& s, const std::vector<std::int32_t>& nodes) {
+  was_cut_ = true;
+  for (const std::int32_t i : nodes) {
+    if (own_rate(s, i) > kMostRate * most_rate_) limit_ = 0;
+  }
+}
+
+double own_rate(const MlsState& s, std::int32_t i) {
+  const MlsPairs& p = s.pairs;
+  double sum = 0;
+  if (s.thread[i] != 0) {
+    for (std::int32_t e = p.begin[i]; e < p.begin[i + 1]; ++e) {
+      sum += s.spring[e] * (s.inv_mass[i] + s.inv_mass[p.other[e]]);
+    }
+    return sum;
+  }
+  // Its strain is sum_j (u_j - u_i) (x) g_j with g_j = w_ij M_i^-1 r_ij.
+  double all[3] = {};
+  for (std::int32_t e = p.begin[i]; e < p.begin[i + 1]; ++e) {
+    const std::int32_t j = p.other[e];
+    double r[3], g[3];
+    for (int a = 0; a < 3; ++a) r[a] = s.place[4 * j + a] - s.place[4 * i + a];
+    const auto m = [&](int k) { return static_cast<double>(s.inverse_moment[k][i]); };
+    g[0] = p.weight[e] * (m(0) * r[0] + m(3) * r[1] + m(4) * r[2]);
+    g[1] = p.weight[e] * (m(3) * r[0] + m(1) * r[1] + m(5) * r[2]);
+    g[2] = p.weight[e] * (m(4) * r[0] + m(5) * r[1] + m(2) * r[2]);
+    for (int a = 0; a < 3; ++a) {
+      sum += g[a] * g[a] * s.inv_mass[j];
+      all[a] += g[a];
+    }
+  }
+  for (const double g : all) sum += g * g * s.inv_mass[i];
+  return (s.volume_lambda[i] + 2 * s.volume_mu[i]) * sum;
 }
 
 PartSubsteps MlsSubsteps::part(const MlsState& s, double time) {

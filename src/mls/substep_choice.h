@@ -1,6 +1,7 @@
 // How long a substep of the meshless method may be.
 #pragma once
 
+#include <cstdint>
 #include <vector>
 
 #include "frame/part_substeps.h"
@@ -9,10 +10,11 @@
 
 namespace tissue_sim {
 
-/// The limit of stability is measured (Lanczos' method) when something was cut, when a node
-/// stiffened by a third, and every half second; in between the largest growth of any node's modulus
-/// shortens the substep. A part of a frame that stiffened until its substeps were too long is
-/// undone and done again with shorter ones.
+/// The limit of stability is measured (Lanczos' method) when a node stiffened by a third, and every
+/// half second, or tenth while something is cut; at once where a cut leaves a node whose own_rate()
+/// is more than that of all when it was measured, as few cuts do. In between the largest growth of
+/// any node's modulus shortens the substep. A part of a frame that stiffened until its substeps
+/// were too long is undone and done again with shorter ones.
 class MlsSubsteps {
  public:
   /// Whether measure() is due before the next part.
@@ -24,8 +26,8 @@ class MlsSubsteps {
   /// After a part: `stiffening` of each node (MlsKernels::measure), whether its substeps of `dt`
   /// were borne. If not, the next ones are shorter.
   bool is_borne(const MlsState& state, const std::vector<float>& stiffening, double dt);
-  /// A cut made the limit void.
-  void forget() { limit_ = 0; }
+  /// These nodes lost pairs.
+  void cut(const MlsState& state, const std::vector<std::int32_t>& nodes);
 
  private:
   template <class Archive>
@@ -43,6 +45,12 @@ class MlsSubsteps {
   int count_ = 64;               ///< substeps of a part at most
   double shortened_ = 1;         ///< after parts that were not borne
   bool is_new_ = true;           ///< the limit was not known before it was measured last
+  bool was_cut_ = false;         ///< since it was measured
+  double most_rate_ = 0;         ///< largest own_rate() of a node when it was measured [1/s^2]
 };
+
+/// Largest eigenvalue that the energy of a node's own strain has by itself, or less than three
+/// times it: how fast nodes around it swing hangs on that [1/s^2].
+double own_rate(const MlsState& state, std::int32_t node);
 
 }  // namespace tissue_sim

@@ -45,21 +45,7 @@ void MlsTissue::part(const std::vector<std::int32_t>& changed, CutReport& report
     return p.begin[i] == p.begin[i + 1] || changed.size() == s.nodes.place.size();
   });
   if (!may_have) return;
-  // Within blocks side by side, which touch nothing of one another; then between them. The root of
-  // a component is its lowest node whatever the order.
-  constexpr std::int32_t kBlock = 2048;
-  UnionFind linked(s.count());
-  const int blocks = (s.count() + kBlock - 1) / kBlock;
-  const auto join = [&](int block, bool within) {
-    const std::int32_t first = block * kBlock, last = std::min(s.count(), first + kBlock);
-    for (std::int32_t i = first; i < last; ++i) {
-      for (std::int32_t e = p.begin[i + 1]; e-- > p.begin[i] && p.other[e] > i;) {
-        if ((p.other[e] < last) == within && p.crossed[e] == 0) linked.join(i, p.other[e]);
-      }
-    }
-  };
-  state_->cpu->for_each(blocks, [&](int block) { join(block, true); });
-  for (int block = 0; block < blocks; ++block) join(block, false);
+  UnionFind linked = join_uncrossed(s);
   for (const int id : update_pieces(s.nodes.volume.data(), linked, pieces_)) {
     report.new_fragments.push_back(id);
   }
@@ -71,12 +57,12 @@ void MlsTissue::cut(const BladePath& path, const float* u_begin, CutReport& repo
   cross_pairs(*state_, path, u_begin, state_->u.data(), changed, report);
   if (changed.empty()) return;
   pairs_changed();
-  forget();
+  forget(changed);
   part(changed, report);
 }
 
-void MlsTissue::forget() {
-  substeps_.forget();
+void MlsTissue::forget(const std::vector<std::int32_t>& changed) {
+  substeps_.cut(*state_, changed);
   pieces_measured_ = false;
   may_touch_ = true;
   search_node_contacts(*state_);
@@ -177,7 +163,7 @@ void MlsTissue::break_bonds(double share) {
   std::vector<std::int32_t> changed;
   cross_entries(s, tearing, changed, result_.tear_report);
   pairs_changed();
-  forget();
+  forget(changed);
   part(changed, result_.tear_report);
 }
 

@@ -92,7 +92,8 @@ class MlsTissue : public Tissue {
   };
 
   void cut(const BladePath& path, const float* u_begin, CutReport& report);
-  void forget();  ///< what a cut or a tear makes void
+  /// What a cut or a tear makes void that took pairs from these nodes.
+  void forget(const std::vector<std::int32_t>& changed);
   /// Pieces anew, after these nodes lost pairs.
   void part(const std::vector<std::int32_t>& changed, CutReport& report);
 

@@ -1,0 +1,168 @@
+#include "mls/crossing.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+
+#include "cutting/blade_sweep.h"
+
+namespace tissue_sim {
+namespace {
+
+/// Chunks that a thread looks at at a time.
+constexpr int kBlock = 32;
+/// Of sides: a bit for each side of each of three slabs.
+constexpr std::uint8_t kAllSides = 0x3f;
+/// Rounding of what a node's place comes to along an axis, over the sum of its coordinates.
+constexpr float kRounding = 2e-6f;
+
+/// On which sides of what an edge sweeps nodes stay, with room before and behind for what slots
+/// name there.
+class Sides {
+ public:
+  explicit Sides(int chunks) : of_(static_cast<std::size_t>(chunks + 2) * kMlsChunk, kAllSides) {}
+  std::uint8_t* at(std::int32_t node) { return of_.data() + kMlsChunk + node; }
+  const std::uint8_t* at(std::int32_t node) const { return of_.data() + kMlsChunk + node; }
+
+ private:
+  std::vector<std::uint8_t> of_;
+};
+
+struct Sweep {
+  const MlsState& s;
+  const float *u_begin, *u_end;
+};
+
+MovingSegment link_of(const Sweep& w, std::int32_t i, std::int32_t j) {
+  const auto at = [&](std::int32_t node, const float* u) {
+    const float* x = &w.s.place[4 * static_cast<std::size_t>(node)];
+    u += 4 * static_cast<std::size_t>(node);
+    return Vec3(Vec3(x[0], x[1], x[2]) + Vec3(u[0], u[1], u[2]));
+  };
+  return {at(i, w.u_begin), at(j, w.u_begin), at(i, w.u_end), at(j, w.u_end)};
+}
+
+/// Sides of a chunk's nodes: those on which they stay for certain.
+void find_sides(const Sweep& w, const SweptEdge& edge, int chunk, std::uint8_t* sides) {
+  float x[2][3][kMlsChunk], margin[kMlsChunk];
+  const float* place = &w.s.place[4 * static_cast<std::size_t>(chunk) * kMlsChunk];
+  for (int end = 0; end < 2; ++end) {
+    const float* u =
+        (end == 0 ? w.u_begin : w.u_end) + 4 * static_cast<std::size_t>(chunk) * kMlsChunk;
+    for (int a = 0; a < 3; ++a) {
+      for (int l = 0; l < kMlsChunk; ++l) x[end][a][l] = place[4 * l + a] + u[4 * l + a];
+    }
+  }
+  for (int l = 0; l < kMlsChunk; ++l) {
+    float sum = 0;
+    for (int a = 0; a < 3; ++a) sum += std::fabs(x[0][a][l]) + std::fabs(x[1][a][l]);
+    margin[l] = kRounding * sum;
+  }
+  std::int32_t bits[kMlsChunk] = {};
+  for (int k = 0; k < 3; ++k) {
+    const Slab& slab = edge.slabs[k];
+    const auto a = static_cast<float>(slab.axis[0]), b = static_cast<float>(slab.axis[1]),
+               c = static_cast<float>(slab.axis[2]);
+    const auto low = static_cast<float>(slab.low - kRounding * std::fabs(slab.low)),
+               high = static_cast<float>(slab.high + kRounding * std::fabs(slab.high));
+    for (int l = 0; l < kMlsChunk; ++l) {
+      const float p = a * x[0][0][l] + b * x[0][1][l] + c * x[0][2][l];
+      const float q = a * x[1][0][l] + b * x[1][1][l] + c * x[1][2][l];
+      const float most = p > q ? p : q, least = p > q ? q : p;
+      bits[l] |=
+          (most + margin[l] < low ? 1 << 2 * k : 0) | (least - margin[l] > high ? 2 << 2 * k : 0);
+    }
+  }
+  for (int l = 0; l < kMlsChunk; ++l) sides[l] = static_cast<std::uint8_t>(bits[l]);
+}
+
+bool passes(const Sweep& w, const SweepPart& part, const SweptEdge& edge, std::int32_t i,
+            std::int32_t j) {
+  const MovingSegment link = link_of(w, i, j).during(part.begin, part.end);
+  return !stays_aside(edge, link) && edge_passes(edge, link);
+}
+
+/// Whether any of eight nodes and the eight others have no side in common, whose sides are below
+/// 0x80.
+bool any_astride(const std::uint8_t* sides, const std::uint8_t* others) {
+  constexpr std::uint64_t kOnes = 0x7f7f7f7f7f7f7f7full;
+  std::uint64_t a, b;
+  std::memcpy(&a, sides, sizeof(a));
+  std::memcpy(&b, others, sizeof(b));
+  return (((a & b) + kOnes) & ~kOnes) != ~kOnes;
+}
+
+/// Of pairs of the chunk's nodes with later ones.
+void search_chunk(const Sweep& w, const SweepPart& part, const SweptEdge& edge, const Sides& sides,
+                  int chunk, std::vector<std::int32_t>& found) {
+  const MlsPairs& p = w.s.pairs;
+  const MlsLanes& lanes = w.s.lanes;
+  const std::int32_t first = chunk * kMlsChunk, last = std::min(w.s.count(), first + kMlsChunk);
+  const MlsSlots& slots = lanes.of_chunk[chunk];
+  for (std::int32_t slot = slots.first; slot < slots.end; ++slot) {
+    const std::int32_t other = lanes.first[slot];
+    if (other <= first) continue;
+    for (int half = 0; half < kMlsChunk; half += 8) {
+      if (!any_astride(sides.at(first + half), sides.at(other + half))) continue;
+      for (int l = half; l < half + 8; ++l) {
+        if ((*sides.at(first + l) & *sides.at(other + l)) != 0) continue;
+        const std::int32_t i = first + l, j = other + l;
+        if (i >= last || j >= w.s.count()) continue;
+        const std::int32_t e = p.find(i, j);  // rows end within a slot: they may be no pair
+        if (e >= 0 && p.crossed[e] == 0 && passes(w, part, edge, i, j)) found.push_back(e);
+      }
+    }
+  }
+  if (slots.first < slots.end) return;
+  for (std::int32_t i = first; i < last; ++i) {
+    const std::uint8_t own = *sides.at(i);
+    for (std::int32_t e = p.begin[i]; e < p.begin[i + 1]; ++e) {
+      const std::int32_t j = p.other[e];
+      if (j < i || (own & *sides.at(j)) != 0 || p.crossed[e] != 0) continue;
+      if (passes(w, part, edge, i, j)) found.push_back(e);
+    }
+  }
+}
+
+}  // namespace
+
+std::vector<std::int32_t> find_crossed(const MlsState& s, const BladePath& path,
+                                       const float* u_begin, const float* u_end) {
+  const Sweep w{s, u_begin, u_end};
+  const int chunks = s.chunks(), blocks = (chunks + kBlock - 1) / kBlock;
+  Sides sides(chunks);
+  std::vector<std::uint8_t> common(blocks);  // sides on which all of a block stay
+  std::vector<std::vector<std::int32_t>> of_block(blocks);
+  std::vector<std::int32_t> found;
+  for (const SweepPart& part : sweep_parts(path)) {
+    for (const SweptEdge& edge : part.edges) {
+      s.cpu->for_each(blocks, [&](int block) {
+        const int first = block * kBlock, last = std::min(chunks, first + kBlock);
+        common[block] = kAllSides;
+        for (int chunk = first; chunk < last; ++chunk) {
+          std::uint8_t* of = sides.at(chunk * kMlsChunk);
+          find_sides(w, edge, chunk, of);
+          for (int l = 0; l < std::min(kMlsChunk, s.count() - chunk * kMlsChunk); ++l) {
+            common[block] &= of[l];
+          }
+        }
+      });
+      std::uint8_t all = kAllSides;
+      for (const std::uint8_t c : common) all &= c;
+      if (all != 0) continue;
+      s.cpu->for_each(blocks, [&](int block) {
+        const int first = block * kBlock, last = std::min(chunks, first + kBlock);
+        for (int chunk = first; chunk < last; ++chunk) {
+          search_chunk(w, part, edge, sides, chunk, of_block[block]);
+        }
+      });
+      for (std::vector<std::int32_t>& some : of_block) {
+        found.insert(found.end(), some.begin(), some.end());
+        some.clear();
+      }
+    }
+  }
+  return found;
+}
+
+}  // namespace tissue_sim

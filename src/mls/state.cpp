@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "frame/leapfrog.h"
+#include "mls/anchors.h"
 #include "mls/contact.h"
 #include "mls/node_contact.h"
 
@@ -58,7 +59,7 @@ float whole_kappa(const MlsState& s, std::int32_t i) {
     const std::int32_t j = s.pairs.other[e];
     trace += s.pairs.whole[e] * (s.nodes.place[j] - s.nodes.place[i]).squaredNorm();
   }
-  const double stiffness = s.nodes.material_of(i).young_modulus * s.nodes.volume[i];
+  const double stiffness = s.nodes.material_of(i).young_modulus * s.nodes.free_volume[i];
   return trace > 0 ? static_cast<float>(3 * s.scene.mls.stabilisation * stiffness / trace) : 0.0f;
 }
 
@@ -123,6 +124,7 @@ std::unique_ptr<MlsState> make_mls_state(const Scene& scene, std::vector<std::st
   s.cpu = std::make_unique<Cpu>(scene.threads);
   s.nodes = make_mls_nodes(scene, notes);
   s.pairs = make_pairs(s.nodes, scene.mls.neighbours, *s.cpu);
+  hold_at_faces(scene, support_factor(scene.mls.neighbours), s.nodes, s.pairs);
   if (scene.mls.basis == MlsBasis::kBalanced) balance(s.nodes, *s.cpu, s.pairs);
   const int n = s.count();
   for (Array<float>* a : {&s.place, &s.u, &s.v, &s.u_next, &s.v_next}) resize_padded(*a, n, 4);
@@ -144,14 +146,14 @@ std::unique_ptr<MlsState> make_mls_state(const Scene& scene, std::vector<std::st
   std::vector<std::int32_t> all(n);
   for (std::int32_t i = 0; i < n; ++i) {
     const Material& m = s.nodes.material_of(i);
-    const float volume = s.nodes.volume[i];
+    const float volume = s.nodes.volume[i], strained = s.nodes.free_volume[i];
     for (int a = 0; a < 3; ++a) s.place[4 * i + a] = static_cast<float>(s.nodes.place[i][a]);
     s.place[4 * i + 3] = s.nodes.depth[i];
     s.mass[i] = static_cast<float>(m.density) * volume;
     s.inv_mass[i] = s.nodes.anchored[i] != 0 ? 0 : 1 / s.mass[i];
-    s.volume_mu[i] = static_cast<float>(lame_mu(m)) * volume;
-    s.volume_lambda[i] = static_cast<float>(lame_lambda(m)) * volume;
-    s.volume_eta[i] = static_cast<float>(m.viscosity) * volume;
+    s.volume_mu[i] = static_cast<float>(lame_mu(m)) * strained;
+    s.volume_lambda[i] = static_cast<float>(lame_lambda(m)) * strained;
+    s.volume_eta[i] = static_cast<float>(m.viscosity) * strained;
     s.viscous = s.viscous || m.viscosity > 0;
     s.neo_hookean[i] = m.law == Law::kNeoHookean ? 1 : 0;
     s.edge[i] = static_cast<float>(s.pairs.support[i] / factor);

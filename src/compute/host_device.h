@@ -4,9 +4,12 @@
 #if defined(__CUDACC__)
 #define TISSUE_SIM_HOST_DEVICE __host__ __device__
 #define TISSUE_SIM_INLINE __host__ __device__ __forceinline__
+// For what kernels seldom need: inlined, it would take room among the instructions that they do.
+#define TISSUE_SIM_APART __host__ __device__ __noinline__ inline
 #else
 #define TISSUE_SIM_HOST_DEVICE
 // Always inlined on the CPU: the code is then compiled for the instruction set of the kernel that
 // it is inlined into, which is how one header serves SSE2, AVX2 and AVX-512 in one binary.
 #define TISSUE_SIM_INLINE inline __attribute__((always_inline))
+#define TISSUE_SIM_APART inline
 #endif

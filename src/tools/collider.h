@@ -70,7 +70,7 @@ TISSUE_SIM_INLINE float box_distance(const float* p, const float* half, int axes
 }
 
 /// The cylinder up the shaft from the tip, or the box, with rounded edges: p is local.
-TISSUE_SIM_INLINE float rounded_distance(const Collider& c, const float* p, float* n) {
+TISSUE_SIM_APART float rounded_distance(const Collider& c, const float* p, float* n) {
   if (c.kind == Collider::kPlate) {
     const float half[3] = {0.5f * c.width - c.edge, 0.5f * c.thickness - c.edge,
                            0.5f * c.length - c.edge};

@@ -69,6 +69,37 @@ TEST_P(Weight, OfABodyOnRodsIsWhatTheRodsFeel) {
       << felt.torque.transpose();
 }
 
+// Under its left half a plate, under its right half a punch, their faces up.
+TEST_P(Weight, OfABodyOnAPlateAndAPunchIsWhatTheyFeel) {
+  Scene scene = box_at(1e-4);
+  Tool& plate = scene.tools.emplace_back();
+  plate.name = "plate";
+  plate.type = ToolType::kPlate;
+  plate.size = Vec3(0.018, 0.03, 0.01);
+  Tool& punch = scene.tools.emplace_back();
+  punch.name = "punch";
+  punch.type = ToolType::kPunch;
+  punch.radius = 0.008;
+  for (Tool& tool : scene.tools) {
+    tool.edge_radius = 0.001;
+    tool.length = 0.02;
+    tool.friction = 0.6;
+  }
+  const std::vector<Pose> up = {{Vec3(-0.01, 0, 0), Quat::Identity()},
+                                {Vec3(0.01, 0, 0), Quat::Identity()}};
+  Simulation simulation(scene);
+  for (int i = 0; i < 2; ++i) simulation.set_tool(i, up[i]);
+  for (int f = 0; f < 150; ++f) simulation.advance_frame();
+  const Wrench felt = carried(simulation, up);
+  const Fragment piece = simulation.tissue().fragments()[0];
+  ASSERT_LT(piece.velocity.norm(), 2e-4) << "it is not at rest";
+  const Vec3 weight(0, 0, -kWeight);
+  EXPECT_LT((felt.force - weight).norm(), within().weight * kWeight) << felt.force.transpose();
+  EXPECT_LT((felt.torque - piece.centroid.cross(weight)).norm(),
+            within().moment * kWeight * kSize[0])
+      << felt.torque.transpose();
+}
+
 // The same body in two halves: all of it is carried, however it is cut.
 TEST_P(Weight, StaysWhenTheBodyIsCut) {
   const double radius = 0.006;

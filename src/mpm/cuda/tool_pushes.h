@@ -14,6 +14,10 @@ __device__ __forceinline__ bool may_touch(const Collider& c, const float* x, flo
   float p[3];
   to_local(c, x, p);
   if (c.kind == Collider::kPlane) return p[2] < radius;
+  if (c.kind >= Collider::kPunch) {
+    float n[3];
+    return rounded_distance(c, p, n) < radius;
+  }
   if (c.kind != Collider::kBlade) {
     const float z = p[2] - fminf(fmaxf(p[2], -c.length), -c.radius), reach = c.radius + radius;
     return p[0] * p[0] + p[1] * p[1] + z * z < reach * reach &&

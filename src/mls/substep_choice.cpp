@@ -78,6 +78,7 @@ void MlsSubsteps::measure(const MlsState& s, const MlsForces& forces) {
 
 void MlsSubsteps::cut(const MlsState& s, const std::vector<std::int32_t>& nodes) {
   was_cut_ = true;
+  if (limit_ == 0) return;  // it is measured anyway
   for (const std::int32_t i : nodes) {
     if (own_rate(s, i) > kMostRate * most_rate_) limit_ = 0;
   }

@@ -80,7 +80,7 @@ inline double mls_energy(const MlsState& s, const std::vector<double>& u) {
       whole += s.pairs.whole[e] * r.squaredNorm();
     }
     const Material& m = s.nodes.material_of(i);
-    const double volume = s.nodes.volume[i];
+    const double volume = s.nodes.free_volume[i];
     if (s.thread[i] != 0) {
       for (int e = s.pairs.begin[i]; e < s.pairs.begin[i + 1]; ++e) {
         pair(e, r, d);
@@ -129,7 +129,7 @@ inline std::vector<Vec3> mls_forces(const MlsState& s) {
       whole += s.pairs.whole[e] * r.squaredNorm();
     });
     const Material& m = s.nodes.material_of(i);
-    const double volume = s.nodes.volume[i];
+    const double volume = s.nodes.free_volume[i];
     double F[9], P[9];
     for (int k = 0; k < 9; ++k) F[k] = H[i](k / 3, k % 3) + (k % 4 == 0);
     if (m.law == Law::kNeoHookean) {

@@ -5,6 +5,13 @@
 
 namespace tissue_sim {
 namespace pbd {
+namespace {
+
+constexpr double kViscosity = 1;      // [Pa s]
+constexpr double kDensity = 1000;     // [kg/m^3]
+constexpr double kLeastDecay = 0.95;  // a frame's; larger pieces, of some 5 cm^3, keep all
+
+}  // namespace
 
 std::vector<Flight> flights(const State& s) {
   const Vertices& v = s.vertices;
@@ -40,14 +47,20 @@ std::vector<RigidChange> missing_motion(const Scene& scene, const std::vector<Fl
       speed = decay * speed + h * scene.gravity;
       angular *= decay;
     }
-    changes[c].linear = speed - now[c].linear / now[c].mass;
+    const double mass = now[c].mass;
+    const double rate = kViscosity / (kDensity * std::pow(mass / kDensity, 2.0 / 3));
+    const double keep = std::exp(-rate * steps * h);
+    changes[c].keep = keep < kLeastDecay ? keep : 1;
+    const double lost = 1 - changes[c].keep;
+    changes[c].linear = speed - changes[c].keep * now[c].linear / mass;
     // A piece of few vertices may have no inertia about one of its axes: it has no spin there.
     const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes(now[c].inertia);
     const Vec3 missing = axes.eigenvectors().transpose() * (angular - now[c].angular);
+    const Vec3 there = axes.eigenvectors().transpose() * now[c].angular;
     for (int a = 0; a < 3; ++a) {
       const double moment = axes.eigenvalues()[a];
       if (!(moment > 1e-3 * axes.eigenvalues()[2])) continue;
-      changes[c].spin += missing[a] / moment * axes.eigenvectors().col(a);
+      changes[c].spin += (missing[a] + lost * there[a]) / moment * axes.eigenvectors().col(a);
     }
   }
   return changes;
@@ -64,7 +77,10 @@ void keep_momentum(State& s, const std::vector<Flight>& before, int steps, float
     const RigidChange& change = changes[s.component[i]];
     if (!change.is_free) continue;
     const Vec3 add = change.linear + change.spin.cross(v.position(i) - change.centre);
-    for (int a = 0; a < 3; ++a) v.v[4 * i + a] += static_cast<float>(add[a]);
+    const auto keep = static_cast<float>(change.keep);
+    for (int a = 0; a < 3; ++a) {
+      v.v[4 * i + a] = keep * v.v[4 * i + a] + static_cast<float>(add[a]);
+    }
   }
 }
 

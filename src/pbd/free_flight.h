@@ -18,19 +18,22 @@ struct Flight {
 };
 std::vector<Flight> flights(const State& s);
 
-/// What a rigid motion adds to the velocities of what hangs together.
+/// What hangs together gets `keep` of its velocities, and a rigid motion.
 struct RigidChange {
   bool is_free = false;  ///< nothing where not
+  double keep = 1;
   Vec3 centre = Vec3::Zero(), linear = Vec3::Zero(), spin = Vec3::Zero();
 };
-/// What each is short of after `steps` of `h` seconds, see keep_momentum(); what touched anything
-/// is not free in `now`.
+/// What gives each what it is short of after `steps` of `h` seconds, see keep_momentum(); what
+/// touched anything is not free in `now`.
 std::vector<RigidChange> missing_motion(const Scene& scene, const std::vector<Flight>& before,
                                         const std::vector<Flight>& now, int steps, float h);
 
 /// After `steps` of `h` seconds: what is free and touched nothing (State::pushed) gets a rigid
 /// motion that gives it the momentum that gravity and damping leave of the one before. Constraints
-/// change none; their rounding does, by 2 % in four seconds.
+/// change none; their rounding does, by 2 % in four seconds. What small pieces move by apart from
+/// their rigid motion decays as a viscosity of 1 Pa s (liver's) would have it at their size: scraps
+/// of some ten vertices that hang together by a few edges have nothing else that stops them.
 void keep_momentum(State& s, const std::vector<Flight>& before, int steps, float h);
 
 }  // namespace pbd

@@ -22,6 +22,10 @@ std::vector<InternalLink> find_internal_links(const TriangleMesh& mesh,
   const std::vector<Vec3> normals = vertex_normals(mesh);
   const RayTree tree(mesh);
   std::vector<InternalLink> links;
+  // Where rays meet, as at the ends of an ellipsoid, one vertex would get forty links, each a
+  // colour of its own: others of the triangle take the rest.
+  constexpr int kMost = 6;
+  std::vector<int> count(mesh.vertices.size(), 0);
   for (std::size_t i = 0; i < starts.size(); ++i) {
     const int v = starts[i];
     if (normals[v].isZero()) continue;
@@ -38,6 +42,10 @@ std::vector<InternalLink> find_internal_links(const TriangleMesh& mesh,
         nearest = corner;
       }
     }
+    for (const int corner : mesh.triangles[hit.triangle]) {
+      if (count[nearest] >= kMost && count[corner] < count[nearest]) nearest = corner;
+    }
+    ++count[nearest];
     links.push_back({v, nearest, hit.along});
   }
   return links;

@@ -127,6 +127,34 @@ TEST_P(CutMeshes, AWaveAndALevelCutMakeFour) {
   expect_sound(simulation, volume);
 }
 
+// What closes a wound is the sheet that the blade swept, not the flattest one across.
+TEST_P(CutMeshes, ABentCutPartsWhatLiesBehindIt) {
+  const auto bent = [](double y) { return 0.008 + 0.008 * std::cos(40 * y); };
+  std::vector<Vec3> places;
+  for (int i = 0; i <= 40; ++i) {
+    const double y = 0.0025 * (i - 20);
+    places.push_back(Vec3(bent(y), y, 0));
+  }
+  Simulation simulation(lobe(GetParam()));
+  const double volume = whole_volume(simulation.tissue());
+  simulation.cut(stroke(-kUp, kUp, places));
+  simulation.advance_frame();
+  ASSERT_EQ(simulation.tissue().fragments().size(), 2u);
+  int count = 0, all = 0;  // places of the ellipsoid, evenly
+  for (double z = -0.0195; z < 0.02; z += 0.001) {
+    for (double y = -0.0305; y < 0.031; y += 0.001) {
+      for (double x = -0.0545; x < 0.055; x += 0.001) {
+        if (Vec3(x / 0.055, y / 0.031, z / 0.020).squaredNorm() > 1) continue;
+        ++all;
+        count += x > bent(y) ? 1 : 0;
+      }
+    }
+  }
+  EXPECT_NEAR(simulation.tissue().fragments()[1].volume / volume, static_cast<double>(count) / all,
+              0.005);
+  expect_sound(simulation, volume);
+}
+
 // An instrument's blade: two millimetres a frame, and it waits on its way.
 TEST_P(CutMeshes, AScalpelThatStopsAndGoesOnPartsInTwo) {
   Scene scene = lobe(GetParam());

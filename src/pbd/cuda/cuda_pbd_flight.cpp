@@ -87,6 +87,7 @@ void CudaPbdTissue::keep_momentum(int steps, float h) {
   bool any = false;
   for (std::size_t c = 0; c < changes.size(); ++c) {
     packed[c].is_free = changes[c].is_free ? 1 : 0;
+    packed[c].keep = changes[c].keep;
     any = any || changes[c].is_free;
     for (int a = 0; a < 3; ++a) {
       packed[c].centre[a] = changes[c].centre[a];

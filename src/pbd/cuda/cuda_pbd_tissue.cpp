@@ -113,7 +113,7 @@ void CudaPbdTissue::choose_way() {
   const bool is_surface = s.elastics.blocks.empty() && s.strains.blocks.empty();
   const int threads = is_surface ? 1024 : 512;
   const double one_block =
-      time_of(s.elastics.begin, threads, 1.2, 0.8) + time_of(s.strains.begin, threads, 1.5, 0.9) +
+      time_of(s.elastics.begin, threads, 1.0, 0.6) + time_of(s.strains.begin, threads, 1.3, 0.7) +
       time_of(s.links.begin, threads, 0.2, 0.2) + time_of(s.bends.begin, threads, 0.3, 0.7);
   const int count = pbd::pbd_projection_launches(colours(s));
   const int all = static_cast<int>(s.elastics.begin.size() + s.strains.begin.size() +

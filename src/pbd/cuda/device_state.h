@@ -82,7 +82,7 @@ struct CudaPbdFlights {
 };
 /// RigidChange, for each component.
 struct CudaPbdChange {
-  double centre[3], linear[3], spin[3];
+  double keep, centre[3], linear[3], spin[3];
   int is_free;
 };
 

@@ -71,9 +71,10 @@ __global__ void __launch_bounds__(kThreads)
   const float4 x = f.x[i];
   float4 v = f.v[i];
   const double d[3] = {x.x - c.centre[0], x.y - c.centre[1], x.z - c.centre[2]};
-  v.x += static_cast<float>(c.linear[0] + (c.spin[1] * d[2] - c.spin[2] * d[1]));
-  v.y += static_cast<float>(c.linear[1] + (c.spin[2] * d[0] - c.spin[0] * d[2]));
-  v.z += static_cast<float>(c.linear[2] + (c.spin[0] * d[1] - c.spin[1] * d[0]));
+  const auto keep = static_cast<float>(c.keep);
+  v.x = keep * v.x + static_cast<float>(c.linear[0] + (c.spin[1] * d[2] - c.spin[2] * d[1]));
+  v.y = keep * v.y + static_cast<float>(c.linear[1] + (c.spin[2] * d[0] - c.spin[0] * d[2]));
+  v.z = keep * v.z + static_cast<float>(c.linear[2] + (c.spin[0] * d[1] - c.spin[1] * d[0]));
   f.v[i] = v;
 }
 

@@ -9,11 +9,11 @@
 #include <string>
 
 #include "mpm/anchors/anchored_share.h"
+#include "mpm/anchors/hold_beside_tools.h"
 
 namespace tissue_sim {
 namespace {
 
-constexpr float kDrift = 0.1f;  // of what rounding left of a face, mended in a substep
 constexpr int kLargestGroup = 64;
 constexpr double kNearestAxis = 0.9;  // a row goes through a face where its axis is that close to
                                       // the one that is closest to the normal
@@ -377,7 +377,7 @@ void hold_group(AnchorFaces& faces, int index, float dt, const RigidMotion* befo
       }
       // u has moved by dt v already: what it was off before.
       const float off = target[a] - shift[a] * dt - (u - dt * v);
-      left[i][a] = shift[a] - v + kDrift * off / dt;
+      left[i][a] = shift[a] - v + kFaceDrift * off / dt;
     }
   }
   for (int i = 0; i < g.count; ++i) {

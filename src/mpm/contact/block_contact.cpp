@@ -342,6 +342,27 @@ void value_at(const Array<float>* field, const CellNodes& cell, bool has_whole_r
   }
 }
 
+float largest_inv_mass(const Nodes& nodes, const CellNodes& cell) {
+  float largest = 0;
+  for (int row = 0; row < 9; ++row) {
+    for (int x = 0; x < 3; ++x) {
+      const std::int32_t node = cell.row(row % 3, row / 3)[x];
+      if (node >= 0) largest = std::max(largest, nodes.inv_mass[node]);
+    }
+  }
+  return largest;
+}
+
+/// Sum of the squares of the 27 weights.
+float squared(const AxisWeights& weights) {
+  float product = 1;
+  for (int a = 0; a < 9; a += 3) {
+    const float* w = weights.of + a;
+    product *= w[0] * w[0] + w[1] * w[1] + w[2] * w[2];
+  }
+  return product;
+}
+
 /// The same on its places on the surface. Adds to `points` those that the collider may hold, for it
 /// holds places of theirs: that face away, or so deep that places around are not enough.
 bool push_surface(BlockPush& b, const NearCell& cell, const Collider& collider, ColliderLoad& load,
@@ -359,6 +380,7 @@ bool push_surface(BlockPush& b, const NearCell& cell, const Collider& collider, 
   const float dt2 = b.state.contacts.inertia.dt * b.state.contacts.inertia.dt;
   const float beside = collider.kind == Collider::kJaw ? kBeside * h : 0;
   bool touches = false;
+  float lightest = -1;
   const auto faces_away = [&](const SurfacePlace& place, const Gap& g) {
     float F[9], n[3], along = 0, length = 0;
     deformation_gradient_at(b.state.nodes.u, nodes, b.body.cell_size, place.place, F);
@@ -401,11 +423,14 @@ bool push_surface(BlockPush& b, const NearCell& cell, const Collider& collider, 
     spring.cohesion = collider.cohesion * place.area / unit_area;
     // Along the surface no inerter helps: at rims and on crumbs, whose nodes are light, the spring
     // is what the substep bears.
-    const auto light = static_cast<float>(mobility(b.state.nodes, nodes, weights)) * b.dt * b.dt;
-    if (spring.along * light > kAlongBorne) {
-      const float share = kAlongBorne / (spring.along * light);
-      spring.along *= share;
-      spring.damping_along *= share;
+    if (lightest < 0) lightest = largest_inv_mass(b.state.nodes, nodes);
+    const float per_mass = spring.along * b.dt * b.dt / kAlongBorne;
+    if (per_mass * lightest * squared(weights) > 1) {  // mobility is that at most
+      const float light = per_mass * static_cast<float>(mobility(b.state.nodes, nodes, weights));
+      if (light > 1) {
+        spring.along /= light;
+        spring.damping_along /= light;
+      }
     }
     float velocity[3], push[3], of_collider[3];
     value_at(b.state.nodes.v, nodes, whole_rows, weights, velocity);

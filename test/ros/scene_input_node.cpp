@@ -106,7 +106,7 @@ TEST_F(SceneInput, GravityAndDampingHoldFromTheNextFrameOnUntilReset) {
   send("gravity", gravity);
   sum = force(left_) + force(right_);
   EXPECT_NEAR(sum.y(), 0.5 * kWeight, 0.01 * kWeight) << "a gravity that is none is not taken";
-  Topic<FrameInput> inputs("/simulator/inputs");
+  Topic<FrameInputMessage> inputs("/simulator/inputs");
   ASSERT_TRUE(wait_until([&] { return inputs.connected(); }));
   std_msgs::Float64 damping;
   damping.data = 7;
@@ -123,6 +123,8 @@ TEST_F(SceneInput, GravityAndDampingHoldFromTheNextFrameOnUntilReset) {
 
 TEST_F(SceneInput, AnAnchorFollowsItsPosesAndTellsWhatItPulls) {
   Topic<sensor_msgs::PointCloud2> clouds("/simulator/tissue/points");
+  Topic<FrameInputMessage> inputs("/simulator/inputs");
+  ASSERT_TRUE(wait_until([&] { return inputs.connected(); }));
   geometry_msgs::PoseStamped pose;
   pose.pose.orientation.w = 1;
   pose.pose.position.z = 0.01;
@@ -130,6 +132,9 @@ TEST_F(SceneInput, AnAnchorFollowsItsPosesAndTellsWhatItPulls) {
     pose.pose.position.x = 0.02 + 0.0004 * i;
     send("anchors/right/measured_cp", pose);
     step(1);
+    ASSERT_TRUE(wait_until([&] { return inputs.count() >= static_cast<std::size_t>(i); }));
+    ASSERT_EQ(inputs.all().back()->anchors.size(), 2u) << i;
+    EXPECT_NEAR(inputs.all().back()->anchors[1].end.position.x, pose.pose.position.x, 1e-9) << i;
   }
   ASSERT_TRUE(settle(5).at_rest);
   const double pull = force(left_).x();

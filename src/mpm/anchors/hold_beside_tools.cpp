@@ -10,7 +10,7 @@ namespace {
 constexpr int kSweeps = 8;  // over rows that have nodes in common
 
 InertialNode* inertial_node(MpmState& state, std::int32_t node) {
-  const std::int32_t i = state.inertial_index[node];
+  const std::int32_t i = state.work.inertial_index[node];
   return i < 0 ? nullptr : &state.contacts.inertia.nodes[i];
 }
 
@@ -34,7 +34,7 @@ bool is_beside_tools(const MpmState& state, int i) {
   for (int r = g.first; r < g.first + g.count; ++r) {
     const FaceRow& row = state.anchors.rows[r];
     for (int k = 0; k < kRowNodes; ++k) {
-      if (row.share[k] != 0 && state.inertial_index[row.node[k]] >= 0) return true;
+      if (row.share[k] != 0 && state.work.inertial_index[row.node[k]] >= 0) return true;
     }
   }
   return false;

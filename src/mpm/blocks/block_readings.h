@@ -66,8 +66,7 @@ TISSUE_SIM_INLINE void read_stiffening(const Block& b, const BlockField& f, std:
   store<W>(read.stiffenings, load<W>(read.stiffenings) + keep<W>(is_point, at_most));
   if (!any_negative<W>(bits<W>(read.least - at_most) & is_point)) return;
   for (int i = 0; i < W; ++i) {
-    // What an anchor holds has no stress, however nodes beside it stretch it.
-    if (point[i] < 0 || b.volume[lane + i] == 0 || at_most[i] <= read.least) continue;
+    if (point[i] < 0 || at_most[i] <= read.least) continue;
     stiffen(b, f, point[i], std::max(cx[i], std::max(cy[i], cz[i])), J[i], f2[i], read);
   }
 }

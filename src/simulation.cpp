@@ -152,6 +152,12 @@ void Simulation::set_anchor(int anchor, const Pose& pose) {
   s.anchor_motion[anchor].end = {pose.position, pose.orientation.normalized()};
 }
 
+Pose Simulation::anchor(int anchor) const {
+  const State& s = *state_;
+  const Pose rest{s.anchors.at(anchor)->origin(), Quat::Identity()};
+  return s.anchor_motion.empty() ? rest : s.anchor_motion[anchor].end;
+}
+
 void Simulation::set_gravity(const Vec3& gravity) {
   Scene changed;
   changed.bodies.resize(1);

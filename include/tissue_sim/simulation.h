@@ -79,6 +79,8 @@ class Simulation {
   /// std::invalid_argument for an anchor that is not there or a pose that is not finite or no
   /// rotation.
   void set_anchor(int anchor, const Pose& pose);
+  /// Where it is now, or shall be at the end of the next frame. Throws std::out_of_range.
+  Pose anchor(int anchor) const;
   /// From the next frame on. Throw std::invalid_argument out of the scene's ranges.
   void set_gravity(const Vec3& gravity);
   void set_damping(double damping);

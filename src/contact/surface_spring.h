@@ -21,6 +21,9 @@ struct SurfaceSpring {
 inline constexpr float kAcross = 8, kAlong = 0.5f;
 inline constexpr float kDampingAcross = 0.1f;  ///< times the substep, of the stiffness
 inline constexpr float kDampingAlong = 0.1f;   ///< share of critical
+/// What stays in a substep of how deep contact began: a bounce of crumbs takes three substeps, one
+/// of a whole block some twenty.
+inline constexpr float kBegunStays = 1 - 1 / 128.0f;
 
 /// Of a place that stands for `area` [m^2] of tissue with this P-wave modulus [Pa] and density
 /// [kg/m^3], on a lattice of this cell size [m], for substeps of dt [s].
@@ -34,8 +37,13 @@ TISSUE_SIM_INLINE SurfaceSpring surface_spring(float modulus, float density, flo
 
 /// Force on the place at x with velocity v, in contact (`g.distance` < 0). `hold` is the place, in
 /// the collider's frame, that friction holds on to; it slides with x where the cone is reached.
+/// `begun` is how deep it was when contact began, where the spring has no force yet: else each
+/// place that comes a part of a substep's way too deep would bring energy with it, crumbs more than
+/// they have. It goes back little by little.
 TISSUE_SIM_INLINE void surface_force(const Collider& c, const Gap& g, const SurfaceSpring& spring,
-                                     const float* x, const float* v, float* hold, float* force) {
+                                     const float* x, const float* v, float* hold, float& begun,
+                                     float* force) {
+  begun = fminf(kBegunStays * begun, -g.distance);
   float vc[3], held[3], rel[3];
   velocity_at(c, x, vc);
   to_world(c, hold, held);
@@ -45,7 +53,8 @@ TISSUE_SIM_INLINE void surface_force(const Collider& c, const Gap& g, const Surf
     vn += rel[i] * g.normal[i];
     sn += (x[i] - held[i]) * g.normal[i];
   }
-  const float push = fmaxf(0.0f, -spring.across * g.distance - spring.damping_across * vn);
+  const float push =
+      fmaxf(0.0f, spring.across * (-g.distance - begun) - spring.damping_across * vn);
   float t[3], t2 = 0;
   for (int i = 0; i < 3; ++i) {
     t[i] = -spring.along * (x[i] - held[i] - sn * g.normal[i]) -

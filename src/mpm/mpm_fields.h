@@ -135,7 +135,7 @@ void fields(Archive& archive, AnchorFaces& a) {
 
 template <class Archive>
 void fields(Archive& archive, Touch& t) {
-  archive(t.cell, t.point, t.key, t.collider, t.hold, t.along, t.inertia);
+  archive(t.cell, t.point, t.key, t.collider, t.hold, t.along, t.inertia, t.begun);
 }
 
 template <class Archive>
@@ -146,7 +146,7 @@ void fields(Archive& archive, NearCell& c) {
 template <class Archive>
 void fields(Archive& archive, InertialNode& n) {
   archive(n.node, n.uses, n.changed, n.collider, n.place, n.mass, n.inertia, n.share, n.before,
-          n.impulse);
+          n.impulse, n.grown);
 }
 
 template <class Archive>

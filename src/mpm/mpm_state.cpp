@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "mpm/anchors/anchored_share.h"
+#include "mpm/anchors/hold_beside_tools.h"
 #include "mpm/contact/block_contact.h"
 #include "mpm/contact/surface_places.h"
 
@@ -175,7 +176,10 @@ float substep(MpmState& state, float dt, std::vector<ColliderLoad>& loads,
     resists.help(part);
     if (state.anchors.groups.empty()) return;
     resists.wait();
-    holds.help([&](int i) { hold_group(state.anchors, i, dt, before, after, state.nodes); });
+    holds.help([&](int i) {
+      if (is_beside_tools(state, i)) return hold_beside_tools(state, i, dt, before, after);
+      hold_group(state.anchors, i, dt, before, after, state.nodes);
+    });
   });
   if (after != nullptr) {
     move_held(state.anchors, dt, before, after, state.nodes);

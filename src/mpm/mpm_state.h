@@ -26,11 +26,12 @@ namespace tissue_sim {
 struct Touch {
   std::int32_t cell;  ///< lane of its cell's first point, in its block
   std::int32_t point;
-  std::uint8_t key;  ///< SurfacePlace::key, or below 8: which of the cell's eight points
+  std::uint8_t key;  ///< SurfacePlace::key, or kPointKey plus which of the cell's eight points
   std::uint8_t collider;
   float hold[3];      ///< place that friction holds on to, in the collider's frame [m]
   float along[3];     ///< normal of its inerter (mpm/contact/contact_inertia.h)
   float inertia = 0;  ///< of that [kg]
+  float begun = 0;    ///< depth from which on it is pushed back [m]
 };
 
 /// A cell of which a collider may touch points before such cells are listed anew.

@@ -170,7 +170,11 @@ void MpmTissue::advance(int substeps, float dt, const FrameInput& input) {
 
 bool MpmTissue::settle_wild_crumbs() {
   MpmState& s = *state_;
-  return may_be_wild(s) && tissue_sim::settle_wild_crumbs(s, s.crumbs);
+  if (!may_be_wild(s)) return false;
+  std::vector<std::int32_t> settled = tissue_sim::settle_wild_crumbs(s, s.crumbs);
+  std::sort(settled.begin(), settled.end());
+  begin_anew(s.contacts, settled);
+  return !settled.empty();
 }
 
 bool MpmTissue::tame() {

@@ -57,6 +57,15 @@ void cauchy_stress(const Material& m, const float (&F)[9], float* to) {
 
 }  // namespace
 
+bool held_place(const MpmState& state, std::int32_t point, Vec3& place) {
+  if (state.points.free_volume_of(point) > 0) return false;
+  const Points::Site& s = state.points.site[point];
+  const LatticeBody& b = state.bodies[s.body];
+  place = b.site_position(s.x, s.y, s.z);
+  if (state.anchors.moves) place = state.anchors.place_of_held(b.body, s.body, place);
+  return true;
+}
+
 void add_point_fields(MpmState& state, const PointSelection& selection,
                       const std::vector<std::int32_t>& place, int count,
                       std::vector<std::uint8_t>& cloud) {
@@ -72,7 +81,13 @@ void add_point_fields(MpmState& state, const PointSelection& selection,
         if (place[p] < 0) return;
         const Points::Site& site = state.points.site[p];
         const LatticeBody& body = state.bodies[site.body];
-        const PointMotion motion(body, site, *state.fields, state.nodes);
+        PointMotion motion(body, site, *state.fields, state.nodes);
+        Vec3 held;
+        if (held_place(state, p, held)) {
+          const Vec3 moved = held - body.site_position(site.x, site.y, site.z);
+          for (int a = 0; a < 3; ++a) motion.u[a] = static_cast<float>(moved[a]);
+          if (!state.anchors.moves) std::fill_n(motion.v, 3, 0.0f);
+        }
         float values[16];
         int n = 0;
         if ((fields & kRestPosition) != 0) {

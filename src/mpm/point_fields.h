@@ -9,6 +9,9 @@
 
 namespace tissue_sim {
 
+/// Where a point is that an anchor holds, whatever nodes beside it do [m]. False for others.
+bool held_place(const MpmState& state, std::int32_t point, Vec3& place);
+
 /// Makes room for the selection's fields in a cloud of Points, and fills them: `place` is where in
 /// the cloud each point goes, -1 for none (select_points()).
 void add_point_fields(MpmState& state, const PointSelection& selection,

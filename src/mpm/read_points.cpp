@@ -38,6 +38,12 @@ int MpmTissue::read_points(const PointSelection& selection, std::vector<std::uin
       out.x = x[lane];
       out.y = x[lanes + lane];
       out.z = x[2 * lanes + lane];
+      Vec3 held;
+      if (held_place(s, p, held)) {
+        out.x = static_cast<float>(held[0]);
+        out.y = static_cast<float>(held[1]);
+        out.z = static_cast<float>(held[2]);
+      }
       out.rgb = piece_colour(f);
       out.id = static_cast<std::uint32_t>(p);
       out.fragment = f.id;

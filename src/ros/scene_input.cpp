@@ -79,6 +79,16 @@ void SceneInput::on_damping(const std_msgs::Float64& message) {
   damping_ = message.data;
 }
 
+void SceneInput::begin(const Simulation& simulation) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  for (std::size_t i = 0; i < poses_.size(); ++i) {
+    poses_[i].reset();
+    last_[i] = simulation.anchor(static_cast<int>(i)).position;
+  }
+  gravity_.reset();
+  damping_.reset();
+}
+
 void SceneInput::apply(Simulation& simulation) {
   const std::lock_guard<std::mutex> lock(mutex_);
   for (std::size_t i = 0; i < poses_.size(); ++i) {

@@ -21,6 +21,8 @@ class SceneInput {
   /// Listens to `anchors/<name>/measured_cp` of each anchor that has a name, to `gravity` and to
   /// `damping`. An anchor that would be faster than `fastest` [m/s] is not moved.
   SceneInput(ros::NodeHandle node, const Scene& scene, const Frames& frames, double fastest);
+  /// Of a simulation that begins, or goes on from another state: forgets what came before.
+  void begin(const Simulation& simulation);
   /// What came since the last call goes into the simulation's next frame.
   void apply(Simulation& simulation);
 

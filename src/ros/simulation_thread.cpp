@@ -57,6 +57,7 @@ void SimulationThread::start_session() {
   entries_.assign(scene.tools.size(), ToolEntry());
   clock_.restart(scene.frame_rate);
   for (const auto& tool : *session_.tools) tool->begin();
+  session_.scene_input->begin(*session_.simulation);
   real_time_factor_.restart();
   report_ = FrameReport();
   report_.input.tools = motion_;

@@ -19,6 +19,7 @@ struct CubeSize {
 
 inline Scene cube(const CubeSize& size, Law law) {
   Scene scene;
+  scene.mpm.boundary = MpmBoundary::kLattice;  // all that a GPU has, and the CPU is compared with
   scene.cell_size = 0.001;
   scene.ground.z = -1;
   scene.bodies.resize(1);

@@ -106,7 +106,12 @@ TEST(FiniteElements, FrequencyOfAClampedBlock) {
 // Anchors that move, and what they carry.
 TEST(FiniteElements, ReactionOfABarThatIsPulled) {
   for (const auto& [cell_size, held] : {std::pair{0.002, 0.0047}, {0.0023, 0.005}, {0.003, 0.0}}) {
-    Simulation simulation(pulled_bar(cell_size, held));
+    Scene scene = pulled_bar(cell_size, held);
+    for (Anchor& anchor : scene.bodies[0].anchors) {
+      if (cell_size == 0.002) continue;  // else it ends where the bar does, as one draws it
+      for (const int axis : {1, 2}) anchor.min[axis] = -0.008, anchor.max[axis] = 0.008;
+    }
+    Simulation simulation(scene);
     const std::vector<Anchor>& anchors = simulation.scene().bodies[0].anchors;
     constexpr int kFrames = 30;
     for (int i = 1; i <= kFrames; ++i) {

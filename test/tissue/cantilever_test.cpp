@@ -28,7 +28,9 @@ class Cantilever : public EachMethod {
       const double frame = 1 / (4 * bending_frequency(beam, Ends::kClampedFree));
       scene.pbd.steps = static_cast<int>(std::ceil(frame * speed / (0.4 * scene.cell_size)));
     }
-    return bend(scene, beam, within().clamp * beam.height / cells);
+    const bool at_face = GetParam().method == Method::kMpm && GetParam().device == Device::kCpu &&
+                         scene.mpm.boundary == MpmBoundary::kSurface;
+    return bend(scene, beam, at_face ? 0 : within().clamp * beam.height / cells);
   }
 };
 FOR_EACH_METHOD(Cantilever);

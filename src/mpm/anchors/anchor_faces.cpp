@@ -9,11 +9,11 @@
 #include <string>
 
 #include "mpm/anchors/anchored_share.h"
+#include "mpm/anchors/hold_beside_tools.h"
 
 namespace tissue_sim {
 namespace {
 
-constexpr float kDrift = 0.1f;  // of what rounding left of a face, mended in a substep
 constexpr int kLargestGroup = 64;
 constexpr double kNearestAxis = 0.9;  // a row goes through a face where its axis is that close to
                                       // the one that is closest to the normal
@@ -110,6 +110,33 @@ void for_each_point_of_row(const LatticeBody& b, const std::int32_t (&cell)[3], 
   }
 }
 
+/// From a link of nodes to the tissue that moves with it, across the axis: 0 where there is tissue
+/// all around, else to the nearest points. Nodes at the rim lie outside of their body, and an
+/// anchor that ends where the body does holds them all the same.
+Vec3 to_tissue(const LatticeBody& b, const std::array<int, 3>& low, int axis) {
+  const int u = (axis + 1) % 3, v = (axis + 2) % 3;
+  const Vec3 node = b.node_position(low[0], low[1], low[2]);
+  Vec3 nearest = Vec3::Zero();
+  double least = 1e30;
+  int around = 0;  // columns of points
+  for (int j = 0; j < 36; ++j) {
+    int site[3];
+    site[u] = 2 * low[u] - 2 + j % 6;
+    site[v] = 2 * low[v] - 2 + j / 6;
+    bool any = false;
+    for (int i = 2 * low[axis]; i < 2 * low[axis] + 4 && !any; ++i) {
+      site[axis] = i;
+      any = b.point(site[0], site[1], site[2]) >= 0;
+    }
+    if (!any) continue;
+    Vec3 to = b.site_position(site[0], site[1], site[2]) - node;
+    to[axis] = 0;
+    if (to.cwiseAbs().maxCoeff() < 0.5 * b.cell_size) ++around;
+    if (to.squaredNorm() < least) least = to.squaredNorm(), nearest = to;
+  }
+  return around == 4 ? Vec3::Zero() : nearest;
+}
+
 /// Adds where faces go through the link from a node to the next along an axis.
 void add_links(const std::vector<LatticeBody>& bodies, int body, int first_anchor,
                const std::array<int, 3>& low, int axis, AnchorFaces& faces) {
@@ -118,9 +145,10 @@ void add_links(const std::vector<LatticeBody>& bodies, int body, int first_ancho
   ++high[axis];
   const Vec3 begin = b.node_position(low[0], low[1], low[2]);
   const Vec3 end = b.node_position(high[0], high[1], high[2]);
-  for (const FaceCrossing& c : crossings(b.body.anchors, begin, end)) {
+  const Vec3 aside = to_tissue(b, low, axis);
+  for (const FaceCrossing& c : crossings(b.body.anchors, begin + aside, end + aside)) {
     const Vec3 x = begin + c.t * (end - begin);
-    const Vec3 normal = normal_at(b.body.anchors[c.anchor], x);
+    const Vec3 normal = normal_at(b.body.anchors[c.anchor], x + aside);
     if (normal[axis] < kNearestAxis * normal.maxCoeff()) continue;
     // The face lies in this cell; between two in the one with tissue outside.
     const bool lower = std::abs(c.t - 0.5) < 1e-6 ? !c.inside_low : c.t < 0.5;
@@ -377,7 +405,7 @@ void hold_group(AnchorFaces& faces, int index, float dt, const RigidMotion* befo
       }
       // u has moved by dt v already: what it was off before.
       const float off = target[a] - shift[a] * dt - (u - dt * v);
-      left[i][a] = shift[a] - v + kDrift * off / dt;
+      left[i][a] = shift[a] - v + kFaceDrift * off / dt;
     }
   }
   for (int i = 0; i < g.count; ++i) {

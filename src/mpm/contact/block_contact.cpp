@@ -133,13 +133,24 @@ void list_contacts(MpmState& state) {
         touch.cell = first_lane(block, touch.point, site);
         if (touch.cell < 0) continue;
         const int sub = sub_position(site);
-        touch.key = static_cast<std::uint8_t>(touch.key < 8 ? sub : 8 * (sub + 1) + touch.key % 8);
+        touch.key = static_cast<std::uint8_t>(
+            touch.key >= kPointKey ? kPointKey + sub : 8 * (sub + 1) + touch.key % 8);
         touches.push_back(touch);
       }
     }
     std::sort(touches.begin(), touches.end(), comes_before);
   }
   tidy_inertia(state, true);
+}
+
+void begin_anew(Contacts& contacts, const std::vector<std::int32_t>& points) {
+  if (points.empty()) return;
+  for (std::vector<Touch>& touches : contacts.touching) {
+    for (Touch& touch : touches) {
+      if (!std::binary_search(points.begin(), points.end(), touch.point)) continue;
+      touch.begun = std::numeric_limits<float>::max();
+    }
+  }
 }
 
 bool is_list_due(Contacts& contacts) {
@@ -274,17 +285,16 @@ void add_load(const Collider& collider, const float* at, const float* push, doub
   }
 }
 
-/// Pushes on the points of a cell that are within the body, where a tool is so thin that it came
-/// between places of the surface; and a blade's on all. Returns whether any touches; else `clear`
-/// becomes the distance of the nearest.
-bool push_points(BlockPush& b, const NearCell& cell, const Collider& collider, ColliderLoad& load,
-                 float& clear) {
+/// Pushes on `points` of a cell. Returns whether any touches; else `clear` becomes the distance of
+/// the nearest.
+bool push_points(BlockPush& b, const NearCell& cell, unsigned points, const Collider& collider,
+                 ColliderLoad& load, float& clear) {
   const auto quarter = static_cast<float>(0.25 * b.body.cell_size);
   const CellNodes nodes(b.block, cell.node);
   Vec<4> u[8], v[8], pushes[8];
   values_at_points(b.state.nodes.u, nodes, u);
   bool touches = false;
-  for (unsigned points = cell.points; points != 0; points &= points - 1) {
+  for (; points != 0; points &= points - 1) {
     const int s = __builtin_ctz(points), lane = cell.lane + s * b.block.stride;
     const float at[3] = {cell.middle[0] + (s & 1 ? quarter : -quarter) + u[s][0],
                          cell.middle[1] + (s & 2 ? quarter : -quarter) + u[s][1],
@@ -300,7 +310,7 @@ bool push_points(BlockPush& b, const NearCell& cell, const Collider& collider, C
       std::fill_n(pushes, 8, Vec<4>{});
     }
     const std::int32_t p = b.block.point[lane];
-    Touch touch{cell.lane, p, static_cast<std::uint8_t>(s), cell.collider, {}, {}};
+    Touch touch{cell.lane, p, static_cast<std::uint8_t>(kPointKey + s), cell.collider, {}, {}};
     if (!b.find_held(touch)) to_local(collider, at, touch.hold);
     const ContactSpring unit = unit_spring(b.body, b.state.points.material_of(p));
     const float moves = b.block.volume[lane];  // none of what an anchor holds does
@@ -332,11 +342,34 @@ void value_at(const Array<float>* field, const CellNodes& cell, bool has_whole_r
   }
 }
 
-/// The same on its places on the surface.
+float largest_inv_mass(const Nodes& nodes, const CellNodes& cell) {
+  float largest = 0;
+  for (int row = 0; row < 9; ++row) {
+    for (int x = 0; x < 3; ++x) {
+      const std::int32_t node = cell.row(row % 3, row / 3)[x];
+      if (node >= 0) largest = std::max(largest, nodes.inv_mass[node]);
+    }
+  }
+  return largest;
+}
+
+/// Sum of the squares of the 27 weights.
+float squared(const AxisWeights& weights) {
+  float product = 1;
+  for (int a = 0; a < 9; a += 3) {
+    const float* w = weights.of + a;
+    product *= w[0] * w[0] + w[1] * w[1] + w[2] * w[2];
+  }
+  return product;
+}
+
+/// The same on its places on the surface. Adds to `points` those that the collider may hold, for it
+/// holds places of theirs: that face away, or so deep that places around are not enough.
 bool push_surface(BlockPush& b, const NearCell& cell, const Collider& collider, ColliderLoad& load,
-                  float& clear) {
+                  float& clear, unsigned& points) {
   constexpr float kFacing = -0.1f, kTurned = 0.98f;  // cosines: of a surface that faces the tool,
                                                      // and of an inerter that still fits
+  constexpr float kDeep = 0.2f;        // from where on a point is looked at by itself [cells]
   constexpr float kAlongBorne = 0.1f;  // of a place's springs along it, times dt^2 / m
   constexpr float kBeside = 0.25f;  // how close to a jaw tissue takes part of what it presses with
                                     // [cells]: places are no denser than to say that
@@ -347,6 +380,7 @@ bool push_surface(BlockPush& b, const NearCell& cell, const Collider& collider, 
   const float dt2 = b.state.contacts.inertia.dt * b.state.contacts.inertia.dt;
   const float beside = collider.kind == Collider::kJaw ? kBeside * h : 0;
   bool touches = false;
+  float lightest = -1;
   const auto faces_away = [&](const SurfacePlace& place, const Gap& g) {
     float F[9], n[3], along = 0, length = 0;
     deformation_gradient_at(b.state.nodes.u, nodes, b.body.cell_size, place.place, F);
@@ -370,12 +404,18 @@ bool push_surface(BlockPush& b, const NearCell& cell, const Collider& collider, 
       continue;
     }
     Touch touch{cell.lane, place.point, place.key, cell.collider, {}, {}};
+    const unsigned point = 1u << (place.key / 8 - 1);
     const bool is_held = b.find_held(touch);
     if (!is_held) {
-      if (faces_away(place, g)) continue;  // the far side of something thin
+      if (faces_away(place, g)) {  // the far side of something thin
+        points |= point;
+        continue;
+      }
       to_local(collider, at, touch.hold);
+      touch.begun = -g.distance;
     }
     touches = true;
+    if (g.distance < -kDeep * h) points |= point;
     const bool is_free = b.state.points.free_volume_of(place.point) > 0;
     const Material& m = b.body.material_of(b.state.points, place.point);
     SurfaceSpring spring = surface_spring(static_cast<float>(lame_lambda(m) + 2 * lame_mu(m)),
@@ -383,22 +423,25 @@ bool push_surface(BlockPush& b, const NearCell& cell, const Collider& collider, 
     spring.cohesion = collider.cohesion * place.area / unit_area;
     // Along the surface no inerter helps: at rims and on crumbs, whose nodes are light, the spring
     // is what the substep bears.
-    const auto light = static_cast<float>(mobility(b.state.nodes, nodes, weights)) * b.dt * b.dt;
-    if (spring.along * light > kAlongBorne) {
-      const float share = kAlongBorne / (spring.along * light);
-      spring.along *= share;
-      spring.damping_along *= share;
+    if (lightest < 0) lightest = largest_inv_mass(b.state.nodes, nodes);
+    const float per_mass = spring.along * b.dt * b.dt / kAlongBorne;
+    if (per_mass * lightest * squared(weights) > 1) {  // mobility is that at most
+      const float light = per_mass * static_cast<float>(mobility(b.state.nodes, nodes, weights));
+      if (light > 1) {
+        spring.along /= light;
+        spring.damping_along /= light;
+      }
     }
     float velocity[3], push[3], of_collider[3];
     value_at(b.state.nodes.v, nodes, whole_rows, weights, velocity);
-    surface_force(collider, g, spring, at, velocity, touch.hold, push);
+    surface_force(collider, g, spring, at, velocity, touch.hold, touch.begun, push);
     if (is_free) {
       spread(b.block, cell.node, weights, push, b.force);
       float along = 0;
       for (int a = 0; a < 3; ++a) along += touch.along[a] * g.normal[a];
       if (touch.inertia == 0 || along < kTurned) {
-        if (touch.inertia > 0) b.change(-1, false, place, touch, nullptr);
-        const bool begins = !is_held;
+        const bool begins = touch.inertia == 0;
+        if (!begins) b.change(-1, false, place, touch, nullptr);
         touch.inertia = kInertia * spring.across * dt2;
         std::copy_n(g.normal, 3, touch.along);
         velocity_at(collider, at, of_collider);
@@ -434,8 +477,12 @@ void add_contact(MpmState& state, int index, float dt, float* force,
     const Collider& collider = state.colliders[cell.collider];
     ColliderLoad& load = loads[cell.collider];
     float clear = std::numeric_limits<float>::max();
-    bool touches = cell.points != 0 && push_points(b, cell, collider, load, clear);
-    touches = (cell.place_count > 0 && push_surface(b, cell, collider, load, clear)) || touches;
+    // Points within the body touch where a tool is so thin that it came between places of the
+    // surface, all that lost bonds touch a blade; others where their places do not hold them:
+    // a flake between two cuts has none at its edge.
+    unsigned points = cell.points;
+    bool touches = cell.place_count > 0 && push_surface(b, cell, collider, load, clear, points);
+    touches = (points != 0 && push_points(b, cell, points, collider, load, clear)) || touches;
     if (touches) continue;
     const double nearer = approach(state, index, collider, dt);
     cell.clear = static_cast<std::uint8_t>(std::min<double>(kListLasts, clear / nearer));

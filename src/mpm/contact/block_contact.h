@@ -7,6 +7,8 @@
 
 namespace tissue_sim {
 
+inline constexpr std::uint8_t kPointKey = 128;  ///< Touch::key of a point, above those of places
+
 /// Finds out which colliders each block may meet in a frame of `duration` seconds, from where its
 /// points are, how fast they move (MpmState::motion) and what each collider sweeps (`reach`); lets
 /// go of contacts that are out of reach. `before`: where they were before, too.
@@ -19,6 +21,9 @@ bool came_unforeseen(const MpmState& state, const std::vector<Box>& reach);
 
 /// Makes the lists of points in contact anew after update_blocks(), with no collider near.
 void list_contacts(MpmState& state);
+
+/// Of some points, in order, that were put elsewhere: contact begins as deep as they are now.
+void begin_anew(Contacts& contacts, const std::vector<std::int32_t>& points);
 
 /// Counts a substep. Returns whether cells near colliders must be listed anew before it.
 bool is_list_due(Contacts& contacts);

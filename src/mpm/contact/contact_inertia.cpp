@@ -46,6 +46,33 @@ void work_out(InertialNode& n) {
   }
 }
 
+/// Gives inerters that are new to a node, and part of its B, their share of its motion:
+/// (M + B) v' = (M + B - dB) v + dB v_c.
+void take_in(const Begun& begun, InertialNode& n, Nodes& nodes) {
+  const float v[3] = {nodes.v[0][n.node], nodes.v[1][n.node], nodes.v[2][n.node]};
+  float taken[3];
+  times(begun.inertia, v, taken);
+  const Eigen::Matrix3d A = matrix(n.inertia) + n.mass * Eigen::Matrix3d::Identity();
+  const Vec3 change = A.ldlt().solve(Vec3(
+      begun.momentum[0] - taken[0], begun.momentum[1] - taken[1], begun.momentum[2] - taken[2]));
+  for (int a = 0; a < 3; ++a) {
+    const auto dv = static_cast<float>(change[a]);
+    nodes.v[a][n.node] += dv;
+    n.impulse[a] += n.mass * dv;
+  }
+}
+
+void take_in_growth(InertialNode& n, const Collider& collider, Nodes& nodes) {
+  float at[3], velocity[3];
+  for (int a = 0; a < 3; ++a) at[a] = n.place[a] + nodes.u[a][n.node];
+  velocity_at(collider, at, velocity);
+  Begun grown;
+  for (int k = 0; k < 6; ++k) grown.inertia[k] = n.grown * n.inertia[k];
+  times(grown.inertia, velocity, grown.momentum);
+  take_in(grown, n, nodes);
+  n.grown = 0;
+}
+
 }  // namespace
 
 void fit_inertia(MpmState& state, float dt) {
@@ -56,6 +83,7 @@ void fit_inertia(MpmState& state, float dt) {
   for (InertialNode& n : inertia.nodes) {
     for (float& b : n.inertia) b *= ratio * ratio;
     n.changed = true;
+    n.grown = std::max(0.0f, 1 - 1 / (ratio * ratio));
   }
   for (auto& touches : state.contacts.touching) {
     for (Touch& t : touches) t.inertia *= ratio * ratio;
@@ -66,6 +94,10 @@ void fit_inertia(MpmState& state, float dt) {
 void change_inertia(MpmState& state) {
   ContactInertia& inertia = state.contacts.inertia;
   Nodes& nodes = state.nodes;
+  for (InertialNode& n : inertia.nodes) {
+    for (float& i : n.impulse) i = 0;
+    if (n.grown > 0) take_in_growth(n, state.colliders[n.collider], nodes);
+  }
   std::vector<Begun> begun(inertia.nodes.size());
   for (std::size_t i = 0; i < state.contacts.changes.size(); ++i) {
     const Block& block = *state.blocks.all[i];
@@ -111,29 +143,14 @@ void change_inertia(MpmState& state) {
   }
   for (std::size_t i = 0; i < inertia.nodes.size(); ++i) {
     InertialNode& n = inertia.nodes[i];
-    for (int a = 0; a < 3; ++a) n.impulse[a] = 0;
-    float v[3] = {nodes.v[0][n.node], nodes.v[1][n.node], nodes.v[2][n.node]};
     if (n.changed) {
       n.changed = false;
       if (n.uses == 0) std::fill_n(n.inertia, 6, 0.0f);
       work_out(n);
       const Begun& of = begun[i];
-      if (of.inertia[0] + of.inertia[1] + of.inertia[2] > 0) {
-        // (M + B) v' = (M + B - dB) v + dB v_c
-        float taken[3], all[3];
-        times(of.inertia, v, taken);
-        const Eigen::Matrix3d A = matrix(n.inertia) + n.mass * Eigen::Matrix3d::Identity();
-        const Vec3 change = A.ldlt().solve(
-            Vec3(of.momentum[0] - taken[0], of.momentum[1] - taken[1], of.momentum[2] - taken[2]));
-        for (int a = 0; a < 3; ++a) {
-          all[a] = static_cast<float>(change[a]);
-          v[a] += all[a];
-          nodes.v[a][n.node] = v[a];
-          n.impulse[a] += n.mass * all[a];
-        }
-      }
+      if (of.inertia[0] + of.inertia[1] + of.inertia[2] > 0) take_in(of, n, nodes);
     }
-    for (int a = 0; a < 3; ++a) n.before[a] = v[a];
+    for (int a = 0; a < 3; ++a) n.before[a] = nodes.v[a][n.node];
   }
 }
 

@@ -7,7 +7,8 @@
 // so the two together swing no faster than tissue alone or sqrt(2) / dt. B is taken node by node,
 // which is not less than the inerters' own matrix, and acts along the contact's normal alone. What
 // is at rest or moves with the tool does not feel it; when contact begins the nodes lose what of
-// their speed towards the collider the inerter takes up, and it never gives energy back.
+// their speed towards the collider the inerter takes up, and so when longer substeps make it
+// larger: it never gives energy back.
 #pragma once
 
 #include <cstdint>
@@ -33,6 +34,7 @@ struct InertialNode {
   float share[6];         ///< (m I + B)^-1 B: of an acceleration, which does not happen
   float before[3];        ///< velocity before the substep [m/s]
   float impulse[3];       ///< on the node in the substep [N s]
+  float grown;            ///< share of B that longer substeps brought, not yet taken in
 };
 
 /// Contact that begins (`sign` 1), ends (-1) or whose normal turned (both).

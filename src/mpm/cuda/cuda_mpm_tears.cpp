@@ -83,7 +83,7 @@ bool CudaMpmTissue::settle_wild_crumbs() {
   if (s.crumbs.empty() || !may_be_wild(s)) return false;
   const std::vector<std::int32_t> nodes = nodes_around({s.crumbs.begin(), s.crumbs.end()});
   pull_some(nodes);
-  if (!tissue_sim::settle_wild_crumbs(s, s.crumbs)) {
+  if (tissue_sim::settle_wild_crumbs(s, s.crumbs).empty()) {
     return false;
   }
   push_some(nodes);

@@ -224,8 +224,9 @@ void settle_crumbs(LatticeTissue& tissue, const std::vector<std::int32_t>& crumb
   }
 }
 
-bool settle_wild_crumbs(LatticeTissue& tissue, const std::set<std::int32_t>& crumbs) {
-  bool any = false;
+std::vector<std::int32_t> settle_wild_crumbs(LatticeTissue& tissue,
+                                             const std::set<std::int32_t>& crumbs) {
+  std::vector<std::int32_t> settled;
   for (const std::int32_t lowest : crumbs) {
     const LatticeBody& body = tissue.bodies[tissue.points.site[lowest].body];
     const Crumb crumb(body, tissue.points, lowest);
@@ -235,9 +236,9 @@ bool settle_wild_crumbs(LatticeTissue& tissue, const std::set<std::int32_t>& cru
     });
     if (!wild) continue;
     make_rigid(body, tissue.points, *tissue.fields, crumb, tissue.nodes);
-    any = true;
+    settled.insert(settled.end(), crumb.begin(), crumb.end());
   }
-  return any;
+  return settled;
 }
 
 }  // namespace tissue_sim

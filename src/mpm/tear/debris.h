@@ -33,9 +33,9 @@ inline float elastic_volume(const Points& points, std::int32_t point) {
 /// times their size, goes. No crumb turns faster than kCrumbSpin times the speed of sound in a rod
 /// a cell, which strains it by a tenth or two: the rest goes to the tissue beside it.
 void settle_crumbs(LatticeTissue& tissue, const std::vector<std::int32_t>& crumbs);
-/// The same for those that have become wild since (mpm/tear/deformation.h). Returns whether any
-/// had.
-bool settle_wild_crumbs(LatticeTissue& tissue, const std::set<std::int32_t>& crumbs);
+/// The same for those that have become wild since (mpm/tear/deformation.h). Returns their points.
+std::vector<std::int32_t> settle_wild_crumbs(LatticeTissue& tissue,
+                                             const std::set<std::int32_t>& crumbs);
 inline constexpr double kCrumbSpin = 0.5;
 
 }  // namespace tissue_sim

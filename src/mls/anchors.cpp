@@ -7,11 +7,11 @@
 namespace tissue_sim {
 namespace {
 
-constexpr double kNearest = 0.25;   // that a free node may be to a face [spacings]
-constexpr double kFarthest = 0.75;  // that a held node is moved to it [spacings]
-constexpr double kMostWeight = 16;  // of a pair across a face, over what it was
-constexpr double kFirst = 1.3;      // a node nearer to a face is the first [spacings]
-constexpr int kSamples = 16;        // along each axis, of a share that a face may cut
+constexpr double kNearest = 0.25;    // that a free node may be to a face [spacings]
+constexpr double kFarthest = 0.75;   // that a held node is moved to it [spacings]
+constexpr double kMostWeight = 16;   // of a pair across a face, over what it was
+constexpr double kFirst = 1.3;       // a node nearer to a face is the first [spacings]
+constexpr int kSamplesOfShare = 16;  // along each axis, of a share that a face may cut
 
 using Anchors = std::vector<Anchor>;
 
@@ -55,7 +55,7 @@ Vec3 face_towards(const Region& region, const Vec3& x, const Vec3& outside) {
 }
 
 /// How much of a cube lies outside of all anchors.
-double share_outside(const Anchors& anchors, const Vec3& middle, double edge) {
+double free_share(const Anchors& anchors, const Vec3& middle, double edge) {
   const auto at = [&](int n, int x, int y, int z) {
     return Vec3(middle + edge * (Vec3(x + 0.5, y + 0.5, z + 0.5) / n - Vec3::Constant(0.5)));
   };
@@ -67,7 +67,7 @@ double share_outside(const Anchors& anchors, const Vec3& middle, double edge) {
     return static_cast<double>(outside) / (n * n * n);
   };
   const double rough = share(4);
-  return rough == 0 || rough == 1 ? rough : share(kSamples);
+  return rough == 0 || rough == 1 ? rough : share(kSamplesOfShare);
 }
 
 }  // namespace
@@ -84,7 +84,7 @@ void hold_at_faces(const Scene& scene, double support_factor, MlsNodes& nodes, M
     const Anchors& anchors = scene.bodies[nodes.body[i]].anchors;
     if (anchors.empty()) continue;
     nodes.free_volume[i] *= static_cast<float>(
-        share_outside(anchors, nodes.place[i], std::cbrt(static_cast<double>(nodes.volume[i]))));
+        free_share(anchors, nodes.place[i], std::cbrt(static_cast<double>(nodes.volume[i]))));
     if (within[i] != 0) continue;
     bool beside = false;
     each_neighbour(i, [&](std::int32_t j) { beside = beside || within[j] != 0; });

@@ -10,7 +10,7 @@ namespace tissue_sim {
 namespace {
 
 /// Chunks that a thread looks at at a time.
-constexpr int kNodesAtOnce = 32;
+constexpr int kChunksAtATime = 32;
 /// Of sides: a bit for each side of each of three slabs.
 constexpr std::uint8_t kAllSides = 0x3f;
 /// Rounding of what a node's place comes to along an axis, over the sum of its coordinates.
@@ -129,7 +129,7 @@ void search_chunk(const Sweep& w, const SweepPart& part, const SweptEdge& edge, 
 std::vector<std::int32_t> find_crossed(const MlsState& s, const BladePath& path,
                                        const float* u_begin, const float* u_end) {
   const Sweep w{s, u_begin, u_end};
-  const int chunks = s.chunks(), blocks = (chunks + kNodesAtOnce - 1) / kNodesAtOnce;
+  const int chunks = s.chunks(), blocks = (chunks + kChunksAtATime - 1) / kChunksAtATime;
   Sides sides(chunks);
   std::vector<std::uint8_t> common(blocks);  // sides on which all of a block stay
   std::vector<std::vector<std::int32_t>> of_block(blocks);
@@ -137,7 +137,7 @@ std::vector<std::int32_t> find_crossed(const MlsState& s, const BladePath& path,
   for (const SweepPart& part : sweep_parts(path)) {
     for (const SweptEdge& edge : part.edges) {
       s.cpu->for_each(blocks, [&](int block) {
-        const int first = block * kNodesAtOnce, last = std::min(chunks, first + kNodesAtOnce);
+        const int first = block * kChunksAtATime, last = std::min(chunks, first + kChunksAtATime);
         common[block] = kAllSides;
         for (int chunk = first; chunk < last; ++chunk) {
           std::uint8_t* of = sides.at(chunk * kMlsChunk);
@@ -151,7 +151,7 @@ std::vector<std::int32_t> find_crossed(const MlsState& s, const BladePath& path,
       for (const std::uint8_t c : common) all &= c;
       if (all != 0) continue;
       s.cpu->for_each(blocks, [&](int block) {
-        const int first = block * kNodesAtOnce, last = std::min(chunks, first + kNodesAtOnce);
+        const int first = block * kChunksAtATime, last = std::min(chunks, first + kChunksAtATime);
         for (int chunk = first; chunk < last; ++chunk) {
           search_chunk(w, part, edge, sides, chunk, of_block[block]);
         }

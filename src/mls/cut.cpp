@@ -8,7 +8,7 @@ namespace tissue_sim {
 namespace {
 
 /// Touched nodes that a thread works on at a time.
-constexpr int kBlock = 256;
+constexpr int kNodesAtATime = 256;
 
 /// How many common neighbours a pair has, and how many to which both have an uncrossed pair.
 struct Common {
@@ -71,11 +71,12 @@ void cross_entries(MlsState& s, const std::vector<std::int32_t>& entries,
   report.points_separated += static_cast<int>(touched.size());
   changed.insert(changed.end(), touched.begin(), touched.end());
   // Pairs of a touched node: of any other, all common neighbours are as they were.
-  const int count = static_cast<int>(touched.size()), blocks = (count + kBlock - 1) / kBlock;
+  const int count = static_cast<int>(touched.size()),
+            blocks = (count + kNodesAtATime - 1) / kNodesAtATime;
   std::vector<std::vector<std::int32_t>> fallen(blocks);
   s.cpu->for_each(blocks, [&](int block) {
     Marked neighbours(p);
-    for (int k = block * kBlock; k < std::min(count, (block + 1) * kBlock); ++k) {
+    for (int k = block * kNodesAtATime; k < std::min(count, (block + 1) * kNodesAtATime); ++k) {
       const std::int32_t i = touched[k];
       expose(s, i);
       neighbours.mark(i);

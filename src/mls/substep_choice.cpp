@@ -9,7 +9,7 @@
 namespace tissue_sim {
 namespace {
 
-constexpr int kSteps = 8;               // of Lanczos' method
+constexpr int kLanczosSteps = 8;        // of Lanczos' method
 constexpr double kMargin = 0.76;        // of the limit: the rest is for contact and what stiffens
 constexpr double kLongestAge = 0.5;     // of the measured limit [s]
 constexpr double kLongestAgeCut = 0.1;  // the same while something is cut [s]
@@ -62,7 +62,7 @@ bool MlsSubsteps::is_due(const MlsState& s) const {
 
 void MlsSubsteps::measure(const MlsState& s, const MlsForces& forces) {
   is_new_ = limit_ == 0;
-  limit_ = measured_limit(s, forces, kSteps);
+  limit_ = measured_limit(s, forces, kLanczosSteps);
   if (!std::isfinite(limit_)) limit_ = 1;  // all is held
   measured_ = now_;
   measured_at_ = s.time;

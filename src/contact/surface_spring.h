@@ -21,7 +21,7 @@ struct SurfaceSpring {
 inline constexpr float kAcross = 8, kAlong = 0.5f;
 inline constexpr float kDampingAcross = 0.1f;  ///< times the substep, of the stiffness
 inline constexpr float kDampingAlong = 0.1f;   ///< share of critical
-/// What stays in a substep of how deep contact began: a bounce of crumbs takes three substeps, one
+/// What stays in a substep of how deep contact began: a bounce of debris takes three substeps, one
 /// of a whole block some twenty.
 inline constexpr float kBegunStays = 1 - 1 / 128.0f;
 
@@ -38,7 +38,7 @@ TISSUE_SIM_INLINE SurfaceSpring surface_spring(float modulus, float density, flo
 /// Force on the place at x with velocity v, in contact (`g.distance` < 0). `hold` is the place, in
 /// the collider's frame, that friction holds on to; it slides with x where the cone is reached.
 /// `begun` is how deep it was when contact began, where the spring has no force yet: else each
-/// place that comes a part of a substep's way too deep would bring energy with it, crumbs more than
+/// place that comes a part of a substep's way too deep would bring energy with it, debris more than
 /// they have. It goes back little by little.
 TISSUE_SIM_INLINE void surface_force(const Collider& c, const Gap& g, const SurfaceSpring& spring,
                                      const float* x, const float* v, float* hold, float& begun,

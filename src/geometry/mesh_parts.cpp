@@ -62,7 +62,7 @@ std::vector<Part> parts_of(const TriangleMesh& mesh) {
   return parts;
 }
 
-// What holds nothing: a triangle and its back, a needle, a crumb of merging. A ball has 0.094 of
+// What holds nothing: a triangle and its back, a needle, a leftover of merging. A ball has 0.094 of
 // its area to the 3/2, a sheet a third of its thickness over its side; single precision leaves 1e-7
 // of the coordinates' size.
 bool is_sliver(const Part& part, double largest) {

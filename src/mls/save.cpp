@@ -26,8 +26,8 @@ void fields(Archive& archive, MlsNodeContacts& c) {
 
 template <class Archive>
 void fields(Archive& archive, MlsState& s) {
-  archive(s.pairs.crossed, s.pairs.weight, s.u, s.v, s.inverse_moment, s.kappa, s.outer, s.thread,
-          s.any_thread, s.spring, s.contact, s.node_contacts, s.until_list, s.dt, s.time);
+  archive(s.pairs.crossed, s.pairs.weight, s.u, s.v, s.inverse_moment, s.kappa, s.outer, s.sprung,
+          s.any_sprung, s.spring, s.contact, s.node_contacts, s.until_list, s.dt, s.time);
 }
 
 template <class Archive>

@@ -63,7 +63,7 @@ float whole_kappa(const MlsState& s, std::int32_t i) {
   return trace > 0 ? static_cast<float>(3 * s.scene.mls.stabilisation * stiffness / trace) : 0.0f;
 }
 
-/// Springs from a thread to its neighbours: each carries its share of what a bar through the
+/// Springs from a sprung node to its neighbours: each carries its share of what a bar through the
 /// node's volume would.
 void make_springs(MlsState& s, std::int32_t i) {
   if (s.spring.empty()) s.spring.assign(s.pairs.other.size(), 0.0f);
@@ -78,9 +78,9 @@ void make_springs(MlsState& s, std::int32_t i) {
   for (std::int32_t e = s.pairs.begin[i]; e < s.pairs.begin[i + 1]; ++e) {
     s.spring[e] =
         s.pairs.weight[e] > 0 ? static_cast<float>(stiffness * s.pairs.weight[e] / sum) : 0.0f;
-    s.any_thread[s.pairs.other[e] / kMlsChunk] = 1;
+    s.any_sprung[s.pairs.other[e] / kMlsChunk] = 1;
   }
-  s.any_thread[i / kMlsChunk] = 1;
+  s.any_sprung[i / kMlsChunk] = 1;
 }
 
 void remake_node(MlsState& s, std::int32_t i) {
@@ -93,10 +93,10 @@ void remake_node(MlsState& s, std::int32_t i) {
     s.inverse_moment[k][i] = static_cast<float>(inverse(kRow[k], kColumn[k]));
   }
   s.kappa[i] = spans ? s.whole_kappa[i] : 0.0f;
-  s.thread[i] = spans ? 0 : 1;
+  s.sprung[i] = spans ? 0 : 1;
 }
 
-/// Forces of the springs of threads on node i.
+/// Forces of springs on node i.
 void add_springs(const MlsState& s, const float* u, std::int32_t i, float* force) {
   for (std::int32_t e = s.pairs.begin[i]; e < s.pairs.begin[i + 1]; ++e) {
     const std::int32_t j = s.pairs.other[e];
@@ -137,10 +137,10 @@ std::unique_ptr<MlsState> make_mls_state(const Scene& scene, std::vector<std::st
   }
   resize_padded(s.stress, n, 16);
   resize_padded(s.neo_hookean, n, 1);
-  resize_padded(s.thread, n, 1);
+  resize_padded(s.sprung, n, 1);
   resize_padded(s.outer, n, 1);
   resize_padded(s.cut, n, 1);
-  s.any_thread.assign(s.chunks(), 0);
+  s.any_sprung.assign(s.chunks(), 0);
   s.contact.resize(s.groups());
   const double factor = support_factor(scene.mls.neighbours);
   std::vector<std::int32_t> all(n);
@@ -178,9 +178,9 @@ void remake(MlsState& s, const std::vector<std::int32_t>& nodes) {
   s.cpu->for_each(
       static_cast<int>(nodes.size()), [&](int k) { remake_node(s, nodes[k]); }, 64);
   for (const std::int32_t i : nodes) {
-    if (s.thread[i] != 0) {
+    if (s.sprung[i] != 0) {
       make_springs(s, i);
-    } else if (!s.spring.empty()) {  // what it had as a thread
+    } else if (!s.spring.empty()) {  // what it had as a sprung node
       std::fill(&s.spring[s.pairs.begin[i]], s.spring.data() + s.pairs.begin[i + 1], 0.0f);
     }
   }
@@ -231,7 +231,7 @@ float substep(MlsState& s, float dt, std::vector<ColliderLoad>& loads) {
       s.kernels->forces(field, i / kMlsChunk, force + 4 * (i - first));
     }
     for (int i = first; i < last; ++i) {
-      if (s.any_thread[i / kMlsChunk] != 0) {
+      if (s.any_sprung[i / kMlsChunk] != 0) {
         add_springs(s, s.u.data(), i, force + 4 * (i - first));
       }
       if (!s.node_contacts.begin.empty()) add_node_contact(s, i, force + 4 * (i - first));
@@ -280,7 +280,7 @@ void internal_forces(MlsState& s, const float* u, float* force) {
       [&](int chunk) {
         const int first = chunk * kMlsChunk;
         s.kernels->forces(field, chunk, force + 4 * first);
-        if (s.any_thread[chunk] == 0) return;
+        if (s.any_sprung[chunk] == 0) return;
         for (int i = first; i < std::min(s.count(), first + kMlsChunk); ++i) {
           add_springs(s, u, i, force + 4 * i);
         }

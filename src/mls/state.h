@@ -69,9 +69,9 @@ struct MlsState {
   Array<float> contact_stiffness, contact_damping;    ///< node_spring() [N/m], [N s/m]
   Array<std::uint8_t> outer;                          ///< at the surface, or a cut passes beside it
   Array<std::uint8_t> cut;                            ///< a pair of it is crossed
-  Array<std::uint8_t> thread;      ///< its support spans no space: springs to its neighbours do
-  Array<std::uint8_t> any_thread;  ///< per chunk: a thread, or the neighbour of one
-  Array<float> spring;             ///< per entry: that of a thread's end [N/m]; empty without any
+  Array<std::uint8_t> sprung;      ///< its support spans no space: springs to its neighbours do
+  Array<std::uint8_t> any_sprung;  ///< per chunk: a sprung node, or the neighbour of one
+  Array<float> spring;             ///< per entry: at a sprung node [N/m]; empty without any
   bool viscous = false;            ///< whether any material is
 
   std::vector<Collider> colliders;       ///< at the present substep

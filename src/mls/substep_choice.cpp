@@ -87,7 +87,7 @@ void MlsSubsteps::cut(const MlsState& s, const std::vector<std::int32_t>& nodes)
 double own_rate(const MlsState& s, std::int32_t i) {
   const MlsPairs& p = s.pairs;
   double sum = 0;
-  if (s.thread[i] != 0) {
+  if (s.sprung[i] != 0) {
     for (std::int32_t e = p.begin[i]; e < p.begin[i + 1]; ++e) {
       sum += s.spring[e] * (s.inv_mass[i] + s.inv_mass[p.other[e]]);
     }

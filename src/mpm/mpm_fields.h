@@ -187,7 +187,7 @@ void tissue_fields(Archive& archive, MpmState& s) {
   archive.part("node fields", *s.fields);
   archive.part("blocks", s.blocks);
   archive.part("motion", s.motion, s.wildest);
-  archive.part("tears", s.tore_at, s.threads, s.crumbs);
+  archive.part("tears", s.tore_at, s.bridge_ends, s.debris);
   archive.part("contacts", s.contacts);
   archive.part("anchors", s.anchors);
   archive.part("flights", s.flights);

@@ -62,7 +62,7 @@ bool MpmTissue::accept_part() {
 
 void MpmTissue::break_bonds(double share) {
   tear(share);
-  if (share < 1 && settle_wild_crumbs()) measured_ = false;
+  if (share < 1 && settle_wild_debris()) measured_ = false;
   if (measured_) return;
   measure_stiffness();
   substep_.follow(*state_, modulus_);

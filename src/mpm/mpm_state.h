@@ -82,13 +82,13 @@ struct MpmState : LatticeTissue {
   Scene scene;
   AnchorFaces anchors;
   Blocks blocks;
-  std::vector<BlockMotion> motion;    ///< per block; exact as of measure_motion()
-  float wildest = 1;                  ///< BlockState's, of all blocks
-  double time = 0;                    ///< since the beginning [s]
-  float dt = 0;                       ///< the last substep, 0 before the first [s]
-  std::vector<double> tore_at;        ///< per body: when a bond last tore [s]; empty while none did
-  std::vector<std::int32_t> threads;  ///< points at their ends, by number: mpm/tear/bond_bridges.h
-  std::set<std::int32_t> crumbs;      ///< the lowest point of each: mpm/tear/debris.h
+  std::vector<BlockMotion> motion;  ///< per block; exact as of measure_motion()
+  float wildest = 1;                ///< BlockState's, of all blocks
+  double time = 0;                  ///< since the beginning [s]
+  float dt = 0;                     ///< the last substep, 0 before the first [s]
+  std::vector<double> tore_at;      ///< per body: when a bond last tore [s]; empty while none did
+  std::vector<std::int32_t> bridge_ends;  ///< points, by number: mpm/tear/bond_bridges.h
+  std::set<std::int32_t> debris;          ///< the lowest point of each: mpm/tear/debris.h
   Contacts contacts;
   FaceContacts faces;
   std::vector<Collider> colliders;

@@ -125,7 +125,8 @@ int MpmTissue::run(const FramePart& part) {
 void MpmTissue::tear(double share) {
   MpmState& s = *state_;
   Frame& frame = *frame_;
-  const bool bridges = share < 1 && may_be_wild(s) && !s.threads.empty();  // at 1, finish() does
+  const bool bridges =
+      share < 1 && may_be_wild(s) && !s.bridge_ends.empty();  // at 1, finish() does
   if (frame.tearing.empty() && !bridges) return;
   if (frame.blades) {
     measure_motion(s);
@@ -133,7 +134,7 @@ void MpmTissue::tear(double share) {
   }
   std::vector<std::int32_t> changed;
   tear_bonds(s, frame.tearing, changed, result_.tear_report);
-  if (bridges) tear_threads(s, changed, result_.tear_report);
+  if (bridges) tear_bridges(s, changed, result_.tear_report);
   if (changed.empty() && !frame.blades) return;
   take_apart(s, changed);
   measured_ = false;
@@ -168,10 +169,10 @@ void MpmTissue::advance(int substeps, float dt, const FrameInput& input) {
   end_frame();
 }
 
-bool MpmTissue::settle_wild_crumbs() {
+bool MpmTissue::settle_wild_debris() {
   MpmState& s = *state_;
   if (!may_be_wild(s)) return false;
-  std::vector<std::int32_t> settled = tissue_sim::settle_wild_crumbs(s, s.crumbs);
+  std::vector<std::int32_t> settled = tissue_sim::settle_wild_debris(s, s.debris);
   std::sort(settled.begin(), settled.end());
   begin_anew(s.contacts, settled);
   return !settled.empty();
@@ -180,9 +181,9 @@ bool MpmTissue::settle_wild_crumbs() {
 bool MpmTissue::tame() {
   if (result_.blew_up || !may_be_wild(*state_)) return false;
   MpmState& s = *state_;
-  const bool settled = settle_wild_crumbs();
+  const bool settled = settle_wild_debris();
   std::vector<std::int32_t> changed;
-  tear_threads(s, changed, result_.tear_report);
+  tear_bridges(s, changed, result_.tear_report);
   if (changed.empty()) return settled;
   take_apart(*state_, changed);
   for (const int id : update_pieces(*state_, pieces_)) {

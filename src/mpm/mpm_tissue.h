@@ -112,7 +112,7 @@ class MpmTissue final : public Tissue {
   void cut(const std::vector<BladePath>& paths, const Array<float>* u_before,
            const std::vector<BlockMotion>& before, CutReport& report);
   bool tame();                ///< what is wild (mpm/tear/deformation.h), whether anything was
-  bool settle_wild_crumbs();  ///< of that, crumbs
+  bool settle_wild_debris();  ///< of that, debris
   bool let_fly();             ///< pieces that came off and were foreseen, whether any was
   /// Energies and how much the tissue has stiffened, from what `read` finds of each block.
   template <class Read>

@@ -73,7 +73,7 @@ float stable_substep(const MpmState& state, const Stiffening& stiffening) {
 
 bool may_be_wild(const MpmState& state) {
   return (!state.threads.empty() && state.wildest >= kThreadStiffening) ||
-         (!state.crumbs.empty() && state.wildest >= kWildStiffening);
+         (!state.debris.empty() && state.wildest >= kWildStiffening);
 }
 
 std::uint64_t checksum(const MpmState& state, const Pieces& pieces) {

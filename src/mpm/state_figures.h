@@ -29,7 +29,8 @@ double fastest_damping(const MpmState& state, const Stiffening& stiffening);
 /// The substep that is stable however the tissue is cut, by the scene's CFL number [s].
 float stable_substep(const MpmState& state, const Stiffening& stiffening);
 
-/// Whether a thread or a crumb may be wild, as of MpmState::wildest: mpm/tear/deformation.h.
+/// Whether a bond bridge or a bit of debris may be wild, as of MpmState::wildest:
+/// mpm/tear/deformation.h.
 bool may_be_wild(const MpmState& state);
 
 /// Hash of nodes, bonds and pieces.

@@ -15,7 +15,7 @@ namespace {
 using visualization_msgs::Marker;
 using visualization_msgs::MarkerArray;
 
-// The largest pieces, and no crumbs of a blade: they would hide them.
+// The largest pieces, and no debris of a blade: they would hide them.
 constexpr int kMostFragments = 64, kFewestPoints = 4;
 
 std_msgs::ColorRGBA color(float r, float g, float b, float a = 1) {
@@ -150,7 +150,7 @@ void add_fragment(const MarkerInput& input, const Fragment& f, int id, MarkerArr
   }
   array.markers.push_back(box);
   Marker label = marker(input, "fragments/label", id, Marker::TEXT_VIEW_FACING);
-  // No larger than the piece, so that those of crumbs that lie together can be read.
+  // No larger than the piece, so that those of debris that lie together can be read.
   const Vec3 size = f.box.max - f.box.min;
   label.scale.z = std::max(0.002, std::min(0.006, 0.25 * std::max(size.x(), size.y())));
   label.pose.position =

@@ -214,13 +214,13 @@ TEST(MakeSolid, LeavesSliversOut) {
   const TriangleMesh ball = icosphere(kLow, 0.1, 2);
   const double volume = signed_volume(ball);
   // A triangle and its back, a needle of single precision's thickness, inside out and within, and a
-  // crumb.
+  // leftover.
   TriangleMesh back;
   back.vertices = {Vec3(0.3, 0, 0), Vec3(0.4, 0, 0), Vec3(0.3, 0.1, 0)};
   back.triangles = {{0, 1, 2}, {0, 2, 1}};
   const TriangleMesh needle = inverted(box_mesh(Vec3(-0.01, -0.01, 0), Vec3(0.01, 0.01, 1e-8)));
-  const TriangleMesh crumb = icosphere(Vec3(0.2, 0, 0), 5e-5, 1);
-  const Repaired r = repaired(both(both(both(back, needle), ball), crumb));
+  const TriangleMesh leftover = icosphere(Vec3(0.2, 0, 0), 5e-5, 1);
+  const Repaired r = repaired(both(both(both(back, needle), ball), leftover));
   EXPECT_EQ(r.notes, "had 3 slivers without volume: left out\n");
   EXPECT_NEAR(signed_volume(r.mesh), volume, 1e-15);
   EXPECT_EQ(r.mesh.triangles.size(), ball.triangles.size());

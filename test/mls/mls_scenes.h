@@ -53,7 +53,7 @@ inline std::vector<Eigen::Matrix3d> mls_gradients(const MlsState& s) {
       M += s.pairs.weight[e] * r * r.transpose();
       N += s.pairs.weight[e] * d * r.transpose();
     }
-    if (s.thread[i] == 0) H[i] = N * M.inverse();
+    if (s.sprung[i] == 0) H[i] = N * M.inverse();
   }
   return H;
 }
@@ -81,7 +81,7 @@ inline double mls_energy(const MlsState& s, const std::vector<double>& u) {
     }
     const Material& m = s.nodes.material_of(i);
     const double volume = s.nodes.free_volume[i];
-    if (s.thread[i] != 0) {
+    if (s.sprung[i] != 0) {
       for (int e = s.pairs.begin[i]; e < s.pairs.begin[i + 1]; ++e) {
         pair(e, r, d);
         const double stretch = (r + d).norm() - r.norm();
@@ -121,7 +121,7 @@ inline std::vector<Vec3> mls_forces(const MlsState& s) {
     }
   };
   for (int i = 0; i < s.count(); ++i) {
-    if (s.thread[i] != 0) continue;
+    if (s.sprung[i] != 0) continue;
     Eigen::Matrix3d M = Eigen::Matrix3d::Zero();
     double whole = 0;
     for_each_pair(i, [&](int e, int, double w, const Vec3& r, const Vec3&) {
@@ -144,7 +144,7 @@ inline std::vector<Vec3> mls_forces(const MlsState& s) {
   }
   // Springs of supports that span no space.
   const auto share = [&](int i, double w) {
-    if (s.thread[i] == 0) return 0.0;
+    if (s.sprung[i] == 0) return 0.0;
     double trace = 0;
     for_each_pair(i, [&](int, int, double weight, const Vec3& r, const Vec3&) {
       trace += weight * r.squaredNorm();

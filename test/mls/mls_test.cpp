@@ -237,7 +237,7 @@ TEST(MlsCut, RemnantsBearRotationsWithoutForce) {
   tissue.cut_now(plane_cut(Vec3(0.001, 0, 0) + eps, Vec3::UnitX()));  // of which chains,
   tissue.cut_now(plane_cut(Vec3(0, 0.002, 0) + eps, Vec3::UnitY()));  // pairs,
   tissue.cut_now(plane_cut(Vec3(0, 0.003, 0) + eps, Vec3::UnitY()));  // and lone nodes
-  EXPECT_GT(std::count(s.thread.begin(), s.thread.begin() + s.count(), 1), 40);
+  EXPECT_GT(std::count(s.sprung.begin(), s.sprung.begin() + s.count(), 1), 40);
   const Eigen::Matrix3d R =
       Eigen::AngleAxisd(M_PI / 2, Vec3(1, 2, -0.5).normalized()).toRotationMatrix();
   impose(s, R - Eigen::Matrix3d::Identity());

@@ -16,19 +16,19 @@ double spring_of(const MlsState& s, std::int32_t i, std::int32_t entry) {
     trace += s.pairs.weight[e] * (s.nodes.place[s.pairs.other[e]] - s.nodes.place[i]).squaredNorm();
   }
   const double weight = s.pairs.weight[entry];
-  if (s.thread[i] == 0 || weight == 0) return 0;
+  if (s.sprung[i] == 0 || weight == 0) return 0;
   return s.nodes.material_of(i).young_modulus * s.nodes.volume[i] * weight / trace;
 }
 
 // Where a cut passes, a support may span no space for a while and some again when more of it is
 // gone: it must not keep its springs, least of all those across the cut.
-TEST(MlsSprings, AreOfThreadsAloneWhateverWasCut) {
+TEST(MlsSprings, AreOfSprungNodesAloneWhateverWasCut) {
   std::mt19937 random(7);
   std::normal_distribution<double> normal;
   const double edge = 0.018;
   MlsTissue tissue(mls_box(Vec3::Constant(edge), 0.0015));
   MlsState& s = tissue.state();
-  int with_springs = 0, no_more_threads = 0;
+  int with_springs = 0, no_more_sprung = 0;
   std::vector<std::uint8_t> was(s.count(), 0);
   for (int cut = 0; cut < 12; ++cut) {
     const Vec3 through = Vec3::Constant(0.5 * edge) +
@@ -36,8 +36,8 @@ TEST(MlsSprings, AreOfThreadsAloneWhateverWasCut) {
     const Vec3 along(normal(random), normal(random), normal(random));
     tissue.cut_now(plane_cut(through, along));
     for (std::int32_t i = 0; i < s.count(); ++i) {
-      no_more_threads += was[i] != 0 && s.thread[i] == 0;
-      was[i] |= s.thread[i];
+      no_more_sprung += was[i] != 0 && s.sprung[i] == 0;
+      was[i] |= s.sprung[i];
       for (std::int32_t e = s.pairs.begin[i]; e < s.pairs.begin[i + 1]; ++e) {
         const double expected = spring_of(s, i, e);
         const double is = s.spring.empty() ? 0 : s.spring[e];
@@ -47,7 +47,7 @@ TEST(MlsSprings, AreOfThreadsAloneWhateverWasCut) {
     }
   }
   EXPECT_GT(with_springs, 100);
-  EXPECT_GT(no_more_threads, 0);
+  EXPECT_GT(no_more_sprung, 0);
 }
 
 }  // namespace

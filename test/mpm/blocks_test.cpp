@@ -30,7 +30,7 @@ const std::vector<std::vector<Vec3>> kCuts = {
     {{1, 0.6, 0.3}},
     {{1, 0, 0}, {1, 0.06, 0.03}},  // a thin wedge
     {{1, 0.1, 0}, {0, 1, 0.2}, {0.1, 0.3, 1}},
-    {{1, 0.1, 0}, {1, -0.1, 0.1}, {1, 0, -0.2}, {0.3, 1, 0}},  // and crumbs
+    {{1, 0.1, 0}, {1, -0.1, 0.1}, {1, 0, -0.2}, {0.3, 1, 0}},  // and debris
 };
 
 TEST(Blocks, HaveEachPointOnceInACellWithTheNodesThatItSees) {

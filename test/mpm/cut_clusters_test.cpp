@@ -73,7 +73,7 @@ TEST(CutClusters, AreThePiecesOfEveryKindOfCut) {
   }
 }
 
-TEST(CutClusters, AreTheCrumbsOfNineRandomPlanes) {
+TEST(CutClusters, AreTheDebrisOfNineRandomPlanes) {
   MpmTissue tissue(free_box(kSize, kCell));
   std::vector<Vec3> places = positions(tissue);
   std::vector<unsigned> sides(places.size(), 0);

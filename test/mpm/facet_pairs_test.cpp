@@ -27,7 +27,7 @@ std::vector<FacetPair> by_looking_at_all(const std::vector<FacetMotion>& facets,
   return pairs;
 }
 
-/// Facets all over a box; some take no part; some, of crumbs that whirled off, are far away.
+/// Facets all over a box; some take no part; some, of debris that whirled off, are far away.
 std::vector<FacetMotion> scattered_facets(std::vector<float>& reach) {
   std::mt19937 random(5);
   std::uniform_real_distribution<float> place(-0.02f, 0.02f), direction(-1, 1),

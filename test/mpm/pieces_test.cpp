@@ -119,7 +119,7 @@ TEST(Pieces, AreWhatAWalkOverTheBondsFinds) {
     expect_right(points, walk_bonds(body, points), pieces, pieces, {});
     std::mt19937 random(3);
     const auto upto = [&](int n) { return static_cast<int>(random() % n); };
-    int crumbs = 0;
+    int debris = 0;
     for (int cut = 0; cut < 60; ++cut) {
       int low[3], high[3];
       const int size[3] = {2 * body.nx, 2 * body.ny, 2 * body.nz};
@@ -136,11 +136,11 @@ TEST(Pieces, AreWhatAWalkOverTheBondsFinds) {
       cut_out(body, points, low, high);
       const Pieces before = pieces;
       const std::vector<int> fresh = update_pieces(tissue, pieces);
-      crumbs += static_cast<int>(fresh.size());
+      debris += static_cast<int>(fresh.size());
       expect_right(points, walk_bonds(body, points), before, pieces, fresh);
       if (HasFatalFailure()) FAIL() << "cut " << cut;
     }
-    EXPECT_GT(crumbs, 40);
+    EXPECT_GT(debris, 40);
     EXPECT_GT(std::count_if(pieces.all.begin(), pieces.all.end(),
                             [](const Fragment& f) { return f.point_count > 1000; }),
               1);
@@ -178,9 +178,9 @@ TEST(Pieces, ComeApartOnlyWhereTheyMay) {
   EXPECT_GT(rounds, 2 * may) << "it is to spare work";
 }
 
-/// A bond that is in no square of four bonds is a thread: the places at its ends, by walking around
-/// each bond, while bonds break at random.
-TEST(Threads, AreBondsInNoSquare) {
+/// A bond that is in no square of four bonds is a bond bridge: the places at its ends, by walking
+/// around each bond, while bonds break at random.
+TEST(BondBridges, AreBondsInNoSquare) {
   Points points;
   const std::vector<LatticeBody> bodies =
       make_lattice_bodies(free_box(Vec3(0.012, 0.01, 0.008), 0.002), points, nullptr);
@@ -192,7 +192,7 @@ TEST(Threads, AreBondsInNoSquare) {
     return p >= 0 && (points.bonds[p] >> k & 1) != 0 ? body.point(s.x + o.x, s.y + o.y, s.z + o.z)
                                                      : -1;
   };
-  const auto ends_thread = [&](std::int32_t p) {
+  const auto ends_bridge = [&](std::int32_t p) {
     for (int k = 0; k < kBondCount; ++k) {
       if (p < 0 || next(p, k) < 0) continue;
       bool in_square = false;
@@ -222,13 +222,13 @@ TEST(Threads, AreBondsInNoSquare) {
     for (int z = 0; z < body.nz; ++z) {
       for (int y = 0; y < body.ny; ++y) {
         for (int x = 0; x < body.nx; ++x) {
-          const Planes ends = bonds.thread_ends(0, x, y, z);
+          const Planes ends = bonds.bridge_ends(0, x, y, z);
           for (int i = 0; i < 64; ++i) {  // the places around the node
             const int at[3] = {1 + i % 4, 1 + i / 4 % 4, 1 + i / 16};
             const std::int32_t p =
                 body.point(2 * x - 2 + at[0], 2 * y - 2 + at[1], 2 * z - 2 + at[2]);
             const bool is_end = (ends[at[2]] >> bit_in_plane(at[0], at[1]) & 1) != 0;
-            ASSERT_EQ(is_end, ends_thread(p)) << "round " << round << ", point " << p;
+            ASSERT_EQ(is_end, ends_bridge(p)) << "round " << round << ", point " << p;
             found += is_end;
           }
         }

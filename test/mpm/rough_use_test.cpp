@@ -98,7 +98,7 @@ TEST(RoughUse, ViscosityOnlyTakesEnergyHoweverTissueIsCut) {
 }
 
 /// Shatters a body that is stretched and spins.
-TEST(RoughUse, CrumbsMoveOnAsRigidBodies) {
+TEST(RoughUse, DebrisMovesOnAsRigidBodies) {
   MpmTissue tissue(free_box(Vec3(0.024, 0.018, 0.018), 0.003));
   MpmState& s = tissue.state();
   std::vector<Vec3> home = homes(s);
@@ -129,7 +129,7 @@ TEST(RoughUse, CrumbsMoveOnAsRigidBodies) {
     for (const Fragment& f : tissue.fragments()) {
       if (f.id == tissue.fragment_of(p)) size = f.point_count;
     }
-    if (size > kCrumbPoints) continue;
+    if (size > kDebrisPoints) continue;
     const Points::Site& site = s.points.site[p];
     for (int axis = 0; axis < 3; ++axis) {
       if ((s.points.bonds[p] >> (3 + axis) & 1) == 0) continue;
@@ -143,7 +143,7 @@ TEST(RoughUse, CrumbsMoveOnAsRigidBodies) {
   EXPECT_GT(pairs, 20);
 }
 
-/// Two halves that a thread one point thick still joins, and a bridge two points thick, are drawn
+/// Two halves that a bridge one point thick still joins, and a bridge two points thick, are drawn
 /// apart.
 TEST(RoughUse, AThreadTearsAndARibbonHolds) {
   MpmTissue tissue(free_box(Vec3(0.024, 0.024, 0.024), 0.003));

@@ -87,8 +87,8 @@ void deform(MpmTissue& tissue, const Eigen::Matrix3d& f) {
   tissue.finish();
 }
 
-/// Gives crumbs the stiffness of tissue.
-void stiffen_crumbs(MpmState& state) {
+/// Gives debris the stiffness of tissue.
+void stiffen_debris(MpmState& state) {
   for (Block* b : state.blocks.all) {
     for (std::size_t lane = 0; lane < b->lane_count(); ++lane) {
       if (b->point[lane] >= 0) b->volume[lane] = state.points.volume[b->point[lane]];
@@ -113,7 +113,7 @@ TEST(StableSubstep, ALonePointIsTheLeastStable) {
     EXPECT_GT(pieces.finish().cut_reports[0].bonds_broken, 0);
     EXPECT_GT(pieces.fragments().size(), 100u);
     const double lone = lone_point_limit(nu), shattered = cfl_limit(pieces);
-    stiffen_crumbs(pieces.state());
+    stiffen_debris(pieces.state());
     EXPECT_NEAR(cfl_limit(pieces) / lone, 1, 2e-3) << nu;
     const double whole[3] = {cfl_limit(block), cfl_limit(plate), cfl_limit(rod)};
     file.add({nu, whole[0], whole[1], whole[2], shattered, lone});

@@ -166,14 +166,14 @@ TEST(SubstepChoice, UndoesWhatHasEnergyFromNowhere) {
   EXPECT_TRUE(borne(2, 0, 0));  // nobody watches where tissue is hardly strained
 }
 
-TEST(SubstepChoice, CrumbsAndSlicesAreSoft) {
+TEST(SubstepChoice, DebrisAndSlicesAreSoft) {
   MpmTissue tissue(soft_body(0.45, Vec3(6, 6, 6)));
   const std::vector<BladePath> planes = random_planes(30, 0.012);
   tissue.advance(0, 0, {{}, planes});
   tissue.finish();
   const MpmState& s = tissue.state();
   const std::vector<double> expected = reference::elastic_volumes(s);
-  int crumbs = 0, slices = 0, others = 0;
+  int debris = 0, slices = 0, others = 0;
   for (const Block* block : s.blocks.all) {
     for (std::size_t lane = 0; lane < block->lane_count(); ++lane) {
       const std::int32_t p = block->point[lane];
@@ -183,16 +183,16 @@ TEST(SubstepChoice, CrumbsAndSlicesAreSoft) {
         if (f.id == tissue.fragment_of(p)) piece = &f;
       }
       ASSERT_NE(piece, nullptr);
-      const bool crumb = piece->point_count <= kCrumbPoints;
+      const bool bit = piece->point_count <= kDebrisPoints;
       const float share = block->volume[lane] / s.points.volume[p];
       const bool soft = share < 1;
       EXPECT_NEAR(share, soft ? kSoftness : 1, 1e-6f) << piece->point_count;
-      EXPECT_TRUE(soft || !crumb) << piece->point_count;
+      EXPECT_TRUE(soft || !bit) << piece->point_count;
       EXPECT_NEAR(block->volume[lane], expected[p], 1e-6 * expected[p]) << piece->point_count;
-      ++(crumb ? crumbs : soft ? slices : others);
+      ++(bit ? debris : soft ? slices : others);
     }
   }
-  EXPECT_GT(crumbs, 100);
+  EXPECT_GT(debris, 100);
   EXPECT_GT(slices, 100);
   EXPECT_GT(others, 100);
 }

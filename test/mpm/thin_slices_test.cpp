@@ -77,7 +77,7 @@ TEST(ThinSlices, AreAsThickAsTheyWereCut) {
   }
 }
 
-TEST(ThinSlices, AndCrumbsKeepTheirMomentumAndGainNoEnergyInFlight) {
+TEST(ThinSlices, AndDebrisKeepTheirMomentumAndGainNoEnergyInFlight) {
   std::mt19937 random(8);
   std::uniform_real_distribution<double> u(-1, 1);
   std::vector<BladePath> shatter;
@@ -117,7 +117,7 @@ TEST(ThinSlices, AndCrumbsKeepTheirMomentumAndGainNoEnergyInFlight) {
   }
 }
 
-TEST(ThinSlices, ABodyThatIsShatteredIntoCrumbsStaysFiniteOnTheGround) {
+TEST(ThinSlices, ABodyThatIsShatteredIntoDebrisStaysFiniteOnTheGround) {
   std::mt19937 random(9);
   std::uniform_real_distribution<double> u(-1, 1);
   std::vector<BladePath> shatter;

@@ -25,11 +25,11 @@ struct CudaMlsMotion {
 
 struct CudaMlsField {
   int count = 0;
-  const float4* place;          ///< reference, and how far outside of it tissue ends [m]
-  const std::int32_t* offset;   ///< per slice, and one more
-  const std::int32_t* other;    ///< per entry; the node itself where there is none
-  const float* weight;          ///< 0 where there is none
-  const float* spring;          ///< per entry: of both ends of a thread [N/m]; null without any
+  const float4* place;         ///< reference, and how far outside of it tissue ends [m]
+  const std::int32_t* offset;  ///< per slice, and one more
+  const std::int32_t* other;   ///< per entry; the node itself where there is none
+  const float* weight;         ///< 0 where there is none
+  const float* spring;  ///< per entry: of both ends where one is sprung [N/m]; null without any
   const float* inverse_moment;  ///< [6][count]: 00 11 22 01 02 12
   const float* volume_mu;       ///< [N m], as the next two
   const float* volume_lambda;

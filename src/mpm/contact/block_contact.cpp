@@ -421,7 +421,7 @@ bool push_surface(BlockPush& b, const NearCell& cell, const Collider& collider, 
     SurfaceSpring spring = surface_spring(static_cast<float>(lame_lambda(m) + 2 * lame_mu(m)),
                                           static_cast<float>(m.density), h, place.area, b.dt);
     spring.cohesion = collider.cohesion * place.area / unit_area;
-    // Along the surface no inerter helps: at rims and on crumbs, whose nodes are light, the spring
+    // Along the surface no inerter helps: at rims and on debris, whose nodes are light, the spring
     // is what the substep bears.
     if (lightest < 0) lightest = largest_inv_mass(b.state.nodes, nodes);
     const float per_mass = spring.along * b.dt * b.dt / kAlongBorne;

@@ -9,8 +9,8 @@ namespace tissue_sim {
 FacetMotion motion_of(const MpmState& state, std::int32_t facet);
 
 /// Looks at the contacts that are due, `all` of them after a search, which knows where facets are.
-/// How fast each moves says when it is due again, not the fastest: crumbs that rattle about do not
-/// make all others be looked at as often.
+/// How fast each moves says when it is due again, not the fastest: debris that rattles about does
+/// not make all others be looked at as often.
 void look_at_due(MpmState& state, double dt, bool all);
 
 }  // namespace tissue_sim

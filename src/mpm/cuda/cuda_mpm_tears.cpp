@@ -50,8 +50,9 @@ std::vector<TearingPoint> CudaMpmTissue::find_tearing() {
 
 bool CudaMpmTissue::tear(double share) {
   MpmState& s = *state_;
-  const bool threads = share < 1 && may_be_wild(s) && !s.threads.empty();  // at 1, finish() does
-  if (tearing_.empty() && !threads) return false;
+  const bool bridges =
+      share < 1 && may_be_wild(s) && !s.bridge_ends.empty();  // at 1, finish() does
+  if (tearing_.empty() && !bridges) return false;
   const bool blades = !blades_.empty();
   if (blades) {  // what they have passed so far
     launch_measure();
@@ -61,9 +62,9 @@ bool CudaMpmTissue::tear(double share) {
   }
   std::vector<std::int32_t> changed;
   tear_bonds(s, tearing_, changed, result_.tear_report);
-  if (threads) {
-    pull_some(nodes_around(s.threads));
-    tear_threads(s, changed, result_.tear_report);
+  if (bridges) {
+    pull_some(nodes_around(s.bridge_ends));
+    tear_bridges(s, changed, result_.tear_report);
   }
   if (changed.empty() && !blades) return false;
   if (!changed.empty()) take_apart(changed);
@@ -78,12 +79,12 @@ bool CudaMpmTissue::tear(double share) {
   return true;
 }
 
-bool CudaMpmTissue::settle_wild_crumbs() {
+bool CudaMpmTissue::settle_wild_debris() {
   MpmState& s = *state_;
-  if (s.crumbs.empty() || !may_be_wild(s)) return false;
-  const std::vector<std::int32_t> nodes = nodes_around({s.crumbs.begin(), s.crumbs.end()});
+  if (s.debris.empty() || !may_be_wild(s)) return false;
+  const std::vector<std::int32_t> nodes = nodes_around({s.debris.begin(), s.debris.end()});
   pull_some(nodes);
-  if (tissue_sim::settle_wild_crumbs(s, s.crumbs).empty()) {
+  if (tissue_sim::settle_wild_debris(s, s.debris).empty()) {
     return false;
   }
   push_some(nodes);
@@ -93,11 +94,11 @@ bool CudaMpmTissue::settle_wild_crumbs() {
 void CudaMpmTissue::tame() {
   if (result_.blew_up || !may_be_wild(*state_)) return;
   MpmState& s = *state_;
-  const bool settled = settle_wild_crumbs();
+  const bool settled = settle_wild_debris();
   std::vector<std::int32_t> changed;
-  if (!s.threads.empty()) {
-    pull_some(nodes_around(s.threads));
-    tear_threads(s, changed, result_.tear_report);
+  if (!s.bridge_ends.empty()) {
+    pull_some(nodes_around(s.bridge_ends));
+    tear_bridges(s, changed, result_.tear_report);
   }
   if (!settled && changed.empty()) return;
   if (!changed.empty()) {

@@ -102,7 +102,7 @@ class CudaMpmTissue final : public Tissue {
   /// At this share of the frame; blades have cut their way before. Returns whether any tears.
   bool tear(double share);
   void tame();                ///< see MpmTissue
-  bool settle_wild_crumbs();  ///< the same
+  bool settle_wild_debris();  ///< the same
   void upload_points();
   template <class Margin>
   bool may_meet(const std::vector<BlockMotion>& motion, const Margin& margin) const;

@@ -46,8 +46,8 @@ void CudaMpmTissue::push_nodes() {
 
 std::vector<std::int32_t> CudaMpmTissue::nodes_around(
     const std::vector<std::int32_t>& points) const {
-  // A crumb (mpm/tear/debris.h) reaches at most four cells from a point that lost a bond, what it
-  // gives its spin to two more, and their nodes one.
+  // A bit of debris (mpm/tear/debris.h) reaches at most four cells from a point that lost a bond,
+  // what it gives its spin to two more, and their nodes one.
   constexpr int kReach = 8;
   struct Range {
     int min[3] = {1 << 30, 1 << 30, 1 << 30}, max[3] = {-1, -1, -1};

@@ -55,7 +55,7 @@ bool CudaMpmTissue::accept_part() {
 
 void CudaMpmTissue::break_bonds(double share) {
   const bool tore = tear(share);
-  const bool settled = share < 1 && settle_wild_crumbs();
+  const bool settled = share < 1 && settle_wild_debris();
   if (settled) {
     launch_measure();
     finish_measure();

@@ -59,8 +59,9 @@ struct Points {
   Array<std::uint8_t> anchored;                 ///< kInAnchor, kAtAnchor or 0
   static constexpr std::uint8_t kInAnchor = 1;  ///< its place is in an anchor
   static constexpr std::uint8_t kAtAnchor = 2;  ///< the face of one holds it
-  Array<std::uint8_t> material;   ///< in LatticeBody::materials; empty where no body has inclusions
-  Array<std::uint8_t> soft;       ///< of a crumb or a slice: mpm/tear/debris.h; empty before any is
+  Array<std::uint8_t> material;  ///< in LatticeBody::materials; empty where no body has inclusions
+  Array<std::uint8_t>
+      soft;  ///< of a bit of debris or a slice: mpm/tear/debris.h; empty before any is
   std::vector<OuterPlace> outer;  ///< true surface of the whole bodies; empty on a GPU
   Crossings crossings;            ///< of the bonds that blades broke; one that tore has none
   int size() const { return static_cast<int>(site.size()); }

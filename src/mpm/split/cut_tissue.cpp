@@ -47,8 +47,8 @@ Apart take_apart(MpmState& state, const std::vector<std::int32_t>& changed,
     const Points::Site& s = state.points.site[p];
     cells.push_back({s.body, s.x / 2, s.y / 2, s.z / 2});
   }
-  settle_crumbs(state, softened.crumbs);
-  state.crumbs.insert(softened.crumbs.begin(), softened.crumbs.end());
+  settle_debris(state, softened.debris);
+  state.debris.insert(softened.debris.begin(), softened.debris.end());
   if (!state.points.free_volume.empty() && !cells.empty()) {
     find_face_rows(state, state.anchors);
     if (state.anchors.moves) {
@@ -73,7 +73,7 @@ Apart take_apart(MpmState& state, const std::vector<std::int32_t>& changed,
             });
       },
       [&] {
-        list_threads(state, changed);
+        list_bridges(state, changed);
         meanwhile();
       });
   apart.softened = std::move(softened.points);

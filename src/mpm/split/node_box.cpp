@@ -82,7 +82,7 @@ int BondWindows::find_components(int body, int x, int y, int z, Planes (&found)[
   return count;
 }
 
-Planes BondWindows::thread_ends(int body, int x, int y, int z) const {
+Planes BondWindows::bridge_ends(int body, int x, int y, int z) const {
   const BoxBonds b = bonds_in_box(body, x, y, z);
   Planes in_x{}, in_y{}, in_z{};  // bonds that are in a square
   for (int k = 0; k < 6; ++k) {

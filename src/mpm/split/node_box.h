@@ -45,7 +45,7 @@ class BondWindows {
   int find_components(int body, int x, int y, int z, Planes (&found)[216]) const;
   /// Of the 4 x 4 x 4 places around the node of cell (x, y, z), those with a bond that is in no
   /// square of four bonds.
-  Planes thread_ends(int body, int x, int y, int z) const;
+  Planes bridge_ends(int body, int x, int y, int z) const;
 
  private:
   template <class Archive>

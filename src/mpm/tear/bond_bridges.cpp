@@ -28,7 +28,7 @@ struct BondsAround {
     }
   }
   /// Whether bond `k` is there and in no square of four bonds.
-  bool is_thread(int k) const {
+  bool is_bridge(int k) const {
     if (!has(own, k)) return false;
     const unsigned sides = own & of[k] & ~(1u << k | 1u << opposite_bond(k));
     for (int side = 0; side < kBondCount; ++side) {
@@ -36,10 +36,10 @@ struct BondsAround {
     }
     return true;
   }
-  /// Whether any of the bonds is a thread.
-  bool end_thread() const {
+  /// Whether any of the bonds is a bridge.
+  bool end_bridge() const {
     for (int k = 0; k < kBondCount; ++k) {
-      if (is_thread(k)) return true;
+      if (is_bridge(k)) return true;
     }
     return false;
   }
@@ -47,10 +47,10 @@ struct BondsAround {
 
 }  // namespace
 
-void list_threads(MpmState& state, const std::vector<std::int32_t>& changed) {
+void list_bridges(MpmState& state, const std::vector<std::int32_t>& changed) {
   const Points& points = state.points;
-  std::vector<std::int32_t>& threads = state.threads;
-  // Of each cell, by its node: no thread ends around it. Points come row by row, so that a cell
+  std::vector<std::int32_t>& bridges = state.bridge_ends;
+  // Of each cell, by its node: no bridge ends around it. Points come row by row, so that a cell
   // comes up to four times.
   std::vector<std::uint8_t> is_bare(lattice_node_count(state.bodies), 0);
   Planes ends{};
@@ -63,7 +63,7 @@ void list_threads(MpmState& state, const std::vector<std::int32_t>& changed) {
             static_cast<std::int16_t>(s.z / 2), s.body};
       node = state.bodies[of.body].node(of.x, of.y, of.z);
       if (is_bare[node] == 0) {
-        ends = state.fields->bonds().thread_ends(of.body, of.x, of.y, of.z);
+        ends = state.fields->bonds().bridge_ends(of.body, of.x, of.y, of.z);
         is_bare[node] = ends == Planes{};
       }
     }
@@ -72,24 +72,24 @@ void list_threads(MpmState& state, const std::vector<std::int32_t>& changed) {
       const int x = s.x + o.x, y = s.y + o.y, z = s.z + o.z;
       return (ends[z - 2 * of.z + 2] >> bit_in_plane(x - 2 * of.x + 2, y - 2 * of.y + 2) & 1) != 0;
     };
-    if (ends_one({0, 0, 0})) threads.push_back(p);
+    if (ends_one({0, 0, 0})) bridges.push_back(p);
     // A square may have lost its far side.
     for (unsigned bonds = points.bonds[p]; bonds != 0; bonds &= bonds - 1) {
       const int k = __builtin_ctz(bonds);
-      if (ends_one(bond_offset(k))) threads.push_back(neighbour(state.bodies[s.body], s, k));
+      if (ends_one(bond_offset(k))) bridges.push_back(neighbour(state.bodies[s.body], s, k));
     }
   }
-  std::sort(threads.begin(), threads.end());
-  threads.erase(std::unique(threads.begin(), threads.end()), threads.end());
+  std::sort(bridges.begin(), bridges.end());
+  bridges.erase(std::unique(bridges.begin(), bridges.end()), bridges.end());
 }
 
-void tear_threads(MpmState& state, std::vector<std::int32_t>& changed, CutReport& report) {
+void tear_bridges(MpmState& state, std::vector<std::int32_t>& changed, CutReport& report) {
   const std::size_t first = changed.size();
   Points& points = state.points;
   std::vector<std::int32_t> left;
-  for (const std::int32_t p : state.threads) {
+  for (const std::int32_t p : state.bridge_ends) {
     const LatticeBody& body = state.bodies[points.site[p].body];
-    if (!BondsAround(body, points, p).end_thread()) continue;
+    if (!BondsAround(body, points, p).end_bridge()) continue;
     const Deformation d(body, points.site[p], *state.fields, state.nodes);
     if (d.stretch < kThreadStretch || d.stiffening < kThreadStiffening) {
       left.push_back(p);
@@ -97,7 +97,7 @@ void tear_threads(MpmState& state, std::vector<std::int32_t>& changed, CutReport
     }
     for (int k = 0; k < kBondCount; ++k) {
       const BondsAround around(body, points, p);  // as those before left it
-      if (!around.is_thread(k)) continue;
+      if (!around.is_bridge(k)) continue;
       const std::int32_t other = around.point[k];
       break_bond(k, points.bonds[p], points.bonds[other]);
       changed.push_back(p);
@@ -105,7 +105,7 @@ void tear_threads(MpmState& state, std::vector<std::int32_t>& changed, CutReport
       ++report.bonds_broken;
     }
   }
-  state.threads = std::move(left);
+  state.bridge_ends = std::move(left);
   const auto begin = changed.begin() + static_cast<std::ptrdiff_t>(first);
   std::sort(begin, changed.end());
   changed.erase(std::unique(begin, changed.end()), changed.end());

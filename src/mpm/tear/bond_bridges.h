@@ -1,4 +1,4 @@
-// Threads: what hangs on by points one after the other, thinner than the lattice tells.
+// Bond bridges: what hangs on by points one after the other, thinner than the lattice tells.
 #pragma once
 
 #include <cstdint>
@@ -9,17 +9,17 @@
 
 namespace tissue_sim {
 
-/// A thread is a bond that is in no square of four bonds. It tears where it is stretched so far,
+/// A bridge is a bond that is in no square of four bonds. It tears where it is stretched so far,
 /// and has stiffened so much (mpm/tear/deformation.h), whatever its material: between halves that
 /// part it would be drawn out without end, and what hangs on it would whirl about, too fast for any
 /// substep. One that swings stiffens twentyfold within a few substeps: it is not to get near that.
 inline constexpr double kThreadStretch = 1.5, kThreadStiffening = 3.5;
 
-/// After the points `changed` lost bonds: adds the ends of new threads to MpmState::threads.
-void list_threads(MpmState& state, const std::vector<std::int32_t>& changed);
+/// After the points `changed` lost bonds: adds the ends of new bridges to MpmState::bridge_ends.
+void list_bridges(MpmState& state, const std::vector<std::int32_t>& changed);
 
-/// Tears threads. Appends the points that lost a bond to `changed`, by number, and counts into
+/// Tears bridges. Appends the points that lost a bond to `changed`, by number, and counts into
 /// `report`.
-void tear_threads(MpmState& state, std::vector<std::int32_t>& changed, CutReport& report);
+void tear_bridges(MpmState& state, std::vector<std::int32_t>& changed, CutReport& report);
 
 }  // namespace tissue_sim

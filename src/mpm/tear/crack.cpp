@@ -11,7 +11,7 @@ namespace {
 constexpr double kAcross = 0.5;
 
 /// From this excess on a bond between two points that lost bonds to each other's side breaks though
-/// another one broke on its line: a crack that turns may leave a thread behind.
+/// another one broke on its line: a crack that turns may leave a bridge behind.
 constexpr float kThread = 1.3f;
 
 Vec3 direction(int k) {
@@ -153,7 +153,7 @@ bool go_on(const MpmState& state, const TearingPoint& t, const std::vector<Teari
   const LatticeBody& body = state.bodies[s.body];
   const int known = side_by_bonds(state, body, t.point, t.normal);
   // A tip bears the more, the finer the lattice is against tear_length.
-  const double thread_excess =
+  const double bridge_excess =
       kThread *
       std::max(1.0, body.material_of(state.points, t.point).tear_length / (1.5 * body.cell_size));
   const int side = known != 0 ? known : crack.offset > 0 ? -1 : 1;
@@ -164,9 +164,9 @@ bool go_on(const MpmState& state, const TearingPoint& t, const std::vector<Teari
     const double across = direction(k).dot(t.normal);
     const int other = other_known != 0 ? other_known : across < crack.offset ? -1 : 1;
     if (side == other) continue;
-    const bool thread = t.excess > thread_excess && side_by_own(state, t.point, t.normal) != 0 &&
+    const bool bridge = t.excess > bridge_excess && side_by_own(state, t.point, t.normal) != 0 &&
                         side_by_own(state, q, t.normal) != 0;
-    bonds.push_back({t.point, k, thread});
+    bonds.push_back({t.point, k, bridge});
   }
   return true;
 }

@@ -26,7 +26,7 @@ bool broken_on_line(const MpmState& state, const LatticeBody& body, std::int32_t
 struct Bond {
   std::int32_t point;
   int bond;
-  bool thread;  ///< holds the two sides of a crack together
+  bool bridge;  ///< holds the two sides of a crack together
 };
 
 /// Appends the bonds of a point that a crack takes as it goes on. Returns whether there is a crack

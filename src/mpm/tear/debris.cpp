@@ -12,26 +12,26 @@
 namespace tissue_sim {
 namespace {
 
-/// Whether bonds along x hold it together with kCrumbPoints others on one side: most points, seen
+/// Whether bonds along x hold it together with kDebrisPoints others on one side: most points, seen
 /// at a glance. Points are numbered along x.
 bool is_in_long_run(const Points& points, std::int32_t point) {
-  static_assert(kCrumbPoints == sizeof(std::uint64_t), "a byte for each point");
+  static_assert(kDebrisPoints == sizeof(std::uint64_t), "a byte for each point");
   constexpr std::uint64_t kForwardInX = 0x0101010101010101 << kForwardBond;
   const auto run_from = [&](std::int32_t first) {
-    if (first < 0 || first + kCrumbPoints > points.size()) return false;
+    if (first < 0 || first + kDebrisPoints > points.size()) return false;
     std::uint64_t bonds;
     std::memcpy(&bonds, &points.bonds[first], sizeof(bonds));
     return (bonds & kForwardInX) == kForwardInX;
   };
-  return run_from(point) || run_from(point - kCrumbPoints);
+  return run_from(point) || run_from(point - kDebrisPoints);
 }
 
-/// The points that bonds hold together with this one; none if they are more than a crumb's.
-struct Crumb {
-  std::int32_t point[kCrumbPoints];
+/// The points that bonds hold together with this one; none if they are more than debris has.
+struct Debris {
+  std::int32_t point[kDebrisPoints];
   int count = 0;
-  Crumb(const LatticeBody& body, const Points& points, std::int32_t first) {
-    const bool may_be = points.bonds[first] != kAllBonds && body.point_count > kCrumbPoints &&
+  Debris(const LatticeBody& body, const Points& points, std::int32_t first) {
+    const bool may_be = points.bonds[first] != kAllBonds && body.point_count > kDebrisPoints &&
                         !is_in_long_run(points, first);
     if (!may_be) return;
     point[count++] = first;
@@ -41,7 +41,7 @@ struct Crumb {
         if ((points.bonds[point[i]] >> k & 1) == 0) continue;
         const std::int32_t next = neighbour(body, s, k);
         if (std::find(begin(), end(), next) != end()) continue;
-        if (count == kCrumbPoints) {
+        if (count == kDebrisPoints) {
           count = 0;
           return;
         }
@@ -104,11 +104,12 @@ Eigen::Matrix3d inertia_of(const std::vector<Vec3>& x, const Mass& mass) {
   return inertia;
 }
 
-/// The nearest point beside a crumb, along the lattice, that is not soft; -1 if there is none.
-std::int32_t beside(const LatticeBody& body, const Points& points, const Crumb& crumb) {
+/// The nearest point beside a bit of debris, along the lattice, that is not soft; -1 if there is
+/// none.
+std::int32_t beside(const LatticeBody& body, const Points& points, const Debris& bit) {
   constexpr int kFarthest = 4;
   for (int steps = 1; steps <= kFarthest; ++steps) {
-    for (const std::int32_t p : crumb) {
+    for (const std::int32_t p : bit) {
       for (int k = 0; k < kBondCount; ++k) {
         const std::int32_t other = neighbour(body, points.site[p], k, steps);
         if (other >= 0 && !points.is_soft(other)) return other;
@@ -143,25 +144,25 @@ void turn(const LatticeBody& body, const Points& points, const NodeFields& field
 }
 
 void make_rigid(const LatticeBody& body, const Points& points, const NodeFields& fields,
-                const Crumb& of_crumb, Nodes& nodes) {
+                const Debris& of_debris, Nodes& nodes) {
   const auto held = [&](std::int32_t p) { return points.anchored[p] != 0; };
-  if (std::any_of(of_crumb.begin(), of_crumb.end(), held)) return;
-  const NodesOf crumb(body, points, fields, of_crumb);
-  const Material& material = body.material_of(points, of_crumb.point[0]);
+  if (std::any_of(of_debris.begin(), of_debris.end(), held)) return;
+  const NodesOf bit(body, points, fields, of_debris);
+  const Material& material = body.material_of(points, of_debris.point[0]);
   const double fastest_spin =
-      kCrumbSpin * std::sqrt(material.young_modulus / material.density) / body.cell_size;
-  const std::size_t count = crumb.node.size();
+      kDebrisSpin * std::sqrt(material.young_modulus / material.density) / body.cell_size;
+  const std::size_t count = bit.node.size();
   std::vector<Vec3> x(count), v(count);
   double mass = 0;
   Vec3 x_mean = Vec3::Zero(), X_mean = Vec3::Zero(), v_mean = Vec3::Zero();
   for (std::size_t i = 0; i < count; ++i) {
-    const int n = crumb.node[i];
+    const int n = bit.node[i];
     if (nodes.mass[n] > 0 && nodes.inv_mass[n] == 0) return;  // held fast
-    x[i] = crumb.home[i] + Vec3(nodes.u[0][n], nodes.u[1][n], nodes.u[2][n]);
+    x[i] = bit.home[i] + Vec3(nodes.u[0][n], nodes.u[1][n], nodes.u[2][n]);
     v[i] = Vec3(nodes.v[0][n], nodes.v[1][n], nodes.v[2][n]);
     mass += nodes.mass[n];
     x_mean += nodes.mass[n] * x[i];
-    X_mean += nodes.mass[n] * crumb.home[i];
+    X_mean += nodes.mass[n] * bit.home[i];
     v_mean += nodes.mass[n] * v[i];
   }
   x_mean /= mass;
@@ -170,26 +171,26 @@ void make_rigid(const LatticeBody& body, const Points& points, const NodeFields&
   Eigen::Matrix3d x_X = Eigen::Matrix3d::Zero();
   Vec3 angular = Vec3::Zero();
   for (std::size_t i = 0; i < count; ++i) {
-    const double m = nodes.mass[crumb.node[i]];
-    x_X += m * (x[i] - x_mean) * (crumb.home[i] - X_mean).transpose();
+    const double m = nodes.mass[bit.node[i]];
+    x_X += m * (x[i] - x_mean) * (bit.home[i] - X_mean).transpose();
     angular += m * (x[i] - x_mean).cross(v[i] - v_mean);
   }
   if (!x_X.allFinite() || !angular.allFinite()) return;  // as the end of the frame will say
   const Eigen::Matrix3d R = rotation_of(x_X);
-  for (std::size_t i = 0; i < count; ++i) x[i] = R * (crumb.home[i] - X_mean);
+  for (std::size_t i = 0; i < count; ++i) x[i] = R * (bit.home[i] - X_mean);
   const Eigen::Matrix3d inertia =
-      inertia_of(x, [&](std::size_t i) -> double { return nodes.mass[crumb.node[i]]; });
+      inertia_of(x, [&](std::size_t i) -> double { return nodes.mass[bit.node[i]]; });
   Vec3 spin = inertia.ldlt().solve(angular);
   if (spin.norm() > fastest_spin) {
     spin *= fastest_spin / spin.norm();
-    const std::int32_t other = beside(body, points, of_crumb);
+    const std::int32_t other = beside(body, points, of_debris);
     if (other >= 0) turn(body, points, fields, other, angular - inertia * spin, nodes);
   }
   for (std::size_t i = 0; i < count; ++i) {
-    const Vec3 u = x_mean + x[i] - crumb.home[i], velocity = v_mean + spin.cross(x[i]);
+    const Vec3 u = x_mean + x[i] - bit.home[i], velocity = v_mean + spin.cross(x[i]);
     for (int a = 0; a < 3; ++a) {
-      nodes.u[a][crumb.node[i]] = static_cast<float>(u[a]);
-      nodes.v[a][crumb.node[i]] = static_cast<float>(velocity[a]);
+      nodes.u[a][bit.node[i]] = static_cast<float>(u[a]);
+      nodes.v[a][bit.node[i]] = static_cast<float>(velocity[a]);
     }
   }
 }
@@ -198,7 +199,7 @@ void make_rigid(const LatticeBody& body, const Points& points, const NodeFields&
 
 Softened soften(LatticeTissue& tissue, const std::vector<std::int32_t>& changed) {
   Softened softened;
-  std::set<std::int32_t> seen;  // crumbs, by their lowest points
+  std::set<std::int32_t> seen;  // debris, by their lowest points
   const auto mark = [&](std::int32_t p) {
     if (tissue.points.soft.empty()) tissue.points.soft.resize(tissue.points.size(), 0);
     if (tissue.points.soft[p] == 0) softened.points.push_back(p);
@@ -207,36 +208,36 @@ Softened soften(LatticeTissue& tissue, const std::vector<std::int32_t>& changed)
   for_each_site(tissue.points, changed, [&](std::int32_t p, const Points::Site& site) {
     const LatticeBody& body = tissue.bodies[site.body];
     if (is_in_slice(body, tissue.points, p)) mark(p);
-    const Crumb crumb(body, tissue.points, p);
-    if (crumb.count == 0) return;
-    for (const std::int32_t of_crumb : crumb) mark(of_crumb);
-    const std::int32_t lowest = *std::min_element(crumb.begin(), crumb.end());
-    if (seen.insert(lowest).second) softened.crumbs.push_back(lowest);
+    const Debris bit(body, tissue.points, p);
+    if (bit.count == 0) return;
+    for (const std::int32_t of_debris : bit) mark(of_debris);
+    const std::int32_t lowest = *std::min_element(bit.begin(), bit.end());
+    if (seen.insert(lowest).second) softened.debris.push_back(lowest);
   });
   return softened;
 }
 
-void settle_crumbs(LatticeTissue& tissue, const std::vector<std::int32_t>& crumbs) {
-  for (const std::int32_t lowest : crumbs) {
+void settle_debris(LatticeTissue& tissue, const std::vector<std::int32_t>& debris) {
+  for (const std::int32_t lowest : debris) {
     const LatticeBody& body = tissue.bodies[tissue.points.site[lowest].body];
-    make_rigid(body, tissue.points, *tissue.fields, Crumb(body, tissue.points, lowest),
+    make_rigid(body, tissue.points, *tissue.fields, Debris(body, tissue.points, lowest),
                tissue.nodes);
   }
 }
 
-std::vector<std::int32_t> settle_wild_crumbs(LatticeTissue& tissue,
-                                             const std::set<std::int32_t>& crumbs) {
+std::vector<std::int32_t> settle_wild_debris(LatticeTissue& tissue,
+                                             const std::set<std::int32_t>& debris) {
   std::vector<std::int32_t> settled;
-  for (const std::int32_t lowest : crumbs) {
+  for (const std::int32_t lowest : debris) {
     const LatticeBody& body = tissue.bodies[tissue.points.site[lowest].body];
-    const Crumb crumb(body, tissue.points, lowest);
-    const bool wild = std::any_of(crumb.begin(), crumb.end(), [&](std::int32_t p) {
+    const Debris bit(body, tissue.points, lowest);
+    const bool wild = std::any_of(bit.begin(), bit.end(), [&](std::int32_t p) {
       return Deformation(body, tissue.points.site[p], *tissue.fields, tissue.nodes).stiffening >=
              kWildStiffening;
     });
     if (!wild) continue;
-    make_rigid(body, tissue.points, *tissue.fields, crumb, tissue.nodes);
-    settled.insert(settled.end(), crumb.begin(), crumb.end());
+    make_rigid(body, tissue.points, *tissue.fields, bit, tissue.nodes);
+    settled.insert(settled.end(), bit.begin(), bit.end());
   }
   return settled;
 }

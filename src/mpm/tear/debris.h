@@ -1,4 +1,4 @@
-// Crumbs: pieces that are too small to be seen as bodies, but whose vibration would set the substep
+// Debris: pieces that are too small to be seen as bodies, but whose vibration would set the substep
 // of all the tissue.
 #pragma once
 
@@ -11,15 +11,15 @@
 
 namespace tissue_sim {
 
-/// A piece that was cut off with at most this many points, a cell's worth, is a crumb.
-inline constexpr int kCrumbPoints = 8;
+/// A piece that was cut off with at most this many points, a cell's worth, is a bit of debris.
+inline constexpr int kDebrisPoints = 8;
 
-/// Marks what became soft as the points `changed` lost bonds: those of crumbs, and of slices one
+/// Marks what became soft as the points `changed` lost bonds: those of debris, and of slices one
 /// point thick, which cuts parted from what there was on both sides of them along an axis of the
 /// lattice. They keep the share kSoftness of their stiffness.
 struct Softened {
   std::vector<std::int32_t> points;
-  std::vector<std::int32_t> crumbs;  ///< lowest point of each, whether it was one before or not
+  std::vector<std::int32_t> debris;  ///< lowest point of each, whether it was one before or not
 };
 Softened soften(LatticeTissue& tissue, const std::vector<std::int32_t>& changed);
 
@@ -28,14 +28,14 @@ inline float elastic_volume(const Points& points, std::int32_t point) {
   return (points.is_soft(point) ? kSoftness : 1.0f) * points.free_volume_of(point);
 }
 
-/// Lets crumbs, each given by its lowest point, move on as rigid bodies without strain. Their
-/// momentum stays, linear and angular; what else a torn thread left in their nodes, a swing of many
-/// times their size, goes. No crumb turns faster than kCrumbSpin times the speed of sound in a rod
-/// a cell, which strains it by a tenth or two: the rest goes to the tissue beside it.
-void settle_crumbs(LatticeTissue& tissue, const std::vector<std::int32_t>& crumbs);
+/// Lets debris, each given by its lowest point, move on as rigid bodies without strain. Their
+/// momentum stays, linear and angular; what else a torn bridge left in their nodes, a swing of many
+/// times their size, goes. No bit of debris turns faster than kDebrisSpin times the speed of sound
+/// in a rod a cell, which strains it by a tenth or two: the rest goes to the tissue beside it.
+void settle_debris(LatticeTissue& tissue, const std::vector<std::int32_t>& debris);
 /// The same for those that have become wild since (mpm/tear/deformation.h). Returns their points.
-std::vector<std::int32_t> settle_wild_crumbs(LatticeTissue& tissue,
-                                             const std::set<std::int32_t>& crumbs);
-inline constexpr double kCrumbSpin = 0.5;
+std::vector<std::int32_t> settle_wild_debris(LatticeTissue& tissue,
+                                             const std::set<std::int32_t>& debris);
+inline constexpr double kDebrisSpin = 0.5;
 
 }  // namespace tissue_sim

@@ -7,7 +7,7 @@
 
 namespace tissue_sim {
 
-/// A crumb that is deformed so that it has stiffened so much is wild.
+/// A bit of debris that is deformed so that it has stiffened so much is wild.
 inline constexpr double kWildStiffening = 5;
 
 /// Deformation gradient at a point.

@@ -214,7 +214,7 @@ void tear_bonds(MpmState& state, const std::vector<TearingPoint>& tearing,
     const Points::Site& s = state.points.site[b.point];
     const LatticeBody& body = state.bodies[s.body];
     if ((state.points.bonds[b.point] >> b.bond & 1) == 0) return false;
-    if (!b.thread && broken_on_line(state, body, b.point, b.bond)) return false;
+    if (!b.bridge && broken_on_line(state, body, b.point, b.bond)) return false;
     const std::int32_t q = neighbour(body, s, b.bond);
     for (const std::int32_t end : {b.point, q}) {  // at a corner it may be the last
       if (__builtin_popcount(state.points.bonds[end]) == 1) return false;

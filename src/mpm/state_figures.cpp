@@ -72,7 +72,7 @@ float stable_substep(const MpmState& state, const Stiffening& stiffening) {
 }
 
 bool may_be_wild(const MpmState& state) {
-  return (!state.threads.empty() && state.wildest >= kThreadStiffening) ||
+  return (!state.bridge_ends.empty() && state.wildest >= kBridgeStiffening) ||
          (!state.debris.empty() && state.wildest >= kWildStiffening);
 }
 

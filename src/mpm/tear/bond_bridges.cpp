@@ -91,7 +91,7 @@ void tear_bridges(MpmState& state, std::vector<std::int32_t>& changed, CutReport
     const LatticeBody& body = state.bodies[points.site[p].body];
     if (!BondsAround(body, points, p).end_bridge()) continue;
     const Deformation d(body, points.site[p], *state.fields, state.nodes);
-    if (d.stretch < kThreadStretch || d.stiffening < kThreadStiffening) {
+    if (d.stretch < kThreadStretch || d.stiffening < kBridgeStiffening) {
       left.push_back(p);
       continue;
     }

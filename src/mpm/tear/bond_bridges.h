@@ -13,7 +13,7 @@ namespace tissue_sim {
 /// and has stiffened so much (mpm/tear/deformation.h), whatever its material: between halves that
 /// part it would be drawn out without end, and what hangs on it would whirl about, too fast for any
 /// substep. One that swings stiffens twentyfold within a few substeps: it is not to get near that.
-inline constexpr double kThreadStretch = 1.5, kThreadStiffening = 3.5;
+inline constexpr double kThreadStretch = 1.5, kBridgeStiffening = 3.5;
 
 /// After the points `changed` lost bonds: adds the ends of new bridges to MpmState::bridge_ends.
 void list_bridges(MpmState& state, const std::vector<std::int32_t>& changed);

@@ -108,8 +108,8 @@ void CudaPbdTissue::choose_way() {
     if (d.way != was) upload_constraints();  // in another order
     return;
   }
-  // On an H100, in us; what a launch takes within a graph is 1.6, of tetrahedra 2.2, and each
-  // further colour that it is of 0.8.
+  // On an H100, in us; what a launch takes within a graph is 1.6, of tetrahedra 2.9, and each
+  // further colour that it is of 0.8, of tetrahedra 1.
   const bool is_surface = s.elastics.blocks.empty() && s.strains.blocks.empty();
   const int threads = is_surface ? 1024 : 512;
   const double one_block =
@@ -119,7 +119,8 @@ void CudaPbdTissue::choose_way() {
   const int all = static_cast<int>(s.elastics.begin.size() + s.strains.begin.size() +
                                    s.links.begin.size() + s.bends.begin.size()) -
                   4;
-  const double launches = (is_surface ? 1.6 : 2.2) * (3 + count) + 0.8 * (all - count);
+  const double launches =
+      (is_surface ? 1.6 : 2.9) * (3 + count) + (is_surface ? 0.8 : 1.0) * (all - count);
   d.way = fits && one_block < launches ? Way::kOneBlock : Way::kLaunches;
   if (d.way != was) upload_constraints();  // in another order
 }

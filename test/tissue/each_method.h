@@ -85,7 +85,7 @@ inline Tolerances tolerances(Method method) {
       t.misplaced = 0;
       t.momentum = 1e-4;
       t.clamp = 0;
-      t.beam_convergence = 1.1;  // read: 1.15; one sweep a step, and linear tetrahedra lock
+      t.beam_convergence = 1.2;
       return t;
   }
   throw std::logic_error("say in each_method.h what this method must reach");
@@ -108,6 +108,8 @@ inline constexpr Shortfall kShortfalls[] = {
      "too stiff by 5 % with a Poisson's ratio of 0, by 16 % with 0.3: linear tetrahedra lock"},
     {Method::kPbd, "FreeFlightStaysThroughCutsAsWithoutThem",
      "angular momentum of all pieces 6e-4 off after five cuts, for 1e-4: places are rounded"},
+    {Method::kPbd, "ConvergesWithResolution",
+     "the error falls by 1.15 from 4 cells to 8, for 1.2: linear tetrahedra lock"},
     {Method::kPbd, "NearlyIncompressible", "too stiff by 25 %, for 5: linear tetrahedra lock"},
 };
 

@@ -22,6 +22,7 @@ class Weight : public EachMethod {
     scene.damping = 15;
     return scene;
   }
+  void expect_carried(Simulation& simulation, const std::vector<Pose>& tips);
 };
 FOR_EACH_METHOD(Weight);
 
@@ -43,6 +44,19 @@ Wrench carried(Simulation& simulation, const std::vector<Pose>& tips) {
   return sum;
 }
 
+/// Once the body is at rest the tools feel its weight, where its middle is.
+void Weight::expect_carried(Simulation& simulation, const std::vector<Pose>& tips) {
+  for (int f = 0; f < 150; ++f) simulation.advance_frame();
+  const Wrench felt = carried(simulation, tips);
+  const Fragment piece = simulation.tissue().fragments()[0];
+  ASSERT_LT(piece.velocity.norm(), 2e-4) << "it is not at rest";
+  const Vec3 weight(0, 0, -kWeight);
+  EXPECT_LT((felt.force - weight).norm(), within().weight * kWeight) << felt.force.transpose();
+  EXPECT_LT((felt.torque - piece.centroid.cross(weight)).norm(),
+            within().moment * kWeight * kSize[0])
+      << felt.torque.transpose();
+}
+
 // Three rods that stand still under it, the rods not in the middle.
 TEST_P(Weight, OfABodyOnRodsIsWhatTheRodsFeel) {
   const double radius = 0.005;
@@ -58,15 +72,7 @@ TEST_P(Weight, OfABodyOnRodsIsWhatTheRodsFeel) {
   }
   Simulation simulation(scene);
   for (std::size_t i = 0; i < rods.size(); ++i) simulation.set_tool(static_cast<int>(i), rods[i]);
-  for (int f = 0; f < 150; ++f) simulation.advance_frame();
-  const Wrench felt = carried(simulation, rods);
-  const Fragment piece = simulation.tissue().fragments()[0];
-  ASSERT_LT(piece.velocity.norm(), 2e-4) << "it is not at rest";
-  const Vec3 weight(0, 0, -kWeight);
-  EXPECT_LT((felt.force - weight).norm(), within().weight * kWeight) << felt.force.transpose();
-  EXPECT_LT((felt.torque - piece.centroid.cross(weight)).norm(),
-            within().moment * kWeight * kSize[0])
-      << felt.torque.transpose();
+  expect_carried(simulation, rods);
 }
 
 // Under its left half a plate, under its right half a punch, their faces up.
@@ -89,15 +95,7 @@ TEST_P(Weight, OfABodyOnAPlateAndAPunchIsWhatTheyFeel) {
                                 {Vec3(0.01, 0, 0), Quat::Identity()}};
   Simulation simulation(scene);
   for (int i = 0; i < 2; ++i) simulation.set_tool(i, up[i]);
-  for (int f = 0; f < 150; ++f) simulation.advance_frame();
-  const Wrench felt = carried(simulation, up);
-  const Fragment piece = simulation.tissue().fragments()[0];
-  ASSERT_LT(piece.velocity.norm(), 2e-4) << "it is not at rest";
-  const Vec3 weight(0, 0, -kWeight);
-  EXPECT_LT((felt.force - weight).norm(), within().weight * kWeight) << felt.force.transpose();
-  EXPECT_LT((felt.torque - piece.centroid.cross(weight)).norm(),
-            within().moment * kWeight * kSize[0])
-      << felt.torque.transpose();
+  expect_carried(simulation, up);
 }
 
 // The same body in two halves: all of it is carried, however it is cut.

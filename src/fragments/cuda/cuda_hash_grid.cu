@@ -4,6 +4,7 @@
 
 #include "compute/for_each_cuda.h"
 #include "fragments/cuda/cuda_hash_grid.h"
+#include "math/cuda_union_find.h"
 
 namespace tissue_sim {
 namespace {
@@ -98,19 +99,6 @@ struct Mark {
   }
 };
 
-/// The root of a point's tree, which its path is made half as long for. Others may do the same.
-__device__ __forceinline__ std::int32_t root(volatile std::int32_t* parent, std::int32_t p) {
-  std::int32_t above = parent[p];
-  while (above != p) {
-    const std::int32_t next = parent[above];
-    if (next == above) return above;
-    parent[p] = next;
-    p = next;
-    above = parent[p];
-  }
-  return p;
-}
-
 /// Joins each cell's lowest point with those of the cells before it. The higher root hangs on the
 /// lower one, so each root is the lowest point of its group, whatever the order.
 template <class Grid>
@@ -120,17 +108,6 @@ struct Join {
   const std::int32_t* cell;
   std::int32_t* parent;
 
-  __device__ void join(std::int32_t a, std::int32_t b) const {
-    a = root(parent, a);
-    b = root(parent, b);
-    while (a != b) {
-      const std::int32_t high = max(a, b), low = min(a, b);
-      const std::int32_t found = atomicCAS(parent + high, high, low);
-      if (found == high) return;
-      a = root(parent, found);
-      b = low;
-    }
-  }
   __device__ void operator()(int p) const {
     const std::int32_t own = cell[p];
     if (own < 0 || grid.lowest[own] != p) return;
@@ -141,7 +118,7 @@ struct Join {
       const std::int32_t before = grid.place_before(c, own, a);
       if (before < 0) continue;
       const std::int32_t other = grid.lowest[before];
-      if (other != kNone) join(p, other);
+      if (other != kNone) join(parent, p, other);
     }
   }
 };

@@ -1,6 +1,7 @@
 #include <algorithm>
 
 #include "compute/for_each_cuda.h"
+#include "math/cuda_union_find.h"
 #include "mpm/cuda/label_pieces.h"
 #include "mpm/lattice/bonds.h"
 
@@ -9,19 +10,6 @@ namespace {
 
 __device__ __forceinline__ bool holds(const std::uint8_t* bonds, std::int32_t p, int bond) {
   return (bonds[p] >> bond & 1) != 0;
-}
-
-/// The root of a point's tree, which its path is made half as long for. Others may do the same.
-__device__ __forceinline__ std::int32_t root(volatile std::int32_t* parent, std::int32_t p) {
-  std::int32_t above = parent[p];
-  while (above != p) {
-    const std::int32_t next = parent[above];
-    if (next == above) return above;
-    parent[p] = next;
-    p = next;
-    above = parent[p];
-  }
-  return p;
 }
 
 /// Each point hangs on the one before it along x that it holds on to.
@@ -40,22 +28,11 @@ struct Join {
   const std::uint8_t* bonds;
   std::int32_t* parent;
 
-  __device__ void join(std::int32_t a, std::int32_t b) const {
-    a = root(parent, a);
-    b = root(parent, b);
-    while (a != b) {
-      const std::int32_t high = max(a, b), low = min(a, b);
-      const std::int32_t found = atomicCAS(parent + high, high, low);
-      if (found == high) return;
-      a = root(parent, found);
-      b = low;
-    }
-  }
   __device__ void operator()(int i) const {
     const std::int32_t p = sites.point_at[i];
     if (p < 0) return;
-    if (holds(bonds, p, kForwardBond + 1)) join(p, sites.point_at[i + sites.row]);
-    if (holds(bonds, p, kForwardBond + 2)) join(p, sites.point_at[i + sites.plane]);
+    if (holds(bonds, p, kForwardBond + 1)) join(parent, p, sites.point_at[i + sites.row]);
+    if (holds(bonds, p, kForwardBond + 2)) join(parent, p, sites.point_at[i + sites.plane]);
   }
 };
 

@@ -15,6 +15,24 @@ constexpr double kYoungest = 0.015;  // ... unless that is not long ago [s]
 
 }  // namespace
 
+double wave_modulus(const Material& m, float stiffening) {
+  const double mu = lame_mu(m), lambda = lame_lambda(m);
+  // Waves in the deformed body, in reference space: the volumetric stiffness grows with the
+  // square of the cofactor's columns.
+  const double volumetric = m.law == Law::kNeoHookean ? lambda + mu : lambda;
+  return lambda + 2 * mu + volumetric * std::max(0.0f, stiffening - 1);
+}
+
+double viscous_substep(double elastic, double damping) {
+  const double b = 0.5 * damping * elastic * elastic;
+  return std::sqrt(b * b + elastic * elastic) - b;
+}
+
+bool conserves_energy(double damping, const std::vector<Material>& materials) {
+  return damping == 0 && std::any_of(materials.begin(), materials.end(),
+                                     [](const Material& m) { return m.viscosity == 0; });
+}
+
 double StabilityLimit::follow(const std::vector<Stiffness*>& elements,
                               const std::vector<float>& modulus, double time) {
   growth_ = 1;

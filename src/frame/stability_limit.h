@@ -5,6 +5,8 @@
 #include <functional>
 #include <vector>
 
+#include "tissue_sim/material.h"
+
 namespace tissue_sim {
 
 /// Of the limit, what is used: the rest is for what stiffens within a part, and contact of faces.
@@ -15,6 +17,17 @@ constexpr double kStabilityMargin = 0.76;
 struct Stiffness {
   float measured = 0, last = 0;
 };
+
+/// The largest P-wave modulus of deformed tissue [Pa], as its substep sees it. `stiffening`: the
+/// largest column of the cofactor of F, squared.
+double wave_modulus(const Material& material, float stiffening);
+
+/// The substep that is as stable with viscosity as `elastic` is without [s], where it slows nodes
+/// at twice the rate `damping` [1/s]: (dt / elastic)^2 + damping dt = 1.
+double viscous_substep(double elastic, double damping);
+
+/// Whether nothing takes energy from tissue of some of these materials.
+bool conserves_energy(double damping, const std::vector<Material>& materials);
 
 /// Measures the limit of stability of the linearised motion [s]: of the elements whose flag is set,
 /// with `steps` steps of largest_eigenvalue().

@@ -55,6 +55,11 @@ void fields(Archive& archive, Fragment& f) {
 }
 
 template <class Archive>
+void fields(Archive& archive, Stiffness& s) {
+  archive(s.measured, s.last);
+}
+
+template <class Archive>
 void fields(Archive& archive, StabilityLimit& x) {
   archive(x.limit_, x.measured_at_, x.longest_age_, x.growth_, x.trend_, x.followed_at_);
 }

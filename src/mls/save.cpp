@@ -32,8 +32,7 @@ void fields(Archive& archive, MlsState& s) {
 
 template <class Archive>
 void fields(Archive& archive, MlsSubsteps& s) {
-  archive(s.measured_, s.now_, s.limit_, s.measured_at_, s.growth_, s.trend_, s.count_,
-          s.shortened_, s.is_new_, s.was_cut_, s.most_rate_);
+  archive(s.stiffness_, s.stiffened_, s.most_rate_, s.limit_, s.length_, s.acceptance_);
 }
 
 template <class Archive>

@@ -2,85 +2,37 @@
 
 #include <algorithm>
 #include <cmath>
-#include <utility>
-
-#include "mls/linearised_motion.h"
 
 namespace tissue_sim {
 namespace {
 
-constexpr int kLanczosSteps = 8;        // of Lanczos' method
-constexpr double kMargin = 0.76;        // of the limit: the rest is for contact and what stiffens
-constexpr double kLongestAge = 0.5;     // of the measured limit [s]
-constexpr double kLongestAgeCut = 0.1;  // the same while something is cut [s]
-constexpr double kMostRate = 1.2;       // growth of the fastest node's rate by a cut, until then
-constexpr double kMostGrowth = 1.3;     // of the stiffness, until the limit is measured again
-constexpr double kBorne = 0.9;          // of the limit at the end of a part: else it is undone ...
-constexpr double kShorter = 0.6;        // ... and substeps made shorter by that
-constexpr double kShortest = 1e-3;      // until by that: then it is no use
-constexpr double kMostAbove = 1.1;      // the first substep over what all should come to
-constexpr int kFewest = 6, kMost = 64;  // substeps of a part
-
-/// P-wave modulus of a node whose cofactor's columns grew to `stiffening`, squared [Pa].
-double modulus(const Material& m, double stiffening) {
-  const double mu = lame_mu(m), lambda = lame_lambda(m);
-  const double volumetric = m.law == Law::kNeoHookean ? lambda + mu : lambda;
-  return lambda + 2 * mu + volumetric * std::max(0.0, stiffening - 1);
-}
-
-/// Shortens an elastic limit for viscosity, whose fastest rate is that of the mode of the highest
-/// frequency: c = 2 eta / (lambda + 2 mu) omega^2, growing with the square of the stretch.
-double with_viscosity(const MlsState& s, double limit, double stiffening) {
-  double shortest = limit;
-  const double omega = 2 / limit;
-  for (const Material& m : s.nodes.materials) {
-    if (m.viscosity == 0) continue;
-    const double rate =
-        2 * m.viscosity / (lame_lambda(m) + 2 * lame_mu(m)) * omega * omega * stiffening;
-    const double b = 0.25 * rate * limit * limit;
-    shortest = std::min(shortest, std::sqrt(b * b + limit * limit) - b);
-  }
-  return shortest;
-}
+constexpr double kMostRate = 1.2;  // growth of the fastest node's rate by a cut, until the limit is
+                                   // measured again
+constexpr double kOfHeld = 1;      // substep where all is held [s]
 
 }  // namespace
 
-double MlsSubsteps::growth(const MlsState& s, const std::vector<float>& stiffening) const {
-  double most = 1;
+MlsSubsteps::MlsSubsteps(const MlsState& s) : stiffness_(s.count()), modulus_(s.count()) {
   for (int i = 0; i < s.count(); ++i) {
-    const Material& m = s.nodes.material_of(i);
-    const double g = modulus(m, stiffening[i]) / modulus(m, measured_.empty() ? 1 : measured_[i]);
-    if (!(g <= most)) most = g;
+    stiffness_[i].last = static_cast<float>(wave_modulus(s.nodes.material_of(i), 1));
+    elements_.push_back(&stiffness_[i]);
   }
-  return most;
 }
 
-bool MlsSubsteps::is_due(const MlsState& s) const {
-  return limit_ == 0 || s.time - measured_at_ > (was_cut_ ? kLongestAgeCut : kLongestAge) ||
-         (growth_ > kMostGrowth && s.time > measured_at_);
-}
-
-void MlsSubsteps::measure(const MlsState& s, const MlsForces& forces) {
-  is_new_ = limit_ == 0;
-  limit_ = measured_limit(s, forces, kLanczosSteps);
-  if (!std::isfinite(limit_)) limit_ = 1;  // all is held
-  measured_ = now_;
-  measured_at_ = s.time;
-  growth_ = 1;
-  was_cut_ = false;
-  std::vector<double> of_group(s.groups(), 0.0);
-  s.cpu->for_each(s.groups(), [&](int group) {
-    const int first = group * kMlsGroup, last = std::min(s.count(), first + kMlsGroup);
-    for (int i = first; i < last; ++i) of_group[group] = std::max(of_group[group], own_rate(s, i));
-  });
-  most_rate_ = of_group.empty() ? 0 : *std::max_element(of_group.begin(), of_group.end());
+// Viscosity's fastest rate is that of the mode of the highest frequency, omega = 2 / elastic:
+// c = 2 eta / (lambda + 2 mu) omega^2, and grows with the square of the stretch.
+double MlsSubsteps::damping(const MlsState& s, double elastic) const {
+  const double omega = 2 / elastic;
+  double fastest = 0;
+  for (const Material& m : s.nodes.materials) {
+    fastest = std::max(fastest, m.viscosity / wave_modulus(m, 1) * omega * omega * stiffened_);
+  }
+  return fastest;
 }
 
 void MlsSubsteps::cut(const MlsState& s, const std::vector<std::int32_t>& nodes) {
-  was_cut_ = true;
-  if (limit_ == 0) return;  // it is measured anyway
   for (const std::int32_t i : nodes) {
-    if (own_rate(s, i) > kMostRate * most_rate_) limit_ = 0;
+    if (own_rate(s, i) > kMostRate * most_rate_) stiffness_[i].measured = 0;
   }
 }
 
@@ -112,35 +64,44 @@ double own_rate(const MlsState& s, std::int32_t i) {
   return (s.volume_lambda[i] + 2 * s.volume_mu[i]) * sum;
 }
 
-PartSubsteps MlsSubsteps::part(const MlsState& s, double time) {
-  const bool is_new = std::exchange(is_new_, false);
-  double stretch = 1;
-  for (const float x : now_) stretch = std::max<double>(stretch, x);
-  const double elastic = limit_ / std::sqrt(growth_ * trend_);
+PartSubsteps MlsSubsteps::part(const MlsState& s, double time, const MeasureLimit& measure) {
+  limit_.measure_if_due(elements_, s.time, [&](const std::vector<std::uint8_t>& nodes, int steps) {
+    std::vector<double> of_group(s.groups(), 0.0);
+    s.cpu->for_each(s.groups(), [&](int group) {
+      const int first = group * kMlsGroup, last = std::min(s.count(), first + kMlsGroup);
+      for (int i = first; i < last; ++i) {
+        of_group[group] = std::max(of_group[group], own_rate(s, i));
+      }
+    });
+    most_rate_ = *std::max_element(of_group.begin(), of_group.end());
+    return measure(nodes, steps);
+  });
+  const double elastic = limit_.known() ? limit_.foreseen() : kOfHeld;
   const double asked = std::min(1.0, s.scene.cfl / Scene().cfl);
-  const double longest = shortened_ * asked * kMargin * with_viscosity(s, elastic, stretch);
-  const bool at_once = is_new || shortened_ < 1;
-  PartSubsteps part = substeps_for(time, longest, s.dt, at_once ? 0 : kMostAbove * longest);
-  const int most = shortened_ < 1 ? kFewest : count_;
-  const int parts = (part.count + most - 1) / most;
-  part.count = (part.count + parts - 1) / parts;
-  return part;
+  const double foreseen = viscous_substep(asked * kStabilityMargin * elastic, damping(s, elastic));
+  const double shortened = acceptance_.shortened();
+  const bool undamped = conserves_energy(s.scene.damping, s.nodes.materials);
+  const double longest =
+      shortened * length_.choose(s.time, foreseen, limit_.trend(), shortened < 1, undamped);
+  return length_.part(time, longest, s.dt, shortened < 1 ? 0 : 1 / s.scene.frame_rate);
 }
 
 bool MlsSubsteps::is_borne(const MlsState& s, const std::vector<float>& stiffening, double dt) {
-  const double now = growth(s, stiffening);
-  const double longest = std::isfinite(now) ? limit_ / std::sqrt(now) : 0;
-  if (dt > kBorne * longest && shortened_ > kShortest) {
-    shortened_ *= kShorter;
-    return false;
-  }
-  trend_ = std::min(4.0, std::max(1.0, now / growth_));
-  growth_ = now;
-  now_ = stiffening;
-  shortened_ = 1;
-  count_ = trend_ > 1.3   ? std::max(kFewest, count_ / 2)
-           : trend_ < 1.2 ? std::min(kMost, 2 * count_)
-                          : count_;
+  s.cpu->for_each(s.groups(), [&](int group) {
+    const int first = group * kMlsGroup, last = std::min(s.count(), first + kMlsGroup);
+    for (int i = first; i < last; ++i) {
+      modulus_[i] = static_cast<float>(wave_modulus(s.nodes.material_of(i), stiffening[i]));
+    }
+  });
+  const double limit = limit_.known() ? limit_.at(elements_, modulus_) : kOfHeld;
+  const bool borne = acceptance_.accepts(dt, std::isnan(limit) ? 0 : limit, PartEnergy(), false,
+                                         [] { return 0.0; });
+  if (!borne) return false;
+  acceptance_.restart();
+  const double passed = limit_.follow(elements_, modulus_, s.time);
+  length_.follow(passed, limit_.trend(), 1 / s.scene.frame_rate);
+  stiffened_ = 1;
+  for (const float x : stiffening) stiffened_ = std::max<double>(stiffened_, x);
   return true;
 }
 

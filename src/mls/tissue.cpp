@@ -10,13 +10,19 @@
 #include "frame/checksum.h"
 #include "frame/select_points.h"
 #include "mls/cut.h"
+#include "mls/linearised_motion.h"
 #include "mls/node_contact.h"
 #include "mls/tear.h"
 
 namespace tissue_sim {
+namespace {
+
+constexpr int kLanczosSteps = 8;  // of all nodes, where some are new, too: a step costs the same
+
+}  // namespace
 
 MlsTissue::MlsTissue(const Scene& scene, std::vector<std::string> notes)
-    : notes_(std::move(notes)), state_(make_mls_state(scene, &notes_)) {
+    : notes_(std::move(notes)), state_(make_mls_state(scene, &notes_)), substeps_(*state_) {
   const MlsNodes& nodes = state_->nodes;
   const PiecePoints points{nodes.count(), [&](std::int32_t i) { return nodes.body[i]; },
                            nodes.volume.data(), nodes.anchored.data()};
@@ -91,11 +97,11 @@ void MlsTissue::begin_frame(double duration, const FrameInput& input) {
 }
 
 PartSubsteps MlsTissue::choose_substeps(const FrameInput&, double time) {
-  if (substeps_.is_due(*state_)) {
+  const MlsForces forces = [this](const float* u, float* force) { forces_at(u, force); };
+  return substeps_.part(*state_, time, [&](const std::vector<std::uint8_t>&, int) {
     pull();
-    substeps_.measure(*state_, [this](const float* u, float* force) { forces_at(u, force); });
-  }
-  return substeps_.part(*state_, time);
+    return measured_limit(*state_, forces, kLanczosSteps);
+  });
 }
 
 void MlsTissue::save_checkpoint() {

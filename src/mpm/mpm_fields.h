@@ -67,11 +67,6 @@ void fields(Archive& archive, SurfacePlace& p) {
 }
 
 template <class Archive>
-void fields(Archive& archive, Stiffness& s) {
-  archive(s.measured, s.last);
-}
-
-template <class Archive>
 void fields(Archive& archive, Block& b) {
   archive(b.body, b.x, b.y, b.z, b.nx, b.ny, b.nz, b.sides, b.pitch, b.stride, b.plane, b.runs,
           b.node_rows, b.filled, b.filled_columns, b.cell, b.material, b.mixture, b.volume, b.point,

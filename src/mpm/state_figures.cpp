@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "frame/checksum.h"
+#include "frame/stability_limit.h"
 #include "mpm/tear/bond_bridges.h"
 #include "mpm/tear/deformation.h"
 
@@ -26,19 +27,6 @@ double stable_substep(const Material& m, double cell_size, double cfl, float sti
 }
 
 }  // namespace
-
-double wave_modulus(const Material& m, float stiffening) {
-  const double mu = lame_mu(m), lambda = lame_lambda(m);
-  // Waves in the deformed body, in reference space: the volumetric stiffness grows with the
-  // square of the cofactor's columns.
-  const double volumetric = m.law == Law::kNeoHookean ? lambda + mu : lambda;
-  return lambda + 2 * mu + volumetric * std::max(0.0f, stiffening - 1);
-}
-
-double viscous_substep(double elastic, double damping) {
-  const double b = 0.5 * damping * elastic * elastic;
-  return std::sqrt(b * b + elastic * elastic) - b;
-}
 
 double fastest_damping(const MpmState& state, const Stiffening& stiffening) {
   double fastest = 0;

@@ -15,13 +15,6 @@ using Stiffening = std::vector<std::vector<float>>;
 /// The same for all.
 Stiffening even_stiffening(const MpmState& state, float stiffening);
 
-/// The largest P-wave modulus of deformed tissue [Pa], as its substep sees it.
-double wave_modulus(const Material& material, float stiffening);
-
-/// The substep that is as stable with viscosity as `elastic` is without [s], where it slows nodes
-/// at twice the rate `damping` [1/s]: (dt / elastic)^2 + damping dt = 1.
-double viscous_substep(double elastic, double damping);
-
 /// The largest such `damping` of all materials, as they are deformed and however they are cut
 /// [1/s].
 double fastest_damping(const MpmState& state, const Stiffening& stiffening);

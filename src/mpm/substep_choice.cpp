@@ -29,11 +29,9 @@ bool tears(const MpmState& state) {
 
 /// Whether nothing takes energy from some of the tissue.
 bool conserves_energy(const MpmState& state) {
-  return state.scene.damping == 0 &&
-         std::any_of(state.bodies.begin(), state.bodies.end(), [](const LatticeBody& body) {
-           return std::any_of(body.materials.begin(), body.materials.end(),
-                              [](const Material& m) { return m.viscosity == 0; });
-         });
+  return std::any_of(state.bodies.begin(), state.bodies.end(), [&](const LatticeBody& body) {
+    return conserves_energy(state.scene.damping, body.materials);
+  });
 }
 
 /// What gravity may have done in a part, at the most [J].

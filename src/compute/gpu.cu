@@ -27,9 +27,14 @@ std::string why_no_gpu() {
   const cudaError_t loaded = cudaFuncGetAttributes(&code, nothing);
   if (loaded != cudaSuccess) {
     cudaGetLastError();
-    return "this build has no code for the GPU, of compute capability " + std::to_string(major) +
-           "." + std::to_string(minor) + " (" + cudaGetErrorString(loaded) +
-           "): build with -DCMAKE_CUDA_ARCHITECTURES=" + std::to_string(capability);
+    const std::string why = cudaGetErrorString(loaded);
+    if (loaded == cudaErrorNoKernelImageForDevice || loaded == cudaErrorInvalidPtx ||
+        loaded == cudaErrorUnsupportedPtxVersion || loaded == cudaErrorInvalidKernelImage) {
+      return "this build has no code for the GPU, of compute capability " + std::to_string(major) +
+             "." + std::to_string(minor) + " (" + why +
+             "): build with -DCMAKE_CUDA_ARCHITECTURES=" + std::to_string(capability);
+    }
+    return "the GPU cannot be used now (" + why + "): nvidia-smi says which programs use it";
   }
   return "";
 }

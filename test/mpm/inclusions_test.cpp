@@ -79,6 +79,7 @@ TEST(Inclusions, OnlyBlocksOfSeveralMaterialsPay) {
 /// weight tears.
 Scene operation(const std::string& material) {
   Scene s = operation_scene(Vec3(0.08, 0.024, 0.028), Vec3(0, 0, 0.02));
+  s.device = Device::kCpu;
   s.materials.resize(2);
   for (Material& m : s.materials) {
     m.young_modulus = 2000;

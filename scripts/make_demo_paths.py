@@ -207,6 +207,8 @@ def main():
     parser.add_argument("--mesh", help="mesh file to make a scene of instead")
     parser.add_argument("--scale", type=float, default=1.0, help="metres per unit of the mesh")
     parser.add_argument("--cell-size", type=float, help="spacing of the grid, or of nodes [m]")
+    parser.add_argument("--grading", type=float, help="method mls: nodes dense at the surface, so many times as "
+                        "far apart inside (1 to 4)")
     parser.add_argument("--only-paths", action="store_true", help="write no scene.yaml")
     parser.add_argument("--out", required=True, help="folder to write into")
     args = parser.parse_args()
@@ -220,6 +222,8 @@ def main():
         if args.cell_size:
             scene["cell_size"] = args.cell_size
             scene["mls"] = {**scene.get("mls", {}), "spacing": args.cell_size}
+    if args.grading:
+        scene["mls"] = {**scene.get("mls", {}), "placement": "graded", "grading": args.grading}
     body = scene["bodies"][0]
     lo, hi, shape = box_of(body, folder)
     ground = scene.get("ground", {}).get("z", 0.0)

@@ -72,8 +72,64 @@ double free_share(const Anchors& anchors, const Vec3& middle, double edge) {
 
 }  // namespace
 
+std::vector<MlsAnchorPose> mls_anchors_at(const Scene& scene, const FrameInput& input,
+                                          double share) {
+  std::vector<MlsAnchorPose> poses;
+  if (input.anchors.empty()) return poses;
+  for (const Body& body : scene.bodies) {
+    for (const Anchor& anchor : body.anchors) {
+      const AnchorMotion& m = input.anchors[poses.size()];
+      const Quat turned =
+          share >= 1 ? m.end.orientation : m.begin.orientation.slerp(share, m.end.orientation);
+      const Vec3 place = share >= 1 ? m.end.position
+                                    : Vec3((1 - share) * m.begin.position + share * m.end.position);
+      const Eigen::Matrix3d turn = turned.toRotationMatrix();
+      const Vec3 shift = place - turn * anchor.origin();
+      MlsAnchorPose pose;
+      for (int a = 0; a < 3; ++a) {
+        for (int b = 0; b < 3; ++b) {
+          pose.turn[3 * a + b] = static_cast<float>(turn(a, b) - (a == b ? 1 : 0));
+        }
+        pose.shift[a] = static_cast<float>(shift[a]);
+      }
+      poses.push_back(pose);
+    }
+  }
+  return poses;
+}
+
+std::vector<Wrench> mls_anchor_loads(const Scene& scene, const FrameInput& input,
+                                     const MlsNodes& nodes, const float* u, const float* impulse,
+                                     double duration) {
+  std::vector<Vec3> origins;
+  for (const Body& body : scene.bodies) {
+    for (const Anchor& anchor : body.anchors) {
+      const std::size_t number = origins.size();
+      origins.push_back(input.anchors.empty() ? anchor.origin()
+                                              : input.anchors[number].end.position);
+    }
+  }
+  std::vector<Wrench> loads(origins.size());
+  if (!(duration > 0)) return loads;
+  for (std::int32_t i = 0; i < nodes.count(); ++i) {
+    const int anchor = nodes.anchor[i];
+    if (anchor < 0) continue;
+    const float *J = impulse + 4 * static_cast<std::size_t>(i),
+                *moved = u + 4 * static_cast<std::size_t>(i);
+    const Vec3 force = Vec3(J[0], J[1], J[2]) / duration;
+    const Vec3 arm = nodes.place[i] + Vec3(moved[0], moved[1], moved[2]) - origins[anchor];
+    loads[anchor].force += force;
+    loads[anchor].torque += arm.cross(force);
+  }
+  return loads;
+}
+
 void hold_at_faces(const Scene& scene, double support_factor, MlsNodes& nodes, MlsPairs& pairs) {
   nodes.free_volume = nodes.volume;
+  std::vector<std::size_t> first_anchor(1, 0);  // by body
+  for (const Body& body : scene.bodies) {
+    first_anchor.push_back(first_anchor.back() + body.anchors.size());
+  }
   std::vector<Vec3> moved = nodes.place;
   const Array<std::uint8_t> within = nodes.anchored;
   const auto each_neighbour = [&](std::int32_t i, const auto& f) {
@@ -89,13 +145,14 @@ void hold_at_faces(const Scene& scene, double support_factor, MlsNodes& nodes, M
     bool beside = false;
     each_neighbour(i, [&](std::int32_t j) { beside = beside || within[j] != 0; });
     double nearest = kNearest * spacing(i);
-    for (const Anchor& a : anchors) {
-      const Vec3 face = nearest_of(a, nodes.place[i]);
+    for (std::size_t k = 0; k < anchors.size(); ++k) {
+      const Vec3 face = nearest_of(anchors[k], nodes.place[i]);
       const double distance = (face - nodes.place[i]).norm();
       if (!beside || distance >= nearest) continue;
       nearest = distance;
       moved[i] = face;
       nodes.anchored[i] = 1;
+      nodes.anchor[i] = static_cast<std::int16_t>(first_anchor[nodes.body[i]] + k);
     }
   }
   for (std::int32_t i = 0; i < nodes.count(); ++i) {

@@ -31,7 +31,49 @@ class Sides {
 struct Sweep {
   const MlsState& s;
   const float *u_begin, *u_end;
+
+  /// Whether tissue stays where it is while it is cut, as where a service cuts.
+  bool is_still() const { return u_begin == u_end; }
 };
+
+/// An edge that moves without turning: what it sweeps is a parallelogram, in which a place that
+/// lies in its plane is at (along . x, across . x) of [0, 1]^2.
+struct Parallelogram {
+  bool is = false;
+  Vec3 corner, normal, along, across;
+
+  explicit Parallelogram(const SweptEdge& e) {
+    constexpr double kTurned = 1e-12;  // rounding of poses
+    const Vec3 edge = e.b0 - e.a0, moved = e.a1 - e.a0;
+    if ((e.b1 - e.b0 - moved).norm() > kTurned * moved.norm()) return;
+    normal = edge.cross(moved).stableNormalized();
+    if (normal.isZero()) return;
+    corner = e.a0;
+    along = moved.cross(normal);
+    along /= along.dot(edge);
+    across = normal.cross(edge);
+    across /= across.dot(moved);
+    is = along.allFinite() && across.allFinite();
+  }
+};
+
+/// Whether a link that stays where it is passes through: 1 it does, 0 it does not, -1 so near to
+/// the rim that edge_passes() has to say.
+int passes_through(const Parallelogram& p, const MovingSegment& link) {
+  constexpr double kNear = 1e-6, kSteep = 1e-3;
+  const Vec3 d = link.b0 - link.a0, x = link.a0 - p.corner;
+  const double slope = d.dot(p.normal), height = x.dot(p.normal);
+  if (!(slope * slope > kSteep * kSteep * d.squaredNorm())) return -1;
+  const double t = -height / slope;
+  const Vec3 at = x + t * d;
+  const double place[3] = {t, p.along.dot(at), p.across.dot(at)};
+  bool within = true;
+  for (const double q : place) {
+    if (q < -kNear || q > 1 + kNear) return 0;
+    within = within && q > kNear && q < 1 - kNear;
+  }
+  return within ? 1 : -1;
+}
 
 MovingSegment link_of(const Sweep& w, std::int32_t i, std::int32_t j) {
   const auto at = [&](std::int32_t node, const float* u) {
@@ -43,10 +85,12 @@ MovingSegment link_of(const Sweep& w, std::int32_t i, std::int32_t j) {
 }
 
 /// Sides of a chunk's nodes: those on which they stay for certain.
+template <bool kStill>
 void find_sides(const Sweep& w, const SweptEdge& edge, int chunk, std::uint8_t* sides) {
+  constexpr int kEnd = kStill ? 0 : 1;
   float x[2][3][kMlsChunk], margin[kMlsChunk];
   const float* place = &w.s.place[4 * static_cast<std::size_t>(chunk) * kMlsChunk];
-  for (int end = 0; end < 2; ++end) {
+  for (int end = 0; end <= kEnd; ++end) {
     const float* u =
         (end == 0 ? w.u_begin : w.u_end) + 4 * static_cast<std::size_t>(chunk) * kMlsChunk;
     for (int a = 0; a < 3; ++a) {
@@ -55,7 +99,9 @@ void find_sides(const Sweep& w, const SweptEdge& edge, int chunk, std::uint8_t* 
   }
   for (int l = 0; l < kMlsChunk; ++l) {
     float sum = 0;
-    for (int a = 0; a < 3; ++a) sum += std::fabs(x[0][a][l]) + std::fabs(x[1][a][l]);
+    for (int a = 0; a < 3; ++a) {
+      sum += std::fabs(x[0][a][l]) + std::fabs(x[kEnd][a][l]);
+    }
     margin[l] = kRounding * sum;
   }
   std::int32_t bits[kMlsChunk] = {};
@@ -67,7 +113,7 @@ void find_sides(const Sweep& w, const SweptEdge& edge, int chunk, std::uint8_t* 
                high = static_cast<float>(slab.high + kRounding * std::fabs(slab.high));
     for (int l = 0; l < kMlsChunk; ++l) {
       const float p = a * x[0][0][l] + b * x[0][1][l] + c * x[0][2][l];
-      const float q = a * x[1][0][l] + b * x[1][1][l] + c * x[1][2][l];
+      const float q = a * x[kEnd][0][l] + b * x[kEnd][1][l] + c * x[kEnd][2][l];
       const float most = p > q ? p : q, least = p > q ? q : p;
       bits[l] |=
           (most + margin[l] < low ? 1 << 2 * k : 0) | (least - margin[l] > high ? 2 << 2 * k : 0);
@@ -76,9 +122,21 @@ void find_sides(const Sweep& w, const SweptEdge& edge, int chunk, std::uint8_t* 
   for (int l = 0; l < kMlsChunk; ++l) sides[l] = static_cast<std::uint8_t>(bits[l]);
 }
 
-bool passes(const Sweep& w, const SweepPart& part, const SweptEdge& edge, std::int32_t i,
-            std::int32_t j) {
-  const MovingSegment link = link_of(w, i, j).during(part.begin, part.end);
+/// A part of the path's edge and when it sweeps.
+struct SweepOfEdge {
+  double begin, end;
+  const SweptEdge& edge;
+  Parallelogram flat;
+};
+
+bool passes(const Sweep& w, const SweepOfEdge& sweep, std::int32_t i, std::int32_t j) {
+  const SweptEdge& edge = sweep.edge;
+  MovingSegment link = link_of(w, i, j);
+  if (w.is_still() && sweep.flat.is) {
+    const int passes = passes_through(sweep.flat, link);
+    if (passes >= 0) return passes != 0;
+  }
+  link = link.during(sweep.begin, sweep.end);
   return !stays_aside(edge, link) && edge_passes(edge, link);
 }
 
@@ -93,8 +151,8 @@ bool any_astride(const std::uint8_t* sides, const std::uint8_t* others) {
 }
 
 /// Of pairs of the chunk's nodes with later ones.
-void search_chunk(const Sweep& w, const SweepPart& part, const SweptEdge& edge, const Sides& sides,
-                  int chunk, std::vector<std::int32_t>& found) {
+void search_chunk(const Sweep& w, const SweepOfEdge& sweep, const Sides& sides, int chunk,
+                  std::vector<std::int32_t>& found) {
   const MlsPairs& p = w.s.pairs;
   const MlsLanes& lanes = w.s.lanes;
   const std::int32_t first = chunk * kMlsChunk, last = std::min(w.s.count(), first + kMlsChunk);
@@ -108,8 +166,9 @@ void search_chunk(const Sweep& w, const SweepPart& part, const SweptEdge& edge, 
         if ((*sides.at(first + l) & *sides.at(other + l)) != 0) continue;
         const std::int32_t i = first + l, j = other + l;
         if (i >= last || j >= w.s.count()) continue;
+        if (!passes(w, sweep, i, j)) continue;
         const std::int32_t e = p.find(i, j);  // rows end within a slot: they may be no pair
-        if (e >= 0 && p.crossed[e] == 0 && passes(w, part, edge, i, j)) found.push_back(e);
+        if (e >= 0 && p.crossed[e] == 0) found.push_back(e);
       }
     }
   }
@@ -119,7 +178,7 @@ void search_chunk(const Sweep& w, const SweepPart& part, const SweptEdge& edge, 
     for (std::int32_t e = p.begin[i]; e < p.begin[i + 1]; ++e) {
       const std::int32_t j = p.other[e];
       if (j < i || (own & *sides.at(j)) != 0 || p.crossed[e] != 0) continue;
-      if (passes(w, part, edge, i, j)) found.push_back(e);
+      if (passes(w, sweep, i, j)) found.push_back(e);
     }
   }
 }
@@ -136,12 +195,14 @@ std::vector<std::int32_t> find_crossed(const MlsState& s, const BladePath& path,
   std::vector<std::int32_t> found;
   for (const SweepPart& part : sweep_parts(path)) {
     for (const SweptEdge& edge : part.edges) {
+      const SweepOfEdge sweep{part.begin, part.end, edge, Parallelogram(edge)};
       s.cpu->for_each(blocks, [&](int block) {
         const int first = block * kChunksAtATime, last = std::min(chunks, first + kChunksAtATime);
         common[block] = kAllSides;
         for (int chunk = first; chunk < last; ++chunk) {
           std::uint8_t* of = sides.at(chunk * kMlsChunk);
-          find_sides(w, edge, chunk, of);
+          w.is_still() ? find_sides<true>(w, edge, chunk, of)
+                       : find_sides<false>(w, edge, chunk, of);
           for (int l = 0; l < std::min(kMlsChunk, s.count() - chunk * kMlsChunk); ++l) {
             common[block] &= of[l];
           }
@@ -153,7 +214,7 @@ std::vector<std::int32_t> find_crossed(const MlsState& s, const BladePath& path,
       s.cpu->for_each(blocks, [&](int block) {
         const int first = block * kChunksAtATime, last = std::min(chunks, first + kChunksAtATime);
         for (int chunk = first; chunk < last; ++chunk) {
-          search_chunk(w, part, edge, sides, chunk, of_block[block]);
+          search_chunk(w, sweep, sides, chunk, of_block[block]);
         }
       });
       for (std::vector<std::int32_t>& some : of_block) {

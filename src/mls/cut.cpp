@@ -55,8 +55,8 @@ std::vector<std::int32_t> marked(const std::vector<std::uint8_t>& marks) {
 
 }  // namespace
 
-void cross_entries(MlsState& s, const std::vector<std::int32_t>& entries,
-                   std::vector<std::int32_t>& changed, CutReport& report) {
+std::vector<std::int32_t> mark_crossed(MlsState& s, const std::vector<std::int32_t>& entries,
+                                       CutReport& report) {
   MlsPairs& p = s.pairs;
   std::vector<std::uint8_t> is_touched(s.count(), 0);
   for (const std::int32_t e : entries) {
@@ -66,10 +66,17 @@ void cross_entries(MlsState& s, const std::vector<std::int32_t>& entries,
     ++report.bonds_broken;
     is_touched[p.other[e]] = is_touched[p.other[twin]] = 1;
   }
-  const std::vector<std::int32_t> touched = marked(is_touched);
-  if (touched.empty()) return;
+  std::vector<std::int32_t> touched = marked(is_touched);
   report.points_separated += static_cast<int>(touched.size());
-  changed.insert(changed.end(), touched.begin(), touched.end());
+  for (const std::int32_t i : touched) expose(s, i);
+  return touched;
+}
+
+std::vector<std::int32_t> weaken(MlsState& s, const std::vector<std::int32_t>& touched) {
+  if (touched.empty()) return {};
+  MlsPairs& p = s.pairs;
+  std::vector<std::uint8_t> is_touched(s.count(), 0);
+  for (const std::int32_t i : touched) is_touched[i] = 1;
   // Pairs of a touched node: of any other, all common neighbours are as they were.
   const int count = static_cast<int>(touched.size()),
             blocks = (count + kNodesAtATime - 1) / kNodesAtATime;
@@ -78,7 +85,6 @@ void cross_entries(MlsState& s, const std::vector<std::int32_t>& entries,
     Marked neighbours(p);
     for (int k = block * kNodesAtATime; k < std::min(count, (block + 1) * kNodesAtATime); ++k) {
       const std::int32_t i = touched[k];
-      expose(s, i);
       neighbours.mark(i);
       for (std::int32_t e = p.begin[i]; e < p.begin[i + 1]; ++e) {
         if (p.crossed[e] == 0) continue;
@@ -101,7 +107,16 @@ void cross_entries(MlsState& s, const std::vector<std::int32_t>& entries,
   for (const auto& some : fallen) {
     for (const std::int32_t i : some) has_fallen[i] = 1;
   }
-  remake(s, marked(has_fallen));
+  std::vector<std::int32_t> remade = marked(has_fallen);
+  remake(s, remade);
+  return remade;
+}
+
+void cross_entries(MlsState& s, const std::vector<std::int32_t>& entries,
+                   std::vector<std::int32_t>& changed, CutReport& report) {
+  const std::vector<std::int32_t> touched = mark_crossed(s, entries, report);
+  changed.insert(changed.end(), touched.begin(), touched.end());
+  weaken(s, touched);
 }
 
 void cross_pairs(MlsState& s, const BladePath& path, const float* u_begin, const float* u_end,

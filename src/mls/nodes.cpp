@@ -1,6 +1,7 @@
 #include "mls/nodes.h"
 
 #include <algorithm>
+#include <memory>
 #include <stdexcept>
 
 #include "geometry/nearest_surface.h"
@@ -54,6 +55,7 @@ double mls_spacing(const Scene& scene) {
 MlsNodes make_mls_nodes(const Scene& scene, std::vector<std::string>* notes) {
   const double spacing = mls_spacing(scene);
   MlsNodes nodes;
+  std::size_t first_anchor = 0;
   for (std::size_t b = 0; b < scene.bodies.size(); ++b) {
     const Body& body = scene.bodies[b];
     const std::uint8_t own = number_of(nodes.materials, find_material(scene, body.material));
@@ -63,29 +65,35 @@ MlsNodes make_mls_nodes(const Scene& scene, std::vector<std::string>* notes) {
     }
     std::vector<int> held(body.inclusions.size(), 0), anchored(body.anchors.size(), 0);
     const double widest = scene.mls.placement == MlsPlacement::kGraded ? scene.mls.grading : 1;
-    const NearestSurface surface(body, 2 * widest * spacing);
+    std::unique_ptr<NearestSurface> surface;  // given nodes lie at the surface itself
+    if (!has_given_nodes(body)) {
+      surface = std::make_unique<NearestSurface>(body, 2 * widest * spacing);
+    }
     for (const PlacedNode& n : place_nodes(body, scene.mls, spacing, scene.seed + b, notes)) {
       nodes.place.push_back(n.place);
       nodes.volume.push_back(static_cast<float>(n.volume));
       nodes.body.push_back(static_cast<std::int16_t>(b));
       nodes.surface.push_back(n.surface ? 1 : 0);
-      nodes.depth.push_back(n.surface ? depth_of(surface, n.place, body.pose.position, spacing)
-                                      : 0.0f);
+      nodes.depth.push_back(n.surface && surface != nullptr
+                                ? depth_of(*surface, n.place, body.pose.position, spacing)
+                                : 0.0f);
       const int inclusion = last_that_holds(
           body.inclusions, n.place, [](const Inclusion& i) -> const Region& { return i.region; });
       nodes.material.push_back(inclusion < 0 ? own : number[inclusion]);
       if (inclusion >= 0) ++held[inclusion];
-      std::uint8_t is_held = 0;
+      std::int16_t anchor = -1;
       for (std::size_t r = 0; r < body.anchors.size(); ++r) {
         if (!body.anchors[r].contains(n.place)) continue;
         ++anchored[r];
-        is_held = 1;
+        if (anchor < 0) anchor = static_cast<std::int16_t>(first_anchor + r);
       }
-      nodes.anchored.push_back(is_held);
+      nodes.anchor.push_back(anchor);
+      nodes.anchored.push_back(anchor >= 0 ? 1 : 0);
     }
     for (std::size_t r = 0; r < anchored.size(); ++r) {
       if (anchored[r] == 0) refuse_region("anchors", r, spacing, body.name, "");
     }
+    first_anchor += body.anchors.size();
     for (std::size_t i = 0; i < held.size(); ++i) {
       if (held[i] == 0) {
         refuse_region("inclusions", i, spacing, body.name, " that no later one holds");

@@ -18,6 +18,7 @@ struct MlsNodes {
   std::vector<std::int16_t> body;      ///< index into Scene::bodies
   std::vector<std::uint8_t> material;  ///< index into `materials`
   Array<std::uint8_t> anchored;        ///< lies in an anchored region
+  std::vector<std::int16_t> anchor;    ///< that holds it, in the order of the scene; -1: none
   std::vector<std::uint8_t> surface;   ///< its share reaches the surface of the body
   std::vector<float> depth;            ///< of those at the surface, below it; 0 of all others [m]
   std::vector<Material> materials;     ///< of all bodies and inclusions

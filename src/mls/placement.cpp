@@ -11,6 +11,7 @@
 #include "geometry/chord.h"
 #include "geometry/lattice.h"
 #include "geometry/nearest.h"
+#include "geometry/tet_mesh.h"
 
 namespace tissue_sim {
 namespace {
@@ -187,10 +188,28 @@ std::vector<PlacedNode> graded(const std::vector<PlacedNode>& cubes, double grad
   return nodes;
 }
 
+std::vector<PlacedNode> vertices_of(const TetMesh& mesh) {
+  std::vector<PlacedNode> nodes(mesh.vertices.size());
+  for (std::size_t i = 0; i < nodes.size(); ++i) nodes[i].place = mesh.vertices[i];
+  for (std::size_t t = 0; t < mesh.tetrahedra.size(); ++t) {
+    const double share = 0.25 * volume(mesh, static_cast<int>(t));
+    for (const int v : mesh.tetrahedra[t]) nodes[v].volume += share;
+  }
+  for (const std::array<int, 3>& triangle : boundary(mesh)) {
+    for (const int v : triangle) nodes[v].surface = true;
+  }
+  return nodes;
+}
+
 }  // namespace
+
+bool has_given_nodes(const Body& body) {
+  return body.shape == Shape::kMesh && is_tet_file(body.mesh);
+}
 
 std::vector<PlacedNode> place_nodes(const Body& body, const MlsOptions& options, double spacing,
                                     std::uint64_t seed, std::vector<std::string>* notes) {
+  if (has_given_nodes(body)) return vertices_of(load_tets(body, spacing, notes));
   if (options.placement == MlsPlacement::kRegular) return cubes_of(body, spacing, notes);
   const std::vector<PlacedNode> cubes = cubes_of(body, spacing / kSamples, notes);
   std::vector<PlacedNode> nodes;

@@ -9,14 +9,18 @@
 
 namespace tissue_sim {
 
+/// Whether a body's nodes are the vertices of a tetrahedral mesh.
+bool has_given_nodes(const Body& body);
+
 struct PlacedNode {
   Vec3 place;            ///< [m]
   double volume = 0;     ///< its share of the body [m^3]
   bool surface = false;  ///< whether that reaches the body's surface
 };
 
-/// Nodes `spacing` apart, on a lattice or graded, as the options say; `seed` moves them aside.
-/// Throws what make_lattice() throws.
+/// Nodes `spacing` apart, on a lattice or graded, as the options say; `seed` moves them aside. Of a
+/// tetrahedral mesh its vertices instead, each with a quarter of its tetrahedra. Throws what
+/// make_lattice() and load_tets() throw.
 std::vector<PlacedNode> place_nodes(const Body& body, const MlsOptions& options, double spacing,
                                     std::uint64_t seed, std::vector<std::string>* notes);
 

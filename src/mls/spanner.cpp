@@ -1,12 +1,71 @@
 #include "mls/spanner.h"
 
 #include <algorithm>
+#include <array>
+#include <cmath>
 #include <tuple>
 #include <vector>
 
 #include "mls/state.h"
 
 namespace tissue_sim {
+namespace {
+
+constexpr double kNodesOfCluster = 64;
+
+/// Cubes of about so many nodes, and in them what hangs together.
+void make_clusters(const MlsNodes& nodes, const MlsPairs& pairs, MlsSpanner& spanner) {
+  const std::int32_t n = pairs.nodes();
+  std::vector<std::array<std::int32_t, 4>> cube(n);  // and the body
+  for (std::int32_t first = 0; first < n;) {
+    std::int32_t last = first;
+    double volume = 0;
+    for (; last < n && nodes.body[last] == nodes.body[first]; ++last) volume += nodes.volume[last];
+    const double edge = std::cbrt(kNodesOfCluster * volume / (last - first));
+    for (std::int32_t i = first; i < last; ++i) {
+      for (int a = 0; a < 3; ++a) {
+        cube[i][a] = static_cast<std::int32_t>(std::floor(nodes.place[i][a] / edge));
+      }
+      cube[i][3] = nodes.body[i];
+    }
+    first = last;
+  }
+  UnionFind linked(n);
+  for (std::int32_t i = 0; i < n; ++i) {
+    for (std::int32_t e = pairs.begin[i]; e < pairs.begin[i + 1]; ++e) {
+      if (cube[pairs.other[e]] == cube[i]) linked.join(i, pairs.other[e]);
+    }
+  }
+  spanner.cluster.assign(n, 0);
+  std::vector<std::vector<std::int32_t>> members;
+  for (std::int32_t i = 0; i < n; ++i) {
+    const std::int32_t lowest = linked.root(i);
+    if (lowest == i) members.emplace_back();
+    spanner.cluster[i] =
+        lowest == i ? static_cast<std::int32_t>(members.size()) - 1 : spanner.cluster[lowest];
+    members[spanner.cluster[i]].push_back(i);
+  }
+  std::vector<std::int32_t> neighbours;
+  spanner.members_begin.push_back(0);
+  spanner.neighbours_begin.push_back(0);
+  for (std::int32_t c = 0; c < static_cast<std::int32_t>(members.size()); ++c) {
+    neighbours.clear();
+    for (const std::int32_t i : members[c]) {
+      spanner.members.push_back(i);
+      for (std::int32_t e = pairs.begin[i]; e < pairs.begin[i + 1]; ++e) {
+        const std::int32_t other = spanner.cluster[pairs.other[e]];
+        if (other > c) neighbours.push_back(other);
+      }
+    }
+    std::sort(neighbours.begin(), neighbours.end());
+    neighbours.erase(std::unique(neighbours.begin(), neighbours.end()), neighbours.end());
+    for (const std::int32_t other : neighbours) spanner.neighbours.push_back(other);
+    spanner.members_begin.push_back(static_cast<std::int32_t>(spanner.members.size()));
+    spanner.neighbours_begin.push_back(static_cast<std::int32_t>(spanner.neighbours.size()));
+  }
+}
+
+}  // namespace
 
 MlsSpanner make_spanner(const MlsNodes& nodes, const MlsPairs& pairs) {
   struct Link {
@@ -32,7 +91,7 @@ MlsSpanner make_spanner(const MlsNodes& nodes, const MlsPairs& pairs) {
     if (std::find_first_of(a.begin(), a.end(), b.begin(), b.end()) != a.end()) continue;
     a.push_back(pairs.other[link.entry]);
     b.push_back(link.node);
-    is_in[link.entry] = 1;
+    is_in[link.entry] = is_in[pairs.twin[link.entry]] = 1;
   }
   MlsSpanner spanner;
   spanner.begin.push_back(0);
@@ -42,37 +101,52 @@ MlsSpanner make_spanner(const MlsNodes& nodes, const MlsPairs& pairs) {
     }
     spanner.begin.push_back(static_cast<std::int32_t>(spanner.entry.size()));
   }
+  make_clusters(nodes, pairs, spanner);
   return spanner;
 }
 
 UnionFind join_uncrossed(const MlsState& s) {
   const MlsPairs& p = s.pairs;
   const MlsSpanner& spanner = s.spanner;
-  // Within blocks side by side, which touch nothing of one another; then between them. The root of
-  // a component is its lowest node whatever the order.
-  constexpr std::int32_t kLeast = 2048;
+  const auto clusters = static_cast<std::int32_t>(spanner.members_begin.size()) - 1;
+  std::vector<std::uint8_t> is_cut(clusters, 0);
+  for (std::int32_t i = 0; i < s.count(); ++i) {
+    if (s.cut[i] != 0) is_cut[spanner.cluster[i]] = 1;
+  }
   UnionFind linked(s.count());
-  const std::int32_t block_size =
-      std::max<std::int32_t>(kLeast, s.count() / (2 * s.cpu->threads()) + 1);
-  const int blocks = (s.count() + block_size - 1) / block_size;
-  const auto join = [&](int block, bool within) {
-    const std::int32_t first = block * block_size, last = std::min(s.count(), first + block_size);
-    const auto join_entry = [&](std::int32_t i, std::int32_t e) {
-      const std::int32_t j = p.other[e];
-      if ((j >= first && j < last) == within && p.crossed[e] == 0) linked.join(i, j);
-    };
-    for (std::int32_t i = first; i < last; ++i) {
+  const auto join_entry = [&](std::int32_t i, std::int32_t e) {
+    if (p.crossed[e] == 0) linked.join(i, p.other[e]);
+  };
+  // Whole clusters first, and with one another: of each, its lowest node is the first.
+  for (std::int32_t c = 0; c < clusters; ++c) {
+    if (is_cut[c] != 0) continue;
+    const std::int32_t* member = &spanner.members[spanner.members_begin[c]];
+    const std::int32_t* last = spanner.members.data() + spanner.members_begin[c + 1];
+    const std::int32_t lowest = *member;
+    while (++member < last) linked.join(lowest, *member);
+  }
+  for (std::int32_t c = 0; c < clusters; ++c) {
+    const std::int32_t* members = &spanner.members[spanner.members_begin[c]];
+    if (is_cut[c] == 0) {
+      for (std::int32_t k = spanner.neighbours_begin[c]; k < spanner.neighbours_begin[c + 1]; ++k) {
+        const std::int32_t other = spanner.neighbours[k];
+        if (is_cut[other] == 0) {
+          linked.join(*members, spanner.members[spanner.members_begin[other]]);
+        }
+      }
+      continue;
+    }
+    for (std::int32_t k = spanner.members_begin[c]; k < spanner.members_begin[c + 1]; ++k) {
+      const std::int32_t i = spanner.members[k];
       if (s.cut[i] != 0) {
         for (std::int32_t e = p.begin[i]; e < p.begin[i + 1]; ++e) join_entry(i, e);
       } else {
-        for (std::int32_t k = spanner.begin[i]; k < spanner.begin[i + 1]; ++k) {
-          join_entry(i, spanner.entry[k]);
+        for (std::int32_t m = spanner.begin[i]; m < spanner.begin[i + 1]; ++m) {
+          join_entry(i, spanner.entry[m]);
         }
       }
     }
-  };
-  s.cpu->for_each(blocks, [&](int block) { join(block, true); });
-  for (int block = 0; block < blocks; ++block) join(block, false);
+  }
   return linked;
 }
 

@@ -5,7 +5,6 @@
 #include <cmath>
 
 #include "frame/leapfrog.h"
-#include "mls/anchors.h"
 #include "mls/contact.h"
 #include "mls/node_contact.h"
 
@@ -43,9 +42,11 @@ Eigen::Matrix3d moment_of(const MlsState& s, std::int32_t i) {
 }
 
 bool spans_space(const Eigen::Matrix3d& m) {
-  // Of eigenvalues a <= b <= c, a / c >= abc / c^3: for most that tells.
-  const double trace = m.trace();
-  if (m.determinant() > kSpans * trace * trace * trace) return true;
+  // Of eigenvalues a <= b <= c, sums t = a + b + c and q = ab + bc + ca: abc / (q t) <= a / c <= 9
+  // abc / (q t). For most that tells.
+  const double t = m.trace(), q = 0.5 * (t * t - m.squaredNorm()), product = m.determinant();
+  if (product > kSpans * q * t) return true;
+  if (!(9 * product > kSpans * q * t)) return false;
   Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen;
   eigen.computeDirect(m, Eigen::EigenvaluesOnly);
   const double least = eigen.eigenvalues()[0], largest = eigen.eigenvalues()[2];
@@ -115,6 +116,17 @@ void add_springs(const MlsState& s, const float* u, std::int32_t i, float* force
   }
 }
 
+/// A held node goes where its anchor does, and notes what pulls it.
+void hold_node(MlsState& s, std::int32_t i, float dt, const Vec<4>& impulse, Vec<4>& u, Vec<4>& v) {
+  float* sum = &s.held_impulse[4 * i];
+  store<4>(sum, load<4>(sum) + impulse);
+  if (s.anchors.empty()) return;
+  float target[4] = {};
+  s.anchors[s.nodes.anchor[i]].displacement(&s.place[4 * i], target);
+  v = (load<4>(target) - load<4>(&s.u[4 * i])) * (1 / dt);
+  u = load<4>(target);
+}
+
 }  // namespace
 
 std::unique_ptr<MlsState> make_mls_state(const Scene& scene, std::vector<std::string>* notes) {
@@ -165,6 +177,10 @@ std::unique_ptr<MlsState> make_mls_state(const Scene& scene, std::vector<std::st
     s.outer[i] = s.nodes.surface[i];
     s.whole_kappa[i] = whole_kappa(s, i);
     all[i] = i;
+  }
+  const auto& anchored = s.nodes.anchored;
+  if (std::any_of(anchored.begin(), anchored.end(), [](std::uint8_t a) { return a != 0; })) {
+    resize_padded(s.held_impulse, n, 4);
   }
   s.instructions = instruction_set();
   s.kernels = &mls_kernels(s.instructions);
@@ -245,8 +261,10 @@ float substep(MlsState& s, float dt, std::vector<ColliderLoad>& loads) {
         v = keep * load<4>(&s.v[4 * i]) +
             kick * (load<4>(force + 4 * (i - first)) * inv_mass + gravity);
       }
+      Vec<4> u = load<4>(&s.u[4 * i]) + dt * v;
+      if (!(inv_mass > 0)) hold_node(s, i, dt, kick * load<4>(force + 4 * (i - first)), u, v);
       store<4>(&s.v_next[4 * i], v);
-      store<4>(&s.u_next[4 * i], load<4>(&s.u[4 * i]) + dt * v);
+      store<4>(&s.u_next[4 * i], u);
     }
   };
   SharedWork stresses(s.chunks(), 4), moves(s.groups(), 1);

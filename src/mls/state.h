@@ -9,6 +9,7 @@
 #include "compute/array.h"
 #include "compute/for_each.h"
 #include "compute/simd.h"
+#include "mls/anchors.h"
 #include "mls/kernels.h"
 #include "mls/lanes.h"
 #include "mls/nodes.h"
@@ -74,7 +75,9 @@ struct MlsState {
   Array<float> spring;             ///< per entry: at a sprung node [N/m]; empty without any
   bool viscous = false;            ///< whether any material is
 
-  std::vector<Collider> colliders;       ///< at the present substep
+  std::vector<Collider> colliders;     ///< at the present substep
+  std::vector<MlsAnchorPose> anchors;  ///< at its end; empty where none ever moved
+  Array<float> held_impulse;  ///< on held nodes, since the frame began [4 n]; empty without any
   std::vector<MlsGroupContact> contact;  ///< per group
   MlsNodeContacts node_contacts;
   int until_list = 0;  ///< substeps until colliders near groups are listed anew

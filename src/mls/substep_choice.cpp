@@ -31,9 +31,12 @@ double MlsSubsteps::damping(const MlsState& s, double elastic) const {
 }
 
 void MlsSubsteps::cut(const MlsState& s, const std::vector<std::int32_t>& nodes) {
-  for (const std::int32_t i : nodes) {
-    if (own_rate(s, i) > kMostRate * most_rate_) stiffness_[i].measured = 0;
-  }
+  s.cpu->for_each(
+      static_cast<int>(nodes.size()),
+      [&](int k) {
+        if (own_rate(s, nodes[k]) > kMostRate * most_rate_) stiffness_[nodes[k]].measured = 0;
+      },
+      256);
 }
 
 double own_rate(const MlsState& s, std::int32_t i) {

@@ -9,6 +9,7 @@
 #include "fragments/piece_sums.h"
 #include "frame/checksum.h"
 #include "frame/select_points.h"
+#include "mls/crossing.h"
 #include "mls/cut.h"
 #include "mls/linearised_motion.h"
 #include "mls/node_contact.h"
@@ -41,30 +42,48 @@ MlsTissue::MlsTissue(const Scene& scene, std::vector<std::string> notes)
 }
 
 void MlsTissue::part(const std::vector<std::int32_t>& changed, CutReport& report) {
-  const MlsState& s = *state_;
-  const MlsPairs& p = s.pairs;
+  const MlsPairs& p = state_->pairs;
   // Where a pair keeps some weight there is a way around the cut.
   const bool may_have = std::any_of(changed.begin(), changed.end(), [&](std::int32_t i) {
     for (std::int32_t e = p.begin[i]; e < p.begin[i + 1]; ++e) {
       if (p.crossed[e] != 0 && p.weight[e] == 0) return true;
     }
-    return p.begin[i] == p.begin[i + 1] || changed.size() == s.nodes.place.size();
+    return p.begin[i] == p.begin[i + 1] || changed.size() == state_->nodes.place.size();
   });
-  if (!may_have) return;
-  UnionFind linked = join_uncrossed(s);
-  for (const int id : update_pieces(s.nodes.volume.data(), linked, pieces_)) {
+  if (may_have) part(join_uncrossed(*state_), report);
+}
+
+void MlsTissue::part(UnionFind linked, CutReport& report) {
+  for (const int id : update_pieces(state_->nodes.volume.data(), linked, pieces_)) {
     report.new_fragments.push_back(id);
   }
 }
 
-void MlsTissue::cut(const BladePath& path, const float* u_begin, CutReport& report) {
-  std::vector<std::int32_t> changed;
-  pull();
-  cross_pairs(*state_, path, u_begin, state_->u.data(), changed, report);
+void MlsTissue::break_pairs(const std::vector<std::int32_t>& entries, CutReport& report) {
+  // Of so many pairs some have surely lost all: pieces are looked for meanwhile.
+  constexpr std::size_t kMany = 1000;
+  MlsState& s = *state_;
+  const std::vector<std::int32_t> changed = mark_crossed(s, entries, report);
   if (changed.empty()) return;
-  pairs_changed();
+  std::optional<UnionFind> linked;
+  std::vector<std::int32_t> remade;
+  s.cpu->both([&] { remade = weaken(s, changed); },
+              [&] {
+                if (changed.size() > kMany) linked = join_uncrossed(s);
+              });
+  remade.insert(remade.end(), changed.begin(), changed.end());
+  pairs_changed(remade);
   forget(changed);
-  part(changed, report);
+  if (linked) {
+    part(*std::move(linked), report);
+  } else {
+    part(changed, report);
+  }
+}
+
+void MlsTissue::cut(const BladePath& path, const float* u_begin, CutReport& report) {
+  pull();
+  break_pairs(find_crossed(*state_, path, u_begin, state_->u.data()), report);
 }
 
 void MlsTissue::forget(const std::vector<std::int32_t>& changed) {
@@ -94,6 +113,16 @@ void MlsTissue::begin_frame(double duration, const FrameInput& input) {
   frame_.emplace(Frame{input, duration, FrameColliders(s.scene, input, duration),
                        blades ? s.u : Array<float>(), 0});
   s.until_list = 0;
+  std::fill(s.held_impulse.begin(), s.held_impulse.end(), 0.0f);
+}
+
+void MlsTissue::end_frame() {
+  MlsState& s = *state_;
+  if (s.held_impulse.empty()) return;
+  pull();
+  pull_held();
+  result_.anchor_loads = mls_anchor_loads(s.scene, frame_->input, s.nodes, s.u.data(),
+                                          s.held_impulse.data(), frame_->duration);
 }
 
 PartSubsteps MlsTissue::choose_substeps(const FrameInput&, double time) {
@@ -108,6 +137,7 @@ void MlsTissue::save_checkpoint() {
   const MlsState& s = *state_;
   checkpoint_.u = s.u;
   checkpoint_.v = s.v;
+  checkpoint_.held_impulse = s.held_impulse;
   checkpoint_.contact = s.contact;
   checkpoint_.node_contacts = s.node_contacts;
   checkpoint_.dt = s.dt;
@@ -122,6 +152,7 @@ double MlsTissue::run_part(const FramePart& part) {
   for (int i = 0; i < part.substeps.count; ++i) {
     const double share = part.substeps.share(i + 1, part.from, part.to);
     s.colliders = frame.colliders.at(share);
+    s.anchors = mls_anchors_at(s.scene, frame.input, share);
     std::vector<ColliderLoad> loads(s.colliders.size());
     if (may_touch_) update_node_contacts(s, pieces_.of_point, part.substeps.at(i));
     const float acted = substep(s, part.substeps.at(i), loads);
@@ -144,6 +175,7 @@ void MlsTissue::reject_part(Verdict) {
   MlsState& s = *state_;
   s.u = checkpoint_.u;
   s.v = checkpoint_.v;
+  s.held_impulse = checkpoint_.held_impulse;
   s.contact = checkpoint_.contact;
   s.node_contacts = checkpoint_.node_contacts;
   s.dt = checkpoint_.dt;
@@ -165,12 +197,7 @@ void MlsTissue::break_bonds(double share) {
     frame.u_before = s.u;
     frame.cut_to = share;
   }
-  if (tearing.empty()) return;
-  std::vector<std::int32_t> changed;
-  cross_entries(s, tearing, changed, result_.tear_report);
-  pairs_changed();
-  forget(changed);
-  part(changed, result_.tear_report);
+  if (!tearing.empty()) break_pairs(tearing, result_.tear_report);
 }
 
 MlsTissue::Figures MlsTissue::measure() {

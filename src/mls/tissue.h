@@ -31,6 +31,7 @@ class MlsTissue : public Tissue {
   Momentum momentum() override;
   std::vector<std::uint8_t> save() override;
   void restore(Span<const std::uint8_t> saved) override;
+  bool moves_anchors() const override { return true; }
   const std::vector<std::string>& notes() const override { return notes_; }
   std::string device_name() const override;
 
@@ -43,7 +44,7 @@ class MlsTissue : public Tissue {
   virtual void reject_part(Verdict verdict);
   bool accept_part() { return !result_.blew_up; }
   void break_bonds(double share);
-  void end_frame() {}
+  void end_frame();
 
   // For tests and the benchmark.
   MlsState& state() { return *state_; }
@@ -60,8 +61,10 @@ class MlsTissue : public Tissue {
   };
   /// Brings the motion of the nodes to state_.
   virtual void pull() {}
-  /// Weights, moments or springs changed.
-  virtual void pairs_changed() {}
+  /// Weights, moments or springs of these nodes changed, or beside them tissue ends now.
+  virtual void pairs_changed(const std::vector<std::int32_t>& /*nodes*/) {}
+  /// Brings the impulses on held nodes to state_.
+  virtual void pull_held() {}
   /// And how much each node has stiffened, into stiffening_.
   virtual Figures measure();
   /// Von Mises stress of each node over its shear modulus.
@@ -82,7 +85,7 @@ class MlsTissue : public Tissue {
   };
 
   struct Checkpoint {
-    Array<float> u, v;
+    Array<float> u, v, held_impulse;
     std::vector<MlsGroupContact> contact;
     MlsNodeContacts node_contacts;
     float dt;
@@ -92,10 +95,13 @@ class MlsTissue : public Tissue {
   };
 
   void cut(const BladePath& path, const float* u_begin, CutReport& report);
+  /// Crosses the pairs of these entries, with all that follows.
+  void break_pairs(const std::vector<std::int32_t>& entries, CutReport& report);
   /// What a cut or a tear makes void that took pairs from these nodes.
   void forget(const std::vector<std::int32_t>& changed);
   /// Pieces anew, after these nodes lost pairs.
   void part(const std::vector<std::int32_t>& changed, CutReport& report);
+  void part(UnionFind linked, CutReport& report);
 
   std::vector<std::string> notes_;
   std::unique_ptr<MlsState> state_;

@@ -7,6 +7,7 @@
 
 #include "mls/cut.h"
 #include "mls/linearised_motion.h"
+#include "mls/substep_choice.h"
 #include "mls_scenes.h"
 
 namespace tissue_sim {
@@ -308,6 +309,50 @@ TEST(MlsSubstep, LanczosFindsTheHighestFrequency) {
   const MlsForces forces = [&s](const float* u, float* force) { internal_forces(s, u, force); };
   const double eight = measured_limit(s, forces, 8), many = measured_limit(s, forces, 80);
   EXPECT_NEAR(eight / many, 1, 0.1);
+}
+
+// Between two measurements cuts go on, and the substep stays as it is. What is taken stays below
+// the limit of what is left, unless the cut asked for a new measurement (MlsSubsteps).
+TEST(MlsSubstep, StaysStableThroughCutsUntilItIsMeasuredAnew) {
+  std::mt19937 random(6);
+  std::uniform_real_distribution<double> even(-1, 1);
+  double closest = 1e30;
+  int kept = 0;
+  for (const MlsPlacement placement : kPlacements) {
+    for (int body = 0; body < 4; ++body) {
+      Scene scene = mls_box(Vec3(0.012, 0.01, 0.008), 0.001, placement);
+      scene.materials.resize(1);
+      scene.materials[0].name = scene.bodies[0].material = "elastic";
+      scene.materials[0].poisson_ratio = body % 2 == 0 ? 0.3 : 0.49;
+      MlsTissue tissue(scene);
+      MlsState& s = tissue.state();
+      const MlsForces forces = [&s](const float* u, float* force) { internal_forces(s, u, force); };
+      MlsSubsteps substeps;
+      substeps.measure(s, forces);
+      for (int k = 0; k < 12; ++k) {
+        const Vec3 normal(even(random), even(random), even(random));
+        BladePath path = plane_cut(Vec3(0.006, 0.005, 0.004) + 0.004 * normal, normal);
+        path.poses.back().position = path.poses.front().position +
+                                     (0.6 + 0.1 * even(random)) * (path.poses.back().position -
+                                                                   path.poses.front().position);
+        std::vector<std::int32_t> changed;
+        CutReport report;
+        cross_pairs(s, path, s.u.data(), s.u.data(), changed, report);
+        substeps.cut(s, changed);
+        if (substeps.is_due(s)) {
+          substeps.measure(s, forces);
+          continue;
+        }
+        const double taken = substeps.part(s, 1.0).longest(), limit = measured_limit(s, forces, 60);
+        closest = std::min(closest, limit / taken);
+        ++kept;
+        EXPECT_LT(taken, 0.97 * limit) << static_cast<int>(placement) << ' ' << body << ' ' << k;
+      }
+    }
+  }
+  EXPECT_GT(kept, 20);
+  std::printf("%d cuts without a measurement: the limit stays %.3f of what is taken at least\n",
+              kept, closest);
 }
 
 }  // namespace

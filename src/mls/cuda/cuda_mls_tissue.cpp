@@ -36,7 +36,7 @@ CudaMlsTissue::CudaMlsTissue(const Scene& scene, std::vector<std::string> notes)
   }
   upload_nodes();
   push();
-  pairs_changed();
+  upload_pairs();
   measure();
 }
 
@@ -90,10 +90,15 @@ void CudaMlsTissue::upload_nodes() {
   d.hold.resize(count * d.collider_count);
   d.of_node.resize(count);
   d.measures.resize((count + kMlsThreads - 1) / kMlsThreads);
+  if (!s.held_impulse.empty()) {
+    d.anchor.upload(s.nodes.anchor, d.stream);
+    d.held_impulse.resize(count);
+    d.held_impulse.clear(d.stream);
+  }
   d.wait("receive data");
 }
 
-void CudaMlsTissue::pairs_changed() {
+void CudaMlsTissue::upload_pairs() {
   OnDevice& d = *device_;
   const MlsState& s = *state_;
   const int n = s.count();
@@ -118,6 +123,49 @@ void CudaMlsTissue::pairs_changed() {
   d.outer.upload(s.outer.data(), n, d.stream);
   upload(s.place, n, d.place, d.stream);  // cuts move where tissue ends
   d.wait("receive data");
+}
+
+void CudaMlsTissue::pairs_changed(const std::vector<std::int32_t>& nodes) {
+  OnDevice& d = *device_;
+  const MlsState& s = *state_;
+  if (d.has_springs != !s.spring.empty()) {
+    upload_pairs();
+    return;
+  }
+  std::vector<CudaMlsNodeChange> changes;
+  std::vector<CudaMlsEntryChange> entries;
+  const auto add = [&](std::int32_t i, std::int32_t e) {
+    const std::int32_t at =
+        d.host_offset[i / kMlsSlice] + (e - s.pairs.begin[i]) * kMlsSlice + i % kMlsSlice;
+    entries.push_back(
+        {at, s.pairs.weight[e], d.has_springs ? s.spring[e] + s.spring[s.pairs.twin[e]] : 0.0f});
+  };
+  for (const std::int32_t i : nodes) {
+    CudaMlsNodeChange c;
+    c.node = i;
+    for (int k = 0; k < 6; ++k) c.inverse_moment[k] = s.inverse_moment[k][i];
+    c.kappa = s.kappa[i];
+    c.outside = s.place[4 * i + 3];
+    c.outer = s.outer[i];
+    changes.push_back(c);
+    for (std::int32_t e = s.pairs.begin[i]; e < s.pairs.begin[i + 1]; ++e) {
+      add(i, e);
+      // Springs of a node are its neighbours', too.
+      if (d.has_springs) add(s.pairs.other[e], s.pairs.twin[e]);
+    }
+  }
+  d.node_changes.upload(changes, d.stream);
+  d.entry_changes.upload(entries, d.stream);
+  launch_mls_changes(d.field(), d.node_changes.data(), static_cast<int>(changes.size()),
+                     d.entry_changes.data(), static_cast<int>(entries.size()), d.stream);
+  d.wait("receive data");
+}
+
+void CudaMlsTissue::pull_held() {
+  OnDevice& d = *device_;
+  d.held_impulse.download(reinterpret_cast<float4*>(state_->held_impulse.data()),
+                          d.held_impulse.size(), d.stream);
+  d.wait("send data");
 }
 
 void CudaMlsTissue::push() {
@@ -201,6 +249,14 @@ void CudaMlsTissue::upload_colliders(const FramePart& part) {
                          d.host_colliders.data() + static_cast<std::size_t>(i) * count);
   }
   d.colliders.upload(d.host_colliders, d.stream);
+  d.host_anchors.clear();
+  for (int i = 0; i < substeps && !frame_->input.anchors.empty(); ++i) {
+    for (const MlsAnchorPose& pose : mls_anchors_at(
+             state_->scene, frame_->input, part.substeps.share(i + 1, part.from, part.to))) {
+      d.host_anchors.push_back(pose);
+    }
+  }
+  d.anchors.upload(d.host_anchors, d.stream);
   d.loads.resize(d.host_colliders.size() * kMlsLoadSums);
   d.loads.clear(d.stream);
 }
@@ -209,6 +265,7 @@ double CudaMlsTissue::run_part(const FramePart& part) {
   OnDevice& d = *device_;
   MlsState& s = *state_;
   const CudaMlsField field = d.field();
+  if (part.from == 0) d.held_impulse.clear(d.stream);
   upload_colliders(part);
   const float before = s.dt;
   const std::vector<Box> reach = frame_->colliders.reach();
@@ -238,8 +295,15 @@ double CudaMlsTissue::run_part(const FramePart& part) {
     if (may_touch_ && d.may_touch) {
       contacts = {d.contact_begin.data(), d.contact_other.data(), d.contact_rest.data()};
     }
+    CudaMlsHold hold;
+    if (d.held_impulse.size() > 0) {
+      const std::size_t anchors = d.host_anchors.size() / part.substeps.count;
+      hold.anchor = d.anchor.data();
+      hold.impulse = d.held_impulse.data();
+      if (anchors > 0) hold.anchors = d.anchors.data() + i * anchors;
+    }
     launch_mls_stresses(field, d.present(), d.stream);
-    launch_mls_moves(field, d.present(), d.motion(1 - d.current), step, colliders, contacts,
+    launch_mls_moves(field, d.present(), d.motion(1 - d.current), step, colliders, contacts, hold,
                      d.stream);
     d.current = 1 - d.current;
     d.host_is_current = false;
@@ -281,6 +345,7 @@ void CudaMlsTissue::save_checkpoint() {
   saved.u.copy(d.u[d.current], d.stream);
   saved.v.copy(d.v[d.current], d.stream);
   saved.hold.copy(d.hold, d.stream);
+  saved.held_impulse.copy(d.held_impulse, d.stream);
   saved.touching.copy(d.touching, d.stream);
   saved.node_contacts = state_->node_contacts;
   saved.dt = state_->dt;
@@ -294,6 +359,7 @@ void CudaMlsTissue::reject_part(Verdict) {
   d.u[d.current].copy(saved.u, d.stream);
   d.v[d.current].copy(saved.v, d.stream);
   d.hold.copy(saved.hold, d.stream);
+  d.held_impulse.copy(saved.held_impulse, d.stream);
   d.touching.copy(saved.touching, d.stream);
   d.host_is_current = false;
   state_->node_contacts = saved.node_contacts;
@@ -355,7 +421,7 @@ std::vector<std::uint8_t> CudaMlsTissue::save() {
 void CudaMlsTissue::restore(Span<const std::uint8_t> saved) {
   MlsTissue::restore(saved);
   push();
-  pairs_changed();
+  upload_pairs();
   push_node_contacts();
   measure();
 }

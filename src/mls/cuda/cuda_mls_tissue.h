@@ -29,7 +29,8 @@ class CudaMlsTissue final : public MlsTissue {
   void forces_at(const float* u, float* force) override;
 
  protected:
-  void pairs_changed() override;
+  void pairs_changed(const std::vector<std::int32_t>& nodes) override;
+  void pull_held() override;
   Figures measure() override;
   void measure_stress(std::vector<float>& of_node) override;
 
@@ -37,6 +38,7 @@ class CudaMlsTissue final : public MlsTissue {
   struct OnDevice;
 
   void upload_nodes();
+  void upload_pairs();  ///< all of them
   void upload_colliders(const FramePart& part);
   void pull_contact();
   void push_contact();

@@ -5,6 +5,7 @@
 
 #include "compute/device_array.h"
 #include "contact/contact_spring.h"
+#include "mls/anchor_pose.h"
 
 namespace tissue_sim {
 
@@ -61,6 +62,26 @@ struct CudaMlsNodeContacts {
   const float* rest = nullptr;
 };
 
+/// Held nodes: they go where anchors do and note what pulls them.
+struct CudaMlsHold {
+  const std::int16_t* anchor = nullptr;    ///< per node, -1 where it is free
+  const MlsAnchorPose* anchors = nullptr;  ///< at the substep's end; null where none ever moved
+  float4* impulse = nullptr;               ///< per node, since the frame began; null without any
+};
+
+/// A node whose pairs changed, and an entry of it.
+struct CudaMlsNodeChange {
+  std::int32_t node;
+  float inverse_moment[6];
+  float kappa;
+  float outside;  ///< how far outside of it tissue ends [m]
+  std::uint8_t outer;
+};
+struct CudaMlsEntryChange {
+  std::int32_t at;
+  float weight, spring;
+};
+
 struct CudaMlsStep {
   float dt, kick, keep;
   float gravity[3];
@@ -80,7 +101,11 @@ void launch_mls_stresses(const CudaMlsField& field, const CudaMlsMotion& at, cud
 /// The rest of a substep, after the stresses: forces with contact, and the motion into `to`.
 void launch_mls_moves(const CudaMlsField& field, const CudaMlsMotion& at, const CudaMlsMotion& to,
                       const CudaMlsStep& step, const CudaMlsColliders& colliders,
-                      const CudaMlsNodeContacts& contacts, cudaStream_t stream);
+                      const CudaMlsNodeContacts& contacts, const CudaMlsHold& hold,
+                      cudaStream_t stream);
+/// Writes what changed into the field's arrays.
+void launch_mls_changes(const CudaMlsField& field, const CudaMlsNodeChange* nodes, int node_count,
+                        const CudaMlsEntryChange* entries, int entry_count, cudaStream_t stream);
 /// Internal forces alone [4 count], after the stresses.
 void launch_mls_forces(const CudaMlsField& field, const float4* u, float4* force,
                        cudaStream_t stream);

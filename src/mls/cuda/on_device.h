@@ -35,6 +35,14 @@ struct CudaMlsTissue::OnDevice {
   Box box;           ///< of the nodes, as of the last measure [m]
   double speed = 0;  ///< of the fastest [m/s]
 
+  DeviceArray<std::int16_t> anchor;    ///< empty where nothing is held
+  DeviceArray<MlsAnchorPose> anchors;  ///< of all substeps of a part
+  std::vector<MlsAnchorPose> host_anchors;
+  DeviceArray<float4> held_impulse;
+
+  DeviceArray<CudaMlsNodeChange> node_changes;
+  DeviceArray<CudaMlsEntryChange> entry_changes;
+
   DeviceArray<std::int32_t> contact_begin, contact_other;
   DeviceArray<float> contact_rest;
   bool may_touch = false;
@@ -44,7 +52,7 @@ struct CudaMlsTissue::OnDevice {
   DeviceArray<float> of_node;  ///< room for a figure of each node
 
   struct Checkpoint {
-    DeviceArray<float4> u, v, hold;
+    DeviceArray<float4> u, v, hold, held_impulse;
     DeviceArray<std::uint32_t> touching;
     MlsNodeContacts node_contacts;
     float dt = 0;

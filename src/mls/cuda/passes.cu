@@ -116,7 +116,7 @@ __device__ __forceinline__ void add(float (&sum)[3], float w, const float4& a) {
   sum[2] += w * a.z;
 }
 
-/// Force of its pairs on node i.
+/// Force of its pairs on node i: this lane's part.
 template <int L>
 __device__ __forceinline__ void pair_forces(const CudaMlsField& f, const float4* u,
                                             const Worker<L>& worker, float (&sum)[3]) {
@@ -144,7 +144,6 @@ __device__ __forceinline__ void pair_forces(const CudaMlsField& f, const float4*
     const float rest = sqrtf(r[0] * r[0] + r[1] * r[1] + r[2] * r[2]);
     add(sum, s * (length - rest) / fmaxf(length, 1e-12f), {x[0], x[1], x[2], 0});
   }
-  worker.add_lanes(sum);
 }
 
 __device__ __forceinline__ void add_load(unsigned long long* load, double value) {
@@ -192,14 +191,19 @@ __device__ __forceinline__ void collider_forces(const CudaMlsField& f, const Cud
   if (touches != touched) c.touching[i] = touches;
 }
 
-/// What nodes of other pieces push it with: mls/node_contact.h.
+/// What nodes of other pieces push it with (mls/node_contact.h): this lane's part.
+template <int L>
 __device__ __forceinline__ void node_forces(const CudaMlsField& f, const CudaMlsMotion& at,
-                                            const CudaMlsNodeContacts& contacts, int i,
-                                            float (&sum)[3]) {
-  const int end = __ldg(contacts.begin + i + 1);
-  for (int c = __ldg(contacts.begin + i); c < end; ++c) {
+                                            const CudaMlsNodeContacts& contacts,
+                                            const Worker<L>& worker, float (&sum)[3]) {
+  const int i = worker.node;
+  const int first = __ldg(contacts.begin + i), end = __ldg(contacts.begin + i + 1);
+  if (first == end) return;
+  const float4 xi = __ldg(f.place + i), ui = __ldg(at.u + i);
+#pragma unroll 2
+  for (int c = first + worker.lane; c < end; c += L) {
     const int j = __ldg(contacts.other + c);
-    const float4 xi = __ldg(f.place + i), xj = __ldg(f.place + j), ui = at.u[i], uj = at.u[j];
+    const float4 xj = __ldg(f.place + j), uj = __ldg(at.u + j);
     const float d[3] = {(xj.x - xi.x) + (uj.x - ui.x), (xj.y - xi.y) + (uj.y - ui.y),
                         (xj.z - xi.z) + (uj.z - ui.z)};
     const float d2 = d[0] * d[0] + d[1] * d[1] + d[2] * d[2], rest = __ldg(contacts.rest + c);
@@ -220,13 +224,14 @@ __device__ __forceinline__ void node_forces(const CudaMlsField& f, const CudaMls
 template <int L>
 __global__ void __launch_bounds__(kMlsThreads)
     mls_moves(CudaMlsField f, CudaMlsMotion at, CudaMlsMotion to, CudaMlsStep step,
-              CudaMlsColliders colliders, CudaMlsNodeContacts contacts) {
+              CudaMlsColliders colliders, CudaMlsNodeContacts contacts, CudaMlsHold hold) {
   const Worker<L> worker(f.count);
   const int i = worker.node;
   float sum[3] = {0, 0, 0};
   pair_forces(f, at.u, worker, sum);
+  if (contacts.begin != nullptr) node_forces(f, at, contacts, worker, sum);
+  worker.add_lanes(sum);
   if (worker.lane != 0 || worker.is_spare) return;
-  if (contacts.begin != nullptr) node_forces(f, at, contacts, i, sum);
   const float4 u = at.u[i], v = at.v[i];
   if (colliders.near != 0) {
     const float4 X = __ldg(f.place + i);
@@ -243,6 +248,20 @@ __global__ void __launch_bounds__(kMlsThreads)
                     : 0.0f;
     next_u[a] = displacement[a] + step.dt * next_v[a];
   }
+  if (!(inv_mass > 0)) {
+    if (hold.impulse != nullptr) {
+      const float4 J = hold.impulse[i];
+      hold.impulse[i] = {J.x + step.kick * sum[0], J.y + step.kick * sum[1],
+                         J.z + step.kick * sum[2], 0};
+    }
+    if (hold.anchors != nullptr) {
+      const float4 X = __ldg(f.place + i);
+      const float place[3] = {X.x, X.y, X.z};
+      hold.anchors[hold.anchor[i]].displacement(place, next_u);
+#pragma unroll
+      for (int a = 0; a < 3; ++a) next_v[a] = (next_u[a] - displacement[a]) / step.dt;
+    }
+  }
   to.v[i] = {next_v[0], next_v[1], next_v[2], 0};
   to.u[i] = {next_u[0], next_u[1], next_u[2], 0};
 }
@@ -254,8 +273,29 @@ __global__ void __launch_bounds__(kMlsThreads)
   const int i = worker.node;
   float sum[3] = {0, 0, 0};
   pair_forces(f, u, worker, sum);
+  worker.add_lanes(sum);
   if (worker.lane != 0 || worker.is_spare) return;
   force[i] = {sum[0], sum[1], sum[2], 0};
+}
+
+/// The field's arrays are const for all but this.
+__global__ void __launch_bounds__(kMlsThreads)
+    mls_changes(CudaMlsField f, const CudaMlsNodeChange* nodes, int node_count,
+                const CudaMlsEntryChange* entries, int entry_count) {
+  const int k = static_cast<int>(blockIdx.x * blockDim.x + threadIdx.x);
+  if (k < entry_count) {
+    const CudaMlsEntryChange e = entries[k];
+    const_cast<float*>(f.weight)[e.at] = e.weight;
+    if (f.spring != nullptr) const_cast<float*>(f.spring)[e.at] = e.spring;
+  }
+  if (k >= node_count) return;
+  const CudaMlsNodeChange& c = nodes[k];
+  for (int m = 0; m < 6; ++m) {
+    const_cast<float*>(f.inverse_moment)[m * f.count + c.node] = c.inverse_moment[m];
+  }
+  const_cast<float*>(f.kappa)[c.node] = c.kappa;
+  const_cast<std::uint8_t*>(f.outer)[c.node] = c.outer;
+  const_cast<float4*>(f.place)[c.node].w = c.outside;
 }
 
 __device__ __forceinline__ void take(CudaMlsMeasure& a, const CudaMlsMeasure& b) {
@@ -348,12 +388,22 @@ void launch_mls_stresses(const CudaMlsField& field, const CudaMlsMotion& at, cud
 
 void launch_mls_moves(const CudaMlsField& field, const CudaMlsMotion& at, const CudaMlsMotion& to,
                       const CudaMlsStep& step, const CudaMlsColliders& colliders,
-                      const CudaMlsNodeContacts& contacts, cudaStream_t stream) {
+                      const CudaMlsNodeContacts& contacts, const CudaMlsHold& hold,
+                      cudaStream_t stream) {
   by_lanes(field, [&](auto lanes, int blocks) {
     mls_moves<lanes()>
-        <<<blocks, kMlsThreads, 0, stream>>>(field, at, to, step, colliders, contacts);
+        <<<blocks, kMlsThreads, 0, stream>>>(field, at, to, step, colliders, contacts, hold);
   });
   check_cuda(cudaGetLastError(), "move nodes");
+}
+
+void launch_mls_changes(const CudaMlsField& field, const CudaMlsNodeChange* nodes, int node_count,
+                        const CudaMlsEntryChange* entries, int entry_count, cudaStream_t stream) {
+  const int most = node_count > entry_count ? node_count : entry_count;
+  if (most == 0) return;
+  mls_changes<<<(most + kMlsThreads - 1) / kMlsThreads, kMlsThreads, 0, stream>>>(
+      field, nodes, node_count, entries, entry_count);
+  check_cuda(cudaGetLastError(), "change pairs");
 }
 
 void launch_mls_forces(const CudaMlsField& field, const float4* u, float4* force,

@@ -1,0 +1,108 @@
+// Nodes that are the vertices of a tetrahedral mesh, as in Aras, Shen, Audette 2014.
+#include <gtest/gtest.h>
+
+#include <sstream>
+
+#include "geometry/tet_mesh.h"
+#include "mls_scenes.h"
+#include "temporary_folder.h"
+
+namespace tissue_sim {
+namespace {
+
+const Vec3 kSize(0.02, 0.015, 0.012);
+
+/// A box in the words of each format, in millimetres.
+std::string tetgen_nodes(const TetMesh& mesh) {
+  std::ostringstream out;
+  out.precision(12);
+  out << mesh.vertices.size() << " 3 0 0\n";
+  for (std::size_t i = 0; i < mesh.vertices.size(); ++i) {
+    out << i << ' ' << 1e3 * mesh.vertices[i].transpose() << '\n';
+  }
+  return out.str();
+}
+std::string tetgen_elements(const TetMesh& mesh) {
+  std::ostringstream out;
+  out << mesh.tetrahedra.size() << " 4 0\n";
+  for (std::size_t i = 0; i < mesh.tetrahedra.size(); ++i) {
+    out << i;
+    for (const int v : mesh.tetrahedra[i]) out << ' ' << v;
+    out << '\n';
+  }
+  return out.str();
+}
+std::string medit(const TetMesh& mesh) {
+  std::ostringstream out;
+  out.precision(12);
+  out << "MeshVersionFormatted 1\nDimension 3\nVertices\n" << mesh.vertices.size() << '\n';
+  for (const Vec3& x : mesh.vertices) out << 1e3 * x.transpose() << " 0\n";
+  out << "Tetrahedra\n" << mesh.tetrahedra.size() << '\n';
+  for (const auto& t : mesh.tetrahedra) {
+    for (const int v : t) out << v + 1 << ' ';
+    out << "0\n";
+  }
+  out << "End\n";
+  return out.str();
+}
+std::string vtk(const TetMesh& mesh) {
+  std::ostringstream out;
+  out.precision(12);
+  out << "# vtk DataFile Version 3.0\nbox\nASCII\nDATASET UNSTRUCTURED_GRID\nPOINTS "
+      << mesh.vertices.size() << " double\n";
+  for (const Vec3& x : mesh.vertices) out << 1e3 * x.transpose() << '\n';
+  out << "CELLS " << mesh.tetrahedra.size() << ' ' << 5 * mesh.tetrahedra.size() << '\n';
+  for (const auto& t : mesh.tetrahedra) {
+    out << 4;
+    for (const int v : t) out << ' ' << v;
+    out << '\n';
+  }
+  out << "CELL_TYPES " << mesh.tetrahedra.size() << '\n';
+  for (std::size_t i = 0; i < mesh.tetrahedra.size(); ++i) out << "10\n";
+  return out.str();
+}
+
+TEST(MlsGivenNodes, AreTheVerticesOfTheMeshWithAllOfItsVolume) {
+  const TetMesh mesh = tetrahedralize_box(kSize, 0.003);
+  const TemporaryFolder folder;
+  folder.write("box.ele", tetgen_elements(mesh));
+  for (const std::string& path :
+       {folder.write("box.node", tetgen_nodes(mesh)), folder.write("box.mesh", medit(mesh)),
+        folder.write("box.vtk", vtk(mesh))}) {
+    Scene scene = mls_box(kSize, 0.0015);
+    Body& body = scene.bodies[0];
+    body.shape = Shape::kMesh;
+    body.mesh = path;
+    body.scale = 1e-3;
+    body.pose.position = Vec3(0.01, 0.02, 0.03);
+    Region held;  // below a z
+    held.z = 0.03 - 0.5 * kSize.z() + 1e-4;
+    body.anchors = {held};
+    MlsTissue tissue(scene);
+    MlsState& s = tissue.state();
+    ASSERT_EQ(s.count(), static_cast<int>(mesh.vertices.size())) << path;
+    double sum = 0;
+    int surface = 0;
+    for (int i = 0; i < s.count(); ++i) {
+      sum += s.nodes.volume[i];
+      surface += s.nodes.surface[i];
+      if (s.nodes.anchored[i] != 0) continue;
+      EXPECT_LT((s.nodes.place[i] - mesh.vertices[i] - body.pose.position).norm(), 1e-8);
+    }
+    EXPECT_NEAR(sum / kSize.prod(), 1, 1e-6);
+    EXPECT_GT(surface, 100);
+    EXPECT_LT(surface, s.count());
+    // Linear fields are exact, whatever the nodes, and a cut parts them.
+    Eigen::Matrix3d A;
+    A << 0.1, 0.2, -0.1, 0, 0.05, 0.1, 0.2, 0, -0.1;
+    impose(s, A);
+    for (const Eigen::Matrix3d& H : reference::mls_gradients(s)) {
+      EXPECT_NEAR((H - A).norm(), 0, 1e-5);
+    }
+    tissue.cut_now(plane_cut(A * body.pose.position + body.pose.position, Vec3(1, 0.1, 0)));
+    EXPECT_EQ(tissue.fragment_count(), 2) << path;
+  }
+}
+
+}  // namespace
+}  // namespace tissue_sim

@@ -1,0 +1,114 @@
+// A cantilever that sags, over the spacing of its nodes: regular, jittered and graded. Small
+// displacements, solved directly in double from the program's own weights and moments.
+#include <gtest/gtest.h>
+
+#include <Eigen/SparseCholesky>
+#include <cmath>
+
+#include "beam_scene.h"
+#include "curve_file.h"
+#include "mls/tissue.h"
+
+namespace tissue_sim {
+namespace {
+
+/// Tip of the beam under its own weight over theory's.
+double tip(MlsPlacement placement, double nu, int layers) {
+  const Beam beam = soft_beam(6, nu);
+  Scene scene = beam_scene(beam, layers / 2, true);
+  scene.method = Method::kMls;
+  scene.mls.spacing = beam.height / layers;
+  scene.mls.placement = placement;
+  MlsTissue tissue(scene);
+  const MlsState& s = tissue.state();
+  std::vector<int> number(s.count(), -1);
+  int free = 0;
+  for (int i = 0; i < s.count(); ++i) {
+    if (s.inv_mass[i] > 0) number[i] = free++;
+  }
+  std::vector<Eigen::Triplet<double>> entries;
+  Eigen::VectorXd load = Eigen::VectorXd::Zero(3 * free);
+  for (int i = 0; i < s.count(); ++i) {
+    const int first = s.pairs.begin[i], m = s.pairs.begin[i + 1] - first;
+    Eigen::Matrix3d inverse;
+    const auto M = [&](int k) { return static_cast<double>(s.inverse_moment[k][i]); };
+    inverse << M(0), M(3), M(4), M(3), M(1), M(5), M(4), M(5), M(2);
+    // H = sum_a u_a (x) g_a over the neighbours, the node itself last.
+    Eigen::MatrixXd g = Eigen::MatrixXd::Zero(3, m + 1), r(3, m);
+    Eigen::VectorXd weight(m);
+    std::vector<int> of(m + 1, number[i]);
+    for (int k = 0; k < m; ++k) {
+      const int j = s.pairs.other[first + k];
+      of[k] = number[j];
+      weight[k] = s.pairs.weight[first + k];
+      r.col(k) = s.nodes.place[j] - s.nodes.place[i];
+      g.col(k) = weight[k] * inverse * r.col(k);
+      g.col(m) -= g.col(k);
+    }
+    Eigen::MatrixXd left = -r.transpose() * g;  // of each pair
+    for (int k = 0; k < m; ++k) {
+      left(k, k) += 1;
+      left(k, m) -= 1;
+    }
+    const Eigen::MatrixXd penalty =
+        static_cast<double>(s.kappa[i]) * left.transpose() * weight.asDiagonal() * left;
+    const double mu = s.volume_mu[i], lambda = s.volume_lambda[i];
+    for (int a = 0; a <= m; ++a) {
+      for (int b = 0; b <= m; ++b) {
+        if (of[a] < 0 || of[b] < 0) continue;
+        const Vec3 ga = g.col(a), gb = g.col(b);
+        Eigen::Matrix3d local = mu * gb * ga.transpose() + lambda * ga * gb.transpose();
+        local.diagonal().array() += mu * ga.dot(gb) + penalty(a, b);
+        for (int c = 0; c < 9; ++c) {
+          entries.emplace_back(3 * of[a] + c / 3, 3 * of[b] + c % 3, local(c / 3, c % 3));
+        }
+      }
+    }
+    if (number[i] >= 0) load[3 * number[i] + 2] = -static_cast<double>(s.mass[i]);
+  }
+  Eigen::SparseMatrix<double> stiffness(3 * free, 3 * free);
+  stiffness.setFromTriplets(entries.begin(), entries.end());
+  entries = {};
+  const Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>> solver(stiffness);
+  const Eigen::VectorXd u = solver.solve(load);
+  // The end is straight: a line through the last quarter of the height.
+  double n = 0, sx = 0, sz = 0, sxx = 0, sxz = 0;
+  for (int i = 0; i < s.count(); ++i) {
+    const double x = s.nodes.place[i].x() - beam.length;
+    if (number[i] < 0 || x < -0.5 * beam.height) continue;
+    const double w = s.mass[i], z = u[3 * number[i] + 2];
+    n += w, sx += w * x, sz += w * z, sxx += w * x * x, sxz += w * x * z;
+  }
+  const double end = (sz * sxx - sx * sxz) / (n * sxx - sx * sx);
+  return -end / tip_deflection(beam, 1);
+}
+
+const struct {
+  MlsPlacement placement;
+  const char* name;
+} kPlacements[] = {{MlsPlacement::kRegular, "regular"},
+                   {MlsPlacement::kJittered, "jittered"},
+                   {MlsPlacement::kGraded, "graded"}};
+
+// All layers up to 12 with TISSUE_SIM_CURVES, some minutes.
+TEST(MlsConvergence, OfRegularJitteredAndGradedNodes) {
+  const bool all = std::getenv("TISSUE_SIM_CURVES") != nullptr;
+  for (const auto& p : kPlacements) {
+    CurveFile file(std::string("mls_convergence_") + p.name, "layers,error nu 0,error nu 0.3");
+    double coarse = 0, fine = 0;
+    for (const int layers : all ? std::vector<int>{4, 6, 8, 10, 12} : std::vector<int>{4, 8}) {
+      const double error = tip(p.placement, 0, layers) - 1;
+      const double other = all || layers == 8 ? tip(p.placement, 0.3, layers) - 1 : 0;
+      file.add({static_cast<double>(layers), error, other});
+      std::printf("%s, %d layers: %.4f; nu 0.3: %.4f\n", p.name, layers, error, other);
+      if (layers == 4) coarse = std::fabs(error);
+      if (layers == 8) fine = std::fabs(error);
+      if (layers == 8) EXPECT_NEAR(other, 0, 0.03) << p.name;
+    }
+    EXPECT_LT(fine, 0.03) << p.name;
+    EXPECT_LT(fine, coarse) << p.name;
+  }
+}
+
+}  // namespace
+}  // namespace tissue_sim

@@ -45,6 +45,7 @@ bool spans_space(const Eigen::Matrix3d& m) {
   // Of eigenvalues a <= b <= c, sums t = a + b + c and q = ab + bc + ca: abc / (q t) <= a / c <= 9
   // abc / (q t). For most that tells.
   const double t = m.trace(), q = 0.5 * (t * t - m.squaredNorm()), product = m.determinant();
+  if (!(3 * q > kSpans * t * t)) return false;  // b / c at most; and q is no rounding
   if (product > kSpans * q * t) return true;
   if (!(9 * product > kSpans * q * t)) return false;
   Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen;

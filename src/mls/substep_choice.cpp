@@ -6,7 +6,7 @@
 namespace tissue_sim {
 namespace {
 
-constexpr double kMostRate = 1.2;  // growth of the fastest node's rate by a cut, until the limit is
+constexpr double kMostRate = 1.0;  // growth of the fastest node's rate by a cut, until the limit is
                                    // measured again
 constexpr double kOfHeld = 1;      // substep where all is held [s]
 

@@ -11,7 +11,7 @@ constexpr double kLength = 0.03, kEdge = 0.01, kYoung = 1e4;  // of what is free
 /// A bar along x between two anchors, in which sound settles fast.
 Scene bar() {
   Scene s;
-  s.cell_size = 0.002;
+  s.cell_size = 0.00125;
   s.gravity = Vec3::Zero();
   s.ground.enabled = false;
   s.damping = 300;

@@ -350,7 +350,7 @@ TEST(MlsSubstep, StaysStableThroughCutsUntilItIsMeasuredAnew) {
         const double limit = measured_limit(s, forces, 60);
         closest = std::min(closest, limit / taken);
         ++kept;
-        EXPECT_LT(taken, limit) << static_cast<int>(placement) << ' ' << body << ' ' << k;
+        EXPECT_LT(taken, 0.97 * limit) << static_cast<int>(placement) << ' ' << body << ' ' << k;
       }
     }
   }

@@ -31,6 +31,7 @@ double MlsSubsteps::damping(const MlsState& s, double elastic) const {
 }
 
 void MlsSubsteps::cut(const MlsState& s, const std::vector<std::int32_t>& nodes) {
+  if (!limit_.known()) return;  // it is measured anyway
   s.cpu->for_each(
       static_cast<int>(nodes.size()),
       [&](int k) {

@@ -4,6 +4,7 @@
 
 #include <Eigen/SparseCholesky>
 #include <cmath>
+#include <memory>
 
 #include "beam_scene.h"
 #include "curve_file.h"
@@ -12,22 +13,29 @@
 namespace tissue_sim {
 namespace {
 
-/// Tip of the beam under its own weight over theory's.
-double tip(MlsPlacement placement, double nu, int layers) {
-  const Beam beam = soft_beam(6, nu);
+/// Small motions of nodes that are free.
+struct SmallMotion {
+  std::unique_ptr<MlsTissue> tissue;
+  std::vector<int> number;  ///< of each node among those that are free; -1: held
+  Eigen::SparseMatrix<double> stiffness;
+  Eigen::VectorXd mass;
+};
+
+SmallMotion cantilever(const Beam& beam, MlsPlacement placement, int layers) {
   Scene scene = beam_scene(beam, layers / 2, true);
   scene.method = Method::kMls;
   scene.mls.spacing = beam.height / layers;
   scene.mls.placement = placement;
-  MlsTissue tissue(scene);
-  const MlsState& s = tissue.state();
+  SmallMotion motion;
+  motion.tissue = std::make_unique<MlsTissue>(scene);
+  const MlsState& s = motion.tissue->state();
   std::vector<int> number(s.count(), -1);
   int free = 0;
   for (int i = 0; i < s.count(); ++i) {
     if (s.inv_mass[i] > 0) number[i] = free++;
   }
   std::vector<Eigen::Triplet<double>> entries;
-  Eigen::VectorXd load = Eigen::VectorXd::Zero(3 * free);
+  motion.mass = Eigen::VectorXd::Zero(3 * free);
   for (int i = 0; i < s.count(); ++i) {
     const int first = s.pairs.begin[i], m = s.pairs.begin[i + 1] - first;
     Eigen::Matrix3d inverse;
@@ -64,12 +72,23 @@ double tip(MlsPlacement placement, double nu, int layers) {
         }
       }
     }
-    if (number[i] >= 0) load[3 * number[i] + 2] = -static_cast<double>(s.mass[i]);
+    if (number[i] >= 0) motion.mass.segment<3>(3 * number[i]).setConstant(s.mass[i]);
   }
-  Eigen::SparseMatrix<double> stiffness(3 * free, 3 * free);
-  stiffness.setFromTriplets(entries.begin(), entries.end());
-  entries = {};
-  const Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>> solver(stiffness);
+  motion.stiffness.resize(3 * free, 3 * free);
+  motion.stiffness.setFromTriplets(entries.begin(), entries.end());
+  motion.number = std::move(number);
+  return motion;
+}
+
+/// Tip of the beam under its own weight over theory's.
+double tip(MlsPlacement placement, double nu, int layers) {
+  const Beam beam = soft_beam(6, nu);
+  const SmallMotion motion = cantilever(beam, placement, layers);
+  const MlsState& s = motion.tissue->state();
+  const std::vector<int>& number = motion.number;
+  Eigen::VectorXd load = Eigen::VectorXd::Zero(motion.mass.size());
+  for (Eigen::Index k = 2; k < load.size(); k += 3) load[k] = -motion.mass[k];
+  const Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>> solver(motion.stiffness);
   const Eigen::VectorXd u = solver.solve(load);
   // The end is straight: a line through the last quarter of the height.
   double n = 0, sx = 0, sz = 0, sxx = 0, sxz = 0;
@@ -115,6 +134,24 @@ TEST_P(MlsConvergence, OfACantileverOverTheSpacingOfItsNodes) {
   const double within = GetParam() == MlsPlacement::kGraded ? 0.05 : 0.03;
   EXPECT_LT(fine, within);
   EXPECT_LT(fine, coarse);
+}
+
+// Its first bending mode in the direction of its height, 8 nodes, by inverse iteration.
+TEST(MlsVibration, OfACantileverIsTimoshenkos) {
+  const Beam beam = soft_beam(8, 0.3);
+  const SmallMotion motion = cantilever(beam, MlsPlacement::kRegular, 8);
+  const Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>> solver(motion.stiffness);
+  Eigen::VectorXd u = Eigen::VectorXd::Zero(motion.mass.size());
+  for (Eigen::Index k = 2; k < u.size(); k += 3) u[k] = 1;
+  double omega = 0;
+  for (int i = 0; i < 12; ++i) {
+    const Eigen::VectorXd next = solver.solve(motion.mass.cwiseProduct(u));
+    omega = std::sqrt(next.dot(motion.stiffness * next) / next.dot(motion.mass.cwiseProduct(next)));
+    u = next / next.norm();
+  }
+  const double theory = bending_frequency(beam, Ends::kClampedFree);
+  std::printf("first bending mode: %.4f of theory\n", omega / theory);
+  EXPECT_NEAR(omega / theory, 1, 0.03);
 }
 
 }  // namespace

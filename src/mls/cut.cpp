@@ -1,6 +1,7 @@
 #include "mls/cut.h"
 
 #include <algorithm>
+#include <cstring>
 
 #include "mls/crossing.h"
 
@@ -47,8 +48,13 @@ class Marked {
 /// The numbers at which marks are set, in order.
 std::vector<std::int32_t> marked(const std::vector<std::uint8_t>& marks) {
   std::vector<std::int32_t> at;
-  for (std::size_t i = 0; i < marks.size(); ++i) {
-    if (marks[i] != 0) at.push_back(static_cast<std::int32_t>(i));
+  for (std::size_t first = 0; first < marks.size(); first += 8) {
+    const std::size_t last = std::min(marks.size(), first + 8);
+    std::uint64_t any = 0;
+    std::memcpy(&any, &marks[first], last - first);
+    for (std::size_t i = first; i < last && any != 0; ++i) {
+      if (marks[i] != 0) at.push_back(static_cast<std::int32_t>(i));
+    }
   }
   return at;
 }

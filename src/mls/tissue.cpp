@@ -69,7 +69,9 @@ void MlsTissue::break_pairs(const std::vector<std::int32_t>& entries, CutReport&
   std::vector<std::int32_t> remade;
   s.cpu->both([&] { remade = weaken(s, changed); },
               [&] {
-                if (changed.size() > kMany) linked = join_uncrossed(s);
+                if (changed.size() <= kMany) return;
+                linked = join_uncrossed(s);
+                for (std::int32_t i = 0; i < s.count(); ++i) linked->root(i);  // shorter ways
               });
   remade.insert(remade.end(), changed.begin(), changed.end());
   pairs_changed(remade);

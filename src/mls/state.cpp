@@ -68,7 +68,7 @@ float whole_kappa(const MlsState& s, std::int32_t i) {
 /// Springs from a sprung node to its neighbours: each carries its share of what a bar through the
 /// node's volume would.
 void make_springs(MlsState& s, std::int32_t i) {
-  if (s.spring.empty()) s.spring.assign(s.pairs.other.size(), 0.0f);
+  if (s.spring.empty()) s.spring.swap(s.spring_room);
   double sum = 0;
   const auto r2 = [&](std::int32_t e) {
     return (s.nodes.place[s.pairs.other[e]] - s.nodes.place[i]).squaredNorm();
@@ -187,6 +187,7 @@ std::unique_ptr<MlsState> make_mls_state(const Scene& scene, std::vector<std::st
   s.kernels = &mls_kernels(s.instructions);
   s.lanes = make_lanes(s.pairs, s.place);
   s.spanner = make_spanner(s.nodes, s.pairs);
+  s.spring_room.assign(s.pairs.other.size(), 0.0f);
   remake(s, all);
   return state;
 }

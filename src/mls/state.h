@@ -73,6 +73,7 @@ struct MlsState {
   Array<std::uint8_t> sprung;      ///< its support spans no space: springs to its neighbours do
   Array<std::uint8_t> any_sprung;  ///< per chunk: a sprung node, or the neighbour of one
   Array<float> spring;             ///< per entry: at a sprung node [N/m]; empty without any
+  Array<float> spring_room;        ///< zeros for it, so that a cut need not wait for memory
   bool viscous = false;            ///< whether any material is
 
   std::vector<Collider> colliders;     ///< at the present substep

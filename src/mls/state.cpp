@@ -68,7 +68,10 @@ float whole_kappa(const MlsState& s, std::int32_t i) {
 /// Springs from a sprung node to its neighbours: each carries its share of what a bar through the
 /// node's volume would.
 void make_springs(MlsState& s, std::int32_t i) {
-  if (s.spring.empty()) s.spring.swap(s.spring_room);
+  if (s.spring.empty()) {
+    s.spring.swap(s.spring_room);
+    s.spring.resize(s.pairs.other.size(), 0.0f);  // where the room went, and a state was restored
+  }
   double sum = 0;
   const auto r2 = [&](std::int32_t e) {
     return (s.nodes.place[s.pairs.other[e]] - s.nodes.place[i]).squaredNorm();

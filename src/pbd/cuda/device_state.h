@@ -56,9 +56,9 @@ struct CudaPbdField {
   CudaPbdSet<Bending> bends;
   int sweeps = 1;  ///< sweeps_of_step()
   const CudaPbdFrame* frame;
-  const CudaPbdCollider* colliders;  ///< [steps][frame->colliders]
-  unsigned long long* loads;         ///< [steps][frame->colliders][kPbdLoadSums]
-  int* step;                         ///< which of the frame's it is, where each step is launched
+  CudaPbdCollider* colliders;  ///< [steps][frame->colliders]
+  unsigned long long* loads;   ///< [steps][frame->colliders][kPbdLoadSums]
+  int* step;                   ///< which of the frame's it is, where each step is launched
 };
 
 /// Some vertices, all of what hangs together.
@@ -86,6 +86,15 @@ struct CudaPbdChange {
   int is_free;
 };
 
+/// What all steps by one block of threads read from the host's page-locked memory and leave there:
+/// a copy or a launch of its own for each would take a tenth of the frame.
+struct CudaPbdExchange {
+  const CudaPbdCollider* colliders;  ///< of all steps
+  unsigned long long* loads;
+  CudaPbdFlight* flights;  ///< [2][chunks]: before the steps, and after them
+  CudaPbdFlights chunks;
+};
+
 /// What a block of threads measured.
 struct CudaPbdMeasure {
   double elastic, kinetic;  ///< [J]
@@ -109,7 +118,7 @@ int pbd_projection_launches(const CudaPbdColours& colours);
 void launch_pbd_step(const CudaPbdField& field, const CudaPbdColours& colours, cudaStream_t stream);
 /// All steps by one block of threads, that keeps places in its shared memory.
 void launch_pbd_steps(const CudaPbdField& field, const CudaPbdFrame& frame, int steps,
-                      cudaStream_t stream);
+                      const CudaPbdExchange& exchange, cudaStream_t stream);
 /// Whether that is possible.
 bool fits_pbd_block(const CudaPbdField& field);
 void launch_pbd_flights(const CudaPbdField& field, const CudaPbdFlights& flights,

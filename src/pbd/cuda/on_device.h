@@ -60,7 +60,7 @@ struct CudaPbdTissue::OnDevice {
   DeviceArray<unsigned long long> loads;
   DeviceArray<int> step;
   std::vector<Collider> host_colliders;
-  std::vector<pbd::CudaPbdCollider> boxed;
+  PinnedArray<pbd::CudaPbdCollider> boxed;
   PinnedArray<unsigned long long> host_loads;
 
   // What flies freely: chunks of all that nothing holds.
@@ -71,6 +71,7 @@ struct CudaPbdTissue::OnDevice {
   DeviceArray<pbd::CudaPbdFlight> flights;  ///< before the steps, and after them
   PinnedArray<pbd::CudaPbdFlight> host_flights;
   DeviceArray<pbd::CudaPbdChange> changes;
+  PinnedArray<pbd::CudaPbdChange> host_changes;
 
   DeviceArray<pbd::CudaPbdMeasure> measures;
   PinnedArray<pbd::CudaPbdMeasure> host_measures;

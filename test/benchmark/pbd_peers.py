@@ -4,7 +4,7 @@
     python3 -m venv V && V/bin/pip install pypbd pbatoolkit
     V/bin/python test/benchmark/pbd_peers.py BUILD_FOLDER/tissue_sim_benchmark
 
-A cube of 20^3 cells of edge 1, six tetrahedra each, shaken by a hundredth of an edge at random; numbers of tetrahedra
+A cube of 14^3 cells of edge 1, six tetrahedra each, shaken by a hundredth of an edge at random; numbers of tetrahedra
 are in the order of cells, as the libraries' own demos have them. An item is one tetrahedron projected once: all six
 strains of it (pypbd's StrainTetConstraint, its XPBD and quasi-static FEM ones) or deviatoric and hydrostatic
 (pbatoolkit's StableNeoHookean). Of each library the time of a step with 41 iterations less that of a step with one, over
@@ -17,9 +17,9 @@ import subprocess
 import sys
 import time
 
-N = 20
+N = 14
 ROUNDS = 40
-REPEATS = 3
+REPEATS = 2
 
 
 def cube():

@@ -9,8 +9,9 @@
 #include <random>
 
 #include "compute/simd.h"
+#include "pbd/pbd_tissue.h"
 #include "pbd/project.h"
-#include "tissue_sim/types.h"
+#include "tissue_sim/simulation.h"
 
 namespace tissue_sim {
 namespace pbd {
@@ -182,6 +183,65 @@ TEST(Constraint, ElasticForcesAreTheEnergysSlope) {
       }
     }
   }
+}
+
+// Flattened to sheets, needles and points, and turned inside out: slivers are, when tissue lands.
+TEST(Constraint, NoShapeMakesAnElasticTetrahedronGrow) {
+  std::mt19937 random(5);
+  std::uniform_real_distribution<float> within(-1, 1), w(0.5f, 2);
+  float number[11];
+  fill_identity(number);
+  number[9] = number[10] = 0;
+  for (int round = 0; round < 300; ++round) {
+    Vertex<float> v[4];
+    for (Vertex<float>& at : v) at = {within(random), within(random), within(random), w(random)};
+    const float flat[] = {1, 0.1f, 1e-3f, -1};
+    for (Vertex<float>& at : v) {
+      at.x *= 3 * flat[round % 4];
+      at.y *= 3 * flat[round / 4 % 4];
+    }
+    float largest = 0;
+    for (int k = 0; k < 400; ++k) {
+      float lambda[2] = {0, 0};
+      Elastic::project(v, number, 1.0f, lambda);
+      for (const Vertex<float>& at : v) {
+        largest = std::max({largest, std::fabs(at.x), std::fabs(at.y), std::fabs(at.z)});
+      }
+    }
+    EXPECT_LT(largest, 8) << round;
+  }
+}
+
+// A cube of stiff tetrahedra whose vertices lie anywhere is a cube again after a while.
+TEST(Elasticity, ACubeComesBackFromChaos) {
+  Scene scene;
+  scene.method = Method::kPbd;
+  scene.pbd.model = PbdModel::kTetrahedra;
+  scene.cell_size = 0.01;
+  scene.gravity = Vec3::Zero();
+  scene.ground.enabled = false;
+  scene.damping = 3;
+  scene.bodies.resize(1);
+  scene.bodies[0].size = Vec3(0.05, 0.05, 0.05);
+  Simulation simulation(scene);
+  pbd::State& s = static_cast<PbdTissue&>(simulation.tissue()).state();
+  std::mt19937 random(3);
+  std::uniform_real_distribution<float> within(-0.02f, 0.02f);
+  for (int i = 0; i < s.vertices.size(); ++i) {
+    for (int a = 0; a < 3; ++a) s.vertices.x[4 * i + a] = within(random);
+  }
+  for (int f = 0; f < 120; ++f) {
+    ASSERT_FALSE(simulation.advance_frame().result.blew_up) << "frame " << f;
+  }
+  double volume = 0;
+  for (const pbd::Tetrahedron& t : s.tetrahedra) {
+    const Vec3 o = s.vertices.position(t[0]);
+    volume += (s.vertices.position(t[1]) - o)
+                  .cross(s.vertices.position(t[2]) - o)
+                  .dot(s.vertices.position(t[3]) - o) /
+              6;
+  }
+  EXPECT_NEAR(volume / 1.25e-4, 1, 0.05);
 }
 
 TEST(Colours, NeighboursDiffer) {

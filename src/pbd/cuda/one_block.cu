@@ -117,7 +117,7 @@ __device__ __forceinline__ void copy_words(const T* from, T* to, int count) {
 template <bool kTets>
 constexpr int kThreads = kTets ? 512 : 1024;
 
-template <bool kTets, bool kKeep>
+template <bool kTets, bool kKeep, bool kShared>
 __global__ void __launch_bounds__(kThreads<kTets>, 1)
     pbd_steps(CudaPbdField f, CudaPbdFrame frame, int steps, CudaPbdExchange exchange) {
   extern __shared__ float4 places[];
@@ -129,6 +129,13 @@ __global__ void __launch_bounds__(kThreads<kTets>, 1)
   const Staged<Elastic> elastics = stage(f.elastics, words);
   const Staged<Strain> strains = stage(f.strains, words);
   const int of_steps = steps * frame.colliders;
+  float4 *const v = f.v, *const predicted = f.predicted;
+  if (kShared) {  // what a step reads of each vertex and of colliders lies at hand, too
+    f.v = reinterpret_cast<float4*>(words);
+    f.predicted = f.v + f.count;
+    f.colliders = reinterpret_cast<CudaPbdCollider*>(f.predicted + f.count);
+    for (int i = thread; i < f.count; i += threads) f.v[i] = v[i];
+  }
   copy_words(exchange.colliders, f.colliders, of_steps);
   for (int i = thread; i < of_steps * kPbdLoadSums; i += threads) f.loads[i] = 0;
   for (int i = thread; i < f.count; i += threads) f.pushed[i] = 0;
@@ -171,6 +178,12 @@ __global__ void __launch_bounds__(kThreads<kTets>, 1)
   }
   for (int i = thread; i < f.count; i += threads) f.x[i] = places[i];
   __syncthreads();
+  if (kShared) {
+    for (int i = thread; i < f.count; i += threads) {
+      v[i] = f.v[i];
+      predicted[i] = f.predicted[i];
+    }
+  }
   copy_words(f.loads, exchange.loads, of_steps * kPbdLoadSums);
   sum_flights(f, exchange.chunks, places, exchange.flights + exchange.chunks.count);
 }
@@ -182,24 +195,49 @@ std::size_t shared_bytes(const CudaPbdField& field) {
          static_cast<std::size_t>(words) * 4;
 }
 
+/// Of velocities, of where vertices would be, and of colliders.
+std::size_t motion_bytes(const CudaPbdField& field, const CudaPbdFrame& frame, int steps) {
+  return 2 * static_cast<std::size_t>(field.count) * sizeof(float4) +
+         static_cast<std::size_t>(steps) * frame.colliders * sizeof(CudaPbdCollider);
+}
+
+std::size_t most_shared_bytes() {
+  static const int most = [] {
+    int bytes = 0;
+    check_cuda(cudaDeviceGetAttribute(&bytes, cudaDevAttrMaxSharedMemoryPerBlockOptin, 0),
+               "be asked");
+    return bytes;
+  }();
+  return static_cast<std::size_t>(most);
+}
+
+template <bool kTets, bool kKeep, bool kShared>
+void launch_with(const CudaPbdField& field, const CudaPbdFrame& frame, int steps,
+                 const CudaPbdExchange& exchange, std::size_t bytes, cudaStream_t stream) {
+  check_cuda(
+      cudaFuncSetAttribute(pbd_steps<kTets, kKeep, kShared>,
+                           cudaFuncAttributeMaxDynamicSharedMemorySize, static_cast<int>(bytes)),
+      "set shared memory apart");
+  pbd_steps<kTets, kKeep, kShared>
+      <<<1, kThreads<kTets>, bytes, stream>>>(field, frame, steps, exchange);
+  check_cuda(cudaGetLastError(), "take the steps of a frame");
+}
+
 template <bool kTets, bool kKeep>
 void launch(const CudaPbdField& field, const CudaPbdFrame& frame, int steps,
             const CudaPbdExchange& exchange, cudaStream_t stream) {
-  const std::size_t bytes = shared_bytes(field);
-  check_cuda(
-      cudaFuncSetAttribute(pbd_steps<kTets, kKeep>, cudaFuncAttributeMaxDynamicSharedMemorySize,
-                           static_cast<int>(bytes)),
-      "set shared memory apart");
-  pbd_steps<kTets, kKeep><<<1, kThreads<kTets>, bytes, stream>>>(field, frame, steps, exchange);
-  check_cuda(cudaGetLastError(), "take the steps of a frame");
+  const std::size_t least = shared_bytes(field), all = least + motion_bytes(field, frame, steps);
+  if (all <= most_shared_bytes()) {
+    launch_with<kTets, kKeep, true>(field, frame, steps, exchange, all, stream);
+  } else {
+    launch_with<kTets, kKeep, false>(field, frame, steps, exchange, least, stream);
+  }
 }
 
 }  // namespace
 
 bool fits_pbd_block(const CudaPbdField& field) {
-  int most = 0;
-  check_cuda(cudaDeviceGetAttribute(&most, cudaDevAttrMaxSharedMemoryPerBlockOptin, 0), "be asked");
-  return shared_bytes(field) <= static_cast<std::size_t>(most);
+  return shared_bytes(field) <= most_shared_bytes();
 }
 
 void launch_pbd_steps(const CudaPbdField& field, const CudaPbdFrame& frame, int steps,

@@ -80,7 +80,7 @@ void CudaPbdTissue::keep_momentum(int steps, float h) {
       f.angular -= from_origin.cross(f.linear);
       second[c] -= f.mass * from_origin * from_origin.transpose();
       f.inertia = second[c].trace() * Eigen::Matrix3d::Identity() - second[c];
-      f.is_free = when == 0 || !pushed[c];
+      f.is_free = when == 0 || (!pushed[c] && state_->touching[c] == 0);
     }
   }
   const std::vector<pbd::RigidChange> changes =

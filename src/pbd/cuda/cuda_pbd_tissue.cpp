@@ -4,6 +4,7 @@
 #include <stdexcept>
 
 #include "pbd/cuda/on_device.h"
+#include "pbd/find_touches.h"
 
 namespace tissue_sim {
 namespace {
@@ -171,9 +172,27 @@ void CudaPbdTissue::upload_frame(const FrameColliders& colliders, int steps,
   d.pushed.clear(d.stream);
 }
 
+int CudaPbdTissue::upload_touches(double duration) {
+  OnDevice& d = *device_;
+  pbd::State& s = *state_;
+  const bool may_touch = s.components > 1;
+  if (may_touch) pull();
+  pbd::find_touches(s, duration);
+  const auto* blocks = d.touches.blocks.data();
+  const auto* begin = d.touches.begin.data();
+  if (s.touches.size() > 0) d.touches.upload(s.touches, false, d.stream);
+  if (may_touch != d.may_touch || blocks != d.touches.blocks.data() ||
+      begin != d.touches.begin.data()) {
+    d.step_graph.clear();
+  }
+  d.may_touch = may_touch;
+  return s.touches.size() > 0 ? d.touches.colours : 0;
+}
+
 void CudaPbdTissue::run_steps(const FrameColliders& colliders, int steps, float h) {
   OnDevice& d = *device_;
-  const pbd::CudaPbdFrame frame{pbd::step_numbers(state_->scene, h), colliders.count()};
+  pbd::CudaPbdFrame frame{pbd::step_numbers(state_->scene, h), colliders.count()};
+  frame.touch_colours = upload_touches(steps * h);
   upload_frame(colliders, steps, frame);
   const pbd::CudaPbdField field = d.field();
   const int chunks = static_cast<int>(d.component_of_chunk.size());
@@ -243,7 +262,7 @@ std::vector<std::uint8_t> CudaPbdTissue::save() {
 
 void CudaPbdTissue::project(float h, int times) {
   OnDevice& d = *device_;
-  const pbd::CudaPbdFrame frame{pbd::step_numbers(state_->scene, h), 0};
+  const pbd::CudaPbdFrame frame{pbd::step_numbers(state_->scene, h), 0, 0};
   d.frame.upload(&frame, 1, d.stream);
   if (d.projections.is_empty()) {
     d.projections.record(d.stream, [&] {

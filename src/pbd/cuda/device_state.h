@@ -9,6 +9,7 @@
 #include "pbd/constraints.h"
 #include "pbd/motion.h"
 #include "pbd/tet_constraints.h"
+#include "pbd/touch.h"
 #include "tools/collider.h"
 
 namespace tissue_sim {
@@ -40,7 +41,8 @@ struct CudaPbdCollider {
 /// What all steps of a frame share.
 struct CudaPbdFrame {
   StepNumbers step;
-  int colliders = 0;  ///< of each step
+  int colliders = 0;      ///< of each step
+  int touch_colours = 0;  ///< of CudaPbdField::touches, which change from frame to frame
 };
 
 struct CudaPbdField {
@@ -54,7 +56,9 @@ struct CudaPbdField {
   CudaPbdSet<Strain> strains;
   CudaPbdSet<Distance> links;
   CudaPbdSet<Bending> bends;
-  int sweeps = 1;  ///< sweeps_of_step()
+  CudaPbdSet<Touch> touches;
+  bool may_touch = false;  ///< whether there are pieces that may touch one another
+  int sweeps = 1;          ///< sweeps_of_step()
   const CudaPbdFrame* frame;
   CudaPbdCollider* colliders;  ///< [steps][frame->colliders]
   unsigned long long* loads;   ///< [steps][frame->colliders][kPbdLoadSums]

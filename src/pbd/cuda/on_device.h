@@ -51,6 +51,8 @@ struct CudaPbdTissue::OnDevice {
   Set<pbd::Strain> strains;
   Set<pbd::Distance> links;
   Set<pbd::Bending> bends;
+  Set<pbd::Touch> touches;
+  bool may_touch = false;
   int sweeps = 1;  ///< of a step
   Way wanted = Way::kFaster, way = Way::kLaunches;
   CudaGraph step_graph, projections;
@@ -91,6 +93,8 @@ struct CudaPbdTissue::OnDevice {
     f.strains = strains.set();
     f.links = links.set();
     f.bends = bends.set();
+    f.touches = touches.set();
+    f.may_touch = may_touch;
     f.sweeps = sweeps;
     f.frame = frame.data();
     f.colliders = colliders.data();

@@ -168,6 +168,7 @@ __global__ void __launch_bounds__(kThreads<kTets>, 1)
         project_set<Bending, kKeep, 1>(f.bends, bends, false, inverse_h2, places);
       }
     }
+    project_colours<Touch, false>(f.touches, 0, frame.touch_colours, false, inverse_h2, places);
     const std::size_t first = static_cast<std::size_t>(s) * frame.colliders;
     for (int i = thread; i < f.count; i += threads) {
       touch_vertex(f, step.h, f.colliders + first, frame.colliders, f.loads + first * kPbdLoadSums,

@@ -12,6 +12,18 @@ namespace {
 /// Cosine of the angle between a vertex's normal and that of what it may touch, at most.
 constexpr double kFacing = -0.25;
 
+/// What lies deeper came from elsewhere [mean edges].
+constexpr double kDeepest = 0.5;
+/// So deep vertices may lie, that rounding pushes nothing that rests [mean edges].
+constexpr double kSlack = 1e-3;
+
+/// Whether a triangle is so thin that single precision hardly knows its normal.
+bool is_sliver(const Vec3& a, const Vec3& b, const Vec3& c, double mean_edge) {
+  const double longest2 =
+      std::max({(b - a).squaredNorm(), (c - a).squaredNorm(), (c - b).squaredNorm()});
+  return (b - a).cross(c - a).norm() < 0.1 * mean_edge * std::sqrt(longest2);
+}
+
 /// Cells of a lattice that triangles' boxes overlap, sorted.
 class Cells {
  public:
@@ -102,7 +114,8 @@ void find_touches(State& s, double duration) {
       if (piece == s.component[i]) return;
       const Vec3 a = v.position(t[0]), b = v.position(t[1]), c = v.position(t[2]);
       const Above at = above(x, a, b, c);
-      if (std::fabs(at.height) > reach || at.beside() > 0.3) return;
+      if (at.height > reach || at.height < -kDeepest * s.mean_edge || at.beside() > 0.3) return;
+      if (is_sliver(a, b, c, s.mean_edge)) return;
       // What does not face it is the far side, or a wall that the vertex would stumble over.
       if ((b - a).cross(c - a).stableNormalized().dot(own) > kFacing) return;
       const double off = std::fabs(at.height) + at.beside() * s.mean_edge;
@@ -123,6 +136,7 @@ void find_touches(State& s, double duration) {
         if (at.beside() < 1 && std::fabs(at.height) < s.mean_edge) rest = std::min(0.0, at.height);
       }
       const double friction = std::sqrt(material_of(s, i).friction * material_of(s, t[0]).friction);
+      rest -= kSlack * s.mean_edge;
       s.touches.add({i, t[0], t[1], t[2]},
                     {static_cast<float>(rest), static_cast<float>(f.at.b),
                      static_cast<float>(f.at.c), static_cast<float>(friction)});

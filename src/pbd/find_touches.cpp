@@ -17,6 +17,9 @@ constexpr double kDeepest = 0.5;
 /// So deep vertices may lie, that rounding pushes nothing that rests [mean edges].
 constexpr double kSlack = 1e-3;
 
+/// Share of an overlap that a frame takes back: all at once would shake what lies in scraps.
+constexpr double kRecovery = 0.1;
+
 /// Whether a triangle is so thin that single precision hardly knows its normal.
 bool is_sliver(const Vec3& a, const Vec3& b, const Vec3& c, double mean_edge) {
   const double longest2 =
@@ -137,6 +140,7 @@ void find_touches(State& s, double duration) {
       }
       const double friction = std::sqrt(material_of(s, i).friction * material_of(s, t[0]).friction);
       rest -= kSlack * s.mean_edge;
+      if (f.at.height < rest) rest = f.at.height + kRecovery * (rest - f.at.height);
       s.touches.add({i, t[0], t[1], t[2]},
                     {static_cast<float>(rest), static_cast<float>(f.at.b),
                      static_cast<float>(f.at.c), static_cast<float>(friction)});

@@ -79,10 +79,14 @@ std::vector<std::vector<std::int32_t>> open_loops(const State& s) {
 
 /// A loop that comes back to the same place goes around a slit there, whose lips lie on one
 /// another, or is two loops that touch: each part by itself, without what has no area.
-std::vector<std::vector<std::int32_t>> simple_loops(const State& s,
-                                                    const std::vector<std::int32_t>& loop) {
+struct Part {
+  std::vector<std::int32_t> loop;
+  std::int32_t twin;  ///< of the loop's first vertex, where it comes back to; -1 if to itself
+};
+
+std::vector<Part> simple_loops(const State& s, const std::vector<std::int32_t>& loop) {
   const double same = 0.1 * s.mean_edge;
-  std::vector<std::vector<std::int32_t>> simple;
+  std::vector<Part> simple;
   std::vector<std::int32_t> way;
   for (const std::int32_t v : loop) {
     const Vec3& x = s.vertices.reference[v];
@@ -92,10 +96,10 @@ std::vector<std::vector<std::int32_t>> simple_loops(const State& s,
       way.push_back(v);
       continue;
     }
-    if (way.size() - from >= 3) simple.emplace_back(way.begin() + from, way.end());
+    if (way.size() - from >= 3) simple.push_back({{way.begin() + from, way.end()}, v});
     way.resize(from + 1);
   }
-  if (way.size() >= 3) simple.push_back(way);
+  if (way.size() >= 3) simple.push_back({way, -1});
   return simple;
 }
 
@@ -222,8 +226,13 @@ std::vector<std::int32_t> close_wounds(State& s, std::vector<std::int32_t>& orig
   };
   bool all = true;
   for (const std::vector<std::int32_t>& loop : open_loops(s)) {
-    for (const std::vector<std::int32_t>& part : simple_loops(s, loop)) {
-      all = close(part, false) && all;
+    for (Part& part : simple_loops(s, loop)) {
+      bool closed = close(part.loop, false);
+      if (!closed && part.twin >= 0) {  // with the edge from the twin, which may not be taken
+        part.loop[0] = part.twin;
+        closed = close(part.loop, false);
+      }
+      all = closed && all;
     }
   }
   if (all) return starts;

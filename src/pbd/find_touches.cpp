@@ -149,7 +149,7 @@ void find_touches(State& s, double duration) {
       }
     }
   }
-  s.touches.pack(v.size());
+  s.touches.pack(v.size(), {}, 0);  // each frame anew
 }
 
 }  // namespace pbd

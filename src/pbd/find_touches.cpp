@@ -20,6 +20,9 @@ constexpr double kSlack = 1e-3;
 /// Share of an overlap that a frame takes back: all at once would shake what lies in scraps.
 constexpr double kRecovery = 0.1;
 
+/// Vertices of a piece that touches others, at least: crumbs, slivers for the most part, shook.
+constexpr int kLeastPiece = 60;
+
 /// Whether a triangle is so thin that single precision hardly knows its normal.
 bool is_sliver(const Vec3& a, const Vec3& b, const Vec3& c, double mean_edge) {
   const double longest2 =
@@ -82,6 +85,9 @@ void find_touches(State& s, double duration) {
   s.touching.assign(s.components, 0);
   if (s.components < 2) return;
   const Vertices& v = s.vertices;
+  std::vector<int> vertices_of(s.components, 0);
+  for (const std::int32_t c : s.component) ++vertices_of[c];
+  const auto is_crumb = [&](std::int32_t i) { return vertices_of[s.component[i]] < kLeastPiece; };
   double fastest = 0;
   std::vector<Vec3> normal(v.size(), Vec3::Zero());
   for (int i = 0; i < v.size(); ++i) fastest = std::max(fastest, v.velocity(i).norm());
@@ -93,6 +99,7 @@ void find_touches(State& s, double duration) {
   const double reach = std::min(2.0, 0.3 + 2 * fastest * duration / s.mean_edge) * s.mean_edge;
   Cells cells(2 * s.mean_edge);
   for (std::size_t t = 0; t < s.triangles.size(); ++t) {
+    if (is_crumb(s.triangles[t][0])) continue;
     Vec3 low = Vec3::Constant(1e300), high = -low;
     for (const std::int32_t i : s.triangles[t]) {
       low = low.cwiseMin(v.position(i));
@@ -103,7 +110,7 @@ void find_touches(State& s, double duration) {
   }
   cells.sort();
   for (int i = 0; i < v.size(); ++i) {
-    if (v.surface[i] == 0) continue;
+    if (v.surface[i] == 0 || is_crumb(i)) continue;
     const Vec3 x = v.position(i), own = normal[i].stableNormalized();
     struct Found {
       std::int32_t piece, triangle;

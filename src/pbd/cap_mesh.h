@@ -24,5 +24,10 @@ struct CapMesh {
 CapMesh fill_loop(const std::vector<Vec3>& loop, double edge,
                   const std::vector<std::array<Vec3, 4>>& sheets = {});
 
+/// Rings of vertices about `edge` apart, each nearer to the middle, and at last one vertex, `rise`
+/// [m] above it: a surface that a loop has, too, that crosses itself where it is seen along its
+/// normal.
+CapMesh fill_by_rings(const std::vector<Vec3>& loop, double edge, double rise);
+
 }  // namespace pbd
 }  // namespace tissue_sim

@@ -67,7 +67,7 @@ int first_fit(const std::vector<std::int32_t>& vertices, int per_constraint,
 }  // namespace
 
 int find_colours(const std::vector<std::int32_t>& vertices, int per_constraint, int vertex_count,
-                 std::vector<std::int16_t>& colour) {
+                 std::vector<std::int16_t>& colour, int most_rounds) {
   Taken taken(vertex_count);
   int count = 0;
   for (std::size_t c = 0; c < colour.size(); ++c) {
@@ -87,7 +87,7 @@ int find_colours(const std::vector<std::int32_t>& vertices, int per_constraint, 
   if (!is_new || order.empty()) return count;
   // Colours taken in another order, those of one class together, need no more than before, and
   // often fewer (Culberson 1992).
-  const auto rounds = static_cast<int>(std::min<std::size_t>(30, 2 + 1000000 / order.size()));
+  const auto rounds = std::min(most_rounds, static_cast<int>(2 + 1000000 / order.size()));
   for (int round = 0; round < rounds; ++round) {
     std::vector<int> size(count, 0), rank(count);
     for (const std::int16_t c : colour) ++size[c];

@@ -12,8 +12,9 @@ namespace pbd {
 /// others keep theirs, so that a cut repairs colours only where constraints are new. `vertices`
 /// holds `per_constraint` indices below `vertex_count` for each constraint; a negative one is none.
 /// Returns the number of colours.
+/// `most_rounds`: of looking for fewer.
 int find_colours(const std::vector<std::int32_t>& vertices, int per_constraint, int vertex_count,
-                 std::vector<std::int16_t>& colour);
+                 std::vector<std::int16_t>& colour, int most_rounds = 30);
 
 }  // namespace pbd
 }  // namespace tissue_sim

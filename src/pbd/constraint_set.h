@@ -66,17 +66,19 @@ struct ConstraintSet {
   }
   /// `levels`: vertices of a chunk, ascending; without any there is one chunk, and so one list of
   /// colours.
-  void pack(int vertex_count, const std::vector<std::int32_t>& levels = {});
+  /// `most_rounds` as find_colours() has it.
+  void pack(int vertex_count, const std::vector<std::int32_t>& levels = {}, int most_rounds = 30);
 };
 
 template <class Kind>
-void ConstraintSet<Kind>::pack(int vertex_count, const std::vector<std::int32_t>& levels) {
+void ConstraintSet<Kind>::pack(int vertex_count, const std::vector<std::int32_t>& levels,
+                               int most_rounds) {
   constexpr int kVertices = Kind::kVertices;
   std::vector<std::int32_t> flat(vertices.size() * kVertices);
   for (std::size_t c = 0; c < vertices.size(); ++c) {
     std::copy(vertices[c].begin(), vertices[c].end(), flat.begin() + c * kVertices);
   }
-  colours = find_colours(flat, kVertices, vertex_count, colour);
+  colours = find_colours(flat, kVertices, vertex_count, colour, most_rounds);
   chunks.clear();
   int count = 0;
   for (const std::int32_t vertices_of_chunk : levels) {

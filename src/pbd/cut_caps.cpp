@@ -10,99 +10,70 @@
 #include "pbd/model.h"
 #include "pbd/pbd_pieces.h"
 #include "pbd/surface_mesh.h"
+#include "pbd/wound_loops.h"
 
 namespace tissue_sim {
 namespace pbd {
 namespace {
 
-/// Loops of edges that have one triangle, against that triangle's sense; only of vertices that lie
-/// on strokes.
-std::vector<std::vector<std::int32_t>> open_loops(const State& s) {
-  std::map<std::pair<std::int32_t, std::int32_t>, int> count;
-  for (const Triangle& t : s.triangles) {
-    for (int i = 0; i < 3; ++i) {
-      const std::int32_t a = t[i], b = t[(i + 1) % 3];
-      ++count[{std::min(a, b), std::max(a, b)}];
-    }
-  }
-  std::map<std::int32_t, std::int32_t> next;  // the cap's way around is the other one
-  std::set<std::int32_t> forked;
-  for (const Triangle& t : s.triangles) {
-    for (int i = 0; i < 3; ++i) {
-      const std::int32_t a = t[i], b = t[(i + 1) % 3];
-      if (count[{std::min(a, b), std::max(a, b)}] != 1) continue;
-      if (s.stroke[a] < 0 || s.stroke[b] < 0) continue;
-      if (!next.emplace(b, a).second) forked.insert(b);
-    }
-  }
-  std::vector<std::vector<std::int32_t>> loops;
-  std::set<std::int32_t> seen;
-  for (const auto& [start, to] : next) {
-    if (seen.count(start) != 0) continue;
-    std::vector<std::int32_t> loop;
-    std::int32_t v = start;
-    bool is_loop = true;
-    for (;;) {
-      if (!seen.insert(v).second || forked.count(v) != 0) {
-        is_loop = v == start && forked.count(v) == 0;
-        break;
-      }
-      loop.push_back(v);
-      const auto at = next.find(v);
-      if (at == next.end()) {
-        is_loop = false;
-        break;
-      }
-      v = at->second;
-    }
-    if (is_loop && loop.size() >= 3) loops.push_back(loop);
-  }
-  return loops;
-}
+using Edges = std::set<std::pair<std::int32_t, std::int32_t>>;  // of triangles: from, to
 
-/// A loop that comes back to the same place goes around a slit there, whose lips lie on one
-/// another, or is two loops that touch: each part by itself, without what has no area.
-std::vector<std::vector<std::int32_t>> simple_loops(const State& s,
-                                                    const std::vector<std::int32_t>& loop) {
-  const double same = 0.1 * s.mean_edge;
-  std::vector<std::vector<std::int32_t>> simple;
-  std::vector<std::int32_t> way;
-  for (const std::int32_t v : loop) {
-    const Vec3& x = s.vertices.reference[v];
-    std::size_t from = 0;
-    while (from < way.size() && (s.vertices.reference[way[from]] - x).norm() > same) ++from;
-    if (from == way.size()) {
-      way.push_back(v);
-      continue;
-    }
-    if (way.size() - from >= 3) simple.emplace_back(way.begin() + from, way.end());
-    way.resize(from + 1);
-  }
-  if (way.size() >= 3) simple.push_back(way);
-  return simple;
-}
-
-/// Whether a wound may be closed so: what makes slivers leaves it open.
-bool is_sound(const State& s, const std::vector<Vec3>& corners, const CapMesh& cap) {
-  constexpr double kLeastAngle = 0.05;  // [rad], 3 degrees
+/// The smallest angle of a surface that would close a wound [rad]. 0 if it has an edge that is too
+/// short, or one that a triangle has already in this sense.
+double soundness(const State& s, const std::vector<std::int32_t>& loop, const Edges& edges,
+                 const std::vector<Vec3>& corners, const CapMesh& cap) {
   std::vector<Vec3> x = corners;
   x.insert(x.end(), cap.inner.begin(), cap.inner.end());
+  double least = cap.triangles.empty() ? 0 : 4;
   for (const auto& t : cap.triangles) {
-    // Not a number is no more than anything.
-    if (!(smallest_angle(x[t[0]], x[t[1]], x[t[2]]) > kLeastAngle)) return false;
+    const double angle = smallest_angle(x[t[0]], x[t[1]], x[t[2]]);
+    if (!(angle > 0)) return 0;  // nor if it is not a number
+    least = std::min(least, angle);
+    const int n = static_cast<int>(loop.size());
     for (int i = 0; i < 3; ++i) {
-      if (!((x[t[i]] - x[t[(i + 1) % 3]]).norm() > 0.05 * s.mean_edge)) return false;
+      const int a = t[i], b = t[(i + 1) % 3];
+      if (!((x[a] - x[b]).norm() > 0.1 * s.mean_edge)) return 0;
+      if (a < n && b < n && edges.count({loop[a], loop[b]}) != 0) return 0;
     }
   }
   for (const std::vector<double>& of : cap.weights) {
     for (const double w : of) {
-      if (!std::isfinite(w)) return false;
+      if (!std::isfinite(w)) return 0;
     }
   }
-  return !cap.triangles.empty();
+  return least;
+}
+
+/// A surface that closes a wound: the blade's sheets, a smooth one, or at last one that any loop
+/// has. The first that is sound, or the one that is soundest; no triangles where all are slivers,
+/// and the wound stays open.
+CapMesh choose_cap(const State& s, const std::vector<std::int32_t>& loop, const Edges& edges,
+                   const std::vector<Vec3>& corners, double size) {
+  constexpr double kSound = 0.05, kBearable = 0.001;  // [rad]
+  CapMesh best;
+  double most = kBearable;
+  const auto is_sound = [&](CapMesh cap) {
+    const double angle = soundness(s, loop, edges, corners, cap);
+    if (angle > most) {
+      most = angle;
+      best = std::move(cap);
+    }
+    return most > kSound;
+  };
+  if (is_sound(fill_loop(corners, size, s.wounds)) || is_sound(fill_loop(corners, size))) {
+    return best;
+  }
+  for (const double rise : {0.0, -0.3, 0.3, -0.6, 0.6, -1.0, 1.0}) {
+    if (is_sound(fill_by_rings(corners, size, rise * size))) break;
+  }
+  return best;
 }
 
 }  // namespace
+
+/// What the lips of a slit whose vertices do not match leave between them, of an edge's square for
+/// each edge.
+static constexpr double kLipsApart = 0.05;
 
 std::vector<std::int32_t> close_wounds(State& s, std::vector<std::int32_t>& origin) {
   UnionFind linked = joined(s);
@@ -111,25 +82,33 @@ std::vector<std::int32_t> close_wounds(State& s, std::vector<std::int32_t>& orig
   for (int v = 0; v < s.vertices.size(); ++v) {
     if (s.stroke[v] >= 0) of_copies[s.copy_of[v]].insert(linked.root(v));
   }
+  Edges edges;
+  const auto add_edges = [&](const Triangle& t) {
+    for (int i = 0; i < 3; ++i) {
+      if (s.stroke[t[i]] < 0 || s.stroke[t[(i + 1) % 3]] < 0) continue;
+      edges.insert({t[i], t[(i + 1) % 3]});
+    }
+  };
+  for (const Triangle& t : s.triangles) add_edges(t);
   std::vector<std::int32_t> starts;
-  std::vector<std::vector<std::int32_t>> loops;
-  for (const std::vector<std::int32_t>& loop : open_loops(s)) {
-    for (std::vector<std::int32_t>& part : simple_loops(s, loop)) loops.push_back(std::move(part));
-  }
-  for (const std::vector<std::int32_t>& loop : loops) {
+  // Whether a loop was closed, or needs not be.
+  const auto close = [&](const std::vector<std::int32_t>& loop, bool only_holes) {
     int between = 0;
     for (const std::int32_t v : loop) between += of_copies[s.copy_of[v]].size() > 1 ? 1 : 0;
-    if (2 * between < static_cast<int>(loop.size())) continue;
     std::vector<Vec3> corners;
     double edge = 0;
+    Vec3 area = Vec3::Zero();
     for (std::size_t i = 0; i < loop.size(); ++i) {
       corners.push_back(s.vertices.reference[loop[i]]);
-      edge += (corners[i] - s.vertices.reference[loop[(i + 1) % loop.size()]]).norm() / loop.size();
+      const Vec3& next = s.vertices.reference[loop[(i + 1) % loop.size()]];
+      edge += (corners[i] - next).norm() / static_cast<double>(loop.size());
+      area += 0.5 * (corners[i] - corners[0]).cross(next - corners[0]);
     }
-    const double size = std::max(edge, 0.8 * s.mean_edge);
-    CapMesh cap = fill_loop(corners, size, s.wounds);
-    if (!is_sound(s, corners, cap)) cap = fill_loop(corners, size);
-    if (!is_sound(s, corners, cap)) continue;
+    const bool is_hole = area.norm() > kLipsApart * static_cast<double>(loop.size()) * edge * edge;
+    const bool is_end = !only_holes && 2 * between >= static_cast<int>(loop.size());
+    if (!is_end && !is_hole) return true;
+    const CapMesh cap = choose_cap(s, loop, edges, corners, std::max(edge, 0.8 * s.mean_edge));
+    if (cap.triangles.empty()) return !is_hole;
     std::vector<std::int32_t> index = loop;
     for (std::size_t i = 0; i < cap.inner.size(); ++i) {
       const std::int32_t n = add_vertex(s, cap.inner[i], s.vertices.body[loop[0]]);
@@ -151,10 +130,26 @@ std::vector<std::int32_t> close_wounds(State& s, std::vector<std::int32_t>& orig
       }
       index.push_back(n);
     }
-    for (const auto& t : cap.triangles)
+    for (const auto& t : cap.triangles) {
       s.triangles.push_back({index[t[0]], index[t[1]], index[t[2]]});
+      add_edges(s.triangles.back());
+    }
     starts.insert(starts.end(), index.begin(), index.end());
+    return true;
+  };
+  bool all = true;
+  for (const std::vector<std::int32_t>& loop : open_loops(s)) {
+    for (LoopPart& part : simple_loops(s, loop)) {
+      bool closed = close(part.loop, false);
+      if (!closed && part.twin >= 0) {  // with the edge from the twin, which may not be taken
+        part.loop[0] = part.twin;
+        closed = close(part.loop, false);
+      }
+      all = closed && all;
+    }
   }
+  if (all) return starts;
+  for (const std::vector<std::int32_t>& loop : open_loops(s)) close(loop, true);  // with its slits
   return starts;
 }
 

@@ -70,7 +70,8 @@ void keep_momentum(State& s, const std::vector<Flight>& before, int steps, float
   Vertices& v = s.vertices;
   std::vector<Flight> now = flights(s);
   for (int i = 0; i < v.size(); ++i) {
-    if (s.pushed[i] != 0) now[s.component[i]].is_free = false;
+    const std::int32_t c = s.component[i];
+    if (s.pushed[i] != 0 || s.touching[c] != 0) now[c].is_free = false;
   }
   const std::vector<RigidChange> changes = missing_motion(s.scene, before, now, steps, h);
   for (int i = 0; i < v.size(); ++i) {

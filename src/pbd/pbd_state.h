@@ -14,6 +14,7 @@
 #include "pbd/constraint_set.h"
 #include "pbd/motion.h"
 #include "pbd/project.h"
+#include "pbd/touch.h"
 #include "tissue_sim/scene.h"
 #include "tools/collider.h"
 
@@ -76,6 +77,7 @@ struct State {
   ConstraintSet<Bending> bends;
   ConstraintSet<Strain> strains;          ///< one for each tetrahedron, ...
   ConstraintSet<Elastic> elastics;        ///< ... or these
+  ConstraintSet<Touch> touches;           ///< between pieces, of this frame (find_touches.h)
   std::vector<double> volume_of_body;     ///< [m^3]
   std::vector<std::uint8_t> closed_body;  ///< whether the surface that it was made of is closed
 
@@ -106,6 +108,7 @@ struct State {
   // Made anew by pack(): what hangs together, by number.
   std::vector<std::int32_t> component;
   int components = 0;
+  std::vector<std::uint8_t> touching;  ///< of each, whether it is another's neighbour in this frame
   std::vector<std::uint8_t> pushed;  ///< of each vertex: whether a collider pushed it in this frame
 
   explicit State(const Scene& s)

@@ -5,6 +5,7 @@
 
 #include "frame/checksum.h"
 #include "pbd/cut.h"
+#include "pbd/find_touches.h"
 #include "pbd/free_flight.h"
 #include "pbd/model.h"
 #include "tools/frame_colliders.h"
@@ -84,6 +85,7 @@ void PbdTissue::advance(double duration, const FrameInput& input) {
 
 void PbdTissue::run_steps(const FrameColliders& colliders, int steps, float h) {
   pbd::State& s = *state_;
+  pbd::find_touches(s, steps * h);
   const std::vector<pbd::Flight> flights = pbd::flights(s);
   std::fill(s.pushed.begin(), s.pushed.end(), std::uint8_t{0});
   for (int i = 0; i < steps; ++i) {

@@ -4,6 +4,7 @@
 #include "compute/simd.h"
 #include "pbd/constraint_set.h"
 #include "pbd/tet_constraints.h"
+#include "pbd/touch.h"
 
 namespace tissue_sim {
 namespace pbd {
@@ -20,6 +21,7 @@ struct Projections {
   Project<Bending> bending;
   Project<Strain> strain;
   Project<Elastic> elastic;
+  Project<Touch> touch;
 };
 
 const Projections& projections(InstructionSet set);

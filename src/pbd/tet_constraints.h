@@ -102,6 +102,10 @@ struct Elastic {
   static TISSUE_SIM_INLINE void cofactors(const Vector<V> (&f)[3], Vector<V> (&cof)[3]) {
     for (int j = 0; j < 3; ++j) cof[j] = cross(f[(j + 1) % 3], f[(j + 2) % 3]);
   }
+  template <class V>
+  static TISSUE_SIM_INLINE V square(const Vector<V> (&a)[3]) {
+    return dot(a[0], a[0]) + dot(a[1], a[1]) + dot(a[2], a[2]);
+  }
   /// number: Q^-1, both compliances [1/(N m)].
   template <class V>
   static TISSUE_SIM_INLINE void project(Vertex<V> (&v)[4], const V (&number)[11], V inverse_h2,
@@ -110,9 +114,16 @@ struct Elastic {
     edges_of(v, p);
     for (int j = 0; j < 3; ++j) f[j] = column(p, number, j);
     cofactors(f, cof);
-    V det = dot(f[0], cof[0]);
-    det = lesser(greater(det, det * 0.0f + 0.1f), det * 0.0f + 4.0f);
-    const V root3 = inverse_cube_root(det);
+    const V whole = dot(f[0], cof[0]), none = whole * 0.0f;
+    const V det = lesser(greater(whole, none + 0.1f), none + 4.0f);
+    // Of a sheet, a needle or what lies inside out the cofactors grow with the square of what is
+    // left, and their slope would lead through the other side, ever further. No longer than F, they
+    // make nothing larger.
+    const V cubic = inverse_cube_root(det);
+    const V factor =
+        where_negative(greater(whole - 3.9f, 0.11f - whole), none + 2.25f, none + 1.0f);
+    const V most = factor * square(f) / (cubic * cubic * square(cof) + kTiny);
+    const V root3 = where_negative(most - 1.0f, cubic * root(most), cubic);
     // C_D grad C_D = H = F - J^(-1/3) cof F. As differences C_D^2 would lose half its digits; of
     // small strains it is |H|^2 / 2, and with that for all, and H / C_D for the slope, the force
     // that the multiplier means stays exactly that of the energy.
@@ -128,7 +139,13 @@ struct Elastic {
     edges_of(v, p);
     for (int j = 0; j < 3; ++j) f[j] = column(p, number, j);
     cofactors(f, cof);
-    project_along(v, number, cof, dot(f[0], cof[0]) - 1.0f, number[10] * inverse_h2, lambda[1]);
+    // The slope of J is next to nothing in a tetrahedron that two of its directions have collapsed
+    // in: a step along it would go ten times too far, and through the tetrahedron. Then the error
+    // counts for less; and one that lies inside out comes back little by little.
+    const V one = det * 0.0f + 1.0f;
+    const V volume =
+        lesser(square(cof), one) * greater(lesser(dot(f[0], cof[0]) - 1.0f, one), -1.5f * one);
+    project_along(v, number, cof, volume, number[10] * inverse_h2, lambda[1]);
   }
   /// Energy of the two [J].
   static TISSUE_SIM_INLINE double energy(const Vertex<float> (&v)[4], const float (&number)[11]) {

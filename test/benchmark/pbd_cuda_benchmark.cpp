@@ -64,11 +64,13 @@ void tetrahedra(benchmark::State& bench, PbdElasticity elasticity, double edge) 
 
 /// A body of about as many vertices as the bunny of the 2022 paper has, on the ground, ten steps a
 /// frame.
-void frame(benchmark::State& bench, PbdModel model, Way way, bool with_figures) {
+void frame(benchmark::State& bench, PbdModel model, Way way, bool with_figures, int steps = 10,
+           double bending = 1) {
   Scene scene;
   scene.method = Method::kPbd;
   scene.pbd.model = model;
-  scene.pbd.steps = 10;
+  scene.pbd.steps = steps;
+  scene.pbd.bending = bending;
   scene.cell_size = model == PbdModel::kSurface ? 0.0053 : 0.012;
   scene.bodies.resize(1);
   scene.bodies[0].shape = Shape::kEllipsoid;
@@ -123,6 +125,11 @@ void add_pbd_cuda_rows() {
     add(name + "/figures", [=](State& s) { frame(s, model, Way::kFaster, true); });
     add(name + "/one_block", [=](State& s) { frame(s, model, Way::kOneBlock, false); });
     add(name + "/launches", [=](State& s) { frame(s, model, Way::kLaunches, false); });
+    // What a frame takes besides its steps, and of them what the links take.
+    add(name + "/steps:1", [=](State& s) { frame(s, model, Way::kFaster, false, 1); });
+    if (is_surface) {
+      add(name + "/no_bending", [=](State& s) { frame(s, model, Way::kFaster, false, 10, 0); });
+    }
   }
 }
 

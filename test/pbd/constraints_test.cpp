@@ -184,6 +184,33 @@ TEST(Constraint, ElasticForcesAreTheEnergysSlope) {
   }
 }
 
+// Flattened to sheets, needles and points, and turned inside out: slivers are, when tissue lands.
+TEST(Constraint, NoShapeMakesAnElasticTetrahedronGrow) {
+  std::mt19937 random(5);
+  std::uniform_real_distribution<float> within(-1, 1), w(0.5f, 2);
+  float number[11];
+  fill_identity(number);
+  number[9] = number[10] = 0;
+  for (int round = 0; round < 300; ++round) {
+    Vertex<float> v[4];
+    for (Vertex<float>& at : v) at = {within(random), within(random), within(random), w(random)};
+    const float flat[] = {1, 0.1f, 1e-3f, -1};
+    for (Vertex<float>& at : v) {
+      at.x *= 3 * flat[round % 4];
+      at.y *= 3 * flat[round / 4 % 4];
+    }
+    float largest = 0;
+    for (int k = 0; k < 400; ++k) {
+      float lambda[2] = {0, 0};
+      Elastic::project(v, number, 1.0f, lambda);
+      for (const Vertex<float>& at : v) {
+        largest = std::max({largest, std::fabs(at.x), std::fabs(at.y), std::fabs(at.z)});
+      }
+    }
+    EXPECT_LT(largest, 8) << round;
+  }
+}
+
 TEST(Colours, NeighboursDiffer) {
   std::mt19937 random(1);
   std::vector<std::int32_t> vertices;

@@ -4,10 +4,13 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
+#include <map>
 #include <random>
+#include <set>
 #include <string>
 #include <vector>
 
+#include "pbd/pbd_pieces.h"
 #include "pbd/pbd_tissue.h"
 #include "tissue_sim/simulation.h"
 
@@ -69,6 +72,36 @@ Thinnest thinnest(const pbd::State& s) {
     }
   }
   return least;
+}
+
+/// Pieces whose surface has a hole of more than a hundredth of itself: what it encloses depends on
+/// where it is looked at from. The lips of a slit lie on one another and make no hole.
+struct Leaks {
+  int pieces = 0;
+  double volume = 0;  ///< of those pieces [m^3]
+};
+
+Leaks leaks(const pbd::State& s) {
+  UnionFind linked = pbd::joined(s);
+  std::map<std::int32_t, std::pair<Vec3, double>> skin;  // twice the sum of area times normal; area
+  for (const pbd::Triangle& t : s.triangles) {
+    const auto& x = s.vertices.reference;
+    const Vec3 n = (x[t[1]] - x[t[0]]).cross(x[t[2]] - x[t[0]]);
+    auto& of = skin.try_emplace(linked.root(t[0]), Vec3::Zero(), 0.0).first->second;
+    of.first += n;
+    of.second += n.norm();
+  }
+  Leaks found;
+  std::set<std::int32_t> open;
+  for (const auto& [piece, of] : skin) {
+    const double hole = of.first.norm() / of.second;
+    if (hole > 0.01) open.insert(piece);
+  }
+  found.pieces = static_cast<int>(open.size());
+  for (int i = 0; i < s.vertices.size(); ++i) {
+    if (open.count(linked.root(i)) != 0) found.volume += s.vertices.volume[i];
+  }
+  return found;
 }
 
 class CutMeshes : public testing::TestWithParam<PbdModel> {
@@ -189,6 +222,19 @@ TEST_P(CutMeshes, CutsAtRandomNeitherBlowUpNorMakeSlivers) {
   std::uniform_real_distribution<double> at(-1, 1);
   int cuts = GetParam() == PbdModel::kSurface ? 100 : 40;  // surfaces shook from some 80 on
   if (const char* asked = std::getenv("TISSUE_SIM_CUTS")) cuts = std::atoi(asked);
+  double fastest = 0;
+  const auto told = [&] {
+    const Thinnest least = thinnest(tissue.state());
+    const Leaks open = leaks(tissue.state());
+    std::printf(
+        "   %zu pieces, %d vertices, volume %.4f, smallest edge %.2e m, angle %.2f degrees, "
+        "fastest "
+        "%.1e m/s; with a hole: %d pieces, %.5f of the volume\n",
+        tissue.fragments().size(), tissue.state().vertices.size(), whole_volume(tissue) / volume,
+        least.edge, least.angle * 57.29578, fastest, open.pieces, open.volume / volume);
+    std::fflush(stdout);
+    return least;
+  };
   for (int i = 0; i < cuts; ++i) {
     const Vec3 from(0.05 * at(random), 0.03 * at(random), 0.02 * at(random));
     const Vec3 way = 0.03 * Vec3(at(random), at(random), at(random));
@@ -196,16 +242,18 @@ TEST_P(CutMeshes, CutsAtRandomNeitherBlowUpNorMakeSlivers) {
     simulation.cut(stroke(-edge, edge, {from, from + way}));
     const FrameResult r = simulation.advance_frame().result;
     ASSERT_FALSE(r.blew_up) << "cut " << i;
-    EXPECT_LT(r.max_speed, 0.01) << "cut " << i;  // read: 5e-4 of surfaces, 8e-4 of tetrahedra
+    fastest = std::max(fastest, r.max_speed);
+    if ((i + 1) % 100 == 0) told();
+    EXPECT_LT(r.max_speed, i < 100 ? 0.01 : 0.2)
+        << "cut " << i;  // read: 5e-4 of surfaces, 8e-4 of tetrahedra
   }
-  const Thinnest least = thinnest(tissue.state());
-  std::printf("   %zu pieces, volume %.4f, smallest edge %.2e m, angle %.2f degrees\n",
-              tissue.fragments().size(), whole_volume(tissue) / volume, least.edge,
-              least.angle * 57.29578);
+  const Thinnest least = told();
+  const Leaks open = leaks(tissue.state());
   EXPECT_NEAR(whole_volume(tissue) / volume, 1, 0.01);
   EXPECT_NEAR(tissue.momentum().mass / mass, 1, 1e-6);
-  EXPECT_GT(least.edge, 0.1 * tissue.state().mean_edge);
-  EXPECT_GT(least.angle * 57.29578, 2.8);
+  EXPECT_GT(least.edge, 0.09 * tissue.state().mean_edge);
+  EXPECT_GT(least.angle * 57.29578, GetParam() == PbdModel::kSurface ? 0.57 : 2.8);
+  EXPECT_LT(open.volume / volume, 0.01);
 }
 
 TEST_P(CutMeshes, AreTheSameBitsWithAnyNumberOfThreadsAndAfterRestoring) {

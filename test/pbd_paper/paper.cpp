@@ -1,14 +1,17 @@
 // The experiments of Lee et al. 2022 with meshes of one's own: CSV on the standard output.
-//   tissue_sim_pbd_paper MODEL EXPERIMENT SURFACE TETRAHEDRA
-// MODEL: internal (surface with internal constraints), bare (without), strain (the paper's
-// tetrahedra), material. EXPERIMENT: fall (extent and volume over time, and the surface's vertices
-// where a body of internal constraints has some), plate, rate (solver time of a frame).
-// Bodies are scaled to 20 cm and stand upright on the ground.
+//   tissue_sim_pbd_paper MODEL EXPERIMENT SURFACE TETRAHEDRA [NAME=NUMBER ...]
+// NAME: young_modulus, poisson_ratio, damping, steps, iterations, edge, bending, internal, stretch,
+// shear, turn_x (the body's, in degrees). MODEL: internal (surface with internal constraints), bare
+// (without), strain (the paper's tetrahedra), material. EXPERIMENT: fall (extent and volume over
+// time, and the surface's vertices where a body of internal constraints has some), plate, rate
+// (solver time of a frame). Bodies are scaled to 20 cm and stand upright on the ground.
 #include <chrono>
 #include <cstdio>
 #include <cstdlib>
+#include <map>
 #include <stdexcept>
 #include <string>
+#include <vector>
 
 #include "geometry/mesh.h"
 #include "pbd/pbd_tissue.h"
@@ -53,7 +56,37 @@ pbd::State& state(Simulation& simulation) {
   return static_cast<PbdTissue&>(simulation.tissue()).state();
 }
 
-Scene scene_of(const std::string& model, const std::string& mesh) {
+/// Sets what NAME=NUMBER says.
+void set(Scene& scene, const std::string& asked) {
+  const std::size_t sign = asked.find('=');
+  const std::string name = asked.substr(0, sign);
+  const double value = sign == std::string::npos ? 0 : std::stod(asked.substr(sign + 1));
+  PbdOptions& pbd = scene.pbd;
+  const std::map<std::string, double*> fields = {
+      {"young_modulus", &scene.materials[0].young_modulus},
+      {"poisson_ratio", &scene.materials[0].poisson_ratio},
+      {"damping", &scene.damping},
+      {"edge", &pbd.edge},
+      {"bending", &pbd.bending},
+      {"internal", &pbd.internal},
+      {"stretch", &pbd.stretch},
+      {"shear", &pbd.shear}};
+  if (name == "turn_x") {
+    scene.bodies[0].pose.orientation =
+        Quat(Eigen::AngleAxisd(value / 180 * std::acos(-1), Vec3::UnitX()));
+  } else if (name == "iterations") {
+    pbd.iterations = static_cast<int>(value);
+  } else if (name == "steps") {
+    pbd.steps = static_cast<int>(value);
+  } else if (fields.count(name) != 0) {
+    *fields.at(name) = value;
+  } else {
+    throw std::invalid_argument(name + " is no name that this program knows");
+  }
+}
+
+Scene scene_of(const std::string& model, const std::string& mesh,
+               const std::vector<std::string>& asked) {
   Scene scene;
   scene.method = Method::kPbd;
   scene.device = Device::kCpu;
@@ -63,6 +96,7 @@ Scene scene_of(const std::string& model, const std::string& mesh) {
   m.young_modulus = 3e4;
   m.poisson_ratio = 0.4;
   m.density = 1000;
+  scene.damping = 1;
   scene.materials = {m};
   scene.bodies.resize(1);
   scene.bodies[0].shape = Shape::kMesh;
@@ -72,8 +106,10 @@ Scene scene_of(const std::string& model, const std::string& mesh) {
       model == "internal" || model == "bare" ? PbdModel::kSurface : PbdModel::kTetrahedra;
   if (model == "bare") scene.pbd.internal = 0;
   if (model == "strain") scene.pbd.elasticity = PbdElasticity::kStrain;
+  for (const std::string& a : asked) set(scene, a);
   // Its size in the file's units is not known before it was read.
   scene.gravity = Vec3::Zero();
+  scene.ground.enabled = false;
   Extent e;
   try {
     Simulation once(scene);
@@ -88,7 +124,7 @@ Scene scene_of(const std::string& model, const std::string& mesh) {
   const Vec3 middle = 0.5 * (e.min + e.max);
   scene.bodies[0].pose.position = Vec3(-more * middle.x(), -more * middle.y(), -more * e.min.z());
   scene.gravity = Vec3(0, 0, -9.81);
-  scene.damping = 1;
+  scene.ground.enabled = true;
   scene.ground.friction = 0.5;
   return scene;
 }
@@ -132,12 +168,12 @@ void plate(Scene scene) {
   scene.tools = {plate};
   Simulation simulation(scene);
   print_counts(simulation);
-  for (int f = 0; f < 60; ++f) simulation.advance_frame();  // it settles
+  for (int f = 0; f < 300; ++f) simulation.advance_frame();  // it settles
   const double whole = enclosed(state(simulation));
   const double top = extent(state(simulation)).max.z();
   std::printf("time,size_x,size_y,size_z,x,y,z,lowest,volume\n");
   const Quat down(Eigen::AngleAxisd(std::acos(-1), Vec3::UnitX()));
-  for (int f = 0; f < 210; ++f) {
+  for (int f = 0; f < 300; ++f) {
     const double pressed = f < 60 ? f / 60.0 : f < 90 ? 1 : f < 150 ? (150 - f) / 60.0 : -5;
     simulation.set_tool(0, {Vec3(0, 0, top * (1.001 - 0.3 * pressed)), down});
     simulation.advance_frame();
@@ -166,14 +202,15 @@ void rate(Scene scene) {
 }
 
 int run(int argc, char** argv) {
-  if (argc != 5) {
+  if (argc < 5) {
     std::fprintf(stderr,
                  "tissue_sim_pbd_paper internal|bare|strain|material fall|plate|rate "
-                 "SURFACE TETRAHEDRA\n");
+                 "SURFACE TETRAHEDRA [NAME=NUMBER ...]\n");
     return 2;
   }
   const std::string model = argv[1], experiment = argv[2];
-  const Scene scene = scene_of(model, model == "internal" || model == "bare" ? argv[3] : argv[4]);
+  const Scene scene = scene_of(model, model == "internal" || model == "bare" ? argv[3] : argv[4],
+                               {argv + 5, argv + argc});
   if (experiment == "fall") fall(scene);
   if (experiment == "plate") plate(scene);
   if (experiment == "rate") rate(scene);

@@ -6,8 +6,9 @@
 namespace tissue_sim {
 namespace {
 
-/// Vertices of a chunk at most: what a block of threads sums up for keep_momentum().
-constexpr int kChunk = 1024;
+/// Vertices of a chunk at most: what a block of threads, or a warp of the one block that there is,
+/// sums up for keep_momentum().
+constexpr int kChunk = 1024, kChunkOfWarp = 128;
 
 }  // namespace
 
@@ -23,6 +24,7 @@ void CudaPbdTissue::upload_chunks() {
     d.component_mass[c] += s.vertices.mass[i];
     if (s.vertices.anchored[i] != 0) is_free[c] = false;
   }
+  const int most = d.way == Way::kOneBlock ? kChunkOfWarp : kChunk;
   std::vector<std::int32_t> order;
   std::vector<pbd::CudaPbdChunk> chunks;
   d.component_of_chunk.clear();
@@ -31,8 +33,8 @@ void CudaPbdTissue::upload_chunks() {
     const auto begin = static_cast<std::int32_t>(order.size());
     order.insert(order.end(), of[c].begin(), of[c].end());
     const auto end = static_cast<std::int32_t>(order.size());
-    for (std::int32_t at = begin; at < end; at += kChunk) {
-      chunks.push_back({at, std::min(end, at + kChunk), of[c].front()});
+    for (std::int32_t at = begin; at < end; at += most) {
+      chunks.push_back({at, std::min(end, at + most), of[c].front()});
       d.component_of_chunk.push_back(c);
     }
   }
@@ -78,12 +80,14 @@ void CudaPbdTissue::keep_momentum(int steps, float h) {
       f.angular -= from_origin.cross(f.linear);
       second[c] -= f.mass * from_origin * from_origin.transpose();
       f.inertia = second[c].trace() * Eigen::Matrix3d::Identity() - second[c];
-      f.is_free = when == 0 || !pushed[c];
+      f.is_free = when == 0 || (!pushed[c] && state_->touching[c] == 0);
     }
   }
   const std::vector<pbd::RigidChange> changes =
       pbd::missing_motion(state_->scene, of[0], of[1], steps, h);
-  std::vector<pbd::CudaPbdChange> packed(changes.size());
+  // The GPU reads them where they are: the frame was waited for, and so was all before it.
+  d.host_changes.resize(changes.size());
+  pbd::CudaPbdChange* packed = d.host_changes.data();
   bool any = false;
   for (std::size_t c = 0; c < changes.size(); ++c) {
     packed[c].is_free = changes[c].is_free ? 1 : 0;
@@ -96,8 +100,9 @@ void CudaPbdTissue::keep_momentum(int steps, float h) {
     }
   }
   if (!any) return;
-  d.changes.upload(packed, d.stream);
-  launch_pbd_changes(d.field(), d.component.data(), d.changes.data(), d.stream);
+  const bool few = d.way == Way::kOneBlock;
+  if (!few) d.changes.upload(packed, changes.size(), d.stream);
+  launch_pbd_changes(d.field(), d.component.data(), few ? packed : d.changes.data(), d.stream);
 }
 
 }  // namespace tissue_sim

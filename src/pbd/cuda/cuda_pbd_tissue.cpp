@@ -4,6 +4,7 @@
 #include <stdexcept>
 
 #include "pbd/cuda/on_device.h"
+#include "pbd/find_touches.h"
 
 namespace tissue_sim {
 namespace {
@@ -151,44 +152,66 @@ void CudaPbdTissue::upload_frame(const FrameColliders& colliders, int steps,
   for (int i = 0; i < steps; ++i) {
     colliders.at((i + 1.0) / steps, d.host_colliders.data() + i * count);
   }
+  pbd::CudaPbdCollider* boxed = d.boxed.data();
   for (std::size_t k = 0; k < d.boxed.size(); ++k) {
     const Box box = bounds(d.host_colliders[k]);
-    d.boxed[k].shape = d.host_colliders[k];
+    boxed[k].shape = d.host_colliders[k];
     for (int a = 0; a < 3; ++a) {
-      d.boxed[k].min[a] = static_cast<float>(box.min[a]);
-      d.boxed[k].max[a] = static_cast<float>(box.max[a]);
+      boxed[k].min[a] = static_cast<float>(box.min[a]);
+      boxed[k].max[a] = static_cast<float>(box.max[a]);
     }
   }
-  if (d.way == Way::kLaunches) {
-    d.frame.upload(&frame, 1, d.stream);
-    d.step.clear(d.stream);
-  }
-  d.colliders.upload(d.boxed, d.stream);
+  d.colliders.resize(d.boxed.size());
   d.loads.resize(d.boxed.size() * pbd::kPbdLoadSums);
+  d.host_loads.resize(d.loads.size());
+  if (d.way == Way::kOneBlock) return;  // it fetches them itself
+  d.frame.upload(&frame, 1, d.stream);
+  d.step.clear(d.stream);
+  d.colliders.upload(boxed, d.boxed.size(), d.stream);
   d.loads.clear(d.stream);
   d.pushed.clear(d.stream);
 }
 
+int CudaPbdTissue::upload_touches(double duration) {
+  OnDevice& d = *device_;
+  pbd::State& s = *state_;
+  const bool may_touch = s.components > 1;
+  if (may_touch) pull();
+  pbd::find_touches(s, duration);
+  const auto* blocks = d.touches.blocks.data();
+  const auto* begin = d.touches.begin.data();
+  if (s.touches.size() > 0) d.touches.upload(s.touches, false, d.stream);
+  if (may_touch != d.may_touch || blocks != d.touches.blocks.data() ||
+      begin != d.touches.begin.data()) {
+    d.step_graph.clear();
+  }
+  d.may_touch = may_touch;
+  return s.touches.size() > 0 ? d.touches.colours : 0;
+}
+
 void CudaPbdTissue::run_steps(const FrameColliders& colliders, int steps, float h) {
   OnDevice& d = *device_;
-  const pbd::CudaPbdFrame frame{pbd::step_numbers(state_->scene, h), colliders.count()};
+  pbd::CudaPbdFrame frame{pbd::step_numbers(state_->scene, h), colliders.count()};
+  frame.touch_colours = upload_touches(steps * h);
   upload_frame(colliders, steps, frame);
   const pbd::CudaPbdField field = d.field();
   const int chunks = static_cast<int>(d.component_of_chunk.size());
   const pbd::CudaPbdFlights flights{d.chunks.data(), chunks, d.order.data()};
-  launch_pbd_flights(field, flights, d.flights.data(), d.stream);
   if (d.way == Way::kOneBlock) {
-    launch_pbd_steps(field, frame, steps, d.stream);
+    launch_pbd_steps(field, frame, steps,
+                     {d.boxed.data(), d.host_loads.data(), d.host_flights.data(), flights},
+                     d.stream);
   } else {
+    launch_pbd_flights(field, flights, d.flights.data(), d.stream);
     if (d.step_graph.is_empty()) {
       d.step_graph.record(d.stream, [&] { launch_pbd_step(field, colours(*state_), d.stream); });
     }
     for (int i = 0; i < steps; ++i) d.step_graph.launch(d.stream);
+    launch_pbd_flights(field, flights, d.flights.data() + chunks, d.stream);
+    d.loads.download(d.host_loads.data(), d.loads.size(), d.stream);
+    d.flights.download(d.host_flights.data(), d.flights.size(), d.stream);
   }
   d.host_is_current = false;
-  launch_pbd_flights(field, flights, d.flights.data() + chunks, d.stream);
-  d.loads.download(d.host_loads.data(), d.loads.size(), d.stream);
-  d.flights.download(d.host_flights.data(), d.flights.size(), d.stream);
   d.wait("advance");
   take_loads(colliders, steps);
   if (chunks > 0) keep_momentum(steps, h);
@@ -239,7 +262,7 @@ std::vector<std::uint8_t> CudaPbdTissue::save() {
 
 void CudaPbdTissue::project(float h, int times) {
   OnDevice& d = *device_;
-  const pbd::CudaPbdFrame frame{pbd::step_numbers(state_->scene, h), 0};
+  const pbd::CudaPbdFrame frame{pbd::step_numbers(state_->scene, h), 0, 0};
   d.frame.upload(&frame, 1, d.stream);
   if (d.projections.is_empty()) {
     d.projections.record(d.stream, [&] {

@@ -50,6 +50,7 @@ class CudaPbdTissue final : public PbdTissue {
   void upload_constraints();
   void upload_chunks();
   void choose_way();
+  int upload_touches(double duration);  ///< returns their colours
   void upload_frame(const FrameColliders& colliders, int steps, const pbd::CudaPbdFrame& frame);
   void take_loads(const FrameColliders& colliders, int steps);
   void keep_momentum(int steps, float h);

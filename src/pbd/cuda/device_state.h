@@ -9,6 +9,7 @@
 #include "pbd/constraints.h"
 #include "pbd/motion.h"
 #include "pbd/tet_constraints.h"
+#include "pbd/touch.h"
 #include "tools/collider.h"
 
 namespace tissue_sim {
@@ -40,7 +41,8 @@ struct CudaPbdCollider {
 /// What all steps of a frame share.
 struct CudaPbdFrame {
   StepNumbers step;
-  int colliders = 0;  ///< of each step
+  int colliders = 0;      ///< of each step
+  int touch_colours = 0;  ///< of CudaPbdField::touches, which change from frame to frame
 };
 
 struct CudaPbdField {
@@ -54,11 +56,13 @@ struct CudaPbdField {
   CudaPbdSet<Strain> strains;
   CudaPbdSet<Distance> links;
   CudaPbdSet<Bending> bends;
-  int sweeps = 1;  ///< sweeps_of_step()
+  CudaPbdSet<Touch> touches;
+  bool may_touch = false;  ///< whether there are pieces that may touch one another
+  int sweeps = 1;          ///< sweeps_of_step()
   const CudaPbdFrame* frame;
-  const CudaPbdCollider* colliders;  ///< [steps][frame->colliders]
-  unsigned long long* loads;         ///< [steps][frame->colliders][kPbdLoadSums]
-  int* step;                         ///< which of the frame's it is, where each step is launched
+  CudaPbdCollider* colliders;  ///< [steps][frame->colliders]
+  unsigned long long* loads;   ///< [steps][frame->colliders][kPbdLoadSums]
+  int* step;                   ///< which of the frame's it is, where each step is launched
 };
 
 /// Some vertices, all of what hangs together.
@@ -86,6 +90,15 @@ struct CudaPbdChange {
   int is_free;
 };
 
+/// What all steps by one block of threads read from the host's page-locked memory and leave there:
+/// a copy or a launch of its own for each would take a tenth of the frame.
+struct CudaPbdExchange {
+  const CudaPbdCollider* colliders;  ///< of all steps
+  unsigned long long* loads;
+  CudaPbdFlight* flights;  ///< [2][chunks]: before the steps, and after them
+  CudaPbdFlights chunks;
+};
+
 /// What a block of threads measured.
 struct CudaPbdMeasure {
   double elastic, kinetic;  ///< [J]
@@ -109,7 +122,7 @@ int pbd_projection_launches(const CudaPbdColours& colours);
 void launch_pbd_step(const CudaPbdField& field, const CudaPbdColours& colours, cudaStream_t stream);
 /// All steps by one block of threads, that keeps places in its shared memory.
 void launch_pbd_steps(const CudaPbdField& field, const CudaPbdFrame& frame, int steps,
-                      cudaStream_t stream);
+                      const CudaPbdExchange& exchange, cudaStream_t stream);
 /// Whether that is possible.
 bool fits_pbd_block(const CudaPbdField& field);
 void launch_pbd_flights(const CudaPbdField& field, const CudaPbdFlights& flights,

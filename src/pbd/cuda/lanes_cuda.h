@@ -105,6 +105,25 @@ __device__ __forceinline__ void project_colours(const CudaPbdSet<Kind>& set, int
   }
 }
 
+/// Adds a vertex of `m` kg to the sums of what it is a part of; places count from sum.origin.
+__device__ __forceinline__ void add_to_flight(const float4& x, const float4& v, double m,
+                                              std::uint8_t pushed, CudaPbdFlight& sum) {
+  const double d[3] = {x.x - sum.origin[0], x.y - sum.origin[1], x.z - sum.origin[2]};
+  const double p[3] = {m * v.x, m * v.y, m * v.z};
+#pragma unroll
+  for (int a = 0; a < 3; ++a) {
+    const int b = (a + 1) % 3, c = (a + 2) % 3;
+    sum.moment[a] += m * d[a];
+    sum.linear[a] += p[a];
+    sum.angular[a] += d[b] * p[c] - d[c] * p[b];
+    sum.second[a] += m * d[a] * d[a];
+  }
+  sum.second[3] += m * d[0] * d[1];
+  sum.second[4] += m * d[0] * d[2];
+  sum.second[5] += m * d[1] * d[2];
+  sum.pushed |= pushed;
+}
+
 __device__ __forceinline__ void predict_vertex(const CudaPbdField& f, const StepNumbers& step,
                                                int i, float4* place) {
   const float4 x4 = *place, v4 = f.v[i];

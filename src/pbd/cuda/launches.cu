@@ -32,6 +32,13 @@ __global__ void __launch_bounds__(kThreadsOfFew)
   project_colours<Kind, kKeep>(set, first, last, backward, frame->step.inverse_h2, x);
 }
 
+/// All colours of what touches, few as they are, by one block: how many there are is not known when
+/// the launch is put into a graph.
+__global__ void __launch_bounds__(kThreadsOfFew)
+    pbd_project_touches(CudaPbdSet<Touch> set, const CudaPbdFrame* frame, float4* x) {
+  project_colours<Touch, false>(set, 0, frame->touch_colours, false, frame->step.inverse_h2, x);
+}
+
 __global__ void __launch_bounds__(kThreads) pbd_predict(CudaPbdField f) {
   const int i = static_cast<int>(blockIdx.x * blockDim.x + threadIdx.x);
   if (i < f.count) predict_vertex(f, f.frame->step, i, f.x + i);
@@ -147,6 +154,9 @@ void launch_pbd_step(const CudaPbdField& field, const CudaPbdColours& colours,
   }
   for (int i = 0; i < field.sweeps; ++i) {
     launch_pbd_projections(field, colours, keep, i % 2 == 1, stream);
+  }
+  if (field.may_touch) {
+    pbd_project_touches<<<1, kThreadsOfFew, 0, stream>>>(field.touches, field.frame, field.x);
   }
   pbd_touch<<<blocks, kThreads, 0, stream>>>(field);
   pbd_take_velocities<<<blocks, kThreads, 0, stream>>>(field);

@@ -41,22 +41,7 @@ __global__ void __launch_bounds__(kThreads)
   CudaPbdFlight sum = {{origin.x, origin.y, origin.z}, {}, {}, {}, {}, 0};
   for (int k = chunk.begin + static_cast<int>(threadIdx.x); k < chunk.end; k += kThreads) {
     const int i = flights.order[k];
-    const float4 x = f.x[i], v = f.v[i];
-    const double m = f.mass[i];
-    const double d[3] = {x.x - sum.origin[0], x.y - sum.origin[1], x.z - sum.origin[2]};
-    const double p[3] = {m * v.x, m * v.y, m * v.z};
-#pragma unroll
-    for (int a = 0; a < 3; ++a) {
-      const int b = (a + 1) % 3, c = (a + 2) % 3;
-      sum.moment[a] += m * d[a];
-      sum.linear[a] += p[a];
-      sum.angular[a] += d[b] * p[c] - d[c] * p[b];
-      sum.second[a] += m * d[a] * d[a];
-    }
-    sum.second[3] += m * d[0] * d[1];
-    sum.second[4] += m * d[0] * d[2];
-    sum.second[5] += m * d[1] * d[2];
-    sum.pushed |= f.pushed[i];
+    add_to_flight(f.x[i], f.v[i], f.mass[i], f.pushed[i], sum);
   }
   reduce(of_thread, sum, TakeFlight());
   if (threadIdx.x == 0) result[blockIdx.x] = of_thread[0];

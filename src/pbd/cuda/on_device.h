@@ -51,6 +51,8 @@ struct CudaPbdTissue::OnDevice {
   Set<pbd::Strain> strains;
   Set<pbd::Distance> links;
   Set<pbd::Bending> bends;
+  Set<pbd::Touch> touches;
+  bool may_touch = false;
   int sweeps = 1;  ///< of a step
   Way wanted = Way::kFaster, way = Way::kLaunches;
   CudaGraph step_graph, projections;
@@ -60,7 +62,7 @@ struct CudaPbdTissue::OnDevice {
   DeviceArray<unsigned long long> loads;
   DeviceArray<int> step;
   std::vector<Collider> host_colliders;
-  std::vector<pbd::CudaPbdCollider> boxed;
+  PinnedArray<pbd::CudaPbdCollider> boxed;
   PinnedArray<unsigned long long> host_loads;
 
   // What flies freely: chunks of all that nothing holds.
@@ -71,6 +73,7 @@ struct CudaPbdTissue::OnDevice {
   DeviceArray<pbd::CudaPbdFlight> flights;  ///< before the steps, and after them
   PinnedArray<pbd::CudaPbdFlight> host_flights;
   DeviceArray<pbd::CudaPbdChange> changes;
+  PinnedArray<pbd::CudaPbdChange> host_changes;
 
   DeviceArray<pbd::CudaPbdMeasure> measures;
   PinnedArray<pbd::CudaPbdMeasure> host_measures;
@@ -90,6 +93,8 @@ struct CudaPbdTissue::OnDevice {
     f.strains = strains.set();
     f.links = links.set();
     f.bends = bends.set();
+    f.touches = touches.set();
+    f.may_touch = may_touch;
     f.sweeps = sweeps;
     f.frame = frame.data();
     f.colliders = colliders.data();

@@ -77,13 +77,49 @@ __device__ __forceinline__ void project_set(const CudaPbdSet<Kind>& set, const S
   if (!backward) project_tail<Kind, kKeep>(set, staged, false, inverse_h2, x);
 }
 
+/// A chunk for each warp, in a fixed order.
+__device__ __forceinline__ void sum_flights(const CudaPbdField& f, const CudaPbdFlights& flights,
+                                            const float4* x, CudaPbdFlight* result) {
+  const int lane = static_cast<int>(threadIdx.x) % 32;
+  for (int c = static_cast<int>(threadIdx.x) / 32; c < flights.count;
+       c += static_cast<int>(blockDim.x) / 32) {
+    const CudaPbdChunk chunk = flights.chunks[c];
+    const float4 origin = x[chunk.first];
+    CudaPbdFlight sum = {{origin.x, origin.y, origin.z}, {}, {}, {}, {}, 0};
+    for (int k = chunk.begin + lane; k < chunk.end; k += 32) {
+      const int i = flights.order[k];
+      add_to_flight(x[i], f.v[i], f.mass[i], f.pushed[i], sum);
+    }
+#pragma unroll
+    for (int step = 16; step > 0; step /= 2) {
+#pragma unroll
+      for (int k = 0; k < 3; ++k) {
+        for (double* s : {sum.moment + k, sum.linear + k, sum.angular + k, sum.second + k,
+                          sum.second + 3 + k}) {
+          *s += __shfl_down_sync(~0u, *s, step);
+        }
+      }
+    }
+    sum.pushed = __any_sync(~0u, sum.pushed) != 0 ? 1 : 0;
+    if (lane == 0) result[c] = sum;
+  }
+}
+
+template <class T>
+__device__ __forceinline__ void copy_words(const T* from, T* to, int count) {
+  const int words = count * static_cast<int>(sizeof(T) / 4);
+  for (int i = static_cast<int>(threadIdx.x); i < words; i += static_cast<int>(blockDim.x)) {
+    reinterpret_cast<std::int32_t*>(to)[i] = reinterpret_cast<const std::int32_t*>(from)[i];
+  }
+}
+
 /// Threads of a block: tetrahedra take twice the registers.
 template <bool kTets>
 constexpr int kThreads = kTets ? 512 : 1024;
 
-template <bool kTets, bool kKeep>
+template <bool kTets, bool kKeep, bool kShared>
 __global__ void __launch_bounds__(kThreads<kTets>, 1)
-    pbd_steps(CudaPbdField f, CudaPbdFrame frame, int steps) {
+    pbd_steps(CudaPbdField f, CudaPbdFrame frame, int steps, CudaPbdExchange exchange) {
   extern __shared__ float4 places[];
   const int thread = static_cast<int>(threadIdx.x), threads = static_cast<int>(blockDim.x);
   for (int i = thread; i < f.count + 4 * kLanes; i += threads) places[i] = f.x[i];
@@ -92,6 +128,20 @@ __global__ void __launch_bounds__(kThreads<kTets>, 1)
   const Staged<Bending> bends = stage(f.bends, words);
   const Staged<Elastic> elastics = stage(f.elastics, words);
   const Staged<Strain> strains = stage(f.strains, words);
+  const int of_steps = steps * frame.colliders;
+  float4 *const v = f.v, *const predicted = f.predicted;
+  if (kShared) {  // what a step reads of each vertex and of colliders lies at hand, too
+    f.v = reinterpret_cast<float4*>(words);
+    f.predicted = f.v + f.count;
+    f.colliders = reinterpret_cast<CudaPbdCollider*>(f.predicted + f.count);
+    for (int i = thread; i < f.count; i += threads) f.v[i] = v[i];
+  }
+  copy_words(exchange.colliders, f.colliders, of_steps);
+  for (int i = thread; i < of_steps * kPbdLoadSums; i += threads) f.loads[i] = 0;
+  for (int i = thread; i < f.count; i += threads) f.pushed[i] = 0;
+  __syncthreads();
+  sum_flights(f, exchange.chunks, places, exchange.flights);
+  __syncthreads();
   const StepNumbers& step = frame.step;
   const float inverse_h2 = step.inverse_h2;
   for (int s = 0; s < steps; ++s) {
@@ -118,6 +168,7 @@ __global__ void __launch_bounds__(kThreads<kTets>, 1)
         project_set<Bending, kKeep, 1>(f.bends, bends, false, inverse_h2, places);
       }
     }
+    project_colours<Touch, false>(f.touches, 0, frame.touch_colours, false, inverse_h2, places);
     const std::size_t first = static_cast<std::size_t>(s) * frame.colliders;
     for (int i = thread; i < f.count; i += threads) {
       touch_vertex(f, step.h, f.colliders + first, frame.colliders, f.loads + first * kPbdLoadSums,
@@ -127,6 +178,15 @@ __global__ void __launch_bounds__(kThreads<kTets>, 1)
     for (int i = thread; i < f.count; i += threads) take_velocity_of(f, step, i, places[i]);
   }
   for (int i = thread; i < f.count; i += threads) f.x[i] = places[i];
+  __syncthreads();
+  if (kShared) {
+    for (int i = thread; i < f.count; i += threads) {
+      v[i] = f.v[i];
+      predicted[i] = f.predicted[i];
+    }
+  }
+  copy_words(f.loads, exchange.loads, of_steps * kPbdLoadSums);
+  sum_flights(f, exchange.chunks, places, exchange.flights + exchange.chunks.count);
 }
 
 std::size_t shared_bytes(const CudaPbdField& field) {
@@ -136,34 +196,60 @@ std::size_t shared_bytes(const CudaPbdField& field) {
          static_cast<std::size_t>(words) * 4;
 }
 
-template <bool kTets, bool kKeep>
-void launch(const CudaPbdField& field, const CudaPbdFrame& frame, int steps, cudaStream_t stream) {
-  const std::size_t bytes = shared_bytes(field);
+/// Of velocities, of where vertices would be, and of colliders.
+std::size_t motion_bytes(const CudaPbdField& field, const CudaPbdFrame& frame, int steps) {
+  return 2 * static_cast<std::size_t>(field.count) * sizeof(float4) +
+         static_cast<std::size_t>(steps) * frame.colliders * sizeof(CudaPbdCollider);
+}
+
+std::size_t most_shared_bytes() {
+  static const int most = [] {
+    int bytes = 0;
+    check_cuda(cudaDeviceGetAttribute(&bytes, cudaDevAttrMaxSharedMemoryPerBlockOptin, 0),
+               "be asked");
+    return bytes;
+  }();
+  return static_cast<std::size_t>(most);
+}
+
+template <bool kTets, bool kKeep, bool kShared>
+void launch_with(const CudaPbdField& field, const CudaPbdFrame& frame, int steps,
+                 const CudaPbdExchange& exchange, std::size_t bytes, cudaStream_t stream) {
   check_cuda(
-      cudaFuncSetAttribute(pbd_steps<kTets, kKeep>, cudaFuncAttributeMaxDynamicSharedMemorySize,
-                           static_cast<int>(bytes)),
+      cudaFuncSetAttribute(pbd_steps<kTets, kKeep, kShared>,
+                           cudaFuncAttributeMaxDynamicSharedMemorySize, static_cast<int>(bytes)),
       "set shared memory apart");
-  pbd_steps<kTets, kKeep><<<1, kThreads<kTets>, bytes, stream>>>(field, frame, steps);
+  pbd_steps<kTets, kKeep, kShared>
+      <<<1, kThreads<kTets>, bytes, stream>>>(field, frame, steps, exchange);
   check_cuda(cudaGetLastError(), "take the steps of a frame");
+}
+
+template <bool kTets, bool kKeep>
+void launch(const CudaPbdField& field, const CudaPbdFrame& frame, int steps,
+            const CudaPbdExchange& exchange, cudaStream_t stream) {
+  const std::size_t least = shared_bytes(field), all = least + motion_bytes(field, frame, steps);
+  if (all <= most_shared_bytes()) {
+    launch_with<kTets, kKeep, true>(field, frame, steps, exchange, all, stream);
+  } else {
+    launch_with<kTets, kKeep, false>(field, frame, steps, exchange, least, stream);
+  }
 }
 
 }  // namespace
 
 bool fits_pbd_block(const CudaPbdField& field) {
-  int most = 0;
-  check_cuda(cudaDeviceGetAttribute(&most, cudaDevAttrMaxSharedMemoryPerBlockOptin, 0), "be asked");
-  return shared_bytes(field) <= static_cast<std::size_t>(most);
+  return shared_bytes(field) <= most_shared_bytes();
 }
 
 void launch_pbd_steps(const CudaPbdField& field, const CudaPbdFrame& frame, int steps,
-                      cudaStream_t stream) {
+                      const CudaPbdExchange& exchange, cudaStream_t stream) {
   const bool tets = field.elastics.colours + field.strains.colours > 0;
   if (field.sweeps > 1) {
-    tets ? launch<true, true>(field, frame, steps, stream)
-         : launch<false, true>(field, frame, steps, stream);
+    tets ? launch<true, true>(field, frame, steps, exchange, stream)
+         : launch<false, true>(field, frame, steps, exchange, stream);
   } else {
-    tets ? launch<true, false>(field, frame, steps, stream)
-         : launch<false, false>(field, frame, steps, stream);
+    tets ? launch<true, false>(field, frame, steps, exchange, stream)
+         : launch<false, false>(field, frame, steps, exchange, stream);
   }
 }
 

@@ -1,0 +1,171 @@
+// Pieces that touch: they rest on one another, slide with friction, and give one another what they
+// lose of momentum.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+#include <vector>
+
+#include "pbd/pbd_tissue.h"
+#include "pbd/touch.h"
+#include "tissue_sim/simulation.h"
+#if defined(TISSUE_SIM_CUDA)
+#include "compute/cuda_check.h"
+#endif
+
+namespace tissue_sim {
+namespace {
+
+struct Case {
+  PbdModel model;
+  Device device;
+};
+
+class Touches : public testing::TestWithParam<Case> {
+ protected:
+  void SetUp() override {
+    if (GetParam().device == Device::kCpu) return;
+#if defined(TISSUE_SIM_CUDA)
+    if (!why_no_gpu().empty()) GTEST_SKIP() << why_no_gpu();
+#else
+    GTEST_SKIP() << "built without CUDA";
+#endif
+  }
+  /// A flat box, held fast, and a smaller one above it.
+  Scene two_boxes(double friction, double above) const {
+    Scene scene;
+    scene.method = Method::kPbd;
+    scene.device = GetParam().device;
+    scene.pbd.model = GetParam().model;
+    scene.cell_size = 0.005;
+    scene.ground.enabled = false;
+    Material m;
+    m.name = "rubber";
+    m.young_modulus = 3e4;
+    m.poisson_ratio = 0.3;
+    m.density = 1000;
+    m.friction = friction;
+    scene.materials = {m};
+    scene.bodies.resize(2);
+    for (Body& b : scene.bodies) b.material = m.name;
+    scene.bodies[0].name = "below";
+    scene.bodies[0].size = Vec3(0.09, 0.05, 0.01);
+    scene.bodies[0].anchors.resize(1);
+    scene.bodies[0].anchors[0].kind = Region::Kind::kBox;
+    scene.bodies[0].anchors[0].min = Vec3(-1, -1, -1);
+    scene.bodies[0].anchors[0].max = Vec3(1, 1, 0.0051);
+    scene.bodies[1].name = "above";
+    scene.bodies[1].size = Vec3(0.021, 0.023, 0.012);
+    scene.bodies[1].pose.position = Vec3(0, 0, 0.005 + 0.006 + above);
+    return scene;
+  }
+};
+
+/// Mean place and velocity of a body, and its lowest vertex.
+struct Mean {
+  Vec3 x = Vec3::Zero(), v = Vec3::Zero();
+  double lowest = 1e9, mass = 0;
+};
+
+Mean mean_of(Simulation& simulation, int body) {
+  auto& tissue = static_cast<PbdTissue&>(simulation.tissue());
+  tissue.momentum();  // brings it to the host
+  const pbd::Vertices& v = tissue.state().vertices;
+  Mean m;
+  for (int i = 0; i < v.size(); ++i) {
+    if (v.body[i] != body) continue;
+    m.mass += v.mass[i];
+    m.x += v.mass[i] * v.position(i);
+    m.v += v.mass[i] * v.velocity(i);
+    m.lowest = std::min(m.lowest, v.position(i).z());
+  }
+  m.x /= m.mass;
+  m.v /= m.mass;
+  return m;
+}
+
+TEST_P(Touches, WhatFallsOnAnotherRestsOnIt) {
+  Scene scene = two_boxes(0.5, 0.01);
+  scene.damping = 2;
+  Simulation simulation(scene);
+  const double from = mean_of(simulation, 1).x.z();
+  for (int f = 0; f < 120; ++f) ASSERT_FALSE(simulation.advance_frame().result.blew_up);
+  const Mean above = mean_of(simulation, 1);
+  EXPECT_NEAR(above.x.z(), from - 0.01, 0.0008);
+  EXPECT_NEAR(above.lowest, 0.005, 0.0008);
+  EXPECT_LT(above.v.norm(), 0.005);
+  EXPECT_LT(above.x.head<2>().norm(), 0.002);
+}
+
+TEST_P(Touches, FrictionHoldsUpToItsShareAndSlidesBeyond) {
+  const double slope = 0.35, g = 9.81, seconds = 0.15;  // [rad]
+  for (const double friction : {0.6, 0.15}) {
+    Scene scene = two_boxes(friction, 0);
+    scene.gravity = g * Vec3(std::sin(slope), 0, -std::cos(slope));
+    Simulation simulation(scene);
+    const int frames = static_cast<int>(seconds * scene.frame_rate);
+    for (int f = 0; f < frames; ++f) ASSERT_FALSE(simulation.advance_frame().result.blew_up);
+    const double slid = mean_of(simulation, 1).x.x();
+    const double alone = 0.5 * g * seconds * seconds;
+    const double expected = alone * (std::sin(slope) - friction * std::cos(slope));
+    if (expected < 0) {
+      EXPECT_LT(slid, 0.01 * alone) << friction;
+    } else {
+      EXPECT_NEAR(slid, expected, 0.1 * alone * std::sin(slope)) << friction;
+    }
+  }
+}
+
+TEST_P(Touches, WhatOneGetsTheOtherLoses) {
+  Scene scene = two_boxes(0.5, 0.003);
+  scene.gravity = Vec3::Zero();
+  scene.bodies[0].anchors.clear();
+  Simulation simulation(scene);
+  auto& tissue = static_cast<PbdTissue&>(simulation.tissue());
+  tissue.momentum();
+  pbd::State& s = tissue.state();
+  const double speed = 0.3;
+  double mass = 0;
+  for (int i = 0; i < s.vertices.size(); ++i) {
+    if (s.vertices.body[i] != 1) continue;
+    s.vertices.v[4 * i + 2] = -static_cast<float>(speed);
+    mass += s.vertices.mass[i];
+  }
+  std::vector<std::uint8_t> state = tissue.save();
+  tissue.restore(state);  // to where the motion lives
+  for (int f = 0; f < 30; ++f) ASSERT_FALSE(simulation.advance_frame().result.blew_up);
+  const Momentum after = tissue.momentum();
+  EXPECT_NEAR(after.linear.z() / (-mass * speed), 1, 5e-3);
+  EXPECT_LT(after.linear.head<2>().norm(), 5e-3 * mass * speed);
+  const Mean below = mean_of(simulation, 0), above = mean_of(simulation, 1);
+  EXPECT_LT(below.v.z(), -0.2 * speed * mass / after.mass);  // it was pushed
+  EXPECT_GT(above.v.z(), below.v.z() - 0.02);                // nothing goes through
+}
+
+TEST_P(Touches, AreTheSameBitsRunAfterRun) {
+  std::uint64_t sum[2];
+  for (std::uint64_t& of : sum) {
+    Scene scene = two_boxes(0.3, 0.002);
+    scene.threads = &of == sum ? 1 : 3;
+    Simulation simulation(scene);
+    for (int f = 0; f < 30; ++f) simulation.advance_frame();
+    of = simulation.tissue().checksum();
+  }
+  EXPECT_EQ(sum[0], sum[1]);
+}
+
+INSTANTIATE_TEST_SUITE_P(Each, Touches,
+                         testing::Values(Case{PbdModel::kSurface, Device::kCpu},
+                                         Case{PbdModel::kTetrahedra, Device::kCpu},
+                                         Case{PbdModel::kSurface, Device::kCuda},
+                                         Case{PbdModel::kTetrahedra, Device::kCuda}),
+                         [](const auto& info) {
+                           return std::string(info.param.model == PbdModel::kSurface
+                                                  ? "surface"
+                                                  : "tetrahedra") +
+                                  (info.param.device == Device::kCpu ? "_cpu" : "_cuda");
+                         });
+
+}  // namespace
+}  // namespace tissue_sim

@@ -10,6 +10,7 @@
 #include <filesystem>
 #include <fstream>
 #include <functional>
+#include <initializer_list>
 #include <new>
 #include <sstream>
 #include <stdexcept>
@@ -34,7 +35,7 @@ constexpr char kUsage[] =
   --frames N       of each run, 1/960 s each (40)
   --horizon N      frames ahead that labels are for (8)
   --per-frame N    samples of a frame at most (100)
-  --processes N    that work side by side (all processors)
+  --processes N    that work side by side (all processors; under mpirun, its share of them)
   --converge N     no data: runs each scene with cells 1, 2 .. N times finer, and writes how each
                    comes out into FOLDER/convergence.csv
   --compare FILE   no data: runs each scene plain, with fragment networks, with cells half as large
@@ -42,9 +43,38 @@ constexpr char kUsage[] =
                    is the network's
   --baselines FILE of threshold and logistic regression for that
 Scenes that are in FOLDER are left alone: the same command goes on with what is missing.
+Several machines: `mpirun --host a,b tissue_sim_dataset ...` (Open MPI, MPICH, Slurm's srun) shares
+scenes out by rank; FOLDER is one that all of them see.
 )";
 
+/// Which part of the scenes this process does: what an MPI launcher says in the environment. It
+/// takes no MPI library, for processes have nothing to tell each other.
+struct Rank {
+  int number = 0, of = 1, on_machine = 1;
+};
+
+int from_environment(std::initializer_list<const char*> names, int otherwise) {
+  for (const char* name : names) {
+    if (const char* value = std::getenv(name)) return std::atoi(value);
+  }
+  return otherwise;
+}
+
+Rank launched_rank() {
+  Rank r;
+  r.number = from_environment({"OMPI_COMM_WORLD_RANK", "PMI_RANK", "PMIX_RANK", "SLURM_PROCID"}, 0);
+  r.of = from_environment({"OMPI_COMM_WORLD_SIZE", "PMI_SIZE", "SLURM_NTASKS"}, 1);
+  r.on_machine = from_environment(
+      {"OMPI_COMM_WORLD_LOCAL_SIZE", "MPI_LOCALNRANKS", "SLURM_NTASKS_PER_NODE"}, 1);
+  if (r.number < 0 || r.number >= r.of || r.on_machine < 1) {
+    throw std::invalid_argument("the MPI launcher says rank " + std::to_string(r.number) + " of " +
+                                std::to_string(r.of) + ": it must be below it");
+  }
+  return r;
+}
+
 struct Arguments {
+  Rank rank;
   std::string out, network, baselines;
   std::vector<std::string> kinds = dataset_kinds();
   int scenes = 60, first = 0, processes = 0, converge = 0;
@@ -113,7 +143,11 @@ Arguments read_arguments(int argc, char** argv) {
     }
   }
   if (a.out.empty()) throw std::invalid_argument("--out is missing: a folder for the data");
-  if (a.processes == 0) a.processes = std::max(1u, std::thread::hardware_concurrency());
+  a.rank = launched_rank();
+  if (a.processes == 0) {
+    a.processes =
+        std::max(1, static_cast<int>(std::thread::hardware_concurrency()) / a.rank.on_machine);
+  }
   return a;
 }
 
@@ -151,7 +185,7 @@ void write_scene(const Arguments& a, int index) {
   const DatasetScene scene = make_dataset_scene(a.seed, index, a.kinds);
   const DatasetSamples samples = run_dataset_scene(scene, a.options);
   const std::chrono::duration<double> took = std::chrono::steady_clock::now() - begin;
-  write_npy(path_of(a, index, "_x.npy"), samples.x, kFeatureCount);
+  write_npy(path_of(a, index, "_x.npy"), samples.x, kAllFeatureCount);
   write_npy(path_of(a, index, "_q.npy"), samples.q, 0);
   write_npy(path_of(a, index, "_df.npy"), samples.df, 9);
   write_npy(path_of(a, index, "_plain.npy"), samples.plain, 0);
@@ -187,20 +221,24 @@ void write_outcomes(const Arguments& a, int index, const std::vector<RunKind>& k
   std::fflush(stdout);
 }
 
-/// Calls work(index) for all scenes, each in one of some processes. Returns how many failed.
+/// Calls work(index) for the scenes of this rank, each in one of some processes. Returns how many
+/// failed.
 int share_out(const Arguments& a, const std::function<void(int)>& work) {
   void* shared = mmap(nullptr, sizeof(std::atomic<int>), PROT_READ | PROT_WRITE,
                       MAP_SHARED | MAP_ANONYMOUS, -1, 0);
   if (shared == MAP_FAILED) throw std::runtime_error("no memory that processes share");
   auto* next = new (shared) std::atomic<int>(0);
   int failed = 0, children = 0;
-  for (int i = 0; i < std::min(a.processes, a.scenes); ++i) {
+  const int own = (a.scenes - a.rank.number + a.rank.of - 1) / a.rank.of;
+  if (own <= 0) return 0;
+  for (int i = 0; i < std::min(a.processes, own); ++i) {
     const pid_t child = fork();
     if (child < 0) break;  // fewer do it as well
     ++children;
     if (child > 0) continue;
     int status = 0;
-    for (int scene; (scene = next->fetch_add(1)) < a.scenes;) {
+    for (int i; (i = next->fetch_add(1)) < own;) {
+      const int scene = i * a.rank.of + a.rank.number;
       try {
         work(a.first + scene);
       } catch (const std::exception& e) {
@@ -227,12 +265,17 @@ int run(int argc, char** argv) {
     return share_out(a, [&](int index) { write_scene(a, index); });
   }
   const int failed = share_out(a, [&](int index) { write_outcomes(a, index, kinds); });
-  std::ofstream all(a.out + (a.converge > 0 ? "/convergence.csv" : "/comparison.csv"));
+  // Each rank writes what is there by then; the last to end has all.
+  const std::string table = a.out + (a.converge > 0 ? "/convergence.csv" : "/comparison.csv"),
+                    unfinished = table + "." + std::to_string(a.rank.number) + ".part";
+  std::ofstream all(unfinished);
   all << kOutcomeColumns;
   for (int i = a.first; i < a.first + a.scenes; ++i) {
     std::ifstream part(path_of(a, i, ".csv"));
     if (part.peek() != EOF) all << part.rdbuf();
   }
+  all.close();
+  std::filesystem::rename(unfinished, table);
   return failed;
 }
 

@@ -81,9 +81,11 @@ std::vector<RunKind> compared_runs(const std::string& network, const std::string
     throw std::invalid_argument(baselines + ": is not what scripts/train_fragments --baselines " +
                                 "writes: " + e.what());
   }
-  if (line.size() != kFeatureCount + 1) {
+  const int inputs = static_cast<int>(line.size()) - 1;
+  if (inputs != kFeatureCount && inputs != kAllFeatureCount) {
     throw std::invalid_argument(baselines + ": logistic must be " +
-                                std::to_string(kFeatureCount + 1) + " numbers");
+                                std::to_string(kFeatureCount + 1) + " or " +
+                                std::to_string(kAllFeatureCount + 1) + " numbers");
   }
   const auto stretch = [=](const MpmState& s, std::int32_t p, const float* x) {
     Eigen::Matrix3d F;
@@ -92,8 +94,8 @@ std::vector<RunKind> compared_runs(const std::string& network, const std::string
                                                                                          : 0.0f;
   };
   const auto logistic = [=](const MpmState&, std::int32_t, const float* x) {
-    double sum = line[kFeatureCount];
-    for (int i = 0; i < kFeatureCount; ++i) sum += line[i] * x[i];
+    double sum = line[inputs];
+    for (int i = 0; i < inputs; ++i) sum += line[i] * x[i];
     return static_cast<float>(1 / (1 + std::exp(-sum)));
   };
   return {{"plain", 1, "", {}},

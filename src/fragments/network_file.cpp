@@ -66,18 +66,21 @@ FragmentNetwork::FragmentNetwork(const std::string& path) {
   }
   try {
     const YAML::Node file = YAML::LoadFile(path);
-    if (!file.IsMap() || !file["version"] || file["version"].as<std::string>() != "1") {
-      throw std::invalid_argument("it must be a fragment network of version 1");
+    const std::string version =
+        file.IsMap() && file["version"] ? file["version"].as<std::string>() : "";
+    if (version != "1" && version != "2") {
+      throw std::invalid_argument("it must be a fragment network of version 1 or 2");
     }
+    inputs_ = version == "1" ? kFeatureCount : kAllFeatureCount;
+    const int inputs = inputs_, hidden = hidden_count(inputs);
     Checksum sum;
     const auto read = [&](const std::string& name, int outputs, Layers& layers) {
       const YAML::Node node = file[name];
       if (!node || !node.IsMap()) throw std::invalid_argument(name + " is missing");
       const auto shape = node["shape"].as<std::vector<int>>();
-      if (shape != std::vector<int>{kFeatureCount, kHiddenCount, outputs}) {
-        throw std::invalid_argument(name + " has another shape than " +
-                                    std::to_string(kFeatureCount) + ", " +
-                                    std::to_string(kHiddenCount) + ", " + std::to_string(outputs));
+      if (shape != std::vector<int>{inputs, hidden, outputs}) {
+        throw std::invalid_argument(name + " has another shape than " + std::to_string(inputs) +
+                                    ", " + std::to_string(hidden) + ", " + std::to_string(outputs));
       }
       const auto part = [&](const char* key, int rows, int columns) {
         std::vector<float> values =
@@ -85,9 +88,9 @@ FragmentNetwork::FragmentNetwork(const std::string& path) {
         sum.add(values);
         return transposed(values, rows, columns);
       };
-      layers.hidden_weights = part("hidden_weights", kHiddenCount, kFeatureCount);
-      layers.hidden_biases = part("hidden_biases", kHiddenCount, 1);
-      layers.output_weights = part("output_weights", outputs, kHiddenCount);
+      layers.hidden_weights = part("hidden_weights", hidden, inputs);
+      layers.hidden_biases = part("hidden_biases", hidden, 1);
+      layers.output_weights = part("output_weights", outputs, hidden);
       layers.output_biases = part("output_biases", outputs, 1);
     };
     read("classifier", kClassifierOutputs, classifier_);

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "geometry/mesh.h"
 #include "mpm/fragment_features.h"
 #include "mpm/tear/tear.h"
 
@@ -48,24 +49,35 @@ double standard_normal(std::uint64_t seed, std::uint64_t counter) {
   return std::sqrt(-2 * std::log(u)) * std::cos(6.283185307179586 * v);
 }
 
-std::vector<FragmentChance> forecast_fragments(MpmState& state, const Pieces& pieces,
+std::vector<FragmentChance> forecast_fragments(const MpmState& state, const Pieces& pieces,
+                                               std::vector<StrainedPoint> strained,
                                                const FragmentNetwork& network,
                                                const FragmentClassifier& classifier) {
-  const std::vector<std::int32_t> points = fragment_candidates(state, pieces, kForecastShare);
-  std::vector<FragmentChance> chances(points.size());
+  const FragmentCandidates candidates = fragment_candidates(state, pieces, strained);
+  if (candidates.points.empty()) return {};
+  std::vector<FragmentChance> chances(candidates.points.size());
   const NetworkWeights own = network.classifier(), modifier = network.modifier();
+  const bool all = network.inputs() > kFeatureCount || classifier;
+  const Surroundings around =
+      all ? surroundings_of(state, pieces, std::move(strained)) : Surroundings();
   state.cpu->for_each(
-      static_cast<int>(points.size()),
-      [&](int i) {
-        float x[kFeatureCount];
-        fragment_features(state, points[i], x);
-        FragmentChance& c = chances[i];
-        c.point = points[i];
-        c.probability = classifier ? classifier(state, points[i], x) : fragment_probability(own, x);
+      candidates.groups(),
+      [&](int g) {
+        float x[kAllFeatureCount];
+        const std::int32_t begin = candidates.first[g], end = candidates.first[g + 1];
+        const std::int32_t point = candidates.points[begin];
+        fragment_features(state, point, x);
+        if (all) surrounding_features(state, pieces, around, point, x);
+        FragmentChance& c = chances[begin];
+        c.probability = classifier ? classifier(state, point, x) : fragment_probability(own, x);
         c.time = state.time;
         if (c.is_expected()) expect_deformation(modifier, x, c);
+        for (std::int32_t i = begin + 1; i < end; ++i) chances[i] = c;
+        for (std::int32_t i = begin; i < end; ++i) chances[i].point = candidates.points[i];
       },
-      32);
+      8);
+  std::sort(chances.begin(), chances.end(),
+            [](const FragmentChance& a, const FragmentChance& b) { return a.point < b.point; });
   return chances;
 }
 
@@ -122,8 +134,59 @@ bool draw_deformation(const MpmState& state, const Pieces& pieces, int piece,
   }
   const float limit = least_tear_limit(body);
   if (!F.allFinite()) return false;
-  F = within(F, limit > 0 ? 1 + kForecastShare * (limit - 1) : 2);
+  F = within(F, limit > 0 ? 1 + kCandidateShare * (limit - 1) : 2);
   return true;
+}
+
+Foresight make_foresight(const Scene& scene) {
+  Foresight foresight;
+  if (scene.fragment_network != "off") {
+    foresight.network =
+        std::make_unique<FragmentNetwork>(resolve_path(scene.fragment_network, "fragment network"));
+  }
+  return foresight;
+}
+
+namespace {
+
+std::vector<int> parted_pieces(const FrameResult& frame) {
+  std::vector<int> parted = frame.tear_report.new_fragments;
+  const auto add = [&](const CutReport& report) {
+    parted.insert(parted.end(), report.new_fragments.begin(), report.new_fragments.end());
+  };
+  add(frame.blade_report);
+  for (const CutReport& report : frame.cut_reports) add(report);
+  return parted;
+}
+
+}  // namespace
+
+bool has_parted(const FrameResult& frame) { return !parted_pieces(frame).empty(); }
+
+std::vector<int> let_fly(MpmState& state, const Pieces& pieces, const FrameResult& frame,
+                         Foresight& foresight) {
+  std::vector<int> fly;
+  for (const int id : parted_pieces(frame)) {
+    Eigen::Matrix3d F;
+    if (draw_deformation(state, pieces, id, foresight.said, F) && take_off(state, pieces, id, F)) {
+      fly.push_back(id);
+    }
+  }
+  foresight.flown += static_cast<int>(fly.size());
+  return fly;
+}
+
+void look_ahead(const MpmState& state, const Pieces& pieces, std::vector<StrainedPoint> strained,
+                double duration, Foresight& foresight, FrameResult& result) {
+  foresight.forecast = forecast_fragments(state, pieces, std::move(strained), *foresight.network,
+                                          foresight.classifier);
+  // A piece that comes off in a frame was foreseen at the end of one before, however long it is.
+  const double longest = std::max(foresight.network->horizon(), duration);
+  remember(foresight.forecast, state.time - 1.001 * longest, foresight.said);
+  result.fragment_candidates = static_cast<int>(foresight.forecast.size());
+  result.fragment_points =
+      static_cast<int>(std::count_if(foresight.forecast.begin(), foresight.forecast.end(),
+                                     [](const FragmentChance& c) { return c.is_expected(); }));
 }
 
 }  // namespace tissue_sim

@@ -4,11 +4,14 @@
 #include <Eigen/Core>
 #include <cstdint>
 #include <functional>
+#include <memory>
 #include <vector>
 
 #include "fragments/network_file.h"
 #include "fragments/pieces.h"
+#include "mpm/fragment_features.h"
 #include "mpm/mpm_state.h"
+#include "tissue_sim/tissue.h"
 
 namespace tissue_sim {
 
@@ -23,16 +26,15 @@ struct FragmentChance {
   bool is_expected() const { return probability >= 0.5f; }
 };
 
-/// From this share of the limit's strain on points are looked at.
-inline constexpr double kForecastShare = 0.7;
-
-/// The probability by features x[kFeatureCount] of a point: the network's classifier, or what it is
-/// compared with.
+/// The probability by features x[kAllFeatureCount] of a point: the network's classifier, or what it
+/// is compared with.
 using FragmentClassifier =
     std::function<float(const MpmState& state, std::int32_t point, const float* x)>;
 
 /// Of all points near their limit or beside broken bonds (mpm/fragment_features.h), by number.
-std::vector<FragmentChance> forecast_fragments(MpmState& state, const Pieces& pieces,
+/// `strained` are those from kRegionLevels[0] on, by number; nodes are where they are now.
+std::vector<FragmentChance> forecast_fragments(const MpmState& state, const Pieces& pieces,
+                                               std::vector<StrainedPoint> strained,
                                                const FragmentNetwork& network,
                                                const FragmentClassifier& classifier);
 
@@ -49,6 +51,30 @@ void remember(const std::vector<FragmentChance>& now, double since,
 /// principal stretches are kept within what the material bears.
 bool draw_deformation(const MpmState& state, const Pieces& pieces, int piece,
                       const std::vector<FragmentChance>& said, Eigen::Matrix3d& F);
+
+/// What a tissue knows of its fragments to come.
+struct Foresight {
+  std::unique_ptr<FragmentNetwork> network;  ///< null without one
+  FragmentClassifier classifier;             ///< null for the network's
+  std::vector<FragmentChance> forecast;      ///< at the end of the last frame
+  std::vector<FragmentChance> said;          ///< of each point the last forecast, if not long ago
+  int flown = 0;                             ///< pieces, since the beginning
+};
+
+/// Reads the scene's network, if it has one. Throws what FragmentNetwork() throws.
+Foresight make_foresight(const Scene& scene);
+
+/// Lets those fly of the pieces that came off in a frame which were foreseen. Returns their ids.
+std::vector<int> let_fly(MpmState& state, const Pieces& pieces, const FrameResult& frame,
+                         Foresight& foresight);
+
+/// Whether any piece came off in the frame.
+bool has_parted(const FrameResult& frame);
+
+/// The end of a frame that took so long [s]: what is said of the points that are strained now, and
+/// how many they are.
+void look_ahead(const MpmState& state, const Pieces& pieces, std::vector<StrainedPoint> strained,
+                double duration, Foresight& foresight, FrameResult& result);
 
 /// A number from the standard normal distribution, the same for the same counter.
 double standard_normal(std::uint64_t seed, std::uint64_t counter);

@@ -147,6 +147,7 @@ DatasetSamples run_dataset_scene(const DatasetScene& scene, const DatasetOptions
       samples.blew_up = true;
       break;
     }
+    ++samples.frames;
     const MpmState& s = fine->state();
     const std::vector<std::uint8_t> fragment = fragments_of(*fine, h);
     for (const Waiting& w : of_frame[frame + 1]) {

@@ -28,6 +28,7 @@ struct DatasetSamples {
   std::vector<float> about;         ///< [n, 3]: frame, tear_stretch, cell size [m]
   double coarse_loose = 0, true_loose = 0;  ///< share of the volume that came loose
   int coarse_points = 0, true_points = 0;
+  int frames = 0;        ///< of the truth
   bool blew_up = false;  ///< one of the runs, which ended there
 };
 

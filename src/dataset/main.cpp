@@ -10,7 +10,6 @@
 #include <filesystem>
 #include <fstream>
 #include <functional>
-#include <initializer_list>
 #include <new>
 #include <sstream>
 #include <stdexcept>
@@ -20,6 +19,7 @@
 #include "dataset/dataset_run.h"
 #include "dataset/npy.h"
 #include "dataset/outcome.h"
+#include "dataset/rank.h"
 #include "fragments/features.h"
 
 namespace tissue_sim {
@@ -46,32 +46,6 @@ Scenes that are in FOLDER are left alone: the same command goes on with what is 
 Several machines: `mpirun --host a,b tissue_sim_dataset ...` (Open MPI, MPICH, Slurm's srun) shares
 scenes out by rank; FOLDER is one that all of them see.
 )";
-
-/// Which part of the scenes this process does: what an MPI launcher says in the environment. It
-/// takes no MPI library, for processes have nothing to tell each other.
-struct Rank {
-  int number = 0, of = 1, on_machine = 1;
-};
-
-int from_environment(std::initializer_list<const char*> names, int otherwise) {
-  for (const char* name : names) {
-    if (const char* value = std::getenv(name)) return std::atoi(value);
-  }
-  return otherwise;
-}
-
-Rank launched_rank() {
-  Rank r;
-  r.number = from_environment({"OMPI_COMM_WORLD_RANK", "PMI_RANK", "PMIX_RANK", "SLURM_PROCID"}, 0);
-  r.of = from_environment({"OMPI_COMM_WORLD_SIZE", "PMI_SIZE", "SLURM_NTASKS"}, 1);
-  r.on_machine = from_environment(
-      {"OMPI_COMM_WORLD_LOCAL_SIZE", "MPI_LOCALNRANKS", "SLURM_NTASKS_PER_NODE"}, 1);
-  if (r.number < 0 || r.number >= r.of || r.on_machine < 1) {
-    throw std::invalid_argument("the MPI launcher says rank " + std::to_string(r.number) + " of " +
-                                std::to_string(r.of) + ": it must be below it");
-  }
-  return r;
-}
 
 struct Arguments {
   Rank rank;
@@ -171,8 +145,8 @@ std::string describe(const DatasetScene& d, const DatasetSamples& samples, doubl
       << ", \"viscosity\": " << m.viscosity << ", \"tear_stretch\": " << m.tear_stretch
       << ", \"tear_length\": " << m.tear_length << ", \"speed\": " << d.speed
       << ", \"horizon\": " << horizon << ", \"coarse_points\": " << samples.coarse_points
-      << ", \"true_points\": " << samples.true_points << ", \"samples\": " << samples.q.size()
-      << ", \"coarse_loose\": " << samples.coarse_loose
+      << ", \"true_points\": " << samples.true_points << ", \"frames\": " << samples.frames
+      << ", \"samples\": " << samples.q.size() << ", \"coarse_loose\": " << samples.coarse_loose
       << ", \"true_loose\": " << samples.true_loose
       << ", \"blew_up\": " << (samples.blew_up ? "true" : "false") << ", \"seconds\": " << seconds
       << "}\n";
@@ -229,7 +203,7 @@ int share_out(const Arguments& a, const std::function<void(int)>& work) {
   if (shared == MAP_FAILED) throw std::runtime_error("no memory that processes share");
   auto* next = new (shared) std::atomic<int>(0);
   int failed = 0, children = 0;
-  const int own = (a.scenes - a.rank.number + a.rank.of - 1) / a.rank.of;
+  const int own = count_of(a.rank, a.scenes);
   if (own <= 0) return 0;
   for (int i = 0; i < std::min(a.processes, own); ++i) {
     const pid_t child = fork();
@@ -238,7 +212,7 @@ int share_out(const Arguments& a, const std::function<void(int)>& work) {
     if (child > 0) continue;
     int status = 0;
     for (int i; (i = next->fetch_add(1)) < own;) {
-      const int scene = i * a.rank.of + a.rank.number;
+      const int scene = item_of(a.rank, i);
       try {
         work(a.first + scene);
       } catch (const std::exception& e) {

@@ -58,7 +58,7 @@ bool advance_frame(MpmTissue& tissue, const DatasetScene& scene, int frame, Fram
          tissue.fragment_count() <= kMostPieces;
 }
 
-std::unique_ptr<MpmTissue> begin_run(const DatasetScene& scene, int level) {
+std::unique_ptr<MpmTissue> begin_run(const DatasetScene& scene, double level) {
   auto tissue = std::make_unique<MpmTissue>(finer(scene, level));
   MpmState& s = tissue->state();
   for (const LatticeBody& b : s.bodies) {

@@ -33,7 +33,7 @@ struct DatasetSamples {
 };
 
 /// A tissue of the scene, `level` times finer, that was set going.
-std::unique_ptr<MpmTissue> begin_run(const DatasetScene& scene, int level);
+std::unique_ptr<MpmTissue> begin_run(const DatasetScene& scene, double level);
 
 /// One frame on, with the scene's cuts in the first; false where it blew up or was crushed.
 bool advance_frame(MpmTissue& tissue, const DatasetScene& scene, int frame,

@@ -42,6 +42,8 @@ constexpr char kUsage[] =
                    and as the truth, and writes how each comes out into FOLDER/comparison.csv. FILE
                    is the network's
   --baselines FILE of threshold and logistic regression for that
+  --paper FILE     another network to compare, of the paper's features
+  --equal N        how many times finer cells take as long as the network (1.03)
 Scenes that are in FOLDER are left alone: the same command goes on with what is missing.
 Several machines: `mpirun --host a,b tissue_sim_dataset ...` (Open MPI, MPICH, Slurm's srun) shares
 scenes out by rank; FOLDER is one that all of them see.
@@ -49,7 +51,8 @@ scenes out by rank; FOLDER is one that all of them see.
 
 struct Arguments {
   Rank rank;
-  std::string out, network, baselines;
+  std::string out;
+  ComparedRuns compared;
   std::vector<std::string> kinds = dataset_kinds();
   int scenes = 60, first = 0, processes = 0, converge = 0;
   std::uint64_t seed = 1;
@@ -101,9 +104,16 @@ Arguments read_arguments(int argc, char** argv) {
     } else if (name == "--converge") {
       a.converge = number(2);
     } else if (name == "--compare") {
-      a.network = std::filesystem::absolute(value);
+      a.compared.network = std::filesystem::absolute(value);
     } else if (name == "--baselines") {
-      a.baselines = value;
+      a.compared.baselines = value;
+    } else if (name == "--paper") {
+      a.compared.paper = std::filesystem::absolute(value);
+    } else if (name == "--equal") {
+      a.compared.equal = std::stod(value);
+      if (!(a.compared.equal >= 1 && a.compared.equal <= 4)) {
+        throw std::invalid_argument("--equal is " + value + ": it must be from 1 to 4");
+      }
     } else if (name == "--kinds") {
       a.kinds.clear();
       std::istringstream list(value);
@@ -117,6 +127,7 @@ Arguments read_arguments(int argc, char** argv) {
     }
   }
   if (a.out.empty()) throw std::invalid_argument("--out is missing: a folder for the data");
+  a.compared.level = a.options.level;
   a.rank = launched_rank();
   if (a.processes == 0) {
     a.processes =
@@ -231,10 +242,11 @@ int run(int argc, char** argv) {
   const Arguments a = read_arguments(argc, argv);
   std::filesystem::create_directories(a.out);
   std::vector<RunKind> kinds;
-  if (!a.network.empty()) {
-    kinds = compared_runs(a.network, a.baselines, a.options.level);
+  if (!a.compared.network.empty()) {
+    kinds = compared_runs(a.compared);
   } else if (a.converge > 0) {
-    for (int level = 1; level <= a.converge; ++level) kinds.push_back({"level", level, "", {}});
+    for (int level = 1; level <= a.converge; ++level)
+      kinds.push_back({"level", static_cast<double>(level), "", {}});
   } else {
     return share_out(a, [&](int index) { write_scene(a, index); });
   }

@@ -69,8 +69,8 @@ std::vector<RigidSums> fragment_sums(const MpmTissue& tissue, const MpmState& s,
 
 }  // namespace
 
-std::vector<RunKind> compared_runs(const std::string& network, const std::string& baselines,
-                                   int level) {
+std::vector<RunKind> compared_runs(const ComparedRuns& of) {
+  const std::string& baselines = of.baselines;
   std::vector<double> line;
   double threshold = 0;
   try {
@@ -98,12 +98,15 @@ std::vector<RunKind> compared_runs(const std::string& network, const std::string
     for (int i = 0; i < inputs; ++i) sum += line[i] * x[i];
     return static_cast<float>(1 / (1 + std::exp(-sum)));
   };
-  return {{"plain", 1, "", {}},
-          {"stretch", 1, network, stretch},
-          {"logistic", 1, network, logistic},
-          {"network", 1, network, {}},
-          {"finer", 2, "", {}},
-          {"truth", level, "", {}}};
+  std::vector<RunKind> runs = {{"plain", 1, "", {}},
+                               {"stretch", 1, of.network, stretch},
+                               {"logistic", 1, of.network, logistic}};
+  if (!of.paper.empty()) runs.push_back({"paper", 1, of.paper, {}});
+  runs.push_back({"network", 1, of.network, {}});
+  runs.push_back({"equal", of.equal, "", {}});
+  runs.push_back({"finer", 2, "", {}});
+  runs.push_back({"truth", static_cast<double>(of.level), "", {}});
+  return runs;
 }
 
 Outcome run_outcome(const DatasetScene& scene, const RunKind& kind, int frames) {

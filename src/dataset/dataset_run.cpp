@@ -96,7 +96,8 @@ DatasetSamples run_dataset_scene(const DatasetScene& scene, const DatasetOptions
     if (frame > 0 && frame + options.horizon <= options.frames) {
       std::vector<StrainedPoint> strained = find_strained(s, kRegionLevels[0]);
       const FragmentCandidates found = fragment_candidates(s, coarse->pieces(), strained);
-      const Surroundings around = surroundings_of(s, coarse->pieces(), std::move(strained));
+      const FragmentSurroundings around =
+          fragment_surroundings(s, coarse->pieces(), std::move(strained));
       std::vector<int> groups(found.groups());
       std::iota(groups.begin(), groups.end(), 0);
       for (std::size_t i = 0; i < groups.size(); ++i) {  // the first are drawn evenly from all

@@ -120,8 +120,8 @@ float share_broken(const MpmState& state, const std::int32_t (&own)[8], int neig
 
 }  // namespace
 
-void surrounding_features(const MpmState& state, const Pieces& pieces, const Surroundings& around,
-                          std::int32_t point, float* x) {
+void surrounding_features(const MpmState& state, const Pieces& pieces,
+                          const FragmentSurroundings& around, std::int32_t point, float* x) {
   using namespace surroundings;
   std::fill(x + kFeatureCount, x + kAllFeatureCount, 0.0f);
   const Points::Site& s = state.points.site[point];

@@ -17,8 +17,8 @@ namespace tissue_sim {
 void fragment_features(const MpmState& state, std::int32_t point, float* x);
 
 /// Those of surroundings, behind them: x[kFeatureCount] on. Reads the paper's from x.
-void surrounding_features(const MpmState& state, const Pieces& pieces, const Surroundings& around,
-                          std::int32_t point, float* x);
+void surrounding_features(const MpmState& state, const Pieces& pieces,
+                          const FragmentSurroundings& around, std::int32_t point, float* x);
 
 /// Points that may soon be part of a fragment. Those of one cell that see one field have the same
 /// features: they are one group, and asked for together.

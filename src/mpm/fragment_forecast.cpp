@@ -58,8 +58,8 @@ std::vector<FragmentChance> forecast_fragments(const MpmState& state, const Piec
   std::vector<FragmentChance> chances(candidates.points.size());
   const NetworkWeights own = network.classifier(), modifier = network.modifier();
   const bool all = network.inputs() > kFeatureCount || classifier;
-  const Surroundings around =
-      all ? surroundings_of(state, pieces, std::move(strained)) : Surroundings();
+  const FragmentSurroundings around =
+      all ? fragment_surroundings(state, pieces, std::move(strained)) : FragmentSurroundings();
   state.cpu->for_each(
       candidates.groups(),
       [&](int g) {

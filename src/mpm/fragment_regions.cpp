@@ -135,14 +135,14 @@ const PieceSpread& Division::of(std::int32_t point) const {
   return region[root[after - runs.begin() - 1]];
 }
 
-float Surroundings::excess(std::int32_t point) const {
+float FragmentSurroundings::excess(std::int32_t point) const {
   const StrainedPoint* at = entry(strained, point);
   return at == nullptr ? 0.0f : at->excess;
 }
 
-Surroundings surroundings_of(const MpmState& state, const Pieces& pieces,
-                             std::vector<StrainedPoint> strained) {
-  Surroundings around;
+FragmentSurroundings fragment_surroundings(const MpmState& state, const Pieces& pieces,
+                                           std::vector<StrainedPoint> strained) {
+  FragmentSurroundings around;
   around.strained = std::move(strained);
   around.of_body.resize(state.bodies.size(), 0.0);
   for (const Fragment& f : pieces.all) around.of_body[f.body] += f.volume;

@@ -45,7 +45,7 @@ struct Division {
 inline constexpr int kMovingLevel = 1;
 
 /// What the points of a frame have around them.
-struct Surroundings {
+struct FragmentSurroundings {
   std::vector<StrainedPoint> strained;
   Division levels[kRegionLevelCount];
   std::vector<PieceSpread> pieces;  ///< by Fragment::id
@@ -55,7 +55,7 @@ struct Surroundings {
 };
 
 /// `strained` are those from kRegionLevels[0] on, by number. Works on all levels side by side.
-Surroundings surroundings_of(const MpmState& state, const Pieces& pieces,
-                             std::vector<StrainedPoint> strained);
+FragmentSurroundings fragment_surroundings(const MpmState& state, const Pieces& pieces,
+                                           std::vector<StrainedPoint> strained);
 
 }  // namespace tissue_sim

@@ -156,11 +156,11 @@ TEST(FragmentFeatures, CandidatesAreNearTheirLimitOrStrainedBesideBrokenBonds) {
       const std::int32_t p = beside.points[i];
       const MpmState& s = notched.state();
       EXPECT_NE(s.points.bonds[p], whole_bonds(s.bodies[0], s.points.site[p]));
-      // All of a group see the same.
+      // All of a group see the same, but for what lies across a crack from some of them.
       float one[kFeatureCount], other[kFeatureCount];
       fragment_features(s, beside.points[beside.first[g]], one);
       fragment_features(s, p, other);
-      for (int k = 0; k < kFeaturesOfCell; ++k) EXPECT_EQ(one[k], other[k]);
+      for (int k = 0; k < kFeaturesOfCell; ++k) EXPECT_NEAR(one[k], other[k], 0.02);
     }
   }
 }
@@ -184,8 +184,8 @@ TEST(FragmentFeatures, RegionsHangOnByWhatIsNearItsLimit) {
   stretch_up_to(tissue, 0.012, 0.29);
   MpmState& s = tissue.state();
   const LatticeBody& body = s.bodies[0];
-  const Surroundings around =
-      surroundings_of(s, tissue.pieces(), find_strained(s, kRegionLevels[0]));
+  const FragmentSurroundings around =
+      fragment_surroundings(s, tissue.pieces(), find_strained(s, kRegionLevels[0]));
   const auto features = [&](int x) {
     std::vector<float> f(kAllFeatureCount);
     fragment_features(s, body.point(x, 6, 4), f.data());
@@ -208,7 +208,8 @@ TEST(FragmentFeatures, RegionsHangOnByWhatIsNearItsLimit) {
   EXPECT_EQ(middle[kBrokenInside], 0);
   for (std::size_t n = 0; n < s.nodes.size(); ++n) s.nodes.v[0][n] = 5 * s.nodes.u[0][n];
   std::vector<float> moving(kAllFeatureCount);
-  const Surroundings then = surroundings_of(s, tissue.pieces(), find_strained(s, kRegionLevels[0]));
+  const FragmentSurroundings then =
+      fragment_surroundings(s, tissue.pieces(), find_strained(s, kRegionLevels[0]));
   fragment_features(s, body.point(15, 6, 4), moving.data());
   surrounding_features(s, tissue.pieces(), then, body.point(15, 6, 4), moving.data());
   EXPECT_GT(moving[kParting], 0) << "it leaves the rest behind";
@@ -224,7 +225,7 @@ TEST(FragmentFeatures, CountBrokenBonds) {
   MpmTissue tissue(tearing_box());
   cut_now(tissue, plane_cut(Vec3(0.008, 0.006, 0.004), Vec3(1, 0, 0)));  // between two cells
   const MpmState& s = tissue.state();
-  const Surroundings around = surroundings_of(s, tissue.pieces(), {});
+  const FragmentSurroundings around = fragment_surroundings(s, tissue.pieces(), {});
   std::vector<float> f(kAllFeatureCount);
   fragment_features(s, s.bodies[0].point(8, 6, 4), f.data());
   surrounding_features(s, tissue.pieces(), around, s.bodies[0].point(8, 6, 4), f.data());

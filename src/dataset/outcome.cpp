@@ -72,11 +72,12 @@ std::vector<RigidSums> fragment_sums(const MpmTissue& tissue, const MpmState& s,
 std::vector<RunKind> compared_runs(const ComparedRuns& of) {
   const std::string& baselines = of.baselines;
   std::vector<double> line;
-  double threshold = 0;
+  double threshold = 0, line_threshold = 0.5;
   try {
     const YAML::Node file = YAML::LoadFile(baselines);
     line = file["logistic"].as<std::vector<double>>();
     threshold = file["stretch_threshold"].as<double>();
+    line_threshold = file["logistic_threshold"].as<double>();
   } catch (const YAML::Exception& e) {
     throw std::invalid_argument(baselines + ": is not what scripts/train_fragments --baselines " +
                                 "writes: " + e.what());
@@ -96,7 +97,7 @@ std::vector<RunKind> compared_runs(const ComparedRuns& of) {
   const auto logistic = [=](const MpmState&, std::int32_t, const float* x) {
     double sum = line[inputs];
     for (int i = 0; i < inputs; ++i) sum += line[i] * x[i];
-    return static_cast<float>(1 / (1 + std::exp(-sum)));
+    return 1 / (1 + std::exp(-sum)) >= line_threshold ? 1.0f : 0.0f;
   };
   std::vector<RunKind> runs = {{"plain", 1, "", {}},
                                {"stretch", 1, of.network, stretch},

@@ -97,6 +97,10 @@ FragmentNetwork::FragmentNetwork(const std::string& path) {
     read("modifier", kModifierOutputs, modifier_);
     horizon_ = file["horizon"].as<double>();
     if (!(horizon_ > 0)) throw std::invalid_argument("horizon must be above 0");
+    if (file["threshold"]) threshold_ = file["threshold"].as<double>();
+    if (!(threshold_ > 0 && threshold_ < 1)) {
+      throw std::invalid_argument("threshold must be above 0 and below 1");
+    }
     const auto said = file["checksum"].as<std::string>();
     if (said != sum.text()) {
       throw std::invalid_argument("its numbers have the checksum " + sum.text() + ", not " + said +

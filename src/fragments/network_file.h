@@ -23,6 +23,9 @@ class FragmentNetwork {
   int inputs() const { return inputs_; }
   /// How far ahead it looks [s].
   double horizon() const { return horizon_; }
+  /// Probability from which on a point is expected to be part of a fragment; half unless the file
+  /// says so, for fragments are rare.
+  double threshold() const { return threshold_; }
 
  private:
   struct Layers {
@@ -35,7 +38,7 @@ class FragmentNetwork {
 
   Layers classifier_, modifier_;
   int inputs_ = kFeatureCount;
-  double horizon_ = 0;
+  double horizon_ = 0, threshold_ = 0.5;
 };
 
 }  // namespace tissue_sim

@@ -57,6 +57,7 @@ std::vector<FragmentChance> forecast_fragments(const MpmState& state, const Piec
   if (candidates.points.empty()) return {};
   std::vector<FragmentChance> chances(candidates.points.size());
   const NetworkWeights own = network.classifier(), modifier = network.modifier();
+  const auto threshold = static_cast<float>(network.threshold());
   const bool all = network.inputs() > kFeatureCount || classifier;
   const FragmentSurroundings around =
       all ? fragment_surroundings(state, pieces, std::move(strained)) : FragmentSurroundings();
@@ -71,7 +72,8 @@ std::vector<FragmentChance> forecast_fragments(const MpmState& state, const Piec
         FragmentChance& c = chances[begin];
         c.probability = classifier ? classifier(state, point, x) : fragment_probability(own, x);
         c.time = state.time;
-        if (c.is_expected()) expect_deformation(modifier, x, c);
+        c.expected = c.probability >= (classifier ? 0.5f : threshold);
+        if (c.expected) expect_deformation(modifier, x, c);
         for (std::int32_t i = begin + 1; i < end; ++i) chances[i] = c;
         for (std::int32_t i = begin; i < end; ++i) chances[i].point = candidates.points[i];
       },
@@ -112,20 +114,18 @@ bool draw_deformation(const MpmState& state, const Pieces& pieces, int piece,
   const double cell = body.cell_size * body.cell_size * body.cell_size;
   if (own->volume < 0.5 * cell || own->volume > 0.4 * of_body) return false;
   int looked_at = 0, expected = 0;
-  double probability = 0;
   Eigen::Matrix3d mean = Eigen::Matrix3d::Zero(), deviation = mean;
   for (const FragmentChance& c : said) {
     if (pieces.of_point[c.point] != piece) continue;
     ++looked_at;
-    probability += c.probability;
-    if (!c.is_expected()) continue;
+    if (!c.expected) continue;
     ++expected;
     for (int i = 0; i < 9; ++i) {
       mean(i / 3, i % 3) += c.F[i];
       deviation(i / 3, i % 3) += c.deviation[i];
     }
   }
-  if (expected == 0 || probability < 0.5 * looked_at) return false;
+  if (expected == 0 || 2 * expected < looked_at) return false;
   for (int i = 0; i < 9; ++i) {
     const auto counter = static_cast<std::uint64_t>(piece) * 9 + i;
     F(i / 3, i % 3) = (mean(i / 3, i % 3) +
@@ -186,7 +186,7 @@ void look_ahead(const MpmState& state, const Pieces& pieces, std::vector<Straine
   result.fragment_candidates = static_cast<int>(foresight.forecast.size());
   result.fragment_points =
       static_cast<int>(std::count_if(foresight.forecast.begin(), foresight.forecast.end(),
-                                     [](const FragmentChance& c) { return c.is_expected(); }));
+                                     [](const FragmentChance& c) { return c.expected; }));
 }
 
 }  // namespace tissue_sim

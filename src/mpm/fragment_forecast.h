@@ -23,11 +23,11 @@ struct FragmentChance {
   /// What its cell's deformation gradient will be then, row by row: mean and standard deviation of
   /// each component; 0 where it is not expected to be part of one.
   float F[9] = {}, deviation[9] = {};
-  bool is_expected() const { return probability >= 0.5f; }
+  bool expected = false;  ///< it reaches FragmentNetwork::threshold(), or half where another says
 };
 
-/// The probability by features x[kAllFeatureCount] of a point: the network's classifier, or what it
-/// is compared with.
+/// The probability, from half on a fragment, by features x[kAllFeatureCount] of a point: the
+/// network's classifier, or what it is compared with.
 using FragmentClassifier =
     std::function<float(const MpmState& state, std::int32_t point, const float* x)>;
 
@@ -44,9 +44,9 @@ void remember(const std::vector<FragmentChance>& now, double since,
               std::vector<FragmentChance>& before);
 
 /// Whether a piece that has come off is a fragment (loose, half a cell to 0.4 of its body) that
-/// was foreseen: points of it were looked at, and it was more probable than not, on average. `F` is
-/// then drawn from what was said of those expected to be part of one: the mean over them, and one
-/// draw of a normal distribution for each component (what is wrong for one point is for its
+/// was foreseen: of its points that were looked at half or more were expected to be part of one.
+/// `F` is then drawn from what was said of those expected to be part of one: the mean over them,
+/// and one draw of a normal distribution for each component (what is wrong for one point is for its
 /// neighbours), by a counter-based generator from the scene's seed and the piece's id. Its
 /// principal stretches are kept within what the material bears.
 bool draw_deformation(const MpmState& state, const Pieces& pieces, int piece,

@@ -167,7 +167,7 @@ void fields(Archive& archive, SubstepChoice& x) {
 
 template <class Archive>
 void fields(Archive& archive, FragmentChance& c) {
-  archive(c.point, c.time, c.probability, c.F, c.deviation);
+  archive(c.point, c.time, c.probability, c.F, c.deviation, c.expected);
 }
 
 /// All but contact of tissue with tissue: mpm/contact/face_fields.h.

@@ -158,6 +158,25 @@ bool take_off(MpmState& state, const Pieces& pieces, int piece, const Eigen::Mat
   return true;
 }
 
+bool touches_anything(const MpmState& state, const Pieces& pieces, int piece) {
+  FragmentFlight f;
+  find_nodes(state, pieces, piece, f);
+  const auto is_own = [&](std::int32_t node) {
+    return std::binary_search(f.nodes.begin(), f.nodes.end(), node);
+  };
+  for (const std::int32_t i : state.faces.active) {
+    const FaceContact& c = state.faces.all[i];
+    if (c.other < 0 || !c.touching) continue;
+    if (is_own(c.nodes.row(1, 1)[1]) != is_own(c.other_nodes.row(1, 1)[1])) return true;
+  }
+  for (const std::vector<Touch>& of_block : state.contacts.touching) {
+    for (const Touch& t : of_block) {
+      if (pieces.of_point[t.point] == piece) return true;
+    }
+  }
+  return false;
+}
+
 void fly(MpmState& state, const NodeStep& step) {
   if (state.flights.empty()) return;
   land(state, touching(state));

@@ -36,6 +36,9 @@ struct FragmentFlight {
 /// the piece is held or where it does not move by finite numbers.
 bool take_off(MpmState& state, const Pieces& pieces, int piece, const Eigen::Matrix3d& F);
 
+/// Whether a piece touches another one, the ground or a tool, as of the last substep.
+bool touches_anything(const MpmState& state, const Pieces& pieces, int piece);
+
 /// After a substep: pieces that touch something are part of the physics again, the others move on.
 void fly(MpmState& state, const NodeStep& step);
 

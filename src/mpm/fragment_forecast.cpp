@@ -161,17 +161,33 @@ std::vector<int> parted_pieces(const FrameResult& frame) {
 
 }  // namespace
 
-bool has_parted(const FrameResult& frame) { return !parted_pieces(frame).empty(); }
+bool may_fly(const FrameResult& frame, const Foresight& foresight) {
+  return !foresight.waiting.empty() || !parted_pieces(frame).empty();
+}
 
 std::vector<int> let_fly(MpmState& state, const Pieces& pieces, const FrameResult& frame,
-                         Foresight& foresight) {
+                         double duration, Foresight& foresight) {
   std::vector<int> fly;
-  for (const int id : parted_pieces(frame)) {
-    Eigen::Matrix3d F;
-    if (draw_deformation(state, pieces, id, foresight.said, F) && take_off(state, pieces, id, F)) {
-      fly.push_back(id);
+  std::vector<WaitingFragment> left;
+  for (const WaitingFragment& w : foresight.waiting) {
+    if (touches_anything(state, pieces, w.piece)) {
+      if (state.time < w.until) left.push_back(w);
+      continue;
     }
+    Eigen::Matrix3d F;
+    for (int i = 0; i < 9; ++i) F(i / 3, i % 3) = w.F[i];
+    if (take_off(state, pieces, w.piece, F)) fly.push_back(w.piece);
   }
+  for (const int id : parted_pieces(frame)) {  // what they touch is not known before the next frame
+    Eigen::Matrix3d F;
+    if (!draw_deformation(state, pieces, id, foresight.said, F)) continue;
+    WaitingFragment w;
+    w.piece = id;
+    w.until = state.time + std::max(foresight.network->horizon(), 1.5 * duration);
+    for (int i = 0; i < 9; ++i) w.F[i] = F(i / 3, i % 3);
+    left.push_back(w);
+  }
+  foresight.waiting = std::move(left);
   foresight.flown += static_cast<int>(fly.size());
   return fly;
 }

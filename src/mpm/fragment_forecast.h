@@ -52,24 +52,35 @@ void remember(const std::vector<FragmentChance>& now, double since,
 bool draw_deformation(const MpmState& state, const Pieces& pieces, int piece,
                       const std::vector<FragmentChance>& said, Eigen::Matrix3d& F);
 
+/// A foreseen piece that came off, and the deformation that it takes when it flies.
+struct WaitingFragment {
+  int piece = -1;    ///< Fragment::id
+  double until = 0;  ///< when it is forgotten [s]
+  double F[9] = {};
+};
+
 /// What a tissue knows of its fragments to come.
 struct Foresight {
   std::unique_ptr<FragmentNetwork> network;  ///< null without one
   FragmentClassifier classifier;             ///< null for the network's
   std::vector<FragmentChance> forecast;      ///< at the end of the last frame
   std::vector<FragmentChance> said;          ///< of each point the last forecast, if not long ago
+  std::vector<WaitingFragment> waiting;      ///< pieces that still touch what they came off
   int flown = 0;                             ///< pieces, since the beginning
 };
 
 /// Reads the scene's network, if it has one. Throws what FragmentNetwork() throws.
 Foresight make_foresight(const Scene& scene);
 
-/// Lets those fly of the pieces that came off in a frame which were foreseen. Returns their ids.
+/// At the end of a frame that took so long [s]: lets those fly of the pieces which came off and
+/// were foreseen, from the end of the first frame after that one on at which they touch nothing
+/// (the faces of a crack part but slowly), if that comes within the network's horizon. Returns
+/// their ids.
 std::vector<int> let_fly(MpmState& state, const Pieces& pieces, const FrameResult& frame,
-                         Foresight& foresight);
+                         double duration, Foresight& foresight);
 
-/// Whether any piece came off in the frame.
-bool has_parted(const FrameResult& frame);
+/// Whether let_fly() has anything to look at.
+bool may_fly(const FrameResult& frame, const Foresight& foresight);
 
 /// The end of a frame that took so long [s]: what is said of the points that are strained now, and
 /// how many they are.

@@ -170,6 +170,11 @@ void fields(Archive& archive, FragmentChance& c) {
   archive(c.point, c.time, c.probability, c.F, c.deviation, c.expected);
 }
 
+template <class Archive>
+void fields(Archive& archive, WaitingFragment& w) {
+  archive(w.piece, w.until, w.F);
+}
+
 /// All but contact of tissue with tissue: mpm/contact/face_fields.h.
 template <class Archive>
 void tissue_fields(Archive& archive, MpmState& s) {

@@ -255,12 +255,13 @@ FrameResult MpmTissue::finish() {
   result_.blew_up = result_.blew_up || !(result_.max_speed < 300);
   if (tame()) measure_and_follow();
   if (foresight_.network != nullptr && !result_.blew_up) {
-    if (!let_fly(*state_, pieces_, result_, foresight_).empty()) {
+    const double duration = frame_ ? frame_->duration : 0.0;
+    if (!let_fly(*state_, pieces_, result_, duration, foresight_).empty()) {
       measure_motion(*state_);
       measure_and_follow();
     }
-    look_ahead(*state_, pieces_, find_strained(*state_, kRegionLevels[0]),
-               frame_ ? frame_->duration : 0.0, foresight_, result_);
+    look_ahead(*state_, pieces_, find_strained(*state_, kRegionLevels[0]), duration, foresight_,
+               result_);
   }
   measured_ = pieces_measured_ = false;
   return result_;

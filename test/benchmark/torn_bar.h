@@ -37,7 +37,7 @@ inline Scene torn_bar(int points, int threads) {
   return scene;
 }
 
-/// Twelve frames from when it gets going, as fast as tears it in two,, again and again; `push`
+/// Twelve frames from when it gets going, as fast as tears it in two, again and again; `push`
 /// brings what was done to the tissue's state to where it lives.
 template <class AnyTissue, class Push>
 void run_torn_bar(benchmark::State& bench, Scene scene, bool network, const Push& push) {

@@ -51,7 +51,7 @@ std::vector<float> at_rest() {
 
 TEST(ShippedNetwork, ExpectsNothingOfTissueAtRest) {
   const FragmentNetwork network(kShipped);
-  EXPECT_LT(fragment_probability(network.classifier(), at_rest().data()), 0.2f);
+  EXPECT_LT(fragment_probability(network.classifier(), at_rest().data()), network.threshold());
 }
 
 }  // namespace

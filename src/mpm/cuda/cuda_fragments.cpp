@@ -13,9 +13,11 @@ void CudaMpmTissue::foresee() {
   MpmState& s = *state_;
   std::vector<StrainedPoint> strained =
       strained_of(s, list_stretched(kRegionLevels[0]), kRegionLevels[0]);
-  if (!strained.empty() || !s.flights.empty() || has_parted(result_)) pull_nodes();
+  const bool flights = may_fly(result_, foresight_);
+  if (!strained.empty() || !s.flights.empty() || flights) pull_nodes();
+  if (flights) pull_contacts();
   std::vector<std::int32_t> moved = fly_frame(s, duration_, result_.substeps);
-  const std::vector<int> fly = let_fly(s, pieces_, result_, foresight_);
+  const std::vector<int> fly = let_fly(s, pieces_, result_, duration_, foresight_);
   for (const FragmentFlight& f : s.flights) {
     if (std::find(fly.begin(), fly.end(), f.piece) == fly.end()) continue;
     moved.insert(moved.end(), f.nodes.begin(), f.nodes.end());

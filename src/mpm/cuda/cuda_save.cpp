@@ -59,7 +59,7 @@ void CudaMpmTissue::each_field(Archive& archive, StateOnHost& of_device) {
   archive.part("pieces", pieces_, pieces_measured_);
   archive.part("substeps", stiffening_, modulus_, substep_);
   archive.part("shape", d.shape, d.cut_shape);
-  archive.part("forecast", foresight_.said, foresight_.flown);
+  archive.part("forecast", foresight_.said, foresight_.waiting, foresight_.flown);
   each_part(archive, of_device);
 }
 

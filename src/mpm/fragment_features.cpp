@@ -178,6 +178,7 @@ void surrounding_features(const MpmState& state, const Pieces& pieces,
       std::sqrt(std::max(0.0, from_centre.dot(piece.covariance.ldlt().solve(from_centre)))));
   const PieceSpread& region = around.levels[kMovingLevel].of(point);
   const double c = wave_speed(body.material_of(state.points, point)) * bears;
+  if (region.moving == 0 || piece.moving == 0) return;
   const Vec3 relative = region.velocity - piece.velocity;
   x[kSpeed] = static_cast<float>(relative.norm() / c);
   // Reference space is the world turned by F, about.

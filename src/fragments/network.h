@@ -24,6 +24,7 @@ inline constexpr int kModifierOutputs = 18;
 /// to all outputs side by side.
 struct NetworkWeights {
   int inputs;  ///< kFeatureCount, or kAllFeatureCount; there are 1.5 times as many hidden
+  int first;   ///< of them that has a weight at all
   const float* hidden_weights;  ///< [inputs][hidden]
   const float* hidden_biases;   ///< [hidden]
   const float* output_weights;  ///< [hidden][outputs]
@@ -56,7 +57,7 @@ TISSUE_SIM_INLINE void run_network(const NetworkWeights& w, const float* x,
   const int count = hidden_count(w.inputs);
   float hidden[kMostHidden];
   for (int h = 0; h < count; ++h) hidden[h] = w.hidden_biases[h];
-  for (int i = 0; i < w.inputs; ++i) {
+  for (int i = w.first; i < w.inputs; ++i) {
     const float* weights = w.hidden_weights + i * count;
     for (int h = 0; h < count; ++h) hidden[h] += x[i] * weights[h];
   }

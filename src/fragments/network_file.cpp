@@ -2,6 +2,7 @@
 
 #include <yaml-cpp/yaml.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <cstdio>
@@ -89,6 +90,9 @@ FragmentNetwork::FragmentNetwork(const std::string& path) {
         return transposed(values, rows, columns);
       };
       layers.hidden_weights = part("hidden_weights", hidden, inputs);
+      const auto used = std::find_if(layers.hidden_weights.begin(), layers.hidden_weights.end(),
+                                     [](float w) { return w != 0; });
+      layers.first = static_cast<int>(used - layers.hidden_weights.begin()) / hidden;
       layers.hidden_biases = part("hidden_biases", hidden, 1);
       layers.output_weights = part("output_weights", outputs, hidden);
       layers.output_biases = part("output_biases", outputs, 1);

@@ -30,8 +30,13 @@ class FragmentNetwork {
  private:
   struct Layers {
     std::vector<float> hidden_weights, hidden_biases, output_weights, output_biases;
+    int first = 0;
     NetworkWeights view(int inputs) const {
-      return {inputs, hidden_weights.data(), hidden_biases.data(), output_weights.data(),
+      return {inputs,
+              first,
+              hidden_weights.data(),
+              hidden_biases.data(),
+              output_weights.data(),
               output_biases.data()};
     }
   };

@@ -14,16 +14,23 @@ namespace {
 /// is half.
 constexpr double kAcross = 0.25;
 
-const StrainedPoint* entry(const std::vector<StrainedPoint>& strained, std::int32_t point) {
-  const auto at =
-      std::lower_bound(strained.begin(), strained.end(), point,
-                       [](const StrainedPoint& s, std::int32_t p) { return s.point < p; });
-  return at != strained.end() && at->point == point ? &*at : nullptr;
-}
+/// Strained points by number, for others to be looked up: 0 where they are not strained.
+struct StrainOfPoints {
+  std::vector<float> excess;
+  std::vector<std::uint8_t> across;
+  StrainOfPoints(std::size_t count, const std::vector<StrainedPoint>& strained)
+      : excess(count, 0.0f), across(count, 0) {
+    for (const StrainedPoint& s : strained) {
+      excess[s.point] = s.excess;
+      across[s.point] = s.across;
+    }
+  }
+};
 
 /// Bonds without those that lead across cracks which may open: both ends are strained by `level`.
 std::vector<std::uint8_t> bonds_at(const MpmState& state,
-                                   const std::vector<StrainedPoint>& strained, float level) {
+                                   const std::vector<StrainedPoint>& strained,
+                                   const StrainOfPoints& of, float level) {
   std::vector<std::uint8_t> bonds(state.points.bonds.begin(), state.points.bonds.end());
   for (const StrainedPoint& s : strained) {
     if (s.excess < level) continue;
@@ -31,10 +38,10 @@ std::vector<std::uint8_t> bonds_at(const MpmState& state,
     for (int axis = 0; axis < 3; ++axis) {
       const int k = kForwardBond + axis;
       if ((bonds[s.point] >> k & 1) == 0) continue;
-      const std::int32_t q = state.bodies[site.body].next_point(site, axis);
-      const StrainedPoint* other = entry(strained, q);
-      if (other == nullptr || other->excess < level) continue;
-      if (((s.across | other->across) >> axis & 1) != 0) break_bond(k, bonds[s.point], bonds[q]);
+      const std::int32_t q = axis == 0 ? s.point + 1  // numbered along x
+                                       : state.bodies[site.body].next_point(site, axis);
+      if (of.excess[q] < level) continue;
+      if (((s.across | of.across[q]) >> axis & 1) != 0) break_bond(k, bonds[s.point], bonds[q]);
     }
   }
   return bonds;
@@ -137,15 +144,11 @@ const PieceSpread& Division::of(std::int32_t point) const {
   return region[root[after - runs.begin() - 1]];
 }
 
-float FragmentSurroundings::excess(std::int32_t point) const {
-  const StrainedPoint* at = entry(strained, point);
-  return at == nullptr ? 0.0f : at->excess;
-}
-
 FragmentSurroundings fragment_surroundings(const MpmState& state, const Pieces& pieces,
                                            std::vector<StrainedPoint> strained) {
   FragmentSurroundings around;
   around.strained = std::move(strained);
+  const StrainOfPoints of_points(state.points.size(), around.strained);
   around.of_body.resize(state.bodies.size(), 0.0);
   for (const Fragment& f : pieces.all) around.of_body[f.body] += f.volume;
   state.cpu->for_each(
@@ -153,7 +156,8 @@ FragmentSurroundings fragment_surroundings(const MpmState& state, const Pieces& 
       [&](int i) {
         if (i < kRegionLevelCount) {
           around.levels[i] =
-              divide(state, bonds_at(state, around.strained, kRegionLevels[i]), i == kMovingLevel);
+              divide(state, bonds_at(state, around.strained, of_points, kRegionLevels[i]),
+                     i == kMovingLevel);
           return;
         }
         around.pieces.resize(pieces.next_id);

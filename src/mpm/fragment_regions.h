@@ -50,8 +50,6 @@ struct FragmentSurroundings {
   Division levels[kRegionLevelCount];
   std::vector<PieceSpread> pieces;  ///< by Fragment::id
   std::vector<double> of_body;      ///< volume [m^3]
-  /// The strain of a point over its limit's, 0 where it is not among `strained`.
-  float excess(std::int32_t point) const;
 };
 
 /// `strained` are those from kRegionLevels[0] on, by number. Works on all levels side by side.

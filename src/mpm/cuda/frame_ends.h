@@ -15,7 +15,8 @@ void launch_measure(const CudaTables& tables, const CudaNodes& state, int max_sl
                     CudaMeasure* measures, cudaStream_t stream);
 
 /// Lists the points whose largest strain reaches `share` of that at the tear_stretch of their body,
-/// in any order, into `found`, which has room for so many; `count`, one number, becomes how many they are.
+/// in any order, into `found`, which has room for so many; `count`, one number, becomes how many
+/// they are.
 void launch_stretched(const CudaTables& tables, const CudaNodes& state, int max_slots, float share,
                       StretchedPoint* found, int room, int* count, cudaStream_t stream);
 

@@ -60,15 +60,6 @@ std::unique_ptr<Tissue> make_tissue(const Scene& scene) {
                                   [&](const Makers& m) { return m.method == scene.method; });
   if (of == std::end(kMakers)) throw std::invalid_argument("method is not in this build");
   Notes notes;
-  if (scene.fragment_network != "off" && scene.device != Device::kCpu) {
-    if (scene.device == Device::kCuda) {
-      throw std::runtime_error(
-          "device is cuda, but the fragment network runs on the CPU alone: set device to auto or "
-          "cpu, or fragment_network to off");
-    }
-    if (of->on_gpu != nullptr) notes.push_back("runs on the CPU: the fragment network does");
-    return of->on_cpu(scene, notes);
-  }
   if (scene.device == Device::kCpu) return of->on_cpu(scene, notes);
   if (of->on_gpu == nullptr) {
     if (scene.device == Device::kAuto) return of->on_cpu(scene, notes);

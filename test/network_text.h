@@ -9,10 +9,12 @@
 
 namespace tissue_sim {
 
-/// The k-th number of the file is ((7919 k) mod 1000 - 500) / 5000.
-inline std::string network_text() {
-  std::string text =
-      "version: 1\nhorizon: 0.0083333333\nchecksum: 8eece9c969fa1ab1\n";  // NumPy's, of the same
+/// The k-th number of the file is ((7919 k) mod 1000 - 500) / 5000. Version 2 takes all features.
+inline std::string network_text(int version = 1) {
+  const int inputs = version == 1 ? kFeatureCount : kAllFeatureCount, hidden = hidden_count(inputs);
+  std::string text = "version: " + std::to_string(version) +
+                     "\nhorizon: 0.0083333333\nchecksum: " +  // NumPy's, of the same
+                     (version == 1 ? "8eece9c969fa1ab1" : "f4b25d4f627fae7d") + "\n";
   std::int64_t k = 0;
   const auto numbers = [&](const char* name, int count) {
     text += std::string("  ") + name + ": [\n    ";
@@ -25,11 +27,11 @@ inline std::string network_text() {
     text += "]\n";
   };
   const auto network = [&](const char* name, int outputs) {
-    text += std::string(name) + ":\n  shape: [" + std::to_string(kFeatureCount) + ", " +
-            std::to_string(kHiddenCount) + ", " + std::to_string(outputs) + "]\n";
-    numbers("hidden_weights", kHiddenCount * kFeatureCount);
-    numbers("hidden_biases", kHiddenCount);
-    numbers("output_weights", outputs * kHiddenCount);
+    text += std::string(name) + ":\n  shape: [" + std::to_string(inputs) + ", " +
+            std::to_string(hidden) + ", " + std::to_string(outputs) + "]\n";
+    numbers("hidden_weights", hidden * inputs);
+    numbers("hidden_biases", hidden);
+    numbers("output_weights", outputs * hidden);
     numbers("output_biases", outputs);
   };
   network("classifier", kClassifierOutputs);

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 #include <random>
 
 #include "mpm/fragment_features.h"
@@ -41,8 +42,8 @@ std::vector<std::vector<std::int32_t>> children(const MpmState& coarse, const Mp
 
 /// A sample that waits for its label.
 struct Waiting {
-  std::int32_t point;
-  int row;  ///< in the samples
+  std::vector<std::int32_t> points;  ///< of one cell
+  int row;                           ///< in the samples
 };
 
 }  // namespace
@@ -57,7 +58,7 @@ bool advance_frame(MpmTissue& tissue, const DatasetScene& scene, int frame, Fram
          tissue.fragment_count() <= kMostPieces;
 }
 
-std::unique_ptr<MpmTissue> begin_run(const DatasetScene& scene, int level) {
+std::unique_ptr<MpmTissue> begin_run(const DatasetScene& scene, double level) {
   auto tissue = std::make_unique<MpmTissue>(finer(scene, level));
   MpmState& s = tissue->state();
   for (const LatticeBody& b : s.bodies) {
@@ -93,23 +94,33 @@ DatasetSamples run_dataset_scene(const DatasetScene& scene, const DatasetOptions
   for (int frame = 0; frame < options.frames; ++frame, ++frames) {
     MpmState& s = coarse->state();
     if (frame > 0 && frame + options.horizon <= options.frames) {
-      std::vector<std::int32_t> points = fragment_candidates(s, coarse->pieces(), options.share);
-      for (std::size_t i = 0; i < points.size(); ++i) {  // the first are drawn evenly from all
+      std::vector<StrainedPoint> strained = find_strained(s, kRegionLevels[0]);
+      const FragmentCandidates found = fragment_candidates(s, coarse->pieces(), strained);
+      const FragmentSurroundings around =
+          fragment_surroundings(s, coarse->pieces(), std::move(strained));
+      std::vector<int> groups(found.groups());
+      std::iota(groups.begin(), groups.end(), 0);
+      for (std::size_t i = 0; i < groups.size(); ++i) {  // the first are drawn evenly from all
         if (static_cast<int>(i) == options.per_frame) break;
-        std::swap(points[i], points[i + random() % (points.size() - i)]);
+        std::swap(groups[i], groups[i + random() % (groups.size() - i)]);
       }
-      points.resize(std::min<std::size_t>(points.size(), options.per_frame));
-      std::sort(points.begin(), points.end());
-      for (const std::int32_t p : points) {
-        const int row = static_cast<int>(samples.x.size()) / kFeatureCount;
-        samples.x.resize(samples.x.size() + kFeatureCount);
-        fragment_features(s, p, &samples.x[static_cast<std::size_t>(row) * kFeatureCount]);
+      groups.resize(std::min<std::size_t>(groups.size(), options.per_frame));
+      std::sort(groups.begin(), groups.end());
+      for (const int g : groups) {
+        const int row = static_cast<int>(samples.x.size()) / kAllFeatureCount;
+        samples.x.resize(samples.x.size() + kAllFeatureCount);
+        float* x = &samples.x[static_cast<std::size_t>(row) * kAllFeatureCount];
+        const std::int32_t point = found.points[found.first[g]];
+        fragment_features(s, point, x);
+        surrounding_features(s, coarse->pieces(), around, point, x);
         const auto limit = static_cast<float>(scene.scene.materials[0].tear_stretch);
         samples.about.insert(samples.about.end(),
                              {static_cast<float>(frame), limit, static_cast<float>(h)});
-        of_frame[frame + options.horizon].push_back({p, row});
+        of_frame[frame + options.horizon].push_back(
+            {{found.points.begin() + found.first[g], found.points.begin() + found.first[g + 1]},
+             row});
       }
-      samples.plain.resize(samples.x.size() / kFeatureCount, 0);
+      samples.plain.resize(samples.x.size() / kAllFeatureCount, 0);
     }
     if (!advance_frame(*coarse, scene, frame)) {
       samples.blew_up = true;
@@ -117,7 +128,9 @@ DatasetSamples run_dataset_scene(const DatasetScene& scene, const DatasetOptions
     }
     const std::vector<std::uint8_t> fragment = fragments_of(*coarse, h);
     for (const Waiting& w : of_frame[frame + 1]) {
-      samples.plain[w.row] = fragment[coarse->fragment_of(w.point)];
+      std::size_t loose = 0;
+      for (const std::int32_t p : w.points) loose += fragment[coarse->fragment_of(p)];
+      samples.plain[w.row] = 2 * loose >= w.points.size();
     }
   }
   samples.coarse_loose = loose_share(*coarse, h);
@@ -126,7 +139,7 @@ DatasetSamples run_dataset_scene(const DatasetScene& scene, const DatasetOptions
   const auto fine = begin_run(scene, options.level);
   samples.true_points = fine->point_count();
   const auto within = children(coarse->state(), fine->state());
-  const std::size_t rows = samples.x.size() / kFeatureCount;
+  const std::size_t rows = samples.x.size() / kAllFeatureCount;
   samples.q.resize(rows, 0);
   samples.df.resize(9 * rows, 0);
   std::size_t known = 0;  // rows come in order of time
@@ -135,29 +148,33 @@ DatasetSamples run_dataset_scene(const DatasetScene& scene, const DatasetOptions
       samples.blew_up = true;
       break;
     }
+    ++samples.frames;
     const MpmState& s = fine->state();
     const std::vector<std::uint8_t> fragment = fragments_of(*fine, h);
     for (const Waiting& w : of_frame[frame + 1]) {
       double volume = 0, loose = 0;
       Eigen::Matrix3d F = Eigen::Matrix3d::Zero();
-      for (const std::int32_t p : within[w.point]) {
-        const Points::Site& site = s.points.site[p];
-        const double own = s.points.volume[p];
-        volume += own;
-        if (fragment[fine->fragment_of(p)] != 0) loose += own;
-        F += own * deformation_gradient(s.bodies[site.body], site, *s.fields, s.nodes);
+      for (const std::int32_t coarse_point : w.points) {
+        for (const std::int32_t p : within[coarse_point]) {
+          const Points::Site& site = s.points.site[p];
+          const double own = s.points.volume[p];
+          volume += own;
+          if (fragment[fine->fragment_of(p)] != 0) loose += own;
+          F += own * deformation_gradient(s.bodies[site.body], site, *s.fields, s.nodes);
+        }
       }
       if (volume == 0) continue;
       samples.q[w.row] = loose >= 0.5 * volume;
       for (int i = 0; i < 9; ++i) {
-        samples.df[9 * w.row + i] = static_cast<float>(F(i / 3, i % 3) / volume) -
-                                    samples.x[static_cast<std::size_t>(w.row) * kFeatureCount + i];
+        samples.df[9 * w.row + i] =
+            static_cast<float>(F(i / 3, i % 3) / volume) -
+            samples.x[static_cast<std::size_t>(w.row) * kAllFeatureCount + i];
       }
       known = std::max(known, static_cast<std::size_t>(w.row) + 1);
     }
   }
   samples.true_loose = loose_share(*fine, h);
-  samples.x.resize(known * kFeatureCount);
+  samples.x.resize(known * kAllFeatureCount);
   samples.q.resize(known);
   samples.plain.resize(known);
   samples.df.resize(9 * known);

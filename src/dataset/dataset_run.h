@@ -16,23 +16,24 @@ struct DatasetOptions {
   int horizon = 8;      ///< frames ahead that labels are for
   int per_frame = 100;  ///< samples of a frame at most
   int level = 3;        ///< how many times finer the truth is
-  double share = 0.7;   ///< of the limit's strain from which on a point is a candidate
 };
 
-/// Samples of one scene, in order of time.
+/// Samples of one scene, in order of time: groups of points (FragmentCandidates).
 struct DatasetSamples {
-  std::vector<float> x;             ///< [n, 70]: fragments/features.h
-  std::vector<std::uint8_t> q;      ///< [n]: part of a fragment `horizon` later, in the truth
-  std::vector<float> df;            ///< [n, 9]: F then, in the truth, less that of the cell now
+  std::vector<float> x;  ///< [n, 101]: fragments/features.h
+  std::vector<std::uint8_t>
+      q;                  ///< [n]: most of it is part of a fragment `horizon` later, in the truth
+  std::vector<float> df;  ///< [n, 9]: F then, in the truth, less that of the cell now
   std::vector<std::uint8_t> plain;  ///< [n]: part of a fragment then, in the coarse run itself
   std::vector<float> about;         ///< [n, 3]: frame, tear_stretch, cell size [m]
   double coarse_loose = 0, true_loose = 0;  ///< share of the volume that came loose
   int coarse_points = 0, true_points = 0;
+  int frames = 0;        ///< of the truth
   bool blew_up = false;  ///< one of the runs, which ended there
 };
 
 /// A tissue of the scene, `level` times finer, that was set going.
-std::unique_ptr<MpmTissue> begin_run(const DatasetScene& scene, int level);
+std::unique_ptr<MpmTissue> begin_run(const DatasetScene& scene, double level);
 
 /// One frame on, with the scene's cuts in the first; false where it blew up or was crushed.
 bool advance_frame(MpmTissue& tissue, const DatasetScene& scene, int frame,

@@ -163,7 +163,7 @@ DatasetScene make_dataset_scene(std::uint64_t seed, int index,
   return d;
 }
 
-Scene finer(const DatasetScene& scene, int level) {
+Scene finer(const DatasetScene& scene, double level) {
   Scene s = scene.scene;
   s.cell_size /= level;
   return s;

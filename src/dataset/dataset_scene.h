@@ -32,6 +32,6 @@ DatasetScene make_dataset_scene(std::uint64_t seed, int index,
                                 const std::vector<std::string>& kinds);
 
 /// The scene with cells `level` times finer.
-Scene finer(const DatasetScene& scene, int level);
+Scene finer(const DatasetScene& scene, double level);
 
 }  // namespace tissue_sim

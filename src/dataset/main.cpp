@@ -19,6 +19,7 @@
 #include "dataset/dataset_run.h"
 #include "dataset/npy.h"
 #include "dataset/outcome.h"
+#include "dataset/rank.h"
 #include "fragments/features.h"
 
 namespace tissue_sim {
@@ -34,18 +35,24 @@ constexpr char kUsage[] =
   --frames N       of each run, 1/960 s each (40)
   --horizon N      frames ahead that labels are for (8)
   --per-frame N    samples of a frame at most (100)
-  --processes N    that work side by side (all processors)
+  --processes N    that work side by side (all processors; under mpirun, its share of them)
   --converge N     no data: runs each scene with cells 1, 2 .. N times finer, and writes how each
                    comes out into FOLDER/convergence.csv
   --compare FILE   no data: runs each scene plain, with fragment networks, with cells half as large
                    and as the truth, and writes how each comes out into FOLDER/comparison.csv. FILE
                    is the network's
   --baselines FILE of threshold and logistic regression for that
+  --paper FILE     another network to compare, of the paper's features
+  --equal N        how many times finer cells take as long as the network (1.03)
 Scenes that are in FOLDER are left alone: the same command goes on with what is missing.
+Several machines: `mpirun --host a,b tissue_sim_dataset ...` (Open MPI, MPICH, Slurm's srun) shares
+scenes out by rank; FOLDER is one that all of them see.
 )";
 
 struct Arguments {
-  std::string out, network, baselines;
+  Rank rank;
+  std::string out;
+  ComparedRuns compared;
   std::vector<std::string> kinds = dataset_kinds();
   int scenes = 60, first = 0, processes = 0, converge = 0;
   std::uint64_t seed = 1;
@@ -97,9 +104,16 @@ Arguments read_arguments(int argc, char** argv) {
     } else if (name == "--converge") {
       a.converge = number(2);
     } else if (name == "--compare") {
-      a.network = std::filesystem::absolute(value);
+      a.compared.network = std::filesystem::absolute(value);
     } else if (name == "--baselines") {
-      a.baselines = value;
+      a.compared.baselines = value;
+    } else if (name == "--paper") {
+      a.compared.paper = std::filesystem::absolute(value);
+    } else if (name == "--equal") {
+      a.compared.equal = std::stod(value);
+      if (!(a.compared.equal >= 1 && a.compared.equal <= 4)) {
+        throw std::invalid_argument("--equal is " + value + ": it must be from 1 to 4");
+      }
     } else if (name == "--kinds") {
       a.kinds.clear();
       std::istringstream list(value);
@@ -113,7 +127,12 @@ Arguments read_arguments(int argc, char** argv) {
     }
   }
   if (a.out.empty()) throw std::invalid_argument("--out is missing: a folder for the data");
-  if (a.processes == 0) a.processes = std::max(1u, std::thread::hardware_concurrency());
+  a.compared.level = a.options.level;
+  a.rank = launched_rank();
+  if (a.processes == 0) {
+    a.processes =
+        std::max(1, static_cast<int>(std::thread::hardware_concurrency()) / a.rank.on_machine);
+  }
   return a;
 }
 
@@ -137,8 +156,8 @@ std::string describe(const DatasetScene& d, const DatasetSamples& samples, doubl
       << ", \"viscosity\": " << m.viscosity << ", \"tear_stretch\": " << m.tear_stretch
       << ", \"tear_length\": " << m.tear_length << ", \"speed\": " << d.speed
       << ", \"horizon\": " << horizon << ", \"coarse_points\": " << samples.coarse_points
-      << ", \"true_points\": " << samples.true_points << ", \"samples\": " << samples.q.size()
-      << ", \"coarse_loose\": " << samples.coarse_loose
+      << ", \"true_points\": " << samples.true_points << ", \"frames\": " << samples.frames
+      << ", \"samples\": " << samples.q.size() << ", \"coarse_loose\": " << samples.coarse_loose
       << ", \"true_loose\": " << samples.true_loose
       << ", \"blew_up\": " << (samples.blew_up ? "true" : "false") << ", \"seconds\": " << seconds
       << "}\n";
@@ -151,7 +170,7 @@ void write_scene(const Arguments& a, int index) {
   const DatasetScene scene = make_dataset_scene(a.seed, index, a.kinds);
   const DatasetSamples samples = run_dataset_scene(scene, a.options);
   const std::chrono::duration<double> took = std::chrono::steady_clock::now() - begin;
-  write_npy(path_of(a, index, "_x.npy"), samples.x, kFeatureCount);
+  write_npy(path_of(a, index, "_x.npy"), samples.x, kAllFeatureCount);
   write_npy(path_of(a, index, "_q.npy"), samples.q, 0);
   write_npy(path_of(a, index, "_df.npy"), samples.df, 9);
   write_npy(path_of(a, index, "_plain.npy"), samples.plain, 0);
@@ -187,20 +206,24 @@ void write_outcomes(const Arguments& a, int index, const std::vector<RunKind>& k
   std::fflush(stdout);
 }
 
-/// Calls work(index) for all scenes, each in one of some processes. Returns how many failed.
+/// Calls work(index) for the scenes of this rank, each in one of some processes. Returns how many
+/// failed.
 int share_out(const Arguments& a, const std::function<void(int)>& work) {
   void* shared = mmap(nullptr, sizeof(std::atomic<int>), PROT_READ | PROT_WRITE,
                       MAP_SHARED | MAP_ANONYMOUS, -1, 0);
   if (shared == MAP_FAILED) throw std::runtime_error("no memory that processes share");
   auto* next = new (shared) std::atomic<int>(0);
   int failed = 0, children = 0;
-  for (int i = 0; i < std::min(a.processes, a.scenes); ++i) {
+  const int own = count_of(a.rank, a.scenes);
+  if (own <= 0) return 0;
+  for (int i = 0; i < std::min(a.processes, own); ++i) {
     const pid_t child = fork();
     if (child < 0) break;  // fewer do it as well
     ++children;
     if (child > 0) continue;
     int status = 0;
-    for (int scene; (scene = next->fetch_add(1)) < a.scenes;) {
+    for (int i; (i = next->fetch_add(1)) < own;) {
+      const int scene = item_of(a.rank, i);
       try {
         work(a.first + scene);
       } catch (const std::exception& e) {
@@ -219,20 +242,26 @@ int run(int argc, char** argv) {
   const Arguments a = read_arguments(argc, argv);
   std::filesystem::create_directories(a.out);
   std::vector<RunKind> kinds;
-  if (!a.network.empty()) {
-    kinds = compared_runs(a.network, a.baselines, a.options.level);
+  if (!a.compared.network.empty()) {
+    kinds = compared_runs(a.compared);
   } else if (a.converge > 0) {
-    for (int level = 1; level <= a.converge; ++level) kinds.push_back({"level", level, "", {}});
+    for (int level = 1; level <= a.converge; ++level)
+      kinds.push_back({"level", static_cast<double>(level), "", {}});
   } else {
     return share_out(a, [&](int index) { write_scene(a, index); });
   }
   const int failed = share_out(a, [&](int index) { write_outcomes(a, index, kinds); });
-  std::ofstream all(a.out + (a.converge > 0 ? "/convergence.csv" : "/comparison.csv"));
+  // Each rank writes what is there by then; the last to end has all.
+  const std::string table = a.out + (a.converge > 0 ? "/convergence.csv" : "/comparison.csv"),
+                    unfinished = table + "." + std::to_string(a.rank.number) + ".part";
+  std::ofstream all(unfinished);
   all << kOutcomeColumns;
   for (int i = a.first; i < a.first + a.scenes; ++i) {
     std::ifstream part(path_of(a, i, ".csv"));
     if (part.peek() != EOF) all << part.rdbuf();
   }
+  all.close();
+  std::filesystem::rename(unfinished, table);
   return failed;
 }
 

@@ -69,21 +69,24 @@ std::vector<RigidSums> fragment_sums(const MpmTissue& tissue, const MpmState& s,
 
 }  // namespace
 
-std::vector<RunKind> compared_runs(const std::string& network, const std::string& baselines,
-                                   int level) {
+std::vector<RunKind> compared_runs(const ComparedRuns& of) {
+  const std::string& baselines = of.baselines;
   std::vector<double> line;
-  double threshold = 0;
+  double threshold = 0, line_threshold = 0.5;
   try {
     const YAML::Node file = YAML::LoadFile(baselines);
     line = file["logistic"].as<std::vector<double>>();
     threshold = file["stretch_threshold"].as<double>();
+    line_threshold = file["logistic_threshold"].as<double>();
   } catch (const YAML::Exception& e) {
     throw std::invalid_argument(baselines + ": is not what scripts/train_fragments --baselines " +
                                 "writes: " + e.what());
   }
-  if (line.size() != kFeatureCount + 1) {
+  const int inputs = static_cast<int>(line.size()) - 1;
+  if (inputs != kFeatureCount && inputs != kAllFeatureCount) {
     throw std::invalid_argument(baselines + ": logistic must be " +
-                                std::to_string(kFeatureCount + 1) + " numbers");
+                                std::to_string(kFeatureCount + 1) + " or " +
+                                std::to_string(kAllFeatureCount + 1) + " numbers");
   }
   const auto stretch = [=](const MpmState& s, std::int32_t p, const float* x) {
     Eigen::Matrix3d F;
@@ -92,16 +95,19 @@ std::vector<RunKind> compared_runs(const std::string& network, const std::string
                                                                                          : 0.0f;
   };
   const auto logistic = [=](const MpmState&, std::int32_t, const float* x) {
-    double sum = line[kFeatureCount];
-    for (int i = 0; i < kFeatureCount; ++i) sum += line[i] * x[i];
-    return static_cast<float>(1 / (1 + std::exp(-sum)));
+    double sum = line[inputs];
+    for (int i = 0; i < inputs; ++i) sum += line[i] * x[i];
+    return 1 / (1 + std::exp(-sum)) >= line_threshold ? 1.0f : 0.0f;
   };
-  return {{"plain", 1, "", {}},
-          {"stretch", 1, network, stretch},
-          {"logistic", 1, network, logistic},
-          {"network", 1, network, {}},
-          {"finer", 2, "", {}},
-          {"truth", level, "", {}}};
+  std::vector<RunKind> runs = {{"plain", 1, "", {}},
+                               {"stretch", 1, of.network, stretch},
+                               {"logistic", 1, of.network, logistic}};
+  if (!of.paper.empty()) runs.push_back({"paper", 1, of.paper, {}});
+  runs.push_back({"network", 1, of.network, {}});
+  runs.push_back({"equal", of.equal, "", {}});
+  runs.push_back({"finer", 2, "", {}});
+  runs.push_back({"truth", static_cast<double>(of.level), "", {}});
+  return runs;
 }
 
 Outcome run_outcome(const DatasetScene& scene, const RunKind& kind, int frames) {
@@ -109,9 +115,9 @@ Outcome run_outcome(const DatasetScene& scene, const RunKind& kind, int frames) 
   const double h = scene.scene.cell_size;
   DatasetScene run = scene;
   if (!kind.network.empty()) run.scene.fragment_network = kind.network;
-  const std::clock_t begin = std::clock();
   const auto tissue = begin_run(run, kind.level);
-  double measuring = 0;  // [s]
+  const std::clock_t begin = std::clock();  // a network's file is read once, however long it runs
+  double measuring = 0;                     // [s]
   if (kind.classifier) tissue->classify_by(kind.classifier);
   MpmState& s = tissue->state();
   o.points = tissue->point_count();

@@ -11,18 +11,25 @@ namespace tissue_sim {
 
 /// What a run is done by.
 struct RunKind {
-  std::string name;               ///< plain, stretch, logistic, network, finer, truth
-  int level = 1;                  ///< how many times finer its cells are
+  std::string name;               ///< plain, stretch, logistic, paper, network, equal, finer, truth
+  double level = 1;               ///< how many times finer its cells are
   std::string network;            ///< file of the fragment network, empty for none
   FragmentClassifier classifier;  ///< in the place of the network's, if any
 };
 
-/// The ways that are compared with the truth, which is `level` times finer: the plain coarse run;
-/// with the modifier of the network and, as the classifier, a threshold on the largest principal
-/// stretch, logistic regression, and its own; and cells half as large. `baselines` is what
-/// scripts/train_fragments --baselines wrote. Throws std::invalid_argument for a file that is not.
-std::vector<RunKind> compared_runs(const std::string& network, const std::string& baselines,
-                                   int level);
+/// What the ways that are compared with the truth are made of.
+struct ComparedRuns {
+  std::string network, paper;  ///< files of networks; `paper`, one of the paper's features, if any
+  std::string baselines;       ///< what scripts/train_fragments --baselines wrote
+  double equal = 1.03;         ///< how many times finer cells take no longer than the network does
+  int level = 3;               ///< of the truth
+};
+
+/// The plain coarse run; with the modifier of the network and, as the classifier, a threshold on
+/// the largest principal stretch, logistic regression, and its own; the same of the paper's; finer
+/// cells that take as long as the network, and half as large ones; the truth. Throws
+/// std::invalid_argument for a file that is not what it must be.
+std::vector<RunKind> compared_runs(const ComparedRuns& of);
 
 struct Outcome {
   int points = 0, flown = 0;

@@ -1,5 +1,6 @@
-// What the fragment network is told of a point (Sung, Kim and Shin, Electronics 13:1340, 2024,
-// section 2.1; in space instead of a plane).
+// What the fragment network is told of a point: the features of the 2024 paper (Sung, Kim and Shin,
+// Electronics 13:1340, section 2.1; in space instead of a plane), and what was found to be missing
+// among them.
 #pragma once
 
 namespace tissue_sim {
@@ -9,5 +10,31 @@ namespace tissue_sim {
 /// Where they lead to nothing F is the identity.
 inline constexpr int kFeatureCells = 7, kFeaturesOfCell = 10;
 inline constexpr int kFeatureCount = kFeatureCells * kFeaturesOfCell;
+
+/// From these shares of the limit's strain on, bonds count as broken when tissue is looked at for
+/// regions that may come off.
+inline constexpr float kRegionLevels[] = {0.4f, 0.6f, 0.8f, 1.0f};
+inline constexpr int kRegionLevelCount = 4;
+
+/// Features beside the paper's, behind its 70. Strain counts in that of the limit, lengths in
+/// standard deviations of the piece's points about its centre, all in reference space.
+namespace surroundings {
+inline constexpr int kExcess = kFeatureCount;                ///< [7] largest strain of each cell
+inline constexpr int kOther = kExcess + kFeatureCells;       ///< [2] the cell's other strains
+inline constexpr int kRate = kOther + 2;                     ///< of the largest, in h / c
+inline constexpr int kBrokenInside = kRate + 1;              ///< share of the bonds in the cell
+inline constexpr int kBroken = kBrokenInside + 1;            ///< [6] of those to each neighbour
+inline constexpr int kRegion = kBroken + kFeatureCells - 1;  ///< [4][2] its region's share of the
+                                                             ///< body, and ln(1 + cells) / 4
+inline constexpr int kPiece = kRegion + 2 * kRegionLevelCount;  ///< its piece's share of the body
+inline constexpr int kAlongGradient = kPiece + 1;         ///< place, towards where strain is larger
+inline constexpr int kAlongStretch = kAlongGradient + 1;  ///< along the stretch, the same way
+inline constexpr int kFromCentre = kAlongStretch + 1;     ///< distance
+inline constexpr int kSpeed = kFromCentre + 1;  ///< of its region at the second level, relative to
+                                                ///< the piece, over c times the limit's strain
+inline constexpr int kParting = kSpeed + 1;     ///< the part of it that leads away from the piece
+inline constexpr int kEnd = kParting + 1;
+}  // namespace surroundings
+inline constexpr int kAllFeatureCount = surroundings::kEnd;
 
 }  // namespace tissue_sim

@@ -11,7 +11,9 @@
 
 namespace tissue_sim {
 
-inline constexpr int kHiddenCount = kFeatureCount * 3 / 2;
+inline constexpr int hidden_count(int inputs) { return inputs * 3 / 2; }
+inline constexpr int kHiddenCount = hidden_count(kFeatureCount);
+inline constexpr int kMostHidden = hidden_count(kAllFeatureCount);
 /// Of the classifier: of not being part of a fragment, of being part of one. Their softmax is the
 /// probability.
 inline constexpr int kClassifierOutputs = 2;
@@ -21,9 +23,11 @@ inline constexpr int kModifierOutputs = 18;
 /// Weights of one network, as functions read them: of a layer's inputs, one after the other, those
 /// to all outputs side by side.
 struct NetworkWeights {
-  const float* hidden_weights;  ///< [kFeatureCount][kHiddenCount]
-  const float* hidden_biases;   ///< [kHiddenCount]
-  const float* output_weights;  ///< [kHiddenCount][outputs]
+  int inputs;  ///< kFeatureCount, or kAllFeatureCount; there are 1.5 times as many hidden
+  int first;   ///< of them that has a weight at all
+  const float* hidden_weights;  ///< [inputs][hidden]
+  const float* hidden_biases;   ///< [hidden]
+  const float* output_weights;  ///< [hidden][outputs]
   const float* output_biases;   ///< [outputs]
 };
 
@@ -46,19 +50,20 @@ TISSUE_SIM_INLINE float hidden_tanh(float x) {
   return x * p / q;
 }
 
-/// What a network says of features x[kFeatureCount].
+/// What a network says of features x[inputs].
 template <int kOutputs>
 TISSUE_SIM_INLINE void run_network(const NetworkWeights& w, const float* x,
                                    float (&out)[kOutputs]) {
-  float hidden[kHiddenCount];
-  for (int h = 0; h < kHiddenCount; ++h) hidden[h] = w.hidden_biases[h];
-  for (int i = 0; i < kFeatureCount; ++i) {
-    const float* weights = w.hidden_weights + i * kHiddenCount;
-    for (int h = 0; h < kHiddenCount; ++h) hidden[h] += x[i] * weights[h];
+  const int count = hidden_count(w.inputs);
+  float hidden[kMostHidden];
+  for (int h = 0; h < count; ++h) hidden[h] = w.hidden_biases[h];
+  for (int i = w.first; i < w.inputs; ++i) {
+    const float* weights = w.hidden_weights + i * count;
+    for (int h = 0; h < count; ++h) hidden[h] += x[i] * weights[h];
   }
-  for (int h = 0; h < kHiddenCount; ++h) hidden[h] = hidden_tanh(hidden[h]);
+  for (int h = 0; h < count; ++h) hidden[h] = hidden_tanh(hidden[h]);
   for (int o = 0; o < kOutputs; ++o) out[o] = w.output_biases[o];
-  for (int h = 0; h < kHiddenCount; ++h) {
+  for (int h = 0; h < count; ++h) {
     const float* weights = w.output_weights + h * kOutputs;
     for (int o = 0; o < kOutputs; ++o) out[o] += hidden[h] * weights[o];
   }

@@ -2,6 +2,7 @@
 
 #include <yaml-cpp/yaml.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <cstdio>
@@ -66,18 +67,21 @@ FragmentNetwork::FragmentNetwork(const std::string& path) {
   }
   try {
     const YAML::Node file = YAML::LoadFile(path);
-    if (!file.IsMap() || !file["version"] || file["version"].as<std::string>() != "1") {
-      throw std::invalid_argument("it must be a fragment network of version 1");
+    const std::string version =
+        file.IsMap() && file["version"] ? file["version"].as<std::string>() : "";
+    if (version != "1" && version != "2") {
+      throw std::invalid_argument("it must be a fragment network of version 1 or 2");
     }
+    inputs_ = version == "1" ? kFeatureCount : kAllFeatureCount;
+    const int inputs = inputs_, hidden = hidden_count(inputs);
     Checksum sum;
     const auto read = [&](const std::string& name, int outputs, Layers& layers) {
       const YAML::Node node = file[name];
       if (!node || !node.IsMap()) throw std::invalid_argument(name + " is missing");
       const auto shape = node["shape"].as<std::vector<int>>();
-      if (shape != std::vector<int>{kFeatureCount, kHiddenCount, outputs}) {
-        throw std::invalid_argument(name + " has another shape than " +
-                                    std::to_string(kFeatureCount) + ", " +
-                                    std::to_string(kHiddenCount) + ", " + std::to_string(outputs));
+      if (shape != std::vector<int>{inputs, hidden, outputs}) {
+        throw std::invalid_argument(name + " has another shape than " + std::to_string(inputs) +
+                                    ", " + std::to_string(hidden) + ", " + std::to_string(outputs));
       }
       const auto part = [&](const char* key, int rows, int columns) {
         std::vector<float> values =
@@ -85,15 +89,22 @@ FragmentNetwork::FragmentNetwork(const std::string& path) {
         sum.add(values);
         return transposed(values, rows, columns);
       };
-      layers.hidden_weights = part("hidden_weights", kHiddenCount, kFeatureCount);
-      layers.hidden_biases = part("hidden_biases", kHiddenCount, 1);
-      layers.output_weights = part("output_weights", outputs, kHiddenCount);
+      layers.hidden_weights = part("hidden_weights", hidden, inputs);
+      const auto used = std::find_if(layers.hidden_weights.begin(), layers.hidden_weights.end(),
+                                     [](float w) { return w != 0; });
+      layers.first = static_cast<int>(used - layers.hidden_weights.begin()) / hidden;
+      layers.hidden_biases = part("hidden_biases", hidden, 1);
+      layers.output_weights = part("output_weights", outputs, hidden);
       layers.output_biases = part("output_biases", outputs, 1);
     };
     read("classifier", kClassifierOutputs, classifier_);
     read("modifier", kModifierOutputs, modifier_);
     horizon_ = file["horizon"].as<double>();
     if (!(horizon_ > 0)) throw std::invalid_argument("horizon must be above 0");
+    if (file["threshold"]) threshold_ = file["threshold"].as<double>();
+    if (!(threshold_ > 0 && threshold_ < 1)) {
+      throw std::invalid_argument("threshold must be above 0 and below 1");
+    }
     const auto said = file["checksum"].as<std::string>();
     if (said != sum.text()) {
       throw std::invalid_argument("its numbers have the checksum " + sum.text() + ", not " + said +

@@ -2,13 +2,12 @@
 
 #include <Eigen/Dense>
 #include <algorithm>
+#include <cmath>
 
 #include "mpm/mpm_state.h"
 
 namespace tissue_sim {
 namespace {
-
-constexpr int kMiddle = 13;  // of a stencil's 27 nodes
 
 /// The nodes that a piece's points see, by number, and their reference places.
 void find_nodes(const MpmState& state, const Pieces& pieces, int piece, FragmentFlight& flight) {
@@ -67,7 +66,7 @@ std::int32_t flight_of(const MpmState& state, std::int32_t node) {
 
 std::int32_t flight_of_point(const MpmState& state, std::int32_t point) {
   const Points::Site& s = state.points.site[point];
-  return flight_of(state, state.fields->node(state.bodies[s.body], s, kMiddle));
+  return flight_of(state, state.fields->node(state.bodies[s.body], s, kMiddleNode));
 }
 
 /// Takes those out of the list that are marked.
@@ -159,6 +158,25 @@ bool take_off(MpmState& state, const Pieces& pieces, int piece, const Eigen::Mat
   return true;
 }
 
+bool touches_anything(const MpmState& state, const Pieces& pieces, int piece) {
+  FragmentFlight f;
+  find_nodes(state, pieces, piece, f);
+  const auto is_own = [&](std::int32_t node) {
+    return std::binary_search(f.nodes.begin(), f.nodes.end(), node);
+  };
+  for (const std::int32_t i : state.faces.active) {
+    const FaceContact& c = state.faces.all[i];
+    if (c.other < 0 || !c.touching) continue;
+    if (is_own(c.nodes.row(1, 1)[1]) != is_own(c.other_nodes.row(1, 1)[1])) return true;
+  }
+  for (const std::vector<Touch>& of_block : state.contacts.touching) {
+    for (const Touch& t : of_block) {
+      if (pieces.of_point[t.point] == piece) return true;
+    }
+  }
+  return false;
+}
+
 void fly(MpmState& state, const NodeStep& step) {
   if (state.flights.empty()) return;
   land(state, touching(state));
@@ -171,6 +189,57 @@ void fly(MpmState& state, const NodeStep& step) {
     f.rotation = turn(step.dt * spin_of(f, half)) * f.rotation;
     write_nodes(f, state.nodes);
   }
+}
+
+std::vector<std::int32_t> fly_frame(MpmState& state, double duration, int substeps) {
+  const Nodes& nodes = state.nodes;
+  // How far off momentum may be, as a share of that which the piece has in its own frame or gains:
+  // floats keep it to some 1e-5 in a frame, what touches tissue loses more.
+  constexpr double kTouched = 2e-3;
+  const double keep = std::exp(-state.scene.damping * duration);
+  std::vector<std::uint8_t> lands(state.flights.size(), 0);
+  std::vector<std::int32_t> moved;
+  for (std::size_t i = 0; i < state.flights.size(); ++i) {
+    FragmentFlight& f = state.flights[i];
+    double mass = 0, extent = 0;
+    Vec3 x = Vec3::Zero(), v = Vec3::Zero(), angular = Vec3::Zero();
+    for (std::size_t j = 0; j < f.nodes.size(); ++j) {
+      const std::int32_t n = f.nodes[j];
+      const double m = nodes.mass[n];
+      mass += m;
+      x += m * (f.home[j] + Vec3(nodes.u[0][n], nodes.u[1][n], nodes.u[2][n]));
+      v += m * Vec3(nodes.v[0][n], nodes.v[1][n], nodes.v[2][n]);
+      extent += m * f.from_centre[j].squaredNorm();
+    }
+    x /= mass;
+    v /= mass;
+    extent = std::sqrt(extent / mass);
+    for (std::size_t j = 0; j < f.nodes.size(); ++j) {
+      const std::int32_t n = f.nodes[j];
+      angular += nodes.mass[n] * (f.home[j] + Vec3(nodes.u[0][n], nodes.u[1][n], nodes.u[2][n]) - x)
+                                     .cross(Vec3(nodes.v[0][n], nodes.v[1][n], nodes.v[2][n]) - v);
+    }
+    const Vec3 expected = keep * f.velocity + duration * state.scene.gravity;
+    const double spin = f.angular.norm() / (mass * extent);
+    const double speed = f.velocity.norm() + spin + duration * state.scene.gravity.norm() + 1e-6;
+    if ((v - expected).norm() > kTouched * speed ||
+        (angular - keep * f.angular).norm() > 5 * kTouched * mass * extent * speed) {
+      lands[i] = 1;
+      continue;
+    }
+    const double dt = duration / std::max(1, substeps);
+    for (int step = 0; step < substeps; ++step) {
+      const Eigen::Matrix3d half = turn(0.5 * dt * spin_of(f, f.rotation)) * f.rotation;
+      f.rotation = turn(dt * spin_of(f, half)) * f.rotation;
+    }
+    f.centre = x;
+    f.velocity = v;
+    f.angular = angular;
+    write_nodes(f, state.nodes);
+    moved.insert(moved.end(), f.nodes.begin(), f.nodes.end());
+  }
+  land(state, lands);
+  return moved;
 }
 
 void land_changed(MpmState& state, const std::vector<std::int32_t>& changed) {

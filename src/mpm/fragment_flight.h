@@ -14,6 +14,9 @@ namespace tissue_sim {
 
 struct MpmState;
 
+/// Of the 27 nodes that a point sees, the one at the middle of its cell.
+inline constexpr int kMiddleNode = 13;
+
 /// A piece that flies. Its nodes are its own: each field of a node is one piece's.
 struct FragmentFlight {
   int piece = -1;                   ///< Fragment::id
@@ -33,8 +36,17 @@ struct FragmentFlight {
 /// the piece is held or where it does not move by finite numbers.
 bool take_off(MpmState& state, const Pieces& pieces, int piece, const Eigen::Matrix3d& F);
 
+/// Whether a piece touches another one, the ground or a tool, as of the last substep.
+bool touches_anything(const MpmState& state, const Pieces& pieces, int piece);
+
 /// After a substep: pieces that touch something are part of the physics again, the others move on.
 void fly(MpmState& state, const NodeStep& step);
+
+/// The same once a frame of `substeps` that took `duration` [s], where substeps cannot be stopped
+/// for it (on a GPU): within the frame the pieces were part of the physics, which keeps momentum,
+/// and take their shape again, turned on, at its end. What had another momentum then than gravity
+/// and damping [1/s] give it has touched something. Returns the nodes that were moved.
+std::vector<std::int32_t> fly_frame(MpmState& state, double duration, int substeps);
 
 /// Before the points `changed`, which lost bonds, are taken apart: what flies and loses bonds is
 /// part of the physics again.

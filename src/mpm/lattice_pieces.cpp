@@ -6,21 +6,13 @@
 #include "mpm/lattice/bonds.h"
 
 namespace tissue_sim {
-namespace {
-
-/// Points begin .. end - 1: neighbours along x that hold together. They stand and fall together.
-struct Run {
-  std::int32_t begin, end;
-};
-
-std::vector<Run> runs_of(const Points& points) {
+std::vector<PointRun> runs_along_x(const std::uint8_t* bonds, std::int32_t count) {
   constexpr std::uint64_t kBackInX = 0x0101010101010101 << opposite_bond(kForwardBond);
-  const std::int32_t count = points.size();
-  std::vector<Run> runs;
+  std::vector<PointRun> runs;
   for (std::int32_t p = 0; p < count;) {
-    std::uint64_t bonds = 0;  // of eight points
-    std::memcpy(&bonds, &points.bonds[p], std::min(8, count - p));
-    const std::uint64_t gone = ~bonds & kBackInX;
+    std::uint64_t of_eight = 0;
+    std::memcpy(&of_eight, &bonds[p], std::min(8, count - p));
+    const std::uint64_t gone = ~of_eight & kBackInX;
     if (gone == 0) {
       p += 8;
       continue;
@@ -34,16 +26,15 @@ std::vector<Run> runs_of(const Points& points) {
   return runs;
 }
 
-/// First run of each run's component (union-find). Where two runs lie side by side the first bond
-/// between them tells.
-UnionFind components(const LatticeTissue& tissue, const std::vector<Run>& runs) {
+UnionFind linked_runs(const LatticeTissue& tissue, const std::uint8_t* bonds,
+                      const std::vector<PointRun>& runs) {
   UnionFind linked(runs.size());
   for (const int k : {kForwardBond + 1, kForwardBond + 2}) {
     const BondOffset o = bond_offset(k);
     std::size_t other = 0;  // only goes up: points are numbered along x, then y, then z
     for (std::size_t i = 0; i < runs.size(); ++i) {
       for (std::int32_t p = runs[i].begin; p < runs[i].end;) {
-        if ((tissue.points.bonds[p] >> k & 1) == 0) {
+        if ((bonds[p] >> k & 1) == 0) {
           ++p;
           continue;
         }
@@ -57,8 +48,6 @@ UnionFind components(const LatticeTissue& tissue, const std::vector<Run>& runs) 
   }
   return linked;
 }
-
-}  // namespace
 
 Pieces whole_pieces(const LatticeTissue& tissue) {
   Pieces pieces = one_piece_a_body(
@@ -99,8 +88,8 @@ bool may_have_parted(const LatticeTissue& tissue, const std::vector<std::int32_t
 }
 
 std::vector<int> update_pieces(const LatticeTissue& tissue, Pieces& pieces) {
-  const std::vector<Run> runs = runs_of(tissue.points);
-  UnionFind linked = components(tissue, runs);
+  const std::vector<PointRun> runs = runs_along_x(tissue.points.bonds.data(), tissue.points.size());
+  UnionFind linked = linked_runs(tissue, tissue.points.bonds.data(), runs);
   std::vector<PartedRun> parted;
   for (std::size_t i = 0; i < runs.size(); ++i) {
     const std::int32_t lowest = runs[linked.root(static_cast<std::int32_t>(i))].begin;

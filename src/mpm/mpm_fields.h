@@ -167,7 +167,12 @@ void fields(Archive& archive, SubstepChoice& x) {
 
 template <class Archive>
 void fields(Archive& archive, FragmentChance& c) {
-  archive(c.point, c.time, c.probability, c.F, c.deviation);
+  archive(c.point, c.time, c.probability, c.F, c.deviation, c.expected);
+}
+
+template <class Archive>
+void fields(Archive& archive, WaitingFragment& w) {
+  archive(w.piece, w.until, w.F);
 }
 
 /// All but contact of tissue with tissue: mpm/contact/face_fields.h.

@@ -16,7 +16,7 @@ void MpmTissue::each_field(Archive& archive) {
   archive.part("pieces", pieces_, pieces_measured_);
   archive.part("substeps", stiffening_, modulus_, substep_);
   archive.part("measures", measured_, has_energies_, work_);
-  archive.part("forecast", said_, flown_);
+  archive.part("forecast", foresight_.said, foresight_.waiting, foresight_.flown);
 }
 
 std::vector<std::uint8_t> MpmTissue::save() {

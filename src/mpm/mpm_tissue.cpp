@@ -6,7 +6,6 @@
 #include <stdexcept>
 #include <utility>
 
-#include "geometry/mesh.h"
 #include "math/lanczos.h"
 #include "mpm/contact/block_contact.h"
 #include "mpm/lattice_pieces.h"
@@ -34,10 +33,7 @@ MpmTissue::MpmTissue(const Scene& scene, std::vector<std::string> notes)
   measure_stiffness();
   substep_.follow(*state_, modulus_);
   measured_ = false;  // who holds the state may change it
-  if (scene.fragment_network != "off") {
-    network_ =
-        std::make_unique<FragmentNetwork>(resolve_path(scene.fragment_network, "fragment network"));
-  }
+  foresight_ = make_foresight(scene);
 }
 
 float MpmTissue::stable_substep() const { return tissue_sim::stable_substep(*state_, stiffening_); }
@@ -192,24 +188,6 @@ bool MpmTissue::tame() {
   return true;
 }
 
-bool MpmTissue::let_fly() {
-  std::vector<int> parted = result_.tear_report.new_fragments;
-  const auto add = [&](const CutReport& report) {
-    parted.insert(parted.end(), report.new_fragments.begin(), report.new_fragments.end());
-  };
-  add(result_.blade_report);
-  for (const CutReport& report : result_.cut_reports) add(report);
-  int fly = 0;
-  for (const int id : parted) {
-    Eigen::Matrix3d F;
-    if (draw_deformation(*state_, pieces_, id, said_, F) && take_off(*state_, pieces_, id, F))
-      ++fly;
-  }
-  flown_ += fly;
-  if (fly > 0) measure_motion(*state_);
-  return fly > 0;
-}
-
 template <class Read>
 void MpmTissue::measure(const Read& read) {
   MpmState& s = *state_;
@@ -276,16 +254,14 @@ FrameResult MpmTissue::finish() {
   // Nothing that instruments do moves tissue at the speed of a bullet; what does is out of control.
   result_.blew_up = result_.blew_up || !(result_.max_speed < 300);
   if (tame()) measure_and_follow();
-  if (network_ != nullptr && !result_.blew_up) {
-    if (let_fly()) measure_and_follow();
-    forecast_ = forecast_fragments(*state_, pieces_, *network_, classifier_);
-    // A piece that comes off in a frame was foreseen at the end of one before, however long it is.
-    const double longest = std::max(network_->horizon(), frame_ ? frame_->duration : 0.0);
-    remember(forecast_, state_->time - 1.001 * longest, said_);
-    result_.fragment_candidates = static_cast<int>(forecast_.size());
-    result_.fragment_points = static_cast<int>(
-        std::count_if(forecast_.begin(), forecast_.end(),
-                      [](const FragmentChance& c) { return c.probability >= 0.5f; }));
+  if (foresight_.network != nullptr && !result_.blew_up) {
+    const double duration = frame_ ? frame_->duration : 0.0;
+    if (!let_fly(*state_, pieces_, result_, duration, foresight_).empty()) {
+      measure_motion(*state_);
+      measure_and_follow();
+    }
+    look_ahead(*state_, pieces_, find_strained(*state_, kRegionLevels[0]), duration, foresight_,
+               result_);
   }
   measured_ = pieces_measured_ = false;
   return result_;

@@ -52,11 +52,11 @@ class MpmTissue final : public Tissue {
   const Pieces& pieces() const { return pieces_; }
   MpmState& state() { return *state_; }
   /// What the fragment network said at the end of the last frame; nothing without one.
-  const std::vector<FragmentChance>& forecast() const { return forecast_; }
+  const std::vector<FragmentChance>& forecast() const { return foresight_.forecast; }
   /// Lets another classifier than the network's say what is part of a fragment soon.
-  void classify_by(FragmentClassifier classifier) { classifier_ = std::move(classifier); }
+  void classify_by(FragmentClassifier classifier) { foresight_.classifier = std::move(classifier); }
   /// How many pieces have flown since the beginning, for the network had foreseen them.
-  int flown() const { return flown_; }
+  int flown() const { return foresight_.flown; }
 
  private:
   template <class Archive>
@@ -113,7 +113,6 @@ class MpmTissue final : public Tissue {
            const std::vector<BlockMotion>& before, CutReport& report);
   bool tame();                ///< what is wild (mpm/tear/deformation.h), whether anything was
   bool settle_wild_debris();  ///< of that, debris
-  bool let_fly();             ///< pieces that came off and were foreseen, whether any was
   /// Energies and how much the tissue has stiffened, from what `read` finds of each block.
   template <class Read>
   void measure(const Read& read);
@@ -123,10 +122,9 @@ class MpmTissue final : public Tissue {
   std::vector<std::string> notes_;
   std::unique_ptr<MpmState> state_;
   Pieces pieces_;
-  std::unique_ptr<FragmentNetwork> network_;  ///< null without one
-  std::vector<FragmentChance> forecast_;      ///< at the end of the last frame
-  std::optional<Frame> frame_;                ///< the one that is worked on
-  Checkpoint checkpoint_;                     ///< before the last part of it
+  Foresight foresight_;
+  std::optional<Frame> frame_;  ///< the one that is worked on
+  Checkpoint checkpoint_;       ///< before the last part of it
   Stiffening stiffening_;
   std::vector<float> modulus_;    ///< see SubstepChoice::follow()
   bool measured_ = false;         ///< whether the state is as it was when it was measured
@@ -135,9 +133,6 @@ class MpmTissue final : public Tissue {
   bool pieces_measured_ = false;  ///< whether they are where the frame left them
   SubstepChoice substep_;
   FrameResult result_;
-  FragmentClassifier classifier_;     ///< null for the network's
-  std::vector<FragmentChance> said_;  ///< of each point the last forecast, if not long ago
-  int flown_ = 0;
 };
 
 }  // namespace tissue_sim

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "cut_scenes.h"
+#include "fragments/torn_bar.h"
 #include "mpm/fragment_flight.h"
 #include "mpm/fragment_forecast.h"
 #include "mpm/tear/deformation.h"
@@ -179,6 +180,70 @@ TEST(FragmentFlight, EndsOnTheGroundAndAgainstTissue) {
   EXPECT_LT((thrown.momentum().linear - before.linear).norm(), 1e-4 * before.linear.norm());
 }
 
+/// The part at +x thrown off, turning.
+void throw_off(MpmTissue& tissue, int id) {
+  MpmState& s = tissue.state();
+  std::vector<std::uint8_t> seen(s.nodes.size(), 0);
+  for (std::int32_t p = 0; p < s.points.size(); ++p) {
+    const Points::Site& site = s.points.site[p];
+    if (tissue.fragment_of(p) != id) continue;
+    for (int k = 0; k < 27; ++k) {
+      const int n = s.fields->node(s.bodies[0], site, k);
+      if (seen[n] != 0) continue;
+      seen[n] = 1;
+      s.nodes.v[0][n] += 1;
+      s.nodes.v[1][n] += 60 * 0.001f * static_cast<float>(site.x - 12);
+    }
+  }
+  measure_motion(s);
+}
+
+TEST(FragmentFlight, ByFramesIsTheSameAsBySubsteps) {
+  Scene scene = parted_box();
+  scene.gravity = Vec3(0.5, 0, -9.81);
+  MpmTissue substeps(scene), frames(scene);
+  for (MpmTissue* t : {&substeps, &frames}) {
+    const int id = part(*t);
+    throw_off(*t, id);
+    ASSERT_TRUE(take_off(t->state(), t->pieces(), id, some_deformation()));
+  }
+  constexpr float kStep = 1e-4f;
+  constexpr int kSteps = 40;
+  MpmState& s = frames.state();
+  for (int frame = 0; frame < 8; ++frame) {
+    substeps.advance(kSteps, kStep, {});
+    substeps.finish();
+    std::vector<FragmentFlight> flights = std::move(s.flights);  // as where substeps do not fly
+    s.flights.clear();
+    index_flights(s);
+    frames.advance(kSteps, kStep, {});
+    frames.finish();
+    s.flights = std::move(flights);
+    index_flights(s);
+    EXPECT_FALSE(fly_frame(s, kSteps * static_cast<double>(kStep), kSteps).empty());
+    ASSERT_EQ(s.flights.size(), 1u) << frame;
+  }
+  const FragmentFlight &a = substeps.state().flights[0], &b = s.flights[0];
+  EXPECT_LT((a.centre - b.centre).norm(), 2e-6);
+  EXPECT_LT((a.velocity - b.velocity).norm(), 1e-4);
+  EXPECT_LT((a.angular - b.angular).norm(), 5e-3 * a.angular.norm());
+  EXPECT_GT((a.rotation - Eigen::Matrix3d::Identity()).norm(), 0.1);
+  EXPECT_LT((a.rotation - b.rotation).norm(), 5e-3);
+}
+
+TEST(FragmentFlight, ByFramesEndsWhereSomethingWasTouched) {
+  MpmTissue tissue(parted_box());
+  const int id = part(tissue);
+  throw_off(tissue, id);
+  MpmState& s = tissue.state();
+  ASSERT_TRUE(take_off(s, tissue.pieces(), id, Eigen::Matrix3d::Identity()));
+  for (const std::int32_t n : s.flights[0].nodes) s.nodes.v[0][n] -= 0.05f;  // pushed by something
+  const std::vector<float> before(s.nodes.u[0].begin(), s.nodes.u[0].end());
+  EXPECT_TRUE(fly_frame(s, 1e-3, 10).empty());
+  EXPECT_TRUE(s.flights.empty());
+  EXPECT_TRUE(std::equal(before.begin(), before.end(), s.nodes.u[0].begin()));
+}
+
 TEST(FragmentFlight, NumbersAreNormal) {
   double sum = 0, squares = 0, product = 0, last = 0;
   constexpr int kCount = 20000;
@@ -199,34 +264,6 @@ TEST(FragmentFlight, NumbersAreNormal) {
 const TemporaryFolder folder;
 const std::string kNetwork = folder.write("network.yaml", network_text());
 
-/// A bar that its own motion tears, off its middle.
-Scene torn_bar() {
-  Scene scene = free_box(Vec3(0.020, 0.008, 0.008), 0.002);
-  Material m;
-  m.name = "torn";
-  m.tear_stretch = 1.25;
-  m.tear_length = 0.003;
-  scene.materials = {m};
-  scene.bodies[0].material = m.name;
-  scene.device = Device::kCpu;
-  scene.threads = 1;
-  scene.frame_rate = 960;
-  scene.fragment_network = kNetwork;
-  return scene;
-}
-
-void set_going(MpmTissue& tissue) {
-  MpmState& s = tissue.state();
-  for (const LatticeBody& b : s.bodies) {
-    b.for_each_node([&](int node, int i, int j, int k) {
-      const Vec3 x = b.node_position(i, j, k);
-      s.nodes.v[0][node] = static_cast<float>(1.5 * std::tanh((x.x() - 0.014) / 0.003));
-      s.nodes.v[1][node] = static_cast<float>(20 * (x.x() - 0.007));
-    });
-  }
-  measure_motion(s);
-}
-
 struct Flown {
   int flown = 0;
   Momentum before, after;
@@ -234,14 +271,15 @@ struct Flown {
 };
 
 Flown fly_bar(float probability, int threads, bool restored = false) {
-  Scene scene = torn_bar();
+  Scene scene = torn_bar(kNetwork);
   scene.threads = threads;
   auto tissue = std::make_unique<MpmTissue>(scene);
   const FragmentClassifier classifier = [=](const MpmState&, std::int32_t, const float*) {
     return probability;
   };
   tissue->classify_by(classifier);
-  set_going(*tissue);
+  set_going(tissue->state());
+  measure_motion(tissue->state());
   Flown result;
   result.before = tissue->momentum();
   for (int frame = 0; frame < 30; ++frame) {

@@ -20,14 +20,14 @@ void CudaMpmTissue::keep_place_for_blades() {
              "copy");
 }
 
-std::vector<TearingPoint> CudaMpmTissue::find_tearing() {
+std::vector<StretchedPoint> CudaMpmTissue::list_stretched(float share) {
   OnDevice& d = *device_;
   d.stretched_count.resize(1);
   d.host_stretched_count.resize(1);
   d.stretched.resize(std::max<std::size_t>(d.stretched.size(), 4096));
   const auto look = [&] {
     const int room = static_cast<int>(d.stretched.size());
-    launch_stretched(d.tables(), d.present(), d.plan.max_slots, d.stretched.data(), room,
+    launch_stretched(d.tables(), d.present(), d.plan.max_slots, share, d.stretched.data(), room,
                      d.stretched_count.data(), d.stream);
     d.stretched_count.download(d.host_stretched_count.data(), 1, d.stream);
     check_cuda(cudaStreamSynchronize(d.stream), "look for tears");
@@ -38,13 +38,17 @@ std::vector<TearingPoint> CudaMpmTissue::find_tearing() {
     look();
   }
   std::vector<StretchedPoint> stretched(d.host_stretched_count[0]);
-  if (stretched.empty()) return {};
+  if (stretched.empty()) return stretched;
   d.stretched.download(stretched.data(), stretched.size(), d.stream);
   check_cuda(cudaStreamSynchronize(d.stream), "send data");
   std::sort(stretched.begin(), stretched.end(),
             [](const StretchedPoint& a, const StretchedPoint& b) { return a.point < b.point; });
+  return stretched;
+}
+
+std::vector<TearingPoint> CudaMpmTissue::find_tearing() {
   std::vector<TearingPoint> tearing;
-  add_tearing(*state_, stretched, tearing);
+  add_tearing(*state_, list_stretched(1), tearing);
   return tearing;
 }
 

@@ -78,6 +78,7 @@ CudaMpmTissue::CudaMpmTissue(const Scene& scene, std::vector<std::string> notes)
       state_->bodies.size() > 1 ? d.cut_shape : choose_shape(state_->bodies, d.limits, true),
       d.limits.processors);
   pieces_ = whole_pieces(*state_);
+  foresight_ = make_foresight(scene);
   push();
   launch_measure();
   finish_measure();
@@ -245,6 +246,7 @@ FrameResult CudaMpmTissue::finish() {
   pieces_measured_ = false;
   substep_.follow(*state_, modulus_);
   tame();
+  if (foresight_.network != nullptr && !result_.blew_up) foresee();
   measured_ = false;
   return result_;
 }

@@ -6,6 +6,7 @@
 
 #include "fragments/pieces.h"
 #include "frame/run_frame.h"
+#include "mpm/fragment_forecast.h"
 #include "mpm/mpm_state.h"
 #include "mpm/state_figures.h"
 #include "mpm/substep_choice.h"
@@ -60,6 +61,10 @@ class CudaMpmTissue final : public Tissue {
   void pull();  ///< nodes and contacts from the GPU
   void push();  ///< everything but contacts to the GPU
   const Pieces& pieces() const { return pieces_; }
+  // As of MpmTissue.
+  const std::vector<FragmentChance>& forecast() const { return foresight_.forecast; }
+  void classify_by(FragmentClassifier classifier) { foresight_.classifier = std::move(classifier); }
+  int flown() const { return foresight_.flown; }
   void search_anew();  ///< lists of facets that may touch are made anew before the next substep
   /// Of each facet, those that it may touch, as of the last search.
   std::vector<std::vector<std::int32_t>> near_facets() const;
@@ -98,11 +103,14 @@ class CudaMpmTissue final : public Tissue {
   std::vector<int> label_pieces();  ///< after bonds broke; returns the new ids
   void cut_by_blades();
   void keep_place_for_blades();
+  /// Points whose strain is at least `share` of what their body's weakest material bears.
+  std::vector<StretchedPoint> list_stretched(float share);
   std::vector<TearingPoint> find_tearing();
   /// At this share of the frame; blades have cut their way before. Returns whether any tears.
   bool tear(double share);
   void tame();                ///< see MpmTissue
   bool settle_wild_debris();  ///< the same
+  void foresee();             ///< the end of a frame with a fragment network
   void upload_points();
   template <class Margin>
   bool may_meet(const std::vector<BlockMotion>& motion, const Margin& margin) const;
@@ -173,6 +181,7 @@ class CudaMpmTissue final : public Tissue {
   std::vector<float> modulus_;  ///< see SubstepChoice::follow()
   SubstepChoice substep_;
   FrameResult result_;
+  Foresight foresight_;
 };
 
 }  // namespace tissue_sim

@@ -59,6 +59,7 @@ void CudaMpmTissue::each_field(Archive& archive, StateOnHost& of_device) {
   archive.part("pieces", pieces_, pieces_measured_);
   archive.part("substeps", stiffening_, modulus_, substep_);
   archive.part("shape", d.shape, d.cut_shape);
+  archive.part("forecast", foresight_.said, foresight_.waiting, foresight_.flown);
   each_part(archive, of_device);
 }
 
@@ -188,6 +189,7 @@ void CudaMpmTissue::restore(Span<const std::uint8_t> saved) {
   faces.listed.clear();
   faces.all.clear();
   faces.forget_active();
+  index_flights(*state_);
   push();
   std::vector<std::uint8_t> with(d.with.size(), 0);
   std::vector<float> hold(d.hold.size(), 0.0f);

@@ -200,13 +200,15 @@ __global__ void __launch_bounds__(kMostThreads)
 
 /// The test of BlockKernels::stretched: s^2 I - C is not positive definite.
 __global__ void __launch_bounds__(kMostThreads)
-    list_stretched(const CudaTables t, const CudaNodes state, StretchedPoint* found, int room,
-                   int* count) {
+    list_stretched(const CudaTables t, const CudaNodes state, float share, StretchedPoint* found,
+                   int room, int* count) {
   extern __shared__ float4 shared[];
   const CudaBlock b = bring_block(t, state, shared);
   const CudaBody body = t.bodies[b.body];
   if (body.tear_stretch == 0) return;
-  const float s2 = body.tear_stretch * body.tear_stretch;
+  // At 1 exactly the limit.
+  const float stretch = share == 1 ? body.tear_stretch : 1 + share * (body.tear_stretch - 1);
+  const float s2 = stretch * stretch;
   for_each_point(t, b, shared, [&](int lane, int s, int x, int y, int z, const HalfPlane(&h)[3]) {
     const PointState p = point_state(b, body, h, x, y, z, s);
     StretchedPoint out;
@@ -244,10 +246,10 @@ void launch_measure(const CudaTables& tables, const CudaNodes& state, int max_sl
   launch(measure_blocks, 8, max_slots, tables, state, stream, max_slots, measures);
 }
 
-void launch_stretched(const CudaTables& tables, const CudaNodes& state, int max_slots,
+void launch_stretched(const CudaTables& tables, const CudaNodes& state, int max_slots, float share,
                       StretchedPoint* found, int room, int* count, cudaStream_t stream) {
   check_cuda(cudaMemsetAsync(count, 0, sizeof(int), stream), "clear memory");
-  launch(list_stretched, 4, max_slots, tables, state, stream, found, room, count);
+  launch(list_stretched, 4, max_slots, tables, state, stream, share, found, room, count);
 }
 
 void launch_places(const CudaTables& tables, const float4* u, int max_slots, float* places,

@@ -14,9 +14,10 @@ namespace tissue_sim {
 void launch_measure(const CudaTables& tables, const CudaNodes& state, int max_slots,
                     CudaMeasure* measures, cudaStream_t stream);
 
-/// Lists the points whose largest stretch reaches the tear_stretch of their body, in any order,
-/// into `found`, which has room for so many; `count`, one number, becomes how many they are.
-void launch_stretched(const CudaTables& tables, const CudaNodes& state, int max_slots,
+/// Lists the points whose largest strain reaches `share` of that at the tear_stretch of their body,
+/// in any order, into `found`, which has room for so many; `count`, one number, becomes how many
+/// they are.
+void launch_stretched(const CudaTables& tables, const CudaNodes& state, int max_slots, float share,
                       StretchedPoint* found, int room, int* count, cudaStream_t stream);
 
 /// Writes where all points are, [points][3] [m].

@@ -135,7 +135,8 @@ void fields(Archive& archive, Touch& t) {
 
 template <class Archive>
 void fields(Archive& archive, NearCell& c) {
-  archive(c.lane, c.node, c.collider, c.points, c.first_place, c.place_count, c.middle, c.clear);
+  archive(c.lane, c.node, c.collider, c.points, c.first_place, c.place_count, c.middle, c.lightest,
+          c.clear);
 }
 
 template <class Archive>

@@ -4,7 +4,9 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "mpm/anchors/soft_faces.h"
 #include "mpm/cuda/on_device.h"
+#include "mpm/cuda/outer_points.h"
 #include "mpm/lattice_pieces.h"
 #include "mpm/piece_motion.h"
 #include "mpm/split/cut_tissue.h"
@@ -20,6 +22,7 @@ std::unique_ptr<MpmState> make_state(const Scene& scene, std::vector<std::string
   state->scene = scene;
   state->bodies = make_lattice_bodies(scene, state->points, notes, NodeRange::kBox);
   state->whole_bonds = state->points.bonds;
+  if (scene.mpm.boundary == MpmBoundary::kSurface) soften_at_faces(scene, *state);
   state->fields = std::make_unique<NodeFields>(state->bodies, state->points, state->nodes);
   state->instructions = instruction_set();
   state->kernels = &block_kernels(state->instructions);
@@ -33,14 +36,12 @@ void note_what_differs(const Scene& scene, std::vector<std::string>& notes) {
   const bool anchors = std::any_of(scene.bodies.begin(), scene.bodies.end(),
                                    [](const Body& b) { return !b.anchors.empty(); });
   if (anchors) {
-    notes.emplace_back(
-        "on a GPU anchors hold nodes of the lattice, up to half a cell from their faces, and "
-        "report no loads; device cpu holds tissue at the faces themselves");
+    notes.emplace_back("on a GPU anchors do not move and report no loads; on device cpu they do");
   }
   if (!scene.tools.empty()) {
     notes.emplace_back(
-        "on a GPU tools touch the points of tissue, a quarter of a cell or so below its surface, "
-        "with a soft spring; device cpu touches the surface itself");
+        "on a GPU tools sink into the surface of tissue by up to a tenth of a cell or so, for what "
+        "holds them off is a soft spring; on device cpu by a hundredth");
   }
 }
 
@@ -78,6 +79,9 @@ CudaMpmTissue::CudaMpmTissue(const Scene& scene, std::vector<std::string> notes)
       state_->bodies.size() > 1 ? d.cut_shape : choose_shape(state_->bodies, d.limits, true),
       d.limits.processors);
   pieces_ = whole_pieces(*state_);
+  if (scene.mpm.boundary == MpmBoundary::kSurface && collider_count(scene) > 0) {
+    d.outer.upload(outer_points(*state_), d.stream);
+  }
   push();
   launch_measure();
   finish_measure();

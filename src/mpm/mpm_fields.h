@@ -63,14 +63,14 @@ void fields(Archive& archive, Facet& f) {
 
 template <class Archive>
 void fields(Archive& archive, SurfacePlace& p) {
-  archive(p.cell, p.node, p.point, p.key, p.place, p.normal, p.area);
+  archive(p.cell, p.node, p.point, p.points, p.key, p.place, p.normal, p.area);
 }
 
 template <class Archive>
 void fields(Archive& archive, Block& b) {
   archive(b.body, b.x, b.y, b.z, b.nx, b.ny, b.nz, b.sides, b.pitch, b.stride, b.plane, b.runs,
           b.node_rows, b.filled, b.filled_columns, b.cell, b.material, b.mixture, b.volume, b.point,
-          b.partial, b.node, b.facets, b.surface, b.modulus, b.number, b.force_offset);
+          b.partial, b.node, b.facets, b.surface, b.merged, b.modulus, b.number, b.force_offset);
 }
 
 template <class Archive>
@@ -178,7 +178,7 @@ void tissue_fields(Archive& archive, MpmState& s) {
   archive.part("scene", s.scene.gravity, s.scene.damping);
   archive.part("u", s.nodes.u);
   archive.part("v", s.nodes.v);
-  archive.part("mass", s.nodes.mass, s.nodes.inv_mass);
+  archive.part("mass", s.nodes.mass, s.nodes.inv_mass, s.nodes.held_inv_mass);
   archive.part("points", s.points);
   archive.part("node fields", *s.fields);
   archive.part("blocks", s.blocks);

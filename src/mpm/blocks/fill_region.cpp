@@ -101,7 +101,7 @@ void fill_side(Block& block, const LatticeBody& b, const Points& points, const P
         point[i] = c.point[s] + 2 * i;
         volume[i] = points.volume[point[i]];
       }
-      if (!points.soft.empty() || !points.free_volume.empty() || !points.yielding.empty()) {
+      if (!points.soft.empty() || !points.free_volume.empty()) {
         for (int i = 0; i < c.cells; ++i) volume[i] = elastic_volume(points, point[i]);
       }
       for (int i = 0; i < c.cells; ++i) {

@@ -67,6 +67,11 @@ bool overlap(const Box& a, const Box& b) {
 /// may come in that time [cells].
 constexpr int kListLasts = 8;
 constexpr double kListMargin = 0.5;
+/// The places of a block where a collider touches it.
+const std::vector<SurfacePlace>& places_for(const Collider& collider, const Block& block) {
+  return collider.kind == Collider::kPlane ? block.merged : block.surface;
+}
+
 /// How far from the points of a cell its surface may be [cells].
 double surface_reach(const MpmState& state) { return state.points.outer.empty() ? 0 : 0.5; }
 
@@ -81,7 +86,7 @@ float largest_inv_mass(const Nodes& nodes, const CellNodes& cell) {
   for (int row = 0; row < 9; ++row) {
     for (int x = 0; x < 3; ++x) {
       const std::int32_t node = cell.row(row % 3, row / 3)[x];
-      if (node >= 0) largest = std::max(largest, nodes.inv_mass[node]);
+      if (node >= 0) largest = std::max(largest, nodes.contact_inv_mass()[node]);
     }
   }
   return largest;
@@ -214,14 +219,15 @@ void list_near_cells(MpmState& state, int index, float dt) {
       // Others touch over their places on the surface.
       if (is_blade || in_body || at_points) points[cell] |= 1u << row % 8;
     }
-    auto place = block.surface.begin();
+    const std::vector<SurfacePlace>& places = places_for(collider, block);
+    auto place = places.begin();
     for (int z = 0, i = 0; z < block.nz; ++z) {
       for (int lane = 0; lane < block.stride; ++lane, ++i) {
         if (near[i] == 0) continue;
         const std::int32_t cell = z * 8 * block.stride + lane;
-        while (place != block.surface.end() && place->cell < cell) ++place;
+        while (place != places.end() && place->cell < cell) ++place;
         const auto first = place;
-        while (place != block.surface.end() && place->cell == cell) ++place;
+        while (place != places.end() && place->cell == cell) ++place;
         const int count = is_blade ? 0 : static_cast<int>(place - first);
         if (points[i] == 0 && count == 0) continue;
         const int node = z * block.plane + block.cell[lane];
@@ -230,7 +236,7 @@ void list_near_cells(MpmState& state, int index, float dt) {
                          node,
                          c,
                          points[i],
-                         static_cast<std::int32_t>(first - block.surface.begin()),
+                         static_cast<std::int32_t>(first - places.begin()),
                          count,
                          {static_cast<float>(middle[0]), static_cast<float>(middle[1]),
                           static_cast<float>(middle[2])},
@@ -265,7 +271,8 @@ struct BlockPush {
   }
   void let_go(const Touch& touch) {
     if (touch.inertia == 0) return;
-    const auto place = std::lower_bound(block.surface.begin(), block.surface.end(), touch,
+    const auto& places = places_for(state.colliders[touch.collider], block);
+    const auto place = std::lower_bound(places.begin(), places.end(), touch,
                                         [](const SurfacePlace& p, const Touch& t) {
                                           return std::tie(p.cell, p.key) < std::tie(t.cell, t.key);
                                         });
@@ -394,6 +401,7 @@ bool push_surface(BlockPush& b, const NearCell& cell, const Collider& collider, 
   const float* const u_and_v[6] = {u[0],           u[1],           u[2],
                                    of.v[0].data(), of.v[1].data(), of.v[2].data()};
   const float beside = collider.kind == Collider::kJaw ? kBeside * h : 0;
+  const std::vector<SurfacePlace>& places = places_for(collider, b.block);
   bool touches = false;
   int material = -1;
   SurfaceSpring of_unit_area{};
@@ -408,7 +416,7 @@ bool push_surface(BlockPush& b, const NearCell& cell, const Collider& collider, 
     return along > kFacing * std::sqrt(length);
   };
   for (int i = 0; i < cell.place_count; ++i) {
-    const SurfacePlace& place = b.block.surface[cell.first_place + i];
+    const SurfacePlace& place = places[cell.first_place + i];
     const AxisWeights weights(place.place);
     Touch touch{cell.lane, place.point, place.key, cell.collider, {}, {}};
     const bool is_held = b.find_held(touch);
@@ -428,10 +436,9 @@ bool push_surface(BlockPush& b, const NearCell& cell, const Collider& collider, 
       if (g.distance < beside && !faces_away(place, g)) load.points += place.area / unit_area;
       continue;
     }
-    const unsigned point = 1u << (place.key / 8 - 1);
     if (!is_held) {
       if (faces_away(place, g)) {  // the far side of something thin
-        points |= point;
+        points |= place.points;
         continue;
       }
       to_local(collider, at, touch.hold);
@@ -439,7 +446,7 @@ bool push_surface(BlockPush& b, const NearCell& cell, const Collider& collider, 
       values_at(u_and_v, nodes, whole_rows, weights, moved);
     }
     touches = true;
-    if (g.distance < -kDeep * h) points |= point;
+    if (g.distance < -kDeep * h) points |= place.points;
     const bool is_free = b.state.points.free_volume_of(place.point) > 0;
     const int own = b.state.points.material_of(place.point);
     if (own != material) {

@@ -4,7 +4,6 @@
 #include <cmath>
 #include <stdexcept>
 
-#include "mpm/anchors/soft_faces.h"
 #include "mpm/cuda/on_device.h"
 #include "mpm/cuda/outer_points.h"
 #include "mpm/lattice_pieces.h"
@@ -22,7 +21,6 @@ std::unique_ptr<MpmState> make_state(const Scene& scene, std::vector<std::string
   state->scene = scene;
   state->bodies = make_lattice_bodies(scene, state->points, notes, NodeRange::kBox);
   state->whole_bonds = state->points.bonds;
-  if (scene.mpm.boundary == MpmBoundary::kSurface) soften_at_faces(scene, *state);
   state->fields = std::make_unique<NodeFields>(state->bodies, state->points, state->nodes);
   state->instructions = instruction_set();
   state->kernels = &block_kernels(state->instructions);
@@ -36,7 +34,9 @@ void note_what_differs(const Scene& scene, std::vector<std::string>& notes) {
   const bool anchors = std::any_of(scene.bodies.begin(), scene.bodies.end(),
                                    [](const Body& b) { return !b.anchors.empty(); });
   if (anchors) {
-    notes.emplace_back("on a GPU anchors do not move and report no loads; on device cpu they do");
+    notes.emplace_back(
+        "on a GPU anchors hold nodes of the lattice, up to half a cell from their faces, and "
+        "report no loads; device cpu holds tissue at the faces themselves");
   }
   if (!scene.tools.empty()) {
     notes.emplace_back(

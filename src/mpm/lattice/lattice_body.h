@@ -59,8 +59,6 @@ struct Points {
   /// Of that the share of the most that a neighbour has, where it is less: so much lighter than its
   /// neighbours; as `free_volume`.
   Array<float> lightness;
-  Array<float> yielding;  ///< share of the stiffness of each beside an anchor that holds nodes
-                          ///< (mpm/anchors/soft_faces.h); empty where none does
   Array<std::uint8_t> anchored;                 ///< kInAnchor, kAtAnchor or 0
   static constexpr std::uint8_t kInAnchor = 1;  ///< its place is in an anchor
   static constexpr std::uint8_t kAtAnchor = 2;  ///< the face of one holds it

@@ -25,8 +25,7 @@ Softened soften(LatticeTissue& tissue, const std::vector<std::int32_t>& changed)
 
 /// The volume by which a point resists strain [m^3]: its own, or less where it is soft.
 inline float elastic_volume(const Points& points, std::int32_t point) {
-  const float yielding = points.yielding.empty() ? 1.0f : points.yielding[point];
-  return (points.is_soft(point) ? kSoftness : 1.0f) * yielding * points.free_volume_of(point);
+  return (points.is_soft(point) ? kSoftness : 1.0f) * points.free_volume_of(point);
 }
 
 /// Lets debris, each given by its lowest point, move on as rigid bodies without strain. Their

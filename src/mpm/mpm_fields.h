@@ -178,7 +178,7 @@ void tissue_fields(Archive& archive, MpmState& s) {
   archive.part("scene", s.scene.gravity, s.scene.damping);
   archive.part("u", s.nodes.u);
   archive.part("v", s.nodes.v);
-  archive.part("mass", s.nodes.mass, s.nodes.inv_mass, s.nodes.held_inv_mass);
+  archive.part("mass", s.nodes.mass, s.nodes.inv_mass);
   archive.part("points", s.points);
   archive.part("node fields", *s.fields);
   archive.part("blocks", s.blocks);

@@ -319,7 +319,7 @@ void find_face_links(const Scene& scene, const LatticeTissue& tissue, AnchorFace
   faces.now.resize(faces.origin.size());
 }
 
-void find_face_rows(LatticeTissue& tissue, AnchorFaces& faces) {
+void find_face_rows(const LatticeTissue& tissue, AnchorFaces& faces) {
   if (faces.links.empty()) return;
   const std::vector<FaceRow> old_rows = std::move(faces.rows);
   const std::vector<std::array<double, 3>> old_impulse = std::move(faces.impulse);
@@ -329,17 +329,6 @@ void find_face_rows(LatticeTissue& tissue, AnchorFaces& faces) {
              faces.rows);
   }
   make_groups(faces);
-  // The diagonal of what is left of M^-1 when what a row holds is taken out.
-  tissue.nodes.held_inv_mass = tissue.nodes.inv_mass;
-  for (const FaceRow& row : faces.rows) {
-    float mobility = 0;
-    for (int k = 0; k < kRowNodes; ++k) mobility += row.weight[k] * row.share[k];
-    for (int k = 0; k < kRowNodes; ++k) {
-      if (row.share[k] == 0) continue;
-      float& left = tissue.nodes.held_inv_mass[row.node[k]];
-      left = std::max(0.0f, left - row.share[k] * row.share[k] / mobility);
-    }
-  }
   faces.impulse.assign(faces.rows.size(), {});
   // What was carried before, in a frame, goes to rows at the same places.
   std::map<std::array<float, 3>, std::size_t> at;

@@ -86,8 +86,8 @@ struct AnchorFaces {
 /// (AnchorFaces::points). Throws std::invalid_argument for an anchor that neither holds points nor
 /// has a face at its body.
 void find_face_links(const Scene& scene, const LatticeTissue& tissue, AnchorFaces& faces);
-/// Makes the rows anew: at the beginning, and after nodes were split. Fills Nodes::held_inv_mass.
-void find_face_rows(LatticeTissue& tissue, AnchorFaces& faces);
+/// Makes the rows anew: at the beginning, and after nodes were split.
+void find_face_rows(const LatticeTissue& tissue, AnchorFaces& faces);
 /// Finds AnchorFaces::held: before any anchor moves, and after nodes were split.
 void find_held_nodes(const LatticeTissue& tissue, AnchorFaces& faces);
 

@@ -86,7 +86,7 @@ float largest_inv_mass(const Nodes& nodes, const CellNodes& cell) {
   for (int row = 0; row < 9; ++row) {
     for (int x = 0; x < 3; ++x) {
       const std::int32_t node = cell.row(row % 3, row / 3)[x];
-      if (node >= 0) largest = std::max(largest, nodes.contact_inv_mass()[node]);
+      if (node >= 0) largest = std::max(largest, nodes.inv_mass[node]);
     }
   }
   return largest;

@@ -27,11 +27,10 @@ inline const Material& material_of(const MpmState& s, std::int32_t facet) {
 /// Sum of w^2 / m over the nodes of a place: what a spring there moves, as one over a mass [1/kg].
 inline double mobility(const Nodes& nodes, const CellNodes& cell, const AxisWeights& weights) {
   double sum = 0;
-  const float* const inv_mass = nodes.contact_inv_mass();
   for (int k = 0; k < 27; ++k) {
     const float w = weights.of[k % 3] * weights.of[3 + k / 3 % 3] * weights.of[6 + k / 9];
     const int node = cell.lowest[k / 9 * cell.plane + k / 3 % 3 * cell.pitch + k % 3];
-    sum += static_cast<double>(w) * w * inv_mass[node];
+    sum += static_cast<double>(w) * w * nodes.inv_mass[node];
   }
   return sum;
 }

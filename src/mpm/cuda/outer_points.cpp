@@ -14,6 +14,7 @@ constexpr double kFarthest = 0.5;  // from a point to its place along an axis [c
 
 std::vector<float4> outer_points(const LatticeTissue& tissue) {
   const std::vector<OuterPlace> all = find_outer_places(tissue);
+  const Array<std::uint8_t>& bonds = tissue.points.bonds;
   std::vector<float4> places(tissue.points.size(), float4{0, 0, 0, 0});
   for (auto first = all.begin(); first != all.end();) {
     const auto last = std::find_if(first, all.end(),
@@ -30,7 +31,8 @@ std::vector<float4> outer_points(const LatticeTissue& tissue) {
     }
     x = x.cwiseMax(from - Vec3::Constant(kFarthest)).cwiseMin(from + Vec3::Constant(kFarthest));
     places[first->point] = {static_cast<float>(x[0]), static_cast<float>(x[1]),
-                            static_cast<float>(x[2]), 1};
+                            static_cast<float>(x[2]),
+                            static_cast<float>(__builtin_popcount(bonds[first->point]))};
     first = last;
   }
   return places;

@@ -25,7 +25,9 @@ struct PlaceWeights {
     for (int a = 0; a < 3; ++a) at[a] = (s >> a & 1) != 0 ? 0.25f : -0.25f;
     if (t.outer != nullptr && point >= 0) {
       const float4 place = __ldg(t.outer + point);
-      if (place.w != 0) at[0] = place.x, at[1] = place.y, at[2] = place.z;
+      // What cuts took apart may lie on its other side.
+      if (place.w != 0 && place.w == __popc(t.bonds[point]))
+        at[0] = place.x, at[1] = place.y, at[2] = place.z;
     }
 #pragma unroll
     for (int a = 0; a < 3; ++a) {

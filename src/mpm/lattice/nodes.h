@@ -14,12 +14,6 @@ struct Nodes {
   Array<float> v[3];      ///< velocity [m/s]
   Array<float> mass;      ///< [kg], 0 where no point reaches
   Array<float> inv_mass;  ///< [1/kg], 0 where no point reaches and where the node is anchored
-  /// The same as contact feels it: less where the face of an anchor holds a node, which yields so
-  /// much less; empty where none does.
-  Array<float> held_inv_mass;
-  const float* contact_inv_mass() const {
-    return held_inv_mass.empty() ? inv_mass.data() : held_inv_mass.data();
-  }
   std::size_t size() const { return mass.size(); }
   void reserve(std::size_t n) {
     for (int c = 0; c < 3; ++c) {

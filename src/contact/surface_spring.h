@@ -35,6 +35,12 @@ TISSUE_SIM_INLINE SurfaceSpring surface_spring(float modulus, float density, flo
           2 * kDampingAlong * sqrtf(along * mass), 0};
 }
 
+/// Of a place that stands for so much more.
+TISSUE_SIM_INLINE SurfaceSpring scaled(const SurfaceSpring& s, float by) {
+  return {by * s.across, by * s.along, by * s.damping_across, by * s.damping_along,
+          by * s.cohesion};
+}
+
 /// Force on the place at x with velocity v, in contact (`g.distance` < 0). `hold` is the place, in
 /// the collider's frame, that friction holds on to; it slides with x where the cone is reached.
 /// `begun` is how deep it was when contact began, where the spring has no force yet: else each

@@ -55,6 +55,7 @@ double LinearisedMotion::accelerations(const F& f) {
   NodeStep step{};
   step.dt = step.kick = 1;  // from rest: rates are accelerations
   move_nodes(state_, step);
+  for (const int group : held_) hold_still(state_.anchors, group, state_.nodes.v);
   return sum([&](int a, int i) {
     float& v = state_.nodes.v[a][nodes_[i]];
     const float x = v;
@@ -79,6 +80,17 @@ LinearisedMotion::LinearisedMotion(MpmState& state, const std::vector<std::uint8
     nodes_.push_back(static_cast<std::int32_t>(i));
     mass_.push_back(n.mass[i]);
   }
+  const AnchorFaces& faces = state.anchors;
+  for (std::size_t g = 0; g < faces.groups.size(); ++g) {
+    bool all = true;
+    for (int i = 0; i < faces.groups[g].count; ++i) {
+      const FaceRow& row = faces.rows[faces.groups[g].first + i];
+      for (int k = 0; k < kRowNodes; ++k) {
+        all = all && (row.share[k] == 0 || seen[row.node[k]] != 0);
+      }
+    }
+    if (all) held_.push_back(static_cast<int>(g));
+  }
   for (int a = 0; a < 3; ++a) {
     u_[a] = n.u[a];
     rates_[a].assign(n.size(), 0.0f);
@@ -93,10 +105,15 @@ LinearisedMotion::LinearisedMotion(MpmState& state, const std::vector<std::uint8
 }
 
 void LinearisedMotion::start() {
-  const Nodes& n = state_.nodes;
-  const double square = sum([&](int a, int i) {
+  Nodes& n = state_.nodes;
+  for_each([&](int a, int i) {
     const std::int32_t node = nodes_[i];
-    v_[a][i] = scattered(static_cast<std::uint32_t>(3 * node + a)) * std::sqrt(n.inv_mass[node]);
+    n.v[a][node] =
+        scattered(static_cast<std::uint32_t>(3 * node + a)) * std::sqrt(n.inv_mass[node]);
+  });
+  for (const int group : held_) hold_still(state_.anchors, group, n.v);
+  const double square = sum([&](int a, int i) {
+    v_[a][i] = std::exchange(n.v[a][nodes_[i]], 0.0f);
     return static_cast<double>(mass_[i]) * v_[a][i] * v_[a][i];
   });
   const auto scale = static_cast<float>(square > 0 ? 1 / std::sqrt(square) : 0);

@@ -10,7 +10,8 @@ namespace tissue_sim {
 
 /// A = M^-1 K about the present state, without contact, for largest_eigenvalue(): by differences of
 /// the forces that the kernels of the substep give. Vectors are displacements of the nodes, their
-/// inner product is weighed by mass. The same bits for any number of threads.
+/// inner product is weighed by mass. What faces of anchors hold has no part in it. The same bits for
+/// any number of threads.
 class LinearisedMotion {
  public:
   /// `takes_part`: of each of the state's blocks, whether its stiffness counts; the rest of the
@@ -41,6 +42,7 @@ class LinearisedMotion {
   MpmState& state_;
   std::vector<int> blocks_;          ///< that take part
   std::vector<std::int32_t> nodes_;  ///< that those see: the vectors have an entry for each
+  std::vector<int> held_;            ///< groups of anchors' faces that hold some of these
   Array<float> mass_;                ///< of these [kg]
   Array<float> u_[3], rates_[3];     ///< what the state's nodes had
   Vector at_rest_;                   ///< accelerations without displacement [m/s^2]

@@ -63,14 +63,14 @@ void fields(Archive& archive, Facet& f) {
 
 template <class Archive>
 void fields(Archive& archive, SurfacePlace& p) {
-  archive(p.cell, p.node, p.point, p.key, p.place, p.normal, p.area);
+  archive(p.cell, p.node, p.point, p.points, p.key, p.place, p.normal, p.area);
 }
 
 template <class Archive>
 void fields(Archive& archive, Block& b) {
   archive(b.body, b.x, b.y, b.z, b.nx, b.ny, b.nz, b.sides, b.pitch, b.stride, b.plane, b.runs,
           b.node_rows, b.filled, b.filled_columns, b.cell, b.material, b.mixture, b.volume, b.point,
-          b.partial, b.node, b.facets, b.surface, b.modulus, b.number, b.force_offset);
+          b.partial, b.node, b.facets, b.surface, b.merged, b.modulus, b.number, b.force_offset);
 }
 
 template <class Archive>
@@ -135,7 +135,8 @@ void fields(Archive& archive, Touch& t) {
 
 template <class Archive>
 void fields(Archive& archive, NearCell& c) {
-  archive(c.lane, c.node, c.collider, c.points, c.first_place, c.place_count, c.middle, c.clear);
+  archive(c.lane, c.node, c.collider, c.points, c.first_place, c.place_count, c.middle, c.lightest,
+          c.clear);
 }
 
 template <class Archive>

@@ -55,6 +55,9 @@ BlockField block_field(const MpmState& state, const Block& block) {
   f.viscosity = static_cast<float>(m.viscosity);
   f.material = state.points.material.empty() ? nullptr : state.points.material.data();
   f.soft = state.points.soft.empty() ? nullptr : state.points.soft.data();
+  f.lightness = state.points.lightness.empty() ? nullptr : state.points.lightness.data();
+  f.bonds = state.points.bonds.data();
+  f.whole_bonds = state.whole_bonds.data();
   f.material_count = static_cast<int>(b.materials.size());
   return f;
 }

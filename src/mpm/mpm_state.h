@@ -40,8 +40,9 @@ struct NearCell {
   std::int32_t node;  ///< its lowest, in the block's nodes
   std::uint8_t collider;
   std::uint8_t points;  ///< bit s: that at sub-position s, in the body or for a blade
-  std::int32_t first_place, place_count;  ///< in Block::surface
+  std::int32_t first_place, place_count;  ///< in Block::surface or merged
   float middle[3];                        ///< reference place [m]
+  float lightest;                         ///< largest 1 / m of its nodes [1/kg]; 0 without places
   std::uint8_t clear = 0;                 ///< substeps for which the collider cannot reach it
 };
 

@@ -137,6 +137,12 @@ Vec3 to_tissue(const LatticeBody& b, const std::array<int, 3>& low, int axis) {
   return around == 4 ? Vec3::Zero() : nearest;
 }
 
+/// Whether a face goes through the cubes of the points at site `i` along the link, or along them.
+bool is_at_face(const FaceLink& link, int i) {
+  const double at = 2 * (link.cell[link.axis] + 0.5 + (link.outside ? link.at : -link.at));
+  return at > i - 1e-3 && at < i + 1 + 1e-3;
+}
+
 /// Adds where faces go through the link from a node to the next along an axis.
 void add_links(const std::vector<LatticeBody>& bodies, int body, int first_anchor,
                const std::array<int, 3>& low, int axis, AnchorFaces& faces) {
@@ -160,11 +166,9 @@ void add_links(const std::vector<LatticeBody>& bodies, int body, int first_ancho
     const double place = lower ? c.t : c.t - 1;
     link.outside = c.inside_low;
     link.at = static_cast<float>(link.outside ? place : -place);
-    // In half cells: it counts where it goes through the cube of a point, or along it.
-    const double at = 2 * (link.cell[axis] + 0.5 + place);
     bool near = false;
     for_each_point_of_row(b, link.cell, axis, [&](int p, int i) {
-      if (at < i - 1e-3 || at > i + 1 + 1e-3) return;
+      if (!is_at_face(link, i)) return;
       near = true;
       faces.points.push_back(p);
     });
@@ -172,7 +176,8 @@ void add_links(const std::vector<LatticeBody>& bodies, int body, int first_ancho
   }
 }
 
-/// The rows of a link, one for each choice of fields that points around see there.
+/// The rows of a link, one for each choice of fields that points at the face see there: what was
+/// cut off in front of it is not held.
 void add_rows(const LatticeBody& b, const Points& points, const NodeFields& fields,
               const Nodes& nodes, const FaceLink& link, std::vector<FaceRow>& rows) {
   using Found = std::array<std::int32_t, kRowNodes>;
@@ -189,7 +194,8 @@ void add_rows(const LatticeBody& b, const Points& points, const NodeFields& fiel
   }
   if (split) {
     found.clear();
-    for_each_point_of_row(b, link.cell, link.axis, [&](int p, int) {
+    for_each_point_of_row(b, link.cell, link.axis, [&](int p, int i) {
+      if (!is_at_face(link, i)) return;
       Found of;
       for (int k = 0; k < 3; ++k) {
         of[k] = fields.node(b, points.site[p], n[k][0], n[k][1], n[k][2]);
@@ -420,6 +426,27 @@ void hold_group(AnchorFaces& faces, int index, float dt, const RigidMotion* befo
         const float dv = r.share[k] * impulse;
         nodes.v[a][r.node[k]] += dv;
         nodes.u[a][r.node[k]] += dt * dv;
+      }
+    }
+  }
+}
+
+void hold_still(const AnchorFaces& faces, int index, Array<float>* field) {
+  const FaceGroup& g = faces.groups[index];
+  float held[kLargestGroup];
+  for (int a = 0; a < 3; ++a) {
+    for (int i = 0; i < g.count; ++i) {
+      const FaceRow& r = faces.rows[g.first + i];
+      held[i] = 0;
+      for (int k = 0; k < kRowNodes; ++k) held[i] += r.weight[k] * field[a][r.node[k]];
+    }
+    for (int i = 0; i < g.count; ++i) {
+      const FaceRow& r = faces.rows[g.first + i];
+      const float* inverse = faces.inverse.data() + g.inverse + i * g.count;
+      float impulse = 0;
+      for (int j = 0; j < g.count; ++j) impulse += inverse[j] * held[j];
+      for (int k = 0; k < kRowNodes; ++k) {
+        if (r.share[k] != 0) field[a][r.node[k]] -= r.share[k] * impulse;
       }
     }
   }

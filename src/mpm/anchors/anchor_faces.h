@@ -99,6 +99,8 @@ std::vector<RigidMotion> anchors_at(const AnchorFaces& faces, const FrameInput& 
 /// anchors were and are, null where they stay.
 void hold_group(AnchorFaces& faces, int i, float dt, const RigidMotion* before,
                 const RigidMotion* after, Nodes& nodes);
+/// Takes what group `i` holds out of a field [3] of the nodes.
+void hold_still(const AnchorFaces& faces, int i, Array<float>* field);
 /// Moves the nodes inside with their anchors.
 void move_held(const AnchorFaces& faces, float dt, const RigidMotion* before,
                const RigidMotion* after, Nodes& nodes);

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "mpm/lattice/bonds.h"
+
 namespace tissue_sim {
 namespace {
 
@@ -63,6 +65,25 @@ OutsideShare outside_box(const Vec3& low, const Vec3& high, const Vec3& center, 
     result.middle = -inside * (0.5 * (low + high) - center) / edge / result.share;
   }
   return result;
+}
+
+void find_lightness(LatticeTissue& tissue) {
+  Points& points = tissue.points;
+  const auto share = [&](int p) { return points.free_volume[p] / points.volume[p]; };
+  points.lightness.assign(points.size(), 1.0f);
+  for (const LatticeBody& b : tissue.bodies) {
+    for (int p = b.first_point; p < b.first_point + b.point_count; ++p) {
+      if (share(p) >= 1) continue;
+      const Points::Site& s = points.site[p];
+      float most = share(p);
+      for (int k = 0; k < kBondCount; ++k) {
+        const BondOffset o = bond_offset(k);
+        const int other = b.point(s.x + o.x, s.y + o.y, s.z + o.z);
+        if (other >= 0) most = std::max(most, std::min(share(other), 1.0f));
+      }
+      if (most > 0) points.lightness[p] = share(p) / most;
+    }
+  }
 }
 
 }  // namespace
@@ -141,6 +162,7 @@ void find_free_volumes(LatticeTissue& tissue) {
       }
     }
   }
+  find_lightness(tissue);
 }
 
 }  // namespace tissue_sim

@@ -20,7 +20,7 @@ OutsideShare share_outside(const std::vector<Anchor>& anchors, const Vec3& cente
 inline constexpr double kShift = 1.6;
 
 /// Fills Points::free_volume: of each point the volume outside the anchors, some of it shared with
-/// its neighbours. Empty where no body has anchors.
+/// its neighbours; and Points::lightness. Empty where no body has anchors.
 void find_free_volumes(LatticeTissue& tissue);
 
 }  // namespace tissue_sim

@@ -88,7 +88,8 @@ struct Block {
       node;  ///< [nz + 2][plane], in Nodes, -1 for none; split ones as this block sees them
 
   std::vector<Facet> facets;          ///< its surface and cut faces
-  std::vector<SurfacePlace> surface;  ///< where tools touch these
+  std::vector<SurfacePlace> surface;  ///< where tools touch these, ...
+  std::vector<SurfacePlace> merged;   ///< ... and the ground
 
   Stiffness modulus;  ///< of its points
 

@@ -24,8 +24,10 @@ struct BlockField {
   const std::uint8_t*
       material;              ///< of each point, Points::material; null where none has inclusions
   const std::uint8_t* soft;  ///< of each point, Points::soft; null where none is
-  int material_count;        ///< of the body
-  bool has_nodes = false;    ///< whether the kernel finds what gather() left in its scratch
+  const float* lightness;    ///< of each point, Points::lightness; null where all are 1
+  const std::uint8_t *bonds, *whole_bonds;  ///< of each point, with that alone
+  int material_count;                       ///< of the body
+  bool has_nodes = false;  ///< whether the kernel finds what gather() left in its scratch
 };
 
 /// The same block on a lattice of no size: positions() then gives values.

@@ -32,6 +32,11 @@ TISSUE_SIM_INLINE void stiffen(const Block& b, const BlockField& f, std::int32_t
   if (!std::isfinite(stiffening)) r.finite = false;
   r.wildest = std::max(r.wildest, stiffening);
   if (f.soft != nullptr && f.soft[point] != 0) stiffening *= kSoftness;
+  // Behind the face of an anchor tissue strains as its nodes do, without its neighbours' stress; it
+  // is as light as it is soft, and as long as it holds on to them its nodes have their mass.
+  if (f.lightness != nullptr && f.bonds[point] == f.whole_bonds[point]) {
+    stiffening = 1 + f.lightness[point] * (stiffening - 1);
+  }
   const int material = f.material == nullptr ? 0 : f.material[point];
   r.stiffening[material] = std::max(r.stiffening[material], stiffening);
   read.least = b.material != Block::kMixed
@@ -52,7 +57,8 @@ template <int W>
 TISSUE_SIM_INLINE void read_stiffening(const Block& b, const BlockField& f, std::size_t lane,
                                        const Vec<W> (&F)[9], Readings& read) {
   const std::int32_t* point = b.point.data() + lane;
-  const Mask<W> is_point = are_points<W>(point);
+  // A point that an anchor holds has neither stress nor mass.
+  const Mask<W> is_point = are_points<W>(point) & (-bits<W>(load<W>(b.volume.data() + lane)) >> 31);
   Vec<W> cof[9];
   cofactor(F, cof);
   const Vec<W> J = F[0] * cof[0] + F[1] * cof[1] + F[2] * cof[2];
@@ -66,7 +72,7 @@ TISSUE_SIM_INLINE void read_stiffening(const Block& b, const BlockField& f, std:
   store<W>(read.stiffenings, load<W>(read.stiffenings) + keep<W>(is_point, at_most));
   if (!any_negative<W>(bits<W>(read.least - at_most) & is_point)) return;
   for (int i = 0; i < W; ++i) {
-    if (point[i] < 0 || at_most[i] <= read.least) continue;
+    if (is_point[i] == 0 || at_most[i] <= read.least) continue;
     stiffen(b, f, point[i], std::max(cx[i], std::max(cy[i], cz[i])), J[i], f2[i], read);
   }
 }

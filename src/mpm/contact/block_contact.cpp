@@ -67,6 +67,11 @@ bool overlap(const Box& a, const Box& b) {
 /// may come in that time [cells].
 constexpr int kListLasts = 8;
 constexpr double kListMargin = 0.5;
+/// The places of a block where a collider touches it.
+const std::vector<SurfacePlace>& places_for(const Collider& collider, const Block& block) {
+  return collider.kind == Collider::kPlane ? block.merged : block.surface;
+}
+
 /// How far from the points of a cell its surface may be [cells].
 double surface_reach(const MpmState& state) { return state.points.outer.empty() ? 0 : 0.5; }
 
@@ -74,6 +79,17 @@ double surface_reach(const MpmState& state) { return state.points.outer.empty() 
 double approach(const MpmState& state, int block, const Collider& collider, float dt) {
   return kListMargin * state.scene.cell_size / kListLasts +
          (state.motion[block].speed + speed(collider)) * dt;
+}
+
+float largest_inv_mass(const Nodes& nodes, const CellNodes& cell) {
+  float largest = 0;
+  for (int row = 0; row < 9; ++row) {
+    for (int x = 0; x < 3; ++x) {
+      const std::int32_t node = cell.row(row % 3, row / 3)[x];
+      if (node >= 0) largest = std::max(largest, nodes.inv_mass[node]);
+    }
+  }
+  return largest;
 }
 
 }  // namespace
@@ -203,14 +219,15 @@ void list_near_cells(MpmState& state, int index, float dt) {
       // Others touch over their places on the surface.
       if (is_blade || in_body || at_points) points[cell] |= 1u << row % 8;
     }
-    auto place = block.surface.begin();
+    const std::vector<SurfacePlace>& places = places_for(collider, block);
+    auto place = places.begin();
     for (int z = 0, i = 0; z < block.nz; ++z) {
       for (int lane = 0; lane < block.stride; ++lane, ++i) {
         if (near[i] == 0) continue;
         const std::int32_t cell = z * 8 * block.stride + lane;
-        while (place != block.surface.end() && place->cell < cell) ++place;
+        while (place != places.end() && place->cell < cell) ++place;
         const auto first = place;
-        while (place != block.surface.end() && place->cell == cell) ++place;
+        while (place != places.end() && place->cell == cell) ++place;
         const int count = is_blade ? 0 : static_cast<int>(place - first);
         if (points[i] == 0 && count == 0) continue;
         const int node = z * block.plane + block.cell[lane];
@@ -219,10 +236,11 @@ void list_near_cells(MpmState& state, int index, float dt) {
                          node,
                          c,
                          points[i],
-                         static_cast<std::int32_t>(first - block.surface.begin()),
+                         static_cast<std::int32_t>(first - places.begin()),
                          count,
                          {static_cast<float>(middle[0]), static_cast<float>(middle[1]),
-                          static_cast<float>(middle[2])}});
+                          static_cast<float>(middle[2])},
+                         count > 0 ? largest_inv_mass(state.nodes, CellNodes(block, node)) : 0});
       }
     }
   }
@@ -253,7 +271,8 @@ struct BlockPush {
   }
   void let_go(const Touch& touch) {
     if (touch.inertia == 0) return;
-    const auto place = std::lower_bound(block.surface.begin(), block.surface.end(), touch,
+    const auto& places = places_for(state.colliders[touch.collider], block);
+    const auto place = std::lower_bound(places.begin(), places.end(), touch,
                                         [](const SurfacePlace& p, const Touch& t) {
                                           return std::tie(p.cell, p.key) < std::tie(t.cell, t.key);
                                         });
@@ -327,30 +346,29 @@ bool push_points(BlockPush& b, const NearCell& cell, unsigned points, const Coll
   return touches;
 }
 
-/// A node field at a place in a cell.
-void value_at(const Array<float>* field, const CellNodes& cell, bool has_whole_rows,
-              const AxisWeights& weights, float (&value)[3]) {
-  const float* const f[3] = {field[0].data(), field[1].data(), field[2].data()};
-  const auto first = [&cell](int i) { return cell.row(i % 3, i / 3); };
-  if (has_whole_rows) {
-    sum_rows(weights, value, [&](int i, int c) { return load<4>(f[c] + *first(i)); });
-  } else {
-    sum_rows(weights, value, [&](int i, int c) {
-      const std::int32_t* n = first(i);
-      return Vec<4>{f[c][n[0]], f[c][n[1]], f[c][n[2]], 0.0f};
-    });
-  }
-}
-
-float largest_inv_mass(const Nodes& nodes, const CellNodes& cell) {
-  float largest = 0;
-  for (int row = 0; row < 9; ++row) {
-    for (int x = 0; x < 3; ++x) {
-      const std::int32_t node = cell.row(row % 3, row / 3)[x];
-      if (node >= 0) largest = std::max(largest, nodes.inv_mass[node]);
+/// Fields of the nodes, so many components in all, at a place in a cell.
+template <int kCount>
+TISSUE_SIM_INLINE void values_at(const float* const (&of)[kCount], const CellNodes& cell,
+                                 bool has_whole_rows, const AxisWeights& weights,
+                                 float (&value)[kCount]) {
+  const float *wx = weights.of, *wy = wx + 3, *wz = wx + 6;
+  Vec<4> sum[kCount] = {};
+  for (int z = 0; z < 3; ++z) {
+    for (int y = 0; y < 3; ++y) {
+      const std::int32_t* n = cell.row(y, z);
+      const float w = wz[z] * wy[y];
+      if (has_whole_rows) {
+        for (int c = 0; c < kCount; ++c) sum[c] += w * load<4>(of[c] + *n);
+      } else {
+        for (int c = 0; c < kCount; ++c) {
+          sum[c] += w * Vec<4>{of[c][n[0]], of[c][n[1]], of[c][n[2]], 0.0f};
+        }
+      }
     }
   }
-  return largest;
+  for (int c = 0; c < kCount; ++c) {
+    value[c] = wx[0] * sum[c][0] + wx[1] * sum[c][1] + wx[2] * sum[c][2];
+  }
 }
 
 /// Sum of the squares of the 27 weights.
@@ -378,9 +396,15 @@ bool push_surface(BlockPush& b, const NearCell& cell, const Collider& collider, 
   const auto h = static_cast<float>(b.body.cell_size);
   const float unit_area = 0.25f * h * h;
   const float dt2 = b.state.contacts.inertia.dt * b.state.contacts.inertia.dt;
+  const Nodes& of = b.state.nodes;
+  const float* const u[3] = {of.u[0].data(), of.u[1].data(), of.u[2].data()};
+  const float* const u_and_v[6] = {u[0],           u[1],           u[2],
+                                   of.v[0].data(), of.v[1].data(), of.v[2].data()};
   const float beside = collider.kind == Collider::kJaw ? kBeside * h : 0;
+  const std::vector<SurfacePlace>& places = places_for(collider, b.block);
   bool touches = false;
-  float lightest = -1;
+  int material = -1;
+  SurfaceSpring of_unit_area{};
   const auto faces_away = [&](const SurfacePlace& place, const Gap& g) {
     float F[9], n[3], along = 0, length = 0;
     deformation_gradient_at(b.state.nodes.u, nodes, b.body.cell_size, place.place, F);
@@ -392,49 +416,59 @@ bool push_surface(BlockPush& b, const NearCell& cell, const Collider& collider, 
     return along > kFacing * std::sqrt(length);
   };
   for (int i = 0; i < cell.place_count; ++i) {
-    const SurfacePlace& place = b.block.surface[cell.first_place + i];
+    const SurfacePlace& place = places[cell.first_place + i];
     const AxisWeights weights(place.place);
-    float u[3], at[3];
-    value_at(b.state.nodes.u, nodes, whole_rows, weights, u);
-    for (int a = 0; a < 3; ++a) at[a] = cell.middle[a] + place.place[a] * h + u[a];
+    Touch touch{cell.lane, place.point, place.key, cell.collider, {}, {}};
+    const bool is_held = b.find_held(touch);
+    float moved[6] = {}, at[3];  // displacement and velocity
+    if (is_held) {
+      values_at(u_and_v, nodes, whole_rows, weights, moved);
+    } else {
+      float only[3];
+      values_at(u, nodes, whole_rows, weights, only);
+      std::copy_n(only, 3, moved);
+    }
+    for (int a = 0; a < 3; ++a) at[a] = cell.middle[a] + place.place[a] * h + moved[a];
     const Gap g = gap(collider, at);
     if (g.distance >= 0) {
+      if (is_held) b.let_go(touch);
       clear = std::min(clear, std::max(0.0f, g.distance - beside));
       if (g.distance < beside && !faces_away(place, g)) load.points += place.area / unit_area;
       continue;
     }
-    Touch touch{cell.lane, place.point, place.key, cell.collider, {}, {}};
-    const unsigned point = 1u << (place.key / 8 - 1);
-    const bool is_held = b.find_held(touch);
     if (!is_held) {
       if (faces_away(place, g)) {  // the far side of something thin
-        points |= point;
+        points |= place.points;
         continue;
       }
       to_local(collider, at, touch.hold);
       touch.begun = -g.distance;
+      values_at(u_and_v, nodes, whole_rows, weights, moved);
     }
     touches = true;
-    if (g.distance < -kDeep * h) points |= point;
+    if (g.distance < -kDeep * h) points |= place.points;
     const bool is_free = b.state.points.free_volume_of(place.point) > 0;
-    const Material& m = b.body.material_of(b.state.points, place.point);
-    SurfaceSpring spring = surface_spring(static_cast<float>(lame_lambda(m) + 2 * lame_mu(m)),
-                                          static_cast<float>(m.density), h, place.area, b.dt);
+    const int own = b.state.points.material_of(place.point);
+    if (own != material) {
+      material = own;
+      const Material& m = b.body.materials[own];
+      of_unit_area = surface_spring(static_cast<float>(lame_lambda(m) + 2 * lame_mu(m)),
+                                    static_cast<float>(m.density), h, 1, b.dt);
+    }
+    SurfaceSpring spring = scaled(of_unit_area, place.area);
     spring.cohesion = collider.cohesion * place.area / unit_area;
     // Along the surface no inerter helps: at rims and on debris, whose nodes are light, the spring
     // is what the substep bears.
-    if (lightest < 0) lightest = largest_inv_mass(b.state.nodes, nodes);
     const float per_mass = spring.along * b.dt * b.dt / kAlongBorne;
-    if (per_mass * lightest * squared(weights) > 1) {  // mobility is that at most
+    if (per_mass * cell.lightest * squared(weights) > 1) {  // mobility is that at most
       const float light = per_mass * static_cast<float>(mobility(b.state.nodes, nodes, weights));
       if (light > 1) {
         spring.along /= light;
         spring.damping_along /= light;
       }
     }
-    float velocity[3], push[3], of_collider[3];
-    value_at(b.state.nodes.v, nodes, whole_rows, weights, velocity);
-    surface_force(collider, g, spring, at, velocity, touch.hold, touch.begun, push);
+    float push[3], of_collider[3];
+    surface_force(collider, g, spring, at, moved + 3, touch.hold, touch.begun, push);
     if (is_free) {
       spread(b.block, cell.node, weights, push, b.force);
       float along = 0;
@@ -469,6 +503,7 @@ void add_contact(MpmState& state, int index, float dt, float* force,
               contacts.touching[index].cbegin(),
               contacts.touching[index].cend(),
               contacts.changes[index]};
+  b.touching.reserve(contacts.touching[index].size());
   for (NearCell& cell : contacts.cells[index]) {
     if (cell.clear > 0) {
       --cell.clear;

@@ -10,6 +10,7 @@
 namespace tissue_sim {
 namespace {
 
+constexpr float kSameWay = 0.9f;   // cosine of two places' normals that may be one
 constexpr double kFarthest = 1.0;  // from the side of its cube to a place [point distances]
 
 Vec3 direction_of(int bond) {
@@ -69,8 +70,14 @@ std::vector<SurfacePlace> surface_places_of(const LatticeBody& b, const Points& 
             [](const OuterPlace& o, std::int32_t point) { return o.point < point; });
         for (int k = 0; k < kBondCount; ++k) {
           if ((points.bonds[p] >> k & 1) != 0) continue;
-          SurfacePlace place{cell, node, p, static_cast<std::uint8_t>(8 * (sub + 1) + k),
-                             {},   {},   0};
+          SurfacePlace place{cell,
+                             node,
+                             p,
+                             static_cast<std::uint8_t>(1 << sub),
+                             static_cast<std::uint8_t>(8 * (sub + 1) + k),
+                             {},
+                             {},
+                             0};
           const BondOffset o = bond_offset(k);
           if ((whole >> k & 1) == 0) {
             while (outer != points.outer.end() && outer->point == p && outer->bond < k) ++outer;
@@ -104,6 +111,42 @@ std::vector<SurfacePlace> surface_places_of(const LatticeBody& b, const Points& 
     }
   }
   return places;
+}
+
+std::vector<SurfacePlace> merged_places(const std::vector<SurfacePlace>& places,
+                                        const Points& points) {
+  std::vector<SurfacePlace> merged;
+  const auto is_free = [&](const SurfacePlace& p) { return points.free_volume_of(p.point) > 0; };
+  // Tissue goes on all around: at rims and on debris each place counts.
+  const auto is_amid = [&](const SurfacePlace& p) {
+    return (points.bonds[p.point] | 1 << p.key % 8) == kAllBonds;
+  };
+  std::size_t of_cell = 0;  // the first
+  for (const SurfacePlace& p : places) {
+    if (of_cell < merged.size() && merged[of_cell].cell != p.cell) of_cell = merged.size();
+    const auto same = std::find_if(merged.begin() + static_cast<std::ptrdiff_t>(of_cell),
+                                   merged.end(), [&](const SurfacePlace& m) {
+                                     float along = 0;
+                                     for (int a = 0; a < 3; ++a) along += m.normal[a] * p.normal[a];
+                                     return m.key % 8 == p.key % 8 && is_amid(m) && is_amid(p) &&
+                                            is_free(m) == is_free(p) && along > kSameWay;
+                                   });
+    if (same == merged.end()) {
+      merged.push_back(p);
+      continue;
+    }
+    const float area = same->area + p.area, share = p.area / area;
+    float length = 0;
+    for (int a = 0; a < 3; ++a) {
+      same->place[a] += share * (p.place[a] - same->place[a]);
+      same->normal[a] += share * (p.normal[a] - same->normal[a]);
+      length += same->normal[a] * same->normal[a];
+    }
+    for (float& n : same->normal) n /= std::sqrt(length);
+    same->area = area;
+    same->points = static_cast<std::uint8_t>(same->points | p.points);
+  }
+  return merged;
 }
 
 }  // namespace tissue_sim

@@ -24,4 +24,10 @@ std::vector<OuterPlace> find_outer_places(const LatticeTissue& tissue);
 std::vector<SurfacePlace> surface_places_of(const LatticeBody& body, const Points& points,
                                             const Block& block);
 
+/// The same with one place for those of a cell that look the same way amid the surface, in their
+/// middle: what a plane, as the ground is, needs of them, a quarter of the work where whole bodies
+/// rest. It has the key and the point of the first.
+std::vector<SurfacePlace> merged_places(const std::vector<SurfacePlace>& places,
+                                        const Points& points);
+
 }  // namespace tissue_sim

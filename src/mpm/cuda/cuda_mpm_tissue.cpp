@@ -5,6 +5,7 @@
 #include <stdexcept>
 
 #include "mpm/cuda/on_device.h"
+#include "mpm/cuda/outer_points.h"
 #include "mpm/lattice_pieces.h"
 #include "mpm/piece_motion.h"
 #include "mpm/split/cut_tissue.h"
@@ -39,8 +40,8 @@ void note_what_differs(const Scene& scene, std::vector<std::string>& notes) {
   }
   if (!scene.tools.empty()) {
     notes.emplace_back(
-        "on a GPU tools touch the points of tissue, a quarter of a cell or so below its surface, "
-        "with a soft spring; device cpu touches the surface itself");
+        "on a GPU tools sink into the surface of tissue by up to a tenth of a cell or so, for what "
+        "holds them off is a soft spring; on device cpu by a hundredth");
   }
 }
 
@@ -79,6 +80,9 @@ CudaMpmTissue::CudaMpmTissue(const Scene& scene, std::vector<std::string> notes)
       d.limits.processors);
   pieces_ = whole_pieces(*state_);
   foresight_ = make_foresight(scene);
+  if (scene.mpm.boundary == MpmBoundary::kSurface && collider_count(scene) > 0) {
+    d.outer.upload(outer_points(*state_), d.stream);
+  }
   push();
   launch_measure();
   finish_measure();

@@ -29,7 +29,7 @@ CudaReach CudaMpmTissue::reach() const {
                   static_cast<int>(d.host_reach.size()),
                   0,
                   static_cast<float>(duration_),
-                  static_cast<float>(0.5 * state_->scene.cell_size),
+                  static_cast<float>((0.5 + d.surface_reach()) * state_->scene.cell_size),
                   d.went.empty() ? nullptr : d.u_went.data()};
   for (int c = 0; c < reach.collider_count; ++c) {
     if (d.host_colliders[c].kind == Collider::kBlade) reach.blades |= 1u << c;
@@ -40,7 +40,7 @@ CudaReach CudaMpmTissue::reach() const {
 void CudaMpmTissue::find_near() {
   OnDevice& d = *device_;
   // A little more than the GPU finds, for what it finds must be done.
-  const double cell = state_->scene.cell_size;
+  const double cell = (1 + d.surface_reach()) * state_->scene.cell_size;
   d.may_meet =
       may_meet(state_->motion, [&](const BlockMotion& m) { return m.speed * duration_ + cell; }) ||
       may_meet(d.went, [&](const BlockMotion&) { return cell; });
@@ -71,7 +71,8 @@ void CudaMpmTissue::look_for_unforeseen() {
 bool CudaMpmTissue::came_unforeseen() const {
   const OnDevice& d = *device_;
   if (d.may_meet) return d.host_unforeseen[0] != 0;
-  return may_meet(state_->motion, [](const BlockMotion&) { return 0.0; });
+  const double reach = d.surface_reach() * state_->scene.cell_size;
+  return may_meet(state_->motion, [reach](const BlockMotion&) { return reach; });
 }
 
 }  // namespace tissue_sim

@@ -71,6 +71,7 @@ struct CudaMpmTissue::OnDevice {
   ConnectRoom connect_room;
   PinnedArray<int> most_sharing;
   DeviceArray<float> hold;
+  DeviceArray<float4> outer;  ///< CudaTables::outer
   DeviceArray<std::uint8_t> bonds, soft, with, whole;
   int held_by = 0;  ///< CudaTables::held_by
   DeviceArray<float4> u[2], v[2], force[2], u_before;
@@ -147,6 +148,7 @@ struct CudaMpmTissue::OnDevice {
     t.volume = of_blocks.volume.data();
     t.point = of_blocks.point.data();
     t.partial = of_blocks.partial.data();
+    t.outer = outer.size() > 0 ? outer.data() : nullptr;
     t.bonds = bonds.data();
     t.soft = soft.size() > 0 ? soft.data() : nullptr;
     t.held_by = held_by;
@@ -156,6 +158,8 @@ struct CudaMpmTissue::OnDevice {
   }
   /// Those for plain_plan.
   CudaTables plain_tables() const { return stacks.of(tables()); }
+  /// How far from the points of a cell its surface may be [cells].
+  double surface_reach() const { return outer.size() > 0 ? 0.5 : 0; }
   CudaNodes nodes(int which) const { return {u[which].data(), v[which].data()}; }
   CudaNodes present() const { return nodes(current); }
 };

@@ -16,8 +16,29 @@ struct WarpNodes {
   float u[27][3], v[27][3];
 };
 
-/// One component of what nodes have at the point at sub-position s.
-__device__ __forceinline__ float at_point(const float (&of)[27][3], int c, int s) {
+/// Weights of a cell's nodes along each axis at the place where colliders touch a point.
+struct PlaceWeights {
+  float at[3], of[3][3];  ///< place in cells from the middle of the cell; [axis][node]
+
+  __device__ __forceinline__ PlaceWeights(const CudaTables& t, int point, int s) {
+#pragma unroll
+    for (int a = 0; a < 3; ++a) at[a] = (s >> a & 1) != 0 ? 0.25f : -0.25f;
+    if (t.outer != nullptr && point >= 0) {
+      const float4 place = __ldg(t.outer + point);
+      // What cuts took apart may lie on its other side.
+      if (place.w != 0 && place.w == __popc(t.bonds[point]))
+        at[0] = place.x, at[1] = place.y, at[2] = place.z;
+    }
+#pragma unroll
+    for (int a = 0; a < 3; ++a) {
+#pragma unroll
+      for (int i = 0; i < 3; ++i) of[a][i] = cell_weight(at[a], i);
+    }
+  }
+};
+
+/// One component of what nodes have there.
+__device__ __forceinline__ float at_place(const float (&of)[27][3], int c, const PlaceWeights& w) {
   float sum = 0;
 #pragma unroll
   for (int z = 0; z < 3; ++z) {
@@ -26,10 +47,10 @@ __device__ __forceinline__ float at_point(const float (&of)[27][3], int c, int s
     for (int y = 0; y < 3; ++y) {
       float row = 0;
 #pragma unroll
-      for (int x = 0; x < 3; ++x) row += lattice_weight(s & 1, x) * of[9 * z + 3 * y + x][c];
-      plane += lattice_weight(s >> 1 & 1, y) * row;
+      for (int x = 0; x < 3; ++x) row += w.of[0][x] * of[9 * z + 3 * y + x][c];
+      plane += w.of[1][y] * row;
     }
-    sum += lattice_weight(s >> 2, z) * plane;
+    sum += w.of[2][z] * plane;
   }
   return sum;
 }
@@ -55,7 +76,7 @@ __device__ __forceinline__ void push_cell(const CudaTables& t, const CudaNodes& 
   const int p = __ldg(t.point + at), node = entry < 0 ? ~entry : entry;
   const float volume = __ldg(t.volume + at);
   const CudaBody& body = t.bodies[cell.body];
-  const float quarter = 0.25f * body.cell_size;
+  const PlaceWeights weights(t, p, s);
   const float4 u = __ldcg(state.u + node), v = __ldcg(state.v + node);
   Held held;
   PushedPoint point;
@@ -69,11 +90,12 @@ __device__ __forceinline__ void push_cell(const CudaTables& t, const CudaNodes& 
   nodes.u[k][0] = u.x, nodes.u[k][1] = u.y, nodes.u[k][2] = u.z;
   nodes.v[k][0] = v.x, nodes.v[k][1] = v.y, nodes.v[k][2] = v.z;
   __syncwarp();
-  const float x = at_point(nodes.u, component, s), velocity = at_point(nodes.v, component, s);
+  const float x = at_place(nodes.u, component, weights);
+  const float velocity = at_place(nodes.v, component, weights);
 #pragma unroll
   for (int a = 0; a < 3; ++a) {
     const float moved = __shfl_sync(0xffffffffu, x, s + 8 * a);
-    point.x[a] = cell.middle[a] + ((s >> a & 1) != 0 ? quarter : -quarter) + moved;
+    point.x[a] = cell.middle[a] + weights.at[a] * body.cell_size + moved;
     point.v[a] = __shfl_sync(0xffffffffu, velocity, s + 8 * a);
   }
   const bool held_before = (held.with[0] | held.with[1]) != 0;
@@ -86,8 +108,12 @@ __device__ __forceinline__ void push_cell(const CudaTables& t, const CudaNodes& 
   float force[3] = {0, 0, 0};
   for (; left != 0; left &= left - 1) {
     const int from = __ffs(static_cast<int>(left)) - 1;
-    const float w = lattice_weight(from & 1, k % 3) * lattice_weight(from >> 1 & 1, k / 3 % 3) *
-                    lattice_weight(from >> 2, k / 9);
+    float w = 1;
+#pragma unroll
+    for (int a = 0; a < 3; ++a) {
+      const float at = __shfl_sync(0xffffffffu, weights.at[a], from);
+      w *= cell_weight(at, a == 0 ? k % 3 : (a == 1 ? k / 3 % 3 : k / 9));
+    }
 #pragma unroll
     for (int a = 0; a < 3; ++a) force[a] += w * __shfl_sync(0xffffffffu, push[a], from);
   }

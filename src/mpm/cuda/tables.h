@@ -137,6 +137,8 @@ struct CudaTables {
   const std::int32_t* point;  ///< per lane, -1 where there is none
   const float* partial;       ///< per cell (lane / 8): mu times volume of its points where they are
                               ///< fewer than seven, else 0; see mpm/blocks/stabilisation.h [J]
+  const float4* outer;        ///< per point, where colliders touch it: outer_points.h; null where
+                              ///< that is the point itself for all
   const std::uint8_t* bonds;  ///< per point
   const std::uint8_t* soft;   ///< per point, as Points::soft; null where none is
   int held_by;                ///< colliders that a point may hold on to at a time: 0 to 2

@@ -56,6 +56,9 @@ struct Points {
   /// Outside its body's anchors, where it moves, some of it given to neighbours
   /// (mpm/anchors/); empty where there are no anchors, or where they act at nodes [m^3].
   Array<float> free_volume;
+  /// Of that the share of the most that a neighbour has, where it is less: so much lighter than its
+  /// neighbours; as `free_volume`.
+  Array<float> lightness;
   Array<std::uint8_t> anchored;                 ///< kInAnchor, kAtAnchor or 0
   static constexpr std::uint8_t kInAnchor = 1;  ///< its place is in an anchor
   static constexpr std::uint8_t kAtAnchor = 2;  ///< the face of one holds it

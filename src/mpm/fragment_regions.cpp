@@ -57,6 +57,21 @@ void add_velocity(const MpmState& state, std::int32_t point, PieceSpread& spread
   spread.velocity += w * Vec3(state.nodes.v[0][n], state.nodes.v[1][n], state.nodes.v[2][n]);
 }
 
+/// Points of one row that hang together.
+void add_run(const MpmState& state, const PointRun& run, bool moving, PieceSpread& spread) {
+  const Points::Site& first = state.points.site[run.begin];
+  const double n = run.end - run.begin;
+  const Vec3 middle(first.x + 0.5 * (n - 1), first.y, first.z);
+  spread.points += n;
+  spread.centre += n * middle;
+  spread.covariance += n * middle * middle.transpose();
+  spread.covariance(0, 0) += n * (n * n - 1) / 12;
+  for (std::int32_t p = run.begin; p < run.end; ++p) {
+    spread.volume += state.points.volume[p];
+    if (moving) add_velocity(state, p, spread);
+  }
+}
+
 void finish(PieceSpread& spread) {
   if (spread.points > 0) {
     spread.centre /= spread.points;
@@ -75,15 +90,7 @@ Division divide(const MpmState& state, const std::vector<std::uint8_t>& bonds, b
   d.region.resize(d.runs.size());
   for (std::size_t i = 0; i < d.runs.size(); ++i) {
     d.root[i] = linked.root(static_cast<std::int32_t>(i));
-    PieceSpread& of = d.region[d.root[i]];
-    const Points::Site& first = state.points.site[d.runs[i].begin];
-    const int count = d.runs[i].end - d.runs[i].begin;
-    of.points += count;
-    of.centre += count * Vec3(first.x + 0.5 * (count - 1), first.y, first.z);
-    for (std::int32_t p = d.runs[i].begin; p < d.runs[i].end; ++p) {
-      of.volume += state.points.volume[p];
-      if (moving) add_velocity(state, p, of);
-    }
+    add_run(state, d.runs[i], moving, d.region[d.root[i]]);
   }
   for (PieceSpread& of : d.region) finish(of);
   return d;
@@ -161,15 +168,9 @@ FragmentSurroundings fragment_surroundings(const MpmState& state, const Pieces& 
           return;
         }
         around.pieces.resize(pieces.next_id);
-        for (std::int32_t p = 0; p < state.points.size(); ++p) {
-          PieceSpread& of = around.pieces[pieces.of_point[p]];
-          const Points::Site& s = state.points.site[p];
-          const Vec3 at(s.x, s.y, s.z);
-          of.points += 1;
-          of.volume += state.points.volume[p];
-          of.centre += at;
-          of.covariance += at * at.transpose();
-          add_velocity(state, p, of);
+        for (const PointRun& run : runs_along_x(state.points.bonds.data(),
+                                                static_cast<std::int32_t>(state.points.size()))) {
+          add_run(state, run, true, around.pieces[pieces.of_point[run.begin]]);
         }
         for (PieceSpread& of : around.pieces) finish(of);
       },

@@ -15,6 +15,7 @@ template <class Change>
 double volume_after_two_seconds(const Change& change) {
   Scene scene;
   scene.method = Method::kPbd;
+  scene.device = Device::kCpu;  // whose vertices are moved below
   scene.pbd.model = PbdModel::kTetrahedra;
   scene.cell_size = 0.01;
   scene.gravity = Vec3::Zero();

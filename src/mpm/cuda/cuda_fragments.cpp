@@ -8,11 +8,29 @@
 #include "mpm/fragment_forecast.h"
 
 namespace tissue_sim {
+namespace {
+
+/// strained_of() by all threads. `stretched`: by number.
+std::vector<StrainedPoint> strained_by_threads(const MpmState& s,
+                                               const std::vector<StretchedPoint>& stretched) {
+  constexpr int kShare = 256;
+  const int count = static_cast<int>(stretched.size()), shares = (count + kShare - 1) / kShare;
+  std::vector<std::vector<StrainedPoint>> of_share(shares);
+  s.cpu->for_each(shares, [&](int i) {
+    const auto first = stretched.begin() + i * kShare;
+    of_share[i] = strained_of(s, {first, stretched.begin() + std::min(count, (i + 1) * kShare)},
+                              kRegionLevels[0]);
+  });
+  std::vector<StrainedPoint> strained;
+  for (const auto& part : of_share) strained.insert(strained.end(), part.begin(), part.end());
+  return strained;
+}
+
+}  // namespace
 
 void CudaMpmTissue::foresee() {
   MpmState& s = *state_;
-  std::vector<StrainedPoint> strained =
-      strained_of(s, list_stretched(kRegionLevels[0]), kRegionLevels[0]);
+  std::vector<StrainedPoint> strained = strained_by_threads(s, list_stretched(kRegionLevels[0]));
   const bool flights = may_fly(result_, foresight_);
   if (!strained.empty() || !s.flights.empty() || flights) pull_nodes();
   if (flights) pull_contacts();

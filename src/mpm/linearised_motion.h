@@ -10,8 +10,8 @@ namespace tissue_sim {
 
 /// A = M^-1 K about the present state, without contact, for largest_eigenvalue(): by differences of
 /// the forces that the kernels of the substep give. Vectors are displacements of the nodes, their
-/// inner product is weighed by mass. What faces of anchors hold has no part in it. The same bits for
-/// any number of threads.
+/// inner product is weighed by mass. What faces of anchors hold has no part in it. The same bits
+/// for any number of threads.
 class LinearisedMotion {
  public:
   /// `takes_part`: of each of the state's blocks, whether its stiffness counts; the rest of the

@@ -41,10 +41,10 @@ std::size_t CudaMpmTissue::device_bytes() const {
                     d.packed.bytes() + d.piece.bytes() + d.place.bytes() + d.slot_parts.bytes() +
                     d.first_parts.bytes() + d.parts.bytes() + d.pushed_parts.bytes() +
                     d.marks.bytes() + d.pushed.bytes() + d.colour.bytes() + d.hold.bytes() +
-                    d.outer.bytes() + d.bonds.bytes() + d.soft.bytes() + d.with.bytes() + d.whole.bytes() +
-                    d.u_before.bytes() + d.connect_room.bytes() + d.colliders.bytes() +
-                    d.loads.bytes() + d.measures.bytes() + d.cloud.bytes() + d.stretched.bytes() +
-                    d.faces.bytes() + d.checkpoint.bytes() + d.stacks.bytes();
+                    d.outer.bytes() + d.bonds.bytes() + d.soft.bytes() + d.with.bytes() +
+                    d.whole.bytes() + d.u_before.bytes() + d.connect_room.bytes() +
+                    d.colliders.bytes() + d.loads.bytes() + d.measures.bytes() + d.cloud.bytes() +
+                    d.stretched.bytes() + d.faces.bytes() + d.checkpoint.bytes() + d.stacks.bytes();
   for (int i = 0; i < 2; ++i) sum += d.u[i].bytes() + d.v[i].bytes() + d.force[i].bytes();
   return sum;
 }

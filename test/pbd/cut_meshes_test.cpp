@@ -244,16 +244,21 @@ TEST_P(CutMeshes, CutsAtRandomNeitherBlowUpNorMakeSlivers) {
     ASSERT_FALSE(r.blew_up) << "cut " << i;
     fastest = std::max(fastest, r.max_speed);
     if ((i + 1) % 100 == 0) told();
-    EXPECT_LT(r.max_speed, i < 100 ? 0.01 : 0.2)
-        << "cut " << i;  // read: 5e-4 of surfaces, 8e-4 of tetrahedra
+    EXPECT_LT(r.max_speed, 0.01) << "cut " << i;  // read: 5e-4 of surfaces, 8e-4 of tetrahedra
   }
   const Thinnest least = told();
   const Leaks open = leaks(tissue.state());
   EXPECT_NEAR(whole_volume(tissue) / volume, 1, 0.01);
   EXPECT_NEAR(tissue.momentum().mass / mass, 1, 1e-6);
-  EXPECT_GT(least.edge, 0.09 * tissue.state().mean_edge);
-  EXPECT_GT(least.angle * 57.29578, GetParam() == PbdModel::kSurface ? 0.57 : 2.8);
+  EXPECT_GT(least.edge, 0.1 * tissue.state().mean_edge);
   EXPECT_LT(open.volume / volume, 0.01);
+  constexpr double kLeastAngle = 2.8, kByRings = 0.57;  // [degrees]
+  EXPECT_GT(least.angle * 57.29578, kByRings);
+  if (GetParam() == PbdModel::kSurface && least.angle * 57.29578 <= kLeastAngle) {
+    GTEST_SKIP() << "the smallest angle is " << least.angle * 57.29578 << " degrees, for "
+                 << kLeastAngle << ": wounds that nothing better closes are closed by rings";
+  }
+  EXPECT_GT(least.angle * 57.29578, kLeastAngle);
 }
 
 TEST_P(CutMeshes, AreTheSameBitsWithAnyNumberOfThreadsAndAfterRestoring) {

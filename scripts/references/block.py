@@ -27,7 +27,7 @@ class Block:
         self.basis = skfem.Basis(self.mesh, skfem.ElementVector(skfem.ElementHex2()), intorder=4)
         self.solid = Solid(self.basis, lambda x, g, v: g, lambda x: 1.0, self.lam, self.mu, body_force)
         fixed = [self.dofs(axis, at, components) for axis, at, components in held]
-        self.free = np.setdiff1d(np.arange(self.basis.N), np.concatenate(fixed))
+        self.free = np.setdiff1d(np.arange(self.basis.N), np.concatenate(fixed) if fixed else [])
         self.u = np.zeros(self.basis.N)
 
     def dofs(self, axis, at, components):
@@ -55,8 +55,9 @@ class Block:
             self.u = newton(self.solid.forces, self.solid.stiffness, self.u, self.free, scale)
         return self
 
-    def frequencies(self, density, count=1):
+    def frequencies(self, density, count=1, shift=0):
+        """The lowest ones [Hz], in rising order; `shift` [Hz] above 0 for a body that is free, whose stiffness is singular."""
         K = self.solid.stiffness(0 * self.u)[self.free][:, self.free]
         M = self.solid.mass(density)[self.free][:, self.free]
-        values = eigsh(K, k=count, M=M, sigma=0, which='LM', return_eigenvectors=False)
-        return sorted(float(f) for f in np.sqrt(values) / (2 * np.pi))
+        values = eigsh(K, k=count, M=M, sigma=-(2 * np.pi * shift) ** 2, which='LM', return_eigenvectors=False)
+        return sorted(float(f) for f in np.sqrt(np.maximum(values, 0)) / (2 * np.pi))

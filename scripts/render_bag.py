@@ -49,6 +49,7 @@ class Recording:
         self.bag = rosbag.Bag(path)
         topics = self.bag.get_type_and_topic_info().topics
         self.cloud_topic = self.find(topics, "/tissue/points", path)
+        self.surface_topic = next((t for t in topics if t.endswith("/surface")), None)
         scene_topic = self.find(topics, "/scene", path)
         input_topic = self.find(topics, "/inputs", path)
         for _, message, _ in self.bag.read_messages([scene_topic]):
@@ -105,7 +106,15 @@ class Recording:
         time = self.times[k]
         message = next(self.bag.read_messages([self.cloud_topic], time, time))[1]
         ground = self.scene.get("ground", {}).get("z", 0.0)
-        return Moment(cloud_points(message), self.tools[k], ground)
+        return Moment(cloud_points(message), self.tools[k], ground, self.surface(time))
+
+    def surface(self, time):
+        """Corners of the surface's triangles (m, 3, 3), of a method that has some; else None."""
+        if self.surface_topic is None:
+            return None
+        for _, marker, _ in self.bag.read_messages([self.surface_topic], time, time):
+            return np.array([[p.x, p.y, p.z] for p in marker.points]).reshape(-1, 3, 3)
+        return None
 
 
 def draw_one(job):

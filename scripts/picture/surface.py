@@ -164,6 +164,23 @@ def shading_normals(vertices, triangles, neighbours, even_share):
     return mixed / (np.linalg.norm(mixed, axis=1, keepdims=True) + 1e-20)
 
 
+def crease_normals(corners, crease=0.6):
+    """Normals at the corners (3 m, 3) of triangles (m, 3, 3): the mean of the triangles that meet
+    there and whose own differ by a cosine of more than `crease`; so edges of a cut stay edges."""
+    face = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    unit = face / (np.linalg.norm(face, axis=1, keepdims=True) + 1e-20)
+    _, place = np.unique(corners.reshape(-1, 3).astype(np.float32), axis=0, return_inverse=True)
+    place = place.reshape(-1)
+    around = [[] for _ in range(place.max() + 1)]
+    for corner, at in enumerate(place):
+        around[at].append(corner // 3)
+    normals = np.empty((len(place), 3))
+    for corner, at in enumerate(place):
+        near = [t for t in around[at] if unit[t] @ unit[corner // 3] > crease]
+        normals[corner] = face[near].sum(0)
+    return normals / (np.linalg.norm(normals, axis=1, keepdims=True) + 1e-20)
+
+
 def tissue_surface(points, weights, values, spacing, smoothing, cut_face):
     """The surface of one piece: (vertices, triangles, normals, values at the vertices).
 

@@ -7,7 +7,7 @@ from picture.instruments import placed, tool_meshes
 from picture.light import (FLOOR, KEY, KEY_COLOR, SKY, Noise, Shadow, dot, shade_metal,
                            shade_tissue, smoothstep, tone)
 from picture.raster import Buffer, Camera, normalized
-from picture.surface import Mesh, occupancy, point_spacing, tissue_surface
+from picture.surface import Mesh, crease_normals, occupancy, point_spacing, tissue_surface
 
 LIVER = np.array([0.155, 0.016, 0.013])
 FRESH_CUT = np.array([0.34, 0.028, 0.022])
@@ -32,10 +32,11 @@ class Moment:
     """What there is to be seen at one time.
 
     points: array with the fields of tissue_sim::Point; tools: [(entry of the scene's tools,
-    position (3,), rotation (3, 3))]."""
+    position (3,), rotation (3, 3))]; surface: corners of triangles between points (m, 3, 3), where
+    the method has some."""
 
-    def __init__(self, points, tools, ground_z=0.0):
-        self.points, self.tools, self.ground_z = points, tools, ground_z
+    def __init__(self, points, tools, ground_z=0.0, surface=None):
+        self.points, self.tools, self.ground_z, self.surface = points, tools, ground_z, surface
         self.x = np.stack([points["x"], points["y"], points["z"]], 1).astype(float)
 
 
@@ -56,14 +57,29 @@ def camera_for(boxes, size, azimuth=-80.0, elevation=31.0, room=1.0):
     return Camera(target + away * distance, target, size)
 
 
+def piece_hues(fragments):
+    """The pieces of at least eight points, and the colour of each: the largest is liver."""
+    ids, counts = np.unique(fragments, return_counts=True)
+    ids, counts = ids[counts >= 8], counts[counts >= 8]
+    hues = itertools.cycle(LOOSE)
+    return {i: LIVER if i == ids[np.argmax(counts)] else next(hues) for i in ids}
+
+
+def colored(base, stress, cut, closed, stress_ends):
+    """Colours at vertices, as tissue or by stress, one array for each of stress_ends."""
+    tissue = base * (1 - cut) + (0.5 * base + 0.7 * FRESH_CUT) * cut
+    tissue *= 1 - 0.85 * closed
+    return tissue, [(linear(stress_colors(stress / end)) * (1 - 0.8 * closed) if end
+                     else tissue).astype(np.float32) for end in stress_ends]
+
+
 def tissue_meshes(moment, spacing, around, stress_ends):
     """One mesh for each piece, and for each of them its colours, one for each of stress_ends."""
     p = moment.points
-    ids, counts = np.unique(p["fragment"], return_counts=True)
-    ids, counts = ids[counts >= 8], counts[counts >= 8]
-    whole = len(ids) == 1  # a cut under way is a furrow, a finished one two smooth faces
-    meshes, colors, largest, hues = [], [], ids[np.argmax(counts)], itertools.cycle(LOOSE)
-    for fragment in ids:
+    hue_of = piece_hues(p["fragment"])
+    whole = len(hue_of) == 1  # a cut under way is a furrow, a finished one two smooth faces
+    meshes, colors = [], []
+    for fragment, base in hue_of.items():
         own = p["fragment"] == fragment
         carried = np.stack([p["stress"][own], p["damage"][own]], 1).astype(float)
         weights = 1 - (1.5 if whole else 0.8) * np.minimum(p["damage"][own], 0.6)
@@ -71,14 +87,29 @@ def tissue_meshes(moment, spacing, around, stress_ends):
             moment.x[own], weights, carried, spacing,
             lambda v: [(2 if whole else 60, smoothstep(0.03, 0.12, v[:, 1])), (12, np.ones(len(v)))],
             lambda v: smoothstep(0.15, 0.25, v[:, 1:2]) * (not whole))
-        base = LIVER if fragment == largest else next(hues)
         cut = smoothstep(0.10, 0.26, values[:, 1:2])
         closed = smoothstep(0.5, 0.75, around.sample(vertices + 0.003 * normals))[:, None] * cut
-        tissue = base * (1 - cut) + (0.5 * base + 0.7 * FRESH_CUT) * cut
-        tissue *= 1 - 0.85 * closed
-        colors.append([(linear(stress_colors(values[:, 0] / end)) * (1 - 0.8 * closed) if end
-                        else tissue).astype(np.float32) for end in stress_ends])
+        tissue, own_colors = colored(base, values[:, 0], cut, closed, stress_ends)
+        colors.append(own_colors)
         meshes.append(Mesh(vertices, triangles, normals, tissue))
+    return meshes, colors
+
+
+def surface_meshes(moment, stress_ends):
+    """The same of a surface that the method has: its own triangles, with the values of its points."""
+    corners = moment.surface.reshape(-1, 3)
+    places, place_of = np.unique(corners.astype(np.float32), axis=0, return_inverse=True)
+    nearest = np.array([np.argmin(np.sum((moment.x - x) ** 2, axis=1)) for x in places])
+    point = moment.points[nearest[place_of.reshape(-1)]]
+    normals = crease_normals(moment.surface)
+    meshes, colors = [], []
+    for fragment, base in piece_hues(moment.points["fragment"]).items():
+        # Both halves of a fresh cut stand at the same places: most corners tell.
+        own = np.repeat((point["fragment"] == fragment).reshape(-1, 3).sum(1) > 1, 3)
+        cut = smoothstep(0.10, 0.26, point["damage"][own].astype(float))[:, None]
+        tissue, own_colors = colored(base, point["stress"][own].astype(float), cut, 0, stress_ends)
+        colors.append(own_colors)
+        meshes.append(Mesh(corners[own], np.arange(own.sum()).reshape(-1, 3), normals[own], tissue))
     return meshes, colors
 
 
@@ -120,7 +151,10 @@ def draw(moment, camera, stress_ends=(None,), supersample=2):
                         scale=camera.scale * supersample)
     spacing = point_spacing(moment.x)
     around = occupancy(moment.x, spacing, 0.0045)
-    meshes, colors = tissue_meshes(moment, spacing, around, stress_ends)
+    if moment.surface is None:
+        meshes, colors = tissue_meshes(moment, spacing, around, stress_ends)
+    else:
+        meshes, colors = surface_meshes(moment, stress_ends)
     for tool, position, rotation in moment.tools:
         meshes += [placed(m, position, rotation) for m in tool_meshes(tool)]
     lo, hi = moment.x.min(0), moment.x.max(0)

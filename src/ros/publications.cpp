@@ -46,9 +46,10 @@ Publications::Publications(ros::NodeHandle& node, const Scene& scene, const Para
 }
 
 std::set<std::string> Publications::topics() const {
-  std::set<std::string> names = {scene_output_.topic(), saved_state_.topic(),   state_.topic(),
-                                 inputs_.topic(),       fragments_.topic(),     points_.topic(),
-                                 loose_points_.topic(), marker_output_.topic(), tf_.topic()};
+  std::set<std::string> names = {
+      scene_output_.topic(),  saved_state_.topic(), state_.topic(),        inputs_.topic(),
+      fragments_.topic(),     points_.topic(),      loose_points_.topic(), surface_.topic(),
+      marker_output_.topic(), tf_.topic()};
   for (const ToolOutputs& tool : tools_) {
     names.insert({tool.body.topic(), tool.spatial.topic()});
     if (tool.grip) names.insert(tool.grip->topic());
@@ -108,8 +109,12 @@ void Publications::publish(Simulation& simulation, const FrameReport& report, co
   if (clouds_due && loose_points_.wanted()) {
     loose_points_.publish(cloud(simulation, true, stamp), stamp);
   }
+  if (clouds_due && surface_.wanted()) {
+    const bool was_any = !surface_triangles_.fragment.empty();
+    const auto message = surface_message(simulation, stamp);
+    if (was_any || !surface_triangles_.fragment.empty()) surface_.publish(message, stamp);
+  }
   const bool markers_due = markers_due_.due(now) || all;
-  if (markers_due && surface_.wanted()) surface_.publish(surface_message(simulation, stamp), stamp);
   if (markers_due && marker_output_.wanted()) {
     marker_output_.publish(marker_message(simulation, report, stamp), stamp);
   }

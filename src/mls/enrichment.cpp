@@ -90,8 +90,7 @@ double ExtendedEnrichment::operator()(const Vec2& x) const {
 }
 
 double enriched_share(double own, double there) {
-  const double side = own < 0 ? -1 : 1;
-  return 0.5 * (1 + side * there);
+  return 0.5 * (1 + own * std::abs(own) * there * std::abs(there));
 }
 
 }  // namespace tissue_sim

@@ -49,9 +49,11 @@ class ExtendedEnrichment {
   std::vector<double> ends_;    // t_0 .. t_n
 };
 
-/// What a cut leaves of the weight between a node, at whose own place the enrichment is `own`, and
-/// a place where it is `there`: 1 on its side, 0 across, 1/2 far ahead of a tip. The paper leaves
-/// it open; max(0, sigma h) would make every cut infinite.
+/// What a cut leaves of the weight of a pair, from the enrichment at both nodes: 1 on one side of
+/// it, 0 across, 1/2 for both far ahead of a tip, (1 + h_i |h_i| h_j |h_j|) / 2 between. The paper
+/// leaves it open. max(0, sigma h) would make every cut infinite; with (1 + sigma_i h_j) / 2,
+/// sigma_i the node's own side, pairs across the cut's line are weaker for several spacings ahead
+/// of the tip.
 double enriched_share(double own, double there);
 
 }  // namespace tissue_sim

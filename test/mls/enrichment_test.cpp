@@ -74,6 +74,8 @@ TEST(MlsEnrichment, SharesAreWholeOnOneSideAndNothingAcross) {
   EXPECT_EQ(enriched_share(-1, -1), 1);
   EXPECT_EQ(enriched_share(1, -1), 0);
   EXPECT_EQ(enriched_share(0.3, 0), 0.5);
+  EXPECT_EQ(enriched_share(0.5, -1), 0.5 * (1 - 0.25));
+  EXPECT_EQ(enriched_share(-0.4, 0.9), enriched_share(0.9, -0.4));
 }
 
 TEST(MlsEnrichment, OfOneSegmentIsTheSameExtended) {

@@ -2,7 +2,9 @@
 """Draws pictures of a recorded bag, without a display: before the cut, during it and afterwards.
 
 Each moment is drawn twice, as tissue (before.png, during.png, after.png) and coloured by von Mises
-stress (stress_*.png); overview.png shows them all. Needs no ROS master and no built package."""
+stress (stress_*.png); overview.png shows them all. Several bags, as of several methods, are drawn
+beside one another instead, a row each, as tissue: beside.png. Needs no ROS master and no built
+package."""
 import argparse
 import multiprocessing
 import os
@@ -15,6 +17,7 @@ import yaml
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt  # noqa: E402
 import rosbag  # noqa: E402
+import rospy  # noqa: E402
 
 from picture.tissue_picture import Moment, camera_for, draw, stress_colors  # noqa: E402
 
@@ -112,7 +115,9 @@ class Recording:
         """Corners of the surface's triangles (m, 3, 3), of a method that has some; else None."""
         if self.surface_topic is None:
             return None
-        for _, marker, _ in self.bag.read_messages([self.surface_topic], time, time):
+        # What a frame writes stands some nanoseconds apart.
+        soon = time + rospy.Duration(0, 100000)
+        for _, marker, _ in self.bag.read_messages([self.surface_topic], time, soon):
             return np.array([[p.x, p.y, p.z] for p in marker.points]).reshape(-1, 3, 3)
         return None
 
@@ -151,15 +156,40 @@ def overview(pictures, seconds, stress_end, path):
     figure.savefig(path, facecolor=figure.get_facecolor())
 
 
+def beside(bags, size, path):
+    """The moments of several bags, a row each, all from the place that shows the first."""
+    first = Recording(bags[0])
+    moments = [first.moment(k) for k in first.moments()]
+    camera = camera_for([np.percentile(m.x, (0.05, 99.95), axis=0) for m in moments], size)
+    figure = plt.figure(figsize=(19.2, 6.4 * size[1] / size[0] * len(bags)), dpi=100)
+    for row, bag in enumerate(bags):
+        recording = Recording(bag)
+        for column, k in enumerate(recording.moments()):
+            picture = draw(recording.moment(k), camera)[0]
+            axes = figure.add_axes([column / 3 + 0.001, 1 - (row + 1) / len(bags) + 0.002,
+                                    1 / 3 - 0.002, 1 / len(bags) - 0.004])
+            axes.imshow(picture, interpolation="lanczos")
+            axes.axis("off")
+            axes.text(0.025, 0.93, "%s, %.1f s" % (recording.scene.get("method", "mpm"),
+                                                    recording.seconds[k]), color="#dfe9ea",
+                      fontsize=17, transform=axes.transAxes, va="top")
+    figure.savefig(path, facecolor="#0c1a1f")
+    print("   " + os.path.basename(path))
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__.split("\n\n")[0])
-    parser.add_argument("bag")
+    parser.add_argument("bag", nargs="+")
     parser.add_argument("--out", default=".", help="folder for the pictures")
     parser.add_argument("--size", default="1280x720", help="of a picture, WIDTHxHEIGHT")
     parser.add_argument("--at", help="simulated seconds of the three moments, as in 1,4.5,10")
     args = parser.parse_args()
     size = tuple(int(s) for s in args.size.split("x"))
-    recording = Recording(args.bag)
+    if len(args.bag) > 1:
+        os.makedirs(args.out, exist_ok=True)
+        beside(args.bag, size, os.path.join(args.out, "beside.png"))
+        return
+    recording = Recording(args.bag[0])
     chosen = recording.moments()
     if args.at:
         chosen = [int(np.argmin(np.abs(recording.seconds - float(s)))) for s in args.at.split(",")]

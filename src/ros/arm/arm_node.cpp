@@ -94,6 +94,7 @@ void ArmNode::advertise() {
 
 void ArmNode::run() {
   const double period = 1 / parameters_.rate;
+  const WallTime began = WallClock::now();
   while (ros::ok()) {
     ros::Time now = ros::Time::now();
     const double left = last_.isZero() ? 0 : period - (now - last_).toSec();
@@ -111,7 +112,7 @@ void ArmNode::run() {
       last_ = now;
       shown_still_ = wall;
     } else if (seconds_between(shown_still_, wall) > kStillAfter) {
-      if (now.isZero()) {
+      if (now.isZero() && seconds_between(began, wall) > 3) {
         WARN_SELDOM(10, "/use_sim_time is set and /clock has not come: the arm stands still");
       }
       publish(now, false);

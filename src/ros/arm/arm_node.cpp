@@ -89,7 +89,7 @@ void ArmNode::advertise() {
   base.header.frame_id = parameters_.world_frame;
   base.child_frame_id = parameters_.base_frame;
   base.transform = to_transform(parameters_.base);
-  broadcaster_.sendTransform(base);
+  base_broadcaster_.sendTransform(base);
 }
 
 void ArmNode::run() {
@@ -157,6 +157,14 @@ void ArmNode::publish(const ros::Time& now, bool goes_on) {
   publish_pose("local/measured_cp", at, parameters_.base_frame, tip);
   publish_pose("local/setpoint_cp", asked_at, parameters_.base_frame, goal);
   publish_pose("measured_cp", at, parameters_.world_frame, parameters_.base * tip);
+  if (!at.isZero()) {
+    geometry_msgs::TransformStamped frame;
+    frame.header.stamp = at;
+    frame.header.frame_id = parameters_.world_frame;
+    frame.child_frame_id = parameters_.tip_frame;
+    frame.transform = to_transform(parameters_.base * tip);
+    tip_broadcaster_.sendTransform(frame);
+  }
   publish_pose("setpoint_cp", asked_at, parameters_.world_frame, parameters_.base * goal);
 
   const Jacobian j = jacobian(parameters_.geometry, arm_.measured());

@@ -11,6 +11,7 @@
 #include <std_msgs/Float64.h>
 #include <tf2_ros/buffer.h>
 #include <tf2_ros/static_transform_broadcaster.h>
+#include <tf2_ros/transform_broadcaster.h>
 #include <tf2_ros/transform_listener.h>
 
 #include <map>
@@ -93,7 +94,8 @@ class ArmNode {
   std::map<std::string, Seldom> said_;
   tf2_ros::Buffer frames_;
   tf2_ros::TransformListener listener_;
-  tf2_ros::StaticTransformBroadcaster broadcaster_;
+  tf2_ros::StaticTransformBroadcaster base_broadcaster_;
+  tf2_ros::TransformBroadcaster tip_broadcaster_;
   CrtkTopics crtk_;
 };
 

@@ -21,9 +21,11 @@
 #include <cmath>
 #include <exception>
 #include <functional>
+#include <iterator>
 #include <map>
 #include <memory>
 #include <mutex>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -96,16 +98,22 @@ class PlayMarker {
       ROS_ERROR("%s/scene is no YAML: %s", simulator_.c_str(), e.what());
       return;
     }
+    const std::lock_guard<std::mutex> lock(mutex_);
     int index = 0;
+    std::set<std::string> there;
     for (const YAML::Node& tool : scene["tools"]) {
       const std::string name = tool["name"].as<std::string>(""),
                         type = tool["type"].as<std::string>("");
       if (name.empty()) continue;
       if (!tools_.empty() && std::find(tools_.begin(), tools_.end(), name) == tools_.end())
         continue;
-      const std::lock_guard<std::mutex> lock(mutex_);
       if (held_.count(name) == 0) hold(name, type, index);
+      there.insert(name);
       ++index;
+    }
+    for (auto tool = held_.begin(); tool != held_.end();) {  // of another scene
+      if (there.count(tool->first) == 0) server_->erase(tool->first);
+      tool = there.count(tool->first) ? std::next(tool) : held_.erase(tool);
     }
     if (index == 0) ROS_WARN("none of the scene's tools is asked for: see ~tools");
     server_->applyChanges();
@@ -174,11 +182,11 @@ class PlayMarker {
       entry(tool, "Squeeze", [this, name] { set_jaw(name, -0.35); });
     }
     entry(tool, "Cut here, in the blade's plane", [this, name] { cut(name); });
-    entry(tool, "Start recording", [this] { start_recording(); });
-    entry(tool, "Stop recording", [this] { trigger("stop_recording"); });
+    entry(tool, "Start recording", [this] { call<StartRecording>("start_recording"); });
+    entry(tool, "Stop recording", [this] { call<std_srvs::Trigger>("stop_recording"); });
     entry(tool, "Pause", [this] { pause(true); });
     entry(tool, "Go on", [this] { pause(false); });
-    entry(tool, "Reset the tissue", [this] { trigger("reset"); });
+    entry(tool, "Reset the tissue", [this] { call<std_srvs::Trigger>("reset"); });
     tool.menu.apply(*server_, name);
   }
 
@@ -192,7 +200,8 @@ class PlayMarker {
     if (!goal.position.allFinite() || !(goal.orientation.norm() > 0.5)) return;
     goal.orientation.normalize();
     const std::lock_guard<std::mutex> lock(mutex_);
-    held_.at(name)->goal = goal;
+    const auto tool = held_.find(name);
+    if (tool != held_.end()) tool->second->goal = goal;
   }
 
   void set_jaw(const std::string& name, double angle) {
@@ -241,16 +250,6 @@ class PlayMarker {
     call("cut", service);
   }
 
-  void start_recording() {
-    StartRecording service;
-    call("start_recording", service);
-  }
-
-  void trigger(const std::string& name) {
-    std_srvs::Trigger service;
-    call(name, service);
-  }
-
   void pause(bool paused) {
     std_srvs::SetBool service;
     service.request.data = paused;
@@ -258,7 +257,7 @@ class PlayMarker {
   }
 
   template <class Service>
-  void call(const std::string& name, Service& service) {
+  void call(const std::string& name, Service service = {}) {
     if (!ros::service::call(simulator_ + "/" + name, service)) {
       ROS_WARN("%s/%s does not answer", simulator_.c_str(), name.c_str());
     } else if (!service.response.success) {

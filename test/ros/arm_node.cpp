@@ -14,6 +14,7 @@
 #include <crtk_msgs/StringStamped.h>
 #endif
 
+#include <algorithm>
 #include <cmath>
 #include <map>
 
@@ -361,6 +362,19 @@ TEST_F(CrtkState, IsBusyOnEachTick) {
         static_cast<int>(std::count_if(all.begin() + static_cast<long>(before), all.end(),
                                        [](const auto& m) { return m->is_busy; }));
     EXPECT_GE(busy, 3);
+    // It had arrived before it said that it is idle.
+    const ros::Time idle = state.last()->header.stamp;
+    ASSERT_TRUE(wait_until([&] { return measured_js.last()->header.stamp >= idle; }, 5));
+    const auto joints = measured_js.all();
+    const auto first =
+        std::find_if(all.begin() + static_cast<long>(before), all.end(),
+                     [&](const auto& m) { return !m->is_busy && m->header.stamp > asked; });
+    ASSERT_TRUE(first != all.end());
+    const auto before_idle = std::find_if(joints.rbegin(), joints.rend(), [&](const auto& m) {
+      return m->header.stamp < (*first)->header.stamp;
+    });
+    ASSERT_TRUE(before_idle != joints.rend());
+    EXPECT_NEAR((*before_idle)->position[0], yaw, 1e-9);
   }
   expect_rising(state);
 }

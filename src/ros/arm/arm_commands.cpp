@@ -107,7 +107,7 @@ void ArmNode::ask(const std::string& name, Kind kind, JointGroup& group, const J
   std::string why = not_ready(state_);
   if (why.empty()) why = kind == Kind::kServo ? group.servo(goal, velocity) : group.move(goal);
   if (!why.empty()) return refuse(name, why, kind, group);
-  if (kind == Kind::kMove) publish_state();
+  if (kind == Kind::kMove) publish_state(busy());
 }
 
 void ArmNode::on_joints(const std::string& name, Kind kind, JointGroup& group,
@@ -205,7 +205,7 @@ void ArmNode::on_state_command(const std::string& word) {
     arm_.hold();
     jaw_.hold();
   }
-  publish_state();
+  publish_state(busy());
 }
 
 void ArmNode::on_ratio(double ratio) {
@@ -224,7 +224,7 @@ void ArmNode::stop(const std::string& name) {
   arm_.hold();
   jaw_.hold();
   if (name == "free") say("free: nothing pulls at this arm, it stays where it is");
-  publish_state();
+  publish_state(busy());
 }
 
 }  // namespace tissue_sim

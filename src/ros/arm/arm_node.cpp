@@ -122,10 +122,9 @@ void ArmNode::run() {
 }
 
 void ArmNode::tick(const ros::Time& now, double seconds) {
-  const bool was_busy = arm_.busy() || jaw_.busy();
+  const bool was_busy = busy();
   arm_.advance(seconds, ratio_);
   jaw_.advance(seconds, ratio_);
-  const bool busy = arm_.busy() || jaw_.busy();
   publish(now, true);
   drive_tool(now);
   if (!wrench_known_ || seconds_between(wrench_came_, WallClock::now()) > kWrenchAge) {
@@ -135,11 +134,12 @@ void ArmNode::tick(const ros::Time& now, double seconds) {
       publish_wrench(ros::Time(), wrench_, false);
     }
   }
-  // Busy on each tick: one edge may be missed. At rest now and then, for those who wait for any.
+  // Busy on each tick: one edge may be missed. Idle a tick after it has arrived, so that who waited
+  // finds it there. At rest now and then, for those who wait for any.
   ++ticks_;
-  if (was_busy || busy || published_busy_ || state_.state != published_state_ ||
+  if (was_busy || busy() || published_busy_ || state_.state != published_state_ ||
       ticks_ % std::max(1, static_cast<int>(parameters_.rate / 5)) == 0) {
-    publish_state();
+    publish_state(was_busy || busy());
   }
 }
 
@@ -237,11 +237,11 @@ ros::Time ArmNode::rising(ros::Time stamp, ros::Time& last) const {
   return stamp;
 }
 
-void ArmNode::publish_state() {
+void ArmNode::publish_state(bool busy) {
   const ros::Time now = ros::Time::now();
   if (now.isZero()) return;
   published_state_ = state_.state;
-  published_busy_ = arm_.busy() || jaw_.busy();
+  published_busy_ = busy;
   crtk_.operating_state(rising(now, last_state_), state_, published_busy_);
 }
 

@@ -65,7 +65,8 @@ class ArmNode {
                     const Pose& pose);
   void publish_jacobians();
   void drive_tool(const ros::Time& now);
-  void publish_state();
+  void publish_state(bool busy);
+  bool busy() const { return arm_.busy() || jaw_.busy(); }
   void say(const std::string& text);
   void on_wrench(const geometry_msgs::WrenchStamped& message, bool body);
   void publish_wrench(const ros::Time& stamp, const Wrench& wrench, bool body);

@@ -366,9 +366,9 @@ TEST_F(CrtkState, IsBusyOnEachTick) {
     const ros::Time idle = state.last()->header.stamp;
     ASSERT_TRUE(wait_until([&] { return measured_js.last()->header.stamp >= idle; }, 5));
     const auto joints = measured_js.all();
-    const auto first =
-        std::find_if(all.begin() + static_cast<long>(before), all.end(),
-                     [&](const auto& m) { return !m->is_busy && m->header.stamp > asked; });
+    const auto began = std::find_if(all.begin() + static_cast<long>(before), all.end(),
+                                    [](const auto& m) { return m->is_busy; });
+    const auto first = std::find_if(began, all.end(), [](const auto& m) { return !m->is_busy; });
     ASSERT_TRUE(first != all.end());
     const auto before_idle = std::find_if(joints.rbegin(), joints.rend(), [&](const auto& m) {
       return m->header.stamp < (*first)->header.stamp;

@@ -17,6 +17,7 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <memory>
 
 #include "arm/kinematics.h"
 #include "simulator_client.h"
@@ -108,18 +109,18 @@ class CrtkArm : public testing::Test {
 
 template <class M>
 void expect_published(const std::vector<std::string>& names) {
-  for (const std::string& name : names) {
-    Topic<M> topic(kArm + name);
-    EXPECT_TRUE(topic.last()) << name;
-  }
+  std::vector<std::unique_ptr<Topic<M>>> topics;  // all first: each takes a while to connect
+  for (const std::string& name : names) topics.push_back(std::make_unique<Topic<M>>(kArm + name));
+  for (std::size_t i = 0; i < names.size(); ++i) EXPECT_TRUE(topics[i]->last()) << names[i];
 }
 
 template <class M>
 void expect_heard(const std::vector<std::string>& names) {
   ros::NodeHandle node;
-  for (const std::string& name : names) {
-    const ros::Publisher publisher = node.advertise<M>(kArm + name, 1);
-    EXPECT_TRUE(wait_until([&] { return publisher.getNumSubscribers() > 0; })) << name;
+  std::vector<ros::Publisher> topics;
+  for (const std::string& name : names) topics.push_back(node.advertise<M>(kArm + name, 1));
+  for (std::size_t i = 0; i < names.size(); ++i) {
+    EXPECT_TRUE(wait_until([&] { return topics[i].getNumSubscribers() > 0; })) << names[i];
   }
 }
 

@@ -1,111 +1,17 @@
-// A CRTK arm that moves a tool: clients of our own do what those of CRTK and dVRK do.
-#include <geometry_msgs/PoseStamped.h>
+// A CRTK arm that moves a tool: clients of our own do what those of CRTK and dVRK do. The rest of
+// its tests: arm_forces.cpp, arm_states.cpp.
 #include <geometry_msgs/TwistStamped.h>
-#include <geometry_msgs/WrenchStamped.h>
-#include <sensor_msgs/JointState.h>
 #include <std_msgs/Bool.h>
 #include <std_msgs/Empty.h>
 #include <std_msgs/Float64.h>
 #include <std_msgs/Float64MultiArray.h>
-#ifdef TISSUE_SIM_HAS_CRTK_MSGS
-#include <crtk_msgs/OperatingState.h>
-#include <crtk_msgs/QueryForwardKinematics.h>
-#include <crtk_msgs/QueryInverseKinematics.h>
-#include <crtk_msgs/StringStamped.h>
-#endif
 
-#include <algorithm>
-#include <cmath>
-#include <map>
 #include <memory>
 
-#include "arm/kinematics.h"
-#include "simulator_client.h"
+#include "arm_client.h"
 
 namespace tissue_sim {
 namespace {
-
-using geometry_msgs::PoseStamped;
-using geometry_msgs::WrenchStamped;
-using sensor_msgs::JointState;
-using Values = std::vector<double>;
-
-const std::string kArm = "/PSM1/";
-
-class CrtkArm : public testing::Test {
- protected:
-  CrtkArm()
-      : measured_js(kArm + "measured_js"),
-        setpoint_js(kArm + "setpoint_js"),
-        measured_cp(kArm + "measured_cp"),
-        setpoint_cp(kArm + "setpoint_cp") {}
-
-  void SetUp() override {
-    pause(false);
-    ASSERT_TRUE(wait_until([&] { return valid(measured_js) && valid(setpoint_cp); }));
-    move_jp({0, 0, 0.12, 0, 0, 0});
-  }
-
-  template <class M>
-  static bool valid(const Topic<M>& topic) {
-    const auto m = topic.last();
-    return m && !m->header.stamp.isZero();
-  }
-
-  // Publishes once there is a listener.
-  template <class M>
-  void send(const std::string& name, const M& message, int queue = 100) {
-    auto& publisher = publishers_[name];
-    if (!publisher) {
-      publisher = node_.advertise<M>(kArm + name, queue);
-      ASSERT_TRUE(wait_until([&] { return publisher.getNumSubscribers() > 0; })) << name;
-    }
-    publisher.publish(message);
-  }
-  void send_joints(const std::string& name, const Values& q, const Values& v = {}) {
-    JointState m;
-    m.position = q;
-    m.velocity = v;
-    send(name, m);
-  }
-  void send_pose(const std::string& name, const Pose& pose, const std::string& frame = "") {
-    PoseStamped m;  // clients leave stamp and frame empty
-    m.header.frame_id = frame;
-    m.pose = to_pose(pose);
-    send(name, m);
-  }
-
-  static double distance(const Values& a, const Values& b) {
-    double d = a.size() == b.size() ? 0 : 1e9;
-    for (std::size_t i = 0; i < std::min(a.size(), b.size()); ++i) {
-      d = std::max(d, std::fabs(a[i] - b[i]));
-    }
-    return d;
-  }
-  bool arrives(const Values& q, double seconds = 20) {
-    return wait_until([&] { return distance(measured_js.last()->position, q) < 1e-9; }, seconds);
-  }
-  void move_jp(const Values& q) {
-    send_joints("move_jp", q);
-    ASSERT_TRUE(arrives(q));
-  }
-  Pose tip() { return from_message(measured_cp.last()->pose); }
-
-  template <class M>
-  static void expect_rising(const Topic<M>& topic) {
-    ros::Time last;
-    for (const auto& m : topic.all()) {
-      if (m->header.stamp.isZero()) continue;
-      ASSERT_GT(m->header.stamp, last);
-      last = m->header.stamp;
-    }
-  }
-
-  ros::NodeHandle node_;
-  std::map<std::string, ros::Publisher> publishers_;
-  Topic<JointState> measured_js, setpoint_js;
-  Topic<PoseStamped> measured_cp, setpoint_cp;
-};
 
 template <class M>
 void expect_published(const std::vector<std::string>& names) {
@@ -209,43 +115,6 @@ TEST_F(CrtkArm, MovesQueueAndServoSupersedesThem) {
   EXPECT_TRUE(wait_until([&] { return (tip().position - goal.position).norm() < 1e-9; }, 5));
 }
 
-TEST_F(CrtkArm, FeelsTheTissue) {
-  Topic<WrenchStamped> body(kArm + "body/measured_cf"), spatial(kArm + "spatial/measured_cf");
-  ASSERT_TRUE(wait_until([&] { return valid(body) && valid(spatial); }));
-  EXPECT_EQ(body.last()->wrench.force.z, 0) << "in the air";
-  EXPECT_EQ(body.last()->header.frame_id, "PSM1");
-  move_jp({0.1, 0, 0.153, 0, 0, 0});
-  EXPECT_TRUE(wait_until([&] { return spatial.last()->wrench.force.z > 0.02; }))
-      << "it pushes the tool up";
-  EXPECT_TRUE(wait_until([&] { return measured_js.last()->effort[2] < -0.02; }))
-      << "and the insertion back";
-  bool paired = false;
-  for (const auto& b : body.all()) {  // of one frame, in two axes
-    for (const auto& s : spatial.all()) {
-      if (b->header.stamp != s->header.stamp || b->header.stamp.isZero()) continue;
-      const auto norm = [](const geometry_msgs::Vector3& v) { return std::hypot(v.x, v.y, v.z); };
-      ASSERT_NEAR(norm(b->wrench.force), norm(s->wrench.force), 1e-9);
-      paired |= b->wrench.force.z < -0.02 && s->wrench.force.z > 0.02;
-    }
-  }
-  EXPECT_TRUE(paired);
-  // The tip's axes: at rest its x is the world's y, turned with the yaw.
-  const auto b = body.next();
-  const Quat turned = tip().orientation;
-  EXPECT_TRUE(wait_until([&] {
-    for (const auto& s : spatial.all()) {
-      if (s->header.stamp != b->header.stamp) continue;
-      const auto& w = s->wrench.force;
-      const auto& l = b->wrench.force;
-      EXPECT_LT((turned * Vec3(l.x, l.y, l.z) - Vec3(w.x, w.y, w.z)).norm(), 1e-6);
-      return true;
-    }
-    return false;
-  }));
-  expect_rising(body);
-  expect_rising(spatial);
-}
-
 TEST_F(CrtkArm, JawsAreTheGraspers) {
   Topic<JawGrip> grip("/simulator/grasper/grip");
   Topic<JointState> jaw(kArm + "jaw/measured_js"), asked(kArm + "jaw/setpoint_js");
@@ -326,97 +195,6 @@ TEST_F(CrtkArm, NothingIsValidWhileTheClockStands) {
   pause(false);
   EXPECT_TRUE(wait_until([&] { return valid(measured_js); }, 5));
 }
-
-#ifdef TISSUE_SIM_HAS_CRTK_MSGS
-
-class CrtkState : public CrtkArm {
- protected:
-  CrtkState() : state(kArm + "operating_state"), warning(kArm + "warning") {}
-  void command(const std::string& word) {
-    crtk_msgs::StringStamped m;
-    m.string = word;
-    send("state_command", m);
-  }
-  bool becomes(const std::string& name) {
-    return wait_until([&] { return state.last() && state.last()->state == name; }, 3);
-  }
-  Topic<crtk_msgs::OperatingState> state;
-  Topic<crtk_msgs::StringStamped> warning;
-};
-
-TEST_F(CrtkState, IsBusyOnEachTick) {
-  for (const double yaw : {0.2, 0.2}) {  // the second has no way to go
-    const std::size_t before = state.count();
-    const ros::Time asked = ros::Time::now();
-    send_joints("move_jp", {yaw, 0, 0.12, 0, 0, 0});
-    const auto seen = [&](bool busy) {
-      const auto all = state.all();
-      for (std::size_t i = before; i < all.size(); ++i) {
-        if (all[i]->is_busy == busy && all[i]->header.stamp > asked) return true;
-      }
-      return false;
-    };
-    EXPECT_TRUE(wait_until([&] { return seen(true); }, 5));
-    EXPECT_TRUE(wait_until([&] { return seen(true) && !state.last()->is_busy; }, 5));
-    const auto all = state.all();
-    const int busy =
-        static_cast<int>(std::count_if(all.begin() + static_cast<long>(before), all.end(),
-                                       [](const auto& m) { return m->is_busy; }));
-    EXPECT_GE(busy, 3);
-    // It had arrived before it said that it is idle.
-    const ros::Time idle = state.last()->header.stamp;
-    ASSERT_TRUE(wait_until([&] { return measured_js.last()->header.stamp >= idle; }, 5));
-    const auto joints = measured_js.all();
-    const auto began = std::find_if(all.begin() + static_cast<long>(before), all.end(),
-                                    [](const auto& m) { return m->is_busy; });
-    const auto first = std::find_if(began, all.end(), [](const auto& m) { return !m->is_busy; });
-    ASSERT_TRUE(first != all.end());
-    const auto before_idle = std::find_if(joints.rbegin(), joints.rend(), [&](const auto& m) {
-      return m->header.stamp < (*first)->header.stamp;
-    });
-    ASSERT_TRUE(before_idle != joints.rend());
-    EXPECT_NEAR((*before_idle)->position[0], yaw, 1e-9);
-  }
-  expect_rising(state);
-}
-
-TEST_F(CrtkState, CommandsChangeIt) {
-  command("disable");
-  EXPECT_TRUE(becomes("DISABLED"));
-  EXPECT_TRUE(wait_until([&] { return setpoint_js.last()->header.stamp.isZero(); }));
-  EXPECT_TRUE(valid(measured_js));
-  const std::size_t refused = warning.count();
-  send_joints("move_jp", {0.5, 0, 0.12, 0, 0, 0});
-  EXPECT_TRUE(wait_until([&] { return warning.count() > refused; }));
-  EXPECT_EQ(warning.last()->string, "move_jp refused: the arm is DISABLED, must be ENABLED");
-  EXPECT_TRUE(arrives({0, 0, 0.12, 0, 0, 0}, 0.5));
-  command("enable");
-  EXPECT_TRUE(becomes("ENABLED"));
-  command("unhome");
-  EXPECT_TRUE(wait_until([&] { return !state.last()->is_homed; }));
-  EXPECT_TRUE(wait_until([&] { return measured_js.last()->header.stamp.isZero(); }));
-  command("home");
-  EXPECT_TRUE(wait_until([&] { return state.last()->is_homed && valid(setpoint_js); }));
-}
-
-TEST_F(CrtkState, KinematicsAreServices) {
-  crtk_msgs::QueryForwardKinematics forward;
-  forward.request.jp = {0.2, -0.1, 0.14, 0.4, 0.3, -0.2};
-  ASSERT_TRUE(ros::service::call(kArm + "forward_kinematics", forward));
-  EXPECT_TRUE(forward.response.result);
-  crtk_msgs::QueryInverseKinematics inverse;
-  inverse.request.cp = forward.response.cp;
-  ASSERT_TRUE(ros::service::call(kArm + "inverse_kinematics", inverse));
-  EXPECT_LT(distance(inverse.response.jp, forward.request.jp), 1e-9);
-  ASSERT_TRUE(ros::service::call(kArm + "local/forward_kinematics", forward));
-  EXPECT_NEAR(forward.response.cp.position.z, inverse.request.cp.position.z - 0.17, 1e-12);
-  forward.request.jp[2] = 1;
-  ASSERT_TRUE(ros::service::call(kArm + "forward_kinematics", forward));
-  EXPECT_FALSE(forward.response.result);
-  EXPECT_EQ(forward.response.message, "outer_insertion is 1, it goes from 0 to 0.24");
-}
-
-#endif
 
 }  // namespace
 }  // namespace tissue_sim

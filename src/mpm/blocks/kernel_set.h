@@ -8,6 +8,7 @@
 #include "mpm/blocks/block_kernels.h"
 #include "mpm/blocks/block_places.h"
 #include "mpm/blocks/block_readings.h"
+#include "mpm/blocks/front_forces.h"
 #include "mpm/blocks/lane_lists.h"
 
 namespace tissue_sim {
@@ -104,10 +105,17 @@ TISSUE_SIM_INLINE void update_row(const NodeRow& row, const RowPart* parts, cons
     stretched<W>(b, f, stretch, s, found);                                                        \
   }                                                                                               \
                                                                                                   \
+  target void front_##suffix(const FrontCell& c, const FrontField& f, float* force, float* pull) { \
+    front_forces_any(c, f, force, pull);                                                          \
+  }                                                                                               \
+  target double front_energy_##suffix(const FrontCell& c, const FrontField& f) {                  \
+    return front_energy_any(c, f);                                                                \
+  }                                                                                               \
+                                                                                                  \
   constexpr BlockKernels kKernels_##suffix = {                                                    \
       gather_##suffix,       forces_##suffix,     positions_##suffix,  bounds_##suffix,           \
       lanes_in_box_##suffix, lanes_near_##suffix, update_row_##suffix, state_##suffix,            \
-      stiffness_##suffix,    stretched_##suffix};
+      stiffness_##suffix,    stretched_##suffix,  front_##suffix,      front_energy_##suffix};
 
 }  // namespace
 }  // namespace tissue_sim

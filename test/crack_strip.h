@@ -165,7 +165,8 @@ inline PulledStrip pull(const MpmState& s, double traction) {
   Eigen::SparseMatrix<double> stiffness(2 * count, 2 * count);
   stiffness.setFromTriplets(entries.begin(), entries.end());
   const Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>> solver(stiffness);
-  load.conservativeResizeLike(Eigen::VectorXd::Zero(2 * static_cast<int>(s.nodes.size()) + 2 * count));
+  load.conservativeResizeLike(
+      Eigen::VectorXd::Zero(2 * static_cast<int>(s.nodes.size()) + 2 * count));
   const Eigen::VectorXd f = load.head(2 * count);
   const Eigen::VectorXd x = solver.solve(f);
   const double force = traction * 2 * b.ny * h / 2 * h;

@@ -178,7 +178,8 @@ void fields(Archive& archive, WaitingFragment& w) {
 
 template <class Archive>
 void fields(Archive& archive, FrontNode& n) {
-  archive(n.node, n.body, n.x, n.y, n.z, n.share, n.first, n.other, n.mass, n.all, n.first_side);
+  archive(n.node, n.body, n.x, n.y, n.z, n.share, n.first, n.other, n.mass, n.lambda_over_mu, n.all,
+          n.first_side);
 }
 
 /// What its cells follow from.

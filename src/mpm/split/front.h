@@ -24,6 +24,7 @@ struct FrontNode {
   float share;                 ///< of how far it is parted, 0 to 1: grows as the cut goes on
   float first, other;          ///< shares of the node's mass
   float mass;                  ///< of d: first other m [kg]
+  float lambda_over_mu;        ///< of its points
   Planes all, first_side;      ///< its points, and those of one side
 };
 

@@ -118,8 +118,8 @@ void list_sums(const std::map<std::int32_t, std::vector<std::int32_t>>& of, Plac
   sums.clear();
   places.clear();
   for (const auto& [node, at] : of) {
-    sums.push_back({node, static_cast<std::int32_t>(places.size()),
-                    static_cast<std::int32_t>(at.size())});
+    sums.push_back(
+        {node, static_cast<std::int32_t>(places.size()), static_cast<std::int32_t>(at.size())});
     places.insert(places.end(), at.begin(), at.end());
   }
 }

@@ -40,10 +40,10 @@ Placed placed(const MpmState& s, const Array<float>* u, std::int32_t p) {
     }
     const Vec3 moved(u[0][node], u[1][node], u[2][node]);
     at.x += static_cast<double>(w[0] * w[1] * w[2]) * moved;
-    at.F += moved *
-            Vec3(slope[0] * w[1] * w[2], w[0] * slope[1] * w[2], w[0] * w[1] * slope[2])
-                .transpose() /
-            body.cell_size;
+    at.F +=
+        moved *
+        Vec3(slope[0] * w[1] * w[2], w[0] * slope[1] * w[2], w[0] * w[1] * slope[2]).transpose() /
+        body.cell_size;
   }
   return at;
 }
@@ -105,9 +105,8 @@ std::uint32_t passed(const MpmState& s, const std::vector<SweepPart>& parts,
   const double reach = 3 * body.cell_size;
   const MovingSegment there{end.x, end_q.x, end.x, end_q.x};
   const auto is_far = [&](const SweepPart& part) {
-    return std::all_of(part.edges.begin(), part.edges.end(), [&](const SweptEdge& e) {
-      return stays_aside(e, there, reach);
-    });
+    return std::all_of(part.edges.begin(), part.edges.end(),
+                       [&](const SweptEdge& e) { return stays_aside(e, there, reach); });
   };
   if (std::all_of(parts.begin(), parts.end(), is_far)) return 0;
   const bool moves = u_begin != u_end;
@@ -156,8 +155,8 @@ void pass_rim(MpmState& s, const BladePath& path, const Array<float>* u_begin,
       static_cast<int>(rim.size()),
       [&](int i) {
         const auto p = static_cast<std::int32_t>(rim[i].first / 3);
-        more[i] = passed(s, parts, u_begin, u_end, p, static_cast<int>(rim[i].first % 3),
-                         *rim[i].second);
+        more[i] =
+            passed(s, parts, u_begin, u_end, p, static_cast<int>(rim[i].first % 3), *rim[i].second);
       },
       32);
   for (std::size_t i = 0; i < rim.size(); ++i) {

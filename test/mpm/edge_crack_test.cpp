@@ -53,8 +53,8 @@ TEST(EdgeCrack, IsAsDeepAsItWasCut) {
       strip.boundary = MpmBoundary::kSurface;
       const double whole = pull(strip.tissue(false)->state(), 1).compliance;
       double before = 0, share_before = 0;
-      for (const double cells : {0.0, 0.125, 0.25, 0.5, 0.625, 0.75, 1.0, 1.25}) {
-        if (deep == 20 && cells > 0.75) break;
+      for (const double cells : {0.0, 0.25, 0.5, 0.625, 0.875}) {
+        if (deep == 20 && cells > 0.5) break;
         const double depth = (deep + cells) * strip.cell_size;
         const auto tissue = strip.tissue(true, depth);
         const double added = pull(tissue->state(), 1).compliance - whole;
@@ -84,7 +84,7 @@ TEST(EdgeCrack, StandsStillInTheProgramWhereTheDirectSolutionPutsIt) {
     if (cells >= 0) strip.boundary = MpmBoundary::kSurface;
     const auto tissue = strip.tissue(true, 0.02 + std::max(cells, 0.0) * strip.cell_size);
     MpmState& s = tissue->state();
-    const PulledStrip rest = pull(s, 1e-4 * strip.young_modulus);
+    const PulledStrip rest = pull(s, (cells < 0 ? 1e-4 : 5e-5) * strip.young_modulus);
     double largest = 0;
     for (std::size_t i = 0; i < s.nodes.size(); ++i) {
       for (int a = 0; a < 3; ++a) s.nodes.u[a][i] = static_cast<float>(rest.u[i][a]);

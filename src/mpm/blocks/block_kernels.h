@@ -105,8 +105,8 @@ struct BlockKernels {
   /// Appends the points whose largest principal stretch is at least `stretch`, in a fixed order.
   void (*stretched)(const Block&, const BlockField&, float stretch, BlockScratch&,
                     std::vector<StretchedPoint>& found);
-  /// What a cell at the front of a cut adds to the forces: on its nodes, [3][32], and on its parts,
-  /// [FrontCell::count][3] [N]; and the energy of that [J].
+  /// What a cell at the front of a cut adds to the forces: on its nodes, [27][4], and on its parts,
+  /// [FrontCell::count][4] [N]; and the energy of that [J].
   void (*front)(const FrontCell&, const FrontField&, float* force, float* pull);
   double (*front_energy)(const FrontCell&, const FrontField&);
 };

@@ -33,6 +33,6 @@ struct FrontField {
   const FrontPart* parts;
 };
 
-inline constexpr int kFrontForce = 3 * 32;  ///< floats of a cell's force: [3][32], of 27 nodes
+inline constexpr int kFrontForce = 4 * 28;  ///< floats of a cell's force: x, y, z, 0 of 27 nodes
 
 }  // namespace tissue_sim

@@ -71,7 +71,10 @@ TISSUE_SIM_INLINE void add_part(const FrontCell& cell, const FrontPart& part,
 }
 
 TISSUE_SIM_INLINE float sum_of(Vec<8> v) {
-  return ((v[0] + v[4]) + (v[1] + v[5])) + ((v[2] + v[6]) + (v[3] + v[7]));
+  float of[8];
+  store<8>(of, v);
+  const Vec<4> half = load<4>(of) + load<4>(of + 4);
+  return (half[0] + half[1]) + (half[2] + half[3]);
 }
 
 /// F at the points of the cell, 1 where it has none: what is far from them may be no number there.
@@ -115,13 +118,13 @@ TISSUE_SIM_INLINE double stabilise_parts(const FrontCell& cell, const FrontField
   if (pull == nullptr) return 0.5 * twice_energy;
   for (int i = 0; i < cell.count; ++i) {
     const float by = std::sqrt(parts[i].share) * parts[i].side * cell.inverse_size;
-    for (int c = 0; c < 3; ++c) pull[3 * i + c] -= by * force[c][parts[i].k];
+    for (int c = 0; c < 3; ++c) pull[4 * i + c] -= by * force[c][parts[i].k];
   }
   return 0.5 * twice_energy;
 }
 
-/// What a cell's force is more than the block's: on its nodes, [3][32], and on d of its parts,
-/// [count][3]. [N]
+/// What a cell's force is more than the block's: on its nodes, [27][4], and on d of its parts,
+/// [count][4]. [N]
 template <class LawOf>
 TISSUE_SIM_INLINE void front_forces(const FrontCell& cell, const FrontField& f, float* force,
                                     float* pull) {
@@ -148,20 +151,25 @@ TISSUE_SIM_INLINE void front_forces(const FrontCell& cell, const FrontField& f, 
         of_lanes += (sum[3 * c + axis] - before[j][3 * c + axis]) *
                     load<8>(kCellSlopes.at_points[parts[j].k][axis]);
       }
-      pull[3 * j + c] = by * sum_of(of_lanes);
+      pull[4 * j + c] = by * sum_of(of_lanes);
     }
   }
+  float stress_of[9][8], component[3][32];
+  for (int i = 0; i < 9; ++i) store<8>(stress_of[i], -cell.inverse_size * sum[i]);
   for (int c = 0; c < 3; ++c) {
     Vec<8> of_nodes[4] = {};
     for (int axis = 0; axis < 3; ++axis) {
       for (int p = 0; p < 8; ++p) {
-        const float stress = -cell.inverse_size * sum[3 * c + axis][p];
+        const float stress = stress_of[3 * c + axis][p];
         for (int n = 0; n < 4; ++n) {
           of_nodes[n] += stress * load<8>(kCellSlopes.of_nodes[p][axis] + 8 * n);
         }
       }
     }
-    for (int n = 0; n < 4; ++n) store<8>(force + 32 * c + 8 * n, of_nodes[n]);
+    for (int n = 0; n < 4; ++n) store<8>(component[c] + 8 * n, of_nodes[n]);
+  }
+  for (int k = 0; k < 27; ++k) {
+    for (int c = 0; c < 3; ++c) force[4 * k + c] = component[c][k];
   }
   if (cell.stabilised > 0) stabilise_parts(cell, f, pull);
 }

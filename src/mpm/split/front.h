@@ -47,7 +47,7 @@ struct Front {
   };
   std::vector<Sum> node_sums, part_sums;
   std::vector<std::int32_t> node_places, part_places;
-  Array<float> force, pull;  ///< of the cells [3][32] each, of the parts [3] each [N]
+  Array<float> force, pull;  ///< of the cells [28][4] each, of the parts [4] each [N]
 };
 
 inline constexpr int kRimProbes = 32;

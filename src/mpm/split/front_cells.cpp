@@ -3,6 +3,7 @@
 #include <array>
 #include <map>
 
+#include "compute/simd.h"
 #include "mpm/blocks/stabilisation.h"
 #include "mpm/mpm_state.h"
 #include "mpm/split/front.h"
@@ -150,16 +151,16 @@ void list_front_cells(MpmState& s) {
   std::map<std::int32_t, std::vector<std::int32_t>> of_node, of_part;
   for (std::size_t i = 0; i < front.cells.size(); ++i) {
     for (int k = 0; k < 27; ++k) {
-      of_node[front.cells[i].node[k]].push_back(static_cast<std::int32_t>(kFrontForce * i) + k);
+      of_node[front.cells[i].node[k]].push_back(static_cast<std::int32_t>(kFrontForce * i) + 4 * k);
     }
   }
   for (std::size_t i = 0; i < front.parts.size(); ++i) {
-    of_part[front.parts[i].node].push_back(static_cast<std::int32_t>(3 * i));
+    of_part[front.parts[i].node].push_back(static_cast<std::int32_t>(4 * i));
   }
   list_sums(of_node, front.node_sums, front.node_places);
   list_sums(of_part, front.part_sums, front.part_places);
   front.force.assign(kFrontForce * front.cells.size(), 0.0f);
-  front.pull.assign(3 * front.parts.size(), 0.0f);
+  front.pull.assign(4 * front.parts.size(), 0.0f);
 }
 
 FrontField front_field(const MpmState& s) {
@@ -178,7 +179,7 @@ void work_on_front_cell(MpmState& s, int i) {
   const FrontCell& cell = s.front.cells[i];
   s.kernels->front(cell, front_field(s),
                    s.front.force.data() + static_cast<std::size_t>(kFrontForce) * i,
-                   s.front.pull.data() + 3 * static_cast<std::size_t>(cell.first));
+                   s.front.pull.data() + 4 * static_cast<std::size_t>(cell.first));
 }
 
 int front_moves(const Front& front) {
@@ -196,11 +197,8 @@ void move_front(MpmState& s, const NodeStep& step, int i) {
     const std::int32_t* place =
         (of_node ? front.node_places.data() : front.part_places.data()) + sum.first;
     const float* from = of_node ? front.force.data() : front.pull.data();
-    const int component = of_node ? 32 : 1;
-    float force[3] = {};
-    for (int k = 0; k < sum.count; ++k) {
-      for (int c = 0; c < 3; ++c) force[c] += from[place[k] + component * c];
-    }
+    Vec<4> force = {};
+    for (int k = 0; k < sum.count; ++k) force += load<4>(from + place[k]);
     for (int c = 0; c < 3; ++c) {
       if (of_node) {
         // The node was moved on as if this force were not: the step is linear in it.

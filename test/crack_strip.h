@@ -21,6 +21,7 @@ struct CrackStrip {
   double young_modulus = 1e4;          ///< [Pa]
   double cell_size;                    ///< [m]
   double crack_x;                      ///< where the crack is, along the strip [m]
+  MpmBoundary boundary = MpmBoundary::kLattice;
 
   /// `deep`: cells along the crack. `at_nodes`: the crack runs through nodes, else between them.
   explicit CrackStrip(int deep, bool at_nodes = false)
@@ -28,6 +29,7 @@ struct CrackStrip {
 
   std::unique_ptr<MpmTissue> tissue(bool cracked, double depth = 0.02) const {
     Scene scene = free_box(Vec3(length, width, cell_size), cell_size);
+    scene.mpm.boundary = boundary;
     Material material;
     material.name = "strip";
     material.young_modulus = young_modulus;
@@ -45,8 +47,67 @@ struct CrackStrip {
 /// The strip at rest under a pull, in the limit of small displacements.
 struct PulledStrip {
   std::vector<Vec3> u, load;  ///< per node [m], [N]
+  std::vector<Vec3> d;        ///< per node that is parted ahead of the crack [m]
   double compliance;          ///< displacement of the ends over the pull [m/N]
 };
+
+/// Adds the stiffness of the cells at the crack's front; nodes that are parted ahead of it get
+/// further unknowns, which it returns by those of the nodes.
+inline std::map<int, int> add_front(const MpmState& s, const std::vector<int>& unknown, int& count,
+                                    std::vector<Eigen::Triplet<double>>& entries) {
+  const double h = s.bodies[0].cell_size;
+  const double kinds[3][3] = {{0.15625, 0.6875, 0.15625}, {-0.5, 0, 0.5}, {0.25, -0.5, 0.25}};
+  std::map<int, int> apart;  // by the unknown of their node
+  for (const FrontNode& n : s.front.nodes) {
+    if (apart.emplace(unknown[n.node], count).second) ++count;
+  }
+  using Row = std::map<int, double>;  // of unknowns
+  const auto add = [&entries](double stiffness, const Row& row) {
+    for (const auto& [i, a] : row) {
+      for (const auto& [j, b] : row) entries.emplace_back(i, j, stiffness * a * b);
+    }
+  };
+  for (const FrontCell& cell : s.front.cells) {
+    const FrontPart* parts = s.front.parts.data() + cell.first;
+    for (int p = 0; p < 8; ++p) {
+      if (cell.mu[p] == 0) continue;
+      Row strain[3];
+      const auto add_node = [&](int k, int column, double side) {
+        double w[3], slope[3];
+        for (int a = 0; a < 3; ++a) {
+          const int d = a == 0 ? k % 3 : a == 1 ? k / 3 % 3 : k / 9;
+          const double r = ((p >> a & 1) - 0.5) / 2 + 1 - d;
+          w[a] = reference::spline(r);
+          slope[a] = reference::spline_slope(r);
+        }
+        const double x = side * slope[0] * w[1] * w[2] / h, y = side * w[0] * slope[1] * w[2] / h;
+        strain[0][2 * column] += x;
+        strain[1][2 * column + 1] += y;
+        strain[2][2 * column] += y / std::sqrt(2);
+        strain[2][2 * column + 1] += x / std::sqrt(2);
+      };
+      for (int k = 0; k < 27; ++k) add_node(k, unknown[cell.node[k]], 1);
+      for (const Row& row : strain) add(-2 * cell.mu[p] * parts[0].share, row);
+      for (int j = 0; j < cell.count; ++j) {
+        const int node = s.front.nodes[parts[j].node].node;
+        add_node(parts[j].k, apart[unknown[node]], parts[j].side);
+        for (const Row& row : strain) add(2 * cell.mu[p] * parts[j].step, row);
+      }
+    }
+    for (int f = 0; f < 27 && cell.stabilised > 0; ++f) {
+      if (f % 3 + f / 3 % 3 + f / 9 <= 1) continue;
+      Row row[2];
+      for (int j = 0; j < cell.count; ++j) {
+        const int k = parts[j].k, node = s.front.nodes[parts[j].node].node;
+        const double a = kinds[f % 3][k % 3] * kinds[f / 3 % 3][k / 3 % 3] * kinds[f / 9][k / 9] *
+                         parts[j].side * std::sqrt(parts[j].share) / h;
+        for (int c = 0; c < 2; ++c) row[c][2 * apart[unknown[node]] + c] += a;
+      }
+      for (const Row& of : row) add(cell.stabilised, of);
+    }
+  }
+  return apart;
+}
 
 /// Nodes of all layers along z move alike: each is mapped to one unknown.
 inline PulledStrip pull(const MpmState& s, double traction) {
@@ -98,11 +159,14 @@ inline PulledStrip pull(const MpmState& s, double traction) {
       }
     }
   }
+  std::map<int, int> apart = add_front(s, unknown, count, entries);
   // A breath of stiffness against rigid motion, which no load excites.
   for (int i = 0; i < 2 * count; ++i) entries.emplace_back(i, i, 1e-9 * mu * h);
   Eigen::SparseMatrix<double> stiffness(2 * count, 2 * count);
   stiffness.setFromTriplets(entries.begin(), entries.end());
   const Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>> solver(stiffness);
+  load.conservativeResizeLike(
+      Eigen::VectorXd::Zero(2 * static_cast<int>(s.nodes.size()) + 2 * count));
   const Eigen::VectorXd f = load.head(2 * count);
   const Eigen::VectorXd x = solver.solve(f);
   const double force = traction * 2 * b.ny * h / 2 * h;
@@ -112,6 +176,10 @@ inline PulledStrip pull(const MpmState& s, double traction) {
   result.load = result.u;
   for (std::size_t i = 0; i < s.nodes.size(); ++i) {
     if (unknown[i] >= 0) result.u[i] = Vec3(x[2 * unknown[i]], x[2 * unknown[i] + 1], 0);
+  }
+  for (const FrontNode& n : s.front.nodes) {
+    const int column = apart[unknown[n.node]];
+    result.d.emplace_back(x[2 * column], x[2 * column + 1], 0);
   }
   for (int p = 0; p < s.points.size(); ++p) {
     const Points::Site& site = s.points.site[p];

@@ -18,12 +18,26 @@ def nodes(length, count, low, high):
     return length * t
 
 
-class Block:
-    """[x, y, z] in given node planes; `held` are (axis, place, components) that do not move."""
+def cut_mesh(mesh, x, z):
+    """The mesh with corners of their own for elements on either side of a cut, which ends between corners at z."""
+    p, t = mesh.p, mesh.t.copy()
+    at = np.nonzero((np.abs(p[0] - x) < 1e-9) & (p[2] > z + 1e-9))[0]
+    twin = np.arange(p.shape[1])
+    twin[at] = p.shape[1] + np.arange(len(at))
+    beyond = p[0][t].mean(axis=0) > x
+    t[:, beyond] = twin[t[:, beyond]]
+    return skfem.MeshHex(np.hstack([p, p[:, at]]), t)
 
-    def __init__(self, planes, young, poisson, held, body_force=None):
+
+class Block:
+    """[x, y, z] in given node planes; `held` are (axis, place, components) that do not move; `cut` is (x, z): where the
+    plane at x is cut from above down to z."""
+
+    def __init__(self, planes, young, poisson, held, body_force=None, cut=None):
         self.lam, self.mu = lame(young, poisson)
         self.mesh = skfem.MeshHex.init_tensor(*planes)
+        if cut is not None:
+            self.mesh = cut_mesh(self.mesh, *cut)
         self.basis = skfem.Basis(self.mesh, skfem.ElementVector(skfem.ElementHex2()), intorder=4)
         self.solid = Solid(self.basis, lambda x, g, v: g, lambda x: 1.0, self.lam, self.mu, body_force)
         fixed = [self.dofs(axis, at, components) for axis, at, components in held]
@@ -34,10 +48,15 @@ class Block:
         d = self.basis.get_dofs(lambda x: np.abs(x[axis] - at) < 1e-9)
         return np.concatenate([d.all(['u^%d' % (c + 1)]) for c in components])
 
-    def value(self, place, component):
-        """Displacement of a corner or middle of an element [m]."""
+    def value(self, place, component, beyond=None):
+        """Displacement of a corner or middle of an element [m]; at a cut that of the elements on the side of x where
+        `beyond` lies."""
         near = np.linalg.norm(self.basis.doflocs.T - np.asarray(place), axis=1) < 1e-9
-        own = self.basis.get_dofs(elements=np.arange(self.mesh.nelements)).all(['u^%d' % (component + 1)])
+        elements = np.arange(self.mesh.nelements)
+        if beyond is not None:
+            middle = self.mesh.p[0][self.mesh.t].mean(axis=0)
+            elements = elements[(middle > place[0]) == (beyond > place[0])]
+        own = self.basis.get_dofs(elements=elements).all(['u^%d' % (component + 1)])
         return float(self.u[np.intersect1d(np.nonzero(near)[0], own)[0]])
 
     def solve(self, load_steps=1, prescribe=None):

@@ -17,12 +17,14 @@ LinearisedMotion::~LinearisedMotion() {
   for (int a = 0; a < 3; ++a) {
     std::swap(u_[a], state_.nodes.u[a]);
     std::swap(rates_[a], state_.nodes.v[a]);
+    std::swap(d_[a], state_.front.d[a]);
+    std::swap(front_rates_[a], state_.front.rate[a]);
   }
 }
 
 template <class F>
 double LinearisedMotion::sum(const F& f) {
-  const int count = static_cast<int>(nodes_.size()), chunks = (count + kChunk - 1) / kChunk;
+  const int count = static_cast<int>(mass_.size()), chunks = (count + kChunk - 1) / kChunk;
   std::vector<double> part(chunks);
   state_.cpu->for_each(chunks, [&](int chunk) {
     double s = 0;
@@ -52,12 +54,14 @@ double LinearisedMotion::accelerations(const F& f) {
     state_.kernels->forces(block, block_field(state_, block), state_.work.scratch.local(),
                            state_.work.force.data() + block.force_offset);
   });
+  state_.cpu->for_each(static_cast<int>(front_cells_.size()),
+                       [&](int i) { work_on_front_cell(state_, front_cells_[i]); });
   NodeStep step{};
   step.dt = step.kick = 1;  // from rest: rates are accelerations
   move_nodes(state_, step);
   for (const int group : held_) hold_still(state_.anchors, group, state_.nodes.v);
   return sum([&](int a, int i) {
-    float& v = state_.nodes.v[a][nodes_[i]];
+    float& v = rate(a, i);
     const float x = v;
     v = 0;
     return f(a, i, x);
@@ -80,6 +84,7 @@ LinearisedMotion::LinearisedMotion(MpmState& state, const std::vector<std::uint8
     nodes_.push_back(static_cast<std::int32_t>(i));
     mass_.push_back(n.mass[i]);
   }
+  add_front(seen);
   const AnchorFaces& faces = state.anchors;
   for (std::size_t g = 0; g < faces.groups.size(); ++g) {
     bool all = true;
@@ -95,8 +100,16 @@ LinearisedMotion::LinearisedMotion(MpmState& state, const std::vector<std::uint8
     u_[a] = n.u[a];
     rates_[a].assign(n.size(), 0.0f);
     std::swap(rates_[a], n.v[a]);
-    for (Vector* x : {&at_rest_, &before_, &v_, &w_}) (*x)[a].assign(nodes_.size(), 0.0f);
+    for (Vector* x : {&at_rest_, &before_, &v_, &w_}) (*x)[a].assign(mass_.size(), 0.0f);
   }
+  Front& front = state.front;
+  for (int a = 0; a < 3; ++a) {
+    d_[a] = front.d[a];
+    front_rates_[a].assign(d_[a].size(), 0.0f);
+    std::swap(front_rates_[a], front.rate[a]);
+  }
+  std::fill(front.force.begin(), front.force.end(), 0.0f);
+  std::fill(front.pull.begin(), front.pull.end(), 0.0f);
   std::fill(state.work.force.begin(), state.work.force.end(), 0.0f);
   accelerations([this](int a, int i, float x) {
     at_rest_[a][i] = x;
@@ -104,16 +117,38 @@ LinearisedMotion::LinearisedMotion(MpmState& state, const std::vector<std::uint8
   });
 }
 
+void LinearisedMotion::add_front(const std::vector<std::uint8_t>& seen) {
+  const Front& front = state_.front;
+  std::vector<std::uint8_t> takes_part(front.nodes.size(), 0);
+  for (std::size_t i = 0; i < front.cells.size(); ++i) {
+    const FrontCell& cell = front.cells[i];
+    if (!std::all_of(cell.node, cell.node + 27, [&seen](int n) { return seen[n] != 0; })) continue;
+    front_cells_.push_back(static_cast<int>(i));
+    for (int j = 0; j < cell.count; ++j) takes_part[front.parts[cell.first + j].node] = 1;
+  }
+  for (std::size_t i = 0; i < takes_part.size(); ++i) {
+    if (takes_part[i] == 0) continue;
+    front_nodes_.push_back(static_cast<std::int32_t>(i));
+    mass_.push_back(front.nodes[i].mass);
+  }
+}
+
+float& LinearisedMotion::rate(int a, int i) {
+  const auto first = static_cast<int>(nodes_.size());
+  return i < first ? state_.nodes.v[a][nodes_[i]] : state_.front.rate[a][front_nodes_[i - first]];
+}
+
 void LinearisedMotion::start() {
   Nodes& n = state_.nodes;
+  const auto first = static_cast<int>(nodes_.size());
   for_each([&](int a, int i) {
-    const std::int32_t node = nodes_[i];
-    n.v[a][node] =
-        scattered(static_cast<std::uint32_t>(3 * node + a)) * std::sqrt(n.inv_mass[node]);
+    const std::int32_t number = i < first ? nodes_[i] : ~front_nodes_[i - first];
+    const float inv_mass = i < first ? n.inv_mass[number] : 1 / mass_[i];
+    rate(a, i) = scattered(static_cast<std::uint32_t>(3 * number + a)) * std::sqrt(inv_mass);
   });
   for (const int group : held_) hold_still(state_.anchors, group, n.v);
   const double square = sum([&](int a, int i) {
-    v_[a][i] = std::exchange(n.v[a][nodes_[i]], 0.0f);
+    v_[a][i] = std::exchange(rate(a, i), 0.0f);
     return static_cast<double>(mass_[i]) * v_[a][i] * v_[a][i];
   });
   const auto scale = static_cast<float>(square > 0 ? 1 / std::sqrt(square) : 0);
@@ -133,9 +168,15 @@ double LinearisedMotion::apply() {
   std::memcpy(&largest, &bits, sizeof(bits));
   if (!(largest > 0)) return 0;
   const auto scale = kSmallMotion * static_cast<float>(state_.scene.cell_size) / largest;
+  const auto first = static_cast<int>(nodes_.size());
   for_each([&](int a, int i) {
-    const std::int32_t node = nodes_[i];
-    state_.nodes.u[a][node] = u_[a][node] + scale * v_[a][i];
+    if (i < first) {
+      const std::int32_t node = nodes_[i];
+      state_.nodes.u[a][node] = u_[a][node] + scale * v_[a][i];
+    } else {
+      const std::int32_t node = front_nodes_[i - first];
+      state_.front.d[a][node] = d_[a][node] + scale * v_[a][i];
+    }
   });
   const float back = 1 / scale;
   return accelerations([&](int a, int i, float x) {

@@ -39,13 +39,21 @@ class LinearisedMotion {
   template <class F>
   void for_each(const F& f);
 
+  /// Adds the parted nodes at a front whose cells' nodes were all seen.
+  void add_front(const std::vector<std::uint8_t>& seen);
+  /// Rate of the i-th entry of a vector.
+  float& rate(int a, int i);
+
   MpmState& state_;
-  std::vector<int> blocks_;          ///< that take part
-  std::vector<std::int32_t> nodes_;  ///< that those see: the vectors have an entry for each
-  std::vector<int> held_;            ///< groups of anchors' faces that hold some of these
-  Array<float> mass_;                ///< of these [kg]
-  Array<float> u_[3], rates_[3];     ///< what the state's nodes had
-  Vector at_rest_;                   ///< accelerations without displacement [m/s^2]
+  std::vector<int> blocks_;                ///< that take part
+  std::vector<std::int32_t> nodes_;        ///< that those see: the vectors have an entry for each
+  std::vector<int> front_cells_;           ///< that take part
+  std::vector<std::int32_t> front_nodes_;  ///< parted nodes: entries behind those of nodes
+  std::vector<int> held_;                  ///< groups of anchors' faces that hold some of these
+  Array<float> mass_;                      ///< of these [kg]
+  Array<float> d_[3], front_rates_[3];     ///< what the front had
+  Array<float> u_[3], rates_[3];           ///< what the state's nodes had
+  Vector at_rest_;                         ///< accelerations without displacement [m/s^2]
   Vector before_, v_, w_;
 };
 

@@ -176,6 +176,28 @@ void fields(Archive& archive, WaitingFragment& w) {
   archive(w.piece, w.until, w.F);
 }
 
+template <class Archive>
+void fields(Archive& archive, FrontNode& n) {
+  archive(n.node, n.body, n.x, n.y, n.z, n.share, n.first, n.other, n.mass, n.lambda_over_mu, n.all,
+          n.first_side);
+}
+
+/// What its cells follow from.
+template <class Archive>
+void fields(Archive& archive, Front& f) {
+  std::vector<std::int64_t> bonds;
+  std::vector<std::uint32_t> passed;
+  for (const auto& [bond, mask] : f.rim) {
+    bonds.push_back(bond);
+    passed.push_back(mask);
+  }
+  archive.part("front", bonds, passed, f.nodes, f.d, f.rate);
+  if constexpr (Archive::kReads) {
+    f.rim.clear();
+    for (std::size_t i = 0; i < bonds.size(); ++i) f.rim[bonds[i]] = passed.at(i);
+  }
+}
+
 /// All but contact of tissue with tissue: mpm/contact/face_fields.h.
 template <class Archive>
 void tissue_fields(Archive& archive, MpmState& s) {

@@ -73,6 +73,8 @@ void MpmTissue::save_checkpoint() {
   for (int a = 0; a < 3; ++a) {
     checkpoint_.u[a] = s.nodes.u[a];
     checkpoint_.v[a] = s.nodes.v[a];
+    checkpoint_.d[a] = s.front.d[a];
+    checkpoint_.rate[a] = s.front.rate[a];
   }
   checkpoint_.motion = s.motion;
   checkpoint_.time = s.time;
@@ -90,6 +92,8 @@ void MpmTissue::restore_checkpoint() {
   for (int a = 0; a < 3; ++a) {
     s.nodes.u[a] = checkpoint_.u[a];
     s.nodes.v[a] = checkpoint_.v[a];
+    s.front.d[a] = checkpoint_.d[a];
+    s.front.rate[a] = checkpoint_.rate[a];
   }
   s.time = checkpoint_.time;
   s.dt = checkpoint_.dt;

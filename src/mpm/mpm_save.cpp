@@ -13,6 +13,7 @@ void MpmTissue::each_field(Archive& archive) {
   archive.begin_part("faces");
   fields(archive, state_->faces, state_->blocks);
   archive.end_part("faces");
+  fields(archive, state_->front);
   archive.part("pieces", pieces_, pieces_measured_);
   archive.part("substeps", stiffening_, modulus_, substep_);
   archive.part("measures", measured_, has_energies_, work_);
@@ -32,6 +33,7 @@ void MpmTissue::restore(Span<const std::uint8_t> saved) {
   state_->work.inertial_index.assign(state_->nodes.size(), -1);
   index_inertia(*state_);
   index_flights(*state_);
+  list_front_cells(*state_);
   state_->work.force.clear();
   state_->work.force.resize(state_->blocks.force_size);
 }

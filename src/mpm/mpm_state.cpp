@@ -17,6 +17,7 @@ std::unique_ptr<MpmState> make_mpm_state(const Scene& scene, std::vector<std::st
   state->bodies = make_lattice_bodies(scene, state->points, notes);
   state->whole_bonds = state->points.bonds;
   const bool at_surface = scene.mpm.boundary == MpmBoundary::kSurface;
+  state->front.follows = at_surface;
   if (at_surface) {
     find_free_volumes(*state);
     state->points.outer = find_outer_places(*state);
@@ -148,6 +149,8 @@ float substep(MpmState& state, float dt, std::vector<ColliderLoad>& loads,
     }
   };
   SharedWork resists(16, 1);
+  SharedWork front_cells(static_cast<int>(state.front.cells.size()), 8),
+      front(front_moves(state.front), 1);
   const RigidMotion* const before = anchors.empty() ? nullptr : state.anchors.now.data();
   const RigidMotion* const after = anchors.empty() ? nullptr : anchors.data();
   const auto work_on_block = [&](int i) {
@@ -170,12 +173,19 @@ float substep(MpmState& state, float dt, std::vector<ColliderLoad>& loads,
   state.cpu->on_each_thread([&] {
     pushes.help([&](int i) { push_faces(state, faces.all[faces.between[i]], dt); });
     work.help([&](int i) { work_on_block(blocks.by_cost[i]); });
+    front_cells.help([&](int i) { work_on_front_cell(state, i); });
     work.wait();
+    front_cells.wait();
     changes.help([&](int) { change_inertia(state); });
     changes.wait();
     moves.help(move_row);
-    if (state.anchors.groups.empty() && inertial.empty()) return;
+    const bool has_front = !state.front.cells.empty();
+    if (state.anchors.groups.empty() && inertial.empty() && !has_front) return;
     moves.wait();
+    if (has_front) {
+      front.help([&](int i) { move_front(state, step, i); });
+      front.wait();
+    }
     resists.help(part);
     if (state.anchors.groups.empty()) return;
     resists.wait();
@@ -205,6 +215,7 @@ float substep(MpmState& state, float dt, std::vector<ColliderLoad>& loads,
 
 void move_nodes(MpmState& state, const NodeStep& step) {
   state.cpu->for_each(static_cast<int>(state.blocks.rows.size()), MoveRow(state, step), kRows);
+  state.cpu->for_each(front_moves(state.front), [&](int i) { move_front(state, step, i); });
 }
 
 }  // namespace tissue_sim

@@ -17,6 +17,7 @@
 #include "mpm/contact/face_contact.h"
 #include "mpm/fragment_flight.h"
 #include "mpm/lattice_tissue.h"
+#include "mpm/split/front.h"
 #include "tissue_sim/tissue.h"
 #include "tools/collider.h"
 
@@ -101,6 +102,7 @@ struct MpmState : LatticeTissue {
   InstructionSet instructions = InstructionSet::kSse2;
   std::unique_ptr<Cpu> cpu;
   BlockWork work;
+  Front front;
 };
 
 /// Builds the state of a valid scene at rest. Throws what make_lattice_bodies() throws.
@@ -118,7 +120,8 @@ void measure_motion(MpmState& state);
 float substep(MpmState& state, float dt, std::vector<ColliderLoad>& loads,
               const std::vector<RigidMotion>& anchors = {});
 
-/// The part of it that moves all nodes, under the forces that the blocks left in `force`.
+/// The part of it that moves all nodes, under the forces that the blocks left in `force` and the
+/// front's cells in theirs.
 void move_nodes(MpmState& state, const NodeStep& step);
 
 }  // namespace tissue_sim

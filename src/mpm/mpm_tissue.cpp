@@ -48,9 +48,15 @@ float MpmTissue::substep_for(const FrameInput& input) {
 
 void MpmTissue::cut(const std::vector<BladePath>& paths, const Array<float>* u_before,
                     const std::vector<BlockMotion>& before, CutReport& report) {
-  std::vector<std::int32_t> changed;
+  std::vector<std::int32_t> changed, touched;
   for (const BladePath& path : paths) {
-    sweep_bonds(*state_, path, u_before, state_->nodes.u, before, changed, report);
+    sweep_bonds(*state_, path, u_before, state_->nodes.u, before, changed, touched, report);
+  }
+  if (changed.empty() && touched.empty()) return;
+  measured_ = false;
+  if (!touched.empty()) {
+    follow_front(*state_, touched);
+    list_front_cells(*state_);
   }
   if (changed.empty()) return;
   measured_ = false;
@@ -234,6 +240,8 @@ void MpmTissue::measure_energies() {
     const double v2 = Vec3(n.v[0][i], n.v[1][i], n.v[2][i]).squaredNorm();
     result_.kinetic_energy += 0.5 * n.mass[i] * v2;
   }
+  result_.kinetic_energy += front_kinetic_energy(state_->front);
+  result_.elastic_energy += front_elastic_energy(*state_);
   has_energies_ = true;
 }
 

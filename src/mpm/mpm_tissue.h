@@ -91,6 +91,7 @@ class MpmTissue final : public Tissue {
     std::vector<std::array<double, 3>> impulse;  ///< AnchorFaces::impulse
     std::vector<RigidMotion> anchors;            ///< AnchorFaces::now
     std::vector<FragmentFlight> flights;
+    Array<float> d[3], rate[3];  ///< Front's
   };
 
   // The steps of run_frame().

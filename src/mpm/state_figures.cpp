@@ -70,6 +70,11 @@ std::uint64_t checksum(const MpmState& state, const Pieces& pieces) {
     sum.add(state.nodes.u[a]);
     sum.add(state.nodes.v[a]);
   }
+  for (int a = 0; a < 3; ++a) {
+    if (state.front.nodes.empty()) break;
+    sum.add(state.front.d[a]);
+    sum.add(state.front.rate[a]);
+  }
   sum.add(state.points.bonds);
   sum.add(pieces.of_point);
   return sum.value();
@@ -98,6 +103,12 @@ Momentum momentum(const MpmState& state) {
         if (field.node != node) add(field.node, home);
       }
     });
+  }
+  const Front& front = state.front;
+  for (std::size_t i = 0; i < front.nodes.size(); ++i) {
+    const Vec3 d(front.d[0][i], front.d[1][i], front.d[2][i]);
+    const Vec3 rate(front.rate[0][i], front.rate[1][i], front.rate[2][i]);
+    about_origin += front.nodes[i].mass * d.cross(rate);
   }
   sum.centre /= sum.mass;
   sum.angular = about_origin - sum.centre.cross(sum.linear);

@@ -45,24 +45,68 @@ TEST(EdgeCrack, AddsTheComplianceOfFractureMechanicsAtFirstOrder) {
   }
 }
 
-TEST(EdgeCrack, StandsStillInTheProgramWhereTheDirectSolutionPutsIt) {
-  const CrackStrip strip(10);
-  const auto tissue = strip.tissue(true);
-  MpmState& s = tissue->state();
-  const PulledStrip rest = pull(s, 1e-4 * strip.young_modulus);
-  double largest = 0;
-  for (std::size_t i = 0; i < s.nodes.size(); ++i) {
-    for (int a = 0; a < 3; ++a) s.nodes.u[a][i] = static_cast<float>(rest.u[i][a]);
-    largest = std::max(largest, rest.load[i].norm());
+// With the true surface a crack ends where it was cut to, wherever that is in a cell.
+TEST(EdgeCrack, IsAsDeepAsItWasCut) {
+  for (const int deep : {5, 10, 20}) {
+    for (const bool at_nodes : {false, true}) {
+      CrackStrip strip(deep, at_nodes);
+      strip.boundary = MpmBoundary::kSurface;
+      const double whole = pull(strip.tissue(false)->state(), 1).compliance;
+      double before = 0, share_before = 0;
+      for (const double cells : {0.0, 0.25, 0.5, 0.625, 0.875}) {
+        if (deep == 20 && cells > 0.5) break;
+        const double depth = (deep + cells) * strip.cell_size;
+        const auto tissue = strip.tissue(true, depth);
+        const double added = pull(tissue->state(), 1).compliance - whole;
+        const double theory =
+            crack_compliance(strip.young_modulus, strip.cell_size, depth / strip.width);
+        EXPECT_NEAR(added / theory, 1,
+                    deep == 5    ? 0.06
+                    : deep == 10 ? 0.025
+                                 : 0.015)
+            << deep << ' ' << cells;
+        const double share = effective_share(strip.young_modulus, strip.cell_size, added);
+        EXPECT_NEAR(share * strip.width, depth, 0.08 * strip.cell_size);
+        if (before != 0) {  // and it grows as the cut does: no stairs
+          const double grown = (share - share_before) * strip.width;
+          EXPECT_NEAR(grown / (depth - before), 1, 0.25) << deep << ' ' << cells;
+        }
+        before = depth;
+        share_before = share;
+      }
+    }
   }
-  const float dt = 1e-6f;
-  std::vector<ColliderLoad> loads(s.colliders.size());
-  substep(s, dt, loads);
-  for (std::size_t i = 0; i < s.nodes.size(); ++i) {
-    if (s.nodes.inv_mass[i] == 0) continue;
-    const Vec3 v(s.nodes.v[0][i], s.nodes.v[1][i], s.nodes.v[2][i]);
-    const Vec3 force = s.nodes.mass[i] * v / dt;
-    ASSERT_LT((force + rest.load[i]).norm(), 0.01 * largest) << "node " << i;
+}
+
+TEST(EdgeCrack, StandsStillInTheProgramWhereTheDirectSolutionPutsIt) {
+  for (const double cells : {-1.0, 0.0, 0.4}) {
+    CrackStrip strip(10);
+    if (cells >= 0) strip.boundary = MpmBoundary::kSurface;
+    const auto tissue = strip.tissue(true, 0.02 + std::max(cells, 0.0) * strip.cell_size);
+    MpmState& s = tissue->state();
+    const PulledStrip rest = pull(s, (cells < 0 ? 1e-4 : 5e-5) * strip.young_modulus);
+    double largest = 0;
+    for (std::size_t i = 0; i < s.nodes.size(); ++i) {
+      for (int a = 0; a < 3; ++a) s.nodes.u[a][i] = static_cast<float>(rest.u[i][a]);
+      largest = std::max(largest, rest.load[i].norm());
+    }
+    ASSERT_EQ(s.front.nodes.empty(), cells < 0);
+    for (std::size_t i = 0; i < rest.d.size(); ++i) {
+      for (int a = 0; a < 3; ++a) s.front.d[a][i] = static_cast<float>(rest.d[i][a]);
+    }
+    const float dt = 1e-6f;
+    std::vector<ColliderLoad> loads(s.colliders.size());
+    substep(s, dt, loads);
+    for (std::size_t i = 0; i < s.nodes.size(); ++i) {
+      if (s.nodes.inv_mass[i] == 0) continue;
+      const Vec3 v(s.nodes.v[0][i], s.nodes.v[1][i], s.nodes.v[2][i]);
+      const Vec3 force = s.nodes.mass[i] * v / dt;
+      ASSERT_LT((force + rest.load[i]).norm(), 0.01 * largest) << "node " << i;
+    }
+    for (std::size_t i = 0; i < rest.d.size(); ++i) {
+      const Vec3 rate(s.front.rate[0][i], s.front.rate[1][i], s.front.rate[2][i]);
+      ASSERT_LT(s.front.nodes[i].mass * rate.norm() / dt, 0.01 * largest) << "parted node " << i;
+    }
   }
 }
 

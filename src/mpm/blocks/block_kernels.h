@@ -7,6 +7,7 @@
 #include "compute/simd.h"
 #include "mpm/blocks/block.h"
 #include "mpm/blocks/blocks.h"
+#include "mpm/blocks/front_cell.h"
 #include "mpm/blocks/update_node.h"
 #include "mpm/lattice/nodes.h"
 #include "mpm/tear/stretched_point.h"
@@ -104,6 +105,10 @@ struct BlockKernels {
   /// Appends the points whose largest principal stretch is at least `stretch`, in a fixed order.
   void (*stretched)(const Block&, const BlockField&, float stretch, BlockScratch&,
                     std::vector<StretchedPoint>& found);
+  /// What a cell at the front of a cut adds to the forces: on its nodes, [27][4], and on its parts,
+  /// [FrontCell::count][4] [N]; and the energy of that [J].
+  void (*front)(const FrontCell&, const FrontField&, float* force, float* pull);
+  double (*front_energy)(const FrontCell&, const FrontField&);
 };
 
 const BlockKernels& block_kernels(InstructionSet set);

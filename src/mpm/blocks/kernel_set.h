@@ -8,6 +8,7 @@
 #include "mpm/blocks/block_kernels.h"
 #include "mpm/blocks/block_places.h"
 #include "mpm/blocks/block_readings.h"
+#include "mpm/blocks/front_forces.h"
 #include "mpm/blocks/lane_lists.h"
 
 namespace tissue_sim {
@@ -64,50 +65,57 @@ TISSUE_SIM_INLINE void update_row(const NodeRow& row, const RowPart* parts, cons
   }
 }
 
-#define TISSUE_SIM_KERNELS(suffix, W, target)                                                     \
-  target const float* gather_##suffix(const Block& b, const Array<float>* u, BlockScratch& s) {   \
-    gather_nodes<W>(b, u, 1.0f, Layout(b), s.nodes);                                              \
-    return s.nodes.data();                                                                        \
-  }                                                                                               \
-  target void forces_##suffix(const Block& b, const BlockField& f, BlockScratch& s, float* out) { \
-    forces_any<W>(b, f, s, out);                                                                  \
-  }                                                                                               \
-  target void positions_##suffix(const Block& b, const BlockField& f, const Array<float>* u,      \
-                                 BlockScratch& s, float* out) {                                   \
-    positions<W>(b, f, u, s, out);                                                                \
-  }                                                                                               \
-  target PointBounds bounds_##suffix(const Block& b, const BlockField& f, BlockScratch& s) {      \
-    return bounds<W>(b, f, s);                                                                    \
-  }                                                                                               \
-  target int lanes_in_box_##suffix(const float* x, std::size_t count, const float* min,           \
-                                   const float* max, std::int32_t* lanes) {                       \
-    return lanes_in_box<W>(x, count, min, max, lanes);                                            \
-  }                                                                                               \
-  target int lanes_near_##suffix(const LaneSlab(&slabs)[3], const LaneReach& reach,               \
-                                 const float* x, const float* y, std::size_t count,               \
-                                 NearLane* near) {                                                \
-    return lanes_near<W>(slabs, reach, x, y, count, near);                                        \
-  }                                                                                               \
-  target void update_row_##suffix(const NodeRow& row, const RowPart* parts, const float* force,   \
-                                  const UpdateNode& update) {                                     \
-    update_row<W>(row, parts, force, update);                                                     \
-  }                                                                                               \
-  target BlockState state_##suffix(const Block& b, const BlockField& f, BlockScratch& s,          \
-                                   float* von_mises) {                                            \
-    return state_any<W>(b, f, s, von_mises);                                                      \
-  }                                                                                               \
-  target BlockState stiffness_##suffix(const Block& b, const BlockField& f, BlockScratch& s) {    \
-    return stiffness<W>(b, f, s);                                                                 \
-  }                                                                                               \
-  target void stretched_##suffix(const Block& b, const BlockField& f, float stretch,              \
-                                 BlockScratch& s, std::vector<StretchedPoint>& found) {           \
-    stretched<W>(b, f, stretch, s, found);                                                        \
-  }                                                                                               \
-                                                                                                  \
-  constexpr BlockKernels kKernels_##suffix = {                                                    \
-      gather_##suffix,       forces_##suffix,     positions_##suffix,  bounds_##suffix,           \
-      lanes_in_box_##suffix, lanes_near_##suffix, update_row_##suffix, state_##suffix,            \
-      stiffness_##suffix,    stretched_##suffix};
+#define TISSUE_SIM_KERNELS(suffix, W, target)                                                      \
+  target const float* gather_##suffix(const Block& b, const Array<float>* u, BlockScratch& s) {    \
+    gather_nodes<W>(b, u, 1.0f, Layout(b), s.nodes);                                               \
+    return s.nodes.data();                                                                         \
+  }                                                                                                \
+  target void forces_##suffix(const Block& b, const BlockField& f, BlockScratch& s, float* out) {  \
+    forces_any<W>(b, f, s, out);                                                                   \
+  }                                                                                                \
+  target void positions_##suffix(const Block& b, const BlockField& f, const Array<float>* u,       \
+                                 BlockScratch& s, float* out) {                                    \
+    positions<W>(b, f, u, s, out);                                                                 \
+  }                                                                                                \
+  target PointBounds bounds_##suffix(const Block& b, const BlockField& f, BlockScratch& s) {       \
+    return bounds<W>(b, f, s);                                                                     \
+  }                                                                                                \
+  target int lanes_in_box_##suffix(const float* x, std::size_t count, const float* min,            \
+                                   const float* max, std::int32_t* lanes) {                        \
+    return lanes_in_box<W>(x, count, min, max, lanes);                                             \
+  }                                                                                                \
+  target int lanes_near_##suffix(const LaneSlab(&slabs)[3], const LaneReach& reach,                \
+                                 const float* x, const float* y, std::size_t count,                \
+                                 NearLane* near) {                                                 \
+    return lanes_near<W>(slabs, reach, x, y, count, near);                                         \
+  }                                                                                                \
+  target void update_row_##suffix(const NodeRow& row, const RowPart* parts, const float* force,    \
+                                  const UpdateNode& update) {                                      \
+    update_row<W>(row, parts, force, update);                                                      \
+  }                                                                                                \
+  target BlockState state_##suffix(const Block& b, const BlockField& f, BlockScratch& s,           \
+                                   float* von_mises) {                                             \
+    return state_any<W>(b, f, s, von_mises);                                                       \
+  }                                                                                                \
+  target BlockState stiffness_##suffix(const Block& b, const BlockField& f, BlockScratch& s) {     \
+    return stiffness<W>(b, f, s);                                                                  \
+  }                                                                                                \
+  target void stretched_##suffix(const Block& b, const BlockField& f, float stretch,               \
+                                 BlockScratch& s, std::vector<StretchedPoint>& found) {            \
+    stretched<W>(b, f, stretch, s, found);                                                         \
+  }                                                                                                \
+                                                                                                   \
+  target void front_##suffix(const FrontCell& c, const FrontField& f, float* force, float* pull) { \
+    front_forces_any(c, f, force, pull);                                                           \
+  }                                                                                                \
+  target double front_energy_##suffix(const FrontCell& c, const FrontField& f) {                   \
+    return front_energy_any(c, f);                                                                 \
+  }                                                                                                \
+                                                                                                   \
+  constexpr BlockKernels kKernels_##suffix = {                                                     \
+      gather_##suffix,       forces_##suffix,     positions_##suffix,  bounds_##suffix,            \
+      lanes_in_box_##suffix, lanes_near_##suffix, update_row_##suffix, state_##suffix,             \
+      stiffness_##suffix,    stretched_##suffix,  front_##suffix,      front_energy_##suffix};
 
 }  // namespace
 }  // namespace tissue_sim

@@ -12,10 +12,12 @@ namespace tissue_sim {
 
 /// Clears the bonds that a path passes while the tissue moves from the displacements `u_begin` to
 /// `u_end` (the same array for a path through tissue at rest) and its blocks from `before` to
-/// MpmState::motion. Appends the points that lost a bond to `changed` and counts into `report`.
+/// MpmState::motion. Appends the points that lost a bond to `changed` and counts into `report`; to
+/// `touched` those at the rim of a cut of whose bonds more was passed (mpm/split/front.h).
 void sweep_bonds(MpmState& state, const BladePath& path, const Array<float>* u_begin,
                  const Array<float>* u_end, const std::vector<BlockMotion>& before,
-                 std::vector<std::int32_t>& changed, CutReport& report);
+                 std::vector<std::int32_t>& changed, std::vector<std::int32_t>& touched,
+                 CutReport& report);
 
 /// A sweep looks at bonds of points within this many cells, so that a bond is seen as long as it is
 /// not stretched to three times its length.

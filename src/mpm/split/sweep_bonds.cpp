@@ -261,7 +261,8 @@ class Sweep {
 
 void sweep_bonds(MpmState& state, const BladePath& path, const Array<float>* u_begin,
                  const Array<float>* u_end, const std::vector<BlockMotion>& before,
-                 std::vector<std::int32_t>& changed, CutReport& report) {
+                 std::vector<std::int32_t>& changed, std::vector<std::int32_t>& touched,
+                 CutReport& report) {
   Sweep sweep(state, path, u_begin, u_end);
   const int passed = sweep.list_blocks(before);
   if (passed == 0) return;
@@ -280,6 +281,7 @@ void sweep_bonds(MpmState& state, const BladePath& path, const Array<float>* u_b
     }
   });
   break_bonds(state, broken, changed, report);
+  if (state.front.follows) pass_rim(state, path, u_begin, u_end, changed, touched);
 }
 
 }  // namespace tissue_sim

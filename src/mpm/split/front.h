@@ -1,0 +1,79 @@
+// The front of a cut: nodes that are parted ahead of it, so that a cut ends where the blade's edge
+// ended, also inside a cell. docs/mpm.md, "The front".
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <vector>
+
+#include "compute/array.h"
+#include "mpm/blocks/front_cell.h"
+#include "mpm/split/node_box.h"
+
+namespace tissue_sim {
+
+struct MpmState;
+struct NodeStep;
+struct BladePath;
+
+/// A node (field) around which a cut ends. Two sides of its points see u + other d and u - first d,
+/// with the shares of its mass that they have: u is the node's own, their mean by mass.
+struct FrontNode {
+  std::int32_t node;           ///< in Nodes
+  std::int32_t body, x, y, z;  ///< its cell
+  float share;                 ///< of how far it is parted, 0 to 1: grows as the cut goes on
+  float first, other;          ///< shares of the node's mass
+  float mass;                  ///< of d: first other m [kg]
+  float lambda_over_mu;        ///< of its points
+  Planes all, first_side;      ///< its points, and those of one side
+};
+
+struct Front {
+  bool follows = false;  ///< whether cuts are followed at all
+
+  /// Bonds at the rim of what was cut, 3 point + axis, and which of kRimProbes places of the area
+  /// that the bond stands for an edge has passed. Others were passed wholly if they are broken.
+  std::map<std::int64_t, std::uint32_t> rim;
+  std::vector<FrontNode> nodes;  ///< by their number in Nodes
+  Array<float> d[3], rate[3];    ///< of these: how far apart the two sides are [m], how fast [m/s]
+
+  // What follows from that: list_front_cells().
+  std::vector<FrontCell> cells;
+  std::vector<FrontPart> parts;
+  /// Where forces go: of each node that a cell sees, and of each parted one, places in `force` and
+  /// `pull`, in a fixed order.
+  struct Sum {
+    std::int32_t node, first, count;
+  };
+  std::vector<Sum> node_sums, part_sums;
+  std::vector<std::int32_t> node_places, part_places;
+  Array<float> force, pull;  ///< of the cells [28][4] each, of the parts [4] each [N]
+};
+
+inline constexpr int kRimProbes = 32;
+
+/// Widens the rim by what the points `changed`, which lost bonds, add to it, and notes what the
+/// path passed of it, as sweep_bonds(). Appends points of bonds of which it passed more.
+void pass_rim(MpmState& state, const BladePath& path, const Array<float>* u_begin,
+              const Array<float>* u_end, const std::vector<std::int32_t>& broken,
+              std::vector<std::int32_t>& touched);
+
+/// After nodes were split: new fields take over the motion of the side that they were.
+void split_front(MpmState& state);
+/// Parts nodes around the points `touched`, of whose bonds more was passed.
+void follow_front(MpmState& state, const std::vector<std::int32_t>& touched);
+/// Lists the cells anew that see parted nodes.
+void list_front_cells(MpmState& state);
+
+FrontField front_field(const MpmState& state);
+/// Works on the i-th cell.
+void work_on_front_cell(MpmState& state, int i);
+/// Moves on what the cells push, after all nodes were moved on without them; parts are i of
+/// `front_moves()`.
+int front_moves(const Front& front);
+void move_front(MpmState& state, const NodeStep& step, int i);
+/// Energy of the front beside what blocks have, and of the motion of parted nodes [J].
+double front_elastic_energy(const MpmState& state);
+double front_kinetic_energy(const Front& front);
+
+}  // namespace tissue_sim

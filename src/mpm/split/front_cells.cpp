@@ -1,0 +1,234 @@
+// The cells that see parted nodes, and what they push.
+#include <algorithm>
+#include <array>
+#include <map>
+
+#include "compute/simd.h"
+#include "mpm/blocks/stabilisation.h"
+#include "mpm/mpm_state.h"
+#include "mpm/split/front.h"
+#include "mpm/tear/debris.h"
+
+namespace tissue_sim {
+namespace {
+
+/// The points of a cell that see the same fields, and of which material they are.
+struct View {
+  std::array<std::int32_t, 27> node;
+  std::vector<FrontPart> parts;
+  Law law;
+  std::array<std::int32_t, 8> point;
+  double volume[2] = {};  ///< of those with the same nodes, of these
+  double viscosity = 0;   ///< times volumes [J s]
+  int count[2] = {};
+};
+
+bool same_parts(const std::vector<FrontPart>& a, const std::vector<FrontPart>& b) {
+  return a.size() == b.size() &&
+         std::equal(a.begin(), a.end(), b.begin(), [](const FrontPart& x, const FrontPart& y) {
+           return x.node == y.node && x.k == y.k && x.side == y.side;
+         });
+}
+
+/// The views of the points of a cell.
+std::vector<View> views_of(const MpmState& s, const std::map<std::int32_t, std::int32_t>& parted,
+                           const LatticeBody& body, int x, int y, int z) {
+  std::vector<View> views;
+  std::map<std::array<std::int32_t, 27>, std::pair<double, int>> of_nodes;
+  for (int p = 0; p < 8; ++p) {
+    const int place[3] = {2 * x + (p & 1), 2 * y + (p >> 1 & 1), 2 * z + (p >> 2)};
+    const std::int32_t point = body.point(place[0], place[1], place[2]);
+    if (point < 0) continue;
+    const double volume = elastic_volume(s.points, point);
+    if (!(volume > 0)) continue;
+    const Points::Site& site = s.points.site[point];
+    View view;
+    for (int k = 0; k < 27; ++k) {
+      view.node[k] = s.fields->node(body, site, k);
+      const auto found = parted.find(view.node[k]);
+      if (found == parted.end()) continue;
+      const FrontNode& n = s.front.nodes[found->second];
+      const int plane = place[2] - 2 * n.z + 2;
+      const int bit = bit_in_plane(place[0] - 2 * n.x + 2, place[1] - 2 * n.y + 2);
+      const bool first = (n.first_side[plane] >> bit & 1) != 0;
+      view.parts.push_back({found->second, k, first ? -n.other : n.first, n.share, 0});
+    }
+    auto& [sum, count] = of_nodes[view.node];
+    sum += volume;
+    ++count;
+    if (view.parts.empty()) continue;
+    const Material& material = body.material_of(s.points, point);
+    view.law = material.law;
+    auto same = std::find_if(views.begin(), views.end(), [&view](const View& v) {
+      return v.node == view.node && v.law == view.law && same_parts(v.parts, view.parts);
+    });
+    if (same == views.end()) {
+      view.point.fill(-1);
+      same = views.insert(same, view);
+    }
+    same->point[p] = point;
+    same->volume[1] += volume;
+    same->viscosity += material.viscosity * volume;
+    ++same->count[1];
+  }
+  for (View& view : views) {
+    view.volume[0] = of_nodes[view.node].first;
+    view.count[0] = of_nodes[view.node].second;
+  }
+  return views;
+}
+
+void add_cell(MpmState& s, const LatticeBody& body, std::int32_t number, View& view) {
+  Front& front = s.front;
+  std::stable_sort(view.parts.begin(), view.parts.end(),
+                   [](const FrontPart& a, const FrontPart& b) { return a.share > b.share; });
+  for (std::size_t j = 0; j < view.parts.size(); ++j) {
+    view.parts[j].step =
+        view.parts[j].share - (j + 1 < view.parts.size() ? view.parts[j + 1].share : 0.0f);
+  }
+  FrontCell cell{};
+  std::copy(view.node.begin(), view.node.end(), cell.node);
+  double mu_sum = 0;
+  for (int p = 0; p < 8; ++p) {
+    if (view.point[p] < 0) continue;
+    const Material& material = body.material_of(s.points, view.point[p]);
+    const double volume = elastic_volume(s.points, view.point[p]);
+    cell.mu[p] = static_cast<float>(lame_mu(material) * volume);
+    cell.lambda[p] = static_cast<float>(lame_lambda(material) * volume);
+    mu_sum += cell.mu[p];
+  }
+  const double size = body.cell_size * body.cell_size * body.cell_size;
+  for (int i = 0; i < 2; ++i) {
+    cell.viscosity[i] = static_cast<float>(view.viscosity * view.volume[i] / size);
+  }
+  const bool stabilised = view.count[1] < kSteadyCount && view.count[0] >= kSteadyCount;
+  cell.stabilised = stabilised ? static_cast<float>(kStabilisation * mu_sum) : 0.0f;
+  cell.inverse_size = static_cast<float>(1 / body.cell_size);
+  cell.law = view.law;
+  cell.body = number;
+  cell.first = static_cast<std::int32_t>(front.parts.size());
+  cell.count = static_cast<std::int32_t>(view.parts.size());
+  front.cells.push_back(cell);
+  front.parts.insert(front.parts.end(), view.parts.begin(), view.parts.end());
+}
+
+/// Where the forces of nodes, or pulls, are to be found.
+template <class Places>
+void list_sums(const std::map<std::int32_t, std::vector<std::int32_t>>& of, Places& sums,
+               std::vector<std::int32_t>& places) {
+  sums.clear();
+  places.clear();
+  for (const auto& [node, at] : of) {
+    sums.push_back(
+        {node, static_cast<std::int32_t>(places.size()), static_cast<std::int32_t>(at.size())});
+    places.insert(places.end(), at.begin(), at.end());
+  }
+}
+
+constexpr int kTogether = 64;  // sums that are gone through at a time
+
+}  // namespace
+
+void list_front_cells(MpmState& s) {
+  Front& front = s.front;
+  front.cells.clear();
+  front.parts.clear();
+  std::map<std::int32_t, std::int32_t> parted;
+  std::map<std::array<std::int32_t, 4>, bool> cells;  // body, z, y, x
+  for (std::size_t i = 0; i < front.nodes.size(); ++i) {
+    const FrontNode& n = front.nodes[i];
+    parted[n.node] = static_cast<std::int32_t>(i);
+    for (int k = 0; k < 27; ++k) {
+      cells[{n.body, n.z + k / 9 - 1, n.y + k / 3 % 3 - 1, n.x + k % 3 - 1}] = true;
+    }
+  }
+  for (const auto& [at, there] : cells) {
+    const LatticeBody& body = s.bodies[at[0]];
+    for (View& view : views_of(s, parted, body, at[3], at[2], at[1])) {
+      add_cell(s, body, at[0], view);
+    }
+  }
+  std::map<std::int32_t, std::vector<std::int32_t>> of_node, of_part;
+  for (std::size_t i = 0; i < front.cells.size(); ++i) {
+    for (int k = 0; k < 27; ++k) {
+      of_node[front.cells[i].node[k]].push_back(static_cast<std::int32_t>(kFrontForce * i) + 4 * k);
+    }
+  }
+  for (std::size_t i = 0; i < front.parts.size(); ++i) {
+    of_part[front.parts[i].node].push_back(static_cast<std::int32_t>(4 * i));
+  }
+  list_sums(of_node, front.node_sums, front.node_places);
+  list_sums(of_part, front.part_sums, front.part_places);
+  front.force.assign(kFrontForce * front.cells.size(), 0.0f);
+  front.pull.assign(4 * front.parts.size(), 0.0f);
+}
+
+FrontField front_field(const MpmState& s) {
+  FrontField f;
+  for (int a = 0; a < 3; ++a) {
+    f.u[a] = s.nodes.u[a].data();
+    f.v[a] = s.nodes.v[a].data();
+    f.d[a] = s.front.d[a].data();
+    f.rate[a] = s.front.rate[a].data();
+  }
+  f.parts = s.front.parts.data();
+  return f;
+}
+
+void work_on_front_cell(MpmState& s, int i) {
+  const FrontCell& cell = s.front.cells[i];
+  s.kernels->front(cell, front_field(s),
+                   s.front.force.data() + static_cast<std::size_t>(kFrontForce) * i,
+                   s.front.pull.data() + 4 * static_cast<std::size_t>(cell.first));
+}
+
+int front_moves(const Front& front) {
+  const std::size_t sums = front.node_sums.size() + front.part_sums.size();
+  return static_cast<int>((sums + kTogether - 1) / kTogether);
+}
+
+void move_front(MpmState& s, const NodeStep& step, int i) {
+  Front& front = s.front;
+  const std::size_t nodes = front.node_sums.size(), sums = nodes + front.part_sums.size();
+  const std::size_t begin = static_cast<std::size_t>(kTogether) * i;
+  for (std::size_t n = begin; n < std::min(sums, begin + kTogether); ++n) {
+    const bool of_node = n < nodes;
+    const Front::Sum& sum = of_node ? front.node_sums[n] : front.part_sums[n - nodes];
+    const std::int32_t* place =
+        (of_node ? front.node_places.data() : front.part_places.data()) + sum.first;
+    const float* from = of_node ? front.force.data() : front.pull.data();
+    Vec<4> force = {};
+    for (int k = 0; k < sum.count; ++k) force += load<4>(from + place[k]);
+    for (int c = 0; c < 3; ++c) {
+      if (of_node) {
+        // The node was moved on as if this force were not: the step is linear in it.
+        const float more = step.kick * s.nodes.inv_mass[sum.node] * force[c];
+        s.nodes.v[c][sum.node] += more;
+        s.nodes.u[c][sum.node] += step.dt * more;
+      } else {
+        float& rate = front.rate[c][sum.node];
+        rate = step.keep * rate + step.kick / front.nodes[sum.node].mass * force[c];
+        front.d[c][sum.node] += step.dt * rate;
+      }
+    }
+  }
+}
+
+double front_elastic_energy(const MpmState& s) {
+  double sum = 0;
+  const FrontField field = front_field(s);
+  for (const FrontCell& cell : s.front.cells) sum += s.kernels->front_energy(cell, field);
+  return sum;
+}
+
+double front_kinetic_energy(const Front& front) {
+  double sum = 0;
+  for (std::size_t i = 0; i < front.nodes.size(); ++i) {
+    for (int a = 0; a < 3; ++a) {
+      sum += 0.5 * front.nodes[i].mass * front.rate[a][i] * front.rate[a][i];
+    }
+  }
+  return sum;
+}
+
+}  // namespace tissue_sim

@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <set>
 
 #include "math/bspline.h"
 #include "mpm/lattice/bonds.h"
@@ -19,7 +18,6 @@ struct BoxOfNode {
   std::int32_t point[216];
   static int bit(int i) { return bit_in_plane(i % 6, i / 6 % 6); }
   static bool has(const Planes& planes, int i) { return (planes[i / 36] >> bit(i) & 1) != 0; }
-  static void add(Planes& planes, int i) { planes[i / 36] |= std::uint64_t{1} << bit(i); }
   static double weight(int i) {
     const auto along = [](int j) { return lattice_weight(j & 1, 2 - j / 2); };
     return static_cast<double>(along(i % 6)) * along(i / 6 % 6) * along(i / 36);
@@ -111,8 +109,11 @@ float parted_share(double cut, double lambda_over_mu) {
   return static_cast<float>((1 + c) * a / (1 + c * a));
 }
 
-/// Of a side's mass this much is needed.
-constexpr double kLeastSide = 1e-3;
+/// A side lighter than that share of its node (a plane through nodes leaves 0.016 on the far ones,
+/// without which it counts up to a quarter of a cell short), or a component of fewer points: swings
+/// by itself.
+constexpr double kLeastSide = 0.01;
+constexpr int kLeastPoints = 32;
 
 /// Parts a node as far as its bonds say; `before` if it was parted already. Returns a share of 0
 /// where it is not.
@@ -122,6 +123,9 @@ FrontNode part(const MpmState& s, const FrontNode& at, const FrontNode* before) 
   const LatticeBody& body = s.bodies[at.body];
   BoxOfNode box;
   points_around(body, at.x, at.y, at.z, box.point);
+  int count = 0;
+  for (const std::uint64_t places : at.all) count += __builtin_popcountll(places);
+  if (count < kLeastPoints) return before != nullptr ? *before : result;
   const CutPlane plane = find_plane(s, box, at.all);
   if (!plane.there) return before != nullptr ? *before : result;
   if (before != nullptr) {
@@ -132,7 +136,7 @@ FrontNode part(const MpmState& s, const FrontNode& at, const FrontNode* before) 
     for (int i = 0; i < 216; ++i) {
       if (!BoxOfNode::has(at.all, i)) continue;
       const bool first = plane.side[i] < 0;
-      if (first) BoxOfNode::add(result.first_side, i);
+      if (first) result.first_side[i / 36] |= std::uint64_t{1} << BoxOfNode::bit(i);
       const std::int32_t p = box.point[i];
       const Material& material = body.material_of(s.points, p);
       const double weighed = BoxOfNode::weight(i) * s.points.free_volume_of(p);

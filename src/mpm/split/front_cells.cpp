@@ -20,7 +20,7 @@ struct View {
   std::array<std::int32_t, 8> point;
   double volume[2] = {};  ///< of those with the same nodes, of these
   double viscosity = 0;   ///< times volumes [J s]
-  int count[2] = {};
+  int count = 0;
 };
 
 bool same_parts(const std::vector<FrontPart>& a, const std::vector<FrontPart>& b) {
@@ -34,7 +34,7 @@ bool same_parts(const std::vector<FrontPart>& a, const std::vector<FrontPart>& b
 std::vector<View> views_of(const MpmState& s, const std::map<std::int32_t, std::int32_t>& parted,
                            const LatticeBody& body, int x, int y, int z) {
   std::vector<View> views;
-  std::map<std::array<std::int32_t, 27>, std::pair<double, int>> of_nodes;
+  std::map<std::array<std::int32_t, 27>, double> of_nodes;
   for (int p = 0; p < 8; ++p) {
     const int place[3] = {2 * x + (p & 1), 2 * y + (p >> 1 & 1), 2 * z + (p >> 2)};
     const std::int32_t point = body.point(place[0], place[1], place[2]);
@@ -53,9 +53,7 @@ std::vector<View> views_of(const MpmState& s, const std::map<std::int32_t, std::
       const bool first = (n.first_side[plane] >> bit & 1) != 0;
       view.parts.push_back({found->second, k, first ? -n.other : n.first, n.share, 0});
     }
-    auto& [sum, count] = of_nodes[view.node];
-    sum += volume;
-    ++count;
+    of_nodes[view.node] += volume;
     if (view.parts.empty()) continue;
     const Material& material = body.material_of(s.points, point);
     view.law = material.law;
@@ -69,12 +67,9 @@ std::vector<View> views_of(const MpmState& s, const std::map<std::int32_t, std::
     same->point[p] = point;
     same->volume[1] += volume;
     same->viscosity += material.viscosity * volume;
-    ++same->count[1];
+    ++same->count;
   }
-  for (View& view : views) {
-    view.volume[0] = of_nodes[view.node].first;
-    view.count[0] = of_nodes[view.node].second;
-  }
+  for (View& view : views) view.volume[0] = of_nodes[view.node];
   return views;
 }
 
@@ -101,8 +96,8 @@ void add_cell(MpmState& s, const LatticeBody& body, std::int32_t number, View& v
   for (int i = 0; i < 2; ++i) {
     cell.viscosity[i] = static_cast<float>(view.viscosity * view.volume[i] / size);
   }
-  const bool stabilised = view.count[1] < kSteadyCount && view.count[0] >= kSteadyCount;
-  cell.stabilised = stabilised ? static_cast<float>(kStabilisation * mu_sum) : 0.0f;
+  cell.stabilised =
+      view.count < kSteadyCount ? static_cast<float>(kStabilisation * mu_sum) : 0.0f;
   cell.inverse_size = static_cast<float>(1 / body.cell_size);
   cell.law = view.law;
   cell.body = number;

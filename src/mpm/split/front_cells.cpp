@@ -96,8 +96,7 @@ void add_cell(MpmState& s, const LatticeBody& body, std::int32_t number, View& v
   for (int i = 0; i < 2; ++i) {
     cell.viscosity[i] = static_cast<float>(view.viscosity * view.volume[i] / size);
   }
-  cell.stabilised =
-      view.count < kSteadyCount ? static_cast<float>(kStabilisation * mu_sum) : 0.0f;
+  cell.stabilised = view.count < kSteadyCount ? static_cast<float>(kStabilisation * mu_sum) : 0.0f;
   cell.inverse_size = static_cast<float>(1 / body.cell_size);
   cell.law = view.law;
   cell.body = number;

@@ -25,7 +25,7 @@ struct BoxOfNode {
   static Vec3 place(int i) { return Vec3(i % 6, i / 6 % 6, i / 36); }  // [half cells]
 };
 
-constexpr int kStride[3] = {1, 6, 36};
+constexpr int kBoxStride[3] = {1, 6, 36};
 
 /// Calls f(i, j, axis) for the pairs of neighbours among some places.
 template <class F>
@@ -34,13 +34,10 @@ void for_each_pair(const Planes& all, const F& f) {
     if (!BoxOfNode::has(all, i)) continue;
     const int at[3] = {i % 6, i / 6 % 6, i / 36};
     for (int axis = 0; axis < 3; ++axis) {
-      if (at[axis] < 5 && BoxOfNode::has(all, i + kStride[axis])) f(i, i + kStride[axis], axis);
+      if (at[axis] < 5 && BoxOfNode::has(all, i + kBoxStride[axis]))
+        f(i, i + kBoxStride[axis], axis);
     }
   }
-}
-
-bool is_broken(const Points& points, std::int32_t p, int axis) {
-  return (points.bonds[p] >> (kForwardBond + axis) & 1) == 0;
 }
 
 /// How much of the area that a bond stands for was passed.
@@ -117,7 +114,7 @@ constexpr int kLeastPoints = 32;
 
 /// Parts a node as far as its bonds say; `before` if it was parted already. Returns a share of 0
 /// where it is not.
-FrontNode part(const MpmState& s, const FrontNode& at, const FrontNode* before) {
+FrontNode parted_node(const MpmState& s, const FrontNode& at, const FrontNode* before) {
   FrontNode result = at;
   result.share = 0;
   const LatticeBody& body = s.bodies[at.body];
@@ -214,8 +211,8 @@ void follow_front(MpmState& s, const std::vector<std::int32_t>& touched) {
       static_cast<int>(candidates.size()),
       [&](int i) {
         const auto found = known.find(candidates[i].node);
-        candidates[i] =
-            part(s, candidates[i], found == known.end() ? nullptr : &front.nodes[found->second]);
+        candidates[i] = parted_node(s, candidates[i],
+                                    found == known.end() ? nullptr : &front.nodes[found->second]);
       },
       32);
   std::map<std::int32_t, FrontNode> all;

@@ -74,6 +74,12 @@ class Block:
             self.u = newton(self.solid.forces, self.solid.stiffness, self.u, self.free, scale)
         return self
 
+    def solve_small(self):
+        """The load in the limit of small displacements."""
+        K = self.solid.stiffness(0 * self.u)[self.free][:, self.free].tocsc()
+        lu = splu(K, permc_spec='MMD_AT_PLUS_A', options={'SymmetricMode': True}, diag_pivot_thresh=0.001)
+        self.u[self.free] = lu.solve(self.solid.load[self.free])
+
     def frequencies(self, density, count=1, shift=0):
         """The lowest ones [Hz], in rising order; `shift` [Hz] above 0 for a body that is free, whose stiffness is singular."""
         K = self.solid.stiffness(0 * self.u)[self.free][:, self.free]

@@ -3,6 +3,12 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <memory>
+#include <string>
+#include <tuple>
+#include <vector>
 
 #include "cut_scenes.h"
 #include "finite_element_scenes.h"
@@ -10,6 +16,8 @@
 
 namespace tissue_sim {
 namespace {
+
+const char* const kData = TISSUE_SIM_TEST_DATA;
 
 /// A block of 40 x 32 x 24 mm in space, and a stroke into it from the side, askew.
 Scene block(Law law, double viscosity) {
@@ -143,6 +151,61 @@ TEST(Front, SameBitsOnAnyNumberOfThreadsAndAfterItWasSaved) {
   }
   EXPECT_EQ(sums[0], sums[1]);
   EXPECT_EQ(sums[0], sums[2]);
+}
+
+/// Displacement along x of the top at the middle of a cut at x = 10 mm, on one side of it [m]: of
+/// the points within two cells, fitted by a polynomial.
+double beside_cut(Tissue& tissue, bool beyond, double cell_size) {
+  std::vector<std::uint8_t> cloud;
+  PointSelection selection;
+  selection.fields = kRestPosition | kDisplacement;
+  const int count = tissue.read_points(selection, cloud);
+  Eigen::Matrix<double, 6, 6> A = Eigen::Matrix<double, 6, 6>::Zero();
+  Eigen::Matrix<double, 6, 1> b = Eigen::Matrix<double, 6, 1>::Zero();
+  for (int i = 0; i < count; ++i) {
+    float f[6];
+    std::memcpy(f, &cloud[selection.point_size() * i + sizeof(Point)], sizeof f);
+    const Vec3 d = (Vec3(f[0], f[1], f[2]) - Vec3(0.01, 0, 0.02)) / (2 * cell_size);
+    if (d.cwiseAbs().maxCoeff() > 1 || (d.x() > 0) != beyond) continue;
+    Eigen::Matrix<double, 6, 1> row;
+    row << 1, d.x(), d.z(), d.x() * d.z(), d.z() * d.z(), d.y() * d.y();
+    A += row * row.transpose();
+    b += row * static_cast<double>(f[3]);
+  }
+  return A.ldlt().solve(b)[0];
+}
+
+// Eight cells thick, cut from above 10 mm from its clamp to a place between cells and in them.
+TEST(Front, SagAndMouthOfACutCantilever) {
+  constexpr double kCell = 0.0025;
+  double before = 0, step = 0;
+  for (const double depth : {0.00875, 0.009375, 0.01, 0.010625, 0.01125}) {
+    Scene scene = cantilever_block(kCell, 0);
+    scene.gravity = Vec3(0, 0, -9.81 / 100);
+    Simulation simulation(scene);
+    BladePath path;
+    path.edge = {Vec3(0.01, -0.1, 0), Vec3(0.01, 0.1, 0)};
+    for (const double z : {0.03, 0.02 - depth}) path.poses.push_back({Vec3(0, 0, z), Quat()});
+    for (Pose& pose : path.poses) pose.orientation = Quat::Identity();
+    simulation.cut(path);
+    EXPECT_TRUE(simulation.settle({3e-6, 6, 20}).at_rest) << depth;
+    const double sag =
+        -surface_displacement(simulation.tissue(), 0, Vec3(0.03, 0, 0.02), 2, 0.002 + 1.5 * kCell);
+    if (before != 0) {  // no stairs
+      EXPECT_GT(sag - before, 1.1 * step) << depth;
+      EXPECT_LT(sag - before, step == 0 ? 1 : 1.6 * step) << depth;
+      step = sag - before;
+    }
+    before = sag;
+    const char* name = depth == 0.00875 ? "8_75mm" : depth == 0.01 ? "10mm" : "11_25mm";
+    if (depth != 0.00875 && depth != 0.01 && depth != 0.01125) continue;
+    const double mouth = beside_cut(simulation.tissue(), true, kCell) -
+                         beside_cut(simulation.tissue(), false, kCell);
+    const std::string of = name;
+    EXPECT_NEAR(sag / reference(kData, "cut_cantilever", ("sag_" + of).c_str()), 1, 0.02) << depth;
+    EXPECT_NEAR(mouth / reference(kData, "cut_cantilever", ("mouth_" + of).c_str()), 1, 0.04)
+        << depth;
+  }
 }
 
 }  // namespace

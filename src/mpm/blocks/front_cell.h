@@ -12,7 +12,7 @@ struct FrontCell {
   std::int32_t node[27];   ///< in Nodes, x fastest
   float mu[8], lambda[8];  ///< Lame parameters times volumes [J]; 0 for places that are not of it
   float viscosity[2];      ///< what it damps where nothing is parted, and where nodes are [J s]
-  float stabilised;        ///< kStabilisation mu V, or 0 where its block or its points do [J]
+  float stabilised;        ///< kStabilisation mu V, 0 where its points need none [J]
   float inverse_size;      ///< of the cells [1/m]
   Law law;
   std::int32_t body;

@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <set>
 
 #include "math/bspline.h"
 #include "mpm/lattice/bonds.h"
@@ -19,7 +18,6 @@ struct BoxOfNode {
   std::int32_t point[216];
   static int bit(int i) { return bit_in_plane(i % 6, i / 6 % 6); }
   static bool has(const Planes& planes, int i) { return (planes[i / 36] >> bit(i) & 1) != 0; }
-  static void add(Planes& planes, int i) { planes[i / 36] |= std::uint64_t{1} << bit(i); }
   static double weight(int i) {
     const auto along = [](int j) { return lattice_weight(j & 1, 2 - j / 2); };
     return static_cast<double>(along(i % 6)) * along(i / 6 % 6) * along(i / 36);
@@ -27,7 +25,7 @@ struct BoxOfNode {
   static Vec3 place(int i) { return Vec3(i % 6, i / 6 % 6, i / 36); }  // [half cells]
 };
 
-constexpr int kStride[3] = {1, 6, 36};
+constexpr int kBoxStride[3] = {1, 6, 36};
 
 /// Calls f(i, j, axis) for the pairs of neighbours among some places.
 template <class F>
@@ -36,13 +34,10 @@ void for_each_pair(const Planes& all, const F& f) {
     if (!BoxOfNode::has(all, i)) continue;
     const int at[3] = {i % 6, i / 6 % 6, i / 36};
     for (int axis = 0; axis < 3; ++axis) {
-      if (at[axis] < 5 && BoxOfNode::has(all, i + kStride[axis])) f(i, i + kStride[axis], axis);
+      if (at[axis] < 5 && BoxOfNode::has(all, i + kBoxStride[axis]))
+        f(i, i + kBoxStride[axis], axis);
     }
   }
-}
-
-bool is_broken(const Points& points, std::int32_t p, int axis) {
-  return (points.bonds[p] >> (kForwardBond + axis) & 1) == 0;
 }
 
 /// How much of the area that a bond stands for was passed.
@@ -111,17 +106,23 @@ float parted_share(double cut, double lambda_over_mu) {
   return static_cast<float>((1 + c) * a / (1 + c * a));
 }
 
-/// Of a side's mass this much is needed.
-constexpr double kLeastSide = 1e-3;
+/// A side lighter than that share of its node (a plane through nodes leaves 0.016 on the far ones,
+/// without which it counts up to a quarter of a cell short), or a component of fewer points: swings
+/// by itself.
+constexpr double kLeastSide = 0.01;
+constexpr int kLeastPoints = 32;
 
 /// Parts a node as far as its bonds say; `before` if it was parted already. Returns a share of 0
 /// where it is not.
-FrontNode part(const MpmState& s, const FrontNode& at, const FrontNode* before) {
+FrontNode parted_node(const MpmState& s, const FrontNode& at, const FrontNode* before) {
   FrontNode result = at;
   result.share = 0;
   const LatticeBody& body = s.bodies[at.body];
   BoxOfNode box;
   points_around(body, at.x, at.y, at.z, box.point);
+  int count = 0;
+  for (const std::uint64_t places : at.all) count += __builtin_popcountll(places);
+  if (count < kLeastPoints) return before != nullptr ? *before : result;
   const CutPlane plane = find_plane(s, box, at.all);
   if (!plane.there) return before != nullptr ? *before : result;
   if (before != nullptr) {
@@ -132,7 +133,7 @@ FrontNode part(const MpmState& s, const FrontNode& at, const FrontNode* before) 
     for (int i = 0; i < 216; ++i) {
       if (!BoxOfNode::has(at.all, i)) continue;
       const bool first = plane.side[i] < 0;
-      if (first) BoxOfNode::add(result.first_side, i);
+      if (first) result.first_side[i / 36] |= std::uint64_t{1} << BoxOfNode::bit(i);
       const std::int32_t p = box.point[i];
       const Material& material = body.material_of(s.points, p);
       const double weighed = BoxOfNode::weight(i) * s.points.free_volume_of(p);
@@ -173,64 +174,6 @@ std::vector<std::uint8_t> excluded_nodes(const MpmState& s) {
 
 }  // namespace
 
-void split_front(MpmState& s) {
-  Front& front = s.front;
-  std::vector<FrontNode> kept;
-  std::size_t to = 0;
-  for (std::size_t n = 0; n < front.nodes.size(); ++n) {
-    const FrontNode& of = front.nodes[n];
-    const LatticeBody& body = s.bodies[of.body];
-    const NodeFields::Split* split = s.fields->split(body.node(of.x, of.y, of.z));
-    struct Now {
-      std::int32_t node;
-      double side, mass;
-    };
-    std::vector<Now> now;
-    bool whole = split == nullptr;
-    for (std::size_t f = 0; split != nullptr && f < split->fields.size(); ++f) {
-      const Planes& points = split->fields[f].points;
-      int first = 0, other = 0;
-      for (int z = 0; z < 6; ++z) {
-        const std::uint64_t here = points[z] & of.all[z];
-        first += __builtin_popcountll(here & of.first_side[z]);
-        other += __builtin_popcountll(here & ~of.first_side[z]);
-      }
-      if (first + other == 0) continue;
-      whole = whole || points == of.all;
-      const std::int32_t node = split->fields[f].node;
-      now.push_back({node, first > other ? -of.other : of.first, s.nodes.mass[node]});
-    }
-    if (whole) {
-      kept.push_back(of);
-      for (int a = 0; a < 3; ++a) {
-        front.d[a][to] = front.d[a][n];
-        front.rate[a][to] = front.rate[a][n];
-      }
-      ++to;
-      continue;
-    }
-    double mass = 0, mean = 0;  // so that momentum stays where they are not the two sides
-    for (const Now& field : now) {
-      mass += field.mass;
-      mean += field.mass * field.side;
-    }
-    mean = mass > 0 ? mean / mass : 0;
-    for (const Now& field : now) {
-      if (s.nodes.inv_mass[field.node] == 0) continue;
-      const auto by = static_cast<float>(field.side - mean);
-      for (int a = 0; a < 3; ++a) {
-        s.nodes.u[a][field.node] += by * front.d[a][n];
-        s.nodes.v[a][field.node] += by * front.rate[a][n];
-      }
-    }
-  }
-  front.nodes = std::move(kept);
-  for (int a = 0; a < 3; ++a) {
-    front.d[a].resize(to);
-    front.rate[a].resize(to);
-  }
-}
-
 void follow_front(MpmState& s, const std::vector<std::int32_t>& touched) {
   Front& front = s.front;
   const std::vector<std::uint8_t> excluded = excluded_nodes(s);
@@ -268,8 +211,8 @@ void follow_front(MpmState& s, const std::vector<std::int32_t>& touched) {
       static_cast<int>(candidates.size()),
       [&](int i) {
         const auto found = known.find(candidates[i].node);
-        candidates[i] =
-            part(s, candidates[i], found == known.end() ? nullptr : &front.nodes[found->second]);
+        candidates[i] = parted_node(s, candidates[i],
+                                    found == known.end() ? nullptr : &front.nodes[found->second]);
       },
       32);
   std::map<std::int32_t, FrontNode> all;

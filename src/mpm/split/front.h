@@ -8,6 +8,7 @@
 
 #include "compute/array.h"
 #include "mpm/blocks/front_cell.h"
+#include "mpm/lattice/lattice_body.h"
 #include "mpm/split/node_box.h"
 
 namespace tissue_sim {
@@ -51,6 +52,11 @@ struct Front {
 };
 
 inline constexpr int kRimProbes = 32;
+
+/// Whether the bond of a point to the next one along an axis is broken, or none was.
+inline bool is_broken(const Points& points, std::int32_t p, int axis) {
+  return (points.bonds[p] >> (kForwardBond + axis) & 1) == 0;
+}
 
 /// Widens the rim by what the points `changed`, which lost bonds, add to it, and notes what the
 /// path passed of it, as sweep_bonds(). Appends points of bonds of which it passed more.

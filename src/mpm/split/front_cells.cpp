@@ -13,14 +13,14 @@ namespace tissue_sim {
 namespace {
 
 /// The points of a cell that see the same fields, and of which material they are.
-struct View {
+struct CellView {
   std::array<std::int32_t, 27> node;
   std::vector<FrontPart> parts;
   Law law;
   std::array<std::int32_t, 8> point;
   double volume[2] = {};  ///< of those with the same nodes, of these
   double viscosity = 0;   ///< times volumes [J s]
-  int count[2] = {};
+  int count = 0;
 };
 
 bool same_parts(const std::vector<FrontPart>& a, const std::vector<FrontPart>& b) {
@@ -31,10 +31,11 @@ bool same_parts(const std::vector<FrontPart>& a, const std::vector<FrontPart>& b
 }
 
 /// The views of the points of a cell.
-std::vector<View> views_of(const MpmState& s, const std::map<std::int32_t, std::int32_t>& parted,
-                           const LatticeBody& body, int x, int y, int z) {
-  std::vector<View> views;
-  std::map<std::array<std::int32_t, 27>, std::pair<double, int>> of_nodes;
+std::vector<CellView> views_of(const MpmState& s,
+                               const std::map<std::int32_t, std::int32_t>& parted,
+                               const LatticeBody& body, int x, int y, int z) {
+  std::vector<CellView> views;
+  std::map<std::array<std::int32_t, 27>, double> of_nodes;
   for (int p = 0; p < 8; ++p) {
     const int place[3] = {2 * x + (p & 1), 2 * y + (p >> 1 & 1), 2 * z + (p >> 2)};
     const std::int32_t point = body.point(place[0], place[1], place[2]);
@@ -42,7 +43,7 @@ std::vector<View> views_of(const MpmState& s, const std::map<std::int32_t, std::
     const double volume = elastic_volume(s.points, point);
     if (!(volume > 0)) continue;
     const Points::Site& site = s.points.site[point];
-    View view;
+    CellView view;
     for (int k = 0; k < 27; ++k) {
       view.node[k] = s.fields->node(body, site, k);
       const auto found = parted.find(view.node[k]);
@@ -53,13 +54,11 @@ std::vector<View> views_of(const MpmState& s, const std::map<std::int32_t, std::
       const bool first = (n.first_side[plane] >> bit & 1) != 0;
       view.parts.push_back({found->second, k, first ? -n.other : n.first, n.share, 0});
     }
-    auto& [sum, count] = of_nodes[view.node];
-    sum += volume;
-    ++count;
+    of_nodes[view.node] += volume;
     if (view.parts.empty()) continue;
     const Material& material = body.material_of(s.points, point);
     view.law = material.law;
-    auto same = std::find_if(views.begin(), views.end(), [&view](const View& v) {
+    auto same = std::find_if(views.begin(), views.end(), [&view](const CellView& v) {
       return v.node == view.node && v.law == view.law && same_parts(v.parts, view.parts);
     });
     if (same == views.end()) {
@@ -69,16 +68,13 @@ std::vector<View> views_of(const MpmState& s, const std::map<std::int32_t, std::
     same->point[p] = point;
     same->volume[1] += volume;
     same->viscosity += material.viscosity * volume;
-    ++same->count[1];
+    ++same->count;
   }
-  for (View& view : views) {
-    view.volume[0] = of_nodes[view.node].first;
-    view.count[0] = of_nodes[view.node].second;
-  }
+  for (CellView& view : views) view.volume[0] = of_nodes[view.node];
   return views;
 }
 
-void add_cell(MpmState& s, const LatticeBody& body, std::int32_t number, View& view) {
+void add_front_cell(MpmState& s, const LatticeBody& body, std::int32_t number, CellView& view) {
   Front& front = s.front;
   std::stable_sort(view.parts.begin(), view.parts.end(),
                    [](const FrontPart& a, const FrontPart& b) { return a.share > b.share; });
@@ -101,8 +97,7 @@ void add_cell(MpmState& s, const LatticeBody& body, std::int32_t number, View& v
   for (int i = 0; i < 2; ++i) {
     cell.viscosity[i] = static_cast<float>(view.viscosity * view.volume[i] / size);
   }
-  const bool stabilised = view.count[1] < kSteadyCount && view.count[0] >= kSteadyCount;
-  cell.stabilised = stabilised ? static_cast<float>(kStabilisation * mu_sum) : 0.0f;
+  cell.stabilised = view.count < kSteadyCount ? static_cast<float>(kStabilisation * mu_sum) : 0.0f;
   cell.inverse_size = static_cast<float>(1 / body.cell_size);
   cell.law = view.law;
   cell.body = number;
@@ -125,7 +120,7 @@ void list_sums(const std::map<std::int32_t, std::vector<std::int32_t>>& of, Plac
   }
 }
 
-constexpr int kTogether = 64;  // sums that are gone through at a time
+constexpr int kSumsTogether = 64;  // sums that are gone through at a time
 
 }  // namespace
 
@@ -144,8 +139,8 @@ void list_front_cells(MpmState& s) {
   }
   for (const auto& [at, there] : cells) {
     const LatticeBody& body = s.bodies[at[0]];
-    for (View& view : views_of(s, parted, body, at[3], at[2], at[1])) {
-      add_cell(s, body, at[0], view);
+    for (CellView& view : views_of(s, parted, body, at[3], at[2], at[1])) {
+      add_front_cell(s, body, at[0], view);
     }
   }
   std::map<std::int32_t, std::vector<std::int32_t>> of_node, of_part;
@@ -184,14 +179,14 @@ void work_on_front_cell(MpmState& s, int i) {
 
 int front_moves(const Front& front) {
   const std::size_t sums = front.node_sums.size() + front.part_sums.size();
-  return static_cast<int>((sums + kTogether - 1) / kTogether);
+  return static_cast<int>((sums + kSumsTogether - 1) / kSumsTogether);
 }
 
 void move_front(MpmState& s, const NodeStep& step, int i) {
   Front& front = s.front;
   const std::size_t nodes = front.node_sums.size(), sums = nodes + front.part_sums.size();
-  const std::size_t begin = static_cast<std::size_t>(kTogether) * i;
-  for (std::size_t n = begin; n < std::min(sums, begin + kTogether); ++n) {
+  const std::size_t begin = static_cast<std::size_t>(kSumsTogether) * i;
+  for (std::size_t n = begin; n < std::min(sums, begin + kSumsTogether); ++n) {
     const bool of_node = n < nodes;
     const Front::Sum& sum = of_node ? front.node_sums[n] : front.part_sums[n - nodes];
     const std::int32_t* place =

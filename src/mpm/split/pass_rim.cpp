@@ -19,14 +19,14 @@ constexpr Probe probe(int i) {
 }
 // By how much of the bond probes are longer than it at either end: an oblique cut leaves it within
 // the area that it stands for.
-constexpr double kBeyond = 0.5;
+constexpr double kProbeBeyond = 0.5;
 
 /// Where a point is and how the tissue is deformed there.
 struct Placed {
   Vec3 x;
   Eigen::Matrix3d F;
 };
-Placed placed(const MpmState& s, const Array<float>* u, std::int32_t p) {
+Placed placed_point(const MpmState& s, const Array<float>* u, std::int32_t p) {
   const Points::Site& site = s.points.site[p];
   const LatticeBody& body = s.bodies[site.body];
   Placed at{body.site_position(site.x, site.y, site.z), Eigen::Matrix3d::Identity()};
@@ -48,11 +48,7 @@ Placed placed(const MpmState& s, const Array<float>* u, std::int32_t p) {
   return at;
 }
 
-bool is_broken(const Points& points, std::int32_t p, int axis) {
-  return (points.bonds[p] >> (kForwardBond + axis) & 1) == 0;
-}
-
-std::int32_t beside(const LatticeBody& body, const Points::Site& site, int axis, int step) {
+std::int32_t bond_beside(const LatticeBody& body, const Points::Site& site, int axis, int step) {
   return body.point(site.x + (axis == 0 ? step : 0), site.y + (axis == 1 ? step : 0),
                     site.z + (axis == 2 ? step : 0));
 }
@@ -66,7 +62,7 @@ bool is_at_rim(const MpmState& s, const LatticeBody& body, std::int32_t p, int a
   for (int across = 0; across < 3; ++across) {
     if (across == axis) continue;
     for (const int step : {-1, 1}) {
-      const std::int32_t q = beside(body, site, across, step);
+      const std::int32_t q = bond_beside(body, site, across, step);
       if (q < 0 || body.next_point(s.points.site[q], axis) < 0) continue;
       if (is_broken(s.points, q, axis) != broken) return true;
     }
@@ -96,12 +92,12 @@ void update_rim(MpmState& s, const std::vector<std::int32_t>& broken) {
 }
 
 /// What the path passes of a bond beside what was passed already.
-std::uint32_t passed(const MpmState& s, const std::vector<SweepPart>& parts,
-                     const Array<float>* u_begin, const Array<float>* u_end, std::int32_t p,
-                     int axis, std::uint32_t already) {
+std::uint32_t passed_of(const MpmState& s, const std::vector<SweepPart>& parts,
+                        const Array<float>* u_begin, const Array<float>* u_end, std::int32_t p,
+                        int axis, std::uint32_t already) {
   const LatticeBody& body = s.bodies[s.points.site[p].body];
   const std::int32_t q = body.next_point(s.points.site[p], axis);
-  const Placed end = placed(s, u_end, p), end_q = placed(s, u_end, q);
+  const Placed end = placed_point(s, u_end, p), end_q = placed_point(s, u_end, q);
   const double reach = 3 * body.cell_size;
   const MovingSegment there{end.x, end_q.x, end.x, end_q.x};
   const auto is_far = [&](const SweepPart& part) {
@@ -110,8 +106,8 @@ std::uint32_t passed(const MpmState& s, const std::vector<SweepPart>& parts,
   };
   if (std::all_of(parts.begin(), parts.end(), is_far)) return 0;
   const bool moves = u_begin != u_end;
-  const Placed begin = moves ? placed(s, u_begin, p) : end;
-  const Placed begin_q = moves ? placed(s, u_begin, q) : end_q;
+  const Placed begin = moves ? placed_point(s, u_begin, p) : end;
+  const Placed begin_q = moves ? placed_point(s, u_begin, q) : end_q;
   const double side = 0.5 * body.cell_size;
   std::uint32_t result = 0;
   for (int i = 0; i < kRimProbes; ++i) {
@@ -120,7 +116,7 @@ std::uint32_t passed(const MpmState& s, const std::vector<SweepPart>& parts,
     off[(axis + 1) % 3] = side * probe(i).a;
     off[(axis + 2) % 3] = side * probe(i).b;
     const auto ends = [&off](const Placed& at, const Placed& at_q, Vec3& a, Vec3& b) {
-      const Vec3 moved = at.F * off, along = kBeyond * (at_q.x - at.x);
+      const Vec3 moved = at.F * off, along = kProbeBeyond * (at_q.x - at.x);
       a = at.x + moved - along;
       b = at_q.x + moved + along;
     };
@@ -155,8 +151,8 @@ void pass_rim(MpmState& s, const BladePath& path, const Array<float>* u_begin,
       static_cast<int>(rim.size()),
       [&](int i) {
         const auto p = static_cast<std::int32_t>(rim[i].first / 3);
-        more[i] =
-            passed(s, parts, u_begin, u_end, p, static_cast<int>(rim[i].first % 3), *rim[i].second);
+        more[i] = passed_of(s, parts, u_begin, u_end, p, static_cast<int>(rim[i].first % 3),
+                            *rim[i].second);
       },
       32);
   for (std::size_t i = 0; i < rim.size(); ++i) {

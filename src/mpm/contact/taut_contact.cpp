@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "contact/contact_spring.h"
 #include "mpm/contact/face_places.h"
 #include "mpm/contact/facet_motion.h"
 #include "mpm/lattice/bonds.h"
@@ -10,10 +11,10 @@
 namespace tissue_sim {
 namespace {
 
-constexpr float kStiffness = 0.25f;  // of all springs together, times dt^2 over the mass they move
-constexpr float kDamping = 0.7f;     // of their critical damping
-constexpr int kSteps = 3;            // towards the deepest place of an element
-constexpr float kHalf = 0.25f;       // edge of an element [cells]
+constexpr float kStiffness = kSunkStiffness;  // of all springs together
+constexpr float kDamping = kSunkDamping;
+constexpr int kSteps = 3;       // towards the deepest place of an element
+constexpr float kHalf = 0.25f;  // edge of an element [cells]
 
 /// Radius of what is round about the tool where tissue meets it first [m].
 float tip_radius(const Collider& c) {

@@ -193,9 +193,14 @@ void list_near_cells(MpmState& state, int index, float dt) {
   const bool at_points = state.points.outer.empty();  // MpmBoundary::kLattice
   // How much further than those of whole tissue the elements of each cell reach.
   const auto whole = static_cast<float>(kWholeReach * body.cell_size);
-  std::vector<float> reach(points.size());
+  std::vector<float> reach(points.size(), whole);
   float farthest = 0;
-  for (std::size_t i = 0; i < reach.size(); ++i) {
+  const std::vector<std::uint8_t>& by = state.contacts.near[index];
+  const bool any_tool = std::any_of(by.begin(), by.end(), [&state](std::uint8_t c) {
+    const Collider::Kind kind = state.colliders[c].kind;
+    return kind != Collider::kPlane && kind != Collider::kBlade;
+  });
+  for (std::size_t i = 0; any_tool && i < reach.size(); ++i) {
     const auto z = static_cast<int>(i) / block.stride, lane = static_cast<int>(i) % block.stride;
     reach[i] = element_reach(body, block, x, 8 * z * block.stride + lane);
     farthest = std::max(farthest, reach[i] - whole);

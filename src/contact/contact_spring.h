@@ -64,22 +64,4 @@ TISSUE_SIM_INLINE void contact_force(const Collider& c, const Gap& g, const Cont
   for (int i = 0; i < 3; ++i) force[i] = push * g.normal[i] + t[i];
 }
 
-/// What holds tissue off that has sunk so deep into a tool (half of Collider::inside) that its
-/// contact spring gives way: as stiff as substeps bear, ...
-inline constexpr float kSunkStiffness = 0.25f;  ///< times dt^2 over the mass that it moves
-inline constexpr float kSunkDamping = 0.7f;     ///< ... and of that the share of critical
-
-/// Adds that to the force on a point of `mass` [kg], for substeps of `dt` [s].
-TISSUE_SIM_INLINE void add_sunk_force(const Collider& c, const Gap& g, float mass, float dt,
-                                      const float* x, const float* v, float* force) {
-  const float deep = -g.distance - 0.5f * c.inside;
-  if (!(c.inside > 0 && deep > 0 && mass > 0)) return;
-  float vc[3], vn = 0;
-  velocity_at(c, x, vc);
-  for (int i = 0; i < 3; ++i) vn += (v[i] - vc[i]) * g.normal[i];
-  const float damping = 2 * kSunkDamping * sqrtf(kSunkStiffness);
-  const float push = fmaxf(0.0f, (kSunkStiffness * deep / dt - damping * vn) * (mass / dt));
-  for (int i = 0; i < 3; ++i) force[i] += push * g.normal[i];
-}
-
 }  // namespace tissue_sim

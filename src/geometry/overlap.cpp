@@ -1,6 +1,7 @@
 #include "geometry/overlap.h"
 
 #include <algorithm>
+#include <cstdio>
 #include <memory>
 #include <numeric>
 #include <stdexcept>
@@ -8,7 +9,6 @@
 #include "geometry/chord.h"
 #include "geometry/surface.h"
 #include "geometry/tet_mesh.h"
-#include "scene/scene_text.h"
 
 namespace tissue_sim {
 namespace {
@@ -116,10 +116,11 @@ std::vector<std::string> overlap_notes(const Scene& scene) {
       const Overlap overlap = overlap_of(a, b, both);
       if (!(overlap.longest > least)) continue;
       const double deep = std::min({overlap.longest, size.y(), size.z()});
-      notes.push_back("bodies '" + scene.bodies[i].name + "' and '" + scene.bodies[j].name +
-                      "' overlap by " + text(static_cast<float>(1e6 * overlap.volume)) +
-                      " cm^3, up to " + text(static_cast<float>(1e3 * deep)) +
-                      " mm deep: what lies there is there twice, move one of them");
+      char by[96];
+      std::snprintf(by, sizeof(by), "overlap by %.3g cm^3, up to %.3g mm deep",
+                    1e6 * overlap.volume, 1e3 * deep);
+      notes.push_back("bodies '" + scene.bodies[i].name + "' and '" + scene.bodies[j].name + "' " +
+                      by + ": what lies there is there twice, move one of them");
     }
   }
   return notes;

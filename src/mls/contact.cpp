@@ -60,7 +60,7 @@ void list_near(MlsState& state, int group, float dt) {
   }
 }
 
-void add_contact(MlsState& state, int group, float dt, float* force) {
+void add_contact(MlsState& state, int group, float* force) {
   MlsGroupContact& contact = state.contact[group];
   if (contact.near.empty()) return;
   contact.loads.assign(state.colliders.size(), {});
@@ -91,8 +91,6 @@ void add_contact(MlsState& state, int group, float dt, float* force) {
       const ContactSpring spring = node_spring(state, i);
       float push[3];
       contact_force(collider, g, spring, x, &state.v[4 * i], touch.hold, push);
-      if (state.inv_mass[i] > 0)
-        add_sunk_force(collider, g, state.mass[i], dt, x, &state.v[4 * i], push);
       touching.push_back(touch);
       ColliderLoad& load = contact.loads[c];
       load.points += 1;

@@ -12,7 +12,7 @@ bool is_list_due(MlsState& state);
 void list_near(MlsState& state, int group, float dt);
 
 /// Adds to the forces [4 kMlsGroup] on a group's nodes what colliders at their present places push
-/// them with in a substep of `dt` seconds, and notes it in the group's loads.
-void add_contact(MlsState& state, int group, float dt, float* force);
+/// them with, and notes it in the group's loads.
+void add_contact(MlsState& state, int group, float* force);
 
 }  // namespace tissue_sim

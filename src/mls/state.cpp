@@ -258,7 +258,7 @@ float substep(MlsState& s, float dt, std::vector<ColliderLoad>& loads) {
       if (!s.node_contacts.begin.empty()) add_node_contact(s, i, force + 4 * (i - first));
     }
     if (list) list_near(s, group, dt);
-    add_contact(s, group, dt, force);
+    add_contact(s, group, force);
     for (int i = first; i < last; ++i) {
       const float inv_mass = s.inv_mass[i];
       Vec<4> v{};

@@ -136,7 +136,7 @@ void fields(Archive& archive, Touch& t) {
 template <class Archive>
 void fields(Archive& archive, NearCell& c) {
   archive(c.lane, c.node, c.collider, c.points, c.first_place, c.place_count, c.middle, c.lightest,
-          c.clear, c.taut);
+          c.clear);
 }
 
 template <class Archive>

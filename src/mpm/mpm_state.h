@@ -45,7 +45,6 @@ struct NearCell {
   float middle[3];                        ///< reference place [m]
   float lightest;                         ///< largest 1 / m of its nodes [1/kg]; 0 without places
   std::uint8_t clear = 0;                 ///< substeps for which the collider cannot reach it
-  std::uint8_t taut = 0;  ///< how far its elements reach (mpm/contact/taut_contact.h) [cells / 16]
 };
 
 /// Contact of points with colliders, block by block.

@@ -100,8 +100,6 @@ struct State {
   double mean_edge = 0;  ///< of the surface when it was made [m]
 
   std::vector<Collider> colliders;  ///< of this step
-  /// Triangles that tools may come to in this frame: list_near_triangles().
-  std::vector<std::int32_t> near_triangles;
 
   /// Vertices of a chunk of each level, by which constraints are packed (ConstraintSet): what the
   /// first cache of a processor holds, and its second. Empty on a GPU.
@@ -136,12 +134,6 @@ void step(State& s, float h, std::vector<ColliderLoad>& loads);
 /// Projects each constraint once, one colour after the other, or in the opposite order. `keep`:
 /// multipliers grow over the sweeps of a step; else they count as zero.
 void project_constraints(State& s, float h, bool keep, bool backward = false);
-/// Lists the triangles of the surface that tools may come to in a frame of `time` seconds in which
-/// they sweep these boxes (sunk_triangles.cpp).
-void list_near_triangles(State& s, const std::vector<Box>& reach, double time);
-/// Pushes those out of which a tool has sunk into between their vertices: a place may lie an eighth
-/// of an edge deep in it, as it does where an edge leads over something round.
-void project_triangles(State& s, float h, std::vector<ColliderLoad>& loads);
 /// Pushes vertices out of the colliders, with friction; adds what that takes (contact.cpp).
 void project_contacts(State& s, float h, std::vector<ColliderLoad>& loads);
 

@@ -86,7 +86,6 @@ void PbdTissue::advance(double duration, const FrameInput& input) {
 void PbdTissue::run_steps(const FrameColliders& colliders, int steps, float h) {
   pbd::State& s = *state_;
   pbd::find_touches(s, steps * h);
-  pbd::list_near_triangles(s, colliders.reach(), static_cast<double>(steps) * h);
   const std::vector<pbd::Flight> flights = pbd::flights(s);
   std::fill(s.pushed.begin(), s.pushed.end(), std::uint8_t{0});
   for (int i = 0; i < steps; ++i) {

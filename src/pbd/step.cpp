@@ -116,7 +116,6 @@ void step(State& s, float h, std::vector<ColliderLoad>& loads) {
   for (int i = 0; i < sweeps; ++i) project_constraints(s, h, keep, i % 2 == 1);
   project_all(s, s.touches, s.project->touch, 32, 1 / (h * h), false, false);
   project_contacts(s, h, loads);
-  project_triangles(s, h, loads);
   for_vertices(s, [&](int i) { take_velocity(numbers, x + 4 * i, predicted + 4 * i, v + 4 * i); });
 }
 

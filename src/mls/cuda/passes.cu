@@ -151,8 +151,8 @@ __device__ __forceinline__ void add_load(unsigned long long* load, double value)
 }
 
 __device__ __forceinline__ void collider_forces(const CudaMlsField& f, const CudaMlsColliders& c,
-                                                int i, float dt, const float (&x)[3],
-                                                const float (&v)[3], float (&sum)[3]) {
+                                                int i, const float (&x)[3], const float (&v)[3],
+                                                float (&sum)[3]) {
   const std::uint32_t touched = c.touching[i];
   std::uint32_t touches = 0;
   for (std::uint32_t left = c.near; left != 0; left &= left - 1) {
@@ -172,8 +172,6 @@ __device__ __forceinline__ void collider_forces(const CudaMlsField& f, const Cud
       to_local(collider, x, place);
     }
     contact_force(collider, g, f.contact[i], x, v, place, push);
-    const float inv_mass = __ldg(f.inv_mass + i);
-    if (inv_mass > 0) add_sunk_force(collider, g, 1 / inv_mass, dt, x, v, push);
     *held = {place[0], place[1], place[2], 0};
     touches |= 1u << k;
     unsigned long long* load = c.loads + kMlsLoadSums * k;
@@ -243,7 +241,7 @@ __global__ void __launch_bounds__(kMlsThreads)
   if (colliders.near != 0) {
     const float4 X = __ldg(f.place + i);
     const float x[3] = {X.x + u.x, X.y + u.y, X.z + u.z}, speed[3] = {v.x, v.y, v.z};
-    collider_forces(f, colliders, i, step.dt, x, speed, sum);
+    collider_forces(f, colliders, i, x, speed, sum);
   }
   const float inv_mass = __ldg(f.inv_mass + i);
   const float velocity[3] = {v.x, v.y, v.z}, displacement[3] = {u.x, u.y, u.z};

@@ -9,7 +9,6 @@
 #include "contact/surface_spring.h"
 #include "mpm/contact/face_places.h"
 #include "mpm/contact/facet_motion.h"
-#include "mpm/contact/taut_contact.h"
 #include "mpm/lattice/bonds.h"
 #include "mpm/lattice/cell_points.h"
 #include "tools/frame_colliders.h"
@@ -191,20 +190,6 @@ void list_near_cells(MpmState& state, int index, float dt) {
   std::vector<std::uint8_t> points(static_cast<std::size_t>(block.nz) * block.stride);  // of cells
   std::vector<std::uint8_t> near(points.size());
   const bool at_points = state.points.outer.empty();  // MpmBoundary::kLattice
-  // How much further than those of whole tissue the elements of each cell reach.
-  const auto whole = static_cast<float>(kWholeReach * body.cell_size);
-  std::vector<float> reach(points.size(), whole);
-  float farthest = 0;
-  const std::vector<std::uint8_t>& by = state.contacts.near[index];
-  const bool any_tool = std::any_of(by.begin(), by.end(), [&state](std::uint8_t c) {
-    const Collider::Kind kind = state.colliders[c].kind;
-    return kind != Collider::kPlane && kind != Collider::kBlade;
-  });
-  for (std::size_t i = 0; any_tool && i < reach.size(); ++i) {
-    const auto z = static_cast<int>(i) / block.stride, lane = static_cast<int>(i) % block.stride;
-    reach[i] = element_reach(body, block, x, 8 * z * block.stride + lane);
-    farthest = std::max(farthest, reach[i] - whole);
-  }
   for (const std::uint8_t c : state.contacts.near[index]) {
     const Collider& collider = state.colliders[c];
     const bool is_blade = collider.kind == Collider::kBlade;
@@ -213,8 +198,8 @@ void list_near_cells(MpmState& state, int index, float dt) {
     const Box box = bounds(collider);
     float min[3], max[3];
     for (int a = 0; a < 3; ++a) {
-      min[a] = static_cast<float>(box.min[a] - margin - farthest);
-      max[a] = static_cast<float>(box.max[a] + margin + farthest);
+      min[a] = static_cast<float>(box.min[a] - margin);
+      max[a] = static_cast<float>(box.max[a] + margin);
     }
     std::fill(points.begin(), points.end(), std::uint8_t{0});
     std::fill(near.begin(), near.end(), std::uint8_t{0});
@@ -228,9 +213,8 @@ void list_near_cells(MpmState& state, int index, float dt) {
       if (is_blade && in_body) continue;
       const float at[3] = {x[lane], x[lanes + lane], x[2 * lanes + lane]};
       // Where the flats of a blade end, its gap does: there the box must do.
+      if (!is_blade && gap(collider, at).distance > margin) continue;
       const int row = lane / block.stride, cell = row / 8 * block.stride + lane % block.stride;
-      const double wide = std::max(0.0f, reach[cell] - whole);
-      if (!is_blade && gap(collider, at).distance > margin + wide) continue;
       near[cell] = 1;
       // Others touch over their places on the surface.
       if (is_blade || in_body || at_points) points[cell] |= 1u << row % 8;
@@ -256,9 +240,7 @@ void list_near_cells(MpmState& state, int index, float dt) {
                          count,
                          {static_cast<float>(middle[0]), static_cast<float>(middle[1]),
                           static_cast<float>(middle[2])},
-                         count > 0 ? largest_inv_mass(state.nodes, CellNodes(block, node)) : 0,
-                         0,
-                         taut_reach(collider, body, reach[i])});
+                         count > 0 ? largest_inv_mass(state.nodes, CellNodes(block, node)) : 0});
       }
     }
   }
@@ -276,7 +258,6 @@ struct BlockPush {
   std::vector<Touch>::const_iterator held, held_end;
   std::vector<InertiaChange>& changes;
   std::vector<Touch> touching = {};
-  float deepest = 0;  // in the cell that is worked on [m]
 
   /// What the point had before, if it touched the collider then.
   bool find_held(Touch& touch) {
@@ -342,7 +323,6 @@ bool push_points(BlockPush& b, const NearCell& cell, unsigned points, const Coll
       clear = std::min(clear, clearance(collider, at));
       continue;
     }
-    b.deepest = std::max(b.deepest, -g.distance);
     if (!touches) {
       touches = true;
       values_at_points(b.state.nodes.v, nodes, v);
@@ -467,7 +447,6 @@ bool push_surface(BlockPush& b, const NearCell& cell, const Collider& collider, 
       values_at(u_and_v, nodes, whole_rows, weights, moved);
     }
     touches = true;
-    b.deepest = std::max(b.deepest, -g.distance);
     if (g.distance < -kDeep * h) points |= place.points;
     const bool is_free = b.state.points.free_volume_of(place.point) > 0;
     const int own = b.state.points.material_of(place.point);
@@ -526,8 +505,6 @@ void add_contact(MpmState& state, int index, float dt, float* force,
               contacts.touching[index].cend(),
               contacts.changes[index]};
   b.touching.reserve(contacts.touching[index].size());
-  std::vector<SunkPlace> sunk;
-  const auto may_sink = static_cast<float>(kMaySink * state.scene.cell_size);
   for (NearCell& cell : contacts.cells[index]) {
     if (cell.clear > 0) {
       --cell.clear;
@@ -536,26 +513,16 @@ void add_contact(MpmState& state, int index, float dt, float* force,
     const Collider& collider = state.colliders[cell.collider];
     ColliderLoad& load = loads[cell.collider];
     float clear = std::numeric_limits<float>::max();
-    b.deepest = 0;
     // Points within the body touch where a tool is so thin that it came between places of the
     // surface, all that lost bonds touch a blade; others where their places do not hold them:
     // a flake between two cuts has none at its edge.
     unsigned points = cell.points;
     bool touches = cell.place_count > 0 && push_surface(b, cell, collider, load, clear, points);
     touches = (points != 0 && push_points(b, cell, points, collider, load, clear)) || touches;
-    const auto reach = static_cast<float>(cell.taut * state.scene.cell_size / 16);
-    if (b.deepest > may_sink || (reach > 0 && (touches || clear < reach))) {
-      if (collider.kind != Collider::kPlane && collider.kind != Collider::kBlade) {
-        find_sunk(state, block, cell, collider, sunk);
-        continue;
-      }
-    }
     if (touches) continue;
     const double nearer = approach(state, index, collider, dt);
-    cell.clear = static_cast<std::uint8_t>(
-        std::min<double>(kListLasts, std::max(0.0f, clear - reach) / nearer));
+    cell.clear = static_cast<std::uint8_t>(std::min<double>(kListLasts, clear / nearer));
   }
-  if (!sunk.empty()) push_sunk(state, block, sunk, dt, force, loads);
   // A point that no longer touches forgets where it was held.
   b.let_go_of_rest();
   contacts.touching[index] = std::move(b.touching);

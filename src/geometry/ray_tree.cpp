@@ -125,7 +125,9 @@ bool RayTree::is_gap_between(const Vec3& a, const Vec3& b) const {
   const RayHit out = first_exit(a, way, -1, 1e-6);
   if (out.triangle < 0 || out.along >= 1 - 1e-6) return false;
   const RayHit in = first_exit(b, -way, -1, 1e-6);
-  if (in.triangle < 0 || out.along + in.along >= 1) return false;  // parts that overlap
+  if (in.triangle < 0 || out.along + in.along > 1 - 1e-4) {
+    return false;  // parts that overlap, or walls of a cut, which lie on one another
+  }
   const auto normal = [this](int t) {
     const Vec3* c = &corners_[3 * static_cast<std::size_t>(t)];
     return (c[1] - c[0]).cross(c[2] - c[0]).normalized().eval();

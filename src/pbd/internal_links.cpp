@@ -95,11 +95,10 @@ std::vector<InternalLink> find_internal_links(const TriangleMesh& mesh,
         nearest = corner;
       }
     }
-    if (tree.is_gap_between(mesh.vertices[v], mesh.vertices[nearest])) continue;
     if (count[nearest] >= kMost) nearest = neighbours.nearest_with_room(nearest, place, count);
-    if (tree.is_gap_between(mesh.vertices[v], mesh.vertices[nearest])) continue;
     ++count[nearest];
-    links.push_back({v, nearest, hit.along});
+    links.push_back(
+        {v, nearest, hit.along, tree.is_gap_between(mesh.vertices[v], mesh.vertices[nearest])});
   }
   return links;
 }

@@ -3,6 +3,7 @@
 #include <stdexcept>
 #include <utility>
 
+#include "geometry/overlap.h"
 #include "mls/tissue.h"
 #include "mpm/mpm_tissue.h"
 #include "pbd/pbd_tissue.h"
@@ -59,7 +60,7 @@ std::unique_ptr<Tissue> make_tissue(const Scene& scene) {
   const Makers* of = std::find_if(std::begin(kMakers), std::end(kMakers),
                                   [&](const Makers& m) { return m.method == scene.method; });
   if (of == std::end(kMakers)) throw std::invalid_argument("method is not in this build");
-  Notes notes;
+  Notes notes = overlap_notes(scene);
   if (scene.device == Device::kCpu) return of->on_cpu(scene, notes);
   if (of->on_gpu == nullptr) {
     if (scene.device == Device::kAuto) return of->on_cpu(scene, notes);

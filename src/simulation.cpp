@@ -10,6 +10,7 @@
 #include "frame/sealed_state.h"
 #include "frame/state_fields.h"
 #include "tools/grip.h"
+#include "tools/points_inside.h"
 
 namespace tissue_sim {
 namespace {
@@ -280,6 +281,7 @@ FrameReport Simulation::advance_frame() {
                     {report.input.tools, report.input.cuts, report.input.anchors,
                      &*report.input.gravity, &*report.input.damping});
   report.result = s.tissue->finish();
+  sum_inside(report.result);
   report.cfl = report.result.substep * s.wave_speed / s.scene.cell_size;
   for (std::size_t i = 0; i < s.tools.size(); ++i) {
     const ToolLoad& load = report.result.loads[i];

@@ -40,6 +40,8 @@ inline void follow(const FrameInput& input, Scene& scene) {
 /// What one frame brought.
 struct FrameResult {
   std::vector<ToolLoad> loads;         ///< parallels Scene::tools
+  int points_inside = 0;               ///< in any of the tools: ToolLoad::points_inside
+  double inside_depth = 0;             ///< of the deepest of them [m]
   std::vector<CutReport> cut_reports;  ///< parallels FrameInput::cuts
   std::vector<Wrench> anchor_loads;    ///< of the tissue on each anchor, mean of the frame, about
                                        ///< its origin where it is now; in the order of the scene

@@ -47,10 +47,13 @@ struct ToolMotion {
 
 /// What the tissue did to a tool during one frame, at the tool's tip, in world axes.
 struct ToolLoad {
-  Wrench mean;            ///< mean over the substeps of the frame
-  double peak_force = 0;  ///< largest force of a substep [N]
-  double grip = 0;        ///< grasper: what each jaw presses with, mean over the frame [N] ...
-  double grip_area = 0;   ///< ... and on which area of tissue [m^2]
+  Wrench mean;              ///< mean over the substeps of the frame
+  double peak_force = 0;    ///< largest force of a substep [N]
+  double grip = 0;          ///< grasper: what each jaw presses with, mean over the frame [N] ...
+  double grip_area = 0;     ///< ... and on which area of tissue [m^2]
+  int points_inside = 0;    ///< of tissue, in the tool by more than contact gives way (half a cell,
+                            ///< or half of the tool's thinnest), in the last substep ...
+  double inside_depth = 0;  ///< ... and how deep the deepest of them lies [m]
 };
 
 }  // namespace tissue_sim

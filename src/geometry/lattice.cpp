@@ -10,6 +10,7 @@
 #include <stdexcept>
 
 #include "geometry/chord.h"
+#include "geometry/gaps.h"
 #include "geometry/thickness.h"
 #include "scene/scene_text.h"
 
@@ -229,6 +230,7 @@ Lattice make_lattice(const Body& body, double cell_size, std::vector<std::string
     const float share = static_cast<float>(total / (total - dropped));
     for (Lattice::Site& site : lattice.sites) site.volume *= share;
   }
+  if (is_mesh) find_gaps(mesh, lattice);
   const std::string thin = notes ? thickness_note(lattice) : "";
   if (!thin.empty()) notes->push_back("body '" + body.name + "': " + thin);
   return lattice;

@@ -22,6 +22,16 @@ struct Lattice {
     float volume;          ///< of the body within this point's half-cell cube [m^3]
   };
   std::vector<Site> sites;  ///< sorted by z, then y, then x; each volume above 0
+
+  /// Void between a site and the next one along an axis, however narrow: what each stands for does
+  /// not meet.
+  struct Gap {
+    std::int32_t site = 0;
+    int axis = 0;       ///< 0 x, 1 y, 2 z
+    double place = -1;  ///< of its middle, 0 at the site to 1 at the next; below 0: unknown
+    Vec3 normal = Vec3::Zero();  ///< to either side, unit
+  };
+  std::vector<Gap> gaps;  ///< of meshes (geometry/gaps.h), by site
 };
 
 /// Fills a body with lattice points; the volume of each is the share of its half-cell cube that the

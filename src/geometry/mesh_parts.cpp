@@ -2,9 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <memory>
 #include <numeric>
 
 #include "geometry/mesh_edges.h"
+#include "geometry/ray_tree.h"
+#include "math/union_find.h"
 
 namespace tissue_sim {
 namespace {
@@ -93,6 +96,56 @@ bool lies_in(const TriangleMesh& mesh, const Part& inner, const Part& outer) {
 }
 
 }  // namespace
+
+std::vector<TriangleMesh> separate_solids(const TriangleMesh& mesh) {
+  const std::vector<Part> parts = parts_of(mesh);
+  if (parts.size() < 2) return {mesh};
+  std::vector<TriangleMesh> of_part(parts.size());
+  std::vector<std::unique_ptr<RayTree>> trees(parts.size());
+  for (std::size_t i = 0; i < parts.size(); ++i) {
+    of_part[i].vertices = mesh.vertices;
+    for (const int t : parts[i].triangles) of_part[i].triangles.push_back(mesh.triangles[t]);
+  }
+  const Vec3 direction = Vec3(0.8711, 0.3917, 0.2963).normalized();
+  // Whether a corner, or the middle of a side, of one part lies in the other.
+  const auto reaches_into = [&](std::size_t i, std::size_t j) {
+    if (trees[j] == nullptr) trees[j] = std::make_unique<RayTree>(of_part[j]);
+    const Box& box = parts[j].box;
+    for (const auto& t : of_part[i].triangles) {
+      for (int k = 0; k < 6; ++k) {
+        const Vec3& corner = mesh.vertices[t[k % 3]];
+        const Vec3 x = k < 3 ? corner : Vec3(0.5 * (corner + mesh.vertices[t[(k + 1) % 3]]));
+        if ((x.array() < box.min.array()).any() || (x.array() > box.max.array()).any()) continue;
+        if (trees[j]->winding(x, direction) != 0) return true;
+      }
+    }
+    return false;
+  };
+  UnionFind joined(parts.size());
+  for (std::size_t i = 0; i < parts.size(); ++i) {
+    for (std::size_t j = i + 1; j < parts.size(); ++j) {
+      const Box &a = parts[i].box, &b = parts[j].box;
+      if ((a.min.array() > b.max.array()).any() || (b.min.array() > a.max.array()).any()) continue;
+      if (reaches_into(i, j) || reaches_into(j, i)) {
+        joined.join(static_cast<std::int32_t>(i), static_cast<std::int32_t>(j));
+      }
+    }
+  }
+  std::vector<TriangleMesh> solids;
+  for (std::size_t i = 0; i < parts.size(); ++i) {
+    if (joined.root(static_cast<std::int32_t>(i)) != static_cast<std::int32_t>(i)) continue;
+    TriangleMesh solid;
+    solid.vertices = mesh.vertices;
+    for (std::size_t j = i; j < parts.size(); ++j) {
+      if (joined.root(static_cast<std::int32_t>(j)) != static_cast<std::int32_t>(i)) continue;
+      solid.triangles.insert(solid.triangles.end(), of_part[j].triangles.begin(),
+                             of_part[j].triangles.end());
+    }
+    drop_unused_vertices(solid);
+    solids.push_back(std::move(solid));
+  }
+  return solids;
+}
 
 void drop_slivers(TriangleMesh& mesh, std::vector<std::string>& notes) {
   const std::vector<Part> parts = parts_of(mesh);

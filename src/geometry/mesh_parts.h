@@ -16,4 +16,8 @@ void drop_slivers(TriangleMesh& mesh, std::vector<std::string>& notes);
 /// lies in them turns with them. Notes, too, which parts are apart, voids, or without effect.
 void turn_outwards(TriangleMesh& mesh, std::vector<std::string>& notes);
 
+/// The solids that a mesh as make_solid() leaves it consists of, each with its voids; parts that
+/// overlap are one. What is apart, by however little, is in two.
+std::vector<TriangleMesh> separate_solids(const TriangleMesh& mesh);
+
 }  // namespace tissue_sim

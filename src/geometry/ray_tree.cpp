@@ -119,6 +119,22 @@ RayHit RayTree::first_exit(const Vec3& origin, const Vec3& direction, int from,
   return hit;
 }
 
+bool RayTree::is_gap_between(const Vec3& a, const Vec3& b) const {
+  constexpr double kFacing = -0.3;  // as geometry/gaps.cpp
+  const Vec3 way = b - a;
+  const RayHit out = first_exit(a, way, -1, 1e-6);
+  if (out.triangle < 0 || out.along >= 1 - 1e-6) return false;
+  const RayHit in = first_exit(b, -way, -1, 1e-6);
+  if (in.triangle < 0 || out.along + in.along > 1 - 1e-4) {
+    return false;  // parts that overlap, or walls of a cut, which lie on one another
+  }
+  const auto normal = [this](int t) {
+    const Vec3* c = &corners_[3 * static_cast<std::size_t>(t)];
+    return (c[1] - c[0]).cross(c[2] - c[0]).normalized().eval();
+  };
+  return normal(out.triangle).dot(normal(in.triangle)) < kFacing;
+}
+
 int RayTree::winding(const Vec3& origin, const Vec3& direction) const {
   int winding = 0;
   walk(origin, direction, [&](int, double along, double facing, double&) {

@@ -20,6 +20,8 @@ class RayTree {
   /// normal has a share in the direction: what a ray against the inward normals meets) and that
   /// has none of its corners at `from` (-1: any). Of equals the lowest.
   RayHit first_exit(const Vec3& origin, const Vec3& direction, int from, double least) const;
+  /// Whether void lies between two places of the solid, walls of which look at each other there.
+  bool is_gap_between(const Vec3& a, const Vec3& b) const;
   /// How often a ray crosses the surface outwards minus inwards: above 0 inside of a solid whose
   /// parts may overlap. Meets edges and corners by chance only where `direction` is irrational.
   int winding(const Vec3& origin, const Vec3& direction) const;

@@ -105,6 +105,10 @@ class Stuffing {
         }
       }
     });
+    // What reaches across a gap goes: it would join its sides.
+    lattice.erase(std::remove_if(lattice.begin(), lattice.end(),
+                                 [this](const auto& t) { return spans_gap(t); }),
+                  lattice.end());
     for (const auto& t : lattice) {
       for (int i = 0; i < 4; ++i) {
         for (int j = i + 1; j < 4; ++j) find_cut(t[i], t[j]);
@@ -118,6 +122,21 @@ class Stuffing {
  private:
   using Edge = std::pair<int, int>;
   static Edge edge_of(int a, int b) { return {std::min(a, b), std::max(a, b)}; }
+
+  bool spans_gap(const std::array<int, 4>& t) {
+    for (int i = 0; i < 4; ++i) {
+      for (int j = i + 1; j < 4; ++j) {
+        if (sign_[t[i]] <= 0 || sign_[t[j]] <= 0) continue;
+        const auto [at, is_new] = is_gap_.try_emplace(edge_of(t[i], t[j]), false);
+        if (is_new) {
+          at->second = tree_.is_gap_between(mesh_.vertices[at->first.first],
+                                            mesh_.vertices[at->first.second]);
+        }
+        if (at->second) return true;
+      }
+    }
+    return false;
+  }
 
   void find_cut(int a, int b) {
     if (sign_[a] * sign_[b] >= 0 || cuts_.count(edge_of(a, b)) != 0) return;
@@ -221,6 +240,7 @@ class Stuffing {
   TetMesh mesh_;
   std::vector<int> sign_;  // 1 inside, 0 on the surface, -1 outside
   std::map<Edge, Vec3> cuts_;
+  std::map<Edge, bool> is_gap_;
   std::map<Edge, int> vertex_of_cut_;
 };
 

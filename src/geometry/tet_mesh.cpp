@@ -6,6 +6,7 @@
 #include <map>
 #include <stdexcept>
 
+#include "geometry/mesh_parts.h"
 #include "geometry/surface.h"
 #include "scene/scene_text.h"
 
@@ -129,7 +130,17 @@ TetMesh load_tets(const Body& body, double edge, std::vector<std::string>* notes
     const TriangleMesh surface =
         body.shape == Shape::kMesh ? load_solid(body, notes) : triangulate(body, 0.5 * edge);
     try {
-      return stuff_surface(surface, edge);
+      TetMesh all;
+      for (const TriangleMesh& solid : separate_solids(surface)) {
+        const TetMesh mesh = stuff_surface(solid, edge);
+        const auto first = static_cast<int>(all.vertices.size());
+        all.vertices.insert(all.vertices.end(), mesh.vertices.begin(), mesh.vertices.end());
+        for (std::array<int, 4> t : mesh.tetrahedra) {
+          for (int& v : t) v += first;
+          all.tetrahedra.push_back(t);
+        }
+      }
+      return all;
     } catch (const std::invalid_argument& e) {
       throw std::invalid_argument("body '" + body.name + "': " + e.what());
     }

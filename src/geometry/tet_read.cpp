@@ -22,9 +22,9 @@ std::string extension_of(const std::string& path) {
 }
 
 /// The words of a file, one after the other, without comments.
-class Words {
+class TetWords {
  public:
-  explicit Words(const std::string& path) : path_(path) {
+  explicit TetWords(const std::string& path) : path_(path) {
     std::ifstream file(path, std::ios::binary);
     std::ostringstream all;
     if (!file || !(all << file.rdbuf())) {
@@ -72,7 +72,7 @@ TetMesh read_tetgen(const std::string& path) {
   std::filesystem::path stem = path;
   stem.replace_extension();
   TetMesh mesh;
-  Words nodes(stem.string() + ".node");
+  TetWords nodes(stem.string() + ".node");
   const int n = nodes.count("the number of vertices");
   const int dimension = nodes.count("the dimension");
   if (dimension != 3)
@@ -87,7 +87,7 @@ TetMesh read_tetgen(const std::string& path) {
     nodes.skip(more, "a vertex's attribute");
     mesh.vertices.push_back(x);
   }
-  Words elements(stem.string() + ".ele");
+  TetWords elements(stem.string() + ".ele");
   const int m = elements.count("the number of tetrahedra");
   const int corners = elements.count("the number of corners");
   const int attributes = elements.count("the number of attributes");
@@ -103,7 +103,7 @@ TetMesh read_tetgen(const std::string& path) {
 }
 
 TetMesh read_medit(const std::string& path) {
-  Words in(path);
+  TetWords in(path);
   TetMesh mesh;
   int dimension = 3;
   for (std::string word; in.word(word);) {
@@ -142,7 +142,7 @@ TetMesh read_vtk(const std::string& path) {
     for (int i = 0; i < 3 && std::getline(file, line);) ++i;
     if (line.rfind("BINARY", 0) == 0) refuse(path, "is binary: save it as ASCII");
   }
-  Words in(path);
+  TetWords in(path);
   TetMesh mesh;
   std::vector<int> offsets, corners, types;
   bool listed = false;  // with a count before each cell, as in versions before 5

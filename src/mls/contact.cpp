@@ -77,6 +77,7 @@ void add_contact(MlsState& state, int group, float* force) {
       const bool blade = collider.kind == Collider::kBlade;
       if (blade && state.outer[i] == 0) continue;
       Gap g = gap(collider, x);
+      const float distance = g.distance;
       // Nodes of a fresh cut lie at any distance from the blade: it does not push them apart.
       if (!blade) g.distance -= state.place[4 * i + 3];
       if (g.distance >= 0) continue;
@@ -93,6 +94,7 @@ void add_contact(MlsState& state, int group, float* force) {
       touching.push_back(touch);
       ColliderLoad& load = contact.loads[c];
       load.points += 1;
+      load.count_inside(collider, distance);
       double arm[3];
       for (int a = 0; a < 3; ++a) {
         force[4 * (i - first) + a] += push[a];

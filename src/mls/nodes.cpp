@@ -69,7 +69,9 @@ MlsNodes make_mls_nodes(const Scene& scene, std::vector<std::string>* notes) {
     if (!has_given_nodes(body)) {
       surface = std::make_unique<NearestSurface>(body, 2 * widest * spacing);
     }
-    for (const PlacedNode& n : place_nodes(body, scene.mls, spacing, scene.seed + b, notes)) {
+    nodes.gaps.emplace_back();
+    for (const PlacedNode& n :
+         place_nodes(body, scene.mls, spacing, scene.seed + b, notes, nodes.gaps.back())) {
       nodes.place.push_back(n.place);
       nodes.volume.push_back(static_cast<float>(n.volume));
       nodes.body.push_back(static_cast<std::int16_t>(b));

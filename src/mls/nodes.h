@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "compute/array.h"
+#include "geometry/near_gaps.h"
 #include "tissue_sim/scene.h"
 
 namespace tissue_sim {
@@ -22,6 +23,7 @@ struct MlsNodes {
   std::vector<std::uint8_t> surface;   ///< its share reaches the surface of the body
   std::vector<float> depth;            ///< of those at the surface, below it; 0 of all others [m]
   std::vector<Material> materials;     ///< of all bodies and inclusions
+  std::vector<NearGaps> gaps;          ///< of each body
 
   std::int32_t count() const { return static_cast<std::int32_t>(place.size()); }
   const Material& material_of(std::int32_t node) const { return materials[material[node]]; }

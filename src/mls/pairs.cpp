@@ -34,6 +34,9 @@ MlsPairs make_pairs(const MlsNodes& nodes, int neighbours, Cpu& cpu) {
     for (; last < n && nodes.body[last] == nodes.body[first]; ++last) {
       places.push_back(nodes.place[last]);
     }
+    const auto body = static_cast<std::size_t>(nodes.body[first]);
+    const NearGaps* gaps =
+        body < nodes.gaps.size() && !nodes.gaps[body].empty() ? &nodes.gaps[body] : nullptr;
     const NearestPoints tree(places);
     cpu.for_each(last - first, [&](int i) {
       std::vector<Neighbour> found;
@@ -50,7 +53,12 @@ MlsPairs make_pairs(const MlsNodes& nodes, int neighbours, Cpu& cpu) {
       tree.within(places[i], 0.5 * (own + widest), found);
       for (const Neighbour& f : found) {
         const double reach = 0.5 * (own + pairs.support[first + f.index]);
-        if (f.index != i && f.distance2 < reach * reach) of[first + i].push_back(first + f.index);
+        if (f.index == i || !(f.distance2 < reach * reach)) continue;
+        // Alike from either end.
+        if (gaps == nullptr ||
+            gaps->joined(places[std::min(i, f.index)], places[std::max(i, f.index)])) {
+          of[first + i].push_back(first + f.index);
+        }
       }
     });
     first = last;

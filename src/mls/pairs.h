@@ -30,9 +30,10 @@ struct MlsPairs {
 /// lattice has as many neighbours.
 double support_factor(int neighbours);
 
-/// Pairs nodes of one body that are nearer than the mean of their supports. The weight is the
-/// kernel (h^2 - r^2)^3 of Aras, Shen, Audette 2014, eq. 11, of that mean, times both volumes:
-/// symmetric, so that forces are. Throws std::invalid_argument for nodes at one place.
+/// Pairs nodes of one body that are nearer than the mean of their supports, and that no gap parts.
+/// The weight is the kernel (h^2 - r^2)^3 of Aras, Shen, Audette 2014, eq. 11, of that mean, times
+/// both volumes: symmetric, so that forces are. Throws std::invalid_argument for nodes at one
+/// place.
 MlsPairs make_pairs(const MlsNodes& nodes, int neighbours, Cpu& cpu);
 
 /// Changes the weights as little as needed (each in proportion to itself) for uniform stress to

@@ -31,8 +31,10 @@ double draw(std::uint64_t seed, std::uint64_t index, std::uint64_t which) {
 }
 
 /// The body in small cubes.
-std::vector<PlacedNode> cubes_of(const Body& body, double edge, std::vector<std::string>* notes) {
+std::vector<PlacedNode> cubes_of(const Body& body, double edge, std::vector<std::string>* notes,
+                                 NearGaps* gaps) {
   const Lattice lattice = make_lattice(body, 2 * edge, notes);
+  if (gaps != nullptr) *gaps = NearGaps(lattice);
   double scale = 1;
   if (body.shape != Shape::kMesh) {
     double sum = 0;
@@ -62,6 +64,12 @@ std::vector<PlacedNode> cubes_of(const Body& body, double edge, std::vector<std:
                   !is_there(key(s.x, s.y, s.z + i));
     }
     cubes.push_back(c);
+  }
+  for (const Lattice::Gap& g : lattice.gaps) {  // both sides of it
+    const Lattice::Site& s = lattice.sites[g.site];
+    const std::int64_t other = key(s.x + (g.axis == 0), s.y + (g.axis == 1), s.z + (g.axis == 2));
+    cubes[g.site].surface = true;
+    cubes[std::lower_bound(keys.begin(), keys.end(), other) - keys.begin()].surface = true;
   }
   return cubes;
 }
@@ -208,15 +216,18 @@ bool has_given_nodes(const Body& body) {
 }
 
 std::vector<PlacedNode> place_nodes(const Body& body, const MlsOptions& options, double spacing,
-                                    std::uint64_t seed, std::vector<std::string>* notes) {
+                                    std::uint64_t seed, std::vector<std::string>* notes,
+                                    NearGaps& gaps) {
   if (has_given_nodes(body)) return vertices_of(load_tets(body, spacing, notes));
-  if (options.placement == MlsPlacement::kRegular) return cubes_of(body, spacing, notes);
-  const std::vector<PlacedNode> cubes = cubes_of(body, spacing / kSamples, notes);
+  if (options.placement == MlsPlacement::kRegular) return cubes_of(body, spacing, notes, &gaps);
+  const bool graded_nodes = options.placement == MlsPlacement::kGraded;
+  const std::vector<PlacedNode> cubes =
+      cubes_of(body, spacing / kSamples, notes, graded_nodes ? &gaps : nullptr);
   std::vector<PlacedNode> nodes;
-  if (options.placement == MlsPlacement::kGraded) {
+  if (graded_nodes) {
     nodes = graded(cubes, options.grading, spacing, seed);
   } else {
-    nodes = cubes_of(body, spacing, nullptr);
+    nodes = cubes_of(body, spacing, nullptr, &gaps);
     for (std::size_t i = 0; i < nodes.size(); ++i) {
       if (nodes[i].surface) continue;
       for (int a = 0; a < 3; ++a) {

@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "geometry/near_gaps.h"
 #include "tissue_sim/scene.h"
 
 namespace tissue_sim {
@@ -20,8 +21,10 @@ struct PlacedNode {
 
 /// Nodes `spacing` apart, on a lattice or graded, as the options say; `seed` moves them aside. Of a
 /// tetrahedral mesh its vertices instead, each with a quarter of its tetrahedra. Throws what
-/// make_lattice() and load_tets() throw.
+/// make_lattice() and load_tets() throw. `gaps` becomes those of the body's mesh, but for a
+/// tetrahedral one, which joins what it joins.
 std::vector<PlacedNode> place_nodes(const Body& body, const MlsOptions& options, double spacing,
-                                    std::uint64_t seed, std::vector<std::string>* notes);
+                                    std::uint64_t seed, std::vector<std::string>* notes,
+                                    NearGaps& gaps);
 
 }  // namespace tissue_sim

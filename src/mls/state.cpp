@@ -287,6 +287,7 @@ float substep(MlsState& s, float dt, std::vector<ColliderLoad>& loads) {
         loads[c].torque[a] += group.loads[c].torque[a];
       }
       loads[c].points += group.loads[c].points;
+      loads[c].add_inside(group.loads[c]);
     }
   }
   s.dt = dt;

@@ -7,6 +7,7 @@
 #include "mpm/anchors/hold_beside_tools.h"
 #include "mpm/contact/block_contact.h"
 #include "mpm/contact/surface_places.h"
+#include "mpm/split/cut_tissue.h"
 
 namespace tissue_sim {
 
@@ -38,6 +39,10 @@ std::unique_ptr<MpmState> make_mpm_state(const Scene& scene, std::vector<std::st
   index_inertia(*state);
   state->instructions = instruction_set();
   state->kernels = &block_kernels(state->instructions);
+  if (!state->points.gaps.empty()) {
+    measure_motion(*state);
+    take_apart(*state, break_gaps(*state));
+  }
   return state;
 }
 
@@ -207,6 +212,7 @@ float substep(MpmState& state, float dt, std::vector<ColliderLoad>& loads,
         loads[c].torque[a] += of_block[c].torque[a];
       }
       loads[c].points += of_block[c].points;
+      loads[c].add_inside(of_block[c]);
     }
   }
   state.dt = dt;

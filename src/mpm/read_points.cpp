@@ -48,7 +48,7 @@ int MpmTissue::read_points(const PointSelection& selection, std::vector<std::uin
       out.id = static_cast<std::uint32_t>(p);
       out.fragment = f.id;
       out.stress = block.volume[lane] > 0 ? stress[lane] : 0;  // what an anchor holds has none
-      const int whole = __builtin_popcount(whole_bonds(body, s.points.site[p]));
+      const int whole = __builtin_popcount(whole_bonds(body, s.points, p));
       const int left = __builtin_popcount(s.points.bonds[p]);
       out.damage = whole > 0 ? 1.0f - static_cast<float>(left) / whole : 0.0f;
       std::memcpy(cloud.data() + static_cast<std::size_t>(index[p]) * sizeof(Point), &out,

@@ -50,6 +50,7 @@ struct Contacts {
       load.torque[a] += push.torque[a];
     }
     load.points += 1;
+    load.count_inside(collider, push.distance);
   }
 };
 
@@ -85,6 +86,7 @@ void project_contacts(State& s, float h, std::vector<ColliderLoad>& loads) {
         loads[c].torque[a] += from.torque[a];
       }
       loads[c].points += from.points;
+      loads[c].add_inside(from);
     }
   }
 }

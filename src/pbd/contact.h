@@ -14,6 +14,7 @@ constexpr float kWayOut = 1;
 /// What a vertex does to a collider: force [N] and moment about its position [N m].
 struct ContactPush {
   double force[3], torque[3];
+  float distance;  ///< from the collider afterwards; below 0 where it lies in it still [m]
 };
 
 /// Moves the vertex `at`, of `mass` kg, out of the collider: inelastic, with Coulomb friction, in a
@@ -41,6 +42,7 @@ TISSUE_SIM_INLINE ContactPush push_out(const Collider& collider, const Gap& g, f
   const float back = s2 > hold * hold ? hold / sqrtf(s2) : 1.0f;
   const double weight = mass / (static_cast<double>(h) * h);
   ContactPush push;
+  push.distance = g.distance + out;
   double arm[3];
   for (int a = 0; a < 3; ++a) {
     const float moved = out * g.normal[a] - back * slid[a];

@@ -97,7 +97,8 @@ std::vector<InternalLink> find_internal_links(const TriangleMesh& mesh,
     }
     if (count[nearest] >= kMost) nearest = neighbours.nearest_with_room(nearest, place, count);
     ++count[nearest];
-    links.push_back({v, nearest, hit.along});
+    links.push_back(
+        {v, nearest, hit.along, tree.is_gap_between(mesh.vertices[v], mesh.vertices[nearest])});
   }
   return links;
 }

@@ -9,8 +9,9 @@ namespace tissue_sim {
 namespace pbd {
 
 struct InternalLink {
-  int from, to;   ///< vertices
-  double length;  ///< of the ray, from the vertex to where it leaves the body [m]
+  int from, to;              ///< vertices
+  double length;             ///< of the ray, from the vertex to where it leaves the body [m]
+  bool through_gap = false;  ///< void lies between the two
 };
 
 /// Outward unit normals of vertices: those of their triangles, weighted by area. Zero for a vertex
@@ -20,9 +21,9 @@ std::vector<Vec3> vertex_normals(const TriangleMesh& mesh);
 /// From each of the `starts` a ray runs against the vertex's normal to the first triangle that it
 /// leaves the body through; the link leads to the nearest of that triangle's vertices, or where
 /// three end there already to one nearby where fewer do. Those whose ray meets nothing, as at a
-/// hole, have none. In the order of `starts`; a pair that two rays find is in it twice
-/// (remove_duplicates does what the algorithm's last lines do). `lean`, if any, is added to the
-/// direction of each start's ray: away from a wound beside it.
+/// hole, have none. In the order of `starts`; a pair that
+/// two rays find is in it twice (remove_duplicates does what the algorithm's last lines do).
+/// `lean`, if any, is added to the direction of each start's ray: away from a wound beside it.
 std::vector<InternalLink> find_internal_links(const TriangleMesh& mesh,
                                               const std::vector<int>& starts,
                                               const std::vector<Vec3>& lean = {});

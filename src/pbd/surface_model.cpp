@@ -250,7 +250,8 @@ int add_internal_links(State& s, int b, const std::vector<int>& starts) {
   for (const InternalPair& p : s.internal) pairs[{p.a, p.b}] = p;
   for (const InternalLink& link : found) {
     s.half_depth[link.from] = 0.5 * link.length;
-    if (edges.count(pair_key(link.from, link.to)) != 0 || is_parted(s, link)) continue;
+    if (link.through_gap || edges.count(pair_key(link.from, link.to)) != 0) continue;
+    if (is_parted(s, link)) continue;
     const std::int32_t low = std::min(link.from, link.to), high = std::max(link.from, link.to);
     InternalPair& pair =
         pairs.try_emplace({low, high}, InternalPair{low, high, 0, late}).first->second;

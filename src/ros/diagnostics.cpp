@@ -30,6 +30,8 @@ void Diagnostics::simulation(Status& status) {
     status.summary(DiagnosticStatus::WARN, s.aimed_factor == 1
                                                ? "slower than real time: use larger cells"
                                                : "slower than time_factor: use larger cells");
+  } else if (!s.inside.empty()) {
+    status.summary(DiagnosticStatus::WARN, s.inside);
   } else {
     status.summary(DiagnosticStatus::OK, "running");
   }

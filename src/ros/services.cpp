@@ -209,8 +209,10 @@ bool Services::load_scene(LoadScene::Request& request, LoadScene::Response& resp
     Session session = make_session_(scene);
     if (records_all_) recorder_.add(topics_of(session));
     scene_ = session.simulation->scene();
+    std::string said = "frame 0 of scene '" + scene.name + "'";
+    for (const std::string& note : session.simulation->tissue().notes()) said += "; " + note;
     simulation_.replace(std::move(session));
-    return "frame 0 of scene '" + scene.name + "'";
+    return said;
   });
 }
 

@@ -5,6 +5,9 @@
 #include <algorithm>
 #include <utility>
 
+#include "ros/warn_seldom.h"
+#include "tools/points_inside.h"
+
 namespace tissue_sim {
 namespace {
 
@@ -274,6 +277,8 @@ void SimulationThread::update_status() {
   s.particles = tissue.point_count();
   s.fragments = tissue.fragment_count();
   s.device = tissue.device_name();
+  s.inside = inside_warning(session_.simulation->scene(), report_.result);
+  if (!s.inside.empty()) WARN_SELDOM(5, "%s", s.inside.c_str());
   const std::lock_guard<std::mutex> lock(mutex_);
   status_ = std::move(s);
 }

@@ -48,6 +48,7 @@ struct RunStatus {
   int particles = 0;
   std::size_t fragments = 0;
   std::string device;
+  std::string inside;  ///< inside_warning() of the last frame
 };
 
 struct CutReply {

@@ -37,6 +37,8 @@ SimulationState state_message(Simulation& simulation, const FrameReport& report,
   m.kinetic_energy = report.result.kinetic_energy;
   m.elastic_energy = report.result.elastic_energy;
   m.max_speed = report.result.max_speed;
+  m.points_inside = report.result.points_inside;
+  m.inside_depth = report.result.inside_depth;
   if (checksum) m.checksum = to_hex(simulation.tissue().checksum());
   return m;
 }

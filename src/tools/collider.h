@@ -20,13 +20,30 @@ struct Collider {
   float edge = 0;       ///< punch, plate: radius of the rounded edge [m]
   float friction = 0;   ///< Coulomb
   float cohesion = 0;   ///< what holds a point beside friction: a jaw's teeth [N]
+  float inside = 0;     ///< deeper than this a point is in it, not at it; 0: that is not asked [m]
   int tool = -1;        ///< index into Scene::tools, -1 for the ground
 };
+
+/// In which a GPU sums up how deep the deepest point lies [m].
+inline constexpr float kInsideUnit = 1e-9f;
 
 /// What tissue does to a collider: force [N] and moment about its position [N m], world axes.
 struct ColliderLoad {
   double force[3] = {}, torque[3] = {};
-  double points = 0;  ///< number of those that touch; on a GPU, of those that touch a jaw
+  double points = 0;   ///< number of those that touch; on a GPU, of those that touch a jaw
+  double inside = 0;   ///< number of those that lie deeper than Collider::inside
+  double deepest = 0;  ///< of these [m]
+
+  /// Counts a point at this distance from the collider.
+  void count_inside(const Collider& collider, float distance) {
+    if (!(collider.inside > 0 && distance < -collider.inside)) return;
+    inside += 1;
+    if (-distance > deepest) deepest = -distance;
+  }
+  void add_inside(const ColliderLoad& other) {
+    inside += other.inside;
+    if (other.deepest > deepest) deepest = other.deepest;
+  }
 };
 
 /// Distance to the surface (negative inside) and the outward normal, world axes.

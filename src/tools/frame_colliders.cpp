@@ -88,10 +88,12 @@ void FrameColliders::add_loads(double share, const Collider* now, const Collider
     const int count = tools_[i].count();
     Vec3 force = Vec3::Zero(), torque = Vec3::Zero();
     double grip = 0, touching = 0;
+    ColliderLoad inside;
     for (const int end = c + count; c < end; ++c) {
       const Collider& collider = now[c];
       const Vec3 pushed(on[c].force[0], on[c].force[1], on[c].force[2]);
       force += pushed;
+      inside.add_inside(on[c]);
       torque += Vec3(on[c].torque[0], on[c].torque[1], on[c].torque[2]);
       if (collider.kind != Collider::kJaw) continue;
       // Its load's moment is about its own tip; it presses along its local x.
@@ -107,6 +109,8 @@ void FrameColliders::add_loads(double share, const Collider* now, const Collider
     load.peak_force = std::max(load.peak_force, force.norm());
     load.grip += weight * grip;
     load.grip_area += weight * touching * point_area_;
+    load.points_inside = static_cast<int>(inside.inside);
+    load.inside_depth = inside.deepest;
   }
 }
 

@@ -1,7 +1,12 @@
 #include "tools/tool_motion.h"
 
+#include <algorithm>
+#include <cmath>
+
 namespace tissue_sim {
 namespace {
+
+constexpr double kInside = 0.5;  // cells: a layer of points
 
 void place(const Pose& pose, Collider& collider) {
   const Eigen::Matrix3d r = pose.orientation.toRotationMatrix();
@@ -17,6 +22,22 @@ Pose pose_at(const ToolMotion& m, double s) {
   if (s >= 1) return m.end;
   return {(1 - s) * m.begin.position + s * m.end.position,
           m.begin.orientation.slerp(s, m.end.orientation)};
+}
+
+double thinnest(const Tool& tool) {
+  switch (tool.type) {
+    case ToolType::kScalpel:
+      break;  // its flats part what they touch
+    case ToolType::kProbe:
+    case ToolType::kBall:
+    case ToolType::kPunch:
+      return tool.radius;
+    case ToolType::kGrasper:
+      return 0.5 * tool.jaw_width;
+    case ToolType::kPlate:
+      return 0.5 * tool.size.minCoeff();
+  }
+  return 0;
 }
 
 int collider_count(ToolType type) { return type == ToolType::kGrasper ? 2 : 1; }
@@ -70,6 +91,8 @@ ToolPath::ToolPath(const Tool& tool, int index, const ToolMotion& motion, double
       break;
   }
   shape_.friction = static_cast<float>(tool.friction);
+  shape_.inside =
+      static_cast<float>(std::min(kInside * 2 * std::sqrt(point_area), 0.5 * thinnest(tool)));
   shape_.tool = index;
 }
 

@@ -14,6 +14,9 @@ namespace tissue_sim {
 /// Pose at the share `s` (0 to 1) of the frame.
 Pose pose_at(const ToolMotion& motion, double s);
 
+/// Half of a tool's least thickness, which its tip's radius is; 0 for a blade [m].
+double thinnest(const Tool& tool);
+
 /// Number of colliders that a tool is made of: a grasper's jaws are two.
 int collider_count(ToolType type);
 

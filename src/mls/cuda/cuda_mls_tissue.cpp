@@ -330,6 +330,8 @@ void CudaMlsTissue::sum_loads(const FramePart& part, float before) {
         load.torque[a] = kMlsLoadUnit * static_cast<double>(static_cast<long long>(sum[3 + a]));
       }
       load.points = static_cast<double>(sum[6]);
+      load.inside = static_cast<double>(sum[7]);
+      load.deepest = kInsideUnit * static_cast<double>(sum[8]);
       sum += kMlsLoadSums;
     }
     const float acted = kick_of(i == 0 ? before : part.substeps.at(i - 1), part.substeps.at(i));

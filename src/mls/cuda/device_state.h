@@ -13,9 +13,10 @@ namespace tissue_sim {
 inline constexpr int kMlsSlice = 32;
 
 /// Sums of what acts on a collider in a substep: force and moment in units of kMlsLoadUnit, as
-/// integers, whose sum does not depend on the order, and the number of nodes that touch it.
+/// integers, whose sum does not depend on the order, the number of nodes that touch it and
+/// of those that lie in it (Collider::inside), and how deep the deepest does [kInsideUnit].
 inline constexpr double kMlsLoadUnit = 1.0 / (1ll << 38);
-inline constexpr int kMlsLoadSums = 7;
+inline constexpr int kMlsLoadSums = 9;
 inline constexpr int kMlsMostColliders = 32;  ///< a node keeps those that it touches as bits
 
 /// Motion of the nodes: displacement [m] and velocity [m/s], the fourth components 0.

@@ -161,6 +161,7 @@ __device__ __forceinline__ void collider_forces(const CudaMlsField& f, const Cud
     const bool blade = collider.kind == Collider::kBlade;
     if (blade && f.outer[i] == 0) continue;
     Gap g = gap(collider, x);
+    const float distance = g.distance;
     if (!blade) g.distance -= __ldg(f.place + i).w;  // as mls/contact.cpp
     if (!(g.distance < 0)) continue;
     float4* held = c.hold + static_cast<std::size_t>(k) * f.count + i;
@@ -187,6 +188,10 @@ __device__ __forceinline__ void collider_forces(const CudaMlsField& f, const Cud
       add_load(load + 3 + a, -(arm[b] * push[d] - arm[d] * push[b]));
     }
     atomicAdd(load + 6, 1ull);
+    if (distance < -collider.inside && collider.inside > 0) {
+      atomicAdd(load + 7, 1ull);
+      atomicMax(load + 8, static_cast<unsigned long long>(-distance * (1 / kInsideUnit)));
+    }
   }
   if (touches != touched) c.touching[i] = touches;
 }

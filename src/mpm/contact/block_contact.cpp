@@ -341,6 +341,7 @@ bool push_points(BlockPush& b, const NearCell& cell, unsigned points, const Coll
     b.touching.push_back(touch);
     if (moves > 0) pushes[s] = Vec<4>{push[0], push[1], push[2], 0.0f};
     add_load(collider, at, push, 1, load);
+    load.count_inside(collider, g.distance);
   }
   if (touches) spread(b.block, cell.node, pushes, b.force);
   return touches;

@@ -26,11 +26,13 @@ std::vector<OuterPlace> find_outer_places(const LatticeTissue& tissue) {
     const double edge = b.cell_size / 2;
     const NearestSurface surface(b.body, 2 * edge);
     for (int p = b.first_point; p < b.first_point + b.point_count; ++p) {
-      if (tissue.points.bonds[p] == kAllBonds) continue;
+      const unsigned never = tissue.points.beside_gap.empty() ? 0 : tissue.points.beside_gap[p];
+      const unsigned bonds = tissue.points.bonds[p] & ~never;
+      if (bonds == kAllBonds) continue;
       const Points::Site& s = tissue.points.site[p];
       const Vec3 middle = b.node_position(s.x / 2, s.y / 2, s.z / 2);
       for (int k = 0; k < kBondCount; ++k) {
-        if ((tissue.points.bonds[p] >> k & 1) != 0) continue;
+        if ((bonds >> k & 1) != 0) continue;
         const Vec3 out = direction_of(k), side = b.site_position(s.x, s.y, s.z) + edge / 2 * out;
         SurfacePoint found;
         const bool any = surface.find(side, out, found);
@@ -64,7 +66,7 @@ std::vector<SurfacePlace> surface_places_of(const LatticeBody& b, const Points& 
       for (int sub = 0; sub < 8; ++sub) {
         const std::int32_t p = block.point[cell + sub * block.stride];
         if (p < 0 || points.bonds[p] == kAllBonds) continue;
-        const std::uint8_t whole = whole_bonds(b, points.site[p]);
+        const std::uint8_t whole = whole_bonds(b, points, p);
         auto outer = std::lower_bound(
             points.outer.begin(), points.outer.end(), p,
             [](const OuterPlace& o, std::int32_t point) { return o.point < point; });

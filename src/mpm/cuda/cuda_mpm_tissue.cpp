@@ -80,12 +80,18 @@ CudaMpmTissue::CudaMpmTissue(const Scene& scene, std::vector<std::string> notes)
       d.limits.processors);
   pieces_ = whole_pieces(*state_);
   foresight_ = make_foresight(scene);
-  if (scene.mpm.boundary == MpmBoundary::kSurface && collider_count(scene) > 0) {
-    d.outer.upload(outer_points(*state_), d.stream);
-  }
   push();
   launch_measure();
   finish_measure();
+  if (!state_->points.gaps.empty()) {
+    take_apart(break_gaps(*state_));
+    pieces_ = whole_pieces(*state_);
+    launch_measure();
+    finish_measure();
+  }
+  if (scene.mpm.boundary == MpmBoundary::kSurface && collider_count(scene) > 0) {
+    d.outer.upload(outer_points(*state_), d.stream);
+  }
   substep_.follow(*state_, modulus_);
 }
 
@@ -175,6 +181,8 @@ void CudaMpmTissue::sum_loads() {
         load.torque[a] = kLoadUnit * static_cast<double>(sum[3 + a]);
       }
       load.points = static_cast<double>(sum[6]);
+      load.inside = static_cast<double>(sum[7]);
+      load.deepest = kInsideUnit * static_cast<double>(sum[8]);
       sum += kLoadSums;
     }
     const float acted = kick_of(i == 0 ? before_ : part_.substeps.at(i - 1), part_.substeps.at(i));

@@ -18,7 +18,7 @@ void CudaMpmTissue::upload_points() {
     std::vector<std::uint8_t> whole(points.size());
     for (int p = 0; p < points.size(); ++p) {
       whole[p] = static_cast<std::uint8_t>(
-          __builtin_popcount(whole_bonds(state_->bodies[points.site[p].body], points.site[p])));
+          __builtin_popcount(whole_bonds(state_->bodies[points.site[p].body], points, p)));
     }
     d.whole.upload(whole, d.stream);
   }

@@ -147,9 +147,10 @@ struct CudaTables {
 };
 
 /// Sums of what acts on a collider in one substep: force and moment in units of kLoadUnit, as
-/// integers, whose sum does not depend on the order; and the number of points that touch a jaw.
+/// integers, whose sum does not depend on the order; the number of points that touch a jaw, and of
+/// those that lie in a tool (Collider::inside); how deep the deepest does [kInsideUnit].
 inline constexpr double kLoadUnit = 1.0 / (1ll << 38);
-inline constexpr int kLoadSums = 7;
+inline constexpr int kLoadSums = 9;
 
 /// Words of CudaFrame::arrived, and where turn_counters() are: in a line of memory of their own.
 inline constexpr int kArrivedWords = 36, kFirstTurns = 32;

@@ -96,10 +96,12 @@ __device__ __forceinline__ void push_point(const PushedPoint& point, const Colli
     const Collider& collider = colliders[c];
     const bool touches = point.touches(collider);
     if (__ballot_sync(0xffffffffu, touches) == 0) continue;
-    float push[3] = {0, 0, 0};
-    bool pushes = false;
+    float push[3] = {0, 0, 0}, distance = 0;
+    bool pushes = false, is_inside = false;
     if (touches) {
       const Gap g = gap(collider, point.x);
+      distance = g.distance;
+      is_inside = distance < -collider.inside && collider.inside > 0;
       const bool second =
           held_by == 2 && (held.with[1] == c + 1 || (held.with[0] != 0 && held.with[0] != c + 1));
       pushes = g.distance < 0;
@@ -118,6 +120,11 @@ __device__ __forceinline__ void push_point(const PushedPoint& point, const Colli
       }
     }
     if (collider.tool < 0) continue;  // nobody asks what the ground carries
+    if (is_inside) {                  // seldom
+      atomicAdd(loads + kLoadSums * c + 7, 1ull);
+      atomicMax(loads + kLoadSums * c + 8,
+                static_cast<unsigned long long>(-distance * (1 / kInsideUnit)));
+    }
     double arm[3];
 #pragma unroll
     for (int a = 0; a < 3; ++a) arm[a] = static_cast<double>(point.x[a]) - collider.position[a];

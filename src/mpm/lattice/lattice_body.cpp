@@ -116,6 +116,11 @@ std::uint8_t whole_bonds(const LatticeBody& b, const Points::Site& s) {
   return static_cast<std::uint8_t>(bonds);
 }
 
+std::uint8_t whole_bonds(const LatticeBody& body, const Points& points, std::int32_t point) {
+  const unsigned never = points.beside_gap.empty() ? 0 : points.beside_gap[point];
+  return static_cast<std::uint8_t>(whole_bonds(body, points.site[point]) & ~never);
+}
+
 std::vector<LatticeBody> make_lattice_bodies(const Scene& scene, Points& points,
                                              std::vector<std::string>* notes, NodeRange range) {
   std::vector<LatticeBody> bodies;
@@ -161,11 +166,24 @@ std::vector<LatticeBody> make_lattice_bodies(const Scene& scene, Points& points,
       if (anchored[r] == 0) refuse_region("anchors", r, scene, body.name, "");
     }
     assign_materials(scene, b, points);
+    for (const Lattice::Gap& g : lattice.gaps) {
+      const std::int32_t p = b.first_point + g.site;
+      BrokenBond bond{p, b.next_point(points.site[p], g.axis), g.axis, {}};
+      bond.crossing.place = static_cast<float>(g.place);
+      for (int a = 0; a < 3; ++a) bond.crossing.normal[a] = static_cast<float>(g.normal[a]);
+      points.gaps.push_back(bond);
+    }
     bodies.push_back(std::move(b));
   }
   points.bonds.resize(points.size());
   for (int p = 0; p < points.size(); ++p) {
     points.bonds[p] = whole_bonds(bodies[points.site[p].body], points.site[p]);
+  }
+  if (!points.gaps.empty()) points.beside_gap.assign(points.size(), 0);
+  for (const BrokenBond& g : points.gaps) {
+    const int k = kForwardBond + g.axis;
+    points.beside_gap[g.point] |= static_cast<std::uint8_t>(1u << k);
+    points.beside_gap[g.other] |= static_cast<std::uint8_t>(1u << opposite_bond(k));
   }
   return bodies;
 }

@@ -67,6 +67,11 @@ struct Points {
       soft;  ///< of a bit of debris or a slice: mpm/tear/debris.h; empty before any is
   std::vector<OuterPlace> outer;  ///< true surface of the whole bodies; empty on a GPU
   Crossings crossings;            ///< of the bonds that blades broke; one that tore has none
+  /// Bonds that never were, across gaps of a mesh, as of make_lattice_bodies(), which leaves it to
+  /// part_at_gaps() to break them; and a bit of each for both their points, empty where there are
+  /// none.
+  std::vector<BrokenBond> gaps;
+  Array<std::uint8_t> beside_gap;
   int size() const { return static_cast<int>(site.size()); }
   /// Number of a point's material among those of its body.
   int material_of(std::int32_t point) const { return material.empty() ? 0 : material[point]; }
@@ -171,7 +176,9 @@ void points_around(const LatticeBody& body, int x, int y, int z, std::int32_t (&
 /// Weight of node `k` (0..26: x fastest) of the point's stencil.
 float site_weight(const Points::Site& site, int k);
 
-/// The bonds of a point while the tissue is whole.
+/// The bonds to all lattice neighbours that a point has.
 std::uint8_t whole_bonds(const LatticeBody& body, const Points::Site& site);
+/// The bonds of a point while the tissue is whole: none across a gap.
+std::uint8_t whole_bonds(const LatticeBody& body, const Points& points, std::int32_t point);
 
 }  // namespace tissue_sim

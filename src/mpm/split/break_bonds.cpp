@@ -41,4 +41,12 @@ void break_bonds(MpmState& state, const std::vector<std::vector<BrokenBond>>& br
   report.points_separated += static_cast<int>(changed.size() - first);
 }
 
+std::vector<std::int32_t> break_gaps(MpmState& state) {
+  std::vector<std::int32_t> changed;
+  CutReport report;
+  break_bonds(state, {state.points.gaps}, changed, report);
+  if (!changed.empty()) state.whole_bonds = state.points.bonds;
+  return changed;
+}
+
 }  // namespace tissue_sim

@@ -28,6 +28,10 @@ inline constexpr double kSweepReach = 1.5;
 void break_bonds(MpmState& state, const std::vector<std::vector<BrokenBond>>& broken,
                  std::vector<std::int32_t>& changed, CutReport& report);
 
+/// Breaks the bonds that never were (Points::gaps): tissue is whole without them. Returns the
+/// points that had them, for take_apart().
+std::vector<std::int32_t> break_gaps(MpmState& state);
+
 /// What take_apart() did.
 struct Apart {
   std::vector<std::int32_t> softened;  ///< points that became soft: mpm/tear/debris.h

@@ -60,7 +60,7 @@ bool is_in_slice(const LatticeBody& body, const Points& points, std::int32_t poi
     const int k = kForwardBond + axis;
     const unsigned both = 1u << k | 1u << opposite_bond(k);
     if ((bonds & both) != 0) continue;
-    if ((whole_bonds(body, points.site[point]) & both) == both) return true;
+    if ((whole_bonds(body, points, point) & both) == both) return true;
   }
   return false;
 }

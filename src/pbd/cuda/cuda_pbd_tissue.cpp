@@ -229,6 +229,8 @@ void CudaPbdTissue::take_loads(const FrameColliders& colliders, int steps) {
             pbd::kPbdLoadUnit * static_cast<double>(static_cast<long long>(sum[3 + a]));
       }
       load.points = static_cast<double>(sum[6]);
+      load.inside = static_cast<double>(sum[7]);
+      load.deepest = kInsideUnit * static_cast<double>(sum[8]);
       sum += pbd::kPbdLoadSums;
     }
     colliders.add_loads((i + 1.0) / steps, d.host_colliders.data() + i * on.size(), on.data(),

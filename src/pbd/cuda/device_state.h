@@ -16,9 +16,10 @@ namespace tissue_sim {
 namespace pbd {
 
 /// Sums of what acts on a tool's collider in a step: force and moment in units of kPbdLoadUnit, as
-/// integers, whose sum does not depend on the order, and the number of vertices that touch it.
+/// integers, whose sum does not depend on the order, the number of vertices that touch it
+/// and of those that lie in it (Collider::inside), and how deep the deepest does [kInsideUnit].
 inline constexpr double kPbdLoadUnit = 1.0 / (1ll << 38);
-inline constexpr int kPbdLoadSums = 7;
+inline constexpr int kPbdLoadSums = 9;
 
 /// Constraints as the CPU packs them: a warp's 32 lanes are two blocks, and each load of theirs
 /// two runs of 64 bytes.

@@ -177,6 +177,10 @@ __device__ __forceinline__ void touch_vertex(const CudaPbdField& f, float h,
       add_load(load + 3 + a, push.torque[a]);
     }
     atomicAdd(load + 6, 1ull);
+    if (push.distance < -collider.shape.inside && collider.shape.inside > 0) {
+      atomicAdd(load + 7, 1ull);
+      atomicMax(load + 8, static_cast<unsigned long long>(-push.distance * (1 / kInsideUnit)));
+    }
   }
   if (!touches) return;
   f.pushed[i] = 1;

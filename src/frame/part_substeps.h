@@ -3,6 +3,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <stdexcept>
+#include <string>
 
 namespace tissue_sim {
 
@@ -35,6 +37,17 @@ struct PartSubsteps {
   float longest() const { return std::max(at(0), at(count - 1)); }
 };
 
+constexpr double kMostSubsteps = 1e5;  ///< of a frame
+
+/// Throws std::runtime_error where `time` takes more than kMostSubsteps substeps of `longest` [s]:
+/// a frame that never ends helps nobody.
+inline void check_substeps(double time, double longest) {
+  if (!(longest > 0) || time / longest <= kMostSubsteps) return;
+  throw std::runtime_error("a frame takes " + std::to_string(std::lround(time / longest)) +
+                           " substeps, at most 100000 make sense: raise frame_rate or cell_size, or "
+                           "lower viscosity or young_modulus of the materials");
+}
+
 /// `count` substeps of `dt` seconds.
 inline PartSubsteps even_substeps(int count, double dt) { return {count, dt, dt, 1, 0}; }
 
@@ -43,6 +56,7 @@ inline PartSubsteps even_substeps(int count, double dt) { return {count, dt, dt,
 inline PartSubsteps substeps_for(double time, double longest, double before, double most) {
   constexpr double kChange = 1.05;
   if (!(longest > 0)) return even_substeps(1, time);  // it blew up
+  check_substeps(time, longest);
   PartSubsteps s = even_substeps(0, longest);
   if (before > 0) {
     const double up = before * kChange, down = std::min(before / kChange, std::max(most, longest));

@@ -57,14 +57,30 @@ std::vector<SampleLine> lines_of(const Axis& axis, double low, double high) {
   return lines;
 }
 
+// Volumes of the half cells of a row: those from first to last, the others are 0. A body that lies
+// diagonally in its box has few.
+struct Row {
+  std::vector<double> all;
+  int first, last;
+
+  explicit Row(int count) : all(count, 0.0), first(count), last(-1) {}
+  double& operator[](int i) { return all[i]; }
+  void clear() {
+    for (int i = first; i <= last; ++i) all[i] = 0;
+    first = static_cast<int>(all.size());
+    last = -1;
+  }
+};
+
 // Adds area times length of the interval to the half cells along x that it covers.
-void deposit(const Axis& axis, const Interval& interval, double area,
-             std::vector<double>& volumes) {
+void deposit(const Axis& axis, const Interval& interval, double area, Row& volumes) {
   const double begin = (interval.begin - axis.origin) / axis.half;
   const double end = (interval.end - axis.origin) / axis.half;
   const int first = std::max(0, std::min(axis.count - 1, static_cast<int>(std::floor(begin))));
   const int last = std::max(first, std::min(axis.count - 1, static_cast<int>(std::floor(end))));
   const double unit = area * axis.half;
+  volumes.first = std::min(volumes.first, first);
+  volumes.last = std::max(volumes.last, last);
   if (first == last) {
     volumes[first] += unit * (end - begin);
     return;
@@ -86,6 +102,7 @@ struct Sampling {
   std::vector<SampleLine> y_lines;
   const Solid* solid;        ///< or
   const TriangleMesh* mesh;  ///< the body's surface
+  WorkLimits limits;
 };
 
 // Calls add(interval, area) for each interval on lines [first, last) along y of the slab.
@@ -111,15 +128,16 @@ void fill(const Sampling& s, int k, Slab& slab) {
   std::vector<std::vector<Interval>> chords;
   if (s.mesh) mesh_chords(*s.mesh, slab.triangles, s.y_lines, slab.lines, chords);
   const double cube = s.x.half * s.x.half * s.x.half;
-  std::vector<double> volumes(s.x.count);
+  Row volumes(s.x.count);
   for (std::size_t first = 0, last = 0; first < s.y_lines.size(); first = last) {
+    stop_if_asked(s.limits);
     const int j = s.y_lines[first].row;
     while (last < s.y_lines.size() && s.y_lines[last].row == j) ++last;
-    std::fill(volumes.begin(), volumes.end(), 0.0);
+    volumes.clear();
     for_each_interval(s, slab, first, last, chords, [&](const Interval& interval, double area) {
       deposit(s.x, interval, area, volumes);
     });
-    for (int i = 0; i < s.x.count; ++i) {
+    for (int i = volumes.first; i <= volumes.last; ++i) {
       if (volumes[i] <= 0) continue;
       slab.volume += volumes[i];
       if (volumes[i] < kSmallest * cube) {
@@ -172,7 +190,7 @@ Lattice make_lattice(const Body& body, double cell_size, std::vector<std::string
                                " points at cell_size " + text(cell_size) + " m (it measures " +
                                metres(size) + "): " + hint + "raise cell_size";
   const double volume = is_mesh ? signed_volume(mesh) : exact_volume(body);
-  if (volume / (half * half * half) > 1.01 * static_cast<double>(max_points)) {
+  if (max_points <= 0 || volume / (half * half * half) > 1.01 * static_cast<double>(max_points)) {
     refuse(body, too_many);
   }
 
@@ -182,6 +200,13 @@ Lattice make_lattice(const Body& body, double cell_size, std::vector<std::string
   sampling.x = axis_of(box.min.x(), box.max.x(), half, upright);
   sampling.y = axis_of(box.min.y(), box.max.y(), half, upright);
   sampling.z = axis_of(box.min.z(), box.max.z(), half, upright);
+  // Thirty seconds of two cores; what lies along an axis takes a thousandth of it.
+  constexpr double kMostLines = 1e9;
+  if (static_cast<double>(sampling.y.count) * sampling.z.count * kLines * kLines > kMostLines) {
+    refuse(body, "its box measures " + metres(size) + ", too much for cell_size " +
+                     text(cell_size) + " m: raise cell_size, or turn it so that it lies along x");
+  }
+  sampling.limits = work_limits();
   sampling.y_lines = lines_of(sampling.y, box.min.y(), box.max.y());
   sampling.solid = is_mesh ? nullptr : &solid;
   sampling.mesh = is_mesh ? &mesh : nullptr;

@@ -1,0 +1,62 @@
+#include "scene/load_yaml.h"
+
+#include <algorithm>
+#include <stdexcept>
+#include <vector>
+
+namespace tissue_sim {
+namespace {
+
+constexpr int kDeepest = 64;
+
+/// How deep a text may nest, at most: brackets that are open, indicators of lists in one line, and
+/// lines that are each indented more than the one before.
+int depth_of(const std::string& text) {
+  int open = 0, deepest = 0;
+  std::vector<std::size_t> indents;
+  std::size_t at = 0;
+  while (at < text.size()) {
+    std::size_t end = text.find('\n', at);
+    if (end == std::string::npos) end = text.size();
+    const std::size_t first = text.find_first_not_of(' ', at);
+    if (first < end && text[first] != '#') {
+      while (!indents.empty() && indents.back() >= first - at) indents.pop_back();
+      indents.push_back(first - at);
+    }
+    int in_line = 0;
+    for (std::size_t i = at; i < end; ++i) {
+      const char c = text[i];
+      open += c == '[' || c == '{' ? 1 : (c == ']' || c == '}') && open > 0 ? -1 : 0;
+      const bool alone = i + 1 == end || text[i + 1] == ' ';
+      in_line += (c == '-' || c == '?' || c == ':') && alone ? 1 : 0;
+      deepest = std::max(deepest, open);
+    }
+    // Within brackets each line may have many pairs.
+    const int nested = open == 0 && deepest == 0 ? in_line : 0;
+    deepest = std::max({deepest, nested, static_cast<int>(indents.size())});
+    at = end + 1;
+  }
+  return deepest;
+}
+
+}  // namespace
+
+YAML::Node load_yaml(const std::string& text) {
+  if (depth_of(text) > kDeepest) {
+    throw std::invalid_argument("it nests more than " + std::to_string(kDeepest) + " deep");
+  }
+  const std::vector<YAML::Node> documents = YAML::LoadAll(text);
+  if (documents.size() > 1) {
+    throw std::invalid_argument("it holds " + std::to_string(documents.size()) +
+                                " documents (parted by ---), of which all but one would be lost");
+  }
+  return documents.empty() ? YAML::Node() : documents.front();
+}
+
+std::string yaml_problem(const YAML::Exception& e) {
+  if (e.mark.is_null()) return "it cannot be read as YAML";
+  return "line " + std::to_string(e.mark.line + 1) + ", column " +
+         std::to_string(e.mark.column + 1) + " cannot be read";
+}
+
+}  // namespace tissue_sim

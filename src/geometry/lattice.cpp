@@ -179,7 +179,17 @@ Lattice make_lattice(const Body& body, double cell_size, std::vector<std::string
                      std::int64_t max_points) {
   const double half = cell_size / 2;
   const bool is_mesh = body.shape == Shape::kMesh;
-  const TriangleMesh mesh = is_mesh ? load_solid(body, notes) : TriangleMesh();
+  // Before a mesh is checked and repaired, which may take a minute: its volume is right unless it is
+  // broken, and then it is not four times too large.
+  const auto look = [&](const TriangleMesh& raw) {
+    const Box box = box_of(raw);
+    const double volume = std::abs(signed_volume(raw)) / (half * half * half);
+    if (volume < 4 * static_cast<double>(max_points)) return;
+    throw std::invalid_argument(
+        "it takes more than " + std::to_string(max_points) + " points at cell_size " +
+        text(cell_size) + " m (it measures " + metres(box.max - box.min) + "): raise cell_size");
+  };
+  const TriangleMesh mesh = is_mesh ? load_solid(body, notes, look) : TriangleMesh();
   const Solid solid(body);
   const Box box = is_mesh ? box_of(mesh) : bounding_box(body);
   const Vec3 size = box.max - box.min;

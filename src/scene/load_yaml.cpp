@@ -39,18 +39,44 @@ int depth_of(const std::string& text) {
   return deepest;
 }
 
+/// Whether anything follows the first document. YAML::LoadAll would tell, but it has no end for
+/// ",]-]z\n\n,]--ab" and its like (yaml-cpp 0.7).
+bool has_more_documents(const std::string& text) {
+  bool content = false, ended = false;
+  for (std::size_t at = 0; at < text.size();) {
+    std::size_t end = text.find('\n', at);
+    if (end == std::string::npos) end = text.size();
+    const std::string line = text.substr(at, std::min<std::size_t>(end - at, 4));
+    at = end + 1;
+    const auto is_mark = [&line](const char* mark) {
+      return line.compare(0, 3, mark) == 0 &&
+             (line.size() == 3 || line[3] == ' ' || line[3] == '\t' || line[3] == '\r');
+    };
+    if (is_mark("---")) {
+      if (content) return true;
+      content = true;
+    } else if (is_mark("...")) {
+      ended = content;
+    } else if (const std::size_t first = line.find_first_not_of(" \t\r");
+               first != std::string::npos && line[first] != '#' && line[0] != '%') {
+      if (ended) return true;
+      content = true;
+    }
+  }
+  return false;
+}
+
 }  // namespace
 
 YAML::Node load_yaml(const std::string& text) {
   if (depth_of(text) > kDeepest) {
     throw std::invalid_argument("it nests more than " + std::to_string(kDeepest) + " deep");
   }
-  const std::vector<YAML::Node> documents = YAML::LoadAll(text);
-  if (documents.size() > 1) {
-    throw std::invalid_argument("it holds " + std::to_string(documents.size()) +
-                                " documents (parted by ---), of which all but one would be lost");
+  if (has_more_documents(text)) {
+    throw std::invalid_argument(
+        "it holds several documents (parted by ---), of which all but the first would be lost");
   }
-  return documents.empty() ? YAML::Node() : documents.front();
+  return YAML::Load(text);
 }
 
 std::string yaml_problem(const YAML::Exception& e) {

@@ -194,10 +194,11 @@ TEST(SceneText, WhatNobodyMeansIsRefused) {
     list += "]}";
   }
   const std::pair<std::string, const char*> cases[] = {
-      {"bodies: [{}]\n---\nbodies: [{}]", "2 documents"},
+      {"bodies: [{}]\n---\nbodies: [{}]", "several documents"},
       {std::string(100000, '['), "nests more than"},
       {std::string(100000, '{'), "nests more than"},
-      {std::string(200000, '-').replace(0, 0, ""), ""},
+      {"---\nbodies: [{}]\n...\nname: b\n", "several documents"},
+      {",]-]z\n\n,]--ab", ""},  // LoadAll() of yaml-cpp has no end for this
       {list + "]", "bodies[0].size is"},
       {"name: " + std::string(5000, 'a') + "\nbodies: [{}]", "name is a text of 5000"},
       {"bodies: [{name: " + std::string(5000, 'a') + "}]", "must not be longer"},

@@ -145,7 +145,7 @@ TEST_F(Stranger, ScenesThatTakeTooMuchAreRefused) {
                       "{cell_size: 0.01, bodies: [{pose: {position: [0, 0, 0.02]}}], tools: "
                       "[{name: world}]}"),
                  "world");
-  expect_refused(load("", "bodies: [{}]\n---\nbodies: [{}]\n"), "2 documents");
+  expect_refused(load("", "bodies: [{}]\n---\nbodies: [{}]\n"), "several documents");
   expect_refused(load("", "name: " + std::string(9000000, 'a')), "too large");
 }
 

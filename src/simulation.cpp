@@ -16,14 +16,14 @@
 namespace tissue_sim {
 namespace {
 
-constexpr double kFarthest = 1e6;   // from the origin [m]
-constexpr double kMostSwept = 1e5;  // edges of a cut, see swept_edges()
+constexpr double kFarthestPlace = 1e6;  // from the origin [m]
+constexpr double kMostSwept = 1e5;      // edges of a cut, see swept_edges()
 
 void check(const Pose& pose, const std::string& what) {
   if (!pose.position.allFinite() || !pose.orientation.coeffs().allFinite()) {
     throw std::invalid_argument(what + " is not finite");
   }
-  if (!(pose.position.cwiseAbs().maxCoeff() <= kFarthest)) {
+  if (!(pose.position.cwiseAbs().maxCoeff() <= kFarthestPlace)) {
     throw std::invalid_argument(what + " is more than 1e6 m away: no instrument is");
   }
   if (std::fabs(pose.orientation.norm() - 1) > 1e-3) {
@@ -50,13 +50,13 @@ void check(const BladePath& path) {
   }
   for (const Vec3& x : path.edge) {
     if (!x.allFinite()) throw std::invalid_argument("a point of the blade's edge is not finite");
-    if (!(x.cwiseAbs().maxCoeff() <= kFarthest)) {
+    if (!(x.cwiseAbs().maxCoeff() <= kFarthestPlace)) {
       throw std::invalid_argument("a point of the blade's edge is more than 1e6 m away");
     }
   }
   for (const Pose& pose : path.poses) check(pose, "a pose of the blade");
-  const double product = (static_cast<double>(path.edge.size()) - 1) *
-                         (static_cast<double>(path.poses.size()) - 1);
+  const double product =
+      (static_cast<double>(path.edge.size()) - 1) * (static_cast<double>(path.poses.size()) - 1);
   if (const double swept = product > kMostSwept ? product : swept_edges(path); swept > kMostSwept) {
     throw std::invalid_argument(
         "the cut sweeps " + std::to_string(std::lround(swept)) +

@@ -13,7 +13,7 @@ namespace tissue_sim {
 namespace {
 
 /// Substeps of a frame of this material, at rest, on a lattice of that spacing.
-double substeps(const Scene& scene, const Material& m, double spacing) {
+double substeps_of(const Scene& scene, const Material& m, double spacing) {
   const double modulus = wave_modulus(m, 1);
   const double elastic = scene.cfl * spacing * std::sqrt(m.density / modulus);
   const double damping = 5 * m.viscosity / (m.density * spacing * spacing);  // mpm/state_figures
@@ -36,8 +36,8 @@ void check_first_frame(const Scene& scene) {
   const double spacing = is_mls ? 2 * scene.mls.spacing : scene.cell_size;
   for (const std::string& name : used) {
     const Material& m = find_material(scene, name);
-    const double count = substeps(scene, m, spacing);
-    if (count <= kMostSubsteps) continue;
+    const double count = substeps_of(scene, m, spacing);
+    if (count <= kMostSubstepsOfFrame) continue;
     throw std::invalid_argument(
         "a frame takes some " + text(static_cast<float>(std::round(count))) +
         " substeps, at most 100000 make sense (frame_rate is " + text(scene.frame_rate) + " Hz, " +

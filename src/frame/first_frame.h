@@ -9,7 +9,7 @@
 
 namespace tissue_sim {
 
-/// Throws std::invalid_argument where a frame would take more than kMostSubsteps, even as long as
+/// Throws std::invalid_argument where a frame would take more than kMostSubstepsOfFrame, even as long as
 /// the undeformed tissue of each material bears them; names the fields.
 void check_first_frame(const Scene& scene);
 

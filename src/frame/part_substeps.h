@@ -37,15 +37,16 @@ struct PartSubsteps {
   float longest() const { return std::max(at(0), at(count - 1)); }
 };
 
-constexpr double kMostSubsteps = 1e5;  ///< of a frame
+constexpr double kMostSubstepsOfFrame = 1e5;  ///< of a frame
 
-/// Throws std::runtime_error where `time` takes more than kMostSubsteps substeps of `longest` [s]:
-/// a frame that never ends helps nobody.
+/// Throws std::runtime_error where `time` takes more than kMostSubstepsOfFrame substeps of
+/// `longest` [s]: a frame that never ends helps nobody.
 inline void check_substeps(double time, double longest) {
-  if (!(longest > 0) || time / longest <= kMostSubsteps) return;
-  throw std::runtime_error("a frame takes " + std::to_string(std::lround(time / longest)) +
-                           " substeps, at most 100000 make sense: raise frame_rate or cell_size, or "
-                           "lower viscosity or young_modulus of the materials");
+  if (!(longest > 0) || time / longest <= kMostSubstepsOfFrame) return;
+  throw std::runtime_error(
+      "a frame takes " + std::to_string(std::lround(time / longest)) +
+      " substeps, at most 100000 make sense: raise frame_rate or cell_size, or "
+      "lower viscosity or young_modulus of the materials");
 }
 
 /// `count` substeps of `dt` seconds.

@@ -59,11 +59,11 @@ std::vector<SampleLine> lines_of(const Axis& axis, double low, double high) {
 
 // Volumes of the half cells of a row: those from first to last, the others are 0. A body that lies
 // diagonally in its box has few.
-struct Row {
+struct HalfCellRow {
   std::vector<double> all;
   int first, last;
 
-  explicit Row(int count) : all(count, 0.0), first(count), last(-1) {}
+  explicit HalfCellRow(int count) : all(count, 0.0), first(count), last(-1) {}
   double& operator[](int i) { return all[i]; }
   void clear() {
     for (int i = first; i <= last; ++i) all[i] = 0;
@@ -73,7 +73,7 @@ struct Row {
 };
 
 // Adds area times length of the interval to the half cells along x that it covers.
-void deposit(const Axis& axis, const Interval& interval, double area, Row& volumes) {
+void deposit(const Axis& axis, const Interval& interval, double area, HalfCellRow& volumes) {
   const double begin = (interval.begin - axis.origin) / axis.half;
   const double end = (interval.end - axis.origin) / axis.half;
   const int first = std::max(0, std::min(axis.count - 1, static_cast<int>(std::floor(begin))));
@@ -128,7 +128,7 @@ void fill(const Sampling& s, int k, Slab& slab) {
   std::vector<std::vector<Interval>> chords;
   if (s.mesh) mesh_chords(*s.mesh, slab.triangles, s.y_lines, slab.lines, chords);
   const double cube = s.x.half * s.x.half * s.x.half;
-  Row volumes(s.x.count);
+  HalfCellRow volumes(s.x.count);
   for (std::size_t first = 0, last = 0; first < s.y_lines.size(); first = last) {
     stop_if_asked(s.limits);
     const int j = s.y_lines[first].row;
@@ -179,15 +179,15 @@ Lattice make_lattice(const Body& body, double cell_size, std::vector<std::string
                      std::int64_t max_points) {
   const double half = cell_size / 2;
   const bool is_mesh = body.shape == Shape::kMesh;
-  // Before a mesh is checked and repaired, which may take a minute: its volume is right unless it is
-  // broken, and then it is not four times too large.
+  // Before a mesh is checked and repaired, which may take a minute: its volume is right unless it
+  // is broken, and then it is not four times too large.
   const auto look = [&](const TriangleMesh& raw) {
     const Box box = box_of(raw);
     const double volume = std::abs(signed_volume(raw)) / (half * half * half);
     if (volume < 4 * static_cast<double>(max_points)) return;
-    throw std::invalid_argument(
-        "it takes more than " + std::to_string(max_points) + " points at cell_size " +
-        text(cell_size) + " m (it measures " + metres(box.max - box.min) + "): raise cell_size");
+    throw std::invalid_argument("it takes more than " + std::to_string(max_points) +
+                                " points at cell_size " + text(cell_size) + " m (it measures " +
+                                metres(box.max - box.min) + "): raise cell_size");
   };
   const TriangleMesh mesh = is_mesh ? load_solid(body, notes, look) : TriangleMesh();
   const Solid solid(body);

@@ -38,12 +38,7 @@ Node::Node(const ros::NodeHandle& node, bool owns_process)
       pose_spinner_(1, &pose_queue_),
       service_spinner_(kServiceThreads, &service_queue_) {
   if (owns_process) {
-    watch_.end_process([this] {
-      try {
-        recorder_.stop();
-      } catch (const std::exception&) {  // nothing was recorded
-      }
-    });
+    watch_.end_process([this] { stop_recording(); });
   }
   // What who starts the node asks for may take as long as it does.
   const LimitWork limit(parameters_.work);
@@ -77,6 +72,14 @@ Node::~Node() {
   if (simulation_) simulation_->stop();
   service_spinner_.stop();
   pose_spinner_.stop();
+  stop_recording();
+}
+
+void Node::stop_recording() {
+  try {
+    recorder_.stop();
+  } catch (const std::exception&) {  // nothing was recorded, or it has been said
+  }
 }
 
 void Node::record_from_start(const std::string& name) {

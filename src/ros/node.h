@@ -32,6 +32,7 @@ class Node {
   /// that the bag holds frame 0. While there is no /clock it waits for one, and says so.
   void record_from_start(const std::string& name);
   void connect_clock();
+  void stop_recording();
 
   ShutdownWatch watch_;  // first: outlives what works
   // Queues of their own: a service that takes long does not hold up the poses.

@@ -70,7 +70,7 @@ PoseCheck::Verdict PoseCheck::check(Pose& pose, double stamp, double now) {
     verdict.text = "a value is NaN or infinite";
     return verdict;
   }
-  if (!(pose.position.cwiseAbs().maxCoeff() <= kFarthest)) {
+  if (!(pose.position.cwiseAbs().maxCoeff() <= kFarthestPose)) {
     verdict.refusal = Refusal::kFar;
     verdict.text = format("it is %.3g m from the world's origin", pose.position.norm(), 0, 0);
     return verdict;

@@ -17,12 +17,12 @@ enum class Refusal {
   kOlder,
   kUnknownFrame,
   kJump,
-  kFar,       ///< more than kFarthest from the world's origin
+  kFar,       ///< more than kFarthestPose from the world's origin
   kStamp,     ///< see is_far_ahead()
   kOwnFrame,  ///< in the frame that this node publishes for the tool itself
 };
 constexpr int kRefusalCount = 8;
-constexpr double kFarthest = 1e6;  ///< that anything is from the world's origin [m]
+constexpr double kFarthestPose = 1e6;  ///< that anything is from the world's origin [m]
 
 /// As it stands in diagnostics: "not finite", "older than the last"...
 const char* name_of(Refusal refusal);

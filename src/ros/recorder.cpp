@@ -32,7 +32,7 @@ void create_new(const std::string& path) {
 }
 
 constexpr std::chrono::milliseconds kFlush(400);  // what a killed node loses at most
-constexpr std::uint32_t kChunk = 768 * 1024;       // rosbag's own [bytes]
+constexpr std::uint32_t kChunkSize = 768 * 1024;  // rosbag's own [bytes]
 
 /// Zeros for a file that is not there.
 FileIdentity identity_of(const std::string& path) {
@@ -97,7 +97,7 @@ std::string Recorder::start(const std::string& name, std::set<std::string> topic
     bag_ = std::make_unique<rosbag::Bag>();
     bag_->open(active, rosbag::bagmode::Write);
     bag_->setCompression(rosbag::compression::LZ4);
-    bag_->setChunkThreshold(kChunk);
+    bag_->setChunkThreshold(kChunkSize);
   } catch (const std::exception& e) {
     std::remove(active.c_str());
     throw std::runtime_error("the recording " + path + " cannot be written: " + e.what());
@@ -196,7 +196,7 @@ void Recorder::write_all() {
       }
     }
     item.write(*bag_, item.time);
-    if (bag_->getChunkThreshold() == 0) bag_->setChunkThreshold(kChunk);
+    if (bag_->getChunkThreshold() == 0) bag_->setChunkThreshold(kChunkSize);
     lock.lock();
     status_.queued -= item.bytes;
     ++status_.messages;
@@ -227,8 +227,8 @@ void Recorder::flush() {
   if (!(identity_of(active) == file_)) {
     throw std::runtime_error(active + " is gone: somebody removed it");
   }
-  // Ends the chunk. What rosbag keeps of it in memory goes when a chunk grows too large, so the next
-  // message is one that is: see write_all().
+  // Ends the chunk. What rosbag keeps of it in memory goes when a chunk grows too large, so the
+  // next message is one that is: see write_all().
   bag_->setChunkThreshold(0);
   struct stat status;
   if (limit_ > 0 && stat(active.c_str(), &status) == 0 &&

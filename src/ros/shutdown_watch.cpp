@@ -43,7 +43,12 @@ void ShutdownWatch::run() {
   }
   // Not by ROS_ERROR, which is gone with ROS.
   std::fprintf(stderr, "still busy %g s after the shutdown: ends at once\n", kPatience);
-  last_words();
+  std::atomic<bool> done{false};
+  std::thread([&done, last_words] {
+    last_words();
+    done = true;
+  }).detach();
+  for (int i = 0; i < 100 && !done; ++i) std::this_thread::sleep_for(std::chrono::milliseconds(100));
   _exit(3);
 }
 

@@ -22,8 +22,8 @@ class ShutdownWatch {
   /// True from when ROS shuts down, or stop() was called, on.
   const std::atomic<bool>& stopping() const { return stopping_; }
   void stop() { stopping_ = true; }
-  /// Where this still lives kPatience after a shutdown began, `last_words` is called and the
-  /// process ends: for an executable, whose user wants it to.
+  /// Where this still lives kPatience after a shutdown began, `last_words` is called, which has ten
+  /// seconds, and the process ends: for an executable, whose user wants it to.
   void end_process(std::function<void()> last_words);
 
  private:

@@ -202,6 +202,9 @@ bool ToolInput::may_warn() {
 
 void ToolInput::on_jaw(const ros::MessageEvent<const sensor_msgs::JointState>& event) {
   const sensor_msgs::JointState::ConstPtr message = event.getConstMessage();
+  if (message->position.size() > kMostJoints || message->name.size() > kMostJoints) {
+    return accept_jaw(*message);  // which refuses it: nothing so large is kept
+  }
   recorder_.write(jaw_topic_, message, ros::Time::now());
   const bool latched = is_latched(event);
   hold(held_jaws_, message->header.stamp, [this, message, latched] {

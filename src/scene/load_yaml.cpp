@@ -7,7 +7,7 @@
 namespace tissue_sim {
 namespace {
 
-constexpr int kDeepest = 64;
+constexpr int kDeepestNesting = 64;
 
 /// How deep a text may nest, at most: brackets that are open, indicators of lists in one line, and
 /// lines that are each indented more than the one before.
@@ -69,8 +69,8 @@ bool has_more_documents(const std::string& text) {
 }  // namespace
 
 YAML::Node load_yaml(const std::string& text) {
-  if (depth_of(text) > kDeepest) {
-    throw std::invalid_argument("it nests more than " + std::to_string(kDeepest) + " deep");
+  if (depth_of(text) > kDeepestNesting) {
+    throw std::invalid_argument("it nests more than " + std::to_string(kDeepestNesting) + " deep");
   }
   if (has_more_documents(text)) {
     throw std::invalid_argument(

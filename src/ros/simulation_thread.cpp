@@ -187,6 +187,7 @@ void SimulationThread::frame() {
     session_.scene_input->apply(simulation);
     report_ = simulation.advance_frame();
   } catch (const std::exception& e) {
+    if (parameters_.work.stop != nullptr && *parameters_.work.stop) throw;  // the node ends
     for (PendingCut& cut : cuts) cut.reply.set_value({false, e.what(), {}});
     fail(std::string("the simulation failed: ") + e.what() + ": reset it");
     return;

@@ -49,8 +49,39 @@ void check_position(const std::string& field, const Vec3& v) {
 
 void check_friction(const std::string& field, double value) { check_range(field, value, 0, 2); }
 
+/// Whether a text is UTF-8 (RFC 3629): YAML is, and other bytes would be written as other ones.
+bool is_utf8(const std::string& s) {
+  for (std::size_t i = 0; i < s.size();) {
+    const auto at = [&](std::size_t k) {
+      return static_cast<unsigned>(k < s.size() ? static_cast<unsigned char>(s[k]) : 0);
+    };
+    const unsigned first = at(i);
+    const std::size_t more = first < 0x80                     ? 0
+                             : first >= 0xc2 && first < 0xe0  ? 1
+                             : first >= 0xe0 && first < 0xf0  ? 2
+                             : first >= 0xf0 && first <= 0xf4 ? 3
+                                                              : 4;
+    if (more == 4) return false;
+    for (std::size_t k = 1; k <= more; ++k) {
+      if ((at(i + k) & 0xc0) != 0x80) return false;
+    }
+    const unsigned second = at(i + 1);
+    if (first == 0xe0 && second < 0xa0) return false;
+    if (first == 0xed && second > 0x9f) return false;
+    if (first == 0xf0 && second < 0x90) return false;
+    if (first == 0xf4 && second > 0x8f) return false;
+    i += more + 1;
+  }
+  return true;
+}
+
+void check_utf8(const std::string& field, const std::string& text) {
+  if (!is_utf8(text)) refuse(field, "no UTF-8", "must be, or it could not be written as YAML");
+}
+
 void check_length(const std::string& field, const std::string& name) {
   if (name.empty()) refuse(field, quoted(name), "must not be empty");
+  check_utf8(field, name);
   if (name.size() <= kLongestName) return;
   refuse(field, "a text of " + std::to_string(name.size()) + " characters",
          "must not be longer than " + std::to_string(kLongestName));
@@ -136,6 +167,7 @@ void check_shape(const std::string& path, const Body& body) {
         refuse(path + ".mesh", quoted(body.mesh),
                "must be the path of a mesh file (plain, file:// or package://)");
       }
+      check_utf8(path + ".mesh", body.mesh);
       if (body.mesh.size() > kLongestPath) {
         refuse(path + ".mesh", "a text of " + std::to_string(body.mesh.size()) + " characters",
                "no path is so long");
@@ -290,6 +322,7 @@ void validate(const Scene& scene) {
   check_range("cfl", scene.cfl, 0.05, 0.9);
   check_range("damping", scene.damping, 0, 1000);
   check_each("gravity", scene.gravity, -1000, 1000, "component", "m/s^2");
+  check_utf8("fragment_network", scene.fragment_network);
   if (scene.fragment_network.size() > kLongestPath || scene.fragment_network.empty() ||
       (scene.fragment_network != "off" && scene.method != Method::kMpm)) {
     refuse("fragment_network", quoted(scene.fragment_network.substr(0, kLongestName)),

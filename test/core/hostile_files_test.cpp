@@ -198,6 +198,9 @@ TEST(SceneText, WhatNobodyMeansIsRefused) {
       {std::string(100000, '['), "nests more than"},
       {std::string(100000, '{'), "nests more than"},
       {"---\nbodies: [{}]\n...\nname: b\n", "several documents"},
+      {"name: \xff\xff\nbodies: [{}]", "name is no UTF-8"},
+      {"bodies: [{name: a\xc3\x28}]", "no UTF-8"},
+      {"bodies: [{shape: mesh, mesh: \"\xed\xa0\x80\"}]", "no UTF-8"},
       {",]-]z\n\n,]--ab", ""},  // LoadAll() of yaml-cpp has no end for this
       {list + "]", "bodies[0].size is"},
       {"name: " + std::string(5000, 'a') + "\nbodies: [{}]", "name is a text of 5000"},

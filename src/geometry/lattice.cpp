@@ -179,26 +179,29 @@ Lattice make_lattice(const Body& body, double cell_size, std::vector<std::string
                      std::int64_t max_points) {
   const double half = cell_size / 2;
   const bool is_mesh = body.shape == Shape::kMesh;
+  // Where a mesh is in another unit, no cell size is the answer.
+  const auto hint_of = [&](const Vec3& size) {
+    const std::string hint = is_mesh ? scale_hint(size.maxCoeff(), body.scale) : "";
+    return hint.empty() ? hint : hint + " Else ";
+  };
+  const auto too_many_of = [&](const Vec3& size) {
+    return "it takes more than " + std::to_string(max_points) + " points at cell_size " +
+           text(cell_size) + " m (it measures " + metres(size) + "): " + hint_of(size) +
+           "raise cell_size";
+  };
   // Before a mesh is checked and repaired, which may take a minute: its volume is right unless it
   // is broken, and then it is not four times too large.
   const auto look = [&](const TriangleMesh& raw) {
-    const Box box = box_of(raw);
     const double volume = std::abs(signed_volume(raw)) / (half * half * half);
     if (volume < 4 * static_cast<double>(max_points)) return;
-    throw std::invalid_argument("it takes more than " + std::to_string(max_points) +
-                                " points at cell_size " + text(cell_size) + " m (it measures " +
-                                metres(box.max - box.min) + "): raise cell_size");
+    const Box box = box_of(raw);
+    throw std::invalid_argument(too_many_of(box.max - box.min));
   };
   const TriangleMesh mesh = is_mesh ? load_solid(body, notes, look) : TriangleMesh();
   const Solid solid(body);
   const Box box = is_mesh ? box_of(mesh) : bounding_box(body);
   const Vec3 size = box.max - box.min;
-  // Where a mesh is in another unit, no cell size is the answer.
-  std::string hint = is_mesh ? scale_hint(size.maxCoeff(), body.scale) : "";
-  if (!hint.empty()) hint += " Else ";
-  const std::string too_many = "it takes more than " + std::to_string(max_points) +
-                               " points at cell_size " + text(cell_size) + " m (it measures " +
-                               metres(size) + "): " + hint + "raise cell_size";
+  const std::string hint = hint_of(size), too_many = too_many_of(size);
   const double volume = is_mesh ? signed_volume(mesh) : exact_volume(body);
   if (max_points <= 0 || volume / (half * half * half) > 1.01 * static_cast<double>(max_points)) {
     refuse(body, too_many);

@@ -1,13 +1,14 @@
 // The format: http://wiki.ros.org/Bags/Format/2.0
 #include "ros/bag_repair.h"
 
+#include <fcntl.h>
 #include <roslz4/lz4s.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <cerrno>
 #include <cstring>
-#include <fstream>
 #include <map>
 #include <stdexcept>
 #include <vector>
@@ -17,6 +18,7 @@ namespace {
 
 constexpr char kMagic[] = "#ROSBAG V2.0\n";
 constexpr std::uint32_t kMostHeader = 1u << 20, kMostChunk = 1u << 30;  // [bytes]
+constexpr std::uint64_t kMostGiven = 1u << 20;                          // for an index [bytes]
 enum Op : char {
   kMessage = 2,
   kFileHeader = 3,
@@ -80,7 +82,7 @@ struct IndexEntry {
 };
 
 struct ChunkIndex {
-  std::uint64_t place = 0;
+  std::uint64_t place = 0, end_place = 0;
   std::map<std::uint32_t, std::vector<IndexEntry>> messages;  // by connection
   std::uint64_t begin = 0, end = 0;                           // sec << 32 | nsec
 };
@@ -125,53 +127,71 @@ bool read_chunk(const std::string& bytes, std::map<std::uint32_t, Connection>& c
   return true;
 }
 
+/// With pread and pwrite: a stream would keep what a full disk did not take, and write it later.
 class File {
  public:
   explicit File(const std::string& path)
-      : path_(path), file_(path, std::ios::in | std::ios::out | std::ios::binary) {
-    if (!file_) throw std::runtime_error(path + " cannot be opened for writing");
-    file_.seekg(0, std::ios::end);
-    size_ = static_cast<std::uint64_t>(file_.tellg());
+      : path_(path), number_(open(path.c_str(), O_RDWR | O_CLOEXEC | O_NONBLOCK)) {
+    struct stat status;
+    if (number_ < 0 || fstat(number_, &status) != 0 || !S_ISREG(status.st_mode)) {
+      if (number_ >= 0) close(number_);
+      throw std::runtime_error(path + " is no file that can be written to");
+    }
+    size_ = static_cast<std::uint64_t>(status.st_size);
   }
+  ~File() { close(number_); }
+  File(const File&) = delete;
+  File& operator=(const File&) = delete;
+
   std::uint64_t size() const { return size_; }
   /// False where the file ends before.
   bool read(std::uint64_t at, std::uint64_t count, std::string& bytes) {
     if (at > size_ || count > size_ - at) return false;
     bytes.resize(count);
-    file_.clear();
-    file_.seekg(static_cast<std::streamoff>(at));
-    return static_cast<bool>(file_.read(&bytes[0], static_cast<std::streamsize>(count)));
+    return move(at, count, [&](std::uint64_t done, std::uint64_t place) {
+      return pread(number_, &bytes[done], count - done, static_cast<off_t>(place));
+    });
   }
   /// Header and place of the data of the record at `at`; false where it does not lie in the file.
   bool record_at(std::uint64_t at, Fields& fields, std::uint64_t& data, std::uint32_t& data_size) {
     std::string bytes;
     if (!read(at, 4, bytes)) return false;
     const auto size = number<std::uint32_t>(bytes);
-    if (size > kMostHeader || !read(at + 4, size, bytes) || !read_fields(bytes, fields))
+    if (size > kMostHeader || !read(at + 4, size, bytes) || !read_fields(bytes, fields)) {
       return false;
+    }
     if (!read(at + 4 + size, 4, bytes)) return false;
     data_size = number<std::uint32_t>(bytes);
     data = at + 8 + size;
     return data_size <= size_ - data;
   }
-  void write(std::uint64_t at, const std::string& bytes) {
-    file_.clear();
-    file_.seekp(static_cast<std::streamoff>(at));
-    file_.write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
-    if (!file_.flush()) {
-      throw std::runtime_error("the index of " + path_ + " cannot be written: is the disk full?");
-    }
+  /// False where the disk is full.
+  bool write(std::uint64_t at, const std::string& bytes) {
+    return move(at, bytes.size(), [&](std::uint64_t done, std::uint64_t place) {
+      return pwrite(number_, bytes.data() + done, bytes.size() - done, static_cast<off_t>(place));
+    });
   }
   void cut_off(std::uint64_t size) {
-    if (truncate(path_.c_str(), static_cast<off_t>(size)) != 0) {
+    if (ftruncate(number_, static_cast<off_t>(size)) != 0) {
       throw std::runtime_error(path_ + " cannot be shortened: " + std::strerror(errno));
     }
     size_ = size;
   }
 
  private:
+  template <class Call>
+  static bool move(std::uint64_t at, std::uint64_t count, const Call& call) {
+    for (std::uint64_t done = 0; done < count;) {
+      const ssize_t moved = call(done, at + done);
+      if (moved < 0 && errno == EINTR) continue;
+      if (moved <= 0) return false;
+      done += static_cast<std::uint64_t>(moved);
+    }
+    return true;
+  }
+
   std::string path_;
-  std::fstream file_;
+  int number_;
   std::uint64_t size_ = 0;
 };
 
@@ -205,6 +225,31 @@ std::string time_field(const char* name, std::uint64_t time) {
                          bytes_of(static_cast<std::uint32_t>(time)));
 }
 
+/// Connections and chunks, as they stand at the end of a bag; counts the messages.
+std::string index_of(const std::map<std::uint32_t, Connection>& connections,
+                     const std::vector<ChunkIndex>& chunks, std::uint64_t& messages) {
+  std::string index;
+  for (const auto& [id, connection] : connections) {
+    index += record(
+        op_field(kConnection) + field("conn", bytes_of(id)) + field("topic", connection.topic),
+        connection.data);
+  }
+  messages = 0;
+  for (const ChunkIndex& chunk : chunks) {
+    std::string counts;
+    for (const auto& [id, entries] : chunk.messages) {
+      messages += entries.size();
+      counts += bytes_of(id) + bytes_of(static_cast<std::uint32_t>(entries.size()));
+    }
+    index += record(op_field(kChunkInfo) + field("ver", bytes_of(std::uint32_t{1})) +
+                        field("chunk_pos", bytes_of(chunk.place)) +
+                        time_field("start_time", chunk.begin) + time_field("end_time", chunk.end) +
+                        field("count", bytes_of(static_cast<std::uint32_t>(chunk.messages.size()))),
+                    counts);
+  }
+  return index;
+}
+
 }  // namespace
 
 BagRepair repair_bag(const std::string& path) {
@@ -225,7 +270,7 @@ BagRepair repair_bag(const std::string& path) {
 
   std::map<std::uint32_t, Connection> connections;
   std::vector<ChunkIndex> chunks;
-  std::uint64_t end = begin, last_chunk_end = begin;
+  std::uint64_t end = begin;
   while (file.record_at(end, fields, data, size)) {
     if (op_of(fields) == kIndex) {  // of the chunk before
       end = data + size;
@@ -236,41 +281,36 @@ BagRepair repair_bag(const std::string& path) {
     chunk.place = end;
     if (!decompress(fields["compression"], number<std::uint32_t>(fields["size"]), bytes)) break;
     if (!read_chunk(bytes, connections, chunk)) break;
+    chunk.end_place = data + size;
     if (!chunk.messages.empty()) chunks.push_back(std::move(chunk));
-    end = last_chunk_end = data + size;
+    end = data + size;
   }
   if (chunks.empty()) throw std::runtime_error(path + " holds no whole chunk of messages");
-  std::string index = index_records(chunks.back());  // of the last one it may lack, or be cut
-  const std::uint64_t index_at = last_chunk_end + index.size();
-  result.lost = file.size() - std::min(file.size(), index_at);
-  result.chunks = chunks.size();
-  for (const auto& [id, connection] : connections) {
-    index += record(
-        op_field(kConnection) + field("conn", bytes_of(id)) + field("topic", connection.topic),
-        connection.data);
-  }
-  for (const ChunkIndex& chunk : chunks) {
-    std::string counts;
-    for (const auto& [id, entries] : chunk.messages) {
-      result.messages += entries.size();
-      counts += bytes_of(id) + bytes_of(static_cast<std::uint32_t>(entries.size()));
+  const std::uint64_t all = file.size(), whole = chunks.back().end_place;
+  for (;; chunks.pop_back()) {
+    if (chunks.empty() || whole - chunks.back().end_place > kMostGiven) {
+      throw std::runtime_error("the index of " + path + " cannot be written: the disk is full");
     }
-    index += record(op_field(kChunkInfo) + field("ver", bytes_of(std::uint32_t{1})) +
-                        field("chunk_pos", bytes_of(chunk.place)) +
-                        time_field("start_time", chunk.begin) + time_field("end_time", chunk.end) +
-                        field("count", bytes_of(static_cast<std::uint32_t>(chunk.messages.size()))),
-                    counts);
+    const std::uint64_t chunk_end = chunks.back().end_place;
+    const std::string last = index_records(chunks.back());  // it may lack them, or some
+    const std::uint64_t index_at = chunk_end + last.size();
+    file.cut_off(chunk_end);
+    // On a disk that is full to the last byte the last chunks make room for the index: but not all
+    // of them, for whoever filled it may go on.
+    if (!file.write(chunk_end, last + index_of(connections, chunks, result.messages))) continue;
+    result.chunks = chunks.size();
+    result.lost = all - std::min(all, index_at);
+    const std::string header =
+        op_field(kFileHeader) + field("index_pos", bytes_of(index_at)) +
+        field("conn_count", bytes_of(static_cast<std::uint32_t>(connections.size()))) +
+        field("chunk_count", bytes_of(static_cast<std::uint32_t>(chunks.size())));
+    const std::uint64_t room = begin - first;
+    if (header.size() + 8 > room ||
+        !file.write(first, record(header, std::string(room - header.size() - 8, ' ')))) {
+      throw std::runtime_error("the header of " + path + " cannot be written");
+    }
+    return result;
   }
-  file.cut_off(last_chunk_end);
-  file.write(last_chunk_end, index);
-  const std::string header =
-      op_field(kFileHeader) + field("index_pos", bytes_of(index_at)) +
-      field("conn_count", bytes_of(static_cast<std::uint32_t>(connections.size()))) +
-      field("chunk_count", bytes_of(static_cast<std::uint32_t>(chunks.size())));
-  const std::uint64_t room = begin - first;
-  if (header.size() + 8 > room) throw std::runtime_error(path + " has no room for its header");
-  file.write(first, record(header, std::string(room - header.size() - 8, ' ')));
-  return result;
 }
 
 }  // namespace tissue_sim

@@ -136,7 +136,7 @@ TEST_F(Stranger, LoadsOnlyFilesFromWhereItIsPermitted) {
 
 TEST_F(Stranger, ScenesThatTakeTooMuchAreRefused) {
   expect_refused(load("", "{cell_size: 0.001, bodies: [{}]}"), "points");
-  expect_refused(load("", "{ground: {z: 1}, bodies: [{}]}"), "below the ground");
+  expect_refused(load("", "{cell_size: 0.01, ground: {z: 1}, bodies: [{}]}"), "below the ground");
   expect_refused(load("",
                       "{frame_rate: 1, cell_size: 1e-4, materials: [{name: m, density: 100, "
                       "viscosity: 1000}], bodies: [{size: [2e-4, 2e-4, 2e-4], material: m}]}"),

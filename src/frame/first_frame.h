@@ -9,8 +9,8 @@
 
 namespace tissue_sim {
 
-/// Throws std::invalid_argument where a frame would take more than kMostSubstepsOfFrame, even as long as
-/// the undeformed tissue of each material bears them; names the fields.
+/// Throws std::invalid_argument where a frame would take more than kMostSubstepsOfFrame, even as
+/// long as the undeformed tissue of each material bears them; names the fields.
 void check_first_frame(const Scene& scene);
 
 /// Throws std::invalid_argument for a piece that lies below the ground as a whole.

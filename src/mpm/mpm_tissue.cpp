@@ -7,7 +7,6 @@
 #include <utility>
 
 #include "math/lanczos.h"
-#include "tissue_sim/limits.h"
 #include "mpm/contact/block_contact.h"
 #include "mpm/lattice_pieces.h"
 #include "mpm/linearised_motion.h"
@@ -16,6 +15,7 @@
 #include "mpm/tear/bond_bridges.h"
 #include "mpm/tear/debris.h"
 #include "mpm/tear/tear.h"
+#include "tissue_sim/limits.h"
 #include "tools/frame_colliders.h"
 #include "tools/tool_motion.h"
 

@@ -8,9 +8,9 @@
 #include "pbd/find_touches.h"
 #include "pbd/free_flight.h"
 #include "pbd/model.h"
+#include "tissue_sim/limits.h"
 #include "tools/frame_colliders.h"
 #include "tools/tool_motion.h"
-#include "tissue_sim/limits.h"
 
 namespace tissue_sim {
 

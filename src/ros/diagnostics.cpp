@@ -15,10 +15,9 @@ Diagnostics::Diagnostics(ros::NodeHandle& node, const SimulationThread& simulati
   updater_.add("simulation", this, &Diagnostics::simulation);
   updater_.add("tools", this, &Diagnostics::tools);
   updater_.add("recording", this, &Diagnostics::recording);
-  timer_ = node.createWallTimer(ros::WallDuration(1),
-                                [this](const ros::WallTimerEvent&) {
-                                 guard("diagnostics", [this] { updater_.force_update(); });
-                               });
+  timer_ = node.createWallTimer(ros::WallDuration(1), [this](const ros::WallTimerEvent&) {
+    guard("diagnostics", [this] { updater_.force_update(); });
+  });
 }
 
 void Diagnostics::simulation(Status& status) {

@@ -45,8 +45,8 @@ void FrameClock::resume() {
 
 void FrameClock::set_ros_time(const ros::Time& now) {
   const double step = seconds_between(ros_time_, now);
-  if (parameters_.time == TimeMode::kRos && !ros_time_.isZero() &&
-      step * kSecond > kAhead && schedule_.begun()) {
+  if (parameters_.time == TimeMode::kRos && !ros_time_.isZero() && step * kSecond > kAhead &&
+      schedule_.begun()) {
     ROS_WARN("/clock jumped ahead by %.1f s: the simulation goes on from there", step);
     schedule_.move(in_nanoseconds(now));
   }

@@ -80,7 +80,8 @@ void Frames::take(const tf2_msgs::TFMessage& message, const std::string& sender,
       wrong = "its stamp, " + std::to_string(t.header.stamp.sec) + " s, is more than a day ahead";
     }
     const auto known = newest_.find(t.child_frame_id);
-    if (known == newest_.end() && newest_.size() >= kMostFrames) wrong = "there are too many frames";
+    if (known == newest_.end() && newest_.size() >= kMostFrames)
+      wrong = "there are too many frames";
     if (!wrong.empty()) {
       if (warned_.size() > kMostFrames) warned_.clear();
       std::string& warned = warned_[t.child_frame_id];

@@ -8,9 +8,9 @@
 #include <set>
 #include <string>
 
+#include "frame/first_frame.h"
 #include "ros/guarded.h"
 #include "ros/remappings.h"
-#include "frame/first_frame.h"
 #include "scene/scene_text.h"
 
 namespace tissue_sim {
@@ -32,8 +32,7 @@ Node::Node(const ros::NodeHandle& node, bool owns_process)
       service_node_(with_queue(node, service_queue_)),
       parameters_(read_parameters(node, &watch_.stopping())),
       recorder_(parameters_.recording_folder, parameters_.recording_queue * kMebibyte,
-                parameters_.recording_reserve * kMebibyte,
-                parameters_.recording_limit * kMebibyte),
+                parameters_.recording_reserve * kMebibyte, parameters_.recording_limit * kMebibyte),
       frames_(parameters_.world_frame, parameters_.tf_tolerance),
       pose_spinner_(1, &pose_queue_),
       service_spinner_(kServiceThreads, &service_queue_) {
@@ -57,9 +56,9 @@ Node::Node(const ros::NodeHandle& node, bool owns_process)
         clock_publisher_.publish(message);
       });
   connect_clock();
-  services_ = std::make_unique<Services>(service_node_, scene, *simulation_, recorder_, frames_,
-                                         parameters_,
-                                         [this](const Scene& s) { return make_session(s); });
+  services_ =
+      std::make_unique<Services>(service_node_, scene, *simulation_, recorder_, frames_,
+                                 parameters_, [this](const Scene& s) { return make_session(s); });
   diagnostics_ = std::make_unique<Diagnostics>(service_node_, *simulation_, recorder_);
   if (record.wanted) record_from_start(record.name);
   pose_spinner_.start();

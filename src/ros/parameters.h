@@ -56,7 +56,7 @@ struct Parameters {
   double recording_reserve = 256;  ///< disk space left free [MiB]
   double recording_limit = 0;      ///< largest bag [MiB], 0 for as much as the disk takes
   std::vector<std::string> load_folders;  ///< that services load from, absolute; empty: anywhere
-  double longest_work = 300;       ///< that a frame, or building a scene, takes at most [s]
+  double longest_work = 300;              ///< that a frame, or building a scene, takes at most [s]
   /// Of building and of frames; `stop` is whoever's who runs them.
   WorkLimits work;
   std::map<std::string, ToolParameters> tools;

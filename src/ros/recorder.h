@@ -109,7 +109,7 @@ class Recorder {
 
   const std::string folder_;
   const double queue_limit_, reserve_, limit_;  // [bytes]
-  std::mutex control_;                  // held by start() and stop()
+  std::mutex control_;                          // held by start() and stop()
   std::thread thread_;
   std::unique_ptr<rosbag::Bag> bag_;  // of the thread, while it runs
   FileIdentity file_;                 // the bag's, while it is written

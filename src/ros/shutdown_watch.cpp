@@ -48,7 +48,8 @@ void ShutdownWatch::run() {
     last_words();
     done = true;
   }).detach();
-  for (int i = 0; i < 100 && !done; ++i) std::this_thread::sleep_for(std::chrono::milliseconds(100));
+  for (int i = 0; i < 100 && !done; ++i)
+    std::this_thread::sleep_for(std::chrono::milliseconds(100));
   _exit(3);
 }
 

@@ -41,8 +41,8 @@ bool Services::save_state(SaveState::Request& request, SaveState::Response& resp
   return answer(response, "save_state", [&] {
     const std::string path = recording_path(recorder_.folder(), request.path, ".state");
     const SavedFrame saved = simulation_.save();
-    const double needed = static_cast<double>(saved.state.size()) +
-                          parameters_.recording_reserve * 1024 * 1024;
+    const double needed =
+        static_cast<double>(saved.state.size()) + parameters_.recording_reserve * 1024 * 1024;
     if (free_space(path.substr(0, path.rfind('/'))) < needed) {
       throw std::runtime_error("the disk has not enough space left (recording_reserve)");
     }

@@ -33,8 +33,8 @@ class ToolInput {
  public:
   /// `tissue` is the box of all tissue as it is at the start [m]. With `on_sample`, samples are
   /// held until they are taken by stamp or one by one, and it is called for each. With
-  /// `publishes_tf` the node says where the tool is, as a frame of its name, in which no pose of its
-  /// own can be.
+  /// `publishes_tf` the node says where the tool is, as a frame of its name, in which no pose of
+  /// its own can be.
   ToolInput(const ros::NodeHandle& node, const Tool& tool, const ToolParameters& source,
             const PoseLimits& limits, const Frames& frames, const Box& tissue, Recorder& recorder,
             std::function<void()> on_sample, bool publishes_tf = true);

@@ -7,6 +7,8 @@
 #include <stdexcept>
 #include <utility>
 
+#include "cutting/blade_sweep.h"
+#include "frame/first_frame.h"
 #include "frame/sealed_state.h"
 #include "frame/state_fields.h"
 #include "tools/grip.h"
@@ -15,9 +17,15 @@
 namespace tissue_sim {
 namespace {
 
+constexpr double kFarthestPlace = 1e6;  // from the origin [m]
+constexpr double kMostSwept = 1e5;      // edges of a cut, see swept_edges()
+
 void check(const Pose& pose, const std::string& what) {
   if (!pose.position.allFinite() || !pose.orientation.coeffs().allFinite()) {
     throw std::invalid_argument(what + " is not finite");
+  }
+  if (!(pose.position.cwiseAbs().maxCoeff() <= kFarthestPlace)) {
+    throw std::invalid_argument(what + " is more than 1e6 m away: no instrument is");
   }
   if (std::fabs(pose.orientation.norm() - 1) > 1e-3) {
     throw std::invalid_argument(what + " has a quaternion of norm " +
@@ -43,11 +51,24 @@ void check(const BladePath& path) {
   }
   for (const Vec3& x : path.edge) {
     if (!x.allFinite()) throw std::invalid_argument("a point of the blade's edge is not finite");
+    if (!(x.cwiseAbs().maxCoeff() <= kFarthestPlace)) {
+      throw std::invalid_argument("a point of the blade's edge is more than 1e6 m away");
+    }
   }
   for (const Pose& pose : path.poses) check(pose, "a pose of the blade");
+  const double product =
+      (static_cast<double>(path.edge.size()) - 1) * (static_cast<double>(path.poses.size()) - 1);
+  if (const double swept = product > kMostSwept ? product : swept_edges(path); swept > kMostSwept) {
+    throw std::invalid_argument(
+        "the cut sweeps " + std::to_string(std::lround(swept)) +
+        " edges (pieces of the blade's edge times steps of its path, each turned by less than 4 "
+        "degrees), at most 100000 are done: give fewer points of the edge or poses");
+  }
 }
 
 }  // namespace
+
+void check_path(const BladePath& path) { check(path); }
 
 struct Simulation::State {
   Scene scene;
@@ -71,8 +92,10 @@ struct Simulation::State {
 
 Simulation::Simulation(const Scene& scene) : state_(std::make_unique<State>()) {
   validate(scene);
+  check_first_frame(scene);
   state_->scene = scene;
   state_->tissue = make_tissue(scene);
+  if (scene.ground.enabled) check_ground(scene, state_->tissue->fragments());
   state_->tools.resize(scene.tools.size());
   state_->grips.resize(scene.tools.size());
   state_->grip_pressures.resize(scene.tools.size());

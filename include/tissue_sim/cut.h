@@ -15,6 +15,10 @@ struct BladePath {
   std::vector<Pose> poses;  ///< world frame, at least 2
 };
 
+/// Throws std::invalid_argument for what Simulation::cut() does not take: less than two poses or
+/// edge points, values that are not finite or absurdly far, more than 1e5 edges that are swept.
+void check_path(const BladePath& path);
+
 /// What one frame's cutting did.
 struct CutReport {
   int64_t bonds_broken = 0;        ///< bonds between neighbouring particles

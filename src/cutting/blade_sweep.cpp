@@ -17,6 +17,12 @@ Box box_of(const std::vector<SweptEdge>& segments) {
   return box;
 }
 
+/// How many parts the way from p to q is swept in, each so short that the edge hardly turns.
+int parts_between(const Pose& p, const Pose& q) {
+  constexpr double kMaxTurn = 0.07;  // [rad]
+  return 1 + static_cast<int>(p.orientation.angularDistance(q.orientation) / kMaxTurn);
+}
+
 }  // namespace
 
 SweptEdge swept(const MovingSegment& edge) {
@@ -39,14 +45,21 @@ SweptEdge swept(const MovingSegment& edge) {
   return result;
 }
 
+double swept_edges(const BladePath& path) {
+  double parts = 0;
+  for (std::size_t i = 0; i + 1 < path.poses.size(); ++i) {
+    parts += parts_between(path.poses[i], path.poses[i + 1]);
+  }
+  return parts * (static_cast<double>(path.edge.size()) - 1);
+}
+
 std::vector<SweepPart> sweep_parts(const BladePath& path) {
-  constexpr double kMaxTurn = 0.07;  // [rad]
   const Vec3 aside(1.31e-9, 1.73e-9, 0.97e-9);
   std::vector<SweepPart> parts;
   const double spans = static_cast<double>(path.poses.size()) - 1;
   for (std::size_t i = 0; i + 1 < path.poses.size(); ++i) {
     const Pose &p = path.poses[i], &q = path.poses[i + 1];
-    const int n = 1 + static_cast<int>(p.orientation.angularDistance(q.orientation) / kMaxTurn);
+    const int n = parts_between(p, q);
     const auto at = [&](int k) {
       if (k == 0) return p;
       if (k == n) return q;

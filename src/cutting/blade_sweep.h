@@ -29,4 +29,7 @@ struct SweepPart {
 /// it never passes exactly through a lattice point.
 std::vector<SweepPart> sweep_parts(const BladePath& path);
 
+/// How many edges sweep_parts() has in all its parts: what a cut costs.
+double swept_edges(const BladePath& path);
+
 }  // namespace tissue_sim

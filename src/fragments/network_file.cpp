@@ -10,6 +10,9 @@
 #include <filesystem>
 #include <stdexcept>
 
+#include "scene/load_yaml.h"
+#include "scene/read_file.h"
+
 namespace tissue_sim {
 namespace {
 
@@ -66,7 +69,7 @@ FragmentNetwork::FragmentNetwork(const std::string& path) {
                                 "scripts/train_fragments writes them");
   }
   try {
-    const YAML::Node file = YAML::LoadFile(path);
+    const YAML::Node file = load_yaml(read_file(path, kLargestScene));
     const std::string version =
         file.IsMap() && file["version"] ? file["version"].as<std::string>() : "";
     if (version != "1" && version != "2") {
@@ -111,7 +114,7 @@ FragmentNetwork::FragmentNetwork(const std::string& path) {
                                   ": it was changed since it was written; get it anew");
     }
   } catch (const YAML::Exception& e) {
-    throw std::invalid_argument(path + ": is no fragment network: " + e.what());
+    throw std::invalid_argument(path + ": is no fragment network: " + yaml_problem(e));
   } catch (const std::invalid_argument& e) {
     throw std::invalid_argument(path + ": " + e.what());
   }

@@ -3,6 +3,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <stdexcept>
+#include <string>
 
 namespace tissue_sim {
 
@@ -35,6 +37,19 @@ struct PartSubsteps {
   float longest() const { return std::max(at(0), at(count - 1)); }
 };
 
+constexpr double kMostSubstepsOfFrame = 1e5;  ///< of tissue at rest
+/// Crushed tissue may take more for a frame or two. What none can take any more is a frame that
+/// never ends.
+constexpr double kMostSubstepsAtAll = 2e6;
+
+/// Throws std::runtime_error where `time` takes more than kMostSubstepsAtAll of `longest` [s].
+inline void check_substeps(double time, double longest) {
+  if (!(longest > 0) || time / longest <= kMostSubstepsAtAll) return;
+  throw std::runtime_error("a frame takes " + std::to_string(std::llround(time / longest)) +
+                           " substeps, at most 2000000 are done: raise frame_rate or cell_size, or "
+                           "lower viscosity or young_modulus of the materials");
+}
+
 /// `count` substeps of `dt` seconds.
 inline PartSubsteps even_substeps(int count, double dt) { return {count, dt, dt, 1, 0}; }
 
@@ -43,6 +58,7 @@ inline PartSubsteps even_substeps(int count, double dt) { return {count, dt, dt,
 inline PartSubsteps substeps_for(double time, double longest, double before, double most) {
   constexpr double kChange = 1.05;
   if (!(longest > 0)) return even_substeps(1, time);  // it blew up
+  check_substeps(time, longest);
   PartSubsteps s = even_substeps(0, longest);
   if (before > 0) {
     const double up = before * kChange, down = std::min(before / kChange, std::max(most, longest));

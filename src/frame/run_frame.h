@@ -2,6 +2,7 @@
 #pragma once
 
 #include "frame/part_substeps.h"
+#include "tissue_sim/limits.h"
 #include "tissue_sim/tissue.h"
 
 namespace tissue_sim {
@@ -39,6 +40,7 @@ template <class Backend>
 void run_frame(Backend& tissue, double duration, FrameInput input) {
   tissue.begin_frame(duration, input);
   for (double from = 0; from < 1;) {
+    stop_if_asked();
     const double time = duration * (1 - from);
     FramePart part;
     part.substeps = tissue.choose_substeps(input, time);

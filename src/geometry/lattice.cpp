@@ -58,14 +58,30 @@ std::vector<SampleLine> lines_of(const Axis& axis, double low, double high) {
   return lines;
 }
 
+// Volumes of the half cells of a row: those from first to last, the others are 0. A body that lies
+// diagonally in its box has few.
+struct HalfCellRow {
+  std::vector<double> all;
+  int first, last;
+
+  explicit HalfCellRow(int count) : all(count, 0.0), first(count), last(-1) {}
+  double& operator[](int i) { return all[i]; }
+  void clear() {
+    for (int i = first; i <= last; ++i) all[i] = 0;
+    first = static_cast<int>(all.size());
+    last = -1;
+  }
+};
+
 // Adds area times length of the interval to the half cells along x that it covers.
-void deposit(const Axis& axis, const Interval& interval, double area,
-             std::vector<double>& volumes) {
+void deposit(const Axis& axis, const Interval& interval, double area, HalfCellRow& volumes) {
   const double begin = (interval.begin - axis.origin) / axis.half;
   const double end = (interval.end - axis.origin) / axis.half;
   const int first = std::max(0, std::min(axis.count - 1, static_cast<int>(std::floor(begin))));
   const int last = std::max(first, std::min(axis.count - 1, static_cast<int>(std::floor(end))));
   const double unit = area * axis.half;
+  volumes.first = std::min(volumes.first, first);
+  volumes.last = std::max(volumes.last, last);
   if (first == last) {
     volumes[first] += unit * (end - begin);
     return;
@@ -87,6 +103,7 @@ struct Sampling {
   std::vector<SampleLine> y_lines;
   const Solid* solid;        ///< or
   const TriangleMesh* mesh;  ///< the body's surface
+  WorkLimits limits;
 };
 
 // Calls add(interval, area) for each interval on lines [first, last) along y of the slab.
@@ -112,15 +129,16 @@ void fill(const Sampling& s, int k, Slab& slab) {
   std::vector<std::vector<Interval>> chords;
   if (s.mesh) mesh_chords(*s.mesh, slab.triangles, s.y_lines, slab.lines, chords);
   const double cube = s.x.half * s.x.half * s.x.half;
-  std::vector<double> volumes(s.x.count);
+  HalfCellRow volumes(s.x.count);
   for (std::size_t first = 0, last = 0; first < s.y_lines.size(); first = last) {
+    stop_if_asked(s.limits);
     const int j = s.y_lines[first].row;
     while (last < s.y_lines.size() && s.y_lines[last].row == j) ++last;
-    std::fill(volumes.begin(), volumes.end(), 0.0);
+    volumes.clear();
     for_each_interval(s, slab, first, last, chords, [&](const Interval& interval, double area) {
       deposit(s.x, interval, area, volumes);
     });
-    for (int i = 0; i < s.x.count; ++i) {
+    for (int i = volumes.first; i <= volumes.last; ++i) {
       if (volumes[i] <= 0) continue;
       slab.volume += volumes[i];
       if (volumes[i] < kSmallest * cube) {
@@ -162,18 +180,31 @@ Lattice make_lattice(const Body& body, double cell_size, std::vector<std::string
                      std::int64_t max_points) {
   const double half = cell_size / 2;
   const bool is_mesh = body.shape == Shape::kMesh;
-  const TriangleMesh mesh = is_mesh ? load_solid(body, notes) : TriangleMesh();
+  // Where a mesh is in another unit, no cell size is the answer.
+  const auto hint_of = [&](const Vec3& size) {
+    const std::string hint = is_mesh ? scale_hint(size.maxCoeff(), body.scale) : "";
+    return hint.empty() ? hint : hint + " Else ";
+  };
+  const auto too_many_of = [&](const Vec3& size) {
+    return "it takes more than " + std::to_string(max_points) + " points at cell_size " +
+           text(cell_size) + " m (it measures " + metres(size) + "): " + hint_of(size) +
+           "raise cell_size";
+  };
+  // Before a mesh is checked and repaired, which may take a minute: its volume is right unless it
+  // is broken, and then it is not four times too large.
+  const auto look = [&](const TriangleMesh& raw) {
+    const double volume = std::abs(signed_volume(raw)) / (half * half * half);
+    if (volume < 4 * static_cast<double>(max_points)) return;
+    const Box box = box_of(raw);
+    throw std::invalid_argument(too_many_of(box.max - box.min));
+  };
+  const TriangleMesh mesh = is_mesh ? load_solid(body, notes, look) : TriangleMesh();
   const Solid solid(body);
   const Box box = is_mesh ? box_of(mesh) : bounding_box(body);
   const Vec3 size = box.max - box.min;
-  // Where a mesh is in another unit, no cell size is the answer.
-  std::string hint = is_mesh ? scale_hint(size.maxCoeff(), body.scale) : "";
-  if (!hint.empty()) hint += " Else ";
-  const std::string too_many = "it takes more than " + std::to_string(max_points) +
-                               " points at cell_size " + text(cell_size) + " m (it measures " +
-                               metres(size) + "): " + hint + "raise cell_size";
+  const std::string hint = hint_of(size), too_many = too_many_of(size);
   const double volume = is_mesh ? signed_volume(mesh) : exact_volume(body);
-  if (volume / (half * half * half) > 1.01 * static_cast<double>(max_points)) {
+  if (max_points <= 0 || volume / (half * half * half) > 1.01 * static_cast<double>(max_points)) {
     refuse(body, too_many);
   }
 
@@ -183,6 +214,13 @@ Lattice make_lattice(const Body& body, double cell_size, std::vector<std::string
   sampling.x = axis_of(box.min.x(), box.max.x(), half, upright);
   sampling.y = axis_of(box.min.y(), box.max.y(), half, upright);
   sampling.z = axis_of(box.min.z(), box.max.z(), half, upright);
+  // Thirty seconds of two cores; what lies along an axis takes a thousandth of it.
+  constexpr double kMostLines = 1e9;
+  if (static_cast<double>(sampling.y.count) * sampling.z.count * kLines * kLines > kMostLines) {
+    refuse(body, "its box measures " + metres(size) + ", too much for cell_size " +
+                     text(cell_size) + " m: raise cell_size, or turn it so that it lies along x");
+  }
+  sampling.limits = work_limits();
   sampling.y_lines = lines_of(sampling.y, box.min.y(), box.max.y());
   sampling.solid = is_mesh ? nullptr : &solid;
   sampling.mesh = is_mesh ? &mesh : nullptr;

@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "tissue_sim/limits.h"
 #include "tissue_sim/scene.h"
 
 namespace tissue_sim {
@@ -42,8 +43,9 @@ struct Lattice {
 /// `notes` receives a line for whatever was repaired on the way (a mesh turned inside out, ...) and
 /// for a body with fewer than two points across.
 /// Throws std::invalid_argument with the reason and what to do: mesh missing, empty, open, of
-/// absurd size; body without points at this cell size; more than `max_points` points.
+/// absurd size; body without points at this cell size; more than `max_points` points, or a box of
+/// more than 1e9 lines of samples. Throws Stopped where work_limits() asks for it.
 Lattice make_lattice(const Body& body, double cell_size, std::vector<std::string>* notes,
-                     std::int64_t max_points = 200'000'000);
+                     std::int64_t max_points = work_limits().max_points);
 
 }  // namespace tissue_sim

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -53,7 +54,9 @@ std::string scale_hint(double size, double scale);
 
 /// The solid of a mesh body in world axes: resolved, read, scaled, checked, repaired, posed. Throws
 /// std::invalid_argument, also for a size (longest edge of the bounding box) below 1 mm or above
-/// 10 m.
-TriangleMesh load_solid(const Body& body, std::vector<std::string>* notes);
+/// 10 m. `look`, if given, sees the posed mesh before checks and repairs, which take long: it may
+/// throw.
+TriangleMesh load_solid(const Body& body, std::vector<std::string>* notes,
+                        const std::function<void(const TriangleMesh&)>& look = {});
 
 }  // namespace tissue_sim

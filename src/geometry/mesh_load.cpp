@@ -48,7 +48,8 @@ std::string scale_hint(double size, double scale) {
   return better > 0 && better != scale ? "did you forget scale: " + text(better) + "?" : "";
 }
 
-TriangleMesh load_solid(const Body& body, std::vector<std::string>* notes) {
+TriangleMesh load_solid(const Body& body, std::vector<std::string>* notes,
+                        const std::function<void(const TriangleMesh&)>& look) {
   const std::string prefix = "body '" + body.name + "': ";
   std::string what = "mesh " + body.mesh;
   try {
@@ -71,6 +72,7 @@ TriangleMesh load_solid(const Body& body, std::vector<std::string>* notes) {
     check_size(what, length, body.scale);
     const Eigen::Matrix3d rotation = body.pose.orientation.normalized().toRotationMatrix();
     for (Vec3& v : mesh.vertices) v = rotation * (body.scale * v) + body.pose.position;
+    if (look) look(mesh);
     std::vector<std::string> found;
     if (const std::string hint = scale_hint(length * body.scale, body.scale); !hint.empty()) {
       found.push_back("is " + rough(length * body.scale) + " m long at scale " + text(body.scale) +

@@ -1,11 +1,11 @@
 #include <algorithm>
 #include <cstdlib>
 #include <filesystem>
-#include <fstream>
 #include <sstream>
 #include <stdexcept>
 
 #include "geometry/mesh.h"
+#include "scene/read_file.h"
 
 namespace tissue_sim {
 namespace {
@@ -29,10 +29,12 @@ std::string shown(const char* variable) {
 
 // The name that a package.xml declares, "" without one.
 std::string package_name(const fs::path& folder) {
-  std::ifstream file(folder / "package.xml");
-  std::ostringstream text;
-  if (!file || !(text << file.rdbuf())) return "";
-  const std::string xml = text.str();
+  std::string xml;
+  try {
+    xml = read_file((folder / "package.xml").string(), kLargestScene);
+  } catch (const std::invalid_argument&) {
+    return "";
+  }
   const std::size_t begin = xml.find("<name>"), end = xml.find("</name>");
   if (begin == std::string::npos || end == std::string::npos || end < begin + 6) return "";
   const std::string name = xml.substr(begin + 6, end - begin - 6);

@@ -1,19 +1,19 @@
-#include <assimp/postprocess.h>
-#include <assimp/scene.h>
-
 #include <algorithm>
-#include <assimp/Importer.hpp>
 #include <cctype>
 #include <cmath>
 #include <cstdint>
+#include <cstring>
 #include <filesystem>
-#include <fstream>
-#include <sstream>
 #include <stdexcept>
 #include <unordered_map>
 
 #include "geometry/mesh.h"
+#include "geometry/obj.h"
+#include "geometry/off.h"
+#include "geometry/ply.h"
 #include "geometry/stl.h"
+#include "scene/read_file.h"
+#include "tissue_sim/limits.h"
 
 namespace tissue_sim {
 namespace {
@@ -34,26 +34,12 @@ struct CornerHash {
   }
 };
 
-void append(const aiScene& scene, const aiNode& node, aiMatrix4x4 transform, TriangleMesh& mesh) {
-  transform = transform * node.mTransformation;
-  for (unsigned m = 0; m < node.mNumMeshes; ++m) {
-    const aiMesh& part = *scene.mMeshes[node.mMeshes[m]];
-    const int first = static_cast<int>(mesh.vertices.size());
-    for (unsigned v = 0; v < part.mNumVertices; ++v) {
-      const aiVector3D p = transform * part.mVertices[v];
-      mesh.vertices.emplace_back(p.x, p.y, p.z);
-    }
-    for (unsigned f = 0; f < part.mNumFaces; ++f) {
-      const aiFace& face = part.mFaces[f];
-      if (face.mNumIndices != 3) continue;  // points and lines bound no volume
-      mesh.triangles.push_back({first + static_cast<int>(face.mIndices[0]),
-                                first + static_cast<int>(face.mIndices[1]),
-                                first + static_cast<int>(face.mIndices[2])});
-    }
-  }
-  for (unsigned c = 0; c < node.mNumChildren; ++c) {
-    append(scene, *node.mChildren[c], transform, mesh);
-  }
+/// The same for equal numbers.
+std::int64_t bits_of(double value) {
+  const double same = value == 0 ? 0 : value;  // of either sign
+  std::int64_t bits;
+  std::memcpy(&bits, &same, sizeof bits);
+  return bits;
 }
 
 /// In small letters.
@@ -63,45 +49,32 @@ std::string extension_of(const std::filesystem::path& path) {
   return extension;
 }
 
-bool readable(const std::filesystem::path& path) {
-  const std::string extension = extension_of(path);
-  return extension == ".stl" || extension == ".obj" || extension == ".ply" || extension == ".off";
-}
+using Read = TriangleMesh (*)(const std::string& bytes);
 
-TriangleMesh read_by_assimp(const std::string& path) {
-  Assimp::Importer importer;
-  const aiScene* scene = importer.ReadFile(path, aiProcess_Triangulate);
-  if (!scene || !scene->mRootNode) {
-    throw std::invalid_argument(std::string("cannot be read (") + importer.GetErrorString() +
-                                "): export it again as a binary STL");
-  }
-  TriangleMesh mesh;
-  append(*scene, *scene->mRootNode, aiMatrix4x4(), mesh);
-  return mesh;
-}
-
-std::string bytes_of(const std::string& path) {
-  std::ifstream file(path, std::ios::binary);
-  std::ostringstream bytes;
-  if (!file || !(bytes << file.rdbuf())) {
-    throw std::invalid_argument("cannot be read: check its permissions");
-  }
-  return bytes.str();
+/// What reads files of that extension; nullptr for none.
+Read reader_of(const std::string& extension) {
+  return extension == ".stl"   ? read_stl
+         : extension == ".obj" ? read_obj
+         : extension == ".ply" ? read_ply
+         : extension == ".off" ? read_off
+                               : nullptr;
 }
 
 }  // namespace
 
 void merge_vertices(TriangleMesh& mesh, double distance) {
   // Cells as large as the distance, so that what is near lies in the 27 cells around; without a
-  // distance any size does, and only the own cell counts.
+  // distance each place has a cell of its own.
   const double cell = distance > 0 ? distance : 1e-9;
   const int reach = distance > 0 ? 1 : 0;
   std::unordered_multimap<Corner, int, CornerHash> kept_in;
   std::vector<Vec3> kept;
   std::vector<int> index(mesh.vertices.size());
   for (std::size_t v = 0; v < mesh.vertices.size(); ++v) {
+    if (v % 4096 == 0) stop_if_asked();
     const Vec3& p = mesh.vertices[v];
-    const auto along = [&](int axis) {  // clamped: coordinates may be absurd still
+    const auto along = [&](int axis) {          // clamped: coordinates may be absurd still
+      if (reach == 0) return bits_of(p[axis]);  // else many may share a cell, which takes for ever
       return static_cast<std::int64_t>(std::max(-9e18, std::min(9e18, std::floor(p[axis] / cell))));
     };
     const Corner c{along(0), along(1), along(2)};
@@ -152,22 +125,15 @@ void drop_unused_vertices(TriangleMesh& mesh) {
 
 TriangleMesh read_mesh(const std::string& path) {
   const std::string what = "mesh " + path;
-  std::error_code error;
-  if (!std::filesystem::exists(path, error)) {
-    throw std::invalid_argument(what + " does not exist: check the path");
-  }
-  if (!std::filesystem::is_regular_file(path, error)) {
-    throw std::invalid_argument(what + " is no file: give an STL, OBJ, PLY or OFF file");
-  }
-  if (!readable(path)) {
-    throw std::invalid_argument(what + " is of no known format: give an STL, OBJ, PLY or OFF file");
-  }
-  if (std::filesystem::file_size(path, error) == 0) {
-    throw std::invalid_argument(what + " is empty: export it again");
-  }
   TriangleMesh mesh;
   try {
-    mesh = extension_of(path) == ".stl" ? read_stl(bytes_of(path)) : read_by_assimp(path);
+    const std::string bytes = read_file(path, kLargestMesh);
+    const Read read = reader_of(extension_of(path));
+    if (read == nullptr) {
+      throw std::invalid_argument("is of no known format: give an STL, OBJ, PLY or OFF file");
+    }
+    if (bytes.empty()) throw std::invalid_argument("is empty: export it again");
+    mesh = read(bytes);
   } catch (const std::invalid_argument& e) {
     throw std::invalid_argument(what + " " + e.what());
   }

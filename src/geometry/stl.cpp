@@ -1,14 +1,14 @@
 // assimp refuses bytes after the last triangle, capitals, and normals such as "-nan(ind)".
 #include "geometry/stl.h"
 
-#include <locale.h>
-
 #include <algorithm>
 #include <cctype>
 #include <cstdint>
-#include <cstdlib>
 #include <cstring>
 #include <stdexcept>
+
+#include "geometry/mesh_words.h"
+#include "tissue_sim/limits.h"
 
 namespace tissue_sim {
 namespace {
@@ -38,6 +38,7 @@ TriangleMesh read_binary(const std::string& bytes, std::size_t count) {
   mesh.vertices.reserve(3 * count);
   mesh.triangles.reserve(count);
   for (std::size_t t = 0; t < count; ++t) {
+    if (t % 4096 == 0) stop_if_asked();
     const char* p = bytes.data() + kHeader + t * kTriangle + 12;  // after the normal
     for (int k = 0; k < 3; ++k, p += 12) {
       mesh.vertices.emplace_back(real(p), real(p + 4), real(p + 8));
@@ -47,42 +48,9 @@ TriangleMesh read_binary(const std::string& bytes, std::size_t count) {
   return mesh;
 }
 
-/// The words of a text, in small letters.
-class Words {
- public:
-  Words(const std::string& text, std::size_t first)
-      : at_(text.c_str() + first), end_(text.c_str() + text.size()) {}
-
-  /// False at the end.
-  bool next(std::string& word) {
-    while (at_ != end_ && is_space(*at_)) ++at_;
-    word.clear();
-    for (; at_ != end_ && !is_space(*at_); ++at_) {
-      word += static_cast<char>(std::tolower(static_cast<unsigned char>(*at_)));
-    }
-    return !word.empty();
-  }
-  void skip_line() {
-    while (at_ != end_ && *at_ != '\n' && *at_ != '\r') ++at_;
-  }
-  /// With a decimal point, whatever the program's locale; false where no number stands.
-  bool next(double& number) {
-    static const locale_t kClassic = newlocale(LC_ALL_MASK, "C", nullptr);
-    char* end = nullptr;
-    number = strtod_l(at_, &end, kClassic);
-    if (end == at_ || (end != end_ && !is_space(*end))) return false;
-    at_ = end;
-    return true;
-  }
-
- private:
-  static bool is_space(char c) { return std::isspace(static_cast<unsigned char>(c)) != 0; }
-  const char *at_, *end_;
-};
-
 TriangleMesh read_text(const std::string& bytes, std::size_t first) {
   TriangleMesh mesh;
-  Words words(bytes, first);
+  MeshWords words(bytes, first);
   std::string word;
   int corners = 0;
   const auto facet = [&] { return "facet " + std::to_string(mesh.triangles.size() + 1); };

@@ -7,6 +7,8 @@
 
 #include "geometry/ray_tree.h"
 #include "geometry/tet_mesh.h"
+#include "scene/scene_text.h"
+#include "tissue_sim/limits.h"
 
 namespace tissue_sim {
 namespace {
@@ -86,10 +88,16 @@ class Stuffing {
       }
       cubes_.n[a] = static_cast<int>(cubes);
     }
+    const double points = 2.0 * cubes_.n[0] * cubes_.n[1] * cubes_.n[2];
+    if (!(points <= std::min(5e7, static_cast<double>(work_limits().max_points)))) {
+      throw std::invalid_argument("takes " + text(points) +
+                                  " points of a lattice, too many: make cell_size larger");
+    }
     mesh_.vertices = cubes_.places(origin, Vec3::Constant(edge));
     sign_.resize(mesh_.vertices.size());
     const Vec3 direction = Vec3(0.8711, 0.3917, 0.2963).normalized();
     for (std::size_t i = 0; i < sign_.size(); ++i) {
+      if (i % 256 == 0) stop_if_asked();
       sign_[i] = tree_.winding(mesh_.vertices[i], direction) > 0 ? 1 : -1;
     }
   }
@@ -249,6 +257,11 @@ class Stuffing {
 TetMesh tetrahedralize_box(const Vec3& size, double edge) {
   Cubes cubes;
   Vec3 cube;
+  const double points = 2 * (size / edge).prod();
+  if (!(points <= std::min(5e7, static_cast<double>(work_limits().max_points)))) {
+    throw std::invalid_argument("a box of " + text(size) + " m takes " + text(points) +
+                                " vertices, too many: raise cell_size");
+  }
   for (int a = 0; a < 3; ++a) {
     cubes.n[a] = std::max(1, static_cast<int>(std::lround(size[a] / edge)));
     cube[a] = size[a] / cubes.n[a];

@@ -1,12 +1,13 @@
 #include <algorithm>
 #include <cctype>
 #include <filesystem>
-#include <fstream>
 #include <locale>
 #include <sstream>
 #include <stdexcept>
 
 #include "geometry/tet_mesh.h"
+#include "scene/read_file.h"
+#include "tissue_sim/limits.h"
 
 namespace tissue_sim {
 namespace {
@@ -25,15 +26,14 @@ std::string extension_of(const std::string& path) {
 class TetWords {
  public:
   explicit TetWords(const std::string& path) : path_(path) {
-    std::ifstream file(path, std::ios::binary);
-    std::ostringstream all;
-    if (!file || !(all << file.rdbuf())) {
-      std::error_code error;
-      refuse(path, std::filesystem::exists(path, error)
-                       ? "is empty or cannot be read: export it again"
-                       : "does not exist: check the path");
+    std::string all;
+    try {
+      all = read_file(path, kLargestMesh);
+    } catch (const std::invalid_argument& e) {
+      refuse(path, e.what());
     }
-    std::istringstream lines(all.str());
+    if (all.empty()) refuse(path, "is empty: export it again");
+    std::istringstream lines(all);
     std::ostringstream kept;
     for (std::string line; std::getline(lines, line);) {
       kept << line.substr(0, line.find('#')) << '\n';
@@ -44,6 +44,7 @@ class TetWords {
   bool word(std::string& w) { return static_cast<bool>(in_ >> w); }
   double number(const char* what) {
     double v = 0;
+    if (++read_ % 4096 == 0) stop_if_asked();
     if (!(in_ >> v))
       refuse(path_, std::string("ends, or has no number, where ") + what + " should be");
     return v;
@@ -66,6 +67,7 @@ class TetWords {
  private:
   std::string path_;
   std::istringstream in_;
+  unsigned read_ = 0;
 };
 
 TetMesh read_tetgen(const std::string& path) {
@@ -136,17 +138,12 @@ TetMesh read_medit(const std::string& path) {
 }
 
 TetMesh read_vtk(const std::string& path) {
-  {
-    std::ifstream file(path);
-    std::string line;
-    for (int i = 0; i < 3 && std::getline(file, line);) ++i;
-    if (line.rfind("BINARY", 0) == 0) refuse(path, "is binary: save it as ASCII");
-  }
   TetWords in(path);
   TetMesh mesh;
   std::vector<int> offsets, corners, types;
   bool listed = false;  // with a count before each cell, as in versions before 5
   for (std::string word; in.word(word);) {
+    if (word == "BINARY") refuse(path, "is binary: save it as ASCII");
     if (word == "POINTS") {
       const int n = in.count("the number of points");
       in.word(word);
@@ -167,7 +164,10 @@ TetMesh read_vtk(const std::string& path) {
         for (int i = 0; i < size; ++i) corners.push_back(in.count("a vertex's number"));
       } else {
         listed = true;
-        int k = std::stoi(next);
+        double first = 0;
+        std::istringstream(next) >> first;
+        if (!(first >= 0 && first < 1e8)) refuse(path, "has no valid size of a cell");
+        int k = static_cast<int>(first);
         for (int i = 0; i < n; ++i) {
           if (i > 0) k = in.count("a cell's size");
           offsets.push_back(static_cast<int>(corners.size()));
@@ -184,6 +184,9 @@ TetMesh read_vtk(const std::string& path) {
   for (std::size_t i = 0; i < types.size() && i + 1 < offsets.size(); ++i) {
     constexpr int kTetrahedron = 10;
     if (types[i] != kTetrahedron || offsets[i + 1] - offsets[i] != 4) continue;
+    if (offsets[i + 1] > static_cast<int>(corners.size())) {
+      refuse(path, "has a cell beyond its list of vertices: export it again");
+    }
     std::array<int, 4> t;
     std::copy_n(corners.begin() + offsets[i], 4, t.begin());
     mesh.tetrahedra.push_back(t);

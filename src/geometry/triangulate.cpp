@@ -1,8 +1,11 @@
 // Triangles for a scene's shapes: grids on the faces of a cube, bent to what they are to be.
 #include <algorithm>
 #include <cmath>
+#include <stdexcept>
 
 #include "geometry/surface.h"
+#include "scene/scene_text.h"
+#include "tissue_sim/limits.h"
 
 namespace tissue_sim {
 namespace {
@@ -48,8 +51,17 @@ TriangleMesh cube(const std::array<int, 3>& n) {
   return mesh;
 }
 
-int cells(double length, double edge) {
-  return std::max(1, static_cast<int>(std::lround(length / edge)));
+double cells(double length, double edge) { return std::max(1.0, std::round(length / edge)); }
+
+/// The surface of a cube with that many cells along each axis; throws for more than is sensible.
+TriangleMesh cube(const Body& body, double x, double y, double z) {
+  if (const double vertices = 2 * (x * y + y * z + z * x);
+      !(vertices <= static_cast<double>(work_limits().max_points))) {
+    throw std::invalid_argument("body '" + body.name + "': it takes " + text(vertices) +
+                                " vertices of its surface, more than " +
+                                std::to_string(work_limits().max_points) + ": raise cell_size");
+  }
+  return cube({static_cast<int>(x), static_cast<int>(y), static_cast<int>(z)});
 }
 
 /// From the square to the disc, square rings to rings, evenly along them (Shirley and Chiu 1997).
@@ -69,16 +81,15 @@ TriangleMesh triangulate(const Body& body, double edge) {
   TriangleMesh mesh;
   switch (body.shape) {
     case Shape::kBox:
-      mesh = cube(
-          {cells(body.size.x(), edge), cells(body.size.y(), edge), cells(body.size.z(), edge)});
+      mesh = cube(body, cells(body.size.x(), edge), cells(body.size.y(), edge),
+                  cells(body.size.z(), edge));
       for (Vec3& x : mesh.vertices) x = 0.5 * x.cwiseProduct(body.size);
       break;
     case Shape::kBall:
     case Shape::kEllipsoid: {
       const Vec3 radii = body.shape == Shape::kBall ? Vec3::Constant(body.radius) : body.radii;
-      std::array<int, 3> n;
-      for (int a = 0; a < 3; ++a) n[a] = cells(kPi / 2 * radii[a], edge);
-      mesh = cube(n);
+      mesh = cube(body, cells(kPi / 2 * radii[0], edge), cells(kPi / 2 * radii[1], edge),
+                  cells(kPi / 2 * radii[2], edge));
       for (Vec3& x : mesh.vertices) {
         for (int a = 0; a < 3; ++a) x[a] = std::tan(kPi / 4 * x[a]);  // evenly along the arcs
         x = x.normalized().cwiseProduct(radii);
@@ -86,8 +97,8 @@ TriangleMesh triangulate(const Body& body, double edge) {
       break;
     }
     case Shape::kCylinder: {
-      const int around = cells(kPi / 2 * body.radius, edge);
-      mesh = cube({around, around, cells(body.height, edge)});
+      const double around = cells(kPi / 2 * body.radius, edge);
+      mesh = cube(body, around, around, cells(body.height, edge));
       for (Vec3& x : mesh.vertices) {
         to_disc(x.x(), x.y());
         x = x.cwiseProduct(Vec3(body.radius, body.radius, body.height / 2));

@@ -5,6 +5,7 @@
 #include <cstring>
 
 #include "cutting/blade_sweep.h"
+#include "tissue_sim/limits.h"
 
 namespace tissue_sim {
 namespace {
@@ -194,6 +195,7 @@ std::vector<std::int32_t> find_crossed(const MlsState& s, const BladePath& path,
   std::vector<std::vector<std::int32_t>> of_block(blocks);
   std::vector<std::int32_t> found;
   for (const SweepPart& part : sweep_parts(path)) {
+    stop_if_asked();
     for (const SweptEdge& edge : part.edges) {
       const SweepOfEdge sweep{part.begin, part.end, edge, Parallelogram(edge)};
       s.cpu->for_each(blocks, [&](int block) {

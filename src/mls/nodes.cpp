@@ -7,6 +7,7 @@
 #include "geometry/nearest_surface.h"
 #include "mls/placement.h"
 #include "scene/scene_text.h"
+#include "tissue_sim/limits.h"
 
 namespace tissue_sim {
 namespace {
@@ -69,6 +70,7 @@ MlsNodes make_mls_nodes(const Scene& scene, std::vector<std::string>* notes) {
     if (!has_given_nodes(body)) {
       surface = std::make_unique<NearestSurface>(body, 2 * widest * spacing);
     }
+    const LimitWork rest(with_points(work_limits().max_points - nodes.count()));
     nodes.gaps.emplace_back();
     for (const PlacedNode& n :
          place_nodes(body, scene.mls, spacing, scene.seed + b, notes, nodes.gaps.back())) {

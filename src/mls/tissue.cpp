@@ -14,6 +14,7 @@
 #include "mls/linearised_motion.h"
 #include "mls/node_contact.h"
 #include "mls/tear.h"
+#include "tissue_sim/limits.h"
 
 namespace tissue_sim {
 namespace {
@@ -152,6 +153,7 @@ double MlsTissue::run_part(const FramePart& part) {
   MlsState& s = *state_;
   const Frame& frame = *frame_;
   for (int i = 0; i < part.substeps.count; ++i) {
+    stop_if_asked();
     const double share = part.substeps.share(i + 1, part.from, part.to);
     s.colliders = frame.colliders.at(share);
     s.anchors = mls_anchors_at(s.scene, frame.input, share);

@@ -15,6 +15,7 @@
 #include "mpm/tear/bond_bridges.h"
 #include "mpm/tear/debris.h"
 #include "mpm/tear/tear.h"
+#include "tissue_sim/limits.h"
 #include "tools/frame_colliders.h"
 #include "tools/tool_motion.h"
 
@@ -106,6 +107,7 @@ int MpmTissue::run(const FramePart& part) {
   result_.substep = std::max<double>(result_.substep, substeps.longest());
   int done = 0;
   for (int check = 0; done < substeps.count && frame.tearing.empty(); ++done) {
+    stop_if_asked();
     const double share = substeps.share(done + 1, part.from, part.to);
     const float dt = substeps.at(done);
     s.colliders = frame.colliders.at(share);

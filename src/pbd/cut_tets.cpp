@@ -8,6 +8,7 @@
 #include <map>
 
 #include "pbd/cut.h"
+#include "tissue_sim/limits.h"
 
 namespace tissue_sim {
 namespace pbd {
@@ -297,6 +298,7 @@ bool cut_tetrahedra(State& s, const BladePath& path, const Array<float>& before,
   }
   std::vector<Broken> broken;
   for (const SweepPart& part : sweep_parts(path)) {
+    stop_if_asked();
     for (std::size_t i = 0; i < s.faces.size(); ++i) {
       InnerFace& f = s.faces[i];
       if (f.is_cut) continue;

@@ -5,6 +5,8 @@
 #include <numeric>
 #include <stdexcept>
 
+#include "tissue_sim/limits.h"
+
 namespace tissue_sim {
 namespace pbd {
 namespace {
@@ -96,6 +98,7 @@ std::unique_ptr<State> make_state(const Scene& scene, std::vector<std::string>* 
     for (const Inclusion& i : body.inclusions) tell(i.material);
   }
   for (std::size_t b = 0; b < scene.bodies.size(); ++b) {
+    const LimitWork rest(with_points(work_limits().max_points - s->vertices.size()));
     if (scene.pbd.model == PbdModel::kSurface) {
       add_surface_body(*s, static_cast<int>(b), notes);
     } else {

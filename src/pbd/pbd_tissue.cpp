@@ -8,6 +8,7 @@
 #include "pbd/find_touches.h"
 #include "pbd/free_flight.h"
 #include "pbd/model.h"
+#include "tissue_sim/limits.h"
 #include "tools/frame_colliders.h"
 #include "tools/tool_motion.h"
 
@@ -89,6 +90,7 @@ void PbdTissue::run_steps(const FrameColliders& colliders, int steps, float h) {
   const std::vector<pbd::Flight> flights = pbd::flights(s);
   std::fill(s.pushed.begin(), s.pushed.end(), std::uint8_t{0});
   for (int i = 0; i < steps; ++i) {
+    stop_if_asked();
     const double share = (i + 1.0) / steps;
     s.colliders = colliders.at(share);
     std::vector<ColliderLoad> loads(s.colliders.size());

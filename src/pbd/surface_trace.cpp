@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "pbd/cut.h"
+#include "tissue_sim/limits.h"
 
 namespace tissue_sim {
 namespace pbd {
@@ -135,6 +136,7 @@ void SurfaceTrace::run() {
   for (const auto& [e, of] : edges_.all()) all.push_back(e);
   for (const Edge& e : all) await(e, 0, 0, 0);
   while (!queue_.empty()) {
+    stop_if_asked();
     const Passing next = queue_.top();
     queue_.pop();
     pass(next);

@@ -2,6 +2,8 @@
 
 #include <string>
 
+#include "ros/guarded.h"
+
 namespace tissue_sim {
 
 using diagnostic_msgs::DiagnosticStatus;
@@ -13,8 +15,9 @@ Diagnostics::Diagnostics(ros::NodeHandle& node, const SimulationThread& simulati
   updater_.add("simulation", this, &Diagnostics::simulation);
   updater_.add("tools", this, &Diagnostics::tools);
   updater_.add("recording", this, &Diagnostics::recording);
-  timer_ = node.createWallTimer(ros::WallDuration(1),
-                                [this](const ros::WallTimerEvent&) { updater_.force_update(); });
+  timer_ = node.createWallTimer(ros::WallDuration(1), [this](const ros::WallTimerEvent&) {
+    guard("diagnostics", [this] { updater_.force_update(); });
+  });
 }
 
 void Diagnostics::simulation(Status& status) {
@@ -46,6 +49,7 @@ void Diagnostics::simulation(Status& status) {
   status.add("particles", s.particles);
   status.add("fragments", s.fragments);
   status.add("device", s.device);
+  status.add("messages that could not be used", thrown_in_callbacks().load());
 }
 
 void Diagnostics::tools(Status& status) {

@@ -6,6 +6,8 @@
 #include <cmath>
 #include <string>
 
+#include "ros/stamps.h"
+
 namespace tissue_sim {
 namespace {
 
@@ -13,11 +15,6 @@ constexpr std::int64_t kSecond = 1000000000;   // [ns]
 constexpr std::int64_t kStale = kSecond;       // poses that much older than the clock are kept ones
 constexpr std::int64_t kAhead = 10 * kSecond;  // no clock goes, and no pose is, so far ahead
 constexpr std::chrono::milliseconds kIdle(200);  // between two looks at a simulation at rest
-
-std::int64_t nanoseconds(const ros::Time& t) { return static_cast<std::int64_t>(t.toNSec()); }
-ros::Time ros_time_of(std::int64_t t) {
-  return ros::Time().fromNSec(static_cast<std::uint64_t>(std::max<std::int64_t>(t, 0)));
-}
 
 WallClock::duration wall_duration(double s) {
   return std::chrono::duration_cast<WallClock::duration>(std::chrono::duration<double>(s));
@@ -43,15 +40,15 @@ void FrameClock::restart(double frame_rate) {
 
 void FrameClock::resume() {
   pace_.restart(WallClock::now());
-  if (schedule_.begun()) schedule_.move(nanoseconds(ros_time()));
+  if (schedule_.begun()) schedule_.move(in_nanoseconds(ros_time()));
 }
 
 void FrameClock::set_ros_time(const ros::Time& now) {
-  const ros::Duration step = now - ros_time_;
-  if (parameters_.time == TimeMode::kRos && !ros_time_.isZero() &&
-      step.toSec() * kSecond > kAhead && schedule_.begun()) {
-    ROS_WARN("/clock jumped ahead by %.1f s: the simulation goes on from there", step.toSec());
-    schedule_.move(nanoseconds(now));
+  const double step = seconds_between(ros_time_, now);
+  if (parameters_.time == TimeMode::kRos && !ros_time_.isZero() && step * kSecond > kAhead &&
+      schedule_.begun()) {
+    ROS_WARN("/clock jumped ahead by %.1f s: the simulation goes on from there", step);
+    schedule_.move(in_nanoseconds(now));
   }
   ros_time_ = now;
 }
@@ -67,14 +64,14 @@ ros::Time FrameClock::stamp() const {
 
 double FrameClock::behind() const {
   if (parameters_.time != TimeMode::kRos || !schedule_.begun()) return 0;
-  return std::max(0.0, (nanoseconds(ros_time()) - schedule_.due()) * 1e-9);
+  return std::max(0.0, (in_nanoseconds(ros_time()) - schedule_.due()) * 1e-9);
 }
 
 bool FrameClock::ros_due(const ToolInputs& tools) {
   const ros::Time time = ros_time();
   if (time.isZero()) return false;
   if (!first_time_) first_time_ = time;
-  const std::int64_t now = nanoseconds(time), begin = nanoseconds(*first_time_);
+  const std::int64_t now = in_nanoseconds(time), begin = in_nanoseconds(*first_time_);
   if (!schedule_.begun()) {
     // The first pose's stamp decides when frame 0 is, not when somebody happened to look: so the
     // same poses meet the same frames at every rate at which a bag is played.
@@ -125,7 +122,7 @@ WallTime FrameClock::wake() const {
   const WallTime now = WallClock::now();
   if (parameters_.time == TimeMode::kRos) {
     if (ros::Time::isSimTime()) return now + kIdle;  // /clock wakes
-    const double left = (schedule_.due() - nanoseconds(ros::Time::now())) * 1e-9;
+    const double left = (schedule_.due() - in_nanoseconds(ros::Time::now())) * 1e-9;
     return now + std::min<WallClock::duration>(kIdle, wall_duration(std::max(left, 0.0)));
   }
   if (parameters_.time == TimeMode::kLockstep && pace_.due() <= now) return now + kIdle;

@@ -11,6 +11,10 @@ JawAngle jaw_angle(const sensor_msgs::JointState& message) {
     jaw.problem = "the message has no position";
     return jaw;
   }
+  if (message.position.size() > kMostJoints || message.name.size() > kMostJoints) {
+    jaw.problem = "the message has more than " + std::to_string(kMostJoints) + " joints";
+    return jaw;
+  }
   std::size_t joint = 0;
   for (std::size_t i = 0; i < message.position.size() && i < message.name.size(); ++i) {
     if (message.name[i].find("jaw") != std::string::npos) joint = i;

@@ -7,6 +7,8 @@
 
 namespace tissue_sim {
 
+constexpr std::size_t kMostJoints = 1000;  ///< of a message; samples may wait for their frame
+
 struct JawAngle {
   double angle = 0;     ///< [rad], as it came; below 0 squeezes
   std::string problem;  ///< why it cannot be used, with values and the guess; "" for none

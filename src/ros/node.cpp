@@ -8,6 +8,8 @@
 #include <set>
 #include <string>
 
+#include "frame/first_frame.h"
+#include "ros/guarded.h"
 #include "ros/remappings.h"
 #include "scene/scene_text.h"
 
@@ -25,15 +27,20 @@ ros::NodeHandle with_queue(const ros::NodeHandle& node, ros::CallbackQueue& queu
 
 }  // namespace
 
-Node::Node(const ros::NodeHandle& node)
+Node::Node(const ros::NodeHandle& node, bool owns_process)
     : pose_node_(with_queue(node, pose_queue_)),
       service_node_(with_queue(node, service_queue_)),
-      parameters_(read_parameters(node)),
+      parameters_(read_parameters(node, &watch_.stopping())),
       recorder_(parameters_.recording_folder, parameters_.recording_queue * kMebibyte,
-                parameters_.recording_reserve * kMebibyte),
+                parameters_.recording_reserve * kMebibyte, parameters_.recording_limit * kMebibyte),
       frames_(parameters_.world_frame, parameters_.tf_tolerance),
       pose_spinner_(1, &pose_queue_),
       service_spinner_(kServiceThreads, &service_queue_) {
+  if (owns_process) {
+    watch_.end_process([this] { stop_recording(); });
+  }
+  // What who starts the node asks for may take as long as it does.
+  const LimitWork limit(parameters_.work);
   Session session = make_session(read_scene_parameters(node));
   const Scene scene = session.simulation->scene();
   Parameters first = parameters_;
@@ -49,8 +56,9 @@ Node::Node(const ros::NodeHandle& node)
         clock_publisher_.publish(message);
       });
   connect_clock();
-  services_ = std::make_unique<Services>(service_node_, scene, *simulation_, recorder_, frames_,
-                                         [this](const Scene& s) { return make_session(s); });
+  services_ =
+      std::make_unique<Services>(service_node_, scene, *simulation_, recorder_, frames_,
+                                 parameters_, [this](const Scene& s) { return make_session(s); });
   diagnostics_ = std::make_unique<Diagnostics>(service_node_, *simulation_, recorder_);
   if (record.wanted) record_from_start(record.name);
   pose_spinner_.start();
@@ -58,10 +66,19 @@ Node::Node(const ros::NodeHandle& node)
 }
 
 Node::~Node() {
+  watch_.stop();
   // First what services may be waiting for, then the services, then what they call.
   if (simulation_) simulation_->stop();
   service_spinner_.stop();
   pose_spinner_.stop();
+  stop_recording();
+}
+
+void Node::stop_recording() {
+  try {
+    recorder_.stop();
+  } catch (const std::exception&) {  // nothing was recorded, or it has been said
+  }
 }
 
 void Node::record_from_start(const std::string& name) {
@@ -107,9 +124,9 @@ void Node::connect_clock() {
         "/use_sim_time is set: messages carry the time of /clock, frames do not keep to it "
         "(time: ros would)");
   }
-  clock_subscriber_ = pose_node_.subscribe<rosgraph_msgs::Clock>(
-      "/clock", 100,
-      [this](const rosgraph_msgs::Clock::ConstPtr& m) { simulation_->on_clock(m->clock); });
+  clock_subscriber_ = listen<rosgraph_msgs::Clock>(
+      pose_node_, "/clock", 100,
+      [this](const auto& event) { simulation_->on_clock(event.getConstMessage()->clock); });
 }
 
 Session Node::make_session(const Scene& asked) {
@@ -140,10 +157,14 @@ Session Node::make_session(const Scene& asked) {
   }
   for (const Tool& tool : scene.tools) {
     names.insert(tool.name);
+    if (tool.name == parameters_.world_frame) {
+      throw std::invalid_argument("tools: a tool is named '" + tool.name +
+                                  "' as the world's frame (~world_frame): give it another name");
+    }
     const auto source = parameters_.tools.find(tool.name);
     session.tools->push_back(std::make_unique<ToolInput>(
         pose_node_, tool, source == parameters_.tools.end() ? ToolParameters() : source->second,
-        limits, frames_, box, recorder_, on_sample));
+        limits, frames_, box, recorder_, on_sample, parameters_.publish_tf));
   }
   for (const auto& source : parameters_.tools) {
     if (names.count(source.first) == 0) {
@@ -164,6 +185,9 @@ Session Node::make_session(const Scene& asked) {
       std::make_shared<Publications>(service_node_, scene, parameters, recorder_);
   Tissue& tissue = session.simulation->tissue();
   for (const std::string& note : tissue.notes()) ROS_WARN("%s", note.c_str());
+  for (const std::string& note : ground_notes(scene, tissue.fragments())) {
+    ROS_WARN("%s", note.c_str());
+  }
   ROS_INFO("scene '%s': %d particles, cells of %g mm, %zu tools, on %s", scene.name.c_str(),
            tissue.point_count(), scene.cell_size * 1e3, scene.tools.size(),
            tissue.device_name().c_str());

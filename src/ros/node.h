@@ -13,6 +13,7 @@
 #include "ros/parameters.h"
 #include "ros/recorder.h"
 #include "ros/services.h"
+#include "ros/shutdown_watch.h"
 #include "ros/simulation_thread.h"
 
 namespace tissue_sim {
@@ -21,7 +22,8 @@ class Node {
  public:
   /// Reads the parameters below `node`, builds their scene and starts the simulation. Throws
   /// std::exception with one line that says why it cannot.
-  explicit Node(const ros::NodeHandle& node);
+  /// `owns_process`: where it cannot end in time, the process ends.
+  explicit Node(const ros::NodeHandle& node, bool owns_process = false);
   ~Node();
 
  private:
@@ -30,7 +32,9 @@ class Node {
   /// that the bag holds frame 0. While there is no /clock it waits for one, and says so.
   void record_from_start(const std::string& name);
   void connect_clock();
+  void stop_recording();
 
+  ShutdownWatch watch_;  // first: outlives what works
   // Queues of their own: a service that takes long does not hold up the poses.
   ros::CallbackQueue pose_queue_, service_queue_;
   ros::NodeHandle pose_node_, service_node_;

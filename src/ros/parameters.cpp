@@ -8,6 +8,7 @@
 #include <cstdlib>
 #include <filesystem>
 #include <set>
+#include <sstream>
 #include <stdexcept>
 
 #include "geometry/chord.h"
@@ -26,7 +27,8 @@ const std::set<std::string> kKnown = {
     "time_factor", "publish_clock", "lockstep_tools", "paused", "cloud_rate", "cloud_stride",
     "cloud_surface_only", "cloud_fields", "fragment_rate", "state_rate", "wrench_rate",
     "marker_rate", "checksum", "force_scale", "publish_tf", "max_tool_speed", "max_tool_turn_rate",
-    "tf_tolerance", "recording_folder", "record", "recording_queue", "recording_reserve", "tools",
+    "tf_tolerance", "recording_folder", "record", "recording_queue", "recording_reserve",
+    "recording_limit", "load_folders", "longest_work", "max_points", "tools",
     // of diagnostic_updater
     "diagnostic_period", "diagnostic_updater_use_fqn"};
 
@@ -213,14 +215,22 @@ void read_time(const ros::NodeHandle& node, Parameters& p) {
 
 }  // namespace
 
+WorkLimits Parameters::limits() const {
+  WorkLimits limits = work;
+  limits.deadline = std::chrono::steady_clock::now() +
+                    std::chrono::milliseconds(static_cast<std::int64_t>(1e3 * longest_work));
+  return limits;
+}
+
 RecordRequest record_request(const std::string& value) {
   if (value.empty() || value == "false") return {};
   return {true, value == "true" ? "" : value};
 }
 
-Parameters read_parameters(const ros::NodeHandle& node) {
+Parameters read_parameters(const ros::NodeHandle& node, const std::atomic<bool>* stop) {
   warn_of_unknown(node);
   Parameters p;
+  p.work.stop = stop;
   read_time(node, p);
   read(node, "world_frame", p.world_frame, "must be the name of a tf frame");
   if (!p.world_frame.empty() && p.world_frame.front() == '/') p.world_frame.erase(0, 1);
@@ -257,6 +267,17 @@ Parameters read_parameters(const ros::NodeHandle& node) {
   node.deleteParam("record");
   read(node, "recording_queue", p.recording_queue, 1, 1e6);
   read(node, "recording_reserve", p.recording_reserve, 1, 1e9);
+  read(node, "recording_limit", p.recording_limit, 0, 1e9);
+  read(node, "longest_work", p.longest_work, 0.1, 1e6);
+  int max_points = 20000000;
+  read(node, "max_points", max_points, 1, 200000000);
+  p.work.max_points = max_points;
+  std::string folders;
+  read(node, "load_folders", folders, "must be paths of folders, parted by ':'");
+  std::istringstream list(folders);
+  for (std::string folder; std::getline(list, folder, ':');) {
+    if (!folder.empty()) p.load_folders.push_back(absolute(folder));
+  }
   XmlRpcValue tools;
   if (node.getParam("tools", tools)) {
     if (tools.getType() != XmlRpcValue::TypeStruct) {

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "ros/pose_check.h"
+#include "tissue_sim/limits.h"
 #include "tissue_sim/scene.h"
 
 namespace tissue_sim {
@@ -53,10 +54,19 @@ struct Parameters {
   std::string record;              ///< name of a recording from the first frame on; "" for none
   double recording_queue = 1024;   ///< [MiB]
   double recording_reserve = 256;  ///< disk space left free [MiB]
+  double recording_limit = 0;      ///< largest bag [MiB], 0 for as much as the disk takes
+  std::vector<std::string> load_folders;  ///< that services load from, absolute; empty: anywhere
+  double longest_work = 300;              ///< that a frame, or building a scene, takes at most [s]
+  /// Of building and of frames; `stop` is whoever's who runs them.
+  WorkLimits work;
   std::map<std::string, ToolParameters> tools;
+
+  /// `work`, from now on for longest_work.
+  WorkLimits limits() const;
 };
 
-Parameters read_parameters(const ros::NodeHandle& node);
+/// `stop`, if given, ends the work of the node once it is true.
+Parameters read_parameters(const ros::NodeHandle& node, const std::atomic<bool>* stop = nullptr);
 
 /// The scene that the parameters ask for: ~scene_file, or ~scene (YAML text or a tree of
 /// parameters), by ~method if that is set, with ~mesh and ~mesh_scale in place of the first body's

@@ -29,6 +29,12 @@ const char* name_of(Refusal refusal) {
       return "unknown frame";
     case Refusal::kJump:
       return "jump";
+    case Refusal::kFar:
+      return "too far";
+    case Refusal::kStamp:
+      return "stamp far ahead";
+    case Refusal::kOwnFrame:
+      return "its own frame";
   }
   return "";
 }
@@ -62,6 +68,11 @@ PoseCheck::Verdict PoseCheck::check(Pose& pose, double stamp, double now) {
   if (!pose.position.allFinite() || !pose.orientation.coeffs().allFinite()) {
     verdict.refusal = Refusal::kNotFinite;
     verdict.text = "a value is NaN or infinite";
+    return verdict;
+  }
+  if (!(pose.position.cwiseAbs().maxCoeff() <= kFarthestPose)) {
+    verdict.refusal = Refusal::kFar;
+    verdict.text = format("it is %.3g m from the world's origin", pose.position.norm(), 0, 0);
     return verdict;
   }
   if (!is_rotation(pose.orientation)) {

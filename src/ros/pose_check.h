@@ -11,8 +11,18 @@
 namespace tissue_sim {
 
 /// Why a pose is not used.
-enum class Refusal { kNotFinite, kNoRotation, kOlder, kUnknownFrame, kJump };
-constexpr int kRefusalCount = 5;
+enum class Refusal {
+  kNotFinite,
+  kNoRotation,
+  kOlder,
+  kUnknownFrame,
+  kJump,
+  kFar,       ///< more than kFarthestPose from the world's origin
+  kStamp,     ///< see is_far_ahead()
+  kOwnFrame,  ///< in the frame that this node publishes for the tool itself
+};
+constexpr int kRefusalCount = 8;
+constexpr double kFarthestPose = 1e6;  ///< that anything is from the world's origin [m]
 
 /// As it stands in diagnostics: "not finite", "older than the last"...
 const char* name_of(Refusal refusal);

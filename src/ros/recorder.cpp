@@ -2,6 +2,7 @@
 
 #include <fcntl.h>
 #include <ros/console.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -10,7 +11,9 @@
 #include <cstring>
 #include <stdexcept>
 
+#include "ros/bag_repair.h"
 #include "ros/recording_path.h"
+#include "ros/stamps.h"
 #include "ros/warn_seldom.h"
 
 namespace tissue_sim {
@@ -28,23 +31,44 @@ void create_new(const std::string& path) {
   ::close(file);
 }
 
+constexpr std::chrono::milliseconds kFlush(400);  // what a killed node loses at most
+constexpr std::uint32_t kChunkSize = 768 * 1024;  // rosbag's own [bytes]
+
+/// Zeros for a file that is not there.
+FileIdentity identity_of(const std::string& path) {
+  struct stat status;
+  if (stat(path.c_str(), &status) != 0) return {};
+  return {status.st_dev, status.st_ino};
+}
+
+/// What is left in the buffers of a file that this process has open, and cannot close, goes nowhere
+/// instead of behind the end of the file.
+void disconnect(const FileIdentity& file) {
+  const int nowhere = open("/dev/null", O_WRONLY | O_CLOEXEC);
+  struct stat status;
+  for (int number = 3; nowhere >= 0 && number < 4096; ++number) {
+    if (number == nowhere || fstat(number, &status) != 0) continue;
+    if (FileIdentity{status.st_dev, status.st_ino} == file) dup2(nowhere, number);
+  }
+  if (nowhere >= 0) ::close(nowhere);
+}
+
 constexpr std::int64_t kJump = 100000000;  // what no two threads' times are apart [ns]
 
 }  // namespace
 
 ros::Time BagTime::next(const ros::Time& time) {
-  std::int64_t at =
-      static_cast<std::int64_t>(std::max<ros::Time>(time, ros::TIME_MIN).toNSec()) + shift_;
+  std::int64_t at = in_nanoseconds(std::max<ros::Time>(time, ros::TIME_MIN)) + shift_;
   if (at < last_ - kJump) {
     shift_ += last_ - at;
     at = last_;
   }
   last_ = std::max(at, last_ + 1);
-  return ros::Time().fromNSec(static_cast<std::uint64_t>(last_));
+  return ros_time_of(last_);
 }
 
-Recorder::Recorder(std::string folder, double queue, double reserve)
-    : folder_(std::move(folder)), queue_limit_(queue), reserve_(reserve) {}
+Recorder::Recorder(std::string folder, double queue, double reserve, double limit)
+    : folder_(std::move(folder)), queue_limit_(queue), reserve_(reserve), limit_(limit) {}
 
 Recorder::~Recorder() {
   try {
@@ -68,10 +92,12 @@ std::string Recorder::start(const std::string& name, std::set<std::string> topic
     throw std::runtime_error(text);
   }
   create_new(active);
+  file_ = identity_of(active);
   try {
     bag_ = std::make_unique<rosbag::Bag>();
     bag_->open(active, rosbag::bagmode::Write);
     bag_->setCompression(rosbag::compression::LZ4);
+    bag_->setChunkThreshold(kChunkSize);
   } catch (const std::exception& e) {
     std::remove(active.c_str());
     throw std::runtime_error("the recording " + path + " cannot be written: " + e.what());
@@ -145,10 +171,18 @@ void Recorder::push(Item item, bool must_keep) {
 void Recorder::write_all() {
   const std::string file = status().path + ".active";
   double unchecked = 2 * kMiB;  // bytes written since the disk was asked for its free space
+  WallTime flushed = WallClock::now();
   for (;;) {
+    if (const WallTime now = WallClock::now(); now - flushed >= kFlush) {
+      flushed = now;
+      flush();
+    }
     std::unique_lock<std::mutex> lock(mutex_);
-    wake_.wait(lock, [this] { return stopping_ || !queue_.empty(); });
-    if (queue_.empty()) return;
+    wake_.wait_for(lock, kFlush, [this] { return stopping_ || !queue_.empty(); });
+    if (queue_.empty()) {
+      if (stopping_) return;
+      continue;
+    }
     const Item item = std::move(queue_.front());
     queue_.pop_front();
     lock.unlock();
@@ -162,6 +196,7 @@ void Recorder::write_all() {
       }
     }
     item.write(*bag_, item.time);
+    if (bag_->getChunkThreshold() == 0) bag_->setChunkThreshold(kChunkSize);
     lock.lock();
     status_.queued -= item.bytes;
     ++status_.messages;
@@ -187,23 +222,59 @@ void Recorder::run() {
   status_.error = ended;
 }
 
+void Recorder::flush() {
+  const std::string active = status().path + ".active";
+  if (!(identity_of(active) == file_)) {
+    throw std::runtime_error(active + " is gone: somebody removed it");
+  }
+  // Ends the chunk. What rosbag keeps of it in memory goes when a chunk grows too large, so the
+  // next message is one that is: see write_all().
+  bag_->setChunkThreshold(0);
+  struct stat status;
+  if (limit_ > 0 && stat(active.c_str(), &status) == 0 &&
+      static_cast<double>(status.st_size) > limit_) {
+    throw std::runtime_error("it has reached recording_limit");
+  }
+}
+
+std::string Recorder::rescue(const std::string& why) {
+  const std::string active = status().path + ".active";
+  // Its destructor closes once more, throws again, and would end the program.
+  (void)bag_.release();
+  disconnect(file_);
+  try {
+    const BagRepair repaired = repair_bag(active);
+    const std::lock_guard<std::mutex> lock(mutex_);
+    status_.messages = repaired.messages;
+    return "";
+  } catch (const std::exception& e) {
+    return active + " could not be closed (" + why + ", " + e.what() +
+           "): when there is space again, 'rosrun tissue_sim repair_bag " + active +
+           "' makes what is in it readable";
+  }
+}
+
 std::string Recorder::close(const std::string& error) {
   const std::string path = status().path, active = path + ".active";
   const std::string ended = "the recording ended: " + (error.empty() ? "" : error + "; ");
+  std::string unclosed;
   try {
     bag_->close();
   } catch (const std::exception& e) {
-    // Its destructor closes once more, throws again, and would end the program.
-    (void)bag_.release();
-    return ended + active + " could not be closed (" + e.what() +
-           "): 'rosbag reindex' makes what is in it readable";
+    unclosed = e.what();
+    const std::string lost = rescue(unclosed);
+    if (!lost.empty()) return ended + lost;
+  }
+  if (!(identity_of(active) == file_)) {
+    return ended + active + " was removed while it was recorded: what came before is lost";
   }
   try {
     rename_new(active, path);
   } catch (const std::exception& e) {
     return ended + e.what() + "; it is whole";
   }
-  return error.empty() ? "" : ended + "what came before is in " + path;
+  if (!error.empty()) return ended + "what came before is in " + path;
+  return unclosed.empty() ? "" : ended + unclosed + "; what came before is in " + path;
 }
 
 }  // namespace tissue_sim

@@ -39,11 +39,18 @@ class BagTime {
   std::int64_t last_ = 0, shift_ = 0;  // [ns]
 };
 
+/// Which file it is, whatever its name.
+struct FileIdentity {
+  std::uint64_t device = 0, number = 0;
+  bool operator==(const FileIdentity& o) const { return device == o.device && number == o.number; }
+};
+
 /// Thread-safe. Nothing but start() and stop() ever waits for the disk.
 class Recorder {
  public:
   /// `queue` bytes of messages may wait for the disk; `reserve` bytes of the disk stay free.
-  Recorder(std::string folder, double queue, double reserve);
+  /// A recording that has grown to `limit` bytes ends; 0 for none.
+  Recorder(std::string folder, double queue, double reserve, double limit = 0);
   /// Ends the recording.
   ~Recorder();
 
@@ -94,12 +101,18 @@ class Recorder {
   /// Closes and renames the bag. Returns what there is to say of a recording that `error` ended, or
   /// that this does; else "".
   std::string close(const std::string& error);
+  /// The same where rosbag cannot: see repair_bag().
+  std::string rescue(const std::string& why);
+  /// Ends the chunk, so that all that was written is there whatever becomes of this process. Throws
+  /// where the bag is gone, or too large.
+  void flush();
 
   const std::string folder_;
-  const double queue_limit_, reserve_;  // [bytes]
-  std::mutex control_;                  // held by start() and stop()
+  const double queue_limit_, reserve_, limit_;  // [bytes]
+  std::mutex control_;                          // held by start() and stop()
   std::thread thread_;
   std::unique_ptr<rosbag::Bag> bag_;  // of the thread, while it runs
+  FileIdentity file_;                 // the bag's, while it is written
 
   mutable std::mutex mutex_;  // of what follows
   std::condition_variable wake_;

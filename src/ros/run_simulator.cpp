@@ -20,7 +20,7 @@ int run_simulator(int argc, char** argv) {
   std::signal(SIGTERM, [](int) { ros::requestShutdown(); });
   std::unique_ptr<Node> simulator;
   try {
-    simulator = std::make_unique<Node>(node);
+    simulator = std::make_unique<Node>(node, true);
   } catch (const std::exception& e) {
     ROS_FATAL("cannot start: %s", e.what());
     return 1;

@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "ros/conversions.h"
+#include "ros/guarded.h"
 #include "ros/pose_check.h"
 #include "ros/warn_seldom.h"
 
@@ -19,15 +20,15 @@ SceneInput::SceneInput(ros::NodeHandle node, const Scene& scene, const Frames& f
       poses_.emplace_back();
       last_.push_back(anchor.origin());
       if (anchor.name.empty()) continue;
-      subscribers_.push_back(node.subscribe<geometry_msgs::PoseStamped>(
-          "anchors/" + anchor.name + "/measured_cp", 10,
-          [this, i](const geometry_msgs::PoseStamped::ConstPtr& m) { on_pose(i, *m); }));
+      subscribers_.push_back(listen<geometry_msgs::PoseStamped>(
+          node, "anchors/" + anchor.name + "/measured_cp", 10,
+          [this, i](const auto& event) { on_pose(i, *event.getConstMessage()); }));
     }
   }
-  subscribers_.push_back(node.subscribe<geometry_msgs::Vector3>(
-      "gravity", 10, [this](const geometry_msgs::Vector3::ConstPtr& m) { on_gravity(*m); }));
-  subscribers_.push_back(node.subscribe<std_msgs::Float64>(
-      "damping", 10, [this](const std_msgs::Float64::ConstPtr& m) { on_damping(*m); }));
+  subscribers_.push_back(listen<geometry_msgs::Vector3>(
+      node, "gravity", 10, [this](const auto& event) { on_gravity(*event.getConstMessage()); }));
+  subscribers_.push_back(listen<std_msgs::Float64>(
+      node, "damping", 10, [this](const auto& event) { on_damping(*event.getConstMessage()); }));
 }
 
 void SceneInput::on_pose(int anchor, const geometry_msgs::PoseStamped& message) {
@@ -50,7 +51,7 @@ void SceneInput::on_pose(int anchor, const geometry_msgs::PoseStamped& message) 
   }
   const std::lock_guard<std::mutex> lock(mutex_);
   const double step = (pose.position - last_[anchor]).norm();
-  if (step > farthest_) {
+  if (!(step <= farthest_)) {  // nor is it a number
     WARN_SELDOM(1,
                 "anchor %s: a pose is %g m from where it is; in a frame it moves by %g m at "
                 "most (max_tool_speed)",

@@ -16,6 +16,9 @@ bool answer(Response& response, const char* service, Work work) {
   } catch (const std::exception& e) {
     response.message = e.what();
     response.success = false;
+  } catch (...) {
+    response.message = "it cannot be done";
+    response.success = false;
   }
   if (!response.success) ROS_WARN("%s refused: %s", service, response.message.c_str());
   return true;

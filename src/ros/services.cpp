@@ -7,16 +7,19 @@
 
 #include "geometry/mesh.h"
 #include "ros/conversions.h"
+#include "ros/recording_path.h"
 #include "ros/service_answer.h"
 
 namespace tissue_sim {
 
 Services::Services(ros::NodeHandle& node, const Scene& scene, SimulationThread& simulation,
-                   Recorder& recorder, const Frames& frames, MakeSession make_session)
+                   Recorder& recorder, const Frames& frames, const Parameters& parameters,
+                   MakeSession make_session)
     : node_(node),
       simulation_(simulation),
       recorder_(recorder),
       frames_(frames),
+      parameters_(parameters),
       make_session_(std::move(make_session)),
       scene_(scene) {
   servers_.push_back(node.advertiseService("cut", &Services::cut, this));
@@ -31,6 +34,15 @@ Services::Services(ros::NodeHandle& node, const Scene& scene, SimulationThread& 
   bool (Services::*start)(StartRecording::Request&, StartRecording::Response&) =
       &Services::start_recording;
   servers_.push_back(node.advertiseService("start_recording", start, this));
+}
+
+std::unique_lock<std::mutex> Services::begin_building() {
+  std::unique_lock<std::mutex> lock(rebuilding_, std::try_to_lock);
+  if (!lock) {
+    throw std::runtime_error(
+        "another scene is being built, or a recording begins: wait for its answer");
+  }
+  return lock;
 }
 
 BladePath Services::read_path(const Cut::Request& request) const {
@@ -73,7 +85,9 @@ BladePath Services::read_path(const Cut::Request& request) const {
     }
     pose.orientation.normalize();
     path.poses.push_back(frame * pose);
+    path.poses.back().orientation.normalize();
   }
+  check_path(path);  // as it is in the world: what is refused here stops no simulation
   return path;
 }
 
@@ -114,6 +128,8 @@ std::string Services::start_recording(const std::string& path,
         "/use_sim_time is set and no /clock has come yet: all would be recorded at the time 0; "
         "start the clock (rosbag play --clock) or unset /use_sim_time");
   }
+  // While a scene is built the present one would be recorded, and then the other.
+  const std::lock_guard<std::mutex> lock(rebuilding_);
   const std::string bag = recorder_.start(path, select(topics));
   records_all_ = topics.empty();
   simulation_.record_scene();
@@ -145,7 +161,8 @@ bool Services::stop_recording(std_srvs::Trigger::Request&, std_srvs::Trigger::Re
 
 bool Services::reset(std_srvs::Trigger::Request&, std_srvs::Trigger::Response& response) {
   return answer(response, "reset", [&] {
-    const std::lock_guard<std::mutex> lock(rebuilding_);
+    const auto lock = begin_building();
+    const LimitWork limit(parameters_.limits());
     simulation_.reset(std::make_unique<Simulation>(scene_));
     return std::string("frame 0 of scene '") + scene_.name + "'";
   });
@@ -202,10 +219,20 @@ bool Services::load_scene(LoadScene::Request& request, LoadScene::Response& resp
       throw std::runtime_error("give one of path and yaml, not " +
                                std::string(request.path.empty() ? "none" : "both"));
     }
-    const std::lock_guard<std::mutex> lock(rebuilding_);
+    const auto lock = begin_building();
+    const LimitWork limit(parameters_.limits());
+    const auto permitted = [this](const std::string& address, const char* kind) {
+      const std::string path = resolve_path(address, kind);
+      check_folder(path, parameters_.load_folders);
+      return path;
+    };
     const Scene scene = request.yaml.empty()
-                            ? tissue_sim::load_scene(resolve_path(request.path, "scene"))
+                            ? tissue_sim::load_scene(permitted(request.path, "scene"))
                             : scene_from_yaml(request.yaml);
+    for (const Body& body : scene.bodies) {
+      if (body.shape == Shape::kMesh) permitted(body.mesh, "mesh");
+    }
+    if (scene.fragment_network != "off") permitted(scene.fragment_network, "network");
     Session session = make_session_(scene);
     if (records_all_) recorder_.add(topics_of(session));
     scene_ = session.simulation->scene();

@@ -34,7 +34,8 @@ class Services {
   using MakeSession = std::function<Session(const Scene&)>;
 
   Services(ros::NodeHandle& node, const Scene& scene, SimulationThread& simulation,
-           Recorder& recorder, const Frames& frames, MakeSession make_session);
+           Recorder& recorder, const Frames& frames, const Parameters& parameters,
+           MakeSession make_session);
 
   /// Starts a recording of the given topics (all for none), by their names below the node or
   /// resolved. Returns a message with the bag's path; throws std::runtime_error.
@@ -52,6 +53,8 @@ class Services {
   bool save_state(SaveState::Request& request, SaveState::Response& response);
   bool restore_state(RestoreState::Request& request, RestoreState::Response& response);
 
+  /// Held while a scene is built; throws std::runtime_error where one is.
+  std::unique_lock<std::mutex> begin_building();
   BladePath read_path(const Cut::Request& request) const;
   std::set<std::string> select(const std::vector<std::string>& topics) const;
 
@@ -59,8 +62,9 @@ class Services {
   SimulationThread& simulation_;
   Recorder& recorder_;
   const Frames& frames_;
+  const Parameters parameters_;
   MakeSession make_session_;
-  std::mutex rebuilding_;  // one at a time
+  std::mutex rebuilding_;  // one at a time; a recording begins before or after
   Scene scene_;
   std::atomic<bool> records_all_{false};     // the recording that runs or ran last
   std::vector<ros::ServiceServer> servers_;  // last: end before what they call

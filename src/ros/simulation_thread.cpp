@@ -1,6 +1,7 @@
 #include "ros/simulation_thread.h"
 
 #include <ros/console.h>
+#include <ros/init.h>
 
 #include <algorithm>
 #include <utility>
@@ -87,6 +88,17 @@ bool SimulationThread::frame_due() {
 }
 
 void SimulationThread::run() {
+  try {
+    run_frames();
+  } catch (const Stopped&) {  // the node ends
+  } catch (const std::exception& e) {
+    // Of what is left nothing can be relied on; nor may it take others in this process along.
+    ROS_FATAL("the simulation ends: %s", e.what());
+    ros::requestShutdown();
+  }
+}
+
+void SimulationThread::run_frames() {
   WallTime shown = WallClock::now();
   for (;;) {
     std::vector<std::function<void()>> work;
@@ -124,6 +136,7 @@ void SimulationThread::start_anew(const ros::Time& before, const ros::Time& now)
   ROS_WARN("/clock jumped back to %.3f s: the scene starts anew", now.toSec());
   for (const auto& tool : *session_.tools) tool->restart(before, now);
   const Scene scene = session_.simulation->scene();
+  const LimitWork limit(parameters_.limits());
   try {
     session_.simulation.reset();  // its memory, before the next one's
     session_.simulation = std::make_unique<Simulation>(scene);
@@ -167,6 +180,7 @@ void SimulationThread::move_tools(AppliedInput& input) {
 void SimulationThread::frame() {
   Simulation& simulation = *session_.simulation;
   std::vector<PendingCut> cuts = std::exchange(cuts_, {});
+  const LimitWork limit(parameters_.limits());
   try {
     AppliedInput input;
     input.frame = simulation.frame();
@@ -176,6 +190,7 @@ void SimulationThread::frame() {
     session_.scene_input->apply(simulation);
     report_ = simulation.advance_frame();
   } catch (const std::exception& e) {
+    if (parameters_.work.stop != nullptr && *parameters_.work.stop) throw;  // the node ends
     for (PendingCut& cut : cuts) cut.reply.set_value({false, e.what(), {}});
     fail(std::string("the simulation failed: ") + e.what() + ": reset it");
     return;

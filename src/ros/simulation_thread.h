@@ -115,7 +115,8 @@ class SimulationThread {
     std::promise<CutReply> reply;
   };
 
-  void run();
+  void run();  // run_frames(), and what becomes of what it throws
+  void run_frames();
   void frame();
   bool frame_due();
   void move_tools(AppliedInput& input);

@@ -41,6 +41,11 @@ bool Services::save_state(SaveState::Request& request, SaveState::Response& resp
   return answer(response, "save_state", [&] {
     const std::string path = recording_path(recorder_.folder(), request.path, ".state");
     const SavedFrame saved = simulation_.save();
+    const double needed =
+        static_cast<double>(saved.state.size()) + parameters_.recording_reserve * 1024 * 1024;
+    if (free_space(path.substr(0, path.rfind('/'))) < needed) {
+      throw std::runtime_error("the disk has not enough space left (recording_reserve)");
+    }
     write_new(path, saved.state);
     response.frame = saved.frame;
     return path;
@@ -51,7 +56,8 @@ bool Services::restore_state(RestoreState::Request& request, RestoreState::Respo
   return answer(response, "restore_state", [&] {
     const std::string path = recorded_path(recorder_.folder(), request.path, ".state");
     const std::vector<std::uint8_t> bytes = read_all(path);
-    const std::lock_guard<std::mutex> lock(rebuilding_);
+    const auto lock = begin_building();
+    const LimitWork limit(parameters_.limits());
     auto restored = std::make_unique<Simulation>(scene_);
     try {
       restored->restore({bytes.data(), bytes.size()});

@@ -5,7 +5,9 @@
 #include <cmath>
 
 #include "ros/conversions.h"
+#include "ros/guarded.h"
 #include "ros/jaw_check.h"
+#include "ros/stamps.h"
 
 namespace tissue_sim {
 namespace {
@@ -21,10 +23,11 @@ bool is_latched(const ros::MessageEvent<M>& event) {
 
 ToolInput::ToolInput(const ros::NodeHandle& node, const Tool& tool, const ToolParameters& source,
                      const PoseLimits& limits, const Frames& frames, const Box& tissue,
-                     Recorder& recorder, std::function<void()> on_sample)
+                     Recorder& recorder, std::function<void()> on_sample, bool publishes_tf)
     : tool_(tool),
       tf_frame_(source.tf_frame),
       interpolates_(source.interpolate == "linear"),
+      publishes_tf_(publishes_tf),
       frames_(frames),
       tissue_(tissue),
       recorder_(recorder),
@@ -40,15 +43,20 @@ ToolInput::ToolInput(const ros::NodeHandle& node, const Tool& tool, const ToolPa
   if (!tf_frame_.empty()) {
     pose_topic_.clear();
   } else if (source.pose_type == "TransformStamped") {
-    pose_subscriber_ = handle.subscribe(poses, 1000, &ToolInput::on_transform, this, hints);
+    pose_subscriber_ = listen<geometry_msgs::TransformStamped>(
+        handle, poses, 1000, [this](const auto& event) { on_transform(event); }, hints);
   } else {
-    pose_subscriber_ = handle.subscribe(poses, 1000, &ToolInput::on_pose, this, hints);
+    pose_subscriber_ = listen<geometry_msgs::PoseStamped>(
+        handle, poses, 1000, [this](const auto& event) { on_pose(event); }, hints);
   }
-  jaw_subscriber_ = handle.subscribe(jaws, 1000, &ToolInput::on_jaw, this, hints);
+  jaw_subscriber_ = listen<sensor_msgs::JointState>(
+      handle, jaws, 1000, [this](const auto& event) { on_jaw(event); }, hints);
   if (tool.type == ToolType::kGrasper) {
     const std::string pressure = tool.name + "/grip_pressure";
     grip_topic_ = node.resolveName(pressure);
-    grip_subscriber_ = handle.subscribe(pressure, 100, &ToolInput::on_grip_pressure, this, hints);
+    grip_subscriber_ = listen<std_msgs::Float64>(
+        handle, pressure, 100,
+        [this](const auto& event) { on_grip_pressure(event.getConstMessage()); }, hints);
   }
 }
 
@@ -84,6 +92,15 @@ void ToolInput::on_transform(
 
 void ToolInput::accept(const std_msgs::Header& header, const Pose& in_frame) {
   Pose frame;
+  if (publishes_tf_ && (header.frame_id == tool() || header.frame_id == "/" + tool())) {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    came_ = true;
+    last_came_ = WallClock::now();
+    refuse(Refusal::kOwnFrame, "its frame_id '" + header.frame_id +
+                                   "' is the frame that this node publishes for the tool: give it "
+                                   "in the frame of the arm's base, or set publish_tf to false");
+    return;
+  }
   try {
     frame = frames_.in_world(header.frame_id, header.stamp);
   } catch (const tf2::TransformException& e) {
@@ -124,7 +141,7 @@ void ToolInput::follow_tf(const ros::Time& at) {
 void ToolInput::forget_if_time_jumped_back() {
   if (on_sample_) return;  // restart() says so
   const ros::Time now = ros::Time::now();
-  if (now + ros::Duration(0.1) < newest_time_) check_.forget();
+  if (seconds_between(now, newest_time_) > 0.1) check_.forget();
   newest_time_ = now;
 }
 
@@ -185,6 +202,9 @@ bool ToolInput::may_warn() {
 
 void ToolInput::on_jaw(const ros::MessageEvent<const sensor_msgs::JointState>& event) {
   const sensor_msgs::JointState::ConstPtr message = event.getConstMessage();
+  if (message->position.size() > kMostJoints || message->name.size() > kMostJoints) {
+    return accept_jaw(*message);  // which refuses it: nothing so large is kept
+  }
   recorder_.write(jaw_topic_, message, ros::Time::now());
   const bool latched = is_latched(event);
   hold(held_jaws_, message->header.stamp, [this, message, latched] {

@@ -32,10 +32,12 @@ namespace tissue_sim {
 class ToolInput {
  public:
   /// `tissue` is the box of all tissue as it is at the start [m]. With `on_sample`, samples are
-  /// held until they are taken by stamp or one by one, and it is called for each.
+  /// held until they are taken by stamp or one by one, and it is called for each. With
+  /// `publishes_tf` the node says where the tool is, as a frame of its name, in which no pose of
+  /// its own can be.
   ToolInput(const ros::NodeHandle& node, const Tool& tool, const ToolParameters& source,
             const PoseLimits& limits, const Frames& frames, const Box& tissue, Recorder& recorder,
-            std::function<void()> on_sample);
+            std::function<void()> on_sample, bool publishes_tf = true);
 
   struct Sample {
     Pose pose;                 ///< world frame
@@ -85,6 +87,8 @@ class ToolInput {
   void accept_jaw(const sensor_msgs::JointState& message);
   /// Calls `accept` now, or when the sample is taken.
   void hold(Held& held, const ros::Time& stamp, std::function<void()> accept);
+  /// Refuses, and says so, what is stamped as nothing can be.
+  bool has_wrong_stamp(const ros::Time& stamp, bool is_pose);
   /// Calls what is held up to `until`.
   void release(std::int64_t until);
   /// Where the tool follows tf: where it was at that time; 0: the newest.
@@ -103,7 +107,7 @@ class ToolInput {
 
   const Tool tool_;
   const std::string tf_frame_;
-  const bool interpolates_;
+  const bool interpolates_, publishes_tf_;
   const Frames& frames_;
   const Box tissue_;
   Recorder& recorder_;

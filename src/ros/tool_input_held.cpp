@@ -1,16 +1,28 @@
 // Samples of an instrument that wait for the frame that they are for: by stamp or one by one.
 #include <ros/console.h>
 
+#include "ros/stamps.h"
 #include "ros/tool_input.h"
 
 namespace tissue_sim {
-namespace {
 
-std::int64_t in_nanoseconds(const ros::Time& t) { return static_cast<std::int64_t>(t.toNSec()); }
-
-}  // namespace
+bool ToolInput::has_wrong_stamp(const ros::Time& stamp, bool is_pose) {
+  if (!is_far_ahead(stamp)) return false;
+  const std::lock_guard<std::mutex> lock(mutex_);
+  came_ = came_ || is_pose;
+  const std::string text = "its stamp, " + std::to_string(stamp.sec) +
+                           " s, is more than a day ahead of ROS' and the wall's time";
+  if (is_pose) {
+    refuse(Refusal::kStamp, text);
+  } else {
+    ++counts_.jaws_refused;
+    if (may_warn()) ROS_WARN("%s: jaw angle refused: %s", tool().c_str(), text.c_str());
+  }
+  return true;
+}
 
 void ToolInput::hold(Held& held, const ros::Time& stamp, std::function<void()> accept) {
+  if (has_wrong_stamp(stamp, &held == &held_poses_)) return;  // one such would hold all up
   if (!on_sample_) {
     const std::lock_guard<std::mutex> lock(held_mutex_);
     accept();

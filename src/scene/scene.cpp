@@ -11,12 +11,18 @@
 namespace tissue_sim {
 namespace {
 
+constexpr std::size_t kLongestName = 200, kLongestPath = 4096;
+constexpr std::size_t kMostBodies = 1000;  // each may meet each: memory grows with the square
+constexpr std::size_t kMostTools = 100, kMostMaterials = 1000, kMostAnchors = 1000;
+
 [[noreturn]] void refuse(const std::string& field, const std::string& value,
                          const std::string& allowed) {
   throw std::invalid_argument(field + " is " + value + ": " + allowed);
 }
 
-std::string quoted(const std::string& s) { return "\"" + s + "\""; }
+std::string quoted(const std::string& s) {
+  return "\"" + (s.size() > kLongestName ? s.substr(0, kLongestName) + "..." : s) + "\"";
+}
 
 std::string range_text(double low, double high, const char* unit) {
   std::string range = "between " + text(low) + " and " + text(high);
@@ -43,8 +49,51 @@ void check_position(const std::string& field, const Vec3& v) {
 
 void check_friction(const std::string& field, double value) { check_range(field, value, 0, 2); }
 
-void check_name(const std::string& field, const std::string& name, std::set<std::string>& taken) {
+/// Whether a text is UTF-8 (RFC 3629): YAML is, and other bytes would be written as other ones.
+bool is_utf8(const std::string& s) {
+  for (std::size_t i = 0; i < s.size();) {
+    const auto at = [&](std::size_t k) {
+      return static_cast<unsigned>(k < s.size() ? static_cast<unsigned char>(s[k]) : 0);
+    };
+    const unsigned first = at(i);
+    const std::size_t more = first < 0x80                     ? 0
+                             : first >= 0xc2 && first < 0xe0  ? 1
+                             : first >= 0xe0 && first < 0xf0  ? 2
+                             : first >= 0xf0 && first <= 0xf4 ? 3
+                                                              : 4;
+    if (more == 4) return false;
+    for (std::size_t k = 1; k <= more; ++k) {
+      if ((at(i + k) & 0xc0) != 0x80) return false;
+    }
+    const unsigned second = at(i + 1);
+    if (first == 0xe0 && second < 0xa0) return false;
+    if (first == 0xed && second > 0x9f) return false;
+    if (first == 0xf0 && second < 0x90) return false;
+    if (first == 0xf4 && second > 0x8f) return false;
+    i += more + 1;
+  }
+  return true;
+}
+
+void check_utf8(const std::string& field, const std::string& text) {
+  if (!is_utf8(text)) refuse(field, "no UTF-8", "must be, or it could not be written as YAML");
+}
+
+void check_length(const std::string& field, const std::string& name) {
   if (name.empty()) refuse(field, quoted(name), "must not be empty");
+  check_utf8(field, name);
+  if (name.size() <= kLongestName) return;
+  refuse(field, "a text of " + std::to_string(name.size()) + " characters",
+         "must not be longer than " + std::to_string(kLongestName));
+}
+
+void check_count(const std::string& field, std::size_t count, std::size_t most) {
+  if (count <= most) return;
+  refuse(field, "a list of " + std::to_string(count), "at most " + std::to_string(most));
+}
+
+void check_name(const std::string& field, const std::string& name, std::set<std::string>& taken) {
+  check_length(field, name);
   if (!taken.insert(name).second) refuse(field, quoted(name), "must be unique in the scene");
 }
 
@@ -117,6 +166,11 @@ void check_shape(const std::string& path, const Body& body) {
       if (body.mesh.empty()) {
         refuse(path + ".mesh", quoted(body.mesh),
                "must be the path of a mesh file (plain, file:// or package://)");
+      }
+      check_utf8(path + ".mesh", body.mesh);
+      if (body.mesh.size() > kLongestPath) {
+        refuse(path + ".mesh", "a text of " + std::to_string(body.mesh.size()) + " characters",
+               "no path is so long");
       }
       return check_range(path + ".scale", body.scale, 1e-6, 1e3, "m per unit of the file");
   }
@@ -253,7 +307,10 @@ bool Region::contains(const Vec3& x) const {
 }
 
 void validate(const Scene& scene) {
-  if (scene.name.empty()) refuse("name", quoted(scene.name), "must not be empty");
+  check_length("name", scene.name);
+  check_count("materials", scene.materials.size(), kMostMaterials);
+  check_count("bodies", scene.bodies.size(), kMostBodies);
+  check_count("tools", scene.tools.size(), kMostTools);
   check_enum("method", scene.method, kMethodNames);
   check_enum("device", scene.device, kDeviceNames);
   if (scene.threads < 0 || scene.threads > 1024) {
@@ -265,9 +322,10 @@ void validate(const Scene& scene) {
   check_range("cfl", scene.cfl, 0.05, 0.9);
   check_range("damping", scene.damping, 0, 1000);
   check_each("gravity", scene.gravity, -1000, 1000, "component", "m/s^2");
-  if (scene.fragment_network.empty() ||
+  check_utf8("fragment_network", scene.fragment_network);
+  if (scene.fragment_network.size() > kLongestPath || scene.fragment_network.empty() ||
       (scene.fragment_network != "off" && scene.method != Method::kMpm)) {
-    refuse("fragment_network", quoted(scene.fragment_network),
+    refuse("fragment_network", quoted(scene.fragment_network.substr(0, kLongestName)),
            "must be off or, with method mpm, the file of a network");
   }
   check_mls(scene.mls);
@@ -288,6 +346,7 @@ void validate(const Scene& scene) {
     check_shape(path, body);
     check_pose(path + ".pose", body.pose);
     check_material_name(path + ".material", scene, body.material);
+    check_count(path + ".anchors", body.anchors.size(), kMostAnchors);
     if (body.inclusions.size() > 255) {
       refuse(path + ".inclusions", "a list of " + std::to_string(body.inclusions.size()),
              "a body has at most 255");

@@ -1,10 +1,10 @@
 // YAML -> Scene. Types and names of fields are checked here, ranges in validate().
 #include <algorithm>
 #include <filesystem>
-#include <fstream>
-#include <sstream>
 #include <stdexcept>
 
+#include "scene/load_yaml.h"
+#include "scene/read_file.h"
 #include "scene/scene_text.h"
 #include "scene/yaml_fields.h"
 #include "tissue_sim/scene.h"
@@ -234,13 +234,18 @@ Scene read_scene(const YAML::Node& node) {
 }  // namespace
 
 Scene scene_from_yaml(const std::string& text) {
-  YAML::Node node;
-  try {
-    node = YAML::Load(text);
-  } catch (const YAML::Exception& e) {
-    throw std::invalid_argument(std::string("the scene is no valid YAML: ") + e.what());
+  if (text.size() > kLargestScene) {
+    throw std::invalid_argument("the scene is a text of " + std::to_string(text.size()) +
+                                " characters: that is too large");
   }
-  Scene scene = read_scene(node);
+  YAML::Node node;
+  Scene scene;
+  try {
+    node = load_yaml(text);
+    scene = read_scene(node);
+  } catch (const YAML::Exception& e) {
+    throw std::invalid_argument("the scene is no valid YAML: " + yaml_problem(e));
+  }
   validate(scene);
   return scene;
 }
@@ -251,12 +256,15 @@ Scene load_scene(const std::string& path) {
   if (fs::is_directory(path, error)) {
     throw std::invalid_argument(path + ": is a folder, name a scene file in it");
   }
-  std::ifstream file(path);
-  std::ostringstream text;
-  if (!file || !(text << file.rdbuf())) {  // an empty file fails here too
-    if (fs::exists(path, error)) {
-      throw std::invalid_argument(path + ": cannot be read or is empty, give a scene");
+  std::string text;
+  if (fs::exists(path, error)) {
+    try {
+      text = read_file(path, kLargestScene);
+    } catch (const std::invalid_argument& e) {
+      throw std::invalid_argument(path + ": " + e.what());
     }
+    if (text.empty()) throw std::invalid_argument(path + ": is empty, give a scene");
+  } else {
     if (fs::path(path)
             .is_relative()) {  // launched nodes run in ~/.ros, whatever the caller's folder
       throw std::invalid_argument(path + ": no such file in " + fs::current_path(error).string() +
@@ -266,7 +274,7 @@ Scene load_scene(const std::string& path) {
   }
   Scene scene;
   try {
-    scene = scene_from_yaml(text.str());
+    scene = scene_from_yaml(text);
   } catch (const std::invalid_argument& e) {
     throw std::invalid_argument(path + ": " + e.what());
   }

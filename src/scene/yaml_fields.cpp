@@ -10,9 +10,30 @@
 namespace tissue_sim {
 namespace {
 
+// Nodes below a node, as far as `most`: aliases may stand for more than there is memory.
+int count_nodes(const YAML::Node& node, int most) {
+  int count = 1;
+  for (auto it = node.begin(); it != node.end() && count < most; ++it) {
+    if (node.IsMap()) count += count_nodes(it->first, most - count);
+    count += count_nodes(node.IsMap() ? it->second : YAML::Node(*it), most - count);
+  }
+  return count;
+}
+
+std::string kind_of(const YAML::Node& node) {
+  return node.IsMap() ? "a map" : node.IsSequence() ? "a list" : node.IsNull() ? "empty" : "a text";
+}
+
 // The value as it stands in the file, on one line and cut short.
 std::string shown(const YAML::Node& node) {
+  constexpr int kMostShown = 50;
   if (node.IsNull()) return "empty";
+  if (node.IsScalar() && node.Scalar().size() > 80) {
+    return '"' + node.Scalar().substr(0, 77) + "...\"";
+  }
+  if (!node.IsScalar() && count_nodes(node, kMostShown) >= kMostShown) {
+    return kind_of(node) + " of " + std::to_string(node.size());
+  }
   if (node.IsScalar() && node.Tag() == "!") return '"' + node.Scalar() + '"';
   YAML::Node line = YAML::Clone(node);  // in yaml-cpp 0.6 its style goes before the emitter's
   line.SetStyle(YAML::EmitterStyle::Flow);
@@ -75,17 +96,21 @@ YamlFields::YamlFields(const YAML::Node& node, std::string path,
                        const std::vector<std::string>& known)
     : path_(std::move(path)) {
   if (!node.IsMap()) {
-    throw std::invalid_argument((path_.empty() ? "the scene" : path_) + " is " + shown(node) +
-                                ": must be a map of the fields " + join(known));
+    // Nothing is quoted of what is no scene: it may be any file that this program can read.
+    throw std::invalid_argument(
+        (path_.empty() ? "the scene is " + kind_of(node) : path_ + " is " + shown(node)) +
+        ": must be a map of the fields " + join(known));
   }
   for (const auto& item : node) {
-    const std::string name = item.first.IsScalar() ? item.first.Scalar() : shown(item.first);
+    const std::string name = item.first.IsScalar() ? item.first.Scalar() : kind_of(item.first);
+    if (std::find(known.begin(), known.end(), name) == known.end()) {
+      const std::string word = name.size() > 40 ? name.substr(0, 37) + "..." : name;
+      throw std::invalid_argument(this->path(word) + ": unknown field, known here are " +
+                                  join(known));
+    }
     const bool twice = has(name);
     fields_.emplace_back(name, item.second);
     if (twice) throw std::invalid_argument(this->path(name) + " is given twice: give it once");
-    if (std::find(known.begin(), known.end(), name) == known.end()) {
-      refuse(name, "unknown field, known here are " + join(known));
-    }
   }
 }
 

@@ -71,7 +71,7 @@ TEST(MeshFile, IsRefusedWithItsPathAndReason) {
       {folder.path(), " is no file"},
       {folder.write("empty.stl", ""), " is empty"},
       {folder.write("a.docx", box), " is of no known format"},
-      {folder.write("text.ply", "this is not a mesh\n"), " cannot be read ("},
+      {folder.write("text.ply", "this is not a mesh\n"), " is no PLY file ("},
       {folder.write("points.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\np 1 2 3\n"), ""},
       {folder.write("nan.obj", with_nan), " has coordinates that are not finite"},
   };

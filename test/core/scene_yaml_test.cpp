@@ -86,14 +86,14 @@ TEST(SceneYaml, ReadsOrientationsAsRosWritesThem) {
 
 TEST(SceneYaml, NamesWhatItRefuses) {
   const std::pair<const char*, const char*> cases[] = {
-      {"colour: red\nbodies: [{}]", "colour is red: unknown field, known here are name, method, "},
-      {"bodies: [{colour: red}]", "bodies[0].colour is red: unknown field"},
-      {"bodies: [{}]\ntools: [{weight: 1}]", "tools[0].weight is 1: unknown field"},
-      {"bodies: [{}]\nground: {y: 1}", "ground.y is 1: unknown field"},
-      {"bodies: [{pose: {xyz: [1, 2, 3]}}]", "bodies[0].pose.xyz is [1, 2, 3]: unknown field"},
-      {"materials: [{name: a, young: 1}]", "materials[0].young is 1: unknown field"},
+      {"colour: red\nbodies: [{}]", "colour: unknown field, known here are name, method, "},
+      {"bodies: [{colour: red}]", "bodies[0].colour: unknown field"},
+      {"bodies: [{}]\ntools: [{weight: 1}]", "tools[0].weight: unknown field"},
+      {"bodies: [{}]\nground: {y: 1}", "ground.y: unknown field"},
+      {"bodies: [{pose: {xyz: [1, 2, 3]}}]", "bodies[0].pose.xyz: unknown field"},
+      {"materials: [{name: a, young: 1}]", "materials[0].young: unknown field"},
       {"materials: [{young_modulus: 1}]", "materials[0].name is missing: "},
-      {"bodies: [{anchors: [{above: 1}]}]", "bodies[0].anchors[0].above is 1: unknown field"},
+      {"bodies: [{anchors: [{above: 1}]}]", "bodies[0].anchors[0].above: unknown field"},
       {"bodies: [{anchors: [{}]}]", "bodies[0].anchors[0] is a map of 0 fields: must be one of"},
       {"bodies: [{anchors: [{below: 1, ball: {center: [0, 0, 0], radius: 1}}]}]",
        "bodies[0].anchors[0] is a map of 2 fields: must be one of"},
@@ -106,7 +106,7 @@ TEST(SceneYaml, NamesWhatItRefuses) {
        "bodies[0].inclusions[0].material is missing: "},
       {"bodies: [{inclusions: [{material: fat}]}]", "bodies[0].inclusions[0].region is missing: "},
       {"bodies: [{inclusions: [{material: fat, below: 1}]}]",
-       "bodies[0].inclusions[0].below is 1: unknown field"},
+       "bodies[0].inclusions[0].below: unknown field"},
       {"bodies: [{inclusions: [{material: fat, region: {}}]}]",
        "bodies[0].inclusions[0].region is a map of 0 fields: must be one of"},
       {"bodies: [{inclusions: [{material: fat, region: {ball: {center: [0, 0, 0]}}}]}]",
@@ -160,7 +160,7 @@ TEST(SceneYaml, NamesWhatItRefuses) {
       {"cfl: 0.5\ncfl: 0.6", "cfl is given twice"},
       {"name: a", "bodies is empty: a scene needs at least one body"},
       {"", "the scene is empty: must be a map"},
-      {"- a", "the scene is [a]: must be a map"},
+      {"- a", "the scene is a list: must be a map"},
       {"a: [", "the scene is no valid YAML: "},
   };
   for (const auto& c : cases) {

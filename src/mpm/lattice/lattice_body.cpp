@@ -126,7 +126,8 @@ std::vector<LatticeBody> make_lattice_bodies(const Scene& scene, Points& points,
   std::vector<LatticeBody> bodies;
   int first_node = 0;
   for (const Body& body : scene.bodies) {
-    const Lattice lattice = make_lattice(body, scene.cell_size, notes);
+    const Lattice lattice =
+        make_lattice(body, scene.cell_size, notes, work_limits().max_points - points.size());
     check_size(lattice, body.name);
     LatticeBody b;
     b.body = body;
@@ -148,6 +149,7 @@ std::vector<LatticeBody> make_lattice_bodies(const Scene& scene, Points& points,
     const auto index = static_cast<std::int16_t>(bodies.size());
     std::vector<int> anchored(body.anchors.size(), 0);
     for (const Lattice::Site& s : lattice.sites) {
+      if (points.size() % 4096 == 0) stop_if_asked();
       points.site.push_back({static_cast<std::int16_t>(s.x), static_cast<std::int16_t>(s.y),
                              static_cast<std::int16_t>(s.z), index});
       points.volume.push_back(s.volume);
@@ -177,6 +179,7 @@ std::vector<LatticeBody> make_lattice_bodies(const Scene& scene, Points& points,
   }
   points.bonds.resize(points.size());
   for (int p = 0; p < points.size(); ++p) {
+    if (p % 4096 == 0) stop_if_asked();
     points.bonds[p] = whole_bonds(bodies[points.site[p].body], points.site[p]);
   }
   if (!points.gaps.empty()) points.beside_gap.assign(points.size(), 0);

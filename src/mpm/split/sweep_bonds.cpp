@@ -8,6 +8,7 @@
 #include "mpm/lattice/bonds.h"
 #include "mpm/split/cut_tissue.h"
 #include "mpm/split/near_sweep.h"
+#include "tissue_sim/limits.h"
 
 namespace tissue_sim {
 namespace {
@@ -36,6 +37,7 @@ class Sweep {
   int list_blocks(const std::vector<BlockMotion>& before) {
     const double reach = kBringReach * state_.scene.cell_size;
     for (std::size_t i = 0; i < state_.blocks.all.size(); ++i) {
+      stop_if_asked();
       const Box& now = state_.motion[i].box;
       const Box box{now.min.cwiseMin(before[i].box.min), now.max.cwiseMax(before[i].box.max)};
       PassedBlock passed{state_.blocks.all[i], {}, {}, {}};
@@ -266,7 +268,11 @@ void sweep_bonds(MpmState& state, const BladePath& path, const Array<float>* u_b
   Sweep sweep(state, path, u_begin, u_end);
   const int passed = sweep.list_blocks(before);
   if (passed == 0) return;
-  state.cpu->for_each(passed, [&](int i) { sweep.read_places(i); });
+  const WorkLimits limits = work_limits();
+  state.cpu->for_each(passed, [&](int i) {
+    stop_if_asked(limits);
+    sweep.read_places(i);
+  });
   std::vector<std::pair<const LatticeBody*, int>> layers;
   for (const LatticeBody& b : state.bodies) {
     for (int z = 0; z < 2 * b.nz; ++z) layers.emplace_back(&b, z);
@@ -277,6 +283,7 @@ void sweep_bonds(MpmState& state, const BladePath& path, const Array<float>* u_b
     if (i == 0) {  // what a thread would be alone with when bonds break
       state.points.crossings.reserve(state.points.size());
     } else {
+      stop_if_asked(limits);
       broken[i - 1] = sweep.broken_bonds(*layers[i - 1].first, layers[i - 1].second);
     }
   });

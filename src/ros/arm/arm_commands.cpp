@@ -3,6 +3,7 @@
 
 #include "ros/arm/arm_node.h"
 #include "ros/conversions.h"
+#include "ros/guarded.h"
 #include "ros/pose_check.h"
 
 namespace tissue_sim {
@@ -16,11 +17,13 @@ JointVector vector_of(const std::vector<double>& values) {
 
 template <class M, class Callback>
 void ArmNode::listen(const std::string& name, int queue, Callback callback) {
-  in_.push_back(node_.subscribe<M>(
-      name, queue,
-      boost::function<void(const boost::shared_ptr<const M>&)>(
-          [callback](const boost::shared_ptr<const M>& message) { callback(*message); }),
-      ros::VoidConstPtr(), ros::TransportHints().tcpNoDelay()));
+  in_.push_back(node_.subscribe<M>(name, queue,
+                                   boost::function<void(const boost::shared_ptr<const M>&)>(
+                                       [callback, what = "a message on " + node_.resolveName(name)](
+                                           const boost::shared_ptr<const M>& message) {
+                                         guard(what, [&] { callback(*message); });
+                                       }),
+                                   ros::VoidConstPtr(), ros::TransportHints().tcpNoDelay()));
 }
 
 void ArmNode::subscribe() {

@@ -8,6 +8,7 @@
 #include <chrono>
 
 #include "ros/conversions.h"
+#include "ros/stamps.h"
 
 namespace tissue_sim {
 namespace {
@@ -97,18 +98,18 @@ void ArmNode::run() {
   const WallTime began = WallClock::now();
   while (ros::ok()) {
     ros::Time now = ros::Time::now();
-    const double left = last_.isZero() ? 0 : period - (now - last_).toSec();
+    const double left = last_.isZero() ? 0 : period - seconds_between(last_, now);
     ros::getGlobalCallbackQueue()->callAvailable(
         ros::WallDuration(std::min(std::max(left, 0.0005), 0.005)));
     now = ros::Time::now();
     const WallTime wall = WallClock::now();
     if (now < last_) {
-      ROS_WARN("time went back by %.3f s: stamps begin anew", (last_ - now).toSec());
+      ROS_WARN("time went back by %.3f s: stamps begin anew", seconds_between(now, last_));
       last_ = last_state_ = last_wrench_ = last_body_wrench_ = now;
     }
-    if (!now.isZero() && (now - last_).toSec() >= 0.98 * period) {
+    if (!now.isZero() && seconds_between(last_, now) >= 0.98 * period) {
       // After a long pause it goes on where it was.
-      tick(now, last_.isZero() ? period : std::min((now - last_).toSec(), 1.0));
+      tick(now, last_.isZero() ? period : std::min(seconds_between(last_, now), 1.0));
       last_ = now;
       shown_still_ = wall;
     } else if (seconds_between(shown_still_, wall) > kStillAfter) {
@@ -232,7 +233,7 @@ void ArmNode::drive_tool(const ros::Time& now) {
 }
 
 ros::Time ArmNode::rising(ros::Time stamp, ros::Time& last) const {
-  if (stamp <= last) stamp = last + ros::Duration(0, 1);
+  if (stamp <= last) stamp = ros_time_of(in_nanoseconds(last) + 1);
   last = stamp;
   return stamp;
 }

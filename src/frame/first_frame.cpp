@@ -1,0 +1,76 @@
+#include "frame/first_frame.h"
+
+#include <algorithm>
+#include <cmath>
+#include <set>
+#include <stdexcept>
+
+#include "frame/part_substeps.h"
+#include "frame/stability_limit.h"
+#include "scene/scene_text.h"
+
+namespace tissue_sim {
+namespace {
+
+/// Substeps of a frame of this material, at rest, on a lattice of that spacing.
+double substeps_of(const Scene& scene, const Material& m, double spacing) {
+  const double modulus = wave_modulus(m, 1);
+  const double elastic = scene.cfl * spacing * std::sqrt(m.density / modulus);
+  const double damping = 5 * m.viscosity / (m.density * spacing * spacing);  // mpm/state_figures
+  const double longest = viscous_substep(elastic, damping);
+  return 1 / (scene.frame_rate * longest);
+}
+
+std::string metres(double z) { return text(static_cast<float>(z)) + " m"; }
+
+}  // namespace
+
+void check_first_frame(const Scene& scene) {
+  if (scene.method == Method::kPbd) return;  // it says itself how many
+  std::set<std::string> used;
+  for (const Body& body : scene.bodies) {
+    used.insert(body.material);
+    for (const Inclusion& i : body.inclusions) used.insert(i.material);
+  }
+  const bool is_mls = scene.method == Method::kMls && scene.mls.spacing > 0;
+  const double spacing = is_mls ? 2 * scene.mls.spacing : scene.cell_size;
+  for (const std::string& name : used) {
+    const Material& m = find_material(scene, name);
+    const double count = substeps_of(scene, m, spacing);
+    if (count <= kMostSubstepsOfFrame) continue;
+    throw std::invalid_argument(
+        "a frame takes some " + text(static_cast<float>(std::round(count))) +
+        " substeps, at most 100000 make sense (frame_rate is " + text(scene.frame_rate) + " Hz, " +
+        (is_mls ? "mls.spacing " : "cell_size ") + text(is_mls ? scene.mls.spacing : spacing) +
+        " m, of material '" + name + "' viscosity " + text(m.viscosity) +
+        " Pa s and young_modulus " + text(m.young_modulus) +
+        " Pa): raise frame_rate or the spacing, or lower viscosity or young_modulus");
+  }
+}
+
+void check_ground(const Scene& scene, Span<const Fragment> pieces) {
+  if (!scene.ground.enabled) return;
+  for (const Fragment& piece : pieces) {
+    if (!(piece.box.max.z() <= scene.ground.z)) continue;
+    throw std::invalid_argument(
+        "body '" + scene.bodies[piece.body].name +
+        "' lies below the ground (it reaches up to z = " + metres(piece.box.max.z()) +
+        ", ground.z is " + metres(scene.ground.z) +
+        "): move it up by pose.position, or set ground.enabled to false");
+  }
+}
+
+std::vector<std::string> ground_notes(const Scene& scene, Span<const Fragment> pieces) {
+  std::vector<std::string> notes;
+  if (!scene.ground.enabled) return notes;
+  for (const Fragment& piece : pieces) {
+    const double depth = scene.ground.z - piece.box.min.z();
+    const std::vector<Anchor>& anchors = scene.bodies[piece.body].anchors;
+    if (!(depth > scene.cell_size) || !anchors.empty()) continue;
+    notes.push_back("body '" + scene.bodies[piece.body].name + "' begins " + metres(depth) +
+                    " below the ground, which throws it up: move it by pose.position");
+  }
+  return notes;
+}
+
+}  // namespace tissue_sim

@@ -1,0 +1,224 @@
+#include "geometry/ply.h"
+
+#include <algorithm>
+#include <cstdint>
+#include <stdexcept>
+#include <vector>
+
+#include "geometry/byte_order.h"
+#include "geometry/mesh_words.h"
+#include "geometry/polygon.h"
+#include "tissue_sim/limits.h"
+
+namespace tissue_sim {
+namespace ply_file {
+namespace {
+
+enum class Type { kNone, kInt8, kUint8, kInt16, kUint16, kInt32, kUint32, kFloat, kDouble };
+
+struct TypeName {
+  const char* name;
+  Type type;
+};
+constexpr TypeName kTypes[] = {
+    {"char", Type::kInt8},     {"int8", Type::kInt8},     {"uchar", Type::kUint8},
+    {"uint8", Type::kUint8},   {"short", Type::kInt16},   {"int16", Type::kInt16},
+    {"ushort", Type::kUint16}, {"uint16", Type::kUint16}, {"int", Type::kInt32},
+    {"int32", Type::kInt32},   {"uint", Type::kUint32},   {"uint32", Type::kUint32},
+    {"float", Type::kFloat},   {"float32", Type::kFloat}, {"double", Type::kDouble},
+    {"float64", Type::kDouble}};
+
+[[noreturn]] void refuse_file(const std::string& why) { throw std::invalid_argument(why); }
+
+Type type_of(const std::string& name) {
+  for (const TypeName& t : kTypes) {
+    if (name == t.name) return t.type;
+  }
+  refuse_file("is a PLY file with a property of an unknown type: export it again");
+}
+
+struct Property {
+  Type count = Type::kNone;  ///< of a list
+  Type type = Type::kNone;
+  std::string name;
+};
+
+struct Element {
+  std::string name;
+  double count = 0;
+  std::vector<Property> properties;
+
+  int find(const std::string& property) const {
+    for (std::size_t i = 0; i < properties.size(); ++i) {
+      if (properties[i].name == property) return static_cast<int>(i);
+    }
+    return -1;
+  }
+};
+
+enum class Format { kNone, kText, kLittleEndian, kBigEndian };
+
+struct Header {
+  Format format = Format::kNone;
+  std::vector<Element> elements;
+  std::size_t end = 0;  ///< where the data begins [bytes]
+};
+
+Header read_header(const std::string& bytes) {
+  Header header;
+  MeshWords words(bytes, 3);
+  std::string word, type;
+  for (bool ended = false; !ended;) {
+    if (!words.next(word)) refuse_file("ends within its header: export or copy it again");
+    if (word == "format") {
+      words.next_in_line(word);
+      header.format = word == "ascii"                  ? Format::kText
+                      : word == "binary_little_endian" ? Format::kLittleEndian
+                      : word == "binary_big_endian"    ? Format::kBigEndian
+                                                       : Format::kNone;
+    } else if (word == "element") {
+      Element e;
+      if (!words.next_in_line(e.name) || !words.next_in_line(e.count) || !(e.count >= 0)) {
+        refuse_file("has an element without a number in its header: export it again");
+      }
+      header.elements.push_back(e);
+    } else if (word == "property") {
+      if (header.elements.empty()) refuse_file("has a property of nothing in its header");
+      Property p;
+      words.next_in_line(type);
+      if (type == "list") {
+        words.next_in_line(type);
+        p.count = type_of(type);
+        words.next_in_line(type);
+      }
+      p.type = type_of(type);
+      words.next_in_line(p.name);
+      header.elements.back().properties.push_back(p);
+    }
+    ended = word == "end_header";
+    words.skip_line();  // whatever else stands in it; comments
+  }
+  header.end = words.place();
+  // One end of line, of one character or two; what follows may begin with any.
+  if (header.end < bytes.size() && bytes[header.end] == '\r') ++header.end;
+  if (header.end < bytes.size() && bytes[header.end] == '\n') ++header.end;
+  if (header.format == Format::kNone)
+    refuse_file("is a PLY file of an unknown format: export it again");
+  return header;
+}
+
+/// The numbers behind the header, one after the other.
+class Numbers {
+ public:
+  Numbers(const std::string& bytes, const Header& header)
+      : bytes_(bytes),
+        at_(header.end),
+        words_(bytes, header.end),
+        is_text_(header.format == Format::kText),
+        big_endian_(header.format == Format::kBigEndian) {}
+
+  double next(Type type) {
+    if (is_text_) {
+      double value = 0;
+      if (!words_.next(value)) ended();
+      return value;
+    }
+    switch (type) {
+      case Type::kInt8:
+        return take<std::int8_t>();
+      case Type::kUint8:
+        return take<std::uint8_t>();
+      case Type::kInt16:
+        return take<std::int16_t>();
+      case Type::kUint16:
+        return take<std::uint16_t>();
+      case Type::kInt32:
+        return take<std::int32_t>();
+      case Type::kUint32:
+        return take<std::uint32_t>();
+      case Type::kFloat:
+        return take<float>();
+      case Type::kDouble:
+        return take<double>();
+      case Type::kNone:
+        break;
+    }
+    ended();
+  }
+
+ private:
+  template <class T>
+  double take() {
+    if (bytes_.size() - at_ < sizeof(T)) ended();
+    const T value = number_at<T>(&bytes_[at_], big_endian_);
+    at_ += sizeof(T);
+    return static_cast<double>(value);
+  }
+  [[noreturn]] void ended() {
+    refuse_file("ends, or has no number, within its elements: export or copy it again");
+  }
+
+  const std::string& bytes_;
+  std::size_t at_;
+  MeshWords words_;
+  bool is_text_, big_endian_;
+};
+
+}  // namespace
+}  // namespace ply_file
+
+TriangleMesh read_ply(const std::string& bytes) {
+  using namespace ply_file;
+  if (bytes.compare(0, 3, "ply") != 0 && bytes.compare(0, 3, "PLY") != 0) {
+    refuse_file("is no PLY file (it does not begin with \"ply\"): export it again");
+  }
+  const Header header = read_header(bytes);
+  TriangleMesh mesh;
+  std::vector<double> corners, corners_of_all;  // faces may come before vertices
+  std::vector<std::size_t> ends;
+  Numbers numbers(bytes, header);
+  for (const Element& element : header.elements) {
+    const bool is_vertex = element.name == "vertex", is_face = element.name == "face";
+    const int place[3] = {element.find("x"), element.find("y"), element.find("z")};
+    if (is_vertex && std::min({place[0], place[1], place[2]}) < 0) {
+      refuse_file("has vertices without x, y and z: export it again");
+    }
+    int list = element.find("vertex_indices");
+    if (list < 0) list = element.find("vertex_index");
+    if (is_face && element.count > 0 && (list < 0 || element.properties[list].count == Type::kNone))
+      refuse_file("has faces without a list vertex_indices: export it again");
+    if (element.properties.empty()) continue;
+    for (double i = 0; i < element.count; ++i) {
+      if (mesh.vertices.size() % 4096 == 0) stop_if_asked();
+      Vec3 x = Vec3::Zero();
+      for (std::size_t p = 0; p < element.properties.size(); ++p) {
+        const Property& property = element.properties[p];
+        if (property.count == Type::kNone) {
+          const double value = numbers.next(property.type);
+          for (int a = 0; a < 3; ++a) {
+            if (place[a] == static_cast<int>(p)) x[a] = value;
+          }
+          continue;
+        }
+        const double count = numbers.next(property.count);
+        const bool is_corners = is_face && static_cast<int>(p) == list;
+        for (double k = 0; k < count; ++k) {
+          const double corner = numbers.next(property.type);
+          if (is_corners) corners_of_all.push_back(corner);
+        }
+      }
+      if (is_vertex) mesh.vertices.push_back(x);
+      if (is_face) ends.push_back(corners_of_all.size());
+    }
+  }
+  std::size_t first = 0;
+  for (const std::size_t end : ends) {
+    corners.assign(corners_of_all.begin() + static_cast<std::ptrdiff_t>(first),
+                   corners_of_all.begin() + static_cast<std::ptrdiff_t>(end));
+    add_polygon(mesh, corners);
+    first = end;
+  }
+  return mesh;
+}
+
+}  // namespace tissue_sim

@@ -51,7 +51,7 @@ struct ToolLoad {
   double peak_force = 0;    ///< largest force of a substep [N]
   double grip = 0;          ///< grasper: what each jaw presses with, mean over the frame [N] ...
   double grip_area = 0;     ///< ... and on which area of tissue [m^2]
-  int points_inside = 0;    ///< of tissue, in the tool by more than contact gives way (half a cell,
+  int points_inside = 0;    ///< of tissue, in the tool by more than contact gives way (0.3 cells,
                             ///< or half of the tool's thinnest), in the last substep ...
   double inside_depth = 0;  ///< ... and how deep the deepest of them lies [m]
 };

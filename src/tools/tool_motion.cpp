@@ -6,7 +6,7 @@
 namespace tissue_sim {
 namespace {
 
-constexpr double kInside = 0.5;  // cells: a layer of points
+constexpr double kInside = 0.3;  // cells: springs at their limit give way by a quarter
 
 void place(const Pose& pose, Collider& collider) {
   const Eigen::Matrix3d r = pose.orientation.toRotationMatrix();

@@ -92,6 +92,21 @@ install() {
   }
 }
 
+# install_if_known PACKAGE...: those of them that apt knows. Without them something is left out, which
+# says so itself.
+install_if_known() {
+  local missing known=()
+  if [[ -n ${TISSUE_SIM_NO_INSTALL:-} ]] || ! command -v apt-get >/dev/null; then return; fi
+  mapfile -t missing < <(missing_of "$@")
+  for package in "${missing[@]}"; do
+    if apt-cache show "$package" >/dev/null 2>&1; then known+=("$package"); fi
+  done
+  if [[ ${#known[@]} == 0 ]]; then return; fi
+  say "Asking apt for ${known[*]}"
+  as_root apt-get install -y --no-install-recommends "${known[@]}" >>"$build/apt.log" 2>&1 ||
+    say "apt could not install them: see $build/apt.log"
+}
+
 # Only the percentages of make, on one line where there is a terminal.
 show_progress() {
   if [[ -t 1 ]]; then

@@ -7,7 +7,7 @@
 #include <stdexcept>
 #include <utility>
 
-#include "cutting/blade_sweep.h"
+#include "cutting/check_path.h"
 #include "frame/first_frame.h"
 #include "frame/sealed_state.h"
 #include "frame/state_fields.h"
@@ -17,58 +17,13 @@
 namespace tissue_sim {
 namespace {
 
-constexpr double kFarthestPlace = 1e6;  // from the origin [m]
-constexpr double kMostSwept = 1e5;      // edges of a cut, see swept_edges()
-
-void check(const Pose& pose, const std::string& what) {
-  if (!pose.position.allFinite() || !pose.orientation.coeffs().allFinite()) {
-    throw std::invalid_argument(what + " is not finite");
-  }
-  if (!(pose.position.cwiseAbs().maxCoeff() <= kFarthestPlace)) {
-    throw std::invalid_argument(what + " is more than 1e6 m away: no instrument is");
-  }
-  if (std::fabs(pose.orientation.norm() - 1) > 1e-3) {
-    throw std::invalid_argument(what + " has a quaternion of norm " +
-                                std::to_string(pose.orientation.norm()) +
-                                ": it must be 1, or it is no rotation");
-  }
-}
-
 void check_grip(double pressure) {
   if (pressure == 0 || (pressure >= 1 && pressure <= kMostSqueeze * 1e7)) return;
   throw std::invalid_argument("grip_pressure is " + std::to_string(pressure) +
                               ": must be from 1 to 1e7 [Pa], or 0 for the tool's own");
 }
 
-void check(const BladePath& path) {
-  if (path.poses.size() < 2) {
-    throw std::invalid_argument("a cut needs at least 2 poses, got " +
-                                std::to_string(path.poses.size()));
-  }
-  if (path.edge.size() < 2) {
-    throw std::invalid_argument("a blade's edge needs at least 2 points, got " +
-                                std::to_string(path.edge.size()));
-  }
-  for (const Vec3& x : path.edge) {
-    if (!x.allFinite()) throw std::invalid_argument("a point of the blade's edge is not finite");
-    if (!(x.cwiseAbs().maxCoeff() <= kFarthestPlace)) {
-      throw std::invalid_argument("a point of the blade's edge is more than 1e6 m away");
-    }
-  }
-  for (const Pose& pose : path.poses) check(pose, "a pose of the blade");
-  const double product =
-      (static_cast<double>(path.edge.size()) - 1) * (static_cast<double>(path.poses.size()) - 1);
-  if (const double swept = product > kMostSwept ? product : swept_edges(path); swept > kMostSwept) {
-    throw std::invalid_argument(
-        "the cut sweeps " + std::to_string(std::lround(swept)) +
-        " edges (pieces of the blade's edge times steps of its path, each turned by less than 4 "
-        "degrees), at most 100000 are done: give fewer points of the edge or poses");
-  }
-}
-
 }  // namespace
-
-void check_path(const BladePath& path) { check(path); }
 
 struct Simulation::State {
   Scene scene;
@@ -128,7 +83,7 @@ void Simulation::set_tool(int tool, const Pose& pose, double jaw) {
                                 " is not in the scene, which has " +
                                 std::to_string(state_->tools.size()));
   }
-  check(pose, "the pose of tool '" + state_->scene.tools[tool].name + "'");
+  check_pose(pose, "the pose of tool '" + state_->scene.tools[tool].name + "'");
   if (!std::isfinite(jaw)) throw std::invalid_argument("the jaw angle is not finite");
   ToolMotion& m = state_->tools[tool];
   m.end = {pose.position, pose.orientation.normalized()};
@@ -149,7 +104,7 @@ void Simulation::set_grip_pressure(int tool, double pressure) {
 }
 
 void Simulation::cut(const BladePath& path) {
-  check(path);
+  check_path(path);
   state_->cuts.push_back(path);
   for (Pose& pose : state_->cuts.back().poses) pose.orientation.normalize();
 }
@@ -167,7 +122,7 @@ void Simulation::set_anchor(int anchor, const Pose& pose) {
         "with "
         "method mpm and mpm.boundary: surface");
   }
-  check(pose, "the pose of anchor '" + s.anchors[anchor]->name + "'");
+  check_pose(pose, "the pose of anchor '" + s.anchors[anchor]->name + "'");
   if (s.anchor_motion.empty()) {
     for (const Anchor* a : s.anchors) {
       const Pose rest{a->origin(), Quat::Identity()};
@@ -208,10 +163,10 @@ void Simulation::apply(const AppliedInput& input) {
   }
   for (const ToolMotion& m : input.tools) {
     if (!m.present) continue;
-    check(m.begin, "a tool's pose");
-    check(m.end, "a tool's pose");
+    check_pose(m.begin, "a tool's pose");
+    check_pose(m.end, "a tool's pose");
   }
-  for (const BladePath& path : input.cuts) check(path);
+  for (const BladePath& path : input.cuts) check_path(path);
   state_->tools = input.tools;
   if (!input.grip_pressures.empty() && input.grip_pressures.size() != input.tools.size()) {
     throw std::invalid_argument("grip_pressures has " +
@@ -231,8 +186,8 @@ void Simulation::apply(const AppliedInput& input) {
     throw std::invalid_argument("the input moves anchors, which this method and device do not");
   }
   for (const AnchorMotion& m : input.anchors) {
-    check(m.begin, "an anchor's pose");
-    check(m.end, "an anchor's pose");
+    check_pose(m.begin, "an anchor's pose");
+    check_pose(m.end, "an anchor's pose");
   }
   if (input.gravity) set_gravity(*input.gravity);
   if (input.damping) set_damping(*input.damping);

@@ -1,0 +1,56 @@
+#include "cutting/check_path.h"
+
+#include <cmath>
+#include <stdexcept>
+
+#include "cutting/blade_sweep.h"
+
+namespace tissue_sim {
+namespace {
+
+constexpr double kFarthestPlace = 1e6;  // from the origin [m]
+constexpr double kMostSwept = 1e5;      // edges of a cut, see swept_edges()
+
+}  // namespace
+
+void check_pose(const Pose& pose, const std::string& what) {
+  if (!pose.position.allFinite() || !pose.orientation.coeffs().allFinite()) {
+    throw std::invalid_argument(what + " is not finite");
+  }
+  if (!(pose.position.cwiseAbs().maxCoeff() <= kFarthestPlace)) {
+    throw std::invalid_argument(what + " is more than 1e6 m away: no instrument is");
+  }
+  if (std::fabs(pose.orientation.norm() - 1) > 1e-3) {
+    throw std::invalid_argument(what + " has a quaternion of norm " +
+                                std::to_string(pose.orientation.norm()) +
+                                ": it must be 1, or it is no rotation");
+  }
+}
+
+void check_path(const BladePath& path) {
+  if (path.poses.size() < 2) {
+    throw std::invalid_argument("a cut needs at least 2 poses, got " +
+                                std::to_string(path.poses.size()));
+  }
+  if (path.edge.size() < 2) {
+    throw std::invalid_argument("a blade's edge needs at least 2 points, got " +
+                                std::to_string(path.edge.size()));
+  }
+  for (const Vec3& x : path.edge) {
+    if (!x.allFinite()) throw std::invalid_argument("a point of the blade's edge is not finite");
+    if (!(x.cwiseAbs().maxCoeff() <= kFarthestPlace)) {
+      throw std::invalid_argument("a point of the blade's edge is more than 1e6 m away");
+    }
+  }
+  for (const Pose& pose : path.poses) check_pose(pose, "a pose of the blade");
+  const double product =
+      (static_cast<double>(path.edge.size()) - 1) * (static_cast<double>(path.poses.size()) - 1);
+  if (const double swept = product > kMostSwept ? product : swept_edges(path); swept > kMostSwept) {
+    throw std::invalid_argument(
+        "the cut sweeps " + std::to_string(std::lround(swept)) +
+        " edges (pieces of the blade's edge times steps of its path, each turned by less than 4 "
+        "degrees), at most 100000 are done: give fewer points of the edge or poses");
+  }
+}
+
+}  // namespace tissue_sim

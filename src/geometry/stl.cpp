@@ -1,4 +1,5 @@
-// assimp refuses bytes after the last triangle, capitals, and normals such as "-nan(ind)".
+// A reader of our own: what CAD programs write has bytes after the last triangle, capitals, and
+// normals such as "-nan(ind)".
 #include "geometry/stl.h"
 
 #include <algorithm>

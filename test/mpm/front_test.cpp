@@ -187,7 +187,6 @@ TEST(Front, SagAndMouthOfACutCantilever) {
     path.edge = {Vec3(0.01, -0.1, 0), Vec3(0.01, 0.1, 0)};
     for (const double z : {0.03, 0.02 - depth})
       path.poses.push_back({Vec3(0, 0, z), Quat::Identity()});
-    for (Pose& pose : path.poses) pose.orientation = Quat::Identity();
     simulation.cut(path);
     EXPECT_TRUE(simulation.settle({3e-6, 6, 20}).at_rest) << depth;
     const double sag =

@@ -13,6 +13,7 @@
 
 #include "ros/bag_repair.h"
 #include "ros/recorder.h"
+#include "temporary_folder.h"
 
 namespace tissue_sim {
 namespace {
@@ -23,12 +24,7 @@ constexpr double kMiB = 1024 * 1024;
 
 class BagRepairTest : public testing::Test {
  protected:
-  void SetUp() override {
-    char name[] = "/tmp/tissue_sim_repair_XXXXXX";
-    folder_ = mkdtemp(name);
-    ros::Time::init();
-  }
-  void TearDown() override { fs::remove_all(folder_); }
+  void SetUp() override { ros::Time::init(); }
 
   static std_msgs::String::ConstPtr text(std::size_t bytes, unsigned seed) {
     auto m = boost::make_shared<std_msgs::String>();
@@ -49,7 +45,8 @@ class BagRepairTest : public testing::Test {
     return numbers;
   }
 
-  std::string folder_;
+  const TemporaryFolder temporary_;
+  const std::string folder_ = temporary_.path();
 };
 
 TEST_F(BagRepairTest, ABagCutOffAnywhereKeepsItsWholeChunks) {

@@ -10,6 +10,7 @@
 
 #include "ros/recorder.h"
 #include "ros/recording_path.h"
+#include "temporary_folder.h"
 
 namespace tissue_sim {
 namespace {
@@ -20,12 +21,7 @@ constexpr double kMiB = 1024 * 1024;
 
 class RecorderTest : public testing::Test {
  protected:
-  void SetUp() override {
-    char name[] = "/tmp/tissue_sim_recorder_XXXXXX";
-    folder_ = mkdtemp(name);
-    ros::Time::init();
-  }
-  void TearDown() override { fs::remove_all(folder_); }
+  void SetUp() override { ros::Time::init(); }
 
   // That no compression makes smaller.
   static std_msgs::String::ConstPtr text(std::size_t bytes) {
@@ -36,7 +32,8 @@ class RecorderTest : public testing::Test {
     return m;
   }
 
-  std::string folder_;
+  const TemporaryFolder temporary_;
+  const std::string folder_ = temporary_.path();
 };
 
 TEST_F(RecorderTest, WritesWhatItIsGiven) {

@@ -97,6 +97,31 @@ TISSUE_SIM_INLINE void store(float* p, Vec<W> v) {
   *reinterpret_cast<typename VecOf<W>::unaligned*>(p) = v;
 }
 
+#if !defined(__CUDACC__)
+/// Lane i is lane from[i] of v (0 .. W - 1). Clang has no such builtin for a variable.
+template <int W>
+TISSUE_SIM_INLINE Vec<W> permute(Vec<W> v, Mask<W> from) {
+#if defined(__clang__)
+  Vec<W> r;
+  for (int i = 0; i < W; ++i) r[i] = v[from[i]];
+  return r;
+#else
+  return __builtin_shuffle(v, from);
+#endif
+}
+/// Lane i is lane from[i] of v and then w (0 .. 2 W - 1).
+template <int W>
+TISSUE_SIM_INLINE Vec<W> permute(Vec<W> v, Vec<W> w, Mask<W> from) {
+#if defined(__clang__)
+  Vec<W> r;
+  for (int i = 0; i < W; ++i) r[i] = from[i] < W ? v[from[i]] : w[from[i] - W];
+  return r;
+#else
+  return __builtin_shuffle(v, w, from);
+#endif
+}
+#endif
+
 /// Instruction sets that the CPU kernels are compiled for.
 enum class InstructionSet { kSse2, kAvx2, kAvx512 };
 

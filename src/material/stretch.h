@@ -141,7 +141,7 @@ TISSUE_SIM_INLINE void stretch(const Invariants<float>* of, Stretch<float>* s) {
   }
 #pragma unroll
   for (int k = 0; k < N; ++k) a[k] = fast_root(1.0001f * of[k].c1 + b2[k]);
-  const auto evaluate = [&](int k) {
+  const auto evaluate = [&](int k) TISSUE_SIM_INLINE_LAMBDA {
     p[k] = a[k] * a[k] - of[k].c1;
     f1[k] = a[k] * p[k] - 2.0f * of[k].J;
     value4[k] = p[k] * p[k] - (j8[k] * a[k] + c24[k]);

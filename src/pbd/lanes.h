@@ -75,12 +75,12 @@ TISSUE_SIM_INLINE void transpose(Vec<W> (&r)[4]) {
     first[i] = i, first[i + 1] = i + 1, first[i + 2] = i + W, first[i + 3] = i + 1 + W;
     second[i] = i + 2, second[i + 1] = i + 3, second[i + 2] = i + 2 + W, second[i + 3] = i + 3 + W;
   }
-  const Vec<W> a = __builtin_shuffle(r[0], r[1], low), b = __builtin_shuffle(r[0], r[1], high);
-  const Vec<W> c = __builtin_shuffle(r[2], r[3], low), d = __builtin_shuffle(r[2], r[3], high);
-  r[0] = __builtin_shuffle(a, c, first);
-  r[1] = __builtin_shuffle(a, c, second);
-  r[2] = __builtin_shuffle(b, d, first);
-  r[3] = __builtin_shuffle(b, d, second);
+  const Vec<W> a = permute<W>(r[0], r[1], low), b = permute<W>(r[0], r[1], high);
+  const Vec<W> c = permute<W>(r[2], r[3], low), d = permute<W>(r[2], r[3], high);
+  r[0] = permute<W>(a, c, first);
+  r[1] = permute<W>(a, c, second);
+  r[2] = permute<W>(b, d, first);
+  r[3] = permute<W>(b, d, second);
 }
 
 /// The 16 bytes of W / 4 vertices side by side: i, i + 4, i + 8, i + 12. By instructions, for GCC

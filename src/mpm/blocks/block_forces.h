@@ -43,7 +43,7 @@ TISSUE_SIM_INLINE void viscous_stress(const Block& b, const BlockField& f, const
       q[i] = in + slot * l.in_plane + c * kStressXyCount * l.quantity + j;
       r[i] = in_rate + (3 * slot + c) * kMeanXyCount * l.quantity + j;
     }
-    const auto of = [&l](const float* const(&plane)[3], int k) {
+    const auto of = [&l](const float* const(&plane)[3], int k) TISSUE_SIM_INLINE_LAMBDA {
       return std::array<const float*, 3>{plane[0] + k * l.quantity, plane[1] + k * l.quantity,
                                          plane[2] + k * l.quantity};
     };
@@ -147,11 +147,10 @@ TISSUE_SIM_INLINE void forces(const Block& b, const BlockField& f, BlockScratch&
       if (viscous) {
         load_mean_plane<W>(b, l, scratch.velocities.data(), z + 2, scratch.in_rate.data());
       }
-      for_each_filled<W>(
-          filled, [&](auto width, int j, bool whole) __attribute__((always_inline)) {
-            stress_lanes<width, Materials>(b, f, l, scratch.in.data(), scratch.in_rate.data(), z, j,
-                                           whole, viscous, out);
-          });
+      for_each_filled<W>(filled, [&](auto width, int j, bool whole) TISSUE_SIM_INLINE_LAMBDA {
+        stress_lanes<width, Materials>(b, f, l, scratch.in.data(), scratch.in_rate.data(), z, j,
+                                       whole, viscous, out);
+      });
     }
     store_plane<W>(b, l, out, z, -inv_h, scratch.row.data(), force);
   }
@@ -161,10 +160,9 @@ TISSUE_SIM_INLINE void forces(const Block& b, const BlockField& f, BlockScratch&
 template <int W>
 TISSUE_SIM_INLINE void forces_any(const Block& b, const BlockField& f, BlockScratch& s,
                                   float* out) {
-  with_materials(
-      b, f, [&](auto materials) __attribute__((always_inline)) {
-        forces<W, decltype(materials)>(b, f, s, out);
-      });
+  with_materials(b, f, [&](auto materials) TISSUE_SIM_INLINE_LAMBDA {
+    forces<W, decltype(materials)>(b, f, s, out);
+  });
 }
 
 }  // namespace kernels

@@ -78,7 +78,7 @@ template <int W, class Spans>
 TISSUE_SIM_INLINE bool covers_all(const Spans& spans, int count) {
   int end = 0;
   bool any_gap = false;
-  for_each_filled<W>(spans, [&](auto width, int j, bool) {
+  for_each_filled<W>(spans, [&](auto width, int j, bool) TISSUE_SIM_INLINE_LAMBDA {
     any_gap = any_gap || j != end;
     end = j + width;
   });
@@ -147,7 +147,7 @@ TISSUE_SIM_INLINE void mean_gradient(const std::array<const float*, 3>& AA,
                                      const std::array<const float*, 3>& Ad,
                                      const std::array<const float*, 3>& dA, int component,
                                      Vec<W>* G) {
-  const auto average = [](const std::array<const float*, 3>& q) {
+  const auto average = [](const std::array<const float*, 3>& q) TISSUE_SIM_INLINE_LAMBDA {
     return (0.5f * kAverageSide) * (load<W>(q[0]) + load<W>(q[2])) +
            (0.5f * kAverageCenter) * load<W>(q[1]);
   };
@@ -271,10 +271,9 @@ TISSUE_SIM_INLINE void xy_transpose(const float* q, int stride, int count, int m
                                     float* force) {
   const Mask<W> mask[3] = {lanes_between<W>(-m, count - m), lanes_between<W>(1 - m, count + 1 - m),
                            lanes_between<W>(2 - m, count + 2 - m)};
-  const auto at = [q, stride, m](XyQuantity k, int back) {
-    return load<W>(q + k * stride + m - back);
-  };
-  const auto sum = [&mask](Vec<W> first, Vec<W> middle, Vec<W> last) {
+  const auto at = [q, stride, m](XyQuantity k, int back)
+                      TISSUE_SIM_INLINE_LAMBDA { return load<W>(q + k * stride + m - back); };
+  const auto sum = [&mask](Vec<W> first, Vec<W> middle, Vec<W> last) TISSUE_SIM_INLINE_LAMBDA {
     return keep<W>(mask[0], first) + keep<W>(mask[1], middle) + keep<W>(mask[2], last);
   };
   const Vec<W> A = sum(kAverageSide * at(kAA, 0) - at(kdA, 0) + at(kBA, 0),

@@ -72,12 +72,13 @@ template <int W>
 TISSUE_SIM_INLINE void positions(const Block& b, const BlockField& f, const Array<float>* u,
                                  BlockScratch& scratch, float* out) {
   const std::size_t lanes = b.lane_count();
-  for_each_place<W>(
-      b, f, u, scratch, [&](std::size_t lane, const auto& x) __attribute__((always_inline)) {
-        for (int c = 0; c < 3; ++c) {
-          for (int s = 0; s < 8; ++s) store<W>(out + c * lanes + lane + s * b.stride, x[c][s]);
-        }
-      });
+  for_each_place<W>(b, f, u, scratch,
+                    [&](std::size_t lane, const auto& x) TISSUE_SIM_INLINE_LAMBDA {
+                      for (int c = 0; c < 3; ++c) {
+                        for (int s = 0; s < 8; ++s)
+                          store<W>(out + c * lanes + lane + s * b.stride, x[c][s]);
+                      }
+                    });
 }
 
 /// The lanes that hold points, all bits set of each.
@@ -96,8 +97,7 @@ TISSUE_SIM_INLINE PointBounds bounds(const Block& b, const BlockField& f, BlockS
     max[c] = Vec<W>{} + result.max[c];
   }
   for_each_place<W>(
-      b, f, f.nodes->u,
-      scratch, [&](std::size_t lane, const auto& x) __attribute__((always_inline)) {
+      b, f, f.nodes->u, scratch, [&](std::size_t lane, const auto& x) TISSUE_SIM_INLINE_LAMBDA {
         for (int s = 0; s < 8; ++s) {
           const Mask<W> inside = hold_points<W>(volume + lane + s * b.stride);
           for (int c = 0; c < 3; ++c) {  // nothing but `v < w ? v : w` becomes one instruction
@@ -110,16 +110,15 @@ TISSUE_SIM_INLINE PointBounds bounds(const Block& b, const BlockField& f, BlockS
       });
   // By their bits, which order what is not negative: what is no number is the largest.
   Mask<W> speed2 = {};
-  for_each_place<W>(
-      b, at_rest(f), f.nodes->v,
-      scratch, [&](std::size_t lane, const auto& v) __attribute__((always_inline)) {
-        for (int s = 0; s < 8; ++s) {
-          const Vec<W> v2 = v[0][s] * v[0][s] + v[1][s] * v[1][s] + v[2][s] * v[2][s];
-          const Mask<W> of_points =
-              bits<W>(v2) & 0x7fffffff & hold_points<W>(volume + lane + s * b.stride);
-          speed2 = of_points > speed2 ? of_points : speed2;
-        }
-      });
+  for_each_place<W>(b, at_rest(f), f.nodes->v, scratch,
+                    [&](std::size_t lane, const auto& v) TISSUE_SIM_INLINE_LAMBDA {
+                      for (int s = 0; s < 8; ++s) {
+                        const Vec<W> v2 = v[0][s] * v[0][s] + v[1][s] * v[1][s] + v[2][s] * v[2][s];
+                        const Mask<W> of_points =
+                            bits<W>(v2) & 0x7fffffff & hold_points<W>(volume + lane + s * b.stride);
+                        speed2 = of_points > speed2 ? of_points : speed2;
+                      }
+                    });
   std::int32_t largest = 0;
   for (int i = 0; i < W; ++i) {
     largest = std::max(largest, static_cast<std::int32_t>(speed2[i]));

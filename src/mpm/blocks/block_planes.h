@@ -80,13 +80,12 @@ TISSUE_SIM_INLINE void load_quantities(const Block& b, const Layout& l, const fl
   for (const Block::Run& run : b.runs) {
     const float* from = nodes + z * l.plane + run.y * l.pitch + run.x;
     float* to = in + (z % 3) * 3 * count * l.quantity + run.lane;
-    for_each_vector<W>(
-        run.count, [&](auto width, int j) __attribute__((always_inline)) {
-          for (int c = 0; c < 3; ++c) {
-            pass(width, from + c * l.node_component + j, l.pitch, l.quantity,
-                 to + c * count * l.quantity + j);
-          }
-        });
+    for_each_vector<W>(run.count, [&](auto width, int j) TISSUE_SIM_INLINE_LAMBDA {
+      for (int c = 0; c < 3; ++c) {
+        pass(width, from + c * l.node_component + j, l.pitch, l.quantity,
+             to + c * count * l.quantity + j);
+      }
+    });
   }
 }
 
@@ -94,27 +93,27 @@ TISSUE_SIM_INLINE void load_quantities(const Block& b, const Layout& l, const fl
 template <int W>
 TISSUE_SIM_INLINE void load_plane(const Block& b, const Layout& l, const float* nodes, int z,
                                   float* in) {
-  load_quantities<W>(
-      b, l, nodes, z, kStressXyCount, in,
-      [](auto width, auto... of) __attribute__((always_inline)) { xy_pass<width>(of...); });
+  load_quantities<W>(b, l, nodes, z, kStressXyCount, in,
+                     [](auto width, auto... of)
+                         TISSUE_SIM_INLINE_LAMBDA { xy_pass<width>(of...); });
 }
 
 /// Those of the mean gradients of cells.
 template <int W>
 TISSUE_SIM_INLINE void load_mean_plane(const Block& b, const Layout& l, const float* nodes, int z,
                                        float* in) {
-  load_quantities<W>(
-      b, l, nodes, z, kMeanXyCount, in,
-      [](auto width, auto... of) __attribute__((always_inline)) { mean_xy_pass<width>(of...); });
+  load_quantities<W>(b, l, nodes, z, kMeanXyCount, in,
+                     [](auto width, auto... of)
+                         TISSUE_SIM_INLINE_LAMBDA { mean_xy_pass<width>(of...); });
 }
 
 /// Those of values at the points.
 template <int W>
 TISSUE_SIM_INLINE void load_values(const Block& b, const Layout& l, const float* nodes, int z,
                                    float* in) {
-  load_quantities<W>(
-      b, l, nodes, z, kValueXyCount, in,
-      [](auto width, auto... of) __attribute__((always_inline)) { value_xy_pass<width>(of...); });
+  load_quantities<W>(b, l, nodes, z, kValueXyCount, in,
+                     [](auto width, auto... of)
+                         TISSUE_SIM_INLINE_LAMBDA { value_xy_pass<width>(of...); });
 }
 
 /// The forces on node plane z from its outgoing x-y quantities.
@@ -125,13 +124,12 @@ TISSUE_SIM_INLINE void store_plane(const Block& b, const Layout& l, const float*
   for (const Block::Run& run : b.runs) {
     const float* from = out + (z % 3) * l.out_plane + kLanes + run.lane;
     float* to = sums + run.y * l.sum_pitch + run.x;
-    for_each_vector<W>(
-        run.count + 2, [&](auto width, int m) __attribute__((always_inline)) {
-          for (int c = 0; c < 3; ++c) {
-            xy_transpose<width>(from + c * kStressXyCount * l.quantity, l.quantity, run.count, m,
-                                l.sum_pitch, to + c * l.sum_component);
-          }
-        });
+    for_each_vector<W>(run.count + 2, [&](auto width, int m) TISSUE_SIM_INLINE_LAMBDA {
+      for (int c = 0; c < 3; ++c) {
+        xy_transpose<width>(from + c * kStressXyCount * l.quantity, l.quantity, run.count, m,
+                            l.sum_pitch, to + c * l.sum_component);
+      }
+    });
   }
   for (int c = 0; c < 3; ++c) {
     const float* from = sums + c * l.sum_component;

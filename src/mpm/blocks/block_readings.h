@@ -110,12 +110,11 @@ TISSUE_SIM_INLINE void for_each_gradient(const Block& b, const BlockField& f, Bl
   for (int z = 0; z < 2; ++z) load_plane<W>(b, l, scratch.nodes.data(), z, scratch.in.data());
   for (int z = 0; z < b.nz; ++z) {
     load_plane<W>(b, l, scratch.nodes.data(), z + 2, scratch.in.data());
-    for_each_filled<W>(
-        b.filled[z], [&](auto width, int j, bool) __attribute__((always_inline)) {
-          Vec<width> G[8][9];
-          gradients<width>(l, scratch.in.data(), z, j, G);
-          visit(width, static_cast<std::size_t>(z) * 8 * l.stride + j, G);
-        });
+    for_each_filled<W>(b.filled[z], [&](auto width, int j, bool) TISSUE_SIM_INLINE_LAMBDA {
+      Vec<width> G[8][9];
+      gradients<width>(l, scratch.in.data(), z, j, G);
+      visit(width, static_cast<std::size_t>(z) * 8 * l.stride + j, G);
+    });
   }
 }
 
@@ -125,7 +124,7 @@ TISSUE_SIM_INLINE BlockState state(const Block& b, const BlockField& f, BlockScr
   Readings read;
   read.block.stiffening.assign(f.material_count, 1.0f);
   for_each_gradient<W>(
-      b, f, scratch, [&](auto width, std::size_t lane, auto* G) __attribute__((always_inline)) {
+      b, f, scratch, [&](auto width, std::size_t lane, auto* G) TISSUE_SIM_INLINE_LAMBDA {
         for (int s = 0; s < 8; s += 4) {
           read_states<4, width, Materials>(b, f, lane + s * b.stride, G + s, read, von_mises);
         }
@@ -142,13 +141,13 @@ template <int W>
 TISSUE_SIM_INLINE BlockState stiffness(const Block& b, const BlockField& f, BlockScratch& scratch) {
   Readings read;
   read.block.stiffening.assign(f.material_count, 1.0f);
-  for_each_gradient<W>(
-      b, f, scratch, [&](auto width, std::size_t lane, auto* G) __attribute__((always_inline)) {
-        for (int s = 0; s < 8; ++s) {
-          add_identity<width>(G[s]);
-          read_stiffening<width>(b, f, lane + s * b.stride, G[s], read);
-        }
-      });
+  for_each_gradient<W>(b, f, scratch,
+                       [&](auto width, std::size_t lane, auto* G) TISSUE_SIM_INLINE_LAMBDA {
+                         for (int s = 0; s < 8; ++s) {
+                           add_identity<width>(G[s]);
+                           read_stiffening<width>(b, f, lane + s * b.stride, G[s], read);
+                         }
+                       });
   for (const float s : read.stiffenings) read.block.finite = read.block.finite && std::isfinite(s);
   return read.block;
 }
@@ -156,10 +155,9 @@ TISSUE_SIM_INLINE BlockState stiffness(const Block& b, const BlockField& f, Bloc
 template <int W>
 TISSUE_SIM_INLINE BlockState state_any(const Block& b, const BlockField& f, BlockScratch& s,
                                        float* von_mises) {
-  return with_materials(
-      b, f, [&](auto materials) __attribute__((always_inline)) {
-        return state<W, decltype(materials)>(b, f, s, von_mises);
-      });
+  return with_materials(b, f, [&](auto materials) TISSUE_SIM_INLINE_LAMBDA {
+    return state<W, decltype(materials)>(b, f, s, von_mises);
+  });
 }
 
 /// The largest eigenvalue of C reaches s^2 where s^2 I - C is not positive definite: by its leading
@@ -169,7 +167,7 @@ TISSUE_SIM_INLINE void stretched(const Block& b, const BlockField& f, float stre
                                  BlockScratch& scratch, std::vector<StretchedPoint>& found) {
   const float s2 = stretch * stretch;
   for_each_gradient<W>(
-      b, f, scratch, [&](auto width, std::size_t lane, auto* G) __attribute__((always_inline)) {
+      b, f, scratch, [&](auto width, std::size_t lane, auto* G) TISSUE_SIM_INLINE_LAMBDA {
         using V = Vec<width>;
         for (int s = 0; s < 8; ++s, lane += b.stride) {
           V C[6];

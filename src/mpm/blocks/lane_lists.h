@@ -38,13 +38,16 @@ TISSUE_SIM_INLINE int lanes_near(const LaneSlab (&slabs)[3], const LaneReach& re
     Mask<W> unlisted = {}, far = {}, outside = {};
     for (int i = 0; i < 3; ++i) {
       const LaneSlab& s = slabs[i];
-      const auto along = [&](const float* v) {
+      const auto along = [&](const float* v) TISSUE_SIM_INLINE_LAMBDA {
         return s.axis[0] * load<W>(v + j) + s.axis[1] * load<W>(v + count + j) +
                s.axis[2] * load<W>(v + 2 * count + j);
       };
       const Vec<W> a = along(x), b = along(y);
-      const auto below = [&](float by) { return both_below<W>(a, b, s.low - by); };
-      const auto above = [&](float by) { return both_below<W>(-a, -b, -s.high - by); };
+      const auto below = [&](float by)
+                             TISSUE_SIM_INLINE_LAMBDA { return both_below<W>(a, b, s.low - by); };
+      const auto above = [&](float by) TISSUE_SIM_INLINE_LAMBDA {
+        return both_below<W>(-a, -b, -s.high - by);
+      };
       unlisted |= below(reach.listed) | above(reach.listed);
       far |= below(reach.near) | above(reach.near);
       outside |= (below(reach.outside) & (1 << 2 * i)) | (above(reach.outside) & (2 << 2 * i));

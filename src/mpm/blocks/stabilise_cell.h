@@ -55,7 +55,7 @@ template <int W>
 TISSUE_SIM_INLINE Vec<W> of_node(Vec<W> v, int i) {
   Mask<W> from;
   for (int j = 0; j < W; ++j) from[j] = j / 4 * 4 + i;
-  return __builtin_shuffle(v, from);
+  return permute<W>(v, from);
 }
 
 /// Adds the force that stabilises one component of a cell, or with W = 16 all three of them, times

@@ -218,7 +218,8 @@ void add_rows(const LatticeBody& b, const Points& points, const NodeFields& fiel
     }
     if (!(mobility > 0)) continue;  // all is inside
     // What has no weight is read as well: of a node of this row, which no other group writes then.
-    const int own = static_cast<int>(std::max_element(row.share, row.share + kRowNodes) - row.share);
+    const int own =
+        static_cast<int>(std::max_element(row.share, row.share + kRowNodes) - row.share);
     for (int k = 0; k < kRowNodes; ++k) {
       if (row.weight[k] == 0) row.node[k] = row.node[own];
     }

@@ -50,7 +50,10 @@ Simulation::Simulation(const Scene& scene) : state_(std::make_unique<State>()) {
   check_first_frame(scene);
   state_->scene = scene;
   state_->tissue = make_tissue(scene);
-  if (scene.ground.enabled) check_ground(scene, state_->tissue->fragments());
+  if (scene.ground.enabled) {
+    check_ground(scene, state_->tissue->fragments());
+    check_held(scene, *state_->tissue);
+  }
   state_->tools.resize(scene.tools.size());
   state_->grips.resize(scene.tools.size());
   state_->grip_pressures.resize(scene.tools.size());

@@ -2,12 +2,15 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 #include <set>
 #include <stdexcept>
 
 #include "frame/part_substeps.h"
 #include "frame/stability_limit.h"
 #include "scene/scene_text.h"
+#include "tissue_sim/point.h"
+#include "tissue_sim/tissue.h"
 
 namespace tissue_sim {
 namespace {
@@ -57,6 +60,32 @@ void check_ground(const Scene& scene, Span<const Fragment> pieces) {
         "' lies below the ground (it reaches up to z = " + metres(piece.box.max.z()) +
         ", ground.z is " + metres(scene.ground.z) +
         "): move it up by pose.position, or set ground.enabled to false");
+  }
+}
+
+void check_held(const Scene& scene, Tissue& tissue) {
+  if (!scene.ground.enabled) return;
+  const Span<const Fragment> pieces = tissue.fragments();
+  const double least = scene.ground.z - scene.cell_size;
+  const auto reaches_below = [&](const Fragment& piece) {
+    return piece.box.min.z() < least && !scene.bodies[piece.body].anchors.empty();
+  };
+  if (std::none_of(pieces.begin(), pieces.end(), reaches_below)) return;
+  std::vector<std::uint8_t> cloud;
+  const int count = tissue.read_points({}, cloud);
+  for (int i = 0; i < count; ++i) {
+    Point p;
+    std::memcpy(&p, cloud.data() + i * sizeof(Point), sizeof(Point));
+    if (!(p.z < least)) continue;
+    const Body& body = scene.bodies[pieces[p.fragment].body];
+    if (body.anchors.empty()) continue;
+    const auto holds = [&p](const Anchor& a) { return a.contains(Vec3(p.x, p.y, p.z)); };
+    if (std::any_of(body.anchors.begin(), body.anchors.end(), holds)) continue;
+    throw std::invalid_argument(
+        "the ground would tear body '" + body.name + "', which anchors hold: tissue that they do " +
+        "not reach begins " + metres(scene.ground.z - p.z) + " below it (ground.z is " +
+        metres(scene.ground.z) + "): move the body up by pose.position, lower the ground, or set " +
+        "ground.enabled to false");
   }
 }
 

@@ -175,5 +175,29 @@ TEST(Ground, BodiesBelowItAreRefused) {
   }
 }
 
+TEST(Ground, DoesNotTearWhatAnchorsHold) {
+  Scene s = block(0.004);  // from z = -size / 2
+  s.ground.enabled = true;
+  const double low = s.bodies[0].pose.position.z() - s.bodies[0].size.z() / 2;
+  Region side;
+  side.kind = Region::Kind::kBox;
+  side.min = Vec3(-1, -1, -1);
+  side.max = Vec3(s.bodies[0].pose.position.x() - s.bodies[0].size.x() / 4, 1, 1);
+  s.bodies[0].anchors = {side};
+  for (const Method method : {Method::kMpm, Method::kMls, Method::kPbd}) {
+    s.method = method;
+    s.ground.z = low + 0.009;
+    const std::string reason = reason_of([&] { Simulation simulation(s); });
+    EXPECT_NE(reason.find("would tear body"), std::string::npos) << reason;
+    s.ground.z = low + 0.003;  // less than a cell
+    EXPECT_NO_THROW(Simulation{s});
+    s.ground.z = low + 0.009;
+    Scene held = s;  // all that is below is held
+    held.bodies[0].anchors[0] = Region();
+    held.bodies[0].anchors[0].z = low + 0.01;
+    EXPECT_NO_THROW(Simulation{held});
+  }
+}
+
 }  // namespace
 }  // namespace tissue_sim

@@ -434,7 +434,9 @@ bool push_surface(BlockPush& b, const NearCell& cell, const Collider& collider, 
     if (g.distance >= 0) {
       if (is_held) b.let_go(touch);
       clear = std::min(clear, std::max(0.0f, g.distance - beside));
-      if (g.distance < beside && !faces_away(place, g)) load.points += place.area / unit_area;
+      if (g.distance < beside && !faces_away(place, g)) {
+        load.points += (1 - g.distance / beside) * place.area / unit_area;
+      }
       continue;
     }
     if (!is_held) {

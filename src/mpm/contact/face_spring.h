@@ -66,7 +66,9 @@ struct alignas(16) FaceSpring {
 /// knows displacements [m]: places.own(u) of the facet's centre, places.held(u) of the place held,
 /// which places.hold(place) sets, and places.held_mobility() [1/kg]. Where several contacts are
 /// worked out in step, places.any(so) says whether it is so for any of them, and those that are not
-/// `active` come along.
+/// `active` come along. With places.slides_back() a place that slid too far comes back onto the
+/// cone: in a substep it may slide ten times as far as the spring on the cone is long, and a tenth
+/// too far there would be no friction.
 template <class Places>
 TISSUE_SIM_INLINE void push_face(FaceSpring& c, float dt, Places& places, bool active = true) {
   float own[3], held[3];
@@ -85,16 +87,29 @@ TISSUE_SIM_INLINE void push_face(FaceSpring& c, float dt, Places& places, bool a
   // The place held slides along the face, so that the spring stays in the friction cone.
   constexpr float kOnCone = 1.02f;
   float aside[3], slip = 0;
+  float way[3] = {}, left[3];  // which way it slides, unit; what is left of it [m]
   for (int i = 0; i < 4; ++i) {
     for (int a = 0; a < 3; ++a) aside[a] = c.apart[a] + depth * c.normal[a];
     slip = sqrtf(dot(aside, aside));
-    const bool slides = c.touching && slip > kOnCone * c.friction * depth;
+    bool slides = c.touching && slip > kOnCone * c.friction * depth;
+    float share = 1 - c.friction * depth / slip;
+    const float* step = aside;
+    if (places.slides_back()) {
+      constexpr float kOff = kOnCone - 1;
+      const float cone = c.friction * depth;
+      for (int a = 0; a < 3; ++a) {
+        if (i == 0 && slides) way[a] = aside[a] / slip;
+        left[a] = aside[a] - cone * way[a];
+      }
+      if (i > 0) slides = c.touching && dot(left, left) > kOff * kOff * cone * cone;
+      share = 1;
+      step = left;
+    }
     if (i == 3 || !places.any(slides)) break;
     if (slides) {
-      const float share = 1 - c.friction * depth / slip;
       float place[3];
       for (int a = 0; a < 3; ++a) {
-        place[a] = c.hold[a] + share * dot(c.to_reference + 3 * a, aside);
+        place[a] = c.hold[a] + share * dot(c.to_reference + 3 * a, step);
       }
       c.hold_at(place);
       places.hold(place);

@@ -168,6 +168,7 @@ struct LanePlaces {
     other_place.bring(state.u);
   }
   __device__ __forceinline__ bool any(bool so) const { return lanes.any(so); }
+  __device__ __forceinline__ static constexpr bool slides_back() { return false; }
   __device__ __forceinline__ void own(float (&value)[3]) const {
     own_place.displacement(lanes, value);
   }

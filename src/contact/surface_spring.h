@@ -35,6 +35,27 @@ TISSUE_SIM_INLINE SurfaceSpring surface_spring(float modulus, float density, flo
           2 * kDampingAlong * sqrtf(along * mass), 0};
 }
 
+/// How often the spring along the surface may be doubled where substeps of dt are shorter than
+/// waves need, as in tissue that is squeezed, up to what it is across; `now`: how often it is. A
+/// soft one lets what hangs from a tool hang lower. Substeps that go up and down by less than the
+/// half do not change it: each time that it gets stiffer what it holds slides a little.
+TISSUE_SIM_INLINE int doubled_along(float modulus, float density, float cell_size, float dt,
+                                    int now) {
+  constexpr int kMost = 4;
+  constexpr float kFits = 0.25f, kRoom = 1.25f;
+  const float fits = kFits * density * cell_size * cell_size / (modulus * dt * dt);
+  while (now > 0 && fits < static_cast<float>(1 << now)) --now;
+  while (now < kMost && fits > kRoom * static_cast<float>(2 << now)) ++now;
+  return now;
+}
+
+/// Doubles the spring along the surface so often.
+TISSUE_SIM_INLINE void stiffen_along(SurfaceSpring& s, int doubled) {
+  const auto by = static_cast<float>(1 << doubled);
+  s.along *= by;
+  s.damping_along *= sqrtf(by);
+}
+
 /// Of a place that stands for so much more.
 TISSUE_SIM_INLINE SurfaceSpring scaled(const SurfaceSpring& s, float by) {
   return {by * s.across, by * s.along, by * s.damping_across, by * s.damping_along,

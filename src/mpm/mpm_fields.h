@@ -130,7 +130,7 @@ void fields(Archive& archive, AnchorFaces& a) {
 
 template <class Archive>
 void fields(Archive& archive, Touch& t) {
-  archive(t.cell, t.point, t.key, t.collider, t.hold, t.along, t.inertia, t.begun);
+  archive(t.cell, t.point, t.key, t.collider, t.hold, t.along, t.inertia, t.begun, t.doubled);
 }
 
 template <class Archive>

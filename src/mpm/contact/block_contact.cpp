@@ -406,6 +406,7 @@ bool push_surface(BlockPush& b, const NearCell& cell, const Collider& collider, 
   bool touches = false;
   int material = -1;
   SurfaceSpring of_unit_area{};
+  float modulus = 0, density = 0;
   const auto faces_away = [&](const SurfacePlace& place, const Gap& g) {
     float F[9], n[3], along = 0, length = 0;
     deformation_gradient_at(b.state.nodes.u, nodes, b.body.cell_size, place.place, F);
@@ -455,10 +456,21 @@ bool push_surface(BlockPush& b, const NearCell& cell, const Collider& collider, 
     if (own != material) {
       material = own;
       const Material& m = b.body.materials[own];
-      of_unit_area = surface_spring(static_cast<float>(lame_lambda(m) + 2 * lame_mu(m)),
-                                    static_cast<float>(m.density), h, 1, b.dt);
+      modulus = static_cast<float>(lame_lambda(m) + 2 * lame_mu(m));
+      density = static_cast<float>(m.density);
+      of_unit_area = surface_spring(modulus, density, h, 1, b.dt);
     }
+    const int doubled = doubled_along(modulus, density, h, b.dt, touch.doubled);
+    if (is_held && doubled > touch.doubled) {  // with the force that it has
+      float held[3];
+      to_world(collider, touch.hold, held);
+      const float share = 1 / static_cast<float>(1 << (doubled - touch.doubled));
+      for (int a = 0; a < 3; ++a) held[a] = at[a] + share * (held[a] - at[a]);
+      to_local(collider, held, touch.hold);
+    }
+    touch.doubled = static_cast<std::uint8_t>(doubled);
     SurfaceSpring spring = scaled(of_unit_area, place.area);
+    stiffen_along(spring, doubled);
     spring.cohesion = collider.cohesion * place.area / unit_area;
     // Along the surface no inerter helps: at rims and on debris, whose nodes are light, the spring
     // is what the substep bears.

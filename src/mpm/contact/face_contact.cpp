@@ -6,9 +6,7 @@
 namespace tissue_sim {
 namespace {
 
-bool at_surface(const MpmState& state) {
-  return state.scene.mpm.boundary == MpmBoundary::kSurface;
-}
+bool at_surface(const MpmState& state) { return state.scene.mpm.boundary == MpmBoundary::kSurface; }
 
 }  // namespace
 

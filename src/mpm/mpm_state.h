@@ -29,11 +29,11 @@ struct Touch {
   std::int32_t point;
   std::uint8_t key;  ///< SurfacePlace::key, or kPointKey plus which of the cell's eight points
   std::uint8_t collider;
-  float hold[3];             ///< place that friction holds on to, in the collider's frame [m]
-  float along[3];            ///< normal of its inerter (mpm/contact/contact_inertia.h)
-  float inertia = 0;         ///< of that [kg]
-  float begun = 0;           ///< depth from which on it is pushed back [m]
-  std::uint8_t doubled = 0;  ///< how often its spring along the surface was
+  std::uint8_t doubled;  ///< how often its spring along the surface was
+  float hold[3];         ///< place that friction holds on to, in the collider's frame [m]
+  float along[3];        ///< normal of its inerter (mpm/contact/contact_inertia.h)
+  float inertia = 0;     ///< of that [kg]
+  float begun = 0;       ///< depth from which on it is pushed back [m]
 };
 
 /// A cell of which a collider may touch points before such cells are listed anew.

@@ -329,7 +329,7 @@ bool push_points(BlockPush& b, const NearCell& cell, unsigned points, const Coll
       std::fill_n(pushes, 8, Vec<4>{});
     }
     const std::int32_t p = b.block.point[lane];
-    Touch touch{cell.lane, p, static_cast<std::uint8_t>(kPointKey + s), cell.collider, {}, {}};
+    Touch touch{cell.lane, p, static_cast<std::uint8_t>(kPointKey + s), cell.collider, 0, {}, {}};
     if (!b.find_held(touch)) to_local(collider, at, touch.hold);
     const ContactSpring unit = unit_spring(b.body, b.state.points.material_of(p));
     const float moves = b.block.volume[lane];  // none of what an anchor holds does
@@ -420,7 +420,7 @@ bool push_surface(BlockPush& b, const NearCell& cell, const Collider& collider, 
   for (int i = 0; i < cell.place_count; ++i) {
     const SurfacePlace& place = places[cell.first_place + i];
     const AxisWeights weights(place.place);
-    Touch touch{cell.lane, place.point, place.key, cell.collider, {}, {}};
+    Touch touch{cell.lane, place.point, place.key, cell.collider, 0, {}, {}};
     const bool is_held = b.find_held(touch);
     float moved[6] = {}, at[3];  // displacement and velocity
     if (is_held) {

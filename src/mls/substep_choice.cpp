@@ -3,16 +3,22 @@
 #include <algorithm>
 #include <cmath>
 
+#include "mls/own_rate.h"
+
 namespace tissue_sim {
 namespace {
 
 constexpr double kMostRate = 1.0;  // growth of the fastest node's rate by a cut, until the limit is
                                    // measured again
 constexpr double kOfHeld = 1;      // substep where all is held [s]
+/// How fast a material may swing over the fastest of its nodes by itself: 1.2 to 1.9 were seen, in
+/// regular, jittered and graded nodes, cut and whole, of Poisson's ratios of 0.3 and 0.45.
+constexpr double kTogether = 3;
 
 }  // namespace
 
-MlsSubsteps::MlsSubsteps(const MlsState& s) : stiffness_(s.count()), modulus_(s.count()) {
+MlsSubsteps::MlsSubsteps(const MlsState& s)
+    : stiffness_(s.count()), modulus_(s.count()), most_rate_(s.nodes.materials.size(), 0.0) {
   for (int i = 0; i < s.count(); ++i) {
     stiffness_[i].last = static_cast<float>(wave_modulus(s.nodes.material_of(i), 1));
     elements_.push_back(&stiffness_[i]);
@@ -20,12 +26,15 @@ MlsSubsteps::MlsSubsteps(const MlsState& s) : stiffness_(s.count()), modulus_(s.
 }
 
 // Viscosity's fastest rate is that of the mode of the highest frequency, omega = 2 / elastic:
-// c = 2 eta / (lambda + 2 mu) omega^2, and grows with the square of the stretch.
+// c = 2 eta / (lambda + 2 mu) omega^2, and grows with the square of the stretch. A soft material
+// has not the frequency of a stiff one beside it.
 double MlsSubsteps::damping(const MlsState& s, double elastic) const {
   const double omega = 2 / elastic;
   double fastest = 0;
-  for (const Material& m : s.nodes.materials) {
-    fastest = std::max(fastest, m.viscosity / wave_modulus(m, 1) * omega * omega * stiffened_);
+  for (std::size_t k = 0; k < s.nodes.materials.size(); ++k) {
+    const Material& m = s.nodes.materials[k];
+    const double rate = std::min(omega * omega, kTogether * most_rate_[k] * stiffened_);
+    fastest = std::max(fastest, m.viscosity / wave_modulus(m, 1) * rate * stiffened_);
   }
   return fastest;
 }
@@ -35,49 +44,24 @@ void MlsSubsteps::cut(const MlsState& s, const std::vector<std::int32_t>& nodes)
   s.cpu->for_each(
       static_cast<int>(nodes.size()),
       [&](int k) {
-        if (own_rate(s, nodes[k]) > kMostRate * most_rate_) stiffness_[nodes[k]].measured = 0;
+        const std::int32_t i = nodes[k];
+        if (own_rate(s, i) > kMostRate * most_rate_[s.nodes.material[i]]) {
+          stiffness_[i].measured = 0;
+        }
       },
       256);
 }
 
-double own_rate(const MlsState& s, std::int32_t i) {
-  const MlsPairs& p = s.pairs;
-  double sum = 0;
-  if (s.sprung[i] != 0) {
-    for (std::int32_t e = p.begin[i]; e < p.begin[i + 1]; ++e) {
-      sum += s.spring[e] * (s.inv_mass[i] + s.inv_mass[p.other[e]]);
-    }
-    return sum;
-  }
-  // Its strain is sum_j (u_j - u_i) (x) g_j with g_j = w_ij M_i^-1 r_ij.
-  double all[3] = {};
-  for (std::int32_t e = p.begin[i]; e < p.begin[i + 1]; ++e) {
-    const std::int32_t j = p.other[e];
-    double r[3], g[3];
-    for (int a = 0; a < 3; ++a) r[a] = s.place[4 * j + a] - s.place[4 * i + a];
-    const auto m = [&](int k) { return static_cast<double>(s.inverse_moment[k][i]); };
-    g[0] = p.weight[e] * (m(0) * r[0] + m(3) * r[1] + m(4) * r[2]);
-    g[1] = p.weight[e] * (m(3) * r[0] + m(1) * r[1] + m(5) * r[2]);
-    g[2] = p.weight[e] * (m(4) * r[0] + m(5) * r[1] + m(2) * r[2]);
-    for (int a = 0; a < 3; ++a) {
-      sum += g[a] * g[a] * s.inv_mass[j];
-      all[a] += g[a];
-    }
-  }
-  for (const double g : all) sum += g * g * s.inv_mass[i];
-  return (s.volume_lambda[i] + 2 * s.volume_mu[i]) * sum;
-}
-
 PartSubsteps MlsSubsteps::part(const MlsState& s, double time, const MeasureLimit& measure) {
   limit_.measure_if_due(elements_, s.time, [&](const std::vector<std::uint8_t>& nodes, int steps) {
-    std::vector<double> of_group(s.groups(), 0.0);
-    s.cpu->for_each(s.groups(), [&](int group) {
-      const int first = group * kMlsGroup, last = std::min(s.count(), first + kMlsGroup);
-      for (int i = first; i < last; ++i) {
-        of_group[group] = std::max(of_group[group], own_rate(s, i));
-      }
-    });
-    most_rate_ = *std::max_element(of_group.begin(), of_group.end());
+    std::vector<double> rate(s.count());
+    s.cpu->for_each(
+        s.count(), [&](int i) { rate[i] = own_rate(s, i); }, kMlsGroup);
+    std::fill(most_rate_.begin(), most_rate_.end(), 0.0);
+    for (std::int32_t i = 0; i < s.count(); ++i) {
+      double& most = most_rate_[s.nodes.material[i]];
+      most = std::max(most, rate[i]);
+    }
     return measure(nodes, steps);
   });
   const double elastic = limit_.known() ? limit_.foreseen() : kOfHeld;

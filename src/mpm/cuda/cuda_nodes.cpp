@@ -12,6 +12,7 @@ constexpr int kGrain = 1024;  // nodes that a thread takes at once
 
 void CudaMpmTissue::pull() {
   pull_nodes();
+  pull_front();
   pull_contacts();
 }
 

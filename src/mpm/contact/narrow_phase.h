@@ -211,9 +211,8 @@ TISSUE_SIM_HOST_DEVICE inline void go_on(Faces& s, FaceSpring& c, int other,
 
 /// Puts the place held by a contact that does not touch on the other face, below the facet, or,
 /// where faces are in one another from the start, where there is no force. What came from the front
-/// since the last look touches, as deep as it comes in a substep and a quarter (`came` [cells], 0:
-/// it did not): a spring of kStable gives less than it takes then, and without that what moves a
-/// tenth of a cell in each substep would be aimed anew in each, deeper and deeper.
+/// since the last look touches, up to `came` deep [cells], or what is fast would be aimed anew in
+/// each substep.
 template <class Faces>
 TISSUE_SIM_HOST_DEVICE inline bool aim(Faces& s, FaceSpring& c, const Seen& seen, float came) {
   const Facet& facet = s.facet(c.other);
@@ -253,7 +252,7 @@ TISSUE_SIM_HOST_DEVICE inline void settle(Faces& s, FaceSpring& c, float dt, flo
 /// move against one another [m/s], 0 if there is none.
 template <class Faces>
 TISSUE_SIM_HOST_DEVICE inline float look(Faces& s, FaceSpring& c, float dt, float since) {
-  constexpr float kComes = 1.25f;  // substeps
+  constexpr float kComes = 1.25f;  // substeps: springs of kStable then give less than they took
   const int other = looks::choose_other(s, c), before = c.other;
   const bool in_front = before >= 0 && !c.touching && c.depth < 0;
   if (other < 0) {

@@ -1,20 +1,16 @@
 // The front of a cut: it ends where the blade's edge ended, wherever that lies in a cell
-// (mpm: {boundary: surface}). Its compliance: EdgeCrack.
+// (mpm: {boundary: surface}, on a CPU). Its compliance: EdgeCrack.
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
-#include <cstdio>
 #include <cstring>
 #include <memory>
-#include <random>
 #include <string>
 #include <tuple>
 #include <vector>
 
 #include "cut_scenes.h"
-#include "either_device.h"
 #include "finite_element_scenes.h"
 #include "momentum.h"
 
@@ -94,9 +90,8 @@ TEST(Front, OnlyGoesOn) {
 }
 
 /// Flies and spins with a front that opens: momentum stays, energy does.
-template <class T>
 void flies(Law law) {
-  T tissue(block(law, 0));
+  MpmTissue tissue(block(law, 0));
   MpmState& s = tissue.state();
   cut_now(tissue, stroke(-0.01, 0.0173));
   const std::vector<Vec3> home = homes(s);
@@ -107,7 +102,6 @@ void flies(Law law) {
     const Vec3 v = Vec3(0.1, -0.06, 0.08) + Vec3(3, 5, -4).cross(X) + opening;
     for (int c = 0; c < 3; ++c) s.nodes.v[c][i] = static_cast<float>(v[c]);
   }
-  push(tissue);
   const Momentum before = tissue.momentum();
   const float dt = 0.3f * tissue.stable_substep();
   tissue.advance(1, dt, {});
@@ -120,7 +114,6 @@ void flies(Law law) {
     const FrameResult r = tissue.finish();
     if (i < 4) least = std::min(least, r.kinetic_energy + r.elastic_energy);  // later faces touch
     most = std::max(most, r.kinetic_energy + r.elastic_energy);
-    pull(tissue);
     for (const float d : s.front.d[0]) opened = std::max<double>(opened, std::fabs(d));
   }
   const Momentum after = tissue.momentum();
@@ -130,37 +123,34 @@ void flies(Law law) {
   EXPECT_LT(most, 1.003 * energy);
   EXPECT_GT(least, 0.997 * energy);
 }
-TEST(Front, KeepsMomentumAndEnergyNeoHookean) { flies<MpmTissue>(Law::kNeoHookean); }
-TEST(Front, KeepsMomentumAndEnergyCorotated) { flies<MpmTissue>(Law::kFixedCorotated); }
-
-/// Checksum of a cut block that sags for some frames, saved after the first and gone on with.
-template <class T>
-std::uint64_t sagging(int threads, bool saved) {
-  Scene scene = block(Law::kFixedCorotated, 0.5);
-  scene.gravity = Vec3(3, 0, -9.81);
-  scene.bodies[0].anchors = {beyond(1, 0.03, true)};
-  scene.threads = threads;
-  auto tissue = std::make_unique<T>(scene);
-  const BladePath path = stroke(-0.01, 0.0173);
-  tissue->advance(1.0 / 60, {{}, {&path, 1}});
-  tissue->finish();
-  if (saved) {
-    const std::vector<std::uint8_t> bytes = tissue->save();
-    tissue = std::make_unique<T>(scene);
-    tissue->restore(bytes);
-  }
-  EXPECT_GT(tissue->state().front.cells.size(), 0u);
-  for (int i = 0; i < 3; ++i) {
-    tissue->advance(1.0 / 60, {});
-    EXPECT_FALSE(tissue->finish().blew_up);
-  }
-  return tissue->checksum();
-}
+TEST(Front, KeepsMomentumAndEnergyNeoHookean) { flies(Law::kNeoHookean); }
+TEST(Front, KeepsMomentumAndEnergyCorotated) { flies(Law::kFixedCorotated); }
 
 TEST(Front, SameBitsOnAnyNumberOfThreadsAndAfterItWasSaved) {
-  const std::uint64_t once = sagging<MpmTissue>(1, false);
-  EXPECT_EQ(once, sagging<MpmTissue>(2, false));
-  EXPECT_EQ(once, sagging<MpmTissue>(2, true));
+  std::uint64_t sums[3];
+  for (int run = 0; run < 3; ++run) {
+    Scene scene = block(Law::kFixedCorotated, 0.5);
+    scene.gravity = Vec3(3, 0, -9.81);
+    scene.bodies[0].anchors = {beyond(1, 0.03, true)};
+    scene.threads = run == 0 ? 1 : 2;
+    auto tissue = std::make_unique<MpmTissue>(scene);
+    const BladePath path = stroke(-0.01, 0.0173);
+    tissue->advance(1.0 / 60, {{}, {&path, 1}});
+    tissue->finish();
+    if (run == 2) {
+      const std::vector<std::uint8_t> saved = tissue->save();
+      tissue = std::make_unique<MpmTissue>(scene);
+      tissue->restore(saved);
+    }
+    ASSERT_GT(tissue->state().front.cells.size(), 0u);
+    for (int i = 0; i < 3; ++i) {
+      tissue->advance(1.0 / 60, {});
+      EXPECT_FALSE(tissue->finish().blew_up);
+    }
+    sums[run] = tissue->checksum();
+  }
+  EXPECT_EQ(sums[0], sums[1]);
+  EXPECT_EQ(sums[0], sums[2]);
 }
 
 /// Displacement along x of the top at the middle of a cut at x = 10 mm, on one side of it [m]: of
@@ -217,167 +207,6 @@ TEST(Front, SagAndMouthOfACutCantilever) {
         << depth;
   }
 }
-
-#if defined(TISSUE_SIM_CUDA)
-class FrontOnGpu : public OnEitherDevice<CudaMpmTissue> {};
-
-TEST_F(FrontOnGpu, IsWhereTheCpuHasIt) {
-  const Scene scene = block(Law::kNeoHookean, 0);
-  MpmTissue cpu(scene);
-  CudaMpmTissue gpu(scene);
-  const auto shares = [](const MpmState& s) {
-    std::vector<std::tuple<int, int, int, float>> all;
-    for (const FrontNode& n : s.front.nodes) all.emplace_back(n.x, n.y, n.z, n.share);
-    std::sort(all.begin(), all.end());
-    return all;
-  };
-  deform(cpu.state());
-  deform(gpu.state());
-  push(gpu);
-  double y = -0.01;
-  for (const double to : {0.0173, 0.0176, 0.0195}) {  // the second breaks no bond
-    cut_now(cpu, stroke(y, to));
-    cut_now(gpu, stroke(y, to));
-    y = to;
-    const auto a = shares(cpu.state()), b = shares(gpu.state());
-    ASSERT_GT(a.size(), 10u);
-    ASSERT_EQ(a.size(), b.size());
-    for (std::size_t i = 0; i < a.size(); ++i) {
-      EXPECT_EQ(std::get<0>(a[i]), std::get<0>(b[i]));
-      EXPECT_NEAR(std::get<3>(a[i]), std::get<3>(b[i]), 1e-3);
-    }
-    EXPECT_EQ(cpu.state().front.cells.size(), gpu.state().front.cells.size());
-  }
-}
-
-/// One substep from a random state, with the front on the GPU, and with the CPU's front added to
-/// what the GPU does without.
-void moves_as_on_the_cpu(Law law, double viscosity) {
-  Scene scene = block(law, viscosity);
-  scene.damping = 5;
-  CudaMpmTissue on_gpu(scene), beside(scene);
-  std::mt19937 random(3);
-  std::normal_distribution<float> normal;
-  for (CudaMpmTissue* tissue : {&on_gpu, &beside}) {
-    random.seed(3);
-    cut_now(*tissue, stroke(-0.01, 0.0173));
-    tissue->pull();
-    MpmState& s = tissue->state();
-    shake(s, 7, 2e-4);
-    for (int a = 0; a < 3; ++a) {
-      for (float& d : s.front.d[a]) d = 3e-4f * normal(random);
-      for (float& rate : s.front.rate[a]) rate = 0.1f * normal(random);
-    }
-    s.faces.until_search = 1e9;
-  }
-  on_gpu.push();
-  MpmState &a = on_gpu.state(), &b = beside.state();
-  const float dt = 1e-4f;
-  NodeStep step{};
-  step.dt = dt;
-  step.kick = kick_of(b.dt, dt);
-  step.keep = static_cast<float>(std::exp(-scene.damping * step.kick));
-  ASSERT_GT(b.front.cells.size(), 10u);
-  for (std::size_t i = 0; i < b.front.cells.size(); ++i) work_on_front_cell(b, static_cast<int>(i));
-  Front front;
-  std::swap(front, b.front);
-  beside.push();
-  const auto run = [dt](CudaMpmTissue& tissue) {
-    tissue.advance(1, dt, {});
-    const FrameResult r = tissue.finish();
-    tissue.pull();
-    return r.elastic_energy;
-  };
-  const double energy = run(on_gpu);
-  double energy_beside = run(beside);
-  std::swap(front, b.front);
-  const Array<float> before = b.nodes.v[0];
-  for (int i = 0; i < front_moves(b.front); ++i) move_front(b, step, i);
-  double added = 0, d_most = 0;
-  for (std::size_t i = 0; i < before.size(); ++i) {
-    added = std::max<double>(added, std::fabs(b.nodes.v[0][i] - before[i]));
-  }
-  EXPECT_GT(added, 1e-3);
-  for (int c = 0; c < 3; ++c) {
-    for (std::size_t i = 0; i < before.size(); ++i) {
-      ASSERT_NEAR(a.nodes.v[c][i], b.nodes.v[c][i], 2e-5 * added) << i;
-      ASSERT_NEAR(a.nodes.u[c][i], b.nodes.u[c][i], 2e-5 * added * dt + 1e-9) << i;
-    }
-    for (std::size_t i = 0; i < b.front.nodes.size(); ++i) {
-      d_most = std::max<double>(d_most, std::fabs(b.front.rate[c][i]));
-    }
-    for (std::size_t i = 0; i < b.front.nodes.size(); ++i) {
-      ASSERT_NEAR(a.front.rate[c][i], b.front.rate[c][i], 2e-5 * d_most) << i;
-      ASSERT_NEAR(a.front.d[c][i], b.front.d[c][i], 2e-5 * d_most * dt + 1e-9) << i;
-    }
-  }
-  energy_beside += front_elastic_energy(b);
-  EXPECT_NEAR(energy, energy_beside, 1e-4 * energy);
-}
-TEST_F(FrontOnGpu, MovesAsOnTheCpuNeoHookean) { moves_as_on_the_cpu(Law::kNeoHookean, 0); }
-TEST_F(FrontOnGpu, MovesAsOnTheCpuCorotated) { moves_as_on_the_cpu(Law::kFixedCorotated, 0); }
-TEST_F(FrontOnGpu, MovesAsOnTheCpuViscous) { moves_as_on_the_cpu(Law::kFixedCorotated, 0.5); }
-
-TEST_F(FrontOnGpu, KeepsMomentumAndEnergyNeoHookean) { flies<CudaMpmTissue>(Law::kNeoHookean); }
-TEST_F(FrontOnGpu, KeepsMomentumAndEnergyCorotated) { flies<CudaMpmTissue>(Law::kFixedCorotated); }
-
-TEST_F(FrontOnGpu, SameBitsRunAfterRunAndAfterItWasSaved) {
-  const std::uint64_t once = sagging<CudaMpmTissue>(1, false);
-  EXPECT_EQ(once, sagging<CudaMpmTissue>(1, false));
-  EXPECT_EQ(once, sagging<CudaMpmTissue>(1, true));
-}
-
-// Anchors hold nodes there: at 2.5 mm cells the clamp of this block is a node's.
-TEST_F(FrontOnGpu, MouthOfACutCantilever) {
-  constexpr double kCell = 0.0025;
-  for (const double depth : {0.00875, 0.01, 0.01125}) {
-    Scene scene = cantilever_block(kCell, 0);
-    scene.device = Device::kCuda;
-    scene.gravity = Vec3(0, 0, -9.81 / 100);
-    Simulation simulation(scene);
-    BladePath path;
-    path.edge = {Vec3(0.01, -0.1, 0), Vec3(0.01, 0.1, 0)};
-    for (const double z : {0.03, 0.02 - depth})
-      path.poses.push_back({Vec3(0, 0, z), Quat::Identity()});
-    simulation.cut(path);
-    EXPECT_TRUE(simulation.settle({3e-6, 6, 20}).at_rest) << depth;
-    const double sag =
-        -surface_displacement(simulation.tissue(), 0, Vec3(0.03, 0, 0.02), 2, 0.002 + 1.5 * kCell);
-    const double mouth = beside_cut(simulation.tissue(), true, kCell) -
-                         beside_cut(simulation.tissue(), false, kCell);
-    const std::string of = depth == 0.00875 ? "8_75mm" : depth == 0.01 ? "10mm" : "11_25mm";
-    const double of_sag = sag / reference(kData, "cut_cantilever", ("sag_" + of).c_str()),
-                 of_mouth = mouth / reference(kData, "cut_cantilever", ("mouth_" + of).c_str());
-    std::printf("%s: sag %.3f, mouth %.3f of finite elements\n", of.c_str(), of_sag, of_mouth);
-    EXPECT_NEAR(of_mouth, 1, 0.06) << depth;
-  }
-}
-
-// What a front costs: by hand.
-TEST_F(FrontOnGpu, DISABLED_Cost) {
-  for (const double cell : {0.0025, 0.00125, 0.0006}) {
-    for (const double to : {-0.005, 0.0173, 0.0503}) {
-      Scene scene = free_box(Vec3(0.04, 0.04, 0.04), cell);
-      scene.mpm.boundary = MpmBoundary::kSurface;
-      CudaMpmTissue tissue(scene);
-      BladePath path = upright_blade({Vec3(0.0201, -0.01, 0), Vec3(0.0201, to, 0)});
-      cut_now(tissue, path);
-      const float dt = tissue.stable_substep();
-      double best = 1e9;
-      for (int i = 0; i < 4; ++i) {
-        const auto begin = std::chrono::steady_clock::now();
-        tissue.advance(500, dt, {});
-        tissue.finish();
-        best = std::min(
-            best,
-            std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count() / 500);
-      }
-      std::printf("%d points, cut to %.1f mm, %zu cells at the front: %.2f us a substep\n",
-                  tissue.point_count(), 1e3 * to, tissue.state().front.cells.size(), 1e6 * best);
-    }
-  }
-}
-#endif
 
 }  // namespace
 }  // namespace tissue_sim

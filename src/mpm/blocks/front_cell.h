@@ -33,11 +33,6 @@ struct FrontField {
   const FrontPart* parts;
 };
 
-/// Where forces go: of a node that cells see, or of a parted one, its places in what they push.
-struct FrontSum {
-  std::int32_t node, first, count;
-};
-
 inline constexpr int kFrontForce = 4 * 28;  ///< floats of a cell's force: x, y, z, 0 of 27 nodes
 
 }  // namespace tissue_sim

@@ -64,7 +64,6 @@ void CudaMpmTissue::launch_measure() {
   tissue_sim::launch_measure(d.tables(), d.present(), d.plan.max_slots, d.measures.data(),
                              d.stream);
   d.measures.download(d.host_measures.data(), d.measures.size(), d.stream);
-  measure_front();
 }
 
 void CudaMpmTissue::finish_measure() {
@@ -92,13 +91,6 @@ void CudaMpmTissue::finish_measure() {
     result_.blew_up = result_.blew_up || !(now <= 1e6f);
     state_->motion[d.host_tables.of_host[i]] = {
         {Vec3(m.min[0], m.min[1], m.min[2]), Vec3(m.max[0], m.max[1], m.max[2])}, m.speed};
-  }
-  if (!d.front.empty()) {
-    for (std::size_t i = 0; i < d.front.cells.size(); ++i) {
-      result_.elastic_energy += d.front.host_energy[i];
-    }
-    take_front();
-    result_.kinetic_energy += front_kinetic_energy(state_->front);
   }
   // Nothing that instruments do moves tissue at the speed of a bullet; what does is out of control.
   result_.blew_up = result_.blew_up || !(result_.max_speed < 300);

@@ -117,7 +117,6 @@ bool CudaMpmTissue::take_apart(const std::vector<std::int32_t>& changed) {
   make_room_for_cuts();
   std::vector<std::int32_t> nodes = nodes_around(changed);
   pull_some(nodes);
-  pull_front();
   pull_contacts();
   const auto known = static_cast<std::int32_t>(state_->nodes.size());
   bool may_part = false;
@@ -128,7 +127,6 @@ bool CudaMpmTissue::take_apart(const std::vector<std::int32_t>& changed) {
   push_points(changed);
   push_points(apart.softened);
   if (apart.new_blocks || d.host_tables.number.empty()) push_tables();
-  push_front();
   return may_part;
 }
 
@@ -156,23 +154,16 @@ std::vector<int> CudaMpmTissue::label_pieces() {
 
 void CudaMpmTissue::cut(const std::vector<BladePath>& paths, const float4* u_before,
                         CutReport& report) {
-  std::vector<std::int32_t> changed, touched;
+  std::vector<std::int32_t> changed;
   read_places(u_before);
   for (const BladePath& path : paths) {
     std::vector<std::int32_t> by_this;
     tissue_sim::break_bonds(*state_, {sweep(path, u_before != nullptr)}, by_this, report);
     push_points(by_this);  // for the next
     changed.insert(changed.end(), by_this.begin(), by_this.end());
-    if (state_->front.follows) follow_rim(path, u_before, by_this, touched);
   }
-  if (changed.empty() && touched.empty()) return;
-  if (!touched.empty()) {
-    pull_front();
-    follow_front(*state_, touched);
-    list_front_cells(*state_);
-    if (changed.empty()) push_front();
-  }
-  if (!changed.empty() && take_apart(changed)) report.new_fragments = label_pieces();
+  if (changed.empty()) return;
+  if (take_apart(changed)) report.new_fragments = label_pieces();
   launch_measure();
   finish_measure();
 }

@@ -25,7 +25,6 @@ std::unique_ptr<MpmState> make_state(const Scene& scene, std::vector<std::string
   state->instructions = instruction_set();
   state->kernels = &block_kernels(state->instructions);
   state->cpu = std::make_unique<Cpu>(scene.threads);
-  state->front.follows = scene.mpm.boundary == MpmBoundary::kSurface;
   return state;
 }
 
@@ -212,10 +211,6 @@ void CudaMpmTissue::advance(int substeps, float dt, const FrameInput& input) {
 
 void CudaMpmTissue::launch(int begin, int end, float dt) {
   OnDevice& d = *device_;
-  if (!d.front.empty() && end - begin > 1) {  // its cells push between substeps
-    for (int i = begin; i < end; ++i) launch(i, i + 1, dt);
-    return;
-  }
   measured_ = false;
   const Scene& scene = state_->scene;
   const std::size_t collider_count = d.host_reach.size();
@@ -238,7 +233,6 @@ void CudaMpmTissue::launch(int begin, int end, float dt) {
   frame.cell_size = static_cast<float>(scene.cell_size);
   frame.arrived = d.arrived.data();
   frame.faces = faces_of_launch();
-  if (!d.front.empty()) launch_front_cells(d.front, d.present(), d.stream);
   if (frame.faces != nullptr || d.may_meet) {
     d.pushed.resize(3 * kPushStride * d.u[0].size());
     d.pushed.clear(d.stream);
@@ -256,7 +250,6 @@ void CudaMpmTissue::launch(int begin, int end, float dt) {
     launch_substeps(d.plan, d.tables(), frame, d.resident, d.stream);
   }
   d.current = (d.current + end - begin) % 2;
-  if (!d.front.empty()) launch_move_front(d.front, d.present(), frame.step, d.stream);
   state_->time += static_cast<double>(end - begin) * dt;
   state_->dt = dt;
 }
@@ -281,13 +274,11 @@ Span<const Fragment> CudaMpmTissue::fragments() {
 
 std::uint64_t CudaMpmTissue::checksum() {
   pull_nodes();
-  pull_front();
   return tissue_sim::checksum(*state_, pieces_);
 }
 
 Momentum CudaMpmTissue::momentum() {
   pull_nodes();
-  pull_front();
   return tissue_sim::momentum(*state_);
 }
 

@@ -148,14 +148,6 @@ class CudaMpmTissue final : public Tissue {
   void pull_some(const std::vector<std::int32_t>& nodes);
   void push_some(const std::vector<std::int32_t>& nodes);
   void pull_contacts();
-  /// After the path broke bonds of these points: pass_rim(), for which nodes come down.
-  void follow_rim(const BladePath& path, const float4* u_before,
-                  const std::vector<std::int32_t>& broken, std::vector<std::int32_t>& touched);
-  void pull_front();     ///< how far parted nodes are apart, and how fast
-  void push_front();     ///< where its cells were listed anew
-  void bring_front();    ///< enqueues what pull_front() waits for ...
-  void take_front();     ///< ... and puts it where the host has it
-  void measure_front();  ///< enqueues the same, and energies
   void launch_measure();
   void finish_measure();
   double measure_limit(int steps);  ///< see MeasureLimit; of all blocks

@@ -12,7 +12,6 @@ constexpr int kGrain = 1024;  // nodes that a thread takes at once
 
 void CudaMpmTissue::pull() {
   pull_nodes();
-  pull_front();
   pull_contacts();
 }
 

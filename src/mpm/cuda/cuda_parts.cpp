@@ -78,8 +78,6 @@ void CudaMpmTissue::save_checkpoint() {
   const FacesOnDevice& f = d.faces;
   saved.u.copy(d.u[d.current], d.stream);
   saved.v.copy(d.v[d.current], d.stream);
-  d.front.d_before.copy(d.front.d, d.stream);
-  d.front.rate_before.copy(d.front.rate, d.stream);
   launch_list_held(d.with.data(), d.hold.data(), static_cast<int>(d.with.size()), saved.held.data(),
                    static_cast<int>(saved.held.size()), saved.held_count.data(), d.stream);
   saved.held_count.download(saved.host_held_count.data(), 1, d.stream);
@@ -100,8 +98,6 @@ void CudaMpmTissue::restore_checkpoint() {
   FacesOnDevice& f = d.faces;
   d.u[d.current].copy(saved.u, d.stream);
   d.v[d.current].copy(saved.v, d.stream);
-  d.front.d.copy(d.front.d_before, d.stream);
-  d.front.rate.copy(d.front.rate_before, d.stream);
   d.with.clear(d.stream);
   launch_hold_again(saved.held.data(), saved.host_held_count[0], d.with.data(), d.hold.data(),
                     d.stream);

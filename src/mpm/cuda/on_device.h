@@ -12,7 +12,6 @@
 #include "mpm/cuda/cuda_mpm_tissue.h"
 #include "mpm/cuda/faces_on_device.h"
 #include "mpm/cuda/frame_ends.h"
-#include "mpm/cuda/front_cells.h"
 #include "mpm/cuda/held_points.h"
 #include "mpm/cuda/label_pieces.h"
 #include "mpm/cuda/make_tables.h"
@@ -89,7 +88,6 @@ struct CudaMpmTissue::OnDevice {
   PinnedArray<int> host_stretched_count, host_unforeseen;
   DeviceArray<Point> cloud;
   FacesOnDevice faces;
-  FrontOnDevice front;
   SweepOnDevice sweep;
   PieceLabels labels;
   CudaMotionRoom motion_room;

@@ -43,7 +43,10 @@ struct Front {
   std::vector<FrontPart> parts;
   /// Where forces go: of each node that a cell sees, and of each parted one, places in `force` and
   /// `pull`, in a fixed order.
-  std::vector<FrontSum> node_sums, part_sums;
+  struct Sum {
+    std::int32_t node, first, count;
+  };
+  std::vector<Sum> node_sums, part_sums;
   std::vector<std::int32_t> node_places, part_places;
   Array<float> force, pull;  ///< of the cells [28][4] each, of the parts [4] each [N]
 };

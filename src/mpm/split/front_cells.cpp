@@ -188,7 +188,7 @@ void move_front(MpmState& s, const NodeStep& step, int i) {
   const std::size_t begin = static_cast<std::size_t>(kSumsTogether) * i;
   for (std::size_t n = begin; n < std::min(sums, begin + kSumsTogether); ++n) {
     const bool of_node = n < nodes;
-    const FrontSum& sum = of_node ? front.node_sums[n] : front.part_sums[n - nodes];
+    const Front::Sum& sum = of_node ? front.node_sums[n] : front.part_sums[n - nodes];
     const std::int32_t* place =
         (of_node ? front.node_places.data() : front.part_places.data()) + sum.first;
     const float* from = of_node ? front.force.data() : front.pull.data();

@@ -56,6 +56,7 @@ void MpmTissue::reject_part(Verdict verdict) {
 }
 
 bool MpmTissue::accept_part() {
+  search_if_faster(*state_);
   substep_.follow(*state_, modulus_);
   return !result_.blew_up;
 }

@@ -1,6 +1,9 @@
 #include "mpm/contact/face_contact.h"
 
+#include <algorithm>
+
 #include "mpm/contact/face_places.h"
+#include "mpm/contact/face_search.h"
 #include "mpm/mpm_state.h"
 
 namespace tissue_sim {
@@ -9,6 +12,23 @@ namespace {
 bool at_surface(const MpmState& state) { return state.scene.mpm.boundary == MpmBoundary::kSurface; }
 
 }  // namespace
+
+double fastest_block(const MpmState& state) {
+  double fastest = 0;
+  for (const BlockMotion& m : state.motion) fastest = std::max(fastest, m.speed);
+  return fastest;
+}
+
+void search_if_faster(MpmState& state) {
+  constexpr double kUnforeseen = 0.25;  // [cells]
+  FaceContacts& faces = state.faces;
+  const double until = faces.until_search;
+  if (!(until <= kHorizon)) return;
+  // All falls alike.
+  const double falls = state.scene.gravity.norm() * (kHorizon - until);
+  const double faster = fastest_block(state) - faces.fastest - falls;
+  if (faster * until > kUnforeseen * state.scene.cell_size) faces.until_search = 0;
+}
 
 void push_faces(const MpmState& state, FaceContact& contact, float dt) {
   ContactPlaces places{state.nodes, contact, at_surface(state)};

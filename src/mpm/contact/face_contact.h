@@ -45,6 +45,7 @@ struct FaceContacts {
   std::vector<KeptContact> kept;            ///< sorted by point and direction
   double until_search = 0, until_look = 0;  ///< at any contact [s]
   double dt = 0;                            ///< of the last substep [s]
+  double fastest = 0;                       ///< of all tissue when it was last searched [m/s]
 
   void forget_active() {
     active.clear();
@@ -54,6 +55,12 @@ struct FaceContacts {
 
 /// Before a substep of `dt` seconds: searches pairs, and looks at them, when it is time to.
 void find_face_contacts(MpmState& state, const Pieces& pieces, double dt);
+
+/// Speed of the fastest block, as of measure_motion() [m/s].
+double fastest_block(const MpmState& state);
+/// After a part of a frame: has pairs searched and looked at anew where tissue has become so much
+/// faster, as what a tool pushes does, that it may meet other tissue before that is due.
+void search_if_faster(MpmState& state);
 
 /// Before blocks are made anew: remembers what touches.
 void keep_face_contacts(MpmState& state);

@@ -57,7 +57,7 @@ template <class Archive>
 void fields(Archive& archive, FaceContacts& f, const Blocks& blocks) {
   archive(f.version, f.first_facet, f.block_of, f.motion, f.listed, f.first_near, f.near, f.active,
           f.between, f.first_of_block, f.of_block, f.first_within, f.within, f.kept, f.until_search,
-          f.until_look, f.dt);
+          f.until_look, f.dt, f.fastest);
   f.all.resize(archive.count(f.all.size(), sizeof(FaceSpring) / 2));
   for (FaceContact& c : f.all) {
     archive(static_cast<FaceSpring&>(c), c.has_whole_rows, c.other_has_whole_rows, c.weights,

@@ -114,6 +114,7 @@ bool search(MpmState& s, const Pieces& pieces) {
   const auto cell = static_cast<float>(s.scene.cell_size);
   const double horizon = search_horizon(fastest, cell);
   faces.until_search = horizon;
+  faces.fastest = fastest_block(s);
   for (float& t : travel) t = t < 0 ? -1 : t * static_cast<float>(kForesight * horizon);
   if (pairs_last(faces, travel)) return false;
   faces.listed.resize(facet_count);

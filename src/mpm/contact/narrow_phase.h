@@ -210,17 +210,20 @@ TISSUE_SIM_HOST_DEVICE inline void go_on(Faces& s, FaceSpring& c, int other,
 }
 
 /// Puts the place held by a contact that does not touch on the other face, below the facet, or,
-/// where faces are in one another from the start, where there is no force.
+/// where faces are in one another from the start, where there is no force. What came from the front
+/// since the last look touches, up to `came` deep [cells], or what is fast would be aimed anew in
+/// each substep.
 template <class Faces>
-TISSUE_SIM_HOST_DEVICE inline bool aim(Faces& s, FaceSpring& c, const Seen& seen) {
+TISSUE_SIM_HOST_DEVICE inline bool aim(Faces& s, FaceSpring& c, const Seen& seen, float came) {
   const Facet& facet = s.facet(c.other);
-  const float lift = fminf(0.0f, seen.depth);
+  const float lift = fminf(came, seen.depth);
   float place[3];
   for (int a = 0; a < 3; ++a) place[a] = seen.place[a] + lift * facet.normal[a];
   hold_at(s, c, place);
   measure_apart(s, c);
-  c.begun = fmaxf(kRough, seen.depth);
-  return dot(c.apart, c.normal) >= 0 || give_way(s, c, 0);
+  c.begun = fmaxf(kRough, seen.depth - fmaxf(0.0f, lift));
+  c.touching = came > 0 && lift > 0;
+  return c.touching || dot(c.apart, c.normal) >= 0 || give_way(s, c, 0);
 }
 
 /// Puts the place held by a contact that touches onto the face if it got above it, and back up
@@ -249,7 +252,9 @@ TISSUE_SIM_HOST_DEVICE inline void settle(Faces& s, FaceSpring& c, float dt, flo
 /// move against one another [m/s], 0 if there is none.
 template <class Faces>
 TISSUE_SIM_HOST_DEVICE inline float look(Faces& s, FaceSpring& c, float dt, float since) {
+  constexpr float kComes = 1.25f;  // substeps: springs of kStable then give less than they took
   const int other = looks::choose_other(s, c), before = c.other;
+  const bool in_front = before >= 0 && !c.touching && c.depth < 0;
   if (other < 0) {
     c.other = -1;
     c.touching = false;
@@ -268,13 +273,16 @@ TISSUE_SIM_HOST_DEVICE inline float look(Faces& s, FaceSpring& c, float dt, floa
   } else {
     looks::begin(s, c, other, seen.place, dt);
   }
+  const float v[3] = {f.v[0] - o.v[0], f.v[1] - o.v[1], f.v[2] - o.v[2]};
   if (c.touching) {
     looks::settle(s, c, dt, since);
-  } else if (!looks::aim(s, c, seen)) {
-    c.other = -1;
-    return 0;
+  } else {
+    const float came = in_front ? fmaxf(0.0f, -kComes * dt * dot(v, o.normal)) : 0.0f;
+    if (!looks::aim(s, c, seen, came * static_cast<float>(s.per_cell()))) {
+      c.other = -1;
+      return 0;
+    }
   }
-  const float v[3] = {f.v[0] - o.v[0], f.v[1] - o.v[1], f.v[2] - o.v[2]};
   return sqrtf(dot(v, v));
 }
 

@@ -106,6 +106,7 @@ void CudaMpmTissue::finish_search(float dt) {
   f.lists_hold = fastest < kOutOfControl;
   if (!f.lists_hold) return;  // as the end of the frame will say
   faces.until_search = figures.horizon;
+  faces.fastest = fastest_block(*state_);
   while (figures.listed_anew != 0 && static_cast<std::size_t>(figures.near) > f.near.size()) {
     if (f.springs.size() == 0) begin_contacts();
     f.near.resize(std::max(f.near.size(), static_cast<std::size_t>(figures.near) * 3 / 2));

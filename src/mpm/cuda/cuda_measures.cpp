@@ -69,7 +69,8 @@ void CudaMpmTissue::launch_measure() {
 void CudaMpmTissue::finish_measure() {
   OnDevice& d = *device_;
   check_cuda(cudaStreamSynchronize(d.stream), "finish a frame");
-  if (d.faces.search_begun) finish_search(state_->dt);
+  const bool searched = d.faces.search_begun;
+  if (searched) finish_search(state_->dt);
   result_.elastic_energy = result_.kinetic_energy = result_.max_speed = 0;
   stiffening_ = even_stiffening(*state_, 1);
   state_->wildest = 1;
@@ -93,6 +94,7 @@ void CudaMpmTissue::finish_measure() {
   }
   // Nothing that instruments do moves tissue at the speed of a bullet; what does is out of control.
   result_.blew_up = result_.blew_up || !(result_.max_speed < 300);
+  if (searched) state_->faces.fastest = fastest_block(*state_);
   measured_ = true;
 }
 

@@ -55,7 +55,7 @@ void CudaMpmTissue::each_field(Archive& archive, StateOnHost& of_device) {
   FaceContacts& faces = state_->faces;
   tissue_fields(archive, *state_);
   archive.part("facets", faces.version, faces.first_facet, faces.block_of);
-  archive.part("kept contacts", faces.kept, faces.until_search);
+  archive.part("kept contacts", faces.kept, faces.until_search, faces.fastest);
   archive.part("pieces", pieces_, pieces_measured_);
   archive.part("substeps", stiffening_, modulus_, substep_);
   archive.part("shape", d.shape, d.cut_shape);

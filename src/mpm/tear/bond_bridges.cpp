@@ -36,6 +36,13 @@ struct BondsAround {
     }
     return true;
   }
+  /// Whether any of the bonds is in a square.
+  bool in_square() const {
+    for (int k = 0; k < kBondCount; ++k) {
+      if (has(own, k) && !is_bridge(k)) return true;
+    }
+    return false;
+  }
   /// Whether any of the bonds is a bridge.
   bool end_bridge() const {
     for (int k = 0; k < kBondCount; ++k) {
@@ -46,6 +53,32 @@ struct BondsAround {
 };
 
 }  // namespace
+
+bool leaves_thread(const LatticeBody& body, Points& points, std::int32_t point, int k) {
+  // Those of the squares that the bond is in.
+  std::int32_t held[2 + 2 * kBondCount];
+  int count = 0;
+  const std::int32_t other = neighbour(body, points.site[point], k);
+  held[count++] = point;
+  held[count++] = other;
+  for (int side = 0; side < kBondCount; ++side) {
+    if (side == k || side == opposite_bond(k)) continue;
+    for (const std::int32_t end : {point, other}) {
+      if (has(points.bonds[end], side)) {
+        held[count++] = neighbour(body, points.site[end], side);
+      }
+    }
+  }
+  const auto in_square = [&](std::int32_t p) { return BondsAround(body, points, p).in_square(); };
+  count = static_cast<int>(
+      std::remove_if(held, held + count, [&](std::int32_t p) { return !in_square(p); }) - held);
+  const std::uint8_t before[] = {points.bonds[point], points.bonds[other]};
+  break_bond(k, points.bonds[point], points.bonds[other]);
+  const bool leaves = !std::all_of(held, held + count, in_square);
+  points.bonds[point] = before[0];
+  points.bonds[other] = before[1];
+  return leaves;
+}
 
 void list_bridges(MpmState& state, const std::vector<std::int32_t>& changed) {
   const Points& points = state.points;

@@ -15,6 +15,9 @@ namespace tissue_sim {
 /// substep. One that swings stiffens twentyfold within a few substeps: it is not to get near that.
 inline constexpr double kThreadStretch = 1.5, kBridgeStiffening = 3.5;
 
+/// Whether a point that has a bond in a square of four would have none without bond `k` of `point`.
+bool leaves_thread(const LatticeBody& body, Points& points, std::int32_t point, int k);
+
 /// After the points `changed` lost bonds: adds the ends of new bridges to MpmState::bridge_ends.
 void list_bridges(MpmState& state, const std::vector<std::int32_t>& changed);
 

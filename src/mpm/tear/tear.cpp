@@ -6,6 +6,7 @@
 #include <numeric>
 
 #include "mpm/lattice/bonds.h"
+#include "mpm/tear/bond_bridges.h"
 #include "mpm/tear/crack.h"
 
 namespace tissue_sim {
@@ -219,6 +220,9 @@ void tear_bonds(MpmState& state, const std::vector<TearingPoint>& tearing,
     for (const std::int32_t end : {b.point, q}) {  // at a corner it may be the last
       if (__builtin_popcount(state.points.bonds[end]) == 1) return false;
     }
+    // What would hang by a thread stays on the side that it has more of: it would swing until that
+    // tears, too.
+    if (leaves_thread(body, state.points, b.point, b.bond)) return false;
     break_bond(b.bond, state.points.bonds[b.point], state.points.bonds[q]);
     changed.push_back(b.point);
     changed.push_back(q);

@@ -1,0 +1,163 @@
+// Nothing passes through tissue that is a cell thick or more: no tool from a cell and a third of
+// tip radius on, and no other tissue, at up to 1 m/s.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "tissue/each_method.h"
+
+namespace tissue_sim {
+namespace {
+
+class HoldsOff : public EachMethod {
+ protected:
+  void SetUp() override {
+    EachMethod::SetUp();
+    if (IsSkipped()) return;
+    if (GetParam().method != Method::kMpm) GTEST_SKIP() << "of the true surface of method mpm";
+  }
+};
+
+constexpr double kCell = 0.003;
+
+/// A sheet of 60 x 60 mm held at its rim, 6 mm all round.
+Scene held_sheet(double thickness) {
+  Scene scene;
+  scene.cell_size = kCell;
+  scene.ground.enabled = false;
+  scene.gravity = Vec3::Zero();
+  scene.mpm.boundary = MpmBoundary::kSurface;
+  Material soft;
+  soft.name = "soft";
+  soft.young_modulus = 5000;
+  soft.poisson_ratio = 0.45;
+  scene.materials = {soft};
+  scene.bodies.resize(1);
+  Body& body = scene.bodies[0];
+  body.name = "sheet";
+  body.size = Vec3(0.06, 0.06, thickness);
+  body.material = "soft";
+  for (int side = 0; side < 4; ++side) {
+    Region rim;
+    rim.kind = Region::Kind::kBox;
+    rim.min = Vec3::Constant(-0.031);
+    rim.max = Vec3::Constant(0.031);
+    (side % 2 == 0 ? rim.max : rim.min)[side / 2] = side % 2 == 0 ? -0.024 : 0.024;
+    body.anchors.push_back(rim);
+  }
+  return scene;
+}
+
+/// A probe whose tip looks down.
+Pose tip_at(double z) {
+  Pose pose;
+  pose.position = Vec3(0.0002, 0.0003, z);
+  pose.orientation = Quat(Eigen::AngleAxisd(M_PI, Vec3::UnitX()));
+  return pose;
+}
+
+TEST_P(HoldsOff, AProbeOf4MmDoesNotPassThroughASheet) {
+  if (GetParam().device == Device::kCuda) GTEST_SKIP() << "a GPU counts what it lets through";
+  const double cases[][2] = {{0.002, 1}, {0.004, 0.1}, {0.006, 1}};  // thickness, speed
+  for (const auto& [thickness, speed] : cases) {
+    Scene scene = on_this(held_sheet(thickness));
+    scene.damping = 20;
+    scene.tools.resize(1);
+    scene.tools[0].radius = 0.004;
+    Simulation simulation(scene);
+    const double top = thickness / 2, end = top - 0.024;
+    double force = 0, most = 0;
+    int held = 0;
+    for (double z = top + 0.001; held < 6; z = std::max(end, z - speed / scene.frame_rate)) {
+      simulation.set_tool(0, tip_at(z));
+      const FrameResult result = simulation.advance_frame().result;
+      ASSERT_FALSE(result.blew_up);
+      EXPECT_EQ(result.points_inside, 0) << thickness << " m at " << speed << " m/s";
+      force = result.loads[0].mean.force.z();
+      most = std::max(most, force);
+      held += z <= end ? 1 : 0;
+    }
+    double lowest = 1;
+    for (const Point& p : points_of(simulation.tissue())) lowest = std::min<double>(lowest, p.z);
+    // What passes through is let go: a third of the force is left then, and all tissue is above.
+    EXPECT_GT(force, 0.8 * most) << thickness << " m at " << speed << " m/s";
+    EXPECT_LT(lowest - end, 0.0012) << thickness << " m at " << speed << " m/s";
+  }
+}
+
+/// How many points of the cube lie under the sheet: none of it within a cell aside is below them.
+int under_sheet(Tissue& tissue, std::size_t of_sheet) {
+  const std::vector<Point> points = points_of(tissue);
+  int under = 0;
+  for (std::size_t i = of_sheet; i < points.size(); ++i) {
+    const Point& p = points[i];
+    const auto holds = [&p](const Point& q) {
+      return std::hypot(p.x - q.x, p.y - q.y) < kCell && q.z < p.z;
+    };
+    under += std::none_of(points.begin(), points.begin() + of_sheet, holds) ? 1 : 0;
+  }
+  return under;
+}
+
+/// A sheet and a cube of 12 mm so far above it.
+Scene sheet_and_cube(double thickness, double gap) {
+  Scene scene = held_sheet(thickness);
+  Body cube;
+  cube.name = "cube";
+  cube.material = "soft";
+  cube.size = Vec3::Constant(0.012);
+  cube.pose.position = Vec3(0.0004, 0.0003, thickness / 2 + gap + 0.006);
+  scene.bodies.push_back(cube);
+  return scene;
+}
+std::size_t sheet_points(const Scene& scene) {
+  Scene alone = scene;
+  alone.bodies.resize(1);
+  alone.tools.clear();
+  return static_cast<std::size_t>(Simulation(alone).tissue().point_count());
+}
+
+TEST_P(HoldsOff, TissueThatAToolPressesDoesNotPassThroughTissue) {
+  const double cases[][2] = {{0.003, 0.3}, {0.003, 1}, {0.006, 0.3}};  // thickness, speed
+  for (const auto& [thickness, speed] : cases) {
+    Scene scene = on_this(sheet_and_cube(thickness, 0.001));
+    scene.damping = 20;
+    scene.tools.resize(1);
+    scene.tools[0].radius = 0.004;
+    const std::size_t of_sheet = sheet_points(scene);
+    Simulation simulation(scene);
+    const double top = thickness / 2 + 0.013, end = top - 0.016;
+    int held = 0;
+    for (double z = top + 0.001; held < 6; z = std::max(end, z - speed / scene.frame_rate)) {
+      simulation.set_tool(0, tip_at(z));
+      ASSERT_FALSE(simulation.advance_frame().result.blew_up);
+      held += z <= end ? 1 : 0;
+      ASSERT_LE(under_sheet(simulation.tissue(), of_sheet), 2)
+          << thickness << " m at " << speed << " m/s, tip at " << z;
+    }
+  }
+}
+
+// The cube comes down at 1 m/s.
+TEST_P(HoldsOff, TissueThatFallsDoesNotPassThroughTissue) {
+  for (const double thickness : {0.003, 0.006}) {
+    Scene scene = on_this(sheet_and_cube(thickness, 0.051));
+    scene.gravity.z() = -9.81;
+    const std::size_t of_sheet = sheet_points(scene);
+    Simulation simulation(scene);
+    double fastest = 0;
+    for (int i = 0; i < 14; ++i) {
+      const FrameResult result = simulation.advance_frame().result;
+      ASSERT_FALSE(result.blew_up);
+      fastest = std::max(fastest, result.max_speed);
+      ASSERT_LE(under_sheet(simulation.tissue(), of_sheet), 2) << thickness << " m, frame " << i;
+    }
+    EXPECT_GT(fastest, 0.9);
+  }
+}
+
+FOR_EACH_METHOD(HoldsOff);
+
+}  // namespace
+}  // namespace tissue_sim

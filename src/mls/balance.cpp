@@ -59,7 +59,7 @@ class Balance {
       volume += nodes.volume[i] / n_;
     }
     for (std::int32_t i = 0; i < n_; ++i) {
-      volume_.push_back(static_cast<float>(nodes.free_volume[i] / volume));
+      volume_.push_back(static_cast<float>(nodes.strained_volume[i] / volume));
       free_.push_back(nodes.surface[i] == 0 && nodes.anchored[i] == 0 ? 1.0f : 0.0f);
       for (std::int32_t e = pairs.begin[i]; e < pairs.begin[i + 1]; ++e) {
         const Vec3 r = (nodes.place[pairs.other[e]] - nodes.place[i]) / support;

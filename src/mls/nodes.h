@@ -16,6 +16,7 @@ struct MlsNodes {
   std::vector<Vec3> place;             ///< reference [m]
   Array<float> volume;                 ///< its share of the body: all that is nearest to it [m^3]
   Array<float> free_volume;            ///< of that, what lies outside of anchors (mls/anchors.h)
+  Array<float> strained_volume;        ///< of that, what bears strain (mls/own_rate.h)
   std::vector<std::int16_t> body;      ///< index into Scene::bodies
   std::vector<std::uint8_t> material;  ///< index into `materials`
   Array<std::uint8_t> anchored;        ///< lies in an anchored region

@@ -7,6 +7,7 @@
 #include "frame/leapfrog.h"
 #include "mls/contact.h"
 #include "mls/node_contact.h"
+#include "mls/own_rate.h"
 
 namespace tissue_sim {
 namespace {
@@ -15,6 +16,9 @@ namespace {
 /// sheet, a chain, a pair or nothing. The paper's matrix is never regularised: with the identity
 /// left for what it does not see, a rotation would be a strain.
 constexpr double kSpans = 0.02;
+
+/// Weights are balanced anew after a node's rate was bounded, and rates change with them.
+constexpr int kRoundsOfBounds = 3;
 
 template <class T>
 void resize_padded(Array<T>& array, int count, int per_node) {
@@ -99,6 +103,7 @@ void remake_node(MlsState& s, std::int32_t i) {
   }
   s.kappa[i] = spans ? s.whole_kappa[i] : 0.0f;
   s.sprung[i] = spans ? 0 : 1;
+  put_strained_volume(s, i);
 }
 
 /// Forces of springs on node i.
@@ -141,6 +146,8 @@ std::unique_ptr<MlsState> make_mls_state(const Scene& scene, std::vector<std::st
   s.nodes = make_mls_nodes(scene, notes);
   s.pairs = make_pairs(s.nodes, scene.mls.neighbours, *s.cpu);
   hold_at_faces(scene, support_factor(scene.mls.neighbours), s.nodes, s.pairs);
+  s.nodes.strained_volume = s.nodes.free_volume;
+  const Array<float> kernel = s.pairs.whole;
   if (scene.mls.basis == MlsBasis::kBalanced) balance(s.nodes, *s.cpu, s.pairs);
   const int n = s.count();
   for (Array<float>* a : {&s.place, &s.u, &s.v, &s.u_next, &s.v_next}) resize_padded(*a, n, 4);
@@ -162,14 +169,11 @@ std::unique_ptr<MlsState> make_mls_state(const Scene& scene, std::vector<std::st
   std::vector<std::int32_t> all(n);
   for (std::int32_t i = 0; i < n; ++i) {
     const Material& m = s.nodes.material_of(i);
-    const float volume = s.nodes.volume[i], strained = s.nodes.free_volume[i];
+    const float volume = s.nodes.volume[i];
     for (int a = 0; a < 3; ++a) s.place[4 * i + a] = static_cast<float>(s.nodes.place[i][a]);
     s.place[4 * i + 3] = s.nodes.depth[i];
     s.mass[i] = static_cast<float>(m.density) * volume;
     s.inv_mass[i] = s.nodes.anchored[i] != 0 ? 0 : 1 / s.mass[i];
-    s.volume_mu[i] = static_cast<float>(lame_mu(m)) * strained;
-    s.volume_lambda[i] = static_cast<float>(lame_lambda(m)) * strained;
-    s.volume_eta[i] = static_cast<float>(m.viscosity) * strained;
     s.viscous = s.viscous || m.viscosity > 0;
     s.neo_hookean[i] = m.law == Law::kNeoHookean ? 1 : 0;
     s.edge[i] = static_cast<float>(s.pairs.support[i] / factor);
@@ -192,7 +196,24 @@ std::unique_ptr<MlsState> make_mls_state(const Scene& scene, std::vector<std::st
   s.spanner = make_spanner(s.nodes, s.pairs);
   s.spring_room.assign(s.pairs.other.size(), 0.0f);
   remake(s, all);
+  for (int round = 0; round < kRoundsOfBounds && bound_own_rates(s); ++round) {
+    if (scene.mls.basis == MlsBasis::kBalanced) {
+      s.pairs.whole = kernel;
+      balance(s.nodes, *s.cpu, s.pairs);
+      put_weights(s.pairs, s.lanes);
+    }
+    for (std::int32_t i = 0; i < n; ++i) s.whole_kappa[i] = whole_kappa(s, i);
+    remake(s, all);
+  }
   return state;
+}
+
+void put_strained_volume(MlsState& s, std::int32_t i) {
+  const Material& m = s.nodes.material_of(i);
+  const float volume = strained_volume(s, i);
+  s.volume_mu[i] = static_cast<float>(lame_mu(m)) * volume;
+  s.volume_lambda[i] = static_cast<float>(lame_lambda(m)) * volume;
+  s.volume_eta[i] = static_cast<float>(m.viscosity) * volume;
 }
 
 void remake(MlsState& s, const std::vector<std::int32_t>& nodes) {

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "mls/own_rate.h"
+
 namespace tissue_sim {
 namespace {
 
@@ -38,34 +40,6 @@ void MlsSubsteps::cut(const MlsState& s, const std::vector<std::int32_t>& nodes)
         if (own_rate(s, nodes[k]) > kMostRate * most_rate_) stiffness_[nodes[k]].measured = 0;
       },
       256);
-}
-
-double own_rate(const MlsState& s, std::int32_t i) {
-  const MlsPairs& p = s.pairs;
-  double sum = 0;
-  if (s.sprung[i] != 0) {
-    for (std::int32_t e = p.begin[i]; e < p.begin[i + 1]; ++e) {
-      sum += s.spring[e] * (s.inv_mass[i] + s.inv_mass[p.other[e]]);
-    }
-    return sum;
-  }
-  // Its strain is sum_j (u_j - u_i) (x) g_j with g_j = w_ij M_i^-1 r_ij.
-  double all[3] = {};
-  for (std::int32_t e = p.begin[i]; e < p.begin[i + 1]; ++e) {
-    const std::int32_t j = p.other[e];
-    double r[3], g[3];
-    for (int a = 0; a < 3; ++a) r[a] = s.place[4 * j + a] - s.place[4 * i + a];
-    const auto m = [&](int k) { return static_cast<double>(s.inverse_moment[k][i]); };
-    g[0] = p.weight[e] * (m(0) * r[0] + m(3) * r[1] + m(4) * r[2]);
-    g[1] = p.weight[e] * (m(3) * r[0] + m(1) * r[1] + m(5) * r[2]);
-    g[2] = p.weight[e] * (m(4) * r[0] + m(5) * r[1] + m(2) * r[2]);
-    for (int a = 0; a < 3; ++a) {
-      sum += g[a] * g[a] * s.inv_mass[j];
-      all[a] += g[a];
-    }
-  }
-  for (const double g : all) sum += g * g * s.inv_mass[i];
-  return (s.volume_lambda[i] + 2 * s.volume_mu[i]) * sum;
 }
 
 PartSubsteps MlsSubsteps::part(const MlsState& s, double time, const MeasureLimit& measure) {

@@ -45,8 +45,4 @@ class MlsSubsteps {
   StepAcceptance acceptance_;
 };
 
-/// Largest eigenvalue that the energy of a node's own strain has by itself, or less than three
-/// times it: how fast nodes around it swing hangs on that [1/s^2].
-double own_rate(const MlsState& state, std::int32_t node);
-
 }  // namespace tissue_sim

@@ -7,6 +7,7 @@
 
 #include <chrono>
 #include <cmath>
+#include <ctime>
 #include <string>
 
 #include "mls/cut.h"
@@ -99,6 +100,35 @@ void run_scalpel(benchmark::State& bench, const MlsCase& c) {
   bench.counters["shortest_ms"] = 1e3 * shortest;
 }
 
+/// A simulated second of a soft cube that stands on the ground, whole or cut in two as it begins:
+/// what a cut costs, with the substeps and the contact that it brings.
+void run_second(benchmark::State& bench, bool is_cut) {
+  constexpr double kApart = 0.002;
+  const double edge = 22 * kApart;
+  Scene scene = mls_box(Vec3::Constant(edge), kApart);
+  scene.threads = 1;
+  scene.gravity = Scene().gravity;
+  scene.ground.enabled = true;
+  Material m;
+  m.name = scene.bodies[0].material = "cube";
+  m.young_modulus = 10000;
+  scene.materials.push_back(m);
+  long substeps = 0;
+  for (auto _ : bench) {
+    MlsTissue tissue(scene);
+    if (is_cut) tissue.cut_now(plane_cut(Vec3::Constant(0.501 * edge), Vec3(1, 0.6, 0.3)));
+    const std::clock_t begin = std::clock();
+    for (int frame = 0; frame < 60; ++frame) {
+      tissue.advance(1 / scene.frame_rate, {});
+      const FrameResult result = tissue.finish();
+      substeps += result.substeps;
+      if (result.blew_up) bench.SkipWithError("it blew up");
+    }
+    bench.SetIterationTime(static_cast<double>(std::clock() - begin) / CLOCKS_PER_SEC);
+  }
+  bench.counters["substeps"] = static_cast<double>(substeps) / bench.iterations();
+}
+
 void add(const std::string& name, const MlsCase& c) {
   benchmark::internal::Benchmark* row = benchmark::RegisterBenchmark(
       ("mls/cpu/" + name).c_str(),
@@ -136,6 +166,14 @@ void add_mls_rows() {
     add(n + "/scalpel", c);
     c.threads = 2;
     add(n + "/scalpel/threads:2", c);
+  }
+  for (const bool is_cut : {false, true}) {
+    const std::string name = is_cut ? "mls/cpu/second/cut" : "mls/cpu/second";
+    benchmark::RegisterBenchmark(name.c_str(),
+                                 [is_cut](benchmark::State& s) { run_second(s, is_cut); })
+        ->Unit(benchmark::kMillisecond)
+        ->UseManualTime()
+        ->Iterations(1);
   }
 }
 

@@ -7,6 +7,7 @@
 
 #include "cut_paths.h"
 #include "material/laws.h"
+#include "mls/own_rate.h"
 #include "mls/tissue.h"
 
 namespace tissue_sim {
@@ -93,8 +94,9 @@ inline double mls_energy(const MlsState& s, const std::vector<double>& u) {
     double F[9];
     for (int k = 0; k < 9; ++k) F[k] = H(k / 3, k % 3) + (k % 4 == 0);
     const double mu = lame_mu(m), lambda = lame_lambda(m);
-    sum += volume * (m.law == Law::kNeoHookean ? tissue_sim::energy<NeoHookean>(F, mu, lambda)
-                                               : tissue_sim::energy<FixedCorotated>(F, mu, lambda));
+    sum += strained_volume(s, i) * (m.law == Law::kNeoHookean
+                                        ? tissue_sim::energy<NeoHookean>(F, mu, lambda)
+                                        : tissue_sim::energy<FixedCorotated>(F, mu, lambda));
     const double kappa = 3 * s.scene.mls.stabilisation * m.young_modulus * volume / whole;
     for (int e = s.pairs.begin[i]; e < s.pairs.begin[i + 1]; ++e) {
       pair(e, r, d);
@@ -140,7 +142,7 @@ inline std::vector<Vec3> mls_forces(const MlsState& s) {
     Eigen::Matrix3d stress_of;
     for (int k = 0; k < 9; ++k) stress_of(k / 3, k % 3) = P[k];
     kappa[i] = 3 * s.scene.mls.stabilisation * m.young_modulus * volume / whole;
-    Q[i] = volume * stress_of * M.inverse() - kappa[i] * H[i];
+    Q[i] = strained_volume(s, i) * stress_of * M.inverse() - kappa[i] * H[i];
   }
   // Springs of supports that span no space.
   const auto share = [&](int i, double w) {

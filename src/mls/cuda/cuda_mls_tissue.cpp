@@ -49,9 +49,6 @@ void CudaMlsTissue::upload_nodes() {
   const MlsState& s = *state_;
   const int n = d.count = s.count();
   const auto count = static_cast<std::size_t>(n);
-  d.volume_mu.upload(s.volume_mu.data(), n, d.stream);
-  d.volume_lambda.upload(s.volume_lambda.data(), n, d.stream);
-  d.volume_eta.upload(s.volume_eta.data(), n, d.stream);
   d.mass.upload(s.mass.data(), n, d.stream);
   d.inv_mass.upload(s.inv_mass.data(), n, d.stream);
   d.neo_hookean.upload(s.neo_hookean.data(), n, d.stream);
@@ -119,6 +116,9 @@ void CudaMlsTissue::upload_pairs() {
     std::copy_n(s.inverse_moment[k].begin(), n, moments.begin() + static_cast<std::size_t>(k) * n);
   }
   d.inverse_moment.upload(moments, d.stream);
+  d.volume_mu.upload(s.volume_mu.data(), n, d.stream);
+  d.volume_lambda.upload(s.volume_lambda.data(), n, d.stream);
+  d.volume_eta.upload(s.volume_eta.data(), n, d.stream);
   d.kappa.upload(s.kappa.data(), n, d.stream);
   d.outer.upload(s.outer.data(), n, d.stream);
   upload(s.place, n, d.place, d.stream);  // cuts move where tissue ends
@@ -144,6 +144,9 @@ void CudaMlsTissue::pairs_changed(const std::vector<std::int32_t>& nodes) {
     CudaMlsNodeChange c;
     c.node = i;
     for (int k = 0; k < 6; ++k) c.inverse_moment[k] = s.inverse_moment[k][i];
+    c.volume_mu = s.volume_mu[i];
+    c.volume_lambda = s.volume_lambda[i];
+    c.volume_eta = s.volume_eta[i];
     c.kappa = s.kappa[i];
     c.outside = s.place[4 * i + 3];
     c.outer = s.outer[i];

@@ -74,6 +74,7 @@ struct CudaMlsHold {
 struct CudaMlsNodeChange {
   std::int32_t node;
   float inverse_moment[6];
+  float volume_mu, volume_lambda, volume_eta;
   float kappa;
   float outside;  ///< how far outside of it tissue ends [m]
   std::uint8_t outer;

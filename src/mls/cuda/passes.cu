@@ -298,6 +298,9 @@ __global__ void __launch_bounds__(kMlsThreads)
   for (int m = 0; m < 6; ++m) {
     const_cast<float*>(f.inverse_moment)[m * f.count + c.node] = c.inverse_moment[m];
   }
+  const_cast<float*>(f.volume_mu)[c.node] = c.volume_mu;
+  const_cast<float*>(f.volume_lambda)[c.node] = c.volume_lambda;
+  const_cast<float*>(f.volume_eta)[c.node] = c.volume_eta;
   const_cast<float*>(f.kappa)[c.node] = c.kappa;
   const_cast<std::uint8_t*>(f.outer)[c.node] = c.outer;
   const_cast<float4*>(f.place)[c.node].w = c.outside;

@@ -11,10 +11,14 @@ namespace {
 constexpr double kMostRate = 1.0;  // growth of the fastest node's rate by a cut, until the limit is
                                    // measured again
 constexpr double kOfHeld = 1;      // substep where all is held [s]
+/// How fast a material may swing over the fastest of its nodes by itself: 1.2 to 1.9 were seen, in
+/// regular, jittered and graded nodes, cut and whole, of Poisson's ratios of 0.3 and 0.45.
+constexpr double kTogether = 3;
 
 }  // namespace
 
-MlsSubsteps::MlsSubsteps(const MlsState& s) : stiffness_(s.count()), modulus_(s.count()) {
+MlsSubsteps::MlsSubsteps(const MlsState& s)
+    : stiffness_(s.count()), modulus_(s.count()), most_rate_(s.nodes.materials.size(), 0.0) {
   for (int i = 0; i < s.count(); ++i) {
     stiffness_[i].last = static_cast<float>(wave_modulus(s.nodes.material_of(i), 1));
     elements_.push_back(&stiffness_[i]);
@@ -22,12 +26,15 @@ MlsSubsteps::MlsSubsteps(const MlsState& s) : stiffness_(s.count()), modulus_(s.
 }
 
 // Viscosity's fastest rate is that of the mode of the highest frequency, omega = 2 / elastic:
-// c = 2 eta / (lambda + 2 mu) omega^2, and grows with the square of the stretch.
+// c = 2 eta / (lambda + 2 mu) omega^2, and grows with the square of the stretch. A soft material
+// has not the frequency of a stiff one beside it.
 double MlsSubsteps::damping(const MlsState& s, double elastic) const {
   const double omega = 2 / elastic;
   double fastest = 0;
-  for (const Material& m : s.nodes.materials) {
-    fastest = std::max(fastest, m.viscosity / wave_modulus(m, 1) * omega * omega * stiffened_);
+  for (std::size_t k = 0; k < s.nodes.materials.size(); ++k) {
+    const Material& m = s.nodes.materials[k];
+    const double rate = std::min(omega * omega, kTogether * most_rate_[k] * stiffened_);
+    fastest = std::max(fastest, m.viscosity / wave_modulus(m, 1) * rate * stiffened_);
   }
   return fastest;
 }
@@ -37,21 +44,24 @@ void MlsSubsteps::cut(const MlsState& s, const std::vector<std::int32_t>& nodes)
   s.cpu->for_each(
       static_cast<int>(nodes.size()),
       [&](int k) {
-        if (own_rate(s, nodes[k]) > kMostRate * most_rate_) stiffness_[nodes[k]].measured = 0;
+        const std::int32_t i = nodes[k];
+        if (own_rate(s, i) > kMostRate * most_rate_[s.nodes.material[i]]) {
+          stiffness_[i].measured = 0;
+        }
       },
       256);
 }
 
 PartSubsteps MlsSubsteps::part(const MlsState& s, double time, const MeasureLimit& measure) {
   limit_.measure_if_due(elements_, s.time, [&](const std::vector<std::uint8_t>& nodes, int steps) {
-    std::vector<double> of_group(s.groups(), 0.0);
-    s.cpu->for_each(s.groups(), [&](int group) {
-      const int first = group * kMlsGroup, last = std::min(s.count(), first + kMlsGroup);
-      for (int i = first; i < last; ++i) {
-        of_group[group] = std::max(of_group[group], own_rate(s, i));
-      }
-    });
-    most_rate_ = *std::max_element(of_group.begin(), of_group.end());
+    std::vector<double> rate(s.count());
+    s.cpu->for_each(
+        s.count(), [&](int i) { rate[i] = own_rate(s, i); }, kMlsGroup);
+    std::fill(most_rate_.begin(), most_rate_.end(), 0.0);
+    for (std::int32_t i = 0; i < s.count(); ++i) {
+      double& most = most_rate_[s.nodes.material[i]];
+      most = std::max(most, rate[i]);
+    }
     return measure(nodes, steps);
   });
   const double elastic = limit_.known() ? limit_.foreseen() : kOfHeld;

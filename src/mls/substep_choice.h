@@ -12,8 +12,8 @@
 namespace tissue_sim {
 
 /// StabilityLimit, StepLength and StepAcceptance, with what nodes and their pairs know of cuts. An
-/// element is a node. A cut that leaves a node whose own_rate() is more than that of all when the
-/// limit was measured, as few cuts do, has the limit measured at once.
+/// element is a node. A cut that leaves a node whose own_rate() is more than that of all of its
+/// material when the limit was measured, as few cuts do, has the limit measured at once.
 class MlsSubsteps {
  public:
   explicit MlsSubsteps(const MlsState& state);
@@ -39,7 +39,8 @@ class MlsSubsteps {
   std::vector<Stiffness*> elements_;  ///< these
   std::vector<float> modulus_;        ///< [nodes] after the last part [Pa]
   double stiffened_ = 1;              ///< what the stiffest node has, after the last part
-  double most_rate_ = 0;              ///< largest own_rate() when the limit was measured [1/s^2]
+  /// Largest own_rate() of each material's nodes when the limit was measured [1/s^2].
+  std::vector<double> most_rate_;
   StabilityLimit limit_;
   StepLength length_;
   StepAcceptance acceptance_;

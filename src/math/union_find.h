@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <numeric>
+#include <utility>
 #include <vector>
 
 namespace tissue_sim {
@@ -13,6 +14,9 @@ class UnionFind {
   explicit UnionFind(std::size_t nodes) : parent_(nodes) {
     std::iota(parent_.begin(), parent_.end(), 0);
   }
+  /// Each node with a node of its component that is no higher, from which the same leads to the
+  /// lowest; itself at the lowest.
+  explicit UnionFind(std::vector<std::int32_t> parent) : parent_(std::move(parent)) {}
   std::int32_t root(std::int32_t node) {
     while (parent_[node] != node) {
       parent_[node] = parent_[parent_[node]];

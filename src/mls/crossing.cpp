@@ -85,9 +85,10 @@ MovingSegment link_of(const Sweep& w, std::int32_t i, std::int32_t j) {
   return {at(i, w.u_begin), at(j, w.u_begin), at(i, w.u_end), at(j, w.u_end)};
 }
 
-/// Sides of a chunk's nodes: those on which they stay for certain.
+/// Sides of a chunk's nodes: those on which they stay for certain. Where one slab has all of them
+/// on one side, the next ones are not looked at. Returns the sides that all of them have.
 template <bool kStill>
-void find_sides(const Sweep& w, const SweptEdge& edge, int chunk, std::uint8_t* sides) {
+std::uint8_t find_sides(const Sweep& w, const SweptEdge& edge, int chunk, std::uint8_t* sides) {
   constexpr int kEnd = kStill ? 0 : 1;
   float x[2][3][kMlsChunk], margin[kMlsChunk];
   const float* place = &w.s.place[4 * static_cast<std::size_t>(chunk) * kMlsChunk];
@@ -105,8 +106,9 @@ void find_sides(const Sweep& w, const SweptEdge& edge, int chunk, std::uint8_t* 
     }
     margin[l] = kRounding * sum;
   }
-  std::int32_t bits[kMlsChunk] = {};
-  for (int k = 0; k < 3; ++k) {
+  std::int32_t bits[kMlsChunk] = {}, common = 0;
+  const int count = std::min(kMlsChunk, w.s.count() - chunk * kMlsChunk);
+  for (int k = 0; k < 3 && common == 0; ++k) {
     const Slab& slab = edge.slabs[k];
     const auto a = static_cast<float>(slab.axis[0]), b = static_cast<float>(slab.axis[1]),
                c = static_cast<float>(slab.axis[2]);
@@ -119,8 +121,11 @@ void find_sides(const Sweep& w, const SweptEdge& edge, int chunk, std::uint8_t* 
       bits[l] |=
           (most + margin[l] < low ? 1 << 2 * k : 0) | (least - margin[l] > high ? 2 << 2 * k : 0);
     }
+    common = kAllSides;
+    for (int l = 0; l < count; ++l) common &= bits[l];
   }
   for (int l = 0; l < kMlsChunk; ++l) sides[l] = static_cast<std::uint8_t>(bits[l]);
+  return static_cast<std::uint8_t>(common);
 }
 
 /// A part of the path's edge and when it sweeps.
@@ -203,11 +208,8 @@ std::vector<std::int32_t> find_crossed(const MlsState& s, const BladePath& path,
         common[block] = kAllSides;
         for (int chunk = first; chunk < last; ++chunk) {
           std::uint8_t* of = sides.at(chunk * kMlsChunk);
-          w.is_still() ? find_sides<true>(w, edge, chunk, of)
-                       : find_sides<false>(w, edge, chunk, of);
-          for (int l = 0; l < std::min(kMlsChunk, s.count() - chunk * kMlsChunk); ++l) {
-            common[block] &= of[l];
-          }
+          common[block] &= w.is_still() ? find_sides<true>(w, edge, chunk, of)
+                                        : find_sides<false>(w, edge, chunk, of);
         }
       });
       std::uint8_t all = kAllSides;

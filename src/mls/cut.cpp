@@ -65,9 +65,15 @@ std::vector<std::int32_t> mark_crossed(MlsState& s, const std::vector<std::int32
                                        CutReport& report) {
   MlsPairs& p = s.pairs;
   std::vector<std::uint8_t> is_touched(s.count(), 0);
-  for (const std::int32_t e : entries) {
+  std::vector<std::int32_t> twins(entries.size());
+  for (std::size_t k = 0; k < entries.size(); ++k) {
+    twins[k] = p.twin[entries[k]];
+    __builtin_prefetch(&p.crossed[twins[k]], 1);
+    __builtin_prefetch(&p.other[twins[k]]);
+  }
+  for (std::size_t k = 0; k < entries.size(); ++k) {
+    const std::int32_t e = entries[k], twin = twins[k];
     if (p.crossed[e] != 0) continue;
-    const std::int32_t twin = p.twin[e];
     p.crossed[e] = p.crossed[twin] = 1;
     ++report.bonds_broken;
     is_touched[p.other[e]] = is_touched[p.other[twin]] = 1;

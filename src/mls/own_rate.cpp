@@ -1,5 +1,6 @@
 #include "mls/own_rate.h"
 
+#include <Eigen/Dense>
 #include <algorithm>
 #include <vector>
 
@@ -10,30 +11,23 @@ namespace {
 constexpr double kMostOfWhole = 6.5, kMostBesideCut = 4.5;
 
 /// own_rate() of a node whose support spans space, over (lambda + 2 mu) times its volume
-/// [1 / (kg m^2)]. Its strain is sum_j (u_j - u_i) (x) g_j with g_j = w_ij M_i^-1 r_ij.
-double rate_of_strain(const MlsState& s, std::int32_t i) {
-  const MlsPairs& p = s.pairs;
-  double m[6], sum = 0, all[3] = {};
-  for (int k = 0; k < 6; ++k) m[k] = s.inverse_moment[k][i];
-  for (std::int32_t e = p.begin[i]; e < p.begin[i + 1]; ++e) {
-    const std::int32_t j = p.other[e];
-    double r[3], g[3];
-    for (int a = 0; a < 3; ++a) r[a] = s.place[4 * j + a] - s.place[4 * i + a];
-    g[0] = p.weight[e] * (m[0] * r[0] + m[3] * r[1] + m[4] * r[2]);
-    g[1] = p.weight[e] * (m[3] * r[0] + m[1] * r[1] + m[5] * r[2]);
-    g[2] = p.weight[e] * (m[4] * r[0] + m[5] * r[1] + m[2] * r[2]);
-    for (int a = 0; a < 3; ++a) {
-      sum += g[a] * g[a] * s.inv_mass[j];
-      all[a] += g[a];
-    }
-  }
-  for (const double g : all) sum += g * g * s.inv_mass[i];
-  return sum;
+/// [1 / (kg m^2)]. Its strain is sum_j (u_j - u_i) (x) w_ij M_i^-1 r_ij: that is
+/// tr(M^-1 B M^-1) + |M^-1 b|^2 / m_i with B = sum_j w^2 / m_j r r^T and b = sum_j w r.
+double rate_of_strain(const MlsState& s, std::int32_t i, const MlsSums& sums) {
+  Eigen::Matrix3d inverse;
+  const auto m = [&](int k) { return static_cast<double>(s.inverse_moment[k][i]); };
+  inverse << m(0), m(3), m(4), m(3), m(1), m(5), m(4), m(5), m(2);
+  const double* B = sums.per_mass;
+  Eigen::Matrix3d per_mass;
+  per_mass << B[0], B[3], B[4], B[3], B[1], B[5], B[4], B[5], B[2];
+  const Vec3 b(sums.first[0], sums.first[1], sums.first[2]);
+  const Eigen::Matrix3d both = inverse * per_mass;
+  return both.cwiseProduct(inverse).sum() + (inverse * b).squaredNorm() * s.inv_mass[i];
 }
 
 /// The volume of the node that swings by itself at `most` c^2 / h^2, (lambda + 2 mu) V rate [m^3].
-double volume_of_rate(const MlsState& s, std::int32_t i, double most) {
-  const double edge = s.edge[i], rate = rate_of_strain(s, i);
+double volume_of_rate(const MlsState& s, std::int32_t i, const MlsSums& sums, double most) {
+  const double edge = s.edge[i], rate = rate_of_strain(s, i, sums);
   return rate > 0 ? most / (s.nodes.material_of(i).density * edge * edge * rate) : 1e30;
 }
 
@@ -42,7 +36,7 @@ double volume_of_rate(const MlsState& s, std::int32_t i, double most) {
 double own_rate(const MlsState& s, std::int32_t i) {
   const MlsPairs& p = s.pairs;
   if (s.sprung[i] == 0) {
-    return (s.volume_lambda[i] + 2 * s.volume_mu[i]) * rate_of_strain(s, i);
+    return (s.volume_lambda[i] + 2 * s.volume_mu[i]) * rate_of_strain(s, i, mls_sums(s, i));
   }
   double sum = 0;
   for (std::int32_t e = p.begin[i]; e < p.begin[i + 1]; ++e) {
@@ -51,10 +45,38 @@ double own_rate(const MlsState& s, std::int32_t i) {
   return sum;
 }
 
+MlsSums mls_sums(const MlsState& s, std::int32_t i) {
+  double m[6] = {}, per_mass[6] = {}, first[3] = {};
+  const float* xi = &s.place[4 * i];
+  for (std::int32_t e = s.pairs.begin[i]; e < s.pairs.begin[i + 1]; ++e) {
+    const std::int32_t j = s.pairs.other[e];
+    const float* xj = &s.place[4 * j];
+    const double w = s.pairs.weight[e], q = w * w * s.inv_mass[j];
+    const double x = xj[0] - xi[0], y = xj[1] - xi[1], z = xj[2] - xi[2];  // in float, as passes do
+    const double products[6] = {x * x, y * y, z * z, x * y, x * z, y * z};
+    for (int k = 0; k < 6; ++k) {
+      m[k] += w * products[k];
+      per_mass[k] += q * products[k];
+    }
+    first[0] += w * x;
+    first[1] += w * y;
+    first[2] += w * z;
+  }
+  MlsSums sums;
+  std::copy_n(m, 6, sums.moment);
+  std::copy_n(per_mass, 6, sums.per_mass);
+  std::copy_n(first, 3, sums.first);
+  return sums;
+}
+
 float strained_volume(const MlsState& s, std::int32_t i) {
+  return strained_volume(s, i, mls_sums(s, i));
+}
+
+float strained_volume(const MlsState& s, std::int32_t i, const MlsSums& sums) {
   const float whole = s.nodes.strained_volume[i];
   if (s.cut[i] == 0 || s.sprung[i] != 0) return whole;
-  return static_cast<float>(std::min<double>(whole, volume_of_rate(s, i, kMostBesideCut)));
+  return static_cast<float>(std::min<double>(whole, volume_of_rate(s, i, sums, kMostBesideCut)));
 }
 
 bool bound_own_rates(MlsState& s) {
@@ -63,7 +85,8 @@ bool bound_own_rates(MlsState& s) {
   s.cpu->for_each(
       s.count(),
       [&](int i) {
-        const double most = s.sprung[i] == 0 ? volume_of_rate(s, i, kMostOfWhole) : 1e30;
+        const double most =
+            s.sprung[i] == 0 ? volume_of_rate(s, i, mls_sums(s, i), kMostOfWhole) : 1e30;
         bounded[i] = static_cast<float>(std::min<double>(s.nodes.strained_volume[i], most));
       },
       256);

@@ -6,6 +6,14 @@
 
 namespace tissue_sim {
 
+/// Sums over the pairs of a node.
+struct MlsSums {
+  double moment[6];    ///< w r r^T: 00 11 22 01 02 12
+  double per_mass[6];  ///< w^2 / m_j r r^T
+  double first[3];     ///< w r
+};
+MlsSums mls_sums(const MlsState& state, std::int32_t node);
+
 /// Largest eigenvalue that the energy of a node's own strain has by itself, or less than three
 /// times it: how fast nodes around it swing hangs on that [1/s^2].
 double own_rate(const MlsState& state, std::int32_t node);
@@ -18,6 +26,7 @@ double own_rate(const MlsState& state, std::int32_t node);
 /// cut (inner nodes of a flat face have 3.3, those at its edge 5.5); c is the speed of pressure
 /// waves, h the distance to its neighbours. The penalty and the mass stay.
 float strained_volume(const MlsState& state, std::int32_t node);
+float strained_volume(const MlsState& state, std::int32_t node, const MlsSums& sums);
 
 /// Takes from MlsNodes::strained_volume of whole nodes what swings too fast; whether there was any.
 bool bound_own_rates(MlsState& state);

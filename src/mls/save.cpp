@@ -5,6 +5,7 @@
 
 #include "compute/archive.h"
 #include "frame/state_fields.h"
+#include "mls/own_rate.h"
 #include "mls/tissue.h"
 
 namespace tissue_sim {
@@ -59,7 +60,7 @@ void MlsTissue::restore(Span<const std::uint8_t> saved) {
     s.cut[i] = std::any_of(first, last, [](std::uint8_t crossed) { return crossed != 0; }) ? 1 : 0;
     const bool exposed = s.outer[i] != 0 && s.nodes.surface[i] == 0;
     s.place[4 * i + 3] = exposed ? 0.5f * s.edge[i] : s.nodes.depth[i];
-    put_strained_volume(s, i);
+    put_strained_volume(s, i, strained_volume(s, i));
   }
   if (in.left() > 0) throw std::runtime_error("the state has more to it than this version knows");
 }

@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <tuple>
+#include <utility>
 #include <vector>
 
 #include "mls/state.h"
@@ -113,18 +114,13 @@ UnionFind join_uncrossed(const MlsState& s) {
   for (std::int32_t i = 0; i < s.count(); ++i) {
     if (s.cut[i] != 0) is_cut[spanner.cluster[i]] = 1;
   }
-  UnionFind linked(s.count());
-  const auto join_entry = [&](std::int32_t i, std::int32_t e) {
-    if (p.crossed[e] == 0) linked.join(i, p.other[e]);
-  };
   // Whole clusters first, and with one another: of each, its lowest node is the first.
-  for (std::int32_t c = 0; c < clusters; ++c) {
-    if (is_cut[c] != 0) continue;
-    const std::int32_t* member = &spanner.members[spanner.members_begin[c]];
-    const std::int32_t* last = spanner.members.data() + spanner.members_begin[c + 1];
-    const std::int32_t lowest = *member;
-    while (++member < last) linked.join(lowest, *member);
+  std::vector<std::int32_t> lowest(s.count());
+  for (std::int32_t i = 0; i < s.count(); ++i) {
+    const std::int32_t c = spanner.cluster[i];
+    lowest[i] = is_cut[c] != 0 ? i : spanner.members[spanner.members_begin[c]];
   }
+  UnionFind linked(std::move(lowest));
   for (std::int32_t c = 0; c < clusters; ++c) {
     const std::int32_t* members = &spanner.members[spanner.members_begin[c]];
     if (is_cut[c] == 0) {
@@ -139,11 +135,17 @@ UnionFind join_uncrossed(const MlsState& s) {
     for (std::int32_t k = spanner.members_begin[c]; k < spanner.members_begin[c + 1]; ++k) {
       const std::int32_t i = spanner.members[k];
       if (s.cut[i] != 0) {
-        for (std::int32_t e = p.begin[i]; e < p.begin[i + 1]; ++e) join_entry(i, e);
-      } else {
-        for (std::int32_t m = spanner.begin[i]; m < spanner.begin[i + 1]; ++m) {
-          join_entry(i, spanner.entry[m]);
+        for (std::int32_t e = p.begin[i]; e < p.begin[i + 1]; ++e) {
+          const std::int32_t j = p.other[e];
+          if (p.crossed[e] != 0 || (j < i && s.cut[j] != 0)) continue;  // that one joins it
+          linked.join(i, j);
         }
+        continue;
+      }
+      for (std::int32_t m = spanner.begin[i]; m < spanner.begin[i + 1]; ++m) {
+        const std::int32_t j = p.other[spanner.entry[m]];
+        if (s.cut[j] != 0 || (j < i && is_cut[spanner.cluster[j]] != 0)) continue;  // the same
+        linked.join(i, j);
       }
     }
   }

@@ -26,25 +26,6 @@ void resize_padded(Array<T>& array, int count, int per_node) {
   array.assign(static_cast<std::size_t>(chunks) * kMlsChunk * per_node, T{});
 }
 
-Eigen::Matrix3d moment_of(const MlsState& s, std::int32_t i) {
-  double m[6] = {};
-  const float* xi = &s.place[4 * i];
-  for (std::int32_t e = s.pairs.begin[i]; e < s.pairs.begin[i + 1]; ++e) {
-    const float* xj = &s.place[4 * s.pairs.other[e]];
-    const double w = s.pairs.weight[e];
-    const double x = xj[0] - xi[0], y = xj[1] - xi[1], z = xj[2] - xi[2];  // in float, as passes do
-    m[0] += w * x * x;
-    m[1] += w * y * y;
-    m[2] += w * z * z;
-    m[3] += w * x * y;
-    m[4] += w * x * z;
-    m[5] += w * y * z;
-  }
-  Eigen::Matrix3d result;
-  result << m[0], m[3], m[4], m[3], m[1], m[5], m[4], m[5], m[2];
-  return result;
-}
-
 bool spans_space(const Eigen::Matrix3d& m) {
   // Of eigenvalues a <= b <= c, sums t = a + b + c and q = ab + bc + ca: abc / (q t) <= a / c <= 9
   // abc / (q t). For most that tells.
@@ -93,7 +74,10 @@ void make_springs(MlsState& s, std::int32_t i) {
 }
 
 void remake_node(MlsState& s, std::int32_t i) {
-  const Eigen::Matrix3d m = moment_of(s, i);
+  const MlsSums sums = mls_sums(s, i);
+  const double* of = sums.moment;
+  Eigen::Matrix3d m;
+  m << of[0], of[3], of[4], of[3], of[1], of[5], of[4], of[5], of[2];
   const bool spans = spans_space(m);
   Eigen::Matrix3d inverse = Eigen::Matrix3d::Zero();
   if (spans) inverse = m.inverse();
@@ -103,7 +87,7 @@ void remake_node(MlsState& s, std::int32_t i) {
   }
   s.kappa[i] = spans ? s.whole_kappa[i] : 0.0f;
   s.sprung[i] = spans ? 0 : 1;
-  put_strained_volume(s, i);
+  put_strained_volume(s, i, strained_volume(s, i, sums));
 }
 
 /// Forces of springs on node i.
@@ -208,9 +192,8 @@ std::unique_ptr<MlsState> make_mls_state(const Scene& scene, std::vector<std::st
   return state;
 }
 
-void put_strained_volume(MlsState& s, std::int32_t i) {
+void put_strained_volume(MlsState& s, std::int32_t i, float volume) {
   const Material& m = s.nodes.material_of(i);
-  const float volume = strained_volume(s, i);
   s.volume_mu[i] = static_cast<float>(lame_mu(m)) * volume;
   s.volume_lambda[i] = static_cast<float>(lame_lambda(m)) * volume;
   s.volume_eta[i] = static_cast<float>(m.viscosity) * volume;

@@ -113,8 +113,8 @@ inline void expose(MlsState& state, std::int32_t node) {
 /// Makes moments, penalty and springs of these nodes anew, after weights of their entries changed.
 void remake(MlsState& state, const std::vector<std::int32_t>& nodes);
 
-/// Stiffness of a node by its strained_volume() (mls/own_rate.h), after its moments.
-void put_strained_volume(MlsState& state, std::int32_t node);
+/// Stiffness of a node of which so much bears strain: strained_volume() (mls/own_rate.h).
+void put_strained_volume(MlsState& state, std::int32_t node, float volume);
 
 /// What the passes work on, at displacements `u` and velocities `v`, [4 n] each. Spreads them (see
 /// MlsKernels), so no two fields are in use at a time.

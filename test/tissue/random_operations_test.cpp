@@ -228,7 +228,7 @@ FOR_EACH_METHOD(RandomOperations);
 TEST_P(RandomOperations, DoNotBlowUp) {
   std::vector<int> seeds = {13, 14, 103};
   if (GetParam().method == Method::kMls)
-    seeds = {14, 103, 1, 2, 3};  // 13 takes 2 200 substeps a frame
+    seeds = {13, 14, 103, 1, 2};
   if (GetParam().method == Method::kPbd) seeds.insert(seeds.end(), {1, 2});
   if (const char* asked = std::getenv("TISSUE_SIM_OPERATIONS")) {
     int first, count;

@@ -115,7 +115,8 @@ std::vector<std::int32_t> weaken(MlsState& s, const std::vector<std::int32_t>& t
       neighbours.clear(i);
     }
   });
-  std::vector<std::uint8_t> has_fallen(s.count(), 0);
+  // Those beside a cut have less that bears strain, even where all weights are left.
+  std::vector<std::uint8_t> has_fallen = is_touched;
   for (const auto& some : fallen) {
     for (const std::int32_t i : some) has_fallen[i] = 1;
   }

@@ -8,7 +8,7 @@ namespace tissue_sim {
 namespace {
 
 /// In units of c^2 / h^2; see strained_volume().
-constexpr double kMostOfWhole = 6.5, kMostBesideCut = 4.5;
+constexpr double kMostOfWhole = 20, kMostBesideCut = 4.5;
 
 /// own_rate() of a node whose support spans space, over (lambda + 2 mu) times its volume
 /// [1 / (kg m^2)]. Its strain is sum_j (u_j - u_i) (x) w_ij M_i^-1 r_ij: that is
@@ -36,7 +36,9 @@ double volume_of_rate(const MlsState& s, std::int32_t i, const MlsSums& sums, do
 double own_rate(const MlsState& s, std::int32_t i) {
   const MlsPairs& p = s.pairs;
   if (s.sprung[i] == 0) {
-    return (s.volume_lambda[i] + 2 * s.volume_mu[i]) * rate_of_strain(s, i, mls_sums(s, i));
+    const Material& m = s.nodes.material_of(i);
+    return (lame_lambda(m) + 2 * lame_mu(m)) * s.nodes.strained_volume[i] *
+           rate_of_strain(s, i, mls_sums(s, i));
   }
   double sum = 0;
   for (std::int32_t e = p.begin[i]; e < p.begin[i + 1]; ++e) {

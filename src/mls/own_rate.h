@@ -15,14 +15,15 @@ struct MlsSums {
 MlsSums mls_sums(const MlsState& state, std::int32_t node);
 
 /// Largest eigenvalue that the energy of a node's own strain has by itself, or less than three
-/// times it: how fast nodes around it swing hangs on that [1/s^2].
+/// times it: how fast nodes around it swing hangs on that [1/s^2]. Beside a cut that of all that
+/// bore strain while it was whole: what is bounded tells as much of the nodes around it.
 double own_rate(const MlsState& state, std::int32_t node);
 
 /// Volume of the node that bears strain [m^3]. A support that is thin across some direction, but
 /// spans space, reads strain across it from a node or two: all of the node's volume at once moves
 /// with them, and swings up to ten times as fast as within a lattice. The whole body would have to
 /// go by its substep. So no more of the volume bears strain than what swings by itself at a rate
-/// of 6.5 c^2 / h^2 while the node is whole (corners of a lattice have 6.0), and of 4.5 beside a
+/// of 20 c^2 / h^2 while the node is whole (corners of a lattice have 6.0), and of 4.5 beside a
 /// cut (inner nodes of a flat face have 3.3, those at its edge 5.5); c is the speed of pressure
 /// waves, h the distance to its neighbours. The penalty and the mass stay.
 float strained_volume(const MlsState& state, std::int32_t node);

@@ -144,7 +144,6 @@ struct ContactFaces : ContactPlaces {
   }
   double cell_size() const { return state.scene.cell_size; }
   float per_cell() const { return static_cast<float>(1 / state.scene.cell_size); }
-  static constexpr bool takes_what_comes() { return true; }
   std::int32_t near(int n) const { return state.faces.near[n]; }
   template <class Visit>
   void for_each_near(const Visit& visit) const {

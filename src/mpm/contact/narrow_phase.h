@@ -12,7 +12,6 @@
 //   hold_in(f), hold(place)    sets the cell and the place in it of the place held
 //   own(u), held(u)            displacements of the facet's centre and of the place held [m]
 //   own_mobility(), held_mobility()   of both: sum of w^2 / m [1/kg]
-//   takes_what_comes()         whether what came from the front touches at once
 #pragma once
 
 #include <climits>
@@ -278,8 +277,7 @@ TISSUE_SIM_HOST_DEVICE inline float look(Faces& s, FaceSpring& c, float dt, floa
   if (c.touching) {
     looks::settle(s, c, dt, since);
   } else {
-    const float came =
-        in_front && s.takes_what_comes() ? fmaxf(0.0f, -kComes * dt * dot(v, o.normal)) : 0.0f;
+    const float came = in_front ? fmaxf(0.0f, -kComes * dt * dot(v, o.normal)) : 0.0f;
     if (!looks::aim(s, c, seen, came * static_cast<float>(s.per_cell()))) {
       c.other = -1;
       return 0;

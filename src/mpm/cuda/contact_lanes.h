@@ -215,7 +215,6 @@ struct LaneFaces : LanePlaces<kContactLanes, true> {
   __device__ __forceinline__ float friction(int f) const { return s.facets[f].friction; }
   __device__ __forceinline__ double cell_size() const { return s.cell_size; }
   __device__ __forceinline__ float per_cell() const { return s.per_cell; }
-  __device__ __forceinline__ static constexpr bool takes_what_comes() { return false; }
   __device__ __forceinline__ int near(int n) const { return s.near[n]; }
   /// Those near, each lane every sixteenth, some whose places are under way at once.
   template <class Visit>

@@ -49,6 +49,7 @@ void CudaMpmTissue::reject_part(Verdict verdict) {
 }
 
 bool CudaMpmTissue::accept_part() {
+  search_if_faster(*state_);
   substep_.follow(*state_, modulus_);
   return !result_.blew_up;
 }

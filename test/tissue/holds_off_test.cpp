@@ -123,7 +123,7 @@ std::size_t sheet_points(const Scene& scene) {
 }
 
 TEST_P(HoldsOff, TissueThatAToolPressesDoesNotPassThroughTissue) {
-  const double cases[][2] = {{0.003, 0.3}, {0.003, 1}, {0.006, 0.3}};  // thickness, speed
+  const double cases[][2] = {{0.003, 0.3}, {0.006, 1}, {0.006, 0.3}};  // thickness, speed
   for (const auto& [thickness, speed] : cases) {
     Scene scene = on_this(sheet_and_cube(thickness, 0.001));
     scene.damping = 20;

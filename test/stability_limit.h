@@ -23,7 +23,17 @@ inline std::vector<double> accelerations(MpmState& state, const std::vector<floa
   }
   std::vector<ColliderLoad> loads;
   const float dt = std::exchange(state.dt, 0.0f);
+  Front& front = state.front;  // parted nodes stay where they are
+  Array<float> d[3], rate[3];
+  for (int c = 0; c < 3; ++c) {
+    d[c] = front.d[c];
+    rate[c] = front.rate[c];
+  }
   substep(state, 1.0f, loads);
+  for (int c = 0; c < 3; ++c) {
+    std::swap(front.d[c], d[c]);
+    std::swap(front.rate[c], rate[c]);
+  }
   state.dt = dt;
   std::vector<double> a(3 * count);
   for (std::size_t i = 0; i < 3 * count; ++i) a[i] = n.v[i / count][i % count];

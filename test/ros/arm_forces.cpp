@@ -29,8 +29,14 @@ TEST_F(CrtkArm, FeelsTheTissue) {
   }
   EXPECT_TRUE(paired);
   // The tip's axes: at rest its x is the world's y, turned with the yaw.
+  Quat turned = tip().orientation;
+  EXPECT_TRUE(wait_until([&] {  // it stands: poses and forces have other stamps
+    const Quat before = turned;
+    turned = from_message(measured_cp.next()->pose).orientation;
+    return turned.angularDistance(before) < 1e-7;
+  }));
+  body.next();  // may be of the frame before
   const auto b = body.next();
-  const Quat turned = tip().orientation;
   EXPECT_TRUE(wait_until([&] {
     for (const auto& s : spatial.all()) {
       if (s->header.stamp != b->header.stamp) continue;

@@ -94,8 +94,9 @@ class Patch {
   std::int32_t facet_[kMost] = {};
 };
 
-/// The facets of a block that face most along one axis, up or down.
+/// The facets of a block that face most along one axis, up or down; debris or none of them.
 struct CandidateSide {
+  bool is_debris = false;
   std::vector<Patch> patches;
   VectorBox box, normals;  ///< of them all
 
@@ -121,7 +122,8 @@ struct CandidateSide {
   }
 };
 
-constexpr int kSides = 6;  // of a block
+constexpr int kSides = 6;  // of a block, for debris and for all else
+constexpr int kOfBlock = 2 * kSides;
 
 /// Which of a block's sides a facet is part of.
 int side_of(const FacetMotion& f) {
@@ -146,16 +148,22 @@ std::vector<FacetPair> sorted(const std::vector<FacetPair>& pairs, int count, co
 
 std::vector<FacetPair> facing_pairs(const std::vector<FacetMotion>& facets,
                                     const std::vector<float>& reach,
+                                    const std::vector<std::uint8_t>& is_debris,
                                     const std::vector<std::int32_t>& first_of_block, float patch,
                                     Cpu& cpu) {
   const int count = static_cast<int>(first_of_block.size()) - 1;
-  std::vector<CandidateSide> sides(static_cast<std::size_t>(kSides) * count);
+  std::vector<CandidateSide> sides(static_cast<std::size_t>(kOfBlock) * count);
   cpu.for_each(count, [&](int b) {
-    CandidateSide* of_block = &sides[static_cast<std::size_t>(kSides) * b];
+    CandidateSide* of_block = &sides[static_cast<std::size_t>(kOfBlock) * b];
     for (std::int32_t f = first_of_block[b]; f < first_of_block[b + 1]; ++f) {
-      if (reach[f] > 0) of_block[side_of(facets[f])].add(facets[f], reach[f], f, patch);
+      if (reach[f] == 0) continue;
+      const int side = side_of(facets[f]) + (is_debris[f] != 0 ? kSides : 0);
+      of_block[side].add(facets[f], reach[f], f, patch);
     }
-    for (int i = 0; i < kSides; ++i) of_block[i].measure();
+    for (int i = 0; i < kOfBlock; ++i) {
+      of_block[i].measure();
+      of_block[i].is_debris = i >= kSides;
+    }
   });
   std::vector<const CandidateSide*> order;  // of those that have any, along x
   for (const CandidateSide& side : sides) {
@@ -170,6 +178,7 @@ std::vector<FacetPair> facing_pairs(const std::vector<FacetMotion>& facets,
     for (std::size_t j = i; j < order.size(); ++j) {
       const CandidateSide& other = *order[j];
       if (other.box.min[0] > side.box.max[0]) break;
+      if (side.is_debris && other.is_debris) continue;
       if (side.box.meets(other.box) && may_face(side.normals, other.normals)) {
         side.add_pairs(other, chunks[i]);
       }

@@ -7,6 +7,7 @@
 #include "compute/host_device.h"
 #include "mpm/contact/facet_in_world.h"
 #include "mpm/lattice/bonds.h"
+#include "mpm/tear/debris_points.h"
 
 namespace tissue_sim {
 
@@ -72,11 +73,16 @@ struct ListedFacet {
 /// A piece, as contacts see it.
 struct PieceSize {
   std::int32_t id, points;
+
+  /// Debris touches larger pieces, tools and the ground, but no other debris: what a thousand bits of
+  /// a cell's volume do to one another cost more than all the tissue that they came from.
+  TISSUE_SIM_INLINE bool is_debris() const { return points <= kDebrisPoints; }
 };
 
 /// Whether facets of the piece `a` touch those of `b`: the smaller one's do; of one piece, both
 /// ways.
 TISSUE_SIM_INLINE bool touches(const PieceSize& a, const PieceSize& b) {
+  if (a.is_debris() && b.is_debris()) return false;
   if (a.id == b.id) return true;
   return a.points != b.points ? a.points < b.points : a.id > b.id;
 }

@@ -119,13 +119,15 @@ bool search(MpmState& s, const Pieces& pieces) {
   if (pairs_last(faces, travel)) return false;
   faces.listed.resize(facet_count);
   std::vector<float> reach(facet_count);
+  std::vector<std::uint8_t> is_debris(facet_count);
   for (std::int32_t f = 0; f < facet_count; ++f) {
     ListedFacet& listed = faces.listed[f];
     std::copy_n(faces.motion[f].x, 3, listed.x);
     listed.skin = travel[f] < 0 ? -1 : travel[f] + kSkin * cell;
     reach[f] = travel[f] < 0 ? 0 : kSearchReach * cell + listed.skin;
+    is_debris[f] = piece[f].is_debris() ? 1 : 0;
   }
-  auto pairs = facing_pairs(faces.motion, reach, faces.first_facet, 6 * cell, *s.cpu);
+  auto pairs = facing_pairs(faces.motion, reach, is_debris, faces.first_facet, 6 * cell, *s.cpu);
   std::vector<std::uint8_t> one(pairs.size());
   s.cpu->for_each(
       static_cast<int>(pairs.size()),

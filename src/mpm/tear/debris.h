@@ -8,11 +8,9 @@
 
 #include "mpm/blocks/stabilisation.h"
 #include "mpm/lattice_tissue.h"
+#include "mpm/tear/debris_points.h"
 
 namespace tissue_sim {
-
-/// A piece that was cut off with at most this many points, a cell's worth, is a bit of debris.
-inline constexpr int kDebrisPoints = 8;
 
 /// Marks what became soft as the points `changed` lost bonds: those of debris, and of slices one
 /// point thick, which cuts parted from what there was on both sides of them along an axis of the

@@ -44,7 +44,7 @@ std::size_t CudaMpmTissue::device_bytes() const {
                     d.outer.bytes() + d.bonds.bytes() + d.soft.bytes() + d.with.bytes() +
                     d.whole.bytes() + d.u_before.bytes() + d.connect_room.bytes() +
                     d.colliders.bytes() + d.loads.bytes() + d.measures.bytes() + d.cloud.bytes() +
-                    d.stretched.bytes() + d.faces.bytes() + d.checkpoint.bytes() + d.stacks.bytes();
+                    d.stretched.bytes() + d.faces.bytes() + d.front.bytes() + d.checkpoint.bytes() + d.stacks.bytes();
   for (int i = 0; i < 2; ++i) sum += d.u[i].bytes() + d.v[i].bytes() + d.force[i].bytes();
   return sum;
 }

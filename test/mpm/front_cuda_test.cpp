@@ -114,32 +114,32 @@ TEST_P(FrontOnGpu, OneSubstepAgreesWithTheCpusFrontAndBruteForce) {
   tissue.advance(1, dt, {});
   tissue.finish();
   tissue.pull();
-  double force_scale = 0, v_scale = 0, moved = 0, worst = 0;
+  double force_scale = 0, v_scale = 0, tells = 0, worst = 0;
   for (std::size_t i = 0; i < expected.u.size(); ++i) {
     force_scale = std::max(force_scale, expected.force[i].norm());
     v_scale = std::max(v_scale, expected.v[i].norm());
-    moved = std::max(moved, (expected.v[i] - without.v[i]).norm());
   }
-  EXPECT_GT(moved, 0.05 * v_scale) << "the front must push to tell anything";
   for (std::size_t i = 0; i < expected.u.size(); ++i) {
     if (s.nodes.inv_mass[i] == 0) continue;
     const Vec3 v(s.nodes.v[0][i], s.nodes.v[1][i], s.nodes.v[2][i]);
     const Vec3 u(s.nodes.u[0][i], s.nodes.u[1][i], s.nodes.u[2][i]);
-    const double bound = 3e-6 * force_scale * dt / expected.mass[i] + 2e-6 * v_scale;
+    const double bound = 3e-7 * force_scale * dt / expected.mass[i] + 2e-7 * v_scale;
+    tells = std::max(tells, (expected.v[i] - without.v[i]).norm() / bound);
     ASSERT_LT((v - expected.v[i]).norm(), bound) << "node " << i;
     ASSERT_LT((u - expected.u[i]).norm(), dt * bound + 1e-8) << "node " << i;
     worst = std::max(worst, (v - expected.v[i]).norm() / bound);
   }
   for (std::size_t i = 0; i < d.size(); ++i) {
-    const double bound = 3e-6 * force_scale * dt / s.front.nodes[i].mass + 2e-6 * v_scale;
+    const double bound = 3e-7 * force_scale * dt / s.front.nodes[i].mass + 2e-7 * v_scale;
     const Vec3 now(s.front.d[0][i], s.front.d[1][i], s.front.d[2][i]);
     const Vec3 rate_now(s.front.rate[0][i], s.front.rate[1][i], s.front.rate[2][i]);
     ASSERT_LT((rate_now - rate[i]).norm(), bound) << "parted node " << i;
     ASSERT_LT((now - d[i]).norm(), dt * bound + 1e-8) << "parted node " << i;
     worst = std::max(worst, (rate_now - rate[i]).norm() / bound);
   }
-  std::printf("%zu cells, %zu parted nodes; off by %.2f of what may be\n", s.front.cells.size(),
-              d.size(), worst);
+  EXPECT_GT(tells, 100) << "the front must push much more than what may be off";
+  std::printf("%zu cells, %zu parted nodes; off by %.2f of what may be, without them by %.0f\n",
+              s.front.cells.size(), d.size(), worst, tells);
 }
 
 INSTANTIATE_TEST_SUITE_P(All, FrontOnGpu,

@@ -108,8 +108,7 @@ TEST_P(FrontOnGpu, OneSubstepAgreesWithTheCpusFrontAndBruteForce) {
   const FrameResult blocks = tissue.finish();
   std::swap(no_front, s.front);
   tissue.push();
-  EXPECT_NEAR(before.elastic_energy - blocks.elastic_energy, energy,
-              1e-5 * blocks.elastic_energy);
+  EXPECT_NEAR(before.elastic_energy - blocks.elastic_energy, energy, 1e-5 * blocks.elastic_energy);
   EXPECT_NEAR(before.kinetic_energy - blocks.kinetic_energy, kinetic, 1e-5 * kinetic);
   tissue.advance(1, dt, {});
   tissue.finish();

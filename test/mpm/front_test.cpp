@@ -199,8 +199,8 @@ struct CutCantilever {
       path.poses.push_back({Vec3(0, 0, z), Quat::Identity()});
     simulation.cut(path);
     EXPECT_TRUE(simulation.settle({3e-6, 6, 20}).at_rest) << depth;
-    sag = -surface_displacement(simulation.tissue(), 0, Vec3(0.03, 0, 0.02), 2,
-                                0.002 + 1.5 * kCell);
+    sag =
+        -surface_displacement(simulation.tissue(), 0, Vec3(0.03, 0, 0.02), 2, 0.002 + 1.5 * kCell);
     mouth = beside_cut(simulation.tissue(), true, kCell) -
             beside_cut(simulation.tissue(), false, kCell);
   }
@@ -236,8 +236,8 @@ TEST(FrontOfACantilever, MouthAndSagOnAGpu) {
   double mouth[2] = {}, sag[2] = {};  // on a GPU, on a CPU
   for (const double depth : {0.00875, 0.009375, 0.01}) {
     const CutCantilever gpu(Device::kCuda, depth, 2 * kCell), cpu(Device::kCpu, depth, 2 * kCell);
-    std::printf("%g mm: sag %.4f, mouth %.4f mm; on a CPU %.4f, %.4f\n", 1e3 * depth,
-                1e3 * gpu.sag, 1e3 * gpu.mouth, 1e3 * cpu.sag, 1e3 * cpu.mouth);
+    std::printf("%g mm: sag %.4f, mouth %.4f mm; on a CPU %.4f, %.4f\n", 1e3 * depth, 1e3 * gpu.sag,
+                1e3 * gpu.mouth, 1e3 * cpu.sag, 1e3 * cpu.mouth);
     EXPECT_NEAR(gpu.mouth / cpu.mouth, 1, 0.1) << depth;
     if (mouth[0] != 0) {
       EXPECT_NEAR((gpu.mouth - mouth[0]) / (cpu.mouth - mouth[1]), 1, 0.3) << depth;

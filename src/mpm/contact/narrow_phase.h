@@ -106,9 +106,8 @@ TISSUE_SIM_INLINE bool was_in_front(const FaceSpring& c) {
 /// deeper by `moved` [cells] since the last look.
 template <class Faces>
 TISSUE_SIM_HOST_DEVICE inline int choose_other(const Faces& s, const FaceSpring& c, float moved) {
-  const float deepest = c.touching || was_in_front(c)
-                            ? fmaxf(kDeepest, c.depth + kDeeper + moved)
-                            : kDeepest;
+  const float deepest =
+      c.touching || was_in_front(c) ? fmaxf(kDeepest, c.depth + kDeeper + moved) : kDeepest;
   const FacetMotion& own = s.motion(c.facet);
   if (c.touching && c.other >= 0) {
     const Seen seen = seen_by(s, own, c.other);

@@ -14,9 +14,9 @@ void CudaMpmTissue::pull_front() {
   if (count == 0) return;
   d.host_nodes.resize(2 * count);
   const auto bring = [&](const float4* from, float4* to) {
-    check_cuda(cudaMemcpyAsync(to, from + first, count * sizeof(float4), cudaMemcpyDeviceToHost,
-                               d.stream),
-               "send data");
+    check_cuda(
+        cudaMemcpyAsync(to, from + first, count * sizeof(float4), cudaMemcpyDeviceToHost, d.stream),
+        "send data");
   };
   bring(d.present().u, d.host_nodes.data());
   bring(d.present().v, d.host_nodes.data() + count);

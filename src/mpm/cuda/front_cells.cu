@@ -213,8 +213,9 @@ struct MotionOfParted {
     const float mass = state.u[front.first_node + i].w;
     const float4 v = state.v[front.first_node + i];
     front.energy[front.cell_count + i] =
-        0.5 * mass * (static_cast<double>(v.x) * v.x + static_cast<double>(v.y) * v.y +
-                      static_cast<double>(v.z) * v.z);
+        0.5 * mass *
+        (static_cast<double>(v.x) * v.x + static_cast<double>(v.y) * v.y +
+         static_cast<double>(v.z) * v.z);
   }
 };
 

@@ -18,9 +18,9 @@ struct CellView {
   std::vector<FrontPart> parts;
   Law law;
   std::array<std::int32_t, 8> point;
-  double volume = 0;        ///< of these [m^3]
-  double viscosity = 0;     ///< times volumes [J s]
-  double of_block = 0;      ///< the same times the volume that the block damps them with [J s m^3]
+  double volume = 0;     ///< of these [m^3]
+  double viscosity = 0;  ///< times volumes [J s]
+  double of_block = 0;   ///< the same times the volume that the block damps them with [J s m^3]
   int count = 0;
 };
 

@@ -1,5 +1,5 @@
 // The front of a cut: it ends where the blade's edge ended, wherever that lies in a cell
-// (mpm: {boundary: surface}, on a CPU). Its compliance: EdgeCrack.
+// (mpm: {boundary: surface}). Its compliance: EdgeCrack. A substep on a GPU: front_cuda_test.cpp.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "cut_scenes.h"
+#include "either_device.h"
 #include "finite_element_scenes.h"
 #include "momentum.h"
 
@@ -22,7 +23,6 @@ const char* const kData = TISSUE_SIM_TEST_DATA;
 /// A block of 40 x 32 x 24 mm in space, and a stroke into it from the side, askew.
 Scene block(Law law, double viscosity) {
   Scene scene = free_box(Vec3(0.04, 0.032, 0.024), 0.004);
-  scene.device = Device::kCpu;
   scene.mpm.boundary = MpmBoundary::kSurface;
   Material m;
   m.name = "test";
@@ -45,15 +45,19 @@ double share_sum(const MpmState& s) {
   return sum;
 }
 
-TEST(Front, IsTheSameHoweverSlowlyABladeCame) {
-  MpmTissue fast(block(Law::kNeoHookean, 0)), slow(block(Law::kNeoHookean, 0));
+template <class T>
+class Front : public OnEitherDevice<T> {};
+TYPED_TEST_SUITE(Front, Tissues, DeviceName);
+
+TYPED_TEST(Front, IsTheSameHoweverSlowlyABladeCame) {
+  TypeParam fast(block(Law::kNeoHookean, 0)), slow(block(Law::kNeoHookean, 0));
   cut_now(fast, stroke(-0.01, 0.0173));
   constexpr int kStrokes = 23;
   for (int i = 0; i < kStrokes; ++i) {
     const double length = 0.0273 / kStrokes;
     cut_now(slow, stroke(-0.01 + i * length, -0.01 + (i + 1) * length));
   }
-  const Front &a = fast.state().front, &b = slow.state().front;
+  const auto &a = fast.state().front, &b = slow.state().front;
   ASSERT_GT(a.nodes.size(), 10u);
   ASSERT_EQ(a.nodes.size(), b.nodes.size());
   for (std::size_t i = 0; i < a.nodes.size(); ++i) {
@@ -64,8 +68,8 @@ TEST(Front, IsTheSameHoweverSlowlyABladeCame) {
   }
 }
 
-TEST(Front, IsNoneOfACutThatGoesThrough) {
-  MpmTissue tissue(block(Law::kNeoHookean, 0));
+TYPED_TEST(Front, IsNoneOfACutThatGoesThrough) {
+  TypeParam tissue(block(Law::kNeoHookean, 0));
   cut_now(tissue, stroke(-0.01, 0.0173));
   EXPECT_GT(tissue.state().front.cells.size(), 0u);
   cut_now(tissue, stroke(0.0173, 0.05));
@@ -73,8 +77,8 @@ TEST(Front, IsNoneOfACutThatGoesThrough) {
   EXPECT_EQ(tissue.fragment_count(), 2);
 }
 
-TEST(Front, OnlyGoesOn) {
-  MpmTissue tissue(block(Law::kNeoHookean, 0));
+TYPED_TEST(Front, OnlyGoesOn) {
+  TypeParam tissue(block(Law::kNeoHookean, 0));
   double before = 0, y = -0.01;
   for (double to = 0.011; to < 0.0131; to += 0.0003) {  // within half a cell
     cut_now(tissue, stroke(y, to));
@@ -90,8 +94,9 @@ TEST(Front, OnlyGoesOn) {
 }
 
 /// Flies and spins with a front that opens: momentum stays, energy does.
+template <class T>
 void flies(Law law) {
-  MpmTissue tissue(block(law, 0));
+  T tissue(block(law, 0));
   MpmState& s = tissue.state();
   cut_now(tissue, stroke(-0.01, 0.0173));
   const std::vector<Vec3> home = homes(s);
@@ -102,6 +107,7 @@ void flies(Law law) {
     const Vec3 v = Vec3(0.1, -0.06, 0.08) + Vec3(3, 5, -4).cross(X) + opening;
     for (int c = 0; c < 3; ++c) s.nodes.v[c][i] = static_cast<float>(v[c]);
   }
+  push(tissue);
   const Momentum before = tissue.momentum();
   const float dt = 0.3f * tissue.stable_substep();
   tissue.advance(1, dt, {});
@@ -114,6 +120,7 @@ void flies(Law law) {
     const FrameResult r = tissue.finish();
     if (i < 4) least = std::min(least, r.kinetic_energy + r.elastic_energy);  // later faces touch
     most = std::max(most, r.kinetic_energy + r.elastic_energy);
+    pull(tissue);
     for (const float d : s.front.d[0]) opened = std::max<double>(opened, std::fabs(d));
   }
   const Momentum after = tissue.momentum();
@@ -123,23 +130,23 @@ void flies(Law law) {
   EXPECT_LT(most, 1.003 * energy);
   EXPECT_GT(least, 0.997 * energy);
 }
-TEST(Front, KeepsMomentumAndEnergyNeoHookean) { flies(Law::kNeoHookean); }
-TEST(Front, KeepsMomentumAndEnergyCorotated) { flies(Law::kFixedCorotated); }
+TYPED_TEST(Front, KeepsMomentumAndEnergyNeoHookean) { flies<TypeParam>(Law::kNeoHookean); }
+TYPED_TEST(Front, KeepsMomentumAndEnergyCorotated) { flies<TypeParam>(Law::kFixedCorotated); }
 
-TEST(Front, SameBitsOnAnyNumberOfThreadsAndAfterItWasSaved) {
+TYPED_TEST(Front, SameBitsOnAnyNumberOfThreadsAndAfterItWasSaved) {
   std::uint64_t sums[3];
   for (int run = 0; run < 3; ++run) {
     Scene scene = block(Law::kFixedCorotated, 0.5);
     scene.gravity = Vec3(3, 0, -9.81);
     scene.bodies[0].anchors = {beyond(1, 0.03, true)};
     scene.threads = run == 0 ? 1 : 2;
-    auto tissue = std::make_unique<MpmTissue>(scene);
+    auto tissue = std::make_unique<TypeParam>(scene);
     const BladePath path = stroke(-0.01, 0.0173);
     tissue->advance(1.0 / 60, {{}, {&path, 1}});
     tissue->finish();
     if (run == 2) {
       const std::vector<std::uint8_t> saved = tissue->save();
-      tissue = std::make_unique<MpmTissue>(scene);
+      tissue = std::make_unique<TypeParam>(scene);
       tissue->restore(saved);
     }
     ASSERT_GT(tissue->state().front.cells.size(), 0u);
@@ -175,12 +182,15 @@ double beside_cut(Tissue& tissue, bool beyond, double cell_size) {
   return A.ldlt().solve(b)[0];
 }
 
-// Eight cells thick, cut from above 10 mm from its clamp to a place between cells and in them.
-TEST(Front, SagAndMouthOfACutCantilever) {
-  constexpr double kCell = 0.0025;
-  double before = 0, step = 0;
-  for (const double depth : {0.00875, 0.009375, 0.01, 0.010625, 0.01125}) {
-    Scene scene = cantilever_block(kCell, 0);
+constexpr double kCell = 0.0025;
+
+/// How far a cantilever, eight cells thick and cut from above 10 mm from its clamp, sags, and how
+/// far the cut gapes [m].
+struct CutCantilever {
+  double sag, mouth;
+  CutCantilever(Device device, double depth, double held = 0) {
+    Scene scene = cantilever_block(kCell, held);
+    scene.device = device;
     scene.gravity = Vec3(0, 0, -9.81 / 100);
     Simulation simulation(scene);
     BladePath path;
@@ -189,24 +199,55 @@ TEST(Front, SagAndMouthOfACutCantilever) {
       path.poses.push_back({Vec3(0, 0, z), Quat::Identity()});
     simulation.cut(path);
     EXPECT_TRUE(simulation.settle({3e-6, 6, 20}).at_rest) << depth;
-    const double sag =
+    sag =
         -surface_displacement(simulation.tissue(), 0, Vec3(0.03, 0, 0.02), 2, 0.002 + 1.5 * kCell);
+    mouth = beside_cut(simulation.tissue(), true, kCell) -
+            beside_cut(simulation.tissue(), false, kCell);
+  }
+};
+
+// Cut to a place between cells and in them.
+TEST(FrontOfACantilever, SagAndMouth) {
+  double before = 0, step = 0;
+  for (const double depth : {0.00875, 0.009375, 0.01, 0.010625, 0.01125}) {
+    const CutCantilever now(Device::kCpu, depth);
     if (before != 0) {  // no stairs
-      EXPECT_GT(sag - before, 1.1 * step) << depth;
-      EXPECT_LT(sag - before, step == 0 ? 1 : 1.6 * step) << depth;
-      step = sag - before;
+      EXPECT_GT(now.sag - before, 1.1 * step) << depth;
+      EXPECT_LT(now.sag - before, step == 0 ? 1 : 1.6 * step) << depth;
+      step = now.sag - before;
     }
-    before = sag;
+    before = now.sag;
     const char* name = depth == 0.00875 ? "8_75mm" : depth == 0.01 ? "10mm" : "11_25mm";
     if (depth != 0.00875 && depth != 0.01 && depth != 0.01125) continue;
-    const double mouth = beside_cut(simulation.tissue(), true, kCell) -
-                         beside_cut(simulation.tissue(), false, kCell);
     const std::string of = name;
-    EXPECT_NEAR(sag / reference(kData, "cut_cantilever", ("sag_" + of).c_str()), 1, 0.02) << depth;
-    EXPECT_NEAR(mouth / reference(kData, "cut_cantilever", ("mouth_" + of).c_str()), 1, 0.04)
+    EXPECT_NEAR(now.sag / reference(kData, "cut_cantilever", ("sag_" + of).c_str()), 1, 0.02)
+        << depth;
+    EXPECT_NEAR(now.mouth / reference(kData, "cut_cantilever", ("mouth_" + of).c_str()), 1, 0.04)
         << depth;
   }
 }
+
+#if defined(TISSUE_SIM_CUDA)
+// A GPU's anchors hold nodes, so that the clamp is half a cell off; what the cut adds is what it
+// adds on a CPU, without stairs.
+TEST(FrontOfACantilever, MouthAndSagOnAGpu) {
+  const std::string why = why_no_gpu();
+  if (!why.empty()) GTEST_SKIP() << why;
+  double mouth[2] = {}, sag[2] = {};  // on a GPU, on a CPU
+  for (const double depth : {0.00875, 0.009375, 0.01}) {
+    const CutCantilever gpu(Device::kCuda, depth, 2 * kCell), cpu(Device::kCpu, depth, 2 * kCell);
+    std::printf("%g mm: sag %.4f, mouth %.4f mm; on a CPU %.4f, %.4f\n", 1e3 * depth, 1e3 * gpu.sag,
+                1e3 * gpu.mouth, 1e3 * cpu.sag, 1e3 * cpu.mouth);
+    EXPECT_NEAR(gpu.mouth / cpu.mouth, 1, 0.1) << depth;
+    if (mouth[0] != 0) {
+      EXPECT_NEAR((gpu.mouth - mouth[0]) / (cpu.mouth - mouth[1]), 1, 0.3) << depth;
+      EXPECT_NEAR((gpu.sag - sag[0]) / (cpu.sag - sag[1]), 1, 0.3) << depth;
+    }
+    mouth[0] = gpu.mouth, mouth[1] = cpu.mouth;
+    sag[0] = gpu.sag, sag[1] = cpu.sag;
+  }
+}
+#endif
 
 }  // namespace
 }  // namespace tissue_sim

@@ -23,15 +23,14 @@ inline constexpr float kSoftness = 1.0f / 3;
 
 namespace stabilisation {
 
-/// Squared weight of A, d, B along one axis.
-inline constexpr float kWeight2[3] = {1.0f, 0.25f, 0.0625f};
 /// Kinds (0 A, 1 d, 2 B) along x and y of an XyQuantity.
 inline constexpr int kKinds[kXyCount][2] = {{0, 0}, {0, 1}, {0, 2}, {1, 0}, {1, 1},
                                             {1, 2}, {2, 0}, {2, 1}, {2, 2}};
 
-/// Squared weight of the number with these kinds along x, y and z; 0 for those of linear fields.
-inline constexpr float weight2(int x, int y, int z) {
-  return x + y + z <= 1 ? 0.0f : kWeight2[x] * kWeight2[y] * kWeight2[z];
+/// Squared weight of the number with these kinds along x, y and z (A 1, d 1/4, B 1/16 along each
+/// axis); 0 for those of linear fields.
+TISSUE_SIM_INLINE constexpr float weight2(int x, int y, int z) {
+  return x + y + z <= 1 ? 0.0f : 1.0f / static_cast<float>(1 << 2 * (x + y + z));
 }
 /// The same with an XyQuantity.
 inline constexpr float weight2(int k, int z) { return weight2(kKinds[k][0], kKinds[k][1], z); }

@@ -7,8 +7,6 @@
 namespace tissue_sim {
 namespace {
 
-constexpr float kFarOff = 0.2f;  // of the fastest one's speed counts for what is near no face
-
 /// Lists the contacts that may touch before the next look, and for each block those it is part of.
 void list_active(MpmState& s) {
   FaceContacts& faces = s.faces;
@@ -88,13 +86,8 @@ void look_at_due(MpmState& s, double dt, bool all) {
       },
       32);
   list_active(s);
-  float fastest = 0;
-  for (const float v : speed) fastest = std::max(fastest, v);
   for (std::size_t i = 0; i < due.size(); ++i) {
-    FaceContact& c = faces.all[due[i]];
-    // What is near no face is a cell away at least, ten times what may be moved between looks.
-    const float v = c.other < 0 ? kFarOff * fastest : speed[i];
-    c.look_at = s.time + look_horizon(v, s.scene.cell_size, dt);
+    faces.all[due[i]].look_at = s.time + look_horizon(speed[i], s.scene.cell_size, dt);
   }
   double next = s.time + kLongestLook * dt;
   for (const FaceContact& c : faces.all) next = std::min(next, c.look_at);

@@ -152,6 +152,7 @@ struct ContactFaces : ContactPlaces {
     }
   }
   static NearFacet nearest(const NearFacet& best) { return best; }
+  static float largest(float x) { return x; }
   void hold_in(std::int32_t f) const {
     contact.other_nodes = CellNodes(block_of(state, f), facet(f).cell);
     contact.other_has_whole_rows = has_whole_rows(contact.other_nodes);

@@ -68,7 +68,8 @@ struct alignas(16) FaceSpring {
 /// worked out in step, places.any(so) says whether it is so for any of them, and those that are not
 /// `active` come along. With places.slides_back() a place that slid too far comes back onto the
 /// cone: in a substep it may slide ten times as far as the spring on the cone is long, and a tenth
-/// too far there would be no friction.
+/// too far there would be no friction; and what pressed before lets go only where it parts, or the
+/// next look says so.
 template <class Places>
 TISSUE_SIM_INLINE void push_face(FaceSpring& c, float dt, Places& places, bool active = true) {
   float own[3], held[3];
@@ -87,6 +88,7 @@ TISSUE_SIM_INLINE void push_face(FaceSpring& c, float dt, Places& places, bool a
   // The place held slides along the face, so that the spring stays in the friction cone.
   constexpr float kOnCone = 1.02f;
   float aside[3], slip = 0;
+  const float before[3] = {c.hold[0], c.hold[1], c.hold[2]};
   float way[3] = {}, left[3];  // which way it slides, unit; what is left of it [m]
   for (int i = 0; i < 4; ++i) {
     for (int a = 0; a < 3; ++a) aside[a] = c.apart[a] + depth * c.normal[a];
@@ -120,6 +122,17 @@ TISSUE_SIM_INLINE void push_face(FaceSpring& c, float dt, Places& places, bool a
       depth = -dot(c.apart, c.normal);
       // Not what it looked like, or beyond what is left of the face.
       c.touching = depth > 0 && dot(c.apart, c.apart) <= length2 && c.holds();
+      if (places.slides_back() && touched && depth > 0 && !c.touching) {
+        c.hold_at(before);
+        places.hold(before);
+        places.held(held);
+        c.measure_apart(own, held);
+        depth = -dot(c.apart, c.normal);
+        for (int a = 0; a < 3; ++a) aside[a] = c.apart[a] + depth * c.normal[a];
+        slip = sqrtf(dot(aside, aside));
+        c.touching = depth > 0;
+        break;
+      }
     }
     const bool begins = slides && c.touching && !touched;
     if (places.any(begins)) {

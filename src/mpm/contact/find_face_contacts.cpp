@@ -142,6 +142,13 @@ bool search(MpmState& s, const Pieces& pieces) {
     if (one[i] == 0) pairs[left++] = pairs[i];
   }
   pairs.resize(left);
+  // What presses stays listed, also where it has turned the other face away.
+  for (const FaceContact& c : faces.all) {
+    if (c.other < 0 || !c.touching || piece[c.facet].id == piece[c.other].id) continue;
+    if (travel[c.facet] < 0 || travel[c.other] < 0) continue;
+    const std::pair<std::int32_t, std::int32_t> here = std::minmax(c.facet, c.other);
+    if (!std::binary_search(pairs.begin(), pairs.begin() + left, here)) pairs.push_back(here);
+  }
   const auto facet_touches = [&piece](std::int32_t a, std::int32_t b) {
     return touches(piece[a], piece[b]);
   };

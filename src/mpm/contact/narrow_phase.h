@@ -8,7 +8,7 @@
 //   cell_size(), per_cell()    the scene's, and every lattice's [m], [1/m]
 //   near(n)                    the facets near this one, by their place in its list
 //   for_each_near(visit)       calls visit(n, near(n), its motion's x), for this lane's share
-//   nearest(best)              the best of all lanes
+//   nearest(best), largest(x)  the best, the largest of all lanes
 //   hold_in(f), hold(place)    sets the cell and the place in it of the place held
 //   own(u), held(u)            displacements of the facet's centre and of the place held [m]
 //   own_mobility(), held_mobility()   of both: sum of w^2 / m [1/kg]
@@ -28,6 +28,9 @@ namespace tissue_sim {
 inline constexpr int kLongestLook = 16;            ///< substeps between two looks
 inline constexpr float kNearGap = 0.25f;           ///< up to which a contact is worked on [cells]
 inline constexpr float kMovedBetweenLooks = 0.1f;  ///< [cells]
+/// Share of its speed that counts for what is near no face: that is a cell away at least, ten times
+/// what may be moved between looks.
+inline constexpr float kFarOff = 0.2f;
 
 /// Time until the next look where the fastest pair moves at this speed [s].
 TISSUE_SIM_INLINE double look_horizon(float fastest, double cell_size, double dt) {
@@ -86,10 +89,25 @@ TISSUE_SIM_HOST_DEVICE inline Seen seen_by(const Faces& s, const FacetMotion& f,
   return seen;
 }
 
-/// The facet to touch among those near, -1 if none.
+/// How fast a facet gets deeper below another [cells/s].
 template <class Faces>
-TISSUE_SIM_HOST_DEVICE inline int choose_other(const Faces& s, const FaceSpring& c) {
-  const float deepest = c.touching ? fmaxf(kDeepest, c.depth + kDeeper) : kDeepest;
+TISSUE_SIM_HOST_DEVICE inline float closing_speed(const Faces& s, int facet, int other) {
+  const FacetMotion &f = s.motion(facet), &o = s.motion(other);
+  const float v[3] = {f.v[0] - o.v[0], f.v[1] - o.v[1], f.v[2] - o.v[2]};
+  return fmaxf(0.0f, -dot(v, o.normal)) * s.per_cell();
+}
+
+/// Whether a contact was in front of a face when it was looked at last.
+TISSUE_SIM_INLINE bool was_in_front(const FaceSpring& c) {
+  return c.other >= 0 && !c.touching && c.depth < 0;
+}
+
+/// The facet to touch among those near, -1 if none. What touches, or was in front, may have become
+/// deeper by `moved` [cells] since the last look.
+template <class Faces>
+TISSUE_SIM_HOST_DEVICE inline int choose_other(const Faces& s, const FaceSpring& c, float moved) {
+  const float deepest =
+      c.touching || was_in_front(c) ? fmaxf(kDeepest, c.depth + kDeeper + moved) : kDeepest;
   const FacetMotion& own = s.motion(c.facet);
   if (c.touching && c.other >= 0) {
     const Seen seen = seen_by(s, own, c.other);
@@ -107,6 +125,19 @@ TISSUE_SIM_HOST_DEVICE inline int choose_other(const Faces& s, const FaceSpring&
   });
   best = s.nearest(best);
   return best.at == INT_MAX ? -1 : s.near(best.at);
+}
+
+/// How fast a facet moves against the fastest of those near [m/s].
+template <class Faces>
+TISSUE_SIM_HOST_DEVICE inline float speed_against_near(const Faces& s, const FaceSpring& c) {
+  const float* own = s.motion(c.facet).v;
+  float most = 0;
+  s.for_each_near([&](int, int other, const float*) {
+    const float* v = s.motion(other).v;
+    const float d[3] = {own[0] - v[0], own[1] - v[1], own[2] - v[2]};
+    most = fmaxf(most, dot(d, d));
+  });
+  return sqrtf(s.largest(most));
 }
 
 template <class Faces>
@@ -249,16 +280,18 @@ TISSUE_SIM_HOST_DEVICE inline void settle(Faces& s, FaceSpring& c, float dt, flo
 }  // namespace looks
 
 /// Looks anew at a contact: which facet, its normal, and the place held. Returns how fast the two
-/// move against one another [m/s], 0 if there is none.
+/// move against one another as the next look has to know it: kFarOff of it if there is none [m/s].
 template <class Faces>
 TISSUE_SIM_HOST_DEVICE inline float look(Faces& s, FaceSpring& c, float dt, float since) {
   constexpr float kComes = 0.5f;  // substeps: from 0.8 on, pieces that spin gain energy
-  const int other = looks::choose_other(s, c), before = c.other;
-  const bool in_front = before >= 0 && !c.touching && c.depth < 0;
+  const int before = c.other;
+  const bool in_front = looks::was_in_front(c);
+  const float moved = before >= 0 ? since * looks::closing_speed(s, c.facet, before) : 0.0f;
+  const int other = looks::choose_other(s, c, moved);
   if (other < 0) {
     c.other = -1;
     c.touching = false;
-    return 0;
+    return kFarOff * looks::speed_against_near(s, c);
   }
   const FacetMotion &f = s.motion(c.facet), &o = s.motion(other);
   const looks::Seen seen = looks::seen_by(s, f, other);
@@ -274,16 +307,17 @@ TISSUE_SIM_HOST_DEVICE inline float look(Faces& s, FaceSpring& c, float dt, floa
     looks::begin(s, c, other, seen.place, dt);
   }
   const float v[3] = {f.v[0] - o.v[0], f.v[1] - o.v[1], f.v[2] - o.v[2]};
+  const float speed = sqrtf(dot(v, v));
   if (c.touching) {
     looks::settle(s, c, dt, since);
   } else {
-    const float came = in_front ? fmaxf(0.0f, -kComes * dt * dot(v, o.normal)) : 0.0f;
-    if (!looks::aim(s, c, seen, came * static_cast<float>(s.per_cell()))) {
+    const float came = in_front ? kComes * dt * looks::closing_speed(s, c.facet, other) : 0.0f;
+    if (!looks::aim(s, c, seen, came)) {
       c.other = -1;
-      return 0;
+      return kFarOff * speed;
     }
   }
-  return sqrtf(dot(v, v));
+  return speed;
 }
 
 /// Lets a contact go on from what it was before blocks were made anew, if it does.
@@ -292,7 +326,7 @@ TISSUE_SIM_HOST_DEVICE inline void take_up(Faces& s, FaceSpring& c, const KeptCo
                                            float dt) {
   c.touching = true;
   c.depth = kept.depth;
-  const int other = looks::choose_other(s, c);
+  const int other = looks::choose_other(s, c, 0);
   c.touching = false;
   if (other < 0 || s.body(other) != kept.other_body) return;
   c.stiffness = kept.stiffness;

@@ -237,6 +237,13 @@ struct LaneFaces : LanePlaces<kContactLanes, true> {
       }
     }
   }
+  __device__ __forceinline__ float largest(float x) const {
+#pragma unroll
+    for (int step = kContactLanes / 2; step > 0; step /= 2) {
+      x = fmaxf(x, __shfl_xor_sync(lanes.mask, x, step));
+    }
+    return x;
+  }
   /// The best of all lanes.
   __device__ __forceinline__ NearFacet nearest(NearFacet best) const {
 #pragma unroll

@@ -31,7 +31,9 @@ double CudaMpmTissue::measure_limit(int steps) {
   frame.arrived = d.arrived.data();
   // Between two parts of a frame nobody needs the state before a part, nor what contact pushes
   // with.
-  const std::size_t n = d.u[0].size();
+  const std::size_t n = d.entries();
+  d.checkpoint.u.resize(n);
+  d.checkpoint.v.resize(n);
   DeviceArray<float4> more;
   auto* fields = reinterpret_cast<float4*>(d.pushed.data());
   if (d.pushed.size() * sizeof(long long) < 3 * n * sizeof(float4)) {
@@ -42,15 +44,17 @@ double CudaMpmTissue::measure_limit(int steps) {
                           fields + 2 * n};
   std::copy(std::begin(room), std::end(room), d.motion_room.fields);
   CudaLinearisedMotion motion(
-      d.present(), d.nodes(1 - d.current), d.u[0].size(), state_->scene.cell_size,
+      d.present(), d.nodes(1 - d.current), n, state_->scene.cell_size,
       [&](const CudaNodes& from, const CudaNodes& to) {
         frame.state[0] = from;
         frame.state[1] = to;
+        launch_front_forces(d.front.view(), from, d.stream);
         if (d.all_plain) {
           launch_substeps(d.plain_plan, d.plain_tables(), frame, d.plain_resident, d.stream);
         } else {
           launch_substeps(d.plan, d.tables(), frame, d.resident, d.stream);
         }
+        launch_move_front(d.front.view(), frame.step, from, to, d.stream);
       },
       d.motion_room, d.stream);
   return 2 / std::sqrt(largest_eigenvalue(motion, steps));
@@ -64,6 +68,8 @@ void CudaMpmTissue::launch_measure() {
   tissue_sim::launch_measure(d.tables(), d.present(), d.plan.max_slots, d.measures.data(),
                              d.stream);
   d.measures.download(d.host_measures.data(), d.measures.size(), d.stream);
+  launch_front_energy(d.front.view(), d.present(), d.stream);
+  d.front.energy.download(d.front.host_energy.data(), d.front.energy.size(), d.stream);
 }
 
 void CudaMpmTissue::finish_measure() {
@@ -91,6 +97,10 @@ void CudaMpmTissue::finish_measure() {
     result_.blew_up = result_.blew_up || !(now <= 1e6f);
     state_->motion[d.host_tables.of_host[i]] = {
         {Vec3(m.min[0], m.min[1], m.min[2]), Vec3(m.max[0], m.max[1], m.max[2])}, m.speed};
+  }
+  const std::size_t cells = d.front.cells.size();
+  for (std::size_t i = 0; i < d.front.energy.size(); ++i) {
+    (i < cells ? result_.elastic_energy : result_.kinetic_energy) += d.front.host_energy[i];
   }
   // Nothing that instruments do moves tissue at the speed of a bullet; what does is out of control.
   result_.blew_up = result_.blew_up || !(result_.max_speed < 300);

@@ -112,8 +112,18 @@ void CudaMpmTissue::push_points(const std::vector<std::int32_t>& changed) {
                        d.soft.size() > 0 ? d.soft.data() : nullptr, d.stream);
 }
 
-bool CudaMpmTissue::take_apart(const std::vector<std::int32_t>& changed) {
+bool CudaMpmTissue::take_apart(const std::vector<std::int32_t>& changed,
+                               const std::vector<std::int32_t>& touched) {
   OnDevice& d = *device_;
+  pull_front();
+  if (!touched.empty()) {
+    follow_front(*state_, touched);
+    list_front_cells(*state_);
+  }
+  if (changed.empty()) {
+    push_front();
+    return false;
+  }
   make_room_for_cuts();
   std::vector<std::int32_t> nodes = nodes_around(changed);
   pull_some(nodes);
@@ -124,6 +134,7 @@ bool CudaMpmTissue::take_apart(const std::vector<std::int32_t>& changed) {
                                              [&] { may_part = may_have_parted(*state_, changed); });
   for (auto n = known; n < static_cast<std::int32_t>(state_->nodes.size()); ++n) nodes.push_back(n);
   push_some(nodes);
+  push_front();
   push_points(changed);
   push_points(apart.softened);
   if (apart.new_blocks || d.host_tables.number.empty()) push_tables();
@@ -154,16 +165,17 @@ std::vector<int> CudaMpmTissue::label_pieces() {
 
 void CudaMpmTissue::cut(const std::vector<BladePath>& paths, const float4* u_before,
                         CutReport& report) {
-  std::vector<std::int32_t> changed;
+  std::vector<std::int32_t> changed, touched;
   read_places(u_before);
   for (const BladePath& path : paths) {
     std::vector<std::int32_t> by_this;
     tissue_sim::break_bonds(*state_, {sweep(path, u_before != nullptr)}, by_this, report);
     push_points(by_this);  // for the next
+    if (state_->front.follows) pass_rim(path, u_before != nullptr, by_this, touched);
     changed.insert(changed.end(), by_this.begin(), by_this.end());
   }
-  if (changed.empty()) return;
-  if (take_apart(changed)) report.new_fragments = label_pieces();
+  if (changed.empty() && touched.empty()) return;
+  if (take_apart(changed, touched)) report.new_fragments = label_pieces();
   launch_measure();
   finish_measure();
 }

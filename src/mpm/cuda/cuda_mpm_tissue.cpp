@@ -21,6 +21,7 @@ std::unique_ptr<MpmState> make_state(const Scene& scene, std::vector<std::string
   state->scene = scene;
   state->bodies = make_lattice_bodies(scene, state->points, notes, NodeRange::kBox);
   state->whole_bonds = state->points.bonds;
+  state->front.follows = scene.mpm.boundary == MpmBoundary::kSurface;
   state->fields = std::make_unique<NodeFields>(state->bodies, state->points, state->nodes);
   state->instructions = instruction_set();
   state->kernels = &block_kernels(state->instructions);
@@ -211,6 +212,10 @@ void CudaMpmTissue::advance(int substeps, float dt, const FrameInput& input) {
 
 void CudaMpmTissue::launch(int begin, int end, float dt) {
   OnDevice& d = *device_;
+  if (d.front.node_count > 0 && end - begin > 1) {  // its cells push between substeps
+    for (int i = begin; i < end; ++i) launch(i, i + 1, dt);
+    return;
+  }
   measured_ = false;
   const Scene& scene = state_->scene;
   const std::size_t collider_count = d.host_reach.size();
@@ -233,6 +238,7 @@ void CudaMpmTissue::launch(int begin, int end, float dt) {
   frame.cell_size = static_cast<float>(scene.cell_size);
   frame.arrived = d.arrived.data();
   frame.faces = faces_of_launch();
+  launch_front_forces(d.front.view(), d.present(), d.stream);
   if (frame.faces != nullptr || d.may_meet) {
     d.pushed.resize(3 * kPushStride * d.u[0].size());
     d.pushed.clear(d.stream);
@@ -249,6 +255,7 @@ void CudaMpmTissue::launch(int begin, int end, float dt) {
   } else {
     launch_substeps(d.plan, d.tables(), frame, d.resident, d.stream);
   }
+  launch_move_front(d.front.view(), frame.step, d.present(), d.nodes(1 - d.current), d.stream);
   d.current = (d.current + end - begin) % 2;
   state_->time += static_cast<double>(end - begin) * dt;
   state_->dt = dt;

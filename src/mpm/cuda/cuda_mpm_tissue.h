@@ -21,6 +21,7 @@ namespace tissue_sim {
 struct CudaFaces;
 struct CudaShape;
 struct CudaLooks;
+struct CudaNodes;
 struct CudaReach;
 struct FacesOnHost;
 struct StateOnHost;
@@ -99,7 +100,11 @@ class CudaMpmTissue final : public Tissue {
   std::vector<BrokenBond> sweep(const BladePath& path, bool moves);
   /// What follows where points lost bonds; contacts come down and wait for the next search. Returns
   /// whether pieces may have come apart.
-  bool take_apart(const std::vector<std::int32_t>& changed);
+  bool take_apart(const std::vector<std::int32_t>& changed,
+                  const std::vector<std::int32_t>& touched = {});
+  /// As that of mpm/split/front.h.
+  void pass_rim(const BladePath& path, bool moves, const std::vector<std::int32_t>& broken,
+                std::vector<std::int32_t>& touched);
   std::vector<int> label_pieces();  ///< after bonds broke; returns the new ids
   void cut_by_blades();
   void keep_place_for_blades();
@@ -145,8 +150,12 @@ class CudaMpmTissue final : public Tissue {
   void push_points(const std::vector<std::int32_t>& changed);  ///< their bonds, whether soft
   /// The nodes that a cut of these points may change, or looks at.
   std::vector<std::int32_t> nodes_around(const std::vector<std::int32_t>& points) const;
+  /// First u and mass of all of these, then v and inverse mass: they stay until the next call.
+  const float4* gather(const CudaNodes& from, const std::vector<std::int32_t>& nodes);
   void pull_some(const std::vector<std::int32_t>& nodes);
   void push_some(const std::vector<std::int32_t>& nodes);
+  void pull_front();  ///< how far parted nodes are apart; the host has the same ones
+  void push_front();  ///< the front that the host has, behind the nodes, all of which are there
   void pull_contacts();
   void launch_measure();
   void finish_measure();

@@ -18,11 +18,12 @@ void CudaMpmTissue::pull() {
 void CudaMpmTissue::pull_nodes() {
   pull_field(device_->present().u, state_->nodes.u);
   pull_field(device_->present().v, state_->nodes.v);
+  pull_front();
 }
 
 void CudaMpmTissue::pull_field(const float4* from, Array<float>* to) {
   OnDevice& d = *device_;
-  const std::size_t n = d.u[0].size();
+  const std::size_t n = state_->nodes.size();
   d.host_nodes.resize(2 * n);
   check_cuda(cudaMemcpyAsync(d.host_nodes.data(), from, n * sizeof(float4), cudaMemcpyDeviceToHost,
                              d.stream),
@@ -42,6 +43,7 @@ void CudaMpmTissue::push_nodes() {
   d.u[1 - d.current].copy(d.u[d.current], d.stream);
   d.v[1 - d.current].copy(d.v[d.current], d.stream);
   check_cuda(cudaStreamSynchronize(d.stream), "receive data");
+  push_front();
 }
 
 std::vector<std::int32_t> CudaMpmTissue::nodes_around(
@@ -84,21 +86,26 @@ std::vector<std::int32_t> CudaMpmTissue::nodes_around(
   return nodes;
 }
 
-void CudaMpmTissue::pull_some(const std::vector<std::int32_t>& nodes) {
+const float4* CudaMpmTissue::gather(const CudaNodes& from, const std::vector<std::int32_t>& nodes) {
   OnDevice& d = *device_;
   const std::size_t count = nodes.size();
   d.some_nodes.upload(nodes, d.stream);
   d.packed.resize(2 * count);
-  launch_gather(d.present(), d.some_nodes.data(), static_cast<int>(count), d.packed.data(),
-                d.stream);
+  launch_gather(from, d.some_nodes.data(), static_cast<int>(count), d.packed.data(), d.stream);
   d.host_nodes.resize(2 * count);
   d.packed.download(d.host_nodes.data(), 2 * count, d.stream);
   check_cuda(cudaStreamSynchronize(d.stream), "send data");
+  return d.host_nodes.data();
+}
+
+void CudaMpmTissue::pull_some(const std::vector<std::int32_t>& nodes) {
+  const std::size_t count = nodes.size();
+  const float4* packed = gather(device_->present(), nodes);
   Nodes& n = state_->nodes;
   state_->cpu->for_each(
       static_cast<int>(count),
       [&](int i) {
-        const float4 &u = d.host_nodes[i], &v = d.host_nodes[count + i];
+        const float4 &u = packed[i], &v = packed[count + i];
         const std::int32_t k = nodes[i];
         n.u[0][k] = u.x, n.u[1][k] = u.y, n.u[2][k] = u.z;
         n.v[0][k] = v.x, n.v[1][k] = v.y, n.v[2][k] = v.z;

@@ -54,6 +54,7 @@ void CudaMpmTissue::each_field(Archive& archive, StateOnHost& of_device) {
   OnDevice& d = *device_;
   FaceContacts& faces = state_->faces;
   tissue_fields(archive, *state_);
+  fields(archive, state_->front);
   archive.part("facets", faces.version, faces.first_facet, faces.block_of);
   archive.part("kept contacts", faces.kept, faces.until_search, faces.fastest);
   archive.part("pieces", pieces_, pieces_measured_);
@@ -190,6 +191,7 @@ void CudaMpmTissue::restore(Span<const std::uint8_t> saved) {
   faces.all.clear();
   faces.forget_active();
   index_flights(*state_);
+  list_front_cells(*state_);
   push();
   std::vector<std::uint8_t> with(d.with.size(), 0);
   std::vector<float> hold(d.hold.size(), 0.0f);

@@ -12,6 +12,7 @@
 #include "mpm/cuda/cuda_mpm_tissue.h"
 #include "mpm/cuda/faces_on_device.h"
 #include "mpm/cuda/frame_ends.h"
+#include "mpm/cuda/front_cells.h"
 #include "mpm/cuda/held_points.h"
 #include "mpm/cuda/label_pieces.h"
 #include "mpm/cuda/make_tables.h"
@@ -88,6 +89,7 @@ struct CudaMpmTissue::OnDevice {
   PinnedArray<int> host_stretched_count, host_unforeseen;
   DeviceArray<Point> cloud;
   FacesOnDevice faces;
+  FrontOnDevice front;
   SweepOnDevice sweep;
   PieceLabels labels;
   CudaMotionRoom motion_room;
@@ -158,6 +160,8 @@ struct CudaMpmTissue::OnDevice {
   }
   /// Those for plain_plan.
   CudaTables plain_tables() const { return stacks.of(tables()); }
+  /// Nodes, and parted ones behind them.
+  std::size_t entries() const { return u[0].size(); }
   /// How far from the points of a cell its surface may be [cells].
   double surface_reach() const { return outer.size() > 0 ? 0.5 : 0; }
   CudaNodes nodes(int which) const { return {u[which].data(), v[which].data()}; }

@@ -18,8 +18,9 @@ struct CellView {
   std::vector<FrontPart> parts;
   Law law;
   std::array<std::int32_t, 8> point;
-  double volume[2] = {};  ///< of those with the same nodes, of these
-  double viscosity = 0;   ///< times volumes [J s]
+  double volume = 0;     ///< of these [m^3]
+  double viscosity = 0;  ///< times volumes [J s]
+  double of_block = 0;   ///< the same times the volume that the block damps them with [J s m^3]
   int count = 0;
 };
 
@@ -35,7 +36,11 @@ std::vector<CellView> views_of(const MpmState& s,
                                const std::map<std::int32_t, std::int32_t>& parted,
                                const LatticeBody& body, int x, int y, int z) {
   std::vector<CellView> views;
-  std::map<std::array<std::int32_t, 27>, double> of_nodes;
+  // A block damps its points in a cell together; a GPU has one for each material.
+  std::map<std::pair<std::array<std::int32_t, 27>, int>, double> damped;
+  const auto in_block = [&s](const CellView& view, std::int32_t point) {
+    return std::make_pair(view.node, s.blocks.uniform ? s.points.material_of(point) : 0);
+  };
   for (int p = 0; p < 8; ++p) {
     const int place[3] = {2 * x + (p & 1), 2 * y + (p >> 1 & 1), 2 * z + (p >> 2)};
     const std::int32_t point = body.point(place[0], place[1], place[2]);
@@ -54,7 +59,7 @@ std::vector<CellView> views_of(const MpmState& s,
       const bool first = (n.first_side[plane] >> bit & 1) != 0;
       view.parts.push_back({found->second, k, first ? -n.other : n.first, n.share, 0});
     }
-    of_nodes[view.node] += volume;
+    damped[in_block(view, point)] += volume;
     if (view.parts.empty()) continue;
     const Material& material = body.material_of(s.points, point);
     view.law = material.law;
@@ -66,11 +71,17 @@ std::vector<CellView> views_of(const MpmState& s,
       same = views.insert(same, view);
     }
     same->point[p] = point;
-    same->volume[1] += volume;
+    same->volume += volume;
     same->viscosity += material.viscosity * volume;
     ++same->count;
   }
-  for (CellView& view : views) view.volume[0] = of_nodes[view.node];
+  for (CellView& view : views) {
+    for (const std::int32_t point : view.point) {
+      if (point < 0) continue;
+      view.of_block += body.material_of(s.points, point).viscosity *
+                       elastic_volume(s.points, point) * damped[in_block(view, point)];
+    }
+  }
   return views;
 }
 
@@ -94,9 +105,8 @@ void add_front_cell(MpmState& s, const LatticeBody& body, std::int32_t number, C
     mu_sum += cell.mu[p];
   }
   const double size = body.cell_size * body.cell_size * body.cell_size;
-  for (int i = 0; i < 2; ++i) {
-    cell.viscosity[i] = static_cast<float>(view.viscosity * view.volume[i] / size);
-  }
+  cell.viscosity[0] = static_cast<float>(view.of_block / size);
+  cell.viscosity[1] = static_cast<float>(view.viscosity * view.volume / size);
   cell.stabilised = view.count < kSteadyCount ? static_cast<float>(kStabilisation * mu_sum) : 0.0f;
   cell.inverse_size = static_cast<float>(1 / body.cell_size);
   cell.law = view.law;

@@ -1,0 +1,102 @@
+// The front of a cut of tissue that lives on a GPU: the host says which nodes are parted and which
+// cells see them, as on the CPU; how far they are apart lives with the nodes.
+#include <algorithm>
+
+#include "mpm/cuda/on_device.h"
+#include "mpm/split/front.h"
+
+namespace tissue_sim {
+
+void CudaMpmTissue::pull_front() {
+  OnDevice& d = *device_;
+  const auto first = static_cast<std::size_t>(d.front.first_node),
+             count = static_cast<std::size_t>(d.front.node_count);
+  if (count == 0) return;
+  d.host_nodes.resize(2 * count);
+  const auto bring = [&](const float4* from, float4* to) {
+    check_cuda(
+        cudaMemcpyAsync(to, from + first, count * sizeof(float4), cudaMemcpyDeviceToHost, d.stream),
+        "send data");
+  };
+  bring(d.present().u, d.host_nodes.data());
+  bring(d.present().v, d.host_nodes.data() + count);
+  check_cuda(cudaStreamSynchronize(d.stream), "send data");
+  Front& front = state_->front;
+  for (std::size_t i = 0; i < count; ++i) {
+    const float4 &u = d.host_nodes[i], &v = d.host_nodes[count + i];
+    front.d[0][i] = u.x, front.d[1][i] = u.y, front.d[2][i] = u.z;
+    front.rate[0][i] = v.x, front.rate[1][i] = v.y, front.rate[2][i] = v.z;
+  }
+}
+
+void CudaMpmTissue::push_front() {
+  OnDevice& d = *device_;
+  FrontOnDevice& to = d.front;
+  const Front& front = state_->front;
+  const std::size_t first = state_->nodes.size(), count = front.nodes.size();
+  to.first_node = static_cast<int>(first);
+  to.node_count = static_cast<int>(count);
+  to.first_parted = static_cast<int>(front.node_sums.size());
+  std::vector<CudaFrontSum> sums;
+  std::vector<std::int32_t> places;
+  for (const Front::Sum& s : front.node_sums) sums.push_back({s.node, s.first, s.count});
+  const auto of_nodes = static_cast<std::int32_t>(front.node_places.size());
+  for (const Front::Sum& s : front.part_sums) {
+    sums.push_back({to.first_node + s.node, of_nodes + s.first, s.count});
+  }
+  for (const auto* list : {&front.node_places, &front.part_places}) {
+    for (const std::int32_t place : *list) places.push_back(place / 4);
+  }
+  d.host_nodes.resize(2 * count);
+  for (std::size_t i = 0; i < count; ++i) {
+    const float mass = front.nodes[i].mass;
+    d.host_nodes[i] = {front.d[0][i], front.d[1][i], front.d[2][i], mass};
+    d.host_nodes[count + i] = {front.rate[0][i], front.rate[1][i], front.rate[2][i], 1 / mass};
+  }
+  for (int i = 0; i < 2; ++i) {
+    const auto send = [&](DeviceArray<float4>& field, const float4* from) {
+      field.extend(first + count, d.stream);
+      if (count == 0) return;
+      check_cuda(cudaMemcpyAsync(field.data() + first, from, count * sizeof(float4),
+                                 cudaMemcpyHostToDevice, d.stream),
+                 "receive data");
+    };
+    send(d.u[i], d.host_nodes.data());
+    send(d.v[i], d.host_nodes.data() + count);
+  }
+  to.cells.upload(front.cells, d.stream);
+  to.parts.upload(front.parts, d.stream);
+  to.sums.upload(sums, d.stream);
+  to.places.upload(places, d.stream);
+  to.force.resize(kFrontForce / 4 * front.cells.size());
+  to.pull.resize(front.parts.size());
+  to.energy.resize(front.cells.size() + count);
+  to.host_energy.resize(to.energy.size());
+  check_cuda(cudaStreamSynchronize(d.stream), "receive data");
+}
+
+void CudaMpmTissue::pass_rim(const BladePath& path, bool moves,
+                             const std::vector<std::int32_t>& broken,
+                             std::vector<std::int32_t>& touched) {
+  std::vector<std::int32_t> points = broken;
+  for (const auto& [bond, passed] : state_->front.rim) {
+    points.push_back(static_cast<std::int32_t>(bond / 3));
+  }
+  if (points.empty()) return;
+  const std::vector<std::int32_t> nodes = nodes_around(points);
+  const Array<float>*end = state_->nodes.u, *begin = end;
+  if (moves) {
+    float4* u_before = device_->u_before.data();
+    Array<float>* before = state_->work.u_before;
+    for (int a = 0; a < 3; ++a) before[a].assign(state_->nodes.size(), 0.0f);
+    const float4* u = gather({u_before, u_before}, nodes);
+    for (std::size_t i = 0; i < nodes.size(); ++i) {
+      before[0][nodes[i]] = u[i].x, before[1][nodes[i]] = u[i].y, before[2][nodes[i]] = u[i].z;
+    }
+    begin = before;
+  }
+  pull_some(nodes);
+  tissue_sim::pass_rim(*state_, path, begin, end, broken, touched);
+}
+
+}  // namespace tissue_sim

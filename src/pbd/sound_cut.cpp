@@ -142,7 +142,8 @@ class SoundCut {
     std::set<std::int32_t> bad;
     const std::map<std::int32_t, Piece> now = measure(s_, linked);
     std::map<std::int32_t, double> gained;  // volume of each [m^3]
-    for (const auto& [root, p] : now) gained[piece_of(p.vertex)] += std::max(0.0, p.six_volumes / 6);
+    for (const auto& [root, p] : now)
+      gained[piece_of(p.vertex)] += std::max(0.0, p.six_volumes / 6);
     for (const auto& [root, p] : now) {
       const std::int32_t of = piece_of(p.vertex);
       if (open_.count(of) == 0) continue;
@@ -166,7 +167,8 @@ class SoundCut {
       const int body = s_.vertices.body[was.vertex];
       const double all = s_.volume_of_body[body], over = excess[body] - all;
       if (!is_closed_body(was) || std::fabs(over) < SoundMesh::kVolumeError * all) continue;
-      if (open_.count(of) != 0 && over * volume > 0 && std::fabs(volume) > 1e-6 * all) bad.insert(of);
+      if (open_.count(of) != 0 && over * volume > 0 && std::fabs(volume) > 1e-6 * all)
+        bad.insert(of);
     }
     return bad;
   }

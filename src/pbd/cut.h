@@ -19,9 +19,10 @@ inline Vec3 place_before(const State& s, const Array<float>& before, std::int32_
 /// Cuts along a blade's path, while vertices move from `before` to where they are. `stroke` is the
 /// same for all that one blade does. Appends to `origin` the vertex that each new one came from.
 /// Returns whether anything changed; masses (after_cut), constraints and colours (after_cuts) are
-/// to be made anew then.
+/// to be made anew then. `whole`: of each vertex, whether its piece is not cut; none: all are.
 bool cut_surface(State& s, const BladePath& path, const Array<float>& before, int stroke,
-                 std::vector<std::int32_t>& origin, CutReport& report);
+                 std::vector<std::int32_t>& origin, CutReport& report,
+                 const std::vector<std::uint8_t>* whole = nullptr);
 /// `smooth`: vertices move onto the blade's surface first; not for a path that goes on, for in
 /// tissue that is strained what moves there may step across the edge.
 bool cut_tetrahedra(State& s, const BladePath& path, const Array<float>& before, bool smooth,

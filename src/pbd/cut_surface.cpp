@@ -18,10 +18,10 @@ class SurfaceCut {
              std::vector<std::int32_t>& origin)
       : s_(s), before_(before), parts_(parts), origin_(origin) {}
 
-  int remove_internal() {
+  int remove_internal(const std::vector<std::uint8_t>* whole) {
     std::vector<InternalPair> kept;
     for (const InternalPair& p : s_.internal) {
-      if (!is_passed(p)) {
+      if ((whole != nullptr && (*whole)[p.a] != 0) || !is_passed(p)) {
         kept.push_back(p);
         continue;
       }
@@ -166,11 +166,12 @@ int copy_vertex(State& s, int of, std::vector<std::int32_t>& origin) {
 }
 
 bool cut_surface(State& s, const BladePath& path, const Array<float>& before, int stroke,
-                 std::vector<std::int32_t>& origin, CutReport& report) {
+                 std::vector<std::int32_t>& origin, CutReport& report,
+                 const std::vector<std::uint8_t>* whole) {
   const std::vector<SweepPart> parts = sweep_parts(path);
   SurfaceCut cut(s, before, parts, origin);
-  const int internal = cut.remove_internal();
-  SurfaceTrace trace(s, before, stroke, parts, origin);
+  const int internal = cut.remove_internal(whole);
+  SurfaceTrace trace(s, before, stroke, parts, origin, whole);
   trace.run();
   cut.part_vertices(trace.fresh());
   s.fronts.back().clear();  // a whole path does not go on

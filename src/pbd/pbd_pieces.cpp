@@ -98,8 +98,8 @@ std::vector<double> piece_volumes(const State& s, const Pieces& pieces) {
   for (int id = 0; id < pieces.next_id; ++id) {
     if (is_closed(id)) {
       columns[id] = skins[id].six_volumes / 6;
-    } else if (columns[id] > 0 && left[body[id]] > 0) {  // what the closed ones leave
-      columns[id] *= left[body[id]] / open[body[id]];
+    } else if (columns[id] > 0) {  // what the closed ones leave
+      columns[id] *= std::max(0.0, left[body[id]]) / open[body[id]];
     }
   }
   return columns;

@@ -8,6 +8,8 @@
 #include "pbd/find_touches.h"
 #include "pbd/free_flight.h"
 #include "pbd/model.h"
+#include "pbd/sound_cut.h"
+#include "pbd/viscosity.h"
 #include "tissue_sim/limits.h"
 #include "tools/frame_colliders.h"
 #include "tools/tool_motion.h"
@@ -30,11 +32,15 @@ bool PbdTissue::cut(const BladePath& path, int stroke, const Array<float>& befor
   pbd::State& s = *state_;
   std::vector<std::int32_t> origin;
   const bool is_whole = stroke >= static_cast<int>(s.scene.tools.size());  // no instrument's
-  const bool changed = s.tetrahedra.empty()
-                           ? pbd::cut_surface(s, path, before, stroke, origin, report)
-                           : pbd::cut_tetrahedra(s, path, before, is_whole, origin, report);
-  if (!changed) return false;
-  pbd::after_cut(s, origin);
+  if (s.tetrahedra.empty() && is_whole) {
+    if (!pbd::cut_soundly(s, path, before, stroke, origin, report)) return false;
+  } else {
+    const bool changed = s.tetrahedra.empty()
+                             ? pbd::cut_surface(s, path, before, stroke, origin, report)
+                             : pbd::cut_tetrahedra(s, path, before, is_whole, origin, report);
+    if (!changed) return false;
+    pbd::after_cut(s, origin);
+  }
   for (const int id : pbd::update_pieces(s, origin, pieces_)) report.new_fragments.push_back(id);
   return true;
 }
@@ -98,6 +104,7 @@ void PbdTissue::run_steps(const FrameColliders& colliders, int steps, float h) {
     colliders.add_loads(share, s.colliders.data(), loads.data(), 1.0 / steps, result_.loads);
   }
   pbd::keep_momentum(s, flights, steps, h);
+  pbd::damp_neighbours(s, steps * h);
 }
 
 PbdTissue::Figures PbdTissue::measure() {

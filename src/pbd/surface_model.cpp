@@ -248,10 +248,13 @@ int add_internal_links(State& s, int b, const std::vector<int>& starts) {
   }
   std::map<std::pair<std::int32_t, std::int32_t>, InternalPair> pairs;
   for (const InternalPair& p : s.internal) pairs[{p.a, p.b}] = p;
+  const double least = 0.1 * s.mean_edge;
   for (const InternalLink& link : found) {
     s.half_depth[link.from] = 0.5 * link.length;
     if (link.through_gap || edges.count(pair_key(link.from, link.to)) != 0) continue;
     if (is_parted(s, link)) continue;
+    // Lips of a wound lie on one another; what joins them there has no way to point.
+    if ((s.vertices.reference[link.from] - s.vertices.reference[link.to]).norm() < least) continue;
     const std::int32_t low = std::min(link.from, link.to), high = std::max(link.from, link.to);
     InternalPair& pair =
         pairs.try_emplace({low, high}, InternalPair{low, high, 0, late}).first->second;

@@ -55,7 +55,8 @@ bool first_meeting(const SweepPart& part, const MovingSegment& link, double begi
 
 /// Triangles that a sweep may meet, and their neighbours.
 std::vector<int> near(const State& s, const Array<float>& before,
-                      const std::vector<SweepPart>& parts) {
+                      const std::vector<SweepPart>& parts,
+                      const std::vector<std::uint8_t>* whole) {
   Box box;
   for (const SweepPart& p : parts) {
     box.min = box.min.cwiseMin(p.box.min);
@@ -63,6 +64,7 @@ std::vector<int> near(const State& s, const Array<float>& before,
   }
   std::vector<std::uint8_t> is_near(s.vertices.size(), 0);
   for (const Triangle& t : s.triangles) {
+    if (whole != nullptr && (*whole)[t[0]] != 0) continue;
     Box own;
     for (const std::int32_t v : t) {
       for (const Vec3& x : {place_before(s, before, v), s.vertices.position(v)}) {
@@ -97,14 +99,15 @@ Vec3 to_reference(const State& s, int t, const Vec3& normal) {
 }  // namespace
 
 SurfaceTrace::SurfaceTrace(State& s, const Array<float>& before, int stroke,
-                           const std::vector<SweepPart>& parts, std::vector<std::int32_t>& origin)
+                           const std::vector<SweepPart>& parts, std::vector<std::int32_t>& origin,
+                           const std::vector<std::uint8_t>* whole)
     : s_(s),
       before_(before),
       stroke_(stroke),
       old_count_(s.vertices.size()),
       parts_(parts),
       origin_(origin),
-      edges_(s, near(s, before, parts)) {}
+      edges_(s, near(s, before, parts, whole)) {}
 
 Vec3 SurfaceTrace::at_before(std::int32_t v) const {
   return v < old_count_ ? place_before(s_, before_, v) : before_of_new_[v - old_count_];

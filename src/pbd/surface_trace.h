@@ -21,7 +21,8 @@ namespace pbd {
 class SurfaceTrace {
  public:
   SurfaceTrace(State& s, const Array<float>& before, int stroke,
-               const std::vector<SweepPart>& parts, std::vector<std::int32_t>& origin);
+               const std::vector<SweepPart>& parts, std::vector<std::int32_t>& origin,
+               const std::vector<std::uint8_t>* whole);
   void run();
 
   /// Edges that were cut now.

@@ -214,24 +214,35 @@ TEST_P(CutMeshes, AScalpelThatStopsAndGoesOnPartsInTwo) {
   EXPECT_NEAR(whole_volume(simulation.tissue()) / volume, 1, 0.01);
 }
 
-TEST_P(CutMeshes, CutsAtRandomNeitherBlowUpNorMakeSlivers) {
-  Simulation simulation(lobe(GetParam()));
+/// A number of an environment's variable, for runs that are longer than a test's.
+double asked(const char* name, double otherwise) {
+  const char* text = std::getenv(name);
+  return text != nullptr ? std::atof(text) : otherwise;
+}
+
+// TISSUE_SIM_CUTS, TISSUE_SIM_CELL [m] and TISSUE_SIM_SEED ask for other runs.
+TEST_P(CutMeshes, CutsAtRandomNeitherBlowUpNorLeakNorMakeSlivers) {
+  const bool is_surface = GetParam() == PbdModel::kSurface;
+  Scene scene = lobe(GetParam());
+  scene.cell_size = asked("TISSUE_SIM_CELL", scene.cell_size);
+  Simulation simulation(scene);
   auto& tissue = static_cast<PbdTissue&>(simulation.tissue());
   const double volume = whole_volume(tissue), mass = tissue.momentum().mass;
-  std::mt19937 random(4);
+  std::mt19937 random(static_cast<unsigned>(asked("TISSUE_SIM_SEED", 4)));
   std::uniform_real_distribution<double> at(-1, 1);
-  int cuts = GetParam() == PbdModel::kSurface ? 100 : 40;  // surfaces shook from some 80 on
-  if (const char* asked = std::getenv("TISSUE_SIM_CUTS")) cuts = std::atoi(asked);
+  const int cuts = static_cast<int>(asked("TISSUE_SIM_CUTS", is_surface ? 100 : 40));
   double fastest = 0;
+  int nothing = 0;
   const auto told = [&] {
     const Thinnest least = thinnest(tissue.state());
     const Leaks open = leaks(tissue.state());
     std::printf(
-        "   %zu pieces, %d vertices, volume %.4f, smallest edge %.2e m, angle %.2f degrees, "
-        "fastest "
-        "%.1e m/s; with a hole: %d pieces, %.5f of the volume\n",
+        "   %zu pieces, %d vertices, volume %.4f, smallest edge %.3f of the mean, angle %.2f "
+        "degrees, fastest %.1e m/s; %d cuts did nothing; with a hole: %d pieces, %.5f of the "
+        "volume\n",
         tissue.fragments().size(), tissue.state().vertices.size(), whole_volume(tissue) / volume,
-        least.edge, least.angle * 57.29578, fastest, open.pieces, open.volume / volume);
+        least.edge / tissue.state().mean_edge, least.angle * 57.29578, fastest, nothing,
+        open.pieces, open.volume / volume);
     std::fflush(stdout);
     return least;
   };
@@ -242,23 +253,21 @@ TEST_P(CutMeshes, CutsAtRandomNeitherBlowUpNorMakeSlivers) {
     simulation.cut(stroke(-edge, edge, {from, from + way}));
     const FrameResult r = simulation.advance_frame().result;
     ASSERT_FALSE(r.blew_up) << "cut " << i;
+    nothing += r.cut_reports[0].bonds_broken == 0 ? 1 : 0;
     fastest = std::max(fastest, r.max_speed);
-    if ((i + 1) % 100 == 0) told();
-    EXPECT_LT(r.max_speed, 0.01) << "cut " << i;  // read: 5e-4 of surfaces, 8e-4 of tetrahedra
+    if ((i + 1) % 100 == 0 && i + 1 < cuts) {
+      told();
+      fastest = 0;
+    }
+    // Further on crumbs that come off fly at some centimetres a second.
+    EXPECT_LT(r.max_speed, i < 100 ? 0.01 : 1.0) << "cut " << i;
   }
   const Thinnest least = told();
-  const Leaks open = leaks(tissue.state());
   EXPECT_NEAR(whole_volume(tissue) / volume, 1, 0.01);
   EXPECT_NEAR(tissue.momentum().mass / mass, 1, 1e-6);
   EXPECT_GT(least.edge, 0.1 * tissue.state().mean_edge);
-  EXPECT_LT(open.volume / volume, 0.01);
-  constexpr double kLeastAngle = 2.8, kByRings = 0.57;  // [degrees]
-  EXPECT_GT(least.angle * 57.29578, kByRings);
-  if (GetParam() == PbdModel::kSurface && least.angle * 57.29578 <= kLeastAngle) {
-    GTEST_SKIP() << "the smallest angle is " << least.angle * 57.29578 << " degrees, for "
-                 << kLeastAngle << ": wounds that nothing better closes are closed by rings";
-  }
-  EXPECT_GT(least.angle * 57.29578, kLeastAngle);
+  EXPECT_LT(leaks(tissue.state()).volume / volume, 0.01);
+  EXPECT_GT(least.angle * 57.29578, 2.8);
 }
 
 TEST_P(CutMeshes, AreTheSameBitsWithAnyNumberOfThreadsAndAfterRestoring) {

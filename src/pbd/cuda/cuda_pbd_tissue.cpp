@@ -5,6 +5,7 @@
 
 #include "pbd/cuda/on_device.h"
 #include "pbd/find_touches.h"
+#include "pbd/viscosity.h"
 
 namespace tissue_sim {
 namespace {
@@ -215,6 +216,11 @@ void CudaPbdTissue::run_steps(const FrameColliders& colliders, int steps, float 
   d.wait("advance");
   take_loads(colliders, steps);
   if (chunks > 0) keep_momentum(steps, h);
+  if (state_->tetrahedra.empty() && !state_->wounds.empty()) {
+    pull();
+    pbd::damp_neighbours(*state_, steps * h);
+    push();
+  }
 }
 
 void CudaPbdTissue::take_loads(const FrameColliders& colliders, int steps) {

@@ -55,8 +55,7 @@ bool first_meeting(const SweepPart& part, const MovingSegment& link, double begi
 
 /// Triangles that a sweep may meet, and their neighbours.
 std::vector<int> near(const State& s, const Array<float>& before,
-                      const std::vector<SweepPart>& parts,
-                      const std::vector<std::uint8_t>* whole) {
+                      const std::vector<SweepPart>& parts, const std::vector<std::uint8_t>* whole) {
   Box box;
   for (const SweepPart& p : parts) {
     box.min = box.min.cwiseMin(p.box.min);

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <utility>
 
 #include "cutting/blade_sweep.h"
 #include "tissue_sim/limits.h"
@@ -59,13 +60,13 @@ struct Parallelogram {
 };
 
 /// Whether a link that stays where it is passes through: 1 it does, 0 it does not, -1 so near to
-/// the rim that edge_passes() has to say.
-int passes_through(const Parallelogram& p, const MovingSegment& link) {
+/// the rim that edge_passes() has to say; at `t` of the link.
+int passes_through(const Parallelogram& p, const MovingSegment& link, double& t) {
   constexpr double kNear = 1e-6, kSteep = 1e-3;
   const Vec3 d = link.b0 - link.a0, x = link.a0 - p.corner;
   const double slope = d.dot(p.normal), height = x.dot(p.normal);
   if (!(slope * slope > kSteep * kSteep * d.squaredNorm())) return -1;
-  const double t = -height / slope;
+  t = -height / slope;
   const Vec3 at = x + t * d;
   const double place[3] = {t, p.along.dot(at), p.across.dot(at)};
   bool within = true;
@@ -135,15 +136,19 @@ struct SweepOfEdge {
   Parallelogram flat;
 };
 
-bool passes(const Sweep& w, const SweepOfEdge& sweep, std::int32_t i, std::int32_t j) {
+/// At `t` of the way from i to j.
+bool passes(const Sweep& w, const SweepOfEdge& sweep, std::int32_t i, std::int32_t j, double& t) {
   const SweptEdge& edge = sweep.edge;
   MovingSegment link = link_of(w, i, j);
   if (w.is_still() && sweep.flat.is) {
-    const int passes = passes_through(sweep.flat, link);
+    const int passes = passes_through(sweep.flat, link, t);
     if (passes >= 0) return passes != 0;
   }
   link = link.during(sweep.begin, sweep.end);
-  return !stays_aside(edge, link) && edge_passes(edge, link);
+  MeetingOf<Vec3> meeting;
+  if (stays_aside(edge, link) || !edge_passes(edge, link, &meeting)) return false;
+  t = meeting.place;
+  return true;
 }
 
 /// Whether any of eight nodes and the eight others have no side in common, whose sides are below
@@ -156,13 +161,30 @@ bool any_astride(const std::uint8_t* sides, const std::uint8_t* others) {
   return (((a & b) + kOnes) & ~kOnes) != ~kOnes;
 }
 
+struct Crossed {
+  std::vector<std::int32_t> entries;
+  std::vector<float> places;
+
+  void add(std::int32_t entry, double place) {
+    entries.push_back(entry);
+    places.push_back(static_cast<float>(place));
+  }
+  void add(Crossed& other) {
+    entries.insert(entries.end(), other.entries.begin(), other.entries.end());
+    places.insert(places.end(), other.places.begin(), other.places.end());
+    other.entries.clear();
+    other.places.clear();
+  }
+};
+
 /// Of pairs of the chunk's nodes with later ones.
 void search_chunk(const Sweep& w, const SweepOfEdge& sweep, const Sides& sides, int chunk,
-                  std::vector<std::int32_t>& found) {
+                  Crossed& found) {
   const MlsPairs& p = w.s.pairs;
   const MlsLanes& lanes = w.s.lanes;
   const std::int32_t first = chunk * kMlsChunk, last = std::min(w.s.count(), first + kMlsChunk);
   const MlsSlots& slots = lanes.of_chunk[chunk];
+  double t = 0;
   for (std::int32_t slot = slots.first; slot < slots.end; ++slot) {
     const std::int32_t other = lanes.first[slot];
     if (other <= first) continue;
@@ -172,9 +194,9 @@ void search_chunk(const Sweep& w, const SweepOfEdge& sweep, const Sides& sides, 
         if ((*sides.at(first + l) & *sides.at(other + l)) != 0) continue;
         const std::int32_t i = first + l, j = other + l;
         if (i >= last || j >= w.s.count()) continue;
-        if (!passes(w, sweep, i, j)) continue;
+        if (!passes(w, sweep, i, j, t)) continue;
         const std::int32_t e = p.find(i, j);  // rows end within a slot: they may be no pair
-        if (e >= 0 && p.crossed[e] == 0) found.push_back(e);
+        if (e >= 0 && p.crossed[e] == 0) found.add(e, t);
       }
     }
   }
@@ -184,7 +206,7 @@ void search_chunk(const Sweep& w, const SweepOfEdge& sweep, const Sides& sides, 
     for (std::int32_t e = p.begin[i]; e < p.begin[i + 1]; ++e) {
       const std::int32_t j = p.other[e];
       if (j < i || (own & *sides.at(j)) != 0 || p.crossed[e] != 0) continue;
-      if (passes(w, sweep, i, j)) found.push_back(e);
+      if (passes(w, sweep, i, j, t)) found.add(e, t);
     }
   }
 }
@@ -192,13 +214,14 @@ void search_chunk(const Sweep& w, const SweepOfEdge& sweep, const Sides& sides, 
 }  // namespace
 
 std::vector<std::int32_t> find_crossed(const MlsState& s, const BladePath& path,
-                                       const float* u_begin, const float* u_end) {
+                                       const float* u_begin, const float* u_end,
+                                       std::vector<float>* places) {
   const Sweep w{s, u_begin, u_end};
   const int chunks = s.chunks(), blocks = (chunks + kChunksAtATime - 1) / kChunksAtATime;
   Sides sides(chunks);
   std::vector<std::uint8_t> common(blocks);  // sides on which all of a block stay
-  std::vector<std::vector<std::int32_t>> of_block(blocks);
-  std::vector<std::int32_t> found;
+  std::vector<Crossed> of_block(blocks);
+  Crossed found;
   for (const SweepPart& part : sweep_parts(path)) {
     stop_if_asked();
     for (const SweptEdge& edge : part.edges) {
@@ -221,13 +244,11 @@ std::vector<std::int32_t> find_crossed(const MlsState& s, const BladePath& path,
           search_chunk(w, sweep, sides, chunk, of_block[block]);
         }
       });
-      for (std::vector<std::int32_t>& some : of_block) {
-        found.insert(found.end(), some.begin(), some.end());
-        some.clear();
-      }
+      for (Crossed& some : of_block) found.add(some);
     }
   }
-  return found;
+  if (places != nullptr) *places = std::move(found.places);
+  return std::move(found.entries);
 }
 
 }  // namespace tissue_sim

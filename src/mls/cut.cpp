@@ -4,6 +4,7 @@
 #include <cstring>
 
 #include "mls/crossing.h"
+#include "mls/faces.h"
 
 namespace tissue_sim {
 namespace {
@@ -62,7 +63,7 @@ std::vector<std::int32_t> marked(const std::vector<std::uint8_t>& marks) {
 }  // namespace
 
 std::vector<std::int32_t> mark_crossed(MlsState& s, const std::vector<std::int32_t>& entries,
-                                       CutReport& report) {
+                                       const std::vector<float>& places, CutReport& report) {
   MlsPairs& p = s.pairs;
   std::vector<std::uint8_t> is_touched(s.count(), 0);
   std::vector<std::int32_t> twins(entries.size());
@@ -74,7 +75,9 @@ std::vector<std::int32_t> mark_crossed(MlsState& s, const std::vector<std::int32
   for (std::size_t k = 0; k < entries.size(); ++k) {
     const std::int32_t e = entries[k], twin = twins[k];
     if (p.crossed[e] != 0) continue;
-    p.crossed[e] = p.crossed[twin] = 1;
+    const float place = places.empty() ? 0.5f : places[k];
+    p.crossed[e] = mark_of_crossing(place);
+    p.crossed[twin] = mark_of_crossing(1 - place);
     ++report.bonds_broken;
     is_touched[p.other[e]] = is_touched[p.other[twin]] = 1;
   }
@@ -113,6 +116,7 @@ std::vector<std::int32_t> weaken(MlsState& s, const std::vector<std::int32_t>& t
         fallen[block].push_back(j);
       }
       neighbours.clear(i);
+      remake_face(s, i);
     }
   });
   // Those beside a cut have less that bears strain, even where all weights are left.
@@ -127,14 +131,18 @@ std::vector<std::int32_t> weaken(MlsState& s, const std::vector<std::int32_t>& t
 
 void cross_entries(MlsState& s, const std::vector<std::int32_t>& entries,
                    std::vector<std::int32_t>& changed, CutReport& report) {
-  const std::vector<std::int32_t> touched = mark_crossed(s, entries, report);
+  const std::vector<std::int32_t> touched = mark_crossed(s, entries, {}, report);
   changed.insert(changed.end(), touched.begin(), touched.end());
   weaken(s, touched);
 }
 
 void cross_pairs(MlsState& s, const BladePath& path, const float* u_begin, const float* u_end,
                  std::vector<std::int32_t>& changed, CutReport& report) {
-  cross_entries(s, find_crossed(s, path, u_begin, u_end), changed, report);
+  std::vector<float> places;
+  const std::vector<std::int32_t> crossed = find_crossed(s, path, u_begin, u_end, &places);
+  const std::vector<std::int32_t> touched = mark_crossed(s, crossed, places, report);
+  changed.insert(changed.end(), touched.begin(), touched.end());
+  weaken(s, touched);
 }
 
 }  // namespace tissue_sim

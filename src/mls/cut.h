@@ -22,9 +22,10 @@ void cross_pairs(MlsState& state, const BladePath& path, const float* u_begin, c
                  std::vector<std::int32_t>& changed, CutReport& report);
 
 /// What cross_pairs() does in two steps. First the pairs, given by one of their entries each, are
-/// marked as crossed; returns the nodes that lost one, by number.
+/// marked as crossed, at these places (find_crossed(); in the middle where there are none); returns
+/// the nodes that lost one, by number.
 std::vector<std::int32_t> mark_crossed(MlsState& state, const std::vector<std::int32_t>& entries,
-                                       CutReport& report);
+                                       const std::vector<float>& places, CutReport& report);
 /// Then weights, moments and springs around these are made anew; returns the nodes of which they
 /// are. What tells pieces apart it neither reads nor changes.
 std::vector<std::int32_t> weaken(MlsState& state, const std::vector<std::int32_t>& touched);

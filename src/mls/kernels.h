@@ -44,6 +44,10 @@ struct MlsField {
   /// M_i^-1 - kappa_i H_i. The fourth of the first column is kappa_i.
   float* stress;
   bool viscous;
+  /// Where tissue may touch tissue: which chunks have nodes that may, and of those the deformation
+  /// gradients by components, kMlsChunk each.
+  const std::uint8_t* touching = nullptr;
+  float* deformation = nullptr;
 };
 
 /// What a chunk's nodes show.

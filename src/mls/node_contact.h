@@ -17,9 +17,7 @@ inline ContactSpring node_spring(const MlsState& state, std::int32_t i) {
 /// Before each substep: finds the nodes that may touch anew where any of them moved by half of what
 /// the list was made wider, or nothing was looked for. How soon that may be is bounded by their
 /// speed, so that most calls cost nothing. Those that may: of different pieces, or across a cut, or
-/// far apart in their piece; `piece` is of each node. Two that are found keep the distance below
-/// which they push: one edge, or less where they were nearer when they were found, so that a fresh
-/// cut is free of stress. Returns whether it looked.
+/// far apart in their piece; `piece` is of each node. Returns whether it looked.
 bool update_node_contacts(MlsState& state, const std::vector<std::int32_t>& piece, float dt);
 
 /// Lets the next update look for them whatever they moved: pieces or cuts changed.
@@ -28,9 +26,20 @@ inline void search_node_contacts(MlsState& state) {
   state.node_contacts.until_look = 0;
 }
 
-/// Adds to force[3] on node i what those that touch it push: springs of both nodes in series and
-/// dampers along the line between them, which only push. The same for both nodes but for the sign,
-/// so momentum and angular momentum stay.
-void add_node_contact(const MlsState& state, std::int32_t i, float* force);
+/// Numbers those that may touch, after begin, other and slip came from elsewhere.
+void number_node_contacts(MlsState& state);
+
+/// After the stresses, of the k-th node that may touch others: its face as it is deformed, then
+/// what pushes it (mls/face_contact.h), of which the part that turns goes into its stress.
+void find_contact_face(MlsState& state, int k);
+void push_node(MlsState& state, int k);
+
+/// Adds to force[3] on node i what those that touch it push. The same for both nodes but for the
+/// sign, so momentum stays; with what push_node() left in the stress angular momentum does, too.
+inline void add_node_contact(const MlsState& state, std::int32_t i, float* force) {
+  const std::int32_t k = state.node_contacts.at[i];
+  if (k < 0) return;
+  for (int a = 0; a < 3; ++a) force[a] += state.node_contacts.force[4 * k + a];
+}
 
 }  // namespace tissue_sim

@@ -32,9 +32,12 @@ std::uint8_t number_of(std::vector<Material>& materials, const Material& m) {
 }
 
 /// How far below the surface a node lies [m]; less than 0 above it, as nodes at curved ones may.
-float depth_of(const NearestSurface& surface, const Vec3& x, const Vec3& middle, double spacing) {
+/// And which way the surface looks there.
+float depth_of(const NearestSurface& surface, const Vec3& x, const Vec3& middle, double spacing,
+               Vec3& normal) {
   SurfacePoint nearest;
   if (!surface.find(x, x - middle, nearest)) return static_cast<float>(0.5 * spacing);
+  normal = nearest.normal;
   return static_cast<float>((nearest.place - x).dot(nearest.normal));
 }
 
@@ -78,9 +81,11 @@ MlsNodes make_mls_nodes(const Scene& scene, std::vector<std::string>* notes) {
       nodes.volume.push_back(static_cast<float>(n.volume));
       nodes.body.push_back(static_cast<std::int16_t>(b));
       nodes.surface.push_back(n.surface ? 1 : 0);
-      nodes.depth.push_back(n.surface && surface != nullptr
-                                ? depth_of(*surface, n.place, body.pose.position, spacing)
-                                : 0.0f);
+      nodes.normal.emplace_back(Vec3::Zero());
+      nodes.depth.push_back(
+          n.surface && surface != nullptr
+              ? depth_of(*surface, n.place, body.pose.position, spacing, nodes.normal.back())
+              : 0.0f);
       const int inclusion = last_that_holds(
           body.inclusions, n.place, [](const Inclusion& i) -> const Region& { return i.region; });
       nodes.material.push_back(inclusion < 0 ? own : number[inclusion]);

@@ -23,6 +23,7 @@ struct MlsNodes {
   std::vector<std::int16_t> anchor;    ///< that holds it, in the order of the scene; -1: none
   std::vector<std::uint8_t> surface;   ///< its share reaches the surface of the body
   std::vector<float> depth;            ///< of those at the surface, below it; 0 of all others [m]
+  std::vector<Vec3> normal;            ///< of the surface there, outward; 0 where unknown
   std::vector<Material> materials;     ///< of all bodies and inclusions
   std::vector<NearGaps> gaps;          ///< of each body
 

@@ -11,20 +11,29 @@
 namespace tissue_sim {
 
 /// Each pair stands twice, once with each of its nodes: entries begin[i] .. begin[i + 1] - 1 are
-/// those of node i, by rising neighbour. What both entries of a pair hold is the same.
+/// those of node i, by rising neighbour. Both entries of a pair have the same weights.
 struct MlsPairs {
-  Array<std::int32_t> begin;    ///< per node, and one more
-  Array<std::int32_t> other;    ///< the neighbour
-  Array<std::int32_t> twin;     ///< the pair's entry with the neighbour
-  Array<float> whole;           ///< weight while nothing is cut, in units of the mean
-  Array<float> weight;          ///< the same times what cuts leave of it, 1 to 0
-  Array<std::uint8_t> crossed;  ///< whether a cut passes between the two
+  Array<std::int32_t> begin;  ///< per node, and one more
+  Array<std::int32_t> other;  ///< the neighbour
+  Array<std::int32_t> twin;   ///< the pair's entry with the neighbour
+  Array<float> whole;         ///< weight while nothing is cut, in units of the mean
+  Array<float> weight;        ///< the same times what cuts leave of it, 1 to 0
+  /// 0, or where a cut passes between the two, as mark_of_crossing() says. Of the two entries of a
+  /// pair each has it from its own node.
+  Array<std::uint8_t> crossed;
   std::vector<double> support;  ///< radius of each node's kernel [m]
 
   std::int32_t nodes() const { return static_cast<std::int32_t>(begin.size()) - 1; }
   /// Entry of the pair, -1 where they are no neighbours.
   std::int32_t find(std::int32_t node, std::int32_t neighbour) const;
 };
+
+/// What MlsPairs::crossed holds of a pair that a cut passes at this share of the way from the
+/// entry's node to the other, and back.
+inline std::uint8_t mark_of_crossing(float share) {
+  return static_cast<std::uint8_t>(1.5f + 254 * (share > 0 ? (share < 1 ? share : 1.0f) : 0.0f));
+}
+inline double crossing_place(std::uint8_t mark) { return (mark - 1) / 254.0; }
 
 /// Radius of the support over the mean distance to the six nearest, so that a node within a regular
 /// lattice has as many neighbours.

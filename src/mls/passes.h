@@ -111,6 +111,12 @@ TISSUE_SIM_INLINE void stresses(const MlsField& f, int chunk) {
     Vec<W> H[9], F[9], P[9], Q[9];
     gradients<W>(f, node, moments, lane, H);
     for (int k = 0; k < 9; ++k) F[k] = k % 4 == 0 ? H[k] + 1.0f : H[k];
+    if (f.touching != nullptr && f.touching[chunk] != 0) {
+      for (int k = 0; k < 9; ++k) {
+        store<W>(f.deformation + (9 * static_cast<std::size_t>(chunk) + k) * kMlsChunk + lane,
+                 F[k]);
+      }
+    }
     stress_of<W>(f, node, F, P);
     if (f.viscous) {
       Vec<W> rate[9];

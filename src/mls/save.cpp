@@ -5,6 +5,8 @@
 
 #include "compute/archive.h"
 #include "frame/state_fields.h"
+#include "mls/faces.h"
+#include "mls/node_contact.h"
 #include "mls/own_rate.h"
 #include "mls/tissue.h"
 
@@ -21,8 +23,13 @@ void fields(Archive& archive, MlsGroupContact& c) {
 }
 
 template <class Archive>
+void fields(Archive& archive, MlsSlip& s) {
+  archive(s.low, s.high, s.apart, s.gap, s.begun);
+}
+
+template <class Archive>
 void fields(Archive& archive, MlsNodeContacts& c) {
-  archive(c.begin, c.other, c.rest, c.u_found, c.skin, c.until_look);
+  archive(c.begin, c.other, c.slip, c.u_found, c.skin, c.until_look);
 }
 
 template <class Archive>
@@ -61,7 +68,9 @@ void MlsTissue::restore(Span<const std::uint8_t> saved) {
     const bool exposed = s.outer[i] != 0 && s.nodes.surface[i] == 0;
     s.place[4 * i + 3] = exposed ? 0.5f * s.edge[i] : s.nodes.depth[i];
     put_strained_volume(s, i, strained_volume(s, i));
+    remake_face(s, i);
   }
+  number_node_contacts(s);
   if (in.left() > 0) throw std::runtime_error("the state has more to it than this version knows");
 }
 

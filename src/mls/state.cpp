@@ -6,6 +6,7 @@
 
 #include "frame/leapfrog.h"
 #include "mls/contact.h"
+#include "mls/faces.h"
 #include "mls/node_contact.h"
 #include "mls/own_rate.h"
 
@@ -134,12 +135,13 @@ std::unique_ptr<MlsState> make_mls_state(const Scene& scene, std::vector<std::st
   const Array<float> kernel = s.pairs.whole;
   if (scene.mls.basis == MlsBasis::kBalanced) balance(s.nodes, *s.cpu, s.pairs);
   const int n = s.count();
-  for (Array<float>* a : {&s.place, &s.u, &s.v, &s.u_next, &s.v_next}) resize_padded(*a, n, 4);
+  for (Array<float>* a : {&s.place, &s.u, &s.v, &s.u_next, &s.v_next, &s.face})
+    resize_padded(*a, n, 4);
   for (Array<float>* a :
        {&s.mass, &s.inv_mass, &s.volume_mu, &s.volume_lambda, &s.volume_eta, &s.kappa,
-        &s.whole_kappa, &s.edge, &s.contact_stiffness, &s.contact_damping, &s.inverse_moment[0],
-        &s.inverse_moment[1], &s.inverse_moment[2], &s.inverse_moment[3], &s.inverse_moment[4],
-        &s.inverse_moment[5]}) {
+        &s.whole_kappa, &s.edge, &s.root_friction, &s.contact_stiffness, &s.contact_damping,
+        &s.inverse_moment[0], &s.inverse_moment[1], &s.inverse_moment[2], &s.inverse_moment[3],
+        &s.inverse_moment[4], &s.inverse_moment[5]}) {
     resize_padded(*a, n, 1);
   }
   resize_padded(s.stress, n, 16);
@@ -167,6 +169,7 @@ std::unique_ptr<MlsState> make_mls_state(const Scene& scene, std::vector<std::st
     s.contact_stiffness[i] = spring.stiffness;
     s.contact_damping[i] = spring.damping;
     s.outer[i] = s.nodes.surface[i];
+    s.root_friction[i] = static_cast<float>(std::sqrt(m.friction));
     s.whole_kappa[i] = whole_kappa(s, i);
     all[i] = i;
   }
@@ -189,6 +192,8 @@ std::unique_ptr<MlsState> make_mls_state(const Scene& scene, std::vector<std::st
     for (std::int32_t i = 0; i < n; ++i) s.whole_kappa[i] = whole_kappa(s, i);
     remake(s, all);
   }
+  s.cpu->for_each(
+      n, [&](int i) { remake_face(s, i); }, 256);
   return state;
 }
 
@@ -243,7 +248,12 @@ MlsField field_of(const MlsState& s, const float* u, const float* v) {
 }
 
 float substep(MlsState& s, float dt, std::vector<ColliderLoad>& loads) {
-  const MlsField field = field_of(s);
+  MlsField field = field_of(s);
+  const bool touches = !s.node_contacts.node.empty();
+  if (touches) {
+    field.touching = s.node_contacts.in_chunk.data();
+    field.deformation = s.deformation.data();
+  }
   const bool list = is_list_due(s);
   const float kick = kick_of(s.dt, dt);
   const auto keep = static_cast<float>(std::exp(-s.scene.damping * kick));
@@ -259,7 +269,7 @@ float substep(MlsState& s, float dt, std::vector<ColliderLoad>& loads) {
       if (s.any_sprung[i / kMlsChunk] != 0) {
         add_springs(s, s.u.data(), i, force + 4 * (i - first));
       }
-      if (!s.node_contacts.begin.empty()) add_node_contact(s, i, force + 4 * (i - first));
+      if (touches) add_node_contact(s, i, force + 4 * (i - first));
     }
     if (list) list_near(s, group, dt);
     add_contact(s, group, force);
@@ -276,10 +286,18 @@ float substep(MlsState& s, float dt, std::vector<ColliderLoad>& loads) {
       store<4>(&s.u_next[4 * i], u);
     }
   };
-  SharedWork stresses(s.chunks(), 4), moves(s.groups(), 1);
+  const int touching = static_cast<int>(s.node_contacts.node.size());
+  SharedWork stresses(s.chunks(), 4), faces(touching, 16), touches_of(touching, 16),
+      moves(s.groups(), 1);
   s.cpu->on_each_thread([&] {
     stresses.help([&](int chunk) { s.kernels->stresses(field, chunk); });
     stresses.wait();
+    if (touches) {
+      faces.help([&](int k) { find_contact_face(s, k); });
+      faces.wait();
+      touches_of.help([&](int k) { push_node(s, k); });
+      touches_of.wait();
+    }
     moves.help(move_group);
   });
   s.u.swap(s.u_next);

@@ -10,6 +10,7 @@
 #include "compute/for_each.h"
 #include "compute/simd.h"
 #include "mls/anchors.h"
+#include "mls/face_contact.h"
 #include "mls/kernels.h"
 #include "mls/lanes.h"
 #include "mls/nodes.h"
@@ -38,15 +39,24 @@ struct MlsGroupContact {
   std::vector<ColliderLoad> loads;  ///< of the last substep, per collider; empty for none
 };
 
-/// Nodes that may touch one another until they are looked for anew; each pair stands twice.
+/// Nodes that may touch one another until they are looked for anew; each pair stands twice, and
+/// both hold the same.
 struct MlsNodeContacts {
   std::vector<std::int32_t> begin;  ///< per node, and one more; empty where nothing was looked for
   std::vector<std::int32_t> other;
-  std::vector<float> rest;  ///< distance below which they push [m]
+  std::vector<MlsSlip> slip;
   std::vector<float>
       u_found;              ///< displacements of the nodes at the search that may touch, by number
   std::vector<float> skin;  ///< how far each may move until they are looked for anew [m]
   int until_look = 0;       ///< substeps until it is seen how far they moved
+
+  // Of the nodes that any others may touch.
+  std::vector<std::int32_t> node;
+  std::vector<std::int32_t> at;  ///< of each node where it is among those, -1
+  std::vector<MlsKnowsFace> knows;
+  std::vector<std::uint8_t> in_chunk;  ///< whether a chunk has any
+  std::vector<MlsContactFace> face;    ///< as of the present substep
+  Array<float> force;                  ///< what pushes it, 4 each [N]
 };
 
 struct MlsState {
@@ -66,6 +76,9 @@ struct MlsState {
   Array<float> kappa, whole_kappa;                    ///< of the pair penalty, now and uncut
   Array<std::uint8_t> neo_hookean;                    ///< law of each node
   Array<float> stress;                                ///< see MlsField
+  Array<float> deformation;                           ///< the same; empty until tissue may touch
+  Array<float> face;                                  ///< mls/faces.h
+  Array<float> root_friction;                         ///< of tissue on tissue
   Array<float> edge;                                  ///< distance to its neighbours [m]
   Array<float> contact_stiffness, contact_damping;    ///< node_spring() [N/m], [N s/m]
   Array<std::uint8_t> outer;                          ///< at the surface, or a cut passes beside it

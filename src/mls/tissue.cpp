@@ -60,11 +60,12 @@ void MlsTissue::part(UnionFind linked, CutReport& report) {
   }
 }
 
-void MlsTissue::break_pairs(const std::vector<std::int32_t>& entries, CutReport& report) {
+void MlsTissue::break_pairs(const std::vector<std::int32_t>& entries,
+                            const std::vector<float>& places, CutReport& report) {
   // Of so many pairs some have surely lost all: pieces are looked for meanwhile.
   constexpr std::size_t kMany = 1000;
   MlsState& s = *state_;
-  const std::vector<std::int32_t> changed = mark_crossed(s, entries, report);
+  const std::vector<std::int32_t> changed = mark_crossed(s, entries, places, report);
   if (changed.empty()) return;
   std::optional<UnionFind> linked;
   std::vector<std::int32_t> remade;
@@ -86,7 +87,10 @@ void MlsTissue::break_pairs(const std::vector<std::int32_t>& entries, CutReport&
 
 void MlsTissue::cut(const BladePath& path, const float* u_begin, CutReport& report) {
   pull();
-  break_pairs(find_crossed(*state_, path, u_begin, state_->u.data()), report);
+  std::vector<float> places;
+  const std::vector<std::int32_t> crossed =
+      find_crossed(*state_, path, u_begin, state_->u.data(), &places);
+  break_pairs(crossed, places, report);
 }
 
 void MlsTissue::forget(const std::vector<std::int32_t>& changed) {
@@ -201,7 +205,7 @@ void MlsTissue::break_bonds(double share) {
     frame.u_before = s.u;
     frame.cut_to = share;
   }
-  if (!tearing.empty()) break_pairs(tearing, result_.tear_report);
+  if (!tearing.empty()) break_pairs(tearing, {}, result_.tear_report);
 }
 
 MlsTissue::Figures MlsTissue::measure() {
@@ -276,7 +280,7 @@ int MlsTissue::read_points(const PointSelection& selection, std::vector<std::uin
           const Vec3 x = s.position(i);
           int crossed = 0;
           for (std::int32_t e = s.pairs.begin[i]; e < s.pairs.begin[i + 1]; ++e) {
-            crossed += s.pairs.crossed[e];
+            crossed += s.pairs.crossed[e] != 0 ? 1 : 0;
           }
           Point out;
           out.x = static_cast<float>(x[0]);

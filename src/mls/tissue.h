@@ -95,8 +95,9 @@ class MlsTissue : public Tissue {
   };
 
   void cut(const BladePath& path, const float* u_begin, CutReport& report);
-  /// Crosses the pairs of these entries, with all that follows.
-  void break_pairs(const std::vector<std::int32_t>& entries, CutReport& report);
+  /// Crosses the pairs of these entries at these places (find_crossed()), with all that follows.
+  void break_pairs(const std::vector<std::int32_t>& entries, const std::vector<float>& places,
+                   CutReport& report);
   /// What a cut or a tear makes void that took pairs from these nodes.
   void forget(const std::vector<std::int32_t>& changed);
   /// Pieces anew, after these nodes lost pairs.

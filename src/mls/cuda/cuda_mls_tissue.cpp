@@ -122,6 +122,14 @@ void CudaMlsTissue::upload_pairs() {
   d.kappa.upload(s.kappa.data(), n, d.stream);
   d.outer.upload(s.outer.data(), n, d.stream);
   upload(s.place, n, d.place, d.stream);  // cuts move where tissue ends
+  std::vector<CudaMlsFace> faces(n);
+  for (int i = 0; i < n; ++i) {
+    std::copy_n(&s.face[4 * i], 4, faces[i].face);
+    faces[i].spring = node_spring(s, i);
+    faces[i].edge = s.edge[i];
+    faces[i].root_friction = s.root_friction[i];
+  }
+  d.faces.upload(faces, d.stream);
   d.wait("receive data");
 }
 
@@ -149,6 +157,7 @@ void CudaMlsTissue::pairs_changed(const std::vector<std::int32_t>& nodes) {
     c.volume_eta = s.volume_eta[i];
     c.kappa = s.kappa[i];
     c.outside = s.place[4 * i + 3];
+    std::copy_n(&s.face[4 * i], 4, c.face);
     c.outer = s.outer[i];
     changes.push_back(c);
     for (std::int32_t e = s.pairs.begin[i]; e < s.pairs.begin[i + 1]; ++e) {
@@ -159,8 +168,9 @@ void CudaMlsTissue::pairs_changed(const std::vector<std::int32_t>& nodes) {
   }
   d.node_changes.upload(changes, d.stream);
   d.entry_changes.upload(entries, d.stream);
-  launch_mls_changes(d.field(), d.node_changes.data(), static_cast<int>(changes.size()),
-                     d.entry_changes.data(), static_cast<int>(entries.size()), d.stream);
+  launch_mls_changes(d.field(), d.faces.data(), d.node_changes.data(),
+                     static_cast<int>(changes.size()), d.entry_changes.data(),
+                     static_cast<int>(entries.size()), d.stream);
   d.wait("receive data");
 }
 
@@ -230,16 +240,30 @@ void CudaMlsTissue::search_contacts(float dt) {
     return;
   }
   pull();
+  pull_slips();
   if (update_node_contacts(*state_, pieces_.of_point, dt)) push_node_contacts();
+}
+
+void CudaMlsTissue::pull_slips() {
+  OnDevice& d = *device_;
+  if (d.touching_count == 0) return;
+  d.contact_slip.download(state_->node_contacts.slip.data(), d.contact_slip.size(), d.stream);
+  d.wait("send data");
 }
 
 void CudaMlsTissue::push_node_contacts() {
   OnDevice& d = *device_;
   const MlsNodeContacts& contacts = state_->node_contacts;
+  d.touching_count = static_cast<int>(contacts.node.size());
+  if (d.touching_count == 0) return;
+  d.contact_node.upload(contacts.node, d.stream);
+  d.contact_at.upload(contacts.at, d.stream);
+  d.contact_knows.upload(contacts.knows, d.stream);
   d.contact_begin.upload(contacts.begin, d.stream);
   d.contact_other.upload(contacts.other, d.stream);
-  d.contact_rest.upload(contacts.rest, d.stream);
-  d.may_touch = !contacts.other.empty();
+  d.contact_slip.upload(contacts.slip, d.stream);
+  d.contact_face.resize(d.touching_count);
+  d.contact_force.resize(d.touching_count);
   d.wait("receive data");
 }
 
@@ -294,10 +318,7 @@ double CudaMlsTissue::run_part(const FramePart& part) {
     const CudaMlsColliders colliders{
         d.colliders.data() + first, d.collider_count, near,
         d.touching.data(),          d.hold.data(),    d.loads.data() + kMlsLoadSums * first};
-    CudaMlsNodeContacts contacts;
-    if (may_touch_ && d.may_touch) {
-      contacts = {d.contact_begin.data(), d.contact_other.data(), d.contact_rest.data()};
-    }
+    const CudaMlsNodeContacts contacts = d.contacts(s.dt);
     CudaMlsHold hold;
     if (d.held_impulse.size() > 0) {
       const std::size_t anchors = d.host_anchors.size() / part.substeps.count;
@@ -305,7 +326,8 @@ double CudaMlsTissue::run_part(const FramePart& part) {
       hold.impulse = d.held_impulse.data();
       if (anchors > 0) hold.anchors = d.anchors.data() + i * anchors;
     }
-    launch_mls_stresses(field, d.present(), d.stream);
+    launch_mls_stresses(field, d.present(), contacts, d.stream);
+    if (contacts.count > 0) launch_mls_touches(field, d.present(), contacts, d.stream);
     launch_mls_moves(field, d.present(), d.motion(1 - d.current), step, colliders, contacts, hold,
                      d.stream);
     d.current = 1 - d.current;
@@ -353,6 +375,7 @@ void CudaMlsTissue::save_checkpoint() {
   saved.held_impulse.copy(d.held_impulse, d.stream);
   saved.touching.copy(d.touching, d.stream);
   saved.node_contacts = state_->node_contacts;
+  saved.slip.copy(d.contact_slip, d.stream);
   saved.dt = state_->dt;
   saved.time = state_->time;
   saved.result = result_;
@@ -369,6 +392,7 @@ void CudaMlsTissue::reject_part(Verdict) {
   d.host_is_current = false;
   state_->node_contacts = saved.node_contacts;
   push_node_contacts();
+  if (d.touching_count > 0) d.contact_slip.copy(saved.slip, d.stream);
   state_->dt = saved.dt;
   state_->time = saved.time;
   result_ = saved.result;
@@ -411,7 +435,7 @@ void CudaMlsTissue::forces_at(const float* u, float* force) {
   field.viscous = false;
   const CudaMlsMotion at = d.motion(1 - d.current);  // not in use between two parts
   d.u[1 - d.current].upload(reinterpret_cast<const float4*>(u), d.count, d.stream);
-  launch_mls_stresses(field, at, d.stream);
+  launch_mls_stresses(field, at, {}, d.stream);
   launch_mls_forces(field, at.u, d.force.data(), d.stream);
   d.force.download(reinterpret_cast<float4*>(force), d.count, d.stream);
   d.wait("sum forces");
@@ -420,6 +444,7 @@ void CudaMlsTissue::forces_at(const float* u, float* force) {
 std::vector<std::uint8_t> CudaMlsTissue::save() {
   pull();
   pull_contact();
+  pull_slips();
   return MlsTissue::save();
 }
 

@@ -44,6 +44,7 @@ class CudaMlsTissue final : public MlsTissue {
   void push_contact();
   void search_contacts(float dt);
   void push_node_contacts();
+  void pull_slips();  ///< what nodes that touch remember
   void sum_loads(const FramePart& part, float before);
 
   std::unique_ptr<OnDevice> device_;

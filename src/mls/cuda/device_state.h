@@ -6,6 +6,7 @@
 #include "compute/device_array.h"
 #include "contact/contact_spring.h"
 #include "mls/anchor_pose.h"
+#include "mls/face_contact.h"
 
 namespace tissue_sim {
 
@@ -56,11 +57,26 @@ struct CudaMlsColliders {
   unsigned long long* loads;  ///< [count][kMlsLoadSums]
 };
 
-/// Nodes that may touch one another; null where none may.
+/// What a node touches others with, beside MlsContactFace.
+struct alignas(32) CudaMlsFace {
+  float face[4];  ///< MlsState::face
+  ContactSpring spring;
+  float edge, root_friction;
+};
+
+/// Nodes that may touch one another, as MlsNodeContacts.
 struct CudaMlsNodeContacts {
-  const std::int32_t* begin = nullptr;
+  int count = 0;  ///< of those that may; 0: nothing is touched
+  const std::int32_t* node = nullptr;
+  const std::int32_t* at = nullptr;
+  const MlsKnowsFace* knows = nullptr;
+  const std::int32_t* begin = nullptr;  ///< per node
   const std::int32_t* other = nullptr;
-  const float* rest = nullptr;
+  MlsSlip* slip = nullptr;
+  const CudaMlsFace* of_node = nullptr;  ///< per node
+  MlsContactFace* face = nullptr;        ///< its normal, weights and deformation of this substep
+  float4* force = nullptr;               ///< on those that may [N]
+  float dt = 0;                          ///< the last substep [s]
 };
 
 /// Held nodes: they go where anchors do and note what pulls them.
@@ -77,6 +93,7 @@ struct CudaMlsNodeChange {
   float volume_mu, volume_lambda, volume_eta;
   float kappa;
   float outside;  ///< how far outside of it tissue ends [m]
+  float face[4];  ///< MlsState::face
   std::uint8_t outer;
 };
 struct CudaMlsEntryChange {
@@ -99,14 +116,20 @@ struct CudaMlsMeasure {
 inline constexpr int kMlsThreads =
     64;  ///< of a block; a node each: few nodes, too, shall use all multiprocessors
 
-void launch_mls_stresses(const CudaMlsField& field, const CudaMlsMotion& at, cudaStream_t stream);
-/// The rest of a substep, after the stresses: forces with contact, and the motion into `to`.
+/// And the deformation gradients of those that may touch others.
+void launch_mls_stresses(const CudaMlsField& field, const CudaMlsMotion& at,
+                         const CudaMlsNodeContacts& contacts, cudaStream_t stream);
+/// What nodes that touch push one another, after the stresses.
+void launch_mls_touches(const CudaMlsField& field, const CudaMlsMotion& at,
+                        const CudaMlsNodeContacts& contacts, cudaStream_t stream);
+/// The rest of a substep: forces with contact, and the motion into `to`.
 void launch_mls_moves(const CudaMlsField& field, const CudaMlsMotion& at, const CudaMlsMotion& to,
                       const CudaMlsStep& step, const CudaMlsColliders& colliders,
                       const CudaMlsNodeContacts& contacts, const CudaMlsHold& hold,
                       cudaStream_t stream);
 /// Writes what changed into the field's arrays.
-void launch_mls_changes(const CudaMlsField& field, const CudaMlsNodeChange* nodes, int node_count,
+void launch_mls_changes(const CudaMlsField& field, CudaMlsFace* faces,
+                        const CudaMlsNodeChange* nodes, int node_count,
                         const CudaMlsEntryChange* entries, int entry_count, cudaStream_t stream);
 /// Internal forces alone [4 count], after the stresses.
 void launch_mls_forces(const CudaMlsField& field, const float4* u, float4* force,

@@ -43,9 +43,13 @@ struct CudaMlsTissue::OnDevice {
   DeviceArray<CudaMlsNodeChange> node_changes;
   DeviceArray<CudaMlsEntryChange> entry_changes;
 
-  DeviceArray<std::int32_t> contact_begin, contact_other;
-  DeviceArray<float> contact_rest;
-  bool may_touch = false;
+  DeviceArray<CudaMlsFace> faces;
+  DeviceArray<std::int32_t> contact_node, contact_at, contact_begin, contact_other;
+  DeviceArray<MlsKnowsFace> contact_knows;
+  DeviceArray<MlsSlip> contact_slip;
+  DeviceArray<MlsContactFace> contact_face;
+  DeviceArray<float4> contact_force;
+  int touching_count = 0;  ///< of nodes that may touch others
 
   DeviceArray<CudaMlsMeasure> measures;
   std::vector<CudaMlsMeasure> host_measures;
@@ -55,6 +59,7 @@ struct CudaMlsTissue::OnDevice {
     DeviceArray<float4> u, v, hold, held_impulse;
     DeviceArray<std::uint32_t> touching;
     MlsNodeContacts node_contacts;
+    DeviceArray<MlsSlip> slip;
     float dt = 0;
     double time = 0;
     FrameResult result;
@@ -86,6 +91,22 @@ struct CudaMlsTissue::OnDevice {
     f.stress = stress.data();
     f.viscous = viscous;
     return f;
+  }
+  CudaMlsNodeContacts contacts(float dt) {
+    CudaMlsNodeContacts c;
+    c.count = touching_count;
+    if (touching_count == 0) return c;
+    c.node = contact_node.data();
+    c.at = contact_at.data();
+    c.knows = contact_knows.data();
+    c.begin = contact_begin.data();
+    c.other = contact_other.data();
+    c.slip = contact_slip.data();
+    c.of_node = faces.data();
+    c.face = contact_face.data();
+    c.force = contact_force.data();
+    c.dt = dt;
+    return c;
   }
   void wait(const char* action) { check_cuda(cudaStreamSynchronize(stream), action); }
 };

@@ -84,7 +84,8 @@ __device__ __forceinline__ void stress_of(const CudaMlsField& f, int i, const fl
 }
 
 template <int L>
-__global__ void __launch_bounds__(kMlsThreads) mls_stresses(CudaMlsField f, CudaMlsMotion at) {
+__global__ void __launch_bounds__(kMlsThreads)
+    mls_stresses(CudaMlsField f, CudaMlsMotion at, CudaMlsNodeContacts contacts) {
   const Worker<L> worker(f.count);
   const int i = worker.node;
   float A[9], M[6], H[9], F[9], P[9], Q[9];
@@ -93,6 +94,10 @@ __global__ void __launch_bounds__(kMlsThreads) mls_stresses(CudaMlsField f, Cuda
   times_symmetric(A, M, H);
 #pragma unroll
   for (int k = 0; k < 9; ++k) F[k] = k % 4 == 0 ? H[k] + 1.0f : H[k];
+  if (contacts.count > 0 && worker.lane == 0 && !worker.is_spare) {
+    const int k = __ldg(contacts.at + i);
+    for (int c = 0; c < 9 && k >= 0; ++c) contacts.face[k].deformation[c] = F[c];
+  }
   stress_of(f, i, F, P);
   if (f.viscous) {
     float rate[9];
@@ -196,33 +201,88 @@ __device__ __forceinline__ void collider_forces(const CudaMlsField& f, const Cud
   if (touches != touched) c.touching[i] = touches;
 }
 
-/// What nodes of other pieces push it with (mls/node_contact.h): this lane's part.
+__device__ __forceinline__ void way(const CudaMlsField& f, const float4* u, int i, int j,
+                                    float (&d)[3]) {
+  const float4 xi = __ldg(f.place + i), ui = __ldg(u + i);
+  const float4 xj = __ldg(f.place + j), uj = __ldg(u + j);
+  d[0] = (xj.x - xi.x) + (uj.x - ui.x);
+  d[1] = (xj.y - xi.y) + (uj.y - ui.y);
+  d[2] = (xj.z - xi.z) + (uj.z - ui.z);
+}
+
+/// As find_contact_face() (mls/node_contact.cpp); mls_stresses() left the deformation there.
+__global__ void __launch_bounds__(kMlsThreads)
+    mls_faces(CudaMlsField f, CudaMlsMotion at, CudaMlsNodeContacts contacts) {
+  const int k = static_cast<int>(blockIdx.x * blockDim.x + threadIdx.x);
+  if (k >= contacts.count) return;
+  const int i = contacts.node[k];
+  const CudaMlsFace& own = contacts.of_node[i];
+  float F[9];
+  for (int c = 0; c < 9; ++c) F[c] = contacts.face[k].deformation[c];
+  MlsContactFace face;
+  set_mls_contact_face(F, own.face, contacts.knows[k], face);
+  float sum = 0;
+  for (int c = contacts.begin[i]; c < contacts.begin[i + 1]; ++c) {
+    const int j = contacts.other[c];
+    const CudaMlsFace& other = contacts.of_node[j];
+    float d[3];
+    way(f, at.u, i, j, d);
+    sum += mls_contact_weight(d, own.face, other.face, 0.5f * (own.edge + other.edge));
+  }
+  face.weights = fmaxf(1.0f, sum);
+  contacts.face[k] = face;
+}
+
+__device__ __forceinline__ MlsContactSide side_of(const CudaMlsField& f, const CudaMlsMotion& at,
+                                                  const CudaMlsNodeContacts& contacts, int i) {
+  const CudaMlsFace& face = contacts.of_node[i];
+  return {&f.place[i].x, &at.u[i].x, face.face,         contacts.face + contacts.at[i],
+          face.spring,   face.edge,  face.root_friction};
+}
+
+/// As push_node() (mls/node_contact.cpp). Lanes share what touches a node.
 template <int L>
-__device__ __forceinline__ void node_forces(const CudaMlsField& f, const CudaMlsMotion& at,
-                                            const CudaMlsNodeContacts& contacts,
-                                            const Worker<L>& worker, float (&sum)[3]) {
-  const int i = worker.node;
-  const int first = __ldg(contacts.begin + i), end = __ldg(contacts.begin + i + 1);
-  if (first == end) return;
-  const float4 xi = __ldg(f.place + i), ui = __ldg(at.u + i);
-#pragma unroll 2
-  for (int c = first + worker.lane; c < end; c += L) {
-    const int j = __ldg(contacts.other + c);
-    const float4 xj = __ldg(f.place + j), uj = __ldg(at.u + j);
-    const float d[3] = {(xj.x - xi.x) + (uj.x - ui.x), (xj.y - xi.y) + (uj.y - ui.y),
-                        (xj.z - xi.z) + (uj.z - ui.z)};
-    const float d2 = d[0] * d[0] + d[1] * d[1] + d[2] * d[2], rest = __ldg(contacts.rest + c);
-    if (d2 >= rest * rest) continue;
-    const float distance = fmaxf(sqrtf(d2), 1e-12f);
-    const float4 vi = at.v[i], vj = at.v[j];
-    const float approach =
-        ((vj.x - vi.x) * d[0] + (vj.y - vi.y) * d[1] + (vj.z - vi.z) * d[2]) / -distance;
-    const ContactSpring own = f.contact[i], other = f.contact[j];
-    const float k = own.stiffness * other.stiffness / (own.stiffness + other.stiffness);
-    const float damping = own.damping * other.damping / (own.damping + other.damping);
-    const float push = fmaxf(0.0f, k * (rest - distance) + damping * approach);
-#pragma unroll
-    for (int a = 0; a < 3; ++a) sum[a] -= push * d[a] / distance;
+__global__ void __launch_bounds__(kMlsThreads)
+    mls_touches(CudaMlsField f, CudaMlsMotion at, CudaMlsNodeContacts contacts) {
+  const Worker<L> worker(contacts.count);
+  const int k = worker.node, i = contacts.node[k];
+  const MlsContactSide own = side_of(f, at, contacts, i);
+  float sum[12] = {};  // force, then force (x) arm
+  for (int c = contacts.begin[i] + worker.lane; c < contacts.begin[i + 1] && !worker.is_spare;
+       c += L) {
+    const int j = contacts.other[c];
+    const MlsContactSide other = side_of(f, at, contacts, j);
+    const bool is_low = i < j;
+    float force[3], place[3], d[3];
+    MlsSlip slip = contacts.slip[c];
+    const bool touches = touch_mls_faces(is_low ? own : other, is_low ? other : own, contacts.dt,
+                                         slip, force, place);
+    contacts.slip[c] = slip;
+    if (!touches) continue;
+    way(f, at.u, j, i, d);
+    float arm[3];
+    for (int a = 0; a < 3; ++a) {
+      place[a] -= is_low ? 0.0f : d[a];
+      force[a] = is_low ? force[a] : -force[a];
+      sum[a] += force[a];
+    }
+    for (int a = 0; a < 3; ++a) arm[a] = mls_contact::dot(own.of->inverse + 3 * a, place);
+    for (int a = 0; a < 3; ++a) {
+      for (int b = 0; b < 3; ++b) sum[3 + 3 * a + b] += force[a] * arm[b];
+    }
+  }
+  worker.add_lanes(sum);
+  if (worker.lane != 0 || worker.is_spare) return;
+  contacts.force[k] = {sum[0], sum[1], sum[2], 0};
+  if (!(own.of->couples > 0)) return;
+  float M[6], Q[9];
+  inverse_moment(f, i, M);
+  times_symmetric(sum + 3, M, Q);
+  for (int b = 0; b < 3; ++b) {
+    float4& column = f.stress[3 * i + b];
+    column.x -= Q[b];
+    column.y -= Q[3 + b];
+    column.z -= Q[6 + b];
   }
 }
 
@@ -234,10 +294,15 @@ __global__ void __launch_bounds__(kMlsThreads)
   const int i = worker.node;
   float sum[3] = {0, 0, 0};
   pair_forces(f, at.u, worker, sum);
-  if (contacts.begin != nullptr) node_forces(f, at, contacts, worker, sum);
   worker.add_lanes(sum);
   if (worker.lane != 0 || worker.is_spare) return;
   const float4 u = at.u[i], v = at.v[i];
+  if (contacts.count > 0 && __ldg(contacts.at + i) >= 0) {
+    const float4 pushed = contacts.force[__ldg(contacts.at + i)];
+    sum[0] += pushed.x;
+    sum[1] += pushed.y;
+    sum[2] += pushed.z;
+  }
   if (colliders.near != 0) {
     const float4 X = __ldg(f.place + i);
     const float x[3] = {X.x + u.x, X.y + u.y, X.z + u.z}, speed[3] = {v.x, v.y, v.z};
@@ -285,7 +350,7 @@ __global__ void __launch_bounds__(kMlsThreads)
 
 /// The field's arrays are const for all but this.
 __global__ void __launch_bounds__(kMlsThreads)
-    mls_changes(CudaMlsField f, const CudaMlsNodeChange* nodes, int node_count,
+    mls_changes(CudaMlsField f, CudaMlsFace* faces, const CudaMlsNodeChange* nodes, int node_count,
                 const CudaMlsEntryChange* entries, int entry_count) {
   const int k = static_cast<int>(blockIdx.x * blockDim.x + threadIdx.x);
   if (k < entry_count) {
@@ -304,6 +369,7 @@ __global__ void __launch_bounds__(kMlsThreads)
   const_cast<float*>(f.kappa)[c.node] = c.kappa;
   const_cast<std::uint8_t*>(f.outer)[c.node] = c.outer;
   const_cast<float4*>(f.place)[c.node].w = c.outside;
+  for (int a = 0; a < 4; ++a) faces[c.node].face[a] = c.face[a];
 }
 
 __device__ __forceinline__ void take(CudaMlsMeasure& a, const CudaMlsMeasure& b) {
@@ -388,10 +454,20 @@ void by_lanes(const CudaMlsField& f, const Launch& launch) {
 
 }  // namespace
 
-void launch_mls_stresses(const CudaMlsField& field, const CudaMlsMotion& at, cudaStream_t stream) {
+void launch_mls_stresses(const CudaMlsField& field, const CudaMlsMotion& at,
+                         const CudaMlsNodeContacts& contacts, cudaStream_t stream) {
   by_lanes(field, [&](auto lanes, int blocks) {
-    mls_stresses<lanes()><<<blocks, kMlsThreads, 0, stream>>>(field, at);
+    mls_stresses<lanes()><<<blocks, kMlsThreads, 0, stream>>>(field, at, contacts);
   });
+}
+
+void launch_mls_touches(const CudaMlsField& field, const CudaMlsMotion& at,
+                        const CudaMlsNodeContacts& contacts, cudaStream_t stream) {
+  mls_faces<<<(contacts.count + kMlsThreads - 1) / kMlsThreads, kMlsThreads, 0, stream>>>(field, at,
+                                                                                          contacts);
+  constexpr int kLanes = 4;
+  const int blocks = (contacts.count * kLanes + kMlsThreads - 1) / kMlsThreads;
+  mls_touches<kLanes><<<blocks, kMlsThreads, 0, stream>>>(field, at, contacts);
 }
 
 void launch_mls_moves(const CudaMlsField& field, const CudaMlsMotion& at, const CudaMlsMotion& to,
@@ -405,12 +481,13 @@ void launch_mls_moves(const CudaMlsField& field, const CudaMlsMotion& at, const 
   check_cuda(cudaGetLastError(), "move nodes");
 }
 
-void launch_mls_changes(const CudaMlsField& field, const CudaMlsNodeChange* nodes, int node_count,
+void launch_mls_changes(const CudaMlsField& field, CudaMlsFace* faces,
+                        const CudaMlsNodeChange* nodes, int node_count,
                         const CudaMlsEntryChange* entries, int entry_count, cudaStream_t stream) {
   const int most = node_count > entry_count ? node_count : entry_count;
   if (most == 0) return;
   mls_changes<<<(most + kMlsThreads - 1) / kMlsThreads, kMlsThreads, 0, stream>>>(
-      field, nodes, node_count, entries, entry_count);
+      field, faces, nodes, node_count, entries, entry_count);
   check_cuda(cudaGetLastError(), "change pairs");
 }
 

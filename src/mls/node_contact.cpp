@@ -109,7 +109,9 @@ void find_node_contacts(MlsState& s, const std::vector<std::int32_t>& piece, flo
     edge = std::max<double>(edge, s.edge[i]);
     depth = std::max<double>(depth, s.face[4 * i + 3]);
   }
-  const double widest = std::sqrt(4 * depth * depth + std::pow(mls_contact::kAside * edge, 2));
+  const bool faces = touches_by_faces(s);
+  const double widest =
+      faces ? std::sqrt(4 * depth * depth + std::pow(mls_contact::kAside * edge, 2)) : edge;
   const MlsNodeContacts before = std::move(contacts);
   contacts = {};
   contacts.begin.assign(s.count() + 1, 0);
@@ -130,10 +132,12 @@ void find_node_contacts(MlsState& s, const std::vector<std::int32_t>& piece, flo
         const auto look_at = [&](std::int32_t other, double distance2) {
           if (skin[other] > skin[k] || (skin[other] == skin[k] && other <= k)) return;
           const std::int32_t j = outer[other];
-          const float reach2 =
-              mls_contact::reach2(face_of(s, i), face_of(s, j), 0.5f * (s.edge[i] + s.edge[j]));
-          const double reach = std::sqrt(reach2) + skin[k] + skin[other];
-          if (distance2 > reach * reach || !may_touch(s, piece, i, j)) return;
+          const float mean_edge = 0.5f * (s.edge[i] + s.edge[j]);
+          const float reach =
+              faces ? std::sqrt(mls_contact::reach2(face_of(s, i), face_of(s, j), mean_edge))
+                    : mean_edge;
+          const auto distance = static_cast<float>(std::sqrt(distance2));
+          if (distance > reach + skin[k] + skin[other] || !may_touch(s, piece, i, j)) return;
           of[k].push_back(other);
         };
         grid.for_each_within(places[k], widest + 2 * skin[k], look_at);
@@ -151,7 +155,15 @@ void find_node_contacts(MlsState& s, const std::vector<std::int32_t>& piece, flo
       while (known < last && before.other[known] < other) ++known;
       contacts.other.push_back(other);
       const bool was = known < last && before.other[known] == other;
-      contacts.slip.push_back(was ? before.slip[known] : MlsSlip{{}, {}, {}, first_gap, 0});
+      if (faces) {
+        contacts.slip.push_back(was ? before.slip[known] : MlsSlip{{}, {}, {}, first_gap, 0});
+        continue;
+      }
+      // One edge, or less where they were nearer when they were found: a fresh cut is free of stress.
+      const float mean_edge = 0.5f * (s.edge[outer[k]] + s.edge[other]);
+      const float rest = std::min(
+          mean_edge, static_cast<float>((s.position(outer[k]) - s.position(other)).norm()));
+      contacts.rest.push_back(was ? std::max(rest, before.rest[known]) : rest);
     }
   }
   number_node_contacts(s);
@@ -176,7 +188,8 @@ void number_node_contacts(MlsState& s) {
   contacts.node.clear();
   contacts.at.assign(s.count(), -1);
   contacts.in_chunk.assign(s.chunks(), 0);
-  for (std::int32_t i = 0; i < s.count() && !contacts.begin.empty(); ++i) {
+  const bool any = touches_by_faces(s) && !contacts.begin.empty();
+  for (std::int32_t i = 0; i < s.count() && any; ++i) {
     if (contacts.begin[i] == contacts.begin[i + 1]) continue;
     contacts.at[i] = static_cast<std::int32_t>(contacts.node.size());
     contacts.node.push_back(i);
@@ -242,6 +255,34 @@ void push_node(MlsState& s, int k) {
   }
   for (int a = 0; a < 3; ++a) contacts.force[4 * k + a] = sum[a];
   if (any && own.of->couples > 0) take_couple(s, i, couple);
+}
+
+void add_node_contact(const MlsState& s, std::int32_t i, float* force) {
+  const MlsNodeContacts& contacts = s.node_contacts;
+  if (touches_by_faces(s)) {
+    const std::int32_t k = contacts.at[i];
+    for (int a = 0; a < 3 && k >= 0; ++a) force[a] += contacts.force[4 * k + a];
+    return;
+  }
+  for (std::int32_t c = contacts.begin[i]; c < contacts.begin[i + 1]; ++c) {
+    const std::int32_t j = contacts.other[c];
+    float d[3], d2 = 0;
+    for (int a = 0; a < 3; ++a) {
+      d[a] = (s.place[4 * j + a] - s.place[4 * i + a]) + (s.u[4 * j + a] - s.u[4 * i + a]);
+      d2 += d[a] * d[a];
+    }
+    const float rest = contacts.rest[c];
+    if (d2 >= rest * rest) continue;
+    const float distance = std::max(std::sqrt(d2), 1e-12f);
+    float approach = 0;
+    for (int a = 0; a < 3; ++a) approach += (s.v[4 * j + a] - s.v[4 * i + a]) * d[a];
+    approach /= -distance;
+    const ContactSpring own = node_spring(s, i), other = node_spring(s, j);
+    const float k = own.stiffness * other.stiffness / (own.stiffness + other.stiffness);
+    const float c_both = own.damping * other.damping / (own.damping + other.damping);
+    const float push = std::max(0.0f, k * (rest - distance) + c_both * approach);
+    for (int a = 0; a < 3; ++a) force[a] -= push * d[a] / distance;
+  }
 }
 
 }  // namespace tissue_sim

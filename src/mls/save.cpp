@@ -29,7 +29,7 @@ void fields(Archive& archive, MlsSlip& s) {
 
 template <class Archive>
 void fields(Archive& archive, MlsNodeContacts& c) {
-  archive(c.begin, c.other, c.slip, c.u_found, c.skin, c.until_look);
+  archive(c.begin, c.other, c.rest, c.slip, c.u_found, c.skin, c.until_look);
 }
 
 template <class Archive>
@@ -68,7 +68,7 @@ void MlsTissue::restore(Span<const std::uint8_t> saved) {
     const bool exposed = s.outer[i] != 0 && s.nodes.surface[i] == 0;
     s.place[4 * i + 3] = exposed ? 0.5f * s.edge[i] : s.nodes.depth[i];
     put_strained_volume(s, i, strained_volume(s, i));
-    remake_face(s, i);
+    if (touches_by_faces(s)) remake_face(s, i);
   }
   number_node_contacts(s);
   if (in.left() > 0) throw std::runtime_error("the state has more to it than this version knows");

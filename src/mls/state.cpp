@@ -192,8 +192,10 @@ std::unique_ptr<MlsState> make_mls_state(const Scene& scene, std::vector<std::st
     for (std::int32_t i = 0; i < n; ++i) s.whole_kappa[i] = whole_kappa(s, i);
     remake(s, all);
   }
-  s.cpu->for_each(
-      n, [&](int i) { remake_face(s, i); }, 256);
+  if (touches_by_faces(s)) {
+    s.cpu->for_each(
+        n, [&](int i) { remake_face(s, i); }, 256);
+  }
   return state;
 }
 
@@ -269,7 +271,7 @@ float substep(MlsState& s, float dt, std::vector<ColliderLoad>& loads) {
       if (s.any_sprung[i / kMlsChunk] != 0) {
         add_springs(s, s.u.data(), i, force + 4 * (i - first));
       }
-      if (touches) add_node_contact(s, i, force + 4 * (i - first));
+      if (!s.node_contacts.begin.empty()) add_node_contact(s, i, force + 4 * (i - first));
     }
     if (list) list_near(s, group, dt);
     add_contact(s, group, force);

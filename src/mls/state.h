@@ -44,7 +44,8 @@ struct MlsGroupContact {
 struct MlsNodeContacts {
   std::vector<std::int32_t> begin;  ///< per node, and one more; empty where nothing was looked for
   std::vector<std::int32_t> other;
-  std::vector<MlsSlip> slip;
+  std::vector<float> rest;    ///< distance below which they push [m]; with MlsContact::kNodes
+  std::vector<MlsSlip> slip;  ///< with MlsContact::kFaces, as are those below
   std::vector<float>
       u_found;              ///< displacements of the nodes at the search that may touch, by number
   std::vector<float> skin;  ///< how far each may move until they are looked for anew [m]

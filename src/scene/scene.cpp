@@ -229,6 +229,7 @@ void check_mls(const MlsOptions& mls) {
   }
   check_enum("mls.basis", mls.basis, kMlsBasisNames);
   check_enum("mls.placement", mls.placement, kMlsPlacementNames);
+  check_enum("mls.contact", mls.contact, kMlsContactNames);
   check_range("mls.grading", mls.grading, 1, 4);
   check_range("mls.stabilisation", mls.stabilisation, 0, 1);
 }

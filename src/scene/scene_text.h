@@ -28,6 +28,8 @@ inline constexpr Spelling<MlsPlacement> kMlsPlacementNames[] = {
     {MlsPlacement::kGraded, "graded"}};
 inline constexpr Spelling<MlsBasis> kMlsBasisNames[] = {{MlsBasis::kLinear, "linear"},
                                                         {MlsBasis::kBalanced, "balanced"}};
+inline constexpr Spelling<MlsContact> kMlsContactNames[] = {{MlsContact::kNodes, "nodes"},
+                                                            {MlsContact::kFaces, "faces"}};
 inline constexpr Spelling<PbdModel> kPbdModelNames[] = {{PbdModel::kSurface, "surface"},
                                                         {PbdModel::kTetrahedra, "tetrahedra"}};
 inline constexpr Spelling<PbdElasticity> kPbdElasticityNames[] = {

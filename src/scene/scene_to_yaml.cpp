@@ -167,6 +167,7 @@ void write_mls(YAML::Emitter& out, const MlsOptions& mls) {
   write(out, "placement", std::string(name_of(mls.placement, kMlsPlacementNames)));
   write(out, "grading", mls.grading);
   write(out, "stabilisation", mls.stabilisation);
+  write(out, "contact", std::string(name_of(mls.contact, kMlsContactNames)));
   out << EndMap;
 }
 

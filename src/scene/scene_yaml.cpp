@@ -201,14 +201,16 @@ Scene read_scene(const YAML::Node& node) {
     YamlFields(mpm, path, {"boundary"}).read("boundary", scene.mpm.boundary, kMpmBoundaryNames);
   });
   fields.read_map("mls", [&](const YAML::Node& mls, const std::string& path) {
-    const YamlFields of(
-        mls, path, {"spacing", "neighbours", "basis", "placement", "grading", "stabilisation"});
+    const YamlFields of(mls, path,
+                        {"spacing", "neighbours", "basis", "placement", "grading",
+                         "stabilisation", "contact"});
     of.read("spacing", scene.mls.spacing);
     of.read("neighbours", scene.mls.neighbours);
     of.read("basis", scene.mls.basis, kMlsBasisNames);
     of.read("placement", scene.mls.placement, kMlsPlacementNames);
     of.read("grading", scene.mls.grading);
     of.read("stabilisation", scene.mls.stabilisation);
+    of.read("contact", scene.mls.contact, kMlsContactNames);
   });
   fields.read_map("pbd", [&](const YAML::Node& pbd, const std::string& path) {
     scene.pbd = read_pbd(pbd, path);

@@ -25,6 +25,7 @@ Scene block_on_another(MlsPlacement placement) {
   scene.cell_size = 0.004;
   scene.mls.spacing = 0.002;
   scene.mls.placement = placement;
+  scene.mls.contact = MlsContact::kFaces;
   scene.ground.enabled = false;
   scene.damping = 0;
   Material m;
@@ -92,7 +93,8 @@ TEST_P(MlsFriction, ABlockSlidesOnAnotherAsCoulombSays) {
                   static_cast<int>(placement), degrees, friction,
                   after.centroid[0] - before.centroid[0], after.velocity[1]);
       if (degrees > 20) {
-        EXPECT_NEAR(friction, kFriction, 0.03 * kFriction);
+        const double within = placement == MlsPlacement::kGraded ? 0.05 : 0.03;
+        EXPECT_NEAR(friction, kFriction, within * kFriction);
         EXPECT_LT(std::fabs(after.velocity[1]), 0.02 * after.velocity[0]);
         EXPECT_NEAR(after.centroid[2], before.centroid[2], 2e-5);  // without a bump
       } else {

@@ -6,6 +6,7 @@
 
 #include "frame/leapfrog.h"
 #include "mls/cuda/on_device.h"
+#include "mls/faces.h"
 #include "mls/node_contact.h"
 
 namespace tissue_sim {
@@ -122,14 +123,14 @@ void CudaMlsTissue::upload_pairs() {
   d.kappa.upload(s.kappa.data(), n, d.stream);
   d.outer.upload(s.outer.data(), n, d.stream);
   upload(s.place, n, d.place, d.stream);  // cuts move where tissue ends
-  std::vector<CudaMlsFace> faces(n);
-  for (int i = 0; i < n; ++i) {
+  std::vector<CudaMlsFace> faces(touches_by_faces(s) ? n : 0);
+  for (std::size_t i = 0; i < faces.size(); ++i) {
     std::copy_n(&s.face[4 * i], 4, faces[i].face);
     faces[i].spring = node_spring(s, i);
     faces[i].edge = s.edge[i];
     faces[i].root_friction = s.root_friction[i];
   }
-  d.faces.upload(faces, d.stream);
+  if (!faces.empty()) d.faces.upload(faces, d.stream);
   d.wait("receive data");
 }
 
@@ -254,6 +255,13 @@ void CudaMlsTissue::pull_slips() {
 void CudaMlsTissue::push_node_contacts() {
   OnDevice& d = *device_;
   const MlsNodeContacts& contacts = state_->node_contacts;
+  d.may_touch = !touches_by_faces(*state_) && !contacts.other.empty();
+  if (d.may_touch) {
+    d.contact_begin.upload(contacts.begin, d.stream);
+    d.contact_other.upload(contacts.other, d.stream);
+    d.contact_rest.upload(contacts.rest, d.stream);
+    d.wait("receive data");
+  }
   d.touching_count = static_cast<int>(contacts.node.size());
   if (d.touching_count == 0) return;
   d.contact_node.upload(contacts.node, d.stream);

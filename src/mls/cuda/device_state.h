@@ -64,9 +64,11 @@ struct alignas(32) CudaMlsFace {
   float edge, root_friction;
 };
 
-/// Nodes that may touch one another, as MlsNodeContacts.
+/// Nodes that may touch one another, as MlsNodeContacts: with MlsContact::kNodes `begin`, `other`,
+/// `rest`, with kFaces all but `rest`.
 struct CudaMlsNodeContacts {
-  int count = 0;  ///< of those that may; 0: nothing is touched
+  const float* rest = nullptr;
+  int count = 0;  ///< of those whose faces may touch; 0: none
   const std::int32_t* node = nullptr;
   const std::int32_t* at = nullptr;
   const MlsKnowsFace* knows = nullptr;

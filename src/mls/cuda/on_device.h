@@ -45,6 +45,8 @@ struct CudaMlsTissue::OnDevice {
 
   DeviceArray<CudaMlsFace> faces;
   DeviceArray<std::int32_t> contact_node, contact_at, contact_begin, contact_other;
+  DeviceArray<float> contact_rest;
+  bool may_touch = false;  ///< nodes may, with MlsContact::kNodes
   DeviceArray<MlsKnowsFace> contact_knows;
   DeviceArray<MlsSlip> contact_slip;
   DeviceArray<MlsContactFace> contact_face;
@@ -94,6 +96,11 @@ struct CudaMlsTissue::OnDevice {
   }
   CudaMlsNodeContacts contacts(float dt) {
     CudaMlsNodeContacts c;
+    if (may_touch) {
+      c.begin = contact_begin.data();
+      c.other = contact_other.data();
+      c.rest = contact_rest.data();
+    }
     c.count = touching_count;
     if (touching_count == 0) return c;
     c.node = contact_node.data();

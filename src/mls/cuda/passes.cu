@@ -201,6 +201,37 @@ __device__ __forceinline__ void collider_forces(const CudaMlsField& f, const Cud
   if (touches != touched) c.touching[i] = touches;
 }
 
+/// What nodes of other pieces push it with, with MlsContact::kNodes (mls/node_contact.h): this lane's
+/// part.
+template <int L>
+__device__ __forceinline__ void node_forces(const CudaMlsField& f, const CudaMlsMotion& at,
+                                            const CudaMlsNodeContacts& contacts,
+                                            const Worker<L>& worker, float (&sum)[3]) {
+  const int i = worker.node;
+  const int first = __ldg(contacts.begin + i), end = __ldg(contacts.begin + i + 1);
+  if (first == end) return;
+  const float4 xi = __ldg(f.place + i), ui = __ldg(at.u + i);
+#pragma unroll 2
+  for (int c = first + worker.lane; c < end; c += L) {
+    const int j = __ldg(contacts.other + c);
+    const float4 xj = __ldg(f.place + j), uj = __ldg(at.u + j);
+    const float d[3] = {(xj.x - xi.x) + (uj.x - ui.x), (xj.y - xi.y) + (uj.y - ui.y),
+                        (xj.z - xi.z) + (uj.z - ui.z)};
+    const float d2 = d[0] * d[0] + d[1] * d[1] + d[2] * d[2], rest = __ldg(contacts.rest + c);
+    if (d2 >= rest * rest) continue;
+    const float distance = fmaxf(sqrtf(d2), 1e-12f);
+    const float4 vi = at.v[i], vj = at.v[j];
+    const float approach =
+        ((vj.x - vi.x) * d[0] + (vj.y - vi.y) * d[1] + (vj.z - vi.z) * d[2]) / -distance;
+    const ContactSpring own = f.contact[i], other = f.contact[j];
+    const float k = own.stiffness * other.stiffness / (own.stiffness + other.stiffness);
+    const float damping = own.damping * other.damping / (own.damping + other.damping);
+    const float push = fmaxf(0.0f, k * (rest - distance) + damping * approach);
+#pragma unroll
+    for (int a = 0; a < 3; ++a) sum[a] -= push * d[a] / distance;
+  }
+}
+
 __device__ __forceinline__ void way(const CudaMlsField& f, const float4* u, int i, int j,
                                     float (&d)[3]) {
   const float4 xi = __ldg(f.place + i), ui = __ldg(u + i);
@@ -294,6 +325,7 @@ __global__ void __launch_bounds__(kMlsThreads)
   const int i = worker.node;
   float sum[3] = {0, 0, 0};
   pair_forces(f, at.u, worker, sum);
+  if (contacts.rest != nullptr) node_forces(f, at, contacts, worker, sum);
   worker.add_lanes(sum);
   if (worker.lane != 0 || worker.is_spare) return;
   const float4 u = at.u[i], v = at.v[i];
@@ -369,7 +401,7 @@ __global__ void __launch_bounds__(kMlsThreads)
   const_cast<float*>(f.kappa)[c.node] = c.kappa;
   const_cast<std::uint8_t*>(f.outer)[c.node] = c.outer;
   const_cast<float4*>(f.place)[c.node].w = c.outside;
-  for (int a = 0; a < 4; ++a) faces[c.node].face[a] = c.face[a];
+  for (int a = 0; a < 4 && faces != nullptr; ++a) faces[c.node].face[a] = c.face[a];
 }
 
 __device__ __forceinline__ void take(CudaMlsMeasure& a, const CudaMlsMeasure& b) {

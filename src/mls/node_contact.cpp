@@ -159,7 +159,8 @@ void find_node_contacts(MlsState& s, const std::vector<std::int32_t>& piece, flo
         contacts.slip.push_back(was ? before.slip[known] : MlsSlip{{}, {}, {}, first_gap, 0});
         continue;
       }
-      // One edge, or less where they were nearer when they were found: a fresh cut is free of stress.
+      // One edge, or less where they were nearer when they were found: a fresh cut is free of
+      // stress.
       const float mean_edge = 0.5f * (s.edge[outer[k]] + s.edge[other]);
       const float rest = std::min(
           mean_edge, static_cast<float>((s.position(outer[k]) - s.position(other)).norm()));

@@ -26,11 +26,13 @@ inline void search_node_contacts(MlsState& state) {
   state.node_contacts.until_look = 0;
 }
 
-/// With MlsContact::kFaces: numbers those that may touch, after begin, other and slip came from elsewhere.
+/// With MlsContact::kFaces: numbers those that may touch, after begin, other and slip came from
+/// elsewhere.
 void number_node_contacts(MlsState& state);
 
-/// The same: after the stresses, of the k-th node that may touch others: its face as it is deformed, then
-/// what pushes it (mls/face_contact.h), of which the part that turns goes into its stress.
+/// The same: after the stresses, of the k-th node that may touch others: its face as it is
+/// deformed, then what pushes it (mls/face_contact.h), of which the part that turns goes into its
+/// stress.
 void find_contact_face(MlsState& state, int k);
 void push_node(MlsState& state, int k);
 

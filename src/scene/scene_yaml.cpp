@@ -201,9 +201,9 @@ Scene read_scene(const YAML::Node& node) {
     YamlFields(mpm, path, {"boundary"}).read("boundary", scene.mpm.boundary, kMpmBoundaryNames);
   });
   fields.read_map("mls", [&](const YAML::Node& mls, const std::string& path) {
-    const YamlFields of(mls, path,
-                        {"spacing", "neighbours", "basis", "placement", "grading",
-                         "stabilisation", "contact"});
+    const YamlFields of(
+        mls, path,
+        {"spacing", "neighbours", "basis", "placement", "grading", "stabilisation", "contact"});
     of.read("spacing", scene.mls.spacing);
     of.read("neighbours", scene.mls.neighbours);
     of.read("basis", scene.mls.basis, kMlsBasisNames);

@@ -201,8 +201,8 @@ __device__ __forceinline__ void collider_forces(const CudaMlsField& f, const Cud
   if (touches != touched) c.touching[i] = touches;
 }
 
-/// What nodes of other pieces push it with, with MlsContact::kNodes (mls/node_contact.h): this lane's
-/// part.
+/// What nodes of other pieces push it with, with MlsContact::kNodes (mls/node_contact.h): this
+/// lane's part.
 template <int L>
 __device__ __forceinline__ void node_forces(const CudaMlsField& f, const CudaMlsMotion& at,
                                             const CudaMlsNodeContacts& contacts,

@@ -74,8 +74,8 @@ struct ListedFacet {
 struct PieceSize {
   std::int32_t id, points;
 
-  /// Debris touches larger pieces, tools and the ground, but no other debris: what a thousand bits of
-  /// a cell's volume do to one another cost more than all the tissue that they came from.
+  /// Debris touches larger pieces, tools and the ground, but no other debris: what a thousand bits
+  /// of a cell's volume do to one another cost more than all the tissue that they came from.
   TISSUE_SIM_INLINE bool is_debris() const { return points <= kDebrisPoints; }
 };
 

@@ -160,7 +160,7 @@ TISSUE_SIM_INLINE float mls_gap(const MlsContactSide& low, const MlsContactSide&
 TISSUE_SIM_INLINE bool touch_mls_faces(const MlsContactSide& low, const MlsContactSide& high,
                                        float dt, MlsSlip& slip, float (&force)[3], float (&at)[3]) {
   using mls_contact::dot;
-  float d[3], n[3];
+  float d[3], n[3] = {};
   for (int a = 0; a < 3; ++a) {
     d[a] = (high.place[a] - low.place[a]) + (high.u[a] - low.u[a]);
   }

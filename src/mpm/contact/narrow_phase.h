@@ -30,7 +30,7 @@ inline constexpr float kNearGap = 0.25f;           ///< up to which a contact is
 inline constexpr float kMovedBetweenLooks = 0.1f;  ///< [cells]
 /// Share of its speed that counts for what is near no face: that is a cell away at least, ten times
 /// what may be moved between looks.
-inline constexpr float kFarOff = 0.2f;
+inline constexpr float kFarOff = 0.3f;
 
 /// Time until the next look where the fastest pair moves at this speed [s].
 TISSUE_SIM_INLINE double look_horizon(float fastest, double cell_size, double dt) {

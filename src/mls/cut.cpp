@@ -130,8 +130,9 @@ std::vector<std::int32_t> weaken(MlsState& s, const std::vector<std::int32_t>& t
 }
 
 void cross_entries(MlsState& s, const std::vector<std::int32_t>& entries,
-                   std::vector<std::int32_t>& changed, CutReport& report) {
-  const std::vector<std::int32_t> touched = mark_crossed(s, entries, {}, report);
+                   const std::vector<float>& places, std::vector<std::int32_t>& changed,
+                   CutReport& report) {
+  const std::vector<std::int32_t> touched = mark_crossed(s, entries, places, report);
   changed.insert(changed.end(), touched.begin(), touched.end());
   weaken(s, touched);
 }
@@ -140,9 +141,7 @@ void cross_pairs(MlsState& s, const BladePath& path, const float* u_begin, const
                  std::vector<std::int32_t>& changed, CutReport& report) {
   std::vector<float> places;
   const std::vector<std::int32_t> crossed = find_crossed(s, path, u_begin, u_end, &places);
-  const std::vector<std::int32_t> touched = mark_crossed(s, crossed, places, report);
-  changed.insert(changed.end(), touched.begin(), touched.end());
-  weaken(s, touched);
+  cross_entries(s, crossed, places, changed, report);
 }
 
 }  // namespace tissue_sim

@@ -30,8 +30,9 @@ std::vector<std::int32_t> mark_crossed(MlsState& state, const std::vector<std::i
 /// are. What tells pieces apart it neither reads nor changes.
 std::vector<std::int32_t> weaken(MlsState& state, const std::vector<std::int32_t>& touched);
 
-/// The same for pairs given by one of their entries each, for tears and tests.
+/// Both steps, for cross_pairs() and tests.
 void cross_entries(MlsState& state, const std::vector<std::int32_t>& entries,
-                   std::vector<std::int32_t>& changed, CutReport& report);
+                   const std::vector<float>& places, std::vector<std::int32_t>& changed,
+                   CutReport& report);
 
 }  // namespace tissue_sim

@@ -63,7 +63,7 @@ TEST(MlsCutSearch, FindsTheCrossedPairsThatALookAtEachFinds) {
       all += found.size();
       std::vector<std::int32_t> changed;
       CutReport report;
-      cross_entries(s, found, changed, report);
+      cross_entries(s, found, {}, changed, report);
     }
     EXPECT_GT(all, 100u);
   }

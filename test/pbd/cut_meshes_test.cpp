@@ -259,8 +259,8 @@ TEST_P(CutMeshes, CutsAtRandomNeitherBlowUpNorLeakNorMakeSlivers) {
       told();
       fastest = 0;
     }
-    // Further on crumbs that come off fly at some centimetres a second.
-    EXPECT_LT(r.max_speed, i < 100 ? 0.01 : 1.0) << "cut " << i;
+    // Further on crumbs that come off fly: 0.05 m/s was the most in 1 000 cuts.
+    EXPECT_LT(r.max_speed, i < 100 ? 0.01 : 0.1) << "cut " << i;
   }
   const Thinnest least = told();
   EXPECT_NEAR(whole_volume(tissue) / volume, 1, 0.01);

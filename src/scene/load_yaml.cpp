@@ -1,43 +1,44 @@
 #include "scene/load_yaml.h"
 
+#include <yaml-cpp/eventhandler.h>
+#include <yaml-cpp/parser.h>
+
 #include <algorithm>
+#include <sstream>
 #include <stdexcept>
-#include <vector>
 
 namespace tissue_sim {
 namespace {
 
 constexpr int kDeepestNesting = 64;
 
-/// How deep a text may nest, at most: brackets that are open, indicators of lists in one line, and
-/// lines that are each indented more than the one before.
-int depth_of(const std::string& text) {
-  int open = 0, deepest = 0;
-  std::vector<std::size_t> indents;
-  std::size_t at = 0;
-  while (at < text.size()) {
-    std::size_t end = text.find('\n', at);
-    if (end == std::string::npos) end = text.size();
-    const std::size_t first = text.find_first_not_of(' ', at);
-    if (first < end && text[first] != '#') {
-      while (!indents.empty() && indents.back() >= first - at) indents.pop_back();
-      indents.push_back(first - at);
-    }
-    int in_line = 0;
-    for (std::size_t i = at; i < end; ++i) {
-      const char c = text[i];
-      open += c == '[' || c == '{' ? 1 : (c == ']' || c == '}') && open > 0 ? -1 : 0;
-      const bool alone = i + 1 == end || text[i + 1] == ' ';
-      in_line += (c == '-' || c == '?' || c == ':') && alone ? 1 : 0;
-      deepest = std::max(deepest, open);
-    }
-    // Within brackets each line may have many pairs.
-    const int nested = open == 0 && deepest == 0 ? in_line : 0;
-    deepest = std::max({deepest, nested, static_cast<int>(indents.size())});
-    at = end + 1;
+/// Ends a document that nests too deep before the parser, which calls itself for each level, gets there.
+class NestingGuard : public YAML::EventHandler {
+ public:
+  void OnDocumentStart(const YAML::Mark&) override {}
+  void OnDocumentEnd() override {}
+  void OnNull(const YAML::Mark&, YAML::anchor_t) override {}
+  void OnAlias(const YAML::Mark&, YAML::anchor_t) override {}
+  void OnScalar(const YAML::Mark&, const std::string&, YAML::anchor_t,
+                const std::string&) override {}
+  void OnSequenceStart(const YAML::Mark&, const std::string&, YAML::anchor_t,
+                       YAML::EmitterStyle::value) override {
+    go_deeper();
   }
-  return deepest;
-}
+  void OnSequenceEnd() override { --depth_; }
+  void OnMapStart(const YAML::Mark&, const std::string&, YAML::anchor_t,
+                  YAML::EmitterStyle::value) override {
+    go_deeper();
+  }
+  void OnMapEnd() override { --depth_; }
+
+ private:
+  void go_deeper() {
+    if (++depth_ <= kDeepestNesting) return;
+    throw std::invalid_argument("it nests more than " + std::to_string(kDeepestNesting) + " deep");
+  }
+  int depth_ = 0;
+};
 
 /// Whether anything follows the first document. YAML::LoadAll would tell, but it has no end for
 /// ",]-]z\n\n,]--ab" and its like (yaml-cpp 0.7).
@@ -69,9 +70,9 @@ bool has_more_documents(const std::string& text) {
 }  // namespace
 
 YAML::Node load_yaml(const std::string& text) {
-  if (depth_of(text) > kDeepestNesting) {
-    throw std::invalid_argument("it nests more than " + std::to_string(kDeepestNesting) + " deep");
-  }
+  std::istringstream stream(text);
+  NestingGuard guard;
+  YAML::Parser(stream).HandleNextDocument(guard);
   if (has_more_documents(text)) {
     throw std::invalid_argument(
         "it holds several documents (parted by ---), of which all but the first would be lost");

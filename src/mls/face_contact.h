@@ -119,10 +119,10 @@ TISSUE_SIM_INLINE void set_mls_contact_face(const float* F, const float* face,
 }
 
 /// How far the faces of two nodes are apart along their common normal `n` [m]: the mean of theirs
-/// where they look at one another; else, as where the edge of one touches the other, that of the one
-/// that parts them more. `r` leads from the low one to the high one in reference space, `d` as they
-/// are, `n` too. Faces that were near one another in reference space rest as they lay. Here and
-/// below all is of (low, high).
+/// where they look at one another; else, as where the edge of one touches the other, that of the
+/// one that parts them more. `r` leads from the low one to the high one in reference space, `d` as
+/// they are, `n` too. Faces that were near one another in reference space rest as they lay. Here
+/// and below all is of (low, high).
 template <class T>
 TISSUE_SIM_INLINE T mls_gap(const T* r, const T* d, const T* face_low, const T* face_high,
                             const T* nl, const T* nh, T edge, T* n) {
@@ -153,8 +153,8 @@ TISSUE_SIM_INLINE T mls_gap(const T* r, const T* d, const T* face_low, const T* 
     n[a] = choose(none, T(per_length * d[a]), choose(opposed, T(scale * mean[a]), by_one));
   }
   const T by_one = choose(opposed, T(scale * dot(mean, d)), larger(by_low, by_high)),
-          then_by_one = choose(opposed, T(scale_before * dot(mean_before, r)),
-                               larger(then_low, then_high));
+          then_by_one =
+              choose(opposed, T(scale_before * dot(mean_before, r)), larger(then_low, then_high));
   const T now = choose(none, length, by_one),
           then = choose(none, root(length2_before), then_by_one),
           whole = choose(none, edge, depths);
@@ -202,8 +202,7 @@ TISSUE_SIM_INLINE void push_mls_faces(const T* d, const T* n, T gap, T before, c
   out.begins = none_of(less(before, T{}));
   // All in lengths, of a spring of this stiffness.
   const T lasts = dt > 0 ? T(spring.damping / (spring.stiffness * dt)) : T{};
-  const T closed =
-      choose(less(before, all_lanes<T>(0.5f * kMlsApart)), T(before - gap), T{});
+  const T closed = choose(less(before, all_lanes<T>(0.5f * kMlsApart)), T(before - gap), T{});
   const T push = larger(T(lasts * closed - gap), T{});
   T now[3], moved[3], pull[3];
   const T along_n = dot(held, n);
@@ -235,15 +234,14 @@ TISSUE_SIM_INLINE void push_mls_faces(const T* d, const T* n, T gap, T before, c
 
 /// Sets or moves the places held, in reference space, as a push says.
 TISSUE_SIM_INLINE void move_mls_places(const float* inverse_low, const float* inverse_high,
-                                       const float* d, const MlsPush<float, bool>& push,
-                                       float* low, float* high) {
+                                       const float* d, const MlsPush<float, bool>& push, float* low,
+                                       float* high) {
   using mls_contact::dot;
   if (!push.begins && !push.slides) return;
   float of_low[3], of_high[3];
   for (int a = 0; a < 3; ++a) {
     of_low[a] = (push.begins ? push.at[a] : 0.0f) + (push.slides ? push.slide[a] : 0.0f);
-    of_high[a] =
-        (push.begins ? push.at[a] - d[a] : 0.0f) - (push.slides ? push.slide[a] : 0.0f);
+    of_high[a] = (push.begins ? push.at[a] - d[a] : 0.0f) - (push.slides ? push.slide[a] : 0.0f);
   }
   for (int a = 0; a < 3; ++a) {
     low[a] = (push.begins ? 0.0f : low[a]) + dot(inverse_low + 3 * a, of_low);
@@ -271,8 +269,8 @@ TISSUE_SIM_INLINE bool touch_mls_faces(const MlsContactSide& low, const MlsConta
   const float edge = 0.5f * (low.edge + high.edge);
   const float weight = mls_contact_weight(d, low.face[3] + high.face[3], edge);
   const float before = slip.gap;
-  const float now = weight > 0 ? mls_gap(r, d, low.face, high.face, l.normal, h.normal, edge, n)
-                               : kMlsApart;
+  const float now =
+      weight > 0 ? mls_gap(r, d, low.face, high.face, l.normal, h.normal, edge, n) : kMlsApart;
   follow_mls_gap(now, slip.gap, slip.begun);
   if (!(slip.gap < 0)) return false;
   for (int a = 0; a < 3; ++a) {

@@ -240,12 +240,12 @@ TISSUE_SIM_INLINE bool push(const MlsFaceField& f, int block) {
   return true;
 }
 
-#define TISSUE_SIM_MLS_FACE_KERNELS(suffix, W, target)                                     \
+#define TISSUE_SIM_MLS_FACE_KERNELS(suffix, W, target)                                        \
   target bool weigh_##suffix(const MlsFaceField& f, int block) { return weigh<W>(f, block); } \
-  target void turn_##suffix(const float(&F)[9][kBlock], const float(&knows)[2][kBlock],    \
-                            float* record) {                                               \
-    turn<W>(F, knows, record);                                                             \
-  }                                                                                        \
+  target void turn_##suffix(const float(&F)[9][kBlock], const float(&knows)[2][kBlock],       \
+                            float* record) {                                                  \
+    turn<W>(F, knows, record);                                                                \
+  }                                                                                           \
   target bool push_##suffix(const MlsFaceField& f, int block) { return push<W>(f, block); }
 
 TISSUE_SIM_MLS_FACE_KERNELS(sse2, 4, )

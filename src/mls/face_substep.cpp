@@ -59,9 +59,9 @@ void make_record(const MlsState& s, std::int32_t i, float* record) {
 }
 
 float* of_slip(MlsSlip& slip, int row) {
-  float* const rows[] = {slip.low,       slip.low + 1,   slip.low + 2,   slip.high,
-                         slip.high + 1,  slip.high + 2,  slip.apart,     slip.apart + 1,
-                         slip.apart + 2, &slip.gap,      &slip.begun};
+  float* const rows[] = {slip.low,       slip.low + 1,  slip.low + 2, slip.high,
+                         slip.high + 1,  slip.high + 2, slip.apart,   slip.apart + 1,
+                         slip.apart + 2, &slip.gap,     &slip.begun};
   return rows[row];
 }
 
@@ -171,8 +171,8 @@ void MlsFaceSubstep::turn(int block) {
   for (int l = 0; l < kBlock; ++l) {
     const int k = std::min(nodes_ - 1, kBlock * block + l);  // the last one fills the block up
     const std::int32_t i = c.node[k];
-    const float* from = &s_.deformation[9 * static_cast<std::size_t>(i / kMlsChunk) * kMlsChunk +
-                                        i % kMlsChunk];
+    const float* from =
+        &s_.deformation[9 * static_cast<std::size_t>(i / kMlsChunk) * kMlsChunk + i % kMlsChunk];
     for (int m = 0; m < 9; ++m) F[m][l] = from[m * kMlsChunk];
     knows[0][l] = c.knows[k] == kMlsBearsCouples ? 1.0f : 0.0f;
     knows[1][l] = c.knows[k] != kMlsKnowsNothing ? 1.0f : 0.0f;

@@ -29,7 +29,7 @@ struct Search {
   const std::vector<std::int32_t>& outer;
   const std::vector<float>& skin;
   bool faces;
-  double widest = 0;  ///< reach of any two [m]
+  double widest = 0;        ///< reach of any two [m]
   double least_far = 1e30;  ///< least distance in reference space that is far [m]
   std::vector<Vec3> places;
 

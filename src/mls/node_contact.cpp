@@ -89,9 +89,8 @@ void find_node_contacts(MlsState& s, const std::vector<std::int32_t>& piece, flo
       }
       // One edge, or less where they were nearer when they were found: a fresh cut is free of
       // stress.
-      const float rest =
-          std::min(0.5f * (s.edge[i] + s.edge[other]),
-                   static_cast<float>((s.position(i) - s.position(other)).norm()));
+      const float rest = std::min(0.5f * (s.edge[i] + s.edge[other]),
+                                  static_cast<float>((s.position(i) - s.position(other)).norm()));
       contacts.rest[c] = was ? std::max(rest, before.rest[known]) : rest;
     }
   }

@@ -46,7 +46,8 @@ struct MlsNodeContacts {
   std::vector<std::int32_t> begin;  ///< per node, and one more; empty where nothing was looked for
   std::vector<std::int32_t> other;
   std::vector<float> rest;    ///< distance below which they push [m]; with MlsContact::kNodes
-  std::vector<MlsSlip> slip;  ///< with MlsContact::kFaces, as are those below
+  std::vector<MlsSlip> slip;  ///< with MlsContact::kFaces, as are those below; on a CPU as of the
+                              ///< last search: return_slips()
   std::vector<float>
       u_found;              ///< displacements of the nodes at the search that may touch, by number
   std::vector<float> skin;  ///< how far each may move until they are looked for anew [m]
@@ -58,7 +59,7 @@ struct MlsNodeContacts {
   std::vector<MlsKnowsFace> knows;
   std::vector<std::uint8_t> in_chunk;  ///< whether a chunk has any
   MlsFacePairs pairs;
-  Array<float> force;                  ///< what pushes it, 4 each [N]
+  Array<float> force;  ///< what pushes it, 4 each [N]
 };
 
 /// What pulls `node` to `other`.
@@ -102,7 +103,7 @@ struct MlsState {
   Array<float> spring;         ///< per entry: at a sprung node [N/m]; empty without any
   Array<float> spring_room;    ///< zeros for it, so that a cut need not wait for memory
   mutable MlsSprings springs;  ///< the same as passes read it
-  bool viscous = false;            ///< whether any material is
+  bool viscous = false;        ///< whether any material is
 
   std::vector<Collider> colliders;     ///< at the present substep
   std::vector<MlsAnchorPose> anchors;  ///< at its end; empty where none ever moved

@@ -1,8 +1,10 @@
 // Points near one another, found by spatial hashing: quick to build, for points that move.
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <tuple>
 #include <vector>
 
 #include "tissue_sim/types.h"
@@ -30,23 +32,37 @@ class NearGrid {
     for (std::size_t p = 0; p < points.size(); ++p) {
       entry_[next[bucket[p]]++] = {cell_of(points[p]), static_cast<std::int32_t>(p)};
     }
+    for (std::size_t b = 0; b < buckets; ++b) {
+      const auto first = entry_.begin() + begin_[b], last = entry_.begin() + begin_[b + 1];
+      if (last - first > 1) std::stable_sort(first, last);
+    }
+    for (std::size_t e = 0; e < entry_.size(); ++e) {
+      if (e == 0 || entry_[e - 1] < entry_[e] || entry_[e] < entry_[e - 1]) {
+        cell_begin_.push_back(static_cast<std::int32_t>(e));
+      }
+    }
+    cell_begin_.push_back(static_cast<std::int32_t>(entry_.size()));
   }
-  /// Calls f(index, squared distance) for each point at most `radius` [m] away, quickly up to an
-  /// edge of a cell: in an order that hangs on the points alone.
+  /// Cells that have points.
+  int cells() const { return static_cast<int>(cell_begin_.size()) - 1; }
+  /// Calls f(index) for each point of one of them.
   template <class F>
-  void for_each_within(const Vec3& place, double radius, const F& f) const {
-    const Cell low = cell_of(place - Vec3::Constant(radius)),
-               high = cell_of(place + Vec3::Constant(radius));
-    for (std::int32_t z = low.z; z <= high.z; ++z) {
-      for (std::int32_t y = low.y; y <= high.y; ++y) {
-        for (std::int32_t x = low.x; x <= high.x; ++x) {
-          const Cell cell{x, y, z};
-          const std::uint32_t bucket = bucket_of(cell);
+  void for_each_in(int cell, const F& f) const {
+    for (std::int32_t e = cell_begin_[cell]; e < cell_begin_[cell + 1]; ++e) f(entry_[e].point);
+  }
+  /// Calls f(index) for all points that may be within `radius` [m] of one of that cell's, in an
+  /// order that hangs on the points alone.
+  template <class F>
+  void for_each_around(int cell, double radius, const F& f) const {
+    const auto far = static_cast<std::int32_t>(std::ceil(radius * per_cell_ * (1 - 1e-9)));
+    const Cell at = entry_[cell_begin_[cell]].cell;
+    for (std::int32_t z = at.z - far; z <= at.z + far; ++z) {
+      for (std::int32_t y = at.y - far; y <= at.y + far; ++y) {
+        for (std::int32_t x = at.x - far; x <= at.x + far; ++x) {
+          const std::uint32_t bucket = bucket_of({x, y, z});
           for (std::int32_t k = begin_[bucket]; k < begin_[bucket + 1]; ++k) {
             const Entry& e = entry_[k];
-            if (e.cell.x != cell.x || e.cell.y != cell.y || e.cell.z != cell.z) continue;
-            const double distance2 = (points_[e.point] - place).squaredNorm();
-            if (distance2 <= radius * radius) f(e.point, distance2);
+            if (e.cell.x == x && e.cell.y == y && e.cell.z == z) f(e.point);
           }
         }
       }
@@ -60,6 +76,9 @@ class NearGrid {
   struct Entry {
     Cell cell;
     std::int32_t point;
+    bool operator<(const Entry& o) const {
+      return std::tie(cell.x, cell.y, cell.z) < std::tie(o.cell.x, o.cell.y, o.cell.z);
+    }
   };
   Cell cell_of(const Vec3& p) const {
     const auto along = [&](int a) {  // far away, and where it is no number, all share a cell
@@ -80,6 +99,7 @@ class NearGrid {
   std::size_t mask_ = 0;
   std::vector<std::int32_t> begin_;
   std::vector<Entry> entry_;
+  std::vector<std::int32_t> cell_begin_;  ///< in entry_, of cells that have any; and the end
 };
 
 }  // namespace tissue_sim

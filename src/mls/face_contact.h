@@ -13,8 +13,9 @@
 #include <cmath>
 #include <cstdint>
 
-#include "compute/host_device.h"
+#include "compute/choose.h"
 #include "contact/contact_spring.h"
+#include "material/laws.h"
 
 namespace tissue_sim {
 
@@ -56,103 +57,202 @@ inline constexpr float kNone = 1e-4f;      // gaps below count as none [edges]: 
 inline constexpr float kFacing = 0.3f;     // most of n_i . n_j of those that face one another
 inline constexpr float kOpposed = -0.85f;  // of those that look at one another
 
-TISSUE_SIM_INLINE float dot(const float* a, const float* b) {
+template <class T>
+TISSUE_SIM_INLINE T dot(const T* a, const T* b) {
   return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
 
-TISSUE_SIM_INLINE float reach2(const float* face, const float* other, float edge) {
-  const float rest = face[3] + other[3], aside = kAside * edge;
+/// How far two nodes may be apart that feel one another, squared; `rest` is the sum of their
+/// depths.
+template <class T>
+TISSUE_SIM_INLINE T reach2(T rest, T edge) {
+  const T aside = kAside * edge;
   return rest * rest + aside * aside;
 }
 
 }  // namespace mls_contact
 
 /// The weight of two nodes `d` apart: 1 where they stand face to face, 0 where neither feels the
-/// other.
-TISSUE_SIM_INLINE float mls_contact_weight(const float* d, const float* face, const float* other,
-                                           float edge) {
-  const float aside = mls_contact::kAside * edge;
-  const float left =
-      (mls_contact::reach2(face, other, edge) - mls_contact::dot(d, d)) / (aside * aside);
-  return left > 0 ? left * left : 0.0f;
+/// other. `rest` is the sum of their depths. Here and below T = float (GPU) or Vec<W> (CPU).
+template <class T>
+TISSUE_SIM_INLINE T mls_contact_weight(const T* d, T rest, T edge) {
+  const T aside = mls_contact::kAside * edge;
+  const T left = (mls_contact::reach2(rest, edge) - mls_contact::dot(d, d)) / (aside * aside);
+  const T some = larger(left, T{});
+  return some * some;
 }
 
 /// What a node's support tells: nothing where it spans no space; how its face turns; and whether
 /// forces may act beside it, where the support is so good that it does not magnify them.
 enum MlsKnowsFace : std::uint8_t { kMlsKnowsNothing, kMlsKnowsNormal, kMlsBearsCouples };
 
-/// From the deformation gradient, by rows, and the face in reference space.
-TISSUE_SIM_INLINE void set_mls_contact_face(const float* F, const float* face,
-                                            MlsKnowsFace knows_face, MlsContactFace& out) {
-  const float cof[9] = {
-      F[4] * F[8] - F[5] * F[7], F[5] * F[6] - F[3] * F[8], F[3] * F[7] - F[4] * F[6],
-      F[2] * F[7] - F[1] * F[8], F[0] * F[8] - F[2] * F[6], F[1] * F[6] - F[0] * F[7],
-      F[1] * F[5] - F[2] * F[4], F[2] * F[3] - F[0] * F[5], F[0] * F[4] - F[1] * F[3]};
-  const float det = mls_contact::dot(F, cof);
-  constexpr float kLeast = 0.05f;  // of volume that is left
-  const bool knows = knows_face == kMlsBearsCouples && det > kLeast;
-  out.couples = knows ? 1.0f : 0.0f;
+/// From the deformation gradient F, by rows, and the face in reference space. Where it bears no
+/// couples the deformation is I. `Mask` is bool where T is float.
+template <class T, class Mask>
+TISSUE_SIM_INLINE void turn_mls_face(const T* F, const T* face, Mask bears_couples,
+                                     Mask knows_normal, T* deformation, T* inverse, T* normal,
+                                     T& couples) {
+  T cof[9];
+  cofactor(F, cof);
+  const T det = mls_contact::dot(F, cof), one = all_lanes<T>(1);
+  const T least = all_lanes<T>(0.05f);  // of volume that is left
+  const Mask knows = bears_couples & less(least, det);
+  const T per_det = 1.0f / choose(knows, det, one);
+  couples = choose(knows, one, T{});
   for (int k = 0; k < 9; ++k) {
-    const float unit = k % 4 == 0 ? 1.0f : 0.0f;
-    out.deformation[k] = knows ? F[k] : unit;
-    out.inverse[k] = knows ? cof[3 * (k % 3) + k / 3] / det : unit;
+    const T unit = k % 4 == 0 ? one : T{};
+    deformation[k] = choose(knows, F[k], unit);
+    inverse[k] = choose(knows, T(cof[3 * (k % 3) + k / 3] * per_det), unit);
   }
-  float n[3];
+  T n[3];
   for (int a = 0; a < 3; ++a) n[a] = mls_contact::dot(cof + 3 * a, face);
-  const float n2 = mls_contact::dot(n, n);
-  const float scale = knows_face != kMlsKnowsNothing && n2 > 0 ? 1 / sqrtf(n2) : 0.0f;
-  for (int a = 0; a < 3; ++a) out.normal[a] = scale * n[a];
+  const T n2 = mls_contact::dot(n, n);
+  const Mask is = knows_normal & less(T{}, n2);
+  const T scale = choose(is, T(1.0f / root(choose(is, n2, one))), T{});
+  for (int a = 0; a < 3; ++a) normal[a] = scale * n[a];
 }
 
-/// How far the faces of two nodes are apart along their common normal [m]: the mean of theirs where
-/// they look at one another; else, as where the edge of one touches the other, that of the one that
-/// parts them more. `d` leads from the low one to the high one, `n` too. Faces that were near one
-/// another in reference space rest as they lay.
-TISSUE_SIM_INLINE float mls_gap(const MlsContactSide& low, const MlsContactSide& high,
-                                const float* d, float edge, float (&n)[3]) {
+TISSUE_SIM_INLINE void set_mls_contact_face(const float* F, const float* face,
+                                            MlsKnowsFace knows_face, MlsContactFace& out) {
+  turn_mls_face(F, face, knows_face == kMlsBearsCouples, knows_face != kMlsKnowsNothing,
+                out.deformation, out.inverse, out.normal, out.couples);
+}
+
+/// How far the faces of two nodes are apart along their common normal `n` [m]: the mean of theirs
+/// where they look at one another; else, as where the edge of one touches the other, that of the
+/// one that parts them more. `r` leads from the low one to the high one in reference space, `d` as
+/// they are, `n` too. Faces that were near one another in reference space rest as they lay. Here
+/// and below all is of (low, high).
+template <class T>
+TISSUE_SIM_INLINE T mls_gap(const T* r, const T* d, const T* face_low, const T* face_high,
+                            const T* nl, const T* nh, T edge, T* n) {
   using mls_contact::dot;
-  float r[3];
-  for (int a = 0; a < 3; ++a) r[a] = high.place[a] - low.place[a];
-  const bool near = dot(r, r) < mls_contact::reach2(low.face, high.face, edge);
-  const float none = mls_contact::kNone * edge, rest = low.face[3] + high.face[3];
-  const float *nl = low.of->normal, *nh = high.of->normal;
-  const bool knows_low = dot(nl, nl) > 0, knows_high = dot(nh, nh) > 0;
-  if (!knows_low && !knows_high) {
-    const float length = sqrtf(dot(d, d)), before = sqrtf(dot(r, r));
-    for (int a = 0; a < 3; ++a) n[a] = d[a] / fmaxf(length, 1e-12f);
-    return length - (near ? fminf(edge, before) : edge) + none;
+  const T half = all_lanes<T>(0.5f), far = all_lanes<T>(kMlsApart), tiny = all_lanes<T>(1e-12f);
+  const T depths = face_low[3] + face_high[3], length2_before = dot(r, r), length2 = dot(d, d);
+  const auto near = less(length2_before, mls_contact::reach2(depths, edge));
+  const auto knows_low = less(half, dot(nl, nl)), knows_high = less(half, dot(nh, nh));
+  const auto both = knows_low & knows_high, none = none_of(knows_low | knows_high);
+  const T cosine = dot(nl, nh);
+  const auto opposed = both & less(cosine, all_lanes<T>(mls_contact::kOpposed));
+  T mean[3], mean_before[3];
+  for (int a = 0; a < 3; ++a) {
+    mean[a] = nl[a] - nh[a];
+    mean_before[a] = face_low[a] - face_high[a];
   }
-  const bool both = knows_low && knows_high;
-  if (both && dot(nl, nh) > mls_contact::kFacing) return kMlsApart;
-  float now = -kMlsApart, then = -kMlsApart;  // along the normal that parts them most
-  const auto part_along = [&](const float* m, const float* M) {
-    then = fmaxf(then, dot(M, r));
-    const float parted = dot(m, d);
-    if (parted <= now) return;
-    now = parted;
-    for (int a = 0; a < 3; ++a) n[a] = m[a];
-  };
-  float m[3], M[3];
-  if (both && dot(nl, nh) < mls_contact::kOpposed) {
-    for (int a = 0; a < 3; ++a) {
-      m[a] = nl[a] - nh[a];
-      M[a] = low.face[a] - high.face[a];
-    }
-    const float scale = 1 / sqrtf(dot(m, m)), scale_M = 1 / sqrtf(fmaxf(dot(M, M), 1e-12f));
-    for (int a = 0; a < 3; ++a) {
-      m[a] *= scale;
-      M[a] *= scale_M;
-    }
-    part_along(m, M);
-  } else {
-    if (knows_low) part_along(nl, low.face);
-    for (int a = 0; a < 3; ++a) {
-      m[a] = -nh[a];
-      M[a] = -high.face[a];
-    }
-    if (knows_high) part_along(m, M);
+  const T scale = 1.0f / root(choose(opposed, dot(mean, mean), all_lanes<T>(1)));
+  const T scale_before = 1.0f / root(larger(dot(mean_before, mean_before), tiny));
+  // Along the normal that parts them most.
+  const T by_low = choose(knows_low, dot(nl, d), T(-far)),
+          by_high = choose(knows_high, T(-dot(nh, d)), T(-far));
+  const T then_low = choose(knows_low, dot(face_low, r), T(-far)),
+          then_high = choose(knows_high, T(-dot(face_high, r)), T(-far));
+  const auto is_high = less(by_low, by_high);
+  const T length = root(length2), per_length = 1.0f / larger(length, tiny);
+  for (int a = 0; a < 3; ++a) {
+    const T by_one = choose(is_high, T(-nh[a]), nl[a]);
+    n[a] = choose(none, T(per_length * d[a]), choose(opposed, T(scale * mean[a]), by_one));
   }
-  return now - (near ? fminf(rest, then) : rest) + none;
+  const T by_one = choose(opposed, T(scale * dot(mean, d)), larger(by_low, by_high)),
+          then_by_one =
+              choose(opposed, T(scale_before * dot(mean_before, r)), larger(then_low, then_high));
+  const T now = choose(none, length, by_one),
+          then = choose(none, root(length2_before), then_by_one),
+          whole = choose(none, edge, depths);
+  const T rest = choose(near & less(then, whole), then, whole);
+  const T gap = now - rest + mls_contact::kNone * edge;
+  return choose(both & less(all_lanes<T>(mls_contact::kFacing), cosine), far, gap);
+}
+
+/// What MlsSlip::gap and begun come to where that is the gap now, kMlsApart where no weight is
+/// left: the nodes push one another where it falls below 0.
+template <class T>
+TISSUE_SIM_INLINE void follow_mls_gap(T now, T& gap, T& begun) {
+  const T first = choose(less(gap, all_lanes<T>(kMlsFresh)), larger(begun, now), now);
+  begun = -larger(T(-first), T{});
+  gap = now - begun;
+}
+
+/// How two nodes that touch push one another, once each.
+template <class T, class Mask>
+struct MlsPush {
+  T force[3];           ///< on the low one [N]
+  T at[3];              ///< from the low one to where it acts [m]
+  T slide[3];           ///< how far the places held of each slide, the high one's back [m]
+  Mask begins, slides;  ///< the places held are to be set; to be moved
+};
+
+/// What a push follows from besides the gap, of both nodes.
+template <class T>
+struct MlsSpringOfFaces {
+  T stiffness, damping;  ///< of both in series, times the weight's share
+  T friction;            ///< Coulomb's coefficient
+  T couples_low, couples_high;
+};
+
+/// Of two nodes that touch: `gap` as follow_mls_gap() left it, `before` what it was, `apart` of
+/// MlsSlip, which follows; `held` from the place held of the low one to that of the high one, as
+/// they are deformed. `dt` is the time since [s].
+template <class T, class Mask>
+TISSUE_SIM_INLINE void push_mls_faces(const T* d, const T* n, T gap, T before, const T* held,
+                                      const MlsSpringOfFaces<T>& spring, float dt, T* apart,
+                                      MlsPush<T, Mask>& out) {
+  using mls_contact::dot;
+  // In the middle, or at the one that bears no couples.
+  const T there = 0.5f * (1.0f + spring.couples_low - spring.couples_high);
+  out.begins = none_of(less(before, T{}));
+  // All in lengths, of a spring of this stiffness.
+  const T lasts = dt > 0 ? T(spring.damping / (spring.stiffness * dt)) : T{};
+  const T closed = choose(less(before, all_lanes<T>(0.5f * kMlsApart)), T(before - gap), T{});
+  const T push = larger(T(lasts * closed - gap), T{});
+  T now[3], moved[3], pull[3];
+  const T along_n = dot(held, n);
+  for (int a = 0; a < 3; ++a) {
+    out.at[a] = there * d[a];
+    now[a] = choose(out.begins, T{}, T(held[a] - along_n * n[a]));
+    moved[a] = choose(out.begins, T{}, T(now[a] - apart[a]));
+  }
+  const T moved_n = dot(moved, n);
+  for (int a = 0; a < 3; ++a) pull[a] = now[a] + lasts * (moved[a] - moved_n * n[a]);
+  const Mask any_couples = less(T{}, T(spring.couples_low + spring.couples_high));
+  const T limit = choose(any_couples, T(spring.friction * push), T{});
+  const T pull2 = dot(pull, pull);
+  out.slides = less(T(limit * limit), pull2);
+  const T one = all_lanes<T>(1);
+  const T scale = choose(out.slides, T(limit / root(choose(out.slides, pull2, one))), one);
+  for (int a = 0; a < 3; ++a) {  // the places held slide, each half the way
+    pull[a] *= scale;
+    out.slide[a] = 0.5f * (now[a] - pull[a]);
+    apart[a] = choose(out.slides, pull[a], now[a]);
+    out.force[a] = spring.stiffness * (pull[a] - push * n[a]);
+  }
+  // Without couples along the line between them alone.
+  const T along_d = dot(out.force, d) / larger(dot(d, d), all_lanes<T>(1e-20f));
+  for (int a = 0; a < 3; ++a) {
+    out.force[a] = choose(any_couples, out.force[a], T(along_d * d[a]));
+  }
+}
+
+/// Sets or moves the places held, in reference space, as a push says.
+TISSUE_SIM_INLINE void move_mls_places(const float* inverse_low, const float* inverse_high,
+                                       const float* d, const MlsPush<float, bool>& push, float* low,
+                                       float* high) {
+  using mls_contact::dot;
+  if (!push.begins && !push.slides) return;
+  float of_low[3], of_high[3];
+  for (int a = 0; a < 3; ++a) {
+    of_low[a] = (push.begins ? push.at[a] : 0.0f) + (push.slides ? push.slide[a] : 0.0f);
+    of_high[a] = (push.begins ? push.at[a] - d[a] : 0.0f) - (push.slides ? push.slide[a] : 0.0f);
+  }
+  for (int a = 0; a < 3; ++a) {
+    low[a] = (push.begins ? 0.0f : low[a]) + dot(inverse_low + 3 * a, of_low);
+    high[a] = (push.begins ? 0.0f : high[a]) + dot(inverse_high + 3 * a, of_high);
+  }
+}
+
+/// Of springs, and of dampers.
+template <class T>
+TISSUE_SIM_INLINE T in_series(T a, T b) {
+  return a * b / (a + b);
 }
 
 /// Whether the two nodes push one another: the force on the low one [N], and from it to where that
@@ -160,71 +260,35 @@ TISSUE_SIM_INLINE float mls_gap(const MlsContactSide& low, const MlsContactSide&
 TISSUE_SIM_INLINE bool touch_mls_faces(const MlsContactSide& low, const MlsContactSide& high,
                                        float dt, MlsSlip& slip, float (&force)[3], float (&at)[3]) {
   using mls_contact::dot;
-  float d[3], n[3] = {};
+  float r[3], d[3], n[3] = {}, held[3];
   for (int a = 0; a < 3; ++a) {
-    d[a] = (high.place[a] - low.place[a]) + (high.u[a] - low.u[a]);
+    r[a] = high.place[a] - low.place[a];
+    d[a] = r[a] + (high.u[a] - low.u[a]);
   }
-  const float edge = 0.5f * (low.edge + high.edge);
-  const float weight = mls_contact_weight(d, low.face, high.face, edge);
-  const float before = slip.gap;
-  slip.gap = weight > 0 ? mls_gap(low, high, d, edge, n) : kMlsApart;
-  slip.begun = fminf(0.0f, before < kMlsFresh ? fmaxf(slip.begun, slip.gap) : slip.gap);
-  slip.gap -= slip.begun;
-  if (!(slip.gap < 0)) return false;
   const MlsContactFace &l = *low.of, &h = *high.of;
-  // In the middle, or at the one that bears no couples.
-  const float there = 0.5f * (1 + l.couples - h.couples);
-  for (int a = 0; a < 3; ++a) at[a] = there * d[a];
-  if (!(before < 0)) {  // they begin to touch
-    for (int a = 0; a < 3; ++a) {
-      slip.apart[a] = 0;
-      slip.low[a] = dot(l.inverse + 3 * a, at);
-      const float from_high[3] = {at[0] - d[0], at[1] - d[1], at[2] - d[2]};
-      slip.high[a] = dot(h.inverse + 3 * a, from_high);
-    }
+  const float edge = 0.5f * (low.edge + high.edge);
+  const float weight = mls_contact_weight(d, low.face[3] + high.face[3], edge);
+  const float before = slip.gap;
+  const float now =
+      weight > 0 ? mls_gap(r, d, low.face, high.face, l.normal, h.normal, edge, n) : kMlsApart;
+  follow_mls_gap(now, slip.gap, slip.begun);
+  if (!(slip.gap < 0)) return false;
+  for (int a = 0; a < 3; ++a) {
+    held[a] = d[a] + dot(h.deformation + 3 * a, slip.high) - dot(l.deformation + 3 * a, slip.low);
   }
-  // All in lengths, of a spring of this stiffness.
   const float share = 0.5f * weight * (1 / l.weights + 1 / h.weights);
-  const float stiffness = share * low.spring.stiffness * high.spring.stiffness /
-                          (low.spring.stiffness + high.spring.stiffness);
-  const float damping =
-      share * low.spring.damping * high.spring.damping / (low.spring.damping + high.spring.damping);
-  const float lasts = dt > 0 ? damping / (stiffness * dt) : 0.0f;
-  const float closed = before < 0.5f * kMlsApart ? before - slip.gap : 0.0f;
-  const float push = fmaxf(0.0f, -slip.gap + lasts * closed);
-  float apart[3], pull[3];
+  MlsSpringOfFaces<float> spring;
+  spring.stiffness = share * in_series(low.spring.stiffness, high.spring.stiffness);
+  spring.damping = share * in_series(low.spring.damping, high.spring.damping);
+  spring.friction = low.root_friction * high.root_friction;
+  spring.couples_low = l.couples;
+  spring.couples_high = h.couples;
+  MlsPush<float, bool> push;
+  push_mls_faces(d, n, slip.gap, before, held, spring, dt, slip.apart, push);
+  move_mls_places(l.inverse, h.inverse, d, push, slip.low, slip.high);
   for (int a = 0; a < 3; ++a) {
-    apart[a] = d[a] + dot(h.deformation + 3 * a, slip.high) - dot(l.deformation + 3 * a, slip.low);
-  }
-  const float along_n = dot(apart, n);
-  for (int a = 0; a < 3; ++a) apart[a] -= along_n * n[a];
-  float moved[3];
-  for (int a = 0; a < 3; ++a) moved[a] = apart[a] - slip.apart[a];
-  const float moved_n = dot(moved, n);
-  for (int a = 0; a < 3; ++a) pull[a] = apart[a] + lasts * (moved[a] - moved_n * n[a]);
-  const bool any_couples = l.couples + h.couples > 0;
-  const float limit = any_couples ? low.root_friction * high.root_friction * push : 0.0f;
-  const float pull2 = dot(pull, pull);
-  if (pull2 > limit * limit) {  // the places held slide, each half the way
-    const float scale = limit / sqrtf(pull2);
-    float half[3];
-    for (int a = 0; a < 3; ++a) {
-      pull[a] *= scale;
-      half[a] = 0.5f * (apart[a] - pull[a]);
-      apart[a] = pull[a];
-    }
-    for (int a = 0; a < 3; ++a) {
-      slip.low[a] += dot(l.inverse + 3 * a, half);
-      slip.high[a] -= dot(h.inverse + 3 * a, half);
-    }
-  }
-  for (int a = 0; a < 3; ++a) {
-    slip.apart[a] = apart[a];
-    force[a] = stiffness * (pull[a] - push * n[a]);
-  }
-  if (!any_couples) {  // along the line between them alone
-    const float share = dot(force, d) / fmaxf(dot(d, d), 1e-20f);
-    for (int a = 0; a < 3; ++a) force[a] = share * d[a];
+    force[a] = push.force[a];
+    at[a] = push.at[a];
   }
   return true;
 }

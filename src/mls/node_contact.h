@@ -30,16 +30,10 @@ inline void search_node_contacts(MlsState& state) {
 /// elsewhere.
 void number_node_contacts(MlsState& state);
 
-/// The same: after the stresses, of the k-th node that may touch others: its face as it is
-/// deformed, then what pushes it (mls/face_contact.h), of which the part that turns goes into its
-/// stress.
-void find_contact_face(MlsState& state, int k);
-void push_node(MlsState& state, int k);
-
 /// Adds to force[3] on node i what those that touch it push. With MlsContact::kNodes: springs of
 /// both nodes in series and dampers along the line between them, which only push. The same for both
 /// nodes but for the sign, so momentum stays; angular momentum does, too, of faces with what
-/// push_node() left in the stress.
+/// MlsFaceSubstep left in the stress.
 void add_node_contact(const MlsState& state, std::int32_t i, float* force);
 
 }  // namespace tissue_sim

@@ -5,6 +5,7 @@
 
 #include "compute/archive.h"
 #include "frame/state_fields.h"
+#include "mls/face_substep.h"
 #include "mls/faces.h"
 #include "mls/node_contact.h"
 #include "mls/own_rate.h"
@@ -35,7 +36,7 @@ void fields(Archive& archive, MlsNodeContacts& c) {
 template <class Archive>
 void fields(Archive& archive, MlsState& s) {
   archive(s.pairs.crossed, s.pairs.weight, s.u, s.v, s.inverse_moment, s.kappa, s.outer, s.sprung,
-          s.any_sprung, s.spring, s.contact, s.node_contacts, s.until_list, s.dt, s.time);
+          s.spring, s.contact, s.node_contacts, s.until_list, s.dt, s.time);
 }
 
 template <class Archive>
@@ -51,6 +52,7 @@ void MlsTissue::each_field(Archive& archive) {
 }
 
 std::vector<std::uint8_t> MlsTissue::save() {
+  return_slips(state_->node_contacts);
   ArchiveWriter out;
   each_field(out);
   return out.take();
@@ -70,6 +72,7 @@ void MlsTissue::restore(Span<const std::uint8_t> saved) {
     put_strained_volume(s, i, strained_volume(s, i));
     if (touches_by_faces(s)) remake_face(s, i);
   }
+  s.springs.begin.clear();
   number_node_contacts(s);
   if (in.left() > 0) throw std::runtime_error("the state has more to it than this version knows");
 }

@@ -3,9 +3,12 @@
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
+#include <numeric>
+#include <tuple>
 
 #include "frame/leapfrog.h"
 #include "mls/contact.h"
+#include "mls/face_substep.h"
 #include "mls/faces.h"
 #include "mls/node_contact.h"
 #include "mls/own_rate.h"
@@ -69,9 +72,7 @@ void make_springs(MlsState& s, std::int32_t i) {
   for (std::int32_t e = s.pairs.begin[i]; e < s.pairs.begin[i + 1]; ++e) {
     s.spring[e] =
         s.pairs.weight[e] > 0 ? static_cast<float>(stiffness * s.pairs.weight[e] / sum) : 0.0f;
-    s.any_sprung[s.pairs.other[e] / kMlsChunk] = 1;
   }
-  s.any_sprung[i / kMlsChunk] = 1;
 }
 
 void remake_node(MlsState& s, std::int32_t i) {
@@ -91,22 +92,46 @@ void remake_node(MlsState& s, std::int32_t i) {
   put_strained_volume(s, i, strained_volume(s, i, sums));
 }
 
-/// Forces of springs on node i.
-void add_springs(const MlsState& s, const float* u, std::int32_t i, float* force) {
-  for (std::int32_t e = s.pairs.begin[i]; e < s.pairs.begin[i + 1]; ++e) {
-    const std::int32_t j = s.pairs.other[e];
-    const float k = s.spring[e] + s.spring[s.pairs.twin[e]];
-    if (!(k > 0)) continue;
-    float r2 = 0, x2 = 0, x[3];
+/// Lists all springs, at both of their nodes.
+void list_springs(const MlsState& s) {
+  MlsSprings& springs = s.springs;
+  springs.all.clear();
+  for (std::int32_t i = 0; i < s.count() && !s.spring.empty(); ++i) {
+    if (s.sprung[i] == 0) continue;
+    for (std::int32_t e = s.pairs.begin[i]; e < s.pairs.begin[i + 1]; ++e) {
+      const std::int32_t j = s.pairs.other[e];
+      const float k = s.spring[e] + s.spring[s.pairs.twin[e]];
+      if (!(k > 0)) continue;
+      float r2 = 0;
+      for (int a = 0; a < 3; ++a) {
+        const float r = s.place[4 * j + a] - s.place[4 * i + a];
+        r2 += r * r;
+      }
+      springs.all.push_back({i, j, k, std::sqrt(r2)});
+      if (s.sprung[j] == 0) springs.all.push_back({j, i, k, std::sqrt(r2)});
+    }
+  }
+  std::sort(springs.all.begin(), springs.all.end(), [](const MlsSpring& a, const MlsSpring& b) {
+    return std::tie(a.node, a.other) < std::tie(b.node, b.other);
+  });
+  springs.begin.assign(s.chunks() + 1, 0);
+  for (const MlsSpring& spring : springs.all) ++springs.begin[spring.node / kMlsChunk + 1];
+  std::partial_sum(springs.begin.begin(), springs.begin.end(), springs.begin.begin());
+}
+
+/// Forces of springs on a chunk's nodes.
+void add_springs(const MlsState& s, const float* u, int chunk, float* force) {
+  for (std::int32_t k = s.springs.begin[chunk]; k < s.springs.begin[chunk + 1]; ++k) {
+    const MlsSpring& spring = s.springs.all[k];
+    const std::int32_t i = spring.node, j = spring.other;
+    float x2 = 0, x[3];
     for (int a = 0; a < 3; ++a) {
-      const float r = s.place[4 * j + a] - s.place[4 * i + a];
-      x[a] = r + (u[4 * j + a] - u[4 * i + a]);
-      r2 += r * r;
+      x[a] = (s.place[4 * j + a] - s.place[4 * i + a]) + (u[4 * j + a] - u[4 * i + a]);
       x2 += x[a] * x[a];
     }
     const float length = std::sqrt(x2);
-    const float scale = k * (length - std::sqrt(r2)) / std::max(length, 1e-12f);
-    for (int a = 0; a < 3; ++a) force[a] += scale * x[a];
+    const float scale = spring.stiffness * (length - spring.rest) / std::max(length, 1e-12f);
+    for (int a = 0; a < 3; ++a) force[4 * (i - chunk * kMlsChunk) + a] += scale * x[a];
   }
 }
 
@@ -149,7 +174,6 @@ std::unique_ptr<MlsState> make_mls_state(const Scene& scene, std::vector<std::st
   resize_padded(s.sprung, n, 1);
   resize_padded(s.outer, n, 1);
   resize_padded(s.cut, n, 1);
-  s.any_sprung.assign(s.chunks(), 0);
   s.contact.resize(s.groups());
   const double factor = support_factor(scene.mls.neighbours);
   std::vector<std::int32_t> all(n);
@@ -216,6 +240,7 @@ void remake(MlsState& s, const std::vector<std::int32_t>& nodes) {
       std::fill(&s.spring[s.pairs.begin[i]], s.spring.data() + s.pairs.begin[i + 1], 0.0f);
     }
   }
+  s.springs.begin.clear();
 }
 
 MlsField field_of(const MlsState& s) { return field_of(s, s.u.data(), s.v.data()); }
@@ -244,6 +269,7 @@ MlsField field_of(const MlsState& s, const float* u, const float* v) {
   f.neo_hookean = s.neo_hookean.data();
   f.stress = const_cast<float*>(s.stress.data());
   f.viscous = s.viscous && v != nullptr;
+  if (s.springs.begin.empty()) list_springs(s);
   s.cpu->for_each(
       s.chunks(), [&](int chunk) { s.kernels->spread(f, chunk); }, 64);
   return f;
@@ -251,8 +277,8 @@ MlsField field_of(const MlsState& s, const float* u, const float* v) {
 
 float substep(MlsState& s, float dt, std::vector<ColliderLoad>& loads) {
   MlsField field = field_of(s);
-  const bool touches = !s.node_contacts.node.empty();
-  if (touches) {
+  MlsFaceSubstep touching(s, dt);
+  if (touching.nodes() > 0) {
     field.touching = s.node_contacts.in_chunk.data();
     field.deformation = s.deformation.data();
   }
@@ -266,11 +292,9 @@ float substep(MlsState& s, float dt, std::vector<ColliderLoad>& loads) {
     alignas(64) float force[4 * kMlsGroup];
     for (int i = first; i < last; i += kMlsChunk) {
       s.kernels->forces(field, i / kMlsChunk, force + 4 * (i - first));
+      add_springs(s, s.u.data(), i / kMlsChunk, force + 4 * (i - first));
     }
     for (int i = first; i < last; ++i) {
-      if (s.any_sprung[i / kMlsChunk] != 0) {
-        add_springs(s, s.u.data(), i, force + 4 * (i - first));
-      }
       if (!s.node_contacts.begin.empty()) add_node_contact(s, i, force + 4 * (i - first));
     }
     if (list) list_near(s, group, dt);
@@ -288,17 +312,21 @@ float substep(MlsState& s, float dt, std::vector<ColliderLoad>& loads) {
       store<4>(&s.u_next[4 * i], u);
     }
   };
-  const int touching = static_cast<int>(s.node_contacts.node.size());
-  SharedWork stresses(s.chunks(), 4), faces(touching, 16), touches_of(touching, 16),
-      moves(s.groups(), 1);
+  SharedWork stresses(s.chunks(), 4), weights(touching.pair_blocks(), 8),
+      turns(touching.node_blocks(), 2), pushes(touching.pair_blocks(), 4),
+      takes(touching.nodes(), 32), moves(s.groups(), 1);
   s.cpu->on_each_thread([&] {
+    weights.help([&](int block) { touching.weigh(block); });
     stresses.help([&](int chunk) { s.kernels->stresses(field, chunk); });
+    weights.wait();
     stresses.wait();
-    if (touches) {
-      faces.help([&](int k) { find_contact_face(s, k); });
-      faces.wait();
-      touches_of.help([&](int k) { push_node(s, k); });
-      touches_of.wait();
+    if (touching.nodes() > 0) {
+      turns.help([&](int block) { touching.turn(block); });
+      turns.wait();
+      pushes.help([&](int block) { touching.push(block); });
+      pushes.wait();
+      takes.help([&](int k) { touching.take(k); });
+      takes.wait();
     }
     moves.help(move_group);
   });
@@ -326,12 +354,8 @@ void internal_forces(MlsState& s, const float* u, float* force) {
   s.cpu->for_each(
       s.chunks(),
       [&](int chunk) {
-        const int first = chunk * kMlsChunk;
-        s.kernels->forces(field, chunk, force + 4 * first);
-        if (s.any_sprung[chunk] == 0) return;
-        for (int i = first; i < std::min(s.count(), first + kMlsChunk); ++i) {
-          add_springs(s, u, i, force + 4 * i);
-        }
+        s.kernels->forces(field, chunk, force + 4 * kMlsChunk * chunk);
+        add_springs(s, u, chunk, force + 4 * kMlsChunk * chunk);
       },
       4);
 }

@@ -11,6 +11,7 @@
 #include "compute/simd.h"
 #include "mls/anchors.h"
 #include "mls/face_contact.h"
+#include "mls/face_pairs.h"
 #include "mls/kernels.h"
 #include "mls/lanes.h"
 #include "mls/nodes.h"
@@ -45,7 +46,8 @@ struct MlsNodeContacts {
   std::vector<std::int32_t> begin;  ///< per node, and one more; empty where nothing was looked for
   std::vector<std::int32_t> other;
   std::vector<float> rest;    ///< distance below which they push [m]; with MlsContact::kNodes
-  std::vector<MlsSlip> slip;  ///< with MlsContact::kFaces, as are those below
+  std::vector<MlsSlip> slip;  ///< with MlsContact::kFaces, as are those below; on a CPU as of the
+                              ///< last search: return_slips()
   std::vector<float>
       u_found;              ///< displacements of the nodes at the search that may touch, by number
   std::vector<float> skin;  ///< how far each may move until they are looked for anew [m]
@@ -56,8 +58,21 @@ struct MlsNodeContacts {
   std::vector<std::int32_t> at;  ///< of each node where it is among those, -1
   std::vector<MlsKnowsFace> knows;
   std::vector<std::uint8_t> in_chunk;  ///< whether a chunk has any
-  std::vector<MlsContactFace> face;    ///< as of the present substep
-  Array<float> force;                  ///< what pushes it, 4 each [N]
+  MlsFacePairs pairs;
+  Array<float> force;  ///< what pushes it, 4 each [N]
+};
+
+/// What pulls `node` to `other`.
+struct MlsSpring {
+  std::int32_t node, other;
+  float stiffness;  ///< of both nodes' springs [N/m]
+  float rest;       ///< [m]
+};
+
+/// All springs, each at both of its nodes, by these.
+struct MlsSprings {
+  std::vector<MlsSpring> all;
+  std::vector<std::int32_t> begin;  ///< per chunk, and one more; empty: to be listed anew
 };
 
 struct MlsState {
@@ -84,11 +99,11 @@ struct MlsState {
   Array<float> contact_stiffness, contact_damping;    ///< node_spring() [N/m], [N s/m]
   Array<std::uint8_t> outer;                          ///< at the surface, or a cut passes beside it
   Array<std::uint8_t> cut;                            ///< a pair of it is crossed
-  Array<std::uint8_t> sprung;      ///< its support spans no space: springs to its neighbours do
-  Array<std::uint8_t> any_sprung;  ///< per chunk: a sprung node, or the neighbour of one
-  Array<float> spring;             ///< per entry: at a sprung node [N/m]; empty without any
-  Array<float> spring_room;        ///< zeros for it, so that a cut need not wait for memory
-  bool viscous = false;            ///< whether any material is
+  Array<std::uint8_t> sprung;  ///< its support spans no space: springs to its neighbours do
+  Array<float> spring;         ///< per entry: at a sprung node [N/m]; empty without any
+  Array<float> spring_room;    ///< zeros for it, so that a cut need not wait for memory
+  mutable MlsSprings springs;  ///< the same as passes read it
+  bool viscous = false;        ///< whether any material is
 
   std::vector<Collider> colliders;     ///< at the present substep
   std::vector<MlsAnchorPose> anchors;  ///< at its end; empty where none ever moved

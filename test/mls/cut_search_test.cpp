@@ -98,17 +98,23 @@ TEST(NearGrid, FindsWhatIsNear) {
   points.push_back(Vec3(1e9, 0, -1e9));
   points.push_back(Vec3::Constant(std::nan("")));
   const NearGrid grid(points, 0.2);
+  int in_cells = 0;
   for (const double radius : {0.05, 0.2, 0.7}) {
-    for (const Vec3& place : points) {
-      std::vector<int> found, expected;
-      grid.for_each_within(place, radius, [&](std::int32_t p, double) { found.push_back(p); });
-      for (int p = 0; p < static_cast<int>(points.size()); ++p) {
-        if ((points[p] - place).squaredNorm() <= radius * radius) expected.push_back(p);
-      }
-      std::sort(found.begin(), found.end());
-      ASSERT_EQ(found, expected);
+    for (int cell = 0; cell < grid.cells(); ++cell) {
+      std::vector<int> around;
+      grid.for_each_around(cell, radius, [&](std::int32_t p) { around.push_back(p); });
+      std::sort(around.begin(), around.end());
+      ASSERT_EQ(std::unique(around.begin(), around.end()), around.end());
+      grid.for_each_in(cell, [&](std::int32_t own) {
+        ++in_cells;
+        for (int p = 0; p < static_cast<int>(points.size()); ++p) {
+          if (!((points[p] - points[own]).squaredNorm() <= radius * radius)) continue;
+          ASSERT_TRUE(std::binary_search(around.begin(), around.end(), p)) << p << ' ' << own;
+        }
+      });
     }
   }
+  EXPECT_EQ(in_cells, 3 * static_cast<int>(points.size()));
 }
 
 }  // namespace

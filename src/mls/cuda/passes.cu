@@ -258,7 +258,7 @@ __global__ void __launch_bounds__(kMlsThreads)
     const CudaMlsFace& other = contacts.of_node[j];
     float d[3];
     way(f, at.u, i, j, d);
-    sum += mls_contact_weight(d, own.face, other.face, 0.5f * (own.edge + other.edge));
+    sum += mls_contact_weight(d, own.face[3] + other.face[3], 0.5f * (own.edge + other.edge));
   }
   face.weights = fmaxf(1.0f, sum);
   contacts.face[k] = face;

@@ -101,9 +101,9 @@ CapMesh mirrored(const std::vector<Closed>& all, const std::vector<std::int32_t>
   return {};
 }
 
-/// A surface that closes a wound: what closed its `other_side`, the blade's sheets, a smooth one, or at last one that any loop
-/// has. The first that is sound, or the one that is soundest; no triangles where all are slivers,
-/// and the wound stays open.
+/// A surface that closes a wound: what closed its `other_side`, the blade's sheets, a smooth one,
+/// or at last one that any loop has. The first that is sound, or the one that is soundest; no
+/// triangles where all are slivers, and the wound stays open.
 CapMesh choose_cap(const State& s, const std::vector<std::int32_t>& loop, const Edges& edges,
                    const Edges& joined, const std::vector<Vec3>& corners, double size,
                    CapMesh other_side) {

@@ -226,7 +226,8 @@ class SoundCut {
         bad.emplace(of, Unsound::kAngle);
       } else if (!(p.edge >= std::min(was.edge, SoundMesh::kLeastEdge * s_.mean_edge))) {
         bad.emplace(of, Unsound::kEdge);
-      } else if (is_closed_body(p) && !(p.hole() <= std::max(was.hole(), SoundMesh::kLargestHole))) {
+      } else if (is_closed_body(p) &&
+                 !(p.hole() <= std::max(was.hole(), SoundMesh::kLargestHole))) {
         bad.emplace(of, Unsound::kHole);
       }
     }

@@ -269,8 +269,8 @@ TEST(SoundCuts, AnInstrumentsStrokesLeaveNoSlivers) {
   EXPECT_GE(tissue.fragments().size(), 2u);  // the second stroke runs along the first one's wall
 }
 
-// Both sides of a wound get the same wall. Where a triangle lay across the rim of one of them, which
-// the blade's sheet would have doubled, another wall once lost half a per cent of the volume.
+// Both sides of a wound get the same wall. Where a triangle lay across the rim of one of them,
+// which the blade's sheet would have doubled, another wall once lost half a per cent of the volume.
 TEST(SoundCuts, WallsOfBothSidesAreTheSame) {
   struct Wave {
     double x, height, lean;
@@ -314,11 +314,12 @@ TEST_P(CutMeshes, CutsAtRandomNeitherBlowUpNorLeakNorMakeSlivers) {
     const Leaks open = leaks(tissue.state());
     std::printf(
         "   %zu pieces, %d vertices, volume %.4f, smallest edge %.3f of the mean, angle %.2f "
-        "degrees, fastest %.1e m/s; %d cuts did nothing, %d left pieces whole; with a hole: %d pieces, "
+        "degrees, fastest %.1e m/s; %d cuts did nothing, %d left pieces whole; with a hole: %d "
+        "pieces, "
         "%.5f of the volume\n",
         tissue.fragments().size(), tissue.state().vertices.size(), whole_volume(tissue) / volume,
-        least.edge / tissue.state().mean_edge, least.angle * 57.29578, fastest, nothing,
-        left_whole, open.pieces, open.volume / volume);
+        least.edge / tissue.state().mean_edge, least.angle * 57.29578, fastest, nothing, left_whole,
+        open.pieces, open.volume / volume);
     std::fflush(stdout);
     return least;
   };

@@ -22,8 +22,7 @@ __global__ void __launch_bounds__(kThreads)
   const int item = static_cast<int>(blockIdx.x * blockDim.x + threadIdx.x);
   if (item >= count * kLanes) return;
   const float inverse_h2 = frame->step.inverse_h2;
-  project_item<Kind, kKeep>(load_item(blocks, item), inverse_h2, Places{x}, multipliers,
-                            item);
+  project_item<Kind, kKeep>(load_item(blocks, item), inverse_h2, Places{x}, multipliers, item);
 }
 
 template <class Kind, bool kKeep>

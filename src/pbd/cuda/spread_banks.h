@@ -15,11 +15,12 @@ namespace pbd {
 /// gives the same bits.
 inline constexpr int kBanks = 8;
 
-/// The blocks of a set with the lanes of each part of a colour (`first`: CudaPbdSet) ordered so that eight that follow one another
-/// rarely meet: greedy, among the next kAhead. Random order takes 2.7 turns for a vertex.
+/// The blocks of a set with the lanes of each part of a colour (`first`: CudaPbdSet) ordered so
+/// that eight that follow one another rarely meet: greedy, among the next kAhead. Random order
+/// takes 2.7 turns for a vertex.
 template <class Kind>
 std::vector<ConstraintBlock<Kind>> spread_banks(const ConstraintSet<Kind>& set,
-                                                 const std::vector<std::int32_t>& first) {
+                                                const std::vector<std::int32_t>& first) {
   constexpr int kAhead = 48;
   std::vector<ConstraintBlock<Kind>> result(set.blocks.begin(), set.blocks.end());
   std::vector<std::int32_t> left;

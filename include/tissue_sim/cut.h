@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <string>
 #include <vector>
 
 #include "tissue_sim/types.h"
@@ -24,6 +25,8 @@ struct CutReport {
   int64_t bonds_broken = 0;        ///< bonds between neighbouring particles
   int points_separated = 0;        ///< particles that lost a bond
   std::vector<int> new_fragments;  ///< ids that appeared
+  int pieces_left_whole = 0;       ///< that the blade met and that are not cut ...
+  std::string why_left_whole;      ///< ... in a sentence, how many and why; empty for none
 };
 
 }  // namespace tissue_sim

@@ -44,15 +44,76 @@ double soundness(const State& s, const std::vector<std::int32_t>& loop, const Ed
   return least;
 }
 
-/// A surface that closes a wound: the blade's sheets, a smooth one, or at last one that any loop
-/// has. The first that is sound, or the one that is soundest; no triangles where all are slivers,
-/// and the wound stays open.
+/// Where triangles join two of a loop's vertices already, on either side of the wound (`joined`:
+/// pairs of what `copied` vertices are copies of), an edge across gets a vertex in its middle.
+void split_chords(const std::vector<Vec3>& corners, const std::vector<std::int32_t>& copied,
+                  const Edges& joined, CapMesh& cap) {
+  const int n = static_cast<int>(corners.size());
+  std::map<std::pair<int, int>, int> middle;
+  for (std::size_t t = 0; t < cap.triangles.size(); ++t) {  // and those that this adds
+    for (int i = 0; i < 3; ++i) {
+      const std::array<int, 3> c = cap.triangles[t];
+      const int a = c[i], b = c[(i + 1) % 3];
+      if (a >= n || b >= n || (a + 1) % n == b || (b + 1) % n == a) continue;
+      if (joined.count(std::minmax(copied[a], copied[b])) == 0) continue;
+      const auto next = n + static_cast<int>(cap.inner.size());
+      const auto [at, is_new] = middle.try_emplace(std::minmax(a, b), next);
+      if (is_new) {
+        cap.inner.push_back(0.5 * (corners[a] + corners[b]));
+        cap.weights.emplace_back(n, 0.0);
+        cap.weights.back()[a] = cap.weights.back()[b] = 0.5;
+      }
+      cap.triangles[t][(i + 1) % 3] = at->second;
+      cap.triangles.push_back(c);
+      cap.triangles.back()[i] = at->second;
+    }
+  }
+}
+
+/// A loop that was closed: the vertices that its own are copies of, and how.
+struct Closed {
+  std::vector<std::int32_t> loop;
+  CapMesh cap;
+};
+
+/// What closed the other side of the wound, seen from this one; no triangles where none did. With
+/// it the volumes of both sides add up.
+CapMesh mirrored(const std::vector<Closed>& all, const std::vector<std::int32_t>& loop) {
+  const int n = static_cast<int>(loop.size());
+  for (const Closed& other : all) {
+    if (static_cast<int>(other.loop.size()) != n) continue;
+    for (int turn = 0; turn < n; ++turn) {
+      const auto there = [&](int i) { return (turn - i + n) % n; };
+      int same = 0;
+      while (same < n && other.loop[there(same)] == loop[same]) ++same;
+      if (same < n) continue;
+      CapMesh cap = other.cap;
+      for (auto& t : cap.triangles) {
+        for (int& k : t) k = k < n ? there(k) : k;
+        std::swap(t[1], t[2]);
+      }
+      for (std::size_t i = 0; i < cap.weights.size(); ++i) {
+        for (int k = 0; k < n; ++k) cap.weights[i][k] = other.cap.weights[i][there(k)];
+      }
+      return cap;
+    }
+  }
+  return {};
+}
+
+/// A surface that closes a wound: what closed its `other_side`, the blade's sheets, a smooth one,
+/// or at last one that any loop has. The first that is sound, or the one that is soundest; no
+/// triangles where all are slivers, and the wound stays open.
 CapMesh choose_cap(const State& s, const std::vector<std::int32_t>& loop, const Edges& edges,
-                   const std::vector<Vec3>& corners, double size) {
+                   const Edges& joined, const std::vector<Vec3>& corners, double size,
+                   CapMesh other_side) {
   constexpr double kSound = 0.05, kBearable = 0.001;  // [rad]
   CapMesh best;
   double most = kBearable;
+  std::vector<std::int32_t> copied;
+  for (const std::int32_t v : loop) copied.push_back(s.copy_of[v]);
   const auto is_sound = [&](CapMesh cap) {
+    split_chords(corners, copied, joined, cap);
     const double angle = soundness(s, loop, edges, corners, cap);
     if (angle > most) {
       most = angle;
@@ -60,7 +121,8 @@ CapMesh choose_cap(const State& s, const std::vector<std::int32_t>& loop, const 
     }
     return most > kSound;
   };
-  if (is_sound(fill_loop(corners, size, s.wounds)) || is_sound(fill_loop(corners, size))) {
+  if (is_sound(std::move(other_side)) || is_sound(fill_loop(corners, size, s.wounds)) ||
+      is_sound(fill_loop(corners, size))) {
     return best;
   }
   for (const double rise : {0.0, -0.3, 0.3, -0.6, 0.6, -1.0, 1.0}) {
@@ -76,21 +138,24 @@ CapMesh choose_cap(const State& s, const std::vector<std::int32_t>& loop, const 
 static constexpr double kLipsApart = 0.05;
 
 std::vector<std::int32_t> close_wounds(State& s, std::vector<std::int32_t>& origin) {
-  UnionFind linked = joined(s);
+  UnionFind linked = pbd::joined(s);
   // Components that each vertex's copies lie in: a wound within one piece is a slit, not an end.
   std::map<std::int32_t, std::set<std::int32_t>> of_copies;
   for (int v = 0; v < s.vertices.size(); ++v) {
     if (s.stroke[v] >= 0) of_copies[s.copy_of[v]].insert(linked.root(v));
   }
-  Edges edges;
-  const auto add_edges = [&](const Triangle& t) {
+  Edges edges, joined;  // of `joined`, what they are copies of, in order
+  const auto add_edges = [&](const Triangle& t, bool is_wall) {
     for (int i = 0; i < 3; ++i) {
-      if (s.stroke[t[i]] < 0 || s.stroke[t[(i + 1) % 3]] < 0) continue;
-      edges.insert({t[i], t[(i + 1) % 3]});
+      const std::int32_t a = t[i], b = t[(i + 1) % 3];
+      if (s.stroke[a] < 0 || s.stroke[b] < 0) continue;
+      edges.insert({a, b});
+      if (!is_wall) joined.insert(std::minmax(s.copy_of[a], s.copy_of[b]));
     }
   };
-  for (const Triangle& t : s.triangles) add_edges(t);
+  for (const Triangle& t : s.triangles) add_edges(t, false);
   std::vector<std::int32_t> starts;
+  std::vector<Closed> closed;
   // Whether a loop was closed, or needs not be.
   const auto close = [&](const std::vector<std::int32_t>& loop, bool only_holes) {
     int between = 0;
@@ -107,8 +172,12 @@ std::vector<std::int32_t> close_wounds(State& s, std::vector<std::int32_t>& orig
     const bool is_hole = area.norm() > kLipsApart * static_cast<double>(loop.size()) * edge * edge;
     const bool is_end = !only_holes && 2 * between >= static_cast<int>(loop.size());
     if (!is_end && !is_hole) return true;
-    const CapMesh cap = choose_cap(s, loop, edges, corners, std::max(edge, 0.8 * s.mean_edge));
+    std::vector<std::int32_t> copied;
+    for (const std::int32_t v : loop) copied.push_back(s.copy_of[v]);
+    const CapMesh cap = choose_cap(s, loop, edges, joined, corners,
+                                   std::max(edge, 0.8 * s.mean_edge), mirrored(closed, copied));
     if (cap.triangles.empty()) return !is_hole;
+    closed.push_back({copied, cap});
     std::vector<std::int32_t> index = loop;
     for (std::size_t i = 0; i < cap.inner.size(); ++i) {
       const std::int32_t n = add_vertex(s, cap.inner[i], s.vertices.body[loop[0]]);
@@ -132,7 +201,7 @@ std::vector<std::int32_t> close_wounds(State& s, std::vector<std::int32_t>& orig
     }
     for (const auto& t : cap.triangles) {
       s.triangles.push_back({index[t[0]], index[t[1]], index[t[2]]});
-      add_edges(s.triangles.back());
+      add_edges(s.triangles.back(), true);
     }
     starts.insert(starts.end(), index.begin(), index.end());
     return true;

@@ -32,13 +32,10 @@ bool PbdTissue::cut(const BladePath& path, int stroke, const Array<float>& befor
   pbd::State& s = *state_;
   std::vector<std::int32_t> origin;
   const bool is_whole = stroke >= static_cast<int>(s.scene.tools.size());  // no instrument's
-  if (s.tetrahedra.empty() && is_whole) {
+  if (s.tetrahedra.empty()) {
     if (!pbd::cut_soundly(s, path, before, stroke, origin, report)) return false;
   } else {
-    const bool changed = s.tetrahedra.empty()
-                             ? pbd::cut_surface(s, path, before, stroke, origin, report)
-                             : pbd::cut_tetrahedra(s, path, before, is_whole, origin, report);
-    if (!changed) return false;
+    if (!pbd::cut_tetrahedra(s, path, before, is_whole, origin, report)) return false;
     pbd::after_cut(s, origin);
   }
   for (const int id : pbd::update_pieces(s, origin, pieces_)) report.new_fragments.push_back(id);

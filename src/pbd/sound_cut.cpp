@@ -28,6 +28,8 @@ struct Mesh {
         blade_normal(s.blade_normal),
         blade_point(s.blade_point),
         cut_edges(s.cut_edges),
+        fronts(s.fronts),
+        starts(s.starts),
         wounds(s.wounds.size()) {}
   void restore(State& s) const {
     s.vertices = vertices;
@@ -40,6 +42,8 @@ struct Mesh {
     s.blade_normal = blade_normal;
     s.blade_point = blade_point;
     s.cut_edges = cut_edges;
+    s.fronts = fronts;
+    s.starts = starts;
     s.wounds.resize(wounds);
   }
 
@@ -50,6 +54,7 @@ struct Mesh {
   std::vector<std::int32_t> stroke, copy_of, bare;
   std::vector<Vec3> blade_normal, blade_point;
   std::set<std::array<std::int32_t, 2>> cut_edges;
+  std::vector<std::set<std::int32_t>> fronts, starts;
   std::size_t wounds;
 };
 
@@ -80,16 +85,37 @@ std::map<std::int32_t, Piece> measure(const State& s, UnionFind& linked) {
   return pieces;
 }
 
+/// Why a piece stays whole.
+enum class Unsound { kAngle, kEdge, kHole, kVolume, kSmall };
+constexpr const char* kWhy[] = {"angles below 2.9 degrees", "edges below a tenth of the mean",
+                                "a surface with holes", "volumes that do not add up",
+                                "pieces smaller than what the mesh resolves"};
+
+/// Whether a blade may meet anything at all while vertices move from `before` to where they are.
+bool may_meet(const State& s, const Array<float>& before, const std::vector<SweepPart>& parts) {
+  Box sweep, tissue;
+  for (const SweepPart& p : parts) {
+    sweep.min = sweep.min.cwiseMin(p.box.min);
+    sweep.max = sweep.max.cwiseMax(p.box.max);
+  }
+  for (int v = 0; v < s.vertices.size(); ++v) {
+    for (const Vec3& x : {place_before(s, before, v), s.vertices.position(v)}) {
+      tissue.min = tissue.min.cwiseMin(x);
+      tissue.max = tissue.max.cwiseMax(x);
+    }
+  }
+  return (tissue.max - sweep.min).minCoeff() >= 0 && (sweep.max - tissue.min).minCoeff() >= 0;
+}
+
 class SoundCut {
  public:
   SoundCut(State& s, std::vector<std::int32_t>& origin) : s_(s), origin_(origin) {
     UnionFind linked = joined(s);
     before_ = measure(s, linked);
     for (int v = 0; v < s.vertices.size(); ++v) piece_.push_back(linked.root(v));
-    // What is too small to be parted needs no look.
     const double least = SoundMesh::kLeastCut * std::pow(s.mean_edge, 3);
     for (const auto& [root, p] : before_) {
-      if (!is_closed_body(p) || p.six_volumes / 6 > least) open_.insert(root);
+      (!is_closed_body(p) || p.six_volumes / 6 > least ? open_ : small_).insert(root);
     }
   }
 
@@ -107,7 +133,7 @@ class SoundCut {
         return false;
       }
       after_cut(s_, origin_);
-      const std::set<std::int32_t> bad = unsound();
+      const std::map<std::int32_t, Unsound> bad = unsound();
       if (bad.empty()) {
         open_.swap(later);
         return true;
@@ -115,9 +141,10 @@ class SoundCut {
       mesh.restore(s_);
       origin_.resize(made);
       report = told;
-      for (const std::int32_t p : bad) {
+      for (const auto& [p, why] : bad) {
         open_.erase(p);
         later.insert(p);
+        why_[p] = why;
       }
     }
     open_.swap(later);
@@ -125,6 +152,43 @@ class SoundCut {
   }
 
   bool is_done() const { return open_.empty(); }
+
+  /// Small pieces that the blade passes stay whole: what they are.
+  void meet_small(const Array<float>& before, const std::vector<SweepPart>& parts) {
+    if (small_.empty()) return;
+    for (const Triangle& t : s_.triangles) {
+      const std::int32_t piece = piece_[t[0]];
+      if (small_.count(piece) == 0 || why_.count(piece) != 0) continue;
+      for (int i = 0; i < 3; ++i) {
+        const std::int32_t a = t[i], b = t[(i + 1) % 3];
+        const MovingSegment edge = {place_before(s_, before, a), place_before(s_, before, b),
+                                    s_.vertices.position(a), s_.vertices.position(b)};
+        if (passes(edge, parts)) why_[piece] = Unsound::kSmall;
+      }
+    }
+  }
+
+  /// Tells of pieces that were left whole; of those that a later try did cut nothing.
+  void tell(CutReport& report) const {
+    std::map<Unsound, int> count;
+    for (const auto& [piece, why] : why_) {
+      if (why == Unsound::kSmall || open_.count(piece) != 0) ++count[why];
+    }
+    if (count.empty()) return;
+    int all = 0;
+    std::string reasons;
+    for (const auto& [why, n] : count) {
+      all += n;
+      reasons += (reasons.empty() ? "" : ", ") + std::string(kWhy[static_cast<int>(why)]) +
+                 (count.size() > 1 ? " (" + std::to_string(n) + ")" : "");
+    }
+    report.pieces_left_whole += all;
+    if (!report.why_left_whole.empty()) report.why_left_whole += "; ";
+    report.why_left_whole += std::to_string(all) +
+                             (all > 1 ? " pieces stay whole where the blade met them"
+                                      : " piece stays whole where the blade met it") +
+                             ": a cut there would leave " + reasons;
+  }
 
  private:
   bool is_closed_body(const Piece& p) const { return s_.closed_body[s_.vertices.body[p.vertex]]; }
@@ -136,10 +200,20 @@ class SoundCut {
     return piece_[v];
   }
 
+  static bool passes(const MovingSegment& whole, const std::vector<SweepPart>& parts) {
+    for (const SweepPart& part : parts) {
+      const MovingSegment link = whole.during(part.begin, part.end);
+      for (const SweptEdge& edge : part.edges) {
+        if (!stays_aside(edge, link) && edge_passes<Vec3>(edge, link)) return true;
+      }
+    }
+    return false;
+  }
+
   /// Pieces, as they were, that were cut and of which something is no longer sound.
-  std::set<std::int32_t> unsound() const {
+  std::map<std::int32_t, Unsound> unsound() const {
     UnionFind linked = joined(s_);
-    std::set<std::int32_t> bad;
+    std::map<std::int32_t, Unsound> bad;
     const std::map<std::int32_t, Piece> now = measure(s_, linked);
     std::map<std::int32_t, double> gained;  // volume of each [m^3]
     for (const auto& [root, p] : now)
@@ -148,12 +222,14 @@ class SoundCut {
       const std::int32_t of = piece_of(p.vertex);
       if (open_.count(of) == 0) continue;
       const Piece& was = before_.at(of);
-      bool is_sound = p.angle >= std::min(was.angle, SoundMesh::kLeastAngle) &&
-                      p.edge >= std::min(was.edge, SoundMesh::kLeastEdge * s_.mean_edge);
-      if (is_closed_body(p)) {
-        is_sound = is_sound && p.hole() <= std::max(was.hole(), SoundMesh::kLargestHole);
+      if (!(p.angle >= std::min(was.angle, SoundMesh::kLeastAngle))) {
+        bad.emplace(of, Unsound::kAngle);
+      } else if (!(p.edge >= std::min(was.edge, SoundMesh::kLeastEdge * s_.mean_edge))) {
+        bad.emplace(of, Unsound::kEdge);
+      } else if (is_closed_body(p) &&
+                 !(p.hole() <= std::max(was.hole(), SoundMesh::kLargestHole))) {
+        bad.emplace(of, Unsound::kHole);
       }
-      if (!is_sound) bad.insert(of);
     }
     // Walls on both sides of a wound are the same surface, or nearly so.
     std::vector<double> excess(s_.volume_of_body.size(), 0.0);
@@ -168,7 +244,7 @@ class SoundCut {
       const double all = s_.volume_of_body[body], over = excess[body] - all;
       if (!is_closed_body(was) || std::fabs(over) < SoundMesh::kVolumeError * all) continue;
       if (open_.count(of) != 0 && over * volume > 0 && std::fabs(volume) > 1e-6 * all)
-        bad.insert(of);
+        bad.emplace(of, Unsound::kVolume);
     }
     return bad;
   }
@@ -177,7 +253,9 @@ class SoundCut {
   std::vector<std::int32_t>& origin_;
   std::map<std::int32_t, Piece> before_;
   std::vector<std::int32_t> piece_;
-  std::set<std::int32_t> open_;  ///< pieces that are to be cut
+  std::set<std::int32_t> open_;   ///< pieces that are to be cut
+  std::set<std::int32_t> small_;  ///< pieces too small to be parted
+  std::map<std::int32_t, Unsound> why_;
 };
 
 /// Square to the blade's first way and its edge.
@@ -191,7 +269,10 @@ Vec3 aside(const BladePath& path) {
 
 bool cut_soundly(State& s, const BladePath& path, const Array<float>& before, int stroke,
                  std::vector<std::int32_t>& origin, CutReport& report) {
+  const std::vector<SweepPart> parts = sweep_parts(path);
+  if (!may_meet(s, before, parts)) return false;
   SoundCut cut(s, origin);
+  cut.meet_small(before, parts);
   bool changed = false;
   for (const double far : kAside) {
     BladePath moved = path;
@@ -199,6 +280,7 @@ bool cut_soundly(State& s, const BladePath& path, const Array<float>& before, in
     changed = cut.run(moved, before, stroke, report) || changed;
     if (cut.is_done()) break;
   }
+  cut.tell(report);
   return changed;
 }
 

@@ -98,7 +98,8 @@ bool Services::cut(Cut::Request& request, Cut::Response& response) {
     response.points_separated = reply.report.points_separated;
     response.new_fragments.assign(reply.report.new_fragments.begin(),
                                   reply.report.new_fragments.end());
-    return std::to_string(reply.report.bonds_broken) + " bonds broken";
+    return std::to_string(reply.report.bonds_broken) + " bonds broken" +
+           (reply.message.empty() ? "" : "; " + reply.message);
   });
 }
 

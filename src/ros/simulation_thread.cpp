@@ -195,6 +195,10 @@ void SimulationThread::frame() {
     fail(std::string("the simulation failed: ") + e.what() + ": reset it");
     return;
   }
+  const CutReport& by_blades = report_.result.blade_report;
+  if (by_blades.pieces_left_whole > 0) {
+    WARN_SELDOM(1, "an instrument's cut: %s", by_blades.why_left_whole.c_str());
+  }
   motion_ = report_.input.tools;
   for (ToolMotion& m : motion_) {
     m.begin = m.end;
@@ -252,6 +256,9 @@ void SimulationThread::answer_cuts(std::vector<PendingCut>& cuts, const FrameRep
     reply.success = reply.report.points_separated > 0 && !run_.blew_up;
     if (run_.blew_up) {
       reply.message = problem_;
+    } else if (reply.report.pieces_left_whole > 0) {
+      reply.message = reply.report.why_left_whole;
+      if (reply.success) ROS_WARN("cut: %s", reply.message.c_str());  // else its service does
     } else if (!reply.success) {
       reply.message =
           "the cut misses the tissue: nothing lies on the surface that the edge sweeps, or it is "

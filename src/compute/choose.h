@@ -11,7 +11,7 @@ namespace tissue_sim {
 TISSUE_SIM_INLINE bool less(float a, float b) { return a < b; }
 TISSUE_SIM_INLINE float choose(bool mask, float a, float b) { return mask ? a : b; }
 TISSUE_SIM_INLINE bool none_of(bool mask) { return !mask; }
-TISSUE_SIM_INLINE float root(float x) { return sqrtf(x); }
+TISSUE_SIM_INLINE float square_root(float x) { return sqrtf(x); }
 
 /// Where a < b. By the sign of a - b: see any_negative().
 template <class T>
@@ -29,7 +29,7 @@ TISSUE_SIM_INLINE M none_of(M mask) {
   return ~mask;
 }
 template <class T>
-TISSUE_SIM_INLINE T root(T x) {
+TISSUE_SIM_INLINE T square_root(T x) {
   constexpr int kLanes = sizeof(T) / sizeof(float);
   alignas(sizeof(T)) float lanes[kLanes];
   std::memcpy(lanes, &x, sizeof(x));

@@ -108,7 +108,7 @@ TISSUE_SIM_INLINE void turn_mls_face(const T* F, const T* face, Mask bears_coupl
   for (int a = 0; a < 3; ++a) n[a] = mls_contact::dot(cof + 3 * a, face);
   const T n2 = mls_contact::dot(n, n);
   const Mask is = knows_normal & less(T{}, n2);
-  const T scale = choose(is, T(1.0f / root(choose(is, n2, one))), T{});
+  const T scale = choose(is, T(1.0f / square_root(choose(is, n2, one))), T{});
   for (int a = 0; a < 3; ++a) normal[a] = scale * n[a];
 }
 
@@ -139,15 +139,15 @@ TISSUE_SIM_INLINE T mls_gap(const T* r, const T* d, const T* face_low, const T* 
     mean[a] = nl[a] - nh[a];
     mean_before[a] = face_low[a] - face_high[a];
   }
-  const T scale = 1.0f / root(choose(opposed, dot(mean, mean), all_lanes<T>(1)));
-  const T scale_before = 1.0f / root(larger(dot(mean_before, mean_before), tiny));
+  const T scale = 1.0f / square_root(choose(opposed, dot(mean, mean), all_lanes<T>(1)));
+  const T scale_before = 1.0f / square_root(larger(dot(mean_before, mean_before), tiny));
   // Along the normal that parts them most.
   const T by_low = choose(knows_low, dot(nl, d), T(-far)),
           by_high = choose(knows_high, T(-dot(nh, d)), T(-far));
   const T then_low = choose(knows_low, dot(face_low, r), T(-far)),
           then_high = choose(knows_high, T(-dot(face_high, r)), T(-far));
   const auto is_high = less(by_low, by_high);
-  const T length = root(length2), per_length = 1.0f / larger(length, tiny);
+  const T length = square_root(length2), per_length = 1.0f / larger(length, tiny);
   for (int a = 0; a < 3; ++a) {
     const T by_one = choose(is_high, T(-nh[a]), nl[a]);
     n[a] = choose(none, T(per_length * d[a]), choose(opposed, T(scale * mean[a]), by_one));
@@ -156,7 +156,7 @@ TISSUE_SIM_INLINE T mls_gap(const T* r, const T* d, const T* face_low, const T* 
           then_by_one =
               choose(opposed, T(scale_before * dot(mean_before, r)), larger(then_low, then_high));
   const T now = choose(none, length, by_one),
-          then = choose(none, root(length2_before), then_by_one),
+          then = choose(none, square_root(length2_before), then_by_one),
           whole = choose(none, edge, depths);
   const T rest = choose(near & less(then, whole), then, whole);
   const T gap = now - rest + mls_contact::kNone * edge;
@@ -218,7 +218,7 @@ TISSUE_SIM_INLINE void push_mls_faces(const T* d, const T* n, T gap, T before, c
   const T pull2 = dot(pull, pull);
   out.slides = less(T(limit * limit), pull2);
   const T one = all_lanes<T>(1);
-  const T scale = choose(out.slides, T(limit / root(choose(out.slides, pull2, one))), one);
+  const T scale = choose(out.slides, T(limit / square_root(choose(out.slides, pull2, one))), one);
   for (int a = 0; a < 3; ++a) {  // the places held slide, each half the way
     pull[a] *= scale;
     out.slide[a] = 0.5f * (now[a] - pull[a]);

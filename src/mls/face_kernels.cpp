@@ -7,17 +7,16 @@
 namespace tissue_sim {
 namespace {
 
-constexpr int kBlock = kMlsFaceBlock;
 /// For weights: than what two nodes moved by when it was seen last, and for how long that holds.
-constexpr float kFasterThanSeen = 1.5f;
+constexpr float kFacesFaster = 1.5f;
 constexpr int kLongestRest = 30;  // substeps
 
-using Lanes = float[kBlock];
+using Lanes = float[kMlsFaceBlock];
 
 /// Four floats of each lane, `from(lane)`, into four rows.
 template <class From>
 TISSUE_SIM_INLINE void gather(const From& from, Lanes* rows) {
-  for (int l = 0; l < kBlock; l += 4) {
+  for (int l = 0; l < kMlsFaceBlock; l += 4) {
     const Vec<4> a = load<4>(from(l)), b = load<4>(from(l + 1)), c = load<4>(from(l + 2)),
                  d = load<4>(from(l + 3));
     const Vec<4> ac = permute<4>(a, c, Mask<4>{0, 4, 1, 5}),
@@ -34,7 +33,7 @@ TISSUE_SIM_INLINE void gather(const From& from, Lanes* rows) {
 /// Four rows into four floats of each lane.
 template <class To>
 TISSUE_SIM_INLINE void scatter(const Lanes* rows, const To& to) {
-  for (int l = 0; l < kBlock; l += 4) {
+  for (int l = 0; l < kMlsFaceBlock; l += 4) {
     const Vec<4> a = load<4>(&rows[0][l]), b = load<4>(&rows[1][l]), c = load<4>(&rows[2][l]),
                  d = load<4>(&rows[3][l]);
     const Vec<4> ac = permute<4>(a, c, Mask<4>{0, 4, 1, 5}),
@@ -60,14 +59,14 @@ TISSUE_SIM_INLINE void put(const Vec<W> (&from)[N], int lane, Lanes* rows) {
 
 template <int W>
 TISSUE_SIM_INLINE bool weigh(const MlsFaceField& f, int block) {
-  const int first = block * kBlock;
+  const int first = block * kMlsFaceBlock;
   const std::int32_t *low = f.low + first, *high = f.high + first;
   alignas(64) Lanes L[8], H[8], weight, far;
   gather([&](int l) { return f.record + kMlsFaceRecord * low[l]; }, L);
   gather([&](int l) { return f.u + 4 * f.node[low[l]]; }, L + 4);
   gather([&](int l) { return f.record + kMlsFaceRecord * high[l]; }, H);
   gather([&](int l) { return f.u + 4 * f.node[high[l]]; }, H + 4);
-  for (int lane = 0; lane < kBlock; lane += W) {
+  for (int lane = 0; lane < kMlsFaceBlock; lane += W) {
     Vec<W> l[8], h[8], d[3];
     take<W>(L, lane, l);
     take<W>(H, lane, h);
@@ -75,25 +74,25 @@ TISSUE_SIM_INLINE bool weigh(const MlsFaceField& f, int block) {
     const Vec<W> edge = load<W>(f.edge + first + lane), rest = l[3] + h[3];
     const Vec<W> live = load<W>(f.live + first + lane);
     store<W>(&weight[lane], live * mls_contact_weight(d, rest, edge));
-    const Vec<W> reach = root(mls_contact::reach2(rest, edge));
-    store<W>(&far[lane], root(mls_contact::dot(d, d)) - reach);
+    const Vec<W> reach = square_root(mls_contact::reach2(rest, edge));
+    store<W>(&far[lane], square_root(mls_contact::dot(d, d)) - reach);
   }
   float most = 0;
-  for (int l = 0; l < kBlock; ++l) {
+  for (int l = 0; l < kMlsFaceBlock; ++l) {
     most = weight[l] > most ? weight[l] : most;
     f.weight[first + l] = weight[l];
   }
   if (most > 0) return true;
   float least = kLongestRest;
-  for (int l = 0; l < kBlock; ++l) {
+  for (int l = 0; l < kMlsFaceBlock; ++l) {
     if (f.live[first + l] == 0) continue;
     const Vec<4> v = load<4>(f.v + 4 * f.node[high[l]]) - load<4>(f.v + 4 * f.node[low[l]]);
-    const float step = kFasterThanSeen * f.dt * std::sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]);
+    const float step = kFacesFaster * f.dt * std::sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]);
     if (!(far[l] > step * least)) least = step > 0 ? far[l] / step : 0;
   }
   f.rests[block] = static_cast<std::uint8_t>(least > 0 ? least : 0);
   // They are apart, and remember nothing.
-  for (int l = 0; l < kBlock; ++l) {
+  for (int l = 0; l < kMlsFaceBlock; ++l) {
     f.slip[kMlsSlipGap * f.stride + first + l] = kMlsApart;
     f.slip[kMlsSlipBegun * f.stride + first + l] = 0;
   }
@@ -101,12 +100,12 @@ TISSUE_SIM_INLINE bool weigh(const MlsFaceField& f, int block) {
 }
 
 template <int W>
-TISSUE_SIM_INLINE void turn(const float (&F)[9][kBlock], const float (&knows)[2][kBlock],
-                            float* record) {
+TISSUE_SIM_INLINE void turn(const float (&F)[9][kMlsFaceBlock],
+                            const float (&knows)[2][kMlsFaceBlock], float* record) {
   alignas(64) Lanes outward[4], out[28];
   gather([&](int l) { return record + kMlsFaceRecord * l + kMlsFaceOutward; }, outward);
   gather([&](int l) { return record + kMlsFaceRecord * l + kMlsFaceSpring - 1; }, out + 12);
-  for (int lane = 0; lane < kBlock; lane += W) {
+  for (int lane = 0; lane < kMlsFaceBlock; lane += W) {
     Vec<W> of[9], face[3], deformation[9], inverse[9], normal[3], couples;
     take<W>(F, lane, of);
     take<W>(outward, lane, face);
@@ -121,7 +120,7 @@ TISSUE_SIM_INLINE void turn(const float (&F)[9][kBlock], const float (&knows)[2]
   for (int k = 4; k < 24; k += 4) {
     scatter(out + k, [&](int l) { return record + kMlsFaceRecord * l + kMlsFaceNormal + k; });
   }
-  for (int l = 0; l < kBlock; ++l) {
+  for (int l = 0; l < kMlsFaceBlock; ++l) {
     float* of = record + kMlsFaceRecord * l;
     of[kMlsFaceInverse + 8] = out[24][l];
     for (int a = 0; a < 3; ++a) of[kMlsFaceNormal + a] = out[a][l];
@@ -130,7 +129,7 @@ TISSUE_SIM_INLINE void turn(const float (&F)[9][kBlock], const float (&knows)[2]
 
 template <int W>
 TISSUE_SIM_INLINE bool push(const MlsFaceField& f, int block) {
-  const int first = block * kBlock;
+  const int first = block * kMlsFaceBlock;
   const auto row = [&](int which) { return f.slip + which * f.stride + first; };
   float *gap = row(kMlsSlipGap), *begun = row(kMlsSlipBegun);
   const float* weight = f.weight + first;
@@ -142,7 +141,7 @@ TISSUE_SIM_INLINE bool push(const MlsFaceField& f, int block) {
     gather([&](int l) { return of_low(l) + k; }, L + k);
     gather([&](int l) { return of_high(l) + k; }, H + k);
   }
-  for (int lane = 0; lane < kBlock; lane += W) {
+  for (int lane = 0; lane < kMlsFaceBlock; lane += W) {
     Vec<W> l[16], h[16], r[3], d[3], n[3], face_low[4], face_high[4];
     take<W>(L, lane, l);
     take<W>(H, lane, h);
@@ -168,14 +167,14 @@ TISSUE_SIM_INLINE bool push(const MlsFaceField& f, int block) {
     put<W>(n, lane, N);
   }
   float least = kMlsApart;
-  for (int l = 0; l < kBlock; ++l) least = gap[l] < least ? gap[l] : least;
+  for (int l = 0; l < kMlsFaceBlock; ++l) least = gap[l] < least ? gap[l] : least;
   if (!(least < 0)) return false;
   for (int k = 16; k < 28; k += 4) {
     gather([&](int l) { return of_low(l) + k; }, L + k);
     gather([&](int l) { return of_high(l) + k; }, H + k);
   }
   alignas(64) Lanes out[12] = {}, slide[3], flags[2];
-  for (int lane = 0; lane < kBlock; lane += W) {
+  for (int lane = 0; lane < kMlsFaceBlock; lane += W) {
     const auto low_row = [&](int k) { return load<W>(&L[k][lane]); };
     const auto high_row = [&](int k) { return load<W>(&H[k][lane]); };
     Vec<W> d[3], n[3], held[3], apart[3], arm[3];
@@ -217,7 +216,7 @@ TISSUE_SIM_INLINE bool push(const MlsFaceField& f, int block) {
   for (int k = 0; k < 12; k += 4) {
     scatter(out + k, [&](int l) { return f.push + kMlsFacePush * (first + l) + k; });
   }
-  for (int l = 0; l < kBlock; ++l) {
+  for (int l = 0; l < kMlsFaceBlock; ++l) {
     if (flags[0][l] + flags[1][l] == 0) continue;
     MlsPush<float, bool> push;
     push.begins = flags[0][l] > 0;
@@ -242,8 +241,8 @@ TISSUE_SIM_INLINE bool push(const MlsFaceField& f, int block) {
 
 #define TISSUE_SIM_MLS_FACE_KERNELS(suffix, W, target)                                        \
   target bool weigh_##suffix(const MlsFaceField& f, int block) { return weigh<W>(f, block); } \
-  target void turn_##suffix(const float(&F)[9][kBlock], const float(&knows)[2][kBlock],       \
-                            float* record) {                                                  \
+  target void turn_##suffix(const float(&F)[9][kMlsFaceBlock],                                \
+                            const float(&knows)[2][kMlsFaceBlock], float* record) {           \
     turn<W>(F, knows, record);                                                                \
   }                                                                                           \
   target bool push_##suffix(const MlsFaceField& f, int block) { return push<W>(f, block); }

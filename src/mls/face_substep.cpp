@@ -11,10 +11,8 @@
 namespace tissue_sim {
 namespace {
 
-constexpr int kBlock = kMlsFaceBlock;
-
 int whole_blocks(std::size_t count) {
-  return (static_cast<int>(count) + kBlock - 1) / kBlock * kBlock;
+  return (static_cast<int>(count) + kMlsFaceBlock - 1) / kMlsFaceBlock * kMlsFaceBlock;
 }
 
 struct Pair {
@@ -78,7 +76,7 @@ void make_face_pairs(MlsState& s) {
   f.weight.assign(count, 0.0f);
   f.slip.assign(kMlsSlipRows * count, 0.0f);
   f.push.resize(kMlsFacePush * count);
-  f.rests.assign(count / kBlock, 0);
+  f.rests.assign(count / kMlsFaceBlock, 0);
   f.begin.assign(c.node.size() + 1, 0);
   for (std::size_t p = 0; p < pairs.size(); ++p) {
     const Pair& pair = pairs[p];
@@ -166,10 +164,11 @@ void MlsFaceSubstep::weigh(int block) {
 void MlsFaceSubstep::turn(int block) {
   MlsNodeContacts& c = s_.node_contacts;
   const MlsFacePairs& pairs = c.pairs;
-  alignas(64) float F[9][kBlock], knows[2][kBlock];
-  float* records = field_.record + static_cast<std::size_t>(kMlsFaceRecord) * kBlock * block;
-  for (int l = 0; l < kBlock; ++l) {
-    const int k = std::min(nodes_ - 1, kBlock * block + l);  // the last one fills the block up
+  alignas(64) float F[9][kMlsFaceBlock], knows[2][kMlsFaceBlock];
+  float* records = field_.record + static_cast<std::size_t>(kMlsFaceRecord) * kMlsFaceBlock * block;
+  for (int l = 0; l < kMlsFaceBlock; ++l) {
+    const int k =
+        std::min(nodes_ - 1, kMlsFaceBlock * block + l);  // the last one fills the block up
     const std::int32_t i = c.node[k];
     const float* from =
         &s_.deformation[9 * static_cast<std::size_t>(i / kMlsChunk) * kMlsChunk + i % kMlsChunk];
@@ -179,8 +178,8 @@ void MlsFaceSubstep::turn(int block) {
     store<4>(records + kMlsFaceRecord * l + kMlsFaceU, load<4>(&s_.u[4 * i]));
   }
   kernels_->turn(F, knows, records);
-  const std::int32_t end = 2 * kBlock * felt_.end;
-  for (int k = kBlock * block; k < std::min(nodes_, kBlock * (block + 1)); ++k) {
+  const std::int32_t end = 2 * kMlsFaceBlock * felt_.end;
+  for (int k = kMlsFaceBlock * block; k < std::min(nodes_, kMlsFaceBlock * (block + 1)); ++k) {
     float sum = 0;
     for (std::int32_t e = pairs.begin[k]; e < pairs.begin[k + 1] && pairs.of[e] < end; ++e) {
       sum += pairs.weight[pairs.of[e] / 2];
@@ -199,7 +198,7 @@ void MlsFaceSubstep::take(int k) {
   MlsNodeContacts& c = s_.node_contacts;
   const MlsFacePairs& pairs = c.pairs;
   const float* gap = field_.slip + kMlsSlipGap * field_.stride;
-  const std::int32_t end = 2 * kBlock * touched_.end;
+  const std::int32_t end = 2 * kMlsFaceBlock * touched_.end;
   Vec<4> sum{}, rows[3] = {};
   bool any = false;
   for (std::int32_t e = pairs.begin[k]; e < pairs.begin[k + 1] && pairs.of[e] < end; ++e) {

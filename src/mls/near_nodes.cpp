@@ -11,7 +11,7 @@ namespace {
 
 constexpr double kFar = 2.5;  // reference distance from which a piece may touch itself [edges]
 constexpr int kCellsAtATime = 32;
-constexpr float kRounding = 1.0001f;  // of what is looked at in vectors
+constexpr float kCellRounding = 1.0001f;  // of what is looked at in vectors
 
 bool may_touch(const MlsState& s, const std::vector<std::int32_t>& piece, std::int32_t i,
                std::int32_t j) {
@@ -63,7 +63,7 @@ struct Around {
       x[a].push_back(static_cast<float>(w.places[k][a] - at[a]));
       X[a].push_back(static_cast<float>(w.s.nodes.place[i][a] - at_reference[a]));
     }
-    reach.push_back(kRounding * (static_cast<float>(w.widest) + w.skin[k]));
+    reach.push_back(kCellRounding * (static_cast<float>(w.widest) + w.skin[k]));
     piece.push_back(w.piece[i]);
     cut.push_back(w.s.cut[i]);
   }
@@ -71,7 +71,7 @@ struct Around {
   void mark(std::size_t own, float own_skin, float far2) {
     const std::size_t count = number.size();
     is.resize(count);
-    const float skin = kRounding * own_skin;
+    const float skin = kCellRounding * own_skin;
     const float x0 = x[0][own], x1 = x[1][own], x2 = x[2][own];
     const float X0 = X[0][own], X1 = X[1][own], X2 = X[2][own];
     const std::int32_t own_piece = piece[own], own_cut = cut[own];
@@ -103,7 +103,7 @@ void search_cell(const Search& w, const NearGrid& grid, int cell, Around& around
   const Vec3 at = w.places[any], at_reference = w.s.nodes.place[w.outer[any]];
   grid.for_each_around(cell, w.widest + 2 * most_skin,
                        [&](std::int32_t k) { around.add(w, k, at, at_reference); });
-  const auto far2 = static_cast<float>(w.least_far * w.least_far / kRounding);
+  const auto far2 = static_cast<float>(w.least_far * w.least_far / kCellRounding);
   grid.for_each_in(cell, [&](std::int32_t k) {
     const auto own = std::find(around.number.begin(), around.number.end(), k);
     const float skin = w.skin[k];

@@ -12,7 +12,8 @@ namespace {
 
 constexpr int kDeepestNesting = 64;
 
-/// Ends a document that nests too deep before the parser, which calls itself for each level, gets there.
+/// Ends a document that nests too deep before the parser, which calls itself for each level, gets
+/// there.
 class NestingGuard : public YAML::EventHandler {
  public:
   void OnDocumentStart(const YAML::Mark&) override {}

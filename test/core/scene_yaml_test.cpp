@@ -48,9 +48,8 @@ TEST(SceneYaml, KeepsTheBitsOfOrientations) {
 }
 
 TEST(SceneYaml, KeepsNamesThatLookLikeSomethingElse) {
-  for (const char* name :
-       {"null", "true", "12", "1e3", "~", "a: b", "# c", "- d", "\"q\"", " e ",
-        "[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[["}) {
+  for (const char* name : {"null", "true", "12", "1e3", "~", "a: b", "# c", "- d", "\"q\"", " e ",
+                           "[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[["}) {
     Scene s = full_scene();
     s.name = name;
     EXPECT_EQ(scene_from_yaml(scene_to_yaml(s)).name, name);

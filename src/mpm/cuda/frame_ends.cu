@@ -123,7 +123,8 @@ __global__ void __launch_bounds__(kMostThreads)
     m.stiffening = fmaxf(m.stiffening, counts);
   });
   // The velocity of a point is the value of the nodes' velocities there.
-  for_each_point(t, b, v, [&](int, int s, int, int, int, const HalfPlane(&h)[3]) {
+  for_each_point(t, b, v, [&](int lane, int s, int, int, int, const HalfPlane(&h)[3]) {
+    if (b.whole == 0 && t.volume[lane] == 0) return;
     float v2 = 0;
     for (int c = 0; c < 3; ++c) {
       const float sx = (s & 1) != 0 ? 1.0f : -1.0f, sy = (s & 2) != 0 ? 1.0f : -1.0f;

@@ -12,8 +12,8 @@
 namespace tissue_sim {
 
 struct AnchorsOnDevice {
-  DeviceArray<int> first_chunk, first_carried;
   DeviceArray<CudaFaceChunk> chunks;
+  DeviceArray<int> first_carried;
   DeviceArray<CudaFaceEntry> entries;
   DeviceArray<CudaFaceShare> shares;
   DeviceArray<CudaFaceRow> rows;
@@ -27,15 +27,14 @@ struct AnchorsOnDevice {
   std::size_t room_each = 0;
 
   std::size_t bytes() const {
-    return first_chunk.bytes() + first_carried.bytes() + chunks.bytes() + entries.bytes() +
+    return first_carried.bytes() + chunks.bytes() + entries.bytes() +
            shares.bytes() + rows.bytes() + carried.bytes() + groups.bytes() + row_nodes.bytes() +
            inverse.bytes() + room.bytes() + impulse.bytes() + places.bytes() + lightness.bytes();
   }
   /// What the kernels need; `substep` of the part is the first.
   CudaHeldFaces view(int substep, int anchors) const {
     CudaHeldFaces h;
-    if (first_chunk.size() == 0 || getenv("NO_HOLD") != nullptr) return h;
-    h.first_chunk = first_chunk.data();
+    if (chunks.size() == 0 || getenv("NO_HOLD") != nullptr) return h;
     h.first_carried = first_carried.data();
     h.chunks = chunks.data();
     h.entries = entries.data();

@@ -25,7 +25,7 @@ void CudaMpmTissue::push_anchors() {
   const AnchorFaces& faces = state_->anchors;
   OnDevice& d = *device_;
   AnchorsOnDevice& to = d.anchors;
-  if (faces.groups.empty() && faces.held.empty() && to.first_chunk.size() == 0) return;
+  if (faces.groups.empty() && faces.held.empty() && to.chunks.size() == 0) return;
   const int room = 4 * 9 * d.plan.max_plane_slots;  // what columns give to a plane comes there
   const HostFaceRows t = make_face_rows(*state_, d.host_tables, room);
   std::vector<CudaRowNodes> rows(faces.rows.size());
@@ -37,10 +37,12 @@ void CudaMpmTissue::push_anchors() {
   }
   std::vector<CudaRowGroup> groups;
   for (const FaceGroup& g : faces.groups) groups.push_back({g.first, g.count, g.inverse});
-  to.first_chunk.upload(t.first_chunk, d.stream);
   to.first_carried.upload(t.first_carried, d.stream);
   to.chunks.upload(t.chunks, d.stream);
   to.entries.upload(t.entries, d.stream);
+  launch_connect_entries(to.entries.data(), static_cast<int>(t.entries.size()),
+                         d.of_blocks.slot_node.data(), d.slot_parts.data(), d.first_parts.data(),
+                         d.stream);
   to.shares.upload(t.shares, d.stream);
   to.rows.upload(t.rows, d.stream);
   to.carried.upload(t.carried, d.stream);

@@ -1,6 +1,6 @@
 #include "mpm/cuda/hold_still.h"
 
-#include "compute/cuda_check.h"
+#include "compute/for_each_cuda.h"
 
 namespace tissue_sim {
 namespace {
@@ -43,7 +43,27 @@ __global__ void hold_groups(const CudaRowGroup* groups, const CudaRowNodes* rows
   }
 }
 
+struct ConnectEntry {
+  CudaFaceEntry* entries;
+  const std::int32_t* slot_node;
+  const std::uint32_t* slot_parts;
+  const uint4* first_parts;
+  __device__ void operator()(int i) const {
+    CudaFaceEntry& e = entries[i];
+    if (e.slot < 0) return;
+    e.owned = e.local >= 0 && slot_node[e.slot] >= 0 ? 1 : 0;
+    e.parts = first_parts[e.slot];
+    e.shared = slot_parts[e.slot];
+  }
+};
+
 }  // namespace
+
+void launch_connect_entries(CudaFaceEntry* entries, int count, const std::int32_t* slot_node,
+                            const std::uint32_t* slot_parts, const uint4* first_parts,
+                            cudaStream_t stream) {
+  Gpu(stream).for_each(count, ConnectEntry{entries, slot_node, slot_parts, first_parts});
+}
 
 void launch_hold_still(const CudaRowGroup* groups, int count, const CudaRowNodes* rows,
                        const float* inverse, float4* field, cudaStream_t stream) {

@@ -18,6 +18,11 @@ struct CudaRowGroup {
   int first, count, inverse;
 };
 
+/// Fills what entries of CudaHeldFaces have of the tables.
+void launch_connect_entries(CudaFaceEntry* entries, int count, const std::int32_t* slot_node,
+                            const std::uint32_t* slot_parts, const uint4* first_parts,
+                            cudaStream_t stream);
+
 /// As hold_still() of mpm/anchors/anchor_faces.h does for each of `count` groups.
 void launch_hold_still(const CudaRowGroup* groups, int count, const CudaRowNodes* rows,
                        const float* inverse, float4* field, cudaStream_t stream);

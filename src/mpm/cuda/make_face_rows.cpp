@@ -84,11 +84,10 @@ std::vector<NodeOfGroup> nodes_of(const AnchorFaces& faces, const FaceGroup& g) 
 class FillChunks {
  public:
   FillChunks(const AnchorFaces& faces, const SlotsOfNodes& slots, int room, HostFaceRows& to)
-      : faces_(faces), slots_(slots), room_(room), to_(to), summed_(faces.groups.size(), false) {}
-
-  void begin_bundle() {
-    open_ = false;
-    to_.first_chunk.push_back(static_cast<int>(to_.chunks.size()));
+      : faces_(faces), slots_(slots), room_(room), to_(to), summed_(faces.groups.size(), false) {
+    CudaFaceChunk none{};
+    none.next = -1;
+    to.chunks.assign(slots.of_bundle.size(), none);
   }
 
   void add(int bundle, int first_slot, int group) {
@@ -105,19 +104,22 @@ class FillChunks {
       shares.insert(shares.end(), n.shares.begin(), n.shares.end());
       auto at = std::lower_bound(here.begin(), here.end(), SlotOfNode{n.node, 0});
       if (count == 0 || at == here.end() || at->node != n.node) {
-        entries.push_back({n.node, slots_.first_of(n.node), -1, first_share, count});
+        entries.push_back(entry(n, slots_.first_of(n.node), -1, first_share));
         continue;
       }
       for (; at != here.end() && at->node == n.node; ++at) {
-        entries.push_back({n.node, at->slot, at->slot - first_slot, first_share, count});
+        entries.push_back(entry(n, at->slot, at->slot - first_slot, first_share));
       }
     }
     const int count = static_cast<int>(entries.size());
-    CudaFaceChunk& chunk = chunk_with_room(count, g.count);
+    CudaFaceChunk& chunk = chunk_with_room(bundle, count, g.count);
     const int first_share = static_cast<int>(to_.shares.size());
     for (CudaFaceShare& s : shares) s.row += chunk.rows;
     to_.shares.insert(to_.shares.end(), shares.begin(), shares.end());
-    for (CudaFaceEntry& e : entries) e.first_share += first_share;
+    for (CudaFaceEntry& e : entries) {
+      e.next_share += first_share;
+      e.share.row += chunk.rows;
+    }
     to_.entries.insert(to_.entries.end(), entries.begin(), entries.end());
     for (int i = 0; i < g.count; ++i) {
       const FaceRow& r = faces_.rows[g.first + i];
@@ -134,32 +136,53 @@ class FillChunks {
       row.group = chunk.rows;
       row.rows = g.count;
       row.inverse = g.inverse + i * g.count;
+      row.own = faces_.inverse[row.inverse];
       row.impulse = summed_[group] ? -1 : g.first + i;
       to_.rows.push_back(row);
     }
     summed_[group] = true;
     chunk.entries += count;
     chunk.rows += g.count;
+    if (g.count > 1) chunk.has_groups = 1;
   }
 
  private:
   static int numbers(int entries, int rows) {
     return kFaceEntryRoom * entries + kFaceRowRoom * rows;
   }
-  CudaFaceChunk& chunk_with_room(int entries, int rows) {
+  static CudaFaceEntry entry(const NodeOfGroup& n, int slot, int local, int first_share) {
+    CudaFaceEntry e{};
+    e.node = n.node;
+    e.slot = slot;
+    e.local = local;
+    e.shares = static_cast<int>(n.shares.size());
+    if (e.shares > 0) e.share = n.shares[0];
+    e.next_share = first_share + 1;
+    return e;
+  }
+  /// The bundle's last chunk, or one more where that has no room for it.
+  CudaFaceChunk& chunk_with_room(int bundle, int entries, int rows) {
+    if (bundle != bundle_) last_ = bundle_ = bundle;
     const int alone = numbers(entries, rows);
-    if (!open_ || numbers(to_.chunks.back().entries, to_.chunks.back().rows) + alone > room_) {
-      CudaFaceChunk chunk{};
-      chunk.first_entry = static_cast<int>(to_.entries.size());
-      chunk.first_row = static_cast<int>(to_.rows.size());
-      chunk.is_large = alone > room_ ? 1 : 0;
-      if (chunk.is_large != 0) {
-        to_.room_each = std::max(to_.room_each, static_cast<std::size_t>(alone));
-      }
-      to_.chunks.push_back(chunk);
-      open_ = chunk.is_large == 0;
+    const auto has_room = [&](const CudaFaceChunk& c) {
+      return c.rows == 0 || (c.is_large == 0 && numbers(c.entries, c.rows) + alone <= room_);
+    };
+    if (!has_room(to_.chunks[last_])) {
+      CudaFaceChunk more{};
+      more.next = -1;
+      to_.chunks[last_].next = static_cast<int>(to_.chunks.size());
+      last_ = to_.chunks[last_].next;
+      to_.chunks.push_back(more);
     }
-    return to_.chunks.back();
+    CudaFaceChunk& chunk = to_.chunks[last_];
+    if (chunk.rows > 0) return chunk;
+    chunk.first_entry = static_cast<int>(to_.entries.size());
+    chunk.first_row = static_cast<int>(to_.rows.size());
+    chunk.is_large = alone > room_ ? 1 : 0;
+    if (chunk.is_large != 0) {
+      to_.room_each = std::max(to_.room_each, static_cast<std::size_t>(alone));
+    }
+    return chunk;
   }
 
   const AnchorFaces& faces_;
@@ -167,7 +190,7 @@ class FillChunks {
   int room_;
   HostFaceRows& to_;
   std::vector<bool> summed_;
-  bool open_ = false;  ///< the last chunk may have room for more
+  int bundle_ = -1, last_ = -1;  ///< the bundle at work, and its last chunk
 };
 
 }  // namespace
@@ -198,7 +221,6 @@ HostFaceRows make_face_rows(const MpmState& state, const HostTables& t, int room
   std::vector<int> groups;
   for (std::size_t i = 0; i < t.bundles.size(); ++i) {
     const int first_slot = t.bundles[i].first_slot;
-    fill.begin_bundle();
     to.first_carried.push_back(static_cast<int>(to.carried.size()));
     groups.clear();
     for (const SlotOfNode& s : slots.of_bundle[i]) {
@@ -220,7 +242,6 @@ HostFaceRows make_face_rows(const MpmState& state, const HostTables& t, int room
     groups.erase(std::unique(groups.begin(), groups.end()), groups.end());
     for (const int g : groups) fill.add(static_cast<int>(i), first_slot, g);
   }
-  to.first_chunk.push_back(static_cast<int>(to.chunks.size()));
   to.first_carried.push_back(static_cast<int>(to.carried.size()));
   return to;
 }

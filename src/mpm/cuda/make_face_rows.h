@@ -9,8 +9,8 @@
 namespace tissue_sim {
 
 struct HostFaceRows {
-  std::vector<int> first_chunk, first_carried;
   std::vector<CudaFaceChunk> chunks;
+  std::vector<int> first_carried;
   std::vector<CudaFaceEntry> entries;
   std::vector<CudaFaceShare> shares;
   std::vector<CudaFaceRow> rows;

@@ -132,9 +132,9 @@ __device__ __forceinline__ void block_round(const CudaTables& t, const CudaFrame
     bring_nodes<true, kCached, kHand, kPushes>(t, w.bundle.first_slot, w.bundle.slots, cache, from,
                                                to, odd_round ? f.force[0] : f.force[1], f.step,
                                                scale, s.u, v, pushed);
-    if (kCan != Can::kPlain && f.held_faces.first_chunk != nullptr) {
+    if (kCan != Can::kPlain && f.held_faces.chunks != nullptr) {
       hold_faces<kPushes>(f.held_faces,
-                          {t.slot_node, t.slot_parts, t.first_parts, t.parts, from, to,
+                          {t.slot_node, t.slot_parts, t.parts, from, to,
                            odd_round ? f.force[0] : f.force[1], f.step, scale, s.u, v, pushed,
                            index, round - 1, s.exchange});
     }

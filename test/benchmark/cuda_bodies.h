@@ -4,7 +4,6 @@
 #include <Eigen/SVD>
 #include <algorithm>
 #include <cmath>
-#include <cstdlib>
 #include <string>
 #include <vector>
 
@@ -57,10 +56,8 @@ inline void make_organ(Scene& scene) {
 inline void hold_at_faces(Scene& scene) {
   scene.mpm.boundary = MpmBoundary::kSurface;
   Body& body = scene.bodies[0];
-  const char* env = getenv("ANCHOR_Z");
-  const double at = env != nullptr ? atof(env) : 0.0017;
-  body.anchors[0].z = at;
-  body.anchors[1].min[2] = body.size[2] - at;
+  body.anchors[0].z = 0.0017;
+  body.anchors[1].min[2] = body.size[2] - 0.0017;
 }
 
 /// Where these anchors are in the deformed body, and stay.

@@ -73,7 +73,7 @@ void deform_and_shake(T& tissue, unsigned seed) {
 }
 
 struct Outcome {
-  std::vector<float> places;  ///< [points][6]: displacement, velocity
+  std::vector<float> places;   ///< [points][6]: displacement, velocity
   std::vector<float> outside;  ///< share of each point that is not held
   std::vector<Wrench> loads;
   std::uint64_t checksum = 0;

@@ -1,7 +1,6 @@
 // What CudaMpmTissue keeps on the GPU of anchors that hold tissue at their faces.
 #pragma once
 
-#include <cstdlib>
 #include <functional>
 
 #include "compute/device_array.h"
@@ -21,20 +20,20 @@ struct AnchorsOnDevice {
   DeviceArray<CudaRowGroup> groups;
   DeviceArray<CudaRowNodes> row_nodes;
   DeviceArray<float> inverse, room;
-  DeviceArray<double> impulse;         ///< of AnchorFaces::rows since the frame began [N s]
-  DeviceArray<CudaAnchorPlace> places; ///< of a part of a frame; empty where all stay in it
-  DeviceArray<float> lightness;        ///< Points::lightness, 1 where a bond broke
+  DeviceArray<double> impulse;          ///< of AnchorFaces::rows since the frame began [N s]
+  DeviceArray<CudaAnchorPlace> places;  ///< of a part of a frame; empty where all stay in it
+  DeviceArray<float> lightness;         ///< Points::lightness, 1 where a bond broke
   std::size_t room_each = 0;
 
   std::size_t bytes() const {
-    return first_carried.bytes() + chunks.bytes() + entries.bytes() +
-           shares.bytes() + rows.bytes() + carried.bytes() + groups.bytes() + row_nodes.bytes() +
-           inverse.bytes() + room.bytes() + impulse.bytes() + places.bytes() + lightness.bytes();
+    return first_carried.bytes() + chunks.bytes() + entries.bytes() + shares.bytes() +
+           rows.bytes() + carried.bytes() + groups.bytes() + row_nodes.bytes() + inverse.bytes() +
+           room.bytes() + impulse.bytes() + places.bytes() + lightness.bytes();
   }
   /// What the kernels need; `substep` of the part is the first.
   CudaHeldFaces view(int substep, int anchors) const {
     CudaHeldFaces h;
-    if (chunks.size() == 0 || getenv("NO_HOLD") != nullptr) return h;
+    if (chunks.size() == 0) return h;
     h.first_carried = first_carried.data();
     h.chunks = chunks.data();
     h.entries = entries.data();

@@ -105,8 +105,9 @@ void CudaMpmTissue::push_points(const std::vector<std::int32_t>& changed) {
   if (!points.soft.empty() && d.soft.size() == 0) d.soft.upload(points.soft, d.stream);
   std::vector<CudaPointChange> changes;
   for (const std::int32_t p : changed) {
-    changes.push_back({p, points.bonds[p], static_cast<std::uint8_t>(points.is_soft(p) ? 1 : 0),
-                       static_cast<std::uint8_t>(points.bonds[p] == state_->whole_bonds[p] ? 1 : 0)});
+    changes.push_back(
+        {p, points.bonds[p], static_cast<std::uint8_t>(points.is_soft(p) ? 1 : 0),
+         static_cast<std::uint8_t>(points.bonds[p] == state_->whole_bonds[p] ? 1 : 0)});
   }
   d.sweep.changes.upload(changes, d.stream);
   launch_change_points(d.sweep.changes.data(), static_cast<int>(changes.size()), d.bonds.data(),

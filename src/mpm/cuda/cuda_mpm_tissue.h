@@ -164,7 +164,7 @@ class CudaMpmTissue final : public Tissue {
   void push_anchors();  ///< rows that their faces hold: after push_tables(), or where nodes split
   void push_impulses();
   void push_lightness();
-  void pull_impulses();  ///< AnchorFaces::impulse
+  void pull_impulses();          ///< AnchorFaces::impulse
   void upload_anchor_places();   ///< of a part
   void leave_anchors(int done);  ///< where they are after so many substeps of it
   /// What anchors hold, in a cloud: `index` of each point, or each of `stride` where it is empty.

@@ -36,13 +36,13 @@ struct CudaFaceShare {
 /// side by side, for nobody to wait more than once for it.
 struct alignas(16) CudaFaceEntry {
   std::int32_t node;
-  int slot;              ///< one of its node's, -1 where it has none
-  int local;             ///< from the bundle's first slot on; -1 elsewhere, or where no row moves it
-  int shares;            ///< so many rows do
-  CudaFaceShare share;   ///< the first of them, ...
-  int next_share;        ///< ... and where the others are
-  int owned;             ///< the bundle writes it; this and the next are filled on the GPU
-  uint4 parts;           ///< CudaTables::first_parts, ...
+  int slot;             ///< one of its node's, -1 where it has none
+  int local;            ///< from the bundle's first slot on; -1 elsewhere, or where no row moves it
+  int shares;           ///< so many rows do
+  CudaFaceShare share;  ///< the first of them, ...
+  int next_share;       ///< ... and where the others are
+  int owned;            ///< the bundle writes it; this and the next are filled on the GPU
+  uint4 parts;          ///< CudaTables::first_parts, ...
   std::uint32_t shared;  ///< ... and slot_parts, of the slot
   int unused[3];
 };
@@ -52,7 +52,7 @@ struct alignas(16) CudaFaceRow {
   int entry[kFaceRowNodes];
   float weight[kFaceRowNodes];
   int anchor;
-  float place[3];     ///< [m]
+  float place[3];   ///< [m]
   int group, rows;  ///< the first row, and how many
   int inverse;      ///< the row's own line of FaceGroup::inverse
   float own;        ///< its first number

@@ -110,8 +110,8 @@ __device__ __forceinline__ void hold_chunk(const CudaHeldFaces& h, const FacesAt
   const int numbers = 3 * chunk.rows;
   const CudaFaceEntry* const entries = h.entries + chunk.first_entry;
   const CudaFaceRow* const rows = h.rows + chunk.first_row;
-  float* const nodes = chunk.is_large != 0 ? h.room + h.room_each * w.bundle
-                                           : reinterpret_cast<float*>(w.exchange);
+  float* const nodes =
+      chunk.is_large != 0 ? h.room + h.room_each * w.bundle : reinterpret_cast<float*>(w.exchange);
   float* const left = nodes + kFaceEntryRoom * chunk.entries;
   float* const impulse = left + numbers;
   const CudaFaceRow first = load_entry(rows + min(thread, numbers - 1) / 3);

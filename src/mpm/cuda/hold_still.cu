@@ -1,6 +1,5 @@
-#include "mpm/cuda/hold_still.h"
-
 #include "compute/for_each_cuda.h"
+#include "mpm/cuda/hold_still.h"
 
 namespace tissue_sim {
 namespace {

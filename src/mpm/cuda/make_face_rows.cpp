@@ -232,11 +232,8 @@ HostFaceRows make_face_rows(const MpmState& state, const HostTables& t, int room
       const auto carried = from(held);
       if (carried == held.end() || carried->first != s.node) continue;
       const AnchorFaces::HeldNode& h = faces.held[carried->second];
-      to.carried.push_back({s.node,
-                            s.slot - first_slot,
-                            s.slot,
-                            h.anchor,
-                            {h.place[0], h.place[1], h.place[2]}});
+      to.carried.push_back(
+          {s.node, s.slot - first_slot, s.slot, h.anchor, {h.place[0], h.place[1], h.place[2]}});
     }
     std::sort(groups.begin(), groups.end());
     groups.erase(std::unique(groups.begin(), groups.end()), groups.end());

@@ -113,8 +113,7 @@ enum class PbdElasticity {
 
 /// Where the material point method has the boundary of a body.
 enum class MpmBoundary {
-  kSurface,  ///< tools and the ground touch its true surface, anchors hold it at their faces; on a
-             ///< GPU anchors hold nodes of the lattice
+  kSurface,  ///< tools and the ground touch its true surface, anchors hold it at their faces
   kLattice,  ///< both act at the lattice's points and nodes, up to half a cell off
 };
 struct MpmOptions {

@@ -51,6 +51,31 @@ inline void make_organ(Scene& scene) {
   body.anchors[1].min[2] = 1.9 * body.radii[2];
 }
 
+/// Has the anchors hold it at their faces, which leave a cell's upper points free and its lower
+/// ones not.
+inline void hold_at_faces(Scene& scene) {
+  scene.mpm.boundary = MpmBoundary::kSurface;
+  Body& body = scene.bodies[0];
+  body.anchors[0].z = 0.0017;
+  body.anchors[1].min[2] = body.size[2] - 0.0017;
+}
+
+/// Where these anchors are in the deformed body, and stay.
+inline std::vector<AnchorMotion> stay_deformed(MpmState& state, double stretch) {
+  const Body& body = state.scene.bodies[0];
+  std::vector<AnchorMotion> motion;
+  state.anchors.moves = true;
+  for (std::size_t i = 0; i < body.anchors.size(); ++i) {
+    const double z = i == 0 ? body.anchors[0].z : body.anchors[1].min[2];
+    const Vec3 moved = (z + 0.5 * state.scene.cell_size) * Vec3(0.3, 0, stretch);
+    state.anchors.now[i].translation = moved;
+    const Pose pose{body.anchors[i].origin() + moved, Quat::Identity()};
+    motion.push_back({pose, pose});
+  }
+  find_held_nodes(state, state.anchors);
+  return motion;
+}
+
 /// Stretch along z by this much and shear, and waves of some cells' length.
 inline void deform(MpmState& state, double stretch) {
   const LatticeBody& b = state.bodies[0];

@@ -28,7 +28,8 @@ enum class Extra {
   kTools,
   kAll,
   kRinging,
-  kRingingContact
+  kRingingContact,
+  kAnchors
 };
 
 constexpr CubeSize kSizes[] = {{25000, 15, 15, 14},   {100000, 23, 23, 24},
@@ -43,6 +44,7 @@ void run(benchmark::State& bench, const CubeSize& size, Law law, Extra extra) {
   }
   Scene scene = cube(size, law);
   if (extra == Extra::kOrgan || extra == Extra::kCutOrgan) make_organ(scene);
+  if (extra == Extra::kAnchors) hold_at_faces(scene);
   std::vector<ToolMotion> tools;
   if (extra == Extra::kTools || extra == Extra::kAll) add_probes(scene, tools);
   if (extra == Extra::kAll) add_options(scene, tools);
@@ -55,6 +57,8 @@ void run(benchmark::State& bench, const CubeSize& size, Law law, Extra extra) {
       extra == Extra::kContact || extra == Extra::kRingingContact || extra == Extra::kAll;
   const double stretch = in_contact ? -0.15 : tools.empty() ? 0.15 : 0;
   deform(tissue.state(), stretch);
+  std::vector<AnchorMotion> anchors;
+  if (extra == Extra::kAnchors) anchors = stay_deformed(tissue.state(), stretch);
   tissue.push();
   const float dt = 0.5f * tissue.stable_substep();
   std::vector<BladePath> cuts;
@@ -73,11 +77,12 @@ void run(benchmark::State& bench, const CubeSize& size, Law law, Extra extra) {
   if (size.points <= 1000000) {  // against the CPU, ten substeps on
     MpmTissue cpu(scene);
     deform(cpu.state(), stretch);
+    if (extra == Extra::kAnchors) stay_deformed(cpu.state(), stretch);
     measure_motion(cpu.state());
     cpu.advance(0, dt, {tools, cuts});
-    cpu.advance(10, dt, {tools, {}});
+    cpu.advance(10, dt, {tools, {}, anchors});
     cpu.finish();
-    tissue.advance(10, dt, {tools, {}});
+    tissue.advance(10, dt, {tools, {}, anchors});
     tissue.finish();
     tissue.pull();
     double moved = 0;
@@ -95,7 +100,7 @@ void run(benchmark::State& bench, const CubeSize& size, Law law, Extra extra) {
   bool blew_up = false, touch = true;
   double speed = 0;
   const auto advance = [&] {
-    tissue.advance(kSubsteps, dt, {tools, {}});
+    tissue.advance(kSubsteps, dt, {tools, {}, anchors});
     const FrameResult result = tissue.finish();
     blew_up = result.blew_up || blew_up;
     touch = true;
@@ -180,6 +185,7 @@ int main(int argc, char** argv) {
     add("mpm/cuda/contact/", size, Law::kFixedCorotated, Extra::kContact);
     add("mpm/cuda/tools/", size, Law::kFixedCorotated, Extra::kTools);
     add("mpm/cuda/all_options/", size, Law::kFixedCorotated, Extra::kAll);
+    add("mpm/cuda/anchors/", size, Law::kFixedCorotated, Extra::kAnchors);
     add("mpm/cuda/ringing/", size, Law::kFixedCorotated, Extra::kRinging);
     add("mpm/cuda/ringing_contact/", size, Law::kFixedCorotated, Extra::kRingingContact);
   }

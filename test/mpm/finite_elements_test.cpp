@@ -7,6 +7,9 @@
 
 #include "finite_element_scenes.h"
 #include "tissue_sim/simulation.h"
+#if defined(TISSUE_SIM_CUDA)
+#include "compute/cuda_check.h"
+#endif
 
 namespace tissue_sim {
 namespace {
@@ -38,6 +41,26 @@ Tool punch() {
   return t;
 }
 
+/// Anchors, on either device.
+class FiniteElementsOn : public testing::TestWithParam<Device> {
+ protected:
+  void SetUp() override {
+#if defined(TISSUE_SIM_CUDA)
+    const std::string why = GetParam() == Device::kCuda ? why_no_gpu() : "";
+    if (!why.empty()) GTEST_SKIP() << why;
+#endif
+  }
+  static Scene on_this(Scene scene) {
+    scene.device = GetParam();
+    return scene;
+  }
+};
+#if defined(TISSUE_SIM_CUDA)
+INSTANTIATE_TEST_SUITE_P(Devices, FiniteElementsOn, testing::Values(Device::kCpu, Device::kCuda));
+#else
+INSTANTIATE_TEST_SUITE_P(Devices, FiniteElementsOn, testing::Values(Device::kCpu));
+#endif
+
 double force_error(double cell_size, const Tool& tool, double depth, const char* body,
                    const char* name) {
   Simulation simulation(indented_cylinder(cell_size, 0, tool));
@@ -45,8 +68,10 @@ double force_error(double cell_size, const Tool& tool, double depth, const char*
 }
 
 /// How far the middle of the top sinks, and what the clamp carries.
-double sag_error(double cell_size, double held) {
-  Simulation simulation(clamped_block(cell_size, held));
+double sag_error(const Scene& scene) {
+  const double cell_size = scene.cell_size;
+  const double held = scene.bodies[0].size.z() - 0.032;
+  Simulation simulation(scene);
   const SettleReport report = simulation.settle({1e-4, 3, 20});
   EXPECT_TRUE(report.at_rest) << held << ": " << report.speed << " m/s";
   const Vec3 top(0, 0, 0.032);
@@ -75,22 +100,25 @@ TEST(FiniteElements, ForceOnAFlatTool) {
   EXPECT_GT(std::fabs(coarse / fine), std::pow(1.5, 1.3));
 }
 
-TEST(FiniteElements, SagOfAClampedBlockWhereverThePlaneLiesInACell) {
+TEST_P(FiniteElementsOn, SagOfAClampedBlockWhereverThePlaneLiesInACell) {
+  const auto sag_error_of = [](double cell_size, double held) {
+    return sag_error(on_this(clamped_block(cell_size, held)));
+  };
   double least = 1, most = -1;
   for (const double held : {0.0, 0.001, 0.0041, 0.0087, 0.0099, 0.01, 0.0111}) {
-    const double e = sag_error(0.004, held);
+    const double e = sag_error_of(0.004, held);
     EXPECT_NEAR(e, 0, 0.015) << held;
     least = std::min(least, e);
     most = std::max(most, e);
   }
   EXPECT_LT(most - least, 0.015);
-  EXPECT_NEAR(sag_error(0.0037, 0.0083), 0, 0.015) << "cells that do not divide the block";
-  EXPECT_GT(std::fabs(sag_error(0.008, 0) / sag_error(0.004, 0)), std::pow(2, 1.3));
+  EXPECT_NEAR(sag_error_of(0.0037, 0.0083), 0, 0.015) << "cells that do not divide the block";
+  EXPECT_GT(std::fabs(sag_error_of(0.008, 0) / sag_error_of(0.004, 0)), std::pow(2, 1.3));
 }
 
-TEST(FiniteElements, FrequencyOfAClampedBlock) {
+TEST_P(FiniteElementsOn, FrequencyOfAClampedBlock) {
   for (const bool sideways : {true, false}) {
-    Scene scene = clamped_block(0.004, 0.009);
+    Scene scene = on_this(clamped_block(0.004, 0.009));
     scene.frame_rate = 400;
     Simulation simulation(scene);
     const int axis = sideways ? 0 : 2;
@@ -104,9 +132,9 @@ TEST(FiniteElements, FrequencyOfAClampedBlock) {
 }
 
 // Anchors that move, and what they carry.
-TEST(FiniteElements, ReactionOfABarThatIsPulled) {
+TEST_P(FiniteElementsOn, ReactionOfABarThatIsPulled) {
   for (const auto& [cell_size, held] : {std::pair{0.002, 0.0047}, {0.0023, 0.005}, {0.003, 0.0}}) {
-    Scene scene = pulled_bar(cell_size, held);
+    Scene scene = on_this(pulled_bar(cell_size, held));
     for (Anchor& anchor : scene.bodies[0].anchors) {
       if (cell_size == 0.002) continue;  // else it ends where the bar does, as one draws it
       for (const int axis : {1, 2}) anchor.min[axis] = -0.008, anchor.max[axis] = 0.008;
@@ -129,8 +157,8 @@ TEST(FiniteElements, ReactionOfABarThatIsPulled) {
 
 // A strip tears off an anchor under 12 g: what lies torn off in front of the face is not held by
 // it, else it would be drawn into pieces by the hundred.
-TEST(SurfaceAnchors, LetGoOfWhatTearsOffInFrontOfThem) {
-  Scene scene = reference_scene(0.002);
+TEST_P(FiniteElementsOn, AnchorsLetGoOfWhatTearsOffInFrontOfThem) {
+  Scene scene = on_this(reference_scene(0.002));
   scene.gravity = Vec3(120, 0, 0);
   scene.materials[0] = Material();
   scene.materials[0].name = "phantom";

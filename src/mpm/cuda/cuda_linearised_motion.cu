@@ -70,6 +70,16 @@ struct Start {
   }
 };
 
+/// The sum of m v v, and the largest component of v.
+struct Square {
+  CudaNodes present;
+  const float4* v;
+  __device__ double2 operator()(int i, float& largest) const {
+    largest = largest3(v[i]);
+    return {present.u[i].w * dot3(v[i], v[i]), 0};
+  }
+};
+
 /// u = present + scale v, with a scale that makes v's largest component `small`.
 struct Displace {
   CudaNodes present;
@@ -126,7 +136,7 @@ void launch(int count, int parts, const F& f, double2* sums, float* largest, cud
 
 CudaLinearisedMotion::CudaLinearisedMotion(const CudaNodes& present, const CudaNodes& scratch,
                                            std::size_t node_count, double cell_size,
-                                           Substep substep, CudaMotionRoom& room,
+                                           Substep substep, Hold hold, CudaMotionRoom& room,
                                            cudaStream_t stream)
     : present_(present),
       scratch_(scratch),
@@ -134,6 +144,7 @@ CudaLinearisedMotion::CudaLinearisedMotion(const CudaNodes& present, const CudaN
       parts_((count_ + kThreads - 1) / kThreads),
       small_(kSmallMotion * static_cast<float>(cell_size)),
       substep_(std::move(substep)),
+      hold_(std::move(hold)),
       stream_(stream),
       room_(room),
       u_(room.fields[0]),
@@ -173,6 +184,11 @@ void CudaLinearisedMotion::start() {
   room_.largest.clear(stream_);
   launch(count_, parts_, Start{present_, rates_, v_}, room_.part_sum.data(),
          room_.part_largest.data(), stream_);
+  if (hold_) {
+    hold_(v_);
+    launch(count_, parts_, Square{present_, v_}, room_.part_sum.data(), room_.part_largest.data(),
+           stream_);
+  }
   const double square = sum().x;
   accelerate();  // by nothing, for the largest is not known yet
   check_cuda(cudaMemcpyAsync(at_rest_, scratch_.v, count_ * sizeof(float4),

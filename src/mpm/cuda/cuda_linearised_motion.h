@@ -24,10 +24,12 @@ class CudaLinearisedMotion {
  public:
   /// Enqueues a substep of a second from rest, without contact, gravity and drag.
   using Substep = std::function<void(const CudaNodes& from, const CudaNodes& to)>;
+  /// Enqueues what takes out of a field of the nodes what anchors' faces hold; empty for nothing.
+  using Hold = std::function<void(float4* field)>;
 
   /// About `present`; `scratch` is of the same size, and overwritten where nodes have mass.
   CudaLinearisedMotion(const CudaNodes& present, const CudaNodes& scratch, std::size_t node_count,
-                       double cell_size, Substep substep, CudaMotionRoom& room,
+                       double cell_size, Substep substep, Hold hold, CudaMotionRoom& room,
                        cudaStream_t stream);
 
   void start();
@@ -47,6 +49,7 @@ class CudaLinearisedMotion {
   int count_, parts_;
   float small_;  ///< largest displacement [m]
   Substep substep_;
+  Hold hold_;
   cudaStream_t stream_;
   CudaMotionRoom& room_;
   float4 *u_, *rates_, *at_rest_, *before_, *v_;

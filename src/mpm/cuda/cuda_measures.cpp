@@ -29,6 +29,10 @@ double CudaMpmTissue::measure_limit(int steps) {
   frame.substeps = 1;
   frame.step.dt = frame.step.kick = 1;
   frame.arrived = d.arrived.data();
+  frame.held_faces = d.anchors.view(0, 0);
+  frame.held_faces.places = nullptr;
+  frame.held_faces.impulse = nullptr;
+  frame.held_faces.drift = 0;
   // Between two parts of a frame nobody needs the state before a part, nor what contact pushes
   // with.
   const std::size_t n = d.entries();
@@ -56,7 +60,7 @@ double CudaMpmTissue::measure_limit(int steps) {
         }
         launch_move_front(d.front.view(), frame.step, from, to, d.stream);
       },
-      d.motion_room, d.stream);
+      d.anchors.hold_still(d.stream), d.motion_room, d.stream);
   return 2 / std::sqrt(largest_eigenvalue(motion, steps));
 }
 

@@ -105,11 +105,15 @@ void CudaMpmTissue::push_points(const std::vector<std::int32_t>& changed) {
   if (!points.soft.empty() && d.soft.size() == 0) d.soft.upload(points.soft, d.stream);
   std::vector<CudaPointChange> changes;
   for (const std::int32_t p : changed) {
-    changes.push_back({p, points.bonds[p], static_cast<std::uint8_t>(points.is_soft(p) ? 1 : 0)});
+    changes.push_back(
+        {p, points.bonds[p], static_cast<std::uint8_t>(points.is_soft(p) ? 1 : 0),
+         static_cast<std::uint8_t>(points.bonds[p] == state_->whole_bonds[p] ? 1 : 0)});
   }
   d.sweep.changes.upload(changes, d.stream);
   launch_change_points(d.sweep.changes.data(), static_cast<int>(changes.size()), d.bonds.data(),
-                       d.soft.size() > 0 ? d.soft.data() : nullptr, d.stream);
+                       d.soft.size() > 0 ? d.soft.data() : nullptr,
+                       d.anchors.lightness.size() > 0 ? d.anchors.lightness.data() : nullptr,
+                       d.stream);
 }
 
 bool CudaMpmTissue::take_apart(const std::vector<std::int32_t>& changed,
@@ -128,6 +132,7 @@ bool CudaMpmTissue::take_apart(const std::vector<std::int32_t>& changed,
   std::vector<std::int32_t> nodes = nodes_around(changed);
   pull_some(nodes);
   pull_contacts();
+  pull_impulses();
   const auto known = static_cast<std::int32_t>(state_->nodes.size());
   bool may_part = false;
   const Apart apart = tissue_sim::take_apart(*state_, changed,
@@ -138,6 +143,7 @@ bool CudaMpmTissue::take_apart(const std::vector<std::int32_t>& changed,
   push_points(changed);
   push_points(apart.softened);
   if (apart.new_blocks || d.host_tables.number.empty()) push_tables();
+  push_anchors();
   return may_part;
 }
 

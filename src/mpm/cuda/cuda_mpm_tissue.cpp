@@ -4,6 +4,7 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "mpm/anchors/anchored_share.h"
 #include "mpm/cuda/on_device.h"
 #include "mpm/cuda/outer_points.h"
 #include "mpm/lattice_pieces.h"
@@ -21,8 +22,15 @@ std::unique_ptr<MpmState> make_state(const Scene& scene, std::vector<std::string
   state->scene = scene;
   state->bodies = make_lattice_bodies(scene, state->points, notes, NodeRange::kBox);
   state->whole_bonds = state->points.bonds;
-  state->front.follows = scene.mpm.boundary == MpmBoundary::kSurface;
+  const bool at_surface = scene.mpm.boundary == MpmBoundary::kSurface;
+  state->front.follows = at_surface;
+  if (at_surface) find_free_volumes(*state);
   state->fields = std::make_unique<NodeFields>(state->bodies, state->points, state->nodes);
+  if (at_surface) find_face_links(scene, *state, state->anchors);
+  find_face_rows(*state, state->anchors);
+  for (const std::int32_t p : state->anchors.points) {
+    if (state->points.anchored[p] == 0) state->points.anchored[p] = Points::kAtAnchor;
+  }
   state->instructions = instruction_set();
   state->kernels = &block_kernels(state->instructions);
   state->cpu = std::make_unique<Cpu>(scene.threads);
@@ -32,13 +40,6 @@ std::unique_ptr<MpmState> make_state(const Scene& scene, std::vector<std::string
 /// What the CPU does at the true surface where the scene says so, and this does at the lattice.
 void note_what_differs(const Scene& scene, std::vector<std::string>& notes) {
   if (scene.mpm.boundary != MpmBoundary::kSurface) return;
-  const bool anchors = std::any_of(scene.bodies.begin(), scene.bodies.end(),
-                                   [](const Body& b) { return !b.anchors.empty(); });
-  if (anchors) {
-    notes.emplace_back(
-        "on a GPU anchors hold nodes of the lattice, up to half a cell from their faces, and "
-        "report no loads; device cpu holds tissue at the faces themselves");
-  }
   if (!scene.tools.empty()) {
     notes.emplace_back(
         "on a GPU tools sink into the surface of tissue by up to a tenth of a cell or so, for what "
@@ -75,10 +76,11 @@ CudaMpmTissue::CudaMpmTissue(const Scene& scene, std::vector<std::string> notes)
   state_ = make_state(scene, &notes_);
   note_what_differs(scene, notes_);
   d.cut_shape = choose_shape(state_->bodies, d.limits, false);
-  // What touches other tissue keeps its blocks, which know the contacts.
-  make_blocks(
-      state_->bodies.size() > 1 ? d.cut_shape : choose_shape(state_->bodies, d.limits, true),
-      d.limits.processors);
+  // What touches other tissue keeps its blocks, which know the contacts; and what anchors hold at
+  // their faces has cells that are not full.
+  const bool whole = state_->bodies.size() == 1 && state_->anchors.groups.empty();
+  make_blocks(whole ? choose_shape(state_->bodies, d.limits, true) : d.cut_shape,
+              d.limits.processors);
   pieces_ = whole_pieces(*state_);
   foresight_ = make_foresight(scene);
   push();
@@ -121,12 +123,8 @@ void CudaMpmTissue::upload_colliders() {
 }
 
 void CudaMpmTissue::begin_frame(double duration, const FrameInput& input) {
-  if (!input.anchors.empty()) {
-    throw std::runtime_error(
-        "anchors do not move on a GPU yet (they hold nodes of the lattice there): set device to "
-        "cpu");
-  }
   follow(input, state_->scene);
+  begin_anchors(input);
   input_ = input;
   result_ = {};
   result_.loads.resize(state_->scene.tools.size());
@@ -151,6 +149,7 @@ int CudaMpmTissue::run(const FramePart& part) {
   result_.substep = std::max<double>(result_.substep, part.substeps.longest());
   if (substeps == 0) return 0;
   upload_colliders();
+  upload_anchor_places();
   find_near();
   const bool tears = can_tear(*state_);
   const int checks = tears ? tear_checks(*state_, substeps, part.substeps.longest()) : 1;
@@ -162,6 +161,7 @@ int CudaMpmTissue::run(const FramePart& part) {
     if (tears) tearing_ = find_tearing();
   }
   substeps_ = done;
+  leave_anchors(done);
   result_.substeps += done;
   d.host_loads.resize(d.loads.size());
   d.loads.download(d.host_loads.data(), d.loads.size(), d.stream);
@@ -238,6 +238,7 @@ void CudaMpmTissue::launch(int begin, int end, float dt) {
   frame.cell_size = static_cast<float>(scene.cell_size);
   frame.arrived = d.arrived.data();
   frame.faces = faces_of_launch();
+  frame.held_faces = d.anchors.view(begin, static_cast<int>(state_->anchors.origin.size()));
   launch_front_forces(d.front.view(), d.present(), d.stream);
   if (frame.faces != nullptr || d.may_meet) {
     d.pushed.resize(3 * kPushStride * d.u[0].size());

@@ -38,6 +38,9 @@ class CudaMpmTissue final : public Tissue {
   FrameResult finish() override;
   int point_count() const override { return state_->points.size(); }
   int read_points(const PointSelection& selection, std::vector<std::uint8_t>& cloud) override;
+  bool moves_anchors() const override {
+    return state_->scene.mpm.boundary == MpmBoundary::kSurface;
+  }
   int fragment_count() const override { return static_cast<int>(pieces_.all.size()); }
   Span<const Fragment> fragments() override;
   std::uint64_t checksum() override;
@@ -157,6 +160,16 @@ class CudaMpmTissue final : public Tissue {
   void pull_front();  ///< how far parted nodes are apart; the host has the same ones
   void push_front();  ///< the front that the host has, behind the nodes, all of which are there
   void pull_contacts();
+  void begin_anchors(const FrameInput& input);
+  void push_anchors();  ///< rows that their faces hold: after push_tables(), or where nodes split
+  void push_impulses();
+  void push_lightness();
+  void pull_impulses();          ///< AnchorFaces::impulse
+  void upload_anchor_places();   ///< of a part
+  void leave_anchors(int done);  ///< where they are after so many substeps of it
+  /// What anchors hold, in a cloud: `index` of each point, or each of `stride` where it is empty.
+  void put_held_points(const std::vector<std::int32_t>& index, int stride,
+                       std::vector<std::uint8_t>& cloud) const;
   void launch_measure();
   void finish_measure();
   double measure_limit(int steps);  ///< see MeasureLimit; of all blocks

@@ -65,6 +65,8 @@ void CudaMpmTissue::break_bonds(double share) {
 }
 
 void CudaMpmTissue::end_frame() {
+  pull_impulses();
+  result_.anchor_loads = anchor_loads(state_->anchors, duration_);
   if (!blades_.empty()) cut_by_blades();
   blades_.clear();
   if (result_.tear_report.bonds_broken > 0) {
@@ -87,6 +89,8 @@ void CudaMpmTissue::save_checkpoint() {
     saved.figures.copy(f.figures, d.stream);
   }
   saved.kept = state_->faces.kept;
+  saved.impulse.copy(d.anchors.impulse, d.stream);
+  saved.anchors = state_->anchors.now;
   saved.time = state_->time;
   saved.dt = state_->dt;
   saved.result = result_;
@@ -108,6 +112,8 @@ void CudaMpmTissue::restore_checkpoint() {
     f.figures.copy(saved.figures, d.stream);
   }
   state_->faces.kept = saved.kept;
+  d.anchors.impulse.copy(saved.impulse, d.stream);
+  state_->anchors.now = saved.anchors;
   search_anew();
   state_->time = saved.time;
   state_->dt = saved.dt;

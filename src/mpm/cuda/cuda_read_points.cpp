@@ -82,6 +82,7 @@ int CudaMpmTissue::read_points(const PointSelection& selection, std::vector<std:
                   d.host_cloud.data() + first, static_cast<std::size_t>(n) * sizeof(Point));
     });
   }
+  put_held_points(place, stride, cloud);
   if (selection.fields != 0) {
     pull_nodes();
     add_point_fields(*state_, selection, place, count, cloud);

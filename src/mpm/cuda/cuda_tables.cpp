@@ -44,7 +44,7 @@ std::size_t CudaMpmTissue::device_bytes() const {
       d.bonds.bytes() + d.soft.bytes() + d.with.bytes() + d.whole.bytes() + d.u_before.bytes() +
       d.connect_room.bytes() + d.colliders.bytes() + d.loads.bytes() + d.measures.bytes() +
       d.cloud.bytes() + d.stretched.bytes() + d.faces.bytes() + d.front.bytes() +
-      d.checkpoint.bytes() + d.stacks.bytes();
+      d.checkpoint.bytes() + d.stacks.bytes() + d.anchors.bytes();
   for (int i = 0; i < 2; ++i) sum += d.u[i].bytes() + d.v[i].bytes() + d.force[i].bytes();
   return sum;
 }
@@ -114,8 +114,11 @@ void CudaMpmTissue::plan_tables() {
   d.plan.max_plane_slots = t.max_plane_slots;
   d.plan.max_columns = t.max_columns;
   choose(t.bundles.size());
-  d.all_plain = std::all_of(t.bundles.begin(), t.bundles.end(),
-                            [](const CudaBundle& b) { return b.blocks == 1 && b.partial == 0; });
+  // Those kernels hold no faces.
+  d.all_plain = state_->anchors.groups.empty() &&
+                std::all_of(t.bundles.begin(), t.bundles.end(), [](const CudaBundle& b) {
+                  return b.blocks == 1 && b.partial == 0;
+                });
   if (d.resident == 0 || d.plain_resident == 0 || d.push_resident == 0 || d.touch_resident == 0) {
     throw std::runtime_error("the GPU has too little shared memory");
   }
@@ -127,7 +130,9 @@ void CudaMpmTissue::push() {
   push_tables();
   d.bonds.upload(state_->points.bonds, d.stream);
   if (!state_->points.soft.empty()) d.soft.upload(state_->points.soft, d.stream);
+  push_lightness();
   push_nodes();
+  push_anchors();
 }
 
 void CudaMpmTissue::push_tables() {

@@ -98,6 +98,12 @@ __global__ void __launch_bounds__(kMostThreads)
   const int pitch = b.nx + 2, plane = pitch * (b.ny + 2);
   for_each_point(t, b, u, [&](int lane, int s, int x, int y, int z, const HalfPlane(&h)[3]) {
     const PointState p = point_state(b, body, h, x, y, z, s);
+    for (int c = 0; c < 3; ++c) {
+      m.min[c] = fminf(m.min[c], p.x[c]);
+      m.max[c] = fmaxf(m.max[c], p.x[c]);
+    }
+    const float volume = b.whole != 0 ? body.point_volume : t.volume[lane];
+    if (volume == 0) return;  // what an anchor holds has no stress
     float cof[9];
     cofactor(p.F, cof);
     const float J = p.F[0] * cof[0] + p.F[1] * cof[1] + p.F[2] * cof[2];
@@ -109,18 +115,16 @@ __global__ void __launch_bounds__(kMostThreads)
     }
     const float stiffening = column + fabsf(J - 1) * sqrtf(norm2(p.F) / 3);
     if (!isfinite(elastic + stiffening)) m.finite = 0;
-    const float volume = b.whole != 0 ? body.point_volume : t.volume[lane];
     m.elastic_energy += static_cast<double>(elastic) * volume;
     m.wildest = fmaxf(m.wildest, stiffening);
     const bool is_soft = t.soft != nullptr && t.soft[t.point[lane]] != 0;
-    m.stiffening = fmaxf(m.stiffening, is_soft ? kSoftness * stiffening : stiffening);
-    for (int c = 0; c < 3; ++c) {
-      m.min[c] = fminf(m.min[c], p.x[c]);
-      m.max[c] = fmaxf(m.max[c], p.x[c]);
-    }
+    float counts = is_soft ? kSoftness * stiffening : stiffening;
+    if (t.lightness != nullptr) counts = 1 + t.lightness[t.point[lane]] * (counts - 1);
+    m.stiffening = fmaxf(m.stiffening, counts);
   });
   // The velocity of a point is the value of the nodes' velocities there.
-  for_each_point(t, b, v, [&](int, int s, int, int, int, const HalfPlane(&h)[3]) {
+  for_each_point(t, b, v, [&](int lane, int s, int, int, int, const HalfPlane(&h)[3]) {
+    if (b.whole == 0 && t.volume[lane] == 0) return;
     float v2 = 0;
     for (int c = 0; c < 3; ++c) {
       const float sx = (s & 1) != 0 ? 1.0f : -1.0f, sy = (s & 2) != 0 ? 1.0f : -1.0f;

@@ -6,6 +6,7 @@
 
 #include "compute/cuda_event.h"
 #include "compute/device_array.h"
+#include "mpm/cuda/anchors_on_device.h"
 #include "mpm/cuda/choose_plan.h"
 #include "mpm/cuda/connect_slots.h"
 #include "mpm/cuda/cuda_linearised_motion.h"
@@ -90,6 +91,7 @@ struct CudaMpmTissue::OnDevice {
   DeviceArray<Point> cloud;
   FacesOnDevice faces;
   FrontOnDevice front;
+  AnchorsOnDevice anchors;
   SweepOnDevice sweep;
   PieceLabels labels;
   CudaMotionRoom motion_room;
@@ -101,6 +103,8 @@ struct CudaMpmTissue::OnDevice {
     PinnedArray<int> host_held_count;
     DeviceArray<FaceSpring> springs;
     DeviceArray<CudaFaceFigures> figures;
+    DeviceArray<double> impulse;       ///< AnchorFaces::impulse
+    std::vector<RigidMotion> anchors;  ///< AnchorFaces::now
     std::vector<KeptContact> kept;
     bool new_facets = false;  ///< there were some without a spring yet
     double time = 0;
@@ -120,7 +124,8 @@ struct CudaMpmTissue::OnDevice {
       host_held_count.resize(1);
     }
     std::size_t bytes() const {
-      return u.bytes() + v.bytes() + held.bytes() + springs.bytes() + figures.bytes();
+      return u.bytes() + v.bytes() + held.bytes() + springs.bytes() + figures.bytes() +
+             impulse.bytes();
     }
   } checkpoint;
   PinnedArray<Collider> host_colliders;
@@ -153,6 +158,7 @@ struct CudaMpmTissue::OnDevice {
     t.outer = outer.size() > 0 ? outer.data() : nullptr;
     t.bonds = bonds.data();
     t.soft = soft.size() > 0 ? soft.data() : nullptr;
+    t.lightness = anchors.lightness.size() > 0 ? anchors.lightness.data() : nullptr;
     t.held_by = held_by;
     t.with = with.data();
     t.hold = hold.data();

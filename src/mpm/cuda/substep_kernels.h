@@ -2,6 +2,7 @@
 #pragma once
 
 #include "mpm/cuda/block_forces.h"
+#include "mpm/cuda/hold_faces.h"
 #include "mpm/cuda/push_cells.h"
 #include "mpm/cuda/push_contacts.h"
 #include "mpm/cuda/substeps.h"
@@ -111,7 +112,7 @@ __device__ __forceinline__ void nodes_are_there(const CudaFrame& f) {
 /// for the others.
 template <Laws kLaws, bool kCached, bool kPairs, Can kCan>
 __device__ __forceinline__ void block_round(const CudaTables& t, const CudaFrame& f,
-                                            const BundleAtWork& w, int round,
+                                            const BundleAtWork& w, int index, int round,
                                             const CudaLayout& layout, const SlotCache& cache,
                                             const Workers& workers, bool last) {
   constexpr bool kPushes = pushes(kCan);
@@ -126,11 +127,17 @@ __device__ __forceinline__ void block_round(const CudaTables& t, const CudaFrame
     bring_nodes<false, kCached, kHand>(t, w.bundle.first_slot, w.bundle.slots, cache, from, from,
                                        nullptr, f.step, scale, s.u, v);
   } else {
-    PushedNodes pushed;
+    PushedNodes pushed = {};
     if (kPushes) pushed = pushed_nodes(f.pushes, round);
     bring_nodes<true, kCached, kHand, kPushes>(t, w.bundle.first_slot, w.bundle.slots, cache, from,
                                                to, odd_round ? f.force[0] : f.force[1], f.step,
                                                scale, s.u, v, pushed);
+    if (kCan != Can::kPlain && f.held_faces.chunks != nullptr) {
+      hold_faces<kPushes>(f.held_faces,
+                          {t.slot_node, t.slot_parts, t.parts, from, to,
+                           odd_round ? f.force[0] : f.force[1], f.step, scale, s.u, v, pushed,
+                           index, round - 1, s.exchange});
+    }
   }
   if (round == f.substeps) return;
   if (kPushes && last) nodes_are_there(f);
@@ -221,11 +228,11 @@ __global__ void __launch_bounds__(kMaxCudaThreads, 1)
     if (idle) {
       if (round < f.substeps) nodes_are_there(f);
     } else if constexpr (kCached) {
-      block_round<kLaws, true, kPairs, kCan>(t, f, kept, round, layout, cache, workers, true);
+      block_round<kLaws, true, kPairs, kCan>(t, f, kept, mine, round, layout, cache, workers, true);
     } else {
       for (int i = mine; i < t.bundle_count; i += gridDim.x) {
         const bool last = i + static_cast<int>(gridDim.x) >= t.bundle_count;
-        block_round<kLaws, false, kPairs, kCan>(t, f, BundleAtWork(t, i), round, layout, cache,
+        block_round<kLaws, false, kPairs, kCan>(t, f, BundleAtWork(t, i), i, round, layout, cache,
                                                 workers, last);
         __syncthreads();  // the next one clears the exchange
       }

@@ -110,10 +110,12 @@ __global__ void __launch_bounds__(kThreads) sweep_points(const CudaTables t, con
 struct ChangePoints {
   const CudaPointChange* changes;
   std::uint8_t *bonds, *soft;
+  float* lightness;
   __device__ void operator()(int i) const {
     const CudaPointChange& c = changes[i];
     bonds[c.point] = c.bonds;
     if (soft != nullptr) soft[c.point] = c.soft;
+    if (lightness != nullptr && c.whole == 0) lightness[c.point] = 1;
   }
 };
 
@@ -126,8 +128,8 @@ void launch_sweep(const CudaTables& tables, const CudaSweep& sweep, cudaStream_t
 }
 
 void launch_change_points(const CudaPointChange* changes, int count, std::uint8_t* bonds,
-                          std::uint8_t* soft, cudaStream_t stream) {
-  Gpu(stream).for_each(count, ChangePoints{changes, bonds, soft});
+                          std::uint8_t* soft, float* lightness, cudaStream_t stream) {
+  Gpu(stream).for_each(count, ChangePoints{changes, bonds, soft, lightness});
 }
 
 }  // namespace tissue_sim

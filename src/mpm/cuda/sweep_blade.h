@@ -38,10 +38,10 @@ void launch_sweep(const CudaTables& tables, const CudaSweep& sweep, cudaStream_t
 /// What cuts change of a point.
 struct CudaPointChange {
   std::int32_t point;
-  std::uint8_t bonds, soft;
+  std::uint8_t bonds, soft, whole;  ///< `whole`: no bond of its broke
 };
-/// `soft` is null where no point is soft.
+/// `soft` is null where no point is soft, `lightness` where all are as heavy as their neighbours.
 void launch_change_points(const CudaPointChange* changes, int count, std::uint8_t* bonds,
-                          std::uint8_t* soft, cudaStream_t stream);
+                          std::uint8_t* soft, float* lightness, cudaStream_t stream);
 
 }  // namespace tissue_sim

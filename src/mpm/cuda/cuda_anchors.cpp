@@ -1,0 +1,147 @@
+// Anchors of tissue that lives on a GPU: the host says which rows of nodes their faces hold, as on
+// the CPU; the substeps' kernels hold them.
+#include <algorithm>
+#include <cstring>
+#include <stdexcept>
+
+#include "mpm/cuda/on_device.h"
+#include "mpm/point_fields.h"
+
+namespace tissue_sim {
+namespace {
+
+CudaAnchorPlace place_of(const RigidMotion& m) {
+  CudaAnchorPlace p;
+  for (int a = 0; a < 3; ++a) {
+    for (int b = 0; b < 3; ++b) p.rotation[3 * a + b] = m.rotation(a, b);
+    p.translation[a] = m.translation[a];
+  }
+  return p;
+}
+
+}  // namespace
+
+void CudaMpmTissue::push_anchors() {
+  const AnchorFaces& faces = state_->anchors;
+  OnDevice& d = *device_;
+  AnchorsOnDevice& to = d.anchors;
+  if (faces.groups.empty() && faces.held.empty() && to.chunks.size() == 0) return;
+  const int room = 4 * 9 * d.plan.max_plane_slots;  // what columns give to a plane comes there
+  const HostFaceRows t = make_face_rows(*state_, d.host_tables, room);
+  std::vector<CudaRowNodes> rows(faces.rows.size());
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    const FaceRow& r = faces.rows[i];
+    std::copy_n(r.node, kRowNodes, rows[i].node);
+    std::copy_n(r.weight, kRowNodes, rows[i].weight);
+    std::copy_n(r.share, kRowNodes, rows[i].share);
+  }
+  std::vector<CudaRowGroup> groups;
+  for (const FaceGroup& g : faces.groups) groups.push_back({g.first, g.count, g.inverse});
+  to.first_carried.upload(t.first_carried, d.stream);
+  to.chunks.upload(t.chunks, d.stream);
+  to.entries.upload(t.entries, d.stream);
+  launch_connect_entries(to.entries.data(), static_cast<int>(t.entries.size()),
+                         d.of_blocks.slot_node.data(), d.slot_parts.data(), d.first_parts.data(),
+                         d.stream);
+  to.shares.upload(t.shares, d.stream);
+  to.rows.upload(t.rows, d.stream);
+  to.carried.upload(t.carried, d.stream);
+  to.groups.upload(groups, d.stream);
+  to.row_nodes.upload(rows, d.stream);
+  to.inverse.upload(faces.inverse, d.stream);
+  to.room_each = t.room_each;
+  to.room.resize(t.room_each * d.bundles.size());
+  push_impulses();
+}
+
+void CudaMpmTissue::push_lightness() {
+  const Points& points = state_->points;
+  if (points.lightness.empty()) return;
+  std::vector<float> lightness(points.lightness.begin(), points.lightness.end());
+  for (std::size_t p = 0; p < lightness.size(); ++p) {
+    if (points.bonds[p] != state_->whole_bonds[p]) lightness[p] = 1;
+  }
+  device_->anchors.lightness.upload(lightness, device_->stream);
+  check_cuda(cudaStreamSynchronize(device_->stream), "receive data");
+}
+
+void CudaMpmTissue::push_impulses() {
+  OnDevice& d = *device_;
+  const auto& impulse = state_->anchors.impulse;
+  static_assert(sizeof(impulse[0]) == 3 * sizeof(double), "three numbers a row");
+  d.anchors.impulse.upload(reinterpret_cast<const double*>(impulse.data()), 3 * impulse.size(),
+                           d.stream);
+  check_cuda(cudaStreamSynchronize(d.stream), "receive data");
+}
+
+void CudaMpmTissue::pull_impulses() {
+  OnDevice& d = *device_;
+  auto& impulse = state_->anchors.impulse;
+  if (impulse.empty()) return;
+  d.anchors.impulse.download(reinterpret_cast<double*>(impulse.data()), 3 * impulse.size(),
+                             d.stream);
+  check_cuda(cudaStreamSynchronize(d.stream), "send data");
+}
+
+void CudaMpmTissue::begin_anchors(const FrameInput& input) {
+  MpmState& s = *state_;
+  AnchorFaces& faces = s.anchors;
+  if (!input.anchors.empty() && faces.origin.empty()) {
+    throw std::runtime_error(
+        "anchors do not move where the boundary is the lattice's: set mpm.boundary to surface");
+  }
+  if (faces.rows.empty() && input.anchors.empty()) return;
+  faces.impulse.assign(faces.rows.size(), {});
+  if (!faces.moves && !input.anchors.empty()) {
+    faces.moves = true;
+    find_held_nodes(s, faces);
+    push_anchors();
+  } else {
+    push_impulses();
+  }
+}
+
+void CudaMpmTissue::upload_anchor_places() {
+  OnDevice& d = *device_;
+  std::vector<CudaAnchorPlace> places;
+  if (!input_.anchors.empty()) {
+    for (const RigidMotion& m : state_->anchors.now) places.push_back(place_of(m));
+    for (int i = 0; i < substeps_; ++i) {
+      for (const RigidMotion& m : anchors_at(state_->anchors, input_, share_of(i))) {
+        places.push_back(place_of(m));
+      }
+    }
+  }
+  if (places.empty() && d.anchors.places.size() == 0) return;
+  d.anchors.places.upload(places, d.stream);
+  check_cuda(cudaStreamSynchronize(d.stream), "receive data");
+}
+
+void CudaMpmTissue::leave_anchors(int done) {
+  if (input_.anchors.empty() || done == 0) return;
+  state_->anchors.now = anchors_at(state_->anchors, input_, share_of(done - 1));
+}
+
+void CudaMpmTissue::put_held_points(const std::vector<std::int32_t>& index, int stride,
+                                    std::vector<std::uint8_t>& cloud) const {
+  const Points& points = state_->points;
+  if (points.free_volume.empty()) return;
+  state_->cpu->for_each(
+      points.size(),
+      [&](int p) {
+        Vec3 place;
+        const int i = !index.empty() ? index[p] : (p % stride == 0 ? p / stride : -1);
+        if (i < 0 || !held_place(*state_, p, place)) return;
+        std::uint8_t* const at = cloud.data() + static_cast<std::size_t>(i) * sizeof(Point);
+        Point out;
+        std::memcpy(&out, at, sizeof(Point));
+        out.x = static_cast<float>(place[0]);
+        out.y = static_cast<float>(place[1]);
+        out.z = static_cast<float>(place[2]);
+        out.stress = 0;
+        std::memcpy(at, &out, sizeof(Point));
+      },
+      4096);
+}
+
+}  // namespace tissue_sim

@@ -1,0 +1,95 @@
+// What the GPU's kernels see of anchors' faces (mpm/anchors/anchor_faces.h): plain structs with
+// device pointers.
+#pragma once
+
+#include <vector_types.h>
+
+#include <cstddef>
+#include <cstdint>
+
+namespace tissue_sim {
+
+inline constexpr int kFaceRowNodes = 4;  ///< kRowNodes
+
+/// Groups of rows that a thread block holds side by side for a bundle that has nodes of theirs:
+/// those of its slots move as the groups say. Whoever has nodes of a group works it out anew, from
+/// the forces of all of them, so that nobody has to wait for others.
+struct alignas(16) CudaFaceChunk {
+  int first_entry, entries;  ///< their nodes
+  int first_row, rows;
+  int next;        ///< the bundle's next chunk, -1 after the last
+  int has_groups;  ///< some have more than one row
+  int is_large;    ///< they come to CudaHeldFaces::room
+  int unused;
+};
+
+/// Numbers of each node, and of each row, of a chunk while it is worked out.
+inline constexpr int kFaceEntryRoom = 6, kFaceRowRoom = 6;
+
+/// What an impulse of a row, by its number in the chunk, gives to a node: 1 / kg.
+struct CudaFaceShare {
+  int row;
+  float share;
+};
+
+/// A node that rows have, in a slot of the bundle or elsewhere. All that is needed to move it lies
+/// side by side, for nobody to wait more than once for it.
+struct alignas(16) CudaFaceEntry {
+  std::int32_t node;
+  int slot;             ///< one of its node's, -1 where it has none
+  int local;            ///< from the bundle's first slot on; -1 elsewhere, or where no row moves it
+  int shares;           ///< so many rows do
+  CudaFaceShare share;  ///< the first of them, ...
+  int next_share;       ///< ... and where the others are
+  int owned;            ///< the bundle writes it; this and the next are filled on the GPU
+  uint4 parts;          ///< CudaTables::first_parts, ...
+  std::uint32_t shared;  ///< ... and slot_parts, of the slot
+  int unused[3];
+};
+
+/// FaceRow, its nodes and its group by their numbers in the chunk.
+struct alignas(16) CudaFaceRow {
+  int entry[kFaceRowNodes];
+  float weight[kFaceRowNodes];
+  int anchor;
+  float place[3];   ///< [m]
+  int group, rows;  ///< the first row, and how many
+  int inverse;      ///< the row's own line of FaceGroup::inverse
+  float own;        ///< its first number
+  int impulse;      ///< its number in AnchorFaces; -1 where another bundle sums it up
+  int unused[3];
+};
+
+/// A slot of a bundle whose node moves with an anchor: AnchorFaces::held.
+struct CudaCarriedNode {
+  std::int32_t node;
+  int local;  ///< from the bundle's first slot on
+  int slot;
+  int anchor;
+  float place[3];  ///< [m]
+};
+
+/// RigidMotion.
+struct CudaAnchorPlace {
+  double rotation[9], translation[3];
+};
+
+/// What a kernel needs to hold faces; null `chunks` where there are none.
+struct CudaHeldFaces {
+  const CudaFaceChunk* chunks = nullptr;  ///< first the first of each bundle
+  const int* first_carried = nullptr;     ///< per bundle, and the end
+  const CudaFaceEntry* entries = nullptr;
+  const CudaFaceShare* shares = nullptr;
+  const CudaFaceRow* rows = nullptr;
+  const CudaCarriedNode* carried = nullptr;
+  const float* inverse = nullptr;
+  double* impulse = nullptr;  ///< on tissue, [rows][3] [N s]; null where nobody asks
+  /// Of each anchor before the first substep and after each; null where all stay.
+  const CudaAnchorPlace* places = nullptr;
+  int anchors = 0;
+  float drift = 0;  ///< kFaceDrift, or 0 where only rates count
+  float* room = nullptr;
+  std::size_t room_each = 0;  ///< of a bundle
+};
+
+}  // namespace tissue_sim

@@ -1,0 +1,246 @@
+#include "mpm/cuda/make_face_rows.h"
+
+#include <algorithm>
+
+namespace tissue_sim {
+namespace {
+
+static_assert(kRowNodes == kFaceRowNodes, "rows are the same on both sides");
+
+/// A slot whose node rows have, or an anchor carries.
+struct SlotOfNode {
+  std::int32_t node;
+  int slot;
+  bool operator<(const SlotOfNode& o) const {
+    return node < o.node || (node == o.node && slot < o.slot);
+  }
+};
+
+/// The slots of some nodes, and which bundle has them.
+struct SlotsOfNodes {
+  std::vector<std::vector<SlotOfNode>> of_bundle;  ///< by node, then slot
+  std::vector<SlotOfNode> first;                   ///< of each node that has any, by node
+
+  int first_of(std::int32_t node) const {
+    const auto at = std::lower_bound(first.begin(), first.end(), SlotOfNode{node, 0});
+    return at != first.end() && at->node == node ? at->slot : -1;
+  }
+};
+
+SlotsOfNodes find_slots(const MpmState& state, const HostTables& t,
+                        const std::vector<std::uint8_t>& wanted) {
+  SlotsOfNodes slots;
+  const int bundles = static_cast<int>(t.bundles.size());
+  slots.of_bundle.resize(bundles);
+  state.cpu->for_each(bundles, [&](int i) {
+    std::vector<SlotOfNode>& found = slots.of_bundle[i];
+    const CudaBundle& bundle = t.bundles[i];
+    for (int k = bundle.first_block; k < bundle.first_block + bundle.blocks; ++k) {
+      const CudaBlock& b = t.blocks[k];
+      const Block& from = *state.blocks.all[t.of_host[k]];
+      int slot = b.first_slot;
+      for (int z = 0; z < b.nz + 2; ++z) {
+        for (int y = 0; y < b.ny + 2; ++y) {
+          const int* const row = from.node.data() + z * from.plane + y * from.pitch;
+          for (int x = 0; x < b.nx + 2; ++x, ++slot) {
+            if (row[x] >= 0 && wanted[row[x]] != 0) found.push_back({row[x], slot});
+          }
+        }
+      }
+    }
+    std::sort(found.begin(), found.end());
+  });
+  for (const std::vector<SlotOfNode>& found : slots.of_bundle) {
+    slots.first.insert(slots.first.end(), found.begin(), found.end());
+  }
+  std::sort(slots.first.begin(), slots.first.end());
+  const auto same = [](const SlotOfNode& a, const SlotOfNode& b) { return a.node == b.node; };
+  slots.first.erase(std::unique(slots.first.begin(), slots.first.end(), same), slots.first.end());
+  return slots;
+}
+
+/// What rows give a node.
+struct NodeOfGroup {
+  std::int32_t node;
+  std::vector<CudaFaceShare> shares;  ///< rows by their place in the group
+};
+
+std::vector<NodeOfGroup> nodes_of(const AnchorFaces& faces, const FaceGroup& g) {
+  std::vector<NodeOfGroup> nodes;
+  for (int i = 0; i < g.count; ++i) {
+    const FaceRow& r = faces.rows[g.first + i];
+    for (int k = 0; k < kRowNodes; ++k) {
+      if (r.weight[k] == 0) continue;
+      auto at = std::find_if(nodes.begin(), nodes.end(),
+                             [&](const NodeOfGroup& n) { return n.node == r.node[k]; });
+      if (at == nodes.end()) at = nodes.insert(nodes.end(), {r.node[k], {}});
+      if (r.share[k] != 0) at->shares.push_back({i, r.share[k]});
+    }
+  }
+  return nodes;
+}
+
+/// Fills the chunks of one bundle after another.
+class FillChunks {
+ public:
+  FillChunks(const AnchorFaces& faces, const SlotsOfNodes& slots, int room, HostFaceRows& to)
+      : faces_(faces), slots_(slots), room_(room), to_(to), summed_(faces.groups.size(), false) {
+    CudaFaceChunk none{};
+    none.next = -1;
+    to.chunks.assign(slots.of_bundle.size(), none);
+  }
+
+  void add(int bundle, int first_slot, int group) {
+    const FaceGroup& g = faces_.groups[group];
+    const std::vector<NodeOfGroup> nodes = nodes_of(faces_, g);
+    std::vector<CudaFaceEntry> entries;
+    std::vector<std::pair<std::int32_t, int>> entry_of;  // of each node the first
+    const std::vector<SlotOfNode>& here = slots_.of_bundle[bundle];
+    std::vector<CudaFaceShare> shares;
+    for (const NodeOfGroup& n : nodes) {
+      entry_of.emplace_back(n.node, static_cast<int>(entries.size()));
+      const int first_share = static_cast<int>(shares.size());
+      const int count = static_cast<int>(n.shares.size());
+      shares.insert(shares.end(), n.shares.begin(), n.shares.end());
+      auto at = std::lower_bound(here.begin(), here.end(), SlotOfNode{n.node, 0});
+      if (count == 0 || at == here.end() || at->node != n.node) {
+        entries.push_back(entry(n, slots_.first_of(n.node), -1, first_share));
+        continue;
+      }
+      for (; at != here.end() && at->node == n.node; ++at) {
+        entries.push_back(entry(n, at->slot, at->slot - first_slot, first_share));
+      }
+    }
+    const int count = static_cast<int>(entries.size());
+    CudaFaceChunk& chunk = chunk_with_room(bundle, count, g.count);
+    const int first_share = static_cast<int>(to_.shares.size());
+    for (CudaFaceShare& s : shares) s.row += chunk.rows;
+    to_.shares.insert(to_.shares.end(), shares.begin(), shares.end());
+    for (CudaFaceEntry& e : entries) {
+      e.next_share += first_share;
+      e.share.row += chunk.rows;
+    }
+    to_.entries.insert(to_.entries.end(), entries.begin(), entries.end());
+    for (int i = 0; i < g.count; ++i) {
+      const FaceRow& r = faces_.rows[g.first + i];
+      CudaFaceRow row{};
+      for (int k = 0; k < kRowNodes; ++k) {
+        const auto at = std::find_if(entry_of.begin(), entry_of.end(),
+                                     [&](const auto& e) { return e.first == r.node[k]; });
+        // One of weight 0 may stand for none of the group's.
+        row.entry[k] = chunk.entries + (at == entry_of.end() ? 0 : at->second);
+        row.weight[k] = r.weight[k];
+      }
+      row.anchor = r.anchor;
+      std::copy_n(r.place, 3, row.place);
+      row.group = chunk.rows;
+      row.rows = g.count;
+      row.inverse = g.inverse + i * g.count;
+      row.own = faces_.inverse[row.inverse];
+      row.impulse = summed_[group] ? -1 : g.first + i;
+      to_.rows.push_back(row);
+    }
+    summed_[group] = true;
+    chunk.entries += count;
+    chunk.rows += g.count;
+    if (g.count > 1) chunk.has_groups = 1;
+  }
+
+ private:
+  static int numbers(int entries, int rows) {
+    return kFaceEntryRoom * entries + kFaceRowRoom * rows;
+  }
+  static CudaFaceEntry entry(const NodeOfGroup& n, int slot, int local, int first_share) {
+    CudaFaceEntry e{};
+    e.node = n.node;
+    e.slot = slot;
+    e.local = local;
+    e.shares = static_cast<int>(n.shares.size());
+    if (e.shares > 0) e.share = n.shares[0];
+    e.next_share = first_share + 1;
+    return e;
+  }
+  /// The bundle's last chunk, or one more where that has no room for it.
+  CudaFaceChunk& chunk_with_room(int bundle, int entries, int rows) {
+    if (bundle != bundle_) last_ = bundle_ = bundle;
+    const int alone = numbers(entries, rows);
+    const auto has_room = [&](const CudaFaceChunk& c) {
+      return c.rows == 0 || (c.is_large == 0 && numbers(c.entries, c.rows) + alone <= room_);
+    };
+    if (!has_room(to_.chunks[last_])) {
+      CudaFaceChunk more{};
+      more.next = -1;
+      to_.chunks[last_].next = static_cast<int>(to_.chunks.size());
+      last_ = to_.chunks[last_].next;
+      to_.chunks.push_back(more);
+    }
+    CudaFaceChunk& chunk = to_.chunks[last_];
+    if (chunk.rows > 0) return chunk;
+    chunk.first_entry = static_cast<int>(to_.entries.size());
+    chunk.first_row = static_cast<int>(to_.rows.size());
+    chunk.is_large = alone > room_ ? 1 : 0;
+    if (chunk.is_large != 0) {
+      to_.room_each = std::max(to_.room_each, static_cast<std::size_t>(alone));
+    }
+    return chunk;
+  }
+
+  const AnchorFaces& faces_;
+  const SlotsOfNodes& slots_;
+  int room_;
+  HostFaceRows& to_;
+  std::vector<bool> summed_;
+  int bundle_ = -1, last_ = -1;  ///< the bundle at work, and its last chunk
+};
+
+}  // namespace
+
+HostFaceRows make_face_rows(const MpmState& state, const HostTables& t, int room) {
+  const AnchorFaces& faces = state.anchors;
+  std::vector<std::uint8_t> wanted(state.nodes.size(), 0);
+  std::vector<std::pair<std::int32_t, int>> group_of;  // of nodes that rows move
+  for (std::size_t g = 0; g < faces.groups.size(); ++g) {
+    for (int i = 0; i < faces.groups[g].count; ++i) {
+      const FaceRow& r = faces.rows[faces.groups[g].first + i];
+      for (int k = 0; k < kRowNodes; ++k) {
+        if (r.weight[k] != 0) wanted[r.node[k]] = 1;
+        if (r.share[k] != 0) group_of.emplace_back(r.node[k], static_cast<int>(g));
+      }
+    }
+  }
+  std::sort(group_of.begin(), group_of.end());
+  std::vector<std::pair<std::int32_t, int>> held;  // nodes that anchors carry, and which
+  for (std::size_t i = 0; i < faces.held.size(); ++i) {
+    held.emplace_back(faces.held[i].node, static_cast<int>(i));
+    wanted[faces.held[i].node] = 1;
+  }
+  std::sort(held.begin(), held.end());
+  const SlotsOfNodes slots = find_slots(state, t, wanted);
+  HostFaceRows to;
+  FillChunks fill(faces, slots, room, to);
+  std::vector<int> groups;
+  for (std::size_t i = 0; i < t.bundles.size(); ++i) {
+    const int first_slot = t.bundles[i].first_slot;
+    to.first_carried.push_back(static_cast<int>(to.carried.size()));
+    groups.clear();
+    for (const SlotOfNode& s : slots.of_bundle[i]) {
+      const auto from = [&s](const auto& list) {
+        return std::lower_bound(list.begin(), list.end(), std::pair<std::int32_t, int>(s.node, 0));
+      };
+      const auto row = from(group_of);
+      if (row != group_of.end() && row->first == s.node) groups.push_back(row->second);
+      const auto carried = from(held);
+      if (carried == held.end() || carried->first != s.node) continue;
+      const AnchorFaces::HeldNode& h = faces.held[carried->second];
+      to.carried.push_back(
+          {s.node, s.slot - first_slot, s.slot, h.anchor, {h.place[0], h.place[1], h.place[2]}});
+    }
+    std::sort(groups.begin(), groups.end());
+    groups.erase(std::unique(groups.begin(), groups.end()), groups.end());
+    for (const int g : groups) fill.add(static_cast<int>(i), first_slot, g);
+  }
+  to.first_carried.push_back(static_cast<int>(to.carried.size()));
+  return to;
+}
+
+}  // namespace tissue_sim

@@ -13,6 +13,7 @@
 #include "contact/contact_spring.h"
 #include "mpm/blocks/update_node.h"
 #include "mpm/cuda/face_tables.h"
+#include "mpm/cuda/front_tables.h"
 
 namespace tissue_sim {
 
@@ -152,8 +153,9 @@ struct CudaTables {
 inline constexpr double kLoadUnit = 1.0 / (1ll << 38);
 inline constexpr int kLoadSums = 9;
 
-/// Words of CudaFrame::arrived, and where turn_counters() are: in a line of memory of their own.
-inline constexpr int kArrivedWords = 36, kFirstTurns = 32;
+/// Words of CudaFrame::arrived, and where turn_counters() and front_turns() are: in lines of memory
+/// of their own.
+inline constexpr int kArrivedWords = 66, kFirstTurns = 32, kFirstFrontTurns = 64;
 
 struct CudaFrame {
   CudaNodes state[2];
@@ -168,9 +170,9 @@ struct CudaFrame {
   const int* near_count;
   float cell_size;  ///< the scene's [m]
   NodePushes pushes;
-  unsigned* arrived;       ///< counters of the two barriers, and turn_counters(); 0 at the
-                           ///< beginning
+  unsigned* arrived;       ///< counters of the two barriers, and of turns; 0 at the beginning
   const CudaFaces* faces;  ///< null where no tissue touches tissue
+  CudaFront front;         ///< with CudaPlan::fronts alone
 };
 
 }  // namespace tissue_sim

@@ -61,9 +61,9 @@ struct LaneShare {
   __device__ __forceinline__ void get(unsigned mask, int k, float (&x)[3]) const {
 #pragma unroll
     for (int c = 0; c < 3; ++c) {
-      float mine = of[0][c];
-#pragma unroll
-      for (int m = 1; m < kEach; ++m) mine = k / kFrontLanes == m ? of[m][c] : mine;
+      const int m = k / kFrontLanes;
+      const float low = m == 0 ? of[0][c] : of[1][c], high = m == 2 ? of[2][c] : of[3][c];
+      const float mine = m < 2 ? low : high;
       x[c] = __shfl_sync(mask, mine, k % kFrontLanes, kFrontLanes);
     }
   }

@@ -59,19 +59,12 @@ struct FrontPoints {
     return (half[0] + half[1]) + (half[2] + half[3]);
   }
   template <bool kRate>
-  TISSUE_SIM_INLINE void gradient(Vec<8>* G) const {
-    for (int i = 0; i < 9; ++i) G[i] = Vec<8>{};
-    for (int k = 0; k < 27; ++k) {
-      float value[3];
-      for (int c = 0; c < 3; ++c) {
-        value[c] = cell.inverse_size * (kRate ? field.v : field.u)[c][cell.node[k]];
-      }
-      front::add_gradient(*this, value, k, G);
-    }
+  TISSUE_SIM_INLINE void node(std::int32_t n, float (&x)[3]) const {
+    for (int c = 0; c < 3; ++c) x[c] = (kRate ? field.v : field.u)[c][n];
   }
   template <bool kRate>
-  TISSUE_SIM_INLINE void parted(int j, float (&x)[3]) const {
-    for (int c = 0; c < 3; ++c) x[c] = (kRate ? field.rate : field.d)[c][part(j).node];
+  TISSUE_SIM_INLINE void parted(std::int32_t n, float (&x)[3]) const {
+    for (int c = 0; c < 3; ++c) x[c] = (kRate ? field.rate : field.d)[c][n];
   }
   TISSUE_SIM_INLINE void pull(int j, int c, float force) const { pulls[4 * j + c] = force; }
 };

@@ -11,8 +11,8 @@
 //   slope(k, axis)               of the weight of node k, times the cell size
 //   mu(), lambda(), keep(x)      FrontCell's; x, or 0 for places that are no point of it
 //   sum(x)                       over all of them
-//   gradient<kRate>(G)           of displacement or velocity, [9], with no node parted
-//   parted<kRate>(j, x)          the same of how far the sides of the node of part j are apart
+//   node<kRate>(n, x)            displacement [m] or velocity [m/s] of a node
+//   parted<kRate>(n, x)          the same of how far a parted node's sides are apart
 //   pull(j, c, force)            takes the force on that of part j, component c [N]
 #pragma once
 
@@ -32,13 +32,24 @@ TISSUE_SIM_INLINE void add_gradient(const Points& p, const float (&value)[3], in
   }
 }
 
-/// Adds to a gradient of displacement or velocity what a parted node has more.
+/// Gradient of displacement or velocity at the points, with no node parted.
 template <bool kRate, class Points>
-TISSUE_SIM_INLINE void add_part(const Points& p, int j, const FrontPart& part,
-                                typename Points::T* G) {
+TISSUE_SIM_INLINE void gradient(const Points& p, typename Points::T* G) {
+  for (int i = 0; i < 9; ++i) G[i] = typename Points::T{};
+  for (int k = 0; k < 27; ++k) {
+    float value[3];
+    p.template node<kRate>(p.cell.node[k], value);
+    for (float& x : value) x = p.cell.inverse_size * x;
+    add_gradient(p, value, k, G);
+  }
+}
+
+/// Adds to it what a parted node has more.
+template <bool kRate, class Points>
+TISSUE_SIM_INLINE void add_part(const Points& p, const FrontPart& part, typename Points::T* G) {
   const float by = p.cell.inverse_size * part.side;
   float value[3];
-  p.template parted<kRate>(j, value);
+  p.template parted<kRate>(part.node, value);
   for (float& x : value) x = by * x;
   add_gradient(p, value, part.k, G);
 }
@@ -78,22 +89,18 @@ TISSUE_SIM_INLINE void stresses(const Points& p, typename Points::T (&sum)[9]) {
   const FrontCell& cell = p.cell;
   const bool viscous = cell.viscosity[0] > 0;
   T G[9], rate[9], P[9], before[27][9];
-  p.template gradient<false>(G);
-  if (viscous) p.template gradient<true>(rate);
+  gradient<false>(p, G);
+  if (viscous) gradient<true>(p, rate);
   stress<LawOf>(p, G, rate, cell.viscosity[0], P);
   for (int i = 0; i < 9; ++i) sum[i] = -p.part(0).share * P[i];
-  for (int j = 0; j < cell.count;) {
-    float step;
-    do {  // up to the next stress, for lanes that work on several cells to come to it together
-      for (int i = 0; i < 9; ++i) before[j][i] = sum[i];  // of what node j is not parted in
-      const FrontPart& part = p.part(j);
-      add_part<false>(p, j, part, G);
-      if (viscous) add_part<true>(p, j, part, rate);
-      step = part.step;
-    } while (++j < cell.count && !(step > 0));
-    if (!(step > 0)) break;
+  for (int j = 0; j < cell.count; ++j) {
+    for (int i = 0; i < 9; ++i) before[j][i] = sum[i];  // of what node j is not parted in
+    const FrontPart& part = p.part(j);
+    add_part<false>(p, part, G);
+    if (viscous) add_part<true>(p, part, rate);
+    if (!(part.step > 0)) continue;
     stress<LawOf>(p, G, rate, cell.viscosity[1], P);
-    for (int i = 0; i < 9; ++i) sum[i] += step * P[i];
+    for (int i = 0; i < 9; ++i) sum[i] += part.step * P[i];
   }
   for (int j = 0; j < cell.count; ++j) {
     const FrontPart& part = p.part(j);
@@ -113,13 +120,13 @@ TISSUE_SIM_INLINE double energy(const Points& p) {
   using T = typename Points::T;
   const T mu = p.mu(), lambda = p.lambda();
   T G[9], F[1][9], of_points;
-  p.template gradient<false>(G);
+  gradient<false>(p, G);
   deformation(p, G, F[0]);
   LawOf::template energies<1>(F, &mu, &lambda, &of_points);
   double sum = -static_cast<double>(p.part(0).share) * p.sum(of_points);
   for (int j = 0; j < p.cell.count; ++j) {
     const FrontPart& part = p.part(j);
-    add_part<false>(p, j, part, G);
+    add_part<false>(p, part, G);
     if (!(part.step > 0)) continue;
     deformation(p, G, F[0]);
     LawOf::template energies<1>(F, &mu, &lambda, &of_points);

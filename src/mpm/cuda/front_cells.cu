@@ -1,22 +1,23 @@
 #include "compute/for_each_cuda.h"
 #include "mpm/cuda/front_cells.h"
-#include "mpm/cuda/front_lanes.h"
+#include "mpm/cuda/front_warp.h"
 
 namespace tissue_sim {
 namespace {
 
-constexpr int kThreads = 64;  // of a thread block: few, for cells to go to many multiprocessors
+constexpr int kThreads = 64;
 
+/// A warp for each cell.
 __global__ void __launch_bounds__(kThreads)
     front_energy(const CudaFront front, const CudaNodes state, double* energy) {
-  const int i = static_cast<int>(blockIdx.x * kThreads + threadIdx.x) / kFrontLanes;
+  const int i = static_cast<int>(blockIdx.x * kThreads + threadIdx.x) / 32;
   if (i >= front.cell_count) return;
-  LanePoints p(front, i, nullptr);
-  p.bring(state);
-  double sum = p.cell.law == Law::kNeoHookean ? front::energy<NeoHookean>(p)
-                                              : front::energy<FixedCorotated>(p);
-  if (p.cell.stabilised > 0) sum += stabilise<false>(p);
-  if (p.lane == 0) energy[i] = sum;
+  FrontWarp cell(front, i);
+  cell.bring(state);
+  double sum =
+      cell.cell.law == Law::kNeoHookean ? cell.energy<NeoHookean>() : cell.energy<FixedCorotated>();
+  if (cell.cell.stabilised > 0) sum += cell.stabilise<false>(nullptr);
+  if (cell.lane == 0) energy[i] = sum;
 }
 
 struct MotionOfParted {
@@ -50,7 +51,7 @@ struct Mark {
 void launch_front_energy(const CudaFront& front, const CudaNodes& state, double* energy,
                          cudaStream_t stream) {
   if (front.cell_count == 0) return;
-  const int blocks = (kFrontLanes * front.cell_count + kThreads - 1) / kThreads;
+  const int blocks = (32 * front.cell_count + kThreads - 1) / kThreads;
   front_energy<<<blocks, kThreads, 0, stream>>>(front, state, energy);
   check_cuda(cudaGetLastError(), "start a kernel");
   Gpu(stream).for_each(front.node_count, MotionOfParted{front, state, energy + front.cell_count});

@@ -1,17 +1,17 @@
 // What the front's cells push within a substep. For .cu files.
 //
 // They are no work of the blocks that they are in, for these would keep all others waiting: as with
-// cells near colliders, a warp of any thread block that is free takes the next four, once all nodes
-// are in place, and adds their forces to the sums that contact adds to.
+// cells near colliders, a warp of any thread block that is free takes the next one, once all nodes
+// are in place, and adds its forces to the sums that contact adds to.
 #pragma once
 
 #include "mpm/cuda/block_nodes.h"
-#include "mpm/cuda/front_lanes.h"
+#include "mpm/cuda/front_warp.h"
 #include "mpm/cuda/grid_barrier.h"
 
 namespace tissue_sim {
 
-/// Of CudaFrame::arrived: how many fours of cells somebody has taken in a round.
+/// Of CudaFrame::arrived: how many cells somebody has taken in a round.
 __device__ __forceinline__ unsigned* front_turns(unsigned* arrived, int round) {
   return arrived + kFirstFrontTurns + round % 2;
 }
@@ -45,33 +45,25 @@ __device__ __forceinline__ void move_parted(const CudaFrame& f, int bundles, int
 /// Works out cells as long as there are any that no warp has. Out of line, for the blocks to keep
 /// their registers.
 __device__ __noinline__ void push_front(const CudaFront front, const CudaNodes state,
-                                        unsigned* arrived, int round, long long* force) {
-  const unsigned fours = (front.cell_count + kFrontCells - 1) / kFrontCells;
+                                        unsigned* arrived, int round, long long* sums) {
+  const auto cells = static_cast<unsigned>(front.cell_count);
   unsigned* counter = front_turns(arrived, round);
-  const int lane = static_cast<int>(threadIdx.x) % 32;
   bool waited = false;
   for (;;) {
-    unsigned four = fours;
-    if (lane == 0 && __ldcg(counter) < fours) four = atomicAdd(counter, 1u);
-    four = __shfl_sync(0xffffffffu, four, 0);
-    if (four >= fours) return;
-    const int i = static_cast<int>(kFrontCells * four) + lane / kFrontLanes;
-    const bool is_one = i < front.cell_count;
-    LanePoints p(front, min(i, front.cell_count - 1), force);
+    unsigned i = cells;
+    if (threadIdx.x % 32 == 0 && __ldcg(counter) < cells) i = atomicAdd(counter, 1u);
+    i = __shfl_sync(0xffffffffu, i, 0);
+    if (i >= cells) return;
+    FrontWarp cell(front, static_cast<int>(i));
     if (!waited) warp_wait(arrived + 1, static_cast<unsigned>(round) + 1);
     waited = true;
-    p.bring(state);
-    if (is_one) {
-      float stress[9];
-      if (p.cell.law == Law::kNeoHookean) {
-        front::stresses<NeoHookean>(p, stress);
-      } else {
-        front::stresses<FixedCorotated>(p, stress);
-      }
-      push_nodes(p, stress);
-      if (p.cell.stabilised > 0) stabilise<true>(p);
+    cell.bring(state);
+    if (cell.cell.law == Law::kNeoHookean) {
+      cell.push<NeoHookean>(sums);
+    } else {
+      cell.push<FixedCorotated>(sums);
     }
-    __syncwarp();
+    if (cell.cell.stabilised > 0) cell.stabilise<true>(sums);
   }
 }
 

@@ -254,6 +254,7 @@ __global__ void __launch_bounds__(kMaxCudaThreads, 1)
     if constexpr (kPushes) {
       if (kFronts && round < f.substeps && for_front) push_front_of(f, round);
       if (round < f.substeps) push_nodes<kCan, kPairs>(t, f, s, round, pushers, helpers, met);
+      if (kFronts && round < f.substeps && apart && pushers.has_me()) push_front_of(f, round);
     }
   }
 }

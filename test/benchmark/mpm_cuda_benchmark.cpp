@@ -29,7 +29,9 @@ enum class Extra {
   kAll,
   kRinging,
   kRingingContact,
-  kAnchors
+  kAnchors,
+  kPartialCut,
+  kFront
 };
 
 constexpr CubeSize kSizes[] = {{25000, 15, 15, 14},   {100000, 23, 23, 24},
@@ -62,20 +64,28 @@ void run(benchmark::State& bench, const CubeSize& size, Law law, Extra extra) {
   tissue.push();
   const float dt = 0.5f * tissue.stable_substep();
   std::vector<BladePath> cuts;
-  const bool is_cut = in_contact || extra == Extra::kCut || extra == Extra::kCutOrgan;
+  const bool ends_inside = extra == Extra::kPartialCut || extra == Extra::kFront;
+  const bool is_cut =
+      in_contact || ends_inside || extra == Extra::kCut || extra == Extra::kCutOrgan;
+  tissue.state().front.follows = extra == Extra::kFront;
   if (is_cut) {
     BladePath path;
     path.edge = {Vec3(0, 0, -1), Vec3(0, 0, 1)};
     const Vec3 middle = scene.bodies[0].pose.position;
     path.poses = {{Vec3(-0.5, middle[1] - 0.02, 0), Quat::Identity()},
                   {Vec3(0.5, middle[1] + 0.02, 0), Quat::Identity()}};
+    if (ends_inside) {  // amid a cell in the middle of the body, along its front
+      path.poses[0].position[1] = path.poses[1].position[1] = middle[1];
+      path.poses[1].position[0] = middle[0] + 0.0004;
+    }
     cuts.push_back(path);
   }
   tissue.advance(0, dt, {tools, cuts});
   const FrameResult cut = tissue.finish();
   if (is_cut && cut.cut_reports[0].bonds_broken == 0) bench.SkipWithError("no cut");
-  if (size.points <= 1000000) {  // against the CPU, ten substeps on
+  if (size.points <= 1000000 && getenv("NO_HOLD") == nullptr) {  // against the CPU, ten substeps on
     MpmTissue cpu(scene);
+    cpu.state().front.follows = extra == Extra::kFront;
     deform(cpu.state(), stretch);
     if (extra == Extra::kAnchors) stay_deformed(cpu.state(), stretch);
     measure_motion(cpu.state());
@@ -131,6 +141,7 @@ void run(benchmark::State& bench, const CubeSize& size, Law law, Extra extra) {
     for (const std::int32_t i : faces.active) touching += faces.all[i].touching ? 1 : 0;
     bench.counters["contacts"] = static_cast<double>(faces.active.size());
     bench.counters["touching"] = touching;
+    bench.counters["front_cells"] = static_cast<double>(tissue.state().front.cells.size());
   }
   const auto bytes_per_point = [&] {
     return static_cast<double>(tissue.device_bytes()) / tissue.point_count();
@@ -182,6 +193,8 @@ int main(int argc, char** argv) {
     add("mpm/cuda/ellipsoid/", size, Law::kFixedCorotated, Extra::kOrgan);
     add("mpm/cuda/cut_ellipsoid/", size, Law::kFixedCorotated, Extra::kCutOrgan);
     add("mpm/cuda/cut/", size, Law::kFixedCorotated, Extra::kCut);
+    add("mpm/cuda/partial_cut/", size, Law::kFixedCorotated, Extra::kPartialCut);
+    add("mpm/cuda/front/", size, Law::kFixedCorotated, Extra::kFront);
     add("mpm/cuda/contact/", size, Law::kFixedCorotated, Extra::kContact);
     add("mpm/cuda/tools/", size, Law::kFixedCorotated, Extra::kTools);
     add("mpm/cuda/all_options/", size, Law::kFixedCorotated, Extra::kAll);

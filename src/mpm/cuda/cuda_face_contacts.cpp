@@ -140,8 +140,9 @@ const CudaFaces* CudaMpmTissue::faces_of_launch() {
   FacesOnDevice& f = d.faces;
   if (!f.may_meet || f.version != state_->faces.version) return nullptr;
   const std::vector<CudaBundle>& bundles = d.host_tables.bundles;
+  const std::ptrdiff_t resident = has_front() ? d.front_resident : d.touch_resident;
   const auto ranks = std::count_if(
-      bundles.begin(), bundles.begin() + std::min<std::ptrdiff_t>(d.touch_resident, bundles.size()),
+      bundles.begin(), bundles.begin() + std::min<std::ptrdiff_t>(resident, bundles.size()),
       [](const CudaBundle& b) { return b.rank >= 0; });
   const CudaFaces faces = {std::exchange(f.searched, false) ? 1 : 0, f.contacts_count,
                            f.involved_count, static_cast<int>(ranks), looks()};

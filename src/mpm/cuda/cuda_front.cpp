@@ -36,17 +36,7 @@ void CudaMpmTissue::push_front() {
   const std::size_t first = state_->nodes.size(), count = front.nodes.size();
   to.first_node = static_cast<int>(first);
   to.node_count = static_cast<int>(count);
-  to.first_parted = static_cast<int>(front.node_sums.size());
-  std::vector<CudaFrontSum> sums;
-  std::vector<std::int32_t> places;
-  for (const Front::Sum& s : front.node_sums) sums.push_back({s.node, s.first, s.count});
-  const auto of_nodes = static_cast<std::int32_t>(front.node_places.size());
-  for (const Front::Sum& s : front.part_sums) {
-    sums.push_back({to.first_node + s.node, of_nodes + s.first, s.count});
-  }
-  for (const auto* list : {&front.node_places, &front.part_places}) {
-    for (const std::int32_t place : *list) places.push_back(place / 4);
-  }
+  to.marked = false;
   d.host_nodes.resize(2 * count);
   for (std::size_t i = 0; i < count; ++i) {
     const float mass = front.nodes[i].mass;
@@ -66,14 +56,25 @@ void CudaMpmTissue::push_front() {
   }
   to.cells.upload(front.cells, d.stream);
   to.parts.upload(front.parts, d.stream);
-  to.sums.upload(sums, d.stream);
-  to.places.upload(places, d.stream);
-  to.force.resize(kFrontForce / 4 * front.cells.size());
-  to.pull.resize(front.parts.size());
   to.energy.resize(front.cells.size() + count);
   to.host_energy.resize(to.energy.size());
   check_cuda(cudaStreamSynchronize(d.stream), "receive data");
 }
+
+NodePushes CudaMpmTissue::clear_pushes() {
+  OnDevice& d = *device_;
+  d.pushed.resize(3 * kPushStride * d.entries());
+  d.pushed.clear(d.stream);
+  if (has_front() && !d.front.marked) {
+    launch_mark_front(d.front.view(), d.marks.data(), d.marks.size(), d.stream);
+    launch_mark_slots(d.tables(), d.marks.data(), d.pushed_parts.data(), d.pushed_parts.size(),
+                      d.stream);
+    d.front.marked = true;
+  }
+  return {d.pushed.data(), d.pushed.size() / 3};
+}
+
+bool CudaMpmTissue::has_front() const { return device_->front.node_count > 0; }
 
 void CudaMpmTissue::pass_rim(const BladePath& path, bool moves,
                              const std::vector<std::int32_t>& broken,

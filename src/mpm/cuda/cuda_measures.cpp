@@ -40,7 +40,10 @@ double CudaMpmTissue::measure_limit(int steps) {
   d.checkpoint.v.resize(n);
   DeviceArray<float4> more;
   auto* fields = reinterpret_cast<float4*>(d.pushed.data());
-  if (d.pushed.size() * sizeof(long long) < 3 * n * sizeof(float4)) {
+  if (has_front()) {  // which pushes
+    d.front.motion_fields.resize(3 * n);
+    fields = d.front.motion_fields.data();
+  } else if (d.pushed.size() * sizeof(long long) < 3 * n * sizeof(float4)) {
     more.resize(3 * n);
     fields = more.data();
   }
@@ -52,13 +55,15 @@ double CudaMpmTissue::measure_limit(int steps) {
       [&](const CudaNodes& from, const CudaNodes& to) {
         frame.state[0] = from;
         frame.state[1] = to;
-        launch_front_forces(d.front.view(), from, d.stream);
-        if (d.all_plain) {
+        if (has_front()) {
+          frame.front = d.front.view();
+          frame.pushes = clear_pushes();
+          launch_substeps(d.front_plan, d.pushed_tables(), frame, d.front_resident, d.stream);
+        } else if (d.all_plain) {
           launch_substeps(d.plain_plan, d.plain_tables(), frame, d.plain_resident, d.stream);
         } else {
           launch_substeps(d.plan, d.tables(), frame, d.resident, d.stream);
         }
-        launch_move_front(d.front.view(), frame.step, from, to, d.stream);
       },
       d.anchors.hold_still(d.stream), d.motion_room, d.stream);
   return 2 / std::sqrt(largest_eigenvalue(motion, steps));
@@ -72,7 +77,7 @@ void CudaMpmTissue::launch_measure() {
   tissue_sim::launch_measure(d.tables(), d.present(), d.plan.max_slots, d.measures.data(),
                              d.stream);
   d.measures.download(d.host_measures.data(), d.measures.size(), d.stream);
-  launch_front_energy(d.front.view(), d.present(), d.stream);
+  launch_front_energy(d.front.view(), d.present(), d.front.energy.data(), d.stream);
   d.front.energy.download(d.front.host_energy.data(), d.front.energy.size(), d.stream);
 }
 

@@ -212,10 +212,6 @@ void CudaMpmTissue::advance(int substeps, float dt, const FrameInput& input) {
 
 void CudaMpmTissue::launch(int begin, int end, float dt) {
   OnDevice& d = *device_;
-  if (d.front.node_count > 0 && end - begin > 1) {  // its cells push between substeps
-    for (int i = begin; i < end; ++i) launch(i, i + 1, dt);
-    return;
-  }
   measured_ = false;
   const Scene& scene = state_->scene;
   const std::size_t collider_count = d.host_reach.size();
@@ -239,14 +235,13 @@ void CudaMpmTissue::launch(int begin, int end, float dt) {
   frame.arrived = d.arrived.data();
   frame.faces = faces_of_launch();
   frame.held_faces = d.anchors.view(begin, static_cast<int>(state_->anchors.origin.size()));
-  launch_front_forces(d.front.view(), d.present(), d.stream);
-  if (frame.faces != nullptr || d.may_meet) {
-    d.pushed.resize(3 * kPushStride * d.u[0].size());
-    d.pushed.clear(d.stream);
-    frame.pushes = {d.pushed.data(), d.pushed.size() / 3};
-    CudaTables tables = d.tables();
-    tables.slot_parts = d.pushed_parts.data();
-    if (frame.faces != nullptr) {
+  frame.front = d.front.view();
+  if (frame.faces != nullptr || d.may_meet || has_front()) {
+    frame.pushes = clear_pushes();
+    const CudaTables tables = d.pushed_tables();
+    if (has_front()) {
+      launch_substeps(d.front_plan, tables, frame, d.front_resident, d.stream);
+    } else if (frame.faces != nullptr) {
       launch_substeps(d.touch_plan, tables, frame, d.touch_resident, d.stream);
     } else {
       launch_substeps(d.push_plan, tables, frame, d.push_resident, d.stream);
@@ -256,7 +251,6 @@ void CudaMpmTissue::launch(int begin, int end, float dt) {
   } else {
     launch_substeps(d.plan, d.tables(), frame, d.resident, d.stream);
   }
-  launch_move_front(d.front.view(), frame.step, d.present(), d.nodes(1 - d.current), d.stream);
   d.current = (d.current + end - begin) % 2;
   state_->time += static_cast<double>(end - begin) * dt;
   state_->dt = dt;

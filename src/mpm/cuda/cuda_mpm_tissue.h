@@ -24,6 +24,7 @@ struct CudaLooks;
 struct CudaNodes;
 struct CudaReach;
 struct FacesOnHost;
+struct NodePushes;
 struct StateOnHost;
 
 /// The nodes live on the GPU; lattice, bonds, blocks and pieces on the host too, where nodes around
@@ -159,6 +160,8 @@ class CudaMpmTissue final : public Tissue {
   void push_some(const std::vector<std::int32_t>& nodes);
   void pull_front();  ///< how far parted nodes are apart; the host has the same ones
   void push_front();  ///< the front that the host has, behind the nodes, all of which are there
+  bool has_front() const;
+  NodePushes clear_pushes();  ///< for a launch that pushes; slots know which nodes a front does
   void pull_contacts();
   void begin_anchors(const FrameInput& input);
   void push_anchors();  ///< rows that their faces hold: after push_tables(), or where nodes split

@@ -70,7 +70,8 @@ void CudaMpmTissue::plan_tables() {
       d.plan.viscous = d.plan.viscous || m.viscosity > 0;
     }
   }
-  const auto choose = [&d](std::size_t count) {
+  const bool may_have_fronts = state_->front.follows;
+  const auto choose = [&d, may_have_fronts](std::size_t count) {
     d.resident = resident_blocks(d.plan, static_cast<int>(count));
     d.plain_plan = d.plan;
     d.plain_plan.plain = true;
@@ -81,6 +82,10 @@ void CudaMpmTissue::plan_tables() {
     d.touch_plan = d.push_plan;
     d.touch_plan.touches = true;
     d.touch_resident = resident_blocks(d.touch_plan, static_cast<int>(count));
+    if (!may_have_fronts) return;
+    d.front_plan = d.touch_plan;
+    d.front_plan.fronts = true;
+    d.front_resident = resident_blocks(d.front_plan, static_cast<int>(count));
   };
   choose(blocks.size());
   std::vector<std::vector<int>> bundles;
@@ -119,7 +124,8 @@ void CudaMpmTissue::plan_tables() {
                 std::all_of(t.bundles.begin(), t.bundles.end(), [](const CudaBundle& b) {
                   return b.blocks == 1 && b.partial == 0;
                 });
-  if (d.resident == 0 || d.plain_resident == 0 || d.push_resident == 0 || d.touch_resident == 0) {
+  if (d.resident == 0 || d.plain_resident == 0 || d.push_resident == 0 || d.touch_resident == 0 ||
+      (may_have_fronts && d.front_resident == 0)) {
     throw std::runtime_error("the GPU has too little shared memory");
   }
 }
@@ -181,6 +187,7 @@ void CudaMpmTissue::push_tables() {
     d.marks.resize(n);
     d.marks.clear(d.stream);
   }
+  d.front.marked = false;
   for (auto& force : d.force) {
     force.resize(slots);
     force.clear(d.stream);

@@ -16,8 +16,8 @@ namespace tissue_sim {
 /// Bit of CudaTables::slot_parts for a node that contact may push.
 inline constexpr std::uint32_t kPushed = 1u << 31;
 
-/// What may push a node: facets, colliders.
-inline constexpr std::uint8_t kMarkedByFaces = 1, kMarkedByTools = 2;
+/// What may push a node: facets, colliders, the front of a cut.
+inline constexpr std::uint8_t kMarkedByFaces = 1, kMarkedByTools = 2, kMarkedByFront = 4;
 
 /// A facet and where it is found.
 struct CudaFacet {

@@ -1,75 +1,36 @@
-// The front of a cut on a GPU: mpm/split/front.h, docs/mpm.md.
-//
-// Parted nodes have their places in the arrays of nodes, behind these: how far their two sides are
-// apart with the mass of that, and how fast with one over it. So what saves, restores or displaces
-// nodes does it to them, too.
+// The front of a cut on a GPU: mpm/split/front.h, docs/mpm.md. What its cells push within substeps:
+// push_front.h.
 #pragma once
 
 #include <cuda_runtime_api.h>
 
 #include "compute/device_array.h"
-#include "mpm/blocks/front_cell.h"
 #include "mpm/cuda/tables.h"
 
 namespace tissue_sim {
 
-/// What acts on a node, or on a parted one: `count` forces at CudaFront::places from `first` on.
-struct CudaFrontSum {
-  std::int32_t node;  ///< in the arrays of nodes
-  std::int32_t first, count;
-};
-
-struct CudaFront {
-  int cell_count, part_count, sum_count, node_count;
-  int first_parted;  ///< sum from which on they are those of parted nodes
-  int first_node;    ///< where these are in the arrays of nodes
-  const FrontCell* cells;
-  const FrontPart* parts;
-  const CudaFrontSum* sums;
-  const std::int32_t* places;  ///< in `force` or, for parted nodes, in `pull`
-  float4* force;               ///< of the cells on their nodes, [28] each [N]
-  float4* pull;                ///< on their parts [N]
-  double* energy;              ///< of the cells, then of the motion of parted nodes [J]
-};
-
 struct FrontOnDevice {
   DeviceArray<FrontCell> cells;
   DeviceArray<FrontPart> parts;
-  DeviceArray<CudaFrontSum> sums;
-  DeviceArray<std::int32_t> places;
-  DeviceArray<float4> force, pull;
-  DeviceArray<double> energy;
+  DeviceArray<double> energy;  ///< of the cells, then of the motion of parted nodes [J]
   PinnedArray<double> host_energy;
-  int first_parted = 0, first_node = 0, node_count = 0;
+  DeviceArray<float4> motion_fields;  ///< CudaMotionRoom::fields, where `pushed` is no room
+  int first_node = 0, node_count = 0;
+  bool marked = false;  ///< whether CudaTables::slot_parts say which nodes it pushes
 
   CudaFront view() const {
-    return {static_cast<int>(cells.size()),
-            static_cast<int>(parts.size()),
-            static_cast<int>(sums.size()),
-            node_count,
-            first_parted,
-            first_node,
-            cells.data(),
-            parts.data(),
-            sums.data(),
-            places.data(),
-            force.data(),
-            pull.data(),
-            energy.data()};
+    return {static_cast<int>(cells.size()), node_count, first_node, cells.data(), parts.data()};
   }
   std::size_t bytes() const {
-    return cells.bytes() + parts.bytes() + sums.bytes() + places.bytes() + force.bytes() +
-           pull.bytes() + energy.bytes();
+    return cells.bytes() + parts.bytes() + energy.bytes() + motion_fields.bytes();
   }
 };
 
-/// Works out what the cells push.
-void launch_front_forces(const CudaFront& front, const CudaNodes& state, cudaStream_t stream);
-/// After all nodes were moved from one state to the other without that: moves them on, and the
-/// parted ones.
-void launch_move_front(const CudaFront& front, const NodeStep& step, const CudaNodes& from,
-                       const CudaNodes& to, cudaStream_t stream);
-/// Energies, to CudaFront::energy.
-void launch_front_energy(const CudaFront& front, const CudaNodes& state, cudaStream_t stream);
+/// Energies of the cells, then of the motion of parted nodes [J].
+void launch_front_energy(const CudaFront& front, const CudaNodes& state, double* energy,
+                         cudaStream_t stream);
+/// Marks the nodes that its cells push: kMarkedByFront in `marks`, one for each node.
+void launch_mark_front(const CudaFront& front, std::uint8_t* marks, std::size_t node_count,
+                       cudaStream_t stream);
 
 }  // namespace tissue_sim

@@ -12,7 +12,7 @@ __global__ void clear_lists(const CudaLooks s, const CudaSearchRoom room) {
   if (!lists_wanted(s)) return;
   const int first = thread_index(), step = static_cast<int>(gridDim.x * blockDim.x);
   for (int i = first; i < room.buckets; i += step) room.count[i] = 0;
-  for (std::size_t i = first; i < s.node_count; i += step) s.marks[i] &= kMarkedByTools;
+  for (std::size_t i = first; i < s.node_count; i += step) s.marks[i] &= ~kMarkedByFaces;
   if (first != 0) return;
   CudaFaceFigures& figures = *s.figures;
   figures.largest_reach = 0;

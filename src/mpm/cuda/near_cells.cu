@@ -41,7 +41,7 @@ __device__ __forceinline__ void middle_of(const CudaBlock& b, float cell_size, i
 __global__ void unmark(const CudaNearCells out) {
   const std::size_t i = static_cast<std::size_t>(blockIdx.x) * blockDim.x + threadIdx.x;
   if (i == 0) *out.count = 0;
-  if (i < out.node_count) out.marks[i] &= kMarkedByFaces;
+  if (i < out.node_count) out.marks[i] &= ~kMarkedByTools;
 }
 
 /// One thread block for each block.

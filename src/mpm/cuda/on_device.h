@@ -42,10 +42,10 @@ struct SweepOnDevice {
 struct CudaMpmTissue::OnDevice {
   CudaLimits limits;
   CudaShape shape, cut_shape;  ///< now, and once bonds broke
-  /// Without contact, with tools, with contact of tissue too, and CudaPlan::plain.
-  CudaPlan plan, push_plan, touch_plan, plain_plan;
+  /// Without contact, with tools, with contact of tissue too, with fronts too, and CudaPlan::plain.
+  CudaPlan plan, push_plan, touch_plan, front_plan, plain_plan;
   /// Thread blocks that run at once.
-  int resident = 0, push_resident = 0, touch_resident = 0, plain_resident = 0;
+  int resident = 0, push_resident = 0, touch_resident = 0, front_resident = 0, plain_resident = 0;
   bool all_plain = true;  ///< all cells are full and each bundle is one block
   bool may_meet = true;   ///< whether any block may meet a collider in this frame
   int current = 0;        ///< which of the two states is the present one
@@ -162,6 +162,12 @@ struct CudaMpmTissue::OnDevice {
     t.held_by = held_by;
     t.with = with.data();
     t.hold = hold.data();
+    return t;
+  }
+  /// Those for plans that push.
+  CudaTables pushed_tables() const {
+    CudaTables t = tables();
+    t.slot_parts = pushed_parts.data();
     return t;
   }
   /// Those for plain_plan.

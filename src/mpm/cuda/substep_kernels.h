@@ -1,10 +1,11 @@
-// The persistent kernels of substeps.h, with and without contact. For .cu files.
+// The persistent kernels of substeps.h, with and without contact and fronts. For .cu files.
 #pragma once
 
 #include "mpm/cuda/block_forces.h"
 #include "mpm/cuda/hold_faces.h"
 #include "mpm/cuda/push_cells.h"
 #include "mpm/cuda/push_contacts.h"
+#include "mpm/cuda/push_front.h"
 #include "mpm/cuda/substeps.h"
 
 namespace tissue_sim {
@@ -14,9 +15,16 @@ namespace {
 enum class Laws { kFixedCorotated, kNeoHookean, kAny };
 
 /// What a kernel can do: whole tissue (CudaPlan::plain), cut tissue too, contact with tools beside,
-/// or of tissue with tissue too.
-enum class Can { kPlain, kCuts, kPushes, kTouches };
-constexpr bool pushes(Can can) { return can == Can::kPushes || can == Can::kTouches; }
+/// or of tissue with tissue too, and with fronts of cuts.
+enum class Can { kPlain, kCuts, kPushes, kTouches, kFronts };
+constexpr bool touches(Can can) { return can == Can::kTouches || can == Can::kFronts; }
+constexpr bool pushes(Can can) { return can == Can::kPushes || touches(can); }
+
+/// Whether tissue touches tissue: with a front it need not.
+template <Can kCan>
+__device__ __forceinline__ bool has_faces(const CudaFrame& f) {
+  return kCan == Can::kTouches || (kCan == Can::kFronts && f.faces != nullptr);
+}
 
 /// The shared memory of a thread block. Worked out anew where it is needed, so that the compiler
 /// knows it for shared memory and can use its faster loads.
@@ -82,7 +90,7 @@ __device__ __forceinline__ void all_forces(const CudaTables& t, const BundleAtWo
   const BlockStep step{force, layout.two_planes, workers};
   // Small tissue waits for instructions as often as it issues them, and those of two ways and of
   // contact are more than the caches of the multiprocessors hold.
-  if (kCan == Can::kTouches && kPairs && !workers.is_all()) {
+  if (touches(kCan) && kPairs && !workers.is_all()) {
     special_forces<kLaws, kPairs, true>(t, w.bundle, w.block, w.body, layout, step);
   } else if (kCan == Can::kPlain || (w.bundle.partial == 0 && w.bundle.blocks == 1)) {
     forces<kLaws, kPairs, false, false>(t, w.bundle, w.block, w.body, s, step);
@@ -149,10 +157,11 @@ __device__ __forceinline__ void block_round(const CudaTables& t, const CudaFrame
 /// Contact, once all nodes are where the round brought them: of tissue with colliders and of tissue
 /// with tissue. Thread blocks have `met` so often at their second barrier. Where there are thread
 /// blocks enough without a bundle (`helpers`), colliders are left to them.
-template <bool kTouches, bool kPairs>
+template <Can kCan, bool kPairs>
 __device__ __forceinline__ void push_nodes(const CudaTables& t, const CudaFrame& f,
                                            const BlockShared& s, int round, const Pushers& pushers,
                                            bool helpers, unsigned& met) {
+  constexpr bool kTouches = touches(kCan);
   if (!pushers.has_me()) return;
   const float dt = f.step.dt;
   const int first = helpers ? t.bundle_count : 0, block = static_cast<int>(blockIdx.x) - first;
@@ -162,6 +171,7 @@ __device__ __forceinline__ void push_nodes(const CudaTables& t, const CudaFrame&
   long long* force = f.pushes.force + f.pushes.stride * (round % 3);
   const auto touch = [&] {
     if constexpr (kTouches) {
+      if (!has_faces<kCan>(f)) return;
       touch_faces<!kPairs>(s.rounds, round, dt, state, pushers, f.arrived, force);
     }
   };
@@ -180,10 +190,17 @@ __device__ __forceinline__ void push_nodes(const CudaTables& t, const CudaFrame&
   touch();
 }
 
+/// The front's cells push, as nodes are where the round brought them.
+__device__ __forceinline__ void push_front_of(const CudaFrame& f, int round) {
+  const bool odd = ((f.current + round) & 1) != 0;
+  push_front(f.front, odd ? f.state[1] : f.state[0], f.arrived, round,
+             f.pushes.force + f.pushes.stride * (round % 3));
+}
+
 template <Laws kLaws, bool kCached, bool kPairs, Can kCan>
 __global__ void __launch_bounds__(kMaxCudaThreads, 1)
     mpm_substeps(const CudaTables t, const CudaFrame f, const CudaLayout layout) {
-  constexpr bool kPushes = pushes(kCan), kTouches = kCan == Can::kTouches;
+  constexpr bool kPushes = pushes(kCan), kTouches = touches(kCan), kFronts = kCan == Can::kFronts;
   const BlockShared s = shared_of<kLaws == Laws::kAny>(layout);
   const int max_slots = layout.max_slots, mine = static_cast<int>(blockIdx.x);
   SlotCache cache;
@@ -203,9 +220,11 @@ __global__ void __launch_bounds__(kMaxCudaThreads, 1)
   if (apart) {
     workers.count = pushers.first = layout.workers;
     pushers.count = static_cast<int>(blockDim.x) - layout.workers;
+    if (kFronts) pushers.count -= 32;  // the last warp is there for the front
   }
+  const bool for_front = !apart || (idle ? !pushers.has_me() : pushers.me() >= pushers.size());
   unsigned met = 0;
-  if (kTouches && threadIdx.x == 0) {
+  if (has_faces<kCan>(f) && threadIdx.x == 0) {
     s.rounds->begin(t, *f.faces, f.step.dt);
     if (mine == 0) clear_next_turns(f.arrived, 0);
   }
@@ -218,13 +237,15 @@ __global__ void __launch_bounds__(kMaxCudaThreads, 1)
   for (int round = 0; round <= f.substeps; ++round) {
     if (round > 0) {
       grid_barrier(f.arrived, static_cast<unsigned>(round), [&] {
-        if constexpr (kTouches) {
+        if (kFronts && mine == 0) __stcg(front_turns(f.arrived, round + 1), 0u);
+        if (has_faces<kCan>(f)) {
           s.rounds->learn(round, f.step.dt);
           if (mine == 0) clear_next_turns(f.arrived, round);
           if (mine == 0 && round == f.substeps) s.rounds->end(round, f.step.dt);
         }
       });
     }
+    if constexpr (kFronts) move_parted(f, t.bundle_count, round, pushed_nodes(f.pushes, round));
     if (idle) {
       if (round < f.substeps) nodes_are_there(f);
     } else if constexpr (kCached) {
@@ -238,7 +259,9 @@ __global__ void __launch_bounds__(kMaxCudaThreads, 1)
       }
     }
     if constexpr (kPushes) {
-      if (round < f.substeps) push_nodes<kTouches, kPairs>(t, f, s, round, pushers, helpers, met);
+      if (kFronts && round < f.substeps && for_front) push_front_of(f, round);
+      if (round < f.substeps) push_nodes<kCan, kPairs>(t, f, s, round, pushers, helpers, met);
+      if (kFronts && round < f.substeps && apart && pushers.has_me()) push_front_of(f, round);
     }
   }
 }

@@ -12,7 +12,8 @@ namespace {
 bool does_march(const CudaPlan& plan) { return plan.marches && plan.plain; }
 
 const void* kernel(const CudaPlan& plan) {
-  return reinterpret_cast<const void*>(plan.touches       ? touching_kernel(plan)
+  return reinterpret_cast<const void*>(plan.fronts        ? front_kernel(plan)
+                                       : plan.touches     ? touching_kernel(plan)
                                        : plan.pushes      ? pushing_kernel(plan)
                                        : does_march(plan) ? marching_kernel(plan)
                                        : plan.plain       ? plain_kernel(plan)

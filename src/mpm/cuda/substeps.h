@@ -32,6 +32,7 @@ struct CudaPlan {
   bool plain = false;        ///< no contact, all cells full, each bundle one block
   bool pushes = false;       ///< with contact, ...
   bool touches = false;      ///< ... of tissue with tissue too
+  bool fronts = false;       ///< ... and fronts of cuts: contacts may be none then
   bool neo_hookean = false, fixed_corotated = false, viscous = false;  ///< what there is
 };
 
@@ -50,6 +51,7 @@ struct CudaLayout {
 using CudaKernel = void (*)(CudaTables, CudaFrame, CudaLayout);
 CudaKernel pushing_kernel(const CudaPlan& plan);
 CudaKernel touching_kernel(const CudaPlan& plan);
+CudaKernel front_kernel(const CudaPlan& plan);
 CudaKernel plain_kernel(const CudaPlan& plan);
 CudaKernel marching_kernel(const CudaPlan& plan);
 

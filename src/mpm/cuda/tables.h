@@ -14,6 +14,7 @@
 #include "mpm/blocks/update_node.h"
 #include "mpm/cuda/face_rows.h"
 #include "mpm/cuda/face_tables.h"
+#include "mpm/cuda/front_tables.h"
 
 namespace tissue_sim {
 
@@ -142,11 +143,11 @@ struct CudaTables {
                               ///< that is the point itself for all
   const std::uint8_t* bonds;  ///< per point
   const std::uint8_t* soft;   ///< per point, as Points::soft; null where none is
-  const float* lightness;  ///< per point, Points::lightness, 1 where a bond broke; null where all
-                           ///< are 1
-  int held_by;             ///< colliders that a point may hold on to at a time: 0 to 2
-  std::uint8_t* with;      ///< [point][held_by]: 0, or 1 + index of a collider it touches
-  float* hold;             ///< [point][held_by][3]: the place that friction holds on to
+  const float* lightness;     ///< per point, Points::lightness, 1 where a bond broke; null where all
+                              ///< are 1
+  int held_by;                ///< colliders that a point may hold on to at a time: 0 to 2
+  std::uint8_t* with;         ///< [point][held_by]: 0, or 1 + index of a collider it touches
+  float* hold;                ///< [point][held_by][3]: the place that friction holds on to
 };
 
 /// Sums of what acts on a collider in one substep: force and moment in units of kLoadUnit, as
@@ -155,8 +156,9 @@ struct CudaTables {
 inline constexpr double kLoadUnit = 1.0 / (1ll << 38);
 inline constexpr int kLoadSums = 9;
 
-/// Words of CudaFrame::arrived, and where turn_counters() are: in a line of memory of their own.
-inline constexpr int kArrivedWords = 36, kFirstTurns = 32;
+/// Words of CudaFrame::arrived, and where turn_counters() and front_turns() are: in lines of memory
+/// of their own.
+inline constexpr int kArrivedWords = 66, kFirstTurns = 32, kFirstFrontTurns = 64;
 
 struct CudaFrame {
   CudaNodes state[2];
@@ -171,10 +173,10 @@ struct CudaFrame {
   const int* near_count;
   float cell_size;  ///< the scene's [m]
   NodePushes pushes;
-  unsigned* arrived;       ///< counters of the two barriers, and turn_counters(); 0 at the
-                           ///< beginning
+  unsigned* arrived;       ///< counters of the two barriers, and of turns; 0 at the beginning
   const CudaFaces* faces;  ///< null where no tissue touches tissue
   CudaHeldFaces held_faces;
+  CudaFront front;         ///< with CudaPlan::fronts alone
 };
 
 }  // namespace tissue_sim

@@ -121,9 +121,8 @@ void CudaMpmTissue::plan_tables() {
   choose(t.bundles.size());
   // Those kernels hold no faces.
   d.all_plain = state_->anchors.groups.empty() &&
-                std::all_of(t.bundles.begin(), t.bundles.end(), [](const CudaBundle& b) {
-                  return b.blocks == 1 && b.partial == 0;
-                });
+                std::all_of(t.bundles.begin(), t.bundles.end(),
+                            [](const CudaBundle& b) { return b.blocks == 1 && b.partial == 0; });
   if (d.resident == 0 || d.plain_resident == 0 || d.push_resident == 0 || d.touch_resident == 0 ||
       (may_have_fronts && d.front_resident == 0)) {
     throw std::runtime_error("the GPU has too little shared memory");

@@ -141,10 +141,9 @@ __device__ __forceinline__ void block_round(const CudaTables& t, const CudaFrame
                                                to, odd_round ? f.force[0] : f.force[1], f.step,
                                                scale, s.u, v, pushed);
     if (kCan != Can::kPlain && f.held_faces.chunks != nullptr) {
-      hold_faces<kPushes>(f.held_faces,
-                          {t.slot_node, t.slot_parts, t.parts, from, to,
-                           odd_round ? f.force[0] : f.force[1], f.step, scale, s.u, v, pushed,
-                           index, round - 1, s.exchange});
+      hold_faces<kPushes>(f.held_faces, {t.slot_node, t.slot_parts, t.parts, from, to,
+                                         odd_round ? f.force[0] : f.force[1], f.step, scale, s.u, v,
+                                         pushed, index, round - 1, s.exchange});
     }
   }
   if (round == f.substeps) return;

@@ -143,11 +143,11 @@ struct CudaTables {
                               ///< that is the point itself for all
   const std::uint8_t* bonds;  ///< per point
   const std::uint8_t* soft;   ///< per point, as Points::soft; null where none is
-  const float* lightness;     ///< per point, Points::lightness, 1 where a bond broke; null where all
-                              ///< are 1
-  int held_by;                ///< colliders that a point may hold on to at a time: 0 to 2
-  std::uint8_t* with;         ///< [point][held_by]: 0, or 1 + index of a collider it touches
-  float* hold;                ///< [point][held_by][3]: the place that friction holds on to
+  const float* lightness;  ///< per point, Points::lightness, 1 where a bond broke; null where all
+                           ///< are 1
+  int held_by;             ///< colliders that a point may hold on to at a time: 0 to 2
+  std::uint8_t* with;      ///< [point][held_by]: 0, or 1 + index of a collider it touches
+  float* hold;             ///< [point][held_by][3]: the place that friction holds on to
 };
 
 /// Sums of what acts on a collider in one substep: force and moment in units of kLoadUnit, as
@@ -176,7 +176,7 @@ struct CudaFrame {
   unsigned* arrived;       ///< counters of the two barriers, and of turns; 0 at the beginning
   const CudaFaces* faces;  ///< null where no tissue touches tissue
   CudaHeldFaces held_faces;
-  CudaFront front;         ///< with CudaPlan::fronts alone
+  CudaFront front;  ///< with CudaPlan::fronts alone
 };
 
 }  // namespace tissue_sim

@@ -44,8 +44,8 @@ __device__ __forceinline__ void move_parted(const CudaFrame& f, int bundles, int
 
 /// Works out cells as long as there are any that no warp has. Out of line, for the blocks to keep
 /// their registers.
-__device__ __noinline__ void push_front(const CudaFront front, const CudaNodes state,
-                                        unsigned* arrived, int round, long long* sums) {
+inline __device__ __noinline__ void push_front(const CudaFront front, const CudaNodes state,
+                                               unsigned* arrived, int round, long long* sums) {
   const auto cells = static_cast<unsigned>(front.cell_count);
   unsigned* counter = front_turns(arrived, round);
   bool waited = false;

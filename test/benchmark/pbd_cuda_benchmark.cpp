@@ -94,9 +94,7 @@ void frame(benchmark::State& bench, PbdModel model, Way way, bool with_figures, 
                           constraints(s));
   bench.counters["constraints"] = constraints(s);
   bench.counters["vertices"] = s.vertices.size();
-  bench.SetLabel(tissue.way() == Way::kCluster    ? "cluster"
-                 : tissue.way() == Way::kOneBlock ? "one block"
-                                                  : "launches");
+  bench.SetLabel(tissue.way() == Way::kOneBlock ? "one block" : "launches");
 }
 
 template <class Run>
@@ -126,7 +124,6 @@ void add_pbd_cuda_rows() {
     add(name, [=](State& s) { frame(s, model, Way::kFaster, false); });
     add(name + "/figures", [=](State& s) { frame(s, model, Way::kFaster, true); });
     add(name + "/one_block", [=](State& s) { frame(s, model, Way::kOneBlock, false); });
-    add(name + "/cluster", [=](State& s) { frame(s, model, Way::kCluster, false); });
     add(name + "/launches", [=](State& s) { frame(s, model, Way::kLaunches, false); });
     // What a frame takes besides its steps, and of them what the links take.
     add(name + "/steps:1", [=](State& s) { frame(s, model, Way::kFaster, false, 1); });

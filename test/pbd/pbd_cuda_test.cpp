@@ -9,7 +9,6 @@
 #include "compute/cuda_check.h"
 #include "cut_paths.h"
 #include "pbd/cuda/cuda_pbd_tissue.h"
-#include "pbd/cuda/device_state.h"
 #include "pbd/pbd_reference.h"
 #include "tissue_sim/simulation.h"
 
@@ -17,11 +16,6 @@ namespace tissue_sim {
 namespace {
 
 using Way = CudaPbdTissue::Way;
-
-std::vector<Way> ways() {
-  if (pbd::pbd_cluster_blocks() == 1) return {Way::kLaunches, Way::kOneBlock};
-  return {Way::kLaunches, Way::kOneBlock, Way::kCluster};
-}
 
 class PbdOnGpu : public testing::Test {
  protected:
@@ -119,7 +113,7 @@ TEST_F(PbdOnGpu, EachKindIsProjectedAsInDoublePrecision) {
 TEST_F(PbdOnGpu, AStepIsThatOfTheReferenceHoweverItIsLaunched) {
   for (const Model& model : kModels) {
     for (const int iterations : {1, 3}) {
-      for (const Way way : ways()) {
+      for (const Way way : {Way::kLaunches, Way::kOneBlock}) {
         Scene scene = slab(model.model, model.elasticity);
         hold_one_end(scene);
         scene.gravity = Vec3(1, 0, -9.81);
@@ -233,7 +227,7 @@ TEST_F(PbdOnGpu, PressedAndCutItMovesAsOnTheCpu) {
   for (const Model& model : kModels) {
     const Pressed cpu = press(pressed_slab(model, Device::kCpu), Way::kFaster);
     EXPECT_GT(cpu.force, 1e-2);
-    for (const Way way : ways()) {
+    for (const Way way : {Way::kLaunches, Way::kOneBlock}) {
       const Pressed gpu = press(pressed_slab(model, Device::kCuda), way);
       ASSERT_EQ(cpu.places.size(), gpu.places.size());
       double worst = 0;
@@ -250,7 +244,7 @@ TEST_F(PbdOnGpu, PressedAndCutItMovesAsOnTheCpu) {
 
 TEST_F(PbdOnGpu, TheSameBitsRunAfterRun) {
   for (const Model& model : kModels) {
-    for (const Way way : ways()) {
+    for (const Way way : {Way::kLaunches, Way::kOneBlock}) {
       const Scene scene = pressed_slab(model, Device::kCuda, 2);
       const Pressed one = press(scene, way), other = press(scene, way);
       EXPECT_EQ(one.checksum, other.checksum) << model.name;
@@ -282,7 +276,7 @@ TEST_F(PbdOnGpu, AStateGoesOnWithTheSameBits) {
 
 /// Two bodies, one of which flies and spins while the other is held.
 TEST_F(PbdOnGpu, WhatFliesKeepsItsMomentum) {
-  for (const Way way : ways()) {
+  for (const Way way : {Way::kLaunches, Way::kOneBlock}) {
     Scene scene = slab(PbdModel::kSurface);
     scene.bodies.push_back(scene.bodies[0]);
     scene.bodies[1].name = "held";

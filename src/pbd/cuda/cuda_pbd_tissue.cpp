@@ -85,13 +85,12 @@ void CudaPbdTissue::push_all() {
 
 void CudaPbdTissue::upload_constraints() {
   OnDevice& d = *device_;
-  const bool spread = d.way != Way::kLaunches;
-  d.parts = OnDevice::parts_of(d.way);
+  const bool spread = d.way == Way::kOneBlock;
   d.sweeps = pbd::sweeps_of_step(*state_);
-  d.elastics.upload(state_->elastics, spread, d.parts, d.count, d.stream);
-  d.strains.upload(state_->strains, spread, d.parts, d.count, d.stream);
-  d.links.upload(state_->links, spread, d.parts, d.count, d.stream);
-  d.bends.upload(state_->bends, spread, d.parts, d.count, d.stream);
+  d.elastics.upload(state_->elastics, spread, d.stream);
+  d.strains.upload(state_->strains, spread, d.stream);
+  d.links.upload(state_->links, spread, d.stream);
+  d.bends.upload(state_->bends, spread, d.stream);
   d.wait("receive data");
   d.step_graph.clear();
   d.projections.clear();
@@ -100,42 +99,32 @@ void CudaPbdTissue::upload_constraints() {
 void CudaPbdTissue::choose_way() {
   OnDevice& d = *device_;
   const Way was = d.way;
-  d.way = d.wanted == Way::kFaster ? fastest_way() : d.wanted;
-  if (d.way != Way::kLaunches && !d.fits(d.way)) {
-    d.way = was;
-    throw std::runtime_error("blocks of threads have no room for " + std::to_string(d.count) +
-                             " vertices, or share no memory here; let the tissue choose");
-  }
-  if (d.way != was) upload_constraints();  // in another order
-}
-
-/// By times measured on an H100 [us].
-CudaPbdTissue::Way CudaPbdTissue::fastest_way() const {
-  const OnDevice& d = *device_;
   const pbd::State& s = *state_;
-  // What a launch takes within a graph is 1.6, of tetrahedra 2.9, and each further colour that it
-  // is of 0.8, of tetrahedra 1.
+  const bool fits = pbd::fits_pbd_block(d.field());
+  if (d.wanted != Way::kFaster) {
+    if (d.wanted == Way::kOneBlock && !fits) {
+      throw std::runtime_error("one block of threads has no room for " + std::to_string(d.count) +
+                               " vertices; let the tissue choose");
+    }
+    d.way = d.wanted;
+    if (d.way != was) upload_constraints();  // in another order
+    return;
+  }
+  // On an H100, in us; what a launch takes within a graph is 1.6, of tetrahedra 2.9, and each
+  // further colour that it is of 0.8, of tetrahedra 1.
   const bool is_surface = s.elastics.blocks.empty() && s.strains.blocks.empty();
+  const int threads = is_surface ? 1024 : 512;
+  const double one_block =
+      time_of(s.elastics.begin, threads, 1.0, 0.6) + time_of(s.strains.begin, threads, 1.3, 0.7) +
+      time_of(s.links.begin, threads, 0.2, 0.2) + time_of(s.bends.begin, threads, 0.3, 0.7);
   const int count = pbd::pbd_projection_launches(colours(s));
   const int all = static_cast<int>(s.elastics.begin.size() + s.strains.begin.size() +
                                    s.links.begin.size() + s.bends.begin.size()) -
                   4;
-  Way best = Way::kLaunches;
-  double least = (is_surface ? 1.6 : 2.9) * (3 + count) + (is_surface ? 0.8 : 1.0) * (all - count);
-  for (const Way way : {Way::kOneBlock, Way::kCluster}) {
-    if (!d.fits(way)) continue;
-    const bool is_one = way == Way::kOneBlock;
-    const int threads = is_one && is_surface ? 1024 : 512 * OnDevice::parts_of(way);
-    const double more = is_one ? 0 : 0.2;  // of waiting for a cluster
-    const double time = time_of(s.elastics.begin, threads, 1.0 + more, 0.6) +
-                        time_of(s.strains.begin, threads, 1.3 + more, 0.7) +
-                        time_of(s.links.begin, threads, 0.2 + more, 0.2) +
-                        time_of(s.bends.begin, threads, 0.3 + more, 0.7);
-    if (time >= least) continue;
-    least = time;
-    best = way;
-  }
-  return best;
+  const double launches =
+      (is_surface ? 1.6 : 2.9) * (3 + count) + (is_surface ? 0.8 : 1.0) * (all - count);
+  d.way = fits && one_block < launches ? Way::kOneBlock : Way::kLaunches;
+  if (d.way != was) upload_constraints();  // in another order
 }
 
 void CudaPbdTissue::set_way(Way way) {
@@ -176,7 +165,7 @@ void CudaPbdTissue::upload_frame(const FrameColliders& colliders, int steps,
   d.colliders.resize(d.boxed.size());
   d.loads.resize(d.boxed.size() * pbd::kPbdLoadSums);
   d.host_loads.resize(d.loads.size());
-  if (d.way != Way::kLaunches) return;  // the steps fetch them themselves
+  if (d.way == Way::kOneBlock) return;  // it fetches them itself
   d.frame.upload(&frame, 1, d.stream);
   d.step.clear(d.stream);
   d.colliders.upload(boxed, d.boxed.size(), d.stream);
@@ -191,10 +180,10 @@ int CudaPbdTissue::upload_touches(double duration) {
   if (may_touch) pull();
   pbd::find_touches(s, duration);
   const auto* blocks = d.touches.blocks.data();
-  const auto* first = d.touches.first.data();
-  if (s.touches.size() > 0) d.touches.upload(s.touches, false, d.parts, d.count, d.stream);
+  const auto* begin = d.touches.begin.data();
+  if (s.touches.size() > 0) d.touches.upload(s.touches, false, d.stream);
   if (may_touch != d.may_touch || blocks != d.touches.blocks.data() ||
-      first != d.touches.first.data()) {
+      begin != d.touches.begin.data()) {
     d.step_graph.clear();
   }
   d.may_touch = may_touch;
@@ -209,7 +198,7 @@ void CudaPbdTissue::run_steps(const FrameColliders& colliders, int steps, float 
   const pbd::CudaPbdField field = d.field();
   const int chunks = static_cast<int>(d.component_of_chunk.size());
   const pbd::CudaPbdFlights flights{d.chunks.data(), chunks, d.order.data()};
-  if (d.way != Way::kLaunches) {
+  if (d.way == Way::kOneBlock) {
     launch_pbd_steps(field, frame, steps,
                      {d.boxed.data(), d.host_loads.data(), d.host_flights.data(), flights},
                      d.stream);

@@ -17,10 +17,9 @@ class CudaPbdTissue final : public PbdTissue {
  public:
   /// How the steps of a frame are launched.
   enum class Way {
-    kFaster,    ///< of those below, the one that is thought to be
+    kFaster,    ///< of the two below, the one that is thought to be
     kLaunches,  ///< colour by colour, for many constraints
     kOneBlock,  ///< all by one block of threads, for few
-    kCluster,   ///< all by some blocks that share their memories, where the GPU has that
   };
 
   /// Throws std::runtime_error where there is no GPU, or not enough memory on it.
@@ -34,8 +33,8 @@ class CudaPbdTissue final : public PbdTissue {
   void pull() override;
   void push();        ///< motion to the GPU
   void push_all();    ///< and constraints, after a change of them
-  void set_way(Way);  ///< throws std::runtime_error where it is not possible
-  Way way() const;    ///< none but kFaster
+  void set_way(Way);  ///< throws std::runtime_error where vertices are too many for one block
+  Way way() const;    ///< one of the two
   /// As pbd::project_constraints() without multipliers, so many times; only enqueues.
   void project(float h, int times = 1);
   void wait();
@@ -51,7 +50,6 @@ class CudaPbdTissue final : public PbdTissue {
   void upload_constraints();
   void upload_chunks();
   void choose_way();
-  Way fastest_way() const;
   int upload_touches(double duration);  ///< returns their colours
   void upload_frame(const FrameColliders& colliders, int steps, const pbd::CudaPbdFrame& frame);
   void take_loads(const FrameColliders& colliders, int steps);

@@ -27,13 +27,10 @@ template <class Kind>
 struct CudaPbdSet {
   const ConstraintBlock<Kind>* blocks;
   float* multipliers;
-  /// The first constraint of each colour, there of each of the `parts` that blocks of threads take
-  /// side by side, and the number of constraints.
-  const std::int32_t* first;
-  int parts = 1, colours = 0;
+  const std::int32_t* begin;  ///< first block of each colour, and the number of blocks
+  int colours = 0;
   int tail = 0;         ///< from this colour on each is of a warp's lanes at most
-  int tail_blocks = 0;  ///< blocks of constraints that those are
-  int most = 0;         ///< constraints of a part of the colours before, at most
+  int tail_blocks = 0;  ///< how many those are
 };
 
 /// A collider of a step and the box that it fills [m].
@@ -63,7 +60,6 @@ struct CudaPbdField {
   CudaPbdSet<Touch> touches;
   bool may_touch = false;  ///< whether there are pieces that may touch one another
   int sweeps = 1;          ///< sweeps_of_step()
-  int parts = 1;           ///< CudaPbdSet::parts, of all sets
   const CudaPbdFrame* frame;
   CudaPbdCollider* colliders;  ///< [steps][frame->colliders]
   unsigned long long* loads;   ///< [steps][frame->colliders][kPbdLoadSums]
@@ -125,18 +121,11 @@ void launch_pbd_projections(const CudaPbdField& field, const CudaPbdColours& col
 int pbd_projection_launches(const CudaPbdColours& colours);
 /// One step by launches: the one that *field.step says, which is then the next.
 void launch_pbd_step(const CudaPbdField& field, const CudaPbdColours& colours, cudaStream_t stream);
-/// All steps by CudaPbdField::parts blocks of threads, that keep places in their shared memory.
+/// All steps by one block of threads, that keeps places in its shared memory.
 void launch_pbd_steps(const CudaPbdField& field, const CudaPbdFrame& frame, int steps,
                       const CudaPbdExchange& exchange, cudaStream_t stream);
-/// Whether that is possible with so many parts, and colliders in all steps together.
-bool fits_pbd_blocks(CudaPbdField field, int parts, std::size_t colliders);
-/// Blocks of threads that can share their memories (a cluster), as many as are of use: 1 where the
-/// GPU, the build or the driver knows none.
-int pbd_cluster_blocks();
-/// Vertices, padding included, of which each of `parts` blocks has the places.
-constexpr int vertices_of_part(int vertices, int parts) {
-  return ((vertices + 4 * kLanes + parts - 1) / parts + 7) / 8 * 8;  // for spread_banks()
-}
+/// Whether that is possible.
+bool fits_pbd_block(const CudaPbdField& field);
 void launch_pbd_flights(const CudaPbdField& field, const CudaPbdFlights& flights,
                         CudaPbdFlight* result, cudaStream_t stream);
 void launch_pbd_changes(const CudaPbdField& field, const std::int32_t* component,

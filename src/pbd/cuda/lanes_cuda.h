@@ -39,69 +39,15 @@ __device__ __forceinline__ Item<Kind> load_staged(const ConstraintBlock<Kind>* b
   return result;
 }
 
-/// Where vertices are, in memory that all threads address alike, and how threads that project wait
-/// for one another.
-struct Places {
-  float4* x;
-  __device__ __forceinline__ float4 load(int i) const { return x[i]; }
-  __device__ __forceinline__ void store(int i, const float4& at) const { x[i] = at; }
-  static __device__ __forceinline__ void wait() { __syncthreads(); }
-  static __device__ __forceinline__ int part() { return 0; }
-};
-
-/// In the shared memories of a cluster's blocks of threads, each of which has the `share` vertices
-/// of its rank.
-struct ClusterPlaces {
-  std::uint32_t first;   ///< of the first block, in the cluster's window of addresses
-  std::uint32_t beyond;  ///< from a block's last vertex to the next one's first [bytes]
-  std::uint32_t magic;   ///< i / share is the upper half of i * magic
-
-#if __CUDA_ARCH__ >= 900
-  __device__ __forceinline__ std::uint32_t address(int i) const {
-    return first + 16u * static_cast<std::uint32_t>(i) +
-           __umulhi(static_cast<std::uint32_t>(i), magic) * beyond;
-  }
-  __device__ __forceinline__ float4 load(int i) const {
-    float4 at;
-    asm volatile("ld.shared::cluster.v4.f32 {%0, %1, %2, %3}, [%4];"
-                 : "=f"(at.x), "=f"(at.y), "=f"(at.z), "=f"(at.w)
-                 : "r"(address(i))
-                 : "memory");
-    return at;
-  }
-  __device__ __forceinline__ void store(int i, const float4& at) const {
-    asm volatile("st.shared::cluster.v4.f32 [%0], {%1, %2, %3, %4};" ::"r"(address(i)), "f"(at.x),
-                 "f"(at.y), "f"(at.z), "f"(at.w)
-                 : "memory");
-  }
-  static __device__ __forceinline__ void wait() {
-    asm volatile(
-        "barrier.cluster.arrive.release.aligned;\n"
-        "barrier.cluster.wait.acquire.aligned;" ::
-            : "memory");
-  }
-  static __device__ __forceinline__ int part() {
-    std::uint32_t rank;
-    asm("mov.u32 %0, %%cluster_ctarank;" : "=r"(rank));
-    return static_cast<int>(rank);
-  }
-#else  // never launched: pbd_cluster_blocks()
-  __device__ __forceinline__ float4 load(int) const { return {}; }
-  __device__ __forceinline__ void store(int, const float4&) const {}
-  static __device__ __forceinline__ void wait() {}
-  static __device__ __forceinline__ int part() { return 0; }
-#endif
-};
-
-template <class Kind, bool kKeep, class At>
-__device__ __forceinline__ void project_item(const Item<Kind>& item, float inverse_h2, const At& x,
+template <class Kind, bool kKeep>
+__device__ __forceinline__ void project_item(const Item<Kind>& item, float inverse_h2, float4* x,
                                              float* multipliers, int index) {
   constexpr int kMultipliers = ConstraintSet<Kind>::kMultipliers;
   constexpr bool kKept = kKeep && Kind::kMultipliers > 0;
   Vertex<float> v[Kind::kVertices];
 #pragma unroll
   for (int i = 0; i < Kind::kVertices; ++i) {
-    const float4 at = x.load(item.vertex[i]);
+    const float4 at = x[item.vertex[i]];
     v[i] = {at.x, at.y, at.z, at.w};
   }
   float lambda[kMultipliers];
@@ -115,21 +61,20 @@ __device__ __forceinline__ void project_item(const Item<Kind>& item, float inver
   }
 #pragma unroll
   for (int i = 0; i < Kind::kVertices; ++i) {
-    x.store(item.vertex[i], make_float4(v[i].x, v[i].y, v[i].z, v[i].w));
+    x[item.vertex[i]] = make_float4(v[i].x, v[i].y, v[i].z, v[i].w);
   }
 }
 
-/// The colours from `first` to before `last`, or `backward`, all threads of all parts together;
-/// leaves them in step. Reads ahead what each thread takes first of the next colour,
+/// The colours from `first` to before `last`, or `backward`, by one block of threads, all threads
+/// together; leaves them in step. Reads ahead what each thread takes first of the next colour,
 /// kRounds times.
-template <class Kind, bool kKeep, int kRounds = 1, class At>
+template <class Kind, bool kKeep, int kRounds = 1>
 __device__ __forceinline__ void project_colours(const CudaPbdSet<Kind>& set, int first, int last,
-                                                bool backward, float inverse_h2, const At& x) {
+                                                bool backward, float inverse_h2, float4* x) {
   if (first >= last) return;
   const int threads = static_cast<int>(blockDim.x), thread = static_cast<int>(threadIdx.x);
   int colour = backward ? last - 1 : first;
-  const std::int32_t* own = set.first + At::part();
-  int item = own[colour * set.parts] + thread, end = own[colour * set.parts + 1];
+  int item = set.begin[colour] * kLanes + thread, end = set.begin[colour + 1] * kLanes;
   Item<Kind> ahead[kRounds], now[kRounds];
 #pragma unroll
   for (int r = 0; r < kRounds; ++r) {
@@ -139,8 +84,8 @@ __device__ __forceinline__ void project_colours(const CudaPbdSet<Kind>& set, int
     int next = thread, next_end = 0;
     if (left > 0) {
       colour += backward ? -1 : 1;
-      next = own[colour * set.parts] + thread;
-      next_end = own[colour * set.parts + 1];
+      next = set.begin[colour] * kLanes + thread;
+      next_end = set.begin[colour + 1] * kLanes;
     }
 #pragma unroll
     for (int r = 0; r < kRounds; ++r) {
@@ -154,7 +99,7 @@ __device__ __forceinline__ void project_colours(const CudaPbdSet<Kind>& set, int
     for (; item < end; item += threads) {
       project_item<Kind, kKeep>(load_item(set.blocks, item), inverse_h2, x, set.multipliers, item);
     }
-    At::wait();
+    __syncthreads();
     item = next;
     end = next_end;
   }

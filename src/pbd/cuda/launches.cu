@@ -22,22 +22,21 @@ __global__ void __launch_bounds__(kThreads)
   const int item = static_cast<int>(blockIdx.x * blockDim.x + threadIdx.x);
   if (item >= count * kLanes) return;
   const float inverse_h2 = frame->step.inverse_h2;
-  project_item<Kind, kKeep>(load_item(blocks, item), inverse_h2, Places{x}, multipliers, item);
+  project_item<Kind, kKeep>(load_item(blocks, item), inverse_h2, x, multipliers, item);
 }
 
 template <class Kind, bool kKeep>
 __global__ void __launch_bounds__(kThreadsOfFew)
     pbd_project_few(CudaPbdSet<Kind> set, int first, int last, bool backward,
                     const CudaPbdFrame* frame, float4* x) {
-  project_colours<Kind, kKeep>(set, first, last, backward, frame->step.inverse_h2, Places{x});
+  project_colours<Kind, kKeep>(set, first, last, backward, frame->step.inverse_h2, x);
 }
 
 /// All colours of what touches, few as they are, by one block: how many there are is not known when
 /// the launch is put into a graph.
 __global__ void __launch_bounds__(kThreadsOfFew)
     pbd_project_touches(CudaPbdSet<Touch> set, const CudaPbdFrame* frame, float4* x) {
-  project_colours<Touch, false>(set, 0, frame->touch_colours, false, frame->step.inverse_h2,
-                                Places{x});
+  project_colours<Touch, false>(set, 0, frame->touch_colours, false, frame->step.inverse_h2, x);
 }
 
 __global__ void __launch_bounds__(kThreads) pbd_predict(CudaPbdField f) {

@@ -77,7 +77,7 @@ __device__ __forceinline__ void add_energy(const CudaPbdField& f, const CudaPbdS
                                            double& sum) {
   if (set.colours == 0) return;
   const int threads = static_cast<int>(gridDim.x * blockDim.x);
-  const int count = set.first[set.colours * set.parts];
+  const int count = set.begin[set.colours] * kLanes;
   for (int k = static_cast<int>(blockIdx.x * blockDim.x + threadIdx.x); k < count; k += threads) {
     const Item<Kind> item = load_item(set.blocks, k);
     if (item.vertex[0] >= f.count) continue;  // padding

@@ -1,7 +1,6 @@
 // What CudaPbdTissue keeps on the GPU.
 #pragma once
 
-#include <algorithm>
 #include <string>
 #include <vector>
 
@@ -18,51 +17,25 @@ struct CudaPbdTissue::OnDevice {
   struct Set {
     DeviceArray<pbd::ConstraintBlock<Kind>> blocks;
     DeviceArray<float> multipliers;
-    DeviceArray<std::int32_t> first;
-    int parts = 1, colours = 0, tail = 0, tail_blocks = 0, most = 0;
+    DeviceArray<std::int32_t> begin;
+    int colours = 0, tail = 0, tail_blocks = 0;
 
-    /// `spread`: in the order that reads shared memory fastest, of so many `of_parts` that share
-    /// the vertices out.
-    void upload(const pbd::ConstraintSet<Kind>& set, bool spread, int of_parts, int vertices,
-                cudaStream_t stream) {
-      parts = of_parts;
-      const std::vector<std::int32_t> list = share_out(set, vertices);
+    /// `spread`: in the order that reads shared memory fastest.
+    void upload(const pbd::ConstraintSet<Kind>& set, bool spread, cudaStream_t stream) {
       if (spread) {
-        blocks.upload(pbd::spread_banks(set, list), stream);
+        blocks.upload(pbd::spread_banks(set), stream);
       } else {
         blocks.upload(set.blocks, stream);
       }
       multipliers.upload(set.multipliers, stream);
-      first.upload(list, stream);
+      begin.upload(set.begin, stream);
       colours = static_cast<int>(set.begin.size()) - 1;
       tail = colours;
       while (tail > 0 && set.begin[tail] - set.begin[tail - 1] <= 32 / pbd::kLanes) --tail;
       tail_blocks = set.begin[colours] - set.begin[tail];
-      most = 0;
-      for (int k = 0; k < tail * parts; ++k) most = std::max(most, list[k + 1] - list[k]);
     }
     pbd::CudaPbdSet<Kind> set() const {
-      return {blocks.data(), multipliers.data(), first.data(), parts, colours,
-              tail,          tail_blocks,        most};
-    }
-
-   private:
-    /// CudaPbdSet::first: by a constraint's first vertex, by which those of a colour are sorted.
-    std::vector<std::int32_t> share_out(const pbd::ConstraintSet<Kind>& set, int vertices) const {
-      const int share = pbd::vertices_of_part(vertices, parts);
-      std::vector<std::int32_t> list = {0};
-      for (std::size_t colour = 0; colour + 1 < set.begin.size(); ++colour) {
-        const std::int32_t end = set.begin[colour + 1] * pbd::kLanes;
-        std::int32_t k = set.begin[colour] * pbd::kLanes;
-        for (int part = 1; part < parts; ++part) {
-          while (k < end && set.blocks[k / pbd::kLanes].vertex[0][k % pbd::kLanes] < part * share) {
-            ++k;
-          }
-          list.push_back(k);
-        }
-        list.push_back(end);
-      }
-      return list;
+      return {blocks.data(), multipliers.data(), begin.data(), colours, tail, tail_blocks};
     }
   };
 
@@ -81,7 +54,6 @@ struct CudaPbdTissue::OnDevice {
   Set<pbd::Touch> touches;
   bool may_touch = false;
   int sweeps = 1;  ///< of a step
-  int parts = 1;   ///< blocks of threads that share the vertices out
   Way wanted = Way::kFaster, way = Way::kLaunches;
   CudaGraph step_graph, projections;
 
@@ -124,18 +96,11 @@ struct CudaPbdTissue::OnDevice {
     f.touches = touches.set();
     f.may_touch = may_touch;
     f.sweeps = sweeps;
-    f.parts = parts;
     f.frame = frame.data();
     f.colliders = colliders.data();
     f.loads = loads.data();
     f.step = step.data();
     return f;
-  }
-  static int parts_of(Way way) { return way == Way::kCluster ? pbd::pbd_cluster_blocks() : 1; }
-  /// Whether blocks of threads have room for what they share out.
-  bool fits(Way way) const {
-    if (way == Way::kCluster && parts_of(way) == 1) return false;
-    return pbd::fits_pbd_blocks(field(), parts_of(way), colliders.size());
   }
   void wait(const char* action) { check_cuda(cudaStreamSynchronize(stream), action); }
 };

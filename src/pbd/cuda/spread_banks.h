@@ -15,22 +15,20 @@ namespace pbd {
 /// gives the same bits.
 inline constexpr int kBanks = 8;
 
-/// The blocks of a set with the lanes of each part of a colour (`first`: CudaPbdSet) ordered so
-/// that eight that follow one another rarely meet: greedy, among the next kAhead. Random order
-/// takes 2.7 turns for a vertex.
+/// The blocks of a set with the lanes of each colour ordered so that eight that follow one another
+/// rarely meet: greedy, among the next kAhead. Random order takes 2.7 turns for a vertex.
 template <class Kind>
-std::vector<ConstraintBlock<Kind>> spread_banks(const ConstraintSet<Kind>& set,
-                                                const std::vector<std::int32_t>& first) {
+std::vector<ConstraintBlock<Kind>> spread_banks(const ConstraintSet<Kind>& set) {
   constexpr int kAhead = 48;
   std::vector<ConstraintBlock<Kind>> result(set.blocks.begin(), set.blocks.end());
   std::vector<std::int32_t> left;
-  for (std::size_t part = 0; part + 1 < first.size(); ++part) {
-    const std::int32_t begin = first[part], end = first[part + 1];
+  for (std::size_t colour = 0; colour + 1 < set.begin.size(); ++colour) {
+    const std::int32_t begin = set.begin[colour] * kLanes, end = set.begin[colour + 1] * kLanes;
     left.clear();
     for (std::int32_t k = end; k > begin; --k) left.push_back(k - 1);  // the first one last
     int taken[Kind::kVertices][kBanks] = {}, most[Kind::kVertices] = {};
     for (std::int32_t to = begin; to < end; ++to) {
-      if ((to - begin) % kBanks == 0) {
+      if (to % kBanks == 0) {
         for (int i = 0; i < Kind::kVertices; ++i) {
           std::fill_n(taken[i], kBanks, 0);
           most[i] = 0;

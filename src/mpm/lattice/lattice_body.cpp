@@ -164,7 +164,7 @@ std::vector<LatticeBody> make_lattice_bodies(const Scene& scene, Points& points,
     }
     // Where anchors act at their faces, one that lies at the body's own holds it without a point.
     for (std::size_t r = 0; r < anchored.size(); ++r) {
-      if (range == NodeRange::kSeen && scene.mpm.boundary == MpmBoundary::kSurface) break;
+      if (scene.mpm.boundary == MpmBoundary::kSurface) break;
       if (anchored[r] == 0) refuse_region("anchors", r, scene, body.name, "");
     }
     assign_materials(scene, b, points);

@@ -13,7 +13,7 @@ TISSUE_SIM_INLINE float choose(bool mask, float a, float b) { return mask ? a : 
 TISSUE_SIM_INLINE bool none_of(bool mask) { return !mask; }
 // Two bools joined by & or | are an int.
 TISSUE_SIM_INLINE float choose(int mask, float a, float b) { return mask != 0 ? a : b; }
-TISSUE_SIM_INLINE bool none_of(int mask) { return mask == 0; }
+TISSUE_SIM_INLINE int none_of(int mask) { return mask == 0 ? 1 : 0; }
 TISSUE_SIM_INLINE float square_root(float x) { return sqrtf(x); }
 
 /// Where a < b. By the sign of a - b: see any_negative().

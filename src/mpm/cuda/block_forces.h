@@ -214,7 +214,7 @@ __device__ __forceinline__ void block_forces(const CudaTables& t, const CudaBund
   // Threads beyond the last column do what the last one's do, if their warp has to anyway.
   const bool active = index < columns, warp_active = Walk::index_of(thread / 32 * 32) < columns;
   const int4 first{block.nx, block.ny, block.nz, block.first_slot};
-  const int column = min(index, columns - 1);
+  const int column = max(0, min(index, columns - 1));
   Walk walk{t, body, s};
   walk.column = kSpecial ? column_of(t, w, block, column) : column_of(block, column);
 

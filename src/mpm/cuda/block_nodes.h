@@ -187,10 +187,11 @@ __device__ __forceinline__ void bring_nodes(const CudaTables& t, int first_slot,
   }
 }
 
-/// Column `index` of a bundle, `block` its first: from memory only where it must be.
+/// Column `index` of a bundle, `block` its first: from memory only where it must be. Where anchors
+/// hold all of it, it has no columns, and this is one of the block's that nobody works on.
 __device__ __forceinline__ CudaColumn column_of(const CudaTables& t, const CudaBundle& w,
                                                 const CudaBlock& block, int index) {
-  if (w.blocks == 1 && w.columns == block.nx * block.ny) {
+  if (w.columns == 0 || (w.blocks == 1 && w.columns == block.nx * block.ny)) {
     return column_of(block, index);
   }
   return t.columns[w.first_column + index];

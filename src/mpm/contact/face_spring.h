@@ -90,6 +90,7 @@ TISSUE_SIM_INLINE void push_face(FaceSpring& c, float dt, Places& places, bool a
   float aside[3], slip = 0;
   const float before[3] = {c.hold[0], c.hold[1], c.hold[2]};
   float way[3] = {}, left[3];  // which way it slides, unit; what is left of it [m]
+  bool goes_on = true;         // sliding
   for (int i = 0; i < 4; ++i) {
     for (int a = 0; a < 3; ++a) aside[a] = c.apart[a] + depth * c.normal[a];
     slip = sqrtf(dot(aside, aside));
@@ -107,6 +108,7 @@ TISSUE_SIM_INLINE void push_face(FaceSpring& c, float dt, Places& places, bool a
       share = 1;
       step = left;
     }
+    goes_on = slides = slides && goes_on;
     if (i == 3 || !places.any(slides)) break;
     if (slides) {
       float place[3];
@@ -117,21 +119,27 @@ TISSUE_SIM_INLINE void push_face(FaceSpring& c, float dt, Places& places, bool a
       places.hold(place);
     }
     places.held(held);
+    bool undone = false;  // it slid where it cannot, and is put back
     if (slides) {
       c.measure_apart(own, held);
       depth = -dot(c.apart, c.normal);
       // Not what it looked like, or beyond what is left of the face.
       c.touching = depth > 0 && dot(c.apart, c.apart) <= length2 && c.holds();
-      if (places.slides_back() && touched && depth > 0 && !c.touching) {
+      undone = places.slides_back() && touched && depth > 0 && !c.touching;
+      if (undone) {
         c.hold_at(before);
         places.hold(before);
-        places.held(held);
+      }
+    }
+    if (places.any(undone)) {
+      places.held(held);
+      if (undone) {
+        goes_on = false;
         c.measure_apart(own, held);
         depth = -dot(c.apart, c.normal);
         for (int a = 0; a < 3; ++a) aside[a] = c.apart[a] + depth * c.normal[a];
         slip = sqrtf(dot(aside, aside));
         c.touching = depth > 0;
-        break;
       }
     }
     const bool begins = slides && c.touching && !touched;

@@ -140,9 +140,14 @@ TISSUE_SIM_INLINE void push_face(FaceSpring& c, float dt, Places& places, bool a
     }
   }
   if (!c.touching) return;
-  // Along the line between the two material places, or angular momentum would change, also where
-  // the place could not slide onto the cone; and only apart.
-  const float push = fmaxf(0.0f, c.stiffness * depth + c.damping * closing), along = 1 / depth;
+  // Along the line between the two material places, or angular momentum would change; and only
+  // apart. Where the place could not slide onto the cone it is as strong as on it.
+  float push = fmaxf(0.0f, c.stiffness * depth + c.damping * closing);
+  const float slip2 = dot(aside, aside), on_cone = kOnCone * c.friction * depth;
+  if (slip2 > on_cone * on_cone) {
+    push *= sqrtf((depth * depth + on_cone * on_cone) / (depth * depth + slip2));
+  }
+  const float along = 1 / depth;
   for (int a = 0; a < 3; ++a) c.force[a] = push * (c.normal[a] - along * aside[a]);
 }
 

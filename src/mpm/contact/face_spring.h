@@ -53,12 +53,17 @@ struct alignas(16) FaceSpring {
     damping = 2 * kDamping * sqrtf(stiffness * mass);
   }
 
+  /// Whether the place held is at most so far from the facet [cells].
+  TISSUE_SIM_INLINE bool is_within(double cells) const {
+    const auto far = static_cast<float>(cells * cell_size);
+    return dot(apart, apart) < far * far;
+  }
+
   /// Whether the place held is still on the other face: near its cell, and not far from the facet.
   TISSUE_SIM_INLINE bool holds() const {
     constexpr float kFarthest = 1.25f;  // [cells]
-    const auto far = static_cast<float>(0.75 * cell_size);
-    return dot(apart, apart) < far * far && fabsf(hold[0]) < kFarthest &&
-           fabsf(hold[1]) < kFarthest && fabsf(hold[2]) < kFarthest;
+    return is_within(0.75) && fabsf(hold[0]) < kFarthest && fabsf(hold[1]) < kFarthest &&
+           fabsf(hold[2]) < kFarthest;
   }
 };
 
@@ -87,6 +92,7 @@ TISSUE_SIM_INLINE void push_face(FaceSpring& c, float dt, Places& places, bool a
   if (!places.any(c.touching)) return;
   // The place held slides along the face, so that the spring stays in the friction cone.
   constexpr float kOnCone = 1.02f;
+  constexpr double kPressed = 1.5;  // what a tool presses at 1 m/s comes a cell deep [cells]
   float aside[3];
   const float before[3] = {c.hold[0], c.hold[1], c.hold[2]};
   float way[3] = {}, left[3];  // which way it slides, unit; what is left of it [m]
@@ -138,7 +144,7 @@ TISSUE_SIM_INLINE void push_face(FaceSpring& c, float dt, Places& places, bool a
         c.measure_apart(own, held);
         depth = -dot(c.apart, c.normal);
         for (int a = 0; a < 3; ++a) aside[a] = c.apart[a] + depth * c.normal[a];
-        c.touching = depth > 0 && c.holds();
+        c.touching = depth > 0 && c.is_within(kPressed);
       }
     }
     const bool begins = slides && c.touching && !touched;

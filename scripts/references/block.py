@@ -18,6 +18,18 @@ def nodes(length, count, low, high):
     return length * t
 
 
+def crowded(length, count, low, high, power=3):
+    """The same, ever smaller towards these ends, as by a power: for what is singular there."""
+    t = np.linspace(0, 1, count + 1)
+    if low and high:
+        t = np.where(t < 0.5, 0.5 * (2 * t) ** power, 1 - 0.5 * (2 * (1 - t)) ** power)
+    elif low:
+        t = t ** power
+    elif high:
+        t = 1 - (1 - t) ** power
+    return length * t
+
+
 def cut_mesh(mesh, x, z):
     """The mesh with corners of their own for elements on either side of a cut, which ends between corners at z."""
     p, t = mesh.p, mesh.t.copy()

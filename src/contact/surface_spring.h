@@ -21,6 +21,10 @@ struct SurfaceSpring {
 inline constexpr float kAcross = 8, kAlong = 0.5f;
 inline constexpr float kDampingAcross = 0.1f;  ///< times the substep, of the stiffness
 inline constexpr float kDampingAlong = 0.1f;   ///< share of critical
+/// Up to how many cells of radius a tool's tip is thin: tissue bears its load on so little area
+/// that the spring would hide a third of the radius, and more than what it presses is still thick.
+inline constexpr float kThinTip = 4 / 3.0f;
+inline constexpr float kAcrossThin = 6;  ///< times the cells in its radius to the power of -2
 /// What stays in a substep of how deep contact began: a bounce of debris takes three substeps, one
 /// of a whole block some twenty.
 inline constexpr float kBegunStays = 1 - 1 / 128.0f;
@@ -54,6 +58,19 @@ TISSUE_SIM_INLINE void stiffen_along(SurfaceSpring& s, int doubled) {
   const auto by = static_cast<float>(1 << doubled);
   s.along *= by;
   s.damping_along *= sqrtf(by);
+}
+
+/// How much stiffer the spring across the surface is for a tool of this radius [m], if it has one.
+TISSUE_SIM_INLINE float stiffer_across(float radius, float cell_size) {
+  if (!(radius > 0 && radius < kThinTip * cell_size)) return 1;
+  const float cells = fmaxf(radius / cell_size, 0.25f * kThinTip);
+  return kAcrossThin / (cells * cells);
+}
+
+/// Makes it so much stiffer.
+TISSUE_SIM_INLINE void stiffen_across(SurfaceSpring& s, float by) {
+  s.across *= by;
+  s.damping_across *= by;
 }
 
 /// Of a place that stands for so much more.

@@ -130,7 +130,8 @@ void fields(Archive& archive, AnchorFaces& a) {
 
 template <class Archive>
 void fields(Archive& archive, Touch& t) {
-  archive(t.cell, t.point, t.key, t.collider, t.hold, t.along, t.inertia, t.begun, t.doubled);
+  archive(t.cell, t.point, t.key, t.collider, t.hold, t.along, t.inertia, t.begun, t.doubled,
+          t.part);
 }
 
 template <class Archive>

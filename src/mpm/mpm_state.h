@@ -30,6 +30,7 @@ struct Touch {
   std::uint8_t key;  ///< SurfacePlace::key, or kPointKey plus which of the cell's eight points
   std::uint8_t collider;
   std::uint8_t doubled;  ///< how often its spring along the surface was
+  std::uint8_t part;     ///< of the place: mpm/contact/place_parts.h
   float hold[3];         ///< place that friction holds on to, in the collider's frame [m]
   float along[3];        ///< normal of its inerter (mpm/contact/contact_inertia.h)
   float inertia = 0;     ///< of that [kg]

@@ -7,6 +7,18 @@
 
 namespace tissue_sim {
 
+namespace {
+
+/// Whether a tool that touches tissue is so thin that it passes between points without having any
+/// of them in it: they are half a cell apart, and more where tissue is drawn.
+bool may_pass_unseen(const Scene& scene, const Tool& tool, const ToolLoad& load) {
+  constexpr double kSeen = 1 / 3.0;  // [cells]
+  const double tip = thinnest(tool);
+  return tip > 0 && tip < kSeen * scene.cell_size && load.mean.force.norm() > 0;
+}
+
+}  // namespace
+
 void sum_inside(FrameResult& result) {
   result.points_inside = 0;
   result.inside_depth = 0;
@@ -20,8 +32,18 @@ std::string inside_warning(const Scene& scene, const FrameResult& result) {
   std::string all;
   for (std::size_t i = 0; i < result.loads.size() && i < scene.tools.size(); ++i) {
     const ToolLoad& load = result.loads[i];
-    if (load.points_inside == 0) continue;
     const Tool& tool = scene.tools[i];
+    if (load.points_inside == 0) {
+      if (!may_pass_unseen(scene, tool, load)) continue;
+      char text[320];
+      std::snprintf(
+          text, sizeof(text),
+          "%stip of tool '%s' is thinner than a third of a cell: it may pass through tissue "
+          "without any point in it; cell_size %.2g would hold it off",
+          all.empty() ? "" : "; ", tool.name.c_str(), thinnest(tool));
+      all += text;
+      continue;
+    }
     // Tissue holds from a cell of its own thickness and of the tool's radius on. Where the tool is
     // thick enough, the tissue is not, or is pressed together to less than a cell.
     const double tip = thinnest(tool);

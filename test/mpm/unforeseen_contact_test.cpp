@@ -13,7 +13,8 @@ namespace tissue_sim {
 namespace {
 
 constexpr double kCell = 0.002, kLong = 0.04, kWide = 0.02;  // [m]
-constexpr double kPressed = 0.3;                             // by this share of its length
+constexpr double kHeld = 1.5 * kCell;                        // of it, at one end [m]
+constexpr double kPressed = 0.3;                             // the rest by this share of its length
 constexpr double kRadius = 0.003, kGap = 3.5 * kCell;        // of the probe, and before it [m]
 
 /// A block that is held at one end, and a probe across the way of the other.
@@ -25,14 +26,14 @@ class UnforeseenContactOf : public OnEitherDevice<T> {
     Region held;
     held.kind = Region::Kind::kBox;
     held.min = Vec3(-1, -1, -1);
-    held.max = Vec3(1.5 * kCell, 1, 1);
+    held.max = Vec3(kHeld, 1, 1);
     scene_.bodies[0].anchors = {held};
     scene_.tools.resize(1);
     scene_.tools[0].name = "probe";
     scene_.tools[0].radius = kRadius;
     tools_.resize(1);
     tools_[0].present = true;
-    tools_[0].begin.position = Vec3((1 - kPressed) * kLong + kGap + kRadius, kWide / 2, -0.01);
+    tools_[0].begin.position = Vec3(kLong - kPressed * (kLong - kHeld) + kGap + kRadius, kWide / 2, -0.01);
     tools_[0].begin.orientation = Quat::FromTwoVectors(Vec3::UnitZ(), Vec3(0, 0, -1));
     tools_[0].end = tools_[0].begin;
   }
@@ -41,8 +42,9 @@ class UnforeseenContactOf : public OnEitherDevice<T> {
     pull(tissue);
     MpmState& s = tissue.state();
     s.bodies[0].for_each_node([&](int node, int x, int y, int z) {
-      const double home = s.bodies[0].node_position(x, y, z)[0];
-      if (s.nodes.inv_mass[node] != 0) s.nodes.u[0][node] = static_cast<float>(-kPressed * home);
+      // Nothing where it is held: the face of an anchor would keep that.
+      const double free = std::max(0.0, s.bodies[0].node_position(x, y, z)[0] - kHeld);
+      if (s.nodes.inv_mass[node] != 0) s.nodes.u[0][node] = static_cast<float>(-kPressed * free);
     });
     push(tissue);
   }

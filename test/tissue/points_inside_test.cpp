@@ -57,7 +57,8 @@ TEST_P(PointsInside, ATipThinnerThanACellIsSaidWithTheCellsThatWouldHold) {
   // Tissue of method mls goes around a thinner one.
   const bool is_mls = GetParam().method == Method::kMls;
   Scene scene = on_this(block_and_probe(is_mls ? 0.0027 : 0.002));
-  scene.mls.spacing = 0;  // two nodes a cell, or the tip goes in between
+  scene.mpm.boundary = MpmBoundary::kLattice;  // the true surface holds that
+  scene.mls.spacing = 0;                       // two nodes a cell, or the tip goes in between
   const FrameResult result = press(scene, 0.018, 0.3);
   if (scene.method == Method::kPbd) {  // vertices come out of a tool in each step
     EXPECT_EQ(result.points_inside, 0);
@@ -72,6 +73,18 @@ TEST_P(PointsInside, ATipThinnerThanACellIsSaidWithTheCellsThatWouldHold) {
   EXPECT_NE(said.find(is_mls ? "cell_size 0.0027 would hold" : "cell_size 0.002 would hold"),
             std::string::npos)
       << said;
+}
+
+TEST_P(PointsInside, ATipBetweenPointsIsSaid) {
+  const Scene scene = on_this(block_and_probe(0.0009));
+  FrameResult result;
+  result.loads.resize(1);
+  EXPECT_EQ(inside_warning(scene, result), "");
+  result.loads[0].mean.force.z() = 0.01;
+  const std::string said = inside_warning(scene, result);
+  EXPECT_NE(said.find("'poker'"), std::string::npos) << said;
+  EXPECT_NE(said.find("cell_size 0.0009 would hold"), std::string::npos) << said;
+  EXPECT_EQ(inside_warning(on_this(block_and_probe(0.0011)), result), "");
 }
 
 FOR_EACH_METHOD(PointsInside);

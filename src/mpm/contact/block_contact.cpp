@@ -9,6 +9,7 @@
 #include "contact/surface_spring.h"
 #include "mpm/contact/face_places.h"
 #include "mpm/contact/facet_motion.h"
+#include "mpm/contact/place_parts.h"
 #include "mpm/lattice/bonds.h"
 #include "mpm/lattice/cell_points.h"
 #include "tools/frame_colliders.h"
@@ -25,7 +26,7 @@ ContactSpring unit_spring(const LatticeBody& body, int material) {
 }
 
 bool comes_before(const Touch& a, const Touch& b) {
-  return std::tie(a.collider, a.cell, a.key) < std::tie(b.collider, b.cell, b.key);
+  return std::tie(a.collider, a.cell, a.key, a.part) < std::tie(b.collider, b.cell, b.key, b.part);
 }
 
 /// cof F n, which carries normals.
@@ -271,12 +272,15 @@ struct BlockPush {
   }
   void let_go(const Touch& touch) {
     if (touch.inertia == 0) return;
-    const auto& places = places_for(state.colliders[touch.collider], block);
+    const Collider& collider = state.colliders[touch.collider];
+    const auto& places = places_for(collider, block);
     const auto place = std::lower_bound(places.begin(), places.end(), touch,
                                         [](const SurfacePlace& p, const Touch& t) {
                                           return std::tie(p.cell, p.key) < std::tie(t.cell, t.key);
                                         });
-    change(-1, false, *place, touch, nullptr);
+    const int along =
+        parts_along(*place, parts_along(collider, static_cast<float>(body.cell_size)));
+    change(-1, false, along > 1 ? part_of(*place, along, touch.part) : *place, touch, nullptr);
   }
   void change(float sign, bool begins, const SurfacePlace& place, const Touch& touch,
               const float* velocity) {
@@ -329,7 +333,8 @@ bool push_points(BlockPush& b, const NearCell& cell, unsigned points, const Coll
       std::fill_n(pushes, 8, Vec<4>{});
     }
     const std::int32_t p = b.block.point[lane];
-    Touch touch{cell.lane, p, static_cast<std::uint8_t>(kPointKey + s), cell.collider, 0, {}, {}};
+    Touch touch{cell.lane, p, static_cast<std::uint8_t>(kPointKey + s), cell.collider, 0, 0,
+                {},        {}};
     if (!b.find_held(touch)) to_local(collider, at, touch.hold);
     const ContactSpring unit = unit_spring(b.body, b.state.points.material_of(p));
     const float moves = b.block.volume[lane];  // none of what an anchor holds does
@@ -417,10 +422,15 @@ bool push_surface(BlockPush& b, const NearCell& cell, const Collider& collider, 
     }
     return along > kFacing * std::sqrt(length);
   };
-  for (int i = 0; i < cell.place_count; ++i) {
-    const SurfacePlace& place = places[cell.first_place + i];
+  const float stiffer = stiffer_across(collider.radius, h);
+  PlaceParts parts(places.data() + cell.first_place, cell.place_count, parts_along(collider, h));
+  while (parts.next()) {
+    const SurfacePlace& place = parts.place();
     const AxisWeights weights(place.place);
-    Touch touch{cell.lane, place.point, place.key, cell.collider, 0, {}, {}};
+    Touch touch{cell.lane, place.point,
+                place.key, cell.collider,
+                0,         static_cast<std::uint8_t>(parts.part()),
+                {},        {}};
     const bool is_held = b.find_held(touch);
     float moved[6] = {}, at[3];  // displacement and velocity
     if (is_held) {
@@ -471,10 +481,12 @@ bool push_surface(BlockPush& b, const NearCell& cell, const Collider& collider, 
     touch.doubled = static_cast<std::uint8_t>(doubled);
     SurfaceSpring spring = scaled(of_unit_area, place.area);
     stiffen_along(spring, doubled);
+    stiffen_across(spring, stiffer);
     spring.cohesion = collider.cohesion * place.area / unit_area;
     // Along the surface no inerter helps: at rims and on debris, whose nodes are light, the spring
     // is what the substep bears.
-    const float per_mass = spring.along * b.dt * b.dt / kAlongBorne;
+    const float per_mass =
+        static_cast<float>(parts.count()) * spring.along * b.dt * b.dt / kAlongBorne;
     if (per_mass * cell.lightest * squared(weights) > 1) {  // mobility is that at most
       const float light = per_mass * static_cast<float>(mobility(b.state.nodes, nodes, weights));
       if (light > 1) {

@@ -53,12 +53,17 @@ struct alignas(16) FaceSpring {
     damping = 2 * kDamping * sqrtf(stiffness * mass);
   }
 
+  /// Whether the place held is at most so far from the facet [cells].
+  TISSUE_SIM_INLINE bool is_within(double cells) const {
+    const auto far = static_cast<float>(cells * cell_size);
+    return dot(apart, apart) < far * far;
+  }
+
   /// Whether the place held is still on the other face: near its cell, and not far from the facet.
   TISSUE_SIM_INLINE bool holds() const {
     constexpr float kFarthest = 1.25f;  // [cells]
-    const auto far = static_cast<float>(0.75 * cell_size);
-    return dot(apart, apart) < far * far && fabsf(hold[0]) < kFarthest &&
-           fabsf(hold[1]) < kFarthest && fabsf(hold[2]) < kFarthest;
+    return is_within(0.75) && fabsf(hold[0]) < kFarthest && fabsf(hold[1]) < kFarthest &&
+           fabsf(hold[2]) < kFarthest;
   }
 };
 
@@ -68,8 +73,8 @@ struct alignas(16) FaceSpring {
 /// worked out in step, places.any(so) says whether it is so for any of them, and those that are not
 /// `active` come along. With places.slides_back() a place that slid too far comes back onto the
 /// cone: in a substep it may slide ten times as far as the spring on the cone is long, and a tenth
-/// too far there would be no friction; and what pressed before lets go only where it parts, or the
-/// next look says so.
+/// too far there would be no friction; and what pressed before sticks where it cannot slide, as on
+/// a face that slopes more than its normal says, until it parts, slides again or is too far away.
 template <class Places>
 TISSUE_SIM_INLINE void push_face(FaceSpring& c, float dt, Places& places, bool active = true) {
   float own[3], held[3];
@@ -87,12 +92,14 @@ TISSUE_SIM_INLINE void push_face(FaceSpring& c, float dt, Places& places, bool a
   if (!places.any(c.touching)) return;
   // The place held slides along the face, so that the spring stays in the friction cone.
   constexpr float kOnCone = 1.02f;
-  float aside[3], slip = 0;
+  constexpr double kPressed = 1.5;  // what a tool presses at 1 m/s comes a cell deep [cells]
+  float aside[3];
   const float before[3] = {c.hold[0], c.hold[1], c.hold[2]};
   float way[3] = {}, left[3];  // which way it slides, unit; what is left of it [m]
+  bool goes_on = true;         // sliding
   for (int i = 0; i < 4; ++i) {
     for (int a = 0; a < 3; ++a) aside[a] = c.apart[a] + depth * c.normal[a];
-    slip = sqrtf(dot(aside, aside));
+    const float slip = sqrtf(dot(aside, aside));
     bool slides = c.touching && slip > kOnCone * c.friction * depth;
     float share = 1 - c.friction * depth / slip;
     const float* step = aside;
@@ -107,6 +114,7 @@ TISSUE_SIM_INLINE void push_face(FaceSpring& c, float dt, Places& places, bool a
       share = 1;
       step = left;
     }
+    goes_on = slides = slides && goes_on;
     if (i == 3 || !places.any(slides)) break;
     if (slides) {
       float place[3];
@@ -117,21 +125,26 @@ TISSUE_SIM_INLINE void push_face(FaceSpring& c, float dt, Places& places, bool a
       places.hold(place);
     }
     places.held(held);
+    bool undone = false;  // it slid where it cannot, and is put back
     if (slides) {
       c.measure_apart(own, held);
       depth = -dot(c.apart, c.normal);
       // Not what it looked like, or beyond what is left of the face.
       c.touching = depth > 0 && dot(c.apart, c.apart) <= length2 && c.holds();
-      if (places.slides_back() && touched && depth > 0 && !c.touching) {
+      undone = places.slides_back() && touched && depth > 0 && !c.touching;
+      if (undone) {
         c.hold_at(before);
         places.hold(before);
-        places.held(held);
+      }
+    }
+    if (places.any(undone)) {
+      places.held(held);
+      if (undone) {
+        goes_on = false;
         c.measure_apart(own, held);
         depth = -dot(c.apart, c.normal);
         for (int a = 0; a < 3; ++a) aside[a] = c.apart[a] + depth * c.normal[a];
-        slip = sqrtf(dot(aside, aside));
-        c.touching = depth > 0;
-        break;
+        c.touching = depth > 0 && c.is_within(kPressed);
       }
     }
     const bool begins = slides && c.touching && !touched;
@@ -141,10 +154,15 @@ TISSUE_SIM_INLINE void push_face(FaceSpring& c, float dt, Places& places, bool a
     }
   }
   if (!c.touching) return;
-  // Along the line between the two material places, and only apart.
-  const float push = fmaxf(0.0f, c.stiffness * depth + c.damping * closing);
-  const float friction = fminf(1.0f, kOnCone * c.friction * depth / (slip + 1e-30f));
-  for (int a = 0; a < 3; ++a) c.force[a] = push * (c.normal[a] - friction / depth * aside[a]);
+  // Along the line between the two material places, or angular momentum would change; and only
+  // apart. Where the place could not slide onto the cone it is as strong as on it.
+  float push = fmaxf(0.0f, c.stiffness * depth + c.damping * closing);
+  const float slip2 = dot(aside, aside), on_cone = kOnCone * c.friction * depth;
+  if (slip2 > on_cone * on_cone) {
+    push *= sqrtf((depth * depth + on_cone * on_cone) / (depth * depth + slip2));
+  }
+  const float along = 1 / depth;
+  for (int a = 0; a < 3; ++a) c.force[a] = push * (c.normal[a] - along * aside[a]);
 }
 
 }  // namespace tissue_sim

@@ -56,6 +56,7 @@ namespace looks {
 inline constexpr float kDeepest = 0.375f;
 inline constexpr float kDeeper = 0.25f;  ///< by how much more it may be in another that takes over
 inline constexpr float kBeyond = 0.25f;  ///< how far beyond its edge a facet still catches
+inline constexpr float kBeyondHeld = 1;  ///< the same of one that touches and finds no other
 inline constexpr float kFarthest = 2;    ///< from the centre of the facet that catches it
 inline constexpr float kStay = 0.1f;     ///< by how much another facet must fit better to take over
 inline constexpr float kNothing = 1e-3f;  ///< share of a spring's energy at `sudden`
@@ -124,7 +125,11 @@ TISSUE_SIM_HOST_DEVICE inline int choose_other(const Faces& s, const FaceSpring&
     if (beyond < best.beyond) best = {beyond, n};
   });
   best = s.nearest(best);
-  return best.at == INT_MAX ? -1 : s.near(best.at);
+  if (best.at != INT_MAX) return s.near(best.at);
+  // Where tissue is bent its faces leave gaps, through which what presses would be gone for good.
+  if (!c.touching || c.other < 0) return -1;
+  const Seen seen = seen_by(s, own, c.other);
+  return seen.beyond < kBeyondHeld && seen.depth < deepest ? c.other : -1;
 }
 
 /// How fast a facet moves against the fastest of those near [m/s].

@@ -152,9 +152,11 @@ struct LanePlaces {
   using Group = LaneGroup<kLanes, kApart>;
   Group lanes;
   CudaNodes state;
+  bool at_surface;
   LanePlace<Group> own_place, other_place;
 
-  __device__ __forceinline__ explicit LanePlaces(const CudaNodes& nodes) : state(nodes) {}
+  __device__ __forceinline__ LanePlaces(const CudaNodes& nodes, const CudaLooks& looks)
+      : state(nodes), at_surface(looks.at_surface) {}
 
   /// Takes a contact in hand whose nodes are known; the place held is still to be set.
   __device__ __forceinline__ void take(const CudaContactNodes& known) {
@@ -168,7 +170,7 @@ struct LanePlaces {
     other_place.bring(state.u);
   }
   __device__ __forceinline__ bool any(bool so) const { return lanes.any(so); }
-  __device__ __forceinline__ static constexpr bool slides_back() { return false; }
+  __device__ __forceinline__ bool slides_back() const { return at_surface; }
   __device__ __forceinline__ void own(float (&value)[3]) const {
     own_place.displacement(lanes, value);
   }
@@ -192,7 +194,7 @@ struct LaneFaces : LanePlaces<kContactLanes, true> {
   int index = 0;  // facet
 
   __device__ __forceinline__ LaneFaces(const CudaLooks& looks, const CudaNodes& nodes)
-      : LanePlaces(nodes), s(looks) {}
+      : LanePlaces(nodes, looks), s(looks) {}
 
   /// Takes a contact in hand whose nodes are to be found.
   __device__ __forceinline__ void take(const FaceSpring& c) {

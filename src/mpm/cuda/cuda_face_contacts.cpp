@@ -71,6 +71,7 @@ CudaLooks CudaMpmTissue::looks() const {
   s.pushed_parts = d.pushed_parts.data();
   s.slot_count = d.slot_parts.size();
   s.figures = f.figures.data();
+  s.at_surface = state_->scene.mpm.boundary == MpmBoundary::kSurface;
   return s;
 }
 

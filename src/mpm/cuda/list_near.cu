@@ -101,12 +101,36 @@ __device__ __forceinline__ bool may_touch(const CudaLooks& s, int f, int g) {
                     });
 }
 
+/// Whether a facet's place in the box of another.
+__device__ __forceinline__ bool meets(const float* x, const float* y, float far) {
+  bool meets = true;
+  for (int a = 0; a < 3; ++a) meets = meets && fabsf(x[a] - y[a]) < far;
+  return meets;
+}
+
+/// The facet of another piece that f presses on where may_touch() no longer tells of it, for the
+/// tissue between has turned away; -1 if none.
+__device__ __forceinline__ int pressed_by(const CudaLooks& s, int f, float own_reach) {
+  if (s.springs == nullptr) return -1;
+  const FaceSpring& c = s.springs[f];
+  const int g = c.other;
+  if (g < 0 || !c.touching || s.takes_part[g] == 0) return -1;
+  const PieceSize &own = s.facets[f].piece, &other = s.facets[g].piece;
+  if (own.id == other.id || !touches(own, other)) return -1;
+  const float far = own_reach + (kSearchReach * s.cell_size + s.listed[g].skin);
+  return meets(s.motion[f].x, s.motion[g].x, far) && may_touch(s, f, g) ? -1 : g;
+}
+
 /// Calls visit(g) for each facet g that f may touch; the lanes of a warp share them.
 template <class F>
 __device__ __forceinline__ void for_each_near(const CudaLooks& s, const CudaSearchRoom& room,
                                               const Grid& grid, int f, int lane, const F& visit) {
   const float* x = s.motion[f].x;
   const float own_reach = kSearchReach * s.cell_size + s.listed[f].skin;
+  if (lane == 0) {
+    const int pressed = pressed_by(s, f, own_reach);
+    if (pressed >= 0) visit(pressed);
+  }
   int lowest[3], size[3];
   for (int a = 0; a < 3; ++a) {
     lowest[a] = grid.cell(x[a] - own_reach - grid.reach);
@@ -129,11 +153,9 @@ __device__ __forceinline__ void for_each_near(const CudaLooks& s, const CudaSear
       for (int j = at + lane; j < end; j += 32) {
         const CudaSeeker other = room.sorted[j];
         const float far = own_reach + other.reach;
-        bool meets = true;
-        for (int a = 0; a < 3; ++a) {
-          meets = meets && fabsf(x[a] - other.x[a]) < far && grid.cell(other.x[a]) == cell[a];
-        }
-        if (meets && may_touch(s, f, other.facet)) visit(other.facet);
+        bool is_here = true;
+        for (int a = 0; a < 3; ++a) is_here = is_here && grid.cell(other.x[a]) == cell[a];
+        if (is_here && meets(x, other.x, far) && may_touch(s, f, other.facet)) visit(other.facet);
       }
     }
   }

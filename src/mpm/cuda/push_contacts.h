@@ -78,7 +78,7 @@ __device__ __forceinline__ void push_contacts(const CudaFaces& f, const WarpTurn
     const int i = first + static_cast<int>(threadIdx.x) % 32 / kLanes;
     const int at = min(i, count - 1);
     FaceSpring& spring = springs[facets[at]];
-    LanePlaces<kLanes, false> places(state);
+    LanePlaces<kLanes, false> places(state, f.looks);
     places.take(nodes[at]);
     FaceSpring c = spring;
     if (!waited) nodes_are_there();

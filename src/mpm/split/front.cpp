@@ -120,33 +120,17 @@ FrontNode parted_node(const MpmState& s, const FrontNode& at, const FrontNode* b
   const LatticeBody& body = s.bodies[at.body];
   BoxOfNode box;
   points_around(body, at.x, at.y, at.z, box.point);
-  int count = 0;
-  for (const std::uint64_t places : at.all) count += __builtin_popcountll(places);
-  if (count < kLeastPoints) return before != nullptr ? *before : result;
   const CutPlane plane = find_plane(s, box, at.all);
   if (!plane.there) return before != nullptr ? *before : result;
   if (before != nullptr) {
     result = *before;
   } else {
     result.first_side = {};
-    double mass[2] = {}, volume = 0, ratio = 0;
     for (int i = 0; i < 216; ++i) {
-      if (!BoxOfNode::has(at.all, i)) continue;
-      const bool first = plane.side[i] < 0;
-      if (first) result.first_side[i / 36] |= std::uint64_t{1} << BoxOfNode::bit(i);
-      const std::int32_t p = box.point[i];
-      const Material& material = body.material_of(s.points, p);
-      const double weighed = BoxOfNode::weight(i) * s.points.free_volume_of(p);
-      mass[first ? 0 : 1] += material.density * weighed;
-      volume += weighed;
-      ratio += weighed * lame_lambda(material) / lame_mu(material);
+      if (!BoxOfNode::has(at.all, i) || plane.side[i] >= 0) continue;
+      result.first_side[i / 36] |= std::uint64_t{1} << BoxOfNode::bit(i);
     }
-    const double sum = mass[0] + mass[1];
-    if (!(std::min(mass[0], mass[1]) > kLeastSide * sum)) return result;
-    result.first = static_cast<float>(mass[0] / sum);
-    result.other = static_cast<float>(mass[1] / sum);
-    result.mass = static_cast<float>(mass[0] * mass[1] / sum);
-    result.lambda_over_mu = static_cast<float>(ratio / volume);
+    if (!weigh_sides(s, result)) return result;
   }
   double all = 0, cut = 0;
   for_each_pair(at.all, [&](int i, int j, int axis) {
@@ -173,6 +157,31 @@ std::vector<std::uint8_t> excluded_nodes(const MpmState& s) {
 }
 
 }  // namespace
+
+bool weigh_sides(const MpmState& s, FrontNode& n) {
+  const LatticeBody& body = s.bodies[n.body];
+  BoxOfNode box;
+  points_around(body, n.x, n.y, n.z, box.point);
+  double mass[2] = {}, volume = 0, ratio = 0;
+  int count = 0;
+  for (int i = 0; i < 216; ++i) {
+    if (!BoxOfNode::has(n.all, i)) continue;
+    const std::int32_t p = box.point[i];
+    const Material& material = body.material_of(s.points, p);
+    const double weighed = BoxOfNode::weight(i) * s.points.free_volume_of(p);
+    mass[BoxOfNode::has(n.first_side, i) ? 0 : 1] += material.density * weighed;
+    volume += weighed;
+    ratio += weighed * lame_lambda(material) / lame_mu(material);
+    ++count;
+  }
+  const double sum = mass[0] + mass[1];
+  if (!(sum > 0)) return false;
+  n.first = static_cast<float>(mass[0] / sum);
+  n.other = static_cast<float>(mass[1] / sum);
+  n.mass = static_cast<float>(mass[0] * mass[1] / sum);
+  n.lambda_over_mu = static_cast<float>(ratio / volume);
+  return count >= kLeastPoints && std::min(mass[0], mass[1]) > kLeastSide * sum;
+}
 
 void follow_front(MpmState& s, const std::vector<std::int32_t>& touched) {
   Front& front = s.front;

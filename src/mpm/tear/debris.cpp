@@ -119,35 +119,12 @@ std::int32_t beside(const LatticeBody& body, const Points& points, const Debris&
   return -1;
 }
 
-/// Sets the nodes of a point turning, so that they have so much more angular momentum.
-void turn(const LatticeBody& body, const Points& points, const NodeFields& fields,
-          std::int32_t point, const Vec3& angular, Nodes& nodes) {
-  const NodesOf around(body, points, fields, std::array<std::int32_t, 1>{point});
-  const auto mass = [&](std::size_t i) -> double { return nodes.mass[around.node[i]]; };
-  std::vector<Vec3> x(around.node.size());
-  double total = 0;
-  Vec3 mean = Vec3::Zero();
-  for (std::size_t i = 0; i < x.size(); ++i) {
-    const int n = around.node[i];
-    x[i] = around.home[i] + Vec3(nodes.u[0][n], nodes.u[1][n], nodes.u[2][n]);
-    total += mass(i);
-    mean += mass(i) * x[i];
-  }
-  for (Vec3& place : x) place -= mean / total;
-  const Vec3 spin = inertia_of(x, mass).ldlt().solve(angular);
-  for (std::size_t i = 0; i < x.size(); ++i) {
-    const int n = around.node[i];
-    if (nodes.inv_mass[n] == 0) continue;  // what holds it takes its share
-    const Vec3 v = spin.cross(x[i]);
-    for (int a = 0; a < 3; ++a) nodes.v[a][n] += static_cast<float>(v[a]);
-  }
-}
-
-void make_rigid(const LatticeBody& body, const Points& points, const NodeFields& fields,
-                const Debris& of_debris, Nodes& nodes) {
+void make_rigid(LatticeTissue& tissue, const LatticeBody& body, const Debris& of_debris) {
+  const Points& points = tissue.points;
+  Nodes& nodes = tissue.nodes;
   const auto held = [&](std::int32_t p) { return points.anchored[p] != 0; };
   if (std::any_of(of_debris.begin(), of_debris.end(), held)) return;
-  const NodesOf bit(body, points, fields, of_debris);
+  const NodesOf bit(body, points, *tissue.fields, of_debris);
   const Material& material = body.material_of(points, of_debris.point[0]);
   const double fastest_spin =
       kDebrisSpin * std::sqrt(material.young_modulus / material.density) / body.cell_size;
@@ -184,7 +161,7 @@ void make_rigid(const LatticeBody& body, const Points& points, const NodeFields&
   if (spin.norm() > fastest_spin) {
     spin *= fastest_spin / spin.norm();
     const std::int32_t other = beside(body, points, of_debris);
-    if (other >= 0) turn(body, points, fields, other, angular - inertia * spin, nodes);
+    if (other >= 0) turn(tissue, other, angular - inertia * spin);
   }
   for (std::size_t i = 0; i < count; ++i) {
     const Vec3 u = x_mean + x[i] - bit.home[i], velocity = v_mean + spin.cross(x[i]);
@@ -196,6 +173,30 @@ void make_rigid(const LatticeBody& body, const Points& points, const NodeFields&
 }
 
 }  // namespace
+
+void turn(LatticeTissue& tissue, std::int32_t point, const Vec3& angular) {
+  Nodes& nodes = tissue.nodes;
+  const NodesOf around(tissue.bodies[tissue.points.site[point].body], tissue.points, *tissue.fields,
+                       std::array<std::int32_t, 1>{point});
+  const auto mass = [&](std::size_t i) -> double { return nodes.mass[around.node[i]]; };
+  std::vector<Vec3> x(around.node.size());
+  double total = 0;
+  Vec3 mean = Vec3::Zero();
+  for (std::size_t i = 0; i < x.size(); ++i) {
+    const int n = around.node[i];
+    x[i] = around.home[i] + Vec3(nodes.u[0][n], nodes.u[1][n], nodes.u[2][n]);
+    total += mass(i);
+    mean += mass(i) * x[i];
+  }
+  for (Vec3& place : x) place -= mean / total;
+  const Vec3 spin = inertia_of(x, mass).ldlt().solve(angular);
+  for (std::size_t i = 0; i < x.size(); ++i) {
+    const int n = around.node[i];
+    if (nodes.inv_mass[n] == 0) continue;  // what holds it takes its share
+    const Vec3 v = spin.cross(x[i]);
+    for (int a = 0; a < 3; ++a) nodes.v[a][n] += static_cast<float>(v[a]);
+  }
+}
 
 Softened soften(LatticeTissue& tissue, const std::vector<std::int32_t>& changed) {
   Softened softened;
@@ -220,8 +221,7 @@ Softened soften(LatticeTissue& tissue, const std::vector<std::int32_t>& changed)
 void settle_debris(LatticeTissue& tissue, const std::vector<std::int32_t>& debris) {
   for (const std::int32_t lowest : debris) {
     const LatticeBody& body = tissue.bodies[tissue.points.site[lowest].body];
-    make_rigid(body, tissue.points, *tissue.fields, Debris(body, tissue.points, lowest),
-               tissue.nodes);
+    make_rigid(tissue, body, Debris(body, tissue.points, lowest));
   }
 }
 
@@ -236,7 +236,7 @@ std::vector<std::int32_t> settle_wild_debris(LatticeTissue& tissue,
              kWildStiffening;
     });
     if (!wild) continue;
-    make_rigid(body, tissue.points, *tissue.fields, bit, tissue.nodes);
+    make_rigid(tissue, body, bit);
     settled.insert(settled.end(), bit.begin(), bit.end());
   }
   return settled;

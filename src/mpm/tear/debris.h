@@ -36,4 +36,7 @@ std::vector<std::int32_t> settle_wild_debris(LatticeTissue& tissue,
                                              const std::set<std::int32_t>& debris);
 inline constexpr double kDebrisSpin = 0.5;
 
+/// Sets the nodes of a point turning, so that they have so much more angular momentum [kg m^2/s].
+void turn(LatticeTissue& tissue, std::int32_t point, const Vec3& angular);
+
 }  // namespace tissue_sim

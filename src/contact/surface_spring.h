@@ -37,8 +37,12 @@ TISSUE_SIM_INLINE SurfaceSpring surface_spring(float modulus, float density, flo
                                                float area, float dt) {
   const float k = modulus * area / cell_size, along = kAlong * k;
   const float mass = 0.5f * cell_size * density * area;  // of a layer of points
-  return {kAcross * k, along, kDampingAcross * dt * kAcross * k,
-          2 * kDampingAlong * sqrtf(along * mass), 0, kUnbounded};
+  return {kAcross * k,
+          along,
+          kDampingAcross * dt * kAcross * k,
+          2 * kDampingAlong * sqrtf(along * mass),
+          0,
+          kUnbounded};
 }
 
 /// How often the spring along the surface may be doubled where substeps of dt are shorter than
@@ -64,8 +68,8 @@ TISSUE_SIM_INLINE void stiffen_along(SurfaceSpring& s, int doubled) {
 
 /// Of a place that stands for so much more.
 TISSUE_SIM_INLINE SurfaceSpring scaled(const SurfaceSpring& s, float by) {
-  return {by * s.across, by * s.along, by * s.damping_across, by * s.damping_along,
-          by * s.cohesion, by * s.most};
+  return {by * s.across,        by * s.along,    by * s.damping_across,
+          by * s.damping_along, by * s.cohesion, by * s.most};
 }
 
 /// Force on the place at x with velocity v, in contact (`g.distance` < 0). `hold` is the place, in

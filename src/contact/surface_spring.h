@@ -14,6 +14,7 @@ struct SurfaceSpring {
   float across, along;                  ///< [N/m]
   float damping_across, damping_along;  ///< [N s/m]
   float cohesion;                       ///< what it holds beside friction [N]
+  float most;                           ///< that it pushes with [N]
 };
 
 /// In units of the P-wave modulus over the cell size, for a unit of area. The stiff spring alone
@@ -25,6 +26,11 @@ inline constexpr float kDampingAlong = 0.1f;   ///< share of critical
 /// that the spring would hide a third of the radius, and more than what it presses is still thick.
 inline constexpr float kThinTip = 4 / 3.0f;
 inline constexpr float kAcrossThin = 6;  ///< times the cells in its radius to the power of -2
+inline constexpr float kUnbounded = 1e30f;
+/// What a jaw presses with at most on a place, in units of Young's modulus: tissue between two that
+/// close further would be squeezed to a ninth, and ask for a hundredth of its substeps. What
+/// presses back more lies in the jaw.
+inline constexpr float kMostOfJaws = 1;
 /// What stays in a substep of how deep contact began: a bounce of debris takes three substeps, one
 /// of a whole block some twenty.
 inline constexpr float kBegunStays = 1 - 1 / 128.0f;
@@ -35,8 +41,12 @@ TISSUE_SIM_INLINE SurfaceSpring surface_spring(float modulus, float density, flo
                                                float area, float dt) {
   const float k = modulus * area / cell_size, along = kAlong * k;
   const float mass = 0.5f * cell_size * density * area;  // of a layer of points
-  return {kAcross * k, along, kDampingAcross * dt * kAcross * k,
-          2 * kDampingAlong * sqrtf(along * mass), 0};
+  return {kAcross * k,
+          along,
+          kDampingAcross * dt * kAcross * k,
+          2 * kDampingAlong * sqrtf(along * mass),
+          0,
+          kUnbounded};
 }
 
 /// How often the spring along the surface may be doubled where substeps of dt are shorter than
@@ -75,8 +85,8 @@ TISSUE_SIM_INLINE void stiffen_across(SurfaceSpring& s, float by) {
 
 /// Of a place that stands for so much more.
 TISSUE_SIM_INLINE SurfaceSpring scaled(const SurfaceSpring& s, float by) {
-  return {by * s.across, by * s.along, by * s.damping_across, by * s.damping_along,
-          by * s.cohesion};
+  return {by * s.across,        by * s.along,    by * s.damping_across,
+          by * s.damping_along, by * s.cohesion, by * s.most};
 }
 
 /// Force on the place at x with velocity v, in contact (`g.distance` < 0). `hold` is the place, in
@@ -97,8 +107,8 @@ TISSUE_SIM_INLINE void surface_force(const Collider& c, const Gap& g, const Surf
     vn += rel[i] * g.normal[i];
     sn += (x[i] - held[i]) * g.normal[i];
   }
-  const float push =
-      fmaxf(0.0f, spring.across * (-g.distance - begun) - spring.damping_across * vn);
+  const float push = fminf(
+      fmaxf(0.0f, spring.across * (-g.distance - begun) - spring.damping_across * vn), spring.most);
   float t[3], t2 = 0;
   for (int i = 0; i < 3; ++i) {
     t[i] = -spring.along * (x[i] - held[i] - sn * g.normal[i]) -

@@ -3,6 +3,7 @@
 #include <tbb/global_control.h>
 
 #include <cmath>
+#include <utility>
 #include <vector>
 
 #include "cut_scenes.h"
@@ -108,7 +109,7 @@ std::vector<Pose> tool_poses(int frame) {
   const Quat down = Quat(Eigen::AngleAxisd(M_PI, Vec3::UnitX()));
   const double t = frame / 24.0;
   return {{Vec3(0.002 + 0.01 * t, 0.03 - 0.08 * t, -0.001), down},
-          {Vec3(0.03, -0.003, 0.04 - 0.02 * t), down}};
+          {Vec3(0.03, -0.003, 0.03 - 0.02 * t), down}};
 }
 
 Operated operate(const Scene& scene) {
@@ -128,13 +129,13 @@ Operated operate(const Scene& scene) {
   return r;
 }
 
-/// The same in 20 frames of 40 substeps, however much the tissue bears: a rounding error may change
-/// that.
-Operated operate_in_step(const Scene& scene) {
+/// The same in so many frames of 40 substeps, however much the tissue bears: a rounding error may
+/// change that.
+Operated operate_in_step(const Scene& scene, int frames) {
   MpmTissue tissue(scene);
   Operated r;
   std::vector<ToolMotion> tools(2);
-  for (int i = 0; i < 20; ++i) {
+  for (int i = 0; i < frames; ++i) {
     const std::vector<Pose> poses = tool_poses(i);
     for (int tool = 0; tool < 2; ++tool) {
       tools[tool].begin = i == 0 ? poses[tool] : tools[tool].end;
@@ -163,21 +164,26 @@ TEST(Inclusions, OneThatFillsItsBodyIsAsTheBodyOfItsMaterial) {
 }
 
 TEST(Inclusions, OfAMaterialLikeTheBodysChangeNothingButBits) {
-  Scene mixed = operation("own");
-  mixed.materials[0].tear_stretch = mixed.materials[1].tear_stretch = 0;
-  Scene plain = mixed;
-  mixed.bodies[0].inclusions = {ball("twin", Vec3(0, 0, 0.02), 0.014),
-                                ball("twin", Vec3(0.035, 0, 0.034), 0.01)};
-  // Not all the way: through cuts and contact rounding grows, on each processor in its own way.
-  const Operated a = operate_in_step(plain), b = operate_in_step(mixed);
-  EXPECT_GT(a.cut, 10);
-  EXPECT_EQ(a.cut, b.cut);
-  EXPECT_GT(a.push, 5e-4);
-  EXPECT_NEAR(b.energy, a.energy, 1e-3 * a.energy);
-  EXPECT_NEAR(b.push, a.push, 1e-3 * a.push);
-  ASSERT_EQ(a.centroids.size(), b.centroids.size());
-  for (std::size_t i = 0; i < a.centroids.size(); ++i) {
-    EXPECT_LT((a.centroids[i] - b.centroids[i]).norm(), 1e-6);
+  // Not all the way: through cuts and contact rounding grows, on each processor in its own way, and
+  // a hundred times as fast with a cut's front, whose light sides swing freely.
+  for (const auto& [boundary, frames] :
+       {std::pair{MpmBoundary::kLattice, 20}, std::pair{MpmBoundary::kSurface, 10}}) {
+    Scene mixed = operation("own");
+    mixed.mpm.boundary = boundary;
+    mixed.materials[0].tear_stretch = mixed.materials[1].tear_stretch = 0;
+    Scene plain = mixed;
+    mixed.bodies[0].inclusions = {ball("twin", Vec3(0, 0, 0.02), 0.014),
+                                  ball("twin", Vec3(0.035, 0, 0.034), 0.01)};
+    const Operated a = operate_in_step(plain, frames), b = operate_in_step(mixed, frames);
+    EXPECT_GT(a.cut, 10);
+    EXPECT_EQ(a.cut, b.cut);
+    EXPECT_GT(a.push, 5e-4);
+    EXPECT_NEAR(b.energy, a.energy, 1e-3 * a.energy);
+    EXPECT_NEAR(b.push, a.push, 1e-3 * a.push);
+    ASSERT_EQ(a.centroids.size(), b.centroids.size());
+    for (std::size_t i = 0; i < a.centroids.size(); ++i) {
+      EXPECT_LT((a.centroids[i] - b.centroids[i]).norm(), 1e-6);
+    }
   }
 }
 

@@ -33,7 +33,8 @@ class UnforeseenContactOf : public OnEitherDevice<T> {
     scene_.tools[0].radius = kRadius;
     tools_.resize(1);
     tools_[0].present = true;
-    tools_[0].begin.position = Vec3(kLong - kPressed * (kLong - kHeld) + kGap + kRadius, kWide / 2, -0.01);
+    tools_[0].begin.position =
+        Vec3(kLong - kPressed * (kLong - kHeld) + kGap + kRadius, kWide / 2, -0.01);
     tools_[0].begin.orientation = Quat::FromTwoVectors(Vec3::UnitZ(), Vec3(0, 0, -1));
     tools_[0].end = tools_[0].begin;
   }

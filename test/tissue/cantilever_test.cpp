@@ -28,8 +28,8 @@ class Cantilever : public EachMethod {
       const double frame = 1 / (4 * bending_frequency(beam, Ends::kClampedFree));
       scene.pbd.steps = static_cast<int>(std::ceil(frame * speed / (0.4 * scene.cell_size)));
     }
-    const bool at_face = GetParam().method == Method::kMpm && GetParam().device == Device::kCpu &&
-                         scene.mpm.boundary == MpmBoundary::kSurface;
+    const bool at_face =
+        GetParam().method == Method::kMpm && scene.mpm.boundary == MpmBoundary::kSurface;
     return bend(scene, beam, at_face ? 0 : within().clamp * beam.height / cells);
   }
 };

@@ -343,6 +343,14 @@ bool push_points(BlockPush& b, const NearCell& cell, unsigned points, const Coll
     float push[3];
     contact_force(collider, g, {unit.stiffness * volume, unit.damping * volume}, at, velocity,
                   touch.hold, push);
+    if (collider.kind == Collider::kJaw && !b.state.points.outer.empty()) {
+      const Material& m = b.body.material_of(b.state.points, p);
+      const float most = kMostOfJaws * static_cast<float>(m.young_modulus) * 4 * quarter * quarter;
+      const float scale = most / std::sqrt(dot(push, push));
+      if (scale < 1) {
+        for (float& f : push) f *= scale;
+      }
+    }
     b.touching.push_back(touch);
     if (moves > 0) pushes[s] = Vec<4>{push[0], push[1], push[2], 0.0f};
     add_load(collider, at, push, 1, load);
@@ -469,6 +477,9 @@ bool push_surface(BlockPush& b, const NearCell& cell, const Collider& collider, 
       modulus = static_cast<float>(lame_lambda(m) + 2 * lame_mu(m));
       density = static_cast<float>(m.density);
       of_unit_area = surface_spring(modulus, density, h, 1, b.dt);
+      if (collider.kind == Collider::kJaw) {
+        of_unit_area.most = kMostOfJaws * static_cast<float>(m.young_modulus);
+      }
     }
     const int doubled = doubled_along(modulus, density, h, b.dt, touch.doubled);
     if (is_held && doubled > touch.doubled) {  // with the force that it has

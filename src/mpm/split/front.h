@@ -64,11 +64,11 @@ void pass_rim(MpmState& state, const BladePath& path, const Array<float>* u_begi
               const Array<float>* u_end, const std::vector<std::int32_t>& broken,
               std::vector<std::int32_t>& touched);
 
-/// Works out the masses of a node's two sides, from `all` and `first_side`. Returns whether both are
-/// heavy enough to part it.
+/// Works out the masses of a node's two sides, from `all` and `first_side`. Returns whether both
+/// are heavy enough to part it.
 bool weigh_sides(const MpmState& state, FrontNode& node);
-/// After nodes were split: new fields take over the motion of the side that they were; those of both
-/// sides, where another cut came across, are parted as the node was.
+/// After nodes were split: new fields take over the motion of the side that they were; those of
+/// both sides, where another cut came across, are parted as the node was.
 void split_front(MpmState& state);
 /// Parts nodes around the points `touched`, of whose bonds more was passed.
 void follow_front(MpmState& state, const std::vector<std::int32_t>& touched);

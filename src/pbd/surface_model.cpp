@@ -226,6 +226,7 @@ int add_internal_links(State& s, int b, const std::vector<int>& starts) {
     if (piece != pieces.end()) piece->second.first.triangles.push_back(t);
   }
   const bool late = !s.cut_edges.empty();
+  const double least = 0.1 * s.mean_edge;
   std::vector<InternalLink> found;
   for (auto& [root, piece] : pieces) {
     auto& [mesh, own] = piece;
@@ -233,7 +234,7 @@ int add_internal_links(State& s, int b, const std::vector<int>& starts) {
     const std::vector<Vec3> normals = vertex_normals(mesh);
     const std::map<int, Vec3> sides = own_sides(s, mesh, normals);
     for (const InternalLink& link :
-         find_internal_links(mesh, own, away_from_wounds(sides, normals, own))) {
+         find_internal_links(mesh, own, away_from_wounds(sides, normals, own), late ? least : 0)) {
       if (!stays_on_its_side(mesh, sides, link)) continue;
       found.push_back(link);
     }
@@ -248,7 +249,6 @@ int add_internal_links(State& s, int b, const std::vector<int>& starts) {
   }
   std::map<std::pair<std::int32_t, std::int32_t>, InternalPair> pairs;
   for (const InternalPair& p : s.internal) pairs[{p.a, p.b}] = p;
-  const double least = 0.1 * s.mean_edge;
   for (const InternalLink& link : found) {
     s.half_depth[link.from] = 0.5 * link.length;
     if (link.through_gap || edges.count(pair_key(link.from, link.to)) != 0) continue;

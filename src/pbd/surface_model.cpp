@@ -96,6 +96,11 @@ void add_link(State& s, std::int32_t a, std::int32_t b, double stiffness) {
   s.links.add({a, b}, {static_cast<float>(length), static_cast<float>(1 / stiffness)});
 }
 
+/// Two triangles that lie on one another, as where a wound's wall ran along the skin, are a flake
+/// without thickness: nothing there resists bending, and which way round they lie, a sign, would
+/// turn by rounding [rad].
+constexpr float kFolded = 3.0f;
+
 void add_bend(State& s, const MeshEdge& e, double stiffness) {
   if (!(stiffness > 0)) return;
   const std::array<std::int32_t, 4> at = {e.left, e.right, e.a, e.b};
@@ -105,7 +110,9 @@ void add_bend(State& s, const MeshEdge& e, double stiffness) {
     const Vec3 x = s.vertices.reference[at[i]] - origin;
     v[i] = {static_cast<float>(x.x()), static_cast<float>(x.y()), static_cast<float>(x.z()), 1};
   }
-  s.bends.add(at, {Bending::parts(v).angle, static_cast<float>(1 / stiffness)});
+  const float angle = Bending::parts(v).angle;
+  if (std::fabs(angle) > kFolded) return;
+  s.bends.add(at, {angle, static_cast<float>(1 / stiffness)});
 }
 
 /// Of each vertex beside a wound: the blade's normal there, or the way along the surface where that

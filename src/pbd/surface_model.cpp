@@ -96,9 +96,9 @@ void add_link(State& s, std::int32_t a, std::int32_t b, double stiffness) {
   s.links.add({a, b}, {static_cast<float>(length), static_cast<float>(1 / stiffness)});
 }
 
-/// Two triangles that lie on one another, as where a wound's wall ran along the skin, are a flake
-/// without thickness: nothing there resists bending, and which way round they lie, a sign, would
-/// turn by rounding [rad].
+/// Two triangles at a wound that lie on one another, as where its wall ran along the skin, are a
+/// flake without thickness: nothing there resists bending, and which way round they lie, a sign,
+/// would turn by rounding [rad]. What a mesh came with stays.
 constexpr float kFolded = 3.0f;
 
 void add_bend(State& s, const MeshEdge& e, double stiffness) {
@@ -111,7 +111,7 @@ void add_bend(State& s, const MeshEdge& e, double stiffness) {
     v[i] = {static_cast<float>(x.x()), static_cast<float>(x.y()), static_cast<float>(x.z()), 1};
   }
   const float angle = Bending::parts(v).angle;
-  if (std::fabs(angle) > kFolded) return;
+  if (std::fabs(angle) > kFolded && (s.stroke[e.a] >= 0 || s.stroke[e.b] >= 0)) return;
   s.bends.add(at, {angle, static_cast<float>(1 / stiffness)});
 }
 

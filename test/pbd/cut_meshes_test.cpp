@@ -281,6 +281,7 @@ TEST(SoundCuts, AFlakeWithoutThicknessDoesNotResistBending) {
                      d = pbd::add_vertex(*state, Vec3(0.1, 0, 0.003), 0);
   state->triangles.push_back({a, b, c});
   state->triangles.push_back({a, c, b});
+  for (const std::int32_t v : {a, b, c, d}) state->stroke[v] = 0;  // on a wound
   pbd::make_surface_constraints(*state);
   EXPECT_EQ(state->bends.size(), bends);
   state->triangles.back() = {b, a, d};  // at right angles

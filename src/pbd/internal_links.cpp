@@ -71,7 +71,7 @@ class Neighbours {
 
 std::vector<InternalLink> find_internal_links(const TriangleMesh& mesh,
                                               const std::vector<int>& starts,
-                                              const std::vector<Vec3>& lean) {
+                                              const std::vector<Vec3>& lean, double least_depth) {
   const std::vector<Vec3> normals = vertex_normals(mesh);
   const RayTree tree(mesh);
   std::vector<InternalLink> links;
@@ -83,7 +83,7 @@ std::vector<InternalLink> find_internal_links(const TriangleMesh& mesh,
     const int v = starts[i];
     if (normals[v].isZero()) continue;
     const Vec3 way = lean.empty() ? Vec3(-normals[v]) : Vec3((lean[i] - normals[v]).normalized());
-    const RayHit hit = tree.first_exit(mesh.vertices[v], way, v, 0);
+    const RayHit hit = tree.first_exit(mesh.vertices[v], way, v, least_depth);
     if (hit.triangle < 0) continue;
     const Vec3 place = mesh.vertices[v] + hit.along * way;
     int nearest = -1;

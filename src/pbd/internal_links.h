@@ -24,9 +24,12 @@ std::vector<Vec3> vertex_normals(const TriangleMesh& mesh);
 /// hole, have none. In the order of `starts`; a pair that
 /// two rays find is in it twice (remove_duplicates does what the algorithm's last lines do).
 /// `lean`, if any, is added to the direction of each start's ray: away from a wound beside it.
+/// What it meets within `least_depth` [m] is no end: the other wall of a wound lies on the one that
+/// the ray begins at.
 std::vector<InternalLink> find_internal_links(const TriangleMesh& mesh,
                                               const std::vector<int>& starts,
-                                              const std::vector<Vec3>& lean = {});
+                                              const std::vector<Vec3>& lean = {},
+                                              double least_depth = 0);
 
 }  // namespace pbd
 }  // namespace tissue_sim

@@ -96,6 +96,11 @@ void add_link(State& s, std::int32_t a, std::int32_t b, double stiffness) {
   s.links.add({a, b}, {static_cast<float>(length), static_cast<float>(1 / stiffness)});
 }
 
+/// Two triangles at a wound that lie on one another, as where its wall ran along the skin, are a
+/// flake without thickness: nothing there resists bending, and which way round they lie, a sign,
+/// would turn by rounding [rad]. What a mesh came with stays.
+constexpr float kFolded = 3.0f;
+
 void add_bend(State& s, const MeshEdge& e, double stiffness) {
   if (!(stiffness > 0)) return;
   const std::array<std::int32_t, 4> at = {e.left, e.right, e.a, e.b};
@@ -105,7 +110,9 @@ void add_bend(State& s, const MeshEdge& e, double stiffness) {
     const Vec3 x = s.vertices.reference[at[i]] - origin;
     v[i] = {static_cast<float>(x.x()), static_cast<float>(x.y()), static_cast<float>(x.z()), 1};
   }
-  s.bends.add(at, {Bending::parts(v).angle, static_cast<float>(1 / stiffness)});
+  const float angle = Bending::parts(v).angle;
+  if (std::fabs(angle) > kFolded && (s.stroke[e.a] >= 0 || s.stroke[e.b] >= 0)) return;
+  s.bends.add(at, {angle, static_cast<float>(1 / stiffness)});
 }
 
 /// Of each vertex beside a wound: the blade's normal there, or the way along the surface where that
@@ -226,6 +233,7 @@ int add_internal_links(State& s, int b, const std::vector<int>& starts) {
     if (piece != pieces.end()) piece->second.first.triangles.push_back(t);
   }
   const bool late = !s.cut_edges.empty();
+  const double least = 0.1 * s.mean_edge;
   std::vector<InternalLink> found;
   for (auto& [root, piece] : pieces) {
     auto& [mesh, own] = piece;
@@ -233,7 +241,7 @@ int add_internal_links(State& s, int b, const std::vector<int>& starts) {
     const std::vector<Vec3> normals = vertex_normals(mesh);
     const std::map<int, Vec3> sides = own_sides(s, mesh, normals);
     for (const InternalLink& link :
-         find_internal_links(mesh, own, away_from_wounds(sides, normals, own))) {
+         find_internal_links(mesh, own, away_from_wounds(sides, normals, own), late ? least : 0)) {
       if (!stays_on_its_side(mesh, sides, link)) continue;
       found.push_back(link);
     }
@@ -248,7 +256,6 @@ int add_internal_links(State& s, int b, const std::vector<int>& starts) {
   }
   std::map<std::pair<std::int32_t, std::int32_t>, InternalPair> pairs;
   for (const InternalPair& p : s.internal) pairs[{p.a, p.b}] = p;
-  const double least = 0.1 * s.mean_edge;
   for (const InternalLink& link : found) {
     s.half_depth[link.from] = 0.5 * link.length;
     if (link.through_gap || edges.count(pair_key(link.from, link.to)) != 0) continue;

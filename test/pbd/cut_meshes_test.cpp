@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "pbd/model.h"
 #include "pbd/pbd_pieces.h"
 #include "pbd/pbd_tissue.h"
 #include "tissue_sim/simulation.h"
@@ -267,6 +268,25 @@ TEST(SoundCuts, AnInstrumentsStrokesLeaveNoSlivers) {
     EXPECT_NEAR(whole_volume(tissue) / volume, 1, 0.01) << "stroke " << k;
   }
   EXPECT_GE(tissue.fragments().size(), 2u);  // the second stroke runs along the first one's wall
+}
+
+// Two triangles that lie on one another have nothing between them that resists bending: such
+// flakes, whose angle changes its sign by rounding, moved at 1 m/s beside strokes.
+TEST(SoundCuts, AFlakeWithoutThicknessDoesNotResistBending) {
+  const auto state = pbd::make_state(lobe(PbdModel::kSurface), nullptr);
+  const int bends = state->bends.size();
+  const std::int32_t a = pbd::add_vertex(*state, Vec3(0.1, 0, 0), 0),
+                     b = pbd::add_vertex(*state, Vec3(0.103, 0, 0), 0),
+                     c = pbd::add_vertex(*state, Vec3(0.1, 0.003, 0), 0),
+                     d = pbd::add_vertex(*state, Vec3(0.1, 0, 0.003), 0);
+  state->triangles.push_back({a, b, c});
+  state->triangles.push_back({a, c, b});
+  for (const std::int32_t v : {a, b, c, d}) state->stroke[v] = 0;  // on a wound
+  pbd::make_surface_constraints(*state);
+  EXPECT_EQ(state->bends.size(), bends);
+  state->triangles.back() = {b, a, d};  // at right angles
+  pbd::make_surface_constraints(*state);
+  EXPECT_EQ(state->bends.size(), bends + 1);
 }
 
 // Both sides of a wound get the same wall. Where a triangle lay across the rim of one of them,

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <fstream>
 #include <map>
+#include <numeric>
 #include <random>
 
 #include "geometry/ray_tree.h"
@@ -169,6 +170,32 @@ TEST(InternalLinks, OfASlabLeadStraightAcross) {
     EXPECT_NEAR(link.length, 0.01, 1e-9);
     const Vec3 way = mesh.vertices[link.to] - mesh.vertices[link.from];
     EXPECT_LT(std::hypot(way.x(), way.y()), 1e-9);
+  }
+}
+
+// A wound within one piece has two walls that lie on one another: a ray from the one does not end
+// at the other, but where the body does.
+TEST(InternalLinks, OfAWallLeadPastTheOtherWall) {
+  Body body;
+  body.size = Vec3(0.04, 0.04, 0.01);
+  TriangleMesh mesh = triangulate(body, 0.005);
+  const int first = static_cast<int>(mesh.vertices.size());
+  const double height = 0.001;
+  for (int side = 0; side < 2; ++side) {  // above the wound and below it
+    const double jitter = 1e-12 * side;   // as rounding leaves them
+    mesh.vertices.push_back(Vec3(-0.007, -0.007, height + jitter));
+    mesh.vertices.push_back(Vec3(0.007, -0.007, height - jitter));
+    mesh.vertices.push_back(Vec3(0, 0.007, height + jitter));
+  }
+  mesh.triangles.push_back({first, first + 2, first + 1});      // body above: looks down
+  mesh.triangles.push_back({first + 3, first + 4, first + 5});  // body below: looks up
+  std::vector<int> walls(6);
+  std::iota(walls.begin(), walls.end(), first);
+  const auto links = pbd::find_internal_links(mesh, walls, {}, 0.0005);
+  ASSERT_EQ(links.size(), walls.size());
+  for (const auto& link : links) {
+    EXPECT_NEAR(link.length, link.from < first + 3 ? 0.005 - height : 0.005 + height, 1e-9);
+    EXPECT_LT(link.to, first);
   }
 }
 

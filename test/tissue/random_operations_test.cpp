@@ -1,6 +1,7 @@
 // Random scenes under clumsy instruments, which wander about at up to half a metre a second, crush,
 // cut, grasp and drag what they meet, and whose poses come late. Tissue may be hurt, but must not
-// blow up. The three seeds here once did; TISSUE_SIM_OPERATIONS=<first seed>:<count> runs others.
+// blow up, nor move as neither weight nor instruments explain. The seeds here once did;
+// TISSUE_SIM_OPERATIONS=<first seed>:<count> runs others.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -11,12 +12,17 @@
 #include <random>
 #include <vector>
 
+#include "pbd/pbd_tissue.h"
 #include "tissue/each_method.h"
 
 namespace tissue_sim {
 namespace {
 
 constexpr int kFrames = 120, kCalm = 60;  // under instruments; after they went away
+
+/// What position-based tissue may move at beyond free fall [m/s]: what an instrument has torn along
+/// snaps back at a share of sqrt(E / rho), 7.7 m/s here at most. 2.3 m/s seen in seeds 1 to 100.
+constexpr double kLively = 5;
 
 class Random {
  public:
@@ -177,6 +183,20 @@ BladePath random_cut(Random& random, const Vec3& middle) {
   return path;
 }
 
+/// The largest speed of a vertex, less what it may have fallen to without a ground after `seconds`
+/// [m/s].
+double speed_beyond_fall(Simulation& simulation, const Scene& scene, double seconds) {
+  const pbd::Vertices& all = dynamic_cast<PbdTissue&>(simulation.tissue()).state().vertices;
+  const double fall = scene.ground.enabled ? 0 : scene.gravity.norm() * seconds;
+  double most = 0;
+  for (int i = 0; i < all.size(); ++i) {
+    Vec3 v = all.velocity(i);
+    if (v.z() < 0) v.z() = std::min(0.0, v.z() + fall);
+    most = std::max(most, v.norm());
+  }
+  return most;
+}
+
 /// Runs the operation of a seed. Returns the frame in which it blew up, -1 if it did not.
 int run_operation(int seed, const MethodOnDevice& on) {
   Random random(seed);
@@ -196,6 +216,7 @@ int run_operation(int seed, const MethodOnDevice& on) {
   }
   int most = 0;
   long substeps = 0;
+  double liveliest = 0;
   for (int f = 0; f < kFrames + kCalm; ++f) {
     for (std::size_t t = 0; t < tools.size(); ++t) {
       Wanderer& tool = tools[t];
@@ -214,10 +235,19 @@ int run_operation(int seed, const MethodOnDevice& on) {
     most = std::max(most, r.substeps);
     substeps += r.substeps;
     if (r.blew_up) return f;
+    if (on.method != Method::kPbd) continue;
+    const double speed = speed_beyond_fall(simulation, scene, (f + 1) / scene.frame_rate);
+    liveliest = std::max(liveliest, speed);
+    if (!(speed < kLively)) {
+      ADD_FAILURE() << "seed " << seed << " moves at " << speed << " m/s in frame " << f;
+      return -1;
+    }
   }
-  std::printf("seed %d: %d points, %zu pieces, %ld substeps a frame, %d at most\n", seed,
+  std::printf("seed %d: %d points, %zu pieces, %ld substeps a frame, %d at most", seed,
               simulation.tissue().point_count(), simulation.tissue().fragments().size(),
               substeps / (kFrames + kCalm), most);
+  if (on.method == Method::kPbd) std::printf(", %.2f m/s beyond free fall", liveliest);
+  std::printf("\n");
   std::fflush(stdout);
   return -1;
 }
@@ -228,6 +258,7 @@ FOR_EACH_METHOD(RandomOperations);
 TEST_P(RandomOperations, DoNotBlowUp) {
   std::vector<int> seeds = {13, 14, 103};
   if (GetParam().method != Method::kMpm) seeds.insert(seeds.end(), {1, 2});
+  if (GetParam().method == Method::kPbd) seeds.insert(seeds.end(), {37, 61});
   if (const char* asked = std::getenv("TISSUE_SIM_OPERATIONS")) {
     int first, count;
     ASSERT_EQ(std::sscanf(asked, "%d:%d", &first, &count), 2) << "<first seed>:<count>";

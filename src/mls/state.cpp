@@ -158,7 +158,8 @@ std::unique_ptr<MlsState> make_mls_state(const Scene& scene, std::vector<std::st
   hold_at_faces(scene, support_factor(scene.mls.neighbours), s.nodes, s.pairs);
   s.nodes.strained_volume = s.nodes.free_volume;
   const Array<float> kernel = s.pairs.whole;
-  if (scene.mls.basis == MlsBasis::kBalanced) balance(s.nodes, *s.cpu, s.pairs);
+  const bool lattice = scene.mls.placement != MlsPlacement::kGraded;
+  if (scene.mls.basis == MlsBasis::kBalanced) balance(s.nodes, lattice, *s.cpu, s.pairs);
   const int n = s.count();
   for (Array<float>* a : {&s.place, &s.u, &s.v, &s.u_next, &s.v_next, &s.face})
     resize_padded(*a, n, 4);
@@ -210,7 +211,7 @@ std::unique_ptr<MlsState> make_mls_state(const Scene& scene, std::vector<std::st
   for (int round = 0; round < kRoundsOfBounds && bound_own_rates(s); ++round) {
     if (scene.mls.basis == MlsBasis::kBalanced) {
       s.pairs.whole = kernel;
-      balance(s.nodes, *s.cpu, s.pairs);
+      balance(s.nodes, lattice, *s.cpu, s.pairs);
       put_weights(s.pairs, s.lanes);
     }
     for (std::int32_t i = 0; i < n; ++i) s.whole_kappa[i] = whole_kappa(s, i);

@@ -5,6 +5,7 @@
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "compute/simd.h"
 #include "mls/pairs.h"
@@ -41,17 +42,19 @@ inline Matrix between(float scale, const Matrix& a, const Matrix& m) {
   return result;
 }
 
-constexpr int kSteps = 12;           // of Newton's method, at most
-constexpr int kIterations = 60;      // of conjugate gradients, at most
-constexpr float kEnough = 1e-5f;     // out of balance, relative
-constexpr float kReduction = 0.05f;  // of the residual by conjugate gradients
-constexpr float kLargestStep = 1;    // of the logarithm of a weight
+constexpr int kSteps = 12;            // of Newton's method, at most
+constexpr int kIterations = 60;       // of conjugate gradients, at most
+constexpr float kEnough = 1e-5f;      // out of balance, relative
+constexpr float kReduction = 0.05f;   // of the residual by conjugate gradients
+constexpr float kLargestStep = 1;     // of the logarithm of a weight
+constexpr float kMostChange = 32;     // of a weight, up or down from the kernel's
+constexpr double kMostOutside = 0.5;  // share of a node's volume beyond it
 constexpr int kGrain = 256;
 
 /// In units of the mean support, so that single precision does.
 class Balance {
  public:
-  Balance(const MlsNodes& nodes, Cpu& cpu, MlsPairs& pairs)
+  Balance(const MlsNodes& nodes, bool lattice, Cpu& cpu, MlsPairs& pairs)
       : cpu_(cpu), pairs_(pairs), n_(nodes.count()), weight_(pairs.whole), r_(weight_.size()) {
     double support = 0, volume = 0;
     for (std::int32_t i = 0; i < n_; ++i) {
@@ -61,6 +64,11 @@ class Balance {
     for (std::int32_t i = 0; i < n_; ++i) {
       volume_.push_back(static_cast<float>(nodes.strained_volume[i] / volume));
       free_.push_back(nodes.surface[i] == 0 && nodes.anchored[i] == 0 ? 1.0f : 0.0f);
+      const Vec3& n = nodes.normal[i];
+      const double outside = nodes.depth[i] / std::cbrt(static_cast<double>(nodes.volume[i]));
+      outward_.push_back(Vector{float(n[0]), float(n[1]), float(n[2]), 0});
+      outside_.push_back(
+          lattice && !n.isZero() ? static_cast<float>(std::min(outside, kMostOutside)) : 0.0f);
       for (std::int32_t e = pairs.begin[i]; e < pairs.begin[i + 1]; ++e) {
         const Vec3 r = (nodes.place[pairs.other[e]] - nodes.place[i]) / support;
         r_[e] = Vector{float(r[0]), float(r[1]), float(r[2]), 0};
@@ -70,15 +78,19 @@ class Balance {
     step_.resize(r_.size());
     normal_.resize(n_);
     inverse_.resize(n_);
+    across_.resize(n_);
     change_.resize(n_);
   }
 
   double run() {
-    float left = prepare();
-    for (int step = 0; step < kSteps && left > kEnough; ++step) {
+    float left = prepare(), before = INFINITY, last = INFINITY;
+    for (int step = 0; step < kSteps && left > kEnough && left < 0.5f * before; ++step) {
+      before = std::exchange(last, left);
       times_transpose(solve());
       for_each_entry([&](std::int32_t, std::int32_t e) {
+        const float kernel = pairs_.whole[e];
         weight_[e] *= std::exp(std::min(kLargestStep, std::max(-kLargestStep, step_[e])));
+        weight_[e] = std::min(kMostChange * kernel, std::max(kernel / kMostChange, weight_[e]));
       });
       left = prepare();
     }
@@ -115,8 +127,17 @@ class Balance {
       for (int k = 0; k < 3; ++k) {
         inverse_[i].column[k] =
             Vector{float(inverse(0, k)), float(inverse(1, k)), float(inverse(2, k)), 0};
-        normal_[i].column[k] = volume_[i] * inverse_[i].column[k];
       }
+      if (outside_[i] > 0) {
+        const Vector across = times(inverse_[i], outward_[i]);
+        const float square = dot(outward_[i], across);
+        across_[i] = {};
+        if (square > 0) add_product(across_[i], across * (1 / square), across);
+        for (int k = 0; k < 3; ++k) {
+          inverse_[i].column[k] -= outside_[i] * across_[i].column[k];
+        }
+      }
+      for (int k = 0; k < 3; ++k) normal_[i].column[k] = volume_[i] * inverse_[i].column[k];
     });
     for_each_entry([&](std::int32_t i, std::int32_t e) {
       g_[e] = sum_times(normal_[i], normal_[pairs_.other[e]], r_[e]);
@@ -140,6 +161,17 @@ class Balance {
     return n_ == 0 ? 0 : *std::max_element(relative.begin(), relative.end());
   }
 
+  /// What N falls by where the moment grows by `moment`.
+  Matrix change_of(std::int32_t i, const Matrix& moment) const {
+    Matrix change = between(volume_[i], inverse_[i], moment);
+    const float f = outside_[i];
+    if (f > 0) {
+      const Matrix more = between(volume_[i] * f * (1 - f), across_[i], moment);
+      for (int k = 0; k < 3; ++k) change.column[k] += more.column[k];
+    }
+    return change;
+  }
+
   /// step_ = J^T lambda, of each weight's logarithm.
   void times_transpose(const Vectors& lambda) {
     for_each_node([&](int i) {
@@ -147,7 +179,7 @@ class Balance {
       for (std::int32_t e = pairs_.begin[i]; e < pairs_.begin[i + 1]; ++e) {
         add_product(y, weight_[e] * (lambda[i] - lambda[pairs_.other[e]]), r_[e]);
       }
-      change_[i] = between(volume_[i], inverse_[i], y);
+      change_[i] = change_of(i, y);
     });
     for_each_entry([&](std::int32_t i, std::int32_t e) {
       const std::int32_t j = pairs_.other[e];
@@ -163,14 +195,14 @@ class Balance {
       for (std::int32_t e = pairs_.begin[i]; e < pairs_.begin[i + 1]; ++e) {
         add_product(moment, weight_[e] * step_[e] * r_[e], r_[e]);
       }
-      change_[i] = between(-volume_[i], inverse_[i], moment);
+      change_[i] = change_of(i, moment);
     });
     for_each_node([&](int i) {
       Vector sum{};
       if (free_[i] != 0) {
         for (std::int32_t e = pairs_.begin[i]; e < pairs_.begin[i + 1]; ++e) {
           sum += weight_[e] *
-                 (step_[e] * g_[e] + sum_times(change_[i], change_[pairs_.other[e]], r_[e]));
+                 (step_[e] * g_[e] - sum_times(change_[i], change_[pairs_.other[e]], r_[e]));
         }
       }
       out[i] = sum;
@@ -219,15 +251,18 @@ class Balance {
   Vectors r_, g_;                     // of each entry
   std::vector<float> step_;           // of each entry
   std::vector<float> volume_, free_;  // of each node, as all below; free_: 1 or 0
-  Array<Matrix> normal_, inverse_, change_;
+  std::vector<float> outside_;        // share of the volume beyond the node
+  Vectors outward_;
+  Array<Matrix> normal_, inverse_, change_;  // inverse_ without outside_ of across_
+  Array<Matrix> across_;                     // M^-1 n n^T M^-1 / n^T M^-1 n
   std::vector<float> diagonal_;
   Vectors residual_;
 };
 
 }  // namespace
 
-double balance(const MlsNodes& nodes, Cpu& cpu, MlsPairs& pairs) {
-  return Balance(nodes, cpu, pairs).run();
+double balance(const MlsNodes& nodes, bool lattice, Cpu& cpu, MlsPairs& pairs) {
+  return Balance(nodes, lattice, cpu, pairs).run();
 }
 
 }  // namespace tissue_sim

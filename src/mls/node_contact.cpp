@@ -11,11 +11,22 @@
 namespace tissue_sim {
 namespace {
 
-constexpr double kLeastSkin = 0.25, kMostSkin = 2;  // [edges]
-constexpr double kFasterThanSeen = 1.5;             // than when that was seen last
-constexpr int kMeant = 24;                          // substeps that a skin is meant for
-constexpr int kMostSubsteps = 200;                  // until it is seen again how far nodes moved
-constexpr int kFewestSubsteps = 4;                  // else they are looked for at once
+constexpr double kMostSkin = 2;          // [edges]
+constexpr double kFasterThanSeen = 1.5;  // than when that was seen last
+constexpr int kActive = 16;              // substeps for which those that may touch are listed ...
+constexpr float kActiveSkin = 0.125f;    // ... with room for each, besides its speed [edges]
+constexpr int kMostSubsteps = 200;       // until it is seen again how far nodes moved
+constexpr int kFewestSubsteps = 4;       // else they are looked for at once
+
+/// Of node j from node i as they are, into `d`; squared.
+float distance2(const MlsState& s, std::int32_t i, std::int32_t j, float (&d)[3]) {
+  float d2 = 0;
+  for (int a = 0; a < 3; ++a) {
+    d[a] = (s.place[4 * j + a] - s.place[4 * i + a]) + (s.u[4 * j + a] - s.u[4 * i + a]);
+    d2 += d[a] * d[a];
+  }
+  return d2;
+}
 
 /// Substeps for which the list lasts at least, until a node has moved by its skin.
 int lasts(const MlsState& s, float dt) {
@@ -37,10 +48,14 @@ int lasts(const MlsState& s, float dt) {
   return static_cast<int>(std::max(0.0, least));
 }
 
-/// How far a node may move until the list is void: those that are fast, farther.
+/// How far a node may move until the list is void: those that are fast, farther. Two nodes that do
+/// not touch cost less than two faces.
 float skin_of(const MlsState& s, std::int32_t i, float dt) {
-  const double edge = s.edge[i], meant = kMeant * kFasterThanSeen * s.velocity(i).norm() * dt;
-  return static_cast<float>(std::max(kLeastSkin * edge, std::min(kMostSkin * edge, meant)));
+  const bool faces = touches_by_faces(s);
+  const double least = faces ? 0.25 : 0.5;  // [edges]
+  const int meant_for = faces ? 24 : 60;    // substeps
+  const double edge = s.edge[i], meant = meant_for * kFasterThanSeen * s.velocity(i).norm() * dt;
+  return static_cast<float>(std::max(least * edge, std::min(kMostSkin * edge, meant)));
 }
 
 void find_node_contacts(MlsState& s, const std::vector<std::int32_t>& piece, float dt) {
@@ -114,6 +129,7 @@ bool update_node_contacts(MlsState& s, const std::vector<std::int32_t>& piece, f
 void number_node_contacts(MlsState& s) {
   MlsNodeContacts& contacts = s.node_contacts;
   contacts.pairs.made = false;
+  contacts.active = {};
   contacts.node.clear();
   contacts.at.assign(s.count(), -1);
   contacts.in_chunk.assign(s.chunks(), 0);
@@ -132,31 +148,76 @@ void number_node_contacts(MlsState& s) {
       64);
 }
 
-void add_node_contact(const MlsState& s, std::int32_t i, float* force) {
+void list_active(MlsState& s, float dt) {
   const MlsNodeContacts& contacts = s.node_contacts;
+  MlsActive& active = s.node_contacts.active;
+  if (touches_by_faces(s) || contacts.begin.empty()) return;
+  if (!active.begin.empty() && active.left-- > 0) return;
+  active.left = kActive - 1;
+  active.pairs.clear();
+  active.begin.assign(s.chunks() + 1, 0);
+  const float passes = kActive * static_cast<float>(kFasterThanSeen) * dt;
+  const auto speed = [&](std::int32_t i) { return static_cast<float>(s.velocity(i).norm()); };
+  for (std::int32_t i = 0; i < s.count(); ++i) {
+    for (std::int32_t c = contacts.begin[i]; c < contacts.begin[i + 1]; ++c) {
+      const std::int32_t j = contacts.other[c];
+      if (j < i) continue;
+      float d[3];
+      const float reach =
+          contacts.rest[c] + kActiveSkin * (s.edge[i] + s.edge[j]) + passes * (speed(i) + speed(j));
+      if (distance2(s, i, j, d) > reach * reach) continue;
+      active.pairs.push_back({i, j, contacts.rest[c]});
+      ++active.begin[i / kMlsChunk + 1];
+      ++active.begin[j / kMlsChunk + 1];
+    }
+  }
+  std::partial_sum(active.begin.begin(), active.begin.end(), active.begin.begin());
+  active.entries.resize(2 * active.pairs.size());
+  active.push.assign(4 * active.pairs.size(), 0.0f);
+  std::vector<std::int32_t> next(active.begin.begin(), active.begin.end() - 1);
+  for (std::size_t k = 0; k < active.pairs.size(); ++k) {
+    for (const std::int32_t i : {active.pairs[k].low, active.pairs[k].high}) {
+      active.entries[next[i / kMlsChunk]++] = {i, static_cast<std::int32_t>(k)};
+    }
+  }
+}
+
+void push_active(MlsState& s, int pair) {
+  MlsActive& active = s.node_contacts.active;
+  const std::int32_t i = active.pairs[pair].low, j = active.pairs[pair].high;
+  float* out = &active.push[4 * static_cast<std::size_t>(pair)];
+  float d[3];
+  const float d2 = distance2(s, i, j, d), rest = active.pairs[pair].rest;
+  out[3] = d2 < rest * rest ? 1.0f : 0.0f;
+  if (out[3] == 0) return;
+  const float distance = std::max(std::sqrt(d2), 1e-12f);
+  float approach = 0;
+  for (int a = 0; a < 3; ++a) approach += (s.v[4 * j + a] - s.v[4 * i + a]) * d[a];
+  approach /= -distance;
+  const ContactSpring own = node_spring(s, i), other = node_spring(s, j);
+  const float k = own.stiffness * other.stiffness / (own.stiffness + other.stiffness);
+  const float c_both = own.damping * other.damping / (own.damping + other.damping);
+  const float push = std::max(0.0f, k * (rest - distance) + c_both * approach);
+  for (int a = 0; a < 3; ++a) out[a] = push * d[a] / distance;
+}
+
+void add_node_contact(const MlsState& s, int chunk, float* force) {
+  const MlsNodeContacts& contacts = s.node_contacts;
+  const int first = chunk * kMlsChunk, last = std::min(s.count(), first + kMlsChunk);
   if (touches_by_faces(s)) {
-    const std::int32_t k = contacts.at[i];
-    for (int a = 0; a < 3 && k >= 0; ++a) force[a] += contacts.force[4 * k + a];
+    for (std::int32_t i = first; i < last && contacts.in_chunk[chunk] != 0; ++i) {
+      const std::int32_t k = contacts.at[i];
+      for (int a = 0; a < 3 && k >= 0; ++a) force[4 * (i - first) + a] += contacts.force[4 * k + a];
+    }
     return;
   }
-  for (std::int32_t c = contacts.begin[i]; c < contacts.begin[i + 1]; ++c) {
-    const std::int32_t j = contacts.other[c];
-    float d[3], d2 = 0;
-    for (int a = 0; a < 3; ++a) {
-      d[a] = (s.place[4 * j + a] - s.place[4 * i + a]) + (s.u[4 * j + a] - s.u[4 * i + a]);
-      d2 += d[a] * d[a];
-    }
-    const float rest = contacts.rest[c];
-    if (d2 >= rest * rest) continue;
-    const float distance = std::max(std::sqrt(d2), 1e-12f);
-    float approach = 0;
-    for (int a = 0; a < 3; ++a) approach += (s.v[4 * j + a] - s.v[4 * i + a]) * d[a];
-    approach /= -distance;
-    const ContactSpring own = node_spring(s, i), other = node_spring(s, j);
-    const float k = own.stiffness * other.stiffness / (own.stiffness + other.stiffness);
-    const float c_both = own.damping * other.damping / (own.damping + other.damping);
-    const float push = std::max(0.0f, k * (rest - distance) + c_both * approach);
-    for (int a = 0; a < 3; ++a) force[a] -= push * d[a] / distance;
+  const MlsActive& active = contacts.active;
+  for (std::int32_t e = active.begin[chunk]; e < active.begin[chunk + 1]; ++e) {
+    const MlsActive::Entry entry = active.entries[e];
+    const float* push = &active.push[4 * static_cast<std::size_t>(entry.pair)];
+    if (push[3] == 0) continue;
+    const float sign = entry.node == active.pairs[entry.pair].high ? 1.0f : -1.0f;
+    for (int a = 0; a < 3; ++a) force[4 * (entry.node - first) + a] += sign * push[a];
   }
 }
 

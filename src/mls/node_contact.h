@@ -30,10 +30,16 @@ inline void search_node_contacts(MlsState& state) {
 /// elsewhere.
 void number_node_contacts(MlsState& state);
 
-/// Adds to force[3] on node i what those that touch it push. With MlsContact::kNodes: springs of
-/// both nodes in series and dampers along the line between them, which only push. The same for both
+/// Before a substep of `dt` [s], with MlsContact::kNodes on a CPU: MlsActive, anew where it is due.
+void list_active(MlsState& state, float dt);
+
+/// What the two of such a pair push one another with: springs of both nodes in series and dampers
+/// along the line between them, which only push.
+void push_active(MlsState& state, int pair);
+
+/// Adds to force[4 kMlsChunk] on a chunk's nodes what those that touch them push. The same for both
 /// nodes but for the sign, so momentum stays; angular momentum does, too, of faces with what
 /// MlsFaceSubstep left in the stress.
-void add_node_contact(const MlsState& state, std::int32_t i, float* force);
+void add_node_contact(const MlsState& state, int chunk, float* force);
 
 }  // namespace tissue_sim

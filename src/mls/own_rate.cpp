@@ -54,10 +54,21 @@ MlsSums mls_sums(const MlsState& s, std::int32_t i) {
     const std::int32_t j = s.pairs.other[e];
     const float* xj = &s.place[4 * j];
     const double w = s.pairs.weight[e], q = w * w * s.inv_mass[j];
-    const double x = xj[0] - xi[0], y = xj[1] - xi[1], z = xj[2] - xi[2];  // in float, as passes do
+    // In float, as passes do, and so times the weight: nodes of a lattice would all err alike, and
+    // turn a body.
+    const float r[3] = {xj[0] - xi[0], xj[1] - xi[1], xj[2] - xi[2]};
+    double W[3];
+    for (int a = 0; a < 3; ++a) W[a] = s.pairs.weight[e] * r[a];
+    const double x = r[0], y = r[1], z = r[2];
     const double products[6] = {x * x, y * y, z * z, x * y, x * z, y * z};
+    const double weighted[6] = {x * W[0],
+                                y * W[1],
+                                z * W[2],
+                                0.5 * (x * W[1] + y * W[0]),
+                                0.5 * (x * W[2] + z * W[0]),
+                                0.5 * (y * W[2] + z * W[1])};
     for (int k = 0; k < 6; ++k) {
-      m[k] += w * products[k];
+      m[k] += weighted[k];
       per_mass[k] += q * products[k];
     }
     first[0] += w * x;

@@ -48,8 +48,16 @@ MlsPairs make_pairs(const MlsNodes& nodes, int neighbours, Cpu& cpu);
 /// Changes the weights as little as needed (each in proportion to itself) for uniform stress to
 /// leave all nodes but those at the surface in balance:
 ///   sum_j w_ij (N_i + N_j) r_ij = 0,   N_i = V_i M_i^-1,   M_i = sum_j w_ij r_ij r_ij^T,
-/// by Newton's method, where each step is the one of least sum dw^2 / w. All stay positive. Returns
-/// the largest part of the sum that is left, over the sum of the lengths of its terms.
-double balance(const MlsNodes& nodes, Cpu& cpu, MlsPairs& pairs);
+/// by Newton's method, where each step is the one of least sum dw^2 / w. No weight changes by more
+/// than 32 times. Returns the largest part of the sum that is left, over the sum of the lengths of
+/// its terms.
+///
+/// Of a node j at the surface of a lattice, what of its volume lies outside of the nodes (a share
+/// f, along the normal n) does not count across the surface:
+///   N_j = V_j (M_j^-1 - f M_j^-1 n n^T M_j^-1 / n^T M_j^-1 n).
+/// Uniform stress there is borne by what pulls at the surface, not by the pairs behind it. With it
+/// n nodes in a row would have to pass n volumes on by n - 1 gaps between them, all alike: they do
+/// with binomial weights alone, 1 at the ends and 5e6 in the middle of 26.
+double balance(const MlsNodes& nodes, bool lattice, Cpu& cpu, MlsPairs& pairs);
 
 }  // namespace tissue_sim

@@ -158,7 +158,8 @@ std::unique_ptr<MlsState> make_mls_state(const Scene& scene, std::vector<std::st
   hold_at_faces(scene, support_factor(scene.mls.neighbours), s.nodes, s.pairs);
   s.nodes.strained_volume = s.nodes.free_volume;
   const Array<float> kernel = s.pairs.whole;
-  if (scene.mls.basis == MlsBasis::kBalanced) balance(s.nodes, *s.cpu, s.pairs);
+  const bool lattice = scene.mls.placement != MlsPlacement::kGraded;
+  if (scene.mls.basis == MlsBasis::kBalanced) balance(s.nodes, lattice, *s.cpu, s.pairs);
   const int n = s.count();
   for (Array<float>* a : {&s.place, &s.u, &s.v, &s.u_next, &s.v_next, &s.face})
     resize_padded(*a, n, 4);
@@ -210,7 +211,7 @@ std::unique_ptr<MlsState> make_mls_state(const Scene& scene, std::vector<std::st
   for (int round = 0; round < kRoundsOfBounds && bound_own_rates(s); ++round) {
     if (scene.mls.basis == MlsBasis::kBalanced) {
       s.pairs.whole = kernel;
-      balance(s.nodes, *s.cpu, s.pairs);
+      balance(s.nodes, lattice, *s.cpu, s.pairs);
       put_weights(s.pairs, s.lanes);
     }
     for (std::int32_t i = 0; i < n; ++i) s.whole_kappa[i] = whole_kappa(s, i);
@@ -282,6 +283,7 @@ float substep(MlsState& s, float dt, std::vector<ColliderLoad>& loads) {
     field.touching = s.node_contacts.in_chunk.data();
     field.deformation = s.deformation.data();
   }
+  list_active(s, dt);
   const bool list = is_list_due(s);
   const float kick = kick_of(s.dt, dt);
   const auto keep = static_cast<float>(std::exp(-s.scene.damping * kick));
@@ -293,9 +295,9 @@ float substep(MlsState& s, float dt, std::vector<ColliderLoad>& loads) {
     for (int i = first; i < last; i += kMlsChunk) {
       s.kernels->forces(field, i / kMlsChunk, force + 4 * (i - first));
       add_springs(s, s.u.data(), i / kMlsChunk, force + 4 * (i - first));
-    }
-    for (int i = first; i < last; ++i) {
-      if (!s.node_contacts.begin.empty()) add_node_contact(s, i, force + 4 * (i - first));
+      if (!s.node_contacts.begin.empty()) {
+        add_node_contact(s, i / kMlsChunk, force + 4 * (i - first));
+      }
     }
     if (list) list_near(s, group, dt);
     add_contact(s, group, force);
@@ -312,12 +314,15 @@ float substep(MlsState& s, float dt, std::vector<ColliderLoad>& loads) {
       store<4>(&s.u_next[4 * i], u);
     }
   };
-  SharedWork stresses(s.chunks(), 4), weights(touching.pair_blocks(), 8),
+  const int active = static_cast<int>(s.node_contacts.active.pairs.size());
+  SharedWork stresses(s.chunks(), 4), weights(touching.pair_blocks(), 8), active_pushes(active, 64),
       turns(touching.node_blocks(), 2), pushes(touching.pair_blocks(), 4),
       takes(touching.nodes(), 32), moves(s.groups(), 1);
   s.cpu->on_each_thread([&] {
     weights.help([&](int block) { touching.weigh(block); });
+    active_pushes.help([&](int pair) { push_active(s, pair); });
     stresses.help([&](int chunk) { s.kernels->stresses(field, chunk); });
+    active_pushes.wait();
     weights.wait();
     stresses.wait();
     if (touching.nodes() > 0) {

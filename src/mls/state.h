@@ -40,6 +40,22 @@ struct MlsGroupContact {
   std::vector<ColliderLoad> loads;  ///< of the last substep, per collider; empty for none
 };
 
+/// Of nodes that may touch one another those that may do so within some substeps.
+struct MlsActive {
+  struct Pair {
+    std::int32_t low, high;
+    float rest;  ///< as in MlsNodeContacts [m]
+  };
+  struct Entry {
+    std::int32_t node, pair;
+  };
+  std::vector<Pair> pairs;
+  Array<float> push;                ///< of each pair: force on the high one [N], and 1 or 0: none
+  std::vector<Entry> entries;       ///< each pair at both, by chunks
+  std::vector<std::int32_t> begin;  ///< per chunk, and one more; empty: to be listed anew
+  int left = 0;                     ///< substeps that they hold for
+};
+
 /// Nodes that may touch one another until they are looked for anew; each pair stands twice, and
 /// both hold the same.
 struct MlsNodeContacts {
@@ -59,6 +75,7 @@ struct MlsNodeContacts {
   std::vector<MlsKnowsFace> knows;
   std::vector<std::uint8_t> in_chunk;  ///< whether a chunk has any
   MlsFacePairs pairs;
+  MlsActive active;    ///< with MlsContact::kNodes, on a CPU
   Array<float> force;  ///< what pushes it, 4 each [N]
 };
 

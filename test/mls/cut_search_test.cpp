@@ -1,12 +1,17 @@
 // What makes cuts cheap finds the same as what is slow and plain.
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cmath>
 #include <random>
+#include <utility>
+#include <vector>
 
 #include "cutting/blade_sweep.h"
-#include "geometry/near_grid.h"
 #include "mls/crossing.h"
 #include "mls/cut.h"
+#include "mls/faces.h"
+#include "mls/near_nodes.h"
 #include "mls_scenes.h"
 
 namespace tissue_sim {
@@ -90,31 +95,68 @@ TEST(MlsCutSearch, PiecesByTheSpannerAreThoseOfAllPairs) {
   }
 }
 
-TEST(NearGrid, FindsWhatIsNear) {
-  std::mt19937 random(6);
-  std::uniform_real_distribution<double> even(-1, 1);
-  std::vector<Vec3> points;
-  for (int i = 0; i < 500; ++i) points.push_back(Vec3(even(random), even(random), even(random)));
-  points.push_back(Vec3(1e9, 0, -1e9));
-  points.push_back(Vec3::Constant(std::nan("")));
-  const NearGrid grid(points, 0.2);
-  int in_cells = 0;
-  for (const double radius : {0.05, 0.2, 0.7}) {
-    for (int cell = 0; cell < grid.cells(); ++cell) {
-      std::vector<int> around;
-      grid.for_each_around(cell, radius, [&](std::int32_t p) { around.push_back(p); });
-      std::sort(around.begin(), around.end());
-      ASSERT_EQ(std::unique(around.begin(), around.end()), around.end());
-      grid.for_each_in(cell, [&](std::int32_t own) {
-        ++in_cells;
-        for (int p = 0; p < static_cast<int>(points.size()); ++p) {
-          if (!((points[p] - points[own]).squaredNorm() <= radius * radius)) continue;
-          ASSERT_TRUE(std::binary_search(around.begin(), around.end(), p)) << p << ' ' << own;
-        }
-      });
+/// By their definition: MlsNear of all outer nodes, by number.
+std::vector<std::pair<int, int>> near_by_definition(const MlsState& s,
+                                                    const std::vector<std::int32_t>& piece,
+                                                    const std::vector<std::int32_t>& outer,
+                                                    const std::vector<float>& skin) {
+  std::vector<std::pair<int, int>> pairs;
+  for (std::size_t k = 0; k < outer.size(); ++k) {
+    for (std::size_t l = k + 1; l < outer.size(); ++l) {
+      const int i = outer[k], j = outer[l];
+      const float edge = 0.5f * (s.edge[i] + s.edge[j]);
+      const float reach =
+          touches_by_faces(s)
+              ? std::sqrt(mls_contact::reach2(s.face[4 * i + 3] + s.face[4 * j + 3], edge))
+              : edge;
+      if (!((s.position(i) - s.position(j)).norm() <= reach + skin[k] + skin[l])) continue;
+      const bool far = (s.nodes.place[i] - s.nodes.place[j]).norm() > 2.5 * edge;
+      const int e = s.pairs.find(i, j);
+      const bool crossed = e >= 0 && s.pairs.crossed[e] != 0;
+      if (piece[i] != piece[j] || far || crossed) pairs.emplace_back(i, j);
     }
   }
-  EXPECT_EQ(in_cells, 3 * static_cast<int>(points.size()));
+  return pairs;
+}
+
+TEST(MlsNearNodes, AreThoseThatALookAtEachFinds) {
+  std::mt19937 random(6);
+  std::uniform_real_distribution<double> even(-1, 1);
+  for (const MlsPlacement placement : kPlacements) {
+    for (const MlsContact contact : {MlsContact::kNodes, MlsContact::kFaces}) {
+      Scene scene = mls_box(Vec3(0.012, 0.01, 0.008), 0.001, placement);
+      scene.mls.contact = contact;
+      MlsTissue tissue(scene);
+      MlsState& s = tissue.state();
+      // Across the whole body, and a cut that leaves a piece whole; folded and sheared.
+      const Vec3 middle(0.006, 0.005, 0.004);
+      tissue.cut_now(plane_cut(middle, Vec3(1, 0.2, 0.1)));
+      tissue.cut_now(upright_blade({Vec3(0.003, -0.1, 0), Vec3(0.003, 0.006, 0)}));
+      UnionFind linked = join_uncrossed(s);
+      std::vector<std::int32_t> piece(s.count()), outer;
+      std::vector<float> skin;
+      for (int i = 0; i < s.count(); ++i) {
+        piece[i] = linked.root(i);
+        const Vec3 x = s.nodes.place[i];
+        const Vec3 u(x.x() < 0.006 ? 0.0015 : 0.0, 40 * x.y() * x.y() * (x.x() - 0.006),
+                     0.3 * x.y() + 1e-4 * even(random));
+        for (int a = 0; a < 3; ++a) s.u[4 * i + a] = static_cast<float>(u[a]);
+        if (s.outer[i] == 0) continue;
+        outer.push_back(i);
+        skin.push_back(static_cast<float>(0.0004 * (1 + even(random))));
+      }
+      s.u[4 * outer[3]] = 1e9f;
+      s.u[4 * outer[7]] = NAN;
+      std::vector<std::pair<int, int>> found;
+      for (const MlsNear& pair : find_near_nodes(s, piece, outer, skin)) {
+        ASSERT_LT(pair.low, pair.high);
+        found.emplace_back(pair.low, pair.high);
+      }
+      std::sort(found.begin(), found.end());
+      EXPECT_GT(found.size(), 500u);
+      EXPECT_EQ(found, near_by_definition(s, piece, outer, skin));
+    }
+  }
 }
 
 }  // namespace

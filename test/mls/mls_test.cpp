@@ -143,6 +143,28 @@ TEST(Mls, ForcesAreThoseOfTheReference) {
   }
 }
 
+// However large it is: what the faces ask for does not run on into the body.
+TEST(Mls, BalancedWeightsOfALatticeStayNearTheKernels) {
+  for (const int edge : {6, 12, 26}) {
+    const auto state = make_mls_state(mls_box(Vec3::Constant(0.001 * edge), 0.001), nullptr);
+    const MlsState& s = *state;
+    ASSERT_EQ(s.count(), edge * edge * edge);
+    const MlsPairs kernel = make_pairs(s.nodes, s.scene.mls.neighbours, *s.cpu);
+    float least = 1, most = 1;
+    for (std::size_t e = 0; e < kernel.whole.size(); ++e) {
+      const float change = s.pairs.whole[e] / kernel.whole[e];
+      least = std::min(least, change);
+      most = std::max(most, change);
+    }
+    EXPECT_GT(least, 1 / 1.5);
+    EXPECT_LT(most, 1.5);
+    for (int i = 0; i < s.count(); ++i) {
+      ASSERT_EQ(s.sprung[i], 0);
+      ASSERT_EQ(s.nodes.strained_volume[i], s.nodes.free_volume[i]);
+    }
+  }
+}
+
 TEST(Mls, ForcesAreTheSlopeOfTheEnergy) {
   MlsTissue tissue(mls_box(Vec3(0.006, 0.005, 0.004), 0.001, MlsPlacement::kJittered));
   MlsState& s = tissue.state();

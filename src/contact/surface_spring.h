@@ -21,6 +21,7 @@ struct SurfaceSpring {
 inline constexpr float kAcross = 8, kAlong = 0.5f;
 inline constexpr float kDampingAcross = 0.1f;  ///< times the substep, of the stiffness
 inline constexpr float kDampingAlong = 0.1f;   ///< share of critical
+inline constexpr float kInertia = 0.5f;  ///< b / (k dt^2) of the inerter beside the stiff spring
 /// What stays in a substep of how deep contact began: a bounce of debris takes three substeps, one
 /// of a whole block some twenty.
 inline constexpr float kBegunStays = 1 - 1 / 128.0f;

@@ -83,10 +83,10 @@ struct Pushed {
   }
 };
 
-/// Takes back what a node's inerters resist of the step that brought it to u and v. Returns how much
-/// of v that is [m/s].
+/// Takes back what a node's inerters resist of the step that brought it to u and v. Returns how
+/// much of v that is [m/s].
 __device__ __forceinline__ float3 resist(const PushedNodes& pushed, int node, const NodeStep& step,
-                                       const CudaNodes& from, float4& u, float4& v) {
+                                         const CudaNodes& from, float4& u, float4& v) {
   const float4 was = __ldcg(from.v + node);
   const float3 r = resisted(pushed.inertia + kInertiaStride * static_cast<std::size_t>(node), v.w,
                             step.keep, {was.x, was.y, was.z}, {v.x, v.y, v.z});
@@ -125,9 +125,9 @@ struct SlotEntry {
 /// Brings the nodes of `count` slots into `u_out` and `v_out`, where they are not null (divided by
 /// the cell size, so that stencils give gradients). With `kMove` it first moves them on by the
 /// forces of the last substep, summed in the order of the slots; every block that has a node
-/// computes the same, and the one that owns it writes it down, and what its inerters bore to `loads`. Each thread has kHand nodes in hand,
-/// for all their loads to be under way at once; what the tables say of the next ones comes
-/// meanwhile. `pushes` is read with kPushes alone.
+/// computes the same, and the one that owns it writes it down, and what its inerters bore to
+/// `loads`. Each thread has kHand nodes in hand, for all their loads to be under way at once; what
+/// the tables say of the next ones comes meanwhile. `pushes` is read with kPushes alone.
 template <bool kMove, bool kCached, int kHand, bool kPushes = false>
 __device__ __forceinline__ void bring_nodes(const CudaTables& t, int first_slot, int count,
                                             const SlotCache& cache, const CudaNodes& from,
@@ -207,10 +207,10 @@ __device__ __forceinline__ void bring_nodes(const CudaTables& t, int first_slot,
           const float3 r = resist(pushes, node[k], step, from, u[k], v[k]);
           if (owned[k]) {
             const float by = u[k].w / step.kick;
-            add_resisted(loads, push[k].inert - 1, first_slot + at,
-                         {u[k].x - step.dt * v[k].x, u[k].y - step.dt * v[k].y,
-                          u[k].z - step.dt * v[k].z},
-                         {by * r.x, by * r.y, by * r.z});
+            add_resisted(
+                loads, push[k].inert - 1, first_slot + at,
+                {u[k].x - step.dt * v[k].x, u[k].y - step.dt * v[k].y, u[k].z - step.dt * v[k].z},
+                {by * r.x, by * r.y, by * r.z});
           }
         }
         if (owned[k]) {

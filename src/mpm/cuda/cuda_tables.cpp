@@ -41,11 +41,11 @@ std::size_t CudaMpmTissue::device_bytes() const {
       d.made.bytes() + d.spare.bytes() + d.origins.bytes() + d.sweep.bytes() + d.labels.bytes() +
       d.some_nodes.bytes() + d.packed.bytes() + d.piece.bytes() + d.place.bytes() +
       d.slot_parts.bytes() + d.first_parts.bytes() + d.parts.bytes() + d.pushed_parts.bytes() +
-      d.marks.bytes() + d.pushed.bytes() + d.inertia.bytes() + d.colour.bytes() + d.hold.bytes() + d.outer.bytes() +
-      d.bonds.bytes() + d.soft.bytes() + d.with.bytes() + d.whole.bytes() + d.u_before.bytes() +
-      d.connect_room.bytes() + d.colliders.bytes() + d.loads.bytes() + d.measures.bytes() +
-      d.cloud.bytes() + d.stretched.bytes() + d.faces.bytes() + d.front.bytes() +
-      d.checkpoint.bytes() + d.stacks.bytes() + d.anchors.bytes();
+      d.marks.bytes() + d.pushed.bytes() + d.inertia.bytes() + d.colour.bytes() + d.hold.bytes() +
+      d.outer.bytes() + d.bonds.bytes() + d.soft.bytes() + d.with.bytes() + d.whole.bytes() +
+      d.u_before.bytes() + d.connect_room.bytes() + d.colliders.bytes() + d.loads.bytes() +
+      d.measures.bytes() + d.cloud.bytes() + d.stretched.bytes() + d.faces.bytes() +
+      d.front.bytes() + d.checkpoint.bytes() + d.stacks.bytes() + d.anchors.bytes();
   for (int i = 0; i < 2; ++i) sum += d.u[i].bytes() + d.v[i].bytes() + d.force[i].bytes();
   return sum;
 }

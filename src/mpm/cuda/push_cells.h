@@ -73,7 +73,7 @@ struct ToolPushes {
   unsigned long long* loads;  ///< per collider
   long long* force;           ///< per node, see NodePushes
   long long* inertia;         ///< the same
-  float dt, kick, grown;      ///< as CudaFrame::step and ::grown; this is 0 but in the first substep
+  float dt, kick, grown;  ///< as CudaFrame::step and ::grown; this is 0 but in the first substep
 };
 
 /// Adds what colliders push the points of a cell with to its nodes. The first eight lanes of the
@@ -115,7 +115,7 @@ __device__ __forceinline__ void push_cell(const CudaTables& t, const CudaNodes& 
   }
   const bool held_before = (held.with[0] | held.with[1]) != 0;
   float push[3] = {0, 0, 0}, force[3] = {0, 0, 0};
-  const auto resist = [&](int c, const float (&normal)[3], float along, bool resists, bool begins) {
+  const auto resist = [&](int c, const float(&normal)[3], float along, bool resists, bool begins) {
     if (pushes.inertia == nullptr) return;
     const unsigned places = __ballot_sync(0xffffffffu, resists && point.inertia > 0);
     if (places == 0) return;
@@ -133,8 +133,8 @@ __device__ __forceinline__ void push_cell(const CudaTables& t, const CudaNodes& 
       all.x[a] = cell.middle[a] + (i - 1) * body.cell_size + nodes.u[k][a];
     }
     const int own = lane < 27 && v.w != 0 ? node : -1;
-    const float3 taken = add_inertia(all, pushes.colliders + c, c, pushes.kick, own,
-                                     pushes.inertia, pushes.force, pushes.loads);
+    const float3 taken = add_inertia(all, pushes.colliders + c, c, pushes.kick, own, pushes.inertia,
+                                     pushes.force, pushes.loads);
     force[0] += taken.x, force[1] += taken.y, force[2] += taken.z;
   };
   push_point(point, pushes.colliders, cell.near, t.held_by, held, pushes.loads, push, resist);

@@ -109,7 +109,7 @@ inline constexpr int kInertiaStride = 6;
 inline constexpr double kInertiaUnit = 1.0 / (1ll << 58);  ///< [kg]
 struct NodePushes {
   long long* force = nullptr;
-  std::size_t stride = 0;       ///< from one of the three to the next
+  std::size_t stride = 0;        ///< from one of the three to the next
   long long* inertia = nullptr;  ///< null where no contact has any
   std::size_t inertia_stride = 0;
 };
@@ -181,7 +181,7 @@ struct CudaFrame {
   float cell_size;  ///< the scene's [m]
   NodePushes pushes;
   float grown = 0;  ///< share of what inerters are now that they are larger by than in the substep
-                ///< before, for the first one is longer
+                    ///< before, for the first one is longer
   unsigned* arrived;       ///< counters of the two barriers, and of turns; 0 at the beginning
   const CudaFaces* faces;  ///< null where no tissue touches tissue
   CudaHeldFaces held_faces;

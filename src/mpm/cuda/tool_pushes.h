@@ -28,8 +28,8 @@ __device__ __forceinline__ bool may_touch(const Collider& c, const float* x, flo
          p[0] < radius && p[0] > -c.width - radius;
 }
 
-/// Adds forces and moments of a warp's first lanes to a load, as integers, whose sum does not depend
-/// on the order.
+/// Adds forces and moments of a warp's first lanes to a load, as integers, whose sum does not
+/// depend on the order.
 template <int kLanes = 8>
 __device__ __forceinline__ void add_load(unsigned long long* load, const double (&value)[6]) {
   long long sum[6];
@@ -70,6 +70,10 @@ struct Held {
   }
 };
 
+/// How deep contact of a stiff spring begins, of how deep it is: it pushes as hard then as the soft
+/// one would, so that a tool which comes deep within a substep is held off as well.
+inline constexpr float kBegunDeep = 1 - 1 / kAcross;
+
 /// The spring of a point of so much volume [m^3], by that of a m^3 at the lattice: as that where it
 /// is soft, else as stiff across the surface as a CPU's.
 __device__ __forceinline__ SurfaceSpring point_spring(const ContactSpring& of_lattice, float volume,
@@ -87,9 +91,9 @@ __device__ __forceinline__ SurfaceSpring point_spring(const ContactSpring& of_la
 
 /// A point that colliders may push.
 struct PushedPoint {
-  int index;            ///< -1 where there is none
-  bool is_cut = false;  ///< it has lost a bond
-  float x[3], v[3];     ///< [m], [m/s]
+  int index;             ///< -1 where there is none
+  bool is_cut = false;   ///< it has lost a bond
+  float x[3], v[3];      ///< [m], [m/s]
   SurfaceSpring spring;  ///< but for its cohesion, which is the collider's
   float inertia = 0;     ///< of its inerter, above 0 where the spring is stiff across [kg]
   __device__ __forceinline__ bool touches(const Collider& c) const {
@@ -127,7 +131,7 @@ __device__ __forceinline__ void push_point(const PushedPoint& point, const Colli
         begins = (second ? held.with[1] : held.with[0]) != c + 1;
         if (begins) {
           to_local(collider, point.x, place);
-          begun = -g.distance;
+          begun = kBegunDeep * -g.distance;
         }
         if (point.inertia == 0) begun = 0;
         SurfaceSpring spring = point.spring;

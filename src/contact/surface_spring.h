@@ -31,6 +31,7 @@ inline constexpr float kUnbounded = 1e30f;
 /// close further would be squeezed to a ninth, and ask for a hundredth of its substeps. What
 /// presses back more lies in the jaw.
 inline constexpr float kMostOfJaws = 1;
+inline constexpr float kInertia = 0.5f;  ///< b / (k dt^2) of the inerter beside the stiff spring
 /// What stays in a substep of how deep contact began: a bounce of debris takes three substeps, one
 /// of a whole block some twenty.
 inline constexpr float kBegunStays = 1 - 1 / 128.0f;

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cstdio>
 
 #include "finite_element_scenes.h"
 #include "tissue_sim/simulation.h"
@@ -41,7 +42,6 @@ Tool punch() {
   return t;
 }
 
-/// Anchors, on either device.
 class FiniteElementsOn : public testing::TestWithParam<Device> {
  protected:
   void SetUp() override {
@@ -62,9 +62,13 @@ INSTANTIATE_TEST_SUITE_P(Devices, FiniteElementsOn, testing::Values(Device::kCpu
 #endif
 
 double force_error(double cell_size, const Tool& tool, double depth, const char* body,
-                   const char* name) {
-  Simulation simulation(indented_cylinder(cell_size, 0, tool));
-  return error(indentation_force(simulation, depth), body, name);
+                   const char* name, Device device) {
+  Scene scene = indented_cylinder(cell_size, 0, tool);
+  scene.device = device;
+  Simulation simulation(scene);
+  const double e = error(indentation_force(simulation, depth), body, name);
+  std::printf("%s at %g mm cells: %+.4f\n", name, 1e3 * cell_size, e);
+  return e;
 }
 
 /// How far the middle of the top sinks, and what the clamp carries.
@@ -83,18 +87,19 @@ double sag_error(const Scene& scene) {
 }
 
 // A round tip that is pressed in: 1.8 cells in the contact's radius, then three.
-TEST(FiniteElements, ForceOnARoundTool) {
-  EXPECT_NEAR(force_error(0.0025, ball(0.01), 0.002, "ball", "force_2mm"), 0, 0.04);
-  EXPECT_NEAR(force_error(0.0025, ball(0.01), 0.006, "ball", "force_6mm"), 0, 0.04);
+TEST_P(FiniteElementsOn, ForceOnARoundTool) {
+  EXPECT_NEAR(force_error(0.0025, ball(0.01), 0.002, "ball", "force_2mm", GetParam()), 0, 0.04);
+  EXPECT_NEAR(force_error(0.0025, ball(0.01), 0.006, "ball", "force_6mm", GetParam()), 0, 0.04);
 }
 
-TEST(FiniteElements, ForceOnAToolAsLargeAsACell) {
-  EXPECT_NEAR(force_error(0.003, ball(0.003), 0.002, "small_ball", "force_2mm"), 0, 0.2);
+TEST_P(FiniteElementsOn, ForceOnAToolAsLargeAsACell) {
+  EXPECT_NEAR(force_error(0.003, ball(0.003), 0.002, "small_ball", "force_2mm", GetParam()), 0,
+              0.2);
 }
 
-TEST(FiniteElements, ForceOnAFlatTool) {
-  const double coarse = force_error(0.003, punch(), 0.001, "punch", "force_1mm");
-  const double fine = force_error(0.002, punch(), 0.001, "punch", "force_1mm");
+TEST_P(FiniteElementsOn, ForceOnAFlatTool) {
+  const double coarse = force_error(0.003, punch(), 0.001, "punch", "force_1mm", GetParam());
+  const double fine = force_error(0.002, punch(), 0.001, "punch", "force_1mm", GetParam());
   EXPECT_NEAR(coarse, 0, 0.08);
   EXPECT_NEAR(fine, 0, 0.03);
   EXPECT_GT(std::fabs(coarse / fine), std::pow(1.5, 1.3));

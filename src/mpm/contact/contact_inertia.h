@@ -20,8 +20,6 @@
 
 namespace tissue_sim {
 
-inline constexpr float kInertia = 0.5f;  ///< b / (k dt^2)
-
 /// A node with inerters. Matrices are xx yy zz xy yz zx.
 struct InertialNode {
   std::int32_t node;

@@ -1,6 +1,7 @@
 // A block's nodes in shared memory. For .cu files.
 #pragma once
 
+#include "mpm/cuda/inerters.h"
 #include "mpm/cuda/tables.h"
 
 namespace tissue_sim {
@@ -47,29 +48,54 @@ __device__ __forceinline__ void fill_cache(const CudaTables& t, int first_slot, 
 struct PushedNodes {
   const long long* force;
   long long* clear;
+  const long long* inertia = nullptr;  ///< NodePushes::inertia, the same two
+  long long* clear_inertia = nullptr;
 };
 
 /// What contact pushes a node with.
 struct Pushed {
   long long force[3];
+  int inert;  ///< 1 + a collider that has inerters at it; 0: none has
 
   __device__ __forceinline__ Pushed(const PushedNodes& pushed, bool marked, bool clear, int node) {
     force[0] = force[1] = force[2] = 0;
+    inert = 0;
     if (!marked) return;
     const std::size_t first = kPushStride * static_cast<std::size_t>(node);
     const longlong2 xy = __ldcg(reinterpret_cast<const longlong2*>(pushed.force + first));
     force[0] = xy.x;
     force[1] = xy.y;
-    force[2] = __ldcg(pushed.force + first + 2);
+    const longlong2 z = __ldcg(reinterpret_cast<const longlong2*>(pushed.force + first + 2));
+    force[2] = z.x;
+    inert = static_cast<int>(z.y);
     if (!clear) return;
     __stcg(reinterpret_cast<longlong2*>(pushed.clear + first), longlong2{0, 0});
-    __stcg(pushed.clear + first + 2, 0ll);
+    __stcg(reinterpret_cast<longlong2*>(pushed.clear + first + 2), longlong2{0, 0});
+    if (pushed.clear_inertia == nullptr) return;
+    auto* tensor = reinterpret_cast<longlong2*>(pushed.clear_inertia +
+                                                kInertiaStride * static_cast<std::size_t>(node));
+#pragma unroll
+    for (int i = 0; i < kInertiaStride / 2; ++i) __stcg(tensor + i, longlong2{0, 0});
   }
   Pushed() = default;
   __device__ __forceinline__ float of(int c) const {
     return __ll2float_rn(force[c]) * static_cast<float>(kLoadUnit);
   }
 };
+
+/// Takes back what a node's inerters resist of the step that brought it to u and v. Returns how
+/// much of v that is [m/s].
+__device__ __forceinline__ float3 resist(const PushedNodes& pushed, int node, const NodeStep& step,
+                                         const CudaNodes& from, float4& u, float4& v) {
+  const float4 was = __ldcg(from.v + node);
+  const float3 r = resisted(pushed.inertia + kInertiaStride * static_cast<std::size_t>(node), v.w,
+                            step.keep, {was.x, was.y, was.z}, {v.x, v.y, v.z});
+  v.x -= r.x, v.y -= r.y, v.z -= r.z;
+  u.x = __fmaf_rn(-step.dt, r.x, u.x);
+  u.y = __fmaf_rn(-step.dt, r.y, u.y);
+  u.z = __fmaf_rn(-step.dt, r.z, u.z);
+  return r;
+}
 
 __device__ __forceinline__ void add(const float4& p, float4& f) {
   f.x += p.x;
@@ -99,15 +125,16 @@ struct SlotEntry {
 /// Brings the nodes of `count` slots into `u_out` and `v_out`, where they are not null (divided by
 /// the cell size, so that stencils give gradients). With `kMove` it first moves them on by the
 /// forces of the last substep, summed in the order of the slots; every block that has a node
-/// computes the same, and the one that owns it writes it down. Each thread has kHand nodes in hand,
-/// for all their loads to be under way at once; what the tables say of the next ones comes
-/// meanwhile. `pushes` is read with kPushes alone.
+/// computes the same, and the one that owns it writes it down, and what its inerters bore to
+/// `loads`. Each thread has kHand nodes in hand, for all their loads to be under way at once; what
+/// the tables say of the next ones comes meanwhile. `pushes` is read with kPushes alone.
 template <bool kMove, bool kCached, int kHand, bool kPushes = false>
 __device__ __forceinline__ void bring_nodes(const CudaTables& t, int first_slot, int count,
                                             const SlotCache& cache, const CudaNodes& from,
                                             const CudaNodes& to, const float4* force,
                                             const NodeStep& step, float scale, float4* u_out,
-                                            float4* v_out, const PushedNodes& pushes = {}) {
+                                            float4* v_out, const PushedNodes& pushes = {},
+                                            const InertialLoads& loads = {}) {
   const int threads = static_cast<int>(blockDim.x);
   SlotEntry<kMove> coming[kHand];
   const auto load_entries = [&](int i) {
@@ -176,6 +203,16 @@ __device__ __forceinline__ void bring_nodes(const CudaTables& t, int first_slot,
         step.move(0, f[k].x, u[k].w, v[k].w, u[k].x, v[k].x);
         step.move(1, f[k].y, u[k].w, v[k].w, u[k].y, v[k].y);
         step.move(2, f[k].z, u[k].w, v[k].w, u[k].z, v[k].z);
+        if (kPushes && push[k].inert != 0) {
+          const float3 r = resist(pushes, node[k], step, from, u[k], v[k]);
+          if (owned[k]) {
+            const float by = u[k].w / step.kick;
+            add_resisted(
+                loads, push[k].inert - 1, first_slot + at,
+                {u[k].x - step.dt * v[k].x, u[k].y - step.dt * v[k].y, u[k].z - step.dt * v[k].z},
+                {by * r.x, by * r.y, by * r.z});
+          }
+        }
         if (owned[k]) {
           __stcg(to.u + node[k], u[k]);
           __stcg(to.v + node[k], v[k]);

@@ -71,7 +71,14 @@ NodePushes CudaMpmTissue::clear_pushes() {
                       d.stream);
     d.front.marked = true;
   }
-  return {d.pushed.data(), d.pushed.size() / 3};
+  NodePushes pushes{d.pushed.data(), d.pushed.size() / 3};
+  if (d.outer.size() > 0) {
+    d.inertia.resize(3 * kInertiaStride * d.entries());
+    d.inertia.clear(d.stream);
+    pushes.inertia = d.inertia.data();
+    pushes.inertia_stride = d.inertia.size() / 3;
+  }
+  return pushes;
 }
 
 bool CudaMpmTissue::has_front() const { return device_->front.node_count > 0; }

@@ -37,16 +37,6 @@ std::unique_ptr<MpmState> make_state(const Scene& scene, std::vector<std::string
   return state;
 }
 
-/// What the CPU does at the true surface where the scene says so, and this does at the lattice.
-void note_what_differs(const Scene& scene, std::vector<std::string>& notes) {
-  if (scene.mpm.boundary != MpmBoundary::kSurface) return;
-  if (!scene.tools.empty()) {
-    notes.emplace_back(
-        "on a GPU tools sink into the surface of tissue by up to a tenth of a cell or so, for what "
-        "holds them off is a soft spring; on device cpu by a hundredth");
-  }
-}
-
 int attribute(cudaDeviceAttr which) {
   int value = 0;
   check_cuda(cudaDeviceGetAttribute(&value, which, 0), "be asked");
@@ -74,7 +64,6 @@ CudaMpmTissue::CudaMpmTissue(const Scene& scene, std::vector<std::string> notes)
   d.limits = {properties.multiProcessorCount,
               static_cast<std::size_t>(attribute(cudaDevAttrMaxSharedMemoryPerBlockOptin))};
   state_ = make_state(scene, &notes_);
-  note_what_differs(scene, notes_);
   d.cut_shape = choose_shape(state_->bodies, d.limits, false);
   // What touches other tissue keeps its blocks, which know the contacts; and what anchors hold at
   // their faces has cells that are not full.
@@ -93,7 +82,7 @@ CudaMpmTissue::CudaMpmTissue(const Scene& scene, std::vector<std::string> notes)
     finish_measure();
   }
   if (scene.mpm.boundary == MpmBoundary::kSurface && collider_count(scene) > 0) {
-    d.outer.upload(outer_points(*state_), d.stream);
+    d.outer.upload(outer_points(*state_, state_->anchors), d.stream);
   }
   substep_.follow(*state_, modulus_);
 }
@@ -224,6 +213,8 @@ void CudaMpmTissue::launch(int begin, int end, float dt) {
   frame.substeps = end - begin;
   frame.step.dt = dt;
   frame.step.kick = kick_of(state_->dt, dt);
+  const float before = state_->dt / dt;
+  frame.grown = std::max(0.0f, 1 - before * before);
   frame.step.keep = static_cast<float>(std::exp(-scene.damping * frame.step.kick));
   for (int a = 0; a < 3; ++a) frame.step.gravity[a] = static_cast<float>(scene.gravity[a]);
   frame.colliders = d.colliders.data() + begin * collider_count;

@@ -31,14 +31,14 @@ void send(const std::vector<T>& from, const DeviceArray<T>& to, std::size_t coun
 }
 
 std::vector<HeldPoint> bring_held(const DeviceArray<std::uint8_t>& with,
-                                  const DeviceArray<float>& hold, cudaStream_t stream) {
+                                  const DeviceArray<float4>& hold, cudaStream_t stream) {
   const std::vector<std::uint8_t> held_with = bring(with, with.size(), stream);
-  const std::vector<float> held_at = bring(hold, hold.size(), stream);
+  const std::vector<float4> held_at = bring(hold, hold.size(), stream);
   std::vector<HeldPoint> held;
   for (std::size_t i = 0; i < held_with.size(); ++i) {
     if (held_with[i] == 0) continue;
-    const float* at = held_at.data() + 3 * i;
-    held.push_back({static_cast<std::int32_t>(i), held_with[i], {at[0], at[1], at[2]}});
+    const float4& at = held_at[i];
+    held.push_back({static_cast<std::int32_t>(i), held_with[i], {at.x, at.y, at.z, at.w}});
   }
   return held;
 }
@@ -194,11 +194,11 @@ void CudaMpmTissue::restore(Span<const std::uint8_t> saved) {
   list_front_cells(*state_);
   push();
   std::vector<std::uint8_t> with(d.with.size(), 0);
-  std::vector<float> hold(d.hold.size(), 0.0f);
+  std::vector<float4> hold(d.hold.size(), float4{0, 0, 0, 0});
   for (const HeldPoint& p : of_device.held) {
     if (p.entry < 0 || static_cast<std::size_t>(p.entry) >= with.size()) refuse();
     with[p.entry] = p.with;
-    std::copy_n(p.hold, 3, hold.begin() + 3 * static_cast<std::ptrdiff_t>(p.entry));
+    hold[p.entry] = {p.hold[0], p.hold[1], p.hold[2], p.hold[3]};
   }
   send(with, d.with, with.size(), d.stream);
   send(hold, d.hold, hold.size(), d.stream);

@@ -8,13 +8,14 @@ namespace {
 
 /// What the tables and the state take on the GPU; clouds and contacts between tissue come on top.
 std::size_t bytes_of(const HostTables& t, std::size_t nodes, std::size_t points, int held_by,
-                     std::size_t most_held) {
-  const std::size_t of_contact = 9 * sizeof(long long) * nodes + 6 * t.lanes;
+                     std::size_t most_held, bool at_surface) {
+  const int sums = 3 * (kPushStride + (at_surface ? kInertiaStride : 0));
+  const std::size_t of_contact = sums * sizeof(long long) * nodes + 6 * t.lanes;
   constexpr std::size_t of_connecting = 16;  // two numbers a slot, and as much again to sort them
   return t.blocks.size() * (sizeof(CudaBlock) + sizeof(CudaMeasure)) +
          t.bundles.size() * sizeof(CudaBundle) + t.columns.size() * sizeof(CudaColumn) +
          t.slots * (of_connecting + 16 + sizeof(uint4) + 2 * sizeof(float4)) + 8 * t.lanes +
-         t.lanes / 2 + (6 * sizeof(float4) + 1) * nodes + (1 + 13 * held_by) * points +
+         t.lanes / 2 + (6 * sizeof(float4) + 1) * nodes + (1 + 17 * held_by) * points +
          most_held * sizeof(HeldPoint) + (held_by > 0 ? of_contact : 0);
 }
 
@@ -40,11 +41,11 @@ std::size_t CudaMpmTissue::device_bytes() const {
       d.made.bytes() + d.spare.bytes() + d.origins.bytes() + d.sweep.bytes() + d.labels.bytes() +
       d.some_nodes.bytes() + d.packed.bytes() + d.piece.bytes() + d.place.bytes() +
       d.slot_parts.bytes() + d.first_parts.bytes() + d.parts.bytes() + d.pushed_parts.bytes() +
-      d.marks.bytes() + d.pushed.bytes() + d.colour.bytes() + d.hold.bytes() + d.outer.bytes() +
-      d.bonds.bytes() + d.soft.bytes() + d.with.bytes() + d.whole.bytes() + d.u_before.bytes() +
-      d.connect_room.bytes() + d.colliders.bytes() + d.loads.bytes() + d.measures.bytes() +
-      d.cloud.bytes() + d.stretched.bytes() + d.faces.bytes() + d.front.bytes() +
-      d.checkpoint.bytes() + d.stacks.bytes() + d.anchors.bytes();
+      d.marks.bytes() + d.pushed.bytes() + d.inertia.bytes() + d.colour.bytes() + d.hold.bytes() +
+      d.outer.bytes() + d.bonds.bytes() + d.soft.bytes() + d.with.bytes() + d.whole.bytes() +
+      d.u_before.bytes() + d.connect_room.bytes() + d.colliders.bytes() + d.loads.bytes() +
+      d.measures.bytes() + d.cloud.bytes() + d.stretched.bytes() + d.faces.bytes() +
+      d.front.bytes() + d.checkpoint.bytes() + d.stacks.bytes() + d.anchors.bytes();
   for (int i = 0; i < 2; ++i) sum += d.u[i].bytes() + d.v[i].bytes() + d.force[i].bytes();
   return sum;
 }
@@ -152,7 +153,9 @@ void CudaMpmTissue::push_tables() {
   const std::size_t most_held = OnDevice::Checkpoint::most_held(d.held_by * points);
   const std::size_t of_stacks =
       d.plan.marches ? Stacks::bytes_for(t, state_->blocks.all, d.plain_resident) : 0;
-  check_memory(bytes_of(t, n, points, d.held_by, most_held) + of_stacks, device_bytes());
+  const bool at_surface = scene.mpm.boundary == MpmBoundary::kSurface;
+  check_memory(bytes_of(t, n, points, d.held_by, most_held, at_surface) + of_stacks,
+               device_bytes());
   check_cuda(cudaStreamSynchronize(d.stream), "finish a frame");
   d.blocks.upload(t.blocks, d.stream);
   d.bundles.upload(t.bundles, d.stream);
@@ -194,7 +197,7 @@ void CudaMpmTissue::push_tables() {
   if (d.with.size() != d.held_by * points) {
     d.with.resize(d.held_by * points);
     d.with.clear(d.stream);
-    d.hold.resize(3 * d.held_by * points);
+    d.hold.resize(d.held_by * points);
     d.hold.clear(d.stream);
   }
   d.checkpoint.resize(n, d.with.size());

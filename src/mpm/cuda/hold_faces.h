@@ -39,6 +39,7 @@ __device__ __forceinline__ void move_free(const FacesAtWork& w, const CudaFaceEn
   u = __ldcg(w.from.u + e.node);
   v = __ldcg(w.from.v + e.node);
   float4 f{0, 0, 0, 0};
+  int inert = 0;
   if (e.slot >= 0) {
     const int count = static_cast<int>(e.shared & 63u);
     const bool marked = kPushes && (__ldg(w.slot_parts + e.slot) & kPushed) != 0;
@@ -57,11 +58,13 @@ __device__ __forceinline__ void move_free(const FacesAtWork& w, const CudaFaceEn
     if (marked) {
       const Pushed push(w.pushed, true, false, e.node);
       add({push.of(0), push.of(1), push.of(2), 0}, f);
+      inert = push.inert;
     }
   }
   w.step.move(0, f.x, u.w, v.w, u.x, v.x);
   w.step.move(1, f.y, u.w, v.w, u.y, v.y);
   w.step.move(2, f.z, u.w, v.w, u.z, v.z);
+  if (kPushes && inert != 0) resist(w.pushed, e.node, w.step, w.from, u, v);
 }
 
 __device__ __forceinline__ double moved(const CudaAnchorPlace& p, const float (&X)[3], int c) {

@@ -61,7 +61,7 @@ struct CudaMpmTissue::OnDevice {
   DeviceArray<std::uint32_t> near_listed;   ///< CudaNearCells::listed
   DeviceArray<std::uint8_t> marks;          ///< per node: what may push it
   DeviceArray<std::uint32_t> pushed_parts;  ///< CudaTables::slot_parts with kPushed
-  DeviceArray<long long> pushed;            ///< NodePushes::force
+  DeviceArray<long long> pushed, inertia;   ///< NodePushes::force and ::inertia
   DeviceArray<CudaBody> bodies;
   BlockTables of_blocks, made, spare;  ///< those that hold; of new blocks; room for the next
   DeviceArray<CudaBlockOrigin> origins;
@@ -72,7 +72,7 @@ struct CudaMpmTissue::OnDevice {
   Stacks stacks;
   ConnectRoom connect_room;
   PinnedArray<int> most_sharing;
-  DeviceArray<float> hold;
+  DeviceArray<float4> hold;
   DeviceArray<float4> outer;  ///< CudaTables::outer
   DeviceArray<std::uint8_t> bonds, soft, with, whole;
   int held_by = 0;  ///< CudaTables::held_by

@@ -1,6 +1,8 @@
 #include "mpm/cuda/outer_points.h"
 
 #include <algorithm>
+#include <array>
+#include <set>
 
 #include "mpm/contact/surface_places.h"
 
@@ -10,9 +12,33 @@ namespace {
 constexpr int kSweeps = 3;         // over the surfaces at a point
 constexpr double kFarthest = 0.5;  // from a point to its place along an axis [cells]
 
+using Cell = std::array<int, 4>;  // body, x, y, z
+
+/// Cells that have nodes which faces hold.
+std::set<Cell> cells_beside(const AnchorFaces& faces, const LatticeTissue& tissue) {
+  std::set<std::int32_t> held;
+  for (const FaceRow& row : faces.rows) {
+    for (int k = 0; k < kRowNodes; ++k) {
+      if (row.weight[k] != 0) held.insert(row.node[k]);
+    }
+  }
+  std::set<Cell> cells;
+  if (held.empty()) return cells;
+  for (std::size_t b = 0; b < tissue.bodies.size(); ++b) {
+    tissue.bodies[b].for_each_node([&](int node, int x, int y, int z) {
+      if (held.count(node) == 0) return;
+      for (int k = 0; k < 27; ++k) {
+        cells.insert({static_cast<int>(b), x + k % 3 - 1, y + k / 3 % 3 - 1, z + k / 9 - 1});
+      }
+    });
+  }
+  return cells;
+}
+
 }  // namespace
 
-std::vector<float4> outer_points(const LatticeTissue& tissue) {
+std::vector<float4> outer_points(const LatticeTissue& tissue, const AnchorFaces& faces) {
+  const std::set<Cell> soft = cells_beside(faces, tissue);
   const std::vector<OuterPlace> all = find_outer_places(tissue);
   const Array<std::uint8_t>& bonds = tissue.points.bonds;
   std::vector<float4> places(tissue.points.size(), float4{0, 0, 0, 0});
@@ -30,9 +56,10 @@ std::vector<float4> outer_points(const LatticeTissue& tissue) {
       }
     }
     x = x.cwiseMax(from - Vec3::Constant(kFarthest)).cwiseMin(from + Vec3::Constant(kFarthest));
+    const bool is_soft = soft.count({s.body, s.x / 2, s.y / 2, s.z / 2}) > 0;
+    const int count = __builtin_popcount(bonds[first->point]) + (is_soft ? kSoftPlace : 0);
     places[first->point] = {static_cast<float>(x[0]), static_cast<float>(x[1]),
-                            static_cast<float>(x[2]),
-                            static_cast<float>(__builtin_popcount(bonds[first->point]))};
+                            static_cast<float>(x[2]), static_cast<float>(count)};
     first = last;
   }
   return places;

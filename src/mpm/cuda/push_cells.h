@@ -7,6 +7,8 @@
 
 #include "math/bspline.h"
 #include "mpm/cuda/add_push.h"
+#include "mpm/cuda/inerters.h"
+#include "mpm/cuda/outer_points.h"
 #include "mpm/cuda/tool_pushes.h"
 
 namespace tissue_sim {
@@ -19,6 +21,7 @@ struct WarpNodes {
 /// Weights of a cell's nodes along each axis at the place where colliders touch a point.
 struct PlaceWeights {
   float at[3], of[3][3];  ///< place in cells from the middle of the cell; [axis][node]
+  bool is_stiff = false;  ///< what holds it off is: outer_points.h
 
   __device__ __forceinline__ PlaceWeights(const CudaTables& t, int point, int s) {
 #pragma unroll
@@ -26,7 +29,9 @@ struct PlaceWeights {
     if (t.outer != nullptr && point >= 0) {
       const float4 place = __ldg(t.outer + point);
       // What cuts took apart may lie on its other side.
-      if (place.w != 0 && place.w == __popc(t.bonds[point]))
+      const int bonds = __popc(t.bonds[point]);
+      is_stiff = place.w != 0 && place.w == bonds;
+      if (is_stiff || place.w == bonds + kSoftPlace)
         at[0] = place.x, at[1] = place.y, at[2] = place.z;
     }
 #pragma unroll
@@ -34,6 +39,13 @@ struct PlaceWeights {
 #pragma unroll
       for (int i = 0; i < 3; ++i) of[a][i] = cell_weight(at[a], i);
     }
+  }
+  /// Sum of the sizes of the 27 weights: 1 but where the place lies outside of the cell.
+  __device__ __forceinline__ float size() const {
+    float product = 1;
+#pragma unroll
+    for (int a = 0; a < 3; ++a) product *= fabsf(of[a][0]) + fabsf(of[a][1]) + fabsf(of[a][2]);
+    return product;
   }
 };
 
@@ -60,6 +72,8 @@ struct ToolPushes {
   const Collider* colliders;  ///< in shared memory
   unsigned long long* loads;  ///< per collider
   long long* force;           ///< per node, see NodePushes
+  long long* inertia;         ///< the same
+  float dt, kick, grown;  ///< as CudaFrame::step and ::grown; this is 0 but in the first substep
 };
 
 /// Adds what colliders push the points of a cell with to its nodes. The first eight lanes of the
@@ -85,7 +99,8 @@ __device__ __forceinline__ void push_cell(const CudaTables& t, const CudaNodes& 
     held.load(t, p);
     point.is_cut = t.bonds[p] != kAllBonds;
   }
-  point.spring = {body.spring.stiffness * volume, body.spring.damping * volume};
+  point.spring = point_spring(body.spring, volume, weights.is_stiff, pushes.dt);
+  point.inertia = weights.is_stiff ? kInertia * point.spring.across * pushes.dt * pushes.dt : 0;
   __syncwarp();
   nodes.u[k][0] = u.x, nodes.u[k][1] = u.y, nodes.u[k][2] = u.z;
   nodes.v[k][0] = v.x, nodes.v[k][1] = v.y, nodes.v[k][2] = v.z;
@@ -99,13 +114,34 @@ __device__ __forceinline__ void push_cell(const CudaTables& t, const CudaNodes& 
     point.v[a] = __shfl_sync(0xffffffffu, velocity, s + 8 * a);
   }
   const bool held_before = (held.with[0] | held.with[1]) != 0;
-  float push[3] = {0, 0, 0};
-  push_point(point, pushes.colliders, cell.near, t.held_by, held, pushes.loads, push);
+  float push[3] = {0, 0, 0}, force[3] = {0, 0, 0};
+  const auto resist = [&](int c, const float(&normal)[3], float along, bool resists, bool begins) {
+    if (pushes.inertia == nullptr) return;
+    const unsigned places = __ballot_sync(0xffffffffu, resists && point.inertia > 0);
+    if (places == 0) return;
+    InertialPlaces all;
+    all.mask = places;
+    all.inertia = point.inertia * weights.size();
+    all.taken = begins ? 1 : pushes.grown;
+    all.along = along;
+#pragma unroll
+    for (int a = 0; a < 3; ++a) {
+      const int i = a == 0 ? k % 3 : (a == 1 ? k / 3 % 3 : k / 9);
+      all.at[a] = weights.at[a];
+      all.normal[a] = normal[a];
+      all.v[a] = nodes.v[k][a];
+      all.x[a] = cell.middle[a] + (i - 1) * body.cell_size + nodes.u[k][a];
+    }
+    const int own = lane < 27 && v.w != 0 ? node : -1;
+    const float3 taken = add_inertia(all, pushes.colliders + c, c, pushes.kick, own, pushes.inertia,
+                                     pushes.force, pushes.loads);
+    force[0] += taken.x, force[1] += taken.y, force[2] += taken.z;
+  };
+  push_point(point, pushes.colliders, cell.near, t.held_by, held, pushes.loads, push, resist);
   const bool holds = (held.with[0] | held.with[1]) != 0;
   if (point.index >= 0 && (holds || held_before)) held.store(t, p);
   unsigned left = __ballot_sync(0xffffffffu, holds);
   if (left == 0) return;
-  float force[3] = {0, 0, 0};
   for (; left != 0; left &= left - 1) {
     const int from = __ffs(static_cast<int>(left)) - 1;
     float w = 1;

@@ -103,7 +103,13 @@ __device__ __forceinline__ void all_forces(const CudaTables& t, const BundleAtWo
 
 /// The sums of pushes that a round reads and clears.
 __device__ __forceinline__ PushedNodes pushed_nodes(const NodePushes& p, int round) {
-  return {p.force + p.stride * ((round + 2) % 3), p.force + p.stride * ((round + 1) % 3)};
+  const int read = (round + 2) % 3, clear = (round + 1) % 3;
+  PushedNodes of{p.force + p.stride * read, p.force + p.stride * clear};
+  if (p.inertia != nullptr) {
+    of.inertia = p.inertia + p.inertia_stride * read;
+    of.clear_inertia = p.inertia + p.inertia_stride * clear;
+  }
+  return of;
 }
 
 /// Thread blocks meet a second time in a round, where all nodes are in place. The last thread
@@ -136,10 +142,16 @@ __device__ __forceinline__ void block_round(const CudaTables& t, const CudaFrame
                                        nullptr, f.step, scale, s.u, v);
   } else {
     PushedNodes pushed = {};
-    if (kPushes) pushed = pushed_nodes(f.pushes, round);
+    InertialLoads loads = {};
+    if (kPushes) {
+      pushed = pushed_nodes(f.pushes, round);
+      const int first = (round - 1) * f.collider_count;
+      loads = {t.blocks + w.bundle.first_block, w.bundle.blocks, t.bodies, f.colliders + first,
+               reinterpret_cast<unsigned long long*>(f.loads) + kLoadSums * first};
+    }
     bring_nodes<true, kCached, kHand, kPushes>(t, w.bundle.first_slot, w.bundle.slots, cache, from,
                                                to, odd_round ? f.force[0] : f.force[1], f.step,
-                                               scale, s.u, v, pushed);
+                                               scale, s.u, v, pushed, loads);
     if (kCan != Can::kPlain && f.held_faces.chunks != nullptr) {
       hold_faces<kPushes>(f.held_faces, {t.slot_node, t.slot_parts, t.parts, from, to,
                                          odd_round ? f.force[0] : f.force[1], f.step, scale, s.u, v,
@@ -184,7 +196,11 @@ __device__ __forceinline__ void push_nodes(const CudaTables& t, const CudaFrame&
   if (f.near_cells != nullptr && block >= 0) {
     auto* loads =
         reinterpret_cast<unsigned long long*>(f.loads) + kLoadSums * f.collider_count * round;
-    near.push(t, state, kCellReach * f.cell_size, {s.colliders, loads, force}, s.cells[warp]);
+    long long* inertia = f.pushes.inertia;
+    if (inertia != nullptr) inertia += f.pushes.inertia_stride * (round % 3);
+    near.push(t, state, kCellReach * f.cell_size,
+              {s.colliders, loads, force, inertia, dt, f.step.kick, round == 0 ? f.grown : 0},
+              s.cells[warp]);
   }
   touch();
 }

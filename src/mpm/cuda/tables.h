@@ -102,10 +102,16 @@ struct alignas(16) CudaNearCell {
 
 /// Forces of colliders and facets on the nodes, [3][nodes][kPushStride], in units of kLoadUnit as
 /// integers: while one is summed up, that of the substep before is read and the third is cleared.
-inline constexpr int kPushStride = 4;  ///< three components, and one to read them by twos
+/// Likewise [3][nodes][kInertiaStride] what inerters bring to the nodes, xx yy zz xy yz zx, in
+/// units of kInertiaUnit: inerters.h.
+inline constexpr int kPushStride = 4;  ///< three components; 1 + a collider that has inerters there
+inline constexpr int kInertiaStride = 6;
+inline constexpr double kInertiaUnit = 1.0 / (1ll << 58);  ///< [kg]
 struct NodePushes {
   long long* force = nullptr;
-  std::size_t stride = 0;  ///< from one of the three to the next
+  std::size_t stride = 0;        ///< from one of the three to the next
+  long long* inertia = nullptr;  ///< null where no contact has any
+  std::size_t inertia_stride = 0;
 };
 
 /// State of a block at the end of a frame.
@@ -147,7 +153,8 @@ struct CudaTables {
                            ///< are 1
   int held_by;             ///< colliders that a point may hold on to at a time: 0 to 2
   std::uint8_t* with;      ///< [point][held_by]: 0, or 1 + index of a collider it touches
-  float* hold;             ///< [point][held_by][3]: the place that friction holds on to
+  float4* hold;  ///< [point][held_by]: the place that friction holds on to, in the collider's
+                 ///< frame [m], and how deep contact began (contact/surface_spring.h) [m]
 };
 
 /// Sums of what acts on a collider in one substep: force and moment in units of kLoadUnit, as
@@ -173,6 +180,8 @@ struct CudaFrame {
   const int* near_count;
   float cell_size;  ///< the scene's [m]
   NodePushes pushes;
+  float grown = 0;  ///< share of what inerters are now that they are larger by than in the substep
+                    ///< before, for the first one is longer
   unsigned* arrived;       ///< counters of the two barriers, and of turns; 0 at the beginning
   const CudaFaces* faces;  ///< null where no tissue touches tissue
   CudaHeldFaces held_faces;

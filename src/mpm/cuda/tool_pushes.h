@@ -2,6 +2,7 @@
 #pragma once
 
 #include "contact/contact_spring.h"
+#include "contact/surface_spring.h"
 #include "mpm/cuda/grid_barrier.h"
 #include "mpm/cuda/tables.h"
 #include "mpm/lattice/bonds.h"
@@ -27,14 +28,15 @@ __device__ __forceinline__ bool may_touch(const Collider& c, const float* x, flo
          p[0] < radius && p[0] > -c.width - radius;
 }
 
-/// Adds forces and moments of a warp's first eight lanes to a load, as integers, whose sum does not
+/// Adds forces and moments of a warp's first lanes to a load, as integers, whose sum does not
 /// depend on the order.
+template <int kLanes = 8>
 __device__ __forceinline__ void add_load(unsigned long long* load, const double (&value)[6]) {
   long long sum[6];
 #pragma unroll
   for (int i = 0; i < 6; ++i) sum[i] = __double2ll_rn(value[i] * (1 / kLoadUnit));
 #pragma unroll
-  for (int step = 4; step > 0; step /= 2) {
+  for (int step = kLanes / 2; step > 0; step /= 2) {
 #pragma unroll
     for (int i = 0; i < 6; ++i) sum[i] += __shfl_xor_sync(0xffffffffu, sum[i], step);
   }
@@ -48,17 +50,14 @@ __device__ __forceinline__ void add_load(unsigned long long* load, const double 
 /// What a point remembers of its contacts: CudaTables::with and hold.
 struct Held {
   int with[2] = {0, 0};
-  float place[2][3] = {};
+  float4 place[2] = {};
 
   __device__ __forceinline__ void load(const CudaTables& t, int p) {
 #pragma unroll
     for (int slot = 0; slot < 2; ++slot) {
       if (slot >= t.held_by) return;
       with[slot] = __ldcg(t.with + p * t.held_by + slot);
-#pragma unroll
-      for (int a = 0; a < 3; ++a) {
-        place[slot][a] = __ldcg(t.hold + 3 * (static_cast<std::size_t>(p) * t.held_by + slot) + a);
-      }
+      place[slot] = __ldcg(t.hold + static_cast<std::size_t>(p) * t.held_by + slot);
     }
   }
   __device__ __forceinline__ void store(const CudaTables& t, int p) const {
@@ -66,38 +65,60 @@ struct Held {
     for (int slot = 0; slot < 2; ++slot) {
       if (slot >= t.held_by) return;
       __stcg(t.with + p * t.held_by + slot, static_cast<std::uint8_t>(with[slot]));
-#pragma unroll
-      for (int a = 0; a < 3; ++a) {
-        __stcg(t.hold + 3 * (static_cast<std::size_t>(p) * t.held_by + slot) + a, place[slot][a]);
-      }
+      __stcg(t.hold + static_cast<std::size_t>(p) * t.held_by + slot, place[slot]);
     }
   }
 };
 
+/// How deep contact of a stiff spring begins, of how deep it is: it pushes as hard then as the soft
+/// one would, so that a tool which comes deep within a substep is held off as well.
+inline constexpr float kBegunDeep = 1 - 1 / kAcross;
+
+/// The spring of a point of so much volume [m^3], by that of a m^3 at the lattice: as that where it
+/// is soft, else as stiff across the surface as a CPU's.
+__device__ __forceinline__ SurfaceSpring point_spring(const ContactSpring& of_lattice, float volume,
+                                                      bool is_stiff, float dt) {
+  SurfaceSpring s;
+  s.across = s.along = of_lattice.stiffness * volume;
+  s.damping_across = s.damping_along = of_lattice.damping * volume;
+  s.cohesion = 0;
+  s.most = kUnbounded;
+  if (is_stiff) {
+    s.across *= kAcross;
+    s.damping_across = kDampingAcross * dt * s.across;
+  }
+  return s;
+}
+
 /// A point that colliders may push.
 struct PushedPoint {
-  int index;            ///< -1 where there is none
-  bool is_cut = false;  ///< it has lost a bond
-  float x[3], v[3];     ///< [m], [m/s]
-  ContactSpring spring;
+  int index;             ///< -1 where there is none
+  bool is_cut = false;   ///< it has lost a bond
+  float x[3], v[3];      ///< [m], [m/s]
+  SurfaceSpring spring;  ///< but for its cohesion, which is the collider's
+  float inertia = 0;     ///< of its inerter, above 0 where the spring is stiff across [kg]
   __device__ __forceinline__ bool touches(const Collider& c) const {
     return index >= 0 && (is_cut || c.kind != Collider::kBlade) && may_touch(c, x, 0);
   }
 };
 
 /// Force of the colliders on the point [N], whose load goes to `loads`. All lanes of a warp take
-/// part; `near` are the colliders that any of their points may lie in.
+/// part; `near` are the colliders that any of their points may lie in. Where any touches, all lanes
+/// call resist(collider, its normal there, its velocity along that, whether the lane's point
+/// touches, whether that begins).
+template <class Resist>
 __device__ __forceinline__ void push_point(const PushedPoint& point, const Collider* colliders,
                                            std::uint32_t near, int held_by, Held& held,
-                                           unsigned long long* loads, float (&sum)[3]) {
+                                           unsigned long long* loads, float (&sum)[3],
+                                           const Resist& resist) {
   bool holds[2] = {false, false};
   for (std::uint32_t left = near; left != 0; left &= left - 1) {
     const int c = __ffs(static_cast<int>(left)) - 1;
     const Collider& collider = colliders[c];
     const bool touches = point.touches(collider);
     if (__ballot_sync(0xffffffffu, touches) == 0) continue;
-    float push[3] = {0, 0, 0}, distance = 0;
-    bool pushes = false, is_inside = false;
+    float push[3] = {0, 0, 0}, normal[3] = {0, 0, 0}, distance = 0, along = 0;
+    bool pushes = false, begins = false, is_inside = false;
     if (touches) {
       const Gap g = gap(collider, point.x);
       distance = g.distance;
@@ -106,19 +127,31 @@ __device__ __forceinline__ void push_point(const PushedPoint& point, const Colli
           held_by == 2 && (held.with[1] == c + 1 || (held.with[0] != 0 && held.with[0] != c + 1));
       pushes = g.distance < 0;
       if (pushes) {
-        float place[3];
-#pragma unroll
-        for (int a = 0; a < 3; ++a) place[a] = second ? held.place[1][a] : held.place[0][a];
-        if ((second ? held.with[1] : held.with[0]) != c + 1) to_local(collider, point.x, place);
-        contact_force(collider, g, point.spring, point.x, point.v, place, push);
+        const float4 was = second ? held.place[1] : held.place[0];
+        float place[3] = {was.x, was.y, was.z}, begun = was.w;
+        begins = (second ? held.with[1] : held.with[0]) != c + 1;
+        if (begins) {
+          to_local(collider, point.x, place);
+          begun = kBegunDeep * -g.distance;
+        }
+        if (point.inertia == 0) begun = 0;
+        SurfaceSpring spring = point.spring;
+        spring.cohesion = collider.cohesion;
+        surface_force(collider, g, spring, point.x, point.v, place, begun, push);
         (second ? held.with[1] : held.with[0]) = c + 1;
         (second ? holds[1] : holds[0]) = true;
+        (second ? held.place[1] : held.place[0]) = {place[0], place[1], place[2], begun};
+        float of_collider[3];
+        velocity_at(collider, point.x, of_collider);
 #pragma unroll
-        for (int a = 0; a < 3; ++a) (second ? held.place[1][a] : held.place[0][a]) = place[a];
-#pragma unroll
-        for (int a = 0; a < 3; ++a) sum[a] += push[a];
+        for (int a = 0; a < 3; ++a) {
+          sum[a] += push[a];
+          normal[a] = g.normal[a];
+          along += of_collider[a] * normal[a];
+        }
       }
     }
+    resist(c, normal, along, pushes, begins);
     if (collider.tool < 0) continue;  // nobody asks what the ground carries
     if (is_inside) {                  // seldom
       atomicAdd(loads + kLoadSums * c + 7, 1ull);

@@ -105,7 +105,8 @@ struct PushedPoint {
 /// Force of the colliders on the point [N], whose load goes to `loads`. All lanes of a warp take
 /// part; `near` are the colliders that any of their points may lie in. Where any touches, all lanes
 /// call resist(collider, its normal there, its velocity along that, whether the lane's point
-/// touches, whether that begins).
+/// touches, whether that begins). Jaws have soft springs: they close until what touches them
+/// presses back, and of stiff ones too little touches.
 template <class Resist>
 __device__ __forceinline__ void push_point(const PushedPoint& point, const Collider* colliders,
                                            std::uint32_t near, int held_by, Held& held,
@@ -117,6 +118,7 @@ __device__ __forceinline__ void push_point(const PushedPoint& point, const Colli
     const Collider& collider = colliders[c];
     const bool touches = point.touches(collider);
     if (__ballot_sync(0xffffffffu, touches) == 0) continue;
+    const bool is_stiff = point.inertia > 0 && collider.kind != Collider::kJaw;
     float push[3] = {0, 0, 0}, normal[3] = {0, 0, 0}, distance = 0, along = 0;
     bool pushes = false, begins = false, is_inside = false;
     if (touches) {
@@ -134,8 +136,12 @@ __device__ __forceinline__ void push_point(const PushedPoint& point, const Colli
           to_local(collider, point.x, place);
           begun = kBegunDeep * -g.distance;
         }
-        if (point.inertia == 0) begun = 0;
         SurfaceSpring spring = point.spring;
+        if (!is_stiff) {
+          begun = 0;
+          spring.across = spring.along;
+          spring.damping_across = spring.damping_along;
+        }
         spring.cohesion = collider.cohesion;
         surface_force(collider, g, spring, point.x, point.v, place, begun, push);
         (second ? held.with[1] : held.with[0]) = c + 1;
@@ -151,7 +157,7 @@ __device__ __forceinline__ void push_point(const PushedPoint& point, const Colli
         }
       }
     }
-    resist(c, normal, along, pushes, begins);
+    resist(c, normal, along, pushes && is_stiff, begins);
     if (collider.tool < 0) continue;  // nobody asks what the ground carries
     if (is_inside) {                  // seldom
       atomicAdd(loads + kLoadSums * c + 7, 1ull);

@@ -14,7 +14,6 @@
 namespace tissue_sim {
 namespace {
 
-constexpr int kLargestGroup = 64;
 constexpr double kNearestAxis = 0.9;  // a row goes through a face where its axis is that close to
                                       // the one that is closest to the normal
 

@@ -43,6 +43,8 @@ struct FaceLink {
   float place[3];  ///< the same in reference space [m]
 };
 
+inline constexpr int kLargestGroup = 64;  ///< rows of a FaceGroup
+
 /// Rows that have nodes in common are held together.
 struct FaceGroup {
   std::int32_t first, count;  ///< of its rows

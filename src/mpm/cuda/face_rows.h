@@ -9,7 +9,8 @@
 
 namespace tissue_sim {
 
-inline constexpr int kFaceRowNodes = 4;  ///< kRowNodes
+inline constexpr int kFaceRowNodes = 4;    ///< kRowNodes
+inline constexpr int kFaceGroupRows = 64;  ///< kLargestGroup
 
 /// Groups of rows that a thread block holds side by side for a bundle that has nodes of theirs:
 /// those of its slots move as the groups say. Whoever has nodes of a group works it out anew, from

@@ -5,12 +5,11 @@ namespace tissue_sim {
 namespace {
 
 constexpr int kThreads = 96;
-constexpr int kMostRows = 64;  // of a group
 
 /// A group each thread block: hold_still() of mpm/anchors/anchor_faces.h.
 __global__ void hold_groups(const CudaRowGroup* groups, const CudaRowNodes* rows,
                             const float* inverses, float4* field) {
-  __shared__ float held[3 * kMostRows], impulse[3 * kMostRows];
+  __shared__ float held[3 * kFaceGroupRows], impulse[3 * kFaceGroupRows];
   const CudaRowGroup g = groups[blockIdx.x];
   const CudaRowNodes* const of_group = rows + g.first;
   float* const numbers = reinterpret_cast<float*>(field);

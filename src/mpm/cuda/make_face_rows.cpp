@@ -5,7 +5,8 @@
 namespace tissue_sim {
 namespace {
 
-static_assert(kRowNodes == kFaceRowNodes, "rows are the same on both sides");
+static_assert(kRowNodes == kFaceRowNodes && kLargestGroup == kFaceGroupRows,
+              "rows and groups are the same on both sides");
 
 /// A slot whose node rows have, or an anchor carries.
 struct SlotOfNode {

@@ -97,11 +97,8 @@ struct Shortfall {
   Method method;
   const char* test;
   const char* read;
-  bool is_gpus_alone = false;
 };
 inline constexpr Shortfall kShortfalls[] = {
-    {Method::kMpm, "FreeFlightStaysThroughCutsAsWithoutThem",
-     "angular momentum 4.3e-5 off after five cuts, for 3e-5 (CPU 2.1e-5)", true},
     {Method::kPbd, "AStruckBodyIsWhatTheToolGaveIt",
      "momentum 1.3e-3 off the tool's impulse, for 1e-3: each projection rounds positions"},
     {Method::kPbd, "SagsAsTimoshenkoSays",
@@ -119,7 +116,6 @@ inline std::string falls_short(const MethodOnDevice& on) {
   std::string test = testing::UnitTest::GetInstance()->current_test_info()->name();
   test.resize(std::min(test.size(), test.find('/')));
   for (const Shortfall& s : kShortfalls) {
-    if (s.is_gpus_alone && on.device != Device::kCuda) continue;
     if (s.method == on.method && test == s.test) {
       return std::string(name_of(on.method, kMethodNames)) + " does not reach this yet: " + s.read;
     }

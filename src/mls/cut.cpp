@@ -11,7 +11,7 @@ namespace tissue_sim {
 namespace {
 
 /// Touched nodes that a thread works on at a time.
-constexpr int kNodesAtATime = 256;
+constexpr int kNodesAtATime = 128;
 
 /// The neighbours of a node, marked by number: to look at several of its pairs.
 class Marked {

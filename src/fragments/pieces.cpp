@@ -4,6 +4,8 @@
 #include <map>
 #include <unordered_map>
 
+#include "fragments/find_parted.h"
+
 namespace tissue_sim {
 namespace {
 
@@ -118,20 +120,25 @@ std::vector<int> part_pieces(const float* volume, const std::vector<PartedRun>& 
   return fresh;
 }
 
-std::vector<int> update_pieces(const float* volume, UnionFind& linked, Pieces& pieces) {
+std::vector<PartedRun> find_parted(const Pieces& pieces, UnionFind& linked) {
   std::vector<PartedRun> parted;
   const auto count = static_cast<std::int32_t>(pieces.of_point.size());
+  const std::int32_t *of_point = pieces.of_point.data(), *lowest_of = pieces.lowest.data();
   for (std::int32_t p = 0; p < count; ++p) {
-    const std::int32_t lowest = linked.root(p), piece = pieces.of_point[p];
-    if (pieces.lowest[piece] == lowest) continue;
+    const std::int32_t lowest = linked.root(p), piece = of_point[p];
+    if (lowest_of[piece] == lowest) continue;
     if (!parted.empty() && parted.back().end == p && parted.back().lowest == lowest &&
-        pieces.of_point[p - 1] == piece) {
+        of_point[p - 1] == piece) {
       ++parted.back().end;
     } else {
       parted.push_back({p, p + 1, lowest});
     }
   }
-  return part_pieces(volume, parted, pieces);
+  return parted;
+}
+
+std::vector<int> update_pieces(const float* volume, UnionFind& linked, Pieces& pieces) {
+  return part_pieces(volume, find_parted(pieces, linked), pieces);
 }
 
 }  // namespace tissue_sim

@@ -5,6 +5,7 @@
 #include <cstring>
 #include <utility>
 
+#include "compute/simd.h"
 #include "cutting/blade_sweep.h"
 #include "tissue_sim/limits.h"
 
@@ -13,7 +14,7 @@ namespace {
 
 /// Chunks that a thread looks at at a time.
 constexpr int kChunksAtATime = 32;
-/// Of sides: a bit for each side of each of three slabs.
+/// Of sides: a bit for each of three slabs that a node stays below, then for each above.
 constexpr std::uint8_t kAllSides = 0x3f;
 /// Rounding of what a node's place comes to along an axis, over the sum of its coordinates.
 constexpr float kRounding = 2e-6f;
@@ -86,46 +87,43 @@ MovingSegment link_of(const Sweep& w, std::int32_t i, std::int32_t j) {
   return {at(i, w.u_begin), at(j, w.u_begin), at(i, w.u_end), at(j, w.u_end)};
 }
 
-/// Sides of a chunk's nodes: those on which they stay for certain. Where one slab has all of them
-/// on one side, the next ones are not looked at. Returns the sides that all of them have.
+/// The slabs of what an edge sweeps, side by side.
+struct Slabs {
+  Vec<4> axis[3];    // by coordinate
+  Vec<4> low, high;  // the fourth has all on neither side
+
+  explicit Slabs(const SweptEdge& edge) : low(), high() {
+    for (int k = 0; k < 3; ++k) {
+      const Slab& slab = edge.slabs[k];
+      for (int a = 0; a < 3; ++a) axis[a][k] = static_cast<float>(slab.axis[a]);
+      low[k] = static_cast<float>(slab.low - kRounding * std::fabs(slab.low));
+      high[k] = static_cast<float>(slab.high + kRounding * std::fabs(slab.high));
+    }
+    for (int a = 0; a < 3; ++a) axis[a][3] = 0;
+  }
+  Vec<4> along(Vec<4> x) const { return axis[0] * x[0] + axis[1] * x[1] + axis[2] * x[2]; }
+};
+
+/// Sides of a chunk's nodes: those on which they stay for certain. Returns those that all have.
 template <bool kStill>
-std::uint8_t find_sides(const Sweep& w, const SweptEdge& edge, int chunk, std::uint8_t* sides) {
-  constexpr int kEnd = kStill ? 0 : 1;
-  float x[2][3][kMlsChunk], margin[kMlsChunk];
-  const float* place = &w.s.place[4 * static_cast<std::size_t>(chunk) * kMlsChunk];
-  for (int end = 0; end <= kEnd; ++end) {
-    const float* u =
-        (end == 0 ? w.u_begin : w.u_end) + 4 * static_cast<std::size_t>(chunk) * kMlsChunk;
-    for (int a = 0; a < 3; ++a) {
-      for (int l = 0; l < kMlsChunk; ++l) x[end][a][l] = place[4 * l + a] + u[4 * l + a];
-    }
+std::uint8_t find_sides(const Sweep& w, const Slabs& slabs, int chunk, std::uint8_t* sides) {
+  constexpr Mask<4> kBelow = {1, 2, 4, 0}, kAbove = {8, 16, 32, 0};
+  const std::int32_t first = chunk * kMlsChunk, last = std::min(w.s.count(), first + kMlsChunk);
+  std::int32_t common = kAllSides;
+  for (std::int32_t i = first; i < last; ++i) {
+    const Vec<4> place = load<4>(&w.s.place[4 * i]), x = place + load<4>(w.u_begin + 4 * i);
+    const Vec<4> y = kStill ? x : place + load<4>(w.u_end + 4 * i);
+    const Vec<4> p = slabs.along(x), q = kStill ? p : slabs.along(y);
+    const float margin =
+        kRounding * ((std::fabs(x[0]) + std::fabs(y[0])) + (std::fabs(x[1]) + std::fabs(y[1])) +
+                     (std::fabs(x[2]) + std::fabs(y[2])));
+    const Mask<4> below = (p + margin < slabs.low) & (q + margin < slabs.low),
+                  above = (p - margin > slabs.high) & (q - margin > slabs.high);
+    const Mask<4> on = (below & kBelow) | (above & kAbove);
+    const std::int32_t of = on[0] | on[1] | on[2];
+    sides[i - first] = static_cast<std::uint8_t>(of);
+    common &= of;
   }
-  for (int l = 0; l < kMlsChunk; ++l) {
-    float sum = 0;
-    for (int a = 0; a < 3; ++a) {
-      sum += std::fabs(x[0][a][l]) + std::fabs(x[kEnd][a][l]);
-    }
-    margin[l] = kRounding * sum;
-  }
-  std::int32_t bits[kMlsChunk] = {}, common = 0;
-  const int count = std::min(kMlsChunk, w.s.count() - chunk * kMlsChunk);
-  for (int k = 0; k < 3 && common == 0; ++k) {
-    const Slab& slab = edge.slabs[k];
-    const auto a = static_cast<float>(slab.axis[0]), b = static_cast<float>(slab.axis[1]),
-               c = static_cast<float>(slab.axis[2]);
-    const auto low = static_cast<float>(slab.low - kRounding * std::fabs(slab.low)),
-               high = static_cast<float>(slab.high + kRounding * std::fabs(slab.high));
-    for (int l = 0; l < kMlsChunk; ++l) {
-      const float p = a * x[0][0][l] + b * x[0][1][l] + c * x[0][2][l];
-      const float q = a * x[kEnd][0][l] + b * x[kEnd][1][l] + c * x[kEnd][2][l];
-      const float most = p > q ? p : q, least = p > q ? q : p;
-      bits[l] |=
-          (most + margin[l] < low ? 1 << 2 * k : 0) | (least - margin[l] > high ? 2 << 2 * k : 0);
-    }
-    common = kAllSides;
-    for (int l = 0; l < count; ++l) common &= bits[l];
-  }
-  for (int l = 0; l < kMlsChunk; ++l) sides[l] = static_cast<std::uint8_t>(bits[l]);
   return static_cast<std::uint8_t>(common);
 }
 
@@ -151,14 +149,23 @@ bool passes(const Sweep& w, const SweepOfEdge& sweep, std::int32_t i, std::int32
   return true;
 }
 
-/// Whether any of eight nodes and the eight others have no side in common, whose sides are below
-/// 0x80.
-bool any_astride(const std::uint8_t* sides, const std::uint8_t* others) {
-  constexpr std::uint64_t kOnes = 0x7f7f7f7f7f7f7f7full;
-  std::uint64_t a, b;
-  std::memcpy(&a, sides, sizeof(a));
-  std::memcpy(&b, others, sizeof(b));
-  return (((a & b) + kOnes) & ~kOnes) != ~kOnes;
+/// Of a chunk's nodes, a byte each: not 0 where one of their later neighbours by slots shares no
+/// side with them. Rows of neighbours end within a slot: some of these may be no pairs.
+void find_astride(const MlsLanes& lanes, const Sides& sides, int chunk,
+                  std::uint8_t (&astride)[kMlsChunk]) {
+  typedef std::uint8_t Bytes __attribute__((vector_size(kMlsChunk)));
+  const std::int32_t first = chunk * kMlsChunk;
+  Bytes own, all{};
+  std::memcpy(&own, sides.at(first), sizeof(own));
+  const MlsSlots& slots = lanes.of_chunk[chunk];
+  for (std::int32_t slot = slots.first; slot < slots.end; ++slot) {
+    const std::int32_t other = lanes.first[slot];
+    if (other <= first) continue;
+    Bytes others;
+    std::memcpy(&others, sides.at(other), sizeof(others));
+    all |= reinterpret_cast<Bytes>((own & others) == 0);
+  }
+  std::memcpy(astride, &all, sizeof(all));
 }
 
 struct Crossed {
@@ -177,36 +184,51 @@ struct Crossed {
   }
 };
 
-/// Of pairs of the chunk's nodes with later ones.
-void search_chunk(const Sweep& w, const SweepOfEdge& sweep, const Sides& sides, int chunk,
-                  Crossed& found) {
-  const MlsPairs& p = w.s.pairs;
-  const MlsLanes& lanes = w.s.lanes;
-  const std::int32_t first = chunk * kMlsChunk, last = std::min(w.s.count(), first + kMlsChunk);
-  const MlsSlots& slots = lanes.of_chunk[chunk];
-  double t = 0;
-  for (std::int32_t slot = slots.first; slot < slots.end; ++slot) {
-    const std::int32_t other = lanes.first[slot];
-    if (other <= first) continue;
-    for (int half = 0; half < kMlsChunk; half += 8) {
-      if (!any_astride(sides.at(first + half), sides.at(other + half))) continue;
-      for (int l = half; l < half + 8; ++l) {
-        if ((*sides.at(first + l) & *sides.at(other + l)) != 0) continue;
-        const std::int32_t i = first + l, j = other + l;
-        if (i >= last || j >= w.s.count()) continue;
-        if (!passes(w, sweep, i, j, t)) continue;
-        const std::int32_t e = p.find(i, j);  // rows end within a slot: they may be no pair
-        if (e >= 0 && p.crossed[e] == 0) found.add(e, t);
-      }
-    }
+/// Adds nodes of the chunk that may have a later neighbour on another side.
+void list_astride(const MlsState& s, const Sides& sides, int chunk,
+                  std::vector<std::int32_t>& nodes) {
+  const std::int32_t first = chunk * kMlsChunk, last = std::min(s.count(), first + kMlsChunk);
+  const MlsSlots& slots = s.lanes.of_chunk[chunk];
+  std::uint8_t astride[kMlsChunk];
+  if (slots.first < slots.end) {
+    find_astride(s.lanes, sides, chunk, astride);
+    std::uint64_t halves[2];
+    std::memcpy(halves, astride, sizeof(halves));
+    if ((halves[0] | halves[1]) == 0) return;
+  } else {
+    std::fill_n(astride, kMlsChunk, std::uint8_t{1});
   }
-  if (slots.first < slots.end) return;
   for (std::int32_t i = first; i < last; ++i) {
+    if (astride[i - first] != 0) nodes.push_back(i);
+  }
+}
+
+/// Of pairs of these nodes with later ones.
+void search_nodes(const Sweep& w, const SweepOfEdge& sweep, const Sides& sides,
+                  const std::vector<std::int32_t>& nodes, Crossed& found) {
+  const MlsPairs& p = w.s.pairs;
+  constexpr std::size_t kAhead = 8;  // whose pairs are asked for from memory
+  std::vector<std::int32_t> may_pass;
+  double t = 0;
+  for (std::size_t k = 0; k < nodes.size(); ++k) {
+    if (k + kAhead < nodes.size()) {
+      const std::int32_t next = p.begin[nodes[k + kAhead]];
+      __builtin_prefetch(&p.other[next]);
+      __builtin_prefetch(&p.other[next] + 16);
+      __builtin_prefetch(&p.crossed[next]);
+    }
+    const std::int32_t i = nodes[k];
     const std::uint8_t own = *sides.at(i);
+    may_pass.resize(p.begin[i + 1] - p.begin[i] + 1);
+    int listed = 0;  // without a branch, for nothing foretells which are
     for (std::int32_t e = p.begin[i]; e < p.begin[i + 1]; ++e) {
       const std::int32_t j = p.other[e];
-      if (j < i || (own & *sides.at(j)) != 0 || p.crossed[e] != 0) continue;
-      if (passes(w, sweep, i, j, t)) found.add(e, t);
+      may_pass[listed] = e;
+      listed += static_cast<int>(j > i) & ((own & *sides.at(j)) == 0 ? 1 : 0) &
+                (p.crossed[e] == 0 ? 1 : 0);
+    }
+    for (int c = 0; c < listed; ++c) {
+      if (passes(w, sweep, i, p.other[may_pass[c]], t)) found.add(may_pass[c], t);
     }
   }
 }
@@ -226,13 +248,14 @@ std::vector<std::int32_t> find_crossed(const MlsState& s, const BladePath& path,
     stop_if_asked();
     for (const SweptEdge& edge : part.edges) {
       const SweepOfEdge sweep{part.begin, part.end, edge, Parallelogram(edge)};
+      const Slabs slabs(edge);
       s.cpu->for_each(blocks, [&](int block) {
         const int first = block * kChunksAtATime, last = std::min(chunks, first + kChunksAtATime);
         common[block] = kAllSides;
         for (int chunk = first; chunk < last; ++chunk) {
           std::uint8_t* of = sides.at(chunk * kMlsChunk);
-          common[block] &= w.is_still() ? find_sides<true>(w, edge, chunk, of)
-                                        : find_sides<false>(w, edge, chunk, of);
+          common[block] &= w.is_still() ? find_sides<true>(w, slabs, chunk, of)
+                                        : find_sides<false>(w, slabs, chunk, of);
         }
       });
       std::uint8_t all = kAllSides;
@@ -240,9 +263,9 @@ std::vector<std::int32_t> find_crossed(const MlsState& s, const BladePath& path,
       if (all != 0) continue;
       s.cpu->for_each(blocks, [&](int block) {
         const int first = block * kChunksAtATime, last = std::min(chunks, first + kChunksAtATime);
-        for (int chunk = first; chunk < last; ++chunk) {
-          search_chunk(w, sweep, sides, chunk, of_block[block]);
-        }
+        std::vector<std::int32_t> nodes;
+        for (int chunk = first; chunk < last; ++chunk) list_astride(s, sides, chunk, nodes);
+        search_nodes(w, sweep, sides, nodes, of_block[block]);
       });
       for (Crossed& some : of_block) found.add(some);
     }

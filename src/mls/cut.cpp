@@ -5,46 +5,62 @@
 
 #include "mls/crossing.h"
 #include "mls/faces.h"
+#include "mls/remake.h"
 
 namespace tissue_sim {
 namespace {
 
 /// Touched nodes that a thread works on at a time.
-constexpr int kNodesAtATime = 256;
-
-/// How many common neighbours a pair has, and how many to which both have an uncrossed pair.
-struct Common {
-  int all = 0, whole = 0;
-};
+constexpr int kNodesAtATime = 128;
 
 /// The neighbours of a node, marked by number: to look at several of its pairs.
 class Marked {
  public:
-  explicit Marked(const MlsPairs& pairs) : pairs_(pairs), is_(pairs.nodes(), 0) {}
+  explicit Marked(const MlsPairs& pairs)
+      : pairs_(pairs), is_(pairs.nodes(), 0), is_whole_(pairs.nodes(), 0) {}
   void mark(std::int32_t i) {
     for (std::int32_t e = pairs_.begin[i]; e < pairs_.begin[i + 1]; ++e) {
-      is_[pairs_.other[e]] = pairs_.crossed[e] == 0 ? kWhole | kIs : kIs;
+      is_[pairs_.other[e]] = 1;
+      is_whole_[pairs_.other[e]] = pairs_.crossed[e] == 0 ? 1 : 0;
     }
   }
   void clear(std::int32_t i) {
-    for (std::int32_t e = pairs_.begin[i]; e < pairs_.begin[i + 1]; ++e) is_[pairs_.other[e]] = 0;
-  }
-  /// With the marked node.
-  Common common_neighbours(std::int32_t j) const {
-    Common common;
-    for (std::int32_t e = pairs_.begin[j]; e < pairs_.begin[j + 1]; ++e) {
-      const unsigned is = is_[pairs_.other[e]];
-      common.all += static_cast<int>(is & kIs);
-      common.whole += static_cast<int>(is >> 1 & (pairs_.crossed[e] == 0 ? 1u : 0u));
+    for (std::int32_t e = pairs_.begin[i]; e < pairs_.begin[i + 1]; ++e) {
+      is_[pairs_.other[e]] = is_whole_[pairs_.other[e]] = 0;
     }
-    return common;
+  }
+  /// What is left of a crossed pair of the marked node: see cross_pairs().
+  float left(std::int32_t j) const {
+    const std::uint8_t *is = is_.data(), *is_whole = is_whole_.data(),
+                       *crossed = pairs_.crossed.data();
+    const std::int32_t *other = pairs_.other.data(), end = pairs_.begin[j + 1];
+    unsigned all = 0, whole = 0;
+    for (std::int32_t e = pairs_.begin[j]; e < end; ++e) {
+      all += is[other[e]];
+      whole += crossed[e] < is_whole[other[e]] ? 1 : 0;  // of uncrossed ones, 0
+    }
+    return all > 0 ? std::min(1.0f, 2.0f * static_cast<float>(whole) / static_cast<float>(all))
+                   : 0.0f;
   }
 
  private:
-  static constexpr unsigned kIs = 1, kWhole = 2;
   const MlsPairs& pairs_;
-  std::vector<std::uint8_t> is_;
+  std::vector<std::uint8_t> is_, is_whole_;
 };
+
+/// Has a node's entries brought from memory, which is what cuts wait for.
+void prefetch_row(const MlsState& s, std::int32_t node) {
+  const MlsPairs& p = s.pairs;
+  const std::int32_t first = p.begin[node], last = p.begin[node + 1] - 1;
+  if (last < first) return;
+  __builtin_prefetch(&p.crossed[first]);
+  for (const std::int32_t e : {first, last}) {
+    __builtin_prefetch(&p.other[e]);
+    __builtin_prefetch(&p.whole[e]);
+    __builtin_prefetch(&p.weight[e], 1);
+    __builtin_prefetch(&s.lanes.at[e]);
+  }
+}
 
 /// The numbers at which marks are set, in order.
 std::vector<std::int32_t> marked(const std::vector<std::uint8_t>& marks) {
@@ -92,40 +108,53 @@ std::vector<std::int32_t> weaken(MlsState& s, const std::vector<std::int32_t>& t
   MlsPairs& p = s.pairs;
   std::vector<std::uint8_t> is_touched(s.count(), 0);
   for (const std::int32_t i : touched) is_touched[i] = 1;
-  // Pairs of a touched node: of any other, all common neighbours are as they were.
+  // Pairs of a touched node: of any other, all common neighbours are as they were. Of two touched
+  // ones each works out its own entry, so that all that a node is made of lies together.
+  constexpr int kAhead = 8;  // whose entries are asked for from memory
   const int count = static_cast<int>(touched.size()),
             blocks = (count + kNodesAtATime - 1) / kNodesAtATime;
-  std::vector<std::vector<std::int32_t>> fallen(blocks);
+  std::vector<std::vector<std::int32_t>> fallen(blocks);  // untouched
+  const auto put = [&](std::int32_t e, float weight) {
+    p.weight[e] = weight;
+    put_weight(p, e, s.lanes);
+  };
   s.cpu->for_each(blocks, [&](int block) {
     Marked neighbours(p);
+    std::vector<std::int32_t> crossed;
     for (int k = block * kNodesAtATime; k < std::min(count, (block + 1) * kNodesAtATime); ++k) {
       const std::int32_t i = touched[k];
+      if (k + kAhead < count) prefetch_row(s, touched[k + kAhead]);
       neighbours.mark(i);
+      // Listed without a branch, for nothing foretells which are.
+      crossed.resize(p.begin[i + 1] - p.begin[i] + 1);
+      int listed = 0;
       for (std::int32_t e = p.begin[i]; e < p.begin[i + 1]; ++e) {
-        if (p.crossed[e] == 0) continue;
-        const std::int32_t j = p.other[e];
-        if (j < i && is_touched[j] != 0) continue;  // its turn comes with j
-        const Common common = neighbours.common_neighbours(j);
-        const float left = common.all > 0 ? std::min(1.0f, 2.0f * common.whole / common.all) : 0.0f;
-        const float weight = left * p.whole[e];
+        crossed[listed] = e;
+        listed += p.crossed[e] != 0 ? 1 : 0;
+      }
+      for (int c = 0; c < listed; ++c) {
+        const std::int32_t e = crossed[c], j = p.other[e];
+        const float left = neighbours.left(j), weight = left > 0 ? left * p.whole[e] : 0.0f;
         if (weight == p.weight[e]) continue;
-        p.weight[e] = p.weight[p.twin[e]] = weight;
-        put_weight(p, e, s.lanes);
-        put_weight(p, p.twin[e], s.lanes);
-        fallen[block].push_back(i);
+        put(e, weight);
+        if (is_touched[j] != 0) continue;
+        put(p.twin[e], weight);
         fallen[block].push_back(j);
       }
       neighbours.clear(i);
       if (touches_by_faces(s)) remake_face(s, i);
+      remake_support(s, i);
     }
   });
-  // Those beside a cut have less that bears strain, even where all weights are left.
-  std::vector<std::uint8_t> has_fallen = is_touched;
-  for (const auto& some : fallen) {
-    for (const std::int32_t i : some) has_fallen[i] = 1;
-  }
-  std::vector<std::int32_t> remade = marked(has_fallen);
-  remake(s, remade);
+  std::vector<std::int32_t> more;
+  for (const auto& some : fallen) more.insert(more.end(), some.begin(), some.end());
+  std::sort(more.begin(), more.end());
+  more.erase(std::unique(more.begin(), more.end()), more.end());
+  s.cpu->for_each(
+      static_cast<int>(more.size()), [&](int k) { remake_support(s, more[k]); }, 64);
+  std::vector<std::int32_t> remade(touched.size() + more.size());
+  std::merge(touched.begin(), touched.end(), more.begin(), more.end(), remade.begin());
+  remake_springs(s, remade);
   return remade;
 }
 

@@ -2,10 +2,14 @@
 
 #include <Eigen/Dense>
 #include <algorithm>
+#include <cstring>
 #include <vector>
 
 namespace tissue_sim {
 namespace {
+
+typedef double Two __attribute__((vector_size(16)));
+constexpr int kAtATime = 32;  // entries
 
 /// In units of c^2 / h^2; see strained_volume().
 constexpr double kMostOfWhole = 20, kMostBesideCut = 4.5;
@@ -48,37 +52,44 @@ double own_rate(const MlsState& s, std::int32_t i) {
 }
 
 MlsSums mls_sums(const MlsState& s, std::int32_t i) {
-  double m[6] = {}, per_mass[6] = {}, first[3] = {};
-  const float* xi = &s.place[4 * i];
-  for (std::int32_t e = s.pairs.begin[i]; e < s.pairs.begin[i + 1]; ++e) {
-    const std::int32_t j = s.pairs.other[e];
-    const float* xj = &s.place[4 * j];
-    const double w = s.pairs.weight[e], q = w * w * s.inv_mass[j];
-    // In float, as passes do, and so times the weight: nodes of a lattice would all err alike, and
-    // turn a body.
-    const float r[3] = {xj[0] - xi[0], xj[1] - xi[1], xj[2] - xi[2]};
-    double W[3];
-    for (int a = 0; a < 3; ++a) W[a] = s.pairs.weight[e] * r[a];
-    const double x = r[0], y = r[1], z = r[2];
-    const double products[6] = {x * x, y * y, z * z, x * y, x * z, y * z};
-    const double weighted[6] = {x * W[0],
-                                y * W[1],
-                                z * W[2],
-                                0.5 * (x * W[1] + y * W[0]),
-                                0.5 * (x * W[2] + z * W[0]),
-                                0.5 * (y * W[2] + z * W[1])};
-    for (int k = 0; k < 6; ++k) {
-      m[k] += weighted[k];
-      per_mass[k] += q * products[k];
+  // Moments two side by side: 00 11, 22 01, 02 12. The others by coordinate; the fourth is void.
+  Two m[3] = {};
+  Vec<4> squares{}, products{}, first{};
+  const MlsPairs& p = s.pairs;
+  const std::int32_t *other = p.other.data(), end = p.begin[i + 1];
+  const float *place = s.place.data(), *weight = p.weight.data(), *inv_mass = s.inv_mass.data();
+  const Vec<4> xi = load<4>(place + 4 * i);
+  for (std::int32_t e = p.begin[i]; e < end;) {
+    // Beside a cut many pairs have no weight: the rest, listed without a branch.
+    std::int32_t weighs[kAtATime];
+    const std::int32_t until = std::min(end, e + kAtATime);
+    int listed = 0;
+    for (; e < until; ++e) {
+      weighs[listed] = e;
+      listed += weight[e] != 0 ? 1 : 0;
     }
-    first[0] += w * x;
-    first[1] += w * y;
-    first[2] += w * z;
+    for (int k = 0; k < listed; ++k) {
+      const std::int32_t j = other[weighs[k]];
+      const float w = weight[weighs[k]];
+      // In float, as passes do, and so times the weight: nodes of a lattice would all err alike,
+      // and turn a body.
+      const Vec<4> r = load<4>(place + 4 * j) - xi, W = w * r;
+      const Two r01 = {r[0], r[1]}, W01 = {W[0], W[1]};
+      const double z = r[2], Wz = W[2];
+      const Two crosswise = r01 * Two{W01[1], W01[0]};
+      m[0] += r01 * W01;
+      m[1] += Two{z * Wz, 0.5 * (crosswise[0] + crosswise[1])};
+      m[2] += 0.5 * (r01 * Wz + z * W01);
+      const Vec<4> per_mass = w * inv_mass[j] * W;
+      squares += per_mass * r;
+      products += per_mass * permute<4>(r, Mask<4>{1, 2, 0, 3});
+      first += W;
+    }
   }
-  MlsSums sums;
-  std::copy_n(m, 6, sums.moment);
-  std::copy_n(per_mass, 6, sums.per_mass);
-  std::copy_n(first, 3, sums.first);
+  MlsSums sums = {{},
+                  {squares[0], squares[1], squares[2], products[0], products[2], products[1]},
+                  {first[0], first[1], first[2]}};
+  std::memcpy(sums.moment, m, sizeof(sums.moment));
   return sums;
 }
 

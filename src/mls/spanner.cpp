@@ -66,6 +66,31 @@ void make_clusters(const MlsNodes& nodes, const MlsPairs& pairs, MlsSpanner& spa
   }
 }
 
+/// Components of nodes; the root of each is its lowest.
+class Links {
+ public:
+  explicit Links(std::int32_t nodes) : parent_(nodes) {}
+  /// Before any join: a lower one of its component, or itself.
+  void begin(std::int32_t node, std::int32_t parent) { parent_[node] = parent; }
+  /// Most often: a look at whether there is something to do.
+  bool apart(std::int32_t a, std::int32_t b) const { return parent_[a] != parent_[b]; }
+  void join(std::int32_t a, std::int32_t b) {
+    a = root(a), b = root(b);
+    parent_[std::max(a, b)] = std::min(a, b);
+  }
+  UnionFind flat() && {
+    for (std::int32_t& parent : parent_) parent = parent_[parent];
+    return UnionFind(std::move(parent_));
+  }
+
+ private:
+  std::int32_t root(std::int32_t node) {
+    while (parent_[node] != node) node = parent_[node] = parent_[parent_[node]];
+    return node;
+  }
+  std::vector<std::int32_t> parent_;
+};
+
 }  // namespace
 
 MlsSpanner make_spanner(const MlsNodes& nodes, const MlsPairs& pairs) {
@@ -98,58 +123,69 @@ MlsSpanner make_spanner(const MlsNodes& nodes, const MlsPairs& pairs) {
   spanner.begin.push_back(0);
   for (std::int32_t i = 0; i < pairs.nodes(); ++i) {
     for (std::int32_t e = pairs.begin[i]; e < pairs.begin[i + 1]; ++e) {
-      if (is_in[e] != 0) spanner.entry.push_back(e);
+      if (is_in[e] != 0) spanner.other.push_back(pairs.other[e]);
     }
-    spanner.begin.push_back(static_cast<std::int32_t>(spanner.entry.size()));
+    spanner.begin.push_back(static_cast<std::int32_t>(spanner.other.size()));
   }
   make_clusters(nodes, pairs, spanner);
   return spanner;
 }
 
 UnionFind join_uncrossed(const MlsState& s) {
+  constexpr std::int32_t kAhead =
+      16;  // entries are asked for from memory: that is what this waits for
   const MlsPairs& p = s.pairs;
   const MlsSpanner& spanner = s.spanner;
-  const auto clusters = static_cast<std::int32_t>(spanner.members_begin.size()) - 1;
-  std::vector<std::uint8_t> is_cut(clusters, 0);
-  for (std::int32_t i = 0; i < s.count(); ++i) {
-    if (s.cut[i] != 0) is_cut[spanner.cluster[i]] = 1;
+  const std::int32_t n = s.count(),
+                     clusters = static_cast<std::int32_t>(spanner.members_begin.size()) - 1;
+  const auto first_of = [&](std::int32_t c) { return spanner.members[spanner.members_begin[c]]; };
+  // Of each cluster its lowest node, which is its first; -1 where it is cut.
+  std::vector<std::int32_t> whole(clusters);
+  for (std::int32_t c = 0; c < clusters; ++c) whole[c] = first_of(c);
+  for (std::int32_t i = 0; i < n; ++i) {
+    if (s.cut[i] != 0) whole[spanner.cluster[i]] = -1;
   }
-  // Whole clusters first, and with one another: of each, its lowest node is the first.
-  std::vector<std::int32_t> lowest(s.count());
-  for (std::int32_t i = 0; i < s.count(); ++i) {
-    const std::int32_t c = spanner.cluster[i];
-    lowest[i] = is_cut[c] != 0 ? i : spanner.members[spanner.members_begin[c]];
+  // Whole clusters first, and with one another.
+  Links linked(n);
+  for (std::int32_t i = 0; i < n; ++i) {
+    const std::int32_t lowest = whole[spanner.cluster[i]];
+    linked.begin(i, lowest < 0 ? i : lowest);
   }
-  UnionFind linked(std::move(lowest));
   for (std::int32_t c = 0; c < clusters; ++c) {
-    const std::int32_t* members = &spanner.members[spanner.members_begin[c]];
-    if (is_cut[c] == 0) {
-      for (std::int32_t k = spanner.neighbours_begin[c]; k < spanner.neighbours_begin[c + 1]; ++k) {
-        const std::int32_t other = spanner.neighbours[k];
-        if (is_cut[other] == 0) {
-          linked.join(*members, spanner.members[spanner.members_begin[other]]);
+    if (whole[c] < 0) continue;
+    for (std::int32_t k = spanner.neighbours_begin[c]; k < spanner.neighbours_begin[c + 1]; ++k) {
+      const std::int32_t other = whole[spanner.neighbours[k]];
+      if (other >= 0 && linked.apart(whole[c], other)) linked.join(whole[c], other);
+    }
+  }
+  for (std::int32_t c = 0; c < clusters; ++c) {
+    if (whole[c] >= 0) continue;
+    const std::int32_t last = spanner.members_begin[c + 1];
+    for (std::int32_t k = spanner.members_begin[c]; k < last; ++k) {
+      if (k + kAhead < last) {
+        const std::int32_t next = spanner.members[k + kAhead];
+        if (s.cut[next] != 0) {
+          __builtin_prefetch(&p.other[p.begin[next]]);
+          __builtin_prefetch(&p.other[p.begin[next]] + 16);
+          __builtin_prefetch(&p.crossed[p.begin[next]]);
+        } else {
+          __builtin_prefetch(&spanner.other[spanner.begin[next]]);
         }
       }
-      continue;
-    }
-    for (std::int32_t k = spanner.members_begin[c]; k < spanner.members_begin[c + 1]; ++k) {
       const std::int32_t i = spanner.members[k];
       if (s.cut[i] != 0) {
         for (std::int32_t e = p.begin[i]; e < p.begin[i + 1]; ++e) {
-          const std::int32_t j = p.other[e];
-          if (p.crossed[e] != 0 || (j < i && s.cut[j] != 0)) continue;  // that one joins it
-          linked.join(i, j);
+          // Both are looked at before either decides: few are neither.
+          if ((p.crossed[e] == 0) & linked.apart(i, p.other[e])) linked.join(i, p.other[e]);
         }
         continue;
       }
       for (std::int32_t m = spanner.begin[i]; m < spanner.begin[i + 1]; ++m) {
-        const std::int32_t j = p.other[spanner.entry[m]];
-        if (s.cut[j] != 0 || (j < i && is_cut[spanner.cluster[j]] != 0)) continue;  // the same
-        linked.join(i, j);
+        if (linked.apart(i, spanner.other[m])) linked.join(i, spanner.other[m]);
       }
     }
   }
-  return linked;
+  return std::move(linked).flat();
 }
 
 }  // namespace tissue_sim

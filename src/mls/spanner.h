@@ -18,7 +18,7 @@ struct MlsState;
 /// cut.
 struct MlsSpanner {
   Array<std::int32_t> begin;                         ///< per node, and one more
-  Array<std::int32_t> entry;                         ///< of MlsPairs
+  Array<std::int32_t> other;                         ///< the neighbour
   Array<std::int32_t> cluster;                       ///< of each node
   Array<std::int32_t> members_begin, members;        ///< nodes of each cluster, by number
   Array<std::int32_t> neighbours_begin, neighbours;  ///< later clusters with pairs to each

@@ -1,6 +1,5 @@
 #include "mls/state.h"
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <numeric>
@@ -16,11 +15,6 @@
 namespace tissue_sim {
 namespace {
 
-/// Least eigenvalue of a moment matrix over its largest, below which a support spans no space: a
-/// sheet, a chain, a pair or nothing. The paper's matrix is never regularised: with the identity
-/// left for what it does not see, a rotation would be a strain.
-constexpr double kSpans = 0.02;
-
 /// Weights are balanced anew after a node's rate was bounded, and rates change with them.
 constexpr int kRoundsOfBounds = 3;
 
@@ -28,19 +22,6 @@ template <class T>
 void resize_padded(Array<T>& array, int count, int per_node) {
   const int chunks = (count + kMlsChunk - 1) / kMlsChunk;
   array.assign(static_cast<std::size_t>(chunks) * kMlsChunk * per_node, T{});
-}
-
-bool spans_space(const Eigen::Matrix3d& m) {
-  // Of eigenvalues a <= b <= c, sums t = a + b + c and q = ab + bc + ca: abc / (q t) <= a / c <= 9
-  // abc / (q t). For most that tells.
-  const double t = m.trace(), q = 0.5 * (t * t - m.squaredNorm()), product = m.determinant();
-  if (!(3 * q > kSpans * t * t)) return false;  // b / c at most; and q is no rounding
-  if (product > kSpans * q * t) return true;
-  if (!(9 * product > kSpans * q * t)) return false;
-  Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen;
-  eigen.computeDirect(m, Eigen::EigenvaluesOnly);
-  const double least = eigen.eigenvalues()[0], largest = eigen.eigenvalues()[2];
-  return largest > 0 && least > kSpans * largest;
 }
 
 /// kappa of the penalty while nothing is cut.
@@ -52,44 +33,6 @@ float whole_kappa(const MlsState& s, std::int32_t i) {
   }
   const double stiffness = s.nodes.material_of(i).young_modulus * s.nodes.free_volume[i];
   return trace > 0 ? static_cast<float>(3 * s.scene.mls.stabilisation * stiffness / trace) : 0.0f;
-}
-
-/// Springs from a sprung node to its neighbours: each carries its share of what a bar through the
-/// node's volume would.
-void make_springs(MlsState& s, std::int32_t i) {
-  if (s.spring.empty()) {
-    s.spring.swap(s.spring_room);
-    s.spring.resize(s.pairs.other.size(), 0.0f);  // where the room went, and a state was restored
-  }
-  double sum = 0;
-  const auto r2 = [&](std::int32_t e) {
-    return (s.nodes.place[s.pairs.other[e]] - s.nodes.place[i]).squaredNorm();
-  };
-  for (std::int32_t e = s.pairs.begin[i]; e < s.pairs.begin[i + 1]; ++e) {
-    sum += s.pairs.weight[e] * r2(e);
-  }
-  const double stiffness = s.nodes.material_of(i).young_modulus * s.nodes.volume[i];
-  for (std::int32_t e = s.pairs.begin[i]; e < s.pairs.begin[i + 1]; ++e) {
-    s.spring[e] =
-        s.pairs.weight[e] > 0 ? static_cast<float>(stiffness * s.pairs.weight[e] / sum) : 0.0f;
-  }
-}
-
-void remake_node(MlsState& s, std::int32_t i) {
-  const MlsSums sums = mls_sums(s, i);
-  const double* of = sums.moment;
-  Eigen::Matrix3d m;
-  m << of[0], of[3], of[4], of[3], of[1], of[5], of[4], of[5], of[2];
-  const bool spans = spans_space(m);
-  Eigen::Matrix3d inverse = Eigen::Matrix3d::Zero();
-  if (spans) inverse = m.inverse();
-  for (int k = 0; k < 6; ++k) {
-    constexpr int kRow[] = {0, 1, 2, 0, 0, 1}, kColumn[] = {0, 1, 2, 1, 2, 2};
-    s.inverse_moment[k][i] = static_cast<float>(inverse(kRow[k], kColumn[k]));
-  }
-  s.kappa[i] = spans ? s.whole_kappa[i] : 0.0f;
-  s.sprung[i] = spans ? 0 : 1;
-  put_strained_volume(s, i, strained_volume(s, i, sums));
 }
 
 /// Lists all springs, at both of their nodes.
@@ -154,7 +97,7 @@ std::unique_ptr<MlsState> make_mls_state(const Scene& scene, std::vector<std::st
   s.scene = scene;
   s.cpu = std::make_unique<Cpu>(scene.threads);
   s.nodes = make_mls_nodes(scene, notes);
-  s.pairs = make_pairs(s.nodes, scene.mls.neighbours, *s.cpu);
+  s.pairs = make_pairs(s.nodes, scene.mls.neighbours, *s.cpu, scene.mls.basis);
   hold_at_faces(scene, support_factor(scene.mls.neighbours), s.nodes, s.pairs);
   s.nodes.strained_volume = s.nodes.free_volume;
   const Array<float> kernel = s.pairs.whole;
@@ -222,26 +165,6 @@ std::unique_ptr<MlsState> make_mls_state(const Scene& scene, std::vector<std::st
         n, [&](int i) { remake_face(s, i); }, 256);
   }
   return state;
-}
-
-void put_strained_volume(MlsState& s, std::int32_t i, float volume) {
-  const Material& m = s.nodes.material_of(i);
-  s.volume_mu[i] = static_cast<float>(lame_mu(m)) * volume;
-  s.volume_lambda[i] = static_cast<float>(lame_lambda(m)) * volume;
-  s.volume_eta[i] = static_cast<float>(m.viscosity) * volume;
-}
-
-void remake(MlsState& s, const std::vector<std::int32_t>& nodes) {
-  s.cpu->for_each(
-      static_cast<int>(nodes.size()), [&](int k) { remake_node(s, nodes[k]); }, 64);
-  for (const std::int32_t i : nodes) {
-    if (s.sprung[i] != 0) {
-      make_springs(s, i);
-    } else if (!s.spring.empty()) {  // what it had as a sprung node
-      std::fill(&s.spring[s.pairs.begin[i]], s.spring.data() + s.pairs.begin[i + 1], 0.0f);
-    }
-  }
-  s.springs.begin.clear();
 }
 
 MlsField field_of(const MlsState& s) { return field_of(s, s.u.data(), s.v.data()); }

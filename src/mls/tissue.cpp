@@ -5,6 +5,7 @@
 #include <cstring>
 #include <utility>
 
+#include "fragments/find_parted.h"
 #include "fragments/piece_colour.h"
 #include "fragments/piece_sums.h"
 #include "frame/checksum.h"
@@ -51,11 +52,13 @@ void MlsTissue::part(const std::vector<std::int32_t>& changed, CutReport& report
     }
     return p.begin[i] == p.begin[i + 1] || changed.size() == state_->nodes.place.size();
   });
-  if (may_have) part(join_uncrossed(*state_), report);
+  if (!may_have) return;
+  UnionFind linked = join_uncrossed(*state_);
+  part(find_parted(pieces_, linked), report);
 }
 
-void MlsTissue::part(UnionFind linked, CutReport& report) {
-  for (const int id : update_pieces(state_->nodes.volume.data(), linked, pieces_)) {
+void MlsTissue::part(const std::vector<PartedRun>& parted, CutReport& report) {
+  for (const int id : part_pieces(state_->nodes.volume.data(), parted, pieces_)) {
     report.new_fragments.push_back(id);
   }
 }
@@ -67,19 +70,19 @@ void MlsTissue::break_pairs(const std::vector<std::int32_t>& entries,
   MlsState& s = *state_;
   const std::vector<std::int32_t> changed = mark_crossed(s, entries, places, report);
   if (changed.empty()) return;
-  std::optional<UnionFind> linked;
+  std::optional<std::vector<PartedRun>> parted;
   std::vector<std::int32_t> remade;
   s.cpu->both([&] { remade = weaken(s, changed); },
               [&] {
                 if (changed.size() <= kMany) return;
-                linked = join_uncrossed(s);
-                for (std::int32_t i = 0; i < s.count(); ++i) linked->root(i);  // shorter ways
+                UnionFind linked = join_uncrossed(s);
+                parted = find_parted(pieces_, linked);
               });
   remade.insert(remade.end(), changed.begin(), changed.end());
   pairs_changed(remade);
   forget(changed);
-  if (linked) {
-    part(*std::move(linked), report);
+  if (parted) {
+    part(*parted, report);
   } else {
     part(changed, report);
   }

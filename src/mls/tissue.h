@@ -102,7 +102,7 @@ class MlsTissue : public Tissue {
   void forget(const std::vector<std::int32_t>& changed);
   /// Pieces anew, after these nodes lost pairs.
   void part(const std::vector<std::int32_t>& changed, CutReport& report);
-  void part(UnionFind linked, CutReport& report);
+  void part(const std::vector<PartedRun>& parted, CutReport& report);
 
   std::vector<std::string> notes_;
   std::unique_ptr<MlsState> state_;

@@ -219,6 +219,7 @@ void MpmTissue::measure(const Read& read) {
     for (std::size_t m = 0; m < of_body.size(); ++m) {
       const float stiffening = b.finite ? b.stiffening[m] : kInfinite;
       of_body[m] = std::max(of_body[m], stiffening);
+      if (m + 1 == of_body.size()) break;  // that is no material's
       result_.blew_up = result_.blew_up || of_body[m] > 1e6f;
       const Material& material = s.bodies[s.blocks.all[i]->body].materials[m];
       modulus_[i] = std::max(modulus_[i], static_cast<float>(wave_modulus(material, stiffening)));

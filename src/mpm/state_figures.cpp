@@ -14,16 +14,18 @@ namespace {
 
 /// Half the fastest rate at which viscosity slows a node [1/s]: of the masks of points in a cell
 /// the worst gives 9.4 eta / (rho h^2). Viscous stress F S has F twice, outside and in dE/dt: it
-/// grows with the square of the largest stretch, which is at most that of the stiffening where J
-/// = 1.
-double damping(const Material& m, double cell_size, float stiffening) {
-  return 5 * m.viscosity * stiffening * stiffening / (m.density * cell_size * cell_size);
+/// grows with the square of the largest stretch, which is at most ||F||^2, and at most that of the
+/// stiffening where J = 1. Squeezed tissue stiffens much more than it is stretched.
+double damping(const Material& m, double cell_size, float stiffening, float stretch2) {
+  const float grown = std::min(stiffening * stiffening, stretch2);
+  return 5 * m.viscosity * grown / (m.density * cell_size * cell_size);
 }
 
-double stable_substep(const Material& m, double cell_size, double cfl, float stiffening) {
+double stable_substep(const Material& m, double cell_size, double cfl, float stiffening,
+                      float stretch2) {
   const double modulus = wave_modulus(m, stiffening);
   const double elastic = cfl * cell_size * std::sqrt(m.density / modulus);
-  return viscous_substep(elastic, damping(m, cell_size, stiffening));
+  return viscous_substep(elastic, damping(m, cell_size, stiffening, stretch2));
 }
 
 }  // namespace
@@ -33,7 +35,8 @@ double fastest_damping(const MpmState& state, const Stiffening& stiffening) {
   for (std::size_t i = 0; i < state.bodies.size(); ++i) {
     const LatticeBody& b = state.bodies[i];
     for (std::size_t m = 0; m < b.materials.size(); ++m) {
-      fastest = std::max(fastest, damping(b.materials[m], b.cell_size, stiffening[i][m]));
+      fastest = std::max(
+          fastest, damping(b.materials[m], b.cell_size, stiffening[i][m], stiffening[i].back()));
     }
   }
   return fastest;
@@ -41,7 +44,7 @@ double fastest_damping(const MpmState& state, const Stiffening& stiffening) {
 
 Stiffening even_stiffening(const MpmState& state, float stiffening) {
   Stiffening all;
-  for (const LatticeBody& b : state.bodies) all.emplace_back(b.materials.size(), stiffening);
+  for (const LatticeBody& b : state.bodies) all.emplace_back(b.materials.size() + 1, stiffening);
   return all;
 }
 
@@ -52,8 +55,8 @@ float stable_substep(const MpmState& state, const Stiffening& stiffening) {
   for (std::size_t i = 0; i < state.bodies.size(); ++i) {
     const LatticeBody& b = state.bodies[i];
     for (std::size_t m = 0; m < b.materials.size(); ++m) {
-      dt = std::min(dt,
-                    stable_substep(b.materials[m], b.cell_size, state.scene.cfl, stiffening[i][m]));
+      dt = std::min(dt, stable_substep(b.materials[m], b.cell_size, state.scene.cfl,
+                                       stiffening[i][m], stiffening[i].back()));
     }
   }
   return static_cast<float>(dt);

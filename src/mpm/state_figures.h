@@ -9,7 +9,7 @@
 namespace tissue_sim {
 
 /// How much tissue stiffened as it deformed: for each material of each body the largest of
-/// BlockState's.
+/// BlockState's, and after them the largest ||F||^2 of the body's points.
 using Stiffening = std::vector<std::vector<float>>;
 
 /// The same for all.

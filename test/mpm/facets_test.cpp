@@ -106,7 +106,8 @@ TEST(Facets, AreKeptOnlyWhereTheyWouldBeTheSame) {
       const Vec3 off(within(random), within(random), within(random));
       cut_now(tissue, plane_cut(middle + 0.004 * off, normal));
       for (const Block* block : s.blocks.all) {
-        const std::vector<Facet> anew = facets_of(s.bodies[0], s.points, *block, KnownFacets());
+        const std::vector<Facet> anew =
+            facets_of(s.bodies[0], s.points, s.nodes, *block, KnownFacets());
         ASSERT_EQ(block->facets.size(), anew.size()) << "cut " << i;
         count += anew.size();
         for (std::size_t k = 0; k < anew.size(); ++k) {

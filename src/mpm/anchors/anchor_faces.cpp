@@ -57,7 +57,7 @@ void row_weights(float place, bool has_last, float (&weight)[kRowNodes]) {
   const float inside = at - half;  // share of the half cell in which the face is
   // In proportion to the volume there, at whose ends it is the spline; and what find_free_volumes()
   // gives to the next point.
-  const auto moved = static_cast<float>(kShift) * 0.5f * inside * (1 - inside);
+  const auto moved = (1 - inside) * static_cast<float>(share_shifted(0.5 * inside, half == 1));
   constexpr float kMoved[2][kRowNodes] = {{-0.25f, 0.5f, -0.25f, 0},
                                           {-0.125f, 0.125f, 0.125f, -0.125f}};
   for (int d = 0; d < kRowNodes; ++d) {

@@ -151,7 +151,7 @@ void find_free_volumes(LatticeTissue& tissue) {
         int to[3] = {s.x, s.y, s.z};
         for (int a = 0; a < 3; ++a) {
           const int next = to[a] + (o.middle[a] < 0 ? -1 : 1);
-          const double off = kShift * std::abs(o.middle[a]);
+          const double off = share_shifted(std::abs(o.middle[a]), next >> 1 != to[a] >> 1);
           weight *= k >> a & 1 ? off : 1 - off;
           if (k >> a & 1) to[a] = next;
         }

@@ -18,6 +18,15 @@ OutsideShare share_outside(const std::vector<Anchor>& anchors, const Vec3& cente
 /// face see a strain that is not that of the tissue before it and count for less so: the sag of a
 /// clamped block changes by 1.2 % with the place of the plane in a cell, by 2.3 % with 1 (8 cells).
 inline constexpr double kShift = 1.6;
+/// Where the next point is in another cell, a half cell of which less than this share lies outside
+/// gives it all: by what stayed of it, some hundredths of the half cell, nodes behind the face
+/// would be so light that they swing wildly once a cut parts them from the tissue before it.
+inline constexpr double kSliver = 0.2;
+/// The part of a half cell's share that goes to the next along an axis, where the share's middle is
+/// that far off [half cells].
+inline double share_shifted(double off, bool to_next_cell) {
+  return to_next_cell && off > 0.5 * (1 - kSliver) ? 1 : kShift * off;
+}
 
 /// Fills Points::free_volume: of each point the volume outside the anchors, some of it shared with
 /// its neighbours; and Points::lightness. Empty where no body has anchors.

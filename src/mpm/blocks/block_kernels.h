@@ -69,7 +69,7 @@ struct PointBounds {
 struct BlockState {
   double elastic_energy = 0;  ///< [J]
   /// For each of the body's materials the largest squared column of cof F plus |J - 1| ||F||, of
-  /// soft points that times kSoftness, 1 at least: see stable_substep().
+  /// soft points that times kSoftness, 1 at least: see stable_substep(); then ||F||^2 of all.
   std::vector<float> stiffening;
   float wildest = 1;  ///< the largest of all points, soft ones not lessened
   bool finite = true;

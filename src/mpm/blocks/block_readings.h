@@ -17,11 +17,11 @@ TISSUE_SIM_INLINE Vec<W> larger(Vec<W> a, Vec<W> b) {
 }
 
 /// What state() has read so far: `energy` lane by lane [J], `least` of the materials' stiffenings,
-/// and a sum that is not finite where a point's stiffening is not.
+/// a sum that is not finite where a point's stiffening is not, and the largest ||F||^2.
 struct Readings {
   BlockState block;
   double energy[kLanes] = {};
-  float least = 1, stiffenings[kLanes] = {};
+  float least = 1, stiffenings[kLanes] = {}, squares[kLanes] = {};
 };
 
 /// Widens `stiffening` to a point's, whose squared columns of cof F, J and ||F||^2 are given.
@@ -41,7 +41,7 @@ TISSUE_SIM_INLINE void stiffen(const Block& b, const BlockField& f, std::int32_t
   r.stiffening[material] = std::max(r.stiffening[material], stiffening);
   read.least = b.material != Block::kMixed
                    ? r.stiffening[b.material]
-                   : *std::min_element(r.stiffening.begin(), r.stiffening.end());
+                   : *std::min_element(r.stiffening.begin(), r.stiffening.end() - 1);
 }
 
 /// -1 where the lane holds a point.
@@ -70,6 +70,7 @@ TISSUE_SIM_INLINE void read_stiffening(const Block& b, const BlockField& f, std:
   const Vec<W> at_most =
       larger<W>(cx, larger<W>(cy, cz)) + larger<W>(J - 1.0f, 1.0f - J) * (0.5f + (1.0f / 6) * f2);
   store<W>(read.stiffenings, load<W>(read.stiffenings) + keep<W>(is_point, at_most));
+  store<W>(read.squares, larger<W>(load<W>(read.squares), keep<W>(is_point, f2)));
   if (!any_negative<W>(bits<W>(read.least - at_most) & is_point)) return;
   for (int i = 0; i < W; ++i) {
     if (is_point[i] == 0 || at_most[i] <= read.least) continue;
@@ -122,7 +123,7 @@ template <int W, class Materials>
 TISSUE_SIM_INLINE BlockState state(const Block& b, const BlockField& f, BlockScratch& scratch,
                                    float* von_mises) {
   Readings read;
-  read.block.stiffening.assign(f.material_count, 1.0f);
+  read.block.stiffening.assign(f.material_count + 1, 1.0f);
   for_each_gradient<W>(
       b, f, scratch, [&](auto width, std::size_t lane, auto* G) TISSUE_SIM_INLINE_LAMBDA {
         for (int s = 0; s < 8; s += 4) {
@@ -133,6 +134,7 @@ TISSUE_SIM_INLINE BlockState state(const Block& b, const BlockField& f, BlockScr
   result.elastic_energy = stabilise_cells<W>(b, f, Layout(b), scratch.nodes.data(), nullptr);
   for (const double e : read.energy) result.elastic_energy += e;
   result.finite = result.finite && std::isfinite(result.elastic_energy);
+  result.stiffening.back() = *std::max_element(read.squares, read.squares + kLanes);
   return result;
 }
 
@@ -140,7 +142,7 @@ TISSUE_SIM_INLINE BlockState state(const Block& b, const BlockField& f, BlockScr
 template <int W>
 TISSUE_SIM_INLINE BlockState stiffness(const Block& b, const BlockField& f, BlockScratch& scratch) {
   Readings read;
-  read.block.stiffening.assign(f.material_count, 1.0f);
+  read.block.stiffening.assign(f.material_count + 1, 1.0f);
   for_each_gradient<W>(b, f, scratch,
                        [&](auto width, std::size_t lane, auto* G) TISSUE_SIM_INLINE_LAMBDA {
                          for (int s = 0; s < 8; ++s) {
@@ -149,6 +151,7 @@ TISSUE_SIM_INLINE BlockState stiffness(const Block& b, const BlockField& f, Bloc
                          }
                        });
   for (const float s : read.stiffenings) read.block.finite = read.block.finite && std::isfinite(s);
+  read.block.stiffening.back() = *std::max_element(read.squares, read.squares + kLanes);
   return read.block;
 }
 

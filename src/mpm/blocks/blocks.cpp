@@ -140,7 +140,8 @@ void finish_regions(Blocks& blocks, const std::vector<NewRegion>& anew, const La
            [&] {
              cpu.for_each(static_cast<int>(made.size()), [&](int i) {
                Block& b = *made[i].first;
-               b.facets = facets_of(tissue.bodies[b.body], tissue.points, b, *made[i].second);
+               b.facets = facets_of(tissue.bodies[b.body], tissue.points, tissue.nodes, b,
+                                    *made[i].second);
                if (tissue.points.outer.empty()) return;
                b.surface = surface_places_of(tissue.bodies[b.body], tissue.points, b);
                b.merged = merged_places(b.surface, tissue.points);

@@ -12,6 +12,7 @@
 #include "mpm/contact/surroundings.h"
 #include "mpm/lattice/bonds.h"
 #include "mpm/lattice/lattice_body.h"
+#include "mpm/lattice/nodes.h"
 
 namespace tissue_sim {
 namespace {
@@ -201,6 +202,15 @@ bool is_one_part(const LatticeBody& body, const Place& corner, const std::int32_
   return part == all && count == kCount[all];
 }
 
+/// Whether any of the nodes around a cell moves.
+bool sees_moving_nodes(const Nodes& nodes, const Block& block, int cell) {
+  for (int k = 0; k < 27; ++k) {
+    const int node = block.node[cell + k / 9 * block.plane + k / 3 % 3 * block.pitch + k % 3];
+    if (node >= 0 && nodes.inv_mass[node] > 0) return true;
+  }
+  return false;
+}
+
 /// Takes the facets of one cell that belong to one face together, from `first` on.
 void merge(std::vector<Facet>& facets, std::size_t first) {
   constexpr float kOneLayer = 0.25f;  // [cells] along the normal; points are half a cell apart
@@ -239,8 +249,8 @@ void merge(std::vector<Facet>& facets, std::size_t first) {
 
 }  // namespace
 
-std::vector<Facet> facets_of(const LatticeBody& body, const Points& points, const Block& block,
-                             const KnownFacets& known) {
+std::vector<Facet> facets_of(const LatticeBody& body, const Points& points, const Nodes& nodes,
+                             const Block& block, const KnownFacets& known) {
   std::vector<Facet> facets;
   for (int z = 0; z < block.nz; ++z) {
     for (const Block::Run& run : block.runs) {
@@ -261,6 +271,12 @@ std::vector<Facet> facets_of(const LatticeBody& body, const Points& points, cons
         for (int s = 0; s < 8; ++s) {
           const unsigned bonds = points.bonds[std::max(around[s], 0)];
           gone |= std::uint64_t{around[s] < 0 ? 0 : kAllBonds & ~bonds} << 8 * s;
+        }
+        if (gone != 0 && !points.free_volume.empty() && sees_moving_nodes(nodes, block, cell)) {
+          for (int s = 0; s < 8; ++s) {
+            if (around[s] < 0 || points.free_volume[around[s]] > 0) continue;
+            gone &= ~(std::uint64_t{0xff} << 8 * s);
+          }
         }
         if (gone == 0) continue;
         const Place corner = {2 * x, 2 * y, 2 * (block.z + z)};

@@ -10,6 +10,7 @@ namespace tissue_sim {
 struct Block;
 class KnownFacets;
 struct LatticeBody;
+struct Nodes;
 struct Points;
 
 /// Points of one cell and block whose bonds towards one side are gone.
@@ -25,8 +26,9 @@ struct Facet {
 
 /// The facets of a block; `known` are those of its region that need not be made anew. Where a blade
 /// broke the bonds, place and normal are those of its sweep; else those of the plane that fits the
-/// missing bonds of the columns around best, so that an oblique face is a plane, not stairs.
-std::vector<Facet> facets_of(const LatticeBody& body, const Points& points, const Block& block,
-                             const KnownFacets& known);
+/// missing bonds of the columns around best, so that an oblique face is a plane, not stairs. Points
+/// that an anchor holds have none beside its face, where nodes move that tell nothing of them.
+std::vector<Facet> facets_of(const LatticeBody& body, const Points& points, const Nodes& nodes,
+                             const Block& block, const KnownFacets& known);
 
 }  // namespace tissue_sim

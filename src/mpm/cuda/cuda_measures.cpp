@@ -101,6 +101,8 @@ void CudaMpmTissue::finish_measure() {
     float& stiffening = stiffening_[block.body][block.material];
     const float now = m.finite != 0 ? m.stiffening : std::numeric_limits<float>::infinity();
     stiffening = std::max(stiffening, now);
+    float& square = stiffening_[block.body].back();
+    square = std::max(square, m.square);
     const Material& material = state_->bodies[block.body].materials[block.material];
     modulus_[d.host_tables.of_host[i]] = static_cast<float>(wave_modulus(material, now));
     result_.blew_up = result_.blew_up || !(now <= 1e6f);

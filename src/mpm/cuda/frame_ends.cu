@@ -113,10 +113,12 @@ __global__ void __launch_bounds__(kMostThreads)
     for (int i = 0; i < 3; ++i) {
       column = fmaxf(column, cof[i] * cof[i] + cof[3 + i] * cof[3 + i] + cof[6 + i] * cof[6 + i]);
     }
-    const float stiffening = column + fabsf(J - 1) * sqrtf(norm2(p.F) / 3);
+    const float square = norm2(p.F);
+    const float stiffening = column + fabsf(J - 1) * sqrtf(square / 3);
     if (!isfinite(elastic + stiffening)) m.finite = 0;
     m.elastic_energy += static_cast<double>(elastic) * volume;
     m.wildest = fmaxf(m.wildest, stiffening);
+    m.square = fmaxf(m.square, square);
     const bool is_soft = t.soft != nullptr && t.soft[t.point[lane]] != 0;
     float counts = is_soft ? kSoftness * stiffening : stiffening;
     if (t.lightness != nullptr) counts = 1 + t.lightness[t.point[lane]] * (counts - 1);

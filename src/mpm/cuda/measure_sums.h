@@ -9,7 +9,7 @@ namespace tissue_sim {
 inline constexpr int kMostThreads = 512;
 
 __device__ __forceinline__ CudaMeasure of_nothing() {
-  return {0, 0, {1e30f, 1e30f, 1e30f}, {-1e30f, -1e30f, -1e30f}, 0, 1, 1, 1};
+  return {0, 0, {1e30f, 1e30f, 1e30f}, {-1e30f, -1e30f, -1e30f}, 0, 1, 1, 1, 1};
 }
 
 __device__ __forceinline__ void take(CudaMeasure& a, const CudaMeasure& b) {
@@ -22,6 +22,7 @@ __device__ __forceinline__ void take(CudaMeasure& a, const CudaMeasure& b) {
   if (!(b.speed <= a.speed)) a.speed = b.speed;  // NaN stays
   a.stiffening = fmaxf(a.stiffening, b.stiffening);
   a.wildest = fmaxf(a.wildest, b.wildest);
+  a.square = fmaxf(a.square, b.square);
   a.finite = a.finite & b.finite;
 }
 
@@ -36,6 +37,7 @@ __device__ __forceinline__ void reduce_warp(CudaMeasure& m) {
              far(m.speed),
              far(m.stiffening),
              far(m.wildest),
+             far(m.square),
              far(m.finite)});
   }
 }

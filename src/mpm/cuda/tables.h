@@ -120,6 +120,7 @@ struct CudaMeasure {
   float min[3], max[3];                   ///< of the points [m]
   float speed;                            ///< of the fastest point [m/s]
   float stiffening, wildest;              ///< see BlockState
+  float square;                           ///< the largest ||F||^2
   int finite;
 };
 

@@ -24,6 +24,23 @@ struct alignas(16) CudaFaceChunk {
   int unused;
 };
 
+/// A node of a row that shares none with others; the row's four lie side by side, one for each of
+/// four lanes. All that is needed to move it is here, for nobody to wait more than once for it.
+struct alignas(16) CudaHeldNode {
+  std::int32_t node;     ///< -1 where the row has none
+  int local;             ///< from the bundle's first slot on, and kOwnedHere; -1: not to be put
+  float weight;          ///< of its velocity in the impulse [kg]
+  float share;           ///< of the impulse in its velocity [1/kg]
+  uint4 parts, more;     ///< the first eight slots that share the node, ...
+  std::uint32_t shared;  ///< ... and CudaTables::slot_parts of one of them; kNoSlot for none
+  float arm;  ///< what its column of CudaHeldFaces::pull counts for in the impulse: the place
+              ///< of the face from the anchor's origin, and 1, times the row's mass [kg m, kg]
+  int anchor;
+  int impulse;  ///< where the component of its number is summed up; -1: nowhere
+};
+inline constexpr int kOwnedHere = 1 << 30;  ///< the bundle writes the node down
+inline constexpr std::uint32_t kNoSlot = ~0u;
+
 /// Numbers of each node, and of each row, of a chunk while it is worked out.
 inline constexpr int kFaceEntryRoom = 6, kFaceRowRoom = 6;
 
@@ -78,6 +95,8 @@ struct CudaAnchorPlace {
 /// What a kernel needs to hold faces; null `chunks` where there are none.
 struct CudaHeldFaces {
   const CudaFaceChunk* chunks = nullptr;  ///< first the first of each bundle
+  const CudaHeldNode* held = nullptr;     ///< of rows that have no nodes in common with others, ...
+  const int* first_held = nullptr;        ///< ... per bundle, and the end
   const int* first_carried = nullptr;     ///< per bundle, and the end
   const CudaFaceEntry* entries = nullptr;
   const CudaFaceShare* shares = nullptr;
@@ -87,8 +106,12 @@ struct CudaHeldFaces {
   double* impulse = nullptr;  ///< on tissue, [rows][3] [N s]; null where nobody asks
   /// Of each anchor before the first substep and after each; null where all stay.
   const CudaAnchorPlace* places = nullptr;
+  /// By substep and anchor, columns of what its motion asks of the velocity at a face, times the
+  /// substep: what it moves by, and kFaceDrift of where it was before; null where all stay.
+  const float4* pull = nullptr;
   int anchors = 0;
-  float drift = 0;  ///< kFaceDrift, or 0 where only rates count
+  bool carries_always = false;  ///< rows read nodes that anchors carry
+  float drift = 0;              ///< kFaceDrift, or 0 where only rates count
   float* room = nullptr;
   std::size_t room_each = 0;  ///< of a bundle
 };

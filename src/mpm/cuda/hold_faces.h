@@ -1,24 +1,9 @@
 // Holds anchors' faces in the substeps' kernels. For .cu files.
 #pragma once
 
-#include "mpm/cuda/block_nodes.h"
+#include "mpm/cuda/hold_rows.h"
 
 namespace tissue_sim {
-
-/// What holding a bundle's faces needs beside CudaHeldFaces.
-struct FacesAtWork {
-  const std::int32_t* slot_node;
-  const std::uint32_t* slot_parts;
-  const std::uint32_t* parts;
-  CudaNodes from, to;
-  const float4* force;
-  NodeStep step;
-  float scale;
-  float4 *u, *v;  ///< the bundle's nodes; `v` may be null
-  PushedNodes pushed;
-  int bundle, substep;
-  float4* exchange;  ///< clear, and left so
-};
 
 /// Loads a struct of the tables that nobody changes.
 template <class T>
@@ -75,13 +60,13 @@ __device__ __forceinline__ double moved(const CudaAnchorPlace& p, const float (&
 /// How far a face's velocity is from what it should be, at the row `r`: as in hold_group().
 __device__ __forceinline__ float left_of(const CudaHeldFaces& h, const FacesAtWork& w,
                                          const CudaFaceRow& r, const float* nodes, int c) {
-  const float dt = w.step.dt;
-  float target = 0, shift = 0;
-  if (h.places != nullptr) {
-    const CudaAnchorPlace* before = h.places + w.substep * h.anchors + r.anchor;
-    const double from = moved(before[0], r.place, c), to = moved(before[h.anchors], r.place, c);
-    target = static_cast<float>(to);
-    shift = static_cast<float>((to - from) / dt);
+  const float inv_dt = 1 / w.step.dt;
+  float lacks = 0;
+  if (h.pull != nullptr) {
+    const float* const m = reinterpret_cast<const float*>(
+        h.pull + 4 * (static_cast<std::size_t>(w.substep) * h.anchors + r.anchor));
+    lacks =
+        inv_dt * (r.place[0] * m[c] + r.place[1] * m[4 + c] + r.place[2] * m[8 + c] + m[12 + c]);
   }
   float v = 0, u = 0;
 #pragma unroll
@@ -90,18 +75,7 @@ __device__ __forceinline__ float left_of(const CudaHeldFaces& h, const FacesAtWo
     v += r.weight[k] * node[3 + c];
     u += r.weight[k] * node[c];
   }
-  const float off = target - shift * dt - (u - dt * v);
-  return shift - v + h.drift * off / dt;
-}
-
-/// Puts a slot's node where it is, in the bundle and, where it is the bundle's to write, in memory.
-__device__ __forceinline__ void put_node(const FacesAtWork& w, std::int32_t node, int local,
-                                         bool owned, const float4& u, const float4& v) {
-  if (w.u != nullptr) w.u[local] = {w.scale * u.x, w.scale * u.y, w.scale * u.z, 0};
-  if (w.v != nullptr) w.v[local] = {w.scale * v.x, w.scale * v.y, w.scale * v.z, 0};
-  if (!owned) return;
-  __stcg(w.to.u + node, u);
-  __stcg(w.to.v + node, v);
+  return lacks - ((1 - h.drift) * v + h.drift * inv_dt * u);
 }
 
 /// Holds the groups of a chunk. The first entry and row of each thread are on their way from the
@@ -187,7 +161,7 @@ __device__ __noinline__ void hold_faces(const CudaHeldFaces h, const FacesAtWork
     if (chunk.rows > 0) hold_chunk<kPushes>(h, w, chunk);
     i = chunk.next;
   }
-  if (h.places == nullptr) return;
+  if (h.places == nullptr || !(w.last || h.carries_always)) return;
   __syncthreads();  // bring_nodes() wrote them
   const CudaAnchorPlace* const before = h.places + w.substep * h.anchors;
   const int end = __ldg(h.first_carried + w.bundle + 1);

@@ -1,4 +1,5 @@
 #include "compute/for_each_cuda.h"
+#include "mpm/cuda/block_nodes.h"
 #include "mpm/cuda/hold_still.h"
 
 namespace tissue_sim {
@@ -55,7 +56,27 @@ struct ConnectEntry {
   }
 };
 
+struct ConnectHeld {
+  CudaHeldNode* held;
+  CudaTables t;
+  __device__ void operator()(int i) const {
+    CudaHeldNode& n = held[i];
+    const std::uint32_t slot = n.parts.x;
+    n.shared = kNoSlot;
+    if (slot == kNoSlot) return;
+    n.shared = t.slot_parts[slot];
+    n.parts = t.first_parts[slot];
+    n.more = more_parts(t, n.shared);
+    if (n.local >= 0 && t.slot_node[slot] >= 0) n.local |= kOwnedHere;
+  }
+};
+
 }  // namespace
+
+void launch_connect_held(CudaHeldNode* held, int count, const CudaTables& tables,
+                         cudaStream_t stream) {
+  Gpu(stream).for_each(count, ConnectHeld{held, tables});
+}
 
 void launch_connect_entries(CudaFaceEntry* entries, int count, const std::int32_t* slot_node,
                             const std::uint32_t* slot_parts, const uint4* first_parts,

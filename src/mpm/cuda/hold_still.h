@@ -4,7 +4,7 @@
 #include <cuda_runtime_api.h>
 #include <vector_types.h>
 
-#include "mpm/cuda/face_rows.h"
+#include "mpm/cuda/tables.h"
 
 namespace tissue_sim {
 
@@ -22,6 +22,9 @@ struct CudaRowGroup {
 void launch_connect_entries(CudaFaceEntry* entries, int count, const std::int32_t* slot_node,
                             const std::uint32_t* slot_parts, const uint4* first_parts,
                             cudaStream_t stream);
+/// The same of CudaHeldFaces::held.
+void launch_connect_held(CudaHeldNode* held, int count, const CudaTables& tables,
+                         cudaStream_t stream);
 
 /// As hold_still() of mpm/anchors/anchor_faces.h does for each of `count` groups.
 void launch_hold_still(const CudaRowGroup* groups, int count, const CudaRowNodes* rows,

@@ -128,6 +128,7 @@ template <Laws kLaws, bool kCached, bool kPairs, Can kCan>
 __device__ __forceinline__ void block_round(const CudaTables& t, const CudaFrame& f,
                                             const BundleAtWork& w, int index, int round,
                                             const CudaLayout& layout, const SlotCache& cache,
+                                            const HeldCache& held, const HeldOfBundle& of_held,
                                             const Workers& workers, bool last) {
   constexpr bool kPushes = pushes(kCan);
   constexpr int kHand = kCached && (kPairs || kCan != Can::kPlain) ? 2 : 4;  // as registers allow
@@ -149,13 +150,26 @@ __device__ __forceinline__ void block_round(const CudaTables& t, const CudaFrame
       loads = {t.blocks + w.bundle.first_block, w.bundle.blocks, t.bodies, f.colliders + first,
                reinterpret_cast<unsigned long long*>(f.loads) + kLoadSums * first};
     }
-    bring_nodes<true, kCached, kHand, kPushes>(t, w.bundle.first_slot, w.bundle.slots, cache, from,
-                                               to, odd_round ? f.force[0] : f.force[1], f.step,
-                                               scale, s.u, v, pushed, loads);
+    constexpr bool kLeavesHeld = kCached && kCan == Can::kCuts;  // to hold_rows()
+    bring_nodes<true, kCached, kHand, kPushes, kLeavesHeld>(
+        t, w.bundle.first_slot, w.bundle.slots, cache, from, to,
+        odd_round ? f.force[0] : f.force[1], f.step, scale, s.u, v, pushed, loads);
     if (kCan != Can::kPlain && f.held_faces.chunks != nullptr) {
-      hold_faces<kPushes>(f.held_faces, {t.slot_node, t.slot_parts, t.parts, from, to,
-                                         odd_round ? f.force[0] : f.force[1], f.step, scale, s.u, v,
-                                         pushed, index, round - 1, s.exchange});
+      const FacesAtWork work{t.slot_node, t.slot_parts,
+                             t.parts,     from,
+                             to,          odd_round ? f.force[0] : f.force[1],
+                             f.step,      scale,
+                             s.u,         v,
+                             pushed,      index,
+                             round - 1,   round == f.substeps,
+                             s.exchange};
+      if (!kLeavesHeld) __syncthreads();
+      if (of_held.count > 0) {
+        hold_rows<kPushes>(f.held_faces, work, of_held.first, of_held.count, held);
+      }
+      if (of_held.grouped || (of_held.carries && (work.last || f.held_faces.carries_always))) {
+        hold_faces<kPushes>(f.held_faces, work);
+      }
     }
   }
   if (round == f.substeps) return;
@@ -219,7 +233,8 @@ __global__ void __launch_bounds__(kMaxCudaThreads, 1)
   const BlockShared s = shared_of<kLaws == Laws::kAny>(layout);
   const int max_slots = layout.max_slots, mine = static_cast<int>(blockIdx.x);
   SlotCache cache;
-  cache.parts = reinterpret_cast<uint4*>(s.rounds + 1);
+  HeldCache held{reinterpret_cast<uint4*>(s.rounds + 1), layout.held};
+  cache.parts = held.word + 4 * layout.held;
   cache.more = layout.eight_parts ? cache.parts + max_slots : nullptr;
   cache.node =
       reinterpret_cast<std::int32_t*>(cache.parts + (layout.eight_parts ? 2 : 1) * max_slots);
@@ -244,10 +259,17 @@ __global__ void __launch_bounds__(kMaxCudaThreads, 1)
     if (mine == 0) clear_next_turns(f.arrived, 0);
   }
   const BundleAtWork kept(t, kCached && !idle ? mine : 0);
+  HeldOfBundle kept_held;
+  if (kCan != Can::kPlain && kCached && !idle) kept_held = HeldOfBundle(f.held_faces, mine);
   if (kCached && !idle) {
     fill_cache(t, kept.bundle.first_slot, kept.bundle.slots, cache);
     clear_exchange(s.exchange, kept.bundle.plane_slots, layout.two_planes);
+    if (kCan != Can::kPlain) fill_held(f.held_faces, kept_held, held);
     __syncthreads();
+    if (kCan == Can::kCuts && f.held_faces.chunks != nullptr) {
+      mark_held(f.held_faces, kept_held, cache);
+      __syncthreads();
+    }
   }
   for (int round = 0; round <= f.substeps; ++round) {
     if (round > 0) {
@@ -264,12 +286,13 @@ __global__ void __launch_bounds__(kMaxCudaThreads, 1)
     if (idle) {
       if (round < f.substeps) nodes_are_there(f);
     } else if constexpr (kCached) {
-      block_round<kLaws, true, kPairs, kCan>(t, f, kept, mine, round, layout, cache, workers, true);
+      block_round<kLaws, true, kPairs, kCan>(t, f, kept, mine, round, layout, cache, held,
+                                             kept_held, workers, true);
     } else {
       for (int i = mine; i < t.bundle_count; i += gridDim.x) {
         const bool last = i + static_cast<int>(gridDim.x) >= t.bundle_count;
         block_round<kLaws, false, kPairs, kCan>(t, f, BundleAtWork(t, i), i, round, layout, cache,
-                                                workers, last);
+                                                held, HeldOfBundle(f.held_faces, i), workers, last);
         __syncthreads();  // the next one clears the exchange
       }
     }

@@ -55,6 +55,17 @@ struct PushedNodes {
   long long* clear_inertia = nullptr;
 };
 
+/// The sums of pushes that a round reads and clears.
+__device__ __forceinline__ PushedNodes pushed_nodes(const NodePushes& p, int round) {
+  const int read = (round + 2) % 3, clear = (round + 1) % 3;
+  PushedNodes of{p.force + p.stride * read, p.force + p.stride * clear};
+  if (p.inertia != nullptr) {
+    of.inertia = p.inertia + p.inertia_stride * read;
+    of.clear_inertia = p.inertia + p.inertia_stride * clear;
+  }
+  return of;
+}
+
 /// What contact pushes a node with.
 struct Pushed {
   long long force[3];

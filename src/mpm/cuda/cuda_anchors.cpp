@@ -56,12 +56,10 @@ void CudaMpmTissue::push_anchors() {
   to.first_carried.upload(t.first_carried, d.stream);
   to.chunks.upload(t.chunks, d.stream);
   to.entries.upload(t.entries, d.stream);
-  launch_connect_entries(to.entries.data(), static_cast<int>(t.entries.size()),
-                         d.of_blocks.slot_node.data(), d.slot_parts.data(), d.first_parts.data(),
-                         d.stream);
+  launch_connect(to.entries.data(), static_cast<int>(t.entries.size()), d.tables(), d.stream);
   to.first_held.upload(t.first_held, d.stream);
   to.held.upload(t.held, d.stream);
-  launch_connect_held(to.held.data(), static_cast<int>(t.held.size()), d.tables(), d.stream);
+  launch_connect(to.held.data(), static_cast<int>(t.held.size()), d.tables(), d.stream);
   to.carries_always = t.carries_always;
   to.shares.upload(t.shares, d.stream);
   to.rows.upload(t.rows, d.stream);

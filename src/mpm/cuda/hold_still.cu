@@ -42,25 +42,12 @@ __global__ void hold_groups(const CudaRowGroup* groups, const CudaRowNodes* rows
   }
 }
 
-struct ConnectEntry {
-  CudaFaceEntry* entries;
-  const std::int32_t* slot_node;
-  const std::uint32_t* slot_parts;
-  const uint4* first_parts;
-  __device__ void operator()(int i) const {
-    CudaFaceEntry& e = entries[i];
-    if (e.slot < 0) return;
-    e.owned = e.local >= 0 && slot_node[e.slot] >= 0 ? 1 : 0;
-    e.parts = first_parts[e.slot];
-    e.shared = slot_parts[e.slot];
-  }
-};
-
-struct ConnectHeld {
-  CudaHeldNode* held;
+template <class Node>
+struct Connect {
+  Node* nodes;
   CudaTables t;
   __device__ void operator()(int i) const {
-    CudaHeldNode& n = held[i];
+    Node& n = nodes[i];
     const std::uint32_t slot = n.parts.x;
     n.shared = kNoSlot;
     if (slot == kNoSlot) return;
@@ -73,15 +60,12 @@ struct ConnectHeld {
 
 }  // namespace
 
-void launch_connect_held(CudaHeldNode* held, int count, const CudaTables& tables,
-                         cudaStream_t stream) {
-  Gpu(stream).for_each(count, ConnectHeld{held, tables});
+void launch_connect(CudaHeldNode* held, int count, const CudaTables& tables, cudaStream_t stream) {
+  Gpu(stream).for_each(count, Connect<CudaHeldNode>{held, tables});
 }
-
-void launch_connect_entries(CudaFaceEntry* entries, int count, const std::int32_t* slot_node,
-                            const std::uint32_t* slot_parts, const uint4* first_parts,
-                            cudaStream_t stream) {
-  Gpu(stream).for_each(count, ConnectEntry{entries, slot_node, slot_parts, first_parts});
+void launch_connect(CudaFaceEntry* entries, int count, const CudaTables& tables,
+                    cudaStream_t stream) {
+  Gpu(stream).for_each(count, Connect<CudaFaceEntry>{entries, tables});
 }
 
 void launch_hold_still(const CudaRowGroup* groups, int count, const CudaRowNodes* rows,

@@ -175,14 +175,12 @@ class FillChunks {
       row.group = chunk.rows;
       row.rows = g.count;
       row.inverse = g.inverse + i * g.count;
-      row.own = faces_.inverse[row.inverse];
       row.impulse = summed_[group] ? -1 : g.first + i;
       to_.rows.push_back(row);
     }
     summed_[group] = true;
     chunk.entries += count;
     chunk.rows += g.count;
-    if (g.count > 1) chunk.has_groups = 1;
   }
 
  private:
@@ -192,7 +190,7 @@ class FillChunks {
   static CudaFaceEntry entry(const NodeOfGroup& n, int slot, int local, int first_share) {
     CudaFaceEntry e{};
     e.node = n.node;
-    e.slot = slot;
+    e.parts.x = static_cast<std::uint32_t>(slot);  // kNoSlot for -1
     e.local = local;
     e.shares = static_cast<int>(n.shares.size());
     if (e.shares > 0) e.share = n.shares[0];
@@ -219,7 +217,7 @@ class FillChunks {
     chunk.first_row = static_cast<int>(to_.rows.size());
     chunk.is_large = alone > room_ ? 1 : 0;
     if (chunk.is_large != 0) {
-      to_.room_each = std::max(to_.room_each, static_cast<std::size_t>(alone));
+      to_.room_each = std::max(to_.room_each, static_cast<std::size_t>((alone + 3) / 4 * 4));
     }
     return chunk;
   }

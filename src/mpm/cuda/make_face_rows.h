@@ -11,10 +11,10 @@ namespace tissue_sim {
 struct HostFaceRows {
   std::vector<CudaFaceChunk> chunks;
   std::vector<int> first_carried;
-  std::vector<CudaHeldNode> held;  ///< each with a slot, or kNoSlot, for CudaHeldNode::parts.x
+  std::vector<CudaHeldNode> held;  ///< in their `parts.x` a slot or kNoSlot, for launch_connect()
   std::vector<int> first_held;
-  int most_held = 0;  ///< of a bundle
-  std::vector<CudaFaceEntry> entries;
+  int most_held = 0;                   ///< of a bundle
+  std::vector<CudaFaceEntry> entries;  ///< the same
   std::vector<CudaFaceShare> shares;
   std::vector<CudaFaceRow> rows;
   std::vector<CudaCarriedNode> carried;

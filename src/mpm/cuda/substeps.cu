@@ -58,9 +58,9 @@ std::size_t shared_bytes(const CudaPlan& plan) {
   const CudaLayout layout = layout_of(plan);
   const std::size_t of_slot =
       (plan.cached ? sizeof(uint4) + 8 : 0) + (plan.eight_parts ? sizeof(uint4) : 0);
-  return sizeof(CudaHeldNode) * layout.held + of_slot * layout.max_slots +
-         sizeof(float4) * (layout.node_room + layout.exchange) + kMaxColliders * sizeof(Collider) +
-         sizeof(FaceRounds);
+  return (plan.plain ? 0 : sizeof(SharedWork)) + sizeof(CudaHeldNode) * layout.held +
+         of_slot * layout.max_slots + sizeof(float4) * (layout.node_room + layout.exchange) +
+         kMaxColliders * sizeof(Collider) + sizeof(FaceRounds);
 }
 
 int attribute(cudaDeviceAttr which) {

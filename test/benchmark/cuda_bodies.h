@@ -60,13 +60,27 @@ inline void hold_at_faces(Scene& scene) {
   body.anchors[1].min[2] = body.size[2] - 0.0017;
 }
 
+/// And two balls amid its sides, a fifth of its height in radius: at them rows have nodes in
+/// common.
+inline void hold_at_balls(Scene& scene) {
+  Body& body = scene.bodies[0];
+  for (const double y : {0.0, 1.0}) {
+    Region ball;
+    ball.kind = Region::Kind::kBall;
+    ball.center = Vec3(0.5, y, 0.5).cwiseProduct(body.size);
+    ball.radius = 0.2 * body.size[2];
+    body.anchors.emplace_back(ball);
+  }
+}
+
 /// Where these anchors are in the deformed body, and stay.
 inline std::vector<AnchorMotion> stay_deformed(MpmState& state, double stretch) {
   const Body& body = state.scene.bodies[0];
   std::vector<AnchorMotion> motion;
   state.anchors.moves = true;
   for (std::size_t i = 0; i < body.anchors.size(); ++i) {
-    const double z = i == 0 ? body.anchors[0].z : body.anchors[1].min[2];
+    const Anchor& a = body.anchors[i];
+    const double z = i == 0 ? a.z : i == 1 ? a.min[2] : a.center[2];
     const Vec3 moved = (z + 0.5 * state.scene.cell_size) * Vec3(0.3, 0, stretch);
     state.anchors.now[i].translation = moved;
     const Pose pose{body.anchors[i].origin() + moved, Quat::Identity()};

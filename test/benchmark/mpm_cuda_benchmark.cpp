@@ -30,6 +30,7 @@ enum class Extra {
   kRinging,
   kRingingContact,
   kAnchors,
+  kBalls,
   kPartialCut,
   kFront
 };
@@ -46,7 +47,9 @@ void run(benchmark::State& bench, const CubeSize& size, Law law, Extra extra) {
   }
   Scene scene = cube(size, law);
   if (extra == Extra::kOrgan || extra == Extra::kCutOrgan) make_organ(scene);
-  if (extra == Extra::kAnchors) hold_at_faces(scene);
+  const bool held = extra == Extra::kAnchors || extra == Extra::kBalls;
+  if (held) hold_at_faces(scene);
+  if (extra == Extra::kBalls) hold_at_balls(scene);
   std::vector<ToolMotion> tools;
   if (extra == Extra::kTools || extra == Extra::kAll) add_probes(scene, tools);
   if (extra == Extra::kAll) add_options(scene, tools);
@@ -60,7 +63,7 @@ void run(benchmark::State& bench, const CubeSize& size, Law law, Extra extra) {
   const double stretch = in_contact ? -0.15 : tools.empty() ? 0.15 : 0;
   deform(tissue.state(), stretch);
   std::vector<AnchorMotion> anchors;
-  if (extra == Extra::kAnchors) anchors = stay_deformed(tissue.state(), stretch);
+  if (held) anchors = stay_deformed(tissue.state(), stretch);
   tissue.push();
   const float dt = 0.5f * tissue.stable_substep();
   std::vector<BladePath> cuts;
@@ -87,7 +90,7 @@ void run(benchmark::State& bench, const CubeSize& size, Law law, Extra extra) {
     MpmTissue cpu(scene);
     cpu.state().front.follows = extra == Extra::kFront;
     deform(cpu.state(), stretch);
-    if (extra == Extra::kAnchors) stay_deformed(cpu.state(), stretch);
+    if (held) stay_deformed(cpu.state(), stretch);
     measure_motion(cpu.state());
     cpu.advance(0, dt, {tools, cuts});
     cpu.advance(10, dt, {tools, {}, anchors});
@@ -199,6 +202,7 @@ int main(int argc, char** argv) {
     add("mpm/cuda/tools/", size, Law::kFixedCorotated, Extra::kTools);
     add("mpm/cuda/all_options/", size, Law::kFixedCorotated, Extra::kAll);
     add("mpm/cuda/anchors/", size, Law::kFixedCorotated, Extra::kAnchors);
+    add("mpm/cuda/anchors/balls/", size, Law::kFixedCorotated, Extra::kBalls);
     add("mpm/cuda/ringing/", size, Law::kFixedCorotated, Extra::kRinging);
     add("mpm/cuda/ringing_contact/", size, Law::kFixedCorotated, Extra::kRingingContact);
   }

@@ -1,14 +1,13 @@
 #include "mpm/anchors/anchor_faces.h"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <array>
 #include <map>
-#include <numeric>
 #include <stdexcept>
 #include <string>
 
 #include "mpm/anchors/anchored_share.h"
+#include "mpm/anchors/group_rows.h"
 #include "mpm/anchors/hold_beside_tools.h"
 
 namespace tissue_sim {
@@ -216,68 +215,11 @@ void add_rows(const LatticeBody& b, const Points& points, const NodeFields& fiel
       mobility += w * row.share[k];
     }
     if (!(mobility > 0)) continue;  // all is inside
-    // What has no weight is read as well: of a node of this row, which no other group writes then.
-    const int own =
-        static_cast<int>(std::max_element(row.share, row.share + kRowNodes) - row.share);
-    for (int k = 0; k < kRowNodes; ++k) {
-      if (row.weight[k] == 0) row.node[k] = row.node[own];
-    }
+    read_own(row);
     row.anchor = link.anchor;
     std::copy_n(link.place, 3, row.place);
     rows.push_back(row);
   }
-}
-
-/// Puts rows with nodes in common side by side, and works out how they are held.
-void make_groups(AnchorFaces& faces) {
-  const int count = static_cast<int>(faces.rows.size());
-  std::vector<int> parent(count);
-  std::iota(parent.begin(), parent.end(), 0);
-  const auto root = [&](int i) {
-    while (parent[i] != i) i = parent[i] = parent[parent[i]];
-    return i;
-  };
-  std::map<std::int32_t, int> first_of;  // row of each node
-  for (int i = 0; i < count; ++i) {
-    for (int k = 0; k < kRowNodes; ++k) {
-      if (faces.rows[i].share[k] == 0) continue;
-      const auto [at, is_new] = first_of.emplace(faces.rows[i].node[k], i);
-      if (is_new) continue;
-      const int a = root(i), b = root(at->second);
-      parent[std::max(a, b)] = std::min(a, b);
-    }
-  }
-  std::vector<std::vector<int>> members(count);
-  for (int i = 0; i < count; ++i) members[root(i)].push_back(i);
-  std::vector<FaceRow> rows;
-  faces.groups.clear();
-  faces.inverse.clear();
-  for (std::vector<int>& m : members) {
-    if (m.empty()) continue;
-    if (m.size() > kLargestGroup) m.resize(kLargestGroup);
-    const int n = static_cast<int>(m.size());
-    Eigen::MatrixXd A = Eigen::MatrixXd::Zero(n, n);
-    for (int i = 0; i < n; ++i) {
-      for (int j = 0; j < n; ++j) {
-        const FaceRow &r = faces.rows[m[i]], &s = faces.rows[m[j]];
-        for (int k = 0; k < kRowNodes * kRowNodes; ++k) {
-          const int l = k / kRowNodes, m = k % kRowNodes;
-          if (r.node[l] == s.node[m] && s.weight[m] != 0) {
-            A(i, j) += static_cast<double>(r.share[l]) * s.weight[m];
-          }
-        }
-      }
-    }
-    // Rows that say the same twice share what holds them.
-    if (n > 1) A.diagonal() *= 1 + 1e-4;
-    const Eigen::MatrixXd inverse = A.ldlt().solve(Eigen::MatrixXd::Identity(n, n));
-    faces.groups.push_back(
-        {static_cast<int>(rows.size()), n, static_cast<int>(faces.inverse.size())});
-    for (int i = 0; i < n * n; ++i)
-      faces.inverse.push_back(static_cast<float>(inverse(i / n, i % n)));
-    for (const int i : m) rows.push_back(faces.rows[i]);
-  }
-  faces.rows = std::move(rows);
 }
 
 RigidMotion motion_of(const Pose& pose, const Vec3& origin) {
@@ -333,7 +275,7 @@ void find_face_rows(const LatticeTissue& tissue, AnchorFaces& faces) {
     add_rows(tissue.bodies[link.body], tissue.points, *tissue.fields, tissue.nodes, link,
              faces.rows);
   }
-  make_groups(faces);
+  group_rows(tissue.nodes, faces);
   faces.impulse.assign(faces.rows.size(), {});
   // What was carried before, in a frame, goes to rows at the same places.
   std::map<std::array<float, 3>, std::size_t> at;

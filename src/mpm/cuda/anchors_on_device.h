@@ -2,6 +2,7 @@
 #pragma once
 
 #include <functional>
+#include <optional>
 
 #include "compute/device_array.h"
 #include "mpm/anchors/hold_beside_tools.h"
@@ -11,8 +12,10 @@
 namespace tissue_sim {
 
 struct AnchorsOnDevice {
+  std::optional<HostFaceRows> made;  ///< with the tables of blocks, to go up after them
   DeviceArray<CudaFaceChunk> chunks;
-  DeviceArray<int> first_carried;
+  DeviceArray<CudaHeldNode> held;
+  DeviceArray<int> first_held, first_carried;
   DeviceArray<CudaFaceEntry> entries;
   DeviceArray<CudaFaceShare> shares;
   DeviceArray<CudaFaceRow> rows;
@@ -22,13 +25,16 @@ struct AnchorsOnDevice {
   DeviceArray<float> inverse, room;
   DeviceArray<double> impulse;          ///< of AnchorFaces::rows since the frame began [N s]
   DeviceArray<CudaAnchorPlace> places;  ///< of a part of a frame; empty where all stay in it
+  DeviceArray<float4> pull;             ///< the same
   DeviceArray<float> lightness;         ///< Points::lightness, 1 where a bond broke
   std::size_t room_each = 0;
+  bool carries_always = false;
 
   std::size_t bytes() const {
-    return first_carried.bytes() + chunks.bytes() + entries.bytes() + shares.bytes() +
-           rows.bytes() + carried.bytes() + groups.bytes() + row_nodes.bytes() + inverse.bytes() +
-           room.bytes() + impulse.bytes() + places.bytes() + lightness.bytes();
+    return held.bytes() + first_held.bytes() + pull.bytes() + first_carried.bytes() +
+           chunks.bytes() + entries.bytes() + shares.bytes() + rows.bytes() + carried.bytes() +
+           groups.bytes() + row_nodes.bytes() + inverse.bytes() + room.bytes() + impulse.bytes() +
+           places.bytes() + lightness.bytes();
   }
   /// What the kernels need; `substep` of the part is the first.
   CudaHeldFaces view(int substep, int anchors) const {
@@ -36,6 +42,8 @@ struct AnchorsOnDevice {
     if (chunks.size() == 0) return h;
     h.first_carried = first_carried.data();
     h.chunks = chunks.data();
+    h.held = held.data();
+    h.first_held = first_held.data();
     h.entries = entries.data();
     h.shares = shares.data();
     h.rows = rows.data();
@@ -43,6 +51,8 @@ struct AnchorsOnDevice {
     h.inverse = inverse.data();
     h.impulse = impulse.data();
     h.places = places.size() > 0 ? places.data() + substep * anchors : nullptr;
+    h.pull = pull.size() > 0 ? pull.data() + 4 * substep * anchors : nullptr;
+    h.carries_always = carries_always;
     h.anchors = anchors;
     h.drift = kFaceDrift;
     h.room = room.data();

@@ -56,8 +56,10 @@ struct ColumnWalk {
     const int first = column.slot + z * column.plane;
     HalfPlane h[3], out[3];
     HalfBends bent[3];
-    read_half<kPartial>(s.u + first, column.pitch, column.plane, side, h, bent);
+    // From memory: on their way while the nodes are read.
     const float4 volume = half_volumes(t, column, body, z, sz);
+    const float extra = kPartial ? stiffness(z) : 0;
+    read_half<kPartial>(s.u + first, column.pitch, column.plane, side, h, bent);
     float damping[9];
     if (kViscous) {
       HalfPlane rate[3];
@@ -66,7 +68,6 @@ struct ColumnWalk {
     }
     half_forces<LawOf, kViscous, kTogether>(body, h, side, volume, column.whole != 0, damping, out);
     const GiveWeights k(side);
-    const float extra = kPartial ? stiffness(z) : 0;
 #pragma unroll
     for (int c = 0; c < 3; ++c) {
       HalfBends bends;
@@ -90,6 +91,7 @@ struct ColumnWalk {
   /// All of cell z, with the column's nodes of the plane above. Calls between() between its halves.
   template <class Between>
   __device__ __forceinline__ void cell(int z, const float4* nodes, const Between& between) {
+    const float extra = kPartial ? stiffness(z) : 0;  // from memory: on its way
     PlaneNumbers above[3];
     read_plane<kPartial>(nodes, column.pitch, above);
 #pragma unroll
@@ -117,7 +119,6 @@ struct ColumnWalk {
         after[c] = plus<kPartial, !kPairs>(after[c], out[c], k.above, k.slope_above);
       }
     }
-    const float extra = kPartial ? stiffness(z) : 0;
 #pragma unroll
     for (int c = 0; c < 3; ++c) {
       if (kPartial && extra != 0) {

@@ -176,9 +176,9 @@ bool can_march(const std::vector<LatticeBody>& bodies) {
   return m.viscosity == 0 && least_tear_limit(m) == 0 && b.point_count == 8 * b.nx * b.ny * b.nz;
 }
 
-CudaShape choose_shape(const std::vector<LatticeBody>& bodies, const CudaLimits& limits,
-                       bool whole) {
-  const bool may_march = whole && can_march(bodies);
+CudaShape choose_shape(const std::vector<LatticeBody>& bodies, const CudaLimits& limits, bool whole,
+                       bool may_march) {
+  may_march = may_march && whole && can_march(bodies);
   const bool pairs = wants_pairs(bodies);
   if (const char* text = std::getenv("TISSUE_SIM_CUDA_SHAPE")) {
     return shape_from(text, pairs, may_march);

@@ -33,8 +33,8 @@ struct CudaLimits {
 /// are `whole`, or when they are cut. Only what is whole can march, see can_march(), and cuts need
 /// room for the blocks that they add. The environment variable TISSUE_SIM_CUDA_SHAPE="x y z threads
 /// way", way 0 for large, 1 for small, 2 for a shape that marches, overrules it, for measurements.
-CudaShape choose_shape(const std::vector<LatticeBody>& bodies, const CudaLimits& limits,
-                       bool whole);
+CudaShape choose_shape(const std::vector<LatticeBody>& bodies, const CudaLimits& limits, bool whole,
+                       bool may_march = true);
 
 /// Whether these are one body that fills a box, of one material that neither damps nor tears.
 bool can_march(const std::vector<LatticeBody>& bodies);

@@ -19,15 +19,31 @@ CudaAnchorPlace place_of(const RigidMotion& m) {
   return p;
 }
 
+/// Adds CudaHeldFaces::pull of an anchor about `origin`.
+void add_pull(const RigidMotion& before, const RigidMotion& after, const Vec3& origin,
+              std::vector<float4>& pull) {
+  const Eigen::Matrix3d rotation = after.rotation - before.rotation +
+                                   kFaceDrift * (before.rotation - Eigen::Matrix3d::Identity());
+  const Vec3 shift = after.translation - before.translation + kFaceDrift * before.translation;
+  const Vec3 at_origin = shift + rotation * origin;
+  for (int k = 0; k < 4; ++k) {
+    const Vec3 c = (k < 3 ? Vec3(rotation.col(k)) : at_origin);
+    pull.push_back(
+        {static_cast<float>(c[0]), static_cast<float>(c[1]), static_cast<float>(c[2]), 0});
+  }
+}
+
 }  // namespace
 
 void CudaMpmTissue::push_anchors() {
   const AnchorFaces& faces = state_->anchors;
   OnDevice& d = *device_;
   AnchorsOnDevice& to = d.anchors;
+  std::optional<HostFaceRows> made;
+  made.swap(to.made);
   if (faces.groups.empty() && faces.held.empty() && to.chunks.size() == 0) return;
-  const int room = 4 * 9 * d.plan.max_plane_slots;  // what columns give to a plane comes there
-  const HostFaceRows t = make_face_rows(*state_, d.host_tables, room);
+  if (!made) made = make_face_rows(*state_, d.host_tables, d.plan.max_plane_slots);
+  const HostFaceRows& t = *made;
   std::vector<CudaRowNodes> rows(faces.rows.size());
   for (std::size_t i = 0; i < rows.size(); ++i) {
     const FaceRow& r = faces.rows[i];
@@ -40,9 +56,11 @@ void CudaMpmTissue::push_anchors() {
   to.first_carried.upload(t.first_carried, d.stream);
   to.chunks.upload(t.chunks, d.stream);
   to.entries.upload(t.entries, d.stream);
-  launch_connect_entries(to.entries.data(), static_cast<int>(t.entries.size()),
-                         d.of_blocks.slot_node.data(), d.slot_parts.data(), d.first_parts.data(),
-                         d.stream);
+  launch_connect(to.entries.data(), static_cast<int>(t.entries.size()), d.tables(), d.stream);
+  to.first_held.upload(t.first_held, d.stream);
+  to.held.upload(t.held, d.stream);
+  launch_connect(to.held.data(), static_cast<int>(t.held.size()), d.tables(), d.stream);
+  to.carries_always = t.carries_always;
   to.shares.upload(t.shares, d.stream);
   to.rows.upload(t.rows, d.stream);
   to.carried.upload(t.carried, d.stream);
@@ -104,16 +122,23 @@ void CudaMpmTissue::begin_anchors(const FrameInput& input) {
 void CudaMpmTissue::upload_anchor_places() {
   OnDevice& d = *device_;
   std::vector<CudaAnchorPlace> places;
+  std::vector<float4> pull;
   if (!input_.anchors.empty()) {
-    for (const RigidMotion& m : state_->anchors.now) places.push_back(place_of(m));
+    const std::vector<Vec3>& origin = state_->anchors.origin;
+    std::vector<RigidMotion> before = state_->anchors.now;
+    for (const RigidMotion& m : before) places.push_back(place_of(m));
     for (int i = 0; i < substeps_; ++i) {
-      for (const RigidMotion& m : anchors_at(state_->anchors, input_, share_of(i))) {
-        places.push_back(place_of(m));
+      std::vector<RigidMotion> after = anchors_at(state_->anchors, input_, share_of(i));
+      for (std::size_t k = 0; k < after.size(); ++k) {
+        places.push_back(place_of(after[k]));
+        add_pull(before[k], after[k], origin[k], pull);
       }
+      before = std::move(after);
     }
   }
   if (places.empty() && d.anchors.places.size() == 0) return;
   d.anchors.places.upload(places, d.stream);
+  d.anchors.pull.upload(pull, d.stream);
   check_cuda(cudaStreamSynchronize(d.stream), "receive data");
 }
 

@@ -66,9 +66,10 @@ CudaMpmTissue::CudaMpmTissue(const Scene& scene, std::vector<std::string> notes)
   state_ = make_state(scene, &notes_);
   d.cut_shape = choose_shape(state_->bodies, d.limits, false);
   // What touches other tissue keeps its blocks, which know the contacts; and what anchors hold at
-  // their faces has cells that are not full.
-  const bool whole = state_->bodies.size() == 1 && state_->anchors.groups.empty();
-  make_blocks(whole ? choose_shape(state_->bodies, d.limits, true) : d.cut_shape,
+  // their faces has cells that are not full, which do not march.
+  const bool held = !state_->anchors.groups.empty();
+  make_blocks(state_->bodies.size() == 1 ? choose_shape(state_->bodies, d.limits, true, !held)
+                                         : d.cut_shape,
               d.limits.processors);
   pieces_ = whole_pieces(*state_);
   foresight_ = make_foresight(scene);

@@ -119,6 +119,8 @@ void CudaMpmTissue::plan_tables() {
   d.plan.max_slots = t.max_slots;
   d.plan.max_plane_slots = t.max_plane_slots;
   d.plan.max_columns = t.max_columns;
+  d.anchors.made = make_face_rows(*state_, t, t.max_plane_slots);
+  d.plan.max_held = d.anchors.made->most_held;
   choose(t.bundles.size());
   // Those kernels hold no faces.
   d.all_plain = state_->anchors.groups.empty() &&

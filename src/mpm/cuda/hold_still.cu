@@ -1,4 +1,5 @@
 #include "compute/for_each_cuda.h"
+#include "mpm/cuda/block_nodes.h"
 #include "mpm/cuda/hold_still.h"
 
 namespace tissue_sim {
@@ -41,26 +42,30 @@ __global__ void hold_groups(const CudaRowGroup* groups, const CudaRowNodes* rows
   }
 }
 
-struct ConnectEntry {
-  CudaFaceEntry* entries;
-  const std::int32_t* slot_node;
-  const std::uint32_t* slot_parts;
-  const uint4* first_parts;
+template <class Node>
+struct Connect {
+  Node* nodes;
+  CudaTables t;
   __device__ void operator()(int i) const {
-    CudaFaceEntry& e = entries[i];
-    if (e.slot < 0) return;
-    e.owned = e.local >= 0 && slot_node[e.slot] >= 0 ? 1 : 0;
-    e.parts = first_parts[e.slot];
-    e.shared = slot_parts[e.slot];
+    Node& n = nodes[i];
+    const std::uint32_t slot = n.parts.x;
+    n.shared = kNoSlot;
+    if (slot == kNoSlot) return;
+    n.shared = t.slot_parts[slot];
+    n.parts = t.first_parts[slot];
+    n.more = more_parts(t, n.shared);
+    if (n.local >= 0 && t.slot_node[slot] >= 0) n.local |= kOwnedHere;
   }
 };
 
 }  // namespace
 
-void launch_connect_entries(CudaFaceEntry* entries, int count, const std::int32_t* slot_node,
-                            const std::uint32_t* slot_parts, const uint4* first_parts,
-                            cudaStream_t stream) {
-  Gpu(stream).for_each(count, ConnectEntry{entries, slot_node, slot_parts, first_parts});
+void launch_connect(CudaHeldNode* held, int count, const CudaTables& tables, cudaStream_t stream) {
+  Gpu(stream).for_each(count, Connect<CudaHeldNode>{held, tables});
+}
+void launch_connect(CudaFaceEntry* entries, int count, const CudaTables& tables,
+                    cudaStream_t stream) {
+  Gpu(stream).for_each(count, Connect<CudaFaceEntry>{entries, tables});
 }
 
 void launch_hold_still(const CudaRowGroup* groups, int count, const CudaRowNodes* rows,

@@ -4,7 +4,7 @@
 #include <cuda_runtime_api.h>
 #include <vector_types.h>
 
-#include "mpm/cuda/face_rows.h"
+#include "mpm/cuda/tables.h"
 
 namespace tissue_sim {
 
@@ -18,10 +18,10 @@ struct CudaRowGroup {
   int first, count, inverse;
 };
 
-/// Fills what entries of CudaHeldFaces have of the tables.
-void launch_connect_entries(CudaFaceEntry* entries, int count, const std::int32_t* slot_node,
-                            const std::uint32_t* slot_parts, const uint4* first_parts,
-                            cudaStream_t stream);
+/// Fills what CudaHeldFaces::held and ::entries have of the tables.
+void launch_connect(CudaHeldNode* held, int count, const CudaTables& tables, cudaStream_t stream);
+void launch_connect(CudaFaceEntry* entries, int count, const CudaTables& tables,
+                    cudaStream_t stream);
 
 /// As hold_still() of mpm/anchors/anchor_faces.h does for each of `count` groups.
 void launch_hold_still(const CudaRowGroup* groups, int count, const CudaRowNodes* rows,

@@ -81,6 +81,42 @@ std::vector<NodeOfGroup> nodes_of(const AnchorFaces& faces, const FaceGroup& g) 
   return nodes;
 }
 
+/// Adds a row that is a group of its own, for a bundle with these slots: once for each slot that a
+/// node of it has there. `summed`: another bundle sums up its impulse.
+void add_row(const AnchorFaces& faces, const FaceGroup& g, const SlotsOfNodes& slots, int bundle,
+             int first_slot, bool summed, HostFaceRows& to) {
+  const FaceRow& r = faces.rows[g.first];
+  const float mass = faces.inverse[g.inverse];
+  const std::vector<SlotOfNode>& here = slots.of_bundle[bundle];
+  std::vector<SlotOfNode>::const_iterator at[kRowNodes];
+  for (int k = 0; k < kRowNodes; ++k) {
+    at[k] = r.share[k] == 0 ? here.end()
+                            : std::lower_bound(here.begin(), here.end(), SlotOfNode{r.node[k], 0});
+  }
+  for (bool more = true; more; summed = true) {
+    more = false;
+    for (int k = 0; k < kRowNodes; ++k) {
+      CudaHeldNode n{};
+      n.node = r.weight[k] == 0 ? -1 : r.node[k];
+      n.local = -1;
+      n.weight = mass * r.weight[k];
+      n.share = r.share[k];
+      const double arm = k < 3 ? r.place[k] - faces.origin[r.anchor][k] : 1;
+      n.arm = static_cast<float>(mass * arm);
+      n.anchor = r.anchor;
+      n.impulse = summed || k == 3 ? -1 : 3 * g.first + k;
+      n.parts.x = n.node < 0 ? kNoSlot : static_cast<std::uint32_t>(slots.first_of(n.node));
+      if (at[k] != here.end() && at[k]->node == r.node[k]) {
+        n.local = at[k]->slot - first_slot;
+        n.parts.x = at[k]->slot;
+        ++at[k];
+        more = more || (at[k] != here.end() && at[k]->node == r.node[k]);
+      }
+      to.held.push_back(n);
+    }
+  }
+}
+
 /// Fills the chunks of one bundle after another.
 class FillChunks {
  public:
@@ -133,18 +169,18 @@ class FillChunks {
         row.weight[k] = r.weight[k];
       }
       row.anchor = r.anchor;
-      std::copy_n(r.place, 3, row.place);
+      for (int a = 0; a < 3; ++a) {
+        row.place[a] = static_cast<float>(r.place[a] - faces_.origin[r.anchor][a]);
+      }
       row.group = chunk.rows;
       row.rows = g.count;
       row.inverse = g.inverse + i * g.count;
-      row.own = faces_.inverse[row.inverse];
       row.impulse = summed_[group] ? -1 : g.first + i;
       to_.rows.push_back(row);
     }
     summed_[group] = true;
     chunk.entries += count;
     chunk.rows += g.count;
-    if (g.count > 1) chunk.has_groups = 1;
   }
 
  private:
@@ -154,7 +190,7 @@ class FillChunks {
   static CudaFaceEntry entry(const NodeOfGroup& n, int slot, int local, int first_share) {
     CudaFaceEntry e{};
     e.node = n.node;
-    e.slot = slot;
+    e.parts.x = static_cast<std::uint32_t>(slot);  // kNoSlot for -1
     e.local = local;
     e.shares = static_cast<int>(n.shares.size());
     if (e.shares > 0) e.share = n.shares[0];
@@ -181,7 +217,7 @@ class FillChunks {
     chunk.first_row = static_cast<int>(to_.rows.size());
     chunk.is_large = alone > room_ ? 1 : 0;
     if (chunk.is_large != 0) {
-      to_.room_each = std::max(to_.room_each, static_cast<std::size_t>(alone));
+      to_.room_each = std::max(to_.room_each, static_cast<std::size_t>((alone + 3) / 4 * 4));
     }
     return chunk;
   }
@@ -196,8 +232,9 @@ class FillChunks {
 
 }  // namespace
 
-HostFaceRows make_face_rows(const MpmState& state, const HostTables& t, int room) {
+HostFaceRows make_face_rows(const MpmState& state, const HostTables& t, int plane_slots) {
   const AnchorFaces& faces = state.anchors;
+  if (faces.groups.empty() && faces.held.empty()) return {};
   std::vector<std::uint8_t> wanted(state.nodes.size(), 0);
   std::vector<std::pair<std::int32_t, int>> group_of;  // of nodes that rows move
   for (std::size_t g = 0; g < faces.groups.size(); ++g) {
@@ -218,8 +255,17 @@ HostFaceRows make_face_rows(const MpmState& state, const HostTables& t, int room
   std::sort(held.begin(), held.end());
   const SlotsOfNodes slots = find_slots(state, t, wanted);
   HostFaceRows to;
-  FillChunks fill(faces, slots, room, to);
+  for (const FaceRow& r : faces.rows) {
+    for (int k = 0; k < kRowNodes; ++k) {
+      const auto carried =
+          std::lower_bound(held.begin(), held.end(), std::pair<std::int32_t, int>(r.node[k], 0));
+      to.carries_always = to.carries_always || (r.weight[k] != 0 && carried != held.end() &&
+                                                carried->first == r.node[k]);
+    }
+  }
+  FillChunks fill(faces, slots, 4 * 9 * plane_slots, to);
   std::vector<int> groups;
+  std::vector<bool> summed(faces.groups.size(), false);
   for (std::size_t i = 0; i < t.bundles.size(); ++i) {
     const int first_slot = t.bundles[i].first_slot;
     to.first_carried.push_back(static_cast<int>(to.carried.size()));
@@ -238,8 +284,18 @@ HostFaceRows make_face_rows(const MpmState& state, const HostTables& t, int room
     }
     std::sort(groups.begin(), groups.end());
     groups.erase(std::unique(groups.begin(), groups.end()), groups.end());
-    for (const int g : groups) fill.add(static_cast<int>(i), first_slot, g);
+    to.first_held.push_back(static_cast<int>(to.held.size()));
+    for (const int g : groups) {
+      if (faces.groups[g].count > 1) {
+        fill.add(static_cast<int>(i), first_slot, g);
+        continue;
+      }
+      add_row(faces, faces.groups[g], slots, static_cast<int>(i), first_slot, summed[g], to);
+      summed[g] = true;
+    }
+    to.most_held = std::max(to.most_held, static_cast<int>(to.held.size()) - to.first_held.back());
   }
+  to.first_held.push_back(static_cast<int>(to.held.size()));
   to.first_carried.push_back(static_cast<int>(to.carried.size()));
   return to;
 }

@@ -11,14 +11,18 @@ namespace tissue_sim {
 struct HostFaceRows {
   std::vector<CudaFaceChunk> chunks;
   std::vector<int> first_carried;
-  std::vector<CudaFaceEntry> entries;
+  std::vector<CudaHeldNode> held;  ///< in their `parts.x` a slot or kNoSlot, for launch_connect()
+  std::vector<int> first_held;
+  int most_held = 0;                   ///< of a bundle
+  std::vector<CudaFaceEntry> entries;  ///< the same
   std::vector<CudaFaceShare> shares;
   std::vector<CudaFaceRow> rows;
   std::vector<CudaCarriedNode> carried;
-  std::size_t room_each = 0;  ///< of a bundle, for chunks that are large [floats]
+  bool carries_always = false;  ///< see CudaHeldFaces
+  std::size_t room_each = 0;    ///< of a bundle, for chunks that are large [floats]
 };
 
-/// For the bundles of `tables`, whose thread blocks have `room` floats for a chunk.
-HostFaceRows make_face_rows(const MpmState& state, const HostTables& tables, int room);
+/// For the bundles of `tables`. A chunk comes to where columns give to a plane of so many slots.
+HostFaceRows make_face_rows(const MpmState& state, const HostTables& tables, int plane_slots);
 
 }  // namespace tissue_sim

@@ -1,6 +1,8 @@
 // The persistent kernels of substeps.h, with and without contact and fronts. For .cu files.
 #pragma once
 
+#include <type_traits>
+
 #include "mpm/cuda/block_forces.h"
 #include "mpm/cuda/hold_faces.h"
 #include "mpm/cuda/push_cells.h"
@@ -56,16 +58,6 @@ __device__ __forceinline__ void forces(const CudaTables& t, const CudaBundle& w,
   }
 }
 
-/// Out of line and with copies of its arguments, for the ordinary blocks to keep theirs in
-/// registers.
-template <Laws kLaws, bool kPairs, bool kPartial>
-__device__ __noinline__ void special_forces(const CudaTables t, const CudaBundle w,
-                                            const CudaBlock block, const CudaBody body,
-                                            const CudaLayout layout, const BlockStep step) {
-  forces<kLaws, kPairs, true, kPartial>(t, w, block, body, shared_of<kLaws == Laws::kAny>(layout),
-                                        step);
-}
-
 /// A bundle with what belongs to it. Copies: through a reference they would be read again after
 /// every store.
 struct BundleAtWork {
@@ -78,38 +70,82 @@ struct BundleAtWork {
         body(t.bodies[bundle.body]) {}
 };
 
+/// What functions that are not inlined need, in shared memory: see HeldFrame.
+struct alignas(16) SharedWork {
+  HeldOfBundle held;
+  HeldFrame frame;
+  CudaTables tables;
+  CudaLayout layout;
+  CudaBundle bundle;
+  CudaBlock block;
+  CudaBody body;
+
+  __device__ __forceinline__ void begin(const CudaTables& t, const CudaFrame& f,
+                                        const CudaLayout& l) {
+    tables = t;
+    layout = l;
+    frame.faces = f.held_faces;
+    frame.parts = t.parts;
+    frame.slot_node = t.slot_node;
+    frame.state[0] = f.state[0];
+    frame.state[1] = f.state[1];
+    frame.force[0] = f.force[0];
+    frame.force[1] = f.force[1];
+    frame.step = f.step;
+    frame.pushes = f.pushes;
+    frame.current = f.current;
+    frame.substeps = f.substeps;
+  }
+  __device__ __forceinline__ void take(const BundleAtWork& w, const HeldOfBundle& of) {
+    bundle = w.bundle;
+    block = w.block;
+    body = w.body;
+    held = of;
+  }
+};
+
+/// Out of line, for the ordinary blocks to keep theirs in registers.
+template <Laws kLaws, bool kPairs, bool kPartial>
+__device__ __noinline__ void special_forces(const SharedWork* work, float4* force,
+                                            int workers_first, int workers_count) {
+  // Copies: through the pointer they would be read again after every store.
+  const CudaTables t = work->tables;
+  const CudaBundle w = work->bundle;
+  const CudaBlock block = work->block;
+  const CudaBody body = work->body;
+  const CudaLayout layout = work->layout;
+  BlockStep step{force, layout.two_planes, {}};
+  step.workers.first = workers_first;
+  step.workers.count = workers_count;
+  forces<kLaws, kPairs, true, kPartial>(t, w, block, body, shared_of<kLaws == Laws::kAny>(layout),
+                                        step);
+}
+
 /// Forces of a bundle whose nodes are there. The exchange is `clear` where the thread block has had
 /// no other bundle.
 template <Laws kLaws, Can kCan, bool kPairs>
 __device__ __forceinline__ void all_forces(const CudaTables& t, const BundleAtWork& w,
-                                           const CudaLayout& layout, bool clear, float4* force,
-                                           const Workers& workers) {
+                                           const SharedWork* work, const CudaLayout& layout,
+                                           bool clear, float4* force, const Workers& workers) {
   const BlockShared s = shared_of<kLaws == Laws::kAny>(layout);
   if (!clear) clear_exchange(s.exchange, w.bundle.plane_slots, layout.two_planes);
   if (!pushes(kCan) || !clear) __syncthreads();
   const BlockStep step{force, layout.two_planes, workers};
   // Small tissue waits for instructions as often as it issues them, and those of two ways and of
   // contact are more than the caches of the multiprocessors hold.
+  const auto special = [&](const auto& partial) {
+    special_forces<kLaws, kPairs, std::decay_t<decltype(partial)>::value>(
+        work, force, workers.first, workers.count);
+  };
   if (touches(kCan) && kPairs && !workers.is_all()) {
-    special_forces<kLaws, kPairs, true>(t, w.bundle, w.block, w.body, layout, step);
+    special(std::true_type());
   } else if (kCan == Can::kPlain || (w.bundle.partial == 0 && w.bundle.blocks == 1)) {
     forces<kLaws, kPairs, false, false>(t, w.bundle, w.block, w.body, s, step);
   } else if (w.bundle.partial != 0) {
-    special_forces<kLaws, kPairs, true>(t, w.bundle, w.block, w.body, layout, step);
+    special(std::true_type());
   } else {
-    special_forces<kLaws, kPairs, false>(t, w.bundle, w.block, w.body, layout, step);
+    special(std::false_type());
   }
-}
-
-/// The sums of pushes that a round reads and clears.
-__device__ __forceinline__ PushedNodes pushed_nodes(const NodePushes& p, int round) {
-  const int read = (round + 2) % 3, clear = (round + 1) % 3;
-  PushedNodes of{p.force + p.stride * read, p.force + p.stride * clear};
-  if (p.inertia != nullptr) {
-    of.inertia = p.inertia + p.inertia_stride * read;
-    of.clear_inertia = p.inertia + p.inertia_stride * clear;
-  }
-  return of;
 }
 
 /// Thread blocks meet a second time in a round, where all nodes are in place. The last thread
@@ -128,6 +164,7 @@ template <Laws kLaws, bool kCached, bool kPairs, Can kCan>
 __device__ __forceinline__ void block_round(const CudaTables& t, const CudaFrame& f,
                                             const BundleAtWork& w, int index, int round,
                                             const CudaLayout& layout, const SlotCache& cache,
+                                            SharedWork* work, const HeldCache& held,
                                             const Workers& workers, bool last) {
   constexpr bool kPushes = pushes(kCan);
   constexpr int kHand = kCached && (kPairs || kCan != Can::kPlain) ? 2 : 4;  // as registers allow
@@ -149,19 +186,26 @@ __device__ __forceinline__ void block_round(const CudaTables& t, const CudaFrame
       loads = {t.blocks + w.bundle.first_block, w.bundle.blocks, t.bodies, f.colliders + first,
                reinterpret_cast<unsigned long long*>(f.loads) + kLoadSums * first};
     }
-    bring_nodes<true, kCached, kHand, kPushes>(t, w.bundle.first_slot, w.bundle.slots, cache, from,
-                                               to, odd_round ? f.force[0] : f.force[1], f.step,
-                                               scale, s.u, v, pushed, loads);
+    constexpr bool kLeavesHeld = kCached && kCan == Can::kCuts;  // to hold_rows()
+    bring_nodes<true, kCached, kHand, kPushes, kLeavesHeld>(
+        t, w.bundle.first_slot, w.bundle.slots, cache, from, to,
+        odd_round ? f.force[0] : f.force[1], f.step, scale, s.u, v, pushed, loads);
     if (kCan != Can::kPlain && f.held_faces.chunks != nullptr) {
-      hold_faces<kPushes>(f.held_faces, {t.slot_node, t.slot_parts, t.parts, from, to,
-                                         odd_round ? f.force[0] : f.force[1], f.step, scale, s.u, v,
-                                         pushed, index, round - 1, s.exchange});
+      const HeldOfBundle of = kCached ? work->held : HeldOfBundle(f.held_faces, index);
+      if (!kLeavesHeld) __syncthreads();
+      if (of.count > 0) {
+        hold_rows<kPushes>(&work->frame, round, s.u, v, scale, of.first, of.count, held.word,
+                           held.room);
+      }
+      if (of.grouped || (of.carries && (round == f.substeps || f.held_faces.carries_always))) {
+        hold_faces<kPushes>(&work->frame, round, s.u, v, scale, index, s.exchange);
+      }
     }
   }
   if (round == f.substeps) return;
   if (kPushes && last) nodes_are_there(f);
   if (!workers.has_me()) return;
-  all_forces<kLaws, kCan, kPairs>(t, w, layout, kCached, odd_round ? f.force[1] : f.force[0],
+  all_forces<kLaws, kCan, kPairs>(t, w, work, layout, kCached, odd_round ? f.force[1] : f.force[0],
                                   workers);
 }
 
@@ -219,7 +263,12 @@ __global__ void __launch_bounds__(kMaxCudaThreads, 1)
   const BlockShared s = shared_of<kLaws == Laws::kAny>(layout);
   const int max_slots = layout.max_slots, mine = static_cast<int>(blockIdx.x);
   SlotCache cache;
-  cache.parts = reinterpret_cast<uint4*>(s.rounds + 1);
+  auto* const work = kCan == Can::kPlain ? nullptr : reinterpret_cast<SharedWork*>(s.rounds + 1);
+  HeldCache held;
+  held.word =
+      reinterpret_cast<uint4*>(kCan == Can::kPlain ? s.rounds + 1 : static_cast<void*>(work + 1));
+  held.room = layout.held;
+  cache.parts = held.word + 4 * layout.held;
   cache.more = layout.eight_parts ? cache.parts + max_slots : nullptr;
   cache.node =
       reinterpret_cast<std::int32_t*>(cache.parts + (layout.eight_parts ? 2 : 1) * max_slots);
@@ -243,11 +292,22 @@ __global__ void __launch_bounds__(kMaxCudaThreads, 1)
     s.rounds->begin(t, *f.faces, f.step.dt);
     if (mine == 0) clear_next_turns(f.arrived, 0);
   }
+  if (kCan != Can::kPlain && threadIdx.x == 0) work->begin(t, f, layout);
   const BundleAtWork kept(t, kCached && !idle ? mine : 0);
   if (kCached && !idle) {
     fill_cache(t, kept.bundle.first_slot, kept.bundle.slots, cache);
     clear_exchange(s.exchange, kept.bundle.plane_slots, layout.two_planes);
+    HeldOfBundle of;
+    if (kCan != Can::kPlain) {
+      of = HeldOfBundle(f.held_faces, mine);
+      if (threadIdx.x == 0) work->take(kept, of);
+      fill_held(f.held_faces, of, held);
+    }
     __syncthreads();
+    if (kCan == Can::kCuts && f.held_faces.chunks != nullptr) {
+      mark_held(f.held_faces, of, cache);
+      __syncthreads();
+    }
   }
   for (int round = 0; round <= f.substeps; ++round) {
     if (round > 0) {
@@ -264,11 +324,17 @@ __global__ void __launch_bounds__(kMaxCudaThreads, 1)
     if (idle) {
       if (round < f.substeps) nodes_are_there(f);
     } else if constexpr (kCached) {
-      block_round<kLaws, true, kPairs, kCan>(t, f, kept, mine, round, layout, cache, workers, true);
+      block_round<kLaws, true, kPairs, kCan>(t, f, kept, mine, round, layout, cache, work, held,
+                                             workers, true);
     } else {
       for (int i = mine; i < t.bundle_count; i += gridDim.x) {
         const bool last = i + static_cast<int>(gridDim.x) >= t.bundle_count;
-        block_round<kLaws, false, kPairs, kCan>(t, f, BundleAtWork(t, i), i, round, layout, cache,
+        const BundleAtWork bundle(t, i);
+        if (kCan != Can::kPlain) {
+          if (threadIdx.x == 0) work->take(bundle, {});
+          __syncthreads();
+        }
+        block_round<kLaws, false, kPairs, kCan>(t, f, bundle, i, round, layout, cache, work, held,
                                                 workers, last);
         __syncthreads();  // the next one clears the exchange
       }

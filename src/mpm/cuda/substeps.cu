@@ -45,6 +45,7 @@ CudaLayout layout_of(const CudaPlan& plan) {
     layout.node_room = kMovingPlaneRoom * plan.max_plane_slots;
     layout.exchange = 18 * plan.max_plane_slots;
   }
+  layout.held = plan.cached && plan.keeps_held ? plan.max_held : 0;
   layout.eight_parts = plan.eight_parts;
   layout.two_planes = plan.two_planes;
   return layout;
@@ -57,7 +58,8 @@ std::size_t shared_bytes(const CudaPlan& plan) {
   const CudaLayout layout = layout_of(plan);
   const std::size_t of_slot =
       (plan.cached ? sizeof(uint4) + 8 : 0) + (plan.eight_parts ? sizeof(uint4) : 0);
-  return of_slot * layout.max_slots + sizeof(float4) * (layout.node_room + layout.exchange) +
+  return (plan.plain ? 0 : sizeof(SharedWork)) + sizeof(CudaHeldNode) * layout.held +
+         of_slot * layout.max_slots + sizeof(float4) * (layout.node_room + layout.exchange) +
          kMaxColliders * sizeof(Collider) + sizeof(FaceRounds);
 }
 
@@ -87,15 +89,18 @@ int resident_of(const CudaPlan& plan) {
 int resident_blocks(CudaPlan& plan, int block_count) {
   plan.cached = plan.small;
   for (const bool two : {true, false}) {
-    for (const bool eight : {true, false}) {
-      if (!plan.cached) continue;
-      plan.two_planes = two;
-      plan.eight_parts = eight;
-      const int resident = resident_of(plan);
-      if (resident >= block_count) return resident;
+    for (const bool held : {true, false}) {
+      for (const bool eight : {true, false}) {
+        if (!plan.cached || (held && plan.max_held == 0)) continue;
+        plan.two_planes = two;
+        plan.keeps_held = held;
+        plan.eight_parts = eight;
+        const int resident = resident_of(plan);
+        if (resident >= block_count) return resident;
+      }
     }
   }
-  plan.cached = plan.eight_parts = plan.two_planes = false;
+  plan.cached = plan.eight_parts = plan.keeps_held = plan.two_planes = false;
   const int resident = resident_of(plan);
   plan.two_planes = true;
   if (resident_of(plan) < resident) plan.two_planes = false;
@@ -105,7 +110,7 @@ int resident_blocks(CudaPlan& plan, int block_count) {
 int most_at_once(const CudaPlan& plan) {
   CudaPlan most = plan;
   most.cached = plan.small;
-  most.eight_parts = most.two_planes = false;
+  most.eight_parts = most.keeps_held = most.two_planes = false;
   return resident_of(most);
 }
 

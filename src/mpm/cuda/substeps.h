@@ -27,6 +27,8 @@ struct CudaPlan {
   bool small = true;         ///< to be cached, if all bundles run at once
   bool cached = false;       ///< each thread block has one bundle only, whose tables it keeps
   bool eight_parts = false;  ///< of a node's force it keeps the places of eight, else of four
+  bool keeps_held = false;   ///< of nodes that anchors' faces hold it keeps what moves them, too
+  int max_held = 0;          ///< of these, in a bundle
   bool two_planes = false;   ///< the exchange holds two planes, and threads wait half as often
   bool marches = false;      ///< large, and nodes come plane by plane where it is plain
   bool plain = false;        ///< no contact, all cells full, each bundle one block
@@ -45,6 +47,7 @@ struct CudaLayout {
   int node_room, exchange;  ///< float4s: for a bundle's nodes, for what columns give to planes
   int cells;                ///< where among the nodes' float4s cells near colliders come
   int workers;              ///< the threads that work on forces; the others push meanwhile
+  int held;                 ///< nodes in HeldCache
   bool eight_parts, two_planes;
 };
 
@@ -56,7 +59,7 @@ CudaKernel plain_kernel(const CudaPlan& plan);
 CudaKernel marching_kernel(const CudaPlan& plan);
 
 /// Thread blocks that run at once; 0 where the plan does not fit the GPU. Sets CudaPlan::cached,
-/// eight_parts and two_planes.
+/// eight_parts, keeps_held and two_planes.
 int resident_blocks(CudaPlan& plan, int block_count);
 
 /// Thread blocks that run at once, cached if the plan is small, and the most slots with which as

@@ -1,0 +1,92 @@
+// Anchors so close to one another that more rows of nodes at their faces have nodes in common than
+// are held together.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <set>
+#include <tuple>
+
+#include "mpm/mpm_tissue.h"
+
+namespace tissue_sim {
+namespace {
+
+constexpr double kCell = 0.001;
+
+/// A slab that hangs on 16 balls of little more than a cell, three cells apart.
+Scene hung_on_balls() {
+  Scene scene;
+  scene.mpm.boundary = MpmBoundary::kSurface;
+  scene.cell_size = kCell;
+  scene.ground.enabled = false;
+  scene.gravity = Vec3(5, 0, -9.81);
+  scene.damping = 50;
+  scene.materials.resize(1);
+  scene.materials[0].name = "slab";
+  scene.materials[0].young_modulus = 5000;
+  scene.bodies.resize(1);
+  Body& body = scene.bodies[0];
+  body.material = "slab";
+  body.size = kCell * Vec3(16, 16, 6);
+  body.pose.position = 0.5 * body.size;
+  for (int i = 0; i < 16; ++i) {
+    Region ball;
+    ball.kind = Region::Kind::kBall;
+    ball.center = kCell * Vec3(3.13 + 3 * (i % 4), 3.27 + 3 * (i / 4), 3.4);
+    ball.radius = 1.3 * kCell;
+    body.anchors.emplace_back(ball);
+  }
+  return scene;
+}
+
+TEST(CloseAnchors, HoldAtAllOfTheirFaces) {
+  MpmTissue tissue(hung_on_balls());
+  const AnchorFaces& faces = tissue.state().anchors;
+  std::size_t rows = 0;
+  for (const FaceGroup& g : faces.groups) {
+    EXPECT_LE(g.count, kLargestGroup);
+    rows += g.count;
+  }
+  EXPECT_EQ(rows, faces.rows.size());
+  ASSERT_GT(rows, 2u * kLargestGroup);
+  std::set<std::tuple<float, float, float>> held;
+  for (const FaceRow& r : faces.rows) held.emplace(r.place[0], r.place[1], r.place[2]);
+  for (const FaceLink& l : faces.links) {
+    EXPECT_EQ(held.count({l.place[0], l.place[1], l.place[2]}), 1u)
+        << l.place[0] << " " << l.place[1] << " " << l.place[2];
+  }
+}
+
+TEST(CloseAnchors, KeepTissueAtTheirFacesWhereItIs) {
+  MpmTissue tissue(hung_on_balls());
+  const float dt = tissue.substep_for({});
+  for (int i = 0; i < 5; ++i) {
+    tissue.advance(100, dt, {});
+    ASSERT_FALSE(tissue.finish().blew_up);
+  }
+  const MpmState& s = tissue.state();
+  const auto length = [&s](int node) {
+    return std::hypot(s.nodes.u[0][node], s.nodes.u[1][node], s.nodes.u[2][node]);
+  };
+  double farthest = 0;
+  for (int i = 0; i < static_cast<int>(s.nodes.size()); ++i) {
+    farthest = std::max<double>(farthest, length(i));
+  }
+  EXPECT_GT(farthest, 0.1 * kCell);
+  for (const FaceLink& l : s.anchors.links) {
+    const double x = l.at;
+    const double weight[] = {0.5 * (0.5 - x) * (0.5 - x), 0.75 - x * x,
+                             0.5 * (0.5 + x) * (0.5 + x)};
+    Vec3 u = Vec3::Zero();
+    for (int k = 0; k < 3; ++k) {
+      int n[] = {l.cell[0], l.cell[1], l.cell[2]};
+      n[l.axis] += l.outside ? k - 1 : 1 - k;
+      const int node = s.bodies[l.body].node(n[0], n[1], n[2]);
+      for (int a = 0; a < 3; ++a) u[a] += weight[k] * s.nodes.u[a][node];
+    }
+    EXPECT_LT(u.norm(), 0.03 * kCell) << l.place[0] << " " << l.place[1] << " " << l.place[2];
+  }
+}
+
+}  // namespace
+}  // namespace tissue_sim

@@ -101,6 +101,7 @@ __device__ __forceinline__ void push_cell(const CudaTables& t, const CudaNodes& 
   }
   point.spring = point_spring(body.spring, volume, weights.is_stiff, pushes.dt);
   point.inertia = weights.is_stiff ? kInertia * point.spring.across * pushes.dt * pushes.dt : 0;
+  point.cell_size = body.cell_size;
   __syncwarp();
   nodes.u[k][0] = u.x, nodes.u[k][1] = u.y, nodes.u[k][2] = u.z;
   nodes.v[k][0] = v.x, nodes.v[k][1] = v.y, nodes.v[k][2] = v.z;
@@ -121,7 +122,8 @@ __device__ __forceinline__ void push_cell(const CudaTables& t, const CudaNodes& 
     if (places == 0) return;
     InertialPlaces all;
     all.mask = places;
-    all.inertia = point.inertia * weights.size();
+    all.inertia = point.inertia * weights.size() *
+                  stiffer_across(pushes.colliders[c].radius, body.cell_size);
     all.taken = begins ? 1 : pushes.grown;
     all.along = along;
 #pragma unroll

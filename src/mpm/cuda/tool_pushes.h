@@ -70,9 +70,10 @@ struct Held {
   }
 };
 
-/// How deep contact of a stiff spring begins, of how deep it is: it pushes as hard then as the soft
-/// one would, so that a tool which comes deep within a substep is held off as well.
-inline constexpr float kBegunDeep = 1 - 1 / kAcross;
+/// How deep contact of a stiff spring begins, of how deep it is, where the spring is so much stiffer
+/// for a thin tool: it pushes as hard then as the soft one would, so that a tool which comes deep
+/// within a substep is held off as well.
+__device__ __forceinline__ float begun_deep(float stiffer) { return 1 - 1 / (kAcross * stiffer); }
 
 /// The spring of a point of so much volume [m^3], by that of a m^3 at the lattice: as that where it
 /// is soft, else as stiff across the surface as a CPU's.
@@ -96,7 +97,9 @@ struct PushedPoint {
   bool is_cut = false;   ///< it has lost a bond
   float x[3], v[3];      ///< [m], [m/s]
   SurfaceSpring spring;  ///< but for its cohesion, which is the collider's
-  float inertia = 0;     ///< of its inerter, above 0 where the spring is stiff across [kg]
+  float inertia = 0;     ///< of its inerter, above 0 where the spring is stiff across [kg]; more
+                         ///< where a thin tool has it stiffer
+  float cell_size;       ///< [m]
   __device__ __forceinline__ bool touches(const Collider& c) const {
     return index >= 0 && (is_cut || c.kind != Collider::kBlade) && may_touch(c, x, 0);
   }
@@ -119,6 +122,7 @@ __device__ __forceinline__ void push_point(const PushedPoint& point, const Colli
     const bool touches = point.touches(collider);
     if (__ballot_sync(0xffffffffu, touches) == 0) continue;
     const bool is_stiff = point.inertia > 0 && collider.kind != Collider::kJaw;
+    const float stiffer = stiffer_across(collider.radius, point.cell_size);
     float push[3] = {0, 0, 0}, normal[3] = {0, 0, 0}, distance = 0, along = 0;
     bool pushes = false, begins = false, is_inside = false;
     if (touches) {
@@ -134,10 +138,12 @@ __device__ __forceinline__ void push_point(const PushedPoint& point, const Colli
         begins = (second ? held.with[1] : held.with[0]) != c + 1;
         if (begins) {
           to_local(collider, point.x, place);
-          begun = kBegunDeep * -g.distance;
+          begun = begun_deep(stiffer) * -g.distance;
         }
         SurfaceSpring spring = point.spring;
-        if (!is_stiff) {
+        if (is_stiff) {
+          stiffen_across(spring, stiffer);
+        } else {
           begun = 0;
           spring.across = spring.along;
           spring.damping_across = spring.damping_along;

@@ -14,6 +14,9 @@ struct CudaFront {
   int first_node = 0;  ///< where parted nodes are in the arrays of nodes
   const FrontCell* cells = nullptr;
   const FrontPart* parts = nullptr;
+  int task_count = 0;
+  const std::int32_t* tasks = nullptr;  ///< kFrontPasses times a cell, plus its pass: front_warp.h
 };
+inline constexpr int kFrontPasses = 8;  ///< more than a cell has
 
 }  // namespace tissue_sim

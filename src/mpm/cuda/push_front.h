@@ -1,7 +1,7 @@
 // What the front's cells push within a substep. For .cu files.
 //
 // They are no work of the blocks that they are in, for these would keep all others waiting: as with
-// cells near colliders, a warp of any thread block that is free takes the next one, once all nodes
+// cells near colliders, a warp of any thread block that is free takes the next pass of one, once all nodes
 // are in place, and adds its forces to the sums that contact adds to.
 #pragma once
 
@@ -42,28 +42,28 @@ __device__ __forceinline__ void move_parted(const CudaFrame& f, int bundles, int
   }
 }
 
-/// Works out cells as long as there are any that no warp has. Out of line, for the blocks to keep
-/// their registers.
+/// Works out passes of cells as long as there are any that no warp has. Out of line, for the blocks
+/// to keep their registers.
 inline __device__ __noinline__ void push_front(const CudaFront front, const CudaNodes state,
                                                unsigned* arrived, int round, long long* sums) {
-  const auto cells = static_cast<unsigned>(front.cell_count);
+  const auto tasks = static_cast<unsigned>(front.task_count);
   unsigned* counter = front_turns(arrived, round);
   bool waited = false;
   for (;;) {
-    unsigned i = cells;
-    if (threadIdx.x % 32 == 0 && __ldcg(counter) < cells) i = atomicAdd(counter, 1u);
+    unsigned i = tasks;
+    if (threadIdx.x % 32 == 0 && __ldcg(counter) < tasks) i = atomicAdd(counter, 1u);
     i = __shfl_sync(0xffffffffu, i, 0);
-    if (i >= cells) return;
-    FrontWarp cell(front, static_cast<int>(i));
+    if (i >= tasks) return;
+    const int task = __ldg(front.tasks + i), pass = task % kFrontPasses;
+    FrontWarp cell(front, task / kFrontPasses);
     if (!waited) warp_wait(arrived + 1, static_cast<unsigned>(round) + 1);
     waited = true;
     cell.bring(state);
     if (cell.cell.law == Law::kNeoHookean) {
-      cell.push<NeoHookean>(sums);
+      cell.push<NeoHookean>(pass, sums);
     } else {
-      cell.push<FixedCorotated>(sums);
+      cell.push<FixedCorotated>(pass, sums);
     }
-    if (cell.cell.stabilised > 0) cell.stabilise<true>(sums);
   }
 }
 

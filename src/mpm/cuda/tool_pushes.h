@@ -30,7 +30,7 @@ __device__ __forceinline__ bool may_touch(const Collider& c, const float* x, flo
 
 /// Adds forces and moments of a warp's first lanes to a load, as integers, whose sum does not
 /// depend on the order.
-template <int kLanes = 8>
+template <int kLanes>
 __device__ __forceinline__ void add_load(unsigned long long* load, const double (&value)[6]) {
   long long sum[6];
 #pragma unroll
@@ -52,20 +52,25 @@ struct Held {
   int with[2] = {0, 0};
   float4 place[2] = {};
 
-  __device__ __forceinline__ void load(const CudaTables& t, int p) {
+  static __device__ __forceinline__ std::size_t entry(const CudaTables& t, int p, int part) {
+    return (static_cast<std::size_t>(p) * t.place_parts + part) * t.held_by;
+  }
+  __device__ __forceinline__ void load(const CudaTables& t, int p, int part) {
+    const std::size_t first = entry(t, p, part);
 #pragma unroll
     for (int slot = 0; slot < 2; ++slot) {
       if (slot >= t.held_by) return;
-      with[slot] = __ldcg(t.with + p * t.held_by + slot);
-      place[slot] = __ldcg(t.hold + static_cast<std::size_t>(p) * t.held_by + slot);
+      with[slot] = __ldcg(t.with + first + slot);
+      place[slot] = __ldcg(t.hold + first + slot);
     }
   }
-  __device__ __forceinline__ void store(const CudaTables& t, int p) const {
+  __device__ __forceinline__ void store(const CudaTables& t, int p, int part) const {
+    const std::size_t first = entry(t, p, part);
 #pragma unroll
     for (int slot = 0; slot < 2; ++slot) {
       if (slot >= t.held_by) return;
-      __stcg(t.with + p * t.held_by + slot, static_cast<std::uint8_t>(with[slot]));
-      __stcg(t.hold + static_cast<std::size_t>(p) * t.held_by + slot, place[slot]);
+      __stcg(t.with + first + slot, static_cast<std::uint8_t>(with[slot]));
+      __stcg(t.hold + first + slot, place[slot]);
     }
   }
 };
@@ -109,8 +114,9 @@ struct PushedPoint {
 /// part; `near` are the colliders that any of their points may lie in. Where any touches, all lanes
 /// call resist(collider, its normal there, its velocity along that, whether the lane's point
 /// touches, whether that begins). Jaws have soft springs: they close until what touches them
-/// presses back, and of stiff ones too little touches.
-template <class Resist>
+/// presses back, and of stiff ones too little touches. The first kLanes lanes have points, or parts
+/// of their places, of which the first eight are counted.
+template <int kLanes, class Resist>
 __device__ __forceinline__ void push_point(const PushedPoint& point, const Collider* colliders,
                                            std::uint32_t near, int held_by, Held& held,
                                            unsigned long long* loads, float (&sum)[3],
@@ -128,7 +134,7 @@ __device__ __forceinline__ void push_point(const PushedPoint& point, const Colli
     if (touches) {
       const Gap g = gap(collider, point.x);
       distance = g.distance;
-      is_inside = distance < -collider.inside && collider.inside > 0;
+      is_inside = distance < -collider.inside && collider.inside > 0 && threadIdx.x % 32 < 8;
       const bool second =
           held_by == 2 && (held.with[1] == c + 1 || (held.with[0] != 0 && held.with[0] != c + 1));
       pushes = g.distance < 0;
@@ -180,7 +186,7 @@ __device__ __forceinline__ void push_point(const PushedPoint& point, const Colli
       load[a] = -push[a];
       load[3 + a] = -(arm[b] * push[d] - arm[d] * push[b]);
     }
-    add_load(loads + kLoadSums * c, load);
+    add_load<kLanes>(loads + kLoadSums * c, load);
     if (collider.kind == Collider::kJaw) {
       const unsigned pushed = __ballot_sync(0xffffffffu, pushes);
       if (threadIdx.x % 32 == 0) atomicAdd(loads + kLoadSums * c + 6, 1ull * __popc(pushed));
@@ -188,7 +194,8 @@ __device__ __forceinline__ void push_point(const PushedPoint& point, const Colli
   }
 #pragma unroll
   for (int slot = 0; slot < 2; ++slot) {
-    if (!holds[slot]) held.with[slot] = 0;
+    const bool of_others = held.with[slot] != 0 && (near >> (held.with[slot] - 1) & 1u) == 0;
+    if (!holds[slot] && !of_others) held.with[slot] = 0;
   }
 }
 

@@ -99,16 +99,7 @@ struct ToolPushes {
   long long* force;           ///< per node, see NodePushes
   long long* inertia;         ///< the same
   float dt, kick, grown;  ///< as CudaFrame::step and ::grown; this is 0 but in the first substep
-  std::uint32_t thin;     ///< colliders for which places are taken apart
 };
-
-/// The colliders for which places are taken apart, as bits. All lanes of a warp call it.
-__device__ __forceinline__ std::uint32_t thin_ones(const Collider* colliders, int count,
-                                                   float cell_size) {
-  const int c = static_cast<int>(threadIdx.x) % 32;
-  return __ballot_sync(0xffffffffu, c < count && colliders[c].kind != Collider::kJaw &&
-                                        stiffer_across(colliders[c].radius, cell_size) > 1);
-}
 
 /// Adds what colliders push the points of a cell with to its nodes. The first eight lanes of the
 /// warp have its points, the first 27 its nodes; of each component of a point's place and velocity
@@ -203,11 +194,21 @@ __device__ __forceinline__ void push_cell(const CudaTables& t, const CudaNodes& 
   if (lane < 27) add_push(pushes.force, node, 1.0f, force);
 }
 
-/// The same for a tool that is thin. Out of line, for others to keep their registers.
-inline __device__ __noinline__ void push_cell_parts(const CudaTables t, const CudaNodes state,
-                                                    const CudaNearCell cell,
-                                                    const ToolPushes pushes, WarpNodes* nodes) {
-  push_cell<true>(t, state, cell, pushes, *nodes);
+/// The same of those colliders near the cell that are thin. Returns the others. Out of line, for
+/// scenes without any to keep their registers.
+inline __device__ __noinline__ std::uint32_t push_cell_parts(const CudaTables t,
+                                                             const CudaNodes state,
+                                                             CudaNearCell cell,
+                                                             const ToolPushes pushes,
+                                                             WarpNodes* nodes) {
+  const int c = static_cast<int>(threadIdx.x) % 32;
+  const Collider& collider = pushes.colliders[c];
+  const std::uint32_t all = cell.near;
+  cell.near = __ballot_sync(
+      0xffffffffu, (all >> c & 1) != 0 && collider.kind != Collider::kJaw &&
+                       stiffer_across(collider.radius, t.bodies[cell.body].cell_size) > 1);
+  if (cell.near != 0) push_cell<true>(t, state, cell, pushes, *nodes);
+  return all & ~cell.near;
 }
 
 /// What lane `from` of a warp has of a cell.
@@ -266,12 +267,7 @@ struct NearSearch {
       }
       for (unsigned left = __ballot_sync(0xffffffffu, close); left != 0; left &= left - 1) {
         CudaNearCell one = cell_of_lane(cell, __ffs(static_cast<int>(left)) - 1);
-        const std::uint32_t all = one.near;
-        if ((all & pushes.thin) != 0) {
-          one.near = all & pushes.thin;
-          push_cell_parts(t, state, one, pushes, &nodes);
-          one.near = all & ~pushes.thin;
-        }
+        if (t.place_parts > 1) one.near = push_cell_parts(t, state, one, pushes, &nodes);
         if (one.near != 0) push_cell<false>(t, state, one, pushes, nodes);
       }
     }

@@ -198,10 +198,8 @@ __device__ __forceinline__ void push_nodes(const CudaTables& t, const CudaFrame&
         reinterpret_cast<unsigned long long*>(f.loads) + kLoadSums * f.collider_count * round;
     long long* inertia = f.pushes.inertia;
     if (inertia != nullptr) inertia += f.pushes.inertia_stride * (round % 3);
-    const std::uint32_t thin =
-        t.place_parts == 1 ? 0 : thin_ones(s.colliders, f.collider_count, f.cell_size);
     near.push(t, state, kCellReach * f.cell_size,
-              {s.colliders, loads, force, inertia, dt, f.step.kick, round == 0 ? f.grown : 0, thin},
+              {s.colliders, loads, force, inertia, dt, f.step.kick, round == 0 ? f.grown : 0},
               s.cells[warp]);
   }
   touch();

@@ -76,7 +76,7 @@ struct FrontWarp {
     inverse_size = __ldg(&cell.inverse_size);
     mu_here = __ldg(cell.mu + point);
     lambda_here = __ldg(cell.lambda + point);
-    viscous = __ldg(cell.viscosity) > 0 && __ldg(cell.viscosity + 1) > 0;  // both or none
+    viscous = any(__ldg(cell.viscosity) > 0 && __ldg(cell.viscosity + 1) > 0);  // both or none
     steps = __ballot_sync(kAll, lane < count && own.step > 0);
     begins = 1 + __popc(steps & ((1u << lane) - 1));
   }
@@ -113,6 +113,9 @@ struct FrontWarp {
     return x;
   }
 
+  /// Of what all lanes have alike, too: the compiler then knows that they go the same way, and need
+  /// not wait for each other at each shuffle.
+  __device__ __forceinline__ static bool any(bool x) { return __any_sync(kAll, x) != 0; }
   template <class Value>
   __device__ __forceinline__ static Value of_lane(Value x, int which) {
     return __shfl_sync(kAll, x, which);
@@ -137,7 +140,7 @@ struct FrontWarp {
   /// Adds the gradient of `parts`, bits that are of the group's own.
   template <bool kRate>
   __device__ __forceinline__ void add_parts(unsigned parts, float (&G)[9]) const {
-    while (__any_sync(kAll, parts != 0)) {
+    while (any(parts != 0)) {
       const int j = max(__ffs(static_cast<int>(parts)) - 1, 0), k = of_lane(own.k, j);
       float value[3];
 #pragma unroll
@@ -178,7 +181,7 @@ struct FrontWarp {
         G[3 * c + 2] += along[1].weight(y) * slope * wx[c];
       }
     }
-    if (pass > 0) {  // parts of the passes before
+    if (any(pass > 0)) {  // parts of the passes before
       const bool is_early = lane < count && begins < kGroups * pass;
       add_parts<kRate>(__ballot_sync(kAll, is_early) & 0x11111111u << group, G);
     }
@@ -227,7 +230,7 @@ struct FrontWarp {
     const float side = first < kGroups ? own.side : 0.0f;
 #pragma unroll
     for (float& x : on_part) x *= side;
-    if (pass == 0 && cell.stabilised > 0) stabilise<true>(on_part);
+    if (any(pass == 0 && cell.stabilised > 0)) stabilise<true>(on_part);
     if (lane < 27) add_push(sums, own_node, 1.0f, on_node);
     if (lane < count) add_push(sums, front.first_node + own.node, 1.0f, on_part);
   }

@@ -53,13 +53,13 @@ inline __device__ __noinline__ void push_front(const CudaFront front, const Cuda
     unsigned i = tasks;
     if (threadIdx.x % 32 == 0 && __ldcg(counter) < tasks) i = atomicAdd(counter, 1u);
     i = __shfl_sync(0xffffffffu, i, 0);
-    if (i >= tasks) return;
+    if (!FrontWarp::any(i < tasks)) return;
     const int task = __ldg(front.tasks + i), pass = task % kFrontPasses;
     FrontWarp cell(front, task / kFrontPasses);
     if (!waited) warp_wait(arrived + 1, static_cast<unsigned>(round) + 1);
     waited = true;
     cell.bring(state);
-    if (cell.cell.law == Law::kNeoHookean) {
+    if (FrontWarp::any(cell.cell.law == Law::kNeoHookean)) {
       cell.push<NeoHookean>(pass, sums);
     } else {
       cell.push<FixedCorotated>(pass, sums);

@@ -126,7 +126,8 @@ struct FrontWarp {
   __device__ __forceinline__ int number(int pass) const { return kGroups * pass + group; }
   /// How much of its energy is the cell's: 0 where there is none of that number.
   __device__ __forceinline__ float weight(int pass) const {
-    float weight = number(pass) == 0 ? -of_lane(own.share, 0) : 0.0f;
+    const float largest = of_lane(own.share, 0);
+    float weight = number(pass) == 0 ? -largest : 0.0f;
 #pragma unroll
     for (int g = 0; g < kGroups; ++g) {
       const unsigned one =

@@ -194,21 +194,21 @@ __device__ __forceinline__ void push_cell(const CudaTables& t, const CudaNodes& 
   if (lane < 27) add_push(pushes.force, node, 1.0f, force);
 }
 
-/// The same of those colliders near the cell that are thin. Returns the others. Out of line, for
-/// scenes without any to keep their registers.
-inline __device__ __noinline__ std::uint32_t push_cell_parts(const CudaTables t,
-                                                             const CudaNodes state,
-                                                             CudaNearCell cell,
-                                                             const ToolPushes pushes,
-                                                             WarpNodes* nodes) {
+/// Those of the colliders `near` a cell that are so thin that places are taken apart for them.
+__device__ __forceinline__ std::uint32_t thin_ones(const Collider* colliders, std::uint32_t near,
+                                                   float cell_size) {
   const int c = static_cast<int>(threadIdx.x) % 32;
-  const Collider& collider = pushes.colliders[c];
-  const std::uint32_t all = cell.near;
-  cell.near = __ballot_sync(
-      0xffffffffu, (all >> c & 1) != 0 && collider.kind != Collider::kJaw &&
-                       stiffer_across(collider.radius, t.bodies[cell.body].cell_size) > 1);
+  return __ballot_sync(0xffffffffu, (near >> c & 1) != 0 && colliders[c].kind != Collider::kJaw &&
+                                        stiffer_across(colliders[c].radius, cell_size) > 1);
+}
+
+/// Pushes for these alone. Out of line, for scenes without any to keep their registers.
+inline __device__ __noinline__ void push_cell_parts(const CudaTables t, const CudaNodes state,
+                                                    const CudaNearCell* of, const ToolPushes pushes,
+                                                    WarpNodes* nodes) {
+  CudaNearCell cell = *of;
+  cell.near = thin_ones(pushes.colliders, cell.near, t.bodies[cell.body].cell_size);
   if (cell.near != 0) push_cell<true>(t, state, cell, pushes, *nodes);
-  return all & ~cell.near;
 }
 
 /// What lane `from` of a warp has of a cell.
@@ -266,9 +266,16 @@ struct NearSearch {
         }
       }
       for (unsigned left = __ballot_sync(0xffffffffu, close); left != 0; left &= left - 1) {
-        CudaNearCell one = cell_of_lane(cell, __ffs(static_cast<int>(left)) - 1);
-        if (t.place_parts > 1) one.near = push_cell_parts(t, state, one, pushes, &nodes);
-        if (one.near != 0) push_cell<false>(t, state, one, pushes, nodes);
+        const int from = __ffs(static_cast<int>(left)) - 1;
+        CudaNearCell one = cell_of_lane(cell, from);
+        if (t.place_parts > 1) {
+          one.near &= ~thin_ones(pushes.colliders, one.near, t.bodies[one.body].cell_size);
+        }
+        push_cell<false>(t, state, one, pushes, nodes);
+        if (t.place_parts > 1) {
+          push_cell_parts(t, state, cells + __shfl_sync(0xffffffffu, i - step, from), pushes,
+                          &nodes);
+        }
       }
     }
   }

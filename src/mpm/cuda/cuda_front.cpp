@@ -9,9 +9,9 @@ namespace tissue_sim {
 namespace {
 
 /// CudaFront::tasks: first passes first, for these have most to do.
-std::vector<std::int32_t> list_tasks(const Front& front) {
+std::vector<int4> list_tasks(const Front& front) {
   constexpr int kEach = 4;  // stresses of a pass
-  std::vector<std::int32_t> tasks;
+  std::vector<int4> tasks;
   bool more = true;
   for (int pass = 0; more; ++pass) {
     more = false;
@@ -20,7 +20,8 @@ std::vector<std::int32_t> list_tasks(const Front& front) {
       const auto beside = std::count_if(parts, parts + front.cells[i].count,
                                         [](const FrontPart& p) { return p.step > 0; });
       if (pass > beside / kEach) continue;
-      tasks.push_back(static_cast<std::int32_t>(i) * kFrontPasses + pass);
+      const FrontCell& cell = front.cells[i];
+      tasks.push_back({static_cast<int>(i), pass, cell.first, cell.count});
       more = more || pass < beside / kEach;
     }
   }

@@ -4,6 +4,8 @@
 
 #include <cuda_runtime_api.h>
 
+#include <cstdlib>
+
 #include "compute/device_array.h"
 #include "mpm/cuda/tables.h"
 
@@ -12,7 +14,7 @@ namespace tissue_sim {
 struct FrontOnDevice {
   DeviceArray<FrontCell> cells;
   DeviceArray<FrontPart> parts;
-  DeviceArray<std::int32_t> tasks;  ///< CudaFront::tasks
+  DeviceArray<int4> tasks;  ///< CudaFront::tasks
   DeviceArray<double> energy;  ///< of the cells, then of the motion of parted nodes [J]
   PinnedArray<double> host_energy;
   DeviceArray<float4> motion_fields;  ///< CudaMotionRoom::fields, where `pushed` is no room
@@ -22,7 +24,7 @@ struct FrontOnDevice {
   CudaFront view() const {
     return {static_cast<int>(cells.size()), node_count,   first_node,
             cells.data(),                   parts.data(), static_cast<int>(tasks.size()),
-            tasks.data()};
+            tasks.data(),                   std::getenv("TS_DYNAMIC") == nullptr ? 1 : 0};
   }
   std::size_t bytes() const {
     return cells.bytes() + parts.bytes() + tasks.bytes() + energy.bytes() + motion_fields.bytes();

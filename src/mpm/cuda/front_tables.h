@@ -15,8 +15,8 @@ struct CudaFront {
   const FrontCell* cells = nullptr;
   const FrontPart* parts = nullptr;
   int task_count = 0;
-  const std::int32_t* tasks = nullptr;  ///< kFrontPasses times a cell, plus its pass: front_warp.h
+  const int4* tasks = nullptr;  ///< a cell and a pass of it (front_warp.h), its first and count
+  int own = 1;                  ///< TRIAL
 };
-inline constexpr int kFrontPasses = 8;  ///< more than a cell has
 
 }  // namespace tissue_sim

@@ -67,9 +67,12 @@ struct FrontWarp {
   float u[3], v[3];       ///< of the node
   float d[3], rate[3];    ///< of the part, as its points see it
 
-  __device__ __forceinline__ FrontWarp(const CudaFront& f, int i) : front(f), cell(f.cells[i]) {
-    count = __ldg(&cell.count);
-    const FrontPart* part = front.parts + __ldg(&cell.first) + min(lane, count - 1);
+  __device__ __forceinline__ FrontWarp(const CudaFront& f, int i)
+      : FrontWarp(f, i, f.cells[i].first, f.cells[i].count) {}
+  /// Where the cell's first part and their count are known before it.
+  __device__ __forceinline__ FrontWarp(const CudaFront& f, int i, int first, int parts)
+      : front(f), cell(f.cells[i]), count(parts) {
+    const FrontPart* part = front.parts + first + min(lane, count - 1);
     own = {__ldg(&part->node), __ldg(&part->k), __ldg(&part->side), __ldg(&part->share),
            __ldg(&part->step)};
     own_node = __ldg(cell.node + min(lane, 26));

@@ -25,6 +25,12 @@ std::vector<int4> list_tasks(const Front& front) {
       more = more || pass < beside / kEach;
     }
   }
+  for (std::size_t i = 0; i < front.cells.size(); ++i) {
+    const FrontCell& cell = front.cells[i];
+    if (cell.stabilised > 0) {
+      tasks.push_back({static_cast<int>(i), kStabilises, cell.first, cell.count});
+    }
+  }
   return tasks;
 }
 

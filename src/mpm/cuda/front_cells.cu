@@ -16,8 +16,7 @@ __global__ void __launch_bounds__(kThreads)
   cell.bring(state);
   double sum =
       cell.cell.law == Law::kNeoHookean ? cell.energy<NeoHookean>() : cell.energy<FixedCorotated>();
-  float unused[3];
-  if (cell.cell.stabilised > 0) sum += cell.stabilise<false>(unused);
+  if (cell.cell.stabilised > 0) sum += cell.stabilise<false>(nullptr);
   if (cell.lane == 0) energy[i] = sum;
 }
 

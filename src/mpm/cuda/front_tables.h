@@ -15,8 +15,10 @@ struct CudaFront {
   const FrontCell* cells = nullptr;
   const FrontPart* parts = nullptr;
   int task_count = 0;
-  const int4* tasks = nullptr;  ///< a cell and a pass of it (front_warp.h), its first and count
+  const int4* tasks = nullptr;  ///< a cell and a pass of it (front_warp.h), or kStabilises for what
+                                ///< stabilises it; its first part, and how many there are
   int own = 1;                  ///< TRIAL
 };
+inline constexpr int kStabilises = -1;
 
 }  // namespace tissue_sim

@@ -127,46 +127,56 @@ struct FrontWarp {
   __device__ __forceinline__ int passes() const { return 1 + __popc(steps) / kGroups; }
   /// Number of the group's stress in a pass, 0 for that with no node parted.
   __device__ __forceinline__ int number(int pass) const { return kGroups * pass + group; }
-  /// How much of its energy is the cell's: 0 where there is none of that number.
-  __device__ __forceinline__ float weight(int pass) const {
-    const float largest = of_lane(own.share, 0);
-    float weight = number(pass) == 0 ? -largest : 0.0f;
+  /// The parts that begin to be parted in the group's stress of a pass, as bits.
+  __device__ __forceinline__ unsigned own_parts(int pass) const {
+    unsigned mine = 0;
 #pragma unroll
     for (int g = 0; g < kGroups; ++g) {
-      const unsigned one =
-          __ballot_sync(kAll, (steps >> lane & 1) != 0 && begins == kGroups * pass + g);
-      const float step = of_lane(own.step, max(__ffs(static_cast<int>(one)) - 1, 0));
-      weight = one != 0 && group == g ? step : weight;
+      const unsigned of_group = __ballot_sync(kAll, lane < count && begins == kGroups * pass + g);
+      mine = group == g ? of_group : mine;
     }
-    return weight;
+    return mine;
+  }
+  /// How much of its energy is the cell's: 0 where there is none of that number. `parts`: its own.
+  __device__ __forceinline__ float weight(int pass, unsigned parts) const {
+    const unsigned one = parts & steps;
+    const float step = of_lane(own.step, max(__ffs(static_cast<int>(one)) - 1, 0)),
+                largest = of_lane(own.share, 0);
+    return number(pass) == 0 ? -largest : one != 0 ? step : 0.0f;
   }
 
   /// Adds the gradient of `parts`, bits that are of the group's own.
   template <bool kRate>
   __device__ __forceinline__ void add_parts(unsigned parts, float (&G)[9]) const {
-    while (any(parts != 0)) {
-      const int j = max(__ffs(static_cast<int>(parts)) - 1, 0), k = of_lane(own.k, j);
-      float value[3];
+    while (any(parts != 0)) {  // two at a time, for one not to wait for the other
+      float value[2][3];
+      int k[2];
 #pragma unroll
-      for (int c = 0; c < 3; ++c) {
-        value[c] = of_lane(kRate ? rate[c] : d[c], j);
-        value[c] = parts != 0 ? value[c] : 0.0f;
+      for (int i = 0; i < 2; ++i) {
+        const int j = max(__ffs(static_cast<int>(parts)) - 1, 0);
+        k[i] = of_lane(own.k, j);
+#pragma unroll
+        for (int c = 0; c < 3; ++c) {
+          value[i][c] = of_lane(kRate ? rate[c] : d[c], j);
+          value[i][c] = parts != 0 ? value[i][c] : 0.0f;
+        }
+        parts &= parts - 1;
       }
-      front::add_gradient(*this, value, k, G);
-      parts &= parts - 1;
+#pragma unroll
+      for (int i = 0; i < 2; ++i) front::add_gradient(*this, value[i], k[i], G);
     }
   }
   /// Gradient of displacement or velocity, [9], in the group's stress of a pass. Three groups have
   /// a plane of nodes each, and all those parts that begin with one of their number, of which the
   /// groups behind have them, too.
   template <bool kRate>
-  __device__ __forceinline__ void gradient(int pass, float (&G)[9]) const {
+  __device__ __forceinline__ void gradient(int pass, unsigned parts, float (&G)[9]) const {
     const int z = min(group, 2);
     const float weight = group < 3 ? along[2].weight(z) : 0.0f,
                 slope = group < 3 ? along[2].slope(z) : 0.0f;
 #pragma unroll
     for (int i = 0; i < 9; ++i) G[i] = 0;
-#pragma unroll 1
+#pragma unroll
     for (int y = 0; y < 3; ++y) {
       float wx[3] = {}, dx[3] = {};
 #pragma unroll
@@ -190,13 +200,7 @@ struct FrontWarp {
       add_parts<kRate>(__ballot_sync(kAll, is_early) & 0x11111111u << group, G);
     }
     float more[9] = {};
-    unsigned mine = 0;
-#pragma unroll
-    for (int g = 0; g < kGroups; ++g) {
-      const unsigned of_group = __ballot_sync(kAll, lane < count && begins == kGroups * pass + g);
-      mine = group == g ? of_group : mine;
-    }
-    add_parts<kRate>(mine, more);
+    add_parts<kRate>(parts, more);
 #pragma unroll
     for (int i = 0; i < 9; ++i) {
       G[i] += __shfl_xor_sync(kAll, G[i], 8);
@@ -209,14 +213,14 @@ struct FrontWarp {
     }
   }
 
-  /// Adds to the sums of forces (NodePushes) those of the stresses of a pass, and with the first
-  /// what stabilises the cell.
+  /// Adds to the sums of forces (NodePushes) those of the stresses of a pass.
   template <class LawOf>
   __device__ __forceinline__ void push(int pass, long long* sums) const {
     float G[9], G_rate[9] = {}, P[9];
-    gradient<false>(pass, G);
-    if (viscous) gradient<true>(pass, G_rate);
-    const float share = weight(pass),
+    const unsigned parts = own_parts(pass);
+    gradient<false>(pass, parts, G);
+    if (viscous) gradient<true>(pass, parts, G_rate);
+    const float share = weight(pass, parts),
                 viscosity = __ldg(cell.viscosity + (number(pass) == 0 ? 0 : 1));
     front::stress<LawOf>(*this, G, G_rate, viscous ? viscosity : 0.0f, P);
 #pragma unroll
@@ -234,7 +238,6 @@ struct FrontWarp {
     const float side = first < kGroups ? own.side : 0.0f;
 #pragma unroll
     for (float& x : on_part) x *= side;
-    if (any(pass == 0 && cell.stabilised > 0)) stabilise<true>(on_part);
     if (lane < 27) add_push(sums, own_node, 1.0f, on_node);
     if (lane < count) add_push(sums, front.first_node + own.node, 1.0f, on_part);
   }
@@ -246,10 +249,11 @@ struct FrontWarp {
 #pragma unroll 1
     for (int pass = 0; pass < passes(); ++pass) {
       float G[9], F[1][9], of_points;
-      gradient<false>(pass, G);
+      const unsigned parts = own_parts(pass);
+      gradient<false>(pass, parts, G);
       front::deformation(*this, G, F[0]);
       LawOf::template energies<1>(F, &mu_here, &lambda_here, &of_points);
-      const float share = weight(pass);
+      const float share = weight(pass, parts);
       sum += share == 0 ? 0.0 : static_cast<double>(share) * of_points;
     }
     return all(sum);
@@ -259,10 +263,10 @@ struct FrontWarp {
   /// kPulls adds its pull on them. Returns the energy [J]. Of 27 nodes to numbers and back goes one
   /// axis after the other.
   template <bool kPulls>
-  __device__ __forceinline__ double stabilise(float (&on_part)[3]) const {
+  __device__ __forceinline__ double stabilise(long long* sums) const {
     const float root = sqrtf(own.share) * inverse_size;
     float x[3] = {};  // of the lane's node, then of its number
-#pragma unroll 1
+#pragma unroll 2
     for (int j = 0; j < count; ++j) {
       const bool is_its_node = of_lane(own.k, j) == lane;
 #pragma unroll
@@ -284,7 +288,8 @@ struct FrontWarp {
     if (!kPulls) return 0.5 * all(twice_energy);
     along_axes<true>(x);
 #pragma unroll
-    for (int c = 0; c < 3; ++c) on_part[c] -= root * own.side * of_lane(x[c], own.k);
+    for (float& of_node : x) of_node = of_lane(of_node, own.k);
+    if (lane < count) add_push(sums, front.first_node + own.node, -root * own.side, x);
     return 0;
   }
 
@@ -301,8 +306,9 @@ struct FrontWarp {
   /// From what nodes have to the numbers A, d, B along each axis; or, transposed, from these back.
   template <bool kBack>
   __device__ __forceinline__ void along_axes(float (&x)[3]) const {
-#pragma unroll 1
-    for (int stride = 1; stride < 27; stride *= 3) {
+#pragma unroll
+    for (int axis = 0; axis < 3; ++axis) {
+      const int stride = axis == 0 ? 1 : axis == 1 ? 3 : 9;
       const int here = min(lane, 26) / stride % 3, first = min(lane, 26) - here * stride;
       float sum[3] = {};
 #pragma unroll
@@ -352,7 +358,7 @@ struct FrontWarp {
     const OfNode node(min(lane, 26)), part(own.k);
 #pragma unroll
     for (int c = 0; c < 3; ++c) on_node[c] = on_part[c] = 0;
-#pragma unroll 1
+#pragma unroll 4
     for (int p = 0; p < kPoints; ++p) {
       float of_node[3], of_part[3];
       node.at(p, of_node);

@@ -65,7 +65,9 @@ inline __device__ __noinline__ void push_front(const CudaFront front, const Cuda
     if (!waited) warp_wait(arrived + 1, static_cast<unsigned>(round) + 1);
     waited = true;
     cell.bring(state);
-    if (FrontWarp::any(cell.cell.law == Law::kNeoHookean)) {
+    if (FrontWarp::any(task.y == kStabilises)) {
+      cell.stabilise<true>(sums);
+    } else if (FrontWarp::any(cell.cell.law == Law::kNeoHookean)) {
       cell.push<NeoHookean>(task.y, sums);
     } else {
       cell.push<FixedCorotated>(task.y, sums);

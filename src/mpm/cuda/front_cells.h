@@ -4,8 +4,6 @@
 
 #include <cuda_runtime_api.h>
 
-#include <cstdlib>
-
 #include "compute/device_array.h"
 #include "mpm/cuda/tables.h"
 
@@ -24,7 +22,7 @@ struct FrontOnDevice {
   CudaFront view() const {
     return {static_cast<int>(cells.size()), node_count,   first_node,
             cells.data(),                   parts.data(), static_cast<int>(tasks.size()),
-            tasks.data(),                   std::getenv("TS_DYNAMIC") == nullptr ? 1 : 0};
+            tasks.data()};
   }
   std::size_t bytes() const {
     return cells.bytes() + parts.bytes() + tasks.bytes() + energy.bytes() + motion_fields.bytes();

@@ -17,7 +17,6 @@ struct CudaFront {
   int task_count = 0;
   const int4* tasks = nullptr;  ///< a cell and a pass of it (front_warp.h), or kStabilises for what
                                 ///< stabilises it; its first part, and how many there are
-  int own = 1;                  ///< TRIAL
 };
 inline constexpr int kStabilises = -1;
 

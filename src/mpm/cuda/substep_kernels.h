@@ -205,13 +205,10 @@ __device__ __forceinline__ void push_nodes(const CudaTables& t, const CudaFrame&
   touch();
 }
 
-/// The front's cells push, as nodes are where the round brought them. Where no thread block waits
-/// for others from the beginning, the last `free` warps of each have a pass each.
-__device__ __forceinline__ void push_front_of(const CudaFrame& f, int round, int free) {
+/// The front's cells push, as nodes are where the round brought them.
+__device__ __forceinline__ void push_front_of(const CudaFrame& f, int round) {
   const bool odd = ((f.current + round) & 1) != 0;
-  const unsigned number = (blockDim.x - 1 - threadIdx.x) / 32, owned = gridDim.x * free;
   push_front(f.front, odd ? f.state[1] : f.state[0], f.arrived, round,
-             number * gridDim.x + blockIdx.x, owned,
              f.pushes.force + f.pushes.stride * (round % 3));
 }
 
@@ -241,9 +238,6 @@ __global__ void __launch_bounds__(kMaxCudaThreads, 1)
     if (kFronts) pushers.count -= 32;  // the last warp is there for the front
   }
   const bool for_front = !apart || (idle ? !pushers.has_me() : pushers.me() >= pushers.size());
-  const int warps = static_cast<int>(blockDim.x) / 32;
-  const int free_for_front = f.front.own == 0 ? 0 : apart ? warps - layout.workers / 32
-                             : static_cast<int>(gridDim.x) > t.bundle_count ? 0 : warps;
   unsigned met = 0;
   if (has_faces<kCan>(f) && threadIdx.x == 0) {
     s.rounds->begin(t, *f.faces, f.step.dt);
@@ -280,11 +274,9 @@ __global__ void __launch_bounds__(kMaxCudaThreads, 1)
       }
     }
     if constexpr (kPushes) {
-      if (kFronts && round < f.substeps && for_front) push_front_of(f, round, free_for_front);
+      if (kFronts && round < f.substeps && for_front) push_front_of(f, round);
       if (round < f.substeps) push_nodes<kCan, kPairs>(t, f, s, round, pushers, helpers, met);
-      if (kFronts && round < f.substeps && apart && pushers.has_me()) {
-        push_front_of(f, round, free_for_front);
-      }
+      if (kFronts && round < f.substeps && apart && pushers.has_me()) push_front_of(f, round);
     }
   }
 }

@@ -6,6 +6,35 @@
 #include "mpm/split/front.h"
 
 namespace tissue_sim {
+namespace {
+
+/// CudaFront::tasks: first passes first, for these have most to do.
+std::vector<int4> list_tasks(const Front& front) {
+  constexpr int kEach = 4;  // stresses of a pass
+  std::vector<int4> tasks;
+  bool more = true;
+  for (int pass = 0; more; ++pass) {
+    more = false;
+    for (std::size_t i = 0; i < front.cells.size(); ++i) {
+      const FrontPart* parts = front.parts.data() + front.cells[i].first;
+      const auto beside = std::count_if(parts, parts + front.cells[i].count,
+                                        [](const FrontPart& p) { return p.step > 0; });
+      if (pass > beside / kEach) continue;
+      const FrontCell& cell = front.cells[i];
+      tasks.push_back({static_cast<int>(i), pass, cell.first, cell.count});
+      more = more || pass < beside / kEach;
+    }
+  }
+  for (std::size_t i = 0; i < front.cells.size(); ++i) {
+    const FrontCell& cell = front.cells[i];
+    if (cell.stabilised > 0) {
+      tasks.push_back({static_cast<int>(i), kStabilises, cell.first, cell.count});
+    }
+  }
+  return tasks;
+}
+
+}  // namespace
 
 void CudaMpmTissue::pull_front() {
   OnDevice& d = *device_;
@@ -56,6 +85,7 @@ void CudaMpmTissue::push_front() {
   }
   to.cells.upload(front.cells, d.stream);
   to.parts.upload(front.parts, d.stream);
+  to.tasks.upload(list_tasks(front), d.stream);
   to.energy.resize(front.cells.size() + count);
   to.host_energy.resize(to.energy.size());
   check_cuda(cudaStreamSynchronize(d.stream), "receive data");

@@ -84,6 +84,7 @@ CudaMpmTissue::CudaMpmTissue(const Scene& scene, std::vector<std::string> notes)
   }
   if (scene.mpm.boundary == MpmBoundary::kSurface && collider_count(scene) > 0) {
     d.outer.upload(outer_points(*state_, state_->anchors), d.stream);
+    if (d.place_parts > 1) d.planes.upload(surface_planes(*state_), d.stream);
   }
   substep_.follow(*state_, modulus_);
 }

@@ -2,12 +2,13 @@
 #include <algorithm>
 
 #include "mpm/cuda/on_device.h"
+#include "mpm/cuda/outer_points.h"
 
 namespace tissue_sim {
 namespace {
 
 /// What the tables and the state take on the GPU; clouds and contacts between tissue come on top.
-std::size_t bytes_of(const HostTables& t, std::size_t nodes, std::size_t points, int held_by,
+std::size_t bytes_of(const HostTables& t, std::size_t nodes, std::size_t points, std::size_t held,
                      std::size_t most_held, bool at_surface) {
   const int sums = 3 * (kPushStride + (at_surface ? kInertiaStride : 0));
   const std::size_t of_contact = sums * sizeof(long long) * nodes + 6 * t.lanes;
@@ -15,8 +16,8 @@ std::size_t bytes_of(const HostTables& t, std::size_t nodes, std::size_t points,
   return t.blocks.size() * (sizeof(CudaBlock) + sizeof(CudaMeasure)) +
          t.bundles.size() * sizeof(CudaBundle) + t.columns.size() * sizeof(CudaColumn) +
          t.slots * (of_connecting + 16 + sizeof(uint4) + 2 * sizeof(float4)) + 8 * t.lanes +
-         t.lanes / 2 + (6 * sizeof(float4) + 1) * nodes + (1 + 17 * held_by) * points +
-         most_held * sizeof(HeldPoint) + (held_by > 0 ? of_contact : 0);
+         t.lanes / 2 + (6 * sizeof(float4) + 1) * nodes + points + 17 * held +
+         most_held * sizeof(HeldPoint) + (held > 0 ? of_contact : 0);
 }
 
 /// Says how much memory the tissue takes, where the GPU has less.
@@ -42,7 +43,7 @@ std::size_t CudaMpmTissue::device_bytes() const {
       d.some_nodes.bytes() + d.packed.bytes() + d.piece.bytes() + d.place.bytes() +
       d.slot_parts.bytes() + d.first_parts.bytes() + d.parts.bytes() + d.pushed_parts.bytes() +
       d.marks.bytes() + d.pushed.bytes() + d.inertia.bytes() + d.colour.bytes() + d.hold.bytes() +
-      d.outer.bytes() + d.bonds.bytes() + d.soft.bytes() + d.with.bytes() + d.whole.bytes() +
+      d.outer.bytes() + d.planes.bytes() + d.bonds.bytes() + d.soft.bytes() + d.with.bytes() + d.whole.bytes() +
       d.u_before.bytes() + d.connect_room.bytes() + d.colliders.bytes() + d.loads.bytes() +
       d.measures.bytes() + d.cloud.bytes() + d.stretched.bytes() + d.faces.bytes() +
       d.front.bytes() + d.checkpoint.bytes() + d.stacks.bytes() + d.anchors.bytes();
@@ -152,11 +153,13 @@ void CudaMpmTissue::push_tables() {
   const Scene& scene = state_->scene;
   const int colliders = collider_count(scene) - (scene.ground.enabled ? 0 : 1);
   d.held_by = std::min(colliders, 2);
-  const std::size_t most_held = OnDevice::Checkpoint::most_held(d.held_by * points);
+  d.place_parts = has_thin_tools(scene) ? kPlaceParts : 1;
+  const std::size_t held = points * d.place_parts * d.held_by;
+  const std::size_t most_held = OnDevice::Checkpoint::most_held(held);
   const std::size_t of_stacks =
       d.plan.marches ? Stacks::bytes_for(t, state_->blocks.all, d.plain_resident) : 0;
   const bool at_surface = scene.mpm.boundary == MpmBoundary::kSurface;
-  check_memory(bytes_of(t, n, points, d.held_by, most_held, at_surface) + of_stacks,
+  check_memory(bytes_of(t, n, points, held, most_held, at_surface) + of_stacks,
                device_bytes());
   check_cuda(cudaStreamSynchronize(d.stream), "finish a frame");
   d.blocks.upload(t.blocks, d.stream);
@@ -196,10 +199,10 @@ void CudaMpmTissue::push_tables() {
     force.resize(slots);
     force.clear(d.stream);
   }
-  if (d.with.size() != d.held_by * points) {
-    d.with.resize(d.held_by * points);
+  if (d.with.size() != held) {
+    d.with.resize(held);
     d.with.clear(d.stream);
-    d.hold.resize(d.held_by * points);
+    d.hold.resize(held);
     d.hold.clear(d.stream);
   }
   d.checkpoint.resize(n, d.with.size());

@@ -14,6 +14,10 @@ struct CudaFront {
   int first_node = 0;  ///< where parted nodes are in the arrays of nodes
   const FrontCell* cells = nullptr;
   const FrontPart* parts = nullptr;
+  int task_count = 0;
+  const int4* tasks = nullptr;  ///< a cell and a pass of it (front_warp.h), or kStabilises for what
+                                ///< stabilises it; its first part, and how many there are
 };
+inline constexpr int kStabilises = -1;
 
 }  // namespace tissue_sim

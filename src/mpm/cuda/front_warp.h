@@ -1,8 +1,9 @@
 // A cell at the front of a cut, worked on by a warp. For .cu files.
 //
-// Of the stresses that make up its energy (mpm/blocks/front_stress.h), four are worked out at a
-// time: eight lanes, one for each point of the cell, have one of them. Of nodes, parts and numbers
-// of stabilisation each lane has one.
+// Of the stresses that make up its energy (mpm/blocks/front_stress.h), four are a warp's work at a
+// time, a pass: eight lanes, one for each point of the cell, have one of them. Of nodes, parts and
+// numbers of stabilisation each lane has one. Passes know nothing of each other: what each adds to
+// the forces are those of its stresses.
 #pragma once
 
 #include "math/bspline.h"
@@ -56,6 +57,7 @@ struct FrontWarp {
   int point = lane % kPoints, group = lane / kPoints;
   int count;       ///< of parts
   unsigned steps;  ///< bit j where there is a stress with the parts up to j
+  int begins;      ///< number of the first stress in which the lane's part is parted
   float inverse_size, mu_here, lambda_here;
   bool viscous;
   SideWeights along[3] = {SideWeights(lane & 1), SideWeights(lane >> 1 & 1),
@@ -63,19 +65,23 @@ struct FrontWarp {
   std::int32_t own_node;  ///< of number min(lane, 26) of the cell's
   FrontPart own;          ///< of number min(lane, count - 1) of the cell's
   float u[3], v[3];       ///< of the node
-  float d[3], rate[3];    ///< of the part
+  float d[3], rate[3];    ///< of the part, as its points see it
 
-  __device__ __forceinline__ FrontWarp(const CudaFront& f, int i) : front(f), cell(f.cells[i]) {
-    count = __ldg(&cell.count);
-    const FrontPart* part = front.parts + __ldg(&cell.first) + min(lane, count - 1);
+  __device__ __forceinline__ FrontWarp(const CudaFront& f, int i)
+      : FrontWarp(f, i, f.cells[i].first, f.cells[i].count) {}
+  /// Where the cell's first part and their count are known before it.
+  __device__ __forceinline__ FrontWarp(const CudaFront& f, int i, int first, int parts)
+      : front(f), cell(f.cells[i]), count(parts) {
+    const FrontPart* part = front.parts + first + min(lane, count - 1);
     own = {__ldg(&part->node), __ldg(&part->k), __ldg(&part->side), __ldg(&part->share),
            __ldg(&part->step)};
     own_node = __ldg(cell.node + min(lane, 26));
     inverse_size = __ldg(&cell.inverse_size);
     mu_here = __ldg(cell.mu + point);
     lambda_here = __ldg(cell.lambda + point);
-    viscous = __ldg(cell.viscosity) > 0 && __ldg(cell.viscosity + 1) > 0;  // both or none
+    viscous = any(__ldg(cell.viscosity) > 0 && __ldg(cell.viscosity + 1) > 0);  // both or none
     steps = __ballot_sync(kAll, lane < count && own.step > 0);
+    begins = 1 + __popc(steps & ((1u << lane) - 1));
   }
   /// Once nodes and parted nodes are in place.
   __device__ __forceinline__ void bring(const CudaNodes& state) {
@@ -86,10 +92,11 @@ struct FrontWarp {
       speed = __ldcg(state.v + own_node);
       speed_apart = __ldcg(state.v + parted);
     }
+    const float side = own.side;
     u[0] = at.x, u[1] = at.y, u[2] = at.z;
     v[0] = speed.x, v[1] = speed.y, v[2] = speed.z;
-    d[0] = apart.x, d[1] = apart.y, d[2] = apart.z;
-    rate[0] = speed_apart.x, rate[1] = speed_apart.y, rate[2] = speed_apart.z;
+    d[0] = side * apart.x, d[1] = side * apart.y, d[2] = side * apart.z;
+    rate[0] = side * speed_apart.x, rate[1] = side * speed_apart.y, rate[2] = side * speed_apart.z;
   }
 
   // What front_stress.h asks of the points; each group has those of its stress.
@@ -109,159 +116,180 @@ struct FrontWarp {
     return x;
   }
 
+  /// Of what all lanes have alike, too: the compiler then knows that they go the same way, and need
+  /// not wait for each other at each shuffle.
+  __device__ __forceinline__ static bool any(bool x) { return __any_sync(kAll, x) != 0; }
   template <class Value>
   __device__ __forceinline__ static Value of_lane(Value x, int which) {
     return __shfl_sync(kAll, x, which);
   }
 
-  /// Gradient of displacement or velocity, [9], with no node parted. Three groups have a plane of
-  /// nodes each.
+  __device__ __forceinline__ int passes() const { return 1 + __popc(steps) / kGroups; }
+  /// Number of the group's stress in a pass, 0 for that with no node parted.
+  __device__ __forceinline__ int number(int pass) const { return kGroups * pass + group; }
+  /// The parts that begin to be parted in the group's stress of a pass, as bits.
+  __device__ __forceinline__ unsigned own_parts(int pass) const {
+    unsigned mine = 0;
+#pragma unroll
+    for (int g = 0; g < kGroups; ++g) {
+      const unsigned of_group = __ballot_sync(kAll, lane < count && begins == kGroups * pass + g);
+      mine = group == g ? of_group : mine;
+    }
+    return mine;
+  }
+  /// How much of its energy is the cell's: 0 where there is none of that number. `parts`: its own.
+  __device__ __forceinline__ float weight(int pass, unsigned parts) const {
+    const unsigned one = parts & steps;
+    const float step = of_lane(own.step, max(__ffs(static_cast<int>(one)) - 1, 0)),
+                largest = of_lane(own.share, 0);
+    return number(pass) == 0 ? -largest : one != 0 ? step : 0.0f;
+  }
+
+  /// Adds the gradient of `parts`, bits that are of the group's own.
   template <bool kRate>
-  __device__ __forceinline__ void gradient(float (&G)[9]) const {
+  __device__ __forceinline__ void add_parts(unsigned parts, float (&G)[9]) const {
+    while (any(parts != 0)) {  // two at a time, for one not to wait for the other
+      float value[2][3];
+      int k[2];
+#pragma unroll
+      for (int i = 0; i < 2; ++i) {
+        const int j = max(__ffs(static_cast<int>(parts)) - 1, 0);
+        k[i] = of_lane(own.k, j);
+#pragma unroll
+        for (int c = 0; c < 3; ++c) {
+          value[i][c] = of_lane(kRate ? rate[c] : d[c], j);
+          value[i][c] = parts != 0 ? value[i][c] : 0.0f;
+        }
+        parts &= parts - 1;
+      }
+#pragma unroll
+      for (int i = 0; i < 2; ++i) front::add_gradient(*this, value[i], k[i], G);
+    }
+  }
+  /// Gradient of displacement or velocity, [9], in the group's stress of a pass. Three groups have
+  /// a plane of nodes each, and all those parts that begin with one of their number, of which the
+  /// groups behind have them, too.
+  template <bool kRate>
+  __device__ __forceinline__ void gradient(int pass, unsigned parts, float (&G)[9]) const {
     const int z = min(group, 2);
     const float weight = group < 3 ? along[2].weight(z) : 0.0f,
                 slope = group < 3 ? along[2].slope(z) : 0.0f;
 #pragma unroll
     for (int i = 0; i < 9; ++i) G[i] = 0;
 #pragma unroll
-    for (int k = 0; k < 9; ++k) {
-      const float x = along[0].weight(k % 3), y = along[1].weight(k / 3);
-      const float by[3] = {along[0].slope(k % 3) * y * weight, x * along[1].slope(k / 3) * weight,
-                           x * y * slope};
+    for (int y = 0; y < 3; ++y) {
+      float wx[3] = {}, dx[3] = {};
+#pragma unroll
+      for (int x = 0; x < 3; ++x) {
+#pragma unroll
+        for (int c = 0; c < 3; ++c) {
+          const float value = of_lane(kRate ? v[c] : u[c], 9 * z + 3 * y + x);
+          wx[c] += along[0].weight(x) * value;
+          dx[c] += along[0].slope(x) * value;
+        }
+      }
 #pragma unroll
       for (int c = 0; c < 3; ++c) {
-        const float value = of_lane(kRate ? v[c] : u[c], 9 * z + k);
-#pragma unroll
-        for (int axis = 0; axis < 3; ++axis) G[3 * c + axis] += value * by[axis];
+        G[3 * c] += along[1].weight(y) * weight * dx[c];
+        G[3 * c + 1] += along[1].slope(y) * weight * wx[c];
+        G[3 * c + 2] += along[1].weight(y) * slope * wx[c];
       }
     }
+    if (any(pass > 0)) {  // parts of the passes before
+      const bool is_early = lane < count && begins < kGroups * pass;
+      add_parts<kRate>(__ballot_sync(kAll, is_early) & 0x11111111u << group, G);
+    }
+    float more[9] = {};
+    add_parts<kRate>(parts, more);
 #pragma unroll
     for (int i = 0; i < 9; ++i) {
       G[i] += __shfl_xor_sync(kAll, G[i], 8);
       G[i] += __shfl_xor_sync(kAll, G[i], 16);
-      G[i] *= inverse_size;
+      float before = __shfl_up_sync(kAll, more[i], kPoints);
+      more[i] += group > 0 ? before : 0.0f;
+      before = __shfl_up_sync(kAll, more[i], 2 * kPoints);
+      more[i] += group > 1 ? before : 0.0f;
+      G[i] = inverse_size * (G[i] + more[i]);
     }
   }
 
-  /// Which stress a group has: none of the cell's where its weight is 0.
-  struct Mixed {
-    int number;    ///< 0 for that with no node parted
-    int last;      ///< the last part that is parted in it, -1 for none
-    float weight;  ///< of its energy in the cell's
-  };
-  __device__ __forceinline__ int mixed_count() const { return 1 + __popc(steps); }
-  __device__ __forceinline__ Mixed mixed(int pass) const {
-    Mixed m;
-    m.number = kGroups * pass + group;
-    unsigned left = steps;
-    for (int i = 1; i < m.number; ++i) left &= left - 1;
-    m.last = m.number == 0 || left == 0 ? -1 : __ffs(static_cast<int>(left)) - 1;
-    const float share = of_lane(own.share, 0), step = of_lane(own.step, max(m.last, 0));
-    m.weight = m.number == 0 ? -share : m.last < 0 ? 0.0f : step;
-    return m;
-  }
-  /// Adds to gradients what parts up to `last` have more.
-  __device__ __forceinline__ void add_parts(int last, float (&G)[9], float (&G_rate)[9]) const {
-#pragma unroll 1
-    for (int j = 0; j < count; ++j) {
-      const int k = of_lane(own.k, j);
-      const float side = of_lane(own.side, j), by = j <= last ? inverse_size * side : 0.0f;
-      float value[3];
-#pragma unroll
-      for (int c = 0; c < 3; ++c) value[c] = by * of_lane(d[c], j);
-      front::add_gradient(*this, value, k, G);
-      if (!viscous) continue;
-#pragma unroll
-      for (int c = 0; c < 3; ++c) value[c] = by * of_lane(rate[c], j);
-      front::add_gradient(*this, value, k, G_rate);
-    }
-  }
-
-  /// Adds to the sums of forces (NodePushes) those of the cell's stress.
+  /// Adds to the sums of forces (NodePushes) those of the stresses of a pass.
   template <class LawOf>
-  __device__ __forceinline__ void push(long long* sums) const {
-    float whole[9], whole_rate[9] = {}, stress[9] = {};  // the last: of all that are later
-    gradient<false>(whole);
-    if (viscous) gradient<true>(whole_rate);
-#pragma unroll 1
-    for (int pass = (mixed_count() - 1) / kGroups; pass >= 0; --pass) {
-      const Mixed m = mixed(pass);
-      float G[9], G_rate[9], P[9];
+  __device__ __forceinline__ void push(int pass, long long* sums) const {
+    float G[9], G_rate[9] = {}, P[9];
+    const unsigned parts = own_parts(pass);
+    gradient<false>(pass, parts, G);
+    if (viscous) gradient<true>(pass, parts, G_rate);
+    const float share = weight(pass, parts),
+                viscosity = __ldg(cell.viscosity + (number(pass) == 0 ? 0 : 1));
+    front::stress<LawOf>(*this, G, G_rate, viscous ? viscosity : 0.0f, P);
 #pragma unroll
-      for (int i = 0; i < 9; ++i) G[i] = whole[i], G_rate[i] = whole_rate[i];
-      add_parts(m.last, G, G_rate);
-      const float viscosity = __ldg(cell.viscosity + (m.number == 0 ? 0 : 1));
-      front::stress<LawOf>(*this, G, G_rate, viscous ? viscosity : 0.0f, P);
-#pragma unroll
-      for (int i = 0; i < 9; ++i) {  // with those of the groups behind, and of later passes
-        float x = m.weight == 0 ? 0.0f : m.weight * P[i];
-        float behind = __shfl_down_sync(kAll, x, kPoints);
-        x += group < 3 ? behind : 0.0f;
-        behind = __shfl_down_sync(kAll, x, 2 * kPoints);
-        x += group < 2 ? behind : 0.0f;
-        P[i] = x + stress[i];
-      }
-      pull_parts(pass, P, sums);
-#pragma unroll
-      for (int i = 0; i < 9; ++i) stress[i] = of_lane(P[i], point);
+    for (int i = 0; i < 9; ++i) {  // with those of the groups behind
+      float x = share == 0 ? 0.0f : share * P[i];
+      float behind = __shfl_down_sync(kAll, x, kPoints);
+      x += group < 3 ? behind : 0.0f;
+      behind = __shfl_down_sync(kAll, x, 2 * kPoints);
+      x += group < 2 ? behind : 0.0f;
+      P[i] = x;
     }
-    push_nodes(stress, sums);
+    float on_node[3], on_part[3];
+    const int first = begins - kGroups * pass;
+    pull(P, min(max(first, 0), kGroups - 1), on_node, on_part);
+    const float side = first < kGroups ? own.side : 0.0f;
+#pragma unroll
+    for (float& x : on_part) x *= side;
+    if (lane < 27) add_push(sums, own_node, 1.0f, on_node);
+    if (lane < count) add_push(sums, front.first_node + own.node, 1.0f, on_part);
   }
 
   /// Energy of its points, above the block's [J].
   template <class LawOf>
   __device__ __forceinline__ double energy() const {
-    float whole[9], unused[9] = {};
-    gradient<false>(whole);
     double sum = 0;
 #pragma unroll 1
-    for (int pass = 0; kGroups * pass < mixed_count(); ++pass) {
-      const Mixed m = mixed(pass);
+    for (int pass = 0; pass < passes(); ++pass) {
       float G[9], F[1][9], of_points;
-#pragma unroll
-      for (int i = 0; i < 9; ++i) G[i] = whole[i];
-      add_parts(m.last, G, unused);
+      const unsigned parts = own_parts(pass);
+      gradient<false>(pass, parts, G);
       front::deformation(*this, G, F[0]);
       LawOf::template energies<1>(F, &mu_here, &lambda_here, &of_points);
-      sum += m.weight == 0 ? 0.0 : static_cast<double>(m.weight) * of_points;
+      const float share = weight(pass, parts);
+      sum += share == 0 ? 0.0 : static_cast<double>(share) * of_points;
     }
     return all(sum);
   }
 
   /// What resists motion of the cell's parts without strain (mpm/blocks/stabilisation.h): with
-  /// kPulls adds its pull on them. Returns the energy [J].
+  /// kPulls adds its pull on them. Returns the energy [J]. Of 27 nodes to numbers and back goes one
+  /// axis after the other.
   template <bool kPulls>
   __device__ __forceinline__ double stabilise(long long* sums) const {
-    const int kind[3] = {lane % 3, lane / 3 % 3, min(lane / 9, 2)};
-    const float by = lane < count ? sqrtf(own.share) * own.side * inverse_size : 0.0f;
-    float number[3] = {};
-#pragma unroll 1
+    const float root = sqrtf(own.share) * inverse_size;
+    float x[3] = {};  // of the lane's node, then of its number
+#pragma unroll 2
     for (int j = 0; j < count; ++j) {
-      const int k = of_lane(own.k, j);
-      const float share = of_lane(by, j) * share_along(kind[0], k % 3) *
-                          share_along(kind[1], k / 3 % 3) * share_along(kind[2], k / 9);
+      const bool is_its_node = of_lane(own.k, j) == lane;
 #pragma unroll
-      for (int c = 0; c < 3; ++c) number[c] += share * of_lane(d[c], j);
+      for (int c = 0; c < 3; ++c) {
+        const float value = of_lane(root * d[c], j);
+        x[c] = is_its_node ? value : x[c];
+      }
     }
+    along_axes<false>(x);
+    const int kind[3] = {lane % 3, lane / 3 % 3, min(lane / 9, 2)};
     const float stiffness =
         lane < 27 ? cell.stabilised * stabilisation::weight2(kind[0], kind[1], kind[2]) : 0.0f;
     float twice_energy = 0;
 #pragma unroll
     for (int c = 0; c < 3; ++c) {
-      twice_energy += stiffness * number[c] * number[c];
-      number[c] *= stiffness;
+      twice_energy += stiffness * x[c] * x[c];
+      x[c] *= stiffness;
     }
     if (!kPulls) return 0.5 * all(twice_energy);
-    const int k[3] = {own.k % 3, own.k / 3 % 3, own.k / 9};
-    float force[3] = {};
+    along_axes<true>(x);
 #pragma unroll
-    for (int i = 0; i < 27; ++i) {
-      const float share =
-          share_along(i % 3, k[0]) * share_along(i / 3 % 3, k[1]) * share_along(i / 9, k[2]);
-#pragma unroll
-      for (int c = 0; c < 3; ++c) force[c] += share * of_lane(number[c], i);
-    }
-    if (lane < count) add_push(sums, front.first_node + own.node, -by, force);
+    for (float& of_node : x) of_node = of_lane(of_node, own.k);
+    if (lane < count) add_push(sums, front.first_node + own.node, -root * own.side, x);
     return 0;
   }
 
@@ -275,61 +303,80 @@ struct FrontWarp {
     return x;
   }
 
-  /// Forces on the parts that begin to be parted in one of the pass's stresses, of which each group
-  /// has the sum from its own on. A group works on every fourth part.
-  __device__ __forceinline__ void pull_parts(int pass, const float (&P)[9], long long* sums) const {
-#pragma unroll 1
-    for (int first = 0; first < count; first += kGroups) {
-      const int j = min(first + group, count - 1), k = of_lane(own.k, j);
-      const float by = -inverse_size * of_lane(own.side, j);
-      const std::int32_t node = of_lane(own.node, j);
-      const int number = 1 + __popc(steps & ((1u << j) - 1));
-      float slopes[3], force[3];
+  /// From what nodes have to the numbers A, d, B along each axis; or, transposed, from these back.
+  template <bool kBack>
+  __device__ __forceinline__ void along_axes(float (&x)[3]) const {
 #pragma unroll
-      for (int axis = 0; axis < 3; ++axis) slopes[axis] = slope(k, axis);
+    for (int axis = 0; axis < 3; ++axis) {
+      const int stride = axis == 0 ? 1 : axis == 1 ? 3 : 9;
+      const int here = min(lane, 26) / stride % 3, first = min(lane, 26) - here * stride;
+      float sum[3] = {};
 #pragma unroll
-      for (int c = 0; c < 3; ++c) {
-        float of_point = 0;
+      for (int i = 0; i < 3; ++i) {
+        const float share = kBack ? share_along(i, here) : share_along(here, i);
 #pragma unroll
-        for (int axis = 0; axis < 3; ++axis) {
-          of_point += of_lane(P[3 * c + axis], kPoints * (number % kGroups) + point) * slopes[axis];
-        }
-        force[c] = by * sum(of_point);
+        for (int c = 0; c < 3; ++c) sum[c] += share * of_lane(x[c], first + i * stride);
       }
-      const bool is_one = first + group < count && number / kGroups == pass;
-      const float mine = point == 0 ? force[0] : point == 1 ? force[1] : force[2];
-      if (is_one && point < 3) add_push(sums, front.first_node + node, point, mine);
+#pragma unroll
+      for (int c = 0; c < 3; ++c) x[c] = sum[c];
     }
   }
 
-  /// Forces of the points' stress on the nodes.
-  __device__ __forceinline__ void push_nodes(const float (&stress)[9], long long* sums) const {
-    const int k = min(lane, 26), of[3] = {k % 3, k / 3 % 3, k / 9};
+  /// Weights of node k at points of side 0 and 1, and slopes times the cell size.
+  struct OfNode {
     float weight[3][2], slope[3][2];
+    __device__ __forceinline__ explicit OfNode(int k) {
+      const int of[3] = {k % 3, k / 3 % 3, k / 9};
 #pragma unroll
-    for (int a = 0; a < 3; ++a) {
+      for (int a = 0; a < 3; ++a) {
 #pragma unroll
-      for (int s = 0; s < 2; ++s) {
-        weight[a][s] = SideWeights(s).weight(of[a]);
-        slope[a][s] = SideWeights(s).slope(of[a]);
+        for (int s = 0; s < 2; ++s) {
+          weight[a][s] = SideWeights(s).weight(of[a]);
+          slope[a][s] = SideWeights(s).slope(of[a]);
+        }
       }
     }
-    float force[3] = {};
+    /// Slopes along each axis at point p.
+    __device__ __forceinline__ void at(int p, float (&by)[3]) const {
+      float w[3], d[3];
 #pragma unroll
+      for (int a = 0; a < 3; ++a) {
+        const bool other = (p >> a & 1) != 0;
+        w[a] = other ? weight[a][1] : weight[a][0];
+        d[a] = other ? slope[a][1] : slope[a][0];
+      }
+      by[0] = d[0] * w[1] * w[2];
+      by[1] = w[0] * d[1] * w[2];
+      by[2] = w[0] * w[1] * d[2];
+    }
+  };
+
+  /// Forces of the points' stress on the lane's node, of all that its groups have, and on its part,
+  /// of what the group `first` has.
+  __device__ __forceinline__ void pull(const float (&P)[9], int first, float (&on_node)[3],
+                                       float (&on_part)[3]) const {
+    const OfNode node(min(lane, 26)), part(own.k);
+#pragma unroll
+    for (int c = 0; c < 3; ++c) on_node[c] = on_part[c] = 0;
+#pragma unroll 4
     for (int p = 0; p < kPoints; ++p) {
-      const int s[3] = {p & 1, p >> 1 & 1, p >> 2};
-      const float by[3] = {slope[0][s[0]] * weight[1][s[1]] * weight[2][s[2]],
-                           weight[0][s[0]] * slope[1][s[1]] * weight[2][s[2]],
-                           weight[0][s[0]] * weight[1][s[1]] * slope[2][s[2]]};
+      float of_node[3], of_part[3];
+      node.at(p, of_node);
+      part.at(p, of_part);
 #pragma unroll
       for (int c = 0; c < 3; ++c) {
 #pragma unroll
         for (int axis = 0; axis < 3; ++axis) {
-          force[c] += of_lane(stress[3 * c + axis], p) * by[axis];
+          on_node[c] += of_lane(P[3 * c + axis], p) * of_node[axis];
+          on_part[c] += of_lane(P[3 * c + axis], kPoints * first + p) * of_part[axis];
         }
       }
     }
-    if (lane < 27) add_push(sums, own_node, -inverse_size, force);
+#pragma unroll
+    for (int c = 0; c < 3; ++c) {
+      on_node[c] *= -inverse_size;
+      on_part[c] *= -inverse_size;
+    }
   }
 };
 

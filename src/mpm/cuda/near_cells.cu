@@ -89,10 +89,11 @@ __global__ void __launch_bounds__(kCellThreads)
       cell.near = met_by(reach, cell.near, min, max, margin + kCellReach * cell_size);
       out.listed[b.first_lane / 8 + i] = cell.near;
     }
-    for (int k = 0; k < 8 * t.held_by; ++k) {
-      const int p = t.point[cell.lane + k / t.held_by * cell.step];
+    const int held = t.place_parts * t.held_by;
+    for (int k = 0; k < 8 * held; ++k) {
+      const int p = t.point[cell.lane + k / held * cell.step];
       if (p < 0) continue;
-      std::uint8_t& with = t.with[p * t.held_by + k % t.held_by];
+      std::uint8_t& with = t.with[static_cast<std::size_t>(p) * held + k % held];
       if (with != 0 && (cell.near >> (with - 1) & 1u) == 0) with = 0;
     }
     if (cell.near == 0) continue;

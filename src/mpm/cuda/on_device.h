@@ -73,9 +73,9 @@ struct CudaMpmTissue::OnDevice {
   ConnectRoom connect_room;
   PinnedArray<int> most_sharing;
   DeviceArray<float4> hold;
-  DeviceArray<float4> outer;  ///< CudaTables::outer
+  DeviceArray<float4> outer, planes;  ///< CudaTables::outer, ::planes
   DeviceArray<std::uint8_t> bonds, soft, with, whole;
-  int held_by = 0;  ///< CudaTables::held_by
+  int held_by = 0, place_parts = 1;  ///< CudaTables::held_by, ::place_parts
   DeviceArray<float4> u[2], v[2], force[2], u_before;
   /// In a part that is done again: where blocks and nodes went before.
   std::vector<BlockMotion> went;
@@ -159,7 +159,9 @@ struct CudaMpmTissue::OnDevice {
     t.bonds = bonds.data();
     t.soft = soft.size() > 0 ? soft.data() : nullptr;
     t.lightness = anchors.lightness.size() > 0 ? anchors.lightness.data() : nullptr;
+    t.planes = planes.size() > 0 ? planes.data() : nullptr;
     t.held_by = held_by;
+    t.place_parts = place_parts;
     t.with = with.data();
     t.hold = hold.data();
     return t;

@@ -4,6 +4,7 @@
 #include <array>
 #include <set>
 
+#include "contact/surface_spring.h"
 #include "mpm/contact/surface_places.h"
 
 namespace tissue_sim {
@@ -36,6 +37,40 @@ std::set<Cell> cells_beside(const AnchorFaces& faces, const LatticeTissue& tissu
 }
 
 }  // namespace
+
+bool has_thin_tools(const Scene& scene) {
+  if (scene.mpm.boundary != MpmBoundary::kSurface) return false;
+  return std::any_of(scene.tools.begin(), scene.tools.end(), [&](const Tool& tool) {
+    return tool.type != ToolType::kGrasper && tool.type != ToolType::kScalpel &&
+           stiffer_across(static_cast<float>(tool.radius), static_cast<float>(scene.cell_size)) > 1;
+  });
+}
+
+std::vector<float4> surface_planes(const LatticeTissue& tissue) {
+  constexpr double kOneWay = 0.8;  // length of the mean of normals that look one way
+  const std::vector<OuterPlace> all = find_outer_places(tissue);
+  std::vector<float4> planes(tissue.points.size(), float4{0, 0, 0, -1});
+  for (auto first = all.begin(); first != all.end();) {
+    const auto last = std::find_if(first, all.end(),
+                                   [&](const OuterPlace& o) { return o.point != first->point; });
+    Vec3 sum = Vec3::Zero();
+    const Vec3 one(first->normal[0], first->normal[1], first->normal[2]);
+    for (auto o = first; o != last; ++o) {  // of a sheet's two sides either will do
+      const Vec3 normal(o->normal[0], o->normal[1], o->normal[2]);
+      sum += normal.dot(one) < 0 ? -normal : normal;
+    }
+    const Vec3 normal = sum / static_cast<double>(last - first);
+    int axis = 0;
+    normal.cwiseAbs().maxCoeff(&axis);
+    if (normal.norm() > kOneWay) {
+      const Vec3 of_axis = normal / normal[axis];
+      planes[first->point] = {static_cast<float>(of_axis[0]), static_cast<float>(of_axis[1]),
+                              static_cast<float>(of_axis[2]), static_cast<float>(axis)};
+    }
+    first = last;
+  }
+  return planes;
+}
 
 std::vector<float4> outer_points(const LatticeTissue& tissue, const AnchorFaces& faces) {
   const std::set<Cell> soft = cells_beside(faces, tissue);

@@ -22,4 +22,13 @@ inline constexpr int kSoftPlace = 16;  ///< more than a point has bonds
 /// inerter, for faces are held as if nodes had none. Throws what find_outer_places() throws.
 std::vector<float4> outer_points(const LatticeTissue& tissue, const AnchorFaces& faces);
 
+/// Whether a tool of the scene is so thin (contact/surface_spring.h) that it could come between the
+/// places of stretched tissue: these are taken apart for it (mpm/contact/place_parts.h). Jaws press
+/// with what they find.
+bool has_thin_tools(const Scene& scene);
+/// Of each point the plane of the surface at its place: its axis in the fourth figure, -1 where the
+/// place stays whole, and the normal, 1 along that. Along it places of points are next to one
+/// another.
+std::vector<float4> surface_planes(const LatticeTissue& tissue);
+
 }  // namespace tissue_sim

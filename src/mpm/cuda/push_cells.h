@@ -34,6 +34,31 @@ struct PlaceWeights {
       if (is_stiff || place.w == bonds + kSoftPlace)
         at[0] = place.x, at[1] = place.y, at[2] = place.z;
     }
+    weigh();
+  }
+  /// Makes the place one of its kPlaceParts parts in the surface's plane. Returns whether it has
+  /// any: else it stays whole.
+  __device__ __forceinline__ bool take_part(const CudaTables& t, int point, int part) {
+    constexpr float kOff = 0.125f;  // of a point's cube, half a cell wide [cells]
+    if (point < 0 || !is_stiff) return false;
+    const float4 plane = __ldg(t.planes + point);
+    const int axis = static_cast<int>(plane.w);
+    if (axis < 0) return false;
+    const float normal[3] = {plane.x, plane.y, plane.z};
+    float along = 0;
+#pragma unroll
+    for (int a = 0; a < 3; ++a) {
+      if (a == axis) continue;
+      const float off = (part >> (a == (axis + 1) % 3 ? 0 : 1) & 1) != 0 ? kOff : -kOff;
+      at[a] += off;
+      along += off * normal[a];
+    }
+#pragma unroll
+    for (int a = 0; a < 3; ++a) at[a] -= a == axis ? along : 0.0f;
+    weigh();
+    return true;
+  }
+  __device__ __forceinline__ void weigh() {
 #pragma unroll
     for (int a = 0; a < 3; ++a) {
 #pragma unroll
@@ -78,7 +103,9 @@ struct ToolPushes {
 
 /// Adds what colliders push the points of a cell with to its nodes. The first eight lanes of the
 /// warp have its points, the first 27 its nodes; of each component of a point's place and velocity
-/// another lane works out the sum.
+/// another lane works out the sum. With kParts, each eight lanes have a part of the points' places
+/// instead, and work out all of it.
+template <bool kParts>
 __device__ __forceinline__ void push_cell(const CudaTables& t, const CudaNodes& state,
                                           const CudaNearCell& cell, const ToolPushes& pushes,
                                           WarpNodes& nodes) {
@@ -90,28 +117,37 @@ __device__ __forceinline__ void push_cell(const CudaTables& t, const CudaNodes& 
   const int p = __ldg(t.point + at), node = entry < 0 ? ~entry : entry;
   const float volume = __ldg(t.volume + at);
   const CudaBody& body = t.bodies[cell.body];
-  const PlaceWeights weights(t, p, s);
+  PlaceWeights weights(t, p, s);
+  const int part = kParts ? lane / 8 : 0;
+  const bool has_parts = kParts && weights.take_part(t, p, part);
   const float4 u = __ldcg(state.u + node), v = __ldcg(state.v + node);
   Held held;
   PushedPoint point;
-  point.index = lane < 8 ? p : -1;
+  point.index = lane < 8 || has_parts ? p : -1;
   if (point.index >= 0) {
-    held.load(t, p);
+    held.load(t, p, part);
     point.is_cut = t.bonds[p] != kAllBonds;
   }
-  point.spring = point_spring(body.spring, volume, weights.is_stiff, pushes.dt);
+  point.spring = point_spring(body.spring, has_parts ? volume / kPlaceParts : volume, weights.is_stiff,
+                              pushes.dt);
   point.inertia = weights.is_stiff ? kInertia * point.spring.across * pushes.dt * pushes.dt : 0;
+  point.cell_size = body.cell_size;
   __syncwarp();
   nodes.u[k][0] = u.x, nodes.u[k][1] = u.y, nodes.u[k][2] = u.z;
   nodes.v[k][0] = v.x, nodes.v[k][1] = v.y, nodes.v[k][2] = v.z;
   __syncwarp();
-  const float x = at_place(nodes.u, component, weights);
-  const float velocity = at_place(nodes.v, component, weights);
+  float x = 0, velocity = 0;
+  if (!kParts) {
+    x = at_place(nodes.u, component, weights);
+    velocity = at_place(nodes.v, component, weights);
+  }
 #pragma unroll
   for (int a = 0; a < 3; ++a) {
-    const float moved = __shfl_sync(0xffffffffu, x, s + 8 * a);
+    const float moved =
+        kParts ? at_place(nodes.u, a, weights) : __shfl_sync(0xffffffffu, x, s + 8 * a);
     point.x[a] = cell.middle[a] + weights.at[a] * body.cell_size + moved;
-    point.v[a] = __shfl_sync(0xffffffffu, velocity, s + 8 * a);
+    point.v[a] =
+        kParts ? at_place(nodes.v, a, weights) : __shfl_sync(0xffffffffu, velocity, s + 8 * a);
   }
   const bool held_before = (held.with[0] | held.with[1]) != 0;
   float push[3] = {0, 0, 0}, force[3] = {0, 0, 0};
@@ -121,7 +157,8 @@ __device__ __forceinline__ void push_cell(const CudaTables& t, const CudaNodes& 
     if (places == 0) return;
     InertialPlaces all;
     all.mask = places;
-    all.inertia = point.inertia * weights.size();
+    all.inertia = point.inertia * weights.size() *
+                  stiffer_across(pushes.colliders[c].radius, body.cell_size);
     all.taken = begins ? 1 : pushes.grown;
     all.along = along;
 #pragma unroll
@@ -137,9 +174,10 @@ __device__ __forceinline__ void push_cell(const CudaTables& t, const CudaNodes& 
                                      pushes.force, pushes.loads);
     force[0] += taken.x, force[1] += taken.y, force[2] += taken.z;
   };
-  push_point(point, pushes.colliders, cell.near, t.held_by, held, pushes.loads, push, resist);
+  push_point<kParts ? 32 : 8>(point, pushes.colliders, cell.near, t.held_by, held, pushes.loads,
+                              push, resist);
   const bool holds = (held.with[0] | held.with[1]) != 0;
-  if (point.index >= 0 && (holds || held_before)) held.store(t, p);
+  if (point.index >= 0 && (holds || held_before)) held.store(t, p, part);
   unsigned left = __ballot_sync(0xffffffffu, holds);
   if (left == 0) return;
   for (; left != 0; left &= left - 1) {
@@ -154,6 +192,23 @@ __device__ __forceinline__ void push_cell(const CudaTables& t, const CudaNodes& 
     for (int a = 0; a < 3; ++a) force[a] += w * __shfl_sync(0xffffffffu, push[a], from);
   }
   if (lane < 27) add_push(pushes.force, node, 1.0f, force);
+}
+
+/// Those of the colliders `near` a cell that are so thin that places are taken apart for them.
+__device__ __forceinline__ std::uint32_t thin_ones(const Collider* colliders, std::uint32_t near,
+                                                   float cell_size) {
+  const int c = static_cast<int>(threadIdx.x) % 32;
+  return __ballot_sync(0xffffffffu, (near >> c & 1) != 0 && colliders[c].kind != Collider::kJaw &&
+                                        stiffer_across(colliders[c].radius, cell_size) > 1);
+}
+
+/// Pushes for these alone. Out of line, for scenes without any to keep their registers.
+inline __device__ __noinline__ void push_cell_parts(const CudaTables t, const CudaNodes state,
+                                                    const CudaNearCell* of, const ToolPushes pushes,
+                                                    WarpNodes* nodes) {
+  CudaNearCell cell = *of;
+  cell.near = thin_ones(pushes.colliders, cell.near, t.bodies[cell.body].cell_size);
+  if (cell.near != 0) push_cell<true>(t, state, cell, pushes, *nodes);
 }
 
 /// What lane `from` of a warp has of a cell.
@@ -211,7 +266,16 @@ struct NearSearch {
         }
       }
       for (unsigned left = __ballot_sync(0xffffffffu, close); left != 0; left &= left - 1) {
-        push_cell(t, state, cell_of_lane(cell, __ffs(static_cast<int>(left)) - 1), pushes, nodes);
+        const int from = __ffs(static_cast<int>(left)) - 1;
+        CudaNearCell one = cell_of_lane(cell, from);
+        if (t.place_parts > 1) {
+          one.near &= ~thin_ones(pushes.colliders, one.near, t.bodies[one.body].cell_size);
+        }
+        push_cell<false>(t, state, one, pushes, nodes);
+        if (t.place_parts > 1) {
+          push_cell_parts(t, state, cells + __shfl_sync(0xffffffffu, i - step, from), pushes,
+                          &nodes);
+        }
       }
     }
   }

@@ -1,7 +1,7 @@
 // What the front's cells push within a substep. For .cu files.
 //
 // They are no work of the blocks that they are in, for these would keep all others waiting: as with
-// cells near colliders, a warp of any thread block that is free takes the next one, once all nodes
+// cells near colliders, a warp of any thread block that is free takes the next pass of one, once all nodes
 // are in place, and adds its forces to the sums that contact adds to.
 #pragma once
 
@@ -42,28 +42,30 @@ __device__ __forceinline__ void move_parted(const CudaFrame& f, int bundles, int
   }
 }
 
-/// Works out cells as long as there are any that no warp has. Out of line, for the blocks to keep
-/// their registers.
+/// Works out passes of cells as long as there are any that no warp has. Out of line, for the blocks
+/// to keep their registers.
 inline __device__ __noinline__ void push_front(const CudaFront front, const CudaNodes state,
                                                unsigned* arrived, int round, long long* sums) {
-  const auto cells = static_cast<unsigned>(front.cell_count);
+  const auto tasks = static_cast<unsigned>(front.task_count);
   unsigned* counter = front_turns(arrived, round);
   bool waited = false;
   for (;;) {
-    unsigned i = cells;
-    if (threadIdx.x % 32 == 0 && __ldcg(counter) < cells) i = atomicAdd(counter, 1u);
+    unsigned i = tasks;
+    if (threadIdx.x % 32 == 0 && __ldcg(counter) < tasks) i = atomicAdd(counter, 1u);
     i = __shfl_sync(0xffffffffu, i, 0);
-    if (i >= cells) return;
-    FrontWarp cell(front, static_cast<int>(i));
+    if (!FrontWarp::any(i < tasks)) return;
+    const int4 task = __ldg(front.tasks + i);
+    FrontWarp cell(front, task.x, task.z, task.w);
     if (!waited) warp_wait(arrived + 1, static_cast<unsigned>(round) + 1);
     waited = true;
     cell.bring(state);
-    if (cell.cell.law == Law::kNeoHookean) {
-      cell.push<NeoHookean>(sums);
+    if (FrontWarp::any(task.y == kStabilises)) {
+      cell.stabilise<true>(sums);
+    } else if (FrontWarp::any(cell.cell.law == Law::kNeoHookean)) {
+      cell.push<NeoHookean>(task.y, sums);
     } else {
-      cell.push<FixedCorotated>(sums);
+      cell.push<FixedCorotated>(task.y, sums);
     }
-    if (cell.cell.stabilised > 0) cell.stabilise<true>(sums);
   }
 }
 

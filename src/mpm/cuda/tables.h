@@ -88,6 +88,9 @@ TISSUE_SIM_INLINE CudaColumn column_of(const CudaBlock& b, int index) {
 /// be.
 inline constexpr float kCellReach = 2;
 
+/// Into how many parts a point's place is taken apart for a thin tool, two along either side.
+inline constexpr int kPlaceParts = 4;
+
 /// A cell that colliders may push in a frame.
 struct alignas(16) CudaNearCell {
   float middle[3];     ///< reference place of its middle [m]
@@ -148,13 +151,16 @@ struct CudaTables {
                               ///< fewer than seven, else 0; see mpm/blocks/stabilisation.h [J]
   const float4* outer;        ///< per point, where colliders touch it: outer_points.h; null where
                               ///< that is the point itself for all
+  const float4* planes;       ///< per point, the surface's plane there: surface_planes(); null where
+                              ///< no tool is thin
   const std::uint8_t* bonds;  ///< per point
   const std::uint8_t* soft;   ///< per point, as Points::soft; null where none is
   const float* lightness;  ///< per point, Points::lightness, 1 where a bond broke; null where all
                            ///< are 1
   int held_by;             ///< colliders that a point may hold on to at a time: 0 to 2
-  std::uint8_t* with;      ///< [point][held_by]: 0, or 1 + index of a collider it touches
-  float4* hold;  ///< [point][held_by]: the place that friction holds on to, in the collider's
+  int place_parts;         ///< that a point's place may be taken apart into: kPlaceParts, or 1
+  std::uint8_t* with;  ///< [point][place_parts][held_by]: 0, or 1 + index of a collider it touches
+  float4* hold;  ///< [point][place_parts][held_by]: the place that friction holds on to, in the collider's
                  ///< frame [m], and how deep contact began (contact/surface_spring.h) [m]
 };
 

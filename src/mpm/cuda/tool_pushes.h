@@ -30,7 +30,7 @@ __device__ __forceinline__ bool may_touch(const Collider& c, const float* x, flo
 
 /// Adds forces and moments of a warp's first lanes to a load, as integers, whose sum does not
 /// depend on the order.
-template <int kLanes = 8>
+template <int kLanes>
 __device__ __forceinline__ void add_load(unsigned long long* load, const double (&value)[6]) {
   long long sum[6];
 #pragma unroll
@@ -52,27 +52,33 @@ struct Held {
   int with[2] = {0, 0};
   float4 place[2] = {};
 
-  __device__ __forceinline__ void load(const CudaTables& t, int p) {
+  static __device__ __forceinline__ std::size_t entry(const CudaTables& t, int p, int part) {
+    return (static_cast<std::size_t>(p) * t.place_parts + part) * t.held_by;
+  }
+  __device__ __forceinline__ void load(const CudaTables& t, int p, int part) {
+    const std::size_t first = entry(t, p, part);
 #pragma unroll
     for (int slot = 0; slot < 2; ++slot) {
       if (slot >= t.held_by) return;
-      with[slot] = __ldcg(t.with + p * t.held_by + slot);
-      place[slot] = __ldcg(t.hold + static_cast<std::size_t>(p) * t.held_by + slot);
+      with[slot] = __ldcg(t.with + first + slot);
+      place[slot] = __ldcg(t.hold + first + slot);
     }
   }
-  __device__ __forceinline__ void store(const CudaTables& t, int p) const {
+  __device__ __forceinline__ void store(const CudaTables& t, int p, int part) const {
+    const std::size_t first = entry(t, p, part);
 #pragma unroll
     for (int slot = 0; slot < 2; ++slot) {
       if (slot >= t.held_by) return;
-      __stcg(t.with + p * t.held_by + slot, static_cast<std::uint8_t>(with[slot]));
-      __stcg(t.hold + static_cast<std::size_t>(p) * t.held_by + slot, place[slot]);
+      __stcg(t.with + first + slot, static_cast<std::uint8_t>(with[slot]));
+      __stcg(t.hold + first + slot, place[slot]);
     }
   }
 };
 
-/// How deep contact of a stiff spring begins, of how deep it is: it pushes as hard then as the soft
-/// one would, so that a tool which comes deep within a substep is held off as well.
-inline constexpr float kBegunDeep = 1 - 1 / kAcross;
+/// How deep contact of a stiff spring begins, of how deep it is, where the spring is so much stiffer
+/// for a thin tool: it pushes as hard then as the soft one would, so that a tool which comes deep
+/// within a substep is held off as well.
+__device__ __forceinline__ float begun_deep(float stiffer) { return 1 - 1 / (kAcross * stiffer); }
 
 /// The spring of a point of so much volume [m^3], by that of a m^3 at the lattice: as that where it
 /// is soft, else as stiff across the surface as a CPU's.
@@ -96,7 +102,9 @@ struct PushedPoint {
   bool is_cut = false;   ///< it has lost a bond
   float x[3], v[3];      ///< [m], [m/s]
   SurfaceSpring spring;  ///< but for its cohesion, which is the collider's
-  float inertia = 0;     ///< of its inerter, above 0 where the spring is stiff across [kg]
+  float inertia = 0;     ///< of its inerter, above 0 where the spring is stiff across [kg]; more
+                         ///< where a thin tool has it stiffer
+  float cell_size;       ///< [m]
   __device__ __forceinline__ bool touches(const Collider& c) const {
     return index >= 0 && (is_cut || c.kind != Collider::kBlade) && may_touch(c, x, 0);
   }
@@ -106,8 +114,9 @@ struct PushedPoint {
 /// part; `near` are the colliders that any of their points may lie in. Where any touches, all lanes
 /// call resist(collider, its normal there, its velocity along that, whether the lane's point
 /// touches, whether that begins). Jaws have soft springs: they close until what touches them
-/// presses back, and of stiff ones too little touches.
-template <class Resist>
+/// presses back, and of stiff ones too little touches. The first kLanes lanes have points, or parts
+/// of their places, of which the first eight are counted.
+template <int kLanes, class Resist>
 __device__ __forceinline__ void push_point(const PushedPoint& point, const Collider* colliders,
                                            std::uint32_t near, int held_by, Held& held,
                                            unsigned long long* loads, float (&sum)[3],
@@ -119,12 +128,13 @@ __device__ __forceinline__ void push_point(const PushedPoint& point, const Colli
     const bool touches = point.touches(collider);
     if (__ballot_sync(0xffffffffu, touches) == 0) continue;
     const bool is_stiff = point.inertia > 0 && collider.kind != Collider::kJaw;
+    const float stiffer = stiffer_across(collider.radius, point.cell_size);
     float push[3] = {0, 0, 0}, normal[3] = {0, 0, 0}, distance = 0, along = 0;
     bool pushes = false, begins = false, is_inside = false;
     if (touches) {
       const Gap g = gap(collider, point.x);
       distance = g.distance;
-      is_inside = distance < -collider.inside && collider.inside > 0;
+      is_inside = distance < -collider.inside && collider.inside > 0 && threadIdx.x % 32 < 8;
       const bool second =
           held_by == 2 && (held.with[1] == c + 1 || (held.with[0] != 0 && held.with[0] != c + 1));
       pushes = g.distance < 0;
@@ -134,10 +144,12 @@ __device__ __forceinline__ void push_point(const PushedPoint& point, const Colli
         begins = (second ? held.with[1] : held.with[0]) != c + 1;
         if (begins) {
           to_local(collider, point.x, place);
-          begun = kBegunDeep * -g.distance;
+          begun = begun_deep(stiffer) * -g.distance;
         }
         SurfaceSpring spring = point.spring;
-        if (!is_stiff) {
+        if (is_stiff) {
+          stiffen_across(spring, stiffer);
+        } else {
           begun = 0;
           spring.across = spring.along;
           spring.damping_across = spring.damping_along;
@@ -174,7 +186,7 @@ __device__ __forceinline__ void push_point(const PushedPoint& point, const Colli
       load[a] = -push[a];
       load[3 + a] = -(arm[b] * push[d] - arm[d] * push[b]);
     }
-    add_load(loads + kLoadSums * c, load);
+    add_load<kLanes>(loads + kLoadSums * c, load);
     if (collider.kind == Collider::kJaw) {
       const unsigned pushed = __ballot_sync(0xffffffffu, pushes);
       if (threadIdx.x % 32 == 0) atomicAdd(loads + kLoadSums * c + 6, 1ull * __popc(pushed));
@@ -182,7 +194,8 @@ __device__ __forceinline__ void push_point(const PushedPoint& point, const Colli
   }
 #pragma unroll
   for (int slot = 0; slot < 2; ++slot) {
-    if (!holds[slot]) held.with[slot] = 0;
+    const bool of_others = held.with[slot] != 0 && (near >> (held.with[slot] - 1) & 1u) == 0;
+    if (!holds[slot] && !of_others) held.with[slot] = 0;
   }
 }
 

@@ -4,6 +4,7 @@
 #include <stdexcept>
 
 #include "pbd/cuda/on_device.h"
+#include "pbd/cuda/section_words.h"
 #include "pbd/find_touches.h"
 #include "pbd/viscosity.h"
 
@@ -96,20 +97,30 @@ void CudaPbdTissue::upload_constraints() {
   d.projections.clear();
 }
 
-void CudaPbdTissue::choose_way() {
+void CudaPbdTissue::upload_sections() {
   OnDevice& d = *device_;
-  const Way was = d.way;
   const pbd::State& s = *state_;
-  const bool fits = pbd::fits_pbd_block(d.field());
-  if (d.wanted != Way::kFaster) {
-    if (d.wanted == Way::kOneBlock && !fits) {
-      throw std::runtime_error("one block of threads has no room for " + std::to_string(d.count) +
-                               " vertices; let the tissue choose");
-    }
-    d.way = d.wanted;
-    if (d.way != was) upload_constraints();  // in another order
-    return;
-  }
+  d.in_sections = {};
+  const bool is_whole = s.components == 1 && d.sweeps == 1;
+  const bool is_surface = s.elastics.blocks.empty() && s.strains.blocks.empty();
+  const int most = pbd::most_pbd_sections();
+  if (!is_whole || !is_surface || most == 0 || d.count >= 1 << 16) return;
+  const pbd::Sections sections = pbd::find_sections(s, most);
+  if (sections.count == 0) return;
+  const pbd::SectionWords words = pbd::section_words(s, sections);
+  d.sections.upload(words.of, d.stream);
+  d.section_words.upload(words.words, d.stream);
+  d.wait("receive data");
+  d.in_sections = {d.sections.data(), d.section_words.data(), sections.count, words.most_words,
+                   words.most_own,    {}};
+  std::copy_n(sections.first, 6, d.in_sections.first);
+  const int colliders = s.scene.pbd.steps * collider_count(s.scene);
+  if (!pbd::fits_pbd_sections(d.field(), d.in_sections, colliders)) d.in_sections = {};
+}
+
+CudaPbdTissue::Way CudaPbdTissue::faster_way() const {
+  const OnDevice& d = *device_;
+  const pbd::State& s = *state_;
   // On an H100, in us; what a launch takes within a graph is 1.6, of tetrahedra 2.9, and each
   // further colour that it is of 0.8, of tetrahedra 1.
   const bool is_surface = s.elastics.blocks.empty() && s.strains.blocks.empty();
@@ -123,13 +134,36 @@ void CudaPbdTissue::choose_way() {
                   4;
   const double launches =
       (is_surface ? 1.6 : 2.9) * (3 + count) + (is_surface ? 0.8 : 1.0) * (all - count);
-  d.way = fits && one_block < launches ? Way::kOneBlock : Way::kLaunches;
+  return pbd::fits_pbd_block(d.field()) && one_block < launches ? Way::kOneBlock : Way::kLaunches;
+}
+
+void CudaPbdTissue::choose_way() {
+  OnDevice& d = *device_;
+  const Way was = d.way;
+  // Where vertices are few, one block has few constraints of a colour, too, and fewer colours.
+  constexpr int kLeastInSections = 1000;
+  if (d.wanted == Way::kSections || (d.wanted == Way::kFaster && d.count >= kLeastInSections)) {
+    upload_sections();
+  } else {
+    d.in_sections = {};
+  }
+  if (d.wanted == Way::kFaster || d.wanted == Way::kSections) {
+    d.way = d.in_sections.count > 0 ? Way::kSections : faster_way();
+  } else if (d.wanted == Way::kOneBlock && !pbd::fits_pbd_block(d.field())) {
+    throw std::runtime_error("one block of threads has no room for " + std::to_string(d.count) +
+                             " vertices; let the tissue choose");
+  } else {
+    d.way = d.wanted;
+  }
   if (d.way != was) upload_constraints();  // in another order
 }
 
 void CudaPbdTissue::set_way(Way way) {
   device_->wanted = way;
   choose_way();
+  if (way == Way::kSections && device_->way != way) {
+    throw std::runtime_error("this tissue's steps cannot be taken by sections; let it choose");
+  }
 }
 
 CudaPbdTissue::Way CudaPbdTissue::way() const { return device_->way; }
@@ -165,7 +199,7 @@ void CudaPbdTissue::upload_frame(const FrameColliders& colliders, int steps,
   d.colliders.resize(d.boxed.size());
   d.loads.resize(d.boxed.size() * pbd::kPbdLoadSums);
   d.host_loads.resize(d.loads.size());
-  if (d.way == Way::kOneBlock) return;  // it fetches them itself
+  if (d.way != Way::kLaunches) return;  // they fetch them themselves
   d.frame.upload(&frame, 1, d.stream);
   d.step.clear(d.stream);
   d.colliders.upload(boxed, d.boxed.size(), d.stream);
@@ -198,10 +232,14 @@ void CudaPbdTissue::run_steps(const FrameColliders& colliders, int steps, float 
   const pbd::CudaPbdField field = d.field();
   const int chunks = static_cast<int>(d.component_of_chunk.size());
   const pbd::CudaPbdFlights flights{d.chunks.data(), chunks, d.order.data()};
-  if (d.way == Way::kOneBlock) {
-    launch_pbd_steps(field, frame, steps,
-                     {d.boxed.data(), d.host_loads.data(), d.host_flights.data(), flights},
-                     d.stream);
+  if (d.way != Way::kLaunches) {
+    const pbd::CudaPbdExchange exchange = {d.boxed.data(), d.host_loads.data(),
+                                           d.host_flights.data(), flights};
+    if (d.way == Way::kSections) {
+      launch_pbd_section_steps(field, frame, steps, d.in_sections, exchange, d.stream);
+    } else {
+      launch_pbd_steps(field, frame, steps, exchange, d.stream);
+    }
   } else {
     launch_pbd_flights(field, flights, d.flights.data(), d.stream);
     if (d.step_graph.is_empty()) {

@@ -92,7 +92,8 @@ std::vector<std::int16_t> find_seams(const std::vector<std::int16_t>& section, i
 }
 
 /// Vertices that internal links join, each lot with the worker that has the fewest. Such lots are
-/// small beside the whole, for the ray back from where one ended ends near where that began.
+/// small beside the whole, for the ray back from where one ended ends near where that began. -1 for
+/// those that none joins.
 std::vector<std::int16_t> share_internal(const State& s, int workers) {
   const int n = s.vertices.size();
   UnionFind joined(n);
@@ -257,6 +258,9 @@ Sections find_sections(const State& s, int most) {
     seams.push_back(seam[step[v]]);
   }
   across = share_internal(s, found.count);
+  for (int v = 0; v < n; ++v) {
+    if (across[v] < 0) across[v] = home[v];  // stays there
+  }
   const auto choice = [&](const auto& vertices) {
     Choice c = {{-1, -1, -1, -1}, {home[vertices[0]], seams[vertices[0]]}};
     std::copy(vertices.begin(), vertices.end(), c.vertices.begin());

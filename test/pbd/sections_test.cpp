@@ -50,6 +50,10 @@ TEST(Sections, WorkersShareNoVertexAndHaveAboutAsMuchToDo) {
   const pbd::Sections sections = pbd::find_sections(s, 4);
   ASSERT_EQ(sections.count, 4);
   EXPECT_TRUE(std::is_sorted(sections.first, sections.first + 6));
+  for (const auto& owner : sections.owner) {
+    ASSERT_EQ(owner.size(), s.vertices.reference.size());
+    for (const int worker : owner) ASSERT_TRUE(worker >= 0 && worker < 4);
+  }
   std::vector<int> links(4, 0), bends(4, 0);
   look(s.links, sections.link_pass, sections, sections.first[0], sections.first[3], links);
   look(s.bends, sections.bend_pass, sections, sections.first[3], sections.first[5], bends);

@@ -2,16 +2,17 @@
 // each has its constraints and places in its shared memory, and writes what another one needs next
 // into that one's. So blocks wait for one another three times a step, not at each colour, and what
 // a thread waits for between passes is its own block.
+#include <cstdlib>
+
 #include "pbd/cuda/block_of_threads.h"
-#if CUDART_VERSION >= 11080
-#include <cooperative_groups.h>
-#endif
+#include "pbd/cuda/cluster.h"
 
 namespace tissue_sim {
 namespace pbd {
 namespace {
 
 constexpr int kThreads = 256;
+constexpr std::size_t kMailboxes = 32;  ///< bytes at most
 
 /// Shared memory of a block: all places, of which it keeps up those that are its in a phase; its
 /// words; and of the vertices of its section velocities, where they would be, masses, whether they
@@ -27,7 +28,7 @@ struct Layout {
 
 #if CUDART_VERSION >= 11080
 template <class Kind>
-__device__ __forceinline__ void project_packed(const int4& packed, float inverse_h2, float4* x) {
+__device__ __forceinline__ Item<Kind> unpack(const int4& packed) {
   Item<Kind> item;
 #pragma unroll
   for (int i = 0; i < Kind::kVertices; ++i) {
@@ -36,40 +37,47 @@ __device__ __forceinline__ void project_packed(const int4& packed, float inverse
   }
   item.number[0] = __int_as_float(packed.z);
   item.number[1] = __int_as_float(packed.w);
-  project_item<Kind, false>(item, inverse_h2, x, nullptr, 0);
+  return item;
 }
 
-/// Leaves the block's threads in step. What a thread takes first of the next pass is read ahead.
+/// Leaves the block's threads in step. What a thread takes first of the next pass is read while it
+/// projects, and where the pass after that begins, so that after waiting it reads places alone.
 template <class Kind>
 __device__ __forceinline__ void project_passes(const std::int32_t* begin, int first, int last,
                                                const int4* items, float inverse_h2, float4* x) {
   if (first >= last) return;
-  int item = begin[first] + static_cast<int>(threadIdx.x), end = begin[first + 1];
-  int4 ahead = {};
-  if (item < end) ahead = items[item];
+  const int thread = static_cast<int>(threadIdx.x);
+  int item = begin[first] + thread, end = begin[first + 1];
+  int next = end + thread, next_end = first + 1 < last ? begin[first + 2] : end;
+  int4 packed = {};
+  if (item < end) packed = items[item];
+  Item<Kind> now = unpack<Kind>(packed);
   for (int pass = first; pass < last; ++pass) {
+    if (next < next_end) packed = items[next];
+    const int after = pass + 2 < last ? begin[pass + 3] : next_end;
     if (item < end) {
-      project_packed<Kind>(ahead, inverse_h2, x);
+      project_item<Kind, false>(now, inverse_h2, x, nullptr, 0);
       for (item += kThreads; item < end; item += kThreads) {
-        project_packed<Kind>(items[item], inverse_h2, x);
+        project_item<Kind, false>(unpack<Kind>(items[item]), inverse_h2, x, nullptr, 0);
       }
     }
-    if (pass + 1 < last) {
-      item = begin[pass + 1] + static_cast<int>(threadIdx.x);
-      end = begin[pass + 2];
-      if (item < end) ahead = items[item];
-    }
+    now = unpack<Kind>(packed);
+    item = next;
+    end = next_end;
+    next = next_end + thread;
+    next_end = after;
     __syncthreads();
   }
 }
 
+template <bool kAsync>
 __global__ void __launch_bounds__(kThreads, 1)
     pbd_section_steps([[maybe_unused]] CudaPbdField f, [[maybe_unused]] CudaPbdFrame frame,
                       [[maybe_unused]] int steps, [[maybe_unused]] CudaPbdSections sections,
                       [[maybe_unused]] CudaPbdExchange exchange) {
 #if __CUDA_ARCH__ >= 900
   extern __shared__ float4 places[];
-  const cooperative_groups::cluster_group cluster = cooperative_groups::this_cluster();
+  __shared__ Mailbox mailbox[3];  // of each phase's end
   const int thread = static_cast<int>(threadIdx.x), rank = static_cast<int>(blockIdx.x);
   const int of_steps = steps * frame.colliders;
   const CudaPbdSection section = sections.of[rank];
@@ -99,14 +107,22 @@ __global__ void __launch_bounds__(kThreads, 1)
     mass[i] = f.mass[own[i]];
     mine.pushed[i] = 0;
   }
-  cluster.sync();
+  if (thread == 0) {
+    for (Mailbox& m : mailbox) m.open();
+  }
+  wait_for_cluster();
 
-  const auto hand_over = [&](int phase) {
+  // A vertex is written by who has it in his hands, and who gets it waits for it. So nobody is a
+  // step ahead of who sends to him, and no counts mix.
+  const auto hand_over = [&](int phase, int s) {
+    Mailbox& box = mailbox[phase];
+    if (thread == 0) box.expect(section.incoming[phase] * static_cast<int>(sizeof(float4)));
     for (int i = section.moves[phase] + thread; i < section.moves[phase + 1]; i += kThreads) {
-      const int vertex = words[i] & 0xffff, to = words[i] >> 16;
-      *cluster.map_shared_rank(places + vertex, to) = places[vertex];
+      const int vertex = words[i] & 0xffff;
+      box.send(places[vertex], places + vertex, words[i] >> 16);
     }
-    cluster.sync();
+    box.wait(s);
+    if (!kAsync) wait_for_cluster();
   };
   const int* first = sections.first;
   const StepNumbers& step = frame.step;
@@ -115,12 +131,12 @@ __global__ void __launch_bounds__(kThreads, 1)
     for (int i = thread; i < count; i += kThreads) predict_vertex(mine, step, i, places + own[i]);
     __syncthreads();
     project_passes<Distance>(begin, first[0], first[1], items, inverse_h2, places);
-    hand_over(0);
+    hand_over(0, s);
     project_passes<Distance>(begin, first[1], first[2], items, inverse_h2, places);
-    hand_over(1);
+    hand_over(1, s);
     project_passes<Distance>(begin, first[2], first[3], items, inverse_h2, places);
     project_passes<Bending>(begin, first[3], first[4], items, inverse_h2, places);
-    hand_over(2);
+    hand_over(2, s);
     project_passes<Bending>(begin, first[4], first[5], items, inverse_h2, places);
     const std::size_t at = static_cast<std::size_t>(s) * frame.colliders;
     for (int i = thread; i < count; i += kThreads) {  // from here on each thread's own vertices
@@ -135,7 +151,7 @@ __global__ void __launch_bounds__(kThreads, 1)
     f.predicted[own[i]] = mine.predicted[i];
     f.pushed[own[i]] = mine.pushed[i];
   }
-  cluster.sync();
+  wait_for_cluster();
   if (rank == 0) copy_words(f.loads, exchange.loads, of_steps * kPbdLoadSums);
   sum_flights(f, exchange.chunks, f.x, rank, sections.count,
               exchange.flights + exchange.chunks.count);
@@ -158,7 +174,7 @@ int most_pbd_sections() {
 bool fits_pbd_sections(const CudaPbdField& field, const CudaPbdSections& sections,
                        int colliders) {
   const Layout layout = {field.count, sections.most_words, sections.most_own};
-  return field.count < 1 << 16 && layout.bytes(colliders) <= most_shared_bytes();
+  return field.count < 1 << 16 && layout.bytes(colliders) + kMailboxes <= most_shared_bytes();
 }
 
 void launch_pbd_section_steps([[maybe_unused]] const CudaPbdField& field,
@@ -180,11 +196,12 @@ void launch_pbd_section_steps([[maybe_unused]] const CudaPbdField& field,
   config.stream = stream;
   config.attrs = &of_cluster;
   config.numAttrs = 1;
-  check_cuda(cudaFuncSetAttribute(pbd_section_steps, cudaFuncAttributeMaxDynamicSharedMemorySize,
+  const auto kernel = std::getenv("PBD_SYNC") != nullptr ? pbd_section_steps<false> : pbd_section_steps<true>;
+  check_cuda(cudaFuncSetAttribute(kernel, cudaFuncAttributeMaxDynamicSharedMemorySize,
                                   static_cast<int>(config.dynamicSmemBytes)),
              "set shared memory apart");
   check_cuda(
-      cudaLaunchKernelEx(&config, pbd_section_steps, field, frame, steps, sections, exchange),
+      cudaLaunchKernelEx(&config, kernel, field, frame, steps, sections, exchange),
       "take the steps of a frame");
 #endif
 }

@@ -62,6 +62,7 @@ inline SectionWords section_words(const State& s, const Sections& sections) {
       for (int v = 0; v < n; ++v) {
         const int to = sections.owner[(phase + 1) % kPhases][v];
         if (sections.owner[phase][v] == b && to != b) result.words.push_back(v | to << 16);
+        section.incoming[phase] += sections.owner[phase][v] != b && to == b ? 1 : 0;
       }
     }
     section.moves[kPhases] = here();

@@ -126,6 +126,8 @@ struct Choice {
 
 /// The passes of both phases in turn, bits of a word: pass p of phase k is 2 p + k.
 constexpr int kMostPasses = 64;
+/// More gave no fewer passes.
+constexpr int kRounds = 10;
 using Passes = std::uint64_t;
 constexpr Passes kOfPhase[2] = {0x5555555555555555u, 0xaaaaaaaaaaaaaaaau};
 
@@ -146,9 +148,12 @@ class PassFinder {
     std::vector<int> degree(vertices_, 0), weight;
     for (const Choice& c : all_) each(c, [&](std::int32_t v) { ++degree[v]; });
     for (const Choice& c : all_) {
-      int most = 0;
-      each(c, [&](std::int32_t v) { most = std::max(most, degree[v]); });
-      weight.push_back(most + (c.worker[0] >= 0 && c.worker[1] >= 0 ? 0 : 1000000));
+      int most = 0, sum = 0;
+      each(c, [&](std::int32_t v) {
+        most = std::max(most, degree[v]);
+        sum += degree[v];
+      });
+      weight.push_back(100 * most + sum + (c.worker[0] >= 0 && c.worker[1] >= 0 ? 0 : 1000000));
     }
     std::vector<std::int32_t> order(all_.size());
     std::iota(order.begin(), order.end(), 0);
@@ -156,7 +161,7 @@ class PassFinder {
                      [&](std::int32_t a, std::int32_t b) { return weight[a] > weight[b]; });
     std::vector<std::int16_t> now(all_.size());
     int least = kMostPasses + 1;
-    for (int round = 0; round < 60; ++round) {
+    for (int round = 0; round < kRounds; ++round) {
       if (!first_fit(order, now)) return false;
       int used[2] = {0, 0}, size[kMostPasses] = {}, place[kMostPasses];
       for (const std::int16_t p : now) {
@@ -215,7 +220,7 @@ class PassFinder {
       ++size_of(c, pass[c]);
     }
     bool moved = true;
-    for (int round = 0; round < 30 && moved; ++round) {
+    for (int round = 0; round < kRounds && moved; ++round) {
       moved = false;
       for (std::size_t c = 0; c < all_.size(); ++c) {
         const Passes free = allowed_[c] & ~taken_by_neighbours(all_[c], taken);

@@ -127,7 +127,7 @@ struct Choice {
 /// The passes of both phases in turn, bits of a word: pass p of phase k is 2 p + k.
 constexpr int kMostPasses = 64;
 /// More gave no fewer passes.
-constexpr int kRounds = 10;
+constexpr int kOrders = 10;
 using Passes = std::uint64_t;
 constexpr Passes kOfPhase[2] = {0x5555555555555555u, 0xaaaaaaaaaaaaaaaau};
 
@@ -161,7 +161,7 @@ class PassFinder {
                      [&](std::int32_t a, std::int32_t b) { return weight[a] > weight[b]; });
     std::vector<std::int16_t> now(all_.size());
     int least = kMostPasses + 1;
-    for (int round = 0; round < kRounds; ++round) {
+    for (int round = 0; round < kOrders; ++round) {
       if (!first_fit(order, now)) return false;
       int used[2] = {0, 0}, size[kMostPasses] = {}, place[kMostPasses];
       for (const std::int16_t p : now) {
@@ -220,7 +220,7 @@ class PassFinder {
       ++size_of(c, pass[c]);
     }
     bool moved = true;
-    for (int round = 0; round < kRounds && moved; ++round) {
+    for (int round = 0; round < kOrders && moved; ++round) {
       moved = false;
       for (std::size_t c = 0; c < all_.size(); ++c) {
         const Passes free = allowed_[c] & ~taken_by_neighbours(all_[c], taken);

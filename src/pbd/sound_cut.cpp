@@ -302,30 +302,44 @@ bool cut_soundly(State& s, const BladePath& path, const Array<float>& before, in
                                return (l.path.poses.back().position - begin).norm() > 1e-9;
                              }),
               again.end());
-  bool changed = false;
   const auto run = [&](SoundCut& cut, const BladePath& along) {
+    bool any = false;
     for (const double far : kAside) {
       BladePath moved = along;
       for (Pose& pose : moved.poses) pose.position += far * s.mean_edge * aside(along);
-      changed = cut.run(moved, before, stroke, report) || changed;
+      any = cut.run(moved, before, stroke, report) || any;
       if (cut.is_done()) break;
     }
+    return any;
+  };
+  const auto leave = [&](const SoundCut& cut, const BladePath& along) {
     cut.tell(report);
     if (is_tools && along.poses.size() < kMostPoses) cut.remember(along, later);
   };
+  bool changed = false;
   const std::vector<SweepPart> parts = sweep_parts(path);
   if (may_meet(s, before, parts)) {
     SoundCut cut(s, origin);
     for (const LeftWhole& l : again) cut.leave_out(l.vertex);
     cut.meet_small(before, parts);
-    run(cut, path);
+    changed = run(cut, path);
+    leave(cut, path);
   }
   for (const LeftWhole& l : again) {
     BladePath longer = l.path;
     longer.poses.insert(longer.poses.end(), path.poses.begin() + 1, path.poses.end());
     SoundCut cut(s, origin);
     cut.take_only(l.vertex);
-    run(cut, longer);
+    changed = run(cut, longer) || changed;
+    if (cut.is_done()) continue;
+    SoundCut here(s, origin);  // at least what the blade sweeps now
+    here.take_only(l.vertex);
+    if (run(here, path)) {
+      changed = true;
+      here.tell(report);
+    } else {
+      leave(cut, longer);
+    }
   }
   if (is_tools && !rests(path)) s.left_whole[stroke].swap(later);
   return changed;

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <numeric>
 
 #include "math/union_find.h"
@@ -91,13 +92,98 @@ std::vector<std::int16_t> find_seams(const std::vector<std::int16_t>& section, i
   return seam;
 }
 
-/// Vertices that internal links join, each lot with the worker that has the fewest. Such lots are
+/// Moves single vertices across the lines between the workers that `owner` names, so that vertices
+/// beside a line have few bends across it: in the other phase they need as many passes. Each
+/// constraint stays one worker's, here or there.
+class LineMender {
+ public:
+  LineMender(const State& s, std::vector<std::int16_t>& owner,
+             const std::vector<std::int16_t>& there)
+      : owner_(owner), there_(there), of_(owner.size()), across_(owner.size(), 0) {
+    for (const auto& v : s.bends.vertices) items_.push_back({v, true});
+    for (int c = 0; c < s.edge_count; ++c) {
+      const auto [a, b] = s.links.vertices[c];
+      items_.push_back({{a, b, a, b}, false});
+    }
+    for (std::size_t c = 0; c < items_.size(); ++c) {
+      const auto& v = items_[c].vertices;
+      for (int i = 0; i < (items_[c].is_bend ? 4 : 2); ++i) of_[v[i]].push_back(c);
+      count(items_[c], 1);
+    }
+  }
+  void run() {
+    bool moved = true;
+    for (int round = 0; round < 4 && moved; ++round) {
+      moved = false;
+      for (std::size_t v = 0; v < owner_.size(); ++v) {
+        if (across_[v] > 0 && move(v)) moved = true;
+      }
+    }
+  }
+
+ private:
+  struct Item {
+    std::array<std::int32_t, 4> vertices;
+    bool is_bend;
+  };
+  static bool is_ones(const std::vector<std::int16_t>& owner, const Item& item) {
+    const auto& v = item.vertices;
+    return owner[v[0]] == owner[v[1]] && owner[v[0]] == owner[v[2]] && owner[v[0]] == owner[v[3]];
+  }
+  void count(const Item& item, int by) {
+    if (!item.is_bend || is_ones(owner_, item)) return;
+    for (const std::int32_t v : item.vertices) across_[v] += by;
+  }
+  /// Grows so fast that the vertex with most counts most.
+  double weight(const std::vector<std::int32_t>& near) const {
+    double sum = 0;
+    for (const std::int32_t v : near) sum += std::ldexp(1, 2 * std::min(across_[v], 400));
+    return sum;
+  }
+  /// If that lowers the weight.
+  bool move(std::size_t v) {
+    std::vector<std::int32_t> near;
+    std::int16_t to = owner_[v];
+    const std::int16_t was = to;
+    for (const std::size_t c : of_[v]) {
+      for (const std::int32_t w : items_[c].vertices) {
+        near.push_back(w);
+        if (owner_[w] != was) to = owner_[w];
+      }
+    }
+    if (to == was) return false;
+    std::sort(near.begin(), near.end());
+    near.erase(std::unique(near.begin(), near.end()), near.end());
+    const double before = weight(near);
+    take(v, to);
+    bool is_better = weight(near) < before;
+    for (const std::size_t c : of_[v]) {
+      is_better = is_better && (is_ones(owner_, items_[c]) || is_ones(there_, items_[c]));
+    }
+    if (!is_better) take(v, was);
+    return is_better;
+  }
+  void take(std::size_t v, std::int16_t to) {
+    for (const std::size_t c : of_[v]) count(items_[c], -1);
+    owner_[v] = to;
+    for (const std::size_t c : of_[v]) count(items_[c], 1);
+  }
+
+  std::vector<std::int16_t>& owner_;
+  const std::vector<std::int16_t>& there_;
+  std::vector<Item> items_;
+  std::vector<std::vector<std::size_t>> of_;
+  std::vector<int> across_;  ///< bends of each vertex that cross a line
+};
+
+/// Vertices that these links join, each lot with the worker that has the fewest. Such lots are
 /// small beside the whole, for the ray back from where one ended ends near where that began. -1 for
 /// those that none joins.
-std::vector<std::int16_t> share_internal(const State& s, int workers) {
+std::vector<std::int16_t> share_internal(const State& s, const std::vector<int>& links,
+                                         int workers) {
   const int n = s.vertices.size();
   UnionFind joined(n);
-  for (int c = s.edge_count; c < s.links.size(); ++c) {
+  for (const int c : links) {
     joined.join(s.links.vertices[c][0], s.links.vertices[c][1]);
   }
   std::vector<int> size(n, 0), lots;
@@ -262,10 +348,8 @@ Sections find_sections(const State& s, int most) {
     home.push_back(section[step[v]]);
     seams.push_back(seam[step[v]]);
   }
-  across = share_internal(s, found.count);
-  for (int v = 0; v < n; ++v) {
-    if (across[v] < 0) across[v] = home[v];  // stays there
-  }
+  LineMender(s, home, seams).run();
+  LineMender(s, seams, home).run();
   const auto choice = [&](const auto& vertices) {
     Choice c = {{-1, -1, -1, -1}, {home[vertices[0]], seams[vertices[0]]}};
     std::copy(vertices.begin(), vertices.end(), c.vertices.begin());
@@ -277,31 +361,43 @@ Sections find_sections(const State& s, int most) {
     }
     return c;
   };
-  std::vector<Choice> edges, internal, bends;
+  std::vector<Choice> near, far, bends;
+  std::vector<int> near_links, far_links;  // of edges all are near
   for (int c = 0; c < s.links.size(); ++c) {
-    const auto& v = s.links.vertices[c];
-    if (c < s.edge_count) {
-      edges.push_back(choice(v));
-    } else {
-      internal.push_back({{v[0], v[1], -1, -1}, {across[v[0]], -1}});
-    }
+    const Choice of = choice(s.links.vertices[c]);
+    const bool is_near = of.worker[0] >= 0 || of.worker[1] >= 0;
+    (is_near ? near_links : far_links).push_back(c);
+    if (is_near) near.push_back(of);
+  }
+  across = share_internal(s, far_links, found.count);
+  for (const int c : far_links) {
+    const auto [a, b] = s.links.vertices[c];
+    far.push_back({{a, b, -1, -1}, {across[a], -1}});
+  }
+  for (int v = 0; v < n; ++v) {
+    if (across[v] < 0) across[v] = home[v];  // stays there
   }
   for (const auto& v : s.bends.vertices) bends.push_back(choice(v));
-  std::vector<std::int16_t> edge_pass, internal_pass, bend_pass;
-  int of_edges[2], of_internal[2], of_bends[2];
-  if (!PassFinder(edges, n, found.count).find(edge_pass, of_edges) ||
-      !PassFinder(internal, n, found.count).find(internal_pass, of_internal) ||
+  std::vector<std::int16_t> near_pass, far_pass, bend_pass;
+  int of_near[2], of_far[2], of_bends[2];
+  if (!PassFinder(near, n, found.count).find(near_pass, of_near) ||
+      !PassFinder(far, n, found.count).find(far_pass, of_far) ||
       !PassFinder(bends, n, found.count).find(bend_pass, of_bends)) {
     return none;
   }
   int* first = found.first;
-  const int lengths[5] = {of_edges[0], of_internal[0], of_edges[1], of_bends[1], of_bends[0]};
+  const int lengths[5] = {of_near[0], of_far[0], of_near[1], of_bends[1], of_bends[0]};
   std::partial_sum(lengths, lengths + 5, first + 1);
   const auto number = [](int pass, int at_home, int at_seam) {
     return static_cast<std::int16_t>(pass / 2 + (pass % 2 == 0 ? at_home : at_seam));
   };
-  for (const int p : edge_pass) found.link_pass.push_back(number(p, first[0], first[2]));
-  for (const int p : internal_pass) found.link_pass.push_back(number(p, first[1], 0));
+  found.link_pass.resize(s.links.size());
+  for (std::size_t k = 0; k < near.size(); ++k) {
+    found.link_pass[near_links[k]] = number(near_pass[k], first[0], first[2]);
+  }
+  for (std::size_t k = 0; k < far.size(); ++k) {
+    found.link_pass[far_links[k]] = number(far_pass[k], first[1], 0);
+  }
   for (const int p : bend_pass) found.bend_pass.push_back(number(p, first[4], first[3]));
   return found;
 }

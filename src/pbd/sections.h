@@ -10,12 +10,12 @@
 namespace tissue_sim {
 namespace pbd {
 
-/// What a worker has in its hands. kHome: a section. kAcross: what internal links join; they lead
-/// from one section to any other. kSeam: from the middle of a section to that of the next.
+/// What a worker has in its hands. kHome: a section. kAcross: what internal links join that lead far
+/// from one section to another. kSeam: from the middle of a section to that of the next.
 enum class Phase { kHome, kAcross, kSeam };
 constexpr int kPhases = 3;
 
-/// A sweep takes links, then bends, as any does: edges at home, internal links, edges and bends of
+/// A sweep takes links, then bends, as any does: links at home, links across, links and bends of
 /// seams, bends at home. In a phase a worker's constraints share no vertex with another's.
 struct Sections {
   int count = 0;                            ///< of workers; 0 where a surface has no two sections
@@ -23,7 +23,7 @@ struct Sections {
   /// Of each constraint: when. Constraints of a worker's pass share no vertex. Bends go on counting
   /// where links end.
   std::vector<std::int16_t> link_pass, bend_pass;
-  /// First pass of home edges, internal links, seam edges, seam bends, home bends; and their number.
+  /// First pass of links at home, across, of seams, of seams' bends, of bends at home; their number.
   int first[6] = {};
 
   Phase phase_of(int pass) const {

@@ -217,11 +217,11 @@ void choose(Tissue& tissue, Way way) {
   if (auto* on_gpu = dynamic_cast<CudaPbdTissue*>(&tissue)) on_gpu->set_way(way);
 }
 
-void press_frame(Simulation& simulation, int frame) {
+void press_frame(Simulation& simulation, int frame, bool is_cut = true) {
   const Quat down(Eigen::AngleAxisd(M_PI, Vec3::UnitX()));
   const double depth = 0.0004 * std::min(frame, 12 - frame);
   simulation.set_tool(0, {Vec3(0.012 + 0.0002 * frame, 0.012, 0.0125 - depth), down});
-  if (frame == 4) simulation.cut(upright_blade({Vec3(0.027, -0.1, 0), Vec3(0.027, 0.1, 0)}));
+  if (is_cut && frame == 4) simulation.cut(upright_blade({Vec3(0.027, -0.1, 0), Vec3(0.027, 0.1, 0)}));
 }
 
 Scene pressed_slab(const Model& model, Device device, int iterations = 1) {
@@ -236,17 +236,17 @@ Scene pressed_slab(const Model& model, Device device, int iterations = 1) {
 }
 
 /// On the ground a probe presses and drags, a blade cuts, the probe leaves.
-Pressed press(const Scene& scene, Way way) {
+Pressed press(const Scene& scene, Way way, bool is_cut = true) {
   Simulation simulation(scene);
   choose(simulation.tissue(), way);
   Pressed run;
   for (int frame = 0; frame < 12; ++frame) {
-    press_frame(simulation, frame);
+    press_frame(simulation, frame, is_cut);
     const FrameReport report = simulation.advance_frame();
     EXPECT_FALSE(report.result.blew_up);
     run.force = std::max(run.force, report.result.loads[0].mean.force.norm());
     run.moment = std::max(run.moment, report.result.loads[0].mean.torque.norm());
-    if (frame == 4) {
+    if (is_cut && frame == 4) {
       EXPECT_EQ(report.result.cut_reports[0].new_fragments.size(), 1u);
     }
   }
@@ -262,7 +262,7 @@ TEST_F(PbdOnGpu, PressedAndCutItMovesAsOnTheCpu) {
   for (const Model& model : kModels) {
     const Pressed cpu = press(pressed_slab(model, Device::kCpu), Way::kFaster);
     EXPECT_GT(cpu.force, 1e-2);
-    for (const Way way : ways(model)) {
+    for (const Way way : {Way::kLaunches, Way::kOneBlock}) {
       const Pressed gpu = press(pressed_slab(model, Device::kCuda), way);
       ASSERT_EQ(cpu.places.size(), gpu.places.size());
       double worst = 0;
@@ -275,6 +275,21 @@ TEST_F(PbdOnGpu, PressedAndCutItMovesAsOnTheCpu) {
       EXPECT_NEAR(gpu.moment, cpu.moment, 2e-3 * cpu.moment + 1e-6) << model.name;
     }
   }
+}
+
+/// In another order of Gauss-Seidel (on a CPU alike: 1.7e-5 m, 1.1 % of the force). Cut tissue is
+/// not taken so, and what moved a little otherwise is cut elsewhere.
+TEST_F(PbdOnGpu, PressedInSectionsItMovesLikeOnTheCpu) {
+  const Pressed cpu = press(pressed_slab(kModels[0], Device::kCpu), Way::kFaster, false);
+  const Pressed gpu = press(pressed_slab(kModels[0], Device::kCuda), Way::kSections, false);
+  ASSERT_EQ(cpu.places.size(), gpu.places.size());
+  double worst = 0;
+  for (std::size_t i = 0; i < cpu.places.size(); ++i) {
+    worst = std::max(worst, (cpu.places[i] - gpu.places[i]).norm());
+  }
+  EXPECT_LT(worst, 5e-5) << "of 2.4 mm that it was pressed";
+  EXPECT_NEAR(gpu.force, cpu.force, 0.03 * cpu.force);
+  EXPECT_NEAR(gpu.moment, cpu.moment, 0.03 * cpu.moment + 1e-6);
 }
 
 TEST_F(PbdOnGpu, TheSameBitsRunAfterRun) {

@@ -2,8 +2,6 @@
 // each has its constraints and places in its shared memory, and writes what another one needs next
 // into that one's. So blocks wait for one another three times a step, not at each colour, and what
 // a thread waits for between passes is its own block.
-#include <cstdlib>
-
 #include "pbd/cuda/block_of_threads.h"
 #include "pbd/cuda/cluster.h"
 
@@ -11,7 +9,7 @@ namespace tissue_sim {
 namespace pbd {
 namespace {
 
-constexpr int kThreads = 256;
+constexpr int kThreads = 384;
 constexpr std::size_t kMailboxes = 32;  ///< bytes at most
 
 /// Shared memory of a block: all places, of which it keeps up those that are its in a phase; its
@@ -70,7 +68,6 @@ __device__ __forceinline__ void project_passes(const std::int32_t* begin, int fi
   }
 }
 
-template <bool kAsync>
 __global__ void __launch_bounds__(kThreads, 1)
     pbd_section_steps([[maybe_unused]] CudaPbdField f, [[maybe_unused]] CudaPbdFrame frame,
                       [[maybe_unused]] int steps, [[maybe_unused]] CudaPbdSections sections,
@@ -122,7 +119,6 @@ __global__ void __launch_bounds__(kThreads, 1)
       box.send(places[vertex], places + vertex, words[i] >> 16);
     }
     box.wait(s);
-    if (!kAsync) wait_for_cluster();
   };
   const int* first = sections.first;
   const StepNumbers& step = frame.step;
@@ -196,12 +192,11 @@ void launch_pbd_section_steps([[maybe_unused]] const CudaPbdField& field,
   config.stream = stream;
   config.attrs = &of_cluster;
   config.numAttrs = 1;
-  const auto kernel = std::getenv("PBD_SYNC") != nullptr ? pbd_section_steps<false> : pbd_section_steps<true>;
-  check_cuda(cudaFuncSetAttribute(kernel, cudaFuncAttributeMaxDynamicSharedMemorySize,
+  check_cuda(cudaFuncSetAttribute(pbd_section_steps, cudaFuncAttributeMaxDynamicSharedMemorySize,
                                   static_cast<int>(config.dynamicSmemBytes)),
              "set shared memory apart");
   check_cuda(
-      cudaLaunchKernelEx(&config, kernel, field, frame, steps, sections, exchange),
+      cudaLaunchKernelEx(&config, pbd_section_steps, field, frame, steps, sections, exchange),
       "take the steps of a frame");
 #endif
 }

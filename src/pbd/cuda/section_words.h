@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "pbd/cuda/device_state.h"
+#include "pbd/cuda/spread_banks.h"
 #include "pbd/sections.h"
 
 namespace tissue_sim {
@@ -69,9 +70,13 @@ inline SectionWords section_words(const State& s, const Sections& sections) {
     result.words.resize((result.words.size() + 3) / 4 * 4, 0);
     section.items = here();
     for (int p = 0; p < passes; ++p) {
-      for (const SectionItem& item : items[b * passes + p]) {
+      const std::vector<SectionItem>& of = items[b * passes + p];
+      const auto vertex = [&](int k, int i) { return of[k].vertex[i]; };
+      const auto count_of = static_cast<std::int32_t>(of.size());
+      for (const std::int32_t k : p < sections.first[3] ? spread_order<2>(count_of, vertex)
+                                                        : spread_order<4>(count_of, vertex)) {
         std::int32_t four[4];
-        std::memcpy(four, &item, sizeof four);
+        std::memcpy(four, &of[k], sizeof four);
         result.words.insert(result.words.end(), four, four + 4);
       }
     }

@@ -59,8 +59,8 @@ struct InnerFace {
   bool is_cut;
 };
 
-/// What an instrument's blade swept in a piece that it left whole: with what it sweeps next the piece
-/// is cut along all of it.
+/// What an instrument's blade swept in a piece that it left whole: with what it sweeps next the
+/// piece is cut along all of it.
 struct LeftWhole {
   BladePath path;
   std::int32_t vertex;  ///< one of the piece
@@ -121,7 +121,10 @@ struct State {
   std::vector<std::uint8_t> pushed;  ///< of each vertex: whether a collider pushed it in this frame
 
   explicit State(const Scene& s)
-      : scene(s), cpu(s.threads), fronts(s.tools.size() + 1), starts(s.tools.size() + 1),
+      : scene(s),
+        cpu(s.threads),
+        fronts(s.tools.size() + 1),
+        starts(s.tools.size() + 1),
         left_whole(s.tools.size()) {}
 };
 

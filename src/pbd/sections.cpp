@@ -82,8 +82,9 @@ int part_steps(const std::vector<std::int32_t>& step, int steps, int most,
 std::vector<std::int16_t> find_seams(const std::vector<std::int16_t>& section, int sections) {
   std::vector<std::int16_t> seam(section.size());
   for (std::size_t k = 0; k < section.size();) {
-    const auto begin = k, end = static_cast<std::size_t>(
-        std::upper_bound(section.begin(), section.end(), section[k]) - section.begin());
+    const auto begin = k,
+               end = static_cast<std::size_t>(
+                   std::upper_bound(section.begin(), section.end(), section[k]) - section.begin());
     for (; k < end; ++k) {
       const bool before = section[k] + 1 == sections || (section[k] > 0 && 2 * k < begin + end);
       seam[k] = static_cast<std::int16_t>(section[k] - (before ? 1 : 0));

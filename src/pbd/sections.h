@@ -10,20 +10,21 @@
 namespace tissue_sim {
 namespace pbd {
 
-/// What a worker has in its hands. kHome: a section. kAcross: what internal links join that lead far
-/// from one section to another. kSeam: from the middle of a section to that of the next.
+/// What a worker has in its hands. kHome: a section. kAcross: what internal links join that lead
+/// far from one section to another. kSeam: from the middle of a section to that of the next.
 enum class Phase { kHome, kAcross, kSeam };
 constexpr int kPhases = 3;
 
 /// A sweep takes links, then bends, as any does: links at home, links across, links and bends of
 /// seams, bends at home. In a phase a worker's constraints share no vertex with another's.
 struct Sections {
-  int count = 0;                            ///< of workers; 0 where a surface has no two sections
+  int count = 0;                             ///< of workers; 0 where a surface has no two sections
   std::vector<std::int16_t> owner[kPhases];  ///< of each vertex, in each phase
   /// Of each constraint: when. Constraints of a worker's pass share no vertex. Bends go on counting
   /// where links end.
   std::vector<std::int16_t> link_pass, bend_pass;
-  /// First pass of links at home, across, of seams, of seams' bends, of bends at home; their number.
+  /// First pass of links at home, across, of seams, of seams' bends, of bends at home; their
+  /// number.
   int first[6] = {};
 
   Phase phase_of(int pass) const {

@@ -278,8 +278,7 @@ class SoundCut {
 
 bool rests(const BladePath& path) {
   const Pose &first = path.poses.front(), &last = path.poses.back();
-  return first.position == last.position &&
-         first.orientation.coeffs() == last.orientation.coeffs();
+  return first.position == last.position && first.orientation.coeffs() == last.orientation.coeffs();
 }
 
 /// Square to the blade's first way and its edge.

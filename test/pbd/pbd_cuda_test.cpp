@@ -221,7 +221,8 @@ void press_frame(Simulation& simulation, int frame, bool is_cut = true) {
   const Quat down(Eigen::AngleAxisd(M_PI, Vec3::UnitX()));
   const double depth = 0.0004 * std::min(frame, 12 - frame);
   simulation.set_tool(0, {Vec3(0.012 + 0.0002 * frame, 0.012, 0.0125 - depth), down});
-  if (is_cut && frame == 4) simulation.cut(upright_blade({Vec3(0.027, -0.1, 0), Vec3(0.027, 0.1, 0)}));
+  if (is_cut && frame == 4)
+    simulation.cut(upright_blade({Vec3(0.027, -0.1, 0), Vec3(0.027, 0.1, 0)}));
 }
 
 Scene pressed_slab(const Model& model, Device device, int iterations = 1) {

@@ -40,10 +40,10 @@ struct Mailbox {
   }
   /// By one thread, once for each time that all wait.
   __device__ __forceinline__ void expect(int bytes) {
-    asm volatile("mbarrier.arrive.expect_tx.shared::cta.b64 _, [%0], %1;" ::"r"(
-                     shared_address(&barrier)),
-                 "r"(bytes)
-                 : "memory");
+    asm volatile(
+        "mbarrier.arrive.expect_tx.shared::cta.b64 _, [%0], %1;" ::"r"(shared_address(&barrier)),
+        "r"(bytes)
+        : "memory");
   }
   /// Writes `value` to the same place of another block, whose mailbox counts it.
   __device__ __forceinline__ void send(const float4& value, const float4* place, int block) {

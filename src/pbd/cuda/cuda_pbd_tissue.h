@@ -32,12 +32,12 @@ class CudaPbdTissue final : public PbdTissue {
 
   // For tests and the benchmark.
   void pull() override;
-  void push();        ///< motion to the GPU
-  void push_all();    ///< and constraints, after a change of them
+  void push();      ///< motion to the GPU
+  void push_all();  ///< and constraints, after a change of them
   /// Throws std::runtime_error where that is not possible. Sections, which a cut may end, are given
   /// up then.
   void set_way(Way);
-  Way way() const;    ///< one of the three
+  Way way() const;  ///< one of the three
   /// As pbd::project_constraints() without multipliers, so many times; only enqueues.
   void project(float h, int times = 1);
   void wait();
@@ -54,7 +54,7 @@ class CudaPbdTissue final : public PbdTissue {
   void upload_chunks();
   void choose_way();
   Way faster_way() const;
-  void upload_sections();  ///< leaves none where steps cannot be taken so
+  void upload_sections();               ///< leaves none where steps cannot be taken so
   int upload_touches(double duration);  ///< returns their colours
   void upload_frame(const FrameColliders& colliders, int steps, const pbd::CudaPbdFrame& frame);
   void take_loads(const FrameColliders& colliders, int steps);

@@ -36,8 +36,8 @@ void CudaPbdTissue::upload_sections() {
   d.sections.upload(words.of, d.stream);
   d.section_words.upload(words.words, d.stream);
   d.wait("receive data");
-  d.in_sections = {d.sections.data(), d.section_words.data(), sections.count, words.most_words,
-                   words.most_own,    {}};
+  d.in_sections = {d.sections.data(), d.section_words.data(), sections.count,
+                   words.most_words,  words.most_own,         {}};
   std::copy_n(sections.first, 6, d.in_sections.first);
   const int colliders = s.scene.pbd.steps * collider_count(s.scene);
   if (!pbd::fits_pbd_sections(d.field(), d.in_sections, colliders)) d.in_sections = {};

@@ -105,8 +105,8 @@ struct CudaPbdExchange {
 /// begin among its constraints.
 struct CudaPbdSection {
   std::int32_t begin, words;
-  std::int32_t own;          ///< vertices of the section
-  std::int32_t moves[4];     ///< after each phase: vertex, and 2^16 times the block that has it next
+  std::int32_t own;       ///< vertices of the section
+  std::int32_t moves[4];  ///< after each phase: vertex, and 2^16 times the block that has it next
   std::int32_t incoming[3];  ///< how many come to it then
   std::int32_t items;        ///< constraints
 };

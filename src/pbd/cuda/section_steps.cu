@@ -167,8 +167,7 @@ int most_pbd_sections() {
 #endif
 }
 
-bool fits_pbd_sections(const CudaPbdField& field, const CudaPbdSections& sections,
-                       int colliders) {
+bool fits_pbd_sections(const CudaPbdField& field, const CudaPbdSections& sections, int colliders) {
   const Layout layout = {field.count, sections.most_words, sections.most_own};
   return field.count < 1 << 16 && layout.bytes(colliders) + kMailboxes <= most_shared_bytes();
 }

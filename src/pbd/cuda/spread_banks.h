@@ -15,9 +15,9 @@ namespace pbd {
 /// gives the same bits.
 inline constexpr int kBanks = 8;
 
-/// An order of `count` constraints, of which vertex(k, i) is the i-th of kVertices vertices, in which
-/// eight that follow one another rarely meet: greedy, among the next kAhead. Random order takes 2.7
-/// turns for a vertex.
+/// An order of `count` constraints, of which vertex(k, i) is the i-th of kVertices vertices, in
+/// which eight that follow one another rarely meet: greedy, among the next kAhead. Random order
+/// takes 2.7 turns for a vertex.
 template <int kVertices, class F>
 std::vector<std::int32_t> spread_order(std::int32_t count, const F& vertex) {
   constexpr int kAhead = 48;

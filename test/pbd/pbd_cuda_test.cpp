@@ -213,8 +213,17 @@ struct Pressed {
   std::uint64_t checksum = 0;
 };
 
+/// A CPU's tissue is given the order that constraints have in sections.
 void choose(Tissue& tissue, Way way) {
-  if (auto* on_gpu = dynamic_cast<CudaPbdTissue*>(&tissue)) on_gpu->set_way(way);
+  if (auto* on_gpu = dynamic_cast<CudaPbdTissue*>(&tissue)) {
+    on_gpu->set_way(way);
+  } else if (way == Way::kSections) {
+    pbd::State& s = dynamic_cast<PbdTissue&>(tissue).state();
+    const pbd::Sections sections = pbd::find_sections(s, 8);
+    s.links.colour = sections.link_pass;
+    s.bends.colour = sections.bend_pass;
+    pbd::pack(s);
+  }
 }
 
 void press_frame(Simulation& simulation, int frame, bool is_cut = true) {
@@ -278,19 +287,19 @@ TEST_F(PbdOnGpu, PressedAndCutItMovesAsOnTheCpu) {
   }
 }
 
-/// In another order of Gauss-Seidel (on a CPU alike: 1.7e-5 m, 1.1 % of the force). Cut tissue is
-/// not taken so, and what moved a little otherwise is cut elsewhere.
-TEST_F(PbdOnGpu, PressedInSectionsItMovesLikeOnTheCpu) {
-  const Pressed cpu = press(pressed_slab(kModels[0], Device::kCpu), Way::kFaster, false);
+/// Without a cut, which ends sections. In the order that a CPU has, places are 1.7e-5 m apart,
+/// forces 1 %, moments 6 % (two runs on a CPU).
+TEST_F(PbdOnGpu, PressedInSectionsItMovesAsOnTheCpuInTheirOrder) {
+  const Pressed cpu = press(pressed_slab(kModels[0], Device::kCpu), Way::kSections, false);
   const Pressed gpu = press(pressed_slab(kModels[0], Device::kCuda), Way::kSections, false);
   ASSERT_EQ(cpu.places.size(), gpu.places.size());
   double worst = 0;
   for (std::size_t i = 0; i < cpu.places.size(); ++i) {
     worst = std::max(worst, (cpu.places[i] - gpu.places[i]).norm());
   }
-  EXPECT_LT(worst, 5e-5) << "of 2.4 mm that it was pressed";
-  EXPECT_NEAR(gpu.force, cpu.force, 0.03 * cpu.force);
-  EXPECT_NEAR(gpu.moment, cpu.moment, 0.03 * cpu.moment + 1e-6);
+  EXPECT_LT(worst, 2e-5) << "of 2.4 mm that it was pressed";
+  EXPECT_NEAR(gpu.force, cpu.force, 2e-3 * cpu.force);
+  EXPECT_NEAR(gpu.moment, cpu.moment, 2e-3 * cpu.moment + 1e-6);
 }
 
 TEST_F(PbdOnGpu, TheSameBitsRunAfterRun) {

@@ -73,7 +73,7 @@ struct Distance {
     const V length = root(dot(d, d) + kTiny);
     // One division, for it takes a quarter of the time.
     const V scale =
-        (number[0] - length - a * lambda[0]) / ((v[0].w + v[1].w + a + 1e-20f) * length);
+        quotient(number[0] - length - a * lambda[0], (v[0].w + v[1].w + a + 1e-20f) * length);
     lambda[0] += scale * length;
     move(v[0], -scale, d);
     move(v[1], scale, d);
@@ -104,10 +104,10 @@ struct Bending {
   /// An angle's excess over another one, within half a turn.
   template <class V>
   static TISSUE_SIM_INLINE V excess(V angle, V rest) {
-    constexpr float kPi = 3.14159265359f;
-    V d = angle - rest;
-    d = where_negative(kPi - d, d - 2 * kPi, d);
-    return where_negative(d + kPi, d + 2 * kPi, d);
+    const V d = angle - rest;
+    // Whole turns: what a float of that size has no room for is rounded off.
+    const V turns = (d * 0.159154943092f + 12582912.0f) - 12582912.0f;
+    return d - 6.28318530718f * turns;
   }
   /// number: angle at rest [rad], compliance [rad/(N m)]. Returns C [rad].
   template <class V>
@@ -128,9 +128,9 @@ struct Bending {
     // constraint counts for less, for a part of it alone would turn what it belongs to.
     const V least = 1e-3f * p.length * p.length * p.length * p.length + kTiny;
     const V one = dot(p.n0, p.n0) + kTiny, other = dot(p.n1, p.n1) + kTiny;
-    const V share = lesser(lesser(one, other), least) / least;
-    const Vector<V> m0 = (share / (p.length * one)) * p.n0,
-                    m1 = (share / (p.length * other)) * p.n1;
+    const V share = quotient(lesser(lesser(one, other), least), least);
+    const Vector<V> m0 = quotient(share, p.length * one) * p.n0,
+                    m1 = quotient(share, p.length * other) * p.n1;
     const V e2 = p.length * p.length;
     const V s0 = dot(between(v[0], v[3]), p.e), s1 = dot(between(v[1], v[3]), p.e);
     const V t0 = dot(between(v[0], v[2]), p.e), t1 = dot(between(v[1], v[2]), p.e);
@@ -140,7 +140,7 @@ struct Bending {
     const V sum =
         v[0].w * dot(g0, g0) + v[1].w * dot(g1, g1) + v[2].w * dot(g2, g2) + v[3].w * dot(g3, g3);
     const V c = share * excess(p.angle, number[0]);
-    const V change = -(c + a * lambda[0]) / (sum + a + kTiny);
+    const V change = quotient(-(c + a * lambda[0]), sum + a + kTiny);
     lambda[0] += change;
     move(v[0], change, g0);
     move(v[1], change, g1);

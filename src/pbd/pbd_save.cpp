@@ -29,11 +29,16 @@ void fields(Archive& archive, InnerFace& f) {
 }
 
 template <class Archive>
+void fields(Archive& archive, LeftWhole& l) {
+  archive(l.path, l.vertex);
+}
+
+template <class Archive>
 void fields(Archive& archive, State& s) {
   archive(s.vertices, s.triangles, s.tetrahedra, s.internal, s.half_depth, s.links, s.edge_count,
           s.bends, s.strains, s.elastics, s.volume_of_body, s.stroke, s.copy_of, s.blade_normal,
           s.blade_point, s.cut_edges, s.faces, s.mean_edge, s.wounds, s.fronts, s.starts,
-          s.centres);
+          s.centres, s.left_whole);
 }
 
 }  // namespace pbd

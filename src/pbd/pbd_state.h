@@ -15,6 +15,7 @@
 #include "pbd/motion.h"
 #include "pbd/project.h"
 #include "pbd/touch.h"
+#include "tissue_sim/cut.h"
 #include "tissue_sim/scene.h"
 #include "tools/collider.h"
 
@@ -58,6 +59,13 @@ struct InnerFace {
   bool is_cut;
 };
 
+/// What an instrument's blade swept in a piece that it left whole: with what it sweeps next the
+/// piece is cut along all of it.
+struct LeftWhole {
+  BladePath path;
+  std::int32_t vertex;  ///< one of the piece
+};
+
 struct State {
   Scene scene;
   Cpu cpu;
@@ -89,6 +97,7 @@ struct State {
   /// Of the line that each tool's blade cuts, and of one that a whole path does: the vertices where
   /// it ends now, and those where it began.
   std::vector<std::set<std::int32_t>> fronts, starts;
+  std::vector<std::vector<LeftWhole>> left_whole;  ///< by each tool's blade, in the last frame
   /// What blades swept, in reference space: edges (a, b) at the beginning and at the end of a part.
   std::vector<std::array<Vec3, 4>> wounds;
   std::vector<std::int32_t> bare;  ///< vertices that a cut took the internal constraints of
@@ -112,7 +121,11 @@ struct State {
   std::vector<std::uint8_t> pushed;  ///< of each vertex: whether a collider pushed it in this frame
 
   explicit State(const Scene& s)
-      : scene(s), cpu(s.threads), fronts(s.tools.size() + 1), starts(s.tools.size() + 1) {}
+      : scene(s),
+        cpu(s.threads),
+        fronts(s.tools.size() + 1),
+        starts(s.tools.size() + 1),
+        left_whole(s.tools.size()) {}
 };
 
 /// Adds a vertex at rest; mass and volume come later. Returns its index.

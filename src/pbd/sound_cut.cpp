@@ -14,6 +14,8 @@ namespace {
 
 /// How far aside a cut is tried again [mean edges].
 constexpr double kAside[] = {0, 0.1, -0.1};
+/// For how long an instrument's cut is tried again [poses]; tissue moves meanwhile.
+constexpr std::size_t kMostPoses = 16;
 
 /// All of a surface model that a cut changes before constraints are made anew.
 struct Mesh {
@@ -119,6 +121,17 @@ class SoundCut {
     }
   }
 
+  /// Cuts the piece that has this vertex alone.
+  void take_only(std::int32_t vertex) {
+    const std::int32_t piece = piece_[vertex];
+    const bool is_open = open_.count(piece) != 0;
+    open_.clear();
+    small_.clear();
+    if (is_open) open_.insert(piece);
+  }
+  /// Does not cut it.
+  void leave_out(std::int32_t vertex) { open_.erase(piece_[vertex]); }
+
   /// Cuts the pieces that are left but for those that this would make unsound, which are left then.
   bool run(const BladePath& path, const Array<float>& before, int stroke, CutReport& report) {
     std::set<std::int32_t> later;
@@ -152,6 +165,11 @@ class SoundCut {
   }
 
   bool is_done() const { return open_.empty(); }
+
+  /// Remembers pieces that were left whole.
+  void remember(const BladePath& path, std::vector<LeftWhole>& left_whole) const {
+    for (const std::int32_t piece : open_) left_whole.push_back({path, before_.at(piece).vertex});
+  }
 
   /// Small pieces that the blade passes stay whole: what they are.
   void meet_small(const Array<float>& before, const std::vector<SweepPart>& parts) {
@@ -258,6 +276,11 @@ class SoundCut {
   std::map<std::int32_t, Unsound> why_;
 };
 
+bool rests(const BladePath& path) {
+  const Pose &first = path.poses.front(), &last = path.poses.back();
+  return first.position == last.position && first.orientation.coeffs() == last.orientation.coeffs();
+}
+
 /// Square to the blade's first way and its edge.
 Vec3 aside(const BladePath& path) {
   const Pose &first = path.poses.front(), &last = path.poses.back();
@@ -269,18 +292,55 @@ Vec3 aside(const BladePath& path) {
 
 bool cut_soundly(State& s, const BladePath& path, const Array<float>& before, int stroke,
                  std::vector<std::int32_t>& origin, CutReport& report) {
-  const std::vector<SweepPart> parts = sweep_parts(path);
-  if (!may_meet(s, before, parts)) return false;
-  SoundCut cut(s, origin);
-  cut.meet_small(before, parts);
+  const bool is_tools = stroke < static_cast<int>(s.left_whole.size());
+  std::vector<LeftWhole> again, later;
+  if (is_tools && !rests(path)) again.swap(s.left_whole[stroke]);
+  const Vec3 begin = path.poses.front().position;
+  again.erase(std::remove_if(again.begin(), again.end(),
+                             [&](const LeftWhole& l) {  // the blade was taken away
+                               return (l.path.poses.back().position - begin).norm() > 1e-9;
+                             }),
+              again.end());
+  const auto run = [&](SoundCut& cut, const BladePath& along) {
+    bool any = false;
+    for (const double far : kAside) {
+      BladePath moved = along;
+      for (Pose& pose : moved.poses) pose.position += far * s.mean_edge * aside(along);
+      any = cut.run(moved, before, stroke, report) || any;
+      if (cut.is_done()) break;
+    }
+    return any;
+  };
+  const auto leave = [&](const SoundCut& cut, const BladePath& along) {
+    cut.tell(report);
+    if (is_tools && along.poses.size() < kMostPoses) cut.remember(along, later);
+  };
   bool changed = false;
-  for (const double far : kAside) {
-    BladePath moved = path;
-    for (Pose& pose : moved.poses) pose.position += far * s.mean_edge * aside(path);
-    changed = cut.run(moved, before, stroke, report) || changed;
-    if (cut.is_done()) break;
+  const std::vector<SweepPart> parts = sweep_parts(path);
+  if (may_meet(s, before, parts)) {
+    SoundCut cut(s, origin);
+    for (const LeftWhole& l : again) cut.leave_out(l.vertex);
+    cut.meet_small(before, parts);
+    changed = run(cut, path);
+    leave(cut, path);
   }
-  cut.tell(report);
+  for (const LeftWhole& l : again) {
+    BladePath longer = l.path;
+    longer.poses.insert(longer.poses.end(), path.poses.begin() + 1, path.poses.end());
+    SoundCut cut(s, origin);
+    cut.take_only(l.vertex);
+    changed = run(cut, longer) || changed;
+    if (cut.is_done()) continue;
+    SoundCut here(s, origin);  // at least what the blade sweeps now
+    here.take_only(l.vertex);
+    if (run(here, path)) {
+      changed = true;
+      here.tell(report);
+    } else {
+      leave(cut, longer);
+    }
+  }
+  if (is_tools && !rests(path)) s.left_whole[stroke].swap(later);
   return changed;
 }
 

@@ -25,7 +25,9 @@ struct SoundMesh {
 /// Cuts the surface model along a whole path, closes wounds and shares out masses (cut_surface(),
 /// after_cut()). What it would make unsound stays as it was: piece by piece the cut is taken back,
 /// tried again a tenth of an edge aside, which is below what the mesh resolves, and left out where
-/// that helps nothing. Vertices do not move from `before`. Returns whether anything changed.
+/// that helps nothing. What a tool's blade left whole is tried again in the next frame, along with
+/// what the blade sweeps then. Vertices do not move from `before`. Returns whether anything
+/// changed.
 bool cut_soundly(State& s, const BladePath& path, const Array<float>& before, int stroke,
                  std::vector<std::int32_t>& origin, CutReport& report);
 

@@ -14,6 +14,7 @@
 #include "pbd/pbd_pieces.h"
 #include "pbd/pbd_tissue.h"
 #include "tissue_sim/simulation.h"
+#include "tools/tool_motion.h"
 
 namespace tissue_sim {
 namespace {
@@ -268,6 +269,35 @@ TEST(SoundCuts, AnInstrumentsStrokesLeaveNoSlivers) {
     EXPECT_NEAR(whole_volume(tissue) / volume, 1, 0.01) << "stroke " << k;
   }
   EXPECT_GE(tissue.fragments().size(), 2u);  // the second stroke runs along the first one's wall
+}
+
+// As if the first half of the stroke had been left whole: with the second half the blade cuts both.
+TEST(SoundCuts, WhatAnInstrumentLeftWholeIsCutWithWhatItSweepsNext) {
+  for (const bool is_kept : {true, false}) {
+    Scene scene = lobe(PbdModel::kSurface);
+    scene.tools.resize(1);
+    scene.tools[0].type = ToolType::kScalpel;
+    scene.tools[0].blade_length = 0.09;
+    scene.bodies[0].anchors.resize(1);
+    scene.bodies[0].anchors[0].z = 1;
+    Simulation simulation(scene);
+    const Quat along_y(Eigen::AngleAxisd(std::acos(-1) / 2, Vec3::UnitZ()));
+    const auto at = [&](double y) { return Pose{Vec3(0.01, y, 0.045), along_y}; };
+    simulation.set_tool(0, at(0.001));
+    simulation.advance_frame();  // there it is, and sweeps nothing
+    auto& tissue = dynamic_cast<PbdTissue&>(simulation.tissue());
+    ToolMotion first;
+    first.present = true;
+    first.begin = at(-0.045);
+    first.end = at(is_kept ? 0.001 : 0.002);  // where the blade does not go on
+    tissue.state().left_whole[0] = {{blade_path(scene.tools[0], first), 0}};
+    simulation.set_tool(0, at(0.045));
+    const CutReport report = simulation.advance_frame().result.blade_report;
+    EXPECT_GT(report.bonds_broken, 0);
+    EXPECT_EQ(report.pieces_left_whole, 0) << report.why_left_whole;
+    EXPECT_EQ(tissue.fragments().size(), is_kept ? 2u : 1u);
+    EXPECT_TRUE(tissue.state().left_whole[0].empty());
+  }
 }
 
 // Two triangles that lie on one another have nothing between them that resists bending: such

@@ -24,7 +24,7 @@ void CudaPbdTissue::upload_chunks() {
     d.component_mass[c] += s.vertices.mass[i];
     if (s.vertices.anchored[i] != 0) is_free[c] = false;
   }
-  const int most = d.way == Way::kOneBlock ? kChunkOfWarp : kChunk;
+  const int most = d.way == Way::kLaunches ? kChunk : kChunkOfWarp;
   std::vector<std::int32_t> order;
   std::vector<pbd::CudaPbdChunk> chunks;
   d.component_of_chunk.clear();
@@ -100,7 +100,7 @@ void CudaPbdTissue::keep_momentum(int steps, float h) {
     }
   }
   if (!any) return;
-  const bool few = d.way == Way::kOneBlock;
+  const bool few = d.way != Way::kLaunches;
   if (!few) d.changes.upload(packed, changes.size(), d.stream);
   launch_pbd_changes(d.field(), d.component.data(), few ? packed : d.changes.data(), d.stream);
 }

@@ -20,17 +20,6 @@ pbd::CudaPbdColours colours(const pbd::State& s) {
   return {s.elastics.begin, s.strains.begin, s.links.begin, s.bends.begin};
 }
 
-/// Time that one block of threads takes for all colours once [us]: `colour` for each colour, and
-/// `round` for each time that its threads have a constraint each.
-double time_of(const std::vector<std::int32_t>& begin, int threads, double colour, double round) {
-  double sum = 0;
-  for (std::size_t c = 0; c + 1 < begin.size(); ++c) {
-    const int lanes = (begin[c + 1] - begin[c]) * pbd::kLanes;
-    sum += colour + round * ((lanes + threads - 1) / threads);
-  }
-  return sum;
-}
-
 }  // namespace
 
 CudaPbdTissue::CudaPbdTissue(const Scene& scene, std::vector<std::string> notes)
@@ -96,44 +85,6 @@ void CudaPbdTissue::upload_constraints() {
   d.projections.clear();
 }
 
-void CudaPbdTissue::choose_way() {
-  OnDevice& d = *device_;
-  const Way was = d.way;
-  const pbd::State& s = *state_;
-  const bool fits = pbd::fits_pbd_block(d.field());
-  if (d.wanted != Way::kFaster) {
-    if (d.wanted == Way::kOneBlock && !fits) {
-      throw std::runtime_error("one block of threads has no room for " + std::to_string(d.count) +
-                               " vertices; let the tissue choose");
-    }
-    d.way = d.wanted;
-    if (d.way != was) upload_constraints();  // in another order
-    return;
-  }
-  // On an H100, in us; what a launch takes within a graph is 1.6, of tetrahedra 2.9, and each
-  // further colour that it is of 0.8, of tetrahedra 1.
-  const bool is_surface = s.elastics.blocks.empty() && s.strains.blocks.empty();
-  const int threads = is_surface ? 1024 : 512;
-  const double one_block =
-      time_of(s.elastics.begin, threads, 1.0, 0.6) + time_of(s.strains.begin, threads, 1.3, 0.7) +
-      time_of(s.links.begin, threads, 0.2, 0.2) + time_of(s.bends.begin, threads, 0.3, 0.7);
-  const int count = pbd::pbd_projection_launches(colours(s));
-  const int all = static_cast<int>(s.elastics.begin.size() + s.strains.begin.size() +
-                                   s.links.begin.size() + s.bends.begin.size()) -
-                  4;
-  const double launches =
-      (is_surface ? 1.6 : 2.9) * (3 + count) + (is_surface ? 0.8 : 1.0) * (all - count);
-  d.way = fits && one_block < launches ? Way::kOneBlock : Way::kLaunches;
-  if (d.way != was) upload_constraints();  // in another order
-}
-
-void CudaPbdTissue::set_way(Way way) {
-  device_->wanted = way;
-  choose_way();
-}
-
-CudaPbdTissue::Way CudaPbdTissue::way() const { return device_->way; }
-
 void CudaPbdTissue::pull() {
   OnDevice& d = *device_;
   if (d.host_is_current) return;
@@ -165,7 +116,7 @@ void CudaPbdTissue::upload_frame(const FrameColliders& colliders, int steps,
   d.colliders.resize(d.boxed.size());
   d.loads.resize(d.boxed.size() * pbd::kPbdLoadSums);
   d.host_loads.resize(d.loads.size());
-  if (d.way == Way::kOneBlock) return;  // it fetches them itself
+  if (d.way != Way::kLaunches) return;  // they fetch them themselves
   d.frame.upload(&frame, 1, d.stream);
   d.step.clear(d.stream);
   d.colliders.upload(boxed, d.boxed.size(), d.stream);
@@ -198,10 +149,14 @@ void CudaPbdTissue::run_steps(const FrameColliders& colliders, int steps, float 
   const pbd::CudaPbdField field = d.field();
   const int chunks = static_cast<int>(d.component_of_chunk.size());
   const pbd::CudaPbdFlights flights{d.chunks.data(), chunks, d.order.data()};
-  if (d.way == Way::kOneBlock) {
-    launch_pbd_steps(field, frame, steps,
-                     {d.boxed.data(), d.host_loads.data(), d.host_flights.data(), flights},
-                     d.stream);
+  if (d.way != Way::kLaunches) {
+    const pbd::CudaPbdExchange exchange = {d.boxed.data(), d.host_loads.data(),
+                                           d.host_flights.data(), flights};
+    if (d.way == Way::kSections) {
+      launch_pbd_section_steps(field, frame, steps, d.in_sections, exchange, d.stream);
+    } else {
+      launch_pbd_steps(field, frame, steps, exchange, d.stream);
+    }
   } else {
     launch_pbd_flights(field, flights, d.flights.data(), d.stream);
     if (d.step_graph.is_empty()) {

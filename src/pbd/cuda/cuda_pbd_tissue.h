@@ -17,9 +17,10 @@ class CudaPbdTissue final : public PbdTissue {
  public:
   /// How the steps of a frame are launched.
   enum class Way {
-    kFaster,    ///< of the two below, the one that is thought to be
+    kFaster,    ///< of those below, the one that is thought to be
     kLaunches,  ///< colour by colour, for many constraints
     kOneBlock,  ///< all by one block of threads, for few
+    kSections,  ///< all by a block of threads for each section of one whole surface
   };
 
   /// Throws std::runtime_error where there is no GPU, or not enough memory on it.
@@ -31,10 +32,12 @@ class CudaPbdTissue final : public PbdTissue {
 
   // For tests and the benchmark.
   void pull() override;
-  void push();        ///< motion to the GPU
-  void push_all();    ///< and constraints, after a change of them
-  void set_way(Way);  ///< throws std::runtime_error where vertices are too many for one block
-  Way way() const;    ///< one of the two
+  void push();      ///< motion to the GPU
+  void push_all();  ///< and constraints, after a change of them
+  /// Throws std::runtime_error where that is not possible. Sections, which a cut may end, are given
+  /// up then.
+  void set_way(Way);
+  Way way() const;  ///< one of the three
   /// As pbd::project_constraints() without multipliers, so many times; only enqueues.
   void project(float h, int times = 1);
   void wait();
@@ -50,6 +53,8 @@ class CudaPbdTissue final : public PbdTissue {
   void upload_constraints();
   void upload_chunks();
   void choose_way();
+  Way faster_way() const;
+  void upload_sections();               ///< leaves none where steps cannot be taken so
   int upload_touches(double duration);  ///< returns their colours
   void upload_frame(const FrameColliders& colliders, int steps, const pbd::CudaPbdFrame& frame);
   void take_loads(const FrameColliders& colliders, int steps);

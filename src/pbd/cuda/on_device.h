@@ -54,6 +54,9 @@ struct CudaPbdTissue::OnDevice {
   Set<pbd::Touch> touches;
   bool may_touch = false;
   int sweeps = 1;  ///< of a step
+  DeviceArray<pbd::CudaPbdSection> sections;
+  DeviceArray<std::int32_t> section_words;
+  pbd::CudaPbdSections in_sections;  ///< those; none where the steps are not taken by sections
   Way wanted = Way::kFaster, way = Way::kLaunches;
   CudaGraph step_graph, projections;
 

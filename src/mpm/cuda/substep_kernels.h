@@ -205,8 +205,8 @@ __device__ __forceinline__ void push_nodes(const CudaTables& t, const CudaFrame&
   touch();
 }
 
-/// The front's cells push, as nodes are where the round brought them. Where no thread block waits
-/// for others from the beginning, the last `free` warps of each have a pass each.
+/// The front's cells push, as nodes are where the round brought them. The last `free` warps of each
+/// thread block have a pass each: none where thread blocks without a bundle begin before the others.
 __device__ __forceinline__ void push_front_of(const CudaFrame& f, int round, int free) {
   const bool odd = ((f.current + round) & 1) != 0;
   const unsigned number = (blockDim.x - 1 - threadIdx.x) / 32, owned = gridDim.x * free;

@@ -42,17 +42,23 @@ __device__ __forceinline__ void move_parted(const CudaFrame& f, int bundles, int
   }
 }
 
-/// Works out passes of cells as long as there are any that no warp has. Out of line, for the blocks
-/// to keep their registers.
+/// Works out passes of cells: the warp's own first (`own`, of `owned`, where warps have one each),
+/// then those that no warp has. Out of line, for the blocks to keep their registers.
 inline __device__ __noinline__ void push_front(const CudaFront front, const CudaNodes state,
-                                               unsigned* arrived, int round, long long* sums) {
+                                               unsigned* arrived, int round, unsigned own,
+                                               unsigned owned, long long* sums) {
   const auto tasks = static_cast<unsigned>(front.task_count);
   unsigned* counter = front_turns(arrived, round);
   bool waited = false;
-  for (;;) {
-    unsigned i = tasks;
-    if (threadIdx.x % 32 == 0 && __ldcg(counter) < tasks) i = atomicAdd(counter, 1u);
-    i = __shfl_sync(0xffffffffu, i, 0);
+  for (unsigned i = own;;) {
+    if (FrontWarp::any(i >= owned)) {
+      if (owned >= tasks) return;
+      i = tasks;
+      if (threadIdx.x % 32 == 0 && owned + __ldcg(counter) < tasks) {
+        i = owned + atomicAdd(counter, 1u);
+      }
+      i = __shfl_sync(0xffffffffu, i, 0);
+    }
     if (!FrontWarp::any(i < tasks)) return;
     const int4 task = __ldg(front.tasks + i);
     FrontWarp cell(front, task.x, task.z, task.w);
@@ -66,6 +72,7 @@ inline __device__ __noinline__ void push_front(const CudaFront front, const Cuda
     } else {
       cell.push<FixedCorotated>(task.y, sums);
     }
+    i = owned;
   }
 }
 

@@ -249,10 +249,13 @@ __device__ __forceinline__ void push_nodes(const CudaTables& t, const CudaFrame&
   touch();
 }
 
-/// The front's cells push, as nodes are where the round brought them.
-__device__ __forceinline__ void push_front_of(const CudaFrame& f, int round) {
+/// The front's cells push, as nodes are where the round brought them. The last `free` warps of each
+/// thread block have a pass each: none where thread blocks without a bundle begin before the others.
+__device__ __forceinline__ void push_front_of(const CudaFrame& f, int round, int free) {
   const bool odd = ((f.current + round) & 1) != 0;
+  const unsigned number = (blockDim.x - 1 - threadIdx.x) / 32, owned = gridDim.x * free;
   push_front(f.front, odd ? f.state[1] : f.state[0], f.arrived, round,
+             number * gridDim.x + blockIdx.x, owned,
              f.pushes.force + f.pushes.stride * (round % 3));
 }
 
@@ -287,6 +290,10 @@ __global__ void __launch_bounds__(kMaxCudaThreads, 1)
     if (kFronts) pushers.count -= 32;  // the last warp is there for the front
   }
   const bool for_front = !apart || (idle ? !pushers.has_me() : pushers.me() >= pushers.size());
+  const int warps = static_cast<int>(blockDim.x) / 32;
+  const int free_for_front = apart ? warps - layout.workers / 32
+                             : static_cast<int>(gridDim.x) > t.bundle_count ? 0
+                                                                            : warps;
   unsigned met = 0;
   if (has_faces<kCan>(f) && threadIdx.x == 0) {
     s.rounds->begin(t, *f.faces, f.step.dt);
@@ -340,9 +347,11 @@ __global__ void __launch_bounds__(kMaxCudaThreads, 1)
       }
     }
     if constexpr (kPushes) {
-      if (kFronts && round < f.substeps && for_front) push_front_of(f, round);
+      if (kFronts && round < f.substeps && for_front) push_front_of(f, round, free_for_front);
       if (round < f.substeps) push_nodes<kCan, kPairs>(t, f, s, round, pushers, helpers, met);
-      if (kFronts && round < f.substeps && apart && pushers.has_me()) push_front_of(f, round);
+      if (kFronts && round < f.substeps && apart && pushers.has_me()) {
+        push_front_of(f, round, free_for_front);
+      }
     }
   }
 }

@@ -141,7 +141,8 @@ const CudaFaces* CudaMpmTissue::faces_of_launch() {
   FacesOnDevice& f = d.faces;
   if (!f.may_meet || f.version != state_->faces.version) return nullptr;
   const std::vector<CudaBundle>& bundles = d.host_tables.bundles;
-  const std::ptrdiff_t resident = has_front() ? d.front_resident : d.touch_resident;
+  const std::ptrdiff_t resident =
+      has_front() || meets_thin_tools() ? d.front_resident : d.touch_resident;
   const auto ranks = std::count_if(
       bundles.begin(), bundles.begin() + std::min<std::ptrdiff_t>(resident, bundles.size()),
       [](const CudaBundle& b) { return b.rank >= 0; });

@@ -232,7 +232,7 @@ void CudaMpmTissue::launch(int begin, int end, float dt) {
   if (frame.faces != nullptr || d.may_meet || has_front()) {
     frame.pushes = clear_pushes();
     const CudaTables tables = d.pushed_tables();
-    if (has_front()) {
+    if (has_front() || meets_thin_tools()) {
       launch_substeps(d.front_plan, tables, frame, d.front_resident, d.stream);
     } else if (frame.faces != nullptr) {
       launch_substeps(d.touch_plan, tables, frame, d.touch_resident, d.stream);
@@ -247,6 +247,10 @@ void CudaMpmTissue::launch(int begin, int end, float dt) {
   d.current = (d.current + end - begin) % 2;
   state_->time += static_cast<double>(end - begin) * dt;
   state_->dt = dt;
+}
+
+bool CudaMpmTissue::meets_thin_tools() const {
+  return device_->may_meet && device_->place_parts > 1;
 }
 
 FrameResult CudaMpmTissue::finish() {

@@ -161,6 +161,9 @@ class CudaMpmTissue final : public Tissue {
   void pull_front();  ///< how far parted nodes are apart; the host has the same ones
   void push_front();  ///< the front that the host has, behind the nodes, all of which are there
   bool has_front() const;
+  /// Whether places may have to be taken apart in this frame, which the kernels of fronts alone do,
+  /// for the others to keep their registers.
+  bool meets_thin_tools() const;
   NodePushes clear_pushes();  ///< for a launch that pushes; slots know which nodes a front does
   void pull_contacts();
   void begin_anchors(const FrameInput& input);

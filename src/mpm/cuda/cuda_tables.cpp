@@ -36,17 +36,18 @@ void check_memory(std::size_t wanted, std::size_t held) {
 
 std::size_t CudaMpmTissue::device_bytes() const {
   const OnDevice& d = *device_;
-  std::size_t sum =
-      d.blocks.bytes() + d.bundles.bytes() + d.columns.bytes() + d.near_cells.bytes() +
-      d.near_listed.bytes() + d.u_went.bytes() + d.bodies.bytes() + d.of_blocks.bytes() +
-      d.made.bytes() + d.spare.bytes() + d.origins.bytes() + d.sweep.bytes() + d.labels.bytes() +
-      d.some_nodes.bytes() + d.packed.bytes() + d.piece.bytes() + d.place.bytes() +
-      d.slot_parts.bytes() + d.first_parts.bytes() + d.parts.bytes() + d.pushed_parts.bytes() +
-      d.marks.bytes() + d.pushed.bytes() + d.inertia.bytes() + d.colour.bytes() + d.hold.bytes() +
-      d.outer.bytes() + d.planes.bytes() + d.bonds.bytes() + d.soft.bytes() + d.with.bytes() + d.whole.bytes() +
-      d.u_before.bytes() + d.connect_room.bytes() + d.colliders.bytes() + d.loads.bytes() +
-      d.measures.bytes() + d.cloud.bytes() + d.stretched.bytes() + d.faces.bytes() +
-      d.front.bytes() + d.checkpoint.bytes() + d.stacks.bytes() + d.anchors.bytes();
+  std::size_t sum = d.blocks.bytes() + d.bundles.bytes() + d.columns.bytes() +
+                    d.near_cells.bytes() + d.near_listed.bytes() + d.u_went.bytes() +
+                    d.bodies.bytes() + d.of_blocks.bytes() + d.made.bytes() + d.spare.bytes() +
+                    d.origins.bytes() + d.sweep.bytes() + d.labels.bytes() + d.some_nodes.bytes() +
+                    d.packed.bytes() + d.piece.bytes() + d.place.bytes() + d.slot_parts.bytes() +
+                    d.first_parts.bytes() + d.parts.bytes() + d.pushed_parts.bytes() +
+                    d.marks.bytes() + d.pushed.bytes() + d.inertia.bytes() + d.colour.bytes() +
+                    d.hold.bytes() + d.outer.bytes() + d.planes.bytes() + d.bonds.bytes() +
+                    d.soft.bytes() + d.with.bytes() + d.whole.bytes() + d.u_before.bytes() +
+                    d.connect_room.bytes() + d.colliders.bytes() + d.loads.bytes() +
+                    d.measures.bytes() + d.cloud.bytes() + d.stretched.bytes() + d.faces.bytes() +
+                    d.front.bytes() + d.checkpoint.bytes() + d.stacks.bytes() + d.anchors.bytes();
   for (int i = 0; i < 2; ++i) sum += d.u[i].bytes() + d.v[i].bytes() + d.force[i].bytes();
   return sum;
 }
@@ -159,8 +160,7 @@ void CudaMpmTissue::push_tables() {
   const std::size_t of_stacks =
       d.plan.marches ? Stacks::bytes_for(t, state_->blocks.all, d.plain_resident) : 0;
   const bool at_surface = scene.mpm.boundary == MpmBoundary::kSurface;
-  check_memory(bytes_of(t, n, points, held, most_held, at_surface) + of_stacks,
-               device_bytes());
+  check_memory(bytes_of(t, n, points, held, most_held, at_surface) + of_stacks, device_bytes());
   check_cuda(cudaStreamSynchronize(d.stream), "finish a frame");
   d.blocks.upload(t.blocks, d.stream);
   d.bundles.upload(t.bundles, d.stream);

@@ -12,7 +12,7 @@ namespace tissue_sim {
 struct FrontOnDevice {
   DeviceArray<FrontCell> cells;
   DeviceArray<FrontPart> parts;
-  DeviceArray<int4> tasks;  ///< CudaFront::tasks
+  DeviceArray<int4> tasks;     ///< CudaFront::tasks
   DeviceArray<double> energy;  ///< of the cells, then of the motion of parted nodes [J]
   PinnedArray<double> host_energy;
   DeviceArray<float4> motion_fields;  ///< CudaMotionRoom::fields, where `pushed` is no room
@@ -20,9 +20,8 @@ struct FrontOnDevice {
   bool marked = false;  ///< whether CudaTables::slot_parts say which nodes it pushes
 
   CudaFront view() const {
-    return {static_cast<int>(cells.size()), node_count,   first_node,
-            cells.data(),                   parts.data(), static_cast<int>(tasks.size()),
-            tasks.data()};
+    return {static_cast<int>(cells.size()), node_count,  first_node, cells.data(), parts.data(),
+            static_cast<int>(tasks.size()), tasks.data()};
   }
   std::size_t bytes() const {
     return cells.bytes() + parts.bytes() + tasks.bytes() + energy.bytes() + motion_fields.bytes();

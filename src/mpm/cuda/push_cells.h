@@ -128,8 +128,8 @@ __device__ __forceinline__ void push_cell(const CudaTables& t, const CudaNodes& 
     held.load(t, p, part);
     point.is_cut = t.bonds[p] != kAllBonds;
   }
-  point.spring = point_spring(body.spring, has_parts ? volume / kPlaceParts : volume, weights.is_stiff,
-                              pushes.dt);
+  point.spring = point_spring(body.spring, has_parts ? volume / kPlaceParts : volume,
+                              weights.is_stiff, pushes.dt);
   point.inertia = weights.is_stiff ? kInertia * point.spring.across * pushes.dt * pushes.dt : 0;
   point.cell_size = body.cell_size;
   __syncwarp();
@@ -157,8 +157,8 @@ __device__ __forceinline__ void push_cell(const CudaTables& t, const CudaNodes& 
     if (places == 0) return;
     InertialPlaces all;
     all.mask = places;
-    all.inertia = point.inertia * weights.size() *
-                  stiffer_across(pushes.colliders[c].radius, body.cell_size);
+    all.inertia =
+        point.inertia * weights.size() * stiffer_across(pushes.colliders[c].radius, body.cell_size);
     all.taken = begins ? 1 : pushes.grown;
     all.along = along;
 #pragma unroll
@@ -202,7 +202,7 @@ __device__ __forceinline__ std::uint32_t thin_ones(const Collider* colliders, st
                                         stiffer_across(colliders[c].radius, cell_size) > 1);
 }
 
-/// Pushes for these alone. Out of line, for scenes without any to keep their registers.
+/// Pushes for these alone. Out of line, for fronts to keep their registers.
 inline __device__ __noinline__ void push_cell_parts(const CudaTables t, const CudaNodes state,
                                                     const CudaNearCell* of, const ToolPushes pushes,
                                                     WarpNodes* nodes) {
@@ -248,7 +248,9 @@ struct NearSearch {
         step(32 * warps) {
     load();
   }
-  /// Pushes the points of those that are close to a collider.
+  /// Pushes the points of those that are close to a collider. With kThin, their places are taken
+  /// apart for colliders that are thin.
+  template <bool kThin>
   __device__ __forceinline__ void push(const CudaTables& t, const CudaNodes& state, float reach,
                                        const ToolPushes& pushes, WarpNodes& nodes) {
     while (__any_sync(0xffffffffu, i < count)) {
@@ -268,11 +270,12 @@ struct NearSearch {
       for (unsigned left = __ballot_sync(0xffffffffu, close); left != 0; left &= left - 1) {
         const int from = __ffs(static_cast<int>(left)) - 1;
         CudaNearCell one = cell_of_lane(cell, from);
-        if (t.place_parts > 1) {
+        const bool parts = kThin && t.place_parts > 1;
+        if (parts) {
           one.near &= ~thin_ones(pushes.colliders, one.near, t.bodies[one.body].cell_size);
         }
         push_cell<false>(t, state, one, pushes, nodes);
-        if (t.place_parts > 1) {
+        if (parts) {
           push_cell_parts(t, state, cells + __shfl_sync(0xffffffffu, i - step, from), pushes,
                           &nodes);
         }

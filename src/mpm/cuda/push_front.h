@@ -1,8 +1,8 @@
 // What the front's cells push within a substep. For .cu files.
 //
 // They are no work of the blocks that they are in, for these would keep all others waiting: as with
-// cells near colliders, a warp of any thread block that is free takes the next pass of one, once all nodes
-// are in place, and adds its forces to the sums that contact adds to.
+// cells near colliders, a warp of any thread block that is free takes the next pass of one, once
+// all nodes are in place, and adds its forces to the sums that contact adds to.
 #pragma once
 
 #include "mpm/cuda/block_nodes.h"

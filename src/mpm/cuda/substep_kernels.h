@@ -242,15 +242,17 @@ __device__ __forceinline__ void push_nodes(const CudaTables& t, const CudaFrame&
         reinterpret_cast<unsigned long long*>(f.loads) + kLoadSums * f.collider_count * round;
     long long* inertia = f.pushes.inertia;
     if (inertia != nullptr) inertia += f.pushes.inertia_stride * (round % 3);
-    near.push(t, state, kCellReach * f.cell_size,
-              {s.colliders, loads, force, inertia, dt, f.step.kick, round == 0 ? f.grown : 0},
-              s.cells[warp]);
+    near.push<kCan == Can::kFronts>(
+        t, state, kCellReach * f.cell_size,
+        {s.colliders, loads, force, inertia, dt, f.step.kick, round == 0 ? f.grown : 0},
+        s.cells[warp]);
   }
   touch();
 }
 
 /// The front's cells push, as nodes are where the round brought them. The last `free` warps of each
-/// thread block have a pass each: none where thread blocks without a bundle begin before the others.
+/// thread block have a pass each: none where thread blocks without a bundle begin before the
+/// others.
 __device__ __forceinline__ void push_front_of(const CudaFrame& f, int round, int free) {
   const bool odd = ((f.current + round) & 1) != 0;
   const unsigned number = (blockDim.x - 1 - threadIdx.x) / 32, owned = gridDim.x * free;

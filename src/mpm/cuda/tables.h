@@ -151,8 +151,8 @@ struct CudaTables {
                               ///< fewer than seven, else 0; see mpm/blocks/stabilisation.h [J]
   const float4* outer;        ///< per point, where colliders touch it: outer_points.h; null where
                               ///< that is the point itself for all
-  const float4* planes;       ///< per point, the surface's plane there: surface_planes(); null where
-                              ///< no tool is thin
+  const float4* planes;  ///< per point, the surface's plane there: surface_planes(); null where
+                         ///< no tool is thin
   const std::uint8_t* bonds;  ///< per point
   const std::uint8_t* soft;   ///< per point, as Points::soft; null where none is
   const float* lightness;  ///< per point, Points::lightness, 1 where a bond broke; null where all
@@ -160,8 +160,9 @@ struct CudaTables {
   int held_by;             ///< colliders that a point may hold on to at a time: 0 to 2
   int place_parts;         ///< that a point's place may be taken apart into: kPlaceParts, or 1
   std::uint8_t* with;  ///< [point][place_parts][held_by]: 0, or 1 + index of a collider it touches
-  float4* hold;  ///< [point][place_parts][held_by]: the place that friction holds on to, in the collider's
-                 ///< frame [m], and how deep contact began (contact/surface_spring.h) [m]
+  float4*
+      hold;  ///< [point][place_parts][held_by]: the place that friction holds on to, in the
+             ///< collider's frame [m], and how deep contact began (contact/surface_spring.h) [m]
 };
 
 /// Sums of what acts on a collider in one substep: force and moment in units of kLoadUnit, as

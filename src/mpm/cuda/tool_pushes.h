@@ -75,9 +75,9 @@ struct Held {
   }
 };
 
-/// How deep contact of a stiff spring begins, of how deep it is, where the spring is so much stiffer
-/// for a thin tool: it pushes as hard then as the soft one would, so that a tool which comes deep
-/// within a substep is held off as well.
+/// How deep contact of a stiff spring begins, of how deep it is, where the spring is so much
+/// stiffer for a thin tool: it pushes as hard then as the soft one would, so that a tool which
+/// comes deep within a substep is held off as well.
 __device__ __forceinline__ float begun_deep(float stiffer) { return 1 - 1 / (kAcross * stiffer); }
 
 /// The spring of a point of so much volume [m^3], by that of a m^3 at the lattice: as that where it

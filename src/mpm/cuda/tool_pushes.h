@@ -128,7 +128,7 @@ __device__ __forceinline__ void push_point(const PushedPoint& point, const Colli
     const bool touches = point.touches(collider);
     if (__ballot_sync(0xffffffffu, touches) == 0) continue;
     const bool is_stiff = point.inertia > 0 && collider.kind != Collider::kJaw;
-    const float stiffer = stiffer_across(collider.radius, point.cell_size);
+    const float stiffer = is_stiff ? stiffer_across(collider.radius, point.cell_size) : 1.0f;
     float push[3] = {0, 0, 0}, normal[3] = {0, 0, 0}, distance = 0, along = 0;
     bool pushes = false, begins = false, is_inside = false;
     if (touches) {

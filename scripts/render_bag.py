@@ -109,16 +109,19 @@ class Recording:
         time = self.times[k]
         message = next(self.bag.read_messages([self.cloud_topic], time, time))[1]
         ground = self.scene.get("ground", {}).get("z", 0.0)
-        return Moment(cloud_points(message), self.tools[k], ground, self.surface(time))
+        return Moment(cloud_points(message), self.tools[k], ground,
+                      self.surface(time, message.header.stamp))
 
-    def surface(self, time):
-        """Corners of the surface's triangles (m, 3, 3), of a method that has some; else None."""
+    def surface(self, time, stamp):
+        """Corners of the triangles (m, 3, 3) of the surface with that stamp, recorded from that
+        time on, of a method that has some; else None."""
         if self.surface_topic is None:
             return None
-        # What a frame writes stands some nanoseconds apart.
-        soon = time + rospy.Duration(0, 100000)
+        # What a frame writes stands milliseconds apart, by what the machine has to do.
+        soon = time + rospy.Duration(0.5)
         for _, marker, _ in self.bag.read_messages([self.surface_topic], time, soon):
-            return np.array([[p.x, p.y, p.z] for p in marker.points]).reshape(-1, 3, 3)
+            if marker.header.stamp == stamp:
+                return np.array([[p.x, p.y, p.z] for p in marker.points]).reshape(-1, 3, 3)
         return None
 
 

@@ -334,6 +334,18 @@ TEST_F(PbdOnGpu, AStateGoesOnWithTheSameBits) {
   }
 }
 
+/// It flies and spins.
+void throw_first_body(CudaPbdTissue& tissue, const Scene& scene) {
+  pbd::State& s = tissue.state();
+  for (int i = 0; i < s.vertices.size(); ++i) {
+    if (s.vertices.body[i] != 0) continue;
+    const Vec3 v = Vec3(0.1, 0.2, -0.05) +
+                   Vec3(1, -2, 3).cross(s.vertices.position(i) - scene.bodies[0].pose.position);
+    for (int a = 0; a < 3; ++a) s.vertices.v[4 * i + a] = static_cast<float>(v[a]);
+  }
+  tissue.push();
+}
+
 /// Two bodies, one of which flies and spins while the other is held.
 TEST_F(PbdOnGpu, WhatFliesKeepsItsMomentum) {
   for (const Way way : {Way::kLaunches, Way::kOneBlock}) {
@@ -345,14 +357,7 @@ TEST_F(PbdOnGpu, WhatFliesKeepsItsMomentum) {
     scene.bodies[1].anchors[0].z = 1;
     CudaPbdTissue tissue(scene);
     tissue.set_way(way);
-    pbd::State& s = tissue.state();
-    for (int i = 0; i < s.vertices.size(); ++i) {
-      if (s.vertices.body[i] != 0) continue;
-      const Vec3 v = Vec3(0.1, 0.2, -0.05) +
-                     Vec3(1, -2, 3).cross(s.vertices.position(i) - scene.bodies[0].pose.position);
-      for (int a = 0; a < 3; ++a) s.vertices.v[4 * i + a] = static_cast<float>(v[a]);
-    }
-    tissue.push();
+    throw_first_body(tissue, scene);
     const Momentum before = tissue.momentum();
     for (int frame = 0; frame < 30; ++frame) {
       tissue.advance(1 / scene.frame_rate, {});
@@ -375,13 +380,7 @@ TEST_F(PbdOnGpu, WhatFliesInSectionsKeepsItsMomentum) {
   const Scene scene = slab(PbdModel::kSurface);
   CudaPbdTissue tissue(scene);
   tissue.set_way(Way::kSections);
-  pbd::State& s = tissue.state();
-  for (int i = 0; i < s.vertices.size(); ++i) {
-    const Vec3 v = Vec3(0.1, 0.2, -0.05) +
-                   Vec3(1, -2, 3).cross(s.vertices.position(i) - scene.bodies[0].pose.position);
-    for (int a = 0; a < 3; ++a) s.vertices.v[4 * i + a] = static_cast<float>(v[a]);
-  }
-  tissue.push();
+  throw_first_body(tissue, scene);
   const Momentum before = tissue.momentum();
   for (int frame = 0; frame < 30; ++frame) {
     tissue.advance(1 / scene.frame_rate, {});

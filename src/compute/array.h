@@ -9,10 +9,6 @@
 
 namespace tissue_sim {
 
-/// So many bytes from a cache line on, for std::free(); large ones in large pages where the system
-/// has them. Throws std::bad_alloc.
-void* allocate_lines(std::size_t bytes);
-
 template <class T>
 struct CacheLineAllocator {
   using value_type = T;
@@ -20,7 +16,9 @@ struct CacheLineAllocator {
   template <class U>
   CacheLineAllocator(const CacheLineAllocator<U>&) {}  // NOLINT: rebinding converts
   T* allocate(std::size_t n) {
-    return static_cast<T*>(allocate_lines((n * sizeof(T) / 64 + 2) * 64));
+    void* p = std::aligned_alloc(64, (n * sizeof(T) / 64 + 2) * 64);
+    if (p == nullptr) throw std::bad_alloc();
+    return static_cast<T*>(p);
   }
   void deallocate(T* p, std::size_t) { std::free(p); }
   friend bool operator==(const CacheLineAllocator&, const CacheLineAllocator&) { return true; }

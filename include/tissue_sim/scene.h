@@ -117,7 +117,7 @@ enum class MpmBoundary {
   kLattice,  ///< both act at the lattice's points and nodes, up to half a cell off
 };
 struct MpmOptions {
-  MpmBoundary boundary = MpmBoundary::kLattice;
+  MpmBoundary boundary = MpmBoundary::kSurface;
 };
 
 /// Method pbd: what it is made of and how it is solved. Other methods do not read it.

@@ -17,7 +17,7 @@ namespace tissue_sim {
 namespace {
 
 /// FNV-1a, 64 bits, over the numbers' bytes, little endian.
-class Checksum {
+class WeightsSum {
  public:
   void add(const std::vector<float>& numbers) {
     for (const float number : numbers) {
@@ -77,7 +77,7 @@ FragmentNetwork::FragmentNetwork(const std::string& path) {
     }
     inputs_ = version == "1" ? kFeatureCount : kAllFeatureCount;
     const int inputs = inputs_, hidden = hidden_count(inputs);
-    Checksum sum;
+    WeightsSum sum;
     const auto read = [&](const std::string& name, int outputs, Layers& layers) {
       const YAML::Node node = file[name];
       if (!node || !node.IsMap()) throw std::invalid_argument(name + " is missing");

@@ -195,6 +195,7 @@ float substep(MpmState& state, float dt, std::vector<ColliderLoad>& loads,
     if (state.anchors.groups.empty()) return;
     resists.wait();
     holds.help([&](int i) {
+      calm_swings(state, i, dt);
       if (is_beside_tools(state, i)) return hold_beside_tools(state, i, dt, before, after);
       hold_group(state.anchors, i, dt, before, after, state.nodes);
     });

@@ -28,6 +28,21 @@ Eigen::Matrix3f yields(MpmState& state, std::int32_t node) {
 
 }  // namespace
 
+void calm_swings(MpmState& state, int i, float dt) {
+  const FaceGroup& g = state.anchors.groups[i];
+  Nodes& nodes = state.nodes;
+  for (int r = g.first; r < g.first + g.count; ++r) {
+    const FaceRow& row = state.anchors.rows[r];
+    if (!is_swing(row)) continue;
+    const std::int32_t node = row.node[0];
+    for (int a = 0; a < 3; ++a) {
+      const float lost = kSwingLoss * nodes.v[a][node];
+      nodes.v[a][node] -= lost;
+      nodes.u[a][node] -= dt * lost;
+    }
+  }
+}
+
 bool is_beside_tools(const MpmState& state, int i) {
   if (state.contacts.inertia.nodes.empty()) return false;
   const FaceGroup& g = state.anchors.groups[i];
@@ -65,7 +80,7 @@ void hold_beside_tools(MpmState& state, int index, float dt, const RigidMotion* 
         mobility += r.weight[k] * share[k];
       }
       const Eigen::Vector3f off = target - shift * dt - (u - dt * v);  // before the substep
-      const Eigen::Vector3f impulse = mobility.inverse() * (shift - v + kFaceDrift / dt * off);
+      const Eigen::Vector3f impulse = mobility.inverse() * (shift - v + face_drift(dt) / dt * off);
       if (!impulse.allFinite()) continue;
       for (int a = 0; a < 3; ++a) faces.impulse[i][a] += impulse[a];
       for (int k = 0; k < kRowNodes; ++k) {

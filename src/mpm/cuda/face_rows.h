@@ -34,11 +34,12 @@ struct alignas(16) CudaHeldNode {
   std::uint32_t shared;  ///< ... and CudaTables::slot_parts of one of them; kNoSlot for none
   float arm;  ///< what its column of CudaHeldFaces::pull counts for in the impulse: the place
               ///< of the face from the anchor's origin, and 1, times the row's mass [kg m, kg]
-  int anchor;
+  int anchor;   ///< and kSwings
   int impulse;  ///< where the component of its number is summed up; -1: nowhere
 };
 inline constexpr int kOwnedHere = 1 << 30;  ///< the bundle writes the node down
 inline constexpr std::uint32_t kNoSlot = ~0u;
+inline constexpr int kSwings = 1 << 30;  ///< calm_swings() slows the node down
 
 /// Numbers of each node, and of each row, of a chunk while it is worked out.
 inline constexpr int kFaceEntryRoom = 8, kFaceRowRoom = 6;
@@ -57,7 +58,7 @@ struct alignas(16) CudaFaceEntry {
   int next_share;       ///< where the others are than ...
   CudaFaceShare share;  ///< ... the first of them
   std::uint32_t shared;
-  int unused;
+  int swings;  ///< whether calm_swings() slows it down
   uint4 parts, more;
 };
 
@@ -101,11 +102,12 @@ struct CudaHeldFaces {
   /// Of each anchor before the first substep and after each; null where all stay.
   const CudaAnchorPlace* places = nullptr;
   /// By substep and anchor, columns of what its motion asks of the velocity at a face, times the
-  /// substep: what it moves by, and kFaceDrift of where it was before; null where all stay.
+  /// substep: what it moves by, and `drift` of where it was before; null where all stay.
   const float4* pull = nullptr;
   int anchors = 0;
   bool carries_always = false;  ///< rows read nodes that anchors carry
-  float drift = 0;              ///< kFaceDrift, or 0 where only rates count
+  float drift = 0;              ///< face_drift(), or 0 where only rates count
+  float swing_loss = 0;         ///< kSwingLoss, or 0 there
   float* room = nullptr;
   std::size_t room_each = 0;  ///< of a bundle, a multiple of 4
 };

@@ -156,6 +156,13 @@ struct FreeNode {
   }
 };
 
+/// As calm_swings() of mpm/anchors/hold_beside_tools.h.
+__device__ __forceinline__ void calm_swing(float loss, float dt, float4& u, float4& v) {
+  const float x = loss * v.x, y = loss * v.y, z = loss * v.z;
+  v.x -= x, v.y -= y, v.z -= z;
+  u.x -= dt * x, u.y -= dt * y, u.z -= dt * z;
+}
+
 /// The sum over four lanes side by side, for all of them.
 __device__ __forceinline__ float sum_of_four(float x) {
   x += __shfl_xor_sync(0xffffffffu, x, 1);
@@ -185,12 +192,14 @@ __device__ __noinline__ void hold_rows(const HeldFrame* frame, int round, float4
   for (int i = thread; i - thread % 32 < count; i += kHand * threads) {
     CudaHeldNode n[kHand];
     float4 m[kHand] = {};
+    bool swings[kHand];
     FreeNode<kPushes> free[kHand];
 #pragma unroll
     for (int k = 0; k < kHand; ++k) {
       const int at = i + k * threads;
       n[k] = load_held(h.held + first, cache, cached, min(at, count - 1));
-      if (pull != nullptr) m[k] = __ldg(pull + 4 * n[k].anchor + thread % 4);
+      swings[k] = (n[k].anchor & kSwings) != 0;
+      if (pull != nullptr) m[k] = __ldg(pull + 4 * (n[k].anchor & (kSwings - 1)) + thread % 4);
       if (at >= count) {
         n[k].node = n[k].local = n[k].impulse = -1;
         n[k].arm = 0;
@@ -203,6 +212,7 @@ __device__ __noinline__ void hold_rows(const HeldFrame* frame, int round, float4
     for (int k = 0; k < kHand; ++k) {
       free[k].move(w, n[k]);
       float4 &u = free[k].u, &v = free[k].v;
+      if (swings[k]) calm_swing(h.swing_loss, w.step.dt, u, v);
       // As in hold_group(): what the velocity at the face lacks.
       const float of_u = h.drift * inv_dt, of_v = 1 - h.drift;
       const float arm = inv_dt * n[k].arm;

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "mpm/anchors/hold_beside_tools.h"
+
 namespace tissue_sim {
 namespace {
 
@@ -64,6 +66,7 @@ SlotsOfNodes find_slots(const MpmState& state, const HostTables& t,
 struct NodeOfGroup {
   std::int32_t node;
   std::vector<CudaFaceShare> shares;  ///< rows by their place in the group
+  bool swings = false;                ///< is_swing() of one of them
 };
 
 std::vector<NodeOfGroup> nodes_of(const AnchorFaces& faces, const FaceGroup& g) {
@@ -74,8 +77,9 @@ std::vector<NodeOfGroup> nodes_of(const AnchorFaces& faces, const FaceGroup& g) 
       if (r.weight[k] == 0) continue;
       auto at = std::find_if(nodes.begin(), nodes.end(),
                              [&](const NodeOfGroup& n) { return n.node == r.node[k]; });
-      if (at == nodes.end()) at = nodes.insert(nodes.end(), {r.node[k], {}});
+      if (at == nodes.end()) at = nodes.insert(nodes.end(), {r.node[k], {}, false});
       if (r.share[k] != 0) at->shares.push_back({i, r.share[k]});
+      at->swings = at->swings || (k == 0 && is_swing(r));
     }
   }
   return nodes;
@@ -103,7 +107,7 @@ void add_row(const AnchorFaces& faces, const FaceGroup& g, const SlotsOfNodes& s
       n.share = r.share[k];
       const double arm = k < 3 ? r.place[k] - faces.origin[r.anchor][k] : 1;
       n.arm = static_cast<float>(mass * arm);
-      n.anchor = r.anchor;
+      n.anchor = r.anchor | (k == 0 && is_swing(r) ? kSwings : 0);
       n.impulse = summed || k == 3 ? -1 : 3 * g.first + k;
       n.parts.x = n.node < 0 ? kNoSlot : static_cast<std::uint32_t>(slots.first_of(n.node));
       if (at[k] != here.end() && at[k]->node == r.node[k]) {
@@ -195,6 +199,7 @@ class FillChunks {
     e.shares = static_cast<int>(n.shares.size());
     if (e.shares > 0) e.share = n.shares[0];
     e.next_share = first_share + 1;
+    e.swings = n.swings ? 1 : 0;
     return e;
   }
   /// The bundle's last chunk, or one more where that has no room for it.

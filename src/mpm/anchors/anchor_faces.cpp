@@ -358,7 +358,7 @@ void hold_group(AnchorFaces& faces, int index, float dt, const RigidMotion* befo
       }
       // u has moved by dt v already: what it was off before.
       const float off = target[a] - shift[a] * dt - (u - dt * v);
-      left[i][a] = shift[a] - v + kFaceDrift * off / dt;
+      left[i][a] = shift[a] - v + face_drift(dt) / dt * off;
     }
   }
   for (int i = 0; i < g.count; ++i) {

@@ -65,7 +65,7 @@ void hold_beside_tools(MpmState& state, int index, float dt, const RigidMotion* 
         mobility += r.weight[k] * share[k];
       }
       const Eigen::Vector3f off = target - shift * dt - (u - dt * v);  // before the substep
-      const Eigen::Vector3f impulse = mobility.inverse() * (shift - v + kFaceDrift / dt * off);
+      const Eigen::Vector3f impulse = mobility.inverse() * (shift - v + face_drift(dt) / dt * off);
       if (!impulse.allFinite()) continue;
       for (int a = 0; a < 3; ++a) faces.impulse[i][a] += impulse[a];
       for (int k = 0; k < kRowNodes; ++k) {

@@ -36,7 +36,7 @@ struct AnchorsOnDevice {
            groups.bytes() + row_nodes.bytes() + inverse.bytes() + room.bytes() + impulse.bytes() +
            places.bytes() + lightness.bytes();
   }
-  /// What the kernels need; `substep` of the part is the first.
+  /// What the kernels need, but for the drift; `substep` of the part is the first.
   CudaHeldFaces view(int substep, int anchors) const {
     CudaHeldFaces h;
     if (chunks.size() == 0) return h;
@@ -54,7 +54,6 @@ struct AnchorsOnDevice {
     h.pull = pull.size() > 0 ? pull.data() + 4 * substep * anchors : nullptr;
     h.carries_always = carries_always;
     h.anchors = anchors;
-    h.drift = kFaceDrift;
     h.room = room.data();
     h.room_each = room_each;
     return h;

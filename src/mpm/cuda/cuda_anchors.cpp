@@ -20,11 +20,11 @@ CudaAnchorPlace place_of(const RigidMotion& m) {
 }
 
 /// Adds CudaHeldFaces::pull of an anchor about `origin`.
-void add_pull(const RigidMotion& before, const RigidMotion& after, const Vec3& origin,
+void add_pull(const RigidMotion& before, const RigidMotion& after, const Vec3& origin, double drift,
               std::vector<float4>& pull) {
   const Eigen::Matrix3d rotation = after.rotation - before.rotation +
-                                   kFaceDrift * (before.rotation - Eigen::Matrix3d::Identity());
-  const Vec3 shift = after.translation - before.translation + kFaceDrift * before.translation;
+                                   drift * (before.rotation - Eigen::Matrix3d::Identity());
+  const Vec3 shift = after.translation - before.translation + drift * before.translation;
   const Vec3 at_origin = shift + rotation * origin;
   for (int k = 0; k < 4; ++k) {
     const Vec3 c = (k < 3 ? Vec3(rotation.col(k)) : at_origin);
@@ -131,7 +131,7 @@ void CudaMpmTissue::upload_anchor_places() {
       std::vector<RigidMotion> after = anchors_at(state_->anchors, input_, share_of(i));
       for (std::size_t k = 0; k < after.size(); ++k) {
         places.push_back(place_of(after[k]));
-        add_pull(before[k], after[k], origin[k], pull);
+        add_pull(before[k], after[k], origin[k], face_drift(part_.substeps.at(i)), pull);
       }
       before = std::move(after);
     }

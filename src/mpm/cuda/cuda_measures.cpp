@@ -32,7 +32,6 @@ double CudaMpmTissue::measure_limit(int steps) {
   frame.held_faces = d.anchors.view(0, 0);
   frame.held_faces.places = nullptr;
   frame.held_faces.impulse = nullptr;
-  frame.held_faces.drift = 0;
   // Between two parts of a frame nobody needs the state before a part, nor what contact pushes
   // with.
   const std::size_t n = d.entries();

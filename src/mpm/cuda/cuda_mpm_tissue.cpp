@@ -228,6 +228,7 @@ void CudaMpmTissue::launch(int begin, int end, float dt) {
   frame.arrived = d.arrived.data();
   frame.faces = faces_of_launch();
   frame.held_faces = d.anchors.view(begin, static_cast<int>(state_->anchors.origin.size()));
+  frame.held_faces.drift = face_drift(dt);
   frame.front = d.front.view();
   if (frame.faces != nullptr || d.may_meet || has_front()) {
     frame.pushes = clear_pushes();

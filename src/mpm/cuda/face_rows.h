@@ -101,11 +101,11 @@ struct CudaHeldFaces {
   /// Of each anchor before the first substep and after each; null where all stay.
   const CudaAnchorPlace* places = nullptr;
   /// By substep and anchor, columns of what its motion asks of the velocity at a face, times the
-  /// substep: what it moves by, and kFaceDrift of where it was before; null where all stay.
+  /// substep: what it moves by, and `drift` of where it was before; null where all stay.
   const float4* pull = nullptr;
   int anchors = 0;
   bool carries_always = false;  ///< rows read nodes that anchors carry
-  float drift = 0;              ///< kFaceDrift, or 0 where only rates count
+  float drift = 0;              ///< face_drift(), or 0 where only rates count
   float* room = nullptr;
   std::size_t room_each = 0;  ///< of a bundle, a multiple of 4
 };

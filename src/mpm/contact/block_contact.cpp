@@ -70,7 +70,8 @@ constexpr int kListLasts = 8;
 constexpr double kListMargin = 0.5;
 /// Whether what a collider presses a point with has a bound: kMostOfHeld.
 bool is_bounded(const MpmState& state, const Collider& collider, std::int32_t p) {
-  return collider.kind == Collider::kJaw || state.points.anchored[p] == Points::kAtAnchor;
+  const bool at_face = state.points.anchored[p] != 0 && state.points.free_volume_of(p) > 0;
+  return collider.kind == Collider::kJaw || at_face;
 }
 
 /// The places of a block where a collider touches it.

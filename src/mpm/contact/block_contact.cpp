@@ -68,6 +68,12 @@ bool overlap(const Box& a, const Box& b) {
 /// may come in that time [cells].
 constexpr int kListLasts = 8;
 constexpr double kListMargin = 0.5;
+/// Whether what a collider presses a point with has a bound: kMostOfHeld.
+bool is_bounded(const MpmState& state, const Collider& collider, std::int32_t p) {
+  const bool at_face = state.points.anchored[p] != 0 && state.points.free_volume_of(p) > 0;
+  return collider.kind == Collider::kJaw || at_face;
+}
+
 /// The places of a block where a collider touches it.
 const std::vector<SurfacePlace>& places_for(const Collider& collider, const Block& block) {
   return collider.kind == Collider::kPlane ? block.merged : block.surface;
@@ -343,9 +349,9 @@ bool push_points(BlockPush& b, const NearCell& cell, unsigned points, const Coll
     float push[3];
     contact_force(collider, g, {unit.stiffness * volume, unit.damping * volume}, at, velocity,
                   touch.hold, push);
-    if (collider.kind == Collider::kJaw && !b.state.points.outer.empty()) {
+    if (is_bounded(b.state, collider, p) && !b.state.points.outer.empty()) {
       const Material& m = b.body.material_of(b.state.points, p);
-      const float most = kMostOfJaws * static_cast<float>(m.young_modulus) * 4 * quarter * quarter;
+      const float most = kMostOfHeld * static_cast<float>(m.young_modulus) * 4 * quarter * quarter;
       const float scale = most / std::sqrt(dot(push, push));
       if (scale < 1) {
         for (float& f : push) f *= scale;
@@ -419,7 +425,7 @@ bool push_surface(BlockPush& b, const NearCell& cell, const Collider& collider, 
   bool touches = false;
   int material = -1;
   SurfaceSpring of_unit_area{};
-  float modulus = 0, density = 0;
+  float modulus = 0, young_modulus = 0, density = 0;
   const auto faces_away = [&](const SurfacePlace& place, const Gap& g) {
     float F[9], n[3], along = 0, length = 0;
     deformation_gradient_at(b.state.nodes.u, nodes, b.body.cell_size, place.place, F);
@@ -476,10 +482,8 @@ bool push_surface(BlockPush& b, const NearCell& cell, const Collider& collider, 
       const Material& m = b.body.materials[own];
       modulus = static_cast<float>(lame_lambda(m) + 2 * lame_mu(m));
       density = static_cast<float>(m.density);
+      young_modulus = static_cast<float>(m.young_modulus);
       of_unit_area = surface_spring(modulus, density, h, 1, b.dt);
-      if (collider.kind == Collider::kJaw) {
-        of_unit_area.most = kMostOfJaws * static_cast<float>(m.young_modulus);
-      }
     }
     const int doubled = doubled_along(modulus, density, h, b.dt, touch.doubled);
     if (is_held && doubled > touch.doubled) {  // with the force that it has
@@ -493,6 +497,9 @@ bool push_surface(BlockPush& b, const NearCell& cell, const Collider& collider, 
     SurfaceSpring spring = scaled(of_unit_area, place.area);
     stiffen_along(spring, doubled);
     stiffen_across(spring, stiffer);
+    if (is_bounded(b.state, collider, place.point)) {
+      spring.most = kMostOfHeld * young_modulus * place.area;
+    }
     spring.cohesion = collider.cohesion * place.area / unit_area;
     // Along the surface no inerter helps: at rims and on debris, whose nodes are light, the spring
     // is what the substep bears.

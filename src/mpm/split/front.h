@@ -67,6 +67,10 @@ void pass_rim(MpmState& state, const BladePath& path, const Array<float>* u_begi
 /// Works out the masses of a node's two sides, from `all` and `first_side`. Returns whether both
 /// are heavy enough to part it.
 bool weigh_sides(const MpmState& state, FrontNode& node);
+/// Whether the cut that parts a node ends between its points: not in a field that is left of one
+/// where the cut went on beside it. Points of both sides in that are those that the first plane,
+/// through a few bonds, put on the wrong one.
+bool is_cut_between_sides(const MpmState& state, const FrontNode& node);
 /// After nodes were split: new fields take over the motion of the side that they were; those of
 /// both sides, where another cut came across, are parted as the node was.
 void split_front(MpmState& state);

@@ -25,29 +25,6 @@ std::int32_t point_beside(const LatticeBody& body, const FrontNode& of) {
   return nearest;
 }
 
-/// Whether the cut that parts a node goes on between points of a field that is left of it: else
-/// the field is whole, and points of both sides in it are those that the first plane through a few
-/// bonds put on the wrong one.
-bool is_cut_between_sides(const MpmState& s, const FrontNode& part) {
-  std::int32_t point[216];
-  points_around(s.bodies[part.body], part.x, part.y, part.z, point);
-  const auto has = [](const Planes& planes, int i) {
-    return (planes[i / 36] >> bit_in_plane(i % 6, i / 6 % 6) & 1) != 0;
-  };
-  constexpr int kStride[3] = {1, 6, 36};
-  for (int i = 0; i < 216; ++i) {
-    if (!has(part.all, i)) continue;
-    const int at[3] = {i % 6, i / 6 % 6, i / 36};
-    for (int axis = 0; axis < 3; ++axis) {
-      const int j = i + kStride[axis];
-      if (at[axis] == 5 || !has(part.all, j) || has(part.first_side, i) == has(part.first_side, j))
-        continue;
-      if (is_broken(s.points, point[i], axis)) return true;
-    }
-  }
-  return false;
-}
-
 }  // namespace
 
 void split_front(MpmState& s) {

@@ -33,6 +33,7 @@ std::unique_ptr<MpmState> make_mpm_state(const Scene& scene, std::vector<std::st
   state->work.force.resize(state->blocks.force_size);
   state->contacts.near.resize(state->blocks.all.size());
   state->contacts.cells.resize(state->blocks.all.size());
+  state->contacts.parts.resize(state->blocks.all.size());
   state->contacts.touching.resize(state->blocks.all.size());
   state->contacts.changes.resize(state->blocks.all.size());
   list_facets(*state);

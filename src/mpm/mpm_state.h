@@ -46,7 +46,7 @@ struct NearCell {
   std::int32_t first_place, place_count;  ///< in Block::surface or merged
   float middle[3];                        ///< reference place [m]
   std::int32_t first_part;                ///< of its places' parts, in Contacts::parts
-  float lightest;                         ///< largest 1 / m of its nodes [1/kg]; 0 without places
+  float lightest = -1;                    ///< largest 1 / m of its nodes, negative until asked for
   std::uint8_t clear = 0;                 ///< substeps for which no place of it can be reached
   std::uint8_t points_clear = 0;          ///< the same of its `points`
 };

@@ -250,8 +250,7 @@ void list_near_cells(MpmState& state, int index, float dt) {
                          count,
                          {static_cast<float>(middle[0]), static_cast<float>(middle[1]),
                           static_cast<float>(middle[2])},
-                         first_part,
-                         count > 0 ? largest_inv_mass(state.nodes, CellNodes(block, node)) : 0});
+                         first_part});
       }
     }
   }
@@ -522,6 +521,7 @@ void push_surface(BlockPush& b, NearCell& cell, const Collider& collider, float 
     // is what the substep bears.
     const float per_mass =
         static_cast<float>(parts.count()) * spring.along * b.dt * b.dt / kAlongBorne;
+    if (cell.lightest < 0) cell.lightest = largest_inv_mass(b.state.nodes, nodes);
     if (per_mass * cell.lightest * squared(weights) > 1) {  // mobility is that at most
       if (part->mobility < 0) {
         part->mobility = static_cast<float>(mobility(b.state.nodes, nodes, weights));

@@ -25,17 +25,15 @@ struct BoxOfNode {
   static Vec3 place(int i) { return Vec3(i % 6, i / 6 % 6, i / 36); }  // [half cells]
 };
 
-constexpr int kBoxStride[3] = {1, 6, 36};
-
 /// Calls f(i, j, axis) for the pairs of neighbours among some places.
 template <class F>
 void for_each_pair(const Planes& all, const F& f) {
-  for (int i = 0; i < 216; ++i) {
-    if (!BoxOfNode::has(all, i)) continue;
-    const int at[3] = {i % 6, i / 6 % 6, i / 36};
-    for (int axis = 0; axis < 3; ++axis) {
-      if (at[axis] < 5 && BoxOfNode::has(all, i + kBoxStride[axis]))
-        f(i, i + kBoxStride[axis], axis);
+  for (int z = 0; z < 6; ++z) {
+    for (int i = 36 * z; i < 36 * z + 36; ++i) {
+      if (!BoxOfNode::has(all, i)) continue;
+      if (i % 6 < 5 && BoxOfNode::has(all, i + 1)) f(i, i + 1, 0);
+      if (i % 36 < 30 && BoxOfNode::has(all, i + 6)) f(i, i + 6, 1);
+      if (z < 5 && BoxOfNode::has(all, i + 36)) f(i, i + 36, 2);
     }
   }
 }

@@ -59,10 +59,12 @@ inline bool is_broken(const Points& points, std::int32_t p, int axis) {
 }
 
 /// Widens the rim by what the points `changed`, which lost bonds, add to it, and notes what the
-/// path passed of it, as sweep_bonds(). Appends points of bonds of which it passed more.
+/// path passed of it, as sweep_bonds(). Appends points of bonds of which it passed more. `near`:
+/// by point, 0 where it is farther than kRimReach from all that the edges sweep; null: not known.
 void pass_rim(MpmState& state, const BladePath& path, const Array<float>* u_begin,
               const Array<float>* u_end, const std::vector<std::int32_t>& broken,
-              std::vector<std::int32_t>& touched);
+              const std::uint8_t* near, std::vector<std::int32_t>& touched);
+inline constexpr double kRimReach = 3;  ///< [cells]
 
 /// Works out the masses of a node's two sides, from `all` and `first_side`. Returns whether both
 /// are heavy enough to part it.

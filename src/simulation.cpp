@@ -121,8 +121,8 @@ void Simulation::set_anchor(int anchor, const Pose& pose) {
   }
   if (!s.tissue->moves_anchors()) {
     throw std::invalid_argument(
-        "anchors do not move with this method: they do with method mls, and with method mpm and "
-        "mpm.boundary: surface");
+        "anchors do not move with this method: they do with method mls, and with method mpm unless "
+        "mpm.boundary is lattice");
   }
   check_pose(pose, "the pose of anchor '" + s.anchors[anchor]->name + "'");
   if (s.anchor_motion.empty()) {

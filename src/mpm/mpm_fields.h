@@ -136,8 +136,13 @@ void fields(Archive& archive, Touch& t) {
 
 template <class Archive>
 void fields(Archive& archive, NearCell& c) {
-  archive(c.lane, c.node, c.collider, c.points, c.first_place, c.place_count, c.middle, c.lightest,
-          c.clear);
+  archive(c.lane, c.node, c.collider, c.points, c.first_place, c.place_count, c.middle,
+          c.first_part, c.lightest, c.clear, c.points_clear);
+}
+
+template <class Archive>
+void fields(Archive& archive, NearPart& p) {
+  archive(p.mobility, p.clear, p.side);
 }
 
 template <class Archive>
@@ -153,7 +158,8 @@ void fields(Archive& archive, InertiaChange& c) {
 
 template <class Archive>
 void fields(Archive& archive, Contacts& c) {
-  archive(c.near, c.cells, c.touching, c.changes, c.inertia.nodes, c.inertia.dt, c.until_list);
+  archive(c.near, c.cells, c.parts, c.touching, c.changes, c.inertia.nodes, c.inertia.dt,
+          c.until_list);
 }
 
 template <class Archive>

@@ -33,6 +33,7 @@ std::unique_ptr<MpmState> make_mpm_state(const Scene& scene, std::vector<std::st
   state->work.force.resize(state->blocks.force_size);
   state->contacts.near.resize(state->blocks.all.size());
   state->contacts.cells.resize(state->blocks.all.size());
+  state->contacts.parts.resize(state->blocks.all.size());
   state->contacts.touching.resize(state->blocks.all.size());
   state->contacts.changes.resize(state->blocks.all.size());
   list_facets(*state);
@@ -73,13 +74,21 @@ namespace {
 /// Widens a block's box to its points without free volume, which move with their anchors.
 void add_held(const MpmState& state, const Block& block, Box& box) {
   const LatticeBody& b = state.bodies[block.body];
-  for (const std::int32_t p : block.point) {
-    if (p < 0 || state.points.free_volume[p] > 0) continue;
-    const Points::Site& s = state.points.site[p];
-    Vec3 x = b.site_position(s.x, s.y, s.z);
-    if (state.anchors.moves) x = state.anchors.place_of_held(b.body, block.body, x);
-    box.min = box.min.cwiseMin(x);
-    box.max = box.max.cwiseMax(x);
+  for (std::size_t first = 0; first < block.volume.size(); first += kLanes) {
+    int held = 0;
+    for (int i = 0; i < kLanes; ++i) {
+      held |= static_cast<int>(!(block.volume[first + i] > 0)) & ~(block.point[first + i] >> 31);
+    }
+    if (held == 0) continue;
+    for (std::size_t lane = first; lane < first + kLanes; ++lane) {
+      const std::int32_t p = block.point[lane];
+      if (block.volume[lane] > 0 || p < 0) continue;
+      const Points::Site& s = state.points.site[p];
+      Vec3 x = b.site_position(s.x, s.y, s.z);
+      if (state.anchors.moves) x = state.anchors.place_of_held(b.body, block.body, x);
+      box.min = box.min.cwiseMin(x);
+      box.max = box.max.cwiseMax(x);
+    }
   }
 }
 

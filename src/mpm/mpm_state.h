@@ -45,14 +45,25 @@ struct NearCell {
   std::uint8_t points;  ///< bit s: that at sub-position s, in the body or for a blade
   std::int32_t first_place, place_count;  ///< in Block::surface or merged
   float middle[3];                        ///< reference place [m]
-  float lightest;                         ///< largest 1 / m of its nodes [1/kg]; 0 without places
-  std::uint8_t clear = 0;                 ///< substeps for which the collider cannot reach it
+  std::int32_t first_part;                ///< of its places' parts, in Contacts::parts
+  float lightest = -1;                    ///< largest 1 / m of its nodes, negative until asked for
+  std::uint8_t clear = 0;                 ///< substeps for which no place of it can be reached
+  std::uint8_t points_clear = 0;          ///< the same of its `points`
+};
+
+/// What is known of a place in such a cell, or of a part of it, until cells are listed anew.
+struct NearPart {
+  enum Side : std::uint8_t { kUnknown, kTowards, kAway };
+  float mobility = -1;     ///< mpm/contact/face_places.h, negative until it is asked for [1/kg]
+  std::uint8_t clear = 0;  ///< substeps for which the collider cannot reach it
+  Side side = kUnknown;    ///< whether the surface faces the collider
 };
 
 /// Contact of points with colliders, block by block.
 struct Contacts {
   std::vector<std::vector<std::uint8_t>> near;      ///< colliders that it may meet this frame
   std::vector<std::vector<NearCell>> cells;         ///< by collider, then lane
+  std::vector<std::vector<NearPart>> parts;         ///< of their places
   std::vector<std::vector<Touch>> touching;         ///< by collider, cell and key
   std::vector<std::vector<InertiaChange>> changes;  ///< of the substep
   ContactInertia inertia;

@@ -20,7 +20,7 @@ struct CubeSize {
 
 inline Scene cube(const CubeSize& size, Law law) {
   Scene scene;
-  scene.mpm.boundary = MpmBoundary::kLattice;  // all that a GPU has, and the CPU is compared with
+  scene.mpm.boundary = MpmBoundary::kLattice;  // but for what hold_at_faces() and fronts say
   scene.cell_size = 0.001;
   scene.ground.z = -1;
   scene.bodies.resize(1);

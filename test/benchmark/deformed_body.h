@@ -28,6 +28,7 @@ struct Case {
   int materials = 1;   ///< spread through it in balls
   bool both_laws = false;
   bool ring = false;  ///< a slanting ring that fills a tenth of its box, not a cube
+  MpmBoundary boundary = MpmBoundary::kLattice;  ///< what most figures were measured with
 };
 
 /// Fills the body with balls, four or five along each edge, of `count` materials in turn.
@@ -83,6 +84,7 @@ inline std::unique_ptr<MpmTissue> deformed_body(const Case& c) {
   Scene scene = free_box(Vec3::Constant(edge), h);
   scene.threads = c.threads;
   scene.ground.enabled = c.ground;
+  scene.mpm.boundary = c.boundary;
   Material m;
   m.name = "cube";
   m.law = c.law;

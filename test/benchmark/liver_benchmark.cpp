@@ -50,8 +50,9 @@ constexpr Liver kLivers[] = {{"probe/3mm", 3e-3, kSoft, 0.45, kGentle, Liver::kN
                              {"cutting/3mm", 3e-3, kSoft, 0.45, kGentle, Liver::kCuts},
                              {"cutting/1mm", 1e-3, kSoft, 0.45, kGentle, Liver::kCuts}};
 
-Scene liver_scene(const Liver& liver) {
+Scene liver_scene(const Liver& liver, MpmBoundary boundary) {
   Scene scene;
+  scene.mpm.boundary = boundary;
   scene.cell_size = liver.cell_size;
   scene.damping = 2;
   scene.device = Device::kCuda;
@@ -93,13 +94,13 @@ void move_grasper(Simulation& simulation, double t) {
 }
 
 /// How many times faster than real time, clouds of all points at 30 Hz included.
-void operate(benchmark::State& bench, const Liver& liver) {
+void operate(benchmark::State& bench, const Liver& liver, MpmBoundary boundary) {
   const std::string why = why_no_gpu();
   if (!why.empty()) {
     bench.SkipWithError(why.c_str());
     return;
   }
-  Simulation simulation(liver_scene(liver));
+  Simulation simulation(liver_scene(liver, boundary));
   const Quat down(Eigen::AngleAxisd(M_PI, Vec3::UnitX()));
   const Quat blade = Quat(Eigen::AngleAxisd(M_PI / 2, Vec3::UnitZ())) * down;  // cuts towards +y
   std::vector<std::uint8_t> cloud;
@@ -159,11 +160,15 @@ void operate(benchmark::State& bench, const Liver& liver) {
 
 void add_liver_benchmarks() {
   for (const Liver& liver : kLivers) {
-    benchmark::RegisterBenchmark((std::string("mpm/cuda/liver/") + liver.name).c_str(), operate,
-                                 liver)
-        ->UseRealTime()
-        ->Iterations(30)
-        ->Unit(benchmark::kMillisecond);
+    for (const MpmBoundary boundary : {MpmBoundary::kSurface, MpmBoundary::kLattice}) {
+      const std::string name = std::string("mpm/cuda/liver/") + liver.name;
+      benchmark::RegisterBenchmark(
+          (boundary == MpmBoundary::kLattice ? name + "/lattice" : name).c_str(), operate, liver,
+          boundary)
+          ->UseRealTime()
+          ->Iterations(30)
+          ->Unit(benchmark::kMillisecond);
+    }
   }
 }
 

@@ -119,10 +119,15 @@ TYPED_TEST(GrasperOf, PressesWithItsPressureAndNoMore) {
 TYPED_TEST(GrasperOf, ClosedWithAllForceDoesNotMakeTissueBlowUp) {
   Scene scene = block_on_ground(5e3);
   scene.tools[0].grip_pressure = 1e6;
-  Simulation simulation(this->on_device(scene));
+  scene = this->on_device(scene);
+  Simulation simulation(scene);
   const Vec3 low(0, 0, 0.012), high(0.02, 0.01, 0.04);
   move(simulation, low, low, 1.8, 1.8, 0.1);
   FrameReport report = move(simulation, low, low, 0, 0, 1);
+  if (scene.device == Device::kCpu) {  // 0.082 N, 499 substeps
+    EXPECT_GT(report.result.loads[0].grip, 0.07);
+    EXPECT_LT(report.result.substeps, 900);
+  }
   report = move(simulation, low, high, 0, 0, 0.5);
   EXPECT_TRUE(std::isfinite(report.result.kinetic_energy));
   EXPECT_LT(report.result.max_speed, 5);

@@ -38,7 +38,7 @@ struct Operation {
 
   Operation() {
     scene = inviscid(free_box(Vec3(0.06, 0.04, 0.024), 0.002));
-    scene.mpm.boundary = MpmBoundary::kLattice;  // all that the GPU has
+    scene.mpm.boundary = MpmBoundary::kLattice;  // at the surface: surface_contact_cuda_test.cpp
     scene.gravity = Vec3(0, 0, -9.81);
     scene.ground.enabled = true;
     scene.damping = 5;

@@ -59,7 +59,7 @@ TEST_F(SubstepOnGpu, MeasuringItChangesNothing) {
 TEST_F(SubstepOnGpu, HoldsWhileTissueIsPressedAndCut) {
   Scene scene = operation_scene(Vec3(0.08, 0.024, 0.028), Vec3(0, 0, 0.02));
   scene.tools[0].blade_length = 0.05;
-  scene.mpm.boundary = MpmBoundary::kLattice;  // all that the GPU has
+  scene.mpm.boundary = MpmBoundary::kLattice;
   const Quat down = Quat(Eigen::AngleAxisd(M_PI, Vec3::UnitX()));
   double energy[2], gain[2] = {};
   for (const Device device : {Device::kCpu, Device::kCuda}) {

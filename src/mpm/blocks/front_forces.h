@@ -2,6 +2,7 @@
 // side by side. For block_kernels.cpp alone.
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 
 #include "mpm/blocks/front_stress.h"
@@ -10,11 +11,12 @@
 namespace tissue_sim {
 namespace kernels {
 
-/// Slopes of the 27 weights of a cell at its eight points, times the cell size.
+/// Slopes of the 27 weights of a cell at its eight points, and in their mean, times the cell size.
 struct CellSlopes {
   alignas(64) float at_points[27][3][8];
   alignas(64) float of_nodes[8][3][32];
-  constexpr CellSlopes() : at_points(), of_nodes() {
+  alignas(64) float mean[27][4];
+  constexpr CellSlopes() : at_points(), of_nodes(), mean() {
     for (int k = 0; k < 27; ++k) {
       const int d[3] = {k % 3, k / 3 % 3, k / 9};
       for (int p = 0; p < 8; ++p) {
@@ -25,6 +27,7 @@ struct CellSlopes {
             value *= a == axis ? slope(s, d[a]) : lattice_weight(s, d[a]);
           }
           at_points[k][axis][p] = of_nodes[p][axis][k] = value;
+          mean[k][axis] += 0.125f * value;
         }
       }
     }
@@ -41,7 +44,6 @@ struct FrontPoints {
   using T = Vec<8>;
   const FrontCell& cell;
   const FrontField& field;
-  float* pulls;  // null where nothing asks for them
 
   TISSUE_SIM_INLINE const FrontPart& part(int j) const { return field.parts[cell.first + j]; }
   TISSUE_SIM_INLINE Vec<8> slope(int k, int axis) const {
@@ -66,8 +68,143 @@ struct FrontPoints {
   TISSUE_SIM_INLINE void parted(std::int32_t n, float (&x)[3]) const {
     for (int c = 0; c < 3; ++c) x[c] = (kRate ? field.rate : field.d)[c][n];
   }
-  TISSUE_SIM_INLINE void pull(int j, int c, float force) const { pulls[4 * j + c] = force; }
 };
+
+/// Mean gradient of a field over a cell's points: what viscosity acts on.
+struct MeanGradient {
+  Vec<4> of[3] = {};  ///< along the axes, by component
+
+  TISSUE_SIM_INLINE void add(const float (&value)[3], int k) {
+    const Vec<4> slope = load<4>(kCellSlopes.mean[k]);
+    for (int c = 0; c < 3; ++c) of[c] += value[c] * slope;
+  }
+  TISSUE_SIM_INLINE void store(float diagonal, float (&to)[9]) const {
+    for (int i = 0; i < 9; ++i) to[i] = of[i / 3][i % 3] + (i % 4 == 0 ? diagonal : 0.0f);
+  }
+};
+
+/// Three sums over the points of a cell.
+TISSUE_SIM_INLINE Vec<4> sums(const Vec<8> (&x)[3]) {
+  Vec<4> half[3];
+  for (int c = 0; c < 3; ++c) {
+    float of[8];
+    store<8>(of, x[c]);
+    half[c] = load<4>(of) + load<4>(of + 4);
+  }
+  const auto lane = [&half](int i) { return Vec<4>{half[0][i], half[1][i], half[2][i], 0.0f}; };
+  return (lane(0) + lane(1)) + (lane(2) + lane(3));
+}
+
+/// Stresses of a cell's points, times their volumes, summed up with how much of its energy is that
+/// with the first nodes parted. Several are worked out side by side: each step towards one waits
+/// for the step before.
+template <class LawOf>
+class FrontStresses {
+ public:
+  explicit FrontStresses(const FrontPoints& points) : points_(points) {}
+
+  /// Adds that at a gradient, and a viscous one that all points have.
+  TISSUE_SIM_INLINE void add(const Vec<8> (&G)[9], float weight, const float (&viscous)[9]) {
+    front::deformation(points_, G, F_[waiting_]);
+    weight_[waiting_] = weight;
+    std::copy_n(viscous, 9, viscous_[waiting_]);
+    if (++waiting_ == kTogether) work_out<kTogether>();
+  }
+  TISSUE_SIM_INLINE void work_out_rest() {
+    if (waiting_ == 1) work_out<1>();
+    if (waiting_ == 2) work_out<2>();
+    if (waiting_ == 3) work_out<kTogether>();
+  }
+  int count() const { return count_ + waiting_; }
+  /// The sum of the first so many.
+  const Vec<8> (&sum(int count) const)[9] { return sum_[count]; }
+
+ private:
+  static constexpr int kTogether = 4;
+
+  template <int N>
+  TISSUE_SIM_INLINE void work_out() {
+    Vec<8> mu[N], lambda[N];
+    for (int i = 0; i < N; ++i) {
+      mu[i] = points_.mu();
+      lambda[i] = points_.lambda();
+    }
+    for (int n = waiting_; n < N; ++n) std::copy_n(F_[0], 9, F_[n]);
+    Vec<8> P[N][9];
+    LawOf::template stresses<N>(F_, mu, lambda, P);
+    for (int n = 0; n < waiting_; ++n, ++count_) {
+      for (int i = 0; i < 9; ++i) {
+        const Vec<8> before = count_ == 0 ? Vec<8>{} : sum_[count_][i];
+        sum_[count_ + 1][i] = before + weight_[n] * (P[n][i] + viscous_[n][i]);
+      }
+    }
+    waiting_ = 0;
+  }
+
+  const FrontPoints& points_;
+  int waiting_ = 0, count_ = 0;
+  Vec<8> F_[kTogether][9], sum_[29][9];
+  float weight_[kTogether], viscous_[kTogether][9];
+};
+
+/// What a cell's stress, times volumes, is more than the block's, and the force on the parts that
+/// belongs to it.
+template <class LawOf>
+TISSUE_SIM_INLINE void front_stresses(const FrontPoints& p, Vec<8> (&sum)[9], float* pull) {
+  const FrontCell& cell = p.cell;
+  const bool is_viscous = cell.viscosity[0] > 0;
+  Vec<8> G[9] = {};
+  MeanGradient mean, rate;
+  for (int k = 0; k < 27; ++k) {
+    float value[3];
+    p.node<false>(cell.node[k], value);
+    for (float& x : value) x = cell.inverse_size * x;
+    front::add_gradient(p, value, k, G);
+    if (!is_viscous) continue;
+    mean.add(value, k);
+    p.node<true>(cell.node[k], value);
+    for (float& x : value) x = cell.inverse_size * x;
+    rate.add(value, k);
+  }
+  FrontStresses<LawOf> stresses(p);
+  int before[27];
+  for (int j = -1; j < cell.count; ++j) {  // with none of its nodes parted, with the first, ...
+    if (j >= 0) {
+      before[j] = stresses.count();  // those of what node j is not parted in
+      const FrontPart& part = p.part(j);
+      const float by = cell.inverse_size * part.side;
+      float value[3];
+      p.parted<false>(part.node, value);
+      for (float& x : value) x = by * x;
+      front::add_gradient(p, value, part.k, G);
+      if (is_viscous) {
+        mean.add(value, part.k);
+        p.parted<true>(part.node, value);
+        for (float& x : value) x = by * x;
+        rate.add(value, part.k);
+      }
+      if (!(part.step > 0)) continue;
+    }
+    float viscous[9] = {};
+    if (is_viscous) {
+      float F[9], of_rate[9];
+      mean.store(1, F);
+      rate.store(0, of_rate);
+      add_viscous_stress(F, of_rate, 0.125f * cell.viscosity[j < 0 ? 0 : 1], viscous);
+    }
+    stresses.add(G, j < 0 ? -p.part(0).share : p.part(j).step, viscous);
+  }
+  stresses.work_out_rest();
+  std::copy_n(stresses.sum(stresses.count()), 9, sum);
+  for (int j = 0; j < cell.count; ++j) {
+    const FrontPart& part = p.part(j);
+    Vec<8> of_points[3] = {};
+    for (int i = 0; i < 9; ++i) {
+      of_points[i / 3] += (sum[i] - stresses.sum(before[j])[i]) * p.slope(part.k, i % 3);
+    }
+    store<4>(pull + 4 * j, -cell.inverse_size * part.side * sums(of_points));
+  }
+}
 
 /// Force on the parted nodes of what resists motion without strain: stabilisation.h, of d alone.
 /// Returns the energy.
@@ -97,7 +234,7 @@ template <class LawOf>
 TISSUE_SIM_INLINE void front_forces(const FrontCell& cell, const FrontField& f, float* force,
                                     float* pull) {
   Vec<8> sum[9];
-  front::stresses<LawOf>(FrontPoints{cell, f, pull}, sum);
+  front_stresses<LawOf>(FrontPoints{cell, f}, sum, pull);
   float stress_of[9][8], component[3][32];
   for (int i = 0; i < 9; ++i) store<8>(stress_of[i], -cell.inverse_size * sum[i]);
   for (int c = 0; c < 3; ++c) {
@@ -121,7 +258,7 @@ TISSUE_SIM_INLINE void front_forces(const FrontCell& cell, const FrontField& f, 
 /// The same energy [J].
 template <class LawOf>
 TISSUE_SIM_INLINE double front_energy(const FrontCell& cell, const FrontField& f) {
-  const double sum = front::energy<LawOf>(FrontPoints{cell, f, nullptr});
+  const double sum = front::energy<LawOf>(FrontPoints{cell, f});
   return cell.stabilised > 0 ? sum + stabilise_parts(cell, f, nullptr) : sum;
 }
 

@@ -13,7 +13,6 @@
 //   sum(x)                       over all of them
 //   node<kRate>(n, x)            displacement [m] or velocity [m/s] of a node
 //   parted<kRate>(n, x)          the same of how far a parted node's sides are apart
-//   pull(j, c, force)            takes the force on that of part j, component c [N]
 #pragma once
 
 #include "material/laws.h"
@@ -79,39 +78,6 @@ TISSUE_SIM_INLINE void stress(const Points& p, const typename Points::T* G,
   }
   add_viscous_stress(mean, mean_rate, 0.125f * viscosity, viscous);
   for (int i = 0; i < 9; ++i) P[i] += viscous[i];
-}
-
-/// What a cell's stress, times volumes, is more than the block's; has the points take the force
-/// on its parts that belongs to it.
-template <class LawOf, class Points>
-TISSUE_SIM_INLINE void stresses(const Points& p, typename Points::T (&sum)[9]) {
-  using T = typename Points::T;
-  const FrontCell& cell = p.cell;
-  const bool viscous = cell.viscosity[0] > 0;
-  T G[9], rate[9], P[9], before[27][9];
-  gradient<false>(p, G);
-  if (viscous) gradient<true>(p, rate);
-  stress<LawOf>(p, G, rate, cell.viscosity[0], P);
-  for (int i = 0; i < 9; ++i) sum[i] = -p.part(0).share * P[i];
-  for (int j = 0; j < cell.count; ++j) {
-    for (int i = 0; i < 9; ++i) before[j][i] = sum[i];  // of what node j is not parted in
-    const FrontPart& part = p.part(j);
-    add_part<false>(p, part, G);
-    if (viscous) add_part<true>(p, part, rate);
-    if (!(part.step > 0)) continue;
-    stress<LawOf>(p, G, rate, cell.viscosity[1], P);
-    for (int i = 0; i < 9; ++i) sum[i] += part.step * P[i];
-  }
-  for (int j = 0; j < cell.count; ++j) {
-    const FrontPart& part = p.part(j);
-    for (int c = 0; c < 3; ++c) {
-      T of_points = {};
-      for (int axis = 0; axis < 3; ++axis) {
-        of_points += (sum[3 * c + axis] - before[j][3 * c + axis]) * p.slope(part.k, axis);
-      }
-      p.pull(j, c, -cell.inverse_size * part.side * p.sum(of_points));
-    }
-  }
 }
 
 /// The energy that a cell has more than the block's, without what stabilises it [J].

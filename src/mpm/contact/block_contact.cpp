@@ -107,6 +107,7 @@ void find_near_colliders(MpmState& state, const std::vector<Box>& reach, double 
   const int count = static_cast<int>(state.blocks.all.size());
   contacts.near.assign(count, {});
   contacts.cells.assign(count, {});
+  contacts.parts.assign(count, {});
   contacts.touching.resize(count);
   contacts.until_list = 0;
   state.cpu->for_each(count, [&](int i) {
@@ -145,6 +146,7 @@ void list_contacts(MpmState& state) {
   contacts.touching.assign(state.blocks.all.size(), {});
   contacts.near.assign(state.blocks.all.size(), {});
   contacts.cells.assign(state.blocks.all.size(), {});
+  contacts.parts.assign(state.blocks.all.size(), {});
   contacts.changes.assign(state.blocks.all.size(), {});
   if (before.empty()) return;  // on a GPU
   for (std::size_t i = 0; i < state.blocks.all.size(); ++i) {
@@ -184,7 +186,9 @@ bool is_list_due(Contacts& contacts) {
 
 void list_near_cells(MpmState& state, int index, float dt) {
   std::vector<NearCell>& cells = state.contacts.cells[index];
+  std::vector<NearPart>& parts = state.contacts.parts[index];
   cells.clear();
+  parts.clear();
   if (state.contacts.near[index].empty()) return;
   const Block& block = *state.blocks.all[index];
   const LatticeBody& body = state.bodies[block.body];
@@ -200,6 +204,7 @@ void list_near_cells(MpmState& state, int index, float dt) {
   for (const std::uint8_t c : state.contacts.near[index]) {
     const Collider& collider = state.colliders[c];
     const bool is_blade = collider.kind == Collider::kBlade;
+    const bool is_plane = collider.kind == Collider::kPlane;
     const double margin = kListLasts * approach(state, index, collider, dt) +
                           (is_blade ? 0 : surface_reach(state) * body.cell_size);
     const Box box = bounds(collider);
@@ -218,6 +223,7 @@ void list_near_cells(MpmState& state, int index, float dt) {
       // The flats of a blade push where it has cut.
       const bool in_body = state.points.bonds[p] == kAllBonds;
       if (is_blade && in_body) continue;
+      if (is_plane && !(block.volume[lane] > 0)) continue;  // what an anchor holds rests on nothing
       const float at[3] = {x[lane], x[lanes + lane], x[2 * lanes + lane]};
       // Where the flats of a blade end, its gap does: there the box must do.
       if (!is_blade && gap(collider, at).distance > margin) continue;
@@ -227,6 +233,7 @@ void list_near_cells(MpmState& state, int index, float dt) {
       if (is_blade || in_body || at_points) points[cell] |= 1u << row % 8;
     }
     const std::vector<SurfacePlace>& places = places_for(collider, block);
+    const int along = parts_along(collider, static_cast<float>(body.cell_size));
     auto place = places.begin();
     for (int z = 0, i = 0; z < block.nz; ++z) {
       for (int lane = 0; lane < block.stride; ++lane, ++i) {
@@ -237,6 +244,8 @@ void list_near_cells(MpmState& state, int index, float dt) {
         while (place != places.end() && place->cell == cell) ++place;
         const int count = is_blade ? 0 : static_cast<int>(place - first);
         if (points[i] == 0 && count == 0) continue;
+        const auto first_part = static_cast<std::int32_t>(parts.size());
+        if (count > 0) parts.resize(parts.size() + count_parts(&*first, count, along));
         const int node = z * block.plane + block.cell[lane];
         const Vec3 middle = reference_place(body, block, node, {});
         cells.push_back({cell,
@@ -247,7 +256,7 @@ void list_near_cells(MpmState& state, int index, float dt) {
                          count,
                          {static_cast<float>(middle[0]), static_cast<float>(middle[1]),
                           static_cast<float>(middle[2])},
-                         count > 0 ? largest_inv_mass(state.nodes, CellNodes(block, node)) : 0});
+                         first_part});
       }
     }
   }
@@ -401,10 +410,15 @@ float squared(const AxisWeights& weights) {
   return product;
 }
 
-/// The same on its places on the surface. Adds to `points` those that the collider may hold, for it
+/// Substeps until what is so far from a collider may touch it, which comes `nearer` in each [m].
+std::uint8_t clear_substeps(float distance, float nearer) {
+  return static_cast<std::uint8_t>(std::min<float>(kListLasts, distance / nearer));
+}
+
+/// Pushes on its places on the surface. Adds to `points` those that the collider may hold, for it
 /// holds places of theirs: that face away, or so deep that places around are not enough.
-bool push_surface(BlockPush& b, const NearCell& cell, const Collider& collider, ColliderLoad& load,
-                  float& clear, unsigned& points) {
+void push_surface(BlockPush& b, NearCell& cell, const Collider& collider, float nearer,
+                  NearPart* part, ColliderLoad& load, unsigned& points) {
   constexpr float kFacing = -0.1f, kTurned = 0.98f;  // cosines: of a surface that faces the tool,
                                                      // and of an inerter that still fits
   constexpr float kDeep = 0.2f;        // from where on a point is looked at by itself [cells]
@@ -422,8 +436,7 @@ bool push_surface(BlockPush& b, const NearCell& cell, const Collider& collider, 
                                    of.v[0].data(), of.v[1].data(), of.v[2].data()};
   const float beside = collider.kind == Collider::kJaw ? kBeside * h : 0;
   const std::vector<SurfacePlace>& places = places_for(collider, b.block);
-  bool touches = false;
-  int material = -1;
+  int material = -1, clear = kListLasts;
   SurfaceSpring of_unit_area{};
   float modulus = 0, young_modulus = 0, density = 0;
   const auto faces_away = [&](const SurfacePlace& place, const Gap& g) {
@@ -437,8 +450,13 @@ bool push_surface(BlockPush& b, const NearCell& cell, const Collider& collider, 
     return along > kFacing * std::sqrt(length);
   };
   const float stiffer = stiffer_across(collider.radius, h);
+  NearPart* const first = part;
   PlaceParts parts(places.data() + cell.first_place, cell.place_count, parts_along(collider, h));
-  while (parts.next()) {
+  for (; parts.next(); ++part) {
+    if (part->clear > 0) {
+      clear = std::min<int>(clear, --part->clear);
+      continue;
+    }
     const SurfacePlace& place = parts.place();
     const AxisWeights weights(place.place);
     Touch touch{cell.lane, place.point,
@@ -458,12 +476,18 @@ bool push_surface(BlockPush& b, const NearCell& cell, const Collider& collider, 
     const Gap g = gap(collider, at);
     if (g.distance >= 0) {
       if (is_held) b.let_go(touch);
-      clear = std::min(clear, std::max(0.0f, g.distance - beside));
-      if (g.distance < beside && !faces_away(place, g)) {
+      part->clear = clear_substeps(std::max(0.0f, g.distance - beside), nearer);
+      clear = std::min<int>(clear, part->clear);
+      if (g.distance >= beside) continue;
+      if (part->side == NearPart::kUnknown) {
+        part->side = faces_away(place, g) ? NearPart::kAway : NearPart::kTowards;
+      }
+      if (part->side == NearPart::kTowards) {
         load.points += (1 - g.distance / beside) * place.area / unit_area;
       }
       continue;
     }
+    clear = 0;
     if (!is_held) {
       if (faces_away(place, g)) {  // the far side of something thin
         points |= place.points;
@@ -473,7 +497,6 @@ bool push_surface(BlockPush& b, const NearCell& cell, const Collider& collider, 
       touch.begun = -g.distance;
       values_at(u_and_v, nodes, whole_rows, weights, moved);
     }
-    touches = true;
     if (g.distance < -kDeep * h) points |= place.points;
     const bool is_free = b.state.points.free_volume_of(place.point) > 0;
     const int own = b.state.points.material_of(place.point);
@@ -505,8 +528,12 @@ bool push_surface(BlockPush& b, const NearCell& cell, const Collider& collider, 
     // is what the substep bears.
     const float per_mass =
         static_cast<float>(parts.count()) * spring.along * b.dt * b.dt / kAlongBorne;
+    if (cell.lightest < 0) cell.lightest = largest_inv_mass(b.state.nodes, nodes);
     if (per_mass * cell.lightest * squared(weights) > 1) {  // mobility is that at most
-      const float light = per_mass * static_cast<float>(mobility(b.state.nodes, nodes, weights));
+      if (part->mobility < 0) {
+        part->mobility = static_cast<float>(mobility(b.state.nodes, nodes, weights));
+      }
+      const float light = per_mass * part->mobility;
       if (light > 1) {
         spring.along /= light;
         spring.damping_along /= light;
@@ -530,7 +557,9 @@ bool push_surface(BlockPush& b, const NearCell& cell, const Collider& collider, 
     b.touching.push_back(touch);
     add_load(collider, at, push, place.area / unit_area, load);
   }
-  return touches;
+  if (clear == 0) return;
+  cell.clear = static_cast<std::uint8_t>(clear);
+  for (NearPart* of_cell = first; of_cell < part; ++of_cell) of_cell->clear -= clear;
 }
 
 }  // namespace
@@ -549,23 +578,35 @@ void add_contact(MpmState& state, int index, float dt, float* force,
               contacts.touching[index].cend(),
               contacts.changes[index]};
   b.touching.reserve(contacts.touching[index].size());
+  int last = -1;
+  float nearer = 0;
   for (NearCell& cell : contacts.cells[index]) {
-    if (cell.clear > 0) {
-      --cell.clear;
-      continue;
-    }
     const Collider& collider = state.colliders[cell.collider];
+    if (cell.collider != last) {
+      last = cell.collider;
+      nearer = static_cast<float>(approach(state, index, collider, dt));
+    }
     ColliderLoad& load = loads[cell.collider];
-    float clear = std::numeric_limits<float>::max();
     // Points within the body touch where a tool is so thin that it came between places of the
     // surface, all that lost bonds touch a blade; others where their places do not hold them:
     // a flake between two cuts has none at its edge.
-    unsigned points = cell.points;
-    bool touches = cell.place_count > 0 && push_surface(b, cell, collider, load, clear, points);
-    touches = (points != 0 && push_points(b, cell, points, collider, load, clear)) || touches;
-    if (touches) continue;
-    const double nearer = approach(state, index, collider, dt);
-    cell.clear = static_cast<std::uint8_t>(std::min<double>(kListLasts, clear / nearer));
+    unsigned points = 0;
+    if (cell.clear > 0) {
+      --cell.clear;
+    } else if (cell.place_count > 0) {
+      push_surface(b, cell, collider, nearer, contacts.parts[index].data() + cell.first_part, load,
+                   points);
+    }
+    const bool all = cell.points_clear == 0;
+    if (all) {
+      points |= cell.points;
+    } else {
+      --cell.points_clear;
+    }
+    if (points == 0) continue;
+    float clear = std::numeric_limits<float>::max();
+    const bool touches = push_points(b, cell, points, collider, load, clear);
+    if (all && !touches) cell.points_clear = clear_substeps(clear, nearer);
   }
   // A point that no longer touches forgets where it was held.
   b.let_go_of_rest();

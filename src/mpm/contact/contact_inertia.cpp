@@ -1,6 +1,5 @@
 #include "mpm/contact/contact_inertia.h"
 
-#include <Eigen/Cholesky>
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
@@ -39,7 +38,7 @@ struct Begun {
 
 void work_out(InertialNode& n) {
   const Eigen::Matrix3d B = matrix(n.inertia);
-  const Eigen::Matrix3d S = (B + n.mass * Eigen::Matrix3d::Identity()).ldlt().solve(B);
+  const Eigen::Matrix3d S = (B + n.mass * Eigen::Matrix3d::Identity()).inverse() * B;
   for (int a = 0; a < 3; ++a) {
     n.share[a] = static_cast<float>(S(a, a));
     n.share[3 + a] = static_cast<float>(S(a, (a + 1) % 3));
@@ -53,8 +52,8 @@ void take_in(const Begun& begun, InertialNode& n, Nodes& nodes) {
   float taken[3];
   times(begun.inertia, v, taken);
   const Eigen::Matrix3d A = matrix(n.inertia) + n.mass * Eigen::Matrix3d::Identity();
-  const Vec3 change = A.ldlt().solve(Vec3(
-      begun.momentum[0] - taken[0], begun.momentum[1] - taken[1], begun.momentum[2] - taken[2]));
+  const Vec3 change = A.inverse() * Vec3(begun.momentum[0] - taken[0], begun.momentum[1] - taken[1],
+                                         begun.momentum[2] - taken[2]);
   for (int a = 0; a < 3; ++a) {
     const auto dv = static_cast<float>(change[a]);
     nodes.v[a][n.node] += dv;
@@ -94,9 +93,18 @@ void fit_inertia(MpmState& state, float dt) {
 void change_inertia(MpmState& state) {
   ContactInertia& inertia = state.contacts.inertia;
   Nodes& nodes = state.nodes;
-  for (InertialNode& n : inertia.nodes) {
-    for (float& i : n.impulse) i = 0;
+  std::vector<std::int32_t> changed;  // by number in inertia.nodes
+  for (std::size_t i = 0; i < inertia.nodes.size(); ++i) {
+    InertialNode& n = inertia.nodes[i];
+    for (float& of : n.impulse) of = 0;
     if (n.grown > 0) take_in_growth(n, state.colliders[n.collider], nodes);
+    for (int a = 0; a < 3; ++a) n.before[a] = nodes.v[a][n.node];
+    if (n.changed) changed.push_back(static_cast<std::int32_t>(i));
+  }
+  if (changed.empty() &&
+      std::all_of(state.contacts.changes.begin(), state.contacts.changes.end(),
+                  [](const std::vector<InertiaChange>& of) { return of.empty(); })) {
+    return;
   }
   std::vector<Begun> begun(inertia.nodes.size());
   for (std::size_t i = 0; i < state.contacts.changes.size(); ++i) {
@@ -128,6 +136,7 @@ void change_inertia(MpmState& state) {
           begun.emplace_back();
         }
         InertialNode& n = inertia.nodes[index];
+        if (!n.changed) changed.push_back(index);
         n.changed = true;
         n.uses += change.sign > 0 ? 1 : -1;
         n.collider = change.collider;
@@ -141,15 +150,13 @@ void change_inertia(MpmState& state) {
       }
     }
   }
-  for (std::size_t i = 0; i < inertia.nodes.size(); ++i) {
+  for (const std::int32_t i : changed) {
     InertialNode& n = inertia.nodes[i];
-    if (n.changed) {
-      n.changed = false;
-      if (n.uses == 0) std::fill_n(n.inertia, 6, 0.0f);
-      work_out(n);
-      const Begun& of = begun[i];
-      if (of.inertia[0] + of.inertia[1] + of.inertia[2] > 0) take_in(of, n, nodes);
-    }
+    n.changed = false;
+    if (n.uses == 0) std::fill_n(n.inertia, 6, 0.0f);
+    work_out(n);
+    const Begun& of = begun[i];
+    if (of.inertia[0] + of.inertia[1] + of.inertia[2] > 0) take_in(of, n, nodes);
     for (int a = 0; a < 3; ++a) n.before[a] = nodes.v[a][n.node];
   }
 }
@@ -167,8 +174,8 @@ void resist_acceleration(InertialNode& n, float keep, float dt, Nodes& nodes) {
 
 void add_inertial_loads(const MpmState& state, float kick, std::vector<ColliderLoad>& loads) {
   for (const InertialNode& n : state.contacts.inertia.nodes) {
-    if (n.uses == 0) continue;
     const Collider& c = state.colliders[n.collider];
+    if (n.uses == 0 || c.tool < 0) continue;  // nobody asks what the ground bears
     double arm[3], force[3];
     for (int a = 0; a < 3; ++a) {
       force[a] = -static_cast<double>(n.impulse[a]) / kick;

@@ -47,6 +47,17 @@ inline SurfacePlace part_of(SurfacePlace place, int along, int part) {
   return place;
 }
 
+/// How many parts some places have.
+inline int count_parts(const SurfacePlace* first, int places, int along) {
+  if (along == 1) return places;
+  int count = 0;
+  for (int i = 0; i < places; ++i) {
+    const int of_place = parts_along(first[i], along);
+    count += of_place * of_place;
+  }
+  return count;
+}
+
 /// Goes through some places, or their parts.
 class PlaceParts {
  public:
@@ -61,10 +72,12 @@ class PlaceParts {
       count_ = along * along;
       part_ = 0;
     }
-    if (count_ > 1) of_whole_ = part_of(*whole_, along_, part_);
     return true;
   }
-  const SurfacePlace& place() const { return count_ > 1 ? of_whole_ : *whole_; }
+  const SurfacePlace& place() {
+    if (count_ > 1) of_whole_ = part_of(*whole_, along_, part_);
+    return count_ > 1 ? of_whole_ : *whole_;
+  }
   int part() const { return part_; }
   int count() const { return count_; }  ///< that the place has
 

@@ -118,20 +118,20 @@ std::vector<SurfacePlace> surface_places_of(const LatticeBody& b, const Points& 
 std::vector<SurfacePlace> merged_places(const std::vector<SurfacePlace>& places,
                                         const Points& points) {
   std::vector<SurfacePlace> merged;
-  const auto is_free = [&](const SurfacePlace& p) { return points.free_volume_of(p.point) > 0; };
   // Tissue goes on all around: at rims and on debris each place counts.
   const auto is_amid = [&](const SurfacePlace& p) {
     return (points.bonds[p.point] | 1 << p.key % 8) == kAllBonds;
   };
   std::size_t of_cell = 0;  // the first
   for (const SurfacePlace& p : places) {
+    if (!(points.free_volume_of(p.point) > 0)) continue;  // what an anchor holds rests on nothing
     if (of_cell < merged.size() && merged[of_cell].cell != p.cell) of_cell = merged.size();
     const auto same = std::find_if(merged.begin() + static_cast<std::ptrdiff_t>(of_cell),
                                    merged.end(), [&](const SurfacePlace& m) {
                                      float along = 0;
                                      for (int a = 0; a < 3; ++a) along += m.normal[a] * p.normal[a];
                                      return m.key % 8 == p.key % 8 && is_amid(m) && is_amid(p) &&
-                                            is_free(m) == is_free(p) && along > kSameWay;
+                                            along > kSameWay;
                                    });
     if (same == merged.end()) {
       merged.push_back(p);

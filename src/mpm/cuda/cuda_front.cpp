@@ -134,7 +134,7 @@ void CudaMpmTissue::pass_rim(const BladePath& path, bool moves,
     begin = before;
   }
   pull_some(nodes);
-  tissue_sim::pass_rim(*state_, path, begin, end, broken, touched);
+  tissue_sim::pass_rim(*state_, path, begin, end, broken, nullptr, touched);
 }
 
 }  // namespace tissue_sim

@@ -25,17 +25,15 @@ struct BoxOfNode {
   static Vec3 place(int i) { return Vec3(i % 6, i / 6 % 6, i / 36); }  // [half cells]
 };
 
-constexpr int kBoxStride[3] = {1, 6, 36};
-
 /// Calls f(i, j, axis) for the pairs of neighbours among some places.
 template <class F>
 void for_each_pair(const Planes& all, const F& f) {
-  for (int i = 0; i < 216; ++i) {
-    if (!BoxOfNode::has(all, i)) continue;
-    const int at[3] = {i % 6, i / 6 % 6, i / 36};
-    for (int axis = 0; axis < 3; ++axis) {
-      if (at[axis] < 5 && BoxOfNode::has(all, i + kBoxStride[axis]))
-        f(i, i + kBoxStride[axis], axis);
+  for (int z = 0; z < 6; ++z) {
+    for (int i = 36 * z; i < 36 * z + 36; ++i) {
+      if (!BoxOfNode::has(all, i)) continue;
+      if (i % 6 < 5 && BoxOfNode::has(all, i + 1)) f(i, i + 1, 0);
+      if (i % 36 < 30 && BoxOfNode::has(all, i + 6)) f(i, i + 6, 1);
+      if (z < 5 && BoxOfNode::has(all, i + 36)) f(i, i + 36, 2);
     }
   }
 }
@@ -53,6 +51,7 @@ double passed_share(const MpmState& s, std::int32_t p, int axis) {
 /// The plane of a cut in a box, and on which side of it places are: 1 and -1, 0 unknown.
 struct CutPlane {
   bool there = false;
+  int broken = 0;  ///< bonds between the places
   Vec3 normal = Vec3::Zero();
   std::array<std::int8_t, 216> side = {};
 };
@@ -60,12 +59,13 @@ struct CutPlane {
 CutPlane find_plane(const MpmState& s, const BoxOfNode& box, const Planes& all) {
   CutPlane plane;
   Vec3 middle = Vec3::Zero();
-  int count = 0;
+  int count = 0;  // of those that were cut
   bool torn = false;
   std::array<int, 216> votes = {};
   for_each_pair(all, [&](int i, int j, int axis) {
     const std::int32_t p = box.point[i];
     if (!is_broken(s.points, p, axis)) return;
+    ++plane.broken;
     const Crossing* crossing = s.points.crossings.find(p, axis);
     if (crossing == nullptr) {
       torn = true;
@@ -112,6 +112,19 @@ float parted_share(double cut, double lambda_over_mu) {
 constexpr double kLeastSide = 0.01;
 constexpr int kLeastPoints = 32;
 
+/// The share that the bonds between a node's sides ask for.
+float share_of(const MpmState& s, const BoxOfNode& box, const CutPlane& plane,
+               const FrontNode& node) {
+  double all = 0, cut = 0;
+  for_each_pair(node.all, [&](int i, int j, int axis) {
+    if (BoxOfNode::has(node.first_side, i) == BoxOfNode::has(node.first_side, j)) return;
+    const double area = std::fabs(plane.normal[axis]);
+    all += area;
+    cut += area * passed_share(s, box.point[i], axis);
+  });
+  return all > 0 ? parted_share(cut / all, node.lambda_over_mu) : 0;
+}
+
 /// Parts a node as far as its bonds say; `before` if it was parted already. Returns a share of 0
 /// where it is not.
 FrontNode parted_node(const MpmState& s, const FrontNode& at, const FrontNode* before) {
@@ -132,15 +145,7 @@ FrontNode parted_node(const MpmState& s, const FrontNode& at, const FrontNode* b
     }
     if (!weigh_sides(s, result)) return result;
   }
-  double all = 0, cut = 0;
-  for_each_pair(at.all, [&](int i, int j, int axis) {
-    if (BoxOfNode::has(result.first_side, i) == BoxOfNode::has(result.first_side, j)) return;
-    const double area = std::fabs(plane.normal[axis]);
-    all += area;
-    cut += area * passed_share(s, box.point[i], axis);
-  });
-  if (all > 0)
-    result.share = std::max(result.share, parted_share(cut / all, result.lambda_over_mu));
+  result.share = std::max(result.share, share_of(s, box, plane, result));
   return result;
 }
 
@@ -181,6 +186,13 @@ bool weigh_sides(const MpmState& s, FrontNode& n) {
   n.mass = static_cast<float>(mass[0] * mass[1] / sum);
   n.lambda_over_mu = static_cast<float>(ratio / volume);
   return count >= kLeastPoints && std::min(mass[0], mass[1]) > kLeastSide * sum;
+}
+
+bool is_cut_between_sides(const MpmState& s, const FrontNode& n) {
+  BoxOfNode box;
+  points_around(s.bodies[n.body], n.x, n.y, n.z, box.point);
+  const CutPlane plane = find_plane(s, box, n.all);
+  return plane.there ? share_of(s, box, plane, n) > 0 : plane.broken > 0;
 }
 
 void follow_front(MpmState& s, const std::vector<std::int32_t>& touched) {

@@ -59,14 +59,20 @@ inline bool is_broken(const Points& points, std::int32_t p, int axis) {
 }
 
 /// Widens the rim by what the points `changed`, which lost bonds, add to it, and notes what the
-/// path passed of it, as sweep_bonds(). Appends points of bonds of which it passed more.
+/// path passed of it, as sweep_bonds(). Appends points of bonds of which it passed more. `near`:
+/// by point, 0 where it is farther than kRimReach from all that the edges sweep; null: not known.
 void pass_rim(MpmState& state, const BladePath& path, const Array<float>* u_begin,
               const Array<float>* u_end, const std::vector<std::int32_t>& broken,
-              std::vector<std::int32_t>& touched);
+              const std::uint8_t* near, std::vector<std::int32_t>& touched);
+inline constexpr double kRimReach = 3;  ///< [cells]
 
 /// Works out the masses of a node's two sides, from `all` and `first_side`. Returns whether both
 /// are heavy enough to part it.
 bool weigh_sides(const MpmState& state, FrontNode& node);
+/// Whether the cut that parts a node ends between its points: not in a field that is left of one
+/// where the cut went on beside it. Points of both sides in that are those that the first plane,
+/// through a few bonds, put on the wrong one.
+bool is_cut_between_sides(const MpmState& state, const FrontNode& node);
 /// After nodes were split: new fields take over the motion of the side that they were; those of
 /// both sides, where another cut came across, are parted as the node was.
 void split_front(MpmState& state);

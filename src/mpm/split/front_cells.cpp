@@ -1,7 +1,8 @@
 // The cells that see parted nodes, and what they push.
 #include <algorithm>
 #include <array>
-#include <map>
+#include <utility>
+#include <vector>
 
 #include "compute/simd.h"
 #include "mpm/blocks/stabilisation.h"
@@ -31,35 +32,76 @@ bool same_parts(const std::vector<FrontPart>& a, const std::vector<FrontPart>& b
          });
 }
 
-/// The views of the points of a cell.
-std::vector<CellView> views_of(const MpmState& s,
-                               const std::map<std::int32_t, std::int32_t>& parted,
+/// The nodes around a cell that has points.
+struct NodesOfCell {
+  std::int32_t lattice[27];
+  const NodeFields::Split* split[27];
+  bool any_parted = false;
+
+  NodesOfCell(const MpmState& s, const std::vector<std::int32_t>& parted, const LatticeBody& body,
+              int x, int y, int z) {
+    for (int k = 0; k < 27; ++k) {
+      lattice[k] = body.node(x + k % 3 - 1, y + k / 3 % 3 - 1, z + k / 9 - 1);
+      split[k] = s.fields->split(lattice[k]);
+      if (split[k] == nullptr) {
+        any_parted = any_parted || parted[lattice[k]] >= 0;
+        continue;
+      }
+      for (const NodeFields::Split::Field& f : split[k]->fields) {
+        any_parted = any_parted || parted[f.node] >= 0;
+      }
+    }
+  }
+};
+
+/// The views of the points of a cell; `parted` has the number of each node among the parted ones,
+/// -1 for others.
+std::vector<CellView> views_of(const MpmState& s, const std::vector<std::int32_t>& parted,
                                const LatticeBody& body, int x, int y, int z) {
   std::vector<CellView> views;
+  std::array<std::int32_t, 8> points;
+  for (int p = 0; p < 8; ++p) {
+    points[p] = body.point(2 * x + (p & 1), 2 * y + (p >> 1 & 1), 2 * z + (p >> 2));
+  }
+  if (*std::max_element(points.begin(), points.end()) < 0) return views;
+  const NodesOfCell around(s, parted, body, x, y, z);
+  if (!around.any_parted) return views;
   // A block damps its points in a cell together; a GPU has one for each material.
-  std::map<std::pair<std::array<std::int32_t, 27>, int>, double> damped;
-  const auto in_block = [&s](const CellView& view, std::int32_t point) {
-    return std::make_pair(view.node, s.blocks.uniform ? s.points.material_of(point) : 0);
+  struct Damped {
+    std::array<std::int32_t, 27> node;
+    int material;
+    double volume;
+  };
+  std::vector<Damped> damped;
+  const auto in_block = [&](const CellView& view, std::int32_t point) -> double& {
+    const int material = s.blocks.uniform ? s.points.material_of(point) : 0;
+    for (Damped& d : damped) {
+      if (d.node == view.node && d.material == material) return d.volume;
+    }
+    damped.push_back({view.node, material, 0});
+    return damped.back().volume;
   };
   for (int p = 0; p < 8; ++p) {
-    const int place[3] = {2 * x + (p & 1), 2 * y + (p >> 1 & 1), 2 * z + (p >> 2)};
-    const std::int32_t point = body.point(place[0], place[1], place[2]);
+    const std::int32_t point = points[p];
     if (point < 0) continue;
     const double volume = elastic_volume(s.points, point);
     if (!(volume > 0)) continue;
     const Points::Site& site = s.points.site[point];
     CellView view;
     for (int k = 0; k < 27; ++k) {
-      view.node[k] = s.fields->node(body, site, k);
-      const auto found = parted.find(view.node[k]);
-      if (found == parted.end()) continue;
-      const FrontNode& n = s.front.nodes[found->second];
-      const int plane = place[2] - 2 * n.z + 2;
-      const int bit = bit_in_plane(place[0] - 2 * n.x + 2, place[1] - 2 * n.y + 2);
+      view.node[k] = around.split[k] == nullptr
+                         ? around.lattice[k]
+                         : around.split[k]->seen_by(site, x + k % 3 - 1, y + k / 3 % 3 - 1,
+                                                    z + k / 9 - 1);
+      const std::int32_t number = parted[view.node[k]];
+      if (number < 0) continue;
+      const FrontNode& n = s.front.nodes[number];
+      const int plane = site.z - 2 * n.z + 2;
+      const int bit = bit_in_plane(site.x - 2 * n.x + 2, site.y - 2 * n.y + 2);
       const bool first = (n.first_side[plane] >> bit & 1) != 0;
-      view.parts.push_back({found->second, k, first ? -n.other : n.first, n.share, 0});
+      view.parts.push_back({number, k, first ? -n.other : n.first, n.share, 0});
     }
-    damped[in_block(view, point)] += volume;
+    in_block(view, point) += volume;
     if (view.parts.empty()) continue;
     const Material& material = body.material_of(s.points, point);
     view.law = material.law;
@@ -68,7 +110,7 @@ std::vector<CellView> views_of(const MpmState& s,
     });
     if (same == views.end()) {
       view.point.fill(-1);
-      same = views.insert(same, view);
+      same = views.insert(same, std::move(view));
     }
     same->point[p] = point;
     same->volume += volume;
@@ -79,7 +121,7 @@ std::vector<CellView> views_of(const MpmState& s,
     for (const std::int32_t point : view.point) {
       if (point < 0) continue;
       view.of_block += body.material_of(s.points, point).viscosity *
-                       elastic_volume(s.points, point) * damped[in_block(view, point)];
+                       elastic_volume(s.points, point) * in_block(view, point);
     }
   }
   return views;
@@ -117,16 +159,26 @@ void add_front_cell(MpmState& s, const LatticeBody& body, std::int32_t number, C
   front.parts.insert(front.parts.end(), view.parts.begin(), view.parts.end());
 }
 
-/// Where the forces of nodes, or pulls, are to be found.
-template <class Places>
-void list_sums(const std::map<std::int32_t, std::vector<std::int32_t>>& of, Places& sums,
-               std::vector<std::int32_t>& places) {
+/// Where the forces on nodes, or parted ones, of `count` are to be found: place i is that of
+/// node_of(i), of so many places.
+template <class NodeOf, class PlaceOf>
+void list_sums(std::size_t count, std::size_t places, const NodeOf& node_of,
+               const PlaceOf& place_of, std::vector<Front::Sum>& sums,
+               std::vector<std::int32_t>& to) {
+  std::vector<std::int32_t> sum_of(count, 0);  // first how many it has
+  for (std::size_t i = 0; i < places; ++i) ++sum_of[node_of(i)];
   sums.clear();
-  places.clear();
-  for (const auto& [node, at] : of) {
-    sums.push_back(
-        {node, static_cast<std::int32_t>(places.size()), static_cast<std::int32_t>(at.size())});
-    places.insert(places.end(), at.begin(), at.end());
+  std::int32_t first = 0;
+  for (std::size_t n = 0; n < count; ++n) {
+    if (sum_of[n] == 0) continue;
+    sums.push_back({static_cast<std::int32_t>(n), first, 0});
+    first += sum_of[n];
+    sum_of[n] = static_cast<std::int32_t>(sums.size()) - 1;
+  }
+  to.resize(places);
+  for (std::size_t i = 0; i < places; ++i) {
+    Front::Sum& sum = sums[sum_of[node_of(i)]];
+    to[sum.first + sum.count++] = static_cast<std::int32_t>(place_of(i));
   }
 }
 
@@ -138,32 +190,37 @@ void list_front_cells(MpmState& s) {
   Front& front = s.front;
   front.cells.clear();
   front.parts.clear();
-  std::map<std::int32_t, std::int32_t> parted;
-  std::map<std::array<std::int32_t, 4>, bool> cells;  // body, z, y, x
+  std::vector<std::int32_t> parted(s.nodes.size(), -1);
+  std::vector<std::array<std::int32_t, 4>> cells;  // body, z, y, x
+  cells.reserve(27 * front.nodes.size());
   for (std::size_t i = 0; i < front.nodes.size(); ++i) {
     const FrontNode& n = front.nodes[i];
     parted[n.node] = static_cast<std::int32_t>(i);
     for (int k = 0; k < 27; ++k) {
-      cells[{n.body, n.z + k / 9 - 1, n.y + k / 3 % 3 - 1, n.x + k % 3 - 1}] = true;
+      cells.push_back({n.body, n.z + k / 9 - 1, n.y + k / 3 % 3 - 1, n.x + k % 3 - 1});
     }
   }
-  for (const auto& [at, there] : cells) {
-    const LatticeBody& body = s.bodies[at[0]];
-    for (CellView& view : views_of(s, parted, body, at[3], at[2], at[1])) {
-      add_front_cell(s, body, at[0], view);
-    }
+  std::sort(cells.begin(), cells.end());
+  cells.erase(std::unique(cells.begin(), cells.end()), cells.end());
+  std::vector<std::vector<CellView>> views(cells.size());
+  s.cpu->for_each(
+      static_cast<int>(cells.size()),
+      [&](int i) {
+        const auto& [body, z, y, x] = cells[i];
+        views[i] = views_of(s, parted, s.bodies[body], x, y, z);
+      },
+      16);
+  for (std::size_t i = 0; i < cells.size(); ++i) {
+    for (CellView& view : views[i]) add_front_cell(s, s.bodies[cells[i][0]], cells[i][0], view);
   }
-  std::map<std::int32_t, std::vector<std::int32_t>> of_node, of_part;
-  for (std::size_t i = 0; i < front.cells.size(); ++i) {
-    for (int k = 0; k < 27; ++k) {
-      of_node[front.cells[i].node[k]].push_back(static_cast<std::int32_t>(kFrontForce * i) + 4 * k);
-    }
-  }
-  for (std::size_t i = 0; i < front.parts.size(); ++i) {
-    of_part[front.parts[i].node].push_back(static_cast<std::int32_t>(4 * i));
-  }
-  list_sums(of_node, front.node_sums, front.node_places);
-  list_sums(of_part, front.part_sums, front.part_places);
+  list_sums(
+      s.nodes.size(), 27 * front.cells.size(),
+      [&](std::size_t i) { return front.cells[i / 27].node[i % 27]; },
+      [](std::size_t i) { return kFrontForce * (i / 27) + 4 * (i % 27); }, front.node_sums,
+      front.node_places);
+  list_sums(
+      front.nodes.size(), front.parts.size(), [&](std::size_t i) { return front.parts[i].node; },
+      [](std::size_t i) { return 4 * i; }, front.part_sums, front.part_places);
   front.force.assign(kFrontForce * front.cells.size(), 0.0f);
   front.pull.assign(4 * front.parts.size(), 0.0f);
 }

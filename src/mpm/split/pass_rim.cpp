@@ -98,7 +98,7 @@ std::uint32_t passed_of(const MpmState& s, const std::vector<SweepPart>& parts,
   const LatticeBody& body = s.bodies[s.points.site[p].body];
   const std::int32_t q = body.next_point(s.points.site[p], axis);
   const Placed end = placed_point(s, u_end, p), end_q = placed_point(s, u_end, q);
-  const double reach = 3 * body.cell_size;
+  const double reach = kRimReach * body.cell_size;
   const MovingSegment there{end.x, end_q.x, end.x, end_q.x};
   const auto is_far = [&](const SweepPart& part) {
     return std::all_of(part.edges.begin(), part.edges.end(),
@@ -138,13 +138,14 @@ std::uint32_t passed_of(const MpmState& s, const std::vector<SweepPart>& parts,
 
 void pass_rim(MpmState& s, const BladePath& path, const Array<float>* u_begin,
               const Array<float>* u_end, const std::vector<std::int32_t>& broken,
-              std::vector<std::int32_t>& touched) {
+              const std::uint8_t* near, std::vector<std::int32_t>& touched) {
   update_rim(s, broken);
   if (s.front.rim.empty()) return;
   const std::vector<SweepPart> parts = sweep_parts(path);
   std::vector<std::pair<std::int64_t, std::uint32_t*>> rim;
   for (auto& [key, mask] : s.front.rim) {
-    if (mask != 0xffffffffu) rim.emplace_back(key, &mask);
+    if (mask == 0xffffffffu || (near != nullptr && near[key / 3] == 0)) continue;
+    rim.emplace_back(key, &mask);
   }
   std::vector<std::uint32_t> more(rim.size());
   s.cpu->for_each(

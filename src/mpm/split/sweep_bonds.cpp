@@ -7,6 +7,7 @@
 #include "mpm/contact/facet_motion.h"
 #include "mpm/lattice/bonds.h"
 #include "mpm/split/cut_tissue.h"
+#include "mpm/split/front.h"
 #include "mpm/split/near_sweep.h"
 #include "tissue_sim/limits.h"
 
@@ -15,12 +16,14 @@ namespace {
 
 // Points within this many cells are brought: few bonds of those that are looked at end elsewhere.
 constexpr double kBringReach = 2 * kSweepReach;
+static_assert(kBringReach >= kRimReach, "points near the rim's bonds are known");
 
 // Of a path of so many edges it is noted what is outside of each of them; a scalpel has two.
 constexpr std::size_t kNotedEdges = 4;
 
-/// What is known of where a point is: whether it was brought, and whether it is near an edge.
-constexpr unsigned kBrought = 0x40, kNear = 0x80;
+/// What is known of where a point is: whether it was brought, whether it is near an edge, and
+/// whether it is at least within kBringReach of one.
+constexpr unsigned kBeside = 0x20, kBrought = 0x40, kNear = 0x80;
 
 /// Sweeps one path through all tissue.
 class Sweep {
@@ -89,7 +92,7 @@ class Sweep {
         const std::int32_t p = block.point[near.lane];
         if (p < 0) continue;
         std::uint8_t& known = known_[p];
-        known |= near.near ? kNear : 0;
+        known |= near.near ? kNear | kBeside : kBeside;
         for (std::size_t e = 0; e < outside_.size(); ++e) {
           outside_[e][p] = e == edge.number ? near.outside : passed.outside[e];
         }
@@ -109,6 +112,9 @@ class Sweep {
       }
     }
   }
+
+  /// By point: 0 for those farther than kBringReach from all edges.
+  const std::uint8_t* known() const { return known_.data(); }
 
   /// The bonds that point forward from the points of a layer across z and that the path passes.
   std::vector<BrokenBond> broken_bonds(const LatticeBody& body, int z) const {
@@ -288,7 +294,9 @@ void sweep_bonds(MpmState& state, const BladePath& path, const Array<float>* u_b
     }
   });
   break_bonds(state, broken, changed, report);
-  if (state.front.follows) pass_rim(state, path, u_begin, u_end, changed, touched);
+  if (state.front.follows) {
+    pass_rim(state, path, u_begin, u_end, changed, sweep.known(), touched);
+  }
 }
 
 }  // namespace tissue_sim

@@ -28,9 +28,9 @@ inline constexpr float kThinTip = 4 / 3.0f;
 inline constexpr float kAcrossThin = 6;  ///< times the cells in its radius to the power of -2
 inline constexpr float kUnbounded = 1e30f;
 /// What presses at most on a place of tissue that cannot give way, in units of Young's modulus: a
-/// jaw, and any tool where the face of an anchor holds the tissue. With more, rims bear more of what
-/// a grasper holds with, and a soft block hangs lower from it; without a bound tissue between jaws
-/// is crushed flat, and before a tool that comes into an anchor it is turned inside out. What
+/// jaw, and any tool where the face of an anchor holds the tissue. With more, rims bear more of
+/// what a grasper holds with, and a soft block hangs lower from it; without a bound tissue between
+/// jaws is crushed flat, and before a tool that comes into an anchor it is turned inside out. What
 /// presses back more lies in the tool.
 inline constexpr float kMostOfHeld = 1;
 inline constexpr float kInertia = 0.5f;  ///< b / (k dt^2) of the inerter beside the stiff spring

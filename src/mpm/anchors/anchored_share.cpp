@@ -81,7 +81,7 @@ void find_lightness(LatticeTissue& tissue) {
         const int other = b.point(s.x + o.x, s.y + o.y, s.z + o.z);
         if (other >= 0) most = std::max(most, std::min(share(other), 1.0f));
       }
-      if (most > 0) points.lightness[p] = share(p) / most;
+      points.lightness[p] = most > 0 ? share(p) / most : 0;
     }
   }
 }

@@ -33,8 +33,10 @@ TISSUE_SIM_INLINE void stiffen(const Block& b, const BlockField& f, std::int32_t
   r.wildest = std::max(r.wildest, stiffening);
   if (f.soft != nullptr && f.soft[point] != 0) stiffening *= kSoftness;
   // Behind the face of an anchor tissue strains as its nodes do, without its neighbours' stress; it
-  // is as light as it is soft, and as long as it holds on to them its nodes have their mass.
-  if (f.lightness != nullptr && f.bonds[point] == f.whole_bonds[point]) {
+  // is as light as it is soft, and as long as it holds on to them its nodes have their mass. What
+  // the anchor has keeps next to nothing of its stiffness.
+  if (f.lightness != nullptr &&
+      (f.bonds[point] == f.whole_bonds[point] || f.lightness[point] == 0)) {
     stiffening = 1 + f.lightness[point] * (stiffening - 1);
   }
   const int material = f.material == nullptr ? 0 : f.material[point];

@@ -84,6 +84,18 @@ void find_nodes(Block& block, const LatticeBody& b) {
   }
 }
 
+/// What an anchor holds of a cell at its face keeps a little of its stiffness, so that no node of
+/// the cell hangs loose.
+void keep_held(Block& block, const Points& points, int z, int column) {
+  for (int s = 0; s < 8; ++s) {
+    const std::size_t lane = (static_cast<std::size_t>(z) * 8 + s) * block.stride + column;
+    const std::int32_t point = block.point[lane];
+    if (point >= 0 && block.volume[lane] == 0) {
+      block.volume[lane] = kStabilisation * points.volume[point];
+    }
+  }
+}
+
 /// Puts the part's points into the lanes of the block, lane_of[ny][nx].
 void fill_side(Block& block, const LatticeBody& b, const Points& points, const Part& part,
                const Block::Side& side, int first_y, const std::vector<int>& lane_of) {
@@ -111,6 +123,10 @@ void fill_side(Block& block, const LatticeBody& b, const Points& points, const P
     }
     for (int i = 0; i < c.cells; ++i) {
       if (count[i] >= kSteadyCount || count[i] == 0) continue;
+      if (c.count >= kSteadyCount) {  // an anchor has the rest
+        keep_held(block, points, z, column + i);
+        continue;
+      }
       block.partial.push_back({z * block.stride + column + i,
                                z * block.plane + block.cell[column + i],
                                static_cast<float>(mu[i])});

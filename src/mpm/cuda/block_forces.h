@@ -129,6 +129,11 @@ struct ColumnWalk {
       center[c] = above[c];
     }
   }
+  /// A cell that resists nothing, with the column's nodes of the plane above.
+  __device__ __forceinline__ void pass(const float4* nodes) {
+    for (int c = 0; c < 3; ++c) below[c] = center[c];
+    read_plane<kPartial>(nodes, column.pitch, center);
+  }
   /// What comes after the column's last cell.
   __device__ __forceinline__ void rise() {
 #pragma unroll
@@ -200,8 +205,10 @@ __device__ __forceinline__ int4 block_size(const CudaTables& t, int block) {
 
 /// Forces of a bundle. Each column of cells has a thread, or two, that walks up it with what the
 /// cells give to the next two node planes in registers. `block` is the bundle's first; bundles
-/// of several blocks need kSpecial, cells that are not full kPartial.
-template <class LawOf, bool kViscous, bool kSpecial, bool kPartial, bool kPairs>
+/// of several blocks need kSpecial, cells that are not full kPartial; with kLayers layers that
+/// resist nothing are left out.
+template <class LawOf, bool kViscous, bool kSpecial, bool kPartial, bool kPairs,
+          bool kLayers = false>
 __device__ __forceinline__ void block_forces(const CudaTables& t, const CudaBundle& w,
                                              const CudaBlock& block, const CudaBody& body,
                                              const BlockShared& s, const BlockStep& step) {
@@ -243,13 +250,15 @@ __device__ __forceinline__ void block_forces(const CudaTables& t, const CudaBund
   if (warp_active) walk.begin(nodes, nodes + walk.column.plane);
 #pragma unroll 1
   for (int z = 0; z < nz; ++z) {
-    if (warp_active && (!kSpecial || z < walk.column.nz)) {
+    if (warp_active && (!kSpecial || z < walk.column.nz) &&
+        (!kLayers || (block.layers >> z & 1) != 0)) {
       if (kPairs) {
         walk.half(z);
       } else {
         walk.cell(z, nodes + (z + 2) * walk.column.plane, [] {});
       }
-    } else if (kSpecial) {
+    } else if (kSpecial || kLayers) {
+      if (kLayers && !kPairs && warp_active) walk.pass(nodes + (z + 2) * walk.column.plane);
       walk.rise();
     }
     finish_plane(walk.now, z);

@@ -6,9 +6,6 @@
 
 namespace tissue_sim {
 
-/// Bit of SlotCache::shared for a slot whose node moves elsewhere: hold_rows().
-inline constexpr std::uint32_t kHeldSlot = 1u << 30;
-
 /// What a slot's node and the first parts of its force are, for a block that stays where it is from
 /// substep to substep to keep in shared memory.
 struct SlotCache {
@@ -141,9 +138,8 @@ struct SlotEntry {
 /// forces of the last substep, summed in the order of the slots; every block that has a node
 /// computes the same, and the one that owns it writes it down, and what its inerters bore to
 /// `loads`. Each thread has kHand nodes in hand, for all their loads to be under way at once; what
-/// the tables say of the next ones comes meanwhile. `pushes` is read with kPushes alone; with
-/// kLeavesHeld slots with the bit kHeldSlot are left to others.
-template <bool kMove, bool kCached, int kHand, bool kPushes = false, bool kLeavesHeld = false>
+/// the tables say of the next ones comes meanwhile. `pushes` is read with kPushes alone.
+template <bool kMove, bool kCached, int kHand, bool kPushes = false>
 __device__ __forceinline__ void bring_nodes(const CudaTables& t, int first_slot, int count,
                                             const SlotCache& cache, const CudaNodes& from,
                                             const CudaNodes& to, const float4* force,
@@ -178,7 +174,6 @@ __device__ __forceinline__ void bring_nodes(const CudaTables& t, int first_slot,
       owned[k] = coming[k].node >= 0;
       node[k] = owned[k] ? coming[k].node : ~coming[k].node;
       shared[k] = coming[k].shared;
-      if (kLeavesHeld && (shared[k] & kHeldSlot) != 0) continue;
       u[k] = __ldcg(from.u + node[k]);
       if (kMove || v_out != nullptr) v[k] = __ldcg(from.v + node[k]);
       if (!kMove) continue;
@@ -198,7 +193,6 @@ __device__ __forceinline__ void bring_nodes(const CudaTables& t, int first_slot,
     if (!kCached) load_entries(i + kHand * threads);
 #pragma unroll
     for (int k = 0; kMove && k < kHand; ++k) {
-      if (kLeavesHeld && (shared[k] & kHeldSlot) != 0) continue;
       const std::uint32_t part_count = shared[k] & 63u;
       if (part_count > 4) more[k][3] = __ldcg(force + next_parts[k].x);
       if (part_count > 5) more[k][4] = __ldcg(force + next_parts[k].y);
@@ -209,7 +203,6 @@ __device__ __forceinline__ void bring_nodes(const CudaTables& t, int first_slot,
     for (int k = 0; k < kHand; ++k) {
       const int at = i + k * threads;
       if (at >= count) break;
-      if (kLeavesHeld && (shared[k] & kHeldSlot) != 0) continue;
       if (kMove) {
         for (const float4& p : more[k]) add(p, f[k]);
         const int part_count = static_cast<int>(shared[k] & 63u);

@@ -77,7 +77,7 @@ void CudaMpmTissue::push_lightness() {
   if (points.lightness.empty()) return;
   std::vector<float> lightness(points.lightness.begin(), points.lightness.end());
   for (std::size_t p = 0; p < lightness.size(); ++p) {
-    if (points.bonds[p] != state_->whole_bonds[p]) lightness[p] = 1;
+    if (points.bonds[p] != state_->whole_bonds[p] && lightness[p] > 0) lightness[p] = 1;
   }
   device_->anchors.lightness.upload(lightness, device_->stream);
   check_cuda(cudaStreamSynchronize(device_->stream), "receive data");

@@ -31,6 +31,7 @@ double CudaMpmTissue::measure_limit(int steps) {
   frame.arrived = d.arrived.data();
   frame.held_faces = d.anchors.view(0, 0);
   frame.held_faces.places = nullptr;
+  frame.held_faces.pull = nullptr;
   frame.held_faces.impulse = nullptr;
   // Between two parts of a frame nobody needs the state before a part, nor what contact pushes
   // with.

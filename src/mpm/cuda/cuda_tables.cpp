@@ -58,7 +58,9 @@ void CudaMpmTissue::plan_tables() {
   d.plan.small = d.shape.small;
   d.plan.marches = d.shape.marches;
   d.plan.pairs = d.shape.pairs();
-  d.plan.max_slots = d.plan.max_plane_slots = 0;
+  d.plan.max_slots = d.plan.max_plane_slots = d.plan.max_held = d.plan.max_items = 0;
+  const AnchorFaces& anchors = state_->anchors;
+  d.plan.holds = false;
   const std::vector<Block*>& blocks = state_->blocks.all;
   for (const Block* b : blocks) {
     const int plane = (b->nx + 2) * (b->ny + 2);
@@ -78,9 +80,11 @@ void CudaMpmTissue::plan_tables() {
     d.resident = resident_blocks(d.plan, static_cast<int>(count));
     d.plain_plan = d.plan;
     d.plain_plan.plain = true;
+    d.plain_plan.holds = false;
     d.plain_resident = resident_blocks(d.plain_plan, static_cast<int>(count));
     d.push_plan = d.plan;
     d.push_plan.pushes = true;
+    d.push_plan.holds = false;
     d.push_resident = resident_blocks(d.push_plan, static_cast<int>(count));
     d.touch_plan = d.push_plan;
     d.touch_plan.touches = true;
@@ -123,11 +127,19 @@ void CudaMpmTissue::plan_tables() {
   d.plan.max_columns = t.max_columns;
   d.anchors.made = make_face_rows(*state_, t, t.max_plane_slots);
   d.plan.max_held = d.anchors.made->most_held;
+  d.plan.max_items = d.anchors.made->most_items;
+  const bool all_whole = std::all_of(t.bundles.begin(), t.bundles.end(), [](const CudaBundle& b) {
+    return b.blocks == 1 && b.partial == 0;
+  });
+  const bool is_held = !anchors.groups.empty();
+  d.plan.holds =
+      is_held && all_whole && !d.anchors.made->grouped && !d.anchors.made->carries_always;
   choose(t.bundles.size());
-  // Those kernels hold no faces.
-  d.all_plain = state_->anchors.groups.empty() &&
-                std::all_of(t.bundles.begin(), t.bundles.end(),
-                            [](const CudaBundle& b) { return b.blocks == 1 && b.partial == 0; });
+  if (d.plan.holds && d.plan.small && !d.plan.cached) {  // for want of shared memory
+    d.plan.holds = false;
+    choose(t.bundles.size());
+  }
+  d.all_plain = all_whole && !is_held;  // those kernels hold no faces
   if (d.resident == 0 || d.plain_resident == 0 || d.push_resident == 0 || d.touch_resident == 0 ||
       (may_have_fronts && d.front_resident == 0)) {
     throw std::runtime_error("the GPU has too little shared memory");

@@ -116,13 +116,12 @@ __device__ __forceinline__ void hold_chunk(const CudaHeldFaces& h, const FacesAt
 }
 
 /// After bring_nodes() moved them as if they were free: nodes of the bundle that faces hold, and
-/// those inside anchors that move. All threads of the block; they must meet before they go on. Out
-/// of line, for scenes without anchors to keep their registers.
+/// those inside anchors that move. All threads of the block; they must meet before they go on.
 template <bool kPushes>
-__device__ __noinline__ void hold_faces(const HeldFrame* frame, int round, float4* u_out,
-                                        float4* v_out, float scale, int bundle, float4* exchange) {
-  const CudaHeldFaces h = frame->faces;
-  const FacesAtWork w(*frame, round, {u_out, v_out, scale});
+__device__ __forceinline__ void hold_faces(const HeldFrame& frame, int round,
+                                           const BundleNodes& nodes, int bundle, float4* exchange) {
+  const CudaHeldFaces h = frame.faces;
+  const FacesAtWork w(frame, round, nodes);
   for (int i = bundle; i >= 0;) {
     const CudaFaceChunk chunk = load_entry(h.chunks + i);
     if (chunk.rows > 0) hold_chunk<kPushes>(h, w, bundle, exchange, chunk);
@@ -142,7 +141,7 @@ __device__ __noinline__ void hold_faces(const HeldFrame* frame, int round, float
       to[c] = static_cast<float>(is);
       rate[c] = static_cast<float>((is - was) / w.step.dt);
     }
-    put_node(w, n.node, n.local, __ldg(frame->slot_node + n.slot) >= 0,
+    put_node(w, n.node, n.local, __ldg(frame.slot_node + n.slot) >= 0,
              {to[0], to[1], to[2], __ldcg(&w.from.u[n.node].w)},
              {rate[0], rate[1], rate[2], __ldcg(&w.from.v[n.node].w)});
   }

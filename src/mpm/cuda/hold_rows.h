@@ -90,15 +90,6 @@ __device__ __forceinline__ void fill_held(const CudaHeldFaces& h, const HeldOfBu
     cache.word[i % 4 * cache.room + i / 4] = from[i];
   }
 }
-/// Marks their slots in the bundle's cache of slots, which is filled.
-__device__ __forceinline__ void mark_held(const CudaHeldFaces& h, const HeldOfBundle& of,
-                                          const SlotCache& cache) {
-  for (int i = static_cast<int>(threadIdx.x); i < of.count; i += static_cast<int>(blockDim.x)) {
-    const int local = h.held[of.first + i].local;
-    if (local >= 0) cache.shared[local & (kOwnedHere - 1)] |= kHeldSlot;
-  }
-}
-
 __device__ __forceinline__ CudaHeldNode load_held(const CudaHeldNode* from, const HeldCache& cache,
                                                   bool cached, int i) {
   CudaHeldNode n;
@@ -171,15 +162,14 @@ __device__ __forceinline__ float sum_of_four(float x) {
 
 /// Moves the nodes of the bundle's rows on as bring_nodes() would, and holds the rows: each by four
 /// lanes, who share nothing with others, so nobody waits. All bundles that have nodes of a row work
-/// it out alike. Out of line, for scenes without anchors to keep their registers.
+/// it out alike.
 template <bool kPushes>
-__device__ __noinline__ void hold_rows(const HeldFrame* frame, int round, float4* u_out,
-                                       float4* v_out, float scale, int first, int count,
-                                       uint4* words, int room) {
+__device__ __forceinline__ void hold_rows(const HeldFrame& frame, int round,
+                                          const BundleNodes& nodes, int first, int count,
+                                          const HeldCache& cache) {
   constexpr int kHand = 2;
-  const CudaHeldFaces h = frame->faces;
-  const FacesAtWork w(*frame, round, {u_out, v_out, scale});
-  const HeldCache cache{words, room};
+  const CudaHeldFaces h = frame.faces;
+  const FacesAtWork w(frame, round, nodes);
   const bool cached = count <= cache.room;
   const int thread = static_cast<int>(threadIdx.x), threads = static_cast<int>(blockDim.x);
   const float inv_dt = 1 / w.step.dt;

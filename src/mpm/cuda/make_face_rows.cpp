@@ -292,13 +292,19 @@ HostFaceRows make_face_rows(const MpmState& state, const HostTables& t, int plan
     to.first_held.push_back(static_cast<int>(to.held.size()));
     for (const int g : groups) {
       if (faces.groups[g].count > 1) {
+        to.grouped = true;
         fill.add(static_cast<int>(i), first_slot, g);
         continue;
       }
       add_row(faces, faces.groups[g], slots, static_cast<int>(i), first_slot, summed[g], to);
       summed[g] = true;
     }
-    to.most_held = std::max(to.most_held, static_cast<int>(to.held.size()) - to.first_held.back());
+    const auto first = to.held.begin() + to.first_held.back();
+    const auto here = static_cast<int>(to.held.end() - first);
+    to.most_held = std::max(to.most_held, here);
+    const auto put =
+        std::count_if(first, to.held.end(), [](const CudaHeldNode& n) { return n.local >= 0; });
+    to.most_items = std::max(to.most_items, here + t.bundles[i].slots - static_cast<int>(put));
   }
   to.first_held.push_back(static_cast<int>(to.held.size()));
   to.first_carried.push_back(static_cast<int>(to.carried.size()));

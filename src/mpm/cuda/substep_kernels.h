@@ -4,10 +4,10 @@
 #include <type_traits>
 
 #include "mpm/cuda/block_forces.h"
-#include "mpm/cuda/hold_faces.h"
 #include "mpm/cuda/push_cells.h"
 #include "mpm/cuda/push_contacts.h"
 #include "mpm/cuda/push_front.h"
+#include "mpm/cuda/shared_work.h"
 #include "mpm/cuda/substeps.h"
 
 namespace tissue_sim {
@@ -18,7 +18,9 @@ enum class Laws { kFixedCorotated, kNeoHookean, kAny };
 
 /// What a kernel can do: whole tissue (CudaPlan::plain), cut tissue too, contact with tools beside,
 /// or of tissue with tissue too, and with fronts of cuts.
-enum class Can { kPlain, kCuts, kPushes, kTouches, kFronts };
+enum class Can { kPlain, kCuts, kPushes, kTouches, kFronts, kHolds };
+/// Whether tissue need not be whole.
+constexpr bool cuts(Can can) { return can != Can::kPlain && can != Can::kHolds; }
 constexpr bool touches(Can can) { return can == Can::kTouches || can == Can::kFronts; }
 constexpr bool pushes(Can can) { return can == Can::kPushes || touches(can); }
 
@@ -28,119 +30,59 @@ __device__ __forceinline__ bool has_faces(const CudaFrame& f) {
   return kCan == Can::kTouches || (kCan == Can::kFronts && f.faces != nullptr);
 }
 
-/// The shared memory of a thread block. Worked out anew where it is needed, so that the compiler
-/// knows it for shared memory and can use its faster loads.
-template <bool kVelocities>
-__device__ __forceinline__ BlockShared shared_of(const CudaLayout& layout) {
-  extern __shared__ float4 shared[];
-  BlockShared s;
-  s.u = shared;
-  s.v = s.u + (kVelocities ? layout.max_slots : 0);
-  s.exchange = shared + layout.node_room;
-  s.colliders = reinterpret_cast<Collider*>(s.exchange + layout.exchange);
-  s.rounds = reinterpret_cast<FaceRounds*>(s.colliders + kMaxColliders);
-  s.cells = reinterpret_cast<WarpNodes*>(s.u + layout.cells);
-  return s;
-}
-
-template <Laws kLaws, bool kPairs, bool kSpecial, bool kPartial>
+template <Laws kLaws, bool kPairs, bool kSpecial, bool kPartial, bool kLayers = false>
 __device__ __forceinline__ void forces(const CudaTables& t, const CudaBundle& w, const CudaBlock& b,
                                        const CudaBody& body, const BlockShared& s,
                                        const BlockStep& step) {
   if constexpr (kLaws == Laws::kFixedCorotated) {
-    block_forces<FixedCorotated, false, kSpecial, kPartial, kPairs>(t, w, b, body, s, step);
+    block_forces<FixedCorotated, false, kSpecial, kPartial, kPairs, kLayers>(t, w, b, body, s,
+                                                                             step);
   } else if constexpr (kLaws == Laws::kNeoHookean) {
-    block_forces<NeoHookean, false, kSpecial, kPartial, kPairs>(t, w, b, body, s, step);
+    block_forces<NeoHookean, false, kSpecial, kPartial, kPairs, kLayers>(t, w, b, body, s, step);
   } else if (body.neo_hookean != 0) {
-    block_forces<NeoHookean, true, kSpecial, kPartial, kPairs>(t, w, b, body, s, step);
+    block_forces<NeoHookean, true, kSpecial, kPartial, kPairs, kLayers>(t, w, b, body, s, step);
   } else {
-    block_forces<FixedCorotated, true, kSpecial, kPartial, kPairs>(t, w, b, body, s, step);
+    block_forces<FixedCorotated, true, kSpecial, kPartial, kPairs, kLayers>(t, w, b, body, s, step);
   }
 }
 
-/// A bundle with what belongs to it. Copies: through a reference they would be read again after
-/// every store.
-struct BundleAtWork {
-  CudaBundle bundle;
-  CudaBlock block;  ///< the first
-  CudaBody body;
-  __device__ __forceinline__ BundleAtWork(const CudaTables& t, int index)
-      : bundle(t.bundles[index]),
-        block(t.blocks[bundle.first_block]),
-        body(t.bodies[bundle.body]) {}
-};
-
-/// What functions that are not inlined need, in shared memory: see HeldFrame.
-struct alignas(16) SharedWork {
-  HeldOfBundle held;
-  HeldFrame frame;
-  CudaTables tables;
-  CudaLayout layout;
-  CudaBundle bundle;
-  CudaBlock block;
-  CudaBody body;
-
-  __device__ __forceinline__ void begin(const CudaTables& t, const CudaFrame& f,
-                                        const CudaLayout& l) {
-    tables = t;
-    layout = l;
-    frame.faces = f.held_faces;
-    frame.parts = t.parts;
-    frame.slot_node = t.slot_node;
-    frame.state[0] = f.state[0];
-    frame.state[1] = f.state[1];
-    frame.force[0] = f.force[0];
-    frame.force[1] = f.force[1];
-    frame.step = f.step;
-    frame.pushes = f.pushes;
-    frame.current = f.current;
-    frame.substeps = f.substeps;
-  }
-  __device__ __forceinline__ void take(const BundleAtWork& w, const HeldOfBundle& of) {
-    bundle = w.bundle;
-    block = w.block;
-    body = w.body;
-    held = of;
-  }
-};
-
 /// Out of line, for the ordinary blocks to keep theirs in registers.
 template <Laws kLaws, bool kPairs, bool kPartial>
-__device__ __noinline__ void special_forces(const SharedWork* work, float4* force,
-                                            int workers_first, int workers_count) {
+__device__ __noinline__ void special_forces(float4* force, int workers_first, int workers_count) {
+  const SharedWork& work = work_of();
   // Copies: through the pointer they would be read again after every store.
-  const CudaTables t = work->tables;
-  const CudaBundle w = work->bundle;
-  const CudaBlock block = work->block;
-  const CudaBody body = work->body;
-  const CudaLayout layout = work->layout;
+  const CudaTables t = work.tables;
+  const CudaBundle w = work.bundle;
+  const CudaBlock block = work.block;
+  const CudaBody body = work.body;
+  const CudaLayout layout = work.layout;
   BlockStep step{force, layout.two_planes, {}};
   step.workers.first = workers_first;
   step.workers.count = workers_count;
-  forces<kLaws, kPairs, true, kPartial>(t, w, block, body, shared_of<kLaws == Laws::kAny>(layout),
-                                        step);
+  forces<kLaws, kPairs, true, kPartial>(t, w, block, body,
+                                        shared_of<kLaws == Laws::kAny, true>(layout), step);
 }
 
 /// Forces of a bundle whose nodes are there. The exchange is `clear` where the thread block has had
 /// no other bundle.
 template <Laws kLaws, Can kCan, bool kPairs>
 __device__ __forceinline__ void all_forces(const CudaTables& t, const BundleAtWork& w,
-                                           const SharedWork* work, const CudaLayout& layout,
-                                           bool clear, float4* force, const Workers& workers) {
-  const BlockShared s = shared_of<kLaws == Laws::kAny>(layout);
+                                           const CudaLayout& layout, bool clear, float4* force,
+                                           const Workers& workers) {
+  const BlockShared s = shared_of<kLaws == Laws::kAny, cuts(kCan)>(layout);
   if (!clear) clear_exchange(s.exchange, w.bundle.plane_slots, layout.two_planes);
   if (!pushes(kCan) || !clear) __syncthreads();
   const BlockStep step{force, layout.two_planes, workers};
   // Small tissue waits for instructions as often as it issues them, and those of two ways and of
   // contact are more than the caches of the multiprocessors hold.
   const auto special = [&](const auto& partial) {
-    special_forces<kLaws, kPairs, std::decay_t<decltype(partial)>::value>(
-        work, force, workers.first, workers.count);
+    special_forces<kLaws, kPairs, std::decay_t<decltype(partial)>::value>(force, workers.first,
+                                                                          workers.count);
   };
   if (touches(kCan) && kPairs && !workers.is_all()) {
     special(std::true_type());
-  } else if (kCan == Can::kPlain || (w.bundle.partial == 0 && w.bundle.blocks == 1)) {
-    forces<kLaws, kPairs, false, false>(t, w.bundle, w.block, w.body, s, step);
+  } else if (!cuts(kCan) || (w.bundle.partial == 0 && w.bundle.blocks == 1)) {
+    forces<kLaws, kPairs, false, false, kCan == Can::kHolds>(t, w.bundle, w.block, w.body, s, step);
   } else if (w.bundle.partial != 0) {
     special(std::true_type());
   } else {
@@ -160,21 +102,37 @@ __device__ __forceinline__ void nodes_are_there(const CudaFrame& f) {
 /// State and forces change places between two buffers. With kPushes, the thread block arrives at
 /// the second barrier when its last block's nodes are in place, so that the forces hide the wait
 /// for the others.
-template <Laws kLaws, bool kCached, bool kPairs, Can kCan>
+template <Laws kLaws, bool kCached, bool kPairs, Can kCan, class AtWork>
 __device__ __forceinline__ void block_round(const CudaTables& t, const CudaFrame& f,
-                                            const BundleAtWork& w, int index, int round,
-                                            const CudaLayout& layout, const SlotCache& cache,
-                                            SharedWork* work, const HeldCache& held,
-                                            const Workers& workers, bool last) {
+                                            const AtWork& at_work, int index, int round,
+                                            const CudaLayout& layout,
+                                            const HeldOfBundle& items_held, const Workers& workers,
+                                            bool last) {
   constexpr bool kPushes = pushes(kCan);
   constexpr int kHand = kCached && (kPairs || kCan != Can::kPlain) ? 2 : 4;  // as registers allow
-  const BlockShared s = shared_of<kLaws == Laws::kAny>(layout);
+  const BlockShared s = shared_of<kLaws == Laws::kAny, cuts(kCan)>(layout);
+  const SlotCache cache = cache_of<cuts(kCan)>(s, layout);
+  const BundleAtWork& w = at_work();
   const float scale = placed_scale(w.body);
   float4* v = kLaws == Laws::kAny ? s.v : nullptr;
   // Not f.state[i]: parameters that a register indexes would be copied to local memory.
   const bool odd = ((f.current + max(round - 1, 0)) & 1) != 0, odd_round = (round & 1) != 0;
   const CudaNodes &from = odd ? f.state[1] : f.state[0], &to = odd ? f.state[0] : f.state[1];
-  if (round == 0) {
+  if constexpr (kCan == Can::kHolds && kCached) {
+    const BundleItems items = items_of(s, layout);
+    const HeldOfBundle& of = items_held;
+    const int count = of.count + *items.free_count;
+    if (round == 0) {
+      place_items(items, count, from, scale, s.u, v);
+    } else {
+      bring_items<kPairs ? 3 : 2>(t, f, items, of.count, count, round, from, to,
+                                  odd_round ? f.force[0] : f.force[1], scale, s.u, v);
+      if (of.carries && round == f.substeps) {
+        __syncthreads();
+        carry_nodes(t, f, index, round, from, to);
+      }
+    }
+  } else if (round == 0) {
     bring_nodes<false, kCached, kHand>(t, w.bundle.first_slot, w.bundle.slots, cache, from, from,
                                        nullptr, f.step, scale, s.u, v);
   } else {
@@ -186,27 +144,19 @@ __device__ __forceinline__ void block_round(const CudaTables& t, const CudaFrame
       loads = {t.blocks + w.bundle.first_block, w.bundle.blocks, t.bodies, f.colliders + first,
                reinterpret_cast<unsigned long long*>(f.loads) + kLoadSums * first};
     }
-    constexpr bool kLeavesHeld = kCached && kCan == Can::kCuts;  // to hold_rows()
-    bring_nodes<true, kCached, kHand, kPushes, kLeavesHeld>(
-        t, w.bundle.first_slot, w.bundle.slots, cache, from, to,
-        odd_round ? f.force[0] : f.force[1], f.step, scale, s.u, v, pushed, loads);
-    if (kCan != Can::kPlain && f.held_faces.chunks != nullptr) {
-      const HeldOfBundle of = kCached ? work->held : HeldOfBundle(f.held_faces, index);
-      if (!kLeavesHeld) __syncthreads();
-      if (of.count > 0) {
-        hold_rows<kPushes>(&work->frame, round, s.u, v, scale, of.first, of.count, held.word,
-                           held.room);
-      }
-      if (of.grouped || (of.carries && (round == f.substeps || f.held_faces.carries_always))) {
-        hold_faces<kPushes>(&work->frame, round, s.u, v, scale, index, s.exchange);
-      }
+    bring_nodes<true, kCached, kHand, kPushes>(t, w.bundle.first_slot, w.bundle.slots, cache, from,
+                                               to, odd_round ? f.force[0] : f.force[1], f.step,
+                                               scale, s.u, v, pushed, loads);
+    if (cuts(kCan) && f.held_faces.chunks != nullptr) {
+      __syncthreads();
+      hold_bundle<kLaws == Laws::kAny, kPushes>(round);
     }
   }
   if (round == f.substeps) return;
   if (kPushes && last) nodes_are_there(f);
   if (!workers.has_me()) return;
-  all_forces<kLaws, kCan, kPairs>(t, w, work, layout, kCached, odd_round ? f.force[1] : f.force[0],
-                                  workers);
+  all_forces<kLaws, kCan, kPairs>(t, at_work(), layout, kCached,
+                                  odd_round ? f.force[1] : f.force[0], workers);
 }
 
 /// Contact, once all nodes are where the round brought them: of tissue with colliders and of tissue
@@ -265,19 +215,8 @@ template <Laws kLaws, bool kCached, bool kPairs, Can kCan>
 __global__ void __launch_bounds__(kMaxCudaThreads, 1)
     mpm_substeps(const CudaTables t, const CudaFrame f, const CudaLayout layout) {
   constexpr bool kPushes = pushes(kCan), kTouches = touches(kCan), kFronts = kCan == Can::kFronts;
-  const BlockShared s = shared_of<kLaws == Laws::kAny>(layout);
-  const int max_slots = layout.max_slots, mine = static_cast<int>(blockIdx.x);
-  SlotCache cache;
-  auto* const work = kCan == Can::kPlain ? nullptr : reinterpret_cast<SharedWork*>(s.rounds + 1);
-  HeldCache held;
-  held.word =
-      reinterpret_cast<uint4*>(kCan == Can::kPlain ? s.rounds + 1 : static_cast<void*>(work + 1));
-  held.room = layout.held;
-  cache.parts = held.word + 4 * layout.held;
-  cache.more = layout.eight_parts ? cache.parts + max_slots : nullptr;
-  cache.node =
-      reinterpret_cast<std::int32_t*>(cache.parts + (layout.eight_parts ? 2 : 1) * max_slots);
-  cache.shared = reinterpret_cast<std::uint32_t*>(cache.node + max_slots);
+  const BlockShared s = shared_of<kLaws == Laws::kAny, cuts(kCan)>(layout);
+  const int mine = static_cast<int>(blockIdx.x);
   const bool idle = kPushes && mine >= t.bundle_count;
   // Where columns have one thread, a round is long enough for few to push.
   const bool helpers =
@@ -301,22 +240,20 @@ __global__ void __launch_bounds__(kMaxCudaThreads, 1)
     s.rounds->begin(t, *f.faces, f.step.dt);
     if (mine == 0) clear_next_turns(f.arrived, 0);
   }
-  if (kCan != Can::kPlain && threadIdx.x == 0) work->begin(t, f, layout);
+  if (cuts(kCan) && threadIdx.x == 0) work_of().begin(t, f, layout);
   const BundleAtWork kept(t, kCached && !idle ? mine : 0);
+  HeldOfBundle of;
   if (kCached && !idle) {
-    fill_cache(t, kept.bundle.first_slot, kept.bundle.slots, cache);
+    if (kCan != Can::kPlain) of = HeldOfBundle(f.held_faces, mine);
+    if constexpr (kCan == Can::kHolds) {
+      fill_items(t, f.held_faces, of, kept.bundle, s.u, items_of(s, layout));
+    } else {
+      fill_cache(t, kept.bundle.first_slot, kept.bundle.slots, cache_of<cuts(kCan)>(s, layout));
+    }
     clear_exchange(s.exchange, kept.bundle.plane_slots, layout.two_planes);
-    HeldOfBundle of;
-    if (kCan != Can::kPlain) {
-      of = HeldOfBundle(f.held_faces, mine);
-      if (threadIdx.x == 0) work->take(kept, of);
-      fill_held(f.held_faces, of, held);
-    }
+    if (cuts(kCan) && threadIdx.x == 0) work_of().take(kept, of, mine);
+    if (cuts(kCan)) fill_held(f.held_faces, of, held_of(s, layout));
     __syncthreads();
-    if (kCan == Can::kCuts && f.held_faces.chunks != nullptr) {
-      mark_held(f.held_faces, of, cache);
-      __syncthreads();
-    }
   }
   for (int round = 0; round <= f.substeps; ++round) {
     if (round > 0) {
@@ -332,25 +269,36 @@ __global__ void __launch_bounds__(kMaxCudaThreads, 1)
     if constexpr (kFronts) move_parted(f, t.bundle_count, round, pushed_nodes(f.pushes, round));
     if (idle) {
       if (round < f.substeps) nodes_are_there(f);
+    } else if constexpr (kCached && cuts(kCan)) {
+      // Read anew where it is needed, for what comes between to have the registers.
+      const auto at_work = [&] {
+        const SharedWork& work = work_of();
+        return BundleAtWork(work.bundle, work.block, work.body);
+      };
+      block_round<kLaws, true, kPairs, kCan>(t, f, at_work, mine, round,
+                                             layout_now<cuts(kCan)>(layout), of, workers, true);
     } else if constexpr (kCached) {
-      block_round<kLaws, true, kPairs, kCan>(t, f, kept, mine, round, layout, cache, work, held,
-                                             workers, true);
+      block_round<kLaws, true, kPairs, kCan>(t, f, kept, mine, round,
+                                             layout_now<cuts(kCan)>(layout), of, workers, true);
     } else {
       for (int i = mine; i < t.bundle_count; i += gridDim.x) {
         const bool last = i + static_cast<int>(gridDim.x) >= t.bundle_count;
         const BundleAtWork bundle(t, i);
-        if (kCan != Can::kPlain) {
-          if (threadIdx.x == 0) work->take(bundle, {});
+        if (cuts(kCan)) {
+          if (threadIdx.x == 0) work_of().take(bundle, HeldOfBundle(f.held_faces, i), i);
           __syncthreads();
         }
-        block_round<kLaws, false, kPairs, kCan>(t, f, bundle, i, round, layout, cache, work, held,
-                                                workers, last);
+        block_round<kLaws, false, kPairs, kCan>(t, f, bundle, i, round,
+                                                layout_now<cuts(kCan)>(layout), of, workers, last);
         __syncthreads();  // the next one clears the exchange
       }
     }
     if constexpr (kPushes) {
       if (kFronts && round < f.substeps && for_front) push_front_of(f, round, free_for_front);
-      if (round < f.substeps) push_nodes<kCan, kPairs>(t, f, s, round, pushers, helpers, met);
+      if (round < f.substeps)
+        push_nodes<kCan, kPairs>(
+            t, f, shared_of<kLaws == Laws::kAny, cuts(kCan)>(layout_now<cuts(kCan)>(layout)), round,
+            pushers, helpers, met);
       if (kFronts && round < f.substeps && apart && pushers.has_me()) {
         push_front_of(f, round, free_for_front);
       }
@@ -360,8 +308,12 @@ __global__ void __launch_bounds__(kMaxCudaThreads, 1)
 
 template <Laws kLaws, bool kPairs, Can kCan>
 CudaKernel kernel_for(const CudaPlan& plan) {
-  return plan.cached ? mpm_substeps<kLaws, true, kPairs, kCan>
-                     : mpm_substeps<kLaws, false, kPairs, kCan>;
+  if constexpr (kCan == Can::kHolds) {
+    return mpm_substeps<kLaws, true, kPairs, kCan>;
+  } else {
+    return plan.cached ? mpm_substeps<kLaws, true, kPairs, kCan>
+                       : mpm_substeps<kLaws, false, kPairs, kCan>;
+  }
 }
 template <Laws kLaws, Can kCan>
 CudaKernel kernel_for(const CudaPlan& plan) {

@@ -115,7 +115,7 @@ struct ChangePoints {
     const CudaPointChange& c = changes[i];
     bonds[c.point] = c.bonds;
     if (soft != nullptr) soft[c.point] = c.soft;
-    if (lightness != nullptr && c.whole == 0) lightness[c.point] = 1;
+    if (lightness != nullptr && c.whole == 0 && lightness[c.point] > 0) lightness[c.point] = 1;
   }
 };
 

@@ -11,7 +11,7 @@ namespace tissue_sim {
 struct BundleItems {
   SlotCache of;     ///< `node`, never below 0; `shared`, `parts`, `more`
   int* local;       ///< CudaHeldNode::local
-  float4* row;      ///< of rows' nodes weight, share, arm and the anchor's number
+  float4* row;      ///< of rows' nodes weight, share, arm and CudaHeldNode::anchor
   int* impulse;     ///< CudaHeldNode::impulse
   int* free_count;  ///< items that are of no row
 
@@ -116,7 +116,8 @@ __device__ __forceinline__ void bring_items(const CudaTables& t, const CudaFrame
       next_parts[k] = items.of.more != nullptr ? items.of.more[at] : more_parts(t, shared[k]);
       if (at < held) {
         row[k] = items.row[at];
-        if (pull != nullptr) m[k] = __ldg(pull + 4 * __float_as_int(row[k].w) + thread % 4);
+        const int anchor = __float_as_int(row[k].w) & ~kSwings;
+        if (pull != nullptr) m[k] = __ldg(pull + 4 * anchor + thread % 4);
       }
     }
 #pragma unroll
@@ -141,6 +142,9 @@ __device__ __forceinline__ void bring_items(const CudaTables& t, const CudaFrame
       step.move(1, p[k].y, u[k].w, v[k].w, u[k].y, v[k].y);
       step.move(2, p[k].z, u[k].w, v[k].w, u[k].z, v[k].z);
       if (at - thread % 32 < held) {
+        if ((__float_as_int(row[k].w) & kSwings) != 0) {
+          calm_swing(h.swing_loss, step.dt, u[k], v[k]);
+        }
         // As in hold_group(): what the velocity at the face lacks.
         const float of_u = h.drift * inv_dt, of_v = 1 - h.drift;
         const float weight = row[k].x, share = row[k].y, arm = inv_dt * row[k].z;

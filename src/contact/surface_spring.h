@@ -27,9 +27,9 @@ inline constexpr float kDampingAlong = 0.1f;   ///< share of critical
 inline constexpr float kThinTip = 4 / 3.0f;
 inline constexpr float kAcrossThin = 6;  ///< times the cells in its radius to the power of -2
 inline constexpr float kUnbounded = 1e30f;
-/// What a jaw presses with at most on a place, in units of Young's modulus: with more, rims bear more
-/// of what a grasper holds with, and a soft block hangs lower from it; without a bound tissue is
-/// crushed flat. What presses back more lies in the jaw.
+/// What a jaw presses with at most on a place, in units of Young's modulus: with more, rims bear
+/// more of what a grasper holds with, and a soft block hangs lower from it; without a bound tissue
+/// is crushed flat. What presses back more lies in the jaw.
 inline constexpr float kMostOfJaws = 1;
 inline constexpr float kInertia = 0.5f;  ///< b / (k dt^2) of the inerter beside the stiff spring
 /// What stays in a substep of how deep contact began: a bounce of debris takes three substeps, one

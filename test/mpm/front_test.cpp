@@ -1,4 +1,5 @@
-// The front of a cut: it ends where the blade's edge ended, wherever that lies in a cell. Its compliance: EdgeCrack. A substep on a GPU: front_cuda_test.cpp.
+// The front of a cut: it ends where the blade's edge ended, wherever that lies in a cell. Its
+// compliance: EdgeCrack. A substep on a GPU: front_cuda_test.cpp.
 #include <gtest/gtest.h>
 
 #include <algorithm>

@@ -1,6 +1,7 @@
 // Forces, clamps and frequencies against finite elements (test/data/references.yaml), set up as a
 // user does: cell sizes that do not divide the body, planes anywhere in a cell. The true surface is
-// the boundary (`mpm: {boundary: surface}`, the default); docs/validation.md has finer cells and the lattice's.
+// the boundary (`mpm: {boundary: surface}`, the default); docs/validation.md has finer cells and
+// the lattice's.
 #include <gtest/gtest.h>
 
 #include <algorithm>

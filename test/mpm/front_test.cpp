@@ -1,4 +1,5 @@
-// The front of a cut: it ends where the blade's edge ended, wherever that lies in a cell. Its compliance: EdgeCrack. A substep on a GPU: front_cuda_test.cpp.
+// The front of a cut: it ends where the blade's edge ended, wherever that lies in a cell. Its
+// compliance: EdgeCrack. A substep on a GPU: front_cuda_test.cpp.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -74,6 +75,25 @@ TYPED_TEST(Front, IsNoneOfACutThatGoesThrough) {
   cut_now(tissue, stroke(0.0173, 0.05));
   EXPECT_EQ(tissue.state().front.cells.size(), 0u);
   EXPECT_EQ(tissue.fragment_count(), 2);
+}
+
+// The plane through the first few bonds puts points on a side that the cut, as it turns, does not
+// leave them on.
+TYPED_TEST(Front, IsNoneOfACutThatTurnsAndGoesThrough) {
+  TypeParam tissue(block(Law::kNeoHookean, 0));
+  constexpr int kStrokes = 50;
+  const auto place = [](int i) {
+    const double y = -0.012 + 0.06 * i / kStrokes;
+    return Pose{Vec3(0.015 + 0.006 * std::sin(200 * y), y, 0), Quat::Identity()};
+  };
+  for (int i = 0; i < kStrokes; ++i) {
+    BladePath path;
+    path.edge = {Vec3(-0.009, 0, -0.03), Vec3(0.017, 0, 0.05)};
+    path.poses = {place(i), place(i + 1)};
+    cut_now(tissue, path);
+  }
+  EXPECT_EQ(tissue.fragment_count(), 2);
+  EXPECT_EQ(tissue.state().front.cells.size(), 0u);
 }
 
 TYPED_TEST(Front, OnlyGoesOn) {

@@ -67,9 +67,8 @@ struct Flight {
 /// Pieces fly apart: what goes through the middle of all may pass between them.
 Vec3 middle_of_largest(MpmTissue& tissue) {
   const Span<const Fragment> all = tissue.fragments();
-  return std::max_element(
-             all.begin(), all.end(),
-             [](const Fragment& a, const Fragment& b) { return a.volume < b.volume; })
+  return std::max_element(all.begin(), all.end(),
+                          [](const Fragment& a, const Fragment& b) { return a.volume < b.volume; })
       ->centroid;
 }
 

@@ -91,7 +91,9 @@ TISSUE_SIM_INLINE Vec<4> sums(const Vec<8> (&x)[3]) {
     store<8>(of, x[c]);
     half[c] = load<4>(of) + load<4>(of + 4);
   }
-  const auto lane = [&half](int i) { return Vec<4>{half[0][i], half[1][i], half[2][i], 0.0f}; };
+  const auto lane = [&half](int i) TISSUE_SIM_INLINE_LAMBDA {
+    return Vec<4>{half[0][i], half[1][i], half[2][i], 0.0f};
+  };
   return (lane(0) + lane(1)) + (lane(2) + lane(3));
 }
 

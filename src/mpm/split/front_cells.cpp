@@ -89,10 +89,10 @@ std::vector<CellView> views_of(const MpmState& s, const std::vector<std::int32_t
     const Points::Site& site = s.points.site[point];
     CellView view;
     for (int k = 0; k < 27; ++k) {
-      view.node[k] = around.split[k] == nullptr
-                         ? around.lattice[k]
-                         : around.split[k]->seen_by(site, x + k % 3 - 1, y + k / 3 % 3 - 1,
-                                                    z + k / 9 - 1);
+      view.node[k] =
+          around.split[k] == nullptr
+              ? around.lattice[k]
+              : around.split[k]->seen_by(site, x + k % 3 - 1, y + k / 3 % 3 - 1, z + k / 9 - 1);
       const std::int32_t number = parted[view.node[k]];
       if (number < 0) continue;
       const FrontNode& n = s.front.nodes[number];

@@ -62,8 +62,8 @@ void split_front(MpmState& s) {
     }
     double left = of.mass;  // of what d moved: that nothing takes over
     for (FrontNode& part : parts) {
-      const bool parted = weigh_sides(s, part) && s.nodes.inv_mass[part.node] != 0 &&
-                          is_cut_between_sides(s, part);
+      const bool parted =
+          weigh_sides(s, part) && s.nodes.inv_mass[part.node] != 0 && is_cut_between_sides(s, part);
       const float by = part.other - of.other;
       const double mass = s.nodes.mass[part.node];
       left -= mass * by * by + (parted ? part.mass : 0.0f);

@@ -111,7 +111,7 @@ TEST_P(FiniteElementsOn, SagOfAClampedBlockWhereverThePlaneLiesInACell) {
     return sag_error(on_this(clamped_block(cell_size, held)));
   };
   double least = 1, most = -1;
-  for (const double held : {0.0, 0.001, 0.0041, 0.0087, 0.0099, 0.01, 0.0111}) {
+  for (const double held : {0.0, 0.001, 0.0036, 0.0041, 0.0087, 0.0099, 0.01, 0.0111}) {
     const double e = sag_error_of(0.004, held);
     EXPECT_NEAR(e, 0, 0.015) << held;
     least = std::min(least, e);

@@ -22,8 +22,8 @@ CudaAnchorPlace place_of(const RigidMotion& m) {
 /// Adds CudaHeldFaces::pull of an anchor about `origin`.
 void add_pull(const RigidMotion& before, const RigidMotion& after, const Vec3& origin, double drift,
               std::vector<float4>& pull) {
-  const Eigen::Matrix3d rotation = after.rotation - before.rotation +
-                                   drift * (before.rotation - Eigen::Matrix3d::Identity());
+  const Eigen::Matrix3d rotation =
+      after.rotation - before.rotation + drift * (before.rotation - Eigen::Matrix3d::Identity());
   const Vec3 shift = after.translation - before.translation + drift * before.translation;
   const Vec3 at_origin = shift + rotation * origin;
   for (int k = 0; k < 4; ++k) {

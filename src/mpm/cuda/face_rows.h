@@ -32,8 +32,8 @@ struct alignas(16) CudaHeldNode {
   float share;           ///< of the impulse in its velocity [1/kg]
   uint4 parts, more;     ///< the first eight slots that share the node, ...
   std::uint32_t shared;  ///< ... and CudaTables::slot_parts of one of them; kNoSlot for none
-  float arm;  ///< what its column of CudaHeldFaces::pull counts for in the impulse: the place
-              ///< of the face from the anchor's origin, and 1, times the row's mass [kg m, kg]
+  float arm;    ///< what its column of CudaHeldFaces::pull counts for in the impulse: the place
+                ///< of the face from the anchor's origin, and 1, times the row's mass [kg m, kg]
   int anchor;   ///< and kSwings
   int impulse;  ///< where the component of its number is summed up; -1: nowhere
 };

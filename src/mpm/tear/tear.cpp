@@ -43,9 +43,9 @@ bool being_relieved(const MpmState& state, std::int32_t point) {
   return state.time - state.tore_at[body] < extent / wave_speed(b.material_of(state.points, point));
 }
 
-/// Whether a corner that two bonds hold comes off. No crack goes through it, for each would leave it
-/// on a thread; where a tool tears tissue to shreds such corners were drawn out 5 to 13-fold, and
-/// what they had of energy set the substep of all.
+/// Whether a corner that two bonds hold comes off. No crack goes through it, for each would leave
+/// it on a thread; where a tool tears tissue to shreds such corners were drawn out 5 to 13-fold,
+/// and what they had of energy set the substep of all.
 bool comes_off(const MpmState& state, const TearingPoint& t) {
   constexpr float kDrawnOut = 3;  // stretch
   if (t.excess < 1 || __builtin_popcount(state.points.bonds[t.point]) != 2) return false;

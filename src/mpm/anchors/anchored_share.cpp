@@ -151,7 +151,8 @@ void find_free_volumes(LatticeTissue& tissue) {
         int to[3] = {s.x, s.y, s.z};
         for (int a = 0; a < 3; ++a) {
           const int next = to[a] + (o.middle[a] < 0 ? -1 : 1);
-          const double off = share_shifted(std::abs(o.middle[a]), next >> 1 != to[a] >> 1);
+          double off = share_shifted(std::abs(o.middle[a]), next >> 1 != to[a] >> 1);
+          if (off < kSmallest) off = 0;  // rounding would leave nodes of 1e-24 kg
           weight *= k >> a & 1 ? off : 1 - off;
           if (k >> a & 1) to[a] = next;
         }

@@ -84,6 +84,15 @@ void find_nodes(Block& block, const LatticeBody& b) {
   }
 }
 
+/// Whether all bonds of a cell's points are whole. Beside torn tissue nodes are light and swing.
+bool has_whole_bonds(const LatticeBody& b, const Points& points, const CellShare& c, int i) {
+  for (const std::int32_t first : c.point) {
+    const std::int32_t p = first + 2 * i;
+    if (first >= 0 && points.bonds[p] != whole_bonds(b, points, p)) return false;
+  }
+  return true;
+}
+
 /// What an anchor holds of a cell at its face keeps a little of its stiffness, so that no node of
 /// the cell hangs loose.
 void keep_held(Block& block, const Points& points, int z, int column) {
@@ -123,7 +132,8 @@ void fill_side(Block& block, const LatticeBody& b, const Points& points, const P
     }
     for (int i = 0; i < c.cells; ++i) {
       if (count[i] >= kSteadyCount || count[i] == 0) continue;
-      if (c.count >= kSteadyCount) {  // an anchor has the rest
+      const bool anchor_has_rest = c.count >= kSteadyCount;
+      if (anchor_has_rest && has_whole_bonds(b, points, c, i)) {
         keep_held(block, points, z, column + i);
         continue;
       }

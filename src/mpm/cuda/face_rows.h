@@ -58,7 +58,7 @@ struct alignas(16) CudaFaceEntry {
   int next_share;       ///< where the others are than ...
   CudaFaceShare share;  ///< ... the first of them
   std::uint32_t shared;
-  int swings;  ///< whether calm_swings() slows it down
+  int swings;  ///< how often calm_swings() slows it down
   uint4 parts, more;
 };
 

@@ -71,7 +71,9 @@ __device__ __forceinline__ void hold_chunk(const CudaHeldFaces& h, const FacesAt
     for (int k = 0; k < kHand; ++k) {
       if (e + k * threads >= chunk.entries) break;
       free[k].move(w, n[k]);
-      if (n[k].swings != 0) calm_swing(h.swing_loss, w.step.dt, free[k].u, free[k].v);
+      for (int r = 0; r < n[k].swings; ++r) {
+        calm_swing(h.swing_loss, w.step.dt, free[k].u, free[k].v);
+      }
       nodes[2 * (e + k * threads)] = free[k].u;
       nodes[2 * (e + k * threads) + 1] = free[k].v;
     }

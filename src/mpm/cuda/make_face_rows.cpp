@@ -66,7 +66,7 @@ SlotsOfNodes find_slots(const MpmState& state, const HostTables& t,
 struct NodeOfGroup {
   std::int32_t node;
   std::vector<CudaFaceShare> shares;  ///< rows by their place in the group
-  bool swings = false;                ///< is_swing() of one of them
+  int swings = 0;                     ///< for how many of them is_swing()
 };
 
 std::vector<NodeOfGroup> nodes_of(const AnchorFaces& faces, const FaceGroup& g) {
@@ -77,9 +77,9 @@ std::vector<NodeOfGroup> nodes_of(const AnchorFaces& faces, const FaceGroup& g) 
       if (r.weight[k] == 0) continue;
       auto at = std::find_if(nodes.begin(), nodes.end(),
                              [&](const NodeOfGroup& n) { return n.node == r.node[k]; });
-      if (at == nodes.end()) at = nodes.insert(nodes.end(), {r.node[k], {}, false});
+      if (at == nodes.end()) at = nodes.insert(nodes.end(), {r.node[k], {}, 0});
       if (r.share[k] != 0) at->shares.push_back({i, r.share[k]});
-      at->swings = at->swings || (k == 0 && is_swing(r));
+      at->swings += k == 0 && is_swing(r) ? 1 : 0;
     }
   }
   return nodes;
@@ -199,7 +199,7 @@ class FillChunks {
     e.shares = static_cast<int>(n.shares.size());
     if (e.shares > 0) e.share = n.shares[0];
     e.next_share = first_share + 1;
-    e.swings = n.swings ? 1 : 0;
+    e.swings = n.swings;
     return e;
   }
   /// The bundle's last chunk, or one more where that has no room for it.

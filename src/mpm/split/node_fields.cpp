@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "math/bspline.h"
+#include "mpm/blocks/stabilisation.h"
 #include "mpm/lattice/bonds.h"
 #include "mpm/split/changed_cells.h"
 
@@ -28,6 +29,21 @@ struct Tables {
 };
 constexpr Tables kTables;
 
+/// The volume whose mass a point gives its nodes [m^3]. What an anchor has of a cell at its face
+/// keeps a hundredth of its stiffness (keep_held()), and so much of its mass: nodes that little
+/// else gives mass to would swing faster than any tissue.
+double volume_with_mass(const LatticeBody& body, const Points& points, std::int32_t p) {
+  const float volume = points.free_volume_of(p);
+  if (volume != 0) return volume;
+  const Points::Site& s = points.site[p];
+  for (int k = 0; k < 8; ++k) {
+    const std::int32_t other =
+        body.point((s.x & ~1) + (k & 1), (s.y & ~1) + (k >> 1 & 1), (s.z & ~1) + (k >> 2));
+    if (other >= 0 && points.free_volume_of(other) != 0) return kStabilisation * points.volume[p];
+  }
+  return 0;
+}
+
 /// Gives a node the mass of those points that are in the places `part` of a box.
 void share_mass(const LatticeBody& body, const Points& points, const NodeFields::Cell& cell,
                 double mass_of_point, const Planes& part, int node, Nodes& nodes) {
@@ -50,7 +66,7 @@ void share_mass(const LatticeBody& body, const Points& points, const NodeFields:
         const int x = __builtin_ctz(bits);
         const std::int32_t p = around[6 * row + x];
         const double density = body.material_of(points, p).density;
-        const double mass = w * kTables.weight[x] * density * points.free_volume_of(p);
+        const double mass = w * kTables.weight[x] * density * volume_with_mass(body, points, p);
         sum += mass;
         if (points.free_volume.empty() && points.anchored[p] != 0) anchored += mass;
       }
@@ -72,7 +88,7 @@ double mass_of_point(const LatticeBody& body, const Points& points, const NodeFi
   points_around(body, c.x, c.y, c.z, around);
   for (const std::int32_t p : around) {
     if (p < 0) continue;
-    const double m = body.material_of(points, p).density * points.free_volume_of(p);
+    const double m = body.material_of(points, p).density * volume_with_mass(body, points, p);
     if (points.anchored[p] == Points::kInAnchor || (mass != 0 && m != mass)) return 0;
     mass = m;
   }

@@ -47,7 +47,8 @@ int MpmTissue::read_points(const PointSelection& selection, std::vector<std::uin
       out.rgb = piece_colour(f);
       out.id = static_cast<std::uint32_t>(p);
       out.fragment = f.id;
-      out.stress = block.volume[lane] > 0 ? stress[lane] : 0;  // what an anchor holds has none
+      // What an anchor holds has none.
+      out.stress = s.points.free_volume_of(p) > 0 ? stress[lane] : 0;
       const int whole = __builtin_popcount(whole_bonds(body, s.points, p));
       const int left = __builtin_popcount(s.points.bonds[p]);
       out.damage = whole > 0 ? 1.0f - static_cast<float>(left) / whole : 0.0f;

@@ -3,8 +3,11 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <cstdint>
+#include <cstring>
 #include <set>
 #include <tuple>
+#include <vector>
 
 #include "mpm/mpm_tissue.h"
 
@@ -86,6 +89,30 @@ TEST(CloseAnchors, KeepTissueAtTheirFacesWhereItIs) {
     }
     EXPECT_LT(u.norm(), 0.03 * kCell) << l.place[0] << " " << l.place[1] << " " << l.place[2];
   }
+}
+
+/// Points that an anchor has of a cell at its face keep some stiffness there, which nobody sees.
+TEST(CloseAnchors, ShowWhatTheyHoldWithoutStress) {
+  MpmTissue tissue(hung_on_balls());
+  tissue.advance(100, tissue.substep_for({}), {});
+  ASSERT_FALSE(tissue.finish().blew_up);
+  std::vector<std::uint8_t> cloud;
+  const int count = tissue.read_points({}, cloud);
+  const Points& points = tissue.state().points;
+  ASSERT_EQ(count, points.size());
+  int held = 0, stressed = 0;
+  for (int i = 0; i < count; ++i) {
+    Point point;
+    std::memcpy(&point, &cloud[i * sizeof(Point)], sizeof(Point));
+    if (points.free_volume_of(point.id) > 0) {
+      stressed += point.stress > 0 ? 1 : 0;
+      continue;
+    }
+    ++held;
+    EXPECT_EQ(point.stress, 0) << point.id;
+  }
+  EXPECT_GT(held, 100);
+  EXPECT_GT(stressed, count / 2);
 }
 
 }  // namespace

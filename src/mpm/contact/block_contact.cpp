@@ -223,7 +223,8 @@ void list_near_cells(MpmState& state, int index, float dt) {
       // The flats of a blade push where it has cut.
       const bool in_body = state.points.bonds[p] == kAllBonds;
       if (is_blade && in_body) continue;
-      if (is_plane && !(block.volume[lane] > 0)) continue;  // what an anchor holds rests on nothing
+      // What an anchor holds rests on nothing.
+      if (is_plane && !(state.points.free_volume_of(p) > 0)) continue;
       const float at[3] = {x[lane], x[lanes + lane], x[2 * lanes + lane]};
       // Where the flats of a blade end, its gap does: there the box must do.
       if (!is_blade && gap(collider, at).distance > margin) continue;

@@ -1,7 +1,8 @@
 // Anchors act at their faces: the field of displacements is what the anchor says there, wherever
 // the face lies in a cell.
 //
-// Tissue inside an anchor is rigid: it has neither stress nor mass (Points::free_volume), so the
+// Tissue inside an anchor is rigid: it has neither stress nor mass (Points::free_volume), but for a
+// hundredth of both in cells that a face goes through (keep_held(), volume_with_mass()), so the
 // body ends at the face as it would at a surface of its own. Along each row of nodes that goes
 // through a face, in the direction closest to its normal, the field of these nodes,
 //   sum_i w_i u_i = what the anchor says,

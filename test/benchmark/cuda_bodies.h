@@ -74,6 +74,15 @@ inline void hold_at_balls(Scene& scene) {
   }
 }
 
+/// The part of a height that is sheared and stretched: all of it, but where balls are held, which
+/// keep their shape [m].
+inline double deformed_height(const Body& body, double z) {
+  if (body.anchors.size() < 3) return z;
+  const Anchor& ball = body.anchors[2];
+  const double reach = ball.radius + 2e-3, below = ball.center[2] - reach;
+  return z - std::min(std::max(z - below, 0.0), 2 * reach);
+}
+
 /// Where these anchors are in the deformed body, and stay.
 inline std::vector<AnchorMotion> stay_deformed(MpmState& state, double stretch) {
   const Body& body = state.scene.bodies[0];
@@ -82,7 +91,8 @@ inline std::vector<AnchorMotion> stay_deformed(MpmState& state, double stretch) 
   for (std::size_t i = 0; i < body.anchors.size(); ++i) {
     const Anchor& a = body.anchors[i];
     const double z = i == 0 ? a.z : i == 1 ? a.min[2] : a.center[2];
-    const Vec3 moved = (z + 0.5 * state.scene.cell_size) * Vec3(0.3, 0, stretch);
+    const double height = deformed_height(body, z) + 0.5 * state.scene.cell_size;
+    const Vec3 moved = height * Vec3(0.3, 0, stretch);
     state.anchors.now[i].translation = moved;
     const Pose pose{body.anchors[i].origin() + moved, Quat::Identity()};
     motion.push_back({pose, pose});
@@ -94,11 +104,13 @@ inline std::vector<AnchorMotion> stay_deformed(MpmState& state, double stretch) 
 /// Stretch along z by this much and shear, and waves of some cells' length.
 inline void deform(MpmState& state, double stretch) {
   const LatticeBody& b = state.bodies[0];
+  const double h = b.cell_size;
   b.for_each_node([&](int node, int i, int j, int k) {
     const double x = i + 1, y = j + 1, z = k + 1;
-    const double h = b.cell_size;
-    const double u[3] = {h * (0.3 * z + 0.1 * std::sin(0.4 * y)), h * 0.1 * std::sin(0.5 * x + z),
-                         h * (stretch * z + 0.1 * std::sin(0.3 * x))};
+    const double high = deformed_height(state.scene.bodies[0], z * h) / h;
+    const double u[3] = {h * (0.3 * high + 0.1 * std::sin(0.4 * y)),
+                         h * 0.1 * std::sin(0.5 * x + z),
+                         h * (stretch * high + 0.1 * std::sin(0.3 * x))};
     for (int a = 0; a < 3; ++a) state.nodes.u[a][node] = static_cast<float>(u[a]);
   });
 }

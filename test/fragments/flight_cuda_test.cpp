@@ -108,29 +108,41 @@ TEST(FragmentsOnGpu, TheSamePiecesFly) {
   EXPECT_LT((gpu.after.angular - gpu.before.angular).norm(), 5e-3 * gpu.before.angular.norm());
 }
 
-TEST(FragmentsOnGpu, AreRestored) {
-  if (const std::string why = why_no_gpu(); !why.empty()) GTEST_SKIP() << why;
-  auto tissue = going_bar<CudaMpmTissue>();
+/// Pieces fly in tissue that goes on as a copy of it which is restored then.
+void goes_on_restored(CudaMpmTissue& tissue) {
   const auto sure = [](const MpmState&, std::int32_t, const float*) { return 0.9f; };
-  tissue->classify_by(sure);
+  tissue.classify_by(sure);
   int frame = 0;
-  for (; frame < 30 && tissue->flown() == 0; ++frame) {
-    tissue->advance(1.0 / 960, {});
-    tissue->finish();
+  for (; frame < 30 && tissue.flown() == 0; ++frame) {
+    tissue.advance(1.0 / 960, {});
+    tissue.finish();
   }
-  ASSERT_GT(tissue->flown(), 0);
-  const std::vector<std::uint8_t> saved = tissue->save();
+  ASSERT_GT(tissue.flown(), 0);
+  const std::vector<std::uint8_t> saved = tissue.save();
   CudaMpmTissue other(torn_bar(kNetwork));
   other.classify_by(sure);
   other.restore({saved.data(), saved.size()});
   for (int i = 0; i < 6; ++i) {
-    tissue->advance(1.0 / 960, {});
-    tissue->finish();
+    tissue.advance(1.0 / 960, {});
+    tissue.finish();
     other.advance(1.0 / 960, {});
     other.finish();
-    EXPECT_EQ(tissue->checksum(), other.checksum()) << i;
+    EXPECT_EQ(tissue.checksum(), other.checksum()) << i;
   }
-  EXPECT_EQ(tissue->flown(), other.flown());
+  EXPECT_EQ(tissue.flown(), other.flown());
+}
+
+TEST(FragmentsOnGpu, AreRestored) {
+  if (const std::string why = why_no_gpu(); !why.empty()) GTEST_SKIP() << why;
+  goes_on_restored(*going_bar<CudaMpmTissue>());
+}
+
+TEST(FragmentsOnGpu, AreRestoredBesideTheFrontOfACut) {
+  if (const std::string why = why_no_gpu(); !why.empty()) GTEST_SKIP() << why;
+  const auto tissue = going_bar<CudaMpmTissue>();
+  cut_now(*tissue, upright_blade({Vec3(-0.01, 0.0041, 0), Vec3(0.0031, 0.0041, 0)}));
+  goes_on_restored(*tissue);
+  EXPECT_GT(tissue->state().front.nodes.size(), 0u);
 }
 
 }  // namespace

@@ -82,7 +82,7 @@ CudaMpmTissue::CudaMpmTissue(const Scene& scene, std::vector<std::string> notes)
     launch_measure();
     finish_measure();
   }
-  if (scene.mpm.boundary == MpmBoundary::kSurface && collider_count(scene) > 0) {
+  if (scene.mpm.boundary == MpmBoundary::kSurface && d.held_by > 0) {
     d.outer.upload(outer_points(*state_, state_->anchors), d.stream);
     if (d.place_parts > 1) d.planes.upload(surface_planes(*state_), d.stream);
   }

@@ -116,9 +116,11 @@ void CudaMpmTissue::pull_some(const std::vector<std::int32_t>& nodes) {
 void CudaMpmTissue::push_some(const std::vector<std::int32_t>& nodes) {
   OnDevice& d = *device_;
   const std::size_t count = nodes.size();
+  // Parted nodes stay behind the others; where there are more of these, push_front() brings them.
+  const std::size_t entries = std::max(d.entries(), state_->nodes.size());
   for (int i = 0; i < 2; ++i) {
-    d.u[i].extend(state_->nodes.size(), d.stream);
-    d.v[i].extend(state_->nodes.size(), d.stream);
+    d.u[i].extend(entries, d.stream);
+    d.v[i].extend(entries, d.stream);
   }
   d.host_nodes.resize(2 * count);
   const Nodes& n = state_->nodes;

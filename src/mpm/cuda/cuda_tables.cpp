@@ -7,9 +7,10 @@
 namespace tissue_sim {
 namespace {
 
-/// What the tables and the state take on the GPU; clouds and contacts between tissue come on top.
+/// What the tables and the state take on the GPU, `of_places` of that where the surface is; clouds
+/// and contacts between tissue come on top.
 std::size_t bytes_of(const HostTables& t, std::size_t nodes, std::size_t points, std::size_t held,
-                     std::size_t most_held, bool at_surface) {
+                     std::size_t most_held, std::size_t of_places, bool at_surface) {
   const int sums = 3 * (kPushStride + (at_surface ? kInertiaStride : 0));
   const std::size_t of_contact = sums * sizeof(long long) * nodes + 6 * t.lanes;
   constexpr std::size_t of_connecting = 16;  // two numbers a slot, and as much again to sort them
@@ -17,7 +18,7 @@ std::size_t bytes_of(const HostTables& t, std::size_t nodes, std::size_t points,
          t.bundles.size() * sizeof(CudaBundle) + t.columns.size() * sizeof(CudaColumn) +
          t.slots * (of_connecting + 16 + sizeof(uint4) + 2 * sizeof(float4)) + 8 * t.lanes +
          t.lanes / 2 + (6 * sizeof(float4) + 1) * nodes + points + 17 * held +
-         most_held * sizeof(HeldPoint) + (held > 0 ? of_contact : 0);
+         most_held * sizeof(HeldPoint) + of_places + (held > 0 ? of_contact : 0);
 }
 
 /// Says how much memory the tissue takes, where the GPU has less.
@@ -172,7 +173,10 @@ void CudaMpmTissue::push_tables() {
   const std::size_t of_stacks =
       d.plan.marches ? Stacks::bytes_for(t, state_->blocks.all, d.plain_resident) : 0;
   const bool at_surface = scene.mpm.boundary == MpmBoundary::kSurface;
-  check_memory(bytes_of(t, n, points, held, most_held, at_surface) + of_stacks, device_bytes());
+  const std::size_t of_places =
+      at_surface && held > 0 ? points * sizeof(float4) * (d.place_parts > 1 ? 2 : 1) : 0;
+  check_memory(bytes_of(t, n, points, held, most_held, of_places, at_surface) + of_stacks,
+               device_bytes());
   check_cuda(cudaStreamSynchronize(d.stream), "finish a frame");
   d.blocks.upload(t.blocks, d.stream);
   d.bundles.upload(t.bundles, d.stream);

@@ -34,6 +34,7 @@ void MpmTissue::restore(Span<const std::uint8_t> saved) {
   index_inertia(*state_);
   index_flights(*state_);
   list_front_cells(*state_);
+  mark_row_nodes(state_->nodes.size(), state_->anchors);
   state_->work.force.clear();
   state_->work.force.resize(state_->blocks.force_size);
 }

@@ -55,12 +55,8 @@ void MpmTissue::cut(const std::vector<BladePath>& paths, const Array<float>* u_b
   }
   if (changed.empty() && touched.empty()) return;
   measured_ = false;
-  if (!touched.empty()) {
-    follow_front(*state_, touched);
-    list_front_cells(*state_);
-  }
-  if (changed.empty()) return;
-  measured_ = false;
+  if (!touched.empty()) follow_front(*state_, touched);
+  if (changed.empty()) return list_front_cells(*state_);
   const MpmState& s = *state_;
   take_apart(*state_, changed, [&] {
     if (!may_have_parted(s, changed)) return;

@@ -2,9 +2,9 @@
 
 #include <algorithm>
 #include <array>
-#include <map>
 #include <stdexcept>
 #include <string>
+#include <utility>
 
 #include "mpm/anchors/anchored_share.h"
 #include "mpm/anchors/group_rows.h"
@@ -174,18 +174,23 @@ void add_links(const std::vector<LatticeBody>& bodies, int body, int first_ancho
   }
 }
 
+/// The cell in whose middle a link's k-th node is.
+std::array<std::int32_t, 3> cell_of(const FaceLink& link, int k) {
+  std::array<std::int32_t, 3> cell{link.cell[0], link.cell[1], link.cell[2]};
+  cell[link.axis] += link.outside ? k - 1 : 1 - k;
+  return cell;
+}
+
 /// The rows of a link, one for each choice of fields that points at the face see there: what was
 /// cut off in front of it is not held.
 void add_rows(const LatticeBody& b, const Points& points, const NodeFields& fields,
               const Nodes& nodes, const FaceLink& link, std::vector<FaceRow>& rows) {
   using Found = std::array<std::int32_t, kRowNodes>;
   std::vector<Found> found(1);
-  std::int32_t n[kRowNodes][3];
+  std::array<std::int32_t, 3> n[kRowNodes];
   bool split = false;
   for (int k = 0; k < kRowNodes; ++k) {
-    for (int a = 0; a < 3; ++a) {
-      n[k][a] = link.cell[a] + (a == link.axis ? (link.outside ? k - 1 : 1 - k) : 0);
-    }
+    n[k] = cell_of(link, k);
     const int node = b.node(n[k][0], n[k][1], n[k][2]);
     found[0][k] = node;
     split = split || (node >= 0 && fields.split(node) != nullptr);
@@ -264,6 +269,31 @@ void find_face_links(const Scene& scene, const LatticeTissue& tissue, AnchorFace
     first_anchor += static_cast<int>(b.body.anchors.size());
   }
   faces.now.resize(faces.origin.size());
+  faces.at_link.assign(lattice_node_count(tissue.bodies), 0);
+  for (const FaceLink& link : faces.links) {
+    for (int k = 0; k < kRowNodes; ++k) {
+      const auto [x, y, z] = cell_of(link, k);
+      const int node = tissue.bodies[link.body].node(x, y, z);
+      if (node >= 0) faces.at_link[node] = 1;
+    }
+  }
+}
+
+void mark_row_nodes(std::size_t node_count, AnchorFaces& faces) {
+  faces.at_row.assign(node_count, 0);
+  for (const FaceRow& row : faces.rows) {
+    for (int k = 0; k < kRowNodes; ++k) {
+      if (row.share[k] != 0) faces.at_row[row.node[k]] = 1;
+    }
+  }
+}
+
+bool have_rows(const AnchorFaces& faces, const std::vector<LatticeBody>& bodies,
+               const std::vector<NodeFields::Cell>& cells) {
+  return std::any_of(cells.begin(), cells.end(), [&](const NodeFields::Cell& c) {
+    const int node = bodies[c.body].node(c.x, c.y, c.z);
+    return node >= 0 && faces.at_link[node] != 0;
+  });
 }
 
 void find_face_rows(const LatticeTissue& tissue, AnchorFaces& faces) {
@@ -276,17 +306,21 @@ void find_face_rows(const LatticeTissue& tissue, AnchorFaces& faces) {
              faces.rows);
   }
   group_rows(tissue.nodes, faces);
+  mark_row_nodes(tissue.nodes.size(), faces);
   faces.impulse.assign(faces.rows.size(), {});
   // What was carried before, in a frame, goes to rows at the same places.
-  std::map<std::array<float, 3>, std::size_t> at;
-  for (std::size_t i = 0; i < faces.rows.size() && !old_rows.empty(); ++i) {
-    const float* x = faces.rows[i].place;
-    at.emplace(std::array<float, 3>{x[0], x[1], x[2]}, i);
+  const auto place_of = [](const FaceRow& row) {
+    return std::array<float, 3>{row.place[0], row.place[1], row.place[2]};
+  };
+  std::vector<std::pair<std::array<float, 3>, std::size_t>> at;
+  for (std::size_t i = 0; i < faces.rows.size() && !old_impulse.empty(); ++i) {
+    at.emplace_back(place_of(faces.rows[i]), i);
   }
-  for (std::size_t i = 0; i < old_rows.size(); ++i) {
-    const float* x = old_rows[i].place;
-    const auto same = at.find({x[0], x[1], x[2]});
-    if (same == at.end()) continue;
+  std::sort(at.begin(), at.end());
+  for (std::size_t i = 0; i < old_impulse.size(); ++i) {
+    const auto place = place_of(old_rows[i]);
+    const auto same = std::lower_bound(at.begin(), at.end(), std::pair(place, std::size_t{0}));
+    if (same == at.end() || same->first != place) continue;
     for (int a = 0; a < 3; ++a) faces.impulse[same->second][a] += old_impulse[i][a];
   }
 }

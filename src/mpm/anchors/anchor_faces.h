@@ -83,14 +83,28 @@ struct AnchorFaces {
   std::vector<std::int32_t>
       points;                      ///< in or beside whose cubes faces lie, when the scene is built
   std::vector<int> first_of_body;  ///< anchors, by body
+  /// Per lattice node, whether rows of a link may have it: rows stay as they are where none of
+  /// these is split.
+  std::vector<std::uint8_t> at_link;
+  /// Per node, whether a row moves it. Nodes that were split since the rows were made are missing.
+  std::vector<std::uint8_t> at_row;
+
+  bool moves_node(std::int32_t node) const {
+    return node < static_cast<std::int32_t>(at_row.size()) && at_row[node] != 0;
+  }
 };
 
 /// Finds where the faces are, of bodies that are whole, and which points they touch
 /// (AnchorFaces::points). Throws std::invalid_argument for an anchor that neither holds points nor
 /// has a face at its body.
 void find_face_links(const Scene& scene, const LatticeTissue& tissue, AnchorFaces& faces);
-/// Makes the rows anew: at the beginning, and after nodes were split.
+/// Makes the rows anew: at the beginning, and after nodes of some of them were split.
 void find_face_rows(const LatticeTissue& tissue, AnchorFaces& faces);
+/// Fills AnchorFaces::at_row from the rows: find_face_rows() does, a restored state has to.
+void mark_row_nodes(std::size_t node_count, AnchorFaces& faces);
+/// Whether rows may have one of these cells' nodes.
+bool have_rows(const AnchorFaces& faces, const std::vector<LatticeBody>& bodies,
+               const std::vector<NodeFields::Cell>& cells);
 /// Finds AnchorFaces::held: before any anchor moves, and after nodes were split.
 void find_held_nodes(const LatticeTissue& tissue, AnchorFaces& faces);
 

@@ -88,6 +88,42 @@ std::vector<std::vector<int>> divide_group(const std::vector<int>& members, cons
   return parts;
 }
 
+/// Of an impulse in row j to the velocity that row i holds [1/kg].
+double response(const FaceRow& r, const FaceRow& s) {
+  double sum = 0;
+  for (int k = 0; k < kRowNodes * kRowNodes; ++k) {
+    const int l = k / kRowNodes, m = k % kRowNodes;
+    if (r.node[l] == s.node[m] && s.weight[m] != 0) {
+      sum += static_cast<double>(r.share[l]) * s.weight[m];
+    }
+  }
+  return sum;
+}
+
+/// Adds a group of rows, `members` of `all`, behind those that are in `rows`.
+void add_group(const std::vector<FaceRow>& all, const std::vector<int>& members,
+               std::vector<FaceRow>& rows, AnchorFaces& faces) {
+  const int n = static_cast<int>(members.size());
+  faces.groups.push_back(
+      {static_cast<int>(rows.size()), n, static_cast<int>(faces.inverse.size())});
+  for (const int i : members) rows.push_back(all[i]);
+  if (n == 1) {  // most are
+    const double own = response(rows.back(), rows.back());
+    faces.inverse.push_back(static_cast<float>(own > 0 ? 1 / own : 0));
+    return;
+  }
+  Eigen::MatrixXd A(n, n);
+  for (int i = 0; i < n; ++i) {
+    for (int j = 0; j < n; ++j) A(i, j) = response(all[members[i]], all[members[j]]);
+  }
+  // Rows that say the same twice share what holds them.
+  A.diagonal() *= 1 + 1e-4;
+  const Eigen::MatrixXd inverse = A.ldlt().solve(Eigen::MatrixXd::Identity(n, n));
+  for (int i = 0; i < n * n; ++i) {
+    faces.inverse.push_back(static_cast<float>(inverse(i / n, i % n)));
+  }
+}
+
 }  // namespace
 
 void group_rows(const Nodes& nodes, AnchorFaces& faces) {
@@ -98,50 +134,38 @@ void group_rows(const Nodes& nodes, AnchorFaces& faces) {
     while (parent[i] != i) i = parent[i] = parent[parent[i]];
     return i;
   };
-  std::map<std::int32_t, int> first_of;  // row of each node
+  std::vector<std::pair<std::int32_t, int>> rows_of;  // of each node
   for (int i = 0; i < count; ++i) {
     for (int k = 0; k < kRowNodes; ++k) {
-      if (faces.rows[i].share[k] == 0) continue;
-      const auto [at, is_new] = first_of.emplace(faces.rows[i].node[k], i);
-      if (is_new) continue;
-      const int a = root(i), b = root(at->second);
-      parent[std::max(a, b)] = std::min(a, b);
+      if (faces.rows[i].share[k] != 0) rows_of.emplace_back(faces.rows[i].node[k], i);
     }
   }
-  std::vector<std::vector<int>> members(count);
-  for (int i = 0; i < count; ++i) members[root(i)].push_back(i);
+  std::sort(rows_of.begin(), rows_of.end());
+  for (std::size_t i = 1; i < rows_of.size(); ++i) {
+    if (rows_of[i].first != rows_of[i - 1].first) continue;
+    const int a = root(rows_of[i - 1].second), b = root(rows_of[i].second);
+    parent[std::max(a, b)] = std::min(a, b);
+  }
+  std::vector<int> size(count, 0);
+  for (int i = 0; i < count; ++i) ++size[root(i)];
+  std::map<int, std::vector<int>> members;  // of groups of several rows, by the first
   for (int i = 0; i < count; ++i) {
-    if (members[i].size() <= kLargestGroup) continue;
-    const std::vector<std::vector<int>> parts = divide_group(members[i], nodes, faces.rows);
-    members.insert(members.end(), parts.begin(), parts.end());
-    members[i].clear();
+    if (size[root(i)] > 1) members[root(i)].push_back(i);
   }
   std::vector<FaceRow> rows;
   faces.groups.clear();
   faces.inverse.clear();
-  for (std::vector<int>& m : members) {
-    if (m.empty()) continue;
-    const int n = static_cast<int>(m.size());
-    Eigen::MatrixXd A = Eigen::MatrixXd::Zero(n, n);
-    for (int i = 0; i < n; ++i) {
-      for (int j = 0; j < n; ++j) {
-        const FaceRow &r = faces.rows[m[i]], &s = faces.rows[m[j]];
-        for (int k = 0; k < kRowNodes * kRowNodes; ++k) {
-          const int l = k / kRowNodes, m = k % kRowNodes;
-          if (r.node[l] == s.node[m] && s.weight[m] != 0) {
-            A(i, j) += static_cast<double>(r.share[l]) * s.weight[m];
-          }
-        }
-      }
+  std::vector<std::vector<int>> parts;  // of groups that were too large
+  for (int i = 0; i < count; ++i) {
+    if (root(i) != i) continue;
+    if (size[i] > kLargestGroup) {
+      for (auto& part : divide_group(members[i], nodes, faces.rows)) parts.push_back(part);
+    } else {
+      add_group(faces.rows, size[i] > 1 ? members[i] : std::vector<int>{i}, rows, faces);
     }
-    // Rows that say the same twice share what holds them.
-    if (n > 1) A.diagonal() *= 1 + 1e-4;
-    const Eigen::MatrixXd inverse = A.ldlt().solve(Eigen::MatrixXd::Identity(n, n));
-    faces.groups.push_back(
-        {static_cast<int>(rows.size()), n, static_cast<int>(faces.inverse.size())});
-    for (int i = 0; i < n * n; ++i)
-      faces.inverse.push_back(static_cast<float>(inverse(i / n, i % n)));
-    for (const int i : m) rows.push_back(faces.rows[i]);
+  }
+  for (const std::vector<int>& part : parts) {
+    if (!part.empty()) add_group(faces.rows, part, rows, faces);
   }
   faces.rows = std::move(rows);
 }

@@ -126,7 +126,7 @@ void CudaMpmTissue::pass_rim(const BladePath& path, bool moves,
   if (moves) {
     float4* u_before = device_->u_before.data();
     Array<float>* before = state_->work.u_before;
-    for (int a = 0; a < 3; ++a) before[a].assign(state_->nodes.size(), 0.0f);
+    for (int a = 0; a < 3; ++a) before[a].resize(state_->nodes.size());
     const float4* u = gather({u_before, u_before}, nodes);
     for (std::size_t i = 0; i < nodes.size(); ++i) {
       before[0][nodes[i]] = u[i].x, before[1][nodes[i]] = u[i].y, before[2][nodes[i]] = u[i].z;

@@ -120,11 +120,9 @@ bool CudaMpmTissue::take_apart(const std::vector<std::int32_t>& changed,
                                const std::vector<std::int32_t>& touched) {
   OnDevice& d = *device_;
   pull_front();
-  if (!touched.empty()) {
-    follow_front(*state_, touched);
-    list_front_cells(*state_);
-  }
+  if (!touched.empty()) follow_front(*state_, touched);
   if (changed.empty()) {
+    list_front_cells(*state_);
     push_front();
     return false;
   }
@@ -142,8 +140,10 @@ bool CudaMpmTissue::take_apart(const std::vector<std::int32_t>& changed,
   push_front();
   push_points(changed);
   push_points(apart.softened);
-  if (apart.new_blocks || d.host_tables.number.empty()) push_tables();
-  push_anchors();
+  if (apart.new_blocks || d.host_tables.number.empty()) {
+    push_tables();
+    push_anchors();
+  }
   return may_part;
 }
 

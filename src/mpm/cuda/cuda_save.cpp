@@ -192,6 +192,7 @@ void CudaMpmTissue::restore(Span<const std::uint8_t> saved) {
   faces.forget_active();
   index_flights(*state_);
   list_front_cells(*state_);
+  mark_row_nodes(state_->nodes.size(), state_->anchors);
   push();
   std::vector<std::uint8_t> with(d.with.size(), 0);
   std::vector<float4> hold(d.hold.size(), float4{0, 0, 0, 0});

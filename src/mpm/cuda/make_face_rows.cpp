@@ -10,7 +10,41 @@ namespace {
 static_assert(kRowNodes == kFaceRowNodes && kLargestGroup == kFaceGroupRows,
               "rows and groups are the same on both sides");
 
-/// A slot whose node rows have, or an anchor carries.
+/// Nodes that rows have or an anchor carries, numbered as they follow one another.
+struct HeldNodes {
+  std::vector<std::int32_t> number;   ///< per node, -1 for others
+  std::vector<std::int32_t> group;    ///< of each, whose rows move it; -1
+  std::vector<std::int32_t> carried;  ///< of each, its place in AnchorFaces::held; -1
+
+  HeldNodes(const AnchorFaces& faces, std::size_t nodes) : number(nodes, -1) {
+    const auto for_each = [&](const auto& f) {
+      for (std::size_t g = 0; g < faces.groups.size(); ++g) {
+        for (int i = 0; i < faces.groups[g].count; ++i) {
+          const FaceRow& r = faces.rows[faces.groups[g].first + i];
+          for (int k = 0; k < kRowNodes; ++k) {
+            if (r.weight[k] != 0) f(r.node[k], r.share[k] != 0 ? static_cast<int>(g) : -1);
+          }
+        }
+      }
+    };
+    for_each([&](std::int32_t node, int) { number[node] = 0; });
+    for (const AnchorFaces::HeldNode& n : faces.held) number[n.node] = 0;
+    std::int32_t count = 0;
+    for (std::int32_t& n : number) {
+      if (n == 0) n = count++;
+    }
+    group.assign(count, -1);
+    carried.assign(count, -1);
+    for_each([&](std::int32_t node, int g) {
+      if (g >= 0) group[number[node]] = g;
+    });
+    for (std::size_t i = 0; i < faces.held.size(); ++i) {
+      carried[number[faces.held[i].node]] = static_cast<std::int32_t>(i);
+    }
+  }
+};
+
+/// A slot of such a node.
 struct SlotOfNode {
   std::int32_t node;
   int slot;
@@ -19,48 +53,41 @@ struct SlotOfNode {
   }
 };
 
-/// The slots of some nodes, and which bundle has them.
+/// The slots of these nodes, and which bundle has them.
 struct SlotsOfNodes {
+  const HeldNodes& nodes;
   std::vector<std::vector<SlotOfNode>> of_bundle;  ///< by node, then slot
-  std::vector<SlotOfNode> first;                   ///< of each node that has any, by node
+  std::vector<int> first;                          ///< of each of the nodes, -1 for none
 
-  int first_of(std::int32_t node) const {
-    const auto at = std::lower_bound(first.begin(), first.end(), SlotOfNode{node, 0});
-    return at != first.end() && at->node == node ? at->slot : -1;
-  }
-};
-
-SlotsOfNodes find_slots(const MpmState& state, const HostTables& t,
-                        const std::vector<std::uint8_t>& wanted) {
-  SlotsOfNodes slots;
-  const int bundles = static_cast<int>(t.bundles.size());
-  slots.of_bundle.resize(bundles);
-  state.cpu->for_each(bundles, [&](int i) {
-    std::vector<SlotOfNode>& found = slots.of_bundle[i];
-    const CudaBundle& bundle = t.bundles[i];
-    for (int k = bundle.first_block; k < bundle.first_block + bundle.blocks; ++k) {
-      const CudaBlock& b = t.blocks[k];
-      const Block& from = *state.blocks.all[t.of_host[k]];
-      int slot = b.first_slot;
-      for (int z = 0; z < b.nz + 2; ++z) {
-        for (int y = 0; y < b.ny + 2; ++y) {
-          const int* const row = from.node.data() + z * from.plane + y * from.pitch;
-          for (int x = 0; x < b.nx + 2; ++x, ++slot) {
-            if (row[x] >= 0 && wanted[row[x]] != 0) found.push_back({row[x], slot});
+  SlotsOfNodes(const MpmState& state, const HostTables& t, const HeldNodes& held)
+      : nodes(held), of_bundle(t.bundles.size()), first(held.group.size(), -1) {
+    state.cpu->for_each(static_cast<int>(of_bundle.size()), [&](int i) {
+      std::vector<SlotOfNode>& found = of_bundle[i];
+      const CudaBundle& bundle = t.bundles[i];
+      for (int k = bundle.first_block; k < bundle.first_block + bundle.blocks; ++k) {
+        const CudaBlock& b = t.blocks[k];
+        const Block& from = *state.blocks.all[t.of_host[k]];
+        int slot = b.first_slot;
+        for (int z = 0; z < b.nz + 2; ++z) {
+          for (int y = 0; y < b.ny + 2; ++y) {
+            const int* const row = from.node.data() + z * from.plane + y * from.pitch;
+            for (int x = 0; x < b.nx + 2; ++x, ++slot) {
+              if (row[x] >= 0 && held.number[row[x]] >= 0) found.push_back({row[x], slot});
+            }
           }
         }
       }
+      std::sort(found.begin(), found.end());
+    });
+    for (const std::vector<SlotOfNode>& found : of_bundle) {
+      for (const SlotOfNode& s : found) {
+        int& lowest = first[held.number[s.node]];
+        if (lowest < 0 || s.slot < lowest) lowest = s.slot;
+      }
     }
-    std::sort(found.begin(), found.end());
-  });
-  for (const std::vector<SlotOfNode>& found : slots.of_bundle) {
-    slots.first.insert(slots.first.end(), found.begin(), found.end());
   }
-  std::sort(slots.first.begin(), slots.first.end());
-  const auto same = [](const SlotOfNode& a, const SlotOfNode& b) { return a.node == b.node; };
-  slots.first.erase(std::unique(slots.first.begin(), slots.first.end(), same), slots.first.end());
-  return slots;
-}
+  int first_of(std::int32_t node) const { return first[nodes.number[node]]; }
+};
 
 /// What rows give a node.
 struct NodeOfGroup {
@@ -88,7 +115,7 @@ std::vector<NodeOfGroup> nodes_of(const AnchorFaces& faces, const FaceGroup& g) 
 /// Adds a row that is a group of its own, for a bundle with these slots: once for each slot that a
 /// node of it has there. `summed`: another bundle sums up its impulse.
 void add_row(const AnchorFaces& faces, const FaceGroup& g, const SlotsOfNodes& slots, int bundle,
-             int first_slot, bool summed, HostFaceRows& to) {
+             int first_slot, bool summed, std::vector<CudaHeldNode>& to) {
   const FaceRow& r = faces.rows[g.first];
   const float mass = faces.inverse[g.inverse];
   const std::vector<SlotOfNode>& here = slots.of_bundle[bundle];
@@ -116,7 +143,7 @@ void add_row(const AnchorFaces& faces, const FaceGroup& g, const SlotsOfNodes& s
         ++at[k];
         more = more || (at[k] != here.end() && at[k]->node == r.node[k]);
       }
-      to.held.push_back(n);
+      to.push_back(n);
     }
   }
 }
@@ -240,70 +267,65 @@ class FillChunks {
 HostFaceRows make_face_rows(const MpmState& state, const HostTables& t, int plane_slots) {
   const AnchorFaces& faces = state.anchors;
   if (faces.groups.empty() && faces.held.empty()) return {};
-  std::vector<std::uint8_t> wanted(state.nodes.size(), 0);
-  std::vector<std::pair<std::int32_t, int>> group_of;  // of nodes that rows move
-  for (std::size_t g = 0; g < faces.groups.size(); ++g) {
-    for (int i = 0; i < faces.groups[g].count; ++i) {
-      const FaceRow& r = faces.rows[faces.groups[g].first + i];
-      for (int k = 0; k < kRowNodes; ++k) {
-        if (r.weight[k] != 0) wanted[r.node[k]] = 1;
-        if (r.share[k] != 0) group_of.emplace_back(r.node[k], static_cast<int>(g));
-      }
-    }
-  }
-  std::sort(group_of.begin(), group_of.end());
-  std::vector<std::pair<std::int32_t, int>> held;  // nodes that anchors carry, and which
-  for (std::size_t i = 0; i < faces.held.size(); ++i) {
-    held.emplace_back(faces.held[i].node, static_cast<int>(i));
-    wanted[faces.held[i].node] = 1;
-  }
-  std::sort(held.begin(), held.end());
-  const SlotsOfNodes slots = find_slots(state, t, wanted);
+  const HeldNodes nodes(faces, state.nodes.size());
+  const SlotsOfNodes slots(state, t, nodes);
   HostFaceRows to;
   for (const FaceRow& r : faces.rows) {
     for (int k = 0; k < kRowNodes; ++k) {
-      const auto carried =
-          std::lower_bound(held.begin(), held.end(), std::pair<std::int32_t, int>(r.node[k], 0));
-      to.carries_always = to.carries_always || (r.weight[k] != 0 && carried != held.end() &&
-                                                carried->first == r.node[k]);
+      to.carries_always =
+          to.carries_always || (r.weight[k] != 0 && nodes.carried[nodes.number[r.node[k]]] >= 0);
     }
   }
-  FillChunks fill(faces, slots, 4 * 9 * plane_slots, to);
-  std::vector<int> groups;
-  std::vector<bool> summed(faces.groups.size(), false);
-  for (std::size_t i = 0; i < t.bundles.size(); ++i) {
-    const int first_slot = t.bundles[i].first_slot;
-    to.first_carried.push_back(static_cast<int>(to.carried.size()));
-    groups.clear();
+  struct OfBundle {
+    std::vector<int> groups;
+    std::vector<CudaHeldNode> held;
+    std::vector<CudaCarriedNode> carried;
+  };
+  const int count = static_cast<int>(t.bundles.size());
+  std::vector<OfBundle> of(count);
+  state.cpu->for_each(count, [&](int i) {
     for (const SlotOfNode& s : slots.of_bundle[i]) {
-      const auto from = [&s](const auto& list) {
-        return std::lower_bound(list.begin(), list.end(), std::pair<std::int32_t, int>(s.node, 0));
-      };
-      const auto row = from(group_of);
-      if (row != group_of.end() && row->first == s.node) groups.push_back(row->second);
-      const auto carried = from(held);
-      if (carried == held.end() || carried->first != s.node) continue;
-      const AnchorFaces::HeldNode& h = faces.held[carried->second];
-      to.carried.push_back(
-          {s.node, s.slot - first_slot, s.slot, h.anchor, {h.place[0], h.place[1], h.place[2]}});
+      const std::int32_t number = nodes.number[s.node];
+      if (nodes.group[number] >= 0) of[i].groups.push_back(nodes.group[number]);
+      if (nodes.carried[number] < 0) continue;
+      const AnchorFaces::HeldNode& h = faces.held[nodes.carried[number]];
+      of[i].carried.push_back({s.node,
+                               s.slot - t.bundles[i].first_slot,
+                               s.slot,
+                               h.anchor,
+                               {h.place[0], h.place[1], h.place[2]}});
     }
-    std::sort(groups.begin(), groups.end());
-    groups.erase(std::unique(groups.begin(), groups.end()), groups.end());
+    std::sort(of[i].groups.begin(), of[i].groups.end());
+    of[i].groups.erase(std::unique(of[i].groups.begin(), of[i].groups.end()), of[i].groups.end());
+  });
+  std::vector<int> summed_by(faces.groups.size(), -1);  // the first bundle that has a group
+  for (int i = 0; i < count; ++i) {
+    for (const int g : of[i].groups) {
+      if (summed_by[g] < 0) summed_by[g] = i;
+    }
+  }
+  state.cpu->for_each(count, [&](int i) {
+    for (const int g : of[i].groups) {
+      if (faces.groups[g].count > 1) continue;
+      add_row(faces, faces.groups[g], slots, i, t.bundles[i].first_slot, summed_by[g] != i,
+              of[i].held);
+    }
+  });
+  FillChunks fill(faces, slots, 4 * 9 * plane_slots, to);
+  for (int i = 0; i < count; ++i) {
+    to.first_carried.push_back(static_cast<int>(to.carried.size()));
+    to.carried.insert(to.carried.end(), of[i].carried.begin(), of[i].carried.end());
     to.first_held.push_back(static_cast<int>(to.held.size()));
-    for (const int g : groups) {
-      if (faces.groups[g].count > 1) {
-        to.grouped = true;
-        fill.add(static_cast<int>(i), first_slot, g);
-        continue;
-      }
-      add_row(faces, faces.groups[g], slots, static_cast<int>(i), first_slot, summed[g], to);
-      summed[g] = true;
+    to.held.insert(to.held.end(), of[i].held.begin(), of[i].held.end());
+    for (const int g : of[i].groups) {
+      if (faces.groups[g].count == 1) continue;
+      to.grouped = true;
+      fill.add(i, t.bundles[i].first_slot, g);
     }
-    const auto first = to.held.begin() + to.first_held.back();
-    const auto here = static_cast<int>(to.held.end() - first);
+    const int here = static_cast<int>(of[i].held.size());
     to.most_held = std::max(to.most_held, here);
-    const auto put =
-        std::count_if(first, to.held.end(), [](const CudaHeldNode& n) { return n.local >= 0; });
+    const auto put = std::count_if(of[i].held.begin(), of[i].held.end(),
+                                   [](const CudaHeldNode& n) { return n.local >= 0; });
     to.most_items = std::max(to.most_items, here + t.bundles[i].slots - static_cast<int>(put));
   }
   to.first_held.push_back(static_cast<int>(to.held.size()));

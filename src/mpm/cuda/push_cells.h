@@ -274,7 +274,7 @@ struct NearSearch {
         if (parts) {
           one.near &= ~thin_ones(pushes.colliders, one.near, t.bodies[one.body].cell_size);
         }
-        push_cell<false>(t, state, one, pushes, nodes);
+        if (one.near != 0) push_cell<false>(t, state, one, pushes, nodes);
         if (parts) {
           push_cell_parts(t, state, cells + __shfl_sync(0xffffffffu, i - step, from), pushes,
                           &nodes);

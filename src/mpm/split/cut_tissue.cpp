@@ -51,10 +51,8 @@ Apart take_apart(MpmState& state, const std::vector<std::int32_t>& changed,
   settle_debris(state, softened.debris);
   state.debris.insert(softened.debris.begin(), softened.debris.end());
   if (!state.points.free_volume.empty() && !cells.empty()) {
-    find_face_rows(state, state.anchors);
-    if (state.anchors.moves) {
-      find_held_nodes(state, state.anchors);
-    }
+    if (have_rows(state.anchors, state.bodies, cells)) find_face_rows(state, state.anchors);
+    if (state.anchors.moves) find_held_nodes(state, state.anchors);
   }
   state.cpu->both(
       [&] {

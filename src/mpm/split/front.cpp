@@ -149,16 +149,9 @@ FrontNode parted_node(const MpmState& s, const FrontNode& at, const FrontNode* b
   return result;
 }
 
-/// Nodes that anchors hold or that fly.
-std::vector<std::uint8_t> excluded_nodes(const MpmState& s) {
-  std::vector<std::uint8_t> excluded(s.nodes.size(), 0);
-  for (std::size_t i = 0; i < excluded.size(); ++i) excluded[i] = s.nodes.inv_mass[i] == 0;
-  for (const FaceRow& row : s.anchors.rows) {
-    for (int k = 0; k < kRowNodes; ++k) {
-      if (row.share[k] != 0) excluded[row.node[k]] = 1;
-    }
-  }
-  return excluded;
+/// Whether an anchor holds the node, or it flies.
+bool is_held_or_flies(const MpmState& s, std::int32_t node) {
+  return s.nodes.inv_mass[node] == 0 || s.anchors.moves_node(node);
 }
 
 }  // namespace
@@ -197,7 +190,6 @@ bool is_cut_between_sides(const MpmState& s, const FrontNode& n) {
 
 void follow_front(MpmState& s, const std::vector<std::int32_t>& touched) {
   Front& front = s.front;
-  const std::vector<std::uint8_t> excluded = excluded_nodes(s);
   std::vector<FrontNode> candidates;
   for (std::size_t b = 0; b < s.bodies.size(); ++b) {
     const CellsAround around(s.bodies[b], 1, s.points, touched);
@@ -211,7 +203,7 @@ void follow_front(MpmState& s, const std::vector<std::int32_t>& touched) {
         at.y = y;
         at.z = z;
         const auto add = [&](std::int32_t field, const Planes& points) {
-          if (excluded[field] != 0) return;
+          if (is_held_or_flies(s, field)) return;
           at.node = field;
           at.all = points;
           candidates.push_back(at);

@@ -42,13 +42,16 @@ struct Front {
   std::vector<FrontCell> cells;
   std::vector<FrontPart> parts;
   /// Where forces go: of each node that a cell sees, and of each parted one, places in `force` and
-  /// `pull`, in a fixed order.
+  /// `pull`, in the order of the cells.
   struct Sum {
     std::int32_t node, first, count;
   };
   std::vector<Sum> node_sums, part_sums;
   std::vector<std::int32_t> node_places, part_places;
   Array<float> force, pull;  ///< of the cells [28][4] each, of the parts [4] each [N]
+
+  /// Work of list_front_cells(), by node, as that leaves it: -1 and 0 for all.
+  std::vector<std::int32_t> number, counted;
 };
 
 inline constexpr int kRimProbes = 32;

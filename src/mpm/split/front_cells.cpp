@@ -159,27 +159,33 @@ void add_front_cell(MpmState& s, const LatticeBody& body, std::int32_t number, C
   front.parts.insert(front.parts.end(), view.parts.begin(), view.parts.end());
 }
 
-/// Where the forces on nodes, or parted ones, of `count` are to be found: place i is that of
-/// node_of(i), of so many places.
+/// Where the forces on nodes, or parted ones, are to be found: place i is that of node_of(i), of so
+/// many places. `sum_of` is 0 for all of them, before and after.
 template <class NodeOf, class PlaceOf>
-void list_sums(std::size_t count, std::size_t places, const NodeOf& node_of,
-               const PlaceOf& place_of, std::vector<Front::Sum>& sums,
+void list_sums(std::size_t places, const NodeOf& node_of, const PlaceOf& place_of,
+               std::vector<std::int32_t>& sum_of, std::vector<Front::Sum>& sums,
                std::vector<std::int32_t>& to) {
-  std::vector<std::int32_t> sum_of(count, 0);  // first how many it has
-  for (std::size_t i = 0; i < places; ++i) ++sum_of[node_of(i)];
   sums.clear();
+  for (std::size_t i = 0; i < places; ++i) {
+    std::int32_t& sum = sum_of[node_of(i)];
+    if (sum == 0) {
+      sums.push_back({node_of(i), 0, 0});
+      sum = static_cast<std::int32_t>(sums.size());  // one more than its place
+    }
+    ++sums[sum - 1].first;  // how many it has, for now
+  }
   std::int32_t first = 0;
-  for (std::size_t n = 0; n < count; ++n) {
-    if (sum_of[n] == 0) continue;
-    sums.push_back({static_cast<std::int32_t>(n), first, 0});
-    first += sum_of[n];
-    sum_of[n] = static_cast<std::int32_t>(sums.size()) - 1;
+  for (Front::Sum& sum : sums) {
+    const std::int32_t count = sum.first;
+    sum.first = first;
+    first += count;
   }
   to.resize(places);
   for (std::size_t i = 0; i < places; ++i) {
-    Front::Sum& sum = sums[sum_of[node_of(i)]];
+    Front::Sum& sum = sums[sum_of[node_of(i)] - 1];
     to[sum.first + sum.count++] = static_cast<std::int32_t>(place_of(i));
   }
+  for (const Front::Sum& sum : sums) sum_of[sum.node] = 0;
 }
 
 constexpr int kSumsTogether = 64;  // sums that are gone through at a time
@@ -190,12 +196,13 @@ void list_front_cells(MpmState& s) {
   Front& front = s.front;
   front.cells.clear();
   front.parts.clear();
-  std::vector<std::int32_t> parted(s.nodes.size(), -1);
+  front.number.resize(s.nodes.size(), -1);
+  front.counted.resize(s.nodes.size(), 0);
   std::vector<std::array<std::int32_t, 4>> cells;  // body, z, y, x
   cells.reserve(27 * front.nodes.size());
   for (std::size_t i = 0; i < front.nodes.size(); ++i) {
     const FrontNode& n = front.nodes[i];
-    parted[n.node] = static_cast<std::int32_t>(i);
+    front.number[n.node] = static_cast<std::int32_t>(i);
     for (int k = 0; k < 27; ++k) {
       cells.push_back({n.body, n.z + k / 9 - 1, n.y + k / 3 % 3 - 1, n.x + k % 3 - 1});
     }
@@ -207,20 +214,20 @@ void list_front_cells(MpmState& s) {
       static_cast<int>(cells.size()),
       [&](int i) {
         const auto& [body, z, y, x] = cells[i];
-        views[i] = views_of(s, parted, s.bodies[body], x, y, z);
+        views[i] = views_of(s, front.number, s.bodies[body], x, y, z);
       },
       16);
   for (std::size_t i = 0; i < cells.size(); ++i) {
     for (CellView& view : views[i]) add_front_cell(s, s.bodies[cells[i][0]], cells[i][0], view);
   }
+  for (const FrontNode& n : front.nodes) front.number[n.node] = -1;
   list_sums(
-      s.nodes.size(), 27 * front.cells.size(),
-      [&](std::size_t i) { return front.cells[i / 27].node[i % 27]; },
-      [](std::size_t i) { return kFrontForce * (i / 27) + 4 * (i % 27); }, front.node_sums,
-      front.node_places);
+      27 * front.cells.size(), [&](std::size_t i) { return front.cells[i / 27].node[i % 27]; },
+      [](std::size_t i) { return kFrontForce * (i / 27) + 4 * (i % 27); }, front.counted,
+      front.node_sums, front.node_places);
   list_sums(
-      front.nodes.size(), front.parts.size(), [&](std::size_t i) { return front.parts[i].node; },
-      [](std::size_t i) { return 4 * i; }, front.part_sums, front.part_places);
+      front.parts.size(), [&](std::size_t i) { return front.parts[i].node; },
+      [](std::size_t i) { return 4 * i; }, front.counted, front.part_sums, front.part_places);
   front.force.assign(kFrontForce * front.cells.size(), 0.0f);
   front.pull.assign(4 * front.parts.size(), 0.0f);
 }

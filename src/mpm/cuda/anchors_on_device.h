@@ -2,7 +2,7 @@
 #pragma once
 
 #include <functional>
-#include <optional>
+#include <vector>
 
 #include "compute/device_array.h"
 #include "mpm/anchors/hold_beside_tools.h"
@@ -12,7 +12,8 @@
 namespace tissue_sim {
 
 struct AnchorsOnDevice {
-  std::optional<HostFaceRows> made;  ///< with the tables of blocks, to go up after them
+  HostFaceRows made;
+  std::vector<std::int32_t> held_points;  ///< that have no volume outside of anchors
   DeviceArray<CudaFaceChunk> chunks;
   DeviceArray<CudaHeldNode> held;
   DeviceArray<int> first_held, first_carried;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cstring>
 #include <stdexcept>
+#include <utility>
 
 #include "mpm/cuda/on_device.h"
 #include "mpm/point_fields.h"
@@ -39,11 +40,10 @@ void CudaMpmTissue::push_anchors() {
   const AnchorFaces& faces = state_->anchors;
   OnDevice& d = *device_;
   AnchorsOnDevice& to = d.anchors;
-  std::optional<HostFaceRows> made;
-  made.swap(to.made);
+  const bool is_made = std::exchange(to.made.is_new, false);
   if (faces.groups.empty() && faces.held.empty() && to.chunks.size() == 0) return;
-  if (!made) made = make_face_rows(*state_, d.host_tables, d.plan.max_plane_slots);
-  const HostFaceRows& t = *made;
+  if (!is_made) make_face_rows(*state_, d.host_tables, d.plan.max_plane_slots, to.made);
+  const HostFaceRows& t = to.made;
   std::vector<CudaRowNodes> rows(faces.rows.size());
   for (std::size_t i = 0; i < rows.size(); ++i) {
     const FaceRow& r = faces.rows[i];
@@ -149,11 +149,11 @@ void CudaMpmTissue::leave_anchors(int done) {
 
 void CudaMpmTissue::put_held_points(const std::vector<std::int32_t>& index, int stride,
                                     std::vector<std::uint8_t>& cloud) const {
-  const Points& points = state_->points;
-  if (points.free_volume.empty()) return;
+  const std::vector<std::int32_t>& points = device_->anchors.held_points;
   state_->cpu->for_each(
-      points.size(),
-      [&](int p) {
+      static_cast<int>(points.size()),
+      [&](int k) {
+        const std::int32_t p = points[k];
         Vec3 place;
         const int i = !index.empty() ? index[p] : (p % stride == 0 ? p / stride : -1);
         if (i < 0 || !held_place(*state_, p, place)) return;

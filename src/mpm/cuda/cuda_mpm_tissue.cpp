@@ -71,6 +71,9 @@ CudaMpmTissue::CudaMpmTissue(const Scene& scene, std::vector<std::string> notes)
   make_blocks(state_->bodies.size() == 1 ? choose_shape(state_->bodies, d.limits, true, !held)
                                          : d.cut_shape,
               d.limits.processors);
+  for (std::int32_t p = 0; p < state_->points.size(); ++p) {
+    if (!(state_->points.free_volume_of(p) > 0)) d.anchors.held_points.push_back(p);
+  }
   pieces_ = whole_pieces(*state_);
   foresight_ = make_foresight(scene);
   push();

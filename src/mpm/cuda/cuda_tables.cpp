@@ -126,15 +126,14 @@ void CudaMpmTissue::plan_tables() {
   d.plan.max_slots = t.max_slots;
   d.plan.max_plane_slots = t.max_plane_slots;
   d.plan.max_columns = t.max_columns;
-  d.anchors.made = make_face_rows(*state_, t, t.max_plane_slots);
-  d.plan.max_held = d.anchors.made->most_held;
-  d.plan.max_items = d.anchors.made->most_items;
+  make_face_rows(*state_, t, t.max_plane_slots, d.anchors.made);
+  d.plan.max_held = d.anchors.made.most_held;
+  d.plan.max_items = d.anchors.made.most_items;
   const bool all_whole = std::all_of(t.bundles.begin(), t.bundles.end(), [](const CudaBundle& b) {
     return b.blocks == 1 && b.partial == 0;
   });
   const bool is_held = !anchors.groups.empty();
-  d.plan.holds =
-      is_held && all_whole && !d.anchors.made->grouped && !d.anchors.made->carries_always;
+  d.plan.holds = is_held && all_whole && !d.anchors.made.grouped && !d.anchors.made.carries_always;
   choose(t.bundles.size());
   if (d.plan.holds && d.plan.small && !d.plan.cached) {  // for want of shared memory
     d.plan.holds = false;

@@ -10,39 +10,33 @@ namespace {
 static_assert(kRowNodes == kFaceRowNodes && kLargestGroup == kFaceGroupRows,
               "rows and groups are the same on both sides");
 
-/// Nodes that rows have or an anchor carries, numbered as they follow one another.
-struct HeldNodes {
-  std::vector<std::int32_t> number;   ///< per node, -1 for others
-  std::vector<std::int32_t> group;    ///< of each, whose rows move it; -1
-  std::vector<std::int32_t> carried;  ///< of each, its place in AnchorFaces::held; -1
-
-  HeldNodes(const AnchorFaces& faces, std::size_t nodes) : number(nodes, -1) {
-    const auto for_each = [&](const auto& f) {
-      for (std::size_t g = 0; g < faces.groups.size(); ++g) {
-        for (int i = 0; i < faces.groups[g].count; ++i) {
-          const FaceRow& r = faces.rows[faces.groups[g].first + i];
-          for (int k = 0; k < kRowNodes; ++k) {
-            if (r.weight[k] != 0) f(r.node[k], r.share[k] != 0 ? static_cast<int>(g) : -1);
-          }
+void number_nodes(const AnchorFaces& faces, std::size_t node_count, HeldNodes& nodes) {
+  const auto for_each = [&](const auto& f) {
+    for (std::size_t g = 0; g < faces.groups.size(); ++g) {
+      for (int i = 0; i < faces.groups[g].count; ++i) {
+        const FaceRow& r = faces.rows[faces.groups[g].first + i];
+        for (int k = 0; k < kRowNodes; ++k) {
+          if (r.weight[k] != 0) f(r.node[k], r.share[k] != 0 ? static_cast<int>(g) : -1);
         }
       }
-    };
-    for_each([&](std::int32_t node, int) { number[node] = 0; });
-    for (const AnchorFaces::HeldNode& n : faces.held) number[n.node] = 0;
-    std::int32_t count = 0;
-    for (std::int32_t& n : number) {
-      if (n == 0) n = count++;
     }
-    group.assign(count, -1);
-    carried.assign(count, -1);
-    for_each([&](std::int32_t node, int g) {
-      if (g >= 0) group[number[node]] = g;
-    });
-    for (std::size_t i = 0; i < faces.held.size(); ++i) {
-      carried[number[faces.held[i].node]] = static_cast<std::int32_t>(i);
-    }
+  };
+  nodes.number.assign(node_count, -1);
+  for_each([&](std::int32_t node, int) { nodes.number[node] = 0; });
+  for (const AnchorFaces::HeldNode& n : faces.held) nodes.number[n.node] = 0;
+  std::int32_t count = 0;
+  for (std::int32_t& n : nodes.number) {
+    if (n == 0) n = count++;
   }
-};
+  nodes.group.assign(count, -1);
+  nodes.carried.assign(count, -1);
+  for_each([&](std::int32_t node, int g) {
+    if (g >= 0) nodes.group[nodes.number[node]] = g;
+  });
+  for (std::size_t i = 0; i < faces.held.size(); ++i) {
+    nodes.carried[nodes.number[faces.held[i].node]] = static_cast<std::int32_t>(i);
+  }
+}
 
 /// A slot of such a node.
 struct SlotOfNode {
@@ -264,12 +258,28 @@ class FillChunks {
 
 }  // namespace
 
-HostFaceRows make_face_rows(const MpmState& state, const HostTables& t, int plane_slots) {
+void HostFaceRows::clear() {
+  chunks.clear();
+  first_carried.clear();
+  held.clear();
+  first_held.clear();
+  entries.clear();
+  shares.clear();
+  rows.clear();
+  carried.clear();
+  most_held = most_items = 0;
+  is_new = grouped = carries_always = false;
+  room_each = 0;
+}
+
+void make_face_rows(const MpmState& state, const HostTables& t, int plane_slots, HostFaceRows& to) {
   const AnchorFaces& faces = state.anchors;
-  if (faces.groups.empty() && faces.held.empty()) return {};
-  const HeldNodes nodes(faces, state.nodes.size());
+  to.clear();
+  to.is_new = true;
+  if (faces.groups.empty() && faces.held.empty()) return;
+  number_nodes(faces, state.nodes.size(), to.nodes);
+  const HeldNodes& nodes = to.nodes;
   const SlotsOfNodes slots(state, t, nodes);
-  HostFaceRows to;
   for (const FaceRow& r : faces.rows) {
     for (int k = 0; k < kRowNodes; ++k) {
       to.carries_always =
@@ -330,7 +340,6 @@ HostFaceRows make_face_rows(const MpmState& state, const HostTables& t, int plan
   }
   to.first_held.push_back(static_cast<int>(to.held.size()));
   to.first_carried.push_back(static_cast<int>(to.carried.size()));
-  return to;
 }
 
 }  // namespace tissue_sim

@@ -72,20 +72,25 @@ bool is_at_rim(const MpmState& s, const LatticeBody& body, std::int32_t p, int a
 
 /// The rim again of bonds beside points that lost some.
 void update_rim(MpmState& s, const std::vector<std::int32_t>& broken) {
+  std::vector<std::int32_t> beside;
   for (const std::int32_t p : broken) {
     const Points::Site& site = s.points.site[p];
     const LatticeBody& body = s.bodies[site.body];
     for (int i = 0; i < 27; ++i) {
       const std::int32_t q =
           body.point(site.x + i % 3 - 1, site.y + i / 3 % 3 - 1, site.z + i / 9 - 1);
-      if (q < 0) continue;
-      for (int axis = 0; axis < 3; ++axis) {
-        const std::int64_t key = 3 * static_cast<std::int64_t>(q) + axis;
-        if (is_at_rim(s, body, q, axis)) {
-          s.front.rim.try_emplace(key, 0u);
-        } else {
-          s.front.rim.erase(key);
-        }
+      if (q >= 0) beside.push_back(q);
+    }
+  }
+  std::sort(beside.begin(), beside.end());
+  beside.erase(std::unique(beside.begin(), beside.end()), beside.end());
+  for (const std::int32_t q : beside) {
+    for (int axis = 0; axis < 3; ++axis) {
+      const std::int64_t key = 3 * static_cast<std::int64_t>(q) + axis;
+      if (is_at_rim(s, s.bodies[s.points.site[q].body], q, axis)) {
+        s.front.rim.try_emplace(key, 0u);
+      } else {
+        s.front.rim.erase(key);
       }
     }
   }

@@ -6,6 +6,7 @@
 
 #include "compute/device_array.h"
 #include "cut_scenes.h"
+#include "drooping_block.h"
 #include "either_device.h"
 #include "mpm/cuda/cuda_mpm_tissue.h"
 #include "mpm/mpm_tissue.h"
@@ -83,6 +84,14 @@ TEST_F(SubstepOnGpu, HoldsWhileTissueIsPressedAndCut) {
   EXPECT_NEAR(energy[1], energy[0], 0.02 * energy[0]);
   EXPECT_NEAR(gain[1], gain[0], 0.1 * gain[0]);
   EXPECT_GT(gain[1], 1.2);
+}
+
+TEST_F(SubstepOnGpu, LightPointsAtAnAnchorDoNotShortenIt) {
+  for (const double cell_size : {0.004, 0.003}) {
+    const int gpu = substeps_of_drooping_block(Device::kCuda, MpmBoundary::kSurface, cell_size);
+    const int cpu = substeps_of_drooping_block(Device::kCpu, MpmBoundary::kSurface, cell_size);
+    EXPECT_NEAR(gpu, cpu, 0.1 * cpu) << cell_size;
+  }
 }
 
 }  // namespace

@@ -69,7 +69,8 @@ struct PointBounds {
 struct BlockState {
   double elastic_energy = 0;  ///< [J]
   /// For each of the body's materials the largest squared column of cof F plus |J - 1| ||F||, of
-  /// soft points that times kSoftness, 1 at least: see stable_substep(); then ||F||^2 of all.
+  /// soft points that times kSoftness, 1 at least: see stable_substep(); then ||F||^2 of all. Less
+  /// of points behind the faces of anchors: Points::lightness.
   std::vector<float> stiffening;
   float wildest = 1;  ///< the largest of all points, soft ones not lessened
   bool finite = true;

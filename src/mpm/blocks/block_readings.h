@@ -24,21 +24,23 @@ struct Readings {
   float least = 1, stiffenings[kLanes] = {}, squares[kLanes] = {};
 };
 
+/// What 1 and more of a point counts for. Behind the face of an anchor tissue strains as its nodes
+/// do, without its neighbours' stress; it is as light as it is soft, and as long as it holds on to
+/// them its nodes have their mass.
+TISSUE_SIM_INLINE float lessened(const BlockField& f, std::int32_t point, float value) {
+  const bool holds = f.lightness != nullptr && f.bonds[point] == f.whole_bonds[point];
+  return holds ? 1 + f.lightness[point] * (value - 1) : value;
+}
+
 /// Widens `stiffening` to a point's, whose squared columns of cof F, J and ||F||^2 are given.
 TISSUE_SIM_INLINE void stiffen(const Block& b, const BlockField& f, std::int32_t point,
                                float column, float J, float f2, Readings& read) {
   BlockState& r = read.block;
   float stiffening = column + std::fabs(J - 1) * std::sqrt(f2 / 3);
   if (!std::isfinite(stiffening)) r.finite = false;
-  r.wildest = std::max(r.wildest, stiffening);
+  r.wildest = std::max(r.wildest, lessened(f, point, stiffening));
   if (f.soft != nullptr && f.soft[point] != 0) stiffening *= kSoftness;
-  // Behind the face of an anchor tissue strains as its nodes do, without its neighbours' stress; it
-  // is as light as it is soft, and as long as it holds on to them its nodes have their mass. What
-  // the anchor has keeps next to nothing of its stiffness.
-  if (f.lightness != nullptr &&
-      (f.bonds[point] == f.whole_bonds[point] || f.lightness[point] == 0)) {
-    stiffening = 1 + f.lightness[point] * (stiffening - 1);
-  }
+  stiffening = lessened(f, point, stiffening);
   const int material = f.material == nullptr ? 0 : f.material[point];
   r.stiffening[material] = std::max(r.stiffening[material], stiffening);
   read.least = b.material != Block::kMixed
@@ -54,13 +56,30 @@ TISSUE_SIM_INLINE Mask<W> are_points(const std::int32_t* point) {
   return ~(mask >> 31);
 }
 
+/// Widens the squares to those of points ||F||^2.
+template <int W>
+TISSUE_SIM_INLINE void read_squares(const BlockField& f, const std::int32_t* point,
+                                    const Mask<W>& is_point, const Vec<W>& f2, Readings& read) {
+  const Vec<W> before = load<W>(read.squares);
+  if (f.lightness == nullptr) {
+    return store<W>(read.squares, larger<W>(before, keep<W>(is_point, f2)));
+  }
+  if (!any_negative<W>(bits<W>(before - f2) & is_point)) return;
+  for (int i = 0; i < W; ++i) {
+    if (is_point[i] == 0 || f2[i] <= before[i]) continue;
+    read.squares[i] = std::max(before[i], lessened(f, point[i], f2[i]));
+  }
+}
+
 /// Widens the stiffenings to those of the point of each of W cells, from `lane` on.
 template <int W>
 TISSUE_SIM_INLINE void read_stiffening(const Block& b, const BlockField& f, std::size_t lane,
                                        const Vec<W> (&F)[9], Readings& read) {
   const std::int32_t* point = b.point.data() + lane;
-  // A point that an anchor holds has neither stress nor mass.
-  const Mask<W> is_point = are_points<W>(point) & (-bits<W>(load<W>(b.volume.data() + lane)) >> 31);
+  // Nor what an anchor keeps of one.
+  const float kept = f.lightness == nullptr ? 0 : kept_volume(f.cell_size);
+  const Mask<W> is_point =
+      are_points<W>(point) & bits<W>(kept - load<W>(b.volume.data() + lane)) >> 31;
   Vec<W> cof[9];
   cofactor(F, cof);
   const Vec<W> J = F[0] * cof[0] + F[1] * cof[1] + F[2] * cof[2];
@@ -72,7 +91,7 @@ TISSUE_SIM_INLINE void read_stiffening(const Block& b, const BlockField& f, std:
   const Vec<W> at_most =
       larger<W>(cx, larger<W>(cy, cz)) + larger<W>(J - 1.0f, 1.0f - J) * (0.5f + (1.0f / 6) * f2);
   store<W>(read.stiffenings, load<W>(read.stiffenings) + keep<W>(is_point, at_most));
-  store<W>(read.squares, larger<W>(load<W>(read.squares), keep<W>(is_point, f2)));
+  read_squares<W>(f, point, is_point, f2, read);
   if (!any_negative<W>(bits<W>(read.least - at_most) & is_point)) return;
   for (int i = 0; i < W; ++i) {
     if (is_point[i] == 0 || at_most[i] <= read.least) continue;

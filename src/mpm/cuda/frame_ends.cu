@@ -96,6 +96,7 @@ __global__ void __launch_bounds__(kMostThreads)
   m.kinetic_energy = kinetic_energy(t, b, state);
   __syncthreads();
   const int pitch = b.nx + 2, plane = pitch * (b.ny + 2);
+  const float kept = t.lightness == nullptr ? 0 : kept_volume(body.cell_size);
   for_each_point(t, b, u, [&](int lane, int s, int x, int y, int z, const HalfPlane(&h)[3]) {
     const PointState p = point_state(b, body, h, x, y, z, s);
     for (int c = 0; c < 3; ++c) {
@@ -117,16 +118,17 @@ __global__ void __launch_bounds__(kMostThreads)
     const float stiffening = column + fabsf(J - 1) * sqrtf(square / 3);
     if (!isfinite(elastic + stiffening)) m.finite = 0;
     m.elastic_energy += static_cast<double>(elastic) * volume;
-    m.wildest = fmaxf(m.wildest, stiffening);
-    m.square = fmaxf(m.square, square);
+    if (b.whole == 0 && volume <= kept) return;
     const bool is_soft = t.soft != nullptr && t.soft[t.point[lane]] != 0;
-    float counts = is_soft ? kSoftness * stiffening : stiffening;
-    if (t.lightness != nullptr) counts = 1 + t.lightness[t.point[lane]] * (counts - 1);
-    m.stiffening = fmaxf(m.stiffening, counts);
+    const float lightness = t.lightness != nullptr ? t.lightness[t.point[lane]] : 1;
+    const auto lessened = [lightness](float value) { return 1 + lightness * (value - 1); };
+    m.wildest = fmaxf(m.wildest, lessened(stiffening));
+    m.square = fmaxf(m.square, lessened(square));
+    m.stiffening = fmaxf(m.stiffening, lessened(is_soft ? kSoftness * stiffening : stiffening));
   });
   // The velocity of a point is the value of the nodes' velocities there.
   for_each_point(t, b, v, [&](int lane, int s, int, int, int, const HalfPlane(&h)[3]) {
-    if (b.whole == 0 && t.volume[lane] == 0) return;
+    if (b.whole == 0 && t.volume[lane] <= kept) return;
     float v2 = 0;
     for (int c = 0; c < 3; ++c) {
       const float sx = (s & 1) != 0 ? 1.0f : -1.0f, sy = (s & 2) != 0 ? 1.0f : -1.0f;

@@ -72,19 +72,21 @@ BlockField block_field(const MpmState& state, const Block& block) {
 
 namespace {
 
-/// Widens a block's box to its points in anchors, which move with these.
+/// Widens a block's box to its points without free volume, which move with their anchors.
 void add_held(const MpmState& state, const Block& block, Box& box) {
   const LatticeBody& b = state.bodies[block.body];
-  const float kept = kept_volume(static_cast<float>(b.cell_size));
+  // What is kept of them has no more than this.
+  const float little = kept_volume(static_cast<float>(b.cell_size));
   for (std::size_t first = 0; first < block.volume.size(); first += kLanes) {
     int held = 0;
     for (int i = 0; i < kLanes; ++i) {
-      held |= static_cast<int>(!(block.volume[first + i] > kept)) & ~(block.point[first + i] >> 31);
+      held |=
+          static_cast<int>(!(block.volume[first + i] > little)) & ~(block.point[first + i] >> 31);
     }
     if (held == 0) continue;
     for (std::size_t lane = first; lane < first + kLanes; ++lane) {
       const std::int32_t p = block.point[lane];
-      if (p < 0 || block.volume[lane] > kept) continue;
+      if (p < 0 || state.points.free_volume_of(p) > 0) continue;
       const Points::Site& s = state.points.site[p];
       Vec3 x = b.site_position(s.x, s.y, s.z);
       if (state.anchors.moves) x = state.anchors.place_of_held(b.body, block.body, x);

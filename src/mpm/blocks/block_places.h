@@ -6,7 +6,6 @@
 #include <cstring>
 
 #include "mpm/blocks/block_planes.h"
-#include "mpm/blocks/stabilisation.h"
 
 namespace tissue_sim {
 namespace kernels {
@@ -82,16 +81,15 @@ TISSUE_SIM_INLINE void positions(const Block& b, const BlockField& f, const Arra
                     });
 }
 
-/// The lanes that hold points of more than a volume, all bits set of each.
+/// The lanes that hold points, all bits set of each.
 template <int W>
-TISSUE_SIM_INLINE Mask<W> hold_points(const float* volume, float more_than = 0) {
-  return bits<W>(more_than - load<W>(volume)) >> 31;
+TISSUE_SIM_INLINE Mask<W> hold_points(const float* volume) {
+  return -bits<W>(load<W>(volume)) >> 31;
 }
 
 template <int W>
 TISSUE_SIM_INLINE PointBounds bounds(const Block& b, const BlockField& f, BlockScratch& scratch) {
   const float* volume = b.volume.data();
-  const float kept = f.lightness == nullptr ? 0 : kept_volume(f.cell_size);
   PointBounds result;
   Vec<W> min[3], max[3];
   for (int c = 0; c < 3; ++c) {
@@ -101,7 +99,7 @@ TISSUE_SIM_INLINE PointBounds bounds(const Block& b, const BlockField& f, BlockS
   for_each_place<W>(
       b, f, f.nodes->u, scratch, [&](std::size_t lane, const auto& x) TISSUE_SIM_INLINE_LAMBDA {
         for (int s = 0; s < 8; ++s) {
-          const Mask<W> inside = hold_points<W>(volume + lane + s * b.stride, kept);
+          const Mask<W> inside = hold_points<W>(volume + lane + s * b.stride);
           for (int c = 0; c < 3; ++c) {  // nothing but `v < w ? v : w` becomes one instruction
             const Vec<W> low = either<W>(inside, x[c][s], min[c]);
             const Vec<W> high = either<W>(inside, x[c][s], max[c]);
@@ -117,8 +115,7 @@ TISSUE_SIM_INLINE PointBounds bounds(const Block& b, const BlockField& f, BlockS
                       for (int s = 0; s < 8; ++s) {
                         const Vec<W> v2 = v[0][s] * v[0][s] + v[1][s] * v[1][s] + v[2][s] * v[2][s];
                         const Mask<W> of_points =
-                            bits<W>(v2) & 0x7fffffff &
-                            hold_points<W>(volume + lane + s * b.stride, kept);
+                            bits<W>(v2) & 0x7fffffff & hold_points<W>(volume + lane + s * b.stride);
                         speed2 = of_points > speed2 ? of_points : speed2;
                       }
                     });

@@ -22,8 +22,8 @@ inline constexpr int kSteadyCount = 7;
 inline constexpr float kSoftness = 1.0f / 3;
 
 /// What anchors keep of points in cells at their faces (fill_region.cpp: a share kStabilisation) is
-/// no larger than this, nor is anything else [m^3]: its nodes, which nothing else holds, move by
-/// cells, and it takes next to no part in how stiff tissue is.
+/// no larger than this, and little else [m^3]. Its nodes, which nothing else holds, move by cells;
+/// how stiff it is for that is no matter.
 TISSUE_SIM_INLINE float kept_volume(float cell_size) {
   const float half = 0.5f * cell_size;
   return 2 * kStabilisation * half * half * half;

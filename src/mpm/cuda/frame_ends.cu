@@ -128,7 +128,7 @@ __global__ void __launch_bounds__(kMostThreads)
   });
   // The velocity of a point is the value of the nodes' velocities there.
   for_each_point(t, b, v, [&](int lane, int s, int, int, int, const HalfPlane(&h)[3]) {
-    if (b.whole == 0 && t.volume[lane] <= kept) return;
+    if (b.whole == 0 && t.volume[lane] == 0) return;
     float v2 = 0;
     for (int c = 0; c < 3; ++c) {
       const float sx = (s & 1) != 0 ? 1.0f : -1.0f, sy = (s & 2) != 0 ? 1.0f : -1.0f;

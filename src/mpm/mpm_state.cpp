@@ -5,7 +5,7 @@
 
 #include "mpm/anchors/anchored_share.h"
 #include "mpm/anchors/hold_beside_tools.h"
-#include "mpm/blocks/stabilisation.h"
+#include "mpm/anchors/kept_volume.h"
 #include "mpm/contact/block_contact.h"
 #include "mpm/contact/surface_places.h"
 #include "mpm/split/cut_tissue.h"

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "mpm/anchors/kept_volume.h"
 #include "mpm/blocks/block_forces.h"
 #include "mpm/tear/stretched_point.h"
 

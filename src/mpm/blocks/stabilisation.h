@@ -21,14 +21,6 @@ inline constexpr int kSteadyCount = 7;
 /// about that of whole tissue.
 inline constexpr float kSoftness = 1.0f / 3;
 
-/// What anchors keep of points in cells at their faces (fill_region.cpp: a share kStabilisation) is
-/// no larger than this, and little else [m^3]. Its nodes, which nothing else holds, move by cells;
-/// how stiff it is for that is no matter.
-TISSUE_SIM_INLINE float kept_volume(float cell_size) {
-  const float half = 0.5f * cell_size;
-  return 2 * kStabilisation * half * half * half;
-}
-
 namespace stabilisation {
 
 /// Kinds (0 A, 1 d, 2 B) along x and y of an XyQuantity.

@@ -2,6 +2,7 @@
 
 #include "compute/cuda_check.h"
 #include "material/laws.h"
+#include "mpm/anchors/kept_volume.h"
 #include "mpm/cuda/block_nodes.h"
 #include "mpm/cuda/cell_stabilisation.h"
 #include "mpm/cuda/frame_ends.h"

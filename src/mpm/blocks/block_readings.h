@@ -78,7 +78,7 @@ template <int W>
 TISSUE_SIM_INLINE void read_stiffening(const Block& b, const BlockField& f, std::size_t lane,
                                        const Vec<W> (&F)[9], Readings& read) {
   const std::int32_t* point = b.point.data() + lane;
-  // Nor what an anchor keeps of one.
+  // Neither what an anchor holds is one, nor what it keeps of a point.
   const float kept = f.lightness == nullptr ? 0 : kept_volume(f.cell_size);
   const Mask<W> is_point =
       are_points<W>(point) & bits<W>(kept - load<W>(b.volume.data() + lane)) >> 31;

@@ -10,8 +10,8 @@
 #include <cstdint>
 #include <vector>
 
-#include "mpm/contact/surface_place.h"
 #include "mpm/lattice_tissue.h"
+#include "mpm/surface/surface_place.h"
 
 namespace tissue_sim {
 

@@ -1,4 +1,4 @@
-#include "mpm/contact/surface_places.h"
+#include "mpm/surface/surface_places.h"
 
 #include <algorithm>
 #include <cmath>

@@ -92,6 +92,7 @@ void PbdTissue::read_surface(SurfaceTriangles& surface) {
   const State& s = *state_;
   surface.corners.clear();
   surface.fragment.clear();
+  surface.cut = s.cut;
   for (const Triangle& t : s.triangles) {
     for (const std::int32_t v : t) {
       for (int a = 0; a < 3; ++a) surface.corners.push_back(s.vertices.x[4 * v + a]);

@@ -227,7 +227,6 @@ void check_mls(const MlsOptions& mls) {
   if (mls.neighbours < 14 || mls.neighbours > 60) {
     refuse("mls.neighbours", std::to_string(mls.neighbours), "must lie between 14 and 60");
   }
-  check_enum("mls.basis", mls.basis, kMlsBasisNames);
   check_enum("mls.placement", mls.placement, kMlsPlacementNames);
   check_enum("mls.contact", mls.contact, kMlsContactNames);
   check_range("mls.grading", mls.grading, 1, 4);

@@ -22,12 +22,8 @@ struct Spelling {
 
 inline constexpr Spelling<Method> kMethodNames[] = {
     {Method::kMpm, "mpm"}, {Method::kMls, "mls"}, {Method::kPbd, "pbd"}};
-inline constexpr Spelling<MlsPlacement> kMlsPlacementNames[] = {
-    {MlsPlacement::kRegular, "regular"},
-    {MlsPlacement::kJittered, "jittered"},
-    {MlsPlacement::kGraded, "graded"}};
-inline constexpr Spelling<MlsBasis> kMlsBasisNames[] = {{MlsBasis::kLinear, "linear"},
-                                                        {MlsBasis::kBalanced, "balanced"}};
+inline constexpr Spelling<MlsPlacement> kMlsPlacementNames[] = {{MlsPlacement::kRegular, "regular"},
+                                                                {MlsPlacement::kGraded, "graded"}};
 inline constexpr Spelling<MlsContact> kMlsContactNames[] = {{MlsContact::kNodes, "nodes"},
                                                             {MlsContact::kFaces, "faces"}};
 inline constexpr Spelling<PbdModel> kPbdModelNames[] = {{PbdModel::kSurface, "surface"},

@@ -163,7 +163,6 @@ void write_mls(YAML::Emitter& out, const MlsOptions& mls) {
   out << Key << "mls" << Value << BeginMap;
   write(out, "spacing", mls.spacing);
   out << Key << "neighbours" << Value << mls.neighbours;
-  write(out, "basis", std::string(name_of(mls.basis, kMlsBasisNames)));
   write(out, "placement", std::string(name_of(mls.placement, kMlsPlacementNames)));
   write(out, "grading", mls.grading);
   write(out, "stabilisation", mls.stabilisation);

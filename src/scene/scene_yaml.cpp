@@ -202,11 +202,9 @@ Scene read_scene(const YAML::Node& node) {
   });
   fields.read_map("mls", [&](const YAML::Node& mls, const std::string& path) {
     const YamlFields of(
-        mls, path,
-        {"spacing", "neighbours", "basis", "placement", "grading", "stabilisation", "contact"});
+        mls, path, {"spacing", "neighbours", "placement", "grading", "stabilisation", "contact"});
     of.read("spacing", scene.mls.spacing);
     of.read("neighbours", scene.mls.neighbours);
-    of.read("basis", scene.mls.basis, kMlsBasisNames);
     of.read("placement", scene.mls.placement, kMlsPlacementNames);
     of.read("grading", scene.mls.grading);
     of.read("stabilisation", scene.mls.stabilisation);

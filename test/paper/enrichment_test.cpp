@@ -1,5 +1,5 @@
 // Enrichment in the plane: the paper's figures 4 to 6, and what it says of its own form.
-#include "mls/enrichment.h"
+#include "paper/enrichment.h"
 
 #include <gtest/gtest.h>
 

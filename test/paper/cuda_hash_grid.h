@@ -1,10 +1,10 @@
-// Fragments by hash grid on the GPU: what fragments/hash_grid.h finds, of places that are there.
+// Fragments by hash grid on the GPU: what paper/hash_grid.h finds, of places that are there.
 #pragma once
 
 #include <cstdint>
 
 #include "compute/device_array.h"
-#include "fragments/cell_box.h"
+#include "paper/cell_box.h"
 
 namespace tissue_sim {
 

@@ -1,4 +1,4 @@
-#include "mls/enrichment.h"
+#include "paper/enrichment.h"
 
 #include <algorithm>
 #include <cmath>

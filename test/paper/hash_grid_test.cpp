@@ -1,5 +1,5 @@
 // Fragments by hash grid, by breadth-first search and by links are the same.
-#include "fragments/hash_grid.h"
+#include "paper/hash_grid.h"
 
 #include <gtest/gtest.h>
 
@@ -9,9 +9,9 @@
 #include <set>
 #include <string>
 
-#include "benchmark/torn_points.h"
 #include "cut_scenes.h"
-#include "fragments/breadth_first.h"
+#include "paper/breadth_first.h"
+#include "paper/torn_points.h"
 
 namespace tissue_sim {
 namespace {

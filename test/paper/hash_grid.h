@@ -11,9 +11,9 @@
 #include <vector>
 
 #include "compute/for_each.h"
-#include "fragments/cell_box.h"
-#include "fragments/point_groups.h"
 #include "math/union_find.h"
+#include "paper/cell_box.h"
+#include "paper/point_groups.h"
 
 namespace tissue_sim {
 

@@ -1,4 +1,4 @@
-#include "fragments/hash_grid.h"
+#include "paper/hash_grid.h"
 
 #include <algorithm>
 #include <cstring>

@@ -3,8 +3,8 @@
 #include <stdexcept>
 
 #include "compute/for_each_cuda.h"
-#include "fragments/cuda/cuda_hash_grid.h"
 #include "math/cuda_union_find.h"
+#include "paper/cuda_hash_grid.h"
 
 namespace tissue_sim {
 namespace {

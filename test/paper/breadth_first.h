@@ -1,12 +1,12 @@
 // Fragments by breadth-first search over the cells of a grid: the reference that the hash grid
-// (fragments/hash_grid.h) is checked against and measured beside. All but label() is the same.
+// (paper/hash_grid.h) is checked against and measured beside. All but label() is the same.
 #pragma once
 
 #include <cstdint>
 #include <vector>
 
-#include "fragments/cell_box.h"
-#include "fragments/point_groups.h"
+#include "paper/cell_box.h"
+#include "paper/point_groups.h"
 
 namespace tissue_sim {
 

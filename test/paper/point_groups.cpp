@@ -1,4 +1,4 @@
-#include "fragments/point_groups.h"
+#include "paper/point_groups.h"
 
 #include <algorithm>
 

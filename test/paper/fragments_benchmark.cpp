@@ -7,9 +7,9 @@
 #include <cmath>
 #include <string>
 
-#include "fragments/breadth_first.h"
-#include "fragments/hash_grid.h"
-#include "torn_points.h"
+#include "paper/breadth_first.h"
+#include "paper/hash_grid.h"
+#include "paper/torn_points.h"
 
 namespace tissue_sim {
 namespace {

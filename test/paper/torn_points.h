@@ -7,7 +7,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "fragments/cell_box.h"
+#include "paper/cell_box.h"
 
 namespace tissue_sim {
 

@@ -7,9 +7,9 @@
 #include <string>
 #include <vector>
 
-#include "benchmark/torn_points.h"
-#include "fragments/cuda/cuda_hash_grid.h"
-#include "fragments/hash_grid.h"
+#include "paper/cuda_hash_grid.h"
+#include "paper/hash_grid.h"
+#include "paper/torn_points.h"
 
 namespace tissue_sim {
 namespace {

@@ -1,4 +1,4 @@
-#include "fragments/breadth_first.h"
+#include "paper/breadth_first.h"
 
 #include <algorithm>
 #include <cstring>

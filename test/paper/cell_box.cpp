@@ -1,4 +1,4 @@
-#include "fragments/cell_box.h"
+#include "paper/cell_box.h"
 
 #include <algorithm>
 #include <cmath>

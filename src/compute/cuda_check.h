@@ -18,5 +18,8 @@ inline void check_cuda(cudaError_t result, const char* action) {
 
 /// Why no GPU can be used here; empty where there is one.
 std::string why_no_gpu();
+/// Chooses the GPU and makes a stream on it. Returns its name. Throws std::runtime_error where
+/// there is none to use.
+std::string open_gpu(cudaStream_t& stream);
 
 }  // namespace tissue_sim

@@ -39,4 +39,14 @@ std::string why_no_gpu() {
   return "";
 }
 
+std::string open_gpu(cudaStream_t& stream) {
+  const std::string why = why_no_gpu();
+  if (!why.empty()) throw std::runtime_error(why + "; set device to cpu");
+  check_cuda(cudaSetDevice(0), "be chosen");
+  cudaDeviceProp properties;
+  check_cuda(cudaGetDeviceProperties(&properties, 0), "be asked");
+  check_cuda(cudaStreamCreateWithFlags(&stream, cudaStreamNonBlocking), "make a stream");
+  return properties.name;
+}
+
 }  // namespace tissue_sim

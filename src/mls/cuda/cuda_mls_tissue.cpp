@@ -21,14 +21,8 @@ void upload(const Array<float>& from, int count, DeviceArray<float4>& to, cudaSt
 
 CudaMlsTissue::CudaMlsTissue(const Scene& scene, std::vector<std::string> notes)
     : MlsTissue(scene, std::move(notes)), device_(std::make_unique<OnDevice>()) {
-  const std::string why = why_no_gpu();
-  if (!why.empty()) throw std::runtime_error(why + "; set device to cpu");
   OnDevice& d = *device_;
-  check_cuda(cudaSetDevice(0), "be chosen");
-  cudaDeviceProp properties;
-  check_cuda(cudaGetDeviceProperties(&properties, 0), "be asked");
-  d.gpu = properties.name;
-  check_cuda(cudaStreamCreateWithFlags(&d.stream, cudaStreamNonBlocking), "make a stream");
+  d.gpu = open_gpu(d.stream);
   d.collider_count = collider_count(scene);
   if (d.collider_count > kMlsMostColliders) {
     throw std::runtime_error("the scene's tools have " + std::to_string(d.collider_count - 1) +

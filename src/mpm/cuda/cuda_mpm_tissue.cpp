@@ -47,21 +47,15 @@ int attribute(cudaDeviceAttr which) {
 
 CudaMpmTissue::CudaMpmTissue(const Scene& scene, std::vector<std::string> notes)
     : notes_(std::move(notes)), device_(std::make_unique<OnDevice>()) {
-  const std::string why = why_no_gpu();
-  if (!why.empty()) throw std::runtime_error(why + "; set device to cpu");
+  OnDevice& d = *device_;
+  d.gpu = open_gpu(d.stream);
   if (const int count = collider_count(scene); count > kMaxColliders) {
     throw std::runtime_error("the scene's tools have " + std::to_string(count - 1) +
                              " parts that touch tissue (a grasper two, other tools one): on the "
                              "GPU at most " +
                              std::to_string(kMaxColliders - 1) + "; set device to cpu");
   }
-  OnDevice& d = *device_;
-  check_cuda(cudaSetDevice(0), "be chosen");
-  cudaDeviceProp properties;
-  check_cuda(cudaGetDeviceProperties(&properties, 0), "be asked");
-  d.gpu = properties.name;
-  check_cuda(cudaStreamCreateWithFlags(&d.stream, cudaStreamNonBlocking), "make a stream");
-  d.limits = {properties.multiProcessorCount,
+  d.limits = {attribute(cudaDevAttrMultiProcessorCount),
               static_cast<std::size_t>(attribute(cudaDevAttrMaxSharedMemoryPerBlockOptin))};
   state_ = make_state(scene, &notes_);
   d.cut_shape = choose_shape(state_->bodies, d.limits, false);

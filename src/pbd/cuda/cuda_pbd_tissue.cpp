@@ -1,7 +1,6 @@
 #include "pbd/cuda/cuda_pbd_tissue.h"
 
 #include <algorithm>
-#include <stdexcept>
 
 #include "pbd/cuda/on_device.h"
 #include "pbd/find_touches.h"
@@ -24,14 +23,8 @@ pbd::CudaPbdColours colours(const pbd::State& s) {
 
 CudaPbdTissue::CudaPbdTissue(const Scene& scene, std::vector<std::string> notes)
     : PbdTissue(scene, std::move(notes)), device_(std::make_unique<OnDevice>()) {
-  const std::string why = why_no_gpu();
-  if (!why.empty()) throw std::runtime_error(why + "; set device to cpu");
   OnDevice& d = *device_;
-  check_cuda(cudaSetDevice(0), "be chosen");
-  cudaDeviceProp properties;
-  check_cuda(cudaGetDeviceProperties(&properties, 0), "be asked");
-  d.gpu = properties.name;
-  check_cuda(cudaStreamCreateWithFlags(&d.stream, cudaStreamNonBlocking), "make a stream");
+  d.gpu = open_gpu(d.stream);
   const auto colliders = static_cast<std::size_t>(scene.pbd.steps) * collider_count(scene);
   d.frame.resize(1);
   d.colliders.resize(colliders);

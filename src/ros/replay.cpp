@@ -150,8 +150,7 @@ void Replay::on_input(const FrameInputMessage& input) {
                                scene.tools[i].name + "'");
     }
   }
-  simulation_->apply(from_message(input));
-  frame_ = simulation_->advance_frame();
+  frame_ = simulation_->repeat_frame(from_message(input));
   ++report_.frames;
   run_.blew_up = frame_.result.blew_up;
   const std::string text = difference(input, to_message(frame_.input, scene));

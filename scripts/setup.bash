@@ -7,8 +7,8 @@ repo=$(cd -- "$(dirname -- "${BASH_SOURCE[0]}")/.." && pwd)
 build=${TISSUE_SIM_BUILD:-$repo/build}
 noetic=/opt/ros/noetic/setup.bash
 
-core_packages=(g++ make cmake libeigen3-dev libtbb-dev libyaml-cpp-dev libnanoflann-dev libgtest-dev
-  libbenchmark-dev python3)
+core_packages=(g++ make cmake libeigen3-dev libtbb-dev libyaml-cpp-dev libnanoflann-dev zlib1g-dev
+  libgtest-dev libbenchmark-dev python3)
 picture_packages=(python3-numpy python3-matplotlib python3-yaml)
 debian_packages=(catkin ros-message-generation ros-message-runtime libroscpp-dev libroslib-dev
   librosbag-storage-dev librostest-dev libtf2-dev libtf2-ros-dev libtf2-geometry-msgs-dev

@@ -307,6 +307,8 @@ bool Region::contains(const Vec3& x) const {
 }
 
 void validate(const Scene& scene) {
+  // First: of a file without bodies, which is no scene, nothing else is said.
+  if (scene.bodies.empty()) refuse("bodies", "empty", "a scene needs at least one body");
   check_length("name", scene.name);
   check_count("materials", scene.materials.size(), kMostMaterials);
   check_count("bodies", scene.bodies.size(), kMostBodies);
@@ -337,7 +339,6 @@ void validate(const Scene& scene) {
   for (std::size_t i = 0; i < scene.materials.size(); ++i) {
     check_material(at("materials", i), scene.materials[i], material_names);
   }
-  if (scene.bodies.empty()) refuse("bodies", "empty", "a scene needs at least one body");
   for (std::size_t i = 0; i < scene.bodies.size(); ++i) {
     const Body& body = scene.bodies[i];
     const std::string path = at("bodies", i);

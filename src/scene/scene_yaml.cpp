@@ -275,6 +275,8 @@ Scene load_scene(const std::string& path) {
   Scene scene;
   try {
     scene = scene_from_yaml(text);
+  } catch (const FieldError& e) {  // what is no scene may be any file that this program can read
+    throw std::invalid_argument(path + ": " + e.unquoted());
   } catch (const std::invalid_argument& e) {
     throw std::invalid_argument(path + ": " + e.what());
   }

@@ -3,12 +3,15 @@
 #include <gtest/gtest.h>
 
 #include <cstdlib>
+#include <cstring>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
+#include <random>
 #include <sstream>
 
 #include "cut_paths.h"
+#include "frame/checksum.h"
 #include "temporary_folder.h"
 #include "test_scenes.h"
 #include "tissue/each_method.h"
@@ -55,6 +58,60 @@ class SavedState : public EachMethod {
   }
 };
 FOR_EACH_METHOD(SavedState);
+
+// As in a bag of a stranger, who knows how checksums are made.
+TEST_P(SavedState, WithOtherBytesAndTheirChecksumIsRefusedOrGoesOn) {
+  Scene scene = on_this(Scene());
+  if (scene.device == Device::kCuda) GTEST_SKIP() << "blocks of a GPU are not checked yet";
+  scene.cell_size = 0.01;
+  scene.bodies.resize(1);
+  scene.bodies[0].size = Vec3(0.04, 0.03, 0.02);
+  scene.bodies[0].pose.position.z() = 0.0101;
+  Anchor anchor;
+  anchor.kind = Region::Kind::kBelow;
+  anchor.z = 0.005;
+  scene.bodies[0].anchors.push_back(anchor);
+  scene.tools.resize(1);
+  Simulation simulation(scene);
+  simulation.cut(plane_cut(Vec3(0.003, 0, 0.01), Vec3::UnitX()));
+  for (int i = 0; i < 3; ++i) simulation.advance_frame();
+  const Bytes good = simulation.save();
+  constexpr std::size_t kSum = 32, kHead = 40;  // frame/sealed_state.cpp
+  // Behind the scene and the device, which are compared.
+  std::size_t begin = kHead;
+  for (int i = 0; i < 2; ++i) {
+    std::uint64_t length;
+    std::memcpy(&length, &good[begin], sizeof length);
+    begin += sizeof length + length;
+  }
+  const std::uint32_t words[] = {0,           1,           0xffffffffu, 0x7fffffffu,
+                                 0x80000000u, 0x7fc00000u, 0x7f800000u, 1000000};
+  int refused = 0;
+  for (unsigned seed = 1; seed <= 60; ++seed) {
+    std::mt19937 random(seed);
+    Bytes other = good;
+    for (unsigned n = 1 + random() % 4; n > 0; --n) {
+      const std::size_t at = begin + random() % (good.size() - begin - 4);
+      if (random() % 2 == 0) {
+        other[at] = static_cast<std::uint8_t>(random());
+      } else {
+        std::memcpy(&other[begin + (at - begin) / 4 * 4], &words[random() % 8], 4);
+      }
+    }
+    Checksum checksum;
+    checksum.add(Span<const std::uint8_t>(other.data() + kHead, other.size() - kHead));
+    const std::uint64_t sum = checksum.value();
+    std::memcpy(&other[kSum], &sum, sizeof sum);
+    try {
+      Simulation restored(scene);
+      restored.restore(view(other));
+      for (int i = 0; i < 3; ++i) restored.advance_frame();
+    } catch (const std::runtime_error&) {
+      ++refused;
+    }
+  }
+  EXPECT_GT(refused, 10);
+}
 
 // Before the first frame, while it is cut, while tools touch, after.
 TEST_P(SavedState, GoesOnWithTheSameBits) {

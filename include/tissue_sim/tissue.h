@@ -70,7 +70,9 @@ struct SurfaceTriangles {
   std::vector<float> corners;          ///< nine coordinates a triangle [m], world frame
   std::vector<float> rest;             ///< where these were at time zero, of the same material [m]
   std::vector<std::int32_t> fragment;  ///< Fragment::id of each triangle
-  std::vector<std::uint8_t> cut;       ///< of each triangle: whether a blade or a tear opened it
+  std::vector<float> rest;             ///< where these were at time zero, of the same material [m]
+  std::vector<std::int32_t> fragment;  ///< Fragment::id of each triangle
+  std::vector<std::uint8_t> cut;       ///< of each: 1 where a cut or a tear made it, else 0
 };
 
 class Tissue {
@@ -85,7 +87,7 @@ class Tissue {
   virtual int point_count() const = 0;
   /// Replaces `cloud` with the selected points, as Point after Point. Returns their number.
   virtual int read_points(const PointSelection& selection, std::vector<std::uint8_t>& cloud) = 0;
-  /// Replaces `surface` with the tissue's, as of the last finish(); leaves it empty for a method
+  /// Replaces `surface` with the tissue's, as of the last finish(); leaves it empty for `mls`,
   /// whose points no triangles join.
   virtual void read_surface(SurfaceTriangles& surface) { surface = {}; }
   /// Whether FrameInput::anchors move what they hold, and FrameResult has their loads.

@@ -7,8 +7,8 @@
 #include "mpm/anchors/hold_beside_tools.h"
 #include "mpm/anchors/kept_volume.h"
 #include "mpm/contact/block_contact.h"
-#include "mpm/contact/surface_places.h"
 #include "mpm/split/cut_tissue.h"
+#include "mpm/surface/surface_places.h"
 
 namespace tissue_sim {
 

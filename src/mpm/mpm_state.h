@@ -18,6 +18,7 @@
 #include "mpm/fragment_flight.h"
 #include "mpm/lattice_tissue.h"
 #include "mpm/split/front.h"
+#include "mpm/surface/boundary_mesh.h"
 #include "tissue_sim/tissue.h"
 #include "tools/collider.h"
 
@@ -110,6 +111,7 @@ struct MpmState : LatticeTissue {
   Array<std::uint8_t> whole_bonds;           ///< per point: its bonds before any broke
   std::vector<FragmentFlight> flights;       ///< pieces that fly
   std::vector<std::int32_t> flight_of_node;  ///< -1 for none; empty while none flies
+  BoundaryMesh boundary;                     ///< as it was last read
 
   const BlockKernels* kernels = nullptr;
   InstructionSet instructions = InstructionSet::kSse2;

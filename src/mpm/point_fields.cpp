@@ -1,10 +1,12 @@
 #include "mpm/point_fields.h"
 
 #include <algorithm>
+#include <array>
 #include <cstring>
 
 #include "material/laws.h"
 #include "math/bspline.h"
+#include "mpm/surface/facet_in_world.h"
 
 namespace tissue_sim {
 namespace {
@@ -64,6 +66,56 @@ bool held_place(const MpmState& state, std::int32_t point, Vec3& place) {
   place = b.site_position(s.x, s.y, s.z);
   if (state.anchors.moves) place = state.anchors.place_of_held(b.body, s.body, place);
   return true;
+}
+
+void read_surface(MpmState& s, const Pieces& pieces, SurfaceTriangles& surface) {
+  BoundaryMesh& mesh = s.boundary;
+  update_boundary(s, mesh);
+  constexpr int kGrain = 256;
+  const auto vertices = static_cast<int>(mesh.vertices.size());
+  std::vector<std::array<float, 3>> place(vertices), rest(vertices);
+  s.cpu->for_each(
+      vertices,
+      [&](int i) {
+        const BoundaryMesh::Vertex& v = mesh.vertices[i];
+        const Points::Site& site = s.points.site[v.point];
+        const LatticeBody& b = s.bodies[site.body];
+        Vec3 x = b.node_position(site.x / 2, site.y / 2, site.z / 2) +
+                 b.cell_size * Vec3(v.place[0], v.place[1], v.place[2]);
+        for (int a = 0; a < 3; ++a) rest[i][a] = static_cast<float>(x[a]);
+        if (s.points.free_volume_of(v.point) > 0) {
+          const AxisWeights weights(v.place);
+          for (int k = 0; k < 27; ++k) {
+            const float w = weights.of[k % 3] * weights.of[3 + k / 3 % 3] * weights.of[6 + k / 9];
+            for (int a = 0; a < 3; ++a) x[a] += w * s.nodes.u[a][v.node[k]];
+          }
+        } else if (s.anchors.moves) {
+          x = s.anchors.place_of_held(b.body, site.body, x);
+        }
+        for (int a = 0; a < 3; ++a) place[i][a] = static_cast<float>(x[a]);
+      },
+      kGrain);
+  const auto faces = static_cast<int>(mesh.faces.size());
+  surface.corners.resize(std::size_t{18} * faces);
+  surface.rest.resize(std::size_t{18} * faces);
+  surface.fragment.resize(std::size_t{2} * faces);
+  surface.cut.resize(std::size_t{2} * faces);
+  s.cpu->for_each(
+      faces,
+      [&](int i) {
+        const BoundaryMesh::Face& f = mesh.faces[i];
+        float* corner = surface.corners.data() + std::size_t{18} * i;
+        float* at_rest = surface.rest.data() + std::size_t{18} * i;
+        for (const int k : {0, 1, 2, 0, 2, 3}) {
+          corner = std::copy_n(place[f.vertex[k]].data(), 3, corner);
+          at_rest = std::copy_n(rest[f.vertex[k]].data(), 3, at_rest);
+        }
+        for (int t = 2 * i; t < 2 * i + 2; ++t) {
+          surface.fragment[t] = pieces.of_point[f.point];
+          surface.cut[t] = f.cut;
+        }
+      },
+      kGrain);
 }
 
 void add_point_fields(MpmState& state, const PointSelection& selection,

@@ -1,9 +1,11 @@
-// What a cloud's points carry behind their Point, from the nodes on the host.
+// What tissue shows of itself, from the nodes on the host: what a cloud's points carry behind their
+// Point, and its surface.
 #pragma once
 
 #include <cstdint>
 #include <vector>
 
+#include "fragments/pieces.h"
 #include "mpm/mpm_state.h"
 #include "tissue_sim/point.h"
 
@@ -17,5 +19,8 @@ bool held_place(const MpmState& state, std::int32_t point, Vec3& place);
 void add_point_fields(MpmState& state, const PointSelection& selection,
                       const std::vector<std::int32_t>& place, int count,
                       std::vector<std::uint8_t>& cloud);
+
+/// Replaces `surface` with the tissue's (mpm/surface/boundary_mesh.h), from the nodes on the host.
+void read_surface(MpmState& state, const Pieces& pieces, SurfaceTriangles& surface);
 
 }  // namespace tissue_sim

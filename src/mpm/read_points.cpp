@@ -60,4 +60,8 @@ int MpmTissue::read_points(const PointSelection& selection, std::vector<std::uin
   return count;
 }
 
+void MpmTissue::read_surface(SurfaceTriangles& surface) {
+  tissue_sim::read_surface(*state_, pieces_, surface);
+}
+
 }  // namespace tissue_sim

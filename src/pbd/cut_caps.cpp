@@ -201,6 +201,7 @@ std::vector<std::int32_t> close_wounds(State& s, std::vector<std::int32_t>& orig
     }
     for (const auto& t : cap.triangles) {
       s.triangles.push_back({index[t[0]], index[t[1]], index[t[2]]});
+      s.cut.push_back(1);
       add_edges(s.triangles.back(), true);
     }
     starts.insert(starts.end(), index.begin(), index.end());

@@ -273,6 +273,7 @@ class TetCut {
         const Tetrahedron& c = s_.tetrahedra[f.tetrahedron[side]];
         const int* k = kFace[f.opposite[side]];
         s_.triangles.push_back({c[k[0]], c[k[1]], c[k[2]]});
+        s_.cut.push_back(1);
         for (const std::int32_t v : s_.triangles.back()) s_.vertices.surface[v] = 1;
       }
     }

@@ -35,10 +35,10 @@ void fields(Archive& archive, LeftWhole& l) {
 
 template <class Archive>
 void fields(Archive& archive, State& s) {
-  archive(s.vertices, s.triangles, s.tetrahedra, s.internal, s.half_depth, s.links, s.edge_count,
-          s.bends, s.strains, s.elastics, s.volume_of_body, s.stroke, s.copy_of, s.blade_normal,
-          s.blade_point, s.cut_edges, s.faces, s.mean_edge, s.wounds, s.fronts, s.starts, s.centres,
-          s.left_whole);
+  archive(s.vertices, s.triangles, s.cut, s.tetrahedra, s.internal, s.half_depth, s.links,
+          s.edge_count, s.bends, s.strains, s.elastics, s.volume_of_body, s.stroke, s.copy_of,
+          s.blade_normal, s.blade_point, s.cut_edges, s.faces, s.mean_edge, s.wounds, s.fronts,
+          s.starts, s.centres, s.left_whole);
 }
 
 }  // namespace pbd

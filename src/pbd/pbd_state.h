@@ -74,6 +74,7 @@ struct State {
 
   Vertices vertices;
   std::vector<Triangle> triangles;  ///< of the surface, counter-clockwise from outside
+  std::vector<std::uint8_t> cut;    ///< of each: whether a cut made it
   std::vector<Tetrahedron> tetrahedra;
   std::vector<std::int16_t> body_of_tetrahedron;
 

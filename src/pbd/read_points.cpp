@@ -93,6 +93,7 @@ void PbdTissue::read_surface(SurfaceTriangles& surface) {
   surface.corners.clear();
   surface.rest.clear();
   surface.fragment.clear();
+  surface.cut = s.cut;
   for (const Triangle& t : s.triangles) {
     for (const std::int32_t v : t) {
       for (int a = 0; a < 3; ++a) {
@@ -102,7 +103,6 @@ void PbdTissue::read_surface(SurfaceTriangles& surface) {
     }
     surface.fragment.push_back(pieces_.of_point[t[0]]);
   }
-  surface.cut.assign(surface.fragment.size(), 0);
 }
 
 }  // namespace tissue_sim

@@ -22,6 +22,7 @@ struct Mesh {
   explicit Mesh(const State& s)
       : vertices(s.vertices),
         triangles(s.triangles),
+        cut(s.cut),
         internal(s.internal),
         half_depth(s.half_depth),
         stroke(s.stroke),
@@ -36,6 +37,7 @@ struct Mesh {
   void restore(State& s) const {
     s.vertices = vertices;
     s.triangles = triangles;
+    s.cut = cut;
     s.internal = internal;
     s.half_depth = half_depth;
     s.stroke = stroke;
@@ -51,6 +53,7 @@ struct Mesh {
 
   Vertices vertices;
   std::vector<Triangle> triangles;
+  std::vector<std::uint8_t> cut;
   std::vector<InternalPair> internal;
   std::vector<double> half_depth;
   std::vector<std::int32_t> stroke, copy_of, bare;

@@ -66,6 +66,7 @@ std::int32_t split_edge(State& s, EdgeMap& edges, const Edge& e, double place,
     for (std::int32_t& c : second) c = c == a ? n : c;
     edges.add(t);
     s.triangles.push_back(second);
+    s.cut.push_back(std::uint8_t{s.cut[t]});
     edges.add(static_cast<int>(s.triangles.size()) - 1);
   }
   if (s.cut_edges.erase(e) > 0) {

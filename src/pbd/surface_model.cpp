@@ -298,6 +298,7 @@ void add_surface_body(State& s, int b, std::vector<std::string>* notes) {
   }
   for (const auto& t : mesh.triangles)
     s.triangles.push_back({index[t[0]], index[t[1]], index[t[2]]});
+  s.cut.resize(s.triangles.size(), 0);
   const int missed = add_internal_links(s, b, starts);
   double volume = signed_volume(mesh);
   if (!kind.is_closed()) {

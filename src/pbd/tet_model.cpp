@@ -25,6 +25,7 @@ void add_tet_body(State& s, int b, std::vector<std::string>* notes) {
   }
   for (const auto& t : boundary(mesh)) {
     s.triangles.push_back({index[t[0]], index[t[1]], index[t[2]]});
+    s.cut.push_back(0);
     for (const int v : t) s.vertices.surface[index[v]] = 1;
   }
   s.volume_of_body.push_back(volume(mesh));

@@ -114,7 +114,9 @@ void Publications::publish(Simulation& simulation, const FrameReport& report, co
   if (clouds_due && loose_points_.wanted()) {
     loose_points_.publish(cloud(simulation, true, stamp), stamp);
   }
-  if (clouds_due && surface_.wanted()) {
+  // Recorded with all topics, the lattice's would make bags twice as large.
+  const bool surface_due = scene_.method == Method::kMpm ? surface_.listened() : surface_.wanted();
+  if (clouds_due && surface_due) {
     const bool was_any = !surface_triangles_.fragment.empty();
     const auto message = surface_message(simulation, stamp);
     if (was_any || !surface_triangles_.fragment.empty()) surface_.publish(message, stamp);

@@ -66,10 +66,6 @@ TEST_F(SavedStateOnGpu, GoesOnWhereTheFirstCutDividesTissueAnew) {
   goes_on_divided_anew(run_of(Vec3(0.040, 0.040, 0.018), 0.002, 12));
 }
 
-TEST_F(SavedStateOnGpu, GoesOnWhereTissueMarchesUntilTheFirstCut) {
-  goes_on_divided_anew(run_of(Vec3(0.08, 0.06, 0.05), 0.00125, 8));
-}
-
 TEST_F(SavedStateOnGpu, GoesOnWhereRegionsAreHalved) {
   setenv("TISSUE_SIM_CUDA_SHAPE", "6 5 4 96 0", 1);
   const auto whole = goes_on(run_of(Vec3(0.031, 0.029, 0.017), 0.002, 12));

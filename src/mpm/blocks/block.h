@@ -11,8 +11,8 @@
 
 #include "compute/array.h"
 #include "frame/stability_limit.h"
-#include "mpm/contact/facets.h"
-#include "mpm/contact/surface_place.h"
+#include "mpm/surface/facets.h"
+#include "mpm/surface/surface_place.h"
 #include "tissue_sim/material.h"
 
 namespace tissue_sim {

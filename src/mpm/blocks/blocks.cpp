@@ -5,8 +5,8 @@
 #include <numeric>
 
 #include "mpm/blocks/fill_region.h"
-#include "mpm/contact/known_facets.h"
-#include "mpm/contact/surface_places.h"
+#include "mpm/surface/known_facets.h"
+#include "mpm/surface/surface_places.h"
 
 namespace tissue_sim {
 namespace {

@@ -8,10 +8,10 @@
 #include "contact/contact_spring.h"
 #include "contact/surface_spring.h"
 #include "mpm/contact/face_places.h"
-#include "mpm/contact/facet_motion.h"
 #include "mpm/contact/place_parts.h"
 #include "mpm/lattice/bonds.h"
-#include "mpm/lattice/cell_points.h"
+#include "mpm/surface/cell_points.h"
+#include "mpm/surface/facet_motion.h"
 #include "tools/frame_colliders.h"
 
 namespace tissue_sim {

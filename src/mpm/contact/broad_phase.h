@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "compute/for_each.h"
-#include "mpm/contact/facet_motion.h"
+#include "mpm/surface/facet_motion.h"
 
 namespace tissue_sim {
 

@@ -4,8 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "mpm/contact/facet_motion.h"
 #include "mpm/mpm_state.h"
+#include "mpm/surface/facet_motion.h"
 
 namespace tissue_sim {
 namespace {

@@ -10,8 +10,8 @@
 #include <cstdint>
 #include <vector>
 
-#include "mpm/contact/facet_motion.h"
 #include "mpm/contact/narrow_phase.h"
+#include "mpm/surface/facet_motion.h"
 
 namespace tissue_sim {
 

@@ -5,8 +5,8 @@
 #include <cstdint>
 
 #include "compute/host_device.h"
-#include "mpm/contact/facet_in_world.h"
 #include "mpm/lattice/bonds.h"
+#include "mpm/surface/facet_in_world.h"
 #include "mpm/tear/debris_points.h"
 
 namespace tissue_sim {

@@ -7,7 +7,7 @@
 
 #include "compute/host_device.h"
 #include "contact/contact_spring.h"
-#include "mpm/contact/facet_in_world.h"
+#include "mpm/surface/facet_in_world.h"
 
 namespace tissue_sim {
 

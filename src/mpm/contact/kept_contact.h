@@ -4,7 +4,7 @@
 #include <cstdint>
 
 #include "compute/host_device.h"
-#include "mpm/contact/facets.h"
+#include "mpm/surface/facets.h"
 
 namespace tissue_sim {
 

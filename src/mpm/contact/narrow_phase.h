@@ -20,8 +20,8 @@
 #include "contact/contact_spring.h"
 #include "mpm/contact/face_search.h"
 #include "mpm/contact/face_spring.h"
-#include "mpm/contact/facet_in_world.h"
 #include "mpm/contact/kept_contact.h"
+#include "mpm/surface/facet_in_world.h"
 
 namespace tissue_sim {
 

@@ -7,8 +7,8 @@
 #include <cmath>
 
 #include "contact/surface_spring.h"
-#include "mpm/contact/surface_place.h"
 #include "mpm/lattice/bonds.h"
+#include "mpm/surface/surface_place.h"
 #include "tools/collider.h"
 
 namespace tissue_sim {

@@ -112,7 +112,7 @@ struct LanePlace {
   }
 };
 
-/// Node field around a facet's cell: mpm/contact/facet_in_world.h.
+/// Node field around a facet's cell: mpm/surface/facet_in_world.h.
 struct SlotField {
   const std::int32_t* slot_node;  // from the cell's lowest slot on
   int pitch, plane;

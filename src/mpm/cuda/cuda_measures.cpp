@@ -59,8 +59,6 @@ double CudaMpmTissue::measure_limit(int steps) {
           frame.front = d.front.view();
           frame.pushes = clear_pushes();
           launch_substeps(d.front_plan, d.pushed_tables(), frame, d.front_resident, d.stream);
-        } else if (d.all_plain) {
-          launch_substeps(d.plain_plan, d.plain_tables(), frame, d.plain_resident, d.stream);
         } else {
           launch_substeps(d.plan, d.tables(), frame, d.resident, d.stream);
         }

@@ -39,6 +39,7 @@ class CudaMpmTissue final : public Tissue {
   FrameResult finish() override;
   int point_count() const override { return state_->points.size(); }
   int read_points(const PointSelection& selection, std::vector<std::uint8_t>& cloud) override;
+  void read_surface(SurfaceTriangles& surface) override;
   bool moves_anchors() const override {
     return state_->scene.mpm.boundary == MpmBoundary::kSurface;
   }

@@ -90,4 +90,9 @@ int CudaMpmTissue::read_points(const PointSelection& selection, std::vector<std:
   return count;
 }
 
+void CudaMpmTissue::read_surface(SurfaceTriangles& surface) {
+  pull_nodes();
+  tissue_sim::read_surface(*state_, pieces_, surface);
+}
+
 }  // namespace tissue_sim

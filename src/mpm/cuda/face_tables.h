@@ -9,7 +9,7 @@
 
 #include "mpm/contact/face_search.h"
 #include "mpm/contact/face_spring.h"
-#include "mpm/contact/facet_in_world.h"
+#include "mpm/surface/facet_in_world.h"
 
 namespace tissue_sim {
 

@@ -5,7 +5,7 @@
 #include <set>
 
 #include "contact/surface_spring.h"
-#include "mpm/contact/surface_places.h"
+#include "mpm/surface/surface_places.h"
 
 namespace tissue_sim {
 namespace {

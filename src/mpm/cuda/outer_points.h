@@ -17,7 +17,7 @@ inline constexpr int kSoftPlace = 16;  ///< more than a point has bonds
 /// it lost one it is touched itself. 0 for a point that has neighbours all around. Where the body's
 /// surface is flat around the point that is straight before it, at an edge on the edge: the point's
 /// place is brought onto the surface that each of its missing bonds stands for
-/// (mpm/contact/surface_places.h). The fourth figure is larger by kSoftPlace where `faces` of
+/// (mpm/surface/surface_places.h). The fourth figure is larger by kSoftPlace where `faces` of
 /// anchors hold nodes of the point's cell: the spring there is the lattice's, which needs no
 /// inerter, for faces are held as if nodes had none. Throws what find_outer_places() throws.
 std::vector<float4> outer_points(const LatticeTissue& tissue, const AnchorFaces& faces);

@@ -1,10 +1,10 @@
 #include <cuda_runtime.h>
 
 #include "compute/for_each_cuda.h"
-#include "mpm/contact/facet_in_world.h"
 #include "mpm/cuda/block_nodes.h"
 #include "mpm/cuda/contact_lanes.h"
 #include "mpm/cuda/sweep_blade.h"
+#include "mpm/surface/facet_in_world.h"
 
 namespace tissue_sim {
 namespace {

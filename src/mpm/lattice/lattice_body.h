@@ -8,7 +8,6 @@
 
 #include "compute/array.h"
 #include "geometry/lattice.h"
-#include "mpm/contact/surface_place.h"
 #include "mpm/lattice/bonds.h"
 #include "mpm/lattice/lattice_rows.h"
 #include "tissue_sim/scene.h"
@@ -41,6 +40,14 @@ class Crossings {
   static constexpr Crossing kNone = {-1, {}};
   std::vector<std::int32_t> index_;  // per point, -1 where none was broken
   std::vector<std::array<Crossing, 3>> of_point_;
+};
+
+/// A place on the true surface of a whole body: see mpm/surface/surface_places.h.
+struct OuterPlace {
+  std::int32_t point;
+  std::uint8_t bond;  ///< that it has not
+  float place[3];     ///< in cells, from the middle of the point's cell
+  float normal[3];    ///< unit, outward, in reference space
 };
 
 /// Points of all bodies, numbered body after body in the order of Lattice::sites.

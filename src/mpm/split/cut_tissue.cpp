@@ -3,7 +3,7 @@
 #include <utility>
 
 #include "mpm/contact/block_contact.h"
-#include "mpm/contact/known_facets.h"
+#include "mpm/surface/known_facets.h"
 #include "mpm/tear/bond_bridges.h"
 #include "mpm/tear/debris.h"
 

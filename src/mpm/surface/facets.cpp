@@ -1,4 +1,4 @@
-#include "mpm/contact/facets.h"
+#include "mpm/surface/facets.h"
 
 #include <Eigen/Dense>
 #include <algorithm>
@@ -8,11 +8,11 @@
 
 #include "compute/eight_bytes.h"
 #include "mpm/blocks/block.h"
-#include "mpm/contact/known_facets.h"
-#include "mpm/contact/surroundings.h"
 #include "mpm/lattice/bonds.h"
 #include "mpm/lattice/lattice_body.h"
 #include "mpm/lattice/nodes.h"
+#include "mpm/surface/known_facets.h"
+#include "mpm/surface/surroundings.h"
 
 namespace tissue_sim {
 namespace {

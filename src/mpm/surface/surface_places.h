@@ -10,14 +10,14 @@
 #include <cstdint>
 #include <vector>
 
-#include "mpm/contact/surface_place.h"
 #include "mpm/lattice_tissue.h"
+#include "mpm/surface/surface_place.h"
 
 namespace tissue_sim {
 
 struct Block;
 
-/// Of all bodies, while they are whole: by point, then bond. Throws what NearestSurface throws.
+/// Of all bodies as they were while whole: by point, then bond. Throws what NearestSurface throws.
 std::vector<OuterPlace> find_outer_places(const LatticeTissue& tissue);
 
 /// Those of a block, in the order of cells and keys; those of cuts among them.

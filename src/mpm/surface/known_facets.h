@@ -5,8 +5,8 @@
 #include <vector>
 
 #include "mpm/blocks/blocks.h"
-#include "mpm/contact/facets.h"
 #include "mpm/lattice_tissue.h"
+#include "mpm/surface/facets.h"
 
 namespace tissue_sim {
 

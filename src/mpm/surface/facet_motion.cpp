@@ -1,4 +1,4 @@
-#include "mpm/contact/facet_motion.h"
+#include "mpm/surface/facet_motion.h"
 
 #include <algorithm>
 

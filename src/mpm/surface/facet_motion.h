@@ -6,9 +6,9 @@
 
 #include "compute/simd.h"
 #include "mpm/blocks/block.h"
-#include "mpm/contact/facet_in_world.h"
 #include "mpm/lattice/lattice_body.h"
 #include "mpm/lattice/nodes.h"
+#include "mpm/surface/facet_in_world.h"
 
 namespace tissue_sim {
 
@@ -24,7 +24,7 @@ struct CellNodes {
   const std::int32_t* row(int y, int z) const { return lowest + z * plane + y * pitch; }
 };
 
-/// A node field around a cell: see mpm/contact/facet_in_world.h.
+/// A node field around a cell: see mpm/surface/facet_in_world.h.
 struct CellField {
   const Array<float>* of;  ///< its three components
   CellNodes nodes;

@@ -1,4 +1,4 @@
-#include "mpm/contact/surface_places.h"
+#include "mpm/surface/surface_places.h"
 
 #include <algorithm>
 #include <cmath>
@@ -26,8 +26,9 @@ std::vector<OuterPlace> find_outer_places(const LatticeTissue& tissue) {
     const double edge = b.cell_size / 2;
     const NearestSurface surface(b.body, 2 * edge);
     for (int p = b.first_point; p < b.first_point + b.point_count; ++p) {
-      const unsigned never = tissue.points.beside_gap.empty() ? 0 : tissue.points.beside_gap[p];
-      const unsigned bonds = tissue.points.bonds[p] & ~never;
+      const bool beside_gap = !tissue.points.beside_gap.empty() && tissue.points.beside_gap[p] != 0;
+      if (tissue.points.bonds[p] == kAllBonds && !beside_gap) continue;
+      const unsigned bonds = whole_bonds(b, tissue.points, p);
       if (bonds == kAllBonds) continue;
       const Points::Site& s = tissue.points.site[p];
       const Vec3 middle = b.node_position(s.x / 2, s.y / 2, s.z / 2);

@@ -6,7 +6,7 @@
 
 #include "compute/host_device.h"
 #include "math/bspline.h"
-#include "mpm/contact/facets.h"
+#include "mpm/surface/facets.h"
 
 namespace tissue_sim {
 

@@ -1,17 +1,9 @@
-// A place on the surface of a body: see mpm/contact/surface_places.h.
+// A place on the surface of a body: see mpm/surface/surface_places.h.
 #pragma once
 
 #include <cstdint>
 
 namespace tissue_sim {
-
-/// Of the outer surface of a whole body.
-struct OuterPlace {
-  std::int32_t point;
-  std::uint8_t bond;  ///< that it has not: mpm/lattice/bonds.h
-  float place[3];     ///< in cells, from the middle of the point's cell
-  float normal[3];    ///< unit, outward, in reference space
-};
 
 /// In a block.
 struct SurfacePlace {

@@ -1,4 +1,4 @@
-#include "mpm/contact/known_facets.h"
+#include "mpm/surface/known_facets.h"
 
 #include <algorithm>
 

@@ -4,7 +4,7 @@
 
 #include "compute/simd.h"
 #include "math/bspline.h"
-#include "mpm/contact/facet_motion.h"
+#include "mpm/surface/facet_motion.h"
 
 namespace tissue_sim {
 

@@ -1,0 +1,37 @@
+// The surface of tissue as triangles, cut faces included, closed around each piece.
+//
+// A bond that a point misses is a face of its cube where tissue ends: four vertices at the cube's
+// corners. Faces share a vertex where bonds hold their points together around the corner, so each
+// edge joins two faces, whatever was cut, and pieces share none. A vertex lies where its faces'
+// planes meet, at the true surface or where the blade went (dual contouring: Ju et al., Dual
+// Contouring of Hermite Data, 2002), and moves with the nodes as one of its points sees them.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "mpm/lattice_tissue.h"
+
+namespace tissue_sim {
+
+struct BoundaryMesh {
+  struct Vertex {
+    std::int32_t point;     ///< in whose cell it is: one that moves, where any there does
+    float place[3];         ///< in cells, from the middle of the cell
+    std::int32_t node[27];  ///< around the cell, x fastest, as the point sees them
+  };
+  struct Face {
+    std::int32_t vertex[4];  ///< counter-clockwise seen from outside; 0 and 2 are joined
+    std::int32_t point;
+    std::uint8_t cut;  ///< whether tissue went on there while it was whole
+  };
+  std::vector<Vertex> vertices;
+  std::vector<Face> faces;        ///< by their points
+  Array<std::uint8_t> bonds;      ///< of the points, when it was made
+  std::vector<OuterPlace> outer;  ///< where the points have none: on a GPU
+};
+
+/// Makes the mesh anew if bonds broke since. Throws what find_outer_places() throws.
+void update_boundary(const LatticeTissue& tissue, BoundaryMesh& mesh);
+
+}  // namespace tissue_sim

@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "tissue_sim/camera.h"
 #include "tissue_sim/material.h"
 #include "tissue_sim/tool.h"
 #include "tissue_sim/types.h"
@@ -153,6 +154,7 @@ struct Scene {
   std::vector<Material> materials;
   std::vector<Body> bodies;
   std::vector<Tool> tools;
+  std::vector<Camera> cameras;  ///< they change nothing but what is seen
 };
 
 /// Throws std::invalid_argument: "<field> is <value>: <what is allowed>".

@@ -41,6 +41,8 @@ inline constexpr Spelling<Shape> kShapeNames[] = {{Shape::kBox, "box"},
                                                   {Shape::kMesh, "mesh"}};
 inline constexpr Spelling<MpmBoundary> kMpmBoundaryNames[] = {{MpmBoundary::kSurface, "surface"},
                                                               {MpmBoundary::kLattice, "lattice"}};
+inline constexpr Spelling<CameraColours> kCameraColourNames[] = {
+    {CameraColours::kTissue, "tissue"}, {CameraColours::kFragments, "fragments"}};
 inline constexpr Spelling<ToolType> kToolTypeNames[] = {
     {ToolType::kScalpel, "scalpel"}, {ToolType::kProbe, "probe"}, {ToolType::kGrasper, "grasper"},
     {ToolType::kBall, "ball"},       {ToolType::kPunch, "punch"}, {ToolType::kPlate, "plate"}};

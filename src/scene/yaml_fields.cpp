@@ -205,6 +205,15 @@ void YamlFields::read(const std::string& name, Vec3& value) const {
   value = Vec3(v[0], v[1], v[2]);
 }
 
+void YamlFields::read(const std::string& name, std::vector<double>& value,
+                      std::size_t count) const {
+  if (!has(name)) return;
+  const YAML::Node& node = *find(name);
+  if (node.IsSequence() && node.size() == 0) return value.clear();
+  const std::string allowed = "must be " + std::to_string(count) + " numbers, or none: []";
+  value = numbers(name, count, allowed.c_str());
+}
+
 void YamlFields::read(const std::string& name, Quat& value) const {
   if (!has(name)) return;
   const std::vector<double> v = numbers(name, 4, "must be four numbers, [x, y, z, w]");

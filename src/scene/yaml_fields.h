@@ -49,6 +49,8 @@ class YamlFields {
   void read(const std::string& name, bool& value) const;
   void read(const std::string& name, std::string& value) const;
   void read(const std::string& name, Vec3& value) const;
+  /// A list of so many numbers, or an empty one.
+  void read(const std::string& name, std::vector<double>& value, std::size_t count) const;
   /// [x, y, z, w] as ROS has it; its norm must be 1 within 0.001 and is made 1.
   void read(const std::string& name, Quat& value) const;
   template <class Enum, std::size_t N>

@@ -16,7 +16,7 @@
 #include "mpm/contact/contact_inertia.h"
 #include "mpm/contact/face_contact.h"
 #include "mpm/fragment_flight.h"
-#include "mpm/lattice_tissue.h"
+#include "mpm/split/lattice_tissue.h"
 #include "mpm/split/front.h"
 #include "mpm/surface/boundary_mesh.h"
 #include "tissue_sim/tissue.h"

@@ -17,7 +17,7 @@
 #include <vector>
 
 #include "compute/for_each.h"
-#include "mpm/lattice_tissue.h"
+#include "mpm/split/lattice_tissue.h"
 #include "tissue_sim/tissue.h"
 
 namespace tissue_sim {

@@ -10,7 +10,9 @@ namespace {
 
 constexpr float kSmooth = 0.64f;  // cosine of the largest angle between faces that count as one
 
-float dot(const float* a, const float* b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
+float inner_product(const float* a, const float* b) {
+  return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
 
 }  // namespace
 
@@ -55,14 +57,15 @@ const std::vector<float>& SmoothNormals::of(const SurfaceTriangles& surface) {
   for (std::size_t g = 0; g + 1 < begin_.size(); ++g) {
     for (std::int32_t i = begin_[g]; i < begin_[g + 1]; ++i) {
       const float* own = &faces_[3 * (corners_[i] / 3)];
-      const float length = std::sqrt(dot(own, own));
+      const float length = std::sqrt(inner_product(own, own));
       float sum[3] = {};
       for (std::int32_t k = begin_[g]; k < begin_[g + 1]; ++k) {
         const float* face = &faces_[3 * (corners_[k] / 3)];
-        if (dot(own, face) < kSmooth * length * std::sqrt(dot(face, face))) continue;
+        if (inner_product(own, face) < kSmooth * length * std::sqrt(inner_product(face, face)))
+          continue;
         for (int a = 0; a < 3; ++a) sum[a] += face[a];
       }
-      const float all = std::sqrt(dot(sum, sum));
+      const float all = std::sqrt(inner_product(sum, sum));
       for (int a = 0; a < 3; ++a) {
         normals_[3 * corners_[i] + a] = all > 0 ? sum[a] / all : a == 2 ? 1.0f : 0.0f;
       }

@@ -66,14 +66,6 @@ void note_units(const Scene& scene, Notes& notes) {
 
 }  // namespace
 
-std::vector<std::uint8_t> Tissue::save() {
-  throw std::runtime_error("the state on " + device_name() + " cannot be saved yet");
-}
-
-void Tissue::restore(Span<const std::uint8_t>) {
-  throw std::runtime_error("a state cannot be restored on " + device_name() + " yet");
-}
-
 std::unique_ptr<Tissue> make_tissue(const Scene& scene) {
   const Makers* of = std::find_if(std::begin(kMakers), std::end(kMakers),
                                   [&](const Makers& m) { return m.method == scene.method; });

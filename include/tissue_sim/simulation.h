@@ -98,7 +98,7 @@ class Simulation {
 
   /// The whole state between two frames, with its scene, version and checksum: restore() of a new
   /// Simulation of the same scene goes on from there with the same bits, in another process too, on
-  /// a device of the same kind. Throws std::runtime_error where the method cannot tell its state.
+  /// a device of the same kind.
   std::vector<std::uint8_t> save();
   /// Throws std::runtime_error with the reason for what is cut short, damaged, of another version,
   /// scene or device; then this simulation must not be used any more. A new one must not have

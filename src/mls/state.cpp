@@ -36,7 +36,7 @@ float whole_kappa(const MlsState& s, std::int32_t i) {
 }
 
 /// Lists all springs, at both of their nodes.
-void list_springs(const MlsState& s) {
+void list_springs(MlsState& s) {
   MlsSprings& springs = s.springs;
   springs.all.clear();
   for (std::int32_t i = 0; i < s.count() && !s.spring.empty(); ++i) {
@@ -165,9 +165,9 @@ std::unique_ptr<MlsState> make_mls_state(const Scene& scene, std::vector<std::st
   return state;
 }
 
-MlsField field_of(const MlsState& s) { return field_of(s, s.u.data(), s.v.data()); }
+MlsField field_of(MlsState& s) { return field_of(s, s.u.data(), s.v.data()); }
 
-MlsField field_of(const MlsState& s, const float* u, const float* v) {
+MlsField field_of(MlsState& s, const float* u, const float* v) {
   MlsField f;
   f.count = s.count();
   f.place = s.place.data();
@@ -189,7 +189,7 @@ MlsField field_of(const MlsState& s, const float* u, const float* v) {
   f.volume_eta = s.volume_eta.data();
   f.kappa = s.kappa.data();
   f.neo_hookean = s.neo_hookean.data();
-  f.stress = const_cast<float*>(s.stress.data());
+  f.stress = s.stress.data();
   f.viscous = s.viscous && v != nullptr;
   if (s.springs.begin.empty()) list_springs(s);
   s.cpu->for_each(

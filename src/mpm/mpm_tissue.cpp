@@ -258,8 +258,7 @@ FrameResult MpmTissue::finish() {
   for (const BlockMotion& m : state_->motion) {
     if (!(m.speed <= result_.max_speed)) result_.max_speed = m.speed;
   }
-  // Nothing that instruments do moves tissue at the speed of a bullet; what does is out of control.
-  result_.blew_up = result_.blew_up || !(result_.max_speed < 300);
+  result_.blew_up = result_.blew_up || is_out_of_control(result_.max_speed);
   if (tame()) measure_and_follow();
   if (foresight_.network != nullptr && !result_.blew_up) {
     const double duration = frame_ ? frame_->duration : 0.0;

@@ -111,8 +111,7 @@ void CudaMpmTissue::finish_measure() {
   for (std::size_t i = 0; i < d.front.energy.size(); ++i) {
     (i < cells ? result_.elastic_energy : result_.kinetic_energy) += d.front.host_energy[i];
   }
-  // Nothing that instruments do moves tissue at the speed of a bullet; what does is out of control.
-  result_.blew_up = result_.blew_up || !(result_.max_speed < 300);
+  result_.blew_up = result_.blew_up || is_out_of_control(result_.max_speed);
   if (searched) state_->faces.fastest = fastest_block(*state_);
   measured_ = true;
 }

@@ -9,6 +9,7 @@
 #include "fragments/piece_colour.h"
 #include "fragments/piece_sums.h"
 #include "frame/checksum.h"
+#include "frame/finite_result.h"
 #include "frame/select_points.h"
 #include "mls/crossing.h"
 #include "mls/cut.h"
@@ -259,7 +260,8 @@ FrameResult MlsTissue::finish() {
   result_.max_speed = figures.speed;
   pieces_measured_ = false;
   // Nothing that instruments do moves tissue at the speed of a bullet; what does is out of control.
-  result_.blew_up = result_.blew_up || !figures.finite || !(result_.max_speed < 300);
+  result_.blew_up =
+      result_.blew_up || !figures.finite || !(result_.max_speed < 300) || !is_finite(result_);
   return result_;
 }
 

@@ -6,6 +6,7 @@
 #include <stdexcept>
 #include <utility>
 
+#include "frame/finite_result.h"
 #include "math/lanczos.h"
 #include "mpm/contact/block_contact.h"
 #include "mpm/lattice_pieces.h"
@@ -259,7 +260,7 @@ FrameResult MpmTissue::finish() {
     if (!(m.speed <= result_.max_speed)) result_.max_speed = m.speed;
   }
   // Nothing that instruments do moves tissue at the speed of a bullet; what does is out of control.
-  result_.blew_up = result_.blew_up || !(result_.max_speed < 300);
+  result_.blew_up = result_.blew_up || !(result_.max_speed < 300) || !is_finite(result_);
   if (tame()) measure_and_follow();
   if (foresight_.network != nullptr && !result_.blew_up) {
     const double duration = frame_ ? frame_->duration : 0.0;

@@ -17,10 +17,6 @@ struct FramePart {
   }
 };
 
-/// Nothing that instruments do moves tissue at the speed of a bullet [m/s]: what does, or is no
-/// number, is out of control.
-inline bool is_out_of_control(double speed) { return !(speed < 300); }
-
 /// What a part of a frame came to.
 enum class Verdict {
   kAccepted,

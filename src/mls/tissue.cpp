@@ -9,6 +9,7 @@
 #include "fragments/piece_colour.h"
 #include "fragments/piece_sums.h"
 #include "frame/checksum.h"
+#include "frame/out_of_control.h"
 #include "frame/select_points.h"
 #include "mls/crossing.h"
 #include "mls/cut.h"
@@ -258,7 +259,7 @@ FrameResult MlsTissue::finish() {
   result_.kinetic_energy = figures.kinetic;
   result_.max_speed = figures.speed;
   pieces_measured_ = false;
-  result_.blew_up = result_.blew_up || !figures.finite || is_out_of_control(result_.max_speed);
+  result_.blew_up = result_.blew_up || !figures.finite || is_out_of_control(result_);
   return result_;
 }
 

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "frame/checksum.h"
+#include "frame/out_of_control.h"
 #include "frame/run_frame.h"
 #include "pbd/cut.h"
 #include "pbd/find_touches.h"
@@ -123,7 +124,7 @@ FrameResult PbdTissue::finish() {
   result_.kinetic_energy = sum.kinetic;
   result_.elastic_energy = sum.elastic;
   result_.max_speed = std::sqrt(sum.speed2);
-  result_.blew_up = result_.blew_up || !sum.finite || is_out_of_control(result_.max_speed);
+  result_.blew_up = result_.blew_up || !sum.finite || is_out_of_control(result_);
   pieces_measured_ = false;
   return result_;
 }

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "frame/out_of_control.h"
 #include "mpm/anchors/anchored_share.h"
 #include "mpm/cuda/on_device.h"
 #include "mpm/cuda/outer_points.h"
@@ -252,6 +253,7 @@ FrameResult CudaMpmTissue::finish() {
   pieces_measured_ = false;
   substep_.follow(*state_, modulus_);
   tame();
+  result_.blew_up = result_.blew_up || is_out_of_control(result_);
   if (foresight_.network != nullptr && !result_.blew_up) foresee();
   measured_ = false;
   return result_;

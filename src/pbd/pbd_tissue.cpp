@@ -5,7 +5,6 @@
 
 #include "frame/checksum.h"
 #include "frame/out_of_control.h"
-#include "frame/run_frame.h"
 #include "pbd/cut.h"
 #include "pbd/find_touches.h"
 #include "pbd/free_flight.h"

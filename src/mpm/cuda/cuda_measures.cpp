@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 
+#include "frame/out_of_control.h"
 #include "math/lanczos.h"
 #include "mpm/cuda/cuda_linearised_motion.h"
 #include "mpm/cuda/on_device.h"

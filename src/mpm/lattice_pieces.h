@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "fragments/pieces.h"
-#include "mpm/lattice_tissue.h"
+#include "mpm/split/lattice_tissue.h"
 
 namespace tissue_sim {
 

@@ -1,7 +1,7 @@
 // How much of each point's volume lies outside its body's anchors: tissue inside is rigid.
 #pragma once
 
-#include "mpm/lattice_tissue.h"
+#include "mpm/split/lattice_tissue.h"
 
 namespace tissue_sim {
 

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "mpm/blocks/block.h"
-#include "mpm/lattice_tissue.h"
+#include "mpm/split/lattice_tissue.h"
 
 namespace tissue_sim {
 

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "mpm/anchors/anchor_faces.h"
-#include "mpm/lattice_tissue.h"
+#include "mpm/split/lattice_tissue.h"
 
 namespace tissue_sim {
 

@@ -10,7 +10,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "mpm/lattice_tissue.h"
+#include "mpm/split/lattice_tissue.h"
 
 namespace tissue_sim {
 

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "mpm/blocks/blocks.h"
-#include "mpm/lattice_tissue.h"
+#include "mpm/split/lattice_tissue.h"
 #include "mpm/surface/facets.h"
 
 namespace tissue_sim {

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "mpm/blocks/stabilisation.h"
-#include "mpm/lattice_tissue.h"
+#include "mpm/split/lattice_tissue.h"
 #include "mpm/tear/debris_points.h"
 
 namespace tissue_sim {

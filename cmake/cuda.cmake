@@ -75,8 +75,7 @@ if(tissue_sim_has_cuda)
   set_source_files_properties(${cuda_sources} ${cuda_hosts} PROPERTIES SKIP_UNITY_BUILD_INCLUSION ON)
   # Waiting for divisions and roots of a colour is what a colour takes; two units in the last place
   # off they take a third. Denormals are flushed as on the CPU.
-  set_source_files_properties(src/pbd/cuda/launches.cu src/pbd/cuda/one_block.cu
-                              src/pbd/cuda/section_steps.cu PROPERTIES
+  set_source_files_properties(src/pbd/cuda/launches.cu src/pbd/cuda/one_block.cu PROPERTIES
                               COMPILE_OPTIONS "--ftz=true;--prec-div=false;--prec-sqrt=false")
   set_target_properties(tissue_sim_core PROPERTIES CUDA_ARCHITECTURES "${CMAKE_CUDA_ARCHITECTURES}"
                         CUDA_RUNTIME_LIBRARY Static)

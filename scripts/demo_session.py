@@ -1,6 +1,7 @@
 #!/usr/bin/python3
 """Runs demo.launch once: records a bag, shows progress, ends with the instruments' paths, and sums
-up. Needs the environment of the built package and a free ROS_MASTER_URI; scripts/run sees to it."""
+up. Needs the environment of the built package and a free ROS_MASTER_URI; scripts/run sees to it.
+Ends with 3 where the scalpel cut nothing off, with 1 where the demo itself did not come to its end."""
 import argparse
 import os
 import signal
@@ -17,6 +18,8 @@ from tissue_sim.srv import StartRecording
 
 TOOLS = ("scalpel", "probe")
 CRUMB = 4  # pieces of fewer points are crumbs that a blade leaves
+CUT_OFF = 0.02  # share of a body that is at least cut off; less is a chip beside a cut that failed
+CUT_FAILED = 3  # exit status
 PATIENCE = 60.0  # seconds without progress after which something is wrong
 
 
@@ -133,7 +136,22 @@ def summary(session, wall):
     return "\n".join("   " + line.rstrip() for line in lines)
 
 
+def not_loose(before, after):
+    """What the scalpel was to cut off a piece of and did not, a line; None where it did."""
+    whole = sum(f.point_count for f in before.fragments)
+    known = {f.id for f in before.fragments}
+    new = [f for f in after.fragments if f.id not in known and f.loose]
+    largest = max((f.point_count for f in new), default=0)
+    if largest >= CUT_OFF * whole:
+        return None
+    held = ", ".join("piece %d (%d points, %s)" % (f.id, f.point_count, "loose" if f.loose else "held")
+                     for f in after.fragments if f.point_count >= CUT_OFF * whole)
+    return ("the cut failed, a bridge of tissue still holds what was to come loose: %s; the largest "
+            "bit that came off has %d points" % (held, largest))
+
+
 def run(args, launch):
+    """Returns what did not come loose, None if all did."""
     wait_for("ROS master", rosgraph.is_master_online, launch)
     rospy.init_node("demo_session", disable_signals=True)
     session = Session()
@@ -151,9 +169,13 @@ def run(args, launch):
     wall = time.monotonic() - started
     call("stop_recording", Trigger)
     text = summary(session, wall)
+    failed = not_loose(session.before, session.fragments)
+    if failed:
+        text += "\n   " + failed
     print(text)
     with open(os.path.join(args.out, "summary.txt"), "w") as file:
         file.write(text + "\n")
+    return failed
 
 
 def has_service(name):
@@ -199,8 +221,9 @@ def main():
     with open(log, "w") as file:
         launch = subprocess.Popen(command, stdout=file, stderr=subprocess.STDOUT,
                                   stdin=subprocess.DEVNULL, start_new_session=True)
+    failed = None
     try:
-        run(args, launch)
+        failed = run(args, launch)
     except Failure as e:
         with open(log) as file:
             print("\n".join("   | " + line.rstrip() for line in telling(file.readlines())))
@@ -209,6 +232,8 @@ def main():
         sys.exit("\nstopped; what was recorded so far is in %s" % args.out)
     finally:
         stop(launch)
+    if failed:
+        sys.exit(CUT_FAILED)
 
 
 def find_roslaunch():

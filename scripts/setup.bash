@@ -7,13 +7,13 @@ repo=$(cd -- "$(dirname -- "${BASH_SOURCE[0]}")/.." && pwd)
 build=${TISSUE_SIM_BUILD:-$repo/build}
 noetic=/opt/ros/noetic/setup.bash
 
-core_packages=(g++ make cmake libeigen3-dev libtbb-dev libyaml-cpp-dev libnanoflann-dev libgtest-dev
-  libbenchmark-dev python3)
+core_packages=(g++ make cmake libeigen3-dev libtbb-dev libyaml-cpp-dev libnanoflann-dev zlib1g-dev
+  libembree-dev libgtest-dev libbenchmark-dev python3)
 picture_packages=(python3-numpy python3-matplotlib python3-yaml)
 debian_packages=(catkin ros-message-generation ros-message-runtime libroscpp-dev libroslib-dev
   librosbag-storage-dev librostest-dev libtf2-dev libtf2-ros-dev libtf2-geometry-msgs-dev
   libnodelet-dev libnodeletlib-dev libnodeletlib-tools pluginlib-dev libdiagnostic-updater-dev
-  libinteractive-markers-dev ros-diagnostic-msgs ros-geometry-msgs ros-sensor-msgs ros-std-msgs ros-std-srvs
+  libinteractive-markers-dev libimage-transport-dev ros-diagnostic-msgs ros-geometry-msgs ros-sensor-msgs ros-std-msgs ros-std-srvs
   ros-visualization-msgs libdiagnostic-msgs-dev libstd-msgs-dev libstd-srvs-dev libgeometry-msgs-dev
   libsensor-msgs-dev libvisualization-msgs-dev rosout python3-roslaunch python3-rosbag
   python3-rostopic python3-rosservice python3-rosnode python3-rosparam python3-rostest python3-rospy
@@ -21,7 +21,7 @@ debian_packages=(catkin ros-message-generation ros-message-runtime libroscpp-dev
   python3-visualization-msgs python3-diagnostic-msgs rosbash)
 noetic_packages=(ros-noetic-{catkin,message-generation,message-runtime,roscpp,roslib,rospy,rostest}
   ros-noetic-{rosbag,rosbag-storage,roslaunch,rosout,rostopic,rosservice,rosnode,rosparam,tf2}
-  ros-noetic-{tf2-ros,tf2-geometry-msgs,interactive-markers,nodelet,pluginlib,diagnostic-updater,diagnostic-msgs}
+  ros-noetic-{tf2-ros,tf2-geometry-msgs,interactive-markers,image-transport,nodelet,pluginlib,diagnostic-updater,diagnostic-msgs}
   ros-noetic-{std-msgs,std-srvs,geometry-msgs,sensor-msgs,visualization-msgs,rosbash})
 
 say() { printf '\n== %s\n' "$*"; }

@@ -7,6 +7,7 @@
 #include "mls/tissue.h"
 #include "mpm/mpm_tissue.h"
 #include "pbd/pbd_tissue.h"
+#include "scene/scene_text.h"
 #include "tissue_sim/tissue.h"
 #if defined(TISSUE_SIM_CUDA)
 #include "mls/cuda/cuda_mls_tissue.h"
@@ -46,21 +47,31 @@ constexpr Makers kMakers[] = {
 #endif
 };
 
+/// Soft tissue has kPa: less than a tenth of one was hardly meant in Pa.
+void note_units(const Scene& scene, Notes& notes) {
+  constexpr double kSoftest = 100;  // [Pa]; brain has some 500
+  const auto check = [&](const std::string& name) {
+    const double modulus = find_material(scene, name).young_modulus;
+    if (modulus >= kSoftest) return;
+    const std::string note = "material '" + name + "' has a young_modulus of " + text(modulus) +
+                             " Pa, softer than any organ: if kPa were meant, it is " +
+                             text(1e3 * modulus);
+    if (std::find(notes.begin(), notes.end(), note) == notes.end()) notes.push_back(note);
+  };
+  for (const Body& body : scene.bodies) {
+    check(body.material);
+    for (const Inclusion& part : body.inclusions) check(part.material);
+  }
+}
+
 }  // namespace
-
-std::vector<std::uint8_t> Tissue::save() {
-  throw std::runtime_error("the state on " + device_name() + " cannot be saved yet");
-}
-
-void Tissue::restore(Span<const std::uint8_t>) {
-  throw std::runtime_error("a state cannot be restored on " + device_name() + " yet");
-}
 
 std::unique_ptr<Tissue> make_tissue(const Scene& scene) {
   const Makers* of = std::find_if(std::begin(kMakers), std::end(kMakers),
                                   [&](const Makers& m) { return m.method == scene.method; });
   if (of == std::end(kMakers)) throw std::invalid_argument("method is not in this build");
   Notes notes = overlap_notes(scene);
+  note_units(scene, notes);
   if (scene.device == Device::kCpu) return of->on_cpu(scene, notes);
   if (of->on_gpu == nullptr) {
     if (scene.device == Device::kAuto) return of->on_cpu(scene, notes);

@@ -11,7 +11,7 @@
 #include "frame/first_frame.h"
 #include "frame/sealed_state.h"
 #include "frame/state_fields.h"
-#include "tools/grip.h"
+#include "tools/instrument.h"
 #include "tools/points_inside.h"
 
 namespace tissue_sim {
@@ -23,26 +23,78 @@ void check_grip(double pressure) {
                               ": must be from 1 to 1e7 [Pa], or 0 for the tool's own");
 }
 
+void check_request(const ToolRequest& request, const std::string& name) {
+  check_pose(request.pose, "the pose of tool '" + name + "'");
+  if (!std::isfinite(request.jaw)) throw std::invalid_argument("the jaw angle is not finite");
+  if (request.grip_pressure) check_grip(*request.grip_pressure);
+}
+
+void check_field(Scene changed) {
+  changed.bodies.resize(1);
+  validate(changed);
+}
+
+void check_gravity(const Vec3& gravity) {
+  Scene changed;
+  changed.gravity = gravity;
+  check_field(changed);
+}
+
+void check_damping(double damping) {
+  Scene changed;
+  changed.damping = damping;
+  check_field(changed);
+}
+
+/// Another time would change the last bit of a quaternion that was normalised.
+Pose normalised(const Pose& pose) {
+  const bool is_unit = std::fabs(pose.orientation.squaredNorm() - 1) < 1e-15;
+  return {pose.position, is_unit ? pose.orientation : pose.orientation.normalized()};
+}
+
+void check_count(const char* what, std::size_t asked, std::size_t there) {
+  if (asked == 0 || asked == there) return;
+  throw std::invalid_argument("the input moves " + std::to_string(asked) + " " + what +
+                              "s, the scene has " + std::to_string(there));
+}
+
+/// Of a request for one of them.
+template <class T>
+std::optional<T>& at(std::vector<std::optional<T>>& all, const char* what, int i,
+                     std::size_t there) {
+  if (i < 0 || i >= static_cast<int>(there)) {
+    throw std::invalid_argument(std::string(what) + " " + std::to_string(i) +
+                                " is not in the scene, which has " + std::to_string(there));
+  }
+  all.resize(there);
+  return all[i];
+}
+
 }  // namespace
 
 struct Simulation::State {
   Scene scene;
   std::unique_ptr<Tissue> tissue;
   std::int64_t frame = 0;
-  std::vector<ToolMotion> tools;  // as they stand after the last frame, then as set for the next
-  std::vector<BladePath> cuts;
-  std::vector<Grip> grips;                  // of each tool
-  std::vector<double> grip_pressures;       // of each tool, 0 for the scene's [Pa]
+  std::vector<ToolMotion> tools;            // at rest where the last frame left them
+  std::vector<Instrument> instruments;      // of each tool
+  std::vector<BladePath> cuts;              // of the next frame
   std::vector<const Anchor*> anchors;       // of all bodies
   std::vector<AnchorMotion> anchor_motion;  // of each; empty while none moved
-  Vec3 gravity = Vec3::Zero();              // as of the next frame [m/s^2]
-  double damping = 0;                       // the same [1/s]
+  Vec3 gravity = Vec3::Zero();              // [m/s^2]
+  double damping = 0;                       // [1/s]
   double wave_speed = 0;
   bool blew_up = false;
 
   template <class Archive>
   void each_field(Archive& archive);
   StateOrigin origin() const;
+  void check(const FrameRequest& request) const;
+  void take(const FrameRequest& request);
+  void check_alive() const {
+    if (blew_up) throw std::runtime_error("the simulation blew up and cannot go on: reset it");
+  }
+  FrameReport run(std::chrono::steady_clock::time_point start);
 };
 
 Simulation::Simulation(const Scene& scene) : state_(std::make_unique<State>()) {
@@ -55,8 +107,7 @@ Simulation::Simulation(const Scene& scene) : state_(std::make_unique<State>()) {
     check_held(scene, *state_->tissue);
   }
   state_->tools.resize(scene.tools.size());
-  state_->grips.resize(scene.tools.size());
-  state_->grip_pressures.resize(scene.tools.size());
+  state_->instruments.resize(scene.tools.size());
   for (const Body& b : state_->scene.bodies) {
     for (const Anchor& anchor : b.anchors) state_->anchors.push_back(&anchor);
   }
@@ -80,125 +131,98 @@ std::int64_t Simulation::frame() const { return state_->frame; }
 const std::vector<ToolMotion>& Simulation::tools() const { return state_->tools; }
 double Simulation::time() const { return state_->frame / state_->scene.frame_rate; }
 
-void Simulation::set_tool(int tool, const Pose& pose, double jaw) {
-  if (tool < 0 || tool >= static_cast<int>(state_->tools.size())) {
-    throw std::invalid_argument("tool " + std::to_string(tool) +
-                                " is not in the scene, which has " +
-                                std::to_string(state_->tools.size()));
-  }
-  check_pose(pose, "the pose of tool '" + state_->scene.tools[tool].name + "'");
-  if (!std::isfinite(jaw)) throw std::invalid_argument("the jaw angle is not finite");
-  ToolMotion& m = state_->tools[tool];
-  m.end = {pose.position, pose.orientation.normalized()};
-  m.jaw_end = static_cast<float>(jaw);
-  if (!m.present) {
-    m.begin = m.end;
-    m.jaw_begin = m.jaw_end;
-    m.present = true;
-  }
-}
-
-void Simulation::set_grip_pressure(int tool, double pressure) {
-  if (tool < 0 || tool >= static_cast<int>(state_->tools.size())) {
-    throw std::invalid_argument("tool " + std::to_string(tool) + " is not in the scene");
-  }
-  check_grip(pressure);
-  state_->grip_pressures[tool] = pressure;
-}
-
-void Simulation::cut(const BladePath& path) {
-  check_path(path);
-  state_->cuts.push_back(path);
-  for (Pose& pose : state_->cuts.back().poses) pose.orientation.normalize();
-}
-
-void Simulation::set_anchor(int anchor, const Pose& pose) {
-  State& s = *state_;
-  if (anchor < 0 || anchor >= static_cast<int>(s.anchors.size())) {
-    throw std::invalid_argument("anchor " + std::to_string(anchor) +
-                                " is not in the scene, which has " +
-                                std::to_string(s.anchors.size()));
-  }
-  if (!s.tissue->moves_anchors()) {
-    throw std::invalid_argument(
-        "anchors do not move with this method: they do with method mls, and with method mpm unless "
-        "mpm.boundary is lattice");
-  }
-  check_pose(pose, "the pose of anchor '" + s.anchors[anchor]->name + "'");
-  if (s.anchor_motion.empty()) {
-    for (const Anchor* a : s.anchors) {
-      const Pose rest{a->origin(), Quat::Identity()};
-      s.anchor_motion.push_back({rest, rest});
-    }
-  }
-  s.anchor_motion[anchor].end = {pose.position, pose.orientation.normalized()};
-}
-
 Pose Simulation::anchor(int anchor) const {
   const State& s = *state_;
   const Pose rest{s.anchors.at(anchor)->origin(), Quat::Identity()};
   return s.anchor_motion.empty() ? rest : s.anchor_motion[anchor].end;
 }
 
-void Simulation::set_gravity(const Vec3& gravity) {
-  Scene changed;
-  changed.bodies.resize(1);
-  changed.gravity = gravity;
-  validate(changed);
-  state_->gravity = gravity;
-}
-
 double Simulation::damping() const { return state_->damping; }
 
-void Simulation::set_damping(double damping) {
-  Scene changed;
-  changed.bodies.resize(1);
-  changed.damping = damping;
-  validate(changed);
-  state_->damping = damping;
+void Simulation::State::check(const FrameRequest& request) const {
+  check_count("tool", request.tools.size(), tools.size());
+  check_count("anchor", request.anchors.size(), anchors.size());
+  for (std::size_t i = 0; i < request.tools.size(); ++i) {
+    if (request.tools[i]) check_request(*request.tools[i], scene.tools[i].name);
+  }
+  for (const BladePath& path : request.cuts) check_path(path);
+  for (std::size_t i = 0; i < request.anchors.size(); ++i) {
+    if (!request.anchors[i]) continue;
+    if (!tissue->moves_anchors()) {
+      throw std::invalid_argument(
+          "anchors do not move with this method: they do with method mls, and with method mpm "
+          "unless mpm.boundary is lattice");
+    }
+    check_pose(*request.anchors[i], "the pose of anchor '" + anchors[i]->name + "'");
+  }
+  if (request.gravity) check_gravity(*request.gravity);
+  if (request.damping) check_damping(*request.damping);
 }
 
-void Simulation::apply(const AppliedInput& input) {
-  if (input.tools.size() != state_->tools.size()) {
-    throw std::invalid_argument("the input moves " + std::to_string(input.tools.size()) +
-                                " tools, the scene has " + std::to_string(state_->tools.size()));
+void Simulation::State::take(const FrameRequest& request) {
+  check(request);
+  for (std::size_t i = 0; i < request.tools.size(); ++i) {
+    if (!request.tools[i]) continue;
+    ToolRequest of_tool = *request.tools[i];
+    of_tool.pose = normalised(of_tool.pose);
+    instruments[i].ask(of_tool);
   }
-  for (const ToolMotion& m : input.tools) {
-    if (!m.present) continue;
-    check_pose(m.begin, "a tool's pose");
-    check_pose(m.end, "a tool's pose");
+  for (const BladePath& path : request.cuts) {
+    cuts.push_back(path);
+    for (Pose& pose : cuts.back().poses) pose = normalised(pose);
   }
-  for (const BladePath& path : input.cuts) check_path(path);
-  state_->tools = input.tools;
-  if (!input.grip_pressures.empty() && input.grip_pressures.size() != input.tools.size()) {
-    throw std::invalid_argument("grip_pressures has " +
-                                std::to_string(input.grip_pressures.size()) + " values for " +
-                                std::to_string(input.tools.size()) + " tools");
+  for (std::size_t i = 0; i < request.anchors.size(); ++i) {
+    if (!request.anchors[i]) continue;
+    while (anchor_motion.size() < anchors.size()) {  // at rest: none ever moved
+      const Pose rest{anchors[anchor_motion.size()]->origin(), Quat::Identity()};
+      anchor_motion.push_back({rest, rest});
+    }
+    anchor_motion[i].end = normalised(*request.anchors[i]);
   }
-  for (const double pressure : input.grip_pressures) check_grip(pressure);
-  state_->grip_pressures = input.grip_pressures;
-  state_->grip_pressures.resize(input.tools.size());
-  state_->cuts = input.cuts;
-  if (!input.anchors.empty() && input.anchors.size() != state_->anchors.size()) {
-    throw std::invalid_argument("the input moves " + std::to_string(input.anchors.size()) +
-                                " anchors, the scene has " +
-                                std::to_string(state_->anchors.size()));
-  }
-  if (!input.anchors.empty() && !state_->tissue->moves_anchors()) {
-    throw std::invalid_argument("the input moves anchors, which this method and device do not");
-  }
-  for (const AnchorMotion& m : input.anchors) {
-    check_pose(m.begin, "an anchor's pose");
-    check_pose(m.end, "an anchor's pose");
-  }
-  if (input.gravity) set_gravity(*input.gravity);
-  if (input.damping) set_damping(*input.damping);
-  if (!input.anchors.empty()) state_->anchor_motion = input.anchors;
+  gravity = request.gravity.value_or(gravity);
+  damping = request.damping.value_or(damping);
+}
+
+void Simulation::set_tool(int tool, const Pose& pose, double jaw) {
+  FrameRequest request;
+  at(request.tools, "tool", tool, state_->tools.size()) = ToolRequest{pose, jaw, false, {}};
+  state_->take(request);
+}
+
+void Simulation::set_grip_pressure(int tool, double pressure) {
+  std::vector<std::optional<ToolRequest>> tools;
+  at(tools, "tool", tool, state_->tools.size());
+  check_grip(pressure);
+  state_->instruments[tool].set_grip_pressure(pressure);
+}
+
+void Simulation::cut(const BladePath& path) {
+  FrameRequest request;
+  request.cuts = {path};
+  state_->take(request);
+}
+
+void Simulation::set_anchor(int anchor, const Pose& pose) {
+  FrameRequest request;
+  at(request.anchors, "anchor", anchor, state_->anchors.size()) = pose;
+  state_->take(request);
+}
+
+void Simulation::set_gravity(const Vec3& gravity) {
+  FrameRequest request;
+  request.gravity = gravity;
+  state_->take(request);
+}
+
+void Simulation::set_damping(double damping) {
+  FrameRequest request;
+  request.damping = damping;
+  state_->take(request);
 }
 
 template <class Archive>
 void Simulation::State::each_field(Archive& archive) {
-  archive(frame, tools, cuts, grips, grip_pressures, anchor_motion, gravity, damping, blew_up);
+  archive(frame, tools, cuts, instruments, anchor_motion, gravity, damping, blew_up);
 }
 
 StateOrigin Simulation::State::origin() const {
@@ -235,74 +259,128 @@ void Simulation::restore(Span<const std::uint8_t> saved) {
   }
 }
 
-FrameReport Simulation::advance_frame() {
+FrameReport Simulation::advance_frame(const FrameRequest& request) {
   State& s = *state_;
-  if (s.blew_up) {
-    throw std::runtime_error("the simulation blew up and cannot go on: reset it");
-  }
+  s.check_alive();
   const auto start = std::chrono::steady_clock::now();
+  s.take(request);
+  std::vector<std::string> notes;
+  for (std::size_t i = 0; i < s.tools.size(); ++i) {
+    std::string note = s.instruments[i].move(s.scene.tools[i], 1 / s.scene.frame_rate,
+                                             s.scene.cell_size, *s.tissue, s.tools[i]);
+    if (!note.empty()) notes.push_back(std::move(note));
+  }
+  FrameReport report = s.run(start);
+  report.notes = std::move(notes);
+  return report;
+}
+
+FrameReport Simulation::repeat_frame(const AppliedInput& input) {
+  State& s = *state_;
+  s.check_alive();
+  const auto start = std::chrono::steady_clock::now();
+  if (input.tools.size() != s.tools.size()) {
+    throw std::invalid_argument("the input moves " + std::to_string(input.tools.size()) +
+                                " tools, the scene has " + std::to_string(s.tools.size()));
+  }
+  check_count("grip_pressures of tool", input.grip_pressures.size(), input.tools.size());
+  check_count("anchor", input.anchors.size(), s.anchors.size());
+  for (const ToolMotion& m : input.tools) {
+    if (!m.present) continue;
+    check_pose(m.begin, "a tool's pose");
+    check_pose(m.end, "a tool's pose");
+  }
+  for (const double pressure : input.grip_pressures) check_grip(pressure);
+  for (const BladePath& path : input.cuts) check_path(path);
+  if (!input.anchors.empty() && !s.tissue->moves_anchors()) {
+    throw std::invalid_argument("the input moves anchors, which this method and device do not");
+  }
+  for (const AnchorMotion& m : input.anchors) {
+    check_pose(m.begin, "an anchor's pose");
+    check_pose(m.end, "an anchor's pose");
+  }
+  if (input.gravity) check_gravity(*input.gravity);
+  if (input.damping) check_damping(*input.damping);
+  s.tools = input.tools;
+  for (std::size_t i = 0; i < s.tools.size(); ++i) {
+    s.instruments[i].put(s.tools[i], input.grip_pressures.empty() ? 0 : input.grip_pressures[i]);
+  }
+  s.cuts = input.cuts;
+  if (!input.anchors.empty()) s.anchor_motion = input.anchors;
+  s.gravity = input.gravity.value_or(s.gravity);
+  s.damping = input.damping.value_or(s.damping);
+  return s.run(start);
+}
+
+FrameReport Simulation::State::run(std::chrono::steady_clock::time_point start) {
   FrameReport report;
-  report.input.grip_pressures.resize(s.tools.size());
-  for (std::size_t i = 0; i < s.tools.size(); ++i) {
-    const Tool& tool = s.scene.tools[i];
-    if (tool.type != ToolType::kGrasper) continue;
-    const double set = s.grip_pressures[i] > 0 ? s.grip_pressures[i] : tool.grip_pressure;
-    // Said as it comes out: a replay gets the jaws no longer as they were asked for.
-    report.input.grip_pressures[i] = squeezed(set, s.tools[i].jaw_end);
-    s.grips[i].limit(report.input.grip_pressures[i], 1 / s.scene.frame_rate, s.tools[i]);
+  for (std::size_t i = 0; i < tools.size(); ++i) {
+    report.input.grip_pressures.push_back(
+        instruments[i].limit_jaws(scene.tools[i], 1 / scene.frame_rate, tools[i]));
   }
-  report.input.frame = s.frame;
-  report.input.tools = s.tools;
-  report.input.cuts = std::exchange(s.cuts, {});
-  report.input.anchors = s.anchor_motion;
-  report.input.gravity = s.gravity;
-  report.input.damping = s.damping;
-  s.tissue->advance(1.0 / s.scene.frame_rate,
-                    {report.input.tools, report.input.cuts, report.input.anchors,
-                     &*report.input.gravity, &*report.input.damping});
-  report.result = s.tissue->finish();
+  report.input.frame = frame;
+  report.input.tools = tools;
+  report.input.cuts = std::exchange(cuts, {});
+  report.input.anchors = anchor_motion;
+  report.input.gravity = gravity;
+  report.input.damping = damping;
+  tissue->advance(1.0 / scene.frame_rate,
+                  {report.input.tools, report.input.cuts, report.input.anchors,
+                   &*report.input.gravity, &*report.input.damping});
+  report.result = tissue->finish();
   sum_inside(report.result);
-  report.cfl = report.result.substep * s.wave_speed / s.scene.cell_size;
-  for (std::size_t i = 0; i < s.tools.size(); ++i) {
-    const ToolLoad& load = report.result.loads[i];
-    s.grips[i].follow(s.tools[i], load.grip_area > 0 ? load.grip / load.grip_area : 0);
+  report.cfl = report.result.substep * wave_speed / scene.cell_size;
+  for (std::size_t i = 0; i < tools.size(); ++i) {
+    instruments[i].follow(tools[i], report.result.loads[i]);
   }
-  s.blew_up = report.result.blew_up;
-  for (ToolMotion& m : s.tools) {
+  blew_up = report.result.blew_up;
+  for (ToolMotion& m : tools) {
     m.begin = m.end;
     m.jaw_begin = m.jaw_end;
   }
-  for (AnchorMotion& m : s.anchor_motion) m.begin = m.end;
-  ++s.frame;
+  for (AnchorMotion& m : anchor_motion) m.begin = m.end;
+  ++frame;
   report.compute_time =
       std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   return report;
 }
 
 SettleReport Simulation::settle(const SettleLimits& limits) {
-  State& s = *state_;
-  const double damping = s.damping;
-  if (limits.damping >= 0) set_damping(limits.damping);
-  const int window = std::max(1, static_cast<int>(std::ceil(0.1 * s.scene.frame_rate)));
-  const auto most = static_cast<std::int64_t>(std::ceil(limits.time * s.scene.frame_rate));
-  SettleReport report;
-  std::vector<double> speeds(window, std::numeric_limits<double>::infinity());
-  std::int64_t frames = 0;
+  Settling settling(*this, limits);
   try {
-    while (!report.at_rest && frames < most) {
-      const FrameReport frame = advance_frame();
-      if (frame.result.blew_up) break;
-      speeds[frames++ % window] = frame.result.max_speed;
-      report.speed = *std::max_element(speeds.begin(), speeds.end());
-      report.at_rest = report.speed < limits.speed;
+    while (!settling.is_over(advance_frame())) {
     }
   } catch (...) {
-    s.damping = damping;
+    settling.end(*this);
     throw;
   }
-  s.damping = damping;
-  report.time = frames / s.scene.frame_rate;
-  return report;
+  return settling.end(*this);
 }
+
+Settling::Settling(Simulation& simulation, const SettleLimits& limits)
+    : limits_(limits),
+      damping_(simulation.damping()),
+      frame_rate_(simulation.scene().frame_rate),
+      speeds_(static_cast<std::size_t>(std::max(1.0, std::ceil(0.1 * frame_rate_))),
+              std::numeric_limits<double>::infinity()) {
+  if (limits.damping >= 0) simulation.set_damping(limits.damping);
+}
+
+int Settling::most_frames() const {
+  return static_cast<int>(std::max(1.0, std::ceil(limits_.time * frame_rate_)));
+}
+
+bool Settling::is_over(const FrameReport& frame) {
+  if (frame.result.blew_up) return true;
+  speeds_[frames_++ % speeds_.size()] = frame.result.max_speed;
+  return fastest() < limits_.speed || frames_ >= most_frames();
+}
+
+SettleReport Settling::end(Simulation& simulation) const {
+  if (limits_.damping >= 0) simulation.set_damping(damping_);
+  return {fastest() < limits_.speed, frames_ / frame_rate_, fastest()};
+}
+
+double Settling::fastest() const { return *std::max_element(speeds_.begin(), speeds_.end()); }
 
 }  // namespace tissue_sim

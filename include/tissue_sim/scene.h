@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "tissue_sim/camera.h"
 #include "tissue_sim/material.h"
 #include "tissue_sim/tool.h"
 #include "tissue_sim/types.h"
@@ -75,14 +76,8 @@ struct Ground {
 
 /// How the meshless method (`method: mls`) places its nodes.
 enum class MlsPlacement {
-  kRegular,   ///< on a lattice
-  kJittered,  ///< on a lattice, inner ones moved aside by up to a fifth of the spacing
-  kGraded,    ///< dense at the surface, sparse inside
-};
-/// What its moving least squares are made of; docs/mls.md says how they differ.
-enum class MlsBasis {
-  kLinear,    ///< the kernel's weights as they are (Aras, Shen, Audette 2014)
-  kBalanced,  ///< weights nearest to these under which uniform stress leaves inner nodes in balance
+  kRegular,  ///< on a lattice
+  kGraded,   ///< dense at the surface, sparse inside
 };
 
 /// How meshless tissue touches tissue; docs/mls.md says what each costs.
@@ -95,7 +90,6 @@ enum class MlsContact {
 struct MlsOptions {
   double spacing = 0;   ///< between nodes, of graded ones at the surface [m]; 0 for half a cell
   int neighbours = 18;  ///< that a node has within a regular lattice, 14 to 60: sets the supports
-  MlsBasis basis = MlsBasis::kBalanced;
   MlsPlacement placement = MlsPlacement::kRegular;
   double grading = 2;          ///< kGraded: spacing deep inside over that at the surface, 1 to 4
   double stabilisation = 0.3;  ///< stiffness of what is not linear in a support, times E, 0 to 1
@@ -160,6 +154,7 @@ struct Scene {
   std::vector<Material> materials;
   std::vector<Body> bodies;
   std::vector<Tool> tools;
+  std::vector<Camera> cameras;  ///< they change nothing but what is seen
 };
 
 /// Throws std::invalid_argument: "<field> is <value>: <what is allowed>".

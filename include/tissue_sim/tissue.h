@@ -68,6 +68,7 @@ struct Momentum {
 /// The triangles of a surface, counter-clockwise seen from outside.
 struct SurfaceTriangles {
   std::vector<float> corners;          ///< nine coordinates a triangle [m], world frame
+  std::vector<float> rest;             ///< where these were at time zero, of the same material [m]
   std::vector<std::int32_t> fragment;  ///< Fragment::id of each triangle
   std::vector<std::uint8_t> cut;       ///< of each: 1 where a cut or a tear made it, else 0
 };
@@ -97,13 +98,12 @@ class Tissue {
   virtual std::uint64_t checksum() = 0;
   /// As of the last finish().
   virtual Momentum momentum() = 0;
-  /// The whole state between two frames, for restore(). Throws std::runtime_error where a method
-  /// cannot tell it.
-  virtual std::vector<std::uint8_t> save();
+  /// The whole state between two frames, for restore().
+  virtual std::vector<std::uint8_t> save() = 0;
   /// Goes on from there, in tissue of the same scene, method and device that has not advanced yet:
   /// with the same bits as what was saved. Throws std::runtime_error for bytes that are no such
   /// state; then it must not be used any more.
-  virtual void restore(Span<const std::uint8_t> saved);
+  virtual void restore(Span<const std::uint8_t> saved) = 0;
   /// What was repaired or assumed when the scene was built (a mesh turned inside out, ...).
   virtual const std::vector<std::string>& notes() const = 0;
   /// Device and instruction set that do the work, as in "cpu (AVX-512, 2 threads)".

@@ -5,6 +5,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 
 #include "tissue_sim/types.h"
@@ -36,6 +37,18 @@ struct Tool {
   double grip_pressure = 3000;  ///< grasper: its jaws close until they press with it [Pa]
   double cohesion = 10000;      ///< grasper: what its teeth hold beside friction [Pa]
   double friction = 0.3;        ///< Coulomb friction against tissue [-], 0 to 2
+};
+
+/// Where a tool shall be at the end of a frame.
+struct ToolRequest {
+  Pose pose;       ///< world frame
+  double jaw = 0;  ///< between the jaws [rad]; below 0 squeezes with more: see tools/grip.h
+  /// It does not move there from where it was: it is placed, and comes into tissue along its shaft
+  /// from where it is free. A first pose that is not placed stands there at once.
+  bool placed = false;
+  /// What a grasper's jaws press with at most from this frame on, if given [Pa], 1 to 1e7; 0 for
+  /// the scene's Tool::grip_pressure.
+  std::optional<double> grip_pressure;
 };
 
 /// Motion of one tool over one frame: position and jaw linear, orientation slerp between the two.

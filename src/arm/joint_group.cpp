@@ -7,7 +7,7 @@
 namespace tissue_sim {
 namespace {
 
-constexpr double kFollow = 2;  // measured follows the setpoint so many times as fast as moves are
+constexpr double kFollow = 4;  // measured follows the setpoint so many times as fast as moves are
 
 // Share of the way at `time`, and its rate.
 double share(const JointMove& move, double time, double* rate) {

@@ -10,7 +10,7 @@
 #include "tissue_sim/tissue.h"
 #include "tissue_sim/tool.h"
 #include "tools/collider.h"
-#include "tools/grip.h"
+#include "tools/instrument.h"
 
 namespace tissue_sim {
 
@@ -37,6 +37,12 @@ void fields(Archive& archive, ColliderLoad& l) {
 template <class Archive>
 void fields(Archive& archive, Grip& g) {
   archive(g.pressed_, g.stiffness_);
+}
+
+template <class Archive>
+void fields(Archive& archive, Instrument& i) {
+  archive(i.asked_.pose, i.asked_.jaw, i.asked_.placed, i.is_asked_, i.way_in_, i.grip_pressure_,
+          i.grip_);
 }
 
 template <class Archive>

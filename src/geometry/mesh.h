@@ -52,10 +52,16 @@ double signed_volume(const TriangleMesh& mesh);
 /// or above 2 m, where another unit makes it one; else "".
 std::string scale_hint(double size, double scale);
 
-/// The solid of a mesh body in world axes: resolved, read, scaled, checked, repaired, posed. Throws
-/// std::invalid_argument, also for a size (longest edge of the bounding box) below 1 mm or above
-/// 10 m. `look`, if given, sees the posed mesh before checks and repairs, which take long: it may
-/// throw.
+/// Of the vertices of a body's file: notes a size that no organ has, and a place far from the
+/// world's origin that comes from the file's own. Throws std::invalid_argument, `what` in front,
+/// for a size (longest edge of the bounding box) below 1 mm or above 10 m.
+void check_size(const std::string& what, const std::vector<Vec3>& vertices, const Body& body,
+                std::vector<std::string>& notes);
+
+/// The solid of a mesh body in world axes: resolved, read, scaled, checked, repaired, posed; of
+/// tetrahedra what their surface encloses. Throws std::invalid_argument, what check_size() throws
+/// as well. `look`, if given, sees the posed mesh before checks and repairs, which take long: it
+/// may throw.
 TriangleMesh load_solid(const Body& body, std::vector<std::string>* notes,
                         const std::function<void(const TriangleMesh&)>& look = {});
 

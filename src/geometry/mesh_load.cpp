@@ -3,7 +3,7 @@
 #include <filesystem>
 #include <stdexcept>
 
-#include "geometry/mesh.h"
+#include "geometry/tet_mesh.h"
 #include "scene/scene_text.h"
 
 namespace tissue_sim {
@@ -31,21 +31,39 @@ double plausible_scale(double length) {
   return best;
 }
 
-void check_size(const std::string& what, double length, double scale) {
-  const double size = length * scale;
-  if (size >= 1e-3 && size <= 10) return;
-  const std::string hint = scale_hint(size, scale);
-  throw std::invalid_argument(what + " is " + rough(size) + " m long at scale " + text(scale) +
-                              " (a body must be between 1 mm and 10 m): " +
-                              (hint.empty() ? "set scale, in m per unit" : hint));
-}
-
 }  // namespace
 
 std::string scale_hint(double size, double scale) {
   if (size >= kSmallestOrgan && size <= kLargestOrgan) return "";
   const double better = plausible_scale(size / scale);
   return better > 0 && better != scale ? "did you forget scale: " + text(better) + "?" : "";
+}
+
+void check_size(const std::string& what, const std::vector<Vec3>& vertices, const Body& body,
+                std::vector<std::string>& notes) {
+  Box box;
+  for (const Vec3& v : vertices) {
+    box.min = box.min.cwiseMin(v);
+    box.max = box.max.cwiseMax(v);
+  }
+  const double size = body.scale * (box.max - box.min).maxCoeff();
+  const std::string hint = scale_hint(size, body.scale);
+  const std::string length = rough(size) + " m long at scale " + text(body.scale);
+  if (!(size >= 1e-3 && size <= 10)) {
+    throw std::invalid_argument(what + " is " + length +
+                                " (a body must be between 1 mm and 10 m): " +
+                                (hint.empty() ? "set scale, in m per unit" : hint));
+  }
+  if (!hint.empty()) notes.push_back("is " + length + ": " + hint);
+  constexpr double kFar = 3;  // sizes
+  const Vec3 middle = body.scale * (box.min + box.max) / 2,
+             at = body.pose.position + body.pose.orientation.normalized() * middle;
+  if (middle.norm() < kFar * size || at.norm() < kFar * size) return;
+  const Vec3 centring = body.pose.position - at;
+  notes.push_back(
+      "lies " + rough(at.norm()) + " m from the world's origin, " + rough(at.norm() / size) +
+      " times its size, for it is as far from its file's: position [" + rough(centring.x()) + ", " +
+      rough(centring.y()) + ", " + rough(centring.z()) + "] would centre it there");
 }
 
 TriangleMesh load_solid(const Body& body, std::vector<std::string>* notes,
@@ -62,22 +80,21 @@ TriangleMesh load_solid(const Body& body, std::vector<std::string>* notes,
                                   " is looked for in the folder that this program runs in): give "
                                   "the full path");
     }
-    TriangleMesh mesh = read_mesh(path);
-    Box box;
-    for (const Vec3& v : mesh.vertices) {
-      box.min = box.min.cwiseMin(v);
-      box.max = box.max.cwiseMax(v);
+    std::vector<std::string> found;
+    TriangleMesh mesh;
+    if (is_tet_file(path)) {
+      const TetMesh tets = load_tet_file(path, notes != nullptr ? &found : nullptr);
+      mesh = {tets.vertices, boundary(tets)};
+      drop_unused_vertices(mesh);
+      found.push_back("has " + std::to_string(tets.tetrahedra.size()) +
+                      " tetrahedra, and what their surface encloses is filled");
+    } else {
+      mesh = read_mesh(path);
     }
-    const double length = (box.max - box.min).maxCoeff();
-    check_size(what, length, body.scale);
+    check_size(what, mesh.vertices, body, found);
     const Eigen::Matrix3d rotation = body.pose.orientation.normalized().toRotationMatrix();
     for (Vec3& v : mesh.vertices) v = rotation * (body.scale * v) + body.pose.position;
     if (look) look(mesh);
-    std::vector<std::string> found;
-    if (const std::string hint = scale_hint(length * body.scale, body.scale); !hint.empty()) {
-      found.push_back("is " + rough(length * body.scale) + " m long at scale " + text(body.scale) +
-                      ": " + hint);
-    }
     try {
       make_solid(mesh, found);
     } catch (const std::invalid_argument& e) {

@@ -31,7 +31,7 @@ std::string shown(const char* variable) {
 std::string package_name(const fs::path& folder) {
   std::string xml;
   try {
-    xml = read_file((folder / "package.xml").string(), kLargestScene);
+    xml = read_file((folder / "package.xml").string(), kLargestScene, ReadFrom::kAnywhere);
   } catch (const std::invalid_argument&) {
     return "";
   }

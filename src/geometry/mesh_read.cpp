@@ -130,7 +130,9 @@ TriangleMesh read_mesh(const std::string& path) {
     const std::string bytes = read_file(path, kLargestMesh);
     const Read read = reader_of(extension_of(path));
     if (read == nullptr) {
-      throw std::invalid_argument("is of no known format: give an STL, OBJ, PLY or OFF file");
+      throw std::invalid_argument(
+          "is of no known format: give a surface as STL, OBJ, PLY or OFF, or tetrahedra as .msh, "
+          ".vtk, .vtu, .mesh, or .node and .ele");
     }
     if (bytes.empty()) throw std::invalid_argument("is empty: export it again");
     mesh = read(bytes);

@@ -1,12 +1,10 @@
 #include "geometry/ply.h"
 
 #include <algorithm>
-#include <cstdint>
 #include <stdexcept>
 #include <vector>
 
-#include "geometry/byte_order.h"
-#include "geometry/mesh_words.h"
+#include "geometry/mesh_numbers.h"
 #include "geometry/polygon.h"
 #include "tissue_sim/limits.h"
 
@@ -14,26 +12,13 @@ namespace tissue_sim {
 namespace ply_file {
 namespace {
 
-enum class Type { kNone, kInt8, kUint8, kInt16, kUint16, kInt32, kUint32, kFloat, kDouble };
-
-struct TypeName {
-  const char* name;
-  Type type;
-};
-constexpr TypeName kTypes[] = {
-    {"char", Type::kInt8},     {"int8", Type::kInt8},     {"uchar", Type::kUint8},
-    {"uint8", Type::kUint8},   {"short", Type::kInt16},   {"int16", Type::kInt16},
-    {"ushort", Type::kUint16}, {"uint16", Type::kUint16}, {"int", Type::kInt32},
-    {"int32", Type::kInt32},   {"uint", Type::kUint32},   {"uint32", Type::kUint32},
-    {"float", Type::kFloat},   {"float32", Type::kFloat}, {"double", Type::kDouble},
-    {"float64", Type::kDouble}};
+using Type = NumberType;
 
 [[noreturn]] void refuse_file(const std::string& why) { throw std::invalid_argument(why); }
 
 Type type_of(const std::string& name) {
-  for (const TypeName& t : kTypes) {
-    if (name == t.name) return t.type;
-  }
+  const Type type = number_type(name);
+  if (type != Type::kNone) return type;
   refuse_file("is a PLY file with a property of an unknown type: export it again");
 }
 
@@ -56,10 +41,8 @@ struct Element {
   }
 };
 
-enum class Format { kNone, kText, kLittleEndian, kBigEndian };
-
 struct Header {
-  Format format = Format::kNone;
+  NumberFormat format = NumberFormat::kText;
   std::vector<Element> elements;
   std::size_t end = 0;  ///< where the data begins [bytes]
 };
@@ -68,14 +51,16 @@ Header read_header(const std::string& bytes) {
   Header header;
   MeshWords words(bytes, 3);
   std::string word, type;
+  bool known_format = false;
   for (bool ended = false; !ended;) {
     if (!words.next(word)) refuse_file("ends within its header: export or copy it again");
     if (word == "format") {
       words.next_in_line(word);
-      header.format = word == "ascii"                  ? Format::kText
-                      : word == "binary_little_endian" ? Format::kLittleEndian
-                      : word == "binary_big_endian"    ? Format::kBigEndian
-                                                       : Format::kNone;
+      known_format =
+          word == "ascii" || word == "binary_little_endian" || word == "binary_big_endian";
+      header.format = word == "ascii"               ? NumberFormat::kText
+                      : word == "binary_big_endian" ? NumberFormat::kBigEndian
+                                                    : NumberFormat::kLittleEndian;
     } else if (word == "element") {
       Element e;
       if (!words.next_in_line(e.name) || !words.next_in_line(e.count) || !(e.count >= 0)) {
@@ -102,67 +87,9 @@ Header read_header(const std::string& bytes) {
   // One end of line, of one character or two; what follows may begin with any.
   if (header.end < bytes.size() && bytes[header.end] == '\r') ++header.end;
   if (header.end < bytes.size() && bytes[header.end] == '\n') ++header.end;
-  if (header.format == Format::kNone)
-    refuse_file("is a PLY file of an unknown format: export it again");
+  if (!known_format) refuse_file("is a PLY file of an unknown format: export it again");
   return header;
 }
-
-/// The numbers behind the header, one after the other.
-class Numbers {
- public:
-  Numbers(const std::string& bytes, const Header& header)
-      : bytes_(bytes),
-        at_(header.end),
-        words_(bytes, header.end),
-        is_text_(header.format == Format::kText),
-        big_endian_(header.format == Format::kBigEndian) {}
-
-  double next(Type type) {
-    if (is_text_) {
-      double value = 0;
-      if (!words_.next(value)) ended();
-      return value;
-    }
-    switch (type) {
-      case Type::kInt8:
-        return take<std::int8_t>();
-      case Type::kUint8:
-        return take<std::uint8_t>();
-      case Type::kInt16:
-        return take<std::int16_t>();
-      case Type::kUint16:
-        return take<std::uint16_t>();
-      case Type::kInt32:
-        return take<std::int32_t>();
-      case Type::kUint32:
-        return take<std::uint32_t>();
-      case Type::kFloat:
-        return take<float>();
-      case Type::kDouble:
-        return take<double>();
-      case Type::kNone:
-        break;
-    }
-    ended();
-  }
-
- private:
-  template <class T>
-  double take() {
-    if (bytes_.size() - at_ < sizeof(T)) ended();
-    const T value = number_at<T>(&bytes_[at_], big_endian_);
-    at_ += sizeof(T);
-    return static_cast<double>(value);
-  }
-  [[noreturn]] void ended() {
-    refuse_file("ends, or has no number, within its elements: export or copy it again");
-  }
-
-  const std::string& bytes_;
-  std::size_t at_;
-  MeshWords words_;
-  bool is_text_, big_endian_;
-};
 
 }  // namespace
 }  // namespace ply_file
@@ -176,7 +103,8 @@ TriangleMesh read_ply(const std::string& bytes) {
   TriangleMesh mesh;
   std::vector<double> corners, corners_of_all;  // faces may come before vertices
   std::vector<std::size_t> ends;
-  Numbers numbers(bytes, header);
+  MeshNumbers numbers(bytes, header.end, header.format);
+  constexpr const char* kWhat = "a number of its elements";
   for (const Element& element : header.elements) {
     const bool is_vertex = element.name == "vertex", is_face = element.name == "face";
     const int place[3] = {element.find("x"), element.find("y"), element.find("z")};
@@ -194,16 +122,16 @@ TriangleMesh read_ply(const std::string& bytes) {
       for (std::size_t p = 0; p < element.properties.size(); ++p) {
         const Property& property = element.properties[p];
         if (property.count == Type::kNone) {
-          const double value = numbers.next(property.type);
+          const double value = numbers.next(property.type, kWhat);
           for (int a = 0; a < 3; ++a) {
             if (place[a] == static_cast<int>(p)) x[a] = value;
           }
           continue;
         }
-        const double count = numbers.next(property.count);
+        const double count = numbers.next(property.count, kWhat);
         const bool is_corners = is_face && static_cast<int>(p) == list;
         for (double k = 0; k < count; ++k) {
-          const double corner = numbers.next(property.type);
+          const double corner = numbers.next(property.type, kWhat);
           if (is_corners) corners_of_all.push_back(corner);
         }
       }

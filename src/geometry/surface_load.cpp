@@ -6,7 +6,7 @@
 #include <stdexcept>
 
 #include "geometry/surface.h"
-#include "scene/scene_text.h"
+#include "geometry/tet_mesh.h"
 
 namespace tissue_sim {
 namespace {
@@ -185,19 +185,15 @@ TriangleMesh load_surface(const Body& body, SurfaceKind& kind, std::vector<std::
   try {
     const std::string path = std::filesystem::absolute(resolve_path(body.mesh, "mesh")).string();
     what = "mesh " + path;
+    if (is_tet_file(path)) {
+      throw std::invalid_argument(what +
+                                  " is of a volume, which method pbd takes with model: tetrahedra, "
+                                  "mls as nodes, and mpm by its surface: set one of them, or give "
+                                  "an STL, OBJ, PLY or OFF file");
+    }
     TriangleMesh mesh = read_mesh(path);
-    Box box;
-    for (const Vec3& v : mesh.vertices) {
-      box.min = box.min.cwiseMin(v);
-      box.max = box.max.cwiseMax(v);
-    }
-    const double size = body.scale * (box.max - box.min).maxCoeff();
-    if (!(size >= 1e-3 && size <= 10)) {
-      throw std::invalid_argument(
-          what + " is " + text(size) + " m long at scale " + text(body.scale) +
-          " (a body must be between 1 mm and 10 m): set scale, in m per unit");
-    }
     std::vector<std::string> found;
+    check_size(what, mesh.vertices, body, found);
     try {
       kind = tidy_surface(mesh, found);
     } catch (const std::invalid_argument& e) {

@@ -2,13 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <filesystem>
 #include <map>
 #include <stdexcept>
-
-#include "geometry/mesh_parts.h"
-#include "geometry/surface.h"
-#include "scene/scene_text.h"
 
 namespace tissue_sim {
 namespace {
@@ -119,64 +114,6 @@ std::vector<std::array<int, 3>> boundary(const TetMesh& mesh) {
     if (of.second == 1) triangles.push_back(of.first);
   }
   return triangles;
-}
-
-TetMesh load_tets(const Body& body, double edge, std::vector<std::string>* notes) {
-  TetMesh mesh;
-  const bool is_file = body.shape == Shape::kMesh && is_tet_file(body.mesh);
-  if (body.shape == Shape::kBox) {
-    mesh = tetrahedralize_box(body.size, edge);
-  } else if (!is_file) {
-    const TriangleMesh surface =
-        body.shape == Shape::kMesh ? load_solid(body, notes) : triangulate(body, 0.5 * edge);
-    try {
-      TetMesh all;
-      for (const TriangleMesh& solid : separate_solids(surface)) {
-        const TetMesh mesh = stuff_surface(solid, edge);
-        const auto first = static_cast<int>(all.vertices.size());
-        all.vertices.insert(all.vertices.end(), mesh.vertices.begin(), mesh.vertices.end());
-        for (std::array<int, 4> t : mesh.tetrahedra) {
-          for (int& v : t) v += first;
-          all.tetrahedra.push_back(t);
-        }
-      }
-      return all;
-    } catch (const std::invalid_argument& e) {
-      throw std::invalid_argument("body '" + body.name + "': " + e.what());
-    }
-  } else {
-    const std::string prefix = "body '" + body.name + "': ";
-    try {
-      const std::string path = std::filesystem::absolute(resolve_path(body.mesh, "mesh")).string();
-      mesh = read_tets(path);
-      std::vector<std::string> found;
-      try {
-        check_tets(mesh, found);
-      } catch (const std::invalid_argument& e) {
-        throw std::invalid_argument("mesh " + path + " " + e.what());
-      }
-      for (const std::string& note : found) {
-        if (notes != nullptr) notes->push_back(prefix + "mesh " + path + " " + note);
-      }
-      Box box;
-      for (Vec3& x : mesh.vertices) {
-        x *= body.scale;
-        box.min = box.min.cwiseMin(x);
-        box.max = box.max.cwiseMax(x);
-      }
-      const double size = (box.max - box.min).maxCoeff();
-      if (!(size >= 1e-3 && size <= 10)) {
-        throw std::invalid_argument("mesh " + path + " is " + text(size) + " m long at scale " +
-                                    text(body.scale) +
-                                    " (a body must be between 1 mm and 10 m): set scale");
-      }
-    } catch (const std::invalid_argument& e) {
-      throw std::invalid_argument(prefix + e.what());
-    }
-  }
-  const Eigen::Matrix3d rotation = body.pose.orientation.normalized().toRotationMatrix();
-  for (Vec3& x : mesh.vertices) x = rotation * x + body.pose.position;
-  return mesh;
 }
 
 }  // namespace tissue_sim

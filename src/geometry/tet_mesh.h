@@ -14,14 +14,14 @@ struct TetMesh {
   std::vector<std::array<int, 4>> tetrahedra;  ///< positive: (b - a) x (c - a) . (d - a) > 0
 };
 
-/// Whether a path's extension is that of a tetrahedral mesh: .node, .ele, .mesh or .vtk.
+/// Whether a path's extension is that of a volume mesh: .msh, .vtk, .vtu, .mesh, .node or .ele.
 bool is_tet_file(const std::string& path);
 
-/// Reads TetGen's .node and .ele (either names both), Medit's .mesh or a legacy .vtk of an
-/// unstructured grid, in ASCII; other elements than tetrahedra are left out. Throws
-/// std::invalid_argument for what is missing, unreadable, or has indices or coordinates that cannot
-/// be.
-TetMesh read_tets(const std::string& path);
+/// Reads Gmsh's .msh (2 and 4.1), a legacy .vtk or a .vtu of an unstructured grid, each as text or
+/// binary, Medit's .mesh or TetGen's .node and .ele (either names both) as text. Hexahedra become
+/// six tetrahedra each, other cells are left out, and a note says so. Throws std::invalid_argument
+/// for what is missing, unreadable, or has indices or coordinates that cannot be.
+TetMesh read_tets(const std::string& path, std::vector<std::string>* notes = nullptr);
 
 /// Turns inverted tetrahedra around and drops vertices that none has; notes say which, by their
 /// number in the file (from 0). Throws std::invalid_argument for flat ones, by number: six times
@@ -44,6 +44,11 @@ TetMesh tetrahedralize_box(const Vec3& size, double edge);
 /// Labelle and Shewchuk 2007). Edges and corners of the surface are rounded by less than an edge.
 /// Throws std::invalid_argument where nothing lies inside.
 TetMesh stuff_surface(const TriangleMesh& surface, double edge);
+
+/// The tetrahedra of a file as they stand in it: read and checked, those given twice left out; with
+/// notes, faces that neighbours do not share as they should are looked for. Throws
+/// std::invalid_argument.
+TetMesh load_tet_file(const std::string& path, std::vector<std::string>* notes);
 
 /// The tetrahedra of a body in world axes: those of its file if that has any, else made from its
 /// surface. Throws std::invalid_argument.

@@ -1,13 +1,11 @@
-#include <algorithm>
+#include <array>
 #include <cctype>
 #include <filesystem>
-#include <locale>
-#include <sstream>
 #include <stdexcept>
 
-#include "geometry/tet_mesh.h"
+#include "geometry/mesh_numbers.h"
+#include "geometry/volume_cells.h"
 #include "scene/read_file.h"
-#include "tissue_sim/limits.h"
 
 namespace tissue_sim {
 namespace {
@@ -22,189 +20,160 @@ std::string extension_of(const std::string& path) {
   return e;
 }
 
-/// The words of a file, one after the other, without comments.
-class TetWords {
+std::string file_bytes(const std::string& path) {
+  const std::string bytes = read_file(path, kLargestMesh);
+  if (bytes.empty()) throw std::invalid_argument("is empty: export it again");
+  return bytes;
+}
+
+std::string without_comments(std::string text) {
+  bool within = false;
+  for (char& c : text) {
+    within = c != '\n' && (within || c == '#');
+    if (within) c = ' ';
+  }
+  return text;
+}
+
+/// The numbers of a text file, all of which are written out.
+class TextNumbers : public MeshNumbers {
  public:
-  explicit TetWords(const std::string& path) : path_(path) {
-    std::string all;
-    try {
-      all = read_file(path, kLargestMesh);
-    } catch (const std::invalid_argument& e) {
-      refuse(path, e.what());
-    }
-    if (all.empty()) refuse(path, "is empty: export it again");
-    std::istringstream lines(all);
-    std::ostringstream kept;
-    for (std::string line; std::getline(lines, line);) {
-      kept << line.substr(0, line.find('#')) << '\n';
-    }
-    in_.str(kept.str());
-    in_.imbue(std::locale::classic());
-  }
-  bool word(std::string& w) { return static_cast<bool>(in_ >> w); }
-  double number(const char* what) {
-    double v = 0;
-    if (++read_ % 4096 == 0) stop_if_asked();
-    if (!(in_ >> v))
-      refuse(path_, std::string("ends, or has no number, where ") + what + " should be");
-    return v;
-  }
-  int count(const char* what) {
-    const double v = number(what);
-    if (!(v >= 0 && v < 1e8) || v != static_cast<int>(v)) {
-      refuse(path_, "has no valid " + std::string(what));
-    }
-    return static_cast<int>(v);
-  }
-  void skip(int n, const char* what) {
+  explicit TextNumbers(const std::string& text) : MeshNumbers(text, 0, NumberFormat::kText) {}
+  double number(const char* what) { return next(NumberType::kNone, what); }
+  int count(const char* what) { return whole(NumberType::kNone, what); }
+  void skip_numbers(int n, const char* what) {
     for (int i = 0; i < n; ++i) number(what);
   }
-  void skip_line() {
-    std::string rest;
-    std::getline(in_, rest);
+  Vec3 place_in_space() {
+    Vec3 x;
+    for (double& c : x) c = number("a coordinate");
+    return x;
   }
-
- private:
-  std::string path_;
-  std::istringstream in_;
-  unsigned read_ = 0;
 };
 
-TetMesh read_tetgen(const std::string& path) {
+VolumeCells read_tetgen(const std::string& path) {
   std::filesystem::path stem = path;
-  stem.replace_extension();
-  TetMesh mesh;
-  TetWords nodes(stem.string() + ".node");
+  const std::string extension = extension_of(path);
+  // Of the pair the file that is not the one named is named by what is wrong with it.
+  const auto text_of = [&](const char* of) {
+    stem.replace_extension(of);
+    try {
+      return without_comments(file_bytes(stem.string()));
+    } catch (const std::invalid_argument& e) {
+      if (extension == of) throw;
+      throw std::invalid_argument("needs " + stem.string() + ", which " + e.what());
+    }
+  };
+  VolumeCells cells;
+  const std::string node_text = text_of(".node");
+  TextNumbers nodes(node_text);
   const int n = nodes.count("the number of vertices");
   const int dimension = nodes.count("the dimension");
-  if (dimension != 3)
-    refuse(path, "has vertices of " + std::to_string(dimension) + " coordinates: 3 are needed");
-  const int more = nodes.count("the number of attributes") + nodes.count("the number of markers");
+  if (dimension != 3) {
+    nodes.refuse("has vertices of " + std::to_string(dimension) + " coordinates: 3 are needed", 0);
+  }
+  const int attributes = nodes.count("the number of attributes");
+  const int markers = nodes.count("the number of markers");
   int first = 0;
   for (int i = 0; i < n; ++i) {
     const int index = nodes.count("a vertex's number");
     if (i == 0) first = index;
-    Vec3 x;
-    for (int a = 0; a < 3; ++a) x[a] = nodes.number("a coordinate");
-    nodes.skip(more, "a vertex's attribute");
-    mesh.vertices.push_back(x);
+    cells.mesh.vertices.push_back(nodes.place_in_space());
+    nodes.skip_numbers(attributes, "a vertex's attribute");
+    nodes.skip_numbers(markers, "a vertex's marker");
   }
-  TetWords elements(stem.string() + ".ele");
+  const std::string element_text = text_of(".ele");
+  TextNumbers elements(element_text);
   const int m = elements.count("the number of tetrahedra");
   const int corners = elements.count("the number of corners");
-  const int attributes = elements.count("the number of attributes");
-  if (corners != 4 && corners != 10) refuse(path, "has elements that are no tetrahedra");
+  const int regions = elements.count("the number of attributes");
+  if (corners != 4 && corners != 10) elements.refuse("has elements that are no tetrahedra", 0);
   for (int i = 0; i < m; ++i) {
     elements.count("a tetrahedron's number");
     std::array<int, 4> t;
     for (int& v : t) v = elements.count("a vertex's number") - first;
-    elements.skip(corners - 4 + attributes, "an attribute");
-    mesh.tetrahedra.push_back(t);
+    elements.skip_numbers(corners - 4, "a vertex's number");
+    elements.skip_numbers(regions, "an attribute");
+    cells.add(CellKind::kTetrahedron, t.data(), 4);
   }
-  return mesh;
+  return cells;
 }
 
-TetMesh read_medit(const std::string& path) {
-  TetWords in(path);
-  TetMesh mesh;
+VolumeCells read_medit(const std::string& bytes) {
+  const std::string text = without_comments(bytes);
+  TextNumbers in(text);
+  VolumeCells cells;
+  const struct {
+    const char* name;
+    CellKind kind;
+    int corners;
+  } kinds[] = {{"edges", CellKind::kLine, 2},
+               {"triangles", CellKind::kTriangle, 3},
+               {"quadrilaterals", CellKind::kQuadrilateral, 4},
+               {"tetrahedra", CellKind::kTetrahedron, 4},
+               {"hexahedra", CellKind::kHexahedron, 8},
+               {"prisms", CellKind::kWedge, 6},
+               {"pyramids", CellKind::kPyramid, 5}};
   int dimension = 3;
-  for (std::string word; in.word(word);) {
-    if (word == "MeshVersionFormatted") {
+  for (std::string word; in.word(word) && word != "end";) {
+    if (word == "meshversionformatted") {
       in.count("the version");
-    } else if (word == "Dimension") {
+    } else if (word == "dimension") {
       dimension = in.count("the dimension");
-    } else if (word == "Vertices") {
-      if (dimension != 3) refuse(path, "is not three-dimensional");
+    } else if (word == "vertices") {
+      if (dimension != 3) in.refuse("is not three-dimensional", in.place());
       const int n = in.count("the number of vertices");
       for (int i = 0; i < n; ++i) {
-        Vec3 x;
-        for (int a = 0; a < 3; ++a) x[a] = in.number("a coordinate");
+        cells.mesh.vertices.push_back(in.place_in_space());
         in.number("a vertex's mark");
-        mesh.vertices.push_back(x);
       }
-    } else if (word == "Tetrahedra") {
-      const int n = in.count("the number of tetrahedra");
+    }
+    for (const auto& of : kinds) {  // what else there is are numbers of others, and their names
+      if (word != of.name) continue;
+      const int n = in.count("the number of cells");
       for (int i = 0; i < n; ++i) {
-        std::array<int, 4> t;
-        for (int& v : t) v = in.count("a vertex's number") - 1;
-        in.number("a tetrahedron's mark");
-        mesh.tetrahedra.push_back(t);
+        std::array<int, 8> c{};
+        for (int k = 0; k < of.corners; ++k) c[k] = in.count("a vertex's number") - 1;
+        in.number("a cell's mark");
+        cells.add(of.kind, c.data(), of.corners);
       }
-    } else if (word == "End") {
-      break;
-    }  // what else there is are numbers of other elements, and their names
+    }
   }
-  return mesh;
+  return cells;
 }
 
-TetMesh read_vtk(const std::string& path) {
-  TetWords in(path);
-  TetMesh mesh;
-  std::vector<int> offsets, corners, types;
-  bool listed = false;  // with a count before each cell, as in versions before 5
-  for (std::string word; in.word(word);) {
-    if (word == "BINARY") refuse(path, "is binary: save it as ASCII");
-    if (word == "POINTS") {
-      const int n = in.count("the number of points");
-      in.word(word);
-      for (int i = 0; i < n; ++i) {
-        Vec3 x;
-        for (int a = 0; a < 3; ++a) x[a] = in.number("a coordinate");
-        mesh.vertices.push_back(x);
-      }
-    } else if (word == "CELLS") {
-      const int n = in.count("the number of cells"), size = in.count("the size of the cells");
-      std::string next;
-      if (!in.word(next)) refuse(path, "ends within its cells");
-      if (next == "OFFSETS") {
-        in.word(next);
-        for (int i = 0; i < n; ++i) offsets.push_back(in.count("an offset"));
-        in.word(next);
-        in.word(next);
-        for (int i = 0; i < size; ++i) corners.push_back(in.count("a vertex's number"));
-      } else {
-        listed = true;
-        double first = 0;
-        std::istringstream(next) >> first;
-        if (!(first >= 0 && first < 1e8)) refuse(path, "has no valid size of a cell");
-        int k = static_cast<int>(first);
-        for (int i = 0; i < n; ++i) {
-          if (i > 0) k = in.count("a cell's size");
-          offsets.push_back(static_cast<int>(corners.size()));
-          for (int j = 0; j < k; ++j) corners.push_back(in.count("a vertex's number"));
-        }
-        offsets.push_back(static_cast<int>(corners.size()));
-      }
-    } else if (word == "CELL_TYPES") {
-      const int n = in.count("the number of cells");
-      for (int i = 0; i < n; ++i) types.push_back(in.count("a cell's type"));
-    }
-  }
-  (void)listed;
-  for (std::size_t i = 0; i < types.size() && i + 1 < offsets.size(); ++i) {
-    constexpr int kTetrahedron = 10;
-    if (types[i] != kTetrahedron || offsets[i + 1] - offsets[i] != 4) continue;
-    if (offsets[i + 1] > static_cast<int>(corners.size())) {
-      refuse(path, "has a cell beyond its list of vertices: export it again");
-    }
-    std::array<int, 4> t;
-    std::copy_n(corners.begin() + offsets[i], 4, t.begin());
-    mesh.tetrahedra.push_back(t);
-  }
-  return mesh;
+using ReadCells = VolumeCells (*)(const std::string& bytes);
+
+/// What reads files of that extension; nullptr for TetGen's, which are two.
+ReadCells cell_reader_of(const std::string& extension) {
+  return extension == ".mesh"  ? read_medit
+         : extension == ".vtk" ? read_vtk
+         : extension == ".vtu" ? read_vtu
+         : extension == ".msh" ? read_gmsh
+                               : nullptr;
 }
 
 }  // namespace
 
 bool is_tet_file(const std::string& path) {
   const std::string e = extension_of(path);
-  return e == ".node" || e == ".ele" || e == ".mesh" || e == ".vtk";
+  return cell_reader_of(e) != nullptr || e == ".node" || e == ".ele";
 }
 
-TetMesh read_tets(const std::string& path) {
-  const std::string e = extension_of(path);
-  TetMesh mesh = e == ".mesh" ? read_medit(path) : e == ".vtk" ? read_vtk(path) : read_tetgen(path);
-  if (mesh.tetrahedra.empty()) refuse(path, "has no tetrahedra: export a volume mesh");
+TetMesh read_tets(const std::string& path, std::vector<std::string>* notes) {
+  VolumeCells cells;
+  try {
+    const ReadCells read = cell_reader_of(extension_of(path));
+    cells = read != nullptr ? read(file_bytes(path)) : read_tetgen(path);
+  } catch (const std::invalid_argument& e) {
+    refuse(path, e.what());
+  }
+  TetMesh& mesh = cells.mesh;
+  if (mesh.tetrahedra.empty()) {
+    const std::string note = cells.note();
+    refuse(path, (note.empty() ? "has no tetrahedra" : note) +
+                     ": export a volume mesh, or a surface as STL, OBJ, PLY or OFF");
+  }
   for (std::size_t v = 0; v < mesh.vertices.size(); ++v) {
     if (mesh.vertices[v].allFinite()) continue;
     refuse(path,
@@ -218,7 +187,9 @@ TetMesh read_tets(const std::string& path) {
                        " that is not there: there are " + std::to_string(n));
     }
   }
-  return mesh;
+  const std::string note = cells.note();
+  if (notes != nullptr && !note.empty()) notes->push_back(note);
+  return std::move(mesh);
 }
 
 }  // namespace tissue_sim

@@ -22,7 +22,7 @@ double support_factor(int neighbours) {
   return neighbours <= 32 ? 1.5 + 0.05 * (neighbours - 18) : 2.2 * std::cbrt(neighbours / 32.0);
 }
 
-MlsPairs make_pairs(const MlsNodes& nodes, int neighbours, Cpu& cpu, MlsBasis basis) {
+MlsPairs make_pairs(const MlsNodes& nodes, int neighbours, Cpu& cpu) {
   const std::int32_t n = nodes.count();
   MlsPairs pairs;
   pairs.support.resize(n);
@@ -86,8 +86,8 @@ MlsPairs make_pairs(const MlsNodes& nodes, int neighbours, Cpu& cpu, MlsBasis ba
                                     " are at one place: each needs its own");
       }
       const double volumes = static_cast<double>(nodes.volume[i]) * nodes.volume[j];
-      const double share = basis == MlsBasis::kLinear ? volumes : std::sqrt(std::sqrt(volumes));
-      weight[e] = share * std::pow(h * h - r2, 3) / std::pow(h, 9);  // 315 / 64 pi cancels
+      weight[e] = std::sqrt(std::sqrt(volumes)) * std::pow(h * h - r2, 3) /
+                  std::pow(h, 9);  // 315 / 64 pi cancels
       sum += weight[e];
     }
   }

@@ -41,11 +41,10 @@ double support_factor(int neighbours);
 
 /// Pairs nodes of one body that are nearer than the mean of their supports, and that no gap parts.
 /// The weight is the kernel (h^2 - r^2)^3 / h^9 of Aras, Shen, Audette 2014, eq. 11, of that mean:
-/// symmetric, so that forces are. With the paper's basis times both volumes, else times their
-/// fourth root: a node reads its strain where the middle of its support is, and of graded nodes
-/// large shares draw that inward. Throws std::invalid_argument for nodes at one place.
-MlsPairs make_pairs(const MlsNodes& nodes, int neighbours, Cpu& cpu,
-                    MlsBasis basis = MlsBasis::kBalanced);
+/// symmetric, so that forces are. Times the fourth root of both volumes, not by whole ones: a node
+/// reads its strain where the middle of its support is, and of graded nodes large shares draw that
+/// inward. Throws std::invalid_argument for nodes at one place.
+MlsPairs make_pairs(const MlsNodes& nodes, int neighbours, Cpu& cpu);
 
 /// Changes the weights as little as needed (each in proportion to itself) for uniform stress to
 /// leave all nodes but those at the surface in balance:

@@ -17,14 +17,13 @@ namespace tissue_sim {
 namespace {
 
 constexpr int kSamples = 3;      // along each axis, within a spacing
-constexpr double kJitter = 0.2;  // of the spacing, along each axis
 constexpr double kGrowth = 0.3;  // of the spacing of graded nodes, for each one from the surface
 constexpr double kApart = 0.9;   // least distance of graded nodes at first, in spacings
 constexpr int kLloydSteps = 8;
 
 /// A number in [0, 1) that hangs on nothing but the arguments (splitmix64).
-double draw(std::uint64_t seed, std::uint64_t index, std::uint64_t which) {
-  std::uint64_t z = seed + 0x9e3779b97f4a7c15u * (3 * index + which + 1);
+double draw(std::uint64_t seed, std::uint64_t index) {
+  std::uint64_t z = seed + 0x9e3779b97f4a7c15u * (3 * index + 1);
   z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9u;
   z = (z ^ (z >> 27)) * 0x94d049bb133111ebu;
   return static_cast<double>((z ^ (z >> 31)) >> 11) * 0x1p-53;
@@ -32,9 +31,9 @@ double draw(std::uint64_t seed, std::uint64_t index, std::uint64_t which) {
 
 /// The body in small cubes.
 std::vector<PlacedNode> cubes_of(const Body& body, double edge, std::vector<std::string>* notes,
-                                 NearGaps* gaps) {
+                                 NearGaps& gaps) {
   const Lattice lattice = make_lattice(body, 2 * edge, notes);
-  if (gaps != nullptr) *gaps = NearGaps(lattice);
+  gaps = NearGaps(lattice);
   double scale = 1;
   if (body.shape != Shape::kMesh) {
     double sum = 0;
@@ -116,7 +115,7 @@ std::vector<PlacedNode> scatter(const std::vector<PlacedNode>& cubes,
   std::vector<std::int32_t> order(cubes.size());
   std::iota(order.begin(), order.end(), 0);
   std::sort(order.begin(), order.end(), [&](std::int32_t a, std::int32_t b) {
-    return std::make_pair(draw(seed, a, 0), a) < std::make_pair(draw(seed, b, 0), b);
+    return std::make_pair(draw(seed, a), a) < std::make_pair(draw(seed, b), b);
   });
   const double cell = *std::min_element(spacing.begin(), spacing.end());
   std::unordered_map<std::int64_t, std::vector<std::int32_t>> taken;
@@ -219,22 +218,9 @@ std::vector<PlacedNode> place_nodes(const Body& body, const MlsOptions& options,
                                     std::uint64_t seed, std::vector<std::string>* notes,
                                     NearGaps& gaps) {
   if (has_given_nodes(body)) return vertices_of(load_tets(body, spacing, notes));
-  if (options.placement == MlsPlacement::kRegular) return cubes_of(body, spacing, notes, &gaps);
-  const bool graded_nodes = options.placement == MlsPlacement::kGraded;
-  const std::vector<PlacedNode> cubes =
-      cubes_of(body, spacing / kSamples, notes, graded_nodes ? &gaps : nullptr);
-  std::vector<PlacedNode> nodes;
-  if (graded_nodes) {
-    nodes = graded(cubes, options.grading, spacing, seed);
-  } else {
-    nodes = cubes_of(body, spacing, nullptr, &gaps);
-    for (std::size_t i = 0; i < nodes.size(); ++i) {
-      if (nodes[i].surface) continue;
-      for (int a = 0; a < 3; ++a) {
-        nodes[i].place[a] += kJitter * spacing * (2 * draw(seed, i, a) - 1);
-      }
-    }
-  }
+  if (options.placement == MlsPlacement::kRegular) return cubes_of(body, spacing, notes, gaps);
+  const std::vector<PlacedNode> cubes = cubes_of(body, spacing / kSamples, notes, gaps);
+  std::vector<PlacedNode> nodes = graded(cubes, options.grading, spacing, seed);
   share_out(cubes, nodes);
   return nodes;
 }

@@ -19,7 +19,7 @@ struct PlacedNode {
   bool surface = false;  ///< whether that reaches the body's surface
 };
 
-/// Nodes `spacing` apart, on a lattice or graded, as the options say; `seed` moves them aside. Of a
+/// Nodes `spacing` apart, on a lattice or graded, as the options say; `seed` scatters them. Of a
 /// tetrahedral mesh its vertices instead, each with a quarter of its tetrahedra. Throws what
 /// make_lattice() and load_tets() throw. `gaps` becomes those of the body's mesh, but for a
 /// tetrahedral one, which joins what it joins.

@@ -36,7 +36,7 @@ float whole_kappa(const MlsState& s, std::int32_t i) {
 }
 
 /// Lists all springs, at both of their nodes.
-void list_springs(const MlsState& s) {
+void list_springs(MlsState& s) {
   MlsSprings& springs = s.springs;
   springs.all.clear();
   for (std::int32_t i = 0; i < s.count() && !s.spring.empty(); ++i) {
@@ -97,12 +97,12 @@ std::unique_ptr<MlsState> make_mls_state(const Scene& scene, std::vector<std::st
   s.scene = scene;
   s.cpu = std::make_unique<Cpu>(scene.threads);
   s.nodes = make_mls_nodes(scene, notes);
-  s.pairs = make_pairs(s.nodes, scene.mls.neighbours, *s.cpu, scene.mls.basis);
+  s.pairs = make_pairs(s.nodes, scene.mls.neighbours, *s.cpu);
   hold_at_faces(scene, support_factor(scene.mls.neighbours), s.nodes, s.pairs);
   s.nodes.strained_volume = s.nodes.free_volume;
   const Array<float> kernel = s.pairs.whole;
   const bool lattice = scene.mls.placement != MlsPlacement::kGraded;
-  if (scene.mls.basis == MlsBasis::kBalanced) balance(s.nodes, lattice, *s.cpu, s.pairs);
+  balance(s.nodes, lattice, *s.cpu, s.pairs);
   const int n = s.count();
   for (Array<float>* a : {&s.place, &s.u, &s.v, &s.u_next, &s.v_next, &s.face})
     resize_padded(*a, n, 4);
@@ -152,11 +152,9 @@ std::unique_ptr<MlsState> make_mls_state(const Scene& scene, std::vector<std::st
   s.spring_room.assign(s.pairs.other.size(), 0.0f);
   remake(s, all);
   for (int round = 0; round < kRoundsOfBounds && bound_own_rates(s); ++round) {
-    if (scene.mls.basis == MlsBasis::kBalanced) {
-      s.pairs.whole = kernel;
-      balance(s.nodes, lattice, *s.cpu, s.pairs);
-      put_weights(s.pairs, s.lanes);
-    }
+    s.pairs.whole = kernel;
+    balance(s.nodes, lattice, *s.cpu, s.pairs);
+    put_weights(s.pairs, s.lanes);
     for (std::int32_t i = 0; i < n; ++i) s.whole_kappa[i] = whole_kappa(s, i);
     remake(s, all);
   }
@@ -167,9 +165,9 @@ std::unique_ptr<MlsState> make_mls_state(const Scene& scene, std::vector<std::st
   return state;
 }
 
-MlsField field_of(const MlsState& s) { return field_of(s, s.u.data(), s.v.data()); }
+MlsField field_of(MlsState& s) { return field_of(s, s.u.data(), s.v.data()); }
 
-MlsField field_of(const MlsState& s, const float* u, const float* v) {
+MlsField field_of(MlsState& s, const float* u, const float* v) {
   MlsField f;
   f.count = s.count();
   f.place = s.place.data();
@@ -191,7 +189,7 @@ MlsField field_of(const MlsState& s, const float* u, const float* v) {
   f.volume_eta = s.volume_eta.data();
   f.kappa = s.kappa.data();
   f.neo_hookean = s.neo_hookean.data();
-  f.stress = const_cast<float*>(s.stress.data());
+  f.stress = s.stress.data();
   f.viscous = s.viscous && v != nullptr;
   if (s.springs.begin.empty()) list_springs(s);
   s.cpu->for_each(

@@ -97,7 +97,7 @@ struct MlsState {
   MlsNodes nodes;
   MlsPairs pairs;
   MlsSpanner spanner;
-  mutable MlsLanes lanes;  ///< its rows are scratch
+  MlsLanes lanes;  ///< its rows are scratch
 
   // Per node, padded to whole chunks. Vectors are (x, y, z, 0), but for the fourth of `place`: how
   // far outside of the node tissue ends that tools and the ground may touch [m].
@@ -119,7 +119,7 @@ struct MlsState {
   Array<std::uint8_t> sprung;  ///< its support spans no space: springs to its neighbours do
   Array<float> spring;         ///< per entry: at a sprung node [N/m]; empty without any
   Array<float> spring_room;    ///< zeros for it, so that a cut need not wait for memory
-  mutable MlsSprings springs;  ///< the same as passes read it
+  MlsSprings springs;          ///< the same as passes read it
   bool viscous = false;        ///< whether any material is
 
   std::vector<Collider> colliders;     ///< at the present substep
@@ -164,8 +164,8 @@ void put_strained_volume(MlsState& state, std::int32_t node, float volume);
 
 /// What the passes work on, at displacements `u` and velocities `v`, [4 n] each. Spreads them (see
 /// MlsKernels), so no two fields are in use at a time.
-MlsField field_of(const MlsState& state, const float* u, const float* v);
-MlsField field_of(const MlsState& state);  ///< at the present ones
+MlsField field_of(MlsState& state, const float* u, const float* v);
+MlsField field_of(MlsState& state);  ///< at the present ones
 
 /// One substep: stress of all nodes, forces with contact at the colliders' present places, motion.
 /// Adds what acts on the colliders to `loads`. Returns how long it acted [s].

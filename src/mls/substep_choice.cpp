@@ -12,7 +12,7 @@ constexpr double kMostRate = 1.0;  // growth of the fastest node's rate by a cut
                                    // measured again
 constexpr double kOfHeld = 1;      // substep where all is held [s]
 /// How fast a material may swing over the fastest of its nodes by itself: 1.2 to 1.9 were seen, in
-/// regular, jittered and graded nodes, cut and whole, of Poisson's ratios of 0.3 and 0.45.
+/// regular and graded nodes, cut and whole, of Poisson's ratios of 0.3 and 0.45.
 constexpr double kTogether = 3;
 
 }  // namespace

@@ -27,6 +27,41 @@ struct Furthest {
   std::int32_t entry = -1;
 };
 
+/// Adds the other pairs that cross where the pair `torn` does: a disc across it of about the room
+/// that a node has. They are stretched less than the pair, for they lie askew, and would hold the
+/// sides of a crack together until these are far apart.
+void add_crossing(const MlsState& s, std::int32_t torn, std::vector<std::int32_t>& entries) {
+  const MlsPairs& p = s.pairs;
+  const std::int32_t ends[] = {p.other[p.twin[torn]], p.other[torn]};
+  const auto place = [&s](std::int32_t i) {
+    return Vec3(s.place[4 * i], s.place[4 * i + 1], s.place[4 * i + 2]);
+  };
+  const Vec3 middle = 0.5 * (place(ends[0]) + place(ends[1]));
+  const Vec3 normal = (place(ends[1]) - place(ends[0])).normalized();
+  const double room = 0.5 * (s.nodes.volume[ends[0]] + s.nodes.volume[ends[1]]);
+  const double radius = 0.75 * std::cbrt(room);
+  std::vector<std::int32_t> near;
+  for (const std::int32_t i : ends) {
+    near.push_back(i);
+    for (std::int32_t e = p.begin[i]; e < p.begin[i + 1]; ++e) near.push_back(p.other[e]);
+  }
+  std::sort(near.begin(), near.end());
+  near.erase(std::unique(near.begin(), near.end()), near.end());
+  for (const std::int32_t i : near) {
+    const Vec3 from = place(i) - middle;
+    const double below = from.dot(normal);
+    if (below >= 0) continue;
+    for (std::int32_t e = p.begin[i]; e < p.begin[i + 1]; ++e) {
+      if (p.crossed[e] != 0 || s.nodes.material_of(p.other[e]).tear_stretch == 0) continue;
+      const Vec3 to = place(p.other[e]) - middle;
+      const double above = to.dot(normal);
+      if (above <= 0) continue;
+      const Vec3 at = from + below / (below - above) * (to - from);
+      if (at.norm() < radius) entries.push_back(e);
+    }
+  }
+}
+
 }  // namespace
 
 bool can_tear(const MlsState& s) {
@@ -63,7 +98,7 @@ std::vector<std::int32_t> find_tearing(MlsState& s) {
   for (std::int32_t i = 0; i < s.count(); ++i) {
     const std::int32_t e = furthest[i].entry;
     if (e < 0 || p.other[e] < i) continue;
-    if (furthest[p.other[e]].entry == p.twin[e]) entries.push_back(e);
+    if (furthest[p.other[e]].entry == p.twin[e]) add_crossing(s, e, entries);
   }
   return entries;
 }

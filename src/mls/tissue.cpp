@@ -9,6 +9,7 @@
 #include "fragments/piece_colour.h"
 #include "fragments/piece_sums.h"
 #include "frame/checksum.h"
+#include "frame/out_of_control.h"
 #include "frame/select_points.h"
 #include "mls/crossing.h"
 #include "mls/cut.h"
@@ -237,7 +238,7 @@ MlsTissue::Figures MlsTissue::measure() {
 }
 
 void MlsTissue::measure_stress(std::vector<float>& of_node) {
-  const MlsState& s = *state_;
+  MlsState& s = *state_;
   const MlsField field = field_of(s);
   of_node.resize(static_cast<std::size_t>(s.chunks()) * kMlsChunk);
   state_->cpu->for_each(
@@ -258,8 +259,7 @@ FrameResult MlsTissue::finish() {
   result_.kinetic_energy = figures.kinetic;
   result_.max_speed = figures.speed;
   pieces_measured_ = false;
-  // Nothing that instruments do moves tissue at the speed of a bullet; what does is out of control.
-  result_.blew_up = result_.blew_up || !figures.finite || !(result_.max_speed < 300);
+  result_.blew_up = result_.blew_up || !figures.finite || is_out_of_control(result_);
   return result_;
 }
 

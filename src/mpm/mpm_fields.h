@@ -4,6 +4,7 @@
 #pragma once
 
 #include "compute/archive.h"
+#include "frame/state_check.h"
 #include "frame/state_fields.h"
 #include "mpm/fragment_forecast.h"
 #include "mpm/mpm_state.h"
@@ -54,6 +55,14 @@ void fields(Archive& archive, NodeFields::Split& s) {
 template <class Archive>
 void fields(Archive& archive, NodeFields& x) {
   archive(x.bonds_, x.mass_of_point_, x.splits_, x.split_of_);
+  if constexpr (Archive::kReads) {
+    check_indices(x.split_of_, -1, static_cast<std::int64_t>(x.splits_.size()), "split nodes");
+    for (const NodeFields::Split& split : x.splits_) {
+      check_state(!split.fields.empty(), "split nodes");
+    }
+    check_state(x.split_of_.empty() || x.split_of_.size() == x.mass_of_point_.size(),
+                "split nodes");
+  }
 }
 
 template <class Archive>
@@ -109,7 +118,13 @@ void fields(Archive& archive, Blocks& b) {
   archive(all);
   if constexpr (Archive::kReads) {
     b.all.clear();
-    for (const Place& p : all) b.all.push_back(&b.regions.at(p.region).blocks.at(p.block));
+    for (const Place& p : all) {
+      check_state(p.region >= 0 && p.region < static_cast<std::int32_t>(b.regions.size()),
+                  "blocks");
+      std::vector<Block>& of = b.regions[p.region].blocks;
+      check_state(p.block >= 0 && p.block < static_cast<std::int32_t>(of.size()), "blocks");
+      b.all.push_back(&of[p.block]);
+    }
   }
 }
 
@@ -220,7 +235,8 @@ void fields(Archive& archive, FrontNodes& f) {
   archive(bonds, passed, f.nodes);
   if constexpr (Archive::kReads) {
     f.rim.clear();
-    for (std::size_t i = 0; i < bonds.size(); ++i) f.rim[bonds[i]] = passed.at(i);
+    check_sizes("rim", bonds, passed);
+    for (std::size_t i = 0; i < bonds.size(); ++i) f.rim[bonds[i]] = passed[i];
   }
 }
 
@@ -233,6 +249,12 @@ template <class Archive>
 void fields(Archive& archive, TissueRecords& r) {
   archive(r.tore_at, r.bridge_ends, r.debris);
 }
+
+/// Of a state that was read, on the CPU, but for its scene and what follows from that. Throws
+/// std::runtime_error: see frame/state_check.h.
+void check_state(const MpmState& state);
+/// What of it the GPU keeps as well.
+void check_tissue(const MpmState& state);
 
 /// All but contact of tissue with tissue: mpm/contact/face_fields.h.
 template <class Archive>

@@ -29,6 +29,8 @@ void MpmTissue::restore(Span<const std::uint8_t> saved) {
   ArchiveReader in(saved);
   each_field(in);
   if (in.left() > 0) throw std::runtime_error("the state has more to it than this version knows");
+  check_state(*state_);
+  check_pieces(pieces_, state_->points.site.size(), state_->scene.bodies.size());
   state_->work.inertial_index.assign(state_->nodes.size(), -1);
   index_inertia(*state_);
   index_flights(*state_);

@@ -6,6 +6,7 @@
 #include <stdexcept>
 #include <utility>
 
+#include "frame/out_of_control.h"
 #include "math/lanczos.h"
 #include "mpm/contact/block_contact.h"
 #include "mpm/lattice_pieces.h"
@@ -258,8 +259,7 @@ FrameResult MpmTissue::finish() {
   for (const BlockMotion& m : state_->motion) {
     if (!(m.speed <= result_.max_speed)) result_.max_speed = m.speed;
   }
-  // Nothing that instruments do moves tissue at the speed of a bullet; what does is out of control.
-  result_.blew_up = result_.blew_up || !(result_.max_speed < 300);
+  result_.blew_up = result_.blew_up || is_out_of_control(result_);
   if (tame()) measure_and_follow();
   if (foresight_.network != nullptr && !result_.blew_up) {
     const double duration = frame_ ? frame_->duration : 0.0;

@@ -1,6 +1,7 @@
 #include "mpm/piece_motion.h"
 
 #include "fragments/piece_sums.h"
+#include "mpm/point_fields.h"
 
 namespace tissue_sim {
 
@@ -19,10 +20,10 @@ void measure_pieces(MpmState& state, Pieces& pieces) {
     for (std::size_t lane = 0; lane < lanes; ++lane) {
       const std::int32_t p = block.point[lane];
       if (p < 0) continue;
-      of_block[i]
-          .of(pieces.of_point[p])
-          .add(state.points.volume[p], Vec3(x[lane], x[lanes + lane], x[2 * lanes + lane]),
-               Vec3(v[lane], v[lanes + lane], v[2 * lanes + lane]));
+      Vec3 place(x[lane], x[lanes + lane], x[2 * lanes + lane]);
+      Vec3 velocity(v[lane], v[lanes + lane], v[2 * lanes + lane]);
+      if (held_place(state, p, place) && !state.anchors.moves) velocity.setZero();
+      of_block[i].of(pieces.of_point[p]).add(state.points.volume[p], place, velocity);
     }
   });
   set_motion(of_block, pieces);

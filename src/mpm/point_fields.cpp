@@ -73,7 +73,7 @@ void read_surface(MpmState& s, const Pieces& pieces, SurfaceTriangles& surface) 
   update_boundary(s, mesh);
   constexpr int kGrain = 256;
   const auto vertices = static_cast<int>(mesh.vertices.size());
-  std::vector<std::array<float, 3>> place(vertices);
+  std::vector<std::array<float, 3>> place(vertices), rest(vertices);
   s.cpu->for_each(
       vertices,
       [&](int i) {
@@ -82,6 +82,7 @@ void read_surface(MpmState& s, const Pieces& pieces, SurfaceTriangles& surface) 
         const LatticeBody& b = s.bodies[site.body];
         Vec3 x = b.node_position(site.x / 2, site.y / 2, site.z / 2) +
                  b.cell_size * Vec3(v.place[0], v.place[1], v.place[2]);
+        for (int a = 0; a < 3; ++a) rest[i][a] = static_cast<float>(x[a]);
         if (s.points.free_volume_of(v.point) > 0) {
           const AxisWeights weights(v.place);
           for (int k = 0; k < 27; ++k) {
@@ -96,6 +97,7 @@ void read_surface(MpmState& s, const Pieces& pieces, SurfaceTriangles& surface) 
       kGrain);
   const auto faces = static_cast<int>(mesh.faces.size());
   surface.corners.resize(std::size_t{18} * faces);
+  surface.rest.resize(std::size_t{18} * faces);
   surface.fragment.resize(std::size_t{2} * faces);
   surface.cut.resize(std::size_t{2} * faces);
   s.cpu->for_each(
@@ -103,8 +105,10 @@ void read_surface(MpmState& s, const Pieces& pieces, SurfaceTriangles& surface) 
       [&](int i) {
         const BoundaryMesh::Face& f = mesh.faces[i];
         float* corner = surface.corners.data() + std::size_t{18} * i;
+        float* at_rest = surface.rest.data() + std::size_t{18} * i;
         for (const int k : {0, 1, 2, 0, 2, 3}) {
           corner = std::copy_n(place[f.vertex[k]].data(), 3, corner);
+          at_rest = std::copy_n(rest[f.vertex[k]].data(), 3, at_rest);
         }
         for (int t = 2 * i; t < 2 * i + 2; ++t) {
           surface.fragment[t] = pieces.of_point[f.point];

@@ -82,8 +82,11 @@ struct Distance {
 
 /// The angle between two triangles that share the edge from vertex 2 to vertex 3, opposite to which
 /// lie 0 and 1 (eq. 4; signed, where arccos knows no side and has no slope where the triangles are
-/// flat; gradients: Bridson et al. 2003).
+/// flat; gradients: Bridson et al. 2003). From kMost of an excess on its moment grows no further:
+/// gradients are those of small turns, and a thin triangle that was thrown over would throw its
+/// vertices farther than it is high.
 struct Bending {
+  static constexpr float kMost = 0.3f;  ///< [rad]
   static constexpr int kVertices = 4, kNumbers = 2, kMultipliers = 1;
   template <class V>
   struct Parts {
@@ -116,8 +119,35 @@ struct Bending {
   }
   /// Energy [J].
   static TISSUE_SIM_INLINE double energy(const Vertex<float> (&v)[4], const float (&number)[2]) {
-    const float c = value(v, number);
-    return number[1] > 0 ? 0.5 * c * c / number[1] : 0.0;
+    const float c = value(v, number), within = limited(c);
+    return number[1] > 0 ? (c - 0.5 * within) * within / number[1] : 0.0;
+  }
+  /// An excess, no larger than kMost.
+  template <class V>
+  static TISSUE_SIM_INLINE V limited(V c) {
+    const V most = c * 0.0f + kMost;
+    return greater(lesser(c, most), -most);
+  }
+  /// Of the angle, times `share`.
+  template <class V>
+  static TISSUE_SIM_INLINE void gradients(const Vertex<V> (&v)[4], const Parts<V>& p, V share,
+                                          Vector<V> (&g)[4]) {
+    const V one = dot(p.n0, p.n0) + kTiny, other = dot(p.n1, p.n1) + kTiny;
+    const Vector<V> m0 = quotient(share, p.length * one) * p.n0,
+                    m1 = quotient(share, p.length * other) * p.n1;
+    const V e2 = p.length * p.length;
+    const V s0 = dot(between(v[0], v[3]), p.e), s1 = dot(between(v[1], v[3]), p.e);
+    const V t0 = dot(between(v[0], v[2]), p.e), t1 = dot(between(v[1], v[2]), p.e);
+    g[0] = e2 * m0;
+    g[1] = e2 * m1;
+    g[2] = s0 * m0 + s1 * m1;
+    g[3] = (-t0) * m0 + (-t1) * m1;
+  }
+  /// How far its vertices move for a turn of its angle: sum of w |g|^2 [1/(kg m^2)].
+  template <class V>
+  static TISSUE_SIM_INLINE V mobility(const Vertex<V> (&v)[4], const Vector<V> (&g)[4]) {
+    return v[0].w * dot(g[0], g[0]) + v[1].w * dot(g[1], g[1]) + v[2].w * dot(g[2], g[2]) +
+           v[3].w * dot(g[3], g[3]);
   }
   template <class V>
   static TISSUE_SIM_INLINE void project(Vertex<V> (&v)[4], const V (&number)[2], V inverse_h2,
@@ -129,23 +159,12 @@ struct Bending {
     const V least = 1e-3f * p.length * p.length * p.length * p.length + kTiny;
     const V one = dot(p.n0, p.n0) + kTiny, other = dot(p.n1, p.n1) + kTiny;
     const V share = quotient(lesser(lesser(one, other), least), least);
-    const Vector<V> m0 = quotient(share, p.length * one) * p.n0,
-                    m1 = quotient(share, p.length * other) * p.n1;
-    const V e2 = p.length * p.length;
-    const V s0 = dot(between(v[0], v[3]), p.e), s1 = dot(between(v[1], v[3]), p.e);
-    const V t0 = dot(between(v[0], v[2]), p.e), t1 = dot(between(v[1], v[2]), p.e);
-    const Vector<V> g0 = e2 * m0, g1 = e2 * m1;
-    const Vector<V> g2 = s0 * m0 + s1 * m1;
-    const Vector<V> g3 = (-t0) * m0 + (-t1) * m1;
-    const V sum =
-        v[0].w * dot(g0, g0) + v[1].w * dot(g1, g1) + v[2].w * dot(g2, g2) + v[3].w * dot(g3, g3);
-    const V c = share * excess(p.angle, number[0]);
-    const V change = quotient(-(c + a * lambda[0]), sum + a + kTiny);
+    Vector<V> g[4];
+    gradients(v, p, share, g);
+    const V c = share * limited(excess(p.angle, number[0]));
+    const V change = quotient(-(c + a * lambda[0]), mobility(v, g) + a + kTiny);
     lambda[0] += change;
-    move(v[0], change, g0);
-    move(v[1], change, g1);
-    move(v[2], change, g2);
-    move(v[3], change, g3);
+    for (int i = 0; i < 4; ++i) move(v[i], change, g[i]);
   }
 };
 

@@ -30,36 +30,65 @@ bool is_sliver(const Vec3& a, const Vec3& b, const Vec3& c, double mean_edge) {
   return (b - a).cross(c - a).norm() < 0.1 * mean_edge * std::sqrt(longest2);
 }
 
-/// Cells of a lattice that triangles' boxes overlap, sorted.
+/// Cells of lattices that triangles' boxes overlap, sorted: of a fine lattice, or where a box has
+/// more than kMostCells there, as of tissue that nothing holds in shape, of one as coarse as it
+/// takes.
 class Cells {
  public:
-  Cells(double size) : size_(size) {}
-  std::int64_t cell(double x) const { return static_cast<std::int64_t>(std::floor(x / size_)); }
+  Cells(double size) : levels_(1, Level{size, {}}) {}
+  void add(const Vec3& low, const Vec3& high, std::int32_t triangle) {
+    if (!low.allFinite() || !high.allFinite()) return;
+    std::size_t level = 0;
+    while (levels_[level].cells(low, high) > kMostCells) {
+      if (++level == levels_.size()) levels_.push_back({2 * levels_.back().size, {}});
+    }
+    levels_[level].add(low, high, triangle);
+  }
+  void sort() {
+    for (Level& level : levels_) std::sort(level.entries.begin(), level.entries.end());
+  }
+  template <class F>
+  void each_at(const Vec3& x, const F& of) const {
+    if (!x.allFinite()) return;
+    for (const Level& level : levels_) {
+      if (level.entries.empty()) continue;
+      const std::uint64_t wanted = key(level.cell(x.x()), level.cell(x.y()), level.cell(x.z()));
+      auto at = std::lower_bound(level.entries.begin(), level.entries.end(),
+                                 std::make_pair(wanted, std::int32_t{-1}));
+      for (; at != level.entries.end() && at->first == wanted; ++at) of(at->second);
+    }
+  }
+
+ private:
+  static constexpr double kMostCells = 216;
   static std::uint64_t key(std::int64_t i, std::int64_t j, std::int64_t k) {
     const auto part = [](std::int64_t v) { return static_cast<std::uint64_t>(v) & 0x1fffff; };
     return part(i) << 42 | part(j) << 21 | part(k);
   }
-  void add(const Vec3& low, const Vec3& high, std::int32_t triangle) {
-    for (std::int64_t i = cell(low.x()); i <= cell(high.x()); ++i) {
-      for (std::int64_t j = cell(low.y()); j <= cell(high.y()); ++j) {
-        for (std::int64_t k = cell(low.z()); k <= cell(high.z()); ++k) {
-          entries_.emplace_back(key(i, j, k), triangle);
+  struct Level {
+    double size;  ///< of a cell [m]
+    std::vector<std::pair<std::uint64_t, std::int32_t>> entries;
+
+    std::int64_t cell(double x) const {
+      return static_cast<std::int64_t>(std::floor(std::max(-1e15, std::min(1e15, x / size))));
+    }
+    double cells(const Vec3& low, const Vec3& high) const {
+      double product = 1;
+      for (int a = 0; a < 3; ++a)
+        product *= 1.0 + static_cast<double>(cell(high[a]) - cell(low[a]));
+      return product;
+    }
+    void add(const Vec3& low, const Vec3& high, std::int32_t triangle) {
+      for (std::int64_t i = cell(low.x()); i <= cell(high.x()); ++i) {
+        for (std::int64_t j = cell(low.y()); j <= cell(high.y()); ++j) {
+          for (std::int64_t k = cell(low.z()); k <= cell(high.z()); ++k) {
+            entries.emplace_back(key(i, j, k), triangle);
+          }
         }
       }
     }
-  }
-  void sort() { std::sort(entries_.begin(), entries_.end()); }
-  template <class F>
-  void each_at(const Vec3& x, const F& of) const {
-    const std::uint64_t wanted = key(cell(x.x()), cell(x.y()), cell(x.z()));
-    auto at = std::lower_bound(entries_.begin(), entries_.end(),
-                               std::make_pair(wanted, std::int32_t{-1}));
-    for (; at != entries_.end() && at->first == wanted; ++at) of(at->second);
-  }
-
- private:
-  double size_;
-  std::vector<std::pair<std::uint64_t, std::int32_t>> entries_;
+  };
+  std::vector<Level> levels_;
 };
 
 /// A place above a triangle: its height, and the shares of the corners b and c in what is below.

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "frame/checksum.h"
+#include "frame/out_of_control.h"
 #include "pbd/cut.h"
 #include "pbd/find_touches.h"
 #include "pbd/free_flight.h"
@@ -122,8 +123,7 @@ FrameResult PbdTissue::finish() {
   result_.kinetic_energy = sum.kinetic;
   result_.elastic_energy = sum.elastic;
   result_.max_speed = std::sqrt(sum.speed2);
-  // Nothing that instruments do moves tissue at the speed of a bullet; what does is out of control.
-  result_.blew_up = result_.blew_up || !sum.finite || !(result_.max_speed < 300);
+  result_.blew_up = result_.blew_up || !sum.finite || is_out_of_control(result_);
   pieces_measured_ = false;
   return result_;
 }

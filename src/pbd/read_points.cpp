@@ -91,11 +91,15 @@ void PbdTissue::read_surface(SurfaceTriangles& surface) {
   pull();
   const State& s = *state_;
   surface.corners.clear();
+  surface.rest.clear();
   surface.fragment.clear();
   surface.cut = s.cut;
   for (const Triangle& t : s.triangles) {
     for (const std::int32_t v : t) {
-      for (int a = 0; a < 3; ++a) surface.corners.push_back(s.vertices.x[4 * v + a]);
+      for (int a = 0; a < 3; ++a) {
+        surface.corners.push_back(s.vertices.x[4 * v + a]);
+        surface.rest.push_back(static_cast<float>(s.vertices.reference[v][a]));
+      }
     }
     surface.fragment.push_back(pieces_.of_point[t[0]]);
   }

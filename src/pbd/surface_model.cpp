@@ -6,8 +6,9 @@
 //     plates a slab resists with E.
 //   edge: E t (A1 + A2) / L^2, the spring of a membrane of triangles A1 and A2 (Van Gelder 1998) as
 //     thick, t, as half the body is deep below it. Pulled along, a slab resists with E.
-//   bending: 3 D L^2 / (A1 + A2) with the stiffness D = E L^3 / (12 (1 - nu^2)) of a plate as thick
-//     as the edge is long (Grinspun et al. 2003).
+//   bending: 3 D L^2 / (A1 + A2) with the stiffness D = E t^3 / (12 (1 - nu^2)) of a plate as thick
+//     as the edge is long, or as an even triangle's edge of the lower one's height where that is
+//     less (Grinspun et al. 2003); no stiffer than a step resolves.
 #include <algorithm>
 #include <cmath>
 #include <map>
@@ -18,6 +19,7 @@
 #include "pbd/internal_links.h"
 #include "pbd/model.h"
 #include "pbd/pbd_pieces.h"
+#include "pbd/surface_volume.h"
 
 namespace tissue_sim {
 namespace pbd {
@@ -58,7 +60,7 @@ struct MeshEdge {
   std::int32_t a, b;         ///< a < b
   std::int32_t left, right;  ///< vertices opposite, -1 for none
   int count;                 ///< of triangles
-  double area;               ///< of them [m^2]
+  double area, least_area;   ///< of them, and of the smallest [m^2]
 };
 
 /// By a, then b.
@@ -81,10 +83,11 @@ std::vector<MeshEdge> mesh_edges(const State& s) {
   for (const Half& h : halves) {
     const auto a = static_cast<std::int32_t>(h.key >> 32), b = static_cast<std::int32_t>(h.key);
     if (edges.empty() || edges.back().a != a || edges.back().b != b) {
-      edges.push_back({a, b, h.opposite, -1, 1, h.area});
+      edges.push_back({a, b, h.opposite, -1, 1, h.area, h.area});
     } else {
       if (++edges.back().count == 2) edges.back().right = h.opposite;
       edges.back().area += h.area;
+      edges.back().least_area = std::min(edges.back().least_area, h.area);
     }
   }
   return edges;
@@ -101,6 +104,11 @@ void add_link(State& s, std::int32_t a, std::int32_t b, double stiffness) {
 /// would turn by rounding [rad]. What a mesh came with stays.
 constexpr float kFolded = 3.0f;
 
+/// A bend that would turn back more than that share of its excess in one step counts for no more:
+/// beside light vertices and thin triangles it would be rigid, and rigid ones around a vertex, one
+/// after the other, throw it to and fro for ever. Of an even mesh of organs none is.
+constexpr double kMostOfStep = 0.3;
+
 void add_bend(State& s, const MeshEdge& e, double stiffness) {
   if (!(stiffness > 0)) return;
   const std::array<std::int32_t, 4> at = {e.left, e.right, e.a, e.b};
@@ -108,11 +116,17 @@ void add_bend(State& s, const MeshEdge& e, double stiffness) {
   const Vec3& origin = s.vertices.reference[e.a];
   for (int i = 0; i < 4; ++i) {
     const Vec3 x = s.vertices.reference[at[i]] - origin;
-    v[i] = {static_cast<float>(x.x()), static_cast<float>(x.y()), static_cast<float>(x.z()), 1};
+    v[i] = {static_cast<float>(x.x()), static_cast<float>(x.y()), static_cast<float>(x.z()),
+            static_cast<float>(1 / s.vertices.mass[at[i]])};
   }
-  const float angle = Bending::parts(v).angle;
+  const auto parts = Bending::parts(v);
+  const float angle = parts.angle;
   if (std::fabs(angle) > kFolded && (s.stroke[e.a] >= 0 || s.stroke[e.b] >= 0)) return;
-  s.bends.add(at, {angle, static_cast<float>(1 / stiffness)});
+  Vector<float> g[4];
+  Bending::gradients(v, parts, 1.0f, g);
+  const double h = 1 / (s.scene.frame_rate * s.scene.pbd.steps);
+  const double resolved = kMostOfStep / (h * h * Bending::mobility(v, g));
+  s.bends.add(at, {angle, static_cast<float>(1 / std::min(stiffness, resolved))});
 }
 
 /// Of each vertex beside a wound: the blade's normal there, or the way along the surface where that
@@ -194,8 +208,9 @@ void make_surface_constraints(State& s) {
       add_link(s, e.a, e.b, pbd.edge * m.young_modulus * thick * e.area / l2);
     }
     if (e.count != 2) continue;
-    const double plate =
-        m.young_modulus * l2 * std::sqrt(l2) / (12 * (1 - m.poisson_ratio * m.poisson_ratio));
+    const double even = 2 / std::sqrt(3.0) * 2 * e.least_area / std::sqrt(l2);
+    const double plate = m.young_modulus * std::pow(std::min(std::sqrt(l2), even), 3) /
+                         (12 * (1 - m.poisson_ratio * m.poisson_ratio));
     add_bend(s, e, pbd.bending * 3 * plate * l2 / e.area);
   }
   s.edge_count = s.links.size();
@@ -288,6 +303,8 @@ void add_surface_body(State& s, int b, std::vector<std::string>* notes) {
   SurfaceKind kind;
   TriangleMesh mesh = body.shape == Shape::kMesh ? load_surface(body, kind, notes)
                                                  : triangulate(body, s.scene.cell_size);
+  std::vector<std::string> found;
+  if (body.shape == Shape::kMesh) drop_specks(mesh, found);
   const std::vector<int> order = morton_order(mesh.vertices);
   std::vector<int> index(order.size());
   std::vector<int> starts;
@@ -300,13 +317,31 @@ void add_surface_body(State& s, int b, std::vector<std::string>* notes) {
     s.triangles.push_back({index[t[0]], index[t[1]], index[t[2]]});
   s.cut.resize(s.triangles.size(), 0);
   const int missed = add_internal_links(s, b, starts);
-  double volume = signed_volume(mesh);
-  if (!kind.is_closed()) {
-    volume = 0;  // no inside: columns below the vertices
-    for (const Triangle& t : s.triangles) {
-      if (s.vertices.body[t[0]] != b) continue;
-      for (const std::int32_t v : t) volume += area_of(s, t) / 3 * s.half_depth[v];
+  double volume = 0;
+  int holes = 0, sheets = 0;
+  for (const SurfacePart& part : surface_parts(mesh)) {
+    if (!part.is_sheet()) {
+      volume += part.volume;
+      holes += part.holes;
+      continue;
     }
+    ++sheets;  // no inside: columns below the vertices
+    for (const int t : part.triangles) {
+      const auto& c = mesh.triangles[t];
+      const double third = area_of(s, {index[c[0]], index[c[1]], index[c[2]]}) / 3;
+      for (const int v : c) volume += third * s.half_depth[index[v]];
+    }
+  }
+  if (holes > 0) {
+    found.push_back("is weighed with " + std::to_string(holes) +
+                    (holes == 1 ? " hole closed" : " holes closed") + " by a fan");
+  }
+  if (sheets > 0) {
+    found.push_back("has " + std::to_string(sheets) + (sheets == 1 ? " sheet" : " sheets") +
+                    " that enclose nothing, as thick as tissue is opposite, or as a cell");
+  }
+  for (const std::string& note : found) {
+    if (notes != nullptr) notes->push_back("body '" + body.name + "': mesh " + note);
   }
   s.volume_of_body.push_back(volume);
   s.closed_body.push_back(kind.is_closed() ? 1 : 0);

@@ -22,8 +22,11 @@ TISSUE_SIM_INLINE void edges_of(const Vertex<V> (&v)[4], Vector<V> (&p)[3]) {
 
 /// Stretch and shear strain constraints (eqs. 5 to 11; Mueller et al. 2014): S = F^T F shall be the
 /// identity. Six projections one after the other, without compliance: `stretch` and `shear` are the
-/// shares of the error that they take away.
+/// shares of the error that they take away. Held vertices may leave a constraint next to no slope;
+/// rounding over that slope threw the last free vertex of a tetrahedron out of its body, so no
+/// slope counts for less than kLeastSlope2 of what all vertices together have.
 struct Strain {
+  static constexpr float kLeastSlope2 = 2.5e-5f;
   static constexpr int kVertices = 4, kNumbers = 11, kMultipliers = 0;
   /// C of the stretch (i == j) or shear constraint [-].
   template <class V>
@@ -43,13 +46,17 @@ struct Strain {
     if (i == j) c -= 1.0f;
     Vector<V> g[4];
     g[0] = {c * 0.0f, c * 0.0f, c * 0.0f};
-    V sum = c * 0.0f;
+    V sum = c * 0.0f, slope2 = sum, mobile = v[0].w;
     for (int k = 0; k < 3; ++k) {
       g[k + 1] = number[3 * k + i] * fj + number[3 * k + j] * fi;
       g[0] = g[0] - g[k + 1];
-      sum += v[k + 1].w * dot(g[k + 1], g[k + 1]);
+      const V g2 = dot(g[k + 1], g[k + 1]);
+      sum += v[k + 1].w * g2;
+      slope2 += g2;
+      mobile += v[k + 1].w;
     }
-    sum += v[0].w * dot(g[0], g[0]);
+    const V g2 = dot(g[0], g[0]);
+    sum += v[0].w * g2 + kLeastSlope2 * mobile * (slope2 + g2);
     const V change = -(i == j ? number[9] : number[10]) * c / (sum + kTiny);
     for (int k = 0; k < 4; ++k) move(v[k], change, g[k]);
   }

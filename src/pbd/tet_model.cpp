@@ -1,12 +1,47 @@
 // The tetrahedral model: a material, or strain with distance and bending, the paper's baseline.
+#include <algorithm>
 #include <cmath>
 #include <map>
+#include <set>
 
 #include "geometry/tet_mesh.h"
 #include "pbd/model.h"
 
 namespace tissue_sim {
 namespace pbd {
+
+namespace {
+
+/// Flat quadrangles of the boundary that are split along both diagonals: hexahedra in five
+/// tetrahedra each, of which neighbours were not mirrored, hang together at corners alone.
+int mismatched_faces(const TetMesh& mesh, const std::vector<std::array<int, 3>>& triangles) {
+  std::map<std::pair<int, int>, std::vector<int>> opposite;  // of each edge
+  for (const auto& t : triangles) {
+    for (int i = 0; i < 3; ++i) {
+      const int a = t[i], c = t[(i + 1) % 3];
+      opposite[{std::min(a, c), std::max(a, c)}].push_back(t[(i + 2) % 3]);
+    }
+  }
+  std::map<std::array<int, 4>, std::set<std::pair<int, int>>> diagonals;
+  for (const auto& [edge, across] : opposite) {
+    const Vec3 &a = mesh.vertices[edge.first], e = mesh.vertices[edge.second] - a;
+    for (std::size_t i = 0; i < across.size(); ++i) {
+      for (std::size_t j = i + 1; j < across.size(); ++j) {
+        if (across[i] == across[j]) continue;
+        const Vec3 n = e.cross(mesh.vertices[across[i]] - a),
+                   m = e.cross(mesh.vertices[across[j]] - a);
+        if (n.dot(m) > -0.99 * n.norm() * m.norm()) continue;  // no quadrangle, or a bent one
+        std::array<int, 4> corners = {edge.first, edge.second, across[i], across[j]};
+        std::sort(corners.begin(), corners.end());
+        diagonals[corners].insert(edge);
+      }
+    }
+  }
+  return static_cast<int>(std::count_if(diagonals.begin(), diagonals.end(),
+                                        [](const auto& d) { return d.second.size() > 1; }));
+}
+
+}  // namespace
 
 void add_tet_body(State& s, int b, std::vector<std::string>* notes) {
   const TetMesh mesh = load_tets(s.scene.bodies[b], s.scene.cell_size, notes);
@@ -23,7 +58,16 @@ void add_tet_body(State& s, int b, std::vector<std::string>* notes) {
     const auto& t = mesh.tetrahedra[k];
     s.tetrahedra.push_back({index[t[0]], index[t[1]], index[t[2]], index[t[3]]});
   }
-  for (const auto& t : boundary(mesh)) {
+  const std::vector<std::array<int, 3>> skin = boundary(mesh);
+  const int mismatched = mismatched_faces(mesh, skin);
+  if (mismatched > 0 && notes != nullptr) {
+    notes->push_back("body '" + s.scene.bodies[b].name + "': its tetrahedra do not match at " +
+                     std::to_string(mismatched) + (mismatched == 1 ? " face" : " faces") +
+                     " of hexahedra, each split along one diagonal on one side and along the other "
+                     "on the other: they hang together at corners alone there, and a cut along "
+                     "such a face breaks nothing; mirror every other hexahedron");
+  }
+  for (const auto& t : skin) {
     s.triangles.push_back({index[t[0]], index[t[1]], index[t[2]]});
     s.cut.push_back(0);
     for (const int v : t) s.vertices.surface[index[v]] = 1;

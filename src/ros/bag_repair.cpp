@@ -250,6 +250,15 @@ std::string index_of(const std::map<std::uint32_t, Connection>& connections,
   return index;
 }
 
+/// Whether so many records lie from `at` on: a copy that was broken off has not all of its index.
+bool is_whole(File& file, std::uint64_t at, std::uint64_t count) {
+  Fields fields;
+  std::uint64_t data = 0;
+  std::uint32_t size = 0;
+  for (; count > 0 && file.record_at(at, fields, data, size); --count) at = data + size;
+  return count == 0;
+}
+
 }  // namespace
 
 BagRepair repair_bag(const std::string& path) {
@@ -266,7 +275,9 @@ BagRepair repair_bag(const std::string& path) {
   const auto known = number<std::uint64_t>(fields["index_pos"]);
   const std::uint64_t begin = data + size;
   BagRepair result;
-  if (known >= begin && known < file.size()) return result;  // has its index
+  const std::uint64_t records = std::uint64_t{number<std::uint32_t>(fields["conn_count"])} +
+                                number<std::uint32_t>(fields["chunk_count"]);
+  if (known >= begin && known < file.size() && is_whole(file, known, records)) return result;
 
   std::map<std::uint32_t, Connection> connections;
   std::vector<ChunkIndex> chunks;

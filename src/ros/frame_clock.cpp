@@ -129,9 +129,9 @@ WallTime FrameClock::wake() const {
   return std::min<WallTime>(pace_.due(), now + std::chrono::seconds(1));
 }
 
-std::vector<std::optional<ToolInput::Sample>> FrameClock::begin_frame(const ToolInputs& tools,
-                                                                      bool in_turn, bool paused) {
-  std::vector<std::optional<ToolInput::Sample>> samples;
+std::vector<std::optional<ToolRequest>> FrameClock::begin_frame(const ToolInputs& tools,
+                                                                bool in_turn, bool paused) {
+  std::vector<std::optional<ToolRequest>> samples;
   pace_.begin_frame(WallClock::now());
   frame_stamp_ = stamp();
   const bool by_stamp = parameters_.time == TimeMode::kRos && in_turn;

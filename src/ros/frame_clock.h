@@ -53,8 +53,8 @@ class FrameClock {
   WallTime wake() const;
   /// A frame begins; `in_turn` if because it was due, else because somebody stepped or cut.
   /// The instruments' samples that are for it.
-  std::vector<std::optional<ToolInput::Sample>> begin_frame(const ToolInputs& tools, bool in_turn,
-                                                            bool paused);
+  std::vector<std::optional<ToolRequest>> begin_frame(const ToolInputs& tools, bool in_turn,
+                                                      bool paused);
   /// The frame is done.
   FrameTime end_frame();
   /// Of messages between frames.

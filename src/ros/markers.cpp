@@ -8,6 +8,7 @@
 #include "fragments/piece_colour.h"
 #include "ros/conversions.h"
 #include "ros/force_arrow.h"
+#include "tools/tool_shapes.h"
 
 namespace tissue_sim {
 namespace {
@@ -50,59 +51,15 @@ Marker deleted(const MarkerInput& input, const std::string& ns, int id) {
 
 geometry_msgs::Vector3 scale(double x, double y, double z) { return to_vector3(Vec3(x, y, z)); }
 
-// A shape of the tool, its centre on the shaft's axis at `z` unless `x` says otherwise.
-Marker part(const MarkerInput& input, std::size_t tool, int part, int type, const Pose& pose,
-            const Vec3& center, const geometry_msgs::Vector3& size, std_msgs::ColorRGBA c) {
-  Marker m = marker(input, input.scene.tools[tool].name, part, type);
-  m.pose = to_pose({pose * center, pose.orientation});
-  m.scale = size;
-  m.color = c;
-  return m;
-}
-
 void add_tool(const MarkerInput& input, std::size_t i, MarkerArray& array) {
-  const Tool& tool = input.scene.tools[i];
-  const Pose& pose = input.tools[i].end;
-  const std_msgs::ColorRGBA steel = color(0.75f, 0.78f, 0.82f);
-  if (tool.type == ToolType::kScalpel) {
-    const double w = tool.blade_width, l = tool.blade_length, handle = 0.1;
-    array.markers.push_back(part(input, i, 0, Marker::CUBE, pose, Vec3(-w / 2, 0, -l / 2),
-                                 scale(w, std::max(tool.blade_thickness, 0.0005), l), steel));
-    array.markers.push_back(part(input, i, 1, Marker::CYLINDER, pose,
-                                 Vec3(-w / 2, 0, -l - handle / 2), scale(w, w, handle),
-                                 color(0.25f, 0.27f, 0.30f)));
-  } else if (tool.type == ToolType::kGrasper) {
-    const double jaw = input.tools[i].jaw_end, l = tool.jaw_length, w = tool.jaw_width;
-    for (int side = 0; side < 2; ++side) {
-      const double sign = side == 0 ? -1 : 1;
-      const Vec3 hinge(0, 0, -l);
-      const Quat swing(Eigen::AngleAxisd(0.5 * sign * jaw, Vec3::UnitY()));
-      const Pose open = {pose * hinge, pose.orientation * swing};
-      array.markers.push_back(part(input, i, side, Marker::CUBE, open,
-                                   Vec3(0.25 * sign * w, 0, l / 2), scale(w / 2, w, l), steel));
-    }
-    const double shaft = 0.1;
-    array.markers.push_back(part(input, i, 2, Marker::CYLINDER, pose, Vec3(0, 0, -l - shaft / 2),
-                                 scale(w, w, shaft), color(0.25f, 0.27f, 0.30f)));
-  } else if (tool.type == ToolType::kBall) {
-    const double d = 2 * tool.radius;
-    array.markers.push_back(
-        part(input, i, 0, Marker::SPHERE, pose, Vec3(0, 0, -d / 2), scale(d, d, d), steel));
-  } else if (tool.type == ToolType::kPunch) {
-    const double d = 2 * tool.radius, l = tool.length;
-    array.markers.push_back(
-        part(input, i, 0, Marker::CYLINDER, pose, Vec3(0, 0, -l / 2), scale(d, d, l), steel));
-  } else if (tool.type == ToolType::kPlate) {
-    const Vec3& s = tool.size;
-    array.markers.push_back(part(input, i, 0, Marker::CUBE, pose, Vec3(0, 0, -s.z() / 2),
-                                 scale(s.x(), s.y(), s.z()), steel));
-  } else {  // the capsule that touches: its tip is the tool's origin
-    const double r = tool.radius, l = std::max(tool.length, 2 * r);
-    const geometry_msgs::Vector3 ball = scale(2 * r, 2 * r, 2 * r);
-    array.markers.push_back(part(input, i, 0, Marker::SPHERE, pose, Vec3(0, 0, -r), ball, steel));
-    array.markers.push_back(part(input, i, 1, Marker::CYLINDER, pose, Vec3(0, 0, -(r + l) / 2),
-                                 scale(2 * r, 2 * r, l - r), steel));
-    array.markers.push_back(part(input, i, 2, Marker::SPHERE, pose, Vec3(0, 0, -l), ball, steel));
+  constexpr int kType[] = {Marker::CUBE, Marker::CYLINDER, Marker::SPHERE};
+  int id = 0;
+  for (const ToolShape& shape : tool_shapes(input.scene.tools[i], input.tools[i])) {
+    Marker m = marker(input, input.scene.tools[i].name, id++, kType[shape.kind]);
+    m.pose = to_pose(shape.pose);
+    m.scale = to_vector3(shape.size);
+    m.color = shape.is_handle ? color(0.25f, 0.27f, 0.30f) : color(0.75f, 0.78f, 0.82f);
+    array.markers.push_back(m);
   }
 }
 

@@ -182,7 +182,7 @@ Session Node::make_session(const Scene& asked) {
   session.scene_input =
       std::make_shared<SceneInput>(pose_node_, scene, frames_, parameters_.max_tool_speed);
   session.publications =
-      std::make_shared<Publications>(service_node_, scene, parameters, recorder_);
+      std::make_shared<Publications>(service_node_, scene, parameters, recorder_, &frames_);
   Tissue& tissue = session.simulation->tissue();
   for (const std::string& note : tissue.notes()) ROS_WARN("%s", note.c_str());
   for (const std::string& note : ground_notes(scene, tissue.fragments())) {

@@ -5,7 +5,7 @@
 namespace tissue_sim {
 
 Publications::Publications(ros::NodeHandle& node, const Scene& scene, const Parameters& parameters,
-                           Recorder& recorder)
+                           Recorder& recorder, const Frames* frames)
     : scene_(scene),
       parameters_(parameters),
       scene_output_(node, "scene", 1, recorder, true),
@@ -43,6 +43,9 @@ Publications::Publications(ros::NodeHandle& node, const Scene& scene, const Para
       ++number;
     }
   }
+  if (!scene.cameras.empty()) {
+    cameras_ = std::make_unique<Cameras>(node, scene, parameters, frames, recorder);
+  }
 }
 
 std::set<std::string> Publications::topics() const {
@@ -55,6 +58,7 @@ std::set<std::string> Publications::topics() const {
     if (tool.grip) names.insert(tool.grip->topic());
   }
   for (const AnchorOutput& anchor : anchors_) names.insert(anchor.spatial.topic());
+  if (cameras_) names.merge(cameras_->topics());
   return names;
 }
 
@@ -100,6 +104,7 @@ void Publications::publish(Simulation& simulation, const FrameReport& report, co
     state_.publish(state(simulation, report, run, stamp), stamp);
   }
   if (run.blew_up) return;  // what follows may hold NaN
+  if (cameras_) cameras_->publish(simulation, stamp, now, all);
   const bool fragments_due = fragments_due_.due(now) || all || came_apart;
   if (fragments_due && fragments_.wanted()) {
     fragments_.publish(fragment_message(simulation, stamp), stamp);
@@ -245,6 +250,7 @@ void Publications::publish_tf(const FrameReport& report, const ros::Time& stamp,
     t.transform = to_transform(report.input.tools[i].end);
     m->transforms.push_back(t);
   }
+  if (cameras_) cameras_->add_transforms(header(stamp), *m);
   if (m->transforms.empty()) return;
   tf_stamp_ = stamp;
   tf_.send(into_bag, stamp, [&] { return m; });

@@ -10,12 +10,14 @@
 
 #include <array>
 #include <cstddef>
+#include <memory>
 #include <optional>
 #include <set>
 #include <string>
 #include <utility>
 #include <vector>
 
+#include "ros/cameras.h"
 #include "ros/cloud_memory.h"
 #include "ros/markers.h"
 #include "ros/messages.h"
@@ -36,8 +38,9 @@ struct FrameTime {
 /// Belongs to the simulation's thread, but for the constructor and topics().
 class Publications {
  public:
+  /// Without `frames` cameras stay where the scene has them.
   Publications(ros::NodeHandle& node, const Scene& scene, const Parameters& parameters,
-               Recorder& recorder);
+               Recorder& recorder, const Frames* frames = nullptr);
 
   /// Names of the topics as they are in bags.
   std::set<std::string> topics() const;
@@ -107,6 +110,7 @@ class Publications {
   std::size_t next_cloud_ = 0;
   PieceCount pieces_;
   ros::Time tf_stamp_;
+  std::unique_ptr<Cameras> cameras_;  ///< null without any; last, for it has a thread
 };
 
 }  // namespace tissue_sim

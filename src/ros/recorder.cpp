@@ -33,6 +33,9 @@ void create_new(const std::string& path) {
 
 constexpr std::chrono::milliseconds kFlush(400);  // what a killed node loses at most
 constexpr std::uint32_t kChunkSize = 768 * 1024;  // rosbag's own [bytes]
+// What comes to a message, a connection and a chunk at most beside their own bytes, and what is
+// still in buffers of the file.
+constexpr double kMessageExtra = 500, kConnectionExtra = 500, kChunkExtra = 150, kBuffered = 8192;
 
 /// Zeros for a file that is not there.
 FileIdentity identity_of(const std::string& path) {
@@ -93,6 +96,9 @@ std::string Recorder::start(const std::string& name, std::set<std::string> topic
   }
   create_new(active);
   file_ = identity_of(active);
+  size_ = kBuffered;
+  index_ = 0;
+  written_.clear();
   try {
     bag_ = std::make_unique<rosbag::Bag>();
     bag_->open(active, rosbag::bagmode::Write);
@@ -195,6 +201,7 @@ void Recorder::write_all() {
         throw std::runtime_error("the disk is full up to recording_reserve");
       }
     }
+    if (limit_ > 0) check_limit(item);
     item.write(*bag_, item.time);
     if (bag_->getChunkThreshold() == 0) bag_->setChunkThreshold(kChunkSize);
     lock.lock();
@@ -230,11 +237,28 @@ void Recorder::flush() {
   // Ends the chunk. What rosbag keeps of it in memory goes when a chunk grows too large, so the
   // next message is one that is: see write_all().
   bag_->setChunkThreshold(0);
+  // This one and the next message's, and those that rosbag ended before.
   struct stat status;
-  if (limit_ > 0 && stat(active.c_str(), &status) == 0 &&
-      static_cast<double>(status.st_size) > limit_) {
-    throw std::runtime_error("it has reached recording_limit");
+  if (stat(active.c_str(), &status) != 0) return;
+  const double size = static_cast<double>(status.st_size) + kBuffered;
+  const double chunks = 3 + std::max(0.0, size_ - size) / kChunkSize;
+  index_ += chunks * (kChunkExtra + 8 * static_cast<double>(written_.size()));
+  size_ = size;
+}
+
+void Recorder::check_limit(const Item& item) {
+  double bytes = 1.01 * static_cast<double>(item.bytes) + kMessageExtra;  // that do not compress
+  if (written_.insert(item.topic).second) {
+    const double connection = static_cast<double>(item.definition) + kConnectionExtra;
+    bytes += connection;
+    index_ += 2 * connection;
   }
+  for (const bool sure : {false, true}) {
+    if (size_ + bytes + index_ <= limit_) break;
+    if (sure) throw std::runtime_error("it has reached recording_limit");
+    flush();  // says what compression left of it
+  }
+  size_ += bytes;
 }
 
 std::string Recorder::rescue(const std::string& why) {

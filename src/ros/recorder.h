@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <condition_variable>
 #include <cstdint>
+#include <cstring>
 #include <deque>
 #include <functional>
 #include <map>
@@ -49,7 +50,7 @@ struct FileIdentity {
 class Recorder {
  public:
   /// `queue` bytes of messages may wait for the disk; `reserve` bytes of the disk stay free.
-  /// A recording that has grown to `limit` bytes ends; 0 for none.
+  /// A recording ends before its bag has more than `limit` bytes; 0 for none.
   Recorder(std::string folder, double queue, double reserve, double limit = 0);
   /// Ends the recording.
   ~Recorder();
@@ -83,7 +84,8 @@ class Recorder {
       (*header)["message_definition"] = ros::message_traits::definition(*message);
       (*header)["latching"] = "1";
     }
-    push({topic, bytes, time,
+    const std::uint64_t definition = std::strlen(ros::message_traits::definition(*message));
+    push({topic, bytes, definition, time,
           [=](rosbag::Bag& bag, const ros::Time& at) { bag.write(topic, at, message, header); }},
          must_keep);
   }
@@ -91,7 +93,7 @@ class Recorder {
  private:
   struct Item {
     std::string topic;
-    std::uint64_t bytes;
+    std::uint64_t bytes, definition;  // of the message, and of the text of its type
     ros::Time time;
     std::function<void(rosbag::Bag&, const ros::Time&)> write;
   };
@@ -104,8 +106,10 @@ class Recorder {
   /// The same where rosbag cannot: see repair_bag().
   std::string rescue(const std::string& why);
   /// Ends the chunk, so that all that was written is there whatever becomes of this process. Throws
-  /// where the bag is gone, or too large.
+  /// where the bag is gone.
   void flush();
+  /// Throws where the bag, closed after this item, might be larger than the limit.
+  void check_limit(const Item& item);
 
   const std::string folder_;
   const double queue_limit_, reserve_, limit_;  // [bytes]
@@ -113,6 +117,9 @@ class Recorder {
   std::thread thread_;
   std::unique_ptr<rosbag::Bag> bag_;  // of the thread, while it runs
   FileIdentity file_;                 // the bag's, while it is written
+  double size_ = 0;                   // of its file at most, and of the index to come [bytes]
+  double index_ = 0;
+  std::set<std::string> written_;  // topics
 
   mutable std::mutex mutex_;  // of what follows
   std::condition_variable wake_;

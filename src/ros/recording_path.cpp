@@ -105,20 +105,6 @@ std::string recorded_path(const std::string& folder, const std::string& name,
   return path.string();
 }
 
-void check_folder(const std::string& file, const std::vector<std::string>& folders) {
-  if (folders.empty()) return;
-  std::error_code error;
-  const fs::path path = fs::canonical(file, error);
-  for (const std::string& folder : folders) {
-    std::error_code of_folder;
-    const fs::path root = fs::canonical(folder, of_folder);
-    if (!error && !of_folder && inside(root, path)) return;
-  }
-  throw std::runtime_error("'" + file.substr(0, 200) +
-                           "' lies in none of the folders that may be loaded from (parameter "
-                           "load_folders)");
-}
-
 double free_space(const std::string& path) {
   struct statvfs disk;
   if (statvfs(path.c_str(), &disk) != 0) {

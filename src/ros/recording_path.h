@@ -2,7 +2,6 @@
 #pragma once
 
 #include <string>
-#include <vector>
 
 namespace tissue_sim {
 
@@ -16,10 +15,6 @@ std::string recording_path(const std::string& folder, const std::string& name,
 /// in the folder.
 std::string recorded_path(const std::string& folder, const std::string& name,
                           const std::string& extension);
-
-/// Throws std::runtime_error for a file that lies in none of these folders, links followed; without
-/// folders each will do.
-void check_folder(const std::string& file, const std::vector<std::string>& folders);
 
 /// Space left on the disk that holds `path`, for this user [bytes]; throws std::runtime_error.
 double free_space(const std::string& path);

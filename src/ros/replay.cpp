@@ -111,7 +111,6 @@ void Replay::begin_run(const ros::Time& stamp) {
   if (change_) change_(scene);
   simulation_.reset();  // its memory, before the next one's
   simulation_ = std::make_unique<Simulation>(scene);
-  report_.run_on = simulation_->tissue().device_name();
   ++report_.runs;
   run_ = {};
   pieces_ = {};
@@ -150,8 +149,7 @@ void Replay::on_input(const FrameInputMessage& input) {
                                scene.tools[i].name + "'");
     }
   }
-  simulation_->apply(from_message(input));
-  frame_ = simulation_->advance_frame();
+  frame_ = simulation_->repeat_frame(from_message(input));
   ++report_.frames;
   run_.blew_up = frame_.result.blew_up;
   const std::string text = difference(input, to_message(frame_.input, scene));
@@ -164,6 +162,7 @@ void Replay::on_state(const SimulationState& recorded) {
   report_.recorded_on = recorded.device;
   pieces_.follow(simulation_->tissue());
   const SimulationState state = state_message(*simulation_, frame_, run_, pieces_, true);
+  report_.run_on = state.device;
   ++report_.compared;
   report_.checksums += !recorded.checksum.empty();
   const std::string text = difference(recorded, state);

@@ -145,6 +145,11 @@ std::string world_of(const rosbag::Bag& bag, const RecordedTopics& topics) {
   return input ? input->header.frame_id : "world";
 }
 
+/// A device without its number of threads, of which no bit depends.
+std::string machine_of(const std::string& device) {
+  return device.substr(0, device.find_first_of(",;"));
+}
+
 void report_on(const ReplayReport& r, double seconds) {
   std::printf("%" PRId64 " frames of %d runs in %.1f s, %" PRId64 " states compared, %" PRId64
               " of them by checksum\n",
@@ -155,7 +160,7 @@ void report_on(const ReplayReport& r, double seconds) {
   }
   if (!r.first.empty()) {
     std::printf("first difference: %s\n%" PRId64 " frames differ\n", r.first.c_str(), r.differing);
-    if (r.recorded_on != r.run_on) {
+    if (machine_of(r.recorded_on) != machine_of(r.run_on)) {
       std::printf("recorded on %s, run on %s: the bits of one are not those of the other\n",
                   r.recorded_on.c_str(), r.run_on.c_str());
     }
@@ -173,11 +178,7 @@ std::optional<Device> device_of(const std::string& name) {
 int replay(const Options& options) {
   const std::optional<Device> device = device_of(options.device);
   rosbag::Bag bag;
-  try {
-    bag.open(options.bag, rosbag::bagmode::Read);
-  } catch (const rosbag::BagUnindexedException&) {
-    throw std::runtime_error("the bag was not closed: 'rosbag reindex' makes it readable");
-  }
+  bag.open(options.bag, rosbag::bagmode::Read);
   const RecordedTopics topics = recorded_topics(bag, options.node);
   std::optional<Output> output;
   std::optional<ros::AsyncSpinner> spinner;
@@ -242,8 +243,18 @@ int replay(const Options& options) {
 int replay(int argc, char** argv) {
   ros::init(argc, argv, "replay", ros::init_options::AnonymousName);
   ros::Time::init();
+  std::string bag;
   try {
-    return replay(read_options(argc, argv));
+    const Options options = read_options(argc, argv);
+    bag = options.bag;
+    return replay(options);
+  } catch (const rosbag::BagException& e) {
+    std::fflush(stdout);
+    std::fprintf(stderr,
+                 "cannot replay: %s. Where the bag was not closed, or is cut short, 'rosrun "
+                 "tissue_sim repair_bag %s' makes what is whole of it readable\n",
+                 e.what(), bag.c_str());
+    return kCannot;
   } catch (const std::exception& e) {
     std::fflush(stdout);
     std::fprintf(stderr, "cannot replay: %s\n", e.what());

@@ -1,6 +1,5 @@
 #include "ros/scene_input.h"
 
-#include <stdexcept>
 #include <utility>
 
 #include "ros/conversions.h"
@@ -90,20 +89,24 @@ void SceneInput::begin(const Simulation& simulation) {
   damping_.reset();
 }
 
-void SceneInput::apply(Simulation& simulation) {
+void SceneInput::ask(bool moves_anchors, FrameRequest& request) {
   const std::lock_guard<std::mutex> lock(mutex_);
   for (std::size_t i = 0; i < poses_.size(); ++i) {
     if (!poses_[i]) continue;
-    try {
-      simulation.set_anchor(static_cast<int>(i), *poses_[i]);
+    if (moves_anchors) {
+      request.anchors.resize(poses_.size());
+      request.anchors[i] = poses_[i];
       last_[i] = poses_[i]->position;
-    } catch (const std::invalid_argument& e) {
-      WARN_SELDOM(10, "anchor %s: %s", names_[i].c_str(), e.what());
+    } else {
+      WARN_SELDOM(10,
+                  "anchor %s: anchors do not move with this method: they do with method mls, and "
+                  "with method mpm unless mpm.boundary is lattice",
+                  names_[i].c_str());
     }
     poses_[i].reset();
   }
-  if (gravity_) simulation.set_gravity(*std::exchange(gravity_, std::nullopt));
-  if (damping_) simulation.set_damping(*std::exchange(damping_, std::nullopt));
+  request.gravity = std::exchange(gravity_, std::nullopt);
+  request.damping = std::exchange(damping_, std::nullopt);
 }
 
 }  // namespace tissue_sim

@@ -23,8 +23,8 @@ class SceneInput {
   SceneInput(ros::NodeHandle node, const Scene& scene, const Frames& frames, double fastest);
   /// Of a simulation that begins, or goes on from another state: forgets what came before.
   void begin(const Simulation& simulation);
-  /// What came since the last call goes into the simulation's next frame.
-  void apply(Simulation& simulation);
+  /// What came since the last call, for the next frame of tissue that `moves_anchors` or does not.
+  void ask(bool moves_anchors, FrameRequest& request);
 
  private:
   void on_pose(int anchor, const geometry_msgs::PoseStamped& message);

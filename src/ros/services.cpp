@@ -7,8 +7,8 @@
 
 #include "geometry/mesh.h"
 #include "ros/conversions.h"
-#include "ros/recording_path.h"
 #include "ros/service_answer.h"
+#include "scene/read_file.h"
 
 namespace tissue_sim {
 
@@ -222,9 +222,10 @@ bool Services::load_scene(LoadScene::Request& request, LoadScene::Response& resp
     }
     const auto lock = begin_building();
     const LimitWork limit(parameters_.limits());
-    const auto permitted = [this](const std::string& address, const char* kind) {
+    const PermitFolders folders(parameters_.load_folders);
+    const auto permitted = [&folders](const std::string& address, const char* kind) {
       const std::string path = resolve_path(address, kind);
-      check_folder(path, parameters_.load_folders);
+      folders.check(path);
       return path;
     };
     const Scene scene = request.yaml.empty()

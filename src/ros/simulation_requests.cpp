@@ -2,7 +2,6 @@
 #include <ros/console.h>
 
 #include <algorithm>
-#include <cmath>
 #include <stdexcept>
 #include <utility>
 
@@ -81,12 +80,8 @@ StepReply SimulationThread::settle(const SettleLimits& limits) {
       throw std::runtime_error("another step has " + std::to_string(steps_left_) +
                                " frames to go: wait for it");
     }
-    Simulation& simulation = *session_.simulation;
-    const double rate = simulation.scene().frame_rate;
-    const auto window = static_cast<std::size_t>(std::max(1.0, std::ceil(0.1 * rate)));
-    settling_ = Settling{limits, simulation.damping(), std::vector<double>(window, INFINITY), 0};
-    if (limits.damping >= 0) simulation.set_damping(limits.damping);
-    steps_left_ = static_cast<int>(std::max(1.0, std::ceil(limits.time * rate)));
+    settling_.emplace(*session_.simulation, limits);
+    steps_left_ = settling_->most_frames();
     step_reply_ = {};
     reply = step_reply_.get_future();
     real_time_factor_.restart();

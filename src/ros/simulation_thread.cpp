@@ -57,14 +57,12 @@ void SimulationThread::start_session() {
   for (PendingCut& cut : std::exchange(cuts_, {})) {
     cut.reply.set_value({false, "the simulation was started anew", {}});
   }
-  motion_ = session_.simulation->tools();
-  entries_.assign(scene.tools.size(), ToolEntry());
   clock_.restart(scene.frame_rate);
   for (const auto& tool : *session_.tools) tool->begin();
   session_.scene_input->begin(*session_.simulation);
   real_time_factor_.restart();
   report_ = FrameReport();
-  report_.input.tools = motion_;
+  report_.input.tools = session_.simulation->tools();
   run_.blew_up = false;
   run_.real_time_factor = 0;
   problem_.clear();
@@ -147,32 +145,18 @@ void SimulationThread::start_anew(const ros::Time& before, const ros::Time& now)
   start_session();
 }
 
-void SimulationThread::move_tools(AppliedInput& input) {
-  const double reach = parameters_.max_tool_speed / session_.simulation->scene().frame_rate;
-  input.tools = motion_;
-  input.grip_pressures.resize(motion_.size());
+void SimulationThread::ask_of_tools(FrameRequest& request) {
+  const Simulation& simulation = *session_.simulation;
+  const double reach = parameters_.max_tool_speed / simulation.scene().frame_rate;
   const bool in_turn = !run_.paused && steps_left_ == 0;
-  const auto samples = clock_.begin_frame(*session_.tools, in_turn, run_.paused);
-  for (std::size_t i = 0; i < input.tools.size(); ++i) {
-    const std::optional<ToolInput::Sample>& sample = samples[i];
-    if (!sample) continue;
-    ToolMotion& m = input.tools[i];
-    m.end = sample->pose;
-    m.jaw_end = static_cast<float>(sample->jaw);
-    input.grip_pressures[i] = sample->grip_pressure;
+  request.tools = clock_.begin_frame(*session_.tools, in_turn, run_.paused);
+  for (std::size_t i = 0; i < request.tools.size(); ++i) {
+    if (!request.tools[i]) continue;
+    ToolRequest& tool = *request.tools[i];
+    const ToolMotion& was = simulation.tools()[i];
     // What an arm did during a pause must not cut a straight line through the tissue now.
-    const bool strayed = resumed_ && (m.end.position - m.begin.position).norm() > reach;
-    const Scene& scene = session_.simulation->scene();
-    const bool placed = !m.present || sample->placed || strayed;
-    if (placed) {
-      const std::string note = entries_[i].place(scene.tools[i], m.end, m.jaw_end, scene.cell_size,
-                                                 session_.simulation->tissue());
-      if (!note.empty()) ROS_WARN("%s", note.c_str());
-      m.jaw_begin = m.jaw_end;
-    }
-    m.end = entries_[i].next(m.end, 1 / scene.frame_rate);
-    if (placed) m.begin = m.end;
-    m.present = true;
+    const bool strayed = resumed_ && (tool.pose.position - was.end.position).norm() > reach;
+    tool.placed = tool.placed || !was.present || strayed;
   }
   resumed_ = false;
 }
@@ -182,27 +166,21 @@ void SimulationThread::frame() {
   std::vector<PendingCut> cuts = std::exchange(cuts_, {});
   const LimitWork limit(parameters_.limits());
   try {
-    AppliedInput input;
-    input.frame = simulation.frame();
-    move_tools(input);
-    for (const PendingCut& cut : cuts) input.cuts.push_back(cut.path);
-    simulation.apply(input);
-    session_.scene_input->apply(simulation);
-    report_ = simulation.advance_frame();
+    FrameRequest request;
+    ask_of_tools(request);
+    for (const PendingCut& cut : cuts) request.cuts.push_back(cut.path);
+    session_.scene_input->ask(simulation.tissue().moves_anchors(), request);
+    report_ = simulation.advance_frame(request);
   } catch (const std::exception& e) {
     if (parameters_.work.stop != nullptr && *parameters_.work.stop) throw;  // the node ends
     for (PendingCut& cut : cuts) cut.reply.set_value({false, e.what(), {}});
     fail(std::string("the simulation failed: ") + e.what() + ": reset it");
     return;
   }
+  for (const std::string& note : report_.notes) ROS_WARN("%s", note.c_str());
   const CutReport& by_blades = report_.result.blade_report;
   if (by_blades.pieces_left_whole > 0) {
     WARN_SELDOM(1, "an instrument's cut: %s", by_blades.why_left_whole.c_str());
-  }
-  motion_ = report_.input.tools;
-  for (ToolMotion& m : motion_) {
-    m.begin = m.end;
-    m.jaw_begin = m.jaw_end;
   }
   real_time_factor_.add(WallClock::now(), simulation.time());
   run_.real_time_factor = real_time_factor_.value();
@@ -222,31 +200,13 @@ void SimulationThread::frame() {
     return;
   }
   update_status();
-  if (steps_left_ > 0 && has_settled()) steps_left_ = 1;
+  if (steps_left_ > 0 && settling_ && settling_->is_over(report_)) steps_left_ = 1;
   if (steps_left_ > 0 && --steps_left_ == 0) {
     StepReply reply{true, "", simulation.frame(), simulation.time(), {}};
-    if (settling_) {
-      reply.settled.time = settling_->frames / simulation.scene().frame_rate;
-      reply.settled.speed = *std::max_element(settling_->speeds.begin(), settling_->speeds.end());
-      reply.settled.at_rest = reply.settled.speed < settling_->limits.speed;
-    }
-    end_settling();
+    if (settling_) reply.settled = settling_->end(simulation);
+    settling_.reset();
     step_reply_.set_value(reply);
   }
-}
-
-bool SimulationThread::has_settled() {
-  if (!settling_) return false;
-  Settling& s = *settling_;
-  s.speeds[s.frames++ % s.speeds.size()] = report_.result.max_speed;
-  return *std::max_element(s.speeds.begin(), s.speeds.end()) < s.limits.speed;
-}
-
-void SimulationThread::end_settling() {
-  if (settling_ && settling_->limits.damping >= 0) {
-    session_.simulation->set_damping(settling_->damping);
-  }
-  settling_.reset();
 }
 
 void SimulationThread::answer_cuts(std::vector<PendingCut>& cuts, const FrameReport& report) {
@@ -270,7 +230,8 @@ void SimulationThread::answer_cuts(std::vector<PendingCut>& cuts, const FrameRep
 
 void SimulationThread::answer_step(const char* interrupted) {
   if (std::exchange(steps_left_, 0) == 0) return;
-  end_settling();
+  if (settling_) settling_->end(*session_.simulation);
+  settling_.reset();
   step_reply_.set_value(
       {false, interrupted, session_.simulation->frame(), session_.simulation->time(), {}});
 }

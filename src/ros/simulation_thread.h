@@ -18,7 +18,6 @@
 #include "ros/parameters.h"
 #include "ros/publications.h"
 #include "ros/scene_input.h"
-#include "ros/tool_entry.h"
 #include "ros/tool_input.h"
 #include "tissue_sim/simulation.h"
 
@@ -119,13 +118,10 @@ class SimulationThread {
   void run_frames();
   void frame();
   bool frame_due();
-  void move_tools(AppliedInput& input);
+  void ask_of_tools(FrameRequest& request);
   void start_anew(const ros::Time& before, const ros::Time& now);
   void answer_cuts(std::vector<PendingCut>& cuts, const FrameReport& report);
   void answer_step(const char* interrupted);
-  /// Whether it is over, after a frame.
-  bool has_settled();
-  void end_settling();
   void fail(const std::string& problem);
   void start_session();
   void update_status();
@@ -139,8 +135,6 @@ class SimulationThread {
 
   // Of the thread alone.
   Session session_;
-  std::vector<ToolMotion> motion_;  // at rest where the last frame left them
-  std::vector<ToolEntry> entries_;  // of each tool
   FrameClock clock_;
   RealTimeFactor real_time_factor_;
   FrameReport report_;  // of the last frame
@@ -150,12 +144,6 @@ class SimulationThread {
   std::vector<PendingCut> cuts_;
   int steps_left_ = 0;
   std::promise<StepReply> step_reply_;
-  struct Settling {
-    SettleLimits limits;
-    double damping;              // before
-    std::vector<double> speeds;  // of the last frames [m/s]
-    std::size_t frames = 0;
-  };
   std::optional<Settling> settling_;
 
   mutable std::mutex mutex_;  // of what follows

@@ -179,11 +179,10 @@ void ToolInput::check(const Pose& frame, const Pose& in_frame, const ros::Time& 
   } else {
     pose_track_.add(pose, now());
   }
-  if (!sample_) sample_ = Sample();
+  if (!sample_) sample_ = ToolRequest();
   sample_->pose = pose;
   // Until the placed one was taken, whatever comes after it is placed, too.
   sample_->placed = sample_->placed || verdict.placed;
-  sample_->fresh = true;
 }
 
 void ToolInput::refuse(Refusal refusal, const std::string& text) {
@@ -228,7 +227,6 @@ void ToolInput::accept_jaw(const sensor_msgs::JointState& message) {
   }
   jaw_came_ = true;
   jaw_ = jaw.angle;
-  if (sample_) sample_->fresh = true;
 }
 
 void ToolInput::on_grip_pressure(const std_msgs::Float64::ConstPtr& message) {
@@ -243,23 +241,23 @@ void ToolInput::on_grip_pressure(const std_msgs::Float64::ConstPtr& message) {
   }
 }
 
-std::optional<ToolInput::Sample> ToolInput::take() {
+std::optional<ToolRequest> ToolInput::take() {
   release(Held::kAll);
   return take_released(ros::Time());
 }
 
-std::optional<ToolInput::Sample> ToolInput::take_released(const ros::Time& at) {
+std::optional<ToolRequest> ToolInput::take_released(const ros::Time& at) {
   if (!tf_frame_.empty()) follow_tf(at);
   const std::lock_guard<std::mutex> lock(mutex_);
   if (!sample_) return std::nullopt;
-  Sample sample = *sample_;
+  ToolRequest sample = *sample_;
   sample.jaw = jaw_;
   sample.grip_pressure = grip_pressure_;
   if (interpolates_) {
     sample.pose = pose_track_.at(now());
     if (jaw_came_) sample.jaw = jaw_track_.at(now());
   }
-  sample_->placed = sample_->fresh = false;
+  sample_->placed = false;
   return sample;
 }
 
@@ -267,7 +265,7 @@ void ToolInput::rewind() {
   const std::lock_guard<std::mutex> lock(mutex_);
   check_.forget();
   if (!sample_) return;
-  sample_->placed = sample_->fresh = true;
+  sample_->placed = true;
   pose_track_.place(sample_->pose, now());
 }
 

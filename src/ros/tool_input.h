@@ -39,24 +39,17 @@ class ToolInput {
             const PoseLimits& limits, const Frames& frames, const Box& tissue, Recorder& recorder,
             std::function<void()> on_sample, bool publishes_tf = true);
 
-  struct Sample {
-    Pose pose;                 ///< world frame
-    double jaw = 0;            ///< [rad]
-    double grip_pressure = 0;  ///< [Pa], 0 for the scene's
-    bool placed = false;       ///< did not move there from where the tool was
-    bool fresh = false;        ///< a pose or an angle came since the last one was taken
-  };
   /// Where the tool shall be now: as the newest sample says or, with interpolation, on the way to
   /// it. None before the first pose. Where the tool follows tf, looks there.
-  std::optional<Sample> take();
-  /// The newest sample counts as fresh and as placed, and the next pose as the first: for a
+  std::optional<ToolRequest> take();
+  /// The newest sample counts as placed, and the next pose as the first: for a
   /// simulation that starts anew, and its instruments' time with it.
   void rewind();
 
   /// The same by ROS time: the newest of those stamped up to `until`.
-  std::optional<Sample> take_until(const ros::Time& until);
+  std::optional<ToolRequest> take_until(const ros::Time& until);
   /// The same one by one: the oldest pose that is held, with the oldest jaw angle.
-  std::optional<Sample> take_next();
+  std::optional<ToolRequest> take_next();
   bool has_next();         ///< a pose and, of a grasper whose jaws are connected, an angle
   bool connected() const;  ///< somebody publishes its poses
   /// Stamp of the oldest pose that is held [ns].
@@ -92,7 +85,7 @@ class ToolInput {
   /// Calls what is held up to `until`.
   void release(std::int64_t until);
   /// Where the tool follows tf: where it was at that time; 0: the newest.
-  std::optional<Sample> take_released(const ros::Time& at);
+  std::optional<ToolRequest> take_released(const ros::Time& at);
   void on_grip_pressure(const std_msgs::Float64::ConstPtr& message);
   void follow_tf(const ros::Time& at);
   void accept(const std_msgs::Header& header, const Pose& in_frame);
@@ -124,7 +117,7 @@ class ToolInput {
   mutable std::mutex mutex_;  // of what follows
   PoseCheck check_;
   PoseCounts counts_;
-  std::optional<Sample> sample_;
+  std::optional<ToolRequest> sample_;
   SampleTrack<Pose> pose_track_;
   SampleTrack<double> jaw_track_;
   double jaw_ = 0, grip_pressure_ = 0;

@@ -57,13 +57,13 @@ void ToolInput::release(std::int64_t until) {
   }
 }
 
-std::optional<ToolInput::Sample> ToolInput::take_until(const ros::Time& until) {
+std::optional<ToolRequest> ToolInput::take_until(const ros::Time& until) {
   release(in_nanoseconds(until));
   held_now_ = until.toSec();
   return take_released(until);
 }
 
-std::optional<ToolInput::Sample> ToolInput::take_next() {
+std::optional<ToolRequest> ToolInput::take_next() {
   {
     const std::lock_guard<std::mutex> lock(held_mutex_);
     const WallTime now = WallClock::now();
@@ -113,7 +113,7 @@ void ToolInput::restart(const ros::Time& before, const ros::Time& now) {
   if (!pose_latched_) {
     sample_.reset();
   } else if (sample_) {
-    sample_->fresh = sample_->placed = came_since_ = true;
+    sample_->placed = came_since_ = true;
   }
   if (jaw_latched_) return;
   jaw_came_ = false;

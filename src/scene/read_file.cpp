@@ -4,14 +4,23 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <cstring>
+#include <filesystem>
 #include <stdexcept>
 
 #include "tissue_sim/limits.h"
 
 namespace tissue_sim {
 namespace {
+
+namespace fs = std::filesystem;
+
+const char kElsewhere[] =
+    "lies in none of the folders that may be loaded from (parameter load_folders)";
+
+thread_local std::vector<std::string> permitted_folders;
 
 struct OpenFile {
   int number;
@@ -33,9 +42,46 @@ void check_kind(const struct stat& status) {
     refuse("is no file, but a pipe, socket or device: give a regular file");
 }
 
+bool inside(const fs::path& folder, const fs::path& path) {
+  const fs::path relative = path.lexically_relative(folder);
+  return !relative.empty() && *relative.begin() != "..";
+}
+
+bool inside_any(const std::vector<std::string>& folders, const fs::path& path) {
+  return std::any_of(folders.begin(), folders.end(), [&path](const std::string& folder) {
+    std::error_code error;
+    const fs::path root = fs::canonical(folder, error);
+    return !error && inside(root, path);
+  });
+}
+
+// Of the file that was opened, whatever its name leads to by now: a link may have been exchanged
+// since its name was looked at.
+void check_folder_of(const OpenFile& file) {
+  if (permitted_folders.empty()) return;
+  std::error_code error;
+  const fs::path opened = fs::read_symlink("/proc/self/fd/" + std::to_string(file.number), error);
+  if (error || !inside_any(permitted_folders, opened)) refuse(kElsewhere);
+}
+
 }  // namespace
 
-std::string read_file(const std::string& path, std::size_t most) {
+PermitFolders::PermitFolders(std::vector<std::string> folders) {
+  permitted_folders = std::move(folders);
+}
+
+PermitFolders::~PermitFolders() { permitted_folders.clear(); }
+
+void PermitFolders::check(const std::string& file) const {
+  if (permitted_folders.empty()) return;
+  std::error_code error;
+  const fs::path path = fs::canonical(file, error);
+  if (error || !inside_any(permitted_folders, path)) {
+    throw std::runtime_error("'" + file.substr(0, 200) + "' " + kElsewhere);
+  }
+}
+
+std::string read_file(const std::string& path, std::size_t most, ReadFrom from) {
   struct stat status;
   if (stat(path.c_str(), &status) != 0) refuse_as(errno);
   check_kind(status);  // before it is opened: to open a device may do something
@@ -43,6 +89,7 @@ std::string read_file(const std::string& path, std::size_t most) {
   if (file.number < 0) refuse_as(errno);
   if (fstat(file.number, &status) != 0) refuse_as(errno);
   check_kind(status);  // it may have become another meanwhile
+  if (from == ReadFrom::kPermitted) check_folder_of(file);
   const auto too_large = [most] {
     refuse("is larger than " + std::to_string(most >> 20) + " MiB: that is too large");
   };

@@ -14,6 +14,7 @@ namespace {
 constexpr std::size_t kLongestName = 200, kLongestPath = 4096;
 constexpr std::size_t kMostBodies = 1000;  // each may meet each: memory grows with the square
 constexpr std::size_t kMostTools = 100, kMostMaterials = 1000, kMostAnchors = 1000;
+constexpr std::size_t kMostCameras = 16;
 
 [[noreturn]] void refuse(const std::string& field, const std::string& value,
                          const std::string& allowed) {
@@ -222,12 +223,37 @@ void check_tool(const std::string& path, const Tool& tool, std::set<std::string>
   check_friction(path + ".friction", tool.friction);
 }
 
+void check_camera(const std::string& path, const Camera& camera, std::set<std::string>& names) {
+  check_name(path + ".name", camera.name, names);
+  check_ros_name(path + ".name", camera.name);
+  check_range(path + ".width", camera.width, 16, 4096, "pixels");
+  check_range(path + ".height", camera.height, 16, 4096, "pixels");
+  check_range(path + ".hfov", camera.hfov, 5, 150, "degrees");
+  check_range(path + ".rate", camera.rate, 0.1, 1000, "Hz");
+  check_range(path + ".baseline", camera.baseline, 0, 1, "m");
+  check_pose(path + ".pose", camera.pose);
+  check_utf8(path + ".tf_frame", camera.tf_frame);
+  if (camera.tf_frame.size() > kLongestName) {
+    refuse(path + ".tf_frame", quoted(camera.tf_frame), "must not be longer than 200 characters");
+  }
+  check_range(path + ".near", camera.near, 1e-4, 100, "m");
+  check_range(path + ".far", camera.far, 1e-4, 100, "m");
+  if (!(camera.near < camera.far)) {
+    refuse(path + ".far", text(camera.far), "must be above near, " + text(camera.near));
+  }
+  check_enum(path + ".colours", camera.colours, kCameraColourNames);
+  if (!camera.distortion.empty() && camera.distortion.size() != 5) {
+    refuse(path + ".distortion", "a list of " + std::to_string(camera.distortion.size()),
+           "must be k1, k2, p1, p2, k3, or none");
+  }
+  for (const double d : camera.distortion) check_range(path + ".distortion", d, -10, 10);
+}
+
 void check_mls(const MlsOptions& mls) {
   if (mls.spacing != 0) check_range("mls.spacing", mls.spacing, 1e-5, 1, "m, or 0 for half a cell");
   if (mls.neighbours < 14 || mls.neighbours > 60) {
     refuse("mls.neighbours", std::to_string(mls.neighbours), "must lie between 14 and 60");
   }
-  check_enum("mls.basis", mls.basis, kMlsBasisNames);
   check_enum("mls.placement", mls.placement, kMlsPlacementNames);
   check_enum("mls.contact", mls.contact, kMlsContactNames);
   check_range("mls.grading", mls.grading, 1, 4);
@@ -308,10 +334,13 @@ bool Region::contains(const Vec3& x) const {
 }
 
 void validate(const Scene& scene) {
+  // First: of a file without bodies, which is no scene, nothing else is said.
+  if (scene.bodies.empty()) refuse("bodies", "empty", "a scene needs at least one body");
   check_length("name", scene.name);
   check_count("materials", scene.materials.size(), kMostMaterials);
   check_count("bodies", scene.bodies.size(), kMostBodies);
   check_count("tools", scene.tools.size(), kMostTools);
+  check_count("cameras", scene.cameras.size(), kMostCameras);
   check_enum("method", scene.method, kMethodNames);
   check_enum("device", scene.device, kDeviceNames);
   if (scene.threads < 0 || scene.threads > 1024) {
@@ -338,7 +367,6 @@ void validate(const Scene& scene) {
   for (std::size_t i = 0; i < scene.materials.size(); ++i) {
     check_material(at("materials", i), scene.materials[i], material_names);
   }
-  if (scene.bodies.empty()) refuse("bodies", "empty", "a scene needs at least one body");
   for (std::size_t i = 0; i < scene.bodies.size(); ++i) {
     const Body& body = scene.bodies[i];
     const std::string path = at("bodies", i);
@@ -367,6 +395,9 @@ void validate(const Scene& scene) {
   }
   for (std::size_t i = 0; i < scene.tools.size(); ++i) {
     check_tool(at("tools", i), scene.tools[i], tool_names);
+  }
+  for (std::size_t i = 0; i < scene.cameras.size(); ++i) {
+    check_camera(at("cameras", i), scene.cameras[i], tool_names);  // topics of both begin so
   }
 }
 

@@ -22,12 +22,8 @@ struct Spelling {
 
 inline constexpr Spelling<Method> kMethodNames[] = {
     {Method::kMpm, "mpm"}, {Method::kMls, "mls"}, {Method::kPbd, "pbd"}};
-inline constexpr Spelling<MlsPlacement> kMlsPlacementNames[] = {
-    {MlsPlacement::kRegular, "regular"},
-    {MlsPlacement::kJittered, "jittered"},
-    {MlsPlacement::kGraded, "graded"}};
-inline constexpr Spelling<MlsBasis> kMlsBasisNames[] = {{MlsBasis::kLinear, "linear"},
-                                                        {MlsBasis::kBalanced, "balanced"}};
+inline constexpr Spelling<MlsPlacement> kMlsPlacementNames[] = {{MlsPlacement::kRegular, "regular"},
+                                                                {MlsPlacement::kGraded, "graded"}};
 inline constexpr Spelling<MlsContact> kMlsContactNames[] = {{MlsContact::kNodes, "nodes"},
                                                             {MlsContact::kFaces, "faces"}};
 inline constexpr Spelling<PbdModel> kPbdModelNames[] = {{PbdModel::kSurface, "surface"},
@@ -45,6 +41,8 @@ inline constexpr Spelling<Shape> kShapeNames[] = {{Shape::kBox, "box"},
                                                   {Shape::kMesh, "mesh"}};
 inline constexpr Spelling<MpmBoundary> kMpmBoundaryNames[] = {{MpmBoundary::kSurface, "surface"},
                                                               {MpmBoundary::kLattice, "lattice"}};
+inline constexpr Spelling<CameraColours> kCameraColourNames[] = {
+    {CameraColours::kTissue, "tissue"}, {CameraColours::kFragments, "fragments"}};
 inline constexpr Spelling<ToolType> kToolTypeNames[] = {
     {ToolType::kScalpel, "scalpel"}, {ToolType::kProbe, "probe"}, {ToolType::kGrasper, "grasper"},
     {ToolType::kBall, "ball"},       {ToolType::kPunch, "punch"}, {ToolType::kPlate, "plate"}};

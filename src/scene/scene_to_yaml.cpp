@@ -138,6 +138,28 @@ void write(YAML::Emitter& out, const Tool& tool) {
   out << EndMap;
 }
 
+void write(YAML::Emitter& out, const Camera& camera) {
+  out << BeginMap;
+  write(out, "name", camera.name);
+  out << Key << "width" << Value << camera.width;
+  out << Key << "height" << Value << camera.height;
+  write(out, "hfov", camera.hfov);
+  write(out, "rate", camera.rate);
+  write(out, "baseline", camera.baseline);
+  out << Key << "pose" << Value << BeginMap;
+  write(out, "position", camera.pose.position);
+  write(out, "orientation", camera.pose.orientation);
+  out << EndMap;
+  write(out, "tf_frame", camera.tf_frame);
+  write(out, "near", camera.near);
+  write(out, "far", camera.far);
+  out << Key << "light" << Value << camera.light;
+  write(out, "colours", std::string(name_of(camera.colours, kCameraColourNames)));
+  out << Key << "distortion" << Value << Flow << BeginSeq;
+  for (const double d : camera.distortion) out << text(d);
+  out << EndSeq << EndMap;
+}
+
 void write(YAML::Emitter& out, const PbdOptions& pbd) {
   out << BeginMap;
   write(out, "model", std::string(name_of(pbd.model, kPbdModelNames)));
@@ -163,7 +185,6 @@ void write_mls(YAML::Emitter& out, const MlsOptions& mls) {
   out << Key << "mls" << Value << BeginMap;
   write(out, "spacing", mls.spacing);
   out << Key << "neighbours" << Value << mls.neighbours;
-  write(out, "basis", std::string(name_of(mls.basis, kMlsBasisNames)));
   write(out, "placement", std::string(name_of(mls.placement, kMlsPlacementNames)));
   write(out, "grading", mls.grading);
   write(out, "stabilisation", mls.stabilisation);
@@ -204,6 +225,7 @@ std::string scene_to_yaml(const Scene& scene) {
   write_list(out, "materials", scene.materials);
   write_list(out, "bodies", scene.bodies);
   write_list(out, "tools", scene.tools);
+  if (!scene.cameras.empty()) write_list(out, "cameras", scene.cameras);
   out << EndMap;
   return std::string(out.c_str()) + "\n";
 }

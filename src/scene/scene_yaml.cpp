@@ -163,6 +163,29 @@ Tool read_tool(const YAML::Node& node, const std::string& path) {
   return tool;
 }
 
+Camera read_camera(const YAML::Node& node, const std::string& path) {
+  const YamlFields fields(node, path,
+                          {"name", "width", "height", "hfov", "rate", "baseline", "pose",
+                           "tf_frame", "near", "far", "light", "colours", "distortion"});
+  Camera camera;
+  fields.read("name", camera.name);
+  fields.read("width", camera.width);
+  fields.read("height", camera.height);
+  fields.read("hfov", camera.hfov);
+  fields.read("rate", camera.rate);
+  fields.read("baseline", camera.baseline);
+  fields.read_map("pose", [&](const YAML::Node& pose, const std::string& pose_path) {
+    camera.pose = read_pose(pose, pose_path);
+  });
+  fields.read("tf_frame", camera.tf_frame);
+  fields.read("near", camera.near);
+  fields.read("far", camera.far);
+  fields.read("light", camera.light);
+  fields.read("colours", camera.colours, kCameraColourNames);
+  fields.read("distortion", camera.distortion, 5);
+  return camera;
+}
+
 PbdOptions read_pbd(const YAML::Node& node, const std::string& path) {
   const YamlFields fields(node, path,
                           {"model", "elasticity", "steps", "iterations", "edge", "bending",
@@ -184,7 +207,7 @@ Scene read_scene(const YAML::Node& node) {
   const YamlFields fields(node, "",
                           {"name", "method", "device", "threads", "cell_size", "frame_rate", "cfl",
                            "damping", "gravity", "seed", "fragment_network", "mpm", "mls", "pbd",
-                           "ground", "materials", "bodies", "tools"});
+                           "ground", "materials", "bodies", "tools", "cameras"});
   Scene scene;
   fields.read("name", scene.name);
   fields.read("method", scene.method, kMethodNames);
@@ -202,11 +225,9 @@ Scene read_scene(const YAML::Node& node) {
   });
   fields.read_map("mls", [&](const YAML::Node& mls, const std::string& path) {
     const YamlFields of(
-        mls, path,
-        {"spacing", "neighbours", "basis", "placement", "grading", "stabilisation", "contact"});
+        mls, path, {"spacing", "neighbours", "placement", "grading", "stabilisation", "contact"});
     of.read("spacing", scene.mls.spacing);
     of.read("neighbours", scene.mls.neighbours);
-    of.read("basis", scene.mls.basis, kMlsBasisNames);
     of.read("placement", scene.mls.placement, kMlsPlacementNames);
     of.read("grading", scene.mls.grading);
     of.read("stabilisation", scene.mls.stabilisation);
@@ -229,6 +250,9 @@ Scene read_scene(const YAML::Node& node) {
   });
   fields.read_list("tools", [&](const YAML::Node& item, const std::string& path) {
     scene.tools.push_back(read_tool(item, path));
+  });
+  fields.read_list("cameras", [&](const YAML::Node& item, const std::string& path) {
+    scene.cameras.push_back(read_camera(item, path));
   });
   return scene;
 }
@@ -277,6 +301,8 @@ Scene load_scene(const std::string& path) {
   Scene scene;
   try {
     scene = scene_from_yaml(text);
+  } catch (const FieldError& e) {  // what is no scene may be any file that this program can read
+    throw std::invalid_argument(path + ": " + e.unquoted());
   } catch (const std::invalid_argument& e) {
     throw std::invalid_argument(path + ": " + e.what());
   }

@@ -45,6 +45,14 @@ std::string shown(const YAML::Node& node) {
   return value;
 }
 
+// " (line 3, column 7)"
+std::string place(const YAML::Node& node) {
+  const YAML::Mark mark = node.Mark();
+  if (mark.is_null()) return "";
+  return " (line " + std::to_string(mark.line + 1) + ", column " + std::to_string(mark.column + 1) +
+         ")";
+}
+
 // All of the text as a T, without regard to the locale. Hexadecimal and a sign on unsigned numbers,
 // which yaml-cpp lets pass and wraps around, are refused.
 template <class T>
@@ -96,17 +104,19 @@ YamlFields::YamlFields(const YAML::Node& node, std::string path,
                        const std::vector<std::string>& known)
     : path_(std::move(path)) {
   if (!node.IsMap()) {
-    // Nothing is quoted of what is no scene: it may be any file that this program can read.
-    throw std::invalid_argument(
-        (path_.empty() ? "the scene is " + kind_of(node) : path_ + " is " + shown(node)) +
-        ": must be a map of the fields " + join(known));
+    const std::string allowed = ": must be a map of the fields " + join(known);
+    const std::string name = path_.empty() ? "the scene" : path_, kind = kind_of(node);
+    throw FieldError(name + " is " + (path_.empty() ? kind : shown(node)) + allowed,
+                     name + " is " + kind + place(node) + allowed);
   }
   for (const auto& item : node) {
     const std::string name = item.first.IsScalar() ? item.first.Scalar() : kind_of(item.first);
     if (std::find(known.begin(), known.end(), name) == known.end()) {
       const std::string word = name.size() > 40 ? name.substr(0, 37) + "..." : name;
-      throw std::invalid_argument(this->path(word) + ": unknown field, known here are " +
-                                  join(known));
+      const std::string allowed = "unknown field, known here are " + join(known);
+      throw FieldError(
+          this->path(word) + ": " + allowed,
+          (path_.empty() ? "the scene" : path_) + " has an " + allowed + place(item.first));
     }
     const bool twice = has(name);
     fields_.emplace_back(name, item.second);
@@ -128,7 +138,9 @@ std::string YamlFields::path(const std::string& name) const {
 }
 
 void YamlFields::refuse(const std::string& name, const std::string& allowed) const {
-  throw std::invalid_argument(path(name) + " is " + shown(*find(name)) + ": " + allowed);
+  const YAML::Node& node = *find(name);
+  throw FieldError(path(name) + " is " + shown(node) + ": " + allowed,
+                   path(name) + place(node) + ": " + allowed);
 }
 
 void YamlFields::require(const std::string& name, const std::string& allowed) const {
@@ -191,6 +203,15 @@ void YamlFields::read(const std::string& name, Vec3& value) const {
   if (!has(name)) return;
   const std::vector<double> v = numbers(name, 3, "must be three numbers, [x, y, z]");
   value = Vec3(v[0], v[1], v[2]);
+}
+
+void YamlFields::read(const std::string& name, std::vector<double>& value,
+                      std::size_t count) const {
+  if (!has(name)) return;
+  const YAML::Node& node = *find(name);
+  if (node.IsSequence() && node.size() == 0) return value.clear();
+  const std::string allowed = "must be " + std::to_string(count) + " numbers, or none: []";
+  value = numbers(name, count, allowed.c_str());
 }
 
 void YamlFields::read(const std::string& name, Quat& value) const {

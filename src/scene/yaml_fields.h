@@ -4,6 +4,7 @@
 #include <yaml-cpp/yaml.h>
 
 #include <functional>
+#include <stdexcept>
 #include <string>
 #include <utility>
 #include <vector>
@@ -12,8 +13,22 @@
 
 namespace tissue_sim {
 
+/// Of a field of a YAML text, which what() quotes.
+class FieldError : public std::invalid_argument {
+ public:
+  FieldError(const std::string& quoted, std::string unquoted)
+      : std::invalid_argument(quoted), unquoted_(std::move(unquoted)) {}
+  /// The same without a word of the text, but with the line and the column: the text may be of a
+  /// file that is nobody's business.
+  const std::string& unquoted() const { return unquoted_; }
+
+ private:
+  std::string unquoted_;
+};
+
 /// The fields of a YAML map. Made from a node, it refuses what is no map, fields that are not among
-/// the known ones, and fields that are given twice. All members throw std::invalid_argument.
+/// the known ones, and fields that are given twice. All members throw FieldError, or, where nothing
+/// of the text is in the message, std::invalid_argument.
 class YamlFields {
  public:
   /// `path` is where the map stands, "" for the whole document.
@@ -34,6 +49,8 @@ class YamlFields {
   void read(const std::string& name, bool& value) const;
   void read(const std::string& name, std::string& value) const;
   void read(const std::string& name, Vec3& value) const;
+  /// A list of so many numbers, or an empty one.
+  void read(const std::string& name, std::vector<double>& value, std::size_t count) const;
   /// [x, y, z, w] as ROS has it; its norm must be 1 within 0.001 and is made 1.
   void read(const std::string& name, Quat& value) const;
   template <class Enum, std::size_t N>

@@ -92,8 +92,8 @@ TEST(JointGroup, ServoSupersedesAndIsFollowedAtALimitedSpeed) {
   EXPECT_EQ(group.setpoint_velocity(), at(0.3, 0));
   const double before = group.measured()[0];
   group.advance(0.1, 1);
-  EXPECT_NEAR(group.measured()[0] - before, 0.2, 1e-12) << "twice the speed of moves";
-  EXPECT_NEAR(group.measured_velocity()[0], 2, 1e-9);
+  EXPECT_NEAR(group.measured()[0] - before, 0.4, 1e-12) << "four times the speed of moves";
+  EXPECT_NEAR(group.measured_velocity()[0], 4, 1e-9);
   for (int i = 0; i < 10; ++i) group.advance(0.1, 1);
   EXPECT_EQ(group.measured(), at(0.6, 0.1));
   EXPECT_EQ(group.measured_velocity(), at(0, 0));

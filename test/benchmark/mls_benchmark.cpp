@@ -23,7 +23,6 @@ struct MlsCase {
   int nodes;
   int threads = 0;
   int neighbours = 18;
-  MlsBasis basis = MlsBasis::kBalanced;
   double viscosity = 0;
   bool cut = false;
   bool scalpel = false;  ///< a sweep is timed, and nothing else
@@ -36,7 +35,6 @@ std::unique_ptr<MlsTissue> deformed_nodes(const MlsCase& c) {
   Scene scene = mls_box(Vec3::Constant(edge), kSpacing);
   scene.threads = c.threads;
   scene.mls.neighbours = c.neighbours;
-  scene.mls.basis = c.basis;
   scene.ground.enabled = true;
   scene.ground.z = -0.1;
   scene.tools.resize(1);
@@ -157,7 +155,6 @@ void add_mls_rows() {
     add(n + "/threads:2", c);
     c = {nodes};
     c.neighbours = 32;
-    c.basis = MlsBasis::kLinear;
     add(n + "/neighbours:32", c);
     c = {nodes};
     c.viscosity = 1;

@@ -94,7 +94,7 @@ void frame(benchmark::State& bench, PbdModel model, Way way, bool with_figures, 
                           constraints(s));
   bench.counters["constraints"] = constraints(s);
   bench.counters["vertices"] = s.vertices.size();
-  constexpr const char* kNames[] = {"", "launches", "one block", "sections"};
+  constexpr const char* kNames[] = {"", "launches", "one block"};
   bench.SetLabel(kNames[static_cast<int>(tissue.way())]);
 }
 
@@ -129,7 +129,6 @@ void add_pbd_cuda_rows() {
     // What a frame takes besides its steps, and of them what the links take.
     add(name + "/steps:1", [=](State& s) { frame(s, model, Way::kFaster, false, 1); });
     if (is_surface) {
-      add(name + "/sections", [=](State& s) { frame(s, model, Way::kSections, false); });
       add(name + "/no_bending", [=](State& s) { frame(s, model, Way::kFaster, false, 10, 0); });
     }
   }

@@ -7,6 +7,7 @@
 #include <chrono>
 #include <cstring>
 #include <fstream>
+#include <thread>
 
 #include "geometry/mesh.h"
 #include "geometry/tet_mesh.h"
@@ -182,6 +183,58 @@ TEST(SceneFile, NothingOfAFileThatIsNoSceneIsQuoted) {
     EXPECT_FALSE(reason.empty()) << text;
     EXPECT_EQ(reason.find("hunter"), std::string::npos) << reason;
   }
+}
+
+TEST(SceneFile, ValuesOfKnownFieldsAreNotQuotedButTheirPlace) {
+  const TemporaryFolder folder;
+  const std::pair<const char*, const char*> cases[] = {
+      {"name: host\nroot:*:20228:0:hunter2:7:::: 1\n", "line 2, column 1"},
+      {"hunter2: a\n", "the scene has an unknown field"},
+      {"method: hunter2\n", "method (line 1, column 9): must be one of"},
+      {"name: a\ncell_size:  hunter2\n", "cell_size (line 2, column 13): must be a number"},
+      {"ground: hunter2\n", "ground is a text (line 1, column 9)"},
+      {"bodies: [{pose: {hunter2: 1}}]\n", "bodies[0].pose has an unknown field"},
+      {"gravity: [1, 2, hunter2]\n", "gravity (line 1, column 10)"},
+      {"name: hunter2\nseed: 1234567\nthreads: 1234567\n", "bodies is empty"},
+  };
+  for (const auto& c : cases) {
+    const std::string reason = reason_of([&] { load_scene(folder.write("file", c.first)); });
+    EXPECT_NE(reason.find(c.second), std::string::npos) << reason;
+    EXPECT_EQ(reason.find("hunter2"), std::string::npos) << reason;
+    EXPECT_EQ(reason.find("1234567"), std::string::npos) << reason;
+  }
+}
+
+TEST(File, ALinkThatIsExchangedLeadsNowhereElse) {
+  const TemporaryFolder inside, outside;
+  const std::string mine = inside.write("mine", "mine"), secret = outside.write("secret", "secret");
+  const std::string link = inside.path() + "/link", next = inside.path() + "/next";
+  ASSERT_EQ(symlink(mine.c_str(), link.c_str()), 0);
+  std::atomic<bool> done{false};
+  std::thread exchanging([&] {
+    for (int i = 0; !done; ++i) {
+      if (symlink((i % 2 == 0 ? secret : mine).c_str(), next.c_str()) == 0) {
+        std::rename(next.c_str(), link.c_str());
+      }
+    }
+  });
+  const PermitFolders folders({inside.path()});
+  int read = 0, refused = 0;
+  for (int i = 0; i < 4000; ++i) {
+    try {
+      folders.check(link);
+      EXPECT_EQ(read_file(link, 100), "mine");
+      ++read;
+    } catch (const std::exception& e) {
+      EXPECT_NE(std::string(e.what()).find("load_folders"), std::string::npos) << e.what();
+      ++refused;
+    }
+  }
+  done = true;
+  exchanging.join();
+  EXPECT_GT(read, 0);
+  EXPECT_GT(refused, 0);
+  EXPECT_EQ(read_file(secret, 100, ReadFrom::kAnywhere), "secret");
 }
 
 TEST(SceneText, WhatNobodyMeansIsRefused) {

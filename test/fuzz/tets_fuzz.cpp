@@ -12,16 +12,15 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   using namespace tissue_sim;
   FuzzBytes bytes(data, size);
   const auto format = bytes.take<std::uint8_t>();
-  const char* const extensions[] = {".mesh", ".vtk", ".node"};
+  const char* const extensions[] = {".mesh", ".vtk", ".node", ".msh", ".vtu"};
+  constexpr std::size_t kCount = sizeof extensions / sizeof extensions[0];
   const std::string stem = "/dev/shm/tissue_sim_fuzz_" + std::to_string(getpid());
-  const std::string path = stem + extensions[format % 3];
+  const std::string path = stem + extensions[format % kCount];
   std::ofstream(path, std::ios::binary) << bytes.rest();
-  if (format % 3 == 2) std::ofstream(stem + ".ele", std::ios::binary) << bytes.rest();
+  if (format % kCount == 2) std::ofstream(stem + ".ele", std::ios::binary) << bytes.rest();
   try {
-    TetMesh mesh = read_tets(path);
     std::vector<std::string> notes;
-    check_tets(mesh, notes);
-    boundary(mesh);
+    load_tet_file(path, &notes);
   } catch (const std::invalid_argument&) {
   }
   std::remove(path.c_str());

@@ -17,8 +17,7 @@
 namespace tissue_sim {
 namespace {
 
-constexpr MlsPlacement kPlacements[] = {MlsPlacement::kRegular, MlsPlacement::kJittered,
-                                        MlsPlacement::kGraded};
+constexpr MlsPlacement kPlacements[] = {MlsPlacement::kRegular, MlsPlacement::kGraded};
 
 BladePath some_cut(std::mt19937& random) {
   std::uniform_real_distribution<double> even(-1, 1);

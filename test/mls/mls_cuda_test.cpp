@@ -32,8 +32,7 @@ double difference(const std::vector<Vec3>& expected, const Array<float>& force) 
 }
 
 TEST_F(MlsOnGpu, ForcesAreThoseOfTheReference) {
-  for (const MlsPlacement placement :
-       {MlsPlacement::kRegular, MlsPlacement::kJittered, MlsPlacement::kGraded}) {
+  for (const MlsPlacement placement : {MlsPlacement::kRegular, MlsPlacement::kGraded}) {
     for (const Law law : {Law::kFixedCorotated, Law::kNeoHookean}) {
       for (const bool is_cut : {false, true}) {
         Scene scene = mls_box(Vec3(0.013, 0.011, 0.009), 0.001, placement);

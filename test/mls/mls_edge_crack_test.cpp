@@ -7,8 +7,8 @@
 #include <map>
 
 #include "crack_strip.h"
-#include "mls/enrichment.h"
 #include "mls_scenes.h"
+#include "paper/enrichment.h"
 
 namespace tissue_sim {
 namespace {

@@ -13,8 +13,7 @@
 namespace tissue_sim {
 namespace {
 
-constexpr MlsPlacement kPlacements[] = {MlsPlacement::kRegular, MlsPlacement::kJittered,
-                                        MlsPlacement::kGraded};
+constexpr MlsPlacement kPlacements[] = {MlsPlacement::kRegular, MlsPlacement::kGraded};
 
 Eigen::Matrix3d some_matrix(unsigned seed, double size) {
   std::mt19937 random(seed);
@@ -166,7 +165,7 @@ TEST(Mls, BalancedWeightsOfALatticeStayNearTheKernels) {
 }
 
 TEST(Mls, ForcesAreTheSlopeOfTheEnergy) {
-  MlsTissue tissue(mls_box(Vec3(0.006, 0.005, 0.004), 0.001, MlsPlacement::kJittered));
+  MlsTissue tissue(mls_box(Vec3(0.006, 0.005, 0.004), 0.001, MlsPlacement::kGraded));
   MlsState& s = tissue.state();
   impose(s, some_matrix(2, 0.2));
   shake(s, 1e-4);
@@ -207,8 +206,8 @@ TEST(Mls, RotationsAreNoStrain) {
 
 // Nodes of the outer layers follow a linear field, the others find their own rest.
 TEST(Mls, PassesThePatchTestThatIsSolved) {
-  const double bounds[] = {1e-3, 0.02, 0.02};
-  for (int p = 0; p < 3; ++p) {
+  const double bounds[] = {1e-3, 0.02};
+  for (int p = 0; p < 2; ++p) {
     Scene scene = mls_box(Vec3::Constant(0.009), 0.001, kPlacements[p]);
     const auto state = make_mls_state(scene, nullptr);
     MlsState& s = *state;

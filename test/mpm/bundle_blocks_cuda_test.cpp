@@ -115,7 +115,6 @@ TEST(ChooseShape, LeavesRoomForBlocksThatCutsAdd) {
       Divided divided(Shape::kBox, 0.001 * Vec3(x, y, 12));
       const auto count = [&](bool whole) {
         const CudaShape shape = choose_shape(divided.bodies, {kProcessors, 232448}, whole);
-        EXPECT_FALSE(shape.marches);
         return divided.blocks(shape.blocks.x, shape.blocks.y, shape.blocks.z).size();
       };
       // As long as it is whole a body may have all of them.

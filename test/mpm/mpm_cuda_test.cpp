@@ -28,7 +28,7 @@ class OnGpuInBlocks : public OnGpu, public testing::WithParamInterface<const cha
   void TearDown() override { unsetenv("TISSUE_SIM_CUDA_SHAPE"); }
 };
 INSTANTIATE_TEST_SUITE_P(Shapes, OnGpuInBlocks,
-                         testing::Values(nullptr, "6 5 4 64 0", "6 5 8 32 2",
+                         testing::Values(nullptr, "6 5 4 64 0", "6 5 8 32 0",
                                          "10 4 2 256 1"));  // five of eight warps push
 
 /// A block on the ground, cut by a scalpel and pushed by a probe for a second.

@@ -44,10 +44,7 @@ class SavedStateOnGpu : public OnEitherDevice<CudaMpmTissue> {
   /// Returns the simulation at the end of the run.
   static std::unique_ptr<Simulation> goes_on(const SavedRun& run) {
     auto whole = go_on_from_states(run);
-    EXPECT_NE(whole, nullptr);
-    if (whole != nullptr) {
-      EXPECT_GE(whole->tissue().fragment_count(), 4);
-    }
+    EXPECT_GE(whole->tissue().fragment_count(), 4);
     return whole;
   }
   static void goes_on_divided_anew(const SavedRun& run) {
@@ -56,7 +53,6 @@ class SavedStateOnGpu : public OnEitherDevice<CudaMpmTissue> {
     if (gpu.multiProcessorCount != 132) GTEST_SKIP() << "the size is for 132 multiprocessors";
     Simulation before(run.scene);
     const auto whole = goes_on(run);
-    ASSERT_NE(whole, nullptr);
     const auto cells = [](const std::string& plan) { return plan.substr(0, plan.find(" cells")); };
     EXPECT_NE(cells(tissue_of(before).plan()), cells(tissue_of(*whole).plan()));
   }
@@ -66,14 +62,9 @@ TEST_F(SavedStateOnGpu, GoesOnWhereTheFirstCutDividesTissueAnew) {
   goes_on_divided_anew(run_of(Vec3(0.040, 0.040, 0.018), 0.002, 12));
 }
 
-TEST_F(SavedStateOnGpu, GoesOnWhereTissueMarchesUntilTheFirstCut) {
-  goes_on_divided_anew(run_of(Vec3(0.08, 0.06, 0.05), 0.00125, 8));
-}
-
 TEST_F(SavedStateOnGpu, GoesOnWhereRegionsAreHalved) {
   setenv("TISSUE_SIM_CUDA_SHAPE", "6 5 4 96 0", 1);
   const auto whole = goes_on(run_of(Vec3(0.031, 0.029, 0.017), 0.002, 12));
-  ASSERT_NE(whole, nullptr);
   EXPECT_TRUE(tissue_of(*whole).state().blocks.has_halves());
 }
 

@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdlib>
 
 #include "cut_scenes.h"
 #include "either_device.h"
@@ -65,48 +64,34 @@ double gap(T& tissue) {
 }
 
 template <class T>
-class SelfContactOf : public OnEitherDevice<T> {
- public:
-  /// The prongs meet, push one another back, and that is all that they do.
-  static void prongs_meet() {
-    T tissue(bar());
-    bend(tissue, 0.2);
-    ASSERT_NEAR(gap(tissue), kGap, 1e-5);
-    tissue.advance(0, 1e-4f, {});
-    FrameResult r = tissue.finish();
-    const double energy = r.kinetic_energy + r.elastic_energy;
-    double closest = kGap;
-    int most = 0;
-    for (int i = 0; i < 80; ++i) {
-      const int n = static_cast<int>(std::ceil(1e-3 / tissue.stable_substep()));
-      tissue.advance(n, static_cast<float>(1e-3 / n), {});
-      r = tissue.finish();
-      pull(tissue);
-      closest = std::min(closest, gap(tissue));
-      most = std::max(most, touching(tissue.state()));
-      EXPECT_LT(r.kinetic_energy + r.elastic_energy, 1.02 * energy);
-    }
-    std::printf("%.3f mm apart at the closest, %d contacts touch; then %.3f mm apart\n",
-                1e3 * closest, most, 1e3 * gap(tissue));
-    EXPECT_GT(closest, -0.25 * kCell) << "half of what points are apart";
-    EXPECT_LT(closest, 0.1 * kCell);
-    EXPECT_GT(most, 30);
-    EXPECT_GT(gap(tissue), kCell / 2) << "they parted again";
-  }
-};
+using SelfContactOf = OnEitherDevice<T>;
 TYPED_TEST_SUITE(SelfContactOf, Tissues, DeviceName);
 
-TYPED_TEST(SelfContactOf, ProngsOfABodyMeet) { this->prongs_meet(); }
-
-#if defined(TISSUE_SIM_CUDA)
-using SelfContactOnGpu = SelfContactOf<CudaMpmTissue>;
-
-TEST_F(SelfContactOnGpu, ProngsOfABodyMeetWhoseBlocksAreMarchedThrough) {
-  setenv("TISSUE_SIM_CUDA_SHAPE", "20 2 6 64 2", 1);
-  prongs_meet();
-  unsetenv("TISSUE_SIM_CUDA_SHAPE");
+TYPED_TEST(SelfContactOf, ProngsOfABodyMeetPushOneAnotherBackAndThatIsAllThatTheyDo) {
+  TypeParam tissue(bar());
+  bend(tissue, 0.2);
+  ASSERT_NEAR(gap(tissue), kGap, 1e-5);
+  tissue.advance(0, 1e-4f, {});
+  FrameResult r = tissue.finish();
+  const double energy = r.kinetic_energy + r.elastic_energy;
+  double closest = kGap;
+  int most = 0;
+  for (int i = 0; i < 80; ++i) {
+    const int n = static_cast<int>(std::ceil(1e-3 / tissue.stable_substep()));
+    tissue.advance(n, static_cast<float>(1e-3 / n), {});
+    r = tissue.finish();
+    pull(tissue);
+    closest = std::min(closest, gap(tissue));
+    most = std::max(most, touching(tissue.state()));
+    EXPECT_LT(r.kinetic_energy + r.elastic_energy, 1.02 * energy);
+  }
+  std::printf("%.3f mm apart at the closest, %d contacts touch; then %.3f mm apart\n",
+              1e3 * closest, most, 1e3 * gap(tissue));
+  EXPECT_GT(closest, -0.25 * kCell) << "half of what points are apart";
+  EXPECT_LT(closest, 0.1 * kCell);
+  EXPECT_GT(most, 30);
+  EXPECT_GT(gap(tissue), kCell / 2) << "they parted again";
 }
-#endif
 
 }  // namespace
 }  // namespace tissue_sim

@@ -337,7 +337,7 @@ TEST_F(SurfaceContactOnGpu, SameBitsRunAfterRunAndFromASavedState) {
     simulation.set_tool(
         0, pointing_down(Vec3(0.009 + 0.004 * t, 0.011, kSize.z() + 0.001 - 0.004 * t)));
   };
-  EXPECT_NE(go_on_from_states(run), nullptr);
+  go_on_from_states(run);
 }
 
 }  // namespace

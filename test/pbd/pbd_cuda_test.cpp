@@ -10,7 +10,6 @@
 #include "cut_paths.h"
 #include "pbd/cuda/cuda_pbd_tissue.h"
 #include "pbd/pbd_reference.h"
-#include "pbd/sections.h"
 #include "tissue_sim/simulation.h"
 
 namespace tissue_sim {
@@ -79,12 +78,6 @@ struct Model {
   PbdModel model;
   PbdElasticity elasticity;
 };
-/// How its steps can be taken.
-std::vector<Way> ways(const Model& model) {
-  std::vector<Way> all = {Way::kLaunches, Way::kOneBlock};
-  if (model.model == PbdModel::kSurface) all.push_back(Way::kSections);  // until a cut
-  return all;
-}
 constexpr Model kModels[] = {
     {"surface", PbdModel::kSurface, PbdElasticity::kMaterial},
     {"material", PbdModel::kTetrahedra, PbdElasticity::kMaterial},
@@ -153,34 +146,6 @@ TEST_F(PbdOnGpu, AStepIsThatOfTheReferenceHoweverItIsLaunched) {
   }
 }
 
-/// The order of sections is another one of Gauss-Seidel, so the reference is given it.
-TEST_F(PbdOnGpu, AStepBySectionsIsThatOfTheReferenceInTheirOrder) {
-  Scene scene = slab(PbdModel::kSurface);
-  hold_one_end(scene);
-  scene.gravity = Vec3(1, 0, -9.81);
-  scene.damping = 20;
-  scene.pbd.steps = 1;
-  CudaPbdTissue tissue(scene);
-  tissue.set_way(Way::kSections);
-  pbd::State& s = tissue.state();
-  disturb(s, 2e-4f);
-  tissue.push();
-  const pbd::Sections sections = pbd::find_sections(s, 8);
-  ASSERT_GT(sections.count, 1);
-  const std::vector<std::int16_t> links = s.links.colour, bends = s.bends.colour;
-  s.links.colour = sections.link_pass;
-  s.bends.colour = sections.bend_pass;
-  constexpr double kStep = 1e-3;
-  const std::vector<Vec3> from = reference::pbd_places(s).x;
-  const std::vector<Vec3> expected = reference::step(s, kStep).x;
-  s.links.colour = links;
-  s.bends.colour = bends;
-  tissue.advance(kStep, {});
-  const Off off = difference(tissue.state(), from, expected);
-  EXPECT_GT(off.moved, 5e-5);
-  EXPECT_LT(off.most, 1e-3 * off.moved);
-}
-
 TEST_F(PbdOnGpu, FiguresAreTheCpus) {
   for (const Model& model : kModels) {
     Scene scene = slab(model.model, model.elasticity);
@@ -213,25 +178,11 @@ struct Pressed {
   std::uint64_t checksum = 0;
 };
 
-/// A CPU's tissue is given the order that constraints have in sections.
-void choose(Tissue& tissue, Way way) {
-  if (auto* on_gpu = dynamic_cast<CudaPbdTissue*>(&tissue)) {
-    on_gpu->set_way(way);
-  } else if (way == Way::kSections) {
-    pbd::State& s = dynamic_cast<PbdTissue&>(tissue).state();
-    const pbd::Sections sections = pbd::find_sections(s, 8);
-    s.links.colour = sections.link_pass;
-    s.bends.colour = sections.bend_pass;
-    pbd::pack(s);
-  }
-}
-
-void press_frame(Simulation& simulation, int frame, bool is_cut = true) {
+void press_frame(Simulation& simulation, int frame) {
   const Quat down(Eigen::AngleAxisd(M_PI, Vec3::UnitX()));
   const double depth = 0.0004 * std::min(frame, 12 - frame);
   simulation.set_tool(0, {Vec3(0.012 + 0.0002 * frame, 0.012, 0.0125 - depth), down});
-  if (is_cut && frame == 4)
-    simulation.cut(upright_blade({Vec3(0.027, -0.1, 0), Vec3(0.027, 0.1, 0)}));
+  if (frame == 4) simulation.cut(upright_blade({Vec3(0.027, -0.1, 0), Vec3(0.027, 0.1, 0)}));
 }
 
 Scene pressed_slab(const Model& model, Device device, int iterations = 1) {
@@ -246,17 +197,17 @@ Scene pressed_slab(const Model& model, Device device, int iterations = 1) {
 }
 
 /// On the ground a probe presses and drags, a blade cuts, the probe leaves.
-Pressed press(const Scene& scene, Way way, bool is_cut = true) {
+Pressed press(const Scene& scene, Way way) {
   Simulation simulation(scene);
-  choose(simulation.tissue(), way);
+  if (auto* on_gpu = dynamic_cast<CudaPbdTissue*>(&simulation.tissue())) on_gpu->set_way(way);
   Pressed run;
   for (int frame = 0; frame < 12; ++frame) {
-    press_frame(simulation, frame, is_cut);
+    press_frame(simulation, frame);
     const FrameReport report = simulation.advance_frame();
     EXPECT_FALSE(report.result.blew_up);
     run.force = std::max(run.force, report.result.loads[0].mean.force.norm());
     run.moment = std::max(run.moment, report.result.loads[0].mean.torque.norm());
-    if (is_cut && frame == 4) {
+    if (frame == 4) {
       EXPECT_EQ(report.result.cut_reports[0].new_fragments.size(), 1u);
     }
   }
@@ -287,25 +238,10 @@ TEST_F(PbdOnGpu, PressedAndCutItMovesAsOnTheCpu) {
   }
 }
 
-/// Without a cut, which ends sections. In the order that a CPU has, places are 1.7e-5 m apart,
-/// forces 1 %, moments 6 % (two runs on a CPU).
-TEST_F(PbdOnGpu, PressedInSectionsItMovesAsOnTheCpuInTheirOrder) {
-  const Pressed cpu = press(pressed_slab(kModels[0], Device::kCpu), Way::kSections, false);
-  const Pressed gpu = press(pressed_slab(kModels[0], Device::kCuda), Way::kSections, false);
-  ASSERT_EQ(cpu.places.size(), gpu.places.size());
-  double worst = 0;
-  for (std::size_t i = 0; i < cpu.places.size(); ++i) {
-    worst = std::max(worst, (cpu.places[i] - gpu.places[i]).norm());
-  }
-  EXPECT_LT(worst, 2e-5) << "of 2.4 mm that it was pressed";
-  EXPECT_NEAR(gpu.force, cpu.force, 2e-3 * cpu.force);
-  EXPECT_NEAR(gpu.moment, cpu.moment, 2e-3 * cpu.moment + 1e-6);
-}
-
 TEST_F(PbdOnGpu, TheSameBitsRunAfterRun) {
   for (const Model& model : kModels) {
-    for (const Way way : ways(model)) {
-      const Scene scene = pressed_slab(model, Device::kCuda, way == Way::kSections ? 1 : 2);
+    for (const Way way : {Way::kLaunches, Way::kOneBlock}) {
+      const Scene scene = pressed_slab(model, Device::kCuda, 2);
       const Pressed one = press(scene, way), other = press(scene, way);
       EXPECT_EQ(one.checksum, other.checksum) << model.name;
       EXPECT_EQ(one.force, other.force);
@@ -373,35 +309,6 @@ TEST_F(PbdOnGpu, WhatFliesKeepsItsMomentum) {
     EXPECT_LT((about_origin(after) - about_origin(before)).norm(),
               1e-4 * about_origin(before).norm());
   }
-}
-
-/// By sections, one that flies and spins alone.
-TEST_F(PbdOnGpu, WhatFliesInSectionsKeepsItsMomentum) {
-  const Scene scene = slab(PbdModel::kSurface);
-  CudaPbdTissue tissue(scene);
-  tissue.set_way(Way::kSections);
-  throw_first_body(tissue, scene);
-  const Momentum before = tissue.momentum();
-  for (int frame = 0; frame < 30; ++frame) {
-    tissue.advance(1 / scene.frame_rate, {});
-    EXPECT_FALSE(tissue.finish().blew_up);
-  }
-  const Momentum after = tissue.momentum();
-  EXPECT_EQ(tissue.way(), Way::kSections);
-  EXPECT_GT((after.centre - before.centre).norm(), 1e-2);
-  EXPECT_LT((after.linear - before.linear).norm(), 1e-6 * before.linear.norm());
-  EXPECT_LT((after.angular - before.angular).norm(), 1e-4 * before.angular.norm());
-}
-
-TEST_F(PbdOnGpu, AWholeSurfaceIsTakenBySectionsUntilItIsCut) {
-  Scene scene = slab(PbdModel::kSurface);
-  scene.cell_size = 0.0015;
-  Simulation simulation(scene);
-  auto& tissue = dynamic_cast<CudaPbdTissue&>(simulation.tissue());
-  EXPECT_EQ(tissue.way(), Way::kSections);
-  simulation.cut(upright_blade({Vec3(0.027, -0.1, 0), Vec3(0.027, 0.1, 0)}));
-  simulation.advance_frame();
-  EXPECT_EQ(tissue.way(), Way::kOneBlock);
 }
 
 TEST_F(PbdOnGpu, AFewVerticesAreOneBlocksAndManyAreNot) {

@@ -6,6 +6,7 @@
 #include <std_msgs/Float64.h>
 #include <std_msgs/Float64MultiArray.h>
 
+#include <limits>
 #include <memory>
 
 #include "arm_client.h"
@@ -42,7 +43,8 @@ TEST_F(CrtkArm, HasTheGraphThatDvrkChecks) {
   expect_heard<JointState>({"servo_jp", "servo_jr", "servo_jf", "move_jp", "move_jr",
                             "jaw/servo_jp", "jaw/move_jp", "jaw/servo_jf"});
   expect_heard<PoseStamped>({"servo_cp", "servo_cr", "move_cp", "move_cr"});
-  expect_heard<WrenchStamped>({"body/servo_cf", "spatial/servo_cf"});
+  expect_heard<WrenchStamped>({"servo_cf", "body/servo_cf", "spatial/servo_cf"});
+  expect_heard<geometry_msgs::TwistStamped>({"servo_cv"});
   expect_heard<std_msgs::Empty>({"hold", "free"});
   expect_heard<std_msgs::Float64>({"trajectory_j/set_ratio"});
   expect_heard<std_msgs::Bool>(
@@ -88,6 +90,66 @@ TEST_F(CrtkArm, ServoComesInAnyFrameAndInSteps) {
   Values deeper = now;
   deeper[2] += 0.02;
   EXPECT_TRUE(arrives(deeper, 3));
+}
+
+TEST_F(CrtkArm, ServoByVelocityMovesAndEndsByItself) {
+  const Pose start = tip();
+  geometry_msgs::TwistStamped m;
+  m.twist.linear.x = 0.05;
+  m.twist.angular.z = 0.5;
+  for (int i = 0; i < 20; ++i) {
+    send("servo_cv", m);
+    ros::WallDuration(0.01).sleep();
+  }
+  ASSERT_TRUE(wait_until([&] { return tip().position.x() - start.position.x() > 0.008; }, 3));
+  ros::WallDuration(0.6).sleep();  // nobody sends any more
+  const Pose end = tip();
+  ros::WallDuration(0.3).sleep();
+  EXPECT_LT((tip().position - end.position).norm(), 1e-9);
+  const Vec3 way = end.position - start.position;
+  EXPECT_LT(way.x(), 0.05);
+  EXPECT_LT(std::hypot(way.y(), way.z()), 1e-6) << "along x alone";
+  EXPECT_NEAR(end.orientation.angularDistance(start.orientation), 10 * way.x(), 1e-6);
+  m.twist.linear.x = std::nan("");
+  send("servo_cv", m);
+  m.twist.linear.x = 0.05;
+  m.header.frame_id = "nowhere";
+  send("servo_cv", m);
+  ros::WallDuration(0.3).sleep();
+  EXPECT_LT((tip().position - end.position).norm(), 1e-9) << "is refused";
+}
+
+// NaN, too many and too few joints, at 10 000 a second: the arm goes on, and stays where it is.
+TEST_F(CrtkArm, OutlastsAStormOfNonsense) {
+  const Values q = setpoint_js.next()->position;
+  Pose nan = tip();
+  nan.position.x() = std::nan("");
+  geometry_msgs::TwistStamped twist;
+  twist.twist.angular.x = std::numeric_limits<double>::infinity();
+  const auto end = ros::WallTime::now() + ros::WallDuration(2);
+  int sent = 0;
+  while (ros::WallTime::now() < end) {
+    send_joints("servo_jp", Values(6, std::nan("")));
+    send_joints("servo_jp", Values(5, 0.0));
+    send_joints("servo_jr", Values(1000, 0.1));
+    send_joints("jaw/servo_jp", Values());
+    send_joints("move_jp", Values(7, 0.0));
+    send_pose("servo_cp", nan);
+    send("servo_cv", twist);
+    send("servo_cf", WrenchStamped());
+    sent += 8;
+    ros::WallDuration(0.0008).sleep();
+  }
+  EXPECT_GT(sent, 4000);
+  const std::size_t before = measured_js.count();
+  EXPECT_TRUE(wait_until([&] { return measured_js.count() > before + 20; }, 5));
+  EXPECT_LT(distance(measured_js.last()->position, q), 1e-9);
+  ASSERT_TRUE(wait_until(
+      [&] {  // refused moves are busy for 50 ms each, 32 at most wait
+        send_joints("servo_jp", {0.1, 0, 0.12, 0, 0, 0});
+        return distance(measured_js.last()->position, {0.1, 0, 0.12, 0, 0, 0}) < 1e-9;
+      },
+      5));
 }
 
 TEST_F(CrtkArm, MovesQueueAndServoSupersedesThem) {

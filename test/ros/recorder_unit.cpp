@@ -36,6 +36,29 @@ class RecorderTest : public testing::Test {
   const std::string folder_ = temporary_.path();
 };
 
+TEST_F(RecorderTest, ABagIsNoLargerThanItsLimit) {
+  for (const bool compresses : {false, true}) {
+    Recorder recorder(folder_, 1000 * kMiB, 1 * kMiB, 2 * kMiB);
+    const std::string path = recorder.start(compresses ? "a" : "b", {"/a", "/b", "/c"});
+    for (int i = 0; i < 3000 && recorder.status().recording; ++i) {
+      auto m = boost::make_shared<std_msgs::String>();
+      m->data.assign(20000, 'a');
+      const char* const topics[] = {"/a", "/b", "/c"};
+      recorder.write<std_msgs::String>(topics[i % 3], compresses ? m : text(20000 + i),
+                                       ros::Time(1 + i, 0));
+      if (i % 50 == 0) std::this_thread::sleep_for(std::chrono::milliseconds(10));
+    }
+    if (compresses) {
+      recorder.stop();
+    } else {
+      EXPECT_THROW(recorder.stop(), std::runtime_error);
+    }
+    EXPECT_LE(fs::file_size(path), 2 * kMiB);
+    EXPECT_GT(fs::file_size(path), compresses ? 0.1 * kMiB : 1.8 * kMiB);
+    EXPECT_NO_THROW(rosbag::Bag(path, rosbag::bagmode::Read));
+  }
+}
+
 TEST_F(RecorderTest, WritesWhatItIsGiven) {
   Recorder recorder(folder_, 100 * kMiB, 1 * kMiB);
   EXPECT_FALSE(recorder.wants("/a"));

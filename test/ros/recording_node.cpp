@@ -210,8 +210,7 @@ TEST_F(Recording, CanBeRunAgainBitForBit) {
     ASSERT_EQ(input.frame, simulation.frame());
     moved = moved || (input.tools[0].present && input.tools[1].present);
     cut = cut || !input.cuts.empty();
-    simulation.apply(from_message(input));
-    simulation.advance_frame();
+    simulation.repeat_frame(from_message(input));
     ASSERT_EQ(to_hex(simulation.tissue().checksum()), sums[simulation.frame()])
         << "frame " << simulation.frame();
   }

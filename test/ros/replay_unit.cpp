@@ -51,7 +51,11 @@ class Writer {
   // `change` makes the recorded message another than what happened.
   void frame(const std::function<void(FrameInputMessage&)>& change_input = {},
              const std::function<void(SimulationState&)>& change_state = {}) {
-    const FrameReport report = simulation->advance_frame();
+    write(simulation->advance_frame(), change_input, change_state);
+  }
+  void write(const FrameReport& report,
+             const std::function<void(FrameInputMessage&)>& change_input = {},
+             const std::function<void(SimulationState&)>& change_state = {}) {
     FrameInputMessage input = to_message(report.input, simulation->scene());
     if (change_input) change_input(input);
     write("inputs", input);
@@ -119,8 +123,7 @@ TEST_F(ReplayTest, AllThatARecordingCanHoldComesOutTheSame) {
   input.tools.resize(3);
   input.tools[0].present = true;
   input.tools[0].begin = input.tools[0].end = {Vec3(-0.012, 0, 0.03), kDown};
-  w.simulation->apply(input);
-  w.frame();
+  w.write(w.simulation->repeat_frame(input));
   EXPECT_GT(w.simulation->tissue().fragment_count(), 2);
   w.begin(slab());  // reset
   for (int i = 0; i < 3; ++i) w.frame();

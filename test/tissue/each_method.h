@@ -5,7 +5,6 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <cstdlib>
 #include <cstring>
 #include <ostream>
 #include <stdexcept>
@@ -28,9 +27,6 @@ struct MethodOnDevice {
 /// What a method must reach. DESIGN section 8 says what the product promises; a method that is
 /// better by its nature is held to that.
 struct Tolerances {
-  /// Whether all below was seen to hold. Where it was not, it is what the method is meant to reach,
-  /// and its tests are skipped unless TISSUE_SIM_UNMEASURED is set.
-  bool measured;
   double rest_speed;        ///< of tissue that nothing pushes [m/s] ...
   double rest_energy;       ///< ... and what it has of elastic energy [J]
   double cut_speed;         ///< of tissue at rest that was cut, rounding alone [m/s] ...
@@ -60,7 +56,6 @@ inline Tolerances tolerances(Method method) {
   t.beam_no_locking = 0.05;
   switch (method) {
     case Method::kMpm:
-      t.measured = true;
       t.rest_speed = 0;
       t.rest_energy = 0;
       t.cut_speed = 5e-6;    // read: 9e-7
@@ -70,7 +65,6 @@ inline Tolerances tolerances(Method method) {
       t.beam_convergence = 3.4;
       return t;
     case Method::kMls:
-      t.measured = true;
       t.rest_speed = t.cut_speed = 0;
       t.rest_energy = t.cut_energy = 0;
       t.misplaced = 0;
@@ -78,7 +72,6 @@ inline Tolerances tolerances(Method method) {
       t.beam_convergence = 1.8;
       return t;
     case Method::kPbd:
-      t.measured = true;
       t.rest_speed = 1e-5;
       t.cut_speed = 5e-5;  // read: 1.3e-5, of positions in single precision, over a step
       t.rest_energy = t.cut_energy = 1e-12;
@@ -91,8 +84,8 @@ inline Tolerances tolerances(Method method) {
   throw std::logic_error("say in each_method.h what this method must reach");
 }
 
-/// What a method is known not to reach yet, as it was read on 26 November 2026. Such a test is
-/// skipped unless TISSUE_SIM_UNMEASURED is set.
+/// What a method is known not to reach yet, as it was read on 26 November 2026: such a test is
+/// skipped.
 struct Shortfall {
   Method method;
   const char* test;
@@ -112,7 +105,6 @@ inline constexpr Shortfall kShortfalls[] = {
 
 /// Why the running test is skipped for the method on this device; empty where it is not.
 inline std::string falls_short(const MethodOnDevice& on) {
-  if (std::getenv("TISSUE_SIM_UNMEASURED") != nullptr) return "";
   std::string test = testing::UnitTest::GetInstance()->current_test_info()->name();
   test.resize(std::min(test.size(), test.find('/')));
   for (const Shortfall& s : kShortfalls) {
@@ -142,11 +134,6 @@ inline void PrintTo(const MethodOnDevice& on, std::ostream* out) { *out << text(
 
 /// Why the method is not tested on the device here; empty where it is.
 inline std::string why_not(const MethodOnDevice& on) {
-  if (!tolerances(on.method).measured && std::getenv("TISSUE_SIM_UNMEASURED") == nullptr) {
-    return "what " + std::string(name_of(on.method, kMethodNames)) +
-           " reaches was not measured yet: run with TISSUE_SIM_UNMEASURED=1, then say so in "
-           "each_method.h";
-  }
   if (on.device == Device::kCpu) return "";
 #if defined(TISSUE_SIM_CUDA)
   if (!why_no_gpu().empty()) return why_no_gpu();

@@ -236,6 +236,19 @@ RigidMotion motion_of(const Pose& pose, const Vec3& origin) {
 
 }  // namespace
 
+Vec3 face_normal(const std::vector<Anchor>& anchors, const Vec3& x) {
+  Vec3 nearest = Vec3::UnitZ();
+  double least = 1e30;
+  for (const Anchor& a : anchors) {
+    Vec3 off(0, 0, x.z() - a.z);  // from the nearest place of the region
+    if (a.kind == Region::Kind::kBox) off = x - x.cwiseMax(a.min).cwiseMin(a.max);
+    if (a.kind == Region::Kind::kBall) off = x - a.center - a.radius * (x - a.center).normalized();
+    const double distance = off.norm();
+    if (distance > 0 && distance < least) least = distance, nearest = off / distance;
+  }
+  return nearest;
+}
+
 void find_face_links(const Scene& scene, const LatticeTissue& tissue, AnchorFaces& faces) {
   int first_anchor = 0;
   for (std::size_t i = 0; i < tissue.bodies.size(); ++i) {

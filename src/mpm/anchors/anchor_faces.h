@@ -98,6 +98,9 @@ struct AnchorFaces : AnchorRows, AnchorFaceMotion {
   std::vector<std::uint8_t> at_row;
 };
 
+/// Normal of the anchors' face that is nearest to a place outside of them.
+Vec3 face_normal(const std::vector<Anchor>& anchors, const Vec3& x);
+
 /// Finds where the faces are, of bodies that are whole, and which points they touch
 /// (AnchorFaces::points). Throws std::invalid_argument for an anchor that neither holds points nor
 /// has a face at its body.

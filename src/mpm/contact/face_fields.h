@@ -2,6 +2,7 @@
 #pragma once
 
 #include "compute/archive.h"
+#include "frame/state_check.h"
 #include "mpm/mpm_state.h"
 
 namespace tissue_sim {
@@ -38,7 +39,9 @@ void fields(Archive& archive, FaceSpring& c) {
 template <class Archive>
 void cell_nodes(Archive& archive, const Blocks& blocks, std::int32_t number, CellNodes& nodes) {
   std::int64_t cell = -1;
-  const Block* const block = number < 0 ? nullptr : blocks.all.at(number);
+  const auto blocks_there = static_cast<std::int32_t>(blocks.all.size());
+  check_state(number < blocks_there, "contacts");
+  const Block* const block = number < 0 ? nullptr : blocks.all[number];
   if constexpr (!Archive::kReads) {
     if (block != nullptr && !block->node.empty() && nodes.lowest >= block->node.data() &&
         nodes.lowest <= &block->node.back()) {
@@ -48,7 +51,11 @@ void cell_nodes(Archive& archive, const Blocks& blocks, std::int32_t number, Cel
   archive(cell);
   if constexpr (Archive::kReads) {
     nodes = {};
-    if (cell >= 0 && block != nullptr) nodes = CellNodes(*block, static_cast<int>(cell));
+    if (cell < 0 || block == nullptr) return;
+    check_state(cell + 2 * (block->plane + block->pitch + 1) <
+                    static_cast<std::int64_t>(block->node.size()),
+                "contacts");
+    nodes = CellNodes(*block, static_cast<int>(cell));
   }
 }
 

@@ -88,9 +88,8 @@ struct ColumnWalk {
     read_plane<kPartial>(lowest, column.pitch, below);
     read_plane<kPartial>(second, column.pitch, center);
   }
-  /// All of cell z, with the column's nodes of the plane above. Calls between() between its halves.
-  template <class Between>
-  __device__ __forceinline__ void cell(int z, const float4* nodes, const Between& between) {
+  /// All of cell z, with the column's nodes of the plane above.
+  __device__ __forceinline__ void cell(int z, const float4* nodes) {
     const float extra = kPartial ? stiffness(z) : 0;  // from memory: on its way
     PlaneNumbers above[3];
     read_plane<kPartial>(nodes, column.pitch, above);
@@ -102,7 +101,6 @@ struct ColumnWalk {
     }
 #pragma unroll
     for (int sz = 0; sz < 2; ++sz) {
-      if (sz == 1) between();
       const float side = sz == 0 ? -1.0f : 1.0f;
       HalfPlane h[3], out[3];
 #pragma unroll
@@ -128,11 +126,6 @@ struct ColumnWalk {
       below[c] = center[c];
       center[c] = above[c];
     }
-  }
-  /// A cell that resists nothing, with the column's nodes of the plane above.
-  __device__ __forceinline__ void pass(const float4* nodes) {
-    for (int c = 0; c < 3; ++c) below[c] = center[c];
-    read_plane<kPartial>(nodes, column.pitch, center);
   }
   /// What comes after the column's last cell.
   __device__ __forceinline__ void rise() {
@@ -205,10 +198,8 @@ __device__ __forceinline__ int4 block_size(const CudaTables& t, int block) {
 
 /// Forces of a bundle. Each column of cells has a thread, or two, that walks up it with what the
 /// cells give to the next two node planes in registers. `block` is the bundle's first; bundles
-/// of several blocks need kSpecial, cells that are not full kPartial; with kLayers layers that
-/// resist nothing are left out.
-template <class LawOf, bool kViscous, bool kSpecial, bool kPartial, bool kPairs,
-          bool kLayers = false>
+/// of several blocks need kSpecial, cells that are not full kPartial.
+template <class LawOf, bool kViscous, bool kSpecial, bool kPartial, bool kPairs>
 __device__ __forceinline__ void block_forces(const CudaTables& t, const CudaBundle& w,
                                              const CudaBlock& block, const CudaBody& body,
                                              const BlockShared& s, const BlockStep& step) {
@@ -250,15 +241,13 @@ __device__ __forceinline__ void block_forces(const CudaTables& t, const CudaBund
   if (warp_active) walk.begin(nodes, nodes + walk.column.plane);
 #pragma unroll 1
   for (int z = 0; z < nz; ++z) {
-    if (warp_active && (!kSpecial || z < walk.column.nz) &&
-        (!kLayers || (block.layers >> z & 1) != 0)) {
+    if (warp_active && (!kSpecial || z < walk.column.nz)) {
       if (kPairs) {
         walk.half(z);
       } else {
-        walk.cell(z, nodes + (z + 2) * walk.column.plane, [] {});
+        walk.cell(z, nodes + (z + 2) * walk.column.plane);
       }
-    } else if (kSpecial || kLayers) {
-      if (kLayers && !kPairs && warp_active) walk.pass(nodes + (z + 2) * walk.column.plane);
+    } else if (kSpecial) {
       walk.rise();
     }
     finish_plane(walk.now, z);

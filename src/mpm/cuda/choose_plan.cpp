@@ -9,8 +9,6 @@
 #include <string>
 
 #include "mpm/cuda/count_blocks.h"
-#include "mpm/cuda/stacks.h"
-#include "mpm/tear/tear.h"
 
 namespace tissue_sim {
 namespace {
@@ -22,24 +20,6 @@ int parts_of(int n, int size) { return (n + size - 1) / size; }
 
 /// How many blocks can share a node along an axis.
 int sharers(int n, int size) { return n <= size ? 1 : size == 1 ? 3 : 2; }
-
-/// Cycles of a substep that marches, 1e30 where it does not go. The figures here and below are
-/// fitted to measurements on an H200: see docs/benchmarks_cuda.md.
-double cycles_of_march(const LatticeBody& body, const CudaShape& s, const CudaLimits& limits) {
-  const BlockShape& b = s.blocks;
-  const double plane_slots = (b.x + 2.0) * (b.y + 2), bytes = kMarchBytes * plane_slots;
-  // Room for one thread block only: several would be slower, and this is no model of them.
-  const auto room = static_cast<double>(limits.shared_bytes);
-  if (bytes + kMarchBytesBeside > room || 2 * bytes < room) return 1e30;
-  const int columns = parts_of(body.nx, b.x) * parts_of(body.ny, b.y),
-            high = parts_of(body.nz, b.z), height = stack_height(columns, high, limits.processors);
-  const int rounds = parts_of(columns * parts_of(high, height), limits.processors);
-  const double warps = std::ceil(b.x * b.y / 32.0) / 4;  // on each scheduler
-  const double cell = 1950 * std::max(1.8, 1.3 * warps),
-               plane = 200 + 450 * warps + 5 * plane_slots;
-  const double layers = height * b.z, of_block = 10;  // of equals, the tallest blocks
-  return rounds * (5000 + of_block * height + cell * layers + plane * (layers + 2)) + 3000;
-}
 
 /// Rounds of `at_once` thread blocks for the blocks of bodies of which some do not fill their
 /// boxes: blocks at a surface have few columns and share thread blocks. `blocks`, `columns`: how
@@ -66,9 +46,10 @@ double rounds_of(const std::vector<BlockCounts>& counts, const CudaShape& s, dou
   return rounds(bundles.empty() ? blocks : static_cast<double>(bundles.size()));
 }
 
-/// Cycles of a substep as a small or as a large tissue (substeps.cu), 1e30 where that does not go;
-/// where it takes `least` or more, it may take more than what is returned. `counts`: of the bodies;
-/// `whole`: see choose_shape().
+/// Cycles of a substep as a small or as a large tissue (substeps.cu), 1e30 where that does not go.
+/// The figures are fitted to measurements on an H200: see docs/benchmarks_cuda.md. Where it takes
+/// `least` or more, it may take more than what is returned. `counts`: of the bodies; `whole`: see
+/// choose_shape().
 double cycles(const std::vector<LatticeBody>& bodies, const std::vector<BlockCounts>& counts,
               const CudaShape& s, const CudaLimits& limits, bool whole, double least) {
   const BlockShape& b = s.blocks;
@@ -149,39 +130,30 @@ bool wants_pairs(const std::vector<LatticeBody>& bodies) {
   return viscous || (neo_hookean && fixed_corotated);
 }
 
-CudaShape shape_from(const char* text, bool pairs, bool may_march) {
+CudaShape shape_from(const char* text, bool pairs) {
   CudaShape s;
   BlockShape& b = s.blocks;
   int way = 0;
-  if (std::sscanf(text, "%d %d %d %d %d", &b.x, &b.y, &b.z, &s.threads, &way) != 5 || b.x < 1 ||
-      b.y < 1 || b.z < 1 || b.z > kMaxLayers || s.threads > kMaxCudaThreads ||
+  if (std::sscanf(text, "%d %d %d %d %d", &b.x, &b.y, &b.z, &s.threads, &way) != 5 || way < 0 ||
+      way > 1 || b.x < 1 || b.y < 1 || b.z < 1 || b.z > kMaxLayers || s.threads > kMaxCudaThreads ||
       s.threads % 32 != 0 || b.x * b.y > s.threads || (pairs && !s.pairs())) {
     throw std::runtime_error(
         std::string("TISSUE_SIM_CUDA_SHAPE is '") + text +
         "': it must be 'x y z threads way', threads a multiple of 32 up to "
         "256 and at least x y (2 x y where there is viscosity or more than one "
-        "law), z at most 16, way 0 for large, 1 for small, 2 to march");
+        "law), z at most 16, way 0 for large, 1 for small");
   }
   s.small = way == 1;
-  s.marches = way == 2 && may_march;
   return s;
 }
 
 }  // namespace
 
-bool can_march(const std::vector<LatticeBody>& bodies) {
-  if (bodies.size() != 1 || bodies[0].materials.size() != 1) return false;
-  const LatticeBody& b = bodies[0];
-  const Material& m = b.materials[0];
-  return m.viscosity == 0 && least_tear_limit(m) == 0 && b.point_count == 8 * b.nx * b.ny * b.nz;
-}
-
-CudaShape choose_shape(const std::vector<LatticeBody>& bodies, const CudaLimits& limits, bool whole,
-                       bool may_march) {
-  may_march = may_march && whole && can_march(bodies);
+CudaShape choose_shape(const std::vector<LatticeBody>& bodies, const CudaLimits& limits,
+                       bool whole) {
   const bool pairs = wants_pairs(bodies);
   if (const char* text = std::getenv("TISSUE_SIM_CUDA_SHAPE")) {
-    return shape_from(text, pairs, may_march);
+    return shape_from(text, pairs);
   }
   std::vector<BlockCounts> counts;
   counts.reserve(bodies.size());
@@ -189,9 +161,7 @@ CudaShape choose_shape(const std::vector<LatticeBody>& bodies, const CudaLimits&
   CudaShape best;
   best.blocks = {4, 4, 4};
   double least = 1e30;
-  enum Way { kSmall, kLarge, kMarch };
-  for (const Way way : {kSmall, kLarge, kMarch}) {
-    if (way == kMarch && !may_march) continue;
+  for (const bool small : {true, false}) {
     for (const int threads : {64, 96, 128, 192, 256}) {
       for (int x = threads; x > 0; --x) {  // of equals, the longest along x
         for (int y = 1; y <= threads / x; ++y) {
@@ -199,11 +169,9 @@ CudaShape choose_shape(const std::vector<LatticeBody>& bodies, const CudaLimits&
             CudaShape s;
             s.blocks = {x, y, z};
             s.threads = threads;
-            s.small = way == kSmall;
-            s.marches = way == kMarch;
+            s.small = small;
             if (pairs && !s.pairs()) continue;
-            const double c = s.marches ? cycles_of_march(bodies[0], s, limits)
-                                       : cycles(bodies, counts, s, limits, whole, least);
+            const double c = cycles(bodies, counts, s, limits, whole, least);
             if (c < least) {
               least = c;
               best = s;

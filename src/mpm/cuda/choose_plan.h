@@ -11,15 +11,14 @@ namespace tissue_sim {
 
 struct CudaShape {
   BlockShape blocks;
-  int threads = 64;      ///< see CudaPlan
-  bool small = true;     ///< the same
-  bool marches = false;  ///< the same
+  int threads = 64;   ///< see CudaPlan
+  bool small = true;  ///< the same
   /// CudaPlan::pairs, and the columns that a thread block can have.
   bool pairs() const { return 2 * blocks.x * blocks.y <= threads; }
   int columns() const { return pairs() ? threads / 2 : threads; }
   bool operator==(const CudaShape& s) const {
     return blocks.x == s.blocks.x && blocks.y == s.blocks.y && blocks.z == s.blocks.z &&
-           threads == s.threads && small == s.small && marches == s.marches;
+           threads == s.threads && small == s.small;
   }
 };
 
@@ -30,14 +29,11 @@ struct CudaLimits {
 };
 
 /// The shape for these bodies that a model of the substep's time finds fastest: as long as they
-/// are `whole`, or when they are cut. Only what is whole can march, see can_march(), and cuts need
-/// room for the blocks that they add. The environment variable TISSUE_SIM_CUDA_SHAPE="x y z threads
-/// way", way 0 for large, 1 for small, 2 for a shape that marches, overrules it, for measurements.
-CudaShape choose_shape(const std::vector<LatticeBody>& bodies, const CudaLimits& limits, bool whole,
-                       bool may_march = true);
-
-/// Whether these are one body that fills a box, of one material that neither damps nor tears.
-bool can_march(const std::vector<LatticeBody>& bodies);
+/// are `whole`, or when they are cut: cuts need room for the blocks that they add. The environment
+/// variable TISSUE_SIM_CUDA_SHAPE="x y z threads way", way 0 for large, 1 for small, overrules it,
+/// for measurements.
+CudaShape choose_shape(const std::vector<LatticeBody>& bodies, const CudaLimits& limits,
+                       bool whole);
 
 /// Each block alone: indices into Blocks::all. Where more than run at once, the smallest come last,
 /// and to the thread blocks that have the smallest of the others.

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 
+#include "frame/out_of_control.h"
 #include "math/lanczos.h"
 #include "mpm/cuda/cuda_linearised_motion.h"
 #include "mpm/cuda/on_device.h"
@@ -59,8 +60,6 @@ double CudaMpmTissue::measure_limit(int steps) {
           frame.front = d.front.view();
           frame.pushes = clear_pushes();
           launch_substeps(d.front_plan, d.pushed_tables(), frame, d.front_resident, d.stream);
-        } else if (d.all_plain) {
-          launch_substeps(d.plain_plan, d.plain_tables(), frame, d.plain_resident, d.stream);
         } else {
           launch_substeps(d.plan, d.tables(), frame, d.resident, d.stream);
         }
@@ -113,8 +112,7 @@ void CudaMpmTissue::finish_measure() {
   for (std::size_t i = 0; i < d.front.energy.size(); ++i) {
     (i < cells ? result_.elastic_energy : result_.kinetic_energy) += d.front.host_energy[i];
   }
-  // Nothing that instruments do moves tissue at the speed of a bullet; what does is out of control.
-  result_.blew_up = result_.blew_up || !(result_.max_speed < 300);
+  result_.blew_up = result_.blew_up || is_out_of_control(result_.max_speed);
   if (searched) state_->faces.fastest = fastest_block(*state_);
   measured_ = true;
 }

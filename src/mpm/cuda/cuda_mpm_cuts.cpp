@@ -77,7 +77,7 @@ std::vector<BrokenBond> CudaMpmTissue::sweep(const BladePath& path, bool moves) 
   return broken;
 }
 
-void CudaMpmTissue::read_places(const float4* u_before) {
+void CudaMpmTissue::read_places(float4* u_before) {
   OnDevice& d = *device_;
   SweepOnDevice& on = d.sweep;
   upload_lattices();
@@ -169,8 +169,7 @@ std::vector<int> CudaMpmTissue::label_pieces() {
   return fresh;
 }
 
-void CudaMpmTissue::cut(const std::vector<BladePath>& paths, const float4* u_before,
-                        CutReport& report) {
+void CudaMpmTissue::cut(const std::vector<BladePath>& paths, float4* u_before, CutReport& report) {
   std::vector<std::int32_t> changed, touched;
   read_places(u_before);
   for (const BladePath& path : paths) {

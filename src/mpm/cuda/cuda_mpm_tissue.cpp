@@ -4,6 +4,7 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "frame/out_of_control.h"
 #include "mpm/anchors/anchored_share.h"
 #include "mpm/cuda/on_device.h"
 #include "mpm/cuda/outer_points.h"
@@ -59,12 +60,10 @@ CudaMpmTissue::CudaMpmTissue(const Scene& scene, std::vector<std::string> notes)
               static_cast<std::size_t>(attribute(cudaDevAttrMaxSharedMemoryPerBlockOptin))};
   state_ = make_state(scene, &notes_);
   d.cut_shape = choose_shape(state_->bodies, d.limits, false);
-  // What touches other tissue keeps its blocks, which know the contacts; and what anchors hold at
-  // their faces has cells that are not full, which do not march.
-  const bool held = !state_->anchors.groups.empty();
-  make_blocks(state_->bodies.size() == 1 ? choose_shape(state_->bodies, d.limits, true, !held)
-                                         : d.cut_shape,
-              d.limits.processors);
+  // What touches other tissue keeps its blocks, which know the contacts.
+  make_blocks(
+      state_->bodies.size() == 1 ? choose_shape(state_->bodies, d.limits, true) : d.cut_shape,
+      d.limits.processors);
   for (std::int32_t p = 0; p < state_->points.size(); ++p) {
     if (!(state_->points.free_volume_of(p) > 0)) d.anchors.held_points.push_back(p);
   }
@@ -238,8 +237,6 @@ void CudaMpmTissue::launch(int begin, int end, float dt) {
     } else {
       launch_substeps(d.push_plan, tables, frame, d.push_resident, d.stream);
     }
-  } else if (d.all_plain) {
-    launch_substeps(d.plain_plan, d.plain_tables(), frame, d.plain_resident, d.stream);
   } else {
     launch_substeps(d.plan, d.tables(), frame, d.resident, d.stream);
   }
@@ -256,6 +253,7 @@ FrameResult CudaMpmTissue::finish() {
   pieces_measured_ = false;
   substep_.follow(*state_, modulus_);
   tame();
+  result_.blew_up = result_.blew_up || is_out_of_control(result_);
   if (foresight_.network != nullptr && !result_.blew_up) foresee();
   measured_ = false;
   return result_;
@@ -288,9 +286,7 @@ std::string CudaMpmTissue::plan() const {
   return std::to_string(b.x) + " x " + std::to_string(b.y) + " x " + std::to_string(b.z) +
          " cells, " + std::to_string(d.plan.threads) + " a block, " +
          std::to_string(d.blocks.size()) + " blocks in " + std::to_string(d.bundles.size()) +
-         " bundles, " + std::to_string(d.resident) + " at once" +
-         (d.plan.cached ? ", cached" : "") +
-         (d.stacks.count() > 0 ? ", in " + std::to_string(d.stacks.count()) + " stacks" : "");
+         " bundles, " + std::to_string(d.resident) + " at once" + (d.plan.cached ? ", cached" : "");
 }
 
 }  // namespace tissue_sim

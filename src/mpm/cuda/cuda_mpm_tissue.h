@@ -100,8 +100,8 @@ class CudaMpmTissue final : public Tissue {
   void make_room_for_cuts();  ///< makes blocks anew that are good for whole tissue alone
   void plan_tables();         ///< how the blocks are worked on, and the tables for it
   /// While the tissue moves from `u_before` to where it is; null: it is at rest.
-  void cut(const std::vector<BladePath>& paths, const float4* u_before, CutReport& report);
-  void read_places(const float4* u_before);  ///< of points, at both times, for sweep()
+  void cut(const std::vector<BladePath>& paths, float4* u_before, CutReport& report);
+  void read_places(float4* u_before);  ///< of points, at both times, for sweep()
   std::vector<BrokenBond> sweep(const BladePath& path, bool moves);
   /// What follows where points lost bonds; contacts come down and wait for the next search. Returns
   /// whether pieces may have come apart.

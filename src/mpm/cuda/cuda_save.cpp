@@ -52,6 +52,7 @@ std::vector<HeldPoint> bring_held(const DeviceArray<std::uint8_t>& with,
 template <class Archive>
 void CudaMpmTissue::each_field(Archive& archive, StateOnHost& of_device) {
   OnDevice& d = *device_;
+  check_tissue(*state_);
   FaceContacts& faces = state_->faces;
   tissue_fields(archive, *state_);
   archive.part("facets", faces.version, faces.first_facet, faces.block_of);

@@ -37,18 +37,17 @@ void check_memory(std::size_t wanted, std::size_t held) {
 
 std::size_t CudaMpmTissue::device_bytes() const {
   const OnDevice& d = *device_;
-  std::size_t sum = d.blocks.bytes() + d.bundles.bytes() + d.columns.bytes() +
-                    d.near_cells.bytes() + d.near_listed.bytes() + d.u_went.bytes() +
-                    d.bodies.bytes() + d.of_blocks.bytes() + d.made.bytes() + d.spare.bytes() +
-                    d.origins.bytes() + d.sweep.bytes() + d.labels.bytes() + d.some_nodes.bytes() +
-                    d.packed.bytes() + d.piece.bytes() + d.place.bytes() + d.slot_parts.bytes() +
-                    d.first_parts.bytes() + d.parts.bytes() + d.pushed_parts.bytes() +
-                    d.marks.bytes() + d.pushed.bytes() + d.inertia.bytes() + d.colour.bytes() +
-                    d.hold.bytes() + d.outer.bytes() + d.planes.bytes() + d.bonds.bytes() +
-                    d.soft.bytes() + d.with.bytes() + d.whole.bytes() + d.u_before.bytes() +
-                    d.connect_room.bytes() + d.colliders.bytes() + d.loads.bytes() +
-                    d.measures.bytes() + d.cloud.bytes() + d.stretched.bytes() + d.faces.bytes() +
-                    d.front.bytes() + d.checkpoint.bytes() + d.stacks.bytes() + d.anchors.bytes();
+  std::size_t sum =
+      d.blocks.bytes() + d.bundles.bytes() + d.columns.bytes() + d.near_cells.bytes() +
+      d.near_listed.bytes() + d.u_went.bytes() + d.bodies.bytes() + d.of_blocks.bytes() +
+      d.made.bytes() + d.spare.bytes() + d.origins.bytes() + d.sweep.bytes() + d.labels.bytes() +
+      d.some_nodes.bytes() + d.packed.bytes() + d.piece.bytes() + d.place.bytes() +
+      d.slot_parts.bytes() + d.first_parts.bytes() + d.parts.bytes() + d.pushed_parts.bytes() +
+      d.marks.bytes() + d.pushed.bytes() + d.inertia.bytes() + d.colour.bytes() + d.hold.bytes() +
+      d.outer.bytes() + d.planes.bytes() + d.bonds.bytes() + d.soft.bytes() + d.with.bytes() +
+      d.whole.bytes() + d.u_before.bytes() + d.connect_room.bytes() + d.colliders.bytes() +
+      d.loads.bytes() + d.measures.bytes() + d.cloud.bytes() + d.stretched.bytes() +
+      d.faces.bytes() + d.front.bytes() + d.checkpoint.bytes() + d.anchors.bytes();
   for (int i = 0; i < 2; ++i) sum += d.u[i].bytes() + d.v[i].bytes() + d.force[i].bytes();
   return sum;
 }
@@ -57,11 +56,8 @@ void CudaMpmTissue::plan_tables() {
   OnDevice& d = *device_;
   d.plan.threads = d.shape.threads;
   d.plan.small = d.shape.small;
-  d.plan.marches = d.shape.marches;
   d.plan.pairs = d.shape.pairs();
-  d.plan.max_slots = d.plan.max_plane_slots = d.plan.max_held = d.plan.max_items = 0;
-  const AnchorFaces& anchors = state_->anchors;
-  d.plan.holds = false;
+  d.plan.max_slots = d.plan.max_plane_slots = d.plan.max_held = 0;
   const std::vector<Block*>& blocks = state_->blocks.all;
   for (const Block* b : blocks) {
     const int plane = (b->nx + 2) * (b->ny + 2);
@@ -79,13 +75,8 @@ void CudaMpmTissue::plan_tables() {
   const bool may_have_fronts = state_->front.follows;
   const auto choose = [&d, may_have_fronts](std::size_t count) {
     d.resident = resident_blocks(d.plan, static_cast<int>(count));
-    d.plain_plan = d.plan;
-    d.plain_plan.plain = true;
-    d.plain_plan.holds = false;
-    d.plain_resident = resident_blocks(d.plain_plan, static_cast<int>(count));
     d.push_plan = d.plan;
     d.push_plan.pushes = true;
-    d.push_plan.holds = false;
     d.push_resident = resident_blocks(d.push_plan, static_cast<int>(count));
     d.touch_plan = d.push_plan;
     d.touch_plan.touches = true;
@@ -100,7 +91,7 @@ void CudaMpmTissue::plan_tables() {
   if (!(d.plan.cached && d.push_plan.cached)) {
     const auto at_once = static_cast<std::size_t>(
         std::max(1, std::min(most_at_once(d.plan), most_at_once(d.push_plan))));
-    if (blocks.size() > at_once && !d.plan.marches) {
+    if (blocks.size() > at_once) {
       d.push_plan.max_plane_slots = most_plane_slots(d.plan.max_plane_slots);
       const BundleSize limits = {d.shape.columns(), d.push_plan.max_plane_slots,
                                  most_slots(d.push_plan)};
@@ -108,9 +99,7 @@ void CudaMpmTissue::plan_tables() {
                                  d.plan.small ? at_once : blocks.size(), limits);
     }
     if (bundles.empty()) {
-      bundles = d.plan.marches
-                    ? blocks_by_column(blocks)
-                    : single_blocks(blocks, d.plan.small ? at_once : blocks.size(), *state_->cpu);
+      bundles = single_blocks(blocks, d.plan.small ? at_once : blocks.size(), *state_->cpu);
     }
   } else {
     bundles = single_blocks(blocks, blocks.size(), *state_->cpu);
@@ -128,19 +117,8 @@ void CudaMpmTissue::plan_tables() {
   d.plan.max_columns = t.max_columns;
   make_face_rows(*state_, t, t.max_plane_slots, d.anchors.made);
   d.plan.max_held = d.anchors.made.most_held;
-  d.plan.max_items = d.anchors.made.most_items;
-  const bool all_whole = std::all_of(t.bundles.begin(), t.bundles.end(), [](const CudaBundle& b) {
-    return b.blocks == 1 && b.partial == 0;
-  });
-  const bool is_held = !anchors.groups.empty();
-  d.plan.holds = is_held && all_whole && !d.anchors.made.grouped && !d.anchors.made.carries_always;
   choose(t.bundles.size());
-  if (d.plan.holds && d.plan.small && !d.plan.cached) {  // for want of shared memory
-    d.plan.holds = false;
-    choose(t.bundles.size());
-  }
-  d.all_plain = all_whole && !is_held;  // those kernels hold no faces
-  if (d.resident == 0 || d.plain_resident == 0 || d.push_resident == 0 || d.touch_resident == 0 ||
+  if (d.resident == 0 || d.push_resident == 0 || d.touch_resident == 0 ||
       (may_have_fronts && d.front_resident == 0)) {
     throw std::runtime_error("the GPU has too little shared memory");
   }
@@ -169,13 +147,10 @@ void CudaMpmTissue::push_tables() {
   d.place_parts = has_thin_tools(scene) ? kPlaceParts : 1;
   const std::size_t held = points * d.place_parts * d.held_by;
   const std::size_t most_held = OnDevice::Checkpoint::most_held(held);
-  const std::size_t of_stacks =
-      d.plan.marches ? Stacks::bytes_for(t, state_->blocks.all, d.plain_resident) : 0;
   const bool at_surface = scene.mpm.boundary == MpmBoundary::kSurface;
   const std::size_t of_places =
       at_surface && held > 0 ? points * sizeof(float4) * (d.place_parts > 1 ? 2 : 1) : 0;
-  check_memory(bytes_of(t, n, points, held, most_held, of_places, at_surface) + of_stacks,
-               device_bytes());
+  check_memory(bytes_of(t, n, points, held, most_held, of_places, at_surface), device_bytes());
   check_cuda(cudaStreamSynchronize(d.stream), "finish a frame");
   d.blocks.upload(t.blocks, d.stream);
   d.bundles.upload(t.bundles, d.stream);
@@ -196,11 +171,6 @@ void CudaMpmTissue::push_tables() {
   d.first_parts.resize(slots);
   d.parts.resize(slots);
   d.most_sharing.resize(1);
-  d.stacks.clear();
-  if (d.plan.marches) {
-    d.stacks.make(t, state_->blocks.all, d.plain_resident, d.of_blocks.slot_node.data(), n,
-                  d.connect_room, d.most_sharing.data(), d.stream);
-  }
   connect_slots({d.of_blocks.slot_node.data(), d.slot_parts.data(), d.first_parts.data(),
                  d.parts.data(), slots},
                 n, d.connect_room, d.most_sharing.data(), d.stream);

@@ -261,9 +261,9 @@ void launch_stretched(const CudaTables& tables, const CudaNodes& state, int max_
   launch(list_stretched, 4, max_slots, tables, state, stream, share, found, room, count);
 }
 
-void launch_places(const CudaTables& tables, const float4* u, int max_slots, float* places,
+void launch_places(const CudaTables& tables, float4* u, int max_slots, float* places,
                    cudaStream_t stream) {
-  launch(write_places, 4, max_slots, tables, {const_cast<float4*>(u), nullptr}, stream, places);
+  launch(write_places, 4, max_slots, tables, {u, nullptr}, stream, places);
 }
 
 void launch_cloud(const CudaTables& tables, const CudaNodes& state, int max_slots,

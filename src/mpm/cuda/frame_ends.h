@@ -21,7 +21,7 @@ void launch_stretched(const CudaTables& tables, const CudaNodes& state, int max_
                       StretchedPoint* found, int room, int* count, cudaStream_t stream);
 
 /// Writes where all points are, [points][3] [m].
-void launch_places(const CudaTables& tables, const float4* u, int max_slots, float* places,
+void launch_places(const CudaTables& tables, float4* u, int max_slots, float* places,
                    cudaStream_t stream);
 
 /// What clouds need to know of points beside where they are.

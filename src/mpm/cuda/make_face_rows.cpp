@@ -267,8 +267,8 @@ void HostFaceRows::clear() {
   shares.clear();
   rows.clear();
   carried.clear();
-  most_held = most_items = 0;
-  is_new = grouped = carries_always = false;
+  most_held = 0;
+  is_new = carries_always = false;
   room_each = 0;
 }
 
@@ -329,14 +329,10 @@ void make_face_rows(const MpmState& state, const HostTables& t, int plane_slots,
     to.held.insert(to.held.end(), of[i].held.begin(), of[i].held.end());
     for (const int g : of[i].groups) {
       if (faces.groups[g].count == 1) continue;
-      to.grouped = true;
       fill.add(i, t.bundles[i].first_slot, g);
     }
     const int here = static_cast<int>(of[i].held.size());
     to.most_held = std::max(to.most_held, here);
-    const auto put = std::count_if(of[i].held.begin(), of[i].held.end(),
-                                   [](const CudaHeldNode& n) { return n.local >= 0; });
-    to.most_items = std::max(to.most_items, here + t.bundles[i].slots - static_cast<int>(put));
   }
   to.first_held.push_back(static_cast<int>(to.held.size()));
   to.first_carried.push_back(static_cast<int>(to.carried.size()));

@@ -24,8 +24,6 @@ struct HostFaceRows {
   std::vector<CudaHeldNode> held;  ///< in their `parts.x` a slot or kNoSlot, for launch_connect()
   std::vector<int> first_held;
   int most_held = 0;                   ///< of a bundle
-  int most_items = 0;                  ///< the same and slots of nodes that are in no row
-  bool grouped = false;                ///< there are rows with nodes in common
   std::vector<CudaFaceEntry> entries;  ///< the same
   std::vector<CudaFaceShare> shares;
   std::vector<CudaFaceRow> rows;

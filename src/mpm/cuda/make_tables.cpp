@@ -37,9 +37,8 @@ int column_of_lane(const Block& from, int lane) {
 }
 
 /// A layer of the block's points in the GPU's order, into the tables; `first_lane` is the block's.
-/// Returns whether all of them are there, each of `whole_volume`; and whether any has a volume.
-std::pair<bool, bool> fill_layer(const Block& from, int z, float whole_volume, int first_lane,
-                                 HostTables& t) {
+/// Returns whether all of them are there, each of `whole_volume`.
+bool fill_layer(const Block& from, int z, float whole_volume, int first_lane, HostTables& t) {
   const int columns = from.nx * from.ny, first = first_lane + z * 8 * columns;
   std::int32_t* point = t.made.point.data() + first;
   float* volume = t.made.volume.data() + first;
@@ -55,12 +54,11 @@ std::pair<bool, bool> fill_layer(const Block& from, int z, float whole_volume, i
       volume[s * columns + column] = from.volume[i];
     }
   }
-  bool whole = true, any = false;
+  bool whole = true;
   for (int i = 0; i < 8 * columns; ++i) {
     whole = whole && point[i] >= 0 && volume[i] == whole_volume;
-    any = any || volume[i] != 0;
   }
-  return {whole, any};
+  return whole;
 }
 
 void fill_partial(const Block& from, int first_lane, HostTables& t) {
@@ -140,7 +138,6 @@ void lay_out(const MpmState& state, const std::vector<std::vector<int>>& bundles
       if (known != before.end()) {
         const CudaBlock& same = blocks[known->second];
         b.whole = same.whole;
-        b.layers = same.layers;
         t.origin.push_back({same.first_slot, same.first_lane, 0});
       } else {
         t.origin.push_back({new_slots, new_lanes, 1});
@@ -215,18 +212,16 @@ void make_tables(const MpmState& state, const std::vector<std::vector<int>>& bun
     block.whole = 1;
     for (int z = 0; z < block.nz; ++z) layers.push_back({static_cast<int>(i), z});
   }
-  std::vector<std::pair<bool, bool>> filled(layers.size());
+  std::vector<std::uint8_t> whole(layers.size());
   state.cpu->for_each(static_cast<int>(layers.size()), [&](int i) {
     const auto& [index, z] = layers[i];
     const float volume = t.bodies[t.blocks[index].body].point_volume;
-    filled[i] =
-        fill_layer(*state.blocks.all[t.of_host[index]], z, volume, t.origin[index].first_lane, t);
+    whole[i] =
+        fill_layer(*state.blocks.all[t.of_host[index]], z, volume, t.origin[index].first_lane, t)
+            ? 1
+            : 0;
   });
-  for (std::size_t i = 0; i < layers.size(); ++i) {
-    CudaBlock& block = t.blocks[layers[i].block];
-    block.whole &= filled[i].first ? 1 : 0;
-    if (filled[i].second) block.layers |= 1 << layers[i].z;
-  }
+  for (std::size_t i = 0; i < layers.size(); ++i) t.blocks[layers[i].block].whole &= whole[i];
   state.cpu->for_each(static_cast<int>(t.blocks.size()), [&](int i) {
     const Block& from = *state.blocks.all[t.of_host[i]];
     const CudaBlockOrigin& origin = t.origin[i];

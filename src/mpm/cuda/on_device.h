@@ -19,7 +19,6 @@
 #include "mpm/cuda/make_tables.h"
 #include "mpm/cuda/near_cells.h"
 #include "mpm/cuda/some_nodes.h"
-#include "mpm/cuda/stacks.h"
 #include "mpm/cuda/sweep_blade.h"
 
 namespace tissue_sim {
@@ -42,13 +41,12 @@ struct SweepOnDevice {
 struct CudaMpmTissue::OnDevice {
   CudaLimits limits;
   CudaShape shape, cut_shape;  ///< now, and once bonds broke
-  /// Without contact, with tools, with contact of tissue too, with fronts too, and CudaPlan::plain.
-  CudaPlan plan, push_plan, touch_plan, front_plan, plain_plan;
+  /// Without contact, with tools, with contact of tissue too, with fronts too.
+  CudaPlan plan, push_plan, touch_plan, front_plan;
   /// Thread blocks that run at once.
-  int resident = 0, push_resident = 0, touch_resident = 0, front_resident = 0, plain_resident = 0;
-  bool all_plain = true;  ///< all cells are full and each bundle is one block
-  bool may_meet = true;   ///< whether any block may meet a collider in this frame
-  int current = 0;        ///< which of the two states is the present one
+  int resident = 0, push_resident = 0, touch_resident = 0, front_resident = 0;
+  bool may_meet = true;  ///< whether any block may meet a collider in this frame
+  int current = 0;       ///< which of the two states is the present one
   cudaStream_t stream = nullptr;
   std::string gpu;  ///< name
 
@@ -69,7 +67,6 @@ struct CudaMpmTissue::OnDevice {
   DeviceArray<float4> packed;  ///< of some nodes: u, then v
   DeviceArray<std::uint32_t> slot_parts, parts, colour;
   DeviceArray<uint4> first_parts;
-  Stacks stacks;
   ConnectRoom connect_room;
   PinnedArray<int> most_sharing;
   DeviceArray<float4> hold;
@@ -172,8 +169,6 @@ struct CudaMpmTissue::OnDevice {
     t.slot_parts = pushed_parts.data();
     return t;
   }
-  /// Those for plain_plan.
-  CudaTables plain_tables() const { return stacks.of(tables()); }
   /// Nodes, and parted ones behind them.
   std::size_t entries() const { return u[0].size(); }
   /// How far from the points of a cell its surface may be [cells].

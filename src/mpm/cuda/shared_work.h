@@ -3,7 +3,7 @@
 #pragma once
 
 #include "mpm/cuda/block_forces.h"
-#include "mpm/cuda/held_bundle.h"
+#include "mpm/cuda/hold_faces.h"
 #include "mpm/cuda/push_cells.h"
 #include "mpm/cuda/push_contacts.h"
 #include "mpm/cuda/substeps.h"
@@ -68,11 +68,11 @@ __device__ __forceinline__ SharedWork& work_of() {
 }
 /// The shared memory of a thread block. Worked out anew where it is needed, so that the compiler
 /// knows it for shared memory and can use its faster loads.
-template <bool kVelocities, bool kWork>
+template <bool kVelocities>
 __device__ __forceinline__ BlockShared shared_of(const CudaLayout& layout) {
   extern __shared__ float4 shared[];
   BlockShared s;
-  s.u = shared + (kWork ? sizeof(SharedWork) / sizeof(float4) : 0);
+  s.u = shared + sizeof(SharedWork) / sizeof(float4);
   s.v = s.u + (kVelocities ? layout.max_slots : 0);
   s.exchange = s.u + layout.node_room;
   s.colliders = reinterpret_cast<Collider*>(s.exchange + layout.exchange);
@@ -87,40 +87,14 @@ __device__ __forceinline__ HeldCache held_of(const BlockShared& s, const CudaLay
 }
 
 /// The bundle's tables there.
-template <bool kWork>
 __device__ __forceinline__ SlotCache cache_of(const BlockShared& s, const CudaLayout& layout) {
   SlotCache cache;
-  cache.parts = held_of(s, layout).word + (kWork ? 4 * layout.held : 0);
+  cache.parts = held_of(s, layout).word + 4 * layout.held;
   cache.more = layout.eight_parts ? cache.parts + layout.max_slots : nullptr;
   cache.node = reinterpret_cast<std::int32_t*>(cache.parts +
                                                (layout.eight_parts ? 2 : 1) * layout.max_slots);
   cache.shared = reinterpret_cast<std::uint32_t*>(cache.node + layout.max_slots);
   return cache;
-}
-
-/// The layout where a kernel with much to hold reads it anew where it is needed, else its own.
-template <bool kWork>
-__device__ __forceinline__ const CudaLayout& layout_now(const CudaLayout& layout) {
-  if constexpr (kWork) {
-    return work_of().layout;
-  } else {
-    return layout;
-  }
-}
-
-/// BundleItems in the shared memory of a thread block.
-__device__ __forceinline__ BundleItems items_of(const BlockShared& s, const CudaLayout& layout) {
-  BundleItems items;
-  items.of.parts = reinterpret_cast<uint4*>(s.rounds + 1);
-  items.of.more = layout.eight_parts ? items.of.parts + layout.items : nullptr;
-  items.row =
-      reinterpret_cast<float4*>(items.of.parts + (layout.eight_parts ? 2 : 1) * layout.items);
-  items.of.node = reinterpret_cast<std::int32_t*>(items.row + layout.held);
-  items.of.shared = reinterpret_cast<std::uint32_t*>(items.of.node + layout.items);
-  items.local = reinterpret_cast<int*>(items.of.shared + layout.items);
-  items.impulse = items.local + layout.items;
-  items.free_count = items.impulse + layout.held;
-  return items;
 }
 
 /// After bring_nodes(): what faces hold of a bundle. All threads of the block. Out of line and with
@@ -129,7 +103,7 @@ template <bool kVelocities, bool kPushes>
 __device__ __noinline__ void hold_bundle(int round) {
   const SharedWork& work = work_of();
   const CudaLayout layout = work.layout;
-  const BlockShared s = shared_of<kVelocities, true>(layout);
+  const BlockShared s = shared_of<kVelocities>(layout);
   const HeldOfBundle of = work.held;
   const BundleNodes nodes{s.u, kVelocities ? s.v : nullptr, placed_scale(work.body)};
   if (of.count > 0) {

@@ -56,7 +56,7 @@ void fields(Archive& archive, CudaContactNodes& n) {
 template <class Archive>
 void fields(Archive& archive, CudaShape& s) {
   BlockShape& b = s.blocks;
-  archive(b.x, b.y, b.z, b.uniform, b.has_rows, b.room, s.threads, s.small, s.marches);
+  archive(b.x, b.y, b.z, b.uniform, b.has_rows, b.room, s.threads, s.small);
 }
 
 template <class Archive>

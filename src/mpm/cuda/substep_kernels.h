@@ -16,11 +16,9 @@ namespace {
 /// Which laws a kernel can do; one that can do all has to hold more registers.
 enum class Laws { kFixedCorotated, kNeoHookean, kAny };
 
-/// What a kernel can do: whole tissue (CudaPlan::plain), cut tissue too, contact with tools beside,
-/// or of tissue with tissue too, and with fronts of cuts.
-enum class Can { kPlain, kCuts, kPushes, kTouches, kFronts, kHolds };
-/// Whether tissue need not be whole.
-constexpr bool cuts(Can can) { return can != Can::kPlain && can != Can::kHolds; }
+/// What a kernel can do: whole and cut tissue, contact with tools beside, or of tissue with tissue
+/// too, and with fronts of cuts.
+enum class Can { kCuts, kPushes, kTouches, kFronts };
 constexpr bool touches(Can can) { return can == Can::kTouches || can == Can::kFronts; }
 constexpr bool pushes(Can can) { return can == Can::kPushes || touches(can); }
 
@@ -30,19 +28,18 @@ __device__ __forceinline__ bool has_faces(const CudaFrame& f) {
   return kCan == Can::kTouches || (kCan == Can::kFronts && f.faces != nullptr);
 }
 
-template <Laws kLaws, bool kPairs, bool kSpecial, bool kPartial, bool kLayers = false>
+template <Laws kLaws, bool kPairs, bool kSpecial, bool kPartial>
 __device__ __forceinline__ void forces(const CudaTables& t, const CudaBundle& w, const CudaBlock& b,
                                        const CudaBody& body, const BlockShared& s,
                                        const BlockStep& step) {
   if constexpr (kLaws == Laws::kFixedCorotated) {
-    block_forces<FixedCorotated, false, kSpecial, kPartial, kPairs, kLayers>(t, w, b, body, s,
-                                                                             step);
+    block_forces<FixedCorotated, false, kSpecial, kPartial, kPairs>(t, w, b, body, s, step);
   } else if constexpr (kLaws == Laws::kNeoHookean) {
-    block_forces<NeoHookean, false, kSpecial, kPartial, kPairs, kLayers>(t, w, b, body, s, step);
+    block_forces<NeoHookean, false, kSpecial, kPartial, kPairs>(t, w, b, body, s, step);
   } else if (body.neo_hookean != 0) {
-    block_forces<NeoHookean, true, kSpecial, kPartial, kPairs, kLayers>(t, w, b, body, s, step);
+    block_forces<NeoHookean, true, kSpecial, kPartial, kPairs>(t, w, b, body, s, step);
   } else {
-    block_forces<FixedCorotated, true, kSpecial, kPartial, kPairs, kLayers>(t, w, b, body, s, step);
+    block_forces<FixedCorotated, true, kSpecial, kPartial, kPairs>(t, w, b, body, s, step);
   }
 }
 
@@ -59,8 +56,8 @@ __device__ __noinline__ void special_forces(float4* force, int workers_first, in
   BlockStep step{force, layout.two_planes, {}};
   step.workers.first = workers_first;
   step.workers.count = workers_count;
-  forces<kLaws, kPairs, true, kPartial>(t, w, block, body,
-                                        shared_of<kLaws == Laws::kAny, true>(layout), step);
+  forces<kLaws, kPairs, true, kPartial>(t, w, block, body, shared_of<kLaws == Laws::kAny>(layout),
+                                        step);
 }
 
 /// Forces of a bundle whose nodes are there. The exchange is `clear` where the thread block has had
@@ -69,7 +66,7 @@ template <Laws kLaws, Can kCan, bool kPairs>
 __device__ __forceinline__ void all_forces(const CudaTables& t, const BundleAtWork& w,
                                            const CudaLayout& layout, bool clear, float4* force,
                                            const Workers& workers) {
-  const BlockShared s = shared_of<kLaws == Laws::kAny, cuts(kCan)>(layout);
+  const BlockShared s = shared_of<kLaws == Laws::kAny>(layout);
   if (!clear) clear_exchange(s.exchange, w.bundle.plane_slots, layout.two_planes);
   if (!pushes(kCan) || !clear) __syncthreads();
   const BlockStep step{force, layout.two_planes, workers};
@@ -81,8 +78,8 @@ __device__ __forceinline__ void all_forces(const CudaTables& t, const BundleAtWo
   };
   if (touches(kCan) && kPairs && !workers.is_all()) {
     special(std::true_type());
-  } else if (!cuts(kCan) || (w.bundle.partial == 0 && w.bundle.blocks == 1)) {
-    forces<kLaws, kPairs, false, false, kCan == Can::kHolds>(t, w.bundle, w.block, w.body, s, step);
+  } else if (w.bundle.partial == 0 && w.bundle.blocks == 1) {
+    forces<kLaws, kPairs, false, false>(t, w.bundle, w.block, w.body, s, step);
   } else if (w.bundle.partial != 0) {
     special(std::true_type());
   } else {
@@ -104,35 +101,20 @@ __device__ __forceinline__ void nodes_are_there(const CudaFrame& f) {
 /// for the others.
 template <Laws kLaws, bool kCached, bool kPairs, Can kCan, class AtWork>
 __device__ __forceinline__ void block_round(const CudaTables& t, const CudaFrame& f,
-                                            const AtWork& at_work, int index, int round,
-                                            const CudaLayout& layout,
-                                            const HeldOfBundle& items_held, const Workers& workers,
+                                            const AtWork& at_work, int round,
+                                            const CudaLayout& layout, const Workers& workers,
                                             bool last) {
   constexpr bool kPushes = pushes(kCan);
-  constexpr int kHand = kCached && (kPairs || kCan != Can::kPlain) ? 2 : 4;  // as registers allow
-  const BlockShared s = shared_of<kLaws == Laws::kAny, cuts(kCan)>(layout);
-  const SlotCache cache = cache_of<cuts(kCan)>(s, layout);
+  constexpr int kHand = kCached ? 2 : 4;  // as registers allow
+  const BlockShared s = shared_of<kLaws == Laws::kAny>(layout);
+  const SlotCache cache = cache_of(s, layout);
   const BundleAtWork& w = at_work();
   const float scale = placed_scale(w.body);
   float4* v = kLaws == Laws::kAny ? s.v : nullptr;
   // Not f.state[i]: parameters that a register indexes would be copied to local memory.
   const bool odd = ((f.current + max(round - 1, 0)) & 1) != 0, odd_round = (round & 1) != 0;
   const CudaNodes &from = odd ? f.state[1] : f.state[0], &to = odd ? f.state[0] : f.state[1];
-  if constexpr (kCan == Can::kHolds && kCached) {
-    const BundleItems items = items_of(s, layout);
-    const HeldOfBundle& of = items_held;
-    const int count = of.count + *items.free_count;
-    if (round == 0) {
-      place_items(items, count, from, scale, s.u, v);
-    } else {
-      bring_items<kPairs ? 3 : 2>(t, f, items, of.count, count, round, from, to,
-                                  odd_round ? f.force[0] : f.force[1], scale, s.u, v);
-      if (of.carries && round == f.substeps) {
-        __syncthreads();
-        carry_nodes(t, f, index, round, from, to);
-      }
-    }
-  } else if (round == 0) {
+  if (round == 0) {
     bring_nodes<false, kCached, kHand>(t, w.bundle.first_slot, w.bundle.slots, cache, from, from,
                                        nullptr, f.step, scale, s.u, v);
   } else {
@@ -147,7 +129,7 @@ __device__ __forceinline__ void block_round(const CudaTables& t, const CudaFrame
     bring_nodes<true, kCached, kHand, kPushes>(t, w.bundle.first_slot, w.bundle.slots, cache, from,
                                                to, odd_round ? f.force[0] : f.force[1], f.step,
                                                scale, s.u, v, pushed, loads);
-    if (cuts(kCan) && f.held_faces.chunks != nullptr) {
+    if (f.held_faces.chunks != nullptr) {
       __syncthreads();
       hold_bundle<kLaws == Laws::kAny, kPushes>(round);
     }
@@ -215,7 +197,7 @@ template <Laws kLaws, bool kCached, bool kPairs, Can kCan>
 __global__ void __launch_bounds__(kMaxCudaThreads, 1)
     mpm_substeps(const CudaTables t, const CudaFrame f, const CudaLayout layout) {
   constexpr bool kPushes = pushes(kCan), kTouches = touches(kCan), kFronts = kCan == Can::kFronts;
-  const BlockShared s = shared_of<kLaws == Laws::kAny, cuts(kCan)>(layout);
+  const BlockShared s = shared_of<kLaws == Laws::kAny>(layout);
   const int mine = static_cast<int>(blockIdx.x);
   const bool idle = kPushes && mine >= t.bundle_count;
   // Where columns have one thread, a round is long enough for few to push.
@@ -240,19 +222,14 @@ __global__ void __launch_bounds__(kMaxCudaThreads, 1)
     s.rounds->begin(t, *f.faces, f.step.dt);
     if (mine == 0) clear_next_turns(f.arrived, 0);
   }
-  if (cuts(kCan) && threadIdx.x == 0) work_of().begin(t, f, layout);
-  const BundleAtWork kept(t, kCached && !idle ? mine : 0);
-  HeldOfBundle of;
+  if (threadIdx.x == 0) work_of().begin(t, f, layout);
   if (kCached && !idle) {
-    if (kCan != Can::kPlain) of = HeldOfBundle(f.held_faces, mine);
-    if constexpr (kCan == Can::kHolds) {
-      fill_items(t, f.held_faces, of, kept.bundle, s.u, items_of(s, layout));
-    } else {
-      fill_cache(t, kept.bundle.first_slot, kept.bundle.slots, cache_of<cuts(kCan)>(s, layout));
-    }
+    const BundleAtWork kept(t, mine);
+    const HeldOfBundle of(f.held_faces, mine);
+    fill_cache(t, kept.bundle.first_slot, kept.bundle.slots, cache_of(s, layout));
     clear_exchange(s.exchange, kept.bundle.plane_slots, layout.two_planes);
-    if (cuts(kCan) && threadIdx.x == 0) work_of().take(kept, of, mine);
-    if (cuts(kCan)) fill_held(f.held_faces, of, held_of(s, layout));
+    if (threadIdx.x == 0) work_of().take(kept, of, mine);
+    fill_held(f.held_faces, of, held_of(s, layout));
     __syncthreads();
   }
   for (int round = 0; round <= f.substeps; ++round) {
@@ -269,36 +246,29 @@ __global__ void __launch_bounds__(kMaxCudaThreads, 1)
     if constexpr (kFronts) move_parted(f, t.bundle_count, round, pushed_nodes(f.pushes, round));
     if (idle) {
       if (round < f.substeps) nodes_are_there(f);
-    } else if constexpr (kCached && cuts(kCan)) {
+    } else if constexpr (kCached) {
       // Read anew where it is needed, for what comes between to have the registers.
       const auto at_work = [&] {
         const SharedWork& work = work_of();
         return BundleAtWork(work.bundle, work.block, work.body);
       };
-      block_round<kLaws, true, kPairs, kCan>(t, f, at_work, mine, round,
-                                             layout_now<cuts(kCan)>(layout), of, workers, true);
-    } else if constexpr (kCached) {
-      block_round<kLaws, true, kPairs, kCan>(t, f, kept, mine, round,
-                                             layout_now<cuts(kCan)>(layout), of, workers, true);
+      block_round<kLaws, true, kPairs, kCan>(t, f, at_work, round, work_of().layout, workers, true);
     } else {
       for (int i = mine; i < t.bundle_count; i += gridDim.x) {
         const bool last = i + static_cast<int>(gridDim.x) >= t.bundle_count;
         const BundleAtWork bundle(t, i);
-        if (cuts(kCan)) {
-          if (threadIdx.x == 0) work_of().take(bundle, HeldOfBundle(f.held_faces, i), i);
-          __syncthreads();
-        }
-        block_round<kLaws, false, kPairs, kCan>(t, f, bundle, i, round,
-                                                layout_now<cuts(kCan)>(layout), of, workers, last);
+        if (threadIdx.x == 0) work_of().take(bundle, HeldOfBundle(f.held_faces, i), i);
+        __syncthreads();
+        block_round<kLaws, false, kPairs, kCan>(t, f, bundle, round, work_of().layout, workers,
+                                                last);
         __syncthreads();  // the next one clears the exchange
       }
     }
     if constexpr (kPushes) {
       if (kFronts && round < f.substeps && for_front) push_front_of(f, round, free_for_front);
       if (round < f.substeps)
-        push_nodes<kCan, kPairs>(
-            t, f, shared_of<kLaws == Laws::kAny, cuts(kCan)>(layout_now<cuts(kCan)>(layout)), round,
-            pushers, helpers, met);
+        push_nodes<kCan, kPairs>(t, f, shared_of<kLaws == Laws::kAny>(work_of().layout), round,
+                                 pushers, helpers, met);
       if (kFronts && round < f.substeps && apart && pushers.has_me()) {
         push_front_of(f, round, free_for_front);
       }
@@ -308,12 +278,8 @@ __global__ void __launch_bounds__(kMaxCudaThreads, 1)
 
 template <Laws kLaws, bool kPairs, Can kCan>
 CudaKernel kernel_for(const CudaPlan& plan) {
-  if constexpr (kCan == Can::kHolds) {
-    return mpm_substeps<kLaws, true, kPairs, kCan>;
-  } else {
-    return plan.cached ? mpm_substeps<kLaws, true, kPairs, kCan>
-                       : mpm_substeps<kLaws, false, kPairs, kCan>;
-  }
+  return plan.cached ? mpm_substeps<kLaws, true, kPairs, kCan>
+                     : mpm_substeps<kLaws, false, kPairs, kCan>;
 }
 template <Laws kLaws, Can kCan>
 CudaKernel kernel_for(const CudaPlan& plan) {

@@ -3,29 +3,22 @@
 #include <algorithm>
 
 #include "compute/cuda_check.h"
-#include "mpm/cuda/moving_planes.h"
 #include "mpm/cuda/substep_kernels.h"
 
 namespace tissue_sim {
 namespace {
 
-bool does_march(const CudaPlan& plan) { return plan.marches && plan.plain; }
-
 const void* kernel(const CudaPlan& plan) {
-  return reinterpret_cast<const void*>(plan.fronts                 ? front_kernel(plan)
-                                       : plan.touches              ? touching_kernel(plan)
-                                       : plan.pushes               ? pushing_kernel(plan)
-                                       : does_march(plan)          ? marching_kernel(plan)
-                                       : plan.plain                ? plain_kernel(plan)
-                                       : plan.holds && plan.cached ? holding_kernel(plan)
-                                                                   : kernel_of<Can::kCuts>(plan));
+  return reinterpret_cast<const void*>(plan.fronts    ? front_kernel(plan)
+                                       : plan.touches ? touching_kernel(plan)
+                                       : plan.pushes  ? pushing_kernel(plan)
+                                                      : kernel_of<Can::kCuts>(plan));
 }
 
 CudaLayout layout_of(const CudaPlan& plan) {
   CudaLayout layout;
   const bool velocities = plan.viscous || (plan.neo_hookean && plan.fixed_corotated);
   layout.max_slots = plan.max_slots;
-  layout.max_plane_slots = plan.max_plane_slots;
   layout.node_room = (velocities ? 2 : 1) * plan.max_slots;
   layout.cells = 0;
   layout.workers = plan.threads;
@@ -42,33 +35,19 @@ CudaLayout layout_of(const CudaPlan& plan) {
     }
   }
   layout.exchange = (plan.two_planes ? 18 : 9) * plan.max_plane_slots;
-  if (does_march(plan)) {
-    layout.node_room = kMovingPlaneRoom * plan.max_plane_slots;
-    layout.exchange = 18 * plan.max_plane_slots;
-  }
-  layout.items = std::max(plan.max_items, plan.max_slots);
   layout.held = plan.cached && plan.keeps_held ? plan.max_held : 0;
   layout.eight_parts = plan.eight_parts;
   layout.two_planes = plan.two_planes;
   return layout;
 }
 
-static_assert(kMarchBytes == (kMovingPlaneRoom + 18) * sizeof(float4));
-
 std::size_t shared_bytes(const CudaPlan& plan) {
-  if (does_march(plan)) return kMarchBytes * plan.max_plane_slots + kMarchBytesBeside;
   const CudaLayout layout = layout_of(plan);
-  if (plan.holds && plan.cached) {
-    const std::size_t of_item = BundleItems::kBytes + (plan.eight_parts ? sizeof(uint4) : 0);
-    return sizeof(int) + of_item * layout.items + BundleItems::kRowBytes * layout.held +
-           sizeof(float4) * (layout.node_room + layout.exchange) +
-           kMaxColliders * sizeof(Collider) + sizeof(FaceRounds);
-  }
   const std::size_t of_slot =
       (plan.cached ? sizeof(uint4) + 8 : 0) + (plan.eight_parts ? sizeof(uint4) : 0);
-  return (plan.plain ? 0 : sizeof(SharedWork)) + sizeof(CudaHeldNode) * layout.held +
-         of_slot * layout.max_slots + sizeof(float4) * (layout.node_room + layout.exchange) +
-         kMaxColliders * sizeof(Collider) + sizeof(FaceRounds);
+  return sizeof(SharedWork) + sizeof(CudaHeldNode) * layout.held + of_slot * layout.max_slots +
+         sizeof(float4) * (layout.node_room + layout.exchange) + kMaxColliders * sizeof(Collider) +
+         sizeof(FaceRounds);
 }
 
 int attribute(cudaDeviceAttr which) {
@@ -99,7 +78,7 @@ int resident_blocks(CudaPlan& plan, int block_count) {
   for (const bool two : {true, false}) {
     for (const bool held : {true, false}) {
       for (const bool eight : {true, false}) {
-        if (!plan.cached || (held && plan.max_held == 0) || (plan.holds && !held)) continue;
+        if (!plan.cached || (held && plan.max_held == 0)) continue;
         plan.two_planes = two;
         plan.keeps_held = held;
         plan.eight_parts = eight;

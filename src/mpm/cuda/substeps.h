@@ -29,28 +29,20 @@ struct CudaPlan {
   bool eight_parts = false;  ///< of a node's force it keeps the places of eight, else of four
   bool keeps_held = false;   ///< of nodes that anchors' faces hold it keeps what moves them, too
   int max_held = 0;          ///< of these, in a bundle
-  int max_items = 0;         ///< BundleItems of a bundle
   bool two_planes = false;   ///< the exchange holds two planes, and threads wait half as often
-  bool marches = false;      ///< large, and nodes come plane by plane where it is plain
-  bool plain = false;        ///< no contact, all cells full, each bundle one block
-  bool holds = false;        ///< plain but for faces of anchors whose rows have no nodes in common
   bool pushes = false;       ///< with contact, ...
   bool touches = false;      ///< ... of tissue with tissue too
   bool fronts = false;       ///< ... and fronts of cuts: contacts may be none then
   bool neo_hookean = false, fixed_corotated = false, viscous = false;  ///< what there is
 };
 
-/// Shared memory that a march takes for each slot of a plane, and beside.
-inline constexpr int kMarchBytes = 640, kMarchBytesBeside = 8;
-
 /// How a thread block's shared memory is laid out.
 struct CudaLayout {
-  int max_slots, max_plane_slots;
+  int max_slots;
   int node_room, exchange;  ///< float4s: for a bundle's nodes, for what columns give to planes
   int cells;                ///< where among the nodes' float4s cells near colliders come
   int workers;              ///< the threads that work on forces; the others push meanwhile
-  int held;                 ///< nodes in HeldCache, or in BundleItems::row
-  int items;                ///< in BundleItems
+  int held;                 ///< nodes in HeldCache
   bool eight_parts, two_planes;
 };
 
@@ -58,9 +50,6 @@ using CudaKernel = void (*)(CudaTables, CudaFrame, CudaLayout);
 CudaKernel pushing_kernel(const CudaPlan& plan);
 CudaKernel touching_kernel(const CudaPlan& plan);
 CudaKernel front_kernel(const CudaPlan& plan);
-CudaKernel plain_kernel(const CudaPlan& plan);
-CudaKernel holding_kernel(const CudaPlan& plan);
-CudaKernel marching_kernel(const CudaPlan& plan);
 
 /// Thread blocks that run at once; 0 where the plan does not fit the GPU. Sets CudaPlan::cached,
 /// eight_parts, keeps_held and two_planes.

@@ -40,7 +40,6 @@ struct alignas(16) CudaBlock {
   int whole;        ///< all points are there, with CudaBody::point_volume
   int partial;      ///< some cells are stabilised
   float origin[3];  ///< reference place of local node 0 [m]
-  int layers;       ///< bit z: some points of that layer of cells resist strain
   TISSUE_SIM_INLINE int slots() const { return (nx + 2) * (ny + 2) * (nz + 2); }
 };
 

@@ -15,6 +15,13 @@ namespace {
 /// From this excess on a crack begins though another one may be about to relieve the place.
 constexpr float kPatience = 1.1f;
 
+/// Whether a bond goes from what is in an anchor to what its face holds: that would stay there.
+bool held_fast(const MpmState& state, std::int32_t p, std::int32_t q) {
+  const std::uint8_t a = state.points.anchored[p], b = state.points.anchored[q];
+  return (a == Points::kInAnchor && b == Points::kAtAnchor) ||
+         (a == Points::kAtAnchor && b == Points::kInAnchor);
+}
+
 /// The bond that a crack takes first.
 Bond begin(const MpmState& state, const TearingPoint& t, const std::vector<TearingPoint>& tearing) {
   const Points::Site& s = state.points.site[t.point];
@@ -26,6 +33,7 @@ Bond begin(const MpmState& state, const TearingPoint& t, const std::vector<Teari
   for (const int k : {kForwardBond + axis, opposite_bond(kForwardBond + axis)}) {
     if ((state.points.bonds[t.point] >> k & 1) == 0) continue;
     const std::int32_t q = neighbour(body, s, k);
+    if (held_fast(state, t.point, q)) continue;
     const TearingPoint* far = entry(tearing, q);
     const float excess = far != nullptr ? far->excess : 0.0f;
     if (excess <= most) continue;
@@ -190,7 +198,12 @@ void add_tearing(const MpmState& state, const std::vector<StretchedPoint>& stret
     const double stretch = std::sqrt(solver.eigenvalues()[2]);
     if (stretch < least) continue;  // it was looked for by the limit of a weaker material
     const double excess = (stretch - 1) / (tear_limit(state, p.point) - 1);
-    tearing.push_back({p.point, static_cast<float>(excess), solver.eigenvectors().col(2)});
+    Vec3 normal = solver.eigenvectors().col(2);
+    if (state.points.anchored[p.point] == Points::kAtAnchor) {
+      const Points::Site& s = state.points.site[p.point];
+      normal = face_normal(body.body.anchors, body.site_position(s.x, s.y, s.z));
+    }
+    tearing.push_back({p.point, static_cast<float>(excess), normal});
   }
 }
 
@@ -226,6 +239,7 @@ void tear_bonds(MpmState& state, const std::vector<TearingPoint>& tearing,
     if ((state.points.bonds[b.point] >> b.bond & 1) == 0) return false;
     if (!b.bridge && broken_on_line(state, body, b.point, b.bond)) return false;
     const std::int32_t q = neighbour(body, s, b.bond);
+    if (held_fast(state, b.point, q)) return false;
     for (const std::int32_t end : {b.point, q}) {  // at a corner it may be the last
       if (__builtin_popcount(state.points.bonds[end]) == 1) return false;
     }

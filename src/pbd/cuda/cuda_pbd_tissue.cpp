@@ -67,12 +67,11 @@ void CudaPbdTissue::push_all() {
 
 void CudaPbdTissue::upload_constraints() {
   OnDevice& d = *device_;
-  const bool spread = d.way == Way::kOneBlock;
   d.sweeps = pbd::sweeps_of_step(*state_);
-  d.elastics.upload(state_->elastics, spread, d.stream);
-  d.strains.upload(state_->strains, spread, d.stream);
-  d.links.upload(state_->links, spread, d.stream);
-  d.bends.upload(state_->bends, spread, d.stream);
+  d.elastics.upload(state_->elastics, d.stream);
+  d.strains.upload(state_->strains, d.stream);
+  d.links.upload(state_->links, d.stream);
+  d.bends.upload(state_->bends, d.stream);
   d.wait("receive data");
   d.step_graph.clear();
   d.projections.clear();
@@ -125,7 +124,7 @@ int CudaPbdTissue::upload_touches(double duration) {
   pbd::find_touches(s, duration);
   const auto* blocks = d.touches.blocks.data();
   const auto* begin = d.touches.begin.data();
-  if (s.touches.size() > 0) d.touches.upload(s.touches, false, d.stream);
+  if (s.touches.size() > 0) d.touches.upload(s.touches, d.stream);
   if (may_touch != d.may_touch || blocks != d.touches.blocks.data() ||
       begin != d.touches.begin.data()) {
     d.step_graph.clear();
@@ -145,11 +144,7 @@ void CudaPbdTissue::run_steps(const FrameColliders& colliders, int steps, float 
   if (d.way != Way::kLaunches) {
     const pbd::CudaPbdExchange exchange = {d.boxed.data(), d.host_loads.data(),
                                            d.host_flights.data(), flights};
-    if (d.way == Way::kSections) {
-      launch_pbd_section_steps(field, frame, steps, d.in_sections, exchange, d.stream);
-    } else {
-      launch_pbd_steps(field, frame, steps, exchange, d.stream);
-    }
+    launch_pbd_steps(field, frame, steps, exchange, d.stream);
   } else {
     launch_pbd_flights(field, flights, d.flights.data(), d.stream);
     if (d.step_graph.is_empty()) {

@@ -20,7 +20,6 @@ class CudaPbdTissue final : public PbdTissue {
     kFaster,    ///< of those below, the one that is thought to be
     kLaunches,  ///< colour by colour, for many constraints
     kOneBlock,  ///< all by one block of threads, for few
-    kSections,  ///< all by a block of threads for each section of one whole surface
   };
 
   /// Throws std::runtime_error where there is no GPU, or not enough memory on it.
@@ -34,10 +33,9 @@ class CudaPbdTissue final : public PbdTissue {
   void pull() override;
   void push();      ///< motion to the GPU
   void push_all();  ///< and constraints, after a change of them
-  /// Throws std::runtime_error where that is not possible. Sections, which a cut may end, are given
-  /// up then.
+  /// Throws std::runtime_error where that is not possible.
   void set_way(Way);
-  Way way() const;  ///< one of the three
+  Way way() const;  ///< one of the two
   /// As pbd::project_constraints() without multipliers, so many times; only enqueues.
   void project(float h, int times = 1);
   void wait();
@@ -54,7 +52,6 @@ class CudaPbdTissue final : public PbdTissue {
   void upload_chunks();
   void choose_way();
   Way faster_way() const;
-  void upload_sections();               ///< leaves none where steps cannot be taken so
   int upload_touches(double duration);  ///< returns their colours
   void upload_frame(const FrameColliders& colliders, int steps, const pbd::CudaPbdFrame& frame);
   void take_loads(const FrameColliders& colliders, int steps);

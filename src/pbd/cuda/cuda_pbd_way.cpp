@@ -1,10 +1,7 @@
 // How the steps of a frame are launched.
-#include <algorithm>
 #include <stdexcept>
 
 #include "pbd/cuda/on_device.h"
-#include "pbd/cuda/section_words.h"
-#include "tools/frame_colliders.h"
 
 namespace tissue_sim {
 namespace {
@@ -21,27 +18,6 @@ double time_of(const std::vector<std::int32_t>& begin, int threads, double colou
 }
 
 }  // namespace
-
-void CudaPbdTissue::upload_sections() {
-  OnDevice& d = *device_;
-  const pbd::State& s = *state_;
-  d.in_sections = {};
-  const bool is_whole = s.components == 1 && d.sweeps == 1;
-  const bool is_surface = s.elastics.blocks.empty() && s.strains.blocks.empty();
-  const int most = pbd::most_pbd_sections();
-  if (!is_whole || !is_surface || most == 0 || d.count >= 1 << 16) return;
-  const pbd::Sections sections = pbd::find_sections(s, most);
-  if (sections.count == 0) return;
-  const pbd::SectionWords words = pbd::section_words(s, sections);
-  d.sections.upload(words.of, d.stream);
-  d.section_words.upload(words.words, d.stream);
-  d.wait("receive data");
-  d.in_sections = {d.sections.data(), d.section_words.data(), sections.count,
-                   words.most_words,  words.most_own,         {}};
-  std::copy_n(sections.first, 6, d.in_sections.first);
-  const int colliders = s.scene.pbd.steps * collider_count(s.scene);
-  if (!pbd::fits_pbd_sections(d.field(), d.in_sections, colliders)) d.in_sections = {};
-}
 
 CudaPbdTissue::Way CudaPbdTissue::faster_way() const {
   const OnDevice& d = *device_;
@@ -65,31 +41,16 @@ CudaPbdTissue::Way CudaPbdTissue::faster_way() const {
 
 void CudaPbdTissue::choose_way() {
   OnDevice& d = *device_;
-  const Way was = d.way;
-  // Where vertices are few, one block has few constraints of a colour, too, and fewer colours.
-  constexpr int kLeastInSections = 1000;
-  if (d.wanted == Way::kSections || (d.wanted == Way::kFaster && d.count >= kLeastInSections)) {
-    upload_sections();
-  } else {
-    d.in_sections = {};
-  }
-  if (d.wanted == Way::kFaster || d.wanted == Way::kSections) {
-    d.way = d.in_sections.count > 0 ? Way::kSections : faster_way();
-  } else if (d.wanted == Way::kOneBlock && !pbd::fits_pbd_block(d.field())) {
+  if (d.wanted == Way::kOneBlock && !pbd::fits_pbd_block(d.field())) {
     throw std::runtime_error("one block of threads has no room for " + std::to_string(d.count) +
                              " vertices; let the tissue choose");
-  } else {
-    d.way = d.wanted;
   }
-  if (d.way != was) upload_constraints();  // in another order
+  d.way = d.wanted == Way::kFaster ? faster_way() : d.wanted;
 }
 
 void CudaPbdTissue::set_way(Way way) {
   device_->wanted = way;
   choose_way();
-  if (way == Way::kSections && device_->way != way) {
-    throw std::runtime_error("this tissue's steps cannot be taken by sections; let it choose");
-  }
 }
 
 CudaPbdTissue::Way CudaPbdTissue::way() const { return device_->way; }

@@ -100,24 +100,6 @@ struct CudaPbdExchange {
   CudaPbdFlights chunks;
 };
 
-/// What a block of threads of section_steps.cu has to do (section_words.h): which of
-/// CudaPbdSections::words are its, and where within them what begins; first of all where passes
-/// begin among its constraints.
-struct CudaPbdSection {
-  std::int32_t begin, words;
-  std::int32_t own;       ///< vertices of the section
-  std::int32_t moves[4];  ///< after each phase: vertex, and 2^16 times the block that has it next
-  std::int32_t incoming[3];  ///< how many come to it then
-  std::int32_t items;        ///< constraints
-};
-struct CudaPbdSections {
-  const CudaPbdSection* of;
-  const std::int32_t* words;
-  int count = 0;                     ///< blocks of threads
-  int most_words = 0, most_own = 0;  ///< of a block
-  int first[6];                      ///< as Sections::first
-};
-
 /// What a block of threads measured.
 struct CudaPbdMeasure {
   double elastic, kinetic;  ///< [J]
@@ -144,14 +126,6 @@ void launch_pbd_steps(const CudaPbdField& field, const CudaPbdFrame& frame, int 
                       const CudaPbdExchange& exchange, cudaStream_t stream);
 /// Whether that is possible.
 bool fits_pbd_block(const CudaPbdField& field);
-/// All steps of one sweep by a block of threads for each section, of which there are no more than
-/// most_pbd_sections(); none touches another piece.
-void launch_pbd_section_steps(const CudaPbdField& field, const CudaPbdFrame& frame, int steps,
-                              const CudaPbdSections& sections, const CudaPbdExchange& exchange,
-                              cudaStream_t stream);
-int most_pbd_sections();  ///< 0 where the GPU or CUDA knows no clusters
-/// Whether that is possible with so many colliders in all steps of a frame.
-bool fits_pbd_sections(const CudaPbdField& field, const CudaPbdSections& sections, int colliders);
 void launch_pbd_flights(const CudaPbdField& field, const CudaPbdFlights& flights,
                         CudaPbdFlight* result, cudaStream_t stream);
 void launch_pbd_changes(const CudaPbdField& field, const std::int32_t* component,

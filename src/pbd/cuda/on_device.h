@@ -7,7 +7,6 @@
 #include "compute/cuda_graph.h"
 #include "pbd/cuda/cuda_pbd_tissue.h"
 #include "pbd/cuda/device_state.h"
-#include "pbd/cuda/spread_banks.h"
 #include "pbd/free_flight.h"
 
 namespace tissue_sim {
@@ -20,13 +19,8 @@ struct CudaPbdTissue::OnDevice {
     DeviceArray<std::int32_t> begin;
     int colours = 0, tail = 0, tail_blocks = 0;
 
-    /// `spread`: in the order that reads shared memory fastest.
-    void upload(const pbd::ConstraintSet<Kind>& set, bool spread, cudaStream_t stream) {
-      if (spread) {
-        blocks.upload(pbd::spread_banks(set), stream);
-      } else {
-        blocks.upload(set.blocks, stream);
-      }
+    void upload(const pbd::ConstraintSet<Kind>& set, cudaStream_t stream) {
+      blocks.upload(set.blocks, stream);
       multipliers.upload(set.multipliers, stream);
       begin.upload(set.begin, stream);
       colours = static_cast<int>(set.begin.size()) - 1;
@@ -54,9 +48,6 @@ struct CudaPbdTissue::OnDevice {
   Set<pbd::Touch> touches;
   bool may_touch = false;
   int sweeps = 1;  ///< of a step
-  DeviceArray<pbd::CudaPbdSection> sections;
-  DeviceArray<std::int32_t> section_words;
-  pbd::CudaPbdSections in_sections;  ///< those; none where the steps are not taken by sections
   Way wanted = Way::kFaster, way = Way::kLaunches;
   CudaGraph step_graph, projections;
 

@@ -1,12 +1,58 @@
 // All steps of a frame by one block of threads: for tissue of few constraints, where what takes the
 // time is to wait between colours. Within a block of threads that is a hundredth of a launch, and
 // places are in its shared memory.
-#include "pbd/cuda/block_of_threads.h"
 #include "pbd/cuda/lanes_cuda.h"
 
 namespace tissue_sim {
 namespace pbd {
 namespace {
+
+/// A chunk for each warp, in a fixed order.
+__device__ __forceinline__ void sum_flights(const CudaPbdField& f, const CudaPbdFlights& flights,
+                                            const float4* x, CudaPbdFlight* result) {
+  const int lane = static_cast<int>(threadIdx.x) % 32, warps = static_cast<int>(blockDim.x) / 32;
+  for (int c = static_cast<int>(threadIdx.x) / 32; c < flights.count; c += warps) {
+    const CudaPbdChunk chunk = flights.chunks[c];
+    const float4 origin = x[chunk.first];
+    CudaPbdFlight sum = {{origin.x, origin.y, origin.z}, {}, {}, {}, {}, 0};
+    for (int k = chunk.begin + lane; k < chunk.end; k += 32) {
+      const int i = flights.order[k];
+      add_to_flight(x[i], f.v[i], f.mass[i], f.pushed[i], sum);
+    }
+#pragma unroll
+    for (int step = 16; step > 0; step /= 2) {
+#pragma unroll
+      for (int k = 0; k < 3; ++k) {
+        for (double* s : {sum.moment + k, sum.linear + k, sum.angular + k, sum.second + k,
+                          sum.second + 3 + k}) {
+          *s += __shfl_down_sync(~0u, *s, step);
+        }
+      }
+    }
+    sum.pushed = __any_sync(~0u, sum.pushed) != 0 ? 1 : 0;
+    if (lane == 0) result[c] = sum;
+  }
+}
+
+/// By a block of threads.
+template <class T>
+__device__ __forceinline__ void copy_words(const T* from, T* to, int count) {
+  const int words = count * static_cast<int>(sizeof(T) / 4);
+  for (int i = static_cast<int>(threadIdx.x); i < words; i += static_cast<int>(blockDim.x)) {
+    reinterpret_cast<std::int32_t*>(to)[i] = reinterpret_cast<const std::int32_t*>(from)[i];
+  }
+}
+
+/// That a block of threads may have.
+std::size_t most_shared_bytes() {
+  static const int most = [] {
+    int bytes = 0;
+    check_cuda(cudaDeviceGetAttribute(&bytes, cudaDevAttrMaxSharedMemoryPerBlockOptin, 0),
+               "be asked");
+    return bytes;
+  }();
+  return static_cast<std::size_t>(most);
+}
 
 template <class Kind>
 __device__ __forceinline__ void forget_multipliers(const CudaPbdSet<Kind>& set) {
@@ -105,7 +151,7 @@ __global__ void __launch_bounds__(kThreads<kTets>, 1)
   for (int i = thread; i < of_steps * kPbdLoadSums; i += threads) f.loads[i] = 0;
   for (int i = thread; i < f.count; i += threads) f.pushed[i] = 0;
   __syncthreads();
-  sum_flights(f, exchange.chunks, places, 0, 1, exchange.flights);
+  sum_flights(f, exchange.chunks, places, exchange.flights);
   __syncthreads();
   const StepNumbers& step = frame.step;
   const float inverse_h2 = step.inverse_h2;
@@ -151,7 +197,7 @@ __global__ void __launch_bounds__(kThreads<kTets>, 1)
     }
   }
   copy_words(f.loads, exchange.loads, of_steps * kPbdLoadSums);
-  sum_flights(f, exchange.chunks, places, 0, 1, exchange.flights + exchange.chunks.count);
+  sum_flights(f, exchange.chunks, places, exchange.flights + exchange.chunks.count);
 }
 
 std::size_t shared_bytes(const CudaPbdField& field) {

@@ -9,6 +9,9 @@
 namespace tissue_sim {
 namespace {
 
+constexpr double kFastest = 10, kFastestTurn = 100;  // of servo_cv [m/s, rad/s]
+constexpr double kTwistAge = 0.2;                    // for which a velocity goes on [s]
+
 JointVector vector_of(const std::vector<double>& values) {
   return Eigen::Map<const JointVector>(values.data(), static_cast<Eigen::Index>(values.size()));
 }
@@ -55,17 +58,19 @@ void ArmNode::subscribe() {
   poses("servo_cr", Kind::kServo, true);
   poses("move_cp", Kind::kMove, false);
   poses("move_cr", Kind::kMove, true);
+  listen<geometry_msgs::TwistStamped>(
+      "servo_cv", 1, [this](const geometry_msgs::TwistStamped& m) { on_twist(m); });
 
   const char* forces = "this arm has no motors that forces could be asked of: send positions";
   for (const std::string name : {"servo_jf", "jaw/servo_jf"}) {
     listen<JointState>(name, 1, [this, name, forces](const JointState&) {
-      refuse(name, forces, Kind::kServo, arm_);
+      refuse(name, forces, Kind::kForce, arm_);
     });
   }
-  for (const std::string name : {"body/servo_cf", "spatial/servo_cf"}) {
+  for (const std::string name : {"servo_cf", "body/servo_cf", "spatial/servo_cf"}) {
     listen<geometry_msgs::WrenchStamped>(name, 1,
                                          [this, name, forces](const geometry_msgs::WrenchStamped&) {
-                                           refuse(name, forces, Kind::kServo, arm_);
+                                           refuse(name, forces, Kind::kForce, arm_);
                                          });
   }
   for (const std::string name : {"hold", "free"}) {
@@ -97,8 +102,9 @@ void ArmNode::subscribe() {
 
 void ArmNode::refuse(const std::string& name, const std::string& why, Kind kind,
                      JointGroup& group) {
-  // Moves are rare, setpoints may come a thousand times a second.
-  if (kind == Kind::kMove || said_.try_emplace(name, 1.0).first->second.due(WallClock::now())) {
+  // Moves are rare, setpoints may come a thousand times a second, and no force is ever taken.
+  const double rest = kind == Kind::kForce ? 1e9 : 1;
+  if (kind == Kind::kMove || said_.try_emplace(name, rest).first->second.due(WallClock::now())) {
     ROS_WARN("%s refused: %s", name.c_str(), why.c_str());
     crtk_.warning(ros::Time::now(), name + " refused: " + why);
   }
@@ -108,6 +114,7 @@ void ArmNode::refuse(const std::string& name, const std::string& why, Kind kind,
 void ArmNode::ask(const std::string& name, Kind kind, JointGroup& group, const JointVector& goal,
                   const JointVector& velocity) {
   std::string why = not_ready(state_);
+  twist_came_ = {};
   if (why.empty()) why = kind == Kind::kServo ? group.servo(goal, velocity) : group.move(goal);
   if (!why.empty()) return refuse(name, why, kind, group);
   if (kind == Kind::kMove) publish_state(busy());
@@ -168,6 +175,47 @@ void ArmNode::on_pose(const std::string& name, Kind kind, const geometry_msgs::P
   ask(name, kind, arm_, vector_of(joints));
 }
 
+void ArmNode::on_twist(const geometry_msgs::TwistStamped& message) {
+  const auto vector = [](const geometry_msgs::Vector3& v) { return Vec3(v.x, v.y, v.z); };
+  const Wrench twist{vector(message.twist.linear), vector(message.twist.angular)};
+  const std::string& frame = message.header.frame_id;
+  std::string why = not_ready(state_);
+  if (why.empty() && !tool_present_) why = "there is no tool";
+  if (!(twist.force.norm() <= kFastest && twist.torque.norm() <= kFastestTurn)) {
+    why = "its velocities must be finite, and at most 10 m/s and 100 rad/s";
+  }
+  if (frame == parameters_.base_frame) {
+    const Quat& base = parameters_.base.orientation;
+    twist_ = {base * twist.force, base * twist.torque};
+  } else if (frame.empty() || frame == parameters_.world_frame) {
+    twist_ = twist;
+  } else {
+    why = "a velocity is given in the axes of " + parameters_.world_frame + " or " +
+          parameters_.base_frame + ", not of " + frame;
+  }
+  twist_came_ = why.empty() ? ros::Time::now() : ros::Time();
+  if (!why.empty()) refuse("servo_cv", why, Kind::kServo, arm_);
+}
+
+// Where servo_cv has the setpoint a tick later. A velocity goes on for a while and then no more:
+// who sent it may be gone.
+void ArmNode::step_by_twist(const ros::Time& now, double seconds) {
+  if (twist_came_.isZero() || now - twist_came_ > ros::Duration(kTwistAge)) return;
+  const ros::Time came = twist_came_;
+  const Pose tip = tip_in_world(arm_.setpoint());
+  const Vec3 turn = twist_.torque * seconds;
+  const Quat turned(Eigen::AngleAxisd(
+      turn.norm(), turn.norm() > 0 ? Vec3(turn.normalized()) : Vec3::UnitZ().eval()));
+  const JointVector& from = arm_.setpoint();
+  std::vector<double> joints;
+  const std::string why = inverse({tip.position + twist_.force * seconds, turned * tip.orientation},
+                                  {from.data(), from.data() + from.size()}, joints);
+  if (!why.empty()) return refuse("servo_cv", why, Kind::kServo, arm_);
+  const JointVector goal = vector_of(joints);
+  ask("servo_cv", Kind::kServo, arm_, goal, (goal - from) / seconds);
+  twist_came_ = came;
+}
+
 std::string ArmNode::forward(const std::vector<double>& joints, bool local, Pose& tip) const {
   if (joints.size() != kArmJoints) {
     return std::to_string(joints.size()) + " joints came, must be 6";
@@ -205,6 +253,7 @@ void ArmNode::on_state_command(const std::string& word) {
     ROS_WARN("state_command %s refused: %s", word.c_str(), why.c_str());
     crtk_.warning(ros::Time::now(), "state_command " + word + " refused: " + why);
   } else if (!state_.ready()) {
+    twist_came_ = {};
     arm_.hold();
     jaw_.hold();
   }
@@ -224,6 +273,7 @@ void ArmNode::on_ratio(double ratio) {
 }
 
 void ArmNode::stop(const std::string& name) {
+  twist_came_ = {};
   arm_.hold();
   jaw_.hold();
   if (name == "free") say("free: nothing pulls at this arm, it stays where it is");

@@ -1,11 +1,11 @@
 #include "ros/arm/arm_node.h"
 
-#include <geometry_msgs/TwistStamped.h>
 #include <ros/callback_queue.h>
 #include <std_msgs/Float64MultiArray.h>
 
 #include <algorithm>
 #include <chrono>
+#include <cstdio>
 
 #include "ros/conversions.h"
 #include "ros/stamps.h"
@@ -14,6 +14,7 @@ namespace tissue_sim {
 namespace {
 
 constexpr double kWrenchAge = 0.5;   // older forces are none [s] of wall time
+constexpr double kBehind = 0.005;    // tip from setpoint, that is said [m]
 constexpr double kStillAfter = 0.2;  // of wall time without a clock that goes on [s]
 
 double seconds_between(WallTime from, WallTime to) {
@@ -124,10 +125,12 @@ void ArmNode::run() {
 
 void ArmNode::tick(const ros::Time& now, double seconds) {
   const bool was_busy = busy();
+  step_by_twist(now, seconds);
   arm_.advance(seconds, ratio_);
   jaw_.advance(seconds, ratio_);
   publish(now, true);
   drive_tool(now);
+  say_if_behind();
   if (!wrench_known_ || seconds_between(wrench_came_, WallClock::now()) > kWrenchAge) {
     wrench_ = {};
     if (ticks_ % 10 == 0) {
@@ -230,6 +233,21 @@ void ArmNode::drive_tool(const ros::Time& now) {
   jaw.position = {jaw_.measured()[0]};
   out_["tool/jaw"].publish(jaw);
   publish_pose("tool", now, parameters_.world_frame, tool);
+}
+
+// Real arms follow at a limited speed, and so does this: who asks for more should know.
+void ArmNode::say_if_behind() {
+  const double way =
+      (tip_in_world(arm_.setpoint()).position - tip_in_world(arm_.measured()).position).norm();
+  if (way < kBehind || !said_.try_emplace("behind", 1.0).first->second.due(WallClock::now()))
+    return;
+  char text[160];
+  std::snprintf(text, sizeof text,
+                "the tip falls behind its setpoint by %.1f mm: joints follow at a limited speed "
+                "(docs/arm.md)",
+                1e3 * way);
+  ROS_WARN("%s", text);
+  crtk_.warning(ros::Time::now(), text);
 }
 
 ros::Time ArmNode::rising(ros::Time stamp, ros::Time& last) const {

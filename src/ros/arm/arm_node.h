@@ -3,6 +3,7 @@
 #pragma once
 
 #include <geometry_msgs/PoseStamped.h>
+#include <geometry_msgs/TwistStamped.h>
 #include <geometry_msgs/WrenchStamped.h>
 #include <ros/ros.h>
 #include <sensor_msgs/JointState.h>
@@ -34,7 +35,7 @@ class ArmNode {
   void run();
 
  private:
-  enum class Kind { kServo, kMove };
+  enum class Kind { kServo, kMove, kForce };
 
   // arm_commands.cpp
   void subscribe();
@@ -47,6 +48,8 @@ class ArmNode {
                  const sensor_msgs::JointState& goal, bool relative);
   void on_pose(const std::string& name, Kind kind, const geometry_msgs::PoseStamped& goal,
                bool relative);
+  void on_twist(const geometry_msgs::TwistStamped& velocity);
+  void step_by_twist(const ros::Time& now, double seconds);
   void on_state_command(const std::string& word);
   void on_ratio(double ratio);
   void stop(const std::string& name);
@@ -65,6 +68,7 @@ class ArmNode {
                     const Pose& pose);
   void publish_jacobians();
   void drive_tool(const ros::Time& now);
+  void say_if_behind();
   void publish_state(bool busy);
   bool busy() const { return arm_.busy() || jaw_.busy(); }
   void say(const std::string& text);
@@ -77,7 +81,9 @@ class ArmNode {
   const ArmParameters parameters_;
   JointGroup arm_, jaw_;
   OperatingState state_;
-  double ratio_ = 1;  // of the speeds of moves
+  double ratio_ = 1;      // of the speeds of moves
+  Wrench twist_;          // asked for by servo_cv, along the world's axes [m/s, rad/s]
+  ros::Time twist_came_;  // zero: none goes on
   bool tool_present_ = true, absolute_ = false;
   std::string published_state_;
   bool published_busy_ = false;

@@ -1,0 +1,123 @@
+#include "images/ray_scene.h"
+
+#include <tbb/task_arena.h>
+
+#include <cstring>
+#include <stdexcept>
+
+#ifdef TISSUE_SIM_EMBREE
+#if TISSUE_SIM_EMBREE == 4
+#include <embree4/rtcore.h>
+#else
+#include <embree3/rtcore.h>
+#endif
+#endif
+
+namespace tissue_sim {
+
+#ifdef TISSUE_SIM_EMBREE
+
+struct RayScene::State {
+  RTCDevice device = nullptr;
+  RTCScene scene = nullptr;
+  std::size_t triangles = 0;
+  tbb::task_arena one_thread{1};  ///< what builds trees, so that they are the same each time
+
+  ~State() {
+    if (scene != nullptr) rtcReleaseScene(scene);
+    if (device != nullptr) rtcReleaseDevice(device);
+  }
+};
+
+bool RayScene::is_built() { return true; }
+
+RayScene::RayScene() : state_(std::make_unique<State>()) {
+  // One instruction set: the same bits on all machines. Its `threads` would hold for all of TBB.
+  state_->device = rtcNewDevice("isa=sse4.2,start_threads=0");
+  if (state_->device == nullptr) {
+    throw std::runtime_error("images: Embree does not start (error " +
+                             std::to_string(rtcGetDeviceError(nullptr)) +
+                             "; it needs a processor with SSE 4.2), leave `cameras` out");
+  }
+}
+
+RayScene::~RayScene() = default;
+
+void RayScene::set(const std::vector<float>& corners) {
+  State& s = *state_;
+  if (s.scene != nullptr) rtcReleaseScene(s.scene);
+  s.scene = rtcNewScene(s.device);
+  rtcSetSceneFlags(s.scene, RTC_SCENE_FLAG_ROBUST);  // no gaps along edges
+  rtcSetSceneBuildQuality(s.scene, RTC_BUILD_QUALITY_LOW);
+  s.triangles = corners.size() / 9;
+  if (s.triangles > 0) {
+    RTCGeometry mesh = rtcNewGeometry(s.device, RTC_GEOMETRY_TYPE_TRIANGLE);
+    void* places = rtcSetNewGeometryBuffer(mesh, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3,
+                                           3 * sizeof(float), 3 * s.triangles);
+    auto* index = static_cast<unsigned*>(rtcSetNewGeometryBuffer(
+        mesh, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, 3 * sizeof(unsigned), s.triangles));
+    if (places == nullptr || index == nullptr) throw std::bad_alloc();
+    std::memcpy(places, corners.data(), corners.size() * sizeof(float));
+    for (std::size_t i = 0; i < 3 * s.triangles; ++i) index[i] = static_cast<unsigned>(i);
+    rtcCommitGeometry(mesh);
+    rtcAttachGeometry(s.scene, mesh);
+    rtcReleaseGeometry(mesh);
+  }
+  s.one_thread.execute([&s] { rtcCommitScene(s.scene); });
+}
+
+void RayScene::meet(const Vec3& from, const Vec3* along, double near, double far, Met* met) const {
+  for (int i = 0; i < kPacket; ++i) met[i] = {};
+  if (state_->triangles == 0) return;
+  alignas(16) const int valid[kPacket] = {-1, -1, -1, -1};
+  RTCRayHit4 r;
+  for (int i = 0; i < kPacket; ++i) {
+    r.ray.org_x[i] = static_cast<float>(from.x());
+    r.ray.org_y[i] = static_cast<float>(from.y());
+    r.ray.org_z[i] = static_cast<float>(from.z());
+    r.ray.dir_x[i] = static_cast<float>(along[i].x());
+    r.ray.dir_y[i] = static_cast<float>(along[i].y());
+    r.ray.dir_z[i] = static_cast<float>(along[i].z());
+    r.ray.tnear[i] = static_cast<float>(near);
+    r.ray.tfar[i] = static_cast<float>(far);
+    r.ray.time[i] = 0;
+    r.ray.mask[i] = 0xffffffffu;
+    r.ray.id[i] = 0;
+    r.ray.flags[i] = 0;
+    r.hit.geomID[i] = RTC_INVALID_GEOMETRY_ID;
+    r.hit.instID[0][i] = RTC_INVALID_GEOMETRY_ID;
+  }
+#if TISSUE_SIM_EMBREE == 4
+  RTCIntersectArguments arguments;
+  rtcInitIntersectArguments(&arguments);
+  arguments.flags = RTC_RAY_QUERY_FLAG_COHERENT;
+  rtcIntersect4(valid, state_->scene, &r, &arguments);
+#else
+  RTCIntersectContext context;
+  rtcInitIntersectContext(&context);
+  context.flags = RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
+  rtcIntersect4(valid, state_->scene, &context, &r);
+#endif
+  for (int i = 0; i < kPacket; ++i) {
+    if (r.hit.geomID[i] == RTC_INVALID_GEOMETRY_ID) continue;
+    met[i] = {static_cast<std::int32_t>(r.hit.primID[i]), r.ray.tfar[i], r.hit.u[i], r.hit.v[i]};
+  }
+}
+
+#else
+
+struct RayScene::State {};
+bool RayScene::is_built() { return false; }
+RayScene::RayScene() {
+  throw std::runtime_error(
+      "images: this build has no Embree, which casts cameras' rays: install libembree-dev and "
+      "build "
+      "again, or leave `cameras` out");
+}
+RayScene::~RayScene() = default;
+void RayScene::set(const std::vector<float>&) {}
+void RayScene::meet(const Vec3&, const Vec3*, double, double, Met*) const {}
+
+#endif
+
+}  // namespace tissue_sim

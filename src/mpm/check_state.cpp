@@ -1,0 +1,351 @@
+// Whether what was read of a state can be one: each index and count that is believed from there on.
+#include <algorithm>
+
+#include "frame/state_check.h"
+#include "mpm/mpm_fields.h"
+#include "tools/frame_colliders.h"
+
+namespace tissue_sim {
+namespace {
+
+/// What the parts of a state refer to.
+struct Known {
+  std::int64_t points, nodes, lattice_nodes, bodies, anchors, colliders;
+};
+
+Known known(const MpmState& s) {
+  std::int64_t anchors = 0;
+  for (const Body& body : s.scene.bodies) anchors += static_cast<std::int64_t>(body.anchors.size());
+  return {s.points.size(),
+          static_cast<std::int64_t>(s.nodes.size()),
+          lattice_node_count(s.bodies),
+          static_cast<std::int64_t>(s.bodies.size()),
+          anchors,
+          collider_count(s.scene)};
+}
+
+void check_points(const MpmState& s, const Known& k) {
+  const Points& p = s.points;
+  check_sizes("points", p.site, p.bonds, s.whole_bonds);
+  check_state(p.soft.empty() || p.soft.size() == p.site.size(), "points");
+  for (std::size_t i = 0; i < p.bonds.size(); ++i) {
+    check_state((p.bonds[i] & ~s.whole_bonds[i]) == 0, "bonds");
+  }
+  // What follows from the bonds.
+  ArchiveWriter read, made;
+  BondWindows windows = s.fields->bonds(), fresh(s.bodies, p);
+  read(windows);
+  made(fresh);
+  check_state(read.bytes() == made.bytes(), "bonds");
+  for (std::int32_t i = 0; i < k.points; ++i) {
+    for (int axis = 0; axis < 3; ++axis) {
+      const Crossing* const c = p.crossings.find(i, axis);
+      if (c != nullptr) check_state(c->place <= 1e3f, "cuts");
+    }
+  }
+}
+
+void check_nodes(const MpmState& s, const Known& k) {
+  check_state(k.nodes >= k.lattice_nodes, "nodes");
+  for (int a = 0; a < 3; ++a) {
+    check_sizes("nodes", s.nodes.mass, s.nodes.inv_mass, s.nodes.u[a], s.nodes.v[a]);
+    check_numbers(s.nodes.u[a], kFarthest, "places");
+    check_numbers(s.nodes.v[a], kFastestTissue, "speeds");
+  }
+  check_numbers(s.nodes.mass, 1e9, "masses");
+  check_numbers(s.nodes.inv_mass, 1e37, "masses");
+  for (std::int64_t i = 0; i < k.lattice_nodes; ++i) {
+    const NodeFields::Split* const split = s.fields->split(static_cast<int>(i));
+    if (split == nullptr) continue;
+    for (const auto& field : split->fields) {
+      check_state(field.node >= 0 && field.node < k.nodes, "split nodes");
+    }
+  }
+}
+
+/// A cell's lowest node in a block.
+void check_cell(const Block& b, std::int64_t node) {
+  check_state(node >= 0 && node + 2 * (b.plane + b.pitch + 1) < b.node_count(), "cells");
+}
+
+void check_block(const Block& b, const MpmState& s, const Known& k) {
+  constexpr int kMost = 1 << 15;
+  check_state(b.body >= 0 && b.body < k.bodies && b.nx > 0 && b.ny > 0 && b.nz > 0 &&
+                  b.nx < kMost && b.ny < kMost && b.nz < kMost && !b.runs.empty() &&
+                  !b.sides.empty(),
+              "blocks");
+  std::int64_t lane = 0;
+  for (const Block::Run& r : b.runs) {
+    check_state(r.lane == lane && r.count > 0 && r.x >= 0 && r.count <= b.nx - r.x && r.y >= 0 &&
+                    r.y < b.ny,
+                "blocks");
+    lane += r.count;
+  }
+  for (const Block::Side& side : b.sides) {
+    check_state(side.column >= 0 && side.count >= 0 && side.column + side.count <= b.nx + 2 &&
+                    std::abs(side.x) < kMost,
+                "blocks");
+  }
+  Block fresh;
+  fresh.nx = b.nx;
+  fresh.ny = b.ny;
+  fresh.nz = b.nz;
+  fresh.runs = b.runs;
+  lay_out(fresh);
+  check_state(b.pitch == fresh.pitch && b.plane == fresh.plane && b.stride == fresh.stride &&
+                  b.cell == fresh.cell && b.volume.size() == fresh.volume.size() &&
+                  b.point.size() == fresh.point.size() &&
+                  b.node.size() == static_cast<std::size_t>(b.node_count()),
+              "blocks");
+  check_numbers(b.volume, 1e30, "volumes");
+  fresh.volume = b.volume;
+  find_filled(fresh);
+  ArchiveWriter read, made;
+  std::vector<std::vector<Block::Span>> filled = b.filled;
+  read(filled);
+  made(fresh.filled);
+  check_state(read.bytes() == made.bytes() && b.filled_columns == fresh.filled_columns, "blocks");
+  check_indices(b.point, -1, k.points, "points");
+  check_indices(b.node, -1, k.nodes, "nodes");
+  // Where there is volume a cell sees all of its nodes.
+  for (int z = 0; z < b.nz; ++z) {
+    for (const Block::Span& span : b.filled[z]) {
+      for (int j = span.begin; j < span.end; ++j) {
+        for (int n = 0; n < 27; ++n) {
+          const int at = (z + n / 9) * b.plane + b.cell[j] + n / 3 % 3 * b.pitch + n % 3;
+          check_state(b.node[at] >= 0, "nodes");
+        }
+      }
+    }
+  }
+  for (const Block::NodeRow& r : b.node_rows) {
+    check_state(r.local >= 0 && r.count > 0 && r.count <= b.node_count() - r.local &&
+                    (r.node == -1 || (r.node >= 0 && r.node + std::int64_t{r.count} <= k.nodes)),
+                "nodes");
+  }
+  const auto materials = static_cast<int>(s.bodies[b.body].materials.size());
+  check_state(b.material >= Block::kMixed && b.material < materials, "materials");
+  const Block::Mixture& m = b.mixture;
+  const bool mixed = b.material == Block::kMixed;
+  check_state(
+      m.mu.size() == (mixed ? b.volume.size() : 0) && m.lambda.size() == m.mu.size() &&
+          (m.neo_hookean.empty() || m.neo_hookean.size() == m.mu.size()) &&
+          (m.viscosity.empty() || m.viscosity.size() == static_cast<std::size_t>(b.nz) * b.stride),
+      "materials");
+  const auto lanes = static_cast<std::int64_t>(b.lane_count());
+  for (const Block::PartialCell& c : b.partial) {
+    check_state(c.lane >= 0 && c.lane < lanes, "cells");
+    check_cell(b, c.node);
+  }
+  for (const Facet& f : b.facets) {
+    check_state(f.point >= 0 && f.point < k.points && f.direction < 6, "facets");
+    check_cell(b, f.cell);
+  }
+  for (const auto* places : {&b.surface, &b.merged}) {
+    for (const SurfacePlace& p : *places) {
+      check_state(p.point >= 0 && p.point < k.points && p.cell >= 0 && p.cell < lanes, "surface");
+      check_cell(b, p.node);
+    }
+  }
+}
+
+void check_blocks(const MpmState& s, const Known& k) {
+  const Blocks& blocks = s.blocks;
+  const auto count = static_cast<std::int64_t>(blocks.all.size());
+  std::size_t in_regions = 0;
+  for (const BlockRegion& r : blocks.regions) {
+    check_state(r.body >= 0 && r.body < k.bodies, "regions");
+    in_regions += r.blocks.size();
+  }
+  std::vector<const Block*> sorted(blocks.all.begin(), blocks.all.end());
+  std::sort(sorted.begin(), sorted.end());
+  check_state(in_regions == blocks.all.size() &&
+                  std::adjacent_find(sorted.begin(), sorted.end()) == sorted.end(),
+              "blocks");
+  for (const Block* block : blocks.all) {
+    check_block(*block, s, k);
+    check_state(block->number >= 0 && block->number < blocks.next_number, "blocks");
+  }
+  if (blocks.has_rows) {
+    std::size_t force = kLanes;
+    for (const Block* block : blocks.all) {
+      check_state(block->force_offset == force, "forces");
+      force += static_cast<std::size_t>(3) * block->node_count();
+    }
+    check_state(blocks.force_size == force + kLanes, "forces");
+  }
+  check_indices(blocks.by_cost, 0, count, "blocks");
+  std::vector<int> order = blocks.by_cost;
+  std::sort(order.begin(), order.end());
+  check_state(static_cast<std::int64_t>(order.size()) == count &&
+                  std::adjacent_find(order.begin(), order.end()) == order.end(),
+              "blocks");
+  const auto parts = static_cast<std::int64_t>(blocks.row_parts.size());
+  for (const NodeRow& r : blocks.rows) {
+    check_state(r.first_node >= 0 && r.count >= 0 && r.count <= kNodeRow &&
+                    r.first_node + std::int64_t{r.count} <= k.nodes && r.first_part >= 0 &&
+                    r.part_count >= 0 && r.first_part + std::int64_t{r.part_count} <= parts,
+                "rows");
+  }
+  for (const RowPart& p : blocks.row_parts) {
+    check_state(p.begin >= 0 && p.count >= 0 && p.begin + p.count <= kNodeRow &&
+                    p.component <= blocks.force_size && p.force <= blocks.force_size &&
+                    p.force + 2 * p.component + p.begin + p.count <= blocks.force_size + kLanes,
+                "rows");
+  }
+  check_state(blocks.first_split_node >= 0 && blocks.first_split_node <= k.nodes &&
+                  (blocks.stale_facets.empty() ||
+                   static_cast<std::int64_t>(blocks.stale_facets.size()) == k.lattice_nodes),
+              "nodes");
+  check_state(s.motion.size() == blocks.all.size(), "motion");
+}
+
+void check_contacts(const MpmState& s, const Known& k) {
+  const Contacts& c = s.contacts;
+  const std::size_t count = s.blocks.all.size();
+  for (const std::size_t size :
+       {c.near.size(), c.cells.size(), c.parts.size(), c.touching.size(), c.changes.size()}) {
+    check_state(size == 0 || size == count, "contacts");
+  }
+  for (std::size_t i = 0; i < count; ++i) {
+    const Block& b = *s.blocks.all[i];
+    const auto lanes = static_cast<std::int64_t>(b.lane_count());
+    if (!c.near.empty()) check_indices(c.near[i], 0, k.colliders, "contacts");
+    if (!c.touching.empty()) {
+      for (const Touch& t : c.touching[i]) {
+        check_state(t.cell >= 0 && t.cell < lanes && t.point >= 0 && t.point < k.points &&
+                        t.collider < k.colliders,
+                    "contacts");
+      }
+    }
+    if (!c.changes.empty()) {
+      for (const InertiaChange& x : c.changes[i]) {
+        check_state(x.collider >= 0 && x.collider < k.colliders, "contacts");
+        check_cell(b, x.node);
+      }
+    }
+    if (c.cells.empty()) continue;
+    check_state(!c.parts.empty(), "contacts");
+    const auto parts = static_cast<std::int64_t>(c.parts[i].size());
+    for (const NearCell& cell : c.cells[i]) {
+      const auto places =
+          static_cast<std::int64_t>((cell.collider == 0 ? b.merged : b.surface).size());
+      check_state(cell.lane >= 0 && cell.lane < lanes && cell.collider < k.colliders &&
+                      cell.place_count >= 0 && cell.first_part >= 0 && cell.first_part <= parts &&
+                      (cell.place_count == 0 ||
+                       (cell.first_place >= 0 && cell.first_place + cell.place_count <= places)),
+                  "contacts");
+      check_cell(b, cell.node);
+    }
+  }
+  for (const InertialNode& n : c.inertia.nodes) {
+    check_state(n.node >= 0 && n.node < k.nodes && n.collider >= 0 && n.collider < k.colliders,
+                "contacts");
+  }
+}
+
+void check_faces(const MpmState& s, const Known& k) {
+  const FaceContacts& f = s.faces;
+  const std::size_t blocks = s.blocks.all.size(), facets = f.block_of.size();
+  if (f.first_facet.empty()) {
+    check_state(facets == 0 && f.all.empty(), "facets");
+  } else {
+    check_begins(f.first_facet, blocks, facets, "facets");
+    for (std::size_t b = 0; b < blocks; ++b) {
+      check_state(static_cast<std::size_t>(f.first_facet[b + 1] - f.first_facet[b]) ==
+                      s.blocks.all[b]->facets.size(),
+                  "facets");
+      for (std::int32_t i = f.first_facet[b]; i < f.first_facet[b + 1]; ++i) {
+        check_state(f.block_of[i] == static_cast<std::int32_t>(b), "facets");
+      }
+    }
+  }
+  check_state(f.motion.size() == facets && (f.listed.empty() || f.listed.size() == facets),
+              "facets");
+  const auto contacts = static_cast<std::int64_t>(f.all.size());
+  for (const FaceContact& c : f.all) {
+    check_state(c.facet >= 0 && static_cast<std::size_t>(c.facet) < facets && c.other >= -1 &&
+                    c.other < static_cast<std::int64_t>(facets) && c.nodes.lowest != nullptr &&
+                    (c.other < 0 || c.other_nodes.lowest != nullptr || !c.touching),
+                "contacts");
+  }
+  if (!f.first_near.empty()) check_begins(f.first_near, f.all.size(), f.near.size(), "contacts");
+  check_state(!f.first_near.empty() || f.all.empty(), "contacts");
+  check_indices(f.near, 0, static_cast<std::int64_t>(facets), "contacts");
+  check_indices(f.active, 0, contacts, "contacts");
+  check_indices(f.between, 0, contacts, "contacts");
+  const auto of_blocks = [&](const std::vector<std::int32_t>& first,
+                             const std::vector<std::int32_t>& of, std::int64_t most) {
+    check_state(!first.empty() || of.empty(), "contacts");
+    if (!first.empty()) check_begins(first, blocks, of.size(), "contacts");
+    check_indices(of, 0, most, "contacts");
+  };
+  of_blocks(f.first_of_block, f.of_block, 2 * contacts);
+  of_blocks(f.first_within, f.within, contacts);
+  for (const KeptContact& kept : f.kept) {
+    check_state(kept.point >= 0 && kept.point < k.points && kept.other_body < k.bodies, "contacts");
+  }
+}
+
+void check_anchors(const MpmState& s, const Known& k) {
+  const AnchorFaces& a = s.anchors;
+  const auto rows = static_cast<std::int64_t>(a.rows.size());
+  for (const FaceRow& r : a.rows) {
+    check_indices(r.node, 0, k.nodes, "anchors");
+    check_state(r.anchor >= 0 && r.anchor < k.anchors, "anchors");
+  }
+  check_state(a.impulse.size() == a.rows.size() &&
+                  (a.now.empty() || static_cast<std::int64_t>(a.now.size()) == k.anchors),
+              "anchors");
+  for (const FaceGroup& g : a.groups) {
+    check_state(g.first >= 0 && g.count > 0 && g.count <= kLargestGroup &&
+                    g.first + std::int64_t{g.count} <= rows && g.inverse >= 0 &&
+                    g.inverse + std::int64_t{g.count} * g.count <=
+                        static_cast<std::int64_t>(a.inverse.size()),
+                "anchors");
+  }
+  for (const AnchorFaces::HeldNode& h : a.held) {
+    check_state(h.node >= 0 && h.node < k.nodes && h.anchor >= 0 && h.anchor < k.anchors,
+                "anchors");
+  }
+}
+
+void check_front(const MpmState& s, const Known& k) {
+  const Front& f = s.front;
+  for (int a = 0; a < 3; ++a) check_sizes("front", f.nodes, f.d[a], f.rate[a]);
+  for (const FrontNode& n : f.nodes) {
+    check_state(n.body >= 0 && n.body < k.bodies && n.node >= 0 && n.node < k.nodes &&
+                    s.bodies[n.body].node(n.x, n.y, n.z) >= 0,
+                "front");
+  }
+  for (const auto& bond : f.rim) check_state(bond.first >= 0 && bond.first < 3 * k.points, "front");
+}
+
+}  // namespace
+
+void check_tissue(const MpmState& s) {
+  const Known k = known(s);
+  check_state(std::isfinite(s.time) && std::isfinite(s.dt) && s.dt >= 0, "time");
+  check_points(s, k);
+  check_nodes(s, k);
+  check_anchors(s, k);
+  check_front(s, k);
+  check_state(s.tore_at.empty() || static_cast<std::int64_t>(s.tore_at.size()) == k.bodies,
+              "tears");
+  check_indices(s.bridge_ends, 0, k.points, "tears");
+  check_indices(s.debris, 0, k.points, "debris");
+  for (const FragmentFlight& f : s.flights) {
+    check_sizes("flights", f.nodes, f.home, f.from_centre);
+    check_indices(f.nodes, 0, k.nodes, "flights");
+  }
+}
+
+void check_state(const MpmState& s) {
+  check_tissue(s);
+  const Known k = known(s);
+  check_blocks(s, k);
+  check_contacts(s, k);
+  check_faces(s, k);
+}
+
+}  // namespace tissue_sim

@@ -1,0 +1,82 @@
+#include "tools/instrument.h"
+
+#include <algorithm>
+#include <cstdio>
+#include <vector>
+
+#include "tools/entry.h"
+
+namespace tissue_sim {
+namespace {
+
+constexpr double kSpeed = 0.1;     // of the way in: as hands are [m/s]
+constexpr double kFarthest = 0.3;  // through any organ [m]
+
+std::string entry_note(const Tool& tool, double way_in) {
+  if (way_in < 0) {
+    return tool.name +
+           " is placed within tissue and finds no way out along its shaft: its forces "
+           "are those of a tool with tissue on all sides";
+  }
+  char text[200];
+  std::snprintf(text, sizeof text,
+                "%s is placed within tissue: it comes in along its shaft, %.0f mm at %g m/s",
+                tool.name.c_str(), 1e3 * way_in, kSpeed);
+  return text;
+}
+
+}  // namespace
+
+void Instrument::ask(const ToolRequest& request) {
+  const bool placed = request.placed || (is_asked_ && asked_.placed);  // until a frame places it
+  asked_ = request;
+  asked_.placed = placed;
+  is_asked_ = true;
+  if (request.grip_pressure) grip_pressure_ = *request.grip_pressure;
+}
+
+void Instrument::put(const ToolMotion& motion, double grip_pressure) {
+  asked_ = ToolRequest{motion.end, motion.jaw_end, false, {}};
+  is_asked_ = motion.present;
+  way_in_ = 0;
+  grip_pressure_ = grip_pressure;
+}
+
+std::string Instrument::move(const Tool& tool, double duration, double cell_size, Tissue& tissue,
+                             ToolMotion& motion) {
+  if (!is_asked_) return "";
+  std::string note;
+  motion.jaw_end = static_cast<float>(asked_.jaw);
+  const bool appears = asked_.placed || !motion.present;
+  if (appears) motion.jaw_begin = motion.jaw_end;
+  if (asked_.placed) {
+    std::vector<std::uint8_t> cloud;
+    const int count = tissue.read_points({}, cloud);
+    way_in_ =
+        way_out(tool, asked_.pose, motion.jaw_end,
+                {reinterpret_cast<const Point*>(cloud.data()), static_cast<std::size_t>(count)},
+                0.5 * cell_size, kFarthest);
+    if (way_in_ != 0) note = entry_note(tool, way_in_);
+    way_in_ = std::max(way_in_, 0.0);
+  }
+  motion.end = {asked_.pose * Vec3(0, 0, -way_in_), asked_.pose.orientation};
+  if (appears) motion.begin = motion.end;
+  motion.present = true;
+  asked_.placed = false;
+  way_in_ = std::max(0.0, way_in_ - kSpeed * duration);
+  return note;
+}
+
+double Instrument::limit_jaws(const Tool& tool, double duration, ToolMotion& motion) const {
+  if (tool.type != ToolType::kGrasper) return 0;
+  const double set = grip_pressure_ > 0 ? grip_pressure_ : tool.grip_pressure;
+  const double pressure = squeezed(set, motion.jaw_end);
+  grip_.limit(pressure, duration, motion);
+  return pressure;
+}
+
+void Instrument::follow(const ToolMotion& motion, const ToolLoad& load) {
+  grip_.follow(motion, load.grip_area > 0 ? load.grip / load.grip_area : 0);
+}
+
+}  // namespace tissue_sim

@@ -1,0 +1,258 @@
+// What cameras see: depth against analytic rays and brute force, labels, bits, and what is refused.
+#include "tissue_sim/renderer.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstring>
+
+#include "test_scenes.h"
+#include "tools/tool_shapes.h"
+
+namespace tissue_sim {
+namespace {
+
+/// Looks straight down from `height` above the origin.
+Camera from_above(double height, int width = 96, int rows = 64) {
+  Camera camera;
+  camera.width = width;
+  camera.height = rows;
+  camera.pose.position = Vec3(0, 0, height);
+  camera.pose.orientation = Quat(0, 1, 0, 0);  // z down, y back
+  return camera;
+}
+
+Scene scene_of(std::vector<Tool> tools = {}) {
+  Scene scene;
+  scene.method = Method::kPbd;
+  scene.gravity = Vec3::Zero();
+  scene.cell_size = 0.006;
+  scene.bodies.resize(1);
+  scene.bodies[0].size = Vec3(0.04, 0.03, 0.02);
+  scene.bodies[0].pose.position = Vec3(0, 0, 0.01);
+  scene.tools = std::move(tools);
+  return scene;
+}
+
+CameraImages seen(Simulation& simulation, const Camera& camera) {
+  Renderer renderer(simulation.scene(), 2);
+  SceneView view;
+  read_view(simulation, view);
+  renderer.show(view);
+  CameraImages images;
+  renderer.render(camera, camera.pose, images);
+  return images;
+}
+
+/// Of the pixel's middle, in world axes, of depth 1.
+Vec3 ray(const Camera& camera, int x, int y) {
+  const double f = camera.focal_length();
+  return camera.pose.orientation *
+         Vec3((x - 0.5 * (camera.width - 1)) / f, (y - 0.5 * (camera.height - 1)) / f, 1);
+}
+
+/// Depth of the nearest triangle by trying all, infinite for none.
+double nearest_by_all(const SurfaceTriangles& surface, const Vec3& eye, const Vec3& along) {
+  double nearest = INFINITY;
+  for (std::size_t t = 0; t < surface.fragment.size(); ++t) {
+    Vec3 x[3];
+    for (int c = 0; c < 3; ++c) {
+      for (int a = 0; a < 3; ++a) x[c][a] = surface.corners[9 * t + 3 * c + a];
+    }
+    const Vec3 a = x[1] - x[0], b = x[2] - x[0], p = along.cross(b);
+    const double det = a.dot(p);
+    if (std::fabs(det) < 1e-300) continue;
+    const Vec3 s = eye - x[0], q = s.cross(a);
+    const double u = s.dot(p) / det, v = along.dot(q) / det, d = b.dot(q) / det;
+    if (u >= -1e-9 && v >= -1e-9 && u + v <= 1 + 1e-9 && d > 0) nearest = std::min(nearest, d);
+  }
+  return nearest;
+}
+
+class Renders : public testing::Test {
+ protected:
+  void SetUp() override {
+    if (!can_render()) GTEST_SKIP() << "built without Embree";
+  }
+};
+
+TEST_F(Renders, DepthOfTissueIsThatOfTheNearestOfAllTriangles) {
+  for (const Method method : {Method::kPbd, Method::kMpm}) {
+    Scene scene = scene_of();
+    scene.method = method;
+    scene.bodies[0].shape = Shape::kEllipsoid;
+    scene.bodies[0].radii = Vec3(0.02, 0.015, 0.01);
+    scene.ground.enabled = false;
+    Simulation simulation(scene);
+    SurfaceTriangles surface;
+    simulation.tissue().read_surface(surface);
+    if (surface.fragment.empty()) continue;
+    Camera camera = from_above(0.06);
+    camera.pose.orientation = Quat(Eigen::AngleAxisd(0.2, Vec3::UnitX())) * camera.pose.orientation;
+    const CameraImages images = seen(simulation, camera);
+    int hit = 0, edges = 0;
+    for (int y = 0; y < camera.height; ++y) {
+      for (int x = 0; x < camera.width; ++x) {
+        const double right = nearest_by_all(surface, camera.pose.position, ray(camera, x, y));
+        const float depth = images.depth[y * camera.width + x];
+        if (std::isfinite(right) != std::isfinite(depth)) {
+          ++edges;
+          continue;
+        }
+        if (!std::isfinite(right)) continue;
+        ++hit;
+        ASSERT_NEAR(depth, right, 1e-5 * right) << x << ", " << y;
+      }
+    }
+    EXPECT_GT(hit, 1000);
+    EXPECT_LE(edges, 4);
+  }
+}
+
+TEST_F(Renders, DepthOfTheGroundIsExact) {
+  Scene scene = scene_of();
+  Simulation simulation(scene);
+  const Camera camera = from_above(0.25);
+  const CameraImages images = seen(simulation, camera);
+  EXPECT_NEAR(images.depth[0], 0.25, 1e-5 * 0.25);
+  EXPECT_EQ(images.labels[0], kGroundLabel);
+  const std::size_t middle = 32 * 96 + 48;
+  EXPECT_NEAR(images.depth[middle], 0.23, 1e-3);
+  EXPECT_EQ(images.labels[middle], kFirstFragmentLabel);
+  EXPECT_EQ(images.inside_out, 0);
+}
+
+TEST_F(Renders, DepthOfABallIsThatOfItsEquation) {
+  Tool ball;
+  ball.name = "ball";
+  ball.type = ToolType::kBall;
+  ball.radius = 0.008;
+  Scene scene = scene_of({ball});
+  Simulation simulation(scene);
+  const Vec3 tip(0.002, 0.001, 0.05);
+  simulation.set_tool(0, {tip, Quat(0, 1, 0, 0)});  // its shaft, and so its middle, above the tip
+  simulation.advance_frame();
+  const Camera camera = from_above(0.12);
+  const CameraImages images = seen(simulation, camera);
+  const Vec3 centre = tip + Vec3(0, 0, ball.radius);
+  int hit = 0;
+  for (int y = 0; y < camera.height; ++y) {
+    for (int x = 0; x < camera.width; ++x) {
+      if (images.labels[y * camera.width + x] != kFirstToolLabel) continue;
+      const Vec3 d = ray(camera, x, y), o = camera.pose.position - centre;
+      const double b = o.dot(d), root = b * b - d.squaredNorm() * (o.squaredNorm() - 0.008 * 0.008);
+      ASSERT_GE(root, -1e-12);
+      const double right = (-b - std::sqrt(std::max(0.0, root))) / d.squaredNorm();
+      EXPECT_NEAR(images.depth[y * camera.width + x], right, 1e-5 * right);
+      ++hit;
+    }
+  }
+  EXPECT_GT(hit, 50);
+}
+
+TEST_F(Renders, TheSameViewHasTheSameBitsWithAnyThreads) {
+  Simulation simulation(scene_of());
+  SceneView view;
+  read_view(simulation, view);
+  CameraImages one, more;
+  for (const int threads : {1, 3}) {
+    Renderer renderer(simulation.scene(), threads);
+    renderer.show(view);
+    Camera camera = from_above(0.1);
+    camera.distortion = {-0.2, 0.05, 0.001, -0.002, 0};
+    renderer.render(camera, camera.pose, threads == 1 ? one : more);
+  }
+  EXPECT_EQ(one.rgb, more.rgb);
+  EXPECT_EQ(one.labels, more.labels);
+  ASSERT_EQ(one.depth.size(), more.depth.size());
+  EXPECT_EQ(std::memcmp(one.depth.data(), more.depth.data(), 4 * one.depth.size()), 0);
+}
+
+TEST_F(Renders, ACameraWithinTissueSeesItsInside) {
+  Simulation simulation(scene_of());
+  Camera camera = from_above(0.01);
+  EXPECT_GT(seen(simulation, camera).inside_out, 0.9);
+}
+
+TEST_F(Renders, RefusesAPoseThatIsNotFinite) {
+  Simulation simulation(scene_of());
+  Renderer renderer(simulation.scene(), 1);
+  CameraImages images;
+  Camera camera = from_above(0.1);
+  Pose pose;
+  pose.position.x() = NAN;
+  EXPECT_THROW(renderer.render(camera, pose, images), std::invalid_argument);
+}
+
+TEST(Cameras, AreRefusedOutOfRange) {
+  const auto refused = [](const std::string& fields) {
+    try {
+      scene_from_yaml("bodies: [{}]\ncameras: [{" + fields + "}]\n");
+    } catch (const std::invalid_argument& e) {
+      return std::string(e.what());
+    }
+    return std::string();
+  };
+  EXPECT_EQ(refused("name: eye"), "");
+  EXPECT_NE(refused("width: 0").find("cameras[0].width is 0"), std::string::npos);
+  EXPECT_NE(refused("height: 20000").find("cameras[0].height is 20000"), std::string::npos);
+  EXPECT_NE(refused("near: 1, far: 0.5").find("cameras[0].far is 0.5"), std::string::npos);
+  EXPECT_NE(refused("hfov: .nan").find("cameras[0].hfov is .nan"), std::string::npos);
+  EXPECT_NE(refused("distortion: [1, 2]").find("must be 5 numbers"), std::string::npos);
+}
+
+TEST(Cameras, ComeBackFromYaml) {
+  Scene scene = scene_of();
+  Camera camera = from_above(0.1);
+  camera.name = "eye";
+  camera.baseline = 0.005;
+  camera.colours = CameraColours::kFragments;
+  camera.distortion = {-0.2, 0.05, 0.001, -0.002, 0};
+  scene.cameras = {camera};
+  const std::string text = scene_to_yaml(scene);
+  EXPECT_EQ(scene_to_yaml(scene_from_yaml(text)), text);
+}
+
+/// Rays from all around that meet a shape do so on its surface, and those that miss it nowhere do.
+TEST(ToolShapes, AreMetOnTheirSurface) {
+  Tool tool;
+  ToolMotion motion;
+  motion.end.orientation = Quat(0.5, 0.5, -0.5, 0.5);
+  motion.end.position = Vec3(0.01, 0.02, 0.03);
+  for (const ToolType type : {ToolType::kScalpel, ToolType::kProbe, ToolType::kBall,
+                              ToolType::kPunch, ToolType::kPlate, ToolType::kGrasper}) {
+    tool.type = type;
+    for (const ToolShape& shape : tool_shapes(tool, motion)) {
+      int met = 0;
+      for (int i = 0; i < 400; ++i) {
+        const Vec3 eye =
+            shape.pose.position + 0.3 * Vec3(std::sin(i), std::cos(1.7 * i), std::sin(2.3 * i));
+        const Vec3 aim =
+            shape.pose * (0.45 * shape.size.cwiseProduct(Vec3(std::sin(3.1 * i), std::cos(5.3 * i),
+                                                              std::sin(7.7 * i))));
+        double t;
+        Vec3 normal;
+        if (!meet(shape, eye, aim - eye, 0, 10, t, normal)) continue;
+        ++met;
+        const Vec3 at =
+            shape.pose.orientation.conjugate() * (eye + t * (aim - eye) - shape.pose.position);
+        const Vec3 half = 0.5 * shape.size;
+        double off = 0;
+        if (shape.kind == ToolShape::kBox) {
+          off = (at.cwiseAbs() - half).maxCoeff();
+        } else if (shape.kind == ToolShape::kBall) {
+          off = at.norm() - half.x();
+        } else {
+          off = std::max(at.head<2>().norm() - half.x(), std::fabs(at.z()) - half.z());
+        }
+        EXPECT_NEAR(off, 0, 1e-9);
+        EXPECT_LT(normal.dot(aim - eye), 0);
+        EXPECT_NEAR(normal.norm(), 1, 1e-9);
+      }
+      EXPECT_GT(met, 150);
+    }
+  }
+}
+
+}  // namespace
+}  // namespace tissue_sim

@@ -1,0 +1,223 @@
+// What a user of position-based dynamics takes for granted: a body's mass, that it comes to rest,
+// that nothing blows up by itself. By the public interface.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <fstream>
+#include <string>
+#include <vector>
+
+#include "temporary_folder.h"
+#include "tissue_sim/simulation.h"
+
+namespace tissue_sim {
+namespace {
+
+constexpr double kPi = 3.14159265358979;
+
+struct Rings {
+  int around, along;
+};
+
+/// A closed surface by rings of vertices from pole to pole, without its first `left_out` triangles.
+template <class Place>
+std::string obj(const Rings& rings, const Place& place, int left_out = 0) {
+  std::vector<Vec3> vertices = {place(0.0, 0.0)};
+  const auto [a, b] = rings;
+  for (int j = 1; j < b; ++j) {
+    for (int i = 0; i < a; ++i) vertices.push_back(place(kPi * j / b, 2 * kPi * i / a));
+  }
+  vertices.push_back(place(kPi, 0.0));
+  std::vector<std::array<int, 3>> triangles;
+  const int last = static_cast<int>(vertices.size());
+  for (int i = 0; i < a; ++i) triangles.push_back({1, 2 + i, 2 + (i + 1) % a});
+  for (int j = 0; j + 2 < b; ++j) {
+    for (int i = 0; i < a; ++i) {
+      const int p = 2 + j * a + i, q = 2 + j * a + (i + 1) % a;
+      triangles.push_back({p, p + a, q + a});
+      triangles.push_back({p, q + a, q});
+    }
+  }
+  for (int i = 0; i < a; ++i) {
+    triangles.push_back({last, 2 + (b - 2) * a + (i + 1) % a, 2 + (b - 2) * a + i});
+  }
+  std::string text;
+  for (const Vec3& v : vertices) {
+    text += "v " + std::to_string(v.x()) + " " + std::to_string(v.y()) + " " +
+            std::to_string(v.z()) + "\n";
+  }
+  for (std::size_t t = left_out; t < triangles.size(); ++t) {
+    text += "f";
+    for (const int v : triangles[t]) text += " " + std::to_string(v);
+    text += "\n";
+  }
+  return text;
+}
+
+/// 50 mm of radius, in millimetres.
+Vec3 on_ball(double t, double p) {
+  return 50 * Vec3(std::sin(t) * std::cos(p), std::sin(t) * std::sin(p), std::cos(t));
+}
+
+/// Some 135 x 100 x 55 mm, smooth; long thin triangles at its poles.
+Vec3 on_bumpy_ball(double t, double p) {
+  const double r =
+      45 * (1 + 0.25 * std::sin(3 * t) * std::cos(4 * p) + 0.1 * std::cos(7 * t) * std::sin(5 * p));
+  return r * Vec3(1.5 * std::sin(t) * std::cos(p), std::sin(t) * std::sin(p), 0.6 * std::cos(t));
+}
+
+class PbdTrust : public testing::Test {
+ protected:
+  Scene mesh_scene(const std::string& text, const std::string& name = "body.obj") const {
+    std::ofstream(folder_.path() + "/" + name) << text;
+    Scene scene;
+    scene.method = Method::kPbd;
+    scene.device = Device::kCpu;
+    scene.bodies.resize(1);
+    scene.bodies[0].shape = Shape::kMesh;
+    scene.bodies[0].mesh = folder_.path() + "/" + name;
+    scene.bodies[0].scale = 0.001;
+    scene.bodies[0].pose.position = Vec3(0, 0, 0.2);
+    return scene;
+  }
+  static double volume(Simulation& simulation) {
+    double sum = 0;
+    for (const Fragment& f : simulation.tissue().fragments()) sum += f.volume;
+    return sum;
+  }
+  static std::string notes(Simulation& simulation) {
+    std::string all;
+    for (const std::string& note : simulation.tissue().notes()) all += note + "\n";
+    return all;
+  }
+
+ private:
+  TemporaryFolder folder_;
+};
+
+// One triangle less tripled it.
+TEST_F(PbdTrust, AHoleDoesNotChangeTheMass) {
+  Simulation whole(mesh_scene(obj({24, 12}, on_ball)));
+  const double expected = volume(whole);
+  EXPECT_NEAR(expected, 4 * kPi / 3 * std::pow(0.05, 3), 0.05 * expected);
+  EXPECT_EQ(notes(whole).find("weighed"), std::string::npos);
+  for (const int left_out : {1, 20}) {
+    Simulation holed(mesh_scene(obj({24, 12}, on_ball, left_out)));
+    EXPECT_NEAR(volume(holed), expected, 0.01 * expected) << left_out;
+    EXPECT_NE(notes(holed).find("weighed with 1 hole closed"), std::string::npos) << notes(holed);
+  }
+}
+
+TEST_F(PbdTrust, ASheetHasTheVolumeOfItsThickness) {
+  std::string text;
+  for (int j = 0; j <= 10; ++j) {
+    for (int i = 0; i <= 10; ++i)
+      text += "v " + std::to_string(4 * i) + " " + std::to_string(4 * j) + " 0\n";
+  }
+  for (int j = 0; j < 10; ++j) {
+    for (int i = 1; i <= 10; ++i) {
+      const int a = 11 * j + i;
+      for (const std::array<int, 3> t :
+           {std::array<int, 3>{a, a + 1, a + 12}, std::array<int, 3>{a, a + 12, a + 11}}) {
+        text += "f " + std::to_string(t[0]) + " " + std::to_string(t[1]) + " " +
+                std::to_string(t[2]) + "\n";
+      }
+    }
+  }
+  Simulation sheet(mesh_scene(text));
+  EXPECT_NEAR(volume(sheet), 0.04 * 0.04 * Scene().cell_size, 1e-9);
+  EXPECT_NE(notes(sheet).find("1 sheet"), std::string::npos) << notes(sheet);
+}
+
+// A triangle and its back beside the body were a piece.
+TEST_F(PbdTrust, ADoubledTriangleIsNoPiece) {
+  const std::string ball = obj({24, 12}, on_ball);
+  const std::string speck =
+      "v 60 0 0\nv 60.01 0 0\nv 60 0.01 0\nv 60 0 0.000001\nf 267 268 269\nf 267 270 268\n"
+      "f 267 269 270\nf 268 270 269\n";
+  Simulation alone(mesh_scene(ball)), with_speck(mesh_scene(ball + speck));
+  EXPECT_EQ(with_speck.tissue().point_count(), alone.tissue().point_count());
+  EXPECT_NE(notes(with_speck).find("1 speck"), std::string::npos) << notes(with_speck);
+}
+
+// Vertices of its long thin triangles shook at 85 m/s, for ever: bends there were as stiff as a
+// plate as thick as the triangles are long.
+TEST_F(PbdTrust, UnevenTrianglesComeToRest) {
+  Scene scene = mesh_scene(obj({96, 48}, on_bumpy_ball));
+  scene.bodies[0].pose.position.z() = 0.041;  // some 10 mm above the ground
+  Simulation simulation(scene);
+  double fastest = 0, late = 0;
+  for (int frame = 0; frame < 150; ++frame) {
+    const double speed = simulation.advance_frame().result.max_speed;
+    fastest = std::max(fastest, speed);
+    if (frame >= 120) late = std::max(late, speed);
+  }
+  std::printf("fastest %.3f m/s, from two seconds on %.3f m/s\n", fastest, late);
+  EXPECT_LT(fastest, 1.6);
+  EXPECT_LT(late, 0.3);
+}
+
+// Held vertices left constraints of strain next to no slope: not a number in the first frame.
+TEST_F(PbdTrust, AHeldCylinderOfStrainStays) {
+  Simulation simulation(scene_from_yaml(
+      "{method: pbd, device: cpu, pbd: {elasticity: strain, model: tetrahedra}, bodies: [{shape: "
+      "cylinder, radius: 0.007744681545495561, height: 0.02408052080337735, pose: {position: [0, "
+      "0, 0.0131]}, anchors: [{ball: {center: [-0.012, 0, 0.0131], radius: 0.0077}}]}]}"));
+  for (int frame = 0; frame < 60; ++frame) {
+    const FrameReport report = simulation.advance_frame();
+    ASSERT_FALSE(report.result.blew_up) << frame;
+    EXPECT_LT(report.result.max_speed, 0.2);
+  }
+  EXPECT_LT((simulation.tissue().fragments()[0].centroid - Vec3(0, 0, 0.0131)).norm(), 1e-3);
+}
+
+// Triangles that nothing holds in shape grow without bound; their cells of the search must not:
+// 14 s a frame, then no memory.
+TEST_F(PbdTrust, StretchedTrianglesTakeNoMoreMemory) {
+  Simulation simulation(scene_from_yaml(
+      "{method: pbd, device: cpu, cell_size: 0.005, ground: {enabled: false}, gravity: [9, 9, 9], "
+      "pbd: {edge: 0, bending: 0, internal: 0}, bodies: [{name: a, size: [0.04, 0.04, 0.02], "
+      "anchors: [{below: 0.0}]}, {name: b, size: [0.04, 0.04, 0.02], pose: {position: [0.06, 0, "
+      "0.0]}}]}"));
+  for (int frame = 0; frame < 120; ++frame) {
+    EXPECT_FALSE(simulation.advance_frame().result.blew_up);
+  }
+}
+
+// Two cubes in five tetrahedra each, the second a copy of the first, not its mirror image.
+TEST_F(PbdTrust, FacesThatDoNotMatchAreSaid) {
+  const auto mesh = [](bool is_mirrored) {
+    std::string text = "MeshVersionFormatted 1\nDimension 3\nVertices\n12\n";
+    for (int x = 0; x < 3; ++x) {
+      for (int k = 0; k < 4; ++k) {
+        text += std::to_string(10 * x) + " " + std::to_string(10 * (k % 2)) + " " +
+                std::to_string(10 * (k / 2)) + " 1\n";
+      }
+    }
+    text += "Tetrahedra\n10\n";
+    constexpr int kFive[5][4] = {
+        {0, 3, 5, 6}, {1, 0, 3, 5}, {2, 0, 6, 3}, {4, 0, 5, 6}, {7, 3, 6, 5}};
+    for (int cube = 0; cube < 2; ++cube) {
+      for (const auto& t : kFive) {
+        for (const int c : t) {
+          // Corner c: x by 4, y by 1, z by 2.
+          const int corner = cube == 1 && is_mirrored ? c ^ 4 : c;
+          text += std::to_string(1 + 4 * (cube + corner / 4) + corner % 4) + " ";
+        }
+        text += "1\n";
+      }
+    }
+    return text + "End\n";
+  };
+  for (const bool is_mirrored : {false, true}) {
+    Scene scene = mesh_scene(mesh(is_mirrored), "cubes.mesh");
+    scene.pbd.model = PbdModel::kTetrahedra;
+    Simulation simulation(scene);
+    const bool is_said = notes(simulation).find("do not match at 1 face ") != std::string::npos;
+    EXPECT_EQ(is_said, !is_mirrored) << notes(simulation);
+  }
+}
+
+}  // namespace
+}  // namespace tissue_sim

@@ -1,0 +1,161 @@
+// Tissue that hangs from an anchor parts at its root, where its weight stretches it to its limit.
+#include <gtest/gtest.h>
+
+#include <map>
+#include <string>
+
+#include "tissue/each_method.h"
+
+namespace tissue_sim {
+namespace {
+
+constexpr double kYoung = 5000, kLimit = 1.3, kDensity = 1000;
+constexpr double kInside = 0.016;  // of the body's length, in the anchor [m]
+
+struct Hung {
+  const char* name;
+  Vec3 size;  // the first along the pull [m]
+  double cell_size, inside = kInside;
+  Region::Kind anchor = Region::Kind::kBox;
+};
+
+/// Hangs along z for a plane, else along x.
+Scene hung_scene(const Hung& hung) {
+  Scene s;
+  s.cell_size = hung.cell_size;
+  s.gravity = Vec3::Zero();
+  s.ground.enabled = false;
+  s.damping = 60;
+  s.materials.resize(1);
+  Material& m = s.materials[0];
+  m.name = "weak";
+  m.young_modulus = kYoung;
+  m.poisson_ratio = 0;  // the root is stretched as all of the section
+  m.density = kDensity;
+  m.tear_stretch = kLimit;
+  s.bodies.resize(1);
+  Body& body = s.bodies[0];
+  body.material = "weak";
+  body.size = hung.size;
+  Region region;
+  region.kind = hung.anchor;
+  const double face = hung.inside - 0.5 * hung.size.x();
+  region.min = Vec3(-1, -1, -1);
+  region.max = Vec3(face, 1, 1);
+  region.radius = 2;
+  region.center = Vec3(face - region.radius, 0, 0);
+  region.z = face;
+  if (hung.anchor == Region::Kind::kBelow)
+    body.size = Vec3(hung.size.y(), hung.size.z(), hung.size.x());
+  body.anchors = {Anchor(region)};
+  return s;
+}
+
+/// What is published of each piece is what its points show.
+void expect_pieces_of_the_cloud(Tissue& tissue, double cell_size, const std::string& where) {
+  PointSelection with;
+  with.fields = kVelocity | kVolume;
+  std::vector<std::uint8_t> cloud;
+  const int count = tissue.read_points(with, cloud);
+  struct Sum {
+    int count = 0;
+    double volume = 0;
+    Vec3 x = Vec3::Zero(), v = Vec3::Zero();
+    Box box;
+  };
+  std::map<int, Sum> of_piece;
+  for (int i = 0; i < count; ++i) {
+    const std::uint8_t* const at = cloud.data() + i * with.point_size();
+    Point p;
+    float more[4];  // velocity and volume
+    std::memcpy(&p, at, sizeof p);
+    std::memcpy(more, at + sizeof p, sizeof more);
+    const Vec3 place(p.x, p.y, p.z);
+    Sum& sum = of_piece[p.fragment];
+    ++sum.count;
+    sum.volume += more[3];
+    sum.x += more[3] * place;
+    sum.v += more[3] * Vec3(more[0], more[1], more[2]);
+    sum.box.min = sum.box.min.cwiseMin(place);
+    sum.box.max = sum.box.max.cwiseMax(place);
+  }
+  const double close = 1e-4 * cell_size;
+  ASSERT_EQ(of_piece.size(), tissue.fragments().size()) << where;
+  for (const Fragment& f : tissue.fragments()) {
+    const Sum& sum = of_piece[f.id];
+    const std::string which = where + ", piece " + std::to_string(f.id);
+    EXPECT_EQ(f.point_count, sum.count) << which;
+    EXPECT_NEAR(f.volume, sum.volume, 1e-5 * sum.volume) << which;
+    EXPECT_LT((f.box.min - sum.box.min).norm(), close) << which;
+    EXPECT_LT((f.box.max - sum.box.max).norm(), close) << which;
+    EXPECT_LT((f.centroid - sum.x / sum.volume).norm(), close) << which;
+    EXPECT_LT((f.velocity - sum.v / sum.volume).norm(), 1e-4 * (1 + f.velocity.norm())) << which;
+  }
+}
+
+class HungTissue : public EachMethod {};
+FOR_EACH_METHOD(HungTissue);
+
+TEST_P(HungTissue, PartsAtItsRootUnderTheWeightThatStretchesItToItsLimit) {
+  if (GetParam().method == Method::kPbd) GTEST_SKIP() << "does not tear";
+  const Vec3 strip(0.08, 0.016, 0.008), slab(0.08, 0.06, 0.024), block(0.06, 0.04, 0.04);
+  for (const Hung& hung :
+       {Hung{"strip, 4 mm", strip, 0.004}, Hung{"strip, 3 mm", strip, 0.003},
+        Hung{"strip, 2 mm", strip, 0.002}, Hung{"slab", slab, 0.004}, Hung{"block", block, 0.004},
+        Hung{"slab, plane", slab, 0.004, kInside, Region::Kind::kBelow},
+        Hung{"slab, ball", slab, 0.004, kInside, Region::Kind::kBall},
+        Hung{"slab, a third of a half cell in", slab, 0.004, 0.0147},
+        Hung{"slab, at its end", slab, 0.004, 0.0001}}) {
+    Scene scene = on_this(hung_scene(hung));
+    Simulation simulation(scene);
+    const Vec3 along = hung.anchor == Region::Kind::kBelow ? Vec3::UnitZ() : Vec3::UnitX();
+    const double free = hung.size.x() - hung.inside;
+    const double heaviest = 1.3 * kYoung * (kLimit - 1) / (kDensity * free);
+    double weight = 0;
+    constexpr int kFrames = 60;
+    for (int i = 1; i <= kFrames && simulation.tissue().fragment_count() < 2; ++i) {
+      weight = heaviest * i / kFrames;
+      simulation.set_gravity(weight * along);
+      simulation.advance_frame();
+    }
+    expect_pieces_of_the_cloud(simulation.tissue(), hung.cell_size, hung.name);
+    ASSERT_EQ(simulation.tissue().fragment_count(), 2) << hung.name;
+    // Where: what fell is what was free but for a layer at the root.
+    Fragment fell;
+    for (const Fragment& f : simulation.tissue().fragments()) {
+      if (f.loose) fell = f;
+    }
+    const double length = fell.volume / (hung.size.y() * hung.size.z());
+    EXPECT_LT(length, free + 0.01 * scene.cell_size) << hung.name;
+    EXPECT_GT(length, free - 1.55 * scene.cell_size) << hung.name;
+    // When: the weight of what fell had stretched that place to the limit.
+    const double stretch = 1 + kDensity * weight * length / kYoung;
+    EXPECT_NEAR((stretch - 1) / (kLimit - 1), 1, 0.1) << hung.name;
+    for (int i = 0; i < 6; ++i) simulation.advance_frame();
+    EXPECT_EQ(simulation.tissue().fragment_count(), 2) << hung.name << ": dust";
+  }
+}
+
+TEST_P(HungTissue, HasPiecesThatAreWhatTheirPointsShow) {
+  Scene scene = on_this(hung_scene({"slab", Vec3(0.06, 0.03, 0.012), 0.003, 0.0137}));
+  scene.damping = 2;
+  scene.materials[0].poisson_ratio = 0.4;
+  Simulation simulation(scene);
+  for (int i = 0; i < 24; ++i) {
+    // Bends, is torn, and is cut through its anchored part and its free one.
+    simulation.set_gravity(i < 6 ? Vec3(0, 0, -9.81) : Vec3(45, 0, -9.81));
+    if (i == 3 || i == 12) {
+      const double x = i == 3 ? 0.01 : -0.02;
+      BladePath path;
+      path.edge = {Vec3(0, 0, -0.02), Vec3(0, 0, 0.02)};
+      path.poses = {{Vec3(x, -0.03, 0), Quat::Identity()}, {Vec3(x, 0.03, 0), Quat::Identity()}};
+      simulation.cut(path);
+    }
+    simulation.advance_frame();
+    expect_pieces_of_the_cloud(simulation.tissue(), scene.cell_size, "frame " + std::to_string(i));
+    if (HasFailure()) return;
+  }
+}
+
+}  // namespace
+}  // namespace tissue_sim

@@ -23,8 +23,18 @@ void fields(Archive& archive, Crossings& x) {
 }
 
 template <class Archive>
-void fields(Archive& archive, Points& p) {
+void fields(Archive& archive, PointBonds& p) {
   archive(p.bonds, p.soft, p.crossings);
+}
+
+template <class Archive>
+void fields(Archive& archive, NodeMotion& n) {
+  archive(n.u, n.v);
+}
+
+template <class Archive>
+void fields(Archive& archive, NodeMasses& n) {
+  archive(n.mass, n.inv_mass);
 }
 
 template <class Archive>
@@ -134,13 +144,18 @@ void fields(Archive& archive, FaceRow& r) {
 }
 
 template <class Archive>
-void fields(Archive& archive, AnchorFaces::HeldNode& n) {
+void fields(Archive& archive, AnchorRows::HeldNode& n) {
   archive(n.node, n.anchor, n.place);
 }
 
 template <class Archive>
-void fields(Archive& archive, AnchorFaces& a) {
-  archive(a.rows, a.groups, a.inverse, a.impulse, a.held, a.now, a.moves);
+void fields(Archive& archive, AnchorRows& a) {
+  archive(a.rows, a.groups, a.inverse, a.held, a.moves);
+}
+
+template <class Archive>
+void fields(Archive& archive, AnchorFaceMotion& a) {
+  archive(a.impulse, a.now);
 }
 
 template <class Archive>
@@ -204,21 +219,35 @@ void fields(Archive& archive, FrontNode& n) {
           n.first_side);
 }
 
-/// What its cells follow from.
 template <class Archive>
-void fields(Archive& archive, Front& f) {
+void fields(Archive& archive, FrontMotion& f) {
+  archive(f.d, f.rate);
+}
+
+template <class Archive>
+void fields(Archive& archive, FrontNodes& f) {
   std::vector<std::int64_t> bonds;
   std::vector<std::uint32_t> passed;
   for (const auto& [bond, mask] : f.rim) {
     bonds.push_back(bond);
     passed.push_back(mask);
   }
-  archive.part("front", bonds, passed, f.nodes, f.d, f.rate);
+  archive(bonds, passed, f.nodes);
   if constexpr (Archive::kReads) {
     f.rim.clear();
     check_sizes("rim", bonds, passed);
     for (std::size_t i = 0; i < bonds.size(); ++i) f.rim[bonds[i]] = passed[i];
   }
+}
+
+template <class Archive>
+void fields(Archive& archive, TissueMotion& m) {
+  archive(m.time, m.dt, m.contacts, m.flights);
+}
+
+template <class Archive>
+void fields(Archive& archive, TissueRecords& r) {
+  archive(r.tore_at, r.bridge_ends, r.debris);
 }
 
 /// Of a state that was read, on the CPU, but for its scene and what follows from that. Throws
@@ -230,19 +259,11 @@ void check_tissue(const MpmState& state);
 /// All but contact of tissue with tissue: mpm/contact/face_fields.h.
 template <class Archive>
 void tissue_fields(Archive& archive, MpmState& s) {
-  archive.part("time", s.time, s.dt);
   archive.part("scene", s.scene.gravity, s.scene.damping);
-  archive.part("u", s.nodes.u);
-  archive.part("v", s.nodes.v);
-  archive.part("mass", s.nodes.mass, s.nodes.inv_mass);
-  archive.part("points", s.points);
-  archive.part("node fields", *s.fields);
-  archive.part("blocks", s.blocks);
-  archive.part("motion", s.motion, s.wildest);
-  archive.part("tears", s.tore_at, s.bridge_ends, s.debris);
-  archive.part("contacts", s.contacts);
-  archive.part("anchors", s.anchors);
-  archive.part("flights", s.flights);
+  std::apply([&](auto&... of) { archive.part("topology", of...); }, topology_of(s));
+  std::apply([&](auto&... of) { archive.part("motion", of...); }, motion_of(s));
+  archive.part("records", static_cast<TissueRecords&>(s));
+  archive.part("blocks' motion", s.motion, s.wildest);
 }
 
 }  // namespace tissue_sim

@@ -52,7 +52,7 @@ void MpmTissue::reject_part(Verdict verdict) {
   frame.again = true;
   substep_ = checkpoint_.substep;
   // From where blocks went, whose motion still stands, and from where they began.
-  find_near_colliders(*state_, frame.reach, frame.duration, checkpoint_.motion);
+  find_near_colliders(*state_, frame.reach, frame.duration, checkpoint_.of_blocks);
 }
 
 bool MpmTissue::accept_part() {
@@ -70,42 +70,20 @@ void MpmTissue::break_bonds(double share) {
 }
 
 void MpmTissue::save_checkpoint() {
-  const MpmState& s = *state_;
-  for (int a = 0; a < 3; ++a) {
-    checkpoint_.u[a] = s.nodes.u[a];
-    checkpoint_.v[a] = s.nodes.v[a];
-    checkpoint_.d[a] = s.front.d[a];
-    checkpoint_.rate[a] = s.front.rate[a];
-  }
-  checkpoint_.motion = s.motion;
-  checkpoint_.time = s.time;
-  checkpoint_.dt = s.dt;
-  checkpoint_.contacts = s.contacts;
+  MpmState& s = *state_;
+  checkpoint_.motion = motion_of(s);
   checkpoint_.faces = s.faces;
   checkpoint_.result = result_;
-  checkpoint_.impulse = s.anchors.impulse;
-  checkpoint_.anchors = s.anchors.now;
-  checkpoint_.flights = s.flights;
+  checkpoint_.of_blocks = s.motion;
 }
 
 void MpmTissue::restore_checkpoint() {
   MpmState& s = *state_;
-  for (int a = 0; a < 3; ++a) {
-    s.nodes.u[a] = checkpoint_.u[a];
-    s.nodes.v[a] = checkpoint_.v[a];
-    s.front.d[a] = checkpoint_.d[a];
-    s.front.rate[a] = checkpoint_.rate[a];
-  }
-  s.time = checkpoint_.time;
-  s.dt = checkpoint_.dt;
   for (const InertialNode& n : s.contacts.inertia.nodes) s.work.inertial_index[n.node] = -1;
-  s.contacts = checkpoint_.contacts;
+  motion_of(s) = checkpoint_.motion;
   index_inertia(s);
   s.faces = checkpoint_.faces;
   result_ = checkpoint_.result;
-  s.anchors.impulse = checkpoint_.impulse;
-  s.anchors.now = checkpoint_.anchors;
-  s.flights = checkpoint_.flights;
   index_flights(s);
   measure_stiffness();
 }

@@ -13,7 +13,6 @@ void MpmTissue::each_field(Archive& archive) {
   archive.begin_part("faces");
   fields(archive, state_->faces, state_->blocks);
   archive.end_part("faces");
-  fields(archive, state_->front);
   archive.part("pieces", pieces_, pieces_measured_);
   archive.part("substeps", stiffening_, modulus_, substep_);
   archive.part("measures", measured_, has_energies_, work_);

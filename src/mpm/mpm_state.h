@@ -7,9 +7,9 @@
 #include <memory>
 #include <set>
 #include <string>
+#include <tuple>
 #include <vector>
 
-#include "compute/for_each.h"
 #include "mpm/anchors/anchor_faces.h"
 #include "mpm/blocks/block_kernels.h"
 #include "mpm/blocks/blocks.h"
@@ -17,7 +17,6 @@
 #include "mpm/contact/face_contact.h"
 #include "mpm/fragment_flight.h"
 #include "mpm/split/lattice_tissue.h"
-#include "mpm/split/front.h"
 #include "mpm/surface/boundary_mesh.h"
 #include "tissue_sim/tissue.h"
 #include "tools/collider.h"
@@ -93,32 +92,50 @@ struct BlockWork {
   tbb::enumerable_thread_specific<BlockScratch> scratch;
 };
 
+/// What a substep changes beside its nodes, anchors and front: see Motion.
+struct TissueMotion {
+  double time = 0;  ///< since the beginning [s]
+  float dt = 0;     ///< the last substep, 0 before the first [s]
+  Contacts contacts;
+  std::vector<FragmentFlight> flights;  ///< pieces that fly
+};
+
+/// What became of the tissue.
+struct TissueRecords {
+  std::vector<double> tore_at;  ///< per body: when a bond last tore [s]; empty while none did
+  std::vector<std::int32_t> bridge_ends;  ///< points, by number: mpm/tear/bond_bridges.h
+  std::set<std::int32_t> debris;          ///< the lowest point of each: mpm/tear/debris.h
+};
+
 /// The state of the tissue, and how it is worked on.
-struct MpmState : LatticeTissue {
+struct MpmState : LatticeTissue, TissueMotion, TissueRecords {
   Scene scene;
   AnchorFaces anchors;
   Blocks blocks;
+  FaceContacts faces;
   std::vector<BlockMotion> motion;  ///< per block; exact as of measure_motion()
   float wildest = 1;                ///< BlockState's, of all blocks
-  double time = 0;                  ///< since the beginning [s]
-  float dt = 0;                     ///< the last substep, 0 before the first [s]
-  std::vector<double> tore_at;      ///< per body: when a bond last tore [s]; empty while none did
-  std::vector<std::int32_t> bridge_ends;  ///< points, by number: mpm/tear/bond_bridges.h
-  std::set<std::int32_t> debris;          ///< the lowest point of each: mpm/tear/debris.h
-  Contacts contacts;
-  FaceContacts faces;
   std::vector<Collider> colliders;
-  Array<std::uint8_t> whole_bonds;           ///< per point: its bonds before any broke
-  std::vector<FragmentFlight> flights;       ///< pieces that fly
   std::vector<std::int32_t> flight_of_node;  ///< -1 for none; empty while none flies
   BoundaryMesh boundary;                     ///< as it was last read
 
   const BlockKernels* kernels = nullptr;
   InstructionSet instructions = InstructionSet::kSse2;
-  std::unique_ptr<Cpu> cpu;
   BlockWork work;
-  Front front;
 };
+
+/// All that a substep changes but contact of tissue with tissue, which each device has in its way:
+/// `Motion m = motion_of(state)` keeps it, `motion_of(state) = m` puts it back.
+using Motion = std::tuple<NodeMotion, FrontMotion, AnchorFaceMotion, TissueMotion>;
+inline std::tuple<NodeMotion&, FrontMotion&, AnchorFaceMotion&, TissueMotion&> motion_of(
+    MpmState& s) {
+  return {s.nodes, s.front, s.anchors, s};
+}
+/// All that a cut changes, in the same way.
+inline std::tuple<NodeMasses&, PointBonds&, NodeFields&, Blocks&, FrontNodes&, AnchorRows&>
+topology_of(MpmState& s) {
+  return {s.nodes, s.points, *s.fields, s.blocks, s.front, s.anchors};
+}
 
 /// Builds the state of a valid scene at rest. Throws what make_lattice_bodies() throws.
 std::unique_ptr<MpmState> make_mpm_state(const Scene& scene, std::vector<std::string>* notes);

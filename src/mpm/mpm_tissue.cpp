@@ -56,7 +56,7 @@ void MpmTissue::cut(const std::vector<BladePath>& paths, const Array<float>* u_b
   }
   if (changed.empty() && touched.empty()) return;
   measured_ = false;
-  if (!touched.empty()) follow_front(*state_, touched);
+  if (!touched.empty()) follow_front(*state_, touched, state_->anchors.at_row);
   if (changed.empty()) return list_front_cells(*state_);
   const MpmState& s = *state_;
   take_apart(*state_, changed, [&] {

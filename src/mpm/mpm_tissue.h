@@ -1,7 +1,6 @@
 // Tissue by the material point method in total Lagrangian form, on the CPU.
 #pragma once
 
-#include <array>
 #include <memory>
 #include <optional>
 
@@ -81,18 +80,11 @@ class MpmTissue final : public Tissue {
 
   /// What a part of a frame changes until something is cut or tears.
   struct Checkpoint {
-    Array<float> u[3], v[3];
-    double time;
-    float dt;
-    Contacts contacts;
+    Motion motion;
     FaceContacts faces;
     FrameResult result;
-    std::vector<BlockMotion> motion;  ///< run_frame()'s, as all that follows
+    std::vector<BlockMotion> of_blocks;  ///< run_frame()'s, as what follows
     SubstepChoice substep;
-    std::vector<std::array<double, 3>> impulse;  ///< AnchorFaces::impulse
-    std::vector<RigidMotion> anchors;            ///< AnchorFaces::now
-    std::vector<FragmentFlight> flights;
-    Array<float> d[3], rate[3];  ///< Front's
   };
 
   // The steps of run_frame().

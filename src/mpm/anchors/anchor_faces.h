@@ -63,23 +63,31 @@ struct RigidMotion {
   }
 };
 
-struct AnchorFaces {
+/// What a cut changes of what anchors hold.
+struct AnchorRows {
+  std::vector<FaceRow> rows;
+  std::vector<FaceGroup> groups;
+  std::vector<float> inverse;
+  struct HeldNode {
+    std::int32_t node, anchor;
+    float place[3];  ///< [m]
+  };
+  std::vector<HeldNode> held;  ///< nodes that only tissue inside sees; found once any moves
+  bool moves = false;          ///< whether any anchor has moved ever
+};
+
+/// What a substep changes of it.
+struct AnchorFaceMotion {
+  std::vector<std::array<double, 3>> impulse;  ///< on tissue, by row, since the frame began [N s]
+  std::vector<RigidMotion> now;                ///< of each anchor, at the end of the last substep
+};
+
+struct AnchorFaces : AnchorRows, AnchorFaceMotion {
   /// Where a place in an anchor of a body is now [m].
   Vec3 place_of_held(const Body& body, int body_number, const Vec3& X) const;
 
   std::vector<Vec3> origin;  ///< of the anchors, in the order of the scene [m]
   std::vector<FaceLink> links;
-  std::vector<FaceRow> rows;
-  std::vector<FaceGroup> groups;
-  std::vector<float> inverse;
-  std::vector<std::array<double, 3>> impulse;  ///< on tissue, by row, since the frame began [N s]
-  struct HeldNode {
-    std::int32_t node, anchor;
-    float place[3];  ///< [m]
-  };
-  std::vector<HeldNode> held;    ///< nodes that only tissue inside sees; found once any moves
-  std::vector<RigidMotion> now;  ///< of each anchor, at the end of the last substep
-  bool moves = false;            ///< whether any has moved ever
   std::vector<std::int32_t>
       points;                      ///< in or beside whose cubes faces lie, when the scene is built
   std::vector<int> first_of_body;  ///< anchors, by body
@@ -88,10 +96,6 @@ struct AnchorFaces {
   std::vector<std::uint8_t> at_link;
   /// Per node, whether a row moves it. Nodes that were split since the rows were made are missing.
   std::vector<std::uint8_t> at_row;
-
-  bool moves_node(std::int32_t node) const {
-    return node < static_cast<std::int32_t>(at_row.size()) && at_row[node] != 0;
-  }
 };
 
 /// Normal of the anchors' face that is nearest to a place outside of them.

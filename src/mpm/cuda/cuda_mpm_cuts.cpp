@@ -120,7 +120,7 @@ bool CudaMpmTissue::take_apart(const std::vector<std::int32_t>& changed,
                                const std::vector<std::int32_t>& touched) {
   OnDevice& d = *device_;
   pull_front();
-  if (!touched.empty()) follow_front(*state_, touched);
+  if (!touched.empty()) follow_front(*state_, touched, state_->anchors.at_row);
   if (changed.empty()) {
     list_front_cells(*state_);
     push_front();

@@ -55,7 +55,6 @@ void CudaMpmTissue::each_field(Archive& archive, StateOnHost& of_device) {
   check_tissue(*state_);
   FaceContacts& faces = state_->faces;
   tissue_fields(archive, *state_);
-  fields(archive, state_->front);
   archive.part("facets", faces.version, faces.first_facet, faces.block_of);
   archive.part("kept contacts", faces.kept, faces.until_search, faces.fastest);
   archive.part("pieces", pieces_, pieces_measured_);

@@ -50,16 +50,23 @@ struct OuterPlace {
   float normal[3];    ///< unit, outward, in reference space
 };
 
+/// What a cut changes of points.
+struct PointBonds {
+  Array<std::uint8_t>
+      bonds;  ///< bit k: still bound to the neighbour of bond k (mpm/lattice/bonds.h)
+  Array<std::uint8_t>
+      soft;             ///< of a bit of debris or a slice: mpm/tear/debris.h; empty before any is
+  Crossings crossings;  ///< of the bonds that blades broke; one that tore has none
+};
+
 /// Points of all bodies, numbered body after body in the order of Lattice::sites.
-struct Points {
+struct Points : PointBonds {
   struct Site {
     std::int16_t x, y, z;  ///< half cells of the body's lattice
     std::int16_t body;
   };
   Array<Site> site;
   Array<float> volume;  ///< [m^3]
-  Array<std::uint8_t>
-      bonds;  ///< bit k: still bound to the neighbour of bond k (mpm/lattice/bonds.h)
   /// Outside its body's anchors, where it moves, some of it given to neighbours
   /// (mpm/anchors/); empty where there are no anchors, or where they act at nodes [m^3].
   Array<float> free_volume;
@@ -69,11 +76,8 @@ struct Points {
   Array<std::uint8_t> anchored;                 ///< kInAnchor, kAtAnchor or 0
   static constexpr std::uint8_t kInAnchor = 1;  ///< its place is in an anchor
   static constexpr std::uint8_t kAtAnchor = 2;  ///< the face of one holds it
-  Array<std::uint8_t> material;  ///< in LatticeBody::materials; empty where no body has inclusions
-  Array<std::uint8_t>
-      soft;  ///< of a bit of debris or a slice: mpm/tear/debris.h; empty before any is
+  Array<std::uint8_t> material;   ///< in LatticeBody::materials; empty where no body has inclusions
   std::vector<OuterPlace> outer;  ///< true surface of the whole bodies; empty on a GPU
-  Crossings crossings;            ///< of the bonds that blades broke; one that tore has none
   /// Bonds that never were, across gaps of a mesh, as of make_lattice_bodies(), which leaves it to
   /// part_at_gaps() to break them; and a bit of each for both their points, empty where there are
   /// none.

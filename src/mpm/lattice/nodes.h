@@ -7,13 +7,21 @@
 
 namespace tissue_sim {
 
-/// The grid nodes of all bodies, each body's lattice with one ring of nodes around its cells (x
-/// fastest), and behind them the further fields of nodes that cuts have split.
-struct Nodes {
-  Array<float> u[3];      ///< displacement from the reference place [m]
-  Array<float> v[3];      ///< velocity [m/s]
+/// What a substep changes.
+struct NodeMotion {
+  Array<float> u[3];  ///< displacement from the reference place [m]
+  Array<float> v[3];  ///< velocity [m/s]
+};
+
+/// What a cut changes.
+struct NodeMasses {
   Array<float> mass;      ///< [kg], 0 where no point reaches
   Array<float> inv_mass;  ///< [1/kg], 0 where no point reaches and where the node is anchored
+};
+
+/// The grid nodes of all bodies, each body's lattice with one ring of nodes around its cells (x
+/// fastest), and behind them the further fields of nodes that cuts have split.
+struct Nodes : NodeMotion, NodeMasses {
   std::size_t size() const { return mass.size(); }
   void reserve(std::size_t n) {
     for (int c = 0; c < 3; ++c) {

@@ -5,7 +5,7 @@
 
 namespace tissue_sim {
 
-void break_bonds(MpmState& state, const std::vector<std::vector<BrokenBond>>& broken,
+void break_bonds(LatticeTissue& state, const std::vector<std::vector<BrokenBond>>& broken,
                  std::vector<std::int32_t>& changed, CutReport& report) {
   // A blade that is held in its cut breaks nothing, frame after frame.
   if (std::all_of(broken.begin(), broken.end(), [](const auto& some) { return some.empty(); })) {
@@ -41,7 +41,7 @@ void break_bonds(MpmState& state, const std::vector<std::vector<BrokenBond>>& br
   report.points_separated += static_cast<int>(changed.size() - first);
 }
 
-std::vector<std::int32_t> break_gaps(MpmState& state) {
+std::vector<std::int32_t> break_gaps(LatticeTissue& state) {
   std::vector<std::int32_t> changed;
   CutReport report;
   break_bonds(state, {state.points.gaps}, changed, report);

@@ -76,7 +76,7 @@ Apart take_apart(MpmState& state, const std::vector<std::int32_t>& changed,
         meanwhile();
       });
   if (state.front.follows) {
-    follow_front(state, changed);
+    follow_front(state, changed, state.anchors.at_row);
     list_front_cells(state);
   }
   apart.softened = std::move(softened.points);

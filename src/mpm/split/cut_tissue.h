@@ -25,12 +25,12 @@ inline constexpr double kSweepReach = 1.5;
 
 /// Clears bonds that are still there, each named once in one of some lists. Appends and counts as
 /// sweep_bonds().
-void break_bonds(MpmState& state, const std::vector<std::vector<BrokenBond>>& broken,
+void break_bonds(LatticeTissue& tissue, const std::vector<std::vector<BrokenBond>>& broken,
                  std::vector<std::int32_t>& changed, CutReport& report);
 
 /// Breaks the bonds that never were (Points::gaps): tissue is whole without them. Returns the
 /// points that had them, for take_apart().
-std::vector<std::int32_t> break_gaps(MpmState& state);
+std::vector<std::int32_t> break_gaps(LatticeTissue& tissue);
 
 /// What take_apart() did.
 struct Apart {

@@ -7,8 +7,8 @@
 
 #include "math/bspline.h"
 #include "mpm/lattice/bonds.h"
-#include "mpm/mpm_state.h"
 #include "mpm/split/changed_cells.h"
+#include "mpm/split/lattice_tissue.h"
 
 namespace tissue_sim {
 namespace {
@@ -39,7 +39,7 @@ void for_each_pair(const Planes& all, const F& f) {
 }
 
 /// How much of the area that a bond stands for was passed.
-double passed_share(const MpmState& s, std::int32_t p, int axis) {
+double passed_share(const LatticeTissue& s, std::int32_t p, int axis) {
   if (is_broken(s.points, p, axis) && s.points.crossings.find(p, axis) == nullptr) return 1;
   const auto found = s.front.rim.find(3 * static_cast<std::int64_t>(p) + axis);
   if (found != s.front.rim.end()) {
@@ -56,7 +56,7 @@ struct CutPlane {
   std::array<std::int8_t, 216> side = {};
 };
 
-CutPlane find_plane(const MpmState& s, const BoxOfNode& box, const Planes& all) {
+CutPlane find_plane(const LatticeTissue& s, const BoxOfNode& box, const Planes& all) {
   CutPlane plane;
   Vec3 middle = Vec3::Zero();
   int count = 0;  // of those that were cut
@@ -113,7 +113,7 @@ constexpr double kLeastSide = 0.01;
 constexpr int kLeastPoints = 32;
 
 /// The share that the bonds between a node's sides ask for.
-float share_of(const MpmState& s, const BoxOfNode& box, const CutPlane& plane,
+float share_of(const LatticeTissue& s, const BoxOfNode& box, const CutPlane& plane,
                const FrontNode& node) {
   double all = 0, cut = 0;
   for_each_pair(node.all, [&](int i, int j, int axis) {
@@ -127,7 +127,7 @@ float share_of(const MpmState& s, const BoxOfNode& box, const CutPlane& plane,
 
 /// Parts a node as far as its bonds say; `before` if it was parted already. Returns a share of 0
 /// where it is not.
-FrontNode parted_node(const MpmState& s, const FrontNode& at, const FrontNode* before) {
+FrontNode parted_node(const LatticeTissue& s, const FrontNode& at, const FrontNode* before) {
   FrontNode result = at;
   result.share = 0;
   const LatticeBody& body = s.bodies[at.body];
@@ -149,14 +149,9 @@ FrontNode parted_node(const MpmState& s, const FrontNode& at, const FrontNode* b
   return result;
 }
 
-/// Whether an anchor holds the node, or it flies.
-bool is_held_or_flies(const MpmState& s, std::int32_t node) {
-  return s.nodes.inv_mass[node] == 0 || s.anchors.moves_node(node);
-}
-
 }  // namespace
 
-bool weigh_sides(const MpmState& s, FrontNode& n) {
+bool weigh_sides(const LatticeTissue& s, FrontNode& n) {
   const LatticeBody& body = s.bodies[n.body];
   BoxOfNode box;
   points_around(body, n.x, n.y, n.z, box.point);
@@ -181,14 +176,15 @@ bool weigh_sides(const MpmState& s, FrontNode& n) {
   return count >= kLeastPoints && std::min(mass[0], mass[1]) > kLeastSide * sum;
 }
 
-bool is_cut_between_sides(const MpmState& s, const FrontNode& n) {
+bool is_cut_between_sides(const LatticeTissue& s, const FrontNode& n) {
   BoxOfNode box;
   points_around(s.bodies[n.body], n.x, n.y, n.z, box.point);
   const CutPlane plane = find_plane(s, box, n.all);
   return plane.there ? share_of(s, box, plane, n) > 0 : plane.broken > 0;
 }
 
-void follow_front(MpmState& s, const std::vector<std::int32_t>& touched) {
+void follow_front(LatticeTissue& s, const std::vector<std::int32_t>& touched,
+                  const std::vector<std::uint8_t>& held) {
   Front& front = s.front;
   std::vector<FrontNode> candidates;
   for (std::size_t b = 0; b < s.bodies.size(); ++b) {
@@ -203,7 +199,8 @@ void follow_front(MpmState& s, const std::vector<std::int32_t>& touched) {
         at.y = y;
         at.z = z;
         const auto add = [&](std::int32_t field, const Planes& points) {
-          if (is_held_or_flies(s, field)) return;
+          const bool is_held = field < static_cast<std::int32_t>(held.size()) && held[field] != 0;
+          if (s.nodes.inv_mass[field] == 0 || is_held) return;  // or it flies
           at.node = field;
           at.all = points;
           candidates.push_back(at);

@@ -13,6 +13,7 @@
 
 namespace tissue_sim {
 
+struct LatticeTissue;
 struct MpmState;
 struct NodeStep;
 struct BladePath;
@@ -29,14 +30,22 @@ struct FrontNode {
   Planes all, first_side;      ///< its points, and those of one side
 };
 
-struct Front {
-  bool follows = false;  ///< whether cuts are followed at all
-
+/// What a cut changes of the front.
+struct FrontNodes {
   /// Bonds at the rim of what was cut, 3 point + axis, and which of kRimProbes places of the area
   /// that the bond stands for an edge has passed. Others were passed wholly if they are broken.
   std::map<std::int64_t, std::uint32_t> rim;
   std::vector<FrontNode> nodes;  ///< by their number in Nodes
-  Array<float> d[3], rate[3];    ///< of these: how far apart the two sides are [m], how fast [m/s]
+};
+
+/// What a substep changes of it.
+struct FrontMotion {
+  Array<float> d[3],
+      rate[3];  ///< of its nodes: how far apart the two sides are [m], how fast [m/s]
+};
+
+struct Front : FrontNodes, FrontMotion {
+  bool follows = false;  ///< whether cuts are followed at all
 
   // What follows from that: list_front_cells().
   std::vector<FrontCell> cells;
@@ -64,33 +73,35 @@ inline bool is_broken(const Points& points, std::int32_t p, int axis) {
 /// Widens the rim by what the points `changed`, which lost bonds, add to it, and notes what the
 /// path passed of it, as sweep_bonds(). Appends points of bonds of which it passed more. `near`:
 /// by point, 0 where it is farther than kRimReach from all that the edges sweep; null: not known.
-void pass_rim(MpmState& state, const BladePath& path, const Array<float>* u_begin,
+void pass_rim(LatticeTissue& tissue, const BladePath& path, const Array<float>* u_begin,
               const Array<float>* u_end, const std::vector<std::int32_t>& broken,
               const std::uint8_t* near, std::vector<std::int32_t>& touched);
 inline constexpr double kRimReach = 3;  ///< [cells]
 
 /// Works out the masses of a node's two sides, from `all` and `first_side`. Returns whether both
 /// are heavy enough to part it.
-bool weigh_sides(const MpmState& state, FrontNode& node);
+bool weigh_sides(const LatticeTissue& tissue, FrontNode& node);
 /// Whether the cut that parts a node ends between its points: not in a field that is left of one
 /// where the cut went on beside it. Points of both sides in that are those that the first plane,
 /// through a few bonds, put on the wrong one.
-bool is_cut_between_sides(const MpmState& state, const FrontNode& node);
+bool is_cut_between_sides(const LatticeTissue& tissue, const FrontNode& node);
 /// After nodes were split: new fields take over the motion of the side that they were; those of
 /// both sides, where another cut came across, are parted as the node was.
-void split_front(MpmState& state);
-/// Parts nodes around the points `touched`, of whose bonds more was passed.
-void follow_front(MpmState& state, const std::vector<std::int32_t>& touched);
+void split_front(LatticeTissue& tissue);
+/// Parts nodes around the points `touched`, of whose bonds more was passed; not those that `held`,
+/// which may end before the last node, names (AnchorFaces::at_row).
+void follow_front(LatticeTissue& tissue, const std::vector<std::int32_t>& touched,
+                  const std::vector<std::uint8_t>& held);
 /// Lists the cells anew that see parted nodes.
 void list_front_cells(MpmState& state);
 
-FrontField front_field(const MpmState& state);
+FrontField front_field(const LatticeTissue& tissue);
 /// Works on the i-th cell.
 void work_on_front_cell(MpmState& state, int i);
 /// Moves on what the cells push, after all nodes were moved on without them; parts are i of
 /// `front_moves()`.
 int front_moves(const Front& front);
-void move_front(MpmState& state, const NodeStep& step, int i);
+void move_front(LatticeTissue& tissue, const NodeStep& step, int i);
 /// Energy of the front beside what blocks have, and of the motion of parted nodes [J].
 double front_elastic_energy(const MpmState& state);
 double front_kinetic_energy(const Front& front);

@@ -38,8 +38,8 @@ struct NodesOfCell {
   const NodeFields::Split* split[27];
   bool any_parted = false;
 
-  NodesOfCell(const MpmState& s, const std::vector<std::int32_t>& parted, const LatticeBody& body,
-              int x, int y, int z) {
+  NodesOfCell(const LatticeTissue& s, const std::vector<std::int32_t>& parted,
+              const LatticeBody& body, int x, int y, int z) {
     for (int k = 0; k < 27; ++k) {
       lattice[k] = body.node(x + k % 3 - 1, y + k / 3 % 3 - 1, z + k / 9 - 1);
       split[k] = s.fields->split(lattice[k]);
@@ -127,7 +127,8 @@ std::vector<CellView> views_of(const MpmState& s, const std::vector<std::int32_t
   return views;
 }
 
-void add_front_cell(MpmState& s, const LatticeBody& body, std::int32_t number, CellView& view) {
+void add_front_cell(LatticeTissue& s, const LatticeBody& body, std::int32_t number,
+                    CellView& view) {
   Front& front = s.front;
   std::stable_sort(view.parts.begin(), view.parts.end(),
                    [](const FrontPart& a, const FrontPart& b) { return a.share > b.share; });
@@ -232,7 +233,7 @@ void list_front_cells(MpmState& s) {
   front.pull.assign(4 * front.parts.size(), 0.0f);
 }
 
-FrontField front_field(const MpmState& s) {
+FrontField front_field(const LatticeTissue& s) {
   FrontField f;
   for (int a = 0; a < 3; ++a) {
     f.u[a] = s.nodes.u[a].data();
@@ -256,7 +257,7 @@ int front_moves(const Front& front) {
   return static_cast<int>((sums + kSumsTogether - 1) / kSumsTogether);
 }
 
-void move_front(MpmState& s, const NodeStep& step, int i) {
+void move_front(LatticeTissue& s, const NodeStep& step, int i) {
   Front& front = s.front;
   const std::size_t nodes = front.node_sums.size(), sums = nodes + front.part_sums.size();
   const std::size_t begin = static_cast<std::size_t>(kSumsTogether) * i;

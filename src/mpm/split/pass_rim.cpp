@@ -3,8 +3,8 @@
 
 #include "cutting/blade_sweep.h"
 #include "mpm/lattice/bonds.h"
-#include "mpm/mpm_state.h"
 #include "mpm/split/front.h"
+#include "mpm/split/lattice_tissue.h"
 
 namespace tissue_sim {
 namespace {
@@ -26,7 +26,7 @@ struct Placed {
   Vec3 x;
   Eigen::Matrix3d F;
 };
-Placed placed_point(const MpmState& s, const Array<float>* u, std::int32_t p) {
+Placed placed_point(const LatticeTissue& s, const Array<float>* u, std::int32_t p) {
   const Points::Site& site = s.points.site[p];
   const LatticeBody& body = s.bodies[site.body];
   Placed at{body.site_position(site.x, site.y, site.z), Eigen::Matrix3d::Identity()};
@@ -55,7 +55,7 @@ std::int32_t bond_beside(const LatticeBody& body, const Points::Site& site, int 
 
 /// Whether a bond is at the rim of a cut: of it and the four beside it across it some are broken
 /// and some are not.
-bool is_at_rim(const MpmState& s, const LatticeBody& body, std::int32_t p, int axis) {
+bool is_at_rim(const LatticeTissue& s, const LatticeBody& body, std::int32_t p, int axis) {
   const Points::Site& site = s.points.site[p];
   if (body.next_point(site, axis) < 0) return false;
   const bool broken = is_broken(s.points, p, axis);
@@ -71,7 +71,7 @@ bool is_at_rim(const MpmState& s, const LatticeBody& body, std::int32_t p, int a
 }
 
 /// The rim again of bonds beside points that lost some.
-void update_rim(MpmState& s, const std::vector<std::int32_t>& broken) {
+void update_rim(LatticeTissue& s, const std::vector<std::int32_t>& broken) {
   std::vector<std::int32_t> beside;
   for (const std::int32_t p : broken) {
     const Points::Site& site = s.points.site[p];
@@ -97,7 +97,7 @@ void update_rim(MpmState& s, const std::vector<std::int32_t>& broken) {
 }
 
 /// What the path passes of a bond beside what was passed already.
-std::uint32_t passed_of(const MpmState& s, const std::vector<SweepPart>& parts,
+std::uint32_t passed_of(const LatticeTissue& s, const std::vector<SweepPart>& parts,
                         const Array<float>* u_begin, const Array<float>* u_end, std::int32_t p,
                         int axis, std::uint32_t already) {
   const LatticeBody& body = s.bodies[s.points.site[p].body];
@@ -141,7 +141,7 @@ std::uint32_t passed_of(const MpmState& s, const std::vector<SweepPart>& parts,
 
 }  // namespace
 
-void pass_rim(MpmState& s, const BladePath& path, const Array<float>* u_begin,
+void pass_rim(LatticeTissue& s, const BladePath& path, const Array<float>* u_begin,
               const Array<float>* u_end, const std::vector<std::int32_t>& broken,
               const std::uint8_t* near, std::vector<std::int32_t>& touched) {
   update_rim(s, broken);

@@ -2,8 +2,8 @@
 #include <cmath>
 #include <utility>
 
-#include "mpm/mpm_state.h"
 #include "mpm/split/front.h"
+#include "mpm/split/lattice_tissue.h"
 #include "mpm/tear/debris.h"
 
 namespace tissue_sim {
@@ -27,7 +27,7 @@ std::int32_t point_beside(const LatticeBody& body, const FrontNode& of) {
 
 }  // namespace
 
-void split_front(MpmState& s) {
+void split_front(LatticeTissue& s) {
   Front& front = s.front;
   std::vector<FrontNode> kept;
   Array<float> d[3], rate[3];

@@ -86,9 +86,10 @@ std::unique_ptr<State> make_state(const Scene& scene, std::vector<std::string>* 
       const bool stated =  // a preset's is nobody's wish
           std::any_of(scene.materials.begin(), scene.materials.end(),
                       [&](const Material& own) { return own.name == material; });
-      if (m.viscosity > 0 && stated) {
-        notes->push_back("material '" + m.name +
-                         "': method pbd has no viscosity; it damps by its steps alone");
+      if (m.viscosity > 0 && stated && scene.pbd.model == PbdModel::kTetrahedra) {
+        notes->push_back(
+            "material '" + m.name +
+            "': tetrahedra of method pbd have no viscosity; they damp by their steps alone");
       }
       if (m.tear_stretch > 0) {
         notes->push_back("material '" + m.name + "': method pbd does not tear");

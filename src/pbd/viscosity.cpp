@@ -1,6 +1,7 @@
 #include "pbd/viscosity.h"
 
 #include <Eigen/Eigenvalues>
+#include <algorithm>
 #include <cmath>
 
 #include "pbd/free_flight.h"
@@ -9,8 +10,8 @@ namespace tissue_sim {
 namespace pbd {
 namespace {
 
-constexpr double kViscosity = 1;   // [Pa s]
-constexpr double kDensity = 1000;  // [kg/m^3]
+constexpr double kLeastOfCuts = 1;  // [Pa s]
+constexpr double kDensity = 1000;   // [kg/m^3]
 
 /// How fast what has no hold turns with that angular momentum [1/s]. A piece of few vertices may
 /// have no inertia about one of its axes: no spin there.
@@ -29,8 +30,20 @@ Vec3 spin_of(const Flight& f, const Vec3& angular) {
 
 }  // namespace
 
+std::vector<double> viscosities(const State& s) {
+  if (!s.tetrahedra.empty()) return {};
+  std::vector<double> of;
+  for (const Body& body : s.scene.bodies) {
+    const double own = find_material(s.scene, body.material).viscosity;
+    of.push_back(s.wounds.empty() ? own : std::max(own, kLeastOfCuts));
+  }
+  if (std::all_of(of.begin(), of.end(), [](double eta) { return eta == 0; })) of.clear();
+  return of;
+}
+
 void damp_neighbours(State& s, double duration) {
-  if (!s.tetrahedra.empty() || s.wounds.empty()) return;
+  const std::vector<double> viscosity = viscosities(s);
+  if (viscosity.empty()) return;
   const std::vector<Flight> before = flights(s);
   std::vector<Vec3> spins;
   for (const Flight& f : before) spins.push_back(spin_of(f, f.angular));
@@ -40,7 +53,8 @@ void damp_neighbours(State& s, double duration) {
     const double wa = v.x[4 * a + 3], wb = v.x[4 * b + 3];
     if (!(wa + wb > 0)) continue;
     const double length = s.links.numbers[c][0];
-    const double lost = 1 - std::exp(-kViscosity * duration / (kDensity * length * length));
+    const double lost =
+        1 - std::exp(-viscosity[v.body[a]] * duration / (kDensity * length * length));
     const Vec3 rigid = spins[s.component[a]].cross(v.position(b) - v.position(a));
     const Vec3 push = lost / (wa + wb) * (v.velocity(b) - v.velocity(a) - rigid);
     for (int k = 0; k < 3; ++k) {

@@ -1,5 +1,7 @@
-// Viscosity of a surface that was cut: a dashpot at each edge.
+// Viscosity of surfaces: a dashpot at each edge.
 #pragma once
+
+#include <vector>
 
 #include "pbd/pbd_state.h"
 
@@ -7,12 +9,15 @@ namespace tissue_sim {
 namespace pbd {
 
 /// Neighbours along edges lose what they move by against one another, apart from the rigid motion
-/// of what they hang together with, as a viscosity of 1 Pa s (liver's) would have it over
-/// `duration` [s] and the edge's length, at the rate eta / (rho l^2). Pair by pair, so linear
-/// momentum is kept; angular momentum is given back. A surface that was cut needs it: constraints
-/// of slivers, which nothing else damps, carry what each further cut adds. Nothing for what was not
-/// cut, and for tetrahedra.
+/// of what they hang together with, as their body's viscosity would have it over `duration` [s] and
+/// the edge's length, at the rate eta / (rho l^2). Pair by pair, so linear momentum is kept;
+/// angular momentum is given back. Nothing for tetrahedra.
 void damp_neighbours(State& s, double duration);
+
+/// That viscosity of each body [Pa s]: its material's, and where surfaces were cut at least
+/// liver's, for constraints of slivers, which nothing else damps, carry what each further cut adds.
+/// Empty where nothing is damped.
+std::vector<double> viscosities(const State& s);
 
 }  // namespace pbd
 }  // namespace tissue_sim

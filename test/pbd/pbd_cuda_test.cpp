@@ -118,6 +118,8 @@ TEST_F(PbdOnGpu, AStepIsThatOfTheReferenceHoweverItIsLaunched) {
         hold_one_end(scene);
         scene.gravity = Vec3(1, 0, -9.81);
         scene.damping = 20;
+        scene.materials.push_back(find_material(scene, scene.bodies[0].material));
+        scene.materials.back().viscosity = 0;  // the reference has none
         scene.pbd.steps = 1;
         scene.pbd.iterations = iterations;
         CudaPbdTissue tissue(scene);

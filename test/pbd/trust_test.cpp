@@ -3,11 +3,17 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <cstring>
 #include <fstream>
+#include <sstream>
 #include <string>
 #include <vector>
 
+#include "cut_paths.h"
 #include "temporary_folder.h"
 #include "tissue_sim/simulation.h"
 
@@ -154,8 +160,8 @@ TEST_F(PbdTrust, UnevenTrianglesComeToRest) {
     if (frame >= 120) late = std::max(late, speed);
   }
   std::printf("fastest %.3f m/s, from two seconds on %.3f m/s\n", fastest, late);
-  EXPECT_LT(fastest, 1.6);
-  EXPECT_LT(late, 0.3);
+  EXPECT_LT(fastest, 1.2);
+  EXPECT_LT(late, 0.15);
 }
 
 // Held vertices left constraints of strain next to no slope: not a number in the first frame.
@@ -216,6 +222,49 @@ TEST_F(PbdTrust, FacesThatDoNotMatchAreSaid) {
     Simulation simulation(scene);
     const bool is_said = notes(simulation).find("do not match at 1 face ") != std::string::npos;
     EXPECT_EQ(is_said, !is_mirrored) << notes(simulation);
+  }
+}
+
+// scripts/pbd_meshes: a row for each of "mesh,scale;...", dropped by 10 mm, then cut through its
+// middle.
+TEST_F(PbdTrust, MeshTable) {
+  const char* meshes = std::getenv("TISSUE_SIM_MESHES");
+  if (meshes == nullptr) GTEST_SKIP() << "TISSUE_SIM_MESHES names no mesh";
+  std::istringstream all(meshes);
+  for (std::string one; std::getline(all, one, ';');) {
+    const std::size_t comma = one.rfind(',');
+    Scene scene = mesh_scene("");
+    Body& body = scene.bodies[0];
+    body.mesh = one.substr(0, comma);
+    body.scale = std::stod(one.substr(comma + 1));
+    body.pose.position = Vec3::Zero();
+    double low = 1e300;
+    {
+      Simulation still(scene);
+      std::vector<std::uint8_t> cloud;
+      const int count = still.tissue().read_points({}, cloud);
+      for (int i = 0; i < count; ++i) {
+        float place[3];
+        std::memcpy(place, cloud.data() + i * (cloud.size() / count), sizeof place);
+        low = std::min(low, static_cast<double>(place[2]));
+      }
+    }
+    body.pose.position.z() = 0.01 - low;
+    Simulation simulation(scene);
+    const double litres = 1e3 * volume(simulation);
+    double fastest = 0, rests = 0;
+    for (int frame = 1; frame <= 180; ++frame) {
+      const double speed = simulation.advance_frame().result.max_speed;
+      fastest = std::max(fastest, speed);
+      if (speed > 0.1) rests = frame / 60.0;
+    }
+    const Vec3 middle = simulation.tissue().fragments()[0].centroid;
+    simulation.cut(plane_cut(middle, Vec3(1, 0, 0)));
+    const CutReport report = simulation.advance_frame().result.cut_reports.at(0);
+    std::printf("| %s | %.4g | %.2f | %.1f | %d%s |\n",
+                one.substr(one.rfind('/') + 1, comma - one.rfind('/') - 1).c_str(), litres, fastest,
+                rests, static_cast<int>(simulation.tissue().fragments().size()),
+                report.pieces_left_whole > 0 ? " (left whole)" : "");
   }
 }
 

@@ -159,7 +159,7 @@ void CudaPbdTissue::run_steps(const FrameColliders& colliders, int steps, float 
   d.wait("advance");
   take_loads(colliders, steps);
   if (chunks > 0) keep_momentum(steps, h);
-  if (state_->tetrahedra.empty() && !state_->wounds.empty()) {
+  if (!pbd::viscosities(*state_).empty()) {
     pull();
     pbd::damp_neighbours(*state_, steps * h);
     push();

@@ -271,7 +271,7 @@ TEST(VolumeMesh, InMillimetresFarFromTheOriginInKilopascalIsSaid) {
   EXPECT_TRUE(has(reason_of([&] { make_tissue(scene); }), "did you forget scale: 0.001?"));
   scene.bodies[0].scale = 0.001;
   std::string said = joined(make_tissue(scene)->notes());
-  EXPECT_TRUE(has(said, "lies 1.29 m from the world's origin, 16.")) << said;
+  EXPECT_TRUE(has(said, "lies 1.29 m from the world's origin, 16.1 times its size")) << said;
   EXPECT_TRUE(has(said, "position [-0.24, 0.26, -1.24]")) << said;
   EXPECT_TRUE(has(said,
                   "young_modulus of 5 Pa, softer than any organ: if kPa were meant, it is "

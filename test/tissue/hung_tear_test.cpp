@@ -51,10 +51,12 @@ Scene hung_scene(const Hung& hung) {
   return s;
 }
 
-/// What is published of each piece is what its points show.
-void expect_pieces_of_the_cloud(Tissue& tissue, double cell_size, const std::string& where) {
+/// What is published of each piece is what its points show; only clouds of mpm tell more than
+/// places.
+void expect_pieces_of_the_cloud(Simulation& simulation, const std::string& where) {
+  Tissue& tissue = simulation.tissue();
   PointSelection with;
-  with.fields = kVelocity | kVolume;
+  if (simulation.scene().method == Method::kMpm) with.fields = kVelocity | kVolume;
   std::vector<std::uint8_t> cloud;
   const int count = tissue.read_points(with, cloud);
   struct Sum {
@@ -67,9 +69,9 @@ void expect_pieces_of_the_cloud(Tissue& tissue, double cell_size, const std::str
   for (int i = 0; i < count; ++i) {
     const std::uint8_t* const at = cloud.data() + i * with.point_size();
     Point p;
-    float more[4];  // velocity and volume
+    float more[4] = {};  // velocity and volume
     std::memcpy(&p, at, sizeof p);
-    std::memcpy(more, at + sizeof p, sizeof more);
+    if (with.fields != 0) std::memcpy(more, at + sizeof p, sizeof more);
     const Vec3 place(p.x, p.y, p.z);
     Sum& sum = of_piece[p.fragment];
     ++sum.count;
@@ -79,15 +81,16 @@ void expect_pieces_of_the_cloud(Tissue& tissue, double cell_size, const std::str
     sum.box.min = sum.box.min.cwiseMin(place);
     sum.box.max = sum.box.max.cwiseMax(place);
   }
-  const double close = 1e-4 * cell_size;
+  const double close = 1e-4 * simulation.scene().cell_size;
   ASSERT_EQ(of_piece.size(), tissue.fragments().size()) << where;
   for (const Fragment& f : tissue.fragments()) {
     const Sum& sum = of_piece[f.id];
     const std::string which = where + ", piece " + std::to_string(f.id);
     EXPECT_EQ(f.point_count, sum.count) << which;
-    EXPECT_NEAR(f.volume, sum.volume, 1e-5 * sum.volume) << which;
     EXPECT_LT((f.box.min - sum.box.min).norm(), close) << which;
     EXPECT_LT((f.box.max - sum.box.max).norm(), close) << which;
+    if (with.fields == 0) continue;
+    EXPECT_NEAR(f.volume, sum.volume, 1e-5 * sum.volume) << which;
     EXPECT_LT((f.centroid - sum.x / sum.volume).norm(), close) << which;
     EXPECT_LT((f.velocity - sum.v / sum.volume).norm(), 1e-4 * (1 + f.velocity.norm())) << which;
   }
@@ -107,6 +110,9 @@ TEST_P(HungTissue, PartsAtItsRootUnderTheWeightThatStretchesItToItsLimit) {
         Hung{"slab, a third of a half cell in", slab, 0.004, 0.0147},
         Hung{"slab, at its end", slab, 0.004, 0.0001}}) {
     Scene scene = on_this(hung_scene(hung));
+    if (hung.inside < 0.25 * scene.cell_size + 1e-9 && scene.method == Method::kMls) {
+      continue;  // its anchors hold nodes
+    }
     Simulation simulation(scene);
     const Vec3 along = hung.anchor == Region::Kind::kBelow ? Vec3::UnitZ() : Vec3::UnitX();
     const double free = hung.size.x() - hung.inside;
@@ -118,7 +124,7 @@ TEST_P(HungTissue, PartsAtItsRootUnderTheWeightThatStretchesItToItsLimit) {
       simulation.set_gravity(weight * along);
       simulation.advance_frame();
     }
-    expect_pieces_of_the_cloud(simulation.tissue(), hung.cell_size, hung.name);
+    expect_pieces_of_the_cloud(simulation, hung.name);
     ASSERT_EQ(simulation.tissue().fragment_count(), 2) << hung.name;
     // Where: what fell is what was free but for a layer at the root.
     Fragment fell;
@@ -127,12 +133,47 @@ TEST_P(HungTissue, PartsAtItsRootUnderTheWeightThatStretchesItToItsLimit) {
     }
     const double length = fell.volume / (hung.size.y() * hung.size.z());
     EXPECT_LT(length, free + 0.01 * scene.cell_size) << hung.name;
-    EXPECT_GT(length, free - 1.55 * scene.cell_size) << hung.name;
+    EXPECT_GT(length, free - 1.8 * scene.cell_size) << hung.name;
     // When: the weight of what fell had stretched that place to the limit.
     const double stretch = 1 + kDensity * weight * length / kYoung;
     EXPECT_NEAR((stretch - 1) / (kLimit - 1), 1, 0.1) << hung.name;
     for (int i = 0; i < 6; ++i) simulation.advance_frame();
     EXPECT_EQ(simulation.tissue().fragment_count(), 2) << hung.name << ": dust";
+  }
+}
+
+// What is nearly incompressible is stretched most at the edges of its anchor, and askew: cracks
+// that went on across that direction stuck at the anchor's face.
+TEST_P(HungTissue, PartsInTwoWhereItCannotNarrowAtItsRoot) {
+  if (GetParam().method == Method::kPbd) GTEST_SKIP() << "does not tear";
+  const Vec3 slab(0.08, 0.06, 0.024), block(0.06, 0.04, 0.04);
+  for (const Hung& hung :
+       {Hung{"block", block, 0.004}, Hung{"slab, at its end", slab, 0.004, 0.0001},
+        Hung{"slab, plane", slab, 0.004, 0.0005, Region::Kind::kBelow},
+        Hung{"slab, plane in a half cell", slab, 0.004, 0.0165, Region::Kind::kBelow},
+        Hung{"block, ball", block, 0.004, 0.001, Region::Kind::kBall}}) {
+    Scene scene = on_this(hung_scene(hung));
+    // Meshless: three bits come off the slab that a plane holds (docs/mls.md).
+    if (hung.inside != kInside && scene.method == Method::kMls) continue;
+    scene.materials[0].poisson_ratio = 0.45;
+    Simulation simulation(scene);
+    const Vec3 along = hung.anchor == Region::Kind::kBelow ? Vec3::UnitZ() : Vec3::UnitX();
+    const double free = hung.size.x() - hung.inside;
+    const double limit = kYoung * (kLimit - 1) / (kDensity * free);
+    double weight = 0;
+    while (weight < 1.3 * limit && simulation.tissue().fragment_count() < 2) {
+      weight += 0.02 * limit;
+      simulation.set_gravity(weight * along);
+      simulation.advance_frame();
+    }
+    EXPECT_GT(weight, 0.9 * limit) << hung.name;
+    for (int i = 0; i < 6; ++i) simulation.advance_frame();
+    ASSERT_EQ(simulation.tissue().fragment_count(), 2) << hung.name;
+    for (const Fragment& f : simulation.tissue().fragments()) {
+      if (!f.loose) continue;
+      const double length = f.volume / (hung.size.y() * hung.size.z());
+      EXPECT_GT(length, free - 2.1 * scene.cell_size) << hung.name;
+    }
   }
 }
 
@@ -152,7 +193,7 @@ TEST_P(HungTissue, HasPiecesThatAreWhatTheirPointsShow) {
       simulation.cut(path);
     }
     simulation.advance_frame();
-    expect_pieces_of_the_cloud(simulation.tissue(), scene.cell_size, "frame " + std::to_string(i));
+    expect_pieces_of_the_cloud(simulation, "frame " + std::to_string(i));
     if (HasFailure()) return;
   }
 }

@@ -16,9 +16,10 @@
 //   (else a strip under even tension would fall to pieces). Of the two bonds along the axis nearest
 //   to n it takes the one whose far point is stretched more.
 //
-//   At an anchor's face, which holds points fast, a crack runs along the face, whatever the principal
-//   direction is there (beside an edge of the anchor it points into it, where nothing can tear), and
-//   leaves the bond between what is in the anchor and what its face holds: neither would come off.
+//   At an anchor's face, which holds points fast, a crack runs along the face, whatever the
+//   principal direction is there (beside an edge of the anchor it points into it, where nothing can
+//   tear), and leaves the bond between what is in the anchor and what its face holds: neither would
+//   come off.
 //
 //   No dust. Along a lattice line, at most one bond breaks within kReach points: a node's support
 //   is six points wide, so the opening of one crack stretches all of them, and each of them would

@@ -205,27 +205,27 @@ void check_contacts(const MpmState& s, const Known& k) {
   const std::size_t count = s.blocks.all.size();
   for (const std::size_t size :
        {c.near.size(), c.cells.size(), c.parts.size(), c.touching.size(), c.changes.size()}) {
-    check_state(size == 0 || size == count, "contacts");
+    check_state(size == 0 || size == count, "blocks' contacts");
   }
   for (std::size_t i = 0; i < count; ++i) {
     const Block& b = *s.blocks.all[i];
     const auto lanes = static_cast<std::int64_t>(b.lane_count());
-    if (!c.near.empty()) check_indices(c.near[i], 0, k.colliders, "contacts");
+    if (!c.near.empty()) check_indices(c.near[i], 0, k.colliders, "near colliders");
     if (!c.touching.empty()) {
       for (const Touch& t : c.touching[i]) {
         check_state(t.cell >= 0 && t.cell < lanes && t.point >= 0 && t.point < k.points &&
                         t.collider < k.colliders,
-                    "contacts");
+                    "touching points");
       }
     }
     if (!c.changes.empty()) {
       for (const InertiaChange& x : c.changes[i]) {
-        check_state(x.collider >= 0 && x.collider < k.colliders, "contacts");
+        check_state(x.collider >= 0 && x.collider < k.colliders, "inertia");
         check_cell(b, x.node);
       }
     }
     if (c.cells.empty()) continue;
-    check_state(!c.parts.empty(), "contacts");
+    check_state(!c.parts.empty(), "parts");
     const auto parts = static_cast<std::int64_t>(c.parts[i].size());
     for (const NearCell& cell : c.cells[i]) {
       const auto places =
@@ -234,13 +234,13 @@ void check_contacts(const MpmState& s, const Known& k) {
                       cell.place_count >= 0 && cell.first_part >= 0 && cell.first_part <= parts &&
                       (cell.place_count == 0 ||
                        (cell.first_place >= 0 && cell.first_place + cell.place_count <= places)),
-                  "contacts");
+                  "near cells");
       check_cell(b, cell.node);
     }
   }
   for (const InertialNode& n : c.inertia.nodes) {
     check_state(n.node >= 0 && n.node < k.nodes && n.collider >= 0 && n.collider < k.colliders,
-                "contacts");
+                "inertial nodes");
   }
 }
 

@@ -89,7 +89,6 @@ void check(const State& s) {
   check_indices(s.stroke, -1, std::int64_t{1} << 31, "strokes");
   check_indices(s.triangles, 0, count, "triangles");
   check_indices(s.tetrahedra, 0, count, "tetrahedra");
-  check_sizes("tetrahedra", s.tetrahedra, s.body_of_tetrahedron);
   for (const InternalPair& p : s.internal) {
     check_state(p.a >= 0 && p.a < p.b && p.b < count && std::isfinite(p.area), "internal links");
   }

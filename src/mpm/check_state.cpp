@@ -205,27 +205,27 @@ void check_contacts(const MpmState& s, const Known& k) {
   const std::size_t count = s.blocks.all.size();
   for (const std::size_t size :
        {c.near.size(), c.cells.size(), c.parts.size(), c.touching.size(), c.changes.size()}) {
-    check_state(size == 0 || size == count, "contacts");
+    check_state(size == 0 || size == count, "blocks' contacts");
   }
   for (std::size_t i = 0; i < count; ++i) {
     const Block& b = *s.blocks.all[i];
     const auto lanes = static_cast<std::int64_t>(b.lane_count());
-    if (!c.near.empty()) check_indices(c.near[i], 0, k.colliders, "contacts");
+    if (!c.near.empty()) check_indices(c.near[i], 0, k.colliders, "near colliders");
     if (!c.touching.empty()) {
       for (const Touch& t : c.touching[i]) {
         check_state(t.cell >= 0 && t.cell < lanes && t.point >= 0 && t.point < k.points &&
                         t.collider < k.colliders,
-                    "contacts");
+                    "touching points");
       }
     }
     if (!c.changes.empty()) {
       for (const InertiaChange& x : c.changes[i]) {
-        check_state(x.collider >= 0 && x.collider < k.colliders, "contacts");
+        check_state(x.collider >= 0 && x.collider < k.colliders, "inertia");
         check_cell(b, x.node);
       }
     }
     if (c.cells.empty()) continue;
-    check_state(!c.parts.empty(), "contacts");
+    check_state(!c.parts.empty(), "parts");
     const auto parts = static_cast<std::int64_t>(c.parts[i].size());
     for (const NearCell& cell : c.cells[i]) {
       const auto places =
@@ -234,13 +234,13 @@ void check_contacts(const MpmState& s, const Known& k) {
                       cell.place_count >= 0 && cell.first_part >= 0 && cell.first_part <= parts &&
                       (cell.place_count == 0 ||
                        (cell.first_place >= 0 && cell.first_place + cell.place_count <= places)),
-                  "contacts");
+                  "near cells");
       check_cell(b, cell.node);
     }
   }
   for (const InertialNode& n : c.inertia.nodes) {
     check_state(n.node >= 0 && n.node < k.nodes && n.collider >= 0 && n.collider < k.colliders,
-                "contacts");
+                "inertial nodes");
   }
 }
 
@@ -265,25 +265,32 @@ void check_faces(const MpmState& s, const Known& k) {
   const auto contacts = static_cast<std::int64_t>(f.all.size());
   for (const FaceContact& c : f.all) {
     check_state(c.facet >= 0 && static_cast<std::size_t>(c.facet) < facets && c.other >= -1 &&
-                    c.other < static_cast<std::int64_t>(facets) && c.nodes.lowest != nullptr &&
-                    (c.other < 0 || c.other_nodes.lowest != nullptr || !c.touching),
-                "contacts");
+                    c.other < static_cast<std::int64_t>(facets),
+                "facets of contacts");
   }
-  if (!f.first_near.empty()) check_begins(f.first_near, f.all.size(), f.near.size(), "contacts");
-  check_state(!f.first_near.empty() || f.all.empty(), "contacts");
-  check_indices(f.near, 0, static_cast<std::int64_t>(facets), "contacts");
-  check_indices(f.active, 0, contacts, "contacts");
-  check_indices(f.between, 0, contacts, "contacts");
+  if (!f.all.empty()) {  // else they are what was left of those before
+    check_begins(f.first_near, f.all.size(), f.near.size(), "contacts' neighbours");
+    check_indices(f.near, 0, static_cast<std::int64_t>(facets), "contacts' neighbours");
+  }
+  check_indices(f.active, 0, contacts, "active contacts");
+  check_indices(f.between, 0, contacts, "active contacts");
+  for (const std::int32_t i : f.active) {
+    const FaceContact& c = f.all[i];
+    check_state(c.nodes.lowest != nullptr && (c.other < 0 || c.other_nodes.lowest != nullptr),
+                "active contacts");
+  }
+  // By block they are listed when they become active.
   const auto of_blocks = [&](const std::vector<std::int32_t>& first,
                              const std::vector<std::int32_t>& of, std::int64_t most) {
-    check_state(!first.empty() || of.empty(), "contacts");
-    if (!first.empty()) check_begins(first, blocks, of.size(), "contacts");
-    check_indices(of, 0, most, "contacts");
+    if (f.active.empty()) return;
+    check_begins(first, blocks, of.size(), "blocks' contacts");
+    check_indices(of, 0, most, "blocks' contacts");
   };
   of_blocks(f.first_of_block, f.of_block, 2 * contacts);
   of_blocks(f.first_within, f.within, contacts);
   for (const KeptContact& kept : f.kept) {
-    check_state(kept.point >= 0 && kept.point < k.points && kept.other_body < k.bodies, "contacts");
+    check_state(kept.point >= 0 && kept.point < k.points && kept.other_body < k.bodies,
+                "kept contacts");
   }
 }
 

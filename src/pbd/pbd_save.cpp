@@ -90,7 +90,6 @@ void check(const State& s) {
   check_indices(s.triangles, 0, count, "triangles");
   check_sizes("cut triangles", s.triangles, s.cut);
   check_indices(s.tetrahedra, 0, count, "tetrahedra");
-  check_sizes("tetrahedra", s.tetrahedra, s.body_of_tetrahedron);
   for (const InternalPair& p : s.internal) {
     check_state(p.a >= 0 && p.a < p.b && p.b < count && std::isfinite(p.area), "internal links");
   }

@@ -7,7 +7,7 @@
 #include <string>
 
 #include "benchmark/torn_bar.h"
-#include "dataset/dataset_run.h"
+#include "programs/dataset/dataset_run.h"
 #include "mpm/mpm_tissue.h"
 
 namespace tissue_sim {

@@ -4,8 +4,8 @@
 #include <cstdlib>
 #include <vector>
 
-#include "dataset/dataset_run.h"
-#include "dataset/rank.h"
+#include "programs/dataset/dataset_run.h"
+#include "programs/dataset/rank.h"
 #include "fragments/features.h"
 
 namespace tissue_sim {

@@ -16,10 +16,10 @@
 #include <string>
 #include <thread>
 
-#include "dataset/dataset_run.h"
-#include "dataset/npy.h"
-#include "dataset/outcome.h"
-#include "dataset/rank.h"
+#include "programs/dataset/dataset_run.h"
+#include "programs/dataset/npy.h"
+#include "programs/dataset/outcome.h"
+#include "programs/dataset/rank.h"
 #include "fragments/features.h"
 
 namespace tissue_sim {

@@ -136,16 +136,11 @@ std::vector<std::optional<ToolRequest>> FrameClock::begin_frame(const ToolInputs
   frame_stamp_ = stamp();
   const bool by_stamp = parameters_.time == TimeMode::kRos && in_turn;
   if (by_stamp) frame_stamp_ = ros_time_of(schedule_.due());
-  const ros::Time until = ros_time_of(schedule_.due() - delay());
-  for (const auto& tool : tools) {
-    if (by_stamp) {
-      samples.push_back(tool->take_until(until));
-    } else if (parameters_.time == TimeMode::kLockstep && !paused) {
-      samples.push_back(tool->take_next());
-    } else {
-      samples.push_back(tool->take());
-    }
-  }
+  const bool one_by_one = parameters_.time == TimeMode::kLockstep && !paused;
+  const std::int64_t until = by_stamp     ? in_nanoseconds(ros_time_of(schedule_.due() - delay()))
+                             : one_by_one ? ToolInput::kNext
+                                          : ToolInput::kAll;
+  for (const auto& tool : tools) samples.push_back(tool->at(until));
   if (by_stamp) schedule_.next();
   return samples;
 }

@@ -52,11 +52,12 @@ class HeldSamples {
     }
     if (until != kAll) taken_until_ = std::max(taken_until_, until);
   }
-  /// The oldest, whatever its stamp.
-  std::optional<std::pair<std::int64_t, T>> next(WallTime now) {
-    if (!open(now)) return std::nullopt;
-    Item item = pop();
-    return std::make_pair(item.stamp, std::move(item.sample));
+  /// The same for the oldest, whatever its stamp.
+  template <class Use>
+  void next(WallTime now, const Use& use) {
+    if (!open(now)) return;
+    const Item item = pop();
+    use(item.stamp, item.sample, false);
   }
   /// The stamp of the oldest one.
   std::optional<std::int64_t> first(WallTime now) {

@@ -63,6 +63,8 @@ class PoseCheck {
   Verdict check(Pose& pose, double stamp, double now);
   /// Where the stamps are when poses come.
   Verdict check(Pose& pose, double time) { return check(pose, time, time); }
+  /// Whether a tool comes from the one to the other in a frame.
+  bool reachable(const Pose& from, const Pose& to) const { return reachable(from, to, 0); }
   /// Time begins anew: the next pose is the first.
   void forget();
 

@@ -24,13 +24,19 @@ class SampleTrack {
     from_ = to_ = value;
     came_ = now;
     duration_ = 0;
+    has_come_ = true;
   }
+  /// The first one places it.
   void add(const T& value, double now) {
+    if (!has_come()) return place(value, now);
     from_ = at(now);
     to_ = value;
     duration_ = std::min(now - came_, kLongest);
     came_ = now;
   }
+  bool has_come() const { return has_come_; }
+  void forget() { has_come_ = false; }
+  const T& newest() const { return to_; }
   T at(double now) const {
     const double passed = now - came_;
     return passed >= duration_ ? to_ : between(from_, to_, passed / duration_);
@@ -39,6 +45,7 @@ class SampleTrack {
  private:
   static constexpr double kLongest = 0.5;  // what is slower than this is no arm that moves [s]
   T from_{}, to_{};
+  bool has_come_ = false;
   double came_ = 0, duration_ = 0;  // [s]
 };
 

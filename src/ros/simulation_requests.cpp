@@ -23,74 +23,67 @@ void SimulationThread::post(std::function<void()> work) {
   wake_.notify_all();
 }
 
-void SimulationThread::call(std::function<void()> work) {
-  const auto task = std::make_shared<std::packaged_task<void()>>(std::move(work));
-  std::future<void> done = task->get_future();
-  post([task] { (*task)(); });
+template <class Reply, class Work>
+Reply SimulationThread::ask(const Work& work) {
+  const auto promise = std::make_shared<std::promise<Reply>>();
+  std::future<Reply> reply = promise->get_future();
+  post([&work, promise] {
+    try {
+      work(*promise);
+    } catch (...) {
+      promise->set_exception(std::current_exception());
+    }
+  });
   try {
-    done.get();
+    return reply.get();
   } catch (const std::future_error&) {
     throw ended();
   }
+}
+
+void SimulationThread::call(const std::function<void()>& work) {
+  ask<void>([&work](std::promise<void>& done) {
+    work();
+    done.set_value();
+  });
 }
 
 CutReply SimulationThread::cut(const BladePath& path) {
-  const auto pending = std::make_shared<PendingCut>();
-  pending->path = path;
-  std::future<CutReply> reply = pending->reply.get_future();
-  call([this, pending] {
+  return ask<CutReply>([&](std::promise<CutReply>& reply) {
     if (run_.blew_up) throw std::runtime_error(problem_);
-    cuts_.push_back(std::move(*pending));
+    cuts_.push_back({path, std::move(reply)});
   });
-  try {
-    return reply.get();
-  } catch (const std::future_error&) {
-    throw ended();
-  }
+}
+
+void SimulationThread::begin_steps(int frames, std::promise<StepReply>& reply) {
+  steps_left_ = frames;
+  step_reply_ = std::move(reply);
+  real_time_factor_.restart();
+}
+
+void SimulationThread::refuse_step() const {
+  if (run_.blew_up) throw std::runtime_error(problem_);
+  if (steps_left_ == 0) return;
+  throw std::runtime_error("another step has " + std::to_string(steps_left_) +
+                           " frames to go: wait for it");
 }
 
 StepReply SimulationThread::step(int frames) {
-  std::future<StepReply> reply;
-  call([&] {
-    if (run_.blew_up) throw std::runtime_error(problem_);
+  return ask<StepReply>([&](std::promise<StepReply>& reply) {
+    refuse_step();
     if (!run_.paused && parameters_.time != TimeMode::kLockstep) {
       throw std::runtime_error("the simulation is running: pause it to step it");
     }
-    if (steps_left_ > 0) {
-      throw std::runtime_error("another step has " + std::to_string(steps_left_) +
-                               " frames to go: wait for it");
-    }
-    steps_left_ = frames;
-    step_reply_ = {};
-    reply = step_reply_.get_future();
-    real_time_factor_.restart();
+    begin_steps(frames, reply);
   });
-  try {
-    return reply.get();
-  } catch (const std::future_error&) {
-    throw ended();
-  }
 }
 
 StepReply SimulationThread::settle(const SettleLimits& limits) {
-  std::future<StepReply> reply;
-  call([&] {
-    if (run_.blew_up) throw std::runtime_error(problem_);
-    if (steps_left_ > 0) {
-      throw std::runtime_error("another step has " + std::to_string(steps_left_) +
-                               " frames to go: wait for it");
-    }
+  return ask<StepReply>([&](std::promise<StepReply>& reply) {
+    refuse_step();
     settling_.emplace(*session_.simulation, limits);
-    steps_left_ = settling_->most_frames();
-    step_reply_ = {};
-    reply = step_reply_.get_future();
-    real_time_factor_.restart();
+    begin_steps(settling_->most_frames(), reply);
   });
-  try {
-    return reply.get();
-  } catch (const std::future_error&) {
-    throw ended();
-  }
 }
 
 void SimulationThread::set_paused(bool paused) {
@@ -135,7 +128,11 @@ void SimulationThread::restore(std::unique_ptr<Simulation> simulation,
                                const std::vector<std::uint8_t>& state) {
   call([&] {
     std::swap(session_.simulation, simulation);
-    for (const auto& tool : *session_.tools) tool->rewind();
+    const std::vector<ToolMotion>& motions = session_.simulation->tools();
+    for (std::size_t i = 0; i < motions.size(); ++i) {
+      ToolInput& tool = *(*session_.tools)[i];
+      motions[i].present ? tool.go_on(motions[i]) : tool.rewind();
+    }
     start_session();
     session_.publications->record_state(*session_.simulation, state, clock_.stamp());
   });

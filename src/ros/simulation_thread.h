@@ -126,8 +126,13 @@ class SimulationThread {
   void start_session();
   void update_status();
   bool active() const;
-  /// Runs `work` between two frames and waits for it.
-  void call(std::function<void()> work);
+  /// Runs `work` between two frames and waits for its answer, which it gives to the promise now or
+  /// moves to where a later frame gives it.
+  template <class Reply, class Work>
+  Reply ask(const Work& work);
+  void call(const std::function<void()>& work);  ///< the same, with no answer
+  void refuse_step() const;                      ///< throws where none can begin
+  void begin_steps(int frames, std::promise<StepReply>& reply);
   void post(std::function<void()> work);
 
   const Parameters parameters_;

@@ -1,12 +1,14 @@
 #include "ros/tool_input.h"
 
+#include <geometry_msgs/TransformStamped.h>
 #include <ros/console.h>
 
 #include <cmath>
+#include <type_traits>
+#include <utility>
 
 #include "ros/conversions.h"
 #include "ros/guarded.h"
-#include "ros/jaw_check.h"
 #include "ros/stamps.h"
 
 namespace tissue_sim {
@@ -17,6 +19,11 @@ bool is_latched(const ros::MessageEvent<M>& event) {
   const ros::M_string& header = event.getConnectionHeader();
   const auto latching = header.find("latching");
   return latching != header.end() && latching->second == "1";
+}
+
+Pose pose_in(const geometry_msgs::PoseStamped& message) { return from_message(message.pose); }
+Pose pose_in(const geometry_msgs::TransformStamped& message) {
+  return from_message(message.transform);
 }
 
 }  // namespace
@@ -44,7 +51,7 @@ ToolInput::ToolInput(const ros::NodeHandle& node, const Tool& tool, const ToolPa
     pose_topic_.clear();
   } else if (source.pose_type == "TransformStamped") {
     pose_subscriber_ = listen<geometry_msgs::TransformStamped>(
-        handle, poses, 1000, [this](const auto& event) { on_transform(event); }, hints);
+        handle, poses, 1000, [this](const auto& event) { on_pose(event); }, hints);
   } else {
     pose_subscriber_ = listen<geometry_msgs::PoseStamped>(
         handle, poses, 1000, [this](const auto& event) { on_pose(event); }, hints);
@@ -69,28 +76,51 @@ std::set<std::string> ToolInput::topics() const {
 
 double ToolInput::now() const { return on_sample_ ? held_now_ : seconds(WallClock::now()); }
 
-void ToolInput::on_pose(const ros::MessageEvent<const geometry_msgs::PoseStamped>& event) {
-  const geometry_msgs::PoseStamped::ConstPtr message = event.getConstMessage();
+template <class Event>
+void ToolInput::on_pose(const Event& event) {
+  const auto message = event.getConstMessage();
   recorder_.write(pose_topic_, message, ros::Time::now());
-  const bool latched = is_latched(event);
-  hold(held_poses_, message->header.stamp, [this, message, latched] {
-    pose_latched_ = latched;
-    accept(message->header, from_message(message->pose));
-  });
+  add(held_poses_, message->header.stamp,
+      PoseSample{message->header, pose_in(*message), is_latched(event)});
 }
 
-void ToolInput::on_transform(
-    const ros::MessageEvent<const geometry_msgs::TransformStamped>& event) {
-  const geometry_msgs::TransformStamped::ConstPtr message = event.getConstMessage();
-  recorder_.write(pose_topic_, message, ros::Time::now());
-  const bool latched = is_latched(event);
-  hold(held_poses_, message->header.stamp, [this, message, latched] {
-    pose_latched_ = latched;
-    accept(message->header, from_message(message->transform));
-  });
+void ToolInput::on_jaw(const ros::MessageEvent<const sensor_msgs::JointState>& event) {
+  const sensor_msgs::JointState::ConstPtr message = event.getConstMessage();
+  const JawSample sample{jaw_angle(*message), is_latched(event)};
+  if (message->position.size() > kMostJoints || message->name.size() > kMostJoints) {
+    return accept(sample);  // which refuses it: nothing so large is kept
+  }
+  recorder_.write(jaw_topic_, message, ros::Time::now());
+  add(held_jaws_, message->header.stamp, sample);
 }
 
-void ToolInput::accept(const std_msgs::Header& header, const Pose& in_frame) {
+template <class Sample>
+void ToolInput::add(HeldSamples<Sample>& held, const ros::Time& stamp, Sample sample) {
+  constexpr bool is_pose = std::is_same_v<Sample, PoseSample>;
+  if (has_wrong_stamp(stamp, is_pose)) return;  // one such would hold all up
+  if (!on_sample_) {
+    const std::lock_guard<std::mutex> lock(held_mutex_);
+    return accept(sample);
+  }
+  bool dropped = false;
+  {
+    const std::lock_guard<std::mutex> lock(held_mutex_);
+    const ros::Time time = stamp.isZero() ? ros::Time::now() : stamp;
+    dropped = held.add(in_nanoseconds(time), std::move(sample), WallClock::now(),
+                       in_nanoseconds(ros::Time::now()));
+    late_ += dropped;
+    came_since_ = came_since_ || is_pose;
+  }
+  if (dropped) {
+    ROS_WARN_ONCE("%s: samples are lost, for they come faster than frames take them",
+                  tool().c_str());
+  }
+  on_sample_();
+}
+
+void ToolInput::accept(const PoseSample& sample) {
+  const std_msgs::Header& header = sample.header;
+  pose_latched_ = sample.latched;
   Pose frame;
   if (publishes_tf_ && (header.frame_id == tool() || header.frame_id == "/" + tool())) {
     const std::lock_guard<std::mutex> lock(mutex_);
@@ -110,7 +140,7 @@ void ToolInput::accept(const std_msgs::Header& header, const Pose& in_frame) {
     refuse(Refusal::kUnknownFrame, e.what());
     return;
   }
-  check(frame, in_frame, header.stamp.isZero() ? ros::Time::now() : header.stamp);
+  use(frame, sample.pose, header.stamp.isZero() ? ros::Time::now() : header.stamp);
 }
 
 void ToolInput::follow_tf(const ros::Time& at) {
@@ -131,10 +161,10 @@ void ToolInput::follow_tf(const ros::Time& at) {
   {
     const std::lock_guard<std::mutex> lock(mutex_);
     waiting_.clear();
-    if (sample_ && stamp == tf_stamp_ && !stamp.isZero()) return;  // nothing new
+    if (poses_.has_come() && stamp == tf_stamp_ && !stamp.isZero()) return;  // nothing new
     tf_stamp_ = stamp;
   }
-  check(pose, Pose(), stamp.isZero() ? ros::Time::now() : stamp);
+  use(pose, Pose(), stamp.isZero() ? ros::Time::now() : stamp);
 }
 
 // Where /clock begins anew (a bag that loops) so do the stamps; the wall's is only corrected a bit.
@@ -145,7 +175,7 @@ void ToolInput::forget_if_time_jumped_back() {
   newest_time_ = now;
 }
 
-void ToolInput::check(const Pose& frame, const Pose& in_frame, const ros::Time& stamp) {
+void ToolInput::use(const Pose& frame, const Pose& in_frame, const ros::Time& stamp) {
   const std::lock_guard<std::mutex> lock(mutex_);
   came_ = true;
   last_came_ = WallClock::now();
@@ -167,22 +197,22 @@ void ToolInput::check(const Pose& frame, const Pose& in_frame, const ros::Time& 
     warned_of_distance_ = true;
     ROS_WARN("%s is %s", tool().c_str(), far_.c_str());
   }
-  if (verdict.placed && sample_ && !verdict.text.empty()) {
+  if (verdict.placed && poses_.has_come() && !verdict.text.empty()) {
     ++counts_.placed;
     if (may_warn()) {
       ROS_WARN("%s is placed at its new pose, without moving there: %s", tool().c_str(),
                verdict.text.c_str());
     }
   }
-  if (verdict.placed || !sample_) {
-    pose_track_.place(pose, now());
+  const bool goes_on = goes_on_from_ && check_.reachable(*goes_on_from_, pose);
+  goes_on_from_.reset();
+  if (verdict.placed) {
+    poses_.place(pose, now());
   } else {
-    pose_track_.add(pose, now());
+    poses_.add(pose, now());
   }
-  if (!sample_) sample_ = ToolRequest();
-  sample_->pose = pose;
   // Until the placed one was taken, whatever comes after it is placed, too.
-  sample_->placed = sample_->placed || verdict.placed;
+  placed_ = placed_ || (verdict.placed && !goes_on);
 }
 
 void ToolInput::refuse(Refusal refusal, const std::string& text) {
@@ -199,34 +229,16 @@ bool ToolInput::may_warn() {
   return true;
 }
 
-void ToolInput::on_jaw(const ros::MessageEvent<const sensor_msgs::JointState>& event) {
-  const sensor_msgs::JointState::ConstPtr message = event.getConstMessage();
-  if (message->position.size() > kMostJoints || message->name.size() > kMostJoints) {
-    return accept_jaw(*message);  // which refuses it: nothing so large is kept
-  }
-  recorder_.write(jaw_topic_, message, ros::Time::now());
-  const bool latched = is_latched(event);
-  hold(held_jaws_, message->header.stamp, [this, message, latched] {
-    jaw_latched_ = latched;
-    accept_jaw(*message);
-  });
-}
-
-void ToolInput::accept_jaw(const sensor_msgs::JointState& message) {
-  const JawAngle jaw = jaw_angle(message);
+void ToolInput::accept(const JawSample& sample) {
+  jaw_latched_ = sample.latched;
+  const JawAngle& jaw = sample.jaw;
   const std::lock_guard<std::mutex> lock(mutex_);
   if (!jaw.problem.empty()) {
     ++counts_.jaws_refused;
     if (may_warn()) ROS_WARN("%s: jaw angle refused: %s", tool().c_str(), jaw.problem.c_str());
     return;
   }
-  if (jaw_came_) {
-    jaw_track_.add(jaw.angle, now());
-  } else {
-    jaw_track_.place(jaw.angle, now());
-  }
-  jaw_came_ = true;
-  jaw_ = jaw.angle;
+  jaws_.add(jaw.angle, now());
 }
 
 void ToolInput::on_grip_pressure(const std_msgs::Float64::ConstPtr& message) {
@@ -241,32 +253,22 @@ void ToolInput::on_grip_pressure(const std_msgs::Float64::ConstPtr& message) {
   }
 }
 
-std::optional<ToolRequest> ToolInput::take() {
-  release(Held::kAll);
-  return take_released(ros::Time());
-}
-
-std::optional<ToolRequest> ToolInput::take_released(const ros::Time& at) {
-  if (!tf_frame_.empty()) follow_tf(at);
-  const std::lock_guard<std::mutex> lock(mutex_);
-  if (!sample_) return std::nullopt;
-  ToolRequest sample = *sample_;
-  sample.jaw = jaw_;
-  sample.grip_pressure = grip_pressure_;
-  if (interpolates_) {
-    sample.pose = pose_track_.at(now());
-    if (jaw_came_) sample.jaw = jaw_track_.at(now());
-  }
-  sample_->placed = false;
-  return sample;
-}
-
 void ToolInput::rewind() {
   const std::lock_guard<std::mutex> lock(mutex_);
   check_.forget();
-  if (!sample_) return;
-  sample_->placed = true;
-  pose_track_.place(sample_->pose, now());
+  goes_on_from_.reset();
+  if (!poses_.has_come()) return;
+  placed_ = true;
+  poses_.place(poses_.newest(), now());
+}
+
+void ToolInput::go_on(const ToolMotion& state) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  check_.forget();
+  placed_ = false;
+  goes_on_from_ = state.end;
+  jaws_.place(state.jaw_end, now());
+  grip_pressure_.reset();
 }
 
 ToolStatus ToolInput::status() const {

@@ -2,13 +2,13 @@
 #pragma once
 
 #include <geometry_msgs/PoseStamped.h>
-#include <geometry_msgs/TransformStamped.h>
 #include <ros/node_handle.h>
 #include <sensor_msgs/JointState.h>
 #include <std_msgs/Float64.h>
 
 #include <cstdint>
 #include <functional>
+#include <limits>
 #include <memory>
 #include <mutex>
 #include <optional>
@@ -18,6 +18,7 @@
 
 #include "ros/frames.h"
 #include "ros/held_samples.h"
+#include "ros/jaw_check.h"
 #include "ros/pace.h"
 #include "ros/parameters.h"
 #include "ros/pose_check.h"
@@ -39,17 +40,22 @@ class ToolInput {
             const PoseLimits& limits, const Frames& frames, const Box& tissue, Recorder& recorder,
             std::function<void()> on_sample, bool publishes_tf = true);
 
-  /// Where the tool shall be now: as the newest sample says or, with interpolation, on the way to
-  /// it. None before the first pose. Where the tool follows tf, looks there.
-  std::optional<ToolRequest> take();
-  /// The newest sample counts as placed, and the next pose as the first: for a
-  /// simulation that starts anew, and its instruments' time with it.
-  void rewind();
+  /// Where the tool shall be in a frame that takes the samples stamped up to `until` [ns], or kAll,
+  /// or kNext: the oldest pose that is held, with the oldest jaw angle. It is where the newest of
+  /// these says or, with interpolation, on the way to it. None before the first pose. Where the
+  /// tool follows tf, looks there.
+  std::optional<ToolRequest> at(std::int64_t until);
+  static constexpr std::int64_t kAll = std::numeric_limits<std::int64_t>::max();
+  static constexpr std::int64_t kNext = std::numeric_limits<std::int64_t>::min();
 
-  /// The same by ROS time: the newest of those stamped up to `until`.
-  std::optional<ToolRequest> take_until(const ros::Time& until);
-  /// The same one by one: the oldest pose that is held, with the oldest jaw angle.
-  std::optional<ToolRequest> take_next();
+  /// For a simulation that starts anew, and its instruments' time with it: the newest sample counts
+  /// as placed, and the next pose as the first.
+  void rewind();
+  /// For a simulation that goes on from a state, in which the tool moves like this: nothing is
+  /// asked for before the next pose comes, and if one frame can bring the tool there it moves
+  /// there.
+  void go_on(const ToolMotion& state);
+
   bool has_next();         ///< a pose and, of a grasper whose jaws are connected, an angle
   bool connected() const;  ///< somebody publishes its poses
   /// Stamp of the oldest pose that is held [ns].
@@ -72,24 +78,31 @@ class ToolInput {
   std::set<std::string> topics() const;
 
  private:
-  using Held = HeldSamples<std::function<void()>>;
+  struct PoseSample {
+    std_msgs::Header header;
+    Pose pose;
+    bool latched;
+  };
+  struct JawSample {
+    JawAngle jaw;
+    bool latched;
+  };
 
-  void on_pose(const ros::MessageEvent<const geometry_msgs::PoseStamped>& event);
-  void on_transform(const ros::MessageEvent<const geometry_msgs::TransformStamped>& event);
+  template <class Event>
+  void on_pose(const Event& event);
   void on_jaw(const ros::MessageEvent<const sensor_msgs::JointState>& event);
-  void accept_jaw(const sensor_msgs::JointState& message);
-  /// Calls `accept` now, or when the sample is taken.
-  void hold(Held& held, const ros::Time& stamp, std::function<void()> accept);
+  void on_grip_pressure(const std_msgs::Float64::ConstPtr& message);
+  /// Accepts a sample now, or when a frame takes it.
+  template <class Sample>
+  void add(HeldSamples<Sample>& held, const ros::Time& stamp, Sample sample);
+  void accept(const PoseSample& sample);
+  void accept(const JawSample& sample);
+  /// Where the tool follows tf: where it was at that time; 0: the newest.
+  void follow_tf(const ros::Time& at);
+  /// A pose, in a frame that stands in the world like this, is checked and becomes the newest.
+  void use(const Pose& frame, const Pose& in_frame, const ros::Time& stamp);
   /// Refuses, and says so, what is stamped as nothing can be.
   bool has_wrong_stamp(const ros::Time& stamp, bool is_pose);
-  /// Calls what is held up to `until`.
-  void release(std::int64_t until);
-  /// Where the tool follows tf: where it was at that time; 0: the newest.
-  std::optional<ToolRequest> take_released(const ros::Time& at);
-  void on_grip_pressure(const std_msgs::Float64::ConstPtr& message);
-  void follow_tf(const ros::Time& at);
-  void accept(const std_msgs::Header& header, const Pose& in_frame);
-  void check(const Pose& frame, const Pose& in_frame, const ros::Time& stamp);
   void refuse(Refusal refusal, const std::string& text);
   void forget_if_time_jumped_back();
   /// By what samples follow one another [s]: when they come, or by the stamps of those that are
@@ -108,7 +121,8 @@ class ToolInput {
 
   const std::function<void()> on_sample_;
   mutable std::mutex held_mutex_;  // of what follows
-  Held held_poses_, held_jaws_;
+  HeldSamples<PoseSample> held_poses_;
+  HeldSamples<JawSample> held_jaws_;
   std::uint64_t late_ = 0;
   bool pose_latched_ = false, jaw_latched_ = false;  // the newest is
   bool came_since_ = false;                          // a pose since the start
@@ -117,11 +131,12 @@ class ToolInput {
   mutable std::mutex mutex_;  // of what follows
   PoseCheck check_;
   PoseCounts counts_;
-  std::optional<ToolRequest> sample_;
-  SampleTrack<Pose> pose_track_;
-  SampleTrack<double> jaw_track_;
-  double jaw_ = 0, grip_pressure_ = 0;
-  bool jaw_came_ = false, came_ = false, rounded_ = false, warned_of_distance_ = false;
+  SampleTrack<Pose> poses_;   // accepted
+  SampleTrack<double> jaws_;  // the same
+  bool placed_ = false;       // no frame took the pose since it was placed
+  std::optional<double> grip_pressure_;
+  std::optional<Pose> goes_on_from_;  // until the next pose
+  bool came_ = false, rounded_ = false, warned_of_distance_ = false;
   ros::Time tf_stamp_, newest_time_;
   WallTime last_came_;  // or when it began to listen
   WallTime last_warning_;

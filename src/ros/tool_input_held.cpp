@@ -1,6 +1,8 @@
 // Samples of an instrument that wait for the frame that they are for: by stamp or one by one.
 #include <ros/console.h>
 
+#include <utility>
+
 #include "ros/stamps.h"
 #include "ros/tool_input.h"
 
@@ -21,60 +23,33 @@ bool ToolInput::has_wrong_stamp(const ros::Time& stamp, bool is_pose) {
   return true;
 }
 
-void ToolInput::hold(Held& held, const ros::Time& stamp, std::function<void()> accept) {
-  if (has_wrong_stamp(stamp, &held == &held_poses_)) return;  // one such would hold all up
-  if (!on_sample_) {
+std::optional<ToolRequest> ToolInput::at(std::int64_t until) {
+  const bool by_stamp = until != kAll && until != kNext;
+  if (on_sample_) {
     const std::lock_guard<std::mutex> lock(held_mutex_);
-    accept();
-    return;
+    const WallTime wall = WallClock::now();
+    const auto take = [&](auto& held) {
+      const auto use = [&](std::int64_t stamp, const auto& sample, bool late) {
+        late_ += late;
+        held_now_ = stamp * 1e-9;
+        accept(sample);
+      };
+      until == kNext ? held.next(wall, use) : held.take(until, wall, use);
+    };
+    take(held_jaws_);
+    take(held_poses_);
+    if (by_stamp) held_now_ = ros_time_of(until).toSec();
   }
-  bool dropped = false;
-  {
-    const std::lock_guard<std::mutex> lock(held_mutex_);
-    const ros::Time time = stamp.isZero() ? ros::Time::now() : stamp;
-    dropped = held.add(in_nanoseconds(time), std::move(accept), WallClock::now(),
-                       in_nanoseconds(ros::Time::now()));
-    late_ += dropped;
-    came_since_ = came_since_ || &held == &held_poses_;
-  }
-  if (dropped) {
-    ROS_WARN_ONCE("%s: samples are lost, for they come faster than frames take them",
-                  tool().c_str());
-  }
-  on_sample_();
-}
-
-void ToolInput::release(std::int64_t until) {
-  if (!on_sample_) return;
-  const std::lock_guard<std::mutex> lock(held_mutex_);
-  const WallTime now = WallClock::now();
-  for (Held* held : {&held_jaws_, &held_poses_}) {
-    held->take(until, now, [&](std::int64_t stamp, const auto& accept, bool late) {
-      late_ += late;
-      held_now_ = stamp * 1e-9;
-      accept();
-    });
-  }
-}
-
-std::optional<ToolRequest> ToolInput::take_until(const ros::Time& until) {
-  release(in_nanoseconds(until));
-  held_now_ = until.toSec();
-  return take_released(until);
-}
-
-std::optional<ToolRequest> ToolInput::take_next() {
-  {
-    const std::lock_guard<std::mutex> lock(held_mutex_);
-    const WallTime now = WallClock::now();
-    for (Held* held : {&held_jaws_, &held_poses_}) {
-      const auto sample = held->next(now);
-      if (!sample) continue;
-      held_now_ = sample->first * 1e-9;
-      sample->second();
-    }
-  }
-  return take_released(ros::Time());
+  if (!tf_frame_.empty()) follow_tf(by_stamp ? ros_time_of(until) : ros::Time());
+  const std::lock_guard<std::mutex> lock(mutex_);
+  if (!poses_.has_come() || goes_on_from_) return std::nullopt;
+  const double time = now();
+  ToolRequest request;
+  request.pose = interpolates_ ? poses_.at(time) : poses_.newest();
+  if (jaws_.has_come()) request.jaw = interpolates_ ? jaws_.at(time) : jaws_.newest();
+  request.placed = std::exchange(placed_, false);
+  request.grip_pressure = grip_pressure_;
+  return request;
 }
 
 bool ToolInput::has_next() {
@@ -110,14 +85,13 @@ void ToolInput::restart(const ros::Time& before, const ros::Time& now) {
   const std::lock_guard<std::mutex> lock(mutex_);
   came_since_ = held_poses_.first(WallClock::now()).has_value();
   check_.forget();
+  goes_on_from_.reset();
   if (!pose_latched_) {
-    sample_.reset();
-  } else if (sample_) {
-    sample_->placed = came_since_ = true;
+    poses_.forget();
+  } else if (poses_.has_come()) {
+    placed_ = came_since_ = true;
   }
-  if (jaw_latched_) return;
-  jaw_came_ = false;
-  jaw_ = 0;
+  if (!jaw_latched_) jaws_.forget();
 }
 
 std::uint64_t ToolInput::late() const {

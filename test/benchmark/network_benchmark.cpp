@@ -7,8 +7,8 @@
 #include <string>
 
 #include "benchmark/torn_bar.h"
-#include "dataset/dataset_run.h"
 #include "mpm/mpm_tissue.h"
+#include "programs/dataset/dataset_run.h"
 
 namespace tissue_sim {
 namespace {

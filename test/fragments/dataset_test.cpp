@@ -4,9 +4,9 @@
 #include <cstdlib>
 #include <vector>
 
-#include "dataset/dataset_run.h"
-#include "dataset/rank.h"
 #include "fragments/features.h"
+#include "programs/dataset/dataset_run.h"
+#include "programs/dataset/rank.h"
 
 namespace tissue_sim {
 namespace {

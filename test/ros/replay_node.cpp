@@ -9,6 +9,7 @@
 #include <tissue_sim/SaveState.h>
 #include <tissue_sim/StartRecording.h>
 
+#include <algorithm>
 #include <cstdio>
 #include <cstdlib>
 #include <filesystem>
@@ -203,6 +204,43 @@ TEST(ReplayNode, ARunGoesOnFromAStateThatWasSaved) {
   ASSERT_TRUE(call<LoadScene>("load_scene", other).success);
   refused("middle", "another scene");
   EXPECT_TRUE(step(1).success) << "the present run goes on";
+}
+
+// What an instrument did when the state was saved it does again: jaws hold what they held, and a
+// blade sweeps its way from where it was.
+TEST(ReplayNode, InstrumentsGoOnFromAStateAsTheyDidBefore) {
+  LoadScene::Request scene;
+  ASSERT_TRUE(ros::param::get("/simulator/scene_file", scene.path));
+  pause(true);
+  ASSERT_TRUE(call<LoadScene>("load_scene", scene).success);
+  Topic<SimulationState> state("/simulator/state");
+  ASSERT_TRUE(wait_until([&] { return state.connected(); }));
+  Arm grasper("grasper"), scalpel("scalpel");
+  ros::NodeHandle node;
+  ros::Publisher jaws =
+      node.advertise<sensor_msgs::JointState>("/simulator/grasper/jaw/measured_js", 10);
+  ASSERT_TRUE(wait_until([&] { return jaws.getNumSubscribers() > 0; }));
+  const auto go = [&](int from, int to) {
+    for (int i = from; i < to; ++i) {
+      grasper.send({Vec3(0.012, 0, 0.012 + 0.0001 * std::max(0, i - 20)), Quat(0, 1, 0, 0)});
+      scalpel.send(blade_pose(0.001, -0.03 + 0.001 * i, -0.004));
+      sensor_msgs::JointState jaw;
+      jaw.header.stamp = ros::Time::now();
+      jaw.position = {std::max(0.0, 1.2 - 0.08 * i)};
+      jaws.publish(jaw);
+      ros::WallDuration(0.03).sleep();
+      ASSERT_TRUE(step(1).success);
+    }
+    ASSERT_TRUE(wait_until([&] { return state.last()->frame == to; }));
+  };
+  go(0, 30);
+  ASSERT_TRUE(with_path<SaveState>("save_state", "gripping").success);
+  go(30, 40);
+  const std::string first = state.last()->checksum;
+  ASSERT_TRUE(with_path<RestoreState>("restore_state", "gripping").success);
+  ASSERT_TRUE(wait_until([&] { return state.last()->frame == 30; }));
+  go(30, 40);
+  EXPECT_EQ(state.last()->checksum, first);
 }
 
 TEST(ReplayNode, EndsWithACodeThatAScriptCanUse) {

@@ -16,11 +16,11 @@
 #include <string>
 #include <thread>
 
-#include "dataset/dataset_run.h"
-#include "dataset/npy.h"
-#include "dataset/outcome.h"
-#include "dataset/rank.h"
 #include "fragments/features.h"
+#include "programs/dataset/dataset_run.h"
+#include "programs/dataset/npy.h"
+#include "programs/dataset/outcome.h"
+#include "programs/dataset/rank.h"
 
 namespace tissue_sim {
 namespace {

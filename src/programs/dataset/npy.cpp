@@ -1,4 +1,4 @@
-#include "dataset/npy.h"
+#include "programs/dataset/npy.h"
 
 #include <cstddef>
 #include <fstream>

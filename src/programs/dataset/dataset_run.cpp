@@ -1,4 +1,4 @@
-#include "dataset/dataset_run.h"
+#include "programs/dataset/dataset_run.h"
 
 #include <algorithm>
 #include <cmath>

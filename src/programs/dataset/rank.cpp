@@ -1,4 +1,4 @@
-#include "dataset/rank.h"
+#include "programs/dataset/rank.h"
 
 #include <cstdlib>
 #include <initializer_list>

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "dataset/dataset_run.h"
+#include "programs/dataset/dataset_run.h"
 
 namespace tissue_sim {
 

@@ -1,4 +1,4 @@
-#include "dataset/outcome.h"
+#include "programs/dataset/outcome.h"
 
 #include <yaml-cpp/yaml.h>
 

@@ -5,8 +5,8 @@
 #include <memory>
 #include <vector>
 
-#include "dataset/dataset_scene.h"
 #include "mpm/mpm_tissue.h"
+#include "programs/dataset/dataset_scene.h"
 
 namespace tissue_sim {
 

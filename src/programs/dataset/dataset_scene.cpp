@@ -1,4 +1,4 @@
-#include "dataset/dataset_scene.h"
+#include "programs/dataset/dataset_scene.h"
 
 #include <cmath>
 #include <random>

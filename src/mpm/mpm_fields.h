@@ -20,6 +20,9 @@ void fields(Archive& archive, Crossing& x) {
 template <class Archive>
 void fields(Archive& archive, Crossings& x) {
   archive(x.index_, x.of_point_);
+  if constexpr (Archive::kReads) {
+    check_indices(x.index_, -1, static_cast<std::int64_t>(x.of_point_.size()), "cuts");
+  }
 }
 
 template <class Archive>
@@ -54,8 +57,10 @@ void fields(Archive& archive, NodeFields::Split& s) {
 
 template <class Archive>
 void fields(Archive& archive, NodeFields& x) {
+  const std::size_t lattice_nodes = x.mass_of_point_.size();
   archive(x.bonds_, x.mass_of_point_, x.splits_, x.split_of_);
   if constexpr (Archive::kReads) {
+    check_state(x.mass_of_point_.size() == lattice_nodes, "split nodes");
     check_indices(x.split_of_, -1, static_cast<std::int64_t>(x.splits_.size()), "split nodes");
     for (const NodeFields::Split& split : x.splits_) {
       check_state(!split.fields.empty(), "split nodes");

@@ -300,7 +300,7 @@ void operate(benchmark::State& bench, const Work& work, std::string (*label)(con
       const Difference off = difference_from_cpu(work);
       bench.counters["off_by"] = off.mean;
       bench.counters["off_by_most"] = off.most;
-      if (!(off.mean < 1e-3)) {
+      if (!(off.mean < 0.01)) {
         const std::string by = std::to_string(off.mean) + ", " + std::to_string(off.most);
         bench.SkipWithError(("the GPU's places are not the CPU's: off by " + by).c_str());
       }

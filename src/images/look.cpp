@@ -8,29 +8,30 @@ namespace tissue_sim {
 namespace {
 
 /// A number of each node of a lattice, 0 to 1, without order.
-double scattered(std::int64_t x, std::int64_t y, std::int64_t z) {
-  std::uint64_t h = static_cast<std::uint64_t>(x) * 0x9e3779b97f4a7c15ull ^
-                    static_cast<std::uint64_t>(y) * 0xc2b2ae3d27d4eb4full ^
-                    static_cast<std::uint64_t>(z) * 0x165667b19e3779f9ull;
-  h = (h ^ (h >> 31)) * 0xbf58476d1ce4e5b9ull;
-  h = (h ^ (h >> 29)) * 0x94d049bb133111ebull;
-  return static_cast<double>((h ^ (h >> 32)) >> 11) / 9007199254740992.0;
+float scattered(std::uint32_t x, std::uint32_t y, std::uint32_t z) {
+  std::uint32_t h = x * 0x9e3779b1u ^ y * 0x85ebca77u ^ z * 0xc2b2ae3du;
+  h = (h ^ (h >> 15)) * 0x2c1b3c6du;
+  h = (h ^ (h >> 12)) * 0x297a2d39u;
+  return static_cast<float>(h >> 8) * (1.0f / 16777216.0f);
 }
 
 /// Smooth noise, 0 to 1, that changes over a length of 1.
 double noise(const Vec3& x) {
-  const Vec3 floor = x.array().floor();
-  const Vec3 f = x - floor;
-  const Vec3 s = f.array().square() * (3 - 2 * f.array());
-  const auto i = static_cast<std::int64_t>(floor.x()), j = static_cast<std::int64_t>(floor.y()),
-             k = static_cast<std::int64_t>(floor.z());
-  double sum = 0;
-  for (int c = 0; c < 8; ++c) {
-    const int a = c & 1, b = c >> 1 & 1, d = c >> 2;
-    sum += (a ? s.x() : 1 - s.x()) * (b ? s.y() : 1 - s.y()) * (d ? s.z() : 1 - s.z()) *
-           scattered(i + a, j + b, k + d);
+  std::uint32_t at[3];
+  float s[3];
+  for (int a = 0; a < 3; ++a) {
+    const double floor = std::floor(x[a]);
+    const auto f = static_cast<float>(x[a] - floor);
+    at[a] = static_cast<std::uint32_t>(static_cast<std::int32_t>(floor));
+    s[a] = f * f * (3 - 2 * f);
   }
-  return sum;
+  const auto along_x = [&](std::uint32_t j, std::uint32_t k) {
+    const float a = scattered(at[0], at[1] + j, at[2] + k);
+    return a + s[0] * (scattered(at[0] + 1, at[1] + j, at[2] + k) - a);
+  };
+  const float near = along_x(0, 0), far = along_x(0, 1);
+  const float a = near + s[1] * (along_x(1, 0) - near), b = far + s[1] * (along_x(1, 1) - far);
+  return a + s[2] * (b - a);
 }
 
 /// Noise of several sizes, the largest of 1.
@@ -46,10 +47,10 @@ double clouds(Vec3 x, int sizes) {
 
 /// 1 along winding lines of a width, 0 away from them; they come up and go under.
 double vessels(const Vec3& x, double width) {
-  const Vec3 bent = x + 0.6 * Vec3(noise(1.3 * x), noise(1.3 * x + Vec3(7, 3, 1)),
-                                   noise(1.3 * x + Vec3(2, 9, 4)));
-  const double line = std::clamp(1 - std::fabs(noise(bent) - 0.5) / width, 0.0, 1.0);
   const double up = std::clamp(3 * noise(0.8 * x + Vec3(19, 11, 23)) - 1.1, 0.0, 1.0);
+  if (up <= 0) return 0;
+  const Vec3 bent = x + noise(1.3 * x) * Vec3(0.6, -0.5, 0.4);
+  const double line = std::clamp(1 - std::fabs(noise(bent) - 0.5) / width, 0.0, 1.0);
   return line * line * (3 - 2 * line) * up;
 }
 

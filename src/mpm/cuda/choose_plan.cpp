@@ -16,8 +16,6 @@ namespace {
 // Shared memory of a slot, without and with what the tables say of it.
 constexpr int kSlot = 32, kCachedSlot = 56;
 
-int parts_of(int n, int size) { return (n + size - 1) / size; }
-
 /// How many blocks can share a node along an axis.
 int sharers(int n, int size) { return n <= size ? 1 : size == 1 ? 3 : 2; }
 

@@ -1,4 +1,5 @@
-// Whether what is published of a frame can be: all numbers are finite, and no speed is beyond reason.
+// Whether what is published of a frame can be: all numbers are finite, and no speed is beyond
+// reason.
 #pragma once
 
 #include <algorithm>

@@ -234,8 +234,8 @@ std::vector<float> displacements(Tissue& tissue) {
 }
 
 /// By how much places differ from the CPU's after three frames, of how far points came: in the mean
-/// square, and at most. A corner of a point beside a fresh cut touches the other side or not by
-/// rounding alone, and goes its own way: the mean is what must agree.
+/// square, and at most. The mean is what must agree; in `cut` at a million points a place is off by
+/// 7 % of the farthest way, on both sides of the pruning, and why was not looked into.
 struct Difference {
   double mean, most;
 };
@@ -300,7 +300,7 @@ void operate(benchmark::State& bench, const Work& work, std::string (*label)(con
       const Difference off = difference_from_cpu(work);
       bench.counters["off_by"] = off.mean;
       bench.counters["off_by_most"] = off.most;
-      if (!(off.mean < 0.01)) {
+      if (!(off.mean < 5e-3)) {
         const std::string by = std::to_string(off.mean) + ", " + std::to_string(off.most);
         bench.SkipWithError(("the GPU's places are not the CPU's: off by " + by).c_str());
       }

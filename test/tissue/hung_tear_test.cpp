@@ -81,7 +81,7 @@ void expect_pieces_of_the_cloud(Simulation& simulation, const std::string& where
     sum.box.min = sum.box.min.cwiseMin(place);
     sum.box.max = sum.box.max.cwiseMax(place);
   }
-  const double close = 1e-3 * simulation.scene().cell_size;  // a GPU sums in another order
+  const double close = 2e-4 * simulation.scene().cell_size;  // a GPU was off by 1.2e-4
   ASSERT_EQ(of_piece.size(), tissue.fragments().size()) << where;
   for (const Fragment& f : tissue.fragments()) {
     const Sum& sum = of_piece[f.id];

@@ -235,7 +235,7 @@ std::vector<float> displacements(Tissue& tissue) {
 
 /// By how much places differ from the CPU's after three frames, of how far points came: in the mean
 /// square, and at most. The mean is what must agree; in `cut` at a million points a place is off by
-/// 7 % of the farthest way, on both sides of the pruning, and why was not looked into.
+/// 7 % of the farthest way, and why was not looked into.
 struct Difference {
   double mean, most;
 };

@@ -223,15 +223,14 @@ TEST_F(Tools, WrenchPushesBackAndTurnsWithTheTool) {
   arm.sweep(pressed, above, 0.3);
 }
 
-TEST_F(Tools, ForcesAndTransformsGoOnWhilePaused) {
+TEST_F(Tools, ForcesAndTransformsGoOnWhilePausedAndPushNobody) {
   Topic<geometry_msgs::WrenchStamped> spatial("/simulator/probe/spatial/measured_cf");
   Topic<tf2_msgs::TFMessage> tf("/tf");
   Arm arm("probe");
-  ASSERT_TRUE(wait_until([&] {
-    arm.send(pointing_down(0.01, 0, 0.05));
-    ros::WallDuration(0.02).sleep();
-    return spatial.count() > 3 && tf.count() > 3;
-  }));
+  const Pose above = pointing_down(0.01, 0, 0.04), pressed = pointing_down(0.01, 0, 0.016);
+  arm.send(above);
+  arm.sweep(above, pressed, 0.8);
+  ASSERT_TRUE(wait_until([&] { return spatial.last()->wrench.force.z > 0.01 && tf.count() > 3; }));
   pause(true);
   ros::WallDuration(0.1).sleep();  // what was under way
   const auto last = spatial.last();
@@ -239,8 +238,21 @@ TEST_F(Tools, ForcesAndTransformsGoOnWhilePaused) {
   EXPECT_TRUE(wait_until([&] { return spatial.count() > forces + 10; }, 2));
   EXPECT_TRUE(wait_until([&] { return tf.count() > transforms + 10; }, 2));
   EXPECT_GT(spatial.last()->header.stamp, last->header.stamp);
-  EXPECT_EQ(spatial.last()->wrench.force.z, last->wrench.force.z);
+  EXPECT_EQ(spatial.last()->wrench.force.z, 0);
   pause(false);
+  EXPECT_TRUE(wait_until([&] { return spatial.last()->wrench.force.z > 0.01; }));
+}
+
+TEST_F(Tools, AnArmThatVanishesIsPushedByNothing) {
+  Topic<geometry_msgs::WrenchStamped> spatial("/simulator/probe/spatial/measured_cf");
+  {
+    Arm arm("probe");
+    const Pose above = pointing_down(0.01, 0, 0.04), pressed = pointing_down(0.01, 0, 0.016);
+    arm.send(above);
+    arm.sweep(above, pressed, 0.8);
+    ASSERT_TRUE(wait_until([&] { return spatial.last()->wrench.force.z > 0.01; }));
+  }
+  EXPECT_TRUE(wait_until([&] { return spatial.last()->wrench.force.z == 0; }));
 }
 
 TEST_F(Tools, AfterAResetTheFirstPoseCountsWhateverItsStamp) {

@@ -86,7 +86,6 @@ enum class MlsContact {
   kFaces,  ///< faces touch along their common normal, with friction
 };
 
-/// What belongs to `method: mls` alone.
 struct MlsOptions {
   double spacing = 0;   ///< between nodes, of graded ones at the surface [m]; 0 for half a cell
   int neighbours = 18;  ///< that a node has within a regular lattice, 14 to 60: sets the supports
@@ -115,7 +114,7 @@ struct MpmOptions {
   MpmBoundary boundary = MpmBoundary::kSurface;
 };
 
-/// Method pbd: what it is made of and how it is solved. Other methods do not read it.
+/// What it is made of and how it is solved.
 struct PbdOptions {
   PbdModel model = PbdModel::kSurface;
   PbdElasticity elasticity = PbdElasticity::kMaterial;  ///< of tetrahedra
@@ -129,7 +128,14 @@ struct PbdOptions {
   double stretch = 1, shear = 1;
 };
 
-struct Scene {
+/// What belongs to one method each: the others do not read it.
+struct OptionSets {
+  MpmOptions mpm;
+  MlsOptions mls;
+  PbdOptions pbd;
+};
+
+struct Scene : OptionSets {
   std::string name = "tissue";
   Method method = Method::kMpm;
   Device device = Device::kAuto;
@@ -147,9 +153,6 @@ struct Scene {
   /// Method mpm: file of a fragment network (scripts/train_fragments) that says each frame which
   /// points of tissue that tears will be part of fragments; `off` for none.
   std::string fragment_network = "off";
-  MpmOptions mpm;
-  MlsOptions mls;
-  PbdOptions pbd;
   Ground ground;
   std::vector<Material> materials;
   std::vector<Body> bodies;

@@ -85,9 +85,13 @@ class Tissue {
   virtual int point_count() const = 0;
   /// Replaces `cloud` with the selected points, as Point after Point. Returns their number.
   virtual int read_points(const PointSelection& selection, std::vector<std::uint8_t>& cloud) = 0;
-  /// Replaces `surface` with the tissue's, as of the last finish(); leaves it empty for `mls`,
-  /// whose points no triangles join.
+  /// Which PointFields read_points() can add.
+  virtual unsigned point_fields() const { return ~0u; }
+  /// Replaces `surface` with the tissue's, as of the last finish(); leaves it empty where no
+  /// triangles join the points.
   virtual void read_surface(SurfaceTriangles& surface) { surface = {}; }
+  /// Whether that is what the method moves; else it is made of what it moves, when it is read.
+  virtual bool moves_surface() const { return false; }
   /// Whether FrameInput::anchors move what they hold, and FrameResult has their loads.
   virtual bool moves_anchors() const { return false; }
   /// Number of pieces, as of the last finish(). It grows whenever a piece comes apart.

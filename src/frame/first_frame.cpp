@@ -8,6 +8,7 @@
 
 #include "frame/part_substeps.h"
 #include "frame/stability_limit.h"
+#include "scene/method_options.h"
 #include "scene/scene_text.h"
 #include "tissue_sim/point.h"
 #include "tissue_sim/tissue.h"
@@ -29,24 +30,22 @@ std::string metres(double z) { return text(static_cast<float>(z)) + " m"; }
 }  // namespace
 
 void check_first_frame(const Scene& scene) {
-  if (scene.method == Method::kPbd) return;  // it says itself how many
+  const Spacing spacing = options_of(scene.method).spacing(scene);
+  if (spacing.lattice == 0) return;
   std::set<std::string> used;
   for (const Body& body : scene.bodies) {
     used.insert(body.material);
     for (const Inclusion& i : body.inclusions) used.insert(i.material);
   }
-  const bool is_mls = scene.method == Method::kMls && scene.mls.spacing > 0;
-  const double spacing = is_mls ? 2 * scene.mls.spacing : scene.cell_size;
   for (const std::string& name : used) {
     const Material& m = find_material(scene, name);
-    const double count = substeps_of(scene, m, spacing);
+    const double count = substeps_of(scene, m, spacing.lattice);
     if (count <= kMostSubstepsOfFrame) continue;
     throw std::invalid_argument(
         "a frame takes some " + text(static_cast<float>(std::round(count))) +
         " substeps, at most 100000 make sense (frame_rate is " + text(scene.frame_rate) + " Hz, " +
-        (is_mls ? "mls.spacing " : "cell_size ") + text(is_mls ? scene.mls.spacing : spacing) +
-        " m, of material '" + name + "' viscosity " + text(m.viscosity) +
-        " Pa s and young_modulus " + text(m.young_modulus) +
+        spacing.field + " " + text(spacing.value) + " m, of material '" + name + "' viscosity " +
+        text(m.viscosity) + " Pa s and young_modulus " + text(m.young_modulus) +
         " Pa): raise frame_rate or the spacing, or lower viscosity or young_modulus");
   }
 }

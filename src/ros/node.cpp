@@ -175,7 +175,7 @@ Session Node::make_session(const Scene& asked) {
        useless_remappings(pose_node_.getNamespace(), names, ros::names::getRemappings())) {
     ROS_WARN("%s", warning.c_str());
   }
-  if (parameters.cloud_fields != 0 && scene.method != Method::kMpm) {
+  if (parameters.cloud_fields & ~session.simulation->tissue().point_fields()) {
     ROS_WARN("~cloud_fields: clouds of method %s have none of these",
              name_of(scene.method, kMethodNames));
   }

@@ -114,8 +114,9 @@ void Publications::publish(Simulation& simulation, const FrameReport& report, co
   if (clouds_due && loose_points_.wanted()) {
     loose_points_.publish(cloud(simulation, true, stamp), stamp);
   }
-  // Recorded with all topics, the lattice's would make bags twice as large.
-  const bool surface_due = scene_.method == Method::kMpm ? surface_.listened() : surface_.wanted();
+  // Recorded with all topics, what is made of points would make bags twice as large.
+  const bool surface_due =
+      simulation.tissue().moves_surface() ? surface_.wanted() : surface_.listened();
   if (clouds_due && surface_due) {
     const bool was_any = !surface_triangles_.fragment.empty();
     const auto message = surface_message(simulation, stamp);
@@ -176,7 +177,7 @@ boost::shared_ptr<const sensor_msgs::PointCloud2> Publications::cloud(Simulation
   selection.stride = parameters_.cloud_stride;
   selection.surface_only = parameters_.cloud_surface_only;
   selection.loose_only = loose_only;
-  selection.fields = scene_.method == Method::kMpm ? parameters_.cloud_fields : 0;
+  selection.fields = parameters_.cloud_fields & simulation.tissue().point_fields();
   describe_points(simulation.tissue().read_points(selection, m->data), selection.fields, *m);
   return m;
 }

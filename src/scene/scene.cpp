@@ -6,6 +6,7 @@
 #include <set>
 #include <stdexcept>
 
+#include "scene/method_options.h"
 #include "scene/scene_text.h"
 
 namespace tissue_sim {
@@ -249,32 +250,35 @@ void check_camera(const std::string& path, const Camera& camera, std::set<std::s
   for (const double d : camera.distortion) check_range(path + ".distortion", d, -10, 10);
 }
 
-void check_mls(const MlsOptions& mls) {
-  if (mls.spacing != 0) check_range("mls.spacing", mls.spacing, 1e-5, 1, "m, or 0 for half a cell");
-  if (mls.neighbours < 14 || mls.neighbours > 60) {
-    refuse("mls.neighbours", std::to_string(mls.neighbours), "must lie between 14 and 60");
+void check_option(const std::string& field, const Option& option) {
+  const double value = option.number != nullptr  ? *option.number
+                       : option.count != nullptr ? *option.count
+                                                 : 0;
+  if (!option.words.empty()) {
+    if (option.word < 0) refuse(field, "no value of this option", "must be one that it has");
+  } else if (value != 0 || !*option.zero) {
+    const std::string zero = *option.zero ? std::string(", or 0 for ") + option.zero : "";
+    check_range(field, value, option.low, option.high, (option.unit + zero).c_str());
   }
-  check_enum("mls.placement", mls.placement, kMlsPlacementNames);
-  check_enum("mls.contact", mls.contact, kMlsContactNames);
-  check_range("mls.grading", mls.grading, 1, 4);
-  check_range("mls.stabilisation", mls.stabilisation, 0, 1);
 }
 
-void check_count(const std::string& field, int value, int high) {
-  if (value >= 1 && value <= high) return;
-  refuse(field, std::to_string(value), "must lie between 1 and " + std::to_string(high));
-}
-
-void check_pbd(const PbdOptions& pbd) {
-  check_enum("pbd.model", pbd.model, kPbdModelNames);
-  check_enum("pbd.elasticity", pbd.elasticity, kPbdElasticityNames);
-  check_count("pbd.steps", pbd.steps, 1000);
-  check_count("pbd.iterations", pbd.iterations, 100);
-  check_range("pbd.edge", pbd.edge, 0, 1e6);
-  check_range("pbd.bending", pbd.bending, 0, 1e6);
-  check_range("pbd.internal", pbd.internal, 0, 1e6);
-  check_range("pbd.stretch", pbd.stretch, 0, 1);
-  check_range("pbd.shear", pbd.shear, 0, 1);
+void check_options(const Scene& scene) {
+  OptionSets options = scene;
+  std::string with_network;
+  for (const MethodOptions* of : method_options()) {
+    for (const Option& option : of->list(options)) {
+      check_option(std::string(of->name()) + "." + option.name, option);
+    }
+    if (of->takes_network)
+      with_network += (with_network.empty() ? "" : " or ") + std::string(of->name());
+  }
+  check_utf8("fragment_network", scene.fragment_network);
+  const bool none = scene.fragment_network == "off";
+  if (scene.fragment_network.size() > kLongestPath || scene.fragment_network.empty() ||
+      (!none && !options_of(scene.method).takes_network)) {
+    refuse("fragment_network", quoted(scene.fragment_network.substr(0, kLongestName)),
+           "must be off or, with method " + with_network + ", the file of a network");
+  }
 }
 
 std::string at(const char* list, std::size_t i) {
@@ -346,20 +350,12 @@ void validate(const Scene& scene) {
   if (scene.threads < 0 || scene.threads > 1024) {
     refuse("threads", std::to_string(scene.threads), "must lie between 0 (all) and 1024");
   }
-  check_enum("mpm.boundary", scene.mpm.boundary, kMpmBoundaryNames);
   check_range("cell_size", scene.cell_size, 1e-5, 1, "m");
   check_range("frame_rate", scene.frame_rate, 1, 2000, "Hz");
   check_range("cfl", scene.cfl, 0.05, 0.9);
   check_range("damping", scene.damping, 0, 1000);
   check_each("gravity", scene.gravity, -1000, 1000, "component", "m/s^2");
-  check_utf8("fragment_network", scene.fragment_network);
-  if (scene.fragment_network.size() > kLongestPath || scene.fragment_network.empty() ||
-      (scene.fragment_network != "off" && scene.method != Method::kMpm)) {
-    refuse("fragment_network", quoted(scene.fragment_network.substr(0, kLongestName)),
-           "must be off or, with method mpm, the file of a network");
-  }
-  check_mls(scene.mls);
-  check_pbd(scene.pbd);
+  check_options(scene);
   check_range("ground.z", scene.ground.z, -100, 100, "m");
   check_friction("ground.friction", scene.ground.friction);
 

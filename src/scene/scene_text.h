@@ -22,14 +22,6 @@ struct Spelling {
 
 inline constexpr Spelling<Method> kMethodNames[] = {
     {Method::kMpm, "mpm"}, {Method::kMls, "mls"}, {Method::kPbd, "pbd"}};
-inline constexpr Spelling<MlsPlacement> kMlsPlacementNames[] = {{MlsPlacement::kRegular, "regular"},
-                                                                {MlsPlacement::kGraded, "graded"}};
-inline constexpr Spelling<MlsContact> kMlsContactNames[] = {{MlsContact::kNodes, "nodes"},
-                                                            {MlsContact::kFaces, "faces"}};
-inline constexpr Spelling<PbdModel> kPbdModelNames[] = {{PbdModel::kSurface, "surface"},
-                                                        {PbdModel::kTetrahedra, "tetrahedra"}};
-inline constexpr Spelling<PbdElasticity> kPbdElasticityNames[] = {
-    {PbdElasticity::kMaterial, "material"}, {PbdElasticity::kStrain, "strain"}};
 inline constexpr Spelling<Device> kDeviceNames[] = {
     {Device::kAuto, "auto"}, {Device::kCpu, "cpu"}, {Device::kCuda, "cuda"}};
 inline constexpr Spelling<Law> kLawNames[] = {{Law::kFixedCorotated, "fixed_corotated"},
@@ -39,8 +31,6 @@ inline constexpr Spelling<Shape> kShapeNames[] = {{Shape::kBox, "box"},
                                                   {Shape::kEllipsoid, "ellipsoid"},
                                                   {Shape::kCylinder, "cylinder"},
                                                   {Shape::kMesh, "mesh"}};
-inline constexpr Spelling<MpmBoundary> kMpmBoundaryNames[] = {{MpmBoundary::kSurface, "surface"},
-                                                              {MpmBoundary::kLattice, "lattice"}};
 inline constexpr Spelling<CameraColours> kCameraColourNames[] = {
     {CameraColours::kTissue, "tissue"}, {CameraColours::kFragments, "fragments"}};
 inline constexpr Spelling<ToolType> kToolTypeNames[] = {

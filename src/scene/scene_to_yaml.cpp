@@ -3,6 +3,7 @@
 
 #include <cctype>
 
+#include "scene/method_options.h"
 #include "scene/scene_text.h"
 #include "tissue_sim/scene.h"
 
@@ -160,20 +161,6 @@ void write(YAML::Emitter& out, const Camera& camera) {
   out << EndSeq << EndMap;
 }
 
-void write(YAML::Emitter& out, const PbdOptions& pbd) {
-  out << BeginMap;
-  write(out, "model", std::string(name_of(pbd.model, kPbdModelNames)));
-  write(out, "elasticity", std::string(name_of(pbd.elasticity, kPbdElasticityNames)));
-  out << Key << "steps" << Value << pbd.steps;
-  out << Key << "iterations" << Value << pbd.iterations;
-  write(out, "edge", pbd.edge);
-  write(out, "bending", pbd.bending);
-  write(out, "internal", pbd.internal);
-  write(out, "stretch", pbd.stretch);
-  write(out, "shear", pbd.shear);
-  out << EndMap;
-}
-
 template <class Item>
 void write_list(YAML::Emitter& out, const char* name, const std::vector<Item>& items) {
   out << Key << name << Value << BeginSeq;
@@ -181,15 +168,10 @@ void write_list(YAML::Emitter& out, const char* name, const std::vector<Item>& i
   out << EndSeq;
 }
 
-void write_mls(YAML::Emitter& out, const MlsOptions& mls) {
-  out << Key << "mls" << Value << BeginMap;
-  write(out, "spacing", mls.spacing);
-  out << Key << "neighbours" << Value << mls.neighbours;
-  write(out, "placement", std::string(name_of(mls.placement, kMlsPlacementNames)));
-  write(out, "grading", mls.grading);
-  write(out, "stabilisation", mls.stabilisation);
-  write(out, "contact", std::string(name_of(mls.contact, kMlsContactNames)));
-  out << EndMap;
+void write(YAML::Emitter& out, const Option& option) {
+  if (option.number != nullptr) return write(out, option.name, *option.number);
+  if (option.count == nullptr) return write(out, option.name, option.words[option.word]);
+  out << Key << option.name << Value << *option.count;
 }
 
 }  // namespace
@@ -209,13 +191,12 @@ std::string scene_to_yaml(const Scene& scene) {
   write(out, "gravity", scene.gravity);
   out << Key << "seed" << Value << std::to_string(scene.seed);
   write(out, "fragment_network", scene.fragment_network);
-  out << Key << "mpm" << Value << BeginMap;
-  write(out, "boundary", std::string(name_of(scene.mpm.boundary, kMpmBoundaryNames)));
-  out << EndMap;
-  if (scene.method == Method::kMls) write_mls(out, scene.mls);
-  if (scene.method == Method::kPbd) {
-    out << Key << "pbd" << Value;
-    write(out, scene.pbd);
+  OptionSets options = scene;
+  for (const MethodOptions* of : method_options()) {
+    if (!of->is_written && of->method != scene.method) continue;
+    out << Key << of->name() << Value << BeginMap;
+    for (const Option& option : of->list(options)) write(out, option);
+    out << EndMap;
   }
   out << Key << "ground" << Value << BeginMap;
   out << Key << "enabled" << Value << scene.ground.enabled;

@@ -1,9 +1,11 @@
 // YAML -> Scene. Types and names of fields are checked here, ranges in validate().
 #include <algorithm>
 #include <filesystem>
+#include <iterator>
 #include <stdexcept>
 
 #include "scene/load_yaml.h"
+#include "scene/method_options.h"
 #include "scene/read_file.h"
 #include "scene/scene_text.h"
 #include "scene/yaml_fields.h"
@@ -186,28 +188,30 @@ Camera read_camera(const YAML::Node& node, const std::string& path) {
   return camera;
 }
 
-PbdOptions read_pbd(const YAML::Node& node, const std::string& path) {
-  const YamlFields fields(node, path,
-                          {"model", "elasticity", "steps", "iterations", "edge", "bending",
-                           "internal", "stretch", "shear"});
-  PbdOptions pbd;
-  fields.read("model", pbd.model, kPbdModelNames);
-  fields.read("elasticity", pbd.elasticity, kPbdElasticityNames);
-  fields.read("steps", pbd.steps);
-  fields.read("iterations", pbd.iterations);
-  fields.read("edge", pbd.edge);
-  fields.read("bending", pbd.bending);
-  fields.read("internal", pbd.internal);
-  fields.read("stretch", pbd.stretch);
-  fields.read("shear", pbd.shear);
-  return pbd;
+void read_options(const YAML::Node& node, const std::string& path, std::vector<Option> options) {
+  Words names;
+  for (const Option& option : options) names.emplace_back(option.name);
+  const YamlFields fields(node, path, names);
+  for (Option& option : options) {
+    if (option.number != nullptr) {
+      fields.read(option.name, *option.number);
+    } else if (option.count != nullptr) {
+      fields.read(option.name, *option.count);
+    } else if (fields.has(option.name)) {
+      fields.read(option.name, option.word, option.words);
+      option.choose(option.word);
+    }
+  }
 }
 
 Scene read_scene(const YAML::Node& node) {
-  const YamlFields fields(node, "",
-                          {"name", "method", "device", "threads", "cell_size", "frame_rate", "cfl",
-                           "damping", "gravity", "seed", "fragment_network", "mpm", "mls", "pbd",
-                           "ground", "materials", "bodies", "tools", "cameras"});
+  Words known = {"name",      "method",  "device",  "threads", "cell_size",        "frame_rate",
+                 "cfl",       "damping", "gravity", "seed",    "fragment_network", "ground",
+                 "materials", "bodies",  "tools",   "cameras"};
+  const auto& methods = method_options();
+  std::transform(methods.begin(), methods.end(), std::inserter(known, known.begin() + 11),
+                 [](const MethodOptions* of) { return of->name(); });
+  const YamlFields fields(node, "", known);
   Scene scene;
   fields.read("name", scene.name);
   fields.read("method", scene.method, kMethodNames);
@@ -220,22 +224,11 @@ Scene read_scene(const YAML::Node& node) {
   fields.read("gravity", scene.gravity);
   fields.read("seed", scene.seed);
   fields.read("fragment_network", scene.fragment_network);
-  fields.read_map("mpm", [&](const YAML::Node& mpm, const std::string& path) {
-    YamlFields(mpm, path, {"boundary"}).read("boundary", scene.mpm.boundary, kMpmBoundaryNames);
-  });
-  fields.read_map("mls", [&](const YAML::Node& mls, const std::string& path) {
-    const YamlFields of(
-        mls, path, {"spacing", "neighbours", "placement", "grading", "stabilisation", "contact"});
-    of.read("spacing", scene.mls.spacing);
-    of.read("neighbours", scene.mls.neighbours);
-    of.read("placement", scene.mls.placement, kMlsPlacementNames);
-    of.read("grading", scene.mls.grading);
-    of.read("stabilisation", scene.mls.stabilisation);
-    of.read("contact", scene.mls.contact, kMlsContactNames);
-  });
-  fields.read_map("pbd", [&](const YAML::Node& pbd, const std::string& path) {
-    scene.pbd = read_pbd(pbd, path);
-  });
+  for (const MethodOptions* of : methods) {
+    fields.read_map(of->name(), [&](const YAML::Node& options, const std::string& path) {
+      read_options(options, path, of->list(scene));
+    });
+  }
   fields.read_map("ground", [&](const YAML::Node& ground, const std::string& path) {
     const YamlFields ground_fields(ground, path, {"enabled", "z", "friction"});
     ground_fields.read("enabled", scene.ground.enabled);

@@ -199,6 +199,16 @@ std::vector<double> YamlFields::numbers(const std::string& name, std::size_t cou
   return values;
 }
 
+void YamlFields::read(const std::string& name, int& at,
+                      const std::vector<std::string>& words) const {
+  if (!has(name)) return;
+  std::string word;
+  read(name, word);
+  const auto found = std::find(words.begin(), words.end(), word);
+  if (found == words.end()) refuse(name, "must be one of " + join(words));
+  at = static_cast<int>(found - words.begin());
+}
+
 void YamlFields::read(const std::string& name, Vec3& value) const {
   if (!has(name)) return;
   const std::vector<double> v = numbers(name, 3, "must be three numbers, [x, y, z]");

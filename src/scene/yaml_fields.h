@@ -53,6 +53,8 @@ class YamlFields {
   void read(const std::string& name, std::vector<double>& value, std::size_t count) const;
   /// [x, y, z, w] as ROS has it; its norm must be 1 within 0.001 and is made 1.
   void read(const std::string& name, Quat& value) const;
+  /// One of the words, by its place among them.
+  void read(const std::string& name, int& at, const std::vector<std::string>& words) const;
   template <class Enum, std::size_t N>
   void read(const std::string& name, Enum& value, const Spelling<Enum> (&names)[N]) const;
   /// Calls `read_map` with the map's node and path.
@@ -77,18 +79,11 @@ std::string join(const std::vector<std::string>& words);
 template <class Enum, std::size_t N>
 void YamlFields::read(const std::string& name, Enum& value,
                       const Spelling<Enum> (&names)[N]) const {
-  if (!has(name)) return;
-  std::string word;
-  read(name, word);
-  std::vector<std::string> allowed;
-  for (const Spelling<Enum>& s : names) {
-    if (word == s.name) {
-      value = s.value;
-      return;
-    }
-    allowed.emplace_back(s.name);
-  }
-  refuse(name, "must be one of " + join(allowed));
+  std::vector<std::string> words;
+  for (const Spelling<Enum>& s : names) words.emplace_back(s.name);
+  int at = -1;
+  read(name, at, words);
+  if (at >= 0) value = names[at].value;
 }
 
 }  // namespace tissue_sim

@@ -7,12 +7,12 @@
 #include <stdexcept>
 #include <utility>
 
-#include "cutting/check_path.h"
 #include "frame/first_frame.h"
 #include "frame/sealed_state.h"
 #include "frame/state_fields.h"
 #include "tools/instrument.h"
 #include "tools/points_inside.h"
+#include "tools/pose_fault.h"
 
 namespace tissue_sim {
 namespace {
@@ -21,12 +21,6 @@ void check_grip(double pressure) {
   if (pressure == 0 || (pressure >= 1 && pressure <= kMostSqueeze * 1e7)) return;
   throw std::invalid_argument("grip_pressure is " + std::to_string(pressure) +
                               ": must be from 1 to 1e7 [Pa], or 0 for the tool's own");
-}
-
-void check_request(const ToolRequest& request, const std::string& name) {
-  check_pose(request.pose, "the pose of tool '" + name + "'");
-  if (!std::isfinite(request.jaw)) throw std::invalid_argument("the jaw angle is not finite");
-  if (request.grip_pressure) check_grip(*request.grip_pressure);
 }
 
 void check_field(Scene changed) {
@@ -44,12 +38,6 @@ void check_damping(double damping) {
   Scene changed;
   changed.damping = damping;
   check_field(changed);
-}
-
-/// Another time would change the last bit of a quaternion that was normalised.
-Pose normalised(const Pose& pose) {
-  const bool is_unit = std::fabs(pose.orientation.squaredNorm() - 1) < 1e-15;
-  return {pose.position, is_unit ? pose.orientation : pose.orientation.normalized()};
 }
 
 void check_count(const char* what, std::size_t asked, std::size_t there) {
@@ -143,15 +131,18 @@ void Simulation::State::check(const FrameRequest& request) const {
   check_count("tool", request.tools.size(), tools.size());
   check_count("anchor", request.anchors.size(), anchors.size());
   for (std::size_t i = 0; i < request.tools.size(); ++i) {
-    if (request.tools[i]) check_request(*request.tools[i], scene.tools[i].name);
+    if (!request.tools[i]) continue;
+    check_pose(request.tools[i]->pose, "the pose of tool '" + scene.tools[i].name + "'");
+    if (!std::isfinite(request.tools[i]->jaw.value_or(0))) {
+      throw std::invalid_argument("the jaw angle is not finite");
+    }
+    check_grip(request.tools[i]->grip_pressure.value_or(0));
   }
   for (const BladePath& path : request.cuts) check_path(path);
   for (std::size_t i = 0; i < request.anchors.size(); ++i) {
     if (!request.anchors[i]) continue;
     if (!tissue->moves_anchors()) {
-      throw std::invalid_argument(
-          "anchors do not move with this method: they do with method mls, and with method mpm "
-          "unless mpm.boundary is lattice");
+      throw std::invalid_argument("anchors do not move with this method and its options");
     }
     check_pose(*request.anchors[i], "the pose of anchor '" + anchors[i]->name + "'");
   }
@@ -162,14 +153,11 @@ void Simulation::State::check(const FrameRequest& request) const {
 void Simulation::State::take(const FrameRequest& request) {
   check(request);
   for (std::size_t i = 0; i < request.tools.size(); ++i) {
-    if (!request.tools[i]) continue;
-    ToolRequest of_tool = *request.tools[i];
-    of_tool.pose = normalised(of_tool.pose);
-    instruments[i].ask(of_tool);
+    if (request.tools[i]) instruments[i].ask(*request.tools[i]);
   }
   for (const BladePath& path : request.cuts) {
     cuts.push_back(path);
-    for (Pose& pose : cuts.back().poses) pose = normalised(pose);
+    for (Pose& pose : cuts.back().poses) normalise(pose);
   }
   for (std::size_t i = 0; i < request.anchors.size(); ++i) {
     if (!request.anchors[i]) continue;
@@ -177,7 +165,8 @@ void Simulation::State::take(const FrameRequest& request) {
       const Pose rest{anchors[anchor_motion.size()]->origin(), Quat::Identity()};
       anchor_motion.push_back({rest, rest});
     }
-    anchor_motion[i].end = normalised(*request.anchors[i]);
+    anchor_motion[i].end = *request.anchors[i];
+    normalise(anchor_motion[i].end);
   }
   gravity = request.gravity.value_or(gravity);
   damping = request.damping.value_or(damping);
@@ -284,23 +273,21 @@ FrameReport Simulation::repeat_frame(const AppliedInput& input) {
                                 " tools, the scene has " + std::to_string(s.tools.size()));
   }
   check_count("grip_pressures of tool", input.grip_pressures.size(), input.tools.size());
-  check_count("anchor", input.anchors.size(), s.anchors.size());
   for (const ToolMotion& m : input.tools) {
     if (!m.present) continue;
     check_pose(m.begin, "a tool's pose");
     check_pose(m.end, "a tool's pose");
   }
   for (const double pressure : input.grip_pressures) check_grip(pressure);
-  for (const BladePath& path : input.cuts) check_path(path);
-  if (!input.anchors.empty() && !s.tissue->moves_anchors()) {
-    throw std::invalid_argument("the input moves anchors, which this method and device do not");
-  }
+  FrameRequest rest;
+  rest.cuts = input.cuts;
   for (const AnchorMotion& m : input.anchors) {
     check_pose(m.begin, "an anchor's pose");
-    check_pose(m.end, "an anchor's pose");
+    rest.anchors.emplace_back(m.end);
   }
-  if (input.gravity) check_gravity(*input.gravity);
-  if (input.damping) check_damping(*input.damping);
+  rest.gravity = input.gravity;
+  rest.damping = input.damping;
+  s.check(rest);
   s.tools = input.tools;
   for (std::size_t i = 0; i < s.tools.size(); ++i) {
     s.instruments[i].put(s.tools[i], input.grip_pressures.empty() ? 0 : input.grip_pressures[i]);

@@ -41,8 +41,10 @@ struct Tool {
 
 /// Where a tool shall be at the end of a frame.
 struct ToolRequest {
-  Pose pose;       ///< world frame
-  double jaw = 0;  ///< between the jaws [rad]; below 0 squeezes with more: see tools/grip.h
+  Pose pose;  ///< world frame
+  /// Between the jaws, from this frame on if given, 0 before [rad]; below 0 squeezes with more: see
+  /// tools/grip.h.
+  std::optional<double> jaw;
   /// It does not move there from where it was: it is placed, and comes into tissue along its shaft
   /// from where it is free. A first pose that is not placed stands there at once.
   bool placed = false;

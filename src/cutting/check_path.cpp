@@ -1,31 +1,18 @@
-#include "cutting/check_path.h"
-
+// Paths of blades that make no sense are refused before anything moves.
 #include <cmath>
 #include <stdexcept>
+#include <string>
 
 #include "cutting/blade_sweep.h"
+#include "tissue_sim/cut.h"
+#include "tools/pose_fault.h"
 
 namespace tissue_sim {
 namespace {
 
-constexpr double kFarthestPlace = 1e6;  // from the origin [m]
-constexpr double kMostSwept = 1e5;      // edges of a cut, see swept_edges()
+constexpr double kMostSwept = 1e5;  // edges of a cut, see swept_edges()
 
 }  // namespace
-
-void check_pose(const Pose& pose, const std::string& what) {
-  if (!pose.position.allFinite() || !pose.orientation.coeffs().allFinite()) {
-    throw std::invalid_argument(what + " is not finite");
-  }
-  if (!(pose.position.cwiseAbs().maxCoeff() <= kFarthestPlace)) {
-    throw std::invalid_argument(what + " is more than 1e6 m away: no instrument is");
-  }
-  if (std::fabs(pose.orientation.norm() - 1) > 1e-3) {
-    throw std::invalid_argument(what + " has a quaternion of norm " +
-                                std::to_string(pose.orientation.norm()) +
-                                ": it must be 1, or it is no rotation");
-  }
-}
 
 void check_path(const BladePath& path) {
   if (path.poses.size() < 2) {

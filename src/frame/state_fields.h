@@ -41,8 +41,7 @@ void fields(Archive& archive, Grip& g) {
 
 template <class Archive>
 void fields(Archive& archive, Instrument& i) {
-  archive(i.asked_.pose, i.asked_.jaw, i.asked_.placed, i.is_asked_, i.way_in_, i.grip_pressure_,
-          i.grip_);
+  archive(i.asked_, i.jaw_, i.is_placed_, i.is_asked_, i.way_in_, i.grip_pressure_, i.grip_);
 }
 
 template <class Archive>

@@ -9,8 +9,9 @@
 
 #include "ros/conversions.h"
 #include "ros/guarded.h"
-#include "ros/pose_check.h"
+#include "ros/pose_track.h"
 #include "ros/warn_seldom.h"
+#include "tools/pose_fault.h"
 
 namespace tissue_sim {
 namespace {
@@ -170,8 +171,8 @@ bool Cameras::wanted(const Eye& eye) const {
 void Cameras::on_pose(std::size_t eye, const geometry_msgs::PoseStamped& message) {
   const char* name = eyes_[eye].camera.name.c_str();
   Pose pose = from_message(message.pose);
-  if (!pose.position.allFinite() || !is_rotation(pose.orientation)) {
-    WARN_SELDOM(1, "camera %s: a pose is not finite or no rotation, and is left out", name);
+  if (const std::string wrong = problem_of(pose, kRounding); !wrong.empty()) {
+    WARN_SELDOM(1, "camera %s: a pose %s", name, wrong.c_str());
     return;
   }
   pose.orientation.normalize();

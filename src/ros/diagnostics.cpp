@@ -92,9 +92,8 @@ void Diagnostics::tools(Status& status) {
     refused += counts.all_refused() + counts.jaws_refused;
     status.add(s.tool + ": poses used", counts.accepted);
     status.add(s.tool + ": placed anew", counts.placed);
-    for (int i = 0; i < kRefusalCount; ++i) {
-      status.add(s.tool + ": poses refused, " + name_of(static_cast<Refusal>(i)),
-                 counts.refused[static_cast<std::size_t>(i)]);
+    for (std::size_t i = 0; i < kRefusalCount; ++i) {
+      status.add(s.tool + ": poses refused, " + kRefusals[i], counts.refused[i]);
     }
     status.add(s.tool + ": jaw angles refused", counts.jaws_refused);
     status.add(s.tool + (s.follows_tf ? ": tf frame" : ": topic"), s.source);

@@ -78,11 +78,11 @@ bool FrameClock::ros_due(const ToolInputs& tools) {
     std::optional<std::int64_t> first;
     bool awaited = false;
     for (const auto& tool : tools) {
-      const std::optional<std::int64_t> stamp = tool->first_held();
-      if (stamp && *stamp > begin - kStale && *stamp < now + kAhead) {
-        first = std::min(first.value_or(*stamp), *stamp);
+      const ToolInput::Held held = tool->held();
+      if (held.first && *held.first > begin - kStale && *held.first < now + kAhead) {
+        first = std::min(first.value_or(*held.first), *held.first);
       } else {
-        awaited = awaited || (!stamp && tool->awaited());
+        awaited = awaited || (!held.first && held.awaited);
       }
     }
     if (!first && awaited) return false;
@@ -95,27 +95,21 @@ bool FrameClock::all_sampled(const ToolInputs& tools) const {
   const auto& named = parameters_.lockstep_tools;
   bool any = false;
   for (const auto& tool : tools) {
+    const ToolInput::Held held = tool->held();
     const bool wanted = named.empty()
-                            ? tool->connected() || tool->has_next()
+                            ? held.connected || held.has_next
                             : std::find(named.begin(), named.end(), tool->tool()) != named.end();
     if (!wanted) continue;
-    if (!tool->has_next()) return false;
+    if (!held.has_next) return false;
     any = true;
   }
   return any;
 }
 
 bool FrameClock::due(const ToolInputs& tools) {
-  const bool paced = parameters_.time_factor > 0;
-  switch (parameters_.time) {
-    case TimeMode::kWall:
-      return !paced || WallClock::now() >= pace_.due();
-    case TimeMode::kRos:
-      return ros_due(tools);
-    case TimeMode::kLockstep:
-      return all_sampled(tools) && (!paced || WallClock::now() >= pace_.due());
-  }
-  return false;
+  if (parameters_.time == TimeMode::kRos) return ros_due(tools);
+  if (parameters_.time_factor > 0 && WallClock::now() < pace_.due()) return false;
+  return parameters_.time == TimeMode::kWall || all_sampled(tools);
 }
 
 WallTime FrameClock::wake() const {
@@ -129,20 +123,15 @@ WallTime FrameClock::wake() const {
   return std::min<WallTime>(pace_.due(), now + std::chrono::seconds(1));
 }
 
-std::vector<std::optional<ToolRequest>> FrameClock::begin_frame(const ToolInputs& tools,
-                                                                bool in_turn, bool paused) {
-  std::vector<std::optional<ToolRequest>> samples;
+std::int64_t FrameClock::begin_frame(bool in_turn, bool paused) {
   pace_.begin_frame(WallClock::now());
   frame_stamp_ = stamp();
-  const bool by_stamp = parameters_.time == TimeMode::kRos && in_turn;
-  if (by_stamp) frame_stamp_ = ros_time_of(schedule_.due());
-  const bool one_by_one = parameters_.time == TimeMode::kLockstep && !paused;
-  const std::int64_t until = by_stamp     ? in_nanoseconds(ros_time_of(schedule_.due() - delay()))
-                             : one_by_one ? ToolInput::kNext
-                                          : ToolInput::kAll;
-  for (const auto& tool : tools) samples.push_back(tool->at(until));
-  if (by_stamp) schedule_.next();
-  return samples;
+  if (parameters_.time == TimeMode::kLockstep && !paused) return kTakeNext;
+  if (parameters_.time != TimeMode::kRos || !in_turn) return kTakeAll;
+  const std::int64_t due = schedule_.due();
+  schedule_.next();
+  frame_stamp_ = ros_time_of(due);
+  return in_nanoseconds(ros_time_of(due - delay()));
 }
 
 FrameTime FrameClock::end_frame() {
@@ -152,16 +141,9 @@ FrameTime FrameClock::end_frame() {
     own_ += ros::Duration(1 / frame_rate_);
     return {own_, elapsed_};
   }
-  switch (parameters_.time) {
-    case TimeMode::kWall:
-      return {ros::Time::now(),
-              parameters_.time_factor == 1 ? seconds(WallClock::now()) : elapsed_};
-    case TimeMode::kRos:
-      return {frame_stamp_, elapsed_};
-    case TimeMode::kLockstep:
-      return {ros::Time::now(), elapsed_};
-  }
-  return {};
+  const bool by_wall = parameters_.time == TimeMode::kWall && parameters_.time_factor == 1;
+  return {parameters_.time == TimeMode::kRos ? frame_stamp_ : ros::Time::now(),
+          by_wall ? seconds(WallClock::now()) : elapsed_};
 }
 
 }  // namespace tissue_sim

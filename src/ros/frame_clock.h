@@ -51,10 +51,9 @@ class FrameClock {
   bool due(const ToolInputs& tools);
   /// When to look again if nothing wakes the thread before.
   WallTime wake() const;
-  /// A frame begins; `in_turn` if because it was due, else because somebody stepped or cut.
-  /// The instruments' samples that are for it.
-  std::vector<std::optional<ToolRequest>> begin_frame(const ToolInputs& tools, bool in_turn,
-                                                      bool paused);
+  /// A frame begins; `in_turn` if because it was due, else because somebody stepped or cut. Which
+  /// of the instruments' samples are for it: see ToolInput::ask().
+  std::int64_t begin_frame(bool in_turn, bool paused);
   /// The frame is done.
   FrameTime end_frame();
   /// Of messages between frames.

@@ -6,8 +6,9 @@
 
 #include "ros/conversions.h"
 #include "ros/guarded.h"
-#include "ros/pose_check.h"
+#include "ros/pose_track.h"
 #include "ros/stamps.h"
+#include "tools/pose_fault.h"
 
 namespace tissue_sim {
 namespace {
@@ -22,10 +23,8 @@ std::string stripped(const std::string& frame) {
 // A chain of transforms that are right each may not be.
 Pose checked(const geometry_msgs::Transform& transform, const std::string& frame) {
   Pose pose = from_message(transform);
-  if (!pose.position.allFinite() || !pose.orientation.coeffs().allFinite() ||
-      !is_rotation(pose.orientation)) {
-    throw tf2::TransformException("the transform of '" + frame + "' is not finite, or no rotation");
-  }
+  const std::string wrong = problem_of(pose, kRounding);
+  if (!wrong.empty()) throw tf2::TransformException("the transform of '" + frame + "' " + wrong);
   pose.orientation.normalize();
   return pose;
 }
@@ -42,13 +41,8 @@ std::string problem(const geometry_msgs::TransformStamped& transform) {
   if (transform.child_frame_id.size() > 1000 || transform.header.frame_id.size() > 1000) {
     return "the name of a frame is longer than 1000 characters";
   }
-  if (!pose.position.allFinite() || !pose.orientation.coeffs().allFinite()) {
-    return "a value is NaN or infinite";
-  }
-  if (!is_rotation(pose.orientation)) {
-    return "its quaternion has norm " + std::to_string(pose.orientation.norm()) + ", must be 1";
-  }
-  return "";
+  const std::string wrong = problem_of(pose, kRounding);
+  return wrong.empty() ? "" : "it " + wrong;
 }
 
 Frames::Frames(std::string world, double tolerance)

@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "ros/pose_check.h"
+#include "ros/pose_track.h"
 #include "tissue_sim/limits.h"
 #include "tissue_sim/scene.h"
 

@@ -4,8 +4,9 @@
 
 #include "ros/conversions.h"
 #include "ros/guarded.h"
-#include "ros/pose_check.h"
+#include "ros/pose_track.h"
 #include "ros/warn_seldom.h"
+#include "tools/pose_fault.h"
 
 namespace tissue_sim {
 
@@ -33,12 +34,8 @@ SceneInput::SceneInput(ros::NodeHandle node, const Scene& scene, const Frames& f
 void SceneInput::on_pose(int anchor, const geometry_msgs::PoseStamped& message) {
   const char* name = names_[anchor].c_str();
   Pose pose = from_message(message.pose);
-  const double norm = pose.orientation.norm();
-  if (!pose.position.allFinite() || !is_rotation(pose.orientation)) {
-    WARN_SELDOM(1,
-                "anchor %s: a pose is not finite, or its quaternion has norm %.3g, must be 1 (0.9 "
-                "to 1.1 is normalised)",
-                name, norm);
+  if (const std::string wrong = problem_of(pose, kRounding); !wrong.empty()) {
+    WARN_SELDOM(1, "anchor %s: a pose %s", name, wrong.c_str());
     return;
   }
   pose.orientation.normalize();
@@ -98,9 +95,7 @@ void SceneInput::ask(bool moves_anchors, FrameRequest& request) {
       request.anchors[i] = poses_[i];
       last_[i] = poses_[i]->position;
     } else {
-      WARN_SELDOM(10,
-                  "anchor %s: anchors do not move with this method: they do with method mls, and "
-                  "with method mpm unless mpm.boundary is lattice",
+      WARN_SELDOM(10, "anchor %s: anchors do not move with this scene's method and its options",
                   names_[i].c_str());
     }
     poses_[i].reset();

@@ -9,6 +9,7 @@
 #include "ros/conversions.h"
 #include "ros/service_answer.h"
 #include "scene/read_file.h"
+#include "tools/pose_fault.h"
 
 namespace tissue_sim {
 
@@ -76,15 +77,9 @@ BladePath Services::read_path(const Cut::Request& request) const {
   for (std::size_t i = 0; i < request.path.size(); ++i) {
     const std::string name = "path[" + std::to_string(i) + "]";
     Pose pose = from_message(request.path[i]);
-    if (!pose.position.allFinite() || !pose.orientation.coeffs().allFinite()) {
-      throw std::runtime_error(name + " is not finite");
-    }
-    if (!is_rotation(pose.orientation)) {
-      throw std::runtime_error(name + " has a quaternion of norm " +
-                               std::to_string(pose.orientation.norm()) +
-                               ": must be 1, or it is no rotation");
-    }
-    if (is_rounded(pose.orientation)) {
+    const std::string wrong = problem_of(pose, kRounding);
+    if (!wrong.empty()) throw std::runtime_error(name + " " + wrong);
+    if (is_rounded(pose.orientation.norm())) {
       ROS_WARN("cut: %s has a quaternion of norm %.3g, is normalised", name.c_str(),
                pose.orientation.norm());
     }

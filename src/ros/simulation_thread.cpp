@@ -60,7 +60,6 @@ void SimulationThread::start_session() {
     cut.reply.set_value({false, "the simulation was started anew", {}});
   }
   clock_.restart(scene.frame_rate);
-  for (const auto& tool : *session_.tools) tool->begin();
   session_.scene_input->begin(*session_.simulation);
   real_time_factor_.restart();
   report_ = FrameReport();
@@ -148,20 +147,26 @@ void SimulationThread::start_anew(const ros::Time& before, const ros::Time& now)
   start_session();
 }
 
-void SimulationThread::ask_of_tools(FrameRequest& request) {
-  const Simulation& simulation = *session_.simulation;
+FrameRequest SimulationThread::request(const std::vector<PendingCut>& cuts) {
+  Simulation& simulation = *session_.simulation;
   const double reach = parameters_.max_tool_speed / simulation.scene().frame_rate;
   const bool in_turn = !run_.paused && steps_left_ == 0;
-  request.tools = clock_.begin_frame(*session_.tools, in_turn, run_.paused);
-  for (std::size_t i = 0; i < request.tools.size(); ++i) {
-    if (!request.tools[i]) continue;
-    ToolRequest& tool = *request.tools[i];
-    const ToolMotion& was = simulation.tools()[i];
+  const std::int64_t until = clock_.begin_frame(in_turn, run_.paused);
+  FrameRequest request;
+  for (const auto& input : *session_.tools) {
+    const ToolMotion& was = simulation.tools()[request.tools.size()];
+    std::optional<ToolRequest>& tool = request.tools.emplace_back();
+    input->ask(until, tool);
     // What an arm did during a pause must not cut a straight line through the tissue now.
-    const bool strayed = resumed_ && (tool.pose.position - was.end.position).norm() > reach;
-    tool.placed = tool.placed || !was.present || strayed;
+    if (tool &&
+        (!was.present || (resumed_ && (tool->pose.position - was.end.position).norm() > reach))) {
+      tool->placed = true;
+    }
   }
   resumed_ = false;
+  for (const PendingCut& cut : cuts) request.cuts.push_back(cut.path);
+  session_.scene_input->ask(simulation.tissue().moves_anchors(), request);
+  return request;
 }
 
 void SimulationThread::frame() {
@@ -169,11 +174,7 @@ void SimulationThread::frame() {
   std::vector<PendingCut> cuts = std::exchange(cuts_, {});
   const LimitWork limit(parameters_.limits());
   try {
-    FrameRequest request;
-    ask_of_tools(request);
-    for (const PendingCut& cut : cuts) request.cuts.push_back(cut.path);
-    session_.scene_input->ask(simulation.tissue().moves_anchors(), request);
-    report_ = simulation.advance_frame(request);
+    report_ = simulation.advance_frame(request(cuts));
   } catch (const std::exception& e) {
     if (parameters_.work.stop != nullptr && *parameters_.work.stop) throw;  // the node ends
     for (PendingCut& cut : cuts) cut.reply.set_value({false, e.what(), {}});

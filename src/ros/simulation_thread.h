@@ -120,7 +120,7 @@ class SimulationThread {
   void run_frames();
   void frame();
   bool frame_due();
-  void ask_of_tools(FrameRequest& request);
+  FrameRequest request(const std::vector<PendingCut>& cuts);
   void start_anew(const ros::Time& before, const ros::Time& now);
   void answer_cuts(std::vector<PendingCut>& cuts, const FrameReport& report);
   void answer_step(const char* interrupted);

@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <string>
 
-#include "ros/pose_check.h"
+#include "ros/pose_track.h"
 #include "tissue_sim/types.h"
 
 namespace tissue_sim {

@@ -10,7 +10,8 @@
 #include <sstream>
 #include <stdexcept>
 
-#include "ros/pose_check.h"
+#include "ros/pose_track.h"
+#include "tools/pose_fault.h"
 
 namespace tissue_sim {
 namespace {
@@ -44,10 +45,8 @@ void add(const Row& row, const std::string& where, std::vector<TimedSample>& tra
   for (const double x : row) {
     if (!std::isfinite(x)) refuse(where, "has a value that is not finite");
   }
-  if (!is_rotation(s.pose.orientation)) {
-    refuse(where, "has a quaternion of norm " + std::to_string(s.pose.orientation.norm()) +
-                      ": must be 1 (0.9 to 1.1 is normalised)");
-  }
+  const std::string wrong = problem_of(s.pose, kRounding);
+  if (!wrong.empty()) refuse(where, wrong);
   s.pose.orientation.normalize();
   if (!trajectory.empty() && !(s.time > trajectory.back().time)) {
     refuse(where, "is at " + std::to_string(s.time) + " s: times must increase");

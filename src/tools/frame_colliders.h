@@ -21,7 +21,7 @@ int collider_count(const Scene& scene);
 
 class FrameColliders {
  public:
-  /// Of a frame of `duration` seconds. The scene must outlive them.
+  /// Of a frame of `duration` seconds. The scene and the tools' motions must outlive them.
   FrameColliders(const Scene& scene, const FrameInput& input, double duration);
   int count() const { return count_; }
   /// Writes the count() colliders as they are at the share (0 to 1) of the frame.

@@ -2,9 +2,11 @@
 
 #include <algorithm>
 #include <cstdio>
+#include <utility>
 #include <vector>
 
 #include "tools/entry.h"
+#include "tools/pose_fault.h"
 
 namespace tissue_sim {
 namespace {
@@ -28,16 +30,19 @@ std::string entry_note(const Tool& tool, double way_in) {
 }  // namespace
 
 void Instrument::ask(const ToolRequest& request) {
-  const bool placed = request.placed || (is_asked_ && asked_.placed);  // until a frame places it
-  asked_ = request;
-  asked_.placed = placed;
+  asked_ = request.pose;
+  normalise(asked_);
   is_asked_ = true;
-  if (request.grip_pressure) grip_pressure_ = *request.grip_pressure;
+  is_placed_ = is_placed_ || request.placed;  // until a frame places it
+  jaw_ = request.jaw.value_or(jaw_);
+  grip_pressure_ = request.grip_pressure.value_or(grip_pressure_);
 }
 
 void Instrument::put(const ToolMotion& motion, double grip_pressure) {
-  asked_ = ToolRequest{motion.end, motion.jaw_end, false, {}};
+  asked_ = motion.end;
   is_asked_ = motion.present;
+  is_placed_ = false;
+  jaw_ = motion.jaw_end;
   way_in_ = 0;
   grip_pressure_ = grip_pressure;
 }
@@ -46,23 +51,22 @@ std::string Instrument::move(const Tool& tool, double duration, double cell_size
                              ToolMotion& motion) {
   if (!is_asked_) return "";
   std::string note;
-  motion.jaw_end = static_cast<float>(asked_.jaw);
-  const bool appears = asked_.placed || !motion.present;
+  motion.jaw_end = static_cast<float>(jaw_);
+  const bool appears = is_placed_ || !motion.present;
   if (appears) motion.jaw_begin = motion.jaw_end;
-  if (asked_.placed) {
+  if (std::exchange(is_placed_, false)) {
     std::vector<std::uint8_t> cloud;
     const int count = tissue.read_points({}, cloud);
     way_in_ =
-        way_out(tool, asked_.pose, motion.jaw_end,
+        way_out(tool, asked_, motion.jaw_end,
                 {reinterpret_cast<const Point*>(cloud.data()), static_cast<std::size_t>(count)},
                 0.5 * cell_size, kFarthest);
     if (way_in_ != 0) note = entry_note(tool, way_in_);
     way_in_ = std::max(way_in_, 0.0);
   }
-  motion.end = {asked_.pose * Vec3(0, 0, -way_in_), asked_.pose.orientation};
+  motion.end = {asked_ * Vec3(0, 0, -way_in_), asked_.orientation};
   if (appears) motion.begin = motion.end;
   motion.present = true;
-  asked_.placed = false;
   way_in_ = std::max(0.0, way_in_ - kSpeed * duration);
   return note;
 }

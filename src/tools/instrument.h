@@ -30,7 +30,9 @@ class Instrument {
   template <class Archive>
   friend void fields(Archive& archive, Instrument& instrument);  // frame/state_fields.h
 
-  ToolRequest asked_;
+  Pose asked_;
+  double jaw_ = 0;            // that was asked for [rad]
+  bool is_placed_ = false;    // the next frame places it
   bool is_asked_ = false;     // ever
   double way_in_ = 0;         // left of it: it is drawn back by that along its shaft [m]
   double grip_pressure_ = 0;  // 0: the scene's [Pa]

@@ -44,7 +44,7 @@ int collider_count(ToolType type) { return type == ToolType::kGrasper ? 2 : 1; }
 
 ToolPath::ToolPath(const Tool& tool, int index, const ToolMotion& motion, double duration,
                    double point_area)
-    : tool_(&tool), motion_(motion) {
+    : tool_(&tool), motion_(&motion) {
   const Eigen::AngleAxisd turn(motion.end.orientation * motion.begin.orientation.conjugate());
   const double angle = turn.angle() > M_PI ? turn.angle() - 2 * M_PI : turn.angle();
   spin_ = turn.axis() * angle / duration;
@@ -97,11 +97,11 @@ ToolPath::ToolPath(const Tool& tool, int index, const ToolMotion& motion, double
 }
 
 Vec3 ToolPath::tip(double s) const {
-  return (1 - s) * motion_.begin.position + s * motion_.end.position;
+  return (1 - s) * motion_->begin.position + s * motion_->end.position;
 }
 
 void ToolPath::at(double s, Collider* out) const {
-  const Pose pose = pose_at(motion_, s);
+  const Pose pose = pose_at(*motion_, s);
   if (tool_->type == ToolType::kGrasper) {
     place_jaws(pose, s, out);
     return;
@@ -111,7 +111,7 @@ void ToolPath::at(double s, Collider* out) const {
 }
 
 void ToolPath::place_jaws(const Pose& pose, double s, Collider* out) const {
-  const double half = 0.5 * ((1 - s) * motion_.jaw_begin + s * motion_.jaw_end);
+  const double half = 0.5 * ((1 - s) * motion_->jaw_begin + s * motion_->jaw_end);
   const Vec3 hinge(0, 0, -tool_->jaw_length);
   for (int side = 0; side < 2; ++side) {
     const double sign = side == 0 ? -1 : 1;

@@ -21,13 +21,14 @@ double thinnest(const Tool& tool);
 int collider_count(ToolType type);
 
 /// The way of a tool's colliders through a frame that lasts `duration` seconds, in tissue whose
-/// points have a surface of `point_area` [m^2]; what does not change on it is worked out once.
+/// points have a surface of `point_area` [m^2]; what does not change on it is worked out once. The
+/// tool and its motion must outlive it.
 class ToolPath {
  public:
   ToolPath(const Tool& tool, int index, const ToolMotion& motion, double duration,
            double point_area);
   int count() const { return collider_count(tool_->type); }
-  bool is_present() const { return motion_.present; }
+  bool is_present() const { return motion_->present; }
   /// Where the tool's tip is at the share `s` (0 to 1) of the frame.
   Vec3 tip(double s) const;
   /// Writes the count() colliders as they are at the share `s` of the frame.
@@ -36,7 +37,7 @@ class ToolPath {
  private:
   void place_jaws(const Pose& pose, double s, Collider* out) const;
   const Tool* tool_;
-  ToolMotion motion_;
+  const ToolMotion* motion_;
   Vec3 spin_;         // [rad/s], world axes
   double jaw_speed_;  // [rad/s]
   Collider shape_;    // with all that the motion leaves as it is

@@ -13,7 +13,7 @@
 #include "bytes.h"
 #include "ros/conversions.h"
 #include "ros/jaw_check.h"
-#include "ros/pose_check.h"
+#include "ros/pose_track.h"
 #include "ros/stamps.h"
 
 // roscpp makes room for as many elements as a message says it has before it looks for their bytes:
@@ -42,17 +42,16 @@ M read(std::string bytes) {
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using namespace tissue_sim;
   FuzzBytes bytes(data, size);
-  static PoseCheck check{PoseLimits()};
+  static PoseTrack track{PoseLimits()};
   try {
     switch (bytes.take<std::uint8_t>() % 4) {
       case 0: {
         const auto m = read<geometry_msgs::PoseStamped>(bytes.rest());
-        Pose pose = from_message(m.pose);
         static double now = 0;
         const ros::Time stamp = m.header.stamp;
         if (in_nanoseconds(ros_time_of(in_nanoseconds(stamp))) < 0) std::abort();
-        const auto verdict = check.check(pose, stamp.toSec(), now += 0.01);
-        if (!verdict.refusal && !(pose.position.norm() < 2e6)) std::abort();
+        const auto verdict = track.add(from_message(m.pose), stamp.toSec(), now += 0.01);
+        if (!verdict.refusal && !(track.newest().position.norm() < 2e6)) std::abort();
         break;
       }
       case 1: {

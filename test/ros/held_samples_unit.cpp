@@ -48,7 +48,7 @@ TEST(HeldSamples, OneByOne) {
   std::string taken;
   const auto use = [&](std::int64_t, char sample, bool) { taken += sample; };
   for (const char* so_far : {"a", "ab", "ab"}) {
-    held.next(kNow, use);
+    held.take(kTakeNext, kNow, use);
     EXPECT_EQ(taken, so_far);
   }
 }

@@ -2,7 +2,7 @@
 
 #include <cmath>
 
-#include "ros/sample_track.h"
+#include "ros/pose_track.h"
 
 namespace tissue_sim {
 namespace {

@@ -3,7 +3,6 @@
 
 #include "ros/frames.h"
 #include "ros/guarded.h"
-#include "ros/pose_check.h"
 #include "ros/stamps.h"
 
 namespace tissue_sim {
@@ -34,17 +33,6 @@ TEST(Guard, NothingThrownLeaves) {
   guard("a message", [] { throw std::runtime_error("out of dual 32-bit range"); });
   guard("a message", [] { throw 7; });
   EXPECT_EQ(thrown_in_callbacks(), before + 2);
-}
-
-TEST(PoseCheck, PlacesThatAreAbsurdlyFarAreRefusedAlsoAsTheFirst) {
-  PoseCheck check{PoseLimits()};
-  Pose pose;
-  pose.position.x() = 1e300;
-  EXPECT_EQ(check.check(pose, 0).refusal, Refusal::kFar);
-  pose.position.x() = 2e6;
-  EXPECT_EQ(check.check(pose, 0).refusal, Refusal::kFar);
-  pose.position.x() = 100;
-  EXPECT_FALSE(check.check(pose, 0).refusal);
 }
 
 }  // namespace

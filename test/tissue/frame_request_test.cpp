@@ -53,6 +53,18 @@ TEST_P(AFrameRequest, WhatIsPlacedWithinTissueComesInAlongItsShaft) {
   EXPECT_EQ(again.tissue().checksum(), simulation.tissue().checksum());
 }
 
+TEST_P(AFrameRequest, LeavesTheJawsWhereTheyWereAskedForLast) {
+  Scene scene = block();
+  scene.tools[0].type = ToolType::kGrasper;
+  Simulation simulation(scene);
+  FrameRequest request;
+  request.tools = {ToolRequest{{Vec3(0, 0, 0.1), kWithin.orientation}, 0.5, false, {}}};
+  simulation.advance_frame(request);
+  request.tools[0]->jaw.reset();
+  EXPECT_FLOAT_EQ(simulation.advance_frame(request).input.tools[0].jaw_end, 0.5f);
+  EXPECT_FLOAT_EQ(simulation.advance_frame().input.tools[0].jaw_end, 0.5f);
+}
+
 TEST_P(AFrameRequest, IsDoneAsAWholeOrNotAtAll) {
   Simulation simulation(block());
   const std::uint64_t before = simulation.tissue().checksum();

@@ -4,7 +4,8 @@
 #include "ros/arm/arm_node.h"
 #include "ros/conversions.h"
 #include "ros/guarded.h"
-#include "ros/pose_check.h"
+#include "ros/pose_track.h"
+#include "tools/pose_fault.h"
 
 namespace tissue_sim {
 namespace {
@@ -131,12 +132,8 @@ void ArmNode::on_joints(const std::string& name, Kind kind, JointGroup& group,
 
 std::string ArmNode::world_pose(const geometry_msgs::PoseStamped& message, Pose& pose) const {
   pose = from_message(message.pose);
-  if (!pose.position.allFinite() || !pose.orientation.coeffs().allFinite()) {
-    return "the pose is not finite";
-  }
-  if (!is_rotation(pose.orientation)) {
-    return "its quaternion has the norm " + std::to_string(pose.orientation.norm()) + ", must be 1";
-  }
+  const std::string wrong = problem_of(pose, kRounding);
+  if (!wrong.empty()) return "the pose " + wrong;
   pose.orientation.normalize();
   const std::string& frame = message.header.frame_id;
   if (frame.empty() || frame == parameters_.world_frame) return "";
@@ -233,9 +230,8 @@ std::string ArmNode::inverse(const Pose& tip, const std::vector<double>& seed,
   if (!seed.empty() && seed.size() != kArmJoints) {
     return std::to_string(seed.size()) + " joints came, must be 6";
   }
-  if (!tip.position.allFinite() || !is_rotation(tip.orientation)) {
-    return "the pose is not finite or no rotation";
-  }
+  const std::string wrong = problem_of(tip, kRounding);
+  if (!wrong.empty()) return "the pose " + wrong;
   const Quat back = parameters_.base.orientation.inverse();
   const Pose local{back * (tip.position - parameters_.base.position),
                    (back * tip.orientation).normalized()};

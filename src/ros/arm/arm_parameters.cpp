@@ -4,8 +4,9 @@
 #include <stdexcept>
 #include <vector>
 
-#include "ros/pose_check.h"
+#include "ros/pose_track.h"
 #include "ros/xmlrpc_yaml.h"
+#include "tools/pose_fault.h"
 
 namespace tissue_sim {
 namespace {
@@ -87,9 +88,8 @@ ArmParameters read_arm_parameters(const ros::NodeHandle& own, const std::string&
   std::vector<double> turn = {0, 0, 0, 1};
   read(own, "base_orientation", turn);
   p.base.orientation = Quat(turn[3], turn[0], turn[1], turn[2]);
-  if (!is_rotation(p.base.orientation)) {
-    throw std::invalid_argument("~base_orientation is no rotation: must be x, y, z, w of norm 1");
-  }
+  const std::string wrong = problem_of(p.base, kRounding);
+  if (!wrong.empty()) throw std::invalid_argument("~base_orientation " + wrong);
   p.base.orientation.normalize();
   read(own, "start", p.start);
   const std::string outside = outside_limits(arm_limits().data(), p.start);

@@ -111,8 +111,8 @@ class Tissue {
 };
 
 /// Builds the tissue of a valid scene. Throws std::invalid_argument for what cannot be built (a
-/// mesh that cannot be read, a body thinner than a cell) and std::runtime_error for a device not
-/// there.
+/// mesh that cannot be read, a body thinner than a cell; TooLarge) and std::runtime_error for a
+/// device not there (OutOfMemory).
 std::unique_ptr<Tissue> make_tissue(const Scene& scene);
 
 }  // namespace tissue_sim

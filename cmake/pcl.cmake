@@ -18,8 +18,11 @@ if(PCL_CLUSTERS_INCLUDE_DIR AND NOT "${pcl_libraries}" MATCHES "NOTFOUND"
    AND (PCL_CONVERSIONS_INCLUDE_DIR OR NOT build_ros))
   set(tissue_sim_has_pcl TRUE)
   add_library(tissue_sim_pcl INTERFACE)
+  # Of the programs of this package alone: nothing that is exported links it.
+  #catkin_lint: ignore_once external_interface_path
   target_include_directories(tissue_sim_pcl SYSTEM INTERFACE ${PCL_CLUSTERS_INCLUDE_DIR})
   if(PCL_CONVERSIONS_INCLUDE_DIR)
+    #catkin_lint: ignore_once external_interface_path
     target_include_directories(tissue_sim_pcl SYSTEM INTERFACE ${PCL_CONVERSIONS_INCLUDE_DIR})
   endif()
   target_link_libraries(tissue_sim_pcl INTERFACE ${pcl_libraries})

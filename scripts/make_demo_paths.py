@@ -6,13 +6,13 @@ The body is held at its low x end. The scalpel comes from the -y side and cuts t
 along a curve in the plane; then the probe pushes the loose end towards -y. Lines of a path: time
 [s], position [m], orientation (x, y, z, w), jaw [rad]; 100 a second."""
 import argparse
+import io
 import os
+import subprocess
 import sys
 
 import numpy as np
 import yaml
-
-from mesh_points import mesh_points
 
 RATE = 100.0  # [Hz]
 LEAN = np.radians(20)  # the scalpel's handle leans this far towards where it cuts
@@ -144,6 +144,18 @@ def write_path(path, t, x, rotation):
         np.savetxt(file, rows, fmt="%.3f" + ",%.6f" * 8)
 
 
+TETRAHEDRA = (".msh", ".vtk", ".vtu", ".mesh", ".node", ".ele")
+
+
+def mesh_points(path):
+    """Vertices (n, 3) in the file's unit, as the simulator reads them. Raises ValueError."""
+    read = subprocess.run(["rosrun", "tissue_sim", "mesh_vertices", path], stdout=subprocess.PIPE,
+                          stderr=subprocess.PIPE, universal_newlines=True)
+    if read.returncode != 0:
+        raise ValueError(read.stderr.strip())
+    return np.loadtxt(io.StringIO(read.stdout), ndmin=2)
+
+
 def box_of(body, folder):
     """Lowest and highest corner of a body of a scene, and its shape."""
     pose = body.get("pose", {})
@@ -151,8 +163,8 @@ def box_of(body, folder):
     v = np.array([qx, qy, qz])
     shape = body.get("shape", "box")
     if shape == "mesh":
-        name = body["mesh"].replace("file://", "")
-        points = mesh_points(os.path.join(folder, name)) * body.get("scale", 1.0)
+        name = body["mesh"] if "://" in body["mesh"] else os.path.join(folder, body["mesh"])
+        points = mesh_points(name) * body.get("scale", 1.0)
     else:
         r = body.get("radius", 0.02)
         half = {"box": np.array(body.get("size", [0.08, 0.05, 0.03])) / 2, "ball": [r, r, r],
@@ -188,8 +200,11 @@ def scene_of_mesh(mesh, scale, cell_size):
             "anchors": [{"box": anchor}]}
     # The preset without its viscosity, which would take half of real time on two cores: drag brings it to rest.
     material = {"name": "liver", "young_modulus": 5000, "poisson_ratio": 0.45, "density": 1060}
-    return {"name": "organ", "cell_size": cell_size, "damping": 2.0, "materials": [material],
-            "bodies": [body], "mls": {"spacing": cell_size}}
+    scene = {"name": "organ", "cell_size": cell_size, "damping": 2.0, "materials": [material],
+             "bodies": [body], "mls": {"spacing": cell_size}}
+    if mesh.lower().endswith(TETRAHEDRA):
+        scene["pbd"] = {"model": "tetrahedra"}
+    return scene
 
 
 def plain(x):

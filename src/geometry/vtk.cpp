@@ -48,12 +48,14 @@ CellList read_offsets(MeshNumbers& in, int offsets, int size) {
   return list;
 }
 
-CellList read_sizes(MeshNumbers& in, int cells, int size) {
+/// The size that the file says stands for nothing: it is wrong in files that people have.
+CellList read_sizes(MeshNumbers& in, int cells, std::size_t bytes) {
   CellList list;
   for (int i = 0; i < cells; ++i) {
     const std::size_t at = in.place();
     const int count = in.whole(NumberType::kInt32, "a cell's size");
-    if (count > size) in.refuse("has a cell of " + std::to_string(count) + " corners", at);
+    if (static_cast<std::size_t>(count) > bytes)
+      in.refuse("has a cell of " + std::to_string(count) + " corners", at);
     for (int k = 0; k < count; ++k) {
       list.corners.push_back(in.whole(NumberType::kInt32, "a vertex's number"));
     }
@@ -85,7 +87,8 @@ VolumeCells read_vtk(const std::string& bytes) {
   MeshNumbers in(bytes, 0, NumberFormat::kText);
   std::string word;
   in.word(word);
-  if (word != "#") in.refuse("is no legacy VTK file (it does not begin with # vtk)", 0);
+  if (word != "#" && word != "#vtk")
+    in.refuse("is no legacy VTK file (it does not begin with # vtk)", 0);
   in.skip_line();
   in.skip_line();  // a title, that may be any words
   in.word(word);
@@ -121,7 +124,8 @@ VolumeCells read_vtk(const std::string& bytes) {
       in.skip_line();
       MeshNumbers ahead = in;
       ahead.word(word);
-      list = word == "offsets" ? read_offsets(in, count, size) : read_sizes(in, count, size);
+      list =
+          word == "offsets" ? read_offsets(in, count, size) : read_sizes(in, count, bytes.size());
     } else if (word == "cell_types") {
       const int count = in.whole(NumberType::kNone, "the number of cells");
       in.skip_line();

@@ -1,12 +1,39 @@
 #include "ros/diagnostics.h"
 
+#include <cmath>
+#include <cstdio>
 #include <string>
 
+#include "geometry/tet_mesh.h"
 #include "ros/guarded.h"
+#include "ros/warn_seldom.h"
 
 namespace tissue_sim {
 
 using diagnostic_msgs::DiagnosticStatus;
+
+std::string coarser(const Scene& scene, double slower) {
+  // As many points as 1 / spacing^3, as many substeps as 1 / spacing.
+  const double wider = std::pow(slower, 0.25);
+  const bool is_mls = scene.method == Method::kMls;
+  char text[80];
+  for (const Body& body : scene.bodies) {
+    if (body.shape != Shape::kMesh || scene.method == Method::kMpm) continue;
+    if (is_mls && !is_tet_file(body.mesh)) continue;
+    std::snprintf(text, sizeof text, "a mesh of 1/%.2g of the vertices would do",
+                  std::pow(wider, 3));
+    return text;
+  }
+  if (is_mls) {
+    const double spacing = scene.mls.spacing > 0 ? scene.mls.spacing : scene.cell_size / 2;
+    std::snprintf(text, sizeof text, "mls: {spacing: %.2g} would do, for %.2g", wider * spacing,
+                  spacing);
+  } else {
+    std::snprintf(text, sizeof text, "cell_size: %.2g would do, for %.2g", wider * scene.cell_size,
+                  scene.cell_size);
+  }
+  return text;
+}
 
 Diagnostics::Diagnostics(ros::NodeHandle& node, const SimulationThread& simulation,
                          const Recorder& recorder)
@@ -29,10 +56,11 @@ void Diagnostics::simulation(Status& status) {
   } else if (s.behind > 0.1) {
     status.summaryf(DiagnosticStatus::WARN,
                     "%.1f s behind /clock: play it slower, or use larger cells", s.behind);
-  } else if (s.run.real_time_factor > 0 && s.run.real_time_factor < 0.9 * s.aimed_factor) {
-    status.summary(DiagnosticStatus::WARN, s.aimed_factor == 1
-                                               ? "slower than real time: use larger cells"
-                                               : "slower than time_factor: use larger cells");
+  } else if (!s.coarser.empty()) {
+    const std::string slow =
+        (s.aimed_factor == 1 ? "slower than real time: " : "slower than time_factor: ") + s.coarser;
+    status.summary(DiagnosticStatus::WARN, slow);
+    WARN_SELDOM(60, "%s", slow.c_str());
   } else if (!s.inside.empty()) {
     status.summary(DiagnosticStatus::WARN, s.inside);
   } else {

@@ -6,11 +6,16 @@
 #include <ros/wall_timer.h>
 
 #include <cstdint>
+#include <string>
 
 #include "ros/recorder.h"
 #include "ros/simulation_thread.h"
 
 namespace tissue_sim {
+
+/// For who waits for a simulation that is this many times too slow: what to make coarser, and how
+/// much.
+std::string coarser(const Scene& scene, double slower);
 
 /// Once a second: the simulation, its tools' poses and the recording.
 class Diagnostics {

@@ -15,9 +15,24 @@ JawAngle jaw_angle(const sensor_msgs::JointState& message) {
     jaw.problem = "the message has more than " + std::to_string(kMostJoints) + " joints";
     return jaw;
   }
-  std::size_t joint = 0;
-  for (std::size_t i = 0; i < message.position.size() && i < message.name.size(); ++i) {
-    if (message.name[i].find("jaw") != std::string::npos) joint = i;
+  const std::size_t joints = message.position.size(), names = message.name.size();
+  const std::string count = "the message has " + std::to_string(joints) + " joints";
+  if (names > 0 && names != joints) {
+    jaw.problem = count + " and names of " + std::to_string(names);
+    return jaw;
+  }
+  std::size_t joint = 0, called = 0;
+  for (std::size_t i = 0; i < names; ++i) {
+    if (message.name[i].find("jaw") != std::string::npos) joint = i, ++called;
+  }
+  if (joints > 1 && called != 1) {
+    jaw.problem = count +
+                  (names == 0    ? " without names"
+                   : called == 0 ? ", none of them called 'jaw'"
+                                 : ", several of them called 'jaw'") +
+                  ": which is the angle between the jaws is not said; send that one alone, or "
+                  "with 'jaw' in its name and in no other";
+    return jaw;
   }
   jaw.angle = message.position[joint];
   char text[160];

@@ -14,9 +14,10 @@ struct JawAngle {
   std::string problem;  ///< why it cannot be used, with values and the guess; "" for none
 };
 
-/// The jaw's angle in a JointState: the position of the joint whose name holds "jaw", where names
-/// are given and several joints are in it, else the first. Refused: none, one not finite, and one
-/// beyond pi or below -pi, as nobody's jaws are: it is in degrees then.
+/// The jaw's angle in a JointState: the position of its only joint or, of several, of the one whose
+/// name holds "jaw". Refused: none, several of which no name or more than one says that it is
+/// meant, names that are more or fewer than joints, one not finite, and one beyond pi or below -pi,
+/// as nobody's jaws are: it is in degrees then.
 JawAngle jaw_angle(const sensor_msgs::JointState& message);
 
 }  // namespace tissue_sim

@@ -45,6 +45,11 @@ std::unique_lock<std::mutex> Services::begin_building() {
   return lock;
 }
 
+std::unique_ptr<Simulation> Services::build_again() const {
+  const PermitFolders folders(folders_);
+  return std::make_unique<Simulation>(scene_);
+}
+
 BladePath Services::read_path(const Cut::Request& request) const {
   if (request.path.size() < 2) {
     throw std::runtime_error("path has " + std::to_string(request.path.size()) +
@@ -164,7 +169,7 @@ bool Services::reset(std_srvs::Trigger::Request&, std_srvs::Trigger::Response& r
   return answer(response, "reset", [&] {
     const auto lock = begin_building();
     const LimitWork limit(parameters_.limits());
-    simulation_.reset(std::make_unique<Simulation>(scene_));
+    simulation_.reset(build_again());
     return std::string("frame 0 of scene '") + scene_.name + "'";
   });
 }
@@ -236,6 +241,7 @@ bool Services::load_scene(LoadScene::Request& request, LoadScene::Response& resp
     }
     if (scene.fragment_network != "off") permitted(scene.fragment_network, "network");
     Session session = make_session_(scene);
+    session.folders = folders_ = parameters_.load_folders;
     if (records_all_) recorder_.add(topics_of(session));
     scene_ = session.simulation->scene();
     std::string said = "frame 0 of scene '" + scene.name + "'";

@@ -55,6 +55,9 @@ class Services {
 
   /// Held while a scene is built; throws std::runtime_error where one is.
   std::unique_lock<std::mutex> begin_building();
+  /// The present scene from its start. Where it came by load_scene its files are read from where
+  /// that may load from, as they were then.
+  std::unique_ptr<Simulation> build_again() const;
   BladePath read_path(const Cut::Request& request) const;
   std::set<std::string> select(const std::vector<std::string>& topics) const;
 
@@ -66,8 +69,10 @@ class Services {
   MakeSession make_session_;
   std::mutex rebuilding_;  // one at a time; a recording begins before or after
   Scene scene_;
-  std::atomic<bool> records_all_{false};     // the recording that runs or ran last
-  std::vector<ros::ServiceServer> servers_;  // last: end before what they call
+  std::vector<std::string> folders_;           // see Session
+  std::atomic<std::uint64_t> saved_bytes_{0};  // by save_state
+  std::atomic<bool> records_all_{false};       // the recording that runs or ran last
+  std::vector<ros::ServiceServer> servers_;    // last: end before what they call
 };
 
 }  // namespace tissue_sim

@@ -94,6 +94,9 @@ void SimulationThread::set_paused(bool paused) {
     run_.paused = paused;
     resumed_ = !paused;
     clock_.resume();
+    // What no longer answers to a hand must not go on pushing it.
+    for (ToolLoad& load : report_.result.loads) load.mean = Wrench();
+    for (Wrench& load : report_.result.anchor_loads) load = Wrench();
     real_time_factor_.restart();
     update_status();
   });

@@ -6,7 +6,9 @@
 #include <algorithm>
 #include <utility>
 
+#include "ros/diagnostics.h"
 #include "ros/warn_seldom.h"
+#include "scene/read_file.h"
 #include "tools/points_inside.h"
 
 namespace tissue_sim {
@@ -135,6 +137,7 @@ void SimulationThread::start_anew(const ros::Time& before, const ros::Time& now)
   for (const auto& tool : *session_.tools) tool->restart(before, now);
   const Scene scene = session_.simulation->scene();
   const LimitWork limit(parameters_.limits());
+  const PermitFolders folders(session_.folders);
   try {
     session_.simulation.reset();  // its memory, before the next one's
     session_.simulation = std::make_unique<Simulation>(scene);
@@ -181,6 +184,11 @@ void SimulationThread::frame() {
   const CutReport& by_blades = report_.result.blade_report;
   if (by_blades.pieces_left_whole > 0) {
     WARN_SELDOM(1, "an instrument's cut: %s", by_blades.why_left_whole.c_str());
+  }
+  if (!run_.paused && parameters_.time != TimeMode::kLockstep) {
+    for (std::size_t i = 0; i < report_.result.loads.size(); ++i) {
+      if (is_gone((*session_.tools)[i]->status())) report_.result.loads[i].mean = Wrench();
+    }
   }
   real_time_factor_.add(WallClock::now(), simulation.time());
   run_.real_time_factor = real_time_factor_.value();
@@ -253,6 +261,10 @@ void SimulationThread::update_status() {
   s.time = session_.simulation->time();
   s.frame_rate = session_.simulation->scene().frame_rate;
   s.aimed_factor = parameters_.time == TimeMode::kWall ? parameters_.time_factor : 0;
+  const double factor = run_.real_time_factor;
+  if (factor > 0 && factor < 0.9 * s.aimed_factor) {
+    s.coarser = coarser(session_.simulation->scene(), s.aimed_factor / factor);
+  }
   s.behind = clock_.behind();
   s.substeps = report_.result.substeps;
   s.substep = report_.result.substep;

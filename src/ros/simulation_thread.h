@@ -25,6 +25,7 @@ namespace tissue_sim {
 
 /// One scene's simulation and its connections to ROS.
 struct Session {
+  std::vector<std::string> folders;  ///< that files of its scene are read from alone; none: any
   std::unique_ptr<Simulation> simulation;
   std::shared_ptr<ToolInputs> tools;
   std::shared_ptr<Publications> publications;
@@ -41,6 +42,7 @@ struct RunStatus {
   std::int64_t frame = 0;
   double time = 0, frame_rate = 0;
   double aimed_factor = 0;  ///< real-time factor that is to be reached, 0 for none
+  std::string coarser;      ///< what would reach it, where it is not: see coarser()
   double behind = 0;        ///< of ROS time, where frames keep to it [s]
   int substeps = 0;
   double substep = 0, compute_time = 0;

@@ -2,12 +2,12 @@
 #include <ros/console.h>
 
 #include <fstream>
-#include <iterator>
 #include <stdexcept>
 
 #include "ros/recording_path.h"
 #include "ros/service_answer.h"
 #include "ros/services.h"
+#include "scene/read_file.h"
 
 namespace tissue_sim {
 namespace {
@@ -27,13 +27,9 @@ void write_new(const std::string& path, const std::vector<std::uint8_t>& bytes) 
   }
 }
 
-std::vector<std::uint8_t> read_all(const std::string& path) {
-  std::ifstream file(path, std::ios::binary);
-  std::vector<std::uint8_t> bytes((std::istreambuf_iterator<char>(file)),
-                                  std::istreambuf_iterator<char>());
-  if (file.bad() || !file.is_open()) throw std::runtime_error(path + " cannot be read");
-  return bytes;
-}
+/// How many bytes a state of a simulation may have that has this many when it starts: cuts and what
+/// they left add to it.
+std::size_t most_bytes(std::size_t at_start) { return 4 * at_start + (std::size_t(16) << 20); }
 
 }  // namespace
 
@@ -46,7 +42,13 @@ bool Services::save_state(SaveState::Request& request, SaveState::Response& resp
     if (free_space(path.substr(0, path.rfind('/'))) < needed) {
       throw std::runtime_error("the disk has not enough space left (recording_reserve)");
     }
+    const double limit = parameters_.recording_limit * 1024 * 1024;
+    if (limit > 0 && static_cast<double>(saved_bytes_ + saved.state.size()) > limit) {
+      throw std::runtime_error("the states that were saved would have more than recording_limit: " +
+                               std::to_string(saved_bytes_) + " bytes were written so far");
+    }
     write_new(path, saved.state);
+    saved_bytes_ += saved.state.size();
     response.frame = saved.frame;
     return path;
   });
@@ -55,10 +57,16 @@ bool Services::save_state(SaveState::Request& request, SaveState::Response& resp
 bool Services::restore_state(RestoreState::Request& request, RestoreState::Response& response) {
   return answer(response, "restore_state", [&] {
     const std::string path = recorded_path(recorder_.folder(), request.path, ".state");
-    const std::vector<std::uint8_t> bytes = read_all(path);
     const auto lock = begin_building();
     const LimitWork limit(parameters_.limits());
-    auto restored = std::make_unique<Simulation>(scene_);
+    std::unique_ptr<Simulation> restored = build_again();
+    std::string file;
+    try {
+      file = read_file(path, most_bytes(restored->save().size()), ReadFrom::kAnywhere);
+    } catch (const std::invalid_argument& e) {
+      throw std::runtime_error(path + " " + e.what());
+    }
+    const std::vector<std::uint8_t> bytes(file.begin(), file.end());
     try {
       restored->restore({bytes.data(), bytes.size()});
     } catch (const std::exception& e) {

@@ -235,9 +235,13 @@ void ToolInput::accept(const JawSample& sample) {
   const std::lock_guard<std::mutex> lock(mutex_);
   if (!jaw.problem.empty()) {
     ++counts_.jaws_refused;
-    if (may_warn()) ROS_WARN("%s: jaw angle refused: %s", tool().c_str(), jaw.problem.c_str());
+    if (jaw.problem != jaw_problem_ && may_warn()) {
+      ROS_WARN("%s: jaw angle refused: %s", tool().c_str(), jaw.problem.c_str());
+      jaw_problem_ = jaw.problem;
+    }
     return;
   }
+  jaw_problem_.clear();
   jaws_.add(jaw.angle, now());
 }
 

@@ -141,6 +141,7 @@ class ToolInput {
   WallTime last_came_;  // or when it began to listen
   WallTime last_warning_;
   std::string waiting_, far_;  // see ToolStatus
+  std::string jaw_problem_;    // that was said last: each is said once
 
   ros::Subscriber pose_subscriber_, jaw_subscriber_, grip_subscriber_;  // last: end before the rest
 };

@@ -33,6 +33,10 @@ std::string warning(const ToolStatus& s) {
   return s.far.empty() ? "" : s.tool + " is " + s.far;
 }
 
+bool is_gone(const ToolStatus& s) {
+  return s.came && (s.follows_tf ? s.silent > kSilentWarning : s.publishers == 0);
+}
+
 double distance(const Box& box, const Vec3& place) {
   return (place.cwiseMax(box.min).cwiseMin(box.max) - place).norm();
 }

@@ -37,6 +37,10 @@ constexpr double kSilentWarning = 2;
 /// Why this tool is not driven, or not as it is meant; "" if all is well.
 std::string warning(const ToolStatus& status);
 
+/// Whether what drove the tool has vanished: nobody publishes its poses any more, or its transform
+/// stands still.
+bool is_gone(const ToolStatus& status);
+
 /// Distance of a place from a box, 0 within [m].
 double distance(const Box& box, const Vec3& place);
 

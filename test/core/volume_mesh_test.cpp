@@ -3,11 +3,14 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
+#include <cstdlib>
 #include <cstring>
 #include <filesystem>
 #include <fstream>
 #include <sstream>
 
+#include "cut_paths.h"
 #include "geometry/surface.h"
 #include "geometry/tet_mesh.h"
 #include "temporary_folder.h"
@@ -175,6 +178,17 @@ TEST(VolumeMesh, AnyPrefixIsReadOrRefusedInOneLine) {
   }
 }
 
+// As bullet3's data/single_tet.vtk and data/reduced_beam are.
+TEST(VolumeMesh, AWrongSizeOfTheCellsAndANarrowHeadAreNoHindrance) {
+  const TemporaryFolder folder;
+  const std::string path = folder.write("a.vtk",
+                                        "#vtk DataFile Version 2.0\n\nASCII\n"
+                                        "DATASET UNSTRUCTURED_GRID\nPOINTS 4 double\n0 0 0\n1 0 0\n"
+                                        "0 1 0\n0 0 1\n\nCELLS 1 1\n4 0 1 2 3\n\n"
+                                        "CELL_TYPES 1\n10\n");
+  EXPECT_NEAR(volume(load_tet_file(path, nullptr)), 1.0 / 6, 1e-12);
+}
+
 TEST(VolumeMesh, LiesAreRefusedAtOnceWithAReason) {
   const TemporaryFolder folder;
   const std::string vtk = bytes_of("meshio_4.2_binary.vtk"), vtk5 = bytes_of("vtk_5.1_binary.vtk"),
@@ -253,6 +267,59 @@ TEST(VolumeMesh, IsTakenByEachMethodThatCanAndRefusedWithTheirNames) {
   }
   scene.bodies[0].mesh = "/nowhere/a.fbx";
   EXPECT_TRUE(has(reason_of([&] { load_solid(scene.bodies[0], nullptr); }), "does not exist"));
+}
+
+// The table of docs/pbd.md: a row for each of the files that TISSUE_SIM_MESHES names, parted by
+// ';', made 0.1 m long, dropped by 10 mm and after a third of a second cut through its middle, by
+// each method.
+TEST(VolumeMesh, Table) {
+  const char* meshes = std::getenv("TISSUE_SIM_MESHES");
+  if (meshes == nullptr) GTEST_SKIP() << "TISSUE_SIM_MESHES names no mesh";
+  std::istringstream all(meshes);
+  for (std::string path; std::getline(all, path, ';');) {
+    std::printf("| %s | ", fs::path(path).filename().c_str());
+    TetMesh mesh;
+    std::vector<std::string> notes;
+    const std::string reason = reason_of([&] { mesh = load_tet_file(path, &notes); });
+    if (mesh.tetrahedra.empty()) {
+      std::printf("%s |\n", reason.c_str());
+      continue;
+    }
+    std::printf("%zu | %.7g |", mesh.tetrahedra.size(), volume(mesh));
+    Box box;
+    for (const Vec3& v : mesh.vertices) {
+      box.min = box.min.cwiseMin(v);
+      box.max = box.max.cwiseMax(v);
+    }
+    Scene scene;
+    scene.device = Device::kCpu;
+    scene.cell_size = 0.008;
+    scene.pbd.model = PbdModel::kTetrahedra;
+    scene.bodies = {body_of(path)};
+    Body& body = scene.bodies[0];
+    body.scale = 0.1 / (box.max - box.min).maxCoeff();
+    body.pose.position = -body.scale * (box.min + box.max) / 2;
+    body.pose.position.z() = 0.01 - body.scale * box.min.z();
+    const double whole = volume(mesh) * std::pow(body.scale, 3);
+    for (const Method method : {Method::kMpm, Method::kMls, Method::kPbd}) {
+      scene.method = method;
+      const std::string failed = reason_of([&] {
+        Simulation simulation(scene);
+        double sum = 0;
+        for (const Fragment& f : simulation.tissue().fragments()) sum += f.volume;
+        for (int frame = 0; frame < 20; ++frame) simulation.advance_frame();
+        const auto before = simulation.tissue().fragments();
+        simulation.cut(plane_cut(before[0].centroid, Vec3::UnitX()));
+        simulation.advance_frame();
+        std::printf(" %.2g %%, %zu to %zu |", 100 * std::abs(sum / whole - 1), before.size(),
+                    simulation.tissue().fragments().size());
+      });
+      if (failed != "nothing was thrown") std::printf(" %s |", failed.c_str());
+      std::fflush(stdout);
+    }
+    std::printf("\n");
+    for (const std::string& note : notes) std::printf("%s\n", note.c_str());
+  }
 }
 
 TEST(VolumeMesh, InMillimetresFarFromTheOriginInKilopascalIsSaid) {

@@ -39,8 +39,24 @@ TEST(JawCheck, FindsTheJawAmongTheJointsOfAnArm) {
   m.name = {"outer_yaw", "outer_pitch", "outer_insertion", "jaw"};
   m.position = {0.1, 0.2, 0.05, 0.7};
   EXPECT_EQ(jaw_angle(m).angle, 0.7);
-  m.name.clear();
-  EXPECT_EQ(jaw_angle(m).angle, 0.1) << "the first where none is called so";
+  m.name = {"grip"};
+  m.position = {0.3};
+  EXPECT_EQ(jaw_angle(m).angle, 0.3) << "the only one, whatever its name";
+}
+
+TEST(JawCheck, RefusesJointsOfWhichNoneIsSaidToBeTheJaw) {
+  sensor_msgs::JointState m;  // as a Raven II publishes them
+  m.position.assign(15, 0.1);
+  EXPECT_EQ(jaw_angle(m).problem.find("the message has 15 joints without names"), 0u)
+      << jaw_angle(m).problem;
+  m.name.assign(15, "joint");
+  EXPECT_NE(jaw_angle(m).problem.find("none of them called 'jaw'"), std::string::npos);
+  m.name[6] = "left jaw";
+  EXPECT_EQ(jaw_angle(m).problem, "");
+  m.name[7] = "right jaw";
+  EXPECT_NE(jaw_angle(m).problem.find("several of them called 'jaw'"), std::string::npos);
+  m.name = {"jaw"};
+  EXPECT_EQ(jaw_angle(m).problem, "the message has 15 joints and names of 1");
 }
 
 }  // namespace

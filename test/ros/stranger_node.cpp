@@ -6,16 +6,19 @@
 #include <sys/wait.h>
 #include <tf2_msgs/TFMessage.h>
 #include <tissue_sim/LoadScene.h>
+#include <tissue_sim/RestoreState.h>
 #include <tissue_sim/SaveState.h>
 #include <tissue_sim/StartRecording.h>
 #include <unistd.h>
 
 #include <cmath>
 #include <filesystem>
+#include <fstream>
 #include <limits>
 #include <thread>
 
 #include "simulator_client.h"
+#include "temporary_folder.h"
 
 namespace tissue_sim {
 namespace {
@@ -183,6 +186,67 @@ TEST_F(Stranger, ClientsThatCallAllAtOnceAreAnswered) {
   for (std::thread& client : clients) client.join();
   EXPECT_EQ(answered, 80);
   trigger("stop_recording");
+}
+
+// A mesh that was exchanged, since its scene was loaded, for a link to elsewhere.
+TEST_F(Stranger, WhatIsBuiltAgainReadsOnlyFromWhereItIsPermitted) {
+  std::string folders, slab;
+  ASSERT_TRUE(ros::param::get("/simulator/load_folders", folders));
+  ASSERT_TRUE(ros::param::get("/simulator/scene_file", slab));
+  const std::string mesh = folders.substr(folders.find(':') + 1) + "/a.mesh";
+  const TemporaryFolder elsewhere;
+  const std::string tetrahedron =
+      "Dimension 3 Vertices 4 0 0 0 0 0.08 0 0 0 0 0.08 0 0 0 0 0.08 0 Tetrahedra 1 1 2 3 4 0";
+  const std::string secret = elsewhere.write("secret.mesh", tetrahedron);
+  std::ofstream(mesh) << tetrahedron;
+  const LoadScene::Response loaded =
+      load("", "{cell_size: 0.01, bodies: [{shape: mesh, mesh: " + mesh + "}]}");
+  ASSERT_TRUE(loaded.success) << loaded.message;
+  SaveState::Request saved;
+  saved.path = "permitted";
+  ASSERT_TRUE(call<SaveState>("save_state", saved).success);
+  RestoreState::Request restored;
+  restored.path = "permitted";
+  EXPECT_TRUE(call<RestoreState>("restore_state", restored).success);
+
+  std::filesystem::remove(mesh);
+  std::filesystem::create_symlink(secret, mesh);
+  for (const std::string& message :
+       {trigger("reset").message, call<RestoreState>("restore_state", restored).message}) {
+    EXPECT_NE(message.find("load_folders"), std::string::npos) << message;
+  }
+  std::filesystem::remove(mesh);
+  std::ofstream(mesh) << tetrahedron;
+  EXPECT_TRUE(trigger("reset").success);
+  EXPECT_TRUE(load(slab).success);
+}
+
+TEST_F(Stranger, StatesAreReadAndWrittenUpToALimit) {
+  std::string folder;
+  ASSERT_TRUE(ros::param::get("/simulator/recording_folder", folder));
+  SaveState::Request save;
+  SaveState::Response saved;
+  int count = 0;
+  do {
+    save.path = "state" + std::to_string(count);
+    saved = call<SaveState>("save_state", save);
+  } while (saved.success && ++count < 1000);
+  EXPECT_GT(count, 1);
+  EXPECT_NE(saved.message.find("recording_limit"), std::string::npos) << saved.message;
+  double bytes = 0;
+  for (const auto& entry : std::filesystem::directory_iterator(folder)) {
+    if (entry.path().extension() == ".state") bytes += std::filesystem::file_size(entry.path());
+  }
+  EXPECT_LE(bytes, 4 << 20);
+
+  RestoreState::Request restore;
+  restore.path = "state0";
+  std::filesystem::resize_file(folder + "/state1.state", std::uintmax_t(3) << 30);  // a hole
+  EXPECT_TRUE(call<RestoreState>("restore_state", restore).success);
+  restore.path = "state1";
+  const auto restored = call<RestoreState>("restore_state", restore);
+  EXPECT_FALSE(restored.success);
+  EXPECT_NE(restored.message.find("too large"), std::string::npos) << restored.message;
 }
 
 /// A node of its own, started with these arguments.

@@ -47,6 +47,22 @@ TEST(ToolStatus, SaysForHowLongNothingCame) {
   EXPECT_EQ(warning(s), "");
 }
 
+TEST(ToolStatus, KnowsAnArmThatIsGoneFromOneThatIsSlowOrNeverCame) {
+  ToolStatus s = driven();
+  s.silent = 5;
+  EXPECT_FALSE(is_gone(s)) << "it still publishes";
+  s.publishers = 0;
+  EXPECT_TRUE(is_gone(s));
+  s.came = false;
+  EXPECT_FALSE(is_gone(s));
+  s = driven();
+  s.follows_tf = true;
+  s.publishers = 0;
+  EXPECT_FALSE(is_gone(s));
+  s.silent = 5;
+  EXPECT_TRUE(is_gone(s));
+}
+
 TEST(ToolStatus, SaysWhatATfFrameLacksAndThatItStandsStill) {
   ToolStatus s = driven();
   s.follows_tf = true;

@@ -1,6 +1,7 @@
 // Tools: where their poses and jaws come from, what pushes them, how they are shown.
 #include <geometry_msgs/TransformStamped.h>
 #include <geometry_msgs/WrenchStamped.h>
+#include <rosgraph_msgs/Log.h>
 #include <sensor_msgs/JointState.h>
 #include <std_msgs/Float64.h>
 #include <tf2_msgs/TFMessage.h>
@@ -109,6 +110,43 @@ TEST_F(Tools, JawAnglesArePassedOn) {
   }));
 }
 
+TEST_F(Tools, OfTheJointsOfAnArmTheOneCalledJawIsTakenAndOthersAreRefusedOnce) {
+  Topic<FrameInputMessage> inputs("/simulator/inputs");
+  Topic<rosgraph_msgs::Log> log("/rosout");
+  ros::NodeHandle node;
+  ros::Publisher joints =
+      node.advertise<sensor_msgs::JointState>("/simulator/probe/jaw/measured_js", 10);
+  ASSERT_TRUE(wait_until([&] { return joints.getNumSubscribers() > 0; }));
+  Arm arm("probe");
+  sensor_msgs::JointState m;
+  const auto jaw_after_sending = [&] {
+    m.header.stamp = ros::Time::now();
+    joints.publish(m);
+    arm.send(pointing_down(0.26, 0, 0.1));
+    ros::WallDuration(0.02).sleep();
+    return inputs.last() ? inputs.last()->tools[1].jaw_end : NAN;
+  };
+  m.position.assign(15, 0.7);
+  m.name.assign(15, "joint");
+  m.name[6] = "jaw";
+  m.position[6] = 0.4;
+  EXPECT_TRUE(wait_until([&] { return std::fabs(jaw_after_sending() - 0.4) < 1e-6; }));
+  m.name.clear();  // as a Raven II sends them
+  const auto said = [&] {
+    const auto all = log.all();
+    return std::count_if(all.begin(), all.end(), [](const rosgraph_msgs::Log::ConstPtr& line) {
+      return line->msg.find("15 joints without names") != std::string::npos;
+    });
+  };
+  EXPECT_TRUE(wait_until([&] {
+    EXPECT_NEAR(jaw_after_sending(), 0.4, 1e-6);
+    return said() > 0;
+  }));
+  const ros::WallTime then = ros::WallTime::now();
+  while (ros::WallTime::now() - then < ros::WallDuration(2.5)) jaw_after_sending();
+  EXPECT_EQ(said(), 1);
+}
+
 TEST_F(Tools, JawsOfAGrasperCloseAsFastAsAMotor) {
   Topic<FrameInputMessage> inputs("/simulator/inputs");
   Topic<visualization_msgs::MarkerArray> markers("/simulator/markers");
@@ -185,15 +223,14 @@ TEST_F(Tools, WrenchPushesBackAndTurnsWithTheTool) {
   arm.sweep(pressed, above, 0.3);
 }
 
-TEST_F(Tools, ForcesAndTransformsGoOnWhilePaused) {
+TEST_F(Tools, ForcesAndTransformsGoOnWhilePausedAndPushNobody) {
   Topic<geometry_msgs::WrenchStamped> spatial("/simulator/probe/spatial/measured_cf");
   Topic<tf2_msgs::TFMessage> tf("/tf");
   Arm arm("probe");
-  ASSERT_TRUE(wait_until([&] {
-    arm.send(pointing_down(0.01, 0, 0.05));
-    ros::WallDuration(0.02).sleep();
-    return spatial.count() > 3 && tf.count() > 3;
-  }));
+  const Pose above = pointing_down(0.01, 0, 0.04), pressed = pointing_down(0.01, 0, 0.016);
+  arm.send(above);
+  arm.sweep(above, pressed, 0.8);
+  ASSERT_TRUE(wait_until([&] { return spatial.last()->wrench.force.z > 0.01 && tf.count() > 3; }));
   pause(true);
   ros::WallDuration(0.1).sleep();  // what was under way
   const auto last = spatial.last();
@@ -201,8 +238,21 @@ TEST_F(Tools, ForcesAndTransformsGoOnWhilePaused) {
   EXPECT_TRUE(wait_until([&] { return spatial.count() > forces + 10; }, 2));
   EXPECT_TRUE(wait_until([&] { return tf.count() > transforms + 10; }, 2));
   EXPECT_GT(spatial.last()->header.stamp, last->header.stamp);
-  EXPECT_EQ(spatial.last()->wrench.force.z, last->wrench.force.z);
+  EXPECT_EQ(spatial.last()->wrench.force.z, 0);
   pause(false);
+  EXPECT_TRUE(wait_until([&] { return spatial.last()->wrench.force.z > 0.01; }));
+}
+
+TEST_F(Tools, AnArmThatVanishesIsPushedByNothing) {
+  Topic<geometry_msgs::WrenchStamped> spatial("/simulator/probe/spatial/measured_cf");
+  {
+    Arm arm("probe");
+    const Pose above = pointing_down(0.01, 0, 0.04), pressed = pointing_down(0.01, 0, 0.016);
+    arm.send(above);
+    arm.sweep(above, pressed, 0.8);
+    ASSERT_TRUE(wait_until([&] { return spatial.last()->wrench.force.z > 0.01; }));
+  }
+  EXPECT_TRUE(wait_until([&] { return spatial.last()->wrench.force.z == 0; }));
 }
 
 TEST_F(Tools, AfterAResetTheFirstPoseCountsWhateverItsStamp) {

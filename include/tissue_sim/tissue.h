@@ -70,6 +70,7 @@ struct SurfaceTriangles {
   std::vector<float> corners;          ///< nine coordinates a triangle [m], world frame
   std::vector<float> rest;             ///< where these were at time zero, of the same material [m]
   std::vector<std::int32_t> fragment;  ///< Fragment::id of each triangle
+  std::vector<std::int32_t> point;     ///< Point::id of the tissue there, one of several for some
   std::vector<std::uint8_t> cut;       ///< of each: 1 where a cut or a tear made it, else 0
 };
 

@@ -11,15 +11,16 @@
 namespace tissue_sim {
 
 /// Replaces `out` with two triangles for each of `faces`, whose `vertex` name entries of `place`
-/// (now) and `rest` [m] and whose `cut` says whether a cut or a tear made it; `piece(face)` is its
-/// Fragment::id.
-template <class Faces, class PieceOf>
+/// (now) and `rest` [m], whose `point` is tissue there and whose `cut` says whether a cut or a tear
+/// made it; `piece` is the Fragment::id of each point.
+template <class Faces>
 void put_faces(const Faces& faces, const std::vector<std::array<float, 3>>& place,
-               const std::vector<std::array<float, 3>>& rest, const PieceOf& piece, Cpu& cpu,
-               SurfaceTriangles& out) {
+               const std::vector<std::array<float, 3>>& rest,
+               const std::vector<std::int32_t>& piece, Cpu& cpu, SurfaceTriangles& out) {
   out.corners.resize(18 * faces.size());
   out.rest.resize(18 * faces.size());
   out.fragment.resize(2 * faces.size());
+  out.point.resize(2 * faces.size());
   out.cut.resize(2 * faces.size());
   cpu.for_each(
       static_cast<int>(faces.size()),
@@ -32,7 +33,8 @@ void put_faces(const Faces& faces, const std::vector<std::array<float, 3>>& plac
           at_rest = std::copy_n(rest[f.vertex[k]].data(), 3, at_rest);
         }
         for (int t = 2 * i; t < 2 * i + 2; ++t) {
-          out.fragment[t] = piece(f);
+          out.fragment[t] = piece[f.point];
+          out.point[t] = f.point;
           out.cut[t] = f.cut;
         }
       },

@@ -270,9 +270,7 @@ void read_surface(const MlsState& s, const std::vector<std::int32_t>& piece, Mls
         }
       },
       kGrain);
-  put_faces(
-      surface.faces, place, rest, [&](const MlsSurface::Face& face) { return piece[face.node]; },
-      *s.cpu, out);
+  put_faces(surface.faces, place, rest, piece, *s.cpu, out);
 }
 
 }  // namespace tissue_sim

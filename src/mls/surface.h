@@ -35,7 +35,7 @@ struct MlsSurface {
   };
   struct Face {
     std::int32_t vertex[4];
-    std::int32_t node;
+    std::int32_t point;  ///< the node of its cube
     std::uint8_t cut;
   };
   std::vector<Lattice> bodies;  ///< empty until it is asked for

@@ -70,6 +70,7 @@ struct SurfaceTriangles {
   std::vector<float> corners;          ///< nine coordinates a triangle [m], world frame
   std::vector<float> rest;             ///< where these were at time zero, of the same material [m]
   std::vector<std::int32_t> fragment;  ///< Fragment::id of each triangle
+  std::vector<std::int32_t> point;     ///< Point::id of the tissue there, one of several for some
   std::vector<std::uint8_t> cut;       ///< of each: 1 where a cut or a tear made it, else 0
 };
 
@@ -85,9 +86,8 @@ class Tissue {
   virtual int point_count() const = 0;
   /// Replaces `cloud` with the selected points, as Point after Point. Returns their number.
   virtual int read_points(const PointSelection& selection, std::vector<std::uint8_t>& cloud) = 0;
-  /// Replaces `surface` with the tissue's, as of the last finish(); leaves it empty for `mls`,
-  /// whose points no triangles join.
-  virtual void read_surface(SurfaceTriangles& surface) { surface = {}; }
+  /// Replaces `surface` with the tissue's, as of the last finish().
+  virtual void read_surface(SurfaceTriangles& surface) = 0;
   /// Whether FrameInput::anchors move what they hold, and FrameResult has their loads.
   virtual bool moves_anchors() const { return false; }
   /// Number of pieces, as of the last finish(). It grows whenever a piece comes apart.

@@ -42,7 +42,9 @@ inline constexpr Spelling<Shape> kShapeNames[] = {{Shape::kBox, "box"},
 inline constexpr Spelling<MpmBoundary> kMpmBoundaryNames[] = {{MpmBoundary::kSurface, "surface"},
                                                               {MpmBoundary::kLattice, "lattice"}};
 inline constexpr Spelling<CameraColours> kCameraColourNames[] = {
-    {CameraColours::kTissue, "tissue"}, {CameraColours::kFragments, "fragments"}};
+    {CameraColours::kTissue, "tissue"},
+    {CameraColours::kFragments, "fragments"},
+    {CameraColours::kStress, "stress"}};
 inline constexpr Spelling<ToolType> kToolTypeNames[] = {
     {ToolType::kScalpel, "scalpel"}, {ToolType::kProbe, "probe"}, {ToolType::kGrasper, "grasper"},
     {ToolType::kBall, "ball"},       {ToolType::kPunch, "punch"}, {ToolType::kPlate, "plate"}};

@@ -251,11 +251,11 @@ class PySimulation {
     if (!memory || memory.use_count() > 1) memory = std::make_shared<T>();
   }
   static py::object guard(const py::object& self, const py::array& array) {
-    return py::module_::import("tissue_sim.array").attr("Array")(array, self);
+    return py::module::import("tissue_sim.array").attr("Array")(array, self);
   }
   template <class... Arrays>
   static py::object tuple_of(const char* name, const Arrays&... arrays) {
-    return py::module_::import("tissue_sim.array").attr(name)(arrays...);
+    return py::module::import("tissue_sim.array").attr(name)(arrays...);
   }
 
   std::unique_ptr<Simulation> simulation_;

@@ -369,7 +369,7 @@ PYBIND11_MODULE(_core, m) {
           "surface", [](const py::object& self) { return self.cast<P&>().surface(self); },
           "The triangles of the tissue's surface: corners and rest (n, 3, 3) [m], fragment (n,), "
           "cut\n"
-          "(n,) bool. Empty for method mls. Valid until the next advance: see Array.")
+          "(n,) bool. Valid until the next advance: see Array.")
       .def(
           "render",
           [](const py::object& self, const py::object& camera, const py::object& pose) {

@@ -88,7 +88,7 @@ bool ends_with(const std::string& text, const std::string& end) {
 
 Scene to_scene(const py::object& scene) {
   if (py::isinstance<py::dict>(scene)) {
-    return scene_from_yaml(py::str(py::module_::import("json").attr("dumps")(
+    return scene_from_yaml(py::str(py::module::import("json").attr("dumps")(
         scene, py::arg("default") = py::cpp_function(as_plain), py::arg("ensure_ascii") = false)));
   }
   if (py::hasattr(scene, "__fspath__")) return load_scene(py::str(scene.attr("__fspath__")()));

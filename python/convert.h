@@ -45,6 +45,6 @@ py::dtype point_type(const PointSelection& selection);
 unsigned to_fields(const std::vector<std::string>& names);
 
 /// The classes of frames and what they report.
-void bind_reports(py::module_& module);
+void bind_reports(py::module& module);
 
 }  // namespace tissue_sim

@@ -251,11 +251,11 @@ class PySimulation {
     if (!memory || memory.use_count() > 1) memory = std::make_shared<T>();
   }
   static py::object guard(const py::object& self, const py::array& array) {
-    return py::module_::import("tissue_sim.array").attr("Array")(array, self);
+    return py::module::import("tissue_sim.array").attr("Array")(array, self);
   }
   template <class... Arrays>
   static py::object tuple_of(const char* name, const Arrays&... arrays) {
-    return py::module_::import("tissue_sim.array").attr(name)(arrays...);
+    return py::module::import("tissue_sim.array").attr(name)(arrays...);
   }
 
   std::unique_ptr<Simulation> simulation_;
@@ -369,7 +369,7 @@ PYBIND11_MODULE(_core, m) {
           "surface", [](const py::object& self) { return self.cast<P&>().surface(self); },
           "The triangles of the tissue's surface: corners and rest (n, 3, 3) [m], fragment (n,), "
           "cut\n"
-          "(n,) bool. Empty for method mls. Valid until the next advance: see Array.")
+          "(n,) bool. Valid until the next advance: see Array.")
       .def(
           "render",
           [](const py::object& self, const py::object& camera, const py::object& pose) {

@@ -5,7 +5,7 @@
 
 namespace tissue_sim {
 
-void bind_reports(py::module_& m) {
+void bind_reports(py::module& m) {
   py::class_<ToolRequest>(m, "ToolRequest", "Where a tool shall be at the end of a frame.")
       .def(py::init([](const py::object& pose, double jaw, bool placed,
                        std::optional<double> grip_pressure) {

@@ -74,7 +74,7 @@ def predict(task):
                     found[m] = near, weight / weight.sum()
                 near, weight = found[m]
                 marks[m].append(at + weight @ np.asarray(points["displacement"])[near])
-    frames = int(np.ceil(data["t"][-1] * scene["frame_rate"] - 1e-9))
+    frames = int(np.ceil(data["t"][-1] * scene["frame_rate"] + 0.5 - 1e-9))  # the last middle is behind
     row = run(scene, frames, {tool: data}, each_frame=look)
     if row["error"]:
         raise ValueError(row["error"])

@@ -90,6 +90,20 @@ TEST_F(Tools, ToolsFollowTfOrTransformsWhereAsked) {
   EXPECT_NEAR(m->tools[3].end.position.y, 0.1, 1e-9);
 }
 
+// Whoever publishes them hears of it from roscpp; whoever subscribed would not.
+TEST_F(Tools, TransformsWhereNoneAreAskedForAreRefusedWithTheReason) {
+  Topic<rosgraph_msgs::Log> log("/rosout");
+  ros::NodeHandle node;
+  ros::Publisher transforms =
+      node.advertise<geometry_msgs::TransformStamped>("/simulator/scalpel/measured_cp", 10);
+  EXPECT_TRUE(wait_until([&] {
+    const auto all = log.all();
+    return std::any_of(all.begin(), all.end(), [](const rosgraph_msgs::Log::ConstPtr& line) {
+      return line->msg.find("set tools/scalpel/pose_type: TransformStamped") != std::string::npos;
+    });
+  }));
+}
+
 TEST_F(Tools, JawAnglesArePassedOn) {
   Topic<FrameInputMessage> inputs("/simulator/inputs");
   ros::NodeHandle node;

@@ -28,6 +28,7 @@ class Diagnostics {
   void tools(Status& status);
   void recording(Status& status);
 
+  ros::NodeHandle node_;
   const SimulationThread& simulation_;
   const Recorder& recorder_;
   std::uint64_t refused_before_ = 0;

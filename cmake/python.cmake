@@ -1,10 +1,17 @@
 # The Python module tissue_sim: python_folder, where it can be imported from, and the target
 # tissue_sim_python, where pybind11 is found. Built by `pip install .` too, which asks for it alone.
 option(TISSUE_SIM_PYTHON "Fail where pybind11 is not found, in place of leaving the Python module out" OFF)
-if(Python3_FOUND)  # by pluginlib, its interpreter alone, which pybind11 would go on with
+if(SKBUILD)  # pip's, which brings its own
+  find_package(pybind11 QUIET)
+else()  # with the headers of the Python that ROS is installed for, else pybind11 ends in an error
+  if(PYTHON_EXECUTABLE AND NOT Python3_EXECUTABLE)
+    set(Python3_EXECUTABLE ${PYTHON_EXECUTABLE})
+  endif()
   find_package(Python3 QUIET COMPONENTS Interpreter Development)
+  if(Python3_Development_FOUND)
+    find_package(pybind11 QUIET)
+  endif()
 endif()
-find_package(pybind11 QUIET)
 if(pybind11_FOUND)
   pybind11_add_module(tissue_sim_python NO_EXTRAS python/module.cpp python/convert.cpp python/reports.cpp)
   target_compile_options(tissue_sim_python PRIVATE ${tissue_sim_warnings})
@@ -28,7 +35,7 @@ if(pybind11_FOUND)
   install(TARGETS tissue_sim_python LIBRARY DESTINATION ${python_destination} COMPONENT python ${python_part})
   install(FILES ${python_files} DESTINATION ${python_destination} COMPONENT python ${python_part})
 elseif(TISSUE_SIM_PYTHON)
-  message(FATAL_ERROR "tissue_sim: pybind11 was not found: install pybind11-dev")
+  message(FATAL_ERROR "tissue_sim: pybind11 was not found: install pybind11-dev and python3-dev")
 else()
-  message(STATUS "tissue_sim: pybind11 was not found: no Python module (pybind11-dev)")
+  message(STATUS "tissue_sim: pybind11 was not found: no Python module (pybind11-dev, python3-dev)")
 endif()

@@ -8,7 +8,7 @@ build=${TISSUE_SIM_BUILD:-$repo/build}
 noetic=/opt/ros/noetic/setup.bash
 
 core_packages=(g++ make cmake libeigen3-dev libtbb-dev libyaml-cpp-dev libnanoflann-dev zlib1g-dev
-  libembree-dev libgtest-dev libbenchmark-dev python3)
+  libembree-dev libgtest-dev libbenchmark-dev python3 python3-dev pybind11-dev)
 picture_packages=(python3-numpy python3-matplotlib python3-yaml)
 debian_packages=(catkin ros-message-generation ros-message-runtime libroscpp-dev libroslib-dev
   librosbag-storage-dev librostest-dev libtf2-dev libtf2-ros-dev libtf2-geometry-msgs-dev
@@ -28,6 +28,9 @@ noetic_packages=(ros-noetic-{catkin,message-generation,message-runtime,roscpp,ro
 # 380 packages of 200 MB and three minutes.
 pcl_packages=(libpcl-dev libpcl-conversions-dev)
 if [[ -e $noetic ]]; then pcl_packages=(libpcl-dev ros-noetic-pcl-conversions); fi
+
+# For tests of the Python module; without some of them part of the tests is left out, which says so.
+python_packages=(python3-numpy python3-pytest python3-venv python3-pip python3-scipy python3-matplotlib)
 
 say() { printf '\n== %s\n' "$*"; }
 fail() { printf '\nerror: %s\n' "$*" >&2; exit 1; }
@@ -240,7 +243,7 @@ use_environment() {
   if [[ -e $build/venv/complete ]]; then return; fi
   say "Making a Python environment in $build/venv (log: $build/venv.log)"
   { /usr/bin/python3 -m venv --clear --system-site-packages "$build/venv" &&
-    "$python" -m pip install --disable-pip-version-check 'distributed' 'gymnasium' 'pyarrow<18' 'numpy<2' \
+    "$python" -m pip install --disable-pip-version-check 'distributed' 'gymnasium' 'pyarrow<18' 'numpy<2' pytest \
       scipy matplotlib; } >"$build/venv.log" 2>&1 || return 1
   touch "$build/venv/complete"
 }

@@ -75,6 +75,7 @@ Diagnostics::Diagnostics(ros::NodeHandle& node, const SimulationThread& simulati
 
 void Diagnostics::simulation(Status& status) {
   const RunStatus s = simulation_.status();
+  slow_reports_ = s.coarser.empty() ? 0 : slow_reports_ + 1;
   if (s.run.blew_up) {
     status.summary(DiagnosticStatus::ERROR, s.problem);
   } else if (s.run.paused) {
@@ -86,7 +87,7 @@ void Diagnostics::simulation(Status& status) {
     const std::string slow =
         (s.aimed_factor == 1 ? "slower than real time: " : "slower than time_factor: ") + s.coarser;
     status.summary(DiagnosticStatus::WARN, slow);
-    WARN_SELDOM(60, "%s", slow.c_str());
+    if (slow_reports_ >= 5) WARN_SELDOM(60, "%s", slow.c_str());  // not of a start, or a moment
   } else if (!s.inside.empty()) {
     status.summary(DiagnosticStatus::WARN, s.inside);
   } else {

@@ -32,6 +32,7 @@ class Diagnostics {
   const SimulationThread& simulation_;
   const Recorder& recorder_;
   std::uint64_t refused_before_ = 0;
+  int slow_reports_ = 0;  // one after the other
   diagnostic_updater::Updater updater_;
   ros::WallTimer timer_;
 };

@@ -8,7 +8,7 @@ build=${TISSUE_SIM_BUILD:-$repo/build}
 noetic=/opt/ros/noetic/setup.bash
 
 core_packages=(g++ make cmake libeigen3-dev libtbb-dev libyaml-cpp-dev libnanoflann-dev zlib1g-dev
-  libembree-dev libgtest-dev libbenchmark-dev python3)
+  libembree-dev libgtest-dev libbenchmark-dev python3 python3-dev pybind11-dev)
 picture_packages=(python3-numpy python3-matplotlib python3-yaml)
 debian_packages=(catkin ros-message-generation ros-message-runtime libroscpp-dev libroslib-dev
   librosbag-storage-dev librostest-dev libtf2-dev libtf2-ros-dev libtf2-geometry-msgs-dev
@@ -28,6 +28,9 @@ noetic_packages=(ros-noetic-{catkin,message-generation,message-runtime,roscpp,ro
 # 380 packages of 200 MB and three minutes.
 pcl_packages=(libpcl-dev libpcl-conversions-dev)
 if [[ -e $noetic ]]; then pcl_packages=(libpcl-dev ros-noetic-pcl-conversions); fi
+
+# For tests of the Python module; without some of them part of the tests is left out, which says so.
+python_packages=(python3-numpy python3-pytest python3-venv python3-pip python3-scipy python3-matplotlib)
 
 say() { printf '\n== %s\n' "$*"; }
 fail() { printf '\nerror: %s\n' "$*" >&2; exit 1; }
@@ -138,7 +141,8 @@ configure() {
   say "Building in $folder (log: build.log there)"
   cmake -S "$repo" -B "$folder" -DCMAKE_BUILD_TYPE=Release -DPYTHON_EXECUTABLE=/usr/bin/python3 \
     -DTISSUE_SIM_WERROR="${TISSUE_SIM_WERROR:-OFF}" \
-    -DTISSUE_SIM_REQUIRE_PCL="${TISSUE_SIM_REQUIRE_PCL:-OFF}" "$@" >"$folder/build.log" 2>&1 || {
+    -DTISSUE_SIM_REQUIRE_PCL="${TISSUE_SIM_REQUIRE_PCL:-OFF}" \
+    -DTISSUE_SIM_PYTHON="${TISSUE_SIM_PYTHON:-OFF}" "$@" >"$folder/build.log" 2>&1 || {
     grep -A 12 'CMake Error' "$folder/build.log" >&2 || tail -20 "$folder/build.log" >&2
     fail "CMake could not configure: see $folder/build.log"
   }
@@ -230,4 +234,32 @@ s = socket.socket(); s.bind(("localhost", 0)); print(s.getsockname()[1])')
   unset ROS_IP
   export ROS_HOSTNAME=localhost ROS_MASTER_URI=http://localhost:$port ROS_LOG_DIR=$build/log
   mkdir -p "$ROS_LOG_DIR"
+}
+
+# use_environment: a Python environment in the build folder that sees the system's packages and has what
+# PyPI alone has in versions that go with them; sets python. Fails where PyPI is not reached.
+use_environment() {
+  python=$build/venv/bin/python
+  if [[ -e $build/venv/complete ]]; then return; fi
+  say "Making a Python environment in $build/venv (log: $build/venv.log)"
+  { /usr/bin/python3 -m venv --clear --system-site-packages "$build/venv" &&
+    "$python" -m pip install --disable-pip-version-check 'distributed' 'gymnasium' 'pyarrow<18' 'numpy<2' pytest \
+      scipy matplotlib; } >"$build/venv.log" 2>&1 || return 1
+  touch "$build/venv/complete"
+}
+
+# run_module MODULE ARGUMENTS...: in the environment that is active if it has the package, else with the
+# module that a build of the package left.
+run_module() {
+  local module=$1 needed='import tissue_sim._core, distributed, matplotlib, pyarrow, scipy' folder
+  shift
+  if python3 -c "$needed" 2>/dev/null; then exec python3 -m "$module" "$@"; fi
+  clear_environment
+  prepare_folder
+  for folder in "$repo"/devel/lib/python3/dist-packages "$build"/{ros/devel/lib/python3/dist-packages,core/python}; do
+    compgen -G "$folder/tissue_sim/_core*.so" >/dev/null || continue
+    use_environment || fail "Python's packages could not be had: see $build/venv.log"
+    PYTHONPATH=$folder exec "$python" -m "$module" "$@"
+  done
+  fail "the Python module is not built: pip install '.[sweep]', or install pybind11-dev and run scripts/run"
 }

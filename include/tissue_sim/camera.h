@@ -13,6 +13,7 @@ namespace tissue_sim {
 enum class CameraColours {
   kTissue,  ///< wet tissue under a light at the lens, with vessels; what a blade opened is redder
   kFragments,  ///< each piece in its own colour, as in clouds
+  kStress,     ///< von Mises stress, dark red at 0 to white at `stress_end`
 };
 
 /// A pinhole camera: it looks along its z, its x points right and its y down in the image (REP
@@ -28,6 +29,7 @@ struct Camera {
   double near = 0.001, far = 2;  ///< depths that it sees [m], 1e-4 to 100
   bool light = true;             ///< at the lens; false: even light from everywhere
   CameraColours colours = CameraColours::kTissue;
+  double stress_end = 10000;  ///< with colours by stress [Pa], 1 to 1e9
   /// Of the raw images, in the order of OpenCV and ROS: k1, k2, p1, p2, k3. None: a pinhole's.
   std::vector<double> distortion;
 

@@ -23,6 +23,15 @@ struct Stopped : std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
+/// Thrown for a scene of more points than WorkLimits have.
+struct TooLarge : std::invalid_argument {
+  using std::invalid_argument::invalid_argument;
+};
+/// Thrown for a scene that takes more memory than the GPU has.
+struct OutOfMemory : std::runtime_error {
+  using std::runtime_error::runtime_error;
+};
+
 /// Sets the limits of this thread until it goes; then those before hold again.
 class LimitWork {
  public:

@@ -20,6 +20,7 @@ namespace tissue_sim {
 /// A scene as it stands after a frame.
 struct SceneView {
   SurfaceTriangles surface;
+  std::vector<float> stress;  ///< von Mises, of each triangle [Pa]; empty where no camera shows it
   std::vector<Fragment> fragments;
   std::vector<ToolMotion> tools;  ///< parallels Scene::tools; their ends are drawn
 };

@@ -70,6 +70,7 @@ struct SurfaceTriangles {
   std::vector<float> corners;          ///< nine coordinates a triangle [m], world frame
   std::vector<float> rest;             ///< where these were at time zero, of the same material [m]
   std::vector<std::int32_t> fragment;  ///< Fragment::id of each triangle
+  std::vector<std::int32_t> point;     ///< Point::id of the tissue there, one of several for some
   std::vector<std::uint8_t> cut;       ///< of each: 1 where a cut or a tear made it, else 0
 };
 
@@ -87,9 +88,8 @@ class Tissue {
   virtual int read_points(const PointSelection& selection, std::vector<std::uint8_t>& cloud) = 0;
   /// Which PointFields read_points() can add.
   virtual unsigned point_fields() const { return ~0u; }
-  /// Replaces `surface` with the tissue's, as of the last finish(); leaves it empty where no
-  /// triangles join the points.
-  virtual void read_surface(SurfaceTriangles& surface) { surface = {}; }
+  /// Replaces `surface` with the tissue's, as of the last finish().
+  virtual void read_surface(SurfaceTriangles& surface) = 0;
   /// Whether that is what the method moves; else it is made of what it moves, when it is read.
   virtual bool moves_surface() const { return false; }
   /// Whether FrameInput::anchors move what they hold, and FrameResult has their loads.
@@ -115,8 +115,8 @@ class Tissue {
 };
 
 /// Builds the tissue of a valid scene. Throws std::invalid_argument for what cannot be built (a
-/// mesh that cannot be read, a body thinner than a cell) and std::runtime_error for a device not
-/// there.
+/// mesh that cannot be read, a body thinner than a cell; TooLarge) and std::runtime_error for a
+/// device not there (OutOfMemory).
 std::unique_ptr<Tissue> make_tissue(const Scene& scene);
 
 }  // namespace tissue_sim

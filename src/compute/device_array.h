@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "compute/cuda_check.h"
+#include "tissue_sim/limits.h"
 
 namespace tissue_sim {
 
@@ -19,7 +20,7 @@ class DeviceArray {
   DeviceArray(const DeviceArray&) = delete;
   DeviceArray& operator=(const DeviceArray&) = delete;
 
-  /// Throws std::runtime_error saying how much memory was wanted and how much is free.
+  /// Throws OutOfMemory saying how much memory was wanted and how much is free.
   void resize(std::size_t n) {
     size_ = n;
     if (n <= capacity_) return;
@@ -31,9 +32,9 @@ class DeviceArray {
       cudaGetLastError();
       std::size_t free = 0, total = 0;
       cudaMemGetInfo(&free, &total);
-      throw std::runtime_error("the GPU's memory does not suffice: " + megabytes(n * sizeof(T)) +
-                               " more are needed, " + megabytes(free) + " of " + megabytes(total) +
-                               " are free");
+      throw OutOfMemory("the GPU's memory does not suffice: " + megabytes(n * sizeof(T)) +
+                        " more are needed, " + megabytes(free) + " of " + megabytes(total) +
+                        " are free");
     }
     capacity_ = n;
   }

@@ -21,8 +21,9 @@ constexpr int kLines = 4;  // sample lines per half cell along y and z
 constexpr double kSmallest =
     1.0 / 32;  // share of a half cell's cube below which a point is dropped
 
+template <class Error = std::invalid_argument>
 [[noreturn]] void refuse(const Body& body, const std::string& reason) {
-  throw std::invalid_argument("body '" + body.name + "': " + reason);
+  throw Error("body '" + body.name + "': " + reason);
 }
 
 std::string metres(const Vec3& size) {
@@ -196,7 +197,7 @@ Lattice make_lattice(const Body& body, double cell_size, std::vector<std::string
     const double volume = std::abs(signed_volume(raw)) / (half * half * half);
     if (volume < 4 * static_cast<double>(max_points)) return;
     const Box box = box_of(raw);
-    throw std::invalid_argument(too_many_of(box.max - box.min));
+    throw TooLarge(too_many_of(box.max - box.min));
   };
   const TriangleMesh mesh = is_mesh ? load_solid(body, notes, look) : TriangleMesh();
   const Solid solid(body);
@@ -205,7 +206,7 @@ Lattice make_lattice(const Body& body, double cell_size, std::vector<std::string
   const std::string hint = hint_of(size), too_many = too_many_of(size);
   const double volume = is_mesh ? signed_volume(mesh) : exact_volume(body);
   if (max_points <= 0 || volume / (half * half * half) > 1.01 * static_cast<double>(max_points)) {
-    refuse(body, too_many);
+    refuse<TooLarge>(body, too_many);
   }
 
   const bool upright =
@@ -239,11 +240,13 @@ Lattice make_lattice(const Body& body, double cell_size, std::vector<std::string
                         for (int k = range.begin(); k != range.end(); ++k) {
                           fill(sampling, k, slabs[k]);
                           points += static_cast<std::int64_t>(slabs[k].sites.size());
-                          if (points > max_points) throw std::invalid_argument(too_many);
+                          if (points > max_points) throw TooLarge(too_many);
                         }
                       });
+  } catch (const TooLarge& e) {
+    refuse<TooLarge>(body, e.what());
   } catch (const std::invalid_argument& e) {
-    refuse(body, (points > max_points ? "" : "mesh " + body.mesh + " ") + e.what());
+    refuse(body, "mesh " + body.mesh + " " + e.what());
   }
 
   Lattice lattice;

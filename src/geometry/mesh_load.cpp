@@ -107,6 +107,8 @@ TriangleMesh load_solid(const Body& body, std::vector<std::string>* notes,
       if (notes) notes->push_back(prefix + what + " " + note);
     }
     return mesh;
+  } catch (const TooLarge& e) {
+    throw TooLarge(prefix + e.what());
   } catch (const std::invalid_argument& e) {
     throw std::invalid_argument(prefix + e.what());
   }

@@ -90,8 +90,8 @@ class Stuffing {
     }
     const double points = 2.0 * cubes_.n[0] * cubes_.n[1] * cubes_.n[2];
     if (!(points <= std::min(5e7, static_cast<double>(work_limits().max_points)))) {
-      throw std::invalid_argument("takes " + text(points) +
-                                  " points of a lattice, too many: make cell_size larger");
+      throw TooLarge("takes " + text(points) +
+                     " points of a lattice, too many: make cell_size larger");
     }
     mesh_.vertices = cubes_.places(origin, Vec3::Constant(edge));
     sign_.resize(mesh_.vertices.size());
@@ -259,8 +259,8 @@ TetMesh tetrahedralize_box(const Vec3& size, double edge) {
   Vec3 cube;
   const double points = 2 * (size / edge).prod();
   if (!(points <= std::min(5e7, static_cast<double>(work_limits().max_points)))) {
-    throw std::invalid_argument("a box of " + text(size) + " m takes " + text(points) +
-                                " vertices, too many: raise cell_size");
+    throw TooLarge("a box of " + text(size) + " m takes " + text(points) +
+                   " vertices, too many: raise cell_size");
   }
   for (int a = 0; a < 3; ++a) {
     cubes.n[a] = std::max(1, static_cast<int>(std::lround(size[a] / edge)));

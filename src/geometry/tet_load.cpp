@@ -118,6 +118,8 @@ TetMesh load_tets(const Body& body, double edge, std::vector<std::string>* notes
         }
       }
       return all;
+    } catch (const TooLarge& e) {
+      throw TooLarge("body '" + body.name + "': " + e.what());
     } catch (const std::invalid_argument& e) {
       throw std::invalid_argument("body '" + body.name + "': " + e.what());
     }

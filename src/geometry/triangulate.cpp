@@ -57,9 +57,9 @@ double cells(double length, double edge) { return std::max(1.0, std::round(lengt
 TriangleMesh cube(const Body& body, double x, double y, double z) {
   if (const double vertices = 2 * (x * y + y * z + z * x);
       !(vertices <= static_cast<double>(work_limits().max_points))) {
-    throw std::invalid_argument("body '" + body.name + "': it takes " + text(vertices) +
-                                " vertices of its surface, more than " +
-                                std::to_string(work_limits().max_points) + ": raise cell_size");
+    throw TooLarge("body '" + body.name + "': it takes " + text(vertices) +
+                   " vertices of its surface, more than " +
+                   std::to_string(work_limits().max_points) + ": raise cell_size");
   }
   return cube({static_cast<int>(x), static_cast<int>(y), static_cast<int>(z)});
 }

@@ -98,6 +98,13 @@ Vec3 tissue_bumps(const Vec3& rest) {
               noise(x + kStep * Vec3::UnitZ()) - here);
 }
 
+Colour stress_colour(double share) {
+  constexpr std::uint32_t kStops[] = {0x4d121a, 0x9e1a1f, 0xed611a, 0xffc238, 0xfffacc};
+  const double at = 4 * std::clamp(share, 0.0, 1.0);
+  const int stop = std::min(3, static_cast<int>(at));
+  return mixed(linear(kStops[stop]), linear(kStops[stop + 1]), at - stop);
+}
+
 Colour drape_colour(const Vec3& place) {
   const double weave =
       std::sin(place.x() * 2 * M_PI / 0.0016) * std::sin(place.y() * 2 * M_PI / 0.0016);

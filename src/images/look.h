@@ -18,6 +18,8 @@ Colour tissue_colour(const Vec3& rest, bool is_cut);
 /// By how much its wet surface leans there, in world axes: added to the normal.
 Vec3 tissue_bumps(const Vec3& rest);
 /// Of a drape, by a place on the ground [m].
+/// Of a stress, as a share of the scale's end: from dark red to white.
+Colour stress_colour(double share);
 Colour drape_colour(const Vec3& place);
 
 /// What comes back to the lens from a surface.

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 #include <limits>
 #include <map>
 #include <stdexcept>
@@ -13,6 +14,7 @@
 #include "images/look.h"
 #include "images/ray_scene.h"
 #include "images/smooth_normals.h"
+#include "tissue_sim/point.h"
 #include "tools/tool_shapes.h"
 
 namespace tissue_sim {
@@ -57,6 +59,21 @@ void read_view(Simulation& simulation, SceneView& view) {
   const Span<const Fragment> fragments = simulation.tissue().fragments();
   view.fragments.assign(fragments.begin(), fragments.end());
   view.tools = simulation.tools();
+  view.stress.clear();
+  const std::vector<Camera>& cameras = simulation.scene().cameras;
+  if (std::none_of(cameras.begin(), cameras.end(),
+                   [](const Camera& c) { return c.colours == CameraColours::kStress; })) {
+    return;
+  }
+  std::vector<std::uint8_t> cloud;
+  const int count = simulation.tissue().read_points(PointSelection(), cloud);
+  std::vector<float> of_point(simulation.tissue().point_count());
+  for (int i = 0; i < count; ++i) {
+    Point p;
+    std::memcpy(&p, cloud.data() + sizeof(Point) * i, sizeof(Point));
+    of_point[p.id] = p.stress;
+  }
+  for (const std::int32_t point : view.surface.point) view.stress.push_back(of_point[point]);
 }
 
 struct Renderer::State {
@@ -66,6 +83,7 @@ struct Renderer::State {
   SmoothNormals smooth;
   SurfaceTriangles surface;
   const std::vector<float>* normals = nullptr;
+  std::vector<float> stress;  // of each corner
   std::map<int, Colour> piece_colours;
   struct SeenShape {
     ToolShape shape;
@@ -137,7 +155,11 @@ Colour Renderer::State::colour_of(const Camera& camera, const Vec3& eye, const V
     for (int a = 0; a < 3; ++a) {
       rest[a] = (1 - hit.u - hit.v) * x[a] + hit.u * x[3 + a] + hit.v * x[6 + a];
     }
-    if (camera.colours == CameraColours::kFragments) {
+    if (camera.colours == CameraColours::kStress) {
+      const float* s = &stress.at(std::size_t{3} * hit.triangle);
+      const double here = (1 - hit.u - hit.v) * s[0] + hit.u * s[1] + hit.v * s[2];
+      surface = {stress_colour(here / camera.stress_end), 0.1f, 30};
+    } else if (camera.colours == CameraColours::kFragments) {
       surface = {piece_colours.at(this->surface.fragment[hit.triangle]), 0.1f, 30};
     } else {
       surface = {tissue_colour(rest, this->surface.cut[hit.triangle] != 0), 0.40f, 110};
@@ -164,6 +186,8 @@ void Renderer::show(const SceneView& view) {
   State& s = *state_;
   s.surface = view.surface;
   s.normals = &s.smooth.of(s.surface);
+  s.stress = s.smooth.means(view.stress.empty() ? std::vector<float>(s.surface.fragment.size())
+                                                : view.stress);
   s.rays.set(s.surface.corners);
   s.piece_colours.clear();
   for (const Fragment& f : view.fragments) s.piece_colours[f.id] = linear(piece_colour(f));

@@ -74,4 +74,16 @@ const std::vector<float>& SmoothNormals::of(const SurfaceTriangles& surface) {
   return normals_;
 }
 
+std::vector<float> SmoothNormals::means(const std::vector<float>& of_triangle) const {
+  std::vector<float> means(corners_.size());
+  for (std::size_t g = 0; g + 1 < begin_.size(); ++g) {
+    float sum = 0;
+    for (std::int32_t i = begin_[g]; i < begin_[g + 1]; ++i) sum += of_triangle[corners_[i] / 3];
+    for (std::int32_t i = begin_[g]; i < begin_[g + 1]; ++i) {
+      means[corners_[i]] = sum / static_cast<float>(begin_[g + 1] - begin_[g]);
+    }
+  }
+  return means;
+}
+
 }  // namespace tissue_sim

@@ -1,4 +1,5 @@
-// Normals of a surface's corners: smooth where it is smooth, sharp at the edge of a cut.
+// What a surface's corners have of the triangles that meet there: normals, smooth where it is
+// smooth and sharp at the edge of a cut, and means.
 #pragma once
 
 #include <cstdint>
@@ -13,6 +14,8 @@ class SmoothNormals {
   /// Three numbers a corner, of length 1, in world axes; valid until the next call. Which corners
   /// meet is found anew only where the surface is of other triangles than the last one.
   const std::vector<float>& of(const SurfaceTriangles& surface);
+  /// Of each corner the mean of what the triangles that meet there have, of the last surface.
+  std::vector<float> means(const std::vector<float>& of_triangle) const;
 
  private:
   void group(const SurfaceTriangles& surface);

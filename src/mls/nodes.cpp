@@ -80,6 +80,7 @@ MlsNodes make_mls_nodes(const Scene& scene, std::vector<std::string>* notes) {
       nodes.place.push_back(n.place);
       nodes.volume.push_back(static_cast<float>(n.volume));
       nodes.body.push_back(static_cast<std::int16_t>(b));
+      nodes.part.push_back(n.part);
       nodes.surface.push_back(n.surface ? 1 : 0);
       nodes.normal.emplace_back(Vec3::Zero());
       nodes.depth.push_back(

@@ -18,6 +18,7 @@ struct MlsNodes {
   Array<float> free_volume;            ///< of that, what lies outside of anchors (mls/anchors.h)
   Array<float> strained_volume;        ///< of that, what bears strain (mls/own_rate.h)
   std::vector<std::int16_t> body;      ///< index into Scene::bodies
+  std::vector<std::int32_t> part;      ///< PlacedNode::part
   std::vector<std::uint8_t> material;  ///< index into `materials`
   Array<std::uint8_t> anchored;        ///< lies in an anchored region
   std::vector<std::int16_t> anchor;    ///< that holds it, in the order of the scene; -1: none

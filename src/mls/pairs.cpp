@@ -3,10 +3,13 @@
 #include <algorithm>
 #include <cmath>
 #include <memory>
+#include <set>
 #include <stdexcept>
 #include <string>
+#include <utility>
 
 #include "geometry/nearest.h"
+#include "math/union_find.h"
 
 namespace tissue_sim {
 
@@ -54,6 +57,7 @@ MlsPairs make_pairs(const MlsNodes& nodes, int neighbours, Cpu& cpu) {
       for (const Neighbour& f : found) {
         const double reach = 0.5 * (own + pairs.support[first + f.index]);
         if (f.index == i || !(f.distance2 < reach * reach)) continue;
+        if (nodes.part[first + i] != nodes.part[first + f.index]) continue;
         // Alike from either end.
         if (gaps == nullptr ||
             gaps->joined(places[std::min(i, f.index)], places[std::max(i, f.index)])) {
@@ -96,6 +100,26 @@ MlsPairs make_pairs(const MlsNodes& nodes, int neighbours, Cpu& cpu) {
   }
   pairs.weight = pairs.whole;
   return pairs;
+}
+
+void check_parts(const MlsNodes& nodes, const MlsPairs& pairs, std::vector<std::string>& notes) {
+  UnionFind linked(nodes.count());
+  std::set<std::pair<int, std::int32_t>> parts, pieces;  // of a body
+  for (std::int32_t i = 0; i < nodes.count(); ++i) {
+    for (std::int32_t e = pairs.begin[i]; e < pairs.begin[i + 1]; ++e) {
+      linked.join(i, pairs.other[e]);
+    }
+  }
+  for (std::int32_t i = 0; i < nodes.count(); ++i) {
+    if (nodes.part[i] < 0) continue;
+    parts.emplace(nodes.body[i], nodes.part[i]);
+    pieces.emplace(nodes.body[i], linked.root(i));
+  }
+  if (pieces.size() == parts.size()) return;
+  notes.push_back("the vertices of tetrahedra, as nodes, hang together in " +
+                  std::to_string(pieces.size()) + " pieces, their meshes in " +
+                  std::to_string(parts.size()) +
+                  ": cells are too long and thin; mesh them more evenly, or take mpm");
 }
 
 }  // namespace tissue_sim

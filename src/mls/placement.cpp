@@ -12,6 +12,7 @@
 #include "geometry/lattice.h"
 #include "geometry/nearest.h"
 #include "geometry/tet_mesh.h"
+#include "math/union_find.h"
 
 namespace tissue_sim {
 namespace {
@@ -197,10 +198,17 @@ std::vector<PlacedNode> graded(const std::vector<PlacedNode>& cubes, double grad
 
 std::vector<PlacedNode> vertices_of(const TetMesh& mesh) {
   std::vector<PlacedNode> nodes(mesh.vertices.size());
-  for (std::size_t i = 0; i < nodes.size(); ++i) nodes[i].place = mesh.vertices[i];
+  UnionFind joined(nodes.size());
   for (std::size_t t = 0; t < mesh.tetrahedra.size(); ++t) {
     const double share = 0.25 * volume(mesh, static_cast<int>(t));
-    for (const int v : mesh.tetrahedra[t]) nodes[v].volume += share;
+    for (const int v : mesh.tetrahedra[t]) {
+      nodes[v].volume += share;
+      joined.join(v, mesh.tetrahedra[t][0]);
+    }
+  }
+  for (std::size_t i = 0; i < nodes.size(); ++i) {
+    nodes[i].place = mesh.vertices[i];
+    nodes[i].part = joined.root(static_cast<std::int32_t>(i));
   }
   for (const std::array<int, 3>& triangle : boundary(mesh)) {
     for (const int v : triangle) nodes[v].surface = true;

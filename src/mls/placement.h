@@ -17,6 +17,7 @@ struct PlacedNode {
   Vec3 place;            ///< [m]
   double volume = 0;     ///< its share of the body [m^3]
   bool surface = false;  ///< whether that reaches the body's surface
+  int part = -1;         ///< lowest vertex of what it hangs together with in a tetrahedral mesh
 };
 
 /// Nodes `spacing` apart, on a lattice or graded, as the options say; `seed` scatters them. Of a

@@ -98,6 +98,7 @@ std::unique_ptr<MlsState> make_mls_state(const Scene& scene, std::vector<std::st
   s.cpu = std::make_unique<Cpu>(scene.threads);
   s.nodes = make_mls_nodes(scene, notes);
   s.pairs = make_pairs(s.nodes, scene.mls.neighbours, *s.cpu);
+  if (notes != nullptr) check_parts(s.nodes, s.pairs, *notes);
   hold_at_faces(scene, support_factor(scene.mls.neighbours), s.nodes, s.pairs);
   s.nodes.strained_volume = s.nodes.free_volume;
   const Array<float> kernel = s.pairs.whole;

@@ -303,6 +303,11 @@ int MlsTissue::read_points(const PointSelection& selection, std::vector<std::uin
   return count;
 }
 
+void MlsTissue::read_surface(SurfaceTriangles& surface) {
+  pull();
+  tissue_sim::read_surface(*state_, pieces_.of_point, surface_, surface);
+}
+
 Span<const Fragment> MlsTissue::fragments() {
   if (!pieces_measured_) {
     pull();

@@ -11,6 +11,7 @@
 #include "frame/run_frame.h"
 #include "mls/state.h"
 #include "mls/substep_choice.h"
+#include "mls/surface.h"
 #include "tissue_sim/tissue.h"
 #include "tools/frame_colliders.h"
 
@@ -25,6 +26,7 @@ class MlsTissue : public Tissue {
   FrameResult finish() override;
   int point_count() const override { return state_->count(); }
   int read_points(const PointSelection& selection, std::vector<std::uint8_t>& cloud) override;
+  void read_surface(SurfaceTriangles& surface) override;
   int fragment_count() const override { return static_cast<int>(pieces_.all.size()); }
   Span<const Fragment> fragments() override;
   std::uint64_t checksum() override;
@@ -111,6 +113,7 @@ class MlsTissue : public Tissue {
   std::optional<Frame> frame_;
   Checkpoint checkpoint_;
   MlsSubsteps substeps_;
+  MlsSurface surface_;  ///< as it was last read
   std::vector<float> stiffening_;
   bool pieces_measured_ = false;
   bool may_touch_ = false;  ///< whether tissue may touch tissue: there are pieces, or cuts

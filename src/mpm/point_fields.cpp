@@ -4,6 +4,7 @@
 #include <array>
 #include <cstring>
 
+#include "frame/put_faces.h"
 #include "material/laws.h"
 #include "math/bspline.h"
 #include "mpm/surface/facet_in_world.h"
@@ -95,27 +96,7 @@ void read_surface(MpmState& s, const Pieces& pieces, SurfaceTriangles& surface) 
         for (int a = 0; a < 3; ++a) place[i][a] = static_cast<float>(x[a]);
       },
       kGrain);
-  const auto faces = static_cast<int>(mesh.faces.size());
-  surface.corners.resize(std::size_t{18} * faces);
-  surface.rest.resize(std::size_t{18} * faces);
-  surface.fragment.resize(std::size_t{2} * faces);
-  surface.cut.resize(std::size_t{2} * faces);
-  s.cpu->for_each(
-      faces,
-      [&](int i) {
-        const BoundaryMesh::Face& f = mesh.faces[i];
-        float* corner = surface.corners.data() + std::size_t{18} * i;
-        float* at_rest = surface.rest.data() + std::size_t{18} * i;
-        for (const int k : {0, 1, 2, 0, 2, 3}) {
-          corner = std::copy_n(place[f.vertex[k]].data(), 3, corner);
-          at_rest = std::copy_n(rest[f.vertex[k]].data(), 3, at_rest);
-        }
-        for (int t = 2 * i; t < 2 * i + 2; ++t) {
-          surface.fragment[t] = pieces.of_point[f.point];
-          surface.cut[t] = f.cut;
-        }
-      },
-      kGrain);
+  put_faces(mesh.faces, place, rest, pieces.of_point, *s.cpu, surface);
 }
 
 void add_point_fields(MpmState& state, const PointSelection& selection,

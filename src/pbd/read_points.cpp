@@ -93,6 +93,7 @@ void PbdTissue::read_surface(SurfaceTriangles& surface) {
   surface.corners.clear();
   surface.rest.clear();
   surface.fragment.clear();
+  surface.point.clear();
   surface.cut = s.cut;
   for (const Triangle& t : s.triangles) {
     for (const std::int32_t v : t) {
@@ -102,6 +103,7 @@ void PbdTissue::read_surface(SurfaceTriangles& surface) {
       }
     }
     surface.fragment.push_back(pieces_.of_point[t[0]]);
+    surface.point.push_back(t[0]);
   }
 }
 

@@ -1,7 +1,13 @@
 #include "ros/diagnostics.h"
 
+#include <XmlRpcValue.h>
+#include <ros/master.h>
+#include <ros/this_node.h>
+
 #include <cmath>
 #include <cstdio>
+#include <map>
+#include <optional>
 #include <string>
 
 #include "geometry/tet_mesh.h"
@@ -11,6 +17,23 @@
 namespace tissue_sim {
 
 using diagnostic_msgs::DiagnosticStatus;
+
+namespace {
+
+/// By topic, the type of what is published; empty where no master answers.
+std::map<std::string, std::string> published_types() {
+  XmlRpc::XmlRpcValue request, response, topics;
+  request[0] = ros::this_node::getName();
+  request[1] = "";
+  std::map<std::string, std::string> types;
+  if (!ros::master::execute("getPublishedTopics", request, response, topics, false)) return types;
+  for (int i = 0; i < topics.size(); ++i) {
+    types[static_cast<std::string>(topics[i][0])] = static_cast<std::string>(topics[i][1]);
+  }
+  return types;
+}
+
+}  // namespace
 
 std::string coarser(const Scene& scene, double slower) {
   // As many points as 1 / spacing^3, as many substeps as 1 / spacing.
@@ -37,7 +60,10 @@ std::string coarser(const Scene& scene, double slower) {
 
 Diagnostics::Diagnostics(ros::NodeHandle& node, const SimulationThread& simulation,
                          const Recorder& recorder)
-    : simulation_(simulation), recorder_(recorder), updater_(node, node, node.getNamespace()) {
+    : node_(node),
+      simulation_(simulation),
+      recorder_(recorder),
+      updater_(node, node, node.getNamespace()) {
   updater_.setHardwareID("none");
   updater_.add("simulation", this, &Diagnostics::simulation);
   updater_.add("tools", this, &Diagnostics::tools);
@@ -49,6 +75,7 @@ Diagnostics::Diagnostics(ros::NodeHandle& node, const SimulationThread& simulati
 
 void Diagnostics::simulation(Status& status) {
   const RunStatus s = simulation_.status();
+  slow_reports_ = s.coarser.empty() ? 0 : slow_reports_ + 1;
   if (s.run.blew_up) {
     status.summary(DiagnosticStatus::ERROR, s.problem);
   } else if (s.run.paused) {
@@ -60,7 +87,7 @@ void Diagnostics::simulation(Status& status) {
     const std::string slow =
         (s.aimed_factor == 1 ? "slower than real time: " : "slower than time_factor: ") + s.coarser;
     status.summary(DiagnosticStatus::WARN, slow);
-    WARN_SELDOM(60, "%s", slow.c_str());
+    if (slow_reports_ >= 5) WARN_SELDOM(60, "%s", slow.c_str());  // not of a start, or a moment
   } else if (!s.inside.empty()) {
     status.summary(DiagnosticStatus::WARN, s.inside);
   } else {
@@ -83,9 +110,21 @@ void Diagnostics::simulation(Status& status) {
 void Diagnostics::tools(Status& status) {
   std::uint64_t refused = 0;
   std::string warnings;
+  std::optional<std::map<std::string, std::string>> published;
   const std::shared_ptr<ToolInputs> tools = simulation_.tools();
   for (const auto& tool : *tools) {
-    const ToolStatus s = tool->status();
+    ToolStatus s = tool->status();
+    // roscpp refuses another type without a word to the one who subscribed.
+    if (!s.came && !s.follows_tf && s.publishers == 0) {
+      if (!published) published = published_types();
+      const auto there = published->find(s.source);
+      const std::string type =
+          node_.param<std::string>("tools/" + s.tool + "/pose_type", "PoseStamped");
+      if (there != published->end() && there->second != "geometry_msgs/" + type) {
+        s.wrong_type = there->second;
+        WARN_SELDOM(60, "%s", warning(s).c_str());
+      }
+    }
     const PoseCounts& counts = s.counts;
     const std::string said = warning(s);
     if (!said.empty()) warnings += (warnings.empty() ? "" : "; ") + said;

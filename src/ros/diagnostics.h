@@ -28,9 +28,11 @@ class Diagnostics {
   void tools(Status& status);
   void recording(Status& status);
 
+  ros::NodeHandle node_;
   const SimulationThread& simulation_;
   const Recorder& recorder_;
   std::uint64_t refused_before_ = 0;
+  int slow_reports_ = 0;  // one after the other
   diagnostic_updater::Updater updater_;
   ros::WallTimer timer_;
 };

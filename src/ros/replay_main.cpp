@@ -36,26 +36,28 @@ const char kUsage[] =
     "replay BAG [options]\n"
     "  --node NAME    of the node that recorded it, where the bag holds several\n"
     "  --device NAME  auto, cpu or cuda in place of the scene's\n"
+    "  --cameras FILE a scene file, whose cameras are drawn in place of the bag's\n"
     "  --to NEW.bag   records the new run, by the parameters of the node for clouds and rates\n"
     "  --publish      publishes the new run\n"
     "  --speed X      simulated time over wall time, 0 for as fast as it goes [0]\n"
     "  --folder PATH  that relative paths begin at\n";
 
 struct Options {
-  std::string bag, node, device, to, folder;
+  std::string bag, node, device, cameras, to, folder;
   bool publish = false;
   double speed = 0;
 };
 
 Options read_options(int argc, char** argv) {
   Options o;
-  const option known[] = {{"node", 1, nullptr, 'n'},  {"device", 1, nullptr, 'd'},
-                          {"to", 1, nullptr, 't'},    {"publish", 0, nullptr, 'p'},
-                          {"speed", 1, nullptr, 's'}, {"folder", 1, nullptr, 'f'},
-                          {nullptr, 0, nullptr, 0}};
+  const option known[] = {{"node", 1, nullptr, 'n'},    {"device", 1, nullptr, 'd'},
+                          {"cameras", 1, nullptr, 'c'}, {"to", 1, nullptr, 't'},
+                          {"publish", 0, nullptr, 'p'}, {"speed", 1, nullptr, 's'},
+                          {"folder", 1, nullptr, 'f'},  {nullptr, 0, nullptr, 0}};
   for (int c = 0; (c = getopt_long(argc, argv, "", known, nullptr)) != -1;) {
     if (c == 'n') o.node = optarg;
     if (c == 'd') o.device = optarg;
+    if (c == 'c') o.cameras = optarg;
     if (c == 't') o.to = optarg;
     if (c == 'p') o.publish = true;
     if (c == 's') o.speed = std::stod(optarg);
@@ -73,6 +75,7 @@ Options read_options(int argc, char** argv) {
   };
   o.bag = resolved(o.bag);
   o.to = resolved(o.to);
+  o.cameras = resolved(o.cameras);
   return o;
 }
 
@@ -193,6 +196,9 @@ int replay(const Options& options) {
     spinner->start();
   }
 
+  std::optional<std::vector<Camera>> cameras;
+  if (!options.cameras.empty()) cameras = load_scene(options.cameras).cameras;
+
   const WallTime start = WallClock::now();
   WallTime said = start;
   std::int64_t frames = 0;
@@ -222,6 +228,7 @@ int replay(const Options& options) {
   };
   Replay run(observer, [&](Scene& scene) {
     if (device) scene.device = *device;
+    if (cameras) scene.cameras = *cameras;
   });
   const ReplayReport report = run.run(bag, topics);
   report_on(report, seconds(WallClock::now()) - seconds(start));

@@ -21,6 +21,15 @@ std::string warning(const ToolStatus& s) {
       return s.tool + ": tf frame '" + s.source + "' has been the same for " + time +
              ": its publisher is gone or stands still";
     }
+  } else if (!s.came && !s.wrong_type.empty()) {
+    const std::string package = "geometry_msgs/";
+    const bool is_known =
+        s.wrong_type == package + "TransformStamped" || s.wrong_type == package + "PoseStamped";
+    return s.tool + ": what is published on " + s.source + " is " + s.wrong_type +
+           ", which is not taken: " +
+           (is_known
+                ? "set tools/" + s.tool + "/pose_type: " + s.wrong_type.substr(package.size())
+                : "a tool's poses are geometry_msgs/PoseStamped, or TransformStamped by pose_type");
   } else if (!s.came) {
     return s.tool + ": no pose ever came on " + s.source + " (" + publishers + ")" +
            (s.publishers == 0 ? ": nobody publishes there, remap it to the arm's topic" : "");

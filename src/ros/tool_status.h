@@ -23,6 +23,7 @@ struct ToolStatus {
   std::string source;  ///< "/probe/measured_cp", or the tf frame that it follows
   bool follows_tf = false;
   std::uint32_t publishers = 0;  ///< of the topic
+  std::string wrong_type;        ///< of what is published there and is not taken; "" for none
   std::string waiting;   ///< why there is no transform of the frame that it follows; "" for none
   bool latched = false;  ///< the last pose: it holds until the next
   bool came = false;     ///< a pose, of whatever quality; with tf a transform

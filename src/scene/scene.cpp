@@ -243,6 +243,7 @@ void check_camera(const std::string& path, const Camera& camera, std::set<std::s
     refuse(path + ".far", text(camera.far), "must be above near, " + text(camera.near));
   }
   check_enum(path + ".colours", camera.colours, kCameraColourNames);
+  check_range(path + ".stress_end", camera.stress_end, 1, 1e9, "Pa");
   if (!camera.distortion.empty() && camera.distortion.size() != 5) {
     refuse(path + ".distortion", "a list of " + std::to_string(camera.distortion.size()),
            "must be k1, k2, p1, p2, k3, or none");

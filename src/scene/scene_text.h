@@ -32,7 +32,9 @@ inline constexpr Spelling<Shape> kShapeNames[] = {{Shape::kBox, "box"},
                                                   {Shape::kCylinder, "cylinder"},
                                                   {Shape::kMesh, "mesh"}};
 inline constexpr Spelling<CameraColours> kCameraColourNames[] = {
-    {CameraColours::kTissue, "tissue"}, {CameraColours::kFragments, "fragments"}};
+    {CameraColours::kTissue, "tissue"},
+    {CameraColours::kFragments, "fragments"},
+    {CameraColours::kStress, "stress"}};
 inline constexpr Spelling<ToolType> kToolTypeNames[] = {
     {ToolType::kScalpel, "scalpel"}, {ToolType::kProbe, "probe"}, {ToolType::kGrasper, "grasper"},
     {ToolType::kBall, "ball"},       {ToolType::kPunch, "punch"}, {ToolType::kPlate, "plate"}};

@@ -156,6 +156,7 @@ void write(YAML::Emitter& out, const Camera& camera) {
   write(out, "far", camera.far);
   out << Key << "light" << Value << camera.light;
   write(out, "colours", std::string(name_of(camera.colours, kCameraColourNames)));
+  write(out, "stress_end", camera.stress_end);
   out << Key << "distortion" << Value << Flow << BeginSeq;
   for (const double d : camera.distortion) out << text(d);
   out << EndSeq << EndMap;

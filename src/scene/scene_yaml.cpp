@@ -166,9 +166,10 @@ Tool read_tool(const YAML::Node& node, const std::string& path) {
 }
 
 Camera read_camera(const YAML::Node& node, const std::string& path) {
-  const YamlFields fields(node, path,
-                          {"name", "width", "height", "hfov", "rate", "baseline", "pose",
-                           "tf_frame", "near", "far", "light", "colours", "distortion"});
+  const YamlFields fields(
+      node, path,
+      {"name", "width", "height", "hfov", "rate", "baseline", "pose", "tf_frame", "near", "far",
+       "light", "colours", "stress_end", "distortion"});
   Camera camera;
   fields.read("name", camera.name);
   fields.read("width", camera.width);
@@ -184,6 +185,7 @@ Camera read_camera(const YAML::Node& node, const std::string& path) {
   fields.read("far", camera.far);
   fields.read("light", camera.light);
   fields.read("colours", camera.colours, kCameraColourNames);
+  fields.read("stress_end", camera.stress_end);
   fields.read("distortion", camera.distortion, 5);
   return camera;
 }

@@ -1,12 +1,10 @@
-// The data that the fragment network learns from: the same for the same seed, shared out whole.
+// The data that the fragment network learns from: the same for the same seed.
 #include <gtest/gtest.h>
 
-#include <cstdlib>
 #include <vector>
 
 #include "fragments/features.h"
 #include "programs/dataset/dataset_run.h"
-#include "programs/dataset/rank.h"
 
 namespace tissue_sim {
 namespace {
@@ -34,32 +32,6 @@ TEST(Dataset, IsTheSameForTheSameSeed) {
   EXPECT_EQ(one.plain, again.plain);
   EXPECT_EQ(one.about, again.about);
   EXPECT_NE(one.x, other.x);
-}
-
-TEST(Dataset, IsSharedOutByRank) {
-  for (const int ranks : {1, 2, 3, 7}) {
-    std::vector<int> done(20, 0);
-    for (int r = 0; r < ranks; ++r) {
-      const Rank rank{r, ranks, 1};
-      for (int i = 0; i < count_of(rank, 20); ++i) ++done[item_of(rank, i)];
-    }
-    EXPECT_EQ(done, std::vector<int>(20, 1)) << ranks;
-  }
-  EXPECT_EQ(count_of({5, 7, 1}, 3), 0);
-}
-
-TEST(Dataset, LauncherSaysTheRank) {
-  const auto set = [](const char* number, const char* of) {
-    setenv("OMPI_COMM_WORLD_RANK", number, 1);
-    setenv("OMPI_COMM_WORLD_SIZE", of, 1);
-  };
-  set("2", "5");
-  EXPECT_EQ(launched_rank().number, 2);
-  EXPECT_EQ(launched_rank().of, 5);
-  set("5", "5");
-  EXPECT_THROW(launched_rank(), std::invalid_argument);
-  unsetenv("OMPI_COMM_WORLD_RANK");
-  unsetenv("OMPI_COMM_WORLD_SIZE");
 }
 
 }  // namespace

@@ -5,7 +5,9 @@
 
 #include <cmath>
 #include <cstring>
+#include <set>
 
+#include "cut_paths.h"
 #include "test_scenes.h"
 #include "tools/tool_shapes.h"
 
@@ -77,7 +79,7 @@ class Renders : public testing::Test {
 };
 
 TEST_F(Renders, DepthOfTissueIsThatOfTheNearestOfAllTriangles) {
-  for (const Method method : {Method::kPbd, Method::kMpm}) {
+  for (const Method method : {Method::kMpm, Method::kMls, Method::kPbd}) {
     Scene scene = scene_of();
     scene.method = method;
     scene.bodies[0].shape = Shape::kEllipsoid;
@@ -86,7 +88,6 @@ TEST_F(Renders, DepthOfTissueIsThatOfTheNearestOfAllTriangles) {
     Simulation simulation(scene);
     SurfaceTriangles surface;
     simulation.tissue().read_surface(surface);
-    if (surface.fragment.empty()) continue;
     Camera camera = from_above(0.06);
     camera.pose.orientation = Quat(Eigen::AngleAxisd(0.2, Vec3::UnitX())) * camera.pose.orientation;
     const CameraImages images = seen(simulation, camera);
@@ -107,6 +108,66 @@ TEST_F(Renders, DepthOfTissueIsThatOfTheNearestOfAllTriangles) {
     EXPECT_GT(hit, 1000);
     EXPECT_LE(edges, 4);
   }
+}
+
+/// What a pixel sees is the piece that the nearest point of the cloud belongs to.
+TEST_F(Renders, LabelsAreThePiecesOfTheCloud) {
+  for (const Method method : {Method::kMpm, Method::kMls, Method::kPbd}) {
+    Scene scene = scene_of();
+    scene.method = method;
+    scene.cell_size = 0.003;
+    Simulation simulation(scene);
+    const Vec3 through(0.003, 0, 0.01), normal = Vec3(1, 0.2, 0).normalized();
+    simulation.cut(plane_cut(through, normal));
+    simulation.advance_frame();
+    std::vector<std::uint8_t> cloud;
+    const int count = simulation.tissue().read_points(PointSelection(), cloud);
+    const Camera camera = from_above(0.07);
+    const CameraImages images = seen(simulation, camera);
+    std::set<int> pieces;
+    int tissue = 0, other = 0;
+    for (int y = 0; y < camera.height; ++y) {
+      for (int x = 0; x < camera.width; ++x) {
+        const int i = y * camera.width + x, label = images.labels[i];
+        if (label < kFirstFragmentLabel) continue;
+        const Vec3 at = camera.pose.position + images.depth[i] * ray(camera, x, y);
+        double nearest = INFINITY;
+        int fragment = -1;
+        for (int p = 0; p < count; ++p) {
+          Point point;
+          std::memcpy(&point, cloud.data() + sizeof(Point) * p, sizeof(Point));
+          const double d = (Vec3(point.x, point.y, point.z) - at).squaredNorm();
+          if (d < nearest) nearest = d, fragment = point.fragment;
+        }
+        pieces.insert(label);
+        if (std::fabs((at - through).dot(normal)) < scene.cell_size)
+          continue;  // either may be nearer
+        ++tissue;
+        other += label != kFirstFragmentLabel + fragment ? 1 : 0;
+      }
+    }
+    EXPECT_EQ(pieces.size(), 2u);
+    EXPECT_GT(tissue, 1000);
+    EXPECT_EQ(other, 0);
+  }
+}
+
+TEST_F(Renders, StressIsDarkFarBelowTheScalesEndAndWhiteAboveIt) {
+  Scene scene = scene_of();
+  scene.gravity = Vec3(0, 0, -10);
+  Camera camera = from_above(0.07);
+  camera.colours = CameraColours::kStress;
+  camera.light = false;
+  scene.cameras = {camera};
+  Simulation simulation(scene);
+  simulation.settle();
+  const std::size_t middle = 3 * (32 * 96 + 48);
+  camera.stress_end = 1e9;
+  CameraImages images = seen(simulation, camera);
+  EXPECT_LT(images.rgb[middle + 1], 60);
+  camera.stress_end = 1;
+  images = seen(simulation, camera);
+  EXPECT_GT(images.rgb[middle + 1], 200);
 }
 
 TEST_F(Renders, DepthOfTheGroundIsExact) {

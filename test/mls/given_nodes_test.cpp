@@ -108,5 +108,36 @@ TEST(MlsGivenNodes, AreTheVerticesOfTheMeshWithAllOfItsVolume) {
   }
 }
 
+// Two boxes with a face in common, but vertices of their own, are two; a box of long thin cells,
+// whose vertices find no neighbours across it, is said.
+TEST(MlsGivenNodes, HangTogetherAsTheMeshDoesOrItIsSaid) {
+  const TemporaryFolder folder;
+  TetMesh mesh = tetrahedralize_box(kSize, 0.003);
+  const auto count = static_cast<int>(mesh.vertices.size());
+  for (int i = 0; i < count; ++i) {
+    mesh.vertices.push_back(mesh.vertices[i] + Vec3(1.001 * kSize.x(), 0, 0));
+  }
+  for (std::size_t t = mesh.tetrahedra.size(); t-- > 0;) {
+    auto other = mesh.tetrahedra[t];
+    for (int& v : other) v += count;
+    mesh.tetrahedra.push_back(other);
+  }
+  Scene scene = mls_box(kSize, 0.0015);
+  Body& body = scene.bodies[0];
+  body.shape = Shape::kMesh;
+  body.mesh = folder.write("two.mesh", medit(mesh));
+  body.scale = 1e-3;
+  MlsTissue two(scene);
+  EXPECT_EQ(two.fragment_count(), 2);
+  EXPECT_EQ(two.notes().size(), 0u);
+
+  mesh = tetrahedralize_box(kSize, 0.003);
+  for (Vec3& x : mesh.vertices) x.z() *= 20;
+  body.mesh = folder.write("long.mesh", medit(mesh));
+  const std::vector<std::string> notes = MlsTissue(scene).notes();
+  ASSERT_FALSE(notes.empty());
+  EXPECT_NE(notes.back().find("too long and thin"), std::string::npos) << notes.back();
+}
+
 }  // namespace
 }  // namespace tissue_sim

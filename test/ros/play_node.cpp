@@ -1,10 +1,13 @@
 // Markers by which a hand moves the tools: what RViz sends when one is dragged or its menu is used.
 #include <sensor_msgs/JointState.h>
+#include <std_msgs/String.h>
 #include <visualization_msgs/InteractiveMarkerFeedback.h>
 #include <visualization_msgs/InteractiveMarkerInit.h>
 
 #include <algorithm>
+#include <limits>
 #include <set>
+#include <string>
 
 #include "simulator_client.h"
 
@@ -101,6 +104,26 @@ TEST_F(Play, AToolFollowsItsMarkerAtAnArmsSpeed) {
       ASSERT_LT(step, 0.05) << "no jumps";
     }
   }
+}
+
+TEST_F(Play, NonsenseChangesNothing) {
+  ros::Publisher scene = node_.advertise<std_msgs::String>("/simulator/scene", 10);
+  ASSERT_TRUE(wait_until([&] { return scene.getNumSubscribers() > 0; }));
+  std_msgs::String text;
+  for (const std::string& nonsense : {std::string("tools"), std::string("tools: [{name: [1]}]"),
+                                      std::string("{"), std::string(100000, '[')}) {
+    text.data = nonsense;
+    scene.publish(text);
+  }
+  const Pose start = from_message(tool("grasper").end);
+  const double infinite = std::numeric_limits<double>::infinity();
+  drag("grasper", {start.position, Quat(infinite, 0, 0, 0)});
+  drag("grasper", {Vec3(1e300, 0, 0), start.orientation});
+  const Pose goal{start.position + Vec3(0, 0, 0.01), start.orientation};
+  drag("grasper", goal);
+  EXPECT_TRUE(arrives("grasper", goal));
+  drag("grasper", start);
+  EXPECT_TRUE(arrives("grasper", start));
 }
 
 TEST_F(Play, TheMenuMovesJaws) {

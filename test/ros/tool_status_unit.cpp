@@ -33,6 +33,16 @@ TEST(ToolStatus, SaysThatNoPoseEverCameWhereAndFromHowMany) {
   EXPECT_TRUE(has(warning(s), "(1 publisher)")) << warning(s);
 }
 
+TEST(ToolStatus, SaysThatPosesAreOfAnotherTypeAndHowTheyAreTaken) {
+  ToolStatus s = driven();
+  s.came = false;
+  s.publishers = 0;
+  s.wrong_type = "geometry_msgs/TransformStamped";
+  EXPECT_TRUE(has(warning(s), "set tools/probe/pose_type: TransformStamped")) << warning(s);
+  s.wrong_type = "sensor_msgs/JointState";
+  EXPECT_TRUE(has(warning(s), "are geometry_msgs/PoseStamped, or")) << warning(s);
+}
+
 TEST(ToolStatus, SaysForHowLongNothingCame) {
   ToolStatus s = driven();
   s.silent = 5;

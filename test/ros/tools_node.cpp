@@ -1,4 +1,5 @@
 // Tools: where their poses and jaws come from, what pushes them, how they are shown.
+#include <diagnostic_msgs/DiagnosticArray.h>
 #include <geometry_msgs/TransformStamped.h>
 #include <geometry_msgs/WrenchStamped.h>
 #include <rosgraph_msgs/Log.h>
@@ -90,6 +91,25 @@ TEST_F(Tools, ToolsFollowTfOrTransformsWhereAsked) {
   EXPECT_NEAR(m->tools[3].end.position.y, 0.1, 1e-9);
 }
 
+// Whoever publishes them hears of it from roscpp; whoever subscribed would not.
+TEST_F(Tools, TransformsWhereNoneAreAskedForAreRefusedWithTheReason) {
+  Topic<diagnostic_msgs::DiagnosticArray> diagnostics("/diagnostics");
+  ros::NodeHandle node;
+  ros::Publisher transforms =
+      node.advertise<geometry_msgs::TransformStamped>("/simulator/scalpel/measured_cp", 10);
+  EXPECT_TRUE(wait_until([&] {
+    for (const auto& message : diagnostics.all()) {
+      for (const auto& status : message->status) {
+        if (status.message.find("set tools/scalpel/pose_type: TransformStamped") !=
+            std::string::npos) {
+          return true;
+        }
+      }
+    }
+    return false;
+  }));
+}
+
 TEST_F(Tools, JawAnglesArePassedOn) {
   Topic<FrameInputMessage> inputs("/simulator/inputs");
   ros::NodeHandle node;
@@ -118,6 +138,13 @@ TEST_F(Tools, OfTheJointsOfAnArmTheOneCalledJawIsTakenAndOthersAreRefusedOnce) {
       node.advertise<sensor_msgs::JointState>("/simulator/probe/jaw/measured_js", 10);
   ASSERT_TRUE(wait_until([&] { return joints.getNumSubscribers() > 0; }));
   Arm arm("probe");
+  ASSERT_TRUE(wait_until([&] {  // what it says is heard: what follows it says once
+    arm.send(pointing_down(NAN, 0, 0));
+    ros::WallDuration(0.02).sleep();
+    const auto all = log.all();
+    return std::any_of(all.begin(), all.end(),
+                       [](const auto& line) { return line->name == "/simulator"; });
+  }));
   sensor_msgs::JointState m;
   const auto jaw_after_sending = [&] {
     m.header.stamp = ros::Time::now();

@@ -59,10 +59,6 @@ enum class Kind { kBox, kEllipsoid, kMesh };
 
 class ReadSurface : public EachMethod {
  protected:
-  void SetUp() override {
-    EachMethod::SetUp();
-    if (GetParam().method == Method::kMls) GTEST_SKIP() << "no triangles join its nodes";
-  }
   Scene scene_of(Kind kind) {
     Scene scene = free_box(Vec3(0.04, 0.03, 0.02), 0.003);
     scene.threads = 2;
@@ -157,8 +153,11 @@ TEST_P(ReadSurface, SaysWhichTrianglesTheCutMade) {
       EXPECT_GT(farthest, 1e-4);
     }
   }
-  // Where tetrahedra part, vertices are moved onto the cut where these stay sound.
-  EXPECT_LT(most, GetParam().method == Method::kPbd ? 2e-3 : 1e-4);
+  // Where tetrahedra part, vertices are moved onto the cut where these stay sound. At the rim two
+  // planes meet at a flat angle, and `mls` knows a cut by places of 1/254 of a pair.
+  EXPECT_LT(most, GetParam().method == Method::kPbd   ? 2e-3
+                  : GetParam().method == Method::kMls ? 2e-4
+                                                      : 1e-4);
   ASSERT_EQ(area.size(), 2u);
   const double whole = 0.03 * 0.02 / normal.x();
   double sides = 0;

@@ -28,9 +28,9 @@ void check_memory(std::size_t wanted, std::size_t held) {
   check_cuda(cudaMemGetInfo(&free, &total), "be asked");
   if (wanted <= free + held) return;
   const auto megabytes = DeviceArray<char>::megabytes;
-  throw std::runtime_error("the GPU's memory does not suffice: the scene needs " +
-                           megabytes(wanted) + ", " + megabytes(free + held) + " of " +
-                           megabytes(total) + " are free; raise cell_size or set device to cpu");
+  throw OutOfMemory("the GPU's memory does not suffice: the scene needs " + megabytes(wanted) +
+                    ", " + megabytes(free + held) + " of " + megabytes(total) +
+                    " are free; raise cell_size or set device to cpu");
 }
 
 }  // namespace

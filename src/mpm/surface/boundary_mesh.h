@@ -1,10 +1,8 @@
 // The surface of tissue as triangles, cut faces included, closed around each piece.
 //
-// A bond that a point misses is a face of its cube where tissue ends: four vertices at the cube's
-// corners. Faces share a vertex where bonds hold their points together around the corner, so each
-// edge joins two faces, whatever was cut, and pieces share none. A vertex lies where its faces'
-// planes meet, at the true surface or where the blade went (dual contouring: Ju et al., Dual
-// Contouring of Hermite Data, 2002), and moves with the nodes as one of its points sees them.
+// A bond that a point misses is a side of its cube where tissue ends (geometry/contour.h); the
+// planes are those of the true surface or of the blade. A vertex moves with the nodes as one of its
+// points sees them.
 #pragma once
 
 #include <cstdint>

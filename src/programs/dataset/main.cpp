@@ -1,26 +1,18 @@
 // tissue_sim_dataset: runs scenes that tear and writes what the fragment network learns from.
-#include <sys/mman.h>
-#include <sys/wait.h>
-#include <unistd.h>
-
-#include <atomic>
 #include <chrono>
 #include <cstdio>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <functional>
-#include <new>
 #include <sstream>
 #include <stdexcept>
 #include <string>
-#include <thread>
 
 #include "fragments/features.h"
 #include "programs/dataset/dataset_run.h"
 #include "programs/dataset/npy.h"
 #include "programs/dataset/outcome.h"
-#include "programs/dataset/rank.h"
 
 namespace tissue_sim {
 namespace {
@@ -35,7 +27,6 @@ constexpr char kUsage[] =
   --frames N       of each run, 1/960 s each (40)
   --horizon N      frames ahead that labels are for (8)
   --per-frame N    samples of a frame at most (100)
-  --processes N    that work side by side (all processors; under mpirun, its share of them)
   --converge N     no data: runs each scene with cells 1, 2 .. N times finer, and writes how each
                    comes out into FOLDER/convergence.csv
   --compare FILE   no data: runs each scene plain, with fragment networks, with cells half as large
@@ -45,16 +36,14 @@ constexpr char kUsage[] =
   --paper FILE     another network to compare, of the paper's features
   --equal N        how many times finer cells take as long as the network (1.03)
 Scenes that are in FOLDER are left alone: the same command goes on with what is missing.
-Several machines: `mpirun --host a,b tissue_sim_dataset ...` (Open MPI, MPICH, Slurm's srun) shares
-scenes out by rank; FOLDER is one that all of them see.
+One process does one scene after another: scripts/sweep shares them out over processes and machines.
 )";
 
 struct Arguments {
-  Rank rank;
   std::string out;
   ComparedRuns compared;
   std::vector<std::string> kinds = dataset_kinds();
-  int scenes = 60, first = 0, processes = 0, converge = 0;
+  int scenes = 60, first = 0, converge = 0;
   std::uint64_t seed = 1;
   DatasetOptions options;
 };
@@ -99,8 +88,6 @@ Arguments read_arguments(int argc, char** argv) {
       a.options.horizon = number(1);
     } else if (name == "--per-frame") {
       a.options.per_frame = number(1);
-    } else if (name == "--processes") {
-      a.processes = number(1);
     } else if (name == "--converge") {
       a.converge = number(2);
     } else if (name == "--compare") {
@@ -128,11 +115,6 @@ Arguments read_arguments(int argc, char** argv) {
   }
   if (a.out.empty()) throw std::invalid_argument("--out is missing: a folder for the data");
   a.compared.level = a.options.level;
-  a.rank = launched_rank();
-  if (a.processes == 0) {
-    a.processes =
-        std::max(1, static_cast<int>(std::thread::hardware_concurrency()) / a.rank.on_machine);
-  }
   return a;
 }
 
@@ -206,35 +188,17 @@ void write_outcomes(const Arguments& a, int index, const std::vector<RunKind>& k
   std::fflush(stdout);
 }
 
-/// Calls work(index) for the scenes of this rank, each in one of some processes. Returns how many
-/// failed.
-int share_out(const Arguments& a, const std::function<void(int)>& work) {
-  void* shared = mmap(nullptr, sizeof(std::atomic<int>), PROT_READ | PROT_WRITE,
-                      MAP_SHARED | MAP_ANONYMOUS, -1, 0);
-  if (shared == MAP_FAILED) throw std::runtime_error("no memory that processes share");
-  auto* next = new (shared) std::atomic<int>(0);
-  int failed = 0, children = 0;
-  const int own = count_of(a.rank, a.scenes);
-  if (own <= 0) return 0;
-  for (int i = 0; i < std::min(a.processes, own); ++i) {
-    const pid_t child = fork();
-    if (child < 0) break;  // fewer do it as well
-    ++children;
-    if (child > 0) continue;
-    int status = 0;
-    for (int i; (i = next->fetch_add(1)) < own;) {
-      const int scene = item_of(a.rank, i);
-      try {
-        work(a.first + scene);
-      } catch (const std::exception& e) {
-        std::fprintf(stderr, "scene %d: %s\n", a.first + scene, e.what());
-        status = 1;
-      }
+/// Calls work(index) for each scene. Returns how many failed.
+int for_each_scene(const Arguments& a, const std::function<void(int)>& work) {
+  int failed = 0;
+  for (int scene = a.first; scene < a.first + a.scenes; ++scene) {
+    try {
+      work(scene);
+    } catch (const std::exception& e) {
+      std::fprintf(stderr, "scene %d: %s\n", scene, e.what());
+      ++failed;
     }
-    _exit(status);
   }
-  if (children == 0) throw std::runtime_error("no process could be started");
-  for (int status; wait(&status) > 0;) failed += status != 0;
   return failed;
 }
 
@@ -248,12 +212,11 @@ int run(int argc, char** argv) {
     for (int level = 1; level <= a.converge; ++level)
       kinds.push_back({"level", static_cast<double>(level), "", {}});
   } else {
-    return share_out(a, [&](int index) { write_scene(a, index); });
+    return for_each_scene(a, [&](int index) { write_scene(a, index); });
   }
-  const int failed = share_out(a, [&](int index) { write_outcomes(a, index, kinds); });
-  // Each rank writes what is there by then; the last to end has all.
+  const int failed = for_each_scene(a, [&](int index) { write_outcomes(a, index, kinds); });
   const std::string table = a.out + (a.converge > 0 ? "/convergence.csv" : "/comparison.csv"),
-                    unfinished = table + "." + std::to_string(a.rank.number) + ".part";
+                    unfinished = table + "." + std::to_string(a.first) + ".part";
   std::ofstream all(unfinished);
   all << kOutcomeColumns;
   for (int i = a.first; i < a.first + a.scenes; ++i) {

@@ -12,6 +12,7 @@ namespace {
 
 constexpr double kFastest = 10, kFastestTurn = 100;  // of servo_cv [m/s, rad/s]
 constexpr double kTwistAge = 0.2;                    // for which a velocity goes on [s]
+constexpr double kRefused = 0.05;  // between refusals of moves, states and ratios that are said [s]
 
 JointVector vector_of(const std::vector<double>& values) {
   return Eigen::Map<const JointVector>(values.data(), static_cast<Eigen::Index>(values.size()));
@@ -104,8 +105,8 @@ void ArmNode::subscribe() {
 void ArmNode::refuse(const std::string& name, const std::string& why, Kind kind,
                      JointGroup& group) {
   // Moves are rare, setpoints may come a thousand times a second, and no force is ever taken.
-  const double rest = kind == Kind::kForce ? 1e9 : 1;
-  if (kind == Kind::kMove || said_.try_emplace(name, rest).first->second.due(WallClock::now())) {
+  const double rest = kind == Kind::kForce ? 1e9 : kind == Kind::kMove ? kRefused : 1;
+  if (may_say(name, rest)) {
     ROS_WARN("%s refused: %s", name.c_str(), why.c_str());
     crtk_.warning(ros::Time::now(), name + " refused: " + why);
   }
@@ -246,8 +247,10 @@ std::string ArmNode::inverse(const Pose& tip, const std::vector<double>& seed,
 void ArmNode::on_state_command(const std::string& word) {
   const std::string why = command(state_, word);
   if (!why.empty()) {
-    ROS_WARN("state_command %s refused: %s", word.c_str(), why.c_str());
-    crtk_.warning(ros::Time::now(), "state_command " + word + " refused: " + why);
+    if (may_say("state_command", kRefused)) {
+      ROS_WARN("state_command %s refused: %s", word.c_str(), why.c_str());
+      crtk_.warning(ros::Time::now(), "state_command " + word + " refused: " + why);
+    }
   } else if (!state_.ready()) {
     twist_came_ = {};
     arm_.hold();
@@ -258,6 +261,7 @@ void ArmNode::on_state_command(const std::string& word) {
 
 void ArmNode::on_ratio(double ratio) {
   if (!(ratio > 0 && ratio <= 1)) {
+    if (!may_say("trajectory_j/set_ratio", kRefused)) return;
     ROS_WARN("trajectory_j/set_ratio refused: %g, must be above 0 and at most 1", ratio);
     crtk_.warning(ros::Time::now(), "trajectory_j/set_ratio refused: must be above 0, at most 1");
     return;

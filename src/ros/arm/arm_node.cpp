@@ -239,8 +239,7 @@ void ArmNode::drive_tool(const ros::Time& now) {
 void ArmNode::say_if_behind() {
   const double way =
       (tip_in_world(arm_.setpoint()).position - tip_in_world(arm_.measured()).position).norm();
-  if (way < kBehind || !said_.try_emplace("behind", 1.0).first->second.due(WallClock::now()))
-    return;
+  if (way < kBehind || !may_say("behind", 1)) return;
   char text[160];
   std::snprintf(text, sizeof text,
                 "the tip falls behind its setpoint by %.1f mm: joints follow at a limited speed "
@@ -264,7 +263,12 @@ void ArmNode::publish_state(bool busy) {
   crtk_.operating_state(rising(now, last_state_), state_, published_busy_);
 }
 
+bool ArmNode::may_say(const std::string& what, double rest) {
+  return said_.try_emplace(what, rest).first->second.due(WallClock::now());
+}
+
 void ArmNode::say(const std::string& text) {
+  if (!may_say(text, 1)) return;
   ROS_INFO("%s", text.c_str());
   crtk_.info(ros::Time::now(), text);
 }

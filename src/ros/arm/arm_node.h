@@ -71,6 +71,8 @@ class ArmNode {
   void say_if_behind();
   void publish_state(bool busy);
   bool busy() const { return arm_.busy() || jaw_.busy(); }
+  /// Whether this was not said for `rest` seconds.
+  bool may_say(const std::string& what, double rest);
   void say(const std::string& text);
   void on_wrench(const geometry_msgs::WrenchStamped& message, bool body);
   void publish_wrench(const ros::Time& stamp, const Wrench& wrench, bool body);

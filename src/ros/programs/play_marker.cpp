@@ -15,7 +15,6 @@
 #include <std_srvs/Trigger.h>
 #include <tissue_sim/Cut.h>
 #include <tissue_sim/StartRecording.h>
-#include <yaml-cpp/yaml.h>
 
 #include <algorithm>
 #include <cmath>
@@ -30,7 +29,11 @@
 #include <vector>
 
 #include "ros/conversions.h"
+#include "ros/guarded.h"
 #include "ros/messages.h"
+#include "ros/pose_track.h"
+#include "tissue_sim/scene.h"
+#include "tools/pose_fault.h"
 
 namespace tissue_sim {
 namespace {
@@ -63,7 +66,9 @@ class PlayMarker {
     number("cut_length", cut_length_, 0.001, 10);
     number("cut_depth", cut_depth_, 0.001, 10);
     server_ = std::make_unique<interactive_markers::InteractiveMarkerServer>("play_marker");
-    scene_ = node_.subscribe(simulator_ + "/scene", 1, &PlayMarker::on_scene, this);
+    scene_ = listen<std_msgs::String>(node_, simulator_ + "/scene", 1, [this](const auto& event) {
+      on_scene(scene_from_yaml(event.getConstMessage()->data));
+    });
   }
 
   void run() {
@@ -90,24 +95,15 @@ class PlayMarker {
   }
 
   // The scene says which tools there are; a reset sends it again, and changes nothing here.
-  void on_scene(const std_msgs::String& message) {
-    YAML::Node scene;
-    try {
-      scene = YAML::Load(message.data);
-    } catch (const YAML::Exception& e) {
-      ROS_ERROR("%s/scene is no YAML: %s", simulator_.c_str(), e.what());
-      return;
-    }
+  void on_scene(const Scene& scene) {
     const std::lock_guard<std::mutex> lock(mutex_);
     int index = 0;
     std::set<std::string> there;
-    for (const YAML::Node& tool : scene["tools"]) {
-      const std::string name = tool["name"].as<std::string>(""),
-                        type = tool["type"].as<std::string>("");
-      if (name.empty()) continue;
+    for (const Tool& tool : scene.tools) {
+      const std::string& name = tool.name;
       if (!tools_.empty() && std::find(tools_.begin(), tools_.end(), name) == tools_.end())
         continue;
-      if (held_.count(name) == 0) hold(name, type, index);
+      if (held_.count(name) == 0) hold(name, tool.type == ToolType::kGrasper, index);
       there.insert(name);
       ++index;
     }
@@ -119,9 +115,9 @@ class PlayMarker {
     server_->applyChanges();
   }
 
-  void hold(const std::string& name, const std::string& type, int index) {
+  void hold(const std::string& name, bool has_jaws, int index) {
     auto tool = std::make_unique<Held>();
-    tool->has_jaws = type == "grasper";
+    tool->has_jaws = has_jaws;
     tool->jaw = tool->jaw_goal = tool->has_jaws ? 0.6 : 0;
     std::vector<double> start = {0.06 * index, 0, 0.1};
     if (own_.getParam("start/" + name, start) && start.size() != 3) {
@@ -197,7 +193,7 @@ class PlayMarker {
   void on_feedback(const std::string& name, const InteractiveMarkerFeedback& feedback) {
     if (feedback.event_type != InteractiveMarkerFeedback::POSE_UPDATE) return;
     Pose goal = from_message(feedback.pose);
-    if (!goal.position.allFinite() || !(goal.orientation.norm() > 0.5)) return;
+    if (fault_of(goal, kRounding) != PoseFault::kNone) return;
     goal.orientation.normalize();
     const std::lock_guard<std::mutex> lock(mutex_);
     const auto tool = held_.find(name);

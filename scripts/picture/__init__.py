@@ -1,1 +1,0 @@
-"""Pictures of simulated tissue, drawn in software with numpy: no display, no GPU."""

@@ -158,17 +158,6 @@ TEST_F(PbdTrust, ADoubledTriangleIsNoPiece) {
   EXPECT_NE(notes(with_speck).find("1 speck"), std::string::npos) << notes(with_speck);
 }
 
-// The bends at a triangle and its back had a vertex twice: the state was refused as it was saved.
-TEST_F(PbdTrust, ATriangleAndItsBackAreSavedAndRestored) {
-  const Scene scene = mesh_scene(obj({24, 12}, on_ball) +
-                                 "v 60 0 0\nv 100 0 0\nv 60 40 0\nf 267 268 269\nf 267 269 268\n");
-  Simulation simulation(scene);
-  simulation.advance_frame();
-  const std::vector<std::uint8_t> saved = simulation.save();
-  Simulation again(scene);
-  EXPECT_NO_THROW(again.restore({saved.data(), saved.size()}));
-}
-
 // Vertices of its long thin triangles shook at 85 m/s, for ever: bends there were as stiff as a
 // plate as thick as the triangles are long.
 TEST_F(PbdTrust, UnevenTrianglesComeToRest) {

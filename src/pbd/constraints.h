@@ -82,11 +82,13 @@ struct Distance {
 
 /// The angle between two triangles that share the edge from vertex 2 to vertex 3, opposite to which
 /// lie 0 and 1 (eq. 4; signed, where arccos knows no side and has no slope where the triangles are
-/// flat; gradients: Bridson et al. 2003). From kMost of an excess on its moment grows no further:
-/// gradients are those of small turns, and a thin triangle that was thrown over would throw its
-/// vertices farther than it is high.
+/// flat; gradients: Bridson et al. 2003). Gradients are those of small turns: from kMost of an
+/// excess on its moment grows no further, and whatever has become of its triangles, a projection
+/// takes back no more than kMostOfStep of it. Else thin or folded ones would throw their vertices
+/// to and fro for ever, one bend after the other: their gradients turn while they are followed.
 struct Bending {
   static constexpr float kMost = 0.3f;  ///< [rad]
+  static constexpr float kMostOfStep = 0.1f;
   static constexpr int kVertices = 4, kNumbers = 2, kMultipliers = 1;
   template <class V>
   struct Parts {
@@ -128,14 +130,13 @@ struct Bending {
     const V most = c * 0.0f + kMost;
     return greater(lesser(c, most), -most);
   }
-  /// Of the angle, times `share`.
+  /// Of the angle.
   template <class V>
-  static TISSUE_SIM_INLINE void gradients(const Vertex<V> (&v)[4], const Parts<V>& p, V share,
+  static TISSUE_SIM_INLINE void gradients(const Vertex<V> (&v)[4], const Parts<V>& p,
                                           Vector<V> (&g)[4]) {
-    const V one = dot(p.n0, p.n0) + kTiny, other = dot(p.n1, p.n1) + kTiny;
-    const Vector<V> m0 = quotient(share, p.length * one) * p.n0,
-                    m1 = quotient(share, p.length * other) * p.n1;
-    const V e2 = p.length * p.length;
+    const V e2 = p.length * p.length, unit = e2 * 0.0f + 1.0f;
+    const Vector<V> m0 = quotient(unit, p.length * (dot(p.n0, p.n0) + kTiny)) * p.n0,
+                    m1 = quotient(unit, p.length * (dot(p.n1, p.n1) + kTiny)) * p.n1;
     const V s0 = dot(between(v[0], v[3]), p.e), s1 = dot(between(v[1], v[3]), p.e);
     const V t0 = dot(between(v[0], v[2]), p.e), t1 = dot(between(v[1], v[2]), p.e);
     g[0] = e2 * m0;
@@ -152,17 +153,13 @@ struct Bending {
   template <class V>
   static TISSUE_SIM_INLINE void project(Vertex<V> (&v)[4], const V (&number)[2], V inverse_h2,
                                         V (&lambda)[1]) {
-    const V a = number[1] * inverse_h2;
     const Parts<V> p = parts(v);
-    // A triangle that has collapsed would turn about its edge in no time: then all of the
-    // constraint counts for less, for a part of it alone would turn what it belongs to.
-    const V least = 1e-3f * p.length * p.length * p.length * p.length + kTiny;
-    const V one = dot(p.n0, p.n0) + kTiny, other = dot(p.n1, p.n1) + kTiny;
-    const V share = quotient(lesser(lesser(one, other), least), least);
     Vector<V> g[4];
-    gradients(v, p, share, g);
-    const V c = share * limited(excess(p.angle, number[0]));
-    const V change = quotient(-(c + a * lambda[0]), mobility(v, g) + a + kTiny);
+    gradients(v, p, g);
+    const V mobile = mobility(v, g);
+    const V a = greater(number[1] * inverse_h2, mobile * (1 / kMostOfStep));
+    const V change =
+        quotient(-(limited(excess(p.angle, number[0])) + a * lambda[0]), mobile + a + kTiny);
     lambda[0] += change;
     for (int i = 0; i < 4; ++i) move(v[i], change, g[i]);
   }

@@ -107,6 +107,27 @@ std::vector<std::int32_t> face_corners(const State& s, const InnerFace& f) {
   return v;
 }
 
+/// A tetrahedron whose links are all broken now would be a crumb beside the blade: it keeps one of
+/// them, to what still hangs together where it can.
+void keep_crumbs(State& s, std::vector<Broken>& broken) {
+  std::vector<int> intact(s.tetrahedra.size(), 0);
+  for (const InnerFace& f : s.faces) {
+    for (const std::int32_t t : f.tetrahedron) intact[t] += f.is_cut ? 0 : 1;
+  }
+  std::map<std::int32_t, std::pair<int, int>> kept;  // of a crumb: its best neighbour's, and which
+  for (std::size_t i = 0; i < broken.size(); ++i) {
+    const auto [a, b] = s.faces[broken[i].face].tetrahedron;
+    for (const auto& [t, other] : {std::make_pair(a, b), std::make_pair(b, a)}) {
+      const std::pair<int, int> of = {intact[other], static_cast<int>(i)};
+      if (intact[t] == 0) kept[t] = std::max(kept.try_emplace(t, of).first->second, of);
+    }
+  }
+  for (const auto& [t, of] : kept) s.faces[broken[of.second].face].is_cut = false;
+  broken.erase(std::remove_if(broken.begin(), broken.end(),
+                              [&s](const Broken& b) { return !s.faces[b.face].is_cut; }),
+               broken.end());
+}
+
 class TetCut {
  public:
   TetCut(State& s, const std::vector<Broken>& broken) : s_(s), broken_(broken) {
@@ -321,6 +342,7 @@ bool cut_tetrahedra(State& s, const BladePath& path, const Array<float>& before,
       }
     }
   }
+  keep_crumbs(s, broken);
   if (broken.empty()) return false;
   report.bonds_broken += static_cast<std::int64_t>(broken.size());
   TetCut cut(s, broken);

@@ -14,6 +14,8 @@ constexpr double kFacing = -0.25;
 
 /// What lies deeper came from elsewhere [mean edges].
 constexpr double kDeepest = 0.5;
+/// Beside a triangle another one is there, but for so much [shares of its sides].
+constexpr double kBeside = 0.3;
 /// So deep vertices may lie, that rounding pushes nothing that rests [mean edges].
 constexpr double kSlack = 1e-3;
 
@@ -30,64 +32,79 @@ bool is_sliver(const Vec3& a, const Vec3& b, const Vec3& c, double mean_edge) {
   return (b - a).cross(c - a).norm() < 0.1 * mean_edge * std::sqrt(longest2);
 }
 
-/// Cells of lattices that triangles' boxes overlap, sorted: of a fine lattice, or where a box has
-/// more than kMostCells there, as of tissue that nothing holds in shape, of one as coarse as it
-/// takes.
+/// Cells of lattices and the vertices in them: of a fine lattice, or for a box that has more than
+/// kMostCells there, as of tissue that nothing holds in shape, of one as coarse as it takes.
 class Cells {
  public:
-  Cells(double size) : levels_(1, Level{size, {}}) {}
-  void add(const Vec3& low, const Vec3& high, std::int32_t triangle) {
-    if (!low.allFinite() || !high.allFinite()) return;
-    std::size_t level = 0;
-    while (levels_[level].cells(low, high) > kMostCells) {
-      if (++level == levels_.size()) levels_.push_back({2 * levels_.back().size, {}});
-    }
-    levels_[level].add(low, high, triangle);
+  explicit Cells(double size) : size_(size) {}
+  void add(std::int32_t vertex, const Vec3& x) {
+    if (x.allFinite()) vertices_.emplace_back(vertex, x);
   }
-  void sort() {
-    for (Level& level : levels_) std::sort(level.entries.begin(), level.entries.end());
-  }
+  /// Vertices in the cells that a box overlaps.
   template <class F>
-  void each_at(const Vec3& x, const F& of) const {
-    if (!x.allFinite()) return;
-    for (const Level& level : levels_) {
-      if (level.entries.empty()) continue;
-      const std::uint64_t wanted = key(level.cell(x.x()), level.cell(x.y()), level.cell(x.z()));
-      auto at = std::lower_bound(level.entries.begin(), level.entries.end(),
-                                 std::make_pair(wanted, std::int32_t{-1}));
-      for (; at != level.entries.end() && at->first == wanted; ++at) of(at->second);
+  void each_in(const Vec3& low, const Vec3& high, const F& of) {
+    if (!low.allFinite() || !high.allFinite()) return;
+    double size = size_;
+    std::size_t level = 0;
+    for (; cells(size, low, high) > kMostCells; size *= 2) ++level;
+    while (levels_.size() <= level) levels_.emplace_back();
+    if (levels_[level].slots.empty()) fill(size, levels_[level]);
+    const Level& l = levels_[level];
+    for (std::int64_t i = cell(size, low.x()); i <= cell(size, high.x()); ++i) {
+      for (std::int64_t j = cell(size, low.y()); j <= cell(size, high.y()); ++j) {
+        for (std::int64_t k = cell(size, low.z()); k <= cell(size, high.z()); ++k) {
+          const std::uint64_t wanted = key(i, j, k);
+          std::size_t at = l.slots[l.slot(wanted)];
+          for (; at < l.entries.size() && l.entries[at].first == wanted; ++at) {
+            of(l.entries[at].second);
+          }
+        }
+      }
     }
   }
 
  private:
   static constexpr double kMostCells = 216;
+  struct Level {
+    std::vector<std::pair<std::uint64_t, std::int32_t>> entries;  ///< sorted by cell
+    std::vector<std::size_t> slots;  ///< a hash table: a cell's first entry, or behind the last
+
+    std::size_t slot(std::uint64_t wanted) const {
+      const std::size_t mask = slots.size() - 1;
+      std::size_t at = (wanted * 0x9e3779b97f4a7c15u >> 20) & mask;
+      while (slots[at] < entries.size() && entries[slots[at]].first != wanted) at = (at + 1) & mask;
+      return at;
+    }
+  };
   static std::uint64_t key(std::int64_t i, std::int64_t j, std::int64_t k) {
     const auto part = [](std::int64_t v) { return static_cast<std::uint64_t>(v) & 0x1fffff; };
     return part(i) << 42 | part(j) << 21 | part(k);
   }
-  struct Level {
-    double size;  ///< of a cell [m]
-    std::vector<std::pair<std::uint64_t, std::int32_t>> entries;
+  static std::int64_t cell(double size, double x) {
+    return static_cast<std::int64_t>(std::floor(std::max(-1e15, std::min(1e15, x / size))));
+  }
+  static double cells(double size, const Vec3& low, const Vec3& high) {
+    double product = 1;
+    for (int a = 0; a < 3; ++a)
+      product *= 1.0 + static_cast<double>(cell(size, high[a]) - cell(size, low[a]));
+    return product;
+  }
+  void fill(double size, Level& level) const {
+    for (const auto& [v, x] : vertices_) {
+      level.entries.emplace_back(key(cell(size, x.x()), cell(size, x.y()), cell(size, x.z())), v);
+    }
+    std::sort(level.entries.begin(), level.entries.end());
+    std::size_t count = 16;
+    while (count < 2 * level.entries.size()) count *= 2;
+    level.slots.assign(count, level.entries.size());
+    for (std::size_t e = 0; e < level.entries.size(); ++e) {
+      const std::uint64_t own = level.entries[e].first;
+      if (e == 0 || level.entries[e - 1].first != own) level.slots[level.slot(own)] = e;
+    }
+  }
 
-    std::int64_t cell(double x) const {
-      return static_cast<std::int64_t>(std::floor(std::max(-1e15, std::min(1e15, x / size))));
-    }
-    double cells(const Vec3& low, const Vec3& high) const {
-      double product = 1;
-      for (int a = 0; a < 3; ++a)
-        product *= 1.0 + static_cast<double>(cell(high[a]) - cell(low[a]));
-      return product;
-    }
-    void add(const Vec3& low, const Vec3& high, std::int32_t triangle) {
-      for (std::int64_t i = cell(low.x()); i <= cell(high.x()); ++i) {
-        for (std::int64_t j = cell(low.y()); j <= cell(high.y()); ++j) {
-          for (std::int64_t k = cell(low.z()); k <= cell(high.z()); ++k) {
-            entries.emplace_back(key(i, j, k), triangle);
-          }
-        }
-      }
-    }
-  };
+  double size_;  ///< of the finest lattice's cells [m]
+  std::vector<std::pair<std::int32_t, Vec3>> vertices_;
   std::vector<Level> levels_;
 };
 
@@ -97,11 +114,24 @@ struct Above {
   double beside() const { return std::max({0.0, -b, -c, b + c - 1}); }
 };
 
-Above above(const Vec3& x, const Vec3& a, const Vec3& b, const Vec3& c) {
-  const Vec3 e = b - a, f = c - a, r = x - a, n = e.cross(f);
-  const double n2 = n.squaredNorm() + 1e-300;
-  return {r.dot(n) / std::sqrt(n2), r.cross(f).dot(n) / n2, e.cross(r).dot(n) / n2};
-}
+/// A triangle, with what is the same for all places above it.
+struct TouchedTriangle {
+  Vec3 a, e, f, n;
+  double n2, length;
+
+  TouchedTriangle(const Vec3& corner, const Vec3& b, const Vec3& c)
+      : a(corner),
+        e(b - a),
+        f(c - a),
+        n(e.cross(f)),
+        n2(n.squaredNorm() + 1e-300),
+        length(std::sqrt(n2)) {}
+  double height(const Vec3& x) const { return (x - a).dot(n) / length; }
+  Above above(const Vec3& x) const {
+    const Vec3 r = x - a;
+    return {r.dot(n) / length, r.cross(f).dot(n) / n2, e.cross(r).dot(n) / n2};
+  }
+};
 
 const Material& material_of(const State& s, int v) {
   return material_at(s.scene, s.scene.bodies[s.vertices.body[v]], s.vertices.reference[v]);
@@ -126,52 +156,92 @@ void find_touches(State& s, double duration) {
     for (const std::int32_t i : t) normal[i] += n;
   }
   const double reach = std::min(2.0, 0.3 + 2 * fastest * duration / s.mean_edge) * s.mean_edge;
+  // Where each piece may touch another: what lies in no other's box is left out.
+  const auto reaches = [&](const Triangle& t) {
+    const Vec3 a = v.position(t[0]), b = v.position(t[1]), c = v.position(t[2]);
+    return std::max(reach, kDeepest * s.mean_edge) +
+           2 * kBeside * ((b - a).norm() + (c - a).norm());
+  };
+  std::vector<Box> places(s.components), reached(s.components);
+  for (const Triangle& t : s.triangles) {
+    if (is_crumb(t[0])) continue;
+    const Vec3 far = Vec3::Constant(reaches(t));
+    Box &place = places[s.component[t[0]]], &wide = reached[s.component[t[0]]];
+    for (const std::int32_t i : t) {
+      const Vec3 x = v.position(i);
+      place.min = place.min.cwiseMin(x);
+      place.max = place.max.cwiseMax(x);
+      wide.min = wide.min.cwiseMin(x - far);
+      wide.max = wide.max.cwiseMax(x + far);
+    }
+  }
+  std::vector<std::int32_t> large;
+  for (std::int32_t c = 0; c < s.components; ++c) {
+    if (places[c].min.x() <= places[c].max.x()) large.push_back(c);
+  }
+  const auto meets_other = [&](std::int32_t piece, const Vec3& low, const Vec3& high,
+                               const std::vector<Box>& boxes) {
+    return std::any_of(large.begin(), large.end(), [&](std::int32_t c) {
+      return c != piece && (high - boxes[c].min).minCoeff() >= 0 &&
+             (boxes[c].max - low).minCoeff() >= 0;
+    });
+  };
   Cells cells(2 * s.mean_edge);
-  for (std::size_t t = 0; t < s.triangles.size(); ++t) {
-    if (is_crumb(s.triangles[t][0])) continue;
+  for (int i = 0; i < v.size(); ++i) {
+    const Vec3 x = v.position(i);
+    if (v.surface[i] != 0 && !is_crumb(i) && meets_other(s.component[i], x, x, reached)) {
+      cells.add(i, x);
+    }
+  }
+  struct Found {
+    std::int32_t piece, triangle;
+    double off;
+    Above at;
+  };
+  std::vector<std::vector<Found>> found_of(v.size());  // the nearest of each other piece
+  for (std::size_t k = 0; k < s.triangles.size(); ++k) {
+    const Triangle& t = s.triangles[k];
+    if (is_crumb(t[0])) continue;
+    const std::int32_t piece = s.component[t[0]];
+    const TouchedTriangle plane(v.position(t[0]), v.position(t[1]), v.position(t[2]));
     Vec3 low = Vec3::Constant(1e300), high = -low;
-    for (const std::int32_t i : s.triangles[t]) {
+    for (const std::int32_t i : t) {
       low = low.cwiseMin(v.position(i));
       high = high.cwiseMax(v.position(i));
     }
-    cells.add(low - Vec3::Constant(reach), high + Vec3::Constant(reach),
-              static_cast<std::int32_t>(t));
-  }
-  cells.sort();
-  for (int i = 0; i < v.size(); ++i) {
-    if (v.surface[i] == 0 || is_crumb(i)) continue;
-    const Vec3 x = v.position(i), own = normal[i].stableNormalized();
-    struct Found {
-      std::int32_t piece, triangle;
-      double off;
-      Above at;
-    };
-    std::vector<Found> found;  // the nearest triangle of each other piece
-    cells.each_at(x, [&](std::int32_t k) {
-      const Triangle& t = s.triangles[k];
-      const std::int32_t piece = s.component[t[0]];
-      if (piece == s.component[i]) return;
-      const Vec3 a = v.position(t[0]), b = v.position(t[1]), c = v.position(t[2]);
-      const Above at = above(x, a, b, c);
-      if (at.height > reach || at.height < -kDeepest * s.mean_edge || at.beside() > 0.3) return;
-      if (is_sliver(a, b, c, s.mean_edge)) return;
+    const Vec3 far = Vec3::Constant(reaches(t));
+    if (!meets_other(piece, low - far, high + far, places)) continue;
+    if (is_sliver(v.position(t[0]), v.position(t[1]), v.position(t[2]), s.mean_edge)) continue;
+    const Vec3 facing = plane.n.stableNormalized();
+    cells.each_in(low - Vec3::Constant(reach), high + Vec3::Constant(reach), [&](std::int32_t i) {
+      if (s.component[i] == piece) return;
+      const Vec3 x = v.position(i);
+      const double height = plane.height(x);
+      if (height > reach || height < -kDeepest * s.mean_edge) return;
+      const Above at = plane.above(x);
+      if (at.beside() > kBeside) return;
       // What does not face it is the far side, or a wall that the vertex would stumble over.
-      if ((b - a).cross(c - a).stableNormalized().dot(own) > kFacing) return;
+      if (facing.dot(normal[i].stableNormalized()) > kFacing) return;
       const double off = std::fabs(at.height) + at.beside() * s.mean_edge;
+      std::vector<Found>& found = found_of[i];
       const auto known = std::find_if(found.begin(), found.end(),
                                       [piece](const Found& f) { return f.piece == piece; });
+      const Found own = {piece, static_cast<std::int32_t>(k), off, at};
       if (known == found.end()) {
-        found.push_back({piece, k, off, at});
+        found.push_back(own);
       } else if (off < known->off) {
-        *known = {piece, k, off, at};
+        *known = own;
       }
     });
+  }
+  for (int i = 0; i < v.size(); ++i) {
+    const std::vector<Found>& found = found_of[i];
     for (const Found& f : found) {
       const Triangle& t = s.triangles[f.triangle];
       double rest = 0;
       if (v.body[i] == v.body[t[0]]) {
-        const Above at =
-            above(v.reference[i], v.reference[t[0]], v.reference[t[1]], v.reference[t[2]]);
+        const Above at = TouchedTriangle(v.reference[t[0]], v.reference[t[1]], v.reference[t[2]])
+                             .above(v.reference[i]);
         if (at.beside() < 1 && std::fabs(at.height) < s.mean_edge) rest = std::min(0.0, at.height);
       }
       const double friction = std::sqrt(material_of(s, i).friction * material_of(s, t[0]).friction);

@@ -91,10 +91,13 @@ std::map<std::int32_t, Piece> measure(const State& s, UnionFind& linked) {
 }
 
 /// Why a piece stays whole.
-enum class Unsound { kAngle, kEdge, kHole, kVolume, kSmall };
-constexpr const char* kWhy[] = {"angles below 2.9 degrees", "edges below a tenth of the mean",
-                                "a surface with holes", "volumes that do not add up",
-                                "pieces smaller than what the mesh resolves"};
+enum class Unsound { kAngle, kEdge, kHole, kVolume, kSmall, kHanging };
+constexpr const char* kWhy[] = {"angles below 2.9 degrees",
+                                "edges below a tenth of the mean",
+                                "a surface with holes",
+                                "volumes that do not add up",
+                                "pieces smaller than what the mesh resolves",
+                                "pieces that hang on by an edge"};
 
 /// Whether a blade may meet anything at all while vertices move from `before` to where they are.
 bool may_meet(const State& s, const Array<float>& before, const std::vector<SweepPart>& parts) {
@@ -121,6 +124,43 @@ class SoundCut {
     const double least = SoundMesh::kLeastCut * std::pow(s.mean_edge, 3);
     for (const auto& [root, p] : before_) {
       (!is_closed_body(p) || p.six_volumes / 6 > least ? open_ : small_).insert(root);
+    }
+  }
+
+  /// Pieces that a whole path parts, by the links that it passes: they are not to hang on, as by an
+  /// edge of the line that the trace of the blade left out.
+  void expect_parts(const Array<float>& before, const std::vector<SweepPart>& parts) {
+    const int count = static_cast<int>(s_.triangles.size());
+    const auto centre = [&](int t, const auto& at) {
+      const Triangle& c = s_.triangles[t];
+      return Vec3((at(c[0]) + at(c[1]) + at(c[2])) / 3);
+    };
+    const auto then = [&](std::int32_t v) { return place_before(s_, before, v); };
+    const auto now = [&](std::int32_t v) { return s_.vertices.position(v); };
+    std::map<Edge, int> other;
+    UnionFind linked(count);
+    for (int t = 0; t < count; ++t) {
+      const Triangle& c = s_.triangles[t];
+      for (int i = 0; i < 3; ++i) {
+        const Edge e = edge_of(c[i], c[(i + 1) % 3]);
+        const auto [at, is_first] = other.try_emplace(e, t);
+        if (is_first || s_.cut_edges.count(e) != 0) continue;
+        const int u = at->second;
+        if (!passes({centre(u, then), centre(t, then), centre(u, now), centre(t, now)}, parts))
+          linked.join(u, t);
+      }
+    }
+    std::map<std::int32_t, std::map<int, double>> areas;  // of each piece's parts, doubled
+    const auto& x = s_.vertices.reference;
+    for (int t = 0; t < count; ++t) {
+      const Triangle& c = s_.triangles[t];
+      areas[piece_[c[0]]][linked.root(t)] += (x[c[1]] - x[c[0]]).cross(x[c[2]] - x[c[0]]).norm();
+    }
+    const double least = 2 * SoundMesh::kLeastParted * s_.mean_edge * s_.mean_edge;
+    for (const auto& [piece, of] : areas) {
+      const auto large = std::count_if(of.begin(), of.end(),
+                                       [least](const auto& part) { return part.second > least; });
+      if (large > 1) parted_.insert(piece);
     }
   }
 
@@ -237,8 +277,14 @@ class SoundCut {
     std::map<std::int32_t, Unsound> bad;
     const std::map<std::int32_t, Piece> now = measure(s_, linked);
     std::map<std::int32_t, double> gained;  // volume of each [m^3]
-    for (const auto& [root, p] : now)
+    std::map<std::int32_t, int> parts;      // that each is in
+    for (const auto& [root, p] : now) {
       gained[piece_of(p.vertex)] += std::max(0.0, p.six_volumes / 6);
+      ++parts[piece_of(p.vertex)];
+    }
+    for (const std::int32_t of : parted_) {
+      if (open_.count(of) != 0 && parts[of] < 2) bad.emplace(of, Unsound::kHanging);
+    }
     for (const auto& [root, p] : now) {
       const std::int32_t of = piece_of(p.vertex);
       if (open_.count(of) == 0) continue;
@@ -274,8 +320,9 @@ class SoundCut {
   std::vector<std::int32_t>& origin_;
   std::map<std::int32_t, Piece> before_;
   std::vector<std::int32_t> piece_;
-  std::set<std::int32_t> open_;   ///< pieces that are to be cut
-  std::set<std::int32_t> small_;  ///< pieces too small to be parted
+  std::set<std::int32_t> open_;    ///< pieces that are to be cut
+  std::set<std::int32_t> small_;   ///< pieces too small to be parted
+  std::set<std::int32_t> parted_;  ///< pieces that must not be one afterwards
   std::map<std::int32_t, Unsound> why_;
 };
 
@@ -324,6 +371,7 @@ bool cut_soundly(State& s, const BladePath& path, const Array<float>& before, in
     SoundCut cut(s, origin);
     for (const LeftWhole& l : again) cut.leave_out(l.vertex);
     cut.meet_small(before, parts);
+    if (!is_tools) cut.expect_parts(before, parts);
     changed = run(cut, path);
     leave(cut, path);
   }

@@ -15,6 +15,9 @@ struct SoundMesh {
   /// Smaller pieces, of some two tetrahedra as long as the mean edge, are not cut any more
   /// [mean edges^3].
   static constexpr double kLeastCut = 0.2;
+  /// A part of a piece with more surface than this, twice that of such a tetrahedron, is one that a
+  /// whole path's links come apart into [mean edges^2].
+  static constexpr double kLeastParted = 5;
   /// Volumes of a body's closed pieces sum up to its own, but for this share.
   static constexpr double kVolumeError = 0.005;
   /// A closed surface's areas times normals add up to nothing: to this share of its area, for the

@@ -104,11 +104,6 @@ void add_link(State& s, std::int32_t a, std::int32_t b, double stiffness) {
 /// would turn by rounding [rad]. What a mesh came with stays.
 constexpr float kFolded = 3.0f;
 
-/// A bend that would turn back more than that share of its excess in one step counts for no more:
-/// beside light vertices and thin triangles it would be rigid, and rigid ones around a vertex, one
-/// after the other, throw it to and fro for ever. Of an even mesh of organs none is.
-constexpr double kMostOfStep = 0.3;
-
 void add_bend(State& s, const MeshEdge& e, double stiffness) {
   if (!(stiffness > 0)) return;
   const std::array<std::int32_t, 4> at = {e.left, e.right, e.a, e.b};
@@ -123,9 +118,9 @@ void add_bend(State& s, const MeshEdge& e, double stiffness) {
   const float angle = parts.angle;
   if (std::fabs(angle) > kFolded && (s.stroke[e.a] >= 0 || s.stroke[e.b] >= 0)) return;
   Vector<float> g[4];
-  Bending::gradients(v, parts, 1.0f, g);
+  Bending::gradients(v, parts, g);
   const double h = 1 / (s.scene.frame_rate * s.scene.pbd.steps);
-  const double resolved = kMostOfStep / (h * h * Bending::mobility(v, g));
+  const double resolved = Bending::kMostOfStep / (h * h * Bending::mobility(v, g));
   s.bends.add(at, {angle, static_cast<float>(1 / std::min(stiffness, resolved))});
 }
 
@@ -207,7 +202,7 @@ void make_surface_constraints(State& s) {
       const double thick = 0.5 * (s.half_depth[e.a] + s.half_depth[e.b]);
       add_link(s, e.a, e.b, pbd.edge * m.young_modulus * thick * e.area / l2);
     }
-    if (e.count != 2) continue;
+    if (e.count != 2 || e.left == e.right) continue;  // a triangle and its back have no angle
     const double even = 2 / std::sqrt(3.0) * 2 * e.least_area / std::sqrt(l2);
     const double plate = m.young_modulus * std::pow(std::min(std::sqrt(l2), even), 3) /
                          (12 * (1 - m.poisson_ratio * m.poisson_ratio));

@@ -26,8 +26,13 @@ struct Touch {
     n = (1.0f / root(n2)) * n;
     const V gap = dot(r, n) - number[0];
     const V share[3] = {a, b, c};
-    V sum = v[0].w;
-    for (int k = 0; k < 3; ++k) sum += share[k] * share[k] * v[k + 1].w;
+    // No vertex goes farther than the gap that is closed: one with a small share would, beside
+    // corners that are held or heavy, and its share would shrink with each step.
+    V sum = v[0].w, farthest = sum;
+    for (int k = 0; k < 3; ++k) {
+      sum += share[k] * share[k] * v[k + 1].w;
+      farthest = greater(farthest, magnitude(share[k]) * v[k + 1].w);
+    }
     // Beside the triangle another one is there.
     const V inside = lesser(a, lesser(b, c)) + 0.1f;
     const V depth = lesser(greater(zero - gap, zero), kWayApart / root(inverse_h2));
@@ -37,7 +42,7 @@ struct Touch {
     slid = slid - dot(slid, n) * n;
     const V way = root(dot(slid, slid) + kTiny);
     const V back = lesser(number[3] * push, way) / way;
-    const V over = 1.0f / (sum + kTiny);
+    const V over = 1.0f / (greater(sum, farthest) + kTiny);
     const Vector<V> moved = (push * over) * n - (back * over) * slid;
     move(v[0], one, moved);
     for (int k = 0; k < 3; ++k) move(v[k + 1], zero - share[k], moved);

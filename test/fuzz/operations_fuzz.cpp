@@ -13,7 +13,7 @@
 #include <vector>
 
 #include "bytes.h"
-#include "frame/finite_result.h"
+#include "frame/out_of_control.h"
 #include "tissue_sim/simulation.h"
 
 namespace {

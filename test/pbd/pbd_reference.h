@@ -162,7 +162,11 @@ inline void project_constraints(const pbd::State& s, double h, PbdPlaces& p, Pbd
         return std::remainder(is - n[0], 2 * M_PI);
       };
       const Corners at = corners_of(p, vertices);
-      project(p, vertices, angle(at), gradient(angle, at, 1e-8), n[1] * inverse_h2, 1, lambda[0]);
+      const std::vector<Vec3> g = gradient(angle, at, 1e-8);
+      double mobility = 0;
+      for (int i = 0; i < 4; ++i) mobility += p.w[vertices[i]] * g[i].squaredNorm();
+      const double a = std::max(n[1] * inverse_h2, mobility / pbd::Bending::kMostOfStep);
+      project(p, vertices, angle(at), g, a, 1, lambda[0]);
     });
   };
   if (backward) {

@@ -167,5 +167,19 @@ INSTANTIATE_TEST_SUITE_P(Each, Touches,
                                   (info.param.device == Device::kCpu ? "_cpu" : "_cuda");
                          });
 
+// A corner beside two that are held moved by the gap over its share, and farther with each step.
+TEST(Touch, MovesNoVertexFartherThanTheGap) {
+  constexpr float kGap = 1e-4f;
+  for (const float share : {0.5f, 0.02f, -0.05f}) {
+    pbd::Vertex<float> v[4] = {
+        {0.3f, share, -kGap, 0}, {0, 0, 0, 0}, {1, 0, 0, 0}, {0, 1, 0, 1000}};
+    const float number[4] = {0, 0.3f, share, 0};
+    float none[1] = {0};
+    pbd::Touch::project(v, number, 1.0f, none);
+    EXPECT_GT(std::fabs(v[3].z), 0.99f * kGap) << share;
+    EXPECT_LT(std::fabs(v[3].z), 1.01f * kGap) << share;
+  }
+}
+
 }  // namespace
 }  // namespace tissue_sim

@@ -92,6 +92,17 @@ class PbdTrust : public testing::Test {
     for (const Fragment& f : simulation.tissue().fragments()) sum += f.volume;
     return sum;
   }
+  static std::vector<double> heights(Simulation& simulation) {
+    std::vector<std::uint8_t> cloud;
+    const int count = simulation.tissue().read_points({}, cloud);
+    std::vector<double> all(count);
+    for (int i = 0; i < count; ++i) {
+      float place[3];
+      std::memcpy(place, cloud.data() + i * (cloud.size() / count), sizeof place);
+      all[i] = place[2];
+    }
+    return all;
+  }
   static std::string notes(Simulation& simulation) {
     std::string all;
     for (const std::string& note : simulation.tissue().notes()) all += note + "\n";
@@ -160,8 +171,9 @@ TEST_F(PbdTrust, UnevenTrianglesComeToRest) {
     if (frame >= 120) late = std::max(late, speed);
   }
   std::printf("fastest %.3f m/s, from two seconds on %.3f m/s\n", fastest, late);
-  EXPECT_LT(fastest, 1.2);
-  EXPECT_LT(late, 0.15);
+  // It lands at 0.44 m/s, and so soft its upper half falls on by another 15 mm: 0.70 m/s.
+  EXPECT_LT(fastest, 0.9);
+  EXPECT_LT(late, 0.02);
 }
 
 // Held vertices left constraints of strain next to no slope: not a number in the first frame.
@@ -225,6 +237,40 @@ TEST_F(PbdTrust, FacesThatDoNotMatchAreSaid) {
   }
 }
 
+// An edge of the line that the trace of the blade left out held a body together that a plane went
+// through, and nothing was said; tetrahedra came off alone beside such a plane.
+TEST_F(PbdTrust, APlaneThroughWhatMovesPartsIt) {
+  struct Case {
+    PbdModel model;
+    double cell;
+    int frames;
+    Vec3 point, normal;
+  };
+  const Case cases[] = {
+      {PbdModel::kSurface, 0.006, 8, {0.0136, 0.0078, 0.0155}, {-0.231, -0.064, 0.830}},
+      {PbdModel::kTetrahedra, 0.008, 14, {-0.0108, -0.0082, 0.0205}, {0.218, 0.711, -0.655}},
+      {PbdModel::kTetrahedra, 0.008, 6, {-0.0149, 0.0088, 0.0098}, {-0.368, -0.985, -0.002}},
+      {PbdModel::kTetrahedra, 0.008, 3, {-0.0007, -0.0109, 0.0146}, {-0.206, -0.672, -0.424}}};
+  for (const Case& c : cases) {
+    Scene scene;
+    scene.method = Method::kPbd;
+    scene.device = Device::kCpu;
+    scene.cell_size = c.cell;
+    scene.pbd.model = c.model;
+    scene.bodies.resize(1);
+    scene.bodies[0].shape = Shape::kEllipsoid;
+    scene.bodies[0].radii = Vec3(0.05, 0.03, 0.02);
+    scene.bodies[0].pose.position.z() = 0.03;
+    Simulation simulation(scene);
+    for (int frame = 0; frame < c.frames; ++frame) simulation.advance_frame();
+    simulation.cut(plane_cut(c.point, c.normal));
+    const CutReport report = simulation.advance_frame().result.cut_reports.at(0);
+    EXPECT_EQ(report.pieces_left_whole, 0) << report.why_left_whole;
+    ASSERT_EQ(simulation.tissue().fragments().size(), 2u);
+    for (const Fragment& f : simulation.tissue().fragments()) EXPECT_GT(f.point_count, 8);
+  }
+}
+
 // scripts/pbd_meshes: a row for each of "mesh,scale;...", dropped by 10 mm, then cut through its
 // middle.
 TEST_F(PbdTrust, MeshTable) {
@@ -238,32 +284,29 @@ TEST_F(PbdTrust, MeshTable) {
     body.mesh = one.substr(0, comma);
     body.scale = std::stod(one.substr(comma + 1));
     body.pose.position = Vec3::Zero();
-    double low = 1e300;
     {
       Simulation still(scene);
-      std::vector<std::uint8_t> cloud;
-      const int count = still.tissue().read_points({}, cloud);
-      for (int i = 0; i < count; ++i) {
-        float place[3];
-        std::memcpy(place, cloud.data() + i * (cloud.size() / count), sizeof place);
-        low = std::min(low, static_cast<double>(place[2]));
-      }
+      const std::vector<double> all = heights(still);
+      body.pose.position.z() = 0.01 - *std::min_element(all.begin(), all.end());
     }
-    body.pose.position.z() = 0.01 - low;
     Simulation simulation(scene);
     const double litres = 1e3 * volume(simulation);
-    double fastest = 0, rests = 0;
+    double fastest = 0, rests = 0, fall = 0;
+    const std::vector<double> begin = heights(simulation);
     for (int frame = 1; frame <= 180; ++frame) {
       const double speed = simulation.advance_frame().result.max_speed;
       fastest = std::max(fastest, speed);
+      const std::vector<double> now = heights(simulation);
+      for (std::size_t i = 0; i < now.size(); ++i) fall = std::max(fall, begin[i] - now[i]);
       if (speed > 0.1) rests = frame / 60.0;
     }
     const Vec3 middle = simulation.tissue().fragments()[0].centroid;
     simulation.cut(plane_cut(middle, Vec3(1, 0, 0)));
     const CutReport report = simulation.advance_frame().result.cut_reports.at(0);
-    std::printf("| %s | %.4g | %.2f | %.1f | %d%s |\n",
+    std::printf("| %s | %.4g | %.2f (%.2f) | %.1f | %d%s |\n",
                 one.substr(one.rfind('/') + 1, comma - one.rfind('/') - 1).c_str(), litres, fastest,
-                rests, static_cast<int>(simulation.tissue().fragments().size()),
+                fastest / std::sqrt(2 * 9.81 * fall), rests,
+                static_cast<int>(simulation.tissue().fragments().size()),
                 report.pieces_left_whole > 0 ? " (left whole)" : "");
   }
 }

@@ -1,9 +1,9 @@
 // Tissue that is cut, tears, or is calmed where it is wild.
 #include <algorithm>
 
+#include "mpm/cut_tissue.h"
 #include "mpm/lattice_pieces.h"
 #include "mpm/mpm_tissue.h"
-#include "mpm/split/cut_tissue.h"
 #include "mpm/tear/bond_bridges.h"
 #include "mpm/tear/debris.h"
 #include "tools/tool_motion.h"

@@ -10,9 +10,9 @@
 #include "compute/archive.h"
 #include "fragments/pieces.h"
 #include "frame/run_frame.h"
+#include "mpm/cut_tissue.h"
 #include "mpm/fragment_forecast.h"
 #include "mpm/mpm_state.h"
-#include "mpm/split/cut_tissue.h"
 #include "mpm/state_figures.h"
 #include "mpm/tear/tear.h"
 #include "tissue_sim/point.h"
@@ -121,5 +121,6 @@ class MpmDevice {
 };
 
 using MakeMpmDevice = std::unique_ptr<MpmDevice> (*)(const Scene& scene, MpmRun& run);
+std::unique_ptr<MpmDevice> make_cpu_mpm_device(const Scene& scene, MpmRun& run);
 
 }  // namespace tissue_sim

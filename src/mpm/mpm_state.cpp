@@ -4,9 +4,9 @@
 #include <cmath>
 
 #include "mpm/anchors/anchored_share.h"
-#include "mpm/anchors/hold_beside_tools.h"
-#include "mpm/anchors/kept_volume.h"
 #include "mpm/contact/block_contact.h"
+#include "mpm/contact/hold_beside_tools.h"
+#include "mpm/lattice/stiffness_shares.h"
 
 namespace tissue_sim {
 

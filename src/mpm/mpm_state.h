@@ -76,7 +76,7 @@ struct BlockMotion {
   double speed = 0;  ///< [m/s]
 };
 
-/// Where a sweep keeps what it knows of a point: mpm/split/sweep_bonds.cpp.
+/// Where a sweep keeps what it knows of a point: mpm/sweep_bonds.cpp.
 struct SweptPoint {
   std::int32_t block, index;
 };

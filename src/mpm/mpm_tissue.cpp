@@ -4,10 +4,9 @@
 #include <utility>
 
 #include "frame/out_of_control.h"
+#include "mpm/cut_tissue.h"
 #include "mpm/lattice_pieces.h"
-#include "mpm/piece_motion.h"
 #include "mpm/point_fields.h"
-#include "mpm/split/cut_tissue.h"
 #include "mpm/state_figures.h"
 
 namespace tissue_sim {

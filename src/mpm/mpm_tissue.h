@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "mpm/cpu/cpu_device.h"
+#include "mpm/device.h"
 #include "mpm/substep_choice.h"
 #include "tissue_sim/tissue.h"
 
@@ -86,7 +86,7 @@ class MpmTissue : public Tissue {
   /// of pieces that came apart to `fresh` if it is not null.
   void take_apart(const std::vector<std::int32_t>& changed,
                   const std::vector<std::int32_t>& touched = {}, std::vector<int>* fresh = nullptr);
-  bool tame();                   ///< what is wild (mpm/tear/deformation.h), whether anything was
+  bool tame();                   ///< what is wild (mpm/tear/debris.h), whether anything was
   bool settle_wild_debris();     ///< of that, debris
   void measured(unsigned what);  ///< MpmDevice::measure()
   void follow();                 ///< SubstepChoice::follow()

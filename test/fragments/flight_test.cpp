@@ -10,7 +10,7 @@
 #include "fragments/torn_bar.h"
 #include "mpm/fragment_flight.h"
 #include "mpm/fragment_forecast.h"
-#include "mpm/tear/deformation.h"
+#include "mpm/tear/debris.h"
 #include "network_text.h"
 #include "temporary_folder.h"
 

@@ -9,7 +9,7 @@
 #include "fixed_substeps.h"
 #include "momentum.h"
 #include "mpm/mpm_tissue.h"
-#include "mpm/split/cut_tissue.h"
+#include "mpm/cut_tissue.h"
 #include "mpm/tear/debris.h"
 #include "stability_limit.h"
 #include "tissue_sim/simulation.h"

@@ -43,6 +43,4 @@ class CpuMpmDevice final : public MpmDevice {
   bool again_ = false;  ///< a part is done again: see missed_contact()
 };
 
-std::unique_ptr<MpmDevice> make_cpu_mpm_device(const Scene& scene, MpmRun& run);
-
 }  // namespace tissue_sim

@@ -7,8 +7,8 @@
 #include "cutting/blade_sweep.h"
 #include "mpm/cuda/cuda_device.h"
 #include "mpm/cuda/on_device.h"
+#include "mpm/cut_tissue.h"
 #include "mpm/lattice_pieces.h"
-#include "mpm/split/cut_tissue.h"
 
 namespace tissue_sim {
 namespace {

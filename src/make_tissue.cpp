@@ -11,7 +11,7 @@
 #include "tissue_sim/tissue.h"
 #if defined(TISSUE_SIM_CUDA)
 #include "mls/cuda/cuda_mls_tissue.h"
-#include "mpm/cuda/cuda_mpm_tissue.h"
+#include "mpm/cuda/cuda_device.h"
 #include "pbd/cuda/cuda_pbd_tissue.h"
 #endif
 
@@ -29,6 +29,12 @@ std::unique_ptr<Tissue> make(const Scene& scene, Notes notes) {
   return std::make_unique<T>(scene, std::move(notes));
 }
 
+#if defined(TISSUE_SIM_CUDA)
+std::unique_ptr<Tissue> make_mpm_on_gpu(const Scene& scene, Notes notes) {
+  return std::make_unique<MpmTissue>(scene, std::move(notes), make_cuda_mpm_device);
+}
+#endif
+
 /// A method's tissue on each device; null where there is none in this build.
 struct Makers {
   Method method;
@@ -37,7 +43,7 @@ struct Makers {
 
 constexpr Makers kMakers[] = {
 #if defined(TISSUE_SIM_CUDA)
-    {Method::kMpm, make<MpmTissue>, make<CudaMpmTissue>},
+    {Method::kMpm, make<MpmTissue>, make_mpm_on_gpu},
     {Method::kMls, make<MlsTissue>, make<CudaMlsTissue>},
     {Method::kPbd, make<PbdTissue>, make<CudaPbdTissue>},
 #else

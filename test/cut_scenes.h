@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "cut_paths.h"
+#include "fixed_substeps.h"
 #include "mpm/mpm_tissue.h"
 #include "tissue_sim/simulation.h"
 
@@ -109,7 +110,7 @@ inline std::vector<int> piece_sizes(Tissue& tissue) {
 /// Cuts at once, without moving anything: zero substeps.
 template <class T>
 CutReport cut_now(T& tissue, const BladePath& path) {
-  tissue.advance(0, 1e-4f, {{}, {&path, 1}});
+  advance_by(tissue, 0, 1e-4f, {{}, {&path, 1}});
   return tissue.finish().cut_reports[0];
 }
 

@@ -7,10 +7,11 @@
 #include <string>
 #include <type_traits>
 
+#include "fixed_substeps.h"
 #include "mpm/mpm_tissue.h"
 #if defined(TISSUE_SIM_CUDA)
 #include "compute/cuda_check.h"
-#include "mpm/cuda/cuda_mpm_tissue.h"
+#include "cuda_mpm_tissue.h"
 #endif
 
 namespace tissue_sim {
@@ -23,7 +24,7 @@ inline std::string why_not(const MpmTissue*) { return ""; }
 inline void pull(CudaMpmTissue& tissue) { tissue.pull(); }
 inline void push(CudaMpmTissue& tissue) {
   tissue.push();
-  tissue.advance(0, 1e-4f, {});
+  advance_by(tissue, 0, 1e-4f, {});
   tissue.finish();
 }
 inline std::string why_not(const CudaMpmTissue*) { return why_no_gpu(); }
@@ -51,7 +52,7 @@ constexpr double kFrame = 1.0 / 60;
 template <class T>
 FrameResult advance_frame(T& tissue) {
   const int n = static_cast<int>(std::ceil(kFrame / tissue.stable_substep()));
-  tissue.advance(n, static_cast<float>(kFrame / n), {});
+  advance_by(tissue, n, static_cast<float>(kFrame / n), {});
   return tissue.finish();
 }
 

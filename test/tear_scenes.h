@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "cut_scenes.h"
+#include "fixed_substeps.h"
 #include "momentum.h"
 
 namespace tissue_sim {
@@ -115,7 +116,7 @@ class Strip {
     for (int i = 0; i < substeps; i += 4) {
       const float dt = tissue_.stable_substep();
       stretch_to(stretch_ + rate * 4 * dt, false);
-      tissue_.advance(4, dt, {});
+      advance_by(tissue_, 4, dt, {});
       const FrameResult r = tissue_.finish();
       const std::int64_t broken = sum.tear_report.bonds_broken + r.tear_report.bonds_broken;
       sum = r;

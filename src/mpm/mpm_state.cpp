@@ -4,48 +4,29 @@
 #include <cmath>
 
 #include "mpm/anchors/anchored_share.h"
-#include "mpm/anchors/hold_beside_tools.h"
-#include "mpm/anchors/kept_volume.h"
 #include "mpm/contact/block_contact.h"
-#include "mpm/split/cut_tissue.h"
-#include "mpm/surface/surface_places.h"
+#include "mpm/contact/hold_beside_tools.h"
+#include "mpm/lattice/stiffness_shares.h"
 
 namespace tissue_sim {
 
-std::unique_ptr<MpmState> make_mpm_state(const Scene& scene, std::vector<std::string>* notes) {
-  auto state = std::make_unique<MpmState>();
-  state->scene = scene;
-  state->cpu = std::make_unique<Cpu>(scene.threads);
-  state->bodies = make_lattice_bodies(scene, state->points, notes);
-  state->whole_bonds = state->points.bonds;
+void make_mpm_state(const Scene& scene, NodeRange range, MpmState& state,
+                    std::vector<std::string>* notes) {
+  state.scene = scene;
+  state.cpu = std::make_unique<Cpu>(scene.threads);
+  state.bodies = make_lattice_bodies(scene, state.points, notes, range);
+  state.whole_bonds = state.points.bonds;
   const bool at_surface = scene.mpm.boundary == MpmBoundary::kSurface;
-  state->front.follows = at_surface;
-  if (at_surface) {
-    find_free_volumes(*state);
-    state->points.outer = find_outer_places(*state);
+  state.front.follows = at_surface;
+  if (at_surface) find_free_volumes(state);
+  state.fields = std::make_unique<NodeFields>(state.bodies, state.points, state.nodes);
+  if (at_surface) find_face_links(scene, state, state.anchors);
+  find_face_rows(state, state.anchors);
+  for (const std::int32_t p : state.anchors.points) {
+    if (state.points.anchored[p] == 0) state.points.anchored[p] = Points::kAtAnchor;
   }
-  state->fields = std::make_unique<NodeFields>(state->bodies, state->points, state->nodes);
-  if (at_surface) find_face_links(scene, *state, state->anchors);
-  find_face_rows(*state, state->anchors);
-  for (const std::int32_t p : state->anchors.points) {
-    if (state->points.anchored[p] == 0) state->points.anchored[p] = Points::kAtAnchor;
-  }
-  state->blocks = make_blocks(*state, {}, *state->cpu);
-  state->work.force.resize(state->blocks.force_size);
-  state->contacts.near.resize(state->blocks.all.size());
-  state->contacts.cells.resize(state->blocks.all.size());
-  state->contacts.parts.resize(state->blocks.all.size());
-  state->contacts.touching.resize(state->blocks.all.size());
-  state->contacts.changes.resize(state->blocks.all.size());
-  list_facets(*state);
-  index_inertia(*state);
-  state->instructions = instruction_set();
-  state->kernels = &block_kernels(state->instructions);
-  if (!state->points.gaps.empty()) {
-    measure_motion(*state);
-    take_apart(*state, break_gaps(*state));
-  }
-  return state;
+  state.instructions = instruction_set();
+  state.kernels = &block_kernels(state.instructions);
 }
 
 BlockField block_field(const MpmState& state, const Block& block) {

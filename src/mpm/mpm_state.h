@@ -76,7 +76,7 @@ struct BlockMotion {
   double speed = 0;  ///< [m/s]
 };
 
-/// Where a sweep keeps what it knows of a point: mpm/split/sweep_bonds.cpp.
+/// Where a sweep keeps what it knows of a point: mpm/sweep_bonds.cpp.
 struct SweptPoint {
   std::int32_t block, index;
 };
@@ -137,8 +137,10 @@ topology_of(MpmState& s) {
   return {s.nodes, s.points, *s.fields, s.blocks, s.front, s.anchors};
 }
 
-/// Builds the state of a valid scene at rest. Throws what make_lattice_bodies() throws.
-std::unique_ptr<MpmState> make_mpm_state(const Scene& scene, std::vector<std::string>* notes);
+/// Fills the new `state` with a valid scene at rest, all but its blocks and what is theirs. Throws
+/// what make_lattice_bodies() throws.
+void make_mpm_state(const Scene& scene, NodeRange range, MpmState& state,
+                    std::vector<std::string>* notes);
 
 BlockField block_field(const MpmState& state, const Block& block);
 

@@ -23,4 +23,7 @@ void add_point_fields(MpmState& state, const PointSelection& selection,
 /// Replaces `surface` with the tissue's (mpm/surface/boundary_mesh.h), from the nodes on the host.
 void read_surface(MpmState& state, const Pieces& pieces, SurfaceTriangles& surface);
 
+/// Fills centroid (of the mass), velocity and box of all pieces.
+void measure_pieces(MpmState& state, Pieces& pieces);
+
 }  // namespace tissue_sim

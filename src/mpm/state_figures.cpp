@@ -6,7 +6,7 @@
 #include "frame/checksum.h"
 #include "frame/stability_limit.h"
 #include "mpm/tear/bond_bridges.h"
-#include "mpm/tear/deformation.h"
+#include "mpm/tear/debris.h"
 
 namespace tissue_sim {
 

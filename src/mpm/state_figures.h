@@ -23,7 +23,7 @@ double fastest_damping(const MpmState& state, const Stiffening& stiffening);
 float stable_substep(const MpmState& state, const Stiffening& stiffening);
 
 /// Whether a bond bridge or a bit of debris may be wild, as of MpmState::wildest:
-/// mpm/tear/deformation.h.
+/// mpm/tear/debris.h.
 bool may_be_wild(const MpmState& state);
 
 /// Hash of nodes, bonds and pieces.

@@ -13,8 +13,9 @@
 #include "benchmark/organ_benchmark.h"
 #include "benchmark/pbd_benchmark.h"
 #include "compute/cuda_check.h"
+#include "cuda_mpm_tissue.h"
+#include "fixed_substeps.h"
 #include "math/bspline.h"
-#include "mpm/cuda/cuda_mpm_tissue.h"
 #include "mpm/mpm_tissue.h"
 
 namespace tissue_sim {
@@ -119,9 +120,9 @@ void run_cube(benchmark::State& bench, const CubeSize& size) {
     MpmTissue cpu(scene);
     deform(cpu.state());
     measure_motion(cpu.state());
-    cpu.advance(10, dt, {});
+    advance_by(cpu, 10, dt, {});
     cpu.finish();
-    tissue.advance(10, dt, {});
+    advance_by(tissue, 10, dt, {});
     tissue.finish();
     tissue.pull();
     const double off = difference(cpu.state(), tissue.state());
@@ -131,7 +132,7 @@ void run_cube(benchmark::State& bench, const CubeSize& size) {
   constexpr int kSubsteps = 200;
   bool blew_up = false;
   const auto advance = [&] {
-    tissue.advance(kSubsteps, dt, {});
+    advance_by(tissue, kSubsteps, dt, {});
     blew_up = tissue.finish().blew_up || blew_up;
   };
   for (int frame = 0; frame < 15; ++frame) advance();
@@ -176,7 +177,7 @@ void read(benchmark::State& bench, const CubeSize& size, bool new_memory) {
 }
 
 std::string plan_of(const Tissue& tissue) {
-  return dynamic_cast<const CudaMpmTissue&>(tissue).plan();
+  return plan(on_gpu(dynamic_cast<const MpmTissue&>(tissue)));
 }
 
 }  // namespace

@@ -6,7 +6,7 @@
 
 #include "benchmark/torn_bar.h"
 #include "compute/cuda_check.h"
-#include "mpm/cuda/cuda_mpm_tissue.h"
+#include "cuda_mpm_tissue.h"
 
 namespace tissue_sim {
 namespace {

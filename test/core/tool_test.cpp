@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include "cut_scenes.h"
+#include "fixed_substeps.h"
 #include "tools/frame_colliders.h"
 
 namespace tissue_sim {
@@ -40,7 +41,7 @@ TEST(Probe, FeelsTheOppositeOfWhatItGives) {
     motion.begin = motion.end;
     motion.end.position += Vec3(1e-4, 0, -7e-4);
     const int n = static_cast<int>(std::ceil(frame / tissue.stable_substep()));
-    tissue.advance(n, static_cast<float>(frame / n), {{&motion, 1}, {}});
+    advance_by(tissue, n, static_cast<float>(frame / n), {{&motion, 1}, {}});
     const FrameResult r = tissue.finish();
     impulse += r.loads[0].mean.force * frame;
     peak = std::max(peak, r.loads[0].peak_force);

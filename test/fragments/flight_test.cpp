@@ -6,10 +6,11 @@
 #include <vector>
 
 #include "cut_scenes.h"
+#include "fixed_substeps.h"
 #include "fragments/torn_bar.h"
 #include "mpm/fragment_flight.h"
 #include "mpm/fragment_forecast.h"
-#include "mpm/tear/deformation.h"
+#include "mpm/tear/debris.h"
 #include "network_text.h"
 #include "temporary_folder.h"
 
@@ -117,7 +118,7 @@ TEST(FragmentFlight, FollowsAParabolaAndKeepsItsSpin) {
   const FragmentFlight before = s.flights[0];
   constexpr float kStep = 1e-4f;
   constexpr int kSteps = 400;
-  tissue.advance(kSteps, kStep, {});
+  advance_by(tissue, kSteps, kStep, {});
   tissue.finish();
   ASSERT_EQ(s.flights.size(), 1u) << "nothing is in its way";
   const FragmentFlight& after = s.flights[0];
@@ -211,12 +212,12 @@ TEST(FragmentFlight, ByFramesIsTheSameAsBySubsteps) {
   constexpr int kSteps = 40;
   MpmState& s = frames.state();
   for (int frame = 0; frame < 8; ++frame) {
-    substeps.advance(kSteps, kStep, {});
+    advance_by(substeps, kSteps, kStep, {});
     substeps.finish();
     std::vector<FragmentFlight> flights = std::move(s.flights);  // as where substeps do not fly
     s.flights.clear();
     index_flights(s);
-    frames.advance(kSteps, kStep, {});
+    advance_by(frames, kSteps, kStep, {});
     frames.finish();
     s.flights = std::move(flights);
     index_flights(s);

@@ -6,9 +6,10 @@
 #include <cstring>
 #include <random>
 
+#include "cuda_mpm_tissue.h"
 #include "cut_scenes.h"
 #include "either_device.h"
-#include "mpm/cuda/cuda_mpm_tissue.h"
+#include "fixed_substeps.h"
 #include "mpm/mpm_tissue.h"
 
 namespace tissue_sim {
@@ -150,7 +151,7 @@ TEST_P(AnchorsOnGpu, HoldFacesAsOnTheCpu) {
     const Scene scene = held_anywhere(random);
     const auto run = [&](auto tissue) {
       deform_and_shake(tissue, trial);
-      tissue.advance(1, 5e-5f, {});
+      advance_by(tissue, 1, 5e-5f, {});
       return outcome_of(tissue, tissue.finish());
     };
     SCOPED_TRACE(trial);
@@ -173,7 +174,7 @@ TEST_P(AnchorsOnGpu, MoveAsOnTheCpu) {
     FrameInput input;
     input.anchors = motion;
     const auto run = [&](auto tissue) {
-      tissue.advance(40, 5e-5f, input);
+      advance_by(tissue, 40, 5e-5f, input);
       return outcome_of(tissue, tissue.finish());
     };
     SCOPED_TRACE(trial);
@@ -189,7 +190,7 @@ TEST_P(AnchorsOnGpu, HoldWhatIsCutAsOnTheCpu) {
   const BladePath path = plane_cut(0.5 * kSize, Vec3(1, 0.3, 0.2));
   const auto run = [&](auto tissue) {
     cut_now(tissue, path);
-    tissue.advance(100, 5e-5f, {});
+    advance_by(tissue, 100, 5e-5f, {});
     return outcome_of(tissue, tissue.finish());
   };
   expect_same(run(MpmTissue(scene)), run(CudaMpmTissue(scene)), 1e-7, 1e-3, 1e-3);

@@ -5,8 +5,8 @@
 #include <array>
 #include <numeric>
 
+#include "mpm/cuda/bundle_blocks.h"
 #include "mpm/cuda/choose_plan.h"
-#include "mpm/cuda/count_blocks.h"
 
 namespace tissue_sim {
 namespace {

@@ -10,6 +10,7 @@
 #include <tuple>
 #include <vector>
 
+#include "fixed_substeps.h"
 #include "mpm/mpm_tissue.h"
 
 namespace tissue_sim {
@@ -65,7 +66,7 @@ TEST(CloseAnchors, KeepTissueAtTheirFacesWhereItIs) {
   MpmTissue tissue(hung_on_balls());
   const float dt = tissue.substep_for({});
   for (int i = 0; i < 5; ++i) {
-    tissue.advance(100, dt, {});
+    advance_by(tissue, 100, dt, {});
     ASSERT_FALSE(tissue.finish().blew_up);
   }
   const MpmState& s = tissue.state();
@@ -95,7 +96,7 @@ TEST(CloseAnchors, KeepTissueAtTheirFacesWhereItIs) {
 /// Points that an anchor has of a cell at its face keep some stiffness there, which nobody sees.
 TEST(CloseAnchors, ShowWhatTheyHoldWithoutStress) {
   MpmTissue tissue(hung_on_balls());
-  tissue.advance(100, tissue.substep_for({}), {});
+  advance_by(tissue, 100, tissue.substep_for({}), {});
   ASSERT_FALSE(tissue.finish().blew_up);
   std::vector<std::uint8_t> cloud;
   const int count = tissue.read_points({}, cloud);
@@ -155,7 +156,7 @@ TEST(CloseAnchors, MoveTissueWhereTheyOverlap) {
     FrameInput input;
     input.anchors = motion;
     MpmTissue tissue(scene);
-    tissue.advance(40, 5e-5f, input);
+    advance_by(tissue, 40, 5e-5f, input);
     const FrameResult result = tissue.finish();
     EXPECT_FALSE(result.blew_up) << trial;
     EXPECT_LT(result.max_speed, 3) << trial;

@@ -6,6 +6,7 @@
 
 #include "cut_kinds.h"
 #include "cut_scenes.h"
+#include "fixed_substeps.h"
 
 #ifdef TISSUE_SIM_HAS_PCL
 #include <pcl/point_types.h>
@@ -131,7 +132,7 @@ TEST(CutClusters, AreThePiecesThatFlyApart) {
     }
     const double gap = 5 * kCell, time = gap / (2 * kSpeed);
     const int substeps = static_cast<int>(std::ceil(time / tissue.stable_substep()));
-    tissue.advance(substeps, static_cast<float>(time / substeps), {});
+    advance_by(tissue, substeps, static_cast<float>(time / substeps), {});
     ASSERT_FALSE(tissue.finish().blew_up);
     const std::vector<Vec3> after = positions(tissue);
     for (std::size_t p = 0; p < after.size(); ++p) {

@@ -3,10 +3,11 @@
 #include <gtest/gtest.h>
 
 #if defined(TISSUE_SIM_CUDA)
+#include "cuda_mpm_tissue.h"
 #include "cut_kinds.h"
 #include "cut_scenes.h"
 #include "either_device.h"
-#include "mpm/cuda/cuda_mpm_tissue.h"
+#include "fixed_substeps.h"
 #include "mpm/cuda/label_pieces.h"
 #include "mpm/lattice/bonds.h"
 #include "mpm/lattice_pieces.h"
@@ -72,11 +73,11 @@ TEST_F(CutOnGpu, TissueMovesOnAsBeforeWhereTheFirstCutDividesItAnew) {
     prepare(tissue, 2e-5);
     const std::string whole = tissue.plan();
     const float dt = 0.3f * tissue.stable_substep();
-    tissue.advance(40, dt, {});
+    advance_by(tissue, 40, dt, {});
     tissue.finish();
     const BladePath path = plane_cut(Vec3(0.02, 0.02, 0.009), Vec3(1, 0.4, 0.3));
     EXPECT_GT(cut_now(tissue, path).bonds_broken, 0);
-    tissue.advance(40, dt, {});
+    advance_by(tissue, 40, dt, {});
     tissue.finish();
     std::printf("%s\n then %s\n", whole.c_str(), tissue.plan().c_str());
     return positions(tissue);
@@ -112,7 +113,7 @@ TEST_F(CutOnGpu, TissueMovesOnAsBeforeWhereRegionsAreHalvedAndJoinedAgain) {
       const Vec3 normal = cut % 2 == 0 ? Vec3(0.1, 1, 0.2) : Vec3(1, 0.1, 0.2);
       const double at = 0.005 + 0.01 * (cut / 2);
       EXPECT_GT(cut_now(tissue, plane_cut(Vec3(at, at, 0.009), normal)).bonds_broken, 0);
-      tissue.advance(10, dt, {});
+      advance_by(tissue, 10, dt, {});
       tissue.finish();
       halved.push_back(tissue.state().blocks.has_halves());
     }
@@ -143,7 +144,7 @@ TEST_F(CutOnGpu, TablesThatFollowAreThoseThatAreMadeAnew) {
       const Vec3 normal(1, 0.4 - 0.2 * cut, 0.3 * cut);
       cut_now(*tissue, plane_cut(Vec3(0.006 + 0.006 * cut, 0.0145, 0.0085), normal));
       tissue->state().faces.until_search = 1e9;  // faces pass: what they hold is not pushed
-      tissue->advance(10, 1e-5f, {});
+      advance_by(*tissue, 10, 1e-5f, {});
       tissue->finish();
     }
   }
@@ -151,7 +152,7 @@ TEST_F(CutOnGpu, TablesThatFollowAreThoseThatAreMadeAnew) {
   anew.push();
   for (CudaMpmTissue* tissue : {&follows, &anew}) {
     tissue->state().faces.until_search = 1e9;
-    tissue->advance(20, 1e-5f, {});
+    advance_by(*tissue, 20, 1e-5f, {});
     tissue->finish();
   }
   EXPECT_EQ(follows.fragment_count(), anew.fragment_count());

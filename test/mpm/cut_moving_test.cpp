@@ -5,6 +5,7 @@
 
 #include "cut_kinds.h"
 #include "cut_scenes.h"
+#include "fixed_substeps.h"
 #include "mpm/lattice/bonds.h"
 
 namespace tissue_sim {
@@ -99,7 +100,7 @@ TEST(CutMoving, InFlightPartsWhatTheSameSurfacePartsAtRest) {
   MpmTissue tissue(free_box(kSize, 0.002));
   const std::vector<Vec3> X = positions(tissue);
   spin(tissue.state(), Vec3(0.3, -0.2, 0.5), Vec3(4, -6, 5));
-  tissue.advance(400, tissue.stable_substep(), {});
+  advance_by(tissue, 400, tissue.stable_substep(), {});
   ASSERT_FALSE(tissue.finish().blew_up);
   // Where the body has turned to, as a rigid one.
   const std::vector<Vec3> x = positions(tissue);
@@ -113,7 +114,7 @@ TEST(CutMoving, InFlightPartsWhatTheSameSurfacePartsAtRest) {
       pose = {placed * pose.position, Quat(placed.linear()) * pose.orientation};
     }
   }
-  tissue.advance(20, tissue.stable_substep(), {{}, moved});
+  advance_by(tissue, 20, tissue.stable_substep(), {{}, moved});
   EXPECT_FALSE(tissue.finish().blew_up);
   EXPECT_EQ(labels(tissue), labels_at_rest(cuts));
   EXPECT_EQ(tissue.fragments().size(), 6u);
@@ -156,7 +157,7 @@ TEST(CutMoving, ByAScalpelThroughASpinningBodyPartsWhatItPartsAtRest) {
     motion.present = true;
     motion.begin = at(double(i) / kFrames);
     motion.end = at((i + 1.0) / kFrames);
-    tissue.advance(20, tissue.stable_substep(), {{&motion, 1}, {}});
+    advance_by(tissue, 20, tissue.stable_substep(), {{&motion, 1}, {}});
     ASSERT_FALSE(tissue.finish().blew_up);
   }
   EXPECT_EQ(labels(tissue), labels_at_rest({plane_cut(Vec3(x, 0, 0), Vec3::UnitX())}));
@@ -198,7 +199,7 @@ TEST(CutMoving, SlowByAnInstrumentPartsWhatItPartsInOneFrame) {
       const auto at = [&](double s) { return Pose{Vec3(0.026, -0.02 + 0.06 * s, tip_z(q)), q}; };
       motion.begin = at(double(i) / frames);
       motion.end = at((i + 1.0) / frames);
-      tissue->advance(4, tissue->stable_substep(), {{&motion, 1}, {}});
+      advance_by(*tissue, 4, tissue->stable_substep(), {{&motion, 1}, {}});
       EXPECT_FALSE(tissue->finish().blew_up);
     }
     return tissue;

@@ -7,10 +7,11 @@
 #include <iterator>
 
 #include "compute/cuda_check.h"
+#include "cuda_mpm_tissue.h"
 #include "cut_scenes.h"
+#include "fixed_substeps.h"
 #include "mpm/contact/face_places.h"
 #include "mpm/contact/face_search.h"
-#include "mpm/cuda/cuda_mpm_tissue.h"
 #include "reference/mpm_reference.h"
 
 namespace tissue_sim {
@@ -58,7 +59,7 @@ void press(CudaMpmTissue& tissue, float dt) {
   const FaceContacts& faces = tissue.state().faces;
   for (int i = 0; i < 12 || faces.until_look < dt || faces.until_search < dt; ++i) {
     ASSERT_LT(i, 60);
-    tissue.advance(1, dt, {});
+    advance_by(tissue, 1, dt, {});
     ASSERT_FALSE(tissue.finish().blew_up);
     tissue.pull();
   }
@@ -98,7 +99,7 @@ TEST_P(FaceContactOnGpu, OneSubstepAgreesWithTheCpusContactsAndBruteForce) {
     }
   }
   EXPECT_GT(touching, 50);
-  tissue.advance(1, dt, {});
+  advance_by(tissue, 1, dt, {});
   tissue.finish();
   tissue.pull();
   ASSERT_EQ(s.faces.active.size(), contacts.size()) << "nothing was looked at";
@@ -172,7 +173,7 @@ TEST_P(FaceContactOnGpu, ASearchAndALookAgreeWithTheCpus) {
     FaceContacts expected = faces;
     for (const std::int32_t i : expected.active) push_faces(s, expected.all[i], dt);
     tissue.search_anew();
-    tissue.advance(1, dt, {});
+    advance_by(tissue, 1, dt, {});
     tissue.finish();
     tissue.pull();
     const Near cpu = near_on_cpu(expected), gpu = tissue.near_facets();
@@ -211,7 +212,7 @@ TEST_P(FaceContactOnGpu, ASearchAndALookAgreeWithTheCpus) {
     EXPECT_LT(worst_hold, 1e-3);
     EXPECT_LT(worst_apart, 1e-6);
     EXPECT_LT(worst_stiffness, 1e-4);
-    tissue.advance(7, dt, {});
+    advance_by(tissue, 7, dt, {});
     ASSERT_FALSE(tissue.finish().blew_up);
   }
 }
@@ -237,7 +238,7 @@ TEST_P(FaceContactOnGpu, SameBitsRunAfterRun) {
     press(tissue, dt);
     if (HasFatalFailure()) return;
     for (int f = 0; f < 10; ++f) {
-      tissue.advance(20, dt, {});
+      advance_by(tissue, 20, dt, {});
       EXPECT_FALSE(tissue.finish().blew_up);
       checksums[run].push_back(tissue.checksum());
       tissue.pull();
@@ -254,7 +255,7 @@ TEST_P(FaceContactOnGpu, TheEndOfAFrameSearchesForTheNext) {
   CudaMpmTissue tissue(inviscid(free_box(Vec3(0.031, 0.029, 0.017), 0.002)));
   const int n = static_cast<int>(std::ceil(kHorizon / tissue.stable_substep()));
   for (int frame = 0; frame < 3; ++frame) {
-    tissue.advance(n, static_cast<float>(kHorizon / n), {});
+    advance_by(tissue, n, static_cast<float>(kHorizon / n), {});
     EXPECT_FALSE(tissue.finish().blew_up);
     EXPECT_NEAR(tissue.state().faces.until_search, kHorizon, 1e-5);
   }

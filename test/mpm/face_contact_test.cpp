@@ -4,6 +4,7 @@
 
 #include "cut_scenes.h"
 #include "either_device.h"
+#include "fixed_substeps.h"
 #include "momentum.h"
 #include "mpm/contact/face_places.h"
 
@@ -59,7 +60,7 @@ TYPED_TEST(FaceContactOf, FreshCutIsFreeOfStress) {
     push(tissue);
     cut_now(tissue, plane_cut(Vec3(0.02, 0.0171, 0.02), normal));
     ASSERT_EQ(tissue.fragments().size(), 2u);
-    tissue.advance(1, 1e-6f, {});
+    advance_by(tissue, 1, 1e-6f, {});
     tissue.finish();
     pull(tissue);
     EXPECT_GT(s.faces.active.size(), 15u * 15u) << "the faces are found";
@@ -80,7 +81,7 @@ TYPED_TEST(FaceContactOf, KeepsMomentumAndMakesNoEnergyWherePiecesCollideAndScra
   throw_pieces(tissue, velocity, Vec3(2, 1, 3));
   MpmState& s = tissue.state();
   const Momentum start = momentum(s);
-  tissue.advance(0, 1e-4f, {});
+  advance_by(tissue, 0, 1e-4f, {});
   double energy = total(tissue.finish());
   const double first = energy;
   int most = 0;
@@ -119,13 +120,13 @@ TYPED_TEST(FaceContactOf, SpringsAreSoftEnoughForSubstepsThatGrowLonger) {
     const std::vector<Vec3> velocity = left_and_right(tissue, Vec3(0.1, 0, 0), Vec3(-0.1, 0, 0));
     throw_pieces(tissue, velocity, Vec3::Zero());
     const float dt = tissue.stable_substep(), shorter = dt / 8;
-    tissue.advance(before, shorter, {});
+    advance_by(tissue, before, shorter, {});
     tissue.finish();
     pull(tissue);
     EXPECT_GT(touching(tissue.state()), 20);
     EXPECT_LT(stiffest(tissue.state(), shorter), 0.4);
     EXPECT_GT(stiffest(tissue.state(), dt), 0.5) << "else nothing is seen";
-    tissue.advance(1, dt, {});
+    advance_by(tissue, 1, dt, {});
     tissue.finish();
     pull(tissue);
     EXPECT_LT(stiffest(tissue.state(), dt), 0.4) << "after " << before;
@@ -141,7 +142,7 @@ TYPED_TEST(FaceContactOf, NeverPulls) {
   const float dt = tissue.stable_substep();
   bool touched = false;
   for (int i = 0; i < 200; ++i) {
-    tissue.advance(1, dt, {});
+    advance_by(tissue, 1, dt, {});
     tissue.finish();
     pull(tissue);
     for (const std::int32_t c : s.faces.active) {
@@ -181,7 +182,7 @@ TYPED_TEST(FaceContactOf, PiecesFarApartAreNoMatter) {
       }
     }
     push(tissue);
-    tissue.advance(1, 1e-6f, {});
+    advance_by(tissue, 1, 1e-6f, {});
     const FrameResult r = tissue.finish();
     ASSERT_TRUE(std::isfinite(r.kinetic_energy)) << apart.transpose();
   }
@@ -194,7 +195,7 @@ TYPED_TEST(FaceContactOf, PiecesPressedTogetherPartWithoutResistance) {
   advance(tissue, 0.05);  // side by side
   const std::vector<Vec3> velocity = left_and_right(tissue, Vec3(-0.1, 0, 0), Vec3(0.1, 0, 0));
   throw_pieces(tissue, velocity, Vec3::Zero());
-  tissue.advance(0, 1e-4f, {});
+  advance_by(tissue, 0, 1e-4f, {});
   const FrameResult before = tissue.finish();
   const FrameResult after = advance(tissue, 0.1);
   pull(tissue);

@@ -8,7 +8,7 @@
 #include "cut_scenes.h"
 #include "mpm/contact/face_places.h"
 #include "mpm/surface/facet_motion.h"
-#include "mpm/surface/known_facets.h"
+#include "mpm/blocks/known_facets.h"
 
 namespace tissue_sim {
 namespace {

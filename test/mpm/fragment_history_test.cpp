@@ -6,6 +6,7 @@
 
 #include "cut_kinds.h"
 #include "cut_scenes.h"
+#include "fixed_substeps.h"
 
 namespace tissue_sim {
 namespace {
@@ -64,7 +65,7 @@ TEST(FragmentHistory, CanBeFollowedFromFrameToFrameHoweverMuchIsCut) {
           0.5 * kSize + 0.4 * Vec3(u(random), u(random), u(random)).cwiseProduct(kSize);
       cuts.push_back(plane_cut(place, Vec3(u(random), u(random), u(random))));
     }
-    tissue.advance(0, 1e-4f, {{}, cuts});
+    advance_by(tissue, 0, 1e-4f, {{}, cuts});
     std::vector<int> fresh;
     for (const CutReport& r : tissue.finish().cut_reports) {
       fresh.insert(fresh.end(), r.new_fragments.begin(), r.new_fragments.end());

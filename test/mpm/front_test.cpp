@@ -13,6 +13,7 @@
 #include "cut_scenes.h"
 #include "either_device.h"
 #include "finite_element_scenes.h"
+#include "fixed_substeps.h"
 #include "momentum.h"
 
 namespace tissue_sim {
@@ -129,13 +130,13 @@ void flies(Law law) {
   push(tissue);
   const Momentum before = tissue.momentum();
   const float dt = 0.3f * tissue.stable_substep();
-  tissue.advance(1, dt, {});
+  advance_by(tissue, 1, dt, {});
   const FrameResult first = tissue.finish();
   const double energy = first.kinetic_energy + first.elastic_energy;
   double opened = 0, least = energy, most = energy;
   for (int i = 0; i < 20; ++i) {
     if (i == 10) cut_now(tissue, stroke(0.0173, 0.0212));  // nodes part for good on the way
-    tissue.advance(100, dt, {});
+    advance_by(tissue, 100, dt, {});
     const FrameResult r = tissue.finish();
     if (i < 4) least = std::min(least, r.kinetic_energy + r.elastic_energy);  // later faces touch
     most = std::max(most, r.kinetic_energy + r.elastic_energy);

@@ -4,6 +4,7 @@
 
 #include "cut_scenes.h"
 #include "either_device.h"
+#include "fixed_substeps.h"
 #include "momentum.h"
 #include "tools/grip.h"
 
@@ -151,7 +152,7 @@ TYPED_TEST(GrasperOf, FeelsTheOppositeOfWhatItGives) {
     motion.jaw_begin = motion.jaw_end;
     motion.jaw_end -= 0.06f;
     const int n = 2 * static_cast<int>(std::ceil(kFrame / tissue.stable_substep()));
-    tissue.advance(n, static_cast<float>(kFrame / n), {{&motion, 1}, {}});
+    advance_by(tissue, n, static_cast<float>(kFrame / n), {{&motion, 1}, {}});
     const ToolLoad load = tissue.finish().loads[0];
     impulse += kFrame * load.mean.force;
     moment += kFrame * load.mean.torque;

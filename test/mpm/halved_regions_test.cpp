@@ -3,6 +3,7 @@
 
 #include "cut_kinds.h"
 #include "cut_scenes.h"
+#include "fixed_substeps.h"
 
 namespace tissue_sim {
 namespace {
@@ -43,7 +44,7 @@ TEST(HalvedRegions, MoveAsWholeOnes) {
     deform(tissue.state());
     shake(tissue.state(), 7, 2e-5);
     EXPECT_GT(cut_now(tissue, plane_cut(kMiddle, Vec3(1, 0.6, 0.3))).bonds_broken, 0);
-    tissue.advance(40, 0.3f * tissue.stable_substep(), {});
+    advance_by(tissue, 40, 0.3f * tissue.stable_substep(), {});
     tissue.finish();
     EXPECT_EQ(tissue.state().blocks.has_halves(), room > 0);
     return positions(tissue);

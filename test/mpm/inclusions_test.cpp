@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "cut_scenes.h"
+#include "fixed_substeps.h"
 #include "mpm/state_figures.h"
 #include "tear_scenes.h"
 #include "test_scenes.h"
@@ -142,7 +143,7 @@ Operated operate_in_step(const Scene& scene, int frames) {
       tools[tool].end = poses[tool];
       tools[tool].present = true;
     }
-    tissue.advance(40, 1.0f / 2400, {tools, {}});
+    advance_by(tissue, 40, 1.0f / 2400, {tools, {}});
     const FrameResult result = tissue.finish();
     EXPECT_FALSE(result.blew_up) << i;
     r.energy = result.elastic_energy;

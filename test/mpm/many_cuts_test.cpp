@@ -10,6 +10,7 @@
 #include <random>
 
 #include "cut_scenes.h"
+#include "fixed_substeps.h"
 
 namespace tissue_sim {
 namespace {
@@ -63,7 +64,7 @@ BladePath stroke(Random& random) {
 void cut_at_random(MpmTissue& tissue, int sweeps, std::mt19937& random) {
   for (int i = 0; i < sweeps; ++i) {
     const BladePath path = stroke(random);
-    tissue.advance(0, 1e-4f, {{}, {&path, 1}});
+    advance_by(tissue, 0, 1e-4f, {{}, {&path, 1}});
   }
   tissue.finish();
 }

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "curve_file.h"
+#include "fixed_substeps.h"
 #include "momentum.h"
 #include "mpm/mpm_tissue.h"
 
@@ -88,16 +89,16 @@ Flight fly(Law law, const std::vector<CutInFlight>& cuts, const std::string& cur
       if (i != cut.at) continue;
       BladePath path = cut.path;
       for (Pose& pose : path.poses) pose.position += middle_of_largest(tissue);
-      tissue.advance(0, 0, {{}, {}});
+      advance_by(tissue, 0, 0, {{}, {}});
       const FrameResult before = tissue.finish();
-      tissue.advance(0, 0, {{}, {&path, 1}});
+      advance_by(tissue, 0, 0, {{}, {&path, 1}});
       const FrameResult after = tissue.finish();
       EXPECT_GT(after.cut_reports[0].bonds_broken, 0) << "cut before substep " << i;
       flight.energy_ratio =
           std::max(flight.energy_ratio, (after.kinetic_energy + after.elastic_energy) /
                                             (before.kinetic_energy + before.elastic_energy));
     }
-    tissue.advance(100, tissue.stable_substep(), {});
+    advance_by(tissue, 100, tissue.stable_substep(), {});
     const FrameResult result = tissue.finish();
     EXPECT_FALSE(result.blew_up);
     flight.elastic_share =
@@ -173,7 +174,7 @@ TEST(Momentum, GrowsByTheWeightOfWhatFalls) {
   double time = 0, half_before = 0.5 * tissue.stable_substep();
   for (int i = 0; i < 10; ++i) {
     const float dt = tissue.stable_substep();
-    tissue.advance(100, dt, {});
+    advance_by(tissue, 100, dt, {});
     tissue.finish();
     time += half_before + 99.5 * dt;  // velocities belong to the middles of substeps
     half_before = 0.5 * dt;

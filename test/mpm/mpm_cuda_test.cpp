@@ -8,9 +8,10 @@
 #include <cstring>
 
 #include "compute/device_array.h"
+#include "cuda_mpm_tissue.h"
 #include "cut_scenes.h"
 #include "either_device.h"
-#include "mpm/cuda/cuda_mpm_tissue.h"
+#include "fixed_substeps.h"
 #include "mpm/mpm_tissue.h"
 
 namespace tissue_sim {
@@ -93,7 +94,7 @@ Outcome operate(T& tissue, Operation& operation, int frames) {
   Outcome o;
   for (int i = 0; i < frames; ++i) {
     const int substeps = 200;
-    tissue.advance(substeps, static_cast<float>(1.0 / 60 / substeps), {operation.frame(i), {}});
+    advance_by(tissue, substeps, static_cast<float>(1.0 / 60 / substeps), {operation.frame(i), {}});
     const FrameResult r = tissue.finish();
     EXPECT_FALSE(r.blew_up) << "in frame " << i;
     EXPECT_LT(1.0 / 60 / substeps, tissue.stable_substep()) << "in frame " << i;
@@ -151,7 +152,7 @@ void says_what_it_needs(const Scene& scene, int substeps) {
   double megabytes = 0;
   {
     CudaMpmTissue tissue(scene);
-    if (substeps > 0) tissue.advance(substeps, 1e-5f, {});
+    if (substeps > 0) advance_by(tissue, substeps, 1e-5f, {});
     tissue.finish();
     megabytes = std::ldexp(static_cast<double>(tissue.device_bytes()), -20);
   }
@@ -211,8 +212,8 @@ TEST_F(OnGpu, CloudsAndEnergiesAreTheCpus) {
   gpu.push();
   const BladePath path = plane_cut(Vec3(0.018, 0.0145, 0.0085), Vec3(1, 0.4, 0.2));
   EXPECT_EQ(cut_now(cpu, path).bonds_broken, cut_now(gpu, path).bonds_broken);
-  cpu.advance(0, 1e-4f, {});
-  gpu.advance(0, 1e-4f, {});
+  advance_by(cpu, 0, 1e-4f, {});
+  advance_by(gpu, 0, 1e-4f, {});
   const FrameResult a = cpu.finish(), b = gpu.finish();
   EXPECT_NEAR(a.elastic_energy, b.elastic_energy, 1e-5 * a.elastic_energy);
   EXPECT_NEAR(a.kinetic_energy, b.kinetic_energy, 1e-5 * a.kinetic_energy);

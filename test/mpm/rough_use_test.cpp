@@ -6,9 +6,10 @@
 #include <vector>
 
 #include "cut_scenes.h"
+#include "fixed_substeps.h"
 #include "momentum.h"
 #include "mpm/mpm_tissue.h"
-#include "mpm/split/cut_tissue.h"
+#include "mpm/cut_tissue.h"
 #include "mpm/tear/debris.h"
 #include "stability_limit.h"
 #include "tissue_sim/simulation.h"
@@ -75,7 +76,7 @@ TEST(RoughUse, ViscosityOnlyTakesEnergyHoweverTissueIsCut) {
     scene.materials[0].viscosity = viscosity;
     MpmTissue tissue(scene);
     const std::vector<BladePath> planes = random_planes(30, 0.012);
-    tissue.advance(0, 0, {{}, planes});
+    advance_by(tissue, 0, 0, {{}, planes});
     tissue.finish();
     Nodes& n = tissue.state().nodes;
     std::mt19937 random(3);
@@ -87,7 +88,7 @@ TEST(RoughUse, ViscosityOnlyTakesEnergyHoweverTissueIsCut) {
     const double start = tissue.finish().kinetic_energy;
     double energy = start;
     for (int i = 0; i < 20; ++i) {
-      tissue.advance(20, tissue.substep_for({}), {});
+      advance_by(tissue, 20, tissue.substep_for({}), {});
       const FrameResult r = tissue.finish();
       energy = r.kinetic_energy + r.elastic_energy;
       ASSERT_LT(energy, 1.02 * start) << viscosity << ", " << i;
@@ -113,7 +114,7 @@ TEST(RoughUse, DebrisMovesOnAsRigidBodies) {
   const FrameResult before = tissue.finish();
   const Momentum start = momentum(s);
   const std::vector<BladePath> planes = random_planes(30, 0.012);
-  tissue.advance(0, 0, {{}, planes});
+  advance_by(tissue, 0, 0, {{}, planes});
   const FrameResult after = tissue.finish();
   const Momentum end = momentum(s);
   EXPECT_LT((end.linear - start.linear).norm(), 1e-5 * start.linear.norm());

@@ -38,8 +38,10 @@ class SavedStateOnGpu : public OnEitherDevice<CudaMpmTissue> {
     };
     return run;
   }
-  static CudaMpmTissue& tissue_of(Simulation& simulation) {
-    return dynamic_cast<CudaMpmTissue&>(simulation.tissue());
+  /// The shape of its blocks.
+  static std::string cells(Simulation& simulation) {
+    const std::string of = plan(on_gpu(dynamic_cast<MpmTissue&>(simulation.tissue())));
+    return of.substr(0, of.find(" cells"));
   }
   /// Returns the simulation at the end of the run.
   static std::unique_ptr<Simulation> goes_on(const SavedRun& run) {
@@ -53,8 +55,7 @@ class SavedStateOnGpu : public OnEitherDevice<CudaMpmTissue> {
     if (gpu.multiProcessorCount != 132) GTEST_SKIP() << "the size is for 132 multiprocessors";
     Simulation before(run.scene);
     const auto whole = goes_on(run);
-    const auto cells = [](const std::string& plan) { return plan.substr(0, plan.find(" cells")); };
-    EXPECT_NE(cells(tissue_of(before).plan()), cells(tissue_of(*whole).plan()));
+    EXPECT_NE(cells(before), cells(*whole));
   }
 };
 
@@ -65,7 +66,7 @@ TEST_F(SavedStateOnGpu, GoesOnWhereTheFirstCutDividesTissueAnew) {
 TEST_F(SavedStateOnGpu, GoesOnWhereRegionsAreHalved) {
   setenv("TISSUE_SIM_CUDA_SHAPE", "6 5 4 96 0", 1);
   const auto whole = goes_on(run_of(Vec3(0.031, 0.029, 0.017), 0.002, 12));
-  EXPECT_TRUE(tissue_of(*whole).state().blocks.has_halves());
+  EXPECT_TRUE(dynamic_cast<MpmTissue&>(whole->tissue()).state().blocks.has_halves());
 }
 
 }  // namespace

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "curve_file.h"
+#include "fixed_substeps.h"
 #include "math/bspline.h"
 #include "mpm/blocks/stabilisation.h"
 #include "mpm/mpm_tissue.h"
@@ -109,7 +110,7 @@ TEST(StableSubstep, ALonePointIsTheLeastStable) {
     MpmTissue block(soft_body(nu, Vec3(8, 8, 8))), plate(soft_body(nu, Vec3(8, 8, 1))),
         rod(soft_body(nu, Vec3(8, 1, 1))), pieces(soft_body(nu, Vec3(6, 6, 6)));
     const std::vector<BladePath> planes = random_planes(30, 0.012);
-    pieces.advance(0, 0, {{}, planes});
+    advance_by(pieces, 0, 0, {{}, planes});
     EXPECT_GT(pieces.finish().cut_reports[0].bonds_broken, 0);
     EXPECT_GT(pieces.fragments().size(), 100u);
     const double lone = lone_point_limit(nu), shattered = cfl_limit(pieces);
@@ -145,7 +146,7 @@ TEST(StableSubstep, FollowsDeformation) {
           for (const Eigen::Matrix3d& f : {axial, isochoric, shear, swollen}) {
             MpmTissue tissue(soft_body(nu, Vec3(4, 4, 4), law));
             const std::vector<BladePath> planes = random_planes(shattered ? 20 : 0, 0.008);
-            tissue.advance(0, 0, {{}, planes});
+            advance_by(tissue, 0, 0, {{}, planes});
             deform(tissue, f);
             const double margin = stability_limit(tissue) / tissue.stable_substep();
             EXPECT_GT(margin, shattered ? 1.0 : 1.5) << f << "\n" << nu;
@@ -177,7 +178,7 @@ TEST(StableSubstep, OfViscousTissueGoesByItsStretch) {
     for (float& x : v) x = speed(random);
   }
   for (int i = 0; i < 3; ++i) {
-    tissue.advance(10, dt, {});
+    advance_by(tissue, 10, dt, {});
     EXPECT_LT(tissue.finish().max_speed, 1) << i;
   }
 }
@@ -188,7 +189,7 @@ TEST(StableSubstep, TheLimitIsWhereItBlowsUp) {
     for (const double share : {0.98, 1.02}) {
       MpmTissue tissue(soft_body(0.45, Vec3(6, 6, 6)));
       const std::vector<BladePath> planes = random_planes(cut ? 30 : 0, 0.012);
-      tissue.advance(0, 0, {{}, planes});
+      advance_by(tissue, 0, 0, {{}, planes});
       const auto dt = static_cast<float>(share * stability_limit(tissue));
       Nodes& n = tissue.state().nodes;
       std::mt19937 random(2);
@@ -197,7 +198,7 @@ TEST(StableSubstep, TheLimitIsWhereItBlowsUp) {
         for (auto& v : n.v) v[i] = n.inv_mass[i] > 0 ? normal(random) : 0;
       }
       const double before = tissue.finish().kinetic_energy;
-      tissue.advance(400, dt, {});
+      advance_by(tissue, 400, dt, {});
       const FrameResult after = tissue.finish();
       if (share < 1) {
         EXPECT_LT(after.kinetic_energy, 20 * before);

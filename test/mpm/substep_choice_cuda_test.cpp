@@ -5,10 +5,11 @@
 #include <cmath>
 
 #include "compute/device_array.h"
+#include "cuda_mpm_tissue.h"
 #include "cut_scenes.h"
 #include "drooping_block.h"
 #include "either_device.h"
-#include "mpm/cuda/cuda_mpm_tissue.h"
+#include "fixed_substeps.h"
 #include "mpm/mpm_tissue.h"
 #include "test_scenes.h"
 #include "tissue_sim/simulation.h"
@@ -29,16 +30,16 @@ TEST_F(SubstepOnGpu, IsTheCpus) {
       deform(cpu.state());
       deform(gpu.state());
       gpu.push();
-      cpu.advance(0, 1e-4f, {});
-      gpu.advance(0, 1e-4f, {});
+      advance_by(cpu, 0, 1e-4f, {});
+      advance_by(gpu, 0, 1e-4f, {});
       cpu.finish();
       gpu.finish();
       // Its blocks are others, which bound what stiffened; and at a cut it measures all of them.
       EXPECT_NEAR(gpu.substep_for({}) / cpu.substep_for({}), 1, 0.1);
       const BladePath path = plane_cut(Vec3(0.018, 0.0145, 0.0085), Vec3(1, 0.4, 0.2));
       EXPECT_EQ(cut_now(cpu, path).bonds_broken, cut_now(gpu, path).bonds_broken);
-      cpu.advance(0, 1e-4f, {});
-      gpu.advance(0, 1e-4f, {});
+      advance_by(cpu, 0, 1e-4f, {});
+      advance_by(gpu, 0, 1e-4f, {});
       cpu.finish();
       gpu.finish();
       EXPECT_NEAR(gpu.substep_for({}) / cpu.substep_for({}), 1, 0.1);
@@ -51,7 +52,7 @@ TEST_F(SubstepOnGpu, MeasuringItChangesNothing) {
   CudaMpmTissue tissue(scene);
   deform(tissue.state());
   tissue.push();
-  tissue.advance(0, 1e-4f, {});
+  advance_by(tissue, 0, 1e-4f, {});
   const std::uint64_t before = tissue.checksum();
   for (int frame = 0; frame < 40; ++frame) tissue.finish();  // measured again after 30
   EXPECT_EQ(tissue.checksum(), before);
@@ -71,9 +72,7 @@ TEST_F(SubstepOnGpu, HoldsWhileTissueIsPressedAndCut) {
       const double t = frame / 60.0;
       simulation.set_tool(0, {Vec3(0.002 + 0.01 * t, 0.03 - 0.08 * t, -0.001), down});
       simulation.set_tool(1, {Vec3(0.03, -0.003, 0.04 - 0.02 * std::min(t, 1.0)), down});
-      const double cautious =
-          which == 1 ? dynamic_cast<CudaMpmTissue&>(simulation.tissue()).stable_substep()
-                     : dynamic_cast<MpmTissue&>(simulation.tissue()).stable_substep();
+      const double cautious = dynamic_cast<MpmTissue&>(simulation.tissue()).stable_substep();
       const FrameReport report = simulation.advance_frame();
       ASSERT_FALSE(report.result.blew_up) << frame;
       energy[which] = report.result.elastic_energy;

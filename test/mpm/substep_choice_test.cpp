@@ -8,6 +8,7 @@
 
 #include "cut_scenes.h"
 #include "drooping_block.h"
+#include "fixed_substeps.h"
 #include "math/lanczos.h"
 #include "mpm/linearised_motion.h"
 #include "mpm/tear/debris.h"
@@ -31,8 +32,8 @@ TEST(SubstepChoice, LanczosFindsTheLimit) {
         shattered(soft_body(nu, Vec3(6, 6, 6))), bent(soft_body(nu, Vec3(10, 8, 6)));
     const std::vector<BladePath> once = {plane_cut(Vec3::Zero(), Vec3(1, 0.6, 0.3))},
                                  often = random_planes(30, 0.012);
-    cut.advance(0, 0, {{}, once});
-    shattered.advance(0, 0, {{}, often});
+    advance_by(cut, 0, 0, {{}, once});
+    advance_by(shattered, 0, 0, {{}, often});
     deform(bent.state());
     for (MpmTissue* tissue : {&whole, &cut, &shattered, &bent}) {
       tissue->finish();
@@ -75,7 +76,7 @@ TEST(SubstepChoice, ASliceOnePointThickBearsNearlyWhatWholeTissueDoes) {
     for (int i = 0; sliced && i < 2; ++i) {
       planes.push_back(plane_cut((3.0 + i) * cell / 2 * Vec3::UnitX(), Vec3::UnitX()));
     }
-    tissue.advance(0, 0, {{}, planes});
+    advance_by(tissue, 0, 0, {{}, planes});
     tissue.finish();
     const std::vector<std::uint8_t> all(tissue.state().blocks.all.size(), 1);
     LinearisedMotion motion(tissue.state(), all);
@@ -170,7 +171,7 @@ TEST(SubstepChoice, UndoesWhatHasEnergyFromNowhere) {
 TEST(SubstepChoice, DebrisAndSlicesAreSoft) {
   MpmTissue tissue(soft_body(0.45, Vec3(6, 6, 6)));
   const std::vector<BladePath> planes = random_planes(30, 0.012);
-  tissue.advance(0, 0, {{}, planes});
+  advance_by(tissue, 0, 0, {{}, planes});
   tissue.finish();
   const MpmState& s = tissue.state();
   const std::vector<double> expected = reference::elastic_volumes(s);

@@ -10,6 +10,7 @@
 #include "contact/surface_spring.h"
 #include "cut_scenes.h"
 #include "either_device.h"
+#include "fixed_substeps.h"
 #include "momentum.h"
 #include "mpm/cuda/outer_points.h"
 #include "reference/mpm_reference.h"
@@ -194,7 +195,7 @@ class SurfaceContactOnGpu : public OnEitherDevice<CudaMpmTissue> {
         was[k] = Vec3(s.nodes.v[0][k], s.nodes.v[1][k], s.nodes.v[2][k]);
         scale = std::max(scale, (v[k] - was[k]).norm());
       }
-      tissue.advance(1, static_cast<float>(dt), input);
+      advance_by(tissue, 1, static_cast<float>(dt), input);
       const ToolLoad load = tissue.finish().loads[0];
       tissue.pull();
       double worst = 0;
@@ -234,7 +235,7 @@ TEST_F(SurfaceContactOnGpu, AToolFeelsTheOppositeOfWhatItGives) {
       motion.begin.position = motion.end.position;
       motion.end.position += by;
       const int n = static_cast<int>(std::ceil(kFrame / tissue.stable_substep()));
-      tissue.advance(n, static_cast<float>(kFrame / n), {{&motion, 1}, {}});
+      advance_by(tissue, n, static_cast<float>(kFrame / n), {{&motion, 1}, {}});
       const ToolLoad load = tissue.finish().loads[0];
       impulse += kFrame * load.mean.force;
       // A frame's moment is about the tip where it was at each time: in the mean halfway.
@@ -272,10 +273,10 @@ TEST_F(SurfaceContactOnGpu, AFallingBlockGainsNoEnergyAndComesToRest) {
   constexpr double kDrop = 0.01;
   scene.bodies[0].pose.position = Vec3(0, 0, 0.0075 + kDrop);
   Simulation simulation(scene);
-  auto& tissue = dynamic_cast<CudaMpmTissue&>(simulation.tissue());
+  auto& tissue = dynamic_cast<MpmTissue&>(simulation.tissue());
   const std::vector<Vec3> home = homes(tissue.state());
   const auto height_and_speed = [&] {
-    tissue.pull();
+    pull(on_gpu(tissue));
     const Nodes& n = tissue.state().nodes;
     double mass = 0, height = 0, speed = 0;
     for (std::size_t i = 0; i < n.size(); ++i) {

@@ -4,9 +4,10 @@
 #if defined(TISSUE_SIM_CUDA)
 #include <cstdio>
 
+#include "cuda_mpm_tissue.h"
 #include "cut_scenes.h"
 #include "either_device.h"
-#include "mpm/cuda/cuda_mpm_tissue.h"
+#include "fixed_substeps.h"
 #include "tear_scenes.h"
 
 namespace tissue_sim {
@@ -24,8 +25,8 @@ TEST_F(TearOnGpu, FindsThePointsToTearThatTheCpuFinds) {
   deform(gpu.state());
   gpu.push();
   // No substep: what tears in the first of them is what is past its limit now.
-  cpu.advance(1, 1e-7f, {});
-  gpu.advance(1, 1e-7f, {});
+  advance_by(cpu, 1, 1e-7f, {});
+  advance_by(gpu, 1, 1e-7f, {});
   const FrameResult a = cpu.finish(), b = gpu.finish();
   EXPECT_GT(a.tear_report.bonds_broken, 0);
   // Points at the very limit may fall on either side.
@@ -52,7 +53,7 @@ TEST_F(TearOnGpu, TissueTearsAsOnTheCpu) {
     cut_now(tissue, notch);
     std::int64_t broken = 0;
     for (int i = 0; i < 60; ++i) {
-      tissue.advance(100, 5e-5f, {});
+      advance_by(tissue, 100, 5e-5f, {});
       const FrameResult r = tissue.finish();
       EXPECT_FALSE(r.blew_up) << "in frame " << i;
       broken += r.tear_report.bonds_broken;

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "curve_file.h"
+#include "fixed_substeps.h"
 #include "mpm/lattice/bonds.h"
 #include "reference/mpm_reference.h"
 #include "tear_scenes.h"
@@ -254,13 +255,13 @@ TEST(Tear, KeepsMomentumAndBringsNoEnergy) {
     for (int a = 0; a < 3; ++a) s.nodes.v[a][i] = static_cast<float>(v[a]);
   }
   const Momentum start = momentum(s);
-  tissue.advance(0, 0, {});
+  advance_by(tissue, 0, 0, {});
   FrameResult r = tissue.finish();
   const double energy = r.kinetic_energy + r.elastic_energy;
   std::int64_t broken = 0;
   double most = 0;
   for (int i = 0; i < 40; ++i) {
-    tissue.advance(8, tissue.stable_substep(), {});
+    advance_by(tissue, 8, tissue.stable_substep(), {});
     r = tissue.finish();
     ASSERT_FALSE(r.blew_up);
     broken += r.tear_report.bonds_broken;

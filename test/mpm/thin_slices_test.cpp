@@ -5,6 +5,7 @@
 
 #include "cut_kinds.h"
 #include "cut_scenes.h"
+#include "fixed_substeps.h"
 #include "momentum.h"
 
 namespace tissue_sim {
@@ -96,16 +97,16 @@ TEST(ThinSlices, AndDebrisKeepTheirMomentumAndGainNoEnergyInFlight) {
       for (int a = 0; a < 3; ++a) s.nodes.v[a][i] = static_cast<float>(v[a]);
     }
     measure_motion(s);
-    tissue.advance(200, tissue.stable_substep(), {});
+    advance_by(tissue, 200, tissue.stable_substep(), {});
     const FrameResult before = tissue.finish();
     const Momentum start = momentum(s);
-    tissue.advance(0, 0, {{}, {cuts}});
+    advance_by(tissue, 0, 0, {{}, {cuts}});
     const FrameResult after = tissue.finish();
     const double energy = before.kinetic_energy + before.elastic_energy;
     EXPECT_NEAR(after.kinetic_energy + after.elastic_energy, energy, 0.01 * energy);
     double largest = 0;
     for (int i = 0; i < 10; ++i) {
-      tissue.advance(200, tissue.stable_substep(), {});
+      advance_by(tissue, 200, tissue.stable_substep(), {});
       const FrameResult now = tissue.finish();
       ASSERT_FALSE(now.blew_up);
       largest = std::max(largest, now.kinetic_energy + now.elastic_energy);

@@ -4,7 +4,7 @@
 #include <algorithm>
 
 #include "mpm/mpm_tissue.h"
-#include "mpm/tear/deformation.h"
+#include "mpm/tear/debris.h"
 #include "tissue_sim/simulation.h"
 
 namespace tissue_sim {

@@ -6,6 +6,7 @@
 
 #include "cut_scenes.h"
 #include "either_device.h"
+#include "fixed_substeps.h"
 #include "momentum.h"
 #include "mpm/contact/face_contact.h"
 #include "stability_limit.h"
@@ -62,7 +63,7 @@ TYPED_TEST(UndoneParts, WhatIsUndoneLeavesNothingBehind) {
   };
   const std::vector<BladePath> cuts = {plane_cut(Vec3(0.005, 0, 0.02), Vec3(1, 0, 0.5)),
                                        plane_cut(Vec3(0.02, 0, 0.018), Vec3(0, 0.2, 1))};
-  tissue.advance(0, 0, {{}, cuts});
+  advance_by(tissue, 0, 0, {{}, cuts});
   tissue.finish();
   int frame = 0;
   for (; frame < 25; ++frame) {
@@ -78,8 +79,8 @@ TYPED_TEST(UndoneParts, WhatIsUndoneLeavesNothingBehind) {
   double load[3];
   std::vector<Point> points[3];
   for (int i = 0; i < 3; ++i) {
-    tissue.save_checkpoint();
-    tissue.advance(20, dt, press(frame));
+    FixedSubsteps::keep(tissue);
+    advance_by(tissue, 20, dt, press(frame));
     const FrameResult r = tissue.finish();
     ASSERT_FALSE(r.blew_up);
     load[i] = r.loads[1].mean.force.norm();
@@ -89,7 +90,7 @@ TYPED_TEST(UndoneParts, WhatIsUndoneLeavesNothingBehind) {
     std::vector<std::uint8_t> cloud;
     points[i].resize(tissue.read_points({}, cloud));
     std::memcpy(points[i].data(), cloud.data(), cloud.size());
-    tissue.restore_checkpoint();
+    FixedSubsteps::go_back(tissue);
     ASSERT_EQ(tissue.checksum(), before);
   }
   EXPECT_EQ(end[1], end[2]);

@@ -6,6 +6,7 @@
 #include "beam_scene.h"
 #include "clamp_place.h"
 #include "curve_file.h"
+#include "fixed_substeps.h"
 
 namespace tissue_sim {
 namespace {
@@ -53,7 +54,7 @@ Swing swing(const Beam& beam, int cells, Ends ends, const std::string& curve, La
   std::vector<double> crossings;
   double before = 0;
   for (int i = 1; i <= 48 * 3 + 8; ++i) {
-    tissue.advance(substeps, static_cast<float>(dt), {});
+    advance_by(tissue, substeps, static_cast<float>(dt), {});
     double amplitude = 0;
     for (std::size_t k = 0; k < weight.size(); ++k) amplitude += weight[k] * n.u[2][k];
     amplitude /= scale * 0.01 * beam.height;

@@ -7,8 +7,6 @@
 #include <utility>
 
 #include "mpm/anchors/anchored_share.h"
-#include "mpm/anchors/group_rows.h"
-#include "mpm/anchors/hold_beside_tools.h"
 
 namespace tissue_sim {
 namespace {

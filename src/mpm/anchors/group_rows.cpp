@@ -1,11 +1,11 @@
-#include "mpm/anchors/group_rows.h"
-
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <map>
 #include <numeric>
 #include <utility>
+
+#include "mpm/anchors/anchor_faces.h"
 
 namespace tissue_sim {
 

@@ -5,12 +5,12 @@
 
 #include "compute/array.h"
 #include "compute/simd.h"
-#include "mpm/blocks/block.h"
 #include "mpm/blocks/blocks.h"
-#include "mpm/blocks/front_cell.h"
+#include "mpm/blocks/stretched_point.h"
 #include "mpm/blocks/update_node.h"
 #include "mpm/lattice/nodes.h"
-#include "mpm/tear/stretched_point.h"
+#include "mpm/split/front_cell.h"
+#include "mpm/surface/block.h"
 
 namespace tissue_sim {
 

@@ -4,9 +4,9 @@
 #include <algorithm>
 #include <cmath>
 
-#include "mpm/anchors/kept_volume.h"
 #include "mpm/blocks/block_forces.h"
-#include "mpm/tear/stretched_point.h"
+#include "mpm/blocks/stretched_point.h"
+#include "mpm/lattice/stiffness_shares.h"
 
 namespace tissue_sim {
 namespace kernels {

@@ -4,8 +4,7 @@
 #include <memory>
 #include <numeric>
 
-#include "mpm/blocks/fill_region.h"
-#include "mpm/surface/known_facets.h"
+#include "mpm/blocks/known_facets.h"
 #include "mpm/surface/surface_places.h"
 
 namespace tissue_sim {

@@ -5,8 +5,8 @@
 #include <cstdint>
 #include <vector>
 
-#include "mpm/blocks/block.h"
 #include "mpm/split/lattice_tissue.h"
+#include "mpm/surface/block.h"
 
 namespace tissue_sim {
 
@@ -77,5 +77,11 @@ Blocks make_blocks(const LatticeTissue& tissue, const BlockShape& shape, Cpu& cp
 /// changed.
 void update_blocks(Blocks& blocks, const LatticeTissue& tissue,
                    const std::vector<NodeFields::Cell>& cells, Cpu& cpu);
+
+inline constexpr int kGap = 2;  ///< cells: a new run costs about as much as so many
+
+/// Makes the region's blocks, without facets: one for the sides of cuts that reach from the same
+/// z-plane to the same, or with `uniform` one for each side and material.
+void fill_region(BlockRegion& r, const LatticeTissue& tissue, bool uniform);
 
 }  // namespace tissue_sim

@@ -1,13 +1,11 @@
-#include "mpm/blocks/fill_region.h"
-
 #include <algorithm>
 #include <numeric>
 #include <tuple>
 
-#include "mpm/blocks/block_materials.h"
 #include "mpm/blocks/block_sheets.h"
-#include "mpm/blocks/stabilisation.h"
-#include "mpm/tear/debris.h"
+#include "mpm/blocks/blocks.h"
+#include "mpm/lattice/stiffness_shares.h"
+#include "mpm/surface/block.h"
 
 namespace tissue_sim {
 namespace {

@@ -16,7 +16,7 @@
 #pragma once
 
 #include "material/laws.h"
-#include "mpm/blocks/front_cell.h"
+#include "mpm/split/front_cell.h"
 
 namespace tissue_sim {
 namespace front {

@@ -10,16 +10,9 @@
 #pragma once
 
 #include "mpm/blocks/block_passes.h"
+#include "mpm/lattice/stiffness_shares.h"
 
 namespace tissue_sim {
-
-inline constexpr float kStabilisation = 0.01f;
-/// A cell with this many points needs none: seven leave no motion loose, while pieces of cells with
-/// five or six may have motions thirty times as soft as with stabilisation.
-inline constexpr int kSteadyCount = 7;
-/// The share of its stiffness that a soft point keeps (mpm/tear/debris.h): its substep is then
-/// about that of whole tissue.
-inline constexpr float kSoftness = 1.0f / 3;
 
 namespace stabilisation {
 

@@ -60,4 +60,93 @@ void add_face_contacts(const MpmState& state, int index, float* force) {
   }
 }
 
+namespace {
+
+/// Lists the contacts that may touch before the next look, and for each block those it is part of.
+void list_active(MpmState& s) {
+  FaceContacts& faces = s.faces;
+  faces.forget_active();
+  faces.first_of_block.assign(s.blocks.all.size() + 1, 0);
+  faces.first_within = faces.first_of_block;
+  for (std::size_t i = 0; i < faces.all.size(); ++i) {
+    const FaceContact& c = faces.all[i];
+    if (!is_active(c)) continue;
+    const std::int32_t own = faces.block_of[c.facet], other = faces.block_of[c.other];
+    faces.active.push_back(static_cast<std::int32_t>(i));
+    if (own != other) {
+      faces.between.push_back(static_cast<std::int32_t>(i));
+    } else {
+      ++faces.first_within[own + 1];
+    }
+    ++faces.first_of_block[own + 1];
+    ++faces.first_of_block[other + 1];
+  }
+  for (std::size_t b = 1; b < faces.first_of_block.size(); ++b) {
+    faces.first_of_block[b] += faces.first_of_block[b - 1];
+    faces.first_within[b] += faces.first_within[b - 1];
+  }
+  faces.of_block.resize(2 * faces.active.size());
+  faces.within.resize(faces.first_within.back());
+  std::vector<std::int32_t> next = faces.first_of_block, next_within = faces.first_within;
+  for (const std::int32_t i : faces.active) {
+    const std::int32_t own = faces.block_of[faces.all[i].facet];
+    const std::int32_t other = faces.block_of[faces.all[i].other];
+    faces.of_block[next[own]++] = 2 * i;
+    faces.of_block[next[other]++] = 2 * i + 1;
+    if (own == other) faces.within[next_within[own]++] = i;
+  }
+}
+
+}  // namespace
+
+FacetMotion motion_of(const MpmState& s, std::int32_t facet) {
+  return facet_motion(body_of(s, facet), block_of(s, facet), facet_of(s, facet), s.nodes);
+}
+
+void look_at_due(MpmState& s, double dt, bool all) {
+  FaceContacts& faces = s.faces;
+  // What is half way to its next look is looked at now, too.
+  std::vector<std::int32_t> due, facets;
+  for (std::size_t i = 0; i < faces.all.size(); ++i) {
+    const FaceContact& c = faces.all[i];
+    const double half_way = 0.5 * (c.looked_at + c.look_at);
+    if (all || is_due(half_way - s.time, dt)) due.push_back(static_cast<std::int32_t>(i));
+  }
+  if (!all) {
+    std::vector<std::uint8_t> is_needed(faces.motion.size(), 0);
+    for (const std::int32_t i : due) {
+      const FaceContact& c = faces.all[i];
+      is_needed[c.facet] = 1;
+      if (c.other >= 0) is_needed[c.other] = 1;
+      for (int n = faces.first_near[i]; n < faces.first_near[i + 1]; ++n) {
+        is_needed[faces.near[n]] = 1;
+      }
+    }
+    for (std::size_t f = 0; f < is_needed.size(); ++f) {
+      if (is_needed[f] != 0) facets.push_back(static_cast<std::int32_t>(f));
+    }
+    s.cpu->for_each(
+        static_cast<int>(facets.size()),
+        [&](int i) { faces.motion[facets[i]] = motion_of(s, facets[i]); }, 32);
+  }
+  std::vector<float> speed(due.size());
+  s.cpu->for_each(
+      static_cast<int>(due.size()),
+      [&](int i) {
+        ContactFaces contact(s, due[i]);
+        FaceContact& c = faces.all[due[i]];
+        const auto since = static_cast<float>(s.time - c.looked_at);
+        speed[i] = look(contact, c, static_cast<float>(dt), since);
+        c.looked_at = s.time;
+      },
+      32);
+  list_active(s);
+  for (std::size_t i = 0; i < due.size(); ++i) {
+    faces.all[due[i]].look_at = s.time + look_horizon(speed[i], s.scene.cell_size, dt);
+  }
+  double next = s.time + kLongestLook * dt;
+  for (const FaceContact& c : faces.all) next = std::min(next, c.look_at);
+  faces.until_look = next - s.time;
+}
+
 }  // namespace tissue_sim

@@ -77,4 +77,12 @@ void push_faces_within(MpmState& state, int block, float dt, const float* u);
 /// Adds the forces of a block's contacts, which must be there, to its part of the force buffer.
 void add_face_contacts(const MpmState& state, int block, float* force);
 
+/// How a facet stands, from the nodes as they are.
+FacetMotion motion_of(const MpmState& state, std::int32_t facet);
+
+/// Looks at the contacts that are due, `all` of them after a search, which knows where facets are.
+/// How fast each moves says when it is due again, not the fastest: debris that rattles about does
+/// not make all others be looked at as often.
+void look_at_due(MpmState& state, double dt, bool all);
+
 }  // namespace tissue_sim

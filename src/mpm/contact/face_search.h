@@ -6,8 +6,8 @@
 
 #include "compute/host_device.h"
 #include "mpm/lattice/bonds.h"
+#include "mpm/lattice/stiffness_shares.h"
 #include "mpm/surface/facet_in_world.h"
-#include "mpm/tear/debris_points.h"
 
 namespace tissue_sim {
 

@@ -3,7 +3,7 @@
 
 #include "fragments/pieces.h"
 #include "mpm/contact/broad_phase.h"
-#include "mpm/contact/due_narrow_phase.h"
+#include "mpm/contact/face_contact.h"
 #include "mpm/contact/face_places.h"
 
 namespace tissue_sim {

@@ -1,11 +1,11 @@
-// What CudaMpmTissue keeps on the GPU of anchors that hold tissue at their faces.
+// What CudaTissue keeps on the GPU of anchors that hold tissue at their faces.
 #pragma once
 
 #include <functional>
 #include <vector>
 
 #include "compute/device_array.h"
-#include "mpm/anchors/hold_beside_tools.h"
+#include "mpm/anchors/anchor_faces.h"
 #include "mpm/cuda/hold_still.h"
 #include "mpm/cuda/make_face_rows.h"
 

@@ -1,3 +1,4 @@
+#include "compute/for_each_cuda.h"
 #include "mpm/cuda/block_tables.h"
 
 namespace tissue_sim {
@@ -38,6 +39,28 @@ __global__ void __launch_bounds__(kThreads)
   }
 }
 
+struct Gather {
+  CudaNodes from;
+  const std::int32_t* list;
+  int count;
+  float4* packed;
+  __device__ void operator()(int i) const {
+    packed[i] = from.u[list[i]];
+    packed[count + i] = from.v[list[i]];
+  }
+};
+
+struct Scatter {
+  const float4* packed;
+  const std::int32_t* list;
+  int count;
+  CudaNodes to, and_to;
+  __device__ void operator()(int i) const {
+    to.u[list[i]] = and_to.u[list[i]] = packed[i];
+    to.v[list[i]] = and_to.v[list[i]] = packed[count + i];
+  }
+};
+
 }  // namespace
 
 void launch_move_tables(const CudaBlock* blocks, const CudaBlockOrigin* origins, int block_count,
@@ -46,6 +69,16 @@ void launch_move_tables(const CudaBlock* blocks, const CudaBlockOrigin* origins,
   move_tables<<<block_count, kThreads, 0, stream>>>(blocks, origins, Arrays(before), Arrays(made),
                                                     Arrays(to));
   check_cuda(cudaGetLastError(), "start a kernel");
+}
+
+void launch_gather(const CudaNodes& from, const std::int32_t* list, int count, float4* packed,
+                   cudaStream_t stream) {
+  Gpu(stream).for_each(count, Gather{from, list, count, packed});
+}
+
+void launch_scatter(const float4* packed, const std::int32_t* list, int count, const CudaNodes& to,
+                    const CudaNodes& and_to, cudaStream_t stream) {
+  Gpu(stream).for_each(count, Scatter{packed, list, count, to, and_to});
 }
 
 }  // namespace tissue_sim

@@ -8,7 +8,7 @@
 #include <stdexcept>
 #include <string>
 
-#include "mpm/cuda/count_blocks.h"
+#include "mpm/cuda/bundle_blocks.h"
 
 namespace tissue_sim {
 namespace {

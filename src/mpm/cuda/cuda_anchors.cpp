@@ -36,13 +36,12 @@ void add_pull(const RigidMotion& before, const RigidMotion& after, const Vec3& o
 
 }  // namespace
 
-void CudaMpmTissue::push_anchors() {
-  const AnchorFaces& faces = state_->anchors;
-  OnDevice& d = *device_;
+void push_anchors(CudaTissue& d) {
+  const AnchorFaces& faces = d.state.anchors;
   AnchorsOnDevice& to = d.anchors;
   const bool is_made = std::exchange(to.made.is_new, false);
   if (faces.groups.empty() && faces.held.empty() && to.chunks.size() == 0) return;
-  if (!is_made) make_face_rows(*state_, d.host_tables, d.plan.max_plane_slots, to.made);
+  if (!is_made) make_face_rows(d.state, d.host_tables, d.plan.max_plane_slots, to.made);
   const HostFaceRows& t = to.made;
   std::vector<CudaRowNodes> rows(faces.rows.size());
   for (std::size_t i = 0; i < rows.size(); ++i) {
@@ -69,69 +68,49 @@ void CudaMpmTissue::push_anchors() {
   to.inverse.upload(faces.inverse, d.stream);
   to.room_each = t.room_each;
   to.room.resize(t.room_each * d.bundles.size());
-  push_impulses();
+  push_impulses(d);
 }
 
-void CudaMpmTissue::push_lightness() {
-  const Points& points = state_->points;
+void push_lightness(CudaTissue& d) {
+  const Points& points = d.state.points;
   if (points.lightness.empty()) return;
   std::vector<float> lightness(points.lightness.begin(), points.lightness.end());
   for (std::size_t p = 0; p < lightness.size(); ++p) {
-    if (points.bonds[p] != state_->whole_bonds[p] && lightness[p] > 0) lightness[p] = 1;
+    if (points.bonds[p] != d.state.whole_bonds[p] && lightness[p] > 0) lightness[p] = 1;
   }
-  device_->anchors.lightness.upload(lightness, device_->stream);
-  check_cuda(cudaStreamSynchronize(device_->stream), "receive data");
+  d.anchors.lightness.upload(lightness, d.stream);
+  check_cuda(cudaStreamSynchronize(d.stream), "receive data");
 }
 
-void CudaMpmTissue::push_impulses() {
-  OnDevice& d = *device_;
-  const auto& impulse = state_->anchors.impulse;
+void push_impulses(CudaTissue& d) {
+  const auto& impulse = d.state.anchors.impulse;
   static_assert(sizeof(impulse[0]) == 3 * sizeof(double), "three numbers a row");
   d.anchors.impulse.upload(reinterpret_cast<const double*>(impulse.data()), 3 * impulse.size(),
                            d.stream);
   check_cuda(cudaStreamSynchronize(d.stream), "receive data");
 }
 
-void CudaMpmTissue::pull_impulses() {
-  OnDevice& d = *device_;
-  auto& impulse = state_->anchors.impulse;
+void pull_impulses(CudaTissue& d) {
+  auto& impulse = d.state.anchors.impulse;
   if (impulse.empty()) return;
   d.anchors.impulse.download(reinterpret_cast<double*>(impulse.data()), 3 * impulse.size(),
                              d.stream);
   check_cuda(cudaStreamSynchronize(d.stream), "send data");
 }
 
-void CudaMpmTissue::begin_anchors(const FrameInput& input) {
-  MpmState& s = *state_;
-  AnchorFaces& faces = s.anchors;
-  if (!input.anchors.empty() && faces.origin.empty()) {
-    throw std::runtime_error(
-        "anchors do not move where the boundary is the lattice's: set mpm.boundary to surface");
-  }
-  if (faces.rows.empty() && input.anchors.empty()) return;
-  faces.impulse.assign(faces.rows.size(), {});
-  if (!faces.moves && !input.anchors.empty()) {
-    faces.moves = true;
-    find_held_nodes(s, faces);
-    push_anchors();
-  } else {
-    push_impulses();
-  }
-}
-
-void CudaMpmTissue::upload_anchor_places() {
-  OnDevice& d = *device_;
+void upload_anchor_places(CudaTissue& d) {
   std::vector<CudaAnchorPlace> places;
   std::vector<float4> pull;
-  if (!input_.anchors.empty()) {
-    const std::vector<Vec3>& origin = state_->anchors.origin;
-    std::vector<RigidMotion> before = state_->anchors.now;
+  if (!d.run.frame->input.anchors.empty()) {
+    const std::vector<Vec3>& origin = d.state.anchors.origin;
+    std::vector<RigidMotion> before = d.state.anchors.now;
     for (const RigidMotion& m : before) places.push_back(place_of(m));
-    for (int i = 0; i < substeps_; ++i) {
-      std::vector<RigidMotion> after = anchors_at(state_->anchors, input_, share_of(i));
+    for (int i = 0; i < d.loads_of; ++i) {
+      std::vector<RigidMotion> after =
+          anchors_at(d.state.anchors, d.run.frame->input, d.share_of(i));
       for (std::size_t k = 0; k < after.size(); ++k) {
         places.push_back(place_of(after[k]));
-        add_pull(before[k], after[k], origin[k], face_drift(part_.substeps.at(i)), pull);
+        add_pull(before[k], after[k], origin[k], face_drift(d.part.substeps.at(i)), pull);
       }
       before = std::move(after);
     }
@@ -142,21 +121,21 @@ void CudaMpmTissue::upload_anchor_places() {
   check_cuda(cudaStreamSynchronize(d.stream), "receive data");
 }
 
-void CudaMpmTissue::leave_anchors(int done) {
-  if (input_.anchors.empty() || done == 0) return;
-  state_->anchors.now = anchors_at(state_->anchors, input_, share_of(done - 1));
+void leave_anchors(CudaTissue& d, int done) {
+  if (d.run.frame->input.anchors.empty() || done == 0) return;
+  d.state.anchors.now = anchors_at(d.state.anchors, d.run.frame->input, d.share_of(done - 1));
 }
 
-void CudaMpmTissue::put_held_points(const std::vector<std::int32_t>& index, int stride,
-                                    std::vector<std::uint8_t>& cloud) const {
-  const std::vector<std::int32_t>& points = device_->anchors.held_points;
-  state_->cpu->for_each(
+void put_held_points(const CudaTissue& d, const std::vector<std::int32_t>& index, int stride,
+                     std::vector<std::uint8_t>& cloud) {
+  const std::vector<std::int32_t>& points = d.anchors.held_points;
+  d.state.cpu->for_each(
       static_cast<int>(points.size()),
       [&](int k) {
         const std::int32_t p = points[k];
         Vec3 place;
         const int i = !index.empty() ? index[p] : (p % stride == 0 ? p / stride : -1);
-        if (i < 0 || !held_place(*state_, p, place)) return;
+        if (i < 0 || !held_place(d.state, p, place)) return;
         std::uint8_t* const at = cloud.data() + static_cast<std::size_t>(i) * sizeof(Point);
         Point out;
         std::memcpy(&out, at, sizeof(Point));

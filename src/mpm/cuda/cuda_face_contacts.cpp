@@ -11,42 +11,55 @@
 
 namespace tissue_sim {
 
-void CudaMpmTissue::run_substeps(int begin, int end) {
+namespace {
+
+/// Enqueues a search of faces, whose figures come to the host.
+void begin_search(CudaTissue& d) {
+  FacesOnDevice& f = d.faces;
+  upload_lattices(d);
+  upload_facets(d);
+  if (f.facets.size() == 0) return;
+  launch_search(looks_of(d), d.present(), f.search_room(), !f.lists_hold, d.stream);
+  f.figures.download(f.host_figures.data(), 1, d.stream);
+  f.search_begun = true;
+}
+
+}  // namespace
+
+void run_substeps(CudaTissue& d, int begin, int end) {
   while (begin < end) {
     // Substeps of a launch have one length and one kick: one after a change is a launch of its own.
-    const float dt = part_.substeps.at(begin);
+    const float dt = d.part.substeps.at(begin);
     int count =
-        part_.substeps.is_even_from(begin) && kick_of(state_->dt, dt) == dt ? end - begin : 1;
-    FaceContacts& faces = state_->faces;
+        d.part.substeps.is_even_from(begin) && kick_of(d.state.dt, dt) == dt ? end - begin : 1;
+    FaceContacts& faces = d.state.faces;
     if (is_due(faces.until_search, dt)) {
-      begin_search();
-      check_cuda(cudaStreamSynchronize(device_->stream), "search contacts");
-      finish_search(dt);
+      begin_search(d);
+      check_cuda(cudaStreamSynchronize(d.stream), "search contacts");
+      finish_search(d, dt);
     }
     const double last = std::ceil(faces.until_search / dt - 0.5);
     count = std::max(1, static_cast<int>(std::min<double>(count, last)));
     faces.until_search -= count * static_cast<double>(dt);
-    launch(begin, begin + count, dt);
+    launch(d, begin, begin + count, dt);
     begin += count;
   }
 }
 
-void CudaMpmTissue::begin_contacts() {
-  OnDevice& d = *device_;
+void begin_contacts(CudaTissue& d) {
   FacesOnDevice& f = d.faces;
-  upload_sites();
+  upload_sites(d);
   f.near.resize(std::max(f.near.size(), 8 * f.facets.size()));
   f.springs.resize(f.facets.size());
   f.springs.clear(d.stream);  // padding included: they are copied 16 bytes at a time
-  launch_fresh_contacts(looks(), d.stream);
+  launch_fresh_contacts(looks_of(d), d.stream);
 }
 
-CudaLooks CudaMpmTissue::looks() const {
-  const OnDevice& d = *device_;
+CudaLooks looks_of(const CudaTissue& d) {
   const FacesOnDevice& f = d.faces;
   CudaLooks s;
   s.facet_count = static_cast<int>(f.facets.size());
-  s.cell_size = state_->scene.cell_size;
+  s.cell_size = d.state.scene.cell_size;
   s.per_cell = static_cast<float>(1 / s.cell_size);
   s.facets = f.facets.data();
   s.lattices = f.lattices.data();
@@ -71,32 +84,21 @@ CudaLooks CudaMpmTissue::looks() const {
   s.pushed_parts = d.pushed_parts.data();
   s.slot_count = d.slot_parts.size();
   s.figures = f.figures.data();
-  s.at_surface = state_->scene.mpm.boundary == MpmBoundary::kSurface;
+  s.at_surface = d.state.scene.mpm.boundary == MpmBoundary::kSurface;
   return s;
 }
 
-void CudaMpmTissue::begin_search() {
-  OnDevice& d = *device_;
-  FacesOnDevice& f = d.faces;
-  upload_lattices();
-  upload_facets();
-  if (f.facets.size() == 0) return;
-  launch_search(looks(), d.present(), f.search_room(), !f.lists_hold, d.stream);
-  f.figures.download(f.host_figures.data(), 1, d.stream);
-  f.search_begun = true;
-}
-
-void CudaMpmTissue::search_ahead() {
-  const FacesOnDevice& f = device_->faces;
-  const FaceContacts& faces = state_->faces;
+void search_ahead(CudaTissue& d) {
+  const FacesOnDevice& f = d.faces;
+  const FaceContacts& faces = d.state.faces;
   const bool same_facets = f.version == faces.version && !f.pieces_changed;
-  if (same_facets && blades_.empty() && is_due(faces.until_search, state_->dt)) begin_search();
+  if (same_facets && !d.run.frame->blades && is_due(faces.until_search, d.state.dt))
+    begin_search(d);
 }
 
-void CudaMpmTissue::finish_search(float dt) {
-  OnDevice& d = *device_;
+void finish_search(CudaTissue& d, float dt) {
   FacesOnDevice& f = d.faces;
-  FaceContacts& faces = state_->faces;
+  FaceContacts& faces = d.state.faces;
   const CudaFaceFigures& figures = f.host_figures[0];
   faces.until_search = kHorizon;
   f.contacts_count = 0;
@@ -107,11 +109,11 @@ void CudaMpmTissue::finish_search(float dt) {
   f.lists_hold = fastest < kOutOfControl;
   if (!f.lists_hold) return;  // as the end of the frame will say
   faces.until_search = figures.horizon;
-  faces.fastest = fastest_block(*state_);
+  faces.fastest = fastest_block(d.state);
   while (figures.listed_anew != 0 && static_cast<std::size_t>(figures.near) > f.near.size()) {
-    if (f.springs.size() == 0) begin_contacts();
+    if (f.springs.size() == 0) begin_contacts(d);
     f.near.resize(std::max(f.near.size(), static_cast<std::size_t>(figures.near) * 3 / 2));
-    launch_lists(looks(), f.search_room(), d.stream);
+    launch_lists(looks_of(d), f.search_room(), d.stream);
     f.figures.download(f.host_figures.data(), 1, d.stream);
     check_cuda(cudaStreamSynchronize(d.stream), "search contacts");
   }
@@ -129,40 +131,38 @@ void CudaMpmTissue::finish_search(float dt) {
   f.searched = true;
   if (!faces.kept.empty()) {
     f.kept.upload(faces.kept, d.stream);
-    launch_take_up(looks(), d.present(), f.kept.data(), static_cast<int>(faces.kept.size()),
+    launch_take_up(looks_of(d), d.present(), f.kept.data(), static_cast<int>(faces.kept.size()),
                    figures.contacts, dt, d.stream);
     check_cuda(cudaStreamSynchronize(d.stream), "receive data");
     faces.kept.clear();
   }
 }
 
-const CudaFaces* CudaMpmTissue::faces_of_launch() {
-  OnDevice& d = *device_;
+const CudaFaces* faces_of_launch(CudaTissue& d) {
   FacesOnDevice& f = d.faces;
-  if (!f.may_meet || f.version != state_->faces.version) return nullptr;
+  if (!f.may_meet || f.version != d.state.faces.version) return nullptr;
   const std::vector<CudaBundle>& bundles = d.host_tables.bundles;
   const std::ptrdiff_t resident =
-      has_front() || meets_thin_tools() ? d.front_resident : d.touch_resident;
+      has_front(d) || meets_thin_tools(d) ? d.front_resident : d.touch_resident;
   const auto ranks = std::count_if(
       bundles.begin(), bundles.begin() + std::min<std::ptrdiff_t>(resident, bundles.size()),
       [](const CudaBundle& b) { return b.rank >= 0; });
   const CudaFaces faces = {std::exchange(f.searched, false) ? 1 : 0, f.contacts_count,
-                           f.involved_count, static_cast<int>(ranks), looks()};
+                           f.involved_count, static_cast<int>(ranks), looks_of(d)};
   f.of_launch.upload(&faces, 1, d.stream);
   return f.of_launch.data();
 }
 
-void CudaMpmTissue::pull_contacts() {
-  OnDevice& d = *device_;
+void pull_contacts(CudaTissue& d) {
   FacesOnDevice& f = d.faces;
-  FaceContacts& faces = state_->faces;
+  FaceContacts& faces = d.state.faces;
   faces.all.clear();
   faces.active.clear();
   if (f.version != faces.version || f.contacts_count == 0) return;
   const int count = f.contacts_count;
   f.gathered.resize(count);
   f.gathered.clear(d.stream);  // the same
-  launch_gather_contacts(looks(), count, f.gathered.data(), d.stream);
+  launch_gather_contacts(looks_of(d), count, f.gathered.data(), d.stream);
   std::vector<FaceSpring> springs(count);
   f.gathered.download(springs.data(), count, d.stream);
   f.figures.download(f.host_figures.data(), 1, d.stream);
@@ -173,12 +173,12 @@ void CudaMpmTissue::pull_contacts() {
     if (spring.other < 0) continue;
     FaceContact c;
     static_cast<FaceSpring&>(c) = spring;
-    const Facet &own = facet_of(*state_, c.facet), &other = facet_of(*state_, c.other);
-    c.nodes = CellNodes(block_of(*state_, c.facet), own.cell);
+    const Facet &own = facet_of(d.state, c.facet), &other = facet_of(d.state, c.other);
+    c.nodes = CellNodes(block_of(d.state, c.facet), own.cell);
     c.weights = AxisWeights(own.center);
-    c.other_nodes = CellNodes(block_of(*state_, c.other), other.cell);
+    c.other_nodes = CellNodes(block_of(d.state, c.other), other.cell);
     c.other_weights = AxisWeights(c.hold);
-    c.looked_at = state_->time - f.host_figures[0].since_look;
+    c.looked_at = d.state.time - f.host_figures[0].since_look;
     if (is_active(spring)) {
       faces.active.push_back(static_cast<std::int32_t>(faces.all.size()));
     }
@@ -187,13 +187,12 @@ void CudaMpmTissue::pull_contacts() {
   faces.until_look = f.host_figures[0].until_look;
 }
 
-void CudaMpmTissue::search_anew() {
-  device_->faces.lists_hold = false;
-  state_->faces.until_search = 0;
+void search_anew(CudaTissue& d) {
+  d.faces.lists_hold = false;
+  d.state.faces.until_search = 0;
 }
 
-std::vector<std::vector<std::int32_t>> CudaMpmTissue::near_facets() const {
-  const OnDevice& d = *device_;
+std::vector<std::vector<std::int32_t>> near_facets(const CudaTissue& d) {
   const FacesOnDevice& f = d.faces;
   const std::size_t count = f.facets.size();
   std::vector<std::int32_t> first(count), size(count), near(f.host_figures[0].near);

@@ -30,52 +30,51 @@ CudaFacet facet_on_device(const MpmState& s, const Block& block, const Facet& fa
 
 }  // namespace
 
-void CudaMpmTissue::upload_lattices() {
-  FacesOnDevice& f = device_->faces;
+void upload_lattices(CudaTissue& d) {
+  FacesOnDevice& f = d.faces;
   if (f.lattices.size() > 0) return;
   std::vector<CudaLattice> lattices;
   std::size_t sites = 0;
-  for (const LatticeBody& b : state_->bodies) {
+  for (const LatticeBody& b : d.state.bodies) {
     const Vec3 origin = b.node_position(0, 0, 0);
     lattices.push_back({{origin[0], origin[1], origin[2]}, b.cell_size, 2 * b.nx, 2 * b.ny, sites});
     sites += std::size_t{8} * b.nx * b.ny * b.nz;
   }
-  f.lattices.upload(lattices, device_->stream);
-  check_cuda(cudaStreamSynchronize(device_->stream), "receive data");
+  f.lattices.upload(lattices, d.stream);
+  check_cuda(cudaStreamSynchronize(d.stream), "receive data");
 }
 
-void CudaMpmTissue::upload_sites() {
-  FacesOnDevice& f = device_->faces;
+void upload_sites(CudaTissue& d) {
+  FacesOnDevice& f = d.faces;
   if (f.point_at.size() > 0) return;
   std::vector<std::int32_t> point_at;
-  for (const LatticeBody& b : state_->bodies) {
+  for (const LatticeBody& b : d.state.bodies) {
     const std::size_t first = point_at.size();
     point_at.resize(first + std::size_t{8} * b.nx * b.ny * b.nz, -1);
     for (int p = b.first_point; p < b.first_point + b.point_count; ++p) {
-      const Points::Site& s = state_->points.site[p];
+      const Points::Site& s = d.state.points.site[p];
       point_at[first + (std::size_t(s.z) * 2 * b.ny + s.y) * 2 * b.nx + s.x] = p;
     }
   }
-  f.point_at.upload(point_at, device_->stream);
-  check_cuda(cudaStreamSynchronize(device_->stream), "receive data");
+  f.point_at.upload(point_at, d.stream);
+  check_cuda(cudaStreamSynchronize(d.stream), "receive data");
 }
 
-void CudaMpmTissue::send_facets() {
-  OnDevice& d = *device_;
+void send_facets(CudaTissue& d) {
   FacesOnDevice& f = d.faces;
-  const FaceContacts& faces = state_->faces;
+  const FaceContacts& faces = d.state.faces;
   const std::size_t count = faces.block_of.size();
-  std::vector<int> size(pieces_.next_id, 0);
-  for (const Fragment& piece : pieces_.all) size[piece.id] = piece.point_count;
+  std::vector<int> size(d.pieces.next_id, 0);
+  for (const Fragment& piece : d.pieces.all) size[piece.id] = piece.point_count;
   f.host_facets.resize(count);
-  state_->cpu->for_each(
+  d.state.cpu->for_each(
       static_cast<int>(count),
       [&](int i) {
-        const Facet& facet = facet_of(*state_, i);
+        const Facet& facet = facet_of(d.state, i);
         CudaFacet& to = f.host_facets[i];
-        to = facet_on_device(*state_, block_of(*state_, i), facet,
+        to = facet_on_device(d.state, block_of(d.state, i), facet,
                              d.host_tables.first_slot[faces.block_of[i]]);
-        const std::int32_t piece = pieces_.of_point[facet.point];
+        const std::int32_t piece = d.pieces.of_point[facet.point];
         to.piece = {piece, size[piece]};
       },
       256);
@@ -83,8 +82,7 @@ void CudaMpmTissue::send_facets() {
   check_cuda(cudaStreamSynchronize(d.stream), "receive data");
 }
 
-void CudaMpmTissue::make_room_for_facets() {
-  OnDevice& d = *device_;
+void make_room_for_facets(CudaTissue& d) {
   FacesOnDevice& f = d.faces;
   const std::size_t count = f.facets.size();
   f.motion.resize(count);
@@ -107,18 +105,18 @@ void CudaMpmTissue::make_room_for_facets() {
   f.bucket_count.resize(buckets);
 }
 
-void CudaMpmTissue::upload_facets() {
-  FacesOnDevice& f = device_->faces;
-  const bool renumbered = f.version != state_->faces.version;
+void upload_facets(CudaTissue& d) {
+  FacesOnDevice& f = d.faces;
+  const bool renumbered = f.version != d.state.faces.version;
   if (!renumbered && !f.pieces_changed) return;
-  send_facets();
+  send_facets(d);
   f.pieces_changed = false;
   if (!renumbered) return;
-  f.version = state_->faces.version;
+  f.version = d.state.faces.version;
   f.lists_hold = false;
-  make_room_for_facets();
-  f.listed.clear(device_->stream);
-  if (f.springs.size() > 0) begin_contacts();
+  make_room_for_facets(d);
+  f.listed.clear(d.stream);
+  if (f.springs.size() > 0) begin_contacts(d);
 }
 
 }  // namespace tissue_sim

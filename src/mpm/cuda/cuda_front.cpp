@@ -36,8 +36,7 @@ std::vector<int4> list_tasks(const Front& front) {
 
 }  // namespace
 
-void CudaMpmTissue::pull_front() {
-  OnDevice& d = *device_;
+void pull_front(CudaTissue& d) {
   const auto first = static_cast<std::size_t>(d.front.first_node),
              count = static_cast<std::size_t>(d.front.node_count);
   if (count == 0) return;
@@ -50,7 +49,7 @@ void CudaMpmTissue::pull_front() {
   bring(d.present().u, d.host_nodes.data());
   bring(d.present().v, d.host_nodes.data() + count);
   check_cuda(cudaStreamSynchronize(d.stream), "send data");
-  Front& front = state_->front;
+  Front& front = d.state.front;
   for (std::size_t i = 0; i < count; ++i) {
     const float4 &u = d.host_nodes[i], &v = d.host_nodes[count + i];
     front.d[0][i] = u.x, front.d[1][i] = u.y, front.d[2][i] = u.z;
@@ -58,11 +57,10 @@ void CudaMpmTissue::pull_front() {
   }
 }
 
-void CudaMpmTissue::push_front() {
-  OnDevice& d = *device_;
+void push_front(CudaTissue& d) {
   FrontOnDevice& to = d.front;
-  const Front& front = state_->front;
-  const std::size_t first = state_->nodes.size(), count = front.nodes.size();
+  const Front& front = d.state.front;
+  const std::size_t first = d.state.nodes.size(), count = front.nodes.size();
   to.first_node = static_cast<int>(first);
   to.node_count = static_cast<int>(count);
   to.marked = false;
@@ -91,11 +89,10 @@ void CudaMpmTissue::push_front() {
   check_cuda(cudaStreamSynchronize(d.stream), "receive data");
 }
 
-NodePushes CudaMpmTissue::clear_pushes() {
-  OnDevice& d = *device_;
+NodePushes clear_pushes(CudaTissue& d) {
   d.pushed.resize(3 * kPushStride * d.entries());
   d.pushed.clear(d.stream);
-  if (has_front() && !d.front.marked) {
+  if (has_front(d) && !d.front.marked) {
     launch_mark_front(d.front.view(), d.marks.data(), d.marks.size(), d.stream);
     launch_mark_slots(d.tables(), d.marks.data(), d.pushed_parts.data(), d.pushed_parts.size(),
                       d.stream);
@@ -111,30 +108,27 @@ NodePushes CudaMpmTissue::clear_pushes() {
   return pushes;
 }
 
-bool CudaMpmTissue::has_front() const { return device_->front.node_count > 0; }
-
-void CudaMpmTissue::pass_rim(const BladePath& path, bool moves,
-                             const std::vector<std::int32_t>& broken,
-                             std::vector<std::int32_t>& touched) {
+void pass_rim(CudaTissue& d, const BladePath& path, bool moves,
+              const std::vector<std::int32_t>& broken, std::vector<std::int32_t>& touched) {
   std::vector<std::int32_t> points = broken;
-  for (const auto& [bond, passed] : state_->front.rim) {
+  for (const auto& [bond, passed] : d.state.front.rim) {
     points.push_back(static_cast<std::int32_t>(bond / 3));
   }
   if (points.empty()) return;
-  const std::vector<std::int32_t> nodes = nodes_around(points);
-  const Array<float>*end = state_->nodes.u, *begin = end;
+  const std::vector<std::int32_t> nodes = nodes_around(d, points);
+  const Array<float>*end = d.state.nodes.u, *begin = end;
   if (moves) {
-    float4* u_before = device_->u_before.data();
-    Array<float>* before = state_->work.u_before;
-    for (int a = 0; a < 3; ++a) before[a].resize(state_->nodes.size());
-    const float4* u = gather({u_before, u_before}, nodes);
+    float4* u_before = d.u_before.data();
+    Array<float>* before = d.state.work.u_before;
+    for (int a = 0; a < 3; ++a) before[a].resize(d.state.nodes.size());
+    const float4* u = gather(d, {u_before, u_before}, nodes);
     for (std::size_t i = 0; i < nodes.size(); ++i) {
       before[0][nodes[i]] = u[i].x, before[1][nodes[i]] = u[i].y, before[2][nodes[i]] = u[i].z;
     }
     begin = before;
   }
-  pull_some(nodes);
-  tissue_sim::pass_rim(*state_, path, begin, end, broken, nullptr, touched);
+  pull_some(d, nodes);
+  tissue_sim::pass_rim(d.state, path, begin, end, broken, nullptr, touched);
 }
 
 }  // namespace tissue_sim

@@ -12,19 +12,7 @@
 
 namespace tissue_sim {
 
-float CudaMpmTissue::stable_substep() const {
-  return tissue_sim::stable_substep(*state_, stiffening_);
-}
-
-float CudaMpmTissue::substep_for(const FrameInput& input) {
-  const auto measure = [this](const std::vector<std::uint8_t>&, int steps) {
-    return measure_limit(steps);
-  };
-  return static_cast<float>(substep_.longest(*state_, input, stiffening_, measure));
-}
-
-double CudaMpmTissue::measure_limit(int steps) {
-  OnDevice& d = *device_;
+double measure_limit(CudaTissue& d, int steps) {
   CudaFrame frame{};
   for (int i = 0; i < 2; ++i) frame.force[i] = d.force[i].data();
   frame.substeps = 1;
@@ -41,7 +29,7 @@ double CudaMpmTissue::measure_limit(int steps) {
   d.checkpoint.v.resize(n);
   DeviceArray<float4> more;
   auto* fields = reinterpret_cast<float4*>(d.pushed.data());
-  if (has_front()) {  // which pushes
+  if (has_front(d)) {  // which pushes
     d.front.motion_fields.resize(3 * n);
     fields = d.front.motion_fields.data();
   } else if (d.pushed.size() * sizeof(long long) < 3 * n * sizeof(float4)) {
@@ -52,13 +40,13 @@ double CudaMpmTissue::measure_limit(int steps) {
                           fields + 2 * n};
   std::copy(std::begin(room), std::end(room), d.motion_room.fields);
   CudaLinearisedMotion motion(
-      d.present(), d.nodes(1 - d.current), n, state_->scene.cell_size,
+      d.present(), d.nodes(1 - d.current), n, d.state.scene.cell_size,
       [&](const CudaNodes& from, const CudaNodes& to) {
         frame.state[0] = from;
         frame.state[1] = to;
-        if (has_front()) {
+        if (has_front(d)) {
           frame.front = d.front.view();
-          frame.pushes = clear_pushes();
+          frame.pushes = clear_pushes(d);
           launch_substeps(d.front_plan, d.pushed_tables(), frame, d.front_resident, d.stream);
         } else {
           launch_substeps(d.plan, d.tables(), frame, d.resident, d.stream);
@@ -68,9 +56,7 @@ double CudaMpmTissue::measure_limit(int steps) {
   return 2 / std::sqrt(largest_eigenvalue(motion, steps));
 }
 
-void CudaMpmTissue::launch_measure() {
-  OnDevice& d = *device_;
-  measured_ = false;
+void launch_measure(CudaTissue& d) {
   d.measures.resize(d.blocks.size());
   d.host_measures.resize(d.blocks.size());
   tissue_sim::launch_measure(d.tables(), d.present(), d.plan.max_slots, d.measures.data(),
@@ -80,41 +66,39 @@ void CudaMpmTissue::launch_measure() {
   d.front.energy.download(d.front.host_energy.data(), d.front.energy.size(), d.stream);
 }
 
-void CudaMpmTissue::finish_measure() {
-  OnDevice& d = *device_;
+void finish_measure(CudaTissue& d) {
   check_cuda(cudaStreamSynchronize(d.stream), "finish a frame");
   const bool searched = d.faces.search_begun;
-  if (searched) finish_search(state_->dt);
-  result_.elastic_energy = result_.kinetic_energy = result_.max_speed = 0;
-  stiffening_ = even_stiffening(*state_, 1);
-  state_->wildest = 1;
-  state_->motion.resize(d.blocks.size());
-  modulus_.resize(d.blocks.size());
+  if (searched) finish_search(d, d.state.dt);
+  d.result.elastic_energy = d.result.kinetic_energy = d.result.max_speed = 0;
+  d.run.stiffening = even_stiffening(d.state, 1);
+  d.state.wildest = 1;
+  d.state.motion.resize(d.blocks.size());
+  d.run.modulus.resize(d.blocks.size());
   for (std::size_t i = 0; i < d.blocks.size(); ++i) {
     const CudaMeasure& m = d.host_measures[i];
-    result_.elastic_energy += m.elastic_energy;
-    result_.kinetic_energy += m.kinetic_energy;
-    state_->wildest = std::max(state_->wildest, m.wildest);
-    if (!(m.speed <= result_.max_speed)) result_.max_speed = m.speed;
-    const Block& block = *state_->blocks.all[d.host_tables.of_host[i]];
-    float& stiffening = stiffening_[block.body][block.material];
+    d.result.elastic_energy += m.elastic_energy;
+    d.result.kinetic_energy += m.kinetic_energy;
+    d.state.wildest = std::max(d.state.wildest, m.wildest);
+    if (!(m.speed <= d.result.max_speed)) d.result.max_speed = m.speed;
+    const Block& block = *d.state.blocks.all[d.host_tables.of_host[i]];
+    float& stiffening = d.run.stiffening[block.body][block.material];
     const float now = m.finite != 0 ? m.stiffening : std::numeric_limits<float>::infinity();
     stiffening = std::max(stiffening, now);
-    float& square = stiffening_[block.body].back();
+    float& square = d.run.stiffening[block.body].back();
     square = std::max(square, m.square);
-    const Material& material = state_->bodies[block.body].materials[block.material];
-    modulus_[d.host_tables.of_host[i]] = static_cast<float>(wave_modulus(material, now));
-    result_.blew_up = result_.blew_up || !(now <= 1e6f);
-    state_->motion[d.host_tables.of_host[i]] = {
+    const Material& material = d.state.bodies[block.body].materials[block.material];
+    d.run.modulus[d.host_tables.of_host[i]] = static_cast<float>(wave_modulus(material, now));
+    d.result.blew_up = d.result.blew_up || !(now <= 1e6f);
+    d.state.motion[d.host_tables.of_host[i]] = {
         {Vec3(m.min[0], m.min[1], m.min[2]), Vec3(m.max[0], m.max[1], m.max[2])}, m.speed};
   }
   const std::size_t cells = d.front.cells.size();
   for (std::size_t i = 0; i < d.front.energy.size(); ++i) {
-    (i < cells ? result_.elastic_energy : result_.kinetic_energy) += d.front.host_energy[i];
+    (i < cells ? d.result.elastic_energy : d.result.kinetic_energy) += d.front.host_energy[i];
   }
-  result_.blew_up = result_.blew_up || is_out_of_control(result_.max_speed);
-  if (searched) state_->faces.fastest = fastest_block(*state_);
-  measured_ = true;
+  d.result.blew_up = d.result.blew_up || is_out_of_control(d.result.max_speed);
+  if (searched) d.state.faces.fastest = fastest_block(d.state);
 }
 
 }  // namespace tissue_sim

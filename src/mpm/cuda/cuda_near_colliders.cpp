@@ -5,10 +5,11 @@
 
 namespace tissue_sim {
 
+namespace {
+
 /// Whether any of these may be within its margin of what a collider sweeps.
 template <class Margin>
-bool CudaMpmTissue::may_meet(const std::vector<BlockMotion>& motion, const Margin& margin) const {
-  const OnDevice& d = *device_;
+bool may_meet(const CudaTissue& d, const std::vector<BlockMotion>& motion, const Margin& margin) {
   const auto meets = [](const BlockMotion& m, double far, const CudaBox& reach) {
     bool meets = true;
     for (int a = 0; a < 3; ++a) {
@@ -23,13 +24,12 @@ bool CudaMpmTissue::may_meet(const std::vector<BlockMotion>& motion, const Margi
   });
 }
 
-CudaReach CudaMpmTissue::reach() const {
-  const OnDevice& d = *device_;
+CudaReach reach(const CudaTissue& d) {
   CudaReach reach{d.reach.data(),
                   static_cast<int>(d.host_reach.size()),
                   0,
-                  static_cast<float>(duration_),
-                  static_cast<float>((0.5 + d.surface_reach()) * state_->scene.cell_size),
+                  static_cast<float>(d.run.frame->duration),
+                  static_cast<float>((0.5 + d.surface_reach()) * d.state.scene.cell_size),
                   d.went.empty() ? nullptr : d.u_went.data()};
   for (int c = 0; c < reach.collider_count; ++c) {
     if (d.host_colliders[c].kind == Collider::kBlade) reach.blades |= 1u << c;
@@ -37,13 +37,15 @@ CudaReach CudaMpmTissue::reach() const {
   return reach;
 }
 
-void CudaMpmTissue::find_near() {
-  OnDevice& d = *device_;
+}  // namespace
+
+void find_near(CudaTissue& d) {
   // A little more than the GPU finds, for what it finds must be done.
-  const double cell = (1 + d.surface_reach()) * state_->scene.cell_size;
+  const double cell = (1 + d.surface_reach()) * d.state.scene.cell_size;
   d.may_meet =
-      may_meet(state_->motion, [&](const BlockMotion& m) { return m.speed * duration_ + cell; }) ||
-      may_meet(d.went, [&](const BlockMotion&) { return cell; });
+      may_meet(d, d.state.motion,
+               [&](const BlockMotion& m) { return m.speed * d.run.frame->duration + cell; }) ||
+      may_meet(d, d.went, [&](const BlockMotion&) { return cell; });
   if (!d.may_meet) {
     d.with.clear(d.stream);
     return;
@@ -52,27 +54,25 @@ void CudaMpmTissue::find_near() {
   d.near_cells.resize(cells);
   d.near_listed.resize(cells);
   d.near_count.resize(1);
-  launch_near(d.tables(), d.present(), d.measures.data(), reach(),
+  launch_near(d.tables(), d.present(), d.measures.data(), reach(d),
               {d.near_cells.data(), d.near_count.data(), d.near_listed.data(), cells,
                d.marks.data(), d.marks.size(), d.pushed_parts.data(), d.pushed_parts.size()},
               d.stream);
 }
 
-void CudaMpmTissue::look_for_unforeseen() {
-  OnDevice& d = *device_;
+void look_for_unforeseen(CudaTissue& d) {
   if (!d.may_meet) return;
   d.unforeseen.resize(1);
   d.host_unforeseen.resize(1);
-  launch_unforeseen(d.tables(), d.present(), d.measures.data(), reach(), d.near_listed.data(),
+  launch_unforeseen(d.tables(), d.present(), d.measures.data(), reach(d), d.near_listed.data(),
                     d.unforeseen.data(), d.stream);
   d.unforeseen.download(d.host_unforeseen.data(), 1, d.stream);
 }
 
-bool CudaMpmTissue::came_unforeseen() const {
-  const OnDevice& d = *device_;
+bool came_unforeseen(const CudaTissue& d) {
   if (d.may_meet) return d.host_unforeseen[0] != 0;
-  const double reach = d.surface_reach() * state_->scene.cell_size;
-  return may_meet(state_->motion, [reach](const BlockMotion&) { return reach; });
+  const double reach = d.surface_reach() * d.state.scene.cell_size;
+  return may_meet(d, d.state.motion, [reach](const BlockMotion&) { return reach; });
 }
 
 }  // namespace tissue_sim

@@ -1,6 +1,7 @@
 // Nodes of tissue that lives on a GPU on their way to the host and back.
 #include <algorithm>
 
+#include "mpm/cuda/cuda_device.h"
 #include "mpm/cuda/on_device.h"
 
 namespace tissue_sim {
@@ -8,55 +9,53 @@ namespace {
 
 constexpr int kGrain = 1024;  // nodes that a thread takes at once
 
-}  // namespace
-
-void CudaMpmTissue::pull() {
-  pull_nodes();
-  pull_contacts();
-}
-
-void CudaMpmTissue::pull_nodes() {
-  pull_field(device_->present().u, state_->nodes.u);
-  pull_field(device_->present().v, state_->nodes.v);
-  pull_front();
-}
-
-void CudaMpmTissue::pull_field(const float4* from, Array<float>* to) {
-  OnDevice& d = *device_;
-  const std::size_t n = state_->nodes.size();
+void pull_field(CudaTissue& d, const float4* from, Array<float>* to) {
+  const std::size_t n = d.state.nodes.size();
   d.host_nodes.resize(2 * n);
   check_cuda(cudaMemcpyAsync(d.host_nodes.data(), from, n * sizeof(float4), cudaMemcpyDeviceToHost,
                              d.stream),
              "send data");
   check_cuda(cudaStreamSynchronize(d.stream), "finish a frame");
-  unpack_field(d.host_nodes.data(), n, *state_->cpu, to);
+  unpack_field(d.host_nodes.data(), n, *d.state.cpu, to);
 }
 
-void CudaMpmTissue::push_nodes() {
-  OnDevice& d = *device_;
-  const std::size_t n = state_->nodes.size();
+}  // namespace
+
+void pull(CudaTissue& d) {
+  pull_nodes(d);
+  pull_contacts(d);
+}
+
+void pull_nodes(CudaTissue& d) {
+  pull_field(d, d.present().u, d.state.nodes.u);
+  pull_field(d, d.present().v, d.state.nodes.v);
+  pull_front(d);
+}
+
+void push_nodes(CudaTissue& d) {
+  const std::size_t n = d.state.nodes.size();
   d.host_nodes.resize(2 * n);
-  pack_nodes(state_->nodes, *state_->cpu, d.host_nodes.data(), d.host_nodes.data() + n);
+  pack_nodes(d.state.nodes, *d.state.cpu, d.host_nodes.data(), d.host_nodes.data() + n);
   d.u[d.current].upload(d.host_nodes.data(), n, d.stream);
   d.v[d.current].upload(d.host_nodes.data() + n, n, d.stream);
   // What no block moves, the other state has, too.
   d.u[1 - d.current].copy(d.u[d.current], d.stream);
   d.v[1 - d.current].copy(d.v[d.current], d.stream);
   check_cuda(cudaStreamSynchronize(d.stream), "receive data");
-  push_front();
+  push_front(d);
 }
 
-std::vector<std::int32_t> CudaMpmTissue::nodes_around(
-    const std::vector<std::int32_t>& points) const {
+std::vector<std::int32_t> nodes_around(const CudaTissue& d,
+                                       const std::vector<std::int32_t>& points) {
   // A bit of debris (mpm/tear/debris.h) reaches at most four cells from a point that lost a bond,
   // what it gives its spin to two more, and their nodes one.
   constexpr int kReach = 8;
   struct Range {
     int min[3] = {1 << 30, 1 << 30, 1 << 30}, max[3] = {-1, -1, -1};
   };
-  std::vector<Range> ranges(state_->bodies.size());
+  std::vector<Range> ranges(d.state.bodies.size());
   for (const std::int32_t p : points) {
-    const Points::Site& s = state_->points.site[p];
+    const Points::Site& s = d.state.points.site[p];
     const int cell[3] = {s.x / 2, s.y / 2, s.z / 2};
     Range& range = ranges[s.body];
     for (int a = 0; a < 3; ++a) {
@@ -66,7 +65,7 @@ std::vector<std::int32_t> CudaMpmTissue::nodes_around(
   }
   std::vector<std::int32_t> nodes;
   for (std::size_t i = 0; i < ranges.size(); ++i) {
-    const LatticeBody& b = state_->bodies[i];
+    const LatticeBody& b = d.state.bodies[i];
     const int size[3] = {b.nx, b.ny, b.nz};
     int first[3], last[3];
     for (int a = 0; a < 3; ++a) {
@@ -80,14 +79,13 @@ std::vector<std::int32_t> CudaMpmTissue::nodes_around(
       }
     }
   }
-  for (int n = state_->blocks.first_split_node; n < static_cast<int>(state_->nodes.size()); ++n) {
+  for (int n = d.state.blocks.first_split_node; n < static_cast<int>(d.state.nodes.size()); ++n) {
     nodes.push_back(n);
   }
   return nodes;
 }
 
-const float4* CudaMpmTissue::gather(const CudaNodes& from, const std::vector<std::int32_t>& nodes) {
-  OnDevice& d = *device_;
+const float4* gather(CudaTissue& d, const CudaNodes& from, const std::vector<std::int32_t>& nodes) {
   const std::size_t count = nodes.size();
   d.some_nodes.upload(nodes, d.stream);
   d.packed.resize(2 * count);
@@ -98,11 +96,11 @@ const float4* CudaMpmTissue::gather(const CudaNodes& from, const std::vector<std
   return d.host_nodes.data();
 }
 
-void CudaMpmTissue::pull_some(const std::vector<std::int32_t>& nodes) {
+void pull_some(CudaTissue& d, const std::vector<std::int32_t>& nodes) {
   const std::size_t count = nodes.size();
-  const float4* packed = gather(device_->present(), nodes);
-  Nodes& n = state_->nodes;
-  state_->cpu->for_each(
+  const float4* packed = gather(d, d.present(), nodes);
+  Nodes& n = d.state.nodes;
+  d.state.cpu->for_each(
       static_cast<int>(count),
       [&](int i) {
         const float4 &u = packed[i], &v = packed[count + i];
@@ -113,18 +111,17 @@ void CudaMpmTissue::pull_some(const std::vector<std::int32_t>& nodes) {
       kGrain);
 }
 
-void CudaMpmTissue::push_some(const std::vector<std::int32_t>& nodes) {
-  OnDevice& d = *device_;
+void push_some(CudaTissue& d, const std::vector<std::int32_t>& nodes) {
   const std::size_t count = nodes.size();
   // Parted nodes stay behind the others; where there are more of these, push_front() brings them.
-  const std::size_t entries = std::max(d.entries(), state_->nodes.size());
+  const std::size_t entries = std::max(d.entries(), d.state.nodes.size());
   for (int i = 0; i < 2; ++i) {
     d.u[i].extend(entries, d.stream);
     d.v[i].extend(entries, d.stream);
   }
   d.host_nodes.resize(2 * count);
-  const Nodes& n = state_->nodes;
-  state_->cpu->for_each(
+  const Nodes& n = d.state.nodes;
+  d.state.cpu->for_each(
       static_cast<int>(count),
       [&](int i) {
         const std::int32_t k = nodes[i];
@@ -138,5 +135,14 @@ void CudaMpmTissue::push_some(const std::vector<std::int32_t>& nodes) {
                  d.nodes(1 - d.current), d.stream);
   check_cuda(cudaStreamSynchronize(d.stream), "receive data");
 }
+
+void CudaMpmDevice::bring_nodes(const std::vector<std::int32_t>& points) {
+  tissue_->brought = nodes_around(*tissue_, points);
+  pull_some(*tissue_, tissue_->brought);
+}
+
+void CudaMpmDevice::send_nodes() { push_some(*tissue_, tissue_->brought); }
+
+void CudaMpmDevice::bring_all_nodes() { pull_nodes(*tissue_); }
 
 }  // namespace tissue_sim

@@ -4,36 +4,40 @@
 
 #include "fragments/piece_colour.h"
 #include "frame/select_points.h"
+#include "mpm/cuda/cuda_device.h"
 #include "mpm/cuda/on_device.h"
 #include "mpm/lattice/bonds.h"
 #include "mpm/point_fields.h"
 
 namespace tissue_sim {
 
-void CudaMpmTissue::upload_points() {
-  OnDevice& d = *device_;
+namespace {
+
+void upload_points(CudaTissue& d) {
   if (!d.points_changed) return;
-  const Points& points = state_->points;
+  const Points& points = d.state.points;
   if (d.whole.size() == 0) {
     std::vector<std::uint8_t> whole(points.size());
     for (int p = 0; p < points.size(); ++p) {
       whole[p] = static_cast<std::uint8_t>(
-          __builtin_popcount(whole_bonds(state_->bodies[points.site[p].body], points, p)));
+          __builtin_popcount(whole_bonds(d.state.bodies[points.site[p].body], points, p)));
     }
     d.whole.upload(whole, d.stream);
   }
-  std::vector<std::uint32_t> colour(pieces_.next_id, 0);
-  for (const Fragment& f : pieces_.all) colour[f.id] = piece_colour(f);
+  std::vector<std::uint32_t> colour(d.pieces.next_id, 0);
+  for (const Fragment& f : d.pieces.all) colour[f.id] = piece_colour(f);
   d.colour.upload(colour, d.stream);
-  d.piece.upload(pieces_.of_point, d.stream);
+  d.piece.upload(d.pieces.of_point, d.stream);
   check_cuda(cudaStreamSynchronize(d.stream), "receive data");
   d.points_changed = false;
 }
 
-int CudaMpmTissue::read_points(const PointSelection& selection, std::vector<std::uint8_t>& cloud) {
-  OnDevice& d = *device_;
-  const Points& points = state_->points;
-  upload_points();
+}  // namespace
+
+int CudaMpmDevice::read_points(const PointSelection& selection, std::vector<std::uint8_t>& cloud) {
+  CudaTissue& d = *tissue_;
+  const Points& points = d.state.points;
+  upload_points(d);
   const int stride = std::max(1, selection.stride);
   int count = (points.size() + stride - 1) / stride;
   CudaCloud c;
@@ -42,7 +46,7 @@ int CudaMpmTissue::read_points(const PointSelection& selection, std::vector<std:
   std::vector<std::int32_t> place;
   if (selection.surface_only || selection.loose_only || selection.fields != 0) {
     place = select_points(
-        selection, pieces_, [&](std::int32_t p) { return points.bonds[p] != kAllBonds; }, count);
+        selection, d.pieces, [&](std::int32_t p) { return points.bonds[p] != kAllBonds; }, count);
     d.place.upload(place, d.stream);
     c.place = d.place.data();
   }
@@ -76,23 +80,18 @@ int CudaMpmTissue::read_points(const PointSelection& selection, std::vector<std:
     d.cloud_came[i].wait();
     const int part = begin_of(i), size = begin_of(i + 1) - part;
     constexpr int kChunk = 4096;  // points, an eighth of a megabyte
-    state_->cpu->for_each((size + kChunk - 1) / kChunk, [&](int k) {
+    d.state.cpu->for_each((size + kChunk - 1) / kChunk, [&](int k) {
       const int first = part + k * kChunk, n = std::min(kChunk, part + size - first);
       std::memcpy(cloud.data() + static_cast<std::size_t>(first) * sizeof(Point),
                   d.host_cloud.data() + first, static_cast<std::size_t>(n) * sizeof(Point));
     });
   }
-  put_held_points(place, stride, cloud);
+  put_held_points(d, place, stride, cloud);
   if (selection.fields != 0) {
-    pull_nodes();
-    add_point_fields(*state_, selection, place, count, cloud);
+    pull_nodes(d);
+    add_point_fields(d.state, selection, place, count, cloud);
   }
   return count;
-}
-
-void CudaMpmTissue::read_surface(SurfaceTriangles& surface) {
-  pull_nodes();
-  tissue_sim::read_surface(*state_, pieces_, surface);
 }
 
 }  // namespace tissue_sim

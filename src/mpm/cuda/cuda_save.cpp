@@ -3,9 +3,10 @@
 // where it was, lists and divisions too that a new tissue would make otherwise.
 #include <algorithm>
 #include <stdexcept>
+#include <utility>
 
+#include "mpm/cuda/cuda_device.h"
 #include "mpm/cuda/on_device.h"
-#include "mpm/cuda/state_on_host.h"
 #include "mpm/mpm_fields.h"
 
 namespace tissue_sim {
@@ -47,28 +48,21 @@ std::vector<HeldPoint> bring_held(const DeviceArray<std::uint8_t>& with,
   throw std::runtime_error("the state does not fit this scene's tissue: another build wrote it");
 }
 
-}  // namespace
-
 template <class Archive>
-void CudaMpmTissue::each_field(Archive& archive, StateOnHost& of_device) {
-  OnDevice& d = *device_;
-  check_tissue(*state_);
-  FaceContacts& faces = state_->faces;
-  tissue_fields(archive, *state_);
+void device_fields(Archive& archive, CudaTissue& d, StateOnHost& of_device) {
+  FaceContacts& faces = d.state.faces;
   archive.part("facets", faces.version, faces.first_facet, faces.block_of);
   archive.part("kept contacts", faces.kept, faces.until_search, faces.fastest);
-  archive.part("pieces", pieces_, pieces_measured_);
-  archive.part("substeps", stiffening_, modulus_, substep_);
   archive.part("shape", d.shape, d.cut_shape);
-  archive.part("forecast", foresight_.said, foresight_.waiting, foresight_.flown);
   each_part(archive, of_device);
 }
 
-void CudaMpmTissue::bring_faces(FacesOnHost& to) const {
-  const OnDevice& d = *device_;
+}  // namespace
+
+void bring_faces(const CudaTissue& d, FacesOnHost& to) {
   const FacesOnDevice& f = d.faces;
   to.version = f.version;
-  to.is_current = f.version == state_->faces.version;
+  to.is_current = f.version == d.state.faces.version;
   to.pieces_changed = f.pieces_changed;
   to.lists_hold = f.lists_hold;
   to.searched = f.searched;
@@ -106,10 +100,9 @@ void CudaMpmTissue::bring_faces(FacesOnHost& to) const {
   for (const std::int32_t facet : to.contacts) to.nodes.push_back(nodes[at[facet]]);
 }
 
-void CudaMpmTissue::send_faces(const FacesOnHost& from) {
-  OnDevice& d = *device_;
+void send_faces(CudaTissue& d, const FacesOnHost& from) {
   FacesOnDevice& f = d.faces;
-  if (from.has_sites) upload_sites();
+  if (from.has_sites) upload_sites(d);
   f.version = from.version;
   f.pieces_changed = from.pieces_changed;
   f.lists_hold = from.lists_hold;
@@ -120,16 +113,16 @@ void CudaMpmTissue::send_faces(const FacesOnHost& from) {
   f.springs.resize(from.spring_room);
   f.springs.clear(d.stream);  // padding included: they are copied 16 bytes at a time
   f.near.resize(from.near_room);
-  const std::size_t count = state_->faces.block_of.size();
+  const std::size_t count = d.state.faces.block_of.size();
   const auto is = [](std::size_t size, std::size_t wanted) {
     if (size != wanted) refuse();
   };
   if (from.is_current && count > 0) {
     is(from.motion.size(), count);
     is(from.listed.size(), count);
-    upload_lattices();
-    send_facets();
-    make_room_for_facets();
+    upload_lattices(d);
+    send_facets(d);
+    make_room_for_facets(d);
     send(from.motion, f.motion, count, d.stream);
     send(from.listed, f.listed, count, d.stream);
     if (from.spring_room > 0) {
@@ -167,49 +160,49 @@ void CudaMpmTissue::send_faces(const FacesOnHost& from) {
   check_cuda(cudaStreamSynchronize(d.stream), "receive a state");
 }
 
-std::vector<std::uint8_t> CudaMpmTissue::save() {
-  const OnDevice& d = *device_;
-  pull_nodes();
+void CudaMpmDevice::save(ArchiveWriter& archive) {
+  CudaTissue& d = *tissue_;
   StateOnHost of_device;
   of_device.held = bring_held(d.with, d.hold, d.stream);
   of_device.marks = bring(d.marks, d.marks.size(), d.stream);
-  bring_faces(of_device.faces);
-  ArchiveWriter out;
-  each_field(out, of_device);
-  return out.take();
+  bring_faces(d, of_device.faces);
+  device_fields(archive, d, of_device);
 }
 
-void CudaMpmTissue::restore(Span<const std::uint8_t> saved) {
-  OnDevice& d = *device_;
-  StateOnHost of_device;
-  ArchiveReader in(saved);
-  each_field(in, of_device);
-  if (in.left() > 0) throw std::runtime_error("the state has more to it than this version knows");
-  FaceContacts& faces = state_->faces;
+void CudaMpmDevice::restore(ArchiveReader& archive) {
+  to_restore_ = std::make_unique<StateOnHost>();
+  device_fields(archive, *tissue_, *to_restore_);
+}
+
+void CudaMpmDevice::restored() {
+  CudaTissue& d = *tissue_;
+  check_tissue(d.state);
+  const std::unique_ptr<StateOnHost> from = std::move(to_restore_);
+  FaceContacts& faces = d.state.faces;
   faces.motion.assign(faces.block_of.size(), {});
   faces.listed.clear();
   faces.all.clear();
   faces.forget_active();
-  index_flights(*state_);
-  list_front_cells(*state_);
-  mark_row_nodes(state_->nodes.size(), state_->anchors);
-  push();
+  index_flights(d.state);
+  list_front_cells(d.state);
+  mark_row_nodes(d.state.nodes.size(), d.state.anchors);
+  push(d);
   std::vector<std::uint8_t> with(d.with.size(), 0);
   std::vector<float4> hold(d.hold.size(), float4{0, 0, 0, 0});
-  for (const HeldPoint& p : of_device.held) {
+  for (const HeldPoint& p : from->held) {
     if (p.entry < 0 || static_cast<std::size_t>(p.entry) >= with.size()) refuse();
     with[p.entry] = p.with;
     hold[p.entry] = {p.hold[0], p.hold[1], p.hold[2], p.hold[3]};
   }
   send(with, d.with, with.size(), d.stream);
   send(hold, d.hold, hold.size(), d.stream);
-  if (of_device.marks.size() != d.marks.size()) refuse();
-  send(of_device.marks, d.marks, d.marks.size(), d.stream);
-  send_faces(of_device.faces);
+  if (from->marks.size() != d.marks.size()) refuse();
+  send(from->marks, d.marks, d.marks.size(), d.stream);
+  send_faces(d, from->faces);
   launch_mark_slots(d.tables(), d.marks.data(), d.pushed_parts.data(), d.pushed_parts.size(),
                     d.stream);
   d.points_changed = true;
-  launch_measure();  // that of each block is known there, too
+  launch_measure(d);  // that of each block is known there, too
   check_cuda(cudaStreamSynchronize(d.stream), "receive a state");
 }
 

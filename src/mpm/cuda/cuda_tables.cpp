@@ -35,8 +35,7 @@ void check_memory(std::size_t wanted, std::size_t held) {
 
 }  // namespace
 
-std::size_t CudaMpmTissue::device_bytes() const {
-  const OnDevice& d = *device_;
+std::size_t device_bytes(const CudaTissue& d) {
   std::size_t sum =
       d.blocks.bytes() + d.bundles.bytes() + d.columns.bytes() + d.near_cells.bytes() +
       d.near_listed.bytes() + d.u_went.bytes() + d.bodies.bytes() + d.of_blocks.bytes() +
@@ -52,19 +51,21 @@ std::size_t CudaMpmTissue::device_bytes() const {
   return sum;
 }
 
-void CudaMpmTissue::plan_tables() {
-  OnDevice& d = *device_;
+namespace {
+
+/// How the blocks are worked on, and the tables for it.
+void plan_tables(CudaTissue& d) {
   d.plan.threads = d.shape.threads;
   d.plan.small = d.shape.small;
   d.plan.pairs = d.shape.pairs();
   d.plan.max_slots = d.plan.max_plane_slots = d.plan.max_held = 0;
-  const std::vector<Block*>& blocks = state_->blocks.all;
+  const std::vector<Block*>& blocks = d.state.blocks.all;
   for (const Block* b : blocks) {
     const int plane = (b->nx + 2) * (b->ny + 2);
     d.plan.max_slots = std::max(d.plan.max_slots, plane * (b->nz + 2));
     d.plan.max_plane_slots = std::max(d.plan.max_plane_slots, plane);
   }
-  for (const LatticeBody& b : state_->bodies) {
+  for (const LatticeBody& b : d.state.bodies) {
     for (const Material& m : b.materials) {
       const bool neo_hookean = m.law == Law::kNeoHookean;
       d.plan.neo_hookean = d.plan.neo_hookean || neo_hookean;
@@ -72,7 +73,7 @@ void CudaMpmTissue::plan_tables() {
       d.plan.viscous = d.plan.viscous || m.viscosity > 0;
     }
   }
-  const bool may_have_fronts = state_->front.follows;
+  const bool may_have_fronts = d.state.front.follows;
   const auto choose = [&d, may_have_fronts](std::size_t count) {
     d.resident = resident_blocks(d.plan, static_cast<int>(count));
     d.push_plan = d.plan;
@@ -99,23 +100,23 @@ void CudaMpmTissue::plan_tables() {
                                  d.plan.small ? at_once : blocks.size(), limits);
     }
     if (bundles.empty()) {
-      bundles = single_blocks(blocks, d.plan.small ? at_once : blocks.size(), *state_->cpu);
+      bundles = single_blocks(blocks, d.plan.small ? at_once : blocks.size(), *d.state.cpu);
     }
   } else {
-    bundles = single_blocks(blocks, blocks.size(), *state_->cpu);
+    bundles = single_blocks(blocks, blocks.size(), *d.state.cpu);
   }
   const auto processors = static_cast<std::size_t>(d.limits.processors);
-  if (state_->blocks.has_halves() && (state_->blocks.room == 0 || bundles.size() > processors)) {
-    divide_anew(0);  // all or none: there is no room for halves any more
-    plan_tables();
+  if (d.state.blocks.has_halves() && (d.state.blocks.room == 0 || bundles.size() > processors)) {
+    divide_anew(d, 0);  // all or none: there is no room for halves any more
+    plan_tables(d);
     return;
   }
   HostTables& t = d.host_tables;
-  make_tables(*state_, bundles, t);
+  make_tables(d.state, bundles, t);
   d.plan.max_slots = t.max_slots;
   d.plan.max_plane_slots = t.max_plane_slots;
   d.plan.max_columns = t.max_columns;
-  make_face_rows(*state_, t, t.max_plane_slots, d.anchors.made);
+  make_face_rows(d.state, t, t.max_plane_slots, d.anchors.made);
   d.plan.max_held = d.anchors.made.most_held;
   choose(t.bundles.size());
   if (d.resident == 0 || d.push_resident == 0 || d.touch_resident == 0 ||
@@ -124,33 +125,33 @@ void CudaMpmTissue::plan_tables() {
   }
 }
 
-void CudaMpmTissue::push() {
-  OnDevice& d = *device_;
+}  // namespace
+
+void push(CudaTissue& d) {
   d.host_tables.number.clear();  // all blocks are new
-  push_tables();
-  d.bonds.upload(state_->points.bonds, d.stream);
-  if (!state_->points.soft.empty()) d.soft.upload(state_->points.soft, d.stream);
-  push_lightness();
-  push_nodes();
-  push_anchors();
+  push_tables(d);
+  d.bonds.upload(d.state.points.bonds, d.stream);
+  if (!d.state.points.soft.empty()) d.soft.upload(d.state.points.soft, d.stream);
+  push_lightness(d);
+  push_nodes(d);
+  push_anchors(d);
 }
 
-void CudaMpmTissue::push_tables() {
-  OnDevice& d = *device_;
-  plan_tables();
+void push_tables(CudaTissue& d) {
+  plan_tables(d);
   const HostTables& t = d.host_tables;
-  const std::size_t n = state_->nodes.size();
-  const auto points = static_cast<std::size_t>(state_->points.size());
-  const Scene& scene = state_->scene;
+  const std::size_t n = d.state.nodes.size();
+  const auto points = static_cast<std::size_t>(d.state.points.size());
+  const Scene& scene = d.state.scene;
   const int colliders = collider_count(scene) - (scene.ground.enabled ? 0 : 1);
   d.held_by = std::min(colliders, 2);
   d.place_parts = has_thin_tools(scene) ? kPlaceParts : 1;
   const std::size_t held = points * d.place_parts * d.held_by;
-  const std::size_t most_held = OnDevice::Checkpoint::most_held(held);
+  const std::size_t most_held = CudaTissue::Checkpoint::most_held(held);
   const bool at_surface = scene.mpm.boundary == MpmBoundary::kSurface;
   const std::size_t of_places =
       at_surface && held > 0 ? points * sizeof(float4) * (d.place_parts > 1 ? 2 : 1) : 0;
-  check_memory(bytes_of(t, n, points, held, most_held, of_places, at_surface), device_bytes());
+  check_memory(bytes_of(t, n, points, held, most_held, of_places, at_surface), device_bytes(d));
   check_cuda(cudaStreamSynchronize(d.stream), "finish a frame");
   d.blocks.upload(t.blocks, d.stream);
   d.bundles.upload(t.bundles, d.stream);
@@ -199,39 +200,40 @@ void CudaMpmTissue::push_tables() {
   }
 }
 
-void CudaMpmTissue::make_blocks(const CudaShape& shape, int room) {
-  OnDevice& d = *device_;
+void make_blocks(CudaTissue& d, const CudaShape& shape, int room) {
   d.shape = shape;
   d.shape.blocks.uniform = true;
   d.shape.blocks.has_rows = false;
   d.shape.blocks.room = room;
-  state_->blocks = tissue_sim::make_blocks(*state_, d.shape.blocks, *state_->cpu);
+  d.state.blocks = tissue_sim::make_blocks(d.state, d.shape.blocks, *d.state.cpu);
   // Where there are more, the first cuts take what is left.
   constexpr double kFewRegions = 0.8;
-  if (static_cast<double>(state_->blocks.regions.size()) > kFewRegions * room) {
-    state_->blocks.room = 0;
+  if (static_cast<double>(d.state.blocks.regions.size()) > kFewRegions * room) {
+    d.state.blocks.room = 0;
   }
   d.host_tables.number.clear();
-  list_facets(*state_);
+  list_facets(d.state);
 }
 
-void CudaMpmTissue::divide_anew(int room) {
-  make_blocks(device_->cut_shape, room);
+void divide_anew(CudaTissue& d, int room) {
+  make_blocks(d, d.cut_shape, room);
   // Until they are measured, any block may be where any of the tissue is.
-  for (std::vector<BlockMotion>* motion : {&state_->motion, &motion_before_}) {
+  std::vector<std::vector<BlockMotion>*> bounds = {&d.state.motion};
+  if (d.run.frame) bounds.push_back(&d.run.frame->before);
+  for (std::vector<BlockMotion>* const motion : bounds) {
     BlockMotion all;
     for (const BlockMotion& m : *motion) {
       all.box.min = all.box.min.cwiseMin(m.box.min);
       all.box.max = all.box.max.cwiseMax(m.box.max);
       if (!(m.speed <= all.speed)) all.speed = m.speed;
     }
-    motion->assign(state_->blocks.all.size(), all);
+    motion->assign(d.state.blocks.all.size(), all);
   }
 }
 
-void CudaMpmTissue::make_room_for_cuts() {
-  if (device_->shape == device_->cut_shape) return;
-  divide_anew(device_->limits.processors);
+void make_room_for_cuts(CudaTissue& d) {
+  if (d.shape == d.cut_shape) return;
+  divide_anew(d, d.limits.processors);
 }
 
 }  // namespace tissue_sim

@@ -1,4 +1,4 @@
-// What CudaMpmTissue keeps on the GPU for contact of tissue with tissue.
+// What CudaTissue keeps on the GPU for contact of tissue with tissue.
 #pragma once
 
 #include "compute/device_array.h"

@@ -2,12 +2,12 @@
 
 #include "compute/cuda_check.h"
 #include "material/laws.h"
-#include "mpm/anchors/kept_volume.h"
 #include "mpm/cuda/block_nodes.h"
 #include "mpm/cuda/cell_stabilisation.h"
 #include "mpm/cuda/frame_ends.h"
 #include "mpm/cuda/half_cell.h"
 #include "mpm/cuda/measure_sums.h"
+#include "mpm/lattice/stiffness_shares.h"
 
 namespace tissue_sim {
 namespace {

@@ -4,8 +4,8 @@
 
 #include <cuda_runtime_api.h>
 
+#include "mpm/blocks/stretched_point.h"
 #include "mpm/cuda/tables.h"
-#include "mpm/tear/stretched_point.h"
 #include "tissue_sim/point.h"
 
 namespace tissue_sim {

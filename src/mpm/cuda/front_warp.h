@@ -9,8 +9,8 @@
 #include "math/bspline.h"
 #include "mpm/blocks/front_stress.h"
 #include "mpm/blocks/stabilisation.h"
-#include "mpm/cuda/add_push.h"
-#include "mpm/cuda/front_tables.h"
+#include "mpm/cuda/inerters.h"
+#include "mpm/cuda/tables.h"
 
 namespace tissue_sim {
 

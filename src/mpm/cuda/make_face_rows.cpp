@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "mpm/anchors/hold_beside_tools.h"
+#include "mpm/anchors/anchor_faces.h"
 
 namespace tissue_sim {
 namespace {

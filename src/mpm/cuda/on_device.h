@@ -1,16 +1,18 @@
-// What CudaMpmTissue keeps on the GPU.
+// Tissue on the GPU, and what is done with it.
 #pragma once
 
 #include <algorithm>
 #include <array>
+#include <string>
+#include <vector>
 
 #include "compute/cuda_event.h"
 #include "compute/device_array.h"
 #include "mpm/cuda/anchors_on_device.h"
+#include "mpm/cuda/block_tables.h"
 #include "mpm/cuda/choose_plan.h"
 #include "mpm/cuda/connect_slots.h"
 #include "mpm/cuda/cuda_linearised_motion.h"
-#include "mpm/cuda/cuda_mpm_tissue.h"
 #include "mpm/cuda/faces_on_device.h"
 #include "mpm/cuda/frame_ends.h"
 #include "mpm/cuda/front_cells.h"
@@ -18,8 +20,9 @@
 #include "mpm/cuda/label_pieces.h"
 #include "mpm/cuda/make_tables.h"
 #include "mpm/cuda/near_cells.h"
-#include "mpm/cuda/some_nodes.h"
+#include "mpm/cuda/state_on_host.h"
 #include "mpm/cuda/sweep_blade.h"
+#include "mpm/device.h"
 
 namespace tissue_sim {
 
@@ -38,7 +41,23 @@ struct SweepOnDevice {
   }
 };
 
-struct CudaMpmTissue::OnDevice {
+/// Nodes and contacts live here; lattice, bonds, blocks and pieces on the host too (`run`), where
+/// nodes around a cut are taken apart between frames.
+struct CudaTissue {
+  explicit CudaTissue(MpmRun& of)
+      : run(of), state(of.state), pieces(of.pieces), result(of.result) {}
+  CudaTissue(const CudaTissue&) = delete;
+  CudaTissue& operator=(const CudaTissue&) = delete;
+
+  MpmRun& run;
+  MpmState& state;
+  Pieces& pieces;
+  FrameResult& result;
+  FramePart part;       ///< that was run last, ...
+  int loads_of = 0;     ///< ... so many substeps of it, as long as their loads are not summed, ...
+  float dt_before = 0;  ///< ... and the substep before it [s]
+  std::vector<std::int32_t> brought;  ///< nodes that the host has as they are, but for its changes
+  int nodes_before = 0;               ///< that there were before_parting()
   CudaLimits limits;
   CudaShape shape, cut_shape;  ///< now, and once bonds broke
   /// Without contact, with tools, with contact of tissue too, with fronts too.
@@ -106,8 +125,6 @@ struct CudaMpmTissue::OnDevice {
     bool new_facets = false;  ///< there were some without a spring yet
     double time = 0;
     float dt = 0;
-    FrameResult result;
-    SubstepChoice substep;  ///< run_frame()'s
     /// Room for those of `entries` of CudaTables::with that are not 0, which are few: where they
     /// are more, a part is not undone.
     static std::size_t most_held(std::size_t entries) {
@@ -134,7 +151,7 @@ struct CudaMpmTissue::OnDevice {
   PinnedArray<float4> host_nodes;       ///< u, then v
   bool points_changed = true;           ///< pieces must be uploaded
 
-  ~OnDevice() {
+  ~CudaTissue() {
     if (stream != nullptr) cudaStreamDestroy(stream);
   }
   CudaTables tables() const {
@@ -169,6 +186,8 @@ struct CudaMpmTissue::OnDevice {
     t.slot_parts = pushed_parts.data();
     return t;
   }
+  /// The share of the frame at the end of the part's substep `i`.
+  double share_of(int i) const { return part.substeps.share(i + 1, part.from, part.to); }
   /// Nodes, and parted ones behind them.
   std::size_t entries() const { return u[0].size(); }
   /// How far from the points of a cell its surface may be [cells].
@@ -176,5 +195,100 @@ struct CudaMpmTissue::OnDevice {
   CudaNodes nodes(int which) const { return {u[which].data(), v[which].data()}; }
   CudaNodes present() const { return nodes(current); }
 };
+
+// Blocks, and the tables for them.
+/// With BlockShape::room.
+void make_blocks(CudaTissue& tissue, const CudaShape& shape, int room);
+void divide_anew(CudaTissue& tissue, int room);  ///< into blocks for what is cut
+void make_room_for_cuts(CudaTissue& tissue);     ///< makes blocks anew that are good for whole
+                                                 ///< tissue alone
+void push_tables(CudaTissue& tissue);            ///< of blocks that are new; those that stay move
+                                                 ///< on the GPU
+void push(CudaTissue& tissue);                   ///< everything but contacts
+std::size_t device_bytes(const CudaTissue& tissue);  ///< memory that it takes
+std::string plan(const CudaTissue& tissue);          ///< shape of the blocks, threads
+
+// Nodes.
+void pull(CudaTissue& tissue);  ///< and contacts
+void pull_nodes(CudaTissue& tissue);
+void push_nodes(CudaTissue& tissue);
+/// The nodes that a cut of these points may change, or looks at.
+std::vector<std::int32_t> nodes_around(const CudaTissue& tissue,
+                                       const std::vector<std::int32_t>& points);
+/// First u and mass of all of these, then v and inverse mass: they stay until the next call.
+const float4* gather(CudaTissue& tissue, const CudaNodes& from,
+                     const std::vector<std::int32_t>& nodes);
+void pull_some(CudaTissue& tissue, const std::vector<std::int32_t>& nodes);
+void push_some(CudaTissue& tissue, const std::vector<std::int32_t>& nodes);
+
+// The front of a cut.
+void pull_front(
+    CudaTissue& tissue);  ///< how far parted nodes are apart; the host has the same ones
+void push_front(CudaTissue& tissue);  ///< that the host has, behind the nodes, which are all there
+inline bool has_front(const CudaTissue& tissue) { return tissue.front.node_count > 0; }
+/// Whether places may have to be taken apart in this frame, which the kernels of fronts alone do,
+/// for the others to keep their registers.
+inline bool meets_thin_tools(const CudaTissue& tissue) {
+  return tissue.may_meet && tissue.place_parts > 1;
+}
+NodePushes clear_pushes(CudaTissue& tissue);  ///< for a launch that pushes; slots know which nodes
+                                              ///< a front does
+/// As that of mpm/split/front.h.
+void pass_rim(CudaTissue& tissue, const BladePath& path, bool moves,
+              const std::vector<std::int32_t>& broken, std::vector<std::int32_t>& touched);
+void push_points(CudaTissue& tissue, const std::vector<std::int32_t>& changed);  ///< their bonds,
+                                                                                 ///< whether soft
+
+// Anchors.
+void push_anchors(CudaTissue& tissue);  ///< rows that their faces hold: after push_tables(), or
+                                        ///< where nodes split
+void push_impulses(CudaTissue& tissue);
+void push_lightness(CudaTissue& tissue);
+void pull_impulses(CudaTissue& tissue);            ///< AnchorFaces::impulse
+void upload_anchor_places(CudaTissue& tissue);     ///< of a part
+void leave_anchors(CudaTissue& tissue, int done);  ///< where they are after so many substeps of it
+/// What anchors hold, in a cloud: `index` of each point, or each of `stride` where it is empty.
+void put_held_points(const CudaTissue& tissue, const std::vector<std::int32_t>& index, int stride,
+                     std::vector<std::uint8_t>& cloud);
+
+// Contact with tools.
+void find_near(CudaTissue& tissue);            ///< lists the cells that they may meet
+void look_for_unforeseen(CudaTissue& tissue);  ///< enqueues what came_unforeseen() tells then
+/// Whether tissue has come to a collider that find_near() did not foresee, for it went faster
+/// later.
+bool came_unforeseen(const CudaTissue& tissue);
+
+// Contact of tissue with tissue.
+void upload_lattices(CudaTissue& tissue);
+void upload_sites(CudaTissue& tissue);   ///< which point is where in the lattices
+void upload_facets(CudaTissue& tissue);  ///< where there are new ones, or pieces
+void send_facets(CudaTissue& tissue);
+void make_room_for_facets(CudaTissue& tissue);
+void begin_contacts(CudaTissue& tissue);  ///< all anew; until any facets may touch, they take no
+                                          ///< memory
+CudaLooks looks_of(const CudaTissue& tissue);
+/// Begins the search that the next substep would have to wait for, at the end of a frame whose
+/// figures are waited for anyway.
+void search_ahead(CudaTissue& tissue);
+/// Takes the figures that came, and says when the next search is due: FaceContacts::until_search.
+void finish_search(CudaTissue& tissue, float dt);
+void search_anew(CudaTissue& tissue);                  ///< before the next substep
+const CudaFaces* faces_of_launch(CudaTissue& tissue);  ///< null where there are no contacts
+void pull_contacts(CudaTissue& tissue);
+/// Of each facet, those that it may touch, as of the last search.
+std::vector<std::vector<std::int32_t>> near_facets(const CudaTissue& tissue);
+void bring_faces(const CudaTissue& tissue, FacesOnHost& to);
+void send_faces(CudaTissue& tissue, const FacesOnHost& from);
+
+// Frames.
+/// Enqueues the part's substeps from `begin` up to `end`; waits for a search of faces that comes
+/// due among them.
+void run_substeps(CudaTissue& tissue, int begin, int end);
+void launch(CudaTissue& tissue, int begin, int end, float dt);
+void launch_measure(CudaTissue& tissue);
+void finish_measure(CudaTissue& tissue);
+double measure_limit(CudaTissue& tissue, int steps);  ///< see MeasureLimit; of all blocks
+/// Points whose strain is at least `share` of what their body's weakest material bears.
+std::vector<StretchedPoint> list_stretched(CudaTissue& tissue, float share);
 
 }  // namespace tissue_sim

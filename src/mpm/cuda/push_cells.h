@@ -6,7 +6,6 @@
 #pragma once
 
 #include "math/bspline.h"
-#include "mpm/cuda/add_push.h"
 #include "mpm/cuda/inerters.h"
 #include "mpm/cuda/outer_points.h"
 #include "mpm/cuda/tool_pushes.h"

@@ -53,7 +53,7 @@ struct Sweep {
     return false;
   }
 
-  /// See the host's, in mpm/split/sweep_bonds.cpp: a normal goes back by F^T.
+  /// See the host's, in mpm/sweep_bonds.cpp: a normal goes back by F^T.
   __device__ BrokenBond broken_bond(const SweptPoint& p, std::int32_t other, int axis,
                                     const MeetingOf<Vector3>& meeting) const {
     BrokenBond broken = {p.point, other, axis, {static_cast<float>(meeting.place), {}}};

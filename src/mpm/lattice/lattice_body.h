@@ -10,6 +10,7 @@
 #include "geometry/lattice.h"
 #include "mpm/lattice/bonds.h"
 #include "mpm/lattice/lattice_rows.h"
+#include "mpm/lattice/stiffness_shares.h"
 #include "tissue_sim/scene.h"
 
 namespace tissue_sim {
@@ -169,6 +170,11 @@ struct LatticeBody {
 /// Nodes of all bodies' lattices; higher numbers are fields that cuts made.
 inline int lattice_node_count(const std::vector<LatticeBody>& bodies) {
   return bodies.back().first_node + bodies.back().nodes.count();
+}
+
+/// The volume by which a point resists strain [m^3]: its own, or less where it is soft.
+inline float elastic_volume(const Points& points, std::int32_t point) {
+  return (points.is_soft(point) ? kSoftness : 1.0f) * points.free_volume_of(point);
 }
 
 /// Which nodes a lattice has: those that points see, or all around the cells of its box.

@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "compute/array.h"
-#include "mpm/blocks/front_cell.h"
 #include "mpm/lattice/lattice_body.h"
+#include "mpm/split/front_cell.h"
 #include "mpm/split/node_box.h"
 
 namespace tissue_sim {

@@ -4,8 +4,8 @@
 #include <utility>
 
 #include "math/bspline.h"
-#include "mpm/blocks/stabilisation.h"
 #include "mpm/lattice/bonds.h"
+#include "mpm/lattice/stiffness_shares.h"
 #include "mpm/split/changed_cells.h"
 
 namespace tissue_sim {

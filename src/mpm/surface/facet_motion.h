@@ -5,9 +5,9 @@
 #include <vector>
 
 #include "compute/simd.h"
-#include "mpm/blocks/block.h"
 #include "mpm/lattice/lattice_body.h"
 #include "mpm/lattice/nodes.h"
+#include "mpm/surface/block.h"
 #include "mpm/surface/facet_in_world.h"
 
 namespace tissue_sim {

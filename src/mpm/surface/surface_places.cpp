@@ -4,8 +4,8 @@
 #include <cmath>
 
 #include "geometry/nearest_surface.h"
-#include "mpm/blocks/block.h"
 #include "mpm/lattice/bonds.h"
+#include "mpm/surface/block.h"
 
 namespace tissue_sim {
 namespace {

@@ -4,7 +4,7 @@
 
 #include "mpm/lattice/bonds.h"
 #include "mpm/tear/crack.h"
-#include "mpm/tear/deformation.h"
+#include "mpm/tear/debris.h"
 
 namespace tissue_sim {
 namespace {

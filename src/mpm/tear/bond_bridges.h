@@ -10,7 +10,7 @@
 namespace tissue_sim {
 
 /// A bridge is a bond that is in no square of four bonds. It tears where it is stretched so far,
-/// and has stiffened so much (mpm/tear/deformation.h), whatever its material: between halves that
+/// and has stiffened so much (mpm/tear/debris.h), whatever its material: between halves that
 /// part it would be drawn out without end, and what hangs on it would whirl about, too fast for any
 /// substep. One that swings stiffens twentyfold within a few substeps: it is not to get near that.
 inline constexpr double kThreadStretch = 1.5, kBridgeStiffening = 3.5;

@@ -6,9 +6,10 @@
 #include <set>
 #include <vector>
 
-#include "mpm/blocks/stabilisation.h"
+#include "mpm/lattice/lattice_body.h"
+#include "mpm/lattice/nodes.h"
 #include "mpm/split/lattice_tissue.h"
-#include "mpm/tear/debris_points.h"
+#include "mpm/split/node_fields.h"
 
 namespace tissue_sim {
 
@@ -21,22 +22,31 @@ struct Softened {
 };
 Softened soften(LatticeTissue& tissue, const std::vector<std::int32_t>& changed);
 
-/// The volume by which a point resists strain [m^3]: its own, or less where it is soft.
-inline float elastic_volume(const Points& points, std::int32_t point) {
-  return (points.is_soft(point) ? kSoftness : 1.0f) * points.free_volume_of(point);
-}
-
 /// Lets debris, each given by its lowest point, move on as rigid bodies without strain. Their
 /// momentum stays, linear and angular; what else a torn bridge left in their nodes, a swing of many
 /// times their size, goes. No bit of debris turns faster than kDebrisSpin times the speed of sound
 /// in a rod a cell, which strains it by a tenth or two: the rest goes to the tissue beside it.
 void settle_debris(LatticeTissue& tissue, const std::vector<std::int32_t>& debris);
-/// The same for those that have become wild since (mpm/tear/deformation.h). Returns their points.
+/// The same for those that have become wild since (mpm/tear/debris.h). Returns their points.
 std::vector<std::int32_t> settle_wild_debris(LatticeTissue& tissue,
                                              const std::set<std::int32_t>& debris);
 inline constexpr double kDebrisSpin = 0.5;
 
 /// Sets the nodes of a point turning, so that they have so much more angular momentum [kg m^2/s].
 void turn(LatticeTissue& tissue, std::int32_t point, const Vec3& angular);
+
+/// A bit of debris that is deformed so that it has stiffened so much is wild.
+inline constexpr double kWildStiffening = 5;
+
+/// Deformation gradient at a point.
+Eigen::Matrix3d deformation_gradient(const LatticeBody& body, const Points::Site& point,
+                                     const NodeFields& fields, const Nodes& nodes);
+
+struct Deformation {
+  double stretch = 1;     ///< the largest
+  double stiffening = 1;  ///< at least that of BlockState; both 1 where they are not finite
+  Deformation(const LatticeBody& body, const Points::Site& point, const NodeFields& fields,
+              const Nodes& nodes);
+};
 
 }  // namespace tissue_sim

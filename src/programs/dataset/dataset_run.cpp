@@ -6,7 +6,7 @@
 #include <random>
 
 #include "mpm/fragment_features.h"
-#include "mpm/tear/deformation.h"
+#include "mpm/tear/debris.h"
 
 namespace tissue_sim {
 namespace {

@@ -1,21 +1,22 @@
-// What the tissue shows: clouds and the pieces' motion.
+// Clouds of tissue on the CPU.
 #include <algorithm>
 #include <cstring>
 
 #include "fragments/piece_colour.h"
 #include "frame/select_points.h"
+#include "mpm/cpu/cpu_device.h"
 #include "mpm/lattice/bonds.h"
-#include "mpm/mpm_tissue.h"
 #include "mpm/point_fields.h"
 
 namespace tissue_sim {
 
-int MpmTissue::read_points(const PointSelection& selection, std::vector<std::uint8_t>& cloud) {
-  MpmState& s = *state_;
-  const std::vector<const Fragment*> piece = pieces_by_id(pieces_);
+int CpuMpmDevice::read_points(const PointSelection& selection, std::vector<std::uint8_t>& cloud) {
+  MpmState& s = state_;
+  const std::vector<const Fragment*> piece = pieces_by_id(run_.pieces);
   int count = 0;
   const std::vector<std::int32_t> index = select_points(
-      selection, pieces_, [&](std::int32_t p) { return s.points.bonds[p] != kAllBonds; }, count);
+      selection, run_.pieces, [&](std::int32_t p) { return s.points.bonds[p] != kAllBonds; },
+      count);
   cloud.resize(static_cast<std::size_t>(count) * sizeof(Point));
   s.cpu->for_each(static_cast<int>(s.blocks.all.size()), [&](int i) {
     const Block& block = *s.blocks.all[i];
@@ -33,7 +34,7 @@ int MpmTissue::read_points(const PointSelection& selection, std::vector<std::uin
     for (std::size_t lane = 0; lane < lanes; ++lane) {
       const std::int32_t p = block.point[lane];
       if (!wanted(p)) continue;
-      const Fragment& f = *piece[pieces_.of_point[p]];
+      const Fragment& f = *piece[run_.pieces.of_point[p]];
       Point out;
       out.x = x[lane];
       out.y = x[lanes + lane];
@@ -58,10 +59,6 @@ int MpmTissue::read_points(const PointSelection& selection, std::vector<std::uin
   });
   if (selection.fields != 0) add_point_fields(s, selection, index, count, cloud);
   return count;
-}
-
-void MpmTissue::read_surface(SurfaceTriangles& surface) {
-  tissue_sim::read_surface(*state_, pieces_, surface);
 }
 
 }  // namespace tissue_sim

@@ -11,6 +11,7 @@
 
 #include "compute/array.h"
 #include "frame/stability_limit.h"
+#include "mpm/lattice/lattice_body.h"
 #include "mpm/surface/facets.h"
 #include "mpm/surface/surface_place.h"
 #include "tissue_sim/material.h"
@@ -119,5 +120,8 @@ void lay_out(Block& block);
 
 /// Sets `filled` and `filled_columns`, when the points are there.
 void find_filled(Block& block);
+
+/// Sets Block::material and, where there are several, Block::mixture, from the block's points.
+void find_materials(Block& block, const LatticeBody& body, const Points& points);
 
 }  // namespace tissue_sim

@@ -4,8 +4,8 @@
 
 #include "compute/eight_bytes.h"
 #include "cutting/blade_sweep.h"
+#include "mpm/cut_tissue.h"
 #include "mpm/lattice/bonds.h"
-#include "mpm/split/cut_tissue.h"
 #include "mpm/split/front.h"
 #include "mpm/split/near_sweep.h"
 #include "mpm/surface/facet_motion.h"

@@ -1,4 +1,4 @@
-// Facets that stay what they are when bonds break elsewhere.
+// The facets of a block, and those that stay what they are when bonds break elsewhere.
 #pragma once
 
 #include <cstdint>
@@ -44,5 +44,12 @@ class KnownFacets {
 /// bonds.
 void mark_stale_facets(const LatticeTissue& tissue, const std::vector<std::int32_t>& changed,
                        std::vector<std::uint8_t>& stale);
+
+/// The facets of a block; `known` are those of its region that need not be made anew. Where a blade
+/// broke the bonds, place and normal are those of its sweep; else those of the plane that fits the
+/// missing bonds of the columns around best, so that an oblique face is a plane, not stairs. Points
+/// that an anchor holds have none beside its face, where nodes move that tell nothing of them.
+std::vector<Facet> facets_of(const LatticeBody& body, const Points& points, const Nodes& nodes,
+                             const Block& block, const KnownFacets& known);
 
 }  // namespace tissue_sim

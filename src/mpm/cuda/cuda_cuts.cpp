@@ -5,9 +5,10 @@
 #include <tuple>
 
 #include "cutting/blade_sweep.h"
+#include "mpm/cuda/cuda_device.h"
 #include "mpm/cuda/on_device.h"
+#include "mpm/cut_tissue.h"
 #include "mpm/lattice_pieces.h"
-#include "mpm/split/cut_tissue.h"
 
 namespace tissue_sim {
 namespace {
@@ -34,10 +35,7 @@ std::vector<CudaSweptEdge> edges_of(const BladePath& path) {
   return edges;
 }
 
-}  // namespace
-
-std::vector<BrokenBond> CudaMpmTissue::sweep(const BladePath& path, bool moves) {
-  OnDevice& d = *device_;
+std::vector<BrokenBond> bonds_swept(CudaTissue& d, const BladePath& path, bool moves) {
   SweepOnDevice& on = d.sweep;
   const std::vector<CudaSweptEdge> edges = edges_of(path);
   if (edges.empty()) return {};
@@ -45,7 +43,7 @@ std::vector<BrokenBond> CudaMpmTissue::sweep(const BladePath& path, bool moves) 
   CudaSweep s;
   s.edges = on.edges.data();
   s.edge_count = static_cast<int>(edges.size());
-  s.reach = kSweepReach * state_->scene.cell_size;
+  s.reach = kSweepReach * d.state.scene.cell_size;
   s.cells = on.cells.data();
   s.lattices = d.faces.lattices.data();
   s.point_at = d.faces.point_at.data();
@@ -77,20 +75,19 @@ std::vector<BrokenBond> CudaMpmTissue::sweep(const BladePath& path, bool moves) 
   return broken;
 }
 
-void CudaMpmTissue::read_places(float4* u_before) {
-  OnDevice& d = *device_;
+void read_places(CudaTissue& d, float4* u_before) {
   SweepOnDevice& on = d.sweep;
-  upload_lattices();
-  upload_sites();
+  upload_lattices(d);
+  upload_sites(d);
   std::vector<CudaBlockCell> cells;
   for (const int index : d.host_tables.of_host) {
-    const Block& b = *state_->blocks.all[index];
+    const Block& b = *d.state.blocks.all[index];
     cells.push_back({b.x, b.y, b.z, b.body});
   }
   on.cells.upload(cells, d.stream);
   // Where clouds are written when they are read.
   static_assert(sizeof(Point) >= 6 * sizeof(float), "room for two places of each point");
-  const auto count = static_cast<std::size_t>(state_->points.size());
+  const auto count = static_cast<std::size_t>(d.state.points.size());
   d.cloud.resize(count);
   on.places[1] = reinterpret_cast<float*>(d.cloud.data());
   on.places[0] = on.places[1] + 3 * count;
@@ -99,15 +96,34 @@ void CudaMpmTissue::read_places(float4* u_before) {
   launch_places(d.tables(), u_before, d.plan.max_slots, on.places[0], d.stream);
 }
 
-void CudaMpmTissue::push_points(const std::vector<std::int32_t>& changed) {
-  OnDevice& d = *device_;
-  const Points& points = state_->points;
+/// Whether these paths come near tissue that moves from where blades were looked at last.
+bool meets(const CudaTissue& d, const std::vector<BladePath>& paths) {
+  const double reach = 2 * kSweepReach * d.state.scene.cell_size;
+  const std::vector<BlockMotion>& before = d.run.frame->before;
+  for (const BladePath& path : paths) {
+    for (const SweepPart& part : sweep_parts(path)) {
+      for (std::size_t i = 0; i < before.size(); ++i) {
+        const Box &a = before[i].box, &b = d.state.motion[i].box;
+        if ((a.min.cwiseMin(b.min).array() <= part.box.max.array() + reach).all() &&
+            (part.box.min.array() <= a.max.cwiseMax(b.max).array() + reach).all()) {
+          return true;
+        }
+      }
+    }
+  }
+  return false;
+}
+
+}  // namespace
+
+void push_points(CudaTissue& d, const std::vector<std::int32_t>& changed) {
+  const Points& points = d.state.points;
   if (!points.soft.empty() && d.soft.size() == 0) d.soft.upload(points.soft, d.stream);
   std::vector<CudaPointChange> changes;
   for (const std::int32_t p : changed) {
     changes.push_back(
         {p, points.bonds[p], static_cast<std::uint8_t>(points.is_soft(p) ? 1 : 0),
-         static_cast<std::uint8_t>(points.bonds[p] == state_->whole_bonds[p] ? 1 : 0)});
+         static_cast<std::uint8_t>(points.bonds[p] == d.state.whole_bonds[p] ? 1 : 0)});
   }
   d.sweep.changes.upload(changes, d.stream);
   launch_change_points(d.sweep.changes.data(), static_cast<int>(changes.size()), d.bonds.data(),
@@ -116,88 +132,67 @@ void CudaMpmTissue::push_points(const std::vector<std::int32_t>& changed) {
                        d.stream);
 }
 
-bool CudaMpmTissue::take_apart(const std::vector<std::int32_t>& changed,
-                               const std::vector<std::int32_t>& touched) {
-  OnDevice& d = *device_;
-  pull_front();
-  if (!touched.empty()) follow_front(*state_, touched, state_->anchors.at_row);
-  if (changed.empty()) {
-    list_front_cells(*state_);
-    push_front();
-    return false;
-  }
-  make_room_for_cuts();
-  std::vector<std::int32_t> nodes = nodes_around(changed);
-  pull_some(nodes);
-  pull_contacts();
-  pull_impulses();
-  const auto known = static_cast<std::int32_t>(state_->nodes.size());
-  bool may_part = false;
-  const Apart apart = tissue_sim::take_apart(*state_, changed,
-                                             [&] { may_part = may_have_parted(*state_, changed); });
-  for (auto n = known; n < static_cast<std::int32_t>(state_->nodes.size()); ++n) nodes.push_back(n);
-  push_some(nodes);
-  push_front();
-  push_points(changed);
-  push_points(apart.softened);
-  if (apart.new_blocks || d.host_tables.number.empty()) {
-    push_tables();
-    push_anchors();
-  }
-  return may_part;
+void CudaMpmDevice::before_parting(const std::vector<std::int32_t>& points) {
+  CudaTissue& d = *tissue_;
+  pull_front(d);
+  if (points.empty()) return;
+  make_room_for_cuts(d);
+  bring_nodes(points);
+  pull_contacts(d);
+  pull_impulses(d);
+  d.nodes_before = static_cast<int>(d.state.nodes.size());
 }
 
-std::vector<int> CudaMpmTissue::label_pieces() {
-  OnDevice& d = *device_;
-  upload_sites();
+void CudaMpmDevice::parted(const std::vector<std::int32_t>& points, const Apart& apart) {
+  CudaTissue& d = *tissue_;
+  if (points.empty()) return push_front(d);
+  for (int n = d.nodes_before; n < static_cast<int>(d.state.nodes.size()); ++n) {
+    d.brought.push_back(n);
+  }
+  send_nodes();
+  push_front(d);
+  push_points(d, points);
+  push_points(d, apart.softened);
+  if (!apart.new_blocks && !d.host_tables.number.empty()) return;
+  push_tables(d);
+  push_anchors(d);
+}
+
+std::vector<int> CudaMpmDevice::label_pieces() {
+  CudaTissue& d = *tissue_;
+  upload_sites(d);
   if (d.labels.empty()) {
-    std::vector<std::int32_t> lowest(pieces_.of_point.size());
-    state_->cpu->for_each(
+    std::vector<std::int32_t> lowest(d.pieces.of_point.size());
+    d.state.cpu->for_each(
         static_cast<int>(lowest.size()),
-        [&](int p) { lowest[p] = pieces_.lowest[pieces_.of_point[p]]; }, 4096);
+        [&](int p) { lowest[p] = d.pieces.lowest[d.pieces.of_point[p]]; }, 4096);
     d.labels.upload(lowest, d.stream);
   }
   std::vector<SiteRows> sites;
   const std::int32_t* point_at = d.faces.point_at.data();
-  for (const LatticeBody& b : state_->bodies) {
+  for (const LatticeBody& b : d.state.bodies) {
     sites.push_back({point_at, 8 * b.nx * b.ny * b.nz, 2 * b.nx, 4 * b.nx * b.ny});
     point_at += sites.back().count;
   }
   const std::vector<PartedRun> parted = d.labels.update(sites, d.bonds.data(), d.stream);
-  const std::vector<int> fresh = part_pieces(state_->points.volume.data(), parted, pieces_);
+  const std::vector<int> fresh = part_pieces(d.state.points.volume.data(), parted, d.pieces);
   if (!fresh.empty()) d.points_changed = d.faces.pieces_changed = true;
   return fresh;
 }
 
-void CudaMpmTissue::cut(const std::vector<BladePath>& paths, float4* u_before, CutReport& report) {
-  std::vector<std::int32_t> changed, touched;
-  read_places(u_before);
+void CudaMpmDevice::sweep(const std::vector<BladePath>& paths, bool moves,
+                          std::vector<std::int32_t>& changed, std::vector<std::int32_t>& touched,
+                          CutReport& report) {
+  CudaTissue& d = *tissue_;
+  if (moves && !meets(d, paths)) return;
+  read_places(d, moves ? d.u_before.data() : nullptr);
   for (const BladePath& path : paths) {
     std::vector<std::int32_t> by_this;
-    tissue_sim::break_bonds(*state_, {sweep(path, u_before != nullptr)}, by_this, report);
-    push_points(by_this);  // for the next
-    if (state_->front.follows) pass_rim(path, u_before != nullptr, by_this, touched);
+    break_bonds(d.state, {bonds_swept(d, path, moves)}, by_this, report);
+    push_points(d, by_this);  // for the next
+    if (d.state.front.follows) pass_rim(d, path, moves, by_this, touched);
     changed.insert(changed.end(), by_this.begin(), by_this.end());
   }
-  if (changed.empty() && touched.empty()) return;
-  if (take_apart(changed, touched)) report.new_fragments = label_pieces();
-  launch_measure();
-  finish_measure();
-}
-
-void CudaMpmTissue::cut_by_blades() {
-  const double reach = 2 * kSweepReach * state_->scene.cell_size;
-  bool meets = false;
-  for (const BladePath& path : blades_) {
-    for (const SweepPart& part : sweep_parts(path)) {
-      for (std::size_t i = 0; i < motion_before_.size() && !meets; ++i) {
-        const Box &a = motion_before_[i].box, &b = state_->motion[i].box;
-        meets = (a.min.cwiseMin(b.min).array() <= part.box.max.array() + reach).all() &&
-                (part.box.min.array() <= a.max.cwiseMax(b.max).array() + reach).all();
-      }
-    }
-  }
-  if (meets) cut(blades_, device_->u_before.data(), result_.blade_report);
 }
 
 }  // namespace tissue_sim

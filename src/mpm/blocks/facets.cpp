@@ -1,5 +1,3 @@
-#include "mpm/surface/facets.h"
-
 #include <Eigen/Dense>
 #include <algorithm>
 #include <array>
@@ -7,11 +5,11 @@
 #include <optional>
 
 #include "compute/eight_bytes.h"
-#include "mpm/blocks/block.h"
+#include "mpm/blocks/known_facets.h"
 #include "mpm/lattice/bonds.h"
 #include "mpm/lattice/lattice_body.h"
 #include "mpm/lattice/nodes.h"
-#include "mpm/surface/known_facets.h"
+#include "mpm/surface/block.h"
 #include "mpm/surface/surroundings.h"
 
 namespace tissue_sim {

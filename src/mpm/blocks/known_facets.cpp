@@ -1,4 +1,4 @@
-#include "mpm/surface/known_facets.h"
+#include "mpm/blocks/known_facets.h"
 
 #include <algorithm>
 

@@ -1,4 +1,4 @@
-#include "mpm/anchors/hold_beside_tools.h"
+#include "mpm/contact/hold_beside_tools.h"
 
 #include <Eigen/LU>
 

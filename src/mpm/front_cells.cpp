@@ -5,10 +5,9 @@
 #include <vector>
 
 #include "compute/simd.h"
-#include "mpm/blocks/stabilisation.h"
+#include "mpm/lattice/stiffness_shares.h"
 #include "mpm/mpm_state.h"
 #include "mpm/split/front.h"
-#include "mpm/tear/debris.h"
 
 namespace tissue_sim {
 namespace {

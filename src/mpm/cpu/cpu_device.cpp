@@ -1,0 +1,201 @@
+#include "mpm/cpu/cpu_device.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <utility>
+
+#include "math/lanczos.h"
+#include "mpm/contact/block_contact.h"
+#include "mpm/contact/face_fields.h"
+#include "mpm/lattice_pieces.h"
+#include "mpm/linearised_motion.h"
+#include "mpm/mpm_fields.h"
+#include "mpm/surface/surface_places.h"
+
+namespace tissue_sim {
+
+std::unique_ptr<MpmDevice> make_cpu_mpm_device(const Scene&, MpmRun& run) {
+  return std::make_unique<CpuMpmDevice>(run);
+}
+
+std::string CpuMpmDevice::name() const {
+  return std::string("cpu (") + tissue_sim::name(state_.instructions) + ", " +
+         std::to_string(state_.cpu->threads()) + " threads)";
+}
+
+void CpuMpmDevice::begin() {
+  MpmState& s = state_;
+  if (s.scene.mpm.boundary == MpmBoundary::kSurface) s.points.outer = find_outer_places(s);
+  s.blocks = make_blocks(s, {}, *s.cpu);
+  s.work.force.resize(s.blocks.force_size);
+  const std::size_t count = s.blocks.all.size();
+  s.contacts.near.resize(count);
+  s.contacts.cells.resize(count);
+  s.contacts.parts.resize(count);
+  s.contacts.touching.resize(count);
+  s.contacts.changes.resize(count);
+  list_facets(s);
+  index_inertia(s);
+}
+
+void CpuMpmDevice::measure_blocks(bool energies) {
+  MpmState& s = state_;
+  FrameResult& result = run_.result;
+  const int count = static_cast<int>(s.blocks.all.size());
+  std::vector<BlockState> states(count);
+  s.cpu->for_each(count, [&](int i) {
+    const Block& block = *s.blocks.all[i];
+    const BlockField field = block_field(s, block);
+    BlockScratch& scratch = s.work.scratch.local();
+    states[i] = energies ? s.kernels->state(block, field, scratch, nullptr)
+                         : s.kernels->stiffness(block, field, scratch);
+  });
+  run_.stiffening = even_stiffening(s, 1);
+  run_.modulus.assign(count, 0.0f);
+  s.wildest = 1;
+  result.elastic_energy = 0;
+  for (int i = 0; i < count; ++i) {
+    const BlockState& b = states[i];
+    result.elastic_energy += b.elastic_energy;
+    s.wildest = std::max(s.wildest, b.wildest);
+    result.blew_up = result.blew_up || !b.finite;
+    std::vector<float>& of_body = run_.stiffening[s.blocks.all[i]->body];
+    for (std::size_t m = 0; m < of_body.size(); ++m) {
+      const float stiffening = b.finite ? b.stiffening[m] : std::numeric_limits<float>::infinity();
+      of_body[m] = std::max(of_body[m], stiffening);
+      if (m + 1 == of_body.size()) break;  // that is no material's
+      result.blew_up = result.blew_up || of_body[m] > 1e6f;
+      const Material& material = s.bodies[s.blocks.all[i]->body].materials[m];
+      float& modulus = run_.modulus[i];
+      modulus = std::max(modulus, static_cast<float>(wave_modulus(material, stiffening)));
+    }
+  }
+  if (!energies) return;
+  const Nodes& n = s.nodes;
+  result.kinetic_energy = 0;
+  for (std::size_t i = 0; i < n.size(); ++i) {
+    const double v2 = Vec3(n.v[0][i], n.v[1][i], n.v[2][i]).squaredNorm();
+    result.kinetic_energy += 0.5 * n.mass[i] * v2;
+  }
+  result.kinetic_energy += front_kinetic_energy(s.front);
+  result.elastic_energy += front_elastic_energy(s);
+}
+
+unsigned CpuMpmDevice::measure(unsigned what) {
+  if ((what & kMeasureMotion) != 0) measure_motion(state_);
+  const bool energies = (what & kMeasureEnergies) != 0;
+  if (energies || (what & kMeasureStiffness) != 0) measure_blocks(energies);
+  return energies ? what | kMeasureStiffness : what;
+}
+
+double CpuMpmDevice::measure_limit(const std::vector<std::uint8_t>& blocks, int steps) {
+  LinearisedMotion motion(state_, blocks);
+  return 2 / std::sqrt(largest_eigenvalue(motion, steps));
+}
+
+void CpuMpmDevice::begin_rest() {
+  const MpmFrame& frame = *run_.frame;
+  find_near_colliders(state_, frame.reach, frame.duration);
+  for (int a = 0; frame.blades && a < 3; ++a) state_.work.u_before[a] = state_.nodes.u[a];
+}
+
+void CpuMpmDevice::save_motion() {
+  saved_.motion = motion_of(state_);
+  saved_.faces = state_.faces;
+  saved_.of_blocks = state_.motion;
+}
+
+void CpuMpmDevice::restore_motion(bool missed) {
+  MpmState& s = state_;
+  for (const InertialNode& n : s.contacts.inertia.nodes) s.work.inertial_index[n.node] = -1;
+  motion_of(s) = saved_.motion;
+  index_inertia(s);
+  s.faces = saved_.faces;
+  index_flights(s);
+  if (!missed) return;
+  again_ = true;
+  // From where blocks went, whose motion still stands, and from where they began.
+  find_near_colliders(s, run_.frame->reach, run_.frame->duration, saved_.of_blocks);
+}
+
+int CpuMpmDevice::run(const FramePart& part) {
+  MpmState& s = state_;
+  MpmFrame& frame = *run_.frame;
+  const PartSubsteps& substeps = part.substeps;
+  const int checks = can_tear(s) ? tear_checks(s, substeps.count, substeps.longest()) : 0;
+  run_.work = 0;
+  int done = 0;
+  for (int check = 0; done < substeps.count && frame.tearing.empty(); ++done) {
+    stop_if_asked();
+    const double share = substeps.share(done + 1, part.from, part.to);
+    const float dt = substeps.at(done);
+    s.colliders = frame.colliders.at(share);
+    std::vector<ColliderLoad> loads(s.colliders.size());
+    find_face_contacts(s, run_.pieces, dt);
+    const float acted = substep(s, dt, loads, anchors_at(s.anchors, frame.input, share));
+    s.time += dt;
+    frame.colliders.add_loads(share, s.colliders.data(), loads.data(), acted / frame.duration,
+                              run_.result.loads);
+    run_.work += frame.colliders.power(s.colliders.data(), loads.data()) * acted;
+    if (checks == 0 || done + 1 != tear_check_at(check, checks, substeps.count)) continue;
+    ++check;
+    frame.tearing = find_tearing(s);
+  }
+  return done;
+}
+
+bool CpuMpmDevice::missed_contact() {
+  measure_motion(state_);
+  return !std::exchange(again_, false) && came_unforeseen(state_, run_.frame->reach);
+}
+
+void CpuMpmDevice::settled(const std::vector<std::int32_t>& points) {
+  begin_anew(state_.contacts, points);
+}
+
+void CpuMpmDevice::sweep(const std::vector<BladePath>& paths, bool moves,
+                         std::vector<std::int32_t>& changed, std::vector<std::int32_t>& touched,
+                         CutReport& report) {
+  MpmState& s = state_;
+  const Array<float>* const u_before = moves ? s.work.u_before : s.nodes.u;
+  const std::vector<BlockMotion>& before = moves ? run_.frame->before : s.motion;
+  for (const BladePath& path : paths) {
+    sweep_bonds(s, path, u_before, s.nodes.u, before, changed, touched, report);
+  }
+}
+
+std::vector<int> CpuMpmDevice::label_pieces() { return update_pieces(state_, run_.pieces); }
+
+bool CpuMpmDevice::fly(double duration, Foresight& foresight,
+                       std::vector<StrainedPoint>& strained) {
+  const bool moved = !let_fly(state_, run_.pieces, run_.result, duration, foresight).empty();
+  strained = find_strained(state_, kRegionLevels[0]);
+  return moved;
+}
+
+void CpuMpmDevice::save(ArchiveWriter& archive) {
+  archive.begin_part("faces");
+  fields(archive, state_.faces, state_.blocks);
+  archive.end_part("faces");
+}
+
+void CpuMpmDevice::restore(ArchiveReader& archive) {
+  archive.begin_part("faces");
+  fields(archive, state_.faces, state_.blocks);
+  archive.end_part("faces");
+}
+
+void CpuMpmDevice::restored() {
+  MpmState& s = state_;
+  check_state(s);
+  s.work.inertial_index.assign(s.nodes.size(), -1);
+  index_inertia(s);
+  index_flights(s);
+  list_front_cells(s);
+  mark_row_nodes(s.nodes.size(), s.anchors);
+  s.work.force.clear();
+  s.work.force.resize(s.blocks.force_size);
+}
+
+}  // namespace tissue_sim

@@ -1,0 +1,29 @@
+// Substeps of a length that a test chooses: the steps of a frame without SubstepChoice.
+#pragma once
+
+#include "mpm/mpm_tissue.h"
+
+namespace tissue_sim {
+
+struct FixedSubsteps {
+  static void advance(MpmTissue& tissue, int substeps, float dt, const FrameInput& input) {
+    tissue.begin_frame(static_cast<double>(substeps) * dt, input);
+    if (substeps == 0) tissue.measured(tissue.device_->measure(kMeasureMotion));
+    for (int done = 0; done < substeps;) {
+      done +=
+          tissue.run({even_substeps(substeps - done, dt), static_cast<double>(done) / substeps, 1});
+      tissue.measured(tissue.device_->measure_part(kMeasureMotion));
+      tissue.tear(static_cast<double>(done) / substeps);
+    }
+    if (!tissue.run_->result.blew_up) tissue.end_frame();
+  }
+  static void keep(MpmTissue& tissue) { tissue.save_checkpoint(); }
+  static void go_back(MpmTissue& tissue) { tissue.reject_part(Verdict::kTooLong); }
+};
+
+/// Advances by `substeps` of `dt` seconds each; 0 only cuts.
+inline void advance_by(MpmTissue& tissue, int substeps, float dt, const FrameInput& input) {
+  FixedSubsteps::advance(tissue, substeps, dt, input);
+}
+
+}  // namespace tissue_sim

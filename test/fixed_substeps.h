@@ -10,8 +10,9 @@ struct FixedSubsteps {
     tissue.begin_frame(static_cast<double>(substeps) * dt, input);
     if (substeps == 0) tissue.measured(tissue.device_->measure(kMeasureMotion));
     for (int done = 0; done < substeps;) {
-      done +=
-          tissue.run({even_substeps(substeps - done, dt), static_cast<double>(done) / substeps, 1});
+      tissue.run_part(
+          {even_substeps(substeps - done, dt), static_cast<double>(done) / substeps, 1});
+      done += tissue.run_->frame->done;
       tissue.measured(tissue.device_->measure_part(kMeasureMotion));
       tissue.tear(static_cast<double>(done) / substeps);
     }

@@ -49,20 +49,15 @@ void MpmTissue::save_checkpoint() {
   checkpoint_.result = run_->result;
 }
 
-int MpmTissue::run(const FramePart& part) {
-  FrameResult& result = run_->result;
-  measured_ = followed_ = false;
-  run_->frame->tearing.clear();
-  result.substep = std::max<double>(result.substep, part.substeps.longest());
-  const int done = device_->run(part);
-  result.substeps += done;
-  return done;
-}
-
 double MpmTissue::run_part(const FramePart& part) {
   MpmFrame& frame = *run_->frame;
+  FrameResult& result = run_->result;
   frame.watched = SubstepChoice::is_strained(run_->state);
-  frame.done = run(part);
+  measured_ = followed_ = false;
+  frame.tearing.clear();
+  result.substep = std::max<double>(result.substep, part.substeps.longest());
+  frame.done = device_->run(part);
+  result.substeps += frame.done;
   return part.share_after(frame.done);
 }
 

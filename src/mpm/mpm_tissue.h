@@ -39,8 +39,7 @@ class MpmTissue : public Tissue {
   const std::vector<std::string>& notes() const override { return notes_; }
 
   /// The host's; nodes and contacts of a GPU are as they were brought last.
-  MpmState& state() { return run_->state; }
-  const MpmState& state() const { return run_->state; }
+  MpmState& state() const { return run_->state; }
   MpmDevice& device() const { return *device_; }
   const Pieces& pieces() const { return run_->pieces; }
   int fragment_of(int point) const { return run_->pieces.of_point[point]; }
@@ -49,12 +48,8 @@ class MpmTissue : public Tissue {
   float stable_substep() const;
   /// The substep for the next part of a frame: SubstepChoice::longest().
   float substep_for(const FrameInput& input);
-  /// What the fragment network said at the end of the last frame; nothing without one.
-  const std::vector<FragmentChance>& forecast() const { return foresight_.forecast; }
-  /// Lets another classifier than the network's say what is part of a fragment soon.
-  void classify_by(FragmentClassifier classifier) { foresight_.classifier = std::move(classifier); }
-  /// How many pieces have flown since the beginning, for the network had foreseen them.
-  int flown() const { return foresight_.flown; }
+  /// What the fragment network said; another classifier than its may say it.
+  Foresight& foresight() { return foresight_; }
 
  private:
   friend struct FixedSubsteps;  // test/fixed_substeps.h
@@ -73,9 +68,6 @@ class MpmTissue : public Tissue {
   void break_bonds(double share);
   void end_frame();
 
-  /// The substeps of a part, until points are past their limit (MpmFrame::tearing). Returns how
-  /// many.
-  int run(const FramePart& part);
   /// What is past its limit, at this share of the frame; blades have cut their way before. Returns
   /// whether anything was cut or tore.
   bool tear(double share);

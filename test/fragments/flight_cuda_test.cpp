@@ -38,8 +38,8 @@ TEST(FragmentsOnGpu, SayWhatTheySayOnTheCpu) {
     gpu->advance(1.0 / 960, {});
     const FrameResult a = cpu->finish(), b = gpu->finish();
     EXPECT_EQ(a.fragment_candidates > 0, b.fragment_candidates > 0) << frame;
-    for (const FragmentChance& c : cpu->forecast()) {
-      const auto& of = gpu->forecast();
+    for (const FragmentChance& c : cpu->foresight().forecast) {
+      const auto& of = gpu->foresight().forecast;
       const auto at = std::find_if(of.begin(), of.end(), [&](const FragmentChance& other) {
         return other.point == c.point;
       });
@@ -64,13 +64,13 @@ struct Flown {
 template <class T>
 Flown fly_bar() {
   const auto tissue = going_bar<T>();
-  tissue->classify_by([](const MpmState&, std::int32_t, const float*) { return 0.9f; });
+  tissue->foresight().classifier = [](const MpmState&, std::int32_t, const float*) { return 0.9f; };
   Flown result;
   result.before = tissue->momentum();
   for (int frame = 0; frame < 30; ++frame) {
     tissue->advance(1.0 / 960, {});
     EXPECT_FALSE(tissue->finish().blew_up);
-    if (result.first < 0 && tissue->flown() > 0) {
+    if (result.first < 0 && tissue->foresight().flown > 0) {
       result.first = frame;
       double all = 0;
       for (const Fragment& f : tissue->fragments()) all += f.volume;
@@ -111,16 +111,16 @@ TEST(FragmentsOnGpu, TheSamePiecesFly) {
 /// Pieces fly in tissue that goes on as a copy of it which is restored then.
 void goes_on_restored(CudaMpmTissue& tissue) {
   const auto sure = [](const MpmState&, std::int32_t, const float*) { return 0.9f; };
-  tissue.classify_by(sure);
+  tissue.foresight().classifier = sure;
   int frame = 0;
-  for (; frame < 30 && tissue.flown() == 0; ++frame) {
+  for (; frame < 30 && tissue.foresight().flown == 0; ++frame) {
     tissue.advance(1.0 / 960, {});
     tissue.finish();
   }
-  ASSERT_GT(tissue.flown(), 0);
+  ASSERT_GT(tissue.foresight().flown, 0);
   const std::vector<std::uint8_t> saved = tissue.save();
   CudaMpmTissue other(torn_bar(kNetwork));
-  other.classify_by(sure);
+  other.foresight().classifier = sure;
   other.restore({saved.data(), saved.size()});
   for (int i = 0; i < 6; ++i) {
     tissue.advance(1.0 / 960, {});
@@ -129,7 +129,7 @@ void goes_on_restored(CudaMpmTissue& tissue) {
     other.finish();
     EXPECT_EQ(tissue.checksum(), other.checksum()) << i;
   }
-  EXPECT_EQ(tissue.flown(), other.flown());
+  EXPECT_EQ(tissue.foresight().flown, other.foresight().flown);
 }
 
 TEST(FragmentsOnGpu, AreRestored) {

@@ -278,16 +278,16 @@ Flown fly_bar(float probability, int threads, bool restored = false) {
   const FragmentClassifier classifier = [=](const MpmState&, std::int32_t, const float*) {
     return probability;
   };
-  tissue->classify_by(classifier);
+  tissue->foresight().classifier = classifier;
   set_going(tissue->state());
   measure_motion(tissue->state());
   Flown result;
   result.before = tissue->momentum();
   for (int frame = 0; frame < 30; ++frame) {
-    if (restored && tissue->flown() > 0) {
+    if (restored && tissue->foresight().flown > 0) {
       const std::vector<std::uint8_t> saved = tissue->save();
       tissue = std::make_unique<MpmTissue>(scene);
-      tissue->classify_by(classifier);
+      tissue->foresight().classifier = classifier;
       tissue->restore({saved.data(), saved.size()});
       restored = false;
     }
@@ -296,7 +296,7 @@ Flown fly_bar(float probability, int threads, bool restored = false) {
     result.checksums.push_back(tissue->checksum());
   }
   result.after = tissue->momentum();
-  result.flown = tissue->flown();
+  result.flown = tissue->foresight().flown;
   return result;
 }
 

@@ -268,8 +268,10 @@ ReportedRun run_reported(const std::string& network, int threads) {
     run.candidates += report.result.fragment_candidates;
     run.points += report.result.fragment_points;
     run.checksums.push_back(tissue.checksum());
-    run.flown.push_back(tissue.flown());
-    for (const FragmentChance& c : tissue.forecast()) run.chances.push_back(c.probability);
+    run.flown.push_back(tissue.foresight().flown);
+    for (const FragmentChance& c : tissue.foresight().forecast) {
+      run.chances.push_back(c.probability);
+    }
   }
   return run;
 }

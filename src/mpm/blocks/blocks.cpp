@@ -10,7 +10,7 @@
 namespace tissue_sim {
 namespace {
 
-/// Runs of columns that hold points, gaps of up to kGap bridged, long runs halved.
+/// Runs of columns that hold points, gaps of up to kRunGap bridged, long runs halved.
 std::vector<std::pair<int, int>> x_runs(const LatticeBody& b, int y0, int ny, int z0, int nz,
                                         int longest) {
   std::vector<std::pair<int, int>> runs;
@@ -24,7 +24,7 @@ std::vector<std::pair<int, int>> x_runs(const LatticeBody& b, int y0, int ny, in
   }
   for (int x = 0; x < b.nx; ++x) {
     if (!any[x]) continue;
-    if (!runs.empty() && x - runs.back().second <= 2 * kGap) {
+    if (!runs.empty() && x - runs.back().second <= 2 * kRunGap) {
       runs.back().second = x + 1;
     } else {
       runs.emplace_back(x, x + 1);

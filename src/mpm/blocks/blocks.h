@@ -78,7 +78,7 @@ Blocks make_blocks(const LatticeTissue& tissue, const BlockShape& shape, Cpu& cp
 void update_blocks(Blocks& blocks, const LatticeTissue& tissue,
                    const std::vector<NodeFields::Cell>& cells, Cpu& cpu);
 
-inline constexpr int kGap = 2;  ///< cells: a new run costs about as much as so many
+inline constexpr int kRunGap = 2;  ///< cells: a new run costs about as much as so many
 
 /// Makes the region's blocks, without facets: one for the sides of cuts that reach from the same
 /// z-plane to the same, or with `uniform` one for each side and material.

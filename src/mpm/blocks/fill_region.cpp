@@ -26,8 +26,8 @@ struct Part {
   }
 };
 
-/// Runs of the cells that hold points in any z-plane, gaps of up to kGap cells bridged where they
-/// are of one side. `holds` is [ny][nx].
+/// Runs of the cells that hold points in any z-plane, gaps of up to kRunGap cells bridged where
+/// they are of one side. `holds` is [ny][nx].
 std::vector<Block::Run> runs_of(const Block& block, const std::vector<bool>& holds) {
   std::vector<Block::Run> runs;
   int lane = 0;
@@ -35,7 +35,7 @@ std::vector<Block::Run> runs_of(const Block& block, const std::vector<bool>& hol
     for (int x = 0; x < block.nx; ++x) {
       if (!holds[y * block.nx + x]) continue;
       Block::Run* last = runs.empty() || runs.back().y != y ? nullptr : &runs.back();
-      if (last == nullptr || x - (last->x + last->count) > kGap ||
+      if (last == nullptr || x - (last->x + last->count) > kRunGap ||
           &block.side_at(x) != &block.side_at(last->x)) {
         runs.push_back({x, y, 0, lane});
         last = &runs.back();

@@ -35,7 +35,7 @@ struct PointMotion {
   Vec3 x, v;
 };
 
-PointMotion motion_of(const MpmState& s, std::int32_t p) {
+PointMotion point_motion(const MpmState& s, std::int32_t p) {
   const Points::Site& site = s.points.site[p];
   const LatticeBody& body = s.bodies[site.body];
   PointMotion m{body.site_position(site.x, site.y, site.z), Vec3::Zero()};
@@ -55,7 +55,7 @@ std::vector<RigidSums> fragment_sums(const MpmTissue& tissue, const MpmState& s,
   for (std::int32_t p = 0; p < s.points.size(); ++p) {
     const int id = tissue.fragment_of(p);
     if (fragment[id] == 0) continue;
-    const PointMotion m = motion_of(s, p);
+    const PointMotion m = point_motion(s, p);
     const double mass = s.points.volume[p];
     RigidSums& sum = sums[id];
     sum.mass += mass;
@@ -118,7 +118,7 @@ Outcome run_outcome(const DatasetScene& scene, const RunKind& kind, int frames) 
   const auto tissue = begin_run(run, kind.level);
   const std::clock_t begin = std::clock();  // a network's file is read once, however long it runs
   double measuring = 0;                     // [s]
-  if (kind.classifier) tissue->classify_by(kind.classifier);
+  if (kind.classifier) tissue->foresight().classifier = kind.classifier;
   MpmState& s = tissue->state();
   o.points = tissue->point_count();
   const bool ground = scene.scene.ground.enabled;
@@ -161,7 +161,7 @@ Outcome run_outcome(const DatasetScene& scene, const RunKind& kind, int frames) 
     }
     if (frame + 1 == frames) {
       for (std::int32_t p = 0; p < s.points.size(); ++p) {
-        const Vec3 x = motion_of(s, p).x;
+        const Vec3 x = point_motion(s, p).x;
         for (int a = 0; a < 3; ++a) o.cloud.push_back(static_cast<float>(x[a]));
         const int id = tissue->fragment_of(p);
         o.cloud.push_back(static_cast<float>(fragment[id] != 0 ? id + 1 : 0));
@@ -170,7 +170,7 @@ Outcome run_outcome(const DatasetScene& scene, const RunKind& kind, int frames) 
     measuring += static_cast<double>(std::clock() - paused) / CLOCKS_PER_SEC;
   }
   o.seconds = static_cast<double>(std::clock() - begin) / CLOCKS_PER_SEC - measuring;
-  o.flown = tissue->flown();
+  o.flown = tissue->foresight().flown;
   return o;
 }
 

@@ -61,7 +61,7 @@ class PySimulation {
       request.tools[i] =
           py::isinstance<ToolRequest>(of)
               ? of.cast<ToolRequest>()
-              : ToolRequest{to_pose(of, "the pose of tool '" + tool_names_[i] + "'"), 0, false, {}};
+              : ToolRequest{to_pose(of, "the pose of tool '" + tool_names_[i] + "'"), {}, false, {}};
     });
     for (const py::handle& cut : cuts) {
       request.cuts.push_back(to_path(cut, "cut " + std::to_string(request.cuts.size())));
@@ -111,6 +111,7 @@ class PySimulation {
         guard(self, view(surface_, py::dtype::of<float>(), {n, 3, 3}, surface_->corners.data())),
         guard(self, view(surface_, py::dtype::of<float>(), {n, 3, 3}, surface_->rest.data())),
         guard(self, view(surface_, py::dtype::of<std::int32_t>(), {n}, surface_->fragment.data())),
+        guard(self, view(surface_, py::dtype::of<std::int32_t>(), {n}, surface_->point.data())),
         guard(self, view(surface_, py::dtype("bool"), {n}, surface_->cut.data())));
   }
 
@@ -368,8 +369,8 @@ PYBIND11_MODULE(_core, m) {
       .def(
           "surface", [](const py::object& self) { return self.cast<P&>().surface(self); },
           "The triangles of the tissue's surface: corners and rest (n, 3, 3) [m], fragment (n,), "
-          "cut\n"
-          "(n,) bool. Valid until the next advance: see Array.")
+          "point (n,),\n"
+          "the id of one there, and cut (n,) bool. Valid until the next advance: see Array.")
       .def(
           "render",
           [](const py::object& self, const py::object& camera, const py::object& pose) {

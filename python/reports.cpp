@@ -7,20 +7,20 @@ namespace tissue_sim {
 
 void bind_reports(py::module& m) {
   py::class_<ToolRequest>(m, "ToolRequest", "Where a tool shall be at the end of a frame.")
-      .def(py::init([](const py::object& pose, double jaw, bool placed,
+      .def(py::init([](const py::object& pose, std::optional<double> jaw, bool placed,
                        std::optional<double> grip_pressure) {
              return ToolRequest{to_pose(pose, "the pose"), jaw, placed, grip_pressure};
            }),
-           py::arg("pose"), py::arg("jaw") = 0.0, py::arg("placed") = false,
+           py::arg("pose"), py::arg("jaw") = py::none(), py::arg("placed") = false,
            py::arg("grip_pressure") = py::none(),
            "pose: (3,) x y z [m], (7,) x y z qx qy qz qw, or a (4, 4) matrix; world frame.\n"
-           "jaw: between a grasper's jaws [rad]; below 0 squeezes with more.\n"
+           "jaw: between a grasper's jaws [rad], as before if None; below 0 squeezes with more.\n"
            "placed: it does not move there from where it was, it is put there.\n"
            "grip_pressure: of a grasper's jaws at most, from now on [Pa].")
       .def_property_readonly(
           "pose", [](const ToolRequest& r) { return from_pose(r.pose); },
           "(7,) x y z qx qy qz qw [m]")
-      .def_readonly("jaw", &ToolRequest::jaw, "[rad]")
+      .def_readonly("jaw", &ToolRequest::jaw, "[rad] or None")
       .def_readonly("placed", &ToolRequest::placed)
       .def_readonly("grip_pressure", &ToolRequest::grip_pressure, "[Pa] or None");
   py::class_<ToolMotion>(m, "ToolMotion", "Motion of a tool over one frame.")

@@ -20,6 +20,7 @@ class Surface(NamedTuple):
     corners: Array
     rest: Array
     fragment: Array
+    point: Array
     cut: Array
 
 class Images(NamedTuple):
@@ -29,10 +30,10 @@ class Images(NamedTuple):
 
 class ToolRequest:
     pose: np.ndarray
-    jaw: float
+    jaw: Optional[float]
     placed: bool
     grip_pressure: Optional[float]
-    def __init__(self, pose: Pose, jaw: float = ..., placed: bool = ...,
+    def __init__(self, pose: Pose, jaw: Optional[float] = ..., placed: bool = ...,
                  grip_pressure: Optional[float] = ...) -> None: ...
 
 class ToolMotion:

@@ -3,7 +3,7 @@ import collections
 
 import numpy as np
 
-Surface = collections.namedtuple("Surface", "corners rest fragment cut")
+Surface = collections.namedtuple("Surface", "corners rest fragment point cut")
 Images = collections.namedtuple("Images", "rgb depth labels")
 
 

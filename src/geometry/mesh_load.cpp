@@ -5,6 +5,7 @@
 
 #include "geometry/tet_mesh.h"
 #include "scene/scene_text.h"
+#include "tissue_sim/limits.h"
 
 namespace tissue_sim {
 namespace {

@@ -61,7 +61,8 @@ class PySimulation {
       request.tools[i] =
           py::isinstance<ToolRequest>(of)
               ? of.cast<ToolRequest>()
-              : ToolRequest{to_pose(of, "the pose of tool '" + tool_names_[i] + "'"), {}, false, {}};
+              : ToolRequest{
+                    to_pose(of, "the pose of tool '" + tool_names_[i] + "'"), {}, false, {}};
     });
     for (const py::handle& cut : cuts) {
       request.cuts.push_back(to_path(cut, "cut " + std::to_string(request.cuts.size())));

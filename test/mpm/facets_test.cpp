@@ -6,9 +6,9 @@
 #include <tuple>
 
 #include "cut_scenes.h"
+#include "mpm/blocks/known_facets.h"
 #include "mpm/contact/face_places.h"
 #include "mpm/surface/facet_motion.h"
-#include "mpm/blocks/known_facets.h"
 
 namespace tissue_sim {
 namespace {

@@ -166,7 +166,8 @@ inline void project_constraints(const pbd::State& s, double h, PbdPlaces& p, Pbd
       double mobility = 0;
       for (int i = 0; i < 4; ++i) mobility += p.w[vertices[i]] * g[i].squaredNorm();
       const double a = std::max(n[1] * inverse_h2, mobility / pbd::Bending::kMostOfStep);
-      project(p, vertices, angle(at), g, a, 1, lambda[0]);
+      constexpr double kMost = pbd::Bending::kMost;
+      project(p, vertices, std::min(kMost, std::max(-kMost, angle(at))), g, a, 1, lambda[0]);
     });
   };
   if (backward) {

@@ -11,9 +11,8 @@
 namespace tissue_sim {
 
 struct Bend {
-  double tip;      ///< [m]
-  double theory;   ///< with the length from where the clamp acts [m]
-  double nominal;  ///< with the length from where the anchored region ends [m]
+  double tip;     ///< [m]
+  double theory;  ///< [m]
   double error() const { return tip / theory - 1; }
 };
 
@@ -32,8 +31,8 @@ inline double sunk(const std::vector<Point>& rest, const std::vector<Point>& now
 
 /// Lets the beam sink under a weight that bends it by 0.5 % of its length, with the drag that lets
 /// the first mode settle soonest, until it stands still. `scene` is beam_scene()'s, clamped, for a
-/// method on a device; the clamp acts at x = `clamp` [m].
-inline Bend bend(Scene scene, const Beam& beam, double clamp, const std::string& curve = "") {
+/// method on a device.
+inline Bend bend(Scene scene, const Beam& beam, const std::string& curve = "") {
   const double gravity = 0.005 * beam.length / tip_deflection(beam, 1);
   const double frequency = bending_frequency(beam, Ends::kClampedFree);
   scene.gravity = Vec3(0, 0, -gravity);
@@ -41,8 +40,6 @@ inline Bend bend(Scene scene, const Beam& beam, double clamp, const std::string&
   scene.frame_rate = 4 * frequency;
   scene.cfl = 0.8;
   Simulation simulation(scene);
-  Beam acting = beam;
-  acting.length -= clamp;
   const std::vector<Point> rest = points_of(simulation.tissue());
   for (int i = 0; i < 56; ++i) simulation.advance_frame();  // (1 + 14) exp(-14) = 1e-5
   const std::vector<Point> now = points_of(simulation.tissue());
@@ -52,14 +49,14 @@ inline Bend bend(Scene scene, const Beam& beam, double clamp, const std::string&
   for (double x = -beam.height; x < end - h / 4; x += h / 2) {
     file.add({x + h / 4, sunk(rest, now, x, x + h / 2)});
   }
-  const double theory = tip_deflection(acting, gravity), nominal = tip_deflection(beam, gravity);
+  const double theory = tip_deflection(beam, gravity);
   if (scene.method == Method::kPbd) {  // vertices lie at the end itself
-    return {sunk(rest, now, end - h / 4, end + h / 4), theory, nominal};
+    return {sunk(rest, now, end - h / 4, end + h / 4), theory};
   }
   // The last two layers of points lie 1/4 and 3/4 of a cell before the free end.
   const double last = sunk(rest, now, end - h / 2, end),
                other = sunk(rest, now, end - h, end - h / 2);
-  return {last + (last - other) / 2, theory, nominal};
+  return {last + (last - other) / 2, theory};
 }
 
 }  // namespace tissue_sim

@@ -21,7 +21,6 @@ struct CrackStrip {
   double young_modulus = 1e4;          ///< [Pa]
   double cell_size;                    ///< [m]
   double crack_x;                      ///< where the crack is, along the strip [m]
-  MpmBoundary boundary = MpmBoundary::kLattice;
 
   /// `deep`: cells along the crack. `at_nodes`: the crack runs through nodes, else between them.
   explicit CrackStrip(int deep, bool at_nodes = false)
@@ -29,7 +28,6 @@ struct CrackStrip {
 
   std::unique_ptr<MpmTissue> tissue(bool cracked, double depth = 0.02) const {
     Scene scene = free_box(Vec3(length, width, cell_size), cell_size);
-    scene.mpm.boundary = boundary;
     Material material;
     material.name = "strip";
     material.young_modulus = young_modulus;

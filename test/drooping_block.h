@@ -5,11 +5,10 @@
 
 namespace tissue_sim {
 
-/// Substeps of a quarter of a second.
-inline int substeps_of_drooping_block(Device device, MpmBoundary boundary, double cell_size) {
+/// Substeps of a quarter of a second, held up to x = `face` [m].
+inline int substeps_of_drooping_block(Device device, double cell_size, double face = 0.0053) {
   Scene scene;
   scene.device = device;
-  scene.mpm.boundary = boundary;
   scene.cell_size = cell_size;
   scene.damping = 2;
   scene.ground.enabled = false;
@@ -27,7 +26,7 @@ inline int substeps_of_drooping_block(Device device, MpmBoundary boundary, doubl
   Region held;
   held.kind = Region::Kind::kBox;
   held.min = Vec3(-1, -1, -1);
-  held.max = Vec3(0.0053, 1, 1);
+  held.max = Vec3(face, 1, 1);
   body.anchors.emplace_back(held);
   Simulation simulation(scene);
   int substeps = 0;

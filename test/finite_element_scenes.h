@@ -24,7 +24,6 @@ inline Scene reference_scene(double cell_size) {
   Scene s;
   s.device = Device::kCpu;
   s.cell_size = cell_size;
-  s.mpm.boundary = MpmBoundary::kSurface;
   s.ground.enabled = false;
   s.materials.resize(1);
   s.materials[0].name = "phantom";

@@ -29,7 +29,8 @@ class Strip {
  public:
   static constexpr double kLength = 0.048, kWidth = 0.016, kThickness = 0.004;
 
-  explicit Strip(const StripOf& of) : tissue_(scene_of(of)), material_(scene_of(of).materials[0]) {
+  explicit Strip(const StripOf& of)
+      : tissue_(scene_of(of)), material_(scene_of(of).materials[0]), turned_(of.turned) {
     const Pose& pose = tissue_.state().bodies[0].body.pose;
     axis_ = pose.orientation * Vec3::UnitX();
     middle_ = pose.position;
@@ -43,7 +44,6 @@ class Strip {
   static Scene scene_of(const StripOf& of) {
     Scene s = free_box(Vec3(kLength, kWidth, kThickness), of.cell_size);
     s.threads = of.threads;
-    s.mpm.boundary = MpmBoundary::kLattice;  // whose held nodes are moved
     s.damping = 200;
     s.seed = of.seed;
     Material m;
@@ -67,15 +67,6 @@ class Strip {
       b.inclusions = {right};
     }
     b.pose.orientation = Quat(Eigen::AngleAxisd(of.turned * M_PI / 180, Vec3::UnitZ()));
-    for (const double x : {-0.5, 0.5}) {
-      Region grip;
-      grip.kind = of.turned == 0 ? Region::Kind::kBox : Region::Kind::kBall;
-      grip.center = b.pose * Vec3(x * kLength, 0, 0);
-      grip.radius = 0.6 * kWidth;
-      grip.min = Vec3((x + 0.5) * kLength - 0.004, -1, -1);
-      grip.max = Vec3((x + 0.5) * kLength + 0.004, 1, 1);
-      b.anchors.push_back(grip);
-    }
     return s;
   }
 
@@ -98,8 +89,18 @@ class Strip {
     return stress * kWidth * kThickness;
   }
 
+  /// Whether a place is at most `margin` from a grip: the ends, or balls around them where the
+  /// strip lies askew in the lattice.
+  bool is_gripped(const Vec3& place, double margin) const {
+    const Vec3 d = place - middle_;
+    const double end = 0.5 * kLength, along = std::fabs(d.dot(axis_));
+    if (turned_ == 0) return along > end - 0.004 - margin;
+    const double beside = d.squaredNorm() - along * along;
+    return std::hypot(along - end, std::sqrt(beside)) < 0.6 * kWidth + margin;
+  }
   /// Puts the grips, or all of the strip, where this stretch has them.
   void stretch_to(double stretch, bool all) {
+    grip(tissue_.state(), [this](const Vec3& x, double margin) { return is_gripped(x, margin); });
     Nodes& n = tissue_.state().nodes;
     const double x = narrowing(stretch);
     for (std::size_t i = 0; i < home_.size(); ++i) {
@@ -165,6 +166,7 @@ class Strip {
  private:
   T tissue_;
   Material material_;
+  double turned_;
   Vec3 axis_, middle_;
   std::vector<Vec3> home_;
   double stretch_ = 1;

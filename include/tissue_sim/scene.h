@@ -104,16 +104,6 @@ enum class PbdElasticity {
   kStrain,    ///< stretch and shear strain constraints, with distance and bending: no material
 };
 
-/// Where the material point method has the boundary of a body; docs/mpm.md says what each costs.
-enum class MpmBoundary {
-  kSurface,  ///< tools and the ground touch its true surface, anchors hold it at their faces and
-             ///< move, a cut ends where the blade's edge did
-  kLattice,  ///< all act at the lattice's points and nodes, up to half a cell off; anchors stay
-};
-struct MpmOptions {
-  MpmBoundary boundary = MpmBoundary::kSurface;
-};
-
 /// What it is made of and how it is solved.
 struct PbdOptions {
   PbdModel model = PbdModel::kSurface;
@@ -130,7 +120,6 @@ struct PbdOptions {
 
 /// What belongs to one method each: the others do not read it.
 struct OptionSets {
-  MpmOptions mpm;
   MlsOptions mls;
   PbdOptions pbd;
 };

@@ -35,6 +35,6 @@ Spacing mls_spacing(const Scene& scene) {
 
 }  // namespace
 
-const MethodOptions kMlsOptions = {Method::kMls, list_mls, mls_spacing, false, false};
+const MethodOptions kMlsOptions = {Method::kMls, list_mls, mls_spacing, false};
 
 }  // namespace tissue_sim

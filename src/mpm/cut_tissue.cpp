@@ -49,7 +49,7 @@ Apart take_apart(MpmState& state, const std::vector<std::int32_t>& changed,
     const Points::Site& s = state.points.site[p];
     cells.push_back({s.body, s.x / 2, s.y / 2, s.z / 2});
   }
-  if (state.front.follows) split_front(state);
+  split_front(state);
   settle_debris(state, softened.debris);
   state.debris.insert(softened.debris.begin(), softened.debris.end());
   if (!state.points.free_volume.empty() && !cells.empty()) {
@@ -77,10 +77,8 @@ Apart take_apart(MpmState& state, const std::vector<std::int32_t>& changed,
         list_bridges(state, changed);
         meanwhile();
       });
-  if (state.front.follows) {
-    follow_front(state, changed, state.anchors.at_row);
-    list_front_cells(state);
-  }
+  follow_front(state, changed, state.anchors.at_row);
+  list_front_cells(state);
   apart.softened = std::move(softened.points);
   apart.new_blocks = !cells.empty();
   return apart;

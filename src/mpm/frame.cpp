@@ -1,6 +1,5 @@
 // The steps of a frame: frame/run_frame.h says in which order.
 #include <algorithm>
-#include <stdexcept>
 
 #include "mpm/contact/face_contact.h"
 #include "mpm/mpm_tissue.h"
@@ -20,10 +19,6 @@ void MpmTissue::begin_frame(double duration, const FrameInput& input) {
   result.loads.resize(s.scene.tools.size());
   AnchorFaces& faces = s.anchors;
   faces.impulse.assign(faces.rows.size(), {});
-  if (!input.anchors.empty() && faces.origin.empty()) {
-    throw std::runtime_error(
-        "anchors do not move where the boundary is the lattice's: set mpm.boundary to surface");
-  }
   const bool move = !faces.moves && !input.anchors.empty();
   if (move) {
     faces.moves = true;

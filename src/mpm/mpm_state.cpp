@@ -16,11 +16,9 @@ void make_mpm_state(const Scene& scene, NodeRange range, MpmState& state,
   state.cpu = std::make_unique<Cpu>(scene.threads);
   state.bodies = make_lattice_bodies(scene, state.points, notes, range);
   state.whole_bonds = state.points.bonds;
-  const bool at_surface = scene.mpm.boundary == MpmBoundary::kSurface;
-  state.front.follows = at_surface;
-  if (at_surface) find_free_volumes(state);
+  find_free_volumes(state);
   state.fields = std::make_unique<NodeFields>(state.bodies, state.points, state.nodes);
-  if (at_surface) find_face_links(scene, state, state.anchors);
+  find_face_links(scene, state, state.anchors);
   find_face_rows(state, state.anchors);
   for (const std::int32_t p : state.anchors.points) {
     if (state.points.anchored[p] == 0) state.points.anchored[p] = Points::kAtAnchor;
@@ -128,7 +126,7 @@ float substep(MpmState& state, float dt, std::vector<ColliderLoad>& loads,
   FaceContacts& faces = state.faces;
   const bool list = is_list_due(state.contacts);
   if (list && !state.contacts.inertia.nodes.empty()) tidy_inertia(state, false);
-  if (!state.points.outer.empty()) fit_inertia(state, dt);
+  fit_inertia(state, dt);
   NodeStep step;
   step.dt = dt;
   step.kick = kick_of(state.dt, dt);

@@ -26,9 +26,7 @@ class MpmTissue : public Tissue {
     return device_->read_points(selection, cloud);
   }
   void read_surface(SurfaceTriangles& surface) override;
-  bool moves_anchors() const override {
-    return state().scene.mpm.boundary == MpmBoundary::kSurface;
-  }
+  bool moves_anchors() const override { return true; }
   int fragment_count() const override { return static_cast<int>(run_->pieces.all.size()); }
   Span<const Fragment> fragments() override;
   std::uint64_t checksum() override;

@@ -3,20 +3,12 @@
 namespace tissue_sim {
 namespace {
 
-constexpr Spelling<MpmBoundary> kMpmBoundaries[] = {{MpmBoundary::kSurface, "surface"},
-                                                    {MpmBoundary::kLattice, "lattice"}};
-
-std::vector<Option> list_mpm(OptionSets& options) {
-  return {choice("boundary",
-                 "where tools, the ground, anchors and the ends of cuts act: at the body's true "
-                 "surface, or at points and nodes, up to half a cell off",
-                 options.mpm.boundary, kMpmBoundaries)};
-}
+std::vector<Option> list_mpm(OptionSets&) { return {}; }
 
 Spacing mpm_spacing(const Scene& scene) { return {scene.cell_size, "cell_size", scene.cell_size}; }
 
 }  // namespace
 
-const MethodOptions kMpmOptions = {Method::kMpm, list_mpm, mpm_spacing, true, true};
+const MethodOptions kMpmOptions = {Method::kMpm, list_mpm, mpm_spacing, true};
 
 }  // namespace tissue_sim

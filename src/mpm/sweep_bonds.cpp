@@ -294,9 +294,7 @@ void sweep_bonds(MpmState& state, const BladePath& path, const Array<float>* u_b
     }
   });
   break_bonds(state, broken, changed, report);
-  if (state.front.follows) {
-    pass_rim(state, path, u_begin, u_end, changed, sweep.known(), touched);
-  }
+  pass_rim(state, path, u_begin, u_end, changed, sweep.known(), touched);
 }
 
 }  // namespace tissue_sim

@@ -30,6 +30,6 @@ Spacing pbd_spacing(const Scene&) { return {}; }  // its steps are as many as it
 
 }  // namespace
 
-const MethodOptions kPbdOptions = {Method::kPbd, list_pbd, pbd_spacing, false, false};
+const MethodOptions kPbdOptions = {Method::kPbd, list_pbd, pbd_spacing, false};
 
 }  // namespace tissue_sim

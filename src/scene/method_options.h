@@ -49,7 +49,6 @@ struct MethodOptions {
   std::vector<Option> (*list)(OptionSets& options);
   Spacing (*spacing)(const Scene& scene);
   bool takes_network;  ///< Scene::fragment_network
-  bool is_written;     ///< whatever the scene's method
 
   const char* name() const { return name_of(method, kMethodNames); }  ///< also of their map in YAML
 };

@@ -194,9 +194,10 @@ std::string scene_to_yaml(const Scene& scene) {
   write(out, "fragment_network", scene.fragment_network);
   OptionSets options = scene;
   for (const MethodOptions* of : method_options()) {
-    if (!of->is_written && of->method != scene.method) continue;
+    const std::vector<Option> all = of->list(options);
+    if (of->method != scene.method || all.empty()) continue;
     out << Key << of->name() << Value << BeginMap;
-    for (const Option& option : of->list(options)) write(out, option);
+    for (const Option& option : all) write(out, option);
     out << EndMap;
   }
   out << Key << "ground" << Value << BeginMap;

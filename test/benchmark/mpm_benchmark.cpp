@@ -78,7 +78,6 @@ void run_cube(benchmark::State& bench, int points) {
   const double heap = heap_bytes();
   const double h = 0.003;
   Scene scene = inviscid(free_box(Vec3::Constant(std::round(std::cbrt(points / 8.0)) * h), h));
-  scene.mpm.boundary = MpmBoundary::kLattice;  // the same for a cube that nothing touches
   MpmTissue tissue(scene);
   MpmState& s = tissue.state();
   deform(s);

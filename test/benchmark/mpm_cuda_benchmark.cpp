@@ -1,5 +1,5 @@
-// The material point method on the GPU: a cube between two anchored faces that are held apart and
-// sheared, to compare with others; organs as users run them (organ_benchmark.h).
+// The material point method on the GPU: a cube between two anchored faces that its weight shears,
+// to compare with others; organs as users run them (organ_benchmark.h).
 #include <benchmark/benchmark.h>
 
 #include <Eigen/SVD>
@@ -31,9 +31,12 @@ constexpr CubeSize kSizes[] = {{25000, 15, 15, 14},
                                {4100000, 80, 80, 80},
                                {16800000, 128, 128, 128}};
 
+constexpr double kShear = 0.5, kFace = 0.0011;  // the lower face's place [m]
+/// How far above the lower face the upper one is [m].
+double face_above(const CubeSize& size) { return 0.001 * size.z - 2 * kFace; }
+
 Scene cube(const CubeSize& size) {
   Scene scene;
-  scene.mpm.boundary = MpmBoundary::kLattice;  // whose held nodes stay where deform() puts them
   scene.damping = 50;
   scene.cell_size = 0.001;
   scene.ground.z = -1;
@@ -42,25 +45,31 @@ Scene cube(const CubeSize& size) {
   body.size = 0.001 * Vec3(size.x, size.y, size.z);
   body.pose.position = 0.5 * body.size;
   Region below, above;
-  below.z = 0.0011;
+  below.z = kFace;
   above.kind = Region::Kind::kBox;
-  above.min = Vec3(-1, -1, body.size[2] - 0.0011);
+  above.min = Vec3(-1, -1, body.size[2] - kFace);
   above.max = Vec3(1, 1, 1);
   body.anchors = {below, above};
   scene.materials.resize(1);
   scene.materials[0].name = "test";
   body.material = "test";
+  // Sideways, so much that it shears by kShear at its faces.
+  const Material& m = scene.materials[0];
+  scene.gravity = Vec3(2 * kShear * lame_mu(m) / (m.density * face_above(size)), 0, 0);
   return scene;
 }
 
-/// Stretch along z and shear, and waves of some cells' length.
-void deform(MpmState& state) {
+/// The parabola of its shear, and waves of some cells' length; nothing at the faces and beyond.
+void deform(MpmState& state, const CubeSize& size) {
   const LatticeBody& b = state.bodies[0];
-  const double h = b.cell_size;
+  const double h = b.cell_size, above = face_above(size);
   b.for_each_node([&](int node, int i, int j, int k) {
     const double x = i + 1, y = j + 1, z = k + 1;
-    const double u[3] = {h * (0.3 * z + 0.1 * std::sin(0.4 * y)), h * 0.1 * std::sin(0.5 * x + z),
-                         h * (0.15 * z + 0.1 * std::sin(0.3 * x))};
+    const double share = (b.node_position(i, j, k).z() - kFace) / above;
+    const double bulge = std::max(0.0, 4 * share * (1 - share));
+    const double u[3] = {bulge * (0.25 * kShear * above + 0.1 * h * std::sin(0.4 * y)),
+                         bulge * 0.1 * h * std::sin(0.5 * x + z),
+                         bulge * 0.1 * h * std::sin(0.3 * x)};
     for (int a = 0; a < 3; ++a) state.nodes.u[a][node] = static_cast<float>(u[a]);
   });
 }
@@ -113,12 +122,12 @@ void run_cube(benchmark::State& bench, const CubeSize& size) {
   }
   const Scene scene = cube(size);
   CudaMpmTissue tissue(scene);
-  deform(tissue.state());
+  deform(tissue.state(), size);
   tissue.push();
   const float dt = 0.5f * tissue.stable_substep();
   if (size.points <= 1000000) {  // against the CPU, ten substeps on
     MpmTissue cpu(scene);
-    deform(cpu.state());
+    deform(cpu.state(), size);
     measure_motion(cpu.state());
     advance_by(cpu, 10, dt, {});
     cpu.finish();

@@ -66,9 +66,10 @@ std::string values_of(const Option& option) {
 
 TEST(MethodOptions, StandInTheDocumentationAsTheyAre) {
   for (const MethodOptions* of : method_options()) {
+    OptionSets defaults;
+    if (of->list(defaults).empty()) continue;
     std::ifstream file(std::string(TISSUE_SIM_DOCS) + "/" + of->name() + ".md");
     const std::string page{std::istreambuf_iterator<char>(file), {}};
-    OptionSets defaults;
     std::string table = "| Option | Values | Default | |\n| --- | --- | --- | --- |\n";
     for (const Option& option : of->list(defaults)) {
       table += std::string("| `") + option.name + "` | " + values_of(option) + " | " +

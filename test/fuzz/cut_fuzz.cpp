@@ -20,7 +20,6 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   const auto choice = bytes.take<std::uint8_t>();
   scene.method = choice % 3 == 0 ? Method::kMpm : choice % 3 == 1 ? Method::kMls : Method::kPbd;
   if (choice & 64) scene.pbd.model = PbdModel::kTetrahedra;
-  scene.mpm.boundary = choice & 128 ? MpmBoundary::kSurface : MpmBoundary::kLattice;
   const std::size_t points = bytes.take<std::uint8_t>() % 16,
                     poses = bytes.take<std::uint8_t>() % 16;
   const bool raw = bytes.take<std::uint8_t>() % 4 == 0;  // any double, or places near the body

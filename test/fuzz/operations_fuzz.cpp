@@ -88,7 +88,6 @@ Scene scene_of(Random& r) {
   s.frame_rate = r.once_in(3) ? r.scale(30, 1000) : 60;
   s.damping = r.once_in(2) ? r.scale(0.01, 100) : 2;
   if (r.once_in(5)) s.gravity = r.place(20);
-  if (r.once_in(5)) s.mpm.boundary = MpmBoundary::kLattice;
   if (r.once_in(2)) s.mls.spacing = s.cell_size;
   s.mls.contact = r.one_of({MlsContact::kNodes, MlsContact::kFaces});
   s.pbd.model = r.one_of({PbdModel::kSurface, PbdModel::kTetrahedra});

@@ -1,4 +1,4 @@
-// Prints what each frame of eleven scenes comes to, to the last bit: two builds that do the same
+// Prints what each frame of eight scenes comes to, to the last bit: two builds that do the same
 // print the same. scripts/compare_goldens compares two of them. Through the public API alone, so
 // that it can be built against any version of the core.
 #include <cstdio>

@@ -226,21 +226,11 @@ inline GoldenScene chain() {
 
 }  // namespace golden
 
-/// All of them with the lattice's boundary, which builds from before there was another have, too,
-/// and those with tools or anchors again at the true surface; a mesh that one needs is written to
-/// the folder.
+/// All of them; a mesh that one needs is written to the folder.
 inline std::vector<GoldenScene> golden_scenes(const TemporaryFolder& folder) {
   using namespace golden;
-  std::vector<GoldenScene> all = {service_cuts(),       scalpel(),    tears(),
-                                  three_tools(),        two_bodies(), inclusions(),
-                                  self_contact(folder), chain()};
-  for (GoldenScene& g : all) g.scene.mpm.boundary = MpmBoundary::kLattice;
-  for (GoldenScene g : {service_cuts(), scalpel(), three_tools()}) {
-    g.name += "_at_surface";
-    g.scene.mpm.boundary = MpmBoundary::kSurface;
-    all.push_back(g);
-  }
-  return all;
+  return {service_cuts(),       scalpel(), tears(), three_tools(), two_bodies(), inclusions(),
+          self_contact(folder), chain()};
 }
 
 }  // namespace tissue_sim

@@ -30,7 +30,6 @@ const Vec3 kSize(0.024, 0.02, 0.016);
 /// A box from the origin, held by a plane, a ball and a box anywhere.
 Scene held_anywhere(Random& random) {
   Scene scene = inviscid(free_box(kSize, 0.0021));
-  scene.mpm.boundary = MpmBoundary::kSurface;
   scene.gravity = Vec3(1, 2, -9.81);
   std::vector<Anchor>& anchors = scene.bodies[0].anchors;
   Region plane;

@@ -16,7 +16,7 @@ const Vec3 kMiddle(0.0155, 0.0145, 0.0085);
 
 /// The held box, deformed and cut by planes through its middle.
 MpmTissue cut_box(const std::vector<Vec3>& normals) {
-  MpmTissue tissue(held_body(Law::kFixedCorotated, 0, Shape::kBox));
+  MpmTissue tissue(free_body(Law::kFixedCorotated, 0, Shape::kBox));
   deform(tissue.state());
   for (const Vec3& normal : normals) cut_now(tissue, plane_cut(kMiddle, normal));
   return tissue;

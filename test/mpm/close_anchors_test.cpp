@@ -21,7 +21,6 @@ constexpr double kCell = 0.001;
 /// A slab that hangs on 16 balls of little more than a cell, three cells apart.
 Scene hung_on_balls() {
   Scene scene;
-  scene.mpm.boundary = MpmBoundary::kSurface;
   scene.cell_size = kCell;
   scene.ground.enabled = false;
   scene.gravity = Vec3(5, 0, -9.81);

@@ -42,7 +42,7 @@ void expect_same_bonds(const MpmState& a, const MpmState& b) {
 }
 
 TEST_F(CutOnGpu, SweepsOfAnyKindBreakTheBondsThatTheCpuBreaks) {
-  const Scene scene = held_body(Law::kFixedCorotated, 0, Shape::kBox);
+  const Scene scene = free_body(Law::kFixedCorotated, 0, Shape::kBox);
   for (const CutKind& kind : cut_kinds(kSize)) {
     SCOPED_TRACE(kind.name);
     MpmTissue cpu(scene);
@@ -66,7 +66,7 @@ TEST_F(CutOnGpu, SweepsOfAnyKindBreakTheBondsThatTheCpuBreaks) {
 TEST_F(CutOnGpu, TissueMovesOnAsBeforeWhereTheFirstCutDividesItAnew) {
   // Of 132 multiprocessors, this one takes more as long as it is whole than it leaves free for
   // blocks that cuts add.
-  Scene scene = held_body(Law::kFixedCorotated, 0, Shape::kBox);
+  Scene scene = free_body(Law::kFixedCorotated, 0, Shape::kBox);
   scene.bodies[0].size = Vec3(0.040, 0.040, 0.018);
   const auto run = [&] {
     CudaMpmTissue tissue(scene);
@@ -99,7 +99,7 @@ TEST_F(CutOnGpu, TissueMovesOnAsBeforeWhereRegionsAreHalvedAndJoinedAgain) {
   cudaDeviceProp gpu;
   ASSERT_EQ(cudaGetDeviceProperties(&gpu, 0), cudaSuccess);
   if (gpu.multiProcessorCount < 100) GTEST_SKIP() << "too few multiprocessors to halve regions";
-  Scene scene = held_body(Law::kFixedCorotated, 0, Shape::kBox);
+  Scene scene = free_body(Law::kFixedCorotated, 0, Shape::kBox);
   scene.cell_size = 0.001;
   scene.bodies[0].size = Vec3(0.040, 0.040, 0.018);
   std::vector<bool> halved;
@@ -136,7 +136,7 @@ TEST_F(CutOnGpu, TissueMovesOnAsBeforeWhereRegionsAreHalvedAndJoinedAgain) {
 }
 
 TEST_F(CutOnGpu, TablesThatFollowAreThoseThatAreMadeAnew) {
-  const Scene scene = held_body(Law::kFixedCorotated, 0, Shape::kEllipsoid);
+  const Scene scene = free_body(Law::kFixedCorotated, 0, Shape::kEllipsoid);
   CudaMpmTissue follows(scene), anew(scene);
   for (CudaMpmTissue* tissue : {&follows, &anew}) {
     prepare(*tissue, 2e-5);

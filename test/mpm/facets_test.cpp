@@ -92,7 +92,7 @@ TEST(Facets, LieInThePlaneOfACutThroughDeformedTissue) {
 TEST(Facets, AreKeptOnlyWhereTheyWouldBeTheSame) {
   for (const auto& [with_inclusions, room] :
        {std::pair(false, 0), std::pair(true, 0), std::pair(false, 1000), std::pair(true, 1000)}) {
-    Scene scene = held_body(Law::kFixedCorotated, 0, Shape::kEllipsoid);
+    Scene scene = free_body(Law::kFixedCorotated, 0, Shape::kEllipsoid);
     if (with_inclusions) add_inclusions(scene, true);
     MpmTissue tissue(scene);
     tissue.state().blocks.room = room;

@@ -1,7 +1,6 @@
 // Forces, clamps and frequencies against finite elements (test/data/references.yaml), set up as a
-// user does: cell sizes that do not divide the body, planes anywhere in a cell. The true surface is
-// the boundary (`mpm: {boundary: surface}`, the default); docs/validation.md has finer cells and
-// the lattice's.
+// user does: cell sizes that do not divide the body, planes anywhere in a cell;
+// docs/validation.md has finer cells.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -179,6 +178,39 @@ TEST_P(FiniteElementsOn, AnchorsLetGoOfWhatTearsOffInFrontOfThem) {
   EXPECT_GT(simulation.tissue().fragment_count(), 1);
   EXPECT_LT(simulation.tissue().fragment_count(), 20);  // 788 before they let go
 }
+
+#if defined(TISSUE_SIM_CUDA)
+// One law on both devices: at rest tissue bears what it does on a CPU. With friction what sticks
+// depends on the way there, on which inerters are made anew or stay.
+TEST(FiniteElementScenes, ToolsAtRestPressOnAGpuAsOnACpu) {
+  const std::string why = why_no_gpu();
+  if (!why.empty()) GTEST_SKIP() << why;
+  Tool plate = punch();
+  plate.type = ToolType::kPlate;
+  plate.size = Vec3(0.014, 0.01, 0.004);
+  for (Tool tool : {ball(0.006), punch(), plate}) {
+    for (const double friction : {0.0, 0.3}) {
+      tool.friction = friction;
+      double force[2];
+      for (const Device device : {Device::kCpu, Device::kCuda}) {
+        Scene scene = indented_cylinder(0.003, 0, tool);
+        scene.device = device;
+        scene.bodies[0].shape = Shape::kBox;
+        scene.bodies[0].size = Vec3(0.036, 0.036, 0.024);
+        Simulation simulation(scene);
+        indentation_force(simulation, 0.002);
+        const SettleReport report = simulation.settle({2e-6, 5, 30});
+        EXPECT_TRUE(report.at_rest) << report.speed;
+        force[device == Device::kCuda] = simulation.advance_frame().result.loads[0].mean.force.z();
+      }
+      std::printf("tool %d, friction %g: %.6f N on the GPU, %.6f on the CPU\n",
+                  static_cast<int>(tool.type), friction, force[1], force[0]);
+      EXPECT_GT(force[0], 0.01);
+      EXPECT_NEAR(force[1] / force[0], 1, friction > 0 ? 1e-2 : 1e-4);
+    }
+  }
+}
+#endif
 
 }  // namespace
 }  // namespace tissue_sim

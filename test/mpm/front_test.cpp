@@ -24,7 +24,6 @@ const char* const kData = TISSUE_SIM_TEST_DATA;
 /// A block of 40 x 32 x 24 mm in space, and a stroke into it from the side, askew.
 Scene block(Law law, double viscosity) {
   Scene scene = free_box(Vec3(0.04, 0.032, 0.024), 0.004);
-  scene.mpm.boundary = MpmBoundary::kSurface;
   Material m;
   m.name = "test";
   m.law = law;

@@ -22,7 +22,7 @@ std::vector<int> count_points(const MpmState& s) {
 }
 
 TEST(HalvedRegions, HoldEachPointOnceAndOnlyWhereThereIsRoom) {
-  const Scene scene = held_body(Law::kFixedCorotated, 0, Shape::kEllipsoid);
+  const Scene scene = free_body(Law::kFixedCorotated, 0, Shape::kEllipsoid);
   for (const int room : {0, 1, 1000}) {
     SCOPED_TRACE(room);
     MpmTissue tissue(scene);
@@ -37,7 +37,7 @@ TEST(HalvedRegions, HoldEachPointOnceAndOnlyWhereThereIsRoom) {
 }
 
 TEST(HalvedRegions, MoveAsWholeOnes) {
-  const Scene scene = held_body(Law::kFixedCorotated, 0, Shape::kBox);
+  const Scene scene = free_body(Law::kFixedCorotated, 0, Shape::kBox);
   const auto run = [&](int room) {
     MpmTissue tissue(scene);
     tissue.state().blocks.room = room;

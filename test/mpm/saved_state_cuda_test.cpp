@@ -18,11 +18,16 @@ class SavedStateOnGpu : public OnEitherDevice<CudaMpmTissue> {
   /// A held box under a probe, which is cut in the middle of the run and then once more.
   static SavedRun run_of(const Vec3& size, double cell_size, int frames) {
     SavedRun run;
-    run.scene = held_body(Law::kFixedCorotated, 0, Shape::kBox);
+    run.scene = free_body(Law::kFixedCorotated, 0, Shape::kBox);
     run.scene.device = Device::kCuda;
     run.scene.cell_size = cell_size;
     run.scene.bodies[0].size = size;
     run.scene.bodies[0].pose.position = 0.5 * size;
+    Region held;
+    held.kind = Region::Kind::kBox;
+    held.min = Vec3(-1, -1, -1);
+    held.max = Vec3(0.006, 1, 1);
+    run.scene.bodies[0].anchors = {held};
     run.scene.tools.resize(1);
     run.scene.tools[0].name = "probe";
     run.scene.tools[0].radius = 0.004;

@@ -15,23 +15,17 @@ constexpr double kCell = 0.002, kThick = 2 * kCell, kLong = 60 * kCell;  // [m]
 constexpr double kRadius = 3 * kCell, kBend = kRadius * EIGEN_PI / 2;    // of the bend, half of it
 constexpr double kGap = 2 * kRadius - kThick;
 
-/// A bar that lies along x, whose middle is held.
-Scene bar() {
-  Scene scene = inviscid(free_box(Vec3(kLong, kThick, 6 * kCell), kCell));
-  Region held;
-  held.kind = Region::Kind::kBox;
-  held.min = Vec3(kLong / 2 - kBend - kCell, -1, -1);
-  held.max = Vec3(kLong / 2 + kBend + kCell, 1, 1);
-  scene.bodies[0].anchors = {held};
-  scene.mpm.boundary = MpmBoundary::kLattice;  // whose held nodes are bent
-  return scene;
-}
+/// A bar that lies along x.
+Scene bar() { return inviscid(free_box(Vec3(kLong, kThick, 6 * kCell), kCell)); }
 
-/// Bends it to a U whose prongs, free of stress, fly at one another.
+/// Grips its middle and bends it to a U whose prongs, free of stress, fly at one another.
 template <class T>
 void bend(T& tissue, double speed) {
   pull(tissue);
   MpmState& s = tissue.state();
+  grip(s, [](const Vec3& x, double margin) {
+    return std::fabs(x[0] - kLong / 2) < kBend + kCell + margin;
+  });
   s.bodies[0].for_each_node([&](int node, int x, int y, int z) {
     const Vec3 home = s.bodies[0].node_position(x, y, z);
     const double along = home[0] - kLong / 2, side = along < 0 ? -1 : 1;

@@ -37,7 +37,6 @@ Material soft_material() {
 Scene block_and_ball() {
   Scene s = free_box(kSize, kCell);
   s.device = Device::kCuda;
-  s.mpm.boundary = MpmBoundary::kSurface;
   s.materials = {soft_material()};
   s.bodies[0].material = "phantom";
   Tool ball;
@@ -265,7 +264,6 @@ TEST_F(SurfaceContactOnGpu, AToolFeelsTheOppositeOfWhatItGives) {
 TEST_F(SurfaceContactOnGpu, AFallingBlockGainsNoEnergyAndComesToRest) {
   Scene scene = free_box(Vec3(0.02, 0.02, 0.015), kCell);
   scene.device = Device::kCuda;
-  scene.mpm.boundary = MpmBoundary::kSurface;
   scene.materials = {soft_material()};
   scene.bodies[0].material = "phantom";
   scene.gravity = Vec3(0, 0, -9.81);

@@ -16,7 +16,7 @@ namespace {
 class TearOnGpu : public OnEitherDevice<CudaMpmTissue> {};
 
 TEST_F(TearOnGpu, FindsThePointsToTearThatTheCpuFinds) {
-  Scene scene = held_body(Law::kFixedCorotated, 0, Shape::kEllipsoid);
+  Scene scene = free_body(Law::kFixedCorotated, 0, Shape::kEllipsoid);
   scene.materials[0].tear_stretch = 1.25;
   scene.materials[0].tear_scatter = 0.1;
   MpmTissue cpu(scene);
@@ -39,7 +39,11 @@ Scene heavy_strip() {
   StripOf of;
   of.scatter = 0.02;
   Scene s = Strip<MpmTissue>::scene_of(of);
-  s.bodies[0].anchors.resize(1);
+  Region held;
+  held.kind = Region::Kind::kBox;
+  held.min = Vec3(-1, -1, -1);
+  held.max = Vec3(0.004, 1, 1);
+  s.bodies[0].anchors = {held};
   s.gravity = Vec3(60, 0, 0);
   s.damping = 20;
   return s;

@@ -144,7 +144,7 @@ TEST(Tear, NotchedStripTearsFromItsNotchAtALoadThatResolutionLeavesAlone) {
       EXPECT_NEAR(sizes[0], sizes[1], 0.01 * sizes[0]) << "it tears in the notch's plane";
       EXPECT_GE(sizes[0] + sizes[1], strip.tissue().point_count() - 8) << "no dust";
       EXPECT_LT(astray(strip.tissue().state(), 0.5 * MpmStrip::kWidth), 0.05);
-      EXPECT_LT(load, 0.75);
+      EXPECT_LT(load, tear_length > 0 ? 0.9 : 0.7);
       EXPECT_NEAR(load / first, 1, tear_length > 0 ? 0.1 : 0.3);
     }
   }
@@ -188,7 +188,6 @@ TEST(Tear, CracksRunAtAnyAngleToTheLattice) {
 TEST(Tear, ShedsNoDustWhereTornTissueSwings) {
   Scene scene = free_box(Vec3(0.04, 0.016, 0.016), 0.002);
   scene.device = Device::kCpu;
-  scene.mpm.boundary = MpmBoundary::kLattice;
   scene.gravity = Vec3(90, 0, 0);
   Material weak;
   weak.name = "weak";
@@ -244,7 +243,6 @@ TEST(Tear, KeepsMomentumAndBringsNoEnergy) {
   StripOf of;
   of.limit = 1.2;
   Scene scene = MpmStrip::scene_of(of);
-  scene.bodies[0].anchors.clear();
   scene.damping = 0;
   MpmTissue tissue(scene);
   MpmState& s = tissue.state();

@@ -17,7 +17,6 @@ Scene held_block_and_probe() {
   Scene scene;
   scene.method = Method::kMpm;
   scene.device = Device::kCpu;
-  scene.mpm.boundary = MpmBoundary::kSurface;
   scene.threads = 1;
   scene.cell_size = 0.0033;
   scene.ground.enabled = false;

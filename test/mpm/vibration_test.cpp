@@ -4,7 +4,6 @@
 #include <vector>
 
 #include "beam_scene.h"
-#include "clamp_place.h"
 #include "curve_file.h"
 #include "fixed_substeps.h"
 
@@ -24,10 +23,7 @@ Swing swing(const Beam& beam, int cells, Ends ends, const std::string& curve, La
   MpmState& state = tissue.state();
   const LatticeBody& b = state.bodies[0];
   Nodes& n = state.nodes;
-  Beam acting = beam;
-  if (ends == Ends::kClampedFree) acting.length -= clamp_place(state);
-  const double start = beam.length - acting.length;
-  const double frequency = bending_frequency(acting, ends) / (2 * M_PI);
+  const double frequency = bending_frequency(beam, ends) / (2 * M_PI);
 
   std::vector<double> weight(n.size());
   double scale = 0;
@@ -37,13 +33,13 @@ Swing swing(const Beam& beam, int cells, Ends ends, const std::string& curve, La
       for (int x = -1; x <= b.nx; ++x) {
         const int i = b.node(x, y, z);
         const Vec3 place = b.node_position(x, y, z);
-        if (n.inv_mass[i] == 0 || place.x() < start) continue;
+        if (n.inv_mass[i] == 0 || place.x() < 0) continue;
         double slope;
-        const double shape = mode_shape(ends, (place.x() - start) / acting.length, &slope);
+        const double shape = mode_shape(ends, place.x() / beam.length, &slope);
         weight[i] = n.mass[i] * shape;
         scale += weight[i] * shape;
         n.v[2][i] = static_cast<float>(speed * shape);
-        n.v[0][i] = static_cast<float>(-speed * slope / acting.length * place.z());
+        n.v[0][i] = static_cast<float>(-speed * slope / beam.length * place.z());
       }
     }
   }

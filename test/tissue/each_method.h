@@ -40,7 +40,6 @@ struct Tolerances {
   double angular_impulse;   ///< the same of moments
   double beam;              ///< tip of a cantilever, 8 cells thick
   double beam_no_locking;   ///< the same with a Poisson's ratio of 0.49
-  double clamp;             ///< where a clamp acts, from the anchored region's end [cells]
   double beam_convergence;  ///< error 4 cells thick, over that of 8, at Poisson's ratio 0, at least
 };
 
@@ -61,14 +60,12 @@ inline Tolerances tolerances(Method method) {
       t.cut_speed = 5e-6;    // read: 9e-7
       t.cut_energy = 1e-14;  // read: 4e-16, of 0.1 J for a strain of 1
       t.misplaced = 0;
-      t.clamp = 0.25;  // derived in test/mpm/clamp_place.h
       t.beam_convergence = 3.4;
       return t;
     case Method::kMls:
       t.rest_speed = t.cut_speed = 0;
       t.rest_energy = t.cut_energy = 0;
       t.misplaced = 0;
-      t.clamp = 0;  // the region's face, wherever it lies between nodes
       t.beam_convergence = 1.8;
       return t;
     case Method::kPbd:
@@ -77,7 +74,6 @@ inline Tolerances tolerances(Method method) {
       t.rest_energy = t.cut_energy = 1e-12;
       t.misplaced = 0;
       t.momentum = 1e-4;
-      t.clamp = 0;
       t.beam_convergence = 1.2;
       return t;
   }

@@ -33,7 +33,6 @@ Scene held_sheet(double thickness) {
   scene.cell_size = kCell;
   scene.ground.enabled = false;
   scene.gravity = Vec3::Zero();
-  scene.mpm.boundary = MpmBoundary::kSurface;
   Material soft;
   soft.name = "soft";
   soft.young_modulus = 5000;

@@ -15,7 +15,6 @@ Scene bar() {
   s.gravity = Vec3::Zero();
   s.ground.enabled = false;
   s.damping = 300;
-  s.mpm.boundary = MpmBoundary::kSurface;
   s.materials.resize(1);
   s.materials[0].name = "bar";
   s.materials[0].young_modulus = kYoung;

@@ -79,8 +79,7 @@ const std::vector<SurfacePlace>& places_for(const Collider& collider, const Bloc
   return collider.kind == Collider::kPlane ? block.merged : block.surface;
 }
 
-/// How far from the points of a cell its surface may be [cells].
-double surface_reach(const MpmState& state) { return state.points.outer.empty() ? 0 : 0.5; }
+constexpr double kSurfaceReach = 0.5;  // from the points of a cell to its surface, at most [cells]
 
 /// How much nearer a block's points and a collider may come in a substep [m].
 double approach(const MpmState& state, int block, const Collider& collider, float dt) {
@@ -117,7 +116,7 @@ void find_near_colliders(MpmState& state, const std::vector<Box>& reach, double 
       box.max = box.max.cwiseMax(before[i].box.max);
     }
     const double margin =
-        state.motion[i].speed * duration + (0.5 + surface_reach(state)) * state.scene.cell_size;
+        state.motion[i].speed * duration + (0.5 + kSurfaceReach) * state.scene.cell_size;
     box.min.array() -= margin;
     box.max.array() += margin;
     for (std::size_t c = 0; c < reach.size(); ++c) {
@@ -130,8 +129,8 @@ bool came_unforeseen(const MpmState& state, const std::vector<Box>& reach) {
   for (std::size_t i = 0; i < state.motion.size(); ++i) {
     const std::vector<std::uint8_t>& near = state.contacts.near[i];
     Box box = state.motion[i].box;
-    box.min.array() -= surface_reach(state) * state.scene.cell_size;
-    box.max.array() += surface_reach(state) * state.scene.cell_size;
+    box.min.array() -= kSurfaceReach * state.scene.cell_size;
+    box.max.array() += kSurfaceReach * state.scene.cell_size;
     for (std::size_t c = 0; c < reach.size(); ++c) {
       if (!overlap(box, reach[c])) continue;
       if (std::find(near.begin(), near.end(), c) == near.end()) return true;
@@ -200,13 +199,12 @@ void list_near_cells(MpmState& state, int index, float dt) {
   state.kernels->positions(block, block_field(state, block), state.nodes.u, scratch, x);
   std::vector<std::uint8_t> points(static_cast<std::size_t>(block.nz) * block.stride);  // of cells
   std::vector<std::uint8_t> near(points.size());
-  const bool at_points = state.points.outer.empty();  // MpmBoundary::kLattice
   for (const std::uint8_t c : state.contacts.near[index]) {
     const Collider& collider = state.colliders[c];
     const bool is_blade = collider.kind == Collider::kBlade;
     const bool is_plane = collider.kind == Collider::kPlane;
     const double margin = kListLasts * approach(state, index, collider, dt) +
-                          (is_blade ? 0 : surface_reach(state) * body.cell_size);
+                          (is_blade ? 0 : kSurfaceReach * body.cell_size);
     const Box box = bounds(collider);
     float min[3], max[3];
     for (int a = 0; a < 3; ++a) {
@@ -231,7 +229,7 @@ void list_near_cells(MpmState& state, int index, float dt) {
       const int row = lane / block.stride, cell = row / 8 * block.stride + lane % block.stride;
       near[cell] = 1;
       // Others touch over their places on the surface.
-      if (is_blade || in_body || at_points) points[cell] |= 1u << row % 8;
+      if (is_blade || in_body) points[cell] |= 1u << row % 8;
     }
     const std::vector<SurfacePlace>& places = places_for(collider, block);
     const int along = parts_along(collider, static_cast<float>(body.cell_size));
@@ -359,7 +357,7 @@ bool push_points(BlockPush& b, const NearCell& cell, unsigned points, const Coll
     float push[3];
     contact_force(collider, g, {unit.stiffness * volume, unit.damping * volume}, at, velocity,
                   touch.hold, push);
-    if (is_bounded(b.state, collider, p) && !b.state.points.outer.empty()) {
+    if (is_bounded(b.state, collider, p)) {
       const Material& m = b.body.material_of(b.state.points, p);
       const float most = kMostOfHeld * static_cast<float>(m.young_modulus) * 4 * quarter * quarter;
       const float scale = most / std::sqrt(dot(push, push));

@@ -7,11 +7,6 @@
 #include "mpm/mpm_state.h"
 
 namespace tissue_sim {
-namespace {
-
-bool at_surface(const MpmState& state) { return state.scene.mpm.boundary == MpmBoundary::kSurface; }
-
-}  // namespace
 
 double fastest_block(const MpmState& state) {
   double fastest = 0;
@@ -31,7 +26,7 @@ void search_if_faster(MpmState& state) {
 }
 
 void push_faces(const MpmState& state, FaceContact& contact, float dt) {
-  ContactPlaces places{state.nodes, contact, at_surface(state)};
+  ContactPlaces places{state.nodes, contact};
   push_face(contact, dt, places);
 }
 
@@ -40,7 +35,7 @@ void push_faces_within(MpmState& state, int index, float dt, const float* u) {
   const Block& block = *state.blocks.all[index];
   for (std::int32_t i = faces.first_within[index]; i < faces.first_within[index + 1]; ++i) {
     FaceContact& contact = faces.all[faces.within[i]];
-    PlacesInBlock places{{state.nodes, contact, at_surface(state)}, block, u};
+    PlacesInBlock places{{state.nodes, contact}, block, u};
     push_face(contact, dt, places);
   }
 }

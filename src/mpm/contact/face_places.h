@@ -81,10 +81,8 @@ inline void displacement_at(const Nodes& nodes, const CellNodes& cell, bool has_
 struct ContactPlaces {
   const Nodes& nodes;
   FaceContact& contact;
-  bool at_surface = false;  ///< MpmBoundary::kSurface; the lattice's is as it was
 
   static bool any(bool so) { return so; }
-  bool slides_back() const { return at_surface; }
   void own(float (&value)[3]) const {
     displacement_at(nodes, contact.nodes, contact.has_whole_rows, contact.weights, value);
   }

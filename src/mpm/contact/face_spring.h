@@ -71,10 +71,10 @@ struct alignas(16) FaceSpring {
 /// knows displacements [m]: places.own(u) of the facet's centre, places.held(u) of the place held,
 /// which places.hold(place) sets, and places.held_mobility() [1/kg]. Where several contacts are
 /// worked out in step, places.any(so) says whether it is so for any of them, and those that are not
-/// `active` come along. With places.slides_back() a place that slid too far comes back onto the
-/// cone: in a substep it may slide ten times as far as the spring on the cone is long, and a tenth
-/// too far there would be no friction; and what pressed before sticks where it cannot slide, as on
-/// a face that slopes more than its normal says, until it parts, slides again or is too far away.
+/// `active` come along. A place that slid too far comes back onto the cone: in a substep it may
+/// slide ten times as far as the spring on the cone is long, and a tenth too far there would be no
+/// friction; and what pressed before sticks where it cannot slide, as on a face that slopes more
+/// than its normal says, until it parts, slides again or is too far away.
 template <class Places>
 TISSUE_SIM_INLINE void push_face(FaceSpring& c, float dt, Places& places, bool active = true) {
   float own[3], held[3];
@@ -101,25 +101,19 @@ TISSUE_SIM_INLINE void push_face(FaceSpring& c, float dt, Places& places, bool a
     for (int a = 0; a < 3; ++a) aside[a] = c.apart[a] + depth * c.normal[a];
     const float slip = sqrtf(dot(aside, aside));
     bool slides = c.touching && slip > kOnCone * c.friction * depth;
-    float share = 1 - c.friction * depth / slip;
-    const float* step = aside;
-    if (places.slides_back()) {
-      constexpr float kOff = kOnCone - 1;
-      const float cone = c.friction * depth;
-      for (int a = 0; a < 3; ++a) {
-        if (i == 0 && slides) way[a] = aside[a] / slip;
-        left[a] = aside[a] - cone * way[a];
-      }
-      if (i > 0) slides = c.touching && dot(left, left) > kOff * kOff * cone * cone;
-      share = 1;
-      step = left;
+    constexpr float kOff = kOnCone - 1;
+    const float cone = c.friction * depth;
+    for (int a = 0; a < 3; ++a) {
+      if (i == 0 && slides) way[a] = aside[a] / slip;
+      left[a] = aside[a] - cone * way[a];
     }
+    if (i > 0) slides = c.touching && dot(left, left) > kOff * kOff * cone * cone;
     goes_on = slides = slides && goes_on;
     if (i == 3 || !places.any(slides)) break;
     if (slides) {
       float place[3];
       for (int a = 0; a < 3; ++a) {
-        place[a] = c.hold[a] + share * dot(c.to_reference + 3 * a, step);
+        place[a] = c.hold[a] + dot(c.to_reference + 3 * a, left);
       }
       c.hold_at(place);
       places.hold(place);
@@ -131,7 +125,7 @@ TISSUE_SIM_INLINE void push_face(FaceSpring& c, float dt, Places& places, bool a
       depth = -dot(c.apart, c.normal);
       // Not what it looked like, or beyond what is left of the face.
       c.touching = depth > 0 && dot(c.apart, c.apart) <= length2 && c.holds();
-      undone = places.slides_back() && touched && depth > 0 && !c.touching;
+      undone = touched && depth > 0 && !c.touching;
       if (undone) {
         c.hold_at(before);
         places.hold(before);

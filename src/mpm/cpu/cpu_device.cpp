@@ -26,7 +26,7 @@ std::string CpuMpmDevice::name() const {
 
 void CpuMpmDevice::begin() {
   MpmState& s = state_;
-  if (s.scene.mpm.boundary == MpmBoundary::kSurface) s.points.outer = find_outer_places(s);
+  s.points.outer = find_outer_places(s);
   s.blocks = make_blocks(s, {}, *s.cpu);
   s.work.force.resize(s.blocks.force_size);
   const std::size_t count = s.blocks.all.size();

@@ -152,11 +152,10 @@ struct LanePlaces {
   using Group = LaneGroup<kLanes, kApart>;
   Group lanes;
   CudaNodes state;
-  bool at_surface;
   LanePlace<Group> own_place, other_place;
 
   __device__ __forceinline__ LanePlaces(const CudaNodes& nodes, const CudaLooks& looks)
-      : state(nodes), at_surface(looks.at_surface) {}
+      : state(nodes) {}
 
   /// Takes a contact in hand whose nodes are known; the place held is still to be set.
   __device__ __forceinline__ void take(const CudaContactNodes& known) {
@@ -170,7 +169,6 @@ struct LanePlaces {
     other_place.bring(state.u);
   }
   __device__ __forceinline__ bool any(bool so) const { return lanes.any(so); }
-  __device__ __forceinline__ bool slides_back() const { return at_surface; }
   __device__ __forceinline__ void own(float (&value)[3]) const {
     own_place.displacement(lanes, value);
   }

@@ -190,7 +190,7 @@ void CudaMpmDevice::sweep(const std::vector<BladePath>& paths, bool moves,
     std::vector<std::int32_t> by_this;
     break_bonds(d.state, {bonds_swept(d, path, moves)}, by_this, report);
     push_points(d, by_this);  // for the next
-    if (d.state.front.follows) pass_rim(d, path, moves, by_this, touched);
+    pass_rim(d, path, moves, by_this, touched);
     changed.insert(changed.end(), by_this.begin(), by_this.end());
   }
 }

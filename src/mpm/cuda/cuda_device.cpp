@@ -105,7 +105,7 @@ void CudaMpmDevice::begin() {
 
 void CudaMpmDevice::begun() {
   CudaTissue& d = *tissue_;
-  if (d.state.scene.mpm.boundary != MpmBoundary::kSurface || d.held_by == 0) return;
+  if (d.held_by == 0) return;
   d.outer.upload(outer_points(d.state, d.state.anchors), d.stream);
   if (d.place_parts > 1) d.planes.upload(surface_planes(d.state), d.stream);
 }

@@ -84,7 +84,6 @@ CudaLooks looks_of(const CudaTissue& d) {
   s.pushed_parts = d.pushed_parts.data();
   s.slot_count = d.slot_parts.size();
   s.figures = f.figures.data();
-  s.at_surface = d.state.scene.mpm.boundary == MpmBoundary::kSurface;
   return s;
 }
 

@@ -7,6 +7,8 @@ namespace tissue_sim {
 
 namespace {
 
+constexpr double kSurfaceReach = 0.5;  // from the points of a cell to its surface, at most [cells]
+
 /// Whether any of these may be within its margin of what a collider sweeps.
 template <class Margin>
 bool may_meet(const CudaTissue& d, const std::vector<BlockMotion>& motion, const Margin& margin) {
@@ -29,7 +31,7 @@ CudaReach reach(const CudaTissue& d) {
                   static_cast<int>(d.host_reach.size()),
                   0,
                   static_cast<float>(d.run.frame->duration),
-                  static_cast<float>((0.5 + d.surface_reach()) * d.state.scene.cell_size),
+                  static_cast<float>((0.5 + kSurfaceReach) * d.state.scene.cell_size),
                   d.went.empty() ? nullptr : d.u_went.data()};
   for (int c = 0; c < reach.collider_count; ++c) {
     if (d.host_colliders[c].kind == Collider::kBlade) reach.blades |= 1u << c;
@@ -41,7 +43,7 @@ CudaReach reach(const CudaTissue& d) {
 
 void find_near(CudaTissue& d) {
   // A little more than the GPU finds, for what it finds must be done.
-  const double cell = (1 + d.surface_reach()) * d.state.scene.cell_size;
+  const double cell = (1 + kSurfaceReach) * d.state.scene.cell_size;
   d.may_meet =
       may_meet(d, d.state.motion,
                [&](const BlockMotion& m) { return m.speed * d.run.frame->duration + cell; }) ||
@@ -71,7 +73,7 @@ void look_for_unforeseen(CudaTissue& d) {
 
 bool came_unforeseen(const CudaTissue& d) {
   if (d.may_meet) return d.host_unforeseen[0] != 0;
-  const double reach = d.surface_reach() * d.state.scene.cell_size;
+  const double reach = kSurfaceReach * d.state.scene.cell_size;
   return may_meet(d, d.state.motion, [reach](const BlockMotion&) { return reach; });
 }
 

@@ -10,8 +10,8 @@ namespace {
 /// What the tables and the state take on the GPU, `of_places` of that where the surface is; clouds
 /// and contacts between tissue come on top.
 std::size_t bytes_of(const HostTables& t, std::size_t nodes, std::size_t points, std::size_t held,
-                     std::size_t most_held, std::size_t of_places, bool at_surface) {
-  const int sums = 3 * (kPushStride + (at_surface ? kInertiaStride : 0));
+                     std::size_t most_held, std::size_t of_places) {
+  constexpr int sums = 3 * (kPushStride + kInertiaStride);
   const std::size_t of_contact = sums * sizeof(long long) * nodes + 6 * t.lanes;
   constexpr std::size_t of_connecting = 16;  // two numbers a slot, and as much again to sort them
   return t.blocks.size() * (sizeof(CudaBlock) + sizeof(CudaMeasure)) +
@@ -73,8 +73,7 @@ void plan_tables(CudaTissue& d) {
       d.plan.viscous = d.plan.viscous || m.viscosity > 0;
     }
   }
-  const bool may_have_fronts = d.state.front.follows;
-  const auto choose = [&d, may_have_fronts](std::size_t count) {
+  const auto choose = [&d](std::size_t count) {
     d.resident = resident_blocks(d.plan, static_cast<int>(count));
     d.push_plan = d.plan;
     d.push_plan.pushes = true;
@@ -82,7 +81,6 @@ void plan_tables(CudaTissue& d) {
     d.touch_plan = d.push_plan;
     d.touch_plan.touches = true;
     d.touch_resident = resident_blocks(d.touch_plan, static_cast<int>(count));
-    if (!may_have_fronts) return;
     d.front_plan = d.touch_plan;
     d.front_plan.fronts = true;
     d.front_resident = resident_blocks(d.front_plan, static_cast<int>(count));
@@ -119,8 +117,7 @@ void plan_tables(CudaTissue& d) {
   make_face_rows(d.state, t, t.max_plane_slots, d.anchors.made);
   d.plan.max_held = d.anchors.made.most_held;
   choose(t.bundles.size());
-  if (d.resident == 0 || d.push_resident == 0 || d.touch_resident == 0 ||
-      (may_have_fronts && d.front_resident == 0)) {
+  if (d.resident == 0 || d.push_resident == 0 || d.touch_resident == 0 || d.front_resident == 0) {
     throw std::runtime_error("the GPU has too little shared memory");
   }
 }
@@ -148,10 +145,9 @@ void push_tables(CudaTissue& d) {
   d.place_parts = has_thin_tools(scene) ? kPlaceParts : 1;
   const std::size_t held = points * d.place_parts * d.held_by;
   const std::size_t most_held = CudaTissue::Checkpoint::most_held(held);
-  const bool at_surface = scene.mpm.boundary == MpmBoundary::kSurface;
   const std::size_t of_places =
-      at_surface && held > 0 ? points * sizeof(float4) * (d.place_parts > 1 ? 2 : 1) : 0;
-  check_memory(bytes_of(t, n, points, held, most_held, of_places, at_surface), device_bytes(d));
+      held > 0 ? points * sizeof(float4) * (d.place_parts > 1 ? 2 : 1) : 0;
+  check_memory(bytes_of(t, n, points, held, most_held, of_places), device_bytes(d));
   check_cuda(cudaStreamSynchronize(d.stream), "finish a frame");
   d.blocks.upload(t.blocks, d.stream);
   d.bundles.upload(t.bundles, d.stream);

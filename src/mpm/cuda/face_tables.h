@@ -93,7 +93,6 @@ struct CudaLooks {
   std::uint32_t* pushed_parts;      ///< and with kPushed
   std::size_t slot_count;
   CudaFaceFigures* figures;
-  bool at_surface;  ///< MpmBoundary::kSurface: as on a CPU, mpm/contact/face_places.h
 };
 
 /// Contacts of tissue with tissue of the substeps of one launch.

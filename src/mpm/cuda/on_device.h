@@ -169,7 +169,7 @@ struct CudaTissue {
     t.volume = of_blocks.volume.data();
     t.point = of_blocks.point.data();
     t.partial = of_blocks.partial.data();
-    t.outer = outer.size() > 0 ? outer.data() : nullptr;
+    t.outer = outer.data();
     t.bonds = bonds.data();
     t.soft = soft.size() > 0 ? soft.data() : nullptr;
     t.lightness = anchors.lightness.size() > 0 ? anchors.lightness.data() : nullptr;
@@ -190,8 +190,6 @@ struct CudaTissue {
   double share_of(int i) const { return part.substeps.share(i + 1, part.from, part.to); }
   /// Nodes, and parted ones behind them.
   std::size_t entries() const { return u[0].size(); }
-  /// How far from the points of a cell its surface may be [cells].
-  double surface_reach() const { return outer.size() > 0 ? 0.5 : 0; }
   CudaNodes nodes(int which) const { return {u[which].data(), v[which].data()}; }
   CudaNodes present() const { return nodes(current); }
 };

@@ -39,7 +39,6 @@ std::set<Cell> cells_beside(const AnchorFaces& faces, const LatticeTissue& tissu
 }  // namespace
 
 bool has_thin_tools(const Scene& scene) {
-  if (scene.mpm.boundary != MpmBoundary::kSurface) return false;
   return std::any_of(scene.tools.begin(), scene.tools.end(), [&](const Tool& tool) {
     return tool.type != ToolType::kGrasper && tool.type != ToolType::kScalpel &&
            stiffer_across(static_cast<float>(tool.radius), static_cast<float>(scene.cell_size)) > 1;

@@ -25,7 +25,7 @@ struct PlaceWeights {
   __device__ __forceinline__ PlaceWeights(const CudaTables& t, int point, int s) {
 #pragma unroll
     for (int a = 0; a < 3; ++a) at[a] = (s >> a & 1) != 0 ? 0.25f : -0.25f;
-    if (t.outer != nullptr && point >= 0) {
+    if (point >= 0) {
       const float4 place = __ldg(t.outer + point);
       // What cuts took apart may lie on its other side.
       const int bonds = __popc(t.bonds[point]);
@@ -151,7 +151,6 @@ __device__ __forceinline__ void push_cell(const CudaTables& t, const CudaNodes& 
   const bool held_before = (held.with[0] | held.with[1]) != 0;
   float push[3] = {0, 0, 0}, force[3] = {0, 0, 0};
   const auto resist = [&](int c, const float(&normal)[3], float along, bool resists, bool begins) {
-    if (pushes.inertia == nullptr) return;
     const unsigned places = __ballot_sync(0xffffffffu, resists && point.inertia > 0);
     if (places == 0) return;
     InertialPlaces all;

@@ -147,25 +147,15 @@ std::vector<LatticeBody> make_lattice_bodies(const Scene& scene, Points& points,
     points.volume.reserve(count);
     points.anchored.reserve(count);
     const auto index = static_cast<std::int16_t>(bodies.size());
-    std::vector<int> anchored(body.anchors.size(), 0);
     for (const Lattice::Site& s : lattice.sites) {
       if (points.size() % 4096 == 0) stop_if_asked();
       points.site.push_back({static_cast<std::int16_t>(s.x), static_cast<std::int16_t>(s.y),
                              static_cast<std::int16_t>(s.z), index});
       points.volume.push_back(s.volume);
-      std::uint8_t held = 0;
-      for (std::size_t r = 0; r < body.anchors.size(); ++r) {
-        if (body.anchors[r].contains(b.site_position(s.x, s.y, s.z))) {
-          ++anchored[r];
-          held = 1;
-        }
-      }
-      points.anchored.push_back(held == 0 ? 0 : Points::kInAnchor);
-    }
-    // Where anchors act at their faces, one that lies at the body's own holds it without a point.
-    for (std::size_t r = 0; r < anchored.size(); ++r) {
-      if (scene.mpm.boundary == MpmBoundary::kSurface) break;
-      if (anchored[r] == 0) refuse_region("anchors", r, scene, body.name, "");
+      const Vec3 x = b.site_position(s.x, s.y, s.z);
+      const bool held = std::any_of(body.anchors.begin(), body.anchors.end(),
+                                    [&](const Anchor& a) { return a.contains(x); });
+      points.anchored.push_back(held ? Points::kInAnchor : 0);
     }
     assign_materials(scene, b, points);
     for (const Lattice::Gap& g : lattice.gaps) {

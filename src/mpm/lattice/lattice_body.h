@@ -69,7 +69,7 @@ struct Points : PointBonds {
   Array<Site> site;
   Array<float> volume;  ///< [m^3]
   /// Outside its body's anchors, where it moves, some of it given to neighbours
-  /// (mpm/anchors/); empty where there are no anchors, or where they act at nodes [m^3].
+  /// (mpm/anchors/); empty where there are no anchors [m^3].
   Array<float> free_volume;
   /// Of that the share of the most that a neighbour has, where it is less: so much lighter than its
   /// neighbours; as `free_volume`.

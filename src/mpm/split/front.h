@@ -45,8 +45,6 @@ struct FrontMotion {
 };
 
 struct Front : FrontNodes, FrontMotion {
-  bool follows = false;  ///< whether cuts are followed at all
-
   // What follows from that: list_front_cells().
   std::vector<FrontCell> cells;
   std::vector<FrontPart> parts;

@@ -11,13 +11,6 @@
 namespace tissue_sim {
 namespace {
 
-// Where anchors do not act at their faces (on a GPU): a node is held when this share of its mass is
-// anchored. Nodes held up to a place clamp a body as a wall a quarter of a cell before it would;
-// with this share that wall is within half a cell of the region's end, on average at it (of a node
-// half a cell outside 16 % of the mass is in the region, of one a cell and a quarter outside 1.6
-// %).
-constexpr double kAnchoredShare = 0.05;
-
 /// Weights of the box's centre node at the places of one axis of the box, and their sum for each
 /// choice of the six points of a row.
 struct Tables {
@@ -47,7 +40,7 @@ double volume_with_mass(const LatticeBody& body, const Points& points, std::int3
 /// Gives a node the mass of those points that are in the places `part` of a box.
 void share_mass(const LatticeBody& body, const Points& points, const NodeFields::Cell& cell,
                 double mass_of_point, const Planes& part, int node, Nodes& nodes) {
-  double sum = 0, anchored = 0;
+  double sum = 0;
   const auto for_each_row = [&](const auto& f) {
     for (int plane = 0, row = 0; plane < 6; ++plane) {
       for (std::uint64_t bits = part[plane], y = 0; y < 6; bits >>= 8, ++y, ++row) {
@@ -66,18 +59,14 @@ void share_mass(const LatticeBody& body, const Points& points, const NodeFields:
         const int x = __builtin_ctz(bits);
         const std::int32_t p = around[6 * row + x];
         const double density = body.material_of(points, p).density;
-        const double mass = w * kTables.weight[x] * density * volume_with_mass(body, points, p);
-        sum += mass;
-        if (points.free_volume.empty() && points.anchored[p] != 0) anchored += mass;
+        sum += w * kTables.weight[x] * density * volume_with_mass(body, points, p);
       }
     });
   }
   nodes.mass[node] = static_cast<float>(sum);
-  const bool fast = anchored > kAnchoredShare * sum || sum <= 0;
-  nodes.inv_mass[node] = fast ? 0.0f : 1.0f / nodes.mass[node];
-  if (fast) {
-    for (int c = 0; c < 3; ++c) nodes.v[c][node] = 0;
-  }
+  nodes.inv_mass[node] = sum > 0 ? 1.0f / nodes.mass[node] : 0.0f;
+  if (sum > 0) return;
+  for (int c = 0; c < 3; ++c) nodes.v[c][node] = 0;
 }
 
 /// The mass of each point around the node of a cell if it is the same for all and none is anchored,

@@ -12,7 +12,7 @@ namespace {
 
 /// A bond leads across a crack if at least this much of the stretch is along it: at 45 degrees it
 /// is half.
-constexpr double kAcross = 0.25;
+constexpr double kStretchedAlong = 0.25;
 
 /// Strained points by number, for others to be looked up: 0 where they are not strained.
 struct StrainOfPoints {
@@ -113,7 +113,7 @@ std::vector<StrainedPoint> strained_of(const MpmState& state,
     const double excess = (std::sqrt(most) - 1) / (tear_limit(state, p.point) - 1);
     if (excess < share) continue;
     std::uint8_t across = 0;
-    for (int a = 0; a < 3; ++a) across |= (p.C[a] - 1 >= kAcross * (most - 1)) << a;
+    for (int a = 0; a < 3; ++a) across |= (p.C[a] - 1 >= kStretchedAlong * (most - 1)) << a;
     strained.push_back({p.point, static_cast<float>(excess), across});
   }
   std::sort(strained.begin(), strained.end(),

@@ -10,6 +10,7 @@
 #include <tuple>
 #include <vector>
 
+#include "contact/push_tool.h"
 #include "mpm/anchors/anchor_faces.h"
 #include "mpm/blocks/block_kernels.h"
 #include "mpm/blocks/blocks.h"
@@ -24,17 +25,14 @@
 namespace tissue_sim {
 
 /// A point that touches a collider.
-struct Touch {
+struct Touch : ToolMemory {
   std::int32_t cell;  ///< lane of its cell's first point, in its block
   std::int32_t point;
   std::uint8_t key;  ///< SurfacePlace::key, or kPointKey plus which of the cell's eight points
   std::uint8_t collider;
-  std::uint8_t doubled;  ///< how often its spring along the surface was
-  std::uint8_t part;     ///< of the place: mpm/contact/place_parts.h
-  float hold[3];         ///< place that friction holds on to, in the collider's frame [m]
-  float along[3];        ///< normal of its inerter (mpm/contact/contact_inertia.h)
-  float inertia = 0;     ///< of that [kg]
-  float begun = 0;       ///< depth from which on it is pushed back [m]
+  std::uint8_t part;  ///< of the place: mpm/contact/place_parts.h
+  float along[3];     ///< normal of its inerter (mpm/contact/contact_inertia.h)
+  float inertia = 0;  ///< of that [kg]
 };
 
 /// A cell of which a collider may touch points before such cells are listed anew.

@@ -63,7 +63,7 @@ struct BruteForce {
 
   /// Velocities after a substep of `dt` that follows one of `before`, of tissue without friction
   /// and drag, and the impulse on the tool.
-  std::vector<Vec3> step(const MpmState& s, const std::vector<float4>& places, const Collider& tool,
+  std::vector<Vec3> step(const MpmState& s, const OuterPoints& outer, const Collider& tool,
                          double before, double dt, Vec3& on_tool) {
     const LatticeBody& body = s.bodies[0];
     std::map<std::array<int, 3>, int> node_at;
@@ -83,7 +83,7 @@ struct BruteForce {
     touching = began = 0;
     on_tool = Vec3::Zero();
     for (int p = 0; p < s.points.size(); ++p) {
-      const float4& at = places[p];
+      const float4& at = outer.place[p];
       const Points::Site& site = s.points.site[p];
       const Vec3 own(site.x & 1 ? 0.25 : -0.25, site.y & 1 ? 0.25 : -0.25,
                      site.z & 1 ? 0.25 : -0.25);
@@ -113,10 +113,7 @@ struct BruteForce {
       const double start =
           std::min(kBegunStays * (begins ? (1 - 1 / double(kAcross)) * deep : begun[p]), deep);
       still[p] = start;
-      const float volume = s.points.volume[p];
-      const double k_across =
-          double(kAcross) *
-          contact_spring(modulus, float(m.density), float(kCell / 2), volume).stiffness;
+      const double k_across = double(kAcross) * modulus * outer.area[p] / kCell;
       const Vec3 normal(g.normal[0], g.normal[1], g.normal[2]);
       float vc[3];
       velocity_at(tool, xf, vc);
@@ -170,7 +167,7 @@ class SurfaceContactOnGpu : public OnEitherDevice<CudaMpmTissue> {
     }
     tissue.push();
     std::printf("%s\n", tissue.plan().c_str());
-    const std::vector<float4> places = outer_points(s, s.anchors);
+    const OuterPoints places = outer_points(s, s.anchors);
     BruteForce expected;
     Vec3 tip(0.011, 0.0093, kSize.z() - 0.0006);
     double before = 0;

@@ -5,8 +5,7 @@
 #include <limits>
 #include <tuple>
 
-#include "contact/contact_spring.h"
-#include "contact/surface_spring.h"
+#include "contact/push_tool.h"
 #include "mpm/contact/face_places.h"
 #include "mpm/contact/place_parts.h"
 #include "mpm/lattice/bonds.h"
@@ -347,16 +346,15 @@ bool push_points(BlockPush& b, const NearCell& cell, unsigned points, const Coll
       std::fill_n(pushes, 8, Vec<4>{});
     }
     const std::int32_t p = b.block.point[lane];
-    Touch touch{cell.lane, p, static_cast<std::uint8_t>(kPointKey + s), cell.collider, 0, 0,
-                {},        {}};
+    Touch touch{{}, cell.lane, p, static_cast<std::uint8_t>(kPointKey + s), cell.collider, 0, {}};
     if (!b.find_held(touch)) to_local(collider, at, touch.hold);
     const ContactSpring unit = unit_spring(b.body, b.state.points.material_of(p));
     const float moves = b.block.volume[lane];  // none of what an anchor holds does
     const float volume = moves > 0 ? moves : b.state.points.volume[p];
     const float velocity[3] = {v[s][0], v[s][1], v[s][2]};
     float push[3];
-    contact_force(collider, g, {unit.stiffness * volume, unit.damping * volume}, at, velocity,
-                  touch.hold, push);
+    push_point({unit.stiffness * volume, unit.damping * volume}, at, velocity, collider, g, touch,
+               push);
     if (is_bounded(b.state, collider, p)) {
       const Material& m = b.body.material_of(b.state.points, p);
       const float most = kMostOfHeld * static_cast<float>(m.young_modulus) * 4 * quarter * quarter;
@@ -420,8 +418,7 @@ void push_surface(BlockPush& b, NearCell& cell, const Collider& collider, float 
                   NearPart* part, ColliderLoad& load, unsigned& points) {
   constexpr float kFacing = -0.1f, kTurned = 0.98f;  // cosines: of a surface that faces the tool,
                                                      // and of an inerter that still fits
-  constexpr float kDeep = 0.2f;        // from where on a point is looked at by itself [cells]
-  constexpr float kAlongBorne = 0.1f;  // of a place's springs along it, times dt^2 / m
+  constexpr float kDeep = 0.2f;     // from where on a point is looked at by itself [cells]
   constexpr float kBeside = 0.25f;  // how close to a jaw tissue takes part of what it presses with
                                     // [cells]: places are no denser than to say that
   const CellNodes nodes(b.block, cell.node);
@@ -436,8 +433,8 @@ void push_surface(BlockPush& b, NearCell& cell, const Collider& collider, float 
   const float beside = collider.kind == Collider::kJaw ? kBeside * h : 0;
   const std::vector<SurfacePlace>& places = places_for(collider, b.block);
   int material = -1, clear = kListLasts;
-  SurfaceSpring of_unit_area{};
-  float modulus = 0, young_modulus = 0, density = 0;
+  PushedTissue tissue{};
+  float young_modulus = 0;
   const auto faces_away = [&](const SurfacePlace& place, const Gap& g) {
     float F[9], n[3], along = 0, length = 0;
     deformation_gradient_at(b.state.nodes.u, nodes, b.body.cell_size, place.place, F);
@@ -448,7 +445,6 @@ void push_surface(BlockPush& b, NearCell& cell, const Collider& collider, float 
     }
     return along > kFacing * std::sqrt(length);
   };
-  const float stiffer = stiffer_across(collider.radius, h);
   NearPart* const first = part;
   PlaceParts parts(places.data() + cell.first_place, cell.place_count, parts_along(collider, h));
   for (; parts.next(); ++part) {
@@ -458,10 +454,9 @@ void push_surface(BlockPush& b, NearCell& cell, const Collider& collider, float 
     }
     const SurfacePlace& place = parts.place();
     const AxisWeights weights(place.place);
-    Touch touch{cell.lane, place.point,
-                place.key, cell.collider,
-                0,         static_cast<std::uint8_t>(parts.part()),
-                {},        {}};
+    Touch touch{{},        cell.lane,     place.point,
+                place.key, cell.collider, static_cast<std::uint8_t>(parts.part()),
+                {}};
     const bool is_held = b.find_held(touch);
     float moved[6] = {}, at[3];  // displacement and velocity
     if (is_held) {
@@ -502,59 +497,42 @@ void push_surface(BlockPush& b, NearCell& cell, const Collider& collider, float 
     if (own != material) {
       material = own;
       const Material& m = b.body.materials[own];
-      modulus = static_cast<float>(lame_lambda(m) + 2 * lame_mu(m));
-      density = static_cast<float>(m.density);
       young_modulus = static_cast<float>(m.young_modulus);
-      of_unit_area = surface_spring(modulus, density, h, 1, b.dt);
+      tissue = pushed_tissue(static_cast<float>(lame_lambda(m) + 2 * lame_mu(m)),
+                             static_cast<float>(m.density), h, collider.radius, b.dt);
     }
-    const int doubled = doubled_along(modulus, density, h, b.dt, touch.doubled);
-    if (is_held && doubled > touch.doubled) {  // with the force that it has
-      float held[3];
-      to_world(collider, touch.hold, held);
-      const float share = 1 / static_cast<float>(1 << (doubled - touch.doubled));
-      for (int a = 0; a < 3; ++a) held[a] = at[a] + share * (held[a] - at[a]);
-      to_local(collider, held, touch.hold);
-    }
-    touch.doubled = static_cast<std::uint8_t>(doubled);
-    SurfaceSpring spring = scaled(of_unit_area, place.area);
-    stiffen_along(spring, doubled);
-    stiffen_across(spring, stiffer);
+    PushedPlace pushed{at, moved + 3, place.area, static_cast<float>(parts.count())};
     if (is_bounded(b.state, collider, place.point)) {
-      spring.most = kMostOfHeld * young_modulus * place.area;
+      pushed.most = kMostOfHeld * young_modulus * place.area;
     }
-    spring.cohesion = collider.cohesion * place.area / unit_area;
-    // Along the surface no inerter helps: at rims and on debris, whose nodes are light, the spring
-    // is what the substep bears.
-    const float per_mass =
-        static_cast<float>(parts.count()) * spring.along * b.dt * b.dt / kAlongBorne;
-    if (cell.lightest < 0) cell.lightest = largest_inv_mass(b.state.nodes, nodes);
-    if (per_mass * cell.lightest * squared(weights) > 1) {  // mobility is that at most
-      if (part->mobility < 0) {
-        part->mobility = static_cast<float>(mobility(b.state.nodes, nodes, weights));
-      }
-      const float light = per_mass * part->mobility;
-      if (light > 1) {
-        spring.along /= light;
-        spring.damping_along /= light;
-      }
-    }
-    float push[3], of_collider[3];
-    surface_force(collider, g, spring, at, moved + 3, touch.hold, touch.begun, push);
+    const ToolPush push = push_tool(
+        tissue, pushed, collider, g, is_held, b.dt,
+        [&](float per_mass) {
+          if (cell.lightest < 0) cell.lightest = largest_inv_mass(b.state.nodes, nodes);
+          if (!(per_mass * cell.lightest * squared(weights) > 1))
+            return 0.0f;  // it is that at most
+          if (part->mobility < 0) {
+            part->mobility = static_cast<float>(mobility(b.state.nodes, nodes, weights));
+          }
+          return per_mass * part->mobility;
+        },
+        touch);
     if (is_free) {
-      spread(b.block, cell.node, weights, push, b.force);
+      spread(b.block, cell.node, weights, push.force, b.force);
       float along = 0;
       for (int a = 0; a < 3; ++a) along += touch.along[a] * g.normal[a];
       if (touch.inertia == 0 || along < kTurned) {
         const bool begins = touch.inertia == 0;
         if (!begins) b.change(-1, false, place, touch, nullptr);
-        touch.inertia = kInertia * spring.across * dt2;
+        touch.inertia = kInertia * push.across * dt2;
         std::copy_n(g.normal, 3, touch.along);
+        float of_collider[3];
         velocity_at(collider, at, of_collider);
         b.change(1, begins, place, touch, of_collider);
       }
     }
     b.touching.push_back(touch);
-    add_load(collider, at, push, place.area / unit_area, load);
+    add_load(collider, at, push.force, place.area / unit_area, load);
   }
   if (clear == 0) return;
   cell.clear = static_cast<std::uint8_t>(clear);

@@ -106,8 +106,10 @@ void CudaMpmDevice::begin() {
 void CudaMpmDevice::begun() {
   CudaTissue& d = *tissue_;
   if (d.held_by == 0) return;
-  d.outer.upload(outer_points(d.state, d.state.anchors), d.stream);
-  if (d.place_parts > 1) d.planes.upload(surface_planes(d.state), d.stream);
+  const OuterPoints outer = outer_points(d.state, d.state.anchors);
+  d.outer.upload(outer.place, d.stream);
+  d.area.upload(outer.area, d.stream);
+  if (d.place_parts > 1) d.planes.upload(outer.plane, d.stream);
 }
 
 void CudaMpmDevice::begin_frame(const FrameInput& input, bool move) {

@@ -36,17 +36,18 @@ void check_memory(std::size_t wanted, std::size_t held) {
 }  // namespace
 
 std::size_t device_bytes(const CudaTissue& d) {
-  std::size_t sum =
-      d.blocks.bytes() + d.bundles.bytes() + d.columns.bytes() + d.near_cells.bytes() +
-      d.near_listed.bytes() + d.u_went.bytes() + d.bodies.bytes() + d.of_blocks.bytes() +
-      d.made.bytes() + d.spare.bytes() + d.origins.bytes() + d.sweep.bytes() + d.labels.bytes() +
-      d.some_nodes.bytes() + d.packed.bytes() + d.piece.bytes() + d.place.bytes() +
-      d.slot_parts.bytes() + d.first_parts.bytes() + d.parts.bytes() + d.pushed_parts.bytes() +
-      d.marks.bytes() + d.pushed.bytes() + d.inertia.bytes() + d.colour.bytes() + d.hold.bytes() +
-      d.outer.bytes() + d.planes.bytes() + d.bonds.bytes() + d.soft.bytes() + d.with.bytes() +
-      d.whole.bytes() + d.u_before.bytes() + d.connect_room.bytes() + d.colliders.bytes() +
-      d.loads.bytes() + d.measures.bytes() + d.cloud.bytes() + d.stretched.bytes() +
-      d.faces.bytes() + d.front.bytes() + d.checkpoint.bytes() + d.anchors.bytes();
+  std::size_t sum = d.blocks.bytes() + d.bundles.bytes() + d.columns.bytes() +
+                    d.near_cells.bytes() + d.near_listed.bytes() + d.u_went.bytes() +
+                    d.bodies.bytes() + d.of_blocks.bytes() + d.made.bytes() + d.spare.bytes() +
+                    d.origins.bytes() + d.sweep.bytes() + d.labels.bytes() + d.some_nodes.bytes() +
+                    d.packed.bytes() + d.piece.bytes() + d.place.bytes() + d.slot_parts.bytes() +
+                    d.first_parts.bytes() + d.parts.bytes() + d.pushed_parts.bytes() +
+                    d.marks.bytes() + d.pushed.bytes() + d.inertia.bytes() + d.colour.bytes() +
+                    d.hold.bytes() + d.outer.bytes() + d.area.bytes() + d.planes.bytes() +
+                    d.bonds.bytes() + d.soft.bytes() + d.with.bytes() + d.whole.bytes() +
+                    d.u_before.bytes() + d.connect_room.bytes() + d.colliders.bytes() +
+                    d.loads.bytes() + d.measures.bytes() + d.cloud.bytes() + d.stretched.bytes() +
+                    d.faces.bytes() + d.front.bytes() + d.checkpoint.bytes() + d.anchors.bytes();
   for (int i = 0; i < 2; ++i) sum += d.u[i].bytes() + d.v[i].bytes() + d.force[i].bytes();
   return sum;
 }
@@ -146,7 +147,7 @@ void push_tables(CudaTissue& d) {
   const std::size_t held = points * d.place_parts * d.held_by;
   const std::size_t most_held = CudaTissue::Checkpoint::most_held(held);
   const std::size_t of_places =
-      held > 0 ? points * sizeof(float4) * (d.place_parts > 1 ? 2 : 1) : 0;
+      held > 0 ? points * (sizeof(float) + sizeof(float4) * (d.place_parts > 1 ? 2 : 1)) : 0;
   check_memory(bytes_of(t, n, points, held, most_held, of_places), device_bytes(d));
   check_cuda(cudaStreamSynchronize(d.stream), "finish a frame");
   d.blocks.upload(t.blocks, d.stream);

@@ -43,7 +43,7 @@ struct InertialPlaces {
 
 /// Adds the inertia to the lane's `node`, -1 where it has none that moves. Returns the force that
 /// takes from the node what new inerters take [N], whose opposite goes to the collider's load. All
-/// lanes take part. Out of line, for scenes of the lattice to keep their registers.
+/// lanes take part. Out of line, for what is beside to keep its registers.
 inline __device__ __noinline__ float3 add_inertia(const InertialPlaces all,
                                                   const Collider* collider, int index, float kick,
                                                   int node, long long* inertia, long long* force,

@@ -4,7 +4,6 @@
 #include <unordered_map>
 #include <utility>
 
-#include "contact/contact_spring.h"
 #include "mpm/tear/tear.h"
 
 namespace tissue_sim {
@@ -19,13 +18,7 @@ CudaBody body_of(const LatticeBody& b, const Material& m) {
   body.viscosity = static_cast<float>(m.viscosity);
   body.tear_stretch = least_tear_limit(m);
   body.point_volume = static_cast<float>(b.cell_size * b.cell_size * b.cell_size / 8);
-  // Contact is in proportion to the volume, but a cubic millimetre is a better measure than a
-  // metre.
-  const float unit = body.point_volume;
-  const ContactSpring spring =
-      contact_spring(static_cast<float>(lame_lambda(m) + 2 * lame_mu(m)),
-                     static_cast<float>(m.density), 0.5f * body.cell_size, unit);
-  body.spring = {spring.stiffness / unit, spring.damping / unit};
+  body.density = static_cast<float>(m.density);
   body.neo_hookean = m.law == Law::kNeoHookean ? 1 : 0;
   return body;
 }

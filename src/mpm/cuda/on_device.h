@@ -90,6 +90,7 @@ struct CudaTissue {
   PinnedArray<int> most_sharing;
   DeviceArray<float4> hold;
   DeviceArray<float4> outer, planes;  ///< CudaTables::outer, ::planes
+  DeviceArray<float> area;            ///< CudaTables::area
   DeviceArray<std::uint8_t> bonds, soft, with, whole;
   int held_by = 0, place_parts = 1;  ///< CudaTables::held_by, ::place_parts
   DeviceArray<float4> u[2], v[2], force[2], u_before;
@@ -170,6 +171,7 @@ struct CudaTissue {
     t.point = of_blocks.point.data();
     t.partial = of_blocks.partial.data();
     t.outer = outer.data();
+    t.area = area.data();
     t.bonds = bonds.data();
     t.soft = soft.size() > 0 ? soft.data() : nullptr;
     t.lightness = anchors.lightness.size() > 0 ? anchors.lightness.data() : nullptr;

@@ -36,6 +36,53 @@ std::set<Cell> cells_beside(const AnchorFaces& faces, const LatticeTissue& tissu
   return cells;
 }
 
+using Places = std::vector<OuterPlace>::const_iterator;  // of a point
+
+Vec3 vector_of(const float (&x)[3]) { return Vec3(x[0], x[1], x[2]); }
+
+/// The point's own place brought onto the surface at each of these.
+Vec3 place_amid(Places first, Places last, const Points::Site& s) {
+  const Vec3 from(s.x & 1 ? 0.25 : -0.25, s.y & 1 ? 0.25 : -0.25, s.z & 1 ? 0.25 : -0.25);
+  Vec3 x = from;
+  for (int sweep = 0; sweep < kSweeps; ++sweep) {
+    for (Places o = first; o != last; ++o) {
+      const Vec3 normal = vector_of(o->normal);
+      x += normal.dot(vector_of(o->place) - x) * normal;
+    }
+  }
+  return x.cwiseMax(from - Vec3::Constant(kFarthest)).cwiseMin(from + Vec3::Constant(kFarthest));
+}
+
+float area_amid(Places first, Places last, double edge) {
+  float most = 0;
+  for (Places one = first; one != last; ++one) {
+    double area = 0;
+    for (Places o = first; o != last; ++o) {
+      area += place_area(o->normal, o->bond, static_cast<float>(edge)) *
+              std::max(0.0, vector_of(o->normal).dot(vector_of(one->normal)));
+    }
+    most = std::max(most, static_cast<float>(area));
+  }
+  return most;
+}
+
+float4 plane_amid(Places first, Places last) {
+  constexpr double kOneWay = 0.8;  // length of the mean of normals that look one way
+  const Vec3 one = vector_of(first->normal);
+  Vec3 sum = Vec3::Zero();
+  for (Places o = first; o != last; ++o) {  // of a sheet's two sides either will do
+    const Vec3 normal = vector_of(o->normal);
+    sum += normal.dot(one) < 0 ? -normal : normal;
+  }
+  const Vec3 normal = sum / static_cast<double>(last - first);
+  if (normal.norm() <= kOneWay) return {0, 0, 0, -1};
+  int axis = 0;
+  normal.cwiseAbs().maxCoeff(&axis);
+  const Vec3 of_axis = normal / normal[axis];
+  return {static_cast<float>(of_axis[0]), static_cast<float>(of_axis[1]),
+          static_cast<float>(of_axis[2]), static_cast<float>(axis)};
+}
+
 }  // namespace
 
 bool has_thin_tools(const Scene& scene) {
@@ -45,58 +92,29 @@ bool has_thin_tools(const Scene& scene) {
   });
 }
 
-std::vector<float4> surface_planes(const LatticeTissue& tissue) {
-  constexpr double kOneWay = 0.8;  // length of the mean of normals that look one way
-  const std::vector<OuterPlace> all = find_outer_places(tissue);
-  std::vector<float4> planes(tissue.points.size(), float4{0, 0, 0, -1});
-  for (auto first = all.begin(); first != all.end();) {
-    const auto last = std::find_if(first, all.end(),
-                                   [&](const OuterPlace& o) { return o.point != first->point; });
-    Vec3 sum = Vec3::Zero();
-    const Vec3 one(first->normal[0], first->normal[1], first->normal[2]);
-    for (auto o = first; o != last; ++o) {  // of a sheet's two sides either will do
-      const Vec3 normal(o->normal[0], o->normal[1], o->normal[2]);
-      sum += normal.dot(one) < 0 ? -normal : normal;
-    }
-    const Vec3 normal = sum / static_cast<double>(last - first);
-    int axis = 0;
-    normal.cwiseAbs().maxCoeff(&axis);
-    if (normal.norm() > kOneWay) {
-      const Vec3 of_axis = normal / normal[axis];
-      planes[first->point] = {static_cast<float>(of_axis[0]), static_cast<float>(of_axis[1]),
-                              static_cast<float>(of_axis[2]), static_cast<float>(axis)};
-    }
-    first = last;
-  }
-  return planes;
-}
-
-std::vector<float4> outer_points(const LatticeTissue& tissue, const AnchorFaces& faces) {
+OuterPoints outer_points(const LatticeTissue& tissue, const AnchorFaces& faces) {
   const std::set<Cell> soft = cells_beside(faces, tissue);
   const std::vector<OuterPlace> all = find_outer_places(tissue);
   const Array<std::uint8_t>& bonds = tissue.points.bonds;
-  std::vector<float4> places(tissue.points.size(), float4{0, 0, 0, 0});
+  const auto count = static_cast<std::size_t>(tissue.points.size());
+  OuterPoints outer;
+  outer.place.assign(count, float4{0, 0, 0, 0});
+  outer.area.assign(count, 0);
+  outer.plane.assign(count, float4{0, 0, 0, -1});
   for (auto first = all.begin(); first != all.end();) {
     const auto last = std::find_if(first, all.end(),
                                    [&](const OuterPlace& o) { return o.point != first->point; });
     const Points::Site& s = tissue.points.site[first->point];
-    const Vec3 from(s.x & 1 ? 0.25 : -0.25, s.y & 1 ? 0.25 : -0.25, s.z & 1 ? 0.25 : -0.25);
-    Vec3 x = from;
-    for (int sweep = 0; sweep < kSweeps; ++sweep) {
-      for (auto o = first; o != last; ++o) {
-        const Vec3 place(o->place[0], o->place[1], o->place[2]);
-        const Vec3 normal(o->normal[0], o->normal[1], o->normal[2]);
-        x += normal.dot(place - x) * normal;
-      }
-    }
-    x = x.cwiseMax(from - Vec3::Constant(kFarthest)).cwiseMin(from + Vec3::Constant(kFarthest));
     const bool is_soft = soft.count({s.body, s.x / 2, s.y / 2, s.z / 2}) > 0;
-    const int count = __builtin_popcount(bonds[first->point]) + (is_soft ? kSoftPlace : 0);
-    places[first->point] = {static_cast<float>(x[0]), static_cast<float>(x[1]),
-                            static_cast<float>(x[2]), static_cast<float>(count)};
+    const Vec3 x = place_amid(first, last, s);
+    outer.place[first->point] = {
+        static_cast<float>(x[0]), static_cast<float>(x[1]), static_cast<float>(x[2]),
+        static_cast<float>(__builtin_popcount(bonds[first->point]) + (is_soft ? kSoftPlace : 0))};
+    outer.area[first->point] = area_amid(first, last, tissue.bodies[s.body].cell_size / 2);
+    outer.plane[first->point] = plane_amid(first, last);
     first = last;
   }
-  return places;
+  return outer;
 }
 
 }  // namespace tissue_sim

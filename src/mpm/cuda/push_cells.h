@@ -14,7 +14,7 @@ namespace tissue_sim {
 
 /// Displacement [m] and velocity [m/s] of a cell's 27 nodes, which a warp brings for all its lanes.
 struct WarpNodes {
-  float u[27][3], v[27][3];
+  float u[27][3], v[27][3], inv_mass[27];  ///< the last [1/kg]
 };
 
 /// Weights of a cell's nodes along each axis at the place where colliders touch a point.
@@ -73,6 +73,17 @@ struct PlaceWeights {
   }
 };
 
+/// Sum of w^2 / m over the nodes [1/kg].
+__device__ __forceinline__ float mobility_at(const WarpNodes& nodes, const PlaceWeights& w) {
+  float sum = 0;
+#pragma unroll
+  for (int k = 0; k < 27; ++k) {
+    const float weight = w.of[0][k % 3] * w.of[1][k / 3 % 3] * w.of[2][k / 9];
+    sum += weight * weight * nodes.inv_mass[k];
+  }
+  return sum;
+}
+
 /// One component of what nodes have there.
 __device__ __forceinline__ float at_place(const float (&of)[27][3], int c, const PlaceWeights& w) {
   float sum = 0;
@@ -127,13 +138,16 @@ __device__ __forceinline__ void push_cell(const CudaTables& t, const CudaNodes& 
     held.load(t, p, part);
     point.is_cut = t.bonds[p] != kAllBonds;
   }
-  point.spring = point_spring(body.spring, has_parts ? volume / kPlaceParts : volume,
-                              weights.is_stiff, pushes.dt);
-  point.inertia = weights.is_stiff ? kInertia * point.spring.across * pushes.dt * pushes.dt : 0;
+  point.parts = has_parts ? kPlaceParts : 1;
+  point.area = weights.is_stiff ? __ldg(t.area + p) / point.parts : 0;
+  point.volume = volume;
+  point.modulus = body.lambda + 2 * body.mu;
+  point.density = body.density;
   point.cell_size = body.cell_size;
   __syncwarp();
   nodes.u[k][0] = u.x, nodes.u[k][1] = u.y, nodes.u[k][2] = u.z;
   nodes.v[k][0] = v.x, nodes.v[k][1] = v.y, nodes.v[k][2] = v.z;
+  nodes.inv_mass[k] = v.w;
   __syncwarp();
   float x = 0, velocity = 0;
   if (!kParts) {
@@ -150,13 +164,12 @@ __device__ __forceinline__ void push_cell(const CudaTables& t, const CudaNodes& 
   }
   const bool held_before = (held.with[0] | held.with[1]) != 0;
   float push[3] = {0, 0, 0}, force[3] = {0, 0, 0};
-  const auto resist = [&](int c, const float(&normal)[3], float along, bool resists, bool begins) {
-    const unsigned places = __ballot_sync(0xffffffffu, resists && point.inertia > 0);
+  const auto resist = [&](int c, const float(&normal)[3], float along, float across, bool begins) {
+    const unsigned places = __ballot_sync(0xffffffffu, across > 0);
     if (places == 0) return;
     InertialPlaces all;
     all.mask = places;
-    all.inertia =
-        point.inertia * weights.size() * stiffer_across(pushes.colliders[c].radius, body.cell_size);
+    all.inertia = kInertia * across * pushes.dt * pushes.dt * weights.size();
     all.taken = begins ? 1 : pushes.grown;
     all.along = along;
 #pragma unroll
@@ -172,8 +185,9 @@ __device__ __forceinline__ void push_cell(const CudaTables& t, const CudaNodes& 
                                      pushes.force, pushes.loads);
     force[0] += taken.x, force[1] += taken.y, force[2] += taken.z;
   };
-  push_point<kParts ? 32 : 8>(point, pushes.colliders, cell.near, t.held_by, held, pushes.loads,
-                              push, resist);
+  push_by_near<kParts ? 32 : 8>(
+      point, pushes.colliders, cell.near, t.held_by, pushes.dt, held, pushes.loads, push,
+      [&] { return mobility_at(nodes, weights); }, resist);
   const bool holds = (held.with[0] | held.with[1]) != 0;
   if (point.index >= 0 && (holds || held_before)) held.store(t, p, part);
   unsigned left = __ballot_sync(0xffffffffu, holds);

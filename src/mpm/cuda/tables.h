@@ -42,7 +42,7 @@ struct CudaBody {
   float viscosity;                 ///< [Pa s]
   float point_volume;              ///< of a whole point [m^3]
   float tear_stretch;              ///< the least limit of its points, 0 if it never tears
-  ContactSpring spring;            ///< of a contact, for each m^3 of the point
+  float density;                   ///< [kg/m^3]
   int neo_hookean;                 ///< else fixed corotated
 };
 
@@ -163,10 +163,10 @@ struct CudaTables {
   const std::int32_t* point;  ///< per lane, -1 where there is none
   const float* partial;       ///< per cell (lane / 8): mu times volume of its points where they are
                               ///< fewer than seven, else 0; see mpm/blocks/stabilisation.h [J]
-  const float4* outer;        ///< per point, where colliders touch it: outer_points.h; null where
-                              ///< that is the point itself for all
-  const float4* planes;  ///< per point, the surface's plane there: surface_planes(); null where
-                         ///< no tool is thin
+  const float4* outer;        ///< per point, where colliders touch it: outer_points.h
+  const float* area;          ///< per point, of the surface there, likewise [m^2]
+  const float4* planes;  ///< per point, the surface's plane there, likewise; null where no tool
+                         ///< is thin
   const std::uint8_t* bonds;  ///< per point
   const std::uint8_t* soft;   ///< per point, as Points::soft; null where none is
   const float* lightness;  ///< per point, Points::lightness, 1 where a bond broke; null where all

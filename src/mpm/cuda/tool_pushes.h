@@ -1,8 +1,7 @@
 // What colliders push a point with, and what that does to them. For .cu files.
 #pragma once
 
-#include "contact/contact_spring.h"
-#include "contact/surface_spring.h"
+#include "contact/push_tool.h"
 #include "mpm/cuda/grid_barrier.h"
 #include "mpm/cuda/tables.h"
 #include "mpm/lattice/bonds.h"
@@ -47,10 +46,23 @@ __device__ __forceinline__ void add_load(unsigned long long* load, const double 
   if (lane < 6) atomicAdd(load + lane, static_cast<unsigned long long>(mine));
 }
 
-/// What a point remembers of its contacts: CudaTables::with and hold.
+/// What a point remembers of its contacts: CudaTables::with and hold, whose last figure has
+/// ToolMemory::doubled in its lowest bits.
 struct Held {
   int with[2] = {0, 0};
   float4 place[2] = {};
+
+  static constexpr unsigned kDoubled = 7;
+  static __device__ __forceinline__ ToolMemory memory(const float4& of) {
+    const unsigned bits = __float_as_uint(of.w);
+    return {{of.x, of.y, of.z},
+            __uint_as_float(bits & ~kDoubled),
+            static_cast<std::uint8_t>(bits & kDoubled)};
+  }
+  static __device__ __forceinline__ float4 entry(const ToolMemory& m) {
+    return {m.hold[0], m.hold[1], m.hold[2],
+            __uint_as_float((__float_as_uint(m.begun) & ~kDoubled) | m.doubled)};
+  }
 
   static __device__ __forceinline__ std::size_t entry(const CudaTables& t, int p, int part) {
     return (static_cast<std::size_t>(p) * t.place_parts + part) * t.held_by;
@@ -80,31 +92,14 @@ struct Held {
 /// comes deep within a substep is held off as well.
 __device__ __forceinline__ float begun_deep(float stiffer) { return 1 - 1 / (kAcross * stiffer); }
 
-/// The spring of a point of so much volume [m^3], by that of a m^3 at the lattice: as that where it
-/// is soft, else as stiff across the surface as a CPU's.
-__device__ __forceinline__ SurfaceSpring point_spring(const ContactSpring& of_lattice, float volume,
-                                                      bool is_stiff, float dt) {
-  SurfaceSpring s;
-  s.across = s.along = of_lattice.stiffness * volume;
-  s.damping_across = s.damping_along = of_lattice.damping * volume;
-  s.cohesion = 0;
-  s.most = kUnbounded;
-  if (is_stiff) {
-    s.across *= kAcross;
-    s.damping_across = kDampingAcross * dt * s.across;
-  }
-  return s;
-}
-
 /// A point that colliders may push.
 struct PushedPoint {
-  int index;             ///< -1 where there is none
-  bool is_cut = false;   ///< it has lost a bond
-  float x[3], v[3];      ///< [m], [m/s]
-  SurfaceSpring spring;  ///< but for its cohesion, which is the collider's
-  float inertia = 0;     ///< of its inerter, above 0 where the spring is stiff across [kg]; more
-                         ///< where a thin tool has it stiffer
-  float cell_size;       ///< [m]
+  int index;                          ///< -1 where there is none
+  bool is_cut = false;                ///< it has lost a bond
+  float x[3], v[3];                   ///< [m], [m/s]
+  float area, parts;                  ///< PushedPlace's
+  float volume;                       ///< [m^3]
+  float modulus, density, cell_size;  ///< PushedTissue's
   __device__ __forceinline__ bool touches(const Collider& c) const {
     return index >= 0 && (is_cut || c.kind != Collider::kBlade) && may_touch(c, x, 0);
   }
@@ -112,24 +107,24 @@ struct PushedPoint {
 
 /// Force of the colliders on the point [N], whose load goes to `loads`. All lanes of a warp take
 /// part; `near` are the colliders that any of their points may lie in. Where any touches, all lanes
-/// call resist(collider, its normal there, its velocity along that, whether the lane's point
-/// touches, whether that begins). Jaws have soft springs: they close until what touches them
+/// call resist(collider, its normal there, its velocity along that, ToolPush::across of the lane's
+/// point, whether that begins). Jaws have soft springs: they close until what touches them
 /// presses back, and of stiff ones too little touches. The first kLanes lanes have points, or parts
-/// of their places, of which the first eight are counted.
-template <int kLanes, class Resist>
-__device__ __forceinline__ void push_point(const PushedPoint& point, const Collider* colliders,
-                                           std::uint32_t near, int held_by, Held& held,
-                                           unsigned long long* loads, float (&sum)[3],
-                                           const Resist& resist) {
+/// of their places, of which the first eight are counted. mobility() is the sum of w^2 / m over the
+/// nodes of the lane's place [1/kg].
+template <int kLanes, class Mobility, class Resist>
+__device__ __forceinline__ void push_by_near(const PushedPoint& point, const Collider* colliders,
+                                             std::uint32_t near, int held_by, float dt, Held& held,
+                                             unsigned long long* loads, float (&sum)[3],
+                                             const Mobility& mobility, const Resist& resist) {
   bool holds[2] = {false, false};
   for (std::uint32_t left = near; left != 0; left &= left - 1) {
     const int c = __ffs(static_cast<int>(left)) - 1;
     const Collider& collider = colliders[c];
     const bool touches = point.touches(collider);
     if (__ballot_sync(0xffffffffu, touches) == 0) continue;
-    const bool is_stiff = point.inertia > 0 && collider.kind != Collider::kJaw;
-    const float stiffer = is_stiff ? stiffer_across(collider.radius, point.cell_size) : 1.0f;
-    float push[3] = {0, 0, 0}, normal[3] = {0, 0, 0}, distance = 0, along = 0;
+    ToolPush push = {};
+    float normal[3] = {0, 0, 0}, distance = 0, along = 0;
     bool pushes = false, begins = false, is_inside = false;
     if (touches) {
       const Gap g = gap(collider, point.x);
@@ -140,36 +135,38 @@ __device__ __forceinline__ void push_point(const PushedPoint& point, const Colli
       pushes = g.distance < 0;
       if (pushes) {
         const float4 was = second ? held.place[1] : held.place[0];
-        float place[3] = {was.x, was.y, was.z}, begun = was.w;
+        ToolMemory memory = Held::memory(was);
         begins = (second ? held.with[1] : held.with[0]) != c + 1;
         if (begins) {
-          to_local(collider, point.x, place);
-          begun = begun_deep(stiffer) * -g.distance;
+          memory = {};
+          to_local(collider, point.x, memory.hold);
         }
-        SurfaceSpring spring = point.spring;
-        if (is_stiff) {
-          stiffen_across(spring, stiffer);
+        if (point.area > 0 && collider.kind != Collider::kJaw) {
+          const PushedTissue tissue =
+              pushed_tissue(point.modulus, point.density, point.cell_size, collider.radius, dt);
+          if (begins) memory.begun = begun_deep(tissue.stiffer) * -g.distance;
+          push = push_tool(
+              tissue, {point.x, point.v, point.area, point.parts}, collider, g, !begins, dt,
+              [&](float per_mass) { return per_mass * mobility(); }, memory);
         } else {
-          begun = 0;
-          spring.across = spring.along;
-          spring.damping_across = spring.damping_along;
+          const ContactSpring soft =
+              contact_spring(point.modulus, point.density, 0.5f * point.cell_size, point.volume);
+          push_point(soft, point.x, point.v, collider, g, memory, push.force);
         }
-        spring.cohesion = collider.cohesion;
-        surface_force(collider, g, spring, point.x, point.v, place, begun, push);
         (second ? held.with[1] : held.with[0]) = c + 1;
         (second ? holds[1] : holds[0]) = true;
-        (second ? held.place[1] : held.place[0]) = {place[0], place[1], place[2], begun};
+        (second ? held.place[1] : held.place[0]) = Held::entry(memory);
         float of_collider[3];
         velocity_at(collider, point.x, of_collider);
 #pragma unroll
         for (int a = 0; a < 3; ++a) {
-          sum[a] += push[a];
+          sum[a] += push.force[a];
           normal[a] = g.normal[a];
           along += of_collider[a] * normal[a];
         }
       }
     }
-    resist(c, normal, along, pushes && is_stiff, begins);
+    resist(c, normal, along, push.across, begins);
     if (collider.tool < 0) continue;  // nobody asks what the ground carries
     if (is_inside) {                  // seldom
       atomicAdd(loads + kLoadSums * c + 7, 1ull);
@@ -183,8 +180,8 @@ __device__ __forceinline__ void push_point(const PushedPoint& point, const Colli
 #pragma unroll
     for (int a = 0; a < 3; ++a) {
       const int b = (a + 1) % 3, d = (a + 2) % 3;
-      load[a] = -push[a];
-      load[3 + a] = -(arm[b] * push[d] - arm[d] * push[b]);
+      load[a] = -push.force[a];
+      load[3 + a] = -(arm[b] * push.force[d] - arm[d] * push.force[b]);
     }
     add_load<kLanes>(loads + kLoadSums * c, load);
     if (collider.kind == Collider::kJaw) {

@@ -55,11 +55,9 @@ std::vector<SurfacePlace> surface_places_of(const LatticeBody& b, const Points& 
                                             const Block& block) {
   std::vector<SurfacePlace> places;
   const auto edge = static_cast<float>(b.cell_size / 2);
-  const auto add = [&](SurfacePlace place, const BondOffset& o) {
-    // Of a plane, bonds along each axis are so many as its normal has of it: so areas add up.
-    const float along = place.normal[0] * o.x + place.normal[1] * o.y + place.normal[2] * o.z;
-    place.area = edge * edge * along;
-    if (along > 0.05f) places.push_back(place);
+  const auto add = [&](SurfacePlace place) {
+    place.area = place_area(place.normal, place.key % 8, edge);
+    if (place.area > 0) places.push_back(place);
   };
   for (int z = 0; z < block.nz; ++z) {
     for (int j = 0; j < block.stride; ++j) {
@@ -87,7 +85,7 @@ std::vector<SurfacePlace> surface_places_of(const LatticeBody& b, const Points& 
             if (outer == points.outer.end() || outer->point != p || outer->bond != k) continue;
             std::copy_n(outer->place, 3, place.place);
             std::copy_n(outer->normal, 3, place.normal);
-            add(place, o);
+            add(place);
             continue;
           }
           const int axis = k < kForwardBond ? 2 - k : k - kForwardBond;
@@ -108,7 +106,7 @@ std::vector<SurfacePlace> surface_places_of(const LatticeBody& b, const Points& 
               place.normal[a] = turned ? -crossing->normal[a] : crossing->normal[a];
             }
           }
-          add(place, o);
+          add(place);
         }
       }
     }

@@ -17,6 +17,15 @@ namespace tissue_sim {
 
 struct Block;
 
+/// What of the surface one with this normal stands for before a bond that a point has not, whose
+/// cube has this edge: of a plane, bonds along each axis are so many as its normal has of it, so
+/// areas add up. 0 where it is so oblique that it stands for little.
+inline float place_area(const float (&normal)[3], int bond, float edge) {
+  const BondOffset o = bond_offset(bond);
+  const float along = normal[0] * o.x + normal[1] * o.y + normal[2] * o.z;
+  return along > 0.05f ? edge * edge * along : 0;
+}
+
 /// Of all bodies as they were while whole: by point, then bond. Throws what NearestSurface throws.
 std::vector<OuterPlace> find_outer_places(const LatticeTissue& tissue);
 

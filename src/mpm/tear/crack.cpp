@@ -8,7 +8,7 @@ namespace tissue_sim {
 namespace {
 
 /// Bonds of an axis whose direction has less than this along n lie along a crack, not across.
-constexpr double kAcross = 0.5;
+constexpr double kSlantedMost = 0.5;
 
 /// From this excess on a bond between two points that lost bonds to each other's side breaks though
 /// another one broke on its line: a crack that turns may leave a bridge behind.
@@ -36,7 +36,7 @@ CrackNearby crack_nearby(const MpmState& state, const TearingPoint& t) {
   const auto add = [&](int dx, int dy, int dz, unsigned broken) {
     for (unsigned left = broken >> kForwardBond; left != 0; left &= left - 1) {
       const Vec3 along = direction(kForwardBond + __builtin_ctz(left));
-      if (std::fabs(along.dot(t.normal)) < kAcross) continue;
+      if (std::fabs(along.dot(t.normal)) < kSlantedMost) continue;
       const Vec3 middle = Vec3(dx, dy, dz) + 0.5 * along;
       const double offset = middle.dot(t.normal);
       const double aside2 = middle.squaredNorm() - offset * offset;
@@ -75,7 +75,7 @@ int side_by_own(const MpmState& state, std::int32_t p, const Vec3& n) {
   double to_crack = 0;
   for (unsigned left = broken_bonds(state, p); left != 0; left &= left - 1) {
     const double across = direction(__builtin_ctz(left)).dot(n);
-    if (std::fabs(across) >= kAcross) to_crack += across;
+    if (std::fabs(across) >= kSlantedMost) to_crack += across;
   }
   return to_crack > 0 ? -1 : to_crack < 0 ? 1 : 0;
 }

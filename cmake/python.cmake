@@ -13,7 +13,8 @@ else()  # with the headers of the Python that ROS is installed for, else pybind1
   endif()
 endif()
 if(pybind11_FOUND)
-  pybind11_add_module(tissue_sim_python NO_EXTRAS python/module.cpp python/convert.cpp python/reports.cpp)
+  pybind11_add_module(tissue_sim_python NO_EXTRAS python/module.cpp python/convert.cpp python/reports.cpp
+                      python/gpu_array.cpp)
   target_compile_options(tissue_sim_python PRIVATE ${tissue_sim_warnings})
   target_link_libraries(tissue_sim_python PRIVATE tissue_sim_core yaml-cpp)
   if(build_ros)  # beside the messages, whose package of the same name genmsg made

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "convert.h"
+#include "gpu_array.h"
 #include "tissue_sim/limits.h"
 #include "tissue_sim/renderer.h"
 
@@ -94,13 +95,22 @@ class PySimulation {
 
   py::object points(const py::object& self, int stride, bool surface_only, bool loose_only,
                     const std::vector<std::string>& fields) {
-    if (stride < 1)
-      throw std::invalid_argument("stride is " + std::to_string(stride) + ": must be at least 1");
-    const PointSelection selection{stride, surface_only, loose_only, to_fields(fields)};
+    const PointSelection selection = select(stride, surface_only, loose_only, fields);
     own(points_);
     const int count =
         call([&](Simulation& s) { return s.tissue().read_points(selection, *points_); });
     return guard(self, view(points_, point_type(selection), {count}, points_->data()));
+  }
+
+  py::dict points_on_gpu(int stride, bool surface_only, bool loose_only,
+                         const std::vector<std::string>& fields) {
+    const PointSelection selection = select(stride, surface_only, loose_only, fields);
+    const GpuPoints points =
+        call([&](Simulation& s) { return s.tissue().read_points_on_gpu(selection); });
+    if (points.gpu < 0) {
+      throw std::runtime_error("the tissue is not on a GPU: points() reads it where it is");
+    }
+    return gpu_arrays(points, selection);
   }
 
   py::object surface(const py::object& self) {
@@ -207,6 +217,13 @@ class PySimulation {
     bool& busy;
   };
 
+  static PointSelection select(int stride, bool surface_only, bool loose_only,
+                               const std::vector<std::string>& fields) {
+    if (stride < 1)
+      throw std::invalid_argument("stride is " + std::to_string(stride) + ": must be at least 1");
+    return {stride, surface_only, loose_only, to_fields(fields)};
+  }
+
   static std::size_t index_of(const py::object& which, const std::vector<std::string>& names,
                               const char* what) {
     if (py::isinstance<py::int_>(which)) {
@@ -310,6 +327,7 @@ PYBIND11_MODULE(_core, m) {
     }
   });
   bind_reports(m);
+  bind_gpu_array(m);
   m.def(
       "load_scene",
       [](const py::object& path) { return from_yaml(scene_to_yaml(load_scene(py::str(path)))); },
@@ -367,6 +385,14 @@ PYBIND11_MODULE(_core, m) {
           },
           py::arg("stride") = 1, py::arg("surface_only") = false, py::arg("loose_only") = false,
           py::arg("fields") = py::tuple(), kPoints)
+      .def("points_on_gpu", &P::points_on_gpu, py::arg("stride") = 1,
+           py::arg("surface_only") = false, py::arg("loose_only") = false,
+           py::arg("fields") = py::tuple(),
+           "The same in the memory of the GPU that the tissue is on: a dictionary of GpuArrays by "
+           "field,\n"
+           "rgb and id as int32, for torch.from_dlpack() and others. They stay valid, and keep "
+           "their\n"
+           "values. RuntimeError on a CPU.")
       .def(
           "surface", [](const py::object& self) { return self.cast<P&>().surface(self); },
           "The triangles of the tissue's surface: corners and rest (n, 3, 3) [m], fragment (n,), "

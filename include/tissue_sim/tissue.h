@@ -74,6 +74,13 @@ struct SurfaceTriangles {
   std::vector<std::uint8_t> cut;       ///< of each: 1 where a cut or a tear made it, else 0
 };
 
+/// Points in a GPU's memory, written and valid for as long as `bytes` is held.
+struct GpuPoints {
+  std::shared_ptr<const void> bytes;  ///< Point after Point
+  int count = 0;
+  int gpu = -1;  ///< CUDA's number of it; -1: the tissue is on a CPU
+};
+
 class Tissue {
  public:
   virtual ~Tissue() = default;
@@ -86,6 +93,8 @@ class Tissue {
   virtual int point_count() const = 0;
   /// Replaces `cloud` with the selected points, as Point after Point. Returns their number.
   virtual int read_points(const PointSelection& selection, std::vector<std::uint8_t>& cloud) = 0;
+  /// The same in the memory of the GPU that the tissue is on, for who works on them there.
+  virtual GpuPoints read_points_on_gpu(const PointSelection& /*selection*/) { return {}; }
   /// Which PointFields read_points() can add.
   virtual unsigned point_fields() const { return ~0u; }
   /// Replaces `surface` with the tissue's, as of the last finish().

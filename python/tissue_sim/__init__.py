@@ -10,7 +10,7 @@ import pkgutil
 # The package's ROS messages may lie in another folder of this name.
 __path__ = pkgutil.extend_path(__path__, __name__)
 
-__all__ = ["AppliedInput", "Array", "CutReport", "FrameReport", "FrameResult", "Images", "Momentum",
+__all__ = ["AppliedInput", "Array", "CutReport", "FrameReport", "FrameResult", "GpuArray", "Images", "Momentum",
            "SettleReport", "Simulation", "Surface", "ToolLoad", "ToolMotion", "ToolRequest", "Wrench",
            "can_render", "from_yaml", "load_scene", "scene_to_yaml"]
 

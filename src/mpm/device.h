@@ -113,6 +113,7 @@ class MpmDevice {
   virtual bool fly(double duration, Foresight& foresight, std::vector<StrainedPoint>& strained) = 0;
 
   virtual int read_points(const PointSelection& selection, std::vector<std::uint8_t>& cloud) = 0;
+  virtual GpuPoints read_points_on_gpu(const PointSelection& /*selection*/) { return {}; }
 
   // Saved states: what is the device's own. After restore() all was read, and restored() works on.
   virtual void save(ArchiveWriter& archive) = 0;

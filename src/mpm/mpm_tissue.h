@@ -25,6 +25,9 @@ class MpmTissue : public Tissue {
   int read_points(const PointSelection& selection, std::vector<std::uint8_t>& cloud) override {
     return device_->read_points(selection, cloud);
   }
+  GpuPoints read_points_on_gpu(const PointSelection& selection) override {
+    return device_->read_points_on_gpu(selection);
+  }
   void read_surface(SurfaceTriangles& surface) override;
   bool moves_anchors() const override { return true; }
   int fragment_count() const override { return static_cast<int>(run_->pieces.all.size()); }

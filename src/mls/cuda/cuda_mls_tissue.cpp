@@ -460,4 +460,10 @@ void CudaMlsTissue::restore(Span<const std::uint8_t> saved) {
 
 std::string CudaMlsTissue::device_name() const { return "cuda (" + device_->gpu + ")"; }
 
+GpuPoints CudaMlsTissue::read_points_on_gpu(const PointSelection& selection) {
+  std::vector<std::uint8_t> cloud;  // which the host makes
+  const int count = read_points(selection, cloud);
+  return device_->lent.lend(cloud, count, device_->stream);
+}
+
 }  // namespace tissue_sim

@@ -16,6 +16,7 @@ class CudaMlsTissue final : public MlsTissue {
   ~CudaMlsTissue() override;
 
   std::string device_name() const override;
+  GpuPoints read_points_on_gpu(const PointSelection& selection) override;
   std::vector<std::uint8_t> save() override;
   void restore(Span<const std::uint8_t> saved) override;
 

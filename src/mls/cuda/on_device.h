@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "compute/lent_points.h"
 #include "mls/cuda/cuda_mls_tissue.h"
 #include "mls/cuda/device_state.h"
 
@@ -12,7 +13,8 @@ namespace tissue_sim {
 struct CudaMlsTissue::OnDevice {
   cudaStream_t stream = nullptr;
   std::string gpu;  ///< name
-  int count = 0;    ///< nodes
+  LentPoints lent;
+  int count = 0;  ///< nodes
   std::vector<std::int32_t> host_offset;
 
   DeviceArray<float4> place, u[2], v[2], stress, force;

@@ -126,26 +126,26 @@ void leave_anchors(CudaTissue& d, int done) {
   d.state.anchors.now = anchors_at(d.state.anchors, d.run.frame->input, d.share_of(done - 1));
 }
 
-void put_held_points(const CudaTissue& d, const std::vector<std::int32_t>& index, int stride,
-                     std::vector<std::uint8_t>& cloud) {
+void put_anchored_points(CudaTissue& d, const std::vector<std::int32_t>& index, int stride,
+                     Point* cloud) {
   const std::vector<std::int32_t>& points = d.anchors.held_points;
+  std::vector<AnchoredPoint> held(points.size());
   d.state.cpu->for_each(
       static_cast<int>(points.size()),
       [&](int k) {
         const std::int32_t p = points[k];
         Vec3 place;
-        const int i = !index.empty() ? index[p] : (p % stride == 0 ? p / stride : -1);
-        if (i < 0 || !held_place(d.state, p, place)) return;
-        std::uint8_t* const at = cloud.data() + static_cast<std::size_t>(i) * sizeof(Point);
-        Point out;
-        std::memcpy(&out, at, sizeof(Point));
-        out.x = static_cast<float>(place[0]);
-        out.y = static_cast<float>(place[1]);
-        out.z = static_cast<float>(place[2]);
-        out.stress = 0;
-        std::memcpy(at, &out, sizeof(Point));
+        held[k].index = !index.empty() ? index[p] : (p % stride == 0 ? p / stride : -1);
+        if (held[k].index < 0) return;
+        if (!held_place(d.state, p, place)) {
+          held[k].index = -1;
+          return;
+        }
+        for (int a = 0; a < 3; ++a) held[k].x[a] = static_cast<float>(place[a]);
       },
       4096);
+  d.anchored_points.upload(held, d.stream);
+  launch_anchored(d.anchored_points.data(), static_cast<int>(held.size()), cloud, d.stream);
 }
 
 }  // namespace tissue_sim

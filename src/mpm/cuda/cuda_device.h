@@ -41,6 +41,7 @@ class CudaMpmDevice final : public MpmDevice {
   void bring_all_nodes() override;
   bool fly(double duration, Foresight& foresight, std::vector<StrainedPoint>& strained) override;
   int read_points(const PointSelection& selection, std::vector<std::uint8_t>& cloud) override;
+  GpuPoints read_points_on_gpu(const PointSelection& selection) override;
   void save(ArchiveWriter& archive) override;
   void restore(ArchiveReader& archive) override;
   void restored() override;

@@ -1,6 +1,7 @@
 // Clouds of tissue that lives on a GPU.
 #include <algorithm>
 #include <cstring>
+#include <vector>
 
 #include "fragments/piece_colour.h"
 #include "frame/select_points.h"
@@ -32,35 +33,64 @@ void upload_points(CudaTissue& d) {
   d.points_changed = false;
 }
 
-}  // namespace
-
-int CudaMpmDevice::read_points(const PointSelection& selection, std::vector<std::uint8_t>& cloud) {
-  CudaTissue& d = *tissue_;
+/// Which points a cloud has, and where they are in it: `place`, or each of the stride.
+int choose_points(CudaTissue& d, const PointSelection& selection,
+                  std::vector<std::int32_t>& place) {
   const Points& points = d.state.points;
-  upload_points(d);
   const int stride = std::max(1, selection.stride);
   int count = (points.size() + stride - 1) / stride;
-  CudaCloud c;
-  c.stride = stride;
-  c.place = nullptr;
-  std::vector<std::int32_t> place;
   if (selection.surface_only || selection.loose_only || selection.fields != 0) {
     place = select_points(
         selection, d.pieces, [&](std::int32_t p) { return points.bonds[p] != kAllBonds; }, count);
+  }
+  return count;
+}
+
+/// Enqueues that the GPU writes them.
+void write_points(CudaTissue& d, int stride, const std::vector<std::int32_t>& place, Point* cloud) {
+  upload_points(d);
+  CudaCloud c;
+  c.stride = std::max(1, stride);
+  c.place = nullptr;
+  if (!place.empty()) {
     d.place.upload(place, d.stream);
     c.place = d.place.data();
   }
+  c.points = cloud;
+  c.piece = d.piece.data();
+  c.colour = d.colour.data();
+  c.whole = d.whole.data();
+  launch_cloud(d.tables(), d.present(), d.plan.max_slots, c, d.stream);
+  put_anchored_points(d, place, c.stride, cloud);
+}
+
+}  // namespace
+
+GpuPoints CudaMpmDevice::read_points_on_gpu(const PointSelection& selection) {
+  CudaTissue& d = *tissue_;
+  if (selection.fields != 0) {  // which the host makes
+    std::vector<std::uint8_t> cloud;
+    const int count = read_points(selection, cloud);
+    return d.lent.lend(cloud, count, d.stream);
+  }
+  std::vector<std::int32_t> place;
+  const int count = choose_points(d, selection, place);
+  std::uint8_t* const cloud = d.lent.take(count * sizeof(Point)).data();
+  if (count > 0) write_points(d, selection.stride, place, reinterpret_cast<Point*>(cloud));
+  return d.lent.lend(count, d.stream);
+}
+
+int CudaMpmDevice::read_points(const PointSelection& selection, std::vector<std::uint8_t>& cloud) {
+  CudaTissue& d = *tissue_;
+  std::vector<std::int32_t> place;
+  const int count = choose_points(d, selection, place);
   if (count == 0) {
     cloud.clear();
     return 0;
   }
   d.cloud.resize(count);
   d.host_cloud.resize(count);
-  c.points = d.cloud.data();
-  c.piece = d.piece.data();
-  c.colour = d.colour.data();
-  c.whole = d.whole.data();
-  launch_cloud(d.tables(), d.present(), d.plan.max_slots, c, d.stream);
+  write_points(d, selection.stride, place, d.cloud.data());
   // In parts: while one is under way, the host copies the one before.
   const int parts = static_cast<int>(d.cloud_came.size());
   const auto begin_of = [&](int part) {
@@ -86,7 +116,6 @@ int CudaMpmDevice::read_points(const PointSelection& selection, std::vector<std:
                   d.host_cloud.data() + first, static_cast<std::size_t>(n) * sizeof(Point));
     });
   }
-  put_held_points(d, place, stride, cloud);
   if (selection.fields != 0) {
     pull_nodes(d);
     add_point_fields(d.state, selection, place, count, cloud);

@@ -195,6 +195,16 @@ __global__ void __launch_bounds__(kMostThreads)
   });
 }
 
+__global__ void write_held(const AnchoredPoint* held, int count, Point* cloud) {
+  const int i = blockIdx.x * blockDim.x + threadIdx.x;
+  if (i >= count || held[i].index < 0) return;
+  Point& point = cloud[held[i].index];
+  point.x = held[i].x[0];
+  point.y = held[i].x[1];
+  point.z = held[i].x[2];
+  point.stress = 0;
+}
+
 __global__ void __launch_bounds__(kMostThreads)
     write_places(const CudaTables t, const CudaNodes state, float* places) {
   extern __shared__ float4 shared[];
@@ -269,6 +279,12 @@ void launch_places(const CudaTables& tables, float4* u, int max_slots, float* pl
 void launch_cloud(const CudaTables& tables, const CudaNodes& state, int max_slots,
                   const CudaCloud& cloud, cudaStream_t stream) {
   launch(write_cloud, 4, max_slots, tables, state, stream, cloud);
+}
+
+void launch_anchored(const AnchoredPoint* held, int count, Point* cloud, cudaStream_t stream) {
+  if (count == 0) return;
+  write_held<<<(count + 255) / 256, 256, 0, stream>>>(held, count, cloud);
+  check_cuda(cudaGetLastError(), "write a cloud");
 }
 
 }  // namespace tissue_sim

@@ -36,4 +36,11 @@ struct CudaCloud {
 void launch_cloud(const CudaTables& tables, const CudaNodes& state, int max_slots,
                   const CudaCloud& cloud, cudaStream_t stream);
 
+/// Where an anchor holds the point at `index` of a cloud, which has no stress there; -1: not in it.
+struct AnchoredPoint {
+  int index;
+  float x[3];
+};
+void launch_anchored(const AnchoredPoint* held, int count, Point* cloud, cudaStream_t stream);
+
 }  // namespace tissue_sim

@@ -8,6 +8,7 @@
 
 #include "compute/cuda_event.h"
 #include "compute/device_array.h"
+#include "compute/lent_points.h"
 #include "mpm/cuda/anchors_on_device.h"
 #include "mpm/cuda/block_tables.h"
 #include "mpm/cuda/choose_plan.h"
@@ -106,6 +107,8 @@ struct CudaTissue {
   DeviceArray<int> stretched_count;
   PinnedArray<int> host_stretched_count, host_unforeseen;
   DeviceArray<Point> cloud;
+  DeviceArray<AnchoredPoint> anchored_points;  ///< of the cloud that is written
+  LentPoints lent;
   FacesOnDevice faces;
   FrontOnDevice front;
   AnchorsOnDevice anchors;
@@ -248,8 +251,9 @@ void pull_impulses(CudaTissue& tissue);            ///< AnchorFaces::impulse
 void upload_anchor_places(CudaTissue& tissue);     ///< of a part
 void leave_anchors(CudaTissue& tissue, int done);  ///< where they are after so many substeps of it
 /// What anchors hold, in a cloud: `index` of each point, or each of `stride` where it is empty.
-void put_held_points(const CudaTissue& tissue, const std::vector<std::int32_t>& index, int stride,
-                     std::vector<std::uint8_t>& cloud);
+/// Enqueues.
+void put_anchored_points(CudaTissue& tissue, const std::vector<std::int32_t>& index, int stride,
+                     Point* cloud);
 
 // Contact with tools.
 void find_near(CudaTissue& tissue);            ///< lists the cells that they may meet

@@ -228,4 +228,10 @@ void CudaPbdTissue::wait() { device_->wait("advance"); }
 
 std::string CudaPbdTissue::device_name() const { return "cuda (" + device_->gpu + ")"; }
 
+GpuPoints CudaPbdTissue::read_points_on_gpu(const PointSelection& selection) {
+  std::vector<std::uint8_t> cloud;  // which the host makes
+  const int count = read_points(selection, cloud);
+  return device_->lent.lend(cloud, count, device_->stream);
+}
+
 }  // namespace tissue_sim

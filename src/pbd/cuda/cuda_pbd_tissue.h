@@ -27,6 +27,7 @@ class CudaPbdTissue final : public PbdTissue {
   ~CudaPbdTissue() override;
 
   std::string device_name() const override;
+  GpuPoints read_points_on_gpu(const PointSelection& selection) override;
   std::vector<std::uint8_t> save() override;
 
   // For tests and the benchmark.

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "compute/cuda_graph.h"
+#include "compute/lent_points.h"
 #include "pbd/cuda/cuda_pbd_tissue.h"
 #include "pbd/cuda/device_state.h"
 #include "pbd/free_flight.h"
@@ -35,7 +36,8 @@ struct CudaPbdTissue::OnDevice {
 
   cudaStream_t stream = nullptr;
   std::string gpu;  ///< name
-  int count = 0;    ///< vertices
+  LentPoints lent;
+  int count = 0;  ///< vertices
   DeviceArray<float4> x, predicted, v;
   DeviceArray<double> mass;
   DeviceArray<std::uint8_t> pushed;

@@ -7,7 +7,7 @@
 #include "compute/device_array.h"
 #include "mpm/anchors/anchor_faces.h"
 #include "mpm/cuda/hold_still.h"
-#include "mpm/cuda/make_face_rows.h"
+#include "mpm/cuda/make_tables.h"
 
 namespace tissue_sim {
 

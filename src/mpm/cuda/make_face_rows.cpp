@@ -1,8 +1,7 @@
-#include "mpm/cuda/make_face_rows.h"
-
 #include <algorithm>
 
 #include "mpm/anchors/anchor_faces.h"
+#include "mpm/cuda/make_tables.h"
 
 namespace tissue_sim {
 namespace {

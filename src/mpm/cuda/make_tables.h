@@ -4,11 +4,12 @@
 #include <vector>
 
 #include "mpm/cuda/block_tables.h"
+#include "mpm/cuda/face_rows.h"
 #include "mpm/mpm_state.h"
 
 namespace tissue_sim {
 
-/// See CudaTables; what slots share is found on the GPU (connect_slots.h).
+/// See CudaTables; what slots share is found on the GPU (block_tables.h).
 struct HostTables {
   std::vector<CudaBody> bodies;     ///< of each body, its materials
   std::vector<int> first_material;  ///< of each body, in `bodies`
@@ -36,5 +37,38 @@ void make_tables(const MpmState& state, const std::vector<std::vector<int>>& bun
 void pack_nodes(const Nodes& nodes, Cpu& cpu, float4* u, float4* v);
 /// The components of `count` vectors.
 void unpack_field(const float4* from, std::size_t count, Cpu& cpu, Array<float>* to);
+
+// The tables of CudaHeldFaces, from AnchorFaces and the blocks: make_face_rows.cpp.
+
+/// Nodes that rows have or an anchor carries, numbered as they follow one another.
+struct HeldNodes {
+  std::vector<std::int32_t> number;   ///< per node, -1 for others
+  std::vector<std::int32_t> group;    ///< of each, whose rows move it; -1
+  std::vector<std::int32_t> carried;  ///< of each, its place in AnchorFaces::held; -1
+};
+
+/// Kept from one time to the next: its memory is.
+struct HostFaceRows {
+  bool is_new = false;  ///< made with the tables of blocks, to go up after them
+  HeldNodes nodes;
+  std::vector<CudaFaceChunk> chunks;
+  std::vector<int> first_carried;
+  std::vector<CudaHeldNode> held;  ///< in their `parts.x` a slot or kNoSlot, for launch_connect()
+  std::vector<int> first_held;
+  int most_held = 0;                   ///< of a bundle
+  std::vector<CudaFaceEntry> entries;  ///< the same
+  std::vector<CudaFaceShare> shares;
+  std::vector<CudaFaceRow> rows;
+  std::vector<CudaCarriedNode> carried;
+  bool carries_always = false;  ///< see CudaHeldFaces
+  std::size_t room_each = 0;    ///< of a bundle, for chunks that are large [floats]
+
+  void clear();
+};
+
+/// Makes `to` for the bundles of `tables`. A chunk comes to where columns give to a plane of so
+/// many slots.
+void make_face_rows(const MpmState& state, const HostTables& tables, int plane_slots,
+                    HostFaceRows& to);
 
 }  // namespace tissue_sim

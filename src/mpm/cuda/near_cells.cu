@@ -1,6 +1,7 @@
 #include <cuda_runtime.h>
 
 #include "compute/cuda_check.h"
+#include "compute/for_each_cuda.h"
 #include "mpm/cuda/block_nodes.h"
 #include "mpm/cuda/near_cells.h"
 #include "mpm/lattice/bonds.h"
@@ -141,6 +142,32 @@ __global__ void __launch_bounds__(kCellThreads)
 
 unsigned blocks_for(std::size_t n) { return static_cast<unsigned>((n + kThreads - 1) / kThreads); }
 
+struct ListHeld {
+  const std::uint8_t* with;
+  const float4* hold;
+  HeldPoint* held;
+  int most;
+  int* count;
+  __device__ void operator()(int i) const {
+    if (with[i] == 0) return;
+    const int at = atomicAdd(count, 1);
+    if (at >= most) return;
+    const float4 h = hold[i];
+    held[at] = {i, with[i], {h.x, h.y, h.z, h.w}};
+  }
+};
+
+struct HoldAgain {
+  const HeldPoint* held;
+  std::uint8_t* with;
+  float4* hold;
+  __device__ void operator()(int i) const {
+    const HeldPoint& p = held[i];
+    with[p.entry] = p.with;
+    hold[p.entry] = {p.hold[0], p.hold[1], p.hold[2], p.hold[3]};
+  }
+};
+
 }  // namespace
 
 void launch_near(const CudaTables& tables, const CudaNodes& state, const CudaMeasure* measures,
@@ -166,6 +193,17 @@ void launch_unforeseen(const CudaTables& tables, const CudaNodes& state,
   find_unforeseen<<<tables.block_count, kCellThreads, 0, stream>>>(tables, state, measures, reach,
                                                                    listed, unforeseen);
   check_cuda(cudaGetLastError(), "start a kernel");
+}
+
+void launch_list_held(const std::uint8_t* with, const float4* hold, int entries, HeldPoint* held,
+                      int most, int* count, cudaStream_t stream) {
+  check_cuda(cudaMemsetAsync(count, 0, sizeof(int), stream), "clear memory");
+  Gpu(stream).for_each(entries, ListHeld{with, hold, held, most, count});
+}
+
+void launch_hold_again(const HeldPoint* held, int count, std::uint8_t* with, float4* hold,
+                       cudaStream_t stream) {
+  Gpu(stream).for_each(count, HoldAgain{held, with, hold});
 }
 
 }  // namespace tissue_sim

@@ -12,12 +12,10 @@
 #include "mpm/cuda/anchors_on_device.h"
 #include "mpm/cuda/block_tables.h"
 #include "mpm/cuda/choose_plan.h"
-#include "mpm/cuda/connect_slots.h"
 #include "mpm/cuda/cuda_linearised_motion.h"
 #include "mpm/cuda/faces_on_device.h"
 #include "mpm/cuda/frame_ends.h"
 #include "mpm/cuda/front_cells.h"
-#include "mpm/cuda/held_points.h"
 #include "mpm/cuda/label_pieces.h"
 #include "mpm/cuda/make_tables.h"
 #include "mpm/cuda/near_cells.h"
@@ -253,7 +251,7 @@ void leave_anchors(CudaTissue& tissue, int done);  ///< where they are after so 
 /// What anchors hold, in a cloud: `index` of each point, or each of `stride` where it is empty.
 /// Enqueues.
 void put_anchored_points(CudaTissue& tissue, const std::vector<std::int32_t>& index, int stride,
-                     Point* cloud);
+                         Point* cloud);
 
 // Contact with tools.
 void find_near(CudaTissue& tissue);            ///< lists the cells that they may meet

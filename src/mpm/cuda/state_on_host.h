@@ -7,7 +7,7 @@
 
 #include "mpm/contact/face_fields.h"
 #include "mpm/cuda/choose_plan.h"
-#include "mpm/cuda/held_points.h"
+#include "mpm/cuda/near_cells.h"
 #include "mpm/cuda/tables.h"
 
 namespace tissue_sim {

@@ -180,8 +180,8 @@ TEST_P(FiniteElementsOn, AnchorsLetGoOfWhatTearsOffInFrontOfThem) {
 }
 
 #if defined(TISSUE_SIM_CUDA)
-// One law on both devices: at rest tissue bears what it does on a CPU. With friction what sticks
-// depends on the way there, on which inerters are made anew or stay.
+// One law on both devices: at rest tissue bears what it does on a CPU. Read on an H200: the same
+// six digits, with friction 4e-5 off, for what sticks depends on the way there.
 TEST(FiniteElementScenes, ToolsAtRestPressOnAGpuAsOnACpu) {
   const std::string why = why_no_gpu();
   if (!why.empty()) GTEST_SKIP() << why;
@@ -206,7 +206,7 @@ TEST(FiniteElementScenes, ToolsAtRestPressOnAGpuAsOnACpu) {
       std::printf("tool %d, friction %g: %.6f N on the GPU, %.6f on the CPU\n",
                   static_cast<int>(tool.type), friction, force[1], force[0]);
       EXPECT_GT(force[0], 0.01);
-      EXPECT_NEAR(force[1] / force[0], 1, friction > 0 ? 1e-2 : 1e-4);
+      EXPECT_NEAR(force[1] / force[0], 1, 1e-4);
     }
   }
 }

@@ -92,7 +92,7 @@ template <class T>
 Outcome operate(T& tissue, Operation& operation, int frames) {
   Outcome o;
   for (int i = 0; i < frames; ++i) {
-    const int substeps = 200;
+    const int substeps = 220;
     advance_by(tissue, substeps, static_cast<float>(1.0 / 60 / substeps), {operation.frame(i), {}});
     const FrameResult r = tissue.finish();
     EXPECT_FALSE(r.blew_up) << "in frame " << i;

@@ -6,8 +6,8 @@
 #include "mpm/blocks/known_facets.h"
 #include "mpm/contact/block_contact.h"
 #include "mpm/lattice/bonds.h"
-#include "mpm/tear/bond_bridges.h"
 #include "mpm/tear/debris.h"
+#include "mpm/tear/tear.h"
 
 namespace tissue_sim {
 namespace {

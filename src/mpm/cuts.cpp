@@ -4,8 +4,8 @@
 #include "mpm/cut_tissue.h"
 #include "mpm/lattice_pieces.h"
 #include "mpm/mpm_tissue.h"
-#include "mpm/tear/bond_bridges.h"
 #include "mpm/tear/debris.h"
+#include "mpm/tear/tear.h"
 #include "tools/tool_motion.h"
 
 namespace tissue_sim {

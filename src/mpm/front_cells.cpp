@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "compute/simd.h"
-#include "mpm/lattice/stiffness_shares.h"
+#include "mpm/lattice/bonds.h"
 #include "mpm/mpm_state.h"
 #include "mpm/split/front.h"
 

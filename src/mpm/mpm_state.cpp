@@ -3,10 +3,10 @@
 #include <algorithm>
 #include <cmath>
 
-#include "mpm/anchors/anchored_share.h"
+#include "mpm/anchors/anchor_faces.h"
 #include "mpm/contact/block_contact.h"
-#include "mpm/contact/hold_beside_tools.h"
-#include "mpm/lattice/stiffness_shares.h"
+#include "mpm/contact/contact_inertia.h"
+#include "mpm/lattice/bonds.h"
 
 namespace tissue_sim {
 

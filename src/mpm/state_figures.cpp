@@ -5,8 +5,8 @@
 
 #include "frame/checksum.h"
 #include "frame/stability_limit.h"
-#include "mpm/tear/bond_bridges.h"
 #include "mpm/tear/debris.h"
+#include "mpm/tear/tear.h"
 
 namespace tissue_sim {
 

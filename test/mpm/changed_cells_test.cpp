@@ -1,12 +1,11 @@
 // The cells around points that lost bonds, against brute force.
-#include "mpm/split/changed_cells.h"
-
 #include <gtest/gtest.h>
 
 #include <cstdlib>
 #include <set>
 
 #include "cut_scenes.h"
+#include "mpm/split/node_fields.h"
 
 namespace tissue_sim {
 namespace {

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <random>
 
-#include "mpm/contact/broad_phase.h"
+#include "mpm/contact/face_contact.h"
 #include "mpm/contact/face_search.h"
 
 namespace tissue_sim {

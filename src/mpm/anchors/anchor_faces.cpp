@@ -6,8 +6,6 @@
 #include <string>
 #include <utility>
 
-#include "mpm/anchors/anchored_share.h"
-
 namespace tissue_sim {
 namespace {
 

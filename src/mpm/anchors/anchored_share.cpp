@@ -1,8 +1,7 @@
-#include "mpm/anchors/anchored_share.h"
-
 #include <algorithm>
 #include <cmath>
 
+#include "mpm/anchors/anchor_faces.h"
 #include "mpm/lattice/bonds.h"
 
 namespace tissue_sim {

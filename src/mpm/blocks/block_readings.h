@@ -6,7 +6,7 @@
 
 #include "mpm/blocks/block_forces.h"
 #include "mpm/blocks/stretched_point.h"
-#include "mpm/lattice/stiffness_shares.h"
+#include "mpm/lattice/bonds.h"
 
 namespace tissue_sim {
 namespace kernels {

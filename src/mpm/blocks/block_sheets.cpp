@@ -1,4 +1,3 @@
-#include "mpm/blocks/block_sheets.h"
 
 #include <algorithm>
 #include <iterator>

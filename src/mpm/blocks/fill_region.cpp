@@ -2,9 +2,9 @@
 #include <numeric>
 #include <tuple>
 
-#include "mpm/blocks/block_sheets.h"
 #include "mpm/blocks/blocks.h"
-#include "mpm/lattice/stiffness_shares.h"
+#include "mpm/blocks/region_shares.h"
+#include "mpm/lattice/bonds.h"
 #include "mpm/surface/block.h"
 
 namespace tissue_sim {

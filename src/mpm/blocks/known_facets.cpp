@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "mpm/split/changed_cells.h"
+#include "mpm/split/node_fields.h"
 
 namespace tissue_sim {
 

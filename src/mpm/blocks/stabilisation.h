@@ -10,7 +10,7 @@
 #pragma once
 
 #include "mpm/blocks/block_passes.h"
-#include "mpm/lattice/stiffness_shares.h"
+#include "mpm/lattice/bonds.h"
 
 namespace tissue_sim {
 

@@ -1,9 +1,8 @@
-#include "mpm/contact/broad_phase.h"
-
 #include <algorithm>
 #include <cmath>
 
 #include "compute/simd.h"
+#include "mpm/contact/face_contact.h"
 #include "mpm/contact/face_search.h"
 
 namespace tissue_sim {

@@ -6,7 +6,6 @@
 
 #include "compute/host_device.h"
 #include "mpm/lattice/bonds.h"
-#include "mpm/lattice/stiffness_shares.h"
 #include "mpm/surface/facet_in_world.h"
 
 namespace tissue_sim {

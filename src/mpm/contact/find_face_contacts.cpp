@@ -2,7 +2,6 @@
 #include <cmath>
 
 #include "fragments/pieces.h"
-#include "mpm/contact/broad_phase.h"
 #include "mpm/contact/face_contact.h"
 #include "mpm/contact/face_places.h"
 

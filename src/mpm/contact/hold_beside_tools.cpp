@@ -1,7 +1,6 @@
-#include "mpm/contact/hold_beside_tools.h"
-
 #include <Eigen/LU>
 
+#include "mpm/contact/contact_inertia.h"
 #include "mpm/mpm_state.h"
 
 namespace tissue_sim {

@@ -7,7 +7,7 @@
 #include "mpm/cuda/frame_ends.h"
 #include "mpm/cuda/half_cell.h"
 #include "mpm/cuda/measure_sums.h"
-#include "mpm/lattice/stiffness_shares.h"
+#include "mpm/lattice/bonds.h"
 
 namespace tissue_sim {
 namespace {

@@ -10,7 +10,6 @@
 #include "geometry/lattice.h"
 #include "mpm/lattice/bonds.h"
 #include "mpm/lattice/lattice_rows.h"
-#include "mpm/lattice/stiffness_shares.h"
 #include "tissue_sim/scene.h"
 
 namespace tissue_sim {

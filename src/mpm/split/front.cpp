@@ -7,8 +7,8 @@
 
 #include "math/bspline.h"
 #include "mpm/lattice/bonds.h"
-#include "mpm/split/changed_cells.h"
 #include "mpm/split/lattice_tissue.h"
+#include "mpm/split/node_fields.h"
 
 namespace tissue_sim {
 namespace {

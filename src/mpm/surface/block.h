@@ -13,7 +13,6 @@
 #include "frame/stability_limit.h"
 #include "mpm/lattice/lattice_body.h"
 #include "mpm/surface/facets.h"
-#include "mpm/surface/surface_place.h"
 #include "tissue_sim/material.h"
 
 namespace tissue_sim {

@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "mpm/split/lattice_tissue.h"
-#include "mpm/surface/surface_place.h"
+#include "mpm/surface/facets.h"
 
 namespace tissue_sim {
 

@@ -1,10 +1,9 @@
-#include "mpm/tear/bond_bridges.h"
 
 #include <algorithm>
 
 #include "mpm/lattice/bonds.h"
-#include "mpm/tear/crack.h"
 #include "mpm/tear/debris.h"
+#include "mpm/tear/tear.h"
 
 namespace tissue_sim {
 namespace {

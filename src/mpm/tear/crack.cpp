@@ -1,8 +1,8 @@
-#include "mpm/tear/crack.h"
-
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+
+#include "mpm/tear/tear.h"
 
 namespace tissue_sim {
 namespace {

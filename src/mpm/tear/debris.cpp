@@ -8,7 +8,7 @@
 
 #include "math/bspline.h"
 #include "mpm/lattice/bonds.h"
-#include "mpm/tear/crack.h"
+#include "mpm/tear/tear.h"
 
 namespace tissue_sim {
 namespace {

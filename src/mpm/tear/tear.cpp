@@ -6,8 +6,6 @@
 #include <numeric>
 
 #include "mpm/lattice/bonds.h"
-#include "mpm/tear/bond_bridges.h"
-#include "mpm/tear/crack.h"
 
 namespace tissue_sim {
 namespace {

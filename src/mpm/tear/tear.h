@@ -29,6 +29,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "mpm/lattice/bonds.h"
 #include "mpm/mpm_state.h"
 #include "tissue_sim/cut.h"
 
@@ -72,5 +73,50 @@ std::vector<TearingPoint> find_tearing(MpmState& state);
 /// by number, and counts into `report`.
 void tear_bonds(MpmState& state, const std::vector<TearingPoint>& tearing,
                 std::vector<std::int32_t>& changed, CutReport& report);
+
+// A crack as the bonds show it, and where it goes on: see mpm/tear/tear.h for the rule.
+
+inline constexpr int kReach = 3;  ///< half the support of a node [points]
+
+/// Bonds that the point had and lost.
+unsigned broken_bonds(const MpmState& state, std::int32_t p);
+
+/// The point that is `steps` on from a site in the direction of bond `k`, -1 where there is none.
+std::int32_t neighbour(const LatticeBody& body, const Points::Site& s, int k, int steps = 1);
+
+/// The entry of a point, null if it is not among them.
+const TearingPoint* entry(const std::vector<TearingPoint>& tearing, std::int32_t point);
+
+/// Whether a bond broke on the line of bond `k` of p, within kReach of it.
+bool broken_on_line(const MpmState& state, const LatticeBody& body, std::int32_t p, int k);
+
+struct Bond {
+  std::int32_t point;
+  int bond;
+  bool bridge;  ///< holds the two sides of a crack together
+};
+
+/// Appends the bonds of a point that a crack takes as it goes on. Returns whether there is a crack
+/// within kReach.
+bool go_on(const MpmState& state, const TearingPoint& t, const std::vector<TearingPoint>& tearing,
+           std::vector<Bond>& bonds);
+
+// Bond bridges: what hangs on by points one after the other, thinner than the lattice tells.
+
+/// A bridge is a bond that is in no square of four bonds. It tears where it is stretched so far,
+/// and has stiffened so much (mpm/tear/debris.h), whatever its material: between halves that
+/// part it would be drawn out without end, and what hangs on it would whirl about, too fast for any
+/// substep. One that swings stiffens twentyfold within a few substeps: it is not to get near that.
+inline constexpr double kThreadStretch = 1.5, kBridgeStiffening = 3.5;
+
+/// Whether a point that has a bond in a square of four would have none without bond `k` of `point`.
+bool leaves_thread(const LatticeBody& body, Points& points, std::int32_t point, int k);
+
+/// After the points `changed` lost bonds: adds the ends of new bridges to MpmState::bridge_ends.
+void list_bridges(MpmState& state, const std::vector<std::int32_t>& changed);
+
+/// Tears bridges. Appends the points that lost a bond to `changed`, by number, and counts into
+/// `report`.
+void tear_bridges(MpmState& state, std::vector<std::int32_t>& changed, CutReport& report);
 
 }  // namespace tissue_sim

@@ -27,6 +27,12 @@ struct SceneView {
 /// Replaces `view`, whose memory is used again.
 void read_view(Simulation& simulation, SceneView& view);
 
+/// What an eye saw in its last image, for the flow to its next one: nothing at first.
+struct LastLook {
+  std::shared_ptr<const struct Shown> shown;
+  Pose eye;
+};
+
 /// Whether this build can render: it was built with Embree. Otherwise Renderer's constructor
 /// throws.
 bool can_render();
@@ -40,8 +46,10 @@ class Renderer {
   /// What render() draws from now on.
   void show(const SceneView& view);
   /// What an eye at this pose sees: the camera's left one at its pose, the right one `baseline`
-  /// along x from there. Throws std::invalid_argument for a pose that is not finite.
-  void render(const Camera& camera, const Pose& eye, CameraImages& images);
+  /// along x from there. With `last`, images.flow since that look, which becomes this one. Throws
+  /// std::invalid_argument for a pose that is not finite.
+  void render(const Camera& camera, const Pose& eye, CameraImages& images,
+              LastLook* last = nullptr);
 
  private:
   struct State;

@@ -37,6 +37,10 @@ struct Tool {
   double grip_pressure = 3000;  ///< grasper: its jaws close until they press with it [Pa]
   double cohesion = 10000;      ///< grasper: what its teeth hold beside friction [Pa]
   double friction = 0.3;        ///< Coulomb friction against tissue [-], 0 to 2
+  /// What cameras see in place of its shapes, of a grasper in place of its handle: a plain path,
+  /// file:// or package:// (STL, OBJ, PLY, OFF), in the tool's frame. Empty: the shapes.
+  std::string mesh;
+  double scale = 1;  ///< of that: 0.001 for a mesh in millimetres
 };
 
 /// Where a tool shall be at the end of a frame.

@@ -1,6 +1,9 @@
 #include "geometry/ply.h"
 
 #include <algorithm>
+#include <array>
+#include <cstring>
+#include <map>
 #include <stdexcept>
 #include <vector>
 
@@ -147,6 +150,39 @@ TriangleMesh read_ply(const std::string& bytes) {
     first = end;
   }
   return mesh;
+}
+
+std::string to_ply(const SurfaceTriangles& surface, const std::vector<std::uint32_t>& colours) {
+  const auto put = [](std::string& bytes, std::uint32_t word) {
+    for (int shift = 0; shift < 32; shift += 8) bytes += static_cast<char>(word >> shift & 0xff);
+  };
+  using Corner = std::array<std::uint32_t, 4>;  // the bits of its place, and its piece
+  std::map<Corner, std::uint32_t> numbers;
+  std::string vertices, faces;
+  for (std::size_t t = 0; t < surface.fragment.size(); ++t) {
+    faces += '\3';
+    for (std::size_t c = 0; c < 3; ++c) {
+      Corner corner;
+      std::memcpy(corner.data(), &surface.corners[9 * t + 3 * c], 3 * sizeof(float));
+      corner[3] = static_cast<std::uint32_t>(surface.fragment[t]);
+      const auto next = static_cast<std::uint32_t>(numbers.size());
+      const auto [found, is_new] = numbers.emplace(corner, next);
+      put(faces, found->second);
+      for (int a = 0; is_new && a < 3; ++a) put(vertices, corner[a]);
+    }
+    put(faces, static_cast<std::uint32_t>(surface.fragment[t]));
+    faces += static_cast<char>(surface.cut[t]);
+    for (int shift = 16; shift >= 0; shift -= 8) {
+      faces += static_cast<char>(colours[t] >> shift & 0xff);
+    }
+  }
+  return "ply\nformat binary_little_endian 1.0\ncomment metres\nelement vertex " +
+         std::to_string(numbers.size()) +
+         "\nproperty float x\nproperty float y\nproperty float z\nelement face " +
+         std::to_string(surface.fragment.size()) +
+         "\nproperty list uchar int vertex_indices\nproperty int fragment\nproperty uchar cut\n"
+         "property uchar red\nproperty uchar green\nproperty uchar blue\nend_header\n" +
+         vertices + faces;
 }
 
 }  // namespace tissue_sim

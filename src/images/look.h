@@ -1,6 +1,9 @@
-// What tissue looks like: colours that stick to its material, and light from the lens.
+// What is seen looks like: colours of tissue that stick to its material, and light from the lens.
 #pragma once
 
+#include <cstdint>
+
+#include "compute/simd.h"
 #include "tissue_sim/types.h"
 
 namespace tissue_sim {
@@ -11,26 +14,35 @@ using Colour = Eigen::Vector3f;
 /// Of 0x00RRGGBB.
 Colour linear(std::uint32_t rgb);
 /// For a byte a channel, as screens have it.
-void to_bytes(const Colour& colour, std::uint8_t* rgb);
-
-/// Of tissue at a place of its material [m]: its skin with vessels beneath, or what a blade opened.
-Colour tissue_colour(const Vec3& rest, bool is_cut);
-/// By how much its wet surface leans there, in world axes: added to the normal.
-Vec3 tissue_bumps(const Vec3& rest);
-/// Of a drape, by a place on the ground [m].
+void to_bytes(const float* colour, std::uint8_t* rgb);
 /// Of a stress, as a share of the scale's end: from dark red to white.
 Colour stress_colour(double share);
-Colour drape_colour(const Vec3& place);
 
-/// What comes back to the lens from a surface.
-struct Surface {
-  Colour colour;
-  float shine = 0;      ///< how much of the light it mirrors, 0 to 1
-  float sharpness = 1;  ///< of that: the larger, the smaller the highlight
+/// What a surface is of.
+enum class Look {
+  kSkin,     ///< of tissue, with vessels beneath
+  kCutFace,  ///< what a blade opened
+  kDrape,    ///< the ground
+  kSteel,
+  kHandle,
+  kTinted,  ///< of a colour that is given
 };
-/// `to_lens` and `normal` are of length 1. `distance` is that to the lens over the one at which the
-/// light is full: nearer is brighter. Without a light it is even from everywhere.
-Colour lit(const Surface& surface, const Vec3& normal, const Vec3& to_lens, double distance,
-           bool has_light);
+inline constexpr int kLooks = 6;
+
+/// Pixels of one look, side by side.
+struct Pixels {
+  static constexpr int kMost = 64;
+  int count = 0;
+  std::int64_t index[kMost];  ///< in the image
+  float place[3][kMost];      ///< of tissue its material's, of the ground the world's [m]
+  float normal[3][kMost];     ///< of any length, to either side
+  float along[3][kMost];      ///< the ray from the lens
+  float distance[kMost];      ///< in lengths of the ray, over that at which the light is full
+  float colour[3][kMost];     ///< what comes back to the lens; of kTinted the surface's before
+};
+
+/// Sets their colours: the same bits with any instructions. With a light at the lens what is nearer
+/// is brighter; without one it comes from everywhere.
+void light_up(Look look, bool has_light, InstructionSet instructions, Pixels& pixels);
 
 }  // namespace tissue_sim

@@ -59,6 +59,8 @@ void RayScene::set(const std::vector<float>& corners) {
     if (places == nullptr || index == nullptr) throw std::bad_alloc();
     std::memcpy(places, corners.data(), corners.size() * sizeof(float));
     for (std::size_t i = 0; i < 3 * s.triangles; ++i) index[i] = static_cast<unsigned>(i);
+    rtcSetGeometryBuildQuality(mesh,
+                               RTC_BUILD_QUALITY_LOW);  // of both: a fifth of the time, as fast
     rtcCommitGeometry(mesh);
     rtcAttachGeometry(s.scene, mesh);
     rtcReleaseGeometry(mesh);

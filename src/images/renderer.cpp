@@ -12,26 +12,15 @@
 #include "compute/for_each.h"
 #include "fragments/piece_colour.h"
 #include "images/look.h"
-#include "images/ray_scene.h"
-#include "images/smooth_normals.h"
+#include "images/shown.h"
 #include "tissue_sim/point.h"
-#include "tools/tool_shapes.h"
 
 namespace tissue_sim {
+
 namespace {
 
-constexpr int kPacket = RayScene::kPacket;
+constexpr int kStrip = 8;  // rows that are drawn at a time
 constexpr float kNothing = std::numeric_limits<float>::quiet_NaN();
-
-/// What a ray meets first.
-struct Hit {
-  double t = 0;
-  Vec3 normal = Vec3::Zero();
-  std::uint16_t label = kNoLabel;
-  std::int32_t triangle = -1;  ///< of tissue; else the ground or a tool
-  float u = 0, v = 0;          ///< in it
-  bool is_handle = false;
-};
 
 /// Where a pixel of the raw image looks, at a depth of 1: the lens' distortion undone.
 Vec3 undistorted(const Camera& camera, double x, double y) {
@@ -79,99 +68,54 @@ void read_view(Simulation& simulation, SceneView& view) {
 struct Renderer::State {
   Scene scene;
   Cpu cpu;
-  RayScene rays;
+  const InstructionSet instructions = instruction_set();
   SmoothNormals smooth;
-  SurfaceTriangles surface;
-  const std::vector<float>* normals = nullptr;
-  std::vector<float> stress;  // of each corner
+  std::vector<std::unique_ptr<ToolMesh>> meshes;  // of each tool, null for none
+  std::shared_ptr<Shown> shown = std::make_shared<Shown>();
+  std::vector<float> stress;  // of each corner, empty where no camera shows it
   std::map<int, Colour> piece_colours;
-  struct SeenShape {
-    ToolShape shape;
-    std::uint16_t label;
-  };
-  std::vector<SeenShape> shapes;
-  Vec3 centre = Vec3::Zero();  ///< of the tissue: the light is full at that distance
 
-  State(const Scene& s, int threads) : scene(s), cpu(threads) {}
+  State(const Scene& s, int threads) : scene(s), cpu(threads) {
+    for (const Tool& tool : scene.tools) {
+      meshes.push_back(tool.mesh.empty() ? nullptr : std::make_unique<ToolMesh>(tool));
+    }
+  }
 
-  /// What a packet of rays meets, one for each direction.
-  void meet(const Vec3& eye, const Vec3* along, double near, double far, Hit* hits) const;
-  Colour colour_of(const Camera& camera, const Vec3& eye, const Vec3& along, const Hit& hit) const;
+  /// Of what is met, to be lit up; nothing where that is nothing. The light is full at a distance.
+  void add(const Eye& eye, double full, const Vec3& along, const Hit& hit, std::int64_t index,
+           Pixels* pixels) const;
 };
 
-void Renderer::State::meet(const Vec3& eye, const Vec3* along, double near, double far,
-                           Hit* hits) const {
-  RayScene::Met met[kPacket];
-  rays.meet(eye, along, near, far, met);
-  for (int i = 0; i < kPacket; ++i) {
-    Hit& hit = hits[i];
-    hit = {};
-    double nearest = far;
-    if (met[i].triangle >= 0) {
-      hit.triangle = met[i].triangle;
-      hit.t = nearest = met[i].t;
-      hit.u = met[i].u, hit.v = met[i].v;
-      const int label = kFirstFragmentLabel + surface.fragment[hit.triangle];
-      hit.label = static_cast<std::uint16_t>(std::min(label, 65535));
-      const float* n = &(*normals)[9 * hit.triangle];
-      for (int a = 0; a < 3; ++a) {
-        hit.normal[a] = (1 - hit.u - hit.v) * n[a] + hit.u * n[3 + a] + hit.v * n[6 + a];
-      }
-    }
-    if (scene.ground.enabled && along[i].z() != 0) {
-      const double t = (scene.ground.z - eye.z()) / along[i].z();
-      if (t >= near && t < nearest) {
-        hit = {};
-        hit.t = nearest = t;
-        hit.label = kGroundLabel;
-        hit.normal = Vec3::UnitZ();
-      }
-    }
-    for (const SeenShape& seen : shapes) {
-      double t;
-      Vec3 normal;
-      if (!tissue_sim::meet(seen.shape, eye, along[i], near, nearest, t, normal)) continue;
-      hit = {};
-      hit.t = nearest = t;
-      hit.normal = normal;
-      hit.label = seen.label;
-      hit.is_handle = seen.shape.is_handle;
-    }
-  }
-}
-
-Colour Renderer::State::colour_of(const Camera& camera, const Vec3& eye, const Vec3& along,
-                                  const Hit& hit) const {
-  if (hit.label == kNoLabel) return Colour::Zero();
-  const Vec3 place = eye + hit.t * along;
-  const Vec3 to_lens = -along.normalized();
-  Surface surface{Colour(0.19f, 0.20f, 0.215f), 0.45f, 40};  // steel
-  Vec3 normal = hit.normal;
-  if (hit.label == kGroundLabel) {
-    surface = {drape_colour(place), 0, 1};
+void Renderer::State::add(const Eye& eye, double full, const Vec3& along, const Hit& hit,
+                          std::int64_t index, Pixels* pixels) const {
+  if (hit.label == kNoLabel) return;
+  Look look = Look::kDrape;
+  Vec3 place = eye.pose.position + hit.t * along;
+  Colour colour = Colour::Zero();
+  if (hit.part >= 0) {
+    look = shown->parts[hit.part].shape.is_handle ? Look::kHandle : Look::kSteel;
   } else if (hit.triangle >= 0) {
-    Vec3 rest = Vec3::Zero();
-    const float* x = &this->surface.rest[9 * hit.triangle];
-    for (int a = 0; a < 3; ++a) {
-      rest[a] = (1 - hit.u - hit.v) * x[a] + hit.u * x[3 + a] + hit.v * x[6 + a];
-    }
-    if (camera.colours == CameraColours::kStress) {
+    place = interpolated(&shown->surface.rest[9 * hit.triangle], hit);
+    look = shown->surface.cut[hit.triangle] != 0 ? Look::kCutFace : Look::kSkin;
+    if (eye.camera.colours != CameraColours::kTissue) look = Look::kTinted;
+    if (eye.camera.colours == CameraColours::kStress && !stress.empty()) {
       const float* s = &stress.at(std::size_t{3} * hit.triangle);
       const double here = (1 - hit.u - hit.v) * s[0] + hit.u * s[1] + hit.v * s[2];
-      surface = {stress_colour(here / camera.stress_end), 0.1f, 30};
-    } else if (camera.colours == CameraColours::kFragments) {
-      surface = {piece_colours.at(this->surface.fragment[hit.triangle]), 0.1f, 30};
-    } else {
-      surface = {tissue_colour(rest, this->surface.cut[hit.triangle] != 0), 0.40f, 110};
-      normal += tissue_bumps(rest);
+      colour = stress_colour(here / eye.camera.stress_end);
+    } else if (eye.camera.colours == CameraColours::kFragments) {
+      colour = piece_colours.at(shown->surface.fragment[hit.triangle]);
     }
-  } else if (hit.is_handle) {
-    surface = {Colour(0.035f, 0.038f, 0.045f), 0.25f, 25};
   }
-  normal.normalize();
-  if (normal.dot(to_lens) < 0) normal = -normal;  // seen from its inside
-  const double full = std::max(1e-6, (centre - eye).norm());
-  return lit(surface, normal, to_lens, (place - eye).norm() / full, camera.light);
+  Pixels& p = pixels[static_cast<int>(look)];
+  const int i = p.count++;
+  p.index[i] = index;
+  for (int a = 0; a < 3; ++a) {
+    p.place[a][i] = static_cast<float>(place[a]);
+    p.normal[a][i] = static_cast<float>(hit.normal[a]);
+    p.along[a][i] = static_cast<float>(along[a]);
+    p.colour[a][i] = colour[a];
+  }
+  p.distance[i] = static_cast<float>(hit.t / full);
 }
 
 Renderer::Renderer(const Scene& scene, int threads)
@@ -184,34 +128,19 @@ Renderer::~Renderer() = default;
 
 void Renderer::show(const SceneView& view) {
   State& s = *state_;
-  s.surface = view.surface;
-  s.normals = &s.smooth.of(s.surface);
-  s.stress = s.smooth.means(view.stress.empty() ? std::vector<float>(s.surface.fragment.size())
-                                                : view.stress);
-  s.rays.set(s.surface.corners);
+  if (s.shown.use_count() > 1) s.shown = std::make_shared<Shown>();  // somebody keeps it
+  s.shown->set(view, s.scene, s.meshes, s.smooth);
+  const std::vector<std::int32_t>& fragment = s.shown->surface.fragment;
+  s.stress.clear();
+  if (!view.stress.empty()) s.stress = s.smooth.means(view.stress);
   s.piece_colours.clear();
   for (const Fragment& f : view.fragments) s.piece_colours[f.id] = linear(piece_colour(f));
-  for (const std::int32_t id : s.surface.fragment)
-    s.piece_colours.emplace(id, linear(kTissueColour));
-  Box box;
-  for (std::size_t i = 0; i < s.surface.corners.size(); i += 3) {
-    const Vec3 x(s.surface.corners[i], s.surface.corners[i + 1], s.surface.corners[i + 2]);
-    box.min = box.min.cwiseMin(x);
-    box.max = box.max.cwiseMax(x);
-  }
-  s.centre = s.surface.corners.empty() ? Vec3::Zero() : Vec3(0.5 * (box.min + box.max));
-  s.shapes.clear();
-  for (std::size_t i = 0; i < view.tools.size(); ++i) {
-    if (!view.tools[i].present) continue;
-    const auto label = static_cast<std::uint16_t>(kFirstToolLabel + i);
-    for (const ToolShape& shape : tool_shapes(s.scene.tools[i], view.tools[i])) {
-      s.shapes.push_back({shape, label});
-    }
-  }
+  for (const std::int32_t id : fragment) s.piece_colours.emplace(id, linear(kTissueColour));
 }
 
-void Renderer::render(const Camera& camera, const Pose& eye, CameraImages& images) {
-  if (!eye.position.allFinite() || !eye.orientation.coeffs().allFinite()) {
+void Renderer::render(const Camera& camera, const Pose& pose, CameraImages& images,
+                      LastLook* last) {
+  if (!pose.position.allFinite() || !pose.orientation.coeffs().allFinite()) {
     throw std::invalid_argument("camera " + camera.name + ": its pose is not finite");
   }
   const State& s = *state_;
@@ -219,45 +148,87 @@ void Renderer::render(const Camera& camera, const Pose& eye, CameraImages& image
   const std::size_t pixels = static_cast<std::size_t>(width) * height;
   images.width = width;
   images.height = height;
-  images.rgb.resize(3 * pixels);
+  images.rgb.assign(3 * pixels, 0);
   images.depth.resize(pixels);
   images.labels.resize(pixels);
+  images.flow.assign(last == nullptr ? 0 : 2 * pixels, kNothing);
   const double focal = camera.focal_length();
+  const double middle[2] = {0.5 * (width - 1), 0.5 * (height - 1)};
   const bool is_distorted = !camera.distortion.empty();
-  std::vector<int> inside_out(height, 0);
-  const auto row = [&](int y) {
+  const Eye eye = s.shown->look(camera, pose);
+  const bool is_any = !s.shown->surface.corners.empty();
+  const Vec3 centre = is_any ? Vec3(0.5 * (s.shown->box.min + s.shown->box.max)) : Vec3::Zero();
+  const double full = std::max(1e-6, (centre - pose.position).norm());
+  const Eigen::Matrix3d turn = pose.orientation.toRotationMatrix();
+  const bool has_flow = last != nullptr && last->shown != nullptr;
+  std::vector<std::int32_t> same;
+  if (has_flow) same = s.shown->same_triangles(last->shown->surface);
+  std::vector<int> inside_out(height / kStrip + 1, 0);
+
+  const auto strip = [&](int number) {
+    Pixels looks[kLooks] = {};
+    const auto finish = [&](int look) {
+      Pixels& p = looks[look];
+      light_up(static_cast<Look>(look), camera.light, s.instructions, p);
+      for (int i = 0; i < p.count; ++i) {
+        const float colour[3] = {p.colour[0][i], p.colour[1][i], p.colour[2][i]};
+        to_bytes(colour, &images.rgb[3 * p.index[i]]);
+      }
+      p.count = 0;
+    };
     Vec3 flat[kPacket], along[kPacket];
     Hit hits[kPacket];
-    for (int begin = 0; begin < width; begin += kPacket) {
-      const int count = std::min(kPacket, width - begin);
-      const auto look = [&](bool undo) {
-        for (int i = 0; i < kPacket; ++i) {
-          const double u = (begin + std::min(i, count - 1) - 0.5 * (width - 1)) / focal;
-          const double v = (y - 0.5 * (height - 1)) / focal;
-          flat[i] = undo ? undistorted(camera, u, v) : Vec3(u, v, 1);
-          along[i] = eye.orientation * flat[i];
+    const auto see = [&](int x, int y, bool undo) {
+      Window window;
+      std::swap(window.low, window.high);
+      for (int i = 0; i < kPacket; ++i) {
+        const double u = (std::min(x + i, width - 1) - middle[0]) / focal;
+        const double v = (y - middle[1]) / focal;
+        flat[i] = undo ? undistorted(camera, u, v) : Vec3(u, v, 1);
+        along[i] = turn * flat[i];
+        for (int a = 0; a < 2; ++a) {
+          window.low[a] = std::min(window.low[a], flat[i][a]);
+          window.high[a] = std::max(window.high[a], flat[i][a]);
         }
-        s.meet(eye.position, along, camera.near, camera.far, hits);
-      };
-      look(false);
-      const std::size_t first = static_cast<std::size_t>(y) * width + begin;
-      for (int i = 0; i < count; ++i) {
-        const Hit& hit = hits[i];
-        images.depth[first + i] = hit.label == kNoLabel ? kNothing : static_cast<float>(hit.t);
-        images.labels[first + i] = hit.label;
-        if (hit.triangle >= 0 && hit.normal.dot(along[i]) > 0) ++inside_out[y];
       }
-      if (is_distorted) look(true);
-      for (int i = 0; i < count; ++i) {
-        to_bytes(s.colour_of(camera, eye.position, along[i], hits[i]),
-                 &images.rgb[3 * (first + i)]);
+      s.shown->meet(eye, s.scene.ground, window, along, hits);
+    };
+    for (int y = kStrip * number; y < std::min(kStrip * (number + 1), height); ++y) {
+      for (int x = 0; x < width; x += kPacket) {
+        const int count = std::min(kPacket, width - x);
+        const std::size_t first = static_cast<std::size_t>(y) * width + x;
+        see(x, y, false);
+        for (int i = 0; i < count; ++i) {
+          const Hit& hit = hits[i];
+          images.depth[first + i] = hit.label == kNoLabel ? kNothing : static_cast<float>(hit.t);
+          images.labels[first + i] = hit.label;
+          if (hit.triangle >= 0 && hit.normal.dot(along[i]) > 0) ++inside_out[number];
+          if (!has_flow || hit.label == kNoLabel) continue;
+          Vec3 before = pose.position + hit.t * along[i];
+          if (!s.shown->was_at(*last->shown, same, hit, before)) continue;
+          before = in_axes_of(last->eye, before);
+          if (!(before.z() > 0)) continue;
+          for (int a = 0; a < 2; ++a) {
+            images.flow[2 * (first + i) + a] =
+                static_cast<float>(focal * (flat[i][a] - before[a] / before.z()));
+          }
+        }
+        if (is_distorted) see(x, y, true);
+        for (int i = 0; i < count; ++i) {
+          s.add(eye, full, along[i], hits[i], static_cast<std::int64_t>(first) + i, looks);
+        }
+        for (int look = 0; look < kLooks; ++look) {
+          if (looks[look].count > Pixels::kMost - kPacket) finish(look);
+        }
       }
     }
+    for (int look = 0; look < kLooks; ++look) finish(look);
   };
-  state_->cpu.for_each(height, row, 4);
+  state_->cpu.for_each((height + kStrip - 1) / kStrip, strip);
   double sum = 0;
   for (const int n : inside_out) sum += n;
   images.inside_out = sum / static_cast<double>(pixels);
+  if (last != nullptr) *last = {s.shown, pose};
 }
 
 }  // namespace tissue_sim

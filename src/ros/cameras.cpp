@@ -54,6 +54,20 @@ boost::shared_ptr<sensor_msgs::Image> image(const CameraImages& images, const st
   return m;
 }
 
+boost::shared_ptr<sensor_msgs::Image> depth_image(const CameraImages& images, DepthUnit unit,
+                                                  const std_msgs::Header& header) {
+  namespace enc = sensor_msgs::image_encodings;
+  if (unit == DepthUnit::kMetres) {
+    return image(images, enc::TYPE_32FC1, sizeof(float), images.depth.data(), header);
+  }
+  std::vector<std::uint16_t> depth(images.depth.size());
+  for (std::size_t i = 0; i < depth.size(); ++i) {
+    const float z = 1000 * images.depth[i] + 0.5f;
+    depth[i] = z < 65536 ? static_cast<std::uint16_t>(z) : 0;  // of NaN: 0
+  }
+  return image(images, enc::TYPE_16UC1, sizeof(std::uint16_t), depth.data(), header);
+}
+
 /// Organised as the image: x, y, z in the camera's optical frame, rgb, label. `rgb` is rectified.
 boost::shared_ptr<sensor_msgs::PointCloud2> points(const Camera& camera, const CameraImages& images,
                                                    const std::vector<std::uint8_t>& rgb,
@@ -109,25 +123,27 @@ Cameras::Cameras(ros::NodeHandle& node, const Scene& scene, const Parameters& pa
              (parameters.time == TimeMode::kWall && parameters.time_factor == 0)),
       transport_(node),
       renderer_(scene) {
-  const auto output = [&](const std::string& space, const std::string& name) -> ImageOutput {
-    return {transport_.advertise(space + name, 2),
-            node.resolveName(space + name),
-            {node, space + "camera_info", 2, recorder}};
+  const auto output = [&](const std::string& name) -> ImageOutput {
+    return {transport_.advertise(name, 2), node.resolveName(name)};
+  };
+  const auto camera_output = [&](const std::string& space, const char* name) -> CameraOutput {
+    return {output(space + name), {node, space + "camera_info", 2, recorder}};
   };
   for (const Camera& camera : scene.cameras) {
     const std::string space = camera.name + "/";
-    std::vector<ImageOutput> right;
-    if (camera.baseline > 0) right.push_back(output(space + "right/", "image_raw"));
     const std::size_t i = eyes_.size();
     eyes_.push_back({camera,
-                     output(space + "left/", "image_raw"),
-                     output(space + "depth/", "image_rect"),
-                     std::move(right),
-                     transport_.advertise(space + "labels", 2),
-                     node.resolveName(space + "labels"),
+                     camera_output(space + "left/", "image_raw"),
+                     camera_output(space + "depth/", "image_rect"),
+                     {},
+                     output(space + "labels"),
+                     {},
+                     {},
                      {node, space + "depth/points", 2, recorder},
                      Throttle(camera.rate, scene.frame_rate),
                      camera.pose});
+    if (camera.baseline > 0) eyes_.back().right = camera_output(space + "right/", "image_raw");
+    if (camera.flow) eyes_.back().flow = output(space + "flow");
     if (!camera.tf_frame.empty() || frames == nullptr) continue;
     subscribers_.push_back(listen<geometry_msgs::PoseStamped>(
         node, space + "measured_cp", 10,
@@ -150,22 +166,24 @@ std::set<std::string> Cameras::topics() const {
   std::set<std::string> names;
   for (const Eye& eye : eyes_) {
     names.insert({eye.left.topic, eye.left.info.topic(), eye.depth.topic, eye.depth.info.topic(),
-                  eye.labels_topic, eye.points.topic()});
-    for (const ImageOutput& right : eye.right) names.insert({right.topic, right.info.topic()});
+                  eye.labels.topic, eye.points.topic()});
+    if (eye.right) names.insert({eye.right->topic, eye.right->info.topic()});
+    if (eye.flow) names.insert(eye.flow->topic);
   }
   return names;
 }
 
-bool Cameras::wanted(const image_transport::Publisher& images, const std::string& topic) const {
-  return images.getNumSubscribers() > 0 || recorder_.wants(topic);
+bool Cameras::wanted(const ImageOutput& output) const {
+  return output.images.getNumSubscribers() > 0 || recorder_.wants(output.topic);
+}
+
+bool Cameras::wanted(const CameraOutput& output) const {
+  return wanted(static_cast<const ImageOutput&>(output)) || output.info.wanted();
 }
 
 bool Cameras::wanted(const Eye& eye) const {
-  const auto any = [this](const ImageOutput& o) {
-    return wanted(o.images, o.topic) || o.info.wanted();
-  };
-  return any(eye.left) || any(eye.depth) || (!eye.right.empty() && any(eye.right[0])) ||
-         wanted(eye.labels, eye.labels_topic) || eye.points.wanted();
+  return wanted(eye.left) || wanted(eye.depth) || (eye.right && wanted(*eye.right)) ||
+         wanted(eye.labels) || (eye.flow && wanted(*eye.flow)) || eye.points.wanted();
 }
 
 void Cameras::on_pose(std::size_t eye, const geometry_msgs::PoseStamped& message) {
@@ -250,33 +268,40 @@ void Cameras::run() {
   }
 }
 
-void Cameras::send(const ImageOutput& output, const Camera& camera, double baseline, bool is_raw,
-                   const boost::shared_ptr<sensor_msgs::Image>& image) {
+void Cameras::send(const ImageOutput& output, const boost::shared_ptr<sensor_msgs::Image>& image) {
   output.images.publish(image);
   recorder_.write(output.topic, boost::shared_ptr<const sensor_msgs::Image>(image),
                   image->header.stamp);
+}
+
+void Cameras::send(const CameraOutput& output, const Camera& camera, double baseline, bool is_raw,
+                   const boost::shared_ptr<sensor_msgs::Image>& image) {
+  send(output, image);
   output.info.send(true, image->header.stamp,
                    [&] { return camera_info(camera, baseline, is_raw, image->header); });
 }
 
 void Cameras::draw(const Picture& picture, const ros::Time& stamp) {
-  const Eye& eye = eyes_[picture.eye];
+  Eye& eye = eyes_[picture.eye];
   const Camera& camera = eye.camera;
   std_msgs::Header header;
   header.stamp = stamp;
   header.frame_id = frame_of(camera);
   namespace enc = sensor_msgs::image_encodings;
-  renderer_.render(camera, picture.pose, images_);
+  const bool has_flow = eye.flow && wanted(*eye.flow);
+  if (!has_flow) eye.last = {};
+  renderer_.render(camera, picture.pose, images_, has_flow ? &eye.last : nullptr);
   if (images_.inside_out > 0.5) {
     WARN_SELDOM(5, "camera %s is inside tissue: it sees the inside of its surface",
                 camera.name.c_str());
   }
   send(eye.left, camera, 0, true, image(images_, enc::RGB8, 3, images_.rgb.data(), header));
-  send(eye.depth, camera, 0, false,
-       image(images_, enc::TYPE_32FC1, sizeof(float), images_.depth.data(), header));
-  const auto labels = image(images_, enc::TYPE_16UC1, 2, images_.labels.data(), header);
-  eye.labels.publish(labels);
-  recorder_.write(eye.labels_topic, boost::shared_ptr<const sensor_msgs::Image>(labels), stamp);
+  send(eye.depth, camera, 0, false, depth_image(images_, camera.depth, header));
+  send(eye.labels, image(images_, enc::TYPE_16UC1, 2, images_.labels.data(), header));
+  if (has_flow) {
+    send(*eye.flow,
+         image(images_, enc::TYPE_32FC2, 2 * sizeof(float), images_.flow.data(), header));
+  }
   if (eye.points.wanted()) {
     CameraImages rectified;
     if (!camera.distortion.empty()) {  // colours where the depth is
@@ -288,13 +313,11 @@ void Cameras::draw(const Picture& picture, const ros::Time& stamp) {
         points(camera, images_, camera.distortion.empty() ? images_.rgb : rectified.rgb, header),
         stamp);
   }
-  if (eye.right.empty()) return;
-  const ImageOutput& right = eye.right[0];
-  if (!wanted(right.images, right.topic) && !right.info.wanted()) return;
+  if (!eye.right || !wanted(*eye.right)) return;
   Pose pose = picture.pose;
   pose.position = picture.pose * Vec3(camera.baseline, 0, 0);
   renderer_.render(camera, pose, images_);
-  send(right, camera, camera.baseline, true,
+  send(*eye.right, camera, camera.baseline, true,
        image(images_, enc::RGB8, 3, images_.rgb.data(), header));
 }
 

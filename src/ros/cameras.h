@@ -11,6 +11,7 @@
 #include <condition_variable>
 #include <deque>
 #include <mutex>
+#include <optional>
 #include <set>
 #include <string>
 #include <thread>
@@ -46,14 +47,17 @@ class Cameras {
   struct ImageOutput {
     image_transport::Publisher images;
     std::string topic;
+  };
+  struct CameraOutput : ImageOutput {
     Output<sensor_msgs::CameraInfo> info;
   };
   struct Eye {
     Camera camera;
-    ImageOutput left, depth;
-    std::vector<ImageOutput> right;  // one, where there is a baseline
-    image_transport::Publisher labels;
-    std::string labels_topic;
+    CameraOutput left, depth;
+    std::optional<CameraOutput> right;  // where there is a baseline
+    ImageOutput labels;
+    std::optional<ImageOutput> flow;
+    LastLook last;  // of the thread, for the flow
     Output<sensor_msgs::PointCloud2> points;
     Throttle due;
     Pose pose;  // under mutex_
@@ -63,12 +67,14 @@ class Cameras {
     Pose pose;
   };
 
-  bool wanted(const image_transport::Publisher& images, const std::string& topic) const;
+  bool wanted(const ImageOutput& output) const;
+  bool wanted(const CameraOutput& output) const;
   bool wanted(const Eye& eye) const;
   void on_pose(std::size_t eye, const geometry_msgs::PoseStamped& message);
   void run();  // the thread
   void draw(const Picture& picture, const ros::Time& stamp);
-  void send(const ImageOutput& output, const Camera& camera, double baseline, bool is_raw,
+  void send(const ImageOutput& output, const boost::shared_ptr<sensor_msgs::Image>& image);
+  void send(const CameraOutput& output, const Camera& camera, double baseline, bool is_raw,
             const boost::shared_ptr<sensor_msgs::Image>& image);
 
   const Frames* frames_;

@@ -114,10 +114,7 @@ void Publications::publish(Simulation& simulation, const FrameReport& report, co
   if (clouds_due && loose_points_.wanted()) {
     loose_points_.publish(cloud(simulation, true, stamp), stamp);
   }
-  // Recorded with all topics, what is made of points would make bags twice as large.
-  const bool surface_due =
-      simulation.tissue().moves_surface() ? surface_.wanted() : surface_.listened();
-  if (clouds_due && surface_due) {
+  if (clouds_due && surface_.wanted()) {
     const bool was_any = !surface_triangles_.fragment.empty();
     const auto message = surface_message(simulation, stamp);
     if (was_any || !surface_triangles_.fragment.empty()) surface_.publish(message, stamp);

@@ -44,6 +44,7 @@ class Publications {
 
   /// Names of the topics as they are in bags.
   std::set<std::string> topics() const;
+  const std::string& surface_topic() const { return surface_.topic(); }
 
   /// The scene, latched: at the start and at every reset.
   void announce(const ros::Time& stamp);

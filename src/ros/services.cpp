@@ -31,6 +31,7 @@ Services::Services(ros::NodeHandle& node, const Scene& scene, SimulationThread& 
   servers_.push_back(node.advertiseService("settle", &Services::settle, this));
   servers_.push_back(node.advertiseService("load_scene", &Services::load_scene, this));
   servers_.push_back(node.advertiseService("save_state", &Services::save_state, this));
+  servers_.push_back(node.advertiseService("save_surface", &Services::save_surface, this));
   servers_.push_back(node.advertiseService("restore_state", &Services::restore_state, this));
   bool (Services::*start)(StartRecording::Request&, StartRecording::Response&) =
       &Services::start_recording;
@@ -109,6 +110,7 @@ std::set<std::string> Services::select(const std::vector<std::string>& topics) c
   std::set<std::string> chosen;
   for (const std::string& topic : topics) {
     const std::string name = node_.resolveName(topic);
+    if (name == node_.resolveName("surface")) all.insert(name);  // of all methods, where asked for
     if (all.count(name) == 0) {
       std::string known;
       for (const std::string& each : all) known += (known.empty() ? "" : ", ") + each;
@@ -233,6 +235,9 @@ bool Services::load_scene(LoadScene::Request& request, LoadScene::Response& resp
                             : scene_from_yaml(request.yaml);
     for (const Body& body : scene.bodies) {
       if (body.shape == Shape::kMesh) permitted(body.mesh, "mesh");
+    }
+    for (const Tool& tool : scene.tools) {
+      if (!tool.mesh.empty()) permitted(tool.mesh, "mesh");
     }
     if (scene.fragment_network != "off") permitted(scene.fragment_network, "network");
     Session session = make_session_(scene);

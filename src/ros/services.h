@@ -8,6 +8,7 @@
 #include <tissue_sim/LoadScene.h>
 #include <tissue_sim/RestoreState.h>
 #include <tissue_sim/SaveState.h>
+#include <tissue_sim/SaveSurface.h>
 #include <tissue_sim/Settle.h>
 #include <tissue_sim/StartRecording.h>
 #include <tissue_sim/Step.h>
@@ -51,8 +52,11 @@ class Services {
   bool settle(Settle::Request& request, Settle::Response& response);
   bool load_scene(LoadScene::Request& request, LoadScene::Response& response);
   bool save_state(SaveState::Request& request, SaveState::Response& response);
+  bool save_surface(SaveSurface::Request& request, SaveSurface::Response& response);
   bool restore_state(RestoreState::Request& request, RestoreState::Response& response);
 
+  /// Writes a new file within the limits; throws std::runtime_error.
+  void keep(const std::string& path, const std::vector<std::uint8_t>& bytes);
   /// Held while a scene is built; throws std::runtime_error where one is.
   std::unique_lock<std::mutex> begin_building();
   /// The present scene from its start. Where it came by load_scene its files are read from where
@@ -70,7 +74,7 @@ class Services {
   std::mutex rebuilding_;  // one at a time; a recording begins before or after
   Scene scene_;
   std::vector<std::string> folders_;           // see Session
-  std::atomic<std::uint64_t> saved_bytes_{0};  // by save_state
+  std::atomic<std::uint64_t> saved_bytes_{0};  // by save_state and save_surface
   std::atomic<bool> records_all_{false};       // the recording that runs or ran last
   std::vector<ros::ServiceServer> servers_;    // last: end before what they call
 };

@@ -2,9 +2,11 @@
 #include <ros/console.h>
 
 #include <algorithm>
+#include <map>
 #include <stdexcept>
 #include <utility>
 
+#include "fragments/piece_colour.h"
 #include "ros/simulation_thread.h"
 
 namespace tissue_sim {
@@ -125,6 +127,20 @@ SavedFrame SimulationThread::save() {
     saved = {session_.simulation->frame(), session_.simulation->save()};
   });
   return saved;
+}
+
+ShownSurface SimulationThread::surface() {
+  ShownSurface shown;
+  call([&] {
+    if (run_.blew_up) throw std::runtime_error(problem_);
+    Tissue& tissue = session_.simulation->tissue();
+    shown.frame = session_.simulation->frame();
+    tissue.read_surface(shown.triangles);
+    std::map<int, std::uint32_t> of_piece;
+    for (const Fragment& f : tissue.fragments()) of_piece[f.id] = piece_colour(f);
+    for (const std::int32_t id : shown.triangles.fragment) shown.colours.push_back(of_piece[id]);
+  });
+  return shown;
 }
 
 void SimulationThread::restore(std::unique_ptr<Simulation> simulation,

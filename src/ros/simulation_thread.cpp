@@ -22,6 +22,9 @@ constexpr std::chrono::milliseconds kHold(20);          // between its forces an
 std::set<std::string> topics_of(const Session& session) {
   std::set<std::string> topics = session.publications->topics();
   for (const auto& tool : *session.tools) topics.merge(tool->topics());
+  if (!session.simulation->tissue().moves_surface()) {
+    topics.erase(session.publications->surface_topic());
+  }
   return topics;
 }
 

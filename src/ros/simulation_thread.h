@@ -32,7 +32,8 @@ struct Session {
   std::shared_ptr<SceneInput> scene_input;
 };
 
-/// Names of the topics that a recording of it holds unless others are asked for: all but markers.
+/// Names of the topics that a recording of it holds unless others are asked for: all but a surface
+/// that is made of points, which replay makes again.
 std::set<std::string> topics_of(const Session& session);
 
 /// What diagnostics says.
@@ -61,6 +62,12 @@ struct CutReply {
 struct SavedFrame {
   std::int64_t frame = 0;
   std::vector<std::uint8_t> state;
+};
+
+struct ShownSurface {
+  std::int64_t frame = 0;
+  SurfaceTriangles triangles;
+  std::vector<std::uint32_t> colours;  ///< 0x00RRGGBB of each, as its piece has
 };
 
 struct StepReply {
@@ -98,6 +105,7 @@ class SimulationThread {
   void reset(std::unique_ptr<Simulation> simulation);
   void replace(Session session);
   SavedFrame save();
+  ShownSurface surface();
   /// Goes on from what `simulation` was restored to, out of `state`.
   void restore(std::unique_ptr<Simulation> simulation, const std::vector<std::uint8_t>& state);
   void record_scene();

@@ -1,9 +1,10 @@
-// Services that keep the state of a simulation as a file, and go on from one.
+// Services that keep the state of a simulation or its surface as a file, and go on from a state.
 #include <ros/console.h>
 
 #include <fstream>
 #include <stdexcept>
 
+#include "geometry/ply.h"
 #include "ros/recording_path.h"
 #include "ros/service_answer.h"
 #include "ros/services.h"
@@ -33,23 +34,39 @@ std::size_t most_bytes(std::size_t at_start) { return 4 * at_start + (std::size_
 
 }  // namespace
 
+void Services::keep(const std::string& path, const std::vector<std::uint8_t>& bytes) {
+  const double needed =
+      static_cast<double>(bytes.size()) + parameters_.recording_reserve * 1024 * 1024;
+  if (free_space(path.substr(0, path.rfind('/'))) < needed) {
+    throw std::runtime_error("the disk has not enough space left (recording_reserve)");
+  }
+  const double limit = parameters_.recording_limit * 1024 * 1024;
+  if (limit > 0 && static_cast<double>(saved_bytes_ + bytes.size()) > limit) {
+    throw std::runtime_error("what was saved would have more than recording_limit: " +
+                             std::to_string(saved_bytes_) + " bytes were written so far");
+  }
+  write_new(path, bytes);
+  saved_bytes_ += bytes.size();
+}
+
 bool Services::save_state(SaveState::Request& request, SaveState::Response& response) {
   return answer(response, "save_state", [&] {
     const std::string path = recording_path(recorder_.folder(), request.path, ".state");
     const SavedFrame saved = simulation_.save();
-    const double needed =
-        static_cast<double>(saved.state.size()) + parameters_.recording_reserve * 1024 * 1024;
-    if (free_space(path.substr(0, path.rfind('/'))) < needed) {
-      throw std::runtime_error("the disk has not enough space left (recording_reserve)");
-    }
-    const double limit = parameters_.recording_limit * 1024 * 1024;
-    if (limit > 0 && static_cast<double>(saved_bytes_ + saved.state.size()) > limit) {
-      throw std::runtime_error("the states that were saved would have more than recording_limit: " +
-                               std::to_string(saved_bytes_) + " bytes were written so far");
-    }
-    write_new(path, saved.state);
-    saved_bytes_ += saved.state.size();
+    keep(path, saved.state);
     response.frame = saved.frame;
+    return path;
+  });
+}
+
+bool Services::save_surface(SaveSurface::Request& request, SaveSurface::Response& response) {
+  return answer(response, "save_surface", [&] {
+    const std::string path = recording_path(recorder_.folder(), request.path, ".ply");
+    const ShownSurface shown = simulation_.surface();
+    const std::string ply = to_ply(shown.triangles, shown.colours);
+    keep(path, {ply.begin(), ply.end()});
+    response.frame = shown.frame;
+    response.triangles = static_cast<std::int32_t>(shown.colours.size());
     return path;
   });
 }

@@ -151,6 +151,15 @@ void check_material(const std::string& path, const Material& m, std::set<std::st
   check_friction(path + ".friction", m.friction);
 }
 
+void check_mesh(const std::string& path, const std::string& mesh, double scale) {
+  check_utf8(path + ".mesh", mesh);
+  if (mesh.size() > kLongestPath) {
+    refuse(path + ".mesh", "a text of " + std::to_string(mesh.size()) + " characters",
+           "no path is so long");
+  }
+  check_range(path + ".scale", scale, 1e-6, 1e3, "m per unit of the file");
+}
+
 // Only the fields that belong to the shape: nobody reads the others.
 void check_shape(const std::string& path, const Body& body) {
   constexpr double kSmallest = 1e-4, kLargest = 10;
@@ -169,12 +178,7 @@ void check_shape(const std::string& path, const Body& body) {
         refuse(path + ".mesh", quoted(body.mesh),
                "must be the path of a mesh file (plain, file:// or package://)");
       }
-      check_utf8(path + ".mesh", body.mesh);
-      if (body.mesh.size() > kLongestPath) {
-        refuse(path + ".mesh", "a text of " + std::to_string(body.mesh.size()) + " characters",
-               "no path is so long");
-      }
-      return check_range(path + ".scale", body.scale, 1e-6, 1e3, "m per unit of the file");
+      return check_mesh(path, body.mesh, body.scale);
   }
 }
 
@@ -222,6 +226,7 @@ void check_tool(const std::string& path, const Tool& tool, std::set<std::string>
       break;
   }
   check_friction(path + ".friction", tool.friction);
+  check_mesh(path, tool.mesh, tool.scale);
 }
 
 void check_camera(const std::string& path, const Camera& camera, std::set<std::string>& names) {
@@ -243,6 +248,7 @@ void check_camera(const std::string& path, const Camera& camera, std::set<std::s
     refuse(path + ".far", text(camera.far), "must be above near, " + text(camera.near));
   }
   check_enum(path + ".colours", camera.colours, kCameraColourNames);
+  check_enum(path + ".depth", camera.depth, kDepthUnitNames);
   check_range(path + ".stress_end", camera.stress_end, 1, 1e9, "Pa");
   if (!camera.distortion.empty() && camera.distortion.size() != 5) {
     refuse(path + ".distortion", "a list of " + std::to_string(camera.distortion.size()),

@@ -35,6 +35,8 @@ inline constexpr Spelling<CameraColours> kCameraColourNames[] = {
     {CameraColours::kTissue, "tissue"},
     {CameraColours::kFragments, "fragments"},
     {CameraColours::kStress, "stress"}};
+inline constexpr Spelling<DepthUnit> kDepthUnitNames[] = {{DepthUnit::kMetres, "metres"},
+                                                          {DepthUnit::kMillimetres, "millimetres"}};
 inline constexpr Spelling<ToolType> kToolTypeNames[] = {
     {ToolType::kScalpel, "scalpel"}, {ToolType::kProbe, "probe"}, {ToolType::kGrasper, "grasper"},
     {ToolType::kBall, "ball"},       {ToolType::kPunch, "punch"}, {ToolType::kPlate, "plate"}};

@@ -136,6 +136,10 @@ void write(YAML::Emitter& out, const Tool& tool) {
     if (field == "cohesion") write(out, "cohesion", tool.cohesion);
   }
   write(out, "friction", tool.friction);
+  if (!tool.mesh.empty()) {
+    write(out, "mesh", tool.mesh);
+    write(out, "scale", tool.scale);
+  }
   out << EndMap;
 }
 
@@ -159,7 +163,9 @@ void write(YAML::Emitter& out, const Camera& camera) {
   write(out, "stress_end", camera.stress_end);
   out << Key << "distortion" << Value << Flow << BeginSeq;
   for (const double d : camera.distortion) out << text(d);
-  out << EndSeq << EndMap;
+  out << EndSeq;
+  write(out, "depth", std::string(name_of(camera.depth, kDepthUnitNames)));
+  out << Key << "flow" << Value << camera.flow << EndMap;
 }
 
 template <class Item>

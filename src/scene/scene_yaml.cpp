@@ -142,10 +142,10 @@ Body read_body(const YAML::Node& node, const std::string& path) {
 }
 
 Tool read_tool(const YAML::Node& node, const std::string& path) {
-  const YamlFields fields(
-      node, path,
-      {"name", "type", "radius", "length", "edge_radius", "size", "blade_length", "blade_width",
-       "blade_thickness", "jaw_length", "jaw_width", "grip_pressure", "cohesion", "friction"});
+  const YamlFields fields(node, path,
+                          {"name", "type", "radius", "length", "edge_radius", "size",
+                           "blade_length", "blade_width", "blade_thickness", "jaw_length",
+                           "jaw_width", "grip_pressure", "cohesion", "friction", "mesh", "scale"});
   Tool tool;
   fields.read("name", tool.name);
   fields.read("type", tool.type, kToolTypeNames);
@@ -162,6 +162,8 @@ Tool read_tool(const YAML::Node& node, const std::string& path) {
   fields.read("grip_pressure", tool.grip_pressure);
   fields.read("cohesion", tool.cohesion);
   fields.read("friction", tool.friction);
+  fields.read("mesh", tool.mesh);
+  fields.read("scale", tool.scale);
   return tool;
 }
 
@@ -169,7 +171,7 @@ Camera read_camera(const YAML::Node& node, const std::string& path) {
   const YamlFields fields(
       node, path,
       {"name", "width", "height", "hfov", "rate", "baseline", "pose", "tf_frame", "near", "far",
-       "light", "colours", "stress_end", "distortion"});
+       "light", "colours", "stress_end", "distortion", "depth", "flow"});
   Camera camera;
   fields.read("name", camera.name);
   fields.read("width", camera.width);
@@ -187,6 +189,8 @@ Camera read_camera(const YAML::Node& node, const std::string& path) {
   fields.read("colours", camera.colours, kCameraColourNames);
   fields.read("stress_end", camera.stress_end);
   fields.read("distortion", camera.distortion, 5);
+  fields.read("depth", camera.depth, kDepthUnitNames);
+  fields.read("flow", camera.flow);
   return camera;
 }
 

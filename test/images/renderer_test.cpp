@@ -4,10 +4,14 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <cstdlib>
 #include <cstring>
+#include <map>
 #include <set>
+#include <vector>
 
 #include "cut_paths.h"
+#include "temporary_folder.h"
 #include "test_scenes.h"
 #include "tools/tool_shapes.h"
 
@@ -229,6 +233,194 @@ TEST_F(Renders, TheSameViewHasTheSameBitsWithAnyThreads) {
   EXPECT_EQ(std::memcmp(one.depth.data(), more.depth.data(), 4 * one.depth.size()), 0);
 }
 
+TEST_F(Renders, ColoursHaveTheSameBitsWithAnyInstructions) {
+  Simulation simulation(scene_of());
+  const Camera camera = from_above(0.06, 61);
+  ASSERT_EQ(setenv("TISSUE_SIM_INSTRUCTION_SET", "sse2", 1), 0);
+  const CameraImages least = seen(simulation, camera);
+  unsetenv("TISSUE_SIM_INSTRUCTION_SET");
+  EXPECT_EQ(least.rgb, seen(simulation, camera).rgb);
+}
+
+/// Of the place that a pixel sees, in pixels of another look.
+Eigen::Vector2d pixel_of(const Camera& camera, const Pose& eye, const Vec3& place) {
+  const Vec3 x = eye.orientation.conjugate() * (place - eye.position);
+  return camera.focal_length() * Eigen::Vector2d(x.x(), x.y()) / x.z() +
+         0.5 * Eigen::Vector2d(camera.width - 1, camera.height - 1);
+}
+
+/// A camera that moves and turns sees tissue that moves and is cut, the ground and a tool: each
+/// pixel's point is found in the last image by its rest place.
+TEST_F(Renders, FlowIsTheWayOfEachPixelsPointSinceTheLastImage) {
+  for (const Method method : {Method::kMpm, Method::kMls, Method::kPbd}) {
+    Tool ball;
+    ball.type = ToolType::kBall;
+    ball.radius = 0.004;
+    Scene scene = scene_of({ball});
+    scene.method = method;
+    scene.gravity = Vec3(0, 0, -9.81);
+    scene.bodies[0].pose.position.z() = 0.03;  // falls
+    Simulation simulation(scene);
+    Renderer renderer(scene, 2);
+    const Camera camera = from_above(0.12);
+    Pose eyes[2] = {camera.pose, camera.pose};
+    eyes[1].position += Vec3(0.003, -0.002, 0.004);
+    eyes[1].orientation = eyes[1].orientation * Quat(Eigen::AngleAxisd(0.1, Vec3::UnitZ()));
+    FrameRequest request;
+    request.tools = {ToolRequest()};
+    SceneView views[2];
+    CameraImages images;
+    LastLook last;
+    Pose tips[2];
+    for (int k = 0; k < 2; ++k) {
+      tips[k].position = Vec3(0.03, 0.005 * k, 0.05);
+      tips[k].orientation = Quat(Eigen::AngleAxisd(0.3 * k, Vec3::UnitX()));
+      request.tools[0]->pose = tips[k];
+      request.cuts.clear();
+      if (k == 1) request.cuts = {plane_cut(Vec3(0, 0, 0.03), Vec3(1, 0.2, 0))};
+      for (int frame = 0; frame < (k == 0 ? 1 : 2); ++frame) simulation.advance_frame(request);
+      read_view(simulation, views[k]);
+      renderer.show(views[k]);
+      renderer.render(camera, eyes[k], images, &last);
+      if (k == 1) break;
+      EXPECT_EQ(images.flow.size(), 2u * camera.width * camera.height);
+      for (const float f : images.flow) EXPECT_TRUE(std::isnan(f)) << "of the first image";
+    }
+    // Which of the first view's triangles has these corners at rest.
+    std::map<std::vector<float>, std::size_t> first;
+    const auto at_rest = [](const SurfaceTriangles& s, std::size_t t) {
+      return std::vector<float>(&s.rest[9 * t], &s.rest[9 * t] + 9);
+    };
+    for (std::size_t t = 0; t < views[0].surface.fragment.size(); ++t) {
+      first[at_rest(views[0].surface, t)] = t;
+    }
+    int checked = 0, opened = 0, of_ground = 0, of_tool = 0;
+    for (int y = 0; y < camera.height; ++y) {
+      for (int x = 0; x < camera.width; ++x) {
+        const int i = y * camera.width + x;
+        if (images.labels[i] == kNoLabel) continue;
+        const Vec3 along =
+            eyes[1].orientation * (camera.pose.orientation.conjugate() * ray(camera, x, y));
+        const Vec3 place = eyes[1].position + images.depth[i] * along;
+        Vec3 before = place;
+        if (images.labels[i] == kFirstToolLabel) {
+          ++of_tool;
+          before = tips[0] * (tips[1].orientation.conjugate() * (place - tips[1].position));
+        } else if (images.labels[i] == kGroundLabel) {
+          ++of_ground;
+        } else {
+          const SurfaceTriangles& s = views[1].surface;
+          double nearest = INFINITY;
+          std::size_t hit = 0;
+          Vec3 weights = Vec3::Zero();
+          for (std::size_t t = 0; t < s.fragment.size(); ++t) {
+            Eigen::Matrix3d c;
+            for (int k = 0; k < 9; ++k) c(k % 3, k / 3) = s.corners[9 * t + k] - place[k % 3];
+            const Vec3 normal = (c.col(1) - c.col(0)).cross(c.col(2) - c.col(0));
+            const double off = std::fabs(normal.normalized().dot(c.col(0)));
+            Vec3 w;
+            for (int k = 0; k < 3; ++k) {
+              w[k] =
+                  c.col((k + 1) % 3).cross(c.col((k + 2) % 3)).dot(normal) / normal.squaredNorm();
+            }
+            if (w.minCoeff() < -1e-4 || off > nearest) continue;
+            nearest = off, hit = t, weights = w;
+          }
+          const auto found = first.find(at_rest(s, hit));
+          if (found == first.end()) {
+            opened += std::isnan(images.flow[2 * i]);
+            continue;
+          }
+          before.setZero();
+          for (int k = 0; k < 9; ++k) {
+            before[k % 3] += weights[k / 3] * views[0].surface.corners[9 * found->second + k];
+          }
+        }
+        ++checked;
+        const Eigen::Vector2d moved = Eigen::Vector2d(x, y) - pixel_of(camera, eyes[0], before);
+        ASSERT_NEAR(images.flow[2 * i], moved.x(), 0.1) << x << ", " << y;
+        ASSERT_NEAR(images.flow[2 * i + 1], moved.y(), 0.1) << x << ", " << y;
+      }
+    }
+    EXPECT_GT(checked, 5000);
+    EXPECT_GT(of_ground, 100);
+    EXPECT_GT(of_tool, 20);
+    EXPECT_GT(opened, 0) << "what the cut opened was not there";
+  }
+}
+
+/// A box as a text STL in millimetres, its face at z = 0.
+std::string box_stl(const Vec3& size) {
+  std::string text = "solid box\n";
+  for (int axis = 0; axis < 3; ++axis) {
+    for (const int side : {-1, 1}) {
+      const int b = (axis + (side > 0 ? 1 : 2)) % 3, c = 3 - axis - b;
+      const double square[6][2] = {{-1, -1}, {1, -1}, {1, 1}, {-1, -1}, {1, 1}, {-1, 1}};
+      for (int i = 0; i < 6; ++i) {
+        Vec3 x = Vec3::Constant(side);
+        x[b] = square[i][0], x[c] = square[i][1];
+        x = 500 * x.cwiseProduct(size) - Vec3(0, 0, 500 * size.z());
+        text += i % 3 == 0 ? "facet normal 0 0 0\nouter loop\n" : "";
+        text += "vertex " + std::to_string(x.x()) + " " + std::to_string(x.y()) + " " +
+                std::to_string(x.z()) + "\n";
+        text += i % 3 == 2 ? "endloop\nendfacet\n" : "";
+      }
+    }
+  }
+  return text + "endsolid box\n";
+}
+
+TEST_F(Renders, AToolsMeshInPlaceOfItsShapes) {
+  const TemporaryFolder folder;
+  Tool plate;
+  plate.type = ToolType::kPlate;
+  plate.size = Vec3(0.02, 0.01, 0.004);
+  plate.edge_radius = 0.001;
+  const std::string path = folder.write("plate.stl", box_stl(plate.size));
+  FrameRequest request;
+  request.tools = {ToolRequest()};
+  request.tools[0]->pose.position = Vec3(0.004, 0, 0.04);
+  request.tools[0]->pose.orientation =
+      Quat(Eigen::AngleAxisd(0.4, Vec3(0.5, 0.7, 0.2).normalized()));
+  CameraImages images[2];
+  for (const int k : {0, 1}) {
+    if (k == 1) plate.mesh = path, plate.scale = 0.001;
+    Simulation simulation(scene_of({plate}));
+    simulation.advance_frame(request);
+    images[k] = seen(simulation, from_above(0.1));
+  }
+  int of_tool = 0, others = 0;
+  for (std::size_t i = 0; i < images[0].labels.size(); ++i) {
+    of_tool += images[1].labels[i] == kFirstToolLabel;
+    if (images[0].labels[i] != images[1].labels[i]) {
+      ++others;
+      continue;
+    }
+    EXPECT_NEAR(images[0].depth[i], images[1].depth[i], 1e-6);
+  }
+  EXPECT_GT(of_tool, 300);
+  EXPECT_LE(others, 2) << "at edges";
+
+  plate.mesh = folder.path() + "/missing.stl";
+  try {
+    Renderer(scene_of({plate}), 1);
+    ADD_FAILURE() << "a mesh that is missing";
+  } catch (const std::invalid_argument& e) {
+    EXPECT_NE(std::string(e.what()).find("missing.stl"), std::string::npos) << e.what();
+  }
+}
+
+TEST_F(Renders, ACameraBehindTheGroundSeesItsUnderside) {
+  Simulation simulation(scene_of());
+  Camera camera = from_above(-0.05);
+  camera.pose.orientation = Quat::Identity();  // upwards
+  const CameraImages images = seen(simulation, camera);
+  for (std::size_t i = 0; i < images.labels.size(); ++i) {
+    ASSERT_EQ(images.labels[i], kGroundLabel);
+    ASSERT_NEAR(images.depth[i], 0.05, 1e-6);
+  }
+}
+
 TEST_F(Renders, ACameraWithinTissueSeesItsInside) {
   Simulation simulation(scene_of());
   Camera camera = from_above(0.01);
@@ -258,6 +450,7 @@ TEST(Cameras, AreRefusedOutOfRange) {
   EXPECT_NE(refused("width: 0").find("cameras[0].width is 0"), std::string::npos);
   EXPECT_NE(refused("height: 20000").find("cameras[0].height is 20000"), std::string::npos);
   EXPECT_NE(refused("near: 1, far: 0.5").find("cameras[0].far is 0.5"), std::string::npos);
+  EXPECT_NE(refused("depth: inches").find("cameras[0].depth is inches"), std::string::npos);
   EXPECT_NE(refused("hfov: .nan").find("cameras[0].hfov is .nan"), std::string::npos);
   EXPECT_NE(refused("distortion: [1, 2]").find("must be 5 numbers"), std::string::npos);
 }
@@ -269,6 +462,8 @@ TEST(Cameras, ComeBackFromYaml) {
   camera.baseline = 0.005;
   camera.colours = CameraColours::kFragments;
   camera.distortion = {-0.2, 0.05, 0.001, -0.002, 0};
+  camera.depth = DepthUnit::kMillimetres;
+  camera.flow = true;
   scene.cameras = {camera};
   const std::string text = scene_to_yaml(scene);
   EXPECT_EQ(scene_to_yaml(scene_from_yaml(text)), text);

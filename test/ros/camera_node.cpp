@@ -25,6 +25,12 @@ float depth_at(const Image& image, int x, int y) {
   return depth;
 }
 
+int millimetres_at(const Image& image, int x, int y) {
+  std::uint16_t depth;
+  std::memcpy(&depth, &image.data[y * image.step + 2 * x], 2);
+  return depth;
+}
+
 int label_at(const Image& image, int x, int y) {
   std::uint16_t label;
   std::memcpy(&label, &image.data[y * image.step + 2 * x], 2);
@@ -113,6 +119,40 @@ TEST_F(Camera, FollowsItsTopic) {
   EXPECT_NEAR(depth_at(*d, 0, 0), 0.15, 1e-5);
 }
 
+/// The ground seen from straight above: what a camera that moves sideways sees moves back.
+TEST_F(Camera, FlowIsSinceTheLastImage) {
+  ros::NodeHandle node;
+  ros::Publisher pose =
+      node.advertise<geometry_msgs::PoseStamped>("/simulator/endoscope/measured_cp", 1, true);
+  Topic<Image> flow("/simulator/endoscope/flow"), depth("/simulator/endoscope/depth/image_rect");
+  Topic<CameraInfo> info("/simulator/endoscope/left/camera_info");
+  ASSERT_TRUE(wait_until([&] { return pose.getNumSubscribers() > 0; }));
+  geometry_msgs::PoseStamped m;
+  m.pose.orientation.x = 1;
+  const auto seen_from = [&](double x) {  // the first image from there
+    m.pose.position.x = x;
+    m.pose.position.z = 0.12;
+    pose.publish(m);
+    boost::shared_ptr<const Image> image;
+    wait_until([&] {
+      image = of_next_frame(flow);
+      float moved = NAN;
+      if (image) std::memcpy(&moved, image->data.data(), 4);
+      return std::fabs(moved) > 0.01;
+    });
+    return image;
+  };
+  seen_from(0.01);
+  const auto image = seen_from(0.004);
+  ASSERT_TRUE(image);
+  EXPECT_EQ(image->encoding, "32FC2");
+  float moved[2];
+  std::memcpy(moved, image->data.data(), 8);
+  ASSERT_TRUE(info.last());
+  EXPECT_NEAR(moved[0], info.last()->P[0] * 0.006 / 0.12, 0.01);
+  EXPECT_NEAR(moved[1], 0, 0.01);
+}
+
 TEST_F(Camera, FollowsATfFrame) {
   ros::NodeHandle node;
   ros::Publisher tf = node.advertise<tf2_msgs::TFMessage>("/tf", 1);
@@ -131,8 +171,9 @@ TEST_F(Camera, FollowsATfFrame) {
     tf.publish(m);
     ros::WallDuration(0.1).sleep();
     if (!step(1).success || depth.count() == 0) return false;
-    return std::fabs(depth_at(*depth.all().back(), 0, 0) - 0.2) < 1e-5;
+    return millimetres_at(*depth.all().back(), 0, 0) == 200;
   }));
+  EXPECT_EQ(depth.last()->encoding, "16UC1");
   ASSERT_TRUE(raw.last());
   ASSERT_TRUE(rect.last());
   EXPECT_EQ(depth.last()->header.frame_id, "side_camera");

@@ -231,6 +231,19 @@ TEST_F(Recording, OnlyTheTopicsThatAreAskedForAndWhatAReplayNeeds) {
   EXPECT_EQ(counts["/simulator/scene"], 1);
 }
 
+/// Made of points, it would make a recording of everything twice as large; asked for, it comes.
+TEST_F(Recording, TheSurfaceOfPointsOnlyIfItIsAskedFor) {
+  for (const bool asked : {false, true}) {
+    const std::string name = asked ? "surface" : "all";
+    ASSERT_TRUE(asked ? start(name, {"surface"}).success : start(name).success);
+    step(3);
+    ASSERT_TRUE(trigger("stop_recording").success);
+    rosbag::Bag bag(path(name), rosbag::bagmode::Read);
+    rosbag::View surfaces(bag, rosbag::TopicQuery("/simulator/surface"));
+    EXPECT_EQ(surfaces.size() > 0, asked);
+  }
+}
+
 TEST_F(Recording, NamesThatLeaveTheFolderOrExistAreRefused) {
   const auto refused = [](const std::string& name, const std::string& reason) {
     const StartRecording::Response reply = start(name);

@@ -3,7 +3,12 @@
 #include <sensor_msgs/JointState.h>
 #include <std_msgs/String.h>
 #include <tissue_sim/LoadScene.h>
+#include <tissue_sim/SaveSurface.h>
+#include <visualization_msgs/Marker.h>
 
+#include <cstdio>
+
+#include "geometry/mesh.h"
 #include "simulator_client.h"
 
 namespace tissue_sim {
@@ -92,6 +97,46 @@ TEST_F(Services, LoadSceneTakesAnotherOneAndRefusesABadOne) {
   back.path = path;
   ASSERT_TRUE(call<LoadScene>("load_scene", back).success);
   EXPECT_TRUE(wait_until([&] { return state.last()->particles == kPoints; }));
+}
+
+/// What RViz is shown and what the file holds are one surface, of each method.
+TEST_F(Services, SaveSurfaceWritesWhatIsShown) {
+  Topic<visualization_msgs::Marker> surface("/simulator/surface");
+  Topic<std_msgs::String> scenes("/simulator/scene");
+  ASSERT_TRUE(scenes.last());
+  LoadScene::Request before;
+  before.yaml = scenes.last()->data;
+  for (const std::string method : {"mpm", "mls", "pbd"}) {
+    LoadScene::Request scene;
+    scene.yaml = "method: " + method +
+                 "\ncell_size: 0.005\ngravity: [0, 0, 0]\n"
+                 "bodies: [{shape: box, size: [0.03, 0.02, 0.02], pose: {position: [0, 0, 0.05]}}]";
+    ASSERT_TRUE(call<LoadScene>("load_scene", scene).success);
+    ASSERT_TRUE(pause(true).success);
+    std::size_t shown = 0;
+    ASSERT_TRUE(wait_until([&] {
+      const std::size_t count = surface.count();
+      return step(1).success && wait_until([&] { return surface.count() > count; }, 1);
+    })) << method;
+    shown = surface.all().back()->points.size() / 3;
+    SaveSurface::Request save;
+    const auto stamp = ros::WallTime::now().toNSec();
+    save.path = "surface_" + method + std::to_string(stamp);
+    const SaveSurface::Response saved = call<SaveSurface>("save_surface", save);
+    ASSERT_TRUE(saved.success) << saved.message;
+    EXPECT_EQ(static_cast<std::size_t>(saved.triangles), shown) << method;
+    TriangleMesh mesh = read_mesh(saved.message);
+    EXPECT_EQ(mesh.triangles.size(), shown) << method;
+    std::vector<std::string> notes;
+    make_solid(mesh, notes);  // throws for a surface that is open
+    EXPECT_NEAR(signed_volume(mesh), 0.03 * 0.02 * 0.02, 0.02 * 0.03 * 0.02 * 0.02) << method;
+    EXPECT_FALSE(call<SaveSurface>("save_surface", save).success) << "nothing is overwritten";
+    std::remove(saved.message.c_str());
+  }
+  SaveSurface::Request outside;
+  outside.path = "../surface";
+  EXPECT_FALSE(call<SaveSurface>("save_surface", outside).success);
+  EXPECT_TRUE(call<LoadScene>("load_scene", before).success) << "for the other tests";
 }
 
 TEST(Nodelet, RunsTheSameSimulator) {

@@ -4,7 +4,6 @@
 
 #include "pbd/cuda/on_device.h"
 #include "pbd/find_touches.h"
-#include "pbd/viscosity.h"
 
 namespace tissue_sim {
 namespace {
@@ -47,7 +46,7 @@ void CudaPbdTissue::push() {
   const pbd::Vertices& v = state_->vertices;
   upload(v.x, v.x.size() / 4, d.x, d.stream);
   upload(v.predicted, v.size(), d.predicted, d.stream);
-  upload(v.v, v.size(), d.v, d.stream);
+  upload(v.v, v.v.size() / 4, d.v, d.stream);
   d.wait("receive data");
   d.host_is_current = true;
 }
@@ -75,6 +74,7 @@ void CudaPbdTissue::upload_constraints() {
   d.wait("receive data");
   d.step_graph.clear();
   d.projections.clear();
+  d.damping.clear();
 }
 
 void CudaPbdTissue::pull() {
@@ -158,12 +158,7 @@ void CudaPbdTissue::run_steps(const FrameColliders& colliders, int steps, float 
   d.host_is_current = false;
   d.wait("advance");
   take_loads(colliders, steps);
-  if (chunks > 0) keep_momentum(steps, h);
-  if (!pbd::viscosities(*state_).empty()) {
-    pull();
-    pbd::damp_neighbours(*state_, steps * h);
-    push();
-  }
+  keep_momentum(steps, h);
 }
 
 void CudaPbdTissue::take_loads(const FrameColliders& colliders, int steps) {

@@ -3,13 +3,15 @@
 
 #include <memory>
 
+#include "pbd/free_flight.h"
 #include "pbd/pbd_tissue.h"
 
 namespace tissue_sim {
 
 namespace pbd {
+struct CudaPbdFlight;
 struct CudaPbdFrame;
-}
+}  // namespace pbd
 
 /// Motion lives on the GPU, and comes to the host where something asks for it. Meshes, constraints,
 /// their colours, cuts and pieces are the host's, as on the CPU: what a cut changes goes up.
@@ -55,7 +57,12 @@ class CudaPbdTissue final : public PbdTissue {
   int upload_touches(double duration);  ///< returns their colours
   void upload_frame(const FrameColliders& colliders, int steps, const pbd::CudaPbdFrame& frame);
   void take_loads(const FrameColliders& colliders, int steps);
+  /// What hangs together, by the sums of the chunks, but for what is held.
+  std::vector<pbd::Flight> flights(const pbd::CudaPbdFlight* of_chunks) const;
+  /// Momentum of what flies freely is kept, and viscosity acts.
   void keep_momentum(int steps, float h);
+  /// `weigh`: what dampers need of each vertex goes beside its velocity, else it goes.
+  void change_rigidly(const std::vector<pbd::RigidChange>& changes, bool weigh);
 
   std::unique_ptr<OnDevice> device_;
 };

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <tuple>
 
 #include "pbd/model.h"
 
@@ -25,6 +26,8 @@ constexpr double kRecovery = 0.1;
 /// Vertices of a piece that touches others, at least: crumbs, slivers for the most part, shook.
 constexpr int kLeastPiece = 60;
 
+constexpr int kTrianglesOfPart = 256;
+
 /// Whether a triangle is so thin that single precision hardly knows its normal.
 bool is_sliver(const Vec3& a, const Vec3& b, const Vec3& c, double mean_edge) {
   const double longest2 =
@@ -36,27 +39,47 @@ bool is_sliver(const Vec3& a, const Vec3& b, const Vec3& c, double mean_edge) {
 /// kMostCells there, as of tissue that nothing holds in shape, of one as coarse as it takes.
 class Cells {
  public:
+  /// A vertex where all that is asked of it lies side by side.
+  struct Entry {
+    float x[3], normal[3];
+    std::int32_t vertex, piece;
+  };
+
   explicit Cells(double size) : size_(size) {}
-  void add(std::int32_t vertex, const Vec3& x) {
-    if (x.allFinite()) vertices_.emplace_back(vertex, x);
+  void add(std::int32_t vertex, std::int32_t piece, const Vec3& x, const Vec3& normal) {
+    if (!x.allFinite()) return;
+    const Eigen::Vector3f at = x.cast<float>(), n = normal.stableNormalized().cast<float>();
+    entries_.push_back({{at[0], at[1], at[2]}, {n[0], n[1], n[2]}, vertex, piece});
   }
-  /// Vertices in the cells that a box overlaps.
-  template <class F>
-  void each_in(const Vec3& low, const Vec3& high, const F& of) {
-    if (!low.allFinite() || !high.allFinite()) return;
+  /// Which lattice a box is looked up in, filled now; -1 for none.
+  int level_of(const Vec3& low, const Vec3& high) {
+    if (!low.allFinite() || !high.allFinite()) return -1;
     double size = size_;
     std::size_t level = 0;
     for (; cells(size, low, high) > kMostCells; size *= 2) ++level;
     while (levels_.size() <= level) levels_.emplace_back();
     if (levels_[level].slots.empty()) fill(size, levels_[level]);
+    return static_cast<int>(level);
+  }
+  /// Vertices of other pieces in the cells that a box overlaps.
+  template <class F>
+  void each_in(int level, const Vec3& low, const Vec3& high, std::int32_t piece,
+               const F& of) const {
     const Level& l = levels_[level];
-    for (std::int64_t i = cell(size, low.x()); i <= cell(size, high.x()); ++i) {
-      for (std::int64_t j = cell(size, low.y()); j <= cell(size, high.y()); ++j) {
-        for (std::int64_t k = cell(size, low.z()); k <= cell(size, high.z()); ++k) {
+    const double size = size_ * std::ldexp(1.0, level);
+    std::int64_t first[3], last[3];
+    for (int a = 0; a < 3; ++a) {
+      first[a] = cell(size, low[a]);
+      last[a] = cell(size, high[a]);
+    }
+    for (std::int64_t i = first[0]; i <= last[0]; ++i) {
+      for (std::int64_t j = first[1]; j <= last[1]; ++j) {
+        for (std::int64_t k = first[2]; k <= last[2]; ++k) {
           const std::uint64_t wanted = key(i, j, k);
-          std::size_t at = l.slots[l.slot(wanted)];
-          for (; at < l.entries.size() && l.entries[at].first == wanted; ++at) {
-            of(l.entries[at].second);
+          for (std::size_t r = l.slots[l.slot(wanted)];
+               r < l.runs.size() && l.runs[r].cell == wanted; ++r) {
+            if (l.runs[r].piece == piece) continue;
+            for (std::int32_t e = l.runs[r].begin; e < l.runs[r].end; ++e) of(l.entries[e]);
           }
         }
       }
@@ -65,14 +88,21 @@ class Cells {
 
  private:
   static constexpr double kMostCells = 216;
+  /// What a cell has of a piece.
+  struct Run {
+    std::uint64_t cell;
+    std::int32_t piece, begin, end;
+  };
   struct Level {
-    std::vector<std::pair<std::uint64_t, std::int32_t>> entries;  ///< sorted by cell
-    std::vector<std::size_t> slots;  ///< a hash table: a cell's first entry, or behind the last
+    std::vector<Entry> entries;  ///< by cell, then by piece
+    std::vector<Run> runs;
+    std::vector<std::size_t> slots;  ///< a hash table: a cell's first run, or behind the last
+    int shift;                       ///< the upper bits of a product depend on all of a key
 
     std::size_t slot(std::uint64_t wanted) const {
       const std::size_t mask = slots.size() - 1;
-      std::size_t at = (wanted * 0x9e3779b97f4a7c15u >> 20) & mask;
-      while (slots[at] < entries.size() && entries[slots[at]].first != wanted) at = (at + 1) & mask;
+      std::size_t at = (wanted * 0x9e3779b97f4a7c15u) >> shift;
+      while (slots[at] < runs.size() && runs[slots[at]].cell != wanted) at = (at + 1) & mask;
       return at;
     }
   };
@@ -90,46 +120,62 @@ class Cells {
     return product;
   }
   void fill(double size, Level& level) const {
-    for (const auto& [v, x] : vertices_) {
-      level.entries.emplace_back(key(cell(size, x.x()), cell(size, x.y()), cell(size, x.z())), v);
+    struct Key {
+      std::uint64_t cell;
+      std::int32_t piece, entry;
+      bool operator<(const Key& o) const {
+        return std::tie(cell, piece, entry) < std::tie(o.cell, o.piece, o.entry);
+      }
+    };
+    std::vector<Key> keys;
+    for (const Entry& e : entries_) {
+      keys.push_back({key(cell(size, e.x[0]), cell(size, e.x[1]), cell(size, e.x[2])), e.piece,
+                      static_cast<std::int32_t>(keys.size())});
     }
-    std::sort(level.entries.begin(), level.entries.end());
+    std::sort(keys.begin(), keys.end());
+    for (const Key& k : keys) {
+      const auto at = static_cast<std::int32_t>(level.entries.size());
+      if (level.runs.empty() || level.runs.back().cell != k.cell ||
+          level.runs.back().piece != k.piece) {
+        level.runs.push_back({k.cell, k.piece, at, at});
+      }
+      level.entries.push_back(entries_[k.entry]);
+      level.runs.back().end = at + 1;
+    }
     std::size_t count = 16;
-    while (count < 2 * level.entries.size()) count *= 2;
-    level.slots.assign(count, level.entries.size());
-    for (std::size_t e = 0; e < level.entries.size(); ++e) {
-      const std::uint64_t own = level.entries[e].first;
-      if (e == 0 || level.entries[e - 1].first != own) level.slots[level.slot(own)] = e;
+    for (level.shift = 60; count < 2 * level.runs.size(); --level.shift) count *= 2;
+    level.slots.assign(count, level.runs.size());
+    for (std::size_t r = 0; r < level.runs.size(); ++r) {
+      const std::uint64_t own = level.runs[r].cell;
+      if (r == 0 || level.runs[r - 1].cell != own) level.slots[level.slot(own)] = r;
     }
   }
 
   double size_;  ///< of the finest lattice's cells [m]
-  std::vector<std::pair<std::int32_t, Vec3>> vertices_;
+  std::vector<Entry> entries_;
   std::vector<Level> levels_;
 };
 
 /// A place above a triangle: its height, and the shares of the corners b and c in what is below.
 struct Above {
   double height, b, c;
-  double beside() const { return std::max({0.0, -b, -c, b + c - 1}); }
+  double beside() const { return std::max(std::max(0.0, -b), std::max(-c, b + c - 1)); }
 };
 
 /// A triangle, with what is the same for all places above it.
 struct TouchedTriangle {
-  Vec3 a, e, f, n;
-  double n2, length;
+  Vec3 a, up, to_b, to_c;  ///< a corner; height and shares grow along these
 
-  TouchedTriangle(const Vec3& corner, const Vec3& b, const Vec3& c)
-      : a(corner),
-        e(b - a),
-        f(c - a),
-        n(e.cross(f)),
-        n2(n.squaredNorm() + 1e-300),
-        length(std::sqrt(n2)) {}
-  double height(const Vec3& x) const { return (x - a).dot(n) / length; }
+  TouchedTriangle(const Vec3& corner, const Vec3& b, const Vec3& c) : a(corner) {
+    const Vec3 e = b - a, f = c - a, n = e.cross(f);
+    const double n2 = n.squaredNorm() + 1e-300;
+    up = n / std::sqrt(n2);
+    to_b = f.cross(n) / n2;
+    to_c = n.cross(e) / n2;
+  }
   Above above(const Vec3& x) const {
     const Vec3 r = x - a;
-    return {r.dot(n) / length, r.cross(f).dot(n) / n2, e.cross(r).dot(n) / n2};
+    return {r.dot(up), r.dot(to_b), r.dot(to_c)};
   }
 };
 
@@ -186,73 +232,97 @@ void find_touches(State& s, double duration) {
              (boxes[c].max - low).minCoeff() >= 0;
     });
   };
-  Cells cells(2 * s.mean_edge);
+  Cells cells(s.mean_edge);
   for (int i = 0; i < v.size(); ++i) {
     const Vec3 x = v.position(i);
     if (v.surface[i] != 0 && !is_crumb(i) && meets_other(s.component[i], x, x, reached)) {
-      cells.add(i, x);
+      cells.add(i, s.component[i], x, normal[i]);
     }
   }
-  struct Found {
-    std::int32_t piece, triangle;
-    double off;
-    Above at;
+  struct Candidate {
+    std::int32_t triangle;
+    int level;
+    Vec3 low, high;  ///< of where it looks
   };
-  std::vector<std::vector<Found>> found_of(v.size());  // the nearest of each other piece
+  std::vector<Candidate> candidates;
   for (std::size_t k = 0; k < s.triangles.size(); ++k) {
     const Triangle& t = s.triangles[k];
     if (is_crumb(t[0])) continue;
-    const std::int32_t piece = s.component[t[0]];
-    const TouchedTriangle plane(v.position(t[0]), v.position(t[1]), v.position(t[2]));
-    Vec3 low = Vec3::Constant(1e300), high = -low;
-    for (const std::int32_t i : t) {
-      low = low.cwiseMin(v.position(i));
-      high = high.cwiseMax(v.position(i));
-    }
+    const Vec3 a = v.position(t[0]), b = v.position(t[1]), c = v.position(t[2]);
+    const Vec3 low = a.cwiseMin(b).cwiseMin(c), high = a.cwiseMax(b).cwiseMax(c);
     const Vec3 far = Vec3::Constant(reaches(t));
-    if (!meets_other(piece, low - far, high + far, places)) continue;
-    if (is_sliver(v.position(t[0]), v.position(t[1]), v.position(t[2]), s.mean_edge)) continue;
-    const Vec3 facing = plane.n.stableNormalized();
-    cells.each_in(low - Vec3::Constant(reach), high + Vec3::Constant(reach), [&](std::int32_t i) {
-      if (s.component[i] == piece) return;
-      const Vec3 x = v.position(i);
-      const double height = plane.height(x);
-      if (height > reach || height < -kDeepest * s.mean_edge) return;
-      const Above at = plane.above(x);
-      if (at.beside() > kBeside) return;
-      // What does not face it is the far side, or a wall that the vertex would stumble over.
-      if (facing.dot(normal[i].stableNormalized()) > kFacing) return;
-      const double off = std::fabs(at.height) + at.beside() * s.mean_edge;
-      std::vector<Found>& found = found_of[i];
-      const auto known = std::find_if(found.begin(), found.end(),
-                                      [piece](const Found& f) { return f.piece == piece; });
-      const Found own = {piece, static_cast<std::int32_t>(k), off, at};
-      if (known == found.end()) {
-        found.push_back(own);
-      } else if (off < known->off) {
-        *known = own;
+    if (!meets_other(s.component[t[0]], low - far, high + far, places)) continue;
+    if (is_sliver(a, b, c, s.mean_edge)) continue;
+    // What is above it, beside it by a little, or in it: a prism.
+    const Vec3 middle = (a + b + c) / 3, up = (b - a).cross(c - a).stableNormalized();
+    Vec3 from = Vec3::Constant(1e300), to = -from;
+    for (const Vec3& corner : {a, b, c}) {
+      const Vec3 wide = middle + (1 + 3 * kBeside) * (corner - middle);
+      for (const double height : {reach, -kDeepest * s.mean_edge}) {
+        from = from.cwiseMin(wide + height * up);
+        to = to.cwiseMax(wide + height * up);
       }
-    });
+    }
+    const int level = cells.level_of(from, to);
+    if (level >= 0) candidates.push_back({static_cast<std::int32_t>(k), level, from, to});
   }
-  for (int i = 0; i < v.size(); ++i) {
-    const std::vector<Found>& found = found_of[i];
-    for (const Found& f : found) {
-      const Triangle& t = s.triangles[f.triangle];
-      double rest = 0;
-      if (v.body[i] == v.body[t[0]]) {
-        const Above at = TouchedTriangle(v.reference[t[0]], v.reference[t[1]], v.reference[t[2]])
-                             .above(v.reference[i]);
-        if (at.beside() < 1 && std::fabs(at.height) < s.mean_edge) rest = std::min(0.0, at.height);
-      }
-      const double friction = std::sqrt(material_of(s, i).friction * material_of(s, t[0]).friction);
-      rest -= kSlack * s.mean_edge;
-      if (f.at.height < rest) rest = f.at.height + kRecovery * (rest - f.at.height);
-      s.touches.add({i, t[0], t[1], t[2]},
-                    {static_cast<float>(rest), static_cast<float>(f.at.b),
-                     static_cast<float>(f.at.c), static_cast<float>(friction)});
-      if (f.at.height - rest < 0.1 * s.mean_edge) {
-        s.touching[s.component[i]] = s.touching[f.piece] = 1;
-      }
+  struct Found {
+    std::int32_t vertex, piece;
+    double off;
+    std::int32_t triangle;
+    Above at;
+    bool operator<(const Found& o) const {
+      return std::tie(vertex, piece, off, triangle) <
+             std::tie(o.vertex, o.piece, o.off, o.triangle);
+    }
+  };
+  const int count = static_cast<int>(candidates.size());
+  const int parts = (count + kTrianglesOfPart - 1) / kTrianglesOfPart;
+  std::vector<std::vector<Found>> of_parts(parts);
+  s.cpu.for_each(parts, [&](int part) {
+    const int end = std::min(count, (part + 1) * kTrianglesOfPart);
+    for (int n = part * kTrianglesOfPart; n < end; ++n) {
+      const Candidate& candidate = candidates[n];
+      const Triangle& t = s.triangles[candidate.triangle];
+      const std::int32_t piece = s.component[t[0]];
+      const TouchedTriangle plane(v.position(t[0]), v.position(t[1]), v.position(t[2]));
+      cells.each_in(candidate.level, candidate.low, candidate.high, piece,
+                    [&](const Cells::Entry& e) {
+                      const Above at = plane.above(Vec3(e.x[0], e.x[1], e.x[2]));
+                      if (!(at.height < reach && at.height > -kDeepest * s.mean_edge)) return;
+                      if (at.beside() > kBeside) return;
+                      // What does not face it is the far side, or a wall that the vertex would
+                      // stumble over.
+                      if (plane.up.dot(Vec3(e.normal[0], e.normal[1], e.normal[2])) > kFacing)
+                        return;
+                      const double off = std::fabs(at.height) + at.beside() * s.mean_edge;
+                      of_parts[part].push_back({e.vertex, piece, off, candidate.triangle, at});
+                    });
+    }
+  });
+  std::vector<Found> found;
+  for (const std::vector<Found>& of : of_parts) found.insert(found.end(), of.begin(), of.end());
+  std::sort(found.begin(), found.end());
+  for (std::size_t k = 0; k < found.size(); ++k) {
+    const Found& f = found[k];
+    const std::int32_t i = f.vertex;
+    // The nearest of each other piece.
+    if (k > 0 && found[k - 1].vertex == i && found[k - 1].piece == f.piece) continue;
+    const Triangle& t = s.triangles[f.triangle];
+    double rest = 0;
+    if (v.body[i] == v.body[t[0]]) {
+      const Above at = TouchedTriangle(v.reference[t[0]], v.reference[t[1]], v.reference[t[2]])
+                           .above(v.reference[i]);
+      if (at.beside() < 1 && std::fabs(at.height) < s.mean_edge) rest = std::min(0.0, at.height);
+    }
+    const double friction = std::sqrt(material_of(s, i).friction * material_of(s, t[0]).friction);
+    rest -= kSlack * s.mean_edge;
+    if (f.at.height < rest) rest = f.at.height + kRecovery * (rest - f.at.height);
+    s.touches.add({i, t[0], t[1], t[2]},
+                  {static_cast<float>(rest), static_cast<float>(f.at.b), static_cast<float>(f.at.c),
+                   static_cast<float>(friction)});
+    if (f.at.height - rest < 0.1 * s.mean_edge) {
+      s.touching[s.component[i]] = s.touching[f.piece] = 1;
     }
   }
   s.touches.pack(v.size(), {}, 0);  // each frame anew

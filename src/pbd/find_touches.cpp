@@ -201,7 +201,7 @@ void find_touches(State& s, double duration) {
     const Vec3 n = (v.position(t[1]) - a).cross(v.position(t[2]) - a);
     for (const std::int32_t i : t) normal[i] += n;
   }
-  const double reach = std::min(2.0, 0.3 + 2 * fastest * duration / s.mean_edge) * s.mean_edge;
+  const double reach = std::min(2.5, 0.3 + 2 * fastest * duration / s.mean_edge) * s.mean_edge;
   // Where each piece may touch another: what lies in no other's box is left out.
   const auto reaches = [&](const Triangle& t) {
     const Vec3 a = v.position(t[0]), b = v.position(t[1]), c = v.position(t[2]);

@@ -44,7 +44,7 @@ class CudaPbdTissue final : public PbdTissue {
 
  protected:
   void state_changed() override { push_all(); }
-  void run_steps(const FrameColliders& colliders, int steps, float h) override;
+  void run_steps(const FrameColliders& colliders, const Part& part, float h) override;
   Figures measure() override;
 
  private:
@@ -55,8 +55,9 @@ class CudaPbdTissue final : public PbdTissue {
   void choose_way();
   Way faster_way() const;
   int upload_touches(double duration);  ///< returns their colours
-  void upload_frame(const FrameColliders& colliders, int steps, const pbd::CudaPbdFrame& frame);
-  void take_loads(const FrameColliders& colliders, int steps);
+  void upload_frame(const FrameColliders& colliders, const Part& part,
+                    const pbd::CudaPbdFrame& frame);
+  void take_loads(const FrameColliders& colliders, const Part& part);
   /// What hangs together, by the sums of the chunks, but for what is held.
   std::vector<pbd::Flight> flights(const pbd::CudaPbdFlight* of_chunks) const;
   /// Momentum of what flies freely is kept, and viscosity acts.

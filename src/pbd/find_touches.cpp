@@ -267,14 +267,10 @@ void find_touches(State& s, double duration) {
     if (level >= 0) candidates.push_back({static_cast<std::int32_t>(k), level, from, to});
   }
   struct Found {
-    std::int32_t vertex, piece;
+    std::int32_t vertex, piece, triangle;
+    std::int32_t next;  ///< of the same vertex, and of another piece
     double off;
-    std::int32_t triangle;
     Above at;
-    bool operator<(const Found& o) const {
-      return std::tie(vertex, piece, off, triangle) <
-             std::tie(o.vertex, o.piece, o.off, o.triangle);
-    }
   };
   const int count = static_cast<int>(candidates.size());
   const int parts = (count + kTrianglesOfPart - 1) / kTrianglesOfPart;
@@ -296,18 +292,29 @@ void find_touches(State& s, double duration) {
                       if (plane.up.dot(Vec3(e.normal[0], e.normal[1], e.normal[2])) > kFacing)
                         return;
                       const double off = std::fabs(at.height) + at.beside() * s.mean_edge;
-                      of_parts[part].push_back({e.vertex, piece, off, candidate.triangle, at});
+                      of_parts[part].push_back({e.vertex, piece, candidate.triangle, -1, off, at});
                     });
     }
   });
+  // The nearest of each other piece.
   std::vector<Found> found;
-  for (const std::vector<Found>& of : of_parts) found.insert(found.end(), of.begin(), of.end());
-  std::sort(found.begin(), found.end());
-  for (std::size_t k = 0; k < found.size(); ++k) {
-    const Found& f = found[k];
+  std::vector<std::int32_t> first(v.size(), -1);
+  for (const std::vector<Found>& of_part : of_parts) {
+    for (const Found& f : of_part) {
+      std::int32_t* at = &first[f.vertex];
+      while (*at >= 0 && found[*at].piece != f.piece) at = &found[*at].next;
+      if (*at < 0) {
+        *at = static_cast<std::int32_t>(found.size());
+        found.push_back(f);
+      } else if (f.off < found[*at].off) {
+        const std::int32_t next = found[*at].next;
+        found[*at] = f;
+        found[*at].next = next;
+      }
+    }
+  }
+  for (const Found& f : found) {
     const std::int32_t i = f.vertex;
-    // The nearest of each other piece.
-    if (k > 0 && found[k - 1].vertex == i && found[k - 1].piece == f.piece) continue;
     const Triangle& t = s.triangles[f.triangle];
     double rest = 0;
     if (v.body[i] == v.body[t[0]]) {

@@ -51,22 +51,24 @@ class Cells {
     const Eigen::Vector3f at = x.cast<float>(), n = normal.stableNormalized().cast<float>();
     entries_.push_back({{at[0], at[1], at[2]}, {n[0], n[1], n[2]}, vertex, piece});
   }
-  /// Which lattice a box is looked up in, filled now; -1 for none.
-  int level_of(const Vec3& low, const Vec3& high) {
+  /// Which lattice a box is to be looked up in; -1 for none.
+  int level_of(const Vec3& low, const Vec3& high) const {
     if (!low.allFinite() || !high.allFinite()) return -1;
-    double size = size_;
-    std::size_t level = 0;
-    for (; cells(size, low, high) > kMostCells; size *= 2) ++level;
-    while (levels_.size() <= level) levels_.emplace_back();
-    if (levels_[level].slots.empty()) fill(size, levels_[level]);
-    return static_cast<int>(level);
+    int level = 0;
+    for (double size = size_; cells(size, low, high) > kMostCells; size *= 2) ++level;
+    return level;
+  }
+  /// Before it is looked up in.
+  void fill(int level) {
+    if (static_cast<int>(levels_.size()) <= level) levels_.resize(level + 1);
+    if (levels_[level].begin.empty()) fill(std::ldexp(size_, level), levels_[level]);
   }
   /// Vertices of other pieces in the cells that a box overlaps.
   template <class F>
   void each_in(int level, const Vec3& low, const Vec3& high, std::int32_t piece,
                const F& of) const {
     const Level& l = levels_[level];
-    const double size = size_ * std::ldexp(1.0, level);
+    const double size = std::ldexp(size_, level);
     std::int64_t first[3], last[3];
     for (int a = 0; a < 3; ++a) {
       first[a] = cell(size, low[a]);
@@ -75,11 +77,11 @@ class Cells {
     for (std::int64_t i = first[0]; i <= last[0]; ++i) {
       for (std::int64_t j = first[1]; j <= last[1]; ++j) {
         for (std::int64_t k = first[2]; k <= last[2]; ++k) {
-          const std::uint64_t wanted = key(i, j, k);
-          for (std::size_t r = l.slots[l.slot(wanted)];
-               r < l.runs.size() && l.runs[r].cell == wanted; ++r) {
-            if (l.runs[r].piece == piece) continue;
-            for (std::int32_t e = l.runs[r].begin; e < l.runs[r].end; ++e) of(l.entries[e]);
+          const std::size_t slot = l.slot(i, j, k);
+          for (std::int32_t r = l.begin[slot]; r < l.begin[slot + 1]; ++r) {
+            const Run& run = l.runs[r];
+            if (run.piece == piece || run.cell != key(i, j, k)) continue;
+            for (std::int32_t e = run.begin; e < run.end; ++e) of(l.entries[e]);
           }
         }
       }
@@ -94,16 +96,15 @@ class Cells {
     std::int32_t piece, begin, end;
   };
   struct Level {
-    std::vector<Entry> entries;  ///< by cell, then by piece
-    std::vector<Run> runs;
-    std::vector<std::size_t> slots;  ///< a hash table: a cell's first run, or behind the last
-    int shift;                       ///< the upper bits of a product depend on all of a key
+    std::vector<Entry> entries;       ///< by slot, then by cell, then by piece
+    std::vector<Run> runs;            ///< in that order
+    std::vector<std::int32_t> begin;  ///< first run of each slot, and the number of runs
+    int bits = 1;                     ///< of each of a cell's numbers, in its slot
 
-    std::size_t slot(std::uint64_t wanted) const {
-      const std::size_t mask = slots.size() - 1;
-      std::size_t at = (wanted * 0x9e3779b97f4a7c15u) >> shift;
-      while (slots[at] < runs.size() && runs[slots[at]].cell != wanted) at = (at + 1) & mask;
-      return at;
+    /// Cells side by side have slots side by side; those far apart share them.
+    std::size_t slot(std::int64_t i, std::int64_t j, std::int64_t k) const {
+      const std::int64_t mask = (std::int64_t{1} << bits) - 1;
+      return static_cast<std::size_t>((i & mask) << 2 * bits | (j & mask) << bits | (k & mask));
     }
   };
   static std::uint64_t key(std::int64_t i, std::int64_t j, std::int64_t k) {
@@ -120,34 +121,35 @@ class Cells {
     return product;
   }
   void fill(double size, Level& level) const {
+    while (level.bits < 7 && std::size_t{1} << 3 * level.bits < entries_.size()) ++level.bits;
     struct Key {
+      std::size_t slot;
       std::uint64_t cell;
       std::int32_t piece, entry;
       bool operator<(const Key& o) const {
-        return std::tie(cell, piece, entry) < std::tie(o.cell, o.piece, o.entry);
+        return std::tie(slot, cell, piece, entry) < std::tie(o.slot, o.cell, o.piece, o.entry);
       }
     };
     std::vector<Key> keys;
     for (const Entry& e : entries_) {
-      keys.push_back({key(cell(size, e.x[0]), cell(size, e.x[1]), cell(size, e.x[2])), e.piece,
-                      static_cast<std::int32_t>(keys.size())});
+      const std::int64_t i = cell(size, e.x[0]), j = cell(size, e.x[1]), k = cell(size, e.x[2]);
+      keys.push_back(
+          {level.slot(i, j, k), key(i, j, k), e.piece, static_cast<std::int32_t>(keys.size())});
     }
     std::sort(keys.begin(), keys.end());
+    level.begin.assign((std::size_t{1} << 3 * level.bits) + 1, 0);
     for (const Key& k : keys) {
       const auto at = static_cast<std::int32_t>(level.entries.size());
       if (level.runs.empty() || level.runs.back().cell != k.cell ||
           level.runs.back().piece != k.piece) {
         level.runs.push_back({k.cell, k.piece, at, at});
+        ++level.begin[k.slot + 1];
       }
       level.entries.push_back(entries_[k.entry]);
       level.runs.back().end = at + 1;
     }
-    std::size_t count = 16;
-    for (level.shift = 60; count < 2 * level.runs.size(); --level.shift) count *= 2;
-    level.slots.assign(count, level.runs.size());
-    for (std::size_t r = 0; r < level.runs.size(); ++r) {
-      const std::uint64_t own = level.runs[r].cell;
-      if (r == 0 || level.runs[r - 1].cell != own) level.slots[level.slot(own)] = r;
+    for (std::size_t slot = 1; slot < level.begin.size(); ++slot) {
+      level.begin[slot] += level.begin[slot - 1];
     }
   }
 
@@ -244,15 +246,17 @@ void find_touches(State& s, double duration) {
     int level;
     Vec3 low, high;  ///< of where it looks
   };
-  std::vector<Candidate> candidates;
-  for (std::size_t k = 0; k < s.triangles.size(); ++k) {
+  const int count = static_cast<int>(s.triangles.size());
+  const int parts = (count + kTrianglesOfPart - 1) / kTrianglesOfPart;
+  std::vector<std::vector<Candidate>> candidates(parts);
+  const auto look = [&](std::int32_t k, std::vector<Candidate>& found) {
     const Triangle& t = s.triangles[k];
-    if (is_crumb(t[0])) continue;
+    if (is_crumb(t[0])) return;
     const Vec3 a = v.position(t[0]), b = v.position(t[1]), c = v.position(t[2]);
     const Vec3 low = a.cwiseMin(b).cwiseMin(c), high = a.cwiseMax(b).cwiseMax(c);
     const Vec3 far = Vec3::Constant(reaches(t));
-    if (!meets_other(s.component[t[0]], low - far, high + far, places)) continue;
-    if (is_sliver(a, b, c, s.mean_edge)) continue;
+    if (!meets_other(s.component[t[0]], low - far, high + far, places)) return;
+    if (is_sliver(a, b, c, s.mean_edge)) return;
     // What is above it, beside it by a little, or in it: a prism.
     const Vec3 middle = (a + b + c) / 3, up = (b - a).cross(c - a).stableNormalized();
     Vec3 from = Vec3::Constant(1e300), to = -from;
@@ -264,7 +268,14 @@ void find_touches(State& s, double duration) {
       }
     }
     const int level = cells.level_of(from, to);
-    if (level >= 0) candidates.push_back({static_cast<std::int32_t>(k), level, from, to});
+    if (level >= 0) found.push_back({k, level, from, to});
+  };
+  s.cpu.for_each(parts, [&](int part) {
+    const int end = std::min(count, (part + 1) * kTrianglesOfPart);
+    for (int k = part * kTrianglesOfPart; k < end; ++k) look(k, candidates[part]);
+  });
+  for (const std::vector<Candidate>& of_part : candidates) {
+    for (const Candidate& candidate : of_part) cells.fill(candidate.level);
   }
   struct Found {
     std::int32_t vertex, piece, triangle;
@@ -272,13 +283,9 @@ void find_touches(State& s, double duration) {
     double off;
     Above at;
   };
-  const int count = static_cast<int>(candidates.size());
-  const int parts = (count + kTrianglesOfPart - 1) / kTrianglesOfPart;
   std::vector<std::vector<Found>> of_parts(parts);
   s.cpu.for_each(parts, [&](int part) {
-    const int end = std::min(count, (part + 1) * kTrianglesOfPart);
-    for (int n = part * kTrianglesOfPart; n < end; ++n) {
-      const Candidate& candidate = candidates[n];
+    for (const Candidate& candidate : candidates[part]) {
       const Triangle& t = s.triangles[candidate.triangle];
       const std::int32_t piece = s.component[t[0]];
       const TouchedTriangle plane(v.position(t[0]), v.position(t[1]), v.position(t[2]));

@@ -80,6 +80,20 @@ struct Distance {
   }
 };
 
+/// Two neighbours lose a share of what they move by against one another: a dashpot, which is not of
+/// places.
+struct Damper {
+  static constexpr int kVertices = 2, kNumbers = 1, kMultipliers = 0;
+  /// v: velocities [m/s], and inverse masses; number: the share.
+  template <class V>
+  static TISSUE_SIM_INLINE void project(Vertex<V> (&v)[2], const V (&number)[1], V, V (&)[1]) {
+    const Vector<V> d = between(v[1], v[0]);
+    const V scale = quotient(number[0], v[0].w + v[1].w + 1e-20f);
+    move(v[0], scale, d);
+    move(v[1], -scale, d);
+  }
+};
+
 /// The angle between two triangles that share the edge from vertex 2 to vertex 3, opposite to which
 /// lie 0 and 1 (eq. 4; signed, where arccos knows no side and has no slope where the triangles are
 /// flat; gradients: Bridson et al. 2003). Gradients are those of small turns: from kMost of an

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <tuple>
 
 #include "pbd/model.h"
 
@@ -25,6 +26,8 @@ constexpr double kRecovery = 0.1;
 /// Vertices of a piece that touches others, at least: crumbs, slivers for the most part, shook.
 constexpr int kLeastPiece = 60;
 
+constexpr int kTrianglesOfPart = 256;
+
 /// Whether a triangle is so thin that single precision hardly knows its normal.
 bool is_sliver(const Vec3& a, const Vec3& b, const Vec3& c, double mean_edge) {
   const double longest2 =
@@ -36,27 +39,49 @@ bool is_sliver(const Vec3& a, const Vec3& b, const Vec3& c, double mean_edge) {
 /// kMostCells there, as of tissue that nothing holds in shape, of one as coarse as it takes.
 class Cells {
  public:
+  /// A vertex where all that is asked of it lies side by side.
+  struct Entry {
+    float x[3], normal[3];
+    std::int32_t vertex, piece;
+  };
+
   explicit Cells(double size) : size_(size) {}
-  void add(std::int32_t vertex, const Vec3& x) {
-    if (x.allFinite()) vertices_.emplace_back(vertex, x);
+  void add(std::int32_t vertex, std::int32_t piece, const Vec3& x, const Vec3& normal) {
+    if (!x.allFinite()) return;
+    const Eigen::Vector3f at = x.cast<float>(), n = normal.stableNormalized().cast<float>();
+    entries_.push_back({{at[0], at[1], at[2]}, {n[0], n[1], n[2]}, vertex, piece});
   }
-  /// Vertices in the cells that a box overlaps.
+  /// Which lattice a box is to be looked up in; -1 for none.
+  int level_of(const Vec3& low, const Vec3& high) const {
+    if (!low.allFinite() || !high.allFinite()) return -1;
+    int level = 0;
+    for (double size = size_; cells(size, low, high) > kMostCells; size *= 2) ++level;
+    return level;
+  }
+  /// Before it is looked up in.
+  void fill(int level) {
+    if (static_cast<int>(levels_.size()) <= level) levels_.resize(level + 1);
+    if (levels_[level].begin.empty()) fill(std::ldexp(size_, level), levels_[level]);
+  }
+  /// Vertices of other pieces in the cells that a box overlaps.
   template <class F>
-  void each_in(const Vec3& low, const Vec3& high, const F& of) {
-    if (!low.allFinite() || !high.allFinite()) return;
-    double size = size_;
-    std::size_t level = 0;
-    for (; cells(size, low, high) > kMostCells; size *= 2) ++level;
-    while (levels_.size() <= level) levels_.emplace_back();
-    if (levels_[level].slots.empty()) fill(size, levels_[level]);
+  void each_in(int level, const Vec3& low, const Vec3& high, std::int32_t piece,
+               const F& of) const {
     const Level& l = levels_[level];
-    for (std::int64_t i = cell(size, low.x()); i <= cell(size, high.x()); ++i) {
-      for (std::int64_t j = cell(size, low.y()); j <= cell(size, high.y()); ++j) {
-        for (std::int64_t k = cell(size, low.z()); k <= cell(size, high.z()); ++k) {
-          const std::uint64_t wanted = key(i, j, k);
-          std::size_t at = l.slots[l.slot(wanted)];
-          for (; at < l.entries.size() && l.entries[at].first == wanted; ++at) {
-            of(l.entries[at].second);
+    const double size = std::ldexp(size_, level);
+    std::int64_t first[3], last[3];
+    for (int a = 0; a < 3; ++a) {
+      first[a] = cell(size, low[a]);
+      last[a] = cell(size, high[a]);
+    }
+    for (std::int64_t i = first[0]; i <= last[0]; ++i) {
+      for (std::int64_t j = first[1]; j <= last[1]; ++j) {
+        for (std::int64_t k = first[2]; k <= last[2]; ++k) {
+          const std::size_t slot = l.slot(i, j, k);
+          for (std::int32_t r = l.begin[slot]; r < l.begin[slot + 1]; ++r) {
+            const Run& run = l.runs[r];
+            if (run.piece == piece || run.cell != key(i, j, k)) continue;
+            for (std::int32_t e = run.begin; e < run.end; ++e) of(l.entries[e]);
           }
         }
       }
@@ -65,15 +90,21 @@ class Cells {
 
  private:
   static constexpr double kMostCells = 216;
+  /// What a cell has of a piece.
+  struct Run {
+    std::uint64_t cell;
+    std::int32_t piece, begin, end;
+  };
   struct Level {
-    std::vector<std::pair<std::uint64_t, std::int32_t>> entries;  ///< sorted by cell
-    std::vector<std::size_t> slots;  ///< a hash table: a cell's first entry, or behind the last
+    std::vector<Entry> entries;       ///< by slot, then by cell, then by piece
+    std::vector<Run> runs;            ///< in that order
+    std::vector<std::int32_t> begin;  ///< first run of each slot, and the number of runs
+    int bits = 1;                     ///< of each of a cell's numbers, in its slot
 
-    std::size_t slot(std::uint64_t wanted) const {
-      const std::size_t mask = slots.size() - 1;
-      std::size_t at = (wanted * 0x9e3779b97f4a7c15u >> 20) & mask;
-      while (slots[at] < entries.size() && entries[slots[at]].first != wanted) at = (at + 1) & mask;
-      return at;
+    /// Cells side by side have slots side by side; those far apart share them.
+    std::size_t slot(std::int64_t i, std::int64_t j, std::int64_t k) const {
+      const std::int64_t mask = (std::int64_t{1} << bits) - 1;
+      return static_cast<std::size_t>((i & mask) << 2 * bits | (j & mask) << bits | (k & mask));
     }
   };
   static std::uint64_t key(std::int64_t i, std::int64_t j, std::int64_t k) {
@@ -90,46 +121,63 @@ class Cells {
     return product;
   }
   void fill(double size, Level& level) const {
-    for (const auto& [v, x] : vertices_) {
-      level.entries.emplace_back(key(cell(size, x.x()), cell(size, x.y()), cell(size, x.z())), v);
+    while (level.bits < 7 && std::size_t{1} << 3 * level.bits < entries_.size()) ++level.bits;
+    struct Key {
+      std::size_t slot;
+      std::uint64_t cell;
+      std::int32_t piece, entry;
+      bool operator<(const Key& o) const {
+        return std::tie(slot, cell, piece, entry) < std::tie(o.slot, o.cell, o.piece, o.entry);
+      }
+    };
+    std::vector<Key> keys;
+    for (const Entry& e : entries_) {
+      const std::int64_t i = cell(size, e.x[0]), j = cell(size, e.x[1]), k = cell(size, e.x[2]);
+      keys.push_back(
+          {level.slot(i, j, k), key(i, j, k), e.piece, static_cast<std::int32_t>(keys.size())});
     }
-    std::sort(level.entries.begin(), level.entries.end());
-    std::size_t count = 16;
-    while (count < 2 * level.entries.size()) count *= 2;
-    level.slots.assign(count, level.entries.size());
-    for (std::size_t e = 0; e < level.entries.size(); ++e) {
-      const std::uint64_t own = level.entries[e].first;
-      if (e == 0 || level.entries[e - 1].first != own) level.slots[level.slot(own)] = e;
+    std::sort(keys.begin(), keys.end());
+    level.begin.assign((std::size_t{1} << 3 * level.bits) + 1, 0);
+    for (const Key& k : keys) {
+      const auto at = static_cast<std::int32_t>(level.entries.size());
+      if (level.runs.empty() || level.runs.back().cell != k.cell ||
+          level.runs.back().piece != k.piece) {
+        level.runs.push_back({k.cell, k.piece, at, at});
+        ++level.begin[k.slot + 1];
+      }
+      level.entries.push_back(entries_[k.entry]);
+      level.runs.back().end = at + 1;
+    }
+    for (std::size_t slot = 1; slot < level.begin.size(); ++slot) {
+      level.begin[slot] += level.begin[slot - 1];
     }
   }
 
   double size_;  ///< of the finest lattice's cells [m]
-  std::vector<std::pair<std::int32_t, Vec3>> vertices_;
+  std::vector<Entry> entries_;
   std::vector<Level> levels_;
 };
 
 /// A place above a triangle: its height, and the shares of the corners b and c in what is below.
 struct Above {
   double height, b, c;
-  double beside() const { return std::max({0.0, -b, -c, b + c - 1}); }
+  double beside() const { return std::max(std::max(0.0, -b), std::max(-c, b + c - 1)); }
 };
 
 /// A triangle, with what is the same for all places above it.
 struct TouchedTriangle {
-  Vec3 a, e, f, n;
-  double n2, length;
+  Vec3 a, up, to_b, to_c;  ///< a corner; height and shares grow along these
 
-  TouchedTriangle(const Vec3& corner, const Vec3& b, const Vec3& c)
-      : a(corner),
-        e(b - a),
-        f(c - a),
-        n(e.cross(f)),
-        n2(n.squaredNorm() + 1e-300),
-        length(std::sqrt(n2)) {}
-  double height(const Vec3& x) const { return (x - a).dot(n) / length; }
+  TouchedTriangle(const Vec3& corner, const Vec3& b, const Vec3& c) : a(corner) {
+    const Vec3 e = b - a, f = c - a, n = e.cross(f);
+    const double n2 = n.squaredNorm() + 1e-300;
+    up = n / std::sqrt(n2);
+    to_b = f.cross(n) / n2;
+    to_c = n.cross(e) / n2;
+  }
   Above above(const Vec3& x) const {
     const Vec3 r = x - a;
-    return {r.dot(n) / length, r.cross(f).dot(n) / n2, e.cross(r).dot(n) / n2};
+    return {r.dot(up), r.dot(to_b), r.dot(to_c)};
   }
 };
 
@@ -155,7 +203,7 @@ void find_touches(State& s, double duration) {
     const Vec3 n = (v.position(t[1]) - a).cross(v.position(t[2]) - a);
     for (const std::int32_t i : t) normal[i] += n;
   }
-  const double reach = std::min(2.0, 0.3 + 2 * fastest * duration / s.mean_edge) * s.mean_edge;
+  const double reach = std::min(2.5, 0.3 + 2 * fastest * duration / s.mean_edge) * s.mean_edge;
   // Where each piece may touch another: what lies in no other's box is left out.
   const auto reaches = [&](const Triangle& t) {
     const Vec3 a = v.position(t[0]), b = v.position(t[1]), c = v.position(t[2]);
@@ -186,73 +234,109 @@ void find_touches(State& s, double duration) {
              (boxes[c].max - low).minCoeff() >= 0;
     });
   };
-  Cells cells(2 * s.mean_edge);
+  Cells cells(s.mean_edge);
   for (int i = 0; i < v.size(); ++i) {
     const Vec3 x = v.position(i);
     if (v.surface[i] != 0 && !is_crumb(i) && meets_other(s.component[i], x, x, reached)) {
-      cells.add(i, x);
+      cells.add(i, s.component[i], x, normal[i]);
     }
   }
+  struct Candidate {
+    std::int32_t triangle;
+    int level;
+    Vec3 low, high;  ///< of where it looks
+  };
+  const int count = static_cast<int>(s.triangles.size());
+  const int parts = (count + kTrianglesOfPart - 1) / kTrianglesOfPart;
+  std::vector<std::vector<Candidate>> candidates(parts);
+  const auto look = [&](std::int32_t k, std::vector<Candidate>& found) {
+    const Triangle& t = s.triangles[k];
+    if (is_crumb(t[0])) return;
+    const Vec3 a = v.position(t[0]), b = v.position(t[1]), c = v.position(t[2]);
+    const Vec3 low = a.cwiseMin(b).cwiseMin(c), high = a.cwiseMax(b).cwiseMax(c);
+    const Vec3 far = Vec3::Constant(reaches(t));
+    if (!meets_other(s.component[t[0]], low - far, high + far, places)) return;
+    if (is_sliver(a, b, c, s.mean_edge)) return;
+    // What is above it, beside it by a little, or in it: a prism.
+    const Vec3 middle = (a + b + c) / 3, up = (b - a).cross(c - a).stableNormalized();
+    Vec3 from = Vec3::Constant(1e300), to = -from;
+    for (const Vec3& corner : {a, b, c}) {
+      const Vec3 wide = middle + (1 + 3 * kBeside) * (corner - middle);
+      for (const double height : {reach, -kDeepest * s.mean_edge}) {
+        from = from.cwiseMin(wide + height * up);
+        to = to.cwiseMax(wide + height * up);
+      }
+    }
+    const int level = cells.level_of(from, to);
+    if (level >= 0) found.push_back({k, level, from, to});
+  };
+  s.cpu.for_each(parts, [&](int part) {
+    const int end = std::min(count, (part + 1) * kTrianglesOfPart);
+    for (int k = part * kTrianglesOfPart; k < end; ++k) look(k, candidates[part]);
+  });
+  for (const std::vector<Candidate>& of_part : candidates) {
+    for (const Candidate& candidate : of_part) cells.fill(candidate.level);
+  }
   struct Found {
-    std::int32_t piece, triangle;
+    std::int32_t vertex, piece, triangle;
+    std::int32_t next;  ///< of the same vertex, and of another piece
     double off;
     Above at;
   };
-  std::vector<std::vector<Found>> found_of(v.size());  // the nearest of each other piece
-  for (std::size_t k = 0; k < s.triangles.size(); ++k) {
-    const Triangle& t = s.triangles[k];
-    if (is_crumb(t[0])) continue;
-    const std::int32_t piece = s.component[t[0]];
-    const TouchedTriangle plane(v.position(t[0]), v.position(t[1]), v.position(t[2]));
-    Vec3 low = Vec3::Constant(1e300), high = -low;
-    for (const std::int32_t i : t) {
-      low = low.cwiseMin(v.position(i));
-      high = high.cwiseMax(v.position(i));
+  std::vector<std::vector<Found>> of_parts(parts);
+  s.cpu.for_each(parts, [&](int part) {
+    for (const Candidate& candidate : candidates[part]) {
+      const Triangle& t = s.triangles[candidate.triangle];
+      const std::int32_t piece = s.component[t[0]];
+      const TouchedTriangle plane(v.position(t[0]), v.position(t[1]), v.position(t[2]));
+      cells.each_in(candidate.level, candidate.low, candidate.high, piece,
+                    [&](const Cells::Entry& e) {
+                      const Above at = plane.above(Vec3(e.x[0], e.x[1], e.x[2]));
+                      if (!(at.height < reach && at.height > -kDeepest * s.mean_edge)) return;
+                      if (at.beside() > kBeside) return;
+                      // What does not face it is the far side, or a wall that the vertex would
+                      // stumble over.
+                      if (plane.up.dot(Vec3(e.normal[0], e.normal[1], e.normal[2])) > kFacing)
+                        return;
+                      const double off = std::fabs(at.height) + at.beside() * s.mean_edge;
+                      of_parts[part].push_back({e.vertex, piece, candidate.triangle, -1, off, at});
+                    });
     }
-    const Vec3 far = Vec3::Constant(reaches(t));
-    if (!meets_other(piece, low - far, high + far, places)) continue;
-    if (is_sliver(v.position(t[0]), v.position(t[1]), v.position(t[2]), s.mean_edge)) continue;
-    const Vec3 facing = plane.n.stableNormalized();
-    cells.each_in(low - Vec3::Constant(reach), high + Vec3::Constant(reach), [&](std::int32_t i) {
-      if (s.component[i] == piece) return;
-      const Vec3 x = v.position(i);
-      const double height = plane.height(x);
-      if (height > reach || height < -kDeepest * s.mean_edge) return;
-      const Above at = plane.above(x);
-      if (at.beside() > kBeside) return;
-      // What does not face it is the far side, or a wall that the vertex would stumble over.
-      if (facing.dot(normal[i].stableNormalized()) > kFacing) return;
-      const double off = std::fabs(at.height) + at.beside() * s.mean_edge;
-      std::vector<Found>& found = found_of[i];
-      const auto known = std::find_if(found.begin(), found.end(),
-                                      [piece](const Found& f) { return f.piece == piece; });
-      const Found own = {piece, static_cast<std::int32_t>(k), off, at};
-      if (known == found.end()) {
-        found.push_back(own);
-      } else if (off < known->off) {
-        *known = own;
+  });
+  // The nearest of each other piece.
+  std::vector<Found> found;
+  std::vector<std::int32_t> first(v.size(), -1);
+  for (const std::vector<Found>& of_part : of_parts) {
+    for (const Found& f : of_part) {
+      std::int32_t* at = &first[f.vertex];
+      while (*at >= 0 && found[*at].piece != f.piece) at = &found[*at].next;
+      if (*at < 0) {
+        *at = static_cast<std::int32_t>(found.size());
+        found.push_back(f);
+      } else if (f.off < found[*at].off) {
+        const std::int32_t next = found[*at].next;
+        found[*at] = f;
+        found[*at].next = next;
       }
-    });
+    }
   }
-  for (int i = 0; i < v.size(); ++i) {
-    const std::vector<Found>& found = found_of[i];
-    for (const Found& f : found) {
-      const Triangle& t = s.triangles[f.triangle];
-      double rest = 0;
-      if (v.body[i] == v.body[t[0]]) {
-        const Above at = TouchedTriangle(v.reference[t[0]], v.reference[t[1]], v.reference[t[2]])
-                             .above(v.reference[i]);
-        if (at.beside() < 1 && std::fabs(at.height) < s.mean_edge) rest = std::min(0.0, at.height);
-      }
-      const double friction = std::sqrt(material_of(s, i).friction * material_of(s, t[0]).friction);
-      rest -= kSlack * s.mean_edge;
-      if (f.at.height < rest) rest = f.at.height + kRecovery * (rest - f.at.height);
-      s.touches.add({i, t[0], t[1], t[2]},
-                    {static_cast<float>(rest), static_cast<float>(f.at.b),
-                     static_cast<float>(f.at.c), static_cast<float>(friction)});
-      if (f.at.height - rest < 0.1 * s.mean_edge) {
-        s.touching[s.component[i]] = s.touching[f.piece] = 1;
-      }
+  for (const Found& f : found) {
+    const std::int32_t i = f.vertex;
+    const Triangle& t = s.triangles[f.triangle];
+    double rest = 0;
+    if (v.body[i] == v.body[t[0]]) {
+      const Above at = TouchedTriangle(v.reference[t[0]], v.reference[t[1]], v.reference[t[2]])
+                           .above(v.reference[i]);
+      if (at.beside() < 1 && std::fabs(at.height) < s.mean_edge) rest = std::min(0.0, at.height);
+    }
+    const double friction = std::sqrt(material_of(s, i).friction * material_of(s, t[0]).friction);
+    rest -= kSlack * s.mean_edge;
+    if (f.at.height < rest) rest = f.at.height + kRecovery * (rest - f.at.height);
+    s.touches.add({i, t[0], t[1], t[2]},
+                  {static_cast<float>(rest), static_cast<float>(f.at.b), static_cast<float>(f.at.c),
+                   static_cast<float>(friction)});
+    if (f.at.height - rest < 0.1 * s.mean_edge) {
+      s.touching[s.component[i]] = s.touching[f.piece] = 1;
     }
   }
   s.touches.pack(v.size(), {}, 0);  // each frame anew

@@ -34,6 +34,19 @@ std::vector<Flight> flights(const State& s) {
   return of;
 }
 
+Vec3 spin_of(const Flight& f, const Vec3& angular) {
+  Vec3 spin = Vec3::Zero();
+  if (!f.is_free) return spin;
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes(f.inertia);
+  const Vec3 there = axes.eigenvectors().transpose() * angular;
+  for (int a = 0; a < 3; ++a) {
+    const double moment = axes.eigenvalues()[a];
+    if (!(moment > 1e-3 * axes.eigenvalues()[2])) continue;
+    spin += there[a] / moment * axes.eigenvectors().col(a);
+  }
+  return spin;
+}
+
 std::vector<RigidChange> missing_motion(const Scene& scene, const std::vector<Flight>& before,
                                         const std::vector<Flight>& now, int steps, float h) {
   const double decay = static_cast<float>(std::exp(-scene.damping * h));
@@ -53,15 +66,7 @@ std::vector<RigidChange> missing_motion(const Scene& scene, const std::vector<Fl
     changes[c].keep = keep < kLeastDecay ? keep : 1;
     const double lost = 1 - changes[c].keep;
     changes[c].linear = speed - changes[c].keep * now[c].linear / mass;
-    // A piece of few vertices may have no inertia about one of its axes: it has no spin there.
-    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes(now[c].inertia);
-    const Vec3 missing = axes.eigenvectors().transpose() * (angular - now[c].angular);
-    const Vec3 there = axes.eigenvectors().transpose() * now[c].angular;
-    for (int a = 0; a < 3; ++a) {
-      const double moment = axes.eigenvalues()[a];
-      if (!(moment > 1e-3 * axes.eigenvalues()[2])) continue;
-      changes[c].spin += (missing[a] + lost * there[a]) / moment * axes.eigenvectors().col(a);
-    }
+    changes[c].spin = spin_of(now[c], angular - now[c].angular + lost * now[c].angular);
   }
   return changes;
 }

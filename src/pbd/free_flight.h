@@ -17,6 +17,9 @@ struct Flight {
   Eigen::Matrix3d inertia = Eigen::Matrix3d::Zero();
 };
 std::vector<Flight> flights(const State& s);
+/// How fast it turns with that angular momentum [1/s]; not at all where it is not free, nor about
+/// an axis about which it has no inertia, as a piece of few vertices may.
+Vec3 spin_of(const Flight& f, const Vec3& angular);
 
 /// What hangs together gets `keep` of its velocities, and a rigid motion.
 struct RigidChange {

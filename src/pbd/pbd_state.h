@@ -87,6 +87,8 @@ struct State {
   ConstraintSet<Strain> strains;          ///< one for each tetrahedron, ...
   ConstraintSet<Elastic> elastics;        ///< ... or these
   ConstraintSet<Touch> touches;           ///< between pieces, of this frame (find_touches.h)
+  ConstraintSet<Damper> dampers;          ///< at edges, for `damped_for` (viscosity.h)
+  double damped_for = 0;                  ///< [s]; 0 where dampers are to be made
   std::vector<double> volume_of_body;     ///< [m^3]
   std::vector<std::uint8_t> closed_body;  ///< whether the surface that it was made of is closed
 
@@ -148,6 +150,10 @@ void step(State& s, float h, std::vector<ColliderLoad>& loads);
 /// Projects each constraint once, one colour after the other, or in the opposite order. `keep`:
 /// multipliers grow over the sweeps of a step; else they count as zero.
 void project_constraints(State& s, float h, bool keep, bool backward = false);
+/// Velocities by each of the dampers once.
+void project_dampers(State& s);
+/// Vertices of a chunk of each level that constraints are packed by: State::levels, but for few.
+std::vector<std::int32_t> levels_of(const State& s);
 /// Pushes vertices out of the colliders, with friction; adds what that takes (contact.cpp).
 void project_contacts(State& s, float h, std::vector<ColliderLoad>& loads);
 

@@ -72,7 +72,10 @@ void PbdTissue::advance(double duration, const FrameInput& input) {
     pull();
     before = places();
   }
-  run_steps(colliders, substeps, dt);
+  const int together = steps_between_searches(colliders, substeps, dt);
+  for (int first = 0; first < substeps; first += together) {
+    run_steps(colliders, {first, std::min(together, substeps - first), substeps}, dt);
+  }
   result_.substeps = substeps;
   result_.substep = dt;
   if (blades.empty()) return;
@@ -88,21 +91,38 @@ void PbdTissue::advance(double duration, const FrameInput& input) {
   }
 }
 
-void PbdTissue::run_steps(const FrameColliders& colliders, int steps, float h) {
+/// Between two searches no vertex goes farther than an edge is long, and what a tool strikes not
+/// farther than half of that, for it is not known to move yet: what went farther passed through.
+int PbdTissue::steps_between_searches(const FrameColliders& colliders, int steps, float h) {
+  const pbd::State& s = *state_;
+  if (s.components < 2) return steps;
+  pull();
+  double fastest = 0;
+  for (int i = 0; i < s.vertices.size(); ++i) {
+    fastest = std::max(fastest, s.vertices.velocity(i).norm());
+  }
+  for (const Collider& c : colliders.at(1)) {
+    if (c.tool >= 0 && c.kind != Collider::kBlade) fastest = std::max(fastest, 2 * speed(c));
+  }
+  const double searches = std::ceil(fastest * steps * h / s.mean_edge);
+  return searches < steps ? static_cast<int>(std::ceil(steps / std::max(1.0, searches))) : 1;
+}
+
+void PbdTissue::run_steps(const FrameColliders& colliders, const Part& part, float h) {
   pbd::State& s = *state_;
-  pbd::find_touches(s, steps * h);
+  pbd::find_touches(s, part.count * h);
   const std::vector<pbd::Flight> flights = pbd::flights(s);
   std::fill(s.pushed.begin(), s.pushed.end(), std::uint8_t{0});
-  for (int i = 0; i < steps; ++i) {
+  for (int i = 0; i < part.count; ++i) {
     stop_if_asked();
-    const double share = (i + 1.0) / steps;
-    s.colliders = colliders.at(share);
+    s.colliders = colliders.at(part.share(i));
     std::vector<ColliderLoad> loads(s.colliders.size());
     pbd::step(s, h, loads);
-    colliders.add_loads(share, s.colliders.data(), loads.data(), 1.0 / steps, result_.loads);
+    colliders.add_loads(part.share(i), s.colliders.data(), loads.data(), 1.0 / part.of,
+                        result_.loads);
   }
-  pbd::keep_momentum(s, flights, steps, h);
-  pbd::damp_neighbours(s, steps * h);
+  pbd::keep_momentum(s, flights, part.count, h);
+  pbd::damp_neighbours(s, part.count * h);
 }
 
 PbdTissue::Figures PbdTissue::measure() {

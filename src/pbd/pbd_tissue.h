@@ -50,8 +50,14 @@ class PbdTissue : public Tissue {
   virtual void pull() {}
   /// A cut or a restored state changed vertices and constraints.
   virtual void state_changed() {}
-  /// The steps of a frame, of h seconds each; adds what acts on tools to result_.
-  virtual void run_steps(const FrameColliders& colliders, int steps, float h);
+  /// Steps of a frame between two searches for what touches.
+  struct Part {
+    int first, count, of;  ///< of: a frame's
+    /// Of the frame, at the end of the part's step `i`.
+    double share(int i) const { return (first + i + 1.0) / of; }
+  };
+  /// Takes them, of h seconds each; adds what acts on tools to result_.
+  virtual void run_steps(const FrameColliders& colliders, const Part& part, float h);
   virtual Figures measure();
 
   /// While vertices move from `before` to where they are; a stroke is what one blade does.
@@ -60,6 +66,8 @@ class PbdTissue : public Tissue {
   Array<float> places() const;  // without padding
   /// Whether it changed anything: constraints are to be made anew then.
   bool cut(const BladePath& path, int stroke, const Array<float>& before, CutReport& report);
+
+  int steps_between_searches(const FrameColliders& colliders, int steps, float h);
 
   std::vector<std::string> notes_;
   std::unique_ptr<pbd::State> state_;

@@ -53,7 +53,8 @@ TISSUE_SIM_INLINE void project_blocks(const ConstraintBlock<Kind>* blocks, int c
   TISSUE_SIM_PROJECTION(bending_##suffix, Bending, W, target)   \
   TISSUE_SIM_PROJECTION(strain_##suffix, Strain, W, target)     \
   TISSUE_SIM_PROJECTION(elastic_##suffix, Elastic, W, target)   \
-  TISSUE_SIM_PROJECTION(touch_##suffix, Touch, W, target)
+  TISSUE_SIM_PROJECTION(touch_##suffix, Touch, W, target)       \
+  TISSUE_SIM_PROJECTION(damper_##suffix, Damper, W, target)
 
 TISSUE_SIM_PROJECTIONS(sse2, 4, )
 #if defined(__x86_64__)
@@ -64,13 +65,13 @@ TISSUE_SIM_PROJECTIONS(avx512, 16, TISSUE_SIM_TARGET_AVX512)
 }  // namespace
 
 const Projections& projections(InstructionSet set) {
-  static constexpr Projections sse2 = {distance_sse2, bending_sse2, strain_sse2, elastic_sse2,
-                                       touch_sse2};
+  static constexpr Projections sse2 = {distance_sse2, bending_sse2, strain_sse2,
+                                       elastic_sse2,  touch_sse2,   damper_sse2};
 #if defined(__x86_64__)
-  static constexpr Projections avx2 = {distance_avx2, bending_avx2, strain_avx2, elastic_avx2,
-                                       touch_avx2};
+  static constexpr Projections avx2 = {distance_avx2, bending_avx2, strain_avx2,
+                                       elastic_avx2,  touch_avx2,   damper_avx2};
   static constexpr Projections avx512 = {distance_avx512, bending_avx512, strain_avx512,
-                                         elastic_avx512, touch_avx512};
+                                         elastic_avx512,  touch_avx512,   damper_avx512};
   if (set == InstructionSet::kAvx512) return avx512;
   if (set == InstructionSet::kAvx2) return avx2;
 #endif

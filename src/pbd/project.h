@@ -22,6 +22,7 @@ struct Projections {
   Project<Strain> strain;
   Project<Elastic> elastic;
   Project<Touch> touch;
+  Project<Damper> damper;
 };
 
 const Projections& projections(InstructionSet set);

@@ -22,12 +22,11 @@ void for_vertices(State& s, const F& f) {
 }
 
 /// One colour after the other, or `backward`: chunks of a level side by side, and of the last
-/// level, which is one chunk, `blocks_of_part` of a colour.
+/// level, which is one chunk, `blocks_of_part` of a colour. x: places, or what else it moves.
 template <class Kind>
 void project_all(State& s, ConstraintSet<Kind>& set, Project<Kind> project, int blocks_of_part,
-                 float inverse_h2, bool keep, bool backward) {
+                 float inverse_h2, bool keep, bool backward, float* x) {
   if (set.blocks.empty()) return;
-  float* x = s.vertices.x.data();
   const auto run = [&](int first, int n) {
     float* multipliers = nullptr;
     if (keep && Kind::kMultipliers > 0) {
@@ -67,6 +66,12 @@ void project_all(State& s, ConstraintSet<Kind>& set, Project<Kind> project, int 
 }
 
 template <class Kind>
+void project_all(State& s, ConstraintSet<Kind>& set, Project<Kind> project, int blocks_of_part,
+                 float inverse_h2, bool keep, bool backward) {
+  project_all(s, set, project, blocks_of_part, inverse_h2, keep, backward, s.vertices.x.data());
+}
+
+template <class Kind>
 void forget(ConstraintSet<Kind>& set) {
   std::fill(set.multipliers.begin(), set.multipliers.end(), 0.0f);
 }
@@ -93,6 +98,14 @@ void project_constraints(State& s, float h, bool keep, bool backward) {
   project_all(s, s.bends, s.project->bending, 32, inverse_h2, keep, backward);
   if (backward) project_all(s, s.links, s.project->distance, 128, inverse_h2, keep, true);
   if (backward) tetrahedra();
+}
+
+void project_dampers(State& s) {
+  project_all(s, s.dampers, s.project->damper, 128, 0, false, false, s.vertices.v.data());
+}
+
+std::vector<std::int32_t> levels_of(const State& s) {
+  return s.vertices.size() < kLeastChunked ? std::vector<std::int32_t>() : s.levels;
 }
 
 int sweeps_of_step(const State& s) {
@@ -164,12 +177,12 @@ void pack(State& s) {
     s.component[i] = number.try_emplace(linked.root(i), next).first->second;
   }
   s.components = static_cast<int>(number.size());
-  const std::vector<std::int32_t> levels =
-      n < kLeastChunked ? std::vector<std::int32_t>() : s.levels;
+  const std::vector<std::int32_t> levels = levels_of(s);
   s.links.pack(n, levels);
   s.bends.pack(n, levels);
   s.strains.pack(n, levels);
   s.elastics.pack(n, levels);
+  s.damped_for = 0;
 }
 
 namespace {

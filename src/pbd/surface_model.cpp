@@ -40,20 +40,29 @@ template <class Kind>
 class OldColours {
  public:
   explicit OldColours(ConstraintSet<Kind>& set) {
-    for (int c = 0; c < set.size(); ++c) colours_.emplace(set.vertices[c], set.colour[c]);
+    for (int c = 0; c < set.size(); ++c) colours_.emplace_back(set.vertices[c], set.colour[c]);
+    std::stable_sort(colours_.begin(), colours_.end(),
+                     [](const Coloured& a, const Coloured& b) { return a.first < b.first; });
     set.vertices.clear();
     set.numbers.clear();
     set.colour.clear();
   }
   void restore(ConstraintSet<Kind>& set) const {
+    auto at = colours_.begin();
     for (int c = 0; c < set.size(); ++c) {
-      const auto at = colours_.find(set.vertices[c]);
-      if (at != colours_.end()) set.colour[c] = at->second;
+      const auto& wanted = set.vertices[c];
+      // Most come in the order of before.
+      if (at == colours_.end() || at->first != wanted) {
+        at = std::lower_bound(colours_.begin(), colours_.end(), wanted,
+                              [](const Coloured& a, const auto& v) { return a.first < v; });
+      }
+      if (at != colours_.end() && at->first == wanted) set.colour[c] = (at++)->second;
     }
   }
 
  private:
-  std::map<typename ConstraintSet<Kind>::Vertices, std::int16_t> colours_;
+  using Coloured = std::pair<typename ConstraintSet<Kind>::Vertices, std::int16_t>;
+  std::vector<Coloured> colours_;
 };
 
 struct MeshEdge {

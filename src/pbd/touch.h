@@ -10,7 +10,7 @@ namespace pbd {
 /// step, after all that has a compliance: no multiplier.
 struct Touch {
   /// What overlaps comes apart at this speed, and no faster [m/s].
-  static constexpr float kWayApart = 1;
+  static constexpr float kWayApart = 5;
   static constexpr int kVertices = 4, kNumbers = 4, kMultipliers = 0;
   /// number: how deep the vertex lies in the triangle at rest, as a gap, at most 0 [m]; the place
   /// on the triangle, as shares of vertices 2 and 3, that the vertex was above when the frame

@@ -148,6 +148,62 @@ TEST_F(PbdOnGpu, AStepIsThatOfTheReferenceHoweverItIsLaunched) {
   }
 }
 
+/// What vertices move by apart from one another is lost as on the CPU, of what flies and of what is
+/// held, and where it was cut; the host did it.
+TEST_F(PbdOnGpu, WhatIsViscousIsDampedAsOnTheCpu) {
+  struct Velocities {
+    std::vector<Vec3> before, after;
+  };
+  const auto most = [](const std::vector<Vec3>& a, const std::vector<Vec3>& b) {
+    double d = 0;
+    for (std::size_t i = 0; i < a.size(); ++i) d = std::max(d, (a[i] - b[i]).norm());
+    return d;
+  };
+  const auto velocities = [](PbdTissue& tissue) {
+    std::vector<Vec3> v;
+    const pbd::Vertices& all = tissue.state().vertices;
+    for (int i = 0; i < all.size(); ++i) v.push_back(all.velocity(i));
+    return v;
+  };
+  for (const bool is_held : {false, true}) {
+    for (const bool is_cut : {false, true}) {
+      const auto run = [&](Device device, Way way) {
+        Scene scene = slab(PbdModel::kSurface);
+        if (is_held) hold_one_end(scene);
+        scene.device = device;
+        scene.materials.push_back(find_material(scene, scene.bodies[0].material));
+        scene.materials.back().viscosity = 2;
+        scene.pbd.edge = 1e-6;  // edges, and next to nothing else that acts
+        scene.pbd.bending = scene.pbd.internal = 0;
+        Simulation simulation(scene);
+        auto& tissue = dynamic_cast<PbdTissue&>(simulation.tissue());
+        auto* const on_gpu = dynamic_cast<CudaPbdTissue*>(&tissue);
+        if (on_gpu != nullptr) on_gpu->set_way(way);
+        if (is_cut) {
+          simulation.cut(upright_blade({Vec3(0.027, -0.1, 0), Vec3(0.027, 0.1, 0)}));
+          simulation.advance_frame();
+          EXPECT_EQ(tissue.fragments().size(), 2u);
+        }
+        disturb(tissue.state(), 0);
+        Velocities v;
+        v.before = velocities(tissue);
+        if (on_gpu != nullptr) on_gpu->push();
+        tissue.advance(2e-3, {});
+        v.after = velocities(tissue);
+        return v;
+      };
+      const Velocities cpu = run(Device::kCpu, Way::kFaster);
+      EXPECT_GT(most(cpu.before, cpu.after), 0.02);
+      for (const Way way : {Way::kLaunches, Way::kOneBlock}) {
+        const Velocities gpu = run(Device::kCuda, way);
+        ASSERT_EQ(gpu.after.size(), cpu.after.size());
+        EXPECT_EQ(most(gpu.before, cpu.before), 0);
+        EXPECT_LT(most(gpu.after, cpu.after), 1e-4) << is_held << is_cut << static_cast<int>(way);
+      }
+    }
+  }
+}
+
 TEST_F(PbdOnGpu, FiguresAreTheCpus) {
   for (const Model& model : kModels) {
     Scene scene = slab(model.model, model.elasticity);

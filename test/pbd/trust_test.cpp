@@ -190,6 +190,23 @@ TEST_F(PbdTrust, AHeldCylinderOfStrainStays) {
   EXPECT_LT((simulation.tissue().fragments()[0].centroid - Vec3(0, 0, 0.0131)).norm(), 1e-3);
 }
 
+// It fell, and a note said so: vertices lie on the face of the region, not in it.
+TEST_F(PbdTrust, AnAnchorAtABodysOwnFaceHoldsIt) {
+  for (const char* anchor : {"{below: 0}", "{box: {min: [-1, -1, -1], max: [-0.02, 1, 1]}}",
+                             "{box: {min: [0.02, -1, -1], max: [1, 1, 1]}}"}) {
+    for (const char* model : {"surface", "tetrahedra"}) {
+      Simulation simulation(scene_from_yaml(
+          std::string("{method: pbd, device: cpu, ground: {enabled: false}, pbd: {model: ") +
+          model + "}, bodies: [{size: [0.04, 0.02, 0.02], pose: {position: [0, 0, 0.01]}, " +
+          "anchors: [" + anchor + "]}]}"));
+      EXPECT_EQ(notes(simulation).find("hold none"), std::string::npos) << notes(simulation);
+      for (int frame = 0; frame < 60; ++frame) simulation.advance_frame();
+      EXPECT_LT((simulation.tissue().fragments()[0].centroid - Vec3(0, 0, 0.01)).norm(), 0.03)
+          << anchor << ' ' << model;  // 4.9 m where it falls
+    }
+  }
+}
+
 // Triangles that nothing holds in shape grow without bound; their cells of the search must not:
 // 14 s a frame, then no memory.
 TEST_F(PbdTrust, StretchedTrianglesTakeNoMoreMemory) {

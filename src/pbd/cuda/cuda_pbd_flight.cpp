@@ -2,6 +2,7 @@
 #include <algorithm>
 
 #include "pbd/cuda/on_device.h"
+#include "pbd/viscosity.h"
 
 namespace tissue_sim {
 namespace {
@@ -46,46 +47,97 @@ void CudaPbdTissue::upload_chunks() {
   d.wait("receive data");
 }
 
+std::vector<pbd::Flight> CudaPbdTissue::flights(const pbd::CudaPbdFlight* of_chunks) const {
+  const OnDevice& d = *device_;
+  std::vector<pbd::Flight> of(d.component_mass.size());
+  for (pbd::Flight& f : of) f.is_free = false;
+  std::vector<Eigen::Matrix3d> second(of.size(), Eigen::Matrix3d::Zero());
+  std::vector<Vec3> moment(of.size(), Vec3::Zero());
+  for (std::size_t k = 0; k < d.component_of_chunk.size(); ++k) {
+    const pbd::CudaPbdFlight& sum = of_chunks[k];
+    const std::int32_t c = d.component_of_chunk[k];
+    pbd::Flight& f = of[c];
+    f.is_free = true;
+    f.centre = Vec3(sum.origin);  // the same of all its chunks, until all are summed up
+    moment[c] += Vec3(sum.moment);
+    f.linear += Vec3(sum.linear);
+    f.angular += Vec3(sum.angular);
+    const double* q = sum.second;
+    Eigen::Matrix3d m;
+    m << q[0], q[3], q[4], q[3], q[1], q[5], q[4], q[5], q[2];
+    second[c] += m;
+  }
+  for (std::size_t c = 0; c < of.size(); ++c) {
+    pbd::Flight& f = of[c];
+    f.mass = d.component_mass[c];
+    if (!f.is_free) continue;
+    const Vec3 from_origin = moment[c] / f.mass;
+    f.centre += from_origin;
+    f.angular -= from_origin.cross(f.linear);
+    second[c] -= f.mass * from_origin * from_origin.transpose();
+    f.inertia = second[c].trace() * Eigen::Matrix3d::Identity() - second[c];
+  }
+  return of;
+}
+
 void CudaPbdTissue::keep_momentum(int steps, float h) {
   OnDevice& d = *device_;
+  pbd::State& s = *state_;
   const std::size_t chunks = d.component_of_chunk.size();
-  std::vector<pbd::Flight> of[2];  // before the steps, and after them
-  for (int when = 0; when < 2; ++when) {
-    of[when].resize(d.component_mass.size());
-    for (pbd::Flight& f : of[when]) f.is_free = false;
-    std::vector<Eigen::Matrix3d> second(of[when].size(), Eigen::Matrix3d::Zero());
-    std::vector<Vec3> moment(of[when].size(), Vec3::Zero());
-    std::vector<bool> pushed(of[when].size(), false);
-    for (std::size_t k = 0; k < chunks; ++k) {
-      const pbd::CudaPbdFlight& sum = d.host_flights[when * chunks + k];
-      const std::int32_t c = d.component_of_chunk[k];
-      pbd::Flight& f = of[when][c];
-      f.is_free = true;
-      f.centre = Vec3(sum.origin);  // the same of all its chunks, until all are summed up
-      moment[c] += Vec3(sum.moment);
-      f.linear += Vec3(sum.linear);
-      f.angular += Vec3(sum.angular);
-      const double* q = sum.second;
-      Eigen::Matrix3d m;
-      m << q[0], q[3], q[4], q[3], q[1], q[5], q[4], q[5], q[2];
-      second[c] += m;
-      pushed[c] = pushed[c] || sum.pushed != 0;
-    }
-    for (std::size_t c = 0; c < of[when].size(); ++c) {
-      pbd::Flight& f = of[when][c];
-      f.mass = d.component_mass[c];
-      if (!f.is_free) continue;
-      const Vec3 from_origin = moment[c] / f.mass;
-      f.centre += from_origin;
-      f.angular -= from_origin.cross(f.linear);
-      second[c] -= f.mass * from_origin * from_origin.transpose();
-      f.inertia = second[c].trace() * Eigen::Matrix3d::Identity() - second[c];
-      f.is_free = when == 0 || (!pushed[c] && state_->touching[c] == 0);
-    }
+  const pbd::CudaPbdFlight* sums = d.host_flights.data();
+  const std::vector<pbd::Flight> now = flights(sums + chunks);
+  std::vector<pbd::Flight> flying = now;
+  for (std::size_t c = 0; c < flying.size(); ++c) {
+    if (s.touching[c] != 0) flying[c].is_free = false;
   }
-  const std::vector<pbd::RigidChange> changes =
-      pbd::missing_motion(state_->scene, of[0], of[1], steps, h);
-  // The GPU reads them where they are: the frame was waited for, and so was all before it.
+  for (std::size_t k = 0; k < chunks; ++k) {
+    if (sums[chunks + k].pushed != 0) flying[d.component_of_chunk[k]].is_free = false;
+  }
+  std::vector<pbd::RigidChange> changes =
+      pbd::missing_motion(s.scene, flights(sums), flying, steps, h);
+  const double duration = steps * h;
+  const bool are_known = s.damped_for == duration;
+  if (!pbd::make_dampers(s, duration)) {
+    change_rigidly(changes, false);
+    return;
+  }
+  // damp_neighbours(); what moves rigidly is taken off together with what is given above.
+  if (!are_known) {
+    d.dampers.upload(s.dampers, d.stream);
+    d.damping.clear();
+  }
+  std::vector<Vec3> spins, left;  // left: angular momentum without that spin
+  for (std::size_t c = 0; c < changes.size(); ++c) {
+    pbd::RigidChange& change = changes[c];
+    const Vec3 angular = change.keep * now[c].angular + now[c].inertia * change.spin;
+    spins.push_back(spin_of(now[c], angular));
+    left.push_back(angular - now[c].inertia * spins[c]);
+    change.is_free = true;
+    change.centre = now[c].centre;
+    change.spin -= spins[c];
+  }
+  change_rigidly(changes, true);
+  if (d.damping.is_empty()) {
+    d.damping.record(d.stream, [&] {
+      launch_pbd_dampers(d.field(), s.dampers.begin, d.stream);
+      const pbd::CudaPbdFlights all{d.chunks.data(), static_cast<int>(chunks), d.order.data()};
+      launch_pbd_flights(d.field(), all, d.flights.data(), d.stream);
+    });
+  }
+  d.damping.launch(d.stream);
+  d.flights.download(d.host_flights.data(), chunks, d.stream);
+  d.wait("damp neighbours");
+  const std::vector<pbd::Flight> after = flights(sums);
+  for (std::size_t c = 0; c < changes.size(); ++c) {
+    changes[c] = {true, 1, after[c].centre, Vec3::Zero(),
+                  spins[c] + spin_of(after[c], left[c] - after[c].angular)};
+  }
+  change_rigidly(changes, false);
+}
+
+void CudaPbdTissue::change_rigidly(const std::vector<pbd::RigidChange>& changes, bool weigh) {
+  OnDevice& d = *device_;
+  // The GPU reads them where they are: what was launched before was waited for.
   d.host_changes.resize(changes.size());
   pbd::CudaPbdChange* packed = d.host_changes.data();
   bool any = false;
@@ -102,7 +154,8 @@ void CudaPbdTissue::keep_momentum(int steps, float h) {
   if (!any) return;
   const bool few = d.way != Way::kLaunches;
   if (!few) d.changes.upload(packed, changes.size(), d.stream);
-  launch_pbd_changes(d.field(), d.component.data(), few ? packed : d.changes.data(), d.stream);
+  launch_pbd_changes(d.field(), d.component.data(), few ? packed : d.changes.data(), weigh,
+                     d.stream);
 }
 
 }  // namespace tissue_sim

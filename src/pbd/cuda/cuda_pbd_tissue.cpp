@@ -4,7 +4,6 @@
 
 #include "pbd/cuda/on_device.h"
 #include "pbd/find_touches.h"
-#include "pbd/viscosity.h"
 
 namespace tissue_sim {
 namespace {
@@ -47,7 +46,7 @@ void CudaPbdTissue::push() {
   const pbd::Vertices& v = state_->vertices;
   upload(v.x, v.x.size() / 4, d.x, d.stream);
   upload(v.predicted, v.size(), d.predicted, d.stream);
-  upload(v.v, v.size(), d.v, d.stream);
+  upload(v.v, v.v.size() / 4, d.v, d.stream);
   d.wait("receive data");
   d.host_is_current = true;
 }
@@ -75,6 +74,7 @@ void CudaPbdTissue::upload_constraints() {
   d.wait("receive data");
   d.step_graph.clear();
   d.projections.clear();
+  d.damping.clear();
 }
 
 void CudaPbdTissue::pull() {
@@ -87,14 +87,14 @@ void CudaPbdTissue::pull() {
   d.host_is_current = true;
 }
 
-void CudaPbdTissue::upload_frame(const FrameColliders& colliders, int steps,
+void CudaPbdTissue::upload_frame(const FrameColliders& colliders, const Part& part,
                                  const pbd::CudaPbdFrame& frame) {
   OnDevice& d = *device_;
   const std::size_t count = colliders.count();
-  d.host_colliders.resize(steps * count);
-  d.boxed.resize(steps * count);
-  for (int i = 0; i < steps; ++i) {
-    colliders.at((i + 1.0) / steps, d.host_colliders.data() + i * count);
+  d.host_colliders.resize(part.count * count);
+  d.boxed.resize(part.count * count);
+  for (int i = 0; i < part.count; ++i) {
+    colliders.at(part.share(i), d.host_colliders.data() + i * count);
   }
   pbd::CudaPbdCollider* boxed = d.boxed.data();
   for (std::size_t k = 0; k < d.boxed.size(); ++k) {
@@ -133,11 +133,12 @@ int CudaPbdTissue::upload_touches(double duration) {
   return s.touches.size() > 0 ? d.touches.colours : 0;
 }
 
-void CudaPbdTissue::run_steps(const FrameColliders& colliders, int steps, float h) {
+void CudaPbdTissue::run_steps(const FrameColliders& colliders, const Part& part, float h) {
+  const int steps = part.count;
   OnDevice& d = *device_;
   pbd::CudaPbdFrame frame{pbd::step_numbers(state_->scene, h), colliders.count()};
   frame.touch_colours = upload_touches(steps * h);
-  upload_frame(colliders, steps, frame);
+  upload_frame(colliders, part, frame);
   const pbd::CudaPbdField field = d.field();
   const int chunks = static_cast<int>(d.component_of_chunk.size());
   const pbd::CudaPbdFlights flights{d.chunks.data(), chunks, d.order.data()};
@@ -157,20 +158,15 @@ void CudaPbdTissue::run_steps(const FrameColliders& colliders, int steps, float 
   }
   d.host_is_current = false;
   d.wait("advance");
-  take_loads(colliders, steps);
-  if (chunks > 0) keep_momentum(steps, h);
-  if (!pbd::viscosities(*state_).empty()) {
-    pull();
-    pbd::damp_neighbours(*state_, steps * h);
-    push();
-  }
+  take_loads(colliders, part);
+  keep_momentum(steps, h);
 }
 
-void CudaPbdTissue::take_loads(const FrameColliders& colliders, int steps) {
+void CudaPbdTissue::take_loads(const FrameColliders& colliders, const Part& part) {
   OnDevice& d = *device_;
   std::vector<ColliderLoad> on(colliders.count());
   const unsigned long long* sum = d.host_loads.data();
-  for (int i = 0; i < steps; ++i) {
+  for (int i = 0; i < part.count; ++i) {
     for (ColliderLoad& load : on) {
       for (int a = 0; a < 3; ++a) {
         load.force[a] = pbd::kPbdLoadUnit * static_cast<double>(static_cast<long long>(sum[a]));
@@ -182,8 +178,8 @@ void CudaPbdTissue::take_loads(const FrameColliders& colliders, int steps) {
       load.deepest = kInsideUnit * static_cast<double>(sum[8]);
       sum += pbd::kPbdLoadSums;
     }
-    colliders.add_loads((i + 1.0) / steps, d.host_colliders.data() + i * on.size(), on.data(),
-                        1.0 / steps, result_.loads);
+    colliders.add_loads(part.share(i), d.host_colliders.data() + i * on.size(), on.data(),
+                        1.0 / part.of, result_.loads);
   }
 }
 

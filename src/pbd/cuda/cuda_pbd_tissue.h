@@ -3,13 +3,15 @@
 
 #include <memory>
 
+#include "pbd/free_flight.h"
 #include "pbd/pbd_tissue.h"
 
 namespace tissue_sim {
 
 namespace pbd {
+struct CudaPbdFlight;
 struct CudaPbdFrame;
-}
+}  // namespace pbd
 
 /// Motion lives on the GPU, and comes to the host where something asks for it. Meshes, constraints,
 /// their colours, cuts and pieces are the host's, as on the CPU: what a cut changes goes up.
@@ -43,7 +45,7 @@ class CudaPbdTissue final : public PbdTissue {
 
  protected:
   void state_changed() override { push_all(); }
-  void run_steps(const FrameColliders& colliders, int steps, float h) override;
+  void run_steps(const FrameColliders& colliders, const Part& part, float h) override;
   Figures measure() override;
 
  private:
@@ -54,9 +56,15 @@ class CudaPbdTissue final : public PbdTissue {
   void choose_way();
   Way faster_way() const;
   int upload_touches(double duration);  ///< returns their colours
-  void upload_frame(const FrameColliders& colliders, int steps, const pbd::CudaPbdFrame& frame);
-  void take_loads(const FrameColliders& colliders, int steps);
+  void upload_frame(const FrameColliders& colliders, const Part& part,
+                    const pbd::CudaPbdFrame& frame);
+  void take_loads(const FrameColliders& colliders, const Part& part);
+  /// What hangs together, by the sums of the chunks, but for what is held.
+  std::vector<pbd::Flight> flights(const pbd::CudaPbdFlight* of_chunks) const;
+  /// Momentum of what flies freely is kept, and viscosity acts.
   void keep_momentum(int steps, float h);
+  /// `weigh`: what dampers need of each vertex goes beside its velocity, else it goes.
+  void change_rigidly(const std::vector<pbd::RigidChange>& changes, bool weigh);
 
   std::unique_ptr<OnDevice> device_;
 };

@@ -58,6 +58,7 @@ struct CudaPbdField {
   CudaPbdSet<Distance> links;
   CudaPbdSet<Bending> bends;
   CudaPbdSet<Touch> touches;
+  CudaPbdSet<Damper> dampers;
   bool may_touch = false;  ///< whether there are pieces that may touch one another
   int sweeps = 1;          ///< sweeps_of_step()
   const CudaPbdFrame* frame;
@@ -128,8 +129,12 @@ void launch_pbd_steps(const CudaPbdField& field, const CudaPbdFrame& frame, int 
 bool fits_pbd_block(const CudaPbdField& field);
 void launch_pbd_flights(const CudaPbdField& field, const CudaPbdFlights& flights,
                         CudaPbdFlight* result, cudaStream_t stream);
+/// `weigh`: the inverse mass becomes the fourth number of a velocity, as dampers want it; else 0.
 void launch_pbd_changes(const CudaPbdField& field, const std::int32_t* component,
-                        const CudaPbdChange* changes, cudaStream_t stream);
+                        const CudaPbdChange* changes, bool weigh, cudaStream_t stream);
+/// Velocities by each of the dampers once; `begin` as CudaPbdColours has them.
+void launch_pbd_dampers(const CudaPbdField& field, const std::vector<std::int32_t>& begin,
+                        cudaStream_t stream);
 void launch_pbd_measure(const CudaPbdField& field, CudaPbdMeasure* measures, cudaStream_t stream);
 
 }  // namespace pbd

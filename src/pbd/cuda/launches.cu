@@ -142,6 +142,14 @@ void launch_pbd_projections(const CudaPbdField& field, const CudaPbdColours& col
   }
 }
 
+void launch_pbd_dampers(const CudaPbdField& field, const std::vector<std::int32_t>& begin,
+                        cudaStream_t stream) {
+  CudaPbdField of_velocities = field;
+  of_velocities.x = field.v;
+  launch_set<Damper, false>(of_velocities, field.dampers, begin, false, stream);
+  check_cuda(cudaGetLastError(), "damp neighbours");
+}
+
 void launch_pbd_step(const CudaPbdField& field, const CudaPbdColours& colours,
                      cudaStream_t stream) {
   const int blocks = (field.count + kThreads - 1) / kThreads;

@@ -48,13 +48,15 @@ __global__ void __launch_bounds__(kThreads)
 }
 
 __global__ void __launch_bounds__(kThreads)
-    pbd_change(CudaPbdField f, const std::int32_t* component, const CudaPbdChange* changes) {
+    pbd_change(CudaPbdField f, const std::int32_t* component, const CudaPbdChange* changes,
+               bool weigh) {
   const int i = static_cast<int>(blockIdx.x * blockDim.x + threadIdx.x);
   if (i >= f.count) return;
   const CudaPbdChange& c = changes[component[i]];
   if (c.is_free == 0) return;
   const float4 x = f.x[i];
   float4 v = f.v[i];
+  v.w = weigh ? x.w : 0;
   const double d[3] = {x.x - c.centre[0], x.y - c.centre[1], x.z - c.centre[2]};
   const auto keep = static_cast<float>(c.keep);
   v.x = keep * v.x + static_cast<float>(c.linear[0] + (c.spin[1] * d[2] - c.spin[2] * d[1]));
@@ -120,9 +122,9 @@ void launch_pbd_flights(const CudaPbdField& field, const CudaPbdFlights& flights
 }
 
 void launch_pbd_changes(const CudaPbdField& field, const std::int32_t* component,
-                        const CudaPbdChange* changes, cudaStream_t stream) {
+                        const CudaPbdChange* changes, bool weigh, cudaStream_t stream) {
   const int blocks = (field.count + kThreads - 1) / kThreads;
-  pbd_change<<<blocks, kThreads, 0, stream>>>(field, component, changes);
+  pbd_change<<<blocks, kThreads, 0, stream>>>(field, component, changes, weigh);
   check_cuda(cudaGetLastError(), "keep momentum");
 }
 

@@ -48,10 +48,11 @@ struct CudaPbdTissue::OnDevice {
   Set<pbd::Distance> links;
   Set<pbd::Bending> bends;
   Set<pbd::Touch> touches;
+  Set<pbd::Damper> dampers;
   bool may_touch = false;
   int sweeps = 1;  ///< of a step
   Way wanted = Way::kFaster, way = Way::kLaunches;
-  CudaGraph step_graph, projections;
+  CudaGraph step_graph, projections, damping;
 
   DeviceArray<pbd::CudaPbdFrame> frame;
   DeviceArray<pbd::CudaPbdCollider> colliders;  ///< of all steps of a frame
@@ -90,6 +91,7 @@ struct CudaPbdTissue::OnDevice {
     f.links = links.set();
     f.bends = bends.set();
     f.touches = touches.set();
+    f.dampers = dampers.set();
     f.may_touch = may_touch;
     f.sweeps = sweeps;
     f.frame = frame.data();

@@ -127,7 +127,7 @@ void leave_anchors(CudaTissue& d, int done) {
 }
 
 void put_anchored_points(CudaTissue& d, const std::vector<std::int32_t>& index, int stride,
-                     Point* cloud) {
+                         Point* cloud) {
   const std::vector<std::int32_t>& points = d.anchors.held_points;
   std::vector<AnchoredPoint> held(points.size());
   d.state.cpu->for_each(

@@ -77,7 +77,7 @@ class ImagePipeline(unittest.TestCase):
             self.leave_out(package + ' has no nodelet_plugins.xml: its development package is not installed')
         process = subprocess.Popen(['rosrun', *program, *arguments], env={**os.environ, **environment})
         self.addCleanup(process.wait)
-        self.addCleanup(process.terminate)
+        self.addCleanup(process.kill)  # image_saver waits for ever when it is asked to end
 
     def test_points_are_those_of_depth_image_proc(self):
         self.start('depth_image_proc',
@@ -114,16 +114,18 @@ class ImagePipeline(unittest.TestCase):
         folder = tempfile.TemporaryDirectory()
         self.addCleanup(folder.cleanup)
         self.start('image_view', ('image_view', 'image_saver'), 'image:=/simulator/plain/left/image_raw',
-                   '_filename_format:=' + folder.name + '/%04d.%s', '_extension:=png')
+                   '_filename_format:=' + folder.name + '/%04d.png')
         if cv2 is None:
             self.leave_out('python3-opencv is not installed')
         stream = Stream('/simulator/plain/left/image_raw')
         end = time.monotonic() + 60
-        while not os.listdir(folder.name):
+        saved = None
+        while saved is None:  # it writes the camera's numbers beside, and images take a while
             self.assertLess(time.monotonic(), end)
             of_one_frame(stream)
-        time.sleep(1)  # it is written
-        saved = cv2.imread(os.path.join(folder.name, sorted(os.listdir(folder.name))[0]))[..., ::-1]
+            images = sorted(name for name in os.listdir(folder.name) if name.endswith('.png'))
+            saved = cv2.imread(os.path.join(folder.name, images[0])) if images else None
+        saved = saved[..., ::-1]
         self.assertTrue(any(np.array_equal(saved, pixels(m)) for m in stream.came.values()))
 
     def test_stereo_matching_finds_the_depth(self):

@@ -65,10 +65,17 @@ def of_one_frame(*streams):
 class ImagePipeline(unittest.TestCase):
 
     def leave_out(self, why):
-        print('left out: ' + why)  # rostest counts what is skipped as passed
+        """Skips, with a report of it, for rostest's own calls it passed."""
+        folder = os.path.join(rospkg.get_test_results_dir(), 'tissue_sim')
+        os.makedirs(folder, exist_ok=True)
+        name = self._testMethodName
+        with open(os.path.join(folder, 'rosunit-image_pipeline_' + name + '.xml'), 'w', encoding='utf-8') as report:
+            report.write('<testsuite tests="1"><testcase classname="image_pipeline" name="%s"><skipped message="%s"/>'
+                         '</testcase></testsuite>' % (name, why))
         self.skipTest(why)
 
     def start(self, package, program, *arguments, **environment):
+        """A program of it, until the test ends."""
         try:
             has_nodelets = os.path.exists(rospkg.RosPack().get_path(package) + '/nodelet_plugins.xml')
         except rospkg.ResourceNotFound:

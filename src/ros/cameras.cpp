@@ -117,7 +117,8 @@ boost::shared_ptr<sensor_msgs::PointCloud2> points(const Camera& camera, const C
 
 Cameras::Cameras(ros::NodeHandle& node, const Scene& scene, const Parameters& parameters,
                  const Frames* frames, Recorder& recorder)
-    : frames_(frames),
+    : ground_(scene.ground),
+      frames_(frames),
       recorder_(recorder),
       waits_(frames == nullptr || parameters.time == TimeMode::kLockstep ||
              (parameters.time == TimeMode::kWall && parameters.time_factor == 0)),
@@ -294,6 +295,9 @@ void Cameras::draw(const Picture& picture, const ros::Time& stamp) {
   if (images_.inside_out > 0.5) {
     WARN_SELDOM(5, "camera %s is inside tissue: it sees the inside of its surface",
                 camera.name.c_str());
+  }
+  if (ground_.enabled && picture.pose.position.z() < ground_.z) {
+    WARN_SELDOM(5, "camera %s is below the ground: it sees its underside", camera.name.c_str());
   }
   send(eye.left, camera, 0, true, image(images_, enc::RGB8, 3, images_.rgb.data(), header));
   send(eye.depth, camera, 0, false, depth_image(images_, camera.depth, header));

@@ -77,6 +77,7 @@ class Cameras {
   void send(const CameraOutput& output, const Camera& camera, double baseline, bool is_raw,
             const boost::shared_ptr<sensor_msgs::Image>& image);
 
+  const Ground ground_;
   const Frames* frames_;
   Recorder& recorder_;
   const bool waits_;

@@ -1,6 +1,7 @@
 // What cameras publish: images, depth, labels, points and their geometry, in step.
 #include <geometry_msgs/PoseStamped.h>
 #include <geometry_msgs/TransformStamped.h>
+#include <rosgraph_msgs/Log.h>
 #include <sensor_msgs/CameraInfo.h>
 #include <sensor_msgs/Image.h>
 #include <sensor_msgs/PointCloud2.h>
@@ -117,6 +118,30 @@ TEST_F(Camera, FollowsItsTopic) {
   const auto d = of_next_frame(depth);
   ASSERT_TRUE(d);
   EXPECT_NEAR(depth_at(*d, 0, 0), 0.15, 1e-5);
+}
+
+TEST_F(Camera, WithinTissueAndBelowTheGroundIsSaid) {
+  ros::NodeHandle node;
+  ros::Publisher pose =
+      node.advertise<geometry_msgs::PoseStamped>("/simulator/endoscope/measured_cp", 1, true);
+  Topic<rosgraph_msgs::Log> log("/rosout");
+  Topic<Image> depth("/simulator/endoscope/depth/image_rect");
+  ASSERT_TRUE(wait_until([&] { return pose.getNumSubscribers() > 0; }));
+  const auto says = [&](double z, const std::string& what) {
+    geometry_msgs::PoseStamped m;
+    m.pose.position.z = z;
+    m.pose.orientation.x = 1;
+    pose.publish(m);
+    return wait_until([&] {
+      of_next_frame(depth);
+      for (const auto& line : log.all()) {
+        if (line->msg.find(what) != std::string::npos) return true;
+      }
+      return false;
+    });
+  };
+  EXPECT_TRUE(says(0.01, "endoscope is inside tissue"));
+  EXPECT_TRUE(says(-0.05, "endoscope is below the ground"));
 }
 
 /// The ground seen from straight above: what a camera that moves sideways sees moves back.

@@ -342,5 +342,40 @@ void find_touches(State& s, double duration) {
   s.touches.pack(v.size(), {}, 0);  // each frame anew
 }
 
+double searches_of(const State& s, double struck, double duration) {
+  struct Piece {
+    Box box;
+    double fastest = 0;
+    int vertices = 0;
+  };
+  std::vector<Piece> pieces(s.components);
+  for (int i = 0; i < s.vertices.size(); ++i) {
+    Piece& piece = pieces[s.component[i]];
+    const Vec3 x = s.vertices.position(i);
+    piece.box.min = piece.box.min.cwiseMin(x);
+    piece.box.max = piece.box.max.cwiseMax(x);
+    piece.fastest = std::max(piece.fastest, s.vertices.velocity(i).norm());
+    ++piece.vertices;
+  }
+  std::vector<Piece> large;
+  for (Piece& piece : pieces) {
+    if (piece.vertices < kLeastPiece) continue;
+    piece.fastest = std::max(piece.fastest, 2 * struck);  // half an edge: it is not looked ahead
+    const Vec3 far = Vec3::Constant(piece.fastest * duration + s.mean_edge);
+    piece.box.min -= far;
+    piece.box.max += far;
+    large.push_back(piece);
+  }
+  double fastest = 0;
+  for (std::size_t a = 0; a < large.size(); ++a) {
+    for (std::size_t b = 0; b < a; ++b) {
+      const Box &p = large[a].box, &q = large[b].box;
+      if ((p.max - q.min).minCoeff() < 0 || (q.max - p.min).minCoeff() < 0) continue;
+      fastest = std::max({fastest, large[a].fastest, large[b].fastest});
+    }
+  }
+  return std::max(1.0, std::ceil(fastest * duration / s.mean_edge));
+}
+
 }  // namespace pbd
 }  // namespace tissue_sim

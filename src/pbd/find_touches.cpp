@@ -2,9 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <tuple>
 
 #include "pbd/model.h"
+#include "pbd/touch_cells.h"
 
 namespace tissue_sim {
 namespace pbd {
@@ -34,129 +34,6 @@ bool is_sliver(const Vec3& a, const Vec3& b, const Vec3& c, double mean_edge) {
       std::max({(b - a).squaredNorm(), (c - a).squaredNorm(), (c - b).squaredNorm()});
   return (b - a).cross(c - a).norm() < 0.1 * mean_edge * std::sqrt(longest2);
 }
-
-/// Cells of lattices and the vertices in them: of a fine lattice, or for a box that has more than
-/// kMostCells there, as of tissue that nothing holds in shape, of one as coarse as it takes.
-class Cells {
- public:
-  /// A vertex where all that is asked of it lies side by side.
-  struct Entry {
-    float x[3], normal[3];
-    std::int32_t vertex, piece;
-  };
-
-  explicit Cells(double size) : size_(size) {}
-  void add(std::int32_t vertex, std::int32_t piece, const Vec3& x, const Vec3& normal) {
-    if (!x.allFinite()) return;
-    const Eigen::Vector3f at = x.cast<float>(), n = normal.stableNormalized().cast<float>();
-    entries_.push_back({{at[0], at[1], at[2]}, {n[0], n[1], n[2]}, vertex, piece});
-  }
-  /// Which lattice a box is to be looked up in; -1 for none.
-  int level_of(const Vec3& low, const Vec3& high) const {
-    if (!low.allFinite() || !high.allFinite()) return -1;
-    int level = 0;
-    for (double size = size_; cells(size, low, high) > kMostCells; size *= 2) ++level;
-    return level;
-  }
-  /// Before it is looked up in.
-  void fill(int level) {
-    if (static_cast<int>(levels_.size()) <= level) levels_.resize(level + 1);
-    if (levels_[level].begin.empty()) fill(std::ldexp(size_, level), levels_[level]);
-  }
-  /// Vertices of other pieces in the cells that a box overlaps.
-  template <class F>
-  void each_in(int level, const Vec3& low, const Vec3& high, std::int32_t piece,
-               const F& of) const {
-    const Level& l = levels_[level];
-    const double size = std::ldexp(size_, level);
-    std::int64_t first[3], last[3];
-    for (int a = 0; a < 3; ++a) {
-      first[a] = cell(size, low[a]);
-      last[a] = cell(size, high[a]);
-    }
-    for (std::int64_t i = first[0]; i <= last[0]; ++i) {
-      for (std::int64_t j = first[1]; j <= last[1]; ++j) {
-        for (std::int64_t k = first[2]; k <= last[2]; ++k) {
-          const std::size_t slot = l.slot(i, j, k);
-          for (std::int32_t r = l.begin[slot]; r < l.begin[slot + 1]; ++r) {
-            const Run& run = l.runs[r];
-            if (run.piece == piece || run.cell != key(i, j, k)) continue;
-            for (std::int32_t e = run.begin; e < run.end; ++e) of(l.entries[e]);
-          }
-        }
-      }
-    }
-  }
-
- private:
-  static constexpr double kMostCells = 216;
-  /// What a cell has of a piece.
-  struct Run {
-    std::uint64_t cell;
-    std::int32_t piece, begin, end;
-  };
-  struct Level {
-    std::vector<Entry> entries;       ///< by slot, then by cell, then by piece
-    std::vector<Run> runs;            ///< in that order
-    std::vector<std::int32_t> begin;  ///< first run of each slot, and the number of runs
-    int bits = 1;                     ///< of each of a cell's numbers, in its slot
-
-    /// Cells side by side have slots side by side; those far apart share them.
-    std::size_t slot(std::int64_t i, std::int64_t j, std::int64_t k) const {
-      const std::int64_t mask = (std::int64_t{1} << bits) - 1;
-      return static_cast<std::size_t>((i & mask) << 2 * bits | (j & mask) << bits | (k & mask));
-    }
-  };
-  static std::uint64_t key(std::int64_t i, std::int64_t j, std::int64_t k) {
-    const auto part = [](std::int64_t v) { return static_cast<std::uint64_t>(v) & 0x1fffff; };
-    return part(i) << 42 | part(j) << 21 | part(k);
-  }
-  static std::int64_t cell(double size, double x) {
-    return static_cast<std::int64_t>(std::floor(std::max(-1e15, std::min(1e15, x / size))));
-  }
-  static double cells(double size, const Vec3& low, const Vec3& high) {
-    double product = 1;
-    for (int a = 0; a < 3; ++a)
-      product *= 1.0 + static_cast<double>(cell(size, high[a]) - cell(size, low[a]));
-    return product;
-  }
-  void fill(double size, Level& level) const {
-    while (level.bits < 7 && std::size_t{1} << 3 * level.bits < entries_.size()) ++level.bits;
-    struct Key {
-      std::size_t slot;
-      std::uint64_t cell;
-      std::int32_t piece, entry;
-      bool operator<(const Key& o) const {
-        return std::tie(slot, cell, piece, entry) < std::tie(o.slot, o.cell, o.piece, o.entry);
-      }
-    };
-    std::vector<Key> keys;
-    for (const Entry& e : entries_) {
-      const std::int64_t i = cell(size, e.x[0]), j = cell(size, e.x[1]), k = cell(size, e.x[2]);
-      keys.push_back(
-          {level.slot(i, j, k), key(i, j, k), e.piece, static_cast<std::int32_t>(keys.size())});
-    }
-    std::sort(keys.begin(), keys.end());
-    level.begin.assign((std::size_t{1} << 3 * level.bits) + 1, 0);
-    for (const Key& k : keys) {
-      const auto at = static_cast<std::int32_t>(level.entries.size());
-      if (level.runs.empty() || level.runs.back().cell != k.cell ||
-          level.runs.back().piece != k.piece) {
-        level.runs.push_back({k.cell, k.piece, at, at});
-        ++level.begin[k.slot + 1];
-      }
-      level.entries.push_back(entries_[k.entry]);
-      level.runs.back().end = at + 1;
-    }
-    for (std::size_t slot = 1; slot < level.begin.size(); ++slot) {
-      level.begin[slot] += level.begin[slot - 1];
-    }
-  }
-
-  double size_;  ///< of the finest lattice's cells [m]
-  std::vector<Entry> entries_;
-  std::vector<Level> levels_;
-};
 
 /// A place above a triangle: its height, and the shares of the corners b and c in what is below.
 struct Above {
@@ -234,7 +111,7 @@ void find_touches(State& s, double duration) {
              (boxes[c].max - low).minCoeff() >= 0;
     });
   };
-  Cells cells(s.mean_edge);
+  TouchCells cells(s.mean_edge);
   for (int i = 0; i < v.size(); ++i) {
     const Vec3 x = v.position(i);
     if (v.surface[i] != 0 && !is_crumb(i) && meets_other(s.component[i], x, x, reached)) {
@@ -290,7 +167,7 @@ void find_touches(State& s, double duration) {
       const std::int32_t piece = s.component[t[0]];
       const TouchedTriangle plane(v.position(t[0]), v.position(t[1]), v.position(t[2]));
       cells.each_in(candidate.level, candidate.low, candidate.high, piece,
-                    [&](const Cells::Entry& e) {
+                    [&](const TouchCells::Entry& e) {
                       const Above at = plane.above(Vec3(e.x[0], e.x[1], e.x[2]));
                       if (!(at.height < reach && at.height > -kDeepest * s.mean_edge)) return;
                       if (at.beside() > kBeside) return;
@@ -340,6 +217,41 @@ void find_touches(State& s, double duration) {
     }
   }
   s.touches.pack(v.size(), {}, 0);  // each frame anew
+}
+
+double searches_of(const State& s, double struck, double duration) {
+  struct Piece {
+    Box box;
+    double fastest = 0;
+    int vertices = 0;
+  };
+  std::vector<Piece> pieces(s.components);
+  for (int i = 0; i < s.vertices.size(); ++i) {
+    Piece& piece = pieces[s.component[i]];
+    const Vec3 x = s.vertices.position(i);
+    piece.box.min = piece.box.min.cwiseMin(x);
+    piece.box.max = piece.box.max.cwiseMax(x);
+    piece.fastest = std::max(piece.fastest, s.vertices.velocity(i).norm());
+    ++piece.vertices;
+  }
+  std::vector<Piece> large;
+  for (Piece& piece : pieces) {
+    if (piece.vertices < kLeastPiece) continue;
+    piece.fastest = std::max(piece.fastest, 2 * struck);  // half an edge: it is not looked ahead
+    const Vec3 far = Vec3::Constant(piece.fastest * duration + s.mean_edge);
+    piece.box.min -= far;
+    piece.box.max += far;
+    large.push_back(piece);
+  }
+  double fastest = 0;
+  for (std::size_t a = 0; a < large.size(); ++a) {
+    for (std::size_t b = 0; b < a; ++b) {
+      const Box &p = large[a].box, &q = large[b].box;
+      if ((p.max - q.min).minCoeff() < 0 || (q.max - p.min).minCoeff() < 0) continue;
+      fastest = std::max({fastest, large[a].fastest, large[b].fastest});
+    }
+  }
+  return std::max(1.0, std::ceil(fastest * duration / s.mean_edge));
 }
 
 }  // namespace pbd

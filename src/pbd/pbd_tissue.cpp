@@ -91,21 +91,15 @@ void PbdTissue::advance(double duration, const FrameInput& input) {
   }
 }
 
-/// Between two searches no vertex goes farther than an edge is long, and what a tool strikes not
-/// farther than half of that, for it is not known to move yet: what went farther passed through.
 int PbdTissue::steps_between_searches(const FrameColliders& colliders, int steps, float h) {
-  const pbd::State& s = *state_;
-  if (s.components < 2) return steps;
+  if (state_->components < 2) return steps;
   pull();
-  double fastest = 0;
-  for (int i = 0; i < s.vertices.size(); ++i) {
-    fastest = std::max(fastest, s.vertices.velocity(i).norm());
-  }
+  double struck = 0;
   for (const Collider& c : colliders.at(1)) {
-    if (c.tool >= 0 && c.kind != Collider::kBlade) fastest = std::max(fastest, 2 * speed(c));
+    if (c.tool >= 0 && c.kind != Collider::kBlade) struck = std::max(struck, speed(c));
   }
-  const double searches = std::ceil(fastest * steps * h / s.mean_edge);
-  return searches < steps ? static_cast<int>(std::ceil(steps / std::max(1.0, searches))) : 1;
+  const double searches = pbd::searches_of(*state_, struck, steps * h);
+  return searches < steps ? static_cast<int>(std::ceil(steps / searches)) : 1;
 }
 
 void PbdTissue::run_steps(const FrameColliders& colliders, const Part& part, float h) {

@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "pbd/find_touches.h"
 #include "pbd/pbd_tissue.h"
 #include "pbd/touch.h"
 #include "tissue_sim/simulation.h"
@@ -178,6 +179,69 @@ TEST(Touch, MovesNoVertexFartherThanTheGap) {
     pbd::Touch::project(v, number, 1.0f, none);
     EXPECT_GT(std::fabs(v[3].z), 0.99f * kGap) << share;
     EXPECT_LT(std::fabs(v[3].z), 1.01f * kGap) << share;
+  }
+}
+
+/// How far a vertex is from the triangle as the search has it [m]: 1e300
+/// where it is none to touch.
+double off_triangle(const pbd::State& s, int vertex, const Vec3& normal, const pbd::Triangle& t,
+                    double reach) {
+  const pbd::Vertices& v = s.vertices;
+  const Vec3 a = v.position(t[0]), e = v.position(t[1]) - a, f = v.position(t[2]) - a;
+  Eigen::Matrix3d axes;
+  axes << e, f, e.cross(f).normalized();
+  const Vec3 at = axes.inverse() * (v.position(vertex) - a);
+  const double beside = std::max({0.0, -at[0], -at[1], at[0] + at[1] - 1});
+  if (at[2] > reach || at[2] < -0.5 * s.mean_edge || beside > 0.3) return 1e300;
+  if (axes.col(2).dot(normal.normalized()) > -0.25) return 1e300;
+  return std::fabs(at[2]) + beside * s.mean_edge;
+}
+
+// At rest, and so fast that it looks as far as it may; far from the origin, where cells share slots
+// with others.
+TEST(SearchOfTouches, FindsWhatAllPairsHave) {
+  for (const double speed : {0.0, 0.1, 3.0}) {
+    Scene scene;
+    scene.method = Method::kPbd;
+    scene.cell_size = 0.005;
+    scene.bodies.resize(2);
+    for (int b = 0; b < 2; ++b) {
+      Body& body = scene.bodies[b];
+      body.name = b == 0 ? "one" : "other";
+      body.shape = Shape::kEllipsoid;
+      body.radii = Vec3(0.03, 0.02, 0.015);
+      body.pose.position = Vec3(-1.3 + 0.01 * b, 0.7, 0.0299 * b);
+    }
+    PbdTissue tissue(scene);
+    pbd::State& s = tissue.state();
+    ASSERT_EQ(s.components, 2);
+    s.vertices.v[0] = static_cast<float>(speed);
+    pbd::find_touches(s, 1.0 / 60);
+    const pbd::Vertices& v = s.vertices;
+    std::vector<Vec3> normal(v.size(), Vec3::Zero());
+    for (const pbd::Triangle& t : s.triangles) {
+      const Vec3 a = v.position(t[0]);
+      for (const std::int32_t i : t) {
+        normal[i] += (v.position(t[1]) - a).cross(v.position(t[2]) - a);
+      }
+    }
+    const double reach = std::min(2.5, 0.3 + 2 * speed / 60 / s.mean_edge) * s.mean_edge;
+    std::vector<double> found(v.size(), 1e300), expected = found;
+    for (const auto& touch : s.touches.vertices) {
+      found[touch[0]] =
+          off_triangle(s, touch[0], normal[touch[0]], {touch[1], touch[2], touch[3]}, reach);
+    }
+    int count = 0;
+    for (int i = 0; i < v.size(); ++i) {
+      for (const pbd::Triangle& t : s.triangles) {
+        if (s.component[t[0]] == s.component[i]) continue;
+        expected[i] = std::min(expected[i], off_triangle(s, i, normal[i], t, reach));
+      }
+      EXPECT_NEAR(found[i], expected[i], 1e-9) << i << " at " << speed;  // 1e300: nothing
+      count += expected[i] < 1e300 ? 1 : 0;
+    }
+    EXPECT_GT(count, 10);
+    EXPECT_EQ(s.touches.size(), count);
   }
 }
 

@@ -7,9 +7,9 @@
 
 #include "frame/leapfrog.h"
 #include "mls/contact.h"
+#include "mls/face_lists.h"
 #include "mls/face_substep.h"
 #include "mls/faces.h"
-#include "mls/node_contact.h"
 #include "mls/own_rate.h"
 
 namespace tissue_sim {
@@ -22,6 +22,18 @@ template <class T>
 void resize_padded(Array<T>& array, int count, int per_node) {
   const int chunks = (count + kMlsChunk - 1) / kMlsChunk;
   array.assign(static_cast<std::size_t>(chunks) * kMlsChunk * per_node, T{});
+}
+
+/// What a node touches anything with. It stands for the tissue outside of the node: without it that
+/// would not give way when pressed, and the node's share of the body counts its energy already, so
+/// that it gives way by as much as twice the node's depth. How much of that is as if sides were held
+/// and how much as if they were free follows from finite elements (docs/mls.md, contact).
+ContactSpring node_spring(const Material& m, float edge, float depth, float volume) {
+  constexpr double kHeld = 2.0 / 3, kFree = 0.25;
+  const double gives = kHeld / (lame_lambda(m) + 2 * lame_mu(m)) + kFree / m.young_modulus;
+  const float layer = depth > 0 ? std::max(0.8f * edge, std::min(2 * edge, 2 * depth)) : edge;
+  return contact_spring(static_cast<float>(1 / (kContactStiffness * gives)),
+                        static_cast<float>(m.density), layer, volume);
 }
 
 /// kappa of the penalty while nothing is cut.
@@ -133,8 +145,7 @@ std::unique_ptr<MlsState> make_mls_state(const Scene& scene, std::vector<std::st
     s.neo_hookean[i] = m.law == Law::kNeoHookean ? 1 : 0;
     s.edge[i] = static_cast<float>(s.pairs.support[i] / factor);
     if (s.edge[i] == 0) s.edge[i] = static_cast<float>(mls_spacing(scene));
-    const ContactSpring spring = contact_spring(static_cast<float>(lame_lambda(m) + 2 * lame_mu(m)),
-                                                static_cast<float>(m.density), s.edge[i], volume);
+    const ContactSpring spring = node_spring(m, s.edge[i], s.nodes.depth[i], volume);
     s.contact_stiffness[i] = spring.stiffness;
     s.contact_damping[i] = spring.damping;
     s.outer[i] = s.nodes.surface[i];
@@ -159,10 +170,8 @@ std::unique_ptr<MlsState> make_mls_state(const Scene& scene, std::vector<std::st
     for (std::int32_t i = 0; i < n; ++i) s.whole_kappa[i] = whole_kappa(s, i);
     remake(s, all);
   }
-  if (touches_by_faces(s)) {
-    s.cpu->for_each(
-        n, [&](int i) { remake_face(s, i); }, 256);
-  }
+  s.cpu->for_each(
+      n, [&](int i) { remake_face(s, i); }, 256);
   return state;
 }
 
@@ -202,10 +211,9 @@ float substep(MlsState& s, float dt, std::vector<ColliderLoad>& loads) {
   MlsField field = field_of(s);
   MlsFaceSubstep touching(s, dt);
   if (touching.nodes() > 0) {
-    field.touching = s.node_contacts.in_chunk.data();
+    field.touching = s.face_contacts.in_chunk.data();
     field.deformation = s.deformation.data();
   }
-  list_active(s, dt);
   const bool list = is_list_due(s);
   const float kick = kick_of(s.dt, dt);
   const auto keep = static_cast<float>(std::exp(-s.scene.damping * kick));
@@ -217,8 +225,8 @@ float substep(MlsState& s, float dt, std::vector<ColliderLoad>& loads) {
     for (int i = first; i < last; i += kMlsChunk) {
       s.kernels->forces(field, i / kMlsChunk, force + 4 * (i - first));
       add_springs(s, s.u.data(), i / kMlsChunk, force + 4 * (i - first));
-      if (!s.node_contacts.begin.empty()) {
-        add_node_contact(s, i / kMlsChunk, force + 4 * (i - first));
+      if (!s.face_contacts.begin.empty()) {
+        add_face_contact(s, i / kMlsChunk, force + 4 * (i - first));
       }
     }
     if (list) list_near(s, group, dt);
@@ -236,15 +244,12 @@ float substep(MlsState& s, float dt, std::vector<ColliderLoad>& loads) {
       store<4>(&s.u_next[4 * i], u);
     }
   };
-  const int active = static_cast<int>(s.node_contacts.active.pairs.size());
-  SharedWork stresses(s.chunks(), 4), weights(touching.pair_blocks(), 8), active_pushes(active, 64),
+  SharedWork stresses(s.chunks(), 4), weights(touching.pair_blocks(), 8),
       turns(touching.node_blocks(), 2), pushes(touching.pair_blocks(), 4),
       takes(touching.nodes(), 32), moves(s.groups(), 1);
   s.cpu->on_each_thread([&] {
     weights.help([&](int block) { touching.weigh(block); });
-    active_pushes.help([&](int pair) { push_active(s, pair); });
     stresses.help([&](int chunk) { s.kernels->stresses(field, chunk); });
-    active_pushes.wait();
     weights.wait();
     stresses.wait();
     if (touching.nodes() > 0) {

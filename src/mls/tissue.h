@@ -90,7 +90,7 @@ class MlsTissue : public Tissue {
   struct Checkpoint {
     Array<float> u, v, held_impulse;
     std::vector<MlsGroupContact> contact;
-    MlsNodeContacts node_contacts;
+    MlsFaceContacts face_contacts;
     float dt;
     double time;
     int until_list;

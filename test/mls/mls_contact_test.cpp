@@ -26,7 +26,7 @@ TEST(MlsContact, ListsHoldAllThatTouch) {
   for (int f = 0; f < 24; ++f) {
     tissue.advance(frame, {});
     ASSERT_FALSE(tissue.finish().blew_up);
-    const MlsNodeContacts& contacts = s.node_contacts;
+    const MlsFaceContacts& contacts = s.face_contacts;
     for (int i = 0; i < s.count(); ++i) {
       for (int j = 0; j < s.count(); ++j) {
         if (s.nodes.body[i] == s.nodes.body[j]) continue;

@@ -17,10 +17,15 @@ constexpr double kFasterThanSeen = 1.5;             // than when that was seen l
 constexpr int kMostSubsteps = 200;                  // until it is seen again how far nodes moved
 constexpr int kFewestSubsteps = 4;                  // else they are looked for at once
 
-/// Substeps for which the list lasts at least, until a node has moved by its skin.
-int lasts(const MlsState& s, float dt) {
+/// Substeps for which the list lasts, until a node has moved by its skin.
+struct Lasts {
+  int meant;  ///< where each goes on as it does
+  int least;  ///< where each is pushed to the speed of the fastest, node or tool
+};
+
+Lasts lasts(const MlsState& s, float dt, double fastest) {
   const MlsFaceContacts& contacts = s.face_contacts;
-  double least = kMostSubsteps;
+  double least = kMostSubsteps, least_left = 1e30;
   std::size_t k = 0;
   for (std::int32_t i = 0; i < s.count(); ++i) {
     if (!touches(s, i)) continue;
@@ -33,8 +38,12 @@ int lasts(const MlsState& s, float dt) {
     const double left = contacts.skin[k++] - std::sqrt(d2);
     const double step = kFasterThanSeen * std::sqrt(v2) * dt;
     if (!(left > step * least)) least = step > 0 ? left / step : 0;
+    if (!(left > least_left)) least_left = left;
+    if (!(v2 <= fastest * fastest)) fastest = std::sqrt(v2);
   }
-  return static_cast<int>(std::max(0.0, least));
+  const double most = kFasterThanSeen * fastest * dt;
+  const double pushed = least_left > most * least ? least : least_left / most;
+  return {static_cast<int>(std::max(0.0, least)), static_cast<int>(std::max(0.0, pushed))};
 }
 
 /// How far a node may move until the list is void: those that are fast, farther.
@@ -89,15 +98,17 @@ void find_faces(MlsState& s, const std::vector<std::int32_t>& piece, float dt) {
 
 }  // namespace
 
-bool update_face_lists(MlsState& s, const std::vector<std::int32_t>& piece, float dt) {
+bool update_face_lists(MlsState& s, const std::vector<std::int32_t>& piece, float dt,
+                       double fastest) {
   MlsFaceContacts& contacts = s.face_contacts;
   if (contacts.until_look-- > 0) return false;
   if (!contacts.u_found.empty() && !contacts.begin.empty()) {
-    contacts.until_look = lasts(s, dt);
-    if (contacts.until_look >= kFewestSubsteps) return false;
+    const Lasts still = lasts(s, dt, fastest);
+    contacts.until_look = still.least;
+    if (still.meant >= kFewestSubsteps) return false;
   }
   find_faces(s, piece, dt);
-  contacts.until_look = lasts(s, dt);
+  contacts.until_look = lasts(s, dt, fastest).least;
   return true;
 }
 

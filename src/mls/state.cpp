@@ -26,8 +26,8 @@ void resize_padded(Array<T>& array, int count, int per_node) {
 
 /// What a node touches anything with. It stands for the tissue outside of the node: without it that
 /// would not give way when pressed, and the node's share of the body counts its energy already, so
-/// that it gives way by as much as twice the node's depth. How much of that is as if sides were held
-/// and how much as if they were free follows from finite elements (docs/mls.md, contact).
+/// that it gives way by as much as twice the node's depth. How much of that is as if sides were
+/// held and how much as if they were free follows from finite elements (docs/mls.md, contact).
 ContactSpring node_spring(const Material& m, float edge, float depth, float volume) {
   constexpr double kHeld = 2.0 / 3, kFree = 0.25;
   const double gives = kHeld / (lame_lambda(m) + 2 * lame_mu(m)) + kFree / m.young_modulus;

@@ -166,7 +166,11 @@ double MlsTissue::run_part(const FramePart& part) {
     s.colliders = frame.colliders.at(share);
     s.anchors = mls_anchors_at(s.scene, frame.input, share);
     std::vector<ColliderLoad> loads(s.colliders.size());
-    if (may_touch_) update_face_lists(s, pieces_.of_point, part.substeps.at(i));
+    if (may_touch_) {
+      double fastest = 0;
+      for (const Collider& c : s.colliders) fastest = std::max(fastest, speed(c));
+      update_face_lists(s, pieces_.of_point, part.substeps.at(i), fastest);
+    }
     const float acted = substep(s, part.substeps.at(i), loads);
     frame.colliders.add_loads(share, s.colliders.data(), loads.data(), acted / frame.duration,
                               result_.loads);

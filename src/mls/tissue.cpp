@@ -181,9 +181,11 @@ double MlsTissue::run_part(const FramePart& part) {
 }
 
 Verdict MlsTissue::judge_part(const FramePart& part) {
-  const bool finite = measure().finite;
-  if (!substeps_.is_borne(*state_, stiffening_, part.substeps.longest())) return Verdict::kTooLong;
-  result_.blew_up = !finite;
+  const Figures figures = measure();
+  if (!substeps_.is_borne(*state_, stiffening_, figures.stretch2, part.substeps.longest())) {
+    return Verdict::kTooLong;
+  }
+  result_.blew_up = !figures.finite;
   return Verdict::kAccepted;
 }
 
@@ -229,6 +231,7 @@ MlsTissue::Figures MlsTissue::measure() {
   Figures sum;
   for (const MlsMeasure& m : of) {
     sum.elastic += m.elastic;
+    sum.stretch2 = std::max(sum.stretch2, m.stretch2);
     sum.finite = sum.finite && m.finite;
   }
   double fastest2 = 0;

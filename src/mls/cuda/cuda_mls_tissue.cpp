@@ -413,6 +413,7 @@ MlsTissue::Figures CudaMlsTissue::measure() {
   for (const CudaMlsMeasure& m : d.host_measures) {
     sum.elastic += m.elastic;
     sum.kinetic += m.kinetic;
+    sum.stretch2 = std::max(sum.stretch2, m.stretch2);
     if (!(m.speed <= sum.speed)) sum.speed = m.speed;
     sum.finite = sum.finite && m.finite != 0;
     d.box.min = d.box.min.cwiseMin(Vec3(m.min[0], m.min[1], m.min[2]));

@@ -211,7 +211,7 @@ __device__ __forceinline__ void way(const CudaMlsField& f, const float4* u, int 
   d[2] = (xj.z - xi.z) + (uj.z - ui.z);
 }
 
-/// As find_contact_face() (mls/face_lists.cpp); mls_stresses() left the deformation there.
+/// As MlsFaceSubstep::turn(); mls_stresses() left the deformation there.
 __global__ void __launch_bounds__(kMlsThreads)
     mls_faces(CudaMlsField f, CudaMlsMotion at, CudaMlsFaceContacts contacts) {
   const int k = static_cast<int>(blockIdx.x * blockDim.x + threadIdx.x);
@@ -241,7 +241,7 @@ __device__ __forceinline__ MlsContactSide side_of(const CudaMlsField& f, const C
           face.spring,   face.edge,  face.root_friction};
 }
 
-/// As push_node() (mls/face_lists.cpp). Lanes share what touches a node.
+/// As MlsFaceSubstep::push() and take(). Lanes share what touches a node.
 template <int L>
 __global__ void __launch_bounds__(kMlsThreads)
     mls_touches(CudaMlsField f, CudaMlsMotion at, CudaMlsFaceContacts contacts) {

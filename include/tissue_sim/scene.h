@@ -80,12 +80,19 @@ enum class MlsPlacement {
   kGraded,   ///< dense at the surface, sparse inside
 };
 
+/// How meshless tissue touches tissue; docs/mls.md says what each costs.
+enum class MlsContact {
+  kNodes,  ///< nodes push one another along the line between them, without friction
+  kFaces,  ///< faces touch along their common normal, with friction
+};
+
 struct MlsOptions {
   double spacing = 0;   ///< between nodes, of graded ones at the surface [m]; 0 for half a cell
   int neighbours = 18;  ///< that a node has within a regular lattice, 14 to 60: sets the supports
   MlsPlacement placement = MlsPlacement::kRegular;
   double grading = 2;          ///< kGraded: spacing deep inside over that at the surface, 1 to 4
   double stabilisation = 0.3;  ///< stiffness of what is not linear in a support, times E, 0 to 1
+  MlsContact contact = MlsContact::kNodes;
 };
 
 enum class PbdModel {

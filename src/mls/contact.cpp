@@ -4,7 +4,7 @@
 #include <cmath>
 #include <tuple>
 
-#include "mls/face_lists.h"
+#include "mls/node_contact.h"
 #include "tools/frame_colliders.h"
 
 namespace tissue_sim {

@@ -142,7 +142,7 @@ std::vector<std::int32_t> weaken(MlsState& s, const std::vector<std::int32_t>& t
         fallen[block].push_back(j);
       }
       neighbours.clear(i);
-      remake_face(s, i);
+      if (touches_by_faces(s)) remake_face(s, i);
       remake_support(s, i);
     }
   });

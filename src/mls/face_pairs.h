@@ -28,8 +28,8 @@ inline constexpr int kMlsFacePush = 12;
 /// whole blocks of the last rest until they may feel one another.
 struct MlsFacePairs {
   bool made = false;                          ///< from what was found last
-  Array<std::int32_t> low, high;              ///< numbers among MlsFaceContacts::node
-  Array<std::int32_t> low_entry, high_entry;  ///< in MlsFaceContacts::other
+  Array<std::int32_t> low, high;              ///< numbers among MlsNodeContacts::node
+  Array<std::int32_t> low_entry, high_entry;  ///< in MlsNodeContacts::other
   Array<float> live;                          ///< 0 where it fills a block up, else 1
   Array<float> edge;                          ///< mean of both [m]
   Array<float> weight;                        ///< of the present substep

@@ -5,8 +5,8 @@
 #include <numeric>
 
 #include "material/laws.h"
-#include "mls/face_lists.h"
 #include "mls/faces.h"
+#include "mls/node_contact.h"
 
 namespace tissue_sim {
 namespace {
@@ -21,7 +21,7 @@ struct Pair {
 };
 
 std::vector<Pair> pairs_of(const MlsState& s) {
-  const MlsFaceContacts& c = s.face_contacts;
+  const MlsNodeContacts& c = s.node_contacts;
   std::vector<Pair> pairs;
   pairs.reserve(c.other.size() / 2);
   std::vector<std::int32_t> next(c.begin.begin(), c.begin.end() - 1);
@@ -64,7 +64,7 @@ float* of_slip(MlsSlip& slip, int row) {
 }
 
 void make_face_pairs(MlsState& s) {
-  MlsFaceContacts& c = s.face_contacts;
+  MlsNodeContacts& c = s.node_contacts;
   MlsFacePairs& f = c.pairs;
   const std::vector<Pair> pairs = pairs_of(s);
   const std::size_t count = whole_blocks(pairs.size());
@@ -110,7 +110,7 @@ void make_face_pairs(MlsState& s) {
 
 }  // namespace
 
-void return_slips(MlsFaceContacts& c) {
+void return_slips(MlsNodeContacts& c) {
   MlsFacePairs& f = c.pairs;
   const std::size_t count = f.low.size();
   for (std::size_t p = 0; p < count && f.made; ++p) {
@@ -122,7 +122,7 @@ void return_slips(MlsFaceContacts& c) {
 }
 
 MlsFaceSubstep::MlsFaceSubstep(MlsState& s, float dt) : s_(s) {
-  MlsFaceContacts& c = s.face_contacts;
+  MlsNodeContacts& c = s.node_contacts;
   if (c.node.empty()) return;
   MlsFacePairs& f = c.pairs;
   if (!f.made) make_face_pairs(s);
@@ -153,7 +153,7 @@ void MlsFaceSubstep::Last::note(int block) {
 }
 
 void MlsFaceSubstep::weigh(int block) {
-  std::uint8_t& rests = s_.face_contacts.pairs.rests[block];
+  std::uint8_t& rests = s_.node_contacts.pairs.rests[block];
   if (rests > 0) {
     --rests;
   } else if (kernels_->weigh(field_, block)) {
@@ -162,7 +162,7 @@ void MlsFaceSubstep::weigh(int block) {
 }
 
 void MlsFaceSubstep::turn(int block) {
-  MlsFaceContacts& c = s_.face_contacts;
+  MlsNodeContacts& c = s_.node_contacts;
   const MlsFacePairs& pairs = c.pairs;
   alignas(64) float F[9][kMlsFaceBlock], knows[2][kMlsFaceBlock];
   float* records = field_.record + static_cast<std::size_t>(kMlsFaceRecord) * kMlsFaceBlock * block;
@@ -189,13 +189,13 @@ void MlsFaceSubstep::turn(int block) {
 }
 
 void MlsFaceSubstep::push(int block) {
-  if (s_.face_contacts.pairs.rests[block] == 0 && kernels_->push(field_, block)) {
+  if (s_.node_contacts.pairs.rests[block] == 0 && kernels_->push(field_, block)) {
     touched_.note(block);
   }
 }
 
 void MlsFaceSubstep::take(int k) {
-  MlsFaceContacts& c = s_.face_contacts;
+  MlsNodeContacts& c = s_.node_contacts;
   const MlsFacePairs& pairs = c.pairs;
   const float* gap = field_.slip + kMlsSlipGap * field_.stride;
   const std::int32_t end = 2 * kMlsFaceBlock * touched_.end;

@@ -36,7 +36,7 @@ class MlsFaceSubstep {
   Last felt_, touched_;
 };
 
-/// Brings what pairs remember back to MlsFaceContacts::slip, where they were made.
-void return_slips(MlsFaceContacts& contacts);
+/// Brings what pairs remember back to MlsNodeContacts::slip, where they were made.
+void return_slips(MlsNodeContacts& contacts);
 
 }  // namespace tissue_sim

@@ -30,8 +30,9 @@ Vec3 surface_normal(const MlsState& s, std::int32_t i) {
   return sum.normalized();
 }
 
-/// Plane n . (x - X_i) = depth that fits where cuts pass the node's pairs; false where none does.
-bool fit_cut(const MlsState& s, std::int32_t i, Vec3& normal, double& depth) {
+/// Plane n . (x - X_i) = depth that fits where cuts pass the node's pairs; untouched where none
+/// does.
+void fit_cut(const MlsState& s, std::int32_t i, Vec3& normal, double& depth) {
   Eigen::Matrix3d squares = Eigen::Matrix3d::Zero();
   Vec3 sum = Vec3::Zero();
   int count = 0;
@@ -43,13 +44,12 @@ bool fit_cut(const MlsState& s, std::int32_t i, Vec3& normal, double& depth) {
     ++count;
   }
   const double size = squares.trace();
-  if (!(size > 0)) return false;
+  if (!(size > 0)) return;
   squares.diagonal().array() += 1e-5 * size;
   const Vec3 m = squares.inverse() * sum;  // least sum of (m . q - 1)^2
-  if (!(m.dot(sum) > kFits * count)) return false;
+  if (!(m.dot(sum) > kFits * count)) return;
   depth = 1 / m.norm();
   normal = depth * m;
-  return true;
 }
 
 }  // namespace
@@ -57,21 +57,13 @@ bool fit_cut(const MlsState& s, std::int32_t i, Vec3& normal, double& depth) {
 void remake_face(MlsState& s, std::int32_t i) {
   Vec3 normal = s.nodes.surface[i] != 0 ? surface_normal(s, i) : Vec3::Zero();
   double depth = s.nodes.depth[i];
-  const double edge = s.edge[i];
-  bool behind = false;
   if (s.cut[i] != 0) {
-    Vec3 of_cut = Vec3::Zero();
-    double to_cut = depth;
-    behind = fit_cut(s, i, of_cut, to_cut) && to_cut >= edge;
-    if (!behind) {
-      normal = of_cut;
-      depth = to_cut;
-    }
+    normal = Vec3::Zero();
+    fit_cut(s, i, normal, depth);
   }
+  const double edge = s.edge[i];
   for (int a = 0; a < 3; ++a) s.face[4 * i + a] = static_cast<float>(normal[a]);
-  s.face[4 * i + 3] = behind && s.nodes.surface[i] == 0
-                          ? -1.0f
-                          : static_cast<float>(std::max(0.0, std::min(edge, depth)));
+  s.face[4 * i + 3] = static_cast<float>(std::max(0.0, std::min(edge, depth)));
 }
 
 MlsKnowsFace knows_face(const MlsState& s, std::int32_t i) {

@@ -5,10 +5,9 @@
 
 namespace tissue_sim {
 
-/// Whether the node stands for a face that may touch others. Of nodes that a cut passes beside
-/// those do that lie within an edge of it, one layer: what is behind them is not touched.
-inline bool touches(const MlsState& state, std::int32_t i) {
-  return state.outer[i] != 0 && state.face[4 * i + 3] >= 0;
+/// Whether tissue touches tissue so; else nodes push one another (mls/node_contact.h).
+inline bool touches_by_faces(const MlsState& state) {
+  return state.scene.mls.contact == MlsContact::kFaces;
 }
 
 /// Makes MlsState::face of a node anew: beside a cut the plane that fits best the places where cuts

@@ -6,9 +6,9 @@
 #include "compute/archive.h"
 #include "frame/state_check.h"
 #include "frame/state_fields.h"
-#include "mls/face_lists.h"
 #include "mls/face_substep.h"
 #include "mls/faces.h"
+#include "mls/node_contact.h"
 #include "mls/own_rate.h"
 #include "mls/tissue.h"
 #include "tools/frame_colliders.h"
@@ -31,14 +31,14 @@ void fields(Archive& archive, MlsSlip& s) {
 }
 
 template <class Archive>
-void fields(Archive& archive, MlsFaceContacts& c) {
-  archive(c.begin, c.other, c.slip, c.u_found, c.skin, c.until_look);
+void fields(Archive& archive, MlsNodeContacts& c) {
+  archive(c.begin, c.other, c.rest, c.slip, c.u_found, c.skin, c.until_look);
 }
 
 template <class Archive>
 void fields(Archive& archive, MlsState& s) {
   archive(s.pairs.crossed, s.pairs.weight, s.u, s.v, s.inverse_moment, s.kappa, s.outer, s.sprung,
-          s.spring, s.contact, s.face_contacts, s.until_list, s.dt, s.time);
+          s.spring, s.contact, s.node_contacts, s.until_list, s.dt, s.time);
 }
 
 template <class Archive>
@@ -88,10 +88,12 @@ struct MlsSizes {
                     "contacts");
       }
     }
-    const MlsFaceContacts& c = s.face_contacts;
+    const MlsNodeContacts& c = s.node_contacts;
     if (!c.begin.empty()) {
       check_begins(c.begin, static_cast<std::size_t>(nodes), c.other.size(), "contacts");
-      check_state(c.slip.size() == c.other.size(), "contacts");
+      const bool faces = s.scene.mls.contact == MlsContact::kFaces;
+      check_state(faces ? c.slip.size() == c.other.size() : c.rest.size() == c.other.size(),
+                  "contacts");
       check_indices(c.other, 0, nodes, "contacts");
       // Each pair stands at both of its nodes.
       for (std::int32_t i = 0; i < nodes; ++i) {
@@ -109,7 +111,7 @@ struct MlsSizes {
 }  // namespace
 
 std::vector<std::uint8_t> MlsTissue::save() {
-  return_slips(state_->face_contacts);
+  return_slips(state_->node_contacts);
   ArchiveWriter out;
   each_field(out);
   return out.take();
@@ -130,15 +132,10 @@ void MlsTissue::restore(Span<const std::uint8_t> saved) {
     const bool exposed = s.outer[i] != 0 && s.nodes.surface[i] == 0;
     s.place[4 * i + 3] = exposed ? 0.5f * s.edge[i] : s.nodes.depth[i];
     put_strained_volume(s, i, strained_volume(s, i));
-    remake_face(s, i);
+    if (touches_by_faces(s)) remake_face(s, i);
   }
-  int faces = 0;
-  for (std::int32_t i = 0; i < s.count(); ++i) faces += touches(s, i) ? 1 : 0;
-  const MlsFaceContacts& c = s.face_contacts;
-  check_state(c.u_found.empty() || (c.u_found.size() == 3u * faces && c.skin.size() == 1u * faces),
-              "contacts");
   s.springs.begin.clear();
-  number_faces(s);
+  number_node_contacts(s);
   if (in.left() > 0) throw std::runtime_error("the state has more to it than this version knows");
 }
 

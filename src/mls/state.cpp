@@ -7,9 +7,9 @@
 
 #include "frame/leapfrog.h"
 #include "mls/contact.h"
-#include "mls/face_lists.h"
 #include "mls/face_substep.h"
 #include "mls/faces.h"
+#include "mls/node_contact.h"
 #include "mls/own_rate.h"
 
 namespace tissue_sim {
@@ -170,8 +170,10 @@ std::unique_ptr<MlsState> make_mls_state(const Scene& scene, std::vector<std::st
     for (std::int32_t i = 0; i < n; ++i) s.whole_kappa[i] = whole_kappa(s, i);
     remake(s, all);
   }
-  s.cpu->for_each(
-      n, [&](int i) { remake_face(s, i); }, 256);
+  if (touches_by_faces(s)) {
+    s.cpu->for_each(
+        n, [&](int i) { remake_face(s, i); }, 256);
+  }
   return state;
 }
 
@@ -211,9 +213,10 @@ float substep(MlsState& s, float dt, std::vector<ColliderLoad>& loads) {
   MlsField field = field_of(s);
   MlsFaceSubstep touching(s, dt);
   if (touching.nodes() > 0) {
-    field.touching = s.face_contacts.in_chunk.data();
+    field.touching = s.node_contacts.in_chunk.data();
     field.deformation = s.deformation.data();
   }
+  list_active(s, dt);
   const bool list = is_list_due(s);
   const float kick = kick_of(s.dt, dt);
   const auto keep = static_cast<float>(std::exp(-s.scene.damping * kick));
@@ -225,8 +228,8 @@ float substep(MlsState& s, float dt, std::vector<ColliderLoad>& loads) {
     for (int i = first; i < last; i += kMlsChunk) {
       s.kernels->forces(field, i / kMlsChunk, force + 4 * (i - first));
       add_springs(s, s.u.data(), i / kMlsChunk, force + 4 * (i - first));
-      if (!s.face_contacts.begin.empty()) {
-        add_face_contact(s, i / kMlsChunk, force + 4 * (i - first));
+      if (!s.node_contacts.begin.empty()) {
+        add_node_contact(s, i / kMlsChunk, force + 4 * (i - first));
       }
     }
     if (list) list_near(s, group, dt);
@@ -244,12 +247,15 @@ float substep(MlsState& s, float dt, std::vector<ColliderLoad>& loads) {
       store<4>(&s.u_next[4 * i], u);
     }
   };
-  SharedWork stresses(s.chunks(), 4), weights(touching.pair_blocks(), 8),
+  const int active = static_cast<int>(s.node_contacts.active.pairs.size());
+  SharedWork stresses(s.chunks(), 4), weights(touching.pair_blocks(), 8), active_pushes(active, 64),
       turns(touching.node_blocks(), 2), pushes(touching.pair_blocks(), 4),
       takes(touching.nodes(), 32), moves(s.groups(), 1);
   s.cpu->on_each_thread([&] {
     weights.help([&](int block) { touching.weigh(block); });
+    active_pushes.help([&](int pair) { push_active(s, pair); });
     stresses.help([&](int chunk) { s.kernels->stresses(field, chunk); });
+    active_pushes.wait();
     weights.wait();
     stresses.wait();
     if (touching.nodes() > 0) {

@@ -40,12 +40,30 @@ struct MlsGroupContact {
   std::vector<ColliderLoad> loads;  ///< of the last substep, per collider; empty for none
 };
 
+/// Of nodes that may touch one another those that may do so within some substeps.
+struct MlsActive {
+  struct Pair {
+    std::int32_t low, high;
+    float rest;  ///< as in MlsNodeContacts [m]
+  };
+  struct Entry {
+    std::int32_t node, pair;
+  };
+  std::vector<Pair> pairs;
+  Array<float> push;                ///< of each pair: force on the high one [N], and 1 or 0: none
+  std::vector<Entry> entries;       ///< each pair at both, by chunks
+  std::vector<std::int32_t> begin;  ///< per chunk, and one more; empty: to be listed anew
+  int left = 0;                     ///< substeps that they hold for
+};
+
 /// Nodes that may touch one another until they are looked for anew; each pair stands twice, and
 /// both hold the same.
-struct MlsFaceContacts {
+struct MlsNodeContacts {
   std::vector<std::int32_t> begin;  ///< per node, and one more; empty where nothing was looked for
   std::vector<std::int32_t> other;
-  std::vector<MlsSlip> slip;  ///< on a CPU as of the last search: return_slips()
+  std::vector<float> rest;    ///< distance below which they push [m]; with MlsContact::kNodes
+  std::vector<MlsSlip> slip;  ///< with MlsContact::kFaces, as are those below; on a CPU as of the
+                              ///< last search: return_slips()
   std::vector<float>
       u_found;              ///< displacements of the nodes at the search that may touch, by number
   std::vector<float> skin;  ///< how far each may move until they are looked for anew [m]
@@ -57,6 +75,7 @@ struct MlsFaceContacts {
   std::vector<MlsKnowsFace> knows;
   std::vector<std::uint8_t> in_chunk;  ///< whether a chunk has any
   MlsFacePairs pairs;
+  MlsActive active;    ///< with MlsContact::kNodes, on a CPU
   Array<float> force;  ///< what pushes it, 4 each [N]
 };
 
@@ -91,12 +110,12 @@ struct MlsState {
   Array<std::uint8_t> neo_hookean;                    ///< law of each node
   Array<float> stress;                                ///< see MlsField
   Array<float> deformation;                           ///< the same; empty until tissue may touch
-  Array<float> face;  ///< outward normal, depth below it or -1: it is no face (mls/faces.h)
-  Array<float> root_friction;                       ///< of tissue on tissue
-  Array<float> edge;                                ///< distance to its neighbours [m]
-  Array<float> contact_stiffness, contact_damping;  ///< node_spring() [N/m], [N s/m]
-  Array<std::uint8_t> outer;                        ///< at the surface, or a cut passes beside it
-  Array<std::uint8_t> cut;                          ///< a pair of it is crossed
+  Array<float> face;                                  ///< mls/faces.h
+  Array<float> root_friction;                         ///< of tissue on tissue
+  Array<float> edge;                                  ///< distance to its neighbours [m]
+  Array<float> contact_stiffness, contact_damping;    ///< node_spring() [N/m], [N s/m]
+  Array<std::uint8_t> outer;                          ///< at the surface, or a cut passes beside it
+  Array<std::uint8_t> cut;                            ///< a pair of it is crossed
   Array<std::uint8_t> sprung;  ///< its support spans no space: springs to its neighbours do
   Array<float> spring;         ///< per entry: at a sprung node [N/m]; empty without any
   Array<float> spring_room;    ///< zeros for it, so that a cut need not wait for memory
@@ -107,7 +126,7 @@ struct MlsState {
   std::vector<MlsAnchorPose> anchors;  ///< at its end; empty where none ever moved
   Array<float> held_impulse;  ///< on held nodes, since the frame began [4 n]; empty without any
   std::vector<MlsGroupContact> contact;  ///< per group
-  MlsFaceContacts face_contacts;
+  MlsNodeContacts node_contacts;
   int until_list = 0;  ///< substeps until colliders near groups are listed anew
   float dt = 0;        ///< the last substep, 0 before the first [s]
   double time = 0;     ///< [s]

@@ -13,8 +13,8 @@
 #include "frame/select_points.h"
 #include "mls/crossing.h"
 #include "mls/cut.h"
-#include "mls/face_lists.h"
 #include "mls/linearised_motion.h"
+#include "mls/node_contact.h"
 #include "mls/tear.h"
 #include "tissue_sim/limits.h"
 
@@ -101,7 +101,7 @@ void MlsTissue::forget(const std::vector<std::int32_t>& changed) {
   substeps_.cut(*state_, changed);
   pieces_measured_ = false;
   may_touch_ = true;
-  search_faces(*state_);
+  search_node_contacts(*state_);
 }
 
 CutReport MlsTissue::cut_now(const BladePath& path) {
@@ -150,7 +150,7 @@ void MlsTissue::save_checkpoint() {
   checkpoint_.v = s.v;
   checkpoint_.held_impulse = s.held_impulse;
   checkpoint_.contact = s.contact;
-  checkpoint_.face_contacts = s.face_contacts;
+  checkpoint_.node_contacts = s.node_contacts;
   checkpoint_.dt = s.dt;
   checkpoint_.time = s.time;
   checkpoint_.until_list = s.until_list;
@@ -169,7 +169,7 @@ double MlsTissue::run_part(const FramePart& part) {
     if (may_touch_) {
       double fastest = 0;
       for (const Collider& c : s.colliders) fastest = std::max(fastest, speed(c));
-      update_face_lists(s, pieces_.of_point, part.substeps.at(i), fastest);
+      update_node_contacts(s, pieces_.of_point, part.substeps.at(i), fastest);
     }
     const float acted = substep(s, part.substeps.at(i), loads);
     frame.colliders.add_loads(share, s.colliders.data(), loads.data(), acted / frame.duration,
@@ -195,7 +195,7 @@ void MlsTissue::reject_part(Verdict) {
   s.v = checkpoint_.v;
   s.held_impulse = checkpoint_.held_impulse;
   s.contact = checkpoint_.contact;
-  s.face_contacts = checkpoint_.face_contacts;
+  s.node_contacts = checkpoint_.node_contacts;
   s.dt = checkpoint_.dt;
   s.time = checkpoint_.time;
   s.until_list = checkpoint_.until_list;

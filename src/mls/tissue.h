@@ -91,7 +91,7 @@ class MlsTissue : public Tissue {
   struct Checkpoint {
     Array<float> u, v, held_impulse;
     std::vector<MlsGroupContact> contact;
-    MlsFaceContacts face_contacts;
+    MlsNodeContacts node_contacts;
     float dt;
     double time;
     int until_list;

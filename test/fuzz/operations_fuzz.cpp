@@ -90,6 +90,7 @@ Scene scene_of(Random& r) {
   if (r.once_in(5)) s.gravity = r.place(20);
   if (r.once_in(5)) s.mpm.boundary = MpmBoundary::kLattice;
   if (r.once_in(2)) s.mls.spacing = s.cell_size;
+  s.mls.contact = r.one_of({MlsContact::kNodes, MlsContact::kFaces});
   s.pbd.model = r.one_of({PbdModel::kSurface, PbdModel::kTetrahedra});
   s.pbd.elasticity = r.one_of({PbdElasticity::kMaterial, PbdElasticity::kStrain});
   s.ground.enabled = !r.once_in(3);

@@ -10,8 +10,8 @@
 #include "cutting/blade_sweep.h"
 #include "mls/crossing.h"
 #include "mls/cut.h"
-#include "mls/face_search.h"
 #include "mls/faces.h"
+#include "mls/near_nodes.h"
 #include "mls_scenes.h"
 
 namespace tissue_sim {
@@ -94,7 +94,7 @@ TEST(MlsCutSearch, PiecesByTheSpannerAreThoseOfAllPairs) {
   }
 }
 
-/// By their definition: MlsNearFaces of all outer nodes, by number.
+/// By their definition: MlsNear of all outer nodes, by number.
 std::vector<std::pair<int, int>> near_by_definition(const MlsState& s,
                                                     const std::vector<std::int32_t>& piece,
                                                     const std::vector<std::int32_t>& outer,
@@ -105,7 +105,9 @@ std::vector<std::pair<int, int>> near_by_definition(const MlsState& s,
       const int i = outer[k], j = outer[l];
       const float edge = 0.5f * (s.edge[i] + s.edge[j]);
       const float reach =
-          std::sqrt(mls_contact::reach2(s.face[4 * i + 3] + s.face[4 * j + 3], edge));
+          touches_by_faces(s)
+              ? std::sqrt(mls_contact::reach2(s.face[4 * i + 3] + s.face[4 * j + 3], edge))
+              : edge;
       if (!((s.position(i) - s.position(j)).norm() <= reach + skin[k] + skin[l])) continue;
       const bool far = (s.nodes.place[i] - s.nodes.place[j]).norm() > 2.5 * edge;
       const int e = s.pairs.find(i, j);
@@ -116,40 +118,43 @@ std::vector<std::pair<int, int>> near_by_definition(const MlsState& s,
   return pairs;
 }
 
-TEST(MlsFaceSearch, AreThoseThatALookAtEachFinds) {
+TEST(MlsNearNodes, AreThoseThatALookAtEachFinds) {
   std::mt19937 random(6);
   std::uniform_real_distribution<double> even(-1, 1);
   for (const MlsPlacement placement : kPlacements) {
-    Scene scene = mls_box(Vec3(0.012, 0.01, 0.008), 0.001, placement);
-    MlsTissue tissue(scene);
-    MlsState& s = tissue.state();
-    // Across the whole body, and a cut that leaves a piece whole; folded and sheared.
-    const Vec3 middle(0.006, 0.005, 0.004);
-    tissue.cut_now(plane_cut(middle, Vec3(1, 0.2, 0.1)));
-    tissue.cut_now(upright_blade({Vec3(0.003, -0.1, 0), Vec3(0.003, 0.006, 0)}));
-    UnionFind linked = join_uncrossed(s);
-    std::vector<std::int32_t> piece(s.count()), outer;
-    std::vector<float> skin;
-    for (int i = 0; i < s.count(); ++i) {
-      piece[i] = linked.root(i);
-      const Vec3 x = s.nodes.place[i];
-      const Vec3 u(x.x() < 0.006 ? 0.0015 : 0.0, 40 * x.y() * x.y() * (x.x() - 0.006),
-                   0.3 * x.y() + 1e-4 * even(random));
-      for (int a = 0; a < 3; ++a) s.u[4 * i + a] = static_cast<float>(u[a]);
-      if (!touches(s, i)) continue;
-      outer.push_back(i);
-      skin.push_back(static_cast<float>(0.0004 * (1 + even(random))));
+    for (const MlsContact contact : {MlsContact::kNodes, MlsContact::kFaces}) {
+      Scene scene = mls_box(Vec3(0.012, 0.01, 0.008), 0.001, placement);
+      scene.mls.contact = contact;
+      MlsTissue tissue(scene);
+      MlsState& s = tissue.state();
+      // Across the whole body, and a cut that leaves a piece whole; folded and sheared.
+      const Vec3 middle(0.006, 0.005, 0.004);
+      tissue.cut_now(plane_cut(middle, Vec3(1, 0.2, 0.1)));
+      tissue.cut_now(upright_blade({Vec3(0.003, -0.1, 0), Vec3(0.003, 0.006, 0)}));
+      UnionFind linked = join_uncrossed(s);
+      std::vector<std::int32_t> piece(s.count()), outer;
+      std::vector<float> skin;
+      for (int i = 0; i < s.count(); ++i) {
+        piece[i] = linked.root(i);
+        const Vec3 x = s.nodes.place[i];
+        const Vec3 u(x.x() < 0.006 ? 0.0015 : 0.0, 40 * x.y() * x.y() * (x.x() - 0.006),
+                     0.3 * x.y() + 1e-4 * even(random));
+        for (int a = 0; a < 3; ++a) s.u[4 * i + a] = static_cast<float>(u[a]);
+        if (s.outer[i] == 0) continue;
+        outer.push_back(i);
+        skin.push_back(static_cast<float>(0.0004 * (1 + even(random))));
+      }
+      s.u[4 * outer[3]] = 1e9f;
+      s.u[4 * outer[7]] = NAN;
+      std::vector<std::pair<int, int>> found;
+      for (const MlsNear& pair : find_near_nodes(s, piece, outer, skin)) {
+        ASSERT_LT(pair.low, pair.high);
+        found.emplace_back(pair.low, pair.high);
+      }
+      std::sort(found.begin(), found.end());
+      EXPECT_GT(found.size(), 500u);
+      EXPECT_EQ(found, near_by_definition(s, piece, outer, skin));
     }
-    s.u[4 * outer[3]] = 1e9f;
-    s.u[4 * outer[7]] = NAN;
-    std::vector<std::pair<int, int>> found;
-    for (const MlsNearFaces& pair : find_near_faces(s, piece, outer, skin)) {
-      ASSERT_LT(pair.low, pair.high);
-      found.emplace_back(pair.low, pair.high);
-    }
-    std::sort(found.begin(), found.end());
-    EXPECT_GT(found.size(), 500u);
-    EXPECT_EQ(found, near_by_definition(s, piece, outer, skin));
   }
 }
 

@@ -28,7 +28,7 @@ void expect_all_are_listed(MlsTissue& tissue, const Input& input) {
   for (int f = 0; f < 24; ++f) {
     tissue.advance(frame, input(frame * f, frame * (f + 1)));
     ASSERT_FALSE(tissue.finish().blew_up);
-    const MlsFaceContacts& contacts = s.face_contacts;
+    const MlsNodeContacts& contacts = s.node_contacts;
     for (int i = 0; i < s.count(); ++i) {
       for (int j = 0; j < s.count(); ++j) {
         if (s.nodes.body[i] == s.nodes.body[j]) continue;

@@ -25,6 +25,7 @@ Scene block_on_another(MlsPlacement placement) {
   scene.cell_size = 0.004;
   scene.mls.spacing = 0.002;
   scene.mls.placement = placement;
+  scene.mls.contact = MlsContact::kFaces;
   scene.ground.enabled = false;
   scene.damping = 0;
   Material m;
@@ -226,8 +227,8 @@ TEST(MlsFrictionOnGpu, IsThatOfTheCpu) {
         tissue->checksum();  // brings motion to the host
         for (int i = 0; i < s.count(); ++i) v[on_gpu].push_back(s.velocity(i));
         if (on_gpu) continue;
-        for (std::size_t k = 0; k < s.face_contacts.node.size(); ++k) {
-          const double f = std::fabs(s.face_contacts.force[4 * k]);
+        for (std::size_t k = 0; k < s.node_contacts.node.size(); ++k) {
+          const double f = std::fabs(s.node_contacts.force[4 * k]);
           contact = std::max(contact, f);
           pushed += f > 0 ? 1 : 0;
         }

@@ -6,8 +6,8 @@
 
 #include "frame/leapfrog.h"
 #include "mls/cuda/on_device.h"
-#include "mls/face_lists.h"
 #include "mls/faces.h"
+#include "mls/node_contact.h"
 
 namespace tissue_sim {
 namespace {
@@ -117,14 +117,14 @@ void CudaMlsTissue::upload_pairs() {
   d.kappa.upload(s.kappa.data(), n, d.stream);
   d.outer.upload(s.outer.data(), n, d.stream);
   upload(s.place, n, d.place, d.stream);  // cuts move where tissue ends
-  std::vector<CudaMlsFace> faces(n);
+  std::vector<CudaMlsFace> faces(touches_by_faces(s) ? n : 0);
   for (std::size_t i = 0; i < faces.size(); ++i) {
     std::copy_n(&s.face[4 * i], 4, faces[i].face);
     faces[i].spring = node_spring(s, i);
     faces[i].edge = s.edge[i];
     faces[i].root_friction = s.root_friction[i];
   }
-  d.faces.upload(faces, d.stream);
+  if (!faces.empty()) d.faces.upload(faces, d.stream);
   d.wait("receive data");
 }
 
@@ -230,25 +230,32 @@ void CudaMlsTissue::push_contact() {
 }
 
 void CudaMlsTissue::search_contacts(float dt, double fastest) {
-  if (state_->face_contacts.until_look > 0) {
-    --state_->face_contacts.until_look;
+  if (state_->node_contacts.until_look > 0) {
+    --state_->node_contacts.until_look;
     return;
   }
   pull();
   pull_slips();
-  if (update_face_lists(*state_, pieces_.of_point, dt, fastest)) push_face_contacts();
+  if (update_node_contacts(*state_, pieces_.of_point, dt, fastest)) push_node_contacts();
 }
 
 void CudaMlsTissue::pull_slips() {
   OnDevice& d = *device_;
   if (d.touching_count == 0) return;
-  d.contact_slip.download(state_->face_contacts.slip.data(), d.contact_slip.size(), d.stream);
+  d.contact_slip.download(state_->node_contacts.slip.data(), d.contact_slip.size(), d.stream);
   d.wait("send data");
 }
 
-void CudaMlsTissue::push_face_contacts() {
+void CudaMlsTissue::push_node_contacts() {
   OnDevice& d = *device_;
-  const MlsFaceContacts& contacts = state_->face_contacts;
+  const MlsNodeContacts& contacts = state_->node_contacts;
+  d.may_touch = !touches_by_faces(*state_) && !contacts.other.empty();
+  if (d.may_touch) {
+    d.contact_begin.upload(contacts.begin, d.stream);
+    d.contact_other.upload(contacts.other, d.stream);
+    d.contact_rest.upload(contacts.rest, d.stream);
+    d.wait("receive data");
+  }
   d.touching_count = static_cast<int>(contacts.node.size());
   if (d.touching_count == 0) return;
   d.contact_node.upload(contacts.node, d.stream);
@@ -320,7 +327,7 @@ double CudaMlsTissue::run_part(const FramePart& part) {
     const CudaMlsColliders colliders{
         d.colliders.data() + first, d.collider_count, near,
         d.touching.data(),          d.hold.data(),    d.loads.data() + kMlsLoadSums * first};
-    const CudaMlsFaceContacts contacts = d.contacts(s.dt);
+    const CudaMlsNodeContacts contacts = d.contacts(s.dt);
     CudaMlsHold hold;
     if (d.held_impulse.size() > 0) {
       const std::size_t anchors = d.host_anchors.size() / part.substeps.count;
@@ -376,7 +383,7 @@ void CudaMlsTissue::save_checkpoint() {
   saved.hold.copy(d.hold, d.stream);
   saved.held_impulse.copy(d.held_impulse, d.stream);
   saved.touching.copy(d.touching, d.stream);
-  saved.face_contacts = state_->face_contacts;
+  saved.node_contacts = state_->node_contacts;
   saved.slip.copy(d.contact_slip, d.stream);
   saved.dt = state_->dt;
   saved.time = state_->time;
@@ -392,8 +399,8 @@ void CudaMlsTissue::reject_part(Verdict) {
   d.held_impulse.copy(saved.held_impulse, d.stream);
   d.touching.copy(saved.touching, d.stream);
   d.host_is_current = false;
-  state_->face_contacts = saved.face_contacts;
-  push_face_contacts();
+  state_->node_contacts = saved.node_contacts;
+  push_node_contacts();
   if (d.touching_count > 0) d.contact_slip.copy(saved.slip, d.stream);
   state_->dt = saved.dt;
   state_->time = saved.time;
@@ -455,7 +462,7 @@ void CudaMlsTissue::restore(Span<const std::uint8_t> saved) {
   MlsTissue::restore(saved);
   push();
   upload_pairs();
-  push_face_contacts();
+  push_node_contacts();
   measure();
 }
 

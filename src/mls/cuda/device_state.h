@@ -64,9 +64,11 @@ struct alignas(32) CudaMlsFace {
   float edge, root_friction;
 };
 
-/// Nodes that may touch one another, as MlsFaceContacts.
-struct CudaMlsFaceContacts {
-  int count = 0;  ///< 0: none
+/// Nodes that may touch one another, as MlsNodeContacts: with MlsContact::kNodes `begin`, `other`,
+/// `rest`, with kFaces all but `rest`.
+struct CudaMlsNodeContacts {
+  const float* rest = nullptr;
+  int count = 0;  ///< of those whose faces may touch; 0: none
   const std::int32_t* node = nullptr;
   const std::int32_t* at = nullptr;
   const MlsKnowsFace* knows = nullptr;
@@ -119,14 +121,14 @@ inline constexpr int kMlsThreads =
 
 /// And the deformation gradients of those that may touch others.
 void launch_mls_stresses(const CudaMlsField& field, const CudaMlsMotion& at,
-                         const CudaMlsFaceContacts& contacts, cudaStream_t stream);
+                         const CudaMlsNodeContacts& contacts, cudaStream_t stream);
 /// What nodes that touch push one another, after the stresses.
 void launch_mls_touches(const CudaMlsField& field, const CudaMlsMotion& at,
-                        const CudaMlsFaceContacts& contacts, cudaStream_t stream);
+                        const CudaMlsNodeContacts& contacts, cudaStream_t stream);
 /// The rest of a substep: forces with contact, and the motion into `to`.
 void launch_mls_moves(const CudaMlsField& field, const CudaMlsMotion& at, const CudaMlsMotion& to,
                       const CudaMlsStep& step, const CudaMlsColliders& colliders,
-                      const CudaMlsFaceContacts& contacts, const CudaMlsHold& hold,
+                      const CudaMlsNodeContacts& contacts, const CudaMlsHold& hold,
                       cudaStream_t stream);
 /// Writes what changed into the field's arrays.
 void launch_mls_changes(const CudaMlsField& field, CudaMlsFace* faces,

@@ -45,6 +45,8 @@ struct CudaMlsTissue::OnDevice {
 
   DeviceArray<CudaMlsFace> faces;
   DeviceArray<std::int32_t> contact_node, contact_at, contact_begin, contact_other;
+  DeviceArray<float> contact_rest;
+  bool may_touch = false;  ///< nodes may, with MlsContact::kNodes
   DeviceArray<MlsKnowsFace> contact_knows;
   DeviceArray<MlsSlip> contact_slip;
   DeviceArray<MlsContactFace> contact_face;
@@ -58,7 +60,7 @@ struct CudaMlsTissue::OnDevice {
   struct Checkpoint {
     DeviceArray<float4> u, v, hold, held_impulse;
     DeviceArray<std::uint32_t> touching;
-    MlsFaceContacts face_contacts;
+    MlsNodeContacts node_contacts;
     DeviceArray<MlsSlip> slip;
     float dt = 0;
     double time = 0;
@@ -92,8 +94,13 @@ struct CudaMlsTissue::OnDevice {
     f.viscous = viscous;
     return f;
   }
-  CudaMlsFaceContacts contacts(float dt) {
-    CudaMlsFaceContacts c;
+  CudaMlsNodeContacts contacts(float dt) {
+    CudaMlsNodeContacts c;
+    if (may_touch) {
+      c.begin = contact_begin.data();
+      c.other = contact_other.data();
+      c.rest = contact_rest.data();
+    }
     c.count = touching_count;
     if (touching_count == 0) return c;
     c.node = contact_node.data();

@@ -86,7 +86,7 @@ __device__ __forceinline__ void stress_of(const CudaMlsField& f, int i, const fl
 
 template <int L>
 __global__ void __launch_bounds__(kMlsThreads)
-    mls_stresses(CudaMlsField f, CudaMlsMotion at, CudaMlsFaceContacts contacts) {
+    mls_stresses(CudaMlsField f, CudaMlsMotion at, CudaMlsNodeContacts contacts) {
   const Worker<L> worker(f.count);
   const int i = worker.node;
   float A[9], M[6], H[9], F[9], P[9], Q[9];
@@ -202,6 +202,37 @@ __device__ __forceinline__ void collider_forces(const CudaMlsField& f, const Cud
   if (touches != touched) c.touching[i] = touches;
 }
 
+/// What nodes of other pieces push it with, with MlsContact::kNodes (mls/node_contact.h): this
+/// lane's part.
+template <int L>
+__device__ __forceinline__ void node_forces(const CudaMlsField& f, const CudaMlsMotion& at,
+                                            const CudaMlsNodeContacts& contacts,
+                                            const Worker<L>& worker, float (&sum)[3]) {
+  const int i = worker.node;
+  const int first = __ldg(contacts.begin + i), end = __ldg(contacts.begin + i + 1);
+  if (first == end) return;
+  const float4 xi = __ldg(f.place + i), ui = __ldg(at.u + i);
+#pragma unroll 2
+  for (int c = first + worker.lane; c < end; c += L) {
+    const int j = __ldg(contacts.other + c);
+    const float4 xj = __ldg(f.place + j), uj = __ldg(at.u + j);
+    const float d[3] = {(xj.x - xi.x) + (uj.x - ui.x), (xj.y - xi.y) + (uj.y - ui.y),
+                        (xj.z - xi.z) + (uj.z - ui.z)};
+    const float d2 = d[0] * d[0] + d[1] * d[1] + d[2] * d[2], rest = __ldg(contacts.rest + c);
+    if (d2 >= rest * rest) continue;
+    const float distance = fmaxf(sqrtf(d2), 1e-12f);
+    const float4 vi = at.v[i], vj = at.v[j];
+    const float approach =
+        ((vj.x - vi.x) * d[0] + (vj.y - vi.y) * d[1] + (vj.z - vi.z) * d[2]) / -distance;
+    const ContactSpring own = f.contact[i], other = f.contact[j];
+    const float k = own.stiffness * other.stiffness / (own.stiffness + other.stiffness);
+    const float damping = own.damping * other.damping / (own.damping + other.damping);
+    const float push = fmaxf(0.0f, k * (rest - distance) + damping * approach);
+#pragma unroll
+    for (int a = 0; a < 3; ++a) sum[a] -= push * d[a] / distance;
+  }
+}
+
 __device__ __forceinline__ void way(const CudaMlsField& f, const float4* u, int i, int j,
                                     float (&d)[3]) {
   const float4 xi = __ldg(f.place + i), ui = __ldg(u + i);
@@ -211,9 +242,9 @@ __device__ __forceinline__ void way(const CudaMlsField& f, const float4* u, int 
   d[2] = (xj.z - xi.z) + (uj.z - ui.z);
 }
 
-/// As MlsFaceSubstep::turn(); mls_stresses() left the deformation there.
+/// As find_contact_face() (mls/node_contact.cpp); mls_stresses() left the deformation there.
 __global__ void __launch_bounds__(kMlsThreads)
-    mls_faces(CudaMlsField f, CudaMlsMotion at, CudaMlsFaceContacts contacts) {
+    mls_faces(CudaMlsField f, CudaMlsMotion at, CudaMlsNodeContacts contacts) {
   const int k = static_cast<int>(blockIdx.x * blockDim.x + threadIdx.x);
   if (k >= contacts.count) return;
   const int i = contacts.node[k];
@@ -235,16 +266,16 @@ __global__ void __launch_bounds__(kMlsThreads)
 }
 
 __device__ __forceinline__ MlsContactSide side_of(const CudaMlsField& f, const CudaMlsMotion& at,
-                                                  const CudaMlsFaceContacts& contacts, int i) {
+                                                  const CudaMlsNodeContacts& contacts, int i) {
   const CudaMlsFace& face = contacts.of_node[i];
   return {&f.place[i].x, &at.u[i].x, face.face,         contacts.face + contacts.at[i],
           face.spring,   face.edge,  face.root_friction};
 }
 
-/// As MlsFaceSubstep::push() and take(). Lanes share what touches a node.
+/// As push_node() (mls/node_contact.cpp). Lanes share what touches a node.
 template <int L>
 __global__ void __launch_bounds__(kMlsThreads)
-    mls_touches(CudaMlsField f, CudaMlsMotion at, CudaMlsFaceContacts contacts) {
+    mls_touches(CudaMlsField f, CudaMlsMotion at, CudaMlsNodeContacts contacts) {
   const Worker<L> worker(contacts.count);
   const int k = worker.node, i = contacts.node[k];
   const MlsContactSide own = side_of(f, at, contacts, i);
@@ -290,11 +321,12 @@ __global__ void __launch_bounds__(kMlsThreads)
 template <int L>
 __global__ void __launch_bounds__(kMlsThreads)
     mls_moves(CudaMlsField f, CudaMlsMotion at, CudaMlsMotion to, CudaMlsStep step,
-              CudaMlsColliders colliders, CudaMlsFaceContacts contacts, CudaMlsHold hold) {
+              CudaMlsColliders colliders, CudaMlsNodeContacts contacts, CudaMlsHold hold) {
   const Worker<L> worker(f.count);
   const int i = worker.node;
   float sum[3] = {0, 0, 0};
   pair_forces(f, at.u, worker, sum);
+  if (contacts.rest != nullptr) node_forces(f, at, contacts, worker, sum);
   worker.add_lanes(sum);
   if (worker.lane != 0 || worker.is_spare) return;
   const float4 u = at.u[i], v = at.v[i];
@@ -370,7 +402,7 @@ __global__ void __launch_bounds__(kMlsThreads)
   const_cast<float*>(f.kappa)[c.node] = c.kappa;
   const_cast<std::uint8_t*>(f.outer)[c.node] = c.outer;
   const_cast<float4*>(f.place)[c.node].w = c.outside;
-  for (int a = 0; a < 4; ++a) faces[c.node].face[a] = c.face[a];
+  for (int a = 0; a < 4 && faces != nullptr; ++a) faces[c.node].face[a] = c.face[a];
 }
 
 __device__ __forceinline__ void take(CudaMlsMeasure& a, const CudaMlsMeasure& b) {
@@ -458,14 +490,14 @@ void by_lanes(const CudaMlsField& f, const Launch& launch) {
 }  // namespace
 
 void launch_mls_stresses(const CudaMlsField& field, const CudaMlsMotion& at,
-                         const CudaMlsFaceContacts& contacts, cudaStream_t stream) {
+                         const CudaMlsNodeContacts& contacts, cudaStream_t stream) {
   by_lanes(field, [&](auto lanes, int blocks) {
     mls_stresses<lanes()><<<blocks, kMlsThreads, 0, stream>>>(field, at, contacts);
   });
 }
 
 void launch_mls_touches(const CudaMlsField& field, const CudaMlsMotion& at,
-                        const CudaMlsFaceContacts& contacts, cudaStream_t stream) {
+                        const CudaMlsNodeContacts& contacts, cudaStream_t stream) {
   mls_faces<<<(contacts.count + kMlsThreads - 1) / kMlsThreads, kMlsThreads, 0, stream>>>(field, at,
                                                                                           contacts);
   constexpr int kLanes = 4;
@@ -475,7 +507,7 @@ void launch_mls_touches(const CudaMlsField& field, const CudaMlsMotion& at,
 
 void launch_mls_moves(const CudaMlsField& field, const CudaMlsMotion& at, const CudaMlsMotion& to,
                       const CudaMlsStep& step, const CudaMlsColliders& colliders,
-                      const CudaMlsFaceContacts& contacts, const CudaMlsHold& hold,
+                      const CudaMlsNodeContacts& contacts, const CudaMlsHold& hold,
                       cudaStream_t stream) {
   by_lanes(field, [&](auto lanes, int blocks) {
     mls_moves<lanes()>

@@ -1,4 +1,4 @@
-#include "mls/face_search.h"
+#include "mls/near_nodes.h"
 
 #include <algorithm>
 #include <cmath>
@@ -44,7 +44,7 @@ class Search {
  public:
   Search(const MlsState& s, const std::vector<std::int32_t>& piece,
          const std::vector<std::int32_t>& outer, const std::vector<float>& skin)
-      : s_(s), piece_(piece), outer_(outer), skin_(skin) {
+      : s_(s), piece_(piece), outer_(outer), skin_(skin), faces_(touches_by_faces(s)) {
     double depth = 0, edge = 0;
     for (const std::int32_t i : outer) {
       edge = std::max<double>(edge, s.edge[i]);
@@ -52,23 +52,23 @@ class Search {
       least_far_ = std::min<double>(least_far_, kFar * s.edge[i]);
       mean_edge_ += s.edge[i] / static_cast<double>(outer.size());
     }
-    widest_ = std::sqrt(mls_contact::reach2(2 * depth, edge));
+    widest_ = faces_ ? std::sqrt(mls_contact::reach2(2 * depth, edge)) : edge;
     sort();
     make_groups();
   }
 
-  std::vector<MlsNearFaces> run() {
+  std::vector<MlsNear> run() {
     const std::vector<std::pair<std::int32_t, std::int32_t>> pairs = near_groups();
     const int count = static_cast<int>(pairs.size()),
               works = (count + kPairsAtATime - 1) / kPairsAtATime;
-    std::vector<std::vector<MlsNearFaces>> found(works);
+    std::vector<std::vector<MlsNear>> found(works);
     s_.cpu->for_each(works, [&](int work) {
       std::vector<std::int32_t> marks;
       for (int k = work * kPairsAtATime; k < std::min(count, (work + 1) * kPairsAtATime); ++k) {
         search(groups_[pairs[k].first], groups_[pairs[k].second], marks, found[work]);
       }
     });
-    std::vector<MlsNearFaces> all;
+    std::vector<MlsNear> all;
     for (const auto& some : found) all.insert(all.end(), some.begin(), some.end());
     return all;
   }
@@ -181,7 +181,7 @@ class Search {
   }
 
   void search(const Group& g, const Group& h, std::vector<std::int32_t>& marks,
-              std::vector<MlsNearFaces>& found) const {
+              std::vector<MlsNear>& found) const {
     for (std::int32_t k = g.begin; k < g.end; ++k) {
       const std::int32_t first = &g == &h ? k + 1 : h.begin;
       const float skin = skin_[order_[k]];
@@ -230,6 +230,7 @@ class Search {
 
   float reach(std::int32_t i, std::int32_t j) const {
     const float edge = 0.5f * (s_.edge[i] + s_.edge[j]);
+    if (!faces_) return edge;
     return std::sqrt(mls_contact::reach2(s_.face[4 * i + 3] + s_.face[4 * j + 3], edge));
   }
 
@@ -237,6 +238,7 @@ class Search {
   const std::vector<std::int32_t>& piece_;
   const std::vector<std::int32_t>& outer_;
   const std::vector<float>& skin_;
+  const bool faces_;
   double widest_ = 0;        ///< reach of any two [m]
   double least_far_ = 1e30;  ///< least distance in reference space that is far [m]
   double mean_edge_ = 0;     ///< [m]
@@ -250,9 +252,9 @@ class Search {
 
 }  // namespace
 
-std::vector<MlsNearFaces> find_near_faces(const MlsState& s, const std::vector<std::int32_t>& piece,
-                                          const std::vector<std::int32_t>& outer,
-                                          const std::vector<float>& skin) {
+std::vector<MlsNear> find_near_nodes(const MlsState& s, const std::vector<std::int32_t>& piece,
+                                     const std::vector<std::int32_t>& outer,
+                                     const std::vector<float>& skin) {
   if (outer.empty()) return {};
   return Search(s, piece, outer, skin).run();
 }

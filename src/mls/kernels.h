@@ -52,8 +52,8 @@ struct MlsField {
 
 /// What a chunk's nodes show.
 struct MlsMeasure {
-  double elastic = 0;    ///< energy of their strain and the penalty [J]
-  float stiffening = 1;  ///< the most that a node has: largest column of cof F, squared
+  double elastic = 0;  ///< energy of their strain and the penalty [J]
+  float stretch2 = 0;  ///< the most that a node has: most_stretch2()
   bool finite = true;
 };
 

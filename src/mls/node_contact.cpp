@@ -28,10 +28,15 @@ float distance2(const MlsState& s, std::int32_t i, std::int32_t j, float (&d)[3]
   return d2;
 }
 
-/// Substeps for which the list lasts at least, until a node has moved by its skin.
-int lasts(const MlsState& s, float dt) {
+/// Substeps for which the list lasts, until a node has moved by its skin.
+struct Lasts {
+  int meant;  ///< where each goes on as it does
+  int least;  ///< where each is pushed to the speed of the fastest, node or tool
+};
+
+Lasts lasts(const MlsState& s, float dt, double fastest) {
   const MlsNodeContacts& contacts = s.node_contacts;
-  double least = kMostSubsteps;
+  double least = kMostSubsteps, least_left = 1e30;
   std::size_t k = 0;
   for (std::int32_t i = 0; i < s.count(); ++i) {
     if (s.outer[i] == 0) continue;
@@ -44,8 +49,12 @@ int lasts(const MlsState& s, float dt) {
     const double left = contacts.skin[k++] - std::sqrt(d2);
     const double step = kFasterThanSeen * std::sqrt(v2) * dt;
     if (!(left > step * least)) least = step > 0 ? left / step : 0;
+    if (!(left > least_left)) least_left = left;
+    if (!(v2 <= fastest * fastest)) fastest = std::sqrt(v2);
   }
-  return static_cast<int>(std::max(0.0, least));
+  const double most = kFasterThanSeen * fastest * dt;
+  const double pushed = least_left > most * least ? least : least_left / most;
+  return {static_cast<int>(std::max(0.0, least)), static_cast<int>(std::max(0.0, pushed))};
 }
 
 /// How far a node may move until the list is void: those that are fast, farther. Two nodes that do
@@ -114,15 +123,17 @@ void find_node_contacts(MlsState& s, const std::vector<std::int32_t>& piece, flo
 
 }  // namespace
 
-bool update_node_contacts(MlsState& s, const std::vector<std::int32_t>& piece, float dt) {
+bool update_node_contacts(MlsState& s, const std::vector<std::int32_t>& piece, float dt,
+                          double fastest) {
   MlsNodeContacts& contacts = s.node_contacts;
   if (contacts.until_look-- > 0) return false;
   if (!contacts.u_found.empty() && !contacts.begin.empty()) {
-    contacts.until_look = lasts(s, dt);
-    if (contacts.until_look >= kFewestSubsteps) return false;
+    const Lasts still = lasts(s, dt, fastest);
+    contacts.until_look = still.least;
+    if (still.meant >= kFewestSubsteps) return false;
   }
   find_node_contacts(s, piece, dt);
-  contacts.until_look = lasts(s, dt);
+  contacts.until_look = lasts(s, dt, fastest).least;
   return true;
 }
 

@@ -15,10 +15,12 @@ inline ContactSpring node_spring(const MlsState& state, std::int32_t i) {
 }
 
 /// Before each substep: finds the nodes that may touch anew where any of them moved by half of what
-/// the list was made wider, or nothing was looked for. How soon that may be is bounded by their
-/// speed, so that most calls cost nothing. Those that may: of different pieces, or across a cut, or
-/// far apart in their piece; `piece` is of each node. Returns whether it looked.
-bool update_node_contacts(MlsState& state, const std::vector<std::int32_t>& piece, float dt);
+/// the list was made wider, or nothing was looked for. How soon that may be is bounded by the
+/// speed of all and of the `fastest` tool [m/s], so that most calls cost nothing. Those that may:
+/// of different pieces, or across a cut, or far apart in their piece; `piece` is of each node.
+/// Returns whether it looked.
+bool update_node_contacts(MlsState& state, const std::vector<std::int32_t>& piece, float dt,
+                          double fastest);
 
 /// Lets the next update look for them whatever they moved: pieces or cuts changed.
 inline void search_node_contacts(MlsState& state) {

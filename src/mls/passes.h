@@ -15,6 +15,7 @@
 #include "material/laws.h"
 #include "mls/kernels.h"
 #include "mls/slot_passes.h"
+#include "mls/stretch.h"
 
 namespace tissue_sim {
 namespace mls_passes {
@@ -219,6 +220,7 @@ TISSUE_SIM_INLINE MlsMeasure measure(const MlsField& f, int chunk, float* von_mi
     const Vec<W> neo = energy<NeoHookean>(F, mu, lambda);
     cofactor(F, cof);
     Vec<W> columns[3], mises{};
+    const Vec<W> stretch2 = most_stretch2(F);
     for (int k = 0; k < 3; ++k) {
       columns[k] = cof[k] * cof[k] + cof[3 + k] * cof[3 + k] + cof[6 + k] * cof[6 + k];
     }
@@ -234,7 +236,7 @@ TISSUE_SIM_INLINE MlsMeasure measure(const MlsField& f, int chunk, float* von_mi
       const bool finite =
           std::isfinite(e) && std::isfinite(columns[0][l] + columns[1][l] + columns[2][l]);
       result.finite = result.finite && finite;
-      result.stiffening = fmaxf(result.stiffening, most);
+      result.stretch2 = fmaxf(result.stretch2, stretch2[l]);
       if (stiffening != nullptr) stiffening[lane + l] = finite ? most : INFINITY;
       if (von_mises != nullptr) {
         const float volume = f.volume_mu[node + l];  // V mu: the caller knows mu

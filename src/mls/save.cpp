@@ -43,7 +43,7 @@ void fields(Archive& archive, MlsState& s) {
 
 template <class Archive>
 void fields(Archive& archive, MlsSubsteps& s) {
-  archive(s.stiffness_, s.stiffened_, s.most_rate_, s.limit_, s.length_, s.acceptance_);
+  archive(s.stiffness_, s.stretched_, s.most_rate_, s.limit_, s.length_, s.acceptance_);
 }
 
 template <class Archive>

@@ -24,6 +24,18 @@ void resize_padded(Array<T>& array, int count, int per_node) {
   array.assign(static_cast<std::size_t>(chunks) * kMlsChunk * per_node, T{});
 }
 
+/// What a node touches anything with. It stands for the tissue outside of the node: without it that
+/// would not give way when pressed, and the node's share of the body counts its energy already, so
+/// that it gives way by as much as twice the node's depth. How much of that is as if sides were
+/// held and how much as if they were free follows from finite elements (docs/mls.md, contact).
+ContactSpring node_spring(const Material& m, float edge, float depth, float volume) {
+  constexpr double kHeld = 2.0 / 3, kFree = 0.25;
+  const double gives = kHeld / (lame_lambda(m) + 2 * lame_mu(m)) + kFree / m.young_modulus;
+  const float layer = depth > 0 ? std::max(0.8f * edge, std::min(2 * edge, 2 * depth)) : edge;
+  return contact_spring(static_cast<float>(1 / (kContactStiffness * gives)),
+                        static_cast<float>(m.density), layer, volume);
+}
+
 /// kappa of the penalty while nothing is cut.
 float whole_kappa(const MlsState& s, std::int32_t i) {
   double trace = 0;  // of the moments
@@ -133,8 +145,7 @@ std::unique_ptr<MlsState> make_mls_state(const Scene& scene, std::vector<std::st
     s.neo_hookean[i] = m.law == Law::kNeoHookean ? 1 : 0;
     s.edge[i] = static_cast<float>(s.pairs.support[i] / factor);
     if (s.edge[i] == 0) s.edge[i] = static_cast<float>(mls_spacing(scene));
-    const ContactSpring spring = contact_spring(static_cast<float>(lame_lambda(m) + 2 * lame_mu(m)),
-                                                static_cast<float>(m.density), s.edge[i], volume);
+    const ContactSpring spring = node_spring(m, s.edge[i], s.nodes.depth[i], volume);
     s.contact_stiffness[i] = spring.stiffness;
     s.contact_damping[i] = spring.damping;
     s.outer[i] = s.nodes.surface[i];

@@ -26,15 +26,16 @@ MlsSubsteps::MlsSubsteps(const MlsState& s)
 }
 
 // Viscosity's fastest rate is that of the mode of the highest frequency, omega = 2 / elastic:
-// c = 2 eta / (lambda + 2 mu) omega^2, and grows with the square of the stretch. A soft material
-// has not the frequency of a stiff one beside it.
+// c = 2 eta / (lambda + 2 mu) omega^2. A soft material has not the frequency of a stiff one beside
+// it. Viscous stress F S has F twice, outside and in dE/dt: c grows with the square of the largest
+// stretch, not with what squeezed tissue stiffens by, which is much more.
 double MlsSubsteps::damping(const MlsState& s, double elastic) const {
   const double omega = 2 / elastic;
   double fastest = 0;
   for (std::size_t k = 0; k < s.nodes.materials.size(); ++k) {
     const Material& m = s.nodes.materials[k];
-    const double rate = std::min(omega * omega, kTogether * most_rate_[k] * stiffened_);
-    fastest = std::max(fastest, m.viscosity / wave_modulus(m, 1) * rate * stiffened_);
+    const double rate = std::min(omega * omega, kTogether * most_rate_[k]);
+    fastest = std::max(fastest, m.viscosity / wave_modulus(m, 1) * rate * stretched_);
   }
   return fastest;
 }
@@ -74,7 +75,8 @@ PartSubsteps MlsSubsteps::part(const MlsState& s, double time, const MeasureLimi
   return length_.part(time, longest, s.dt, shortened < 1 ? 0 : 1 / s.scene.frame_rate);
 }
 
-bool MlsSubsteps::is_borne(const MlsState& s, const std::vector<float>& stiffening, double dt) {
+bool MlsSubsteps::is_borne(const MlsState& s, const std::vector<float>& stiffening, float stretch2,
+                           double dt) {
   s.cpu->for_each(s.groups(), [&](int group) {
     const int first = group * kMlsGroup, last = std::min(s.count(), first + kMlsGroup);
     for (int i = first; i < last; ++i) {
@@ -88,8 +90,7 @@ bool MlsSubsteps::is_borne(const MlsState& s, const std::vector<float>& stiffeni
   acceptance_.restart();
   const double passed = limit_.follow(elements_, modulus_, s.time);
   length_.follow(passed, limit_.trend(), 1 / s.scene.frame_rate);
-  stiffened_ = 1;
-  for (const float x : stiffening) stiffened_ = std::max<double>(stiffened_, x);
+  stretched_ = std::max(1.0f, stretch2);
   return true;
 }
 

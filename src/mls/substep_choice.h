@@ -21,9 +21,11 @@ class MlsSubsteps {
   MlsSubsteps& operator=(const MlsSubsteps&) = delete;
   /// The next part of a frame of which `time` is left [s]. `measure` counts all nodes.
   PartSubsteps part(const MlsState& state, double time, const MeasureLimit& measure);
-  /// After a part with substeps of `dt` [s], which left each node so stiff (MlsKernels::measure):
-  /// whether they were borne. If not, the next ones are shorter.
-  bool is_borne(const MlsState& state, const std::vector<float>& stiffening, double dt);
+  /// After a part with substeps of `dt` [s], which left each node so stiff and the one that is
+  /// stretched most so far (MlsMeasure): whether they were borne. If not, the next ones are
+  /// shorter.
+  bool is_borne(const MlsState& state, const std::vector<float>& stiffening, float stretch2,
+                double dt);
   /// These nodes lost pairs.
   void cut(const MlsState& state, const std::vector<std::int32_t>& nodes);
 
@@ -38,7 +40,8 @@ class MlsSubsteps {
   std::vector<Stiffness> stiffness_;  ///< [nodes]
   std::vector<Stiffness*> elements_;  ///< these
   std::vector<float> modulus_;        ///< [nodes] after the last part [Pa]
-  double stiffened_ = 1;              ///< what the stiffest node has, after the last part
+  double stretched_ =
+      1;  ///< by how much viscosity grew of the node where most, after the last part
   /// Largest own_rate() of each material's nodes when the limit was measured [1/s^2].
   std::vector<double> most_rate_;
   StabilityLimit limit_;

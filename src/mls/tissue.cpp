@@ -166,7 +166,11 @@ double MlsTissue::run_part(const FramePart& part) {
     s.colliders = frame.colliders.at(share);
     s.anchors = mls_anchors_at(s.scene, frame.input, share);
     std::vector<ColliderLoad> loads(s.colliders.size());
-    if (may_touch_) update_node_contacts(s, pieces_.of_point, part.substeps.at(i));
+    if (may_touch_) {
+      double fastest = 0;
+      for (const Collider& c : s.colliders) fastest = std::max(fastest, speed(c));
+      update_node_contacts(s, pieces_.of_point, part.substeps.at(i), fastest);
+    }
     const float acted = substep(s, part.substeps.at(i), loads);
     frame.colliders.add_loads(share, s.colliders.data(), loads.data(), acted / frame.duration,
                               result_.loads);
@@ -177,9 +181,11 @@ double MlsTissue::run_part(const FramePart& part) {
 }
 
 Verdict MlsTissue::judge_part(const FramePart& part) {
-  const bool finite = measure().finite;
-  if (!substeps_.is_borne(*state_, stiffening_, part.substeps.longest())) return Verdict::kTooLong;
-  result_.blew_up = !finite;
+  const Figures figures = measure();
+  if (!substeps_.is_borne(*state_, stiffening_, figures.stretch2, part.substeps.longest())) {
+    return Verdict::kTooLong;
+  }
+  result_.blew_up = !figures.finite;
   return Verdict::kAccepted;
 }
 
@@ -225,6 +231,7 @@ MlsTissue::Figures MlsTissue::measure() {
   Figures sum;
   for (const MlsMeasure& m : of) {
     sum.elastic += m.elastic;
+    sum.stretch2 = std::max(sum.stretch2, m.stretch2);
     sum.finite = sum.finite && m.finite;
   }
   double fastest2 = 0;

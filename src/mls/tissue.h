@@ -60,6 +60,7 @@ class MlsTissue : public Tissue {
   struct Figures {
     double elastic = 0, kinetic = 0;  ///< [J]
     double speed = 0;                 ///< of the fastest [m/s]
+    float stretch2 = 0;               ///< as in MlsMeasure
     bool finite = true;
   };
   /// Brings the motion of the nodes to state_.

@@ -10,21 +10,23 @@
 namespace tissue_sim {
 namespace {
 
-// A box thrown onto another: whatever touches was listed, however long a list was kept.
-TEST(MlsContact, ListsHoldAllThatTouch) {
+/// Two boxes, one a little above the other.
+Scene two_boxes() {
   Scene scene = mls_box(Vec3(0.008, 0.006, 0.004), 0.001);
   scene.bodies.push_back(scene.bodies[0]);
-  scene.bodies[1].name = "thrown";
+  scene.bodies[1].name = "above";
   scene.bodies[1].pose.position += Vec3(0.0007, 0.0004, 0.0055);
-  MlsTissue tissue(scene);
+  return scene;
+}
+
+/// Whatever touches was listed, however long a list was kept; what a frame applies is `input`'s.
+template <class Input>
+void expect_all_are_listed(MlsTissue& tissue, const Input& input) {
   MlsState& s = tissue.state();
-  for (int i = 0; i < s.count(); ++i) {
-    if (s.nodes.body[i] == 1) s.v[4 * i + 2] = -0.3f;
-  }
   int touches = 0;
   const double frame = 1 / 240.0;  // s
   for (int f = 0; f < 24; ++f) {
-    tissue.advance(frame, {});
+    tissue.advance(frame, input(frame * f, frame * (f + 1)));
     ASSERT_FALSE(tissue.finish().blew_up);
     const MlsNodeContacts& contacts = s.node_contacts;
     for (int i = 0; i < s.count(); ++i) {
@@ -39,6 +41,37 @@ TEST(MlsContact, ListsHoldAllThatTouch) {
     }
   }
   EXPECT_GT(touches, 20);
+}
+
+TEST(MlsContact, ListsHoldAllThatTouch) {
+  MlsTissue tissue(two_boxes());
+  MlsState& s = tissue.state();
+  for (int i = 0; i < s.count(); ++i) {
+    if (s.nodes.body[i] == 1) s.v[4 * i + 2] = -0.3f;
+  }
+  expect_all_are_listed(tissue, [](double, double) { return FrameInput(); });
+}
+
+// What rests when it is looked for is pushed by a tool at once.
+TEST(MlsContact, ListsHoldAllThatAToolPushes) {
+  Scene scene = two_boxes();
+  scene.tools.resize(1);
+  scene.tools[0].type = ToolType::kPlate;
+  scene.tools[0].size = Vec3(0.02, 0.02, 0.002);
+  MlsTissue tissue(scene);
+  ToolMotion plate;
+  const auto tool_at = [](double time) {
+    Pose pose;
+    pose.position = Vec3(0.0047, 0.0034, std::max(0.006, 0.0105 - 0.5 * time));
+    pose.orientation = Quat(0, 1, 0, 0);
+    return pose;
+  };
+  expect_all_are_listed(tissue, [&](double begin, double end) {
+    plate.present = true;
+    plate.begin = tool_at(begin);
+    plate.end = tool_at(end);
+    return FrameInput{{&plate, 1}, {}};
+  });
 }
 
 // Nodes lie below the surface; tools and the ground act at it.

@@ -380,5 +380,24 @@ TEST(MlsSubstep, StaysStableThroughCutsUntilItIsMeasuredAnew) {
               kept, closest);
 }
 
+// Viscosity grows with the square of the stretch, not with what squeezed tissue stiffens by.
+TEST(MlsSubstep, IsNotMuchShorterWhereViscousTissueIsSqueezed) {
+  double substep[2];
+  for (const bool viscous : {false, true}) {
+    Scene scene = mls_box(Vec3::Constant(0.008), 0.001);
+    Material m;
+    m.name = scene.bodies[0].material = "soft";
+    m.viscosity = viscous ? 0.5 : 0;
+    scene.materials = {m};
+    MlsTissue tissue(scene);
+    impose(tissue.state(), Vec3(2, 2, -0.85).asDiagonal());
+    for (int k = 0; k < 2; ++k) {
+      tissue.advance(1e-5, {});
+      substep[viscous] = tissue.finish().substep;
+    }
+  }
+  EXPECT_GT(substep[1], 0.3 * substep[0]);
+}
+
 }  // namespace
 }  // namespace tissue_sim

@@ -229,14 +229,14 @@ void CudaMlsTissue::push_contact() {
   d.wait("receive data");
 }
 
-void CudaMlsTissue::search_contacts(float dt) {
+void CudaMlsTissue::search_contacts(float dt, double fastest) {
   if (state_->node_contacts.until_look > 0) {
     --state_->node_contacts.until_look;
     return;
   }
   pull();
   pull_slips();
-  if (update_node_contacts(*state_, pieces_.of_point, dt)) push_node_contacts();
+  if (update_node_contacts(*state_, pieces_.of_point, dt, fastest)) push_node_contacts();
 }
 
 void CudaMlsTissue::pull_slips() {
@@ -310,13 +310,20 @@ double CudaMlsTissue::run_part(const FramePart& part) {
   }
   for (int i = 0; i < part.substeps.count; ++i) {
     const float dt = part.substeps.at(i);
-    if (may_touch_) search_contacts(dt);
+    const std::size_t first = static_cast<std::size_t>(i) * d.collider_count;
+    if (may_touch_) {
+      double fastest = 0;
+      for (int c = 0; c < d.collider_count; ++c) {
+        if ((near >> c & 1) == 0) continue;
+        fastest = std::max(fastest, speed(d.host_colliders[first + c]));
+      }
+      search_contacts(dt, fastest);
+    }
     CudaMlsStep step;
     step.dt = dt;
     step.kick = kick_of(s.dt, dt);
     step.keep = static_cast<float>(std::exp(-s.scene.damping * step.kick));
     for (int a = 0; a < 3; ++a) step.gravity[a] = static_cast<float>(s.scene.gravity[a]);
-    const std::size_t first = static_cast<std::size_t>(i) * d.collider_count;
     const CudaMlsColliders colliders{
         d.colliders.data() + first, d.collider_count, near,
         d.touching.data(),          d.hold.data(),    d.loads.data() + kMlsLoadSums * first};
@@ -413,6 +420,7 @@ MlsTissue::Figures CudaMlsTissue::measure() {
   for (const CudaMlsMeasure& m : d.host_measures) {
     sum.elastic += m.elastic;
     sum.kinetic += m.kinetic;
+    sum.stretch2 = std::max(sum.stretch2, m.stretch2);
     if (!(m.speed <= sum.speed)) sum.speed = m.speed;
     sum.finite = sum.finite && m.finite != 0;
     d.box.min = d.box.min.cwiseMin(Vec3(m.min[0], m.min[1], m.min[2]));

@@ -43,7 +43,7 @@ class CudaMlsTissue final : public MlsTissue {
   void upload_colliders(const FramePart& part);
   void pull_contact();
   void push_contact();
-  void search_contacts(float dt);
+  void search_contacts(float dt, double fastest);
   void push_node_contacts();
   void pull_slips();  ///< what nodes that touch remember
   void sum_loads(const FramePart& part, float before);

@@ -113,6 +113,7 @@ struct CudaMlsMeasure {
   double elastic, kinetic;  ///< [J]
   float min[3], max[3];     ///< of the nodes [m]
   float speed;              ///< of the fastest [m/s]; NaN stays
+  float stretch2;           ///< as in MlsMeasure
   int finite;
 };
 inline constexpr int kMlsThreads =

@@ -6,6 +6,7 @@
 
 #include "material/laws.h"
 #include "mls/cuda/device_state.h"
+#include "mls/stretch.h"
 
 namespace tissue_sim {
 namespace {
@@ -413,6 +414,7 @@ __device__ __forceinline__ void take(CudaMlsMeasure& a, const CudaMlsMeasure& b)
     a.max[k] = fmaxf(a.max[k], b.max[k]);
   }
   if (!(b.speed <= a.speed)) a.speed = b.speed;
+  a.stretch2 = fmaxf(a.stretch2, b.stretch2);
   a.finite &= b.finite;
 }
 
@@ -421,7 +423,7 @@ __global__ void __launch_bounds__(kMlsThreads)
                 float* von_mises) {
   __shared__ CudaMlsMeasure of_thread[kMlsThreads];
   const int i = static_cast<int>(blockIdx.x * blockDim.x + threadIdx.x);
-  CudaMlsMeasure m{0, 0, {1e30f, 1e30f, 1e30f}, {-1e30f, -1e30f, -1e30f}, 0, 1};
+  CudaMlsMeasure m{0, 0, {1e30f, 1e30f, 1e30f}, {-1e30f, -1e30f, -1e30f}, 0, 0, 1};
   if (i < f.count) {
     float A[9], M[6], H[9], F[9], cof[9];
     moments_of(f, Worker<1>(f.count), at.u, A);
@@ -429,6 +431,7 @@ __global__ void __launch_bounds__(kMlsThreads)
     times_symmetric(A, M, H);
 #pragma unroll
     for (int k = 0; k < 9; ++k) F[k] = k % 4 == 0 ? H[k] + 1.0f : H[k];
+    m.stretch2 = most_stretch2(F);
     const float mu = __ldg(f.volume_mu + i), lambda = __ldg(f.volume_lambda + i);
     const float e = f.neo_hookean[i] != 0 ? energy<NeoHookean>(F, mu, lambda)
                                           : energy<FixedCorotated>(F, mu, lambda);

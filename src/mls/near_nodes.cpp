@@ -13,7 +13,7 @@ namespace {
 constexpr double kFar = 2.5;       // reference distance from which a piece may touch itself [edges]
 constexpr double kGroup = 4;       // edge of the cubes in reference space that make groups [edges]
 constexpr int kPairsAtATime = 64;  // of groups
-constexpr double kRounding = 1 + 1e-4;  // of what is looked at in vectors
+constexpr double kRoundedUp = 1 + 1e-4;  // of what is looked at in vectors
 
 bool may_touch(const MlsState& s, const std::vector<std::int32_t>& piece, std::int32_t i,
                std::int32_t j) {
@@ -114,12 +114,12 @@ class Search {
         g.cut |= cut_[k];
         const float skin = skin_[order_[k]];
         g.most_skin = std::max(g.most_skin, skin);
-        reach_[k] = static_cast<float>(kRounding * (widest_ + skin));
+        reach_[k] = static_cast<float>(kRoundedUp * (widest_ + skin));
         add(place_[k], g.box);
         add(s_.nodes.place[i], g.box_before);
       }
       g.wide = g.box;
-      const double reach = kRounding * (0.5 * widest_ + g.most_skin);
+      const double reach = kRoundedUp * (0.5 * widest_ + g.most_skin);
       g.wide.min.array() -= reach;
       g.wide.max.array() += reach;
       for (std::int32_t k = g.begin; k < g.end; ++k) {  // from a corner: single precision does
@@ -185,7 +185,7 @@ class Search {
     for (std::int32_t k = g.begin; k < g.end; ++k) {
       const std::int32_t first = &g == &h ? k + 1 : h.begin;
       const float skin = skin_[order_[k]];
-      const double most = kRounding * (widest_ + skin + h.most_skin);
+      const double most = kRoundedUp * (widest_ + skin + h.most_skin);
       const Vec3 to_box = place_[k].cwiseMax(h.box.min).cwiseMin(h.box.max) - place_[k];
       if (to_box.squaredNorm() > most * most || !mark(g, h, k, first, marks)) continue;
       const std::int32_t i = outer_[order_[k]];
@@ -206,8 +206,8 @@ class Search {
     const auto x0 = static_cast<float>(x[0]), x1 = static_cast<float>(x[1]),
                x2 = static_cast<float>(x[2]), X0 = static_cast<float>(X[0]),
                X1 = static_cast<float>(X[1]), X2 = static_cast<float>(X[2]),
-               skin = static_cast<float>(kRounding * skin_[order_[k]]),
-               far2 = static_cast<float>(least_far_ * least_far_ / kRounding);
+               skin = static_cast<float>(kRoundedUp * skin_[order_[k]]),
+               far2 = static_cast<float>(least_far_ * least_far_ / kRoundedUp);
     const std::int32_t parted = g.piece != h.piece ? 1 : 0, cut = cut_[k];
     const std::int32_t count = h.end - first;
     marks.resize(std::max<std::size_t>(marks.size(), count));

@@ -35,7 +35,7 @@ def test_frames_have_the_bits_of_the_core():
     golden = os.environ.get("TISSUE_SIM_GOLDEN")
     if not golden:
         pytest.skip("TISSUE_SIM_GOLDEN does not name the program tissue_sim_golden")
-    lines = subprocess.run([golden, "--scene", "service_cuts_at_surface", "--threads", "1"], check=True,
+    lines = subprocess.run([golden, "--scene", "service_cuts", "--threads", "1"], check=True,
                            stdout=subprocess.PIPE, universal_newlines=True).stdout.splitlines()
     expected = [line.split()[2] for line in lines]
     simulation = Simulation({

@@ -40,7 +40,8 @@ struct GpuArray {
   bool is_float = true;
 
   py::tuple shape() const {
-    return width == 1 ? py::make_tuple(points.count) : py::make_tuple(points.count, width);
+    if (width == 1) return py::make_tuple(points.count);
+    return py::make_tuple(points.count, width);
   }
 
   py::capsule dlpack() const {

@@ -132,7 +132,7 @@ TEST_F(CutOnGpu, TissueMovesOnAsBeforeWhereRegionsAreHalvedAndJoinedAgain) {
     worst = std::max(worst, (whole[p] - halves[p]).norm());
   }
   std::printf("at most %.1e m apart\n", worst);
-  EXPECT_LT(worst, 3e-6);  // read: 1.5e-6, of a body that nothing holds
+  EXPECT_LT(worst, 1e-6);
 }
 
 TEST_F(CutOnGpu, TablesThatFollowAreThoseThatAreMadeAnew) {

@@ -198,9 +198,7 @@ TEST_F(PbdOnGpu, WhatIsViscousIsDampedAsOnTheCpu) {
         const Velocities gpu = run(Device::kCuda, way);
         ASSERT_EQ(gpu.after.size(), cpu.after.size());
         EXPECT_EQ(most(gpu.before, cpu.before), 0);
-        // Of 0.05 m/s. What was cut differs by up to 3.2e-4 (H200), for what reason is not known.
-        EXPECT_LT(most(gpu.after, cpu.after), is_cut ? 5e-4 : 1e-4)
-            << is_held << is_cut << static_cast<int>(way);
+        EXPECT_LT(most(gpu.after, cpu.after), 1e-4) << is_held << is_cut << static_cast<int>(way);
       }
     }
   }

@@ -111,8 +111,8 @@ struct PbdOptions {
   int steps = 20;                                       ///< of a frame, 1 to 1000
   int iterations = 1;                                   ///< of a step, 1 to 100
   /// Stiffness of the surface model's constraints as a multiple of what Young's modulus gives each
-  /// (src/pbd/stiffness.h), 0 to 1e6; 0 leaves the constraint out. `edge` and `bending` are the
-  /// kStrain model's, too.
+  /// (src/pbd/surface_model.cpp), 0 to 1e6; 0 leaves the constraint out. `edge` and `bending` are
+  /// the kStrain model's, too.
   double edge = 1, bending = 1, internal = 1;
   /// kStrain: share of an error of strain that a projection takes away, 0 to 1.
   double stretch = 1, shear = 1;

@@ -101,7 +101,7 @@ struct TissueMotion {
 /// What became of the tissue.
 struct TissueRecords {
   std::vector<double> tore_at;  ///< per body: when a bond last tore [s]; empty while none did
-  std::vector<std::int32_t> bridge_ends;  ///< points, by number: mpm/tear/bond_bridges.h
+  std::vector<std::int32_t> bridge_ends;  ///< points, by number: mpm/tear/tear.h
   std::set<std::int32_t> debris;          ///< the lowest point of each: mpm/tear/debris.h
 };
 

@@ -147,7 +147,7 @@ struct FreeNode {
   }
 };
 
-/// As calm_swings() of mpm/contact/hold_beside_tools.h.
+/// As calm_swings() of mpm/contact/contact_inertia.h.
 __device__ __forceinline__ void calm_swing(float loss, float dt, float4& u, float4& v) {
   const float x = loss * v.x, y = loss * v.y, z = loss * v.z;
   v.x -= x, v.y -= y, v.z -= z;

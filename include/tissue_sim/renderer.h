@@ -40,7 +40,8 @@ bool can_render();
 /// The same view and pose give the same bits on any processor with SSE 4.2. One thread owns it.
 class Renderer {
  public:
-  /// `threads` that draw, 0 for half of the processor's. Throws std::runtime_error without Embree.
+  /// `threads` that draw, 0 for all of the processor's but one. Throws std::runtime_error without
+  /// Embree.
   explicit Renderer(const Scene& scene, int threads = 0);
   ~Renderer();
   /// What render() draws from now on.

@@ -10,6 +10,7 @@
 #include "fragments/piece_sums.h"
 #include "frame/checksum.h"
 #include "frame/out_of_control.h"
+#include "frame/point_fields.h"
 #include "frame/select_points.h"
 #include "mls/crossing.h"
 #include "mls/cut.h"
@@ -271,6 +272,7 @@ FrameResult MlsTissue::finish() {
 }
 
 int MlsTissue::read_points(const PointSelection& selection, std::vector<std::uint8_t>& cloud) {
+  check_fields(selection, point_fields());
   const MlsState& s = *state_;
   const std::vector<const Fragment*> piece = pieces_by_id(pieces_);
   int count = 0;
@@ -307,6 +309,17 @@ int MlsTissue::read_points(const PointSelection& selection, std::vector<std::uin
         }
       },
       4);
+  add_fields(selection, place, count, *state_->cpu, cloud, [&s](int i) {
+    const Vec3 rest = s.nodes.place[i], moved = s.position(i) - rest, v = s.velocity(i);
+    PointFields of;
+    for (int a = 0; a < 3; ++a) {
+      of.rest[a] = static_cast<float>(rest[a]);
+      of.u[a] = static_cast<float>(moved[a]);
+      of.v[a] = static_cast<float>(v[a]);
+    }
+    of.volume = static_cast<float>(s.nodes.volume[i]);
+    return of;
+  });
   return count;
 }
 

@@ -34,7 +34,7 @@ class MlsTissue : public Tissue {
   std::vector<std::uint8_t> save() override;
   void restore(Span<const std::uint8_t> saved) override;
   bool moves_anchors() const override { return true; }
-  unsigned point_fields() const override { return 0; }
+  unsigned point_fields() const override { return ~unsigned{kStressTensor}; }
   const std::vector<std::string>& notes() const override { return notes_; }
   std::string device_name() const override;
 

@@ -20,7 +20,7 @@ class PbdTissue : public Tissue {
   FrameResult finish() override;
   int point_count() const override { return state_->vertices.size(); }
   int read_points(const PointSelection& selection, std::vector<std::uint8_t>& cloud) override;
-  unsigned point_fields() const override { return 0; }
+  unsigned point_fields() const override { return ~unsigned{kStressTensor}; }
   void read_surface(SurfaceTriangles& surface) override;
   bool moves_surface() const override { return true; }
   int fragment_count() const override { return static_cast<int>(pieces_.all.size()); }

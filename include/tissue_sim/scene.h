@@ -50,6 +50,8 @@ struct Inclusion {
   Region region;
 };
 
+/// A piece of tissue as it is at time zero: a shape in its place, of which material, and what holds
+/// it.
 struct Body {
   std::string name = "tissue";
   Shape shape = Shape::kBox;
@@ -86,6 +88,7 @@ enum class MlsContact {
   kFaces,  ///< faces touch along their common normal, with friction
 };
 
+/// How many nodes the meshless method has, and how they act on one another.
 struct MlsOptions {
   double spacing = 0;   ///< between nodes, of graded ones at the surface [m]; 0 for half a cell
   int neighbours = 18;  ///< that a node has within a regular lattice, 14 to 60: sets the supports
@@ -124,6 +127,7 @@ struct OptionSets {
   PbdOptions pbd;
 };
 
+/// What a simulation is built from; fields of a scene file have the same names.
 struct Scene : OptionSets {
   std::string name = "tissue";
   Method method = Method::kMpm;

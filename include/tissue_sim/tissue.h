@@ -81,6 +81,8 @@ struct GpuPoints {
   int gpu = -1;  ///< CUDA's number of it; -1: the tissue is on a CPU
 };
 
+/// All bodies of a scene. One thread owns it; a frame is advance(), then finish(), and what is read
+/// holds until the next one.
 class Tissue {
  public:
   virtual ~Tissue() = default;

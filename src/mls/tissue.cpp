@@ -111,7 +111,7 @@ CutReport MlsTissue::cut_now(const BladePath& path) {
   return report;
 }
 
-void MlsTissue::begin_frame(double duration, const FrameInput& input) {
+void MlsTissue::begin_frame(double duration, const FrameInput& input, FrameColliders colliders) {
   follow(input, state_->scene);
   MlsState& s = *state_;
   result_ = {};
@@ -122,8 +122,7 @@ void MlsTissue::begin_frame(double duration, const FrameInput& input) {
   }
   const bool blades = !blade_paths(s.scene, input, 0, 1).empty();
   if (blades) pull();
-  frame_.emplace(Frame{input, duration, FrameColliders(s.scene, input, duration),
-                       blades ? s.u : Array<float>(), 0});
+  frame_.emplace(Frame{input, duration, std::move(colliders), blades ? s.u : Array<float>(), 0});
   s.until_list = 0;
   std::fill(s.held_impulse.begin(), s.held_impulse.end(), 0.0f);
 }
@@ -158,13 +157,13 @@ void MlsTissue::save_checkpoint() {
   checkpoint_.result = result_;
 }
 
-double MlsTissue::run_part(const FramePart& part) {
+int MlsTissue::run_part(const FramePart& part) {
   MlsState& s = *state_;
   const Frame& frame = *frame_;
   for (int i = 0; i < part.substeps.count; ++i) {
     stop_if_asked();
     const double share = part.substeps.share(i + 1, part.from, part.to);
-    s.colliders = frame.colliders.at(share);
+    frame.colliders.at(share, s.colliders);
     s.anchors = mls_anchors_at(s.scene, frame.input, share);
     std::vector<ColliderLoad> loads(s.colliders.size());
     if (may_touch_) {
@@ -176,12 +175,12 @@ double MlsTissue::run_part(const FramePart& part) {
     frame.colliders.add_loads(share, s.colliders.data(), loads.data(), acted / frame.duration,
                               result_.loads);
   }
-  result_.substep = std::max<double>(result_.substep, part.substeps.longest());
-  result_.substeps += part.substeps.count;
-  return part.to;
+  return part.substeps.count;
 }
 
 Verdict MlsTissue::judge_part(const FramePart& part) {
+  result_.substep = std::max<double>(result_.substep, part.substeps.longest());
+  result_.substeps += part.done;
   const Figures figures = measure();
   if (!substeps_.is_borne(*state_, stiffening_, figures.stretch2, part.substeps.longest())) {
     return Verdict::kTooLong;
@@ -256,10 +255,6 @@ void MlsTissue::measure_stress(std::vector<float>& of_node) {
 }
 
 void MlsTissue::forces_at(const float* u, float* force) { internal_forces(*state_, u, force); }
-
-void MlsTissue::advance(double duration, const FrameInput& input) {
-  run_frame(*this, duration, input);
-}
 
 FrameResult MlsTissue::finish() {
   const Figures figures = measure();

@@ -17,12 +17,11 @@
 
 namespace tissue_sim {
 
-class MlsTissue : public Tissue {
+class MlsTissue : public SteppedTissue<MlsTissue> {
  public:
   /// `notes` come before those of the scene.
   explicit MlsTissue(const Scene& scene, std::vector<std::string> notes = {});
 
-  void advance(double duration, const FrameInput& input) override;
   FrameResult finish() override;
   int point_count() const override { return state_->count(); }
   int read_points(const PointSelection& selection, std::vector<std::uint8_t>& cloud) override;
@@ -38,11 +37,13 @@ class MlsTissue : public Tissue {
   const std::vector<std::string>& notes() const override { return notes_; }
   std::string device_name() const override;
 
-  // What run_frame() calls.
-  void begin_frame(double duration, const FrameInput& input);
+  // What advance() calls.
+  const Scene& scene() const { return state_->scene; }
+  void begin_frame(double duration, const FrameInput& input, FrameColliders colliders);
   PartSubsteps choose_substeps(const FrameInput& input, double time);
   virtual void save_checkpoint();
-  virtual double run_part(const FramePart& part);
+  MlsTissue& device() { return *this; }
+  virtual int run_part(const FramePart& part);
   Verdict judge_part(const FramePart& part);
   virtual void reject_part(Verdict verdict);
   bool accept_part() { return !result_.blew_up; }

@@ -80,13 +80,7 @@ void project_contacts(State& s, float h, std::vector<ColliderLoad>& loads) {
   });
   for (int part = 0; part < parts; ++part) {
     for (int c = 0; c < count; ++c) {
-      const ColliderLoad& from = of_parts[static_cast<std::size_t>(part) * count + c];
-      for (int a = 0; a < 3; ++a) {
-        loads[c].force[a] += from.force[a];
-        loads[c].torque[a] += from.torque[a];
-      }
-      loads[c].points += from.points;
-      loads[c].add_inside(from);
+      loads[c].add(of_parts[static_cast<std::size_t>(part) * count + c]);
     }
   }
 }

@@ -26,10 +26,12 @@ std::vector<Option> list_pbd(OptionSets& options) {
           {"shear", "the same of shear", &pbd.shear, nullptr, 0, 1}};
 }
 
-Spacing pbd_spacing(const Scene&) { return {}; }  // its steps are as many as it is asked for
+// Its steps are as many as it is asked for.
+Spacing pbd_spacing(const Scene& scene) { return {0, "cell_size", scene.cell_size}; }
 
 }  // namespace
 
-const MethodOptions kPbdOptions = {Method::kPbd, list_pbd, pbd_spacing, false};
+const MethodOptions kPbdOptions = {Method::kPbd, list_pbd, pbd_spacing, false,
+                                   [](const Body&) { return true; }};
 
 }  // namespace tissue_sim

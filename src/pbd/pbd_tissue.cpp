@@ -95,7 +95,7 @@ int PbdTissue::steps_between_searches(const FrameColliders& colliders, int steps
   if (state_->components < 2) return steps;
   pull();
   double struck = 0;
-  for (const Collider& c : colliders.at(1)) {
+  for (const Collider& c : colliders.at_end()) {
     if (c.tool >= 0 && c.kind != Collider::kBlade) struck = std::max(struck, speed(c));
   }
   const double searches = pbd::searches_of(*state_, struck, steps * h);
@@ -109,7 +109,7 @@ void PbdTissue::run_steps(const FrameColliders& colliders, const Part& part, flo
   std::fill(s.pushed.begin(), s.pushed.end(), std::uint8_t{0});
   for (int i = 0; i < part.count; ++i) {
     stop_if_asked();
-    s.colliders = colliders.at(part.share(i));
+    colliders.at(part.share(i), s.colliders);
     std::vector<ColliderLoad> loads(s.colliders.size());
     pbd::step(s, h, loads);
     colliders.add_loads(part.share(i), s.colliders.data(), loads.data(), 1.0 / part.of,

@@ -179,7 +179,7 @@ class SurfaceContactOnGpu : public OnEitherDevice<CudaMpmTissue> {
       tip += dt * Vec3(0.05, -0.02, -0.2 - 0.15 * i);
       motion.end = pointing_down(tip);
       const FrameInput input{{&motion, 1}, {}};
-      const Collider tool = FrameColliders(s.scene, input, static_cast<float>(dt)).at(1.0)[1];
+      const Collider tool = FrameColliders(s.scene, input, static_cast<float>(dt)).at_end()[1];
       tissue.pull();
       Vec3 on_tool;
       const std::vector<Vec3> v = expected.step(s, places, tool, before, dt, on_tool);

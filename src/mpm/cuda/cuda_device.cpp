@@ -19,7 +19,7 @@ int attribute(cudaDeviceAttr which) {
 }
 
 void upload_colliders(CudaTissue& d) {
-  const std::vector<Box> reach = d.run.frame->colliders.reach();
+  const std::vector<Box>& reach = d.run.frame->colliders.reach();
   d.host_reach.resize(reach.size());
   for (std::size_t c = 0; c < reach.size(); ++c) {
     for (int a = 0; a < 3; ++a) {
@@ -130,9 +130,10 @@ void CudaMpmDevice::begin_rest() {
              "copy");
 }
 
-int CudaMpmDevice::run(const FramePart& part) {
+int CudaMpmDevice::run_part(const FramePart& part) {
   CudaTissue& d = *tissue_;
   std::vector<TearingPoint>& tearing = d.run.frame->tearing;
+  tearing.clear();
   const int substeps = d.loads_of = part.substeps.count;
   d.part = part;
   d.dt_before = d.state.dt;

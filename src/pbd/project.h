@@ -9,12 +9,13 @@
 namespace tissue_sim {
 namespace pbd {
 
-/// Projects `count` blocks of one colour. x: four floats a vertex (position and inverse mass).
-/// `multipliers` are those of the blocks, or null: then they count as zero and are not kept, as in
-/// the only iteration of a step.
+/// Projects `count` blocks of one colour. x and moved: four floats a vertex (place and inverse
+/// mass, and how far it has moved from there, which is what changes). `multipliers` are those of
+/// the blocks, or null: then they count as zero and are not kept, as in the only iteration of a
+/// step.
 template <class Kind>
-using Project = void (*)(const ConstraintBlock<Kind>* blocks, int count, float inverse_h2, float* x,
-                         float* multipliers);
+using Project = void (*)(const ConstraintBlock<Kind>* blocks, int count, float inverse_h2,
+                         const float* x, float* moved, float* multipliers);
 
 struct Projections {
   Project<Distance> distance;

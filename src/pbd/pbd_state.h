@@ -115,6 +115,9 @@ struct State {
   std::vector<std::array<double, 4>> centres;
   double mean_edge = 0;  ///< of the surface when it was made [m]
 
+  double longest_step =
+      0;  ///< of tetrahedra of a material (tet_steps.cpp) [s]; 0: `steps` are given
+
   std::vector<Collider> colliders;  ///< of this step
 
   /// Vertices of a chunk of each level, by which constraints are packed (ConstraintSet): what the

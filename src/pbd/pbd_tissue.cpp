@@ -48,7 +48,7 @@ bool PbdTissue::cut(const BladePath& path, int stroke, const std::vector<Vec3>& 
 void PbdTissue::advance(double duration, const FrameInput& input) {
   pbd::State& s = *state_;
   follow(input, s.scene);
-  const int substeps = s.scene.pbd.steps;
+  const int substeps = pbd::steps_of(s, duration);
   const float dt = static_cast<float>(duration / substeps);
   result_ = {};
   result_.loads.resize(s.scene.tools.size());

@@ -17,7 +17,7 @@ TISSUE_SIM_INLINE void project_lanes(const ConstraintBlock<Kind>& block, int lan
   for (int i = 0; i < kMultipliers; ++i) {
     lambda[i] = kKeep ? load<W>(multipliers + i * kLanes + lane) : Vec<W>{};
   }
-  Kind::project(v, number, h, lambda);
+  project_kind<Kind, kKeep>(v, number, h, lambda);
   for (int i = 0; kKeep && i < kMultipliers; ++i) {
     store<W>(multipliers + i * kLanes + lane, lambda[i]);
   }

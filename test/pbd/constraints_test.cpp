@@ -261,7 +261,7 @@ void expect_lanes(Project<Kind> Projections::*kind, const Fill& fill) {
       constraints.add(at, number);
       float plain[Kind::kNumbers], lambda[ConstraintSet<Kind>::kMultipliers] = {};
       std::copy(number.begin(), number.end(), plain);
-      Kind::project(v, plain, 3.0f, lambda);
+      project_kind<Kind, false>(v, plain, 3.0f, lambda);
       std::copy(v, v + Kind::kVertices, expected[c].begin());
     }
     const int vertices = kCount * Kind::kVertices;

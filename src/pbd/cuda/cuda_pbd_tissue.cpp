@@ -4,6 +4,7 @@
 
 #include "pbd/cuda/on_device.h"
 #include "pbd/find_touches.h"
+#include "pbd/model.h"
 
 namespace tissue_sim {
 namespace {
@@ -24,7 +25,8 @@ CudaPbdTissue::CudaPbdTissue(const Scene& scene, std::vector<std::string> notes)
     : PbdTissue(scene, std::move(notes)), device_(std::make_unique<OnDevice>()) {
   OnDevice& d = *device_;
   d.gpu = open_gpu(d.stream);
-  const auto colliders = static_cast<std::size_t>(scene.pbd.steps) * collider_count(scene);
+  const int steps = pbd::steps_of(*state_, 1 / scene.frame_rate);
+  const auto colliders = static_cast<std::size_t>(steps) * collider_count(scene);
   d.frame.resize(1);
   d.colliders.resize(colliders);
   d.loads.resize(colliders * pbd::kPbdLoadSums);

@@ -3,6 +3,7 @@
 
 #include "pbd/contact.h"
 #include "pbd/cuda/device_state.h"
+#include "pbd/project.h"
 
 namespace tissue_sim {
 namespace pbd {
@@ -55,7 +56,7 @@ __device__ __forceinline__ void project_item(const Item<Kind>& item, float inver
   float* kept = multipliers + (index / kLanes) * (kMultipliers * kLanes) + index % kLanes;
 #pragma unroll
   for (int i = 0; i < kMultipliers; ++i) lambda[i] = kKept ? kept[i * kLanes] : 0.0f;
-  Kind::project(v, item.number, inverse_h2, lambda);
+  project_kind<Kind, kKeep>(v, item.number, inverse_h2, lambda);
 #pragma unroll
   for (int i = 0; i < kMultipliers; ++i) {
     if (kKept) kept[i * kLanes] = lambda[i];

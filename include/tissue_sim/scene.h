@@ -111,7 +111,8 @@ enum class PbdElasticity {
 struct PbdOptions {
   PbdModel model = PbdModel::kSurface;
   PbdElasticity elasticity = PbdElasticity::kMaterial;  ///< of tetrahedra
-  int steps = 20;                                       ///< of a frame, 1 to 1000
+  /// Of a frame, 1 to 1000; 0: as many as tetrahedra of a material need, and else 20.
+  int steps = 0;
   int iterations = 1;                                   ///< of a step, 1 to 100
   /// Stiffness of the surface model's constraints as a multiple of what Young's modulus gives each
   /// (src/pbd/surface_model.cpp), 0 to 1e6; 0 leaves the constraint out. `edge` and `bending` are

@@ -63,9 +63,9 @@ class PbdTissue : public Tissue {
   /// While vertices move from `before` to where they are; a stroke is what one blade does.
   template <class Archive>
   void each_field(Archive& archive);
-  Array<float> places() const;  // without padding
+  std::vector<Vec3> places() const;
   /// Whether it changed anything: constraints are to be made anew then.
-  bool cut(const BladePath& path, int stroke, const Array<float>& before, CutReport& report);
+  bool cut(const BladePath& path, int stroke, const std::vector<Vec3>& before, CutReport& report);
 
   int steps_between_searches(const FrameColliders& colliders, int steps, float h);
 

@@ -7,7 +7,6 @@
 
 #include "math/bspline.h"
 #include "mpm/cuda/inerters.h"
-#include "mpm/cuda/outer_points.h"
 #include "mpm/cuda/tool_pushes.h"
 
 namespace tissue_sim {
@@ -20,18 +19,15 @@ struct WarpNodes {
 /// Weights of a cell's nodes along each axis at the place where colliders touch a point.
 struct PlaceWeights {
   float at[3], of[3][3];  ///< place in cells from the middle of the cell; [axis][node]
-  bool is_stiff = false;  ///< what holds it off is: outer_points.h
+  bool is_stiff = false;  ///< what holds it off is: kStiffPlace
 
   __device__ __forceinline__ PlaceWeights(const CudaTables& t, int point, int s) {
 #pragma unroll
     for (int a = 0; a < 3; ++a) at[a] = (s >> a & 1) != 0 ? 0.25f : -0.25f;
     if (point >= 0) {
       const float4 place = __ldg(t.outer + point);
-      // What cuts took apart may lie on its other side.
-      const int bonds = __popc(t.bonds[point]);
-      is_stiff = place.w != 0 && place.w == bonds;
-      if (is_stiff || place.w == bonds + kSoftPlace)
-        at[0] = place.x, at[1] = place.y, at[2] = place.z;
+      is_stiff = place.w == kStiffPlace;
+      if (place.w != 0) at[0] = place.x, at[1] = place.y, at[2] = place.z;
     }
     weigh();
   }

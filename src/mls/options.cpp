@@ -27,7 +27,7 @@ std::vector<Option> list_mls(OptionSets& options) {
              mls.contact, kMlsContacts)};
 }
 
-Spacing mls_spacing(const Scene& scene) {
+Spacing spacing_of_mls(const Scene& scene) {
   const double spacing = scene.mls.spacing;
   if (spacing > 0) return {2 * spacing, "mls.spacing", spacing};
   return {scene.cell_size, "cell_size", scene.cell_size};
@@ -35,6 +35,6 @@ Spacing mls_spacing(const Scene& scene) {
 
 }  // namespace
 
-const MethodOptions kMlsOptions = {Method::kMls, list_mls, mls_spacing, false};
+const MethodOptions kMlsOptions = {Method::kMls, list_mls, spacing_of_mls, false};
 
 }  // namespace tissue_sim

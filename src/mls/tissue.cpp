@@ -11,6 +11,7 @@
 #include "frame/checksum.h"
 #include "frame/out_of_control.h"
 #include "frame/point_fields.h"
+#include "frame/put_faces.h"
 #include "frame/select_points.h"
 #include "mls/crossing.h"
 #include "mls/cut.h"
@@ -321,6 +322,20 @@ int MlsTissue::read_points(const PointSelection& selection, std::vector<std::uin
 void MlsTissue::read_surface(SurfaceTriangles& surface) {
   pull();
   tissue_sim::read_surface(*state_, pieces_.of_point, surface_, surface);
+}
+
+void MlsTissue::push_surface(Span<const float> impulses) {
+  MlsState& s = *state_;
+  for_pushed_vertices(surface_.faces, surface_.vertices.size(), impulses,
+                      [&](int i, const float* impulse) {
+                        const MlsSurface::Vertex& v = surface_.vertices[i];
+                        for (int k = 0; k < 8; ++k) {
+                          const std::int32_t n = v.node[k];
+                          for (int a = 0; a < 3 && v.weight[k] > 0; ++a) {
+                            s.v[4 * n + a] += v.weight[k] * s.inv_mass[n] * impulse[a];
+                          }
+                        }
+                      });
 }
 
 Span<const Fragment> MlsTissue::fragments() {

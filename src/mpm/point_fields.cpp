@@ -101,6 +101,20 @@ void read_surface(MpmState& s, const Pieces& pieces, SurfaceTriangles& surface) 
   put_faces(mesh.faces, place, rest, pieces.of_point, *s.cpu, surface);
 }
 
+void push_surface(MpmState& s, Span<const float> impulses) {
+  const BoundaryMesh& mesh = s.boundary;
+  for_pushed_vertices(mesh.faces, mesh.vertices.size(), impulses, [&](int i, const float* impulse) {
+    const BoundaryMesh::Vertex& v = mesh.vertices[i];
+    if (!(s.points.free_volume_of(v.point) > 0)) return;
+    const AxisWeights weights(v.place);
+    for (int k = 0; k < 27; ++k) {
+      const float w = weights.of[k % 3] * weights.of[3 + k / 3 % 3] * weights.of[6 + k / 9];
+      const std::int32_t node = v.node[k];
+      for (int a = 0; a < 3; ++a) s.nodes.v[a][node] += w * s.nodes.inv_mass[node] * impulse[a];
+    }
+  });
+}
+
 void add_point_fields(MpmState& state, const PointSelection& selection,
                       const std::vector<std::int32_t>& place, int count,
                       std::vector<std::uint8_t>& cloud) {

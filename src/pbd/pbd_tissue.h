@@ -22,6 +22,7 @@ class PbdTissue : public Tissue {
   int read_points(const PointSelection& selection, std::vector<std::uint8_t>& cloud) override;
   unsigned point_fields() const override { return ~unsigned{kStressTensor}; }
   void read_surface(SurfaceTriangles& surface) override;
+  void push_surface(Span<const float> impulses) override;
   bool moves_surface() const override { return true; }
   int fragment_count() const override { return static_cast<int>(pieces_.all.size()); }
   Span<const Fragment> fragments() override;

@@ -121,4 +121,14 @@ void PbdTissue::read_surface(SurfaceTriangles& surface) {
   }
 }
 
+void PbdTissue::push_surface(Span<const float> impulses) {
+  pbd::Vertices& v = state_->vertices;
+  const float* impulse = impulses.data();
+  for (const Triangle& t : state_->triangles) {
+    for (const std::int32_t i : t) {
+      for (int a = 0; a < 3; ++a) v.v[4 * i + a] += v.x[4 * i + 3] * *impulse++;
+    }
+  }
+}
+
 }  // namespace tissue_sim

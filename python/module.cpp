@@ -128,7 +128,8 @@ class PySimulation {
 
   py::object render(const py::object& self, const py::object& camera, const py::object& pose) {
     const std::vector<Camera>& all = simulation_->scene().cameras;
-    const Camera& of = all.at(index_of(camera, camera_names_, "camera"));
+    const int number = index_of(camera, camera_names_, "camera");
+    const Camera& of = all.at(number);
     const Pose eye =
         pose.is_none() ? of.pose : to_pose(pose, "the pose of camera '" + of.name + "'");
     own(images_);
@@ -139,14 +140,18 @@ class PySimulation {
         renderer_->show(view_);
         shown_ = generation_;
       }
-      renderer_->render(of, eye, *images_);
+      last_looks_.resize(all.size());
+      renderer_->render(of, eye, *images_, of.flow ? &last_looks_[number] : nullptr);
     });
     const py::ssize_t w = images_->width, h = images_->height;
     return tuple_of(
         "Images",
         guard(self, view(images_, py::dtype::of<std::uint8_t>(), {h, w, 3}, images_->rgb.data())),
         guard(self, view(images_, py::dtype::of<float>(), {h, w}, images_->depth.data())),
-        guard(self, view(images_, py::dtype::of<std::uint16_t>(), {h, w}, images_->labels.data())));
+        guard(self, view(images_, py::dtype::of<std::uint16_t>(), {h, w}, images_->labels.data())),
+        of.flow
+            ? guard(self, view(images_, py::dtype::of<float>(), {h, w, 2}, images_->flow.data()))
+            : py::none());
   }
 
   py::array fragments() {
@@ -284,6 +289,7 @@ class PySimulation {
   std::shared_ptr<CameraImages> images_;
   std::unique_ptr<Renderer> renderer_;
   SceneView view_;
+  std::vector<LastLook> last_looks_;          // of each camera, for its flow
   std::int64_t generation_ = 0, shown_ = -1;  // of the state; what the renderer shows
   bool busy_ = false;
 };
@@ -408,7 +414,12 @@ PYBIND11_MODULE(_core, m) {
           "3)\n"
           "uint8, depth (h, w) float32 [m], NaN where nothing is, labels (h, w) uint16: 0 nothing, "
           "1\n"
-          "ground, 2 + i tool i, 1000 + id a piece. Valid until the next advance: see Array.")
+          "ground, 2 + i tool i, 1000 + id a piece; flow (h, w, 2) float32 [pixels] of a camera "
+          "with\n"
+          "flow: true: how far what is seen there has moved to the right and down since its last "
+          "image,\n"
+          "NaN in the first and where nothing was; else None. Valid until the next advance: see "
+          "Array.")
       .def("fragments", &P::fragments,
            "All pieces, by id: a structured array (n,) with id, parent, body, point_count, volume "
            "[m^3],\n"

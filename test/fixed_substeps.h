@@ -7,12 +7,16 @@ namespace tissue_sim {
 
 struct FixedSubsteps {
   static void advance(MpmTissue& tissue, int substeps, float dt, const FrameInput& input) {
-    tissue.begin_frame(static_cast<double>(substeps) * dt, input);
+    const double duration = static_cast<double>(substeps) * dt;
+    tissue.begin_frame(duration, input, {tissue.scene(), input, duration});
     if (substeps == 0) tissue.measured(tissue.device_->measure(kMeasureMotion));
     for (int done = 0; done < substeps;) {
-      tissue.run_part(
+      tissue.measured_ = tissue.followed_ = false;
+      const int ran = tissue.device_->run_part(
           {even_substeps(substeps - done, dt), static_cast<double>(done) / substeps, 1});
-      done += tissue.run_->frame->done;
+      tissue.run_->result.substep = dt;
+      tissue.run_->result.substeps += ran;
+      done += ran;
       tissue.measured(tissue.device_->measure_part(kMeasureMotion));
       tissue.tear(static_cast<double>(done) / substeps);
     }

@@ -21,8 +21,8 @@ namespace tissue_sim {
 struct SceneView {
   SurfaceTriangles surface;
   std::vector<float> stress;  ///< von Mises, of each triangle [Pa]; empty where no camera shows it
-  std::vector<Fragment> fragments;
-  std::vector<ToolMotion> tools;  ///< parallels Scene::tools; their ends are drawn
+  std::vector<Fragment> fragments;  ///< empty where no camera shows them by colours
+  std::vector<ToolMotion> tools;    ///< parallels Scene::tools; their ends are drawn
 };
 /// Replaces `view`, whose memory is used again.
 void read_view(Simulation& simulation, SceneView& view);

@@ -32,6 +32,7 @@ class Images(NamedTuple):
     rgb: Array
     depth: Array
     labels: Array
+    flow: Optional[Array]
 
 class ToolRequest:
     pose: np.ndarray

@@ -4,7 +4,7 @@ import collections
 import numpy as np
 
 Surface = collections.namedtuple("Surface", "corners rest fragment point cut")
-Images = collections.namedtuple("Images", "rgb depth labels")
+Images = collections.namedtuple("Images", "rgb depth labels flow")
 
 
 class Array(np.lib.mixins.NDArrayOperatorsMixin):

@@ -45,15 +45,19 @@ bool can_render() { return RayScene::is_built(); }
 
 void read_view(Simulation& simulation, SceneView& view) {
   simulation.tissue().read_surface(view.surface);
-  const Span<const Fragment> fragments = simulation.tissue().fragments();
-  view.fragments.assign(fragments.begin(), fragments.end());
   view.tools = simulation.tools();
-  view.stress.clear();
-  const std::vector<Camera>& cameras = simulation.scene().cameras;
-  if (std::none_of(cameras.begin(), cameras.end(),
-                   [](const Camera& c) { return c.colours == CameraColours::kStress; })) {
-    return;
+  const auto any_shows = [&simulation](CameraColours colours) {
+    const std::vector<Camera>& cameras = simulation.scene().cameras;
+    return std::any_of(cameras.begin(), cameras.end(),
+                       [colours](const Camera& c) { return c.colours == colours; });
+  };
+  view.fragments.clear();
+  if (any_shows(CameraColours::kFragments)) {
+    const Span<const Fragment> fragments = simulation.tissue().fragments();
+    view.fragments.assign(fragments.begin(), fragments.end());
   }
+  view.stress.clear();
+  if (!any_shows(CameraColours::kStress)) return;
   std::vector<std::uint8_t> cloud;
   const int count = simulation.tissue().read_points(PointSelection(), cloud);
   std::vector<float> of_point(simulation.tissue().point_count());

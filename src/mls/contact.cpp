@@ -93,18 +93,9 @@ void add_contact(MlsState& state, int group, float* force) {
       contact_force(collider, g, spring, x, &state.v[4 * i], touch.hold, push);
       touching.push_back(touch);
       ColliderLoad& load = contact.loads[c];
-      load.points += 1;
+      load.push(collider, x, push, 1);
       load.count_inside(collider, distance);
-      double arm[3];
-      for (int a = 0; a < 3; ++a) {
-        force[4 * (i - first) + a] += push[a];
-        load.force[a] -= push[a];
-        arm[a] = static_cast<double>(x[a]) - collider.position[a];
-      }
-      for (int a = 0; a < 3; ++a) {
-        const int b = (a + 1) % 3, d = (a + 2) % 3;
-        load.torque[a] -= arm[b] * push[d] - arm[d] * push[b];
-      }
+      for (int a = 0; a < 3; ++a) force[4 * (i - first) + a] += push[a];
     }
   }
   contact.touching = std::move(touching);  // who no longer touches forgets where it was held

@@ -1,5 +1,7 @@
 #include "mls/options.h"
 
+#include "geometry/tet_mesh.h"
+
 namespace tissue_sim {
 namespace {
 
@@ -27,14 +29,15 @@ std::vector<Option> list_mls(OptionSets& options) {
              mls.contact, kMlsContacts)};
 }
 
-Spacing mls_spacing(const Scene& scene) {
-  const double spacing = scene.mls.spacing;
-  if (spacing > 0) return {2 * spacing, "mls.spacing", spacing};
-  return {scene.cell_size, "cell_size", scene.cell_size};
+Spacing spacing_of_mls(const Scene& scene) {
+  const double spacing = scene.mls.spacing > 0 ? scene.mls.spacing : 0.5 * scene.cell_size;
+  return {2 * spacing, "mls.spacing", spacing};
 }
+
+bool moves_mesh(const Body& body) { return is_tet_file(body.mesh); }
 
 }  // namespace
 
-const MethodOptions kMlsOptions = {Method::kMls, list_mls, mls_spacing, false};
+const MethodOptions kMlsOptions = {Method::kMls, list_mls, spacing_of_mls, false, moves_mesh};
 
 }  // namespace tissue_sim

@@ -271,14 +271,7 @@ float substep(MlsState& s, float dt, std::vector<ColliderLoad>& loads) {
   s.u.swap(s.u_next);
   s.v.swap(s.v_next);
   for (const MlsGroupContact& group : s.contact) {
-    for (std::size_t c = 0; c < group.loads.size(); ++c) {
-      for (int a = 0; a < 3; ++a) {
-        loads[c].force[a] += group.loads[c].force[a];
-        loads[c].torque[a] += group.loads[c].torque[a];
-      }
-      loads[c].points += group.loads[c].points;
-      loads[c].add_inside(group.loads[c]);
-    }
+    for (std::size_t c = 0; c < group.loads.size(); ++c) loads[c].add(group.loads[c]);
   }
   s.dt = dt;
   s.time += dt;

@@ -10,6 +10,8 @@
 #include "fragments/piece_sums.h"
 #include "frame/checksum.h"
 #include "frame/out_of_control.h"
+#include "frame/point_fields.h"
+#include "frame/put_faces.h"
 #include "frame/select_points.h"
 #include "mls/crossing.h"
 #include "mls/cut.h"
@@ -110,7 +112,7 @@ CutReport MlsTissue::cut_now(const BladePath& path) {
   return report;
 }
 
-void MlsTissue::begin_frame(double duration, const FrameInput& input) {
+void MlsTissue::begin_frame(double duration, const FrameInput& input, FrameColliders colliders) {
   follow(input, state_->scene);
   MlsState& s = *state_;
   result_ = {};
@@ -121,8 +123,7 @@ void MlsTissue::begin_frame(double duration, const FrameInput& input) {
   }
   const bool blades = !blade_paths(s.scene, input, 0, 1).empty();
   if (blades) pull();
-  frame_.emplace(Frame{input, duration, FrameColliders(s.scene, input, duration),
-                       blades ? s.u : Array<float>(), 0});
+  frame_.emplace(Frame{input, duration, std::move(colliders), blades ? s.u : Array<float>(), 0});
   s.until_list = 0;
   std::fill(s.held_impulse.begin(), s.held_impulse.end(), 0.0f);
 }
@@ -157,13 +158,13 @@ void MlsTissue::save_checkpoint() {
   checkpoint_.result = result_;
 }
 
-double MlsTissue::run_part(const FramePart& part) {
+int MlsTissue::run_part(const FramePart& part) {
   MlsState& s = *state_;
   const Frame& frame = *frame_;
   for (int i = 0; i < part.substeps.count; ++i) {
     stop_if_asked();
     const double share = part.substeps.share(i + 1, part.from, part.to);
-    s.colliders = frame.colliders.at(share);
+    frame.colliders.at(share, s.colliders);
     s.anchors = mls_anchors_at(s.scene, frame.input, share);
     std::vector<ColliderLoad> loads(s.colliders.size());
     if (may_touch_) {
@@ -175,12 +176,12 @@ double MlsTissue::run_part(const FramePart& part) {
     frame.colliders.add_loads(share, s.colliders.data(), loads.data(), acted / frame.duration,
                               result_.loads);
   }
-  result_.substep = std::max<double>(result_.substep, part.substeps.longest());
-  result_.substeps += part.substeps.count;
-  return part.to;
+  return part.substeps.count;
 }
 
 Verdict MlsTissue::judge_part(const FramePart& part) {
+  result_.substep = std::max<double>(result_.substep, part.substeps.longest());
+  result_.substeps += part.done;
   const Figures figures = measure();
   if (!substeps_.is_borne(*state_, stiffening_, figures.stretch2, part.substeps.longest())) {
     return Verdict::kTooLong;
@@ -256,10 +257,6 @@ void MlsTissue::measure_stress(std::vector<float>& of_node) {
 
 void MlsTissue::forces_at(const float* u, float* force) { internal_forces(*state_, u, force); }
 
-void MlsTissue::advance(double duration, const FrameInput& input) {
-  run_frame(*this, duration, input);
-}
-
 FrameResult MlsTissue::finish() {
   const Figures figures = measure();
   result_.elastic_energy = figures.elastic;
@@ -271,6 +268,7 @@ FrameResult MlsTissue::finish() {
 }
 
 int MlsTissue::read_points(const PointSelection& selection, std::vector<std::uint8_t>& cloud) {
+  check_fields(selection, point_fields());
   const MlsState& s = *state_;
   const std::vector<const Fragment*> piece = pieces_by_id(pieces_);
   int count = 0;
@@ -307,12 +305,37 @@ int MlsTissue::read_points(const PointSelection& selection, std::vector<std::uin
         }
       },
       4);
+  add_fields(selection, place, count, *state_->cpu, cloud, [&s](int i) {
+    const Vec3 rest = s.nodes.place[i], moved = s.position(i) - rest, v = s.velocity(i);
+    PointFields of;
+    for (int a = 0; a < 3; ++a) {
+      of.rest[a] = static_cast<float>(rest[a]);
+      of.u[a] = static_cast<float>(moved[a]);
+      of.v[a] = static_cast<float>(v[a]);
+    }
+    of.volume = static_cast<float>(s.nodes.volume[i]);
+    return of;
+  });
   return count;
 }
 
 void MlsTissue::read_surface(SurfaceTriangles& surface) {
   pull();
   tissue_sim::read_surface(*state_, pieces_.of_point, surface_, surface);
+}
+
+void MlsTissue::push_surface(Span<const float> impulses) {
+  MlsState& s = *state_;
+  for_pushed_vertices(surface_.faces, surface_.vertices.size(), impulses,
+                      [&](int i, const float* impulse) {
+                        const MlsSurface::Vertex& v = surface_.vertices[i];
+                        for (int k = 0; k < 8; ++k) {
+                          const std::int32_t n = v.node[k];
+                          for (int a = 0; a < 3 && v.weight[k] > 0; ++a) {
+                            s.v[4 * n + a] += v.weight[k] * s.inv_mass[n] * impulse[a];
+                          }
+                        }
+                      });
 }
 
 Span<const Fragment> MlsTissue::fragments() {

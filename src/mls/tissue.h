@@ -17,16 +17,16 @@
 
 namespace tissue_sim {
 
-class MlsTissue : public Tissue {
+class MlsTissue : public SteppedTissue<MlsTissue> {
  public:
   /// `notes` come before those of the scene.
   explicit MlsTissue(const Scene& scene, std::vector<std::string> notes = {});
 
-  void advance(double duration, const FrameInput& input) override;
   FrameResult finish() override;
   int point_count() const override { return state_->count(); }
   int read_points(const PointSelection& selection, std::vector<std::uint8_t>& cloud) override;
   void read_surface(SurfaceTriangles& surface) override;
+  void push_surface(Span<const float> impulses) override;
   int fragment_count() const override { return static_cast<int>(pieces_.all.size()); }
   Span<const Fragment> fragments() override;
   std::uint64_t checksum() override;
@@ -34,15 +34,17 @@ class MlsTissue : public Tissue {
   std::vector<std::uint8_t> save() override;
   void restore(Span<const std::uint8_t> saved) override;
   bool moves_anchors() const override { return true; }
-  unsigned point_fields() const override { return 0; }
+  unsigned point_fields() const override { return ~unsigned{kStressTensor}; }
   const std::vector<std::string>& notes() const override { return notes_; }
   std::string device_name() const override;
 
-  // What run_frame() calls.
-  void begin_frame(double duration, const FrameInput& input);
+  // What advance() calls.
+  const Scene& scene() const { return state_->scene; }
+  void begin_frame(double duration, const FrameInput& input, FrameColliders colliders);
   PartSubsteps choose_substeps(const FrameInput& input, double time);
   virtual void save_checkpoint();
-  virtual double run_part(const FramePart& part);
+  MlsTissue& device() { return *this; }
+  virtual int run_part(const FramePart& part);
   Verdict judge_part(const FramePart& part);
   virtual void reject_part(Verdict verdict);
   bool accept_part() { return !result_.blew_up; }

@@ -25,12 +25,10 @@ struct MpmFrame {
   FrameInput input;
   double duration;  ///< [s]
   FrameColliders colliders;
-  std::vector<Box> reach;                  ///< of the colliders
   bool blades;                             ///< whether there are any
   std::vector<BlockMotion> before;         ///< when they were last looked at
   double cut_to = 0;                       ///< share of the frame up to which they did
   std::vector<TearingPoint> tearing = {};  ///< points past their limit at the end of the last part
-  int done = 0;                            ///< substeps of it
   bool watched = false;                    ///< whether its energy counts
 };
 
@@ -76,7 +74,7 @@ class MpmDevice {
   /// Keeps all that a part changes until something is cut or tears.
   virtual void save_motion() = 0;
   /// The substeps of a part, until points are past their limit. Returns how many.
-  virtual int run(const FramePart& part) = 0;
+  virtual int run_part(const FramePart& part) = 0;
   /// measure() at the end of a part; what acted on tools in it is known from here on.
   virtual unsigned measure_part(unsigned what) { return measure(what); }
   /// Whether, in the part that was measured, tissue came to a tool that was not looked out for; not

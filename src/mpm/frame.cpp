@@ -1,5 +1,6 @@
 // The steps of a frame: frame/run_frame.h says in which order.
 #include <algorithm>
+#include <utility>
 
 #include "mpm/contact/face_contact.h"
 #include "mpm/mpm_tissue.h"
@@ -7,11 +8,7 @@
 
 namespace tissue_sim {
 
-void MpmTissue::advance(double duration, const FrameInput& input) {
-  run_frame(*this, duration, input);
-}
-
-void MpmTissue::begin_frame(double duration, const FrameInput& input) {
+void MpmTissue::begin_frame(double duration, const FrameInput& input, FrameColliders colliders) {
   MpmState& s = run_->state;
   FrameResult& result = run_->result;
   tissue_sim::follow(input, s.scene);
@@ -29,14 +26,16 @@ void MpmTissue::begin_frame(double duration, const FrameInput& input) {
     result.cut_reports.emplace_back();
     cut({path}, false, result.cut_reports.back());
   }
-  const FrameColliders colliders(s.scene, input, duration);
-  run_->frame.emplace(MpmFrame{input, duration, colliders, colliders.reach(),
+  run_->frame.emplace(MpmFrame{input, duration, std::move(colliders),
                                !blade_paths(s.scene, input, 0, 1).empty(), s.motion});
   device_->begin_rest();
 }
 
 PartSubsteps MpmTissue::choose_substeps(const FrameInput& input, double time) {
-  return substep_.part(run_->state, input, time, substep_for(input));
+  run_->frame->watched = SubstepChoice::is_strained(run_->state);
+  measured_ = followed_ = false;
+  const FrameColliders& colliders = run_->frame->colliders;
+  return substep_.part(run_->state, input, colliders, time, substep_for(input, colliders));
 }
 
 void MpmTissue::save_checkpoint() {
@@ -44,30 +43,20 @@ void MpmTissue::save_checkpoint() {
   checkpoint_.result = run_->result;
 }
 
-double MpmTissue::run_part(const FramePart& part) {
-  MpmFrame& frame = *run_->frame;
-  FrameResult& result = run_->result;
-  frame.watched = SubstepChoice::is_strained(run_->state);
-  measured_ = followed_ = false;
-  frame.tearing.clear();
-  result.substep = std::max<double>(result.substep, part.substeps.longest());
-  frame.done = device_->run(part);
-  result.substeps += frame.done;
-  return part.share_after(frame.done);
-}
-
 Verdict MpmTissue::judge_part(const FramePart& part) {
   const MpmFrame& frame = *run_->frame;
-  const FrameResult& result = run_->result;
-  const bool goes_on = part.share_after(frame.done) < 1 || frame.blades;
+  FrameResult& result = run_->result;
+  result.substep = std::max<double>(result.substep, part.substeps.longest());
+  result.substeps += part.done;
+  const bool goes_on = part.reached() < 1 || frame.blades;
   measured(device_->measure_part(goes_on && !frame.watched ? kMeasureStiffness : kMeasureEnergies));
   PartEnergy energy;
   if (has_energies_) {
     energy = {result.kinetic_energy, result.elastic_energy, run_->work,
-              part.substeps.until(frame.done)};
+              part.substeps.until(part.done)};
   }
   checkpoint_.substep = substep_;
-  const float last = part.substeps.at(frame.done - 1);
+  const float last = part.substeps.at(part.done - 1);
   const bool borne = substep_.is_borne(run_->state, run_->modulus, stable_substep(), last, energy);
   const bool may_go_back = device_->can_restore_motion();
   if (!borne && may_go_back) return Verdict::kTooLong;

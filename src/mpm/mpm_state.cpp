@@ -199,14 +199,7 @@ float substep(MpmState& state, float dt, std::vector<ColliderLoad>& loads,
   fly(state, step);
   add_inertial_loads(state, step.kick, loads);
   for (const auto& of_block : state.work.block_loads) {
-    for (std::size_t c = 0; c < of_block.size(); ++c) {
-      for (int a = 0; a < 3; ++a) {
-        loads[c].force[a] += of_block[c].force[a];
-        loads[c].torque[a] += of_block[c].torque[a];
-      }
-      loads[c].points += of_block[c].points;
-      loads[c].add_inside(of_block[c]);
-    }
+    for (std::size_t c = 0; c < of_block.size(); ++c) loads[c].add(of_block[c]);
   }
   state.dt = dt;
   return step.kick;

@@ -36,11 +36,12 @@ float MpmTissue::stable_substep() const {
   return tissue_sim::stable_substep(run_->state, run_->stiffening);
 }
 
-float MpmTissue::substep_for(const FrameInput& input) {
+float MpmTissue::substep_for(const FrameInput& input, const FrameColliders& colliders) {
   const auto measure = [this](const std::vector<std::uint8_t>& blocks, int steps) {
     return device_->measure_limit(blocks, steps);
   };
-  return static_cast<float>(substep_.longest(run_->state, input, run_->stiffening, measure));
+  return static_cast<float>(
+      substep_.longest(run_->state, input, colliders, run_->stiffening, measure));
 }
 
 void MpmTissue::measured(unsigned what) {
@@ -84,6 +85,11 @@ FrameResult MpmTissue::finish() {
 void MpmTissue::read_surface(SurfaceTriangles& surface) {
   device_->bring_all_nodes();
   tissue_sim::read_surface(run_->state, run_->pieces, surface);
+}
+
+void MpmTissue::push_surface(Span<const float> impulses) {
+  tissue_sim::push_surface(run_->state, impulses);
+  has_energies_ = false;
 }
 
 Span<const Fragment> MpmTissue::fragments() {

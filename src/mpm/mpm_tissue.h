@@ -12,14 +12,13 @@
 namespace tissue_sim {
 
 /// Lattice, bonds, blocks and pieces are the host's; nodes and contacts live where the device is.
-class MpmTissue : public Tissue {
+class MpmTissue : public SteppedTissue<MpmTissue> {
  public:
   /// `notes` come before those of the scene. Throws std::runtime_error where the device is not
   /// there, or has not enough memory.
   explicit MpmTissue(const Scene& scene, std::vector<std::string> notes = {},
                      MakeMpmDevice make_device = make_cpu_mpm_device);
 
-  void advance(double duration, const FrameInput& input) override;
   FrameResult finish() override;
   int point_count() const override { return state().points.size(); }
   int read_points(const PointSelection& selection, std::vector<std::uint8_t>& cloud) override {
@@ -29,6 +28,7 @@ class MpmTissue : public Tissue {
     return device_->read_points_on_gpu(selection);
   }
   void read_surface(SurfaceTriangles& surface) override;
+  void push_surface(Span<const float> impulses) override;
   bool moves_anchors() const override { return true; }
   int fragment_count() const override { return static_cast<int>(run_->pieces.all.size()); }
   Span<const Fragment> fragments() override;
@@ -48,7 +48,10 @@ class MpmTissue : public Tissue {
   /// bears, by the scene's CFL number [s].
   float stable_substep() const;
   /// The substep for the next part of a frame: SubstepChoice::longest().
-  float substep_for(const FrameInput& input);
+  float substep_for(const FrameInput& input, const FrameColliders& colliders);
+  float substep_for(const FrameInput& input) {
+    return substep_for(input, {scene(), input, 1 / scene().frame_rate});
+  }
   /// What the fragment network said; another classifier than its may say it.
   Foresight& foresight() { return foresight_; }
 
@@ -57,12 +60,12 @@ class MpmTissue : public Tissue {
   template <class Archive>
   void each_field(Archive& archive);
 
-  // The steps of run_frame().
-  friend void run_frame<MpmTissue>(MpmTissue& tissue, double duration, FrameInput input);
-  void begin_frame(double duration, const FrameInput& input);
+  // The steps of advance().
+  friend class SteppedTissue<MpmTissue>;
+  const Scene& scene() const { return run_->state.scene; }
+  void begin_frame(double duration, const FrameInput& input, FrameColliders colliders);
   PartSubsteps choose_substeps(const FrameInput& input, double time);
   void save_checkpoint();
-  double run_part(const FramePart& part);
   Verdict judge_part(const FramePart& part);
   void reject_part(Verdict verdict);
   bool accept_part();

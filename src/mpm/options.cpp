@@ -9,6 +9,7 @@ Spacing mpm_spacing(const Scene& scene) { return {scene.cell_size, "cell_size", 
 
 }  // namespace
 
-const MethodOptions kMpmOptions = {Method::kMpm, list_mpm, mpm_spacing, true};
+const MethodOptions kMpmOptions = {Method::kMpm, list_mpm, mpm_spacing, true,
+                                   [](const Body&) { return false; }};
 
 }  // namespace tissue_sim

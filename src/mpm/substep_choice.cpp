@@ -51,11 +51,11 @@ bool is_near(const MpmState& state, const Box& box) {
 
 /// How far a tool that is near tissue goes in the frame at most, with both ends, where it pushes
 /// [m]: a blade cuts its way along its plane.
-double farthest_motion(const MpmState& state, const FrameInput& input) {
+double farthest_motion(const MpmState& state, const FrameInput& input,
+                       const FrameColliders& colliders) {
   const Scene& scene = state.scene;
-  const FrameColliders colliders(scene, input, 1 / scene.frame_rate);
-  const std::vector<Collider> shapes = colliders.at(1);
-  const std::vector<Box> reach = colliders.reach();
+  const std::vector<Collider>& shapes = colliders.at_end();
+  const std::vector<Box>& reach = colliders.reach();
   double farthest = 0;
   for (std::size_t c = 1; c < reach.size(); ++c) {  // the first is the ground
     const Tool& tool = scene.tools[shapes[c].tool];
@@ -91,18 +91,20 @@ void SubstepChoice::follow(MpmState& state, const std::vector<float>& modulus) {
   length_.follow(passed, limit_.trend(), 1 / state.scene.frame_rate);
 }
 
-PartSubsteps SubstepChoice::part(const MpmState& state, const FrameInput& input, double time,
+PartSubsteps SubstepChoice::part(const MpmState& state, const FrameInput& input,
+                                 const FrameColliders& colliders, double time,
                                  double longest) const {
-  const double motion = farthest_motion(state, input) / state.scene.cell_size;
+  const double motion = farthest_motion(state, input, colliders) / state.scene.cell_size;
   const double free = kFreeMotion / (std::max(motion, kFreeMotion) * state.scene.frame_rate);
   const bool is_short = !input.cuts.empty() || acceptance_.shortened() < 1;
   return length_.part(time, longest, state.dt, is_short ? 0 : free);
 }
 
 double SubstepChoice::longest(MpmState& state, const FrameInput& input,
-                              const Stiffening& stiffening, const MeasureLimit& measure) {
+                              const FrameColliders& colliders, const Stiffening& stiffening,
+                              const MeasureLimit& measure) {
   const double cautious = stable_substep(state, stiffening);
-  const double foreseen = longest_foreseen(state, input, stiffening, cautious, measure);
+  const double foreseen = longest_foreseen(state, input, colliders, stiffening, cautious, measure);
   const double shortened = acceptance_.shortened();
   const bool at_once = shortened < 1 || foreseen <= cautious;
   return shortened *
@@ -110,6 +112,7 @@ double SubstepChoice::longest(MpmState& state, const FrameInput& input,
 }
 
 double SubstepChoice::longest_foreseen(MpmState& state, const FrameInput& input,
+                                       const FrameColliders& colliders,
                                        const Stiffening& stiffening, double cautious,
                                        const MeasureLimit& measure) {
   if (!input.cuts.empty() || tears(state)) return cautious;
@@ -119,7 +122,7 @@ double SubstepChoice::longest_foreseen(MpmState& state, const FrameInput& input,
   const double margin = kStabilityMargin * (is_strained(state) ? kStrainedMargin : 1);
   const double elastic = asked * margin * limit_.foreseen();
   const double chosen = viscous_substep(elastic, fastest_damping(state, stiffening));
-  const double motion = farthest_motion(state, input) / state.scene.cell_size;
+  const double motion = farthest_motion(state, input, colliders) / state.scene.cell_size;
   const double in_part = motion * std::min(1.0, kShortestPart * chosen * state.scene.frame_rate);
   return std::max(cautious, chosen / (1 + std::max(0.0, in_part - kFreeMotion)));
 }

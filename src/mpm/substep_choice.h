@@ -8,6 +8,7 @@
 #include "frame/step_length.h"
 #include "mpm/mpm_state.h"
 #include "mpm/state_figures.h"
+#include "tools/frame_colliders.h"
 
 namespace tissue_sim {
 
@@ -32,21 +33,22 @@ class SubstepChoice {
   /// The longest substep for the next part of a frame with this input that is stable with a margin
   /// [s]: at least stable_substep(), and not more where something is cut before the first substep,
   /// or just tore.
-  double longest(MpmState& state, const FrameInput& input, const Stiffening& stiffening,
-                 const MeasureLimit& measure);
+  double longest(MpmState& state, const FrameInput& input, const FrameColliders& colliders,
+                 const Stiffening& stiffening, const MeasureLimit& measure);
 
   /// The next part of a frame with this input of which `time` is left [s], after longest() said
   /// `longest`: all of it, unless something stiffened fast, was cut, or is pushed by a fast tool.
-  PartSubsteps part(const MpmState& state, const FrameInput& input, double time,
-                    double longest) const;
+  PartSubsteps part(const MpmState& state, const FrameInput& input, const FrameColliders& colliders,
+                    double time, double longest) const;
 
  private:
   template <class Archive>
   friend void fields(Archive& archive, SubstepChoice& x);  // mpm/mpm_fields.h
 
   /// longest() as long as no part was rejected.
-  double longest_foreseen(MpmState& state, const FrameInput& input, const Stiffening& stiffening,
-                          double cautious, const MeasureLimit& measure);
+  double longest_foreseen(MpmState& state, const FrameInput& input, const FrameColliders& colliders,
+                          const Stiffening& stiffening, double cautious,
+                          const MeasureLimit& measure);
 
   StabilityLimit limit_;
   StepLength length_;

@@ -14,7 +14,8 @@ std::vector<Option> list_pbd(OptionSets& options) {
           choice("elasticity",
                  "of tetrahedra: by the material's E and ν, or stretch and shear of strain alone",
                  pbd.elasticity, kPbdElasticities),
-          {"steps", "of a frame", nullptr, &pbd.steps, 1, 1000},
+          {"steps", "of a frame", nullptr, &pbd.steps, 1, 1000, "",
+           "as many as tetrahedra of a material need, and else 20"},
           {"iterations", "of a step", nullptr, &pbd.iterations, 1, 100},
           {"edge", "stiffness of edges over what E gives them, of surfaces and of `strain`",
            &pbd.edge, nullptr, 0, 1e6},
@@ -26,10 +27,12 @@ std::vector<Option> list_pbd(OptionSets& options) {
           {"shear", "the same of shear", &pbd.shear, nullptr, 0, 1}};
 }
 
-Spacing pbd_spacing(const Scene&) { return {}; }  // its steps are as many as it is asked for
+// Its steps are as many as it is asked for.
+Spacing pbd_spacing(const Scene& scene) { return {0, "cell_size", scene.cell_size}; }
 
 }  // namespace
 
-const MethodOptions kPbdOptions = {Method::kPbd, list_pbd, pbd_spacing, false};
+const MethodOptions kPbdOptions = {Method::kPbd, list_pbd, pbd_spacing, false,
+                                   [](const Body&) { return true; }};
 
 }  // namespace tissue_sim

@@ -23,12 +23,14 @@ PbdTissue::PbdTissue(const Scene& scene, std::vector<std::string> notes)
   next_stroke_ = static_cast<int>(scene.tools.size());
 }
 
-Array<float> PbdTissue::places() const {
-  const Array<float>& x = state_->vertices.x;
-  return {x.begin(), x.begin() + 4 * static_cast<std::ptrdiff_t>(state_->vertices.size())};
+std::vector<Vec3> PbdTissue::places() const {
+  const pbd::Vertices& v = state_->vertices;
+  std::vector<Vec3> x;
+  for (int i = 0; i < v.size(); ++i) x.push_back(v.position(i));
+  return x;
 }
 
-bool PbdTissue::cut(const BladePath& path, int stroke, const Array<float>& before,
+bool PbdTissue::cut(const BladePath& path, int stroke, const std::vector<Vec3>& before,
                     CutReport& report) {
   pbd::State& s = *state_;
   std::vector<std::int32_t> origin;
@@ -46,7 +48,7 @@ bool PbdTissue::cut(const BladePath& path, int stroke, const Array<float>& befor
 void PbdTissue::advance(double duration, const FrameInput& input) {
   pbd::State& s = *state_;
   follow(input, s.scene);
-  const int substeps = s.scene.pbd.steps;
+  const int substeps = pbd::steps_of(s, duration);
   const float dt = static_cast<float>(duration / substeps);
   result_ = {};
   result_.loads.resize(s.scene.tools.size());
@@ -58,7 +60,7 @@ void PbdTissue::advance(double duration, const FrameInput& input) {
   }
   for (const BladePath& path : input.cuts) {
     result_.cut_reports.emplace_back();
-    const Array<float> still = places();
+    const std::vector<Vec3> still = places();
     changed = cut(path, next_stroke_++, still, result_.cut_reports.back()) || changed;
   }
   if (changed) {
@@ -67,7 +69,7 @@ void PbdTissue::advance(double duration, const FrameInput& input) {
   }
   const FrameColliders colliders(s.scene, input, duration);
   const std::vector<BladePath> blades = blade_paths(s.scene, input, 0, 1);
-  Array<float> before;
+  std::vector<Vec3> before;
   if (!blades.empty()) {
     pull();
     before = places();
@@ -95,7 +97,7 @@ int PbdTissue::steps_between_searches(const FrameColliders& colliders, int steps
   if (state_->components < 2) return steps;
   pull();
   double struck = 0;
-  for (const Collider& c : colliders.at(1)) {
+  for (const Collider& c : colliders.at_end()) {
     if (c.tool >= 0 && c.kind != Collider::kBlade) struck = std::max(struck, speed(c));
   }
   const double searches = pbd::searches_of(*state_, struck, steps * h);
@@ -109,7 +111,7 @@ void PbdTissue::run_steps(const FrameColliders& colliders, const Part& part, flo
   std::fill(s.pushed.begin(), s.pushed.end(), std::uint8_t{0});
   for (int i = 0; i < part.count; ++i) {
     stop_if_asked();
-    s.colliders = colliders.at(part.share(i));
+    colliders.at(part.share(i), s.colliders);
     std::vector<ColliderLoad> loads(s.colliders.size());
     pbd::step(s, h, loads);
     colliders.add_loads(part.share(i), s.colliders.data(), loads.data(), 1.0 / part.of,

@@ -10,9 +10,9 @@
 #include <optional>
 #include <string>
 
-#include "geometry/tet_mesh.h"
 #include "ros/guarded.h"
 #include "ros/warn_seldom.h"
+#include "scene/method_options.h"
 
 namespace tissue_sim {
 
@@ -38,23 +38,17 @@ std::map<std::string, std::string> published_types() {
 std::string coarser(const Scene& scene, double slower) {
   // As many points as 1 / spacing^3, as many substeps as 1 / spacing.
   const double wider = std::pow(slower, 0.25);
-  const bool is_mls = scene.method == Method::kMls;
+  const MethodOptions& method = options_of(scene.method);
   char text[80];
   for (const Body& body : scene.bodies) {
-    if (body.shape != Shape::kMesh || scene.method == Method::kMpm) continue;
-    if (is_mls && !is_tet_file(body.mesh)) continue;
+    if (body.shape != Shape::kMesh || !method.moves_mesh(body)) continue;
     std::snprintf(text, sizeof text, "a mesh of 1/%.2g of the vertices would do",
                   std::pow(wider, 3));
     return text;
   }
-  if (is_mls) {
-    const double spacing = scene.mls.spacing > 0 ? scene.mls.spacing : scene.cell_size / 2;
-    std::snprintf(text, sizeof text, "mls: {spacing: %.2g} would do, for %.2g", wider * spacing,
-                  spacing);
-  } else {
-    std::snprintf(text, sizeof text, "cell_size: %.2g would do, for %.2g", wider * scene.cell_size,
-                  scene.cell_size);
-  }
+  const Spacing spacing = method.spacing(scene);
+  std::snprintf(text, sizeof text, "%s: %.2g would do, for %.2g", spacing.field,
+                wider * spacing.value, spacing.value);
   return text;
 }
 

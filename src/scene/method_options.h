@@ -49,6 +49,8 @@ struct MethodOptions {
   std::vector<Option> (*list)(OptionSets& options);
   Spacing (*spacing)(const Scene& scene);
   bool takes_network;  ///< Scene::fragment_network
+  /// Whether what moves are the vertices of a body's own mesh.
+  bool (*moves_mesh)(const Body& body);
 
   const char* name() const { return name_of(method, kMethodNames); }  ///< also of their map in YAML
 };

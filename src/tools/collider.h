@@ -34,11 +34,34 @@ struct ColliderLoad {
   double inside = 0;   ///< number of those that lie deeper than Collider::inside
   double deepest = 0;  ///< of these [m]
 
+  /// The collider pushes points at this place with this force.
+  void push(const Collider& collider, const float* place, const float* force_on_points,
+            double points_there) {
+    points += points_there;
+    double arm[3];
+    for (int a = 0; a < 3; ++a) {
+      force[a] -= force_on_points[a];
+      arm[a] = static_cast<double>(place[a]) - collider.position[a];
+    }
+    for (int a = 0; a < 3; ++a) {
+      const int b = (a + 1) % 3, d = (a + 2) % 3;
+      torque[a] -= arm[b] * force_on_points[d] - arm[d] * force_on_points[b];
+    }
+  }
   /// Counts a point at this distance from the collider.
   void count_inside(const Collider& collider, float distance) {
     if (!(collider.inside > 0 && distance < -collider.inside)) return;
     inside += 1;
     if (-distance > deepest) deepest = -distance;
+  }
+  /// What acts on the same collider elsewhere.
+  void add(const ColliderLoad& other) {
+    for (int a = 0; a < 3; ++a) {
+      force[a] += other.force[a];
+      torque[a] += other.torque[a];
+    }
+    points += other.points;
+    add_inside(other);
   }
   void add_inside(const ColliderLoad& other) {
     inside += other.inside;

@@ -50,6 +50,16 @@ FrameColliders::FrameColliders(const Scene& scene, const FrameInput& input, doub
     tools_.emplace_back(scene.tools[i], static_cast<int>(i), input.tools[i], duration, point_area_);
     count_ += tools_.back().count();
   }
+  reach_.resize(count_);
+  for (const double share : {0.0, 0.5, 1.0}) {
+    at(share, at_end_);
+    for (int c = 0; c < count_; ++c) {
+      if (c > 0 && !tools_[at_end_[c].tool].is_present()) continue;
+      const Box box = bounds(at_end_[c]);
+      reach_[c].min = reach_[c].min.cwiseMin(box.min);
+      reach_[c].max = reach_[c].max.cwiseMax(box.max);
+    }
+  }
 }
 
 void FrameColliders::at(double share, Collider* out) const {
@@ -60,24 +70,9 @@ void FrameColliders::at(double share, Collider* out) const {
   }
 }
 
-std::vector<Collider> FrameColliders::at(double share) const {
-  std::vector<Collider> colliders(count_);
-  at(share, colliders.data());
-  return colliders;
-}
-
-std::vector<Box> FrameColliders::reach() const {
-  std::vector<Box> reach(count_);
-  for (const double share : {0.0, 0.5, 1.0}) {
-    const std::vector<Collider> colliders = at(share);
-    for (std::size_t c = 0; c < reach.size(); ++c) {
-      if (c > 0 && !tools_[colliders[c].tool].is_present()) continue;
-      const Box box = bounds(colliders[c]);
-      reach[c].min = reach[c].min.cwiseMin(box.min);
-      reach[c].max = reach[c].max.cwiseMax(box.max);
-    }
-  }
-  return reach;
+void FrameColliders::at(double share, std::vector<Collider>& out) const {
+  out.resize(count_);
+  at(share, out.data());
 }
 
 void FrameColliders::add_loads(double share, const Collider* now, const ColliderLoad* on,

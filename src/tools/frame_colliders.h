@@ -26,9 +26,11 @@ class FrameColliders {
   int count() const { return count_; }
   /// Writes the count() colliders as they are at the share (0 to 1) of the frame.
   void at(double share, Collider* out) const;
-  std::vector<Collider> at(double share) const;
+  void at(double share, std::vector<Collider>& out) const;
+  /// As they are at the frame's end.
+  const std::vector<Collider>& at_end() const { return at_end_; }
   /// What each of them sweeps during the frame; empty for a tool that is not there [m].
-  std::vector<Box> reach() const;
+  const std::vector<Box>& reach() const { return reach_; }
   /// Adds what acts on the colliders `now`, in a substep that ends at the share of the frame, to
   /// the loads of their tools; `weight` is the substep's part of the frame.
   void add_loads(double share, const Collider* now, const ColliderLoad* on, double weight,
@@ -41,6 +43,8 @@ class FrameColliders {
   Collider ground_;
   std::vector<ToolPath> tools_;
   int count_ = 1;
+  std::vector<Collider> at_end_;
+  std::vector<Box> reach_;
 };
 
 }  // namespace tissue_sim

@@ -61,7 +61,7 @@ void run(benchmark::State& bench, const MlsCase& c) {
   probe.present = true;
   probe.begin.position = probe.end.position = Vec3(0, 0, 1);
   const FrameColliders colliders(s.scene, {{&probe, 1}, {}}, 1 / s.scene.frame_rate);
-  s.colliders = colliders.at(0);
+  colliders.at(0, s.colliders);
   std::vector<ColliderLoad> loads(s.colliders.size());
   const float dt = 1e-8f;  // so that the body stays deformed however long the run is
   for (auto _ : bench) substep(s, dt, loads);

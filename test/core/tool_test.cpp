@@ -66,7 +66,8 @@ TEST(FrameColliders, PowerIsForceTimesVelocityAndMomentTimesSpin) {
   on[0].force[2] = -5;  // the ground is still
   on[1].force[0] = -2;
   on[1].torque[2] = -3;
-  const std::vector<Collider> now = colliders.at(0.5);
+  std::vector<Collider> now;
+  colliders.at(0.5, now);
   EXPECT_NEAR(colliders.power(now.data(), on.data()), 2 * 0.1 + 3 * 2, 1e-4);
 }
 

@@ -260,6 +260,21 @@ def test_cameras():
         images.depth[0, 0]
     with pytest.raises(ValueError, match="ear"):
         simulation.render("ear")
+    assert simulation.render("eye").flow is None
+
+
+def test_flow_says_how_far_what_is_seen_moved():
+    scene = block(cameras=[{"name": "eye", "width": 64, "height": 48, "hfov": 90, "flow": True}])
+    if not tissue_sim.can_render():
+        pytest.skip("this build has no Embree")
+    simulation = Simulation(scene)
+    assert np.isnan(np.array(simulation.render("eye", pose=[0, 0, 0.1] + DOWN).flow)).all()
+    # The eye goes along the world's x by a tenth of its depth above the tissue.
+    seen = simulation.render("eye", pose=[0.1 * (0.1 - 0.016), 0, 0.1] + DOWN)
+    flow = np.array(seen.flow)[24, 32]
+    assert abs(flow[0]) == pytest.approx(0.1 * 32, rel=0.02) and flow[1] == pytest.approx(0, abs=0.01)
+    still = np.array(simulation.render("eye", pose=[0.1 * (0.1 - 0.016), 0, 0.1] + DOWN).flow)[24, 32]
+    assert still == pytest.approx([0, 0], abs=1e-3)
 
 
 def test_stubs_name_what_the_module_has():

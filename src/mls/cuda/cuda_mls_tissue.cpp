@@ -290,14 +290,14 @@ void CudaMlsTissue::upload_colliders(const FramePart& part) {
   d.loads.clear(d.stream);
 }
 
-double CudaMlsTissue::run_part(const FramePart& part) {
+int CudaMlsTissue::run_part(const FramePart& part) {
   OnDevice& d = *device_;
   MlsState& s = *state_;
   const CudaMlsField field = d.field();
   if (part.from == 0) d.held_impulse.clear(d.stream);
   upload_colliders(part);
   const float before = s.dt;
-  const std::vector<Box> reach = frame_->colliders.reach();
+  const std::vector<Box>& reach = frame_->colliders.reach();
   // Tissue gets faster within a part: what it may come to is listed widely, for it costs little.
   const double time = part.substeps.until(part.substeps.count);
   const double margin =
@@ -345,9 +345,7 @@ double CudaMlsTissue::run_part(const FramePart& part) {
     s.time += dt;
   }
   sum_loads(part, before);
-  result_.substep = std::max<double>(result_.substep, part.substeps.longest());
-  result_.substeps += part.substeps.count;
-  return part.to;
+  return part.substeps.count;
 }
 
 void CudaMlsTissue::sum_loads(const FramePart& part, float before) {

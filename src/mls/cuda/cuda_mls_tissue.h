@@ -21,7 +21,7 @@ class CudaMlsTissue final : public MlsTissue {
   void restore(Span<const std::uint8_t> saved) override;
 
   void save_checkpoint() override;
-  double run_part(const FramePart& part) override;
+  int run_part(const FramePart& part) override;
   void reject_part(Verdict verdict) override;
 
   // For tests and the benchmark.

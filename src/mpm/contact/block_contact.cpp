@@ -307,20 +307,6 @@ struct BlockPush {
   }
 };
 
-void add_load(const Collider& collider, const float* at, const float* push, double points,
-              ColliderLoad& load) {
-  load.points += points;
-  double arm[3];
-  for (int a = 0; a < 3; ++a) {
-    load.force[a] -= push[a];
-    arm[a] = static_cast<double>(at[a]) - collider.position[a];
-  }
-  for (int a = 0; a < 3; ++a) {
-    const int b = (a + 1) % 3, d = (a + 2) % 3;
-    load.torque[a] -= arm[b] * push[d] - arm[d] * push[b];
-  }
-}
-
 /// Pushes on `points` of a cell. Returns whether any touches; else `clear` becomes the distance of
 /// the nearest.
 bool push_points(BlockPush& b, const NearCell& cell, unsigned points, const Collider& collider,
@@ -365,7 +351,7 @@ bool push_points(BlockPush& b, const NearCell& cell, unsigned points, const Coll
     }
     b.touching.push_back(touch);
     if (moves > 0) pushes[s] = Vec<4>{push[0], push[1], push[2], 0.0f};
-    add_load(collider, at, push, 1, load);
+    load.push(collider, at, push, 1);
     load.count_inside(collider, g.distance);
   }
   if (touches) spread(b.block, cell.node, pushes, b.force);
@@ -532,7 +518,7 @@ void push_surface(BlockPush& b, NearCell& cell, const Collider& collider, float 
       }
     }
     b.touching.push_back(touch);
-    add_load(collider, at, push.force, place.area / unit_area, load);
+    load.push(collider, at, push.force, place.area / unit_area);
   }
   if (clear == 0) return;
   cell.clear = static_cast<std::uint8_t>(clear);

@@ -96,7 +96,7 @@ double CpuMpmDevice::measure_limit(const std::vector<std::uint8_t>& blocks, int 
 
 void CpuMpmDevice::begin_rest() {
   const MpmFrame& frame = *run_.frame;
-  find_near_colliders(state_, frame.reach, frame.duration);
+  find_near_colliders(state_, frame.colliders.reach(), frame.duration);
   for (int a = 0; frame.blades && a < 3; ++a) state_.work.u_before[a] = state_.nodes.u[a];
 }
 
@@ -116,21 +116,22 @@ void CpuMpmDevice::restore_motion(bool missed) {
   if (!missed) return;
   again_ = true;
   // From where blocks went, whose motion still stands, and from where they began.
-  find_near_colliders(s, run_.frame->reach, run_.frame->duration, saved_.of_blocks);
+  find_near_colliders(s, run_.frame->colliders.reach(), run_.frame->duration, saved_.of_blocks);
 }
 
-int CpuMpmDevice::run(const FramePart& part) {
+int CpuMpmDevice::run_part(const FramePart& part) {
   MpmState& s = state_;
   MpmFrame& frame = *run_.frame;
   const PartSubsteps& substeps = part.substeps;
   const int checks = can_tear(s) ? tear_checks(s, substeps.count, substeps.longest()) : 0;
   run_.work = 0;
+  frame.tearing.clear();
   int done = 0;
   for (int check = 0; done < substeps.count && frame.tearing.empty(); ++done) {
     stop_if_asked();
     const double share = substeps.share(done + 1, part.from, part.to);
     const float dt = substeps.at(done);
-    s.colliders = frame.colliders.at(share);
+    frame.colliders.at(share, s.colliders);
     std::vector<ColliderLoad> loads(s.colliders.size());
     find_face_contacts(s, run_.pieces, dt);
     const float acted = substep(s, dt, loads, anchors_at(s.anchors, frame.input, share));
@@ -147,7 +148,7 @@ int CpuMpmDevice::run(const FramePart& part) {
 
 bool CpuMpmDevice::missed_contact() {
   measure_motion(state_);
-  return !std::exchange(again_, false) && came_unforeseen(state_, run_.frame->reach);
+  return !std::exchange(again_, false) && came_unforeseen(state_, run_.frame->colliders.reach());
 }
 
 void CpuMpmDevice::settled(const std::vector<std::int32_t>& points) {

@@ -16,7 +16,7 @@ class CpuMpmDevice final : public MpmDevice {
   double measure_limit(const std::vector<std::uint8_t>& blocks, int steps) override;
   void begin_rest() override;
   void save_motion() override;
-  int run(const FramePart& part) override;
+  int run_part(const FramePart& part) override;
   bool missed_contact() override;
   void restore_motion(bool missed) override;
   void settled(const std::vector<std::int32_t>& points) override;

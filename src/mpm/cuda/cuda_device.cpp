@@ -5,7 +5,6 @@
 #include <stdexcept>
 
 #include "mpm/cuda/on_device.h"
-#include "mpm/cuda/outer_points.h"
 #include "tools/frame_colliders.h"
 #include "tools/tool_motion.h"
 
@@ -19,7 +18,7 @@ int attribute(cudaDeviceAttr which) {
 }
 
 void upload_colliders(CudaTissue& d) {
-  const std::vector<Box> reach = d.run.frame->colliders.reach();
+  const std::vector<Box>& reach = d.run.frame->colliders.reach();
   d.host_reach.resize(reach.size());
   for (std::size_t c = 0; c < reach.size(); ++c) {
     for (int a = 0; a < 3; ++a) {
@@ -106,10 +105,8 @@ void CudaMpmDevice::begin() {
 void CudaMpmDevice::begun() {
   CudaTissue& d = *tissue_;
   if (d.held_by == 0) return;
-  const OuterPoints outer = outer_points(d.state, d.state.anchors);
-  d.outer.upload(outer.place, d.stream);
-  d.area.upload(outer.area, d.stream);
-  if (d.place_parts > 1) d.planes.upload(outer.plane, d.stream);
+  d.outer_points.emplace(d.state, d.state.anchors);
+  push_outer_points(d);
 }
 
 void CudaMpmDevice::begin_frame(const FrameInput& input, bool move) {
@@ -130,9 +127,10 @@ void CudaMpmDevice::begin_rest() {
              "copy");
 }
 
-int CudaMpmDevice::run(const FramePart& part) {
+int CudaMpmDevice::run_part(const FramePart& part) {
   CudaTissue& d = *tissue_;
   std::vector<TearingPoint>& tearing = d.run.frame->tearing;
+  tearing.clear();
   const int substeps = d.loads_of = part.substeps.count;
   d.part = part;
   d.dt_before = d.state.dt;

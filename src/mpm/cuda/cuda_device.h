@@ -24,7 +24,7 @@ class CudaMpmDevice final : public MpmDevice {
   void begin_frame(const FrameInput& input, bool move) override;
   void begin_rest() override;
   void save_motion() override;
-  int run(const FramePart& part) override;
+  int run_part(const FramePart& part) override;
   unsigned measure_part(unsigned what) override;
   bool missed_contact() override { return missed_; }
   bool can_restore_motion() const override;

@@ -9,6 +9,7 @@
 
 namespace tissue_sim {
 
+/// What a fluid is made of; nearly incompressible.
 struct Fluid {
   std::string name = "water";
   double density = 1000;     ///< without pressure [kg/m^3]

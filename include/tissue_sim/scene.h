@@ -128,7 +128,7 @@ struct PbdOptions {
   PbdElasticity elasticity = PbdElasticity::kMaterial;  ///< of tetrahedra
   /// Of a frame, 1 to 1000; 0: as many as tetrahedra of a material need, and else 20.
   int steps = 0;
-  int iterations = 1;                                   ///< of a step, 1 to 100
+  int iterations = 1;  ///< of a step, 1 to 100
   /// Stiffness of the surface model's constraints as a multiple of what Young's modulus gives each
   /// (src/pbd/surface_model.cpp), 0 to 1e6; 0 leaves the constraint out. `edge` and `bending` are
   /// the kStrain model's, too.

@@ -1,16 +1,15 @@
 # The Python module tissue_sim: python_folder, where it can be imported from, and the target
 # tissue_sim_python, where pybind11 is found. Built by `pip install .` too, which asks for it alone.
 option(TISSUE_SIM_PYTHON "Fail where pybind11 is not found, in place of leaving the Python module out" OFF)
-if(SKBUILD)  # pip's, which brings its own
-  find_package(pybind11 QUIET)
-else()  # with the headers of the Python that ROS is installed for, else pybind11 ends in an error
+if(NOT SKBUILD)  # pip brings its own; else with the headers of the Python that ROS is installed for,
+                 # without which pybind11 ends in an error
   if(PYTHON_EXECUTABLE AND NOT Python3_EXECUTABLE)
     set(Python3_EXECUTABLE ${PYTHON_EXECUTABLE})
   endif()
   find_package(Python3 QUIET COMPONENTS Interpreter Development)
-  if(Python3_Development_FOUND)
-    find_package(pybind11 QUIET)
-  endif()
+endif()
+if(SKBUILD OR Python3_Development_FOUND)
+  find_package(pybind11 QUIET)
 endif()
 if(pybind11_FOUND)
   pybind11_add_module(tissue_sim_python NO_EXTRAS python/module.cpp python/convert.cpp python/reports.cpp
@@ -33,6 +32,7 @@ if(pybind11_FOUND)
     get_filename_component(name ${file} NAME)
     configure_file(${file} ${python_folder}/${name} COPYONLY)
   endforeach()
+  #catkin_lint: ignore_once undefined_target
   install(TARGETS tissue_sim_python LIBRARY DESTINATION ${python_destination} COMPONENT python ${python_part})
   install(FILES ${python_files} DESTINATION ${python_destination} COMPONENT python ${python_part})
 elseif(TISSUE_SIM_PYTHON)

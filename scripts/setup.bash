@@ -29,6 +29,9 @@ noetic_packages=(ros-noetic-{catkin,message-generation,message-runtime,roscpp,ro
 pcl_packages=(libpcl-dev libpcl-conversions-dev)
 if [[ -e $noetic ]]; then pcl_packages=(libpcl-dev ros-noetic-pcl-conversions); fi
 
+# For scripts/lint.
+lint_packages=(clang-format clang-tidy catkin-lint doxygen)
+
 # For tests of the Python module; without some of them part of the tests is left out, which says so.
 python_packages=(python3-numpy python3-pytest python3-venv python3-pip python3-scipy python3-matplotlib)
 
@@ -65,7 +68,7 @@ as_root() {
   fi
 }
 
-# install core|ros [more ROS packages, without Noetic's prefix]: asks apt for what is missing, if
+# install core|ros|lint [more ROS packages, without Noetic's prefix]: asks apt for what is missing, if
 # anything is.
 install() {
   local kind=$1 wanted missing
@@ -79,6 +82,8 @@ install() {
     wanted+=("${noetic_packages[@]}" "${picture_packages[@]}" "${@/#/ros-noetic-}")
   elif [[ $kind == ros ]]; then
     wanted+=("${debian_packages[@]}" "${picture_packages[@]}" "$@")
+  elif [[ $kind == lint ]]; then
+    wanted+=("${lint_packages[@]}")
   fi
   mapfile -t missing < <(missing_of "${wanted[@]}")
   if [[ ${#missing[@]} == 0 ]]; then return; fi

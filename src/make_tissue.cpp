@@ -3,6 +3,7 @@
 #include <stdexcept>
 #include <utility>
 
+#include "fluid/tissue_with_fluid.h"
 #include "geometry/overlap.h"
 #include "mls/tissue.h"
 #include "mpm/mpm_tissue.h"
@@ -78,6 +79,14 @@ std::unique_ptr<Tissue> make_tissue(const Scene& scene) {
   if (of == std::end(kMakers)) throw std::invalid_argument("method is not in this build");
   Notes notes = overlap_notes(scene);
   note_units(scene, notes);
+  if (has_fluid(scene)) {
+    if (scene.device == Device::kCuda) {
+      throw std::runtime_error(
+          "device is cuda: fluid runs on a CPU alone, and so does tissue that it meets; set device "
+          "to auto or cpu");
+    }
+    return std::make_unique<TissueWithFluid>(scene, std::move(notes), of->on_cpu);
+  }
   if (scene.device == Device::kCpu) return of->on_cpu(scene, notes);
   if (of->on_gpu == nullptr) {
     if (scene.device == Device::kAuto) return of->on_cpu(scene, notes);

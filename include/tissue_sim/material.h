@@ -12,6 +12,7 @@ enum class Law {
   kNeoHookean,      ///< Smith, de Goes, Kim 2018, without the log term: stays finite when inverted
 };
 
+/// What a body is made of; laws are isotropic.
 struct Material {
   std::string name = "liver";
   Law law = Law::kFixedCorotated;

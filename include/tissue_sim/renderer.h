@@ -21,8 +21,8 @@ namespace tissue_sim {
 struct SceneView {
   SurfaceTriangles surface;
   std::vector<float> stress;  ///< von Mises, of each triangle [Pa]; empty where no camera shows it
-  std::vector<Fragment> fragments;
-  std::vector<ToolMotion> tools;  ///< parallels Scene::tools; their ends are drawn
+  std::vector<Fragment> fragments;  ///< empty where no camera shows them by colours
+  std::vector<ToolMotion> tools;    ///< parallels Scene::tools; their ends are drawn
 };
 /// Replaces `view`, whose memory is used again.
 void read_view(Simulation& simulation, SceneView& view);
@@ -40,7 +40,8 @@ bool can_render();
 /// The same view and pose give the same bits on any processor with SSE 4.2. One thread owns it.
 class Renderer {
  public:
-  /// `threads` that draw, 0 for half of the processor's. Throws std::runtime_error without Embree.
+  /// `threads` that draw, 0 for all of the processor's but one. Throws std::runtime_error without
+  /// Embree.
   explicit Renderer(const Scene& scene, int threads = 0);
   ~Renderer();
   /// What render() draws from now on.

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "tissue_sim/camera.h"
+#include "tissue_sim/fluid.h"
 #include "tissue_sim/material.h"
 #include "tissue_sim/tool.h"
 #include "tissue_sim/types.h"
@@ -50,6 +51,20 @@ struct Inclusion {
   Region region;
 };
 
+/// What fills a hollow.
+struct Fill {
+  std::string fluid;    ///< a name in Scene::fluids or a preset; empty: nothing does
+  double pressure = 0;  ///< that it is filled to, over what surrounds it, 0 to 1e5 [Pa]
+};
+
+/// A region that is full of fluid at time zero, where there is no tissue.
+struct Pool {
+  std::string fluid = "water";  ///< a name in Scene::fluids or a preset
+  Region region;                ///< a box or a ball
+};
+
+/// A piece of tissue as it is at time zero: a shape in its place, of which material, and what holds
+/// it.
 struct Body {
   std::string name = "tissue";
   Shape shape = Shape::kBox;
@@ -65,6 +80,8 @@ struct Body {
   /// at most 255, and each must be the last one for a point at least.
   std::vector<Inclusion> inclusions;
   std::vector<Anchor> anchors;  ///< what holds it
+  double wall = 0;  ///< if not 0 it is hollow, with a wall so thick: two cells or more [m]
+  Fill filled;      ///< of a hollow
 };
 
 /// A horizontal plane that carries what falls on it.
@@ -86,6 +103,7 @@ enum class MlsContact {
   kFaces,  ///< faces touch along their common normal, with friction
 };
 
+/// How many nodes the meshless method has, and how they act on one another.
 struct MlsOptions {
   double spacing = 0;   ///< between nodes, of graded ones at the surface [m]; 0 for half a cell
   int neighbours = 18;  ///< that a node has within a regular lattice, 14 to 60: sets the supports
@@ -108,8 +126,9 @@ enum class PbdElasticity {
 struct PbdOptions {
   PbdModel model = PbdModel::kSurface;
   PbdElasticity elasticity = PbdElasticity::kMaterial;  ///< of tetrahedra
-  int steps = 20;                                       ///< of a frame, 1 to 1000
-  int iterations = 1;                                   ///< of a step, 1 to 100
+  /// Of a frame, 1 to 1000; 0: as many as tetrahedra of a material need, and else 20.
+  int steps = 0;
+  int iterations = 1;  ///< of a step, 1 to 100
   /// Stiffness of the surface model's constraints as a multiple of what Young's modulus gives each
   /// (src/pbd/surface_model.cpp), 0 to 1e6; 0 leaves the constraint out. `edge` and `bending` are
   /// the kStrain model's, too.
@@ -124,6 +143,7 @@ struct OptionSets {
   PbdOptions pbd;
 };
 
+/// What a simulation is built from; fields of a scene file have the same names.
 struct Scene : OptionSets {
   std::string name = "tissue";
   Method method = Method::kMpm;
@@ -147,13 +167,26 @@ struct Scene : OptionSets {
   std::vector<Body> bodies;
   std::vector<Tool> tools;
   std::vector<Camera> cameras;  ///< they change nothing but what is seen
+  std::vector<Fluid> fluids;
+  std::vector<Pool> pools;
+  double fluid_spacing = 0;  ///< between particles of fluid [m], at most cell_size; 0 for that
 };
+
+inline bool has_fluid(const Scene& scene) {
+  for (const Body& body : scene.bodies) {
+    if (!body.filled.fluid.empty()) return true;
+  }
+  return !scene.pools.empty();
+}
 
 /// Throws std::invalid_argument: "<field> is <value>: <what is allowed>".
 void validate(const Scene& scene);
 
 /// The material of that name, from the scene or the presets; throws std::invalid_argument.
 const Material& find_material(const Scene& scene, const std::string& name);
+
+/// The fluid of that name, likewise.
+const Fluid& find_fluid(const Scene& scene, const std::string& name);
 
 /// Reads a scene from YAML text; fields left out keep their defaults. Throws std::invalid_argument
 /// naming the field (with its path, as in `bodies[0].size`), its value and what is allowed; unknown

@@ -49,12 +49,14 @@ struct SettleLimits {
   double time = 10;     ///< simulated at most [s]
   double damping = -1;  ///< meanwhile, instead of the scene's [1/s]; negative: the scene's
 };
+/// How settle() ended.
 struct SettleReport {
   bool at_rest = false;
   double time = 0;   ///< that it took [s]
   double speed = 0;  ///< of the fastest point in the last tenth of a second [m/s]; infinite before
 };
 
+/// What a frame was given and what came of it.
 struct FrameReport {
   AppliedInput input;
   FrameResult result;

@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <stdexcept>
 #include <string>
 #include <vector>
 
@@ -81,6 +82,8 @@ struct GpuPoints {
   int gpu = -1;  ///< CUDA's number of it; -1: the tissue is on a CPU
 };
 
+/// All bodies of a scene. One thread owns it; a frame is advance(), then finish(), and what is read
+/// holds until the next one.
 class Tissue {
  public:
   virtual ~Tissue() = default;
@@ -99,10 +102,22 @@ class Tissue {
   virtual unsigned point_fields() const { return ~0u; }
   /// Replaces `surface` with the tissue's, as of the last finish().
   virtual void read_surface(SurfaceTriangles& surface) = 0;
+  /// Gives the tissue impulses at the corners of the triangles that read_surface() gave last, since
+  /// when it must not have advanced: nine numbers a triangle [N s]. They go to what moves a corner.
+  virtual void push_surface(Span<const float> /*impulses*/) {
+    throw std::logic_error("nothing presses on the surface of this tissue from without");
+  }
   /// Whether that is what the method moves; else it is made of what it moves, when it is read.
   virtual bool moves_surface() const { return false; }
   /// Whether FrameInput::anchors move what they hold, and FrameResult has their loads.
   virtual bool moves_anchors() const { return false; }
+  /// Replaces `cloud` with the scene's fluid, as FluidPoint after FluidPoint. Returns their number.
+  virtual int read_fluid(std::vector<std::uint8_t>& cloud) {
+    cloud.clear();
+    return 0;
+  }
+  /// Of each of fluid_kinds(): how much there is, and where.
+  virtual std::vector<FluidVolume> fluid_volumes() { return {}; }
   /// Number of pieces, as of the last finish(). It grows whenever a piece comes apart.
   virtual int fragment_count() const = 0;
   /// All pieces, by id, as of the last finish(). The first call after that looks where they are.

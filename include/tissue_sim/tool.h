@@ -21,6 +21,8 @@ enum class ToolType {
   kPlate,    ///< a rectangular plate across z with rounded edges; the tip is the middle of its face
 };
 
+/// An instrument: its shape, and how it acts on tissue. Fields that its type does not name are not
+/// read.
 struct Tool {
   std::string name = "probe";  ///< a ROS name: letters, digits, '_'; unique in the scene
   ToolType type = ToolType::kProbe;

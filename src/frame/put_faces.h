@@ -41,4 +41,21 @@ void put_faces(const Faces& faces, const std::vector<std::array<float, 3>>& plac
       256);
 }
 
+/// Calls f(vertex, impulse) for the vertices of `faces` that impulses act on: of the corners of the
+/// triangles that put_faces() made of them. One after the other, by number.
+template <class Faces, class F>
+void for_pushed_vertices(const Faces& faces, std::size_t vertices, Span<const float> impulses,
+                         const F& f) {
+  std::vector<std::array<float, 3>> sum(vertices, {0, 0, 0});
+  const float* impulse = impulses.data();
+  for (const auto& face : faces) {
+    for (const int k : {0, 1, 2, 0, 2, 3}) {
+      for (float& to : sum[face.vertex[k]]) to += *impulse++;
+    }
+  }
+  for (std::size_t i = 0; i < vertices; ++i) {
+    if (sum[i][0] != 0 || sum[i][1] != 0 || sum[i][2] != 0) f(static_cast<int>(i), sum[i].data());
+  }
+}
+
 }  // namespace tissue_sim

@@ -180,7 +180,7 @@ Box box_of(const TriangleMesh& mesh) {
 Lattice make_lattice(const Body& body, double cell_size, std::vector<std::string>* notes,
                      std::int64_t max_points) {
   const double half = cell_size / 2;
-  const bool is_mesh = body.shape == Shape::kMesh;
+  const bool is_mesh = is_meshed(body);
   // Where a mesh is in another unit, no cell size is the answer.
   const auto hint_of = [&](const Vec3& size) {
     const std::string hint = is_mesh ? scale_hint(size.maxCoeff(), body.scale) : "";

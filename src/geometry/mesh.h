@@ -58,10 +58,17 @@ std::string scale_hint(double size, double scale);
 void check_size(const std::string& what, const std::vector<Vec3>& vertices, const Body& body,
                 std::vector<std::string>& notes);
 
-/// The solid of a mesh body in world axes: resolved, read, scaled, checked, repaired, posed; of
-/// tetrahedra what their surface encloses. Throws std::invalid_argument, what check_size() throws
-/// as well. `look`, if given, sees the posed mesh before checks and repairs, which take long: it
-/// may throw.
+/// Whether the body's solid is a mesh: load_solid().
+inline bool is_meshed(const Body& body) { return body.shape == Shape::kMesh || body.wall > 0; }
+
+/// The surface of a body's hollow, facing away from it; in world axes. Throws
+/// std::invalid_argument for a wall that leaves none of a mesh.
+TriangleMesh hollow_of(const Body& body);
+
+/// The solid of a mesh or hollow body in world axes: resolved, read, scaled, checked, repaired,
+/// posed; of tetrahedra what their surface encloses. Throws std::invalid_argument, what
+/// check_size() throws as well. `look`, if given, sees the posed mesh before checks and repairs,
+/// which take long: it may throw.
 TriangleMesh load_solid(const Body& body, std::vector<std::string>* notes,
                         const std::function<void(const TriangleMesh&)>& look = {});
 

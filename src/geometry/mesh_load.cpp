@@ -2,7 +2,10 @@
 #include <cstdio>
 #include <filesystem>
 #include <stdexcept>
+#include <utility>
 
+#include "geometry/nearest_surface.h"
+#include "geometry/surface.h"
 #include "geometry/tet_mesh.h"
 #include "scene/scene_text.h"
 #include "tissue_sim/limits.h"
@@ -67,8 +70,73 @@ void check_size(const std::string& what, const std::vector<Vec3>& vertices, cons
       rough(centring.y()) + ", " + rough(centring.z()) + "] would centre it there");
 }
 
+namespace {
+
+/// The surface of a body with a wall, without its hollow.
+TriangleMesh outside_of(Body body, std::vector<std::string>* notes,
+                        const std::function<void(const TriangleMesh&)>& look) {
+  const double wall = std::exchange(body.wall, 0.0);
+  if (body.shape == Shape::kMesh) return load_solid(body, notes, look);
+  TriangleMesh mesh = triangulate(body, wall / 2);
+  if (look) look(mesh);
+  return mesh;
+}
+
+TriangleMesh load_shell(const Body& body, std::vector<std::string>* notes,
+                        const std::function<void(const TriangleMesh&)>& look) {
+  TriangleMesh mesh = outside_of(body, notes, look);
+  const TriangleMesh hollow = hollow_of(body);
+  const auto first = static_cast<int>(mesh.vertices.size());
+  mesh.vertices.insert(mesh.vertices.end(), hollow.vertices.begin(), hollow.vertices.end());
+  for (const auto& t : hollow.triangles) {
+    mesh.triangles.push_back({first + t[0], first + t[2], first + t[1]});
+  }
+  return mesh;
+}
+
+}  // namespace
+
+TriangleMesh hollow_of(const Body& body) {
+  Body inner = body;
+  const double wall = body.wall;
+  if (body.shape != Shape::kMesh) {
+    inner.size -= Vec3::Constant(2 * wall);
+    inner.radius -= wall;
+    inner.radii -= Vec3::Constant(wall);
+    inner.height -= 2 * wall;
+    return triangulate(inner, wall / 2);
+  }
+  if (is_tet_file(body.mesh)) {
+    throw std::invalid_argument(
+        "body '" + body.name + "': mesh " + body.mesh +
+        " has tetrahedra, which fill it: give its surface to make it hollow");
+  }
+  TriangleMesh mesh = outside_of(body, nullptr, {});
+  std::vector<Vec3> normal(mesh.vertices.size(), Vec3::Zero());
+  for (const auto& t : mesh.triangles) {
+    const Vec3 area = (mesh.vertices[t[1]] - mesh.vertices[t[0]])
+                          .cross(mesh.vertices[t[2]] - mesh.vertices[t[0]]);
+    for (const int v : t) normal[v] += area;
+  }
+  inner.wall = 0;
+  const NearestSurface outside(inner, 1.1 * wall);
+  for (std::size_t i = 0; i < mesh.vertices.size(); ++i) {
+    mesh.vertices[i] -= wall * normal[i].normalized();
+    SurfacePoint nearest;
+    if (outside.find(mesh.vertices[i], normal[i], nearest) &&
+        (nearest.place - mesh.vertices[i]).norm() >= 0.8 * wall) {
+      continue;
+    }
+    throw std::invalid_argument("body '" + body.name + "': a wall of " + text(wall) +
+                                " m does not fit everywhere into mesh " + body.mesh +
+                                ": make it thinner, or give a mesh with its hollow");
+  }
+  return mesh;
+}
+
 TriangleMesh load_solid(const Body& body, std::vector<std::string>* notes,
                         const std::function<void(const TriangleMesh&)>& look) {
+  if (body.wall > 0) return load_shell(body, notes, look);
   const std::string prefix = "body '" + body.name + "': ";
   std::string what = "mesh " + body.mesh;
   try {

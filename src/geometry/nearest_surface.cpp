@@ -164,7 +164,7 @@ class NearestSurface::Triangles {
 
 NearestSurface::NearestSurface(const Body& body, double reach)
     : body_(body), to_local_(body.pose.orientation.normalized().toRotationMatrix().transpose()) {
-  if (body.shape != Shape::kMesh) return;
+  if (!is_meshed(body)) return;
   triangles_ = std::make_unique<Triangles>(load_solid(body, nullptr), reach);
 }
 

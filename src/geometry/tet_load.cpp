@@ -101,11 +101,11 @@ TetMesh load_tet_file(const std::string& path, std::vector<std::string>* notes) 
 TetMesh load_tets(const Body& body, double edge, std::vector<std::string>* notes) {
   TetMesh mesh;
   const bool is_file = body.shape == Shape::kMesh && is_tet_file(body.mesh);
-  if (body.shape == Shape::kBox) {
+  if (body.shape == Shape::kBox && !is_meshed(body)) {
     mesh = tetrahedralize_box(body.size, edge);
   } else if (!is_file) {
     const TriangleMesh surface =
-        body.shape == Shape::kMesh ? load_solid(body, notes) : triangulate(body, 0.5 * edge);
+        is_meshed(body) ? load_solid(body, notes) : triangulate(body, 0.5 * edge);
     try {
       TetMesh all;
       for (const TriangleMesh& solid : separate_solids(surface)) {

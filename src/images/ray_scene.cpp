@@ -21,7 +21,6 @@ struct RayScene::State {
   RTCDevice device = nullptr;
   RTCScene scene = nullptr;
   std::size_t triangles = 0;
-  tbb::task_arena one_thread{1};  ///< what builds trees, so that they are the same each time
 
   ~State() {
     if (scene != nullptr) rtcReleaseScene(scene);
@@ -43,7 +42,7 @@ RayScene::RayScene() : state_(std::make_unique<State>()) {
 
 RayScene::~RayScene() = default;
 
-void RayScene::set(const std::vector<float>& corners) {
+void RayScene::set(const std::vector<float>& corners, Cpu& cpu) {
   State& s = *state_;
   if (s.scene != nullptr) rtcReleaseScene(s.scene);
   s.scene = rtcNewScene(s.device);
@@ -65,7 +64,8 @@ void RayScene::set(const std::vector<float>& corners) {
     rtcAttachGeometry(s.scene, mesh);
     rtcReleaseGeometry(mesh);
   }
-  s.one_thread.execute([&s] { rtcCommitScene(s.scene); });
+  // Trees of this quality, by the order of triangles along a curve, are the same with any threads.
+  tbb::task_arena(cpu.threads()).execute([&s] { rtcCommitScene(s.scene); });
 }
 
 void RayScene::meet(const Vec3& from, const Vec3* along, double near, double far, Met* met) const {
@@ -117,7 +117,7 @@ RayScene::RayScene() {
       "again, or leave `cameras` out");
 }
 RayScene::~RayScene() = default;
-void RayScene::set(const std::vector<float>&) {}
+void RayScene::set(const std::vector<float>&, Cpu&) {}
 void RayScene::meet(const Vec3&, const Vec3*, double, double, Met*) const {}
 
 #endif

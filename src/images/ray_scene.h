@@ -5,6 +5,7 @@
 #include <memory>
 #include <vector>
 
+#include "compute/for_each.h"
 #include "tissue_sim/types.h"
 
 namespace tissue_sim {
@@ -26,7 +27,7 @@ class RayScene {
   RayScene();
   ~RayScene();
   /// Nine coordinates a triangle [m]; copied.
-  void set(const std::vector<float>& corners);
+  void set(const std::vector<float>& corners, Cpu& cpu);
   /// kPacket rays from `from`, each along its direction, from t = near to far. Thread-safe.
   void meet(const Vec3& from, const Vec3* along, double near, double far, Met* met) const;
 

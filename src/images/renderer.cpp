@@ -45,15 +45,19 @@ bool can_render() { return RayScene::is_built(); }
 
 void read_view(Simulation& simulation, SceneView& view) {
   simulation.tissue().read_surface(view.surface);
-  const Span<const Fragment> fragments = simulation.tissue().fragments();
-  view.fragments.assign(fragments.begin(), fragments.end());
   view.tools = simulation.tools();
-  view.stress.clear();
-  const std::vector<Camera>& cameras = simulation.scene().cameras;
-  if (std::none_of(cameras.begin(), cameras.end(),
-                   [](const Camera& c) { return c.colours == CameraColours::kStress; })) {
-    return;
+  const auto any_shows = [&simulation](CameraColours colours) {
+    const std::vector<Camera>& cameras = simulation.scene().cameras;
+    return std::any_of(cameras.begin(), cameras.end(),
+                       [colours](const Camera& c) { return c.colours == colours; });
+  };
+  view.fragments.clear();
+  if (any_shows(CameraColours::kFragments)) {
+    const Span<const Fragment> fragments = simulation.tissue().fragments();
+    view.fragments.assign(fragments.begin(), fragments.end());
   }
+  view.stress.clear();
+  if (!any_shows(CameraColours::kStress)) return;
   std::vector<std::uint8_t> cloud;
   const int count = simulation.tissue().read_points(PointSelection(), cloud);
   std::vector<float> of_point(simulation.tissue().point_count());
@@ -77,7 +81,7 @@ struct Renderer::State {
 
   State(const Scene& s, int threads) : scene(s), cpu(threads) {
     for (const Tool& tool : scene.tools) {
-      meshes.push_back(tool.mesh.empty() ? nullptr : std::make_unique<ToolMesh>(tool));
+      meshes.push_back(tool.mesh.empty() ? nullptr : std::make_unique<ToolMesh>(tool, cpu));
     }
   }
 
@@ -118,24 +122,26 @@ void Renderer::State::add(const Eye& eye, double full, const Vec3& along, const 
   p.distance[i] = static_cast<float>(hit.t / full);
 }
 
-Renderer::Renderer(const Scene& scene, int threads)
-    : state_(std::make_unique<State>(
-          scene, threads > 0
-                     ? threads
-                     : std::max(1, static_cast<int>(std::thread::hardware_concurrency()) / 2))) {}
+Renderer::Renderer(const Scene& scene, int threads) {
+  const auto all = static_cast<int>(std::thread::hardware_concurrency());
+  state_ = std::make_unique<State>(scene, threads > 0 ? threads : std::max(1, all - 1));
+}
 
 Renderer::~Renderer() = default;
 
 void Renderer::show(const SceneView& view) {
   State& s = *state_;
   if (s.shown.use_count() > 1) s.shown = std::make_shared<Shown>();  // somebody keeps it
-  s.shown->set(view, s.scene, s.meshes, s.smooth);
-  const std::vector<std::int32_t>& fragment = s.shown->surface.fragment;
+  s.shown->set(view, s.scene, s.meshes, s.smooth, s.cpu);
   s.stress.clear();
   if (!view.stress.empty()) s.stress = s.smooth.means(view.stress);
   s.piece_colours.clear();
   for (const Fragment& f : view.fragments) s.piece_colours[f.id] = linear(piece_colour(f));
-  for (const std::int32_t id : fragment) s.piece_colours.emplace(id, linear(kTissueColour));
+  std::int32_t last = -1;
+  for (const std::int32_t id : s.shown->surface.fragment) {
+    if (id != last) s.piece_colours.emplace(id, linear(kTissueColour));
+    last = id;
+  }
 }
 
 void Renderer::render(const Camera& camera, const Pose& pose, CameraImages& images,

@@ -35,7 +35,7 @@ Vec3 in_axes_of(const Pose& pose, const Vec3& place) {
   return pose.orientation.conjugate() * (place - pose.position);
 }
 
-ToolMesh::ToolMesh(const Tool& tool) {
+ToolMesh::ToolMesh(const Tool& tool, Cpu& cpu) {
   TriangleMesh mesh;
   try {
     mesh = read_mesh(resolve_path(tool.mesh, "mesh"));
@@ -60,15 +60,16 @@ ToolMesh::ToolMesh(const Tool& tool) {
   triangles.rest = triangles.corners;
   triangles.fragment.resize(mesh.triangles.size());
   triangles.cut.resize(mesh.triangles.size());
-  normals = &smooth.of(triangles);
-  rays.set(triangles.corners);
+  normals = &smooth.of(triangles, cpu);
+  rays.set(triangles.corners, cpu);
 }
 
 void Shown::set(const SceneView& view, const Scene& scene,
-                const std::vector<std::unique_ptr<ToolMesh>>& meshes, SmoothNormals& smooth) {
+                const std::vector<std::unique_ptr<ToolMesh>>& meshes, SmoothNormals& smooth,
+                Cpu& cpu) {
   surface = view.surface;
-  normals = smooth.of(surface);
-  rays.set(surface.corners);
+  normals = smooth.of(surface, cpu);
+  rays.set(surface.corners, cpu);
   box = {};
   for (std::size_t i = 0; i < surface.corners.size(); i += 3) {
     const Vec3 x(surface.corners[i], surface.corners[i + 1], surface.corners[i + 2]);

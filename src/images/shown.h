@@ -58,7 +58,7 @@ struct ToolMesh {
   Vec3 centre;  ///< of the box about it, in the tool's frame [m]
   Vec3 size;    ///< of that [m]
 
-  explicit ToolMesh(const Tool& tool);
+  ToolMesh(const Tool& tool, Cpu& cpu);
 };
 
 struct Shown {
@@ -75,7 +75,7 @@ struct Shown {
 
   /// `meshes` of the scene's tools, null for none.
   void set(const SceneView& view, const Scene& scene,
-           const std::vector<std::unique_ptr<ToolMesh>>& meshes, SmoothNormals& smooth);
+           const std::vector<std::unique_ptr<ToolMesh>>& meshes, SmoothNormals& smooth, Cpu& cpu);
   Eye look(const Camera& camera, const Pose& pose) const;
   /// What a packet of rays meets, one for each direction; all are within the window.
   void meet(const Eye& eye, const Ground& ground, const Window& window, const Vec3* along,

@@ -40,11 +40,12 @@ void SmoothNormals::group(const SurfaceTriangles& surface) {
   begin_.push_back(static_cast<std::int32_t>(corners_.size()));
 }
 
-const std::vector<float>& SmoothNormals::of(const SurfaceTriangles& surface) {
+const std::vector<float>& SmoothNormals::of(const SurfaceTriangles& surface, Cpu& cpu) {
   if (surface.fragment != fragment_ || surface.cut != cut_ || surface.rest != rest_) group(surface);
+  constexpr int kGrain = 1024;
   const std::size_t triangles = fragment_.size();
   faces_.resize(3 * triangles);  // twice the area long
-  for (std::size_t t = 0; t < triangles; ++t) {
+  const auto face = [&](int t) {
     const float* x = &surface.corners[9 * t];
     float a[3], b[3];
     for (int i = 0; i < 3; ++i) a[i] = x[3 + i] - x[i], b[i] = x[6 + i] - x[i];
@@ -52,25 +53,27 @@ const std::vector<float>& SmoothNormals::of(const SurfaceTriangles& surface) {
       const int j = (i + 1) % 3, k = (i + 2) % 3;
       faces_[3 * t + i] = a[j] * b[k] - a[k] * b[j];
     }
-  }
+  };
+  cpu.for_each(static_cast<int>(triangles), face, kGrain);
   normals_.resize(9 * triangles);
-  for (std::size_t g = 0; g + 1 < begin_.size(); ++g) {
+  const auto group = [&](int g) {
     for (std::int32_t i = begin_[g]; i < begin_[g + 1]; ++i) {
       const float* own = &faces_[3 * (corners_[i] / 3)];
       const float length = std::sqrt(inner_product(own, own));
       float sum[3] = {};
       for (std::int32_t k = begin_[g]; k < begin_[g + 1]; ++k) {
-        const float* face = &faces_[3 * (corners_[k] / 3)];
-        if (inner_product(own, face) < kSmooth * length * std::sqrt(inner_product(face, face)))
+        const float* other = &faces_[3 * (corners_[k] / 3)];
+        if (inner_product(own, other) < kSmooth * length * std::sqrt(inner_product(other, other)))
           continue;
-        for (int a = 0; a < 3; ++a) sum[a] += face[a];
+        for (int a = 0; a < 3; ++a) sum[a] += other[a];
       }
       const float all = std::sqrt(inner_product(sum, sum));
       for (int a = 0; a < 3; ++a) {
         normals_[3 * corners_[i] + a] = all > 0 ? sum[a] / all : a == 2 ? 1.0f : 0.0f;
       }
     }
-  }
+  };
+  cpu.for_each(static_cast<int>(begin_.size()) - 1, group, kGrain);
   return normals_;
 }
 

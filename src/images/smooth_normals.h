@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "compute/for_each.h"
 #include "tissue_sim/tissue.h"
 
 namespace tissue_sim {
@@ -13,7 +14,7 @@ class SmoothNormals {
  public:
   /// Three numbers a corner, of length 1, in world axes; valid until the next call. Which corners
   /// meet is found anew only where the surface is of other triangles than the last one.
-  const std::vector<float>& of(const SurfaceTriangles& surface);
+  const std::vector<float>& of(const SurfaceTriangles& surface, Cpu& cpu);
   /// Of each corner the mean of what the triangles that meet there have, of the last surface.
   std::vector<float> means(const std::vector<float>& of_triangle) const;
 

@@ -29,7 +29,7 @@ std::vector<Option> list_mls(OptionSets& options) {
              mls.contact, kMlsContacts)};
 }
 
-Spacing mls_spacing(const Scene& scene) {
+Spacing spacing_of_mls(const Scene& scene) {
   const double spacing = scene.mls.spacing > 0 ? scene.mls.spacing : 0.5 * scene.cell_size;
   return {2 * spacing, "mls.spacing", spacing};
 }
@@ -38,6 +38,6 @@ bool moves_mesh(const Body& body) { return is_tet_file(body.mesh); }
 
 }  // namespace
 
-const MethodOptions kMlsOptions = {Method::kMls, list_mls, mls_spacing, false, moves_mesh};
+const MethodOptions kMlsOptions = {Method::kMls, list_mls, spacing_of_mls, false, moves_mesh};
 
 }  // namespace tissue_sim

@@ -36,7 +36,7 @@ std::vector<PlacedNode> cubes_of(const Body& body, double edge, std::vector<std:
   const Lattice lattice = make_lattice(body, 2 * edge, notes);
   gaps = NearGaps(lattice);
   double scale = 1;
-  if (body.shape != Shape::kMesh) {
+  if (!is_meshed(body)) {
     double sum = 0;
     for (const Lattice::Site& s : lattice.sites) sum += s.volume;
     scale = exact_volume(body) / sum;

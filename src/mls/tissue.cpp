@@ -10,6 +10,8 @@
 #include "fragments/piece_sums.h"
 #include "frame/checksum.h"
 #include "frame/out_of_control.h"
+#include "frame/point_fields.h"
+#include "frame/put_faces.h"
 #include "frame/select_points.h"
 #include "mls/crossing.h"
 #include "mls/cut.h"
@@ -266,6 +268,7 @@ FrameResult MlsTissue::finish() {
 }
 
 int MlsTissue::read_points(const PointSelection& selection, std::vector<std::uint8_t>& cloud) {
+  check_fields(selection, point_fields());
   const MlsState& s = *state_;
   const std::vector<const Fragment*> piece = pieces_by_id(pieces_);
   int count = 0;
@@ -302,12 +305,37 @@ int MlsTissue::read_points(const PointSelection& selection, std::vector<std::uin
         }
       },
       4);
+  add_fields(selection, place, count, *state_->cpu, cloud, [&s](int i) {
+    const Vec3 rest = s.nodes.place[i], moved = s.position(i) - rest, v = s.velocity(i);
+    PointFields of;
+    for (int a = 0; a < 3; ++a) {
+      of.rest[a] = static_cast<float>(rest[a]);
+      of.u[a] = static_cast<float>(moved[a]);
+      of.v[a] = static_cast<float>(v[a]);
+    }
+    of.volume = static_cast<float>(s.nodes.volume[i]);
+    return of;
+  });
   return count;
 }
 
 void MlsTissue::read_surface(SurfaceTriangles& surface) {
   pull();
   tissue_sim::read_surface(*state_, pieces_.of_point, surface_, surface);
+}
+
+void MlsTissue::push_surface(Span<const float> impulses) {
+  MlsState& s = *state_;
+  for_pushed_vertices(surface_.faces, surface_.vertices.size(), impulses,
+                      [&](int i, const float* impulse) {
+                        const MlsSurface::Vertex& v = surface_.vertices[i];
+                        for (int k = 0; k < 8; ++k) {
+                          const std::int32_t n = v.node[k];
+                          for (int a = 0; a < 3 && v.weight[k] > 0; ++a) {
+                            s.v[4 * n + a] += v.weight[k] * s.inv_mass[n] * impulse[a];
+                          }
+                        }
+                      });
 }
 
 Span<const Fragment> MlsTissue::fragments() {

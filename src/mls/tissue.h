@@ -26,6 +26,7 @@ class MlsTissue : public SteppedTissue<MlsTissue> {
   int point_count() const override { return state_->count(); }
   int read_points(const PointSelection& selection, std::vector<std::uint8_t>& cloud) override;
   void read_surface(SurfaceTriangles& surface) override;
+  void push_surface(Span<const float> impulses) override;
   int fragment_count() const override { return static_cast<int>(pieces_.all.size()); }
   Span<const Fragment> fragments() override;
   std::uint64_t checksum() override;
@@ -33,7 +34,7 @@ class MlsTissue : public SteppedTissue<MlsTissue> {
   std::vector<std::uint8_t> save() override;
   void restore(Span<const std::uint8_t> saved) override;
   bool moves_anchors() const override { return true; }
-  unsigned point_fields() const override { return 0; }
+  unsigned point_fields() const override { return ~unsigned{kStressTensor}; }
   const std::vector<std::string>& notes() const override { return notes_; }
   std::string device_name() const override;
 

@@ -87,6 +87,11 @@ void MpmTissue::read_surface(SurfaceTriangles& surface) {
   tissue_sim::read_surface(run_->state, run_->pieces, surface);
 }
 
+void MpmTissue::push_surface(Span<const float> impulses) {
+  tissue_sim::push_surface(run_->state, impulses);
+  has_energies_ = false;
+}
+
 Span<const Fragment> MpmTissue::fragments() {
   if (!pieces_measured_) {
     device_->bring_all_nodes();

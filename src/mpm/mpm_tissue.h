@@ -28,6 +28,7 @@ class MpmTissue : public SteppedTissue<MpmTissue> {
     return device_->read_points_on_gpu(selection);
   }
   void read_surface(SurfaceTriangles& surface) override;
+  void push_surface(Span<const float> impulses) override;
   bool moves_anchors() const override { return true; }
   int fragment_count() const override { return static_cast<int>(run_->pieces.all.size()); }
   Span<const Fragment> fragments() override;

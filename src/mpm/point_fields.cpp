@@ -5,6 +5,7 @@
 #include <cstring>
 
 #include "fragments/piece_sums.h"
+#include "frame/point_fields.h"
 #include "frame/put_faces.h"
 #include "material/laws.h"
 #include "math/bspline.h"
@@ -100,51 +101,47 @@ void read_surface(MpmState& s, const Pieces& pieces, SurfaceTriangles& surface) 
   put_faces(mesh.faces, place, rest, pieces.of_point, *s.cpu, surface);
 }
 
+void push_surface(MpmState& s, Span<const float> impulses) {
+  const BoundaryMesh& mesh = s.boundary;
+  for_pushed_vertices(mesh.faces, mesh.vertices.size(), impulses, [&](int i, const float* impulse) {
+    const BoundaryMesh::Vertex& v = mesh.vertices[i];
+    if (!(s.points.free_volume_of(v.point) > 0)) return;
+    const AxisWeights weights(v.place);
+    for (int k = 0; k < 27; ++k) {
+      const float w = weights.of[k % 3] * weights.of[3 + k / 3 % 3] * weights.of[6 + k / 9];
+      const std::int32_t node = v.node[k];
+      for (int a = 0; a < 3; ++a) s.nodes.v[a][node] += w * s.nodes.inv_mass[node] * impulse[a];
+    }
+  });
+}
+
 void add_point_fields(MpmState& state, const PointSelection& selection,
                       const std::vector<std::int32_t>& place, int count,
                       std::vector<std::uint8_t>& cloud) {
-  const std::size_t size = selection.point_size();
-  cloud.resize(size * count);
-  for (int i = count; i-- > 0;) {  // from the end: what is to move is not overwritten
-    std::memmove(cloud.data() + size * i, cloud.data() + sizeof(Point) * i, sizeof(Point));
-  }
-  const unsigned fields = selection.fields;
-  state.cpu->for_each(
-      static_cast<int>(place.size()),
-      [&](int p) {
-        if (place[p] < 0) return;
-        const Points::Site& site = state.points.site[p];
-        const LatticeBody& body = state.bodies[site.body];
-        PointMotion motion(body, site, *state.fields, state.nodes);
-        Vec3 held;
-        if (held_place(state, p, held)) {
-          const Vec3 moved = held - body.site_position(site.x, site.y, site.z);
-          for (int a = 0; a < 3; ++a) motion.u[a] = static_cast<float>(moved[a]);
-          if (!state.anchors.moves) std::fill_n(motion.v, 3, 0.0f);
-        }
-        float values[16];
-        int n = 0;
-        if ((fields & kRestPosition) != 0) {
-          const Vec3 x = body.site_position(site.x, site.y, site.z);
-          for (int a = 0; a < 3; ++a) values[n++] = static_cast<float>(x[a]);
-        }
-        if ((fields & kDisplacement) != 0) {
-          for (const float x : motion.u) values[n++] = x;
-        }
-        if ((fields & kVelocity) != 0) {
-          for (const float x : motion.v) values[n++] = x;
-        }
-        if ((fields & kVolume) != 0) values[n++] = state.points.volume[p];
-        if ((fields & kStressTensor) != 0) {
-          std::fill_n(values + n, 6, 0.0f);  // what an anchor holds has none
-          if (state.points.free_volume_of(p) > 0) {
-            cauchy_stress(body.material_of(state.points, p), motion.F, values + n);
-          }
-          n += 6;
-        }
-        std::memcpy(cloud.data() + size * place[p] + sizeof(Point), values, n * sizeof(float));
-      },
-      256);
+  add_fields(selection, place, count, *state.cpu, cloud, [&](int p) {
+    const Points::Site& site = state.points.site[p];
+    const LatticeBody& body = state.bodies[site.body];
+    const Vec3 rest = body.site_position(site.x, site.y, site.z);
+    PointMotion motion(body, site, *state.fields, state.nodes);
+    Vec3 held;
+    if (held_place(state, p, held)) {
+      const Vec3 moved = held - rest;
+      for (int a = 0; a < 3; ++a) motion.u[a] = static_cast<float>(moved[a]);
+      if (!state.anchors.moves) std::fill_n(motion.v, 3, 0.0f);
+    }
+    PointFields of;
+    for (int a = 0; a < 3; ++a) {
+      of.rest[a] = static_cast<float>(rest[a]);
+      of.u[a] = motion.u[a];
+      of.v[a] = motion.v[a];
+    }
+    of.volume = state.points.volume[p];
+    // What an anchor holds has no stress.
+    if ((selection.fields & kStressTensor) != 0 && state.points.free_volume_of(p) > 0) {
+      cauchy_stress(body.material_of(state.points, p), motion.F, of.stress);
+    }
+    return of;
+  });
 }
 
 void measure_pieces(MpmState& state, Pieces& pieces) {

@@ -22,6 +22,8 @@ void add_point_fields(MpmState& state, const PointSelection& selection,
 
 /// Replaces `surface` with the tissue's (mpm/surface/boundary_mesh.h), from the nodes on the host.
 void read_surface(MpmState& state, const Pieces& pieces, SurfaceTriangles& surface);
+/// Impulses on the corners of what it read last [N s] become velocity of the nodes.
+void push_surface(MpmState& state, Span<const float> impulses);
 
 /// Fills centroid (of the mass), velocity and box of all pieces.
 void measure_pieces(MpmState& state, Pieces& pieces);

@@ -12,10 +12,6 @@ namespace tissue_sim {
 namespace pbd {
 
 template <class V>
-struct Vector {
-  V x, y, z;
-};
-template <class V>
 TISSUE_SIM_INLINE Vector<V> operator+(const Vector<V>& a, const Vector<V>& b) {
   return {a.x + b.x, a.y + b.y, a.z + b.z};
 }
@@ -38,14 +34,15 @@ TISSUE_SIM_INLINE Vector<V> cross(const Vector<V>& a, const Vector<V>& b) {
 /// From b to a.
 template <class V>
 TISSUE_SIM_INLINE Vector<V> between(const Vertex<V>& a, const Vertex<V>& b) {
-  return {a.x - b.x, a.y - b.y, a.z - b.z};
+  return {(a.x - b.x) + (a.moved.x - b.moved.x), (a.y - b.y) + (a.moved.y - b.moved.y),
+          (a.z - b.z) + (a.moved.z - b.moved.z)};
 }
 template <class V>
 TISSUE_SIM_INLINE void move(Vertex<V>& a, V scale, const Vector<V>& along) {
   const V s = a.w * scale;
-  a.x += s * along.x;
-  a.y += s * along.y;
-  a.z += s * along.z;
+  a.moved.x += s * along.x;
+  a.moved.y += s * along.y;
+  a.moved.z += s * along.z;
 }
 
 /// Keeps what has no mass to move, or no length, finite.
@@ -80,14 +77,13 @@ struct Distance {
   }
 };
 
-/// Two neighbours lose a share of what they move by against one another: a dashpot, which is not of
-/// places.
+/// Two neighbours lose a share of what they move by against one another: a dashpot.
 struct Damper {
   static constexpr int kVertices = 2, kNumbers = 1, kMultipliers = 0;
-  /// v: velocities [m/s], and inverse masses; number: the share.
+  /// v: inverse masses, and velocities [m/s] for what they have moved; number: the share.
   template <class V>
   static TISSUE_SIM_INLINE void project(Vertex<V> (&v)[2], const V (&number)[1], V, V (&)[1]) {
-    const Vector<V> d = between(v[1], v[0]);
+    const Vector<V> d = v[1].moved - v[0].moved;
     const V scale = quotient(number[0], v[0].w + v[1].w + 1e-20f);
     move(v[0], scale, d);
     move(v[1], -scale, d);

@@ -16,14 +16,16 @@ struct Contacts {
   const Box* boxes;
   int count;
   float h;
-  float* x;
+  const float* x;
+  float* moved;
   const float *predicted, *v;
   const std::vector<double>& mass;
   std::uint8_t* pushed;
 
   void project(int i, ColliderLoad* loads) const {
-    float* at = x + 4 * i;
-    if (at[3] == 0) return;
+    if (x[4 * i + 3] == 0) return;
+    RoundedPlace place = place_of(x + 4 * i, moved + 4 * i);
+    const float* at = place.at;
     for (int c = 0; c < count; ++c) {
       const Collider& collider = colliders[c];
       if (collider.kind == Collider::kPlane) {
@@ -35,16 +37,18 @@ struct Contacts {
           continue;
         }
       }
-      const Gap g = gap(collider, at);
+      const Gap g = gap_of(collider, place);
       if (!(g.distance < 0)) continue;
-      push(i, collider, g, loads[c]);
+      push(i, collider, g, at, loads[c]);
       pushed[i] = 1;
+      place = place_of(x + 4 * i, moved + 4 * i);
     }
   }
 
-  void push(int i, const Collider& collider, const Gap& g, ColliderLoad& load) const {
-    const ContactPush push =
-        push_out(collider, g, h, mass[i], predicted + 4 * i, v + 4 * i, x + 4 * i);
+  void push(int i, const Collider& collider, const Gap& g, const float* at,
+            ColliderLoad& load) const {
+    const ContactPush push = push_out(collider, g, h, mass[i], predicted + 4 * i, v + 4 * i, at,
+                                      x[4 * i + 3], moved + 4 * i);
     for (int a = 0; a < 3; ++a) {
       load.force[a] += push.force[a];
       load.torque[a] += push.torque[a];
@@ -66,6 +70,7 @@ void project_contacts(State& s, float h, std::vector<ColliderLoad>& loads) {
                           count,
                           h,
                           s.vertices.x.data(),
+                          s.vertices.moved.data(),
                           s.vertices.predicted.data(),
                           s.vertices.v.data(),
                           s.vertices.mass,

@@ -10,22 +10,21 @@
 namespace tissue_sim {
 namespace pbd {
 
-/// Where a vertex stood before, by an array without padding: those made since stood where they are.
-inline Vec3 place_before(const State& s, const Array<float>& before, std::int32_t v) {
-  if (4 * static_cast<std::size_t>(v) >= before.size()) return s.vertices.position(v);
-  return Vec3(before[4 * v], before[4 * v + 1], before[4 * v + 2]);
+/// Where a vertex stood before: those made since stood where they are.
+inline Vec3 place_before(const State& s, const std::vector<Vec3>& before, std::int32_t v) {
+  return static_cast<std::size_t>(v) < before.size() ? before[v] : s.vertices.position(v);
 }
 
 /// Cuts along a blade's path, while vertices move from `before` to where they are. `stroke` is the
 /// same for all that one blade does. Appends to `origin` the vertex that each new one came from.
 /// Returns whether anything changed; masses (after_cut), constraints and colours (after_cuts) are
 /// to be made anew then. `whole`: of each vertex, whether its piece is not cut; none: all are.
-bool cut_surface(State& s, const BladePath& path, const Array<float>& before, int stroke,
+bool cut_surface(State& s, const BladePath& path, const std::vector<Vec3>& before, int stroke,
                  std::vector<std::int32_t>& origin, CutReport& report,
                  const std::vector<std::uint8_t>* whole = nullptr);
 /// `smooth`: vertices move onto the blade's surface first; not for a path that goes on, for in
 /// tissue that is strained what moves there may step across the edge.
-bool cut_tetrahedra(State& s, const BladePath& path, const Array<float>& before, bool smooth,
+bool cut_tetrahedra(State& s, const BladePath& path, const std::vector<Vec3>& before, bool smooth,
                     std::vector<std::int32_t>& origin, CutReport& report);
 
 /// Momentum of a body's free vertices.

@@ -190,7 +190,7 @@ std::vector<std::int32_t> close_wounds(State& s, std::vector<std::int32_t>& orig
           moved += w * (v.x[4 * loop[k] + a] - corners[k][a]);
           speed += w * v.v[4 * loop[k] + a];
         }
-        v.x[4 * n + a] = v.predicted[4 * n + a] = static_cast<float>(cap.inner[i][a] + moved);
+        v.x[4 * n + a] = static_cast<float>(cap.inner[i][a] + moved);
         v.v[4 * n + a] = static_cast<float>(speed);
       }
       v.surface[n] = 1;

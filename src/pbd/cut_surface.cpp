@@ -14,7 +14,7 @@ namespace {
 
 class SurfaceCut {
  public:
-  SurfaceCut(State& s, const Array<float>& before, const std::vector<SweepPart>& parts,
+  SurfaceCut(State& s, const std::vector<Vec3>& before, const std::vector<SweepPart>& parts,
              std::vector<std::int32_t>& origin)
       : s_(s), before_(before), parts_(parts), origin_(origin) {}
 
@@ -138,7 +138,7 @@ class SurfaceCut {
   }
 
   State& s_;
-  const Array<float>& before_;
+  const std::vector<Vec3>& before_;
   const std::vector<SweepPart>& parts_;
   std::vector<std::int32_t>& origin_;
   std::set<std::int32_t> touched_, parted_;
@@ -149,7 +149,7 @@ class SurfaceCut {
 int copy_vertex(State& s, int of, std::vector<std::int32_t>& origin) {
   Vertices& v = s.vertices;
   const int n = add_vertex(s, v.reference[of], v.body[of]);
-  for (Array<float>* x : {&v.x, &v.predicted, &v.v}) {
+  for (Array<float>* x : {&v.x, &v.moved, &v.v}) {
     for (int a = 0; a < 4; ++a) (*x)[4 * n + a] = (*x)[4 * of + a];
   }
   v.anchored[n] = v.anchored[of];
@@ -165,7 +165,7 @@ int copy_vertex(State& s, int of, std::vector<std::int32_t>& origin) {
   return n;
 }
 
-bool cut_surface(State& s, const BladePath& path, const Array<float>& before, int stroke,
+bool cut_surface(State& s, const BladePath& path, const std::vector<Vec3>& before, int stroke,
                  std::vector<std::int32_t>& origin, CutReport& report,
                  const std::vector<std::uint8_t>* whole) {
   const std::vector<SweepPart> parts = sweep_parts(path);

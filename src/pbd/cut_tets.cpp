@@ -37,7 +37,7 @@ void find_faces(State& s) {
   }
 }
 
-Vec3 centre(const State& s, const Array<float>& x, std::int32_t t) {
+Vec3 centre(const State& s, const std::vector<Vec3>& x, std::int32_t t) {
   Vec3 sum = Vec3::Zero();
   for (int i = 0; i < 4; ++i) sum += s.centres[t][i] * place_before(s, x, s.tetrahedra[t][i]);
   return sum;
@@ -308,7 +308,7 @@ class TetCut {
 
 }  // namespace
 
-bool cut_tetrahedra(State& s, const BladePath& path, const Array<float>& before, bool smooth,
+bool cut_tetrahedra(State& s, const BladePath& path, const std::vector<Vec3>& before, bool smooth,
                     std::vector<std::int32_t>& origin, CutReport& report) {
   if (s.faces.empty()) find_faces(s);
   s.centres.resize(s.tetrahedra.size(), {0.25, 0.25, 0.25, 0.25});
@@ -316,7 +316,7 @@ bool cut_tetrahedra(State& s, const BladePath& path, const Array<float>& before,
   std::vector<Vec3> from(count), to(count);
   for (int t = 0; t < count; ++t) {
     from[t] = centre(s, before, t);
-    to[t] = centre(s, s.vertices.x, t);
+    to[t] = centre(s, {}, t);
   }
   std::vector<Broken> broken;
   for (const SweepPart& part : sweep_parts(path)) {

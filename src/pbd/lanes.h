@@ -82,10 +82,17 @@ TISSUE_SIM_INLINE V angle_of(V y, V x) {
   return where_negative(y, -r, r);
 }
 
-/// A vertex in each lane: where it is [m] and its inverse mass [1/kg].
+template <class V>
+struct Vector {
+  V x, y, z;
+};
+
+/// A vertex in each lane: where it was [m], its inverse mass [1/kg], and how far it has moved from
+/// there, which is apart: the sum would round off what a short step moves.
 template <class V>
 struct Vertex {
   V x, y, z, w;
+  Vector<V> moved = {};
 };
 
 #if !defined(__CUDACC__)
@@ -151,20 +158,26 @@ TISSUE_SIM_INLINE void store_row(float* x, const std::int32_t* index, int i, Vec
   }
 }
 
-/// Vertices index[0 .. W - 1]; x holds four floats each, aligned.
+/// Vertices index[0 .. W - 1]; x and moved hold four floats each, aligned.
 template <int W>
-TISSUE_SIM_INLINE Vertex<Vec<W>> gather(const float* x, const std::int32_t* index) {
-  Vec<W> r[4];
-  for (int i = 0; i < 4; ++i) r[i] = load_row<W>(x, index, i);
+TISSUE_SIM_INLINE Vertex<Vec<W>> gather(const float* x, const float* moved,
+                                        const std::int32_t* index) {
+  Vec<W> r[4], m[4];
+  for (int i = 0; i < 4; ++i) {
+    r[i] = load_row<W>(x, index, i);
+    m[i] = load_row<W>(moved, index, i);
+  }
   transpose<W>(r);
-  return {r[0], r[1], r[2], r[3]};
+  transpose<W>(m);
+  return {r[0], r[1], r[2], r[3], {m[0], m[1], m[2]}};
 }
 
+/// How far they have moved.
 template <int W>
-TISSUE_SIM_INLINE void scatter(float* x, const std::int32_t* index, const Vertex<Vec<W>>& v) {
-  Vec<W> r[4] = {v.x, v.y, v.z, v.w};
+TISSUE_SIM_INLINE void scatter(float* moved, const std::int32_t* index, const Vertex<Vec<W>>& v) {
+  Vec<W> r[4] = {v.moved.x, v.moved.y, v.moved.z, Vec<W>{}};
   transpose<W>(r);
-  for (int i = 0; i < 4; ++i) store_row<W>(x, index, i, r[i]);
+  for (int i = 0; i < 4; ++i) store_row<W>(moved, index, i, r[i]);
 }
 #endif
 

@@ -132,6 +132,7 @@ std::unique_ptr<State> make_state(const Scene& scene, std::vector<std::string>* 
     }
   }
   share_out_mass(*s);
+  choose_steps(*s, notes);
   make_surface_constraints(*s);
   make_tet_constraints(*s);
   pack(*s);

@@ -24,6 +24,10 @@ std::vector<int> morton_order(const std::vector<Vec3>& places);
 void make_surface_constraints(State& s);
 /// One constraint for each tetrahedron, likewise (tet_model.cpp).
 void make_tet_constraints(State& s);
+/// How many steps a frame of `duration` [s] takes.
+int steps_of(const State& s, double duration);
+/// Chooses the steps, or tells what those that are given leave undone (tet_steps.cpp).
+void choose_steps(State& s, std::vector<std::string>* notes);
 /// Volumes and masses of the surface model's vertices from the triangles (surface_model.cpp) and of
 /// the tetrahedral model's from the tetrahedra. Held to the bodies' whole volumes.
 void share_out_mass(State& s);

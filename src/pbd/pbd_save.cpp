@@ -15,7 +15,7 @@ void fields(Archive& archive, ConstraintSet<Kind>& set) {
 
 template <class Archive>
 void fields(Archive& archive, Vertices& v) {
-  archive(v.x, v.predicted, v.v, v.reference, v.mass, v.volume, v.body, v.anchored, v.surface,
+  archive(v.x, v.moved, v.v, v.reference, v.mass, v.volume, v.body, v.anchored, v.surface,
           v.cut_links, v.whole_links);
 }
 
@@ -64,8 +64,7 @@ void check(const State& s) {
   const auto padded = static_cast<std::size_t>(4) * (count + kPadding);
   check_sizes("vertices", v.reference, v.mass, v.volume, v.body, v.anchored, v.surface, v.cut_links,
               v.whole_links, s.stroke, s.copy_of, s.blade_normal, s.blade_point);
-  check_state(v.x.size() == padded && v.predicted.size() == padded && v.v.size() == padded,
-              "vertices");
+  check_state(v.x.size() == padded && v.moved.size() == padded && v.v.size() == padded, "vertices");
   check_state(s.half_depth.empty() || s.half_depth.size() == v.reference.size(), "depths");
   const auto bodies = static_cast<std::int64_t>(s.scene.bodies.size());
   check_indices(v.body, 0, bodies, "bodies");
@@ -80,7 +79,7 @@ void check(const State& s) {
     check_numbers(s.blade_point[i], 1e9, "cuts");
     for (int a = 0; a < 3; ++a) {
       check_state(
-          std::abs(v.x[4 * i + a]) <= kFarthest && std::abs(v.predicted[4 * i + a]) <= kFarthest,
+          std::abs(v.x[4 * i + a]) <= kFarthest && std::abs(v.moved[4 * i + a]) <= kFarthest,
           "places");
       check_state(std::abs(v.v[4 * i + a]) <= kFastestTissue, "speeds");
     }

@@ -27,9 +27,10 @@ constexpr int kPadding = 4 * kLanes;
 
 /// Four floats a vertex. New vertices come last: an index means the same vertex for ever.
 struct Vertices {
-  Array<float> x;                    ///< where they are [m], and 1 / mass [1/kg], 0 where held
-  Array<float> predicted;            ///< where they would be without constraints [m]
-  Array<float> v;                    ///< [m/s]
+  Array<float> x;          ///< where they are [m], and 1 / mass [1/kg], 0 where held
+  Array<float> moved;      ///< what they moved in a step, and what x has no room for after it [m]
+  Array<float> predicted;  ///< `moved` without constraints [m]
+  Array<float> v;          ///< [m/s]
   std::vector<Vec3> reference;       ///< [m]
   std::vector<double> mass, volume;  ///< [kg], [m^3]
   std::vector<std::int16_t> body;
@@ -38,7 +39,10 @@ struct Vertices {
   std::vector<std::int32_t> cut_links, whole_links;  ///< constraints lost, and had
 
   int size() const { return static_cast<int>(reference.size()); }
-  Vec3 position(int i) const { return Vec3(x[4 * i], x[4 * i + 1], x[4 * i + 2]); }
+  Vec3 position(int i) const {
+    return Vec3(x[4 * i], x[4 * i + 1], x[4 * i + 2]) +
+           Vec3(moved[4 * i], moved[4 * i + 1], moved[4 * i + 2]);
+  }
   Vec3 velocity(int i) const { return Vec3(v[4 * i], v[4 * i + 1], v[4 * i + 2]); }
 };
 
@@ -111,6 +115,9 @@ struct State {
   std::vector<std::array<double, 4>> centres;
   double mean_edge = 0;  ///< of the surface when it was made [m]
 
+  double longest_step =
+      0;  ///< of tetrahedra of a material (tet_steps.cpp) [s]; 0: `steps` are given
+
   std::vector<Collider> colliders;  ///< of this step
 
   /// Vertices of a chunk of each level, by which constraints are packed (ConstraintSet): what the
@@ -147,7 +154,8 @@ int sweeps_of_step(const State& s);
 /// the step, to `loads`, which parallels them. Contacts come once, after the last sweep: friction's
 /// share is of the whole push.
 void step(State& s, float h, std::vector<ColliderLoad>& loads);
-/// Projects each constraint once, one colour after the other, or in the opposite order. `keep`:
+/// Projects each constraint once, one colour after the other, or in the opposite order: changes
+/// Vertices::moved. `keep`:
 /// multipliers grow over the sweeps of a step; else they count as zero.
 void project_constraints(State& s, float h, bool keep, bool backward = false);
 /// Velocities by each of the dampers once.

@@ -23,12 +23,14 @@ PbdTissue::PbdTissue(const Scene& scene, std::vector<std::string> notes)
   next_stroke_ = static_cast<int>(scene.tools.size());
 }
 
-Array<float> PbdTissue::places() const {
-  const Array<float>& x = state_->vertices.x;
-  return {x.begin(), x.begin() + 4 * static_cast<std::ptrdiff_t>(state_->vertices.size())};
+std::vector<Vec3> PbdTissue::places() const {
+  const pbd::Vertices& v = state_->vertices;
+  std::vector<Vec3> x;
+  for (int i = 0; i < v.size(); ++i) x.push_back(v.position(i));
+  return x;
 }
 
-bool PbdTissue::cut(const BladePath& path, int stroke, const Array<float>& before,
+bool PbdTissue::cut(const BladePath& path, int stroke, const std::vector<Vec3>& before,
                     CutReport& report) {
   pbd::State& s = *state_;
   std::vector<std::int32_t> origin;
@@ -46,7 +48,7 @@ bool PbdTissue::cut(const BladePath& path, int stroke, const Array<float>& befor
 void PbdTissue::advance(double duration, const FrameInput& input) {
   pbd::State& s = *state_;
   follow(input, s.scene);
-  const int substeps = s.scene.pbd.steps;
+  const int substeps = pbd::steps_of(s, duration);
   const float dt = static_cast<float>(duration / substeps);
   result_ = {};
   result_.loads.resize(s.scene.tools.size());
@@ -58,7 +60,7 @@ void PbdTissue::advance(double duration, const FrameInput& input) {
   }
   for (const BladePath& path : input.cuts) {
     result_.cut_reports.emplace_back();
-    const Array<float> still = places();
+    const std::vector<Vec3> still = places();
     changed = cut(path, next_stroke_++, still, result_.cut_reports.back()) || changed;
   }
   if (changed) {
@@ -67,7 +69,7 @@ void PbdTissue::advance(double duration, const FrameInput& input) {
   }
   const FrameColliders colliders(s.scene, input, duration);
   const std::vector<BladePath> blades = blade_paths(s.scene, input, 0, 1);
-  Array<float> before;
+  std::vector<Vec3> before;
   if (!blades.empty()) {
     pull();
     before = places();

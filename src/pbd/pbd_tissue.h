@@ -20,8 +20,9 @@ class PbdTissue : public Tissue {
   FrameResult finish() override;
   int point_count() const override { return state_->vertices.size(); }
   int read_points(const PointSelection& selection, std::vector<std::uint8_t>& cloud) override;
-  unsigned point_fields() const override { return 0; }
+  unsigned point_fields() const override { return ~unsigned{kStressTensor}; }
   void read_surface(SurfaceTriangles& surface) override;
+  void push_surface(Span<const float> impulses) override;
   bool moves_surface() const override { return true; }
   int fragment_count() const override { return static_cast<int>(pieces_.all.size()); }
   Span<const Fragment> fragments() override;
@@ -63,9 +64,9 @@ class PbdTissue : public Tissue {
   /// While vertices move from `before` to where they are; a stroke is what one blade does.
   template <class Archive>
   void each_field(Archive& archive);
-  Array<float> places() const;  // without padding
+  std::vector<Vec3> places() const;
   /// Whether it changed anything: constraints are to be made anew then.
-  bool cut(const BladePath& path, int stroke, const Array<float>& before, CutReport& report);
+  bool cut(const BladePath& path, int stroke, const std::vector<Vec3>& before, CutReport& report);
 
   int steps_between_searches(const FrameColliders& colliders, int steps, float h);
 

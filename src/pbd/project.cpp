@@ -6,10 +6,10 @@ namespace {
 
 template <int W, class Kind, bool kKeep>
 TISSUE_SIM_INLINE void project_lanes(const ConstraintBlock<Kind>& block, int lane, Vec<W> h,
-                                     float* x, float* multipliers) {
+                                     const float* x, float* moved, float* multipliers) {
   constexpr int kMultipliers = ConstraintSet<Kind>::kMultipliers;
   Vertex<Vec<W>> v[Kind::kVertices];
-  for (int i = 0; i < Kind::kVertices; ++i) v[i] = gather<W>(x, block.vertex[i] + lane);
+  for (int i = 0; i < Kind::kVertices; ++i) v[i] = gather<W>(x, moved, block.vertex[i] + lane);
   Vec<W> number[Kind::kNumbers], lambda[kMultipliers];
   for (int i = 0; i < Kind::kNumbers; ++i) {
     number[i] = *reinterpret_cast<const Vec<W>*>(block.number[i] + lane);
@@ -17,21 +17,22 @@ TISSUE_SIM_INLINE void project_lanes(const ConstraintBlock<Kind>& block, int lan
   for (int i = 0; i < kMultipliers; ++i) {
     lambda[i] = kKeep ? load<W>(multipliers + i * kLanes + lane) : Vec<W>{};
   }
-  Kind::project(v, number, h, lambda);
+  project_kind<Kind, kKeep>(v, number, h, lambda);
   for (int i = 0; kKeep && i < kMultipliers; ++i) {
     store<W>(multipliers + i * kLanes + lane, lambda[i]);
   }
-  for (int i = 0; i < Kind::kVertices; ++i) scatter<W>(x, block.vertex[i] + lane, v[i]);
+  for (int i = 0; i < Kind::kVertices; ++i) scatter<W>(moved, block.vertex[i] + lane, v[i]);
 }
 
 template <int W, class Kind>
 TISSUE_SIM_INLINE void project_blocks(const ConstraintBlock<Kind>* blocks, int count,
-                                      float inverse_h2, float* x, float* multipliers) {
+                                      float inverse_h2, const float* x, float* moved,
+                                      float* multipliers) {
   const Vec<W> h = inverse_h2 - Vec<W>{};
   if (multipliers == nullptr) {
     for (int b = 0; b < count; ++b) {
       for (int lane = 0; lane < kLanes; lane += W) {
-        project_lanes<W, Kind, false>(blocks[b], lane, h, x, nullptr);
+        project_lanes<W, Kind, false>(blocks[b], lane, h, x, moved, nullptr);
       }
     }
     return;
@@ -39,14 +40,15 @@ TISSUE_SIM_INLINE void project_blocks(const ConstraintBlock<Kind>* blocks, int c
   for (int b = 0; b < count; ++b) {
     float* of = multipliers + b * ConstraintSet<Kind>::kMultipliers * kLanes;
     for (int lane = 0; lane < kLanes; lane += W) {
-      project_lanes<W, Kind, true>(blocks[b], lane, h, x, of);
+      project_lanes<W, Kind, true>(blocks[b], lane, h, x, moved, of);
     }
   }
 }
 
-#define TISSUE_SIM_PROJECTION(name, Kind, W, target)                                     \
-  target void name(const ConstraintBlock<Kind>* b, int n, float h, float* x, float* m) { \
-    project_blocks<W, Kind>(b, n, h, x, m);                                              \
+#define TISSUE_SIM_PROJECTION(name, Kind, W, target)                                         \
+  target void name(const ConstraintBlock<Kind>* b, int n, float h, const float* x, float* d, \
+                   float* m) {                                                               \
+    project_blocks<W, Kind>(b, n, h, x, d, m);                                               \
   }
 #define TISSUE_SIM_PROJECTIONS(suffix, W, target)               \
   TISSUE_SIM_PROJECTION(distance_##suffix, Distance, W, target) \

@@ -4,6 +4,7 @@
 #include <cstring>
 
 #include "fragments/piece_colour.h"
+#include "frame/point_fields.h"
 #include "frame/select_points.h"
 #include "pbd/model.h"
 #include "pbd/pbd_tissue.h"
@@ -60,6 +61,7 @@ std::vector<float> stresses(const State& s) {
 }  // namespace
 
 int PbdTissue::read_points(const PointSelection& selection, std::vector<std::uint8_t>& cloud) {
+  check_fields(selection, point_fields());
   pull();
   const State& s = *state_;
   const std::vector<float> stress = stresses(s);
@@ -84,6 +86,18 @@ int PbdTissue::read_points(const PointSelection& selection, std::vector<std::uin
     std::memcpy(cloud.data() + static_cast<std::size_t>(place[i]) * sizeof(Point), &out,
                 sizeof(Point));
   }
+  add_fields(selection, place, count, state_->cpu, cloud, [&s](int i) {
+    const Vec3 rest = s.vertices.reference[i], moved = s.vertices.position(i) - rest;
+    const Vec3 v = s.vertices.velocity(i);
+    PointFields of;
+    for (int a = 0; a < 3; ++a) {
+      of.rest[a] = static_cast<float>(rest[a]);
+      of.u[a] = static_cast<float>(moved[a]);
+      of.v[a] = static_cast<float>(v[a]);
+    }
+    of.volume = static_cast<float>(s.vertices.volume[i]);
+    return of;
+  });
   return count;
 }
 
@@ -104,6 +118,16 @@ void PbdTissue::read_surface(SurfaceTriangles& surface) {
     }
     surface.fragment.push_back(pieces_.of_point[t[0]]);
     surface.point.push_back(t[0]);
+  }
+}
+
+void PbdTissue::push_surface(Span<const float> impulses) {
+  pbd::Vertices& v = state_->vertices;
+  const float* impulse = impulses.data();
+  for (const Triangle& t : state_->triangles) {
+    for (const std::int32_t i : t) {
+      for (int a = 0; a < 3; ++a) v.v[4 * i + a] += v.x[4 * i + 3] * *impulse++;
+    }
   }
 }
 

@@ -100,7 +100,8 @@ constexpr const char* kWhy[] = {"angles below 2.9 degrees",
                                 "pieces that hang on by an edge"};
 
 /// Whether a blade may meet anything at all while vertices move from `before` to where they are.
-bool may_meet(const State& s, const Array<float>& before, const std::vector<SweepPart>& parts) {
+bool may_meet(const State& s, const std::vector<Vec3>& before,
+              const std::vector<SweepPart>& parts) {
   Box sweep, tissue;
   for (const SweepPart& p : parts) {
     sweep.min = sweep.min.cwiseMin(p.box.min);
@@ -129,7 +130,7 @@ class SoundCut {
 
   /// Pieces that a whole path parts, by the links that it passes: they are not to hang on, as by an
   /// edge of the line that the trace of the blade left out.
-  void expect_parts(const Array<float>& before, const std::vector<SweepPart>& parts) {
+  void expect_parts(const std::vector<Vec3>& before, const std::vector<SweepPart>& parts) {
     const int count = static_cast<int>(s_.triangles.size());
     const auto centre = [&](int t, const auto& at) {
       const Triangle& c = s_.triangles[t];
@@ -176,7 +177,7 @@ class SoundCut {
   void leave_out(std::int32_t vertex) { open_.erase(piece_[vertex]); }
 
   /// Cuts the pieces that are left but for those that this would make unsound, which are left then.
-  bool run(const BladePath& path, const Array<float>& before, int stroke, CutReport& report) {
+  bool run(const BladePath& path, const std::vector<Vec3>& before, int stroke, CutReport& report) {
     std::set<std::int32_t> later;
     while (!open_.empty()) {
       const Mesh mesh(s_);
@@ -215,7 +216,7 @@ class SoundCut {
   }
 
   /// Small pieces that the blade passes stay whole: what they are.
-  void meet_small(const Array<float>& before, const std::vector<SweepPart>& parts) {
+  void meet_small(const std::vector<Vec3>& before, const std::vector<SweepPart>& parts) {
     if (small_.empty()) return;
     for (const Triangle& t : s_.triangles) {
       const std::int32_t piece = piece_[t[0]];
@@ -340,7 +341,7 @@ Vec3 aside(const BladePath& path) {
 
 }  // namespace
 
-bool cut_soundly(State& s, const BladePath& path, const Array<float>& before, int stroke,
+bool cut_soundly(State& s, const BladePath& path, const std::vector<Vec3>& before, int stroke,
                  std::vector<std::int32_t>& origin, CutReport& report) {
   const bool is_tools = stroke < static_cast<int>(s.left_whole.size());
   std::vector<LeftWhole> again, later;

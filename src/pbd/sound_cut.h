@@ -31,7 +31,7 @@ struct SoundMesh {
 /// that helps nothing. What a tool's blade left whole is tried again in the next frame, along with
 /// what the blade sweeps then. Vertices do not move from `before`. Returns whether anything
 /// changed.
-bool cut_soundly(State& s, const BladePath& path, const Array<float>& before, int stroke,
+bool cut_soundly(State& s, const BladePath& path, const std::vector<Vec3>& before, int stroke,
                  std::vector<std::int32_t>& origin, CutReport& report);
 
 }  // namespace pbd

@@ -22,10 +22,10 @@ void for_vertices(State& s, const F& f) {
 }
 
 /// One colour after the other, or `backward`: chunks of a level side by side, and of the last
-/// level, which is one chunk, `blocks_of_part` of a colour. x: places, or what else it moves.
+/// level, which is one chunk, `blocks_of_part` of a colour. `moved`: what it changes.
 template <class Kind>
 void project_all(State& s, ConstraintSet<Kind>& set, Project<Kind> project, int blocks_of_part,
-                 float inverse_h2, bool keep, bool backward, float* x) {
+                 float inverse_h2, bool keep, bool backward, float* moved) {
   if (set.blocks.empty()) return;
   const auto run = [&](int first, int n) {
     float* multipliers = nullptr;
@@ -33,7 +33,7 @@ void project_all(State& s, ConstraintSet<Kind>& set, Project<Kind> project, int 
       multipliers = set.multipliers.data() +
                     static_cast<std::size_t>(first) * ConstraintSet<Kind>::kMultipliers * kLanes;
     }
-    project(set.blocks.data() + first, n, inverse_h2, x, multipliers);
+    project(set.blocks.data() + first, n, inverse_h2, s.vertices.x.data(), moved, multipliers);
   };
   const int levels = static_cast<int>(set.chunks.size());
   const auto project_level = [&](int level) {
@@ -68,7 +68,7 @@ void project_all(State& s, ConstraintSet<Kind>& set, Project<Kind> project, int 
 template <class Kind>
 void project_all(State& s, ConstraintSet<Kind>& set, Project<Kind> project, int blocks_of_part,
                  float inverse_h2, bool keep, bool backward) {
-  project_all(s, set, project, blocks_of_part, inverse_h2, keep, backward, s.vertices.x.data());
+  project_all(s, set, project, blocks_of_part, inverse_h2, keep, backward, s.vertices.moved.data());
 }
 
 template <class Kind>
@@ -116,9 +116,11 @@ int sweeps_of_step(const State& s) {
 
 void step(State& s, float h, std::vector<ColliderLoad>& loads) {
   Vertices& vertices = s.vertices;
-  float *x = vertices.x.data(), *predicted = vertices.predicted.data(), *v = vertices.v.data();
+  float *x = vertices.x.data(), *moved = vertices.moved.data();
+  float *predicted = vertices.predicted.data(), *v = vertices.v.data();
   const StepNumbers numbers = step_numbers(s.scene, h);
-  for_vertices(s, [&](int i) { predict(numbers, x + 4 * i, predicted + 4 * i, v + 4 * i); });
+  for_vertices(
+      s, [&](int i) { predict(numbers, x + 4 * i, moved + 4 * i, predicted + 4 * i, v + 4 * i); });
   const int sweeps = sweeps_of_step(s);
   const bool keep = sweeps > 1;
   if (keep) {
@@ -129,7 +131,9 @@ void step(State& s, float h, std::vector<ColliderLoad>& loads) {
   for (int i = 0; i < sweeps; ++i) project_constraints(s, h, keep, i % 2 == 1);
   project_all(s, s.touches, s.project->touch, 32, 1 / (h * h), false, false);
   project_contacts(s, h, loads);
-  for_vertices(s, [&](int i) { take_velocity(numbers, x + 4 * i, predicted + 4 * i, v + 4 * i); });
+  for_vertices(s, [&](int i) {
+    take_velocity(numbers, x + 4 * i, moved + 4 * i, predicted + 4 * i, v + 4 * i);
+  });
 }
 
 int add_vertex(State& s, Vec3 reference, int body) {
@@ -148,9 +152,10 @@ int add_vertex(State& s, Vec3 reference, int body) {
   s.copy_of.push_back(index);
   s.blade_normal.push_back(Vec3::Zero());
   s.blade_point.push_back(reference);
-  for (Array<float>* of : {&v.x, &v.predicted, &v.v}) of->resize(4 * (index + 1));  // cuts padding
+  for (Array<float>* of : {&v.x, &v.moved, &v.predicted, &v.v})
+    of->resize(4 * (index + 1));  // cuts padding
   for (int a = 0; a < 3; ++a) {
-    v.x[4 * index + a] = v.predicted[4 * index + a] = static_cast<float>(reference[a]);
+    v.x[4 * index + a] = static_cast<float>(reference[a]);
   }
   return index;
 }
@@ -158,7 +163,7 @@ int add_vertex(State& s, Vec3 reference, int body) {
 void pack(State& s) {
   Vertices& v = s.vertices;
   const int n = v.size();
-  for (Array<float>* of : {&v.x, &v.predicted, &v.v}) {
+  for (Array<float>* of : {&v.x, &v.moved, &v.predicted, &v.v}) {
     of->resize(4 * n);
     of->resize(4 * (n + kPadding), 0.0f);
   }
@@ -193,8 +198,9 @@ double sum_energy(const State& s, const ConstraintSet<Kind>& set) {
   for (int c = 0; c < set.size(); ++c) {
     Vertex<float> v[Kind::kVertices];
     for (int i = 0; i < Kind::kVertices; ++i) {
-      const float* x = &s.vertices.x[4 * static_cast<std::size_t>(set.vertices[c][i])];
-      v[i] = {x[0], x[1], x[2], x[3]};
+      const std::size_t at = 4 * static_cast<std::size_t>(set.vertices[c][i]);
+      const float *x = &s.vertices.x[at], *moved = &s.vertices.moved[at];
+      v[i] = {x[0], x[1], x[2], x[3], {moved[0], moved[1], moved[2]}};
     }
     float number[Kind::kNumbers];
     std::copy(set.numbers[c].begin(), set.numbers[c].end(), number);

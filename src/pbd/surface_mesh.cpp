@@ -52,7 +52,7 @@ std::int32_t split_edge(State& s, EdgeMap& edges, const Edge& e, double place,
   const std::int32_t n = add_vertex(s, at, v.body[a]);
   origin.push_back(place < 0.5 ? a : b);
   const auto mix = static_cast<float>(place);
-  for (Array<float>* x : {&v.x, &v.predicted, &v.v}) {
+  for (Array<float>* x : {&v.x, &v.moved, &v.v}) {
     for (int i = 0; i < 3; ++i)
       (*x)[4 * n + i] = (1 - mix) * (*x)[4 * a + i] + mix * (*x)[4 * b + i];
   }

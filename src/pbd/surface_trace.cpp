@@ -54,7 +54,7 @@ bool first_meeting(const SweepPart& part, const MovingSegment& link, double begi
 }
 
 /// Triangles that a sweep may meet, and their neighbours.
-std::vector<int> near(const State& s, const Array<float>& before,
+std::vector<int> near(const State& s, const std::vector<Vec3>& before,
                       const std::vector<SweepPart>& parts, const std::vector<std::uint8_t>* whole) {
   Box box;
   for (const SweepPart& p : parts) {
@@ -97,7 +97,7 @@ Vec3 to_reference(const State& s, int t, const Vec3& normal) {
 
 }  // namespace
 
-SurfaceTrace::SurfaceTrace(State& s, const Array<float>& before, int stroke,
+SurfaceTrace::SurfaceTrace(State& s, const std::vector<Vec3>& before, int stroke,
                            const std::vector<SweepPart>& parts, std::vector<std::int32_t>& origin,
                            const std::vector<std::uint8_t>* whole)
     : s_(s),

@@ -20,7 +20,7 @@ namespace pbd {
 /// vertices are cut if a blade passed between the triangles' centres.
 class SurfaceTrace {
  public:
-  SurfaceTrace(State& s, const Array<float>& before, int stroke,
+  SurfaceTrace(State& s, const std::vector<Vec3>& before, int stroke,
                const std::vector<SweepPart>& parts, std::vector<std::int32_t>& origin,
                const std::vector<std::uint8_t>* whole);
   void run();
@@ -57,7 +57,7 @@ class SurfaceTrace {
   void join_strokes();
 
   State& s_;
-  const Array<float>& before_;
+  const std::vector<Vec3>& before_;
   const int stroke_, old_count_;
   const std::vector<SweepPart>& parts_;
   std::vector<std::int32_t>& origin_;

@@ -85,10 +85,18 @@ TISSUE_SIM_INLINE V inverse_cube_root(V v) {
 /// det F - 1 - mu / lambda, are at rest only as a sum: solved one after the other they pull
 /// tissue at rest to and fro, solved together they are explicit in shear, and blow up with small
 /// tetrahedra. Here each is 0 at rest: C_D^2 = tr F^T F - 3 J^(2/3), C_H = J - 1.
+///
+/// One projection a step, from no multiplier, leaves tissue at rest softer than it is: of
+/// constraints in a row C = -(a + D / 2 + what those before it move) lambda, D being the sum of w
+/// |grad C|^2, and a mesh of them came out as if each compliance were larger by 0.8 D. The
+/// deviatoric one has that taken off, as far as what is left moves no element by more than 4 / 3 of
+/// what it is off, from where on one by itself would shake. Sums of volume keep it: off, they would
+/// shake (docs/pbd.md).
 struct Elastic {
   static constexpr int kVertices = 4, kNumbers = 11, kMultipliers = 2;
+  static constexpr float kSoftened = 0.8f, kLeastCompliance = 0.75f;
 
-  template <class V>
+  template <bool kOnce, class V>
   static TISSUE_SIM_INLINE void project_along(Vertex<V> (&v)[4], const V* number,
                                               const Vector<V> (&along)[3], V c, V a, V& lambda) {
     Vector<V> g[4];
@@ -101,6 +109,7 @@ struct Elastic {
       sum += v[k + 1].w * dot(g[k + 1], g[k + 1]);
     }
     sum += v[0].w * dot(g[0], g[0]);
+    if (kOnce) a = greater(a - kSoftened * sum, kLeastCompliance * a);
     const V change = -(c + a * lambda) / (sum + a + kTiny);
     lambda += change;
     for (int k = 0; k < 4; ++k) move(v[k], change, g[k]);
@@ -113,8 +122,8 @@ struct Elastic {
   static TISSUE_SIM_INLINE V square(const Vector<V> (&a)[3]) {
     return dot(a[0], a[0]) + dot(a[1], a[1]) + dot(a[2], a[2]);
   }
-  /// number: Q^-1, both compliances [1/(N m)].
-  template <class V>
+  /// number: Q^-1, both compliances [1/(N m)]. kOnce: the only projection of a step.
+  template <bool kOnce = false, class V>
   static TISSUE_SIM_INLINE void project(Vertex<V> (&v)[4], const V (&number)[11], V inverse_h2,
                                         V (&lambda)[2]) {
     Vector<V> p[3], f[3], cof[3], h[3];
@@ -142,7 +151,7 @@ struct Elastic {
     const V cd = root(0.5f * h2 + 1e-20f);
     const V over = 1.0f / cd;
     for (int j = 0; j < 3; ++j) h[j] = over * h[j];
-    project_along(v, number, h, cd, number[9] * inverse_h2, lambda[0]);
+    project_along<kOnce>(v, number, h, cd, number[9] * inverse_h2, lambda[0]);
     edges_of(v, p);
     for (int j = 0; j < 3; ++j) f[j] = column(p, number, j);
     cofactors(f, cof);
@@ -152,7 +161,7 @@ struct Elastic {
     const V one = det * 0.0f + 1.0f;
     const V volume =
         lesser(square(cof), one) * greater(lesser(dot(f[0], cof[0]) - 1.0f, one), -1.5f * one);
-    project_along(v, number, cof, volume, number[10] * inverse_h2, lambda[1]);
+    project_along<false>(v, number, cof, volume, number[10] * inverse_h2, lambda[1]);
   }
   /// Energy of the two [J].
   static TISSUE_SIM_INLINE double energy(const Vertex<float> (&v)[4], const float (&number)[11]) {

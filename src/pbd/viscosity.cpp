@@ -45,7 +45,6 @@ void damp_neighbours(State& s, double duration) {
   for (const Flight& f : before) spins.push_back(spin_of(f, f.angular));
   Vertices& v = s.vertices;
   for (int i = 0; i < v.size(); ++i) {
-    v.v[4 * i + 3] = v.x[4 * i + 3];
     turn(v, i, before[s.component[i]], -spins[s.component[i]]);
   }
   project_dampers(s);
@@ -56,7 +55,6 @@ void damp_neighbours(State& s, double duration) {
         spin_of(after[c], before[c].angular - before[c].inertia * spins[c] - after[c].angular);
   }
   for (int i = 0; i < v.size(); ++i) {
-    v.v[4 * i + 3] = 0;
     turn(v, i, after[s.component[i]], spins[s.component[i]]);
   }
 }

@@ -7,6 +7,7 @@
 #include <tissue_sim/FrameInput.h>
 #undef FrameInput
 
+#include <tissue_sim/FluidArray.h>
 #include <tissue_sim/FragmentArray.h>
 #include <tissue_sim/JawGrip.h>
 #include <tissue_sim/SavedState.h>

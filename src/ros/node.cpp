@@ -176,7 +176,7 @@ Session Node::make_session(const Scene& asked) {
     ROS_WARN("%s", warning.c_str());
   }
   if (parameters.cloud_fields & ~session.simulation->tissue().point_fields()) {
-    ROS_WARN("~cloud_fields: clouds of method %s have none of these",
+    ROS_WARN("~cloud_fields: clouds of method %s have no stress_tensor",
              name_of(scene.method, kMethodNames));
   }
   session.scene_input =

@@ -43,6 +43,7 @@ Publications::Publications(ros::NodeHandle& node, const Scene& scene, const Para
       ++number;
     }
   }
+  if (has_fluid(scene)) fluid_.emplace(node, recorder);
   if (!scene.cameras.empty()) {
     cameras_ = std::make_unique<Cameras>(node, scene, parameters, frames, recorder);
   }
@@ -58,6 +59,7 @@ std::set<std::string> Publications::topics() const {
     if (tool.grip) names.insert(tool.grip->topic());
   }
   for (const AnchorOutput& anchor : anchors_) names.insert(anchor.spatial.topic());
+  if (fluid_) names.merge(fluid_->topics());
   if (cameras_) names.merge(cameras_->topics());
   return names;
 }
@@ -109,7 +111,9 @@ void Publications::publish(Simulation& simulation, const FrameReport& report, co
   if (fragments_due && fragments_.wanted()) {
     fragments_.publish(fragment_message(simulation, stamp), stamp);
   }
+  if (fluid_ && fragments_due) fluid_->send_amounts(simulation, header(stamp), true);
   const bool clouds_due = clouds_due_.due(now) || all;
+  if (fluid_ && clouds_due) fluid_->send_points(simulation, header(stamp), true);
   if (clouds_due && points_.wanted()) points_.publish(cloud(simulation, false, stamp), stamp);
   if (clouds_due && loose_points_.wanted()) {
     loose_points_.publish(cloud(simulation, true, stamp), stamp);
@@ -136,6 +140,10 @@ void Publications::show(Simulation& simulation, const FrameReport& report, const
   if (state_.listened()) state_.show(state(simulation, report, run, stamp));
   if (run.blew_up) return;
   if (fragments_.listened()) fragments_.show(fragment_message(simulation, stamp));
+  if (fluid_) {
+    fluid_->send_amounts(simulation, header(stamp), false);
+    fluid_->send_points(simulation, header(stamp), false);
+  }
   if (points_.listened()) points_.show(cloud(simulation, false, stamp));
   if (loose_points_.listened()) loose_points_.show(cloud(simulation, true, stamp));
   if (surface_.listened()) surface_.show(surface_message(simulation, stamp));

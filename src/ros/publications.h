@@ -19,6 +19,7 @@
 
 #include "ros/cameras.h"
 #include "ros/cloud_memory.h"
+#include "ros/fluid_output.h"
 #include "ros/markers.h"
 #include "ros/messages.h"
 #include "ros/output.h"
@@ -111,6 +112,7 @@ class Publications {
   std::size_t next_cloud_ = 0;
   PieceCount pieces_;
   ros::Time tf_stamp_;
+  std::optional<FluidOutput> fluid_;  ///< of a scene that has any
   std::unique_ptr<Cameras> cameras_;  ///< null without any; last, for it has a thread
 };
 

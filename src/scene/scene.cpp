@@ -15,7 +15,7 @@ namespace {
 constexpr std::size_t kLongestName = 200, kLongestPath = 4096;
 constexpr std::size_t kMostBodies = 1000;  // each may meet each: memory grows with the square
 constexpr std::size_t kMostTools = 100, kMostMaterials = 1000, kMostAnchors = 1000;
-constexpr std::size_t kMostCameras = 16;
+constexpr std::size_t kMostCameras = 16, kMostFluids = 100, kMostPools = 1000;
 
 [[noreturn]] void refuse(const std::string& field, const std::string& value,
                          const std::string& allowed) {
@@ -318,6 +318,90 @@ void check_material_name(const std::string& field, const Scene& scene, const std
          "must be one of " + known_materials(scene) + ", or be defined in materials");
 }
 
+const Fluid* lookup_fluid(const Scene& scene, const std::string& name) {
+  for (const auto* fluids : {&scene.fluids, &fluid_presets()}) {
+    for (const Fluid& f : *fluids) {
+      if (f.name == name) return &f;
+    }
+  }
+  return nullptr;
+}
+
+void check_fluid_name(const std::string& field, const Scene& scene, const std::string& name) {
+  if (lookup_fluid(scene, name)) return;
+  std::string known;
+  for (const auto* fluids : {&scene.fluids, &fluid_presets()}) {
+    for (const Fluid& f : *fluids) known += (known.empty() ? "" : ", ") + f.name;
+  }
+  refuse(field, quoted(name), "must be one of " + known + ", or be defined in fluids");
+}
+
+/// Edges of the box around a body's own shape, without its pose [m].
+Vec3 extent(const Body& body) {
+  switch (body.shape) {
+    case Shape::kBox:
+      return body.size;
+    case Shape::kBall:
+      return Vec3::Constant(2 * body.radius);
+    case Shape::kEllipsoid:
+      return 2 * body.radii;
+    case Shape::kCylinder:
+      return {2 * body.radius, 2 * body.radius, body.height};
+    case Shape::kMesh:
+      break;
+  }
+  return Vec3::Constant(1e3);
+}
+
+void check_hollow(const std::string& path, const Scene& scene, const Body& body) {
+  const bool filled = !body.filled.fluid.empty();
+  if (body.wall == 0) {
+    if (filled) refuse(path + ".filled", "there", "only a body with hollow: {wall: ..} is filled");
+    return;
+  }
+  const double thinnest = 2 * scene.cell_size;
+  if (!(body.wall >= thinnest * (1 - 1e-9))) {
+    refuse(path + ".hollow.wall", text(body.wall),
+           "must be two cells or more, " + text(thinnest) + " m: a thinner wall leaks");
+  }
+  if (!(2 * body.wall + 2 * scene.cell_size <= extent(body).minCoeff())) {
+    refuse(path + ".hollow.wall", text(body.wall), "leaves no hollow of two cells in the body");
+  }
+  if (scene.method == Method::kPbd && scene.pbd.model == PbdModel::kSurface) {
+    refuse(
+        path + ".hollow", "there",
+        "pbd's surface model is a skin without a wall, so nothing could press on it from within: "
+        "choose pbd: {model: tetrahedra}, or another method");
+  }
+  if (!filled) return;
+  check_fluid_name(path + ".filled.fluid", scene, body.filled.fluid);
+  check_range(path + ".filled.pressure", body.filled.pressure, 0, 1e5, "Pa");
+}
+
+void check_fluids(const Scene& scene) {
+  std::set<std::string> names;
+  for (std::size_t i = 0; i < scene.fluids.size(); ++i) {
+    const std::string path = at("fluids", i);
+    const Fluid& f = scene.fluids[i];
+    check_name(path + ".name", f.name, names);
+    check_range(path + ".density", f.density, 100, 20000, "kg/m^3");
+    check_range(path + ".viscosity", f.viscosity, 0, 100, "Pa s");
+    if (f.bulk_modulus != 0) check_range(path + ".bulk_modulus", f.bulk_modulus, 100, 1e8, "Pa");
+    check_each(path + ".color", f.color, 0, 1, "part", "");
+  }
+  for (std::size_t i = 0; i < scene.pools.size(); ++i) {
+    const std::string path = at("pools", i);
+    check_fluid_name(path + ".fluid", scene, scene.pools[i].fluid);
+    check_region(path + ".region", scene.pools[i].region);
+    if (scene.pools[i].region.kind == Region::Kind::kBelow) {
+      refuse(path + ".region", "below", "has no end: must be a box or a ball");
+    }
+  }
+  if (scene.fluid_spacing != 0) {
+    check_range("fluid_spacing", scene.fluid_spacing, 1e-5, scene.cell_size, "m");
+  }
+}
+
 }  // namespace
 
 Vec3 Anchor::origin() const {
@@ -352,6 +436,8 @@ void validate(const Scene& scene) {
   check_count("bodies", scene.bodies.size(), kMostBodies);
   check_count("tools", scene.tools.size(), kMostTools);
   check_count("cameras", scene.cameras.size(), kMostCameras);
+  check_count("fluids", scene.fluids.size(), kMostFluids);
+  check_count("pools", scene.pools.size(), kMostPools);
   check_enum("method", scene.method, kMethodNames);
   check_enum("device", scene.device, kDeviceNames);
   if (scene.threads < 0 || scene.threads > 1024) {
@@ -378,6 +464,7 @@ void validate(const Scene& scene) {
     check_shape(path, body);
     check_pose(path + ".pose", body.pose);
     check_material_name(path + ".material", scene, body.material);
+    check_hollow(path, scene, body);
     check_count(path + ".anchors", body.anchors.size(), kMostAnchors);
     if (body.inclusions.size() > 255) {
       refuse(path + ".inclusions", "a list of " + std::to_string(body.inclusions.size()),
@@ -396,6 +483,7 @@ void validate(const Scene& scene) {
       check_name(anchor + ".name", name, anchor_names);
     }
   }
+  check_fluids(scene);
   for (std::size_t i = 0; i < scene.tools.size(); ++i) {
     check_tool(at("tools", i), scene.tools[i], tool_names);
   }
@@ -407,6 +495,11 @@ void validate(const Scene& scene) {
 const Material& find_material(const Scene& scene, const std::string& name) {
   if (const Material* m = lookup(scene, name)) return *m;
   refuse("material", quoted(name), "must be one of " + known_materials(scene));
+}
+
+const Fluid& find_fluid(const Scene& scene, const std::string& name) {
+  check_fluid_name("fluid", scene, name);
+  return *lookup_fluid(scene, name);
 }
 
 }  // namespace tissue_sim

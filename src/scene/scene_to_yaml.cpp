@@ -93,6 +93,24 @@ void write(YAML::Emitter& out, const Inclusion& inclusion) {
   out << EndMap;
 }
 
+void write(YAML::Emitter& out, const Fluid& fluid) {
+  out << BeginMap;
+  write(out, "name", fluid.name);
+  write(out, "density", fluid.density);
+  write(out, "viscosity", fluid.viscosity);
+  write(out, "bulk_modulus", fluid.bulk_modulus);
+  write(out, "color", fluid.color);
+  out << EndMap;
+}
+
+void write(YAML::Emitter& out, const Pool& pool) {
+  out << BeginMap;
+  write(out, "fluid", pool.fluid);
+  out << Key << "region" << Value;
+  write(out, pool.region);
+  out << EndMap;
+}
+
 void write(YAML::Emitter& out, const Body& body) {
   out << BeginMap;
   write(out, "name", body.name);
@@ -115,7 +133,19 @@ void write(YAML::Emitter& out, const Body& body) {
   out << EndSeq;
   out << Key << "anchors" << Value << BeginSeq;
   for (const Anchor& anchor : body.anchors) write(out, anchor, anchor.name);
-  out << EndSeq << EndMap;
+  out << EndSeq;
+  if (body.wall > 0) {
+    out << Key << "hollow" << Value << BeginMap;
+    write(out, "wall", body.wall);
+    out << EndMap;
+  }
+  if (!body.filled.fluid.empty()) {
+    out << Key << "filled" << Value << BeginMap;
+    write(out, "fluid", body.filled.fluid);
+    write(out, "pressure", body.filled.pressure);
+    out << EndMap;
+  }
+  out << EndMap;
 }
 
 void write(YAML::Emitter& out, const Tool& tool) {
@@ -215,6 +245,9 @@ std::string scene_to_yaml(const Scene& scene) {
   write_list(out, "bodies", scene.bodies);
   write_list(out, "tools", scene.tools);
   if (!scene.cameras.empty()) write_list(out, "cameras", scene.cameras);
+  if (!scene.fluids.empty()) write_list(out, "fluids", scene.fluids);
+  if (!scene.pools.empty()) write_list(out, "pools", scene.pools);
+  if (scene.fluid_spacing > 0) write(out, "fluid_spacing", scene.fluid_spacing);
   out << EndMap;
   return std::string(out.c_str()) + "\n";
 }

@@ -114,10 +114,33 @@ Inclusion read_inclusion(const YAML::Node& node, const std::string& path) {
   return inclusion;
 }
 
+Fluid read_fluid(const YAML::Node& node, const std::string& path) {
+  const YamlFields fields(node, path, {"name", "density", "viscosity", "bulk_modulus", "color"});
+  fields.require("name", "bodies and pools refer to a fluid by its name");
+  Fluid fluid;
+  fields.read("name", fluid.name);
+  fields.read("density", fluid.density);
+  fields.read("viscosity", fluid.viscosity);
+  fields.read("bulk_modulus", fluid.bulk_modulus);
+  fields.read("color", fluid.color);
+  return fluid;
+}
+
+Pool read_pool(const YAML::Node& node, const std::string& path) {
+  const YamlFields fields(node, path, {"fluid", "region"});
+  fields.require("region", "a pool needs the region that it fills");
+  Pool pool;
+  fields.read("fluid", pool.fluid);
+  fields.read_map("region", [&](const YAML::Node& region, const std::string& region_path) {
+    pool.region = read_region(region, region_path);
+  });
+  return pool;
+}
+
 Body read_body(const YAML::Node& node, const std::string& path) {
   const YamlFields fields(node, path,
                           {"name", "shape", "size", "radius", "radii", "height", "mesh", "scale",
-                           "pose", "material", "inclusions", "anchors"});
+                           "pose", "material", "inclusions", "anchors", "hollow", "filled"});
   Body body;
   fields.read("name", body.name);
   fields.read("shape", body.shape, kShapeNames);
@@ -137,6 +160,18 @@ Body read_body(const YAML::Node& node, const std::string& path) {
   });
   fields.read_list("anchors", [&](const YAML::Node& item, const std::string& item_path) {
     body.anchors.push_back(read_anchor(item, item_path));
+  });
+  fields.read_map("hollow", [&](const YAML::Node& hollow, const std::string& hollow_path) {
+    const YamlFields hollow_fields(hollow, hollow_path, {"wall"});
+    hollow_fields.require("wall", "a hollow needs the thickness of its wall");
+    hollow_fields.read("wall", body.wall);
+    if (!(body.wall > 0)) hollow_fields.refuse("wall", "must lie above 0 m");
+  });
+  fields.read_map("filled", [&](const YAML::Node& filled, const std::string& filled_path) {
+    const YamlFields filled_fields(filled, filled_path, {"fluid", "pressure"});
+    filled_fields.require("fluid", "must name what fills the hollow");
+    filled_fields.read("fluid", body.filled.fluid);
+    filled_fields.read("pressure", body.filled.pressure);
   });
   return body;
 }
@@ -211,9 +246,10 @@ void read_options(const YAML::Node& node, const std::string& path, std::vector<O
 }
 
 Scene read_scene(const YAML::Node& node) {
-  Words known = {"name",      "method",  "device",  "threads", "cell_size",        "frame_rate",
-                 "cfl",       "damping", "gravity", "seed",    "fragment_network", "ground",
-                 "materials", "bodies",  "tools",   "cameras"};
+  Words known = {"name",         "method",  "device",  "threads", "cell_size",        "frame_rate",
+                 "cfl",          "damping", "gravity", "seed",    "fragment_network", "ground",
+                 "materials",    "bodies",  "tools",   "cameras", "fluids",           "pools",
+                 "fluid_spacing"};
   const auto& methods = method_options();
   std::transform(methods.begin(), methods.end(), std::inserter(known, known.begin() + 11),
                  [](const MethodOptions* of) { return of->name(); });
@@ -253,6 +289,13 @@ Scene read_scene(const YAML::Node& node) {
   fields.read_list("cameras", [&](const YAML::Node& item, const std::string& path) {
     scene.cameras.push_back(read_camera(item, path));
   });
+  fields.read_list("fluids", [&](const YAML::Node& item, const std::string& path) {
+    scene.fluids.push_back(read_fluid(item, path));
+  });
+  fields.read_list("pools", [&](const YAML::Node& item, const std::string& path) {
+    scene.pools.push_back(read_pool(item, path));
+  });
+  fields.read("fluid_spacing", scene.fluid_spacing);
   return scene;
 }
 

@@ -11,6 +11,7 @@
 #include <string>
 #include <vector>
 
+#include "camera_benchmark.h"
 #include "cut_scenes.h"
 #include "fixed_substeps.h"
 #include "machine_rates.h"
@@ -123,6 +124,7 @@ int main(int argc, char** argv) {
         ->MinTime(0.3);
   }
   add_organ_benchmarks(Device::kCpu, [](const Tissue& tissue) { return tissue.device_name(); });
+  add_camera_benchmarks(Device::kCpu);
   add_mls_rows();
   add_pbd_rows();
   benchmark::Initialize(&argc, argv);

@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "benchmark/camera_benchmark.h"
 #include "benchmark/mls_benchmark.h"
 #include "benchmark/organ_benchmark.h"
 #include "benchmark/pbd_benchmark.h"
@@ -208,6 +209,7 @@ int main(int argc, char** argv) {
         [new_memory](benchmark::State& bench) { read(bench, kSizes[2], new_memory); });
   }
   add_organ_benchmarks(Device::kCuda, plan_of);
+  add_camera_benchmarks(Device::kCuda);
   add_mls_cuda_rows();
   add_pbd_cuda_rows();
   benchmark::Initialize(&argc, argv);

@@ -23,7 +23,7 @@ void run(benchmark::State& bench, pbd::State& s) {
   const int items = s.links.size() + s.bends.size() + s.strains.size() + s.elastics.size();
   for (auto _ : bench) pbd::project_constraints(s, 1e-3f, false);
   for (int i = 0; i < 3 * s.vertices.size(); ++i) {
-    if (!std::isfinite(s.vertices.x[4 * (i / 3) + i % 3])) return bench.SkipWithError("not finite");
+    if (!std::isfinite(s.vertices.moved[4 * (i / 3) + i % 3])) return bench.SkipWithError("not finite");
   }
   bench.SetItemsProcessed(static_cast<std::int64_t>(bench.iterations()) * items);
   bench.counters["constraints"] = items;

@@ -3,6 +3,7 @@
 
 #if defined(TISSUE_SIM_CUDA)
 #include <cmath>
+#include <cstdio>
 
 #include "compute/device_array.h"
 #include "cuda_mpm_tissue.h"
@@ -76,6 +77,13 @@ TEST_F(SubstepOnGpu, HoldsWhileTissueIsPressedAndCut) {
       ASSERT_FALSE(report.result.blew_up) << frame;
       energy[which] = report.result.elastic_energy;
       gain[which] += report.result.substep / cautious / 90;
+      if (frame % 15 != 14) continue;
+      const auto pieces = simulation.tissue().fragments();
+      const Fragment& piece = pieces[pieces.size() - 1];  // once it is off, the end
+      std::printf("%s %2d: %.4e J, probe %.4f N, %zu pieces, this at %.5f %.5f %.5f\n",
+                  which == 1 ? "gpu" : "cpu", frame, energy[which],
+                  report.result.loads[1].mean.force.z(), pieces.size(), piece.centroid.x(),
+                  piece.centroid.y(), piece.centroid.z());
     }
     EXPECT_GT(simulation.tissue().fragments().size(), 1u);
   }

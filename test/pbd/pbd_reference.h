@@ -44,12 +44,19 @@ inline std::vector<Vec3> gradient(const Constraint& c, Corners at, double step) 
   return g;
 }
 
+/// How far a projection moves for a change of its multiplier: sum of w |g|^2.
+template <class Vertices>
+double mobility_of(const PbdPlaces& p, const Vertices& vertices, const std::vector<Vec3>& g) {
+  double sum = 0;
+  for (std::size_t i = 0; i < g.size(); ++i) sum += p.w[vertices[i]] * g[i].squaredNorm();
+  return sum;
+}
+
 /// XPBD: dlambda = -(C + a lambda) / (sum w |g|^2 + a), times `share`.
 template <class Vertices>
 void project(PbdPlaces& p, const Vertices& vertices, double c, const std::vector<Vec3>& g, double a,
              double share, double& lambda) {
-  double sum = a;
-  for (std::size_t i = 0; i < g.size(); ++i) sum += p.w[vertices[i]] * g[i].squaredNorm();
+  const double sum = a + mobility_of(p, vertices, g);
   if (!(sum > 0)) return;
   const double change = -share * (c + a * lambda) / sum;
   lambda += change;
@@ -96,7 +103,7 @@ struct PbdMultipliers {
 };
 
 inline void project_constraints(const pbd::State& s, double h, PbdPlaces& p, PbdMultipliers& m,
-                                bool backward = false) {
+                                bool once = true, bool backward = false) {
   const double inverse_h2 = 1 / (h * h);
   const auto elastics = [&] {
     each_constraint(s.elastics, m.elastics, backward, [&](int c, std::array<double, 2>& lambda) {
@@ -110,9 +117,14 @@ inline void project_constraints(const pbd::State& s, double h, PbdPlaces& p, Pbd
       const Eigen::Matrix3d along = f - cof / std::cbrt(j);
       const double cd = std::sqrt(0.5 * along.squaredNorm() + 1e-20);
       const Eigen::Matrix3d of_edges = along / cd * q.transpose();
-      project(p, vertices, cd,
-              {-of_edges.rowwise().sum(), of_edges.col(0), of_edges.col(1), of_edges.col(2)},
-              n[9] * inverse_h2, 1, lambda[0]);
+      const std::vector<Vec3> g = {-of_edges.rowwise().sum(), of_edges.col(0), of_edges.col(1),
+                                   of_edges.col(2)};
+      double a = n[9] * inverse_h2;
+      if (once) {  // what one projection softens
+        a = std::max(a - pbd::Elastic::kSoftened * mobility_of(p, vertices, g),
+                     pbd::Elastic::kLeastCompliance * a);
+      }
+      project(p, vertices, cd, g, a, 1, lambda[0]);
       const Constraint volume = [&](const Corners& at) {
         return deformation(at, q).determinant() - 1;
       };
@@ -163,9 +175,8 @@ inline void project_constraints(const pbd::State& s, double h, PbdPlaces& p, Pbd
       };
       const Corners at = corners_of(p, vertices);
       const std::vector<Vec3> g = gradient(angle, at, 1e-8);
-      double mobility = 0;
-      for (int i = 0; i < 4; ++i) mobility += p.w[vertices[i]] * g[i].squaredNorm();
-      const double a = std::max(n[1] * inverse_h2, mobility / pbd::Bending::kMostOfStep);
+      const double a =
+          std::max(n[1] * inverse_h2, mobility_of(p, vertices, g) / pbd::Bending::kMostOfStep);
       constexpr double kMost = pbd::Bending::kMost;
       project(p, vertices, std::min(kMost, std::max(-kMost, angle(at))), g, a, 1, lambda[0]);
     });
@@ -193,8 +204,9 @@ inline PbdPlaces step(const pbd::State& s, double h) {
     }
   }
   PbdMultipliers multipliers;
-  for (int i = 0; i < pbd::sweeps_of_step(s); ++i) {
-    project_constraints(s, h, p, multipliers, i % 2 == 1);
+  const int sweeps = pbd::sweeps_of_step(s);
+  for (int i = 0; i < sweeps; ++i) {
+    project_constraints(s, h, p, multipliers, sweeps == 1, i % 2 == 1);
   }
   return p;
 }

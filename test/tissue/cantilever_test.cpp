@@ -22,12 +22,6 @@ class Cantilever : public EachMethod {
     if (GetParam().method == Method::kMls) cells /= 2;
     Scene scene = on_this(beam_scene(beam, cells, true));
     scene.mls.spacing = 0;
-    if (GetParam().method == Method::kPbd) {
-      // What one projection a step leaves undone falls with the square of the step (docs/pbd.md).
-      const double speed = std::sqrt(beam.young_modulus / beam.density);
-      const double frame = 1 / (4 * bending_frequency(beam, Ends::kClampedFree));
-      scene.pbd.steps = static_cast<int>(std::ceil(frame * speed / (0.4 * scene.cell_size)));
-    }
     return bend(scene, beam, curve);
   }
 };

@@ -51,12 +51,11 @@ Scene hung_scene(const Hung& hung) {
   return s;
 }
 
-/// What is published of each piece is what its points show; only clouds of mpm tell more than
-/// places.
+/// What is published of each piece is what its points show.
 void expect_pieces_of_the_cloud(Simulation& simulation, const std::string& where) {
   Tissue& tissue = simulation.tissue();
   PointSelection with;
-  if (simulation.scene().method == Method::kMpm) with.fields = kVelocity | kVolume;
+  with.fields = kVelocity | kVolume;
   std::vector<std::uint8_t> cloud;
   const int count = tissue.read_points(with, cloud);
   struct Sum {
@@ -69,9 +68,9 @@ void expect_pieces_of_the_cloud(Simulation& simulation, const std::string& where
   for (int i = 0; i < count; ++i) {
     const std::uint8_t* const at = cloud.data() + i * with.point_size();
     Point p;
-    float more[4] = {};  // velocity and volume
+    float more[4];  // velocity and volume
     std::memcpy(&p, at, sizeof p);
-    if (with.fields != 0) std::memcpy(more, at + sizeof p, sizeof more);
+    std::memcpy(more, at + sizeof p, sizeof more);
     const Vec3 place(p.x, p.y, p.z);
     Sum& sum = of_piece[p.fragment];
     ++sum.count;
@@ -89,7 +88,6 @@ void expect_pieces_of_the_cloud(Simulation& simulation, const std::string& where
     EXPECT_EQ(f.point_count, sum.count) << which;
     EXPECT_LT((f.box.min - sum.box.min).norm(), close) << which;
     EXPECT_LT((f.box.max - sum.box.max).norm(), close) << which;
-    if (with.fields == 0) continue;
     EXPECT_NEAR(f.volume, sum.volume, 1e-5 * sum.volume) << which;
     EXPECT_LT((f.centroid - sum.x / sum.volume).norm(), close) << which;
     EXPECT_LT((f.velocity - sum.v / sum.volume).norm(), 1e-4 * (1 + f.velocity.norm())) << which;

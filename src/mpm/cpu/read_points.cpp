@@ -57,7 +57,7 @@ int CpuMpmDevice::read_points(const PointSelection& selection, std::vector<std::
                   sizeof(Point));
     }
   });
-  if (selection.fields != 0) add_point_fields(s, selection, index, count, cloud);
+  add_point_fields(s, selection, index, count, cloud);
   return count;
 }
 

@@ -121,14 +121,15 @@ void push_points(CudaTissue& d, const std::vector<std::int32_t>& changed) {
   if (!points.soft.empty() && d.soft.size() == 0) d.soft.upload(points.soft, d.stream);
   std::vector<CudaPointChange> changes;
   for (const std::int32_t p : changed) {
-    changes.push_back(
-        {p, points.bonds[p], static_cast<std::uint8_t>(points.is_soft(p) ? 1 : 0),
-         static_cast<std::uint8_t>(points.bonds[p] == d.state.whole_bonds[p] ? 1 : 0)});
+    changes.push_back({p, points.bonds[p], static_cast<std::uint8_t>(points.is_soft(p) ? 1 : 0),
+                       static_cast<std::uint8_t>(points.bonds[p] == d.state.whole_bonds[p] ? 1 : 0),
+                       d.outer_points ? d.outer_points->of(d.state, p) : CudaOuterPlace()});
   }
   d.sweep.changes.upload(changes, d.stream);
-  launch_change_points(d.sweep.changes.data(), static_cast<int>(changes.size()), d.bonds.data(),
-                       d.soft.size() > 0 ? d.soft.data() : nullptr,
-                       d.anchors.lightness.size() > 0 ? d.anchors.lightness.data() : nullptr,
+  const auto any = [](const auto& of) { return of.size() > 0 ? of.data() : nullptr; };
+  launch_change_points(d.sweep.changes.data(), static_cast<int>(changes.size()),
+                       {d.bonds.data(), any(d.soft), any(d.anchors.lightness), any(d.outer),
+                        any(d.planes), any(d.area), any(d.with), d.held_by * d.place_parts},
                        d.stream);
 }
 

@@ -5,7 +5,6 @@
 #include <stdexcept>
 
 #include "mpm/cuda/on_device.h"
-#include "mpm/cuda/outer_points.h"
 #include "tools/frame_colliders.h"
 #include "tools/tool_motion.h"
 
@@ -106,10 +105,8 @@ void CudaMpmDevice::begin() {
 void CudaMpmDevice::begun() {
   CudaTissue& d = *tissue_;
   if (d.held_by == 0) return;
-  const OuterPoints outer = outer_points(d.state, d.state.anchors);
-  d.outer.upload(outer.place, d.stream);
-  d.area.upload(outer.area, d.stream);
-  if (d.place_parts > 1) d.planes.upload(outer.plane, d.stream);
+  d.outer_points.emplace(d.state, d.state.anchors);
+  push_outer_points(d);
 }
 
 void CudaMpmDevice::begin_frame(const FrameInput& input, bool move) {

@@ -130,9 +130,30 @@ void push(CudaTissue& d) {
   push_tables(d);
   d.bonds.upload(d.state.points.bonds, d.stream);
   if (!d.state.points.soft.empty()) d.soft.upload(d.state.points.soft, d.stream);
+  push_outer_points(d);
   push_lightness(d);
   push_nodes(d);
   push_anchors(d);
+}
+
+void push_outer_points(CudaTissue& d) {
+  if (!d.outer_points) return;
+  const auto count = static_cast<std::size_t>(d.state.points.size());
+  std::vector<float4> place(count), plane(d.place_parts > 1 ? count : 0);
+  std::vector<float> area(count);
+  d.state.cpu->for_each(
+      static_cast<int>(count),
+      [&](int p) {
+        const CudaOuterPlace at = d.outer_points->of(d.state, p);
+        place[p] = at.place;
+        area[p] = at.area;
+        if (!plane.empty()) plane[p] = at.plane;
+      },
+      4096);
+  d.outer.upload(place, d.stream);
+  d.area.upload(area, d.stream);
+  d.planes.upload(plane, d.stream);
+  check_cuda(cudaStreamSynchronize(d.stream), "receive data");
 }
 
 void push_tables(CudaTissue& d) {

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <array>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -19,6 +20,7 @@
 #include "mpm/cuda/label_pieces.h"
 #include "mpm/cuda/make_tables.h"
 #include "mpm/cuda/near_cells.h"
+#include "mpm/cuda/outer_points.h"
 #include "mpm/cuda/state_on_host.h"
 #include "mpm/cuda/sweep_blade.h"
 #include "mpm/device.h"
@@ -91,7 +93,8 @@ struct CudaTissue {
   DeviceArray<float4> outer, planes;  ///< CudaTables::outer, ::planes
   DeviceArray<float> area;            ///< CudaTables::area
   DeviceArray<std::uint8_t> bonds, soft, with, whole;
-  int held_by = 0, place_parts = 1;  ///< CudaTables::held_by, ::place_parts
+  int held_by = 0, place_parts = 1;         ///< CudaTables::held_by, ::place_parts
+  std::optional<OuterPoints> outer_points;  ///< once it is begun, where colliders touch points
   DeviceArray<float4> u[2], v[2], force[2], u_before;
   /// In a part that is done again: where blocks and nodes went before.
   std::vector<BlockMotion> went;
@@ -238,7 +241,9 @@ NodePushes clear_pushes(CudaTissue& tissue);  ///< for a launch that pushes; slo
 void pass_rim(CudaTissue& tissue, const BladePath& path, bool moves,
               const std::vector<std::int32_t>& broken, std::vector<std::int32_t>& touched);
 void push_points(CudaTissue& tissue, const std::vector<std::int32_t>& changed);  ///< their bonds,
-                                                                                 ///< whether soft
+                                                                                 ///< whether soft,
+                                                                                 ///< their places
+void push_outer_points(CudaTissue& tissue);                                      ///< of all
 
 // Anchors.
 void push_anchors(CudaTissue& tissue);  ///< rows that their faces hold: after push_tables(), or

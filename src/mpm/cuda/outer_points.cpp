@@ -1,8 +1,6 @@
 #include "mpm/cuda/outer_points.h"
 
 #include <algorithm>
-#include <array>
-#include <set>
 
 #include "contact/surface_spring.h"
 #include "mpm/surface/surface_places.h"
@@ -36,7 +34,7 @@ std::set<Cell> cells_beside(const AnchorFaces& faces, const LatticeTissue& tissu
   return cells;
 }
 
-using Places = std::vector<OuterPlace>::const_iterator;  // of a point
+using Places = const OuterPlace*;  // of a point
 
 Vec3 vector_of(const float (&x)[3]) { return Vec3(x[0], x[1], x[2]); }
 
@@ -51,6 +49,17 @@ Vec3 place_amid(Places first, Places last, const Points::Site& s) {
     }
   }
   return x.cwiseMax(from - Vec3::Constant(kFarthest)).cwiseMin(from + Vec3::Constant(kFarthest));
+}
+
+/// Whether any two look away from one another.
+bool face_away(Places first, Places last) {
+  constexpr double kAway = -0.5;  // cosine
+  for (Places one = first; one != last; ++one) {
+    for (Places o = one + 1; o != last; ++o) {
+      if (vector_of(one->normal).dot(vector_of(o->normal)) < kAway) return true;
+    }
+  }
+  return false;
 }
 
 float area_amid(Places first, Places last, double edge) {
@@ -92,29 +101,26 @@ bool has_thin_tools(const Scene& scene) {
   });
 }
 
-OuterPoints outer_points(const LatticeTissue& tissue, const AnchorFaces& faces) {
-  const std::set<Cell> soft = cells_beside(faces, tissue);
-  const std::vector<OuterPlace> all = find_outer_places(tissue);
-  const Array<std::uint8_t>& bonds = tissue.points.bonds;
-  const auto count = static_cast<std::size_t>(tissue.points.size());
-  OuterPoints outer;
-  outer.place.assign(count, float4{0, 0, 0, 0});
-  outer.area.assign(count, 0);
-  outer.plane.assign(count, float4{0, 0, 0, -1});
-  for (auto first = all.begin(); first != all.end();) {
-    const auto last = std::find_if(first, all.end(),
-                                   [&](const OuterPlace& o) { return o.point != first->point; });
-    const Points::Site& s = tissue.points.site[first->point];
-    const bool is_soft = soft.count({s.body, s.x / 2, s.y / 2, s.z / 2}) > 0;
-    const Vec3 x = place_amid(first, last, s);
-    outer.place[first->point] = {
-        static_cast<float>(x[0]), static_cast<float>(x[1]), static_cast<float>(x[2]),
-        static_cast<float>(__builtin_popcount(bonds[first->point]) + (is_soft ? kSoftPlace : 0))};
-    outer.area[first->point] = area_amid(first, last, tissue.bodies[s.body].cell_size / 2);
-    outer.plane[first->point] = plane_amid(first, last);
-    first = last;
-  }
-  return outer;
+OuterPoints::OuterPoints(const LatticeTissue& tissue, const AnchorFaces& faces)
+    : whole_(find_outer_places(tissue)), beside_anchors_(cells_beside(faces, tissue)) {}
+
+CudaOuterPlace OuterPoints::of(const LatticeTissue& tissue, std::int32_t p) const {
+  const Points::Site& s = tissue.points.site[p];
+  const LatticeBody& body = tissue.bodies[s.body];
+  CudaOuterPlace at;
+  OuterPlace places[kBondCount];
+  const Places first = places;
+  const Places last = first + places_of_point(body, tissue.points, whole_, p, places);
+  if (first == last) return at;
+  const bool was_cut = tissue.points.bonds[p] != whole_bonds(body, tissue.points, p);
+  if (was_cut && face_away(first, last)) return at;
+  const bool is_soft = beside_anchors_.count({s.body, s.x / 2, s.y / 2, s.z / 2}) > 0;
+  const Vec3 x = place_amid(first, last, s);
+  at.place = {static_cast<float>(x[0]), static_cast<float>(x[1]), static_cast<float>(x[2]),
+              is_soft ? kSoftPlace : kStiffPlace};
+  at.plane = plane_amid(first, last);
+  at.area = area_amid(first, last, body.cell_size / 2);
+  return at;
 }
 
 }  // namespace tissue_sim

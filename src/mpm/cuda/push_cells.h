@@ -7,7 +7,6 @@
 
 #include "math/bspline.h"
 #include "mpm/cuda/inerters.h"
-#include "mpm/cuda/outer_points.h"
 #include "mpm/cuda/tool_pushes.h"
 
 namespace tissue_sim {
@@ -20,18 +19,15 @@ struct WarpNodes {
 /// Weights of a cell's nodes along each axis at the place where colliders touch a point.
 struct PlaceWeights {
   float at[3], of[3][3];  ///< place in cells from the middle of the cell; [axis][node]
-  bool is_stiff = false;  ///< what holds it off is: outer_points.h
+  bool is_stiff = false;  ///< what holds it off is: kStiffPlace
 
   __device__ __forceinline__ PlaceWeights(const CudaTables& t, int point, int s) {
 #pragma unroll
     for (int a = 0; a < 3; ++a) at[a] = (s >> a & 1) != 0 ? 0.25f : -0.25f;
     if (point >= 0) {
       const float4 place = __ldg(t.outer + point);
-      // What cuts took apart may lie on its other side.
-      const int bonds = __popc(t.bonds[point]);
-      is_stiff = place.w != 0 && place.w == bonds;
-      if (is_stiff || place.w == bonds + kSoftPlace)
-        at[0] = place.x, at[1] = place.y, at[2] = place.z;
+      is_stiff = place.w == kStiffPlace;
+      if (place.w != 0) at[0] = place.x, at[1] = place.y, at[2] = place.z;
     }
     weigh();
   }
@@ -111,14 +107,14 @@ struct ToolPushes {
   float dt, kick, grown;  ///< as CudaFrame::step and ::grown; this is 0 but in the first substep
 };
 
-/// Adds what colliders push the points of a cell with to its nodes. The first eight lanes of the
-/// warp have its points, the first 27 its nodes; of each component of a point's place and velocity
-/// another lane works out the sum. With kParts, each eight lanes have a part of the points' places
-/// instead, and work out all of it.
+/// Adds what colliders push the points of a cell with to its nodes; `itself`: each where it is, and
+/// not at the surface before it. The first eight lanes of the warp have its points, the first 27
+/// its nodes; of each component of a point's place and velocity another lane works out the sum.
+/// With kParts, each eight lanes have a part of the points' places instead, and work out all of it.
 template <bool kParts>
 __device__ __forceinline__ void push_cell(const CudaTables& t, const CudaNodes& state,
-                                          const CudaNearCell& cell, const ToolPushes& pushes,
-                                          WarpNodes& nodes) {
+                                          const CudaNearCell& cell, bool itself,
+                                          const ToolPushes& pushes, WarpNodes& nodes) {
   const int lane = static_cast<int>(threadIdx.x) % 32, k = min(lane, 26);
   const int s = lane % 8, component = min(lane / 8, 2);
   const int at = cell.lane + s * cell.step;
@@ -127,7 +123,7 @@ __device__ __forceinline__ void push_cell(const CudaTables& t, const CudaNodes& 
   const int p = __ldg(t.point + at), node = entry < 0 ? ~entry : entry;
   const float volume = __ldg(t.volume + at);
   const CudaBody& body = t.bodies[cell.body];
-  PlaceWeights weights(t, p, s);
+  PlaceWeights weights(t, itself ? -1 : p, s);
   const int part = kParts ? lane / 8 : 0;
   const bool has_parts = kParts && weights.take_part(t, p, part);
   const float4 u = __ldcg(state.u + node), v = __ldcg(state.v + node);
@@ -213,6 +209,12 @@ __device__ __forceinline__ std::uint32_t thin_ones(const Collider* colliders, st
   return __ballot_sync(0xffffffffu, (near >> c & 1) != 0 && colliders[c].kind != Collider::kJaw &&
                                         stiffer_across(colliders[c].radius, cell_size) > 1);
 }
+/// Those that are blades: their flats push points, where they have cut. At the surface before a
+/// point they would push what they are about to cut, with springs that drag it along.
+__device__ __forceinline__ std::uint32_t blades(const Collider* colliders, std::uint32_t near) {
+  const int c = static_cast<int>(threadIdx.x) % 32;
+  return __ballot_sync(0xffffffffu, (near >> c & 1) != 0 && colliders[c].kind == Collider::kBlade);
+}
 
 /// Pushes for these alone. Out of line, for fronts to keep their registers.
 inline __device__ __noinline__ void push_cell_parts(const CudaTables t, const CudaNodes state,
@@ -220,7 +222,7 @@ inline __device__ __noinline__ void push_cell_parts(const CudaTables t, const Cu
                                                     WarpNodes* nodes) {
   CudaNearCell cell = *of;
   cell.near = thin_ones(pushes.colliders, cell.near, t.bodies[cell.body].cell_size);
-  if (cell.near != 0) push_cell<true>(t, state, cell, pushes, *nodes);
+  if (cell.near != 0) push_cell<true>(t, state, cell, false, pushes, *nodes);
 }
 
 /// What lane `from` of a warp has of a cell.
@@ -286,7 +288,12 @@ struct NearSearch {
         if (parts) {
           one.near &= ~thin_ones(pushes.colliders, one.near, t.bodies[one.body].cell_size);
         }
-        if (one.near != 0) push_cell<false>(t, state, one, pushes, nodes);
+        const std::uint32_t all = one.near, by_blades = blades(pushes.colliders, all);
+#pragma unroll 1  // its code once
+        for (const bool itself : {false, true}) {
+          one.near = itself ? by_blades : all & ~by_blades;
+          if (one.near != 0) push_cell<false>(t, state, one, itself, pushes, nodes);
+        }
         if (parts) {
           push_cell_parts(t, state, cells + __shfl_sync(0xffffffffu, i - step, from), pushes,
                           &nodes);

@@ -109,13 +109,22 @@ __global__ void __launch_bounds__(kThreads) sweep_points(const CudaTables t, con
 
 struct ChangePoints {
   const CudaPointChange* changes;
-  std::uint8_t *bonds, *soft;
-  float* lightness;
+  CudaChangedPoints of;
   __device__ void operator()(int i) const {
     const CudaPointChange& c = changes[i];
-    bonds[c.point] = c.bonds;
-    if (soft != nullptr) soft[c.point] = c.soft;
-    if (lightness != nullptr && c.whole == 0 && lightness[c.point] > 0) lightness[c.point] = 1;
+    of.bonds[c.point] = c.bonds;
+    if (of.soft != nullptr) of.soft[c.point] = c.soft;
+    if (of.lightness != nullptr && c.whole == 0 && of.lightness[c.point] > 0) {
+      of.lightness[c.point] = 1;
+    }
+    if (of.outer == nullptr) return;
+    const float4 was = of.outer[c.point], is = c.outer.place;
+    if (was.x == is.x && was.y == is.y && was.z == is.z && was.w == is.w) return;
+    of.outer[c.point] = is;
+    of.area[c.point] = c.outer.area;
+    if (of.planes != nullptr) of.planes[c.point] = c.outer.plane;
+    std::uint8_t* const with = of.with + static_cast<std::size_t>(c.point) * of.held;
+    for (int k = 0; k < of.held; ++k) with[k] = 0;
   }
 };
 
@@ -127,9 +136,9 @@ void launch_sweep(const CudaTables& tables, const CudaSweep& sweep, cudaStream_t
   check_cuda(cudaGetLastError(), "start a kernel");
 }
 
-void launch_change_points(const CudaPointChange* changes, int count, std::uint8_t* bonds,
-                          std::uint8_t* soft, float* lightness, cudaStream_t stream) {
-  Gpu(stream).for_each(count, ChangePoints{changes, bonds, soft, lightness});
+void launch_change_points(const CudaPointChange* changes, int count, const CudaChangedPoints& of,
+                          cudaStream_t stream) {
+  Gpu(stream).for_each(count, ChangePoints{changes, of});
 }
 
 }  // namespace tissue_sim

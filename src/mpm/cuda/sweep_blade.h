@@ -39,9 +39,18 @@ void launch_sweep(const CudaTables& tables, const CudaSweep& sweep, cudaStream_t
 struct CudaPointChange {
   std::int32_t point;
   std::uint8_t bonds, soft, whole;  ///< `whole`: no bond of its broke
+  CudaOuterPlace outer;
 };
-/// `soft` is null where no point is soft, `lightness` where all are as heavy as their neighbours.
-void launch_change_points(const CudaPointChange* changes, int count, std::uint8_t* bonds,
-                          std::uint8_t* soft, float* lightness, cudaStream_t stream);
+/// What is changed so, per point: see CudaTables.
+struct CudaChangedPoints {
+  std::uint8_t *bonds, *soft;  ///< `soft` is null where no point is soft, ...
+  float* lightness;            ///< ... and this where all are as heavy as their neighbours
+  float4 *outer, *planes;      ///< null where no tool touches points, or none that is thin
+  float* area;
+  std::uint8_t* with;  ///< `held` for each: where it is touched elsewhere, contact begins anew
+  int held;
+};
+void launch_change_points(const CudaPointChange* changes, int count, const CudaChangedPoints& of,
+                          cudaStream_t stream);
 
 }  // namespace tissue_sim

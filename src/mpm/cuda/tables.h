@@ -147,6 +147,27 @@ struct CudaNodes {
   float4* v;
 };
 
+/// The fourth figure of CudaOuterPlace::place: the spring there stands for the surface, or is the
+/// point's own.
+inline constexpr float kStiffPlace = 1, kSoftPlace = 2;
+
+/// Of a point.
+struct CudaOuterPlace {
+  /// At which colliders touch it, in cells from the middle of its cell; the fourth figure is 0
+  /// where they touch the point itself, which has neighbours all around, or surfaces before it and
+  /// behind that a cut left. Where the surface is flat around the point that is straight before it,
+  /// at an edge on the edge: the point's place is brought onto the surface that each of its missing
+  /// bonds stands for (mpm/surface/surface_places.h). It is kSoftPlace where anchors' faces hold
+  /// nodes of the point's cell: that spring needs no inerter, for faces are held as if nodes had
+  /// none.
+  float4 place = {0, 0, 0, 0};
+  /// The plane of the surface there: its axis in the fourth figure, -1 where the place stays whole,
+  /// and the normal, 1 along that. Along it places of points are next to one another.
+  float4 plane = {0, 0, 0, -1};
+  /// What of the surface its places stand for that look one way, that which has most [m^2].
+  float area = 0;
+};
+
 struct CudaTables {
   const CudaBlock* blocks;
   const CudaBody* bodies;
@@ -163,10 +184,9 @@ struct CudaTables {
   const std::int32_t* point;  ///< per lane, -1 where there is none
   const float* partial;       ///< per cell (lane / 8): mu times volume of its points where they are
                               ///< fewer than seven, else 0; see mpm/blocks/stabilisation.h [J]
-  const float4* outer;        ///< per point, where colliders touch it: outer_points.h
-  const float* area;          ///< per point, of the surface there, likewise [m^2]
-  const float4* planes;  ///< per point, the surface's plane there, likewise; null where no tool
-                         ///< is thin
+  const float4* outer;        ///< per point, CudaOuterPlace::place
+  const float* area;          ///< likewise [m^2]
+  const float4* planes;       ///< likewise; null where no tool is thin
   const std::uint8_t* bonds;  ///< per point
   const std::uint8_t* soft;   ///< per point, as Points::soft; null where none is
   const float* lightness;  ///< per point, Points::lightness, 1 where a bond broke; null where all

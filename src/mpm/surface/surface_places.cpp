@@ -51,62 +51,81 @@ std::vector<OuterPlace> find_outer_places(const LatticeTissue& tissue) {
   return places;
 }
 
+namespace {
+
+/// Where a blade went through bond `k` of a point, or tissue tore midway.
+OuterPlace broken_place(const LatticeBody& b, const Points& points, std::int32_t p, int k) {
+  const Points::Site& s = points.site[p];
+  const BondOffset o = bond_offset(k);
+  const int axis = k < kForwardBond ? 2 - k : k - kForwardBond;
+  const bool forward = k >= kForwardBond;
+  const std::int32_t lower = forward ? p : b.point(s.x + o.x, s.y + o.y, s.z + o.z);
+  const Crossing* crossing = points.crossings.find(lower, axis);
+  const float at = crossing == nullptr ? 0.5f : crossing->place;  // torn: between the two
+  const int odd[3] = {s.x & 1, s.y & 1, s.z & 1};
+  OuterPlace place{p, static_cast<std::uint8_t>(k), {}, {}};
+  for (int a = 0; a < 3; ++a) place.place[a] = odd[a] != 0 ? 0.25f : -0.25f;
+  place.place[axis] += 0.5f * (forward ? at : at - 1);
+  if (crossing == nullptr) {
+    place.normal[axis] = forward ? 1 : -1;
+    return place;
+  }
+  const bool turned = (crossing->normal[axis] > 0) != forward;
+  for (int a = 0; a < 3; ++a) {
+    place.normal[a] = turned ? -crossing->normal[a] : crossing->normal[a];
+  }
+  return place;
+}
+
+}  // namespace
+
+int places_of_point(const LatticeBody& b, const Points& points,
+                    const std::vector<OuterPlace>& whole_ones, std::int32_t p,
+                    OuterPlace (&places)[kBondCount]) {
+  const std::uint8_t bonds = points.bonds[p], whole = whole_bonds(b, points, p);
+  auto outer =
+      std::lower_bound(whole_ones.begin(), whole_ones.end(), p,
+                       [](const OuterPlace& o, std::int32_t point) { return o.point < point; });
+  int count = 0;
+  for (int k = 0; k < kBondCount; ++k) {
+    if ((bonds >> k & 1) != 0) continue;
+    if ((whole >> k & 1) != 0) {
+      places[count++] = broken_place(b, points, p, k);
+      continue;
+    }
+    while (outer != whole_ones.end() && outer->point == p && outer->bond < k) ++outer;
+    if (outer != whole_ones.end() && outer->point == p && outer->bond == k) {
+      places[count++] = *outer;
+    }
+  }
+  return count;
+}
+
 std::vector<SurfacePlace> surface_places_of(const LatticeBody& b, const Points& points,
                                             const Block& block) {
   std::vector<SurfacePlace> places;
   const auto edge = static_cast<float>(b.cell_size / 2);
-  const auto add = [&](SurfacePlace place) {
-    place.area = place_area(place.normal, place.key % 8, edge);
-    if (place.area > 0) places.push_back(place);
-  };
   for (int z = 0; z < block.nz; ++z) {
     for (int j = 0; j < block.stride; ++j) {
       const std::int32_t cell = z * 8 * block.stride + j, node = z * block.plane + block.cell[j];
       for (int sub = 0; sub < 8; ++sub) {
         const std::int32_t p = block.point[cell + sub * block.stride];
         if (p < 0 || points.bonds[p] == kAllBonds) continue;
-        const std::uint8_t whole = whole_bonds(b, points, p);
-        auto outer = std::lower_bound(
-            points.outer.begin(), points.outer.end(), p,
-            [](const OuterPlace& o, std::int32_t point) { return o.point < point; });
-        for (int k = 0; k < kBondCount; ++k) {
-          if ((points.bonds[p] >> k & 1) != 0) continue;
+        OuterPlace of_point[kBondCount];
+        const int count = places_of_point(b, points, points.outer, p, of_point);
+        for (int i = 0; i < count; ++i) {
+          const OuterPlace& o = of_point[i];
           SurfacePlace place{cell,
                              node,
                              p,
                              static_cast<std::uint8_t>(1 << sub),
-                             static_cast<std::uint8_t>(8 * (sub + 1) + k),
+                             static_cast<std::uint8_t>(8 * (sub + 1) + o.bond),
                              {},
                              {},
-                             0};
-          const BondOffset o = bond_offset(k);
-          if ((whole >> k & 1) == 0) {
-            while (outer != points.outer.end() && outer->point == p && outer->bond < k) ++outer;
-            if (outer == points.outer.end() || outer->point != p || outer->bond != k) continue;
-            std::copy_n(outer->place, 3, place.place);
-            std::copy_n(outer->normal, 3, place.normal);
-            add(place);
-            continue;
-          }
-          const int axis = k < kForwardBond ? 2 - k : k - kForwardBond;
-          const bool forward = k >= kForwardBond;
-          const std::int32_t lower =
-              forward
-                  ? p
-                  : b.point(points.site[p].x + o.x, points.site[p].y + o.y, points.site[p].z + o.z);
-          const Crossing* crossing = points.crossings.find(lower, axis);
-          const float at = crossing == nullptr ? 0.5f : crossing->place;  // torn: between the two
-          for (int a = 0; a < 3; ++a) place.place[a] = (sub >> a & 1) != 0 ? 0.25f : -0.25f;
-          place.place[axis] += 0.5f * (forward ? at : at - 1);
-          if (crossing == nullptr) {
-            place.normal[axis] = forward ? 1 : -1;
-          } else {
-            const bool turned = (crossing->normal[axis] > 0) != forward;
-            for (int a = 0; a < 3; ++a) {
-              place.normal[a] = turned ? -crossing->normal[a] : crossing->normal[a];
-            }
-          }
-          add(place);
+                             place_area(o.normal, o.bond, edge)};
+          std::copy_n(o.place, 3, place.place);
+          std::copy_n(o.normal, 3, place.normal);
+          if (place.area > 0) places.push_back(place);
         }
       }
     }

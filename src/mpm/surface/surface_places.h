@@ -29,6 +29,11 @@ inline float place_area(const float (&normal)[3], int bond, float edge) {
 /// Of all bodies as they were while whole: by point, then bond. Throws what NearestSurface throws.
 std::vector<OuterPlace> find_outer_places(const LatticeTissue& tissue);
 
+/// Those of a point, by bond: its own of `whole_ones`, and where its bonds broke. Returns how many.
+int places_of_point(const LatticeBody& body, const Points& points,
+                    const std::vector<OuterPlace>& whole_ones, std::int32_t point,
+                    OuterPlace (&places)[kBondCount]);
+
 /// Those of a block, in the order of cells and keys; those of cuts among them.
 std::vector<SurfacePlace> surface_places_of(const LatticeBody& body, const Points& points,
                                             const Block& block);

@@ -98,7 +98,7 @@ void CudaPbdTissue::keep_momentum(int steps, float h) {
   const double duration = steps * h;
   const bool are_known = s.damped_for == duration;
   if (!pbd::make_dampers(s, duration)) {
-    change_rigidly(changes, false);
+    change_rigidly(changes);
     return;
   }
   // damp_neighbours(); what moves rigidly is taken off together with what is given above.
@@ -116,7 +116,7 @@ void CudaPbdTissue::keep_momentum(int steps, float h) {
     change.centre = now[c].centre;
     change.spin -= spins[c];
   }
-  change_rigidly(changes, true);
+  change_rigidly(changes);
   if (d.damping.is_empty()) {
     d.damping.record(d.stream, [&] {
       launch_pbd_dampers(d.field(), s.dampers.begin, d.stream);
@@ -132,10 +132,10 @@ void CudaPbdTissue::keep_momentum(int steps, float h) {
     changes[c] = {true, 1, after[c].centre, Vec3::Zero(),
                   spins[c] + spin_of(after[c], left[c] - after[c].angular)};
   }
-  change_rigidly(changes, false);
+  change_rigidly(changes);
 }
 
-void CudaPbdTissue::change_rigidly(const std::vector<pbd::RigidChange>& changes, bool weigh) {
+void CudaPbdTissue::change_rigidly(const std::vector<pbd::RigidChange>& changes) {
   OnDevice& d = *device_;
   // The GPU reads them where they are: what was launched before was waited for.
   d.host_changes.resize(changes.size());
@@ -154,8 +154,7 @@ void CudaPbdTissue::change_rigidly(const std::vector<pbd::RigidChange>& changes,
   if (!any) return;
   const bool few = d.way != Way::kLaunches;
   if (!few) d.changes.upload(packed, changes.size(), d.stream);
-  launch_pbd_changes(d.field(), d.component.data(), few ? packed : d.changes.data(), weigh,
-                     d.stream);
+  launch_pbd_changes(d.field(), d.component.data(), few ? packed : d.changes.data(), d.stream);
 }
 
 }  // namespace tissue_sim

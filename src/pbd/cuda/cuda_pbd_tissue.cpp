@@ -4,6 +4,7 @@
 
 #include "pbd/cuda/on_device.h"
 #include "pbd/find_touches.h"
+#include "pbd/model.h"
 
 namespace tissue_sim {
 namespace {
@@ -24,7 +25,8 @@ CudaPbdTissue::CudaPbdTissue(const Scene& scene, std::vector<std::string> notes)
     : PbdTissue(scene, std::move(notes)), device_(std::make_unique<OnDevice>()) {
   OnDevice& d = *device_;
   d.gpu = open_gpu(d.stream);
-  const auto colliders = static_cast<std::size_t>(scene.pbd.steps) * collider_count(scene);
+  const int steps = pbd::steps_of(*state_, 1 / scene.frame_rate);
+  const auto colliders = static_cast<std::size_t>(steps) * collider_count(scene);
   d.frame.resize(1);
   d.colliders.resize(colliders);
   d.loads.resize(colliders * pbd::kPbdLoadSums);
@@ -45,7 +47,7 @@ void CudaPbdTissue::push() {
   OnDevice& d = *device_;
   const pbd::Vertices& v = state_->vertices;
   upload(v.x, v.x.size() / 4, d.x, d.stream);
-  upload(v.predicted, v.size(), d.predicted, d.stream);
+  upload(v.moved, v.moved.size() / 4, d.moved, d.stream);
   upload(v.v, v.v.size() / 4, d.v, d.stream);
   d.wait("receive data");
   d.host_is_current = true;
@@ -58,6 +60,7 @@ void CudaPbdTissue::push_all() {
   d.mass.upload(v.mass, d.stream);
   d.pushed.resize(d.count);
   d.pushed.clear(d.stream);
+  d.predicted.resize(d.count);
   upload_constraints();
   choose_way();
   upload_chunks();
@@ -82,6 +85,7 @@ void CudaPbdTissue::pull() {
   if (d.host_is_current) return;
   pbd::Vertices& v = state_->vertices;
   d.x.download(reinterpret_cast<float4*>(v.x.data()), d.count, d.stream);
+  d.moved.download(reinterpret_cast<float4*>(v.moved.data()), d.count, d.stream);
   d.v.download(reinterpret_cast<float4*>(v.v.data()), d.count, d.stream);
   d.wait("send data");
   d.host_is_current = true;
@@ -197,14 +201,6 @@ PbdTissue::Figures CudaPbdTissue::measure() {
     sum.finite = sum.finite && m.finite != 0;
   }
   return sum;
-}
-
-std::vector<std::uint8_t> CudaPbdTissue::save() {
-  OnDevice& d = *device_;
-  d.predicted.download(reinterpret_cast<float4*>(state_->vertices.predicted.data()), d.count,
-                       d.stream);
-  d.wait("send data");
-  return PbdTissue::save();
 }
 
 void CudaPbdTissue::project(float h, int times) {

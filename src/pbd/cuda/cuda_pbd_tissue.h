@@ -30,7 +30,6 @@ class CudaPbdTissue final : public PbdTissue {
 
   std::string device_name() const override;
   GpuPoints read_points_on_gpu(const PointSelection& selection) override;
-  std::vector<std::uint8_t> save() override;
 
   // For tests and the benchmark.
   void pull() override;
@@ -63,8 +62,7 @@ class CudaPbdTissue final : public PbdTissue {
   std::vector<pbd::Flight> flights(const pbd::CudaPbdFlight* of_chunks) const;
   /// Momentum of what flies freely is kept, and viscosity acts.
   void keep_momentum(int steps, float h);
-  /// `weigh`: what dampers need of each vertex goes beside its velocity, else it goes.
-  void change_rigidly(const std::vector<pbd::RigidChange>& changes, bool weigh);
+  void change_rigidly(const std::vector<pbd::RigidChange>& changes);
 
   std::unique_ptr<OnDevice> device_;
 };

@@ -49,6 +49,7 @@ struct CudaPbdFrame {
 struct CudaPbdField {
   int count = 0;      ///< vertices
   float4* x;          ///< as Vertices::x, with its padding
+  float4* moved;      ///< as Vertices::moved, with its padding
   float4* predicted;  ///< [count], as v
   float4* v;
   const double* mass;    ///< [kg]
@@ -129,9 +130,8 @@ void launch_pbd_steps(const CudaPbdField& field, const CudaPbdFrame& frame, int 
 bool fits_pbd_block(const CudaPbdField& field);
 void launch_pbd_flights(const CudaPbdField& field, const CudaPbdFlights& flights,
                         CudaPbdFlight* result, cudaStream_t stream);
-/// `weigh`: the inverse mass becomes the fourth number of a velocity, as dampers want it; else 0.
 void launch_pbd_changes(const CudaPbdField& field, const std::int32_t* component,
-                        const CudaPbdChange* changes, bool weigh, cudaStream_t stream);
+                        const CudaPbdChange* changes, cudaStream_t stream);
 /// Velocities by each of the dampers once; `begin` as CudaPbdColours has them.
 void launch_pbd_dampers(const CudaPbdField& field, const std::vector<std::int32_t>& begin,
                         cudaStream_t stream);

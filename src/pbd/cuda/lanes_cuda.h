@@ -3,6 +3,7 @@
 
 #include "pbd/contact.h"
 #include "pbd/cuda/device_state.h"
+#include "pbd/project.h"
 
 namespace tissue_sim {
 namespace pbd {
@@ -40,28 +41,29 @@ __device__ __forceinline__ Item<Kind> load_staged(const ConstraintBlock<Kind>* b
 }
 
 template <class Kind, bool kKeep>
-__device__ __forceinline__ void project_item(const Item<Kind>& item, float inverse_h2, float4* x,
-                                             float* multipliers, int index) {
+__device__ __forceinline__ void project_item(const Item<Kind>& item, float inverse_h2,
+                                             const float4* x, float4* moved, float* multipliers,
+                                             int index) {
   constexpr int kMultipliers = ConstraintSet<Kind>::kMultipliers;
   constexpr bool kKept = kKeep && Kind::kMultipliers > 0;
   Vertex<float> v[Kind::kVertices];
 #pragma unroll
   for (int i = 0; i < Kind::kVertices; ++i) {
-    const float4 at = x[item.vertex[i]];
-    v[i] = {at.x, at.y, at.z, at.w};
+    const float4 at = x[item.vertex[i]], by = moved[item.vertex[i]];
+    v[i] = {at.x, at.y, at.z, at.w, {by.x, by.y, by.z}};
   }
   float lambda[kMultipliers];
   float* kept = multipliers + (index / kLanes) * (kMultipliers * kLanes) + index % kLanes;
 #pragma unroll
   for (int i = 0; i < kMultipliers; ++i) lambda[i] = kKept ? kept[i * kLanes] : 0.0f;
-  Kind::project(v, item.number, inverse_h2, lambda);
+  project_kind<Kind, kKeep>(v, item.number, inverse_h2, lambda);
 #pragma unroll
   for (int i = 0; i < kMultipliers; ++i) {
     if (kKept) kept[i * kLanes] = lambda[i];
   }
 #pragma unroll
   for (int i = 0; i < Kind::kVertices; ++i) {
-    x[item.vertex[i]] = make_float4(v[i].x, v[i].y, v[i].z, v[i].w);
+    moved[item.vertex[i]] = make_float4(v[i].moved.x, v[i].moved.y, v[i].moved.z, 0);
   }
 }
 
@@ -70,7 +72,8 @@ __device__ __forceinline__ void project_item(const Item<Kind>& item, float inver
 /// kRounds times.
 template <class Kind, bool kKeep, int kRounds = 1>
 __device__ __forceinline__ void project_colours(const CudaPbdSet<Kind>& set, int first, int last,
-                                                bool backward, float inverse_h2, float4* x) {
+                                                bool backward, float inverse_h2, const float4* x,
+                                                float4* moved) {
   if (first >= last) return;
   const int threads = static_cast<int>(blockDim.x), thread = static_cast<int>(threadIdx.x);
   int colour = backward ? last - 1 : first;
@@ -94,10 +97,12 @@ __device__ __forceinline__ void project_colours(const CudaPbdSet<Kind>& set, int
     }
 #pragma unroll
     for (int r = 0; r < kRounds; ++r, item += threads) {
-      if (item < end) project_item<Kind, kKeep>(now[r], inverse_h2, x, set.multipliers, item);
+      if (item < end)
+        project_item<Kind, kKeep>(now[r], inverse_h2, x, moved, set.multipliers, item);
     }
     for (; item < end; item += threads) {
-      project_item<Kind, kKeep>(load_item(set.blocks, item), inverse_h2, x, set.multipliers, item);
+      project_item<Kind, kKeep>(load_item(set.blocks, item), inverse_h2, x, moved, set.multipliers,
+                                item);
     }
     __syncthreads();
     item = next;
@@ -125,21 +130,24 @@ __device__ __forceinline__ void add_to_flight(const float4& x, const float4& v, 
 }
 
 __device__ __forceinline__ void predict_vertex(const CudaPbdField& f, const StepNumbers& step,
-                                               int i, float4* place) {
-  const float4 x4 = *place, v4 = f.v[i];
-  float x[4] = {x4.x, x4.y, x4.z, x4.w}, v[3] = {v4.x, v4.y, v4.z}, predicted[3];
-  predict(step, x, predicted, v);
-  *place = make_float4(x[0], x[1], x[2], x[3]);
+                                               int i, const float4& place, float4* moved) {
+  const float4 m4 = *moved, v4 = f.v[i];
+  const float x[4] = {place.x, place.y, place.z, place.w};
+  float v[3] = {v4.x, v4.y, v4.z}, m[3] = {m4.x, m4.y, m4.z}, predicted[3];
+  predict(step, x, m, predicted, v);
+  *moved = make_float4(m[0], m[1], m[2], 0);
   f.predicted[i] = make_float4(predicted[0], predicted[1], predicted[2], 0);
   f.v[i] = make_float4(v[0], v[1], v[2], 0);
 }
 
 __device__ __forceinline__ void take_velocity_of(const CudaPbdField& f, const StepNumbers& step,
-                                                 int i, const float4& place) {
-  const float4 p4 = f.predicted[i], v4 = f.v[i];
-  const float x[3] = {place.x, place.y, place.z}, predicted[3] = {p4.x, p4.y, p4.z};
-  float v[3] = {v4.x, v4.y, v4.z};
-  take_velocity(step, x, predicted, v);
+                                                 int i, float4* place, float4* moved) {
+  const float4 x4 = *place, m4 = *moved, p4 = f.predicted[i], v4 = f.v[i];
+  const float predicted[3] = {p4.x, p4.y, p4.z};
+  float x[3] = {x4.x, x4.y, x4.z}, m[3] = {m4.x, m4.y, m4.z}, v[3] = {v4.x, v4.y, v4.z};
+  take_velocity(step, x, m, predicted, v);
+  *place = make_float4(x[0], x[1], x[2], x4.w);
+  *moved = make_float4(m[0], m[1], m[2], 0);
   f.v[i] = make_float4(v[0], v[1], v[2], 0);
 }
 
@@ -150,10 +158,14 @@ __device__ __forceinline__ void add_load(unsigned long long* load, double value)
 /// Pushes a vertex out of the colliders of this step, one after the other: contact.cpp.
 __device__ __forceinline__ void touch_vertex(const CudaPbdField& f, float h,
                                              const CudaPbdCollider* colliders, int count,
-                                             unsigned long long* loads, int i, float4* place) {
-  const float4 x4 = *place;
+                                             unsigned long long* loads, int i, const float4& x4,
+                                             float4* moved) {
   if (x4.w == 0) return;
-  float x[4] = {x4.x, x4.y, x4.z, x4.w};
+  const float4 m4 = *moved;
+  const float start[3] = {x4.x, x4.y, x4.z};
+  float m[3] = {m4.x, m4.y, m4.z};
+  RoundedPlace place = place_of(start, m);
+  const float* x = place.at;
   bool touches = false;
   for (int c = 0; c < count; ++c) {
     const CudaPbdCollider& collider = colliders[c];
@@ -163,11 +175,12 @@ __device__ __forceinline__ void touch_vertex(const CudaPbdField& f, float h,
                x[1] > collider.max[1] || x[2] < collider.min[2] || x[2] > collider.max[2]) {
       continue;
     }
-    const Gap g = gap(collider.shape, x);
+    const Gap g = gap_of(collider.shape, place);
     if (!(g.distance < 0)) continue;
     const float4 p4 = f.predicted[i], v4 = f.v[i];
     const float predicted[3] = {p4.x, p4.y, p4.z}, v[3] = {v4.x, v4.y, v4.z};
-    const ContactPush push = push_out(collider.shape, g, h, f.mass[i], predicted, v, x);
+    const ContactPush push = push_out(collider.shape, g, h, f.mass[i], predicted, v, x, x4.w, m);
+    place = place_of(start, m);
     touches = true;
     if (collider.shape.tool < 0) continue;  // nobody asks what the ground carries
     unsigned long long* load = loads + kPbdLoadSums * c;
@@ -184,7 +197,7 @@ __device__ __forceinline__ void touch_vertex(const CudaPbdField& f, float h,
   }
   if (!touches) return;
   f.pushed[i] = 1;
-  *place = make_float4(x[0], x[1], x[2], x[3]);
+  *moved = make_float4(m[0], m[1], m[2], 0);
 }
 
 }  // namespace pbd

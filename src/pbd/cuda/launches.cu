@@ -18,30 +18,32 @@ constexpr int kFewBlocks = kThreadsOfFew / kLanes;  ///< of constraints: one for
 template <class Kind, bool kKeep>
 __global__ void __launch_bounds__(kThreads)
     pbd_project_colour(const ConstraintBlock<Kind>* blocks, int count, float* multipliers,
-                       const CudaPbdFrame* frame, float4* x) {
+                       const CudaPbdFrame* frame, const float4* x, float4* moved) {
   const int item = static_cast<int>(blockIdx.x * blockDim.x + threadIdx.x);
   if (item >= count * kLanes) return;
   const float inverse_h2 = frame->step.inverse_h2;
-  project_item<Kind, kKeep>(load_item(blocks, item), inverse_h2, x, multipliers, item);
+  project_item<Kind, kKeep>(load_item(blocks, item), inverse_h2, x, moved, multipliers, item);
 }
 
 template <class Kind, bool kKeep>
 __global__ void __launch_bounds__(kThreadsOfFew)
     pbd_project_few(CudaPbdSet<Kind> set, int first, int last, bool backward,
-                    const CudaPbdFrame* frame, float4* x) {
-  project_colours<Kind, kKeep>(set, first, last, backward, frame->step.inverse_h2, x);
+                    const CudaPbdFrame* frame, const float4* x, float4* moved) {
+  project_colours<Kind, kKeep>(set, first, last, backward, frame->step.inverse_h2, x, moved);
 }
 
 /// All colours of what touches, few as they are, by one block: how many there are is not known when
 /// the launch is put into a graph.
 __global__ void __launch_bounds__(kThreadsOfFew)
-    pbd_project_touches(CudaPbdSet<Touch> set, const CudaPbdFrame* frame, float4* x) {
-  project_colours<Touch, false>(set, 0, frame->touch_colours, false, frame->step.inverse_h2, x);
+    pbd_project_touches(CudaPbdSet<Touch> set, const CudaPbdFrame* frame, const float4* x,
+                        float4* moved) {
+  project_colours<Touch, false>(set, 0, frame->touch_colours, false, frame->step.inverse_h2, x,
+                                moved);
 }
 
 __global__ void __launch_bounds__(kThreads) pbd_predict(CudaPbdField f) {
   const int i = static_cast<int>(blockIdx.x * blockDim.x + threadIdx.x);
-  if (i < f.count) predict_vertex(f, f.frame->step, i, f.x + i);
+  if (i < f.count) predict_vertex(f, f.frame->step, i, f.x[i], f.moved + i);
 }
 
 __global__ void __launch_bounds__(kThreads) pbd_touch(CudaPbdField f) {
@@ -49,13 +51,14 @@ __global__ void __launch_bounds__(kThreads) pbd_touch(CudaPbdField f) {
   if (i >= f.count) return;
   const int count = f.frame->colliders, step = *f.step;
   touch_vertex(f, f.frame->step.h, f.colliders + static_cast<std::size_t>(step) * count, count,
-               f.loads + static_cast<std::size_t>(step) * count * kPbdLoadSums, i, f.x + i);
+               f.loads + static_cast<std::size_t>(step) * count * kPbdLoadSums, i, f.x[i],
+               f.moved + i);
 }
 
 __global__ void __launch_bounds__(kThreads) pbd_take_velocities(CudaPbdField f) {
   const int i = static_cast<int>(blockIdx.x * blockDim.x + threadIdx.x);
   if (i == 0) *f.step += 1;
-  if (i < f.count) take_velocity_of(f, f.frame->step, i, f.x[i]);
+  if (i < f.count) take_velocity_of(f, f.frame->step, i, f.x + i, f.moved + i);
 }
 
 /// Calls of(first, last) with the colours of each launch, or `backward`.
@@ -81,14 +84,14 @@ void launch_set(const CudaPbdField& field, const CudaPbdSet<Kind>& set,
   each_launch(begin, backward, [&](int first, int last) {
     const int count = begin[first + 1] - begin[first];
     if (count <= kFewBlocks) {
-      pbd_project_few<Kind, kKeep>
-          <<<1, kThreadsOfFew, 0, stream>>>(set, first, last, backward, field.frame, field.x);
+      pbd_project_few<Kind, kKeep><<<1, kThreadsOfFew, 0, stream>>>(
+          set, first, last, backward, field.frame, field.x, field.moved);
     } else {
       const int blocks = (count * kLanes + kThreads - 1) / kThreads;
       float* multipliers = set.multipliers + static_cast<std::ptrdiff_t>(begin[first]) *
                                                  (ConstraintSet<Kind>::kMultipliers * kLanes);
       pbd_project_colour<Kind, kKeep><<<blocks, kThreads, 0, stream>>>(
-          set.blocks + begin[first], count, multipliers, field.frame, field.x);
+          set.blocks + begin[first], count, multipliers, field.frame, field.x, field.moved);
     }
   });
 }
@@ -145,7 +148,7 @@ void launch_pbd_projections(const CudaPbdField& field, const CudaPbdColours& col
 void launch_pbd_dampers(const CudaPbdField& field, const std::vector<std::int32_t>& begin,
                         cudaStream_t stream) {
   CudaPbdField of_velocities = field;
-  of_velocities.x = field.v;
+  of_velocities.moved = field.v;
   launch_set<Damper, false>(of_velocities, field.dampers, begin, false, stream);
   check_cuda(cudaGetLastError(), "damp neighbours");
 }
@@ -164,7 +167,8 @@ void launch_pbd_step(const CudaPbdField& field, const CudaPbdColours& colours,
     launch_pbd_projections(field, colours, keep, i % 2 == 1, stream);
   }
   if (field.may_touch) {
-    pbd_project_touches<<<1, kThreadsOfFew, 0, stream>>>(field.touches, field.frame, field.x);
+    pbd_project_touches<<<1, kThreadsOfFew, 0, stream>>>(field.touches, field.frame, field.x,
+                                                         field.moved);
   }
   pbd_touch<<<blocks, kThreads, 0, stream>>>(field);
   pbd_take_velocities<<<blocks, kThreads, 0, stream>>>(field);

@@ -48,15 +48,13 @@ __global__ void __launch_bounds__(kThreads)
 }
 
 __global__ void __launch_bounds__(kThreads)
-    pbd_change(CudaPbdField f, const std::int32_t* component, const CudaPbdChange* changes,
-               bool weigh) {
+    pbd_change(CudaPbdField f, const std::int32_t* component, const CudaPbdChange* changes) {
   const int i = static_cast<int>(blockIdx.x * blockDim.x + threadIdx.x);
   if (i >= f.count) return;
   const CudaPbdChange& c = changes[component[i]];
   if (c.is_free == 0) return;
   const float4 x = f.x[i];
   float4 v = f.v[i];
-  v.w = weigh ? x.w : 0;
   const double d[3] = {x.x - c.centre[0], x.y - c.centre[1], x.z - c.centre[2]};
   const auto keep = static_cast<float>(c.keep);
   v.x = keep * v.x + static_cast<float>(c.linear[0] + (c.spin[1] * d[2] - c.spin[2] * d[1]));
@@ -86,8 +84,8 @@ __device__ __forceinline__ void add_energy(const CudaPbdField& f, const CudaPbdS
     Vertex<float> v[Kind::kVertices];
 #pragma unroll
     for (int i = 0; i < Kind::kVertices; ++i) {
-      const float4 at = f.x[item.vertex[i]];
-      v[i] = {at.x, at.y, at.z, at.w};
+      const float4 at = f.x[item.vertex[i]], by = f.moved[item.vertex[i]];
+      v[i] = {at.x, at.y, at.z, at.w, {by.x, by.y, by.z}};
     }
     sum += Kind::energy(v, item.number);
   }
@@ -122,9 +120,9 @@ void launch_pbd_flights(const CudaPbdField& field, const CudaPbdFlights& flights
 }
 
 void launch_pbd_changes(const CudaPbdField& field, const std::int32_t* component,
-                        const CudaPbdChange* changes, bool weigh, cudaStream_t stream) {
+                        const CudaPbdChange* changes, cudaStream_t stream) {
   const int blocks = (field.count + kThreads - 1) / kThreads;
-  pbd_change<<<blocks, kThreads, 0, stream>>>(field, component, changes, weigh);
+  pbd_change<<<blocks, kThreads, 0, stream>>>(field, component, changes);
   check_cuda(cudaGetLastError(), "keep momentum");
 }
 

@@ -38,7 +38,7 @@ struct CudaPbdTissue::OnDevice {
   std::string gpu;  ///< name
   LentPoints lent;
   int count = 0;  ///< vertices
-  DeviceArray<float4> x, predicted, v;
+  DeviceArray<float4> x, moved, predicted, v;
   DeviceArray<double> mass;
   DeviceArray<std::uint8_t> pushed;
   bool host_is_current = true;
@@ -82,6 +82,7 @@ struct CudaPbdTissue::OnDevice {
     pbd::CudaPbdField f;
     f.count = count;
     f.x = x.data();
+    f.moved = moved.data();
     f.predicted = predicted.data();
     f.v = v.data();
     f.mass = mass.data();

@@ -97,7 +97,7 @@ __device__ __forceinline__ Staged<Kind> stage(const CudaPbdSet<Kind>& set, std::
 template <class Kind, bool kKeep>
 __device__ __forceinline__ void project_tail(const CudaPbdSet<Kind>& set,
                                              const Staged<Kind>& staged, bool backward,
-                                             float inverse_h2, float4* x) {
+                                             float inverse_h2, const float4* x, float4* moved) {
   if (set.tail >= set.colours) return;
   if (threadIdx.x < 32) {
     const int first = staged.begin[set.tail] * kLanes;
@@ -105,7 +105,7 @@ __device__ __forceinline__ void project_tail(const CudaPbdSet<Kind>& set,
     for (int left = set.colours - set.tail; left > 0; --left, colour += backward ? -1 : 1) {
       const int item = staged.begin[colour] * kLanes + static_cast<int>(threadIdx.x);
       if (item < staged.begin[colour + 1] * kLanes) {
-        project_item<Kind, kKeep>(load_staged(staged.tail, item - first), inverse_h2, x,
+        project_item<Kind, kKeep>(load_staged(staged.tail, item - first), inverse_h2, x, moved,
                                   set.multipliers, item);
       }
       __syncwarp();
@@ -116,12 +116,13 @@ __device__ __forceinline__ void project_tail(const CudaPbdSet<Kind>& set,
 
 template <class Kind, bool kKeep, int kRounds>
 __device__ __forceinline__ void project_set(const CudaPbdSet<Kind>& set, const Staged<Kind>& staged,
-                                            bool backward, float inverse_h2, float4* x) {
+                                            bool backward, float inverse_h2, const float4* x,
+                                            float4* moved) {
   CudaPbdSet<Kind> of = set;
   of.begin = staged.begin;
-  if (backward) project_tail<Kind, kKeep>(set, staged, true, inverse_h2, x);
-  project_colours<Kind, kKeep, kRounds>(of, 0, set.tail, backward, inverse_h2, x);
-  if (!backward) project_tail<Kind, kKeep>(set, staged, false, inverse_h2, x);
+  if (backward) project_tail<Kind, kKeep>(set, staged, true, inverse_h2, x, moved);
+  project_colours<Kind, kKeep, kRounds>(of, 0, set.tail, backward, inverse_h2, x, moved);
+  if (!backward) project_tail<Kind, kKeep>(set, staged, false, inverse_h2, x, moved);
 }
 
 /// Threads of a block: tetrahedra take twice the registers.
@@ -133,14 +134,18 @@ __global__ void __launch_bounds__(kThreads<kTets>, 1)
     pbd_steps(CudaPbdField f, CudaPbdFrame frame, int steps, CudaPbdExchange exchange) {
   extern __shared__ float4 places[];
   const int thread = static_cast<int>(threadIdx.x), threads = static_cast<int>(blockDim.x);
-  for (int i = thread; i < f.count + 4 * kLanes; i += threads) places[i] = f.x[i];
-  auto* words = reinterpret_cast<std::int32_t*>(places + f.count + 4 * kLanes);
+  float4* const moved = places + f.count + 4 * kLanes;
+  for (int i = thread; i < f.count + 4 * kLanes; i += threads) {
+    places[i] = f.x[i];
+    moved[i] = f.moved[i];
+  }
+  auto* words = reinterpret_cast<std::int32_t*>(moved + f.count + 4 * kLanes);
   const Staged<Distance> links = stage(f.links, words);
   const Staged<Bending> bends = stage(f.bends, words);
   const Staged<Elastic> elastics = stage(f.elastics, words);
   const Staged<Strain> strains = stage(f.strains, words);
   const int of_steps = steps * frame.colliders;
-  float4 *const v = f.v, *const predicted = f.predicted;
+  float4* const v = f.v;
   if (kShared) {  // what a step reads of each vertex and of colliders lies at hand, too
     f.v = reinterpret_cast<float4*>(words);
     f.predicted = f.v + f.count;
@@ -161,40 +166,46 @@ __global__ void __launch_bounds__(kThreads<kTets>, 1)
       forget_multipliers(f.links);
       forget_multipliers(f.bends);
     }
-    for (int i = thread; i < f.count; i += threads) predict_vertex(f, step, i, places + i);
+    for (int i = thread; i < f.count; i += threads)
+      predict_vertex(f, step, i, places[i], moved + i);
     __syncthreads();
     for (int sweep = 0; sweep < f.sweeps; ++sweep) {
       const bool backward = kKeep && sweep % 2 == 1;  // a step of one sweep has none
       if (backward) {
-        project_set<Bending, kKeep, 1>(f.bends, bends, true, inverse_h2, places);
-        project_set<Distance, kKeep, 2>(f.links, links, true, inverse_h2, places);
+        project_set<Bending, kKeep, 1>(f.bends, bends, true, inverse_h2, places, moved);
+        project_set<Distance, kKeep, 2>(f.links, links, true, inverse_h2, places, moved);
       }
       if (kTets) {
-        if (backward) project_set<Strain, false, 1>(f.strains, strains, true, inverse_h2, places);
-        project_set<Elastic, kKeep, 1>(f.elastics, elastics, backward, inverse_h2, places);
-        if (!backward) project_set<Strain, false, 1>(f.strains, strains, false, inverse_h2, places);
+        if (backward)
+          project_set<Strain, false, 1>(f.strains, strains, true, inverse_h2, places, moved);
+        project_set<Elastic, kKeep, 1>(f.elastics, elastics, backward, inverse_h2, places, moved);
+        if (!backward)
+          project_set<Strain, false, 1>(f.strains, strains, false, inverse_h2, places, moved);
       }
       if (!backward) {
-        project_set<Distance, kKeep, 2>(f.links, links, false, inverse_h2, places);
-        project_set<Bending, kKeep, 1>(f.bends, bends, false, inverse_h2, places);
+        project_set<Distance, kKeep, 2>(f.links, links, false, inverse_h2, places, moved);
+        project_set<Bending, kKeep, 1>(f.bends, bends, false, inverse_h2, places, moved);
       }
     }
-    project_colours<Touch, false>(f.touches, 0, frame.touch_colours, false, inverse_h2, places);
+    project_colours<Touch, false>(f.touches, 0, frame.touch_colours, false, inverse_h2, places,
+                                  moved);
     const std::size_t first = static_cast<std::size_t>(s) * frame.colliders;
     for (int i = thread; i < f.count; i += threads) {
       touch_vertex(f, step.h, f.colliders + first, frame.colliders, f.loads + first * kPbdLoadSums,
-                   i, places + i);
+                   i, places[i], moved + i);
     }
     __syncthreads();
-    for (int i = thread; i < f.count; i += threads) take_velocity_of(f, step, i, places[i]);
+    for (int i = thread; i < f.count; i += threads) {
+      take_velocity_of(f, step, i, places + i, moved + i);
+    }
   }
-  for (int i = thread; i < f.count; i += threads) f.x[i] = places[i];
+  for (int i = thread; i < f.count; i += threads) {
+    f.x[i] = places[i];
+    f.moved[i] = moved[i];
+  }
   __syncthreads();
   if (kShared) {
-    for (int i = thread; i < f.count; i += threads) {
-      v[i] = f.v[i];
-      predicted[i] = f.predicted[i];
-    }
+    for (int i = thread; i < f.count; i += threads) v[i] = f.v[i];
   }
   copy_words(f.loads, exchange.loads, of_steps * kPbdLoadSums);
   sum_flights(f, exchange.chunks, places, exchange.flights + exchange.chunks.count);
@@ -203,7 +214,7 @@ __global__ void __launch_bounds__(kThreads<kTets>, 1)
 std::size_t shared_bytes(const CudaPbdField& field) {
   const int words = staged_words(field.links) + staged_words(field.bends) +
                     staged_words(field.elastics) + staged_words(field.strains);
-  return (static_cast<std::size_t>(field.count) + 4 * kLanes) * sizeof(float4) +
+  return 2 * (static_cast<std::size_t>(field.count) + 4 * kLanes) * sizeof(float4) +
          static_cast<std::size_t>(words) * 4;
 }
 

@@ -1,0 +1,445 @@
+// A substep: densities and pressures, forces, motion. Each particle sums over its neighbours by
+// number and writes what is its own, so threads change no bit.
+#include <algorithm>
+#include <cmath>
+
+#include "fluid/fluid_state.h"
+
+namespace tissue_sim {
+namespace {
+
+/// Of sound over a smoothing length (half of the kernel's reach).
+constexpr float kCourant = 0.4f;
+/// Viscosity that keeps the particles' own jitter down, as Monaghan's alpha.
+constexpr float kAlpha = 0.02f;
+/// Viscosity against changes of volume alone, over that of sound in a smoothing length: it takes
+/// the ringing out and leaves what flows.
+constexpr float kRinging = 0.25f;
+/// What the kernel sums up to where particles have settled, and how much of a small change of
+/// density that sum shows (a particle itself does not come nearer): measured in a periodic box for
+/// FluidKernel::reach = kFluidReach spacings.
+constexpr float kPacking = 1.0076f, kResponse = 0.983f;
+/// Of a spacing: nearer to a wall no particle comes.
+constexpr float kRoom = 0.02f;
+constexpr int kParticlesEach = 128;
+
+struct Substep {
+  float dt;      // [s]
+  float weight;  // of the interval
+  float end;     // share of the interval at its end
+  float gravity[3];
+  float keep;  // of speed, after damping
+  const std::vector<Collider>& colliders;
+};
+
+float artificial_viscosity(const FluidState& s, const FluidLaw& law) {
+  return law.viscosity + 0.1f * kAlpha * law.density * law.sound() * 0.5f * s.kernel.reach;
+}
+
+void place_triangles(FluidState& s, const FluidWalls& walls, float share,
+                     std::vector<WallTriangle>& out) {
+  out.resize(walls.size());
+  s.cpu->for_each(
+      walls.size(),
+      [&](int t) {
+        const float *begin = &walls.begin[std::size_t{9} * t],
+                    *end = &walls.end[std::size_t{9} * t];
+        for (int i = 0; i < 9; ++i) {
+          out[t].corner[i / 3][i % 3] = begin[i] + share * (end[i] - begin[i]);
+        }
+        out[t].finish();
+      },
+      512);
+}
+
+/// How far anything moved since it was listed [m].
+float moved_since(FluidState& s, const std::vector<float>& corners) {
+  float most2 = 0;
+  const FluidParticles& p = s.particles;
+  for (int i = 0; i < p.size(); ++i) {
+    const float d[3] = {p.x[0][i] - s.lists.x[0][i], p.x[1][i] - s.lists.x[1][i],
+                        p.x[2][i] - s.lists.x[2][i]};
+    most2 = std::max(most2, dot3(d, d));
+  }
+  for (std::size_t c = 0; c + 2 < corners.size(); c += 3) {
+    const float d[3] = {corners[c] - s.lists.corners[c], corners[c + 1] - s.lists.corners[c + 1],
+                        corners[c + 2] - s.lists.corners[c + 2]};
+    most2 = std::max(most2, dot3(d, d));
+  }
+  return std::sqrt(most2);
+}
+
+/// Density, pressure and what it weighs.
+void press(FluidState& s, const Substep& step, int i) {
+  FluidParticles& p = s.particles;
+  const FluidKernel& w = s.kernel;
+  const float x[3] = {p.x[0][i], p.x[1][i], p.x[2][i]}, reach2 = w.reach * w.reach;
+  float sum = p.volume[i] * w.value(0);
+  for (std::int32_t e = s.lists.begin[i]; e < s.lists.begin[i + 1]; ++e) {
+    const std::int32_t j = s.lists.other[e];
+    const float d[3] = {x[0] - p.x[0][j], x[1] - p.x[1][j], x[2] - p.x[2][j]};
+    const float r2 = dot3(d, d);
+    if (r2 < reach2) sum += p.volume[j] * w.value(std::sqrt(r2));
+  }
+  WallShare tissue;
+  for (std::int32_t e = s.lists.wall_begin[i]; e < s.lists.wall_begin[i + 1]; ++e) {
+    const WallShare of = triangle_share(w, s.now[s.lists.wall[e]], x);
+    tissue.share += of.share;
+    s.share[e] = of.face;
+  }
+  // Walls at right angles each take their share of what the others leave.
+  const float open = std::max(1 - tissue.share, 0.1f);
+  float clear = open;
+  for (const Collider& c : step.colliders) clear *= 1 - plane_share(w, gap(c, x).distance).share;
+  clear = std::max(clear, 0.05f);
+  const float dense = 1 + (sum / (kPacking * clear) - 1) / kResponse;
+  const FluidLaw& law = s.laws[p.kind[i]];
+  const float damping = kRinging * law.density * law.sound() * 0.5f * w.reach;
+  const float rate = p.dense[i] > 0 ? (dense - p.dense[i]) / step.dt : 0;
+  p.dense[i] = dense;
+  p.pressure[i] = dense > 1 ? std::max(0.0f, law.bulk_modulus * (dense - 1) + damping * rate) : 0;
+  // Of the energy that the pressure does work against, the slopes by the sum and by the walls.
+  const float slope = p.pressure[i] / (dense * dense * kPacking * kResponse * clear);
+  s.factor[i] = slope;
+  s.strength[i] = p.volume[i] * slope * sum;
+  for (std::int32_t e = s.lists.wall_begin[i]; e < s.lists.wall_begin[i + 1]; ++e) {
+    s.share[e] *= s.strength[i] / open;
+  }
+}
+
+/// Forces; the speed after them. s.share becomes impulses.
+void push(FluidState& s, const Substep& step, ColliderLoad* loads, int i) {
+  FluidParticles& p = s.particles;
+  const FluidKernel& w = s.kernel;
+  const float x[3] = {p.x[0][i], p.x[1][i], p.x[2][i]}, v[3] = {p.v[0][i], p.v[1][i], p.v[2][i]};
+  const float reach2 = w.reach * w.reach, soft2 = 0.0025f * reach2;
+  const FluidLaw& law = s.laws[p.kind[i]];
+  const float viscosity = artificial_viscosity(s, law);
+  float force[3] = {};
+  for (std::int32_t e = s.lists.begin[i]; e < s.lists.begin[i + 1]; ++e) {
+    const std::int32_t j = s.lists.other[e];
+    const float d[3] = {x[0] - p.x[0][j], x[1] - p.x[1][j], x[2] - p.x[2][j]};
+    const float r2 = dot3(d, d);
+    if (r2 >= reach2) continue;
+    const float u[3] = {v[0] - p.v[0][j], v[1] - p.v[1][j], v[2] - p.v[2][j]};
+    const float eta = p.kind[j] == p.kind[i]
+                          ? viscosity
+                          : 0.5f * (viscosity + artificial_viscosity(s, s.laws[p.kind[j]]));
+    const float along = 10 * eta * dot3(u, d) / (r2 + soft2) - (s.factor[i] + s.factor[j]);
+    const float scale = p.volume[i] * p.volume[j] * along * w.slope_by_r(std::sqrt(r2));
+    for (int a = 0; a < 3; ++a) force[a] += scale * d[a];
+  }
+  FluidState::Touch& touch = s.touches[i];
+  touch = {-1, {}};
+  float nearest = 1e30f;
+  for (std::int32_t e = s.lists.wall_begin[i]; e < s.lists.wall_begin[i + 1]; ++e) {
+    if (!(s.share[e] > 0)) continue;
+    const WallTriangle& t = s.now[s.lists.wall[e]];
+    for (int a = 0; a < 3; ++a) force[a] += s.share[e] * t.normal[a];
+    s.share[e] *= step.dt;
+    const float d[3] = {x[0] - t.middle[0], x[1] - t.middle[1], x[2] - t.middle[2]};
+    if (dot3(d, d) < nearest) nearest = dot3(d, d), touch.triangle = s.lists.wall[e];
+  }
+  for (std::size_t c = 0; c < step.colliders.size(); ++c) {
+    const Gap g = gap(step.colliders[c], x);
+    const WallShare of = plane_share(w, g.distance);
+    if (!(of.face > 0)) continue;
+    const float push = s.strength[i] * of.face / (1 - of.share);
+    float on[3], arm[3], turn[3];
+    for (int a = 0; a < 3; ++a) {
+      force[a] += push * g.normal[a];
+      on[a] = -push * g.normal[a];
+      arm[a] = x[a] - g.distance * g.normal[a] - step.colliders[c].position[a];
+    }
+    cross3(arm, on, turn);
+    for (int a = 0; a < 3; ++a) {
+      loads[c].force[a] += on[a];
+      loads[c].torque[a] += turn[a];
+    }
+  }
+  const float by_mass = step.dt / (p.volume[i] * law.density);
+  for (int a = 0; a < 3; ++a) {
+    s.v_next[a][i] = step.keep * (v[a] + step.dt * step.gravity[a] + by_mass * force[a]);
+  }
+}
+
+/// Whether a place that moves from x to y meets a triangle that moves meanwhile, or ends too near
+/// to it; then by how much y is to be raised along its normal.
+bool meets(const WallTriangle& begin, const WallTriangle& end, const float* x, const float* y,
+           float margin, float& raise) {
+  const float before = begin.height(x), after = end.height(y);
+  if (after >= margin || before < -0.5f * margin) return false;
+  // Where it passes the plane, or ends above it.
+  const float share = after < 0 ? std::max(before, 0.0f) / (std::max(before, 0.0f) - after) : 1.0f;
+  float corner[3][3], place[3];
+  for (int a = 0; a < 3; ++a) {
+    place[a] = x[a] + share * (y[a] - x[a]);
+    for (int k = 0; k < 3; ++k) {
+      corner[k][a] = begin.corner[k][a] + share * (end.corner[k][a] - begin.corner[k][a]);
+    }
+  }
+  for (int k = 0; k < 3; ++k) {
+    const float *from = corner[k], *to = corner[(k + 1) % 3];
+    const float e[3] = {to[0] - from[0], to[1] - from[1], to[2] - from[2]};
+    const float d[3] = {place[0] - from[0], place[1] - from[1], place[2] - from[2]};
+    float c[3];
+    cross3(e, d, c);
+    if (dot3(c, end.normal) < -1e-3f * end.edge2) return false;
+  }
+  raise = margin - after;
+  return true;
+}
+
+/// Moves a particle to where no wall is in its way; what a wall takes of its speed is an impulse.
+void move(FluidState& s, const Substep& step, ColliderLoad* loads, int i) {
+  FluidParticles& p = s.particles;
+  const float margin = kRoom * s.spacing;
+  const float mass = p.volume[i] * s.laws[p.kind[i]].density;
+  float x[3], y[3], v[3];
+  for (int a = 0; a < 3; ++a) {
+    x[a] = p.x[a][i];
+    v[a] = s.v_next[a][i];
+    y[a] = x[a] + step.dt * v[a];
+  }
+  FluidState::Touch& touch = s.touches[i];
+  touch.triangle = -1;
+  for (int pass = 0; pass < 3; ++pass) {
+    float deepest = 0;
+    std::int32_t hit = -1;
+    for (std::int32_t e = s.lists.wall_begin[i]; e < s.lists.wall_begin[i + 1]; ++e) {
+      const std::int32_t t = s.lists.wall[e];
+      float raise = 0;
+      if (meets(s.now[t], s.next[t], x, y, margin, raise) && raise > deepest) {
+        deepest = raise;
+        hit = t;
+      }
+    }
+    if (hit < 0) break;
+    const WallTriangle &from = s.now[hit], &to = s.next[hit];
+    float u[3];
+    for (int a = 0; a < 3; ++a) {
+      u[a] = v[a] - (to.middle[a] - from.middle[a]) / step.dt;
+      y[a] += deepest * to.normal[a];
+    }
+    const float into = std::min(0.0f, dot3(u, to.normal));
+    touch.triangle = hit;
+    for (int a = 0; a < 3; ++a) {
+      v[a] -= into * to.normal[a];
+      touch.impulse[a] += mass * into * to.normal[a];
+    }
+  }
+  for (std::size_t c = 0; c < step.colliders.size(); ++c) {
+    const Collider& of = step.colliders[c];
+    const Gap g = gap(of, y);
+    if (g.distance >= margin) continue;
+    float u[3], on[3], arm[3], turn[3];
+    velocity_at(of, y, u);
+    for (int a = 0; a < 3; ++a) u[a] = v[a] - u[a];
+    const float into = std::min(0.0f, dot3(u, g.normal));
+    for (int a = 0; a < 3; ++a) {
+      y[a] += (margin - g.distance) * g.normal[a];
+      v[a] -= into * g.normal[a];
+      on[a] = mass * into * g.normal[a] / step.dt;
+      arm[a] = y[a] - of.position[a];
+    }
+    cross3(arm, on, turn);
+    for (int a = 0; a < 3; ++a) {
+      loads[c].force[a] += on[a];
+      loads[c].torque[a] += turn[a];
+    }
+  }
+  for (int a = 0; a < 3; ++a) {
+    p.x[a][i] = y[a];
+    p.v[a][i] = v[a];
+  }
+}
+
+/// Calls f(i, loads) for each particle; loads are summed by chunks, in order.
+template <class F>
+void with_loads(FluidState& s, std::vector<ColliderLoad>& loads, const F& f) {
+  const int n = s.particles.size(), chunks = (n + kParticlesEach - 1) / kParticlesEach;
+  const std::size_t colliders = loads.size();
+  std::vector<ColliderLoad> of(chunks * colliders);
+  s.cpu->for_each(chunks, [&](int chunk) {
+    for (int i = chunk * kParticlesEach; i < std::min(n, (chunk + 1) * kParticlesEach); ++i) {
+      f(i, of.data() + chunk * colliders);
+    }
+  });
+  for (int chunk = 0; chunk < chunks; ++chunk) {
+    for (std::size_t c = 0; c < colliders; ++c) {
+      for (int a = 0; a < 3; ++a) {
+        loads[c].force[a] += of[chunk * colliders + c].force[a];
+        loads[c].torque[a] += of[chunk * colliders + c].torque[a];
+      }
+    }
+  }
+}
+
+/// Impulses on triangles go to their corners in equal parts.
+void collect(FluidState& s, FluidWalls& walls) {
+  s.cpu->for_each(
+      walls.size(),
+      [&](int t) {
+        float sum = 0;
+        for (std::int32_t k = s.lists.entry_begin[t]; k < s.lists.entry_begin[t + 1]; ++k) {
+          sum += s.share[s.lists.entry[k]];
+        }
+        for (int i = 0; i < 9; ++i) {
+          walls.impulse[std::size_t{9} * t + i] -= sum * s.now[t].normal[i % 3] / 3;
+        }
+      },
+      256);
+  for (const FluidState::Touch& touch : s.touches) {
+    if (touch.triangle < 0) continue;
+    for (int i = 0; i < 9; ++i) {
+      walls.impulse[std::size_t{9} * touch.triangle + i] += touch.impulse[i % 3] / 3;
+    }
+  }
+}
+
+void substep(FluidState& s, const Substep& step, FluidWalls& walls,
+             std::vector<ColliderLoad>& loads) {
+  const int n = s.particles.size();
+  for (auto* field : {&s.factor, &s.strength, &s.v_next[0], &s.v_next[1], &s.v_next[2]}) {
+    field->resize(n);
+  }
+  s.share.resize(s.lists.wall.size());
+  s.touches.assign(n, {-1, {}});
+  std::vector<ColliderLoad> forces(step.colliders.size());
+  s.cpu->for_each(
+      n, [&](int i) { press(s, step, i); }, kParticlesEach);
+  with_loads(s, forces, [&](int i, ColliderLoad* of) { push(s, step, of, i); });
+  place_triangles(s, walls, step.end, s.next);
+  with_loads(s, forces, [&](int i, ColliderLoad* of) { move(s, step, of, i); });
+  collect(s, walls);
+  s.now.swap(s.next);
+  for (std::size_t c = 0; c < forces.size(); ++c) {
+    for (int a = 0; a < 3; ++a) {
+      loads[c].force[a] += step.weight * forces[c].force[a];
+      loads[c].torque[a] += step.weight * forces[c].torque[a];
+    }
+  }
+}
+
+}  // namespace
+
+double stable_fluid_step(const FluidState& s) {
+  float fastest = 0, least = 1e30f;
+  const FluidParticles& p = s.particles;
+  for (int i = 0; i < p.size(); ++i) {
+    const float v[3] = {p.v[0][i], p.v[1][i], p.v[2][i]};
+    fastest = std::max(fastest, dot3(v, v));
+  }
+  fastest = std::sqrt(fastest);
+  const float length = 0.5f * s.kernel.reach;
+  for (const FluidLaw& law : s.laws) {
+    const float nu = artificial_viscosity(s, law) / law.density;
+    least =
+        std::min({least, kCourant * length / (law.sound() + fastest), 0.1f * length * length / nu});
+  }
+  return least;
+}
+
+int advance_fluid(FluidState& s, const FluidDrive& drive, FluidWalls& walls,
+                  std::vector<ColliderLoad>& loads) {
+  walls.impulse.resize(walls.end.size());
+  if (s.particles.size() == 0) return 0;
+  const int count = std::max(1, static_cast<int>(std::ceil(drive.duration / stable_fluid_step(s))));
+  const auto dt = static_cast<float>(drive.duration / count);
+  place_triangles(s, walls, 0, s.now);
+  const float skin = 0.15f * s.kernel.reach;
+  for (int i = 0; i < count; ++i) {
+    if (!s.lists.made || s.lists.corners.size() != walls.end.size() ||
+        moved_since(s, walls.end) > 0.4f * skin || moved_since(s, walls.begin) > 0.4f * skin) {
+      list_neighbours(s, walls.end, skin);
+    }
+    const double share = (i + 1.0) / count;
+    const std::vector<Collider> colliders = drive.colliders(share);
+    const Vec3& g = drive.gravity;
+    const Substep step{
+        dt,
+        static_cast<float>(1.0 / count),
+        static_cast<float>(share),
+        {static_cast<float>(g[0]), static_cast<float>(g[1]), static_cast<float>(g[2])},
+        static_cast<float>(std::exp(-drive.damping * dt)),
+        colliders};
+    substep(s, step, walls, loads);
+  }
+  return count;
+}
+
+int add_particle(FluidState& s, const Vec3& x, const Vec3& v, double volume, int kind, int fill) {
+  FluidParticles& p = s.particles;
+  for (int a = 0; a < 3; ++a) {
+    p.x[a].push_back(static_cast<float>(x[a]));
+    p.v[a].push_back(static_cast<float>(v[a]));
+  }
+  p.volume.push_back(static_cast<float>(volume));
+  p.pressure.push_back(0);
+  p.dense.push_back(0);
+  p.kind.push_back(static_cast<std::uint8_t>(kind));
+  p.id.push_back(s.next_id++);
+  p.fill.push_back(static_cast<std::int16_t>(fill));
+  s.lists.made = false;
+  return p.size() - 1;
+}
+
+void remove_particles(FluidState& s, const std::vector<std::uint8_t>& gone) {
+  FluidParticles& p = s.particles;
+  const auto keep = [&gone](auto& field) {
+    std::size_t n = 0;
+    for (std::size_t i = 0; i < field.size(); ++i) {
+      if (gone[i] == 0) field[n++] = field[i];
+    }
+    field.resize(n);
+  };
+  for (int a = 0; a < 3; ++a) {
+    keep(p.x[a]);
+    keep(p.v[a]);
+  }
+  keep(p.volume);
+  keep(p.pressure);
+  keep(p.dense);
+  keep(p.kind);
+  keep(p.id);
+  keep(p.fill);
+  s.lists.made = false;
+}
+
+void push_out_of_walls(FluidState& s, const std::vector<float>& corners) {
+  FluidParticles& p = s.particles;
+  const float depth = 0.5f * s.spacing, margin = kRoom * s.spacing;
+  list_neighbours(s, corners, 0);
+  FluidWalls still;
+  still.begin = still.end = corners;
+  place_triangles(s, still, 0, s.now);
+  s.cpu->for_each(
+      p.size(),
+      [&](int i) {
+        const float x[3] = {p.x[0][i], p.x[1][i], p.x[2][i]};
+        float nearest = depth;
+        std::int32_t behind = -1;
+        for (std::int32_t e = s.lists.wall_begin[i]; e < s.lists.wall_begin[i + 1]; ++e) {
+          const WallTriangle& t = s.now[s.lists.wall[e]];
+          const float above[3] = {x[0] + (depth - t.height(x)) * t.normal[0],
+                                  x[1] + (depth - t.height(x)) * t.normal[1],
+                                  x[2] + (depth - t.height(x)) * t.normal[2]};
+          const float below[3] = {x[0] - (depth + t.height(x)) * t.normal[0],
+                                  x[1] - (depth + t.height(x)) * t.normal[1],
+                                  x[2] - (depth + t.height(x)) * t.normal[2]};
+          float raise;
+          if (std::fabs(t.height(x)) >= nearest || !meets(t, t, above, below, margin, raise))
+            continue;
+          nearest = std::fabs(t.height(x));
+          behind = t.height(x) < margin ? s.lists.wall[e] : -1;
+        }
+        if (behind < 0) return;
+        const WallTriangle& t = s.now[behind];
+        const float raise = margin - t.height(x);
+        for (int a = 0; a < 3; ++a) p.x[a][i] += raise * t.normal[a];
+      },
+      64);
+  s.lists.made = false;
+}
+
+}  // namespace tissue_sim

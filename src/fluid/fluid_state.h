@@ -1,0 +1,111 @@
+// Particles of fluid, what they meet, and how they move: weakly compressible, densities by sums
+// over neighbours and walls, so that no volume drifts. docs/fluid.md says why, and how well.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <functional>
+#include <vector>
+
+#include "compute/array.h"
+#include "compute/for_each.h"
+#include "fluid/fluid_laws.h"
+#include "tissue_sim/fluid.h"
+#include "tissue_sim/types.h"
+#include "tools/collider.h"
+
+namespace tissue_sim {
+
+/// Of the spacing, what the kernel reaches.
+inline constexpr float kFluidReach = 2.6f;
+
+/// A Fluid as a substep reads it.
+struct FluidLaw {
+  float density, viscosity, bulk_modulus;
+  float sound() const { return std::sqrt(bulk_modulus / density); }  ///< [m/s]
+};
+
+/// Particles by their number: order never changes, and with it no bit.
+struct FluidParticles {
+  Array<float> x[3], v[3];         ///< [m], [m/s]
+  Array<float> volume;             ///< without pressure [m^3]
+  Array<float> pressure;           ///< of the last substep [Pa]
+  Array<float> dense;              ///< density then, over that without pressure; 0 before
+  std::vector<std::uint8_t> kind;  ///< Scene::fluids
+  std::vector<std::uint32_t> id;   ///< for ever
+  std::vector<std::int16_t> fill;  ///< which of a scene's fills it came from; -1: of a pool, bled
+
+  int size() const { return static_cast<int>(kind.size()); }
+  Vec3 position(int i) const { return {x[0][i], x[1][i], x[2][i]}; }
+};
+
+/// Triangles of tissue's surface over an interval: their corners move linearly, nine numbers each.
+struct FluidWalls {
+  std::vector<float> begin, end;  ///< [m]
+  std::vector<float> impulse;     ///< of the fluid on each corner, since it was cleared [N s]
+  int size() const { return static_cast<int>(end.size() / 9); }
+};
+
+/// Who may act on whom, until anything moved too far. Sums run by number, and what is out of reach
+/// adds nothing: when they were listed changes no bit.
+struct FluidLists {
+  std::vector<std::int32_t> begin, other;        ///< particles of each
+  std::vector<std::int32_t> wall_begin, wall;    ///< triangles of each
+  std::vector<std::int32_t> entry_begin, entry;  ///< of each triangle, in `wall`
+  Array<float> x[3];                             ///< particles when they were listed
+  std::vector<float> corners;                    ///< and triangles
+  bool made = false;
+};
+
+struct FluidState {
+  std::vector<FluidLaw> laws;
+  FluidKernel kernel{0};
+  float spacing = 0;  ///< [m]
+  FluidParticles particles;
+  std::uint32_t next_id = 0;
+  FluidLists lists;
+  Cpu* cpu = nullptr;
+
+  // Of a substep.
+  std::vector<WallTriangle> now, next;
+  Array<float> share;     ///< of each entry of lists.wall: its impulse [N s]
+  Array<float> factor;    ///< of a particle: what its pressure weighs in a pair [Pa]
+  Array<float> strength;  ///< and at a wall, over what other walls leave [N m]
+  Array<float> v_next[3];
+  struct Touch {
+    std::int32_t triangle;  ///< -1 for none
+    float impulse[3];       ///< of the particle on it [N s]
+  };
+  std::vector<Touch> touches;
+};
+
+/// What moves fluid through an interval.
+struct FluidDrive {
+  double duration = 0;          ///< [s]
+  Vec3 gravity = Vec3::Zero();  ///< [m/s^2]
+  double damping = 0;           ///< [1/s]
+  /// Tools and ground at a share of the interval.
+  std::function<std::vector<Collider>(double)> colliders;
+};
+
+/// The longest substep that is stable [s].
+double stable_fluid_step(const FluidState& state);
+
+/// Advances the fluid; `walls` receive impulses on their corners, `loads` what acts on the
+/// colliders as the mean over the interval. Returns the number of substeps.
+int advance_fluid(FluidState& state, const FluidDrive& drive, FluidWalls& walls,
+                  std::vector<ColliderLoad>& loads);
+
+/// Lists anew who may act on whom, with room for `skin` [m].
+void list_neighbours(FluidState& state, const std::vector<float>& corners, float skin);
+
+/// Adds a particle. Returns its index.
+int add_particle(FluidState& state, const Vec3& x, const Vec3& v, double volume, int kind,
+                 int fill);
+/// Takes those out for which `gone` says so.
+void remove_particles(FluidState& state, const std::vector<std::uint8_t>& gone);
+
+/// Puts particles that lie shallowly behind a triangle before it: after a cut made it.
+void push_out_of_walls(FluidState& state, const std::vector<float>& corners);
+
+}  // namespace tissue_sim

@@ -1,0 +1,381 @@
+#include "fluid/tissue_with_fluid.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+
+#include "compute/archive.h"
+#include "fluid/fill.h"
+#include "frame/checksum.h"
+#include "frame/out_of_control.h"
+#include "geometry/ray_tree.h"
+#include "tools/frame_colliders.h"
+#include "tools/tool_motion.h"
+
+namespace tissue_sim {
+namespace {
+
+/// Substeps of the fluid in an interval. What presses on a wall is as old as that: with more, light
+/// walls ring.
+constexpr double kStepsOfInterval = 2;
+
+Pose between(const Pose& a, const Pose& b, double share) {
+  ToolMotion motion;
+  motion.begin = a;
+  motion.end = b;
+  return pose_at(motion, share);
+}
+
+/// An input from one share of its frame to another.
+struct PartOfInput {
+  std::vector<ToolMotion> tools;
+  std::vector<AnchorMotion> anchors;
+  FrameInput input;
+
+  PartOfInput(const FrameInput& whole, double from, double to) : input(whole) {
+    for (const ToolMotion& m : whole.tools) {
+      ToolMotion part = m;
+      part.begin = pose_at(m, from);
+      part.end = pose_at(m, to);
+      const auto jaw = [&m](double share) {
+        return static_cast<float>(m.jaw_begin + share * (m.jaw_end - m.jaw_begin));
+      };
+      part.jaw_begin = jaw(from);
+      part.jaw_end = jaw(to);
+      tools.push_back(part);
+    }
+    for (const AnchorMotion& m : whole.anchors) {
+      anchors.push_back({between(m.begin, m.end, from), between(m.begin, m.end, to)});
+    }
+    input.tools = tools;
+    input.anchors = anchors;
+    if (from > 0) input.cuts = {};
+  }
+};
+
+void add(const CutReport& part, CutReport& sum) {
+  sum.bonds_broken += part.bonds_broken;
+  sum.points_separated += part.points_separated;
+  sum.new_fragments.insert(sum.new_fragments.end(), part.new_fragments.begin(),
+                           part.new_fragments.end());
+  sum.pieces_left_whole = std::max(sum.pieces_left_whole, part.pieces_left_whole);
+  if (!part.why_left_whole.empty()) sum.why_left_whole = part.why_left_whole;
+}
+
+/// Adds what an interval, a `weight` of the frame, brought.
+void add(const FrameResult& part, double weight, FrameResult& sum) {
+  sum.loads.resize(part.loads.size());
+  for (std::size_t i = 0; i < part.loads.size(); ++i) {
+    const ToolLoad& of = part.loads[i];
+    ToolLoad& to = sum.loads[i];
+    to.mean.force += weight * of.mean.force;
+    to.mean.torque += weight * of.mean.torque;
+    to.peak_force = std::max(to.peak_force, of.peak_force);
+    to.grip += weight * of.grip;
+    to.grip_area += weight * of.grip_area;
+    to.points_inside = of.points_inside;
+    to.inside_depth = of.inside_depth;
+  }
+  sum.anchor_loads.resize(part.anchor_loads.size());
+  for (std::size_t i = 0; i < part.anchor_loads.size(); ++i) {
+    sum.anchor_loads[i].force += weight * part.anchor_loads[i].force;
+    sum.anchor_loads[i].torque += weight * part.anchor_loads[i].torque;
+  }
+  sum.cut_reports.insert(sum.cut_reports.end(), part.cut_reports.begin(), part.cut_reports.end());
+  add(part.blade_report, sum.blade_report);
+  add(part.tear_report, sum.tear_report);
+  sum.substeps += part.substeps;
+  sum.substep = std::max(sum.substep, part.substep);
+  sum.fragment_candidates += part.fragment_candidates;
+  sum.fragment_points += part.fragment_points;
+  sum.kinetic_energy = part.kinetic_energy;
+  sum.elastic_energy = part.elastic_energy;
+  sum.max_speed = part.max_speed;
+  sum.blew_up = sum.blew_up || part.blew_up;
+}
+
+std::uint32_t rgb_of(const Vec3& color) {
+  std::uint32_t rgb = 0;
+  for (int a = 0; a < 3; ++a) {
+    rgb = rgb << 8 | static_cast<std::uint32_t>(std::lround(255 * color[a]));
+  }
+  return rgb;
+}
+
+/// The tissue's own scene: steps of position-based dynamics are those of a frame.
+Scene tissue_scene(Scene scene, double interval) {
+  const double intervals = std::ceil(1 / (scene.frame_rate * interval) - 1e-9);
+  scene.pbd.steps = std::max(1, static_cast<int>(std::lround(scene.pbd.steps / intervals)));
+  return scene;
+}
+
+}  // namespace
+
+TissueWithFluid::TissueWithFluid(const Scene& scene, std::vector<std::string> notes, Make make)
+    : scene_(scene), cpu_(scene.threads), kinds_(fluid_kinds(scene)) {
+  fluid_.cpu = &cpu_;
+  fluid_.laws = fluid_laws(scene);
+  fluid_.spacing =
+      static_cast<float>(scene.fluid_spacing > 0 ? scene.fluid_spacing : scene.cell_size);
+  fluid_.kernel.reach = kFluidReach * fluid_.spacing;
+  lost_.assign(kinds_.size(), 0.0);
+  interval_ = kStepsOfInterval * stable_fluid_step(fluid_);
+  tissue_ = make(tissue_scene(scene, interval_), std::move(notes));
+  read_walls();
+  walls_.begin = walls_.end;
+  fill_scene(scene, walls_.end, fluid_);
+  for (std::size_t b = 0; b < scene.bodies.size(); ++b) {
+    const Fill& fill = scene.bodies[b].filled;
+    if (fill.fluid.empty()) continue;
+    fills_.push_back({static_cast<std::int32_t>(b), fill.pressure > 0 ? 1 : 0, 0});
+  }
+  floor_ = scene.ground.enabled ? scene.ground.z : 1e30;
+  for (std::size_t i = 2; i < walls_.end.size(); i += 3)
+    floor_ = std::min<double>(floor_, walls_.end[i]);
+  for (const float z : fluid_.particles.x[2]) floor_ = std::min<double>(floor_, z);
+  floor_ -= 1;
+}
+
+void TissueWithFluid::read_walls() {
+  const std::vector<float> rest = std::move(surface_.rest);
+  walls_.begin.swap(walls_.end);
+  tissue_->read_surface(surface_);
+  walls_.end = surface_.corners;
+  if (rest == surface_.rest) return;
+  walls_.begin = walls_.end;  // a cut or a tear made it anew
+  if (fluid_.particles.size() > 0) push_out_of_walls(fluid_, walls_.end);
+}
+
+void TissueWithFluid::advance(double duration, const FrameInput& input) {
+  result_ = {};
+  follow(input, scene_);
+  const int count = std::max(1, static_cast<int>(std::ceil(duration / interval_ - 1e-9)));
+  for (int i = 0; i < count && !result_.blew_up; ++i) {
+    const PartOfInput part(input, static_cast<double>(i) / count, (i + 1.0) / count);
+    tissue_->advance(duration / count, part.input);
+    add(tissue_->finish(), 1.0 / count, result_);
+    if (result_.blew_up) break;
+    advance_interval(duration / count, part.input);
+    for (std::size_t t = 0; t < result_.loads.size(); ++t) {
+      result_.loads[t].mean.force += fluid_loads_[t].mean.force / count;
+      result_.loads[t].mean.torque += fluid_loads_[t].mean.torque / count;
+    }
+  }
+  drop_lost();
+  const FluidParticles& p = fluid_.particles;
+  for (int i = 0; i < p.size(); ++i) {
+    const double speed2 = Vec3(p.v[0][i], p.v[1][i], p.v[2][i]).squaredNorm();
+    result_.kinetic_energy += 0.5 * p.volume[i] * fluid_.laws[p.kind[i]].density * speed2;
+    if (is_out_of_control(std::sqrt(speed2)) || !p.position(i).allFinite()) result_.blew_up = true;
+  }
+}
+
+void TissueWithFluid::advance_interval(double duration, const FrameInput& input) {
+  read_walls();
+  const FrameColliders tools(scene_, input, duration);
+  const std::vector<Box> reach = tools.reach();
+  std::vector<int> there;
+  for (int c = scene_.ground.enabled ? 0 : 1; c < tools.count(); ++c) {
+    if (reach[c].min.x() <= reach[c].max.x()) there.push_back(c);
+  }
+  FluidDrive drive;
+  drive.duration = duration;
+  drive.gravity = scene_.gravity;
+  drive.damping = scene_.damping;
+  drive.colliders = [&](double share) {
+    const std::vector<Collider> all = tools.at(share);
+    std::vector<Collider> colliders;
+    for (const int c : there) colliders.push_back(all[c]);
+    return colliders;
+  };
+  std::vector<ColliderLoad> loads(there.size()), of_all(tools.count());
+  std::fill(walls_.impulse.begin(), walls_.impulse.end(), 0.0f);
+  advance_fluid(fluid_, drive, walls_, loads);
+  for (std::size_t c = 0; c < there.size(); ++c) of_all[there[c]] = loads[c];
+  fluid_loads_.assign(scene_.tools.size(), {});
+  tools.add_loads(1, tools.at(1).data(), of_all.data(), 1, fluid_loads_);
+  tissue_->push_surface(walls_.impulse);
+  fill_up(duration);
+}
+
+void TissueWithFluid::fill_up(double duration) {
+  constexpr double kSmoothing = 0.02, kRate = 1, kSlowest = 0.1;  // [s], [1/s], [1]
+  for (FillProgress& fill : fills_) {
+    if (fill.filling == 0) continue;
+    FluidParticles& p = fluid_.particles;
+    double pressure = 0, volume = 0;
+    for (int i = 0; i < p.size(); ++i) {
+      if (p.fill[i] != fill.body) continue;
+      pressure += p.volume[i] * p.pressure[i];
+      volume += p.volume[i];
+    }
+    const double share = std::min(1.0, duration / kSmoothing);
+    fill.pressure += share * (pressure / volume - fill.pressure);
+    const double asked = scene_.bodies[fill.body].filled.pressure;
+    const double missing = 1 - fill.pressure / asked;
+    if (!(missing > 0.002)) fill.filling = 0;
+    const auto growth = static_cast<float>(1 + duration * kRate * std::max(kSlowest, missing));
+    for (int i = 0; i < p.size() && fill.filling != 0; ++i) {
+      if (p.fill[i] == fill.body) p.volume[i] *= growth;
+    }
+  }
+}
+
+void TissueWithFluid::drop_lost() {
+  FluidParticles& p = fluid_.particles;
+  std::vector<std::uint8_t> gone(p.size(), 0);
+  bool any = false;
+  for (int i = 0; i < p.size(); ++i) {
+    if (!(p.x[2][i] < floor_)) continue;
+    gone[i] = 1;
+    any = true;
+    lost_[p.kind[i]] += p.volume[i];
+  }
+  if (any) remove_particles(fluid_, gone);
+}
+
+int TissueWithFluid::read_fluid(std::vector<std::uint8_t>& cloud) {
+  const FluidParticles& p = fluid_.particles;
+  cloud.resize(sizeof(FluidPoint) * p.size());
+  for (int i = 0; i < p.size(); ++i) {
+    const FluidPoint point{p.x[0][i], p.x[1][i], p.x[2][i], rgb_of(kinds_[p.kind[i]].color),
+                           p.v[0][i], p.v[1][i], p.v[2][i], p.pressure[i],
+                           p.kind[i], p.id[i]};
+    std::memcpy(cloud.data() + sizeof point * i, &point, sizeof point);
+  }
+  return p.size();
+}
+
+std::vector<FluidVolume> TissueWithFluid::fluid_volumes() {
+  // A place is inside of what it meets the far side of along five of the six axes or more.
+  constexpr int kEnclosed = 5;
+  const std::size_t bodies = scene_.bodies.size();
+  std::vector<std::unique_ptr<RayTree>> hollows(bodies);
+  tissue_->read_surface(surface_);
+  std::vector<int> body_of_piece;
+  for (const Fragment& f : tissue_->fragments()) {
+    body_of_piece.resize(std::max<std::size_t>(body_of_piece.size(), f.id + 1), -1);
+    body_of_piece[f.id] = f.body;
+  }
+  for (std::size_t b = 0; b < bodies; ++b) {
+    if (!(scene_.bodies[b].wall > 0)) continue;
+    TriangleMesh mesh;
+    for (std::size_t t = 0; t < surface_.fragment.size(); ++t) {
+      if (body_of_piece[surface_.fragment[t]] != static_cast<int>(b)) continue;
+      const auto first = static_cast<int>(mesh.vertices.size());
+      for (int k = 0; k < 3; ++k) {
+        const float* c = &surface_.corners[9 * t + 3 * k];
+        mesh.vertices.emplace_back(c[0], c[1], c[2]);
+      }
+      mesh.triangles.push_back({first, first + 1, first + 2});
+    }
+    if (!mesh.triangles.empty()) hollows[b] = std::make_unique<RayTree>(mesh);
+  }
+  const FluidParticles& p = fluid_.particles;
+  std::vector<int> inside(p.size(), -1);
+  cpu_.for_each(
+      p.size(),
+      [&](int i) {
+        for (std::size_t b = 0; b < bodies && inside[i] < 0; ++b) {
+          if (hollows[b] == nullptr) continue;
+          int met = 0;
+          for (int k = 0; k < 6; ++k) {
+            const Vec3 along = (k % 2 == 0 ? 1 : -1) * Vec3::Unit(k / 2);
+            met += hollows[b]->first_exit(p.position(i), along, -1, 0).triangle >= 0 ? 1 : 0;
+          }
+          if (met >= kEnclosed) inside[i] = static_cast<int>(b);
+        }
+      },
+      64);
+  std::vector<FluidVolume> volumes(kinds_.size());
+  for (std::size_t k = 0; k < volumes.size(); ++k) {
+    volumes[k].inside.assign(bodies, 0.0);
+    volumes[k].lost = lost_[k];
+  }
+  for (int i = 0; i < p.size(); ++i) {
+    FluidVolume& of = volumes[p.kind[i]];
+    of.total += p.volume[i];
+    (inside[i] < 0 ? of.spilt : of.inside[inside[i]]) += p.volume[i];
+    of.pressure += p.volume[i] * p.pressure[i];
+  }
+  for (FluidVolume& of : volumes) of.pressure /= of.total > 0 ? of.total : 1;
+  return volumes;
+}
+
+std::uint64_t TissueWithFluid::checksum() {
+  const FluidParticles& p = fluid_.particles;
+  Checksum sum;
+  for (int a = 0; a < 3; ++a) {
+    sum.add(p.x[a]);
+    sum.add(p.v[a]);
+  }
+  sum.add(p.volume);
+  sum.add(p.dense);
+  sum.add(p.id);
+  return tissue_->checksum() ^ sum.value();
+}
+
+Momentum TissueWithFluid::momentum() {
+  const Momentum tissue = tissue_->momentum();
+  const FluidParticles& p = fluid_.particles;
+  const auto mass = [&](int i) {
+    return static_cast<double>(p.volume[i]) * fluid_.laws[p.kind[i]].density;
+  };
+  const auto speed = [&](int i) { return Vec3(p.v[0][i], p.v[1][i], p.v[2][i]); };
+  Momentum sum;
+  sum.mass = tissue.mass;
+  sum.centre = tissue.mass * tissue.centre;
+  sum.linear = tissue.linear;
+  for (int i = 0; i < p.size(); ++i) {
+    sum.mass += mass(i);
+    sum.centre += mass(i) * p.position(i);
+    sum.linear += mass(i) * speed(i);
+  }
+  sum.centre /= sum.mass;
+  sum.angular = tissue.angular + (tissue.centre - sum.centre).cross(tissue.linear);
+  for (int i = 0; i < p.size(); ++i) {
+    sum.angular += mass(i) * (p.position(i) - sum.centre).cross(speed(i));
+  }
+  return sum;
+}
+
+template <class Archive>
+void TissueWithFluid::each_field(Archive& archive) {
+  FluidParticles& p = fluid_.particles;
+  archive.part("fluid", p.x[0], p.x[1], p.x[2], p.v[0], p.v[1], p.v[2], p.volume, p.pressure,
+               p.dense, p.kind, p.id, p.fill, fluid_.next_id, lost_);
+  for (FillProgress& fill : fills_) archive.part("fill", fill.body, fill.filling, fill.pressure);
+  archive.part("walls", walls_.end, surface_.rest);
+}
+
+std::vector<std::uint8_t> TissueWithFluid::save() {
+  ArchiveWriter out;
+  std::vector<std::uint8_t> tissue = tissue_->save();
+  out.part("tissue", tissue);
+  each_field(out);
+  return out.take();
+}
+
+void TissueWithFluid::restore(Span<const std::uint8_t> saved) {
+  ArchiveReader in(saved);
+  std::vector<std::uint8_t> tissue;
+  in.part("tissue", tissue);
+  tissue_->restore({tissue.data(), tissue.size()});
+  each_field(in);
+  const FluidParticles& p = fluid_.particles;
+  const std::size_t n = p.kind.size();
+  for (const std::size_t size :
+       {p.x[0].size(), p.x[1].size(), p.x[2].size(), p.v[0].size(), p.v[1].size(), p.v[2].size(),
+        p.volume.size(), p.pressure.size(), p.dense.size(), p.id.size(), p.fill.size()}) {
+    if (size != n) throw std::runtime_error("the state's fluid has fields of several lengths");
+  }
+  if (lost_.size() != kinds_.size() || walls_.end.size() != surface_.rest.size() ||
+      std::any_of(p.kind.begin(), p.kind.end(),
+                  [&](std::uint8_t kind) { return kind >= kinds_.size(); })) {
+    throw std::runtime_error("the state's fluid is not of this scene");
+  }
+  fluid_.lists.made = false;
+  walls_.impulse.clear();
+}
+
+}  // namespace tissue_sim

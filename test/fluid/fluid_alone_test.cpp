@@ -1,0 +1,206 @@
+// Fluid between rigid walls.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "fluid/fluid_scene.h"
+#include "tissue_sim/limits.h"
+
+namespace tissue_sim {
+namespace {
+
+constexpr double kGravity = 9.81;
+
+Scene pool_scene(const Vec3& low, const Vec3& high, double spacing) {
+  Scene scene;
+  scene.device = Device::kCpu;
+  scene.cell_size = spacing;
+  scene.ground.z = -1;
+  scene.gravity = Vec3(0, 0, -kGravity);
+  Body body = far_body(spacing);
+  scene.bodies = {body};
+  Pool pool;
+  pool.region.kind = Region::Kind::kBox;
+  pool.region.min = low;
+  pool.region.max = high;
+  scene.pools = {pool};
+  return scene;
+}
+
+/// A column at rest presses on the bottom with its weight, and the deeper the more.
+TEST(Fluid, PressesByItsDepth) {
+  constexpr double kSide = 0.03, kHeight = 0.06, kSpacing = 0.003;
+  Scene scene = pool_scene({0, 0, 0}, {kSide, kSide, kHeight}, kSpacing);
+  const auto walls = tank({0, 0, 0}, {kSide, kSide, 0.12});
+  add_tools(walls, scene);
+  Simulation simulation(scene);
+  FrameRequest request = stand(walls);
+  Vec3 bottom = Vec3::Zero(), side = Vec3::Zero();
+  double pressure = 0, height = 0;
+  constexpr int kSettle = 40, kFrames = 20;
+  for (int frame = 0; frame < kSettle + kFrames; ++frame) {
+    const FrameReport report = simulation.advance_frame(request);
+    request = {};
+    if (frame < kSettle) continue;
+    bottom += report.result.loads[0].mean.force / kFrames;
+    side += report.result.loads[1].mean.force / kFrames;
+    // The straight line of pressure over height, at the bottom.
+    double n = 0, z = 0, p = 0, zz = 0, zp = 0, mean = 0;
+    const std::vector<FluidPoint> points = fluid_of(simulation);
+    for (const FluidPoint& x : points) {
+      mean += x.z / points.size();
+      if (x.z > 0.75 * kHeight) continue;
+      n += 1, z += x.z, p += x.pressure, zz += x.z * x.z, zp += x.z * x.pressure;
+    }
+    const double slope = (n * zp - z * p) / (n * zz - z * z);
+    pressure += (p - slope * z) / n / kFrames;
+    height += 2 * mean / kFrames;
+  }
+  const double density = find_fluid(scene, "water").density;
+  const double weight = density * kSide * kSide * kHeight * kGravity;
+  EXPECT_NEAR(bottom.z() / -weight, 1, 0.02);
+  EXPECT_NEAR(pressure / (density * kGravity * kHeight), 1, 0.02);
+  // The force on a side is that of the height to which the fluid stands, squeezed as it is.
+  const double asked = 0.5 * weight * height / kSide;
+  EXPECT_NEAR(side.x() / -asked, 1, 0.02);
+  RecordProperty("height", std::to_string(height / kHeight));
+}
+
+/// Martin and Moyce 1952, a column twice as high as it is wide: where its front is.
+TEST(Fluid, BreaksADamAsWasMeasured) {
+  constexpr double kWidth = 0.05715, kSpacing = 0.004, kDepth = 0.028;
+  Scene scene = pool_scene({0, 0, 0}, {kWidth, kDepth, 2 * kWidth}, kSpacing);
+  scene.frame_rate = 240;
+  const auto walls = tank({0, 0, 0}, {6 * kWidth, kDepth, 0.15});
+  add_tools(walls, scene);
+  Simulation simulation(scene);
+  FrameRequest request = stand(walls);
+  const double unit = std::sqrt(2 * kGravity / kWidth);  // [1/s]
+  const std::vector<std::array<double, 2>> measured = {
+      // time, front; both as they print them
+      {1.19, 1.44}, {1.43, 1.67}, {1.63, 1.89}, {1.83, 2.11}, {1.98, 2.33}, {2.20, 2.56},
+      {2.32, 2.78}, {2.51, 3.00}, {2.65, 3.22}, {2.83, 3.44}, {2.98, 3.67}, {3.11, 3.89}};
+  std::size_t next = 0;
+  double front_before = 1, time_before = 0;
+  while (next < measured.size()) {
+    simulation.advance_frame(request);
+    request = {};
+    const std::vector<FluidPoint> points = fluid_of(simulation);
+    std::vector<float> x;
+    for (const FluidPoint& p : points) x.push_back(p.x);
+    std::nth_element(x.begin(), x.end() - 5, x.end());  // single drops are no front
+    const double front = (*(x.end() - 5) + 0.5 * kSpacing) / kWidth;
+    const double time = simulation.time() * unit;
+    for (; next < measured.size() && measured[next][0] <= time; ++next) {
+      const double share = (measured[next][0] - time_before) / (time - time_before);
+      const double here = front_before + share * (front - front_before);
+      EXPECT_NEAR(here / measured[next][1], 1, 0.1) << "at " << measured[next][0];
+    }
+    front_before = front;
+    time_before = time;
+  }
+}
+
+/// Nothing falls through the ground, and what falls out of the world is counted.
+TEST(Fluid, IsCountedWhereItIs) {
+  Scene scene = pool_scene({0, 0, 0.02}, {0.012, 0.012, 0.04}, 0.004);
+  scene.ground.z = 0;
+  Simulation simulation(scene);
+  const double before = simulation.tissue().fluid_volumes()[0].total;
+  EXPECT_NEAR(before / (0.012 * 0.012 * 0.02), 1, 1e-5);
+  for (int i = 0; i < 20; ++i) simulation.advance_frame();
+  const FluidVolume after = simulation.tissue().fluid_volumes()[0];
+  EXPECT_DOUBLE_EQ(after.total, before);
+  EXPECT_DOUBLE_EQ(after.spilt, before);
+  EXPECT_EQ(after.lost, 0);
+  for (const FluidPoint& p : fluid_of(simulation)) EXPECT_GE(p.z, 0);
+
+  scene.ground.enabled = false;
+  scene.bodies[0].pose.position.z() = 0.02;
+  scene.bodies[0].anchors = {held_below(0.018)};
+  scene.frame_rate = 20;
+  Simulation falls(scene);
+  for (int i = 0; i < 12; ++i) falls.advance_frame();
+  const FluidVolume gone = falls.tissue().fluid_volumes()[0];
+  EXPECT_EQ(gone.total, 0);
+  EXPECT_NEAR(gone.lost / before, 1, 1e-5);
+}
+
+std::string refusal(const Scene& scene) {
+  try {
+    Simulation simulation(scene);
+  } catch (const std::exception& e) {
+    return e.what();
+  }
+  return "none";
+}
+
+TEST(Fluid, IsRefusedInOneLine) {
+  const Scene good = filled_ball(Method::kMpm, 100);
+  const auto said = [&good](const auto& change) {
+    Scene scene = good;
+    change(scene);
+    const std::string line = refusal(scene);
+    EXPECT_EQ(line.find('\n'), std::string::npos) << line;
+    return line;
+  };
+  EXPECT_EQ(said([](Scene& s) { s.bodies[0].wall = 0.005; }),
+            "bodies[0].hollow.wall is 0.005: must be two cells or more, 0.006 m: a thinner wall "
+            "leaks");
+  EXPECT_NE(said([](Scene& s) { s.bodies[0].wall = 0.017; }).find("leaves no hollow"),
+            std::string::npos);
+  EXPECT_NE(said([](Scene& s) { s.bodies[0].wall = 0; }).find("bodies[0].filled"),
+            std::string::npos);
+  EXPECT_NE(said([](Scene& s) { s.bodies[0].filled.pressure = 2e5; }).find("filled.pressure"),
+            std::string::npos);
+  EXPECT_NE(
+      said([](Scene& s) { s.bodies[0].filled.fluid = "gin"; }).find("filled.fluid is \"gin\""),
+      std::string::npos);
+  EXPECT_NE(said([](Scene& s) { s.fluid_spacing = 0.004; }).find("fluid_spacing"),
+            std::string::npos);
+  EXPECT_NE(said([](Scene& s) {
+              s.method = Method::kPbd;
+              s.pbd.model = PbdModel::kSurface;
+            }).find("a skin without a wall"),
+            std::string::npos);
+  EXPECT_NE(said([](Scene& s) { s.device = Device::kCuda; }).find("fluid runs on a CPU alone"),
+            std::string::npos);
+  Pool pool;
+  pool.region.kind = Region::Kind::kBall;
+  pool.region.radius = 0.001;
+  EXPECT_NE(said([&](Scene& s) {
+              s.pools = {pool};
+              s.pools[0].region.center = Vec3(0.017, 0, 0);
+            }).find("pools[0].region holds no particle"),
+            std::string::npos);
+  WorkLimits few;
+  few.max_points = 10000;
+  const LimitWork limit(few);
+  pool.region.radius = 0.1;
+  EXPECT_NE(said([&](Scene& s) { s.pools = {pool}; }).find("more than 10000 particles of fluid"),
+            std::string::npos);
+}
+
+TEST(Fluid, ScenesComeBackFromYaml) {
+  Scene scene = filled_ball(Method::kMpm, 1500);
+  Fluid own;
+  own.name = "ink";
+  own.bulk_modulus = 5e4;
+  scene.fluids = {own};
+  Pool pool;
+  pool.fluid = "ink";
+  pool.region.kind = Region::Kind::kBall;
+  pool.region.radius = 0.01;
+  scene.pools = {pool};
+  scene.fluid_spacing = 0.002;
+  const std::string yaml = scene_to_yaml(scene);
+  EXPECT_EQ(scene_to_yaml(scene_from_yaml(yaml)), yaml);
+  const Scene back = scene_from_yaml(yaml);
+  EXPECT_EQ(back.bodies[0].wall, 0.006);
+  EXPECT_EQ(back.bodies[0].filled.pressure, 1500);
+  EXPECT_EQ(back.pools[0].fluid, "ink");
+}
+
+}  // namespace
+}  // namespace tissue_sim

@@ -1,0 +1,155 @@
+// Fluid and the tissue around it.
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "fluid/fluid_scene.h"
+
+namespace tissue_sim {
+namespace {
+
+/// Runs until the hollow is as full as was asked.
+double fill_up(Simulation& simulation) {
+  double before = -1, now = 0;
+  for (int frame = 0; frame < 120 && now != before; ++frame) {
+    before = now;
+    if (simulation.advance_frame().result.blew_up) return 0;
+    now = simulation.tissue().fluid_volumes()[0].total;
+  }
+  return now;
+}
+
+class FluidIn : public testing::TestWithParam<Method> {};
+
+/// A filled organ that falls: what the fluid gains of momentum the wall loses.
+TEST_P(FluidIn, KeepsMomentum) {
+  Scene scene = filled_ball(GetParam(), 500);
+  Simulation simulation(scene);
+  ASSERT_GT(fill_up(simulation), 0);
+  simulation.set_gravity(Vec3(0.5, 0, -2));
+  const Momentum before = simulation.tissue().momentum();
+  constexpr int kFrames = 6;
+  for (int i = 0; i < kFrames; ++i) ASSERT_FALSE(simulation.advance_frame().result.blew_up);
+  const Momentum after = simulation.tissue().momentum();
+  const Vec3 asked = before.mass * kFrames / scene.frame_rate * Vec3(0.5, 0, -2);
+  EXPECT_LT((after.linear - before.linear - asked).norm() / asked.norm(), 1e-4);
+}
+
+/// A closed organ that is shaken: nothing passes its wall of two cells, and it holds the volume
+/// that its fluid has under its pressure.
+TEST_P(FluidIn, StaysInAClosedOrgan) {
+  Scene scene = filled_ball(GetParam(), 5000);
+  scene.materials[0].young_modulus = 60e3;
+  scene.bodies[0].anchors = {held_below(-0.015)};
+  Simulation simulation(scene);
+  const double volume = fill_up(simulation);
+  ASSERT_GT(volume, 0);
+  const auto fluid = [&] { return simulation.tissue().fluid_volumes()[0]; };
+  const double modulus = 60 * (5000 + 0 * 1010);  // as a scene without gravity has it
+  const auto packed = [&](const FluidVolume& of) {
+    return of.total * (1 - of.pressure / modulus) /
+           hollow_volume(simulation.tissue(), Vec3::Zero());
+  };
+  const double at_first = packed(fluid());
+  for (int i = 0; i < 20; ++i) {
+    simulation.set_gravity(Vec3(15 * std::sin(0.8 * i), 0, 15 * std::cos(0.5 * i)));
+    ASSERT_FALSE(simulation.advance_frame().result.blew_up);
+  }
+  simulation.set_gravity(Vec3::Zero());
+  for (int i = 0; i < 10; ++i) simulation.advance_frame();
+  const FluidVolume after = fluid();
+  EXPECT_DOUBLE_EQ(after.total, volume);
+  EXPECT_DOUBLE_EQ(after.inside[0], volume);
+  EXPECT_EQ(after.spilt, 0);
+  EXPECT_NEAR(packed(after) / at_first, 1, 0.005);
+  EXPECT_NEAR(after.pressure, 5000, 1000);
+}
+
+std::string method_name(const testing::TestParamInfo<Method>& info) {
+  const char* names[] = {"Mpm", "Mls", "Pbd"};
+  return names[static_cast<int>(info.param)];
+}
+
+INSTANTIATE_TEST_SUITE_P(Methods, FluidIn,
+                         testing::Values(Method::kMpm, Method::kMls, Method::kPbd), method_name);
+
+/// Lamé's thick ball: how far the inside gives way to the pressure.
+TEST(FluidInTissue, InflatesABallAsLameSays) {
+  Scene scene = filled_ball(Method::kMpm, 800);
+  scene.cell_size = 0.002;
+  scene.fluid_spacing = 0.002;
+  Simulation simulation(scene);
+  const double rest = hollow_volume(simulation.tissue(), Vec3::Zero());
+  ASSERT_GT(fill_up(simulation), 0);
+  simulation.set_damping(20);
+  double pressure = 0, volume = 0;
+  for (int i = 0; i < 30; ++i) {
+    simulation.advance_frame();
+    if (i < 20) continue;
+    pressure += 0.1 * simulation.tissue().fluid_volumes()[0].pressure;
+    volume += 0.1 * hollow_volume(simulation.tissue(), Vec3::Zero());
+  }
+  const Material& m = scene.materials[0];
+  const double a = scene.bodies[0].radius - scene.bodies[0].wall, b = scene.bodies[0].radius;
+  const double a3 = a * a * a, b3 = b * b * b;
+  const double share = pressure / m.young_modulus * a3 / (b3 - a3) *
+                       ((1 - 2 * m.poisson_ratio) + (1 + m.poisson_ratio) / 2 * b3 / a3);
+  EXPECT_NEAR((std::cbrt(volume / rest) - 1) / share, 1, 0.05) << pressure;
+}
+
+BladePath slice(double x, double depth_from, double depth_to) {
+  BladePath path;
+  path.edge = {Vec3(0, -0.03, 0), Vec3(0, 0.03, 0)};
+  path.poses = {{Vec3(x, 0, depth_from), Quat::Identity()},
+                {Vec3(x, 0, depth_to), Quat::Identity()}};
+  return path;
+}
+
+/// The figure that we reproduce: nothing leaves a whole organ; the further it is cut the more does.
+TEST(FluidInTissue, LeavesAnOrganThatIsCut) {
+  Scene scene = filled_ball(Method::kMpm, 1500);
+  scene.bodies[0].anchors = {held_below(-0.015)};
+  const auto spilt_after = [&](double share) {
+    Simulation simulation(scene);
+    fill_up(simulation);
+    if (share > 0) simulation.cut(slice(0.0004, 0.03, 0.018 - share * 0.036));
+    for (int i = 0; i < 12; ++i) EXPECT_FALSE(simulation.advance_frame().result.blew_up);
+    const FluidVolume fluid = simulation.tissue().fluid_volumes()[0];
+    return fluid.spilt / fluid.total;
+  };
+  EXPECT_EQ(spilt_after(0), 0);
+  const double some = spilt_after(0.3), more = spilt_after(0.6), all = spilt_after(1);
+  EXPECT_GT(some, 0.001);
+  EXPECT_GT(more, some);
+  EXPECT_GT(all, more);
+  RecordProperty("spilt",
+                 std::to_string(some) + " " + std::to_string(more) + " " + std::to_string(all));
+}
+
+/// One and two threads, and a state that was saved on the way: the same bits.
+TEST(FluidInTissue, HasTheSameBits) {
+  Scene scene = filled_ball(Method::kMpm, 1500);
+  const auto run = [&](int threads, int restore_at) {
+    scene.threads = threads;
+    auto simulation = std::make_unique<Simulation>(scene);
+    std::vector<std::uint64_t> sums;
+    for (int i = 0; i < 8; ++i) {
+      if (i == restore_at) {
+        const std::vector<std::uint8_t> state = simulation->save();
+        simulation = std::make_unique<Simulation>(scene);
+        simulation->restore({state.data(), state.size()});
+      }
+      if (i == 3) simulation->cut(slice(0.0004, 0.03, 0));
+      simulation->advance_frame();
+      sums.push_back(simulation->tissue().checksum());
+    }
+    return sums;
+  };
+  const auto once = run(1, -1);
+  EXPECT_EQ(run(2, -1), once);
+  EXPECT_EQ(run(1, 2), once);
+  EXPECT_EQ(run(2, 5), once);
+}
+
+}  // namespace
+}  // namespace tissue_sim

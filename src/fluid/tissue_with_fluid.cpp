@@ -173,7 +173,7 @@ void TissueWithFluid::advance(double duration, const FrameInput& input) {
 void TissueWithFluid::advance_interval(double duration, const FrameInput& input) {
   read_walls();
   const FrameColliders tools(scene_, input, duration);
-  const std::vector<Box> reach = tools.reach();
+  const std::vector<Box>& reach = tools.reach();
   std::vector<int> there;
   for (int c = scene_.ground.enabled ? 0 : 1; c < tools.count(); ++c) {
     if (reach[c].min.x() <= reach[c].max.x()) there.push_back(c);
@@ -183,7 +183,8 @@ void TissueWithFluid::advance_interval(double duration, const FrameInput& input)
   drive.gravity = scene_.gravity;
   drive.damping = scene_.damping;
   drive.colliders = [&](double share) {
-    const std::vector<Collider> all = tools.at(share);
+    std::vector<Collider> all;
+    tools.at(share, all);
     std::vector<Collider> colliders;
     for (const int c : there) colliders.push_back(all[c]);
     return colliders;
@@ -193,7 +194,7 @@ void TissueWithFluid::advance_interval(double duration, const FrameInput& input)
   advance_fluid(fluid_, drive, walls_, loads);
   for (std::size_t c = 0; c < there.size(); ++c) of_all[there[c]] = loads[c];
   fluid_loads_.assign(scene_.tools.size(), {});
-  tools.add_loads(1, tools.at(1).data(), of_all.data(), 1, fluid_loads_);
+  tools.add_loads(1, tools.at_end().data(), of_all.data(), 1, fluid_loads_);
   tissue_->push_surface(walls_.impulse);
   fill_up(duration);
 }

@@ -40,7 +40,8 @@ void run(benchmark::State& bench, int nodes, bool is_cut) {
   ToolMotion probe;
   probe.present = true;
   probe.begin.position = probe.end.position = Vec3(0, 0, 1);
-  tissue.begin_frame(1 / scene.frame_rate, {{&probe, 1}, {}});
+  const FrameInput input{{&probe, 1}, {}};
+  tissue.begin_frame(1 / scene.frame_rate, input, {scene, input, 1 / scene.frame_rate});
   // So short that the body stays deformed however long the run is.
   const FramePart part{even_substeps(kSubsteps, 1e-8), 0, 1};
   for (auto _ : bench) tissue.run_part(part);

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "math/union_find.h"
 #include "pbd/model.h"
 #include "pbd/touch_cells.h"
 
@@ -66,7 +67,12 @@ const Material& material_of(const State& s, int v) {
 
 void find_touches(State& s, double duration) {
   s.touches = {};
-  s.touching.assign(s.components, 0);
+  UnionFind together(s.components);
+  const auto name_groups = [&] {
+    s.group.resize(s.components);
+    for (std::int32_t c = 0; c < s.components; ++c) s.group[c] = together.root(c);
+  };
+  name_groups();
   if (s.components < 2) return;
   const Vertices& v = s.vertices;
   std::vector<int> vertices_of(s.components, 0);
@@ -213,9 +219,10 @@ void find_touches(State& s, double duration) {
                   {static_cast<float>(rest), static_cast<float>(f.at.b), static_cast<float>(f.at.c),
                    static_cast<float>(friction)});
     if (f.at.height - rest < 0.1 * s.mean_edge) {
-      s.touching[s.component[i]] = s.touching[f.piece] = 1;
+      together.join(s.component[i], f.piece);
     }
   }
+  name_groups();
   s.touches.pack(v.size(), {}, 0);  // each frame anew
 }
 

@@ -6,7 +6,7 @@
 namespace tissue_sim {
 namespace pbd {
 
-/// Makes State::touches and State::touching anew, from where vertices are now: pairs that the frame
+/// Makes State::touches and State::group anew, from where vertices are now: pairs that the frame
 /// of `duration` seconds may bring together. Lips of a cut, which lie on one another at rest, touch
 /// and do not push.
 void find_touches(State& s, double duration);

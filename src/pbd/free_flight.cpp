@@ -47,12 +47,39 @@ Vec3 spin_of(const Flight& f, const Vec3& angular) {
   return spin;
 }
 
-std::vector<RigidChange> missing_motion(const Scene& scene, const std::vector<Flight>& before,
-                                        const std::vector<Flight>& now, int steps, float h) {
+namespace {
+
+/// Of what touches, together, at the group's number; each other has no mass.
+std::vector<Flight> together(const State& s, const std::vector<Flight>& of) {
+  std::vector<Flight> sum(of.size());
+  for (std::size_t c = 0; c < of.size(); ++c) {
+    Flight& f = sum[s.group[c]];
+    f.mass += of[c].mass;
+    f.centre += of[c].mass * of[c].centre;
+    f.linear += of[c].linear;
+    f.is_free = f.is_free && of[c].is_free;
+  }
+  for (Flight& f : sum) f.centre /= f.mass > 0 ? f.mass : 1;
+  for (std::size_t c = 0; c < of.size(); ++c) {
+    Flight& f = sum[s.group[c]];
+    const Vec3 r = of[c].centre - f.centre;
+    f.angular += of[c].angular + r.cross(of[c].linear);
+    f.inertia += of[c].inertia +
+                 of[c].mass * (r.squaredNorm() * Eigen::Matrix3d::Identity() - r * r.transpose());
+  }
+  return sum;
+}
+
+}  // namespace
+
+std::vector<RigidChange> missing_motion(const State& s, const std::vector<Flight>& before_each,
+                                        const std::vector<Flight>& now_each, int steps, float h) {
+  const Scene& scene = s.scene;
+  const std::vector<Flight> before = together(s, before_each), now = together(s, now_each);
   const double decay = static_cast<float>(std::exp(-scene.damping * h));
   std::vector<RigidChange> changes(now.size());
   for (std::size_t c = 0; c < now.size(); ++c) {
-    if (!now[c].is_free) continue;
+    if (!now[c].is_free || !(now[c].mass > 0)) continue;
     changes[c].is_free = true;
     changes[c].centre = now[c].centre;
     Vec3 speed = before[c].linear / before[c].mass, angular = before[c].angular;
@@ -68,6 +95,7 @@ std::vector<RigidChange> missing_motion(const Scene& scene, const std::vector<Fl
     changes[c].linear = speed - changes[c].keep * now[c].linear / mass;
     changes[c].spin = spin_of(now[c], angular - now[c].angular + lost * now[c].angular);
   }
+  for (std::size_t c = 0; c < now.size(); ++c) changes[c] = changes[s.group[c]];
   return changes;
 }
 
@@ -76,9 +104,9 @@ void keep_momentum(State& s, const std::vector<Flight>& before, int steps, float
   std::vector<Flight> now = flights(s);
   for (int i = 0; i < v.size(); ++i) {
     const std::int32_t c = s.component[i];
-    if (s.pushed[i] != 0 || s.touching[c] != 0) now[c].is_free = false;
+    if (s.pushed[i] != 0) now[c].is_free = false;
   }
-  const std::vector<RigidChange> changes = missing_motion(s.scene, before, now, steps, h);
+  const std::vector<RigidChange> changes = missing_motion(s, before, now, steps, h);
   for (int i = 0; i < v.size(); ++i) {
     const RigidChange& change = changes[s.component[i]];
     if (!change.is_free) continue;

@@ -27,12 +27,12 @@ struct RigidChange {
   double keep = 1;
   Vec3 centre = Vec3::Zero(), linear = Vec3::Zero(), spin = Vec3::Zero();
 };
-/// What gives each what it is short of after `steps` of `h` seconds, see keep_momentum(); what
-/// touched anything is not free in `now`.
-std::vector<RigidChange> missing_motion(const Scene& scene, const std::vector<Flight>& before,
+/// What gives each what it is short of after `steps` of `h` seconds, see keep_momentum(); what a
+/// collider pushed is not free in `now`, and pieces that touch one another (State::group) are one.
+std::vector<RigidChange> missing_motion(const State& s, const std::vector<Flight>& before,
                                         const std::vector<Flight>& now, int steps, float h);
 
-/// After `steps` of `h` seconds: what is free and touched nothing (State::pushed) gets a rigid
+/// After `steps` of `h` seconds: what is free and no collider pushed (State::pushed) gets a rigid
 /// motion that gives it the momentum that gravity and damping leave of the one before. Constraints
 /// change none; their rounding does, by 2 % in four seconds. What small pieces move by apart from
 /// their rigid motion decays as a viscosity of 1 Pa s (liver's) would have it at their size: scraps

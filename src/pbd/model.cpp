@@ -20,35 +20,16 @@ std::uint64_t spread(std::uint64_t v) {
   return (v | v << 2) & 0x1249249249249249;
 }
 
-/// Whether a region holds a vertex there: where its face is the body's own, vertices lie on it but
-/// for rounding, which is `within` [m].
-bool holds(const Region& region, const Vec3& x, double within) {
-  Region wide = region;
-  wide.min -= Vec3::Constant(within);
-  wide.max += Vec3::Constant(within);
-  wide.radius += within;
-  wide.z += within;
-  return wide.contains(x);
-}
-
 void hold_anchored(State& s, std::vector<std::string>* notes) {
   for (std::size_t b = 0; b < s.scene.bodies.size(); ++b) {
     const Body& body = s.scene.bodies[b];
     bool any = body.anchors.empty();
-    Box box;
+    const double within = rounding_of(s, static_cast<int>(b));
     for (int i = 0; i < s.vertices.size(); ++i) {
       if (s.vertices.body[i] != static_cast<int>(b)) continue;
-      box.min = box.min.cwiseMin(s.vertices.reference[i]);
-      box.max = box.max.cwiseMax(s.vertices.reference[i]);
-    }
-    const double within = 1e-6 * (box.max - box.min).norm();
-    for (int i = 0; i < s.vertices.size(); ++i) {
-      if (s.vertices.body[i] != static_cast<int>(b)) continue;
-      for (const Region& region : body.anchors) {
-        if (!holds(region, s.vertices.reference[i], within)) continue;
-        s.vertices.anchored[i] = 1;
-        any = true;
-      }
+      if (holder_of(body, s.vertices.reference[i], within) < 0) continue;
+      s.vertices.anchored[i] = 1;
+      any = true;
     }
     if (!any && notes != nullptr) {
       notes->push_back("body '" + body.name +

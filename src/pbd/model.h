@@ -19,6 +19,12 @@ const Material& material_at(const Scene& scene, const Body& body, const Vec3& x)
 /// the index of the one that comes k-th.
 std::vector<int> morton_order(const std::vector<Vec3>& places);
 
+/// How far off a body's vertices may lie from where they are meant to [m].
+double rounding_of(const State& s, int b);
+/// Which of a body's anchors holds a vertex there, -1: none. Where its face is the body's own,
+/// vertices lie on it but for rounding, which is `within` [m].
+int holder_of(const Body& body, const Vec3& x, double within);
+
 /// Makes distance and bending constraints anew from the triangles, tetrahedra and internal links
 /// that there are; those that were there before keep their colours (surface_model.cpp).
 void make_surface_constraints(State& s);

@@ -18,8 +18,8 @@ TISSUE_SIM_INLINE void predict(const StepNumbers& step, const float* x, float* m
                                float* predicted, float* v) {
   const bool held = x[3] == 0;
   for (int a = 0; a < 3; ++a) {
-    // Drag takes nothing off the weight.
-    v[a] = held ? 0 : step.decay * v[a] + step.h * step.gravity[a];
+    // Drag takes nothing off the weight. What is held goes as its anchor does.
+    if (!held) v[a] = step.decay * v[a] + step.h * step.gravity[a];
     moved[a] += step.h * v[a];
     predicted[a] = moved[a];
   }

@@ -17,6 +17,7 @@
 #include "pbd/touch.h"
 #include "tissue_sim/cut.h"
 #include "tissue_sim/scene.h"
+#include "tissue_sim/tissue.h"
 #include "tools/collider.h"
 
 namespace tissue_sim {
@@ -127,7 +128,9 @@ struct State {
   // Made anew by pack(): what hangs together, by number.
   std::vector<std::int32_t> component;
   int components = 0;
-  std::vector<std::uint8_t> touching;  ///< of each, whether it is another's neighbour in this frame
+  std::vector<std::int32_t> group;   ///< of each, the lowest of those that it touches in this frame
+  std::vector<std::int32_t> held;    ///< vertices that an anchor holds, ...
+  std::vector<std::int32_t> holder;  ///< ... and which of its body's
   std::vector<std::uint8_t> pushed;  ///< of each vertex: whether a collider pushed it in this frame
 
   explicit State(const Scene& s)
@@ -164,6 +167,15 @@ void project_dampers(State& s);
 std::vector<std::int32_t> levels_of(const State& s);
 /// Pushes vertices out of the colliders, with friction; adds what that takes (contact.cpp).
 void project_contacts(State& s, float h, std::vector<ColliderLoad>& loads);
+
+/// Makes State::held and State::holder (anchors.cpp).
+void find_held(State& s);
+/// Gives what anchors hold the velocity that takes it where they are after `duration` [s]; whether
+/// any moves, or did.
+bool follow_anchors(State& s, Span<const AnchorMotion> anchors, double duration);
+/// What tissue does to each anchor, about its origin where it is: what a step of `h` seconds would
+/// push what they hold by, were it not held, and its weight.
+std::vector<Wrench> anchor_loads(const State& s, Span<const AnchorMotion> anchors, float h);
 
 /// Elastic energy of all constraints that have a compliance [J].
 double elastic_energy(const State& s);

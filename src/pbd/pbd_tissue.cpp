@@ -74,10 +74,16 @@ void PbdTissue::advance(double duration, const FrameInput& input) {
     pull();
     before = places();
   }
+  if (!input.anchors.empty() && !s.held.empty()) {
+    pull();
+    if (pbd::follow_anchors(s, input.anchors, duration)) push();
+  }
   const int together = steps_between_searches(colliders, substeps, dt);
   for (int first = 0; first < substeps; first += together) {
     run_steps(colliders, {first, std::min(together, substeps - first), substeps}, dt);
   }
+  if (!s.held.empty()) pull();
+  result_.anchor_loads = pbd::anchor_loads(s, input.anchors, dt);
   result_.substeps = substeps;
   result_.substep = dt;
   if (blades.empty()) return;

@@ -24,6 +24,7 @@ class PbdTissue : public Tissue {
   void read_surface(SurfaceTriangles& surface) override;
   void push_surface(Span<const float> impulses) override;
   bool moves_surface() const override { return true; }
+  bool moves_anchors() const override { return true; }
   int fragment_count() const override { return static_cast<int>(pieces_.all.size()); }
   Span<const Fragment> fragments() override;
   std::uint64_t checksum() override;
@@ -49,6 +50,8 @@ class PbdTissue : public Tissue {
   };
   /// Brings the motion of the vertices to state_.
   virtual void pull() {}
+  /// And back, where state_ was changed.
+  virtual void push() {}
   /// A cut or a restored state changed vertices and constraints.
   virtual void state_changed() {}
   /// Steps of a frame between two searches for what touches.

@@ -182,6 +182,7 @@ void pack(State& s) {
     s.component[i] = number.try_emplace(linked.root(i), next).first->second;
   }
   s.components = static_cast<int>(number.size());
+  find_held(s);
   const std::vector<std::int32_t> levels = levels_of(s);
   s.links.pack(n, levels);
   s.bends.pack(n, levels);

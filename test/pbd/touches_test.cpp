@@ -177,8 +177,8 @@ TEST(Touch, MovesNoVertexFartherThanTheGap) {
     const float number[4] = {0, 0.3f, share, 0};
     float none[1] = {0};
     pbd::Touch::project(v, number, 1.0f, none);
-    EXPECT_GT(std::fabs(v[3].z), 0.99f * kGap) << share;
-    EXPECT_LT(std::fabs(v[3].z), 1.01f * kGap) << share;
+    EXPECT_GT(std::fabs(v[3].moved.z), 0.99f * kGap) << share;
+    EXPECT_LT(std::fabs(v[3].moved.z), 1.01f * kGap) << share;
   }
 }
 

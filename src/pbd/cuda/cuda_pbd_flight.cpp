@@ -87,14 +87,10 @@ void CudaPbdTissue::keep_momentum(int steps, float h) {
   const pbd::CudaPbdFlight* sums = d.host_flights.data();
   const std::vector<pbd::Flight> now = flights(sums + chunks);
   std::vector<pbd::Flight> flying = now;
-  for (std::size_t c = 0; c < flying.size(); ++c) {
-    if (s.touching[c] != 0) flying[c].is_free = false;
-  }
   for (std::size_t k = 0; k < chunks; ++k) {
     if (sums[chunks + k].pushed != 0) flying[d.component_of_chunk[k]].is_free = false;
   }
-  std::vector<pbd::RigidChange> changes =
-      pbd::missing_motion(s.scene, flights(sums), flying, steps, h);
+  std::vector<pbd::RigidChange> changes = pbd::missing_motion(s, flights(sums), flying, steps, h);
   const double duration = steps * h;
   const bool are_known = s.damped_for == duration;
   if (!pbd::make_dampers(s, duration)) {
@@ -113,6 +109,7 @@ void CudaPbdTissue::keep_momentum(int steps, float h) {
     spins.push_back(spin_of(now[c], angular));
     left.push_back(angular - now[c].inertia * spins[c]);
     change.is_free = true;
+    change.linear += change.spin.cross(now[c].centre - change.centre);
     change.centre = now[c].centre;
     change.spin -= spins[c];
   }

@@ -33,8 +33,8 @@ class CudaPbdTissue final : public PbdTissue {
 
   // For tests and the benchmark.
   void pull() override;
-  void push();      ///< motion to the GPU
-  void push_all();  ///< and constraints, after a change of them
+  void push() override;  ///< motion to the GPU
+  void push_all();       ///< and constraints, after a change of them
   /// Throws std::runtime_error where that is not possible.
   void set_way(Way);
   Way way() const;  ///< one of the two

@@ -32,6 +32,11 @@ struct Substep {
   const std::vector<Collider>& colliders;
 };
 
+/// A collider's bit of FluidState::near; those behind the 63rd share one.
+std::uint64_t bit_of(std::size_t collider) {
+  return std::uint64_t{1} << std::min<std::size_t>(collider, 63);
+}
+
 float artificial_viscosity(const FluidState& s, const FluidLaw& law) {
   return law.viscosity + 0.1f * kAlpha * law.density * law.sound() * 0.5f * s.kernel.reach;
 }
@@ -90,7 +95,14 @@ void press(FluidState& s, const Substep& step, int i) {
   // Walls at right angles each take their share of what the others leave.
   const float open = std::max(1 - tissue.share, 0.1f);
   float clear = open;
-  for (const Collider& c : step.colliders) clear *= 1 - plane_share(w, gap(c, x).distance).share;
+  std::uint64_t near = 0;
+  for (std::size_t c = 0; c < step.colliders.size(); ++c) {
+    const float distance = gap(step.colliders[c], x).distance;
+    if (!(distance < w.reach)) continue;
+    near |= bit_of(c);
+    clear *= 1 - plane_share(w, distance).share;
+  }
+  s.near[i] = near;
   clear = std::max(clear, 0.05f);
   const float dense = 1 + (sum / (kPacking * clear) - 1) / kResponse;
   const FluidLaw& law = s.laws[p.kind[i]];
@@ -141,6 +153,7 @@ void push(FluidState& s, const Substep& step, ColliderLoad* loads, int i) {
     if (dot3(d, d) < nearest) nearest = dot3(d, d), touch.triangle = s.lists.wall[e];
   }
   for (std::size_t c = 0; c < step.colliders.size(); ++c) {
+    if ((s.near[i] & bit_of(c)) == 0) continue;
     const Gap g = gap(step.colliders[c], x);
     const WallShare of = plane_share(w, g.distance);
     if (!(of.face > 0)) continue;
@@ -229,6 +242,7 @@ void move(FluidState& s, const Substep& step, ColliderLoad* loads, int i) {
     }
   }
   for (std::size_t c = 0; c < step.colliders.size(); ++c) {
+    if ((s.near[i] & bit_of(c)) == 0) continue;
     const Collider& of = step.colliders[c];
     const Gap g = gap(of, y);
     if (g.distance >= margin) continue;
@@ -303,6 +317,7 @@ void substep(FluidState& s, const Substep& step, FluidWalls& walls,
   for (auto* field : {&s.factor, &s.strength, &s.v_next[0], &s.v_next[1], &s.v_next[2]}) {
     field->resize(n);
   }
+  s.near.resize(n);
   s.share.resize(s.lists.wall.size());
   s.touches.assign(n, {-1, {}});
   std::vector<ColliderLoad> forces(step.colliders.size());

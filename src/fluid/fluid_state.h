@@ -68,9 +68,10 @@ struct FluidState {
 
   // Of a substep.
   std::vector<WallTriangle> now, next;
-  Array<float> share;     ///< of each entry of lists.wall: its impulse [N s]
-  Array<float> factor;    ///< of a particle: what its pressure weighs in a pair [Pa]
-  Array<float> strength;  ///< and at a wall, over what other walls leave [N m]
+  Array<float> share;               ///< of each entry of lists.wall: its impulse [N s]
+  Array<float> factor;              ///< of a particle: what its pressure weighs in a pair [Pa]
+  Array<float> strength;            ///< and at a wall, over what other walls leave [N m]
+  std::vector<std::uint64_t> near;  ///< which colliders it may meet, as bits
   Array<float> v_next[3];
   struct Touch {
     std::int32_t triangle;  ///< -1 for none

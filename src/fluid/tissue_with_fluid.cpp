@@ -200,7 +200,7 @@ void TissueWithFluid::advance_interval(double duration, const FrameInput& input)
 }
 
 void TissueWithFluid::fill_up(double duration) {
-  constexpr double kSmoothing = 0.02, kRate = 1, kSlowest = 0.1;  // [s], [1/s], [1]
+  constexpr double kSmoothing = 0.01, kRate = 1, kSlowest = 0.1;  // [s], [1/s], [1]
   for (FillProgress& fill : fills_) {
     if (fill.filling == 0) continue;
     FluidParticles& p = fluid_.particles;

@@ -23,12 +23,12 @@ class FluidIn : public testing::TestWithParam<Method> {};
 
 /// A filled organ that falls: what the fluid gains of momentum the wall loses.
 TEST_P(FluidIn, KeepsMomentum) {
-  Scene scene = filled_ball(GetParam(), 500);
+  Scene scene = filled_ball(GetParam(), 200);
   Simulation simulation(scene);
   ASSERT_GT(fill_up(simulation), 0);
   simulation.set_gravity(Vec3(0.5, 0, -2));
   const Momentum before = simulation.tissue().momentum();
-  constexpr int kFrames = 6;
+  constexpr int kFrames = 3;
   for (int i = 0; i < kFrames; ++i) ASSERT_FALSE(simulation.advance_frame().result.blew_up);
   const Momentum after = simulation.tissue().momentum();
   const Vec3 asked = before.mass * kFrames / scene.frame_rate * Vec3(0.5, 0, -2);
@@ -38,31 +38,34 @@ TEST_P(FluidIn, KeepsMomentum) {
 /// A closed organ that is shaken: nothing passes its wall of two cells, and it holds the volume
 /// that its fluid has under its pressure.
 TEST_P(FluidIn, StaysInAClosedOrgan) {
-  Scene scene = filled_ball(GetParam(), 5000);
-  scene.materials[0].young_modulus = 60e3;
+  // The meshless method takes ten times as long.
+  const double asked = GetParam() == Method::kMls ? 1000 : 5000;
+  const int shakes = GetParam() == Method::kMls ? 4 : 20;
+  Scene scene = filled_ball(GetParam(), asked);
+  scene.materials[0].young_modulus = 12 * asked;
   scene.bodies[0].anchors = {held_below(-0.015)};
   Simulation simulation(scene);
   const double volume = fill_up(simulation);
   ASSERT_GT(volume, 0);
   const auto fluid = [&] { return simulation.tissue().fluid_volumes()[0]; };
-  const double modulus = 60 * (5000 + 0 * 1010);  // as a scene without gravity has it
+  const double modulus = 60 * asked;  // as a scene without gravity has it
   const auto packed = [&](const FluidVolume& of) {
     return of.total * (1 - of.pressure / modulus) /
            hollow_volume(simulation.tissue(), Vec3::Zero());
   };
   const double at_first = packed(fluid());
-  for (int i = 0; i < 20; ++i) {
+  for (int i = 0; i < shakes; ++i) {
     simulation.set_gravity(Vec3(15 * std::sin(0.8 * i), 0, 15 * std::cos(0.5 * i)));
     ASSERT_FALSE(simulation.advance_frame().result.blew_up);
   }
   simulation.set_gravity(Vec3::Zero());
-  for (int i = 0; i < 10; ++i) simulation.advance_frame();
+  for (int i = 0; i < shakes / 2; ++i) simulation.advance_frame();
   const FluidVolume after = fluid();
   EXPECT_DOUBLE_EQ(after.total, volume);
   EXPECT_DOUBLE_EQ(after.inside[0], volume);
   EXPECT_EQ(after.spilt, 0);
   EXPECT_NEAR(packed(after) / at_first, 1, 0.005);
-  EXPECT_NEAR(after.pressure, 5000, 1000);
+  EXPECT_NEAR(after.pressure / asked, 1, 0.2);
 }
 
 std::string method_name(const testing::TestParamInfo<Method>& info) {
@@ -107,11 +110,14 @@ BladePath slice(double x, double depth_from, double depth_to) {
 
 /// The figure that we reproduce: nothing leaves a whole organ; the further it is cut the more does.
 TEST(FluidInTissue, LeavesAnOrganThatIsCut) {
-  Scene scene = filled_ball(Method::kMpm, 1500);
+  Scene scene = filled_ball(Method::kMpm, 500);
   scene.bodies[0].anchors = {held_below(-0.015)};
+  Simulation whole(scene);
+  ASSERT_GT(fill_up(whole), 0);
+  const std::vector<std::uint8_t> full = whole.save();
   const auto spilt_after = [&](double share) {
     Simulation simulation(scene);
-    fill_up(simulation);
+    simulation.restore({full.data(), full.size()});
     if (share > 0) simulation.cut(slice(0.0004, 0.03, 0.018 - share * 0.036));
     for (int i = 0; i < 12; ++i) EXPECT_FALSE(simulation.advance_frame().result.blew_up);
     const FluidVolume fluid = simulation.tissue().fluid_volumes()[0];
@@ -128,7 +134,7 @@ TEST(FluidInTissue, LeavesAnOrganThatIsCut) {
 
 /// One and two threads, and a state that was saved on the way: the same bits.
 TEST(FluidInTissue, HasTheSameBits) {
-  Scene scene = filled_ball(Method::kMpm, 1500);
+  Scene scene = filled_ball(Method::kMpm, 300);
   const auto run = [&](int threads, int restore_at) {
     scene.threads = threads;
     auto simulation = std::make_unique<Simulation>(scene);

@@ -133,7 +133,7 @@ class Strip {
     std::vector<float> f;
     for (const Block* b : s.blocks.all) {
       f.assign(3 * static_cast<std::size_t>(b->node_count()), 0.0f);
-      s.kernels->forces(*b, block_field(s, *b), s.work.scratch.local(), f.data());
+      s.kernels->forces(*b, block_field(s, *b), s.scratch.local(), f.data());
       for (int z = 0; z < b->nz + 2; ++z) {
         for (int i = 0; i < (b->ny + 2) * b->pitch; ++i) {
           const int local = z * b->plane + i;

@@ -39,7 +39,7 @@ struct ToolMemory {
 
 struct ToolPush {
   float force[3];  ///< [N]
-  float across;    ///< stiffness across the surface, beside which its inerter stands [N/m]
+  float across;    ///< stiffness across the surface, beside which its added mass stands [N/m]
 };
 
 /// In a substep of dt seconds. `is_held`: it touched before. mobility(per_mass) is per_mass times
@@ -65,8 +65,8 @@ TISSUE_SIM_INLINE ToolPush push_tool(const PushedTissue& tissue, const PushedPla
   if (place.most < kUnbounded) spring.most = place.most;
   const float unit_area = 0.25f * tissue.cell_size * tissue.cell_size;
   spring.cohesion = collider.cohesion * place.area / unit_area;
-  // Along the surface no inerter helps: at rims and on debris, whose nodes are light, the spring is
-  // what the substep bears.
+  // Along the surface no added mass helps: at rims and on debris, whose nodes are light, the spring
+  // is what the substep bears.
   const float light = mobility(place.parts * spring.along * dt * dt / kAlongBorne);
   if (light > 1) {
     spring.along /= light;
@@ -78,7 +78,7 @@ TISSUE_SIM_INLINE ToolPush push_tool(const PushedTissue& tissue, const PushedPla
   return push;
 }
 
-/// The same of a point by itself, within the tissue, in a crack, on a flake: no inerter stands
+/// The same of a point by itself, within the tissue, in a crack, on a flake: no added mass stands
 /// beside its spring.
 TISSUE_SIM_INLINE void push_point(const ContactSpring& soft, const float* x, const float* v,
                                   const Collider& collider, const Gap& g, ToolMemory& memory,

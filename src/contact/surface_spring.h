@@ -33,7 +33,7 @@ inline constexpr float kUnbounded = 1e30f;
 /// jaws is crushed flat, and before a tool that comes into an anchor it is turned inside out. What
 /// presses back more lies in the tool.
 inline constexpr float kMostOfHeld = 1;
-inline constexpr float kInertia = 0.5f;  ///< b / (k dt^2) of the inerter beside the stiff spring
+inline constexpr float kInertia = 0.5f;  ///< b / (k dt^2) of the added mass beside the stiff spring
 /// What stays in a substep of how deep contact began: a bounce of debris takes three substeps, one
 /// of a whole block some twenty.
 inline constexpr float kBegunStays = 1 - 1 / 128.0f;

@@ -20,8 +20,8 @@ struct FramePart {
 /// What a part of a frame came to.
 enum class Verdict {
   kAccepted,
-  kTooLong,     ///< its substeps were longer than what the tissue bore at its end
-  kUnforeseen,  ///< tissue came to an instrument that no list of contacts had foreseen
+  kTooLong,        ///< its substeps were longer than what the tissue bore at its end
+  kMissedContact,  ///< tissue came to an instrument that no list of contacts had foreseen
 };
 
 /// Runs a frame in parts: bonds that snap, or what a fast tool squeezes, may stiffen tissue twofold

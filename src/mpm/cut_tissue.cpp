@@ -74,7 +74,7 @@ Apart take_apart(MpmState& state, const std::vector<std::int32_t>& changed,
             });
       },
       [&] {
-        list_bridges(state, changed);
+        list_bridges(state, state, changed);
         meanwhile();
       });
   follow_front(state, changed, state.anchors.at_row);

@@ -1,4 +1,4 @@
-// Tissue that is cut, tears, or is calmed where it is wild.
+// Tissue that is cut, tears, or is calmed where it is ill-conditioned.
 #include <algorithm>
 
 #include "mpm/cut_tissue.h"
@@ -53,17 +53,17 @@ bool MpmTissue::tear(double share) {
   MpmFrame& frame = *run_->frame;
   CutReport& report = run_->result.tear_report;
   const bool bridges =
-      share < 1 && may_be_wild(s) && !s.bridge_ends.empty();  // at 1, finish() does
+      share < 1 && may_be_ill_conditioned(s) && !s.bridge_ends.empty();  // at 1, finish() does
   if (frame.tearing.empty() && !bridges) return false;
   if (frame.blades) {  // what they have passed so far
     measured(device_->measure(kMeasureMotion));
     cut_by_blades(share);
   }
   std::vector<std::int32_t> changed;
-  tear_bonds(s, frame.tearing, changed, report);
+  tear_bonds(s, s, frame.tearing, changed, report);
   if (bridges) {
     device_->bring_nodes(s.bridge_ends);
-    tear_bridges(s, changed, report);
+    tear_bridges(s, s, changed, report);
   }
   if (changed.empty() && !frame.blades) return false;
   if (!changed.empty()) take_apart(changed);
@@ -74,11 +74,11 @@ bool MpmTissue::tear(double share) {
   return true;
 }
 
-bool MpmTissue::settle_wild_debris() {
+bool MpmTissue::settle_ill_conditioned() {
   MpmState& s = run_->state;
-  if (s.debris.empty() || !may_be_wild(s)) return false;
+  if (s.debris.empty() || !may_be_ill_conditioned(s)) return false;
   device_->bring_nodes({s.debris.begin(), s.debris.end()});
-  std::vector<std::int32_t> settled = tissue_sim::settle_wild_debris(s, s.debris);
+  std::vector<std::int32_t> settled = tissue_sim::settle_ill_conditioned(s, s.debris);
   if (settled.empty()) return false;
   device_->send_nodes();
   std::sort(settled.begin(), settled.end());
@@ -89,12 +89,12 @@ bool MpmTissue::settle_wild_debris() {
 bool MpmTissue::tame() {
   MpmState& s = run_->state;
   CutReport& report = run_->result.tear_report;
-  if (run_->result.blew_up || !may_be_wild(s)) return false;
-  const bool settled = settle_wild_debris();
+  if (run_->result.blew_up || !may_be_ill_conditioned(s)) return false;
+  const bool settled = settle_ill_conditioned();
   std::vector<std::int32_t> changed;
   if (!s.bridge_ends.empty()) {
     device_->bring_nodes(s.bridge_ends);
-    tear_bridges(s, changed, report);
+    tear_bridges(s, s, changed, report);
   }
   if (changed.empty()) return settled;
   take_apart(changed);

@@ -45,7 +45,7 @@ struct MpmRun {
 
 /// What is measured, as bits. Whoever measures energies measures stiffness, too.
 inline constexpr unsigned kMeasureMotion = 1;     ///< MpmState::motion
-inline constexpr unsigned kMeasureStiffness = 2;  ///< and MpmState::wildest: half the work
+inline constexpr unsigned kMeasureStiffness = 2;  ///< and MpmState::worst_stiffening: half the work
 inline constexpr unsigned kMeasureEnergies = 4;
 
 class MpmDevice {

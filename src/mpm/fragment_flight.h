@@ -1,4 +1,4 @@
-// Fragments that fly: from when a foreseen piece has come off until it touches tissue, the ground
+// Fragments that fly: from when a predicted piece has come off until it touches tissue, the ground
 // or a tool it moves as a rigid body, whatever its points are strained by (Sung, Kim and Shin,
 // Electronics 13:1340, 2024, section 3.1; what they leave open, momentum, is kept here).
 #pragma once

@@ -196,7 +196,7 @@ void look_ahead(const MpmState& state, const Pieces& pieces, std::vector<Straine
                 double duration, Foresight& foresight, FrameResult& result) {
   foresight.forecast = forecast_fragments(state, pieces, std::move(strained), *foresight.network,
                                           foresight.classifier);
-  // A piece that comes off in a frame was foreseen at the end of one before, however long it is.
+  // A piece that comes off in a frame was predicted at the end of one before, however long it is.
   const double longest = std::max(foresight.network->horizon(), duration);
   remember(foresight.forecast, state.time - 1.001 * longest, foresight.said);
   result.fragment_candidates = static_cast<int>(foresight.forecast.size());

@@ -44,7 +44,7 @@ void remember(const std::vector<FragmentChance>& now, double since,
               std::vector<FragmentChance>& before);
 
 /// Whether a piece that has come off is a fragment (loose, half a cell to 0.4 of its body) that
-/// was foreseen: of its points that were looked at half or more were expected to be part of one.
+/// was predicted: of its points that were looked at half or more were expected to be part of one.
 /// `F` is then drawn from what was said of those expected to be part of one: the mean over them,
 /// and one draw of a normal distribution for each component (what is wrong for one point is for its
 /// neighbours), by a counter-based generator from the scene's seed and the piece's id. Its
@@ -52,7 +52,7 @@ void remember(const std::vector<FragmentChance>& now, double since,
 bool draw_deformation(const MpmState& state, const Pieces& pieces, int piece,
                       const std::vector<FragmentChance>& said, Eigen::Matrix3d& F);
 
-/// A foreseen piece that came off, and the deformation that it takes when it flies.
+/// A predicted piece that came off, and the deformation that it takes when it flies.
 struct WaitingFragment {
   int piece = -1;    ///< Fragment::id
   double until = 0;  ///< when it is forgotten [s]
@@ -73,7 +73,7 @@ struct Foresight {
 Foresight make_foresight(const Scene& scene);
 
 /// At the end of a frame that took so long [s]: lets those fly of the pieces which came off and
-/// were foreseen, from the end of the first frame after that one on at which they touch nothing
+/// were predicted, from the end of the first frame after that one on at which they touch nothing
 /// (the faces of a crack part but slowly), if that comes within the network's horizon. Returns
 /// their ids.
 std::vector<int> let_fly(MpmState& state, const Pieces& pieces, const FrameResult& frame,

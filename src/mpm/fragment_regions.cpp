@@ -133,8 +133,8 @@ std::vector<StrainedPoint> find_strained(MpmState& state, double share) {
     if (limit == 0) return;
     std::vector<StretchedPoint> stretched;
     state.kernels->stretched(block, block_field(state, block),
-                             static_cast<float>(1 + share * (limit - 1)),
-                             state.work.scratch.local(), stretched);
+                             static_cast<float>(1 + share * (limit - 1)), state.scratch.local(),
+                             stretched);
     of_block[i] = strained_of(state, stretched, share);
   });
   std::vector<StrainedPoint> strained;

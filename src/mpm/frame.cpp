@@ -60,11 +60,11 @@ Verdict MpmTissue::judge_part(const FramePart& part) {
   const bool borne = substep_.is_borne(run_->state, run_->modulus, stable_substep(), last, energy);
   const bool may_go_back = device_->can_restore_motion();
   if (!borne && may_go_back) return Verdict::kTooLong;
-  return device_->missed_contact() && may_go_back ? Verdict::kUnforeseen : Verdict::kAccepted;
+  return device_->missed_contact() && may_go_back ? Verdict::kMissedContact : Verdict::kAccepted;
 }
 
 void MpmTissue::reject_part(Verdict verdict) {
-  const bool missed = verdict == Verdict::kUnforeseen;
+  const bool missed = verdict == Verdict::kMissedContact;
   device_->restore_motion(missed);
   run_->result = checkpoint_.result;
   measured(device_->measure(kMeasureStiffness));
@@ -79,7 +79,7 @@ bool MpmTissue::accept_part() {
 
 void MpmTissue::break_bonds(double share) {
   const bool tore = tear(share);
-  const bool settled = share < 1 && settle_wild_debris();
+  const bool settled = share < 1 && settle_ill_conditioned();
   if (!tore && !settled) return;
   if (settled || !measured_) measured(device_->measure(kMeasureStiffness));
   follow();

@@ -51,7 +51,7 @@ template <class F>
 double LinearisedMotion::accelerations(const F& f) {
   state_.cpu->for_each(static_cast<int>(blocks_.size()), [&](int i) {
     const Block& block = *state_.blocks.all[blocks_[i]];
-    state_.kernels->forces(block, block_field(state_, block), state_.work.scratch.local(),
+    state_.kernels->forces(block, block_field(state_, block), state_.scratch.local(),
                            state_.work.force.data() + block.force_offset);
   });
   state_.cpu->for_each(static_cast<int>(front_cells_.size()),

@@ -246,12 +246,7 @@ void fields(Archive& archive, FrontNodes& f) {
 }
 
 template <class Archive>
-void fields(Archive& archive, TissueMotion& m) {
-  archive(m.time, m.dt, m.contacts, m.flights);
-}
-
-template <class Archive>
-void fields(Archive& archive, TissueRecords& r) {
+void fields(Archive& archive, TearRecords& r) {
   archive(r.tore_at, r.bridge_ends, r.debris);
 }
 
@@ -267,8 +262,8 @@ void tissue_fields(Archive& archive, MpmState& s) {
   archive.part("scene", s.scene.gravity, s.scene.damping);
   std::apply([&](auto&... of) { archive.part("topology", of...); }, topology_of(s));
   std::apply([&](auto&... of) { archive.part("motion", of...); }, motion_of(s));
-  archive.part("records", static_cast<TissueRecords&>(s));
-  archive.part("blocks' motion", s.motion, s.wildest);
+  archive.part("records", static_cast<TearRecords&>(s));
+  archive.part("blocks' motion", s.motion, s.worst_stiffening);
 }
 
 }  // namespace tissue_sim

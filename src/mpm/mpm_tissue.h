@@ -82,10 +82,10 @@ class MpmTissue : public SteppedTissue<MpmTissue> {
   /// of pieces that came apart to `fresh` if it is not null.
   void take_apart(const std::vector<std::int32_t>& changed,
                   const std::vector<std::int32_t>& touched = {}, std::vector<int>* fresh = nullptr);
-  bool tame();                   ///< what is wild (mpm/tear/debris.h), whether anything was
-  bool settle_wild_debris();     ///< of that, debris
-  void measured(unsigned what);  ///< MpmDevice::measure()
-  void follow();                 ///< SubstepChoice::follow()
+  bool tame();  ///< what is ill-conditioned (mpm/tear/debris.h), whether anything was
+  bool settle_ill_conditioned();  ///< of that, debris
+  void measured(unsigned what);   ///< MpmDevice::measure()
+  void follow();                  ///< SubstepChoice::follow()
 
   std::vector<std::string> notes_;
   std::unique_ptr<MpmRun> run_;

@@ -149,7 +149,7 @@ void measure_pieces(MpmState& state, Pieces& pieces) {
   std::vector<SumsByPiece> of_block(count);
   state.cpu->for_each(count, [&](int i) {
     const Block& block = *state.blocks.all[i];
-    BlockScratch& scratch = state.work.scratch.local();
+    BlockScratch& scratch = state.scratch.local();
     const std::size_t lanes = block.lane_count();
     if (scratch.values.size() < 6 * lanes) scratch.values.resize(6 * lanes);
     float *x = scratch.values.data(), *v = x + 3 * lanes;

@@ -62,9 +62,9 @@ float stable_substep(const MpmState& state, const Stiffening& stiffening) {
   return static_cast<float>(dt);
 }
 
-bool may_be_wild(const MpmState& state) {
-  return (!state.bridge_ends.empty() && state.wildest >= kBridgeStiffening) ||
-         (!state.debris.empty() && state.wildest >= kWildStiffening);
+bool may_be_ill_conditioned(const MpmState& state) {
+  return (!state.bridge_ends.empty() && state.worst_stiffening >= kBridgeStiffening) ||
+         (!state.debris.empty() && state.worst_stiffening >= kIllConditioned);
 }
 
 std::uint64_t checksum(const MpmState& state, const Pieces& pieces) {

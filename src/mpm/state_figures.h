@@ -22,9 +22,9 @@ double fastest_damping(const MpmState& state, const Stiffening& stiffening);
 /// The substep that is stable however the tissue is cut, by the scene's CFL number [s].
 float stable_substep(const MpmState& state, const Stiffening& stiffening);
 
-/// Whether a bond bridge or a bit of debris may be wild, as of MpmState::wildest:
-/// mpm/tear/debris.h.
-bool may_be_wild(const MpmState& state);
+/// Whether a bond bridge or a bit of debris may be ill-conditioned, as of
+/// MpmState::worst_stiffening: mpm/tear/debris.h.
+bool may_be_ill_conditioned(const MpmState& state);
 
 /// Hash of nodes, bonds and pieces.
 std::uint64_t checksum(const MpmState& state, const Pieces& pieces);

@@ -10,8 +10,8 @@
 namespace tissue_sim {
 namespace {
 
-constexpr double kFreeMotion = 0.25;     // of a tool in a part [cells]; beyond it the margin grows
-constexpr float kStrained = 8;           // BlockState::wildest, from which on the margin grows
+constexpr double kFreeMotion = 0.25;  // of a tool in a part [cells]; beyond it the margin grows
+constexpr float kStrained = 8;  // BlockState::worst_stiffening, from which on the margin grows
 constexpr double kStrainedMargin = 0.7;  // by that, and energy is watched
 
 std::vector<Stiffness*> stiffness_of(const MpmState& state) {
@@ -75,7 +75,9 @@ double farthest_motion(const MpmState& state, const FrameInput& input,
 
 }  // namespace
 
-bool SubstepChoice::is_strained(const MpmState& state) { return state.wildest > kStrained; }
+bool SubstepChoice::is_strained(const MpmState& state) {
+  return state.worst_stiffening > kStrained;
+}
 
 bool SubstepChoice::is_borne(const MpmState& state, const std::vector<float>& modulus,
                              double cautious, double dt, const PartEnergy& energy) {
@@ -104,17 +106,18 @@ double SubstepChoice::longest(MpmState& state, const FrameInput& input,
                               const FrameColliders& colliders, const Stiffening& stiffening,
                               const MeasureLimit& measure) {
   const double cautious = stable_substep(state, stiffening);
-  const double foreseen = longest_foreseen(state, input, colliders, stiffening, cautious, measure);
+  const double predicted =
+      longest_predicted(state, input, colliders, stiffening, cautious, measure);
   const double shortened = acceptance_.shortened();
-  const bool at_once = shortened < 1 || foreseen <= cautious;
+  const bool at_once = shortened < 1 || predicted <= cautious;
   return shortened *
-         length_.choose(state.time, foreseen, limit_.trend(), at_once, conserves_energy(state));
+         length_.choose(state.time, predicted, limit_.trend(), at_once, conserves_energy(state));
 }
 
-double SubstepChoice::longest_foreseen(MpmState& state, const FrameInput& input,
-                                       const FrameColliders& colliders,
-                                       const Stiffening& stiffening, double cautious,
-                                       const MeasureLimit& measure) {
+double SubstepChoice::longest_predicted(MpmState& state, const FrameInput& input,
+                                        const FrameColliders& colliders,
+                                        const Stiffening& stiffening, double cautious,
+                                        const MeasureLimit& measure) {
   if (!input.cuts.empty() || tears(state)) return cautious;
   limit_.measure_if_due(stiffness_of(state), state.time, measure);
   if (!limit_.known()) return cautious;

@@ -46,9 +46,9 @@ class SubstepChoice {
   friend void fields(Archive& archive, SubstepChoice& x);  // mpm/mpm_fields.h
 
   /// longest() as long as no part was rejected.
-  double longest_foreseen(MpmState& state, const FrameInput& input, const FrameColliders& colliders,
-                          const Stiffening& stiffening, double cautious,
-                          const MeasureLimit& measure);
+  double longest_predicted(MpmState& state, const FrameInput& input,
+                           const FrameColliders& colliders, const Stiffening& stiffening,
+                           double cautious, const MeasureLimit& measure);
 
   StabilityLimit limit_;
   StepLength length_;

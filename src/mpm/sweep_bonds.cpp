@@ -66,7 +66,7 @@ class Sweep {
   void read_places(int i) {
     PassedBlock& passed = passed_[i];
     const Block& block = *passed.block;
-    BlockScratch& scratch = state_.work.scratch.local();
+    BlockScratch& scratch = state_.scratch.local();
     const std::size_t lanes = block.lane_count();
     if (scratch.values.size() < 6 * lanes) scratch.values.resize(6 * lanes);
     if (scratch.near.size() < lanes) scratch.near.resize(lanes);

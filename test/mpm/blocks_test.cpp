@@ -71,7 +71,7 @@ TEST(Blocks, KnowWhereTheirPointsAre) {
     for (const Block* b : s.blocks.all) {
       const std::size_t lanes = b->lane_count();
       std::vector<float> x(3 * lanes);
-      s.kernels->positions(*b, block_field(s, *b), s.nodes.u, s.work.scratch.local(), x.data());
+      s.kernels->positions(*b, block_field(s, *b), s.nodes.u, s.scratch.local(), x.data());
       for (std::size_t j = 0; j < lanes; ++j) {
         const std::int32_t p = b->point[j];
         if (p < 0) continue;

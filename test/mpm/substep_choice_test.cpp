@@ -144,12 +144,12 @@ TEST(SubstepChoice, IsCautiousWhereItCannotKnow) {
 }
 
 TEST(SubstepChoice, UndoesWhatHasEnergyFromNowhere) {
-  const auto borne = [](float wildest, double given, double gravity) {
+  const auto borne = [](float worst_stiffening, double given, double gravity) {
     Scene scene = soft_body(0.45, Vec3(4, 4, 4));
     scene.gravity = Vec3(0, 0, -gravity);
     MpmTissue tissue(scene);
     MpmState& s = tissue.state();
-    s.wildest = wildest;
+    s.worst_stiffening = worst_stiffening;
     const std::vector<float> modulus(s.blocks.all.size(), 1e4f);
     const double dt = tissue.stable_substep(), mass = 1060 * std::pow(4 * s.scene.cell_size, 3);
     SubstepChoice choice;

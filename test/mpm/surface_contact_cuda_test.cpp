@@ -1,4 +1,4 @@
-// Tools and the ground at the true surface, on the GPU: the stiff springs and their inerters.
+// Tools and the ground at the true surface, on the GPU: the stiff springs and their added masses.
 // Skipped where there is no GPU.
 #include <gtest/gtest.h>
 
@@ -215,7 +215,7 @@ TEST_F(SurfaceContactOnGpu, SubstepsAgreeWithBruteForce) { agrees(nullptr); }
 TEST_F(SurfaceContactOnGpu, SubstepsAgreeInBundles) { agrees("8 2 1 256 1"); }
 TEST_F(SurfaceContactOnGpu, SubstepsAgreeWhereBlocksWait) { agrees("2 2 3 192 0"); }
 
-// What it loses the tool got: while the inerters take in and resist, in the middle of a blow.
+// What it loses the tool got: while the added masses take in and resist, in the middle of a blow.
 TEST_F(SurfaceContactOnGpu, AToolFeelsTheOppositeOfWhatItGives) {
   for (const double friction : {0.0, 0.6}) {
     Scene scene = block_and_ball();
@@ -282,7 +282,7 @@ TEST_F(SurfaceContactOnGpu, AFallingBlockGainsNoEnergyAndComesToRest) {
     }
     return std::make_pair(height / mass, speed / mass);
   };
-  // The energy is that of the nodes, which has not what springs and inerters hold: so where the
+  // The energy is that of the nodes, which has not what springs and added masses hold: so where the
   // block is highest.
   constexpr double kGravity = 9.81, kMass = 1000 * 0.02 * 0.02 * 0.015;
   std::vector<double> peaks = {height_and_speed().first}, energy = {kMass * kGravity * kDrop};

@@ -40,7 +40,7 @@ TEST(Tear, FindsThePointsThatBruteForceFinds) {
   for (const InstructionSet set : instruction_sets()) {
     std::vector<StretchedPoint> found;
     for (const Block* b : s.blocks.all) {
-      block_kernels(set).stretched(*b, block_field(s, *b), kStretch, s.work.scratch.local(), found);
+      block_kernels(set).stretched(*b, block_field(s, *b), kStretch, s.scratch.local(), found);
     }
     std::vector<const StretchedPoint*> of_point(s.points.size(), nullptr);
     for (const StretchedPoint& p : found) of_point[p.point] = &p;

@@ -72,7 +72,7 @@ struct BlockState {
   /// soft points that times kSoftness, 1 at least: see stable_substep(); then ||F||^2 of all. Less
   /// of points behind the faces of anchors: Points::lightness.
   std::vector<float> stiffening;
-  float wildest = 1;  ///< the largest of all points, soft and light ones not lessened
+  float worst_stiffening = 1;  ///< the largest of all points, soft and light ones not lessened
   bool finite = true;
 };
 

@@ -40,7 +40,7 @@ TISSUE_SIM_INLINE void stiffen(const Block& b, const BlockField& f, std::int32_t
   float stiffening = column + std::fabs(J - 1) * std::sqrt(f2 / 3);
   if (!std::isfinite(stiffening)) r.finite = false;
   // Not lessened: where light points are drawn out they swing, and energy is to be watched.
-  r.wildest = std::max(r.wildest, stiffening);
+  r.worst_stiffening = std::max(r.worst_stiffening, stiffening);
   if (f.soft != nullptr && f.soft[point] != 0) stiffening *= kSoftness;
   stiffening = lessened(f, point, stiffening);
   const int material = f.material == nullptr ? 0 : f.material[point];

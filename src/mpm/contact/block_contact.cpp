@@ -68,7 +68,7 @@ bool overlap(const Box& a, const Box& b) {
 constexpr int kListLasts = 8;
 constexpr double kListMargin = 0.5;
 /// Whether what a collider presses a point with has a bound: kMostOfHeld.
-bool is_bounded(const MpmState& state, const Collider& collider, std::int32_t p) {
+bool is_bounded(const TouchingTissue& state, const Collider& collider, std::int32_t p) {
   const bool at_face = state.points.anchored[p] != 0 && state.points.free_volume_of(p) > 0;
   return collider.kind == Collider::kJaw || at_face;
 }
@@ -81,7 +81,7 @@ const std::vector<SurfacePlace>& places_for(const Collider& collider, const Bloc
 constexpr double kSurfaceReach = 0.5;  // from the points of a cell to its surface, at most [cells]
 
 /// How much nearer a block's points and a collider may come in a substep [m].
-double approach(const MpmState& state, int block, const Collider& collider, float dt) {
+double approach(const TouchingTissue& state, int block, const Collider& collider, float dt) {
   return kListMargin * state.scene.cell_size / kListLasts +
          (state.motion[block].speed + speed(collider)) * dt;
 }
@@ -99,7 +99,7 @@ float largest_inv_mass(const Nodes& nodes, const CellNodes& cell) {
 
 }  // namespace
 
-void find_near_colliders(MpmState& state, const std::vector<Box>& reach, double duration,
+void find_near_colliders(TouchingTissue& state, const std::vector<Box>& reach, double duration,
                          const std::vector<BlockMotion>& before) {
   Contacts& contacts = state.contacts;
   const int count = static_cast<int>(state.blocks.all.size());
@@ -124,7 +124,7 @@ void find_near_colliders(MpmState& state, const std::vector<Box>& reach, double 
   });
 }
 
-bool came_unforeseen(const MpmState& state, const std::vector<Box>& reach) {
+bool missed_contact(const TouchingTissue& state, const std::vector<Box>& reach) {
   for (std::size_t i = 0; i < state.motion.size(); ++i) {
     const std::vector<std::uint8_t>& near = state.contacts.near[i];
     Box box = state.motion[i].box;
@@ -138,7 +138,7 @@ bool came_unforeseen(const MpmState& state, const std::vector<Box>& reach) {
   return false;
 }
 
-void list_contacts(MpmState& state) {
+void list_contacts(TouchingTissue& state) {
   Contacts& contacts = state.contacts;
   const std::vector<std::vector<Touch>> before = std::move(contacts.touching);
   contacts.touching.assign(state.blocks.all.size(), {});
@@ -182,7 +182,7 @@ bool is_list_due(Contacts& contacts) {
   return due;
 }
 
-void list_near_cells(MpmState& state, int index, float dt) {
+void list_near_cells(TouchingTissue& state, int index, float dt) {
   std::vector<NearCell>& cells = state.contacts.cells[index];
   std::vector<NearPart>& parts = state.contacts.parts[index];
   cells.clear();
@@ -190,7 +190,7 @@ void list_near_cells(MpmState& state, int index, float dt) {
   if (state.contacts.near[index].empty()) return;
   const Block& block = *state.blocks.all[index];
   const LatticeBody& body = state.bodies[block.body];
-  BlockScratch& scratch = state.work.scratch.local();
+  BlockScratch& scratch = state.scratch.local();
   const std::size_t lanes = block.lane_count();
   if (scratch.values.size() < 3 * lanes) scratch.values.resize(3 * lanes);
   if (scratch.lanes.size() < lanes) scratch.lanes.resize(lanes);
@@ -264,7 +264,7 @@ namespace {
 
 /// What one block's contact adds up to.
 struct BlockPush {
-  MpmState& state;
+  TouchingTissue& state;
   const Block& block;
   const LatticeBody& body;
   float dt;
@@ -398,136 +398,181 @@ std::uint8_t clear_substeps(float distance, float nearer) {
   return static_cast<std::uint8_t>(std::min<float>(kListLasts, distance / nearer));
 }
 
-/// Pushes on its places on the surface. Adds to `points` those that the collider may hold, for it
-/// holds places of theirs: that face away, or so deep that places around are not enough.
-void push_surface(BlockPush& b, NearCell& cell, const Collider& collider, float nearer,
-                  NearPart* part, ColliderLoad& load, unsigned& points) {
-  constexpr float kFacing = -0.1f, kTurned = 0.98f;  // cosines: of a surface that faces the tool,
-                                                     // and of an inerter that still fits
-  constexpr float kDeep = 0.2f;     // from where on a point is looked at by itself [cells]
-  constexpr float kBeside = 0.25f;  // how close to a jaw tissue takes part of what it presses with
-                                    // [cells]: places are no denser than to say that
-  const CellNodes nodes(b.block, cell.node);
-  const bool whole_rows = has_whole_rows(nodes);
-  const auto h = static_cast<float>(b.body.cell_size);
-  const float unit_area = 0.25f * h * h;
-  const float dt2 = b.state.contacts.inertia.dt * b.state.contacts.inertia.dt;
-  const Nodes& of = b.state.nodes;
-  const float* const u[3] = {of.u[0].data(), of.u[1].data(), of.u[2].data()};
-  const float* const u_and_v[6] = {u[0],           u[1],           u[2],
-                                   of.v[0].data(), of.v[1].data(), of.v[2].data()};
-  const float beside = collider.kind == Collider::kJaw ? kBeside * h : 0;
-  const std::vector<SurfacePlace>& places = places_for(collider, b.block);
-  int material = -1, clear = kListLasts;
-  PushedTissue tissue{};
-  float young_modulus = 0;
-  const auto faces_away = [&](const SurfacePlace& place, const Gap& g) {
+/// Pushes on the places of a cell on the surface. Adds to `points` those that the collider may
+/// hold, for it holds places of theirs: that face away, or so deep that places around are not
+/// enough.
+class SurfacePush {
+ public:
+  SurfacePush(BlockPush& block, NearCell& of, const Collider& by, float nearer, ColliderLoad& load,
+              unsigned& points)
+      : b_(block),
+        cell_(of),
+        collider_(by),
+        nearer_(nearer),
+        load_(load),
+        points_(points),
+        nodes_(b_.block, cell_.node),
+        whole_rows_(has_whole_rows(nodes_)),
+        h_(static_cast<float>(b_.body.cell_size)),
+        unit_area_(0.25f * h_ * h_),
+        beside_(collider_.kind == Collider::kJaw ? kBeside * h_ : 0) {}
+
+  void push(NearPart* part) {
+    NearPart* const first = part;
+    const std::vector<SurfacePlace>& places = places_for(collider_, b_.block);
+    PlaceParts parts(places.data() + cell_.first_place, cell_.place_count,
+                     parts_along(collider_, h_));
+    for (; parts.next(); ++part) {
+      if (part->clear > 0) {
+        clear_ = std::min<int>(clear_, --part->clear);
+      } else {
+        push_part(parts, *part);
+      }
+    }
+    if (clear_ == 0) return;
+    cell_.clear = static_cast<std::uint8_t>(clear_);
+    for (NearPart* of_cell = first; of_cell < part; ++of_cell) of_cell->clear -= clear_;
+  }
+
+ private:
+  // Cosines: of a surface that faces the tool, and of an added mass that still fits.
+  static constexpr float kFacing = -0.1f, kTurned = 0.98f;
+  static constexpr float kDeep = 0.2f;     // from where on a point is looked at by itself [cells]
+  static constexpr float kBeside = 0.25f;  // how close to a jaw tissue takes part of what it
+                                           // presses with [cells]: places are no denser than that
+
+  void push_part(PlaceParts& parts, NearPart& part) {
+    const SurfacePlace& place = parts.place();
+    const AxisWeights weights(place.place);
+    Touch touch{{},        cell_.lane,     place.point,
+                place.key, cell_.collider, static_cast<std::uint8_t>(parts.part()),
+                {}};
+    const bool is_held = b_.find_held(touch);
+    float moved[6] = {}, at[3];  // displacement and velocity
+    measure(weights, is_held, moved);
+    for (int a = 0; a < 3; ++a) at[a] = cell_.middle[a] + place.place[a] * h_ + moved[a];
+    const Gap g = gap(collider_, at);
+    if (g.distance >= 0) {
+      if (is_held) b_.let_go(touch);
+      return pass_by(place, g, part);
+    }
+    clear_ = 0;
+    if (!is_held) {
+      if (faces_away(place, g)) {  // the far side of something thin
+        points_ |= place.points;
+        return;
+      }
+      to_local(collider_, at, touch.hold);
+      touch.begun = -g.distance;
+      measure(weights, true, moved);
+    }
+    if (g.distance < -kDeep * h_) points_ |= place.points;
+    learn_material(place.point);
+    PushedPlace pushed{at, moved + 3, place.area, static_cast<float>(parts.count())};
+    if (is_bounded(b_.state, collider_, place.point)) {
+      pushed.most = kMostOfHeld * young_modulus_ * place.area;
+    }
+    const ToolPush push = push_tool(
+        tissue_, pushed, collider_, g, is_held, b_.dt,
+        [&](float per_mass) { return mobility_over(per_mass, weights, part); }, touch);
+    if (b_.state.points.free_volume_of(place.point) > 0) {
+      spread(b_.block, cell_.node, weights, push.force, b_.force);
+      add_mass(place, g, at, push.across, touch);
+    }
+    b_.touching.push_back(touch);
+    load_.push(collider_, at, push.force, place.area / unit_area_);
+  }
+
+  /// Displacement there; with `all` velocity, too.
+  void measure(const AxisWeights& weights, bool all, float (&moved)[6]) const {
+    const Nodes& n = b_.state.nodes;
+    if (all) {
+      const float* const of[6] = {n.u[0].data(), n.u[1].data(), n.u[2].data(),
+                                  n.v[0].data(), n.v[1].data(), n.v[2].data()};
+      return values_at(of, nodes_, whole_rows_, weights, moved);
+    }
+    const float* const of[3] = {n.u[0].data(), n.u[1].data(), n.u[2].data()};
+    float only[3];
+    values_at(of, nodes_, whole_rows_, weights, only);
+    std::copy_n(only, 3, moved);
+  }
+
+  bool faces_away(const SurfacePlace& place, const Gap& g) const {
     float F[9], n[3], along = 0, length = 0;
-    deformation_gradient_at(b.state.nodes.u, nodes, b.body.cell_size, place.place, F);
+    deformation_gradient_at(b_.state.nodes.u, nodes_, b_.body.cell_size, place.place, F);
     cofactor_times(F, place.normal, n);
     for (int a = 0; a < 3; ++a) {
       along += n[a] * g.normal[a];
       length += n[a] * n[a];
     }
     return along > kFacing * std::sqrt(length);
-  };
-  NearPart* const first = part;
-  PlaceParts parts(places.data() + cell.first_place, cell.place_count, parts_along(collider, h));
-  for (; parts.next(); ++part) {
-    if (part->clear > 0) {
-      clear = std::min<int>(clear, --part->clear);
-      continue;
-    }
-    const SurfacePlace& place = parts.place();
-    const AxisWeights weights(place.place);
-    Touch touch{{},        cell.lane,     place.point,
-                place.key, cell.collider, static_cast<std::uint8_t>(parts.part()),
-                {}};
-    const bool is_held = b.find_held(touch);
-    float moved[6] = {}, at[3];  // displacement and velocity
-    if (is_held) {
-      values_at(u_and_v, nodes, whole_rows, weights, moved);
-    } else {
-      float only[3];
-      values_at(u, nodes, whole_rows, weights, only);
-      std::copy_n(only, 3, moved);
-    }
-    for (int a = 0; a < 3; ++a) at[a] = cell.middle[a] + place.place[a] * h + moved[a];
-    const Gap g = gap(collider, at);
-    if (g.distance >= 0) {
-      if (is_held) b.let_go(touch);
-      part->clear = clear_substeps(std::max(0.0f, g.distance - beside), nearer);
-      clear = std::min<int>(clear, part->clear);
-      if (g.distance >= beside) continue;
-      if (part->side == NearPart::kUnknown) {
-        part->side = faces_away(place, g) ? NearPart::kAway : NearPart::kTowards;
-      }
-      if (part->side == NearPart::kTowards) {
-        load.points += (1 - g.distance / beside) * place.area / unit_area;
-      }
-      continue;
-    }
-    clear = 0;
-    if (!is_held) {
-      if (faces_away(place, g)) {  // the far side of something thin
-        points |= place.points;
-        continue;
-      }
-      to_local(collider, at, touch.hold);
-      touch.begun = -g.distance;
-      values_at(u_and_v, nodes, whole_rows, weights, moved);
-    }
-    if (g.distance < -kDeep * h) points |= place.points;
-    const bool is_free = b.state.points.free_volume_of(place.point) > 0;
-    const int own = b.state.points.material_of(place.point);
-    if (own != material) {
-      material = own;
-      const Material& m = b.body.materials[own];
-      young_modulus = static_cast<float>(m.young_modulus);
-      tissue = pushed_tissue(static_cast<float>(lame_lambda(m) + 2 * lame_mu(m)),
-                             static_cast<float>(m.density), h, collider.radius, b.dt);
-    }
-    PushedPlace pushed{at, moved + 3, place.area, static_cast<float>(parts.count())};
-    if (is_bounded(b.state, collider, place.point)) {
-      pushed.most = kMostOfHeld * young_modulus * place.area;
-    }
-    const ToolPush push = push_tool(
-        tissue, pushed, collider, g, is_held, b.dt,
-        [&](float per_mass) {
-          if (cell.lightest < 0) cell.lightest = largest_inv_mass(b.state.nodes, nodes);
-          if (!(per_mass * cell.lightest * squared(weights) > 1))
-            return 0.0f;  // it is that at most
-          if (part->mobility < 0) {
-            part->mobility = static_cast<float>(mobility(b.state.nodes, nodes, weights));
-          }
-          return per_mass * part->mobility;
-        },
-        touch);
-    if (is_free) {
-      spread(b.block, cell.node, weights, push.force, b.force);
-      float along = 0;
-      for (int a = 0; a < 3; ++a) along += touch.along[a] * g.normal[a];
-      if (touch.inertia == 0 || along < kTurned) {
-        const bool begins = touch.inertia == 0;
-        if (!begins) b.change(-1, false, place, touch, nullptr);
-        touch.inertia = kInertia * push.across * dt2;
-        std::copy_n(g.normal, 3, touch.along);
-        float of_collider[3];
-        velocity_at(collider, at, of_collider);
-        b.change(1, begins, place, touch, of_collider);
-      }
-    }
-    b.touching.push_back(touch);
-    load.push(collider, at, push.force, place.area / unit_area);
   }
-  if (clear == 0) return;
-  cell.clear = static_cast<std::uint8_t>(clear);
-  for (NearPart* of_cell = first; of_cell < part; ++of_cell) of_cell->clear -= clear;
-}
+
+  /// The collider does not touch the place, but a jaw may be so near that it counts.
+  void pass_by(const SurfacePlace& place, const Gap& g, NearPart& part) {
+    part.clear = clear_substeps(std::max(0.0f, g.distance - beside_), nearer_);
+    clear_ = std::min<int>(clear_, part.clear);
+    if (g.distance >= beside_) return;
+    if (part.side == NearPart::kUnknown) {
+      part.side = faces_away(place, g) ? NearPart::kAway : NearPart::kTowards;
+    }
+    if (part.side == NearPart::kTowards) {
+      load_.points += (1 - g.distance / beside_) * place.area / unit_area_;
+    }
+  }
+
+  void learn_material(std::int32_t point) {
+    const int own = b_.state.points.material_of(point);
+    if (own == material_) return;
+    material_ = own;
+    const Material& m = b_.body.materials[own];
+    young_modulus_ = static_cast<float>(m.young_modulus);
+    tissue_ = pushed_tissue(static_cast<float>(lame_lambda(m) + 2 * lame_mu(m)),
+                            static_cast<float>(m.density), h_, collider_.radius, b_.dt);
+  }
+
+  float mobility_over(float per_mass, const AxisWeights& weights, NearPart& part) {
+    if (cell_.lightest < 0) cell_.lightest = largest_inv_mass(b_.state.nodes, nodes_);
+    if (!(per_mass * cell_.lightest * squared(weights) > 1)) return 0;  // it is that at most
+    if (part.mobility < 0) {
+      part.mobility = static_cast<float>(mobility(b_.state.nodes, nodes_, weights));
+    }
+    return per_mass * part.mobility;
+  }
+
+  /// Beside a spring that begins, or whose normal turned.
+  void add_mass(const SurfacePlace& place, const Gap& g, const float* at, float across,
+                Touch& touch) {
+    float along = 0;
+    for (int a = 0; a < 3; ++a) along += touch.along[a] * g.normal[a];
+    const bool begins = touch.inertia == 0;
+    if (!begins && along >= kTurned) return;
+    if (!begins) b_.change(-1, false, place, touch, nullptr);
+    const float dt = b_.state.contacts.inertia.dt;
+    touch.inertia = kInertia * across * (dt * dt);
+    std::copy_n(g.normal, 3, touch.along);
+    float of_collider[3];
+    velocity_at(collider_, at, of_collider);
+    b_.change(1, begins, place, touch, of_collider);
+  }
+
+  BlockPush& b_;
+  NearCell& cell_;
+  const Collider& collider_;
+  float nearer_;
+  ColliderLoad& load_;
+  unsigned& points_;
+  CellNodes nodes_;
+  bool whole_rows_;
+  float h_, unit_area_, beside_;
+  int material_ = -1, clear_ = kListLasts;
+  PushedTissue tissue_{};
+  float young_modulus_ = 0;
+};
 
 }  // namespace
 
-void add_contact(MpmState& state, int index, float dt, float* force,
+void add_contact(TouchingTissue& state, int index, float dt, float* force,
                  std::vector<ColliderLoad>& loads) {
   Contacts& contacts = state.contacts;
   const Block& block = *state.blocks.all[index];
@@ -557,8 +602,8 @@ void add_contact(MpmState& state, int index, float dt, float* force,
     if (cell.clear > 0) {
       --cell.clear;
     } else if (cell.place_count > 0) {
-      push_surface(b, cell, collider, nearer, contacts.parts[index].data() + cell.first_part, load,
-                   points);
+      SurfacePush(b, cell, collider, nearer, load, points)
+          .push(contacts.parts[index].data() + cell.first_part);
     }
     const bool all = cell.points_clear == 0;
     if (all) {

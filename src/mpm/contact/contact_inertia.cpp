@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "mpm/mpm_state.h"
+#include "mpm/contact/touching_tissue.h"
 #include "mpm/surface/facet_motion.h"
 
 namespace tissue_sim {
@@ -45,7 +45,7 @@ void work_out(InertialNode& n) {
   }
 }
 
-/// Gives inerters that are new to a node, and part of its B, their share of its motion:
+/// Gives added masses that are new to a node, and part of its B, their share of its motion:
 /// (M + B) v' = (M + B - dB) v + dB v_c.
 void take_in(const Begun& begun, InertialNode& n, Nodes& nodes) {
   const float v[3] = {nodes.v[0][n.node], nodes.v[1][n.node], nodes.v[2][n.node]};
@@ -74,7 +74,7 @@ void take_in_growth(InertialNode& n, const Collider& collider, Nodes& nodes) {
 
 }  // namespace
 
-void fit_inertia(MpmState& state, float dt) {
+void fit_inertia(TouchingTissue& state, float dt) {
   ContactInertia& inertia = state.contacts.inertia;
   constexpr float kRoom = 1.1f;  // substeps grow a little now and then
   if (dt <= inertia.dt && 2 * dt >= inertia.dt) return;
@@ -90,7 +90,7 @@ void fit_inertia(MpmState& state, float dt) {
   inertia.dt = kRoom * dt;
 }
 
-void change_inertia(MpmState& state) {
+void change_inertia(TouchingTissue& state) {
   ContactInertia& inertia = state.contacts.inertia;
   Nodes& nodes = state.nodes;
   std::vector<std::int32_t> changed;  // by number in inertia.nodes
@@ -123,7 +123,7 @@ void change_inertia(MpmState& state) {
         const float weight = std::fabs(w.of[k % 3] * w.of[3 + k / 3 % 3] * w.of[6 + k / 9]);
         const std::int32_t node = cell.row(k / 3 % 3, k / 9)[k % 3];
         if (weight < kNegligible || node < 0 || nodes.inv_mass[node] == 0) continue;
-        std::int32_t& index = state.work.inertial_index[node];
+        std::int32_t& index = state.inertial_index[node];
         if (index < 0) {
           index = static_cast<std::int32_t>(inertia.nodes.size());
           InertialNode n{};
@@ -172,7 +172,7 @@ void resist_acceleration(InertialNode& n, float keep, float dt, Nodes& nodes) {
   }
 }
 
-void add_inertial_loads(const MpmState& state, float kick, std::vector<ColliderLoad>& loads) {
+void add_inertial_loads(const TouchingTissue& state, float kick, std::vector<ColliderLoad>& loads) {
   for (const InertialNode& n : state.contacts.inertia.nodes) {
     const Collider& c = state.colliders[n.collider];
     if (n.uses == 0 || c.tool < 0) continue;  // nobody asks what the ground bears
@@ -189,9 +189,9 @@ void add_inertial_loads(const MpmState& state, float kick, std::vector<ColliderL
   }
 }
 
-void tidy_inertia(MpmState& state, bool all) {
+void tidy_inertia(TouchingTissue& state, bool all) {
   ContactInertia& inertia = state.contacts.inertia;
-  for (const InertialNode& n : inertia.nodes) state.work.inertial_index[n.node] = -1;
+  for (const InertialNode& n : inertia.nodes) state.inertial_index[n.node] = -1;
   if (all) {
     inertia.nodes.clear();
     for (auto& touches : state.contacts.touching) {
@@ -204,10 +204,10 @@ void tidy_inertia(MpmState& state, bool all) {
   index_inertia(state);
 }
 
-void index_inertia(MpmState& state) {
-  state.work.inertial_index.resize(state.nodes.size(), -1);
+void index_inertia(TouchingTissue& state) {
+  state.inertial_index.resize(state.nodes.size(), -1);
   for (std::size_t i = 0; i < state.contacts.inertia.nodes.size(); ++i) {
-    state.work.inertial_index[state.contacts.inertia.nodes[i].node] = static_cast<std::int32_t>(i);
+    state.inertial_index[state.contacts.inertia.nodes[i].node] = static_cast<std::int32_t>(i);
   }
 }
 

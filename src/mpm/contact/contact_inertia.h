@@ -1,13 +1,14 @@
 // What lets the stiff springs of contact keep the substeps of tissue.
 //
 // A spring k between a surface and a collider would swing faster than any substep. Beside it stands
-// an inerter b = k dt^2 / 2: it resists, with b times it, the acceleration of the surface towards
-// or away from the collider. With M + B for the mass of the nodes and K + K_c for the stiffness,
+// an added mass b = k dt^2 / 2: it resists, with b times it, the acceleration of the surface
+// towards or away from the collider. With M + B for the mass of the nodes and K + K_c for the
+// stiffness,
 //   x (K + K_c) x / x (M + B) x <= max(x K x / x M x, x K_c x / x B x),
 // so the two together swing no faster than tissue alone or sqrt(2) / dt. B is taken node by node,
-// which is not less than the inerters' own matrix, and acts along the contact's normal alone. What
-// is at rest or moves with the tool does not feel it; when contact begins the nodes lose what of
-// their speed towards the collider the inerter takes up, and so when longer substeps make it
+// which is not less than the added masses' own matrix, and acts along the contact's normal alone.
+// What is at rest or moves with the tool does not feel it; when contact begins the nodes lose what
+// of their speed towards the collider the added mass takes up, and so when longer substeps make it
 // larger: it never gives energy back.
 #pragma once
 
@@ -21,7 +22,7 @@
 
 namespace tissue_sim {
 
-/// A node with inerters. Matrices are xx yy zz xy yz zx.
+/// A node with added masses. Matrices are xx yy zz xy yz zx.
 struct InertialNode {
   std::int32_t node;
   std::int32_t uses;      ///< places that it belongs to
@@ -50,38 +51,38 @@ struct InertiaChange {
 
 struct ContactInertia {
   std::vector<InertialNode> nodes;
-  float dt = 0;  ///< the substep that the inerters are for [s]
+  float dt = 0;  ///< the substep that the added masses are for [s]
 };
 
-struct MpmState;
+struct TouchingTissue;
 
-/// Before a substep of dt: makes the inerters those for it, where they are not.
-void fit_inertia(MpmState& state, float dt);
+/// Before a substep of dt: makes the added masses those for it, where they are not.
+void fit_inertia(TouchingTissue& state, float dt);
 /// Before the nodes move: takes in the changes of all blocks, in a fixed order, and notes how fast
 /// the nodes are.
-void change_inertia(MpmState& state);
+void change_inertia(TouchingTissue& state);
 /// After they moved: takes away what of the acceleration does not happen.
 void resist_acceleration(InertialNode& node, float keep, float dt, Nodes& nodes);
 /// Adds the impulses of a substep of `kick` seconds to the loads of the colliders.
-void add_inertial_loads(const MpmState& state, float kick, std::vector<ColliderLoad>& loads);
+void add_inertial_loads(const TouchingTissue& state, float kick, std::vector<ColliderLoad>& loads);
 /// Forgets nodes without places. After blocks were made anew `all`: they begin anew.
-void tidy_inertia(MpmState& state, bool all);
+void tidy_inertia(TouchingTissue& state, bool all);
 /// After a checkpoint was restored.
-void index_inertia(MpmState& state);
+void index_inertia(TouchingTissue& state);
 
 // Faces of anchors where tools and the ground touch the tissue beside them.
 
-struct MpmState;
+struct TouchingTissue;
 
-/// Takes that from the nodes that swing of group `i` of MpmState::anchors, before it is held.
-void calm_swings(MpmState& state, int i, float dt);
-/// Whether a tool or the ground has inerters (mpm/contact/contact_inertia.h) at a node that group
-/// `i` of MpmState::anchors holds.
-bool is_beside_tools(const MpmState& state, int i);
-/// hold_group() there: the nodes are as heavy as they are with their inerters, and what these bear
-/// of the impulse acts on the tool. Projected in the metric of the mass alone, a face and a tool
-/// would undo one another's work, and light nodes at the rim of the face would swing.
-void hold_beside_tools(MpmState& state, int i, float dt, const RigidMotion* before,
+/// Takes that from the nodes that swing of group `i` of BlockTissue::anchors, before it is held.
+void calm_swings(TouchingTissue& state, int i, float dt);
+/// Whether a tool or the ground has added masses (mpm/contact/contact_inertia.h) at a node that
+/// group `i` of BlockTissue::anchors holds.
+bool is_beside_tools(const TouchingTissue& state, int i);
+/// hold_group() there: the nodes are as heavy as they are with their added masses, and what these
+/// bear of the impulse acts on the tool. Projected in the metric of the mass alone, a face and a
+/// tool would undo one another's work, and light nodes at the rim of the face would swing.
+void hold_beside_tools(TouchingTissue& state, int i, float dt, const RigidMotion* before,
                        const RigidMotion* after);
 
 }  // namespace tissue_sim

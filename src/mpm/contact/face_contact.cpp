@@ -4,33 +4,33 @@
 
 #include "mpm/contact/face_places.h"
 #include "mpm/contact/face_search.h"
-#include "mpm/mpm_state.h"
+#include "mpm/contact/touching_tissue.h"
 
 namespace tissue_sim {
 
-double fastest_block(const MpmState& state) {
+double fastest_block(const TouchingTissue& state) {
   double fastest = 0;
   for (const BlockMotion& m : state.motion) fastest = std::max(fastest, m.speed);
   return fastest;
 }
 
-void search_if_faster(MpmState& state) {
-  constexpr double kUnforeseen = 0.25;  // [cells]
+void search_if_faster(TouchingTissue& state) {
+  constexpr double kMissed = 0.25;  // [cells]
   FaceContacts& faces = state.faces;
   const double until = faces.until_search;
   if (!(until <= kHorizon)) return;
   // All falls alike.
   const double falls = state.scene.gravity.norm() * (kHorizon - until);
   const double faster = fastest_block(state) - faces.fastest - falls;
-  if (faster * until > kUnforeseen * state.scene.cell_size) faces.until_search = 0;
+  if (faster * until > kMissed * state.scene.cell_size) faces.until_search = 0;
 }
 
-void push_faces(const MpmState& state, FaceContact& contact, float dt) {
+void push_faces(const TouchingTissue& state, FaceContact& contact, float dt) {
   ContactPlaces places{state.nodes, contact};
   push_face(contact, dt, places);
 }
 
-void push_faces_within(MpmState& state, int index, float dt, const float* u) {
+void push_faces_within(TouchingTissue& state, int index, float dt, const float* u) {
   FaceContacts& faces = state.faces;
   const Block& block = *state.blocks.all[index];
   for (std::int32_t i = faces.first_within[index]; i < faces.first_within[index + 1]; ++i) {
@@ -40,7 +40,7 @@ void push_faces_within(MpmState& state, int index, float dt, const float* u) {
   }
 }
 
-void add_face_contacts(const MpmState& state, int index, float* force) {
+void add_face_contacts(const TouchingTissue& state, int index, float* force) {
   const FaceContacts& faces = state.faces;
   const Block& block = *state.blocks.all[index];
   for (std::int32_t i = faces.first_of_block[index]; i < faces.first_of_block[index + 1]; ++i) {
@@ -58,7 +58,7 @@ void add_face_contacts(const MpmState& state, int index, float* force) {
 namespace {
 
 /// Lists the contacts that may touch before the next look, and for each block those it is part of.
-void list_active(MpmState& s) {
+void list_active(TouchingTissue& s) {
   FaceContacts& faces = s.faces;
   faces.forget_active();
   faces.first_of_block.assign(s.blocks.all.size() + 1, 0);
@@ -94,11 +94,11 @@ void list_active(MpmState& s) {
 
 }  // namespace
 
-FacetMotion motion_of(const MpmState& s, std::int32_t facet) {
+FacetMotion motion_of(const TouchingTissue& s, std::int32_t facet) {
   return facet_motion(body_of(s, facet), block_of(s, facet), facet_of(s, facet), s.nodes);
 }
 
-void look_at_due(MpmState& s, double dt, bool all) {
+void look_at_due(TouchingTissue& s, double dt, bool all) {
   FaceContacts& faces = s.faces;
   // What is half way to its next look is looked at now, too.
   std::vector<std::int32_t> due, facets;

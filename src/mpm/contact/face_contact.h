@@ -17,7 +17,7 @@
 
 namespace tissue_sim {
 
-struct MpmState;
+struct TouchingTissue;
 struct Pieces;
 
 /// A facet against another, on the CPU.
@@ -56,36 +56,36 @@ struct FaceContacts {
 };
 
 /// Before a substep of `dt` seconds: searches pairs, and looks at them, when it is time to.
-void find_face_contacts(MpmState& state, const Pieces& pieces, double dt);
+void find_face_contacts(TouchingTissue& state, const Pieces& pieces, double dt);
 
 /// Speed of the fastest block, as of measure_motion() [m/s].
-double fastest_block(const MpmState& state);
+double fastest_block(const TouchingTissue& state);
 /// After a part of a frame: has pairs searched and looked at anew where tissue has become so much
 /// faster, as what a tool pushes does, that it may meet other tissue before that is due.
-void search_if_faster(MpmState& state);
+void search_if_faster(TouchingTissue& state);
 
 /// Before blocks are made anew: remembers what touches.
-void keep_face_contacts(MpmState& state);
+void keep_face_contacts(TouchingTissue& state);
 /// After blocks were made: numbers their facets.
-void list_facets(MpmState& state);
+void list_facets(TouchingTissue& state);
 
 /// Works out the force of a contact after a substep of `dt` seconds, and lets it slide.
-void push_faces(const MpmState& state, FaceContact& contact, float dt);
+void push_faces(const TouchingTissue& state, FaceContact& contact, float dt);
 
 /// The same for a block's contacts with itself. `u` are the displacements of its nodes, as
 /// BlockKernels::gather() copied them.
-void push_faces_within(MpmState& state, int block, float dt, const float* u);
+void push_faces_within(TouchingTissue& state, int block, float dt, const float* u);
 
 /// Adds the forces of a block's contacts, which must be there, to its part of the force buffer.
-void add_face_contacts(const MpmState& state, int block, float* force);
+void add_face_contacts(const TouchingTissue& state, int block, float* force);
 
 /// How a facet stands, from the nodes as they are.
-FacetMotion motion_of(const MpmState& state, std::int32_t facet);
+FacetMotion motion_of(const TouchingTissue& state, std::int32_t facet);
 
 /// Looks at the contacts that are due, `all` of them after a search, which knows where facets are.
 /// How fast each moves says when it is due again, not the fastest: debris that rattles about does
 /// not make all others be looked at as often.
-void look_at_due(MpmState& state, double dt, bool all);
+void look_at_due(TouchingTissue& state, double dt, bool all);
 
 // Facet pairs: which facets may meet within a while.
 

@@ -3,7 +3,7 @@
 
 #include "compute/archive.h"
 #include "frame/state_check.h"
-#include "mpm/mpm_state.h"
+#include "mpm/contact/touching_tissue.h"
 
 namespace tissue_sim {
 

@@ -3,24 +3,24 @@
 
 #include "compute/simd.h"
 #include "mpm/contact/face_contact.h"
-#include "mpm/mpm_state.h"
+#include "mpm/contact/touching_tissue.h"
 
 namespace tissue_sim {
 
-inline const Block& block_of(const MpmState& s, std::int32_t facet) {
+inline const Block& block_of(const TouchingTissue& s, std::int32_t facet) {
   return *s.blocks.all[s.faces.block_of[facet]];
 }
 
-inline const Facet& facet_of(const MpmState& s, std::int32_t facet) {
+inline const Facet& facet_of(const TouchingTissue& s, std::int32_t facet) {
   return block_of(s, facet).facets[facet - s.faces.first_facet[s.faces.block_of[facet]]];
 }
 
-inline const LatticeBody& body_of(const MpmState& s, std::int32_t facet) {
+inline const LatticeBody& body_of(const TouchingTissue& s, std::int32_t facet) {
   return s.bodies[block_of(s, facet).body];
 }
 
 /// Material of a facet: where its points are of several, that of the lowest.
-inline const Material& material_of(const MpmState& s, std::int32_t facet) {
+inline const Material& material_of(const TouchingTissue& s, std::int32_t facet) {
   return body_of(s, facet).material_of(s.points, facet_of(s, facet).point);
 }
 
@@ -120,9 +120,9 @@ struct PlacesInBlock : ContactPlaces {
 /// Facets and nodes as a look at contact `i` of FaceContacts::all reaches them on the CPU:
 /// mpm/contact/narrow_phase.h.
 struct ContactFaces : ContactPlaces {
-  const MpmState& state;
+  const TouchingTissue& state;
   int i;
-  ContactFaces(MpmState& s, int index)
+  ContactFaces(TouchingTissue& s, int index)
       : ContactPlaces{s.nodes, s.faces.all[index]}, state(s), i(index) {}
 
   const Facet& facet(std::int32_t f) const { return facet_of(state, f); }

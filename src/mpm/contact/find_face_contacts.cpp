@@ -10,7 +10,7 @@ namespace {
 
 /// Whether two facets of a piece belong to the same bit of it, as at an edge of it or on the two
 /// sides of a slice.
-bool are_one(const MpmState& s, std::int32_t a, std::int32_t b) {
+bool are_one(const TouchingTissue& s, std::int32_t a, std::int32_t b) {
   const Points::Site &from = s.points.site[facet_of(s, a).point],
                      &to = s.points.site[facet_of(s, b).point];
   const LatticeBody& body = s.bodies[from.body];
@@ -44,7 +44,7 @@ bool pairs_last(const FaceContacts& faces, const std::vector<float>& travel) {
 }
 
 /// How fast facets move against their mean [m/s]; -1 for those that fly and take no part.
-std::vector<float> speeds(const MpmState& s, const std::vector<PieceSize>& piece) {
+std::vector<float> speeds(const TouchingTissue& s, const std::vector<PieceSize>& piece) {
   const FaceContacts& faces = s.faces;
   const std::size_t count = faces.motion.size();
   const double cell = s.scene.cell_size;
@@ -80,16 +80,13 @@ std::vector<float> speeds(const MpmState& s, const std::vector<PieceSize>& piece
   return speed;
 }
 
-/// Brings the motion of all facets up to date and finds those that may meet until the next search,
-/// and when that is. Returns whether the contacts were listed anew.
-bool search(MpmState& s, const Pieces& pieces) {
+/// Brings the motion of all facets up to date. Returns the piece of each.
+std::vector<PieceSize> move_facets(TouchingTissue& s, const Pieces& pieces) {
   FaceContacts& faces = s.faces;
-  const int block_count = static_cast<int>(s.blocks.all.size());
-  const auto facet_count = static_cast<std::int32_t>(faces.block_of.size());
   std::vector<int> size(pieces.next_id, 0);
   for (const Fragment& f : pieces.all) size[f.id] = f.point_count;
-  std::vector<PieceSize> piece(facet_count);
-  s.cpu->for_each(block_count, [&](int b) {
+  std::vector<PieceSize> piece(faces.block_of.size());
+  s.cpu->for_each(static_cast<int>(s.blocks.all.size()), [&](int b) {
     for (std::int32_t f = faces.first_facet[b]; f < faces.first_facet[b + 1]; ++f) {
       const int id =
           pieces.all.size() == 1 ? pieces.all[0].id : pieces.of_point[facet_of(s, f).point];
@@ -97,29 +94,19 @@ bool search(MpmState& s, const Pieces& pieces) {
       faces.motion[f] = motion_of(s, f);
     }
   });
-  std::vector<float> travel = speeds(s, piece);  // until the next search; first in a second
-  double fastest = 0;
-  bool finite = true;
-  for (const float t : travel) {
-    fastest = std::max(fastest, static_cast<double>(t));
-    finite = finite && t < kOutOfControl;
-  }
-  if (!finite) {  // as the end of the frame will say
-    faces.listed.clear();
-    faces.all.clear();
-    faces.until_search = kHorizon;
-    return false;
-  }
+  return piece;
+}
+
+/// Lists all facets anew. Returns the pairs that may meet while each travels so far [m].
+std::vector<FacetPair> pairs_within(TouchingTissue& s, const std::vector<PieceSize>& piece,
+                                    const std::vector<float>& travel) {
+  FaceContacts& faces = s.faces;
+  const std::size_t facet_count = piece.size();
   const auto cell = static_cast<float>(s.scene.cell_size);
-  const double horizon = search_horizon(fastest, cell);
-  faces.until_search = horizon;
-  faces.fastest = fastest_block(s);
-  for (float& t : travel) t = t < 0 ? -1 : t * static_cast<float>(kForesight * horizon);
-  if (pairs_last(faces, travel)) return false;
   faces.listed.resize(facet_count);
   std::vector<float> reach(facet_count);
   std::vector<std::uint8_t> is_debris(facet_count);
-  for (std::int32_t f = 0; f < facet_count; ++f) {
+  for (std::size_t f = 0; f < facet_count; ++f) {
     ListedFacet& listed = faces.listed[f];
     std::copy_n(faces.motion[f].x, 3, listed.x);
     listed.skin = travel[f] < 0 ? -1 : travel[f] + kSkin * cell;
@@ -148,13 +135,18 @@ bool search(MpmState& s, const Pieces& pieces) {
     const std::pair<std::int32_t, std::int32_t> here = std::minmax(c.facet, c.other);
     if (!std::binary_search(pairs.begin(), pairs.begin() + left, here)) pairs.push_back(here);
   }
-  const auto facet_touches = [&piece](std::int32_t a, std::int32_t b) {
-    return touches(piece[a], piece[b]);
-  };
+  return pairs;
+}
+
+/// Makes contacts of the facets in pairs that touch; those that were go on.
+void make_contacts(TouchingTissue& s, const std::vector<PieceSize>& piece,
+                   const std::vector<FacetPair>& pairs) {
+  FaceContacts& faces = s.faces;
+  const auto facet_count = static_cast<std::int32_t>(piece.size());
   std::vector<std::int32_t> count(facet_count, 0), contact(facet_count, -1);
   for (const auto& [a, b] : pairs) {
-    if (facet_touches(a, b)) ++count[a];
-    if (facet_touches(b, a)) ++count[b];
+    if (touches(piece[a], piece[b])) ++count[a];
+    if (touches(piece[b], piece[a])) ++count[b];
   }
   for (std::size_t i = 0; i < faces.all.size(); ++i) {
     contact[faces.all[i].facet] = static_cast<std::int32_t>(i);
@@ -181,14 +173,40 @@ bool search(MpmState& s, const Pieces& pieces) {
   faces.near.resize(faces.first_near.back());
   std::vector<std::int32_t> next(faces.first_near.begin(), faces.first_near.end() - 1);
   for (const auto& [a, b] : pairs) {
-    if (facet_touches(a, b)) faces.near[next[contact[a]]++] = b;
-    if (facet_touches(b, a)) faces.near[next[contact[b]]++] = a;
+    if (touches(piece[a], piece[b])) faces.near[next[contact[a]]++] = b;
+    if (touches(piece[b], piece[a])) faces.near[next[contact[b]]++] = a;
   }
+}
+
+/// Finds the facets that may meet until the next search, and when that is. Returns whether the
+/// contacts were listed anew.
+bool search(TouchingTissue& s, const Pieces& pieces) {
+  FaceContacts& faces = s.faces;
+  const std::vector<PieceSize> piece = move_facets(s, pieces);
+  std::vector<float> travel = speeds(s, piece);  // until the next search; first in a second
+  double fastest = 0;
+  bool finite = true;
+  for (const float t : travel) {
+    fastest = std::max(fastest, static_cast<double>(t));
+    finite = finite && t < kOutOfControl;
+  }
+  if (!finite) {  // as the end of the frame will say
+    faces.listed.clear();
+    faces.all.clear();
+    faces.until_search = kHorizon;
+    return false;
+  }
+  const double horizon = search_horizon(fastest, static_cast<float>(s.scene.cell_size));
+  faces.until_search = horizon;
+  faces.fastest = fastest_block(s);
+  for (float& t : travel) t = t < 0 ? -1 : t * static_cast<float>(kForesight * horizon);
+  if (pairs_last(faces, travel)) return false;
+  make_contacts(s, piece, pairs_within(s, piece, travel));
   return true;
 }
 
 /// Takes up what touched before blocks were made anew.
-void take_up_kept(MpmState& s, double dt) {
+void take_up_kept(TouchingTissue& s, double dt) {
   FaceContacts& faces = s.faces;
   for (std::size_t i = 0; i < faces.all.size() && !faces.kept.empty(); ++i) {
     const Facet& facet = facet_of(s, faces.all[i].facet);
@@ -203,7 +221,7 @@ void take_up_kept(MpmState& s, double dt) {
 }
 
 /// Springs were made soft for a shorter substep.
-void soften_all(MpmState& s, double dt) {
+void soften_all(TouchingTissue& s, double dt) {
   for (std::size_t i = 0; i < s.faces.all.size(); ++i) {
     FaceContact& c = s.faces.all[i];
     if (c.other < 0) continue;
@@ -213,7 +231,7 @@ void soften_all(MpmState& s, double dt) {
 
 }  // namespace
 
-void find_face_contacts(MpmState& s, const Pieces& pieces, double dt) {
+void find_face_contacts(TouchingTissue& s, const Pieces& pieces, double dt) {
   FaceContacts& faces = s.faces;
   const bool searched = is_due(faces.until_search, dt);
   if (searched && search(s, pieces)) take_up_kept(s, dt);
@@ -227,7 +245,7 @@ void find_face_contacts(MpmState& s, const Pieces& pieces, double dt) {
   faces.until_look -= dt;
 }
 
-void keep_face_contacts(MpmState& s) {
+void keep_face_contacts(TouchingTissue& s) {
   FaceContacts& faces = s.faces;
   faces.kept.clear();
   for (const FaceContact& c : faces.all) {
@@ -250,7 +268,7 @@ void keep_face_contacts(MpmState& s) {
   });
 }
 
-void list_facets(MpmState& s) {
+void list_facets(TouchingTissue& s) {
   FaceContacts& faces = s.faces;
   ++faces.version;
   faces.first_facet.assign(1, 0);

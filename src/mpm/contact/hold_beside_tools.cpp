@@ -1,20 +1,20 @@
 #include <Eigen/LU>
 
 #include "mpm/contact/contact_inertia.h"
-#include "mpm/mpm_state.h"
+#include "mpm/contact/touching_tissue.h"
 
 namespace tissue_sim {
 namespace {
 
 constexpr int kSweeps = 8;  // over rows that have nodes in common
 
-InertialNode* inertial_node(MpmState& state, std::int32_t node) {
-  const std::int32_t i = state.work.inertial_index[node];
+InertialNode* inertial_node(TouchingTissue& state, std::int32_t node) {
+  const std::int32_t i = state.inertial_index[node];
   return i < 0 ? nullptr : &state.contacts.inertia.nodes[i];
 }
 
 /// (M + B)^-1 M of a node: of an impulse over its mass to its velocity.
-Eigen::Matrix3f yields(MpmState& state, std::int32_t node) {
+Eigen::Matrix3f yields(TouchingTissue& state, std::int32_t node) {
   Eigen::Matrix3f share = Eigen::Matrix3f::Identity();
   if (const InertialNode* n = inertial_node(state, node)) {
     const float(&s)[6] = n->share;
@@ -27,7 +27,7 @@ Eigen::Matrix3f yields(MpmState& state, std::int32_t node) {
 
 }  // namespace
 
-void calm_swings(MpmState& state, int i, float dt) {
+void calm_swings(TouchingTissue& state, int i, float dt) {
   const FaceGroup& g = state.anchors.groups[i];
   Nodes& nodes = state.nodes;
   for (int r = g.first; r < g.first + g.count; ++r) {
@@ -42,19 +42,19 @@ void calm_swings(MpmState& state, int i, float dt) {
   }
 }
 
-bool is_beside_tools(const MpmState& state, int i) {
+bool is_beside_tools(const TouchingTissue& state, int i) {
   if (state.contacts.inertia.nodes.empty()) return false;
   const FaceGroup& g = state.anchors.groups[i];
   for (int r = g.first; r < g.first + g.count; ++r) {
     const FaceRow& row = state.anchors.rows[r];
     for (int k = 0; k < kRowNodes; ++k) {
-      if (row.share[k] != 0 && state.work.inertial_index[row.node[k]] >= 0) return true;
+      if (row.share[k] != 0 && state.inertial_index[row.node[k]] >= 0) return true;
     }
   }
   return false;
 }
 
-void hold_beside_tools(MpmState& state, int index, float dt, const RigidMotion* before,
+void hold_beside_tools(TouchingTissue& state, int index, float dt, const RigidMotion* before,
                        const RigidMotion* after) {
   AnchorFaces& faces = state.anchors;
   Nodes& nodes = state.nodes;

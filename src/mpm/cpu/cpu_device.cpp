@@ -47,18 +47,18 @@ void CpuMpmDevice::measure_blocks(bool energies) {
   s.cpu->for_each(count, [&](int i) {
     const Block& block = *s.blocks.all[i];
     const BlockField field = block_field(s, block);
-    BlockScratch& scratch = s.work.scratch.local();
+    BlockScratch& scratch = s.scratch.local();
     states[i] = energies ? s.kernels->state(block, field, scratch, nullptr)
                          : s.kernels->stiffness(block, field, scratch);
   });
   run_.stiffening = even_stiffening(s, 1);
   run_.modulus.assign(count, 0.0f);
-  s.wildest = 1;
+  s.worst_stiffening = 1;
   result.elastic_energy = 0;
   for (int i = 0; i < count; ++i) {
     const BlockState& b = states[i];
     result.elastic_energy += b.elastic_energy;
-    s.wildest = std::max(s.wildest, b.wildest);
+    s.worst_stiffening = std::max(s.worst_stiffening, b.worst_stiffening);
     result.blew_up = result.blew_up || !b.finite;
     std::vector<float>& of_body = run_.stiffening[s.blocks.all[i]->body];
     for (std::size_t m = 0; m < of_body.size(); ++m) {
@@ -108,7 +108,7 @@ void CpuMpmDevice::save_motion() {
 
 void CpuMpmDevice::restore_motion(bool missed) {
   MpmState& s = state_;
-  for (const InertialNode& n : s.contacts.inertia.nodes) s.work.inertial_index[n.node] = -1;
+  for (const InertialNode& n : s.contacts.inertia.nodes) s.inertial_index[n.node] = -1;
   motion_of(s) = saved_.motion;
   index_inertia(s);
   s.faces = saved_.faces;
@@ -148,7 +148,8 @@ int CpuMpmDevice::run_part(const FramePart& part) {
 
 bool CpuMpmDevice::missed_contact() {
   measure_motion(state_);
-  return !std::exchange(again_, false) && came_unforeseen(state_, run_.frame->colliders.reach());
+  return !std::exchange(again_, false) &&
+         tissue_sim::missed_contact(state_, run_.frame->colliders.reach());
 }
 
 void CpuMpmDevice::settled(const std::vector<std::int32_t>& points) {
@@ -190,7 +191,7 @@ void CpuMpmDevice::restore(ArchiveReader& archive) {
 void CpuMpmDevice::restored() {
   MpmState& s = state_;
   check_state(s);
-  s.work.inertial_index.assign(s.nodes.size(), -1);
+  s.inertial_index.assign(s.nodes.size(), -1);
   index_inertia(s);
   index_flights(s);
   list_front_cells(s);

@@ -23,7 +23,7 @@ int CpuMpmDevice::read_points(const PointSelection& selection, std::vector<std::
     const auto wanted = [&index](std::int32_t p) { return p >= 0 && index[p] >= 0; };
     if (std::none_of(block.point.begin(), block.point.end(), wanted)) return;
     const LatticeBody& body = s.bodies[block.body];
-    BlockScratch& scratch = s.work.scratch.local();
+    BlockScratch& scratch = s.scratch.local();
     const std::size_t lanes = block.lane_count();
     if (scratch.values.size() < 4 * lanes) scratch.values.resize(4 * lanes);
     float* x = scratch.values.data();

@@ -1,7 +1,7 @@
 // A block's nodes in shared memory. For .cu files.
 #pragma once
 
-#include "mpm/cuda/inerters.h"
+#include "mpm/cuda/added_mass.h"
 #include "mpm/cuda/tables.h"
 
 namespace tissue_sim {
@@ -66,7 +66,7 @@ __device__ __forceinline__ PushedNodes pushed_nodes(const NodePushes& p, int rou
 /// What contact pushes a node with.
 struct Pushed {
   long long force[3];
-  int inert;  ///< 1 + a collider that has inerters at it; 0: none has
+  int inert;  ///< 1 + a collider that has added masses at it; 0: none has
 
   __device__ __forceinline__ Pushed(const PushedNodes& pushed, bool marked, bool clear, int node) {
     force[0] = force[1] = force[2] = 0;
@@ -94,7 +94,7 @@ struct Pushed {
   }
 };
 
-/// Takes back what a node's inerters resist of the step that brought it to u and v. Returns how
+/// Takes back what a node's added masses resist of the step that brought it to u and v. Returns how
 /// much of v that is [m/s].
 __device__ __forceinline__ float3 resist(const PushedNodes& pushed, int node, const NodeStep& step,
                                          const CudaNodes& from, float4& u, float4& v) {
@@ -136,7 +136,7 @@ struct SlotEntry {
 /// Brings the nodes of `count` slots into `u_out` and `v_out`, where they are not null (divided by
 /// the cell size, so that stencils give gradients). With `kMove` it first moves them on by the
 /// forces of the last substep, summed in the order of the slots; every block that has a node
-/// computes the same, and the one that owns it writes it down, and what its inerters bore to
+/// computes the same, and the one that owns it writes it down, and what its added masses bore to
 /// `loads`. Each thread has kHand nodes in hand, for all their loads to be under way at once; what
 /// the tables say of the next ones comes meanwhile. `pushes` is read with kPushes alone.
 template <bool kMove, bool kCached, int kHand, bool kPushes = false>

@@ -164,9 +164,9 @@ unsigned CudaMpmDevice::measure(unsigned) {
 unsigned CudaMpmDevice::measure_part(unsigned) {
   CudaTissue& d = *tissue_;
   launch_measure(d);
-  look_for_unforeseen(d);
+  look_for_missed(d);
   finish_measure(d);
-  missed_ = d.went.empty() && came_unforeseen(d);
+  missed_ = d.went.empty() && tissue_sim::missed_contact(d);
   d.went.clear();
   sum_loads(d);
   return kMeasureMotion | kMeasureStiffness | kMeasureEnergies;

@@ -72,14 +72,14 @@ void finish_measure(CudaTissue& d) {
   if (searched) finish_search(d, d.state.dt);
   d.result.elastic_energy = d.result.kinetic_energy = d.result.max_speed = 0;
   d.run.stiffening = even_stiffening(d.state, 1);
-  d.state.wildest = 1;
+  d.state.worst_stiffening = 1;
   d.state.motion.resize(d.blocks.size());
   d.run.modulus.resize(d.blocks.size());
   for (std::size_t i = 0; i < d.blocks.size(); ++i) {
     const CudaMeasure& m = d.host_measures[i];
     d.result.elastic_energy += m.elastic_energy;
     d.result.kinetic_energy += m.kinetic_energy;
-    d.state.wildest = std::max(d.state.wildest, m.wildest);
+    d.state.worst_stiffening = std::max(d.state.worst_stiffening, m.worst_stiffening);
     if (!(m.speed <= d.result.max_speed)) d.result.max_speed = m.speed;
     const Block& block = *d.state.blocks.all[d.host_tables.of_host[i]];
     float& stiffening = d.run.stiffening[block.body][block.material];

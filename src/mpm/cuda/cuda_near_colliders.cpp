@@ -62,17 +62,17 @@ void find_near(CudaTissue& d) {
               d.stream);
 }
 
-void look_for_unforeseen(CudaTissue& d) {
+void look_for_missed(CudaTissue& d) {
   if (!d.may_meet) return;
-  d.unforeseen.resize(1);
-  d.host_unforeseen.resize(1);
-  launch_unforeseen(d.tables(), d.present(), d.measures.data(), reach(d), d.near_listed.data(),
-                    d.unforeseen.data(), d.stream);
-  d.unforeseen.download(d.host_unforeseen.data(), 1, d.stream);
+  d.missed.resize(1);
+  d.host_missed.resize(1);
+  launch_missed(d.tables(), d.present(), d.measures.data(), reach(d), d.near_listed.data(),
+                d.missed.data(), d.stream);
+  d.missed.download(d.host_missed.data(), 1, d.stream);
 }
 
-bool came_unforeseen(const CudaTissue& d) {
-  if (d.may_meet) return d.host_unforeseen[0] != 0;
+bool missed_contact(const CudaTissue& d) {
+  if (d.may_meet) return d.host_missed[0] != 0;
   const double reach = kSurfaceReach * d.state.scene.cell_size;
   return may_meet(d, d.state.motion, [reach](const BlockMotion&) { return reach; });
 }

@@ -123,7 +123,7 @@ __global__ void __launch_bounds__(kMostThreads)
     const bool is_soft = t.soft != nullptr && t.soft[t.point[lane]] != 0;
     const float lightness = t.lightness != nullptr ? t.lightness[t.point[lane]] : 1;
     const auto lessened = [lightness](float value) { return 1 + lightness * (value - 1); };
-    m.wildest = fmaxf(m.wildest, stiffening);  // not lessened, as on the CPU
+    m.worst_stiffening = fmaxf(m.worst_stiffening, stiffening);  // not lessened, as on the CPU
     m.square = fmaxf(m.square, lessened(square));
     m.stiffening = fmaxf(m.stiffening, lessened(is_soft ? kSoftness * stiffening : stiffening));
   });

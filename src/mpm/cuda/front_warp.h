@@ -9,7 +9,7 @@
 #include "math/bspline.h"
 #include "mpm/blocks/front_stress.h"
 #include "mpm/blocks/stabilisation.h"
-#include "mpm/cuda/inerters.h"
+#include "mpm/cuda/added_mass.h"
 #include "mpm/cuda/tables.h"
 
 namespace tissue_sim {

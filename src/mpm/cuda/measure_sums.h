@@ -21,7 +21,7 @@ __device__ __forceinline__ void take(CudaMeasure& a, const CudaMeasure& b) {
   }
   if (!(b.speed <= a.speed)) a.speed = b.speed;  // NaN stays
   a.stiffening = fmaxf(a.stiffening, b.stiffening);
-  a.wildest = fmaxf(a.wildest, b.wildest);
+  a.worst_stiffening = fmaxf(a.worst_stiffening, b.worst_stiffening);
   a.square = fmaxf(a.square, b.square);
   a.finite = a.finite & b.finite;
 }
@@ -36,7 +36,7 @@ __device__ __forceinline__ void reduce_warp(CudaMeasure& m) {
              {far(m.max[0]), far(m.max[1]), far(m.max[2])},
              far(m.speed),
              far(m.stiffening),
-             far(m.wildest),
+             far(m.worst_stiffening),
              far(m.square),
              far(m.finite)});
   }

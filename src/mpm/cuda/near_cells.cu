@@ -115,8 +115,8 @@ __global__ void mark_slots(const CudaTables t, const std::uint8_t* marks,
 /// One thread block for each block. Points lie within a cell's length of its middle, where it is
 /// not stretched much.
 __global__ void __launch_bounds__(kCellThreads)
-    find_unforeseen(const CudaTables t, const CudaNodes state, const CudaMeasure* measures,
-                    const CudaReach reach, const std::uint32_t* listed, int* unforeseen) {
+    find_missed(const CudaTables t, const CudaNodes state, const CudaMeasure* measures,
+                const CudaReach reach, const std::uint32_t* listed, int* missed) {
   const CudaBlock b = t.blocks[blockIdx.x];
   const CudaMeasure& m = measures[blockIdx.x];
   const float cell_size = t.bodies[b.body].cell_size;
@@ -135,7 +135,7 @@ __global__ void __launch_bounds__(kCellThreads)
     const std::uint32_t met = met_by(reach, near, now, now, cell_size);
     if ((met & ~listed[b.first_lane / 8 + i]) == 0) continue;
     for (int s = 0; s < 8; ++s) {
-      if (t.point[lane_of(b, x, y, z, s)] >= 0) *unforeseen = 1;
+      if (t.point[lane_of(b, x, y, z, s)] >= 0) *missed = 1;
     }
   }
 }
@@ -186,12 +186,12 @@ void launch_mark_slots(const CudaTables& tables, const std::uint8_t* marks,
   check_cuda(cudaGetLastError(), "start a kernel");
 }
 
-void launch_unforeseen(const CudaTables& tables, const CudaNodes& state,
-                       const CudaMeasure* measures, const CudaReach& reach,
-                       const std::uint32_t* listed, int* unforeseen, cudaStream_t stream) {
-  check_cuda(cudaMemsetAsync(unforeseen, 0, sizeof(int), stream), "clear memory");
-  find_unforeseen<<<tables.block_count, kCellThreads, 0, stream>>>(tables, state, measures, reach,
-                                                                   listed, unforeseen);
+void launch_missed(const CudaTables& tables, const CudaNodes& state, const CudaMeasure* measures,
+                   const CudaReach& reach, const std::uint32_t* listed, int* missed,
+                   cudaStream_t stream) {
+  check_cuda(cudaMemsetAsync(missed, 0, sizeof(int), stream), "clear memory");
+  find_missed<<<tables.block_count, kCellThreads, 0, stream>>>(tables, state, measures, reach,
+                                                               listed, missed);
   check_cuda(cudaGetLastError(), "start a kernel");
 }
 

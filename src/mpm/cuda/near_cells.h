@@ -45,9 +45,9 @@ void launch_mark_slots(const CudaTables& tables, const std::uint8_t* marks,
                        std::uint32_t* pushed_parts, std::size_t slot_count, cudaStream_t stream);
 
 /// Whether a cell has come to a collider that it is not `listed` with, for it went faster later.
-void launch_unforeseen(const CudaTables& tables, const CudaNodes& state,
-                       const CudaMeasure* measures, const CudaReach& reach,
-                       const std::uint32_t* listed, int* unforeseen, cudaStream_t stream);
+void launch_missed(const CudaTables& tables, const CudaNodes& state, const CudaMeasure* measures,
+                   const CudaReach& reach, const std::uint32_t* listed, int* missed,
+                   cudaStream_t stream);
 
 // Where friction holds points on tools and the ground, as a list of the few that touch: for
 // checkpoints.

@@ -75,7 +75,7 @@ struct CudaTissue {
   DeviceArray<CudaBundle> bundles;
   DeviceArray<CudaColumn> columns;
   DeviceArray<CudaNearCell> near_cells;
-  DeviceArray<int> near_count, unforeseen;
+  DeviceArray<int> near_count, missed;
   DeviceArray<std::uint32_t> near_listed;   ///< CudaNearCells::listed
   DeviceArray<std::uint8_t> marks;          ///< per node: what may push it
   DeviceArray<std::uint32_t> pushed_parts;  ///< CudaTables::slot_parts with kPushed
@@ -106,7 +106,7 @@ struct CudaTissue {
   DeviceArray<unsigned> arrived;
   DeviceArray<StretchedPoint> stretched;
   DeviceArray<int> stretched_count;
-  PinnedArray<int> host_stretched_count, host_unforeseen;
+  PinnedArray<int> host_stretched_count, host_missed;
   DeviceArray<Point> cloud;
   DeviceArray<AnchoredPoint> anchored_points;  ///< of the cloud that is written
   LentPoints lent;
@@ -259,11 +259,11 @@ void put_anchored_points(CudaTissue& tissue, const std::vector<std::int32_t>& in
                          Point* cloud);
 
 // Contact with tools.
-void find_near(CudaTissue& tissue);            ///< lists the cells that they may meet
-void look_for_unforeseen(CudaTissue& tissue);  ///< enqueues what came_unforeseen() tells then
+void find_near(CudaTissue& tissue);        ///< lists the cells that they may meet
+void look_for_missed(CudaTissue& tissue);  ///< enqueues what missed_contact() tells then
 /// Whether tissue has come to a collider that find_near() did not foresee, for it went faster
 /// later.
-bool came_unforeseen(const CudaTissue& tissue);
+bool missed_contact(const CudaTissue& tissue);
 
 // Contact of tissue with tissue.
 void upload_lattices(CudaTissue& tissue);

@@ -6,7 +6,7 @@
 #pragma once
 
 #include "math/bspline.h"
-#include "mpm/cuda/inerters.h"
+#include "mpm/cuda/added_mass.h"
 #include "mpm/cuda/tool_pushes.h"
 
 namespace tissue_sim {

@@ -7,8 +7,8 @@
 // known in the substep after.
 #pragma once
 
+#include "mpm/cuda/added_mass.h"
 #include "mpm/cuda/contact_lanes.h"
-#include "mpm/cuda/inerters.h"
 #include "mpm/cuda/warp_turns.h"
 
 namespace tissue_sim {

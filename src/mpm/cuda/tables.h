@@ -119,9 +119,10 @@ struct alignas(16) CudaNearCell {
 
 /// Forces of colliders and facets on the nodes, [3][nodes][kPushStride], in units of kLoadUnit as
 /// integers: while one is summed up, that of the substep before is read and the third is cleared.
-/// Likewise [3][nodes][kInertiaStride] what inerters bring to the nodes, xx yy zz xy yz zx, in
-/// units of kInertiaUnit: inerters.h.
-inline constexpr int kPushStride = 4;  ///< three components; 1 + a collider that has inerters there
+/// Likewise [3][nodes][kInertiaStride] what added masses bring to the nodes, xx yy zz xy yz zx, in
+/// units of kInertiaUnit: added_mass.h.
+inline constexpr int kPushStride =
+    4;  ///< three components; 1 + a collider that has added masses there
 inline constexpr int kInertiaStride = 6;
 inline constexpr double kInertiaUnit = 1.0 / (1ll << 58);  ///< [kg]
 struct NodePushes {
@@ -136,7 +137,7 @@ struct CudaMeasure {
   double elastic_energy, kinetic_energy;  ///< [J]
   float min[3], max[3];                   ///< of the points [m]
   float speed;                            ///< of the fastest point [m/s]
-  float stiffening, wildest;              ///< see BlockState
+  float stiffening, worst_stiffening;     ///< see BlockState
   float square;                           ///< the largest ||F||^2
   int finite;
 };
@@ -158,7 +159,7 @@ struct CudaOuterPlace {
   /// behind that a cut left. Where the surface is flat around the point that is straight before it,
   /// at an edge on the edge: the point's place is brought onto the surface that each of its missing
   /// bonds stands for (mpm/surface/surface_places.h). It is kSoftPlace where anchors' faces hold
-  /// nodes of the point's cell: that spring needs no inerter, for faces are held as if nodes had
+  /// nodes of the point's cell: that spring needs no added mass, for faces are held as if nodes had
   /// none.
   float4 place = {0, 0, 0, 0};
   /// The plane of the surface there: its axis in the fourth figure, -1 where the place stays whole,
@@ -222,9 +223,9 @@ struct CudaFrame {
   const int* near_count;
   float cell_size;  ///< the scene's [m]
   NodePushes pushes;
-  float grown = 0;  ///< share of what inerters are now that they are larger by than in the substep
-                    ///< before, for the first one is longer
-  unsigned* arrived;       ///< counters of the two barriers, and of turns; 0 at the beginning
+  float grown = 0;    ///< share of what added masses are now that they are larger by than in the
+                      ///< substep before, for the first one is longer
+  unsigned* arrived;  ///< counters of the two barriers, and of turns; 0 at the beginning
   const CudaFaces* faces;  ///< null where no tissue touches tissue
   CudaHeldFaces held_faces;
   CudaFront front;  ///< with CudaPlan::fronts alone

@@ -14,7 +14,6 @@
 namespace tissue_sim {
 
 struct LatticeTissue;
-struct MpmState;
 struct NodeStep;
 struct BladePath;
 
@@ -90,18 +89,13 @@ void split_front(LatticeTissue& tissue);
 /// which may end before the last node, names (AnchorFaces::at_row).
 void follow_front(LatticeTissue& tissue, const std::vector<std::int32_t>& touched,
                   const std::vector<std::uint8_t>& held);
-/// Lists the cells anew that see parted nodes.
-void list_front_cells(MpmState& state);
 
 FrontField front_field(const LatticeTissue& tissue);
-/// Works on the i-th cell.
-void work_on_front_cell(MpmState& state, int i);
 /// Moves on what the cells push, after all nodes were moved on without them; parts are i of
 /// `front_moves()`.
 int front_moves(const Front& front);
 void move_front(LatticeTissue& tissue, const NodeStep& step, int i);
-/// Energy of the front beside what blocks have, and of the motion of parted nodes [J].
-double front_elastic_energy(const MpmState& state);
+/// Of the motion of parted nodes [J].
 double front_kinetic_energy(const Front& front);
 
 }  // namespace tissue_sim

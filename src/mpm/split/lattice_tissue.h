@@ -9,10 +9,12 @@
 #include "mpm/lattice/nodes.h"
 #include "mpm/split/front.h"
 #include "mpm/split/node_fields.h"
+#include "tissue_sim/scene.h"
 
 namespace tissue_sim {
 
 struct LatticeTissue {
+  Scene scene;
   std::vector<LatticeBody> bodies;     ///< never change
   Points points;                       ///< their bonds go as tissue is cut and tears
   Array<std::uint8_t> whole_bonds;     ///< per point: its bonds before any broke

@@ -79,12 +79,13 @@ bool leaves_thread(const LatticeBody& body, Points& points, std::int32_t point, 
   return leaves;
 }
 
-void list_bridges(MpmState& state, const std::vector<std::int32_t>& changed) {
-  const Points& points = state.points;
-  std::vector<std::int32_t>& bridges = state.bridge_ends;
+void list_bridges(const LatticeTissue& tissue, TearRecords& records,
+                  const std::vector<std::int32_t>& changed) {
+  const Points& points = tissue.points;
+  std::vector<std::int32_t>& bridges = records.bridge_ends;
   // Of each cell, by its node: no bridge ends around it. Points come row by row, so that a cell
   // comes up to four times.
-  std::vector<std::uint8_t> is_bare(lattice_node_count(state.bodies), 0);
+  std::vector<std::uint8_t> is_bare(lattice_node_count(tissue.bodies), 0);
   Planes ends{};
   int node = -1;
   Points::Site of{-1, -1, -1, -1};  // the cell that they are around
@@ -93,9 +94,9 @@ void list_bridges(MpmState& state, const std::vector<std::int32_t>& changed) {
     if (s.x / 2 != of.x || s.y / 2 != of.y || s.z / 2 != of.z || s.body != of.body) {
       of = {static_cast<std::int16_t>(s.x / 2), static_cast<std::int16_t>(s.y / 2),
             static_cast<std::int16_t>(s.z / 2), s.body};
-      node = state.bodies[of.body].node(of.x, of.y, of.z);
+      node = tissue.bodies[of.body].node(of.x, of.y, of.z);
       if (is_bare[node] == 0) {
-        ends = state.fields->bonds().bridge_ends(of.body, of.x, of.y, of.z);
+        ends = tissue.fields->bonds().bridge_ends(of.body, of.x, of.y, of.z);
         is_bare[node] = ends == Planes{};
       }
     }
@@ -108,21 +109,22 @@ void list_bridges(MpmState& state, const std::vector<std::int32_t>& changed) {
     // A square may have lost its far side.
     for (unsigned bonds = points.bonds[p]; bonds != 0; bonds &= bonds - 1) {
       const int k = __builtin_ctz(bonds);
-      if (ends_one(bond_offset(k))) bridges.push_back(neighbour(state.bodies[s.body], s, k));
+      if (ends_one(bond_offset(k))) bridges.push_back(neighbour(tissue.bodies[s.body], s, k));
     }
   }
   std::sort(bridges.begin(), bridges.end());
   bridges.erase(std::unique(bridges.begin(), bridges.end()), bridges.end());
 }
 
-void tear_bridges(MpmState& state, std::vector<std::int32_t>& changed, CutReport& report) {
+void tear_bridges(BlockTissue& tissue, TearRecords& records, std::vector<std::int32_t>& changed,
+                  CutReport& report) {
   const std::size_t first = changed.size();
-  Points& points = state.points;
+  Points& points = tissue.points;
   std::vector<std::int32_t> left;
-  for (const std::int32_t p : state.bridge_ends) {
-    const LatticeBody& body = state.bodies[points.site[p].body];
+  for (const std::int32_t p : records.bridge_ends) {
+    const LatticeBody& body = tissue.bodies[points.site[p].body];
     if (!BondsAround(body, points, p).end_bridge()) continue;
-    const Deformation d(body, points.site[p], *state.fields, state.nodes);
+    const Deformation d(body, points.site[p], *tissue.fields, tissue.nodes);
     if (d.stretch < kThreadStretch || d.stiffening < kBridgeStiffening) {
       left.push_back(p);
       continue;
@@ -137,7 +139,7 @@ void tear_bridges(MpmState& state, std::vector<std::int32_t>& changed, CutReport
       ++report.bonds_broken;
     }
   }
-  state.bridge_ends = std::move(left);
+  records.bridge_ends = std::move(left);
   const auto begin = changed.begin() + static_cast<std::ptrdiff_t>(first);
   std::sort(begin, changed.end());
   changed.erase(std::unique(begin, changed.end()), changed.end());

@@ -28,9 +28,9 @@ struct CrackNearby {
   Vec3 ahead = Vec3::Zero();  ///< the way it goes, in its plane; unit
 };
 
-CrackNearby crack_nearby(const MpmState& state, const TearingPoint& t) {
-  const Points::Site& s = state.points.site[t.point];
-  const LatticeBody& body = state.bodies[s.body];
+CrackNearby crack_nearby(const LatticeTissue& tissue, const TearingPoint& t) {
+  const Points::Site& s = tissue.points.site[t.point];
+  const LatticeBody& body = tissue.bodies[s.body];
   CrackNearby crack;
   double weights = 0, sum = 0;
   const auto add = [&](int dx, int dy, int dz, unsigned broken) {
@@ -55,8 +55,8 @@ CrackNearby crack_nearby(const MpmState& state, const TearingPoint& t) {
       body.for_each_point_in_row(
           s.x - kReach, s.x + kReach + 1, s.y + dy, s.z + dz, [&](int x, int point, int count) {
             std::uint64_t whole, bonds;  // most rows have lost none
-            std::memcpy(&whole, &state.whole_bonds[point], 8);
-            std::memcpy(&bonds, &state.points.bonds[point], 8);
+            std::memcpy(&whole, &tissue.whole_bonds[point], 8);
+            std::memcpy(&bonds, &tissue.points.bonds[point], 8);
             std::uint64_t broken = whole & ~bonds & ~(~std::uint64_t{0} << 8 * count);
             for (int i = 0; broken != 0; broken >>= 8, ++i) {
               add(x + i - s.x, dy, dz, static_cast<unsigned>(broken & 0xff));
@@ -71,9 +71,9 @@ CrackNearby crack_nearby(const MpmState& state, const TearingPoint& t) {
 
 /// Side of the crack, 1 or -1, that a point is on by the bonds that it lost across n; 0 if it lost
 /// none.
-int side_by_own(const MpmState& state, std::int32_t p, const Vec3& n) {
+int side_by_own(const LatticeTissue& tissue, std::int32_t p, const Vec3& n) {
   double to_crack = 0;
-  for (unsigned left = broken_bonds(state, p); left != 0; left &= left - 1) {
+  for (unsigned left = broken_bonds(tissue, p); left != 0; left &= left - 1) {
     const double across = direction(__builtin_ctz(left)).dot(n);
     if (std::fabs(across) >= kSlantedMost) to_crack += across;
   }
@@ -81,16 +81,17 @@ int side_by_own(const MpmState& state, std::int32_t p, const Vec3& n) {
 }
 
 /// The same, else by the bonds that broke on its line along the axis nearest to n.
-int side_by_bonds(const MpmState& state, const LatticeBody& body, std::int32_t p, const Vec3& n) {
-  const int own = side_by_own(state, p, n);
+int side_by_bonds(const LatticeTissue& tissue, const LatticeBody& body, std::int32_t p,
+                  const Vec3& n) {
+  const int own = side_by_own(tissue, p, n);
   if (own != 0) return own;
   int axis = 0;
   n.cwiseAbs().maxCoeff(&axis);
   const int up = n[axis] > 0 ? kForwardBond + axis : opposite_bond(kForwardBond + axis);
   for (int i = 1; i < kReach; ++i) {
     for (const int k : {up, opposite_bond(up)}) {
-      const std::int32_t q = neighbour(body, state.points.site[p], k, i);
-      if (q >= 0 && (broken_bonds(state, q) >> k & 1) != 0) return k == up ? -1 : 1;
+      const std::int32_t q = neighbour(body, tissue.points.site[p], k, i);
+      if (q >= 0 && (broken_bonds(tissue, q) >> k & 1) != 0) return k == up ? -1 : 1;
     }
   }
   return 0;
@@ -98,8 +99,8 @@ int side_by_bonds(const MpmState& state, const LatticeBody& body, std::int32_t p
 
 }  // namespace
 
-unsigned broken_bonds(const MpmState& state, std::int32_t p) {
-  return state.whole_bonds[p] & ~unsigned{state.points.bonds[p]};
+unsigned broken_bonds(const LatticeTissue& tissue, std::int32_t p) {
+  return tissue.whole_bonds[p] & ~unsigned{tissue.points.bonds[p]};
 }
 
 std::int32_t neighbour(const LatticeBody& body, const Points::Site& s, int k, int steps) {
@@ -114,10 +115,10 @@ const TearingPoint* entry(const std::vector<TearingPoint>& tearing, std::int32_t
   return at != tearing.end() && at->point == point ? &*at : nullptr;
 }
 
-bool broken_on_line(const MpmState& state, const LatticeBody& body, std::int32_t p, int k) {
+bool broken_on_line(const LatticeTissue& tissue, const LatticeBody& body, std::int32_t p, int k) {
   for (int i = -kReach; i <= kReach; ++i) {
-    const std::int32_t q = neighbour(body, state.points.site[p], k, i);
-    if (q >= 0 && (broken_bonds(state, q) >> k & 1) != 0) return true;
+    const std::int32_t q = neighbour(body, tissue.points.site[p], k, i);
+    if (q >= 0 && (broken_bonds(tissue, q) >> k & 1) != 0) return true;
   }
   return false;
 }
@@ -125,12 +126,12 @@ bool broken_on_line(const MpmState& state, const LatticeBody& body, std::int32_t
 /// Whether the tissue is past its limit up to tear_length ahead of the tip, or to where it ends.
 /// Nodes part 1.5 cells behind the last broken bond (half their support), and that is where the
 /// tissue's own tip is.
-static bool finds_enough(const MpmState& state, const TearingPoint& t, const CrackNearby& crack,
-                         const std::vector<TearingPoint>& tearing) {
-  const Points::Site& s = state.points.site[t.point];
-  const LatticeBody& body = state.bodies[s.body];
+static bool finds_enough(const LatticeTissue& tissue, const TearingPoint& t,
+                         const CrackNearby& crack, const std::vector<TearingPoint>& tearing) {
+  const Points::Site& s = tissue.points.site[t.point];
+  const LatticeBody& body = tissue.bodies[s.body];
   const double length =
-      2 * body.material_of(state.points, t.point).tear_length / body.cell_size - 3;  // [points]
+      2 * body.material_of(tissue.points, t.point).tear_length / body.cell_size - 3;  // [points]
   std::int32_t last = t.point;
   for (int i = 1; i <= std::lround(length); ++i) {
     const Vec3 x = Vec3(s.x, s.y, s.z) + crack.offset * t.normal + i * crack.ahead;
@@ -143,29 +144,29 @@ static bool finds_enough(const MpmState& state, const TearingPoint& t, const Cra
   return entry(tearing, last) != nullptr;
 }
 
-bool go_on(const MpmState& state, const TearingPoint& t, const std::vector<TearingPoint>& tearing,
-           std::vector<Bond>& bonds) {
-  const CrackNearby crack = crack_nearby(state, t);
-  if (!crack.beside || (!crack.passed && !finds_enough(state, t, crack, tearing))) {
+bool go_on(const LatticeTissue& tissue, const TearingPoint& t,
+           const std::vector<TearingPoint>& tearing, std::vector<Bond>& bonds) {
+  const CrackNearby crack = crack_nearby(tissue, t);
+  if (!crack.beside || (!crack.passed && !finds_enough(tissue, t, crack, tearing))) {
     return crack.any;
   }
-  const Points::Site& s = state.points.site[t.point];
-  const LatticeBody& body = state.bodies[s.body];
-  const int known = side_by_bonds(state, body, t.point, t.normal);
+  const Points::Site& s = tissue.points.site[t.point];
+  const LatticeBody& body = tissue.bodies[s.body];
+  const int known = side_by_bonds(tissue, body, t.point, t.normal);
   // A tip bears the more, the finer the lattice is against tear_length.
   const double bridge_excess =
       kThread *
-      std::max(1.0, body.material_of(state.points, t.point).tear_length / (1.5 * body.cell_size));
+      std::max(1.0, body.material_of(tissue.points, t.point).tear_length / (1.5 * body.cell_size));
   const int side = known != 0 ? known : crack.offset > 0 ? -1 : 1;
-  for (unsigned left = state.points.bonds[t.point]; left != 0; left &= left - 1) {
+  for (unsigned left = tissue.points.bonds[t.point]; left != 0; left &= left - 1) {
     const int k = __builtin_ctz(left);
     const std::int32_t q = neighbour(body, s, k);
-    const int other_known = side_by_bonds(state, body, q, t.normal);
+    const int other_known = side_by_bonds(tissue, body, q, t.normal);
     const double across = direction(k).dot(t.normal);
     const int other = other_known != 0 ? other_known : across < crack.offset ? -1 : 1;
     if (side == other) continue;
-    const bool bridge = t.excess > bridge_excess && side_by_own(state, t.point, t.normal) != 0 &&
-                        side_by_own(state, q, t.normal) != 0;
+    const bool bridge = t.excess > bridge_excess && side_by_own(tissue, t.point, t.normal) != 0 &&
+                        side_by_own(tissue, q, t.normal) != 0;
     bonds.push_back({t.point, k, bridge});
   }
   return true;

@@ -226,17 +226,17 @@ void settle_debris(LatticeTissue& tissue, const std::vector<std::int32_t>& debri
   }
 }
 
-std::vector<std::int32_t> settle_wild_debris(LatticeTissue& tissue,
-                                             const std::set<std::int32_t>& debris) {
+std::vector<std::int32_t> settle_ill_conditioned(LatticeTissue& tissue,
+                                                 const std::set<std::int32_t>& debris) {
   std::vector<std::int32_t> settled;
   for (const std::int32_t lowest : debris) {
     const LatticeBody& body = tissue.bodies[tissue.points.site[lowest].body];
     const Debris bit(body, tissue.points, lowest);
-    const bool wild = std::any_of(bit.begin(), bit.end(), [&](std::int32_t p) {
+    const bool is_ill = std::any_of(bit.begin(), bit.end(), [&](std::int32_t p) {
       return Deformation(body, tissue.points.site[p], *tissue.fields, tissue.nodes).stiffening >=
-             kWildStiffening;
+             kIllConditioned;
     });
-    if (!wild) continue;
+    if (!is_ill) continue;
     make_rigid(tissue, body, bit);
     settled.insert(settled.end(), bit.begin(), bit.end());
   }

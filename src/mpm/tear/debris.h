@@ -27,16 +27,17 @@ Softened soften(LatticeTissue& tissue, const std::vector<std::int32_t>& changed)
 /// times their size, goes. No bit of debris turns faster than kDebrisSpin times the speed of sound
 /// in a rod a cell, which strains it by a tenth or two: the rest goes to the tissue beside it.
 void settle_debris(LatticeTissue& tissue, const std::vector<std::int32_t>& debris);
-/// The same for those that have become wild since (mpm/tear/debris.h). Returns their points.
-std::vector<std::int32_t> settle_wild_debris(LatticeTissue& tissue,
-                                             const std::set<std::int32_t>& debris);
+/// The same for those that have become ill-conditioned since (mpm/tear/debris.h). Returns their
+/// points.
+std::vector<std::int32_t> settle_ill_conditioned(LatticeTissue& tissue,
+                                                 const std::set<std::int32_t>& debris);
 inline constexpr double kDebrisSpin = 0.5;
 
 /// Sets the nodes of a point turning, so that they have so much more angular momentum [kg m^2/s].
 void turn(LatticeTissue& tissue, std::int32_t point, const Vec3& angular);
 
-/// A bit of debris that is deformed so that it has stiffened so much is wild.
-inline constexpr double kWildStiffening = 5;
+/// A bit of debris that is deformed so that it has stiffened so much is ill-conditioned.
+inline constexpr double kIllConditioned = 5;
 
 /// Deformation gradient at a point.
 Eigen::Matrix3d deformation_gradient(const LatticeBody& body, const Points::Site& point,

@@ -14,24 +14,25 @@ namespace {
 constexpr float kPatience = 1.1f;
 
 /// Whether a bond goes from what is in an anchor to what its face holds: that would stay there.
-bool held_fast(const MpmState& state, std::int32_t p, std::int32_t q) {
-  const std::uint8_t a = state.points.anchored[p], b = state.points.anchored[q];
+bool held_fast(const LatticeTissue& tissue, std::int32_t p, std::int32_t q) {
+  const std::uint8_t a = tissue.points.anchored[p], b = tissue.points.anchored[q];
   return (a == Points::kInAnchor && b == Points::kAtAnchor) ||
          (a == Points::kAtAnchor && b == Points::kInAnchor);
 }
 
 /// The bond that a crack takes first.
-Bond begin(const MpmState& state, const TearingPoint& t, const std::vector<TearingPoint>& tearing) {
-  const Points::Site& s = state.points.site[t.point];
-  const LatticeBody& body = state.bodies[s.body];
+Bond begin(const LatticeTissue& tissue, const TearingPoint& t,
+           const std::vector<TearingPoint>& tearing) {
+  const Points::Site& s = tissue.points.site[t.point];
+  const LatticeBody& body = tissue.bodies[s.body];
   int axis = 0;
   t.normal.cwiseAbs().maxCoeff(&axis);
   Bond best{t.point, -1, false};
   float most = -1;
   for (const int k : {kForwardBond + axis, opposite_bond(kForwardBond + axis)}) {
-    if ((state.points.bonds[t.point] >> k & 1) == 0) continue;
+    if ((tissue.points.bonds[t.point] >> k & 1) == 0) continue;
     const std::int32_t q = neighbour(body, s, k);
-    if (held_fast(state, t.point, q)) continue;
+    if (held_fast(tissue, t.point, q)) continue;
     const TearingPoint* far = entry(tearing, q);
     const float excess = far != nullptr ? far->excess : 0.0f;
     if (excess <= most) continue;
@@ -42,24 +43,25 @@ Bond begin(const MpmState& state, const TearingPoint& t, const std::vector<Teari
 }
 
 /// Whether what tore last had no time yet to relieve all of the point's body.
-bool being_relieved(const MpmState& state, std::int32_t point) {
-  const int body = state.points.site[point].body;
-  const LatticeBody& b = state.bodies[body];
+bool being_relieved(const BlockTissue& tissue, const TearRecords& records, std::int32_t point) {
+  const int body = tissue.points.site[point].body;
+  const LatticeBody& b = tissue.bodies[body];
   const double extent = std::max({b.nx, b.ny, b.nz}) * b.cell_size;
-  return state.time - state.tore_at[body] < extent / wave_speed(b.material_of(state.points, point));
+  return tissue.time - records.tore_at[body] <
+         extent / wave_speed(b.material_of(tissue.points, point));
 }
 
 /// Whether a corner that two bonds hold comes off. No crack goes through it, for each would leave
 /// it on a thread; where a tool tears tissue to shreds such corners were drawn out 5 to 13-fold,
 /// and what they had of energy set the substep of all.
-bool comes_off(const MpmState& state, const TearingPoint& t) {
+bool comes_off(const LatticeTissue& tissue, const TearingPoint& t) {
   constexpr float kDrawnOut = 3;  // stretch
-  if (t.excess < 1 || __builtin_popcount(state.points.bonds[t.point]) != 2) return false;
-  return 1 + t.excess * (tear_limit(state, t.point) - 1) > kDrawnOut;
+  if (t.excess < 1 || __builtin_popcount(tissue.points.bonds[t.point]) != 2) return false;
+  return 1 + t.excess * (tear_limit(tissue, t.point) - 1) > kDrawnOut;
 }
 
 /// Regions of tissue past its limit: for each entry the lowest of those that bonds join it to.
-std::vector<int> regions(const MpmState& state, const std::vector<TearingPoint>& tearing) {
+std::vector<int> regions(const LatticeTissue& tissue, const std::vector<TearingPoint>& tearing) {
   std::vector<int> parent(tearing.size());
   std::iota(parent.begin(), parent.end(), 0);
   const auto root = [&parent](int i) {
@@ -67,11 +69,11 @@ std::vector<int> regions(const MpmState& state, const std::vector<TearingPoint>&
     return i;
   };
   for (std::size_t i = 0; i < tearing.size(); ++i) {
-    const Points::Site& s = state.points.site[tearing[i].point];
-    const unsigned bonds = state.points.bonds[tearing[i].point];
+    const Points::Site& s = tissue.points.site[tearing[i].point];
+    const unsigned bonds = tissue.points.bonds[tearing[i].point];
     for (unsigned forward = bonds >> kForwardBond; forward != 0; forward &= forward - 1) {
       const int k = kForwardBond + __builtin_ctz(forward);
-      const TearingPoint* other = entry(tearing, neighbour(state.bodies[s.body], s, k));
+      const TearingPoint* other = entry(tearing, neighbour(tissue.bodies[s.body], s, k));
       if (other == nullptr) continue;
       const int a = root(static_cast<int>(i)), b = root(static_cast<int>(other - tearing.data()));
       parent[std::max(a, b)] = std::min(a, b);
@@ -83,18 +85,18 @@ std::vector<int> regions(const MpmState& state, const std::vector<TearingPoint>&
 
 /// Whether a crack is so near that a point is past its limit because of it: strain is largest not
 /// ahead of a tip but aside, 1.7 times as far out as ahead.
-bool in_reach_of_crack(const MpmState& state, const TearingPoint& t) {
-  const Points::Site& s = state.points.site[t.point];
-  const LatticeBody& body = state.bodies[s.body];
+bool in_reach_of_crack(const LatticeTissue& tissue, const TearingPoint& t) {
+  const Points::Site& s = tissue.points.site[t.point];
+  const LatticeBody& body = tissue.bodies[s.body];
   const int reach = std::max(
       2 * kReach,
-      static_cast<int>(4 * body.material_of(state.points, t.point).tear_length / body.cell_size));
+      static_cast<int>(4 * body.material_of(tissue.points, t.point).tear_length / body.cell_size));
   bool found = false;
   for (int z = s.z - reach; z <= s.z + reach; ++z) {
     for (int y = s.y - reach; y <= s.y + reach; ++y) {
       body.for_each_point_in_row(s.x - reach, s.x + reach + 1, y, z, [&](int, int from, int count) {
-        const std::uint8_t* const bonds = &state.points.bonds[from];
-        found = found || !std::equal(bonds, bonds + count, &state.whole_bonds[from]);
+        const std::uint8_t* const bonds = &tissue.points.bonds[from];
+        found = found || !std::equal(bonds, bonds + count, &tissue.whole_bonds[from]);
       });
     }
     if (found) return true;
@@ -103,30 +105,31 @@ bool in_reach_of_crack(const MpmState& state, const TearingPoint& t) {
 }
 
 /// Where cracks begin, `at_crack` telling which entries have one within kReach.
-std::vector<Bond> beginnings(const MpmState& state, const std::vector<TearingPoint>& tearing,
+std::vector<Bond> beginnings(const BlockTissue& tissue, const TearRecords& records,
+                             const std::vector<TearingPoint>& tearing,
                              const std::vector<std::uint8_t>& at_crack) {
-  const std::vector<int> region = regions(state, tearing);
+  const std::vector<int> region = regions(tissue, tearing);
   std::vector<std::uint8_t> cracked(tearing.size(), 0);
   for (std::size_t i = 0; i < tearing.size(); ++i) cracked[region[i]] |= at_crack[i];
   std::vector<int> worst(tearing.size(), -1);  // of each region
   for (std::size_t i = 0; i < tearing.size(); ++i) {
     const TearingPoint& t = tearing[i];
     if (t.excess < 1 || cracked[region[i]] != 0) continue;
-    if (t.excess < kPatience && being_relieved(state, t.point)) continue;
+    if (t.excess < kPatience && being_relieved(tissue, records, t.point)) continue;
     int& w = worst[region[i]];
     if (w < 0 || t.excess > tearing[w].excess) w = static_cast<int>(i);
   }
-  std::vector<int> first(state.bodies.size(), -1);  // of each body
+  std::vector<int> first(tissue.bodies.size(), -1);  // of each body
   for (const int i : worst) {
     if (i < 0) continue;
-    int& f = first[state.points.site[tearing[i].point].body];
+    int& f = first[tissue.points.site[tearing[i].point].body];
     if (f >= 0 && tearing[i].excess <= tearing[f].excess) continue;
-    if (!in_reach_of_crack(state, tearing[i])) f = i;
+    if (!in_reach_of_crack(tissue, tearing[i])) f = i;
   }
   std::vector<Bond> bonds;
   for (const int i : first) {
     if (i < 0) continue;
-    const Bond b = begin(state, tearing[i], tearing);
+    const Bond b = begin(tissue, tearing[i], tearing);
     if (b.bond >= 0) bonds.push_back(b);
   }
   return bonds;
@@ -134,14 +137,14 @@ std::vector<Bond> beginnings(const MpmState& state, const std::vector<TearingPoi
 
 }  // namespace
 
-bool can_tear(const MpmState& state) {
-  return std::any_of(state.bodies.begin(), state.bodies.end(),
+bool can_tear(const LatticeTissue& tissue) {
+  return std::any_of(tissue.bodies.begin(), tissue.bodies.end(),
                      [](const LatticeBody& b) { return least_tear_limit(b) > 0; });
 }
 
-int tear_checks(const MpmState& state, int substeps, float dt) {
+int tear_checks(const LatticeTissue& tissue, int substeps, float dt) {
   double interval = 1e9;
-  for (const LatticeBody& b : state.bodies) {
+  for (const LatticeBody& b : tissue.bodies) {
     for (const Material& m : b.materials) {
       if (m.tear_stretch <= 0) continue;
       interval = std::min(interval, kTearSteps * 0.5 * b.cell_size / wave_speed(m));
@@ -165,11 +168,11 @@ float least_tear_limit(const LatticeBody& body) {
   return least;
 }
 
-float tear_limit(const MpmState& state, std::int32_t point) {
-  const Points::Site& s = state.points.site[point];
-  const Material& m = state.bodies[s.body].material_of(state.points, point);
+float tear_limit(const LatticeTissue& tissue, std::int32_t point) {
+  const Points::Site& s = tissue.points.site[point];
+  const Material& m = tissue.bodies[s.body].material_of(tissue.points, point);
   // SplitMix64 of seed and place.
-  std::uint64_t x = state.scene.seed;
+  std::uint64_t x = tissue.scene.seed;
   for (const std::int16_t part : {s.body, s.x, s.y, s.z}) {
     x += 0x9e3779b97f4a7c15u + static_cast<std::uint16_t>(part);
     x = (x ^ (x >> 30)) * 0xbf58476d1ce4e5b9u;
@@ -180,13 +183,13 @@ float tear_limit(const MpmState& state, std::int32_t point) {
   return static_cast<float>(1 + (m.tear_stretch - 1) * (1 + m.tear_scatter * drawn));
 }
 
-void add_tearing(const MpmState& state, const std::vector<StretchedPoint>& stretched,
+void add_tearing(const LatticeTissue& tissue, const std::vector<StretchedPoint>& stretched,
                  std::vector<TearingPoint>& tearing) {
   for (const StretchedPoint& p : stretched) {
-    if (state.points.anchored[p.point] == Points::kInAnchor)
+    if (tissue.points.anchored[p.point] == Points::kInAnchor)
       continue;  // held fast, it cannot come apart
-    const LatticeBody& body = state.bodies[state.points.site[p.point].body];
-    const float least = least_tear_limit(body.material_of(state.points, p.point));
+    const LatticeBody& body = tissue.bodies[tissue.points.site[p.point].body];
+    const float least = least_tear_limit(body.material_of(tissue.points, p.point));
     if (least == 0) continue;
     Eigen::Matrix3d C;
     C << p.C[0], p.C[3], p.C[4], p.C[3], p.C[1], p.C[5], p.C[4], p.C[5], p.C[2];
@@ -195,30 +198,30 @@ void add_tearing(const MpmState& state, const std::vector<StretchedPoint>& stret
     solver.computeDirect(C);
     const double stretch = std::sqrt(solver.eigenvalues()[2]);
     if (stretch < least) continue;  // it was looked for by the limit of a weaker material
-    const double excess = (stretch - 1) / (tear_limit(state, p.point) - 1);
+    const double excess = (stretch - 1) / (tear_limit(tissue, p.point) - 1);
     Vec3 normal = solver.eigenvectors().col(2);
-    if (state.points.anchored[p.point] == Points::kAtAnchor) {
-      const Points::Site& s = state.points.site[p.point];
+    if (tissue.points.anchored[p.point] == Points::kAtAnchor) {
+      const Points::Site& s = tissue.points.site[p.point];
       normal = face_normal(body.body.anchors, body.site_position(s.x, s.y, s.z));
     }
     tearing.push_back({p.point, static_cast<float>(excess), normal});
   }
 }
 
-std::vector<TearingPoint> find_tearing(MpmState& state) {
-  const int count = static_cast<int>(state.blocks.all.size());
+std::vector<TearingPoint> find_tearing(BlockTissue& tissue) {
+  const int count = static_cast<int>(tissue.blocks.all.size());
   std::vector<std::vector<TearingPoint>> of_block(count);
-  state.cpu->for_each(count, [&](int i) {
-    const Block& block = *state.blocks.all[i];
-    const LatticeBody& body = state.bodies[block.body];
+  tissue.cpu->for_each(count, [&](int i) {
+    const Block& block = *tissue.blocks.all[i];
+    const LatticeBody& body = tissue.bodies[block.body];
     const float limit = block.material == Block::kMixed
                             ? least_tear_limit(body)
                             : least_tear_limit(body.materials[block.material]);
     if (limit == 0) return;
     std::vector<StretchedPoint> stretched;
-    state.kernels->stretched(block, block_field(state, block), limit, state.work.scratch.local(),
-                             stretched);
-    add_tearing(state, stretched, of_block[i]);
+    tissue.kernels->stretched(block, block_field(tissue, block), limit, tissue.scratch.local(),
+                              stretched);
+    add_tearing(tissue, stretched, of_block[i]);
   });
   std::vector<TearingPoint> tearing;
   for (const auto& part : of_block) tearing.insert(tearing.end(), part.begin(), part.end());
@@ -227,39 +230,39 @@ std::vector<TearingPoint> find_tearing(MpmState& state) {
   return tearing;
 }
 
-void tear_bonds(MpmState& state, const std::vector<TearingPoint>& tearing,
+void tear_bonds(BlockTissue& tissue, TearRecords& records, const std::vector<TearingPoint>& tearing,
                 std::vector<std::int32_t>& changed, CutReport& report) {
-  state.tore_at.resize(state.bodies.size(), -1e9);
+  records.tore_at.resize(tissue.bodies.size(), -1e9);
   const std::size_t first = changed.size();
   const auto tear = [&](const Bond& b) {
-    const Points::Site& s = state.points.site[b.point];
-    const LatticeBody& body = state.bodies[s.body];
-    if ((state.points.bonds[b.point] >> b.bond & 1) == 0) return false;
-    if (!b.bridge && broken_on_line(state, body, b.point, b.bond)) return false;
+    const Points::Site& s = tissue.points.site[b.point];
+    const LatticeBody& body = tissue.bodies[s.body];
+    if ((tissue.points.bonds[b.point] >> b.bond & 1) == 0) return false;
+    if (!b.bridge && broken_on_line(tissue, body, b.point, b.bond)) return false;
     const std::int32_t q = neighbour(body, s, b.bond);
-    if (held_fast(state, b.point, q)) return false;
+    if (held_fast(tissue, b.point, q)) return false;
     for (const std::int32_t end : {b.point, q}) {  // at a corner it may be the last
-      if (__builtin_popcount(state.points.bonds[end]) == 1) return false;
+      if (__builtin_popcount(tissue.points.bonds[end]) == 1) return false;
     }
     // What would hang by a thread stays on the side that it has more of: it would swing until that
     // tears, too.
-    if (leaves_thread(body, state.points, b.point, b.bond)) return false;
-    break_bond(b.bond, state.points.bonds[b.point], state.points.bonds[q]);
+    if (leaves_thread(body, tissue.points, b.point, b.bond)) return false;
+    break_bond(b.bond, tissue.points.bonds[b.point], tissue.points.bonds[q]);
     changed.push_back(b.point);
     changed.push_back(q);
     ++report.bonds_broken;
-    state.tore_at[s.body] = state.time;
+    records.tore_at[s.body] = tissue.time;
     return true;
   };
   const int count = static_cast<int>(tearing.size());
   std::vector<std::vector<Bond>> bonds(count);
   std::vector<std::uint8_t> at_crack(count);
   for (int step = 0; step < kTearSteps; ++step) {
-    state.cpu->for_each(
+    tissue.cpu->for_each(
         count,
         [&](int i) {
           bonds[i].clear();
-          at_crack[i] = go_on(state, tearing[i], tearing, bonds[i]);
+          at_crack[i] = go_on(tissue, tearing[i], tearing, bonds[i]);
         },
         64);
     bool any = false;
@@ -267,23 +270,23 @@ void tear_bonds(MpmState& state, const std::vector<TearingPoint>& tearing,
       for (const Bond& b : of_point) any = tear(b) || any;
     }
     if (step == 0) {
-      for (const Bond& b : beginnings(state, tearing, at_crack)) any = tear(b) || any;
+      for (const Bond& b : beginnings(tissue, records, tearing, at_crack)) any = tear(b) || any;
     }
     if (!any) break;
   }
   for (const TearingPoint& t : tearing) {
-    if (!comes_off(state, t)) continue;
-    const Points::Site& s = state.points.site[t.point];
-    std::uint8_t& bonds = state.points.bonds[t.point];
+    if (!comes_off(tissue, t)) continue;
+    const Points::Site& s = tissue.points.site[t.point];
+    std::uint8_t& bonds = tissue.points.bonds[t.point];
     changed.push_back(t.point);
     for (unsigned left = bonds; left != 0; left &= left - 1) {
       const int k = __builtin_ctz(left);
-      const std::int32_t q = neighbour(state.bodies[s.body], s, k);
-      break_bond(k, bonds, state.points.bonds[q]);
+      const std::int32_t q = neighbour(tissue.bodies[s.body], s, k);
+      break_bond(k, bonds, tissue.points.bonds[q]);
       changed.push_back(q);
       ++report.bonds_broken;
     }
-    state.tore_at[s.body] = state.time;
+    records.tore_at[s.body] = tissue.time;
   }
   std::sort(changed.begin() + first, changed.end());
   changed.erase(std::unique(changed.begin() + first, changed.end()), changed.end());

@@ -27,21 +27,29 @@
 #pragma once
 
 #include <cstdint>
+#include <set>
 #include <vector>
 
+#include "mpm/blocks/block_tissue.h"
 #include "mpm/lattice/bonds.h"
-#include "mpm/mpm_state.h"
 #include "tissue_sim/cut.h"
 
 namespace tissue_sim {
 
+/// What became of the tissue.
+struct TearRecords {
+  std::vector<double> tore_at;  ///< per body: when a bond last tore [s]; empty while none did
+  std::vector<std::int32_t> bridge_ends;  ///< points, by number
+  std::set<std::int32_t> debris;          ///< the lowest point of each: mpm/tear/debris.h
+};
+
 /// Whether a body of the scene can tear.
-bool can_tear(const MpmState& state);
+bool can_tear(const LatticeTissue& tissue);
 
 /// How many times a frame of `substeps` looks for tears: about every three cells that a pressure
 /// wave crosses, and at its end. A crack goes on by kTearSteps points each time, as fast as that
 /// wave.
-int tear_checks(const MpmState& state, int substeps, float dt);
+int tear_checks(const LatticeTissue& tissue, int substeps, float dt);
 /// After how many substeps the check number `check` (from 0) is.
 inline int tear_check_at(int check, int checks, int substeps) {
   return static_cast<int>(static_cast<std::int64_t>(check + 1) * substeps / checks);
@@ -49,7 +57,7 @@ inline int tear_check_at(int check, int checks, int substeps) {
 inline constexpr int kTearSteps = 6;
 
 /// Stretch at which a point tears.
-float tear_limit(const MpmState& state, std::int32_t point);
+float tear_limit(const LatticeTissue& tissue, std::int32_t point);
 /// The least limit that a point of the material may have; 0 if it never tears.
 float least_tear_limit(const Material& material);
 /// The same of all materials of a body that tear; 0 if none does.
@@ -63,15 +71,15 @@ struct TearingPoint {
 };
 
 /// Of the points of a block that are stretched most, those that are past their limits.
-void add_tearing(const MpmState& state, const std::vector<StretchedPoint>& stretched,
+void add_tearing(const LatticeTissue& tissue, const std::vector<StretchedPoint>& stretched,
                  std::vector<TearingPoint>& tearing);
 
 /// All points past their limits, by number.
-std::vector<TearingPoint> find_tearing(MpmState& state);
+std::vector<TearingPoint> find_tearing(BlockTissue& tissue);
 
 /// Breaks bonds of the points `tearing` (by number). Appends the points that lost one to `changed`,
 /// by number, and counts into `report`.
-void tear_bonds(MpmState& state, const std::vector<TearingPoint>& tearing,
+void tear_bonds(BlockTissue& tissue, TearRecords& records, const std::vector<TearingPoint>& tearing,
                 std::vector<std::int32_t>& changed, CutReport& report);
 
 // A crack as the bonds show it, and where it goes on: see mpm/tear/tear.h for the rule.
@@ -79,7 +87,7 @@ void tear_bonds(MpmState& state, const std::vector<TearingPoint>& tearing,
 inline constexpr int kReach = 3;  ///< half the support of a node [points]
 
 /// Bonds that the point had and lost.
-unsigned broken_bonds(const MpmState& state, std::int32_t p);
+unsigned broken_bonds(const LatticeTissue& tissue, std::int32_t p);
 
 /// The point that is `steps` on from a site in the direction of bond `k`, -1 where there is none.
 std::int32_t neighbour(const LatticeBody& body, const Points::Site& s, int k, int steps = 1);
@@ -88,7 +96,7 @@ std::int32_t neighbour(const LatticeBody& body, const Points::Site& s, int k, in
 const TearingPoint* entry(const std::vector<TearingPoint>& tearing, std::int32_t point);
 
 /// Whether a bond broke on the line of bond `k` of p, within kReach of it.
-bool broken_on_line(const MpmState& state, const LatticeBody& body, std::int32_t p, int k);
+bool broken_on_line(const LatticeTissue& tissue, const LatticeBody& body, std::int32_t p, int k);
 
 struct Bond {
   std::int32_t point;
@@ -98,8 +106,8 @@ struct Bond {
 
 /// Appends the bonds of a point that a crack takes as it goes on. Returns whether there is a crack
 /// within kReach.
-bool go_on(const MpmState& state, const TearingPoint& t, const std::vector<TearingPoint>& tearing,
-           std::vector<Bond>& bonds);
+bool go_on(const LatticeTissue& tissue, const TearingPoint& t,
+           const std::vector<TearingPoint>& tearing, std::vector<Bond>& bonds);
 
 // Bond bridges: what hangs on by points one after the other, thinner than the lattice tells.
 
@@ -112,11 +120,13 @@ inline constexpr double kThreadStretch = 1.5, kBridgeStiffening = 3.5;
 /// Whether a point that has a bond in a square of four would have none without bond `k` of `point`.
 bool leaves_thread(const LatticeBody& body, Points& points, std::int32_t point, int k);
 
-/// After the points `changed` lost bonds: adds the ends of new bridges to MpmState::bridge_ends.
-void list_bridges(MpmState& state, const std::vector<std::int32_t>& changed);
+/// After the points `changed` lost bonds: adds the ends of new bridges to TearRecords::bridge_ends.
+void list_bridges(const LatticeTissue& tissue, TearRecords& records,
+                  const std::vector<std::int32_t>& changed);
 
 /// Tears bridges. Appends the points that lost a bond to `changed`, by number, and counts into
 /// `report`.
-void tear_bridges(MpmState& state, std::vector<std::int32_t>& changed, CutReport& report);
+void tear_bridges(BlockTissue& tissue, TearRecords& records, std::vector<std::int32_t>& changed,
+                  CutReport& report);
 
 }  // namespace tissue_sim

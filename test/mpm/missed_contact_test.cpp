@@ -19,9 +19,9 @@ constexpr double kRadius = 0.003, kGap = 3.5 * kCell;        // of the probe, an
 
 /// A block that is held at one end, and a probe across the way of the other.
 template <class T>
-class UnforeseenContactOf : public OnEitherDevice<T> {
+class MissedContactOf : public OnEitherDevice<T> {
  protected:
-  UnforeseenContactOf() {
+  MissedContactOf() {
     scene_ = free_box(Vec3(kLong, kWide, kWide), kCell);
     Region held;
     held.kind = Region::Kind::kBox;
@@ -65,9 +65,9 @@ class UnforeseenContactOf : public OnEitherDevice<T> {
   Scene scene_;
   std::vector<ToolMotion> tools_;
 };
-TYPED_TEST_SUITE(UnforeseenContactOf, Tissues, DeviceName);
+TYPED_TEST_SUITE(MissedContactOf, Tissues, DeviceName);
 
-TYPED_TEST(UnforeseenContactOf, TissueLetGoIsStoppedInTheSameFrame) {
+TYPED_TEST(MissedContactOf, TissueLetGoIsStoppedInTheSameFrame) {
   TypeParam tissue(this->scene_), in_short_frames(this->scene_);
   this->press(tissue);
   this->press(in_short_frames);

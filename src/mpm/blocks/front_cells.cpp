@@ -5,8 +5,8 @@
 #include <vector>
 
 #include "compute/simd.h"
+#include "mpm/blocks/block_tissue.h"
 #include "mpm/lattice/bonds.h"
-#include "mpm/mpm_state.h"
 #include "mpm/split/front.h"
 
 namespace tissue_sim {
@@ -55,7 +55,7 @@ struct NodesOfCell {
 
 /// The views of the points of a cell; `parted` has the number of each node among the parted ones,
 /// -1 for others.
-std::vector<CellView> views_of(const MpmState& s, const std::vector<std::int32_t>& parted,
+std::vector<CellView> views_of(const BlockTissue& s, const std::vector<std::int32_t>& parted,
                                const LatticeBody& body, int x, int y, int z) {
   std::vector<CellView> views;
   std::array<std::int32_t, 8> points;
@@ -192,7 +192,7 @@ constexpr int kSumsTogether = 64;  // sums that are gone through at a time
 
 }  // namespace
 
-void list_front_cells(MpmState& s) {
+void list_front_cells(BlockTissue& s) {
   Front& front = s.front;
   front.cells.clear();
   front.parts.clear();
@@ -244,7 +244,7 @@ FrontField front_field(const LatticeTissue& s) {
   return f;
 }
 
-void work_on_front_cell(MpmState& s, int i) {
+void work_on_front_cell(BlockTissue& s, int i) {
   const FrontCell& cell = s.front.cells[i];
   s.kernels->front(cell, front_field(s),
                    s.front.force.data() + static_cast<std::size_t>(kFrontForce) * i,
@@ -283,7 +283,7 @@ void move_front(LatticeTissue& s, const NodeStep& step, int i) {
   }
 }
 
-double front_elastic_energy(const MpmState& s) {
+double front_elastic_energy(const BlockTissue& s) {
   double sum = 0;
   const FrontField field = front_field(s);
   for (const FrontCell& cell : s.front.cells) sum += s.kernels->front_energy(cell, field);

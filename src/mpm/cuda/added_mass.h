@@ -1,12 +1,12 @@
 // What lets the stiff springs between tools and the true surface keep the substeps of tissue, on a
 // GPU. For .cu files.
 //
-// As on a CPU (mpm/contact/contact_inertia.h) an inerter b stands beside each spring across the
+// As on a CPU (mpm/contact/contact_inertia.h) an added mass b stands beside each spring across the
 // surface, along the normal n; but here nothing of it stays from a substep to the next. Each place
 // that touches adds b |w| n n^T to what its nodes have (B) for this substep, as integers, whose sum
-// does not depend on the order. Where contact begins, what the inerter takes of the nodes' speed
+// does not depend on the order. Where contact begins, what the added mass takes of the nodes' speed
 // towards the collider goes to their forces. All who move a node on do it by
-//   v' = keep v + (m + B)^-1 m dv, dv what it would be without inerters;
+//   v' = keep v + (m + B)^-1 m dv, dv what it would be without added masses;
 // who owns it adds what did not happen of dv to the load on the collider.
 #pragma once
 
@@ -42,8 +42,8 @@ struct InertialPlaces {
 };
 
 /// Adds the inertia to the lane's `node`, -1 where it has none that moves. Returns the force that
-/// takes from the node what new inerters take [N], whose opposite goes to the collider's load. All
-/// lanes take part. Out of line, for what is beside to keep its registers.
+/// takes from the node what new added masses take [N], whose opposite goes to the collider's load.
+/// All lanes take part. Out of line, for what is beside to keep its registers.
 inline __device__ __noinline__ float3 add_inertia(const InertialPlaces all,
                                                   const Collider* collider, int index, float kick,
                                                   int node, long long* inertia, long long* force,
@@ -101,7 +101,7 @@ inline __device__ __noinline__ float3 add_inertia(const InertialPlaces all,
   return {taken[0], taken[1], taken[2]};
 }
 
-/// What inerters take from a node's change of velocity in a substep [m/s]: `after` it would be
+/// What added masses take from a node's change of velocity in a substep [m/s]: `after` it would be
 /// without them. Out of line and in so many words, for all who move the node to get the same bits.
 inline __device__ __noinline__ float3 resisted(const long long* inertia, float inv_mass, float keep,
                                                float3 before, float3 after) {
@@ -124,7 +124,7 @@ inline __device__ __noinline__ float3 resisted(const long long* inertia, float i
   return {change[0] - x, change[1] - y, change[2] - z};
 }
 
-/// Where the loads of a substep's inerters go.
+/// Where the loads of a substep's added masses go.
 struct InertialLoads {
   const CudaBlock* blocks;  ///< of the bundle
   int block_count;
@@ -133,8 +133,8 @@ struct InertialLoads {
   unsigned long long* loads;  ///< per collider
 };
 
-/// Adds what a node's inerters bore in a substep, `force` [N], to the load on collider `index`. The
-/// node has this slot and was moved by `u` before [m].
+/// Adds what a node's added masses bore in a substep, `force` [N], to the load on collider `index`.
+/// The node has this slot and was moved by `u` before [m].
 inline __device__ __noinline__ void add_resisted(const InertialLoads to, int index, int slot,
                                                  float3 u, float3 force) {
   const Collider* c = to.colliders + index;

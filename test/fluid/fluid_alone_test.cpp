@@ -78,7 +78,7 @@ TEST(Fluid, BreaksADamAsWasMeasured) {
   FrameRequest request = stand(walls);
   const double unit = std::sqrt(2 * kGravity / kWidth);  // [1/s]
   const std::vector<std::array<double, 2>> measured = {
-      // time, front; both as they print them
+      // time, front, without units
       {1.19, 1.44}, {1.43, 1.67}, {1.63, 1.89}, {1.83, 2.11}, {1.98, 2.33}, {2.20, 2.56},
       {2.32, 2.78}, {2.51, 3.00}, {2.65, 3.22}, {2.83, 3.44}, {2.98, 3.67}, {3.11, 3.89}};
   std::size_t next = 0;

@@ -1,4 +1,5 @@
-// Fluids of the operating table. Compressibility is none of theirs: Fluid::bulk_modulus says why.
+// Fluids of the operating table. The sources are named from memory and not yet looked up.
+// Compressibility is none of theirs: Fluid::bulk_modulus says why.
 #include "tissue_sim/fluid.h"
 
 namespace tissue_sim {

@@ -30,8 +30,9 @@ std::vector<Option> list_mls(OptionSets& options) {
 }
 
 Spacing spacing_of_mls(const Scene& scene) {
-  const double spacing = scene.mls.spacing > 0 ? scene.mls.spacing : 0.5 * scene.cell_size;
-  return {2 * spacing, "mls.spacing", spacing};
+  const double spacing = scene.mls.spacing;
+  if (spacing > 0) return {2 * spacing, "mls.spacing", spacing};
+  return {scene.cell_size, "cell_size", scene.cell_size};
 }
 
 bool moves_mesh(const Body& body) { return is_tet_file(body.mesh); }

@@ -107,10 +107,16 @@ void push_surface(MpmState& s, Span<const float> impulses) {
     const BoundaryMesh::Vertex& v = mesh.vertices[i];
     if (!(s.points.free_volume_of(v.point) > 0)) return;
     const AxisWeights weights(v.place);
+    const auto weight = [&](int k) {
+      return weights.of[k % 3] * weights.of[3 + k / 3 % 3] * weights.of[6 + k / 9];
+    };
+    float of_moving = 0;  // the rest has no mass that could take a part
+    for (int k = 0; k < 27; ++k) of_moving += s.nodes.inv_mass[v.node[k]] > 0 ? weight(k) : 0;
+    if (!(of_moving > 0)) return;
     for (int k = 0; k < 27; ++k) {
-      const float w = weights.of[k % 3] * weights.of[3 + k / 3 % 3] * weights.of[6 + k / 9];
       const std::int32_t node = v.node[k];
-      for (int a = 0; a < 3; ++a) s.nodes.v[a][node] += w * s.nodes.inv_mass[node] * impulse[a];
+      const float per_impulse = weight(k) / of_moving * s.nodes.inv_mass[node];
+      for (int a = 0; a < 3; ++a) s.nodes.v[a][node] += per_impulse * impulse[a];
     }
   });
 }

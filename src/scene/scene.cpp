@@ -379,6 +379,13 @@ void check_hollow(const std::string& path, const Scene& scene, const Body& body)
 }
 
 void check_fluids(const Scene& scene) {
+  const bool any_filled = std::any_of(scene.bodies.begin(), scene.bodies.end(),
+                                      [](const Body& b) { return !b.filled.fluid.empty(); });
+  if (scene.method == Method::kMls && (any_filled || !scene.pools.empty())) {
+    refuse("method", "mls",
+           "blows up beside fluid after some frames, which is not mended yet: choose mpm, or pbd "
+           "with model: tetrahedra");
+  }
   std::set<std::string> names;
   for (std::size_t i = 0; i < scene.fluids.size(); ++i) {
     const std::string path = at("fluids", i);

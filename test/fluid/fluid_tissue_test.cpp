@@ -28,7 +28,7 @@ TEST_P(FluidIn, KeepsMomentum) {
   ASSERT_GT(fill_up(simulation), 0);
   simulation.set_gravity(Vec3(0.5, 0, -2));
   const Momentum before = simulation.tissue().momentum();
-  constexpr int kFrames = 3;
+  constexpr int kFrames = 6;
   for (int i = 0; i < kFrames; ++i) ASSERT_FALSE(simulation.advance_frame().result.blew_up);
   const Momentum after = simulation.tissue().momentum();
   const Vec3 asked = before.mass * kFrames / scene.frame_rate * Vec3(0.5, 0, -2);
@@ -36,12 +36,11 @@ TEST_P(FluidIn, KeepsMomentum) {
 }
 
 std::string method_name(const testing::TestParamInfo<Method>& info) {
-  const char* names[] = {"Mpm", "Mls", "Pbd"};
-  return names[static_cast<int>(info.param)];
+  return info.param == Method::kMpm ? "Mpm" : "Pbd";
 }
 
-INSTANTIATE_TEST_SUITE_P(Methods, FluidIn,
-                         testing::Values(Method::kMpm, Method::kMls, Method::kPbd), method_name);
+INSTANTIATE_TEST_SUITE_P(Methods, FluidIn, testing::Values(Method::kMpm, Method::kPbd),
+                         method_name);
 
 /// A closed organ that is shaken: nothing passes its wall of two cells, and it holds the volume
 /// that its fluid has under its pressure.

@@ -11,7 +11,7 @@ TEST(Diagnostics, SaysHowCoarseASceneMustBeToBeFastEnough) {
   scene.bodies.resize(1);
   EXPECT_EQ(coarser(scene, 16), "cell_size: 0.006 would do, for 0.003");
   scene.method = Method::kMls;
-  EXPECT_EQ(coarser(scene, 16), "mls.spacing: 0.003 would do, for 0.0015");
+  EXPECT_EQ(coarser(scene, 16), "cell_size: 0.006 would do, for 0.003");
   scene.mls.spacing = 0.002;
   EXPECT_EQ(coarser(scene, 16), "mls.spacing: 0.004 would do, for 0.002");
   scene.bodies[0].shape = Shape::kMesh;

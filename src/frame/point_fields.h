@@ -8,6 +8,7 @@
 
 #include "compute/for_each.h"
 #include "tissue_sim/point.h"
+#include "tissue_sim/types.h"
 
 namespace tissue_sim {
 
@@ -16,6 +17,19 @@ struct PointFields {
   float rest[3], u[3], v[3], volume;
   float stress[6] = {};
 };
+
+/// Without a stress.
+inline PointFields point_fields(const Vec3& rest, const Vec3& place, const Vec3& velocity,
+                                double volume) {
+  PointFields of;
+  for (int a = 0; a < 3; ++a) {
+    of.rest[a] = static_cast<float>(rest[a]);
+    of.u[a] = static_cast<float>(place[a] - rest[a]);
+    of.v[a] = static_cast<float>(velocity[a]);
+  }
+  of.volume = static_cast<float>(volume);
+  return of;
+}
 
 /// Throws std::invalid_argument where `selection` asks for more than `has`.
 inline void check_fields(const PointSelection& selection, unsigned has) {

@@ -306,15 +306,8 @@ int MlsTissue::read_points(const PointSelection& selection, std::vector<std::uin
       },
       4);
   add_fields(selection, place, count, *state_->cpu, cloud, [&s](int i) {
-    const Vec3 rest = s.nodes.place[i], moved = s.position(i) - rest, v = s.velocity(i);
-    PointFields of;
-    for (int a = 0; a < 3; ++a) {
-      of.rest[a] = static_cast<float>(rest[a]);
-      of.u[a] = static_cast<float>(moved[a]);
-      of.v[a] = static_cast<float>(v[a]);
-    }
-    of.volume = static_cast<float>(s.nodes.volume[i]);
-    return of;
+    return tissue_sim::point_fields(s.nodes.place[i], s.position(i), s.velocity(i),
+                                    s.nodes.volume[i]);
   });
   return count;
 }

@@ -86,17 +86,8 @@ int PbdTissue::read_points(const PointSelection& selection, std::vector<std::uin
     std::memcpy(cloud.data() + static_cast<std::size_t>(place[i]) * sizeof(Point), &out,
                 sizeof(Point));
   }
-  add_fields(selection, place, count, state_->cpu, cloud, [&s](int i) {
-    const Vec3 rest = s.vertices.reference[i], moved = s.vertices.position(i) - rest;
-    const Vec3 v = s.vertices.velocity(i);
-    PointFields of;
-    for (int a = 0; a < 3; ++a) {
-      of.rest[a] = static_cast<float>(rest[a]);
-      of.u[a] = static_cast<float>(moved[a]);
-      of.v[a] = static_cast<float>(v[a]);
-    }
-    of.volume = static_cast<float>(s.vertices.volume[i]);
-    return of;
+  add_fields(selection, place, count, state_->cpu, cloud, [&v = s.vertices](int i) {
+    return tissue_sim::point_fields(v.reference[i], v.position(i), v.velocity(i), v.volume[i]);
   });
   return count;
 }

@@ -101,6 +101,7 @@ TEST(Fluid, BreaksADamAsWasMeasured) {
     front_before = front;
     time_before = time;
   }
+  ASSERT_LT(worst, 0.2);  // what it falls short by today is 0.195
   if (worst > 0.1) {
     GTEST_SKIP() << "the front is off by " << worst << " of where it was measured, 0.1 asked";
   }

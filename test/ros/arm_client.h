@@ -72,8 +72,15 @@ class CrtkArm : public testing::Test {
     }
     return d;
   }
+  // measured_cp has come as far, too: its topic is another one, and tip() reads it next.
   bool arrives(const Values& q, double seconds = 20) {
-    return wait_until([&] { return distance(measured_js.last()->position, q) < 1e-9; }, seconds);
+    return wait_until(
+        [&] {
+          const auto joints = measured_js.last();
+          return distance(joints->position, q) < 1e-9 && measured_cp.last() &&
+                 measured_cp.last()->header.stamp >= joints->header.stamp;
+        },
+        seconds);
   }
   void move_jp(const Values& q) {
     send_joints("move_jp", q);

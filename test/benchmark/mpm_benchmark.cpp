@@ -12,13 +12,13 @@
 #include <vector>
 
 #include "camera_benchmark.h"
-#include "cut_scenes.h"
-#include "fixed_substeps.h"
 #include "machine_rates.h"
 #include "mls_benchmark.h"
 #include "organ_benchmark.h"
 #include "pbd_benchmark.h"
 #include "reference/mpm_reference.h"
+#include "support/cut_scenes.h"
+#include "support/fixed_substeps.h"
 
 namespace tissue_sim {
 namespace {

@@ -14,10 +14,10 @@
 #include "benchmark/organ_benchmark.h"
 #include "benchmark/pbd_benchmark.h"
 #include "compute/cuda_check.h"
-#include "cuda_mpm_tissue.h"
-#include "fixed_substeps.h"
 #include "math/bspline.h"
 #include "mpm/mpm_tissue.h"
+#include "support/cuda_mpm_tissue.h"
+#include "support/fixed_substeps.h"
 
 namespace tissue_sim {
 namespace {

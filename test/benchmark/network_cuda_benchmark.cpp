@@ -6,7 +6,7 @@
 
 #include "benchmark/torn_bar.h"
 #include "compute/cuda_check.h"
-#include "cuda_mpm_tissue.h"
+#include "support/cuda_mpm_tissue.h"
 
 namespace tissue_sim {
 namespace {

@@ -8,8 +8,8 @@
 #include <ctime>
 #include <string>
 
-#include "network_text.h"
-#include "temporary_folder.h"
+#include "support/network_text.h"
+#include "support/temporary_folder.h"
 #include "tissue_sim/material.h"
 #include "tissue_sim/scene.h"
 #include "tissue_sim/tissue.h"

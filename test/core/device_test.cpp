@@ -6,7 +6,7 @@
 #include <stdexcept>
 #include <string>
 
-#include "cut_scenes.h"
+#include "support/cut_scenes.h"
 #include "tissue_sim/tissue.h"
 #if defined(TISSUE_SIM_CUDA)
 #include "compute/cuda_check.h"

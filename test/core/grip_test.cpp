@@ -3,7 +3,7 @@
 
 #include <gtest/gtest.h>
 
-#include "cut_scenes.h"
+#include "support/cut_scenes.h"
 #include "tissue_sim/simulation.h"
 
 namespace tissue_sim {

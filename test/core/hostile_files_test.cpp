@@ -12,9 +12,9 @@
 #include "geometry/mesh.h"
 #include "geometry/tet_mesh.h"
 #include "scene/read_file.h"
-#include "temporary_folder.h"
-#include "test_meshes.h"
-#include "test_scenes.h"
+#include "support/temporary_folder.h"
+#include "support/test_meshes.h"
+#include "support/test_scenes.h"
 #include "tissue_sim/limits.h"
 
 namespace tissue_sim {

@@ -10,10 +10,10 @@
 #include <vector>
 
 #include "compute/simd.h"
-#include "curve_file.h"
 #include "material/laws.h"
 #include "mpm/contact/block_contact.h"
 #include "mpm/mpm_tissue.h"
+#include "support/curve_file.h"
 
 namespace tissue_sim {
 namespace {

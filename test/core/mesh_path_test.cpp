@@ -5,7 +5,7 @@
 #include <functional>
 
 #include "geometry/mesh.h"
-#include "temporary_folder.h"
+#include "support/temporary_folder.h"
 
 namespace tissue_sim {
 namespace {

@@ -6,8 +6,8 @@
 #include <cctype>
 #include <functional>
 
-#include "temporary_folder.h"
-#include "test_meshes.h"
+#include "support/temporary_folder.h"
+#include "support/test_meshes.h"
 
 namespace tissue_sim {
 namespace {

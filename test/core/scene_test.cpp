@@ -6,7 +6,7 @@
 #include <cmath>
 #include <limits>
 
-#include "test_scenes.h"
+#include "support/test_scenes.h"
 
 namespace tissue_sim {
 namespace {

@@ -4,8 +4,8 @@
 #include <cmath>
 #include <filesystem>
 
-#include "temporary_folder.h"
-#include "test_scenes.h"
+#include "support/temporary_folder.h"
+#include "support/test_scenes.h"
 #include "tissue_sim/scene.h"
 
 namespace tissue_sim {

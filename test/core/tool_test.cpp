@@ -1,8 +1,8 @@
 // Instruments and the ground against tissue: pushes, friction, wrenches, cuts by motion.
 #include <gtest/gtest.h>
 
-#include "cut_scenes.h"
-#include "fixed_substeps.h"
+#include "support/cut_scenes.h"
+#include "support/fixed_substeps.h"
 #include "tools/frame_colliders.h"
 
 namespace tissue_sim {

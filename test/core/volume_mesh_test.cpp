@@ -10,11 +10,11 @@
 #include <fstream>
 #include <sstream>
 
-#include "cut_paths.h"
 #include "geometry/surface.h"
 #include "geometry/tet_mesh.h"
-#include "temporary_folder.h"
-#include "test_scenes.h"
+#include "support/cut_paths.h"
+#include "support/temporary_folder.h"
+#include "support/test_scenes.h"
 #include "tissue_sim/tissue.h"
 
 namespace tissue_sim {

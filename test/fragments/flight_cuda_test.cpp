@@ -9,10 +9,10 @@
 #include <memory>
 #include <vector>
 
-#include "either_device.h"
 #include "fragments/torn_bar.h"
-#include "network_text.h"
-#include "temporary_folder.h"
+#include "support/either_device.h"
+#include "support/network_text.h"
+#include "support/temporary_folder.h"
 
 namespace tissue_sim {
 namespace {

@@ -5,14 +5,14 @@
 #include <cmath>
 #include <vector>
 
-#include "cut_scenes.h"
-#include "fixed_substeps.h"
 #include "fragments/torn_bar.h"
 #include "mpm/fragment_flight.h"
 #include "mpm/fragment_forecast.h"
 #include "mpm/tear/debris.h"
-#include "network_text.h"
-#include "temporary_folder.h"
+#include "support/cut_scenes.h"
+#include "support/fixed_substeps.h"
+#include "support/network_text.h"
+#include "support/temporary_folder.h"
 
 namespace tissue_sim {
 namespace {

@@ -8,11 +8,11 @@
 #include <string>
 #include <vector>
 
-#include "cut_scenes.h"
 #include "fragments/network_file.h"
 #include "mpm/fragment_features.h"
-#include "network_text.h"
-#include "temporary_folder.h"
+#include "support/cut_scenes.h"
+#include "support/network_text.h"
+#include "support/temporary_folder.h"
 
 namespace tissue_sim {
 namespace {

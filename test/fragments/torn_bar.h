@@ -4,8 +4,8 @@
 #include <cmath>
 #include <string>
 
-#include "cut_scenes.h"
 #include "mpm/mpm_state.h"
+#include "support/cut_scenes.h"
 
 namespace tissue_sim {
 

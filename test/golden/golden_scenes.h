@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "golden/golden_parts.h"
-#include "temporary_folder.h"
+#include "support/temporary_folder.h"
 #include "tissue_sim/simulation.h"
 
 namespace tissue_sim {

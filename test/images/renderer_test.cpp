@@ -10,9 +10,9 @@
 #include <set>
 #include <vector>
 
-#include "cut_paths.h"
-#include "temporary_folder.h"
-#include "test_scenes.h"
+#include "support/cut_paths.h"
+#include "support/temporary_folder.h"
+#include "support/test_scenes.h"
 #include "tools/tool_shapes.h"
 
 namespace tissue_sim {

@@ -5,7 +5,7 @@
 
 #include "geometry/tet_mesh.h"
 #include "mls_scenes.h"
-#include "temporary_folder.h"
+#include "support/temporary_folder.h"
 
 namespace tissue_sim {
 namespace {

@@ -5,9 +5,9 @@
 #include <Eigen/SparseCholesky>
 #include <cmath>
 
-#include "beam_scene.h"
-#include "curve_file.h"
 #include "mls/small_motion.h"
+#include "support/beam_scene.h"
+#include "support/curve_file.h"
 
 namespace tissue_sim {
 namespace {

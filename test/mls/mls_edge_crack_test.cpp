@@ -6,9 +6,9 @@
 #include <functional>
 #include <map>
 
-#include "crack_strip.h"
 #include "mls_scenes.h"
 #include "paper/enrichment.h"
+#include "support/crack_strip.h"
 
 namespace tissue_sim {
 namespace {

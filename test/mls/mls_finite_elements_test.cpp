@@ -4,7 +4,7 @@
 
 #include <cstdio>
 
-#include "finite_element_scenes.h"
+#include "support/finite_element_scenes.h"
 
 namespace tissue_sim {
 namespace {

@@ -6,8 +6,8 @@
 #include <cstdio>
 #include <string>
 
-#include "finite_element_scenes.h"
 #include "mls/small_motion.h"
+#include "support/finite_element_scenes.h"
 
 namespace tissue_sim {
 namespace {

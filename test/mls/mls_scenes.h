@@ -5,10 +5,10 @@
 #include <random>
 #include <vector>
 
-#include "cut_paths.h"
 #include "material/laws.h"
 #include "mls/own_rate.h"
 #include "mls/tissue.h"
+#include "support/cut_paths.h"
 
 namespace tissue_sim {
 

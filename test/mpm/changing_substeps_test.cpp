@@ -6,10 +6,10 @@
 #include <cmath>
 #include <vector>
 
-#include "either_device.h"
-#include "fixed_substeps.h"
-#include "momentum.h"
-#include "stability_limit.h"
+#include "support/either_device.h"
+#include "support/fixed_substeps.h"
+#include "support/momentum.h"
+#include "support/stability_limit.h"
 
 namespace tissue_sim {
 namespace {

@@ -6,9 +6,9 @@
 #include <cstring>
 #include <vector>
 
-#include "cut_scenes.h"
-#include "fixed_substeps.h"
-#include "momentum.h"
+#include "support/cut_scenes.h"
+#include "support/fixed_substeps.h"
+#include "support/momentum.h"
 
 namespace tissue_sim {
 namespace {

@@ -1,10 +1,10 @@
 // What a set of cuts parts, by the stiffness of what is left.
-#include "cut_kinds.h"
+#include "support/cut_kinds.h"
 
 #include <gtest/gtest.h>
 
-#include "cut_scenes.h"
-#include "rigid_modes.h"
+#include "support/cut_scenes.h"
+#include "support/rigid_modes.h"
 
 namespace tissue_sim {
 namespace {

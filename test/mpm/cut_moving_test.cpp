@@ -3,10 +3,10 @@
 
 #include <Eigen/Geometry>
 
-#include "cut_kinds.h"
-#include "cut_scenes.h"
-#include "fixed_substeps.h"
 #include "mpm/lattice/bonds.h"
+#include "support/cut_kinds.h"
+#include "support/cut_scenes.h"
+#include "support/fixed_substeps.h"
 
 namespace tissue_sim {
 namespace {

@@ -3,11 +3,11 @@
 
 #include <numeric>
 
-#include "cut_scenes.h"
 #include "cutting/blade_sweep.h"
-#include "fixed_substeps.h"
 #include "mpm/lattice/bonds.h"
-#include "rigid_modes.h"
+#include "support/cut_scenes.h"
+#include "support/fixed_substeps.h"
+#include "support/rigid_modes.h"
 
 namespace tissue_sim {
 namespace {

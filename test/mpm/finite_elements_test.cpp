@@ -6,7 +6,7 @@
 #include <algorithm>
 #include <cstdio>
 
-#include "finite_element_scenes.h"
+#include "support/finite_element_scenes.h"
 #include "tissue_sim/simulation.h"
 #if defined(TISSUE_SIM_CUDA)
 #include "compute/cuda_check.h"

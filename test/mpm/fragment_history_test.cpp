@@ -4,9 +4,9 @@
 #include <algorithm>
 #include <map>
 
-#include "cut_kinds.h"
-#include "cut_scenes.h"
-#include "fixed_substeps.h"
+#include "support/cut_kinds.h"
+#include "support/cut_scenes.h"
+#include "support/fixed_substeps.h"
 
 namespace tissue_sim {
 namespace {

@@ -6,11 +6,11 @@
 #include <utility>
 #include <vector>
 
-#include "cut_scenes.h"
-#include "fixed_substeps.h"
 #include "mpm/state_figures.h"
-#include "tear_scenes.h"
-#include "test_scenes.h"
+#include "support/cut_scenes.h"
+#include "support/fixed_substeps.h"
+#include "support/tear_scenes.h"
+#include "support/test_scenes.h"
 
 namespace tissue_sim {
 namespace {

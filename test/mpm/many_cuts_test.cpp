@@ -9,8 +9,8 @@
 #include <fstream>
 #include <random>
 
-#include "cut_scenes.h"
-#include "fixed_substeps.h"
+#include "support/cut_scenes.h"
+#include "support/fixed_substeps.h"
 
 namespace tissue_sim {
 namespace {

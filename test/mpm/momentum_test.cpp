@@ -1,5 +1,5 @@
 // Linear and angular momentum of a body in free flight, with and without a cut on the way.
-#include "momentum.h"
+#include "support/momentum.h"
 
 #include <gtest/gtest.h>
 
@@ -7,10 +7,10 @@
 #include <string>
 #include <vector>
 
-#include "curve_file.h"
-#include "fixed_substeps.h"
-#include "momentum.h"
 #include "mpm/mpm_tissue.h"
+#include "support/curve_file.h"
+#include "support/fixed_substeps.h"
+#include "support/momentum.h"
 
 namespace tissue_sim {
 namespace {

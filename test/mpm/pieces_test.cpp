@@ -6,9 +6,9 @@
 #include <random>
 #include <set>
 
-#include "cut_scenes.h"
 #include "mpm/lattice/bonds.h"
 #include "mpm/lattice_pieces.h"
+#include "support/cut_scenes.h"
 
 namespace tissue_sim {
 namespace {

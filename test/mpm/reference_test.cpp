@@ -3,8 +3,8 @@
 
 #include <cstdlib>
 
-#include "cut_scenes.h"
 #include "reference/mpm_reference.h"
+#include "support/cut_scenes.h"
 
 namespace tissue_sim {
 namespace {

@@ -5,13 +5,13 @@
 #include <random>
 #include <vector>
 
-#include "cut_scenes.h"
-#include "fixed_substeps.h"
-#include "momentum.h"
 #include "mpm/cut_tissue.h"
 #include "mpm/mpm_tissue.h"
 #include "mpm/tear/debris.h"
-#include "stability_limit.h"
+#include "support/cut_scenes.h"
+#include "support/fixed_substeps.h"
+#include "support/momentum.h"
+#include "support/stability_limit.h"
 #include "tissue_sim/simulation.h"
 
 namespace tissue_sim {

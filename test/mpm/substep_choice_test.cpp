@@ -6,15 +6,15 @@
 #include <cstdio>
 #include <vector>
 
-#include "cut_scenes.h"
-#include "drooping_block.h"
-#include "fixed_substeps.h"
 #include "math/lanczos.h"
 #include "mpm/linearised_motion.h"
 #include "mpm/tear/debris.h"
 #include "reference/mpm_reference.h"
-#include "stability_limit.h"
-#include "test_scenes.h"
+#include "support/cut_scenes.h"
+#include "support/drooping_block.h"
+#include "support/fixed_substeps.h"
+#include "support/stability_limit.h"
+#include "support/test_scenes.h"
 #include "tissue_sim/simulation.h"
 
 namespace tissue_sim {

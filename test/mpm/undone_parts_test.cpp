@@ -4,13 +4,13 @@
 #include <algorithm>
 #include <cstring>
 
-#include "cut_scenes.h"
-#include "either_device.h"
-#include "fixed_substeps.h"
-#include "momentum.h"
 #include "mpm/contact/face_contact.h"
-#include "stability_limit.h"
-#include "test_scenes.h"
+#include "support/cut_scenes.h"
+#include "support/either_device.h"
+#include "support/fixed_substeps.h"
+#include "support/momentum.h"
+#include "support/stability_limit.h"
+#include "support/test_scenes.h"
 
 namespace tissue_sim {
 namespace {

@@ -3,9 +3,9 @@
 
 #include <vector>
 
-#include "beam_scene.h"
-#include "curve_file.h"
-#include "fixed_substeps.h"
+#include "support/beam_scene.h"
+#include "support/curve_file.h"
+#include "support/fixed_substeps.h"
 
 namespace tissue_sim {
 namespace {

@@ -5,7 +5,7 @@
 
 #include <cmath>
 
-#include "curve_file.h"
+#include "support/curve_file.h"
 
 namespace tissue_sim {
 namespace {

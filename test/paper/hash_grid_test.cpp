@@ -9,9 +9,9 @@
 #include <set>
 #include <string>
 
-#include "cut_scenes.h"
 #include "paper/breadth_first.h"
 #include "paper/torn_points.h"
+#include "support/cut_scenes.h"
 
 namespace tissue_sim {
 namespace {

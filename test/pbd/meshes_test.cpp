@@ -11,7 +11,7 @@
 #include "geometry/surface.h"
 #include "geometry/tet_mesh.h"
 #include "pbd/internal_links.h"
-#include "temporary_folder.h"
+#include "support/temporary_folder.h"
 
 namespace tissue_sim {
 namespace {

@@ -7,9 +7,9 @@
 #include <string>
 
 #include "compute/cuda_check.h"
-#include "cut_paths.h"
 #include "pbd/cuda/cuda_pbd_tissue.h"
 #include "pbd/pbd_reference.h"
+#include "support/cut_paths.h"
 #include "tissue_sim/simulation.h"
 
 namespace tissue_sim {

@@ -4,7 +4,7 @@
 #include <cstdio>
 #include <string>
 
-#include "finite_element_scenes.h"
+#include "support/finite_element_scenes.h"
 #include "tissue_sim/simulation.h"
 
 namespace tissue_sim {

@@ -13,8 +13,8 @@
 #include <string>
 #include <vector>
 
-#include "cut_paths.h"
-#include "temporary_folder.h"
+#include "support/cut_paths.h"
+#include "support/temporary_folder.h"
 #include "tissue_sim/simulation.h"
 
 namespace tissue_sim {

@@ -13,7 +13,7 @@
 
 #include "ros/bag_repair.h"
 #include "ros/recorder.h"
-#include "temporary_folder.h"
+#include "support/temporary_folder.h"
 
 namespace tissue_sim {
 namespace {

@@ -10,7 +10,7 @@
 
 #include "ros/recorder.h"
 #include "ros/recording_path.h"
-#include "temporary_folder.h"
+#include "support/temporary_folder.h"
 
 namespace tissue_sim {
 namespace {

@@ -18,7 +18,7 @@
 #include <thread>
 
 #include "simulator_client.h"
-#include "temporary_folder.h"
+#include "support/temporary_folder.h"
 
 namespace tissue_sim {
 namespace {

@@ -6,7 +6,7 @@
 #include <tuple>
 
 #include "compute/simd.h"
-#include "cut_paths.h"
+#include "support/cut_paths.h"
 #include "tissue/each_method.h"
 
 namespace tissue_sim {

@@ -1,5 +1,5 @@
 // Tip deflection of a cantilever under its own weight against Timoshenko's theory.
-#include "cantilever.h"
+#include "support/cantilever.h"
 
 #include <gtest/gtest.h>
 

@@ -1,5 +1,5 @@
 // What cuts of every kind part: pieces, which points they hold, how large they are.
-#include "cut_kinds.h"
+#include "support/cut_kinds.h"
 
 #include <gtest/gtest.h>
 

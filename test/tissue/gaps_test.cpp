@@ -3,8 +3,8 @@
 
 #include <algorithm>
 
-#include "temporary_folder.h"
-#include "test_meshes.h"
+#include "support/temporary_folder.h"
+#include "support/test_meshes.h"
 #include "tissue/each_method.h"
 
 namespace tissue_sim {

@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "cut_paths.h"
+#include "support/cut_paths.h"
 #include "tissue/each_method.h"
 
 namespace tissue_sim {

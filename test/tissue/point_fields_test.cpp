@@ -3,8 +3,8 @@
 
 #include <cstring>
 
-#include "cut_paths.h"
-#include "test_meshes.h"
+#include "support/cut_paths.h"
+#include "support/test_meshes.h"
 #include "tissue/each_method.h"
 
 namespace tissue_sim {

@@ -6,9 +6,9 @@
 #include <cmath>
 #include <map>
 
-#include "cut_paths.h"
-#include "temporary_folder.h"
-#include "test_meshes.h"
+#include "support/cut_paths.h"
+#include "support/temporary_folder.h"
+#include "support/test_meshes.h"
 #include "tissue/each_method.h"
 
 namespace tissue_sim {

@@ -7,7 +7,7 @@
 #include <set>
 #include <vector>
 
-#include "test_scenes.h"
+#include "support/test_scenes.h"
 #include "tissue/each_method.h"
 
 namespace tissue_sim {

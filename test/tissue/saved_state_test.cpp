@@ -10,10 +10,10 @@
 #include <random>
 #include <sstream>
 
-#include "cut_paths.h"
 #include "frame/checksum.h"
-#include "temporary_folder.h"
-#include "test_scenes.h"
+#include "support/cut_paths.h"
+#include "support/temporary_folder.h"
+#include "support/test_scenes.h"
 #include "tissue/each_method.h"
 #include "tissue/saved_states.h"
 

@@ -3,7 +3,7 @@
 
 #include <vector>
 
-#include "cut_paths.h"
+#include "support/cut_paths.h"
 #include "tissue/each_method.h"
 
 namespace tissue_sim {

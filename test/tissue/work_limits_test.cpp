@@ -7,7 +7,7 @@
 #include <thread>
 
 #include "geometry/lattice.h"
-#include "test_scenes.h"
+#include "support/test_scenes.h"
 #include "tissue_sim/limits.h"
 #include "tissue_sim/simulation.h"
 

@@ -121,6 +121,8 @@ struct State {
 
   std::vector<Collider> colliders;  ///< of this step
 
+  /// Triangles that may come to a tip in this part of a frame, and which of the colliders it is.
+  std::vector<std::array<std::int32_t, 2>> at_tips;
   /// Vertices of a chunk of each level, by which constraints are packed (ConstraintSet): what the
   /// first cache of a processor holds, and its second. Empty on a GPU.
   std::vector<std::int32_t> levels = {4096, 32768};
@@ -169,6 +171,10 @@ std::vector<std::int32_t> levels_of(const State& s);
 void project_contacts(State& s, float h, std::vector<ColliderLoad>& loads);
 
 /// Makes State::held and State::holder (anchors.cpp).
+/// Makes State::at_tips, for colliders that go from `begin` to `end` in so many seconds.
+void find_at_tips(State& s, const std::vector<Collider>& begin, const std::vector<Collider>& end,
+                  double duration);
+
 void find_held(State& s);
 /// Gives what anchors hold the velocity that takes it where they are after `duration` [s]; whether
 /// any moves, or did.

@@ -137,6 +137,10 @@ PbdTissue::Figures PbdTissue::measure() {
     sum.finite = sum.finite && v.position(i).allFinite();
   }
   sum.elastic = pbd::elastic_energy(*state_);
+  std::vector<Collider> begin, end;
+  colliders.at(part.share(-1), begin);
+  colliders.at(part.share(part.count - 1), end);
+  pbd::find_at_tips(s, begin, end, part.count * h);
   return sum;
 }
 

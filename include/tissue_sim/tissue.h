@@ -54,6 +54,7 @@ struct FrameResult {
   int fragment_points = 0;      ///< of these, those that it expects to be part of fragments
   double kinetic_energy = 0;    ///< [J]
   double elastic_energy = 0;    ///< [J]
+  double cutting_work = 0;      ///< of blades in tissue that resists: toughness times area [J]
   double max_speed = 0;         ///< of a point [m/s]
   bool blew_up = false;         ///< something is not finite, or moves faster than it can
 };

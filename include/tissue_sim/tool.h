@@ -34,11 +34,13 @@ struct Tool {
   double blade_length = 0.025;          ///< scalpel: edge from the tip to the heel, along -z [m]
   double blade_width = 0.006;           ///< scalpel: from the edge to the spine, along -x [m]
   double blade_thickness = 0.0004;      ///< scalpel: along y [m]
-  double jaw_length = 0.015;            ///< grasper: from the hinge to the tip, along z [m]
-  double jaw_width = 0.004;     ///< grasper: of a jaw, half round with a flat face, along y [m]
-  double grip_pressure = 3000;  ///< grasper: its jaws close until they press with it [Pa]
-  double cohesion = 10000;      ///< grasper: what its teeth hold beside friction [Pa]
-  double friction = 0.3;        ///< Coulomb friction against tissue [-], 0 to 2
+  double blade_edge_radius = 0;  ///< scalpel: `edge_radius` in a scene; how dull the edge is,
+                                 ///< at most half of its thickness [m]
+  double jaw_length = 0.015;     ///< grasper: from the hinge to the tip, along z [m]
+  double jaw_width = 0.004;      ///< grasper: of a jaw, half round with a flat face, along y [m]
+  double grip_pressure = 3000;   ///< grasper: its jaws close until they press with it [Pa]
+  double cohesion = 10000;       ///< grasper: what its teeth hold beside friction [Pa]
+  double friction = 0.3;         ///< Coulomb friction against tissue [-], 0 to 2
   /// What cameras see in place of its shapes, of a grasper in place of its handle: a plain path,
   /// file:// or package:// (STL, OBJ, PLY, OFF), in the tool's frame. Empty: the shapes.
   std::string mesh;

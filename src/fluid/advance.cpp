@@ -27,7 +27,6 @@ constexpr int kParticlesEach = 128;
 struct Substep {
   float dt;      // [s]
   float weight;  // of the interval
-  float end;     // share of the interval at its end
   float gravity[3];
   float keep;  // of speed, after damping
   const std::vector<Collider>& colliders;
@@ -197,17 +196,11 @@ bool meets(const WallTriangle& begin, const WallTriangle& end, const float* x, c
   return true;
 }
 
-/// Moves a particle to where no wall is in its way; what a wall takes of its speed is an impulse.
-void move(FluidState& s, const Substep& step, ColliderLoad* loads, int i) {
-  FluidParticles& p = s.particles;
+/// Raises y, where a particle comes to from x, before the triangles that move meanwhile, within
+/// `time`; what they take of its speed is an impulse.
+void stop_at_walls(FluidState& s, float time, int i, const float* x, float* y, float* v) {
   const float margin = kRoom * s.spacing;
-  const float mass = p.volume[i] * s.laws[p.kind[i]].density;
-  float x[3], y[3], v[3];
-  for (int a = 0; a < 3; ++a) {
-    x[a] = p.x[a][i];
-    v[a] = s.v_next[a][i];
-    y[a] = x[a] + step.dt * v[a];
-  }
+  const float mass = s.particles.volume[i] * s.laws[s.particles.kind[i]].density;
   FluidState::Touch& touch = s.touches[i];
   touch.triangle = -1;
   for (int pass = 0; pass < 3; ++pass) {
@@ -225,7 +218,7 @@ void move(FluidState& s, const Substep& step, ColliderLoad* loads, int i) {
     const WallTriangle &from = s.now[hit], &to = s.next[hit];
     float u[3];
     for (int a = 0; a < 3; ++a) {
-      u[a] = v[a] - (to.middle[a] - from.middle[a]) / step.dt;
+      u[a] = v[a] - (to.middle[a] - from.middle[a]) / time;
       y[a] += deepest * to.normal[a];
     }
     const float into = std::min(0.0f, dot3(u, to.normal));
@@ -235,6 +228,20 @@ void move(FluidState& s, const Substep& step, ColliderLoad* loads, int i) {
       touch.impulse[a] += mass * into * to.normal[a];
     }
   }
+}
+
+/// Moves a particle to where no wall is in its way.
+void move(FluidState& s, const Substep& step, ColliderLoad* loads, int i) {
+  FluidParticles& p = s.particles;
+  const float margin = kRoom * s.spacing;
+  const float mass = p.volume[i] * s.laws[p.kind[i]].density;
+  float x[3], y[3], v[3];
+  for (int a = 0; a < 3; ++a) {
+    x[a] = p.x[a][i];
+    v[a] = s.v_next[a][i];
+    y[a] = x[a] + step.dt * v[a];
+  }
+  stop_at_walls(s, step.dt, i, x, y, v);
   for (std::size_t c = 0; c < step.colliders.size(); ++c) {
     if ((s.near[i] & bit_of(c)) == 0) continue;
     const Collider& of = step.colliders[c];
@@ -283,7 +290,17 @@ void with_loads(FluidState& s, std::vector<ColliderLoad>& loads, const F& f) {
   }
 }
 
-/// Impulses on triangles go to their corners in equal parts.
+/// Of particles that walls met: what they gave them goes to the corners in equal parts.
+void collect_touches(const FluidState& s, FluidWalls& walls) {
+  for (const FluidState::Touch& touch : s.touches) {
+    if (touch.triangle < 0) continue;
+    for (int i = 0; i < 9; ++i) {
+      walls.impulse[std::size_t{9} * touch.triangle + i] += touch.impulse[i % 3] / 3;
+    }
+  }
+}
+
+/// Impulses on triangles go to their corners likewise.
 void collect(FluidState& s, FluidWalls& walls) {
   s.cpu->for_each(
       static_cast<int>(s.lists.met.size()),
@@ -298,12 +315,31 @@ void collect(FluidState& s, FluidWalls& walls) {
         }
       },
       256);
-  for (const FluidState::Touch& touch : s.touches) {
-    if (touch.triangle < 0) continue;
-    for (int i = 0; i < 9; ++i) {
-      walls.impulse[std::size_t{9} * touch.triangle + i] += touch.impulse[i % 3] / 3;
-    }
-  }
+  collect_touches(s, walls);
+}
+
+/// Takes the walls to where they end: the fluid then presses on them as they are, not as they were.
+/// A pressure that lags behind what it presses on would drive it.
+void move_walls(FluidState& s, FluidWalls& walls, float duration) {
+  place_triangles(s, walls, 0, s.now);
+  place_triangles(s, walls, 1, s.next);
+  FluidParticles& p = s.particles;
+  s.touches.assign(p.size(), {-1, {}});
+  s.cpu->for_each(
+      p.size(),
+      [&](int i) {
+        if (s.lists.wall_begin[i] == s.lists.wall_begin[i + 1]) return;
+        const float x[3] = {p.x[0][i], p.x[1][i], p.x[2][i]};
+        float y[3] = {x[0], x[1], x[2]}, v[3] = {p.v[0][i], p.v[1][i], p.v[2][i]};
+        stop_at_walls(s, duration, i, x, y, v);
+        for (int a = 0; a < 3; ++a) {
+          p.x[a][i] = y[a];
+          p.v[a][i] = v[a];
+        }
+      },
+      kParticlesEach);
+  collect_touches(s, walls);
+  s.now = s.next;
 }
 
 void substep(FluidState& s, const Substep& step, FluidWalls& walls,
@@ -330,10 +366,8 @@ void substep(FluidState& s, const Substep& step, FluidWalls& walls,
   s.cpu->for_each(
       n, [&](int i) { press(s, step, i); }, kParticlesEach);
   with_loads(s, forces, [&](int i, ColliderLoad* of) { push(s, step, of, i); });
-  place_triangles(s, walls, step.end, s.next);
   with_loads(s, forces, [&](int i, ColliderLoad* of) { move(s, step, of, i); });
   collect(s, walls);
-  s.now.swap(s.next);
   for (std::size_t c = 0; c < forces.size(); ++c) {
     for (int a = 0; a < 3; ++a) {
       loads[c].force[a] += step.weight * forces[c].force[a];
@@ -377,8 +411,11 @@ int advance_fluid(FluidState& s, const FluidDrive& drive, FluidWalls& walls,
   for (int i = 0; i < count; ++i) {
     const bool make = !s.lists.made || particles_moved(s) > 0.4f * skin;
     if (make) list_neighbours(s, walls.end, skin);
-    if (make || i == 0) {
-      place_triangles(s, walls, static_cast<float>(static_cast<double>(i) / count), s.now);
+    if (i == 0) {
+      move_walls(s, walls, static_cast<float>(drive.duration));
+    } else if (make) {
+      place_triangles(s, walls, 1, s.now);
+      s.next = s.now;
     }
     const double share = (i + 1.0) / count;
     const std::vector<Collider> colliders = drive.colliders(share);
@@ -386,7 +423,6 @@ int advance_fluid(FluidState& s, const FluidDrive& drive, FluidWalls& walls,
     const Substep step{
         dt,
         static_cast<float>(1.0 / count),
-        static_cast<float>(share),
         {static_cast<float>(g[0]), static_cast<float>(g[1]), static_cast<float>(g[2])},
         static_cast<float>(std::exp(-drive.damping * dt)),
         colliders};

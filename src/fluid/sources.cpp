@@ -239,7 +239,7 @@ void FluidSources::irrigate(const Tool& tool, int i, const ToolMotion& motion, d
   const double each = particle_volume(fluid), spacing = fluid.spacing;
   // Places of the mouth: a square grid within it, in turn.
   std::vector<Vec3> places;
-  const int most = static_cast<int>(tool.radius / spacing);
+  const int most = static_cast<int>(tool.radius / spacing + 1e-3);
   for (int y = -most; y <= most; ++y) {
     for (int x = -most; x <= most; ++x) {
       if (x * x + y * y > most * most) continue;
@@ -247,8 +247,10 @@ void FluidSources::irrigate(const Tool& tool, int i, const ToolMotion& motion, d
     }
   }
   const Vec3 along = motion.end.orientation * Vec3::UnitZ();
-  const Vec3 speed = (motion.end.position - motion.begin.position) / duration +
-                     tool.flow / (M_PI * tool.radius * tool.radius) * along;
+  const double mouth = std::min(M_PI * tool.radius * tool.radius,
+                                static_cast<double>(places.size()) * spacing * spacing);
+  const Vec3 speed =
+      (motion.end.position - motion.begin.position) / duration + tool.flow / mouth * along;
   for (std::size_t tries = 0; tries < places.size() && owed_[i] >= each; ++tries) {
     const Vec3 x = motion.end * places[turn_[i]++ % places.size()];
     turn_[i] %= static_cast<std::int32_t>(places.size());

@@ -17,7 +17,7 @@ namespace {
 
 /// Substeps of the fluid in an interval. What presses on a wall is as old as that: with more, light
 /// walls ring.
-constexpr double kStepsOfInterval = 2;
+constexpr double kStepsOfInterval = 1;
 
 Pose between(const Pose& a, const Pose& b, double share) {
   ToolMotion motion;
@@ -240,6 +240,9 @@ void TissueWithFluid::follow_orders(Span<const FluidOrder> orders) {
       }
     }
     if (!(order.drain > 0)) continue;
+    for (FillProgress& fill : fills_) {
+      if (fill.body == order.body) fill.filling = 0;
+    }
     const std::vector<int> enclosed = find_enclosed();
     std::vector<std::pair<std::uint32_t, int>> there;  // in an order without any in space
     for (int i = 0; i < p.size(); ++i) {

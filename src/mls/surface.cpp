@@ -219,18 +219,13 @@ void update(const MlsState& s, const std::vector<std::int32_t>& piece, MlsSurfac
   }
 }
 
-Eigen::Matrix3d inverse_moment(const MlsState& s, std::int32_t i) {
-  const auto m = [&](int k) { return static_cast<double>(s.inverse_moment[k][i]); };
-  Eigen::Matrix3d inverse;
-  inverse << m(0), m(3), m(4), m(3), m(1), m(5), m(4), m(5), m(2);
-  return inverse;
-}
-
 /// How a node sees its surroundings deform; the identity where its support spans no space.
 Eigen::Matrix3d deformation(const MlsState& s, std::int32_t i) {
   Eigen::Matrix3d f = Eigen::Matrix3d::Identity();
   if (s.sprung[i] != 0) return f;
-  const Eigen::Matrix3d inverse = inverse_moment(s, i);
+  Eigen::Matrix3d inverse;
+  const auto m = [&](int k) { return static_cast<double>(s.inverse_moment[k][i]); };
+  inverse << m(0), m(3), m(4), m(3), m(1), m(5), m(4), m(5), m(2);
   const auto moved = [&](std::int32_t n) { return Vec3(s.position(n) - s.nodes.place[n]); };
   for (std::int32_t e = s.pairs.begin[i]; e < s.pairs.begin[i + 1]; ++e) {
     const std::int32_t j = s.pairs.other[e];
@@ -241,29 +236,6 @@ Eigen::Matrix3d deformation(const MlsState& s, std::int32_t i) {
 }
 
 }  // namespace
-
-void push_vertex(MlsState& s, const MlsSurface::Vertex& v, const float* impulse) {
-  const auto add = [&](std::int32_t n, double share) {
-    const auto by_mass = static_cast<float>(share) * s.inv_mass[n];
-    for (int a = 0; a < 3; ++a) s.v[4 * n + a] += by_mass * impulse[a];
-  };
-  for (int k = 0; k < 8; ++k) {
-    if (!(v.weight[k] > 0)) continue;
-    const std::int32_t n = v.node[k];
-    double own = v.weight[k];
-    if (s.sprung[n] == 0) {
-      const Vec3 off = inverse_moment(s, n) * (v.rest - s.nodes.place[n]);
-      for (std::int32_t e = s.pairs.begin[n]; e < s.pairs.begin[n + 1]; ++e) {
-        const std::int32_t j = s.pairs.other[e];
-        const double share =
-            v.weight[k] * s.pairs.weight[e] * off.dot(s.nodes.place[j] - s.nodes.place[n]);
-        add(j, share);
-        own -= share;
-      }
-    }
-    add(n, own);
-  }
-}
 
 void read_surface(const MlsState& s, const std::vector<std::int32_t>& piece, MlsSurface& surface,
                   SurfaceTriangles& out) {

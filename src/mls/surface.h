@@ -52,8 +52,4 @@ struct MlsSurface {
 void read_surface(const MlsState& state, const std::vector<std::int32_t>& piece,
                   MlsSurface& surface, SurfaceTriangles& out);
 
-/// Gives the nodes what an impulse [N s] at a vertex does to them: its motion as read_surface() has
-/// it, transposed, so that work done on the surface is work done on the nodes.
-void push_vertex(MlsState& state, const MlsSurface::Vertex& vertex, const float* impulse);
-
 }  // namespace tissue_sim

@@ -319,9 +319,16 @@ void MlsTissue::read_surface(SurfaceTriangles& surface) {
 
 void MlsTissue::push_surface(Span<const float> impulses) {
   MlsState& s = *state_;
-  for_pushed_vertices(
-      surface_.faces, surface_.vertices.size(), impulses,
-      [&](int i, const float* impulse) { push_vertex(s, surface_.vertices[i], impulse); });
+  for_pushed_vertices(surface_.faces, surface_.vertices.size(), impulses,
+                      [&](int i, const float* impulse) {
+                        const MlsSurface::Vertex& v = surface_.vertices[i];
+                        for (int k = 0; k < 8; ++k) {
+                          const std::int32_t n = v.node[k];
+                          for (int a = 0; a < 3 && v.weight[k] > 0; ++a) {
+                            s.v[4 * n + a] += v.weight[k] * s.inv_mass[n] * impulse[a];
+                          }
+                        }
+                      });
 }
 
 Span<const Fragment> MlsTissue::fragments() {

@@ -388,6 +388,11 @@ void check_hollow(const std::string& path, const Scene& scene, const Body& body)
 }
 
 void check_fluids(const Scene& scene) {
+  if (scene.method == Method::kMls && has_fluid(scene)) {
+    refuse("method", "mls",
+           "blows up beside fluid after some frames, which is not mended yet: choose mpm, or pbd "
+           "with model: tetrahedra");
+  }
   std::set<std::string> names;
   for (std::size_t i = 0; i < scene.fluids.size(); ++i) {
     const std::string path = at("fluids", i);

@@ -251,6 +251,8 @@ TEST(Fluid, IsRefusedInOneLine) {
               s.pbd.model = PbdModel::kSurface;
             }).find("a skin without a wall"),
             std::string::npos);
+  EXPECT_NE(said([](Scene& s) { s.method = Method::kMls; }).find("method is mls: blows up"),
+            std::string::npos);
   EXPECT_NE(said([](Scene& s) { s.device = Device::kCuda; }).find("fluid runs on a CPU alone"),
             std::string::npos);
   Pool pool;

@@ -31,29 +31,31 @@ Scene pool_and_tube(ToolType type, double flow) {
   return scene;
 }
 
-FrameRequest tube_at(double x, double y, double z) {
-  FrameRequest request;
+FrameRequest tube_at(double x, double y, double z, FrameRequest request = {}) {
   ToolRequest tool;
   tool.pose = {Vec3(x, y, z), Quat(0, 1, 0, 0)};
-  request.tools = {tool};
+  request.tools.insert(request.tools.begin(), tool);
   return request;
 }
 
 TEST(FluidSources, SuctionTakesItsFlowAndNoMoreThanIsThere) {
-  constexpr double kFlow = 4e-6, kParticle = 64e-9;
-  const Scene scene = pool_and_tube(ToolType::kSuction, kFlow);
-  Simulation simulation(scene);
+  constexpr double kFlow = 2e-6, kParticle = 64e-9;
+  Scene scene = pool_and_tube(ToolType::kSuction, kFlow);
+  const auto walls = tank({0, 0, 0}, {0.024, 0.024, 0.05});
+  add_tools(walls, scene);
+  Simulation away(scene), simulation(scene);
   const double poured = volumes(simulation).total;
-  FrameRequest request = tube_at(0.012, 0.012, 0.2);  // out of reach
-  for (int i = 0; i < 3; ++i) simulation.advance_frame(request);
-  EXPECT_EQ(volumes(simulation).sucked, 0);
-  request = tube_at(0.012, 0.012, 0.004);
-  simulation.advance_frame(request);
-  const double before = volumes(simulation).sucked;
+  away.advance_frame(tube_at(0.012, 0.012, 0.1, stand(walls)));
+  away.advance_frame();
+  EXPECT_EQ(volumes(away).sucked, 0);
+  FrameRequest request = tube_at(0.012, 0.012, 0.006, stand(walls));
   constexpr int kFrames = 12;
-  for (int i = 0; i < kFrames; ++i) ASSERT_FALSE(simulation.advance_frame().result.blew_up);
+  for (int i = 0; i < kFrames; ++i) {
+    ASSERT_FALSE(simulation.advance_frame(request).result.blew_up);
+    request = {};
+  }
   const FluidVolume now = volumes(simulation);
-  EXPECT_NEAR(now.sucked - before, kFlow * kFrames / scene.frame_rate, 2 * kParticle);
+  EXPECT_NEAR(now.sucked, kFlow * kFrames / scene.frame_rate, 2 * kParticle);
   EXPECT_NEAR((now.sucked + now.total) / poured, 1, 1e-6);
 }
 
@@ -71,7 +73,7 @@ TEST(FluidSources, IrrigationGivesItsFlow) {
   }
   const FluidVolume now = volumes(simulation);
   EXPECT_NEAR(now.irrigated, kFlow * kFrames / scene.frame_rate, 2 * kParticle);
-  EXPECT_DOUBLE_EQ(now.total, now.irrigated);
+  EXPECT_NEAR(now.total / now.irrigated, 1, 1e-6);
   double fastest = 0;
   for (const FluidPoint& p : fluid_of(simulation)) {
     EXPECT_GE(p.z, 0);
@@ -140,12 +142,12 @@ TEST_P(FluidFromWounds, BleedsWhatWasOpenedUntilItClots) {
   EXPECT_EQ(volumes(simulation).bleeding, 0);
 }
 
-INSTANTIATE_TEST_SUITE_P(Methods, FluidFromWounds,
-                         testing::Values(Method::kMpm, Method::kMls, Method::kPbd),
-                         [](const testing::TestParamInfo<Method>& info) {
-                           const char* names[] = {"Mpm", "Mls", "Pbd"};
-                           return std::string(names[static_cast<int>(info.param)]);
-                         });
+std::string name_of_method(const testing::TestParamInfo<Method>& info) {
+  return info.param == Method::kMpm ? "Mpm" : "Pbd";
+}
+
+INSTANTIATE_TEST_SUITE_P(Methods, FluidFromWounds, testing::Values(Method::kMpm, Method::kPbd),
+                         name_of_method);
 
 TEST(FluidSources, FillsAndDrainsAnOrgan) {
   Simulation simulation(filled_ball(Method::kPbd, 300));
@@ -160,8 +162,9 @@ TEST(FluidSources, FillsAndDrainsAnOrgan) {
   simulation.drain(0, taken);
   for (int i = 0; i < 35; ++i) ASSERT_FALSE(simulation.advance_frame().result.blew_up);
   const FluidVolume drained = volumes(simulation);
-  EXPECT_NEAR(drained.drained / taken, 1, 0.05);
-  EXPECT_NEAR((drained.total + drained.drained) / full.total, 1, 0.01);
+  constexpr double kParticle = 27e-9;  // and half of one that filling made larger
+  EXPECT_NEAR(drained.drained, taken, 1.5 * kParticle);
+  EXPECT_NEAR((drained.total + drained.drained) / full.total, 1, 1e-6);
   EXPECT_LT(drained.pressure, 0.7 * full.pressure);
 }
 
@@ -191,7 +194,7 @@ TEST(FluidSources, RunsAgainWithTheSameBits) {
     FrameRequest request = tube_at(0.014, 0, 0.035 - 0.001 * i);
     if (i == 1) request.cuts = {across(0.0113)};
     if (i == 3) simulation.fill(1, 800);
-    if (i == kSaved - 1) simulation.drain(1, 3e-7);
+    if (i == kSaved - 1) simulation.drain(1, 2e-6);
     inputs.push_back(simulation.advance_frame(request).input);
     sums.push_back(simulation.tissue().checksum());
   }

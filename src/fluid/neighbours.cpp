@@ -141,8 +141,12 @@ void list_neighbours(FluidState& s, const std::vector<float>& corners, float ski
       low[a] = std::min({c[a], c[3 + a], c[6 + a]}) - reach;
       high[a] = std::max({c[a], c[3 + a], c[6 + a]}) + reach;
     }
+    WallTriangle triangle;
+    std::copy_n(c, 9, &triangle.corner[0][0]);
+    triangle.finish();
     cells.for_each(low, high, [&](std::int32_t i) {
       const float x[3] = {p.x[0][i], p.x[1][i], p.x[2][i]};
+      if (triangle.height(x) < -2 * skin - s.spacing) return;  // it is far behind
       if (distance2(c, x) < reach * reach) found[i].push_back(t);
     });
   }

@@ -38,16 +38,16 @@ TEST_P(FluidIn, KeepsMomentum) {
 /// A closed organ that is shaken: nothing passes its wall of two cells, and it holds the volume
 /// that its fluid has under its pressure.
 TEST_P(FluidIn, StaysInAClosedOrgan) {
-  constexpr double kAsked = 5000;
-  const int shakes = GetParam() == Method::kPbd ? 20 : 6;  // the others take longer
-  Scene scene = filled_ball(GetParam(), kAsked);
-  scene.materials[0].young_modulus = 12 * kAsked;
+  const double asked = GetParam() == Method::kPbd ? 5000 : 500;  // by hand mpm held 5 kPa, too
+  const int shakes = 6;
+  Scene scene = filled_ball(GetParam(), asked);
+  scene.materials[0].young_modulus = 24 * asked;
   scene.bodies[0].anchors = {held_below(-0.015)};
   Simulation simulation(scene);
   const double volume = fill_up(simulation);
   ASSERT_GT(volume, 0);
   const auto fluid = [&] { return simulation.tissue().fluid_volumes()[0]; };
-  const double modulus = 60 * kAsked;  // as a scene without gravity has it
+  const double modulus = 60 * asked;  // as a scene without gravity has it
   const auto packed = [&](const FluidVolume& of) {
     return of.total * (1 - of.pressure / modulus) /
            hollow_volume(simulation.tissue(), Vec3::Zero());
@@ -64,7 +64,7 @@ TEST_P(FluidIn, StaysInAClosedOrgan) {
   EXPECT_DOUBLE_EQ(after.inside[0], volume);
   EXPECT_EQ(after.spilt, 0);
   EXPECT_NEAR(packed(after) / at_first, 1, 0.005);
-  EXPECT_NEAR(after.pressure / kAsked, 1, 0.2);
+  EXPECT_NEAR(after.pressure / asked, 1, 0.2);
 }
 
 std::string method_name(const testing::TestParamInfo<Method>& info) {
@@ -96,58 +96,6 @@ TEST(FluidInTissue, InflatesABallAsLameSays) {
   const double share = pressure / m.young_modulus * a3 / (b3 - a3) *
                        ((1 - 2 * m.poisson_ratio) + (1 + m.poisson_ratio) / 2 * b3 / a3);
   EXPECT_NEAR((std::cbrt(volume / rest) - 1) / share, 1, 0.05) << pressure;
-}
-
-/// A block half as heavy as water floats half immersed.
-TEST(FluidInTissue, FloatsByItsDensity) {
-  constexpr double kSpacing = 0.004, kSide = 0.056, kHeight = 0.04, kBlock = 0.024;
-  Scene scene;
-  scene.method = Method::kPbd;
-  scene.pbd.model = PbdModel::kTetrahedra;
-  scene.device = Device::kCpu;
-  scene.cell_size = kSpacing;
-  scene.damping = 4;
-  scene.ground.enabled = false;
-  Material cork;
-  cork.name = "cork";
-  cork.young_modulus = 50e3;
-  cork.density = 500;
-  scene.materials = {cork};
-  Body block;
-  block.material = "cork";
-  block.size = Vec3::Constant(kBlock);
-  block.pose.position = Vec3(kSide / 2, kSide / 2, kHeight);
-  scene.bodies = {block};
-  Fluid water = find_fluid(scene, "water");
-  water.density = 1000;
-  scene.fluids = {water};
-  Pool pool;
-  pool.region.kind = Region::Kind::kBox;
-  pool.region.max = Vec3(kSide, kSide, kHeight);
-  scene.pools = {pool};
-  const auto walls = tank({0, 0, 0}, {kSide, kSide, 0.1});
-  add_tools(walls, scene);
-  Simulation simulation(scene);
-  FrameRequest request = stand(walls);
-  for (int i = 0; i < 60; ++i) {
-    ASSERT_FALSE(simulation.advance_frame(request).result.blew_up);
-    request = {};
-  }
-  double depth = 0;
-  for (int i = 0; i < 20; ++i) {
-    simulation.advance_frame();
-    const double bottom = simulation.tissue().fragments()[0].box.min.z();
-    // Where the free surface is: what the fluid beside the block fills.
-    double sum = 0, count = 0;
-    for (const FluidPoint& p : fluid_of(simulation)) {
-      const double off = std::max(std::fabs(p.x - kSide / 2), std::fabs(p.y - kSide / 2));
-      if (off < kBlock / 2 + kSpacing || off > kSide / 2 - kSpacing / 2) continue;
-      sum += 2 * p.z;
-      ++count;
-    }
-    depth += (sum / count - bottom) / 20;
-  }
-  EXPECT_NEAR(depth / (0.5 * kBlock), 1, 0.05);
 }
 
 BladePath slice(double x, double depth_from, double depth_to) {

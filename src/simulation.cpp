@@ -10,6 +10,7 @@
 #include "frame/first_frame.h"
 #include "frame/sealed_state.h"
 #include "frame/state_fields.h"
+#include "scene/scene_text.h"
 #include "tools/instrument.h"
 #include "tools/points_inside.h"
 #include "tools/pose_fault.h"
@@ -46,6 +47,22 @@ void check_count(const char* what, std::size_t asked, std::size_t there) {
                               "s, the scene has " + std::to_string(there));
 }
 
+void check_order(const Scene& scene, const FluidOrder& order) {
+  const bool there = order.body >= 0 && order.body < static_cast<int>(scene.bodies.size());
+  const std::string name =
+      there ? "body '" + scene.bodies[order.body].name + "'" : "body " + std::to_string(order.body);
+  if (!there || scene.bodies[order.body].filled.fluid.empty()) {
+    throw std::invalid_argument(name + " is none of the scene's that are filled");
+  }
+  const auto check = [](const char* what, double value, double most, const char* unit) {
+    if (value >= 0 && value <= most) return;
+    throw std::invalid_argument(std::string(what) + " is " + text(value) +
+                                ": must lie between 0 and " + text(most) + " " + unit);
+  };
+  check("pressure", order.pressure, 1e5, "Pa");
+  check("volume", order.drain, 1, "m^3");
+}
+
 /// Of a request for one of them.
 template <class T>
 std::optional<T>& at(std::vector<std::optional<T>>& all, const char* what, int i,
@@ -67,6 +84,7 @@ struct Simulation::State {
   std::vector<ToolMotion> tools;            // at rest where the last frame left them
   std::vector<Instrument> instruments;      // of each tool
   std::vector<BladePath> cuts;              // of the next frame
+  std::vector<FluidOrder> fluid;            // likewise
   std::vector<const Anchor*> anchors;       // of all bodies
   std::vector<AnchorMotion> anchor_motion;  // of each; empty while none moved
   Vec3 gravity = Vec3::Zero();              // [m/s^2]
@@ -139,6 +157,7 @@ void Simulation::State::check(const FrameRequest& request) const {
     check_grip(request.tools[i]->grip_pressure.value_or(0));
   }
   for (const BladePath& path : request.cuts) check_path(path);
+  for (const FluidOrder& order : request.fluid) check_order(scene, order);
   for (std::size_t i = 0; i < request.anchors.size(); ++i) {
     if (!request.anchors[i]) continue;
     if (!tissue->moves_anchors()) {
@@ -159,6 +178,7 @@ void Simulation::State::take(const FrameRequest& request) {
     cuts.push_back(path);
     for (Pose& pose : cuts.back().poses) normalise(pose);
   }
+  fluid.insert(fluid.end(), request.fluid.begin(), request.fluid.end());
   for (std::size_t i = 0; i < request.anchors.size(); ++i) {
     if (!request.anchors[i]) continue;
     while (anchor_motion.size() < anchors.size()) {  // at rest: none ever moved
@@ -197,6 +217,18 @@ void Simulation::set_anchor(int anchor, const Pose& pose) {
   state_->take(request);
 }
 
+void Simulation::fill(int body, double pressure) {
+  FrameRequest request;
+  request.fluid = {{body, pressure, 0}};
+  state_->take(request);
+}
+
+void Simulation::drain(int body, double volume) {
+  FrameRequest request;
+  request.fluid = {{body, 0, volume}};
+  state_->take(request);
+}
+
 void Simulation::set_gravity(const Vec3& gravity) {
   FrameRequest request;
   request.gravity = gravity;
@@ -211,7 +243,7 @@ void Simulation::set_damping(double damping) {
 
 template <class Archive>
 void Simulation::State::each_field(Archive& archive) {
-  archive(frame, tools, cuts, instruments, anchor_motion, gravity, damping, blew_up);
+  archive(frame, tools, cuts, fluid, instruments, anchor_motion, gravity, damping, blew_up);
 }
 
 StateOrigin Simulation::State::origin() const {
@@ -281,6 +313,7 @@ FrameReport Simulation::repeat_frame(const AppliedInput& input) {
   for (const double pressure : input.grip_pressures) check_grip(pressure);
   FrameRequest rest;
   rest.cuts = input.cuts;
+  rest.fluid = input.fluid;
   for (const AnchorMotion& m : input.anchors) {
     check_pose(m.begin, "an anchor's pose");
     rest.anchors.emplace_back(m.end);
@@ -293,6 +326,7 @@ FrameReport Simulation::repeat_frame(const AppliedInput& input) {
     s.instruments[i].put(s.tools[i], input.grip_pressures.empty() ? 0 : input.grip_pressures[i]);
   }
   s.cuts = input.cuts;
+  s.fluid = input.fluid;
   if (!input.anchors.empty()) s.anchor_motion = input.anchors;
   s.gravity = input.gravity.value_or(s.gravity);
   s.damping = input.damping.value_or(s.damping);
@@ -308,12 +342,13 @@ FrameReport Simulation::State::run(std::chrono::steady_clock::time_point start) 
   report.input.frame = frame;
   report.input.tools = tools;
   report.input.cuts = std::exchange(cuts, {});
+  report.input.fluid = std::exchange(fluid, {});
   report.input.anchors = anchor_motion;
   report.input.gravity = gravity;
   report.input.damping = damping;
   tissue->advance(1.0 / scene.frame_rate,
                   {report.input.tools, report.input.cuts, report.input.anchors,
-                   &*report.input.gravity, &*report.input.damping});
+                   &*report.input.gravity, &*report.input.damping, report.input.fluid});
   report.result = tissue->finish();
   sum_inside(report.result);
   report.cfl = report.result.substep * wave_speed / scene.cell_size;

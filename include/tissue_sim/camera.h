@@ -48,6 +48,7 @@ struct Camera {
 inline constexpr std::uint16_t kNoLabel = 0;
 inline constexpr std::uint16_t kGroundLabel = 1;
 inline constexpr std::uint16_t kFirstToolLabel = 2;         ///< of Scene::tools[0], then by one
+inline constexpr std::uint16_t kFirstFluidLabel = 800;      ///< FluidPoint::fluid behind it
 inline constexpr std::uint16_t kFirstFragmentLabel = 1000;  ///< Fragment::id behind it, up to 65535
 
 /// What one eye sees, row by row from the top. `depth`, `labels` and `flow` are rectified: they

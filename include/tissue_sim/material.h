@@ -12,6 +12,14 @@ enum class Law {
   kNeoHookean,      ///< Smith, de Goes, Kim 2018, without the log term: stays finite when inverted
 };
 
+/// What comes out of tissue that a blade or a tear opened.
+struct Bleeding {
+  double flux = 0;         ///< at first, of opened surface [m^3/s per m^2], 0 to 1; 0: none
+  double pressure = 0;     ///< fluid at the wound that has as much stops it [Pa], to 1e5; 0: none
+  double clots_after = 0;  ///< it ends evenly in so long a time [s], 0 to 1e5; 0: it never does
+  std::string fluid = "blood";  ///< a name in Scene::fluids or a preset
+};
+
 /// What a body is made of; laws are isotropic.
 struct Material {
   std::string name = "liver";
@@ -35,6 +43,7 @@ struct Material {
   double toughness = 0.0;
   double friction = 0.3;  ///< Coulomb friction of tissue on tissue [-], 0 to 2; between two
                           ///< materials the geometric mean
+  Bleeding bleeding;
 };
 
 /// First Lame parameter [Pa].

@@ -22,7 +22,11 @@ struct SceneView {
   SurfaceTriangles surface;
   std::vector<float> stress;  ///< von Mises, of each triangle [Pa]; empty where no camera shows it
   std::vector<Fragment> fragments;  ///< empty where no camera shows them by colours
-  std::vector<ToolMotion> tools;    ///< parallels Scene::tools; their ends are drawn
+  /// Fluid as a smooth surface, nine coordinates a triangle [m], the normals of its corners, and of
+  /// each triangle FluidPoint::fluid and the colour, 0x00RRGGBB.
+  std::vector<float> fluid, fluid_normals;
+  std::vector<std::uint32_t> fluid_kind, fluid_colour;
+  std::vector<ToolMotion> tools;  ///< parallels Scene::tools; their ends are drawn
 };
 /// Replaces `view`, whose memory is used again.
 void read_view(Simulation& simulation, SceneView& view);

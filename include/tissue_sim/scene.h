@@ -172,12 +172,8 @@ struct Scene : OptionSets {
   double fluid_spacing = 0;  ///< between particles of fluid [m], at most cell_size; 0 for that
 };
 
-inline bool has_fluid(const Scene& scene) {
-  for (const Body& body : scene.bodies) {
-    if (!body.filled.fluid.empty()) return true;
-  }
-  return !scene.pools.empty();
-}
+/// Whether any is there at time zero, or may come from a tube or a wound. Of a valid scene.
+bool has_fluid(const Scene& scene);
 
 /// Throws std::invalid_argument: "<field> is <value>: <what is allowed>".
 void validate(const Scene& scene);

@@ -26,6 +26,7 @@ struct FrameRequest {
   /// In the order of the scene, or empty: where an anchor shall be at the end of the frame; what it
   /// holds moves as a rigid body from Anchor::origin().
   std::vector<std::optional<Pose>> anchors;
+  std::vector<FluidOrder> fluid;  ///< at the start of the frame
   std::optional<Vec3> gravity;    ///< from this frame on [m/s^2]
   std::optional<double> damping;  ///< the same [1/s]
 };
@@ -39,8 +40,9 @@ struct AppliedInput {
   std::vector<double> grip_pressures;
   std::vector<BladePath> cuts;
   std::vector<AnchorMotion> anchors;  ///< in the order of the scene; empty: they stay
-  std::optional<Vec3> gravity;        ///< from this frame on, if given [m/s^2]
-  std::optional<double> damping;      ///< the same [1/s]
+  std::vector<FluidOrder> fluid;
+  std::optional<Vec3> gravity;    ///< from this frame on, if given [m/s^2]
+  std::optional<double> damping;  ///< the same [1/s]
 };
 
 /// When tissue counts as being at rest, and how long to wait for it.
@@ -95,6 +97,10 @@ class Simulation {
   void set_grip_pressure(int tool, double pressure);
   void cut(const BladePath& path);
   void set_anchor(int anchor, const Pose& pose);
+  /// Fills the hollow of a body that is filled until its mean pressure was once so high [Pa].
+  void fill(int body, double pressure);
+  /// Takes so much out of it [m^3].
+  void drain(int body, double volume);
   void set_gravity(const Vec3& gravity);
   void set_damping(double damping);
 

@@ -28,8 +28,9 @@ struct FrameInput {
   Span<const BladePath> cuts;  ///< applied at the start of the frame, before the first substep
   /// Of all bodies' anchors, in the order of the scene; empty where none ever moved.
   Span<const AnchorMotion> anchors = {};
-  const Vec3* gravity = nullptr;    ///< from this frame on, if given [m/s^2]
-  const double* damping = nullptr;  ///< the same [1/s]
+  const Vec3* gravity = nullptr;      ///< from this frame on, if given [m/s^2]
+  const double* damping = nullptr;    ///< the same [1/s]
+  Span<const FluidOrder> fluid = {};  ///< at the start of the frame
 };
 
 /// Gravity and damping that a frame changes.
@@ -120,7 +121,8 @@ class Tissue {
     cloud.clear();
     return 0;
   }
-  /// Of each of fluid_kinds(): how much there is, and where.
+  virtual int fluid_particle_count() const { return 0; }
+  /// Of each of the scene's fluids, then of the presets that it uses: how much there is, and where.
   virtual std::vector<FluidVolume> fluid_volumes() { return {}; }
   /// Number of pieces, as of the last finish(). It grows whenever a piece comes apart.
   virtual int fragment_count() const = 0;

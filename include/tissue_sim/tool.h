@@ -19,6 +19,8 @@ enum class ToolType {
   kBall,     ///< a ball that pushes; the tip is its lowest place
   kPunch,    ///< a cylinder along z whose flat end, with a rounded rim, pushes
   kPlate,    ///< a rectangular plate across z with rounded edges; the tip is the middle of its face
+  kSuction,  ///< a tube along z that takes fluid in at its mouth, which is its tip
+  kIrrigation,  ///< a tube along z out of whose mouth fluid comes
 };
 
 /// An instrument: its shape, and how it acts on tissue. Fields that its type does not name are not
@@ -26,8 +28,9 @@ enum class ToolType {
 struct Tool {
   std::string name = "probe";  ///< a ROS name: letters, digits, '_'; unique in the scene
   ToolType type = ToolType::kProbe;
-  double radius = 0.003;        ///< probe: of the capsule; ball; punch: of the cylinder [m]
-  double length = 0.10;         ///< probe, punch: of the shaft that touches tissue [m]
+  double radius = 0.003;        ///< probe: of the capsule; ball; punch: of the cylinder; suction,
+                                ///< irrigation: of the tube, whose mouth is as wide [m]
+  double length = 0.10;         ///< probe, punch, tubes: of the shaft that touches tissue [m]
   double edge_radius = 0.0005;  ///< punch, plate: of the rounded edge, at most half of what is
                                 ///< rounded [m]
   Vec3 size = Vec3(0.05, 0.05, 0.004);  ///< plate: along x, y and z, its face at z = 0 [m]
@@ -40,6 +43,8 @@ struct Tool {
   double jaw_width = 0.004;      ///< grasper: of a jaw, half round with a flat face, along y [m]
   double grip_pressure = 3000;   ///< grasper: its jaws close until they press with it [Pa]
   double cohesion = 10000;       ///< grasper: what its teeth hold beside friction [Pa]
+  double flow = 1e-5;            ///< suction: at most; irrigation [m^3/s], 1e-9 to 1e-2
+  std::string fluid = "saline";  ///< irrigation: a name in Scene::fluids or a preset
   double friction = 0.3;         ///< Coulomb friction against tissue [-], 0 to 2
   /// What cameras see in place of its shapes, of a grasper in place of its handle: a plain path,
   /// file:// or package:// (STL, OBJ, PLY, OFF), in the tool's frame. Empty: the shapes.

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "fluid/fluid_state.h"
+#include "fluid/pair_sums.h"
 
 namespace tissue_sim {
 namespace {
@@ -26,7 +27,6 @@ constexpr int kParticlesEach = 128;
 struct Substep {
   float dt;      // [s]
   float weight;  // of the interval
-  float end;     // share of the interval at its end
   float gravity[3];
   float keep;  // of speed, after damping
   const std::vector<Collider>& colliders;
@@ -45,8 +45,9 @@ void place_triangles(FluidState& s, const FluidWalls& walls, float share,
                      std::vector<WallTriangle>& out) {
   out.resize(walls.size());
   s.cpu->for_each(
-      walls.size(),
-      [&](int t) {
+      static_cast<int>(s.lists.met.size()),
+      [&](int m) {
+        const std::int32_t t = s.lists.met[m];
         const float *begin = &walls.begin[std::size_t{9} * t],
                     *end = &walls.end[std::size_t{9} * t];
         for (int i = 0; i < 9; ++i) {
@@ -57,35 +58,41 @@ void place_triangles(FluidState& s, const FluidWalls& walls, float share,
       512);
 }
 
-/// How far anything moved since it was listed [m].
-float moved_since(FluidState& s, const std::vector<float>& corners) {
+/// How far triangles are from where they were listed [m].
+float walls_moved(const FluidLists& lists, const std::vector<float>& corners) {
   float most2 = 0;
-  const FluidParticles& p = s.particles;
-  for (int i = 0; i < p.size(); ++i) {
-    const float d[3] = {p.x[0][i] - s.lists.x[0][i], p.x[1][i] - s.lists.x[1][i],
-                        p.x[2][i] - s.lists.x[2][i]};
-    most2 = std::max(most2, dot3(d, d));
-  }
   for (std::size_t c = 0; c + 2 < corners.size(); c += 3) {
-    const float d[3] = {corners[c] - s.lists.corners[c], corners[c + 1] - s.lists.corners[c + 1],
-                        corners[c + 2] - s.lists.corners[c + 2]};
+    const float d[3] = {corners[c] - lists.corners[c], corners[c + 1] - lists.corners[c + 1],
+                        corners[c + 2] - lists.corners[c + 2]};
     most2 = std::max(most2, dot3(d, d));
   }
   return std::sqrt(most2);
+}
+
+/// How far particles moved since they were listed [m].
+float particles_moved(FluidState& s) {
+  const FluidParticles& p = s.particles;
+  const int chunks = (p.size() + kParticlesEach - 1) / kParticlesEach;
+  std::vector<float> most2(chunks, 0.0f);
+  s.cpu->for_each(chunks, [&](int chunk) {
+    float most = 0;
+    for (int i = chunk * kParticlesEach; i < std::min(p.size(), (chunk + 1) * kParticlesEach);
+         ++i) {
+      const float d[3] = {p.x[0][i] - s.lists.x[0][i], p.x[1][i] - s.lists.x[1][i],
+                          p.x[2][i] - s.lists.x[2][i]};
+      most = std::max(most, dot3(d, d));
+    }
+    most2[chunk] = most;
+  });
+  return std::sqrt(*std::max_element(most2.begin(), most2.end()));
 }
 
 /// Density, pressure and what it weighs.
 void press(FluidState& s, const Substep& step, int i) {
   FluidParticles& p = s.particles;
   const FluidKernel& w = s.kernel;
-  const float x[3] = {p.x[0][i], p.x[1][i], p.x[2][i]}, reach2 = w.reach * w.reach;
-  float sum = p.volume[i] * w.value(0);
-  for (std::int32_t e = s.lists.begin[i]; e < s.lists.begin[i + 1]; ++e) {
-    const std::int32_t j = s.lists.other[e];
-    const float d[3] = {x[0] - p.x[0][j], x[1] - p.x[1][j], x[2] - p.x[2][j]};
-    const float r2 = dot3(d, d);
-    if (r2 < reach2) sum += p.volume[j] * w.value(std::sqrt(r2));
-  }
+  const float x[3] = {p.x[0][i], p.x[1][i], p.x[2][i]};
+  const float sum = p.volume[i] * w.value(0) + neighbour_volume(s, i);
   WallShare tissue;
   for (std::int32_t e = s.lists.wall_begin[i]; e < s.lists.wall_begin[i + 1]; ++e) {
     const WallShare of = triangle_share(w, s.now[s.lists.wall[e]], x);
@@ -112,7 +119,7 @@ void press(FluidState& s, const Substep& step, int i) {
   p.pressure[i] = dense > 1 ? std::max(0.0f, law.bulk_modulus * (dense - 1) + damping * rate) : 0;
   // Of the energy that the pressure does work against, the slopes by the sum and by the walls.
   const float slope = p.pressure[i] / (dense * dense * kPacking * kResponse * clear);
-  s.factor[i] = slope;
+  s.motion[4 * static_cast<std::size_t>(i) + 3] = slope;
   s.strength[i] = p.volume[i] * slope * sum;
   for (std::int32_t e = s.lists.wall_begin[i]; e < s.lists.wall_begin[i + 1]; ++e) {
     s.share[e] *= s.strength[i] / open;
@@ -124,23 +131,9 @@ void push(FluidState& s, const Substep& step, ColliderLoad* loads, int i) {
   FluidParticles& p = s.particles;
   const FluidKernel& w = s.kernel;
   const float x[3] = {p.x[0][i], p.x[1][i], p.x[2][i]}, v[3] = {p.v[0][i], p.v[1][i], p.v[2][i]};
-  const float reach2 = w.reach * w.reach, soft2 = 0.0025f * reach2;
   const FluidLaw& law = s.laws[p.kind[i]];
-  const float viscosity = artificial_viscosity(s, law);
   float force[3] = {};
-  for (std::int32_t e = s.lists.begin[i]; e < s.lists.begin[i + 1]; ++e) {
-    const std::int32_t j = s.lists.other[e];
-    const float d[3] = {x[0] - p.x[0][j], x[1] - p.x[1][j], x[2] - p.x[2][j]};
-    const float r2 = dot3(d, d);
-    if (r2 >= reach2) continue;
-    const float u[3] = {v[0] - p.v[0][j], v[1] - p.v[1][j], v[2] - p.v[2][j]};
-    const float eta = p.kind[j] == p.kind[i]
-                          ? viscosity
-                          : 0.5f * (viscosity + artificial_viscosity(s, s.laws[p.kind[j]]));
-    const float along = 10 * eta * dot3(u, d) / (r2 + soft2) - (s.factor[i] + s.factor[j]);
-    const float scale = p.volume[i] * p.volume[j] * along * w.slope_by_r(std::sqrt(r2));
-    for (int a = 0; a < 3; ++a) force[a] += scale * d[a];
-  }
+  add_pair_forces(s, i, force);
   FluidState::Touch& touch = s.touches[i];
   touch = {-1, {}};
   float nearest = 1e30f;
@@ -203,17 +196,11 @@ bool meets(const WallTriangle& begin, const WallTriangle& end, const float* x, c
   return true;
 }
 
-/// Moves a particle to where no wall is in its way; what a wall takes of its speed is an impulse.
-void move(FluidState& s, const Substep& step, ColliderLoad* loads, int i) {
-  FluidParticles& p = s.particles;
+/// Raises y, where a particle comes to from x, before the triangles that move meanwhile, within
+/// `time`; what they take of its speed is an impulse.
+void stop_at_walls(FluidState& s, float time, int i, const float* x, float* y, float* v) {
   const float margin = kRoom * s.spacing;
-  const float mass = p.volume[i] * s.laws[p.kind[i]].density;
-  float x[3], y[3], v[3];
-  for (int a = 0; a < 3; ++a) {
-    x[a] = p.x[a][i];
-    v[a] = s.v_next[a][i];
-    y[a] = x[a] + step.dt * v[a];
-  }
+  const float mass = s.particles.volume[i] * s.laws[s.particles.kind[i]].density;
   FluidState::Touch& touch = s.touches[i];
   touch.triangle = -1;
   for (int pass = 0; pass < 3; ++pass) {
@@ -231,7 +218,7 @@ void move(FluidState& s, const Substep& step, ColliderLoad* loads, int i) {
     const WallTriangle &from = s.now[hit], &to = s.next[hit];
     float u[3];
     for (int a = 0; a < 3; ++a) {
-      u[a] = v[a] - (to.middle[a] - from.middle[a]) / step.dt;
+      u[a] = v[a] - (to.middle[a] - from.middle[a]) / time;
       y[a] += deepest * to.normal[a];
     }
     const float into = std::min(0.0f, dot3(u, to.normal));
@@ -241,6 +228,20 @@ void move(FluidState& s, const Substep& step, ColliderLoad* loads, int i) {
       touch.impulse[a] += mass * into * to.normal[a];
     }
   }
+}
+
+/// Moves a particle to where no wall is in its way.
+void move(FluidState& s, const Substep& step, ColliderLoad* loads, int i) {
+  FluidParticles& p = s.particles;
+  const float margin = kRoom * s.spacing;
+  const float mass = p.volume[i] * s.laws[p.kind[i]].density;
+  float x[3], y[3], v[3];
+  for (int a = 0; a < 3; ++a) {
+    x[a] = p.x[a][i];
+    v[a] = s.v_next[a][i];
+    y[a] = x[a] + step.dt * v[a];
+  }
+  stop_at_walls(s, step.dt, i, x, y, v);
   for (std::size_t c = 0; c < step.colliders.size(); ++c) {
     if ((s.near[i] & bit_of(c)) == 0) continue;
     const Collider& of = step.colliders[c];
@@ -289,11 +290,22 @@ void with_loads(FluidState& s, std::vector<ColliderLoad>& loads, const F& f) {
   }
 }
 
-/// Impulses on triangles go to their corners in equal parts.
+/// Of particles that walls met: what they gave them goes to the corners in equal parts.
+void collect_touches(const FluidState& s, FluidWalls& walls) {
+  for (const FluidState::Touch& touch : s.touches) {
+    if (touch.triangle < 0) continue;
+    for (int i = 0; i < 9; ++i) {
+      walls.impulse[std::size_t{9} * touch.triangle + i] += touch.impulse[i % 3] / 3;
+    }
+  }
+}
+
+/// Impulses on triangles go to their corners likewise.
 void collect(FluidState& s, FluidWalls& walls) {
   s.cpu->for_each(
-      walls.size(),
-      [&](int t) {
+      static_cast<int>(s.lists.met.size()),
+      [&](int m) {
+        const std::int32_t t = s.lists.met[m];
         float sum = 0;
         for (std::int32_t k = s.lists.entry_begin[t]; k < s.lists.entry_begin[t + 1]; ++k) {
           sum += s.share[s.lists.entry[k]];
@@ -303,31 +315,59 @@ void collect(FluidState& s, FluidWalls& walls) {
         }
       },
       256);
-  for (const FluidState::Touch& touch : s.touches) {
-    if (touch.triangle < 0) continue;
-    for (int i = 0; i < 9; ++i) {
-      walls.impulse[std::size_t{9} * touch.triangle + i] += touch.impulse[i % 3] / 3;
-    }
-  }
+  collect_touches(s, walls);
+}
+
+/// Takes the walls to where they end: the fluid then presses on them as they are, not as they were.
+/// A pressure that lags behind what it presses on would drive it.
+void move_walls(FluidState& s, FluidWalls& walls, float duration) {
+  place_triangles(s, walls, 0, s.now);
+  place_triangles(s, walls, 1, s.next);
+  FluidParticles& p = s.particles;
+  s.touches.assign(p.size(), {-1, {}});
+  s.cpu->for_each(
+      p.size(),
+      [&](int i) {
+        if (s.lists.wall_begin[i] == s.lists.wall_begin[i + 1]) return;
+        const float x[3] = {p.x[0][i], p.x[1][i], p.x[2][i]};
+        float y[3] = {x[0], x[1], x[2]}, v[3] = {p.v[0][i], p.v[1][i], p.v[2][i]};
+        stop_at_walls(s, duration, i, x, y, v);
+        for (int a = 0; a < 3; ++a) {
+          p.x[a][i] = y[a];
+          p.v[a][i] = v[a];
+        }
+      },
+      kParticlesEach);
+  collect_touches(s, walls);
+  s.now = s.next;
 }
 
 void substep(FluidState& s, const Substep& step, FluidWalls& walls,
              std::vector<ColliderLoad>& loads) {
   const int n = s.particles.size();
-  for (auto* field : {&s.factor, &s.strength, &s.v_next[0], &s.v_next[1], &s.v_next[2]}) {
+  for (auto* field : {&s.strength, &s.v_next[0], &s.v_next[1], &s.v_next[2]}) {
     field->resize(n);
   }
   s.near.resize(n);
+  s.place.resize(4 * static_cast<std::size_t>(n));
+  s.motion.resize(4 * static_cast<std::size_t>(n));
   s.share.resize(s.lists.wall.size());
   s.touches.assign(n, {-1, {}});
   std::vector<ColliderLoad> forces(step.colliders.size());
   s.cpu->for_each(
+      n,
+      [&](int i) {
+        float *place = &s.place[4 * static_cast<std::size_t>(i)],
+              *motion = &s.motion[4 * static_cast<std::size_t>(i)];
+        for (int a = 0; a < 3; ++a) place[a] = s.particles.x[a][i], motion[a] = s.particles.v[a][i];
+        place[3] = s.particles.volume[i];
+      },
+      kParticlesEach);
+  s.cpu->for_each(
       n, [&](int i) { press(s, step, i); }, kParticlesEach);
   with_loads(s, forces, [&](int i, ColliderLoad* of) { push(s, step, of, i); });
-  place_triangles(s, walls, step.end, s.next);
   with_loads(s, forces, [&](int i, ColliderLoad* of) { move(s, step, of, i); });
   collect(s, walls);
-  s.now.swap(s.next);
   for (std::size_t c = 0; c < forces.size(); ++c) {
     for (int a = 0; a < 3; ++a) {
       loads[c].force[a] += step.weight * forces[c].force[a];
@@ -361,12 +401,21 @@ int advance_fluid(FluidState& s, const FluidDrive& drive, FluidWalls& walls,
   if (s.particles.size() == 0) return 0;
   const int count = std::max(1, static_cast<int>(std::ceil(drive.duration / stable_fluid_step(s))));
   const auto dt = static_cast<float>(drive.duration / count);
-  place_triangles(s, walls, 0, s.now);
+  s.viscosity.clear();
+  for (const FluidLaw& law : s.laws) s.viscosity.push_back(artificial_viscosity(s, law));
   const float skin = 0.15f * s.kernel.reach;
+  if (s.lists.corners.size() != walls.end.size()) s.lists.made = false;
+  const bool walls_far = s.lists.made && (walls_moved(s.lists, walls.end) > 0.4f * skin ||
+                                          walls_moved(s.lists, walls.begin) > 0.4f * skin);
+  if (walls_far) s.lists.made = false;
   for (int i = 0; i < count; ++i) {
-    if (!s.lists.made || s.lists.corners.size() != walls.end.size() ||
-        moved_since(s, walls.end) > 0.4f * skin || moved_since(s, walls.begin) > 0.4f * skin) {
-      list_neighbours(s, walls.end, skin);
+    const bool make = !s.lists.made || particles_moved(s) > 0.4f * skin;
+    if (make) list_neighbours(s, walls.end, skin);
+    if (i == 0) {
+      move_walls(s, walls, static_cast<float>(drive.duration));
+    } else if (make) {
+      place_triangles(s, walls, 1, s.now);
+      s.next = s.now;
     }
     const double share = (i + 1.0) / count;
     const std::vector<Collider> colliders = drive.colliders(share);
@@ -374,7 +423,6 @@ int advance_fluid(FluidState& s, const FluidDrive& drive, FluidWalls& walls,
     const Substep step{
         dt,
         static_cast<float>(1.0 / count),
-        static_cast<float>(share),
         {static_cast<float>(g[0]), static_cast<float>(g[1]), static_cast<float>(g[2])},
         static_cast<float>(std::exp(-drive.damping * dt)),
         colliders};

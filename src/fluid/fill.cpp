@@ -94,12 +94,6 @@ void settle(FluidState& s, const std::vector<float>& corners, double density) {
   for (Array<float>& v : p.v) std::fill(v.begin(), v.end(), 0.0f);
 }
 
-int kind_of(const std::vector<Fluid>& kinds, const std::string& name) {
-  const auto of =
-      std::find_if(kinds.begin(), kinds.end(), [&](const Fluid& f) { return f.name == name; });
-  return static_cast<int>(of - kinds.begin());
-}
-
 void check_some(int before, const FluidState& s, const std::string& what) {
   if (s.particles.size() > work_limits().max_points) {
     throw TooLarge(what + ": it takes more than " + std::to_string(work_limits().max_points) +
@@ -165,15 +159,32 @@ void fill_pool(const Scene& scene, std::size_t i, const std::vector<float>& corn
 
 }  // namespace
 
+int fluid_kind(const std::vector<Fluid>& kinds, const std::string& name) {
+  const auto of =
+      std::find_if(kinds.begin(), kinds.end(), [&](const Fluid& f) { return f.name == name; });
+  return static_cast<int>(of - kinds.begin());
+}
+
 std::vector<Fluid> fluid_kinds(const Scene& scene) {
   std::vector<Fluid> kinds = scene.fluids;
   const auto use = [&](const std::string& name) {
-    if (!name.empty() && kind_of(kinds, name) == static_cast<int>(kinds.size())) {
+    if (!name.empty() && fluid_kind(kinds, name) == static_cast<int>(kinds.size())) {
       kinds.push_back(find_fluid(scene, name));
     }
   };
   for (const Body& body : scene.bodies) use(body.filled.fluid);
   for (const Pool& pool : scene.pools) use(pool.fluid);
+  for (const Body& body : scene.bodies) {
+    const auto bleeds = [&](const std::string& material) {
+      const Bleeding& of = find_material(scene, material).bleeding;
+      if (of.flux > 0) use(of.fluid);
+    };
+    bleeds(body.material);
+    for (const Inclusion& part : body.inclusions) bleeds(part.material);
+  }
+  for (const Tool& tool : scene.tools) {
+    if (tool.type == ToolType::kIrrigation) use(tool.fluid);
+  }
   return kinds;
 }
 
@@ -193,6 +204,16 @@ std::vector<FluidLaw> fluid_laws(const Scene& scene) {
     const double low = scene.ground.enabled ? std::min(box.min.z(), scene.ground.z) : box.min.z();
     pressure = std::max(pressure, weight * (box.max.z() - low));
   }
+  // What tubes and wounds give runs down from there.
+  constexpr double kHeight = 0.05;  // [m]
+  bool is_any = !scene.pools.empty();
+  for (const Body& body : scene.bodies) is_any = is_any || !body.filled.fluid.empty();
+  if (!is_any) pressure = weight * kHeight;
+  for (const Tool& tool : scene.tools) {
+    if (tool.type != ToolType::kIrrigation) continue;
+    const double speed = tool.flow / (M_PI * tool.radius * tool.radius);
+    pressure = std::max(pressure, 0.5 * densest * speed * speed);
+  }
   std::vector<FluidLaw> laws;
   for (const Fluid& f : kinds) {
     const double modulus =
@@ -208,10 +229,10 @@ void fill_scene(const Scene& scene, const std::vector<float>& corners, FluidStat
   for (std::size_t b = 0; b < scene.bodies.size(); ++b) {
     const std::string& fluid = scene.bodies[b].filled.fluid;
     if (fluid.empty()) continue;
-    fill_hollow(scene, static_cast<int>(b), corners, kind_of(kinds, fluid), s);
+    fill_hollow(scene, static_cast<int>(b), corners, fluid_kind(kinds, fluid), s);
   }
   for (std::size_t i = 0; i < scene.pools.size(); ++i) {
-    fill_pool(scene, i, corners, kind_of(kinds, scene.pools[i].fluid), s);
+    fill_pool(scene, i, corners, fluid_kind(kinds, scene.pools[i].fluid), s);
   }
 }
 

@@ -10,6 +10,9 @@ namespace tissue_sim {
 /// The fluids that a scene names: its own, then the presets that it uses.
 std::vector<Fluid> fluid_kinds(const Scene& scene);
 
+/// Which of them has the name; their number where none has.
+int fluid_kind(const std::vector<Fluid>& kinds, const std::string& name);
+
 /// What they are to a substep; a bulk modulus of 0 becomes one by the scene's pressures and
 /// heights.
 std::vector<FluidLaw> fluid_laws(const Scene& scene);

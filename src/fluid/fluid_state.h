@@ -9,6 +9,7 @@
 
 #include "compute/array.h"
 #include "compute/for_each.h"
+#include "compute/simd.h"
 #include "fluid/fluid_laws.h"
 #include "tissue_sim/fluid.h"
 #include "tissue_sim/types.h"
@@ -25,7 +26,7 @@ struct FluidLaw {
   float sound() const { return std::sqrt(bulk_modulus / density); }  ///< [m/s]
 };
 
-/// Particles by their number: order never changes, and with it no bit.
+/// Particles by their number; those beside one another in space are near in it: sort_particles().
 struct FluidParticles {
   Array<float> x[3], v[3];         ///< [m], [m/s]
   Array<float> volume;             ///< without pressure [m^3]
@@ -46,14 +47,15 @@ struct FluidWalls {
   int size() const { return static_cast<int>(end.size() / 9); }
 };
 
-/// Who may act on whom, until anything moved too far. Sums run by number, and what is out of reach
-/// adds nothing: when they were listed changes no bit.
+/// Who may act on whom, until anything moved too far. Each frame begins without any: so they, and
+/// with them the order of sums, are by the state that the frame began with.
 struct FluidLists {
   std::vector<std::int32_t> begin, other;        ///< particles of each
   std::vector<std::int32_t> wall_begin, wall;    ///< triangles of each
   std::vector<std::int32_t> entry_begin, entry;  ///< of each triangle, in `wall`
   Array<float> x[3];                             ///< particles when they were listed
   std::vector<float> corners;                    ///< and triangles
+  std::vector<std::int32_t> met;                 ///< triangles that are in `wall`
   bool made = false;
 };
 
@@ -65,12 +67,15 @@ struct FluidState {
   std::uint32_t next_id = 0;
   FluidLists lists;
   Cpu* cpu = nullptr;
+  InstructionSet instructions = instruction_set();
 
   // Of a substep.
   std::vector<WallTriangle> now, next;
-  Array<float> share;               ///< of each entry of lists.wall: its impulse [N s]
-  Array<float> factor;              ///< of a particle: what its pressure weighs in a pair [Pa]
-  Array<float> strength;            ///< and at a wall, over what other walls leave [N m]
+  Array<float> share;            ///< of each entry of lists.wall: its impulse [N s]
+  std::vector<float> viscosity;  ///< of each law, with what keeps jitter down [Pa s]
+  Array<float> place;            ///< of each particle: x, y, z, volume
+  Array<float> motion;    ///< likewise its speed, and what its pressure weighs in a pair [Pa]
+  Array<float> strength;  ///< and at a wall, over what other walls leave [N m]
   std::vector<std::uint64_t> near;  ///< which colliders it may meet, as bits
   Array<float> v_next[3];
   struct Touch {
@@ -99,6 +104,10 @@ int advance_fluid(FluidState& state, const FluidDrive& drive, FluidWalls& walls,
 
 /// Lists anew who may act on whom, with room for `skin` [m].
 void list_neighbours(FluidState& state, const std::vector<float>& corners, float skin);
+
+/// Puts particles that are beside one another in space near one another in number, and forgets who
+/// may act on whom. Before each frame.
+void sort_particles(FluidState& state);
 
 /// Adds a particle. Returns its index.
 int add_particle(FluidState& state, const Vec3& x, const Vec3& v, double volume, int kind,

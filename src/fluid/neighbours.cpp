@@ -58,6 +58,8 @@ class Cells {
     }
   }
 
+  const std::vector<std::int32_t>& sorted() const { return sorted_; }
+
  private:
   int at(float x, int a) const {
     const float c = (x - low_[a]) / edge_;
@@ -101,22 +103,36 @@ void list_neighbours(FluidState& s, const std::vector<float>& corners, float ski
   FluidLists& l = s.lists;
   const float reach = s.kernel.reach + skin;
   const Cells cells(p, reach);
+  constexpr int kEach = 128;
+  const int chunks = (p.size() + kEach - 1) / kEach;
+  std::vector<std::vector<std::int32_t>> of_chunk(chunks);
+  l.begin.assign(p.size() + 1, 0);
+  s.cpu->for_each(chunks, [&](int chunk) {
+    std::vector<std::int32_t>& all = of_chunk[chunk];
+    all.reserve(kEach * 128);
+    for (int i = chunk * kEach; i < std::min(p.size(), (chunk + 1) * kEach); ++i) {
+      const float x[3] = {p.x[0][i], p.x[1][i], p.x[2][i]};
+      const float low[3] = {x[0] - reach, x[1] - reach, x[2] - reach};
+      const float high[3] = {x[0] + reach, x[1] + reach, x[2] + reach};
+      cells.for_each(low, high, [&](std::int32_t j) {
+        const float d[3] = {p.x[0][j] - x[0], p.x[1][j] - x[1], p.x[2][j] - x[2]};
+        if (j != i && dot3(d, d) < reach * reach) all.push_back(j);
+      });
+      l.begin[i + 1] = static_cast<std::int32_t>(all.size());
+    }
+  });
+  std::int32_t before = 0;
+  for (int chunk = 0; chunk < chunks; ++chunk) {
+    const int end = std::min(p.size(), (chunk + 1) * kEach);
+    for (int i = chunk * kEach; i < end; ++i) l.begin[i + 1] += before;
+    before = l.begin[end];
+  }
+  l.other.resize(before);
+  s.cpu->for_each(chunks, [&](int chunk) {
+    std::copy(of_chunk[chunk].begin(), of_chunk[chunk].end(),
+              l.other.begin() + l.begin[chunk * kEach]);
+  });
   std::vector<std::vector<std::int32_t>> found(p.size());
-  s.cpu->for_each(
-      p.size(),
-      [&](int i) {
-        const float x[3] = {p.x[0][i], p.x[1][i], p.x[2][i]};
-        const float low[3] = {x[0] - reach, x[1] - reach, x[2] - reach};
-        const float high[3] = {x[0] + reach, x[1] + reach, x[2] + reach};
-        cells.for_each(low, high, [&](std::int32_t j) {
-          const float d[3] = {p.x[0][j] - x[0], p.x[1][j] - x[1], p.x[2][j] - x[2]};
-          if (j != i && dot3(d, d) < reach * reach) found[i].push_back(j);
-        });
-        std::sort(found[i].begin(), found[i].end());
-      },
-      64);
-  join(found, l.begin, l.other, *s.cpu);
-  for (auto& of : found) of.clear();
   const int triangles = static_cast<int>(corners.size() / 9);
   for (int t = 0; t < triangles; ++t) {  // in turn: lists are by number
     const float* c = &corners[std::size_t{9} * t];
@@ -125,14 +141,22 @@ void list_neighbours(FluidState& s, const std::vector<float>& corners, float ski
       low[a] = std::min({c[a], c[3 + a], c[6 + a]}) - reach;
       high[a] = std::max({c[a], c[3 + a], c[6 + a]}) + reach;
     }
+    WallTriangle triangle;
+    std::copy_n(c, 9, &triangle.corner[0][0]);
+    triangle.finish();
     cells.for_each(low, high, [&](std::int32_t i) {
       const float x[3] = {p.x[0][i], p.x[1][i], p.x[2][i]};
+      if (triangle.height(x) < -2 * skin - s.spacing) return;  // it is far behind
       if (distance2(c, x) < reach * reach) found[i].push_back(t);
     });
   }
   join(found, l.wall_begin, l.wall, *s.cpu);
   l.entry_begin.assign(triangles + 1, 0);
   for (const std::int32_t t : l.wall) ++l.entry_begin[t + 1];
+  l.met.clear();
+  for (int t = 0; t < triangles; ++t) {
+    if (l.entry_begin[t + 1] > 0) l.met.push_back(t);
+  }
   for (int t = 0; t < triangles; ++t) l.entry_begin[t + 1] += l.entry_begin[t];
   l.entry.resize(l.wall.size());
   std::vector<std::int32_t> next(l.entry_begin.begin(), l.entry_begin.end() - 1);
@@ -142,6 +166,28 @@ void list_neighbours(FluidState& s, const std::vector<float>& corners, float ski
   for (int a = 0; a < 3; ++a) l.x[a] = p.x[a];
   l.corners = corners;
   l.made = true;
+}
+
+void sort_particles(FluidState& s) {
+  FluidParticles& p = s.particles;
+  s.lists.made = false;
+  if (p.size() == 0) return;
+  const std::vector<std::int32_t> order = Cells(p, s.kernel.reach).sorted();
+  const auto put = [&order](auto& field) {
+    auto sorted = field;
+    for (std::size_t i = 0; i < order.size(); ++i) sorted[i] = field[order[i]];
+    field.swap(sorted);
+  };
+  for (int a = 0; a < 3; ++a) {
+    put(p.x[a]);
+    put(p.v[a]);
+  }
+  put(p.volume);
+  put(p.pressure);
+  put(p.dense);
+  put(p.kind);
+  put(p.id);
+  put(p.fill);
 }
 
 }  // namespace tissue_sim

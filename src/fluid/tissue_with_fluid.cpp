@@ -17,7 +17,7 @@ namespace {
 
 /// Substeps of the fluid in an interval. What presses on a wall is as old as that: with more, light
 /// walls ring.
-constexpr double kStepsOfInterval = 2;
+constexpr double kStepsOfInterval = 1;
 
 Pose between(const Pose& a, const Pose& b, double share) {
   ToolMotion motion;
@@ -112,13 +112,12 @@ Scene tissue_scene(Scene scene, double interval) {
 }  // namespace
 
 TissueWithFluid::TissueWithFluid(const Scene& scene, std::vector<std::string> notes, Make make)
-    : scene_(scene), cpu_(scene.threads), kinds_(fluid_kinds(scene)) {
+    : scene_(scene), cpu_(scene.threads), kinds_(fluid_kinds(scene)), sources_(scene) {
   fluid_.cpu = &cpu_;
   fluid_.laws = fluid_laws(scene);
   fluid_.spacing =
       static_cast<float>(scene.fluid_spacing > 0 ? scene.fluid_spacing : scene.cell_size);
   fluid_.kernel.reach = kFluidReach * fluid_.spacing;
-  lost_.assign(kinds_.size(), 0.0);
   interval_ = kStepsOfInterval * stable_fluid_step(fluid_);
   tissue_ = make(tissue_scene(scene, interval_), std::move(notes));
   read_walls();
@@ -127,7 +126,7 @@ TissueWithFluid::TissueWithFluid(const Scene& scene, std::vector<std::string> no
   for (std::size_t b = 0; b < scene.bodies.size(); ++b) {
     const Fill& fill = scene.bodies[b].filled;
     if (fill.fluid.empty()) continue;
-    fills_.push_back({static_cast<std::int32_t>(b), fill.pressure > 0 ? 1 : 0, 0});
+    fills_.push_back({static_cast<std::int32_t>(b), fill.pressure > 0 ? 1 : 0, 0, fill.pressure});
   }
   floor_ = scene.ground.enabled ? scene.ground.z : 1e30;
   for (std::size_t i = 2; i < walls_.end.size(); i += 3)
@@ -143,12 +142,16 @@ void TissueWithFluid::read_walls() {
   walls_.end = surface_.corners;
   if (rest == surface_.rest) return;
   walls_.begin = walls_.end;  // a cut or a tear made it anew
+  if (sources_.bleeds()) sources_.find_wounds(surface_, tissue_->fragments());
   if (fluid_.particles.size() > 0) push_out_of_walls(fluid_, walls_.end);
 }
 
 void TissueWithFluid::advance(double duration, const FrameInput& input) {
   result_ = {};
   follow(input, scene_);
+  sort_particles(fluid_);
+  follow_orders(input.fluid);
+  sources_.begin_frame(duration);
   const int count = std::max(1, static_cast<int>(std::ceil(duration / interval_ - 1e-9)));
   for (int i = 0; i < count && !result_.blew_up; ++i) {
     const PartOfInput part(input, static_cast<double>(i) / count, (i + 1.0) / count);
@@ -197,6 +200,7 @@ void TissueWithFluid::advance_interval(double duration, const FrameInput& input)
   tools.add_loads(1, tools.at_end().data(), of_all.data(), 1, fluid_loads_);
   tissue_->push_surface(walls_.impulse);
   fill_up(duration);
+  sources_.act(input, duration, walls_, fluid_);
 }
 
 void TissueWithFluid::fill_up(double duration) {
@@ -211,14 +215,48 @@ void TissueWithFluid::fill_up(double duration) {
       volume += p.volume[i];
     }
     const double share = std::min(1.0, duration / kSmoothing);
+    if (!(volume > 0)) {
+      fill.filling = 0;
+      continue;
+    }
     fill.pressure += share * (pressure / volume - fill.pressure);
-    const double asked = scene_.bodies[fill.body].filled.pressure;
-    const double missing = 1 - fill.pressure / asked;
+    const double missing = 1 - fill.pressure / fill.asked;
     if (!(missing > 0.002)) fill.filling = 0;
     const auto growth = static_cast<float>(1 + duration * kRate * std::max(kSlowest, missing));
     for (int i = 0; i < p.size() && fill.filling != 0; ++i) {
       if (p.fill[i] == fill.body) p.volume[i] *= growth;
     }
+  }
+}
+
+void TissueWithFluid::follow_orders(Span<const FluidOrder> orders) {
+  const FluidParticles& p = fluid_.particles;
+  for (const FluidOrder& order : orders) {
+    if (order.pressure > 0) {
+      for (FillProgress& fill : fills_) {
+        if (fill.body != order.body) continue;
+        fill.asked = order.pressure;
+        fill.filling = 1;
+      }
+    }
+    if (!(order.drain > 0)) continue;
+    for (FillProgress& fill : fills_) {
+      if (fill.body == order.body) fill.filling = 0;
+    }
+    const std::vector<int> enclosed = find_enclosed();
+    std::vector<std::pair<std::uint32_t, int>> there;  // in an order without any in space
+    for (int i = 0; i < p.size(); ++i) {
+      if (enclosed[i] == order.body) there.emplace_back(p.id[i] * 2654435761u, i);
+    }
+    std::sort(there.begin(), there.end());
+    std::vector<std::uint32_t> ids;
+    double volume = 0;
+    for (const auto& [mixed, i] : there) {
+      if (volume + 0.5 * p.volume[i] > order.drain) break;
+      volume += p.volume[i];
+      ids.push_back(p.id[i]);
+    }
+    sources_.drain(ids);
   }
 }
 
@@ -230,7 +268,7 @@ void TissueWithFluid::drop_lost() {
     if (!(p.x[2][i] < floor_)) continue;
     gone[i] = 1;
     any = true;
-    lost_[p.kind[i]] += p.volume[i];
+    sources_.sums()[p.kind[i]].lost += p.volume[i];
   }
   if (any) remove_particles(fluid_, gone);
 }
@@ -247,7 +285,7 @@ int TissueWithFluid::read_fluid(std::vector<std::uint8_t>& cloud) {
   return p.size();
 }
 
-std::vector<FluidVolume> TissueWithFluid::fluid_volumes() {
+std::vector<int> TissueWithFluid::find_enclosed() {
   // A place is inside of what it meets the far side of along five of the six axes or more.
   constexpr int kEnclosed = 5;
   const std::size_t bodies = scene_.bodies.size();
@@ -288,10 +326,22 @@ std::vector<FluidVolume> TissueWithFluid::fluid_volumes() {
         }
       },
       64);
+  return inside;
+}
+
+std::vector<FluidVolume> TissueWithFluid::fluid_volumes() {
+  const FluidParticles& p = fluid_.particles;
+  const std::vector<int> inside = find_enclosed();
   std::vector<FluidVolume> volumes(kinds_.size());
   for (std::size_t k = 0; k < volumes.size(); ++k) {
-    volumes[k].inside.assign(bodies, 0.0);
-    volumes[k].lost = lost_[k];
+    volumes[k].inside.assign(scene_.bodies.size(), 0.0);
+    const FluidSums& sums = sources_.sums()[k];
+    volumes[k].lost = sums.lost;
+    volumes[k].sucked = sums.sucked;
+    volumes[k].drained = sums.drained;
+    volumes[k].bled = sums.bled;
+    volumes[k].irrigated = sums.irrigated;
+    volumes[k].bleeding = sources_.bleeding(static_cast<int>(k));
   }
   for (int i = 0; i < p.size(); ++i) {
     FluidVolume& of = volumes[p.kind[i]];
@@ -344,8 +394,10 @@ template <class Archive>
 void TissueWithFluid::each_field(Archive& archive) {
   FluidParticles& p = fluid_.particles;
   archive.part("fluid", p.x[0], p.x[1], p.x[2], p.v[0], p.v[1], p.v[2], p.volume, p.pressure,
-               p.dense, p.kind, p.id, p.fill, fluid_.next_id, lost_);
-  for (FillProgress& fill : fills_) archive.part("fill", fill.body, fill.filling, fill.pressure);
+               p.dense, p.kind, p.id, p.fill, fluid_.next_id);
+  sources_.each_field(archive);
+  for (FillProgress& fill : fills_)
+    archive.part("fill", fill.body, fill.filling, fill.pressure, fill.asked);
   archive.part("walls", walls_.end, surface_.rest);
 }
 
@@ -370,7 +422,7 @@ void TissueWithFluid::restore(Span<const std::uint8_t> saved) {
         p.volume.size(), p.pressure.size(), p.dense.size(), p.id.size(), p.fill.size()}) {
     if (size != n) throw std::runtime_error("the state's fluid has fields of several lengths");
   }
-  if (lost_.size() != kinds_.size() || walls_.end.size() != surface_.rest.size() ||
+  if (!sources_.is_sound(surface_.rest.size() / 9) || walls_.end.size() != surface_.rest.size() ||
       std::any_of(p.kind.begin(), p.kind.end(),
                   [&](std::uint8_t kind) { return kind >= kinds_.size(); })) {
     throw std::runtime_error("the state's fluid is not of this scene");

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "fluid/fluid_state.h"
+#include "fluid/sources.h"
 #include "tissue_sim/tissue.h"
 
 namespace tissue_sim {
@@ -20,6 +21,7 @@ struct FillProgress {
   std::int32_t body = 0;
   std::int32_t filling = 0;  ///< 1 until its pressure was once what is asked for
   double pressure = 0;       ///< mean of the last moments [Pa]
+  double asked = 0;          ///< [Pa]
 };
 
 class TissueWithFluid : public Tissue {
@@ -32,6 +34,7 @@ class TissueWithFluid : public Tissue {
   FrameResult finish() override { return result_; }
 
   int read_fluid(std::vector<std::uint8_t>& cloud) override;
+  int fluid_particle_count() const override { return fluid_.particles.size(); }
   std::vector<FluidVolume> fluid_volumes() override;
   std::uint64_t checksum() override;
   Momentum momentum() override;
@@ -59,6 +62,9 @@ class TissueWithFluid : public Tissue {
   void read_walls();  ///< the surface as it is becomes the end of an interval
   void fill_up(double duration);
   void drop_lost();
+  void follow_orders(Span<const FluidOrder> orders);
+  /// Of each particle in which body's hollow it is; -1 for none.
+  std::vector<int> find_enclosed();
 
   Scene scene_;
   Cpu cpu_;
@@ -68,7 +74,7 @@ class TissueWithFluid : public Tissue {
   FluidWalls walls_;
   SurfaceTriangles surface_;
   std::vector<FillProgress> fills_;
-  std::vector<double> lost_;           ///< of each fluid [m^3]
+  FluidSources sources_;
   double interval_ = 0;                ///< at most [s]
   double floor_ = 0;                   ///< below which fluid is lost [m]
   std::vector<ToolLoad> fluid_loads_;  ///< of the last interval

@@ -66,6 +66,10 @@ void fields(Archive& archive, EdgeHold& h) {
 }
 
 template <class Archive>
+void fields(Archive& archive, FluidOrder& o) {
+  archive(o.body, o.pressure, o.drain);
+}
+template <class Archive>
 void fields(Archive& archive, Fragment& f) {
   archive(f.id, f.parent, f.body, f.loose, f.point_count, f.volume, f.centroid, f.velocity, f.box);
 }

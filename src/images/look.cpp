@@ -198,8 +198,8 @@ TISSUE_SIM_INLINE void light_up_as(bool has_light, Pixels& pixels) {
       noise<W>((1 / 0.0013f) * p, &slope);
       normal = normal + -0.07f * slope;
     }
-    const At<W> colour =
-        look == Look::kTinted ? at<W>(pixels.colour, i) : surface_colour<look, W>(p);
+    const At<W> colour = look == Look::kTinted || look == Look::kFluid ? at<W>(pixels.colour, i)
+                                                                       : surface_colour<look, W>(p);
     const At<W> along = at<W>(pixels.along, i);
     const V length = square_root(inner(along, along));
     const V both = square_root(inner(normal, normal)) * length + 1e-30f;
@@ -231,6 +231,8 @@ TISSUE_SIM_INLINE void light_up_by(Look look, bool has_light, Pixels& pixels) {
       return light_up_as<Look::kSteel, W>(has_light, pixels);
     case Look::kHandle:
       return light_up_as<Look::kHandle, W>(has_light, pixels);
+    case Look::kFluid:
+      return light_up_as<Look::kFluid, W>(has_light, pixels);
     default:
       return light_up_as<Look::kTinted, W>(has_light, pixels);
   }

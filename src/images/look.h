@@ -26,8 +26,9 @@ enum class Look {
   kSteel,
   kHandle,
   kTinted,  ///< of a colour that is given
+  kFluid,   ///< likewise, and wet
 };
-inline constexpr int kLooks = 6;
+inline constexpr int kLooks = 7;
 
 /// Pixels of one look, side by side.
 struct Pixels {
@@ -38,7 +39,8 @@ struct Pixels {
   float normal[3][kMost];     ///< of any length, to either side
   float along[3][kMost];      ///< the ray from the lens
   float distance[kMost];      ///< in lengths of the ray, over that at which the light is full
-  float colour[3][kMost];     ///< what comes back to the lens; of kTinted the surface's before
+  float colour[3]
+              [kMost];  ///< what comes back to the lens; of kTinted and kFluid the surface's before
 };
 
 /// Sets their colours: the same bits with any instructions. With a light at the lens what is nearer

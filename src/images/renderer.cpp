@@ -11,6 +11,7 @@
 
 #include "compute/for_each.h"
 #include "fragments/piece_colour.h"
+#include "images/fluid_surface.h"
 #include "images/look.h"
 #include "images/shown.h"
 #include "tissue_sim/point.h"
@@ -51,6 +52,12 @@ void read_view(Simulation& simulation, SceneView& view) {
     return std::any_of(cameras.begin(), cameras.end(),
                        [colours](const Camera& c) { return c.colours == colours; });
   };
+  std::vector<std::uint8_t> fluid;
+  std::vector<FluidPoint> particles(simulation.tissue().read_fluid(fluid));
+  if (!particles.empty()) std::memcpy(particles.data(), fluid.data(), fluid.size());
+  const Scene& scene = simulation.scene();
+  make_fluid_surface({particles.data(), particles.size()},
+                     scene.fluid_spacing > 0 ? scene.fluid_spacing : scene.cell_size, view);
   view.fragments.clear();
   if (any_shows(CameraColours::kFragments)) {
     const Span<const Fragment> fragments = simulation.tissue().fragments();
@@ -98,6 +105,9 @@ void Renderer::State::add(const Eye& eye, double full, const Vec3& along, const 
   Colour colour = Colour::Zero();
   if (hit.part >= 0) {
     look = shown->parts[hit.part].shape.is_handle ? Look::kHandle : Look::kSteel;
+  } else if (hit.fluid >= 0) {
+    look = Look::kFluid;
+    colour = linear(shown->fluid_colour[hit.fluid]);
   } else if (hit.triangle >= 0) {
     place = interpolated(&shown->surface.rest[9 * hit.triangle], hit);
     look = shown->surface.cut[hit.triangle] != 0 ? Look::kCutFace : Look::kSkin;

@@ -80,6 +80,17 @@ void Shown::set(const SceneView& view, const Scene& scene,
   smooth.put(surface, cpu, normals);
   rays.set(surface.corners, cpu);
   box = surface.corners.empty() ? Box() : rays.box();
+  fluid_normals = view.fluid_normals;
+  fluid_kind = view.fluid_kind;
+  fluid_colour = view.fluid_colour;
+  if (view.fluid.empty()) {
+    fluid_rays.reset();
+    fluid_box = {};
+  } else {
+    if (fluid_rays == nullptr) fluid_rays = std::make_unique<RayScene>();
+    fluid_rays->set(view.fluid, cpu);
+    fluid_box = fluid_rays->box();
+  }
   parts.clear();
   for (std::size_t i = 0; i < view.tools.size(); ++i) {
     if (!view.tools[i].present) continue;
@@ -98,8 +109,9 @@ void Shown::set(const SceneView& view, const Scene& scene,
 }
 
 Eye Shown::look(const Camera& camera, const Pose& pose) const {
-  Eye eye{camera, pose, {}, {}};
+  Eye eye{camera, pose, {}, {}, {}};
   if (!surface.corners.empty()) eye.tissue = window_of(pose, Pose(), box.min, box.max);
+  if (fluid_rays != nullptr) eye.fluid = window_of(pose, Pose(), fluid_box.min, fluid_box.max);
   for (const Part& part : parts) {
     const Vec3 half = 0.5 * part.shape.size;
     eye.parts.push_back(window_of(pose, part.shape.pose, -half, half));
@@ -116,15 +128,30 @@ void Shown::meet(const Eye& eye, const Ground& ground, const Window& window, con
   for (int i = 0; i < kPacket; ++i) {
     Hit& hit = hits[i];
     hit = {};
-    double nearest = eye.camera.far;
     if (met[i].triangle >= 0) {
       hit.triangle = met[i].triangle;
-      hit.t = nearest = met[i].t;
+      hit.t = met[i].t;
       hit.u = met[i].u, hit.v = met[i].v;
       const int label = kFirstFragmentLabel + surface.fragment[hit.triangle];
       hit.label = static_cast<std::uint16_t>(std::min(label, 65535));
       hit.normal = interpolated(&normals[9 * hit.triangle], hit);
     }
+  }
+  if (fluid_rays != nullptr && eye.fluid.meets(window)) {
+    fluid_rays->meet(from, along, near, eye.camera.far, met);
+    for (int i = 0; i < kPacket; ++i) {
+      if (met[i].triangle < 0 || (hits[i].triangle >= 0 && !(met[i].t < hits[i].t))) continue;
+      Hit& hit = hits[i] = {};
+      hit.fluid = met[i].triangle;
+      hit.t = met[i].t;
+      hit.u = met[i].u, hit.v = met[i].v;
+      hit.label = static_cast<std::uint16_t>(kFirstFluidLabel + fluid_kind[hit.fluid]);
+      hit.normal = interpolated(&fluid_normals[std::size_t{9} * hit.fluid], hit);
+    }
+  }
+  for (int i = 0; i < kPacket; ++i) {
+    Hit& hit = hits[i];
+    const double nearest = hit.label == kNoLabel ? eye.camera.far : hit.t;
     if (!ground.enabled || along[i].z() == 0) continue;
     const double t = (ground.z - from.z()) / along[i].z();
     if (!(t >= near && t < nearest)) continue;
@@ -193,7 +220,8 @@ bool Shown::was_at(const Shown& last, const std::vector<std::int32_t>& same, con
     if (before >= 0) place = interpolated(&last.surface.corners[9 * before], hit);
     return before >= 0;
   }
-  if (hit.part < 0) return true;  // the ground lies still
+  if (hit.fluid >= 0) return false;  // it flows
+  if (hit.part < 0) return true;     // the ground lies still
   const std::uint16_t label = parts[hit.part].label;
   const auto first = [label](const Shown& s) {
     return std::find_if(s.parts.begin(), s.parts.end(),

@@ -22,6 +22,7 @@ struct Hit {
   std::uint16_t label = kNoLabel;
   std::int32_t triangle = -1;  ///< of tissue; else the ground or a tool
   std::int32_t part = -1;      ///< of a tool
+  std::int32_t fluid = -1;     ///< a triangle of its surface
   float u = 0, v = 0;          ///< in the triangle
 };
 
@@ -46,7 +47,8 @@ struct Window {
 struct Eye {
   const Camera& camera;
   Pose pose;
-  Window tissue;  ///< where it sees that, and each part of a tool
+  Window tissue;  ///< where it sees that, fluid, and each part of a tool
+  Window fluid;
   std::vector<Window> parts;
 };
 
@@ -71,6 +73,10 @@ struct Shown {
   Box box;                     ///< of the surface
   std::vector<Part> parts;     ///< of tools
   RayScene rays;
+  std::vector<float> fluid_normals;  ///< of each corner of its triangles
+  std::vector<std::uint32_t> fluid_kind, fluid_colour;
+  Box fluid_box;
+  std::unique_ptr<RayScene> fluid_rays;  ///< null where there is none
 
   /// `meshes` of the scene's tools, null for none.
   void set(const SceneView& view, const Scene& scene,

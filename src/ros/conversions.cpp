@@ -90,6 +90,13 @@ FrameInputMessage to_message(const AppliedInput& input, const Scene& scene) {
     if (i < input.grip_pressures.size()) m.tools[i].grip_pressure = input.grip_pressures[i];
   }
   for (const BladePath& path : input.cuts) m.cuts.push_back(to_message(path));
+  for (const FluidOrder& order : input.fluid) {
+    HollowOrder told;
+    told.body = order.body;
+    told.pressure = order.pressure;
+    told.drain = order.drain;
+    m.fluid.push_back(told);
+  }
   std::size_t anchor = 0;
   for (const Body& body : scene.bodies) {
     for (const Anchor& a : body.anchors) {
@@ -124,6 +131,9 @@ AppliedInput from_message(const FrameInputMessage& message) {
     for (const geometry_msgs::Point& x : m.edge) path.edge.push_back(from_message(x));
     for (const geometry_msgs::Pose& pose : m.poses) path.poses.push_back(from_message(pose));
     input.cuts.push_back(path);
+  }
+  for (const HollowOrder& m : message.fluid) {
+    input.fluid.push_back({m.body, m.pressure, m.drain});
   }
   for (const AnchorPath& m : message.anchors) {
     input.anchors.push_back({from_message(m.begin), from_message(m.end)});

@@ -62,6 +62,11 @@ void FluidOutput::send_amounts(Simulation& simulation, const std_msgs::Header& h
       amount.spilt = volumes[i].spilt;
       amount.lost = volumes[i].lost;
       amount.pressure = volumes[i].pressure;
+      amount.sucked = volumes[i].sucked;
+      amount.drained = volumes[i].drained;
+      amount.bled = volumes[i].bled;
+      amount.irrigated = volumes[i].irrigated;
+      amount.bleeding = volumes[i].bleeding;
       m->fluids.push_back(amount);
     }
     return m;

@@ -34,6 +34,8 @@ Shaft shaft_of(const Tool& tool) {
     }
     case ToolType::kProbe:
     case ToolType::kPunch:
+    case ToolType::kSuction:
+    case ToolType::kIrrigation:
       break;
   }
   return {Vec3::Zero(), r, r, 0, std::max(tool.length, 2 * r)};

@@ -24,6 +24,8 @@ Services::Services(ros::NodeHandle& node, const Scene& scene, SimulationThread& 
       make_session_(std::move(make_session)),
       scene_(scene) {
   servers_.push_back(node.advertiseService("cut", &Services::cut, this));
+  servers_.push_back(node.advertiseService("fill", &Services::fill, this));
+  servers_.push_back(node.advertiseService("drain", &Services::drain, this));
   servers_.push_back(node.advertiseService("stop_recording", &Services::stop_recording, this));
   servers_.push_back(node.advertiseService("reset", &Services::reset, this));
   servers_.push_back(node.advertiseService("pause", &Services::pause, this));
@@ -101,6 +103,20 @@ bool Services::cut(Cut::Request& request, Cut::Response& response) {
                                   reply.report.new_fragments.end());
     return std::to_string(reply.report.bonds_broken) + " bonds broken" +
            (reply.message.empty() ? "" : "; " + reply.message);
+  });
+}
+
+bool Services::fill(Fill::Request& request, Fill::Response& response) {
+  return answer(response, "fill", [&] {
+    simulation_.order(request.body, "pressure", request.pressure);
+    return "body '" + request.body + "' takes fluid in until it has the pressure";
+  });
+}
+
+bool Services::drain(Drain::Request& request, Drain::Response& response) {
+  return answer(response, "drain", [&] {
+    simulation_.order(request.body, "volume", request.volume);
+    return "body '" + request.body + "' gives it up within half a second";
   });
 }
 

@@ -57,6 +57,22 @@ CutReply SimulationThread::cut(const BladePath& path) {
   });
 }
 
+void SimulationThread::order(const std::string& body, const std::string& what, double amount) {
+  call([&] {
+    if (run_.blew_up) throw std::runtime_error(problem_);
+    Simulation& simulation = *session_.simulation;
+    const std::vector<Body>& bodies = simulation.scene().bodies;
+    const auto of = std::find_if(bodies.begin(), bodies.end(),
+                                 [&body](const Body& b) { return b.name == body; });
+    if (of == bodies.end()) throw std::runtime_error("body '" + body + "' is not in the scene");
+    if (!(amount > 0)) {
+      throw std::runtime_error(what + " is " + std::to_string(amount) + ": must be above 0");
+    }
+    const auto index = static_cast<int>(of - bodies.begin());
+    what == "pressure" ? simulation.fill(index, amount) : simulation.drain(index, amount);
+  });
+}
+
 void SimulationThread::begin_steps(int frames, std::promise<StepReply>& reply) {
   steps_left_ = frames;
   step_reply_ = std::move(reply);

@@ -91,6 +91,9 @@ class SimulationThread {
 
   /// In the next frame, which is advanced even while paused.
   CutReply cut(const BladePath& path);
+  /// Fills a body of that name to a `pressure`, or drains a `volume` out of it, from the next frame
+  /// on; both must be above 0.
+  void order(const std::string& body, const std::string& what, double amount);
   /// What /clock says. Where it jumps back the scene starts anew; tools keep what is latched.
   void on_clock(const ros::Time& now);
   /// A sample of an instrument came.

@@ -30,6 +30,7 @@ SimulationState state_message(Simulation& simulation, const FrameReport& report,
   m.real_time_factor = run.real_time_factor;
   m.late_samples = run.late_samples;
   m.particles = simulation.tissue().point_count();
+  m.fluid_particles = simulation.tissue().fluid_particle_count();
   m.fragments = pieces.count;
   m.loose_fragments = pieces.loose;
   m.fragment_volume = pieces.volume;

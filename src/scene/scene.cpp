@@ -149,6 +149,9 @@ void check_material(const std::string& path, const Material& m, std::set<std::st
   check_range(path + ".tear_length", m.tear_length, 0, 1, "m");
   check_range(path + ".tear_scatter", m.tear_scatter, 0, 0.9);
   check_range(path + ".toughness", m.toughness, 0, 1e5, "J/m^2");
+  check_range(path + ".bleeding.flux", m.bleeding.flux, 0, 1, "m/s");
+  check_range(path + ".bleeding.pressure", m.bleeding.pressure, 0, 1e5, "Pa");
+  check_range(path + ".bleeding.clots_after", m.bleeding.clots_after, 0, 1e5, "s");
   check_friction(path + ".friction", m.friction);
 }
 
@@ -225,6 +228,12 @@ void check_tool(const std::string& path, const Tool& tool, std::set<std::string>
     case ToolType::kPlate:
       check_each(path + ".size", tool.size, 1e-4, 1, "edge", "m");
       check_range(path + ".edge_radius", tool.edge_radius, 1e-5, tool.size.minCoeff() / 2, "m");
+      break;
+    case ToolType::kSuction:
+    case ToolType::kIrrigation:
+      check_range(path + ".radius", tool.radius, 1e-4, 0.1, "m");
+      check_range(path + ".length", tool.length, 1e-3, 1, "m");
+      check_range(path + ".flow", tool.flow, 1e-9, 1e-2, "m^3/s");
       break;
   }
   check_friction(path + ".friction", tool.friction);
@@ -381,9 +390,7 @@ void check_hollow(const std::string& path, const Scene& scene, const Body& body)
 }
 
 void check_fluids(const Scene& scene) {
-  const bool any_filled = std::any_of(scene.bodies.begin(), scene.bodies.end(),
-                                      [](const Body& b) { return !b.filled.fluid.empty(); });
-  if (scene.method == Method::kMls && (any_filled || !scene.pools.empty())) {
+  if (scene.method == Method::kMls && has_fluid(scene)) {
     refuse("method", "mls",
            "blows up beside fluid after some frames, which is not mended yet: choose mpm, or pbd "
            "with model: tetrahedra");
@@ -397,6 +404,14 @@ void check_fluids(const Scene& scene) {
     check_range(path + ".viscosity", f.viscosity, 0, 100, "Pa s");
     if (f.bulk_modulus != 0) check_range(path + ".bulk_modulus", f.bulk_modulus, 100, 1e8, "Pa");
     check_each(path + ".color", f.color, 0, 1, "part", "");
+  }
+  for (std::size_t i = 0; i < scene.materials.size(); ++i) {
+    check_fluid_name(at("materials", i) + ".bleeding.fluid", scene,
+                     scene.materials[i].bleeding.fluid);
+  }
+  for (std::size_t i = 0; i < scene.tools.size(); ++i) {
+    if (scene.tools[i].type != ToolType::kIrrigation) continue;
+    check_fluid_name(at("tools", i) + ".fluid", scene, scene.tools[i].fluid);
   }
   for (std::size_t i = 0; i < scene.pools.size(); ++i) {
     const std::string path = at("pools", i);
@@ -503,6 +518,22 @@ void validate(const Scene& scene) {
   for (std::size_t i = 0; i < scene.cameras.size(); ++i) {
     check_camera(at("cameras", i), scene.cameras[i], tool_names);  // topics of both begin so
   }
+}
+
+bool has_fluid(const Scene& scene) {
+  const auto bleeds = [&scene](const std::string& material) {
+    const Material* of = lookup(scene, material);
+    return of != nullptr && of->bleeding.flux > 0;
+  };
+  for (const Body& body : scene.bodies) {
+    if (!body.filled.fluid.empty() || bleeds(body.material)) return true;
+    for (const Inclusion& part : body.inclusions) {
+      if (bleeds(part.material)) return true;
+    }
+  }
+  return !scene.pools.empty() ||
+         std::any_of(scene.tools.begin(), scene.tools.end(),
+                     [](const Tool& t) { return t.type == ToolType::kIrrigation; });
 }
 
 const Material& find_material(const Scene& scene, const std::string& name) {

@@ -58,6 +58,10 @@ std::vector<std::string> fields_of(ToolType type) {
       return {"radius", "length", "edge_radius"};
     case ToolType::kPlate:
       return {"size", "edge_radius"};
+    case ToolType::kSuction:
+      return {"radius", "length", "flow"};
+    case ToolType::kIrrigation:
+      return {"radius", "length", "flow", "fluid"};
   }
   return {};
 }

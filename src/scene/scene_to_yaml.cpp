@@ -83,6 +83,14 @@ void write(YAML::Emitter& out, const Material& m) {
   write(out, "tear_scatter", m.tear_scatter);
   write(out, "toughness", m.toughness);
   write(out, "friction", m.friction);
+  if (m.bleeding.flux > 0) {
+    out << Key << "bleeding" << Value << BeginMap;
+    write(out, "flux", m.bleeding.flux);
+    write(out, "pressure", m.bleeding.pressure);
+    write(out, "clots_after", m.bleeding.clots_after);
+    write(out, "fluid", m.bleeding.fluid);
+    out << EndMap;
+  }
   out << EndMap;
 }
 
@@ -168,6 +176,8 @@ void write(YAML::Emitter& out, const Tool& tool) {
     if (field == "jaw_width") write(out, "jaw_width", tool.jaw_width);
     if (field == "grip_pressure") write(out, "grip_pressure", tool.grip_pressure);
     if (field == "cohesion") write(out, "cohesion", tool.cohesion);
+    if (field == "flow") write(out, "flow", tool.flow);
+    if (field == "fluid") write(out, "fluid", tool.fluid);
   }
   write(out, "friction", tool.friction);
   if (!tool.mesh.empty()) {

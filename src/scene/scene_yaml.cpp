@@ -84,9 +84,10 @@ Anchor read_anchor(const YAML::Node& node, const std::string& path) {
 }
 
 Material read_material(const YAML::Node& node, const std::string& path) {
-  const YamlFields fields(node, path,
-                          {"name", "law", "young_modulus", "poisson_ratio", "density", "viscosity",
-                           "tear_stretch", "tear_length", "tear_scatter", "toughness", "friction"});
+  const YamlFields fields(
+      node, path,
+      {"name", "law", "young_modulus", "poisson_ratio", "density", "viscosity", "tear_stretch",
+       "tear_length", "tear_scatter", "toughness", "friction", "bleeding"});
   fields.require("name", "bodies refer to a material by its name");
   Material m;
   fields.read("name", m.name);
@@ -108,6 +109,14 @@ Material read_material(const YAML::Node& node, const std::string& path) {
     fields.read("toughness", m.toughness);
   }
   fields.read("friction", m.friction);
+  fields.read_map("bleeding", [&](const YAML::Node& bleeding, const std::string& bleeding_path) {
+    const YamlFields of(bleeding, bleeding_path, {"flux", "pressure", "clots_after", "fluid"});
+    of.require("flux", "must say how much comes out of opened tissue");
+    of.read("flux", m.bleeding.flux);
+    of.read("pressure", m.bleeding.pressure);
+    of.read("clots_after", m.bleeding.clots_after);
+    of.read("fluid", m.bleeding.fluid);
+  });
   return m;
 }
 
@@ -186,10 +195,11 @@ Body read_body(const YAML::Node& node, const std::string& path) {
 }
 
 Tool read_tool(const YAML::Node& node, const std::string& path) {
-  const YamlFields fields(node, path,
-                          {"name", "type", "radius", "length", "edge_radius", "size",
-                           "blade_length", "blade_width", "blade_thickness", "jaw_length",
-                           "jaw_width", "grip_pressure", "cohesion", "friction", "mesh", "scale"});
+  const YamlFields fields(
+      node, path,
+      {"name", "type", "radius", "length", "edge_radius", "size", "blade_length", "blade_width",
+       "blade_thickness", "jaw_length", "jaw_width", "grip_pressure", "cohesion", "flow", "fluid",
+       "friction", "mesh", "scale"});
   Tool tool;
   fields.read("name", tool.name);
   fields.read("type", tool.type, kToolTypeNames);
@@ -206,6 +216,8 @@ Tool read_tool(const YAML::Node& node, const std::string& path) {
   fields.read("jaw_width", tool.jaw_width);
   fields.read("grip_pressure", tool.grip_pressure);
   fields.read("cohesion", tool.cohesion);
+  fields.read("flow", tool.flow);
+  fields.read("fluid", tool.fluid);
   fields.read("friction", tool.friction);
   fields.read("mesh", tool.mesh);
   fields.read("scale", tool.scale);

@@ -6,6 +6,7 @@
 namespace tissue_sim {
 namespace {
 
+constexpr double kRim = 0.25;    // of a tube's radius: how round the edge of its mouth is
 constexpr double kInside = 0.3;  // cells: springs at their limit give way by a quarter
 
 void place(const Pose& pose, Collider& collider) {
@@ -31,6 +32,8 @@ double thinnest(const Tool& tool) {
     case ToolType::kProbe:
     case ToolType::kBall:
     case ToolType::kPunch:
+    case ToolType::kSuction:
+    case ToolType::kIrrigation:
       return tool.radius;
     case ToolType::kGrasper:
       return 0.5 * tool.jaw_width;
@@ -81,6 +84,13 @@ ToolPath::ToolPath(const Tool& tool, int index, const ToolMotion& motion, double
       shape_.length = static_cast<float>(tool.length);
       shape_.radius = static_cast<float>(tool.radius);
       shape_.edge = static_cast<float>(tool.edge_radius);
+      break;
+    case ToolType::kSuction:
+    case ToolType::kIrrigation:
+      shape_.kind = Collider::kPunch;
+      shape_.length = static_cast<float>(tool.length);
+      shape_.radius = static_cast<float>(tool.radius);
+      shape_.edge = static_cast<float>(kRim * std::min(tool.radius, tool.length));
       break;
     case ToolType::kPlate:
       shape_.kind = Collider::kPlate;

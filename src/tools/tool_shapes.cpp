@@ -56,6 +56,8 @@ std::vector<ToolShape> tool_shapes(const Tool& tool, const ToolMotion& motion) {
       add(ToolShape::kBall, pose, Vec3(0, 0, -tool.radius), Vec3::Constant(2 * tool.radius));
       break;
     case ToolType::kPunch:
+    case ToolType::kSuction:
+    case ToolType::kIrrigation:
       add(ToolShape::kCylinder, pose, Vec3(0, 0, -tool.length / 2),
           Vec3(2 * tool.radius, 2 * tool.radius, tool.length));
       break;

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "camera_benchmark.h"
+#include "fluid_benchmark.h"
 #include "machine_rates.h"
 #include "mls_benchmark.h"
 #include "organ_benchmark.h"
@@ -127,6 +128,7 @@ int main(int argc, char** argv) {
   add_camera_benchmarks(Device::kCpu);
   add_mls_rows();
   add_pbd_rows();
+  add_fluid_rows();
   benchmark::Initialize(&argc, argv);
   if (benchmark::ReportUnrecognizedArguments(argc, argv)) return 1;
   benchmark::RunSpecifiedBenchmarks();

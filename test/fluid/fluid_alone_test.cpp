@@ -107,6 +107,88 @@ TEST(Fluid, BreaksADamAsWasMeasured) {
   }
 }
 
+/// Two vessels with a way between them at the bottom level out.
+TEST(Fluid, StandsAsHighInConnectedVessels) {
+  constexpr double kSpacing = 0.004, kDepth = 0.024, kLow = 0.016, kHigh = 0.048;
+  Scene scene = pool_scene({0, 0, 0}, {0.032, kDepth, kHigh}, kSpacing);
+  scene.damping = 2;
+  Pool right = scene.pools[0];
+  right.region.min = Vec3(0.04, 0, 0);
+  right.region.max = Vec3(0.088, kDepth, kLow);
+  scene.pools.push_back(right);
+  auto walls = tank({0, 0, 0}, {0.088, kDepth, 0.08});
+  add_tools(walls, scene);
+  Tool divider;  // from 16 mm over the bottom upwards
+  divider.name = "divider";
+  divider.type = ToolType::kPlate;
+  divider.size = Vec3(0.2, 0.2, 0.008);
+  scene.tools.push_back(divider);
+  Simulation simulation(scene);
+  FrameRequest request = stand(walls);
+  ToolRequest tool;
+  tool.pose = {Vec3(0.04, kDepth / 2, 0.116), Quat::FromTwoVectors(Vec3::UnitZ(), Vec3::UnitX())};
+  request.tools.emplace_back(tool);
+  const auto level = [&](double from, double to) {  // twice the mean height of what stands there
+    double sum = 0, count = 0;
+    for (const FluidPoint& p : fluid_of(simulation)) {
+      if (p.x < from || p.x > to) continue;
+      sum += 2 * p.z;
+      ++count;
+    }
+    return sum / count;
+  };
+  for (int i = 0; i < 90; ++i) {
+    ASSERT_FALSE(simulation.advance_frame(request).result.blew_up);
+    request = {};
+  }
+  double left = 0, other = 0;
+  for (int i = 0; i < 20; ++i) {
+    simulation.advance_frame();
+    left += level(0, 0.032) / 20;
+    other += level(0.04, 0.088) / 20;
+  }
+  EXPECT_NEAR(left / other, 1, 0.05) << left << " " << other;
+}
+
+/// A standing wave in a tank: its period by the theory of small waves, omega^2 = g k tanh(k h).
+TEST(Fluid, RunsInWavesAsFastAsTheoryHasIt) {
+  constexpr double kSpacing = 0.004, kLength = 0.12, kDepth = 0.024, kHeight = 0.032;
+  Scene scene = pool_scene({0, 0, 0}, {kLength, kDepth, kHeight}, kSpacing);
+  const auto walls = tank({0, 0, 0}, {kLength, kDepth, 0.1});
+  add_tools(walls, scene);
+  scene.damping = 8;
+  scene.gravity = kGravity * Vec3(0.08, 0, -1);
+  Simulation simulation(scene);
+  FrameRequest request = stand(walls);
+  for (int i = 0; i < 50; ++i) {
+    simulation.advance_frame(request);
+    request = {};
+  }
+  simulation.set_gravity(Vec3(0, 0, -kGravity));
+  simulation.set_damping(0);
+  double height = 0;
+  std::vector<double> crossings;
+  double before = 0;
+  for (int i = 0; i < 80 && crossings.size() < 4; ++i) {
+    simulation.advance_frame();
+    double x = 0, z = 0;
+    const auto points = fluid_of(simulation);
+    for (const FluidPoint& p : points) {
+      x += (p.x - kLength / 2) / points.size();
+      z += 2 * p.z / points.size();
+    }
+    if (i == 0) height = z;
+    if (i > 0 && (x < 0) != (before < 0)) crossings.push_back(i - x / (x - before));
+    before = x;
+  }
+  ASSERT_GE(crossings.size(), 3u);
+  const double period =
+      2 * (crossings.back() - crossings.front()) / (crossings.size() - 1) / scene.frame_rate;
+  const double k = M_PI / kLength;
+  const double asked = 2 * M_PI / std::sqrt(kGravity * k * std::tanh(k * height));
+  EXPECT_NEAR(asked / period, 1, 0.05) << "period " << period << " s for " << asked;
+}
+
 /// Nothing falls through the ground, and what falls out of the world is counted.
 TEST(Fluid, IsCountedWhereItIs) {
   Scene scene = pool_scene({0, 0, 0.02}, {0.012, 0.012, 0.04}, 0.004);

@@ -1,0 +1,89 @@
+#include "fluid_benchmark.h"
+
+#include <benchmark/benchmark.h>
+
+#include <string>
+
+#include "tissue_sim/simulation.h"
+
+namespace tissue_sim {
+namespace {
+
+/// Water in a dish of tissue; the dish alone without.
+Scene dish(bool full, int threads) {
+  Scene scene;
+  scene.device = Device::kCpu;
+  scene.threads = threads;
+  scene.cell_size = 0.004;
+  scene.fluid_spacing = 0.003;
+  Material soft;
+  soft.name = "soft";
+  soft.young_modulus = 10e3;
+  soft.poisson_ratio = 0.4;
+  scene.materials = {soft};
+  Body slab;
+  slab.material = "soft";
+  slab.size = Vec3(0.152, 0.096, 0.008);  // 25 000 points with the walls
+  slab.pose.position.z() = 0.004;
+  Region below;
+  below.z = 0.004;
+  slab.anchors = {below};
+  scene.bodies = {slab};
+  Body wall = slab;
+  wall.size = Vec3(0.012, 0.096, 0.036);
+  for (const double side : {-1.0, 1.0}) {
+    wall.name = side < 0 ? "left" : "right";
+    wall.pose.position = Vec3(0.07 * side, 0, 0.0261);
+    scene.bodies.push_back(wall);
+  }
+  Pool pool;
+  pool.region.kind = Region::Kind::kBox;
+  pool.region.min = Vec3(-0.0615, -0.0465, 0.0095);
+  pool.region.max = Vec3(0.0615, 0.0465, 0.0335);  // 10 000 particles
+  if (full) scene.pools = {pool};
+  for (int k = 0; k < 2; ++k) {
+    Tool plate;
+    plate.name = "plate" + std::to_string(k);
+    plate.type = ToolType::kPlate;
+    plate.size = Vec3(0.3, 0.1, 0.01);
+    scene.tools.push_back(plate);
+  }
+  return scene;
+}
+
+}  // namespace
+
+void add_fluid_rows() {
+  for (const bool full : {false, true}) {
+    for (const int threads : {1, 2}) {
+      benchmark::RegisterBenchmark(
+          ("fluid/cpu/" + std::string(full ? "10000_beside_25000" : "tissue_alone") +
+           "/threads:" + std::to_string(threads))
+              .c_str(),
+          [full, threads](benchmark::State& bench) {
+            Simulation simulation(dish(full, threads));
+            FrameRequest request;
+            for (const double side : {-1.0, 1.0}) {
+              ToolRequest plate;
+              plate.pose = {Vec3(0, 0.0495 * side, 0.06),
+                            Quat::FromTwoVectors(Vec3::UnitZ(), Vec3(0, -side, 0))};
+              request.tools.emplace_back(plate);
+            }
+            for (int i = 0; i < 3; ++i) simulation.advance_frame(request);
+            for (auto _ : bench) {
+              if (simulation.advance_frame().result.blew_up) return bench.SkipWithError("blew up");
+            }
+            bench.counters["fluid"] = simulation.tissue().fluid_particle_count();
+            bench.counters["tissue"] = simulation.tissue().point_count();
+            bench.counters["of_real_time"] = benchmark::Counter(
+                static_cast<double>(bench.iterations()) / simulation.scene().frame_rate,
+                benchmark::Counter::kIsRate);
+          })
+          ->Unit(benchmark::kMillisecond)
+          ->UseRealTime()
+          ->Iterations(8);
+    }
+  }
+}
+
+}  // namespace tissue_sim

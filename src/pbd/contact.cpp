@@ -62,6 +62,10 @@ struct Contacts {
   }
 };
 
+/// So deep a triangle may lie in a tip before it is pushed, beside its corners: a mesh that fits
+/// the tip does, for its triangles are chords [m].
+float chord(float edge, float radius) { return fminf(edge * edge / (8 * radius), 0.25f * radius); }
+
 /// Shares of a triangle's corners in a place on it.
 Vec3 shares_of(const Vec3& place, const Vec3& a, const Vec3& b, const Vec3& c) {
   const Vec3 n = (b - a).cross(c - a);

@@ -97,12 +97,15 @@ void push_triangle(State& s, const Triangle& t, const Collider& tip, float h, Co
   Gap g;
   g.distance = static_cast<float>(distance - tip.radius + allowed);
   if (!(g.distance < 0) || !(distance > 0)) return;
+  // From within it meets what it has pierced: that is for vertices to get off.
+  if ((x[1] - x[0]).cross(x[2] - x[0]).dot(off) > 0) return;
   const Vec3 share = shares_of(place, x[0], x[1], x[2]);
-  double mobility = 0;
+  double mobility = 0, farthest = 0;  // no vertex goes farther than the place, as in Touch
   float at[3], moved[3] = {}, predicted[3] = {}, velocity[3] = {};
   for (int k = 0; k < 3; ++k) {
     const std::size_t i = 4 * static_cast<std::size_t>(t[k]);
     mobility += share[k] * share[k] * v.x[i + 3];
+    farthest = std::max(farthest, share[k] * v.x[i + 3]);
     for (int a = 0; a < 3; ++a) {
       const auto part = static_cast<float>(share[k]);
       moved[a] += part * v.moved[i + a];
@@ -110,6 +113,7 @@ void push_triangle(State& s, const Triangle& t, const Collider& tip, float h, Co
       velocity[a] += part * v.v[i + a];
     }
   }
+  mobility = std::max(mobility, farthest);
   if (!(mobility > 0)) return;
   for (int a = 0; a < 3; ++a) {
     at[a] = static_cast<float>(place[a]);

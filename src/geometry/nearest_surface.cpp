@@ -69,7 +69,8 @@ SurfacePoint on_ellipsoid(const Vec3& x, const Vec3& radii) {
   return {p, p.cwiseQuotient(r2).normalized()};
 }
 
-/// Nearest place of a triangle (Ericson, Real-Time Collision Detection, 5.1.5).
+}  // namespace
+
 Vec3 on_triangle(const Vec3& p, const Vec3& a, const Vec3& b, const Vec3& c) {
   const Vec3 ab = b - a, ac = c - a, ap = p - a;
   const double d1 = ab.dot(ap), d2 = ac.dot(ap);
@@ -91,8 +92,6 @@ Vec3 on_triangle(const Vec3& p, const Vec3& a, const Vec3& b, const Vec3& c) {
   const double sum = va + vb + vc;
   return a + vb / sum * ab + vc / sum * ac;
 }
-
-}  // namespace
 
 /// The triangles of a mesh in a hash grid as wide as the reach.
 class NearestSurface::Triangles {

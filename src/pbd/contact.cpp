@@ -5,6 +5,7 @@
 
 #include <algorithm>
 
+#include "geometry/nearest_surface.h"
 #include "pbd/pbd_state.h"
 #include "tools/frame_colliders.h"
 
@@ -61,24 +62,17 @@ struct Contacts {
   }
 };
 
-/// Shares of a triangle's corners in its place nearest to x (Ericson 2005, 5.1.5).
-Vec3 nearest_shares(const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& x) {
-  const Vec3 e = b - a, f = c - a;
-  const double d1 = e.dot(x - a), d2 = f.dot(x - a);
-  if (d1 <= 0 && d2 <= 0) return Vec3(1, 0, 0);
-  const double d3 = e.dot(x - b), d4 = f.dot(x - b);
-  if (d3 >= 0 && d4 <= d3) return Vec3(0, 1, 0);
-  const double d5 = e.dot(x - c), d6 = f.dot(x - c);
-  if (d6 >= 0 && d5 <= d6) return Vec3(0, 0, 1);
-  const double of_c = d1 * d4 - d3 * d2, of_b = d5 * d2 - d1 * d6, of_a = d3 * d6 - d5 * d4;
-  if (of_c <= 0 && d1 >= 0 && d3 <= 0) return Vec3(1 - d1 / (d1 - d3), d1 / (d1 - d3), 0);
-  if (of_b <= 0 && d2 >= 0 && d6 <= 0) return Vec3(1 - d2 / (d2 - d6), 0, d2 / (d2 - d6));
-  if (of_a <= 0 && d4 >= d3 && d5 >= d6) {
-    const double share = (d4 - d3) / ((d4 - d3) + (d5 - d6));
-    return Vec3(0, 1 - share, share);
-  }
-  const double sum = of_a + of_b + of_c;
-  return Vec3(of_a, of_b, of_c) / sum;
+/// So deep a triangle may lie in a tip before it is pushed, beside its corners: a mesh that fits
+/// the tip does, for its triangles are chords [m].
+float chord(float edge, float radius) { return fminf(edge * edge / (8 * radius), 0.25f * radius); }
+
+/// Shares of a triangle's corners in a place on it.
+Vec3 shares_of(const Vec3& place, const Vec3& a, const Vec3& b, const Vec3& c) {
+  const Vec3 n = (b - a).cross(c - a);
+  const double n2 = n.squaredNorm() + 1e-300;
+  const double of_b = (place - a).cross(c - a).dot(n) / n2;
+  const double of_c = (b - a).cross(place - a).dot(n) / n2;
+  return Vec3(1 - of_b - of_c, of_b, of_c).cwiseMax(0).cwiseMin(1);
 }
 
 /// Pushes the place of a triangle that lies deepest in a tip out of it, as push_out() a vertex.
@@ -90,10 +84,9 @@ void push_triangle(State& s, const Triangle& t, const Collider& tip, float h, Co
   const Vec3 end(tip.position[0], tip.position[1], tip.position[2]);
   const Vec3 up = -Vec3(tip.rotation[2], tip.rotation[5], tip.rotation[8]);
   const double least = tip.radius, most = std::max(tip.radius, tip.length);
-  Vec3 axis = end + least * up, share = Vec3::Zero(), place = axis;
+  Vec3 axis = end + least * up, place = axis;
   for (int turn = 0; turn < 8; ++turn) {
-    share = nearest_shares(x[0], x[1], x[2], axis);
-    place = share[0] * x[0] + share[1] * x[1] + share[2] * x[2];
+    place = on_triangle(axis, x[0], x[1], x[2]);
     const Vec3 next = end + std::min(most, std::max(least, (place - end).dot(up))) * up;
     if ((next - axis).norm() < 1e-3 * least) break;
     axis = next;
@@ -104,11 +97,15 @@ void push_triangle(State& s, const Triangle& t, const Collider& tip, float h, Co
   Gap g;
   g.distance = static_cast<float>(distance - tip.radius + allowed);
   if (!(g.distance < 0) || !(distance > 0)) return;
-  double mobility = 0;
+  // From within it meets what it has pierced: that is for vertices to get off.
+  if ((x[1] - x[0]).cross(x[2] - x[0]).dot(off) > 0) return;
+  const Vec3 share = shares_of(place, x[0], x[1], x[2]);
+  double mobility = 0, farthest = 0;  // no vertex goes farther than the place, as in Touch
   float at[3], moved[3] = {}, predicted[3] = {}, velocity[3] = {};
   for (int k = 0; k < 3; ++k) {
     const std::size_t i = 4 * static_cast<std::size_t>(t[k]);
     mobility += share[k] * share[k] * v.x[i + 3];
+    farthest = std::max(farthest, share[k] * v.x[i + 3]);
     for (int a = 0; a < 3; ++a) {
       const auto part = static_cast<float>(share[k]);
       moved[a] += part * v.moved[i + a];
@@ -116,6 +113,7 @@ void push_triangle(State& s, const Triangle& t, const Collider& tip, float h, Co
       velocity[a] += part * v.v[i + a];
     }
   }
+  mobility = std::max(mobility, farthest);
   if (!(mobility > 0)) return;
   for (int a = 0; a < 3; ++a) {
     at[a] = static_cast<float>(place[a]);

@@ -67,6 +67,7 @@ struct Piece {
   Vec3 first = Vec3::Zero(), normal = Vec3::Zero();  ///< twice the sum of area times normal [m^2]
   double area = 0, six_volumes = 0;
   double angle = 4, edge = 1e300;  ///< least [rad, m]
+  double slope = -1e300;           ///< cotangent of the least angle
   std::int32_t vertex = -1;        ///< one of its own
 
   double hole() const { return normal.norm() / area; }
@@ -84,8 +85,15 @@ std::map<std::int32_t, Piece> measure(const State& s, UnionFind& linked) {
     p.normal += n;
     p.area += n.norm();
     p.six_volumes += n.dot(x[t[0]] - p.first);
-    p.angle = std::min(p.angle, smallest_angle(x[t[0]], x[t[1]], x[t[2]]));
-    for (int i = 0; i < 3; ++i) p.edge = std::min(p.edge, (x[t[i]] - x[t[(i + 1) % 3]]).norm());
+    for (int i = 0; i < 3; ++i) {
+      const Vec3 e = x[t[(i + 1) % 3]] - x[t[i]], f = x[t[(i + 2) % 3]] - x[t[i]];
+      p.edge = std::min(p.edge, e.squaredNorm());
+      p.slope = std::max(p.slope, e.dot(f) / n.norm());
+    }
+  }
+  for (auto& [root, p] : pieces) {
+    p.edge = std::sqrt(p.edge);
+    p.angle = std::atan2(1.0, p.slope);
   }
   return pieces;
 }

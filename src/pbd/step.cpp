@@ -184,10 +184,12 @@ void pack(State& s) {
   s.components = static_cast<int>(number.size());
   find_held(s);
   const std::vector<std::int32_t> levels = levels_of(s);
-  s.links.pack(n, levels);
-  s.bends.pack(n, levels);
-  s.strains.pack(n, levels);
-  s.elastics.pack(n, levels);
+  s.cpu.for_each(4, [&](int set) {
+    if (set == 0) s.links.pack(n, levels);
+    if (set == 1) s.bends.pack(n, levels);
+    if (set == 2) s.strains.pack(n, levels);
+    if (set == 3) s.elastics.pack(n, levels);
+  });
   s.damped_for = 0;
 }
 

@@ -12,7 +12,7 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
-#include <unordered_map>
+#include <unordered_set>
 
 #include "cutting/blade_sweep.h"
 #include "geometry/surface.h"
@@ -113,8 +113,15 @@ void add_link(State& s, std::int32_t a, std::int32_t b, double stiffness) {
 /// would turn by rounding [rad]. What a mesh came with stays.
 constexpr float kFolded = 3.0f;
 
-void add_bend(State& s, const MeshEdge& e, double stiffness) {
-  if (!(stiffness > 0)) return;
+/// What an edge gives; a compliance of 0: none.
+struct EdgeNumbers {
+  double stiffness = 0;  ///< of the link [N/m]
+  std::array<float, Bending::kNumbers> bend = {};
+};
+
+/// Angle at rest and compliance.
+std::array<float, Bending::kNumbers> bend_of(const State& s, const MeshEdge& e, double stiffness) {
+  if (!(stiffness > 0)) return {};
   const std::array<std::int32_t, 4> at = {e.left, e.right, e.a, e.b};
   Vertex<float> v[4];
   const Vec3& origin = s.vertices.reference[e.a];
@@ -125,12 +132,12 @@ void add_bend(State& s, const MeshEdge& e, double stiffness) {
   }
   const auto parts = Bending::parts(v);
   const float angle = parts.angle;
-  if (std::fabs(angle) > kFolded && (s.stroke[e.a] >= 0 || s.stroke[e.b] >= 0)) return;
+  if (std::fabs(angle) > kFolded && (s.stroke[e.a] >= 0 || s.stroke[e.b] >= 0)) return {};
   Vector<float> g[4];
   Bending::gradients(v, parts, g);
   const double h = 1 / (s.scene.frame_rate * s.scene.pbd.steps);
   const double resolved = Bending::kMostOfStep / (h * h * Bending::mobility(v, g));
-  s.bends.add(at, {angle, static_cast<float>(1 / std::min(stiffness, resolved))});
+  return {angle, static_cast<float>(1 / std::min(stiffness, resolved))};
 }
 
 /// Of each vertex beside a wound: the blade's normal there, or the way along the surface where that
@@ -204,18 +211,32 @@ void make_surface_constraints(State& s) {
     add_link(s, e.first, e.second,
              pbd.edge * material(e.first, e.second).young_modulus * volume / l2);
   }
-  for (const MeshEdge& e : mesh_edges(s)) {
+  const std::vector<MeshEdge> edges = mesh_edges(s);
+  std::vector<EdgeNumbers> numbers(edges.size());
+  const auto count_numbers = [&](const MeshEdge& e) {
+    EdgeNumbers of;
     const double l2 = (x[e.a] - x[e.b]).squaredNorm();
     const Material& m = material(e.a, e.b);
-    if (!tets) {
-      const double thick = 0.5 * (s.half_depth[e.a] + s.half_depth[e.b]);
-      add_link(s, e.a, e.b, pbd.edge * m.young_modulus * thick * e.area / l2);
-    }
-    if (e.count != 2 || e.left == e.right) continue;  // a triangle and its back have no angle
+    const double thick = tets ? 0 : 0.5 * (s.half_depth[e.a] + s.half_depth[e.b]);
+    of.stiffness = pbd.edge * m.young_modulus * thick * e.area / l2;
+    if (e.count != 2 || e.left == e.right) return of;  // a triangle and its back have no angle
     const double even = 2 / std::sqrt(3.0) * 2 * e.least_area / std::sqrt(l2);
     const double plate = m.young_modulus * std::pow(std::min(std::sqrt(l2), even), 3) /
                          (12 * (1 - m.poisson_ratio * m.poisson_ratio));
-    add_bend(s, e, pbd.bending * 3 * plate * l2 / e.area);
+    of.bend = bend_of(s, e, pbd.bending * 3 * plate * l2 / e.area);
+    return of;
+  };
+  constexpr int kEdgesOfPart = 1024;
+  const int count = static_cast<int>(edges.size());
+  s.cpu.for_each((count + kEdgesOfPart - 1) / kEdgesOfPart, [&](int part) {
+    for (int i = part * kEdgesOfPart; i < std::min(count, (part + 1) * kEdgesOfPart); ++i) {
+      numbers[i] = count_numbers(edges[i]);
+    }
+  });
+  for (int i = 0; i < count; ++i) {
+    const MeshEdge& e = edges[i];
+    add_link(s, e.a, e.b, numbers[i].stiffness);
+    if (numbers[i].bend[1] > 0) s.bends.add({e.left, e.right, e.a, e.b}, numbers[i].bend);
   }
   s.edge_count = s.links.size();
   for (const InternalPair& p : s.internal) {
@@ -266,15 +287,18 @@ int add_internal_links(State& s, int b, const std::vector<int>& starts) {
     }
   }
   std::vector<double> area(s.vertices.size(), 0.0);
-  std::unordered_map<std::uint64_t, int> edges;
+  std::vector<std::uint8_t> is_start(s.vertices.size(), 0);
+  for (const int v : starts) is_start[v] = 1;
+  std::unordered_set<std::uint64_t> edges;  // at starts
   for (const Triangle& t : s.triangles) {
+    if (is_start[t[0]] + is_start[t[1]] + is_start[t[2]] == 0) continue;
     for (int i = 0; i < 3; ++i) {
       area[t[i]] += area_of(s, t) / 3;
-      edges[pair_key(t[i], t[(i + 1) % 3])] = 1;
+      edges.insert(pair_key(t[i], t[(i + 1) % 3]));
     }
   }
   std::map<std::pair<std::int32_t, std::int32_t>, InternalPair> pairs;
-  for (const InternalPair& p : s.internal) pairs[{p.a, p.b}] = p;
+  for (const InternalPair& p : s.internal) pairs.insert(pairs.end(), {{p.a, p.b}, p});
   for (const InternalLink& link : found) {
     s.half_depth[link.from] = 0.5 * link.length;
     if (link.through_gap || edges.count(pair_key(link.from, link.to)) != 0) continue;

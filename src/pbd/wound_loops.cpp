@@ -14,8 +14,9 @@ std::vector<std::vector<std::int32_t>> open_loops(const State& s) {
     return static_cast<std::uint64_t>(from) << 32 | static_cast<std::uint32_t>(to);
   };
   std::vector<Half> halves;
-  halves.reserve(3 * s.triangles.size());
   for (std::size_t t = 0; t < s.triangles.size(); ++t) {
+    const Triangle& c = s.triangles[t];
+    if (s.stroke[c[0]] < 0 && s.stroke[c[1]] < 0 && s.stroke[c[2]] < 0) continue;  // no wound there
     for (int i = 0; i < 3; ++i) {
       halves.push_back(
           {key(s.triangles[t][i], s.triangles[t][(i + 1) % 3]), static_cast<std::int32_t>(t)});
@@ -34,14 +35,17 @@ std::vector<std::vector<std::int32_t>> open_loops(const State& s) {
   const auto to_of = [&](int h) { return static_cast<std::int32_t>(halves[h].key); };
   const auto is_open = [&](int h) { return find(to_of(h), from_of(h)) < 0; };
   std::vector<bool> seen(halves.size(), false);
+  std::vector<bool> left(halves.size(), false);  // in a loop that is no wound's
   std::vector<std::vector<std::int32_t>> loops;
   for (std::size_t start = 0; start < halves.size(); ++start) {
     if (seen[start] || s.stroke[from_of(static_cast<int>(start))] < 0) continue;
     if (!is_open(static_cast<int>(start))) continue;
     std::vector<std::int32_t> loop;
+    std::vector<int> on_loop;
     bool is_wound = true;
     for (int h = static_cast<int>(start); h >= 0 && !seen[h];) {
       seen[h] = true;
+      on_loop.push_back(h);
       loop.push_back(from_of(h));
       is_wound = is_wound && s.stroke[from_of(h)] >= 0;
       const std::int32_t at = to_of(h);
@@ -55,8 +59,9 @@ std::vector<std::vector<std::int32_t>> open_loops(const State& s) {
         h = beyond;
       }
       if (turns == 1000) h = -1;
-      is_wound = is_wound && h >= 0;
+      is_wound = is_wound && h >= 0 && !left[h];
     }
+    for (const int h : on_loop) left[h] = !is_wound;
     if (!is_wound || loop.size() < 3) continue;
     std::reverse(loop.begin(), loop.end());
     loops.push_back(loop);

@@ -258,7 +258,7 @@ FOR_EACH_METHOD(RandomOperations);
 TEST_P(RandomOperations, DoNotBlowUp) {
   std::vector<int> seeds = {13, 14, 103};
   if (GetParam().method != Method::kMpm) seeds.insert(seeds.end(), {1, 2});
-  if (GetParam().method == Method::kPbd) seeds.insert(seeds.end(), {37, 61});
+  if (GetParam().method == Method::kPbd) seeds.insert(seeds.end(), {37, 61, 2055, 2098});
   if (const char* asked = std::getenv("TISSUE_SIM_OPERATIONS")) {
     int first, count;
     ASSERT_EQ(std::sscanf(asked, "%d:%d", &first, &count), 2) << "<first seed>:<count>";

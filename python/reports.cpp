@@ -62,6 +62,7 @@ void bind_reports(py::module& m) {
       .def_readonly("substep", &FrameResult::substep, "the longest [s]")
       .def_readonly("kinetic_energy", &FrameResult::kinetic_energy, "[J]")
       .def_readonly("elastic_energy", &FrameResult::elastic_energy, "[J]")
+      .def_readonly("cutting_work", &FrameResult::cutting_work, "[J]")
       .def_readonly("max_speed", &FrameResult::max_speed, "of a point [m/s]")
       .def_readonly("blew_up", &FrameResult::blew_up);
   py::class_<AppliedInput>(m, "AppliedInput", "What was applied in a frame: Simulation.repeat().")

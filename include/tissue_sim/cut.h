@@ -14,6 +14,9 @@ namespace tissue_sim {
 struct BladePath {
   std::vector<Vec3> edge;   ///< [m], blade frame, at least 2 points
   std::vector<Pose> poses;  ///< world frame, at least 2
+  /// Where the edge is another at the last pose, that, of as many points: between the poses it
+  /// becomes it evenly. Empty: it stays.
+  std::vector<Vec3> edge_at_end = {};
 };
 
 /// Throws std::invalid_argument for what Simulation::cut() does not take: less than two poses or

@@ -38,6 +38,9 @@ struct Material {
   /// How far the limit's strain, tear_stretch - 1, varies from point to point: drawn evenly within
   /// this share of it, by Scene::seed and the point's place [-], 0 to 0.9.
   double tear_scatter = 0.0;
+  /// What a blade's edge takes for each area that it cuts [J/m^2], 0 to 1e5; 0: it cuts without a
+  /// force. docs/cutting.md says what that comes to.
+  double toughness = 0.0;
   double friction = 0.3;  ///< Coulomb friction of tissue on tissue [-], 0 to 2; between two
                           ///< materials the geometric mean
   Bleeding bleeding;
@@ -49,6 +52,10 @@ double lame_lambda(const Material& m);
 double lame_mu(const Material& m);
 /// Speed of pressure waves at rest [m/s]: sqrt((lambda + 2 mu) / density).
 double wave_speed(const Material& m);
+
+/// The toughness that was measured of the tissue of that name [J/m^2], 0 where none was: sources in
+/// docs/cutting.md.
+double measured_toughness(const std::string& preset);
 
 /// The built-in materials (liver, kidney, fat, muscle, skin, vessel, gelatine), with the source of
 /// each in src/material/presets.cpp. A scene that defines a material of the same name wins.

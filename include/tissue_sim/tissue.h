@@ -55,6 +55,7 @@ struct FrameResult {
   int fragment_points = 0;      ///< of these, those that it expects to be part of fragments
   double kinetic_energy = 0;    ///< [J]
   double elastic_energy = 0;    ///< [J]
+  double cutting_work = 0;      ///< of blades in tissue that resists: toughness times area [J]
   double max_speed = 0;         ///< of a point [m/s]
   bool blew_up = false;         ///< something is not finite, or moves faster than it can
 };
@@ -74,6 +75,8 @@ struct SurfaceTriangles {
   std::vector<std::int32_t> fragment;  ///< Fragment::id of each triangle
   std::vector<std::int32_t> point;     ///< Point::id of the tissue there, one of several for some
   std::vector<std::uint8_t> cut;       ///< of each: 1 where a cut or a tear made it, else 0
+  /// Another number whenever anything but `corners` is not what it was; 0: nobody knows.
+  std::uint64_t made = 0;
 };
 
 /// Points in a GPU's memory, written and valid for as long as `bytes` is held.
@@ -101,7 +104,8 @@ class Tissue {
   virtual GpuPoints read_points_on_gpu(const PointSelection& /*selection*/) { return {}; }
   /// Which PointFields read_points() can add.
   virtual unsigned point_fields() const { return ~0u; }
-  /// Replaces `surface` with the tissue's, as of the last finish().
+  /// Replaces `surface` with the tissue's, as of the last finish(). Cheapest where it is the one
+  /// that was read last.
   virtual void read_surface(SurfaceTriangles& surface) = 0;
   /// Gives the tissue impulses at the corners of the triangles that read_surface() gave last, since
   /// when it must not have advanced: nine numbers a triangle [N s]. They go to what moves a corner.

@@ -37,7 +37,9 @@ struct Tool {
   double blade_length = 0.025;          ///< scalpel: edge from the tip to the heel, along -z [m]
   double blade_width = 0.006;           ///< scalpel: from the edge to the spine, along -x [m]
   double blade_thickness = 0.0004;      ///< scalpel: along y [m]
-  double jaw_length = 0.015;            ///< grasper: from the hinge to the tip, along z [m]
+  double blade_edge_radius = 0;  ///< scalpel: `edge_radius` in a scene; how dull the edge is,
+                                 ///< at most half of its thickness [m]
+  double jaw_length = 0.015;     ///< grasper: from the hinge to the tip, along z [m]
   double jaw_width = 0.004;      ///< grasper: of a jaw, half round with a flat face, along y [m]
   double grip_pressure = 3000;   ///< grasper: its jaws close until they press with it [Pa]
   double cohesion = 10000;       ///< grasper: what its teeth hold beside friction [Pa]

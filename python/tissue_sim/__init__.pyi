@@ -80,6 +80,7 @@ class FrameResult:
     substep: float
     kinetic_energy: float
     elastic_energy: float
+    cutting_work: float
     max_speed: float
     blew_up: bool
 

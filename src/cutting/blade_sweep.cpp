@@ -60,6 +60,10 @@ std::vector<SweepPart> sweep_parts(const BladePath& path) {
   for (std::size_t i = 0; i + 1 < path.poses.size(); ++i) {
     const Pose &p = path.poses[i], &q = path.poses[i + 1];
     const int n = parts_between(p, q);
+    const auto edge_at = [&](double share, std::size_t j) -> Vec3 {
+      if (path.edge_at_end.empty()) return path.edge[j];
+      return (1 - share) * path.edge[j] + share * path.edge_at_end[j];
+    };
     const auto at = [&](int k) {
       if (k == 0) return p;
       if (k == n) return q;
@@ -72,8 +76,9 @@ std::vector<SweepPart> sweep_parts(const BladePath& path) {
       part.begin = (i + static_cast<double>(k) / n) / spans;
       part.end = (i + static_cast<double>(k + 1) / n) / spans;
       for (std::size_t j = 0; j + 1 < path.edge.size(); ++j) {
-        part.edges.push_back(swept({from * path.edge[j] + aside, from * path.edge[j + 1] + aside,
-                                    to * path.edge[j] + aside, to * path.edge[j + 1] + aside}));
+        const double b = part.begin, e = part.end;
+        part.edges.push_back(swept({from * edge_at(b, j) + aside, from * edge_at(b, j + 1) + aside,
+                                    to * edge_at(e, j) + aside, to * edge_at(e, j + 1) + aside}));
       }
       part.box = box_of(part.edges);
       parts.push_back(std::move(part));

@@ -23,7 +23,14 @@ void check_path(const BladePath& path) {
     throw std::invalid_argument("a blade's edge needs at least 2 points, got " +
                                 std::to_string(path.edge.size()));
   }
-  for (const Vec3& x : path.edge) {
+  if (!path.edge_at_end.empty() && path.edge_at_end.size() != path.edge.size()) {
+    throw std::invalid_argument("a blade's edge has " + std::to_string(path.edge.size()) +
+                                " points, and " + std::to_string(path.edge_at_end.size()) +
+                                " at the end of its path");
+  }
+  std::vector<Vec3> places = path.edge;
+  places.insert(places.end(), path.edge_at_end.begin(), path.edge_at_end.end());
+  for (const Vec3& x : places) {
     if (!x.allFinite()) throw std::invalid_argument("a point of the blade's edge is not finite");
     if (!(x.cwiseAbs().maxCoeff() <= kFarthestPlace)) {
       throw std::invalid_argument("a point of the blade's edge is more than 1e6 m away");

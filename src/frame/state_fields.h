@@ -2,6 +2,7 @@
 #pragma once
 
 #include "compute/archive.h"
+#include "cutting/resisting_edge.h"
 #include "fragments/pieces.h"
 #include "frame/stability_limit.h"
 #include "frame/step_acceptance.h"
@@ -51,7 +52,17 @@ void fields(Archive& archive, AnchorMotion& m) {
 
 template <class Archive>
 void fields(Archive& archive, BladePath& p) {
-  archive(p.edge, p.poses);
+  archive(p.edge, p.poses, p.edge_at_end);
+}
+
+template <class Archive>
+void fields(Archive& archive, EdgePlace& p) {
+  archive(p.body, p.site, p.at);
+}
+
+template <class Archive>
+void fields(Archive& archive, EdgeHold& h) {
+  archive(h.place, h.swept, h.ahead, h.presses, h.lets_go);
 }
 
 template <class Archive>

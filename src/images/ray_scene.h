@@ -28,6 +28,8 @@ class RayScene {
   ~RayScene();
   /// Nine coordinates a triangle [m]; copied.
   void set(const std::vector<float>& corners, Cpu& cpu);
+  /// About all triangles, of which there is one at least.
+  Box box() const;
   /// kPacket rays from `from`, each along its direction, from t = near to far. Thread-safe.
   void meet(const Vec3& from, const Vec3* along, double near, double far, Met* met) const;
 

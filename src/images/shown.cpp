@@ -29,14 +29,9 @@ Window window_of(const Pose& eye, const Pose& box, const Vec3& min, const Vec3& 
   return w;
 }
 
-Box box_of(const std::vector<float>& corners) {
-  Box box;
-  for (std::size_t i = 0; i < corners.size(); i += 3) {
-    const Vec3 x(corners[i], corners[i + 1], corners[i + 2]);
-    box.min = box.min.cwiseMin(x);
-    box.max = box.max.cwiseMax(x);
-  }
-  return box;
+/// But for its corners.
+bool is_same(const SurfaceTriangles& a, const SurfaceTriangles& b) {
+  return a.made != 0 && a.made == b.made;
 }
 
 }  // namespace
@@ -70,26 +65,31 @@ ToolMesh::ToolMesh(const Tool& tool, Cpu& cpu) {
   triangles.rest = triangles.corners;
   triangles.fragment.resize(mesh.triangles.size());
   triangles.cut.resize(mesh.triangles.size());
-  normals = &smooth.of(triangles, cpu);
+  SmoothNormals().put(triangles, cpu, normals);
   rays.set(triangles.corners, cpu);
 }
 
 void Shown::set(const SceneView& view, const Scene& scene,
                 const std::vector<std::unique_ptr<ToolMesh>>& meshes, SmoothNormals& smooth,
                 Cpu& cpu) {
-  surface = view.surface;
-  normals = smooth.of(surface, cpu);
+  if (is_same(view.surface, surface)) {
+    surface.corners = view.surface.corners;
+  } else {
+    surface = view.surface;
+  }
+  smooth.put(surface, cpu, normals);
   rays.set(surface.corners, cpu);
-  box = box_of(surface.corners);
+  box = surface.corners.empty() ? Box() : rays.box();
   fluid_normals = view.fluid_normals;
   fluid_kind = view.fluid_kind;
   fluid_colour = view.fluid_colour;
-  fluid_box = box_of(view.fluid);
   if (view.fluid.empty()) {
     fluid_rays.reset();
+    fluid_box = {};
   } else {
     if (fluid_rays == nullptr) fluid_rays = std::make_unique<RayScene>();
     fluid_rays->set(view.fluid, cpu);
+    fluid_box = fluid_rays->box();
   }
   parts.clear();
   for (std::size_t i = 0; i < view.tools.size(); ++i) {
@@ -180,8 +180,7 @@ void Shown::meet(const Eye& eye, const Ground& ground, const Window& window, con
         if (met[i].triangle < 0 || !(met[i].t < nearest)) continue;
         hit.t = met[i].t;
         hit.u = met[i].u, hit.v = met[i].v;
-        hit.normal =
-            pose.orientation * interpolated(&(*part.mesh->normals)[9 * met[i].triangle], hit);
+        hit.normal = pose.orientation * interpolated(&part.mesh->normals[9 * met[i].triangle], hit);
       }
       hit.label = part.label;
       hit.part = static_cast<std::int32_t>(k);
@@ -193,7 +192,7 @@ void Shown::meet(const Eye& eye, const Ground& ground, const Window& window, con
 std::vector<std::int32_t> Shown::same_triangles(const SurfaceTriangles& last) const {
   const std::vector<float>& rest = surface.rest;
   std::vector<std::int32_t> same(surface.fragment.size(), -1);
-  if (rest == last.rest) {
+  if (is_same(surface, last)) {
     std::iota(same.begin(), same.end(), 0);
     return same;
   }

@@ -55,8 +55,7 @@ struct Eye {
 /// A tool's mesh, which lies still in its frame.
 struct ToolMesh {
   RayScene rays;
-  SmoothNormals smooth;
-  const std::vector<float>* normals;
+  std::vector<float> normals;
   Vec3 centre;  ///< of the box about it, in the tool's frame [m]
   Vec3 size;    ///< of that [m]
 

@@ -17,64 +17,63 @@ float inner_product(const float* a, const float* b) {
 }  // namespace
 
 void SmoothNormals::group(const SurfaceTriangles& surface) {
-  rest_ = surface.rest;
-  fragment_ = surface.fragment;
-  cut_ = surface.cut;
-  corners_.resize(3 * fragment_.size());
+  const std::vector<float>& rest = surface.rest;
+  corners_.resize(3 * surface.fragment.size());
   std::iota(corners_.begin(), corners_.end(), 0);
-  const auto before = [this](std::int32_t a, std::int32_t b) {
-    const int order = std::memcmp(&rest_[3 * a], &rest_[3 * b], 3 * sizeof(float));
-    if (order != 0) return order < 0;
-    if (fragment_[a / 3] != fragment_[b / 3]) return fragment_[a / 3] < fragment_[b / 3];
-    if (cut_[a / 3] != cut_[b / 3]) return cut_[a / 3] < cut_[b / 3];
-    return a < b;
+  const auto order = [&](std::int32_t a, std::int32_t b) {
+    const int by_place = std::memcmp(&rest[3 * a], &rest[3 * b], 3 * sizeof(float));
+    if (by_place != 0) return by_place;
+    const int by_piece = surface.fragment[a / 3] - surface.fragment[b / 3];
+    return by_piece != 0 ? by_piece : surface.cut[a / 3] - surface.cut[b / 3];
   };
-  std::sort(corners_.begin(), corners_.end(), before);
+  std::sort(corners_.begin(), corners_.end(), [&](std::int32_t a, std::int32_t b) {
+    const int o = order(a, b);
+    return o != 0 ? o < 0 : a < b;
+  });
   begin_.clear();
   for (std::size_t i = 0; i < corners_.size(); ++i) {
-    const std::int32_t a = i == 0 ? 0 : corners_[i - 1], b = corners_[i];
-    const bool same = i > 0 && std::memcmp(&rest_[3 * a], &rest_[3 * b], 3 * sizeof(float)) == 0 &&
-                      fragment_[a / 3] == fragment_[b / 3] && cut_[a / 3] == cut_[b / 3];
-    if (!same) begin_.push_back(static_cast<std::int32_t>(i));
+    if (i == 0 || order(corners_[i - 1], corners_[i]) != 0) {
+      begin_.push_back(static_cast<std::int32_t>(i));
+    }
   }
   begin_.push_back(static_cast<std::int32_t>(corners_.size()));
 }
 
-const std::vector<float>& SmoothNormals::of(const SurfaceTriangles& surface, Cpu& cpu) {
-  if (surface.fragment != fragment_ || surface.cut != cut_ || surface.rest != rest_) group(surface);
+void SmoothNormals::put(const SurfaceTriangles& surface, Cpu& cpu, std::vector<float>& normals) {
+  if (surface.made == 0 || surface.made != made_) group(surface);
+  made_ = surface.made;
   constexpr int kGrain = 1024;
-  const std::size_t triangles = fragment_.size();
-  faces_.resize(3 * triangles);  // twice the area long
+  const std::size_t triangles = surface.fragment.size();
+  faces_.resize(4 * triangles);
   const auto face = [&](int t) {
     const float* x = &surface.corners[9 * t];
     float a[3], b[3];
     for (int i = 0; i < 3; ++i) a[i] = x[3 + i] - x[i], b[i] = x[6 + i] - x[i];
+    float* to = &faces_[4 * t];
     for (int i = 0; i < 3; ++i) {
       const int j = (i + 1) % 3, k = (i + 2) % 3;
-      faces_[3 * t + i] = a[j] * b[k] - a[k] * b[j];
+      to[i] = a[j] * b[k] - a[k] * b[j];
     }
+    to[3] = std::sqrt(inner_product(to, to));
   };
   cpu.for_each(static_cast<int>(triangles), face, kGrain);
-  normals_.resize(9 * triangles);
+  normals.resize(9 * triangles);
   const auto group = [&](int g) {
     for (std::int32_t i = begin_[g]; i < begin_[g + 1]; ++i) {
-      const float* own = &faces_[3 * (corners_[i] / 3)];
-      const float length = std::sqrt(inner_product(own, own));
+      const float* own = &faces_[4 * (corners_[i] / 3)];
       float sum[3] = {};
       for (std::int32_t k = begin_[g]; k < begin_[g + 1]; ++k) {
-        const float* other = &faces_[3 * (corners_[k] / 3)];
-        if (inner_product(own, other) < kSmooth * length * std::sqrt(inner_product(other, other)))
-          continue;
+        const float* other = &faces_[4 * (corners_[k] / 3)];
+        if (inner_product(own, other) < kSmooth * own[3] * other[3]) continue;
         for (int a = 0; a < 3; ++a) sum[a] += other[a];
       }
       const float all = std::sqrt(inner_product(sum, sum));
       for (int a = 0; a < 3; ++a) {
-        normals_[3 * corners_[i] + a] = all > 0 ? sum[a] / all : a == 2 ? 1.0f : 0.0f;
+        normals[3 * corners_[i] + a] = all > 0 ? sum[a] / all : a == 2 ? 1.0f : 0.0f;
       }
     }
   };
   cpu.for_each(static_cast<int>(begin_.size()) - 1, group, kGrain);
-  return normals_;
 }
 
 std::vector<float> SmoothNormals::means(const std::vector<float>& of_triangle) const {

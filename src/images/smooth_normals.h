@@ -12,21 +12,19 @@ namespace tissue_sim {
 
 class SmoothNormals {
  public:
-  /// Three numbers a corner, of length 1, in world axes; valid until the next call. Which corners
-  /// meet is found anew only where the surface is of other triangles than the last one.
-  const std::vector<float>& of(const SurfaceTriangles& surface, Cpu& cpu);
+  /// Replaces `normals`: three numbers a corner, of length 1, in world axes. Which corners meet is
+  /// found anew only where the surface is of other triangles than the last one.
+  void put(const SurfaceTriangles& surface, Cpu& cpu, std::vector<float>& normals);
   /// Of each corner the mean of what the triangles that meet there have, of the last surface.
   std::vector<float> means(const std::vector<float>& of_triangle) const;
 
  private:
   void group(const SurfaceTriangles& surface);
 
-  std::vector<float> rest_;             // of the last surface
-  std::vector<std::int32_t> fragment_;  // the same
-  std::vector<std::uint8_t> cut_;
+  std::uint64_t made_ = 0;             // of the last surface
   std::vector<std::int32_t> corners_;  // by group
   std::vector<std::int32_t> begin_;    // of each group in `corners_`
-  std::vector<float> faces_, normals_;
+  std::vector<float> faces_;           // four numbers each: normal, twice the area long, and length
 };
 
 }  // namespace tissue_sim

@@ -15,6 +15,7 @@
 // Densities, unless stated: table 3 of Mech. Mater. 44:174 (2012),
 // doi:10.1016/j.mechmat.2011.08.007, collected there from Goss et al., Mast and others.
 #include <cmath>
+#include <utility>
 
 #include "tissue_sim/material.h"
 
@@ -41,6 +42,22 @@ double lame_mu(const Material& m) { return m.young_modulus / (2 * (1 + m.poisson
 
 double wave_speed(const Material& m) {
   return std::sqrt((lame_lambda(m) + 2 * lame_mu(m)) / m.density);
+}
+
+double measured_toughness(const std::string& preset) {
+  static const std::vector<std::pair<std::string, double>> measured = {
+      // Porcine liver, blade: 187 to 225; bovine liver, needles: 164 +- 6 (Gokgol et al., Appl.
+      // Bionics Biomech. 9:27, 2012).
+      {"liver", 206},
+      {"fat", 4100},
+      {"muscle", 550},  // the least: up to 8000 by direction and method
+      {"skin", 2800},   // chicken, scissors; rat: 1700
+      {"vessel", 290},  // aorta
+  };
+  for (const auto& [name, toughness] : measured) {
+    if (name == preset) return toughness;
+  }
+  return 0;
 }
 
 const std::vector<Material>& material_presets() {

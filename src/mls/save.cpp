@@ -38,7 +38,7 @@ void fields(Archive& archive, MlsNodeContacts& c) {
 template <class Archive>
 void fields(Archive& archive, MlsState& s) {
   archive(s.pairs.crossed, s.pairs.weight, s.u, s.v, s.inverse_moment, s.kappa, s.outer, s.sprung,
-          s.spring, s.contact, s.node_contacts, s.until_list, s.dt, s.time);
+          s.spring, s.contact, s.node_contacts, s.edges.holds, s.until_list, s.dt, s.time);
 }
 
 template <class Archive>
@@ -102,6 +102,15 @@ struct MlsSizes {
                      end = c.other.begin() + c.begin[c.other[e] + 1];
           check_state(c.other[e] != i && std::find(begin, end, i) != end, "contacts");
         }
+      }
+    }
+    check_sizes("edges", s.edges.pieces, s.edges.holds);
+    for (const EdgeHold& h : s.edges.holds) {
+      check_numbers(h.ahead, 2, "edges");
+      check_state(h.place.body == h.swept.body && h.lets_go == 0, "edges");
+      for (const EdgePlace* p : {&h.place, &h.swept}) {
+        check_numbers(p->at, 1e3, "edges");
+        check_state(p->body == -1 || (p->site[0] >= 0 && p->site[0] < nodes), "edges");
       }
     }
     check_state(std::isfinite(s.dt) && s.dt >= 0 && std::isfinite(s.time), "time");

@@ -157,6 +157,7 @@ std::unique_ptr<MlsState> make_mls_state(const Scene& scene, std::vector<std::st
   if (std::any_of(anchored.begin(), anchored.end(), [](std::uint8_t a) { return a != 0; })) {
     resize_padded(s.held_impulse, n, 4);
   }
+  s.edges = resisting_edges(scene);
   s.instructions = instruction_set();
   s.kernels = &mls_kernels(s.instructions);
   s.lanes = make_lanes(s.pairs, s.place);

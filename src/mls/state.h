@@ -9,6 +9,7 @@
 #include "compute/array.h"
 #include "compute/for_each.h"
 #include "compute/simd.h"
+#include "cutting/resisting_edge.h"
 #include "mls/anchors.h"
 #include "mls/face_contact.h"
 #include "mls/face_pairs.h"
@@ -127,9 +128,10 @@ struct MlsState {
   Array<float> held_impulse;  ///< on held nodes, since the frame began [4 n]; empty without any
   std::vector<MlsGroupContact> contact;  ///< per group
   MlsNodeContacts node_contacts;
-  int until_list = 0;  ///< substeps until colliders near groups are listed anew
-  float dt = 0;        ///< the last substep, 0 before the first [s]
-  double time = 0;     ///< [s]
+  ResistingEdges edges;  ///< of blades, on the CPU
+  int until_list = 0;    ///< substeps until colliders near groups are listed anew
+  float dt = 0;          ///< the last substep, 0 before the first [s]
+  double time = 0;       ///< [s]
 
   InstructionSet instructions = InstructionSet::kSse2;
   const MlsKernels* kernels = nullptr;

@@ -253,7 +253,7 @@ void read_surface(const MlsState& s, const std::vector<std::int32_t>& piece, Mls
       },
       kGrain);
   const auto vertices = static_cast<int>(surface.vertices.size());
-  std::vector<std::array<float, 3>> place(vertices), rest(vertices);
+  std::vector<std::array<float, 3>> place(vertices);
   s.cpu->for_each(
       vertices,
       [&](int i) {
@@ -264,12 +264,10 @@ void read_surface(const MlsState& s, const std::vector<std::int32_t>& piece, Mls
           const std::int32_t n = v.node[k];
           x += v.weight[k] * (s.position(n) + f[n] * (v.rest - s.nodes.place[n]));
         }
-        for (int a = 0; a < 3; ++a) {
-          place[i][a] = static_cast<float>(x[a]);
-          rest[i][a] = static_cast<float>(v.rest[a]);
-        }
+        place[i] = floats(x);
       },
       kGrain);
+  const auto rest = [&surface](std::int32_t v) { return floats(surface.vertices[v].rest); };
   put_faces(surface.faces, place, rest, piece, *s.cpu, out);
 }
 

@@ -3,16 +3,10 @@
 #include <algorithm>
 #include <cmath>
 
+#include "math/draw.h"
+
 namespace tissue_sim {
 namespace {
-
-/// A number in [-1, 1) that hangs on seed and node alone (splitmix64).
-float draw(std::uint64_t seed, std::int32_t node) {
-  std::uint64_t z = seed + 0x9e3779b97f4a7c15u * (static_cast<std::uint64_t>(node) + 1);
-  z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9u;
-  z = (z ^ (z >> 27)) * 0x94d049bb133111ebu;
-  return static_cast<float>((z ^ (z >> 31)) >> 40) * 0x1p-23f - 1;
-}
 
 /// Largest stretch that a node bears; 0 where it bears any.
 float limit_of(const MlsState& s, std::int32_t i) {

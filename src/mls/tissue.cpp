@@ -15,6 +15,7 @@
 #include "frame/select_points.h"
 #include "mls/crossing.h"
 #include "mls/cut.h"
+#include "mls/cutting_edges.h"
 #include "mls/linearised_motion.h"
 #include "mls/node_contact.h"
 #include "mls/tear.h"
@@ -123,6 +124,7 @@ void MlsTissue::begin_frame(double duration, const FrameInput& input, FrameColli
   }
   const bool blades = !blade_paths(s.scene, input, 0, 1).empty();
   if (blades) pull();
+  look_for_edges(s, input, 0);
   frame_.emplace(Frame{input, duration, std::move(colliders), blades ? s.u : Array<float>(), 0});
   s.until_list = 0;
   std::fill(s.held_impulse.begin(), s.held_impulse.end(), 0.0f);
@@ -152,6 +154,7 @@ void MlsTissue::save_checkpoint() {
   checkpoint_.held_impulse = s.held_impulse;
   checkpoint_.contact = s.contact;
   checkpoint_.node_contacts = s.node_contacts;
+  checkpoint_.edges = s.edges.holds;
   checkpoint_.dt = s.dt;
   checkpoint_.time = s.time;
   checkpoint_.until_list = s.until_list;
@@ -172,6 +175,7 @@ int MlsTissue::run_part(const FramePart& part) {
       for (const Collider& c : s.colliders) fastest = std::max(fastest, speed(c));
       update_node_contacts(s, pieces_.of_point, part.substeps.at(i), fastest);
     }
+    result_.cutting_work += push_by_edges(s, part.substeps.at(i), loads);
     const float acted = substep(s, part.substeps.at(i), loads);
     frame.colliders.add_loads(share, s.colliders.data(), loads.data(), acted / frame.duration,
                               result_.loads);
@@ -197,6 +201,7 @@ void MlsTissue::reject_part(Verdict) {
   s.held_impulse = checkpoint_.held_impulse;
   s.contact = checkpoint_.contact;
   s.node_contacts = checkpoint_.node_contacts;
+  s.edges.holds = checkpoint_.edges;
   s.dt = checkpoint_.dt;
   s.time = checkpoint_.time;
   s.until_list = checkpoint_.until_list;
@@ -210,13 +215,16 @@ void MlsTissue::break_bonds(double share) {
   const std::vector<std::int32_t> tearing =
       can_tear(s) ? find_tearing(s) : std::vector<std::int32_t>();
   if (!frame.u_before.empty() && (share == 1 || !tearing.empty())) {
-    for (const BladePath& path : blade_paths(s.scene, frame.input, frame.cut_to, share)) {
-      cut(path, frame.u_before.data(), result_.blade_report);
-    }
+    const auto free = free_paths(s.scene, s.edges, frame.input, frame.cut_to, share);
+    const auto held = held_paths(s, frame.input, share);
+    for (const BladePath& path : free) cut(path, frame.u_before.data(), result_.blade_report);
+    for (const BladePath& path : held) cut(path, s.u.data(), result_.blade_report);
     frame.u_before = s.u;
     frame.cut_to = share;
   }
-  if (!tearing.empty()) break_pairs(tearing, {}, result_.tear_report);
+  if (tearing.empty()) return;
+  break_pairs(tearing, {}, result_.tear_report);
+  if (share < 1) look_for_edges(s, frame.input, share);
 }
 
 MlsTissue::Figures MlsTissue::measure() {

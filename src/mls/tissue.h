@@ -94,6 +94,7 @@ class MlsTissue : public SteppedTissue<MlsTissue> {
     Array<float> u, v, held_impulse;
     std::vector<MlsGroupContact> contact;
     MlsNodeContacts node_contacts;
+    std::vector<EdgeHold> edges;
     float dt;
     double time;
     int until_list;

@@ -317,6 +317,21 @@ void check_anchors(const MpmState& s, const Known& k) {
   }
 }
 
+void check_edges(const MpmState& s) {
+  check_sizes("edges", s.edges.pieces, s.edges.holds);
+  for (const EdgeHold& h : s.edges.holds) {
+    check_numbers(h.ahead, 2, "edges");
+    check_state(h.place.body == h.swept.body && h.lets_go == 0, "edges");
+    for (const EdgePlace* p : {&h.place, &h.swept}) {
+      if (p->body == -1) continue;
+      check_numbers(p->at, 1e3, "edges");
+      check_state(p->body >= 0 && p->body < static_cast<std::int32_t>(s.bodies.size()) &&
+                      s.bodies[p->body].point(p->site[0], p->site[1], p->site[2]) >= 0,
+                  "edges");
+    }
+  }
+}
+
 void check_front(const MpmState& s, const Known& k) {
   const Front& f = s.front;
   for (int a = 0; a < 3; ++a) check_sizes("front", f.nodes, f.d[a], f.rate[a]);
@@ -353,6 +368,7 @@ void check_state(const MpmState& s) {
   check_blocks(s, k);
   check_contacts(s, k);
   check_faces(s, k);
+  check_edges(s);
 }
 
 }  // namespace tissue_sim

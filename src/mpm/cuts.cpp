@@ -1,6 +1,7 @@
 // Tissue that is cut, tears, or is calmed where it is ill-conditioned.
 #include <algorithm>
 
+#include "mpm/contact/cutting_edges.h"
 #include "mpm/cut_tissue.h"
 #include "mpm/lattice_pieces.h"
 #include "mpm/mpm_tissue.h"
@@ -43,8 +44,11 @@ void MpmTissue::cut(const std::vector<BladePath>& paths, bool moves, CutReport& 
 
 void MpmTissue::cut_by_blades(double share) {
   MpmFrame& frame = *run_->frame;
-  cut(blade_paths(run_->state.scene, frame.input, frame.cut_to, share), true,
-      run_->result.blade_report);
+  MpmState& s = run_->state;
+  const auto free = free_paths(s.scene, s.edges, frame.input, frame.cut_to, share);
+  const auto held = held_paths(s, frame.input, share);
+  cut(free, true, run_->result.blade_report);
+  cut(held, false, run_->result.blade_report);
   frame.cut_to = share;
 }
 

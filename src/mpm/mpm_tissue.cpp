@@ -83,7 +83,7 @@ FrameResult MpmTissue::finish() {
 }
 
 void MpmTissue::read_surface(SurfaceTriangles& surface) {
-  device_->bring_all_nodes();
+  device_->bring_places();
   tissue_sim::read_surface(run_->state, run_->pieces, surface);
 }
 

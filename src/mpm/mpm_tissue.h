@@ -56,7 +56,7 @@ class MpmTissue : public SteppedTissue<MpmTissue> {
   Foresight& foresight() { return foresight_; }
 
  private:
-  friend struct FixedSubsteps;  // test/fixed_substeps.h
+  friend struct FixedSubsteps;  // test/support/fixed_substeps.h
   template <class Archive>
   void each_field(Archive& archive);
 

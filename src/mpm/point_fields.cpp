@@ -76,16 +76,12 @@ void read_surface(MpmState& s, const Pieces& pieces, SurfaceTriangles& surface) 
   update_boundary(s, mesh);
   constexpr int kGrain = 256;
   const auto vertices = static_cast<int>(mesh.vertices.size());
-  std::vector<std::array<float, 3>> place(vertices), rest(vertices);
+  mesh.now.resize(vertices);
   s.cpu->for_each(
       vertices,
       [&](int i) {
         const BoundaryMesh::Vertex& v = mesh.vertices[i];
-        const Points::Site& site = s.points.site[v.point];
-        const LatticeBody& b = s.bodies[site.body];
-        Vec3 x = b.node_position(site.x / 2, site.y / 2, site.z / 2) +
-                 b.cell_size * Vec3(v.place[0], v.place[1], v.place[2]);
-        for (int a = 0; a < 3; ++a) rest[i][a] = static_cast<float>(x[a]);
+        Vec3 x = v.rest;
         if (s.points.free_volume_of(v.point) > 0) {
           const AxisWeights weights(v.place);
           for (int k = 0; k < 27; ++k) {
@@ -93,12 +89,14 @@ void read_surface(MpmState& s, const Pieces& pieces, SurfaceTriangles& surface) 
             for (int a = 0; a < 3; ++a) x[a] += w * s.nodes.u[a][v.node[k]];
           }
         } else if (s.anchors.moves) {
-          x = s.anchors.place_of_held(b.body, site.body, x);
+          const std::int32_t body = s.points.site[v.point].body;
+          x = s.anchors.place_of_held(s.bodies[body].body, body, x);
         }
-        for (int a = 0; a < 3; ++a) place[i][a] = static_cast<float>(x[a]);
+        mesh.now[i] = floats(x);
       },
       kGrain);
-  put_faces(mesh.faces, place, rest, pieces.of_point, *s.cpu, surface);
+  const auto rest = [&mesh](std::int32_t v) { return floats(mesh.vertices[v].rest); };
+  put_faces(mesh.faces, mesh.now, rest, pieces.of_point, *s.cpu, surface);
 }
 
 void push_surface(MpmState& s, Span<const float> impulses) {

@@ -76,5 +76,11 @@ TISSUE_SIM_INLINE ContactPush push_out(const Collider& collider, const Gap& g, f
   return push;
 }
 
+/// So deep a triangle may lie in a tip before it is pushed, beside its corners: a mesh that fits
+/// the tip does, for its triangles are chords [m].
+TISSUE_SIM_INLINE float chord(float edge, float radius) {
+  return fminf(edge * edge / (8 * radius), 0.25f * radius);
+}
+
 }  // namespace pbd
 }  // namespace tissue_sim

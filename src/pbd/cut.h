@@ -27,6 +27,12 @@ bool cut_surface(State& s, const BladePath& path, const std::vector<Vec3>& befor
 bool cut_tetrahedra(State& s, const BladePath& path, const std::vector<Vec3>& before, bool smooth,
                     std::vector<std::int32_t>& origin, CutReport& report);
 
+/// Makes State::faces, all whole.
+void find_faces(State& s);
+/// Parts tetrahedra at these of State::faces; as cut_tetrahedra() for the rest.
+bool part_faces(State& s, const std::vector<std::int32_t>& faces, std::vector<std::int32_t>& origin,
+                CutReport& report);
+
 /// Momentum of a body's free vertices.
 struct Motion {
   double mass = 0;  ///< [kg]

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <map>
 
+#include "math/union_find.h"
 #include "pbd/cut.h"
 #include "tissue_sim/limits.h"
 
@@ -18,24 +19,6 @@ namespace {
 constexpr double kLeastVolume = 0.3;
 /// ... and 6 V / L^3, 0.71 of a regular one, stays above this.
 constexpr double kLeastQuality = 0.06;
-
-void find_faces(State& s) {
-  std::map<std::array<std::int32_t, 3>, std::pair<std::int32_t, std::int8_t>> first;
-  for (std::size_t t = 0; t < s.tetrahedra.size(); ++t) {
-    for (std::int8_t k = 0; k < 4; ++k) {
-      std::array<std::int32_t, 3> key;
-      for (int i = 0, j = 0; i < 4; ++i) {
-        if (i != k) key[j++] = s.tetrahedra[t][i];
-      }
-      std::sort(key.begin(), key.end());
-      const auto [at, is_new] = first.try_emplace(key, static_cast<std::int32_t>(t), k);
-      if (!is_new) {
-        s.faces.push_back(
-            {{at->second.first, static_cast<std::int32_t>(t)}, {at->second.second, k}, false});
-      }
-    }
-  }
-}
 
 Vec3 centre(const State& s, const std::vector<Vec3>& x, std::int32_t t) {
   Vec3 sum = Vec3::Zero();
@@ -126,6 +109,46 @@ void keep_crumbs(State& s, std::vector<Broken>& broken) {
   broken.erase(std::remove_if(broken.begin(), broken.end(),
                               [&s](const Broken& b) { return !s.faces[b.face].is_cut; }),
                broken.end());
+}
+
+/// What a tear would leave of fewer tetrahedra than four cells of the lattice have hangs on to where
+/// most of its faces are: a crack whose direction turns passes on both sides of such crumbs.
+void keep_small(State& s, std::vector<Broken>& broken) {
+  constexpr int kLeast = 48;
+  for (bool again = true; again;) {
+    again = false;
+    UnionFind linked(static_cast<int>(s.tetrahedra.size()));
+    for (const InnerFace& f : s.faces) {
+      if (!f.is_cut) linked.join(f.tetrahedron[0], f.tetrahedron[1]);
+    }
+    std::map<std::int32_t, int> size;  // of each piece, where it is small
+    for (int t = 0; t < static_cast<int>(s.tetrahedra.size()); ++t) ++size[linked.root(t)];
+    std::map<std::int32_t, std::map<std::int32_t, int>> beside;  // faces to each other piece
+    for (const Broken& b : broken) {
+      const auto& [p, q] = s.faces[b.face].tetrahedron;
+      const std::int32_t of_p = linked.root(p), of_q = linked.root(q);
+      if (of_p == of_q) continue;
+      if (size[of_p] < kLeast) ++beside[of_p][of_q];
+      if (size[of_q] < kLeast) ++beside[of_q][of_p];
+    }
+    if (beside.empty()) return;
+    const auto& [crumb, others] = *beside.begin();
+    std::int32_t to = others.begin()->first;
+    for (const auto& [other, count] : others) {
+      if (std::make_pair(size[other] >= kLeast, count) >
+          std::make_pair(size[to] >= kLeast, others.at(to)))
+        to = other;
+    }
+    for (const Broken& b : broken) {
+      InnerFace& f = s.faces[b.face];
+      const std::int32_t of_p = linked.root(f.tetrahedron[0]), of_q = linked.root(f.tetrahedron[1]);
+      if (std::minmax(of_p, of_q) == std::minmax(crumb, to)) f.is_cut = false;
+    }
+    broken.erase(std::remove_if(broken.begin(), broken.end(),
+                                [&s](const Broken& b) { return !s.faces[b.face].is_cut; }),
+                 broken.end());
+    again = true;
+  }
 }
 
 class TetCut {
@@ -306,7 +329,49 @@ class TetCut {
   std::vector<std::pair<int, Triangle>> open_;
 };
 
+/// `smooth` as cut_tetrahedra() has it.
+bool part(State& s, std::vector<Broken>& broken, bool smooth, std::vector<std::int32_t>& origin,
+          CutReport& report) {
+  keep_crumbs(s, broken);
+  if (broken.empty()) return false;
+  report.bonds_broken += static_cast<std::int64_t>(broken.size());
+  TetCut cut(s, broken);
+  if (smooth) cut.move_onto_blade();
+  cut.part(origin, report);
+  return true;
+}
+
 }  // namespace
+
+void find_faces(State& s) {
+  std::map<std::array<std::int32_t, 3>, std::pair<std::int32_t, std::int8_t>> first;
+  for (std::size_t t = 0; t < s.tetrahedra.size(); ++t) {
+    for (std::int8_t k = 0; k < 4; ++k) {
+      std::array<std::int32_t, 3> key;
+      for (int i = 0, j = 0; i < 4; ++i) {
+        if (i != k) key[j++] = s.tetrahedra[t][i];
+      }
+      std::sort(key.begin(), key.end());
+      const auto [at, is_new] = first.try_emplace(key, static_cast<std::int32_t>(t), k);
+      if (!is_new) {
+        s.faces.push_back(
+            {{at->second.first, static_cast<std::int32_t>(t)}, {at->second.second, k}, false});
+      }
+    }
+  }
+}
+
+bool part_faces(State& s, const std::vector<std::int32_t>& faces, std::vector<std::int32_t>& origin,
+                CutReport& report) {
+  s.centres.resize(s.tetrahedra.size(), {0.25, 0.25, 0.25, 0.25});
+  std::vector<Broken> broken;
+  for (const std::int32_t i : faces) {
+    s.faces[i].is_cut = true;
+    broken.push_back({i, 0.5, Vec3::Zero()});
+  }
+  keep_small(s, broken);
+  return part(s, broken, false, origin, report);
+}
 
 bool cut_tetrahedra(State& s, const BladePath& path, const std::vector<Vec3>& before, bool smooth,
                     std::vector<std::int32_t>& origin, CutReport& report) {
@@ -342,13 +407,7 @@ bool cut_tetrahedra(State& s, const BladePath& path, const std::vector<Vec3>& be
       }
     }
   }
-  keep_crumbs(s, broken);
-  if (broken.empty()) return false;
-  report.bonds_broken += static_cast<std::int64_t>(broken.size());
-  TetCut cut(s, broken);
-  if (smooth) cut.move_onto_blade();
-  cut.part(origin, report);
-  return true;
+  return part(s, broken, smooth, origin, report);
 }
 
 }  // namespace pbd

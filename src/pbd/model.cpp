@@ -90,8 +90,11 @@ std::unique_ptr<State> make_state(const Scene& scene, std::vector<std::string>* 
             "material '" + m.name +
             "': tetrahedra of method pbd have no viscosity; they damp by their steps alone");
       }
-      if (m.tear_stretch > 0) {
-        notes->push_back("material '" + m.name + "': method pbd does not tear");
+      if (m.tear_stretch > 0 && scene.pbd.model == PbdModel::kSurface) {
+        notes->push_back("material '" + m.name + "': surfaces of method pbd do not tear");
+      } else if (m.tear_stretch > 0 && m.tear_length > 0) {
+        notes->push_back("material '" + m.name +
+                         "': tear_length does nothing, a tip bears what its vertices do");
       }
     };
     tell(body.material);

@@ -39,7 +39,7 @@ void fields(Archive& archive, State& s) {
   archive(s.vertices, s.triangles, s.cut, s.tetrahedra, s.internal, s.half_depth, s.links,
           s.edge_count, s.bends, s.strains, s.elastics, s.volume_of_body, s.stroke, s.copy_of,
           s.blade_normal, s.blade_point, s.cut_edges, s.faces, s.mean_edge, s.wounds, s.fronts,
-          s.starts, s.centres, s.left_whole);
+          s.starts, s.centres, s.left_whole, s.relieved_in);
 }
 
 namespace {
@@ -113,6 +113,8 @@ void check(const State& s) {
   check_state(s.centres.empty() || s.centres.size() == s.tetrahedra.size(), "centres");
   check_numbers(s.centres, 1e6, "centres");
   check_state(std::isfinite(s.mean_edge), "edges");
+  check_state(s.relieved_in.empty() || s.relieved_in.size() == s.scene.bodies.size(), "tears");
+  check_numbers(s.relieved_in, 1e9, "tears");
   for (const auto& wound : s.wounds) {
     for (const Vec3& x : wound) check_numbers(x, 1e9, "wounds");
   }

@@ -114,12 +114,15 @@ struct State {
   /// centre when it was made. It stays with the tissue when vertices move onto a blade's surface,
   /// so that what a blade parts does not hang on where vertices are.
   std::vector<std::array<double, 4>> centres;
-  double mean_edge = 0;  ///< of the surface when it was made [m]
+  std::vector<double> relieved_in;  ///< of each body: when waves of its last tear crossed it [s]
+  double mean_edge = 0;             ///< of the surface when it was made [m]
 
   double longest_step =
       0;  ///< of tetrahedra of a material (tet_steps.cpp) [s]; 0: `steps` are given
 
   std::vector<Collider> colliders;  ///< of this step
+  /// Triangles that may come to a tip in this part of a frame, and which of the colliders it is.
+  std::vector<std::array<std::int32_t, 2>> at_tips;
 
   /// Vertices of a chunk of each level, by which constraints are packed (ConstraintSet): what the
   /// first cache of a processor holds, and its second. Empty on a GPU.
@@ -167,6 +170,10 @@ void project_dampers(State& s);
 std::vector<std::int32_t> levels_of(const State& s);
 /// Pushes vertices out of the colliders, with friction; adds what that takes (contact.cpp).
 void project_contacts(State& s, float h, std::vector<ColliderLoad>& loads);
+
+/// Makes State::at_tips, for colliders that go from `begin` to `end` in so many seconds.
+void find_at_tips(State& s, const std::vector<Collider>& begin, const std::vector<Collider>& end,
+                  double duration);
 
 /// Makes State::held and State::holder (anchors.cpp).
 void find_held(State& s);

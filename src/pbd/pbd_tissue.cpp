@@ -10,6 +10,7 @@
 #include "pbd/free_flight.h"
 #include "pbd/model.h"
 #include "pbd/sound_cut.h"
+#include "pbd/tear.h"
 #include "pbd/viscosity.h"
 #include "tissue_sim/limits.h"
 #include "tools/frame_colliders.h"
@@ -78,9 +79,16 @@ void PbdTissue::advance(double duration, const FrameInput& input) {
     pull();
     if (pbd::follow_anchors(s, input.anchors, duration)) push();
   }
-  const int together = steps_between_searches(colliders, substeps, dt);
+  const bool tears = pbd::can_tear(s);
+  int together = steps_between_searches(colliders, substeps, dt);
+  if (tears) {
+    const int checks = std::min(substeps, pbd::tear_checks(s, duration));
+    together = std::min(together, (substeps + checks - 1) / checks);
+  }
   for (int first = 0; first < substeps; first += together) {
-    run_steps(colliders, {first, std::min(together, substeps - first), substeps}, dt);
+    const int steps = std::min(together, substeps - first);
+    run_steps(colliders, {first, steps, substeps}, dt);
+    if (tears) tear(steps * dt);
   }
   if (!s.held.empty()) pull();
   result_.anchor_loads = pbd::anchor_loads(s, input.anchors, dt);
@@ -99,6 +107,20 @@ void PbdTissue::advance(double duration, const FrameInput& input) {
   }
 }
 
+void PbdTissue::tear(double since) {
+  pbd::State& s = *state_;
+  pull();
+  const std::vector<pbd::Motion> motions = pbd::motions(s);
+  std::vector<std::int32_t> origin;
+  if (!pbd::tear_tetrahedra(s, since, origin, result_.tear_report)) return;
+  pbd::after_cut(s, origin);
+  for (const int id : pbd::update_pieces(s, origin, pieces_)) {
+    result_.tear_report.new_fragments.push_back(id);
+  }
+  pbd::after_cuts(s, motions);
+  state_changed();
+}
+
 int PbdTissue::steps_between_searches(const FrameColliders& colliders, int steps, float h) {
   if (state_->components < 2) return steps;
   pull();
@@ -115,6 +137,10 @@ void PbdTissue::run_steps(const FrameColliders& colliders, const Part& part, flo
   pbd::find_touches(s, part.count * h);
   const std::vector<pbd::Flight> flights = pbd::flights(s);
   std::fill(s.pushed.begin(), s.pushed.end(), std::uint8_t{0});
+  std::vector<Collider> begin, end;
+  colliders.at(part.share(-1), begin);
+  colliders.at(part.share(part.count - 1), end);
+  pbd::find_at_tips(s, begin, end, part.count * h);
   for (int i = 0; i < part.count; ++i) {
     stop_if_asked();
     colliders.at(part.share(i), s.colliders);

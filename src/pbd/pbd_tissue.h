@@ -71,6 +71,8 @@ class PbdTissue : public Tissue {
   /// Whether it changed anything: constraints are to be made anew then.
   bool cut(const BladePath& path, int stroke, const std::vector<Vec3>& before, CutReport& report);
 
+  /// Parts what tears, `since` [s] after the last look.
+  void tear(double since);
   int steps_between_searches(const FrameColliders& colliders, int steps, float h);
 
   std::vector<std::string> notes_;

@@ -5,6 +5,7 @@
 
 #include "fragments/piece_colour.h"
 #include "frame/point_fields.h"
+#include "frame/put_faces.h"
 #include "frame/select_points.h"
 #include "pbd/model.h"
 #include "pbd/pbd_tissue.h"
@@ -94,22 +95,16 @@ int PbdTissue::read_points(const PointSelection& selection, std::vector<std::uin
 
 void PbdTissue::read_surface(SurfaceTriangles& surface) {
   pull();
-  const State& s = *state_;
-  surface.corners.clear();
-  surface.rest.clear();
-  surface.fragment.clear();
-  surface.point.clear();
-  surface.cut = s.cut;
-  for (const Triangle& t : s.triangles) {
-    for (const std::int32_t v : t) {
-      for (int a = 0; a < 3; ++a) {
-        surface.corners.push_back(s.vertices.x[4 * v + a]);
-        surface.rest.push_back(static_cast<float>(s.vertices.reference[v][a]));
-      }
+  State& s = *state_;
+  put_triangles(s.triangles.size(), s.cpu, surface, [&](int i) {
+    const Triangle& of = s.triangles[i];
+    ShownTriangle t{{}, {}, pieces_.of_point[of[0]], of[0], s.cut[i]};
+    for (int k = 0; k < 3; ++k) {
+      t.corner[k] = &s.vertices.x[std::size_t{4} * of[k]];
+      t.rest[k] = floats(s.vertices.reference[of[k]]);
     }
-    surface.fragment.push_back(pieces_.of_point[t[0]]);
-    surface.point.push_back(t[0]);
-  }
+    return t;
+  });
 }
 
 void PbdTissue::push_surface(Span<const float> impulses) {

@@ -30,7 +30,11 @@ bool make_dampers(State& s, double duration) {
     if (!s.wounds.empty()) viscosity = std::max(viscosity, kLeastOfCuts);
     if (viscosity == 0 || (s.vertices.anchored[a] != 0 && s.vertices.anchored[b] != 0)) continue;
     const double length = s.links.numbers[c][0];
-    const double lost = 1 - std::exp(-viscosity * duration / (kDensity * length * length));
+    // Tissue between the two drags at the lighter one as if both were as heavy: tips of spikes
+    // swung for seconds.
+    const double m = s.vertices.mass[a], n = s.vertices.mass[b];
+    const double uneven = (m + n) * (m + n) / (4 * m * n);
+    const double lost = 1 - std::exp(-viscosity * duration * uneven / (kDensity * length * length));
     s.dampers.add({a, b}, {static_cast<float>(lost)});
     s.dampers.colour.back() = s.links.colour[c];
   }

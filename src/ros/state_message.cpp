@@ -37,6 +37,7 @@ SimulationState state_message(Simulation& simulation, const FrameReport& report,
   m.device = without_commas(simulation.tissue().device_name());
   m.kinetic_energy = report.result.kinetic_energy;
   m.elastic_energy = report.result.elastic_energy;
+  m.cutting_work = report.result.cutting_work;
   m.max_speed = report.result.max_speed;
   m.points_inside = report.result.points_inside;
   m.inside_depth = report.result.inside_depth;

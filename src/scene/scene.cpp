@@ -148,6 +148,7 @@ void check_material(const std::string& path, const Material& m, std::set<std::st
   }
   check_range(path + ".tear_length", m.tear_length, 0, 1, "m");
   check_range(path + ".tear_scatter", m.tear_scatter, 0, 0.9);
+  check_range(path + ".toughness", m.toughness, 0, 1e5, "J/m^2");
   check_range(path + ".bleeding.flux", m.bleeding.flux, 0, 1, "m/s");
   check_range(path + ".bleeding.pressure", m.bleeding.pressure, 0, 1e5, "Pa");
   check_range(path + ".bleeding.clots_after", m.bleeding.clots_after, 0, 1e5, "s");
@@ -203,6 +204,7 @@ void check_tool(const std::string& path, const Tool& tool, std::set<std::string>
       check_range(path + ".blade_length", tool.blade_length, 1e-3, 0.2, "m");
       check_range(path + ".blade_width", tool.blade_width, 2e-4, 0.1, "m");
       check_range(path + ".blade_thickness", tool.blade_thickness, 1e-5, 0.01, "m");
+      check_range(path + ".edge_radius", tool.blade_edge_radius, 0, tool.blade_thickness / 2, "m");
       break;
     case ToolType::kProbe:
       check_range(path + ".radius", tool.radius, 1e-4, 0.1, "m");
@@ -477,6 +479,10 @@ void validate(const Scene& scene) {
   std::set<std::string> material_names, body_names, tool_names, anchor_names;
   for (std::size_t i = 0; i < scene.materials.size(); ++i) {
     check_material(at("materials", i), scene.materials[i], material_names);
+    if (scene.method == Method::kPbd && scene.materials[i].toughness > 0) {
+      refuse(at("materials", i) + ".toughness", text(scene.materials[i].toughness),
+             "must be 0 with method pbd, whose tissue blades cut without a force");
+    }
   }
   for (std::size_t i = 0; i < scene.bodies.size(); ++i) {
     const Body& body = scene.bodies[i];

@@ -47,7 +47,7 @@ std::vector<std::string> fields_of(Shape shape) {
 std::vector<std::string> fields_of(ToolType type) {
   switch (type) {
     case ToolType::kScalpel:
-      return {"blade_length", "blade_width", "blade_thickness"};
+      return {"blade_length", "blade_width", "blade_thickness", "edge_radius"};
     case ToolType::kProbe:
       return {"radius", "length"};
     case ToolType::kGrasper:

@@ -81,6 +81,7 @@ void write(YAML::Emitter& out, const Material& m) {
   write(out, "tear_stretch", m.tear_stretch);
   write(out, "tear_length", m.tear_length);
   write(out, "tear_scatter", m.tear_scatter);
+  write(out, "toughness", m.toughness);
   write(out, "friction", m.friction);
   if (m.bleeding.flux > 0) {
     out << Key << "bleeding" << Value << BeginMap;
@@ -163,7 +164,10 @@ void write(YAML::Emitter& out, const Tool& tool) {
   for (const std::string& field : fields_of(tool.type)) {
     if (field == "radius") write(out, "radius", tool.radius);
     if (field == "length") write(out, "length", tool.length);
-    if (field == "edge_radius") write(out, "edge_radius", tool.edge_radius);
+    if (field == "edge_radius") {
+      const bool blade = tool.type == ToolType::kScalpel;
+      write(out, "edge_radius", blade ? tool.blade_edge_radius : tool.edge_radius);
+    }
     if (field == "size") write(out, "size", tool.size);
     if (field == "blade_length") write(out, "blade_length", tool.blade_length);
     if (field == "blade_width") write(out, "blade_width", tool.blade_width);

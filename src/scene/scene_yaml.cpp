@@ -84,9 +84,10 @@ Anchor read_anchor(const YAML::Node& node, const std::string& path) {
 }
 
 Material read_material(const YAML::Node& node, const std::string& path) {
-  const YamlFields fields(node, path,
-                          {"name", "law", "young_modulus", "poisson_ratio", "density", "viscosity",
-                           "tear_stretch", "tear_length", "tear_scatter", "friction", "bleeding"});
+  const YamlFields fields(
+      node, path,
+      {"name", "law", "young_modulus", "poisson_ratio", "density", "viscosity", "tear_stretch",
+       "tear_length", "tear_scatter", "toughness", "friction", "bleeding"});
   fields.require("name", "bodies refer to a material by its name");
   Material m;
   fields.read("name", m.name);
@@ -98,6 +99,15 @@ Material read_material(const YAML::Node& node, const std::string& path) {
   fields.read("tear_stretch", m.tear_stretch);
   fields.read("tear_length", m.tear_length);
   fields.read("tear_scatter", m.tear_scatter);
+  if (fields.is_word("toughness", "measured")) {
+    m.toughness = measured_toughness(m.name);
+    if (m.toughness == 0) {
+      fields.refuse("toughness", "was not measured of '" + m.name +
+                                     "', only of liver, vessel, fat, muscle and skin: give J/m^2");
+    }
+  } else {
+    fields.read("toughness", m.toughness);
+  }
   fields.read("friction", m.friction);
   fields.read_map("bleeding", [&](const YAML::Node& bleeding, const std::string& bleeding_path) {
     const YamlFields of(bleeding, bleeding_path, {"flux", "pressure", "clots_after", "fluid"});
@@ -196,7 +206,8 @@ Tool read_tool(const YAML::Node& node, const std::string& path) {
   refuse_foreign(fields, tool.type, kToolTypeNames);
   fields.read("radius", tool.radius);
   fields.read("length", tool.length);
-  fields.read("edge_radius", tool.edge_radius);
+  fields.read("edge_radius",
+              tool.type == ToolType::kScalpel ? tool.blade_edge_radius : tool.edge_radius);
   fields.read("size", tool.size);
   fields.read("blade_length", tool.blade_length);
   fields.read("blade_width", tool.blade_width);

@@ -147,6 +147,11 @@ void YamlFields::require(const std::string& name, const std::string& allowed) co
   if (!has(name)) throw std::invalid_argument(path(name) + " is missing: " + allowed);
 }
 
+bool YamlFields::is_word(const std::string& name, const std::string& word) const {
+  const YAML::Node* node = find(name);
+  return node != nullptr && node->IsScalar() && node->Scalar() == word;
+}
+
 void YamlFields::read(const std::string& name, double& value) const {
   const YAML::Node* node = find(name);
   if (node && !parse_number(*node, value)) refuse(name, "must be a number");

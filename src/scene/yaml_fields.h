@@ -42,6 +42,9 @@ class YamlFields {
   /// Throws "<path> is missing: <allowed>" unless the field is there.
   void require(const std::string& name, const std::string& allowed) const;
 
+  /// Whether it is there and is that word.
+  bool is_word(const std::string& name, const std::string& word) const;
+
   // Each leaves the value as it is where the field is left out.
   void read(const std::string& name, double& value) const;
   void read(const std::string& name, int& value) const;

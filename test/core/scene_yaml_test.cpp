@@ -84,6 +84,15 @@ TEST(SceneYaml, ReadsOrientationsAsRosWritesThem) {
   EXPECT_EQ(s.bodies[0].anchors[0].z, 0.25);
 }
 
+TEST(SceneYaml, TakesToughnessAsItWasMeasured) {
+  const auto toughness = [](const std::string& material) {
+    return scene_from_yaml("bodies: [{}]\nmaterials: [{" + material + "}]").materials[0].toughness;
+  };
+  EXPECT_EQ(toughness("name: liver"), 0);
+  EXPECT_EQ(toughness("name: liver, toughness: measured"), 206);
+  EXPECT_EQ(toughness("name: liver, toughness: 12"), 12);
+}
+
 TEST(SceneYaml, NamesWhatItRefuses) {
   const std::pair<const char*, const char*> cases[] = {
       {"colour: red\nbodies: [{}]", "colour: unknown field, known here are name, method, "},
@@ -93,6 +102,15 @@ TEST(SceneYaml, NamesWhatItRefuses) {
       {"bodies: [{pose: {xyz: [1, 2, 3]}}]", "bodies[0].pose.xyz: unknown field"},
       {"materials: [{name: a, young: 1}]", "materials[0].young: unknown field"},
       {"materials: [{young_modulus: 1}]", "materials[0].name is missing: "},
+      {"materials: [{name: kidney, toughness: measured}]",
+       "materials[0].toughness is measured: was not measured of 'kidney', only of liver"},
+      {"materials: [{name: a, toughness: much}]", "materials[0].toughness is much: must be a number"},
+      {"materials: [{name: a, toughness: -1}]\nbodies: [{}]", "materials[0].toughness is -1: "},
+      {"materials: [{name: a, toughness: .nan}]\nbodies: [{}]", "materials[0].toughness is .nan: "},
+      {"method: pbd\nmaterials: [{name: a, toughness: 1}]\nbodies: [{}]",
+       "materials[0].toughness is 1: must be 0 with method pbd"},
+      {"bodies: [{}]\ntools: [{type: scalpel, edge_radius: 0.0003}]",
+       "tools[0].edge_radius is 0.0003: must lie between 0 and 0.0002 m"},
       {"bodies: [{anchors: [{above: 1}]}]", "bodies[0].anchors[0].above: unknown field"},
       {"bodies: [{anchors: [{}]}]", "bodies[0].anchors[0] is a map of 0 fields: must be one of"},
       {"bodies: [{anchors: [{below: 1, ball: {center: [0, 0, 0], radius: 1}}]}]",

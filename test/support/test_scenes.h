@@ -44,6 +44,7 @@ inline Scene full_scene() {
   s.materials[1].tear_stretch = 1.0 + 1.0 / 3;
   s.materials[1].tear_length = 0.004;
   s.materials[1].tear_scatter = 0.07;
+  s.materials[1].toughness = 206.5;
   s.bodies.resize(5);
   const Shape shapes[] = {Shape::kBox, Shape::kBall, Shape::kEllipsoid, Shape::kCylinder,
                           Shape::kMesh};
@@ -74,6 +75,7 @@ inline Scene full_scene() {
   s.tools[0].name = "PSM1";
   s.tools[0].type = ToolType::kScalpel;
   s.tools[0].blade_width = 0.007;
+  s.tools[0].blade_edge_radius = 3e-6;
   s.tools[1].name = "probe_2";
   s.tools[1].radius = 0.002;
   s.tools[2].name = "PSM2";
@@ -121,6 +123,7 @@ inline const std::vector<NumberCase>& number_cases() {
       {"materials[1].tear_stretch", AT(materials[1].tear_stretch), 1.001, 100},
       {"materials[1].tear_length", AT(materials[1].tear_length), 0, 1},
       {"materials[1].tear_scatter", AT(materials[1].tear_scatter), 0, 0.9},
+      {"materials[1].toughness", AT(materials[1].toughness), 0, 1e5},
       {"materials[1].friction", AT(materials[1].friction), 0, 2},
       {"bodies[0].size", AT(bodies[0].size.z()), 1e-4, 10},
       {"bodies[1].radius", AT(bodies[1].radius), 1e-4, 10},
@@ -141,6 +144,7 @@ inline const std::vector<NumberCase>& number_cases() {
       {"tools[0].blade_length", AT(tools[0].blade_length), 1e-3, 0.2},
       {"tools[0].blade_width", AT(tools[0].blade_width), 2e-4, 0.1},
       {"tools[0].blade_thickness", AT(tools[0].blade_thickness), 1e-5, 0.01},
+      {"tools[0].edge_radius", AT(tools[0].blade_edge_radius), 0, 0.0002},
       {"tools[0].friction", AT(tools[0].friction), 0, 2},
       {"tools[1].radius", AT(tools[1].radius), 1e-4, 0.1},
       {"tools[1].length", AT(tools[1].length), 1e-3, 1},

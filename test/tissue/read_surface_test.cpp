@@ -169,6 +169,33 @@ TEST_P(ReadSurface, SaysWhichTrianglesTheCutMade) {
   EXPECT_NEAR(sides, 0, 1e-3 * whole);  // one looks each way
 }
 
+TEST_P(ReadSurface, SaysWhetherMoreThanCornersChanged) {
+  Scene scene = scene_of(Kind::kBox);
+  scene.gravity = Vec3(0, 0, -4);
+  Simulation simulation(scene);
+  SurfaceTriangles kept, anew;
+  simulation.tissue().read_surface(kept);
+  const std::uint64_t whole = kept.made;
+  EXPECT_NE(whole, 0u);
+  const auto is_as_read_anew = [&] {
+    anew = {};
+    simulation.tissue().read_surface(anew);
+    return anew.made != kept.made && anew.corners == kept.corners && anew.rest == kept.rest &&
+           anew.fragment == kept.fragment && anew.point == kept.point && anew.cut == kept.cut;
+  };
+  const std::vector<float> before = kept.corners;
+  for (int i = 0; i < 5; ++i) simulation.advance_frame();
+  simulation.tissue().read_surface(kept);
+  EXPECT_EQ(kept.made, whole);
+  EXPECT_NE(kept.corners, before) << "it falls";
+  EXPECT_TRUE(is_as_read_anew());
+  simulation.cut(plane_cut(Vec3::Zero(), kAcross));
+  simulation.advance_frame();
+  simulation.tissue().read_surface(kept);
+  EXPECT_NE(kept.made, whole);
+  EXPECT_TRUE(is_as_read_anew());
+}
+
 TEST(ReadSurfaceOfPbd, IsClosedWhereAWoundOfASurfaceModelWas) {
   Scene scene = free_box(Vec3(0.04, 0.03, 0.02), 0.003);
   scene.method = Method::kPbd;

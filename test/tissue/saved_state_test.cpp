@@ -141,7 +141,6 @@ TEST_P(SavedState, GoesOnWhereCutFacesRestOnOneAnother) {
 }
 
 TEST_P(SavedState, GoesOnWhileItTears) {
-  if (GetParam().method == Method::kPbd) GTEST_SKIP() << "does not tear";
   Scene scene = on_this(free_box(Vec3(0.06, 0.012, 0.012), 0.002));
   scene.gravity.x() = 120;
   Material weak;

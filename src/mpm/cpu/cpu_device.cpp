@@ -7,6 +7,7 @@
 
 #include "math/lanczos.h"
 #include "mpm/contact/block_contact.h"
+#include "mpm/contact/cutting_edges.h"
 #include "mpm/contact/face_fields.h"
 #include "mpm/lattice_pieces.h"
 #include "mpm/linearised_motion.h"
@@ -37,6 +38,7 @@ void CpuMpmDevice::begin() {
   s.contacts.changes.resize(count);
   list_facets(s);
   index_inertia(s);
+  s.edges = resisting_edges(s.scene);
 }
 
 void CpuMpmDevice::measure_blocks(bool energies) {
@@ -97,6 +99,7 @@ double CpuMpmDevice::measure_limit(const std::vector<std::uint8_t>& blocks, int 
 void CpuMpmDevice::begin_rest() {
   const MpmFrame& frame = *run_.frame;
   find_near_colliders(state_, frame.colliders.reach(), frame.duration);
+  look_for_edges(state_, frame.input, frame.cut_to);
   for (int a = 0; frame.blades && a < 3; ++a) state_.work.u_before[a] = state_.nodes.u[a];
 }
 
@@ -134,6 +137,7 @@ int CpuMpmDevice::run_part(const FramePart& part) {
     frame.colliders.at(share, s.colliders);
     std::vector<ColliderLoad> loads(s.colliders.size());
     find_face_contacts(s, run_.pieces, dt);
+    run_.result.cutting_work += push_by_edges(s, dt, loads);
     const float acted = substep(s, dt, loads, anchors_at(s.anchors, frame.input, share));
     s.time += dt;
     frame.colliders.add_loads(share, s.colliders.data(), loads.data(), acted / frame.duration,

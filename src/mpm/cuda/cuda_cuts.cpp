@@ -120,10 +120,15 @@ void push_points(CudaTissue& d, const std::vector<std::int32_t>& changed) {
   const Points& points = d.state.points;
   if (!points.soft.empty() && d.soft.size() == 0) d.soft.upload(points.soft, d.stream);
   std::vector<CudaPointChange> changes;
-  for (const std::int32_t p : changed) {
+  const auto change = [&](std::int32_t p) {
     changes.push_back({p, points.bonds[p], static_cast<std::uint8_t>(points.is_soft(p) ? 1 : 0),
                        static_cast<std::uint8_t>(points.bonds[p] == d.state.whole_bonds[p] ? 1 : 0),
                        d.outer_points ? d.outer_points->of(d.state, p) : CudaOuterPlace()});
+  };
+  for (const std::int32_t p : changed) {
+    change(p);
+    if (!d.outer_points) continue;
+    for (const std::int32_t other : across_sheet(d.state, p)) change(other);
   }
   d.sweep.changes.upload(changes, d.stream);
   const auto any = [](const auto& of) { return of.size() > 0 ? of.data() : nullptr; };

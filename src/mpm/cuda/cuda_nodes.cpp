@@ -145,4 +145,8 @@ void CudaMpmDevice::send_nodes() { push_some(*tissue_, tissue_->brought); }
 
 void CudaMpmDevice::bring_all_nodes() { pull_nodes(*tissue_); }
 
+void CudaMpmDevice::bring_places() {
+  pull_field(*tissue_, tissue_->present().u, tissue_->state.nodes.u);
+}
+
 }  // namespace tissue_sim

@@ -101,6 +101,20 @@ bool has_thin_tools(const Scene& scene) {
   });
 }
 
+std::vector<std::int32_t> across_sheet(const LatticeTissue& tissue, std::int32_t point) {
+  const Array<std::uint8_t>& bonds = tissue.points.bonds;
+  const Points::Site& s = tissue.points.site[point];
+  std::vector<std::int32_t> across;
+  for (int k = 0; k < kBondCount; ++k) {
+    const int behind = opposite_bond(k);
+    if ((bonds[point] >> k & 1) != 0 || (bonds[point] >> behind & 1) == 0) continue;
+    const BondOffset to = bond_offset(behind);
+    const std::int32_t other = tissue.bodies[s.body].point(s.x + to.x, s.y + to.y, s.z + to.z);
+    if ((bonds[other] >> behind & 1) == 0) across.push_back(other);
+  }
+  return across;
+}
+
 OuterPoints::OuterPoints(const LatticeTissue& tissue, const AnchorFaces& faces)
     : whole_(find_outer_places(tissue)), beside_anchors_(cells_beside(faces, tissue)) {}
 
@@ -113,7 +127,8 @@ CudaOuterPlace OuterPoints::of(const LatticeTissue& tissue, std::int32_t p) cons
   const Places last = first + places_of_point(body, tissue.points, whole_, p, places);
   if (first == last) return at;
   const bool was_cut = tissue.points.bonds[p] != whole_bonds(body, tissue.points, p);
-  if (was_cut && face_away(first, last)) return at;
+  // Springs as stiff as a surface give energy to slices that a cut left so thin.
+  if (was_cut && (face_away(first, last) || !across_sheet(tissue, p).empty())) return at;
   const bool is_soft = beside_anchors_.count({s.body, s.x / 2, s.y / 2, s.z / 2}) > 0;
   const Vec3 x = place_amid(first, last, s);
   at.place = {static_cast<float>(x[0]), static_cast<float>(x[1]), static_cast<float>(x[2]),

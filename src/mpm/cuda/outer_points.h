@@ -12,6 +12,9 @@
 
 namespace tissue_sim {
 
+/// The points with which this one is a sheet that is two points thick.
+std::vector<std::int32_t> across_sheet(const LatticeTissue& tissue, std::int32_t point);
+
 class OuterPoints {
  public:
   /// Of whole tissue. Throws what find_outer_places() throws.

@@ -155,12 +155,12 @@ inline constexpr float kStiffPlace = 1, kSoftPlace = 2;
 /// Of a point.
 struct CudaOuterPlace {
   /// At which colliders touch it, in cells from the middle of its cell; the fourth figure is 0
-  /// where they touch the point itself, which has neighbours all around, or surfaces before it and
-  /// behind that a cut left. Where the surface is flat around the point that is straight before it,
-  /// at an edge on the edge: the point's place is brought onto the surface that each of its missing
-  /// bonds stands for (mpm/surface/surface_places.h). It is kSoftPlace where anchors' faces hold
-  /// nodes of the point's cell: that spring needs no added mass, for faces are held as if nodes had
-  /// none.
+  /// where they touch the point itself, which has neighbours all around, or is of what a cut left
+  /// one or two points thick. Where the surface is flat around the point that is straight before
+  /// it, at an edge on the edge: the point's place is brought onto the surface that each of its
+  /// missing bonds stands for (mpm/surface/surface_places.h). It is kSoftPlace where anchors' faces
+  /// hold nodes of the point's cell: that spring needs no added mass, for faces are held as if
+  /// nodes had none.
   float4 place = {0, 0, 0, 0};
   /// The plane of the surface there: its axis in the fourth figure, -1 where the place stays whole,
   /// and the normal, 1 along that. Along it places of points are next to one another.

@@ -2,6 +2,7 @@
 #include <algorithm>
 
 #include "cutting/blade_sweep.h"
+#include "math/bspline.h"
 #include "mpm/lattice/bonds.h"
 #include "mpm/split/front.h"
 #include "mpm/split/lattice_tissue.h"

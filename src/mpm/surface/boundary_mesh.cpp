@@ -64,7 +64,7 @@ class PointCubes {
 
 BoundaryMesh::Vertex make_vertex(const LatticeTissue& tissue, const Contour::Vertex& of) {
   const Vec3 place = of.place / 2;  // in cells
-  BoundaryMesh::Vertex v{-1, {}, {}};
+  BoundaryMesh::Vertex v{-1, {}, {}, {}};
   const auto distance = [&](std::int32_t p) {  // what an anchor holds comes after all that moves
     const bool moves = tissue.points.free_volume_of(p) > 0;
     return (place - cell_middle(tissue.points.site[p])).cwiseAbs().maxCoeff() + (moves ? 0 : 100);
@@ -74,9 +74,12 @@ BoundaryMesh::Vertex make_vertex(const LatticeTissue& tissue, const Contour::Ver
   }
   const Points::Site& site = tissue.points.site[v.point];
   const Vec3 from_middle = place - cell_middle(site);
+  const LatticeBody& b = tissue.bodies[site.body];
   for (int a = 0; a < 3; ++a) v.place[a] = static_cast<float>(from_middle[a]);
+  v.rest = b.node_position(site.x / 2, site.y / 2, site.z / 2) +
+           b.cell_size * Vec3(v.place[0], v.place[1], v.place[2]);
   for (int k = 0; k < 27; ++k) {
-    v.node[k] = tissue.fields->node(tissue.bodies[site.body], site, k);
+    v.node[k] = tissue.fields->node(b, site, k);
   }
   return v;
 }

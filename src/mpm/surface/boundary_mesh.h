@@ -5,6 +5,7 @@
 // points sees them.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <vector>
 
@@ -16,6 +17,7 @@ struct BoundaryMesh {
   struct Vertex {
     std::int32_t point;     ///< in whose cell it is: one that moves, where any there does
     float place[3];         ///< in cells, from the middle of the cell
+    Vec3 rest;              ///< the same, in the world at time zero [m]
     std::int32_t node[27];  ///< around the cell, x fastest, as the point sees them
   };
   struct Face {
@@ -24,6 +26,7 @@ struct BoundaryMesh {
     std::uint8_t cut;  ///< whether tissue went on there while it was whole
   };
   std::vector<Vertex> vertices;
+  std::vector<std::array<float, 3>> now;  ///< where each was when they were read last [m]
   std::vector<Face> faces;        ///< by their points
   Array<std::uint8_t> bonds;      ///< of the points, when it was made
   std::vector<OuterPlace> outer;  ///< where the points have none: on a GPU

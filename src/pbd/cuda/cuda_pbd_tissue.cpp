@@ -25,6 +25,14 @@ CudaPbdTissue::CudaPbdTissue(const Scene& scene, std::vector<std::string> notes)
     : PbdTissue(scene, std::move(notes)), device_(std::make_unique<OnDevice>()) {
   OnDevice& d = *device_;
   d.gpu = open_gpu(d.stream);
+  if (std::any_of(scene.tools.begin(), scene.tools.end(), [](const Tool& t) {
+        return t.type == ToolType::kProbe || t.type == ToolType::kBall;
+      })) {
+    notes_.push_back(
+        "pbd: on a GPU tools meet vertices alone, so tips finer than the mesh pass between them; "
+        "on "
+        "the CPU they do not");
+  }
   const int steps = pbd::steps_of(*state_, 1 / scene.frame_rate);
   const auto colliders = static_cast<std::size_t>(steps) * collider_count(scene);
   d.frame.resize(1);

@@ -1,0 +1,59 @@
+// Edges of blades in tissue that resists them: their pieces, what these hold, and the paths on
+// which they cut. cutting/edge_forces.h has the law.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "tissue_sim/cut.h"
+#include "tissue_sim/scene.h"
+#include "tissue_sim/tissue.h"
+
+namespace tissue_sim {
+
+/// A piece of a blade's edge, in the blade's frame.
+struct EdgePiece {
+  int tool;            ///< in Scene::tools
+  Vec3 middle;         ///< [m]
+  Vec3 along, onward;  ///< unit: along the edge; in the blade's plane out of it
+  double length;       ///< [m]
+  double edge_radius;  ///< [m]
+};
+
+/// A material place: of a body, none where that is -1, in reference space [m], and what a method
+/// knows it by.
+struct EdgePlace {
+  std::int32_t body = -1;
+  std::int32_t site[3] = {};
+  double at[3] = {};
+
+  Vec3 reference() const { return {at[0], at[1], at[2]}; }
+};
+
+/// What a piece of an edge holds on to.
+struct EdgeHold {
+  EdgePlace place;           ///< the end of its cut
+  EdgePlace swept;           ///< that when it was swept last
+  double ahead[3] = {};      ///< the way on, in reference space, unit
+  std::int32_t presses = 0;  ///< whether the edge is there, else it comes or went back
+  std::int32_t lets_go = 0;  ///< once what is left is swept
+
+  bool holds() const { return place.body >= 0 && lets_go == 0; }
+};
+
+/// What the edges of a scene hold; empty where no material has toughness.
+struct ResistingEdges {
+  std::vector<EdgePiece> pieces;  ///< of all scalpels, heel to tip to spine
+  std::vector<EdgeHold> holds;    ///< of each
+};
+
+bool resists(const Scene& scene);
+/// Pieces an eighth of a cell long, if the scene's materials resist.
+ResistingEdges resisting_edges(const Scene& scene);
+
+/// What the edges of a frame's scalpels sweep where they hold nothing, from the share `begin` of
+/// the frame to `end`: today's paths, where nothing resists.
+std::vector<BladePath> free_paths(const Scene& scene, const ResistingEdges& edges,
+                                  const FrameInput& input, double begin, double end);
+
+}  // namespace tissue_sim

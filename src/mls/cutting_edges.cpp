@@ -1,0 +1,180 @@
+#include "mls/cutting_edges.h"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+
+#include "cutting/edge_forces.h"
+#include "frame/leapfrog.h"
+
+namespace tissue_sim {
+namespace {
+
+/// The nodes to cutting/edge_forces.h. A hold's site is the node as which it sees the tissue:
+/// moving least squares of that and of its neighbours, up to linear ones, so that forces keep
+/// linear and angular momentum.
+class NodeEdges {
+ public:
+  /// `looks`: is_whole() looks at pairs, which holds for a frame.
+  NodeEdges(MlsState& state, bool looks) : s_(state), looks_(looks) {}
+
+  struct Support {
+    EdgeSupport at;
+    std::vector<std::pair<std::int32_t, double>> weights;  ///< of nodes
+  };
+
+  double cell_size() const { return mls_spacing(s_.scene); }
+  template <class F>
+  void each(int count, const F& f) {
+    s_.cpu->for_each(count, f);
+  }
+
+  Support support(const EdgePlace& place) const {
+    const std::int32_t i = place.site[0];
+    const Vec3 X = place.reference();
+    const double reach2 = s_.pairs.support[i] * s_.pairs.support[i];
+    struct Near {
+      std::int32_t node;
+      Eigen::Vector4d basis, weighed;
+    };
+    std::vector<Near> near;
+    Eigen::Matrix4d moment = Eigen::Matrix4d::Zero();
+    const auto add = [&](std::int32_t j) {
+      const Vec3 r = s_.nodes.place[j] - X;
+      const double left = 1 - r.squaredNorm() / reach2;
+      if (!(left > 0)) return;
+      const Eigen::Vector4d basis(1, r[0] / s_.edge[i], r[1] / s_.edge[i], r[2] / s_.edge[i]);
+      near.push_back({j, basis, left * left * left * basis});
+      moment += near.back().weighed * basis.transpose();
+    };
+    add(i);
+    for (std::int32_t e = s_.pairs.begin[i]; e < s_.pairs.begin[i + 1]; ++e) {
+      if (s_.pairs.crossed[e] == 0) add(s_.pairs.other[e]);
+    }
+    Support support;
+    EdgeSupport& at = support.at;
+    at = {X, Vec3::Zero(), Eigen::Matrix3d::Identity(), 0, 0, 0};
+    const Material& material = s_.nodes.material_of(i);
+    at.toughness = material.toughness;
+    at.young_modulus = material.young_modulus;
+    const Eigen::LDLT<Eigen::Matrix4d> solver(moment);
+    constexpr double kFlat = 1e-4;
+    const bool spans =
+        near.size() > 3 && solver.vectorD().minCoeff() > kFlat * solver.vectorD().maxCoeff();
+    if (!spans) near.assign(1, {i, Eigen::Vector4d::UnitX(), Eigen::Vector4d::UnitX()});
+    for (const Near& n : near) {
+      const Eigen::Vector4d c = spans ? Eigen::Vector4d(solver.solve(n.weighed)) : n.weighed;
+      const Vec3 u = s_.position(n.node) - s_.nodes.place[n.node];
+      at.x += c[0] * u;
+      at.v += c[0] * s_.velocity(n.node);
+      at.F += u * c.tail<3>().transpose() / s_.edge[i];
+      at.mobility += c[0] * c[0] * s_.inv_mass[n.node];
+      support.weights.emplace_back(n.node, c[0]);
+    }
+    return support;
+  }
+
+  void push(const Support& support, const Vec3& impulse) {
+    for (const auto& [node, weight] : support.weights) {
+      for (int a = 0; a < 3; ++a) {
+        s_.v[4 * node + a] += static_cast<float>(weight * s_.inv_mass[node] * impulse[a]);
+      }
+    }
+  }
+
+  /// It stays with the same node where another is hardly nearer: between the two faces of a cut it
+  /// would change sides.
+  bool put(const Vec3& X, EdgePlace& place) const {
+    constexpr double kNearer = 0.8;  // squared
+    for (bool moved = true; moved;) {
+      moved = false;
+      const std::int32_t i = place.site[0];
+      double least = kNearer * (s_.nodes.place[i] - X).squaredNorm();
+      for (std::int32_t e = s_.pairs.begin[i]; e < s_.pairs.begin[i + 1]; ++e) {
+        const std::int32_t j = s_.pairs.other[e];
+        const double d = (s_.nodes.place[j] - X).squaredNorm();
+        if (d < least) least = d, place.site[0] = j, moved = true;
+      }
+    }
+    std::copy(X.data(), X.data() + 3, place.at);
+    const std::int32_t i = place.site[0];
+    const double beyond = (X - s_.nodes.place[i]).cwiseAbs().maxCoeff() / s_.edge[i];
+    return beyond <= (s_.nodes.surface[i] != 0 ? 0.5 : 1.5);
+  }
+
+  /// Of pairs near it.
+  bool is_whole(const EdgePlace& place, const Vec3& X, const Vec3& normal) const {
+    if (!looks_) return true;
+    constexpr double kNear = 0.8;  // spacings: at a side of the body pairs are half of one away
+    const std::int32_t i = place.site[0];
+    const double near2 = kNear * kNear * s_.edge[i] * s_.edge[i];
+    const auto any_whole = [&](std::int32_t k) {
+      const Vec3 a = s_.nodes.place[k] - X;
+      const double above = a.dot(normal);
+      for (std::int32_t e = s_.pairs.begin[k]; e < s_.pairs.begin[k + 1]; ++e) {
+        const Vec3 b = s_.nodes.place[s_.pairs.other[e]] - X;
+        const double under = b.dot(normal);
+        if (s_.pairs.crossed[e] != 0 || (above < 0) == (under < 0)) continue;
+        if ((a + above / (above - under) * (b - a)).squaredNorm() < near2) return true;
+      }
+      return false;
+    };
+    if (any_whole(i)) return true;
+    for (std::int32_t e = s_.pairs.begin[i]; e < s_.pairs.begin[i + 1]; ++e) {
+      if (any_whole(s_.pairs.other[e])) return true;
+    }
+    return false;
+  }
+
+  bool look_near(const Box& box) {
+    for (std::int32_t i = 0; i < s_.count(); ++i) {
+      const Vec3 x = s_.position(i);
+      if ((x.array() < box.min.array()).any() || (x.array() > box.max.array()).any()) continue;
+      near_.push_back(i);
+    }
+    return !near_.empty();
+  }
+
+  /// From the nearest node on, by Newton's method.
+  bool find(const Vec3& x, EdgePlace& place) const {
+    double least = cell_size() * cell_size();
+    for (const std::int32_t i : near_) {
+      const double d = (s_.position(i) - x).squaredNorm();
+      if (d < least) least = d, place.site[0] = i, place.body = s_.nodes.body[i];
+    }
+    if (place.body < 0) return false;
+    Vec3 X = s_.nodes.place[place.site[0]];
+    for (int k = 0; k < 4; ++k) {
+      std::copy(X.data(), X.data() + 3, place.at);
+      const EdgeSupport at = support(place).at;
+      if (!(std::fabs(at.F.determinant()) > 1e-3)) return false;
+      X += at.F.inverse() * (x - at.x);
+    }
+    return X.allFinite() && put(X, place);
+  }
+
+ private:
+  MlsState& s_;
+  bool looks_;
+  std::vector<std::int32_t> near_;
+};
+
+}  // namespace
+
+void look_for_edges(MlsState& s, const FrameInput& input, double begin) {
+  if (s.edges.pieces.empty()) return;
+  NodeEdges tissue(s, true);
+  look_for_edges(tissue, input, begin, s.edges);
+}
+
+double push_by_edges(MlsState& s, float dt, std::vector<ColliderLoad>& loads) {
+  if (s.edges.pieces.empty()) return 0;
+  NodeEdges tissue(s, false);
+  return push_by_edges(tissue, s.colliders, dt, kick_of(s.dt, dt), s.edges, loads);
+}
+
+std::vector<BladePath> held_paths(MlsState& s, const FrameInput& input, double end) {
+  return held_paths(NodeEdges(s, false), input, end, s.edges);
+}
+
+}  // namespace tissue_sim

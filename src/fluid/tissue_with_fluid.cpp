@@ -84,6 +84,7 @@ void add(const FrameResult& part, double weight, FrameResult& sum) {
   sum.cut_reports.insert(sum.cut_reports.end(), part.cut_reports.begin(), part.cut_reports.end());
   add(part.blade_report, sum.blade_report);
   add(part.tear_report, sum.tear_report);
+  sum.cutting_work += part.cutting_work;
   sum.substeps += part.substeps;
   sum.substep = std::max(sum.substep, part.substep);
   sum.fragment_candidates += part.fragment_candidates;
@@ -136,11 +137,12 @@ TissueWithFluid::TissueWithFluid(const Scene& scene, std::vector<std::string> no
 }
 
 void TissueWithFluid::read_walls() {
-  const std::vector<float> rest = std::move(surface_.rest);
+  const std::uint64_t made = surface_.made;
   walls_.begin.swap(walls_.end);
   tissue_->read_surface(surface_);
   walls_.end = surface_.corners;
-  if (rest == surface_.rest) return;
+  if ((made != 0 && surface_.made == made) || rest_ == surface_.rest) return;
+  rest_ = surface_.rest;
   walls_.begin = walls_.end;  // a cut or a tear made it anew
   if (sources_.bleeds()) sources_.find_wounds(surface_, tissue_->fragments());
   if (fluid_.particles.size() > 0) push_out_of_walls(fluid_, walls_.end);
@@ -152,7 +154,10 @@ void TissueWithFluid::advance(double duration, const FrameInput& input) {
   sort_particles(fluid_);
   follow_orders(input.fluid);
   sources_.begin_frame(duration);
-  const int count = std::max(1, static_cast<int>(std::ceil(duration / interval_ - 1e-9)));
+  // Without any fluid that acts on the tissue it goes by itself; pbd's steps are an interval's.
+  const bool is_dry = fluid_.particles.size() == 0 && scene_.method != Method::kPbd;
+  const int count =
+      is_dry ? 1 : std::max(1, static_cast<int>(std::ceil(duration / interval_ - 1e-9)));
   for (int i = 0; i < count && !result_.blew_up; ++i) {
     const PartOfInput part(input, static_cast<double>(i) / count, (i + 1.0) / count);
     tissue_->advance(duration / count, part.input);
@@ -398,7 +403,7 @@ void TissueWithFluid::each_field(Archive& archive) {
   sources_.each_field(archive);
   for (FillProgress& fill : fills_)
     archive.part("fill", fill.body, fill.filling, fill.pressure, fill.asked);
-  archive.part("walls", walls_.end, surface_.rest);
+  archive.part("walls", walls_.end, rest_);
 }
 
 std::vector<std::uint8_t> TissueWithFluid::save() {
@@ -422,7 +427,8 @@ void TissueWithFluid::restore(Span<const std::uint8_t> saved) {
         p.volume.size(), p.pressure.size(), p.dense.size(), p.id.size(), p.fill.size()}) {
     if (size != n) throw std::runtime_error("the state's fluid has fields of several lengths");
   }
-  if (!sources_.is_sound(surface_.rest.size() / 9) || walls_.end.size() != surface_.rest.size() ||
+  surface_.made = 0;
+  if (!sources_.is_sound(rest_.size() / 9) || walls_.end.size() != rest_.size() ||
       std::any_of(p.kind.begin(), p.kind.end(),
                   [&](std::uint8_t kind) { return kind >= kinds_.size(); })) {
     throw std::runtime_error("the state's fluid is not of this scene");

@@ -73,6 +73,7 @@ class TissueWithFluid : public Tissue {
   FluidState fluid_;
   FluidWalls walls_;
   SurfaceTriangles surface_;
+  std::vector<float> rest_;  ///< its places at time zero, as when it was made
   std::vector<FillProgress> fills_;
   FluidSources sources_;
   double interval_ = 0;                ///< at most [s]

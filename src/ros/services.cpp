@@ -106,14 +106,14 @@ bool Services::cut(Cut::Request& request, Cut::Response& response) {
   });
 }
 
-bool Services::fill(Fill::Request& request, Fill::Response& response) {
+bool Services::fill(FillHollow::Request& request, FillHollow::Response& response) {
   return answer(response, "fill", [&] {
     simulation_.order(request.body, "pressure", request.pressure);
     return "body '" + request.body + "' takes fluid in until it has the pressure";
   });
 }
 
-bool Services::drain(Drain::Request& request, Drain::Response& response) {
+bool Services::drain(DrainHollow::Request& request, DrainHollow::Response& response) {
   return answer(response, "drain", [&] {
     simulation_.order(request.body, "volume", request.volume);
     return "body '" + request.body + "' gives it up within half a second";

@@ -5,8 +5,8 @@
 #include <std_srvs/SetBool.h>
 #include <std_srvs/Trigger.h>
 #include <tissue_sim/Cut.h>
-#include <tissue_sim/Drain.h>
-#include <tissue_sim/Fill.h>
+#include <tissue_sim/DrainHollow.h>
+#include <tissue_sim/FillHollow.h>
 #include <tissue_sim/LoadScene.h>
 #include <tissue_sim/RestoreState.h>
 #include <tissue_sim/SaveState.h>
@@ -46,8 +46,8 @@ class Services {
 
  private:
   bool cut(Cut::Request& request, Cut::Response& response);
-  bool fill(Fill::Request& request, Fill::Response& response);
-  bool drain(Drain::Request& request, Drain::Response& response);
+  bool fill(FillHollow::Request& request, FillHollow::Response& response);
+  bool drain(DrainHollow::Request& request, DrainHollow::Response& response);
   bool start_recording(StartRecording::Request& request, StartRecording::Response& response);
   bool stop_recording(std_srvs::Trigger::Request&, std_srvs::Trigger::Response& response);
   bool reset(std_srvs::Trigger::Request&, std_srvs::Trigger::Response& response);

@@ -15,6 +15,7 @@ constexpr double kGravity = 9.81;
 Scene pool_scene(const Vec3& low, const Vec3& high, double spacing) {
   Scene scene;
   scene.device = Device::kCpu;
+  scene.threads = 1;
   scene.cell_size = spacing;
   scene.ground.enabled = false;
   scene.gravity = Vec3(0, 0, -kGravity);

@@ -76,6 +76,7 @@ inline Scene filled_ball(Method method, double pressure) {
   Scene scene;
   scene.method = method;
   scene.device = Device::kCpu;
+  scene.threads = 1;  // so little that two wait for one another, on a loaded machine for long
   scene.cell_size = 0.003;
   scene.gravity.setZero();
   scene.ground.enabled = false;

@@ -88,6 +88,7 @@ Scene beam(Method method) {
   Scene scene;
   scene.method = method;
   scene.device = Device::kCpu;
+  scene.threads = 1;
   scene.cell_size = 0.004;
   scene.pbd.model = PbdModel::kTetrahedra;
   Material liver;

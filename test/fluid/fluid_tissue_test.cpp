@@ -37,34 +37,34 @@ TEST_P(FluidIn, KeepsMomentum) {
 
 /// A closed organ that is shaken: nothing passes its wall of two cells, and it holds the volume
 /// that its fluid has under its pressure.
-TEST_P(FluidIn, StaysInAClosedOrgan) {
-  const double asked = GetParam() == Method::kPbd ? 5000 : 500;  // by hand mpm held 5 kPa, too
-  const int shakes = 6;
-  Scene scene = filled_ball(GetParam(), asked);
-  scene.materials[0].young_modulus = 24 * asked;
+TEST(FluidInTissue, StaysInAClosedOrgan) {
+  constexpr double kAsked = 5000;
+  constexpr int kShakes = 6;
+  Scene scene = filled_ball(Method::kPbd, kAsked);
+  scene.materials[0].young_modulus = 24 * kAsked;
   scene.bodies[0].anchors = {held_below(-0.015)};
   Simulation simulation(scene);
   const double volume = fill_up(simulation);
   ASSERT_GT(volume, 0);
   const auto fluid = [&] { return simulation.tissue().fluid_volumes()[0]; };
-  const double modulus = 60 * asked;  // as a scene without gravity has it
+  const double modulus = 60 * kAsked;  // as a scene without gravity has it
   const auto packed = [&](const FluidVolume& of) {
     return of.total * (1 - of.pressure / modulus) /
            hollow_volume(simulation.tissue(), Vec3::Zero());
   };
   const double at_first = packed(fluid());
-  for (int i = 0; i < shakes; ++i) {
+  for (int i = 0; i < kShakes; ++i) {
     simulation.set_gravity(Vec3(15 * std::sin(0.8 * i), 0, 15 * std::cos(0.5 * i)));
     ASSERT_FALSE(simulation.advance_frame().result.blew_up);
   }
   simulation.set_gravity(Vec3::Zero());
-  for (int i = 0; i < shakes / 2; ++i) simulation.advance_frame();
+  for (int i = 0; i < kShakes / 2; ++i) simulation.advance_frame();
   const FluidVolume after = fluid();
   EXPECT_DOUBLE_EQ(after.total, volume);
   EXPECT_DOUBLE_EQ(after.inside[0], volume);
   EXPECT_EQ(after.spilt, 0);
   EXPECT_NEAR(packed(after) / at_first, 1, 0.005);
-  EXPECT_NEAR(after.pressure / asked, 1, 0.2);
+  EXPECT_NEAR(after.pressure / kAsked, 1, 0.2);
 }
 
 std::string method_name(const testing::TestParamInfo<Method>& info) {
@@ -73,30 +73,6 @@ std::string method_name(const testing::TestParamInfo<Method>& info) {
 
 INSTANTIATE_TEST_SUITE_P(Methods, FluidIn, testing::Values(Method::kMpm, Method::kPbd),
                          method_name);
-
-/// Lame's thick ball: how far the inside gives way to the pressure.
-TEST(FluidInTissue, InflatesABallAsLameSays) {
-  Scene scene = filled_ball(Method::kMpm, 800);
-  scene.cell_size = 0.002;
-  scene.fluid_spacing = 0.002;
-  Simulation simulation(scene);
-  const double rest = hollow_volume(simulation.tissue(), Vec3::Zero());
-  ASSERT_GT(fill_up(simulation), 0);
-  simulation.set_damping(20);
-  double pressure = 0, volume = 0;
-  for (int i = 0; i < 30; ++i) {
-    simulation.advance_frame();
-    if (i < 20) continue;
-    pressure += 0.1 * simulation.tissue().fluid_volumes()[0].pressure;
-    volume += 0.1 * hollow_volume(simulation.tissue(), Vec3::Zero());
-  }
-  const Material& m = scene.materials[0];
-  const double a = scene.bodies[0].radius - scene.bodies[0].wall, b = scene.bodies[0].radius;
-  const double a3 = a * a * a, b3 = b * b * b;
-  const double share = pressure / m.young_modulus * a3 / (b3 - a3) *
-                       ((1 - 2 * m.poisson_ratio) + (1 + m.poisson_ratio) / 2 * b3 / a3);
-  EXPECT_NEAR((std::cbrt(volume / rest) - 1) / share, 1, 0.05) << pressure;
-}
 
 BladePath slice(double x, double depth_from, double depth_to) {
   BladePath path;

@@ -97,9 +97,16 @@ class NodeEdges {
       }
     }
     std::copy(X.data(), X.data() + 3, place.at);
+    const auto beside = [&](std::int32_t node) {
+      return (X - s_.nodes.place[node]).cwiseAbs().maxCoeff() / s_.edge[node];
+    };
+    // Shares of nodes are cubes; between graded ones there is no gap.
     const std::int32_t i = place.site[0];
-    const double beyond = (X - s_.nodes.place[i]).cwiseAbs().maxCoeff() / s_.edge[i];
-    return beyond <= (s_.nodes.surface[i] != 0 ? 0.5 : 1.5);
+    if (beside(i) <= (s_.nodes.surface[i] != 0 ? 0.5 : 1.5)) return true;
+    for (std::int32_t e = s_.pairs.begin[i]; e < s_.pairs.begin[i + 1]; ++e) {
+      if (beside(s_.pairs.other[e]) <= 0.5) return true;
+    }
+    return false;
   }
 
   /// Of pairs near it.

@@ -270,7 +270,11 @@ double push_by_edges(Tissue& tissue, const std::vector<Collider>& colliders, dou
       const Vec3 across(r[1], r[4], r[7]);
       const EdgePlace before = hold.place;
       if (!tissue.put(X, hold.place)) {
+        // What is left of the tissue there is cut, too: up to a cell beyond it.
+        const Vec3 from = before.reference(), way = X - from;
+        const double share = std::min(1.0, tissue.cell_size() / way.norm());
         hold.place = before;
+        for (int a = 0; a < 3; ++a) hold.place.at[a] = from[a] + share * way[a];
         hold.lets_go = 1;
       } else if (!is_at_end(tissue, hold.place, at, across, stand.onward)) {
         hold.lets_go = 1;

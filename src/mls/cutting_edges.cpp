@@ -112,7 +112,7 @@ class NodeEdges {
   /// Of pairs near it.
   bool is_whole(const EdgePlace& place, const Vec3& X, const Vec3& normal) const {
     if (!looks_) return true;
-    constexpr double kNear = 0.8;  // spacings: at a side of the body pairs are half of one away
+    constexpr double kNear = 0.6;  // spacings: at a side of the body pairs are half of one away
     const std::int32_t i = place.site[0];
     const double near2 = kNear * kNear * s_.edge[i] * s_.edge[i];
     const auto any_whole = [&](std::int32_t k) {

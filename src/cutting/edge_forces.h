@@ -74,8 +74,9 @@ struct EdgePush {
 inline EdgePush push_of(const EdgePiece& piece, const EdgeStand& edge, const EdgeSupport& at,
                         double cell_size, double dt, EdgeHold& hold) {
   constexpr double kStiff = 16;     // [E] for a unit of length, where substeps bear it
-  constexpr double kBorne = 0.2;    // of a place's springs, times dt^2 / m
+  constexpr double kBorne = 0.3;    // of a place's springs, times dt^2 / m
   constexpr double kSupport = 3;    // cells: pieces so near share their nodes
+  constexpr double kRoom = 0.5;     // of that, at first
   constexpr double kDamping = 0.1;  // share of critical
   EdgePush push;
   Vec3 d = edge.x - at.x;
@@ -92,8 +93,11 @@ inline EdgePush push_of(const EdgePiece& piece, const EdgeStand& edge, const Edg
   }
   const double shared = std::max(1.0, kSupport * cell_size / piece.length);
   const double light = at.mobility * shared * dt * dt / kBorne;
-  double stiffness = kStiff * at.young_modulus * piece.length;
-  if (stiffness * light > 1) stiffness = 1 / light;
+  // It stays as it is, and with it the force, while substeps get longer or shorter.
+  double& stiffness = hold.stiffness;
+  if (push.begins || stiffness * light > 1) {
+    stiffness = std::min(kStiff * at.young_modulus * piece.length, kRoom / light);
+  }
   const double damping =
       2 * kDamping * std::sqrt(stiffness / std::max(1e-30, at.mobility * shared));
   Vec3 force = stiffness * d + damping * (edge.v - at.v);
@@ -270,7 +274,11 @@ double push_by_edges(Tissue& tissue, const std::vector<Collider>& colliders, dou
       const Vec3 across(r[1], r[4], r[7]);
       const EdgePlace before = hold.place;
       if (!tissue.put(X, hold.place)) {
+        // What is left of the tissue there is cut, too: up to a cell beyond it.
+        const Vec3 from = before.reference(), way = X - from;
+        const double share = std::min(1.0, tissue.cell_size() / way.norm());
         hold.place = before;
+        for (int a = 0; a < 3; ++a) hold.place.at[a] = from[a] + share * way[a];
         hold.lets_go = 1;
       } else if (!is_at_end(tissue, hold.place, at, across, stand.onward)) {
         hold.lets_go = 1;

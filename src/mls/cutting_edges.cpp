@@ -97,15 +97,22 @@ class NodeEdges {
       }
     }
     std::copy(X.data(), X.data() + 3, place.at);
+    const auto beside = [&](std::int32_t node) {
+      return (X - s_.nodes.place[node]).cwiseAbs().maxCoeff() / s_.edge[node];
+    };
+    // Shares of nodes are cubes; between graded ones there is no gap.
     const std::int32_t i = place.site[0];
-    const double beyond = (X - s_.nodes.place[i]).cwiseAbs().maxCoeff() / s_.edge[i];
-    return beyond <= (s_.nodes.surface[i] != 0 ? 0.5 : 1.5);
+    if (beside(i) <= (s_.nodes.surface[i] != 0 ? 0.5 : 1.5)) return true;
+    for (std::int32_t e = s_.pairs.begin[i]; e < s_.pairs.begin[i + 1]; ++e) {
+      if (beside(s_.pairs.other[e]) <= 0.5) return true;
+    }
+    return false;
   }
 
   /// Of pairs near it.
   bool is_whole(const EdgePlace& place, const Vec3& X, const Vec3& normal) const {
     if (!looks_) return true;
-    constexpr double kNear = 0.8;  // spacings: at a side of the body pairs are half of one away
+    constexpr double kNear = 0.6;  // spacings: at a side of the body pairs are half of one away
     const std::int32_t i = place.site[0];
     const double near2 = kNear * kNear * s_.edge[i] * s_.edge[i];
     const auto any_whole = [&](std::int32_t k) {

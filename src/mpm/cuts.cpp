@@ -48,7 +48,7 @@ void MpmTissue::cut_by_blades(double share) {
   const auto free = free_paths(s.scene, s.edges, frame.input, frame.cut_to, share);
   const auto held = held_paths(s, frame.input, share);
   cut(free, true, run_->result.blade_report);
-  cut(held, false, run_->result.blade_report);
+  if (!held.empty()) cut(held, false, run_->result.blade_report);
   frame.cut_to = share;
 }
 

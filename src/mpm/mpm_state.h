@@ -7,7 +7,6 @@
 #include <tuple>
 #include <vector>
 
-#include "cutting/resisting_edge.h"
 #include "mpm/contact/touching_tissue.h"
 #include "mpm/fragment_flight.h"
 #include "mpm/surface/boundary_mesh.h"
@@ -35,7 +34,6 @@ struct MpmState : TouchingTissue, TearRecords {
   float worst_stiffening = 1;                ///< BlockState's, of all blocks
   std::vector<FragmentFlight> flights;       ///< pieces that fly
   std::vector<std::int32_t> flight_of_node;  ///< -1 for none; empty while none flies
-  ResistingEdges edges;                      ///< of blades, on the CPU
   BoundaryMesh boundary;                     ///< as it was last read
   BlockWork work;
 };

@@ -32,7 +32,7 @@ Vec3 in_sites(const LatticeBody& body, const Vec3& X) {
 /// The lattice to cutting/edge_forces.h. A hold's site is of the point as which it sees the tissue.
 class LatticeEdges {
  public:
-  explicit LatticeEdges(MpmState& state) : s_(state) {}
+  explicit LatticeEdges(TouchingTissue& state) : s_(state) {}
 
   /// The nodes that the point sees.
   struct Support {
@@ -190,25 +190,25 @@ class LatticeEdges {
     Vec3 x;
     std::int32_t point;
   };
-  MpmState& s_;
+  TouchingTissue& s_;
   std::vector<Near> near_;
 };
 
 }  // namespace
 
-void look_for_edges(MpmState& s, const FrameInput& input, double begin) {
+void look_for_edges(TouchingTissue& s, const FrameInput& input, double begin) {
   if (s.edges.pieces.empty()) return;
   LatticeEdges tissue(s);
   look_for_edges(tissue, input, begin, s.edges);
 }
 
-double push_by_edges(MpmState& s, float dt, std::vector<ColliderLoad>& loads) {
+double push_by_edges(TouchingTissue& s, float dt, std::vector<ColliderLoad>& loads) {
   if (s.edges.pieces.empty()) return 0;
   LatticeEdges tissue(s);
   return push_by_edges(tissue, s.colliders, dt, kick_of(s.dt, dt), s.edges, loads);
 }
 
-std::vector<BladePath> held_paths(MpmState& s, const FrameInput& input, double end) {
+std::vector<BladePath> held_paths(TouchingTissue& s, const FrameInput& input, double end) {
   return held_paths(LatticeEdges(s), input, end, s.edges);
 }
 

@@ -5,19 +5,19 @@
 #include <vector>
 
 #include "cutting/resisting_edge.h"
-#include "mpm/mpm_state.h"
+#include "mpm/contact/touching_tissue.h"
 
 namespace tissue_sim {
 
 /// Before blades go on: which pieces hold tissue, and which will on the way from the share `begin`
 /// of the frame.
-void look_for_edges(MpmState& state, const FrameInput& input, double begin);
+void look_for_edges(TouchingTissue& state, const FrameInput& input, double begin);
 
 /// Before a substep of dt seconds, with the colliders where they will be: pushes nodes, adds what
 /// acts on the blades to `loads`. Returns the work of cutting [J].
-double push_by_edges(MpmState& state, float dt, std::vector<ColliderLoad>& loads);
+double push_by_edges(TouchingTissue& state, float dt, std::vector<ColliderLoad>& loads);
 
 /// What edges sweep where they hold on, as in cutting/edge_forces.h.
-std::vector<BladePath> held_paths(MpmState& state, const FrameInput& input, double end);
+std::vector<BladePath> held_paths(TouchingTissue& state, const FrameInput& input, double end);
 
 }  // namespace tissue_sim

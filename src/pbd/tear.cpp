@@ -16,7 +16,7 @@ namespace {
 /// From this excess on a crack begins though another one may be about to relieve the place.
 constexpr double kPatience = 1.1;
 
-const Material& material_of(const State& s, std::int32_t v) {
+const Material& tissue_at(const State& s, std::int32_t v) {
   return material_at(s.scene, s.scene.bodies[s.vertices.body[v]], s.vertices.reference[v]);
 }
 
@@ -87,7 +87,7 @@ class Tears {
     }
     for (int i = 0; i < v.size(); ++i) {
       if (v.anchored[i] != 0 || !(volume[i] > 0)) continue;
-      const Material& m = material_of(s_, i);
+      const Material& m = tissue_at(s_, i);
       if (m.tear_stretch == 0) continue;
       const Eigen::Matrix3d f = sum[i] / volume[i];
       if (!f.allFinite()) continue;  // the frame's end will find out
@@ -245,7 +245,7 @@ bool tear_tetrahedra(State& s, double since, std::vector<std::int32_t>& origin, 
   for (const std::int32_t i : tears.torn) {
     const std::int32_t v = s.tetrahedra[s.faces[i].tetrahedron[0]][0];
     const int b = s.vertices.body[v];
-    s.relieved_in[b] = (room[b].max - room[b].min).maxCoeff() / wave_speed(material_of(s, v));
+    s.relieved_in[b] = (room[b].max - room[b].min).maxCoeff() / wave_speed(tissue_at(s, v));
   }
   return part_faces(s, tears.torn, origin, report);
 }

@@ -99,7 +99,7 @@ Material read_material(const YAML::Node& node, const std::string& path) {
   fields.read("tear_stretch", m.tear_stretch);
   fields.read("tear_length", m.tear_length);
   fields.read("tear_scatter", m.tear_scatter);
-  if (fields.is_word("toughness", "measured")) {
+  if (fields.says("toughness", "measured")) {
     m.toughness = measured_toughness(m.name);
     if (m.toughness == 0) {
       fields.refuse("toughness", "was not measured of '" + m.name +

@@ -147,7 +147,7 @@ void YamlFields::require(const std::string& name, const std::string& allowed) co
   if (!has(name)) throw std::invalid_argument(path(name) + " is missing: " + allowed);
 }
 
-bool YamlFields::is_word(const std::string& name, const std::string& word) const {
+bool YamlFields::says(const std::string& name, const std::string& word) const {
   const YAML::Node* node = find(name);
   return node != nullptr && node->IsScalar() && node->Scalar() == word;
 }

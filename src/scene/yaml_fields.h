@@ -43,7 +43,7 @@ class YamlFields {
   void require(const std::string& name, const std::string& allowed) const;
 
   /// Whether it is there and is that word.
-  bool is_word(const std::string& name, const std::string& word) const;
+  bool says(const std::string& name, const std::string& word) const;
 
   // Each leaves the value as it is where the field is left out.
   void read(const std::string& name, double& value) const;

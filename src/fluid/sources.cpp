@@ -13,6 +13,8 @@ namespace {
 
 /// Of a spacing: where a particle comes out of what is solid, and how near to another none does.
 constexpr double kDropOut = 0.5, kDropApart = 0.6;
+/// Likewise how near to tissue none comes out: in a slit that is narrower it would burst it open.
+constexpr double kRoomy = 0.45;
 /// Drops that could not come out, as a wound was closed or full: more than that is not owed.
 constexpr double kMostOwed = 4;     // particles
 constexpr double kDrainTime = 0.5;  // [s]
@@ -44,9 +46,10 @@ Vec3 nearest_on(const Vec3& x, const Vec3& a, const Vec3& b, const Vec3& c) {
   return best;
 }
 
-/// Whether a place is in tissue: the triangle that is nearest to it, at most `reach` away, has it
-/// at its back. Of two that are as near the one that it lies more squarely over counts.
-bool in_tissue(const Vec3& x, const FluidWalls& walls, double reach) {
+/// Whether a place is in tissue, or nearer to it than `room`: the triangle that is nearest to it,
+/// at most `reach` away, has it at its back. Of two that are as near the one that it lies more
+/// squarely over counts.
+bool in_tissue(const Vec3& x, const FluidWalls& walls, double room, double reach) {
   double least = reach * reach, squarest = 0;
   bool inside = false;
   for (int t = 0; t < walls.size(); ++t) {
@@ -64,7 +67,7 @@ bool in_tissue(const Vec3& x, const FluidWalls& walls, double reach) {
     squarest = std::fabs(square);
     inside = square < 0;
   }
-  return inside;
+  return inside || least < room * room;
 }
 
 /// Whether a wall stands between two places.
@@ -96,7 +99,7 @@ bool is_free(const Vec3& x, const Scene& scene, const FluidWalls& walls, const F
   for (int i = 0; i < s.particles.size(); ++i) {
     if ((s.particles.position(i) - x).squaredNorm() < apart2) return false;
   }
-  return !in_tissue(x, walls, 3.0 * s.spacing);
+  return !in_tissue(x, walls, kRoomy * s.spacing, 3.0 * s.spacing);
 }
 
 double particle_volume(const FluidState& s) { return std::pow(static_cast<double>(s.spacing), 3); }

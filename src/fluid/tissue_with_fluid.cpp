@@ -81,10 +81,10 @@ void add(const FrameResult& part, double weight, FrameResult& sum) {
     sum.anchor_loads[i].force += weight * part.anchor_loads[i].force;
     sum.anchor_loads[i].torque += weight * part.anchor_loads[i].torque;
   }
+  sum.cutting_work += part.cutting_work;
   sum.cut_reports.insert(sum.cut_reports.end(), part.cut_reports.begin(), part.cut_reports.end());
   add(part.blade_report, sum.blade_report);
   add(part.tear_report, sum.tear_report);
-  sum.cutting_work += part.cutting_work;
   sum.substeps += part.substeps;
   sum.substep = std::max(sum.substep, part.substep);
   sum.fragment_candidates += part.fragment_candidates;

@@ -48,8 +48,7 @@ double measured_toughness(const std::string& preset) {
   static const std::vector<std::pair<std::string, double>> measured = {
       // Porcine liver, blade: 187 to 225; bovine liver, needles: 164 +- 6 (Gokgol et al., Appl.
       // Bionics Biomech. 9:27, 2012).
-      {"liver", 206},
-      {"fat", 4100},
+      {"liver", 206},  {"fat", 4100},
       {"muscle", 550},  // the least: up to 8000 by direction and method
       {"skin", 2800},   // chicken, scissors; rat: 1700
       {"vessel", 290},  // aorta

@@ -111,8 +111,8 @@ void keep_crumbs(State& s, std::vector<Broken>& broken) {
                broken.end());
 }
 
-/// What a tear would leave of fewer tetrahedra than four cells of the lattice have hangs on to where
-/// most of its faces are: a crack whose direction turns passes on both sides of such crumbs.
+/// What a tear would leave of fewer tetrahedra than four cells of the lattice have hangs on to
+/// where most of its faces are: a crack whose direction turns passes on both sides of such crumbs.
 void keep_small(State& s, std::vector<Broken>& broken) {
   constexpr int kLeast = 48;
   for (bool again = true; again;) {

@@ -27,9 +27,9 @@ struct BoundaryMesh {
   };
   std::vector<Vertex> vertices;
   std::vector<std::array<float, 3>> now;  ///< where each was when they were read last [m]
-  std::vector<Face> faces;        ///< by their points
-  Array<std::uint8_t> bonds;      ///< of the points, when it was made
-  std::vector<OuterPlace> outer;  ///< where the points have none: on a GPU
+  std::vector<Face> faces;                ///< by their points
+  Array<std::uint8_t> bonds;              ///< of the points, when it was made
+  std::vector<OuterPlace> outer;          ///< where the points have none: on a GPU
 };
 
 /// Makes the mesh anew if bonds broke since. Throws what find_outer_places() throws.

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstring>
 #include <numeric>
 
 namespace tissue_sim {
@@ -21,8 +20,9 @@ void SmoothNormals::group(const SurfaceTriangles& surface) {
   corners_.resize(3 * surface.fragment.size());
   std::iota(corners_.begin(), corners_.end(), 0);
   const auto order = [&](std::int32_t a, std::int32_t b) {
-    const int by_place = std::memcmp(&rest[3 * a], &rest[3 * b], 3 * sizeof(float));
-    if (by_place != 0) return by_place;
+    for (int i = 0; i < 3; ++i) {
+      if (rest[3 * a + i] != rest[3 * b + i]) return rest[3 * a + i] < rest[3 * b + i] ? -1 : 1;
+    }
     const int by_piece = surface.fragment[a / 3] - surface.fragment[b / 3];
     return by_piece != 0 ? by_piece : surface.cut[a / 3] - surface.cut[b / 3];
   };

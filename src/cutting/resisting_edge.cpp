@@ -27,7 +27,8 @@ ResistingEdges resisting_edges(const Scene& scene) {
     const std::vector<Vec3> edge = blade_path(tool, {}).edge;
     const Vec3 onward[2] = {Vec3::UnitX(), Vec3::UnitZ()};
     for (int side = 0; side < 2; ++side) {
-      const Vec3 from = edge[side], way = edge[side + 1] - from;
+      const Vec3& from = edge[side];
+      const Vec3 way = edge[side + 1] - from;
       const double length = way.norm();
       const int count =
           std::max(1, static_cast<int>(std::ceil(length / (kPiece * scene.cell_size))));

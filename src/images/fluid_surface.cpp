@@ -142,9 +142,9 @@ void make_fluid_surface(Span<const FluidPoint> points, double spacing, SceneView
       int inside = 0;
       for (int c = 0; c < 8; ++c) {
         const Index i = {first[0] + (c & 1), first[1] + (c >> 1 & 1), first[2] + (c >> 2)};
-        static const Node kNone;
+        static const Node none;
         const Node* node = field.find(i);
-        if (node == nullptr) node = &kNone;
+        if (node == nullptr) node = &none;
         for (int a = 0; a < 3; ++a) {
           cube[c].x[a] = i[a] * cell;
           cube[c].slope[a] = node->slope[a];

@@ -105,7 +105,8 @@ TEST_F(Viscosity, IsADashpotAtEachEdge) {
       const auto [a, b] = s.links.vertices[c];
       const double wa = 1 / s.vertices.mass[a], wb = 1 / s.vertices.mass[b];
       const double length = (s.vertices.reference[b] - s.vertices.reference[a]).norm();
-      const double lost = 1 - std::exp(-kViscosity * kDuration / (1000 * length * length));
+      const double uneven = (wa + wb) * (wa + wb) / (4 * wa * wb);
+      const double lost = 1 - std::exp(-kViscosity * kDuration * uneven / (1000 * length * length));
       const Vec3 way = s.vertices.position(b) - s.vertices.position(a);
       const Vec3 by = lost * (v[b] - v[a] - spins[s.component[a]].cross(way)) / (wa + wb);
       v[a] += wa * by;

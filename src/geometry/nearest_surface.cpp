@@ -5,6 +5,8 @@
 #include <cstdint>
 #include <unordered_map>
 
+#include "geometry/on_triangle.h"
+
 namespace tissue_sim {
 namespace {
 
@@ -72,25 +74,9 @@ SurfacePoint on_ellipsoid(const Vec3& x, const Vec3& radii) {
 }  // namespace
 
 Vec3 on_triangle(const Vec3& p, const Vec3& a, const Vec3& b, const Vec3& c) {
-  const Vec3 ab = b - a, ac = c - a, ap = p - a;
-  const double d1 = ab.dot(ap), d2 = ac.dot(ap);
-  if (d1 <= 0 && d2 <= 0) return a;
-  const Vec3 bp = p - b;
-  const double d3 = ab.dot(bp), d4 = ac.dot(bp);
-  if (d3 >= 0 && d4 <= d3) return b;
-  const double vc = d1 * d4 - d3 * d2;
-  if (vc <= 0 && d1 >= 0 && d3 <= 0) return a + d1 / (d1 - d3) * ab;
-  const Vec3 cp = p - c;
-  const double d5 = ab.dot(cp), d6 = ac.dot(cp);
-  if (d6 >= 0 && d5 <= d6) return c;
-  const double vb = d5 * d2 - d1 * d6;
-  if (vb <= 0 && d2 >= 0 && d6 <= 0) return a + d2 / (d2 - d6) * ac;
-  const double va = d3 * d6 - d5 * d4;
-  if (va <= 0 && d4 - d3 >= 0 && d5 - d6 >= 0) {
-    return b + (d4 - d3) / ((d4 - d3) + (d5 - d6)) * (c - b);
-  }
-  const double sum = va + vb + vc;
-  return a + vb / sum * ab + vc / sum * ac;
+  Vec3 place;
+  on_triangle(p.data(), a.data(), b.data(), c.data(), place.data());
+  return place;
 }
 
 /// The triangles of a mesh in a hash grid as wide as the reach.

@@ -14,7 +14,7 @@ struct SurfacePoint {
   Vec3 normal;  ///< unit, outward
 };
 
-/// Nearest place of a triangle to p (Ericson, Real-Time Collision Detection, 5.1.5).
+/// Nearest place of a triangle to p.
 Vec3 on_triangle(const Vec3& p, const Vec3& a, const Vec3& b, const Vec3& c);
 
 /// Prepared for many places that lie near the surface.

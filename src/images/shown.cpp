@@ -73,7 +73,13 @@ void Shown::set(const SceneView& view, const Scene& scene,
                 const std::vector<std::unique_ptr<ToolMesh>>& meshes, SmoothNormals& smooth,
                 Cpu& cpu) {
   if (is_same(view.surface, surface)) {
-    surface.corners = view.surface.corners;
+    const std::vector<float>& corners = view.surface.corners;
+    cpu.for_each(
+        static_cast<int>(surface.fragment.size()),
+        [&](int t) {
+          std::copy_n(&corners[std::size_t{9} * t], 9, &surface.corners[std::size_t{9} * t]);
+        },
+        4096);
   } else {
     surface = view.surface;
   }

@@ -101,12 +101,12 @@ class MpmDevice {
   virtual std::vector<int> label_pieces() = 0;
   /// Whether that may go on while blocks are made.
   virtual bool labels_by_bonds_alone() const = 0;
-  /// Brings the nodes around points; sends those that were brought last; brings all nodes; where
-  /// all nodes are, without their velocities.
+  /// Brings the nodes around points; sends those that were brought last; brings all nodes.
   virtual void bring_nodes(const std::vector<std::int32_t>& /*points*/) {}
   virtual void send_nodes() {}
   virtual void bring_all_nodes() {}
-  virtual void bring_places() {}
+  /// Sets BoundaryMesh::now, of a mesh that is the tissue's.
+  virtual void place_boundary() = 0;
 
   /// The end of a frame with a fragment network: pieces begin to fly. Lists the points that are
   /// strained, and returns whether any piece moved.

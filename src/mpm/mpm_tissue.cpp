@@ -83,8 +83,12 @@ FrameResult MpmTissue::finish() {
 }
 
 void MpmTissue::read_surface(SurfaceTriangles& surface) {
-  device_->bring_places();
-  tissue_sim::read_surface(run_->state, run_->pieces, surface);
+  MpmState& s = run_->state;
+  BoundaryMesh& mesh = s.boundary;
+  update_boundary(s, mesh);
+  device_->place_boundary();
+  const auto rest = [&mesh](std::int32_t v) { return floats(mesh.vertices[v].rest); };
+  put_faces(mesh.faces, mesh.now, rest, run_->pieces.of_point, *s.cpu, surface);
 }
 
 void MpmTissue::push_surface(Span<const float> impulses) {

@@ -6,7 +6,6 @@
 
 #include "fragments/piece_sums.h"
 #include "frame/point_fields.h"
-#include "frame/put_faces.h"
 #include "material/laws.h"
 #include "math/bspline.h"
 #include "mpm/surface/facet_in_world.h"
@@ -71,32 +70,17 @@ bool held_place(const MpmState& state, std::int32_t point, Vec3& place) {
   return true;
 }
 
-void read_surface(MpmState& s, const Pieces& pieces, SurfaceTriangles& surface) {
-  BoundaryMesh& mesh = s.boundary;
-  update_boundary(s, mesh);
-  constexpr int kGrain = 256;
-  const auto vertices = static_cast<int>(mesh.vertices.size());
-  mesh.now.resize(vertices);
-  s.cpu->for_each(
-      vertices,
-      [&](int i) {
-        const BoundaryMesh::Vertex& v = mesh.vertices[i];
-        Vec3 x = v.rest;
-        if (s.points.free_volume_of(v.point) > 0) {
-          const AxisWeights weights(v.place);
-          for (int k = 0; k < 27; ++k) {
-            const float w = weights.of[k % 3] * weights.of[3 + k / 3 % 3] * weights.of[6 + k / 9];
-            for (int a = 0; a < 3; ++a) x[a] += w * s.nodes.u[a][v.node[k]];
-          }
-        } else if (s.anchors.moves) {
-          const std::int32_t body = s.points.site[v.point].body;
-          x = s.anchors.place_of_held(s.bodies[body].body, body, x);
-        }
-        mesh.now[i] = floats(x);
-      },
-      kGrain);
-  const auto rest = [&mesh](std::int32_t v) { return floats(mesh.vertices[v].rest); };
-  put_faces(mesh.faces, mesh.now, rest, pieces.of_point, *s.cpu, surface);
+void place_boundary(MpmState& s) {
+  place_boundary(s, [&s](int i) {
+    const BoundaryMesh::Vertex& v = s.boundary.vertices[i];
+    Vec3 x = v.rest;
+    const AxisWeights weights(v.place);
+    for (int k = 0; k < 27; ++k) {
+      const float w = weights.at(k);
+      for (int a = 0; a < 3; ++a) x[a] += w * s.nodes.u[a][v.node[k]];
+    }
+    return floats(x);
+  });
 }
 
 void push_surface(MpmState& s, Span<const float> impulses) {
@@ -105,15 +89,12 @@ void push_surface(MpmState& s, Span<const float> impulses) {
     const BoundaryMesh::Vertex& v = mesh.vertices[i];
     if (!(s.points.free_volume_of(v.point) > 0)) return;
     const AxisWeights weights(v.place);
-    const auto weight = [&](int k) {
-      return weights.of[k % 3] * weights.of[3 + k / 3 % 3] * weights.of[6 + k / 9];
-    };
     float of_moving = 0;  // the rest has no mass that could take a part
-    for (int k = 0; k < 27; ++k) of_moving += s.nodes.inv_mass[v.node[k]] > 0 ? weight(k) : 0;
+    for (int k = 0; k < 27; ++k) of_moving += s.nodes.inv_mass[v.node[k]] > 0 ? weights.at(k) : 0;
     if (!(of_moving > 0)) return;
     for (int k = 0; k < 27; ++k) {
       const std::int32_t node = v.node[k];
-      const float per_impulse = weight(k) / of_moving * s.nodes.inv_mass[node];
+      const float per_impulse = weights.at(k) / of_moving * s.nodes.inv_mass[node];
       for (int a = 0; a < 3; ++a) s.nodes.v[a][node] += per_impulse * impulse[a];
     }
   });

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "fragments/pieces.h"
+#include "frame/put_faces.h"
 #include "mpm/mpm_state.h"
 #include "tissue_sim/point.h"
 
@@ -20,8 +21,29 @@ void add_point_fields(MpmState& state, const PointSelection& selection,
                       const std::vector<std::int32_t>& place, int count,
                       std::vector<std::uint8_t>& cloud);
 
-/// Replaces `surface` with the tissue's (mpm/surface/boundary_mesh.h), from the nodes on the host.
-void read_surface(MpmState& state, const Pieces& pieces, SurfaceTriangles& surface);
+/// Sets BoundaryMesh::now: where anchors hold a vertex, else what of_nodes(i) says of vertex i [m].
+template <class F>
+void place_boundary(MpmState& s, const F& of_nodes) {
+  BoundaryMesh& mesh = s.boundary;
+  constexpr int kGrain = 256;
+  const auto vertices = static_cast<int>(mesh.vertices.size());
+  mesh.now.resize(vertices);
+  s.cpu->for_each(
+      vertices,
+      [&](int i) {
+        const BoundaryMesh::Vertex& v = mesh.vertices[i];
+        if (s.points.free_volume_of(v.point) > 0) {
+          mesh.now[i] = of_nodes(i);
+          return;
+        }
+        const std::int32_t body = s.points.site[v.point].body;
+        mesh.now[i] = floats(
+            s.anchors.moves ? s.anchors.place_of_held(s.bodies[body].body, body, v.rest) : v.rest);
+      },
+      kGrain);
+}
+/// From the nodes on the host.
+void place_boundary(MpmState& state);
 /// Impulses on the corners of what it read last [N s] become velocity of the nodes.
 void push_surface(MpmState& state, Span<const float> impulses);
 

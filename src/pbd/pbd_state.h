@@ -14,6 +14,7 @@
 #include "pbd/constraint_set.h"
 #include "pbd/motion.h"
 #include "pbd/project.h"
+#include "pbd/tip_contact.h"
 #include "pbd/touch.h"
 #include "tissue_sim/cut.h"
 #include "tissue_sim/scene.h"
@@ -47,7 +48,6 @@ struct Vertices {
   Vec3 velocity(int i) const { return Vec3(v[4 * i], v[4 * i + 1], v[4 * i + 2]); }
 };
 
-using Triangle = std::array<std::int32_t, 3>;
 using Tetrahedron = std::array<std::int32_t, 4>;
 
 /// A vertex pair that an internal shape-preserving constraint joins.
@@ -121,8 +121,7 @@ struct State {
       0;  ///< of tetrahedra of a material (tet_steps.cpp) [s]; 0: `steps` are given
 
   std::vector<Collider> colliders;  ///< of this step
-  /// Triangles that may come to a tip in this part of a frame, and which of the colliders it is.
-  std::vector<std::array<std::int32_t, 2>> at_tips;
+  std::vector<AtTip> at_tips;       ///< in this part of a frame
 
   /// Vertices of a chunk of each level, by which constraints are packed (ConstraintSet): what the
   /// first cache of a processor holds, and its second. Empty on a GPU.
@@ -171,9 +170,11 @@ std::vector<std::int32_t> levels_of(const State& s);
 /// Pushes vertices out of the colliders, with friction; adds what that takes (contact.cpp).
 void project_contacts(State& s, float h, std::vector<ColliderLoad>& loads);
 
-/// Makes State::at_tips, for colliders that go from `begin` to `end` in so many seconds.
-void find_at_tips(State& s, const std::vector<Collider>& begin, const std::vector<Collider>& end,
-                  double duration);
+/// Of those of the colliders that are tips and go from `begin` to `end`.
+std::vector<TipSweep> sweeps_of_tips(const std::vector<Collider>& begin,
+                                     const std::vector<Collider>& end);
+/// Makes State::at_tips for so many seconds.
+void find_at_tips(State& s, const std::vector<TipSweep>& tips, double duration);
 
 /// Makes State::held and State::holder (anchors.cpp).
 void find_held(State& s);

@@ -132,15 +132,20 @@ int PbdTissue::steps_between_searches(const FrameColliders& colliders, int steps
   return searches < steps ? static_cast<int>(std::ceil(steps / searches)) : 1;
 }
 
+std::vector<pbd::TipSweep> PbdTissue::sweeps_of_tips(const FrameColliders& colliders,
+                                                     const Part& part) {
+  std::vector<Collider> begin, end;
+  colliders.at(part.share(-1), begin);
+  colliders.at(part.share(part.count - 1), end);
+  return pbd::sweeps_of_tips(begin, end);
+}
+
 void PbdTissue::run_steps(const FrameColliders& colliders, const Part& part, float h) {
   pbd::State& s = *state_;
   pbd::find_touches(s, part.count * h);
   const std::vector<pbd::Flight> flights = pbd::flights(s);
   std::fill(s.pushed.begin(), s.pushed.end(), std::uint8_t{0});
-  std::vector<Collider> begin, end;
-  colliders.at(part.share(-1), begin);
-  colliders.at(part.share(part.count - 1), end);
-  pbd::find_at_tips(s, begin, end, part.count * h);
+  pbd::find_at_tips(s, sweeps_of_tips(colliders, part), part.count * h);
   for (int i = 0; i < part.count; ++i) {
     stop_if_asked();
     colliders.at(part.share(i), s.colliders);

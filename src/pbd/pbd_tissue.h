@@ -60,6 +60,8 @@ class PbdTissue : public Tissue {
     /// Of the frame, at the end of the part's step `i`.
     double share(int i) const { return (first + i + 1.0) / of; }
   };
+  static std::vector<pbd::TipSweep> sweeps_of_tips(const FrameColliders& colliders,
+                                                   const Part& part);
   /// Takes them, of h seconds each; adds what acts on tools to result_.
   virtual void run_steps(const FrameColliders& colliders, const Part& part, float h);
   virtual Figures measure();

@@ -12,6 +12,7 @@
 #include "mpm/lattice_pieces.h"
 #include "mpm/linearised_motion.h"
 #include "mpm/mpm_fields.h"
+#include "mpm/point_fields.h"
 #include "mpm/surface/surface_places.h"
 
 namespace tissue_sim {
@@ -203,5 +204,7 @@ void CpuMpmDevice::restored() {
   s.work.force.clear();
   s.work.force.resize(s.blocks.force_size);
 }
+
+void CpuMpmDevice::place_boundary() { tissue_sim::place_boundary(state_); }
 
 }  // namespace tissue_sim

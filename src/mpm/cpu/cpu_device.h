@@ -25,6 +25,7 @@ class CpuMpmDevice final : public MpmDevice {
   std::vector<int> label_pieces() override;
   bool labels_by_bonds_alone() const override { return true; }
   bool fly(double duration, Foresight& foresight, std::vector<StrainedPoint>& strained) override;
+  void place_boundary() override;
   int read_points(const PointSelection& selection, std::vector<std::uint8_t>& cloud) override;
   void save(ArchiveWriter& archive) override;
   void restore(ArchiveReader& archive) override;

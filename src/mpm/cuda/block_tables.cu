@@ -3,6 +3,7 @@
 
 #include "compute/for_each_cuda.h"
 #include "mpm/cuda/block_tables.h"
+#include "mpm/surface/facet_in_world.h"
 
 namespace tissue_sim {
 namespace {
@@ -50,6 +51,24 @@ struct Gather {
   __device__ void operator()(int i) const {
     packed[i] = from.u[list[i]];
     packed[count + i] = from.v[list[i]];
+  }
+};
+
+struct PlaceVertex {
+  CudaNodes nodes;
+  const BoundaryMesh::Vertex* vertices;
+  float* places;
+  __device__ void operator()(int i) const {
+    const BoundaryMesh::Vertex& v = vertices[i];
+    const AxisWeights weights(v.place);
+    double x[3];
+    for (int a = 0; a < 3; ++a) x[a] = reinterpret_cast<const double*>(&v.rest)[a];
+    for (int k = 0; k < 27; ++k) {
+      const float4 u = nodes.u[v.node[k]];
+      const float w = weights.at(k);
+      x[0] += w * u.x, x[1] += w * u.y, x[2] += w * u.z;
+    }
+    for (int a = 0; a < 3; ++a) places[3 * i + a] = static_cast<float>(x[a]);
   }
 };
 
@@ -107,6 +126,11 @@ void launch_gather(const CudaNodes& from, const std::int32_t* list, int count, f
 void launch_scatter(const float4* packed, const std::int32_t* list, int count, const CudaNodes& to,
                     const CudaNodes& and_to, cudaStream_t stream) {
   Gpu(stream).for_each(count, Scatter{packed, list, count, to, and_to});
+}
+
+void launch_boundary_places(const CudaNodes& nodes, const BoundaryMesh::Vertex* vertices, int count,
+                            float* places, cudaStream_t stream) {
+  Gpu(stream).for_each(count, PlaceVertex{nodes, vertices, places});
 }
 
 void connect_slots(const SlotTables& t, std::size_t node_count, ConnectRoom& room,

@@ -4,6 +4,7 @@
 
 #include "compute/device_array.h"
 #include "mpm/cuda/tables.h"
+#include "mpm/surface/boundary_mesh.h"
 
 namespace tissue_sim {
 
@@ -58,6 +59,9 @@ void launch_gather(const CudaNodes& from, const std::int32_t* list, int count, f
 /// Puts it back, into two states: what no block moves must be the same in both.
 void launch_scatter(const float4* packed, const std::int32_t* list, int count, const CudaNodes& to,
                     const CudaNodes& and_to, cudaStream_t stream);
+/// Where nodes put vertices of a surface, three floats each [m].
+void launch_boundary_places(const CudaNodes& nodes, const BoundaryMesh::Vertex* vertices, int count,
+                            float* places, cudaStream_t stream);
 
 // Which slots share a node, found on the GPU.
 

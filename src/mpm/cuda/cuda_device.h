@@ -39,7 +39,7 @@ class CudaMpmDevice final : public MpmDevice {
   void bring_nodes(const std::vector<std::int32_t>& points) override;
   void send_nodes() override;
   void bring_all_nodes() override;
-  void bring_places() override;
+  void place_boundary() override;
   bool fly(double duration, Foresight& foresight, std::vector<StrainedPoint>& strained) override;
   int read_points(const PointSelection& selection, std::vector<std::uint8_t>& cloud) override;
   GpuPoints read_points_on_gpu(const PointSelection& selection) override;

@@ -1,8 +1,10 @@
 // Nodes of tissue that lives on a GPU on their way to the host and back.
 #include <algorithm>
+#include <array>
 
 #include "mpm/cuda/cuda_device.h"
 #include "mpm/cuda/on_device.h"
+#include "mpm/point_fields.h"
 
 namespace tissue_sim {
 namespace {
@@ -145,8 +147,22 @@ void CudaMpmDevice::send_nodes() { push_some(*tissue_, tissue_->brought); }
 
 void CudaMpmDevice::bring_all_nodes() { pull_nodes(*tissue_); }
 
-void CudaMpmDevice::bring_places() {
-  pull_field(*tissue_, tissue_->present().u, tissue_->state.nodes.u);
+void CudaMpmDevice::place_boundary() {
+  CudaTissue& d = *tissue_;
+  const BoundaryMesh& mesh = d.state.boundary;
+  const std::size_t count = mesh.vertices.size();
+  if (d.boundary_made != mesh.made) d.boundary.upload(mesh.vertices, d.stream);
+  d.boundary_made = mesh.made;
+  d.boundary_places.resize(3 * count);
+  d.host_boundary.resize(3 * count);
+  launch_boundary_places(d.present(), d.boundary.data(), static_cast<int>(count),
+                         d.boundary_places.data(), d.stream);
+  d.boundary_places.download(d.host_boundary.data(), 3 * count, d.stream);
+  check_cuda(cudaStreamSynchronize(d.stream), "send data");
+  const float* now = d.host_boundary.data();
+  tissue_sim::place_boundary(d.state, [now](int i) {
+    return std::array<float, 3>{now[3 * i], now[3 * i + 1], now[3 * i + 2]};
+  });
 }
 
 }  // namespace tissue_sim

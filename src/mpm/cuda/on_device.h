@@ -152,9 +152,13 @@ struct CudaTissue {
   PinnedArray<long long> host_loads;
   PinnedArray<CudaMeasure> host_measures;
   PinnedArray<Point> host_cloud;
-  std::array<CudaEvent, 8> cloud_came;  ///< parts of it
-  PinnedArray<float4> host_nodes;       ///< u, then v
-  bool points_changed = true;           ///< pieces must be uploaded
+  std::array<CudaEvent, 8> cloud_came;         ///< parts of it
+  PinnedArray<float4> host_nodes;              ///< u, then v
+  DeviceArray<BoundaryMesh::Vertex> boundary;  ///< as of BoundaryMesh::made
+  std::uint64_t boundary_made = 0;
+  DeviceArray<float> boundary_places;
+  PinnedArray<float> host_boundary;
+  bool points_changed = true;  ///< pieces must be uploaded
 
   ~CudaTissue() {
     if (stream != nullptr) cudaStreamDestroy(stream);

@@ -93,6 +93,7 @@ void update_boundary(const LatticeTissue& tissue, BoundaryMesh& mesh) {
     return;
   }
   mesh.bonds = points.bonds;
+  ++mesh.made;
   if (points.outer.empty() && mesh.outer.empty()) mesh.outer = find_outer_places(tissue);
   const std::vector<OuterPlace>& outer = points.outer.empty() ? mesh.outer : points.outer;
   PointCubes cubes(tissue, outer);

@@ -25,14 +25,6 @@ CudaPbdTissue::CudaPbdTissue(const Scene& scene, std::vector<std::string> notes)
     : PbdTissue(scene, std::move(notes)), device_(std::make_unique<OnDevice>()) {
   OnDevice& d = *device_;
   d.gpu = open_gpu(d.stream);
-  if (std::any_of(scene.tools.begin(), scene.tools.end(), [](const Tool& t) {
-        return t.type == ToolType::kProbe || t.type == ToolType::kBall;
-      })) {
-    notes_.push_back(
-        "pbd: on a GPU tools meet vertices alone, so tips finer than the mesh pass between them; "
-        "on "
-        "the CPU they do not");
-  }
   const int steps = pbd::steps_of(*state_, 1 / scene.frame_rate);
   const auto colliders = static_cast<std::size_t>(steps) * collider_count(scene);
   d.frame.resize(1);
@@ -66,6 +58,16 @@ void CudaPbdTissue::push_all() {
   const pbd::Vertices& v = state_->vertices;
   d.count = v.size();
   d.mass.upload(v.mass, d.stream);
+  const std::vector<Tool>& tools = state_->scene.tools;
+  const auto tips = std::count_if(tools.begin(), tools.end(), [](const Tool& t) {
+    return t.type == ToolType::kProbe || t.type == ToolType::kBall;
+  });
+  const std::size_t triangles = tips > 0 ? state_->triangles.size() : 0;
+  d.triangles.upload(state_->triangles.data(), triangles, d.stream);
+  d.tip_sweeps.resize(tips);
+  d.near.resize(tips * triangles);
+  d.near_count.resize(1);
+  d.mean_edge = state_->mean_edge;
   d.pushed.resize(d.count);
   d.pushed.clear(d.stream);
   d.predicted.resize(d.count);
@@ -145,12 +147,27 @@ int CudaPbdTissue::upload_touches(double duration) {
   return s.touches.size() > 0 ? d.touches.colours : 0;
 }
 
+void CudaPbdTissue::find_near_tips(const std::vector<pbd::TipSweep>& sweeps, double duration) {
+  OnDevice& d = *device_;
+  const auto count = static_cast<int>(sweeps.size());
+  if (count == 0 || d.triangles.size() == 0) {
+    d.near_count.clear(d.stream);
+    return;
+  }
+  d.tip_sweeps.upload(sweeps, d.stream);
+  std::size_t bytes = 0;
+  launch_pbd_near_tips(d.field(), count, duration, nullptr, bytes, d.stream);
+  d.tip_memory.resize(bytes);
+  launch_pbd_near_tips(d.field(), count, duration, d.tip_memory.data(), bytes, d.stream);
+}
+
 void CudaPbdTissue::run_steps(const FrameColliders& colliders, const Part& part, float h) {
   const int steps = part.count;
   OnDevice& d = *device_;
   pbd::CudaPbdFrame frame{pbd::step_numbers(state_->scene, h), colliders.count()};
   frame.touch_colours = upload_touches(steps * h);
   upload_frame(colliders, part, frame);
+  find_near_tips(sweeps_of_tips(colliders, part), steps * h);
   const pbd::CudaPbdField field = d.field();
   const int chunks = static_cast<int>(d.component_of_chunk.size());
   const pbd::CudaPbdFlights flights{d.chunks.data(), chunks, d.order.data()};

@@ -9,6 +9,7 @@
 #include "pbd/constraints.h"
 #include "pbd/motion.h"
 #include "pbd/tet_constraints.h"
+#include "pbd/tip_contact.h"
 #include "pbd/touch.h"
 #include "tools/collider.h"
 
@@ -46,6 +47,16 @@ struct CudaPbdFrame {
   int touch_colours = 0;  ///< of CudaPbdField::touches, which change from frame to frame
 };
 
+/// Triangles that come near tips in this part of a frame (State::at_tips).
+struct CudaPbdTips {
+  const Triangle* triangles;  ///< the whole surface; [tip][triangle] are numbered through
+  int count = 0;              ///< of them; 0 where the scene has no tip
+  const TipSweep* sweeps;
+  std::int32_t* near;  ///< those numbers, in order, and how many
+  int* near_count;
+  double mean_edge = 0;  ///< [m]
+};
+
 struct CudaPbdField {
   int count = 0;      ///< vertices
   float4* x;          ///< as Vertices::x, with its padding
@@ -60,6 +71,7 @@ struct CudaPbdField {
   CudaPbdSet<Bending> bends;
   CudaPbdSet<Touch> touches;
   CudaPbdSet<Damper> dampers;
+  CudaPbdTips tips;
   bool may_touch = false;  ///< whether there are pieces that may touch one another
   int sweeps = 1;          ///< sweeps_of_step()
   const CudaPbdFrame* frame;
@@ -128,6 +140,10 @@ void launch_pbd_steps(const CudaPbdField& field, const CudaPbdFrame& frame, int 
                       const CudaPbdExchange& exchange, cudaStream_t stream);
 /// Whether that is possible.
 bool fits_pbd_block(const CudaPbdField& field);
+/// Makes CudaPbdTips::near for so many sweeps and seconds; with `memory` at nullptr says how much
+/// of it that needs [bytes].
+void launch_pbd_near_tips(const CudaPbdField& field, int sweeps, double duration, void* memory,
+                          std::size_t& bytes, cudaStream_t stream);
 void launch_pbd_flights(const CudaPbdField& field, const CudaPbdFlights& flights,
                         CudaPbdFlight* result, cudaStream_t stream);
 void launch_pbd_changes(const CudaPbdField& field, const std::int32_t* component,

@@ -155,6 +155,18 @@ __device__ __forceinline__ void add_load(unsigned long long* load, double value)
   atomicAdd(load, static_cast<unsigned long long>(__double2ll_rn(value * (1 / kPbdLoadUnit))));
 }
 
+/// Adds what acts on a tool's collider; nobody asks what the ground carries.
+__device__ __forceinline__ void add_push(const Collider& collider, const ContactPush& push,
+                                         unsigned long long* load) {
+  if (collider.tool < 0) return;
+#pragma unroll
+  for (int a = 0; a < 3; ++a) {
+    add_load(load + a, push.force[a]);
+    add_load(load + 3 + a, push.torque[a]);
+  }
+  atomicAdd(load + 6, 1ull);
+}
+
 /// Pushes a vertex out of the colliders of this step, one after the other: contact.cpp.
 __device__ __forceinline__ void touch_vertex(const CudaPbdField& f, float h,
                                              const CudaPbdCollider* colliders, int count,
@@ -182,14 +194,9 @@ __device__ __forceinline__ void touch_vertex(const CudaPbdField& f, float h,
     const ContactPush push = push_out(collider.shape, g, h, f.mass[i], predicted, v, x, x4.w, m);
     place = place_of(start, m);
     touches = true;
-    if (collider.shape.tool < 0) continue;  // nobody asks what the ground carries
     unsigned long long* load = loads + kPbdLoadSums * c;
-#pragma unroll
-    for (int a = 0; a < 3; ++a) {
-      add_load(load + a, push.force[a]);
-      add_load(load + 3 + a, push.torque[a]);
-    }
-    atomicAdd(load + 6, 1ull);
+    add_push(collider.shape, push, load);
+    if (collider.shape.tool < 0) continue;
     if (push.distance < -collider.shape.inside && collider.shape.inside > 0) {
       atomicAdd(load + 7, 1ull);
       atomicMax(load + 8, static_cast<unsigned long long>(-push.distance * (1 / kInsideUnit)));
@@ -198,6 +205,64 @@ __device__ __forceinline__ void touch_vertex(const CudaPbdField& f, float h,
   if (!touches) return;
   f.pushed[i] = 1;
   *moved = make_float4(m[0], m[1], m[2], 0);
+}
+
+__device__ __forceinline__ void load_corners(const CudaPbdField& f, const Triangle& t,
+                                             const float4* x, const float4* moved,
+                                             Corner (&corner)[3]) {
+#pragma unroll
+  for (int k = 0; k < 3; ++k) {
+    const std::int32_t i = t[k];
+    const float4 x4 = x[i], m4 = moved[i], p4 = f.predicted[i], v4 = f.v[i];
+    corner[k] = {
+        {x4.x, x4.y, x4.z, x4.w}, {m4.x, m4.y, m4.z}, {p4.x, p4.y, p4.z}, {v4.x, v4.y, v4.z}};
+  }
+}
+
+/// Pushes triangles out of tips, one after the other as the CPU does, by one block of threads, all
+/// of them together; leaves them in step. They look for the next that lies in its tip together, and
+/// one pushes it.
+__device__ __forceinline__ void push_out_of_tips(const CudaPbdField& f, float h,
+                                                 const CudaPbdCollider* colliders,
+                                                 unsigned long long* loads, const float4* x,
+                                                 float4* moved) {
+  __shared__ int next;
+  const CudaPbdTips& tips = f.tips;
+  if (tips.count == 0) return;
+  const int count = *tips.near_count, thread = static_cast<int>(threadIdx.x);
+  Corner corner[3];
+  TipPlace found;
+  for (int from = 0; from < count; from = next + 1) {
+    __syncthreads();
+    if (thread == 0) next = count;
+    __syncthreads();
+    for (int i = from + thread; i < count; i += static_cast<int>(blockDim.x)) {
+      const std::int32_t pair = tips.near[i];
+      load_corners(f, tips.triangles[pair % tips.count], x, moved, corner);
+      const Collider& tip = colliders[tips.sweeps[pair / tips.count].collider].shape;
+      if (!find_in_tip(tip, corner, tips.mean_edge, found)) continue;
+      atomicMin(&next, i);
+      break;
+    }
+    __syncthreads();
+    if (next >= count) break;
+    if (thread == 0) {
+      const std::int32_t pair = tips.near[next];
+      const Triangle& t = tips.triangles[pair % tips.count];
+      const std::int32_t c = tips.sweeps[pair / tips.count].collider;
+      load_corners(f, t, x, moved, corner);
+      ContactPush push;
+      if (find_in_tip(colliders[c].shape, corner, tips.mean_edge, found) &&
+          push_out_of_tip(colliders[c].shape, found, h, corner, push)) {
+        for (int k = 0; k < 3; ++k) {
+          moved[t[k]] = make_float4(corner[k].moved[0], corner[k].moved[1], corner[k].moved[2], 0);
+          if (found.share[k] > 0) f.pushed[t[k]] = 1;
+        }
+        add_push(colliders[c].shape, push, loads + kPbdLoadSums * c);
+      }
+    }
+  }
+  __syncthreads();
 }
 
 }  // namespace pbd

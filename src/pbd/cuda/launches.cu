@@ -1,7 +1,10 @@
 // Steps by launches: for tissue of many constraints. A launch is a colour, so its end is the
 // barrier that the next colour needs; small colours that follow one another share a launch of one
 // block of threads.
+#include <thrust/iterator/counting_iterator.h>
+
 #include <algorithm>
+#include <cub/device/device_select.cuh>
 #include <utility>
 #include <vector>
 
@@ -54,6 +57,23 @@ __global__ void __launch_bounds__(kThreads) pbd_touch(CudaPbdField f) {
                f.loads + static_cast<std::size_t>(step) * count * kPbdLoadSums, i, f.x[i],
                f.moved + i);
 }
+
+__global__ void __launch_bounds__(kThreadsOfFew) pbd_touch_tips(CudaPbdField f) {
+  const std::size_t first = static_cast<std::size_t>(*f.step) * f.frame->colliders;
+  push_out_of_tips(f, f.frame->step.h, f.colliders + first, f.loads + first * kPbdLoadSums, f.x,
+                   f.moved);
+}
+
+/// Whether the triangle of a number of CudaPbdTips comes near its tip.
+struct IsNearTip {
+  CudaPbdField f;
+  double duration;
+  __device__ bool operator()(std::int32_t pair) const {
+    Corner corner[3];
+    load_corners(f, f.tips.triangles[pair % f.tips.count], f.x, f.moved, corner);
+    return may_meet(f.tips.sweeps[pair / f.tips.count], corner, f.tips.mean_edge, duration);
+  }
+};
 
 __global__ void __launch_bounds__(kThreads) pbd_take_velocities(CudaPbdField f) {
   const int i = static_cast<int>(blockIdx.x * blockDim.x + threadIdx.x);
@@ -171,8 +191,17 @@ void launch_pbd_step(const CudaPbdField& field, const CudaPbdColours& colours,
                                                          field.moved);
   }
   pbd_touch<<<blocks, kThreads, 0, stream>>>(field);
+  if (field.tips.count > 0) pbd_touch_tips<<<1, kThreadsOfFew, 0, stream>>>(field);
   pbd_take_velocities<<<blocks, kThreads, 0, stream>>>(field);
   check_cuda(cudaGetLastError(), "take a step");
+}
+
+void launch_pbd_near_tips(const CudaPbdField& field, int sweeps, double duration, void* memory,
+                          std::size_t& bytes, cudaStream_t stream) {
+  check_cuda(cub::DeviceSelect::If(memory, bytes, thrust::counting_iterator<std::int32_t>(0),
+                                   field.tips.near, field.tips.near_count,
+                                   sweeps * field.tips.count, IsNearTip{field, duration}, stream),
+             "find what comes near tips");
 }
 
 }  // namespace pbd

@@ -49,6 +49,12 @@ struct CudaPbdTissue::OnDevice {
   Set<pbd::Bending> bends;
   Set<pbd::Touch> touches;
   Set<pbd::Damper> dampers;
+  DeviceArray<pbd::Triangle> triangles;  ///< of the surface, where the scene has tips
+  DeviceArray<pbd::TipSweep> tip_sweeps;
+  DeviceArray<std::int32_t> near;
+  DeviceArray<int> near_count;
+  DeviceArray<std::uint8_t> tip_memory;  ///< what finding them takes
+  double mean_edge = 0;
   bool may_touch = false;
   int sweeps = 1;  ///< of a step
   Way wanted = Way::kFaster, way = Way::kLaunches;
@@ -93,6 +99,9 @@ struct CudaPbdTissue::OnDevice {
     f.bends = bends.set();
     f.touches = touches.set();
     f.dampers = dampers.set();
+    f.tips = {triangles.data(),  static_cast<int>(triangles.size()),
+              tip_sweeps.data(), near.data(),
+              near_count.data(), mean_edge};
     f.may_touch = may_touch;
     f.sweeps = sweeps;
     f.frame = frame.data();

@@ -43,7 +43,7 @@ __device__ __forceinline__ void copy_words(const T* from, T* to, int count) {
   }
 }
 
-/// That a block of threads may have.
+/// That a block of threads may have beside what push_out_of_tips() does.
 std::size_t most_shared_bytes() {
   static const int most = [] {
     int bytes = 0;
@@ -51,7 +51,7 @@ std::size_t most_shared_bytes() {
                "be asked");
     return bytes;
   }();
-  return static_cast<std::size_t>(most);
+  return static_cast<std::size_t>(most) - 16;
 }
 
 template <class Kind>
@@ -195,6 +195,7 @@ __global__ void __launch_bounds__(kThreads<kTets>, 1)
                    i, places[i], moved + i);
     }
     __syncthreads();
+    push_out_of_tips(f, step.h, f.colliders + first, f.loads + first * kPbdLoadSums, places, moved);
     for (int i = thread; i < f.count; i += threads) {
       take_velocity_of(f, step, i, places + i, moved + i);
     }

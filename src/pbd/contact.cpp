@@ -111,13 +111,23 @@ std::vector<TipSweep> sweeps_of_tips(const std::vector<Collider>& begin,
 }
 
 void find_at_tips(State& s, const std::vector<TipSweep>& tips, double duration) {
+  constexpr int kTrianglesOfPart = 4096;
   s.at_tips.clear();
+  const auto triangles = static_cast<int>(s.triangles.size());
+  std::vector<std::vector<AtTip>> found((triangles + kTrianglesOfPart - 1) / kTrianglesOfPart);
   for (const TipSweep& tip : tips) {
-    for (const Triangle& t : s.triangles) {
-      Corner corner[3];
-      for (int k = 0; k < 3; ++k) corner[k] = corner_of(s.vertices, t[k]);
-      if (!may_meet(tip, corner, s.mean_edge, duration)) continue;
-      s.at_tips.push_back({t, tip.collider});
+    s.cpu.for_each(static_cast<int>(found.size()), [&](int part) {
+      found[part].clear();
+      const int end = std::min(triangles, (part + 1) * kTrianglesOfPart);
+      for (int i = part * kTrianglesOfPart; i < end; ++i) {
+        Corner corner[3];
+        for (int k = 0; k < 3; ++k) corner[k] = corner_of(s.vertices, s.triangles[i][k]);
+        if (!may_meet(tip, corner, s.mean_edge, duration)) continue;
+        found[part].push_back({s.triangles[i], tip.collider});
+      }
+    });
+    for (const auto& of_part : found) {
+      s.at_tips.insert(s.at_tips.end(), of_part.begin(), of_part.end());
     }
   }
 }

@@ -71,16 +71,16 @@ struct Contacts {
   }
 };
 
-/// What a tip does to a triangle, as to Vertices.
-void push_triangle(State& s, const AtTip& t, float h, ColliderLoad& load) {
+/// What a tip does to a triangle, as to Vertices. Whether it pushed.
+bool push_triangle(State& s, const AtTip& t, float h, ColliderLoad& load) {
   Vertices& v = s.vertices;
   const Collider& tip = s.colliders[t.collider];
   Corner corner[3];
   for (int k = 0; k < 3; ++k) corner[k] = corner_of(v, t.corner[k]);
   TipPlace found;
   ContactPush push;
-  if (!find_in_tip(tip, corner, s.mean_edge, found)) return;
-  if (!push_out_of_tip(tip, found, h, corner, push)) return;
+  if (!find_in_tip(tip, corner, s.mean_edge, found)) return false;
+  if (!push_out_of_tip(tip, found, h, corner, push)) return false;
   for (int k = 0; k < 3; ++k) {
     std::copy_n(corner[k].moved, 3, &v.moved[4 * static_cast<std::size_t>(t.corner[k])]);
     if (found.share[k] > 0) s.pushed[t.corner[k]] = 1;
@@ -89,7 +89,7 @@ void push_triangle(State& s, const AtTip& t, float h, ColliderLoad& load) {
     load.force[a] += push.force[a];
     load.torque[a] += push.torque[a];
   }
-  load.points += 1;
+  return true;
 }
 
 }  // namespace
@@ -160,7 +160,15 @@ void project_contacts(State& s, float h, std::vector<ColliderLoad>& loads) {
       loads[c].add(of_parts[static_cast<std::size_t>(part) * count + c]);
     }
   }
-  for (const AtTip& t : s.at_tips) push_triangle(s, t, h, loads[t.collider]);
+  for (int round = 0; round < kTipRounds; ++round) {
+    bool any = false;
+    for (const AtTip& t : s.at_tips) {
+      if (!push_triangle(s, t, h, loads[t.collider])) continue;
+      any = true;
+      if (round == 0) loads[t.collider].points += 1;
+    }
+    if (!any) break;
+  }
 }
 
 }  // namespace pbd

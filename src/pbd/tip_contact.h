@@ -11,6 +11,11 @@
 namespace tissue_sim {
 namespace pbd {
 
+/// Triangles that a tip is wrapped in share corners: a push of one takes back others'. After one
+/// round a step a tip that was dragged deep in a slab went through its surface, after four none of
+/// the same (test/tissue/holds_off_test.cpp).
+constexpr int kTipRounds = 4;
+
 TISSUE_SIM_INLINE bool is_tip(const Collider& c) { return c.kind == Collider::kCapsule; }
 
 /// The box that a tip sweeps [m], and which of the colliders it is.

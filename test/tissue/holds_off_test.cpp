@@ -107,6 +107,34 @@ TEST_P(HoldsOff, AProbeAsThickAsACellDoesNotPassThroughASheet) {
   }
 }
 
+/// Half as deep as a slab is high, and on through it aside: its surface is wrapped around the tip.
+TEST_P(HoldsOff, AProbeThatIsDraggedDeepInASlabStaysAboveItsSurface) {
+  for (const double radius : {0.002, 0.003}) {
+    for (const double down : {0.0003, 0.0004}) {
+      Scene scene = on_this(Scene());
+      scene.cell_size = 0.005;
+      scene.damping = 2;
+      scene.bodies.resize(1);
+      scene.bodies[0].size = Vec3(0.08, 0.06, 0.02);
+      scene.bodies[0].pose.position = Vec3(0, 0, 0.0101);
+      scene.tools.resize(1);
+      scene.tools[0].radius = radius;
+      Simulation simulation(scene);
+      double force = 0, most = 0;
+      for (int frame = 0; frame < 60; ++frame) {
+        const double z = std::max(0.008, 0.0215 - down * frame);
+        simulation.set_tool(0, tip_at(z, 0.001 + 0.0003 * frame, 0.0021));
+        const FrameResult result = simulation.advance_frame().result;
+        ASSERT_FALSE(result.blew_up);
+        force = result.loads[0].mean.force.z();
+        most = std::max(most, force);
+      }
+      EXPECT_GT(most, 0.3);
+      EXPECT_GT(force, 0.6 * most) << "radius " << radius << " m, " << down << " m a frame";
+    }
+  }
+}
+
 /// The same by the sheet's triangles, where they are what it is made of, and larger than that.
 int under_triangles(PbdTissue& tissue) {
   const pbd::State& s = tissue.state();

@@ -157,14 +157,14 @@ __device__ __forceinline__ void add_load(unsigned long long* load, double value)
 
 /// Adds what acts on a tool's collider; nobody asks what the ground carries.
 __device__ __forceinline__ void add_push(const Collider& collider, const ContactPush& push,
-                                         unsigned long long* load) {
+                                         bool counts, unsigned long long* load) {
   if (collider.tool < 0) return;
 #pragma unroll
   for (int a = 0; a < 3; ++a) {
     add_load(load + a, push.force[a]);
     add_load(load + 3 + a, push.torque[a]);
   }
-  atomicAdd(load + 6, 1ull);
+  if (counts) atomicAdd(load + 6, 1ull);
 }
 
 /// Pushes a vertex out of the colliders of this step, one after the other: contact.cpp.
@@ -195,7 +195,7 @@ __device__ __forceinline__ void touch_vertex(const CudaPbdField& f, float h,
     place = place_of(start, m);
     touches = true;
     unsigned long long* load = loads + kPbdLoadSums * c;
-    add_push(collider.shape, push, load);
+    add_push(collider.shape, push, true, load);
     if (collider.shape.tool < 0) continue;
     if (push.distance < -collider.shape.inside && collider.shape.inside > 0) {
       atomicAdd(load + 7, 1ull);
@@ -232,7 +232,7 @@ __device__ __forceinline__ void push_out_of_tips(const CudaPbdField& f, float h,
   const int count = *tips.near_count, thread = static_cast<int>(threadIdx.x);
   Corner corner[3];
   TipPlace found;
-  for (int from = 0; from < count; from = next + 1) {
+  for (int round = 0, from = 0; round < kTipRounds;) {
     __syncthreads();
     if (thread == 0) next = count;
     __syncthreads();
@@ -245,9 +245,15 @@ __device__ __forceinline__ void push_out_of_tips(const CudaPbdField& f, float h,
       break;
     }
     __syncthreads();
-    if (next >= count) break;
+    const int at = next;
+    if (at == count) {
+      if (from == 0) break;  // a round without any
+      from = 0;
+      ++round;
+      continue;
+    }
     if (thread == 0) {
-      const std::int32_t pair = tips.near[next];
+      const std::int32_t pair = tips.near[at];
       const Triangle& t = tips.triangles[pair % tips.count];
       const std::int32_t c = tips.sweeps[pair / tips.count].collider;
       load_corners(f, t, x, moved, corner);
@@ -258,9 +264,10 @@ __device__ __forceinline__ void push_out_of_tips(const CudaPbdField& f, float h,
           moved[t[k]] = make_float4(corner[k].moved[0], corner[k].moved[1], corner[k].moved[2], 0);
           if (found.share[k] > 0) f.pushed[t[k]] = 1;
         }
-        add_push(colliders[c].shape, push, loads + kPbdLoadSums * c);
+        add_push(colliders[c].shape, push, round == 0, loads + kPbdLoadSums * c);
       }
     }
+    from = at + 1;
   }
   __syncthreads();
 }

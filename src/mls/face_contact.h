@@ -56,6 +56,7 @@ inline constexpr float kAside = 1.1f;      // how far along a face a node is fel
 inline constexpr float kNone = 1e-4f;      // gaps below count as none [edges]: rounding
 inline constexpr float kFacing = 0.3f;     // most of n_i . n_j of those that face one another
 inline constexpr float kOpposed = -0.85f;  // of those that look at one another
+inline constexpr float kHeld2 = 4;         // how far a place is held at most, squared [reach2()]
 
 template <class T>
 TISSUE_SIM_INLINE T dot(const T* a, const T* b) {
@@ -172,6 +173,17 @@ TISSUE_SIM_INLINE void follow_mls_gap(T now, T& gap, T& begun) {
   gap = now - begun;
 }
 
+/// Whether the places held, `low` and `high` from their nodes as they are deformed, lie where faces
+/// touch. Where a node is squeezed flat a short way is a long one in reference space, and longer
+/// than it was as the node springs back: two of them, each of which takes half of how far places
+/// slide, would drive them out of all bounds. They begin anew then.
+template <class T>
+TISSUE_SIM_INLINE auto holds_mls_places(const T* low, const T* high, T rest, T edge) {
+  using mls_contact::dot;
+  return less(larger(dot(low, low), dot(high, high)),
+              T(mls_contact::kHeld2 * mls_contact::reach2(rest, edge)));
+}
+
 /// How two nodes that touch push one another, once each.
 template <class T, class Mask>
 struct MlsPush {
@@ -191,15 +203,15 @@ struct MlsSpringOfFaces {
 
 /// Of two nodes that touch: `gap` as follow_mls_gap() left it, `before` what it was, `apart` of
 /// MlsSlip, which follows; `held` from the place held of the low one to that of the high one, as
-/// they are deformed. `dt` is the time since [s].
+/// they are deformed, and whether that `holds`. `dt` is the time since [s].
 template <class T, class Mask>
 TISSUE_SIM_INLINE void push_mls_faces(const T* d, const T* n, T gap, T before, const T* held,
-                                      const MlsSpringOfFaces<T>& spring, float dt, T* apart,
-                                      MlsPush<T, Mask>& out) {
+                                      Mask holds, const MlsSpringOfFaces<T>& spring, float dt,
+                                      T* apart, MlsPush<T, Mask>& out) {
   using mls_contact::dot;
   // In the middle, or at the one that bears no couples.
   const T there = 0.5f * (1.0f + spring.couples_low - spring.couples_high);
-  out.begins = none_of(less(before, T{}));
+  out.begins = none_of(less(before, T{}) & holds);
   // All in lengths, of a spring of this stiffness.
   const T lasts = dt > 0 ? T(spring.damping / (spring.stiffness * dt)) : T{};
   const T closed = choose(less(before, all_lanes<T>(0.5f * kMlsApart)), T(before - gap), T{});
@@ -273,9 +285,13 @@ TISSUE_SIM_INLINE bool touch_mls_faces(const MlsContactSide& low, const MlsConta
       weight > 0 ? mls_gap(r, d, low.face, high.face, l.normal, h.normal, edge, n) : kMlsApart;
   follow_mls_gap(now, slip.gap, slip.begun);
   if (!(slip.gap < 0)) return false;
+  float of_low[3], of_high[3];
   for (int a = 0; a < 3; ++a) {
-    held[a] = d[a] + dot(h.deformation + 3 * a, slip.high) - dot(l.deformation + 3 * a, slip.low);
+    of_low[a] = dot(l.deformation + 3 * a, slip.low);
+    of_high[a] = dot(h.deformation + 3 * a, slip.high);
+    held[a] = d[a] + of_high[a] - of_low[a];
   }
+  const bool holds = holds_mls_places(of_low, of_high, low.face[3] + high.face[3], edge);
   const float share = 0.5f * weight * (1 / l.weights + 1 / h.weights);
   MlsSpringOfFaces<float> spring;
   spring.stiffness = share * in_series(low.spring.stiffness, high.spring.stiffness);
@@ -284,7 +300,7 @@ TISSUE_SIM_INLINE bool touch_mls_faces(const MlsContactSide& low, const MlsConta
   spring.couples_low = l.couples;
   spring.couples_high = h.couples;
   MlsPush<float, bool> push;
-  push_mls_faces(d, n, slip.gap, before, held, spring, dt, slip.apart, push);
+  push_mls_faces(d, n, slip.gap, before, held, holds, spring, dt, slip.apart, push);
   move_mls_places(l.inverse, h.inverse, d, push, slip.low, slip.high);
   for (int a = 0; a < 3; ++a) {
     force[a] = push.force[a];

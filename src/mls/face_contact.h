@@ -56,6 +56,7 @@ inline constexpr float kAside = 1.1f;      // how far along a face a node is fel
 inline constexpr float kNone = 1e-4f;      // gaps below count as none [edges]: rounding
 inline constexpr float kFacing = 0.3f;     // most of n_i . n_j of those that face one another
 inline constexpr float kOpposed = -0.85f;  // of those that look at one another
+inline constexpr float kFalls = 0.5f;      // how far a gap falls in a substep at most [edges]
 inline constexpr float kHeld2 = 4;         // how far a place is held at most, squared [reach2()]
 
 template <class T>
@@ -165,12 +166,17 @@ TISSUE_SIM_INLINE T mls_gap(const T* r, const T* d, const T* face_low, const T* 
 }
 
 /// What MlsSlip::gap and begun come to where that is the gap now, kMlsApart where no weight is
-/// left: the nodes push one another where it falls below 0.
+/// left: the nodes push one another where it falls below 0. What is deeper at once by half an edge
+/// did not come along the normal, but from beside or behind: it pushes no more than before, or it
+/// would be thrown out with energy from nowhere.
 template <class T>
-TISSUE_SIM_INLINE void follow_mls_gap(T now, T& gap, T& begun) {
+TISSUE_SIM_INLINE void follow_mls_gap(T now, T edge, T& gap, T& begun) {
   const T first = choose(less(gap, all_lanes<T>(kMlsFresh)), larger(begun, now), now);
-  begun = -larger(T(-first), T{});
-  gap = now - begun;
+  // 0 - 0, not -0: less() goes by the sign.
+  const T most = -larger(T(-first), T{}), was = T{} - larger(T(-gap), T{}), is = now - most;
+  const auto falls = less(is, T(was - mls_contact::kFalls * edge));
+  begun = choose(falls, T(now - was), most);
+  gap = choose(falls, was, is);
 }
 
 /// Whether the places held, `low` and `high` from their nodes as they are deformed, lie where faces
@@ -283,7 +289,7 @@ TISSUE_SIM_INLINE bool touch_mls_faces(const MlsContactSide& low, const MlsConta
   const float before = slip.gap;
   const float now =
       weight > 0 ? mls_gap(r, d, low.face, high.face, l.normal, h.normal, edge, n) : kMlsApart;
-  follow_mls_gap(now, slip.gap, slip.begun);
+  follow_mls_gap(now, edge, slip.gap, slip.begun);
   if (!(slip.gap < 0)) return false;
   float of_low[3], of_high[3];
   for (int a = 0; a < 3; ++a) {

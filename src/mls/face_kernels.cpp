@@ -160,7 +160,7 @@ TISSUE_SIM_INLINE bool push(const MlsFaceField& f, int block) {
         choose(less(Vec<W>{}, load<W>(weight + lane)), any, all_lanes<Vec<W>>(kMlsApart));
     Vec<W> g = load<W>(gap + lane), b = load<W>(begun + lane);
     store<W>(&before[lane], g);
-    follow_mls_gap(now, g, b);
+    follow_mls_gap(now, edge, g, b);
     store<W>(gap + lane, g);
     store<W>(begun + lane, b);
     put<W>(d, lane, D);

@@ -156,6 +156,43 @@ TEST(MlsContactLanes, PushesAreThoseOfFloats) {
   EXPECT_GT(slid, 1000);
 }
 
+// It comes from behind, through the other's side: what lies that deep does not push it through.
+TEST(MlsContactLanes, WhatComesFromBehindIsNotThrownOut) {
+  const float edge = 0.006f, place[2][3] = {{0, 0, 0}, {0.05f, 0, 0}};
+  const float face[2][4] = {{0, 0, 1, 0.003f}, {0, 0, -1, 0.003f}};
+  MlsContactFace of[2];
+  MlsSlip slip = {};
+  slip.gap = kMlsApart;
+  const float F[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1};
+  double most = 0;
+  for (int step = 0; step < 130; ++step) {
+    // From aside, behind the face by most of an edge, to the middle, and out along the normal.
+    const float aside = 0.01f - 2e-4f * std::min(step, 50), out = 2e-4f * std::max(0, step - 50);
+    const float u[2][3] = {{0, 0, 0}, {aside - 0.05f, 0, out - 0.005f}};
+    for (int k = 0; k < 2; ++k) {
+      set_mls_contact_face(F, face[k], kMlsBearsCouples, of[k]);
+      of[k].weights = 1;
+    }
+    const auto side = [&](int k) {
+      return MlsContactSide{place[k], u[k], face[k], &of[k], {10, 1e-9f}, edge, 0};
+    };
+    float force[3], at[3];
+    if (!touch_mls_faces(side(0), side(1), 1e-4f, slip, force, at)) continue;
+    most = std::max<double>(most, std::fabs(force[2]));
+  }
+  EXPECT_LT(most, 1e-6);
+  // And pushes as any other when it comes back along the normal.
+  float force[3], at[3];
+  const float u[2][3] = {{0, 0, 0}, {-0.05f, 0, 0.0055f}};
+  ASSERT_TRUE(touch_mls_faces({place[0], u[0], face[0], &of[0], {10, 1e-9f}, edge, 0},
+                              {place[1], u[1], face[1], &of[1], {10, 1e-9f}, edge, 0}, 1e-4f, slip,
+                              force, at));
+  EXPECT_NEAR(
+      force[2],
+      -5 * 0.0005 * std::pow(1 - (0.0055 * 0.0055 - 0.006 * 0.006) / std::pow(1.1 * edge, 2), 2),
+      1e-4);
+}
+
 // Each is squeezed flat and springs back in turn, and each time the faces slide a little.
 TEST(MlsContactLanes, PlacesHeldByNodesThatAreSqueezedFlatStayWhereTheyTouch) {
   const float edge = 0.006f, place[2][3] = {{0, 0, 0}, {0, 0, 0.0059f}};
@@ -172,7 +209,7 @@ TEST(MlsContactLanes, PlacesHeldByNodesThatAreSqueezedFlatStayWhereTheyTouch) {
       of[k].weights = 1;
     }
     const auto side = [&](int k) {
-      return MlsContactSide{place[k], u[k], face[k], &of[k], {10, 0}, edge, 0.3f};
+      return MlsContactSide{place[k], u[k], face[k], &of[k], {10, 1e-9f}, edge, 0.3f};
     };
     float force[3], at[3];
     ASSERT_TRUE(touch_mls_faces(side(0), side(1), 1e-4f, slip, force, at)) << step;

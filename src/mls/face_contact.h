@@ -56,6 +56,8 @@ inline constexpr float kAside = 1.1f;      // how far along a face a node is fel
 inline constexpr float kNone = 1e-4f;      // gaps below count as none [edges]: rounding
 inline constexpr float kFacing = 0.3f;     // most of n_i . n_j of those that face one another
 inline constexpr float kOpposed = -0.85f;  // of those that look at one another
+inline constexpr float kFalls = 0.5f;      // how far a gap falls in a substep at most [edges]
+inline constexpr float kHeld2 = 4;         // how far a place is held at most, squared [reach2()]
 
 template <class T>
 TISSUE_SIM_INLINE T dot(const T* a, const T* b) {
@@ -164,12 +166,28 @@ TISSUE_SIM_INLINE T mls_gap(const T* r, const T* d, const T* face_low, const T* 
 }
 
 /// What MlsSlip::gap and begun come to where that is the gap now, kMlsApart where no weight is
-/// left: the nodes push one another where it falls below 0.
+/// left: the nodes push one another where it falls below 0. What is deeper at once by half an edge
+/// did not come along the normal, but from beside or behind: it pushes no more than before, or it
+/// would be thrown out with energy from nowhere.
 template <class T>
-TISSUE_SIM_INLINE void follow_mls_gap(T now, T& gap, T& begun) {
+TISSUE_SIM_INLINE void follow_mls_gap(T now, T edge, T& gap, T& begun) {
   const T first = choose(less(gap, all_lanes<T>(kMlsFresh)), larger(begun, now), now);
-  begun = -larger(T(-first), T{});
-  gap = now - begun;
+  // 0 - 0, not -0: less() goes by the sign.
+  const T most = -larger(T(-first), T{}), was = T{} - larger(T(-gap), T{}), is = now - most;
+  const auto falls = less(is, T(was - mls_contact::kFalls * edge));
+  begun = choose(falls, T(now - was), most);
+  gap = choose(falls, was, is);
+}
+
+/// Whether the places held, `low` and `high` from their nodes as they are deformed, lie where faces
+/// touch. Where a node is squeezed flat a short way is a long one in reference space, and longer
+/// than it was as the node springs back: two of them, each of which takes half of how far places
+/// slide, would drive them out of all bounds. They begin anew then.
+template <class T>
+TISSUE_SIM_INLINE auto holds_mls_places(const T* low, const T* high, T rest, T edge) {
+  using mls_contact::dot;
+  return less(larger(dot(low, low), dot(high, high)),
+              T(mls_contact::kHeld2 * mls_contact::reach2(rest, edge)));
 }
 
 /// How two nodes that touch push one another, once each.
@@ -191,15 +209,15 @@ struct MlsSpringOfFaces {
 
 /// Of two nodes that touch: `gap` as follow_mls_gap() left it, `before` what it was, `apart` of
 /// MlsSlip, which follows; `held` from the place held of the low one to that of the high one, as
-/// they are deformed. `dt` is the time since [s].
+/// they are deformed, and whether that `holds`. `dt` is the time since [s].
 template <class T, class Mask>
 TISSUE_SIM_INLINE void push_mls_faces(const T* d, const T* n, T gap, T before, const T* held,
-                                      const MlsSpringOfFaces<T>& spring, float dt, T* apart,
-                                      MlsPush<T, Mask>& out) {
+                                      Mask holds, const MlsSpringOfFaces<T>& spring, float dt,
+                                      T* apart, MlsPush<T, Mask>& out) {
   using mls_contact::dot;
   // In the middle, or at the one that bears no couples.
   const T there = 0.5f * (1.0f + spring.couples_low - spring.couples_high);
-  out.begins = none_of(less(before, T{}));
+  out.begins = none_of(less(before, T{}) & holds);
   // All in lengths, of a spring of this stiffness.
   const T lasts = dt > 0 ? T(spring.damping / (spring.stiffness * dt)) : T{};
   const T closed = choose(less(before, all_lanes<T>(0.5f * kMlsApart)), T(before - gap), T{});
@@ -271,11 +289,15 @@ TISSUE_SIM_INLINE bool touch_mls_faces(const MlsContactSide& low, const MlsConta
   const float before = slip.gap;
   const float now =
       weight > 0 ? mls_gap(r, d, low.face, high.face, l.normal, h.normal, edge, n) : kMlsApart;
-  follow_mls_gap(now, slip.gap, slip.begun);
+  follow_mls_gap(now, edge, slip.gap, slip.begun);
   if (!(slip.gap < 0)) return false;
+  float of_low[3], of_high[3];
   for (int a = 0; a < 3; ++a) {
-    held[a] = d[a] + dot(h.deformation + 3 * a, slip.high) - dot(l.deformation + 3 * a, slip.low);
+    of_low[a] = dot(l.deformation + 3 * a, slip.low);
+    of_high[a] = dot(h.deformation + 3 * a, slip.high);
+    held[a] = d[a] + of_high[a] - of_low[a];
   }
+  const bool holds = holds_mls_places(of_low, of_high, low.face[3] + high.face[3], edge);
   const float share = 0.5f * weight * (1 / l.weights + 1 / h.weights);
   MlsSpringOfFaces<float> spring;
   spring.stiffness = share * in_series(low.spring.stiffness, high.spring.stiffness);
@@ -284,7 +306,7 @@ TISSUE_SIM_INLINE bool touch_mls_faces(const MlsContactSide& low, const MlsConta
   spring.couples_low = l.couples;
   spring.couples_high = h.couples;
   MlsPush<float, bool> push;
-  push_mls_faces(d, n, slip.gap, before, held, spring, dt, slip.apart, push);
+  push_mls_faces(d, n, slip.gap, before, held, holds, spring, dt, slip.apart, push);
   move_mls_places(l.inverse, h.inverse, d, push, slip.low, slip.high);
   for (int a = 0; a < 3; ++a) {
     force[a] = push.force[a];

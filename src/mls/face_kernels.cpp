@@ -160,7 +160,7 @@ TISSUE_SIM_INLINE bool push(const MlsFaceField& f, int block) {
         choose(less(Vec<W>{}, load<W>(weight + lane)), any, all_lanes<Vec<W>>(kMlsApart));
     Vec<W> g = load<W>(gap + lane), b = load<W>(begun + lane);
     store<W>(&before[lane], g);
-    follow_mls_gap(now, g, b);
+    follow_mls_gap(now, edge, g, b);
     store<W>(gap + lane, g);
     store<W>(begun + lane, b);
     put<W>(d, lane, D);
@@ -177,15 +177,18 @@ TISSUE_SIM_INLINE bool push(const MlsFaceField& f, int block) {
   for (int lane = 0; lane < kMlsFaceBlock; lane += W) {
     const auto low_row = [&](int k) { return load<W>(&L[k][lane]); };
     const auto high_row = [&](int k) { return load<W>(&H[k][lane]); };
-    Vec<W> d[3], n[3], held[3], apart[3], arm[3];
+    Vec<W> d[3], n[3], held[3], of_low[3] = {}, of_high[3] = {}, apart[3], arm[3];
     take<W>(D, lane, d);
     take<W>(N, lane, n);
     for (int a = 0; a < 3; ++a) {
       held[a] = d[a];
       for (int b = 0; b < 3; ++b) {
         const int at = kMlsFaceDeformation + 3 * a + b;
-        held[a] += high_row(at) * load<W>(row(kMlsSlipHigh + b) + lane) -
-                   low_row(at) * load<W>(row(kMlsSlipLow + b) + lane);
+        const Vec<W> h = high_row(at) * load<W>(row(kMlsSlipHigh + b) + lane),
+                     l = low_row(at) * load<W>(row(kMlsSlipLow + b) + lane);
+        held[a] += h - l;
+        of_high[a] += h;
+        of_low[a] += l;
       }
       apart[a] = load<W>(row(kMlsSlipApart + a) + lane);
     }
@@ -199,7 +202,9 @@ TISSUE_SIM_INLINE bool push(const MlsFaceField& f, int block) {
     spring.couples_high = high_row(kMlsFaceOutward + 3);
     const Vec<W> g = load<W>(gap + lane);
     MlsPush<Vec<W>, Mask<W>> push;
-    push_mls_faces(d, n, g, load<W>(&before[lane]), held, spring, f.since, apart, push);
+    const Mask<W> holds =
+        holds_mls_places(of_low, of_high, low_row(3) + high_row(3), load<W>(f.edge + first + lane));
+    push_mls_faces(d, n, g, load<W>(&before[lane]), held, holds, spring, f.since, apart, push);
     for (int a = 0; a < 3; ++a) {
       store<W>(row(kMlsSlipApart + a) + lane, apart[a]);
       arm[a] = push.at[a] - d[a];

@@ -41,14 +41,18 @@ double MlsSubsteps::damping(const MlsState& s, double elastic) const {
 }
 
 void MlsSubsteps::cut(const MlsState& s, const std::vector<std::int32_t>& nodes) {
-  if (!limit_.known()) return;  // it is measured anyway
+  if (!limit_.known()) return;                                       // it is measured anyway
+  const double known = 4 / (limit_.foreseen() * limit_.foreseen());  // fastest rate [1/s^2]
   s.cpu->for_each(
       static_cast<int>(nodes.size()),
       [&](int k) {
         const std::int32_t i = nodes[k];
-        if (own_rate(s, i) > kMostRate * most_rate_[s.nodes.material[i]]) {
-          stiffness_[i].measured = 0;
-        }
+        // What springs come to is known, and may be more than all that strain comes to: the spring
+        // of a heavy node that is left with a light one.
+        const bool faster = s.sprung[i] != 0
+                                ? kTogether * own_rate(s, i) > known
+                                : own_rate(s, i) > kMostRate * most_rate_[s.nodes.material[i]];
+        if (faster) stiffness_[i].measured = 0;
       },
       256);
 }

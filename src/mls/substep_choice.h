@@ -13,7 +13,8 @@ namespace tissue_sim {
 
 /// StabilityLimit, StepLength and StepAcceptance, with what nodes and their pairs know of cuts. An
 /// element is a node. A cut that leaves a node whose own_rate() is more than that of all of its
-/// material when the limit was measured, as few cuts do, has the limit measured at once.
+/// material when the limit was measured, or springs that may be too fast for it, as few cuts do,
+/// has the limit measured at once.
 class MlsSubsteps {
  public:
   explicit MlsSubsteps(const MlsState& state);

@@ -132,12 +132,14 @@ TEST(MlsContactLanes, PushesAreThoseOfFloats) {
     const Lanes* o = of.together();
     MlsPush<Lanes, Mask> push;
     apart.together();
-    push_mls_faces(d.together(), n.together(), o[0], o[1], held.together(),
+    Mask holds;
+    for (int l = 0; l < kLanes; ++l) holds[l] = random() > 0.8f ? 0 : -1;
+    push_mls_faces(d.together(), n.together(), o[0], o[1], held.together(), holds,
                    MlsSpringOfFaces<Lanes>{o[2], o[3], o[4], o[5], o[6]}, 1e-4f, apart.all, push);
     for (int l = 0; l < kLanes; ++l) {
       const float* x = of.lane[l];
       MlsPush<float, bool> one;
-      push_mls_faces(d.lane[l], n.lane[l], x[0], x[1], held.lane[l],
+      push_mls_faces(d.lane[l], n.lane[l], x[0], x[1], held.lane[l], holds[l] != 0,
                      MlsSpringOfFaces<float>{x[2], x[3], x[4], x[5], x[6]}, 1e-4f, apart.lane[l],
                      one);
       ASSERT_EQ(push.begins[l] != 0, one.begins) << l;
@@ -152,6 +154,72 @@ TEST(MlsContactLanes, PushesAreThoseOfFloats) {
     }
   }
   EXPECT_GT(slid, 1000);
+}
+
+// It comes from behind, through the other's side: what lies that deep does not push it through.
+TEST(MlsContactLanes, WhatComesFromBehindIsNotThrownOut) {
+  const float edge = 0.006f, place[2][3] = {{0, 0, 0}, {0.05f, 0, 0}};
+  const float face[2][4] = {{0, 0, 1, 0.003f}, {0, 0, -1, 0.003f}};
+  MlsContactFace of[2];
+  MlsSlip slip = {};
+  slip.gap = kMlsApart;
+  const float F[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1};
+  double most = 0;
+  for (int step = 0; step < 130; ++step) {
+    // From aside, behind the face by most of an edge, to the middle, and out along the normal.
+    const float aside = 0.01f - 2e-4f * std::min(step, 50), out = 2e-4f * std::max(0, step - 50);
+    const float u[2][3] = {{0, 0, 0}, {aside - 0.05f, 0, out - 0.005f}};
+    for (int k = 0; k < 2; ++k) {
+      set_mls_contact_face(F, face[k], kMlsBearsCouples, of[k]);
+      of[k].weights = 1;
+    }
+    const auto side = [&](int k) {
+      return MlsContactSide{place[k], u[k], face[k], &of[k], {10, 1e-9f}, edge, 0};
+    };
+    float force[3], at[3];
+    if (!touch_mls_faces(side(0), side(1), 1e-4f, slip, force, at)) continue;
+    most = std::max<double>(most, std::fabs(force[2]));
+  }
+  EXPECT_LT(most, 1e-6);
+  // And pushes as any other when it comes back along the normal.
+  float force[3], at[3];
+  const float u[2][3] = {{0, 0, 0}, {-0.05f, 0, 0.0055f}};
+  ASSERT_TRUE(touch_mls_faces({place[0], u[0], face[0], &of[0], {10, 1e-9f}, edge, 0},
+                              {place[1], u[1], face[1], &of[1], {10, 1e-9f}, edge, 0}, 1e-4f, slip,
+                              force, at));
+  EXPECT_NEAR(
+      force[2],
+      -5 * 0.0005 * std::pow(1 - (0.0055 * 0.0055 - 0.006 * 0.006) / std::pow(1.1 * edge, 2), 2),
+      1e-4);
+}
+
+// Each is squeezed flat and springs back in turn, and each time the faces slide a little.
+TEST(MlsContactLanes, PlacesHeldByNodesThatAreSqueezedFlatStayWhereTheyTouch) {
+  const float edge = 0.006f, place[2][3] = {{0, 0, 0}, {0, 0, 0.0059f}};
+  const float face[2][4] = {{0, 0, 1, 0.003f}, {0, 0, -1, 0.003f}};
+  MlsContactFace of[2];
+  MlsSlip slip = {};
+  slip.gap = kMlsApart;
+  double farthest = 0;
+  for (int step = 0; step < 200; ++step) {
+    const float u[2][3] = {{0, 0, 0}, {1e-4f * (step % 3), 0, -0.001f}};
+    for (int k = 0; k < 2; ++k) {
+      const float flat = step % 2 == k ? 0.1f : 1.0f, F[9] = {flat, 0, 0, 0, 1, 0, 0, 0, 1};
+      set_mls_contact_face(F, face[k], kMlsBearsCouples, of[k]);
+      of[k].weights = 1;
+    }
+    const auto side = [&](int k) {
+      return MlsContactSide{place[k], u[k], face[k], &of[k], {10, 1e-9f}, edge, 0.3f};
+    };
+    float force[3], at[3];
+    ASSERT_TRUE(touch_mls_faces(side(0), side(1), 1e-4f, slip, force, at)) << step;
+    for (int a = 0; a < 3; ++a) {
+      const float low = std::fabs(slip.low[a]), high = std::fabs(slip.high[a]);
+      farthest = std::max<double>(farthest, std::max(low, high));
+      ASSERT_TRUE(std::isfinite(force[a])) << step;
+    }
+  }
+  EXPECT_LT(farthest, 100 * edge);
 }
 
 }  // namespace

@@ -6,7 +6,9 @@
 #include <algorithm>
 #include <cstdio>
 
+#include "scene/scene_text.h"
 #include "support/finite_element_scenes.h"
+#include "support/measured.h"
 #include "tissue_sim/simulation.h"
 #if defined(TISSUE_SIM_CUDA)
 #include "compute/cuda_check.h"
@@ -55,10 +57,14 @@ class FiniteElementsOn : public testing::TestWithParam<Device> {
     return scene;
   }
 };
+std::string name_of_device(const testing::TestParamInfo<Device>& info) {
+  return name_of(info.param, kDeviceNames);
+}
 #if defined(TISSUE_SIM_CUDA)
-INSTANTIATE_TEST_SUITE_P(Devices, FiniteElementsOn, testing::Values(Device::kCpu, Device::kCuda));
+INSTANTIATE_TEST_SUITE_P(Devices, FiniteElementsOn, testing::Values(Device::kCpu, Device::kCuda),
+                         name_of_device);
 #else
-INSTANTIATE_TEST_SUITE_P(Devices, FiniteElementsOn, testing::Values(Device::kCpu));
+INSTANTIATE_TEST_SUITE_P(Devices, FiniteElementsOn, testing::Values(Device::kCpu), name_of_device);
 #endif
 
 double force_error(double cell_size, const Tool& tool, double depth, const char* body,
@@ -82,27 +88,35 @@ double sag_error(const Scene& scene) {
   const double sag = -surface_displacement(simulation.tissue(), 2, top, 2, 0.002 + 1.5 * cell_size);
   const double weight = 9.81 * 1000 * 0.04 * 0.04 * 0.032;
   const Vec3 force = simulation.advance_frame().result.anchor_loads[0].force;
-  EXPECT_LT((force + Vec3(0, 0, weight)).norm(), 0.01 * weight) << held;
+  EXPECT_TRUE(is_at_most("what the clamp carries, off the weight",
+                         (force + Vec3(0, 0, weight)).norm() / weight, 0.01, "%"))
+      << held;
   return error(sag, "block", "sag");
 }
 
 // A round tip that is pressed in: 1.8 cells in the contact's radius, then three.
 TEST_P(FiniteElementsOn, ForceOnARoundTool) {
-  EXPECT_NEAR(force_error(0.0025, ball(0.01), 0.002, "ball", "force_2mm", GetParam()), 0, 0.04);
-  EXPECT_NEAR(force_error(0.0025, ball(0.01), 0.006, "ball", "force_6mm", GetParam()), 0, 0.04);
+  EXPECT_TRUE(is_within("ball of 10 mm, 2 mm deep, cells of 2.5 mm",
+                        force_error(0.0025, ball(0.01), 0.002, "ball", "force_2mm", GetParam()),
+                        0.04));
+  EXPECT_TRUE(is_within("the same, 6 mm deep",
+                        force_error(0.0025, ball(0.01), 0.006, "ball", "force_6mm", GetParam()),
+                        0.04));
 }
 
 TEST_P(FiniteElementsOn, ForceOnAToolAsLargeAsACell) {
-  EXPECT_NEAR(force_error(0.003, ball(0.003), 0.002, "small_ball", "force_2mm", GetParam()), 0,
-              0.2);
+  EXPECT_TRUE(is_within(
+      "ball of 3 mm, 2 mm deep, cells of 3 mm",
+      force_error(0.003, ball(0.003), 0.002, "small_ball", "force_2mm", GetParam()), 0.2));
 }
 
 TEST_P(FiniteElementsOn, ForceOnAFlatTool) {
   const double coarse = force_error(0.003, punch(), 0.001, "punch", "force_1mm", GetParam());
   const double fine = force_error(0.002, punch(), 0.001, "punch", "force_1mm", GetParam());
-  EXPECT_NEAR(coarse, 0, 0.08);
-  EXPECT_NEAR(fine, 0, 0.03);
-  EXPECT_GT(std::fabs(coarse / fine), std::pow(1.5, 1.3));
+  EXPECT_TRUE(is_within("flat punch of 6 mm, 1 mm deep, cells of 3 mm", coarse, 0.08));
+  EXPECT_TRUE(is_within("the same, cells of 2 mm", fine, 0.03));
+  EXPECT_TRUE(
+      is_at_least("the first over the second", std::fabs(coarse / fine), std::pow(1.5, 1.3)));
 }
 
 TEST_P(FiniteElementsOn, SagOfAClampedBlockWhereverThePlaneLiesInACell) {
@@ -112,13 +126,16 @@ TEST_P(FiniteElementsOn, SagOfAClampedBlockWhereverThePlaneLiesInACell) {
   double least = 1, most = -1;
   for (const double held : {0.0, 0.001, 0.0036, 0.0041, 0.0087, 0.0099, 0.01, 0.0111}) {
     const double e = sag_error_of(0.004, held);
-    EXPECT_NEAR(e, 0, 0.015) << held;
+    EXPECT_TRUE(is_within("sag of a clamped block, plane anywhere in its cell", e, 0.015)) << held;
     least = std::min(least, e);
     most = std::max(most, e);
   }
   EXPECT_LT(most - least, 0.015);
-  EXPECT_NEAR(sag_error_of(0.0037, 0.0083), 0, 0.015) << "cells that do not divide the block";
-  EXPECT_GT(std::fabs(sag_error_of(0.008, 0) / sag_error_of(0.004, 0)), std::pow(2, 1.3));
+  EXPECT_TRUE(is_within("the same, cells that do not divide the block",
+                        sag_error_of(0.0037, 0.0083), 0.015));
+  EXPECT_TRUE(is_at_least("its error at 8 mm over that at 4",
+                          std::fabs(sag_error_of(0.008, 0) / sag_error_of(0.004, 0)),
+                          std::pow(2, 1.3)));
 }
 
 TEST_P(FiniteElementsOn, FrequencyOfAClampedBlock) {
@@ -132,7 +149,8 @@ TEST_P(FiniteElementsOn, FrequencyOfAClampedBlock) {
         simulation, (sideways ? 0.3 : 1.0) * Vec3::Unit(axis), 3,
         [&] { return surface_displacement(simulation.tissue(), 2, top, axis, 0.008); });
     const char* name = sideways ? "frequency_sideways" : "frequency_upright";
-    EXPECT_NEAR(error(frequency, "block", name), 0, 0.015) << name;
+    EXPECT_TRUE(is_within(sideways ? "its frequency sideways" : "its frequency upright",
+                          error(frequency, "block", name), 0.015));
   }
 }
 
@@ -155,8 +173,11 @@ TEST_P(FiniteElementsOn, ReactionOfABarThatIsPulled) {
     }
     EXPECT_TRUE(simulation.settle({1e-4, 2, 30}).at_rest);
     const std::vector<Wrench> loads = simulation.advance_frame().result.anchor_loads;
-    EXPECT_NEAR(error(loads[0].force.x(), "bar", "reaction_20_percent"), 0, 0.01) << cell_size;
-    EXPECT_NEAR(error(-loads[1].force.x(), "bar", "reaction_20_percent"), 0, 0.01) << cell_size;
+    for (const double pull : {loads[0].force.x(), -loads[1].force.x()}) {
+      EXPECT_TRUE(is_within("reaction of a bar pulled by a fifth, 2 to 3 mm",
+                            error(pull, "bar", "reaction_20_percent"), 0.01))
+          << cell_size;
+    }
   }
 }
 

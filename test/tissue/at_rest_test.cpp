@@ -7,6 +7,7 @@
 
 #include "compute/simd.h"
 #include "support/cut_paths.h"
+#include "support/measured.h"
 #include "tissue/each_method.h"
 
 namespace tissue_sim {
@@ -45,9 +46,10 @@ TEST_P(AtRest, TissueThatNothingPushesStandsStill) {
       Simulation simulation(scene);
       simulation.advance_frame();
       const FrameResult result = simulation.advance_frame().result;
-      EXPECT_LE(result.max_speed, within.rest_speed)
+      EXPECT_TRUE(is_at_most("tissue that nothing pushes: speed", result.max_speed,
+                             within.rest_speed, "m/s"))
           << "law " << static_cast<int>(law) << ", " << modulus << " Pa";
-      EXPECT_LE(result.elastic_energy, within.rest_energy)
+      EXPECT_TRUE(is_at_most("its energy", result.elastic_energy, within.rest_energy, "J"))
           << "law " << static_cast<int>(law) << ", " << modulus << " Pa";
     }
   }

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 
+#include "support/measured.h"
 #include "support/temporary_folder.h"
 #include "support/test_meshes.h"
 #include "tissue/each_method.h"
@@ -111,8 +112,9 @@ TEST_P(Gaps, NothingPullsAcrossAGap) {
     least = std::min<double>(least, after[p].x - before[p].x);
     most = std::max<double>(most, after[p].x - before[p].x);
   }
-  EXPECT_NEAR(least / fell, 1, 0.02);
-  EXPECT_NEAR(most / fell, 1, 0.02);
+  for (const double way : {least, most}) {
+    EXPECT_TRUE(is_within("a part beyond a gap falls freely", way / fell - 1, 0.02));
+  }
 }
 
 TEST_P(Gaps, ASlitPartsTheLegsAndACutBelowItSetsThemFree) {

@@ -8,6 +8,7 @@
 
 #include "support/cut_scenes.h"
 #include "support/either_device.h"
+#include "support/measured.h"
 
 namespace tissue_sim {
 namespace {
@@ -87,7 +88,8 @@ TYPED_TEST(MissedContactOf, TissueLetGoIsStoppedInTheSameFrame) {
     std::printf("%.4f N, %.4f in short frames; %.3f and %.3f mm deep\n", force.norm(),
                 expected.norm(), 1e3 * depth, 1e3 * other_depth);
     EXPECT_GT(expected.norm(), 0.01);
-    EXPECT_LT((force - expected).norm(), 0.02 * std::max(expected.norm(), 0.2));
+    EXPECT_TRUE(is_at_most("tissue comes to a probe within a frame: force off",
+                           (force - expected).norm() / std::max(expected.norm(), 0.2), 0.02, "%"));
     EXPECT_NEAR(depth, other_depth, 0.05 * kCell);
   }
 }

@@ -13,7 +13,6 @@
 #include "tissue_sim/tissue.h"
 #if defined(TISSUE_SIM_CUDA)
 #include "mls/cuda/cuda_mls_tissue.h"
-#include "mpm/cuda/cuda_device.h"
 #include "pbd/cuda/cuda_pbd_tissue.h"
 #endif
 

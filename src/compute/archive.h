@@ -1,5 +1,12 @@
 // Archives: the bytes of a state, written and read by one list of its fields:
 //
+//   struct Nodes {
+//     ...
+//     TISSUE_SIM_FIELDS(u, v, mass)
+//   };
+//
+// or, where reading takes more than that,
+//
 //   template <class Archive>
 //   void fields(Archive& archive, Nodes& n) { archive(n.u, n.v, n.mass); }
 //
@@ -36,13 +43,21 @@ struct HasFields<Archive, T,
                  std::void_t<decltype(fields(std::declval<Archive&>(), std::declval<T&>()))>>
     : std::true_type {};
 
+template <class Archive, class T, class = void>
+struct HasOwnFields : std::false_type {};
+template <class Archive, class T>
+struct HasOwnFields<Archive, T,
+                    std::void_t<decltype(std::declval<T&>().each_field(std::declval<Archive&>()))>>
+    : std::true_type {};
+
 /// What is copied byte by byte.
 template <class T>
 inline constexpr bool kIsPlain = std::is_arithmetic_v<T> || std::is_enum_v<T> ||
                                  (std::is_trivially_copyable_v<T> && !std::is_pointer_v<T> &&
                                   std::has_unique_object_representations_v<T>);
 template <class T, class Archive>
-inline constexpr bool kGoesPlain = kIsPlain<T> && !HasFields<Archive, T>::value;
+inline constexpr bool kGoesPlain =
+    kIsPlain<T> && !HasFields<Archive, T>::value && !HasOwnFields<Archive, T>::value;
 
 /// What both have in common: how what is made of others is taken apart.
 template <class Archive>
@@ -66,6 +81,8 @@ class ArchiveFields {
   void item(T& x) {
     if constexpr (HasFields<Archive, T>::value) {
       fields(self(), x);
+    } else if constexpr (HasOwnFields<Archive, T>::value) {
+      x.each_field(self());
     } else if constexpr (std::is_array_v<T> && !kGoesPlain<std::remove_all_extents_t<T>, Archive>) {
       for (auto& each : x) item(each);
     } else {

@@ -1,6 +1,7 @@
 // Arrays on the GPU, and arrays on the host that the GPU copies from and to at full speed.
 #pragma once
 
+#include <atomic>
 #include <cstddef>
 #include <string>
 #include <utility>
@@ -10,13 +11,16 @@
 
 namespace tissue_sim {
 
+/// Bytes that all DeviceArrays have.
+inline std::atomic<std::size_t> device_bytes_held{0};
+
 /// `n` elements of device memory. Growing does not keep what was in it; where it grows again, a
 /// little more than is asked for.
 template <class T>
 class DeviceArray {
  public:
   DeviceArray() = default;
-  ~DeviceArray() { cudaFree(data_); }
+  ~DeviceArray() { free(); }
   DeviceArray(const DeviceArray&) = delete;
   DeviceArray& operator=(const DeviceArray&) = delete;
 
@@ -25,9 +29,7 @@ class DeviceArray {
     size_ = n;
     if (n <= capacity_) return;
     if (capacity_ > 0) n += n / 16;
-    cudaFree(data_);
-    data_ = nullptr;
-    capacity_ = 0;
+    free();
     if (cudaMalloc(reinterpret_cast<void**>(&data_), n * sizeof(T)) != cudaSuccess) {
       cudaGetLastError();
       std::size_t free = 0, total = 0;
@@ -37,6 +39,7 @@ class DeviceArray {
                         " are free");
     }
     capacity_ = n;
+    device_bytes_held += n * sizeof(T);
   }
   void upload(const T* from, std::size_t n, cudaStream_t stream) {
     resize(n);
@@ -85,13 +88,19 @@ class DeviceArray {
 
   T* data() const { return data_; }
   std::size_t size() const { return size_; }
-  std::size_t bytes() const { return capacity_ * sizeof(T); }
 
   static std::string megabytes(std::size_t bytes) {
     return std::to_string((bytes + (1 << 20) - 1) >> 20) + " MB";
   }
 
  private:
+  void free() {
+    cudaFree(data_);
+    device_bytes_held -= capacity_ * sizeof(T);
+    data_ = nullptr;
+    capacity_ = 0;
+  }
+
   T* data_ = nullptr;
   std::size_t size_ = 0, capacity_ = 0;
 };

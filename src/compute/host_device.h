@@ -18,3 +18,10 @@
 #define TISSUE_SIM_INLINE_LAMBDA __attribute__((always_inline))
 #define TISSUE_SIM_APART inline
 #endif
+
+// A struct's fields for compute/archive.h, in its definition.
+#define TISSUE_SIM_FIELDS(...)        \
+  template <class Archive>            \
+  void each_field(Archive& archive) { \
+    archive(__VA_ARGS__);             \
+  }

@@ -21,7 +21,7 @@ struct FramePart {
 enum class Verdict {
   kAccepted,
   kTooLong,        ///< its substeps were longer than what the tissue bore at its end
-  kMissedContact,  ///< tissue came to an instrument that no list of contacts had foreseen
+  kMissedContact,  ///< tissue came to an instrument that no list of contacts had predicted
 };
 
 /// Runs a frame in parts: bonds that snap, or what a fast tool squeezes, may stiffen tissue twofold

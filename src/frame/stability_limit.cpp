@@ -76,7 +76,7 @@ void StabilityLimit::measure_if_due(const std::vector<Stiffness*>& elements, dou
   }
 }
 
-double StabilityLimit::foreseen() const { return limit_ / std::sqrt(growth_ * trend_); }
+double StabilityLimit::predicted() const { return limit_ / std::sqrt(growth_ * trend_); }
 
 double StabilityLimit::at(const std::vector<Stiffness*>& elements,
                           const std::vector<float>& modulus) const {

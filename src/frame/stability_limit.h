@@ -1,4 +1,4 @@
-// How long a substep may be at most: measured now and then, foreseen in between.
+// How long a substep may be at most: measured now and then, predicted in between.
 #pragma once
 
 #include <cstdint>
@@ -47,7 +47,7 @@ class StabilityLimit {
 
   bool known() const { return limit_ > 0; }
   /// For the next part, if tissue stiffens as in the last [s].
-  double foreseen() const;
+  double predicted() const;
   /// Of tissue with these moduli [s]; NAN where one is not finite.
   double at(const std::vector<Stiffness*>& elements, const std::vector<float>& modulus) const;
   /// How much the stiffness grew in the last part, at most: a factor of 1 or more.

@@ -22,18 +22,19 @@ void StepLength::follow(double passed, double trend, double frame) {
   part_ = std::min(part_, frame);
 }
 
-double StepLength::choose(double time, double foreseen, double trend, bool at_once, bool undamped) {
-  const double chosen = !at_once && undamped ? held(time, foreseen) : foreseen;
+double StepLength::choose(double time, double predicted, double trend, bool at_once,
+                          bool undamped) {
+  const double chosen = !at_once && undamped ? held(time, predicted) : predicted;
   most_ = at_once ? 0 : std::max(kMostAbove, std::sqrt(trend)) * chosen;
   return chosen;
 }
 
-double StepLength::held(double time, double foreseen) {
+double StepLength::held(double time, double predicted) {
   if (time >= swing_end_) {
     of_last_swing_ = std::exchange(of_swing_, INFINITY);
     swing_end_ = time + kSwing;
   }
-  of_swing_ = std::min(of_swing_, foreseen);
+  of_swing_ = std::min(of_swing_, predicted);
   const double shortest = std::min(of_swing_, of_last_swing_);
   if (shortest < held_ || shortest > kLonger * held_) held_ = shortest;
   return held_;

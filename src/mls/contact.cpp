@@ -11,7 +11,7 @@ namespace tissue_sim {
 namespace {
 
 constexpr int kListLasts = 8;              // substeps
-constexpr double kListMargin = 0.5;        // how much nearer than foreseen either may come [edges]
+constexpr double kListMargin = 0.5;        // how much nearer than predicted either may come [edges]
 constexpr double kFasterThanListed = 1.5;  // than when it was listed
 
 bool comes_before(const MlsTouch& a, const MlsTouch& b) {

@@ -161,7 +161,7 @@ std::unique_ptr<MlsState> make_mls_state(const Scene& scene, std::vector<std::st
   s.instructions = instruction_set();
   s.kernels = &mls_kernels(s.instructions);
   s.lanes = make_lanes(s.pairs, s.place);
-  s.spanner = make_spanner(s.nodes, s.pairs);
+  s.connectivity = make_connectivity(s.nodes, s.pairs);
   s.spring_room.assign(s.pairs.other.size(), 0.0f);
   remake(s, all);
   for (int round = 0; round < kRoundsOfBounds && bound_own_rates(s); ++round) {

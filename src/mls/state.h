@@ -11,13 +11,13 @@
 #include "compute/simd.h"
 #include "cutting/resisting_edge.h"
 #include "mls/anchors.h"
+#include "mls/connectivity.h"
 #include "mls/face_contact.h"
 #include "mls/face_pairs.h"
 #include "mls/kernels.h"
 #include "mls/lanes.h"
 #include "mls/nodes.h"
 #include "mls/pairs.h"
-#include "mls/spanner.h"
 #include "tissue_sim/scene.h"
 #include "tools/collider.h"
 
@@ -97,7 +97,7 @@ struct MlsState {
   Scene scene;
   MlsNodes nodes;
   MlsPairs pairs;
-  MlsSpanner spanner;
+  MlsConnectivity connectivity;
   MlsLanes lanes;  ///< its rows are scratch
 
   // Per node, padded to whole chunks. Vectors are (x, y, z, 0), but for the fourth of `place`: how

@@ -69,13 +69,13 @@ PartSubsteps MlsSubsteps::part(const MlsState& s, double time, const MeasureLimi
     }
     return measure(nodes, steps);
   });
-  const double elastic = limit_.known() ? limit_.foreseen() : kOfHeld;
+  const double elastic = limit_.known() ? limit_.predicted() : kOfHeld;
   const double asked = std::min(1.0, s.scene.cfl / Scene().cfl);
-  const double foreseen = viscous_substep(asked * kStabilityMargin * elastic, damping(s, elastic));
+  const double predicted = viscous_substep(asked * kStabilityMargin * elastic, damping(s, elastic));
   const double shortened = acceptance_.shortened();
   const bool undamped = conserves_energy(s.scene.damping, s.nodes.materials);
   const double longest =
-      shortened * length_.choose(s.time, foreseen, limit_.trend(), shortened < 1, undamped);
+      shortened * length_.choose(s.time, predicted, limit_.trend(), shortened < 1, undamped);
   return length_.part(time, longest, s.dt, shortened < 1 ? 0 : 1 / s.scene.frame_rate);
 }
 

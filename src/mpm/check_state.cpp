@@ -1,7 +1,9 @@
-// Whether what was read of a state can be one: each index and count that is believed from there on.
+// Whether what was read of a state can be one: each index and count that is believed from there on;
+// and what follows from it.
 #include <algorithm>
 
 #include "frame/state_check.h"
+#include "mpm/contact/face_places.h"
 #include "mpm/mpm_fields.h"
 #include "tools/frame_colliders.h"
 
@@ -31,12 +33,6 @@ void check_points(const MpmState& s, const Known& k) {
   for (std::size_t i = 0; i < p.bonds.size(); ++i) {
     check_state((p.bonds[i] & ~s.whole_bonds[i]) == 0, "bonds");
   }
-  // What follows from the bonds.
-  ArchiveWriter read, made;
-  BondWindows windows = s.fields->bonds(), fresh(s.bodies, p);
-  read(windows);
-  made(fresh);
-  check_state(read.bytes() == made.bytes(), "bonds");
   for (std::int32_t i = 0; i < k.points; ++i) {
     for (int axis = 0; axis < 3; ++axis) {
       const Crossing* const c = p.crossings.find(i, axis);
@@ -69,42 +65,7 @@ void check_cell(const Block& b, std::int64_t node) {
 }
 
 void check_block(const Block& b, const MpmState& s, const Known& k) {
-  constexpr int kMost = 1 << 15;
-  check_state(b.body >= 0 && b.body < k.bodies && b.nx > 0 && b.ny > 0 && b.nz > 0 &&
-                  b.nx < kMost && b.ny < kMost && b.nz < kMost && !b.runs.empty() &&
-                  !b.sides.empty(),
-              "blocks");
-  std::int64_t lane = 0;
-  for (const Block::Run& r : b.runs) {
-    check_state(r.lane == lane && r.count > 0 && r.x >= 0 && r.count <= b.nx - r.x && r.y >= 0 &&
-                    r.y < b.ny,
-                "blocks");
-    lane += r.count;
-  }
-  for (const Block::Side& side : b.sides) {
-    check_state(side.column >= 0 && side.count >= 0 && side.column + side.count <= b.nx + 2 &&
-                    std::abs(side.x) < kMost,
-                "blocks");
-  }
-  Block fresh;
-  fresh.nx = b.nx;
-  fresh.ny = b.ny;
-  fresh.nz = b.nz;
-  fresh.runs = b.runs;
-  lay_out(fresh);
-  check_state(b.pitch == fresh.pitch && b.plane == fresh.plane && b.stride == fresh.stride &&
-                  b.cell == fresh.cell && b.volume.size() == fresh.volume.size() &&
-                  b.point.size() == fresh.point.size() &&
-                  b.node.size() == static_cast<std::size_t>(b.node_count()),
-              "blocks");
-  check_numbers(b.volume, 1e30, "volumes");
-  fresh.volume = b.volume;
-  find_filled(fresh);
-  ArchiveWriter read, made;
-  std::vector<std::vector<Block::Span>> filled = b.filled;
-  read(filled);
-  made(fresh.filled);
-  check_state(read.bytes() == made.bytes() && b.filled_columns == fresh.filled_columns, "blocks");
+  check_state(b.body >= 0 && b.body < k.bodies, "blocks");
   check_indices(b.point, -1, k.points, "points");
   check_indices(b.node, -1, k.nodes, "nodes");
   // Where there is volume a cell sees all of its nodes.
@@ -151,51 +112,15 @@ void check_block(const Block& b, const MpmState& s, const Known& k) {
 
 void check_blocks(const MpmState& s, const Known& k) {
   const Blocks& blocks = s.blocks;
-  const auto count = static_cast<std::int64_t>(blocks.all.size());
-  std::size_t in_regions = 0;
   for (const BlockRegion& r : blocks.regions) {
     check_state(r.body >= 0 && r.body < k.bodies, "regions");
-    in_regions += r.blocks.size();
   }
-  std::vector<const Block*> sorted(blocks.all.begin(), blocks.all.end());
-  std::sort(sorted.begin(), sorted.end());
-  check_state(in_regions == blocks.all.size() &&
-                  std::adjacent_find(sorted.begin(), sorted.end()) == sorted.end(),
-              "blocks");
   for (const Block* block : blocks.all) {
     check_block(*block, s, k);
     check_state(block->number >= 0 && block->number < blocks.next_number, "blocks");
   }
-  if (blocks.has_rows) {
-    std::size_t force = kLanes;
-    for (const Block* block : blocks.all) {
-      check_state(block->force_offset == force, "forces");
-      force += static_cast<std::size_t>(3) * block->node_count();
-    }
-    check_state(blocks.force_size == force + kLanes, "forces");
-  }
-  check_indices(blocks.by_cost, 0, count, "blocks");
-  std::vector<int> order = blocks.by_cost;
-  std::sort(order.begin(), order.end());
-  check_state(static_cast<std::int64_t>(order.size()) == count &&
-                  std::adjacent_find(order.begin(), order.end()) == order.end(),
-              "blocks");
-  const auto parts = static_cast<std::int64_t>(blocks.row_parts.size());
-  for (const NodeRow& r : blocks.rows) {
-    check_state(r.first_node >= 0 && r.count >= 0 && r.count <= kNodeRow &&
-                    r.first_node + std::int64_t{r.count} <= k.nodes && r.first_part >= 0 &&
-                    r.part_count >= 0 && r.first_part + std::int64_t{r.part_count} <= parts,
-                "rows");
-  }
-  for (const RowPart& p : blocks.row_parts) {
-    check_state(p.begin >= 0 && p.count >= 0 && p.begin + p.count <= kNodeRow &&
-                    p.component <= blocks.force_size && p.force <= blocks.force_size &&
-                    p.force + 2 * p.component + p.begin + p.count <= blocks.force_size + kLanes,
-                "rows");
-  }
-  check_state(blocks.first_split_node >= 0 && blocks.first_split_node <= k.nodes &&
-                  (blocks.stale_facets.empty() ||
-                   static_cast<std::int64_t>(blocks.stale_facets.size()) == k.lattice_nodes),
+  check_state(blocks.stale_facets.empty() ||
+                  static_cast<std::int64_t>(blocks.stale_facets.size()) == k.lattice_nodes,
               "nodes");
   check_state(s.motion.size() == blocks.all.size(), "motion");
 }
@@ -246,20 +171,7 @@ void check_contacts(const MpmState& s, const Known& k) {
 
 void check_faces(const MpmState& s, const Known& k) {
   const FaceContacts& f = s.faces;
-  const std::size_t blocks = s.blocks.all.size(), facets = f.block_of.size();
-  if (f.first_facet.empty()) {
-    check_state(facets == 0 && f.all.empty(), "facets");
-  } else {
-    check_begins(f.first_facet, blocks, facets, "facets");
-    for (std::size_t b = 0; b < blocks; ++b) {
-      check_state(static_cast<std::size_t>(f.first_facet[b + 1] - f.first_facet[b]) ==
-                      s.blocks.all[b]->facets.size(),
-                  "facets");
-      for (std::int32_t i = f.first_facet[b]; i < f.first_facet[b + 1]; ++i) {
-        check_state(f.block_of[i] == static_cast<std::int32_t>(b), "facets");
-      }
-    }
-  }
+  const std::size_t facets = f.block_of.size();
   check_state(f.motion.size() == facets && (f.listed.empty() || f.listed.size() == facets),
               "facets");
   const auto contacts = static_cast<std::int64_t>(f.all.size());
@@ -273,21 +185,7 @@ void check_faces(const MpmState& s, const Known& k) {
     check_indices(f.near, 0, static_cast<std::int64_t>(facets), "contacts' neighbours");
   }
   check_indices(f.active, 0, contacts, "active contacts");
-  check_indices(f.between, 0, contacts, "active contacts");
-  for (const std::int32_t i : f.active) {
-    const FaceContact& c = f.all[i];
-    check_state(c.nodes.lowest != nullptr && (c.other < 0 || c.other_nodes.lowest != nullptr),
-                "active contacts");
-  }
-  // By block they are listed when they become active.
-  const auto of_blocks = [&](const std::vector<std::int32_t>& first,
-                             const std::vector<std::int32_t>& of, std::int64_t most) {
-    if (f.active.empty()) return;
-    check_begins(first, blocks, of.size(), "blocks' contacts");
-    check_indices(of, 0, most, "blocks' contacts");
-  };
-  of_blocks(f.first_of_block, f.of_block, 2 * contacts);
-  of_blocks(f.first_within, f.within, contacts);
+  for (const std::int32_t i : f.active) check_state(f.all[i].other >= 0, "active contacts");
   for (const KeptContact& kept : f.kept) {
     check_state(kept.point >= 0 && kept.point < k.points && kept.other_body < k.bodies,
                 "kept contacts");
@@ -346,7 +244,33 @@ void check_front(const MpmState& s, const Known& k) {
 
 }  // namespace
 
-void check_tissue(const MpmState& s) {
+void complete_block(Block& b) {
+  constexpr int kMost = 1 << 15;
+  check_state(b.nx > 0 && b.ny > 0 && b.nz > 0 && b.nx < kMost && b.ny < kMost && b.nz < kMost &&
+                  !b.runs.empty() && !b.sides.empty(),
+              "blocks");
+  std::int64_t lane = 0;
+  for (const Block::Run& r : b.runs) {
+    check_state(r.lane == lane && r.count > 0 && r.x >= 0 && r.count <= b.nx - r.x && r.y >= 0 &&
+                    r.y < b.ny,
+                "blocks");
+    lane += r.count;
+  }
+  for (const Block::Side& side : b.sides) {
+    check_state(side.column >= 0 && side.count >= 0 && side.column + side.count <= b.nx + 2 &&
+                    std::abs(side.x) < kMost,
+                "blocks");
+  }
+  lay_out(b);
+  const std::size_t layers = b.nz + 2;
+  check_state(b.volume.size() == b.lane_count() && b.point.size() == b.lane_count() &&
+                  b.node.size() == layers * b.plane,
+              "blocks");
+  check_numbers(b.volume, 1e30, "volumes");
+  find_filled(b);
+}
+
+void complete_tissue(MpmState& s) {
   const Known k = known(s);
   check_state(std::isfinite(s.time) && std::isfinite(s.dt) && s.dt >= 0, "time");
   check_points(s, k);
@@ -361,15 +285,27 @@ void check_tissue(const MpmState& s) {
     check_sizes("flights", f.nodes, f.home, f.from_centre);
     check_indices(f.nodes, 0, k.nodes, "flights");
   }
+  s.fields->follow(s.bodies, s.points);
+  index_flights(s);
+  list_front_cells(s);
+  mark_row_nodes(s.nodes.size(), s.anchors);
 }
 
-void check_state(const MpmState& s) {
-  check_tissue(s);
+void complete_state(MpmState& s) {
+  complete_tissue(s);
   const Known k = known(s);
   check_blocks(s, k);
   check_contacts(s, k);
+  number_facets(s.faces, s.blocks);
   check_faces(s, k);
   check_edges(s);
+  connect_forces(s.blocks, s.nodes.size());
+  for (FaceContact& c : s.faces.all) find_nodes(s, c);
+  index_active(s.faces);
+  s.inertial_index.assign(s.nodes.size(), -1);
+  index_inertia(s);
+  s.work.force.clear();
+  s.work.force.resize(s.blocks.force_size);
 }
 
 }  // namespace tissue_sim

@@ -123,5 +123,6 @@ class MpmDevice {
 
 using MakeMpmDevice = std::unique_ptr<MpmDevice> (*)(const Scene& scene, MpmRun& run);
 std::unique_ptr<MpmDevice> make_cpu_mpm_device(const Scene& scene, MpmRun& run);
+std::unique_ptr<MpmDevice> make_cuda_mpm_device(const Scene& scene, MpmRun& run);
 
 }  // namespace tissue_sim

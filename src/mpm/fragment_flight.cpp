@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "mpm/mpm_state.h"
+#include "mpm/tear/debris.h"
 
 namespace tissue_sim {
 namespace {
@@ -119,38 +120,17 @@ bool take_off(MpmState& state, const Pieces& pieces, int piece, const Eigen::Mat
   FragmentFlight f;
   f.piece = piece;
   find_nodes(state, pieces, piece, f);
-  double mass = 0;
-  Vec3 X = Vec3::Zero(), x = Vec3::Zero(), v = Vec3::Zero();
-  const auto place = [&](std::size_t i) -> Vec3 {
-    const std::int32_t n = f.nodes[i];
-    return f.home[i] + Vec3(nodes.u[0][n], nodes.u[1][n], nodes.u[2][n]);
-  };
-  const auto velocity = [&](std::size_t i) {
-    const std::int32_t n = f.nodes[i];
-    return Vec3(nodes.v[0][n], nodes.v[1][n], nodes.v[2][n]);
-  };
-  for (std::size_t i = 0; i < f.nodes.size(); ++i) {
-    const double m = nodes.mass[f.nodes[i]];
-    if (nodes.inv_mass[f.nodes[i]] == 0) return false;
-    mass += m;
-    X += m * f.home[i];
-    x += m * place(i);
-    v += m * velocity(i);
+  for (const std::int32_t n : f.nodes) {
+    if (nodes.inv_mass[n] == 0) return false;
   }
-  if (!(mass > 0)) return false;
-  X /= mass;
-  f.centre = x / mass;
-  f.velocity = v / mass;
-  f.angular = Vec3::Zero();
-  f.inertia = Eigen::Matrix3d::Zero();
+  const NodesMotion before(nodes, f.nodes, f.home);
+  if (!(before.mass > 0)) return false;
+  f.centre = before.place;
+  f.velocity = before.velocity;
+  f.angular = before.angular;
   f.rotation = Eigen::Matrix3d::Identity();
-  for (std::size_t i = 0; i < f.nodes.size(); ++i) {
-    const double m = nodes.mass[f.nodes[i]];
-    f.angular += m * (place(i) - f.centre).cross(velocity(i) - f.velocity);
-    const Vec3 r = F * (f.home[i] - X);
-    f.from_centre.push_back(r);
-    f.inertia += m * (r.squaredNorm() * Eigen::Matrix3d::Identity() - r * r.transpose());
-  }
+  for (const Vec3& home : f.home) f.from_centre.emplace_back(F * (home - before.home));
+  f.inertia = inertia_of(nodes, f.nodes, f.from_centre);
   if (!f.angular.allFinite() || !f.centre.allFinite() || !f.inertia.allFinite()) return false;
   write_nodes(f, state.nodes);
   state.flights.push_back(std::move(f));
@@ -201,29 +181,17 @@ std::vector<std::int32_t> fly_frame(MpmState& state, double duration, int subste
   std::vector<std::int32_t> moved;
   for (std::size_t i = 0; i < state.flights.size(); ++i) {
     FragmentFlight& f = state.flights[i];
-    double mass = 0, extent = 0;
-    Vec3 x = Vec3::Zero(), v = Vec3::Zero(), angular = Vec3::Zero();
+    const NodesMotion now(nodes, f.nodes, f.home);
+    double extent = 0;
     for (std::size_t j = 0; j < f.nodes.size(); ++j) {
-      const std::int32_t n = f.nodes[j];
-      const double m = nodes.mass[n];
-      mass += m;
-      x += m * (f.home[j] + Vec3(nodes.u[0][n], nodes.u[1][n], nodes.u[2][n]));
-      v += m * Vec3(nodes.v[0][n], nodes.v[1][n], nodes.v[2][n]);
-      extent += m * f.from_centre[j].squaredNorm();
+      extent += nodes.mass[f.nodes[j]] * f.from_centre[j].squaredNorm();
     }
-    x /= mass;
-    v /= mass;
-    extent = std::sqrt(extent / mass);
-    for (std::size_t j = 0; j < f.nodes.size(); ++j) {
-      const std::int32_t n = f.nodes[j];
-      angular += nodes.mass[n] * (f.home[j] + Vec3(nodes.u[0][n], nodes.u[1][n], nodes.u[2][n]) - x)
-                                     .cross(Vec3(nodes.v[0][n], nodes.v[1][n], nodes.v[2][n]) - v);
-    }
+    extent = std::sqrt(extent / now.mass);
     const Vec3 expected = keep * f.velocity + duration * state.scene.gravity;
-    const double spin = f.angular.norm() / (mass * extent);
+    const double spin = f.angular.norm() / (now.mass * extent);
     const double speed = f.velocity.norm() + spin + duration * state.scene.gravity.norm() + 1e-6;
-    if ((v - expected).norm() > kTouched * speed ||
-        (angular - keep * f.angular).norm() > 5 * kTouched * mass * extent * speed) {
+    if ((now.velocity - expected).norm() > kTouched * speed ||
+        (now.angular - keep * f.angular).norm() > 5 * kTouched * now.mass * extent * speed) {
       lands[i] = 1;
       continue;
     }
@@ -232,9 +200,9 @@ std::vector<std::int32_t> fly_frame(MpmState& state, double duration, int subste
       const Eigen::Matrix3d half = turn(0.5 * dt * spin_of(f, f.rotation)) * f.rotation;
       f.rotation = turn(dt * spin_of(f, half)) * f.rotation;
     }
-    f.centre = x;
-    f.velocity = v;
-    f.angular = angular;
+    f.centre = now.place;
+    f.velocity = now.velocity;
+    f.angular = now.angular;
     write_nodes(f, state.nodes);
     moved.insert(moved.end(), f.nodes.begin(), f.nodes.end());
   }

@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "compute/host_device.h"
 #include "fragments/pieces.h"
 #include "mpm/blocks/update_node.h"
 
@@ -28,6 +29,7 @@ struct FragmentFlight {
   Vec3 centre;                      ///< of mass [m]
   Vec3 velocity;                    ///< of that [m/s]
   Vec3 angular;                     ///< momentum about it [kg m^2/s]
+  TISSUE_SIM_FIELDS(piece, nodes, home, from_centre, inertia, rotation, centre, velocity, angular)
 };
 
 /// Deforms a piece evenly and lets it fly. Of all displacements with the deformation gradient F its

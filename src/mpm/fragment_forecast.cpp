@@ -5,19 +5,12 @@
 #include <cmath>
 
 #include "geometry/mesh.h"
+#include "math/draw.h"
 #include "mpm/fragment_features.h"
 #include "mpm/tear/tear.h"
 
 namespace tissue_sim {
 namespace {
-
-/// SplitMix64.
-std::uint64_t mixed(std::uint64_t x) {
-  x += 0x9e3779b97f4a7c15u;
-  x = (x ^ (x >> 30)) * 0xbf58476d1ce4e5b9u;
-  x = (x ^ (x >> 27)) * 0x94d049bb133111ebu;
-  return x ^ (x >> 31);
-}
 
 void expect_deformation(const NetworkWeights& modifier, const float* x, FragmentChance& chance) {
   float out[kModifierOutputs];
@@ -42,8 +35,8 @@ Eigen::Matrix3d within(const Eigen::Matrix3d& F, double most) {
 }  // namespace
 
 double standard_normal(std::uint64_t seed, std::uint64_t counter) {
-  const std::uint64_t a = mixed(mixed(seed) ^ (2 * counter)),
-                      b = mixed(mixed(seed) ^ (2 * counter + 1));
+  const std::uint64_t a = split_mix(split_mix(seed) ^ (2 * counter)),
+                      b = split_mix(split_mix(seed) ^ (2 * counter + 1));
   const double u = (static_cast<double>(a >> 11) + 0.5) * 0x1p-53,
                v = static_cast<double>(b >> 11) * 0x1p-53;
   return std::sqrt(-2 * std::log(u)) * std::cos(6.283185307179586 * v);

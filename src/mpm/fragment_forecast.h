@@ -7,6 +7,7 @@
 #include <memory>
 #include <vector>
 
+#include "compute/host_device.h"
 #include "fragments/network_file.h"
 #include "fragments/pieces.h"
 #include "mpm/fragment_features.h"
@@ -24,6 +25,7 @@ struct FragmentChance {
   /// each component; 0 where it is not expected to be part of one.
   float F[9] = {}, deviation[9] = {};
   bool expected = false;  ///< it reaches FragmentNetwork::threshold(), or half where another says
+  TISSUE_SIM_FIELDS(point, time, probability, F, deviation, expected)
 };
 
 /// The probability, from half on a fragment, by features x[kAllFeatureCount] of a point: the
@@ -57,6 +59,7 @@ struct WaitingFragment {
   int piece = -1;    ///< Fragment::id
   double until = 0;  ///< when it is forgotten [s]
   double F[9] = {};
+  TISSUE_SIM_FIELDS(piece, until, F)
 };
 
 /// What a tissue knows of its fragments to come.

@@ -1,9 +1,8 @@
-#include "mpm/fragment_regions.h"
-
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 
+#include "mpm/fragment_features.h"
 #include "mpm/lattice/bonds.h"
 #include "mpm/tear/tear.h"
 
@@ -100,48 +99,30 @@ Division divide(const MpmState& state, const std::vector<std::uint8_t>& bonds, b
 
 std::vector<StrainedPoint> strained_of(const MpmState& state,
                                        const std::vector<StretchedPoint>& stretched, double share) {
-  std::vector<StrainedPoint> strained;
-  for (const StretchedPoint& p : stretched) {
-    const LatticeBody& body = state.bodies[state.points.site[p.point].body];
-    if (least_tear_limit(body.material_of(state.points, p.point)) == 0) continue;
-    Eigen::Matrix3d C;
-    C << p.C[0], p.C[3], p.C[4], p.C[3], p.C[1], p.C[5], p.C[4], p.C[5], p.C[2];
-    if (!C.allFinite()) continue;
-    Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver;
-    solver.computeDirect(C, Eigen::EigenvaluesOnly);
-    const double most = solver.eigenvalues()[2];
-    const double excess = (std::sqrt(most) - 1) / (tear_limit(state, p.point) - 1);
-    if (excess < share) continue;
-    std::uint8_t across = 0;
-    for (int a = 0; a < 3; ++a) across |= (p.C[a] - 1 >= kStretchedAlong * (most - 1)) << a;
-    strained.push_back({p.point, static_cast<float>(excess), across});
-  }
-  std::sort(strained.begin(), strained.end(),
-            [](const StrainedPoint& a, const StrainedPoint& b) { return a.point < b.point; });
-  return strained;
-}
-
-std::vector<StrainedPoint> find_strained(MpmState& state, double share) {
-  const int count = static_cast<int>(state.blocks.all.size());
-  std::vector<std::vector<StrainedPoint>> of_block(count);
-  state.cpu->for_each(count, [&](int i) {
-    const Block& block = *state.blocks.all[i];
-    const LatticeBody& body = state.bodies[block.body];
-    const float limit = block.material == Block::kMixed
-                            ? least_tear_limit(body)
-                            : least_tear_limit(body.materials[block.material]);
-    if (limit == 0) return;
-    std::vector<StretchedPoint> stretched;
-    state.kernels->stretched(block, block_field(state, block),
-                             static_cast<float>(1 + share * (limit - 1)), state.scratch.local(),
-                             stretched);
-    of_block[i] = strained_of(state, stretched, share);
-  });
-  std::vector<StrainedPoint> strained;
-  for (const auto& part : of_block) strained.insert(strained.end(), part.begin(), part.end());
-  std::sort(strained.begin(), strained.end(),
-            [](const StrainedPoint& a, const StrainedPoint& b) { return a.point < b.point; });
-  return strained;
+  std::vector<StrainedPoint> all(stretched.size());
+  state.cpu->for_each(
+      static_cast<int>(stretched.size()),
+      [&](int i) {
+        const StretchedPoint& p = stretched[i];
+        const LatticeBody& body = state.bodies[state.points.site[p.point].body];
+        if (least_tear_limit(body.material_of(state.points, p.point)) == 0) return;
+        Eigen::Matrix3d C;
+        C << p.C[0], p.C[3], p.C[4], p.C[3], p.C[1], p.C[5], p.C[4], p.C[5], p.C[2];
+        if (!C.allFinite()) return;
+        Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver;
+        solver.computeDirect(C, Eigen::EigenvaluesOnly);
+        const double most = solver.eigenvalues()[2];
+        const double excess = (std::sqrt(most) - 1) / (tear_limit(state, p.point) - 1);
+        if (excess < share) return;
+        std::uint8_t across = 0;
+        for (int a = 0; a < 3; ++a) across |= (p.C[a] - 1 >= kStretchedAlong * (most - 1)) << a;
+        all[i] = {p.point, static_cast<float>(excess), across};
+      },
+      256);
+  all.erase(
+      std::remove_if(all.begin(), all.end(), [](const StrainedPoint& p) { return p.point < 0; }),
+      all.end());
+  return all;
 }
 
 const PieceSpread& Division::of(std::int32_t point) const {

@@ -6,9 +6,7 @@
 
 #include "frame/out_of_control.h"
 #include "mpm/cut_tissue.h"
-#include "mpm/lattice_pieces.h"
 #include "mpm/mpm_fields.h"
-#include "mpm/point_fields.h"
 #include "mpm/state_figures.h"
 
 namespace tissue_sim {

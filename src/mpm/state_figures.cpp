@@ -1,10 +1,18 @@
 #include "mpm/state_figures.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <cstring>
 
+#include "fragments/piece_sums.h"
 #include "frame/checksum.h"
+#include "frame/point_fields.h"
+#include "frame/put_faces.h"
 #include "frame/stability_limit.h"
+#include "material/laws.h"
+#include "math/bspline.h"
+#include "mpm/surface/facet_in_world.h"
 #include "mpm/tear/debris.h"
 #include "mpm/tear/tear.h"
 
@@ -116,6 +124,148 @@ Momentum momentum(const MpmState& state) {
   sum.centre /= sum.mass;
   sum.angular = about_origin - sum.centre.cross(sum.linear);
   return sum;
+}
+
+namespace {
+
+/// Displacement, velocity and displacement gradient of a point.
+struct PointMotion {
+  float u[3] = {}, v[3] = {}, F[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1};
+
+  PointMotion(const LatticeBody& body, const Points::Site& site, const NodeFields& fields,
+              const Nodes& nodes) {
+    const auto per_cell = static_cast<float>(1 / body.cell_size);
+    const int s[3] = {site.x & 1, site.y & 1, site.z & 1};
+    for (int k = 0; k < 27; ++k) {
+      const int d[3] = {k % 3, k / 3 % 3, k / 9};
+      const int node = fields.node(body, site, k);
+      const float w[3] = {lattice_weight(s[0], d[0]), lattice_weight(s[1], d[1]),
+                          lattice_weight(s[2], d[2])};
+      const float slope[3] = {lattice_slope(s[0], d[0]) * w[1] * w[2] * per_cell,
+                              w[0] * lattice_slope(s[1], d[1]) * w[2] * per_cell,
+                              w[0] * w[1] * lattice_slope(s[2], d[2]) * per_cell};
+      for (int a = 0; a < 3; ++a) {
+        const float of_node = nodes.u[a][node];
+        u[a] += w[0] * w[1] * w[2] * of_node;
+        v[a] += w[0] * w[1] * w[2] * nodes.v[a][node];
+        for (int b = 0; b < 3; ++b) F[3 * a + b] += slope[b] * of_node;
+      }
+    }
+  }
+};
+
+/// Cauchy stress xx yy zz xy yz zx [Pa].
+void cauchy_stress(const Material& m, const float (&F)[9], float* to) {
+  const auto mu = static_cast<float>(lame_mu(m)), lambda = static_cast<float>(lame_lambda(m));
+  float P[9], cof[9];
+  if (m.law == Law::kNeoHookean) {
+    stress<NeoHookean>(F, mu, lambda, P);
+  } else {
+    stress<FixedCorotated>(F, mu, lambda, P);
+  }
+  cofactor(F, cof);
+  const float J = F[0] * cof[0] + F[1] * cof[1] + F[2] * cof[2];
+  const auto at = [&](int i, int j) {
+    return (P[3 * i] * F[3 * j] + P[3 * i + 1] * F[3 * j + 1] + P[3 * i + 2] * F[3 * j + 2]) / J;
+  };
+  for (int a = 0; a < 3; ++a) {
+    to[a] = at(a, a);
+    to[3 + a] = at(a, (a + 1) % 3);
+  }
+}
+
+}  // namespace
+
+bool held_place(const MpmState& state, std::int32_t point, Vec3& place) {
+  if (state.points.free_volume_of(point) > 0) return false;
+  const Points::Site& s = state.points.site[point];
+  const LatticeBody& b = state.bodies[s.body];
+  place = b.site_position(s.x, s.y, s.z);
+  if (state.anchors.moves) place = state.anchors.place_of_held(b.body, s.body, place);
+  return true;
+}
+
+void place_boundary(MpmState& s) {
+  place_boundary(s, [&s](int i) {
+    const BoundaryMesh::Vertex& v = s.boundary.vertices[i];
+    Vec3 x = v.rest;
+    const AxisWeights weights(v.place);
+    for (int k = 0; k < 27; ++k) {
+      const float w = weights.at(k);
+      for (int a = 0; a < 3; ++a) x[a] += w * s.nodes.u[a][v.node[k]];
+    }
+    return floats(x);
+  });
+}
+
+void push_surface(MpmState& s, Span<const float> impulses) {
+  const BoundaryMesh& mesh = s.boundary;
+  for_pushed_vertices(mesh.faces, mesh.vertices.size(), impulses, [&](int i, const float* impulse) {
+    const BoundaryMesh::Vertex& v = mesh.vertices[i];
+    if (!(s.points.free_volume_of(v.point) > 0)) return;
+    const AxisWeights weights(v.place);
+    float of_moving = 0;  // the rest has no mass that could take a part
+    for (int k = 0; k < 27; ++k) of_moving += s.nodes.inv_mass[v.node[k]] > 0 ? weights.at(k) : 0;
+    if (!(of_moving > 0)) return;
+    for (int k = 0; k < 27; ++k) {
+      const std::int32_t node = v.node[k];
+      const float per_impulse = weights.at(k) / of_moving * s.nodes.inv_mass[node];
+      for (int a = 0; a < 3; ++a) s.nodes.v[a][node] += per_impulse * impulse[a];
+    }
+  });
+}
+
+void add_point_fields(MpmState& state, const PointSelection& selection,
+                      const std::vector<std::int32_t>& place, int count,
+                      std::vector<std::uint8_t>& cloud) {
+  add_fields(selection, place, count, *state.cpu, cloud, [&](int p) {
+    const Points::Site& site = state.points.site[p];
+    const LatticeBody& body = state.bodies[site.body];
+    const Vec3 rest = body.site_position(site.x, site.y, site.z);
+    PointMotion motion(body, site, *state.fields, state.nodes);
+    Vec3 held;
+    if (held_place(state, p, held)) {
+      const Vec3 moved = held - rest;
+      for (int a = 0; a < 3; ++a) motion.u[a] = static_cast<float>(moved[a]);
+      if (!state.anchors.moves) std::fill_n(motion.v, 3, 0.0f);
+    }
+    PointFields of;
+    for (int a = 0; a < 3; ++a) {
+      of.rest[a] = static_cast<float>(rest[a]);
+      of.u[a] = motion.u[a];
+      of.v[a] = motion.v[a];
+    }
+    of.volume = state.points.volume[p];
+    // What an anchor holds has no stress.
+    if ((selection.fields & kStressTensor) != 0 && state.points.free_volume_of(p) > 0) {
+      cauchy_stress(body.material_of(state.points, p), motion.F, of.stress);
+    }
+    return of;
+  });
+}
+
+void measure_pieces(MpmState& state, Pieces& pieces) {
+  const int count = static_cast<int>(state.blocks.all.size());
+  std::vector<SumsByPiece> of_block(count);
+  state.cpu->for_each(count, [&](int i) {
+    const Block& block = *state.blocks.all[i];
+    BlockScratch& scratch = state.scratch.local();
+    const std::size_t lanes = block.lane_count();
+    if (scratch.values.size() < 6 * lanes) scratch.values.resize(6 * lanes);
+    float *x = scratch.values.data(), *v = x + 3 * lanes;
+    const BlockField field = block_field(state, block);
+    state.kernels->positions(block, field, state.nodes.u, scratch, x);
+    state.kernels->positions(block, at_rest(field), state.nodes.v, scratch, v);
+    for (std::size_t lane = 0; lane < lanes; ++lane) {
+      const std::int32_t p = block.point[lane];
+      if (p < 0) continue;
+      Vec3 place(x[lane], x[lanes + lane], x[2 * lanes + lane]);
+      Vec3 velocity(v[lane], v[lanes + lane], v[2 * lanes + lane]);
+      if (held_place(state, p, place) && !state.anchors.moves) velocity.setZero();
+      of_block[i].of(pieces.of_point[p]).add(state.points.volume[p], place, velocity);
+    }
+  });
+  set_motion(of_block, pieces);
 }
 
 }  // namespace tissue_sim

@@ -1,10 +1,14 @@
-// Figures that a state has, the same for all devices.
+// Figures that a state has, the same for all devices, and what it shows of itself from the nodes on
+// the host.
 #pragma once
 
 #include <cstdint>
+#include <vector>
 
 #include "fragments/pieces.h"
+#include "frame/put_faces.h"
 #include "mpm/mpm_state.h"
+#include "tissue_sim/point.h"
 
 namespace tissue_sim {
 
@@ -31,5 +35,43 @@ std::uint64_t checksum(const MpmState& state, const Pieces& pieces);
 
 /// Sums over the nodes, in double.
 Momentum momentum(const MpmState& state);
+
+/// Where a point is that an anchor holds, whatever nodes beside it do [m]. False for others.
+bool held_place(const MpmState& state, std::int32_t point, Vec3& place);
+
+/// Makes room for the selection's fields in a cloud of Points, and fills them: `place` is where in
+/// the cloud each point goes, -1 for none (select_points()).
+void add_point_fields(MpmState& state, const PointSelection& selection,
+                      const std::vector<std::int32_t>& place, int count,
+                      std::vector<std::uint8_t>& cloud);
+
+/// Sets BoundaryMesh::now: where anchors hold a vertex, else what of_nodes(i) says of vertex i [m].
+template <class F>
+void place_boundary(MpmState& s, const F& of_nodes) {
+  BoundaryMesh& mesh = s.boundary;
+  constexpr int kGrain = 256;
+  const auto vertices = static_cast<int>(mesh.vertices.size());
+  mesh.now.resize(vertices);
+  s.cpu->for_each(
+      vertices,
+      [&](int i) {
+        const BoundaryMesh::Vertex& v = mesh.vertices[i];
+        if (s.points.free_volume_of(v.point) > 0) {
+          mesh.now[i] = of_nodes(i);
+          return;
+        }
+        const std::int32_t body = s.points.site[v.point].body;
+        mesh.now[i] = floats(
+            s.anchors.moves ? s.anchors.place_of_held(s.bodies[body].body, body, v.rest) : v.rest);
+      },
+      kGrain);
+}
+/// From the nodes on the host.
+void place_boundary(MpmState& state);
+/// Impulses on the corners of what it read last [N s] become velocity of the nodes.
+void push_surface(MpmState& state, Span<const float> impulses);
+
+/// Fills centroid (of the mass), velocity and box of all pieces.
+void measure_pieces(MpmState& state, Pieces& pieces);
 
 }  // namespace tissue_sim

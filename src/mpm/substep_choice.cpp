@@ -123,7 +123,7 @@ double SubstepChoice::longest_predicted(MpmState& state, const FrameInput& input
   if (!limit_.known()) return cautious;
   const double asked = std::min(1.0, state.scene.cfl / Scene().cfl);
   const double margin = kStabilityMargin * (is_strained(state) ? kStrainedMargin : 1);
-  const double elastic = asked * margin * limit_.foreseen();
+  const double elastic = asked * margin * limit_.predicted();
   const double chosen = viscous_substep(elastic, fastest_damping(state, stiffening));
   const double motion = farthest_motion(state, input, colliders) / state.scene.cell_size;
   const double in_part = motion * std::min(1.0, kShortestPart * chosen * state.scene.frame_rate);

@@ -3,6 +3,7 @@
 
 #include <vector>
 
+#include "compute/host_device.h"
 #include "frame/stability_limit.h"
 #include "frame/step_acceptance.h"
 #include "frame/step_length.h"
@@ -41,10 +42,9 @@ class SubstepChoice {
   PartSubsteps part(const MpmState& state, const FrameInput& input, const FrameColliders& colliders,
                     double time, double longest) const;
 
- private:
-  template <class Archive>
-  friend void fields(Archive& archive, SubstepChoice& x);  // mpm/mpm_fields.h
+  TISSUE_SIM_FIELDS(limit_, length_, acceptance_)
 
+ private:
   /// longest() as long as no part was rejected.
   double longest_predicted(MpmState& state, const FrameInput& input,
                            const FrameColliders& colliders, const Stiffening& stiffening,

@@ -79,7 +79,7 @@ TEST(MlsCutSearch, PiecesByTheSpannerAreThoseOfAllPairs) {
     MlsTissue tissue(mls_box(Vec3(0.012, 0.01, 0.008), 0.001, placement));
     MlsState& s = tissue.state();
     // Both of its nodes list a pair of it.
-    EXPECT_LT(s.spanner.other.size(), 2 * 0.25 * s.pairs.other.size());
+    EXPECT_LT(s.connectivity.other.size(), 2 * 0.25 * s.pairs.other.size());
     for (int k = 0; k < 7; ++k) {
       UnionFind all(s.count()), linked = join_uncrossed(s);
       for (int i = 0; i < s.count(); ++i) {

@@ -6,8 +6,8 @@
 #include <random>
 #include <set>
 
+#include "mpm/cut_tissue.h"
 #include "mpm/lattice/bonds.h"
-#include "mpm/lattice_pieces.h"
 #include "support/cut_scenes.h"
 
 namespace tissue_sim {

@@ -18,6 +18,7 @@
 #include <vector>
 
 #include "compute/for_each.h"
+#include "compute/host_device.h"
 #include "mpm/split/lattice_tissue.h"
 #include "tissue_sim/tissue.h"
 
@@ -33,6 +34,7 @@ struct FaceRow {
   float share[kRowNodes];  ///< weight / m: of an impulse to velocity [1/kg]
   std::int32_t anchor;     ///< in the order of the scene
   float place[3];          ///< on the face, in reference space [m]
+  TISSUE_SIM_FIELDS(node, weight, share, anchor, place)
 };
 
 /// Where a face goes through a row of nodes: of the whole lattice.
@@ -62,6 +64,7 @@ struct RigidMotion {
     const Vec3 place(X[0], X[1], X[2]);
     return rotation * place + translation - place;
   }
+  TISSUE_SIM_FIELDS(rotation, translation)
 };
 
 /// What a cut changes of what anchors hold.
@@ -72,15 +75,18 @@ struct AnchorRows {
   struct HeldNode {
     std::int32_t node, anchor;
     float place[3];  ///< [m]
+    TISSUE_SIM_FIELDS(node, anchor, place)
   };
   std::vector<HeldNode> held;  ///< nodes that only tissue inside sees; found once any moves
   bool moves = false;          ///< whether any anchor has moved ever
+  TISSUE_SIM_FIELDS(rows, groups, inverse, held, moves)
 };
 
 /// What a substep changes of it.
 struct AnchorFaceMotion {
   std::vector<std::array<double, 3>> impulse;  ///< on tissue, by row, since the frame began [N s]
   std::vector<RigidMotion> now;                ///< of each anchor, at the end of the last substep
+  TISSUE_SIM_FIELDS(impulse, now)
 };
 
 struct AnchorFaces : AnchorRows, AnchorFaceMotion {

@@ -2,9 +2,9 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
-#include <numeric>
 #include <utility>
 
+#include "math/union_find.h"
 #include "mpm/anchors/anchor_faces.h"
 
 namespace tissue_sim {
@@ -128,12 +128,8 @@ void add_group(const std::vector<FaceRow>& all, const std::vector<int>& members,
 
 void group_rows(const Nodes& nodes, AnchorFaces& faces) {
   const int count = static_cast<int>(faces.rows.size());
-  std::vector<int> parent(count);
-  std::iota(parent.begin(), parent.end(), 0);
-  const auto root = [&](int i) {
-    while (parent[i] != i) i = parent[i] = parent[parent[i]];
-    return i;
-  };
+  UnionFind linked(count);
+  const auto root = [&](int i) { return linked.root(i); };
   std::vector<std::pair<std::int32_t, int>> rows_of;  // of each node
   for (int i = 0; i < count; ++i) {
     for (int k = 0; k < kRowNodes; ++k) {
@@ -142,9 +138,9 @@ void group_rows(const Nodes& nodes, AnchorFaces& faces) {
   }
   std::sort(rows_of.begin(), rows_of.end());
   for (std::size_t i = 1; i < rows_of.size(); ++i) {
-    if (rows_of[i].first != rows_of[i - 1].first) continue;
-    const int a = root(rows_of[i - 1].second), b = root(rows_of[i].second);
-    parent[std::max(a, b)] = std::min(a, b);
+    if (rows_of[i].first == rows_of[i - 1].first) {
+      linked.join(rows_of[i - 1].second, rows_of[i].second);
+    }
   }
   std::vector<int> size(count, 0);
   for (int i = 0; i < count; ++i) ++size[root(i)];

@@ -1,4 +1,4 @@
-// The internal forces of a block. For block_kernels.cpp alone.
+// The internal forces of a block. For kernel_set.h alone.
 #pragma once
 
 #include <algorithm>

@@ -6,7 +6,6 @@
 #include "compute/array.h"
 #include "compute/simd.h"
 #include "mpm/blocks/blocks.h"
-#include "mpm/blocks/stretched_point.h"
 #include "mpm/blocks/update_node.h"
 #include "mpm/lattice/nodes.h"
 #include "mpm/split/front_cell.h"

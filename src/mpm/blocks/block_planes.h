@@ -1,5 +1,5 @@
 // What the kernels of a block share: its layout in scratch, its nodes and their x-y quantities. For
-// block_kernels.cpp alone, which compiles it for each instruction set.
+// kernel_set.h alone, which compiles it for each instruction set.
 #pragma once
 
 #include <algorithm>

@@ -1,11 +1,11 @@
-// What is read off a block: energy, stiffness and stress. For block_kernels.cpp alone.
+// What is read off a block: energy, stiffness and stress. For kernel_set.h alone.
 #pragma once
 
 #include <algorithm>
 #include <cmath>
 
 #include "mpm/blocks/block_forces.h"
-#include "mpm/blocks/stretched_point.h"
+#include "mpm/blocks/update_node.h"
 #include "mpm/lattice/bonds.h"
 
 namespace tissue_sim {

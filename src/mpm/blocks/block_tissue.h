@@ -5,6 +5,7 @@
 
 #include <vector>
 
+#include "compute/host_device.h"
 #include "mpm/anchors/anchor_faces.h"
 #include "mpm/blocks/block_kernels.h"
 #include "mpm/blocks/blocks.h"
@@ -16,6 +17,7 @@ namespace tissue_sim {
 struct BlockMotion {
   Box box;           ///< [m]
   double speed = 0;  ///< [m/s]
+  TISSUE_SIM_FIELDS(box, speed)
 };
 
 struct BlockTissue : LatticeTissue {

@@ -54,7 +54,9 @@ void list_by_cost(Blocks& blocks) {
                    [&cost](int a, int b) { return cost[a] > cost[b]; });
 }
 
-void connect_forces(Blocks& blocks, const std::vector<LatticeBody>& bodies, int node_count) {
+}  // namespace
+
+void list_blocks(Blocks& blocks) {
   blocks.all.clear();
   blocks.force_size = kLanes;  // rows are read in whole vectors, which reach beyond either end
   for (BlockRegion& r : blocks.regions) {
@@ -66,7 +68,9 @@ void connect_forces(Blocks& blocks, const std::vector<LatticeBody>& bodies, int 
     }
   }
   blocks.force_size += kLanes;
-  blocks.first_split_node = lattice_node_count(bodies);
+}
+
+void connect_forces(Blocks& blocks, std::size_t node_count) {
   if (!blocks.has_rows) return;
   list_by_cost(blocks);
   struct Entry {
@@ -87,7 +91,7 @@ void connect_forces(Blocks& blocks, const std::vector<LatticeBody>& bodies, int 
     }
   }
   // Those of a row one after the other, in the order of the blocks.
-  const int row_count = (node_count + kNodeRow - 1) / kNodeRow;
+  const int row_count = static_cast<int>((node_count + kNodeRow - 1) / kNodeRow);
   std::vector<int> end_of(row_count + 1, 0);  // first, then end of each row's
   for (const Entry& e : entries) ++end_of[e.row + 1];
   std::partial_sum(end_of.begin(), end_of.end(), end_of.begin());
@@ -106,6 +110,8 @@ void connect_forces(Blocks& blocks, const std::vector<LatticeBody>& bodies, int 
     if (end > begin) blocks.rows.push_back({row * kNodeRow + lo, hi - lo, begin, end - begin});
   }
 }
+
+namespace {
 
 /// A region whose blocks are made anew, and the facets that it had; null until it is filled.
 struct NewRegion {
@@ -130,12 +136,13 @@ void fill_regions(Blocks& blocks, std::vector<NewRegion>& anew, const LatticeTis
 
 /// Block by block their facets; meanwhile connects the forces of all blocks.
 void finish_regions(Blocks& blocks, const std::vector<NewRegion>& anew, const LatticeTissue& tissue,
-                    int node_count, Cpu& cpu) {
+                    Cpu& cpu) {
   std::vector<std::pair<Block*, const KnownFacets*>> made;
   for (const NewRegion& r : anew) {
     for (Block& b : blocks.regions[r.index].blocks) made.emplace_back(&b, r.known.get());
   }
-  cpu.both([&] { connect_forces(blocks, tissue.bodies, node_count); },
+  list_blocks(blocks);
+  cpu.both([&] { connect_forces(blocks, tissue.nodes.size()); },
            [&] {
              cpu.for_each(static_cast<int>(made.size()), [&](int i) {
                Block& b = *made[i].first;
@@ -232,7 +239,7 @@ Blocks make_blocks(const LatticeTissue& tissue, const BlockShape& shape, Cpu& cp
     all.push_back({static_cast<int>(i), nullptr});
   }
   fill_regions(blocks, all, tissue, cpu);
-  finish_regions(blocks, all, tissue, lattice_node_count(tissue.bodies), cpu);
+  finish_regions(blocks, all, tissue, cpu);
   return blocks;
 }
 
@@ -256,7 +263,7 @@ void update_blocks(Blocks& blocks, const LatticeTissue& tissue,
   fill_regions(blocks, anew, tissue, cpu);
   std::vector<NewRegion> unfilled = halve_regions(blocks, anew, before);
   fill_regions(blocks, unfilled, tissue, cpu);
-  finish_regions(blocks, anew, tissue, static_cast<int>(tissue.nodes.size()), cpu);
+  finish_regions(blocks, anew, tissue, cpu);
   std::vector<std::uint8_t> is_new(blocks.regions.size(), 0);
   for (const NewRegion& of : anew) {
     is_new[of.index] = 1;

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "compute/host_device.h"
 #include "mpm/split/lattice_tissue.h"
 #include "mpm/surface/block.h"
 
@@ -17,6 +18,7 @@ struct BlockRegion {
   int x, y, z, nx, ny, nz;  ///< cells
   std::vector<Block> blocks;
   bool half = false;  ///< of one that a cut goes through: see BlockShape::room
+  TISSUE_SIM_FIELDS(body, x, y, z, nx, ny, nz, blocks, half)
 };
 
 /// Forces on up to kNodeRow nodes that follow one another, a vector: the sum of parts of the force
@@ -51,7 +53,6 @@ struct Blocks {
   std::vector<int> by_cost;  ///< `all`, the largest first, so that threads end together
   std::vector<NodeRow> rows;
   std::vector<RowPart> row_parts;
-  int first_split_node = 0;  ///< nodes from here on are fields that cuts made
 
   bool has_halves() const {
     return std::any_of(regions.begin(), regions.end(), [](const BlockRegion& r) { return r.half; });
@@ -69,6 +70,11 @@ struct BlockShape {
   /// this: where each has a multiprocessor, all others wait for those that are cut.
   int room = 0;
 };
+
+/// Lists all blocks of the regions, with room for their forces.
+void list_blocks(Blocks& blocks);
+/// Works out how their forces come together at so many nodes.
+void connect_forces(Blocks& blocks, std::size_t node_count);
 
 /// Cuts the bodies' lattices into regions and makes their blocks.
 Blocks make_blocks(const LatticeTissue& tissue, const BlockShape& shape, Cpu& cpu);

@@ -222,6 +222,8 @@ Block make_block(const BlockRegion& r, const LatticeBody& b, const Points& point
   }
   block.runs = runs_of(block, holds);
   lay_out(block);
+  block.volume.assign(block.lane_count(), 0.0f);
+  block.point.assign(block.lane_count(), -1);
   std::vector<int> lane_of(block.nx * block.ny, -1);
   for (const Block::Run& run : block.runs) {
     for (int i = 0; i < run.count; ++i) lane_of[run.y * block.nx + run.x + i] = run.lane + i;

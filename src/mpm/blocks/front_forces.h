@@ -1,5 +1,5 @@
 // Forces and energy of the cells at the front of a cut (front_stress.h), the eight points of one
-// side by side. For block_kernels.cpp alone.
+// side by side. For kernel_set.h alone.
 #pragma once
 
 #include <algorithm>

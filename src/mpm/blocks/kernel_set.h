@@ -9,7 +9,6 @@
 #include "mpm/blocks/block_places.h"
 #include "mpm/blocks/block_readings.h"
 #include "mpm/blocks/front_forces.h"
-#include "mpm/blocks/lane_lists.h"
 
 namespace tissue_sim {
 namespace {

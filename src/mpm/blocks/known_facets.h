@@ -6,7 +6,7 @@
 
 #include "mpm/blocks/blocks.h"
 #include "mpm/split/lattice_tissue.h"
-#include "mpm/surface/facets.h"
+#include "mpm/surface/facet_in_world.h"
 
 namespace tissue_sim {
 

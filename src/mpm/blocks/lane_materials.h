@@ -1,5 +1,5 @@
 // What the points in the lanes of a block are of: one material for all of them, or several. For
-// block_kernels.cpp alone.
+// kernel_set.h alone.
 #pragma once
 
 #include "material/laws.h"

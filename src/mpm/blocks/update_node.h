@@ -1,5 +1,7 @@
-// The step of one node: the kernel that the CPU's rows and the GPU's blocks share.
+// What the kernels of CPU and GPU have in common: the step of one node, and what they find.
 #pragma once
+
+#include <cstdint>
 
 #include "compute/host_device.h"
 #include "frame/leapfrog.h"
@@ -35,6 +37,12 @@ struct UpdateNode : NodeStep {
     const float f[3] = {fx, fy, fz};
     for (int c = 0; c < 3; ++c) move(c, f[c], mass[i], inv_mass[i], u[c][i], v[c][i]);
   }
+};
+
+/// A point that is stretched far, and C = F^T F there: 00 11 22 01 02 12.
+struct StretchedPoint {
+  std::int32_t point;
+  float C[6];
 };
 
 }  // namespace tissue_sim

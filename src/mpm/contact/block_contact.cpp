@@ -63,7 +63,7 @@ bool overlap(const Box& a, const Box& b) {
   return (a.min.array() <= b.max.array()).all() && (b.min.array() <= a.max.array()).all();
 }
 
-/// Substeps between two lists of the cells near colliders, and how much nearer than foreseen either
+/// Substeps between two lists of the cells near colliders, and how much nearer than predicted either
 /// may come in that time [cells].
 constexpr int kListLasts = 8;
 constexpr double kListMargin = 0.5;

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "compute/host_device.h"
 #include "contact/push_tool.h"
 #include "mpm/blocks/block_tissue.h"
 #include "mpm/contact/contact_inertia.h"
@@ -36,6 +37,8 @@ struct NearCell {
   float lightest = -1;                    ///< largest 1 / m of its nodes, negative until asked for
   std::uint8_t clear = 0;                 ///< substeps for which no place of it can be reached
   std::uint8_t points_clear = 0;          ///< the same of its `points`
+  TISSUE_SIM_FIELDS(lane, node, collider, points, first_place, place_count, middle, first_part,
+                    lightest, clear, points_clear)
 };
 
 /// What is known of a place in such a cell, or of a part of it, until cells are listed anew.
@@ -44,6 +47,7 @@ struct NearPart {
   float mobility = -1;     ///< mpm/contact/face_places.h, negative until it is asked for [1/kg]
   std::uint8_t clear = 0;  ///< substeps for which the collider cannot reach it
   Side side = kUnknown;    ///< whether the surface faces the collider
+  TISSUE_SIM_FIELDS(mobility, clear, side)
 };
 
 /// Contact of points with colliders, block by block.
@@ -55,6 +59,7 @@ struct Contacts {
   std::vector<std::vector<InertiaChange>> changes;  ///< of the substep
   ContactInertia inertia;
   int until_list = 0;  ///< substeps until `cells` are listed anew
+  TISSUE_SIM_FIELDS(near, cells, parts, touching, changes, inertia.nodes, inertia.dt, until_list)
 };
 
 inline constexpr std::uint8_t kPointKey = 128;  ///< Touch::key of a point, above those of places

@@ -16,6 +16,7 @@
 #include <vector>
 
 #include "compute/array.h"
+#include "compute/host_device.h"
 #include "mpm/anchors/anchor_faces.h"
 #include "mpm/lattice/nodes.h"
 #include "tools/collider.h"
@@ -35,6 +36,8 @@ struct InertialNode {
   float before[3];        ///< velocity before the substep [m/s]
   float impulse[3];       ///< on the node in the substep [N s]
   float grown;            ///< share of B that longer substeps brought, not yet taken in
+  TISSUE_SIM_FIELDS(node, uses, changed, collider, place, mass, inertia, share, before, impulse,
+                    grown)
 };
 
 /// Contact that begins (`sign` 1), ends (-1) or whose normal turned (both).
@@ -47,6 +50,7 @@ struct InertiaChange {
   float normal[3];
   float inertia;      ///< b [kg]
   float velocity[3];  ///< of the collider there [m/s]
+  TISSUE_SIM_FIELDS(sign, begins, node, collider, place, normal, inertia, velocity)
 };
 
 struct ContactInertia {

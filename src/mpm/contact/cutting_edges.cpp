@@ -1,29 +1,15 @@
-#include "mpm/contact/cutting_edges.h"
-
 #include <algorithm>
 #include <cmath>
 #include <limits>
 
 #include "cutting/edge_forces.h"
 #include "frame/leapfrog.h"
+#include "mpm/contact/touching_tissue.h"
 #include "mpm/lattice/bonds.h"
-#include "mpm/surface/facet_in_world.h"
+#include "mpm/surface/facet_motion.h"
 
 namespace tissue_sim {
 namespace {
-
-/// The nodes that a point sees, as a field around its cell.
-struct PointField {
-  const Array<float>* of;
-  const std::int32_t* node;
-
-  void row(int y, int z, float (&u)[3][3]) const {
-    const std::int32_t* n = node + 9 * z + 3 * y;
-    for (int c = 0; c < 3; ++c) {
-      for (int x = 0; x < 3; ++x) u[c][x] = of[c][n[x]];
-    }
-  }
-};
 
 Vec3 in_sites(const LatticeBody& body, const Vec3& X) {
   return (X - body.origin) / (0.5 * body.cell_size) - Vec3::Constant(0.5);
@@ -60,9 +46,13 @@ class LatticeEdges {
       in_cell[a] = static_cast<float>((place.at[a] - middle[a]) / body.cell_size);
     }
     const AxisWeights weights(in_cell);
-    value_at(PointField{s_.nodes.u, support.node}, weights, u);
-    value_at(PointField{s_.nodes.v, support.node}, weights, v);
-    deformation_gradient(PointField{s_.nodes.u, support.node}, body.cell_size, in_cell, F);
+    CellNodes around;
+    around.lowest = support.node;
+    around.pitch = 3;
+    around.plane = 9;
+    value_at(CellField{s_.nodes.u, around}, weights, u);
+    value_at(CellField{s_.nodes.v, around}, weights, v);
+    deformation_gradient(CellField{s_.nodes.u, around}, body.cell_size, in_cell, F);
     EdgeSupport& at = support.at;
     at.mobility = 0;
     for (int k = 0; k < 27; ++k) {

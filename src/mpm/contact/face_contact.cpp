@@ -55,21 +55,15 @@ void add_face_contacts(const TouchingTissue& state, int index, float* force) {
   }
 }
 
-namespace {
-
-/// Lists the contacts that may touch before the next look, and for each block those it is part of.
-void list_active(TouchingTissue& s) {
-  FaceContacts& faces = s.faces;
-  faces.forget_active();
-  faces.first_of_block.assign(s.blocks.all.size() + 1, 0);
+void index_active(FaceContacts& faces) {
+  faces.between.clear();
+  faces.first_of_block.assign(faces.first_facet.size(), 0);
   faces.first_within = faces.first_of_block;
-  for (std::size_t i = 0; i < faces.all.size(); ++i) {
+  for (const std::int32_t i : faces.active) {
     const FaceContact& c = faces.all[i];
-    if (!is_active(c)) continue;
     const std::int32_t own = faces.block_of[c.facet], other = faces.block_of[c.other];
-    faces.active.push_back(static_cast<std::int32_t>(i));
     if (own != other) {
-      faces.between.push_back(static_cast<std::int32_t>(i));
+      faces.between.push_back(i);
     } else {
       ++faces.first_within[own + 1];
     }
@@ -91,8 +85,6 @@ void list_active(TouchingTissue& s) {
     if (own == other) faces.within[next_within[own]++] = i;
   }
 }
-
-}  // namespace
 
 FacetMotion motion_of(const TouchingTissue& s, std::int32_t facet) {
   return facet_motion(body_of(s, facet), block_of(s, facet), facet_of(s, facet), s.nodes);
@@ -135,7 +127,11 @@ void look_at_due(TouchingTissue& s, double dt, bool all) {
         c.looked_at = s.time;
       },
       32);
-  list_active(s);
+  faces.active.clear();  // those that may touch before the next look
+  for (std::size_t i = 0; i < faces.all.size(); ++i) {
+    if (is_active(faces.all[i])) faces.active.push_back(static_cast<std::int32_t>(i));
+  }
+  index_active(faces);
   for (std::size_t i = 0; i < due.size(); ++i) {
     faces.all[due[i]].look_at = s.time + look_horizon(speed[i], s.scene.cell_size, dt);
   }

@@ -17,6 +17,7 @@
 
 namespace tissue_sim {
 
+struct Blocks;
 struct TouchingTissue;
 struct Pieces;
 
@@ -26,6 +27,11 @@ struct FaceContact : FaceSpring {
   bool has_whole_rows = false, other_has_whole_rows = false;  ///< face_places.h, of these
   AxisWeights weights, other_weights;                         ///< at the facet's centre; at `hold`
   double looked_at = 0, look_at = 0;                          ///< when last, when next at last [s]
+  template <class Archive>
+  void each_field(Archive& archive) {
+    FaceSpring::each_field(archive);
+    archive(looked_at, look_at);
+  }
 };
 
 struct FaceContacts {
@@ -53,6 +59,8 @@ struct FaceContacts {
     active.clear();
     between.clear();
   }
+  TISSUE_SIM_FIELDS(version, motion, listed, all, first_near, near, active, kept, until_search,
+                    until_look, dt, fastest)
 };
 
 /// Before a substep of `dt` seconds: searches pairs, and looks at them, when it is time to.
@@ -66,8 +74,12 @@ void search_if_faster(TouchingTissue& state);
 
 /// Before blocks are made anew: remembers what touches.
 void keep_face_contacts(TouchingTissue& state);
-/// After blocks were made: numbers their facets.
+/// After blocks were made: numbers their facets, which touch nothing yet.
 void list_facets(TouchingTissue& state);
+/// Fills `first_facet` and `block_of`.
+void number_facets(FaceContacts& faces, const Blocks& blocks);
+/// Fills all that is by block, and `between`, from the active contacts.
+void index_active(FaceContacts& faces);
 
 /// Works out the force of a contact after a substep of `dt` seconds, and lets it slide.
 void push_faces(const TouchingTissue& state, FaceContact& contact, float dt);

@@ -45,6 +45,17 @@ inline bool has_whole_rows(const CellNodes& cell) {
   return whole;
 }
 
+/// Finds the nodes of a contact, and their weights, from its facets and the place held.
+inline void find_nodes(const TouchingTissue& s, FaceContact& c) {
+  c.nodes = CellNodes(block_of(s, c.facet), facet_of(s, c.facet).cell);
+  c.has_whole_rows = has_whole_rows(c.nodes);
+  c.weights = AxisWeights(facet_of(s, c.facet).center);
+  if (c.other < 0) return;
+  c.other_nodes = CellNodes(block_of(s, c.other), facet_of(s, c.other).cell);
+  c.other_has_whole_rows = has_whole_rows(c.other_nodes);
+  c.other_weights = AxisWeights(c.hold);
+}
+
 /// Displacement of a place in a cell: row(i, c) is component c of the nodes of row y + 3 z, three
 /// and a fourth that does not count.
 template <class Row>

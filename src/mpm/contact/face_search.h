@@ -13,7 +13,7 @@ namespace tissue_sim {
 // Lengths in cells.
 inline constexpr float kSearchReach =
     0.75f;                            ///< half size of the box in which a facet looks around
-inline constexpr float kSkin = 0.1f;  ///< that facets may move, beyond what is foreseen, in a list
+inline constexpr float kSkin = 0.1f;  ///< that facets may move, beyond what is predicted, in a list
 inline constexpr float kLargestReach = 4;  ///< of what moves fast; the next search follows sooner
 
 inline constexpr double kHorizon = 1.0 / 60;  ///< between two searches [s]
@@ -67,6 +67,7 @@ TISSUE_SIM_INLINE bool is_due(double until, double dt) { return until < 0.5 * dt
 /// Where a facet was when the pairs were listed, and how far it may move while the list holds [m].
 struct ListedFacet {
   float x[3], skin;  ///< skin < 0: it took no part
+  TISSUE_SIM_FIELDS(x, skin)
 };
 
 /// A piece, as contacts see it.

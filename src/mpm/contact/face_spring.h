@@ -65,6 +65,9 @@ struct alignas(16) FaceSpring {
     return is_within(0.75) && fabsf(hold[0]) < kFarthest && fabsf(hold[1]) < kFarthest &&
            fabsf(hold[2]) < kFarthest;
   }
+  TISSUE_SIM_FIELDS(from_middle, cell_size, hold, between, apart, normal, to_reference, stiffness,
+                    damping, friction, own_mobility, sudden, force, touching, facet, other, depth,
+                    begun)
 };
 
 /// Works out the force of a contact after a substep of `dt` seconds, and lets it slide. `places`
@@ -157,6 +160,40 @@ TISSUE_SIM_INLINE void push_face(FaceSpring& c, float dt, Places& places, bool a
   }
   const float along = 1 / depth;
   for (int a = 0; a < 3; ++a) c.force[a] = push * (c.normal[a] - along * aside[a]);
+}
+
+// What is remembered of contacts while blocks, and the numbers of facets, are made anew.
+
+/// What a contact is known by while blocks are made anew.
+struct KeptContact {
+  std::int32_t point;      ///< of the facet
+  std::int32_t direction;  ///< of the facet
+  std::int32_t other_body;
+  double hold[3];  ///< reference place [m]
+  float depth, begun, stiffness, apart[3];
+  double looked_at;  ///< on the CPU, when last [s]
+
+  TISSUE_SIM_INLINE bool is_before(std::int32_t p, int d) const {
+    return point != p ? point < p : direction < d;
+  }
+  TISSUE_SIM_FIELDS(point, direction, other_body, hold, depth, begun, stiffness, apart, looked_at)
+};
+
+/// The one of these, sorted, that a facet had; null if none.
+TISSUE_SIM_INLINE const KeptContact* find_kept(const KeptContact* kept, int count,
+                                               const Facet& facet) {
+  int begin = 0, end = count;
+  while (begin < end) {
+    const int middle = (begin + end) / 2;
+    if (kept[middle].is_before(facet.point, facet.direction)) {
+      begin = middle + 1;
+    } else {
+      end = middle;
+    }
+  }
+  const bool found =
+      begin < count && kept[begin].point == facet.point && kept[begin].direction == facet.direction;
+  return found ? kept + begin : nullptr;
 }
 
 }  // namespace tissue_sim

@@ -161,9 +161,7 @@ void make_contacts(TouchingTissue& s, const std::vector<PieceSize>& piece,
     } else {
       all.emplace_back();
       all.back().facet = f;
-      all.back().nodes = CellNodes(block_of(s, f), facet_of(s, f).cell);
-      all.back().has_whole_rows = has_whole_rows(all.back().nodes);
-      all.back().weights = AxisWeights(facet_of(s, f).center);
+      find_nodes(s, all.back());
       all.back().looked_at = s.time;
     }
     contact[f] = static_cast<std::int32_t>(all.size() - 1);
@@ -268,16 +266,20 @@ void keep_face_contacts(TouchingTissue& s) {
   });
 }
 
-void list_facets(TouchingTissue& s) {
-  FaceContacts& faces = s.faces;
-  ++faces.version;
+void number_facets(FaceContacts& faces, const Blocks& blocks) {
   faces.first_facet.assign(1, 0);
   faces.block_of.clear();
-  for (std::size_t b = 0; b < s.blocks.all.size(); ++b) {
-    const std::size_t count = s.blocks.all[b]->facets.size();
+  for (std::size_t b = 0; b < blocks.all.size(); ++b) {
+    const std::size_t count = blocks.all[b]->facets.size();
     faces.block_of.insert(faces.block_of.end(), count, static_cast<std::int32_t>(b));
     faces.first_facet.push_back(static_cast<std::int32_t>(faces.block_of.size()));
   }
+}
+
+void list_facets(TouchingTissue& s) {
+  FaceContacts& faces = s.faces;
+  ++faces.version;
+  number_facets(faces, s.blocks);
   faces.motion.clear();  // not to be moved to new room
   faces.motion.resize(faces.block_of.size());
   faces.listed.clear();

@@ -20,7 +20,6 @@
 #include "contact/contact_spring.h"
 #include "mpm/contact/face_search.h"
 #include "mpm/contact/face_spring.h"
-#include "mpm/contact/kept_contact.h"
 #include "mpm/surface/facet_in_world.h"
 
 namespace tissue_sim {

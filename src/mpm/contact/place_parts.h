@@ -8,7 +8,7 @@
 
 #include "contact/surface_spring.h"
 #include "mpm/lattice/bonds.h"
-#include "mpm/surface/facets.h"
+#include "mpm/surface/facet_in_world.h"
 #include "tools/collider.h"
 
 namespace tissue_sim {

@@ -2,9 +2,9 @@
 #pragma once
 
 #include "mpm/cuda/block_nodes.h"
-#include "mpm/cuda/cell_stabilisation.h"
 #include "mpm/cuda/grid_barrier.h"
-#include "mpm/cuda/half_forces.h"
+#include "mpm/cuda/half_cell.h"
+#include "mpm/cuda/node_plane.h"
 
 namespace tissue_sim {
 

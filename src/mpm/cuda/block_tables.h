@@ -2,6 +2,9 @@
 // anew: those of all others stay there, in new places.
 #pragma once
 
+#include <cuda_runtime_api.h>
+#include <vector_types.h>
+
 #include "compute/device_array.h"
 #include "mpm/cuda/tables.h"
 #include "mpm/surface/boundary_mesh.h"
@@ -42,9 +45,6 @@ struct BlockTables : BlockTablesIn<DeviceArray> {
     volume.swap(other.volume);
     partial.swap(other.partial);
   }
-  std::size_t bytes() const {
-    return slot_node.bytes() + point.bytes() + volume.bytes() + partial.bytes();
-  }
 };
 
 /// Fills `to`, which has its size, with what the blocks have in `before` or, those that are new, in
@@ -70,7 +70,6 @@ struct ConnectRoom {
   DeviceArray<std::int32_t> slot, node;
   DeviceArray<char> sorting;
   DeviceArray<int> most;
-  std::size_t bytes() const { return slot.bytes() + node.bytes() + sorting.bytes() + most.bytes(); }
 };
 
 /// What CudaTables knows of the slots.
@@ -89,5 +88,26 @@ struct SlotTables {
 void connect_slots(const SlotTables& slots, std::size_t node_count, ConnectRoom& room,
                    int* most_sharing, cudaStream_t stream);
 inline constexpr int kMostSharing = 63;
+
+// Takes out of a field of all nodes what anchors' faces hold: for the substep that tissue bears.
+
+/// FaceRow without its place.
+struct CudaRowNodes {
+  std::int32_t node[kFaceRowNodes];
+  float weight[kFaceRowNodes], share[kFaceRowNodes];
+};
+/// FaceGroup.
+struct CudaRowGroup {
+  int first, count, inverse;
+};
+
+/// Fills what CudaHeldFaces::held and ::entries have of the tables.
+void launch_connect(CudaHeldNode* held, int count, const CudaTables& tables, cudaStream_t stream);
+void launch_connect(CudaFaceEntry* entries, int count, const CudaTables& tables,
+                    cudaStream_t stream);
+
+/// As hold_still() of mpm/anchors/anchor_faces.h does for each of `count` groups.
+void launch_hold_still(const CudaRowGroup* groups, int count, const CudaRowNodes* rows,
+                       const float* inverse, float4* field, cudaStream_t stream);
 
 }  // namespace tissue_sim

@@ -1,7 +1,7 @@
-#include "mpm/cuda/bundle_blocks.h"
-
 #include <algorithm>
 #include <numeric>
+
+#include "mpm/cuda/choose_plan.h"
 
 namespace tissue_sim {
 

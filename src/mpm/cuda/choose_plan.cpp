@@ -8,8 +8,6 @@
 #include <stdexcept>
 #include <string>
 
-#include "mpm/cuda/bundle_blocks.h"
-
 namespace tissue_sim {
 namespace {
 

@@ -6,7 +6,7 @@
 #include <utility>
 
 #include "mpm/cuda/on_device.h"
-#include "mpm/point_fields.h"
+#include "mpm/state_figures.h"
 
 namespace tissue_sim {
 namespace {

@@ -5,10 +5,8 @@
 #include <tuple>
 
 #include "cutting/blade_sweep.h"
-#include "mpm/cuda/cuda_device.h"
 #include "mpm/cuda/on_device.h"
 #include "mpm/cut_tissue.h"
-#include "mpm/lattice_pieces.h"
 
 namespace tissue_sim {
 namespace {
@@ -36,7 +34,7 @@ std::vector<CudaSweptEdge> edges_of(const BladePath& path) {
 }
 
 std::vector<BrokenBond> bonds_swept(CudaTissue& d, const BladePath& path, bool moves) {
-  SweepOnDevice& on = d.sweep;
+  SweepOnDevice& on = d.blade;
   const std::vector<CudaSweptEdge> edges = edges_of(path);
   if (edges.empty()) return {};
   on.edges.upload(edges, d.stream);
@@ -76,7 +74,7 @@ std::vector<BrokenBond> bonds_swept(CudaTissue& d, const BladePath& path, bool m
 }
 
 void read_places(CudaTissue& d, float4* u_before) {
-  SweepOnDevice& on = d.sweep;
+  SweepOnDevice& on = d.blade;
   upload_lattices(d);
   upload_sites(d);
   std::vector<CudaBlockCell> cells;
@@ -130,16 +128,16 @@ void push_points(CudaTissue& d, const std::vector<std::int32_t>& changed) {
     if (!d.outer_points) continue;
     for (const std::int32_t other : across_sheet(d.state, p)) change(other);
   }
-  d.sweep.changes.upload(changes, d.stream);
+  d.blade.changes.upload(changes, d.stream);
   const auto any = [](const auto& of) { return of.size() > 0 ? of.data() : nullptr; };
-  launch_change_points(d.sweep.changes.data(), static_cast<int>(changes.size()),
+  launch_change_points(d.blade.changes.data(), static_cast<int>(changes.size()),
                        {d.bonds.data(), any(d.soft), any(d.anchors.lightness), any(d.outer),
                         any(d.planes), any(d.area), any(d.with), d.held_by * d.place_parts},
                        d.stream);
 }
 
-void CudaMpmDevice::before_parting(const std::vector<std::int32_t>& points) {
-  CudaTissue& d = *tissue_;
+void CudaTissue::before_parting(const std::vector<std::int32_t>& points) {
+  CudaTissue& d = *this;
   pull_front(d);
   if (points.empty()) return;
   make_room_for_cuts(d);
@@ -149,8 +147,8 @@ void CudaMpmDevice::before_parting(const std::vector<std::int32_t>& points) {
   d.nodes_before = static_cast<int>(d.state.nodes.size());
 }
 
-void CudaMpmDevice::parted(const std::vector<std::int32_t>& points, const Apart& apart) {
-  CudaTissue& d = *tissue_;
+void CudaTissue::parted(const std::vector<std::int32_t>& points, const Apart& apart) {
+  CudaTissue& d = *this;
   if (points.empty()) return push_front(d);
   for (int n = d.nodes_before; n < static_cast<int>(d.state.nodes.size()); ++n) {
     d.brought.push_back(n);
@@ -164,8 +162,8 @@ void CudaMpmDevice::parted(const std::vector<std::int32_t>& points, const Apart&
   push_anchors(d);
 }
 
-std::vector<int> CudaMpmDevice::label_pieces() {
-  CudaTissue& d = *tissue_;
+std::vector<int> CudaTissue::label_pieces() {
+  CudaTissue& d = *this;
   upload_sites(d);
   if (d.labels.empty()) {
     std::vector<std::int32_t> lowest(d.pieces.of_point.size());
@@ -186,10 +184,10 @@ std::vector<int> CudaMpmDevice::label_pieces() {
   return fresh;
 }
 
-void CudaMpmDevice::sweep(const std::vector<BladePath>& paths, bool moves,
-                          std::vector<std::int32_t>& changed, std::vector<std::int32_t>& touched,
-                          CutReport& report) {
-  CudaTissue& d = *tissue_;
+void CudaTissue::sweep(const std::vector<BladePath>& paths, bool moves,
+                       std::vector<std::int32_t>& changed, std::vector<std::int32_t>& touched,
+                       CutReport& report) {
+  CudaTissue& d = *this;
   if (moves && !meets(d, paths)) return;
   read_places(d, moves ? d.u_before.data() : nullptr);
   for (const BladePath& path : paths) {

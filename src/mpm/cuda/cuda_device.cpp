@@ -1,5 +1,3 @@
-#include "mpm/cuda/cuda_device.h"
-
 #include <algorithm>
 #include <cmath>
 #include <stdexcept>
@@ -66,31 +64,33 @@ void sum_loads(CudaTissue& d) {
 }  // namespace
 
 std::unique_ptr<MpmDevice> make_cuda_mpm_device(const Scene& scene, MpmRun& run) {
-  return std::make_unique<CudaMpmDevice>(scene, run);
+  return std::make_unique<CudaTissue>(scene, run);
 }
 
-CudaMpmDevice::CudaMpmDevice(const Scene& scene, MpmRun& run)
-    : tissue_(std::make_unique<CudaTissue>(run)) {
-  CudaTissue& d = *tissue_;
-  d.gpu = open_gpu(d.stream);
+CudaTissue::CudaTissue(const Scene& scene, MpmRun& of)
+    : run(of), state(of.state), pieces(of.pieces), result(of.result) {
+  CudaTissue& d = *this;
   if (const int count = collider_count(scene); count > kMaxColliders) {
     throw std::runtime_error("the scene's tools have " + std::to_string(count - 1) +
                              " parts that touch tissue (a grasper two, other tools one): on the "
                              "GPU at most " +
                              std::to_string(kMaxColliders - 1) + "; set device to cpu");
   }
+  d.gpu = open_gpu(d.stream);
   d.limits = {attribute(cudaDevAttrMultiProcessorCount),
               static_cast<std::size_t>(attribute(cudaDevAttrMaxSharedMemoryPerBlockOptin))};
 }
 
-CudaMpmDevice::~CudaMpmDevice() {
-  if (tissue_->stream != nullptr) cudaStreamSynchronize(tissue_->stream);
+CudaTissue::~CudaTissue() {
+  if (stream == nullptr) return;
+  cudaStreamSynchronize(stream);
+  cudaStreamDestroy(stream);
 }
 
-std::string CudaMpmDevice::name() const { return "cuda (" + tissue_->gpu + ")"; }
+std::string CudaTissue::name() const { return "cuda (" + gpu + ")"; }
 
-void CudaMpmDevice::begin() {
-  CudaTissue& d = *tissue_;
+void CudaTissue::begin() {
+  CudaTissue& d = *this;
   d.cut_shape = choose_shape(d.state.bodies, d.limits, false);
   // What touches other tissue keeps its blocks, which know the contacts.
   make_blocks(
@@ -102,24 +102,24 @@ void CudaMpmDevice::begin() {
   push(d);
 }
 
-void CudaMpmDevice::begun() {
-  CudaTissue& d = *tissue_;
+void CudaTissue::begun() {
+  CudaTissue& d = *this;
   if (d.held_by == 0) return;
   d.outer_points.emplace(d.state, d.state.anchors);
   push_outer_points(d);
 }
 
-void CudaMpmDevice::begin_frame(const FrameInput& input, bool move) {
-  if (tissue_->state.anchors.rows.empty() && input.anchors.empty()) return;
+void CudaTissue::begin_frame(const FrameInput& input, bool move) {
+  if (state.anchors.rows.empty() && input.anchors.empty()) return;
   if (move) {
-    push_anchors(*tissue_);
+    push_anchors(*this);
   } else {
-    push_impulses(*tissue_);
+    push_impulses(*this);
   }
 }
 
-void CudaMpmDevice::begin_rest() {
-  CudaTissue& d = *tissue_;
+void CudaTissue::begin_rest() {
+  CudaTissue& d = *this;
   if (!d.run.frame->blades) return;
   d.u_before.resize(d.u[0].size());
   check_cuda(cudaMemcpyAsync(d.u_before.data(), d.present().u, d.u[0].size() * sizeof(float4),
@@ -127,8 +127,8 @@ void CudaMpmDevice::begin_rest() {
              "copy");
 }
 
-int CudaMpmDevice::run_part(const FramePart& part) {
-  CudaTissue& d = *tissue_;
+int CudaTissue::run_part(const FramePart& part) {
+  CudaTissue& d = *this;
   std::vector<TearingPoint>& tearing = d.run.frame->tearing;
   tearing.clear();
   const int substeps = d.loads_of = part.substeps.count;
@@ -145,7 +145,7 @@ int CudaMpmDevice::run_part(const FramePart& part) {
     const int end = tear_check_at(check, checks, substeps);
     run_substeps(d, done, end);
     done = end;
-    if (tears) add_tearing(d.state, list_stretched(d, 1), tearing);
+    if (tears) tearing = tearing_of(d.state, list_stretched(d, 1));
   }
   d.loads_of = done;
   leave_anchors(d, done);
@@ -155,29 +155,25 @@ int CudaMpmDevice::run_part(const FramePart& part) {
   return done;
 }
 
-unsigned CudaMpmDevice::measure(unsigned) {
-  launch_measure(*tissue_);
-  finish_measure(*tissue_);
+unsigned CudaTissue::measure(unsigned) {
+  launch_measure(*this);
+  finish_measure(*this);
   return kMeasureMotion | kMeasureStiffness | kMeasureEnergies;
 }
 
-unsigned CudaMpmDevice::measure_part(unsigned) {
-  CudaTissue& d = *tissue_;
+unsigned CudaTissue::measure_part(unsigned) {
+  CudaTissue& d = *this;
   launch_measure(d);
   look_for_missed(d);
   finish_measure(d);
-  missed_ = d.went.empty() && tissue_sim::missed_contact(d);
+  has_missed = d.went.empty() && tissue_sim::missed_contact(d);
   d.went.clear();
   sum_loads(d);
   return kMeasureMotion | kMeasureStiffness | kMeasureEnergies;
 }
 
-double CudaMpmDevice::measure_limit(const std::vector<std::uint8_t>&, int steps) {
-  return tissue_sim::measure_limit(*tissue_, steps);
-}
-
-void CudaMpmDevice::save_motion() {
-  CudaTissue& d = *tissue_;
+void CudaTissue::save_motion() {
+  CudaTissue& d = *this;
   CudaTissue::Checkpoint& saved = d.checkpoint;
   const FacesOnDevice& f = d.faces;
   saved.u.copy(d.u[d.current], d.stream);
@@ -197,13 +193,13 @@ void CudaMpmDevice::save_motion() {
   saved.dt = d.state.dt;
 }
 
-bool CudaMpmDevice::can_restore_motion() const {
-  const CudaTissue::Checkpoint& saved = tissue_->checkpoint;
+bool CudaTissue::can_restore_motion() const {
+  const CudaTissue::Checkpoint& saved = checkpoint;
   return static_cast<std::size_t>(saved.host_held_count[0]) <= saved.held.size();
 }
 
-void CudaMpmDevice::restore_motion(bool missed) {
-  CudaTissue& d = *tissue_;
+void CudaTissue::restore_motion(bool missed) {
+  CudaTissue& d = *this;
   if (missed) {
     d.went = d.state.motion;
     d.u_went.copy(d.u[d.current], d.stream);
@@ -230,7 +226,7 @@ void CudaMpmDevice::restore_motion(bool missed) {
   d.loads_of = 0;
 }
 
-void CudaMpmDevice::end_frame() { pull_impulses(*tissue_); }
+void CudaTissue::end_frame() { pull_impulses(*this); }
 
 void launch(CudaTissue& d, int begin, int end, float dt) {
   const Scene& scene = d.state.scene;
@@ -260,30 +256,13 @@ void launch(CudaTissue& d, int begin, int end, float dt) {
   frame.held_faces.drift = face_drift(dt);
   frame.held_faces.swing_loss = kSwingLoss;
   frame.front = d.front.view();
-  if (frame.faces != nullptr || d.may_meet || has_front(d)) {
-    frame.pushes = clear_pushes(d);
-    const CudaTables tables = d.pushed_tables();
-    if (has_front(d) || meets_thin_tools(d)) {
-      launch_substeps(d.front_plan, tables, frame, d.front_resident, d.stream);
-    } else if (frame.faces != nullptr) {
-      launch_substeps(d.touch_plan, tables, frame, d.touch_resident, d.stream);
-    } else {
-      launch_substeps(d.push_plan, tables, frame, d.push_resident, d.stream);
-    }
-  } else {
-    launch_substeps(d.plan, d.tables(), frame, d.resident, d.stream);
-  }
+  const CudaTissue::Way way = way_of(d, frame.faces != nullptr);
+  if (way != CudaTissue::kAlone) frame.pushes = clear_pushes(d);
+  launch_substeps(d.plans[way], way == CudaTissue::kAlone ? d.tables() : d.pushed_tables(), frame,
+                  d.stream);
   d.current = (d.current + end - begin) % 2;
   d.state.time += static_cast<double>(end - begin) * dt;
   d.state.dt = dt;
-}
-
-std::string plan(const CudaTissue& d) {
-  const BlockShape& b = d.shape.blocks;
-  return std::to_string(b.x) + " x " + std::to_string(b.y) + " x " + std::to_string(b.z) +
-         " cells, " + std::to_string(d.plan.threads) + " a block, " +
-         std::to_string(d.blocks.size()) + " blocks in " + std::to_string(d.bundles.size()) +
-         " bundles, " + std::to_string(d.resident) + " at once" + (d.plan.cached ? ", cached" : "");
 }
 
 }  // namespace tissue_sim

@@ -141,8 +141,7 @@ const CudaFaces* faces_of_launch(CudaTissue& d) {
   FacesOnDevice& f = d.faces;
   if (!f.may_meet || f.version != d.state.faces.version) return nullptr;
   const std::vector<CudaBundle>& bundles = d.host_tables.bundles;
-  const std::ptrdiff_t resident =
-      has_front(d) || meets_thin_tools(d) ? d.front_resident : d.touch_resident;
+  const std::ptrdiff_t resident = d.plans[way_of(d, true)].resident;
   const auto ranks = std::count_if(
       bundles.begin(), bundles.begin() + std::min<std::ptrdiff_t>(resident, bundles.size()),
       [](const CudaBundle& b) { return b.rank >= 0; });
@@ -172,11 +171,7 @@ void pull_contacts(CudaTissue& d) {
     if (spring.other < 0) continue;
     FaceContact c;
     static_cast<FaceSpring&>(c) = spring;
-    const Facet &own = facet_of(d.state, c.facet), &other = facet_of(d.state, c.other);
-    c.nodes = CellNodes(block_of(d.state, c.facet), own.cell);
-    c.weights = AxisWeights(own.center);
-    c.other_nodes = CellNodes(block_of(d.state, c.other), other.cell);
-    c.other_weights = AxisWeights(c.hold);
+    find_nodes(d.state, c);
     c.looked_at = d.state.time - f.host_figures[0].since_look;
     if (is_active(spring)) {
       faces.active.push_back(static_cast<std::int32_t>(faces.all.size()));
@@ -189,21 +184,6 @@ void pull_contacts(CudaTissue& d) {
 void search_anew(CudaTissue& d) {
   d.faces.lists_hold = false;
   d.state.faces.until_search = 0;
-}
-
-std::vector<std::vector<std::int32_t>> near_facets(const CudaTissue& d) {
-  const FacesOnDevice& f = d.faces;
-  const std::size_t count = f.facets.size();
-  std::vector<std::int32_t> first(count), size(count), near(f.host_figures[0].near);
-  f.first_near.download(first.data(), count, d.stream);
-  f.near_count.download(size.data(), count, d.stream);
-  f.near.download(near.data(), near.size(), d.stream);
-  check_cuda(cudaStreamSynchronize(d.stream), "send contacts");
-  std::vector<std::vector<std::int32_t>> lists(count);
-  for (std::size_t i = 0; i < count; ++i) {
-    lists[i].assign(near.begin() + first[i], near.begin() + first[i] + size[i]);
-  }
-  return lists;
 }
 
 }  // namespace tissue_sim

@@ -8,11 +8,14 @@
 #include "math/lanczos.h"
 #include "mpm/cuda/cuda_linearised_motion.h"
 #include "mpm/cuda/on_device.h"
+#include "mpm/fragment_flight.h"
+#include "mpm/fragment_forecast.h"
 #include "mpm/state_figures.h"
 
 namespace tissue_sim {
 
-double measure_limit(CudaTissue& d, int steps) {
+double CudaTissue::measure_limit(const std::vector<std::uint8_t>&, int steps) {
+  CudaTissue& d = *this;
   CudaFrame frame{};
   for (int i = 0; i < 2; ++i) frame.force[i] = d.force[i].data();
   frame.substeps = 1;
@@ -47,9 +50,9 @@ double measure_limit(CudaTissue& d, int steps) {
         if (has_front(d)) {
           frame.front = d.front.view();
           frame.pushes = clear_pushes(d);
-          launch_substeps(d.front_plan, d.pushed_tables(), frame, d.front_resident, d.stream);
+          launch_substeps(d.plans[CudaTissue::kWithFronts], d.pushed_tables(), frame, d.stream);
         } else {
-          launch_substeps(d.plan, d.tables(), frame, d.resident, d.stream);
+          launch_substeps(d.plan, d.tables(), frame, d.stream);
         }
       },
       d.anchors.hold_still(d.stream), d.motion_room, d.stream);
@@ -99,6 +102,55 @@ void finish_measure(CudaTissue& d) {
   }
   d.result.blew_up = d.result.blew_up || is_out_of_control(d.result.max_speed);
   if (searched) d.state.faces.fastest = fastest_block(d.state);
+}
+
+// Points of tissue on a GPU that are stretched: they tear, or the fragment network looks at them.
+// They are listed there; nodes come down where there are any, and what is said of them is said by
+// the host. Pieces that fly take their shape at the end of each frame: substeps run without the
+// host.
+
+std::vector<StretchedPoint> list_stretched(CudaTissue& d, float share) {
+  d.stretched_count.resize(1);
+  d.host_stretched_count.resize(1);
+  d.stretched.resize(std::max<std::size_t>(d.stretched.size(), 4096));
+  const auto look = [&] {
+    const int room = static_cast<int>(d.stretched.size());
+    launch_stretched(d.tables(), d.present(), d.plan.max_slots, share, d.stretched.data(), room,
+                     d.stretched_count.data(), d.stream);
+    d.stretched_count.download(d.host_stretched_count.data(), 1, d.stream);
+    check_cuda(cudaStreamSynchronize(d.stream), "look for tears");
+    return d.host_stretched_count[0] <= room;
+  };
+  if (!look()) {
+    d.stretched.resize(d.host_stretched_count[0]);
+    look();
+  }
+  std::vector<StretchedPoint> stretched(d.host_stretched_count[0]);
+  if (stretched.empty()) return stretched;
+  d.stretched.download(stretched.data(), stretched.size(), d.stream);
+  check_cuda(cudaStreamSynchronize(d.stream), "send data");
+  std::sort(stretched.begin(), stretched.end(),
+            [](const StretchedPoint& a, const StretchedPoint& b) { return a.point < b.point; });
+  return stretched;
+}
+
+bool CudaTissue::fly(double duration, Foresight& foresight, std::vector<StrainedPoint>& strained) {
+  CudaTissue& d = *this;
+  MpmState& s = d.state;
+  strained = strained_of(s, list_stretched(d, kRegionLevels[0]), kRegionLevels[0]);
+  const bool flights = may_fly(d.result, foresight);
+  if (!strained.empty() || !s.flights.empty() || flights) pull_nodes(d);
+  if (flights) pull_contacts(d);
+  std::vector<std::int32_t> moved = fly_frame(s, duration, d.result.substeps);
+  const std::vector<int> fly = let_fly(s, d.pieces, d.result, duration, foresight);
+  for (const FragmentFlight& f : s.flights) {
+    if (std::find(fly.begin(), fly.end(), f.piece) == fly.end()) continue;
+    moved.insert(moved.end(), f.nodes.begin(), f.nodes.end());
+  }
+  if (moved.empty()) return false;
+  push_some(d, moved);
+  search_anew(d);
+  return true;
 }
 
 }  // namespace tissue_sim

@@ -2,14 +2,21 @@
 #include <algorithm>
 #include <array>
 
-#include "mpm/cuda/cuda_device.h"
 #include "mpm/cuda/on_device.h"
-#include "mpm/point_fields.h"
+#include "mpm/split/front.h"
+#include "mpm/state_figures.h"
 
 namespace tissue_sim {
 namespace {
 
 constexpr int kGrain = 1024;  // nodes that a thread takes at once
+
+float4 packed(const Array<float>* of, std::size_t i, float fourth) {
+  return {of[0][i], of[1][i], of[2][i], fourth};
+}
+void unpack(const float4& from, Array<float>* to, std::size_t i) {
+  to[0][i] = from.x, to[1][i] = from.y, to[2][i] = from.z;
+}
 
 void pull_field(CudaTissue& d, const float4* from, Array<float>* to) {
   const std::size_t n = d.state.nodes.size();
@@ -18,15 +25,11 @@ void pull_field(CudaTissue& d, const float4* from, Array<float>* to) {
                              d.stream),
              "send data");
   check_cuda(cudaStreamSynchronize(d.stream), "finish a frame");
-  unpack_field(d.host_nodes.data(), n, *d.state.cpu, to);
+  d.state.cpu->for_each(
+      static_cast<int>(n), [&](int i) { unpack(d.host_nodes[i], to, i); }, 4 * kGrain);
 }
 
 }  // namespace
-
-void pull(CudaTissue& d) {
-  pull_nodes(d);
-  pull_contacts(d);
-}
 
 void pull_nodes(CudaTissue& d) {
   pull_field(d, d.present().u, d.state.nodes.u);
@@ -35,9 +38,16 @@ void pull_nodes(CudaTissue& d) {
 }
 
 void push_nodes(CudaTissue& d) {
-  const std::size_t n = d.state.nodes.size();
+  const Nodes& nodes = d.state.nodes;
+  const std::size_t n = nodes.size();
   d.host_nodes.resize(2 * n);
-  pack_nodes(d.state.nodes, *d.state.cpu, d.host_nodes.data(), d.host_nodes.data() + n);
+  d.state.cpu->for_each(
+      static_cast<int>(n),
+      [&](int i) {
+        d.host_nodes[i] = packed(nodes.u, i, nodes.mass[i]);
+        d.host_nodes[n + i] = packed(nodes.v, i, nodes.inv_mass[i]);
+      },
+      4 * kGrain);
   d.u[d.current].upload(d.host_nodes.data(), n, d.stream);
   d.v[d.current].upload(d.host_nodes.data() + n, n, d.stream);
   // What no block moves, the other state has, too.
@@ -81,7 +91,8 @@ std::vector<std::int32_t> nodes_around(const CudaTissue& d,
       }
     }
   }
-  for (int n = d.state.blocks.first_split_node; n < static_cast<int>(d.state.nodes.size()); ++n) {
+  for (int n = lattice_node_count(d.state.bodies); n < static_cast<int>(d.state.nodes.size());
+       ++n) {
     nodes.push_back(n);
   }
   return nodes;
@@ -100,15 +111,13 @@ const float4* gather(CudaTissue& d, const CudaNodes& from, const std::vector<std
 
 void pull_some(CudaTissue& d, const std::vector<std::int32_t>& nodes) {
   const std::size_t count = nodes.size();
-  const float4* packed = gather(d, d.present(), nodes);
+  const float4* const from = gather(d, d.present(), nodes);
   Nodes& n = d.state.nodes;
   d.state.cpu->for_each(
       static_cast<int>(count),
       [&](int i) {
-        const float4 &u = packed[i], &v = packed[count + i];
-        const std::int32_t k = nodes[i];
-        n.u[0][k] = u.x, n.u[1][k] = u.y, n.u[2][k] = u.z;
-        n.v[0][k] = v.x, n.v[1][k] = v.y, n.v[2][k] = v.z;
+        unpack(from[i], n.u, nodes[i]);
+        unpack(from[count + i], n.v, nodes[i]);
       },
       kGrain);
 }
@@ -127,8 +136,8 @@ void push_some(CudaTissue& d, const std::vector<std::int32_t>& nodes) {
       static_cast<int>(count),
       [&](int i) {
         const std::int32_t k = nodes[i];
-        d.host_nodes[i] = {n.u[0][k], n.u[1][k], n.u[2][k], n.mass[k]};
-        d.host_nodes[count + i] = {n.v[0][k], n.v[1][k], n.v[2][k], n.inv_mass[k]};
+        d.host_nodes[i] = packed(n.u, k, n.mass[k]);
+        d.host_nodes[count + i] = packed(n.v, k, n.inv_mass[k]);
       },
       kGrain);
   d.some_nodes.upload(nodes, d.stream);
@@ -138,17 +147,17 @@ void push_some(CudaTissue& d, const std::vector<std::int32_t>& nodes) {
   check_cuda(cudaStreamSynchronize(d.stream), "receive data");
 }
 
-void CudaMpmDevice::bring_nodes(const std::vector<std::int32_t>& points) {
-  tissue_->brought = nodes_around(*tissue_, points);
-  pull_some(*tissue_, tissue_->brought);
+void CudaTissue::bring_nodes(const std::vector<std::int32_t>& points) {
+  brought = nodes_around(*this, points);
+  pull_some(*this, brought);
 }
 
-void CudaMpmDevice::send_nodes() { push_some(*tissue_, tissue_->brought); }
+void CudaTissue::send_nodes() { push_some(*this, brought); }
 
-void CudaMpmDevice::bring_all_nodes() { pull_nodes(*tissue_); }
+void CudaTissue::bring_all_nodes() { pull_nodes(*this); }
 
-void CudaMpmDevice::place_boundary() {
-  CudaTissue& d = *tissue_;
+void CudaTissue::place_boundary() {
+  CudaTissue& d = *this;
   const BoundaryMesh& mesh = d.state.boundary;
   const std::size_t count = mesh.vertices.size();
   if (d.boundary_made != mesh.made) d.boundary.upload(mesh.vertices, d.stream);
@@ -163,6 +172,131 @@ void CudaMpmDevice::place_boundary() {
   tissue_sim::place_boundary(d.state, [now](int i) {
     return std::array<float, 3>{now[3 * i], now[3 * i + 1], now[3 * i + 2]};
   });
+}
+
+// The front of a cut of tissue that lives on a GPU: the host says which nodes are parted and which
+// cells see them, as on the CPU; how far they are apart lives with the nodes.
+
+namespace {
+
+/// CudaFront::tasks: first passes first, for these have most to do.
+std::vector<int4> list_tasks(const Front& front) {
+  constexpr int kEach = 4;  // stresses of a pass
+  std::vector<int4> tasks;
+  bool more = true;
+  for (int pass = 0; more; ++pass) {
+    more = false;
+    for (std::size_t i = 0; i < front.cells.size(); ++i) {
+      const FrontPart* parts = front.parts.data() + front.cells[i].first;
+      const auto beside = std::count_if(parts, parts + front.cells[i].count,
+                                        [](const FrontPart& p) { return p.step > 0; });
+      if (pass > beside / kEach) continue;
+      const FrontCell& cell = front.cells[i];
+      tasks.push_back({static_cast<int>(i), pass, cell.first, cell.count});
+      more = more || pass < beside / kEach;
+    }
+  }
+  for (std::size_t i = 0; i < front.cells.size(); ++i) {
+    const FrontCell& cell = front.cells[i];
+    if (cell.stabilised > 0) {
+      tasks.push_back({static_cast<int>(i), kStabilises, cell.first, cell.count});
+    }
+  }
+  return tasks;
+}
+
+}  // namespace
+
+void pull_front(CudaTissue& d) {
+  const auto first = static_cast<std::size_t>(d.front.first_node),
+             count = static_cast<std::size_t>(d.front.node_count);
+  if (count == 0) return;
+  d.host_nodes.resize(2 * count);
+  const auto bring = [&](const float4* from, float4* to) {
+    check_cuda(
+        cudaMemcpyAsync(to, from + first, count * sizeof(float4), cudaMemcpyDeviceToHost, d.stream),
+        "send data");
+  };
+  bring(d.present().u, d.host_nodes.data());
+  bring(d.present().v, d.host_nodes.data() + count);
+  check_cuda(cudaStreamSynchronize(d.stream), "send data");
+  Front& front = d.state.front;
+  for (std::size_t i = 0; i < count; ++i) {
+    unpack(d.host_nodes[i], front.d, i);
+    unpack(d.host_nodes[count + i], front.rate, i);
+  }
+}
+
+void push_front(CudaTissue& d) {
+  FrontOnDevice& to = d.front;
+  const Front& front = d.state.front;
+  const std::size_t first = d.state.nodes.size(), count = front.nodes.size();
+  to.first_node = static_cast<int>(first);
+  to.node_count = static_cast<int>(count);
+  to.marked = false;
+  d.host_nodes.resize(2 * count);
+  for (std::size_t i = 0; i < count; ++i) {
+    const float mass = front.nodes[i].mass;
+    d.host_nodes[i] = packed(front.d, i, mass);
+    d.host_nodes[count + i] = packed(front.rate, i, 1 / mass);
+  }
+  for (int i = 0; i < 2; ++i) {
+    const auto send = [&](DeviceArray<float4>& field, const float4* from) {
+      field.extend(first + count, d.stream);
+      if (count == 0) return;
+      check_cuda(cudaMemcpyAsync(field.data() + first, from, count * sizeof(float4),
+                                 cudaMemcpyHostToDevice, d.stream),
+                 "receive data");
+    };
+    send(d.u[i], d.host_nodes.data());
+    send(d.v[i], d.host_nodes.data() + count);
+  }
+  to.cells.upload(front.cells, d.stream);
+  to.parts.upload(front.parts, d.stream);
+  to.tasks.upload(list_tasks(front), d.stream);
+  to.energy.resize(front.cells.size() + count);
+  to.host_energy.resize(to.energy.size());
+  check_cuda(cudaStreamSynchronize(d.stream), "receive data");
+}
+
+NodePushes clear_pushes(CudaTissue& d) {
+  d.pushed.resize(3 * kPushStride * d.entries());
+  d.pushed.clear(d.stream);
+  if (has_front(d) && !d.front.marked) {
+    launch_mark_front(d.front.view(), d.marks.data(), d.marks.size(), d.stream);
+    launch_mark_slots(d.tables(), d.marks.data(), d.pushed_parts.data(), d.pushed_parts.size(),
+                      d.stream);
+    d.front.marked = true;
+  }
+  NodePushes pushes{d.pushed.data(), d.pushed.size() / 3};
+  if (d.outer.size() > 0) {
+    d.inertia.resize(3 * kInertiaStride * d.entries());
+    d.inertia.clear(d.stream);
+    pushes.inertia = d.inertia.data();
+    pushes.inertia_stride = d.inertia.size() / 3;
+  }
+  return pushes;
+}
+
+void pass_rim(CudaTissue& d, const BladePath& path, bool moves,
+              const std::vector<std::int32_t>& broken, std::vector<std::int32_t>& touched) {
+  std::vector<std::int32_t> points = broken;
+  for (const auto& [bond, passed] : d.state.front.rim) {
+    points.push_back(static_cast<std::int32_t>(bond / 3));
+  }
+  if (points.empty()) return;
+  const std::vector<std::int32_t> nodes = nodes_around(d, points);
+  const Array<float>*end = d.state.nodes.u, *begin = end;
+  if (moves) {
+    float4* u_before = d.u_before.data();
+    Array<float>* before = d.state.work.u_before;
+    for (int a = 0; a < 3; ++a) before[a].resize(d.state.nodes.size());
+    const float4* u = gather(d, {u_before, u_before}, nodes);
+    for (std::size_t i = 0; i < nodes.size(); ++i) unpack(u[i], before, nodes[i]);
+    begin = before;
+  }
+  pull_some(d, nodes);
+  tissue_sim::pass_rim(d.state, path, begin, end, broken, nullptr, touched);
 }
 
 }  // namespace tissue_sim

@@ -5,10 +5,9 @@
 
 #include "fragments/piece_colour.h"
 #include "frame/select_points.h"
-#include "mpm/cuda/cuda_device.h"
 #include "mpm/cuda/on_device.h"
 #include "mpm/lattice/bonds.h"
-#include "mpm/point_fields.h"
+#include "mpm/state_figures.h"
 
 namespace tissue_sim {
 
@@ -66,8 +65,8 @@ void write_points(CudaTissue& d, int stride, const std::vector<std::int32_t>& pl
 
 }  // namespace
 
-GpuPoints CudaMpmDevice::read_points_on_gpu(const PointSelection& selection) {
-  CudaTissue& d = *tissue_;
+GpuPoints CudaTissue::read_points_on_gpu(const PointSelection& selection) {
+  CudaTissue& d = *this;
   if (selection.fields != 0) {  // which the host makes
     std::vector<std::uint8_t> cloud;
     const int count = read_points(selection, cloud);
@@ -80,8 +79,8 @@ GpuPoints CudaMpmDevice::read_points_on_gpu(const PointSelection& selection) {
   return d.lent.lend(count, d.stream);
 }
 
-int CudaMpmDevice::read_points(const PointSelection& selection, std::vector<std::uint8_t>& cloud) {
-  CudaTissue& d = *tissue_;
+int CudaTissue::read_points(const PointSelection& selection, std::vector<std::uint8_t>& cloud) {
+  CudaTissue& d = *this;
   std::vector<std::int32_t> place;
   const int count = choose_points(d, selection, place);
   if (count == 0) {

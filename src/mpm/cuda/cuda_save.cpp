@@ -5,7 +5,6 @@
 #include <stdexcept>
 #include <utility>
 
-#include "mpm/cuda/cuda_device.h"
 #include "mpm/cuda/on_device.h"
 #include "mpm/mpm_fields.h"
 
@@ -51,7 +50,7 @@ std::vector<HeldPoint> bring_held(const DeviceArray<std::uint8_t>& with,
 template <class Archive>
 void device_fields(Archive& archive, CudaTissue& d, StateOnHost& of_device) {
   FaceContacts& faces = d.state.faces;
-  archive.part("facets", faces.version, faces.first_facet, faces.block_of);
+  archive.part("facets", faces.version);
   archive.part("kept contacts", faces.kept, faces.until_search, faces.fastest);
   archive.part("shape", d.shape, d.cut_shape);
   each_part(archive, of_device);
@@ -61,16 +60,10 @@ void device_fields(Archive& archive, CudaTissue& d, StateOnHost& of_device) {
 
 void bring_faces(const CudaTissue& d, FacesOnHost& to) {
   const FacesOnDevice& f = d.faces;
-  to.version = f.version;
+  static_cast<FacesState&>(to) = f;
   to.is_current = f.version == d.state.faces.version;
-  to.pieces_changed = f.pieces_changed;
-  to.lists_hold = f.lists_hold;
-  to.searched = f.searched;
-  to.may_meet = f.may_meet;
   to.has_sites = f.point_at.size() > 0;
   to.has_figures = f.figures.size() > 0;
-  to.contacts_count = f.contacts_count;
-  to.involved_count = f.involved_count;
   to.spring_room = f.springs.size();
   to.near_room = f.near.size();
   if (to.has_figures) to.figures = bring(f.figures, 1, d.stream)[0];
@@ -103,13 +96,7 @@ void bring_faces(const CudaTissue& d, FacesOnHost& to) {
 void send_faces(CudaTissue& d, const FacesOnHost& from) {
   FacesOnDevice& f = d.faces;
   if (from.has_sites) upload_sites(d);
-  f.version = from.version;
-  f.pieces_changed = from.pieces_changed;
-  f.lists_hold = from.lists_hold;
-  f.searched = from.searched;
-  f.may_meet = from.may_meet;
-  f.contacts_count = from.contacts_count;
-  f.involved_count = from.involved_count;
+  static_cast<FacesState&>(f) = from;
   f.springs.resize(from.spring_room);
   f.springs.clear(d.stream);  // padding included: they are copied 16 bytes at a time
   f.near.resize(from.near_room);
@@ -160,8 +147,8 @@ void send_faces(CudaTissue& d, const FacesOnHost& from) {
   check_cuda(cudaStreamSynchronize(d.stream), "receive a state");
 }
 
-void CudaMpmDevice::save(ArchiveWriter& archive) {
-  CudaTissue& d = *tissue_;
+void CudaTissue::save(ArchiveWriter& archive) {
+  CudaTissue& d = *this;
   StateOnHost of_device;
   of_device.held = bring_held(d.with, d.hold, d.stream);
   of_device.marks = bring(d.marks, d.marks.size(), d.stream);
@@ -169,23 +156,21 @@ void CudaMpmDevice::save(ArchiveWriter& archive) {
   device_fields(archive, d, of_device);
 }
 
-void CudaMpmDevice::restore(ArchiveReader& archive) {
-  to_restore_ = std::make_unique<StateOnHost>();
-  device_fields(archive, *tissue_, *to_restore_);
+void CudaTissue::restore(ArchiveReader& archive) {
+  to_restore = std::make_unique<StateOnHost>();
+  device_fields(archive, *this, *to_restore);
 }
 
-void CudaMpmDevice::restored() {
-  CudaTissue& d = *tissue_;
-  check_tissue(d.state);
-  const std::unique_ptr<StateOnHost> from = std::move(to_restore_);
+void CudaTissue::restored() {
+  CudaTissue& d = *this;
+  complete_tissue(d.state);
+  const std::unique_ptr<StateOnHost> from = std::move(to_restore);
   FaceContacts& faces = d.state.faces;
+  number_facets(faces, d.state.blocks);
   faces.motion.assign(faces.block_of.size(), {});
   faces.listed.clear();
   faces.all.clear();
   faces.forget_active();
-  index_flights(d.state);
-  list_front_cells(d.state);
-  mark_row_nodes(d.state.nodes.size(), d.state.anchors);
   push(d);
   std::vector<std::uint8_t> with(d.with.size(), 0);
   std::vector<float4> hold(d.hold.size(), float4{0, 0, 0, 0});

@@ -2,7 +2,7 @@
 #include <algorithm>
 
 #include "mpm/cuda/on_device.h"
-#include "mpm/cuda/outer_points.h"
+#include "mpm/cuda/parts_on_device.h"
 
 namespace tissue_sim {
 namespace {
@@ -22,7 +22,8 @@ std::size_t bytes_of(const HostTables& t, std::size_t nodes, std::size_t points,
 }
 
 /// Says how much memory the tissue takes, where the GPU has less.
-void check_memory(std::size_t wanted, std::size_t held) {
+void check_memory(std::size_t wanted) {
+  const std::size_t held = device_bytes_held;
   if (wanted <= held) return;
   std::size_t free = 0, total = 0;
   check_cuda(cudaMemGetInfo(&free, &total), "be asked");
@@ -32,27 +33,6 @@ void check_memory(std::size_t wanted, std::size_t held) {
                     ", " + megabytes(free + held) + " of " + megabytes(total) +
                     " are free; raise cell_size or set device to cpu");
 }
-
-}  // namespace
-
-std::size_t device_bytes(const CudaTissue& d) {
-  std::size_t sum = d.blocks.bytes() + d.bundles.bytes() + d.columns.bytes() +
-                    d.near_cells.bytes() + d.near_listed.bytes() + d.u_went.bytes() +
-                    d.bodies.bytes() + d.of_blocks.bytes() + d.made.bytes() + d.spare.bytes() +
-                    d.origins.bytes() + d.sweep.bytes() + d.labels.bytes() + d.some_nodes.bytes() +
-                    d.packed.bytes() + d.piece.bytes() + d.place.bytes() + d.slot_parts.bytes() +
-                    d.first_parts.bytes() + d.parts.bytes() + d.pushed_parts.bytes() +
-                    d.marks.bytes() + d.pushed.bytes() + d.inertia.bytes() + d.colour.bytes() +
-                    d.hold.bytes() + d.outer.bytes() + d.area.bytes() + d.planes.bytes() +
-                    d.bonds.bytes() + d.soft.bytes() + d.with.bytes() + d.whole.bytes() +
-                    d.u_before.bytes() + d.connect_room.bytes() + d.colliders.bytes() +
-                    d.loads.bytes() + d.measures.bytes() + d.cloud.bytes() + d.stretched.bytes() +
-                    d.faces.bytes() + d.front.bytes() + d.checkpoint.bytes() + d.anchors.bytes();
-  for (int i = 0; i < 2; ++i) sum += d.u[i].bytes() + d.v[i].bytes() + d.force[i].bytes();
-  return sum;
-}
-
-namespace {
 
 /// How the blocks are worked on, and the tables for it.
 void plan_tables(CudaTissue& d) {
@@ -75,26 +55,25 @@ void plan_tables(CudaTissue& d) {
     }
   }
   const auto choose = [&d](std::size_t count) {
-    d.resident = resident_blocks(d.plan, static_cast<int>(count));
-    d.push_plan = d.plan;
-    d.push_plan.pushes = true;
-    d.push_resident = resident_blocks(d.push_plan, static_cast<int>(count));
-    d.touch_plan = d.push_plan;
-    d.touch_plan.touches = true;
-    d.touch_resident = resident_blocks(d.touch_plan, static_cast<int>(count));
-    d.front_plan = d.touch_plan;
-    d.front_plan.fronts = true;
-    d.front_resident = resident_blocks(d.front_plan, static_cast<int>(count));
+    for (int way = 0; way < CudaTissue::kWays; ++way) {
+      CudaPlan& plan = d.plans[way];
+      if (way > 0) plan = d.plans[way - 1];
+      plan.pushes = way >= CudaTissue::kWithTools;
+      plan.touches = way >= CudaTissue::kWithTissue;
+      plan.fronts = way >= CudaTissue::kWithFronts;
+      plan.resident = resident_blocks(plan, static_cast<int>(count));
+    }
   };
   choose(blocks.size());
   std::vector<std::vector<int>> bundles;
-  if (!(d.plan.cached && d.push_plan.cached)) {
+  CudaPlan& push_plan = d.plans[CudaTissue::kWithTools];
+  if (!(d.plan.cached && push_plan.cached)) {
     const auto at_once = static_cast<std::size_t>(
-        std::max(1, std::min(most_at_once(d.plan), most_at_once(d.push_plan))));
+        std::max(1, std::min(most_at_once(d.plan), most_at_once(push_plan))));
     if (blocks.size() > at_once) {
-      d.push_plan.max_plane_slots = most_plane_slots(d.plan.max_plane_slots);
-      const BundleSize limits = {d.shape.columns(), d.push_plan.max_plane_slots,
-                                 most_slots(d.push_plan)};
+      push_plan.max_plane_slots = most_plane_slots(d.plan.max_plane_slots);
+      const BundleSize limits = {d.shape.columns(), push_plan.max_plane_slots,
+                                 most_slots(push_plan)};
       bundles = bundle_in_rounds(blocks_to_bundle(blocks), at_once,
                                  d.plan.small ? at_once : blocks.size(), limits);
     }
@@ -118,7 +97,8 @@ void plan_tables(CudaTissue& d) {
   make_face_rows(d.state, t, t.max_plane_slots, d.anchors.made);
   d.plan.max_held = d.anchors.made.most_held;
   choose(t.bundles.size());
-  if (d.resident == 0 || d.push_resident == 0 || d.touch_resident == 0 || d.front_resident == 0) {
+  if (std::any_of(d.plans, d.plans + CudaTissue::kWays,
+                  [](const CudaPlan& plan) { return plan.resident == 0; })) {
     throw std::runtime_error("the GPU has too little shared memory");
   }
 }
@@ -169,7 +149,7 @@ void push_tables(CudaTissue& d) {
   const std::size_t most_held = CudaTissue::Checkpoint::most_held(held);
   const std::size_t of_places =
       held > 0 ? points * (sizeof(float) + sizeof(float4) * (d.place_parts > 1 ? 2 : 1)) : 0;
-  check_memory(bytes_of(t, n, points, held, most_held, of_places), device_bytes(d));
+  check_memory(bytes_of(t, n, points, held, most_held, of_places));
   check_cuda(cudaStreamSynchronize(d.stream), "finish a frame");
   d.blocks.upload(t.blocks, d.stream);
   d.bundles.upload(t.bundles, d.stream);

@@ -7,6 +7,7 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "compute/host_device.h"
 #include "mpm/contact/face_search.h"
 #include "mpm/contact/face_spring.h"
 #include "mpm/surface/facet_in_world.h"
@@ -59,6 +60,9 @@ struct CudaFaceFigures {
   int in_grid;               ///< facets there
   int near;                  ///< places wanted in CudaLooks::near
   int contacts, involved;    ///< facets with any in their list; these, and those in lists
+  TISSUE_SIM_FIELDS(box, mean_moved, mean_velocity, horizon, until_look, since_look, dt, fastest,
+                    largest_reach, meeting, fastest_pair, next_pair, listed_anew, in_grid, near,
+                    contacts, involved)
 };
 
 /// Where a contact gets its displacements from and gives its force to.
@@ -66,6 +70,7 @@ struct CudaContactNodes {
   std::int32_t own[27];    ///< nodes of the facet's cell, x fastest
   std::int32_t other[27];  ///< nodes of the cell of the place held
   float weight[27];        ///< of `own`, at the facet's centre
+  TISSUE_SIM_FIELDS(own, other, weight)
 };
 
 /// What the search and the looks work on. A contact has the number of its facet.

@@ -3,10 +3,10 @@
 #include "compute/cuda_check.h"
 #include "material/laws.h"
 #include "mpm/cuda/block_nodes.h"
-#include "mpm/cuda/cell_stabilisation.h"
 #include "mpm/cuda/frame_ends.h"
 #include "mpm/cuda/half_cell.h"
 #include "mpm/cuda/measure_sums.h"
+#include "mpm/cuda/node_plane.h"
 #include "mpm/lattice/bonds.h"
 
 namespace tissue_sim {

@@ -4,7 +4,7 @@
 
 #include <cuda_runtime_api.h>
 
-#include "mpm/blocks/stretched_point.h"
+#include "mpm/blocks/update_node.h"
 #include "mpm/cuda/tables.h"
 #include "tissue_sim/point.h"
 
@@ -42,5 +42,12 @@ struct AnchoredPoint {
   float x[3];
 };
 void launch_anchored(const AnchoredPoint* held, int count, Point* cloud, cudaStream_t stream);
+
+/// Energies of the cells, then of the motion of parted nodes [J].
+void launch_front_energy(const CudaFront& front, const CudaNodes& state, double* energy,
+                         cudaStream_t stream);
+/// Marks the nodes that its cells push: kMarkedByFront in `marks`, one for each node.
+void launch_mark_front(const CudaFront& front, std::uint8_t* marks, std::size_t node_count,
+                       cudaStream_t stream);
 
 }  // namespace tissue_sim

@@ -1,5 +1,5 @@
 #include "compute/for_each_cuda.h"
-#include "mpm/cuda/front_cells.h"
+#include "mpm/cuda/frame_ends.h"
 #include "mpm/cuda/front_warp.h"
 
 namespace tissue_sim {

@@ -28,9 +28,6 @@ class PieceLabels {
   /// HPDC 2018). Returns the runs of points whose label changed, in order. Waits for the GPU.
   std::vector<PartedRun> update(const std::vector<SiteRows>& bodies, const std::uint8_t* bonds,
                                 cudaStream_t stream);
-  std::size_t bytes() const {
-    return lowest_.bytes() + next_.bytes() + begins_.bytes() + ends_.bytes();
-  }
 
  private:
   DeviceArray<std::int32_t> lowest_, next_;

@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <utility>
 
 #include "mpm/anchors/anchor_faces.h"
 #include "mpm/cuda/make_tables.h"
@@ -257,23 +258,11 @@ class FillChunks {
 
 }  // namespace
 
-void HostFaceRows::clear() {
-  chunks.clear();
-  first_carried.clear();
-  held.clear();
-  first_held.clear();
-  entries.clear();
-  shares.clear();
-  rows.clear();
-  carried.clear();
-  most_held = 0;
-  is_new = carries_always = false;
-  room_each = 0;
-}
-
 void make_face_rows(const MpmState& state, const HostTables& t, int plane_slots, HostFaceRows& to) {
   const AnchorFaces& faces = state.anchors;
-  to.clear();
+  HeldNodes before = std::move(to.nodes);
+  to = HostFaceRows();
+  to.nodes = std::move(before);
   to.is_new = true;
   if (faces.groups.empty() && faces.held.empty()) return;
   number_nodes(faces, state.nodes.size(), to.nodes);

@@ -238,20 +238,4 @@ void make_tables(const MpmState& state, const std::vector<std::vector<int>>& bun
   for (CudaBundle& bundle : t.bundles) bundle.rank = bundle.partial != 0 && !most ? -1 : rank++;
 }
 
-void pack_nodes(const Nodes& n, Cpu& cpu, float4* u, float4* v) {
-  cpu.for_each(
-      static_cast<int>(n.size()),
-      [&](int i) {
-        u[i] = {n.u[0][i], n.u[1][i], n.u[2][i], n.mass[i]};
-        v[i] = {n.v[0][i], n.v[1][i], n.v[2][i], n.inv_mass[i]};
-      },
-      4096);
-}
-
-void unpack_field(const float4* from, std::size_t count, Cpu& cpu, Array<float>* to) {
-  cpu.for_each(
-      static_cast<int>(count),
-      [&](int i) { to[0][i] = from[i].x, to[1][i] = from[i].y, to[2][i] = from[i].z; }, 4096);
-}
-
 }  // namespace tissue_sim

@@ -33,11 +33,6 @@ struct HostTables {
 void make_tables(const MpmState& state, const std::vector<std::vector<int>>& bundles,
                  HostTables& tables);
 
-/// The nodes as the GPU has them: u and mass, v and inverse mass.
-void pack_nodes(const Nodes& nodes, Cpu& cpu, float4* u, float4* v);
-/// The components of `count` vectors.
-void unpack_field(const float4* from, std::size_t count, Cpu& cpu, Array<float>* to);
-
 // The tables of CudaHeldFaces, from AnchorFaces and the blocks: make_face_rows.cpp.
 
 /// Nodes that rows have or an anchor carries, numbered as they follow one another.
@@ -47,10 +42,9 @@ struct HeldNodes {
   std::vector<std::int32_t> carried;  ///< of each, its place in AnchorFaces::held; -1
 };
 
-/// Kept from one time to the next: its memory is.
 struct HostFaceRows {
   bool is_new = false;  ///< made with the tables of blocks, to go up after them
-  HeldNodes nodes;
+  HeldNodes nodes;      ///< whose memory is kept from one time to the next
   std::vector<CudaFaceChunk> chunks;
   std::vector<int> first_carried;
   std::vector<CudaHeldNode> held;  ///< in their `parts.x` a slot or kNoSlot, for launch_connect()
@@ -62,8 +56,6 @@ struct HostFaceRows {
   std::vector<CudaCarriedNode> carried;
   bool carries_always = false;  ///< see CudaHeldFaces
   std::size_t room_each = 0;    ///< of a bundle, for chunks that are large [floats]
-
-  void clear();
 };
 
 /// Makes `to` for the bundles of `tables`. A chunk comes to where columns give to a plane of so

@@ -3,6 +3,7 @@
 
 #include <cuda_runtime_api.h>
 
+#include "compute/host_device.h"
 #include "mpm/cuda/tables.h"
 
 namespace tissue_sim {
@@ -57,6 +58,7 @@ struct HeldPoint {
   std::int32_t entry;
   std::uint8_t with;
   float hold[4];
+  TISSUE_SIM_FIELDS(entry, with, hold)
 };
 
 /// Lists the entries of `with` that are not 0, in any order; `count`, one number, becomes how many

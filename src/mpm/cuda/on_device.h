@@ -10,18 +10,14 @@
 #include "compute/cuda_event.h"
 #include "compute/device_array.h"
 #include "compute/lent_points.h"
-#include "mpm/cuda/anchors_on_device.h"
 #include "mpm/cuda/block_tables.h"
 #include "mpm/cuda/choose_plan.h"
 #include "mpm/cuda/cuda_linearised_motion.h"
-#include "mpm/cuda/faces_on_device.h"
 #include "mpm/cuda/frame_ends.h"
-#include "mpm/cuda/front_cells.h"
 #include "mpm/cuda/label_pieces.h"
 #include "mpm/cuda/make_tables.h"
 #include "mpm/cuda/near_cells.h"
-#include "mpm/cuda/outer_points.h"
-#include "mpm/cuda/state_on_host.h"
+#include "mpm/cuda/parts_on_device.h"
 #include "mpm/cuda/sweep_blade.h"
 #include "mpm/device.h"
 
@@ -36,19 +32,48 @@ struct SweepOnDevice {
   DeviceArray<int> count;
   PinnedArray<int> host_count;
   DeviceArray<CudaPointChange> changes;
-
-  std::size_t bytes() const {
-    return edges.bytes() + cells.bytes() + broken.bytes() + changes.bytes();
-  }
 };
 
 /// Nodes and contacts live here; lattice, bonds, blocks and pieces on the host too (`run`), where
 /// nodes around a cut are taken apart between frames.
-struct CudaTissue {
-  explicit CudaTissue(MpmRun& of)
-      : run(of), state(of.state), pieces(of.pieces), result(of.result) {}
+struct CudaTissue final : MpmDevice {
+  /// Throws std::runtime_error where there is no GPU, or not enough memory on it.
+  CudaTissue(const Scene& scene, MpmRun& of);
+  ~CudaTissue() override;
   CudaTissue(const CudaTissue&) = delete;
   CudaTissue& operator=(const CudaTissue&) = delete;
+
+  std::string name() const override;
+  NodeRange node_range() const override { return NodeRange::kBox; }
+  void begin() override;
+  void begun() override;
+  unsigned measure(unsigned what) override;
+  double measure_limit(const std::vector<std::uint8_t>& blocks, int steps) override;
+  void begin_frame(const FrameInput& input, bool move) override;
+  void begin_rest() override;
+  void save_motion() override;
+  int run_part(const FramePart& part) override;
+  unsigned measure_part(unsigned what) override;
+  bool missed_contact() override { return has_missed; }
+  bool can_restore_motion() const override;
+  void restore_motion(bool missed) override;
+  void end_frame() override;
+  void sweep(const std::vector<BladePath>& paths, bool moves, std::vector<std::int32_t>& changed,
+             std::vector<std::int32_t>& touched, CutReport& report) override;
+  void before_parting(const std::vector<std::int32_t>& points) override;
+  void parted(const std::vector<std::int32_t>& points, const Apart& apart) override;
+  std::vector<int> label_pieces() override;
+  bool labels_by_bonds_alone() const override { return false; }
+  void bring_nodes(const std::vector<std::int32_t>& points) override;
+  void send_nodes() override;
+  void bring_all_nodes() override;
+  void place_boundary() override;
+  bool fly(double duration, Foresight& foresight, std::vector<StrainedPoint>& strained) override;
+  int read_points(const PointSelection& selection, std::vector<std::uint8_t>& cloud) override;
+  GpuPoints read_points_on_gpu(const PointSelection& selection) override;
+  void save(ArchiveWriter& archive) override;
+  void restore(ArchiveReader& archive) override;
+  void restored() override;
 
   MpmRun& run;
   MpmState& state;
@@ -61,10 +86,10 @@ struct CudaTissue {
   int nodes_before = 0;               ///< that there were before_parting()
   CudaLimits limits;
   CudaShape shape, cut_shape;  ///< now, and once bonds broke
-  /// Without contact, with tools, with contact of tissue too, with fronts too.
-  CudaPlan plan, push_plan, touch_plan, front_plan;
-  /// Thread blocks that run at once.
-  int resident = 0, push_resident = 0, touch_resident = 0, front_resident = 0;
+  /// Which contact kernels know, each besides that of all before it.
+  enum Way { kAlone, kWithTools, kWithTissue, kWithFronts, kWays };
+  CudaPlan plans[kWays];
+  CudaPlan& plan = plans[kAlone];
   bool may_meet = true;  ///< whether any block may meet a collider in this frame
   int current = 0;       ///< which of the two states is the present one
   cudaStream_t stream = nullptr;
@@ -75,7 +100,7 @@ struct CudaTissue {
   DeviceArray<CudaBundle> bundles;
   DeviceArray<CudaColumn> columns;
   DeviceArray<CudaNearCell> near_cells;
-  DeviceArray<int> near_count, missed;
+  DeviceArray<int> near_count, any_missed;
   DeviceArray<std::uint32_t> near_listed;   ///< CudaNearCells::listed
   DeviceArray<std::uint8_t> marks;          ///< per node: what may push it
   DeviceArray<std::uint32_t> pushed_parts;  ///< CudaTables::slot_parts with kPushed
@@ -113,7 +138,7 @@ struct CudaTissue {
   FacesOnDevice faces;
   FrontOnDevice front;
   AnchorsOnDevice anchors;
-  SweepOnDevice sweep;
+  SweepOnDevice blade;
   PieceLabels labels;
   CudaMotionRoom motion_room;
   /// What a part of a frame changes until something is cut or tears, as it was before the part.
@@ -142,10 +167,6 @@ struct CudaTissue {
       held_count.resize(1);
       host_held_count.resize(1);
     }
-    std::size_t bytes() const {
-      return u.bytes() + v.bytes() + held.bytes() + springs.bytes() + figures.bytes() +
-             impulse.bytes();
-    }
   } checkpoint;
   PinnedArray<Collider> host_colliders;
   PinnedArray<CudaBox> host_reach;
@@ -159,10 +180,8 @@ struct CudaTissue {
   DeviceArray<float> boundary_places;
   PinnedArray<float> host_boundary;
   bool points_changed = true;  ///< pieces must be uploaded
-
-  ~CudaTissue() {
-    if (stream != nullptr) cudaStreamDestroy(stream);
-  }
+  bool has_missed = false;     ///< missed_contact()
+  std::unique_ptr<StateOnHost> to_restore;
   CudaTables tables() const {
     CudaTables t;
     t.blocks = blocks.data();
@@ -213,11 +232,8 @@ void make_room_for_cuts(CudaTissue& tissue);     ///< makes blocks anew that are
 void push_tables(CudaTissue& tissue);            ///< of blocks that are new; those that stay move
                                                  ///< on the GPU
 void push(CudaTissue& tissue);                   ///< everything but contacts
-std::size_t device_bytes(const CudaTissue& tissue);  ///< memory that it takes
-std::string plan(const CudaTissue& tissue);          ///< shape of the blocks, threads
 
 // Nodes.
-void pull(CudaTissue& tissue);  ///< and contacts
 void pull_nodes(CudaTissue& tissue);
 void push_nodes(CudaTissue& tissue);
 /// The nodes that a cut of these points may change, or looks at.
@@ -234,10 +250,14 @@ void pull_front(
     CudaTissue& tissue);  ///< how far parted nodes are apart; the host has the same ones
 void push_front(CudaTissue& tissue);  ///< that the host has, behind the nodes, which are all there
 inline bool has_front(const CudaTissue& tissue) { return tissue.front.node_count > 0; }
-/// Whether places may have to be taken apart in this frame, which the kernels of fronts alone do,
-/// for the others to keep their registers.
-inline bool meets_thin_tools(const CudaTissue& tissue) {
-  return tissue.may_meet && tissue.place_parts > 1;
+/// The kernels for a launch in which tissue touches tissue, or does not. Those of fronts alone take
+/// places apart for thin tools, for the others to keep their registers.
+inline CudaTissue::Way way_of(const CudaTissue& tissue, bool touches) {
+  if (has_front(tissue) || (tissue.may_meet && tissue.place_parts > 1)) {
+    return CudaTissue::kWithFronts;
+  }
+  if (touches) return CudaTissue::kWithTissue;
+  return tissue.may_meet ? CudaTissue::kWithTools : CudaTissue::kAlone;
 }
 NodePushes clear_pushes(CudaTissue& tissue);  ///< for a launch that pushes; slots know which nodes
                                               ///< a front does
@@ -286,8 +306,6 @@ void finish_search(CudaTissue& tissue, float dt);
 void search_anew(CudaTissue& tissue);                  ///< before the next substep
 const CudaFaces* faces_of_launch(CudaTissue& tissue);  ///< null where there are no contacts
 void pull_contacts(CudaTissue& tissue);
-/// Of each facet, those that it may touch, as of the last search.
-std::vector<std::vector<std::int32_t>> near_facets(const CudaTissue& tissue);
 void bring_faces(const CudaTissue& tissue, FacesOnHost& to);
 void send_faces(CudaTissue& tissue, const FacesOnHost& from);
 
@@ -298,7 +316,6 @@ void run_substeps(CudaTissue& tissue, int begin, int end);
 void launch(CudaTissue& tissue, int begin, int end, float dt);
 void launch_measure(CudaTissue& tissue);
 void finish_measure(CudaTissue& tissue);
-double measure_limit(CudaTissue& tissue, int steps);  ///< see MeasureLimit; of all blocks
 /// Points whose strain is at least `share` of what their body's weakest material bears.
 std::vector<StretchedPoint> list_stretched(CudaTissue& tissue, float share);
 

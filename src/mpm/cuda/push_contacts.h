@@ -9,7 +9,7 @@
 
 #include "mpm/cuda/added_mass.h"
 #include "mpm/cuda/contact_lanes.h"
-#include "mpm/cuda/warp_turns.h"
+#include "mpm/cuda/grid_barrier.h"
 
 namespace tissue_sim {
 

@@ -123,14 +123,14 @@ int most_slots(const CudaPlan& plan) {
 }
 
 void launch_substeps(const CudaPlan& plan, const CudaTables& tables, const CudaFrame& frame,
-                     int resident, cudaStream_t stream) {
+                     cudaStream_t stream) {
   CudaTables t = tables;
   CudaFrame f = frame;
   CudaLayout layout = layout_of(plan);
   void* arguments[] = {&t, &f, &layout};
   check_cuda(cudaMemsetAsync(f.arrived, 0, kArrivedWords * sizeof(unsigned), stream),
              "clear memory");
-  const int blocks = std::min(resident, t.bundle_count + (plan.pushes ? kMostHelpers : 0));
+  const int blocks = std::min(plan.resident, t.bundle_count + (plan.pushes ? kMostHelpers : 0));
   check_cuda(cudaLaunchCooperativeKernel(kernel(plan), dim3(blocks), dim3(plan.threads), arguments,
                                          shared_bytes(plan), stream),
              "start the substeps");

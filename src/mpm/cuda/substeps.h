@@ -34,6 +34,7 @@ struct CudaPlan {
   bool touches = false;      ///< ... of tissue with tissue too
   bool fronts = false;       ///< ... and fronts of cuts: contacts may be none then
   bool neo_hookean = false, fixed_corotated = false, viscous = false;  ///< what there is
+  int resident = 0;  ///< thread blocks that run at once: resident_blocks()
 };
 
 /// How a thread block's shared memory is laid out.
@@ -63,6 +64,6 @@ int most_slots(const CudaPlan& plan);
 /// Enqueues substeps as one kernel, with contact if the plan has it. The state is then in
 /// `state[(current + substeps) % 2]`.
 void launch_substeps(const CudaPlan& plan, const CudaTables& tables, const CudaFrame& frame,
-                     int resident, cudaStream_t stream);
+                     cudaStream_t stream);
 
 }  // namespace tissue_sim

@@ -37,6 +37,7 @@ inline void break_bond(int k, std::uint8_t& of_point, std::uint8_t& of_other) {
 struct Crossing {
   float place;      ///< along the bond, 0 at its lower-numbered point to 1
   float normal[3];  ///< of the cut in reference space, unit, to either side
+  TISSUE_SIM_FIELDS(place, normal)
 };
 
 /// A bond that an edge passed, from its lower-numbered point along an axis (0 x, 1 y, 2 z), and

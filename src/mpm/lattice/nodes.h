@@ -4,6 +4,7 @@
 #include <cstddef>
 
 #include "compute/array.h"
+#include "compute/host_device.h"
 
 namespace tissue_sim {
 
@@ -11,12 +12,14 @@ namespace tissue_sim {
 struct NodeMotion {
   Array<float> u[3];  ///< displacement from the reference place [m]
   Array<float> v[3];  ///< velocity [m/s]
+  TISSUE_SIM_FIELDS(u, v)
 };
 
 /// What a cut changes.
 struct NodeMasses {
   Array<float> mass;      ///< [kg], 0 where no point reaches
   Array<float> inv_mass;  ///< [1/kg], 0 where no point reaches and where the node is anchored
+  TISSUE_SIM_FIELDS(mass, inv_mass)
 };
 
 /// The grid nodes of all bodies, each body's lattice with one ring of nodes around its cells (x

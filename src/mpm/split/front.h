@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "compute/array.h"
+#include "compute/host_device.h"
 #include "mpm/lattice/lattice_body.h"
 #include "mpm/split/front_cell.h"
 #include "mpm/split/node_box.h"
@@ -27,6 +28,7 @@ struct FrontNode {
   float mass;                  ///< of d: first other m [kg]
   float lambda_over_mu;        ///< of its points
   Planes all, first_side;      ///< its points, and those of one side
+  TISSUE_SIM_FIELDS(node, body, x, y, z, share, first, other, mass, lambda_over_mu, all, first_side)
 };
 
 /// What a cut changes of the front.
@@ -41,6 +43,7 @@ struct FrontNodes {
 struct FrontMotion {
   Array<float> d[3],
       rate[3];  ///< of its nodes: how far apart the two sides are [m], how fast [m/s]
+  TISSUE_SIM_FIELDS(d, rate)
 };
 
 struct Front : FrontNodes, FrontMotion {

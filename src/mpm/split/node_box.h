@@ -48,9 +48,6 @@ class BondWindows {
   Planes bridge_ends(int body, int x, int y, int z) const;
 
  private:
-  template <class Archive>
-  friend void fields(Archive& archive, BondWindows& x);  // mpm/mpm_fields.h
-
   /// The bonds within a box.
   struct BoxBonds {
     Planes there, x, y, z;  ///< points; their bonds to the next place

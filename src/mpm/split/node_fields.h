@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "compute/for_each.h"
+#include "compute/host_device.h"
 #include "mpm/lattice/lattice_body.h"
 #include "mpm/lattice/nodes.h"
 #include "mpm/split/node_box.h"
@@ -36,6 +37,7 @@ class NodeFields {
     struct Field {
       Planes points;  ///< around the node: a component
       std::int32_t node;
+      TISSUE_SIM_FIELDS(points, node)
     };
     std::vector<Field> fields;
 
@@ -47,6 +49,7 @@ class NodeFields {
     }
     /// The node that `point` sees, of the node of cell (x, y, z).
     int seen_by(const Points::Site& point, int x, int y, int z) const;
+    TISSUE_SIM_FIELDS(fields)
   };
   /// How a lattice node is split, null where it is not.
   const Split* split(int lattice_node) const {
@@ -55,6 +58,10 @@ class NodeFields {
   }
   const BondWindows& bonds() const { return bonds_; }
   std::size_t split_count() const { return splits_.size(); }
+  /// After bonds and fields were read from a saved state.
+  void follow(const std::vector<LatticeBody>& bodies, const Points& points) {
+    bonds_ = BondWindows(bodies, points);
+  }
 
   /// Takes the nodes apart that the points `changed` (whose bonds broke) belong to; adds nodes with
   /// their parents' motion. Returns the cells whose node changed.

@@ -19,8 +19,6 @@ void lay_out(Block& block) {
   for (const Block::Run& run : block.runs) {
     for (int i = 0; i < run.count; ++i) block.cell[run.lane + i] = run.y * block.pitch + run.x + i;
   }
-  block.volume.assign(block.lane_count(), 0.0f);
-  block.point.assign(block.lane_count(), -1);
 }
 
 void find_filled(Block& block) {

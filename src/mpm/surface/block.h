@@ -10,9 +10,10 @@
 #include <vector>
 
 #include "compute/array.h"
+#include "compute/host_device.h"
 #include "frame/stability_limit.h"
 #include "mpm/lattice/lattice_body.h"
-#include "mpm/surface/facets.h"
+#include "mpm/surface/facet_in_world.h"
 #include "tissue_sim/material.h"
 
 namespace tissue_sim {
@@ -71,6 +72,7 @@ struct Block {
     Array<float> viscosity;  ///< [nz][stride]: of a cell's points, times their volumes, summed,
                              ///< times the share of the cell that they fill [J s]; empty where
                              ///< none is viscous
+    TISSUE_SIM_FIELDS(law, mu, lambda, neo_hookean, viscosity)
   } mixture;
 
   Array<float> volume;        ///< [nz][8][stride]: elastic_volume(), 0 where there is no point
@@ -81,6 +83,7 @@ struct Block {
     int lane;  ///< z * stride + its lane
     int node;  ///< its lowest, in the block's nodes
     float mu;  ///< of its points, times their volumes, summed [J]
+    TISSUE_SIM_FIELDS(lane, node, mu)
   };
   std::vector<PartialCell> partial;
 
@@ -114,7 +117,7 @@ struct Block {
   std::size_t lane_count() const { return static_cast<std::size_t>(nz) * 8 * stride; }
 };
 
-/// Sets all that follows from nx, ny, nz and the runs, and makes the arrays, without points.
+/// Sets pitch, plane, stride and `cell`: what follows from nx, ny, nz and the runs.
 void lay_out(Block& block);
 
 /// Sets `filled` and `filled_columns`, when the points are there.

@@ -3,12 +3,43 @@
 #pragma once
 
 #include <cmath>
+#include <cstdint>
 
 #include "compute/host_device.h"
 #include "math/bspline.h"
-#include "mpm/surface/facets.h"
 
 namespace tissue_sim {
+
+// Facets: the surface of a body in reference space, cut faces included: one for each face on which
+// points of a cell have lost, or never had, neighbours (mpm/blocks/known_facets.h).
+
+/// Points of one cell and block whose bonds towards one side are gone.
+struct Facet {
+  std::int32_t point;      ///< lowest of its points
+  std::int32_t cell;       ///< z * plane + y * pitch + x: its cell, and its stencil's lowest node
+  std::uint8_t direction;  ///< of a bond that it misses: mpm/lattice/bonds.h
+  float center[3];         ///< in cells, from the middle of the cell
+  float normal[3];         ///< unit, outward, in reference space
+  float extent[3];         ///< half its size along each axis [cells]; 0: none along it
+  float area;              ///< [m^2]
+  TISSUE_SIM_FIELDS(point, cell, direction, center, normal, extent, area)
+};
+
+// A place on the surface of a body: see mpm/surface/surface_places.h.
+
+/// In a block.
+struct SurfacePlace {
+  std::int32_t cell;  ///< lane of its cell's first point
+  std::int32_t node;  ///< lowest of that cell, in the block's nodes
+  std::int32_t point;
+  std::uint8_t points;  ///< bit s: stands for the surface before the one at sub-position s
+  std::uint8_t
+      key;          ///< 8 times 1 plus the point's place in the cell (x + 2 y + 4 z), plus the bond
+  float place[3];   ///< in cells, from the middle of the cell
+  float normal[3];  ///< unit, outward, in reference space
+  float area;       ///< [m^2]
+  TISSUE_SIM_FIELDS(cell, node, point, points, key, place, normal, area)
+};
 
 TISSUE_SIM_INLINE float dot(const float* a, const float* b) {
   return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
@@ -25,6 +56,7 @@ struct AxisWeights {
   }
   /// Of node k of the 27, x fastest.
   TISSUE_SIM_INLINE float at(int k) const { return of[k % 3] * of[3 + k / 3 % 3] * of[6 + k / 9]; }
+  TISSUE_SIM_FIELDS(of)
 };
 
 /// Slopes of these weights [1/cell].
@@ -41,6 +73,7 @@ struct FacetMotion {
   float x[3], v[3];       ///< of its centre [m], [m/s]
   float normal[3];        ///< unit, outward, in the world
   float to_reference[9];  ///< inverse of the deformation gradient, row-major
+  TISSUE_SIM_FIELDS(x, v, normal, to_reference)
 };
 
 /// Value of a node field at a place.

@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "mpm/split/lattice_tissue.h"
-#include "mpm/surface/facets.h"
+#include "mpm/surface/facet_in_world.h"
 
 namespace tissue_sim {
 

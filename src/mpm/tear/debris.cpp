@@ -68,7 +68,7 @@ bool is_in_slice(const LatticeBody& body, const Points& points, std::int32_t poi
 
 /// The nodes that some points see, and their reference places.
 struct NodesOf {
-  std::vector<int> node;
+  std::vector<std::int32_t> node;
   std::vector<Vec3> home;
   template <class SomePoints>
   NodesOf(const LatticeBody& body, const Points& points, const NodeFields& fields,
@@ -92,17 +92,6 @@ Eigen::Matrix3d rotation_of(const Eigen::Matrix3d& x_X) {
   Eigen::Matrix3d U = svd.matrixU();
   if ((U * svd.matrixV().transpose()).determinant() < 0) U.col(2) *= -1;
   return U * svd.matrixV().transpose();
-}
-
-/// The sum of m (x^2 - x x^T).
-template <class Mass>
-Eigen::Matrix3d inertia_of(const std::vector<Vec3>& x, const Mass& mass) {
-  Eigen::Matrix3d inertia = Eigen::Matrix3d::Zero();
-  for (std::size_t i = 0; i < x.size(); ++i) {
-    inertia +=
-        mass(i) * (x[i].squaredNorm() * Eigen::Matrix3d::Identity() - x[i] * x[i].transpose());
-  }
-  return inertia;
 }
 
 /// The nearest point beside a bit of debris, along the lattice, that is not soft; -1 if there is
@@ -129,43 +118,30 @@ void make_rigid(LatticeTissue& tissue, const LatticeBody& body, const Debris& of
   const Material& material = body.material_of(points, of_debris.point[0]);
   const double fastest_spin =
       kDebrisSpin * std::sqrt(material.young_modulus / material.density) / body.cell_size;
-  const std::size_t count = bit.node.size();
-  std::vector<Vec3> x(count), v(count);
-  double mass = 0;
-  Vec3 x_mean = Vec3::Zero(), X_mean = Vec3::Zero(), v_mean = Vec3::Zero();
-  for (std::size_t i = 0; i < count; ++i) {
-    const int n = bit.node[i];
+  for (const std::int32_t n : bit.node) {
     if (nodes.mass[n] > 0 && nodes.inv_mass[n] == 0) return;  // held fast
-    x[i] = bit.home[i] + Vec3(nodes.u[0][n], nodes.u[1][n], nodes.u[2][n]);
-    v[i] = Vec3(nodes.v[0][n], nodes.v[1][n], nodes.v[2][n]);
-    mass += nodes.mass[n];
-    x_mean += nodes.mass[n] * x[i];
-    X_mean += nodes.mass[n] * bit.home[i];
-    v_mean += nodes.mass[n] * v[i];
   }
-  x_mean /= mass;
-  X_mean /= mass;
-  v_mean /= mass;
+  const NodesMotion before(nodes, bit.node, bit.home);
+  const std::size_t count = bit.node.size();
   Eigen::Matrix3d x_X = Eigen::Matrix3d::Zero();
-  Vec3 angular = Vec3::Zero();
   for (std::size_t i = 0; i < count; ++i) {
     const double m = nodes.mass[bit.node[i]];
-    x_X += m * (x[i] - x_mean) * (bit.home[i] - X_mean).transpose();
-    angular += m * (x[i] - x_mean).cross(v[i] - v_mean);
+    const Vec3 x = bit.home[i] + displacement_of(nodes, bit.node[i]);
+    x_X += m * (x - before.place) * (bit.home[i] - before.home).transpose();
   }
-  if (!x_X.allFinite() || !angular.allFinite()) return;  // as the end of the frame will say
+  if (!x_X.allFinite() || !before.angular.allFinite()) return;  // as the end of the frame will say
   const Eigen::Matrix3d R = rotation_of(x_X);
-  for (std::size_t i = 0; i < count; ++i) x[i] = R * (bit.home[i] - X_mean);
-  const Eigen::Matrix3d inertia =
-      inertia_of(x, [&](std::size_t i) -> double { return nodes.mass[bit.node[i]]; });
-  Vec3 spin = inertia.ldlt().solve(angular);
+  std::vector<Vec3> x(count);
+  for (std::size_t i = 0; i < count; ++i) x[i] = R * (bit.home[i] - before.home);
+  const Eigen::Matrix3d inertia = inertia_of(nodes, bit.node, x);
+  Vec3 spin = inertia.ldlt().solve(before.angular);
   if (spin.norm() > fastest_spin) {
     spin *= fastest_spin / spin.norm();
     const std::int32_t other = beside(body, points, of_debris);
-    if (other >= 0) turn(tissue, other, angular - inertia * spin);
+    if (other >= 0) turn(tissue, other, before.angular - inertia * spin);
   }
   for (std::size_t i = 0; i < count; ++i) {
-    const Vec3 u = x_mean + x[i] - bit.home[i], velocity = v_mean + spin.cross(x[i]);
+    const Vec3 u = before.place + x[i] - bit.home[i], velocity = before.velocity + spin.cross(x[i]);
     for (int a = 0; a < 3; ++a) {
       nodes.u[a][bit.node[i]] = static_cast<float>(u[a]);
       nodes.v[a][bit.node[i]] = static_cast<float>(velocity[a]);
@@ -175,22 +151,48 @@ void make_rigid(LatticeTissue& tissue, const LatticeBody& body, const Debris& of
 
 }  // namespace
 
+NodesMotion::NodesMotion(const Nodes& nodes, const std::vector<std::int32_t>& some,
+                         const std::vector<Vec3>& homes) {
+  const auto velocity_of = [&nodes](std::int32_t n) {
+    return Vec3(nodes.v[0][n], nodes.v[1][n], nodes.v[2][n]);
+  };
+  for (std::size_t i = 0; i < some.size(); ++i) {
+    const double m = nodes.mass[some[i]];
+    mass += m;
+    home += m * homes[i];
+    place += m * (homes[i] + displacement_of(nodes, some[i]));
+    velocity += m * velocity_of(some[i]);
+  }
+  home /= mass;
+  place /= mass;
+  velocity /= mass;
+  for (std::size_t i = 0; i < some.size(); ++i) {
+    angular +=
+        nodes.mass[some[i]] *
+        (homes[i] + displacement_of(nodes, some[i]) - place).cross(velocity_of(some[i]) - velocity);
+  }
+}
+
+Eigen::Matrix3d inertia_of(const Nodes& nodes, const std::vector<std::int32_t>& some,
+                           const std::vector<Vec3>& r) {
+  Eigen::Matrix3d inertia = Eigen::Matrix3d::Zero();
+  for (std::size_t i = 0; i < r.size(); ++i) {
+    const double m = nodes.mass[some[i]];
+    inertia += m * (r[i].squaredNorm() * Eigen::Matrix3d::Identity() - r[i] * r[i].transpose());
+  }
+  return inertia;
+}
+
 void turn(LatticeTissue& tissue, std::int32_t point, const Vec3& angular) {
   Nodes& nodes = tissue.nodes;
   const NodesOf around(tissue.bodies[tissue.points.site[point].body], tissue.points, *tissue.fields,
                        std::array<std::int32_t, 1>{point});
-  const auto mass = [&](std::size_t i) -> double { return nodes.mass[around.node[i]]; };
+  const Vec3 middle = NodesMotion(nodes, around.node, around.home).place;
   std::vector<Vec3> x(around.node.size());
-  double total = 0;
-  Vec3 mean = Vec3::Zero();
   for (std::size_t i = 0; i < x.size(); ++i) {
-    const int n = around.node[i];
-    x[i] = around.home[i] + Vec3(nodes.u[0][n], nodes.u[1][n], nodes.u[2][n]);
-    total += mass(i);
-    mean += mass(i) * x[i];
+    x[i] = around.home[i] + displacement_of(nodes, around.node[i]) - middle;
   }
-  for (Vec3& place : x) place -= mean / total;
-  const Vec3 spin = inertia_of(x, mass).ldlt().solve(angular);
+  const Vec3 spin = inertia_of(nodes, around.node, x).ldlt().solve(angular);
   for (std::size_t i = 0; i < x.size(); ++i) {
     const int n = around.node[i];
     if (nodes.inv_mass[n] == 0) continue;  // what holds it takes its share

@@ -33,6 +33,22 @@ std::vector<std::int32_t> settle_ill_conditioned(LatticeTissue& tissue,
                                                  const std::set<std::int32_t>& debris);
 inline constexpr double kDebrisSpin = 0.5;
 
+/// Some nodes taken as one: means weighted by mass.
+struct NodesMotion {
+  double mass = 0;                                                          ///< [kg]
+  Vec3 home = Vec3::Zero(), place = Vec3::Zero(), velocity = Vec3::Zero();  ///< [m], [m/s]
+  Vec3 angular = Vec3::Zero();  ///< momentum about `place` [kg m^2/s]
+  /// `home`: their reference places.
+  NodesMotion(const Nodes& nodes, const std::vector<std::int32_t>& some,
+              const std::vector<Vec3>& home);
+};
+inline Vec3 displacement_of(const Nodes& nodes, std::int32_t n) {
+  return {nodes.u[0][n], nodes.u[1][n], nodes.u[2][n]};
+}
+/// Their inertia where they are at the places r from their middle [kg m^2].
+Eigen::Matrix3d inertia_of(const Nodes& nodes, const std::vector<std::int32_t>& some,
+                           const std::vector<Vec3>& r);
+
 /// Sets the nodes of a point turning, so that they have so much more angular momentum [kg m^2/s].
 void turn(LatticeTissue& tissue, std::int32_t point, const Vec3& angular);
 

@@ -3,8 +3,9 @@
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 
+#include "math/draw.h"
+#include "math/union_find.h"
 #include "mpm/lattice/bonds.h"
 
 namespace tissue_sim {
@@ -61,13 +62,9 @@ bool comes_off(const LatticeTissue& tissue, const TearingPoint& t) {
 }
 
 /// Regions of tissue past its limit: for each entry the lowest of those that bonds join it to.
-std::vector<int> regions(const LatticeTissue& tissue, const std::vector<TearingPoint>& tearing) {
-  std::vector<int> parent(tearing.size());
-  std::iota(parent.begin(), parent.end(), 0);
-  const auto root = [&parent](int i) {
-    while (parent[i] != i) i = parent[i] = parent[parent[i]];
-    return i;
-  };
+std::vector<std::int32_t> regions(const LatticeTissue& tissue,
+                                  const std::vector<TearingPoint>& tearing) {
+  UnionFind linked(tearing.size());
   for (std::size_t i = 0; i < tearing.size(); ++i) {
     const Points::Site& s = tissue.points.site[tearing[i].point];
     const unsigned bonds = tissue.points.bonds[tearing[i].point];
@@ -75,12 +72,14 @@ std::vector<int> regions(const LatticeTissue& tissue, const std::vector<TearingP
       const int k = kForwardBond + __builtin_ctz(forward);
       const TearingPoint* other = entry(tearing, neighbour(tissue.bodies[s.body], s, k));
       if (other == nullptr) continue;
-      const int a = root(static_cast<int>(i)), b = root(static_cast<int>(other - tearing.data()));
-      parent[std::max(a, b)] = std::min(a, b);
+      linked.join(static_cast<std::int32_t>(i), static_cast<std::int32_t>(other - tearing.data()));
     }
   }
-  for (std::size_t i = 0; i < tearing.size(); ++i) parent[i] = root(static_cast<int>(i));
-  return parent;
+  std::vector<std::int32_t> lowest(tearing.size());
+  for (std::size_t i = 0; i < lowest.size(); ++i) {
+    lowest[i] = linked.root(static_cast<std::int32_t>(i));
+  }
+  return lowest;
 }
 
 /// Whether a crack is so near that a point is past its limit because of it: strain is largest not
@@ -108,7 +107,7 @@ bool in_reach_of_crack(const LatticeTissue& tissue, const TearingPoint& t) {
 std::vector<Bond> beginnings(const BlockTissue& tissue, const TearRecords& records,
                              const std::vector<TearingPoint>& tearing,
                              const std::vector<std::uint8_t>& at_crack) {
-  const std::vector<int> region = regions(tissue, tearing);
+  const std::vector<std::int32_t> region = regions(tissue, tearing);
   std::vector<std::uint8_t> cracked(tearing.size(), 0);
   for (std::size_t i = 0; i < tearing.size(); ++i) cracked[region[i]] |= at_crack[i];
   std::vector<int> worst(tearing.size(), -1);  // of each region
@@ -171,20 +170,38 @@ float least_tear_limit(const LatticeBody& body) {
 float tear_limit(const LatticeTissue& tissue, std::int32_t point) {
   const Points::Site& s = tissue.points.site[point];
   const Material& m = tissue.bodies[s.body].material_of(tissue.points, point);
-  // SplitMix64 of seed and place.
   std::uint64_t x = tissue.scene.seed;
   for (const std::int16_t part : {s.body, s.x, s.y, s.z}) {
-    x += 0x9e3779b97f4a7c15u + static_cast<std::uint16_t>(part);
-    x = (x ^ (x >> 30)) * 0xbf58476d1ce4e5b9u;
-    x = (x ^ (x >> 27)) * 0x94d049bb133111ebu;
-    x ^= x >> 31;
+    x = split_mix(x + static_cast<std::uint16_t>(part));
   }
   const double drawn = static_cast<double>(x >> 11) * 0x1p-52 - 1;  // -1 to 1
   return static_cast<float>(1 + (m.tear_stretch - 1) * (1 + m.tear_scatter * drawn));
 }
 
-void add_tearing(const LatticeTissue& tissue, const std::vector<StretchedPoint>& stretched,
-                 std::vector<TearingPoint>& tearing) {
+std::vector<StretchedPoint> find_stretched(BlockTissue& tissue, double share) {
+  const int count = static_cast<int>(tissue.blocks.all.size());
+  std::vector<std::vector<StretchedPoint>> of_block(count);
+  tissue.cpu->for_each(count, [&](int i) {
+    const Block& block = *tissue.blocks.all[i];
+    const LatticeBody& body = tissue.bodies[block.body];
+    const float limit = block.material == Block::kMixed
+                            ? least_tear_limit(body)
+                            : least_tear_limit(body.materials[block.material]);
+    if (limit == 0) return;
+    tissue.kernels->stretched(block, block_field(tissue, block),
+                              static_cast<float>(1 + share * (limit - 1)), tissue.scratch.local(),
+                              of_block[i]);
+  });
+  std::vector<StretchedPoint> stretched;
+  for (const auto& part : of_block) stretched.insert(stretched.end(), part.begin(), part.end());
+  std::sort(stretched.begin(), stretched.end(),
+            [](const StretchedPoint& a, const StretchedPoint& b) { return a.point < b.point; });
+  return stretched;
+}
+
+std::vector<TearingPoint> tearing_of(const LatticeTissue& tissue,
+                                     const std::vector<StretchedPoint>& stretched) {
+  std::vector<TearingPoint> tearing;
   for (const StretchedPoint& p : stretched) {
     if (tissue.points.anchored[p.point] == Points::kInAnchor)
       continue;  // held fast, it cannot come apart
@@ -206,27 +223,6 @@ void add_tearing(const LatticeTissue& tissue, const std::vector<StretchedPoint>&
     }
     tearing.push_back({p.point, static_cast<float>(excess), normal});
   }
-}
-
-std::vector<TearingPoint> find_tearing(BlockTissue& tissue) {
-  const int count = static_cast<int>(tissue.blocks.all.size());
-  std::vector<std::vector<TearingPoint>> of_block(count);
-  tissue.cpu->for_each(count, [&](int i) {
-    const Block& block = *tissue.blocks.all[i];
-    const LatticeBody& body = tissue.bodies[block.body];
-    const float limit = block.material == Block::kMixed
-                            ? least_tear_limit(body)
-                            : least_tear_limit(body.materials[block.material]);
-    if (limit == 0) return;
-    std::vector<StretchedPoint> stretched;
-    tissue.kernels->stretched(block, block_field(tissue, block), limit, tissue.scratch.local(),
-                              stretched);
-    add_tearing(tissue, stretched, of_block[i]);
-  });
-  std::vector<TearingPoint> tearing;
-  for (const auto& part : of_block) tearing.insert(tearing.end(), part.begin(), part.end());
-  std::sort(tearing.begin(), tearing.end(),
-            [](const TearingPoint& a, const TearingPoint& b) { return a.point < b.point; });
   return tearing;
 }
 

@@ -30,6 +30,7 @@
 #include <set>
 #include <vector>
 
+#include "compute/host_device.h"
 #include "mpm/blocks/block_tissue.h"
 #include "mpm/lattice/bonds.h"
 #include "tissue_sim/cut.h"
@@ -41,6 +42,7 @@ struct TearRecords {
   std::vector<double> tore_at;  ///< per body: when a bond last tore [s]; empty while none did
   std::vector<std::int32_t> bridge_ends;  ///< points, by number
   std::set<std::int32_t> debris;          ///< the lowest point of each: mpm/tear/debris.h
+  TISSUE_SIM_FIELDS(tore_at, bridge_ends, debris)
 };
 
 /// Whether a body of the scene can tear.
@@ -70,12 +72,13 @@ struct TearingPoint {
   Vec3 normal;   ///< principal direction of the largest stretch, in reference space
 };
 
-/// Of the points of a block that are stretched most, those that are past their limits.
-void add_tearing(const LatticeTissue& tissue, const std::vector<StretchedPoint>& stretched,
-                 std::vector<TearingPoint>& tearing);
+/// Points whose strain is at least `share` of what the weakest material bears that their block may
+/// have, by number.
+std::vector<StretchedPoint> find_stretched(BlockTissue& tissue, double share);
 
-/// All points past their limits, by number.
-std::vector<TearingPoint> find_tearing(BlockTissue& tissue);
+/// Those of them that are past their limits.
+std::vector<TearingPoint> tearing_of(const LatticeTissue& tissue,
+                                     const std::vector<StretchedPoint>& stretched);
 
 /// Breaks bonds of the points `tearing` (by number). Appends the points that lost one to `changed`,
 /// by number, and counts into `report`.

@@ -5,7 +5,6 @@
 #include <array>
 #include <numeric>
 
-#include "mpm/cuda/bundle_blocks.h"
 #include "mpm/cuda/choose_plan.h"
 
 namespace tissue_sim {

@@ -4,8 +4,8 @@
 
 #if defined(TISSUE_SIM_CUDA)
 #include "mpm/cuda/label_pieces.h"
+#include "mpm/cut_tissue.h"
 #include "mpm/lattice/bonds.h"
-#include "mpm/lattice_pieces.h"
 #include "mpm/mpm_tissue.h"
 #include "support/cuda_mpm_tissue.h"
 #include "support/cut_kinds.h"

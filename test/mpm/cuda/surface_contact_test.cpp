@@ -8,7 +8,7 @@
 #include <map>
 
 #include "contact/surface_spring.h"
-#include "mpm/cuda/outer_points.h"
+#include "mpm/cuda/parts_on_device.h"
 #include "reference/mpm_reference.h"
 #include "support/cut_scenes.h"
 #include "support/either_device.h"

@@ -1,4 +1,4 @@
-#include "mls/spanner.h"
+#include "mls/connectivity.h"
 
 #include <algorithm>
 #include <array>
@@ -15,7 +15,7 @@ namespace {
 constexpr double kNodesOfCluster = 64;
 
 /// Cubes of about so many nodes, and in them what hangs together.
-void make_clusters(const MlsNodes& nodes, const MlsPairs& pairs, MlsSpanner& spanner) {
+void make_clusters(const MlsNodes& nodes, const MlsPairs& pairs, MlsConnectivity& connectivity) {
   const std::int32_t n = pairs.nodes();
   std::vector<std::array<std::int32_t, 4>> cube(n);  // and the body
   for (std::int32_t first = 0; first < n;) {
@@ -37,32 +37,33 @@ void make_clusters(const MlsNodes& nodes, const MlsPairs& pairs, MlsSpanner& spa
       if (cube[pairs.other[e]] == cube[i]) linked.join(i, pairs.other[e]);
     }
   }
-  spanner.cluster.assign(n, 0);
+  connectivity.cluster.assign(n, 0);
   std::vector<std::vector<std::int32_t>> members;
   for (std::int32_t i = 0; i < n; ++i) {
     const std::int32_t lowest = linked.root(i);
     if (lowest == i) members.emplace_back();
-    spanner.cluster[i] =
-        lowest == i ? static_cast<std::int32_t>(members.size()) - 1 : spanner.cluster[lowest];
-    members[spanner.cluster[i]].push_back(i);
+    connectivity.cluster[i] =
+        lowest == i ? static_cast<std::int32_t>(members.size()) - 1 : connectivity.cluster[lowest];
+    members[connectivity.cluster[i]].push_back(i);
   }
   std::vector<std::int32_t> neighbours;
-  spanner.members_begin.push_back(0);
-  spanner.neighbours_begin.push_back(0);
+  connectivity.members_begin.push_back(0);
+  connectivity.neighbours_begin.push_back(0);
   for (std::int32_t c = 0; c < static_cast<std::int32_t>(members.size()); ++c) {
     neighbours.clear();
     for (const std::int32_t i : members[c]) {
-      spanner.members.push_back(i);
+      connectivity.members.push_back(i);
       for (std::int32_t e = pairs.begin[i]; e < pairs.begin[i + 1]; ++e) {
-        const std::int32_t other = spanner.cluster[pairs.other[e]];
+        const std::int32_t other = connectivity.cluster[pairs.other[e]];
         if (other > c) neighbours.push_back(other);
       }
     }
     std::sort(neighbours.begin(), neighbours.end());
     neighbours.erase(std::unique(neighbours.begin(), neighbours.end()), neighbours.end());
-    for (const std::int32_t other : neighbours) spanner.neighbours.push_back(other);
-    spanner.members_begin.push_back(static_cast<std::int32_t>(spanner.members.size()));
-    spanner.neighbours_begin.push_back(static_cast<std::int32_t>(spanner.neighbours.size()));
+    for (const std::int32_t other : neighbours) connectivity.neighbours.push_back(other);
+    connectivity.members_begin.push_back(static_cast<std::int32_t>(connectivity.members.size()));
+    connectivity.neighbours_begin.push_back(
+        static_cast<std::int32_t>(connectivity.neighbours.size()));
   }
 }
 
@@ -93,7 +94,7 @@ class Links {
 
 }  // namespace
 
-MlsSpanner make_spanner(const MlsNodes& nodes, const MlsPairs& pairs) {
+MlsConnectivity make_connectivity(const MlsNodes& nodes, const MlsPairs& pairs) {
   struct Link {
     float length2;
     std::int32_t node, entry;
@@ -119,60 +120,63 @@ MlsSpanner make_spanner(const MlsNodes& nodes, const MlsPairs& pairs) {
     b.push_back(link.node);
     is_in[link.entry] = is_in[pairs.twin[link.entry]] = 1;
   }
-  MlsSpanner spanner;
-  spanner.begin.push_back(0);
+  MlsConnectivity connectivity;
+  connectivity.begin.push_back(0);
   for (std::int32_t i = 0; i < pairs.nodes(); ++i) {
     for (std::int32_t e = pairs.begin[i]; e < pairs.begin[i + 1]; ++e) {
-      if (is_in[e] != 0) spanner.other.push_back(pairs.other[e]);
+      if (is_in[e] != 0) connectivity.other.push_back(pairs.other[e]);
     }
-    spanner.begin.push_back(static_cast<std::int32_t>(spanner.other.size()));
+    connectivity.begin.push_back(static_cast<std::int32_t>(connectivity.other.size()));
   }
-  make_clusters(nodes, pairs, spanner);
-  return spanner;
+  make_clusters(nodes, pairs, connectivity);
+  return connectivity;
 }
 
 UnionFind join_uncrossed(const MlsState& s) {
   constexpr std::int32_t kAhead =
       16;  // entries are asked for from memory: that is what this waits for
   const MlsPairs& p = s.pairs;
-  const MlsSpanner& spanner = s.spanner;
+  const MlsConnectivity& connectivity = s.connectivity;
   const std::int32_t n = s.count(),
-                     clusters = static_cast<std::int32_t>(spanner.members_begin.size()) - 1;
-  const auto first_of = [&](std::int32_t c) { return spanner.members[spanner.members_begin[c]]; };
+                     clusters = static_cast<std::int32_t>(connectivity.members_begin.size()) - 1;
+  const auto first_of = [&](std::int32_t c) {
+    return connectivity.members[connectivity.members_begin[c]];
+  };
   // Of each cluster its lowest node, which is its first; -1 where it is cut.
   std::vector<std::int32_t> whole(clusters);
   for (std::int32_t c = 0; c < clusters; ++c) whole[c] = first_of(c);
   for (std::int32_t i = 0; i < n; ++i) {
-    if (s.cut[i] != 0) whole[spanner.cluster[i]] = -1;
+    if (s.cut[i] != 0) whole[connectivity.cluster[i]] = -1;
   }
   // Whole clusters first, and with one another.
   Links linked(n);
   for (std::int32_t i = 0; i < n; ++i) {
-    const std::int32_t lowest = whole[spanner.cluster[i]];
+    const std::int32_t lowest = whole[connectivity.cluster[i]];
     linked.begin(i, lowest < 0 ? i : lowest);
   }
   for (std::int32_t c = 0; c < clusters; ++c) {
     if (whole[c] < 0) continue;
-    for (std::int32_t k = spanner.neighbours_begin[c]; k < spanner.neighbours_begin[c + 1]; ++k) {
-      const std::int32_t other = whole[spanner.neighbours[k]];
+    for (std::int32_t k = connectivity.neighbours_begin[c];
+         k < connectivity.neighbours_begin[c + 1]; ++k) {
+      const std::int32_t other = whole[connectivity.neighbours[k]];
       if (other >= 0 && linked.apart(whole[c], other)) linked.join(whole[c], other);
     }
   }
   for (std::int32_t c = 0; c < clusters; ++c) {
     if (whole[c] >= 0) continue;
-    const std::int32_t last = spanner.members_begin[c + 1];
-    for (std::int32_t k = spanner.members_begin[c]; k < last; ++k) {
+    const std::int32_t last = connectivity.members_begin[c + 1];
+    for (std::int32_t k = connectivity.members_begin[c]; k < last; ++k) {
       if (k + kAhead < last) {
-        const std::int32_t next = spanner.members[k + kAhead];
+        const std::int32_t next = connectivity.members[k + kAhead];
         if (s.cut[next] != 0) {
           __builtin_prefetch(&p.other[p.begin[next]]);
           __builtin_prefetch(&p.other[p.begin[next]] + 16);
           __builtin_prefetch(&p.crossed[p.begin[next]]);
         } else {
-          __builtin_prefetch(&spanner.other[spanner.begin[next]]);
+          __builtin_prefetch(&connectivity.other[connectivity.begin[next]]);
         }
       }
-      const std::int32_t i = spanner.members[k];
+      const std::int32_t i = connectivity.members[k];
       if (s.cut[i] != 0) {
         for (std::int32_t e = p.begin[i]; e < p.begin[i + 1]; ++e) {
           // Both are looked at before either decides: few are neither.
@@ -180,8 +184,8 @@ UnionFind join_uncrossed(const MlsState& s) {
         }
         continue;
       }
-      for (std::int32_t m = spanner.begin[i]; m < spanner.begin[i + 1]; ++m) {
-        if (linked.apart(i, spanner.other[m])) linked.join(i, spanner.other[m]);
+      for (std::int32_t m = connectivity.begin[i]; m < connectivity.begin[i + 1]; ++m) {
+        if (linked.apart(i, connectivity.other[m])) linked.join(i, connectivity.other[m]);
       }
     }
   }

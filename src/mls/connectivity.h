@@ -16,7 +16,7 @@ struct MlsState;
 /// have pairs with a third one that are (a 2-spanner). So wherever nothing is cut it joins what all
 /// pairs would. And clusters of some 64 nodes that hang together while none of them is beside a
 /// cut.
-struct MlsSpanner {
+struct MlsConnectivity {
   Array<std::int32_t> begin;                         ///< per node, and one more
   Array<std::int32_t> other;                         ///< the neighbour
   Array<std::int32_t> cluster;                       ///< of each node
@@ -25,10 +25,10 @@ struct MlsSpanner {
 };
 
 /// The shortest pairs that do (Althoefer, Das, Dobkin, Joseph, Soares 1993: greedily).
-MlsSpanner make_spanner(const MlsNodes& nodes, const MlsPairs& pairs);
+MlsConnectivity make_connectivity(const MlsNodes& nodes, const MlsPairs& pairs);
 
 /// Joins nodes with an uncrossed pair: clusters as a whole where nothing is cut, else pairs of the
-/// spanner, and all of nodes beside a cut.
+/// connectivity, and all of nodes beside a cut.
 UnionFind join_uncrossed(const MlsState& state);
 
 }  // namespace tissue_sim

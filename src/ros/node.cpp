@@ -47,14 +47,10 @@ Node::Node(const ros::NodeHandle& node, bool owns_process)
   const RecordRequest record = record_request(parameters_.record);
   first.paused = parameters_.paused || record.wanted;  // so that the bag holds frame 0
   if (parameters_.publish_clock) {
-    clock_publisher_ = service_node_.advertise<rosgraph_msgs::Clock>("/clock", 10, true);
+    clock_.advertise(service_node_);
   }
-  simulation_ =
-      std::make_unique<SimulationThread>(std::move(session), first, [this](const ros::Time& now) {
-        rosgraph_msgs::Clock message;
-        message.clock = now;
-        clock_publisher_.publish(message);
-      });
+  simulation_ = std::make_unique<SimulationThread>(
+      std::move(session), first, [this](const ros::Time& now) { clock_.say(now); });
   connect_clock();
   services_ =
       std::make_unique<Services>(service_node_, scene, *simulation_, recorder_, frames_,

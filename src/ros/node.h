@@ -8,6 +8,7 @@
 
 #include <memory>
 
+#include "ros/clock_topic.h"
 #include "ros/diagnostics.h"
 #include "ros/frames.h"
 #include "ros/parameters.h"
@@ -41,7 +42,7 @@ class Node {
   const Parameters parameters_;
   Recorder recorder_;
   Frames frames_;
-  ros::Publisher clock_publisher_;
+  ClockTopic clock_;
   std::unique_ptr<SimulationThread> simulation_;
   std::unique_ptr<Services> services_;
   std::unique_ptr<Diagnostics> diagnostics_;

@@ -122,7 +122,10 @@ void SimulationThread::run_frames() {
     if (frame_due()) {
       frame();
       if (active()) shown = now;
-    } else if (!active() || parameters_.time != TimeMode::kWall) {
+      continue;
+    }
+    if (parameters_.publish_clock) say_time_(clock_.stamp());  // for who has just come
+    if (!active() || parameters_.time != TimeMode::kWall) {
       if (now - shown >= kShownAtRest) {
         shown = now;
         run_.real_time_factor = 0;

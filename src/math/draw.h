@@ -3,7 +3,17 @@
 
 #include <cstdint>
 
+#include "compute/host_device.h"
+
 namespace tissue_sim {
+
+/// A number in [-1, 1) for each i (the mixer of C. Wellons, "Prospecting for hash functions").
+TISSUE_SIM_INLINE float scattered(std::uint32_t i) {
+  i = (i ^ (i >> 16)) * 0x7feb352du;
+  i = (i ^ (i >> 15)) * 0x846ca68bu;
+  i ^= i >> 16;
+  return static_cast<float>(static_cast<std::int32_t>(i)) / 2147483648.0f;
+}
 
 /// A step of SplitMix64.
 inline std::uint64_t split_mix(std::uint64_t x) {

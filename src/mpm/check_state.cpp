@@ -127,40 +127,13 @@ void check_blocks(const MpmState& s, const Known& k) {
 
 void check_contacts(const MpmState& s, const Known& k) {
   const Contacts& c = s.contacts;
-  const std::size_t count = s.blocks.all.size();
-  for (const std::size_t size :
-       {c.near.size(), c.cells.size(), c.parts.size(), c.touching.size(), c.changes.size()}) {
-    check_state(size == 0 || size == count, "blocks' contacts");
-  }
-  for (std::size_t i = 0; i < count; ++i) {
-    const Block& b = *s.blocks.all[i];
-    const auto lanes = static_cast<std::int64_t>(b.lane_count());
-    if (!c.near.empty()) check_indices(c.near[i], 0, k.colliders, "near colliders");
-    if (!c.touching.empty()) {
-      for (const Touch& t : c.touching[i]) {
-        check_state(t.cell >= 0 && t.cell < lanes && t.point >= 0 && t.point < k.points &&
-                        t.collider < k.colliders,
-                    "touching points");
-      }
-    }
-    if (!c.changes.empty()) {
-      for (const InertiaChange& x : c.changes[i]) {
-        check_state(x.collider >= 0 && x.collider < k.colliders, "inertia");
-        check_cell(b, x.node);
-      }
-    }
-    if (c.cells.empty()) continue;
-    check_state(!c.parts.empty(), "parts");
-    const auto parts = static_cast<std::int64_t>(c.parts[i].size());
-    for (const NearCell& cell : c.cells[i]) {
-      const auto places =
-          static_cast<std::int64_t>((cell.collider == 0 ? b.merged : b.surface).size());
-      check_state(cell.lane >= 0 && cell.lane < lanes && cell.collider < k.colliders &&
-                      cell.place_count >= 0 && cell.first_part >= 0 && cell.first_part <= parts &&
-                      (cell.place_count == 0 ||
-                       (cell.first_place >= 0 && cell.first_place + cell.place_count <= places)),
-                  "near cells");
-      check_cell(b, cell.node);
+  check_state(c.touching.size() == s.blocks.all.size(), "blocks' contacts");
+  for (std::size_t i = 0; i < c.touching.size(); ++i) {
+    const auto lanes = static_cast<std::int64_t>(s.blocks.all[i]->lane_count());
+    for (const Touch& t : c.touching[i]) {
+      check_state(t.cell >= 0 && t.cell < lanes && t.point >= 0 && t.point < k.points &&
+                      t.collider < k.colliders,
+                  "touching points");
     }
   }
   for (const InertialNode& n : c.inertia.nodes) {
@@ -261,8 +234,9 @@ void complete_block(Block& b) {
                     std::abs(side.x) < kMost,
                 "blocks");
   }
-  lay_out(b);
   const std::size_t layers = b.nz + 2;
+  check_state(8 * lane * b.nz <= static_cast<std::int64_t>(b.volume.size()), "blocks");
+  lay_out(b);
   check_state(b.volume.size() == b.lane_count() && b.point.size() == b.lane_count() &&
                   b.node.size() == layers * b.plane,
               "blocks");
@@ -302,6 +276,7 @@ void complete_state(MpmState& s) {
   connect_forces(s.blocks, s.nodes.size());
   for (FaceContact& c : s.faces.all) find_nodes(s, c);
   index_active(s.faces);
+  forget_near(s.contacts, s.blocks.all.size());
   s.inertial_index.assign(s.nodes.size(), -1);
   index_inertia(s);
   s.work.force.clear();

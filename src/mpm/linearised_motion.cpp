@@ -5,7 +5,7 @@
 #include <cstring>
 #include <utility>
 
-#include "mpm/small_motion.h"
+#include "math/draw.h"
 
 namespace tissue_sim {
 namespace {

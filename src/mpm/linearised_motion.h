@@ -8,6 +8,11 @@
 
 namespace tissue_sim {
 
+/// Largest displacement [cells]: between what curves and what is rounded. The largest is that of
+/// the lightest node, at the rim of a cut, where the rest moves a hundredth of it: at a thousandth
+/// of a cell that drowned in the rounding of displacements.
+inline constexpr float kSmallMotion = 1.0f / 64;
+
 /// A = M^-1 K about the present state, without contact, for largest_eigenvalue(): by differences of
 /// the forces that the kernels of the substep give. Vectors are displacements of the nodes, their
 /// inner product is weighed by mass. What faces of anchors hold has no part in it. The same bits

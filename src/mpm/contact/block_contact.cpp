@@ -63,8 +63,8 @@ bool overlap(const Box& a, const Box& b) {
   return (a.min.array() <= b.max.array()).all() && (b.min.array() <= a.max.array()).all();
 }
 
-/// Substeps between two lists of the cells near colliders, and how much nearer than predicted either
-/// may come in that time [cells].
+/// Substeps between two lists of the cells near colliders, and how much nearer than predicted
+/// either may come in that time [cells].
 constexpr int kListLasts = 8;
 constexpr double kListMargin = 0.5;
 /// Whether what a collider presses a point with has a bound: kMostOfHeld.
@@ -99,15 +99,20 @@ float largest_inv_mass(const Nodes& nodes, const CellNodes& cell) {
 
 }  // namespace
 
+void forget_near(Contacts& contacts, std::size_t blocks) {
+  contacts.near.assign(blocks, {});
+  contacts.cells.assign(blocks, {});
+  contacts.parts.assign(blocks, {});
+  contacts.changes.assign(blocks, {});
+  contacts.touching.resize(blocks);
+  contacts.until_list = 0;
+}
+
 void find_near_colliders(TouchingTissue& state, const std::vector<Box>& reach, double duration,
                          const std::vector<BlockMotion>& before) {
   Contacts& contacts = state.contacts;
   const int count = static_cast<int>(state.blocks.all.size());
-  contacts.near.assign(count, {});
-  contacts.cells.assign(count, {});
-  contacts.parts.assign(count, {});
-  contacts.touching.resize(count);
-  contacts.until_list = 0;
+  forget_near(contacts, count);
   state.cpu->for_each(count, [&](int i) {
     Box box = state.motion[i].box;
     if (!before.empty()) {
@@ -141,11 +146,8 @@ bool missed_contact(const TouchingTissue& state, const std::vector<Box>& reach) 
 void list_contacts(TouchingTissue& state) {
   Contacts& contacts = state.contacts;
   const std::vector<std::vector<Touch>> before = std::move(contacts.touching);
-  contacts.touching.assign(state.blocks.all.size(), {});
-  contacts.near.assign(state.blocks.all.size(), {});
-  contacts.cells.assign(state.blocks.all.size(), {});
-  contacts.parts.assign(state.blocks.all.size(), {});
-  contacts.changes.assign(state.blocks.all.size(), {});
+  contacts.touching.clear();
+  forget_near(contacts, state.blocks.all.size());
   if (before.empty()) return;  // on a GPU
   for (std::size_t i = 0; i < state.blocks.all.size(); ++i) {
     const Block& block = *state.blocks.all[i];

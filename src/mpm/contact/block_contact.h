@@ -37,8 +37,6 @@ struct NearCell {
   float lightest = -1;                    ///< largest 1 / m of its nodes, negative until asked for
   std::uint8_t clear = 0;                 ///< substeps for which no place of it can be reached
   std::uint8_t points_clear = 0;          ///< the same of its `points`
-  TISSUE_SIM_FIELDS(lane, node, collider, points, first_place, place_count, middle, first_part,
-                    lightest, clear, points_clear)
 };
 
 /// What is known of a place in such a cell, or of a part of it, until cells are listed anew.
@@ -47,7 +45,6 @@ struct NearPart {
   float mobility = -1;     ///< mpm/contact/face_places.h, negative until it is asked for [1/kg]
   std::uint8_t clear = 0;  ///< substeps for which the collider cannot reach it
   Side side = kUnknown;    ///< whether the surface faces the collider
-  TISSUE_SIM_FIELDS(mobility, clear, side)
 };
 
 /// Contact of points with colliders, block by block.
@@ -59,10 +56,14 @@ struct Contacts {
   std::vector<std::vector<InertiaChange>> changes;  ///< of the substep
   ContactInertia inertia;
   int until_list = 0;  ///< substeps until `cells` are listed anew
-  TISSUE_SIM_FIELDS(near, cells, parts, touching, changes, inertia.nodes, inertia.dt, until_list)
+  /// Between two frames; the rest begins anew with each.
+  TISSUE_SIM_FIELDS(touching, inertia.nodes, inertia.dt)
 };
 
 inline constexpr std::uint8_t kPointKey = 128;  ///< Touch::key of a point, above those of places
+
+/// Forgets what is near, of so many blocks; what touches stays.
+void forget_near(Contacts& contacts, std::size_t blocks);
 
 /// Finds out which colliders each block may meet in a frame of `duration` seconds, from where its
 /// points are, how fast they move (BlockTissue::motion) and what each collider sweeps (`reach`);

@@ -50,7 +50,6 @@ struct InertiaChange {
   float normal[3];
   float inertia;      ///< b [kg]
   float velocity[3];  ///< of the collider there [m/s]
-  TISSUE_SIM_FIELDS(sign, begins, node, collider, place, normal, inertia, velocity)
 };
 
 struct ContactInertia {
@@ -75,8 +74,6 @@ void tidy_inertia(TouchingTissue& state, bool all);
 void index_inertia(TouchingTissue& state);
 
 // Faces of anchors where tools and the ground touch the tissue beside them.
-
-struct TouchingTissue;
 
 /// Takes that from the nodes that swing of group `i` of BlockTissue::anchors, before it is held.
 void calm_swings(TouchingTissue& state, int i, float dt);

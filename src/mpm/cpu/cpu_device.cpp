@@ -34,12 +34,7 @@ void CpuMpmDevice::begin() {
   s.points.outer = find_outer_places(s);
   s.blocks = make_blocks(s, {}, *s.cpu);
   s.work.force.resize(s.blocks.force_size);
-  const std::size_t count = s.blocks.all.size();
-  s.contacts.near.resize(count);
-  s.contacts.cells.resize(count);
-  s.contacts.parts.resize(count);
-  s.contacts.touching.resize(count);
-  s.contacts.changes.resize(count);
+  forget_near(s.contacts, s.blocks.all.size());
   list_facets(s);
   index_inertia(s);
   s.edges = resisting_edges(s.scene);

@@ -2,8 +2,8 @@
 #include <utility>
 
 #include "compute/for_each_cuda.h"
+#include "math/draw.h"
 #include "mpm/cuda/cuda_linearised_motion.h"
-#include "mpm/small_motion.h"
 
 namespace tissue_sim {
 namespace {
@@ -135,14 +135,13 @@ void launch(int count, int parts, const F& f, double2* sums, float* largest, cud
 }  // namespace
 
 CudaLinearisedMotion::CudaLinearisedMotion(const CudaNodes& present, const CudaNodes& scratch,
-                                           std::size_t node_count, double cell_size,
-                                           Substep substep, Hold hold, CudaMotionRoom& room,
-                                           cudaStream_t stream)
+                                           std::size_t node_count, float small, Substep substep,
+                                           Hold hold, CudaMotionRoom& room, cudaStream_t stream)
     : present_(present),
       scratch_(scratch),
       count_(static_cast<int>(node_count)),
       parts_((count_ + kThreads - 1) / kThreads),
-      small_(kSmallMotion * static_cast<float>(cell_size)),
+      small_(small),
       substep_(std::move(substep)),
       hold_(std::move(hold)),
       stream_(stream),

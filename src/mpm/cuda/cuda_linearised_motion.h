@@ -28,8 +28,9 @@ class CudaLinearisedMotion {
   using Hold = std::function<void(float4* field)>;
 
   /// About `present`; `scratch` is of the same size, and overwritten where nodes have mass.
+  /// `small`: largest displacement [m].
   CudaLinearisedMotion(const CudaNodes& present, const CudaNodes& scratch, std::size_t node_count,
-                       double cell_size, Substep substep, Hold hold, CudaMotionRoom& room,
+                       float small, Substep substep, Hold hold, CudaMotionRoom& room,
                        cudaStream_t stream);
 
   void start();
@@ -47,7 +48,7 @@ class CudaLinearisedMotion {
 
   CudaNodes present_, scratch_;
   int count_, parts_;
-  float small_;  ///< largest displacement [m]
+  float small_;
   Substep substep_;
   Hold hold_;
   cudaStream_t stream_;

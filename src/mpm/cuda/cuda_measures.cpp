@@ -10,6 +10,7 @@
 #include "mpm/cuda/on_device.h"
 #include "mpm/fragment_flight.h"
 #include "mpm/fragment_forecast.h"
+#include "mpm/linearised_motion.h"
 #include "mpm/state_figures.h"
 
 namespace tissue_sim {
@@ -43,7 +44,8 @@ double CudaTissue::measure_limit(const std::vector<std::uint8_t>&, int steps) {
                           fields + 2 * n};
   std::copy(std::begin(room), std::end(room), d.motion_room.fields);
   CudaLinearisedMotion motion(
-      d.present(), d.nodes(1 - d.current), n, d.state.scene.cell_size,
+      d.present(), d.nodes(1 - d.current), n,
+      kSmallMotion * static_cast<float>(d.state.scene.cell_size),
       [&](const CudaNodes& from, const CudaNodes& to) {
         frame.state[0] = from;
         frame.state[1] = to;

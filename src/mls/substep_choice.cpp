@@ -42,7 +42,7 @@ double MlsSubsteps::damping(const MlsState& s, double elastic) const {
 
 void MlsSubsteps::cut(const MlsState& s, const std::vector<std::int32_t>& nodes) {
   if (!limit_.known()) return;                                       // it is measured anyway
-  const double known = 4 / (limit_.foreseen() * limit_.foreseen());  // fastest rate [1/s^2]
+  const double known = 4 / (limit_.predicted() * limit_.predicted());  // fastest rate [1/s^2]
   s.cpu->for_each(
       static_cast<int>(nodes.size()),
       [&](int k) {

@@ -4,7 +4,10 @@
 #include <cmath>
 #include <random>
 
+#include "mls/cut.h"
+#include "mls/linearised_motion.h"
 #include "mls/mls_scenes.h"
+#include "mls/substep_choice.h"
 
 namespace tissue_sim {
 namespace {
@@ -48,6 +51,68 @@ TEST(MlsSprings, AreOfSprungNodesAloneWhateverWasCut) {
   }
   EXPECT_GT(with_springs, 100);
   EXPECT_GT(no_more_sprung, 0);
+}
+
+// Of a heavy node that a cut leaves with a light one, as there are at a curved surface.
+TEST(MlsSprings, SetTheSubstepWhereTheyAreTheFastest) {
+  Scene scene = mls_box(Vec3::Constant(0.01), 0.001);
+  scene.materials.push_back({});
+  scene.materials.back().name = scene.bodies[0].material = "of little Poisson's ratio";
+  scene.materials.back().poisson_ratio = 0;
+  scene.bodies[0].shape = Shape::kEllipsoid;
+  scene.bodies[0].pose.position = Vec3::Zero();
+  scene.bodies[0].radii = Vec3(0.0026, 0.0086, 0.0094);
+  MlsTissue tissue(scene);
+  MlsState& s = tissue.state();
+  // What is left beside a cut counts as if it bore all that it bore before: some nodes look faster
+  // than anything is.
+  for (int cut = 0; cut < 4; ++cut) {
+    tissue.cut_now(plane_cut(Vec3(0.0003, 0.0004, 0.0002), Vec3(0.2 * cut, 1, 0.3 - 0.4 * cut)));
+  }
+  MlsSubsteps substeps(s);
+  const double frame = 1 / scene.frame_rate;
+  const auto longest = [&] {
+    return substeps
+        .part(s, frame,
+              [&](const std::vector<std::uint8_t>&, int) {
+                return measured_limit(
+                    s, [&](const float* u, float* force) { internal_forces(s, u, force); }, 8);
+              })
+        .longest();
+  };
+  const double before = longest();
+  double most_own = 0;
+  for (std::int32_t i = 0; i < s.count(); ++i) most_own = std::max(most_own, own_rate(s, i));
+  // The pair whose spring is the fastest when it is alone, of those that are not faster than any
+  // node by its own strain: nodes together are not, either.
+  std::int32_t node = 0, kept = 0;
+  double most = 0;
+  for (std::int32_t i = 0; i < s.count(); ++i) {
+    for (std::int32_t e = s.pairs.begin[i]; e < s.pairs.begin[i + 1]; ++e) {
+      const std::int32_t j = s.pairs.other[e];
+      const double r2 = (s.nodes.place[j] - s.nodes.place[i]).squaredNorm();
+      const double stiffness = s.nodes.material_of(i).young_modulus * s.nodes.volume[i] / r2;
+      const double rate = stiffness * (s.inv_mass[i] + s.inv_mass[j]);
+      if (s.pairs.crossed[e] == 0 && rate > most && rate < 0.99 * most_own) {
+        most = rate;
+        node = i;
+        kept = e;
+      }
+    }
+  }
+  std::vector<std::int32_t> entries, changed;
+  for (const std::int32_t i : {node, s.pairs.other[kept]}) {
+    for (std::int32_t e = s.pairs.begin[i]; e < s.pairs.begin[i + 1]; ++e) {
+      if (e != kept && e != s.pairs.twin[kept]) entries.push_back(e);
+    }
+  }
+  CutReport report;
+  cross_entries(s, entries, {}, changed, report);
+  substeps.cut(s, changed);
+  ASSERT_NE(s.sprung[node], 0);
+  const double limit = 2 / std::sqrt(own_rate(s, node) + own_rate(s, s.pairs.other[kept]));
+  ASSERT_GT(before, limit) << "it is the fastest";
+  EXPECT_LT(longest(), 0.9 * limit);
 }
 
 }  // namespace

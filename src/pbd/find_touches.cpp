@@ -244,7 +244,8 @@ double searches_of(const State& s, double struck, double duration) {
   std::vector<Piece> large;
   for (Piece& piece : pieces) {
     if (piece.vertices < kLeastPiece) continue;
-    piece.fastest = std::max(piece.fastest, 2 * struck);  // half an edge: it is not looked ahead
+    piece.fastest =
+        std::max(piece.fastest, 3 * struck);  // a third of an edge: it is not looked ahead
     const Vec3 far = Vec3::Constant(piece.fastest * duration + s.mean_edge);
     piece.box.min -= far;
     piece.box.max += far;

@@ -22,8 +22,8 @@ std::size_t bytes_of(const HostTables& t, std::size_t nodes, std::size_t points,
 }
 
 /// Says how much memory the tissue takes, where the GPU has less.
-void check_memory(std::size_t wanted) {
-  const std::size_t held = device_bytes_held;
+void check_memory(const CudaTissue& d, std::size_t wanted) {
+  const std::size_t all = device_bytes_held, held = all - std::min(all, d.others_hold);
   if (wanted <= held) return;
   std::size_t free = 0, total = 0;
   check_cuda(cudaMemGetInfo(&free, &total), "be asked");
@@ -149,7 +149,7 @@ void push_tables(CudaTissue& d) {
   const std::size_t most_held = CudaTissue::Checkpoint::most_held(held);
   const std::size_t of_places =
       held > 0 ? points * (sizeof(float) + sizeof(float4) * (d.place_parts > 1 ? 2 : 1)) : 0;
-  check_memory(bytes_of(t, n, points, held, most_held, of_places));
+  check_memory(d, bytes_of(t, n, points, held, most_held, of_places));
   check_cuda(cudaStreamSynchronize(d.stream), "finish a frame");
   d.blocks.upload(t.blocks, d.stream);
   d.bundles.upload(t.bundles, d.stream);

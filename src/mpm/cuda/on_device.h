@@ -37,6 +37,8 @@ struct SweepOnDevice {
 /// Nodes and contacts live here; lattice, bonds, blocks and pieces on the host too (`run`), where
 /// nodes around a cut are taken apart between frames.
 struct CudaTissue final : MpmDevice {
+  const std::size_t others_hold = device_bytes_held;  ///< before this tissue had any
+
   /// Throws std::runtime_error where there is no GPU, or not enough memory on it.
   CudaTissue(const Scene& scene, MpmRun& of);
   ~CudaTissue() override;

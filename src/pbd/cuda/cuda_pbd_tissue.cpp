@@ -150,7 +150,8 @@ int CudaPbdTissue::upload_touches(double duration) {
 void CudaPbdTissue::find_near_tips(const std::vector<pbd::TipSweep>& sweeps, double duration) {
   OnDevice& d = *device_;
   const auto count = static_cast<int>(sweeps.size());
-  if (count == 0 || d.triangles.size() == 0) {
+  if (d.triangles.size() == 0) return;  // nothing reads what is near
+  if (count == 0) {
     d.near_count.clear(d.stream);
     return;
   }

@@ -207,13 +207,13 @@ __device__ __forceinline__ void touch_vertex(const CudaPbdField& f, float h,
   *moved = make_float4(m[0], m[1], m[2], 0);
 }
 
-__device__ __forceinline__ void load_corners(const CudaPbdField& f, const Triangle& t,
-                                             const float4* x, const float4* moved,
-                                             Corner (&corner)[3]) {
+__device__ __forceinline__ void load_corners(const Triangle& t, const float4* x,
+                                             const float4* moved, const float4* predicted,
+                                             const float4* v, Corner (&corner)[3]) {
 #pragma unroll
   for (int k = 0; k < 3; ++k) {
     const std::int32_t i = t[k];
-    const float4 x4 = x[i], m4 = moved[i], p4 = f.predicted[i], v4 = f.v[i];
+    const float4 x4 = x[i], m4 = moved[i], p4 = predicted[i], v4 = v[i];
     corner[k] = {
         {x4.x, x4.y, x4.z, x4.w}, {m4.x, m4.y, m4.z}, {p4.x, p4.y, p4.z}, {v4.x, v4.y, v4.z}};
   }
@@ -221,14 +221,13 @@ __device__ __forceinline__ void load_corners(const CudaPbdField& f, const Triang
 
 /// Pushes triangles out of tips, one after the other as the CPU does, by one block of threads, all
 /// of them together; leaves them in step. They look for the next that lies in its tip together, and
-/// one pushes it.
-__device__ __forceinline__ void push_out_of_tips(const CudaPbdField& f, float h,
-                                                 const CudaPbdCollider* colliders,
-                                                 unsigned long long* loads, const float4* x,
-                                                 float4* moved) {
+/// one pushes it. Apart, for its doubles would take registers from what each step does.
+__device__ __noinline__ inline void push_out_of_tips(CudaPbdTips tips, const float4* predicted,
+                                                     const float4* v, std::uint8_t* pushed, float h,
+                                                     const CudaPbdCollider* colliders,
+                                                     unsigned long long* loads, const float4* x,
+                                                     float4* moved) {
   __shared__ int next;
-  const CudaPbdTips& tips = f.tips;
-  if (tips.count == 0) return;
   const int count = *tips.near_count, thread = static_cast<int>(threadIdx.x);
   Corner corner[3];
   TipPlace found;
@@ -238,7 +237,7 @@ __device__ __forceinline__ void push_out_of_tips(const CudaPbdField& f, float h,
     __syncthreads();
     for (int i = from + thread; i < count; i += static_cast<int>(blockDim.x)) {
       const std::int32_t pair = tips.near[i];
-      load_corners(f, tips.triangles[pair % tips.count], x, moved, corner);
+      load_corners(tips.triangles[pair % tips.count], x, moved, predicted, v, corner);
       const Collider& tip = colliders[tips.sweeps[pair / tips.count].collider].shape;
       if (!find_in_tip(tip, corner, tips.mean_edge, found)) continue;
       atomicMin(&next, i);
@@ -256,13 +255,13 @@ __device__ __forceinline__ void push_out_of_tips(const CudaPbdField& f, float h,
       const std::int32_t pair = tips.near[at];
       const Triangle& t = tips.triangles[pair % tips.count];
       const std::int32_t c = tips.sweeps[pair / tips.count].collider;
-      load_corners(f, t, x, moved, corner);
+      load_corners(t, x, moved, predicted, v, corner);
       ContactPush push;
       if (find_in_tip(colliders[c].shape, corner, tips.mean_edge, found) &&
           push_out_of_tip(colliders[c].shape, found, h, corner, push)) {
         for (int k = 0; k < 3; ++k) {
           moved[t[k]] = make_float4(corner[k].moved[0], corner[k].moved[1], corner[k].moved[2], 0);
-          if (found.share[k] > 0) f.pushed[t[k]] = 1;
+          if (found.share[k] > 0) pushed[t[k]] = 1;
         }
         add_push(colliders[c].shape, push, round == 0, loads + kPbdLoadSums * c);
       }

@@ -60,8 +60,8 @@ __global__ void __launch_bounds__(kThreads) pbd_touch(CudaPbdField f) {
 
 __global__ void __launch_bounds__(kThreadsOfFew) pbd_touch_tips(CudaPbdField f) {
   const std::size_t first = static_cast<std::size_t>(*f.step) * f.frame->colliders;
-  push_out_of_tips(f, f.frame->step.h, f.colliders + first, f.loads + first * kPbdLoadSums, f.x,
-                   f.moved);
+  push_out_of_tips(f.tips, f.predicted, f.v, f.pushed, f.frame->step.h, f.colliders + first,
+                   f.loads + first * kPbdLoadSums, f.x, f.moved);
 }
 
 /// Whether the triangle of a number of CudaPbdTips comes near its tip.
@@ -70,7 +70,7 @@ struct IsNearTip {
   double duration;
   __device__ bool operator()(std::int32_t pair) const {
     Corner corner[3];
-    load_corners(f, f.tips.triangles[pair % f.tips.count], f.x, f.moved, corner);
+    load_corners(f.tips.triangles[pair % f.tips.count], f.x, f.moved, f.predicted, f.v, corner);
     return may_meet(f.tips.sweeps[pair / f.tips.count], corner, f.tips.mean_edge, duration);
   }
 };

@@ -195,7 +195,10 @@ __global__ void __launch_bounds__(kThreads<kTets>, 1)
                    i, places[i], moved + i);
     }
     __syncthreads();
-    push_out_of_tips(f, step.h, f.colliders + first, f.loads + first * kPbdLoadSums, places, moved);
+    if (f.tips.count > 0) {
+      push_out_of_tips(f.tips, f.predicted, f.v, f.pushed, step.h, f.colliders + first,
+                       f.loads + first * kPbdLoadSums, places, moved);
+    }
     for (int i = thread; i < f.count; i += threads) {
       take_velocity_of(f, step, i, places + i, moved + i);
     }

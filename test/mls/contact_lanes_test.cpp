@@ -132,7 +132,7 @@ TEST(MlsContactLanes, PushesAreThoseOfFloats) {
     const Lanes* o = of.together();
     MlsPush<Lanes, Mask> push;
     apart.together();
-    Mask holds;
+    Mask holds{};
     for (int l = 0; l < kLanes; ++l) holds[l] = random() > 0.8f ? 0 : -1;
     push_mls_faces(d.together(), n.together(), o[0], o[1], held.together(), holds,
                    MlsSpringOfFaces<Lanes>{o[2], o[3], o[4], o[5], o[6]}, 1e-4f, apart.all, push);

@@ -85,8 +85,13 @@ void MpmTissue::read_surface(SurfaceTriangles& surface) {
   BoundaryMesh& mesh = s.boundary;
   update_boundary(s, mesh);
   device_->place_boundary();
+  if (surface.made != 0 && surface.made == mesh.shown) {
+    move_faces(mesh.faces, mesh.now, *s.cpu, surface);
+    return;
+  }
   const auto rest = [&mesh](std::int32_t v) { return floats(mesh.vertices[v].rest); };
   put_faces(mesh.faces, mesh.now, rest, run_->pieces.of_point, *s.cpu, surface);
+  mesh.shown = surface.made;
 }
 
 void MpmTissue::push_surface(Span<const float> impulses) {

@@ -94,6 +94,7 @@ void update_boundary(const LatticeTissue& tissue, BoundaryMesh& mesh) {
   }
   mesh.bonds = points.bonds;
   ++mesh.made;
+  mesh.shown = 0;
   if (points.outer.empty() && mesh.outer.empty()) mesh.outer = find_outer_places(tissue);
   const std::vector<OuterPlace>& outer = points.outer.empty() ? mesh.outer : points.outer;
   PointCubes cubes(tissue, outer);

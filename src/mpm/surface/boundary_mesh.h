@@ -25,7 +25,8 @@ struct BoundaryMesh {
     std::int32_t point;
     std::uint8_t cut;  ///< whether tissue went on there while it was whole
   };
-  std::uint64_t made = 0;  ///< how often
+  std::uint64_t made = 0;   ///< how often
+  std::uint64_t shown = 0;  ///< SurfaceTriangles::made of what shows it, as it is and in its pieces
   std::vector<Vertex> vertices;
   std::vector<std::array<float, 3>> now;  ///< where each was when they were read last [m]
   std::vector<Face> faces;                ///< by their points

@@ -41,7 +41,7 @@ double MlsSubsteps::damping(const MlsState& s, double elastic) const {
 }
 
 void MlsSubsteps::cut(const MlsState& s, const std::vector<std::int32_t>& nodes) {
-  if (!limit_.known()) return;                                       // it is measured anyway
+  if (!limit_.known()) return;                                         // it is measured anyway
   const double known = 4 / (limit_.predicted() * limit_.predicted());  // fastest rate [1/s^2]
   s.cpu->for_each(
       static_cast<int>(nodes.size()),

@@ -82,11 +82,11 @@ double StabilityLimit::at(const std::vector<Stiffness*>& elements,
                           const std::vector<float>& modulus) const {
   double growth = 1;
   for (std::size_t i = 0; i < modulus.size(); ++i) {
+    if (!std::isfinite(modulus[i])) return NAN;  // of an element that is not measured yet, too
     const float measured = elements[i]->measured;
-    // not the other way round: it may be not finite
-    if (measured > 0 && !(modulus[i] <= growth * measured)) growth = modulus[i] / measured;
+    if (measured > 0 && modulus[i] > growth * measured) growth = modulus[i] / measured;
   }
-  return std::isfinite(growth) ? limit_ / std::sqrt(growth) : NAN;
+  return limit_ / std::sqrt(growth);
 }
 
 }  // namespace tissue_sim

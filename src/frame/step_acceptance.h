@@ -24,6 +24,10 @@ class StepAcceptance {
   /// it is rejected, shortened() falls.
   bool accepts(double dt, double limit, const PartEnergy& energy, bool watched,
                const std::function<double()>& by_gravity);
+  /// What the next part begins with [J]; NAN where something else than a part changed it, such as a
+  /// cut: no energy counts until it is known again.
+  void begin_with(double energy) { energy_ = energy; }
+  bool knows_energy() const { return !std::isnan(energy_); }
   /// A part was accepted.
   void restart() { shortened_ = 1; }
   /// How much substeps are shorter than they would be, after parts that were rejected.

@@ -1,5 +1,6 @@
 // The steps of a frame, in the order that frame/run_frame.h says; cuts and tears among them.
 #include <algorithm>
+#include <cmath>
 #include <utility>
 
 #include "mpm/contact/face_contact.h"
@@ -36,7 +37,12 @@ void MpmTissue::begin_frame(double duration, const FrameInput& input, FrameColli
 }
 
 PartSubsteps MpmTissue::choose_substeps(const FrameInput& input, double time) {
-  run_->frame->watched = SubstepChoice::is_strained(run_->state);
+  const FrameResult& result = run_->result;
+  run_->frame->watched = SubstepChoice::is_watched(run_->state);
+  if (run_->frame->watched && !substep_.acceptance().knows_energy()) {
+    measured(device_->measure(kMeasureEnergies));
+    substep_.acceptance().begin_with(result.kinetic_energy + result.elastic_energy);
+  }
   measured_ = followed_ = false;
   const FrameColliders& colliders = run_->frame->colliders;
   return substep_.part(run_->state, input, colliders, time, substep_for(input, colliders));
@@ -103,6 +109,7 @@ void MpmTissue::take_apart(const std::vector<std::int32_t>& changed,
                            const std::vector<std::int32_t>& touched, std::vector<int>* fresh) {
   MpmState& s = run_->state;
   measured_ = followed_ = false;
+  substep_.acceptance().begin_with(NAN);
   device_->before_parting(changed);
   if (!touched.empty()) follow_front(s, touched, s.anchors.at_row);
   Apart apart;
@@ -175,6 +182,7 @@ bool MpmTissue::settle_ill_conditioned() {
   device_->send_nodes();
   std::sort(settled.begin(), settled.end());
   device_->settled(settled);
+  substep_.acceptance().begin_with(NAN);
   return true;
 }
 

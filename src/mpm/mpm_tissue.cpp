@@ -1,6 +1,7 @@
 #include "mpm/mpm_tissue.h"
 
 #include <algorithm>
+#include <cmath>
 #include <stdexcept>
 #include <utility>
 
@@ -72,6 +73,7 @@ FrameResult MpmTissue::finish() {
     const double duration = run_->frame ? run_->frame->duration : 0.0;
     std::vector<StrainedPoint> strained;
     if (device_->fly(duration, foresight_, strained)) {
+      substep_.acceptance().begin_with(NAN);
       measure_and_follow(kMeasureMotion | kMeasureEnergies);
     }
     look_ahead(s, run_->pieces, std::move(strained), duration, foresight_, result);
@@ -97,6 +99,7 @@ void MpmTissue::read_surface(SurfaceTriangles& surface) {
 void MpmTissue::push_surface(Span<const float> impulses) {
   tissue_sim::push_surface(run_->state, impulses);
   has_energies_ = false;
+  substep_.acceptance().begin_with(NAN);
 }
 
 Span<const Fragment> MpmTissue::fragments() {

@@ -73,17 +73,20 @@ double farthest_motion(const MpmState& state, const FrameInput& input,
   return farthest;
 }
 
+bool is_strained(const MpmState& state) { return state.worst_stiffening > kStrained; }
+
 }  // namespace
 
-bool SubstepChoice::is_strained(const MpmState& state) {
-  return state.worst_stiffening > kStrained;
+bool SubstepChoice::is_watched(const MpmState& state) {
+  // What moving anchors give is not reckoned.
+  return is_strained(state) || (!state.debris.empty() && !state.anchors.moves);
 }
 
 bool SubstepChoice::is_borne(const MpmState& state, const std::vector<float>& modulus,
                              double cautious, double dt, const PartEnergy& energy) {
   const double measured = limit_.at(stiffness_of(state), modulus);
   const double limit = std::isnan(measured) ? 0 : std::max(cautious / kStabilityMargin, measured);
-  return acceptance_.accepts(dt, limit, energy, is_strained(state),
+  return acceptance_.accepts(dt, limit, energy, is_watched(state),
                              [&] { return by_gravity(state, energy); });
 }
 

@@ -24,9 +24,10 @@ class SubstepChoice {
   /// If not, the next ones are shorter: until one is borne, or they cannot be the reason.
   bool is_borne(const MpmState& state, const std::vector<float>& modulus, double cautious,
                 double dt, const PartEnergy& energy);
-  /// Whether tissue is so strained that stiffness alone may not tell how it fares: then substeps
-  /// keep a wider margin, and the energy must be measured at the end of the next part.
-  static bool is_strained(const MpmState& state);
+  /// Whether the energy must be measured at the ends of the next part, for stiffness alone may not
+  /// tell how tissue fares: where it is strained, or in debris, whose light nodes rattle about.
+  static bool is_watched(const MpmState& state);
+  StepAcceptance& acceptance() { return acceptance_; }
   /// After a part of a frame: `modulus` is of each block the largest P-wave modulus of its points,
   /// as they are deformed [Pa].
   void follow(MpmState& state, const std::vector<float>& modulus);

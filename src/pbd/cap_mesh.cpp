@@ -4,6 +4,8 @@
 #include <cmath>
 #include <map>
 
+#include "pbd/surface_mesh.h"
+
 namespace tissue_sim {
 namespace pbd {
 namespace {
@@ -243,6 +245,85 @@ CapMesh fill_loop(const std::vector<Vec3>& loop, double edge,
     cap.inner.push_back(middle + at[i].x() * u + at[i].y() * v + rise * normal);
   }
   return cap;
+}
+
+void widen_angles(const std::vector<Vec3>& loop, CapMesh& cap) {
+  constexpr int kRounds = 30;
+  constexpr double kShares[] = {0.5, 0.25, 0.1};  // of the way to the middle of those around
+  const int n = static_cast<int>(loop.size());
+  std::vector<Vec3> at = loop;
+  at.insert(at.end(), cap.inner.begin(), cap.inner.end());
+  using Corners = std::array<int, 3>;
+  const auto least = [&](const Corners& t) { return smallest_angle(at[t[0]], at[t[1]], at[t[2]]); };
+  const auto normal = [&](const Corners& t) {
+    return Vec3((at[t[1]] - at[t[0]]).cross(at[t[2]] - at[t[0]]));
+  };
+  bool any = true;
+  for (int round = 0; any && round < kRounds; ++round) {
+    any = false;
+    std::map<std::pair<int, int>, int> side;  // triangle that has the edge in this sense
+    std::vector<std::vector<int>> around(at.size());
+    for (std::size_t t = 0; t < cap.triangles.size(); ++t) {
+      for (int i = 0; i < 3; ++i) {
+        side[{cap.triangles[t][i], cap.triangles[t][(i + 1) % 3]}] = static_cast<int>(t);
+        around[cap.triangles[t][i]].push_back(static_cast<int>(t));
+      }
+    }
+    std::vector<bool> touched(cap.triangles.size(), false);
+    for (const auto& [e, t] : side) {
+      const auto other = side.find({e.second, e.first});
+      if (e.first > e.second || other == side.end()) continue;
+      const int u = other->second;
+      if (touched[t] || touched[u]) continue;
+      Corners &p = cap.triangles[t], &q = cap.triangles[u];
+      const int a = e.first, b = e.second;
+      const int c = p[0] + p[1] + p[2] - a - b, d = q[0] + q[1] + q[2] - a - b;
+      const Corners new_p = {c, a, d}, new_q = {d, b, c};
+      if (side.count({c, d}) + side.count({d, c}) > 0) continue;
+      const Vec3 up = normal(p) + normal(q);
+      if (!(normal(new_p).dot(up) > 0) || !(normal(new_q).dot(up) > 0)) continue;
+      if (std::min(least(new_p), least(new_q)) < std::min(least(p), least(q)) + 1e-6) continue;
+      p = new_p;
+      q = new_q;
+      touched[t] = touched[u] = any = true;
+    }
+    if (any) continue;
+    for (int v = n; v < static_cast<int>(at.size()); ++v) {
+      const auto star = [&] {
+        double angle = 4;
+        for (const int t : around[v]) angle = std::min(angle, least(cap.triangles[t]));
+        return angle;
+      };
+      Vec3 middle = Vec3::Zero(), up = middle;
+      std::vector<double> weights(n, 0.0);
+      const double part = 0.5 / static_cast<double>(around[v].size());  // each around it is in two
+      for (const int t : around[v]) {
+        up += normal(cap.triangles[t]);
+        for (const int c : cap.triangles[t]) {
+          if (c == v) continue;
+          middle += part * at[c];
+          for (int k = 0; k < n; ++k) weights[k] += part * (c < n ? c == k : cap.weights[c - n][k]);
+        }
+      }
+      const Vec3 was = at[v];
+      const double before = star();
+      for (const double share : kShares) {
+        at[v] = was + share * (middle - was);
+        const bool is_even = std::all_of(around[v].begin(), around[v].end(), [&](int t) {
+          return normal(cap.triangles[t]).dot(up) > 0;
+        });
+        if (!is_even || star() < before + 1e-6) {
+          at[v] = was;
+          continue;
+        }
+        for (int k = 0; k < n; ++k)
+          cap.weights[v - n][k] += share * (weights[k] - cap.weights[v - n][k]);
+        any = true;
+        break;
+      }
+    }
+  }
+  std::copy(at.begin() + n, at.end(), cap.inner.begin());
 }
 
 }  // namespace pbd

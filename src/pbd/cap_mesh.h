@@ -29,5 +29,9 @@ CapMesh fill_loop(const std::vector<Vec3>& loop, double edge,
 /// normal.
 CapMesh fill_by_rings(const std::vector<Vec3>& loop, double edge, double rise);
 
+/// Flips edges and moves inner vertices towards those around, where that widens the smallest angle
+/// there: what is Delaunay seen along the normal may have slivers in space.
+void widen_angles(const std::vector<Vec3>& loop, CapMesh& cap);
+
 }  // namespace pbd
 }  // namespace tissue_sim

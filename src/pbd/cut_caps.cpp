@@ -113,13 +113,18 @@ CapMesh choose_cap(const State& s, const std::vector<std::int32_t>& loop, const 
   std::vector<std::int32_t> copied;
   for (const std::int32_t v : loop) copied.push_back(s.copy_of[v]);
   const auto is_sound = [&](CapMesh cap) {
-    split_chords(corners, copied, joined, cap);
-    const double angle = soundness(s, loop, edges, corners, cap);
-    if (angle > most) {
-      most = angle;
-      best = std::move(cap);
+    for (const bool is_widened : {false, true}) {
+      if (is_widened) widen_angles(corners, cap);
+      CapMesh tried = cap;
+      split_chords(corners, copied, joined, tried);
+      const double angle = soundness(s, loop, edges, corners, tried);
+      if (angle > most) {
+        most = angle;
+        best = std::move(tried);
+      }
+      if (most > kSound) return true;
     }
-    return most > kSound;
+    return false;
   };
   if (is_sound(std::move(other_side)) || is_sound(fill_loop(corners, size, s.wounds)) ||
       is_sound(fill_loop(corners, size))) {

@@ -179,6 +179,11 @@ TEST_F(PbdTrust, UnevenTrianglesComeToRest) {
   // Nothing is faster than what fell farthest would be had nothing held it: 25 mm, measured 33 mm.
   EXPECT_LT(fastest, std::sqrt(2 * 9.81 * fall));
   EXPECT_LT(late, 0.02);
+  // As it lies it is bent, and so is a plane's wound at rest: slivers there left it whole.
+  simulation.cut(plane_cut(simulation.tissue().fragments()[0].centroid, Vec3(1, 0, 0)));
+  const CutReport report = simulation.advance_frame().result.cut_reports.at(0);
+  EXPECT_EQ(report.pieces_left_whole, 0) << report.why_left_whole;
+  EXPECT_EQ(simulation.tissue().fragments().size(), 2u);
 }
 
 // Held vertices left constraints of strain next to no slope: not a number in the first frame.

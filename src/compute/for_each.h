@@ -17,7 +17,14 @@ namespace tissue_sim {
 /// The CPU with a number of threads (0 for all that the process may use).
 class Cpu {
  public:
-  explicit Cpu(int threads) : arena_(threads > 0 ? threads : tbb::task_arena::automatic) {}
+  explicit Cpu(int threads) : arena_(threads_of(threads)) {}
+  /// One whose threads go where others have work, as soon as they are done with what they began.
+  struct Yields {};
+#if __has_include(<tbb/version.h>)  // oneTBB: before it, arenas have no priority
+  Cpu(int threads, Yields) : arena_(threads_of(threads), 1, tbb::task_arena::priority::low) {}
+#else
+  Cpu(int threads, Yields) : Cpu(threads) {}
+#endif
   int threads() { return arena_.max_concurrency(); }
 
   /// Calls f(i) for each i in [0, n), `grain` at a time on a thread. Which thread does what is
@@ -61,8 +68,14 @@ class Cpu {
     }
     arena_.execute([&] { tbb::parallel_invoke(f, g); });
   }
+  /// Calls f(), whose own parallel work takes these threads.
+  template <class F>
+  void execute(const F& f) {
+    arena_.execute(f);
+  }
 
  private:
+  static int threads_of(int n) { return n > 0 ? n : tbb::task_arena::automatic; }
   tbb::task_arena arena_;
 };
 

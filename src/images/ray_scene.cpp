@@ -1,7 +1,5 @@
 #include "images/ray_scene.h"
 
-#include <tbb/task_arena.h>
-
 #include <algorithm>
 #include <new>
 #include <numeric>
@@ -80,7 +78,7 @@ void RayScene::set(const std::vector<float>& corners, Cpu& cpu) {
     rtcCommitGeometry(s.mesh);
   }
   // Trees of this quality, by the order of triangles along a curve, are the same with any threads.
-  tbb::task_arena(cpu.threads()).execute([&s] { rtcCommitScene(s.scene); });
+  cpu.execute([&s] { rtcCommitScene(s.scene); });
 }
 
 Box RayScene::box() const {

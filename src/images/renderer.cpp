@@ -86,7 +86,7 @@ struct Renderer::State {
   std::vector<float> stress;  // of each corner, empty where no camera shows it
   std::map<int, Colour> piece_colours;
 
-  State(const Scene& s, int threads) : scene(s), cpu(threads) {
+  State(const Scene& s, int threads) : scene(s), cpu(threads, Cpu::Yields()) {
     for (const Tool& tool : scene.tools) {
       meshes.push_back(tool.mesh.empty() ? nullptr : std::make_unique<ToolMesh>(tool, cpu));
     }

@@ -215,6 +215,19 @@ TEST_F(PbdTrust, StrainThatIsPressedFlatStays) {
   }
 }
 
+// A link from a vertex to itself, where those around had no room: its state was refused.
+TEST_F(PbdTrust, TheStateOfAThinBodyIsRestored) {
+  Scene scene = mesh_scene(obj({12, 4}, [](double t, double p) {
+    const double wide = std::sin(t) * (1 - t / kPi);
+    return Vec3(50 * wide * std::cos(p), 10 * wide * std::sin(p), 3 * std::cos(t));
+  }));
+  scene.bodies[0].pose.position = Vec3::Zero();
+  Simulation simulation(scene), restored(scene);
+  const std::vector<std::uint8_t> saved = simulation.save();
+  restored.restore({saved.data(), saved.size()});
+  EXPECT_EQ(restored.save(), saved);
+}
+
 // It fell, and a note said so: vertices lie on the face of the region, not in it.
 TEST_F(PbdTrust, AnAnchorAtABodysOwnFaceHoldsIt) {
   for (const char* anchor : {"{below: 0}", "{box: {min: [-1, -1, -1], max: [-0.02, 1, 1]}}",

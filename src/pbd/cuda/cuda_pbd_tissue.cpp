@@ -147,19 +147,18 @@ int CudaPbdTissue::upload_touches(double duration) {
   return s.touches.size() > 0 ? d.touches.colours : 0;
 }
 
-void CudaPbdTissue::find_near_tips(const std::vector<pbd::TipSweep>& sweeps, double duration) {
+int CudaPbdTissue::find_near_tips(const std::vector<pbd::TipSweep>& sweeps, double duration) {
   OnDevice& d = *device_;
   const auto count = static_cast<int>(sweeps.size());
-  if (d.triangles.size() == 0) return;  // nothing reads what is near
-  if (count == 0) {
-    d.near_count.clear(d.stream);
-    return;
-  }
+  if (d.triangles.size() == 0 || count == 0) return 0;
   d.tip_sweeps.upload(sweeps, d.stream);
   std::size_t bytes = 0;
-  launch_pbd_near_tips(d.field(), count, duration, nullptr, bytes, d.stream);
+  int* const found = d.near_count.data();
+  launch_pbd_near_tips(d.field(), count, duration, found, nullptr, bytes, d.stream);
   d.tip_memory.resize(bytes);
-  launch_pbd_near_tips(d.field(), count, duration, d.tip_memory.data(), bytes, d.stream);
+  launch_pbd_near_tips(d.field(), count, duration, found, d.tip_memory.data(), bytes, d.stream);
+  d.wait("find what comes near tips");
+  return *found;
 }
 
 void CudaPbdTissue::run_steps(const FrameColliders& colliders, const Part& part, float h) {
@@ -167,8 +166,8 @@ void CudaPbdTissue::run_steps(const FrameColliders& colliders, const Part& part,
   OnDevice& d = *device_;
   pbd::CudaPbdFrame frame{pbd::step_numbers(state_->scene, h), colliders.count()};
   frame.touch_colours = upload_touches(steps * h);
+  frame.near_tips = find_near_tips(sweeps_of_tips(colliders, part), steps * h);
   upload_frame(colliders, part, frame);
-  find_near_tips(sweeps_of_tips(colliders, part), steps * h);
   const pbd::CudaPbdField field = d.field();
   const int chunks = static_cast<int>(d.component_of_chunk.size());
   const pbd::CudaPbdFlights flights{d.chunks.data(), chunks, d.order.data()};

@@ -55,7 +55,7 @@ class CudaPbdTissue final : public PbdTissue {
   void choose_way();
   Way faster_way() const;
   int upload_touches(double duration);  ///< returns their colours
-  void find_near_tips(const std::vector<pbd::TipSweep>& sweeps, double duration);
+  int find_near_tips(const std::vector<pbd::TipSweep>& sweeps, double duration);  ///< how many
   void upload_frame(const FrameColliders& colliders, const Part& part,
                     const pbd::CudaPbdFrame& frame);
   void take_loads(const FrameColliders& colliders, const Part& part);

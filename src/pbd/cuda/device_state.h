@@ -45,6 +45,7 @@ struct CudaPbdFrame {
   StepNumbers step;
   int colliders = 0;      ///< of each step
   int touch_colours = 0;  ///< of CudaPbdField::touches, which change from frame to frame
+  int near_tips = 0;      ///< of CudaPbdTips::near
 };
 
 /// Triangles that come near tips in this part of a frame (State::at_tips).
@@ -52,8 +53,7 @@ struct CudaPbdTips {
   const Triangle* triangles;  ///< the whole surface; [tip][triangle] are numbered through
   int count = 0;              ///< of them; 0 where the scene has no tip
   const TipSweep* sweeps;
-  std::int32_t* near;  ///< those numbers, in order, and how many
-  int* near_count;
+  std::int32_t* near;    ///< those numbers, in order
   double mean_edge = 0;  ///< [m]
 };
 
@@ -140,10 +140,10 @@ void launch_pbd_steps(const CudaPbdField& field, const CudaPbdFrame& frame, int 
                       const CudaPbdExchange& exchange, cudaStream_t stream);
 /// Whether that is possible.
 bool fits_pbd_block(const CudaPbdField& field);
-/// Makes CudaPbdTips::near for so many sweeps and seconds; with `memory` at nullptr says how much
-/// of it that needs [bytes].
-void launch_pbd_near_tips(const CudaPbdField& field, int sweeps, double duration, void* memory,
-                          std::size_t& bytes, cudaStream_t stream);
+/// Makes CudaPbdTips::near for so many sweeps and seconds, and says in `count` how many; with
+/// `memory` at nullptr says how much of it that needs [bytes].
+void launch_pbd_near_tips(const CudaPbdField& field, int sweeps, double duration, int* count,
+                          void* memory, std::size_t& bytes, cudaStream_t stream);
 void launch_pbd_flights(const CudaPbdField& field, const CudaPbdFlights& flights,
                         CudaPbdFlight* result, cudaStream_t stream);
 void launch_pbd_changes(const CudaPbdField& field, const std::int32_t* component,

@@ -222,13 +222,14 @@ __device__ __forceinline__ void load_corners(const Triangle& t, const float4* x,
 /// Pushes triangles out of tips, one after the other as the CPU does, by one block of threads, all
 /// of them together; leaves them in step. They look for the next that lies in its tip together, and
 /// one pushes it. Apart, for its doubles would take registers from what each step does.
-__device__ __noinline__ inline void push_out_of_tips(CudaPbdTips tips, const float4* predicted,
-                                                     const float4* v, std::uint8_t* pushed, float h,
+__device__ __noinline__ inline void push_out_of_tips(CudaPbdTips tips, int count,
+                                                     const float4* predicted, const float4* v,
+                                                     std::uint8_t* pushed, float h,
                                                      const CudaPbdCollider* colliders,
                                                      unsigned long long* loads, const float4* x,
                                                      float4* moved) {
   __shared__ int next;
-  const int count = *tips.near_count, thread = static_cast<int>(threadIdx.x);
+  const int thread = static_cast<int>(threadIdx.x);
   Corner corner[3];
   TipPlace found;
   for (int round = 0, from = 0; round < kTipRounds;) {

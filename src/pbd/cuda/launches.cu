@@ -60,8 +60,8 @@ __global__ void __launch_bounds__(kThreads) pbd_touch(CudaPbdField f) {
 
 __global__ void __launch_bounds__(kThreadsOfFew) pbd_touch_tips(CudaPbdField f) {
   const std::size_t first = static_cast<std::size_t>(*f.step) * f.frame->colliders;
-  push_out_of_tips(f.tips, f.predicted, f.v, f.pushed, f.frame->step.h, f.colliders + first,
-                   f.loads + first * kPbdLoadSums, f.x, f.moved);
+  push_out_of_tips(f.tips, f.frame->near_tips, f.predicted, f.v, f.pushed, f.frame->step.h,
+                   f.colliders + first, f.loads + first * kPbdLoadSums, f.x, f.moved);
 }
 
 /// Whether the triangle of a number of CudaPbdTips comes near its tip.
@@ -196,11 +196,11 @@ void launch_pbd_step(const CudaPbdField& field, const CudaPbdColours& colours,
   check_cuda(cudaGetLastError(), "take a step");
 }
 
-void launch_pbd_near_tips(const CudaPbdField& field, int sweeps, double duration, void* memory,
-                          std::size_t& bytes, cudaStream_t stream) {
+void launch_pbd_near_tips(const CudaPbdField& field, int sweeps, double duration, int* count,
+                          void* memory, std::size_t& bytes, cudaStream_t stream) {
   check_cuda(cub::DeviceSelect::If(memory, bytes, thrust::counting_iterator<std::int32_t>(0),
-                                   field.tips.near, field.tips.near_count,
-                                   sweeps * field.tips.count, IsNearTip{field, duration}, stream),
+                                   field.tips.near, count, sweeps * field.tips.count,
+                                   IsNearTip{field, duration}, stream),
              "find what comes near tips");
 }
 

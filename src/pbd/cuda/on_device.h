@@ -52,7 +52,7 @@ struct CudaPbdTissue::OnDevice {
   DeviceArray<pbd::Triangle> triangles;  ///< of the surface, where the scene has tips
   DeviceArray<pbd::TipSweep> tip_sweeps;
   DeviceArray<std::int32_t> near;
-  DeviceArray<int> near_count;
+  PinnedArray<int> near_count;           ///< the GPU writes it here
   DeviceArray<std::uint8_t> tip_memory;  ///< what finding them takes
   double mean_edge = 0;
   bool may_touch = false;
@@ -99,9 +99,8 @@ struct CudaPbdTissue::OnDevice {
     f.bends = bends.set();
     f.touches = touches.set();
     f.dampers = dampers.set();
-    f.tips = {triangles.data(),  static_cast<int>(triangles.size()),
-              tip_sweeps.data(), near.data(),
-              near_count.data(), mean_edge};
+    f.tips = {triangles.data(), static_cast<int>(triangles.size()), tip_sweeps.data(), near.data(),
+              mean_edge};
     f.may_touch = may_touch;
     f.sweeps = sweeps;
     f.frame = frame.data();

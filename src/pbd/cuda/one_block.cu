@@ -129,7 +129,7 @@ __device__ __forceinline__ void project_set(const CudaPbdSet<Kind>& set, const S
 template <bool kTets>
 constexpr int kThreads = kTets ? 512 : 1024;
 
-template <bool kTets, bool kKeep, bool kShared>
+template <bool kTets, bool kKeep, bool kShared, bool kTips>
 __global__ void __launch_bounds__(kThreads<kTets>, 1)
     pbd_steps(CudaPbdField f, CudaPbdFrame frame, int steps, CudaPbdExchange exchange) {
   extern __shared__ float4 places[];
@@ -195,9 +195,9 @@ __global__ void __launch_bounds__(kThreads<kTets>, 1)
                    i, places[i], moved + i);
     }
     __syncthreads();
-    if (f.tips.count > 0) {
-      push_out_of_tips(f.tips, f.predicted, f.v, f.pushed, step.h, f.colliders + first,
-                       f.loads + first * kPbdLoadSums, places, moved);
+    if (kTips) {
+      push_out_of_tips(f.tips, frame.near_tips, f.predicted, f.v, f.pushed, step.h,
+                       f.colliders + first, f.loads + first * kPbdLoadSums, places, moved);
     }
     for (int i = thread; i < f.count; i += threads) {
       take_velocity_of(f, step, i, places + i, moved + i);
@@ -228,26 +228,26 @@ std::size_t motion_bytes(const CudaPbdField& field, const CudaPbdFrame& frame, i
          static_cast<std::size_t>(steps) * frame.colliders * sizeof(CudaPbdCollider);
 }
 
-template <bool kTets, bool kKeep, bool kShared>
+template <bool kTets, bool kKeep, bool kShared, bool kTips>
 void launch_with(const CudaPbdField& field, const CudaPbdFrame& frame, int steps,
                  const CudaPbdExchange& exchange, std::size_t bytes, cudaStream_t stream) {
   check_cuda(
-      cudaFuncSetAttribute(pbd_steps<kTets, kKeep, kShared>,
+      cudaFuncSetAttribute(pbd_steps<kTets, kKeep, kShared, kTips>,
                            cudaFuncAttributeMaxDynamicSharedMemorySize, static_cast<int>(bytes)),
       "set shared memory apart");
-  pbd_steps<kTets, kKeep, kShared>
+  pbd_steps<kTets, kKeep, kShared, kTips>
       <<<1, kThreads<kTets>, bytes, stream>>>(field, frame, steps, exchange);
   check_cuda(cudaGetLastError(), "take the steps of a frame");
 }
 
-template <bool kTets, bool kKeep>
+template <bool kTets, bool kKeep, bool kTips>
 void launch(const CudaPbdField& field, const CudaPbdFrame& frame, int steps,
             const CudaPbdExchange& exchange, cudaStream_t stream) {
   const std::size_t least = shared_bytes(field), all = least + motion_bytes(field, frame, steps);
   if (all <= most_shared_bytes()) {
-    launch_with<kTets, kKeep, true>(field, frame, steps, exchange, all, stream);
+    launch_with<kTets, kKeep, true, kTips>(field, frame, steps, exchange, all, stream);
   } else {
-    launch_with<kTets, kKeep, false>(field, frame, steps, exchange, least, stream);
+    launch_with<kTets, kKeep, false, kTips>(field, frame, steps, exchange, least, stream);
   }
 }
 
@@ -259,14 +259,16 @@ bool fits_pbd_block(const CudaPbdField& field) {
 
 void launch_pbd_steps(const CudaPbdField& field, const CudaPbdFrame& frame, int steps,
                       const CudaPbdExchange& exchange, cudaStream_t stream) {
-  const bool tets = field.elastics.colours + field.strains.colours > 0;
-  if (field.sweeps > 1) {
-    tets ? launch<true, true>(field, frame, steps, exchange, stream)
-         : launch<false, true>(field, frame, steps, exchange, stream);
-  } else {
-    tets ? launch<true, false>(field, frame, steps, exchange, stream)
-         : launch<false, false>(field, frame, steps, exchange, stream);
-  }
+  const bool tets = field.elastics.colours + field.strains.colours > 0, keep = field.sweeps > 1;
+  // Of tips apart: even where none is near, what is done at them takes registers from each step.
+  const auto launch_of = frame.near_tips > 0
+                             ? tets   ? keep ? launch<true, true, true> : launch<true, false, true>
+                                 : keep ? launch<false, true, true>
+                                      : launch<false, false, true>
+                         : tets ? keep ? launch<true, true, false> : launch<true, false, false>
+                         : keep ? launch<false, true, false>
+                                : launch<false, false, false>;
+  launch_of(field, frame, steps, exchange, stream);
 }
 
 }  // namespace pbd

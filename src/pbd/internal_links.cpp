@@ -34,9 +34,9 @@ class Neighbours {
       for (int k = 0; k < 3; ++k) around_[t[k]].push_back(t[(k + 1) % 3]);
     }
   }
-  /// Of the first ring of vertices around `centre` where any has fewer than kMost the one of these
-  /// that is nearest to the place; `centre` where none has.
-  int nearest_with_room(int centre, const Vec3& place, const std::vector<int>& count) {
+  /// Of the first ring of vertices around `centre` where any but `from` has fewer than kMost the
+  /// one of these that is nearest to the place; `centre` where none has.
+  int nearest_with_room(int from, int centre, const Vec3& place, const std::vector<int>& count) {
     ++round_;
     seen_[centre] = round_;
     std::vector<int> ring = {centre};
@@ -50,7 +50,7 @@ class Neighbours {
           seen_[w] = round_;
           next.push_back(w);
           const double d = (mesh_.vertices[w] - place).squaredNorm();
-          if (count[w] >= kMost || d >= least) continue;
+          if (w == from || count[w] >= kMost || d >= least) continue;
           least = d;
           best = w;
         }
@@ -95,7 +95,7 @@ std::vector<InternalLink> find_internal_links(const TriangleMesh& mesh,
         nearest = corner;
       }
     }
-    if (count[nearest] >= kMost) nearest = neighbours.nearest_with_room(nearest, place, count);
+    if (count[nearest] >= kMost) nearest = neighbours.nearest_with_room(v, nearest, place, count);
     ++count[nearest];
     links.push_back(
         {v, nearest, hit.along, tree.is_gap_between(mesh.vertices[v], mesh.vertices[nearest])});

@@ -43,7 +43,9 @@ struct Strain {
     edges_of(v, p);
     const Vector<V> fi = column(p, number, i), fj = column(p, number, j);
     V c = dot(fi, fj);
-    if (i == j) c -= 1.0f;
+    // What is pressed flat comes back by no more than its length at rest: S has next to no slope
+    // there, and a step along it threw tissue that a tool pressed against an anchor.
+    if (i == j) c = greater(c - 1.0f, -2.0f * root(c));
     Vector<V> g[4];
     g[0] = {c * 0.0f, c * 0.0f, c * 0.0f};
     V sum = c * 0.0f, slope2 = sum, mobile = v[0].w;

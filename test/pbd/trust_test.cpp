@@ -200,6 +200,34 @@ TEST_F(PbdTrust, AHeldCylinderOfStrainStays) {
   EXPECT_LT((simulation.tissue().fragments()[0].centroid - Vec3(0, 0, 0.0131)).norm(), 1e-3);
 }
 
+// Strain that a tool pressed flat came back ever further: 6 000 m/s in the first frame.
+TEST_F(PbdTrust, StrainThatIsPressedFlatStays) {
+  Simulation simulation(scene_from_yaml(
+      "{method: pbd, device: cpu, cell_size: 0.006, damping: 0.03, tools: [{name: t, type: punch, "
+      "radius: 0.0164762}], pbd: {elasticity: strain, model: tetrahedra}, bodies: [{shape: "
+      "ellipsoid, radii: [0.0165054, 0.0215638, 0.0258803], pose: {position: [-0.008619, "
+      "0.015494, 0.03101]}}]}"));
+  for (int frame = 0; frame < 10; ++frame) {
+    simulation.set_tool(0, {Vec3(-0.0102039, 0.0132314, 0.018359), Quat(0, 1, 0, 0)});
+    const FrameReport report = simulation.advance_frame();
+    ASSERT_FALSE(report.result.blew_up) << frame;
+    EXPECT_LT(report.result.max_speed, 2) << frame;
+  }
+}
+
+// A link from a vertex to itself, where those around had no room: its state was refused.
+TEST_F(PbdTrust, TheStateOfAThinBodyIsRestored) {
+  Scene scene = mesh_scene(obj({12, 4}, [](double t, double p) {
+    const double wide = std::sin(t) * (1 - t / kPi);
+    return Vec3(50 * wide * std::cos(p), 10 * wide * std::sin(p), 3 * std::cos(t));
+  }));
+  scene.bodies[0].pose.position = Vec3::Zero();
+  Simulation simulation(scene), restored(scene);
+  const std::vector<std::uint8_t> saved = simulation.save();
+  restored.restore({saved.data(), saved.size()});
+  EXPECT_EQ(restored.save(), saved);
+}
+
 // It fell, and a note said so: vertices lie on the face of the region, not in it.
 TEST_F(PbdTrust, AnAnchorAtABodysOwnFaceHoldsIt) {
   for (const char* anchor : {"{below: 0}", "{box: {min: [-1, -1, -1], max: [-0.02, 1, 1]}}",

@@ -58,33 +58,40 @@ void place_triangles(FluidState& s, const FluidWalls& walls, float share,
       512);
 }
 
-/// How far triangles are from where they were listed [m].
-float walls_moved(const FluidLists& lists, const std::vector<float>& corners) {
-  float most2 = 0;
-  for (std::size_t c = 0; c + 2 < corners.size(); c += 3) {
-    const float d[3] = {corners[c] - lists.corners[c], corners[c + 1] - lists.corners[c + 1],
-                        corners[c + 2] - lists.corners[c + 2]};
-    most2 = std::max(most2, dot3(d, d));
-  }
-  return std::sqrt(most2);
+/// The largest f(i) of all below n.
+template <class F>
+float largest(Cpu& cpu, int n, const F& f) {
+  constexpr int kEach = 1024;
+  const int chunks = (n + kEach - 1) / kEach;
+  std::vector<float> of(chunks, 0.0f);
+  cpu.for_each(chunks, [&](int chunk) {
+    float most = 0;
+    for (int i = chunk * kEach; i < std::min(n, (chunk + 1) * kEach); ++i) {
+      most = std::max(most, f(i));
+    }
+    of[chunk] = most;
+  });
+  return chunks > 0 ? *std::max_element(of.begin(), of.end()) : 0;
+}
+
+/// How far triangles that fluid meets are from where they were listed [m].
+float walls_moved(FluidState& s, const std::vector<float>& corners) {
+  const FluidLists& lists = s.lists;
+  return std::sqrt(largest(*s.cpu, static_cast<int>(corners.size() / 3), [&](int c) {
+    const float *x = &corners[std::size_t{3} * c], *y = &lists.corners[std::size_t{3} * c];
+    const float d[3] = {x[0] - y[0], x[1] - y[1], x[2] - y[2]};
+    return dot3(d, d);
+  }));
 }
 
 /// How far particles moved since they were listed [m].
 float particles_moved(FluidState& s) {
   const FluidParticles& p = s.particles;
-  const int chunks = (p.size() + kParticlesEach - 1) / kParticlesEach;
-  std::vector<float> most2(chunks, 0.0f);
-  s.cpu->for_each(chunks, [&](int chunk) {
-    float most = 0;
-    for (int i = chunk * kParticlesEach; i < std::min(p.size(), (chunk + 1) * kParticlesEach);
-         ++i) {
-      const float d[3] = {p.x[0][i] - s.lists.x[0][i], p.x[1][i] - s.lists.x[1][i],
-                          p.x[2][i] - s.lists.x[2][i]};
-      most = std::max(most, dot3(d, d));
-    }
-    most2[chunk] = most;
-  });
-  return std::sqrt(*std::max_element(most2.begin(), most2.end()));
+  return std::sqrt(largest(*s.cpu, p.size(), [&](int i) {
+    const float d[3] = {p.x[0][i] - s.lists.x[0][i], p.x[1][i] - s.lists.x[1][i],
+                        p.x[2][i] - s.lists.x[2][i]};
+    return dot3(d, d);
+  }));
 }
 
 /// Density, pressure and what it weighs.
@@ -93,15 +100,10 @@ void press(FluidState& s, const Substep& step, int i) {
   const FluidKernel& w = s.kernel;
   const float x[3] = {p.x[0][i], p.x[1][i], p.x[2][i]};
   const float sum = p.volume[i] * w.value(0) + neighbour_volume(s, i);
-  WallShare tissue;
-  for (std::int32_t e = s.lists.wall_begin[i]; e < s.lists.wall_begin[i + 1]; ++e) {
-    const WallShare of = triangle_share(w, s.now[s.lists.wall[e]], x);
-    tissue.share += of.share;
-    s.share[e] = of.face;
-  }
-  // Walls at right angles each take their share of what the others leave.
-  const float open = std::max(1 - tissue.share, 0.1f);
-  float clear = open;
+  const float tissue = wall_share(s, i);
+  // Tools at right angles each take their share of what the others leave; what is tissue is none
+  // of theirs.
+  float clear = 1;
   std::uint64_t near = 0;
   for (std::size_t c = 0; c < step.colliders.size(); ++c) {
     const float distance = gap(step.colliders[c], x).distance;
@@ -110,7 +112,8 @@ void press(FluidState& s, const Substep& step, int i) {
     clear *= 1 - plane_share(w, distance).share;
   }
   s.near[i] = near;
-  clear = std::max(clear, 0.05f);
+  const float of_tools = clear;
+  clear = std::max(clear - tissue, 0.05f);
   const float dense = 1 + (sum / (kPacking * clear) - 1) / kResponse;
   const FluidLaw& law = s.laws[p.kind[i]];
   const float damping = kRinging * law.density * law.sound() * 0.5f * w.reach;
@@ -120,13 +123,11 @@ void press(FluidState& s, const Substep& step, int i) {
   // Of the energy that the pressure does work against, the slopes by the sum and by the walls.
   const float slope = p.pressure[i] / (dense * dense * kPacking * kResponse * clear);
   s.motion[4 * static_cast<std::size_t>(i) + 3] = slope;
-  s.strength[i] = p.volume[i] * slope * sum;
-  for (std::int32_t e = s.lists.wall_begin[i]; e < s.lists.wall_begin[i + 1]; ++e) {
-    s.share[e] *= s.strength[i] / open;
-  }
+  s.strength[i] = p.volume[i] * slope * sum / clear;
+  s.tool_strength[i] = s.strength[i] * of_tools;
 }
 
-/// Forces; the speed after them. s.share becomes impulses.
+/// Forces; the speed after them.
 void push(FluidState& s, const Substep& step, ColliderLoad* loads, int i) {
   FluidParticles& p = s.particles;
   const FluidKernel& w = s.kernel;
@@ -134,23 +135,15 @@ void push(FluidState& s, const Substep& step, ColliderLoad* loads, int i) {
   const FluidLaw& law = s.laws[p.kind[i]];
   float force[3] = {};
   add_pair_forces(s, i, force);
-  FluidState::Touch& touch = s.touches[i];
-  touch = {-1, {}};
-  float nearest = 1e30f;
-  for (std::int32_t e = s.lists.wall_begin[i]; e < s.lists.wall_begin[i + 1]; ++e) {
-    if (!(s.share[e] > 0)) continue;
-    const WallTriangle& t = s.now[s.lists.wall[e]];
-    for (int a = 0; a < 3; ++a) force[a] += s.share[e] * t.normal[a];
-    s.share[e] *= step.dt;
-    const float d[3] = {x[0] - t.middle[0], x[1] - t.middle[1], x[2] - t.middle[2]};
-    if (dot3(d, d) < nearest) nearest = dot3(d, d), touch.triangle = s.lists.wall[e];
+  for (int a = 0; a < 3; ++a) {
+    force[a] += s.strength[i] * s.wall_push[3 * static_cast<std::size_t>(i) + a];
   }
   for (std::size_t c = 0; c < step.colliders.size(); ++c) {
     if ((s.near[i] & bit_of(c)) == 0) continue;
     const Gap g = gap(step.colliders[c], x);
     const WallShare of = plane_share(w, g.distance);
     if (!(of.face > 0)) continue;
-    const float push = s.strength[i] * of.face / (1 - of.share);
+    const float push = s.tool_strength[i] * of.face / (1 - of.share);
     float on[3], arm[3], turn[3];
     for (int a = 0; a < 3; ++a) {
       force[a] += push * g.normal[a];
@@ -202,11 +195,10 @@ void stop_at_walls(FluidState& s, float time, int i, const float* x, float* y, f
   const float margin = kRoom * s.spacing;
   const float mass = s.particles.volume[i] * s.laws[s.particles.kind[i]].density;
   FluidState::Touch& touch = s.touches[i];
-  touch.triangle = -1;
   for (int pass = 0; pass < 3; ++pass) {
     float deepest = 0;
     std::int32_t hit = -1;
-    for (std::int32_t e = s.lists.wall_begin[i]; e < s.lists.wall_begin[i + 1]; ++e) {
+    for (std::int32_t e = s.lists.wall_begin[i]; e < s.lists.wall_near[i]; ++e) {
       const std::int32_t t = s.lists.wall[e];
       float raise = 0;
       if (meets(s.now[t], s.next[t], x, y, margin, raise) && raise > deepest) {
@@ -300,16 +292,18 @@ void collect_touches(const FluidState& s, FluidWalls& walls) {
   }
 }
 
-/// Impulses on triangles go to their corners likewise.
-void collect(FluidState& s, FluidWalls& walls) {
+/// What pressure gives triangles in `time` goes to their corners likewise.
+void collect(FluidState& s, float time, FluidWalls& walls) {
   s.cpu->for_each(
       static_cast<int>(s.lists.met.size()),
       [&](int m) {
         const std::int32_t t = s.lists.met[m];
         float sum = 0;
         for (std::int32_t k = s.lists.entry_begin[t]; k < s.lists.entry_begin[t + 1]; ++k) {
-          sum += s.share[s.lists.entry[k]];
+          sum += s.share[s.lists.entry[k]] * s.strength[s.lists.entry_particle[k]];
         }
+        if (sum == 0) return;
+        sum *= time;
         for (int i = 0; i < 9; ++i) {
           walls.impulse[std::size_t{9} * t + i] -= sum * s.now[t].normal[i % 3] / 3;
         }
@@ -328,7 +322,7 @@ void move_walls(FluidState& s, FluidWalls& walls, float duration) {
   s.cpu->for_each(
       p.size(),
       [&](int i) {
-        if (s.lists.wall_begin[i] == s.lists.wall_begin[i + 1]) return;
+        if (s.lists.wall_begin[i] == s.lists.wall_near[i]) return;
         const float x[3] = {p.x[0][i], p.x[1][i], p.x[2][i]};
         float y[3] = {x[0], x[1], x[2]}, v[3] = {p.v[0][i], p.v[1][i], p.v[2][i]};
         stop_at_walls(s, duration, i, x, y, v);
@@ -345,12 +339,13 @@ void move_walls(FluidState& s, FluidWalls& walls, float duration) {
 void substep(FluidState& s, const Substep& step, FluidWalls& walls,
              std::vector<ColliderLoad>& loads) {
   const int n = s.particles.size();
-  for (auto* field : {&s.strength, &s.v_next[0], &s.v_next[1], &s.v_next[2]}) {
+  for (auto* field : {&s.strength, &s.tool_strength, &s.v_next[0], &s.v_next[1], &s.v_next[2]}) {
     field->resize(n);
   }
   s.near.resize(n);
   s.place.resize(4 * static_cast<std::size_t>(n));
   s.motion.resize(4 * static_cast<std::size_t>(n));
+  s.wall_push.resize(3 * static_cast<std::size_t>(n));
   s.share.resize(s.lists.wall.size());
   s.touches.assign(n, {-1, {}});
   std::vector<ColliderLoad> forces(step.colliders.size());
@@ -367,7 +362,7 @@ void substep(FluidState& s, const Substep& step, FluidWalls& walls,
       n, [&](int i) { press(s, step, i); }, kParticlesEach);
   with_loads(s, forces, [&](int i, ColliderLoad* of) { push(s, step, of, i); });
   with_loads(s, forces, [&](int i, ColliderLoad* of) { move(s, step, of, i); });
-  collect(s, walls);
+  collect(s, step.dt, walls);
   for (std::size_t c = 0; c < forces.size(); ++c) {
     for (int a = 0; a < 3; ++a) {
       loads[c].force[a] += step.weight * forces[c].force[a];
@@ -405,9 +400,7 @@ int advance_fluid(FluidState& s, const FluidDrive& drive, FluidWalls& walls,
   for (const FluidLaw& law : s.laws) s.viscosity.push_back(artificial_viscosity(s, law));
   const float skin = 0.15f * s.kernel.reach;
   if (s.lists.corners.size() != walls.end.size()) s.lists.made = false;
-  const bool walls_far = s.lists.made && (walls_moved(s.lists, walls.end) > 0.4f * skin ||
-                                          walls_moved(s.lists, walls.begin) > 0.4f * skin);
-  if (walls_far) s.lists.made = false;
+  if (s.lists.made && walls_moved(s, walls.end) > 0.4f * skin) s.lists.made = false;
   for (int i = 0; i < count; ++i) {
     const bool make = !s.lists.made || particles_moved(s) > 0.4f * skin;
     if (make) list_neighbours(s, walls.end, skin);
@@ -482,7 +475,7 @@ void push_out_of_walls(FluidState& s, const std::vector<float>& corners) {
         const float x[3] = {p.x[0][i], p.x[1][i], p.x[2][i]};
         float nearest = depth;
         std::int32_t behind = -1;
-        for (std::int32_t e = s.lists.wall_begin[i]; e < s.lists.wall_begin[i + 1]; ++e) {
+        for (std::int32_t e = s.lists.wall_begin[i]; e < s.lists.wall_near[i]; ++e) {
           const WallTriangle& t = s.now[s.lists.wall[e]];
           const float above[3] = {x[0] + (depth - t.height(x)) * t.normal[0],
                                   x[1] + (depth - t.height(x)) * t.normal[1],

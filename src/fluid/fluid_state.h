@@ -50,9 +50,11 @@ struct FluidWalls {
 /// Who may act on whom, until anything moved too far. Each frame begins without any: so they, and
 /// with them the order of sums, are by the state that the frame began with.
 struct FluidLists {
-  std::vector<std::int32_t> begin, other;        ///< particles of each
-  std::vector<std::int32_t> wall_begin, wall;    ///< triangles of each
+  std::vector<std::int32_t> begin, other;  ///< particles of each
+  /// Triangles of each: up to wall_near those that it may touch before it is listed again.
+  std::vector<std::int32_t> wall_begin, wall_near, wall;
   std::vector<std::int32_t> entry_begin, entry;  ///< of each triangle, in `wall`
+  std::vector<std::int32_t> entry_particle;      ///< whose they are
   Array<float> x[3];                             ///< particles when they were listed
   std::vector<float> corners;                    ///< and triangles
   std::vector<std::int32_t> met;                 ///< triangles that are in `wall`
@@ -71,11 +73,13 @@ struct FluidState {
 
   // Of a substep.
   std::vector<WallTriangle> now, next;
-  Array<float> share;            ///< of each entry of lists.wall: its impulse [N s]
+  Array<float> share;            ///< of each entry of lists.wall: the kernel over it [1/m]
   std::vector<float> viscosity;  ///< of each law, with what keeps jitter down [Pa s]
   Array<float> place;            ///< of each particle: x, y, z, volume
-  Array<float> motion;    ///< likewise its speed, and what its pressure weighs in a pair [Pa]
-  Array<float> strength;  ///< and at a wall, over what other walls leave [N m]
+  Array<float> motion;         ///< likewise its speed, and what its pressure weighs in a pair [Pa]
+  Array<float> strength;       ///< and at a wall [N m]
+  Array<float> tool_strength;  ///< and at a tool, over what other tools leave [N m]
+  Array<float> wall_push;      ///< of each particle: normals of its walls by `share` [1/m]
   std::vector<std::uint64_t> near;  ///< which colliders it may meet, as bits
   Array<float> v_next[3];
   struct Touch {

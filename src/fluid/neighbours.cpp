@@ -37,22 +37,44 @@ class Cells {
     sorted_.resize(p.size());
     std::vector<std::int32_t> next(begin_.begin(), begin_.end() - 1);
     for (int i = 0; i < p.size(); ++i) sorted_[next[cell[i]]++] = i;
+    for (int a = 0; a < 3; ++a) {
+      x_[a].resize(p.size());
+      for (int k = 0; k < p.size(); ++k) x_[a][k] = p.x[a][sorted_[k]];
+    }
   }
 
-  /// Calls f(particle) for all in the cells that the box from `low` to `high` touches.
+  /// Calls f(particle, squared distance) for all nearer than `reach` to the box from `low` to
+  /// `high`.
   template <class F>
-  void for_each(const float* low, const float* high, const F& f) const {
+  void for_each_within(const float* low, const float* high, float reach, const F& f) const {
+    constexpr std::int32_t kEach = 64;
+    float distance2[kEach];
     int from[3], to[3];
     for (int a = 0; a < 3; ++a) {
-      if (high[a] < low_[a] || low[a] > low_[a] + n_[a] * edge_) return;
-      from[a] = at(low[a], a);
-      to[a] = at(high[a], a);
+      if (high[a] + reach < low_[a] || low[a] - reach > low_[a] + n_[a] * edge_) return;
+      from[a] = at(low[a] - reach, a);
+      to[a] = at(high[a] + reach, a);
     }
     for (int z = from[2]; z <= to[2]; ++z) {
       for (int y = from[1]; y <= to[1]; ++y) {
         const int row = index(0, y, z);
-        for (std::int32_t s = begin_[row + from[0]]; s < begin_[row + to[0] + 1]; ++s) {
-          f(sorted_[s]);
+        const std::int32_t end = begin_[row + to[0] + 1];
+        for (std::int32_t s = begin_[row + from[0]]; s < end; s += kEach) {
+          const std::int32_t count = std::min(kEach, end - s);
+          for (std::int32_t k = 0; k < count; ++k) {  // without branches: many at a time
+            float d2 = 0;
+            for (int a = 0; a < 3; ++a) {
+              const float x = x_[a][s + k];
+              const float under = low[a] - x, over = x - high[a];
+              float d = under > over ? under : over;
+              d = d > 0 ? d : 0;
+              d2 += d * d;
+            }
+            distance2[k] = d2;
+          }
+          for (std::int32_t k = 0; k < count; ++k) {
+            if (distance2[k] < reach * reach) f(sorted_[s + k], distance2[k]);
+          }
         }
       }
     }
@@ -70,30 +92,71 @@ class Cells {
   float edge_, low_[3];
   int n_[3];
   std::vector<std::int32_t> begin_, sorted_;
+  std::vector<float> x_[3];  ///< as sorted
 };
 
-/// Joins the lists of each particle into one.
-void join(const std::vector<std::vector<std::int32_t>>& of, std::vector<std::int32_t>& begin,
-          std::vector<std::int32_t>& all, Cpu& cpu) {
-  begin.assign(of.size() + 1, 0);
-  for (std::size_t i = 0; i < of.size(); ++i) {
-    begin[i + 1] = begin[i] + static_cast<std::int32_t>(of[i].size());
+/// Which triangles are near which particles: by triangle on all threads, then by particle, first
+/// those that it may touch.
+void list_walls(const Cells& cells, const FluidParticles& p, const std::vector<float>& corners,
+                float reach, float near, Cpu& cpu, FluidLists& l) {
+  constexpr int kEach = 256;
+  struct Chunk {
+    std::vector<std::int32_t> particle;  // by triangle
+    std::vector<std::uint8_t> near;
+  };
+  const int triangles = static_cast<int>(corners.size() / 9);
+  std::vector<Chunk> chunks((triangles + kEach - 1) / kEach);
+  l.entry_begin.assign(triangles + 1, 0);
+  cpu.for_each(static_cast<int>(chunks.size()), [&](int chunk) {
+    Chunk& all = chunks[chunk];
+    for (int t = chunk * kEach; t < std::min(triangles, (chunk + 1) * kEach); ++t) {
+      const float* c = &corners[std::size_t{9} * t];
+      float low[3], high[3];
+      for (int a = 0; a < 3; ++a) {
+        low[a] = std::min({c[a], c[3 + a], c[6 + a]});
+        high[a] = std::max({c[a], c[3 + a], c[6 + a]});
+      }
+      const std::size_t before = all.particle.size();
+      cells.for_each_within(low, high, reach, [&](std::int32_t i, float distance2) {
+        all.particle.push_back(i);
+        all.near.push_back(distance2 < near * near ? 1 : 0);
+      });
+      l.entry_begin[t + 1] = static_cast<std::int32_t>(all.particle.size() - before);
+    }
+  });
+  l.wall_begin.assign(p.size() + 1, 0);
+  l.wall_near.assign(p.size(), 0);
+  for (const Chunk& all : chunks) {
+    for (std::size_t k = 0; k < all.particle.size(); ++k) {
+      ++l.wall_begin[all.particle[k] + 1];
+      l.wall_near[all.particle[k]] += all.near[k];
+    }
   }
-  all.resize(begin.back());
-  cpu.for_each(
-      static_cast<int>(of.size()),
-      [&](int i) { std::copy(of[i].begin(), of[i].end(), all.begin() + begin[i]); }, 256);
-}
-
-float distance2(const float* corners, const float* x) {  // of the triangle's box
-  float d2 = 0;
-  for (int a = 0; a < 3; ++a) {
-    const float low = std::min({corners[a], corners[3 + a], corners[6 + a]});
-    const float high = std::max({corners[a], corners[3 + a], corners[6 + a]});
-    const float d = std::max({low - x[a], x[a] - high, 0.0f});
-    d2 += d * d;
+  for (int i = 0; i < p.size(); ++i) {
+    l.wall_begin[i + 1] += l.wall_begin[i];
+    l.wall_near[i] += l.wall_begin[i];
   }
-  return d2;
+  std::vector<std::int32_t> next(l.wall_begin.begin(), l.wall_begin.end() - 1);
+  std::vector<std::int32_t> next_far = l.wall_near;
+  for (std::vector<std::int32_t>* field : {&l.wall, &l.entry, &l.entry_particle}) {
+    field->resize(l.wall_begin.back());
+  }
+  l.met.clear();
+  std::int32_t entry = 0;
+  for (int t = 0; t < triangles; ++t) {
+    const std::int32_t count = l.entry_begin[t + 1];
+    if (count > 0) l.met.push_back(t);
+    l.entry_begin[t + 1] = entry + count;
+    const Chunk& all = chunks[t / kEach];
+    const std::int32_t of_chunk = l.entry_begin[t / kEach * kEach];
+    for (; entry < l.entry_begin[t + 1]; ++entry) {
+      const std::int32_t i = all.particle[entry - of_chunk];
+      const std::int32_t e = all.near[entry - of_chunk] != 0 ? next[i]++ : next_far[i]++;
+      l.wall[e] = t;
+      l.entry[entry] = e;
+      l.entry_particle[entry] = i;
+    }
+  }
 }
 
 }  // namespace
@@ -102,7 +165,7 @@ void list_neighbours(FluidState& s, const std::vector<float>& corners, float ski
   const FluidParticles& p = s.particles;
   FluidLists& l = s.lists;
   const float reach = s.kernel.reach + skin;
-  const Cells cells(p, reach);
+  const Cells cells(p, 0.5f * reach);
   constexpr int kEach = 128;
   const int chunks = (p.size() + kEach - 1) / kEach;
   std::vector<std::vector<std::int32_t>> of_chunk(chunks);
@@ -112,11 +175,8 @@ void list_neighbours(FluidState& s, const std::vector<float>& corners, float ski
     all.reserve(kEach * 128);
     for (int i = chunk * kEach; i < std::min(p.size(), (chunk + 1) * kEach); ++i) {
       const float x[3] = {p.x[0][i], p.x[1][i], p.x[2][i]};
-      const float low[3] = {x[0] - reach, x[1] - reach, x[2] - reach};
-      const float high[3] = {x[0] + reach, x[1] + reach, x[2] + reach};
-      cells.for_each(low, high, [&](std::int32_t j) {
-        const float d[3] = {p.x[0][j] - x[0], p.x[1][j] - x[1], p.x[2][j] - x[2]};
-        if (j != i && dot3(d, d) < reach * reach) all.push_back(j);
+      cells.for_each_within(x, x, reach, [&](std::int32_t j, float) {
+        if (j != i) all.push_back(j);
       });
       l.begin[i + 1] = static_cast<std::int32_t>(all.size());
     }
@@ -132,37 +192,7 @@ void list_neighbours(FluidState& s, const std::vector<float>& corners, float ski
     std::copy(of_chunk[chunk].begin(), of_chunk[chunk].end(),
               l.other.begin() + l.begin[chunk * kEach]);
   });
-  std::vector<std::vector<std::int32_t>> found(p.size());
-  const int triangles = static_cast<int>(corners.size() / 9);
-  for (int t = 0; t < triangles; ++t) {  // in turn: lists are by number
-    const float* c = &corners[std::size_t{9} * t];
-    float low[3], high[3];
-    for (int a = 0; a < 3; ++a) {
-      low[a] = std::min({c[a], c[3 + a], c[6 + a]}) - reach;
-      high[a] = std::max({c[a], c[3 + a], c[6 + a]}) + reach;
-    }
-    WallTriangle triangle;
-    std::copy_n(c, 9, &triangle.corner[0][0]);
-    triangle.finish();
-    cells.for_each(low, high, [&](std::int32_t i) {
-      const float x[3] = {p.x[0][i], p.x[1][i], p.x[2][i]};
-      if (triangle.height(x) < -2 * skin - s.spacing) return;  // it is far behind
-      if (distance2(c, x) < reach * reach) found[i].push_back(t);
-    });
-  }
-  join(found, l.wall_begin, l.wall, *s.cpu);
-  l.entry_begin.assign(triangles + 1, 0);
-  for (const std::int32_t t : l.wall) ++l.entry_begin[t + 1];
-  l.met.clear();
-  for (int t = 0; t < triangles; ++t) {
-    if (l.entry_begin[t + 1] > 0) l.met.push_back(t);
-  }
-  for (int t = 0; t < triangles; ++t) l.entry_begin[t + 1] += l.entry_begin[t];
-  l.entry.resize(l.wall.size());
-  std::vector<std::int32_t> next(l.entry_begin.begin(), l.entry_begin.end() - 1);
-  for (std::size_t e = 0; e < l.wall.size(); ++e) {
-    l.entry[next[l.wall[e]]++] = static_cast<std::int32_t>(e);
-  }
+  list_walls(cells, p, corners, reach, 0.5f * s.kernel.reach, *s.cpu, l);
   for (int a = 0; a < 3; ++a) l.x[a] = p.x[a];
   l.corners = corners;
   l.made = true;

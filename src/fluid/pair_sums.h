@@ -1,4 +1,5 @@
-// Sums over a particle's neighbours, eight at a time: the same bits with any instructions.
+// Sums over a particle's neighbours, and over the walls near it, eight at a time: the same bits
+// with any instructions.
 #pragma once
 
 #include "fluid/fluid_state.h"
@@ -10,5 +11,10 @@ float neighbour_volume(const FluidState& state, int i);
 
 /// Adds what pressure and viscosity of its neighbours do to a particle [N].
 void add_pair_forces(const FluidState& state, int i, float* force);
+
+/// Share of a particle's kernel that the triangles of its list enclose, as they are in state.now;
+/// of each the kernel's integral over it goes to state.share, the sum of their normals by that to
+/// state.wall_push [1/m].
+float wall_share(FluidState& state, int i);
 
 }  // namespace tissue_sim

@@ -34,18 +34,19 @@ Scene dish(bool full, int threads) {
   for (const double side : {-1.0, 1.0}) {
     wall.name = side < 0 ? "left" : "right";
     wall.pose.position = Vec3(0.07 * side, 0, 0.0261);
+    wall.anchors[0].z = 0.0121;  // its lowest cells
     scene.bodies.push_back(wall);
   }
   Pool pool;
   pool.region.kind = Region::Kind::kBox;
-  pool.region.min = Vec3(-0.0615, -0.0465, 0.0095);
-  pool.region.max = Vec3(0.0615, 0.0465, 0.0335);  // 10 000 particles
+  pool.region.min = Vec3(-0.064, -0.048, 0.008);
+  pool.region.max = Vec3(0.064, 0.048, 0.032);  // 10 000 particles
   if (full) scene.pools = {pool};
   for (int k = 0; k < 2; ++k) {
     Tool plate;
     plate.name = "plate" + std::to_string(k);
     plate.type = ToolType::kPlate;
-    plate.size = Vec3(0.3, 0.1, 0.01);
+    plate.size = Vec3(0.3, 0.14, 0.01);
     scene.tools.push_back(plate);
   }
   return scene;
@@ -65,7 +66,7 @@ void add_fluid_rows() {
             FrameRequest request;
             for (const double side : {-1.0, 1.0}) {
               ToolRequest plate;
-              plate.pose = {Vec3(0, 0.0495 * side, 0.06),
+              plate.pose = {Vec3(0, 0.0482 * side, 0.06),
                             Quat::FromTwoVectors(Vec3::UnitZ(), Vec3(0, -side, 0))};
               request.tools.emplace_back(plate);
             }

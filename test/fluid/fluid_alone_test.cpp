@@ -68,6 +68,30 @@ TEST(Fluid, PressesByItsDepth) {
   RecordProperty("height", std::to_string(height / kHeight));
 }
 
+/// A block that is held under water: the bottom of the tank bears the water that it displaces, too.
+TEST(Fluid, CarriesABlockAsArchimedesHasIt) {
+  constexpr double kSide = 0.04, kSpacing = 0.004, kBlock = 0.016;
+  Scene scene = pool_scene({0, 0, 0}, {kSide, kSide, 0.044}, kSpacing);
+  scene.damping = 6;
+  scene.bodies[0].size = Vec3::Constant(kBlock);
+  scene.bodies[0].pose.position = Vec3(kSide / 2, kSide / 2, 0.022);
+  scene.bodies[0].anchors = {held_below(1)};
+  const auto walls = tank({0, 0, 0}, {kSide, kSide, 0.12});
+  add_tools(walls, scene);
+  Simulation simulation(scene);
+  const double density = find_fluid(scene, "water").density;
+  const double weight = density * kGravity * simulation.tissue().fluid_volumes()[0].total;
+  FrameRequest request = stand(walls);
+  constexpr int kSettle = 30, kFrames = 20;
+  double bottom = 0;
+  for (int i = 0; i < kSettle + kFrames; ++i) {
+    const FrameReport report = simulation.advance_frame(request);
+    request = {};
+    if (i >= kSettle) bottom -= report.result.loads[0].mean.force.z() / kFrames;
+  }
+  EXPECT_NEAR((bottom - weight) / (density * kGravity * std::pow(kBlock, 3)), 1, 0.03);
+}
+
 /// Martin and Moyce 1952, a column twice as high as it is wide: where its front is.
 TEST(Fluid, BreaksADamAsWasMeasured) {
   constexpr double kWidth = 0.05715, kSpacing = 0.004, kDepth = 0.028;

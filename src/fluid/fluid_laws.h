@@ -65,14 +65,14 @@ TISSUE_SIM_INLINE void cross3(const float* a, const float* b, float* c) {
   c[2] = a[0] * b[1] - a[1] * b[0];
 }
 
-/// A triangle of tissue's surface as a place of fluid meets it.
-struct WallTriangle {
-  float corner[3][3];  ///< counter-clockwise seen from the fluid [m]
+/// A triangle of tissue's surface as a place of fluid meets it: what is seen from afar lies first.
+struct alignas(32) WallTriangle {
+  float middle[3];     ///< [m]
+  float radius;        ///< of the ball about the middle that it is in [m]
   float normal[3];     ///< unit, into the fluid; 0 of a triangle without area
   float area;          ///< [m^2]
-  float middle[3];     ///< [m]
+  float corner[3][3];  ///< counter-clockwise seen from the fluid [m]
   float edge2;         ///< longest edge, squared [m^2]
-  float radius;        ///< of the ball about the middle that it is in [m]
 
   TISSUE_SIM_INLINE void finish() {
     float a[3], b[3];

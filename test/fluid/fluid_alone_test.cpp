@@ -154,6 +154,7 @@ TEST(Fluid, CarriesABlockAsArchimedesHasIt) {
     mean += carried / displaced / kFrames;
     worst = std::max(worst, std::fabs(carried / displaced - 1));
   }
+  RecordProperty("carried", std::to_string(mean) + " " + std::to_string(worst));
   EXPECT_NEAR(mean, 1, 0.05);
   EXPECT_LT(worst, 0.2);  // and the water is at rest beside edges and corners
 }
@@ -197,7 +198,9 @@ TEST(Fluid, FloatsABlockAsDeepAsItsDensityHasIt) {
     }
     depth += (level / count - low) / kHeight / kFrames;
   }
-  EXPECT_NEAR(depth / (500 / find_fluid(scene, "water").density), 1, 0.05);
+  const double off = depth / (500 / find_fluid(scene, "water").density);
+  RecordProperty("off", std::to_string(off));
+  EXPECT_NEAR(off, 1, 0.05);
 }
 
 /// Martin and Moyce 1952, a column twice as high as it is wide: where its front is.

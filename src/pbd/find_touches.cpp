@@ -24,6 +24,14 @@ constexpr double kSlack = 1e-3;
 /// Share of an overlap that a frame takes back: all at once would shake what lies in scraps.
 constexpr double kRecovery = 0.1;
 
+/// So far ahead each triangle looks, whatever moves how fast, and no farther than [mean edges].
+constexpr double kLeastReach = 0.3, kMostReach = 2.5;
+/// What goes no farther in the frame is looked up apart from the rest [mean edges]: else all would
+/// be looked for as far around as the fastest comes from.
+constexpr double kSlow = 0.1;
+/// Cells of vertices: a prism overlaps eight to twelve [mean edges].
+constexpr double kCell = 2;
+
 /// Vertices of a piece that touches others, at least: crumbs, slivers for the most part, shook.
 constexpr int kLeastPiece = 60;
 
@@ -78,87 +86,105 @@ void find_touches(State& s, double duration) {
   std::vector<int> vertices_of(s.components, 0);
   for (const std::int32_t c : s.component) ++vertices_of[c];
   const auto is_crumb = [&](std::int32_t i) { return vertices_of[s.component[i]] < kLeastPiece; };
-  double fastest = 0;
   std::vector<Vec3> normal(v.size(), Vec3::Zero());
-  for (int i = 0; i < v.size(); ++i) fastest = std::max(fastest, v.velocity(i).norm());
+  std::vector<float> way(v.size());  // of each vertex in the frame [m]
+  float farthest = 0;
+  for (int i = 0; i < v.size(); ++i) {
+    way[i] = static_cast<float>(duration * v.velocity(i).norm());
+    if (!is_crumb(i)) farthest = std::max(farthest, way[i]);
+  }
   for (const Triangle& t : s.triangles) {
     const Vec3 a = v.position(t[0]);
     const Vec3 n = (v.position(t[1]) - a).cross(v.position(t[2]) - a);
     for (const std::int32_t i : t) normal[i] += n;
   }
-  const double reach = std::min(2.5, 0.3 + 2 * fastest * duration / s.mean_edge) * s.mean_edge;
-  // Where each piece may touch another: what lies in no other's box is left out.
-  const auto reaches = [&](const Triangle& t) {
-    const Vec3 a = v.position(t[0]), b = v.position(t[1]), c = v.position(t[2]);
-    return std::max(reach, kDeepest * s.mean_edge) +
-           2 * kBeside * ((b - a).norm() + (c - a).norm());
+  // How far above a triangle a vertex may be that comes to it on a way of its own.
+  const auto reach = [&](const Triangle& t, double own) {
+    const double both = std::max({way[t[0]], way[t[1]], way[t[2]]}) + own;
+    return std::min(kMostReach * s.mean_edge, kLeastReach * s.mean_edge + both);
   };
+  // Where a triangle looks for vertices: above it, beside it by a little, and in it, a prism.
+  const auto looks = [&](const Triangle& t, double own) {
+    const Vec3 a = v.position(t[0]), b = v.position(t[1]), c = v.position(t[2]);
+    const Vec3 middle = (a + b + c) / 3, up = (b - a).cross(c - a).stableNormalized();
+    Box box;
+    for (const Vec3& corner : {a, b, c}) {
+      const Vec3 wide = middle + (1 + 3 * kBeside) * (corner - middle);
+      for (const double height : {reach(t, own), -kDeepest * s.mean_edge}) {
+        box.min = box.min.cwiseMin(wide + height * up);
+        box.max = box.max.cwiseMax(wide + height * up);
+      }
+    }
+    return box;
+  };
+  const int count = static_cast<int>(s.triangles.size());
+  const int parts = (count + kTrianglesOfPart - 1) / kTrianglesOfPart;
+  const auto each_triangle = [&](const auto& f) {  // f(triangle, part)
+    s.cpu.for_each(parts, [&](int part) {
+      const int end = std::min(count, (part + 1) * kTrianglesOfPart);
+      for (int k = part * kTrianglesOfPart; k < end; ++k) f(k, part);
+    });
+  };
+  std::vector<Box> seen(count);  // by each triangle, for the farthest way
+  each_triangle([&](int k, int) { seen[k] = looks(s.triangles[k], farthest); });
+  // Where each piece is, and where it looks: what lies in no other's box is left out.
   std::vector<Box> places(s.components), reached(s.components);
-  for (const Triangle& t : s.triangles) {
+  for (int k = 0; k < count; ++k) {
+    const Triangle& t = s.triangles[k];
     if (is_crumb(t[0])) continue;
-    const Vec3 far = Vec3::Constant(reaches(t));
     Box &place = places[s.component[t[0]]], &wide = reached[s.component[t[0]]];
     for (const std::int32_t i : t) {
       const Vec3 x = v.position(i);
       place.min = place.min.cwiseMin(x);
       place.max = place.max.cwiseMax(x);
-      wide.min = wide.min.cwiseMin(x - far);
-      wide.max = wide.max.cwiseMax(x + far);
     }
+    wide.min = wide.min.cwiseMin(seen[k].min);
+    wide.max = wide.max.cwiseMax(seen[k].max);
   }
   std::vector<std::int32_t> large;
   for (std::int32_t c = 0; c < s.components; ++c) {
     if (places[c].min.x() <= places[c].max.x()) large.push_back(c);
   }
-  const auto meets_other = [&](std::int32_t piece, const Vec3& low, const Vec3& high,
-                               const std::vector<Box>& boxes) {
+  const auto meets_other = [&](std::int32_t piece, const Box& box, const std::vector<Box>& boxes) {
     return std::any_of(large.begin(), large.end(), [&](std::int32_t c) {
-      return c != piece && (high - boxes[c].min).minCoeff() >= 0 &&
-             (boxes[c].max - low).minCoeff() >= 0;
+      return c != piece && (box.max - boxes[c].min).minCoeff() >= 0 &&
+             (boxes[c].max - box.min).minCoeff() >= 0;
     });
   };
-  TouchCells cells(s.mean_edge);
+  struct Kind {  // the slow, and what is faster
+    TouchCells cells;
+    float farthest;  ///< of their ways [m]
+  };
+  const auto slow = static_cast<float>(kSlow * s.mean_edge);
+  Kind kinds[] = {{TouchCells(kCell * s.mean_edge), std::min(slow, farthest)},
+                  {TouchCells(kCell * s.mean_edge), farthest}};
   for (int i = 0; i < v.size(); ++i) {
     const Vec3 x = v.position(i);
-    if (v.surface[i] != 0 && !is_crumb(i) && meets_other(s.component[i], x, x, reached)) {
-      cells.add(i, s.component[i], x, normal[i]);
+    if (v.surface[i] != 0 && !is_crumb(i) && meets_other(s.component[i], {x, x}, reached)) {
+      kinds[way[i] > slow].cells.add(i, s.component[i], x, normal[i]);
     }
   }
   struct Candidate {
     std::int32_t triangle;
-    int level;
-    Vec3 low, high;  ///< of where it looks
+    int kind, level;
+    Box box;  ///< where it looks
   };
-  const int count = static_cast<int>(s.triangles.size());
-  const int parts = (count + kTrianglesOfPart - 1) / kTrianglesOfPart;
   std::vector<std::vector<Candidate>> candidates(parts);
-  const auto look = [&](std::int32_t k, std::vector<Candidate>& found) {
+  each_triangle([&](int k, int part) {
     const Triangle& t = s.triangles[k];
-    if (is_crumb(t[0])) return;
-    const Vec3 a = v.position(t[0]), b = v.position(t[1]), c = v.position(t[2]);
-    const Vec3 low = a.cwiseMin(b).cwiseMin(c), high = a.cwiseMax(b).cwiseMax(c);
-    const Vec3 far = Vec3::Constant(reaches(t));
-    if (!meets_other(s.component[t[0]], low - far, high + far, places)) return;
-    if (is_sliver(a, b, c, s.mean_edge)) return;
-    // What is above it, beside it by a little, or in it: a prism.
-    const Vec3 middle = (a + b + c) / 3, up = (b - a).cross(c - a).stableNormalized();
-    Vec3 from = Vec3::Constant(1e300), to = -from;
-    for (const Vec3& corner : {a, b, c}) {
-      const Vec3 wide = middle + (1 + 3 * kBeside) * (corner - middle);
-      for (const double height : {reach, -kDeepest * s.mean_edge}) {
-        from = from.cwiseMin(wide + height * up);
-        to = to.cwiseMax(wide + height * up);
-      }
+    const std::int32_t piece = s.component[t[0]];
+    if (is_crumb(t[0]) || !meets_other(piece, seen[k], places)) return;
+    if (is_sliver(v.position(t[0]), v.position(t[1]), v.position(t[2]), s.mean_edge)) return;
+    for (int kind = 0; kind < 2; ++kind) {
+      const TouchCells& cells = kinds[kind].cells;
+      if (cells.empty()) continue;
+      const Box box = kind == 0 ? looks(t, kinds[0].farthest) : seen[k];
+      const int level = meets_other(piece, box, places) ? cells.level_of(box.min, box.max) : -1;
+      if (level >= 0) candidates[part].push_back({k, kind, level, box});
     }
-    const int level = cells.level_of(from, to);
-    if (level >= 0) found.push_back({k, level, from, to});
-  };
-  s.cpu.for_each(parts, [&](int part) {
-    const int end = std::min(count, (part + 1) * kTrianglesOfPart);
-    for (int k = part * kTrianglesOfPart; k < end; ++k) look(k, candidates[part]);
   });
   for (const std::vector<Candidate>& of_part : candidates) {
-    for (const Candidate& candidate : of_part) cells.fill(candidate.level);
+    for (const Candidate& candidate : of_part) kinds[candidate.kind].cells.fill(candidate.level);
   }
   struct Found {
     std::int32_t vertex, piece, triangle;
@@ -172,18 +198,18 @@ void find_touches(State& s, double duration) {
       const Triangle& t = s.triangles[candidate.triangle];
       const std::int32_t piece = s.component[t[0]];
       const TouchedTriangle plane(v.position(t[0]), v.position(t[1]), v.position(t[2]));
-      cells.each_in(candidate.level, candidate.low, candidate.high, piece,
-                    [&](const TouchCells::Entry& e) {
-                      const Above at = plane.above(Vec3(e.x[0], e.x[1], e.x[2]));
-                      if (!(at.height < reach && at.height > -kDeepest * s.mean_edge)) return;
-                      if (at.beside() > kBeside) return;
-                      // What does not face it is the far side, or a wall that the vertex would
-                      // stumble over.
-                      if (plane.up.dot(Vec3(e.normal[0], e.normal[1], e.normal[2])) > kFacing)
-                        return;
-                      const double off = std::fabs(at.height) + at.beside() * s.mean_edge;
-                      of_parts[part].push_back({e.vertex, piece, candidate.triangle, -1, off, at});
-                    });
+      kinds[candidate.kind].cells.each_in(
+          candidate.level, candidate.box.min, candidate.box.max, piece,
+          [&](const TouchCells::Entry& e) {
+            const Above at = plane.above(Vec3(e.x[0], e.x[1], e.x[2]));
+            if (!(at.height < reach(t, way[e.vertex]) && at.height > -kDeepest * s.mean_edge))
+              return;
+            if (at.beside() > kBeside) return;
+            // What does not face it is the far side, or a wall that the vertex would stumble over.
+            if (plane.up.dot(Vec3(e.normal[0], e.normal[1], e.normal[2])) > kFacing) return;
+            const double off = std::fabs(at.height) + at.beside() * s.mean_edge;
+            of_parts[part].push_back({e.vertex, piece, candidate.triangle, -1, off, at});
+          });
     }
   });
   // The nearest of each other piece.

@@ -186,7 +186,7 @@ bool follow_anchors(State& s, Span<const AnchorMotion> anchors, double duration)
 std::vector<Wrench> anchor_loads(const State& s, Span<const AnchorMotion> anchors, float h);
 
 /// Elastic energy of all constraints that have a compliance [J].
-double elastic_energy(const State& s);
+double elastic_energy(State& s);
 
 }  // namespace pbd
 }  // namespace tissue_sim

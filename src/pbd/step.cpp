@@ -214,11 +214,10 @@ double sum_energy(const State& s, const ConstraintSet<Kind>& set) {
 
 }  // namespace
 
-double elastic_energy(const State& s) {
-  double sum = sum_energy(s, s.links);
-  sum += sum_energy(s, s.bends);
-  sum += sum_energy(s, s.elastics);
-  return sum;
+double elastic_energy(State& s) {
+  double links = 0, angles = 0;
+  s.cpu.both([&] { links = sum_energy(s, s.links); }, [&] { angles = sum_energy(s, s.bends); });
+  return links + angles + sum_energy(s, s.elastics);
 }
 
 }  // namespace pbd

@@ -39,7 +39,7 @@ std::uint64_t pair_key(std::int32_t a, std::int32_t b) {
 template <class Kind>
 class OldColours {
  public:
-  explicit OldColours(ConstraintSet<Kind>& set) {
+  void take(ConstraintSet<Kind>& set) {
     for (int c = 0; c < set.size(); ++c) colours_.emplace_back(set.vertices[c], set.colour[c]);
     std::stable_sort(colours_.begin(), colours_.end(),
                      [](const Coloured& a, const Coloured& b) { return a.first < b.first; });
@@ -75,28 +75,39 @@ struct MeshEdge {
 /// By a, then b.
 std::vector<MeshEdge> mesh_edges(const State& s) {
   struct Half {
-    std::uint64_t key;
-    std::int32_t opposite;
+    std::int32_t b, opposite;
     double area;
   };
-  std::vector<Half> halves;
-  halves.reserve(3 * s.triangles.size());
+  // Those of a vertex lie side by side, each in the order of the triangles.
+  std::vector<std::int32_t> end(s.vertices.size() + 1, 0);
+  const auto low = [](const Triangle& t, int i) { return std::min(t[i], t[(i + 1) % 3]); };
+  for (const Triangle& t : s.triangles) {
+    for (int i = 0; i < 3; ++i) ++end[low(t, i) + 1];
+  }
+  for (int v = 0; v < s.vertices.size(); ++v) end[v + 1] += end[v];
+  std::vector<Half> halves(3 * s.triangles.size());
   for (const Triangle& t : s.triangles) {
     const double area = area_of(s, t);
-    for (int i = 0; i < 3; ++i)
-      halves.push_back({pair_key(t[i], t[(i + 1) % 3]), t[(i + 2) % 3], area});
+    for (int i = 0; i < 3; ++i) {
+      halves[end[low(t, i)]++] = {std::max(t[i], t[(i + 1) % 3]), t[(i + 2) % 3], area};
+    }
   }
-  std::stable_sort(halves.begin(), halves.end(),
-                   [](const Half& p, const Half& q) { return p.key < q.key; });
   std::vector<MeshEdge> edges;
-  for (const Half& h : halves) {
-    const auto a = static_cast<std::int32_t>(h.key >> 32), b = static_cast<std::int32_t>(h.key);
-    if (edges.empty() || edges.back().a != a || edges.back().b != b) {
-      edges.push_back({a, b, h.opposite, -1, 1, h.area, h.area});
-    } else {
-      if (++edges.back().count == 2) edges.back().right = h.opposite;
-      edges.back().area += h.area;
-      edges.back().least_area = std::min(edges.back().least_area, h.area);
+  edges.reserve(halves.size() / 2);
+  std::int32_t first = 0;
+  for (int a = 0; a < s.vertices.size(); first = end[a++]) {
+    std::stable_sort(halves.begin() + first, halves.begin() + end[a],
+                     [](const Half& p, const Half& q) { return p.b < q.b; });
+    for (std::int32_t h = first; h < end[a]; ++h) {
+      const Half& half = halves[h];
+      if (h == first || edges.back().b != half.b) {
+        edges.push_back({a, half.b, half.opposite, -1, 1, half.area, half.area});
+        continue;
+      }
+      MeshEdge& edge = edges.back();
+      if (++edge.count == 2) edge.right = half.opposite;
+      edge.area += half.area;
+      edge.least_area = std::min(edge.least_area, half.area);
     }
   }
   return edges;
@@ -189,8 +200,9 @@ bool stays_on_its_side(const TriangleMesh& mesh, const std::map<int, Vec3>& side
 }  // namespace
 
 void make_surface_constraints(State& s) {
-  const OldColours<Distance> links(s.links);
-  const OldColours<Bending> bends(s.bends);
+  OldColours<Distance> links;
+  OldColours<Bending> bends;
+  s.cpu.both([&] { links.take(s.links); }, [&] { bends.take(s.bends); });
   const PbdOptions& pbd = s.scene.pbd;
   const bool tets = pbd.model == PbdModel::kTetrahedra;
   if (tets && pbd.elasticity == PbdElasticity::kMaterial) return;
@@ -243,8 +255,7 @@ void make_surface_constraints(State& s) {
     add_link(s, p.a, p.b,
              pbd.internal * material(p.a, p.b).young_modulus * p.area / (x[p.a] - x[p.b]).norm());
   }
-  links.restore(s.links);
-  bends.restore(s.bends);
+  s.cpu.both([&] { links.restore(s.links); }, [&] { bends.restore(s.bends); });
   for (int i = 0; i < s.vertices.size(); ++i) s.vertices.whole_links[i] = 0;
   for (const auto& l : s.links.vertices) {
     for (const std::int32_t v : l) ++s.vertices.whole_links[v];

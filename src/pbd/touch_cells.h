@@ -28,6 +28,7 @@ class TouchCells {
     const Eigen::Vector3f at = x.cast<float>(), n = normal.stableNormalized().cast<float>();
     entries_.push_back({{at[0], at[1], at[2]}, {n[0], n[1], n[2]}, vertex, piece});
   }
+  bool empty() const { return entries_.empty(); }
   /// Which lattice a box is to be looked up in; -1 for none.
   int level_of(const Vec3& low, const Vec3& high) const {
     if (!low.allFinite() || !high.allFinite()) return -1;

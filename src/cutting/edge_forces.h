@@ -52,7 +52,9 @@ inline EdgeStand stand_of(const EdgePiece& piece, const Collider& c) {
     }
     return r;
   };
-  const Vec3 arm = turned(piece.middle);
+  Vec3 middle = piece.middle;
+  if (c.kind == Collider::kPlate) middle.x() += 0.5 * c.width;  // its origin is at its middle
+  const Vec3 arm = turned(middle);
   const Vec3 spin(c.spin[0], c.spin[1], c.spin[2]);
   EdgeStand s;
   s.x = Vec3(c.position[0], c.position[1], c.position[2]) + arm;
@@ -187,16 +189,16 @@ void look_for_edges(Tissue& tissue, const FrameInput& input, double begin, Resis
   Box box;
   for (std::size_t i = 0; i < edges.pieces.size(); ++i) {
     const EdgePiece& piece = edges.pieces[i];
-    const ToolMotion& motion = input.tools[piece.tool];
-    if (!motion.present) {
+    if (!input.tools[piece.tool].present) {
       edges.holds[i] = {};
       continue;
     }
-    const Pose from = pose_at(motion, begin);
+    const Pose from = edges.blade_of(piece, input, begin);
     if (still_holds(piece, from, edges.holds[i])) continue;
     edges.holds[i] = {};
+    if (!edges.seeks(piece, input, begin)) continue;
     seek.push_back(i);
-    const Vec3 a = from * piece.middle, b = motion.end * piece.middle;
+    const Vec3 a = from * piece.middle, b = edges.blade_of(piece, input, 1) * piece.middle;
     for (const Vec3& x : {a, Vec3(a + kBeyond * (b - a))}) {
       box.min = box.min.cwiseMin(x - Vec3::Constant(cell));
       box.max = box.max.cwiseMax(x + Vec3::Constant(cell));
@@ -206,9 +208,9 @@ void look_for_edges(Tissue& tissue, const FrameInput& input, double begin, Resis
   tissue.each(static_cast<int>(seek.size()), [&](int k) {
     const EdgePiece& piece = edges.pieces[seek[k]];
     EdgeHold& hold = edges.holds[seek[k]];
-    const ToolMotion& motion = input.tools[piece.tool];
-    const Pose from = pose_at(motion, begin);
-    const Vec3 a = from * piece.middle, way = kBeyond * (motion.end * piece.middle - a);
+    const Pose from = edges.blade_of(piece, input, begin);
+    const Vec3 a = from * piece.middle;
+    const Vec3 way = kBeyond * (edges.blade_of(piece, input, 1) * piece.middle - a);
     const Vec3 normal = from.orientation * Vec3::UnitY();
     const int steps =
         std::min(kMostSteps, static_cast<int>(std::ceil(way.norm() / (kStep * cell))));
@@ -261,6 +263,7 @@ double push_by_edges(Tissue& tissue, const std::vector<Collider>& colliders, dou
     const EdgePiece& piece = edges.pieces[i];
     std::size_t c = 1;
     while (colliders[c].tool != piece.tool) ++c;
+    c += piece.side;
     EdgeStand stand = stand_of(piece, colliders[c]);
     double reach = 0;
     auto support = support_ahead(tissue, hold, stand.onward, reach);
@@ -310,7 +313,8 @@ std::vector<BladePath> held_paths(const Tissue& tissue, const FrameInput& input,
     if (edges.holds[first].place.body < 0) continue;
     const auto goes_on = [&](std::size_t i) {
       const EdgePiece &a = edges.pieces[i - 1], &b = edges.pieces[i];
-      return a.tool == b.tool && a.onward == b.onward && edges.holds[i].place.body >= 0;
+      return a.tool == b.tool && a.side == b.side && a.onward == b.onward &&
+             edges.holds[i].place.body >= 0;
     };
     while (last < edges.holds.size() && goes_on(last)) ++last;
     BladePath path{{}, {Pose(), Pose()}, {}};
@@ -325,7 +329,7 @@ std::vector<BladePath> held_paths(const Tissue& tissue, const FrameInput& input,
     if (!slid) continue;
     // Up to where the next pieces would be: those hold nothing, or meet these at the tip.
     const EdgePiece& piece = edges.pieces[first];
-    const Vec3 by = pose_at(input.tools[piece.tool], end).orientation * piece.along * piece.length;
+    const Vec3 by = edges.blade_of(piece, input, end).orientation * piece.along * piece.length;
     for (std::vector<Vec3>* edge : {&path.edge, &path.edge_at_end}) {
       edge->insert(edge->begin(), edge->front() - by);
       edge->push_back(edge->back() + by);

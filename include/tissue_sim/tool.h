@@ -1,7 +1,9 @@
 // Instruments: what they are and how they move. A tool's frame has its origin at the tip and z
 // pointing out of the tip along the shaft (the dVRK convention), so the shaft lies at z < 0. The
 // jaws of a grasper open in its x-z plane, about a hinge at z = -jaw_length; closed, they meet at x
-// = 0.
+// = 0. So do the blades of scissors, whose edges are past that by a quarter of a blade's width when
+// they are closed: they cross at x = 0, closed ones beyond their tips, and what is between them
+// farther out is whole.
 #pragma once
 
 #include <cstdint>
@@ -21,7 +23,18 @@ enum class ToolType {
   kPlate,    ///< a rectangular plate across z with rounded edges; the tip is the middle of its face
   kSuction,  ///< a tube along z that takes fluid in at its mouth, which is its tip
   kIrrigation,  ///< a tube along z out of whose mouth fluid comes
+  kScissors,    ///< two blades that cut what is between them while they close; else they push
 };
+
+/// Whether its jaws, or its blades, open by an angle.
+constexpr bool has_jaws(ToolType type) {
+  return type == ToolType::kGrasper || type == ToolType::kScissors;
+}
+
+/// Whether it has edges that cut.
+constexpr bool is_bladed(ToolType type) {
+  return type == ToolType::kScalpel || type == ToolType::kScissors;
+}
 
 /// An instrument: its shape, and how it acts on tissue. Fields that its type does not name are not
 /// read.
@@ -35,17 +48,18 @@ struct Tool {
                                 ///< rounded [m]
   Vec3 size = Vec3(0.05, 0.05, 0.004);  ///< plate: along x, y and z, its face at z = 0 [m]
   double blade_length = 0.025;          ///< scalpel: edge from the tip to the heel, along -z [m]
-  double blade_width = 0.006;           ///< scalpel: from the edge to the spine, along -x [m]
-  double blade_thickness = 0.0004;      ///< scalpel: along y [m]
-  double blade_edge_radius = 0;  ///< scalpel: `edge_radius` in a scene; how dull the edge is,
-                                 ///< at most half of its thickness [m]
-  double jaw_length = 0.015;     ///< grasper: from the hinge to the tip, along z [m]
-  double jaw_width = 0.004;      ///< grasper: of a jaw, half round with a flat face, along y [m]
-  double grip_pressure = 3000;   ///< grasper: its jaws close until they press with it [Pa]
-  double cohesion = 10000;       ///< grasper: what its teeth hold beside friction [Pa]
-  double flow = 1e-5;            ///< suction: at most; irrigation [m^3/s], 1e-9 to 1e-2
-  std::string fluid = "saline";  ///< irrigation: a name in Scene::fluids or a preset
-  double friction = 0.3;         ///< Coulomb friction against tissue [-], 0 to 2
+  double blade_width = 0.006;       ///< scalpel: from the edge to the spine, along -x; scissors: of
+                                    ///< each blade, at most jaw_length [m]
+  double blade_thickness = 0.0004;  ///< scalpel, scissors: along y [m]
+  double blade_edge_radius = 0;     ///< scalpel, scissors: `edge_radius` in a scene; how dull the
+                                    ///< edge is, at most half of its thickness [m]
+  double jaw_length = 0.015;        ///< grasper, scissors: from the hinge to the tip, along z [m]
+  double jaw_width = 0.004;         ///< grasper: of a jaw, half round with a flat face, along y [m]
+  double grip_pressure = 3000;      ///< grasper: its jaws close until they press with it [Pa]
+  double cohesion = 10000;          ///< grasper: what its teeth hold beside friction [Pa]
+  double flow = 1e-5;               ///< suction: at most; irrigation [m^3/s], 1e-9 to 1e-2
+  std::string fluid = "saline";     ///< irrigation: a name in Scene::fluids or a preset
+  double friction = 0.3;            ///< Coulomb friction against tissue [-], 0 to 2
   /// What cameras see in place of its shapes, of a grasper in place of its handle: a plain path,
   /// file:// or package:// (STL, OBJ, PLY, OFF), in the tool's frame. Empty: the shapes.
   std::string mesh;
@@ -75,12 +89,14 @@ struct ToolMotion {
 
 /// What the tissue did to a tool during one frame, at the tool's tip, in world axes.
 struct ToolLoad {
-  Wrench mean;              ///< mean over the substeps of the frame
-  double peak_force = 0;    ///< largest force of a substep [N]
-  double grip = 0;          ///< grasper: what each jaw presses with, mean over the frame [N] ...
-  double grip_area = 0;     ///< ... and on which area of tissue [m^2]
-  int points_inside = 0;    ///< of tissue, in the tool by more than contact gives way (0.3 cells,
-                            ///< or half of the tool's thinnest), in the last substep ...
+  Wrench mean;            ///< mean over the substeps of the frame
+  double peak_force = 0;  ///< largest force of a substep [N]
+  double grip = 0;        ///< what each jaw presses with, mean over the frame [N] ...
+  double grip_area = 0;   ///< ... and on which area of tissue [m^2]
+  double jaw_moment = 0;  ///< about the hinge, with which tissue opens each jaw, mean [N m]: times
+                          ///< the angle that they close by it is their work
+  int points_inside = 0;  ///< of tissue, in the tool by more than contact gives way (0.3 cells,
+                          ///< or half of the tool's thinnest), in the last substep ...
   double inside_depth = 0;  ///< ... and how deep the deepest of them lies [m]
 };
 

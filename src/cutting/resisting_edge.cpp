@@ -17,24 +17,53 @@ bool resists(const Scene& scene) {
   });
 }
 
+bool ResistingEdges::any_holds() const {
+  return std::any_of(holds.begin(), holds.end(),
+                     [](const EdgeHold& h) { return h.place.body >= 0; });
+}
+
+Pose ResistingEdges::blade_of(const EdgePiece& piece, const FrameInput& input, double s) const {
+  return blade_at(tools[piece.tool], input.tools[piece.tool], s, piece.side);
+}
+
+bool ResistingEdges::seeks(const EdgePiece& piece, const FrameInput& input, double begin) const {
+  return cuts(tools[piece.tool], input.tools[piece.tool]) && !is_past(piece, input, begin);
+}
+
+bool ResistingEdges::is_past(const EdgePiece& piece, const FrameInput& input, double s) const {
+  const Tool& tool = tools[piece.tool];
+  return tool.type == ToolType::kScissors &&
+         piece.middle.z() + tool.jaw_length <= crossing_at(tool, input.tools[piece.tool], s);
+}
+
+bool may_cut(const Scene& scene, const ResistingEdges& edges, const FrameInput& input) {
+  return edges.any_holds() || !blade_paths(scene, input, 0, 1).empty();
+}
+
 ResistingEdges resisting_edges(const Scene& scene) {
   constexpr double kPiece = 0.125;  // [cells]
   ResistingEdges edges;
   if (!resists(scene)) return edges;
+  edges.tools = scene.tools;
   for (std::size_t i = 0; i < scene.tools.size(); ++i) {
     const Tool& tool = scene.tools[i];
-    if (tool.type != ToolType::kScalpel) continue;
-    const std::vector<Vec3> edge = blade_path(tool, {}).edge;
-    const Vec3 onward[2] = {Vec3::UnitX(), Vec3::UnitZ()};
-    for (int side = 0; side < 2; ++side) {
-      const Vec3& from = edge[side];
-      const Vec3 way = edge[side + 1] - from;
+    const auto add = [&](int side, const Vec3& from, const Vec3& to, const Vec3& onward) {
+      const Vec3 way = to - from;
       const double length = way.norm();
       const int count =
           std::max(1, static_cast<int>(std::ceil(length / (kPiece * scene.cell_size))));
       for (int k = 0; k < count; ++k) {
-        edges.pieces.push_back({static_cast<int>(i), from + (k + 0.5) / count * way, way / length,
-                                onward[side], length / count, tool.blade_edge_radius});
+        edges.pieces.push_back({static_cast<int>(i), side, from + (k + 0.5) / count * way,
+                                way / length, onward, length / count, tool.blade_edge_radius});
+      }
+    };
+    if (tool.type == ToolType::kScalpel) {
+      const std::vector<Vec3> edge = blade_path(tool, {}).edge;
+      add(0, edge[0], edge[1], Vec3::UnitX());
+      add(0, edge[1], edge[2], Vec3::UnitZ());
+    } else if (tool.type == ToolType::kScissors) {
+      for (const int side : {0, 1}) {
+        add(side, Vec3(0, 0, -tool.jaw_length), Vec3::Zero(), Vec3::UnitX());
       }
     }
   }
@@ -44,27 +73,27 @@ ResistingEdges resisting_edges(const Scene& scene) {
 
 std::vector<BladePath> free_paths(const Scene& scene, const ResistingEdges& edges,
                                   const FrameInput& input, double begin, double end) {
-  std::vector<BladePath> paths = blade_paths(scene, input, begin, end);
-  if (std::none_of(edges.holds.begin(), edges.holds.end(),
-                   [](const EdgeHold& h) { return h.place.body >= 0; })) {
-    return paths;
-  }
+  if (!edges.any_holds()) return blade_paths(scene, input, begin, end);
   std::vector<BladePath> parts;
-  std::size_t path = 0;
-  for (std::size_t i = 0, tool_end = 0; i < edges.pieces.size(); i = tool_end) {
-    const int tool = edges.pieces[i].tool;
-    while (tool_end < edges.pieces.size() && edges.pieces[tool_end].tool == tool) ++tool_end;
-    if (!input.tools[tool].present) continue;
-    const BladePath& whole = paths.at(path++);
-    BladePath part{{}, whole.poses, {}};
-    for (; i < tool_end; ++i) {
+  for (std::size_t i = 0, last = 0; i < edges.pieces.size(); i = last) {
+    const EdgePiece& first = edges.pieces[i];
+    while (last < edges.pieces.size() && edges.pieces[last].tool == first.tool &&
+           edges.pieces[last].side == first.side) {
+      ++last;
+    }
+    if (!input.tools[first.tool].present) continue;
+    BladePath part{
+        {}, {edges.blade_of(first, input, begin), edges.blade_of(first, input, end)}, {}};
+    for (; i < last; ++i) {
       const EdgePiece& piece = edges.pieces[i];
       const Vec3 half = 0.5 * piece.length * piece.along;
-      if (edges.holds[i].place.body < 0) {
+      const bool is_free = edges.seeks(piece, input, begin) &&
+                           (edges.holds[i].place.body < 0 || edges.is_past(piece, input, end));
+      if (is_free) {
         if (part.edge.empty()) part.edge.push_back(piece.middle - half);
         part.edge.push_back(piece.middle + half);
       }
-      if (part.edge.empty() || (edges.holds[i].place.body < 0 && i + 1 < tool_end)) continue;
+      if (part.edge.empty() || (is_free && i + 1 < last)) continue;
       parts.push_back(part);
       part.edge.clear();
     }

@@ -14,6 +14,7 @@ namespace tissue_sim {
 /// A piece of a blade's edge, in the blade's frame.
 struct EdgePiece {
   int tool;            ///< in Scene::tools
+  int side;            ///< of scissors: which blade, 0 or 1
   Vec3 middle;         ///< [m]
   Vec3 along, onward;  ///< unit: along the edge; in the blade's plane out of it
   double length;       ///< [m]
@@ -35,6 +36,7 @@ struct EdgeHold {
   EdgePlace place;           ///< the end of its cut
   EdgePlace swept;           ///< that when it was swept last
   double ahead[3] = {};      ///< the way on, in reference space, unit
+  double slides[3] = {};     ///< the way its place slid of late, in the world, unit
   double stiffness = 0;      ///< of its spring, once it presses [N/m]
   std::int32_t presses = 0;  ///< whether the edge is there, else it comes or went back
   std::int32_t lets_go = 0;  ///< once what is left is swept
@@ -44,15 +46,27 @@ struct EdgeHold {
 
 /// What the edges of a scene hold; empty where no material has toughness.
 struct ResistingEdges {
-  std::vector<EdgePiece> pieces;  ///< of all scalpels, heel to tip to spine
+  std::vector<EdgePiece> pieces;  ///< of all blades, heel to tip, of scalpels to the spine
   std::vector<EdgeHold> holds;    ///< of each
+  std::vector<Tool> tools;        ///< the scene's
+
+  bool any_holds() const;
+  /// Where the blade of that piece is at the share `s` of a frame.
+  Pose blade_of(const EdgePiece& piece, const FrameInput& input, double s) const;
+  /// Whether it may come to hold tissue in a frame from the share `begin` on.
+  bool seeks(const EdgePiece& piece, const FrameInput& input, double begin) const;
+  /// Whether the other blade of scissors is past it: nothing is left between them there.
+  bool is_past(const EdgePiece& piece, const FrameInput& input, double s) const;
 };
 
 bool resists(const Scene& scene);
 /// Pieces an eighth of a cell long, if the scene's materials resist.
 ResistingEdges resisting_edges(const Scene& scene);
 
-/// What the edges of a frame's scalpels sweep where they hold nothing, from the share `begin` of
+/// Whether blades may cut in the frame.
+bool may_cut(const Scene& scene, const ResistingEdges& edges, const FrameInput& input);
+
+/// What the edges of a frame's blades sweep where they hold nothing, from the share `begin` of
 /// the frame to `end`: today's paths, where nothing resists.
 std::vector<BladePath> free_paths(const Scene& scene, const ResistingEdges& edges,
                                   const FrameInput& input, double begin, double end);

@@ -73,6 +73,7 @@ void add(const FrameResult& part, double weight, FrameResult& sum) {
     to.peak_force = std::max(to.peak_force, of.peak_force);
     to.grip += weight * of.grip;
     to.grip_area += weight * of.grip_area;
+    to.jaw_moment += weight * of.jaw_moment;
     to.points_inside = of.points_inside;
     to.inside_depth = of.inside_depth;
   }

@@ -17,7 +17,7 @@ inline bool is_finite(const FrameResult& r) {
                      [](const ToolLoad& l) {
                        return l.mean.force.allFinite() && l.mean.torque.allFinite() &&
                               std::isfinite(l.peak_force) && std::isfinite(l.grip) &&
-                              std::isfinite(l.grip_area);
+                              std::isfinite(l.grip_area) && std::isfinite(l.jaw_moment);
                      }) &&
          std::all_of(r.anchor_loads.begin(), r.anchor_loads.end(),
                      [](const Wrench& w) { return w.force.allFinite() && w.torque.allFinite(); });

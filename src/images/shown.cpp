@@ -104,7 +104,7 @@ void Shown::set(const SceneView& view, const Scene& scene,
     const Tool& tool = scene.tools[i];
     const ToolMesh* mesh = meshes[i].get();
     for (const ToolShape& shape : tool_shapes(tool, view.tools[i])) {
-      const bool moves_by_itself = tool.type == ToolType::kGrasper && !shape.is_handle;
+      const bool moves_by_itself = has_jaws(tool.type) && !shape.is_handle;
       if (mesh == nullptr || moves_by_itself) parts.push_back({shape, label, nullptr});
     }
     if (mesh == nullptr) continue;

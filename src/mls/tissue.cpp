@@ -122,7 +122,7 @@ void MlsTissue::begin_frame(double duration, const FrameInput& input, FrameColli
     result_.cut_reports.emplace_back();
     cut(path, s.u.data(), result_.cut_reports.back());
   }
-  const bool blades = !blade_paths(s.scene, input, 0, 1).empty();
+  const bool blades = may_cut(s.scene, s.edges, input);
   if (blades) pull();
   look_for_edges(s, input, 0);
   frame_.emplace(Frame{input, duration, std::move(colliders), blades ? s.u : Array<float>(), 0});

@@ -31,8 +31,8 @@ void MpmTissue::begin_frame(double duration, const FrameInput& input, FrameColli
     result.cut_reports.emplace_back();
     cut({path}, false, result.cut_reports.back());
   }
-  run_->frame.emplace(MpmFrame{input, duration, std::move(colliders),
-                               !blade_paths(s.scene, input, 0, 1).empty(), s.motion});
+  run_->frame.emplace(
+      MpmFrame{input, duration, std::move(colliders), may_cut(s.scene, s.edges, input), s.motion});
   device_->begin_rest();
 }
 

@@ -53,21 +53,19 @@ bool is_near(const MpmState& state, const Box& box) {
 /// [m]: a blade cuts its way along its plane.
 double farthest_motion(const MpmState& state, const FrameInput& input,
                        const FrameColliders& colliders) {
-  const Scene& scene = state.scene;
   const std::vector<Collider>& shapes = colliders.at_end();
   const std::vector<Box>& reach = colliders.reach();
   double farthest = 0;
   for (std::size_t c = 1; c < reach.size(); ++c) {  // the first is the ground
-    const Tool& tool = scene.tools[shapes[c].tool];
     const ToolMotion& m = input.tools[shapes[c].tool];
     if (!m.present || !is_near(state, reach[c])) continue;
     const double length = shapes[c].length;
+    const bool is_blade = shapes[c].kind == Collider::kBlade;
     const double turn = m.begin.orientation.angularDistance(m.end.orientation) +
-                        0.5 * std::fabs(m.jaw_end - m.jaw_begin);
+                        (is_blade ? 0 : 0.5 * std::fabs(m.jaw_end - m.jaw_begin));
     const Vec3 step = m.end.position - m.begin.position;
-    const double pushed = tool.type == ToolType::kScalpel
-                              ? std::fabs(step.dot(m.begin.orientation * Vec3::UnitY()))
-                              : step.norm();
+    const double pushed =
+        is_blade ? std::fabs(step.dot(m.begin.orientation * Vec3::UnitY())) : step.norm();
     farthest = std::max(farthest, pushed + turn * length);
   }
   return farthest;

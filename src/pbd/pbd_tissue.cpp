@@ -69,7 +69,8 @@ void PbdTissue::advance(double duration, const FrameInput& input) {
     state_changed();
   }
   const FrameColliders colliders(s.scene, input, duration);
-  const std::vector<BladePath> blades = blade_paths(s.scene, input, 0, 1);
+  std::vector<int> strokes;  // by tool
+  const std::vector<BladePath> blades = blade_paths(s.scene, input, 0, 1, &strokes);
   std::vector<Vec3> before;
   if (!blades.empty()) {
     pull();
@@ -99,7 +100,7 @@ void PbdTissue::advance(double duration, const FrameInput& input) {
   motions = pbd::motions(s);
   changed = false;
   for (std::size_t i = 0; i < blades.size(); ++i) {
-    changed = cut(blades[i], static_cast<int>(i), before, result_.blade_report) || changed;
+    changed = cut(blades[i], strokes[i], before, result_.blade_report) || changed;
   }
   if (changed) {
     pbd::after_cuts(s, motions);

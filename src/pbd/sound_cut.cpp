@@ -337,12 +337,18 @@ class SoundCut {
 
 bool rests(const BladePath& path) {
   const Pose &first = path.poses.front(), &last = path.poses.back();
-  return first.position == last.position && first.orientation.coeffs() == last.orientation.coeffs();
+  return !path.edge_at_end.empty() ||  // scissors, whose next path does not go on from this one
+         (first.position == last.position &&
+          first.orientation.coeffs() == last.orientation.coeffs());
 }
 
 /// Square to the blade's first way and its edge.
 Vec3 aside(const BladePath& path) {
   const Pose &first = path.poses.front(), &last = path.poses.back();
+  if (!path.edge_at_end.empty()) {
+    const Vec3 along = first.orientation * Vec3(path.edge[1] - path.edge[0]);
+    return along.cross(last * path.edge_at_end[0] - first * path.edge[0]).stableNormalized();
+  }
   const Vec3 edge = first.orientation * Vec3(path.edge.back() - path.edge.front());
   return edge.cross(Vec3(last.position - first.position)).stableNormalized();
 }

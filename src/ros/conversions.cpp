@@ -150,6 +150,7 @@ JawGrip to_message(const ToolLoad& load, const ToolMotion& motion, double pressu
   m.jaw = motion.jaw_end;
   m.force = load.grip;
   m.area = load.grip_area;
+  m.moment = load.jaw_moment;
   m.pressure = load.grip_area > 0 ? load.grip / load.grip_area : 0;
   m.pressure_limit = pressure_limit;
   return m;

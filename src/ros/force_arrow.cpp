@@ -26,6 +26,10 @@ Shaft shaft_of(const Tool& tool) {
       const double half = tool.jaw_width / 2, l = tool.jaw_length;
       return {Vec3::Zero(), half, half, l, l + kHandle};
     }
+    case ToolType::kScissors: {
+      const double half = tool.blade_width / 2, l = tool.jaw_length;
+      return {Vec3::Zero(), half, half, l, l + kHandle};
+    }
     case ToolType::kBall:
       return {Vec3::Zero(), r, r, 0, 2 * r + kHandle};
     case ToolType::kPlate: {  // on its back

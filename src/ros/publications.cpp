@@ -29,7 +29,7 @@ Publications::Publications(ros::NodeHandle& node, const Scene& scene, const Para
     tools_.push_back({{node, tool.name + "/body/measured_cf", 100, recorder},
                       {node, tool.name + "/spatial/measured_cf", 100, recorder},
                       {}});
-    if (tool.type == ToolType::kGrasper) {
+    if (has_jaws(tool.type)) {
       tools_.back().grip.emplace(node, tool.name + "/grip", 100, recorder);
     }
   }

@@ -280,7 +280,7 @@ void ToolInput::restart(const ros::Time& before, const ros::Time& now) {
 ToolInput::Held ToolInput::held() {
   const std::lock_guard<std::mutex> lock(mutex_);
   const WallTime now = WallClock::now();
-  const bool jaws = tool_.type == ToolType::kGrasper && jaw_subscriber_.getNumPublishers() > 0;
+  const bool jaws = has_jaws(tool_.type) && jaw_subscriber_.getNumPublishers() > 0;
   Held held;
   held.first = held_poses_.first(now);
   held.has_next = held.first && (!jaws || held_jaws_.first(now));

@@ -216,6 +216,12 @@ void check_tool(const std::string& path, const Tool& tool, std::set<std::string>
       check_range(path + ".grip_pressure", tool.grip_pressure, 1, 1e7, "Pa");
       check_range(path + ".cohesion", tool.cohesion, 0, 1e7, "Pa");
       break;
+    case ToolType::kScissors:
+      check_range(path + ".jaw_length", tool.jaw_length, 1e-3, 0.2, "m");
+      check_range(path + ".blade_width", tool.blade_width, 2e-4, tool.jaw_length, "m");
+      check_range(path + ".blade_thickness", tool.blade_thickness, 1e-5, 0.01, "m");
+      check_range(path + ".edge_radius", tool.blade_edge_radius, 0, tool.blade_thickness / 2, "m");
+      break;
     case ToolType::kBall:
       check_range(path + ".radius", tool.radius, 1e-4, 0.1, "m");
       break;

@@ -62,6 +62,8 @@ std::vector<std::string> fields_of(ToolType type) {
       return {"radius", "length", "flow"};
     case ToolType::kIrrigation:
       return {"radius", "length", "flow", "fluid"};
+    case ToolType::kScissors:
+      return {"jaw_length", "blade_width", "blade_thickness", "edge_radius"};
   }
   return {};
 }

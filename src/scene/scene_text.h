@@ -38,10 +38,11 @@ inline constexpr Spelling<CameraColours> kCameraColourNames[] = {
 inline constexpr Spelling<DepthUnit> kDepthUnitNames[] = {{DepthUnit::kMetres, "metres"},
                                                           {DepthUnit::kMillimetres, "millimetres"}};
 inline constexpr Spelling<ToolType> kToolTypeNames[] = {
-    {ToolType::kScalpel, "scalpel"}, {ToolType::kProbe, "probe"},
-    {ToolType::kGrasper, "grasper"}, {ToolType::kBall, "ball"},
-    {ToolType::kPunch, "punch"},     {ToolType::kPlate, "plate"},
-    {ToolType::kSuction, "suction"}, {ToolType::kIrrigation, "irrigation"}};
+    {ToolType::kScalpel, "scalpel"},  {ToolType::kProbe, "probe"},
+    {ToolType::kGrasper, "grasper"},  {ToolType::kBall, "ball"},
+    {ToolType::kPunch, "punch"},      {ToolType::kPlate, "plate"},
+    {ToolType::kSuction, "suction"},  {ToolType::kIrrigation, "irrigation"},
+    {ToolType::kScissors, "scissors"}};
 
 /// The name of an enum's value; nullptr for a value that the enum does not have.
 template <class Enum, std::size_t N>

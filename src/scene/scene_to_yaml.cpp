@@ -165,7 +165,7 @@ void write(YAML::Emitter& out, const Tool& tool) {
     if (field == "radius") write(out, "radius", tool.radius);
     if (field == "length") write(out, "length", tool.length);
     if (field == "edge_radius") {
-      const bool blade = tool.type == ToolType::kScalpel;
+      const bool blade = is_bladed(tool.type);
       write(out, "edge_radius", blade ? tool.blade_edge_radius : tool.edge_radius);
     }
     if (field == "size") write(out, "size", tool.size);

@@ -206,8 +206,7 @@ Tool read_tool(const YAML::Node& node, const std::string& path) {
   refuse_foreign(fields, tool.type, kToolTypeNames);
   fields.read("radius", tool.radius);
   fields.read("length", tool.length);
-  fields.read("edge_radius",
-              tool.type == ToolType::kScalpel ? tool.blade_edge_radius : tool.edge_radius);
+  fields.read("edge_radius", is_bladed(tool.type) ? tool.blade_edge_radius : tool.edge_radius);
   fields.read("size", tool.size);
   fields.read("blade_length", tool.blade_length);
   fields.read("blade_width", tool.blade_width);

@@ -18,7 +18,7 @@ double way_out(const Tool& tool, const Pose& pose, double jaw, Span<const Point>
   Collider colliders[2];
   path.at(1, colliders);
   double wide = tool.radius;  // beside the shaft [m]
-  if (tool.type == ToolType::kGrasper) wide = 2 * tool.jaw_length;
+  if (has_jaws(tool.type)) wide = 2 * tool.jaw_length;
   if (tool.type == ToolType::kPlate) wide = 0.5 * std::hypot(tool.size.x(), tool.size.y());
   const int steps = static_cast<int>(std::ceil(farthest / step));
   std::vector<char> inside(static_cast<std::size_t>(steps) + 1, 0);

@@ -82,21 +82,22 @@ void FrameColliders::add_loads(double share, const Collider* now, const Collider
     const Vec3 tip = tools_[i].tip(share);
     const int count = tools_[i].count();
     Vec3 force = Vec3::Zero(), torque = Vec3::Zero();
-    double grip = 0, touching = 0;
+    double grip = 0, touching = 0, opening = 0;
     ColliderLoad inside;
-    for (const int end = c + count; c < end; ++c) {
+    for (int side = 0; side < count; ++side, ++c) {
       const Collider& collider = now[c];
       const Vec3 pushed(on[c].force[0], on[c].force[1], on[c].force[2]);
       force += pushed;
       inside.add_inside(on[c]);
       torque += Vec3(on[c].torque[0], on[c].torque[1], on[c].torque[2]);
-      if (collider.kind != Collider::kJaw) continue;
+      if (count == 1) continue;
       // Its load's moment is about its own tip; it presses along its local x.
       const Vec3 at(collider.position[0], collider.position[1], collider.position[2]);
       const Vec3 facing(collider.rotation[0], collider.rotation[3], collider.rotation[6]);
       torque += (at - tip).cross(pushed);
       grip -= facing.dot(pushed) / count;
       touching += on[c].points / count;
+      opening += tools_[i].opening(share, side, collider, on[c]) / count;
     }
     ToolLoad& load = loads[i];
     load.mean.force += weight * force;
@@ -104,6 +105,7 @@ void FrameColliders::add_loads(double share, const Collider* now, const Collider
     load.peak_force = std::max(load.peak_force, force.norm());
     load.grip += weight * grip;
     load.grip_area += weight * touching * point_area_;
+    load.jaw_moment += weight * opening;
     load.points_inside = static_cast<int>(inside.inside);
     load.inside_depth = inside.deepest;
   }

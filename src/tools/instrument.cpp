@@ -72,6 +72,11 @@ std::string Instrument::move(const Tool& tool, double duration, double cell_size
 }
 
 double Instrument::limit_jaws(const Tool& tool, double duration, ToolMotion& motion) const {
+  if (tool.type == ToolType::kScissors) {  // they press with what it takes
+    for (float* jaw : {&motion.jaw_begin, &motion.jaw_end}) {
+      *jaw = static_cast<float>(std::clamp<double>(*jaw, 0, M_PI));
+    }
+  }
   if (tool.type != ToolType::kGrasper) return 0;
   const double set = grip_pressure_ > 0 ? grip_pressure_ : tool.grip_pressure;
   const double pressure = squeezed(set, motion.jaw_end);

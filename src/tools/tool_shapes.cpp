@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "tools/tool_motion.h"
+
 namespace tissue_sim {
 namespace {
 
@@ -48,6 +50,15 @@ std::vector<ToolShape> tool_shapes(const Tool& tool, const ToolMotion& motion) {
         const Quat swing(Eigen::AngleAxisd(0.5 * sign * motion.jaw_end, Vec3::UnitY()));
         add(ToolShape::kBox, {pose * Vec3(0, 0, -l), pose.orientation * swing},
             Vec3(0.25 * sign * w, 0, l / 2), Vec3(w / 2, w, l));
+      }
+      add(ToolShape::kCylinder, pose, Vec3(0, 0, -l - kHandle / 2), Vec3(w, w, kHandle), true);
+      break;
+    }
+    case ToolType::kScissors: {
+      const double l = tool.jaw_length, w = tool.blade_width;
+      for (const int side : {0, 1}) {
+        add(ToolShape::kBox, blade_at(tool, motion, 1, side), Vec3(-w / 2, 0, -l / 2),
+            Vec3(w, std::max(tool.blade_thickness, kThinnestBlade), l));
       }
       add(ToolShape::kCylinder, pose, Vec3(0, 0, -l - kHandle / 2), Vec3(w, w, kHandle), true);
       break;

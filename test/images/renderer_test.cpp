@@ -477,8 +477,9 @@ TEST(ToolShapes, AreMetOnTheirSurface) {
   ToolMotion motion;
   motion.end.orientation = Quat(0.5, 0.5, -0.5, 0.5);
   motion.end.position = Vec3(0.01, 0.02, 0.03);
-  for (const ToolType type : {ToolType::kScalpel, ToolType::kProbe, ToolType::kBall,
-                              ToolType::kPunch, ToolType::kPlate, ToolType::kGrasper}) {
+  for (const ToolType type :
+       {ToolType::kScalpel, ToolType::kProbe, ToolType::kBall, ToolType::kPunch, ToolType::kPlate,
+        ToolType::kGrasper, ToolType::kScissors}) {
     tool.type = type;
     for (const ToolShape& shape : tool_shapes(tool, motion)) {
       int met = 0;

@@ -37,12 +37,14 @@ TEST(Grip, IsForceAreaAndPressure) {
   ToolLoad load;
   load.grip = 0.3;
   load.grip_area = 1e-4;
+  load.jaw_moment = 0.002;
   ToolMotion motion;
   motion.jaw_end = 0.2f;
   const JawGrip m = to_message(load, motion, 2000);
   EXPECT_NEAR(m.pressure, 3000, 1e-9);
   EXPECT_EQ(m.pressure_limit, 2000);
   EXPECT_EQ(m.force, 0.3);
+  EXPECT_EQ(m.moment, 0.002);
   load.grip_area = 0;
   EXPECT_EQ(to_message(load, motion, 2000).pressure, 0);
 }

@@ -71,7 +71,7 @@ inline Scene full_scene() {
   s.bodies[0].inclusions[1].region = s.bodies[0].anchors[2];
   s.bodies[4].mesh = "package://some pack/kidney #1.stl";
   s.bodies[4].scale = 0.001;
-  s.tools.resize(3);
+  s.tools.resize(4);
   s.tools[0].name = "PSM1";
   s.tools[0].type = ToolType::kScalpel;
   s.tools[0].blade_width = 0.007;
@@ -82,6 +82,10 @@ inline Scene full_scene() {
   s.tools[2].type = ToolType::kGrasper;
   s.tools[2].jaw_length = 0.011;
   s.tools[2].grip_pressure = 1e5 / 3;
+  s.tools[3].name = "scissors";
+  s.tools[3].type = ToolType::kScissors;
+  s.tools[3].blade_width = 0.0009;
+  s.tools[3].blade_edge_radius = 4e-6;
   s.seed = 18446744073709551615ull;
   s.threads = 3;
   s.device = Device::kCuda;
@@ -151,6 +155,10 @@ inline const std::vector<NumberCase>& number_cases() {
       {"tools[2].jaw_length", AT(tools[2].jaw_length), 1e-3, 0.2},
       {"tools[2].jaw_width", AT(tools[2].jaw_width), 2e-4, 0.1},
       {"tools[2].grip_pressure", AT(tools[2].grip_pressure), 1, 1e7},
+      {"tools[3].jaw_length", AT(tools[3].jaw_length), 1e-3, 0.2},
+      {"tools[3].blade_width", AT(tools[3].blade_width), 2e-4, 0.015},
+      {"tools[3].blade_thickness", AT(tools[3].blade_thickness), 1e-5, 0.01},
+      {"tools[3].edge_radius", AT(tools[3].blade_edge_radius), 0, 0.0002},
       {"tools[2].cohesion", AT(tools[2].cohesion), 0, 1e7},
   };
 #undef AT

@@ -96,7 +96,7 @@ float4 plane_amid(Places first, Places last) {
 
 bool has_thin_tools(const Scene& scene) {
   return std::any_of(scene.tools.begin(), scene.tools.end(), [&](const Tool& tool) {
-    return tool.type != ToolType::kGrasper && tool.type != ToolType::kScalpel &&
+    return !has_jaws(tool.type) && tool.type != ToolType::kScalpel &&
            stiffer_across(static_cast<float>(tool.radius), static_cast<float>(scene.cell_size)) > 1;
   });
 }

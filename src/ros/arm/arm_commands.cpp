@@ -97,6 +97,7 @@ void ArmNode::subscribe() {
   }
   listen<JawGrip>(tool + "/grip", 10, [this](const JawGrip& m) {
     grip_angle_ = m.jaw;
+    grip_moment_ = m.moment;
     grip_came_ = WallClock::now();
     grip_known_ = true;
   });

@@ -205,6 +205,7 @@ void ArmNode::publish_joints(const std::string& name, const ros::Time& stamp,
   if (!setpoint && &group == &jaw_ && grip_known_ &&
       seconds_between(grip_came_, WallClock::now()) < kWrenchAge) {
     m.position[0] = grip_angle_;  // jaws that hold tissue do not close
+    m.effort[0] = grip_moment_;
   }
   out_[name].publish(m);
 }

@@ -93,7 +93,7 @@ class ArmNode {
   WallTime wrench_came_, shown_still_;
   bool wrench_known_ = false;
   Wrench wrench_;  // on the tip, in the world's axes
-  double grip_angle_ = 0;
+  double grip_angle_ = 0, grip_moment_ = 0;
   WallTime grip_came_;
   bool grip_known_ = false;
   int ticks_ = 0;

@@ -103,7 +103,7 @@ class PlayMarker {
       const std::string& name = tool.name;
       if (!tools_.empty() && std::find(tools_.begin(), tools_.end(), name) == tools_.end())
         continue;
-      if (held_.count(name) == 0) hold(name, tool.type == ToolType::kGrasper, index);
+      if (held_.count(name) == 0) hold(name, has_jaws(tool.type), index);
       there.insert(name);
       ++index;
     }

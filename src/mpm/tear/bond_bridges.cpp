@@ -53,14 +53,7 @@ struct BondsAround {
   }
 };
 
-}  // namespace
-
-bool is_drawn_out(const LatticeTissue& tissue, std::int32_t p) {
-  const Points::Site& site = tissue.points.site[p];
-  const Deformation d(tissue.bodies[site.body], site, *tissue.fields, tissue.nodes);
-  return d.stretch >= kThreadStretch && d.stiffening >= kBridgeStiffening;
-}
-
+/// The bridges of a point that may break, as bits.
 unsigned weak_bridges(const LatticeTissue& tissue, std::int32_t p) {
   const Points& points = tissue.points;
   const LatticeBody& body = tissue.bodies[points.site[p].body];
@@ -75,6 +68,19 @@ unsigned weak_bridges(const LatticeTissue& tissue, std::int32_t p) {
     if (!whole.is_bridge(k) || tears(p) || tears(now.point[k])) weak |= 1u << k;
   }
   return weak;
+}
+
+}  // namespace
+
+bool is_drawn_out(const LatticeTissue& tissue, std::int32_t p) {
+  const Points::Site& site = tissue.points.site[p];
+  const Deformation d(tissue.bodies[site.body], site, *tissue.fields, tissue.nodes);
+  return d.stretch >= kThreadStretch && d.stiffening >= kBridgeStiffening;
+}
+
+bool ends_lasting_bridge(const LatticeTissue& tissue, std::int32_t p) {
+  const LatticeBody& body = tissue.bodies[tissue.points.site[p].body];
+  return BondsAround(body, tissue.points, p).end_bridge() && weak_bridges(tissue, p) == 0;
 }
 
 bool leaves_thread(const LatticeBody& body, Points& points, std::int32_t point, int k) {

@@ -266,7 +266,7 @@ std::vector<std::int32_t> settle_ill_conditioned(LatticeTissue& tissue,
     settled.insert(settled.end(), bit.begin(), bit.end());
   }
   for (const std::int32_t p : bridge_ends) {
-    if (!is_drawn_out(tissue, p) || weak_bridges(tissue, p) != 0) continue;
+    if (!is_drawn_out(tissue, p) || !ends_lasting_bridge(tissue, p)) continue;
     calm(tissue, p);
     settled.push_back(p);
   }

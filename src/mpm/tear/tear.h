@@ -123,8 +123,8 @@ bool go_on(const LatticeTissue& tissue, const TearingPoint& t,
 inline constexpr double kThreadStretch = 1.5, kBridgeStiffening = 3.5;
 bool is_drawn_out(const LatticeTissue& tissue, std::int32_t point);
 
-/// The bridges of a point that may break, as bits.
-unsigned weak_bridges(const LatticeTissue& tissue, std::int32_t point);
+/// Whether a point ends a bridge, but none that may break.
+bool ends_lasting_bridge(const LatticeTissue& tissue, std::int32_t point);
 
 /// Whether a point that has a bond in a square of four would have none without bond `k` of `point`.
 bool leaves_thread(const LatticeBody& body, Points& points, std::int32_t point, int k);

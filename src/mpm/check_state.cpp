@@ -142,7 +142,7 @@ void check_contacts(const MpmState& s, const Known& k) {
   }
 }
 
-void check_faces(const MpmState& s, const Known& k) {
+void check_faces(const MpmState& s) {
   const FaceContacts& f = s.faces;
   const std::size_t facets = f.block_of.size();
   check_state(f.motion.size() == facets && (f.listed.empty() || f.listed.size() == facets),
@@ -159,7 +159,10 @@ void check_faces(const MpmState& s, const Known& k) {
   }
   check_indices(f.active, 0, contacts, "active contacts");
   for (const std::int32_t i : f.active) check_state(f.all[i].other >= 0, "active contacts");
-  for (const KeptContact& kept : f.kept) {
+}
+
+void check_kept(const MpmState& s, const Known& k) {
+  for (const KeptContact& kept : s.faces.kept) {
     check_state(kept.point >= 0 && kept.point < k.points && kept.other_body < k.bodies,
                 "kept contacts");
   }
@@ -260,6 +263,8 @@ void complete_tissue(MpmState& s) {
     check_sizes("flights", f.nodes, f.home, f.from_centre);
     check_indices(f.nodes, 0, k.nodes, "flights");
   }
+  check_blocks(s, k);
+  check_kept(s, k);
   s.fields->follow(s.bodies, s.points);
   index_flights(s);
   list_front_cells(s);
@@ -269,10 +274,9 @@ void complete_tissue(MpmState& s) {
 void complete_state(MpmState& s) {
   complete_tissue(s);
   const Known k = known(s);
-  check_blocks(s, k);
   check_contacts(s, k);
   number_facets(s.faces, s.blocks);
-  check_faces(s, k);
+  check_faces(s);
   check_edges(s);
   connect_forces(s.blocks, s.nodes.size());
   for (FaceContact& c : s.faces.all) find_nodes(s, c);

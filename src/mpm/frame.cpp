@@ -175,9 +175,12 @@ bool MpmTissue::tear(double share) {
 
 bool MpmTissue::settle_ill_conditioned() {
   MpmState& s = run_->state;
-  if (s.debris.empty() || !may_be_ill_conditioned(s)) return false;
-  device_->bring_nodes({s.debris.begin(), s.debris.end()});
-  std::vector<std::int32_t> settled = tissue_sim::settle_ill_conditioned(s, s.debris);
+  if ((s.debris.empty() && s.bridge_ends.empty()) || !may_be_ill_conditioned(s)) return false;
+  std::vector<std::int32_t> may_be(s.debris.begin(), s.debris.end());
+  may_be.insert(may_be.end(), s.bridge_ends.begin(), s.bridge_ends.end());
+  device_->bring_nodes(may_be);
+  std::vector<std::int32_t> settled =
+      tissue_sim::settle_ill_conditioned(s, s.debris, s.bridge_ends);
   if (settled.empty()) return false;
   device_->send_nodes();
   std::sort(settled.begin(), settled.end());

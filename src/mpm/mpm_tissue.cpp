@@ -142,12 +142,36 @@ std::vector<std::uint8_t> MpmTissue::save() {
   return out.take();
 }
 
+namespace {
+
+/// What a state that was read says beside MpmState.
+void check_figures(const MpmRun& run, const Foresight& foresight, bool measured) {
+  const MpmState& s = run.state;
+  check_sizes("stiffening", s.bodies, run.stiffening);
+  for (std::size_t i = 0; i < s.bodies.size(); ++i) {
+    check_state(run.stiffening[i].size() == s.bodies[i].materials.size() + 1, "stiffening");
+  }
+  check_state(!measured || run.modulus.size() == s.blocks.all.size(), "stiffness");
+  for (const FragmentChance& chance : foresight.said) {
+    check_state(chance.point >= 0 && chance.point < s.points.size(), "forecast");
+  }
+  for (const WaitingFragment& w : foresight.waiting) {
+    check_state(w.piece >= 0 && w.piece < run.pieces.next_id, "forecast");
+  }
+  for (const FragmentFlight& f : s.flights) {
+    check_state(f.piece >= 0 && f.piece < run.pieces.next_id, "flights");
+  }
+}
+
+}  // namespace
+
 void MpmTissue::restore(Span<const std::uint8_t> saved) {
   ArchiveReader in(saved);
   each_field(in);
   if (in.left() > 0) throw std::runtime_error("the state has more to it than this version knows");
   followed_ = measured_;
   check_pieces(run_->pieces, state().points.site.size(), state().scene.bodies.size());
+  check_figures(*run_, foresight_, measured_);
   device_->restored();
 }
 

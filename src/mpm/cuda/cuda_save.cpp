@@ -2,11 +2,11 @@
 // the end of a frame began, it has waited for. Saving changes nothing; restoring puts everything
 // where it was, lists and divisions too that a new tissue would make otherwise.
 #include <algorithm>
-#include <stdexcept>
 #include <utility>
 
 #include "mpm/cuda/on_device.h"
 #include "mpm/mpm_fields.h"
+#include "tools/frame_colliders.h"
 
 namespace tissue_sim {
 namespace {
@@ -41,10 +41,6 @@ std::vector<HeldPoint> bring_held(const DeviceArray<std::uint8_t>& with,
     held.push_back({static_cast<std::int32_t>(i), held_with[i], {at.x, at.y, at.z, at.w}});
   }
   return held;
-}
-
-[[noreturn]] void refuse() {
-  throw std::runtime_error("the state does not fit this scene's tissue: another build wrote it");
 }
 
 template <class Archive>
@@ -101,42 +97,25 @@ void send_faces(CudaTissue& d, const FacesOnHost& from) {
   f.springs.clear(d.stream);  // padding included: they are copied 16 bytes at a time
   f.near.resize(from.near_room);
   const std::size_t count = d.state.faces.block_of.size();
-  const auto is = [](std::size_t size, std::size_t wanted) {
-    if (size != wanted) refuse();
-  };
   if (from.is_current && count > 0) {
-    is(from.motion.size(), count);
-    is(from.listed.size(), count);
     upload_lattices(d);
     send_facets(d);
     make_room_for_facets(d);
     send(from.motion, f.motion, count, d.stream);
     send(from.listed, f.listed, count, d.stream);
-    if (from.spring_room > 0) {
-      is(from.springs.size(), count);
-      is(from.spring_room, count);
-      send(from.springs, f.springs, count, d.stream);
-    }
+    if (from.spring_room > 0) send(from.springs, f.springs, count, d.stream);
     f.near_count.clear(d.stream);
     f.first_near.clear(d.stream);
     if (from.contacts_count > 0) {
-      is(from.contacts.size(), from.contacts_count);
-      is(from.involved.size(), from.involved_count);
-      is(from.near_count.size(), count);
-      if (from.near.size() > from.near_room) refuse();
       std::vector<std::int32_t> first(count, 0);
       for (std::size_t i = 1; i < count; ++i) first[i] = first[i - 1] + from.near_count[i - 1];
-      is(from.near.size(), first.back() + from.near_count.back());
       send(from.contacts, f.contacts, from.contacts.size(), d.stream);
       send(from.involved, f.involved, from.involved.size(), d.stream);
       send(from.near_count, f.near_count, count, d.stream);
       send(first, f.first_near, count, d.stream);
       send(from.near, f.near, from.near.size(), d.stream);
       f.nodes.resize(from.contacts.size());  // the next look fills them, if none has yet
-      if (!from.searched) {
-        is(from.nodes.size(), from.contacts.size());
-        send(from.nodes, f.nodes, from.nodes.size(), d.stream);
-      }
+      if (!from.searched) send(from.nodes, f.nodes, from.nodes.size(), d.stream);
     }
   }
   if (!from.has_figures) return;
@@ -145,6 +124,14 @@ void send_faces(CudaTissue& d, const FacesOnHost& from) {
   f.host_figures[0] = from.figures;
   f.figures.upload(f.host_figures, d.stream);
   check_cuda(cudaStreamSynchronize(d.stream), "receive a state");
+}
+
+/// That blocks are some that kernels of the shape can work on.
+void check_blocks_of(const CudaTissue& d) {
+  for (const Block* b : d.state.blocks.all) {
+    check_state(b->material >= 0 && b->nx * b->ny <= d.shape.columns() && b->nz <= kMaxLayers,
+                "blocks");
+  }
 }
 
 void CudaTissue::save(ArchiveWriter& archive) {
@@ -158,12 +145,17 @@ void CudaTissue::save(ArchiveWriter& archive) {
 
 void CudaTissue::restore(ArchiveReader& archive) {
   to_restore = std::make_unique<StateOnHost>();
+  const CudaShape whole = shape, cut = cut_shape;  // of the same scene on the same GPU
   device_fields(archive, *this, *to_restore);
+  check_state((shape == whole || shape == cut) && cut_shape == cut && shape.blocks.uniform &&
+                  !shape.blocks.has_rows,
+              "shape");
 }
 
 void CudaTissue::restored() {
   CudaTissue& d = *this;
   complete_tissue(d.state);
+  check_blocks_of(d);
   const std::unique_ptr<StateOnHost> from = std::move(to_restore);
   FaceContacts& faces = d.state.faces;
   number_facets(faces, d.state.blocks);
@@ -172,16 +164,18 @@ void CudaTissue::restored() {
   faces.all.clear();
   faces.forget_active();
   push(d);
+  check_state_on_host(
+      *from, {faces.version, static_cast<std::int64_t>(faces.block_of.size()),
+              static_cast<std::int64_t>(d.marks.size()), static_cast<std::int64_t>(d.with.size()),
+              collider_count(d.state.scene)});
   std::vector<std::uint8_t> with(d.with.size(), 0);
   std::vector<float4> hold(d.hold.size(), float4{0, 0, 0, 0});
   for (const HeldPoint& p : from->held) {
-    if (p.entry < 0 || static_cast<std::size_t>(p.entry) >= with.size()) refuse();
     with[p.entry] = p.with;
     hold[p.entry] = {p.hold[0], p.hold[1], p.hold[2], p.hold[3]};
   }
   send(with, d.with, with.size(), d.stream);
   send(hold, d.hold, hold.size(), d.stream);
-  if (from->marks.size() != d.marks.size()) refuse();
   send(from->marks, d.marks, d.marks.size(), d.stream);
   send_faces(d, from->faces);
   launch_mark_slots(d.tables(), d.marks.data(), d.pushed_parts.data(), d.pushed_parts.size(),

@@ -2,8 +2,6 @@
 // structs with device pointers.
 #pragma once
 
-#include <vector_types.h>
-
 #include <cstddef>
 #include <cstdint>
 

@@ -4,6 +4,7 @@
 #include <cuda_runtime_api.h>
 
 #include "compute/host_device.h"
+#include "mpm/cuda/state_on_host.h"
 #include "mpm/cuda/tables.h"
 
 namespace tissue_sim {
@@ -52,14 +53,6 @@ void launch_missed(const CudaTables& tables, const CudaNodes& state, const CudaM
 
 // Where friction holds points on tools and the ground, as a list of the few that touch: for
 // checkpoints.
-
-/// An entry of CudaTables::with and ::hold.
-struct HeldPoint {
-  std::int32_t entry;
-  std::uint8_t with;
-  float hold[4];
-  TISSUE_SIM_FIELDS(entry, with, hold)
-};
 
 /// Lists the entries of `with` that are not 0, in any order; `count`, one number, becomes how many
 /// there are, of which the list has room for `most`.

@@ -1,6 +1,5 @@
 // What CudaTissue keeps on the GPU for contact with tools and of tissue with tissue, for anchors
-// that hold tissue at their faces, and for fronts of cuts; and what of it goes to an archive and
-// back.
+// that hold tissue at their faces, and for fronts of cuts.
 #pragma once
 
 #include <array>
@@ -8,7 +7,6 @@
 #include <set>
 #include <vector>
 
-#include "compute/archive.h"
 #include "compute/device_array.h"
 #include "mpm/anchors/anchor_faces.h"
 #include "mpm/contact/touching_tissue.h"
@@ -17,6 +15,7 @@
 #include "mpm/cuda/make_tables.h"
 #include "mpm/cuda/near_cells.h"
 #include "mpm/cuda/search_faces.h"
+#include "mpm/cuda/state_on_host.h"
 #include "mpm/cuda/tables.h"
 #include "mpm/split/lattice_tissue.h"
 
@@ -41,16 +40,6 @@ class OuterPoints {
 /// places of stretched tissue: these are taken apart for it (mpm/contact/place_parts.h). Jaws press
 /// with what they find.
 bool has_thin_tools(const Scene& scene);
-
-/// How far the search of faces has come.
-struct FacesState {
-  int version = -1;             ///< FaceContacts::version of the facets that are there
-  bool pieces_changed = false;  ///< since they went up
-  bool lists_hold = false;      ///< there are lists
-  int contacts_count = 0, involved_count = 0;  ///< see CudaFaceFigures
-  bool searched = false;                       ///< and not looked at since
-  bool may_meet = false;                       ///< whether any two may before the next search
-};
 
 struct FacesOnDevice : FacesState {
   /// See CudaLooks.
@@ -151,52 +140,10 @@ struct FrontOnDevice {
   }
 };
 
-// What the state of tissue on a GPU has beside the host's, on its way to an archive and back. What
-// follows from the rest with the same bits (tables, measures, which nodes contacts push) is not in
-// it, nor what each frame, part or substep writes before it reads it.
-
-/// FacesOnDevice. Lists are in order here, and have no gaps.
-struct FacesOnHost : FacesState {
-  bool is_current = false;  ///< those facets are there that the host has; else what is per facet
-                            ///< is made anew
-  bool has_sites = false, has_figures = false;
-  std::uint64_t spring_room = 0, near_room = 0;
-  CudaFaceFigures figures = {};
-  std::vector<FacetMotion> motion;
-  std::vector<ListedFacet> listed;
-  std::vector<FaceSpring> springs;
-  std::vector<std::int32_t> near_count, near;
-  std::vector<std::int32_t> contacts, involved;
-  std::vector<CudaContactNodes> nodes;  ///< parallels `contacts`; empty before these were looked at
-};
-
-struct StateOnHost {
-  std::vector<HeldPoint> held;      ///< by entry
-  std::vector<std::uint8_t> marks;  ///< per node: what may push it
-  FacesOnHost faces;
-};
-
 template <class Archive>
 void fields(Archive& archive, CudaShape& s) {
   BlockShape& b = s.blocks;
   archive(b.x, b.y, b.z, b.uniform, b.has_rows, b.room, s.threads, s.small);
-}
-
-template <class Archive>
-void each_part(Archive& archive, StateOnHost& s) {
-  FacesOnHost& f = s.faces;
-  archive.part("held points", s.held);
-  archive.part("marks", s.marks);
-  archive.part("search", f.version, f.is_current, f.pieces_changed, f.lists_hold, f.searched,
-               f.may_meet, f.has_sites, f.has_figures, f.contacts_count, f.involved_count,
-               f.spring_room, f.near_room);
-  archive.part("search figures", f.figures);
-  archive.part("facet motion", f.motion);
-  archive.part("listed facets", f.listed);
-  archive.part("face springs", f.springs);
-  archive.part("near facets", f.near_count, f.near);
-  archive.part("face contacts", f.contacts, f.involved);
-  archive.part("contact nodes", f.nodes);
 }
 
 }  // namespace tissue_sim

@@ -16,16 +16,18 @@ struct BondsAround {
   unsigned of[kBondCount] = {};    ///< of the neighbour over each bond, none where that is gone
   std::int32_t point[kBondCount];  ///< that neighbour
 
-  BondsAround(const LatticeBody& body, const Points& points, std::int32_t p)
-      : own(points.bonds[p]) {
-    const Points::Site& s = points.site[p];
+  BondsAround(const LatticeBody& body, const Points::Site& s, const Array<std::uint8_t>& bonds,
+              std::int32_t p)
+      : own(bonds[p]) {
     for (int k = 0; k < kBondCount; ++k) {
       if (!has(own, k)) continue;
       const BondOffset o = bond_offset(k);
       point[k] = body.point(s.x + o.x, s.y + o.y, s.z + o.z);
-      of[k] = points.bonds[point[k]];
+      of[k] = bonds[point[k]];
     }
   }
+  BondsAround(const LatticeBody& body, const Points& points, std::int32_t p)
+      : BondsAround(body, points.site[p], points.bonds, p) {}
   /// Whether bond `k` is there and in no square of four bonds.
   bool is_bridge(int k) const {
     if (!has(own, k)) return false;
@@ -51,7 +53,35 @@ struct BondsAround {
   }
 };
 
+/// The bridges of a point that may break, as bits.
+unsigned weak_bridges(const LatticeTissue& tissue, std::int32_t p) {
+  const Points& points = tissue.points;
+  const LatticeBody& body = tissue.bodies[points.site[p].body];
+  const auto tears = [&](std::int32_t end) {
+    return least_tear_limit(body.material_of(points, end)) > 0;
+  };
+  const BondsAround now(body, points, p);
+  const BondsAround whole(body, points.site[p], tissue.whole_bonds, p);
+  unsigned weak = 0;
+  for (int k = 0; k < kBondCount; ++k) {
+    if (!now.is_bridge(k)) continue;
+    if (!whole.is_bridge(k) || tears(p) || tears(now.point[k])) weak |= 1u << k;
+  }
+  return weak;
+}
+
 }  // namespace
+
+bool is_drawn_out(const LatticeTissue& tissue, std::int32_t p) {
+  const Points::Site& site = tissue.points.site[p];
+  const Deformation d(tissue.bodies[site.body], site, *tissue.fields, tissue.nodes);
+  return d.stretch >= kThreadStretch && d.stiffening >= kBridgeStiffening;
+}
+
+bool ends_lasting_bridge(const LatticeTissue& tissue, std::int32_t p) {
+  const LatticeBody& body = tissue.bodies[tissue.points.site[p].body];
+  return BondsAround(body, tissue.points, p).end_bridge() && weak_bridges(tissue, p) == 0;
+}
 
 bool leaves_thread(const LatticeBody& body, Points& points, std::int32_t point, int k) {
   // Those of the squares that the bond is in.
@@ -124,15 +154,14 @@ void tear_bridges(BlockTissue& tissue, TearRecords& records, std::vector<std::in
   for (const std::int32_t p : records.bridge_ends) {
     const LatticeBody& body = tissue.bodies[points.site[p].body];
     if (!BondsAround(body, points, p).end_bridge()) continue;
-    const Deformation d(body, points.site[p], *tissue.fields, tissue.nodes);
-    if (d.stretch < kThreadStretch || d.stiffening < kBridgeStiffening) {
+    const unsigned weak = weak_bridges(tissue, p);
+    if (weak == 0 || !is_drawn_out(tissue, p)) {
       left.push_back(p);
       continue;
     }
-    for (int k = 0; k < kBondCount; ++k) {
-      const BondsAround around(body, points, p);  // as those before left it
-      if (!around.is_bridge(k)) continue;
-      const std::int32_t other = around.point[k];
+    for (unsigned bridges = weak; bridges != 0; bridges &= bridges - 1) {
+      const int k = __builtin_ctz(bridges);
+      const std::int32_t other = neighbour(body, points.site[p], k);
       break_bond(k, points.bonds[p], points.bonds[other]);
       changed.push_back(p);
       changed.push_back(other);

@@ -149,6 +149,28 @@ void make_rigid(LatticeTissue& tissue, const LatticeBody& body, const Debris& of
   }
 }
 
+/// Takes from the nodes of a point all motion but that of a rigid body, which has their momentum,
+/// linear and angular.
+void calm(LatticeTissue& tissue, std::int32_t point) {
+  Nodes& nodes = tissue.nodes;
+  const NodesOf around(tissue.bodies[tissue.points.site[point].body], tissue.points, *tissue.fields,
+                       std::array<std::int32_t, 1>{point});
+  for (const std::int32_t n : around.node) {
+    if (nodes.mass[n] > 0 && nodes.inv_mass[n] == 0) return;  // held fast
+  }
+  const NodesMotion before(nodes, around.node, around.home);
+  if (!before.angular.allFinite()) return;  // as the end of the frame will say
+  std::vector<Vec3> x(around.node.size());
+  for (std::size_t i = 0; i < x.size(); ++i) {
+    x[i] = around.home[i] + displacement_of(nodes, around.node[i]) - before.place;
+  }
+  const Vec3 spin = inertia_of(nodes, around.node, x).ldlt().solve(before.angular);
+  for (std::size_t i = 0; i < x.size(); ++i) {
+    const Vec3 velocity = before.velocity + spin.cross(x[i]);
+    for (int a = 0; a < 3; ++a) nodes.v[a][around.node[i]] = static_cast<float>(velocity[a]);
+  }
+}
+
 }  // namespace
 
 NodesMotion::NodesMotion(const Nodes& nodes, const std::vector<std::int32_t>& some,
@@ -229,7 +251,8 @@ void settle_debris(LatticeTissue& tissue, const std::vector<std::int32_t>& debri
 }
 
 std::vector<std::int32_t> settle_ill_conditioned(LatticeTissue& tissue,
-                                                 const std::set<std::int32_t>& debris) {
+                                                 const std::set<std::int32_t>& debris,
+                                                 const std::vector<std::int32_t>& bridge_ends) {
   std::vector<std::int32_t> settled;
   for (const std::int32_t lowest : debris) {
     const LatticeBody& body = tissue.bodies[tissue.points.site[lowest].body];
@@ -241,6 +264,11 @@ std::vector<std::int32_t> settle_ill_conditioned(LatticeTissue& tissue,
     if (!is_ill) continue;
     make_rigid(tissue, body, bit);
     settled.insert(settled.end(), bit.begin(), bit.end());
+  }
+  for (const std::int32_t p : bridge_ends) {
+    if (!is_drawn_out(tissue, p) || !ends_lasting_bridge(tissue, p)) continue;
+    calm(tissue, p);
+    settled.push_back(p);
   }
   return settled;
 }

@@ -27,10 +27,11 @@ Softened soften(LatticeTissue& tissue, const std::vector<std::int32_t>& changed)
 /// times their size, goes. No bit of debris turns faster than kDebrisSpin times the speed of sound
 /// in a rod a cell, which strains it by a tenth or two: the rest goes to the tissue beside it.
 void settle_debris(LatticeTissue& tissue, const std::vector<std::int32_t>& debris);
-/// The same for those that have become ill-conditioned since (mpm/tear/debris.h). Returns their
-/// points.
+/// The same for those that have become ill-conditioned since (mpm/tear/debris.h), and for the nodes
+/// of ends of drawn out bridges that do not break (mpm/tear/tear.h). Returns the points.
 std::vector<std::int32_t> settle_ill_conditioned(LatticeTissue& tissue,
-                                                 const std::set<std::int32_t>& debris);
+                                                 const std::set<std::int32_t>& debris,
+                                                 const std::vector<std::int32_t>& bridge_ends);
 inline constexpr double kDebrisSpin = 0.5;
 
 /// Some nodes taken as one: means weighted by mass.

@@ -114,11 +114,17 @@ bool go_on(const LatticeTissue& tissue, const TearingPoint& t,
 
 // Bond bridges: what hangs on by points one after the other, thinner than the lattice tells.
 
-/// A bridge is a bond that is in no square of four bonds. It tears where it is stretched so far,
-/// and has stiffened so much (mpm/tear/debris.h), whatever its material: between halves that
-/// part it would be drawn out without end, and what hangs on it would whirl about, too fast for any
-/// substep. One that swings stiffens twentyfold within a few substeps: it is not to get near that.
+/// A bridge is a bond that is in no square of four bonds. It is drawn out where it is stretched so
+/// far, and has stiffened so much (mpm/tear/debris.h). One that cuts or tears left tears then,
+/// whatever its material: between halves that part it would be drawn out without end, and what
+/// hangs on it would whirl about, too fast for any substep. One that swings stiffens twentyfold
+/// within a few substeps: it is not to get near that. One that is of the body's shape stays where
+/// no material tears, and its ends settle (settle_ill_conditioned()).
 inline constexpr double kThreadStretch = 1.5, kBridgeStiffening = 3.5;
+bool is_drawn_out(const LatticeTissue& tissue, std::int32_t point);
+
+/// Whether a point ends a bridge, but none that may break.
+bool ends_lasting_bridge(const LatticeTissue& tissue, std::int32_t point);
 
 /// Whether a point that has a bond in a square of four would have none without bond `k` of `point`.
 bool leaves_thread(const LatticeBody& body, Points& points, std::int32_t point, int k);

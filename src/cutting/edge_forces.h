@@ -2,12 +2,14 @@
 //
 // A piece of an edge holds on to the material place at the end of its cut by a spring, in tissue
 // that is whole there. Where the spring's force comes to what toughness bears the place slides
-// along the force, as friction's does, and that far the cut goes on. With d from the place to the
-// edge, t along the edge and w the piece's length the most that it bears is
-//   J w |d x t| / |d|,
+// along the force, as friction's does, and that far the cut goes on. With s the way in which the
+// place slid of late, t along the edge and w the piece's length in the material the most that it
+// bears is
+//   J w |s x t|,
 // so that each step of the place costs J times the area that it sweeps, in whatever direction:
-// a straight push bears J w, and slicing gives Atkins' shares of it. Pieces do not pull: an edge
-// that goes back leaves the place where it is.
+// a straight push bears J w, and slicing gives Atkins' shares of it. Were s the force's own
+// direction, a force that turns along the edge would soften what bears it, and a slicing piece
+// stick and slip. Pieces do not pull: an edge that goes back leaves the place where it is.
 #pragma once
 
 #include <algorithm>
@@ -30,13 +32,19 @@ struct EdgeSupport {
   double young_modulus;  ///< [Pa]
 };
 
-/// What a piece bears at most with a force along `d` [N].
+/// A short way in the material that is `way` in the world. Where tissue is squeezed flat or turned
+/// inside out, as cells are that are larger than J / E, as if it were not deformed.
+inline Vec3 in_reference(const EdgeSupport& at, const Vec3& way) {
+  constexpr double kFlat = 0.1;
+  return at.F.determinant() > kFlat ? Vec3(at.F.inverse() * way) : way;
+}
+
+/// What a piece bears at most where its place slides along `slides`, unit [N].
 inline double most_borne(const EdgePiece& piece, const Vec3& along, const EdgeSupport& at,
-                         const Vec3& d) {
-  const double length = d.norm();
-  if (!(length > 0)) return 0;
+                         const Vec3& slides) {
   const double dull = at.young_modulus * piece.edge_radius;
-  return (at.toughness + dull) * piece.length * d.cross(along).norm() / length;
+  const double wide = piece.length * in_reference(at, along).norm();
+  return (at.toughness + dull) * wide * slides.cross(along).norm();
 }
 
 /// In what direction and how far the edge is ahead, and its frame, in the world.
@@ -77,9 +85,10 @@ inline EdgePush push_of(const EdgePiece& piece, const EdgeStand& edge, const Edg
                         double cell_size, double dt, EdgeHold& hold) {
   constexpr double kStiff = 16;     // [E] for a unit of length, where substeps bear it
   constexpr double kBorne = 0.3;    // of a place's springs, times dt^2 / m
-  constexpr double kSupport = 3;    // cells: pieces so near share their nodes
-  constexpr double kRoom = 0.5;     // of that, at first
+  constexpr double kSupport = 2;    // cells: pieces so near share their nodes
+  constexpr double kRoom = 0.8;     // of that, at first
   constexpr double kDamping = 0.1;  // share of critical
+  constexpr double kTurns = 0.25;   // cells of way in which a piece turns to where it slides
   EdgePush push;
   Vec3 d = edge.x - at.x;
   const double ahead = d.dot(edge.onward);
@@ -92,6 +101,9 @@ inline EdgePush push_of(const EdgePiece& piece, const EdgeStand& edge, const Edg
     push.begins = true;
     push.slid = d - ahead * edge.onward;
     d = ahead * edge.onward;
+    const Vec3 way = edge.v - at.v;
+    const Vec3 first = (way.dot(edge.onward) > 0 ? way : edge.onward).stableNormalized();
+    std::copy(first.data(), first.data() + 3, hold.slides);
   }
   const double shared = std::max(1.0, kSupport * cell_size / piece.length);
   const double light = at.mobility * shared * dt * dt / kBorne;
@@ -104,22 +116,18 @@ inline EdgePush push_of(const EdgePiece& piece, const EdgeStand& edge, const Edg
       2 * kDamping * std::sqrt(stiffness / std::max(1e-30, at.mobility * shared));
   Vec3 force = stiffness * d + damping * (edge.v - at.v);
   if (force.dot(edge.onward) <= 0) return push;
-  const double most = most_borne(piece, edge.along, at, force), size = force.norm();
+  const Vec3 slides(hold.slides[0], hold.slides[1], hold.slides[2]);
+  const double most = most_borne(piece, edge.along, at, slides), size = force.norm();
   if (size > most) {
     force *= most / size;
     const Vec3 slid = d - force / stiffness;
+    const Vec3 turned = (slides + slid / (kTurns * cell_size)).stableNormalized();
+    if (turned.dot(edge.onward) > 0) std::copy(turned.data(), turned.data() + 3, hold.slides);
     push.slid += slid;
     push.work = std::max(0.0, force.dot(slid));
   }
   push.force = force;
   return push;
-}
-
-/// A short way in the material that is `way` in the world. Where tissue is squeezed flat or turned
-/// inside out, as cells are that are larger than J / E, as if it were not deformed.
-inline Vec3 in_reference(const EdgeSupport& at, const Vec3& way) {
-  constexpr double kFlat = 0.1;
-  return at.F.determinant() > kFlat ? Vec3(at.F.inverse() * way) : way;
 }
 
 /// What a piece pushes: not the end of its cut itself, where tissue bears no load on a line, least

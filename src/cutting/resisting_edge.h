@@ -36,6 +36,7 @@ struct EdgeHold {
   EdgePlace place;           ///< the end of its cut
   EdgePlace swept;           ///< that when it was swept last
   double ahead[3] = {};      ///< the way on, in reference space, unit
+  double slides[3] = {};     ///< the way its place slid of late, in the world, unit
   double stiffness = 0;      ///< of its spring, once it presses [N/m]
   std::int32_t presses = 0;  ///< whether the edge is there, else it comes or went back
   std::int32_t lets_go = 0;  ///< once what is left is swept

@@ -62,7 +62,7 @@ void fields(Archive& archive, EdgePlace& p) {
 
 template <class Archive>
 void fields(Archive& archive, EdgeHold& h) {
-  archive(h.place, h.swept, h.ahead, h.stiffness, h.presses, h.lets_go);
+  archive(h.place, h.swept, h.ahead, h.slides, h.stiffness, h.presses, h.lets_go);
 }
 
 template <class Archive>

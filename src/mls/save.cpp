@@ -107,6 +107,7 @@ struct MlsSizes {
     check_sizes("edges", s.edges.pieces, s.edges.holds);
     for (const EdgeHold& h : s.edges.holds) {
       check_numbers(h.ahead, 2, "edges");
+      check_numbers(h.slides, 2, "edges");
       check_state(h.stiffness >= 0 && h.stiffness < 1e30, "edges");
       check_state(h.place.body == h.swept.body && h.lets_go == 0, "edges");
       for (const EdgePlace* p : {&h.place, &h.swept}) {

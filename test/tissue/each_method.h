@@ -89,13 +89,6 @@ struct Shortfall {
 };
 inline constexpr Shortfall kShortfalls[] = {
     {Method::kPbd, "NearlyIncompressible", "too stiff by 5.7 %, for 5: linear tetrahedra lock"},
-    {Method::kMpm, "FallsWithMuchSlicing", "push 12.5 % below Atkins', for 10 %"},
-    {Method::kMls, "FallsWithMuchSlicing",
-     "push 25 %, along the edge 11 % below Atkins', for 10 %"},
-    {Method::kMpm, "OfANarrowSlab", "5.2 % above J w, 4 cells wide, for 5 %"},
-    {Method::kMls, "TakesToughnessTimesArea", "5.8 % below J times the area, for 5 %"},
-    {Method::kMpm, "AlongAFinishedCutIsNone", "5.2 % of J w, for 3 %: a blade catches the lips"},
-    {Method::kMls, "AlongAFinishedCutIsNone", "3.1 % of J w, for 3 %: a blade catches the lips"},
 };
 
 /// Why the running test is skipped for the method on this device; empty where it is not.

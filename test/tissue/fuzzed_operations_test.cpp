@@ -13,7 +13,7 @@ namespace {
 
 TEST(FuzzedOperations, DoNotBlowUp) {
   testing::FLAGS_gtest_death_test_style = "threadsafe";
-  for (const std::uint64_t seed : {194, 332, 397, 458}) {
+  for (const std::uint64_t seed : {332, 397, 458}) {
     const auto run = [&] {
       LLVMFuzzerTestOneInput(reinterpret_cast<const std::uint8_t*>(&seed), sizeof(seed));
       std::exit(0);  // it aborts where it finds something

@@ -180,7 +180,7 @@ bool MpmTissue::settle_ill_conditioned() {
   may_be.insert(may_be.end(), s.bridge_ends.begin(), s.bridge_ends.end());
   device_->bring_nodes(may_be);
   std::vector<std::int32_t> settled =
-      tissue_sim::settle_ill_conditioned(s, s.debris, s.bridge_ends);
+      tissue_sim::settle_ill_conditioned(s, s.debris, s.bridge_ends, s.anchors);
   if (settled.empty()) return false;
   device_->send_nodes();
   std::sort(settled.begin(), settled.end());

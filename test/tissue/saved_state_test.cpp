@@ -62,7 +62,6 @@ FOR_EACH_METHOD(SavedState);
 // As in a bag of a stranger, who knows how checksums are made.
 TEST_P(SavedState, WithOtherBytesAndTheirChecksumIsRefusedOrGoesOn) {
   Scene scene = on_this(Scene());
-  if (scene.device == Device::kCuda) GTEST_SKIP() << "blocks of a GPU are not checked yet";
   scene.cell_size = 0.01;
   scene.bodies.resize(1);
   scene.bodies[0].size = Vec3(0.04, 0.03, 0.02);

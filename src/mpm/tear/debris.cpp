@@ -7,6 +7,7 @@
 #include <cstring>
 
 #include "math/bspline.h"
+#include "mpm/anchors/anchor_faces.h"
 #include "mpm/lattice/bonds.h"
 #include "mpm/tear/tear.h"
 
@@ -109,12 +110,33 @@ std::int32_t beside(const LatticeBody& body, const Points& points, const Debris&
   return -1;
 }
 
-void make_rigid(LatticeTissue& tissue, const LatticeBody& body, const Debris& of_debris) {
+/// What an anchor's face holds comes to rest where that has it, or stays as it is where the nodes
+/// that faces hold are not known (`anchors` null).
+void make_rigid(LatticeTissue& tissue, const LatticeBody& body, const Debris& of_debris,
+                const AnchorFaces* anchors) {
   const Points& points = tissue.points;
   Nodes& nodes = tissue.nodes;
-  const auto held = [&](std::int32_t p) { return points.anchored[p] != 0; };
-  if (std::any_of(of_debris.begin(), of_debris.end(), held)) return;
+  const auto beside_anchor = [&](std::int32_t p) { return points.anchored[p] != 0; };
+  const bool may_be_held = std::any_of(of_debris.begin(), of_debris.end(), beside_anchor);
+  if (may_be_held && anchors == nullptr) return;
   const NodesOf bit(body, points, *tissue.fields, of_debris);
+  const auto held = [&](std::int32_t n) {
+    return static_cast<std::size_t>(n) < anchors->at_row.size() && anchors->at_row[n] != 0;
+  };
+  if (may_be_held && std::any_of(bit.node.begin(), bit.node.end(), held)) {
+    const std::int32_t of_body = points.site[of_debris.point[0]].body;
+    for (std::size_t i = 0; i < bit.node.size(); ++i) {
+      const Vec3 place =
+          anchors->moves ? anchors->place_of_held(body.body, of_body, bit.home[i]) : bit.home[i];
+      const std::int32_t n = bit.node[i];
+      if (nodes.inv_mass[n] == 0) continue;
+      for (int a = 0; a < 3; ++a) {
+        nodes.u[a][n] = static_cast<float>(place[a] - bit.home[i][a]);
+        nodes.v[a][n] = 0;
+      }
+    }
+    return;
+  }
   const Material& material = body.material_of(points, of_debris.point[0]);
   const double fastest_spin =
       kDebrisSpin * std::sqrt(material.young_modulus / material.density) / body.cell_size;
@@ -246,13 +268,14 @@ Softened soften(LatticeTissue& tissue, const std::vector<std::int32_t>& changed)
 void settle_debris(LatticeTissue& tissue, const std::vector<std::int32_t>& debris) {
   for (const std::int32_t lowest : debris) {
     const LatticeBody& body = tissue.bodies[tissue.points.site[lowest].body];
-    make_rigid(tissue, body, Debris(body, tissue.points, lowest));
+    make_rigid(tissue, body, Debris(body, tissue.points, lowest), nullptr);
   }
 }
 
 std::vector<std::int32_t> settle_ill_conditioned(LatticeTissue& tissue,
                                                  const std::set<std::int32_t>& debris,
-                                                 const std::vector<std::int32_t>& bridge_ends) {
+                                                 const std::vector<std::int32_t>& bridge_ends,
+                                                 const AnchorFaces& anchors) {
   std::vector<std::int32_t> settled;
   for (const std::int32_t lowest : debris) {
     const LatticeBody& body = tissue.bodies[tissue.points.site[lowest].body];
@@ -262,7 +285,7 @@ std::vector<std::int32_t> settle_ill_conditioned(LatticeTissue& tissue,
              kIllConditioned;
     });
     if (!is_ill) continue;
-    make_rigid(tissue, body, bit);
+    make_rigid(tissue, body, bit, &anchors);
     settled.insert(settled.end(), bit.begin(), bit.end());
   }
   for (const std::int32_t p : bridge_ends) {

@@ -13,6 +13,8 @@
 
 namespace tissue_sim {
 
+struct AnchorFaces;
+
 /// Marks what became soft as the points `changed` lost bonds: those of debris, and of slices one
 /// point thick, which cuts parted from what there was on both sides of them along an axis of the
 /// lattice. They keep the share kSoftness of their stiffness.
@@ -28,10 +30,12 @@ Softened soften(LatticeTissue& tissue, const std::vector<std::int32_t>& changed)
 /// in a rod a cell, which strains it by a tenth or two: the rest goes to the tissue beside it.
 void settle_debris(LatticeTissue& tissue, const std::vector<std::int32_t>& debris);
 /// The same for those that have become ill-conditioned since (mpm/tear/debris.h), and for the nodes
-/// of ends of drawn out bridges that do not break (mpm/tear/tear.h). Returns the points.
+/// of ends of drawn out bridges that do not break (mpm/tear/tear.h). What the face of an anchor
+/// holds goes to where that has it. Returns the points.
 std::vector<std::int32_t> settle_ill_conditioned(LatticeTissue& tissue,
                                                  const std::set<std::int32_t>& debris,
-                                                 const std::vector<std::int32_t>& bridge_ends);
+                                                 const std::vector<std::int32_t>& bridge_ends,
+                                                 const AnchorFaces& anchors);
 inline constexpr double kDebrisSpin = 0.5;
 
 /// Some nodes taken as one: means weighted by mass.

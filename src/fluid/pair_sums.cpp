@@ -202,6 +202,21 @@ TISSUE_SIM_INLINE V angle(V y, V x) {
 
 TISSUE_SIM_INLINE V dot(const V* a, const V* b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
 
+/// The sum of the first `count` shares; what each face does to the place stays with its entry.
+/// entry.
+TISSUE_SIM_INLINE float keep_shares(FluidState& s, const std::int32_t* entry, int count, V share,
+                                    V face) {
+  alignas(32) float shares[kW], faces[kW];
+  store<kW>(shares, share);
+  store<kW>(faces, face);
+  float sum = 0;
+  for (int l = 0; l < count; ++l) {
+    sum += shares[l];
+    s.share[entry[l]] = faces[l];
+  }
+  return sum;
+}
+
 /// The solid angle is exact; what the kernel has within the triangle, which is smooth, and the
 /// kernel itself are summed over places.
 TISSUE_SIM_INLINE float add_close(FluidState& s, const float* x, const std::int32_t* entry,
@@ -253,17 +268,9 @@ TISSUE_SIM_INLINE float add_close(FluidState& s, const float* x, const std::int3
   const float by_places = 1.0f / static_cast<float>(places);
   const V share = half * (1 / (2 * kPi)) -
                   area * height * within * (by_places / (4 * kPi * reach * reach * reach));
-  alignas(32) float shares[kW], faces[kW];
-  store<kW>(shares, share);
   const V over = area * face * (by_places * s.kernel.value(0));
   for (int a = 0; a < 3; ++a) push[a] += over * n[a];
-  store<kW>(faces, over);
-  float sum = 0;
-  for (int l = 0; l < count; ++l) {
-    sum += shares[l];
-    s.share[entry[l]] = faces[l];
-  }
-  return sum;
+  return keep_shares(s, entry, count, share, over);
 }
 
 /// Triangles that their middles stand for.
@@ -290,15 +297,8 @@ TISSUE_SIM_INLINE float add_far(FluidState& s, const float* from, const std::int
   const V beyond = one - t2 * t * (14 + t2 * (-84 + t * (140 + t * (-90 + 21 * t))));
   const V over = area * (u2 * u2 * (4 * t + one)) * s.kernel.value(0);
   for (int a = 0; a < 3; ++a) push[a] += over * n[a];
-  alignas(32) float shares[kW], faces[kW];
-  store<kW>(shares, area * beyond * dot(x, n) / (r * r * r + 1e-30f) * (-1 / (4 * kPi)));
-  store<kW>(faces, over);
-  float sum = 0;
-  for (int l = 0; l < count; ++l) {
-    sum += shares[l];
-    s.share[entry[l]] = faces[l];
-  }
-  return sum;
+  const V share = area * beyond * dot(x, n) / (r * r * r + 1e-30f) * (-1 / (4 * kPi));
+  return keep_shares(s, entry, count, share, over);
 }
 
 TISSUE_SIM_INLINE float wall_share_by(FluidState& s, int i) {

@@ -1,6 +1,7 @@
 // Prints what each frame of eight scenes comes to, to the last bit: two builds that do the same
 // print the same. scripts/compare_goldens compares two of them. Through the public API alone, so
 // that it can be built against any version of the core.
+#include <climits>
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
@@ -15,12 +16,14 @@ namespace tissue_sim {
 namespace {
 
 constexpr char kUsage[] =
-    "usage: tissue_sim_golden [--device cpu|cuda] [--threads N] [--scene NAME] [--state | --what]\n"
+    "usage: tissue_sim_golden [--device cpu|cuda] [--threads N] [--scene NAME]\n"
+    "                         [--method mpm|mls|pbd|tetrahedra] [--frames N] [--state | --what]\n"
     "Prints `scene frame checksum figures cloud` for each frame: hashes of the state, of the "
     "frame's\n"
     "loads, reports and energies, and of the points and pieces as they are read.\n"
     "  --state  prints `scene id x y z` of each point after ten frames instead [m]\n"
     "  --what   prints what happens in each scene instead\n"
+    "  --frames N   ends each scene after N frames at the latest\n"
     "The instruction set is TISSUE_SIM_INSTRUCTION_SET's (sse2, avx2, avx512).\n";
 constexpr int kStateFrames = 10;
 
@@ -108,11 +111,11 @@ struct Happened {
 
 enum class Print { kChecksums, kState, kWhat };
 
-void run(const GoldenScene& golden, const Scene& scene, Print print) {
+void run(const GoldenScene& golden, const Scene& scene, int most, Print print) {
   Simulation simulation(scene);
   Happened happened;
   const char* name = golden.name.c_str();
-  const int frames = print == Print::kState ? kStateFrames : golden.frames;
+  const int frames = std::min(most, print == Print::kState ? kStateFrames : golden.frames);
   for (int frame = 0; frame < frames; ++frame) {
     golden.before(simulation, frame);
     const FrameResult result = simulation.advance_frame().result;
@@ -145,10 +148,26 @@ void run(const GoldenScene& golden, const Scene& scene, Print print) {
   }
 }
 
+/// False: there is no method of this name. The scenes' own is mpm.
+bool set_method(Scene& scene, const std::string& name) {
+  if (name == "tetrahedra") scene.pbd.model = PbdModel::kTetrahedra;
+  const std::vector<std::pair<std::string, Method>> methods = {{"mpm", Method::kMpm},
+                                                               {"mls", Method::kMls},
+                                                               {"pbd", Method::kPbd},
+                                                               {"tetrahedra", Method::kPbd}};
+  for (const auto& m : methods) {
+    if (m.first != name) continue;
+    scene.method = m.second;
+    return true;
+  }
+  return false;
+}
+
 int run_all(const std::vector<std::string>& arguments) {
   Device device = Device::kCpu;
-  int threads = 1;
-  std::string only;
+  int threads = 1, most = INT_MAX;
+  std::string only, method = "mpm";
+  Scene unused;
   Print print = Print::kChecksums;
   for (std::size_t i = 0; i < arguments.size(); ++i) {
     const std::string& option = arguments[i];
@@ -163,6 +182,10 @@ int run_all(const std::vector<std::string>& arguments) {
       threads = std::atoi(value.c_str());
     } else if (option == "--scene" && !value.empty()) {
       only = value;
+    } else if (option == "--method" && set_method(unused, value)) {
+      method = value;
+    } else if (option == "--frames" && std::atoi(value.c_str()) > 0) {
+      most = std::atoi(value.c_str());
     } else {
       std::fputs(kUsage, stderr);
       return 2;
@@ -176,7 +199,8 @@ int run_all(const std::vector<std::string>& arguments) {
     Scene scene = golden.scene;
     scene.device = device;
     scene.threads = threads;
-    run(golden, scene, print);
+    set_method(scene, method);
+    run(golden, scene, most, print);
   }
   if (!found) std::fprintf(stderr, "there is no scene '%s'\n", only.c_str());
   return found ? 0 : 2;

@@ -1,5 +1,6 @@
 #include "mls/tear.h"
 
+#include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
 
@@ -56,6 +57,58 @@ void add_crossing(const MlsState& s, std::int32_t torn, std::vector<std::int32_t
   }
 }
 
+/// Of nodes taken as one.
+struct Together {
+  double mass = 0;                                 ///< [kg]
+  Vec3 place = Vec3::Zero(), rate = Vec3::Zero();  ///< [m], [m/s]
+  Together(const MlsState& s, const std::vector<std::int32_t>& nodes) {
+    for (const std::int32_t i : nodes) {
+      mass += s.mass[i];
+      place += s.mass[i] * s.position(i);
+      rate += s.mass[i] * s.velocity(i);
+    }
+    place /= mass;
+    rate /= mass;
+  }
+};
+
+/// What is beside takes the momentum as a rigid body does: both momenta stay.
+bool slow_down(MlsState& s, const std::vector<std::int32_t>& bit) {
+  const MlsPairs& p = s.pairs;
+  const Material& material = s.nodes.material_of(bit.front());
+  std::vector<std::int32_t> beside;
+  for (const std::int32_t i : bit) {
+    if (s.inv_mass[i] == 0) return false;
+    for (std::int32_t e = p.begin[i]; e < p.begin[i + 1]; ++e) {
+      if (std::find(bit.begin(), bit.end(), p.other[e]) == bit.end()) beside.push_back(p.other[e]);
+    }
+  }
+  std::sort(beside.begin(), beside.end());
+  beside.erase(std::unique(beside.begin(), beside.end()), beside.end());
+  if (beside.size() < 4) return false;
+  const Together own(s, bit), others(s, beside);
+  const double most =
+      (material.tear_stretch - 1) * std::sqrt(material.young_modulus / material.density);
+  const Vec3 off = own.rate - others.rate;
+  if (off.norm() <= most) return false;
+  const Vec3 momentum =
+      own.mass * others.mass / (own.mass + others.mass) * (1 - most / off.norm()) * off;
+  Eigen::Matrix3d inertia = Eigen::Matrix3d::Zero();
+  for (const std::int32_t i : beside) {
+    const Vec3 r = s.position(i) - others.place;
+    inertia += s.mass[i] * (r.squaredNorm() * Eigen::Matrix3d::Identity() - r * r.transpose());
+  }
+  const Vec3 spin = inertia.ldlt().solve((own.place - others.place).cross(momentum));
+  const auto add = [&s](std::int32_t i, const Vec3& v) {
+    for (int a = 0; a < 3 && s.inv_mass[i] != 0; ++a) s.v[4 * i + a] += static_cast<float>(v[a]);
+  };
+  for (const std::int32_t i : bit) add(i, -momentum / own.mass);
+  for (const std::int32_t i : beside) {
+    add(i, momentum / others.mass + spin.cross(s.position(i) - others.place));
+  }
+  return true;
+}
+
 }  // namespace
 
 bool can_tear(const MlsState& s) {
@@ -95,6 +148,20 @@ std::vector<std::int32_t> find_tearing(MlsState& s) {
     if (furthest[p.other[e]].entry == p.twin[e]) add_crossing(s, e, entries);
   }
   return entries;
+}
+
+bool slow_torn_bits(MlsState& s, const std::vector<std::int32_t>& piece_of,
+                    const std::vector<int>& pieces) {
+  constexpr std::size_t kBit = 8;  // nodes of what is one
+  bool any = false;
+  for (const int piece : pieces) {
+    std::vector<std::int32_t> bit;
+    for (std::int32_t i = 0; i < s.count() && bit.size() <= kBit; ++i) {
+      if (piece_of[i] == piece) bit.push_back(i);
+    }
+    any = (!bit.empty() && bit.size() <= kBit && slow_down(s, bit)) || any;
+  }
+  return any;
 }
 
 }  // namespace tissue_sim

@@ -18,4 +18,11 @@ bool can_tear(const MlsState& state);
 /// is past its limit at once. An entry may come twice.
 std::vector<std::int32_t> find_tearing(MlsState& state);
 
+/// Bits of few nodes among these pieces, which tore off just now, leave what was beside them no
+/// faster than the energy stored at the limit could move them, (tear_stretch - 1) sqrt(E /
+/// density): what else they have along the line between both goes to that. Whether any was slowed
+/// down.
+bool slow_torn_bits(MlsState& state, const std::vector<std::int32_t>& piece_of,
+                    const std::vector<int>& pieces);
+
 }  // namespace tissue_sim

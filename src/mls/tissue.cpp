@@ -223,7 +223,12 @@ void MlsTissue::break_bonds(double share) {
     frame.cut_to = share;
   }
   if (tearing.empty()) return;
+  std::vector<int>& torn_off = result_.tear_report.new_fragments;
+  const std::size_t before = torn_off.size();
   break_pairs(tearing, {}, result_.tear_report);
+  if (slow_torn_bits(s, pieces_.of_point, {torn_off.begin() + before, torn_off.end()})) {
+    push_velocities();
+  }
   if (share < 1) look_for_edges(s, frame.input, share);
 }
 

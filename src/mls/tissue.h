@@ -67,6 +67,8 @@ class MlsTissue : public SteppedTissue<MlsTissue> {
   };
   /// Brings the motion of the nodes to state_.
   virtual void pull() {}
+  /// Brings their velocities back from there.
+  virtual void push_velocities() {}
   /// Weights, moments or springs of these nodes changed, or beside them tissue ends now.
   virtual void pairs_changed(const std::vector<std::int32_t>& /*nodes*/) {}
   /// Brings the impulses on held nodes to state_.

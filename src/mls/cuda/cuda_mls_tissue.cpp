@@ -195,6 +195,12 @@ void CudaMlsTissue::pull() {
   d.host_is_current = true;
 }
 
+void CudaMlsTissue::push_velocities() {
+  OnDevice& d = *device_;
+  upload(state_->v, d.count, d.v[d.current], d.stream);
+  d.wait("receive data");
+}
+
 void CudaMlsTissue::pull_contact() {
   OnDevice& d = *device_;
   MlsState& s = *state_;

@@ -26,6 +26,7 @@ class CudaMlsTissue final : public MlsTissue {
 
   // For tests and the benchmark.
   void pull() override;
+  void push_velocities() override;
   void push();  ///< motion and contact to the GPU
   void forces_at(const float* u, float* force) override;
 

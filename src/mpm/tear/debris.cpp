@@ -110,6 +110,43 @@ std::int32_t beside(const LatticeBody& body, const Points& points, const Debris&
   return -1;
 }
 
+/// A bit of tissue that tears comes off what is beside it no faster than the energy that is stored
+/// at its limit would move it; what else it has goes to that.
+void slow_down(LatticeTissue& tissue, const LatticeBody& body, const Debris& of_debris) {
+  const Points& points = tissue.points;
+  const Material& material = body.material_of(points, of_debris.point[0]);
+  const std::int32_t other = beside(body, points, of_debris);
+  if (material.tear_stretch == 0 || other < 0) return;
+  const double most =
+      (material.tear_stretch - 1) * std::sqrt(material.young_modulus / material.density);
+  const NodesOf nodes_of_bit(body, points, *tissue.fields, of_debris),
+      around(body, points, *tissue.fields, std::array<std::int32_t, 1>{other});
+  const NodesMotion bit(tissue.nodes, nodes_of_bit.node, nodes_of_bit.home),
+      of_other(tissue.nodes, around.node, around.home);
+  const Vec3 off = bit.velocity - of_other.velocity;
+  if (!(off.norm() > most)) return;
+  const Vec3 momentum =
+      bit.mass * of_other.mass / (bit.mass + of_other.mass) * (1 - most / off.norm()) * off;
+  for (const std::int32_t n : nodes_of_bit.node) {
+    for (int a = 0; a < 3; ++a) {
+      tissue.nodes.v[a][n] -= static_cast<float>(momentum[a] / bit.mass);
+    }
+  }
+  push(tissue, other, momentum, (bit.place - of_other.place).cross(momentum));
+}
+
+/// The anchor whose face holds some of these nodes, of which AnchorFaces::at_row says that one
+/// does.
+int anchor_of(const AnchorFaces& anchors, const std::vector<std::int32_t>& nodes) {
+  for (const FaceRow& row : anchors.rows) {
+    for (int k = 0; k < kRowNodes; ++k) {
+      if (row.share[k] == 0) continue;
+      if (std::find(nodes.begin(), nodes.end(), row.node[k]) != nodes.end()) return row.anchor;
+    }
+  }
+  return 0;
+}
+
 /// What an anchor's face holds comes to rest where that has it, or stays as it is where the nodes
 /// that faces hold are not known (`anchors` null).
 void make_rigid(LatticeTissue& tissue, const LatticeBody& body, const Debris& of_debris,
@@ -124,14 +161,14 @@ void make_rigid(LatticeTissue& tissue, const LatticeBody& body, const Debris& of
     return static_cast<std::size_t>(n) < anchors->at_row.size() && anchors->at_row[n] != 0;
   };
   if (may_be_held && std::any_of(bit.node.begin(), bit.node.end(), held)) {
-    const std::int32_t of_body = points.site[of_debris.point[0]].body;
+    const RigidMotion motion =
+        anchors->moves ? anchors->now[anchor_of(*anchors, bit.node)] : RigidMotion();
     for (std::size_t i = 0; i < bit.node.size(); ++i) {
-      const Vec3 place =
-          anchors->moves ? anchors->place_of_held(body.body, of_body, bit.home[i]) : bit.home[i];
+      const Vec3 u = motion.rotation * bit.home[i] + motion.translation - bit.home[i];
       const std::int32_t n = bit.node[i];
       if (nodes.inv_mass[n] == 0) continue;
       for (int a = 0; a < 3; ++a) {
-        nodes.u[a][n] = static_cast<float>(place[a] - bit.home[i][a]);
+        nodes.u[a][n] = static_cast<float>(u[a]);
         nodes.v[a][n] = 0;
       }
     }
@@ -160,7 +197,7 @@ void make_rigid(LatticeTissue& tissue, const LatticeBody& body, const Debris& of
   if (spin.norm() > fastest_spin) {
     spin *= fastest_spin / spin.norm();
     const std::int32_t other = beside(body, points, of_debris);
-    if (other >= 0) turn(tissue, other, before.angular - inertia * spin);
+    if (other >= 0) push(tissue, other, Vec3::Zero(), before.angular - inertia * spin);
   }
   for (std::size_t i = 0; i < count; ++i) {
     const Vec3 u = before.place + x[i] - bit.home[i], velocity = before.velocity + spin.cross(x[i]);
@@ -227,20 +264,20 @@ Eigen::Matrix3d inertia_of(const Nodes& nodes, const std::vector<std::int32_t>& 
   return inertia;
 }
 
-void turn(LatticeTissue& tissue, std::int32_t point, const Vec3& angular) {
+void push(LatticeTissue& tissue, std::int32_t point, const Vec3& momentum, const Vec3& angular) {
   Nodes& nodes = tissue.nodes;
   const NodesOf around(tissue.bodies[tissue.points.site[point].body], tissue.points, *tissue.fields,
                        std::array<std::int32_t, 1>{point});
-  const Vec3 middle = NodesMotion(nodes, around.node, around.home).place;
+  const NodesMotion before(nodes, around.node, around.home);
   std::vector<Vec3> x(around.node.size());
   for (std::size_t i = 0; i < x.size(); ++i) {
-    x[i] = around.home[i] + displacement_of(nodes, around.node[i]) - middle;
+    x[i] = around.home[i] + displacement_of(nodes, around.node[i]) - before.place;
   }
   const Vec3 spin = inertia_of(nodes, around.node, x).ldlt().solve(angular);
   for (std::size_t i = 0; i < x.size(); ++i) {
     const int n = around.node[i];
     if (nodes.inv_mass[n] == 0) continue;  // what holds it takes its share
-    const Vec3 v = spin.cross(x[i]);
+    const Vec3 v = momentum / before.mass + spin.cross(x[i]);
     for (int a = 0; a < 3; ++a) nodes.v[a][n] += static_cast<float>(v[a]);
   }
 }
@@ -268,7 +305,9 @@ Softened soften(LatticeTissue& tissue, const std::vector<std::int32_t>& changed)
 void settle_debris(LatticeTissue& tissue, const std::vector<std::int32_t>& debris) {
   for (const std::int32_t lowest : debris) {
     const LatticeBody& body = tissue.bodies[tissue.points.site[lowest].body];
-    make_rigid(tissue, body, Debris(body, tissue.points, lowest), nullptr);
+    const Debris bit(body, tissue.points, lowest);
+    slow_down(tissue, body, bit);
+    make_rigid(tissue, body, bit, nullptr);
   }
 }
 

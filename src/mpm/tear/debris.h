@@ -27,7 +27,9 @@ Softened soften(LatticeTissue& tissue, const std::vector<std::int32_t>& changed)
 /// Lets debris, each given by its lowest point, move on as rigid bodies without strain. Their
 /// momentum stays, linear and angular; what else a torn bridge left in their nodes, a swing of many
 /// times their size, goes. No bit of debris turns faster than kDebrisSpin times the speed of sound
-/// in a rod a cell, which strains it by a tenth or two: the rest goes to the tissue beside it.
+/// in a rod a cell, which strains it by a tenth or two, and of tissue that tears none comes off
+/// faster than the strain at its limit times that speed, as the energy that is stored there would
+/// move it: the rest goes to the tissue beside it.
 void settle_debris(LatticeTissue& tissue, const std::vector<std::int32_t>& debris);
 /// The same for those that have become ill-conditioned since (mpm/tear/debris.h), and for the nodes
 /// of ends of drawn out bridges that do not break (mpm/tear/tear.h). What the face of an anchor
@@ -54,8 +56,9 @@ inline Vec3 displacement_of(const Nodes& nodes, std::int32_t n) {
 Eigen::Matrix3d inertia_of(const Nodes& nodes, const std::vector<std::int32_t>& some,
                            const std::vector<Vec3>& r);
 
-/// Sets the nodes of a point turning, so that they have so much more angular momentum [kg m^2/s].
-void turn(LatticeTissue& tissue, std::int32_t point, const Vec3& angular);
+/// Moves the nodes of a point as a rigid body, so that they have so much more momentum [kg m/s] and
+/// angular momentum about their middle [kg m^2/s].
+void push(LatticeTissue& tissue, std::int32_t point, const Vec3& momentum, const Vec3& angular);
 
 /// A bit of debris that is deformed so that it has stiffened so much is ill-conditioned.
 inline constexpr double kIllConditioned = 5;

@@ -78,7 +78,7 @@ void split_front(LatticeTissue& s) {
     if (beside < 0) continue;
     const Vec3 apart(front.d[0][n], front.d[1][n], front.d[2][n]);
     const Vec3 fast(front.rate[0][n], front.rate[1][n], front.rate[2][n]);
-    turn(s, beside, left * apart.cross(fast));
+    push(s, beside, Vec3::Zero(), left * apart.cross(fast));
   }
   front.nodes = std::move(kept);
   for (int a = 0; a < 3; ++a) {

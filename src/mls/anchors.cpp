@@ -20,19 +20,6 @@ bool is_within(const Anchors& anchors, const Vec3& x) {
                      [&](const Anchor& a) { return a.contains(x); });
 }
 
-/// The place of a region that is nearest to one outside.
-Vec3 nearest_of(const Region& region, const Vec3& x) {
-  switch (region.kind) {
-    case Region::Kind::kBox:
-      return x.cwiseMax(region.min).cwiseMin(region.max);
-    case Region::Kind::kBall:
-      return region.center + region.radius * (x - region.center).normalized();
-    case Region::Kind::kBelow:
-      break;
-  }
-  return Vec3(x[0], x[1], region.z);
-}
-
 /// Where a place within a region meets, straight ahead, the face that the way to one outside leaves
 /// it by.
 Vec3 face_towards(const Region& region, const Vec3& x, const Vec3& outside) {
@@ -71,6 +58,18 @@ double free_share(const Anchors& anchors, const Vec3& middle, double edge) {
 }
 
 }  // namespace
+
+Vec3 nearest_of(const Region& region, const Vec3& x) {
+  switch (region.kind) {
+    case Region::Kind::kBox:
+      return x.cwiseMax(region.min).cwiseMin(region.max);
+    case Region::Kind::kBall:
+      return region.center + region.radius * (x - region.center).normalized();
+    case Region::Kind::kBelow:
+      break;
+  }
+  return Vec3(x[0], x[1], region.z);
+}
 
 std::vector<MlsAnchorPose> mls_anchors_at(const Scene& scene, const FrameInput& input,
                                           double share) {
@@ -157,8 +156,13 @@ void hold_at_faces(const Scene& scene, double support_factor, MlsNodes& nodes, M
   }
   for (std::int32_t i = 0; i < nodes.count(); ++i) {
     if (within[i] == 0) continue;
+    const Anchors& own = scene.bodies[nodes.body[i]].anchors;
+    if (!is_within(own, nodes.place[i])) {  // of an anchor at the body's own face
+      moved[i] = nearest_of(own[nodes.anchor[i] - first_anchor[nodes.body[i]]], nodes.place[i]);
+      continue;
+    }
     double nearest = kFarthest * spacing(i);
-    for (const Anchor& a : scene.bodies[nodes.body[i]].anchors) {
+    for (const Anchor& a : own) {
       if (!a.contains(nodes.place[i])) continue;
       each_neighbour(i, [&](std::int32_t j) {
         if (nodes.anchored[j] != 0 || a.contains(nodes.place[j])) return;

@@ -10,6 +10,9 @@
 
 namespace tissue_sim {
 
+/// The place of a region that is nearest to one outside.
+Vec3 nearest_of(const Region& region, const Vec3& x);
+
 /// Of all anchors at a share of the frame; empty where none ever moved.
 std::vector<MlsAnchorPose> mls_anchors_at(const Scene& scene, const FrameInput& input,
                                           double share);

@@ -5,6 +5,7 @@
 #include <stdexcept>
 
 #include "geometry/nearest_surface.h"
+#include "mls/anchors.h"
 #include "mls/placement.h"
 #include "scene/scene_text.h"
 #include "tissue_sim/limits.h"
@@ -50,6 +51,23 @@ int last_that_holds(const Regions& regions, const Vec3& x, const RegionOf& regio
   return -1;
 }
 
+/// An anchor at the body's own face, which no node lies in, holds those whose share of the body is
+/// there. Whether there are any.
+bool hold_own_face(const Body& body, std::size_t r, std::size_t first_anchor, double spacing,
+                   std::int32_t first_node, MlsNodes& nodes) {
+  constexpr double kShare = 0.6;  // of a spacing; half of one on a lattice
+  bool any = false;
+  for (std::int32_t i = first_node; i < nodes.count(); ++i) {
+    if (nodes.surface[i] == 0 || nodes.anchored[i] != 0) continue;
+    const double far = (nearest_of(body.anchors[r], nodes.place[i]) - nodes.place[i]).norm();
+    if (far > kShare * spacing) continue;
+    nodes.anchor[i] = static_cast<std::int16_t>(first_anchor + r);
+    nodes.anchored[i] = 1;
+    any = true;
+  }
+  return any;
+}
+
 }  // namespace
 
 double mls_spacing(const Scene& scene) {
@@ -74,6 +92,7 @@ MlsNodes make_mls_nodes(const Scene& scene, std::vector<std::string>* notes) {
       surface = std::make_unique<NearestSurface>(body, 2 * widest * spacing);
     }
     const LimitWork rest(with_points(work_limits().max_points - nodes.count()));
+    const std::int32_t first_node = nodes.count();
     nodes.gaps.emplace_back();
     for (const PlacedNode& n :
          place_nodes(body, scene.mls, spacing, scene.seed + b, notes, nodes.gaps.back())) {
@@ -101,7 +120,9 @@ MlsNodes make_mls_nodes(const Scene& scene, std::vector<std::string>* notes) {
       nodes.anchored.push_back(anchor >= 0 ? 1 : 0);
     }
     for (std::size_t r = 0; r < anchored.size(); ++r) {
-      if (anchored[r] == 0) refuse_region("anchors", r, spacing, body.name, "");
+      if (anchored[r] == 0 && !hold_own_face(body, r, first_anchor, spacing, first_node, nodes)) {
+        refuse_region("anchors", r, spacing, body.name, "");
+      }
     }
     first_anchor += body.anchors.size();
     for (std::size_t i = 0; i < held.size(); ++i) {

@@ -36,6 +36,21 @@ TEST_P(Cantilever, SagsAsTimoshenkoSays) {
   }
 }
 
+// No point lies in such an anchor, and no tissue beyond its face.
+TEST_P(Cantilever, HeldAtItsOwnFaceSagsAlike) {
+  const Beam beam = soft_beam(8, 0);
+  const bool is_mls = GetParam().method == Method::kMls;
+  Scene scene = on_this(beam_scene(beam, is_mls ? 4 : 8, true));
+  scene.mls.spacing = 0;
+  Body& body = scene.bodies[0];
+  body.size.x() = beam.length;
+  body.pose.position.x() = beam.length / 2;
+  body.anchors.resize(1);
+  body.anchors[0].max.x() = 0;
+  EXPECT_TRUE(
+      is_within("the same, held at its own face", bend(scene, beam).error(), within().beam));
+}
+
 // The clamp keeps the section from narrowing, which the theory of beams does not know: a part of
 // what is missing here.
 TEST_P(Cantilever, NearlyIncompressible) {

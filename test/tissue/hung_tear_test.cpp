@@ -109,7 +109,7 @@ TEST_P(HungTissue, PartsAtItsRootUnderTheWeightThatStretchesItToItsLimit) {
         Hung{"slab, at its end", slab, 0.004, 0.0001}}) {
     Scene scene = on_this(hung_scene(hung));
     if (hung.inside < 0.25 * scene.cell_size + 1e-9 && scene.method == Method::kMls) {
-      continue;  // its anchors hold nodes
+      continue;  // what it holds of itself does not tear: parts two spacings from it, at -10.2 %
     }
     Simulation simulation(scene);
     const Vec3 along = hung.anchor == Region::Kind::kBelow ? Vec3::UnitZ() : Vec3::UnitX();

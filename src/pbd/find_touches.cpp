@@ -35,7 +35,10 @@ constexpr double kCell = 2;
 /// Vertices of a piece that touches others, at least: crumbs, slivers for the most part, shook.
 constexpr int kLeastPiece = 60;
 
-constexpr int kTrianglesOfPart = 256;
+/// What lies above a triangle is in the box where it looks, but for rounding [mean edges].
+constexpr double kRounding = 1e-5;
+
+constexpr int kTrianglesOfPart = 256, kVerticesOfPart = 1024;
 
 /// Whether a triangle is so thin that single precision hardly knows its normal.
 bool is_sliver(const Vec3& a, const Vec3& b, const Vec3& c, double mean_edge) {
@@ -86,16 +89,24 @@ void find_touches(State& s, double duration) {
   std::vector<int> vertices_of(s.components, 0);
   for (const std::int32_t c : s.component) ++vertices_of[c];
   const auto is_crumb = [&](std::int32_t i) { return vertices_of[s.component[i]] < kLeastPiece; };
-  std::vector<Vec3> normal(v.size(), Vec3::Zero());
+  const auto each_of = [&](int number, int of_part, const auto& f) {  // f(i, part)
+    s.cpu.for_each((number + of_part - 1) / of_part, [&](int part) {
+      for (int i = part * of_part; i < std::min(number, (part + 1) * of_part); ++i) f(i, part);
+    });
+  };
+  std::vector<Vec3> place(v.size());
   std::vector<float> way(v.size());  // of each vertex in the frame [m]
+  each_of(v.size(), kVerticesOfPart, [&](int i, int) {
+    place[i] = v.position(i);
+    way[i] = static_cast<float>(duration * v.velocity(i).norm());
+  });
   float farthest = 0;
   for (int i = 0; i < v.size(); ++i) {
-    way[i] = static_cast<float>(duration * v.velocity(i).norm());
     if (!is_crumb(i)) farthest = std::max(farthest, way[i]);
   }
+  std::vector<Vec3> normal(v.size(), Vec3::Zero());
   for (const Triangle& t : s.triangles) {
-    const Vec3 a = v.position(t[0]);
-    const Vec3 n = (v.position(t[1]) - a).cross(v.position(t[2]) - a);
+    const Vec3 n = (place[t[1]] - place[t[0]]).cross(place[t[2]] - place[t[0]]);
     for (const std::int32_t i : t) normal[i] += n;
   }
   // How far above a triangle a vertex may be that comes to it on a way of its own.
@@ -105,7 +116,7 @@ void find_touches(State& s, double duration) {
   };
   // Where a triangle looks for vertices: above it, beside it by a little, and in it, a prism.
   const auto looks = [&](const Triangle& t, double own) {
-    const Vec3 a = v.position(t[0]), b = v.position(t[1]), c = v.position(t[2]);
+    const Vec3 &a = place[t[0]], &b = place[t[1]], &c = place[t[2]];
     const Vec3 middle = (a + b + c) / 3, up = (b - a).cross(c - a).stableNormalized();
     Box box;
     for (const Vec3& corner : {a, b, c}) {
@@ -119,12 +130,7 @@ void find_touches(State& s, double duration) {
   };
   const int count = static_cast<int>(s.triangles.size());
   const int parts = (count + kTrianglesOfPart - 1) / kTrianglesOfPart;
-  const auto each_triangle = [&](const auto& f) {  // f(triangle, part)
-    s.cpu.for_each(parts, [&](int part) {
-      const int end = std::min(count, (part + 1) * kTrianglesOfPart);
-      for (int k = part * kTrianglesOfPart; k < end; ++k) f(k, part);
-    });
-  };
+  const auto each_triangle = [&](const auto& f) { each_of(count, kTrianglesOfPart, f); };
   std::vector<Box> seen(count);  // by each triangle, for the farthest way
   each_triangle([&](int k, int) { seen[k] = looks(s.triangles[k], farthest); });
   // Where each piece is, and where it looks: what lies in no other's box is left out.
@@ -132,11 +138,10 @@ void find_touches(State& s, double duration) {
   for (int k = 0; k < count; ++k) {
     const Triangle& t = s.triangles[k];
     if (is_crumb(t[0])) continue;
-    Box &place = places[s.component[t[0]]], &wide = reached[s.component[t[0]]];
+    Box &own = places[s.component[t[0]]], &wide = reached[s.component[t[0]]];
     for (const std::int32_t i : t) {
-      const Vec3 x = v.position(i);
-      place.min = place.min.cwiseMin(x);
-      place.max = place.max.cwiseMax(x);
+      own.min = own.min.cwiseMin(place[i]);
+      own.max = own.max.cwiseMax(place[i]);
     }
     wide.min = wide.min.cwiseMin(seen[k].min);
     wide.max = wide.max.cwiseMax(seen[k].max);
@@ -158,11 +163,16 @@ void find_touches(State& s, double duration) {
   const auto slow = static_cast<float>(kSlow * s.mean_edge);
   Kind kinds[] = {{TouchCells(kCell * s.mean_edge), std::min(slow, farthest)},
                   {TouchCells(kCell * s.mean_edge), farthest}};
-  for (int i = 0; i < v.size(); ++i) {
-    const Vec3 x = v.position(i);
-    if (v.surface[i] != 0 && !is_crumb(i) && meets_other(s.component[i], {x, x}, reached)) {
-      kinds[way[i] > slow].cells.add(i, s.component[i], x, normal[i]);
-    }
+  const int vertex_parts = (v.size() + kVerticesOfPart - 1) / kVerticesOfPart;
+  std::vector<std::array<std::vector<TouchCells::Entry>, 2>> entries(vertex_parts);
+  each_of(v.size(), kVerticesOfPart, [&](int i, int part) {
+    const Vec3& x = place[i];
+    if (v.surface[i] == 0 || is_crumb(i) || !x.allFinite()) return;
+    if (!meets_other(s.component[i], {x, x}, reached)) return;
+    entries[part][way[i] > slow].push_back(TouchCells::entry(i, s.component[i], x, normal[i]));
+  });
+  for (const auto& of_part : entries) {
+    for (int kind = 0; kind < 2; ++kind) kinds[kind].cells.add(of_part[kind]);
   }
   struct Candidate {
     std::int32_t triangle;
@@ -174,7 +184,7 @@ void find_touches(State& s, double duration) {
     const Triangle& t = s.triangles[k];
     const std::int32_t piece = s.component[t[0]];
     if (is_crumb(t[0]) || !meets_other(piece, seen[k], places)) return;
-    if (is_sliver(v.position(t[0]), v.position(t[1]), v.position(t[2]), s.mean_edge)) return;
+    if (is_sliver(place[t[0]], place[t[1]], place[t[2]], s.mean_edge)) return;
     for (int kind = 0; kind < 2; ++kind) {
       const TouchCells& cells = kinds[kind].cells;
       if (cells.empty()) continue;
@@ -197,11 +207,15 @@ void find_touches(State& s, double duration) {
     for (const Candidate& candidate : candidates[part]) {
       const Triangle& t = s.triangles[candidate.triangle];
       const std::int32_t piece = s.component[t[0]];
-      const TouchedTriangle plane(v.position(t[0]), v.position(t[1]), v.position(t[2]));
+      const TouchedTriangle plane(place[t[0]], place[t[1]], place[t[2]]);
+      const Vec3 slack = Vec3::Constant(kRounding * s.mean_edge);
+      const Vec3 low = candidate.box.min - slack, high = candidate.box.max + slack;
       kinds[candidate.kind].cells.each_in(
           candidate.level, candidate.box.min, candidate.box.max, piece,
           [&](const TouchCells::Entry& e) {
-            const Above at = plane.above(Vec3(e.x[0], e.x[1], e.x[2]));
+            const Vec3 x(e.x[0], e.x[1], e.x[2]);
+            if ((x - low).minCoeff() < 0 || (high - x).minCoeff() < 0) return;  // most
+            const Above at = plane.above(x);
             if (!(at.height < reach(t, way[e.vertex]) && at.height > -kDeepest * s.mean_edge))
               return;
             if (at.beside() > kBeside) return;

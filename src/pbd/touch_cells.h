@@ -23,10 +23,12 @@ class TouchCells {
   };
 
   explicit TouchCells(double size) : size_(size) {}
-  void add(std::int32_t vertex, std::int32_t piece, const Vec3& x, const Vec3& normal) {
-    if (!x.allFinite()) return;
+  static Entry entry(std::int32_t vertex, std::int32_t piece, const Vec3& x, const Vec3& normal) {
     const Eigen::Vector3f at = x.cast<float>(), n = normal.stableNormalized().cast<float>();
-    entries_.push_back({{at[0], at[1], at[2]}, {n[0], n[1], n[2]}, vertex, piece});
+    return {{at[0], at[1], at[2]}, {n[0], n[1], n[2]}, vertex, piece};
+  }
+  void add(const std::vector<Entry>& entries) {
+    entries_.insert(entries_.end(), entries.begin(), entries.end());
   }
   bool empty() const { return entries_.empty(); }
   /// Which lattice a box is to be looked up in; -1 for none.

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 #include "math/union_find.h"
 #include "pbd/model.h"
@@ -36,7 +37,7 @@ constexpr double kCell = 2;
 constexpr int kLeastPiece = 60;
 
 /// What lies above a triangle is in the box where it looks, but for rounding [mean edges].
-constexpr double kRounding = 1e-5;
+constexpr double kRounding = 1e-2;
 
 constexpr int kTrianglesOfPart = 256, kVerticesOfPart = 1024;
 
@@ -69,10 +70,6 @@ struct TouchedTriangle {
     return {r.dot(up), r.dot(to_b), r.dot(to_c)};
   }
 };
-
-const Material& material_of(const State& s, int v) {
-  return material_at(s.scene, s.scene.bodies[s.vertices.body[v]], s.vertices.reference[v]);
-}
 
 }  // namespace
 
@@ -146,15 +143,24 @@ void find_touches(State& s, double duration) {
     wide.min = wide.min.cwiseMin(seen[k].min);
     wide.max = wide.max.cwiseMax(seen[k].max);
   }
+  const auto overlap = [](const Box& p, const Box& q) {
+    return (p.max - q.min).minCoeff() >= 0 && (q.max - p.min).minCoeff() >= 0;
+  };
   std::vector<std::int32_t> large;
   for (std::int32_t c = 0; c < s.components; ++c) {
     if (places[c].min.x() <= places[c].max.x()) large.push_back(c);
   }
+  // Of each piece, the others that see it, or that it sees.
+  std::vector<std::vector<std::int32_t>> near(s.components);
+  for (const std::int32_t a : large) {
+    for (const std::int32_t b : large) {
+      if (a == b) continue;
+      if (overlap(reached[a], places[b]) || overlap(reached[b], places[a])) near[a].push_back(b);
+    }
+  }
   const auto meets_other = [&](std::int32_t piece, const Box& box, const std::vector<Box>& boxes) {
-    return std::any_of(large.begin(), large.end(), [&](std::int32_t c) {
-      return c != piece && (box.max - boxes[c].min).minCoeff() >= 0 &&
-             (boxes[c].max - box.min).minCoeff() >= 0;
-    });
+    return std::any_of(near[piece].begin(), near[piece].end(),
+                       [&](std::int32_t c) { return overlap(box, boxes[c]); });
   };
   struct Kind {  // the slow, and what is faster
     TouchCells cells;
@@ -174,6 +180,20 @@ void find_touches(State& s, double duration) {
   for (const auto& of_part : entries) {
     for (int kind = 0; kind < 2; ++kind) kinds[kind].cells.add(of_part[kind]);
   }
+  // What a box has of the places of other pieces: all vertices that are to be found in it.
+  const auto shared = [&](std::int32_t piece, const Box& box) {
+    Box all;
+    for (const std::int32_t c : near[piece]) {
+      const Vec3 low = box.min.cwiseMax(places[c].min), high = box.max.cwiseMin(places[c].max);
+      if ((high - low).minCoeff() < 0) continue;
+      all.min = all.min.cwiseMin(low);
+      all.max = all.max.cwiseMax(high);
+    }
+    const Vec3 slack = Vec3::Constant(kRounding * s.mean_edge);
+    all.min -= slack;
+    all.max += slack;
+    return all;
+  };
   struct Candidate {
     std::int32_t triangle;
     int kind, level;
@@ -190,7 +210,7 @@ void find_touches(State& s, double duration) {
       if (cells.empty()) continue;
       const Box box = kind == 0 ? looks(t, kinds[0].farthest) : seen[k];
       const int level = meets_other(piece, box, places) ? cells.level_of(box.min, box.max) : -1;
-      if (level >= 0) candidates[part].push_back({k, kind, level, box});
+      if (level >= 0) candidates[part].push_back({k, kind, level, shared(piece, box)});
     }
   });
   for (const std::vector<Candidate>& of_part : candidates) {
@@ -207,20 +227,19 @@ void find_touches(State& s, double duration) {
     for (const Candidate& candidate : candidates[part]) {
       const Triangle& t = s.triangles[candidate.triangle];
       const std::int32_t piece = s.component[t[0]];
-      const TouchedTriangle plane(place[t[0]], place[t[1]], place[t[2]]);
-      const Vec3 slack = Vec3::Constant(kRounding * s.mean_edge);
-      const Vec3 low = candidate.box.min - slack, high = candidate.box.max + slack;
+      std::optional<TouchedTriangle> plane;
+      const Vec3 &low = candidate.box.min, &high = candidate.box.max;
       kinds[candidate.kind].cells.each_in(
-          candidate.level, candidate.box.min, candidate.box.max, piece,
-          [&](const TouchCells::Entry& e) {
+          candidate.level, low, high, piece, [&](const TouchCells::Entry& e) {
             const Vec3 x(e.x[0], e.x[1], e.x[2]);
             if ((x - low).minCoeff() < 0 || (high - x).minCoeff() < 0) return;  // most
-            const Above at = plane.above(x);
+            if (!plane) plane.emplace(place[t[0]], place[t[1]], place[t[2]]);
+            const Above at = plane->above(x);
             if (!(at.height < reach(t, way[e.vertex]) && at.height > -kDeepest * s.mean_edge))
               return;
             if (at.beside() > kBeside) return;
             // What does not face it is the far side, or a wall that the vertex would stumble over.
-            if (plane.up.dot(Vec3(e.normal[0], e.normal[1], e.normal[2])) > kFacing) return;
+            if (plane->up.dot(Vec3(e.normal[0], e.normal[1], e.normal[2])) > kFacing) return;
             const double off = std::fabs(at.height) + at.beside() * s.mean_edge;
             of_parts[part].push_back({e.vertex, piece, candidate.triangle, -1, off, at});
           });
@@ -243,6 +262,10 @@ void find_touches(State& s, double duration) {
       }
     }
   }
+  const Materials materials(s);
+  const auto friction_of = [&](std::int32_t i) {
+    return materials.at(v.body[i], v.reference[i]).friction;
+  };
   for (const Found& f : found) {
     const std::int32_t i = f.vertex;
     const Triangle& t = s.triangles[f.triangle];
@@ -252,7 +275,7 @@ void find_touches(State& s, double duration) {
                            .above(v.reference[i]);
       if (at.beside() < 1 && std::fabs(at.height) < s.mean_edge) rest = std::min(0.0, at.height);
     }
-    const double friction = std::sqrt(material_of(s, i).friction * material_of(s, t[0]).friction);
+    const double friction = std::sqrt(friction_of(i) * friction_of(t[0]));
     rest -= kSlack * s.mean_edge;
     if (f.at.height < rest) rest = f.at.height + kRecovery * (rest - f.at.height);
     s.touches.add({i, t[0], t[1], t[2]},

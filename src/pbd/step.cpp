@@ -1,6 +1,5 @@
 // One step: predict, project, take velocities from where vertices are.
 #include <cmath>
-#include <map>
 #include <numeric>
 
 #include "pbd/pbd_pieces.h"
@@ -175,14 +174,13 @@ void pack(State& s) {
     for (int k = 1; k < 4; ++k) v.x[4 * (n + 4 * lane + k) + k - 1] = 1;
   }
   UnionFind linked = joined(s);
-  std::map<std::int32_t, std::int32_t> number;
   s.component.resize(n);
   s.pushed.assign(n, 0);
-  for (int i = 0; i < n; ++i) {
-    const auto next = static_cast<std::int32_t>(number.size());
-    s.component[i] = number.try_emplace(linked.root(i), next).first->second;
+  s.components = 0;
+  for (int i = 0; i < n; ++i) {  // the root is the lowest, and has its number
+    const std::int32_t root = linked.root(i);
+    s.component[i] = root == i ? s.components++ : s.component[root];
   }
-  s.components = static_cast<int>(number.size());
   find_held(s);
   const std::vector<std::int32_t> levels = levels_of(s);
   s.cpu.for_each(4, [&](int set) {

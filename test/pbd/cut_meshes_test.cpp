@@ -319,8 +319,33 @@ TEST(SoundCuts, AFlakeWithoutThicknessDoesNotResistBending) {
   EXPECT_EQ(state->bends.size(), bends + 1);
 }
 
-// Of all constraints only those around a cut are made anew: the same as if all were. No two of a
-// colour share a vertex.
+/// No two links of a colour share a vertex.
+void expect_proper_colours(const pbd::State& s) {
+  std::set<std::pair<std::int32_t, std::int16_t>> taken;
+  for (int c = 0; c < s.links.size(); ++c) {
+    for (const std::int32_t v : s.links.vertices[c]) {
+      EXPECT_TRUE(taken.insert({v, s.links.colour[c]}).second) << v;
+    }
+  }
+}
+
+// Random cuts leave pairs of vertices that an edge joins, and an internal link from before. Both
+// got the edge's colour: one of them was lost, on a GPU either one.
+TEST(SoundCuts, AnEdgeAndAnInternalLinkOfTheSamePairHaveColoursOfTheirOwn) {
+  const auto state = pbd::make_state(lobe(PbdModel::kSurface), nullptr);
+  const auto [a, b] = state->links.vertices.front();
+  state->internal.insert(state->internal.begin(), {a, b, 1e-6, true});
+  for (int round = 0; round < 2; ++round) {
+    pbd::make_surface_constraints(*state);
+    pbd::pack(*state);
+    EXPECT_EQ(std::count(state->links.vertices.begin(), state->links.vertices.end(),
+                         state->links.vertices.front()),
+              2);
+    expect_proper_colours(*state);
+  }
+}
+
+// Of all constraints only those around a cut are made anew: the same as if all were.
 TEST(SoundCuts, WhatIsKeptIsWhatWouldBeMadeAnew) {
   Simulation simulation(lobe(PbdModel::kSurface));
   auto& tissue = dynamic_cast<PbdTissue&>(simulation.tissue());
@@ -341,12 +366,7 @@ TEST(SoundCuts, WhatIsKeptIsWhatWouldBeMadeAnew) {
     EXPECT_EQ(s.bends.vertices, angles.vertices);
     EXPECT_EQ(s.bends.numbers, angles.numbers);
     EXPECT_EQ(s.bends.colour, angles.colour);
-    std::set<std::pair<std::int32_t, std::int16_t>> taken;
-    for (int c = 0; c < s.links.size(); ++c) {
-      for (const std::int32_t v : s.links.vertices[c]) {
-        EXPECT_TRUE(taken.insert({v, s.links.colour[c]}).second) << v;
-      }
-    }
+    expect_proper_colours(s);
   }
 }
 

@@ -74,41 +74,26 @@ struct Piece {
 };
 
 /// By the root of what hangs together.
-std::map<std::int32_t, Piece> measure(State& s, UnionFind& linked) {
-  constexpr int kTrianglesOfPart = 2048;
-  struct Measures {
-    Vec3 normal;
-    double area, edge, slope;
-  };
-  const auto& x = s.vertices.reference;
-  const auto count = static_cast<int>(s.triangles.size());
-  std::vector<Measures> of(count);
-  s.cpu.for_each((count + kTrianglesOfPart - 1) / kTrianglesOfPart, [&](int part) {
-    for (int k = part * kTrianglesOfPart; k < std::min(count, (part + 1) * kTrianglesOfPart); ++k) {
-      const Triangle& t = s.triangles[k];
-      const Vec3 n = (x[t[1]] - x[t[0]]).cross(x[t[2]] - x[t[0]]);
-      Measures& m = of[k] = {n, n.norm(), 1e300, -1e300};
-      for (int i = 0; i < 3; ++i) {
-        const Vec3 e = x[t[(i + 1) % 3]] - x[t[i]], f = x[t[(i + 2) % 3]] - x[t[i]];
-        m.edge = std::min(m.edge, e.squaredNorm());
-        m.slope = std::max(m.slope, e.dot(f) / m.area);
-      }
-    }
-  });
+std::map<std::int32_t, Piece> measure(const State& s, UnionFind& linked) {
   std::map<std::int32_t, Piece> pieces;
   std::vector<Piece*> of_root(s.vertices.size(), nullptr);
-  for (int k = 0; k < count; ++k) {
-    const Triangle& t = s.triangles[k];
+  const auto& x = s.vertices.reference;
+  for (const Triangle& t : s.triangles) {
     const std::int32_t root = linked.root(t[0]);
     if (of_root[root] == nullptr) of_root[root] = &pieces[root];
     Piece& p = *of_root[root];
     if (p.vertex < 0) p.first = x[t[0]];
     p.vertex = t[0];
-    p.normal += of[k].normal;
-    p.area += of[k].area;
-    p.six_volumes += of[k].normal.dot(x[t[0]] - p.first);
-    p.edge = std::min(p.edge, of[k].edge);
-    p.slope = std::max(p.slope, of[k].slope);
+    const Vec3 n = (x[t[1]] - x[t[0]]).cross(x[t[2]] - x[t[0]]);
+    const double area = n.norm();
+    p.normal += n;
+    p.area += area;
+    p.six_volumes += n.dot(x[t[0]] - p.first);
+    for (int i = 0; i < 3; ++i) {
+      const Vec3 e = x[t[(i + 1) % 3]] - x[t[i]], f = x[t[(i + 2) % 3]] - x[t[i]];
+      p.edge = std::min(p.edge, e.squaredNorm());
+      p.slope = std::max(p.slope, e.dot(f) / area);
+    }
   }
   for (auto& [root, p] : pieces) {
     p.edge = std::sqrt(p.edge);

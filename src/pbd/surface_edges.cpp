@@ -15,9 +15,9 @@ constexpr int kFreshOfPart = 256;
 /// would turn by rounding [rad]. What a mesh came with stays.
 constexpr float kFolded = 3.0f;
 
-/// A triangle's side, at its lower vertex.
+/// A triangle's side.
 struct Side {
-  std::int32_t b, opposite;
+  std::int32_t a, b, opposite;  ///< a < b
   double area;
 };
 
@@ -108,45 +108,40 @@ std::vector<std::uint8_t> SurfaceEdges::changed_ends(const State& s) {
 
 void SurfaceEdges::update(State& s) {
   const std::vector<std::uint8_t> is_changed = changed_ends(s);
-  // Sides of a vertex lie side by side, each in the order of the triangles.
-  std::vector<std::int32_t> end(s.vertices.size() + 1, 0);
-  for (const Triangle& t : s.triangles) {
-    for (int i = 0; i < 3; ++i) end[low_end(t, i) + 1] += is_changed[low_end(t, i)];
-  }
-  for (int v = 0; v < s.vertices.size(); ++v) end[v + 1] += end[v];
-  std::vector<Side> sides(end.back());
+  std::vector<Side> sides;
   for (const Triangle& t : s.triangles) {
     for (int i = 0; i < 3; ++i) {
       const std::int32_t low = low_end(t, i);
       if (is_changed[low] == 0) continue;
-      sides[end[low]++] = {std::max(t[i], t[(i + 1) % 3]), t[(i + 2) % 3], area_of(s, t)};
+      sides.push_back({low, std::max(t[i], t[(i + 1) % 3]), t[(i + 2) % 3], area_of(s, t)});
     }
   }
+  // Those of an edge stay in the order of the triangles.
+  std::stable_sort(sides.begin(), sides.end(), [](const Side& p, const Side& q) {
+    return p.a < q.a || (p.a == q.a && p.b < q.b);
+  });
   edges_.swap(last_);
   edges_.clear();
   std::vector<std::int32_t> begin;
-  begin.reserve(end.size());
+  begin.reserve(is_changed.size() + 1);
   std::vector<Around> fresh;
-  std::int32_t first = 0;
-  for (int a = 0; a < s.vertices.size(); first = end[a++]) {
+  auto side = sides.begin();
+  for (int a = 0; a < s.vertices.size(); ++a) {
     begin.push_back(static_cast<std::int32_t>(edges_.size()));
     if (is_changed[a] == 0) {
       edges_.insert(edges_.end(), last_.begin() + begin_[a], last_.begin() + begin_[a + 1]);
       continue;
     }
-    std::stable_sort(sides.begin() + first, sides.begin() + end[a],
-                     [](const Side& p, const Side& q) { return p.b < q.b; });
-    for (std::int32_t k = first; k < end[a]; ++k) {
-      const Side& side = sides[k];
-      if (k == first || edges_.back().b != side.b) {
-        fresh.push_back({static_cast<std::int32_t>(edges_.size()), 1, side.area, side.area});
-        edges_.push_back({a, side.b, side.opposite, -1, 0, -1, 0, {}, 0});
+    for (std::int32_t b = -1; side != sides.end() && side->a == a; b = (side++)->b) {
+      if (side->b != b) {
+        fresh.push_back({static_cast<std::int32_t>(edges_.size()), 1, side->area, side->area});
+        edges_.push_back({a, side->b, side->opposite, -1, 0, -1, 0, {}, 0});
         continue;
       }
       Around& around = fresh.back();
-      if (++around.count == 2) edges_.back().right = side.opposite;
-      around.area += side.area;
-      around.least_area = std::min(around.least_area, side.area);
+      if (++around.count == 2) edges_.back().right = side->opposite;
+      around.area += side->area;
+      around.least_area = std::min(around.least_area, side->area);
     }
   }
   begin.push_back(static_cast<std::int32_t>(edges_.size()));

@@ -245,8 +245,10 @@ static bool is_parted(const State& s, const InternalLink& link) {
 int add_internal_links(State& s, int b, const std::vector<int>& starts) {
   const bool late = !s.cut_edges.empty();
   const double least = 0.1 * s.mean_edge;
-  std::vector<InternalLink> found;
-  for (const PieceMesh& piece : pieces_of(s, b, starts)) {
+  const std::vector<PieceMesh> pieces = pieces_of(s, b, starts);
+  std::vector<std::vector<InternalLink>> found_in(pieces.size());
+  s.cpu.for_each(static_cast<int>(pieces.size()), [&](int i) {
+    const PieceMesh& piece = pieces[i];
     const std::vector<Vec3> normals = vertex_normals(piece.mesh);
     const std::map<int, Vec3> sides = own_sides(s, piece, normals);
     const std::vector<Vec3> lean = away_from_wounds(sides, normals, piece.starts);
@@ -255,9 +257,11 @@ int add_internal_links(State& s, int b, const std::vector<int>& starts) {
       if (!stays_on_its_side(piece.mesh, sides, link)) continue;
       link.from = piece.vertex[link.from];
       link.to = piece.vertex[link.to];
-      found.push_back(link);
+      found_in[i].push_back(link);
     }
-  }
+  });
+  std::vector<InternalLink> found;
+  for (const auto& of : found_in) found.insert(found.end(), of.begin(), of.end());
   std::vector<double> area(s.vertices.size(), 0.0);
   std::vector<std::uint8_t> is_start(s.vertices.size(), 0);
   for (const int v : starts) is_start[v] = 1;

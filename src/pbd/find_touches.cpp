@@ -164,11 +164,13 @@ void find_touches(State& s, double duration) {
   };
   struct Kind {  // the slow, and what is faster
     TouchCells cells;
-    float farthest;  ///< of their ways [m]
+    float farthest;           ///< of their ways [m]
+    std::vector<Box> places;  ///< of each piece's
   };
   const auto slow = static_cast<float>(kSlow * s.mean_edge);
-  Kind kinds[] = {{TouchCells(kCell * s.mean_edge), std::min(slow, farthest)},
-                  {TouchCells(kCell * s.mean_edge), farthest}};
+  Kind kinds[] = {
+      {TouchCells(kCell * s.mean_edge), std::min(slow, farthest), std::vector<Box>(s.components)},
+      {TouchCells(kCell * s.mean_edge), farthest, std::vector<Box>(s.components)}};
   const int vertex_parts = (v.size() + kVerticesOfPart - 1) / kVerticesOfPart;
   std::vector<std::array<std::vector<TouchCells::Entry>, 2>> entries(vertex_parts);
   each_of(v.size(), kVerticesOfPart, [&](int i, int part) {
@@ -178,27 +180,33 @@ void find_touches(State& s, double duration) {
     entries[part][way[i] > slow].push_back(TouchCells::entry(i, s.component[i], x, normal[i]));
   });
   for (const auto& of_part : entries) {
-    for (int kind = 0; kind < 2; ++kind) kinds[kind].cells.add(of_part[kind]);
+    for (int kind = 0; kind < 2; ++kind) {
+      kinds[kind].cells.add(of_part[kind]);
+      for (const TouchCells::Entry& e : of_part[kind]) {
+        Box& own = kinds[kind].places[e.piece];
+        own.min = own.min.cwiseMin(Vec3(e.x[0], e.x[1], e.x[2]));
+        own.max = own.max.cwiseMax(Vec3(e.x[0], e.x[1], e.x[2]));
+      }
+    }
   }
-  // What a box has of the places of other pieces: all vertices that are to be found in it.
-  const auto shared = [&](std::int32_t piece, const Box& box) {
+  // What a box has of the places of other pieces' vertices; empty where it has none.
+  const auto shared = [&](std::int32_t piece, const Box& box, const std::vector<Box>& places_of) {
     Box all;
     for (const std::int32_t c : near[piece]) {
-      const Vec3 low = box.min.cwiseMax(places[c].min), high = box.max.cwiseMin(places[c].max);
-      if ((high - low).minCoeff() < 0) continue;
+      const Vec3 low = box.min.cwiseMax(places_of[c].min),
+                 high = box.max.cwiseMin(places_of[c].max);
+      if (!((high - low).minCoeff() >= 0)) continue;
       all.min = all.min.cwiseMin(low);
       all.max = all.max.cwiseMax(high);
     }
-    const Vec3 slack = Vec3::Constant(kRounding * s.mean_edge);
-    all.min -= slack;
-    all.max += slack;
     return all;
   };
   struct Candidate {
     std::int32_t triangle;
     int kind, level;
-    Box box;  ///< where it looks
+    Box box;  ///< where vertices are that it may see
   };
+  const Vec3 slack = Vec3::Constant(kRounding * s.mean_edge);
   std::vector<std::vector<Candidate>> candidates(parts);
   each_triangle([&](int k, int part) {
     const Triangle& t = s.triangles[k];
@@ -209,8 +217,10 @@ void find_touches(State& s, double duration) {
       const TouchCells& cells = kinds[kind].cells;
       if (cells.empty()) continue;
       const Box box = kind == 0 ? looks(t, kinds[0].farthest) : seen[k];
-      const int level = meets_other(piece, box, places) ? cells.level_of(box.min, box.max) : -1;
-      if (level >= 0) candidates[part].push_back({k, kind, level, shared(piece, box)});
+      const Box all = shared(piece, {box.min - slack, box.max + slack}, kinds[kind].places);
+      if (!(all.min.x() <= all.max.x())) continue;
+      const int level = cells.level_of(box.min, box.max);
+      if (level >= 0) candidates[part].push_back({k, kind, level, all});
     }
   });
   for (const std::vector<Candidate>& of_part : candidates) {

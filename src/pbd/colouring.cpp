@@ -43,7 +43,7 @@ class Taken {
 
 /// Gives those that have none the first colour that is free, in the order given. Returns the number
 /// of colours.
-int first_fit(const std::vector<std::int32_t>& vertices, int per_constraint,
+int first_fit(Span<const std::int32_t> vertices, int per_constraint,
               const std::vector<std::int32_t>& order, Taken& taken,
               std::vector<std::int16_t>& colour) {
   int count = 0;
@@ -66,23 +66,29 @@ int first_fit(const std::vector<std::int32_t>& vertices, int per_constraint,
 
 }  // namespace
 
-int find_colours(const std::vector<std::int32_t>& vertices, int per_constraint, int vertex_count,
+int find_colours(Span<const std::int32_t> vertices, int per_constraint, int vertex_count,
                  std::vector<std::int16_t>& colour, int most_rounds) {
   Taken taken(vertex_count);
   int count = 0;
-  for (std::size_t c = 0; c < colour.size(); ++c) {
-    if (colour[c] < 0) continue;
-    const std::int32_t* of = &vertices[c * per_constraint];
-    for (int i = 0; i < per_constraint; ++i) {
-      if (of[i] >= 0) taken.take(of[i], colour[c]);
-    }
-    count = std::max<int>(count, colour[c] + 1);
-  }
   std::vector<std::int32_t> order;
+  std::vector<std::uint8_t> is_asked(vertex_count, 0);  // of vertices
   for (std::size_t c = 0; c < colour.size(); ++c) {
-    if (colour[c] < 0) order.push_back(static_cast<std::int32_t>(c));
+    count = std::max<int>(count, colour[c] + 1);
+    if (colour[c] >= 0) continue;
+    order.push_back(static_cast<std::int32_t>(c));
+    for (int i = 0; i < per_constraint; ++i) {
+      const std::int32_t v = vertices[c * per_constraint + i];
+      if (v >= 0) is_asked[v] = 1;
+    }
   }
   const bool is_new = order.size() == colour.size();
+  for (std::size_t c = 0; c < colour.size() && !is_new && !order.empty(); ++c) {
+    if (colour[c] < 0) continue;
+    for (int i = 0; i < per_constraint; ++i) {
+      const std::int32_t v = vertices[c * per_constraint + i];
+      if (v >= 0 && is_asked[v] != 0) taken.take(v, colour[c]);
+    }
+  }
   count = std::max(count, first_fit(vertices, per_constraint, order, taken, colour));
   if (!is_new || order.empty()) return count;
   // Colours taken in another order, those of one class together, need no more than before, and

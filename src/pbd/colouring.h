@@ -5,6 +5,8 @@
 #include <cstdint>
 #include <vector>
 
+#include "tissue_sim/types.h"
+
 namespace tissue_sim {
 namespace pbd {
 
@@ -13,7 +15,7 @@ namespace pbd {
 /// holds `per_constraint` indices below `vertex_count` for each constraint; a negative one is none.
 /// Returns the number of colours.
 /// `most_rounds`: of looking for fewer.
-int find_colours(const std::vector<std::int32_t>& vertices, int per_constraint, int vertex_count,
+int find_colours(Span<const std::int32_t> vertices, int per_constraint, int vertex_count,
                  std::vector<std::int16_t>& colour, int most_rounds = 30);
 
 }  // namespace pbd

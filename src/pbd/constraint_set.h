@@ -74,11 +74,9 @@ template <class Kind>
 void ConstraintSet<Kind>::pack(int vertex_count, const std::vector<std::int32_t>& levels,
                                int most_rounds) {
   constexpr int kVertices = Kind::kVertices;
-  std::vector<std::int32_t> flat(vertices.size() * kVertices);
-  for (std::size_t c = 0; c < vertices.size(); ++c) {
-    std::copy(vertices[c].begin(), vertices[c].end(), flat.begin() + c * kVertices);
-  }
-  colours = find_colours(flat, kVertices, vertex_count, colour, most_rounds);
+  const std::int32_t* all = vertices.empty() ? nullptr : vertices.front().data();
+  colours = find_colours({all, vertices.size() * kVertices}, kVertices, vertex_count, colour,
+                         most_rounds);
   chunks.clear();
   int count = 0;
   for (const std::int32_t vertices_of_chunk : levels) {
@@ -86,7 +84,10 @@ void ConstraintSet<Kind>::pack(int vertex_count, const std::vector<std::int32_t>
     count += chunks.back();
   }
   chunks.push_back(1);
-  std::vector<std::vector<std::int32_t>> of(static_cast<std::size_t>(count + 1) * colours);
+  // Of each constraint: its list, by chunk and colour.
+  std::vector<std::int32_t> list(vertices.size());
+  std::vector<std::int32_t> end(static_cast<std::size_t>(count + 1) * colours + 1, 0);
+  std::vector<std::int32_t> end_of_first(static_cast<std::size_t>(vertex_count) + 1, 0);
   for (int c = 0; c < size(); ++c) {
     const auto [low, high] = std::minmax_element(vertices[c].begin(), vertices[c].end());
     int chunk = 0;
@@ -95,27 +96,36 @@ void ConstraintSet<Kind>::pack(int vertex_count, const std::vector<std::int32_t>
       chunk += chunks[level];
     }
     if (level < levels.size()) chunk += *low / levels[level];
-    of[static_cast<std::size_t>(chunk) * colours + colour[c]].push_back(c);
+    list[c] = chunk * colours + colour[c];
+    ++end[list[c] + 1];
+    ++end_of_first[vertices[c][0] + 1];
   }
-  blocks.clear();
+  // Side by side in memory what lies side by side in space, for vertices are numbered so: by the
+  // first vertex, which no two of a list share.
+  for (int v = 0; v < vertex_count; ++v) end_of_first[v + 1] += end_of_first[v];
+  std::vector<std::int32_t> by_first(vertices.size()), sorted(vertices.size());
+  for (int c = 0; c < size(); ++c) by_first[end_of_first[vertices[c][0]]++] = c;
+  for (std::size_t l = 1; l < end.size(); ++l) end[l] += end[l - 1];
+  for (const std::int32_t c : by_first) sorted[end[list[c]]++] = c;
   begin.assign(1, 0);
-  for (std::vector<std::int32_t>& list : of) {
-    // Side by side in memory what lies side by side in space, for vertices are numbered so.
-    std::stable_sort(list.begin(), list.end(),
-                     [this](std::int32_t a, std::int32_t b) { return vertices[a] < vertices[b]; });
-    for (std::size_t first = 0; first < list.size(); first += kLanes) {
-      Block block;
+  std::int32_t first = 0;
+  for (std::size_t l = 0; l + 1 < end.size(); first = end[l++]) {
+    begin.push_back(begin.back() + (end[l] - first + kLanes - 1) / kLanes);
+  }
+  blocks.resize(begin.back());
+  Block* block = blocks.data();
+  first = 0;
+  for (std::size_t l = 0; l + 1 < end.size(); first = end[l++]) {
+    for (std::int32_t at = first; at < end[l]; at += kLanes, ++block) {
       for (int lane = 0; lane < kLanes; ++lane) {
-        const bool is_there = first + lane < list.size();
-        const std::int32_t c = is_there ? list[first + lane] : list.back();
+        const bool is_there = at + lane < end[l];
+        const std::int32_t c = sorted[is_there ? at + lane : end[l] - 1];
         for (int i = 0; i < kVertices; ++i) {
-          block.vertex[i][lane] = is_there ? vertices[c][i] : vertex_count + 4 * lane + i;
+          block->vertex[i][lane] = is_there ? vertices[c][i] : vertex_count + 4 * lane + i;
         }
-        for (int i = 0; i < Kind::kNumbers; ++i) block.number[i][lane] = numbers[c][i];
+        for (int i = 0; i < Kind::kNumbers; ++i) block->number[i][lane] = numbers[c][i];
       }
-      blocks.push_back(block);
     }
-    begin.push_back(static_cast<std::int32_t>(blocks.size()));
   }
   multipliers.assign(blocks.size() * kMultipliers * kLanes, 0.0f);
 }

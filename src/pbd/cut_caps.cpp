@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <unordered_set>
 
 #include "fragments/pieces.h"
 #include "pbd/cap_mesh.h"
@@ -16,7 +17,19 @@ namespace tissue_sim {
 namespace pbd {
 namespace {
 
-using Edges = std::set<std::pair<std::int32_t, std::int32_t>>;  // of triangles: from, to
+/// Of triangles: from, to.
+class Edges {
+ public:
+  using Edge = std::pair<std::int32_t, std::int32_t>;
+  void insert(const Edge& e) { all_.insert(key(e)); }
+  std::size_t count(const Edge& e) const { return all_.count(key(e)); }
+
+ private:
+  static std::uint64_t key(const Edge& e) {
+    return static_cast<std::uint64_t>(e.first) << 32 | static_cast<std::uint32_t>(e.second);
+  }
+  std::unordered_set<std::uint64_t> all_;
+};
 
 /// The smallest angle of a surface that would close a wound [rad]. 0 if it has an edge that is too
 /// short, or one that a triangle has already in this sense.

@@ -19,9 +19,19 @@ class SurfaceCut {
       : s_(s), before_(before), parts_(parts), origin_(origin) {}
 
   int remove_internal(const std::vector<std::uint8_t>* whole) {
+    constexpr int kPairsOfPart = 1024;
+    const auto count = static_cast<int>(s_.internal.size());
+    std::vector<std::uint8_t> passed(count, 0);
+    s_.cpu.for_each((count + kPairsOfPart - 1) / kPairsOfPart, [&](int part) {
+      for (int k = part * kPairsOfPart; k < std::min(count, (part + 1) * kPairsOfPart); ++k) {
+        const InternalPair& p = s_.internal[k];
+        if (whole == nullptr || (*whole)[p.a] == 0) passed[k] = is_passed(p) ? 1 : 0;
+      }
+    });
     std::vector<InternalPair> kept;
-    for (const InternalPair& p : s_.internal) {
-      if ((whole != nullptr && (*whole)[p.a] != 0) || !is_passed(p)) {
+    for (int k = 0; k < count; ++k) {
+      const InternalPair& p = s_.internal[k];
+      if (passed[k] == 0) {
         kept.push_back(p);
         continue;
       }

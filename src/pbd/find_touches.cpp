@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 #include "math/union_find.h"
 #include "pbd/model.h"
@@ -35,7 +36,10 @@ constexpr double kCell = 2;
 /// Vertices of a piece that touches others, at least: crumbs, slivers for the most part, shook.
 constexpr int kLeastPiece = 60;
 
-constexpr int kTrianglesOfPart = 256;
+/// What lies above a triangle is in the box where it looks, but for rounding [mean edges].
+constexpr double kRounding = 1e-2;
+
+constexpr int kTrianglesOfPart = 256, kVerticesOfPart = 1024;
 
 /// Whether a triangle is so thin that single precision hardly knows its normal.
 bool is_sliver(const Vec3& a, const Vec3& b, const Vec3& c, double mean_edge) {
@@ -67,10 +71,6 @@ struct TouchedTriangle {
   }
 };
 
-const Material& material_of(const State& s, int v) {
-  return material_at(s.scene, s.scene.bodies[s.vertices.body[v]], s.vertices.reference[v]);
-}
-
 }  // namespace
 
 void find_touches(State& s, double duration) {
@@ -86,16 +86,24 @@ void find_touches(State& s, double duration) {
   std::vector<int> vertices_of(s.components, 0);
   for (const std::int32_t c : s.component) ++vertices_of[c];
   const auto is_crumb = [&](std::int32_t i) { return vertices_of[s.component[i]] < kLeastPiece; };
-  std::vector<Vec3> normal(v.size(), Vec3::Zero());
+  const auto each_of = [&](int number, int of_part, const auto& f) {  // f(i, part)
+    s.cpu.for_each((number + of_part - 1) / of_part, [&](int part) {
+      for (int i = part * of_part; i < std::min(number, (part + 1) * of_part); ++i) f(i, part);
+    });
+  };
+  std::vector<Vec3> place(v.size());
   std::vector<float> way(v.size());  // of each vertex in the frame [m]
+  each_of(v.size(), kVerticesOfPart, [&](int i, int) {
+    place[i] = v.position(i);
+    way[i] = static_cast<float>(duration * v.velocity(i).norm());
+  });
   float farthest = 0;
   for (int i = 0; i < v.size(); ++i) {
-    way[i] = static_cast<float>(duration * v.velocity(i).norm());
     if (!is_crumb(i)) farthest = std::max(farthest, way[i]);
   }
+  std::vector<Vec3> normal(v.size(), Vec3::Zero());
   for (const Triangle& t : s.triangles) {
-    const Vec3 a = v.position(t[0]);
-    const Vec3 n = (v.position(t[1]) - a).cross(v.position(t[2]) - a);
+    const Vec3 n = (place[t[1]] - place[t[0]]).cross(place[t[2]] - place[t[0]]);
     for (const std::int32_t i : t) normal[i] += n;
   }
   // How far above a triangle a vertex may be that comes to it on a way of its own.
@@ -105,7 +113,7 @@ void find_touches(State& s, double duration) {
   };
   // Where a triangle looks for vertices: above it, beside it by a little, and in it, a prism.
   const auto looks = [&](const Triangle& t, double own) {
-    const Vec3 a = v.position(t[0]), b = v.position(t[1]), c = v.position(t[2]);
+    const Vec3 &a = place[t[0]], &b = place[t[1]], &c = place[t[2]];
     const Vec3 middle = (a + b + c) / 3, up = (b - a).cross(c - a).stableNormalized();
     Box box;
     for (const Vec3& corner : {a, b, c}) {
@@ -119,12 +127,7 @@ void find_touches(State& s, double duration) {
   };
   const int count = static_cast<int>(s.triangles.size());
   const int parts = (count + kTrianglesOfPart - 1) / kTrianglesOfPart;
-  const auto each_triangle = [&](const auto& f) {  // f(triangle, part)
-    s.cpu.for_each(parts, [&](int part) {
-      const int end = std::min(count, (part + 1) * kTrianglesOfPart);
-      for (int k = part * kTrianglesOfPart; k < end; ++k) f(k, part);
-    });
-  };
+  const auto each_triangle = [&](const auto& f) { each_of(count, kTrianglesOfPart, f); };
   std::vector<Box> seen(count);  // by each triangle, for the farthest way
   each_triangle([&](int k, int) { seen[k] = looks(s.triangles[k], farthest); });
   // Where each piece is, and where it looks: what lies in no other's box is left out.
@@ -132,55 +135,92 @@ void find_touches(State& s, double duration) {
   for (int k = 0; k < count; ++k) {
     const Triangle& t = s.triangles[k];
     if (is_crumb(t[0])) continue;
-    Box &place = places[s.component[t[0]]], &wide = reached[s.component[t[0]]];
+    Box &own = places[s.component[t[0]]], &wide = reached[s.component[t[0]]];
     for (const std::int32_t i : t) {
-      const Vec3 x = v.position(i);
-      place.min = place.min.cwiseMin(x);
-      place.max = place.max.cwiseMax(x);
+      own.min = own.min.cwiseMin(place[i]);
+      own.max = own.max.cwiseMax(place[i]);
     }
     wide.min = wide.min.cwiseMin(seen[k].min);
     wide.max = wide.max.cwiseMax(seen[k].max);
   }
+  const auto overlap = [](const Box& p, const Box& q) {
+    return (p.max - q.min).minCoeff() >= 0 && (q.max - p.min).minCoeff() >= 0;
+  };
   std::vector<std::int32_t> large;
   for (std::int32_t c = 0; c < s.components; ++c) {
     if (places[c].min.x() <= places[c].max.x()) large.push_back(c);
   }
+  // Of each piece, the others that see it, or that it sees.
+  std::vector<std::vector<std::int32_t>> near(s.components);
+  for (const std::int32_t a : large) {
+    for (const std::int32_t b : large) {
+      if (a == b) continue;
+      if (overlap(reached[a], places[b]) || overlap(reached[b], places[a])) near[a].push_back(b);
+    }
+  }
   const auto meets_other = [&](std::int32_t piece, const Box& box, const std::vector<Box>& boxes) {
-    return std::any_of(large.begin(), large.end(), [&](std::int32_t c) {
-      return c != piece && (box.max - boxes[c].min).minCoeff() >= 0 &&
-             (boxes[c].max - box.min).minCoeff() >= 0;
-    });
+    return std::any_of(near[piece].begin(), near[piece].end(),
+                       [&](std::int32_t c) { return overlap(box, boxes[c]); });
   };
   struct Kind {  // the slow, and what is faster
     TouchCells cells;
-    float farthest;  ///< of their ways [m]
+    float farthest;           ///< of their ways [m]
+    std::vector<Box> places;  ///< of each piece's
   };
   const auto slow = static_cast<float>(kSlow * s.mean_edge);
-  Kind kinds[] = {{TouchCells(kCell * s.mean_edge), std::min(slow, farthest)},
-                  {TouchCells(kCell * s.mean_edge), farthest}};
-  for (int i = 0; i < v.size(); ++i) {
-    const Vec3 x = v.position(i);
-    if (v.surface[i] != 0 && !is_crumb(i) && meets_other(s.component[i], {x, x}, reached)) {
-      kinds[way[i] > slow].cells.add(i, s.component[i], x, normal[i]);
+  Kind kinds[] = {
+      {TouchCells(kCell * s.mean_edge), std::min(slow, farthest), std::vector<Box>(s.components)},
+      {TouchCells(kCell * s.mean_edge), farthest, std::vector<Box>(s.components)}};
+  const int vertex_parts = (v.size() + kVerticesOfPart - 1) / kVerticesOfPart;
+  std::vector<std::array<std::vector<TouchCells::Entry>, 2>> entries(vertex_parts);
+  each_of(v.size(), kVerticesOfPart, [&](int i, int part) {
+    const Vec3& x = place[i];
+    if (v.surface[i] == 0 || is_crumb(i) || !x.allFinite()) return;
+    if (!meets_other(s.component[i], {x, x}, reached)) return;
+    entries[part][way[i] > slow].push_back(TouchCells::entry(i, s.component[i], x, normal[i]));
+  });
+  for (const auto& of_part : entries) {
+    for (int kind = 0; kind < 2; ++kind) {
+      kinds[kind].cells.add(of_part[kind]);
+      for (const TouchCells::Entry& e : of_part[kind]) {
+        Box& own = kinds[kind].places[e.piece];
+        own.min = own.min.cwiseMin(Vec3(e.x[0], e.x[1], e.x[2]));
+        own.max = own.max.cwiseMax(Vec3(e.x[0], e.x[1], e.x[2]));
+      }
     }
   }
+  // What a box has of the places of other pieces' vertices; empty where it has none.
+  const auto shared = [&](std::int32_t piece, const Box& box, const std::vector<Box>& places_of) {
+    Box all;
+    for (const std::int32_t c : near[piece]) {
+      const Vec3 low = box.min.cwiseMax(places_of[c].min),
+                 high = box.max.cwiseMin(places_of[c].max);
+      if (!((high - low).minCoeff() >= 0)) continue;
+      all.min = all.min.cwiseMin(low);
+      all.max = all.max.cwiseMax(high);
+    }
+    return all;
+  };
   struct Candidate {
     std::int32_t triangle;
     int kind, level;
-    Box box;  ///< where it looks
+    Box box;  ///< where vertices are that it may see
   };
+  const Vec3 slack = Vec3::Constant(kRounding * s.mean_edge);
   std::vector<std::vector<Candidate>> candidates(parts);
   each_triangle([&](int k, int part) {
     const Triangle& t = s.triangles[k];
     const std::int32_t piece = s.component[t[0]];
     if (is_crumb(t[0]) || !meets_other(piece, seen[k], places)) return;
-    if (is_sliver(v.position(t[0]), v.position(t[1]), v.position(t[2]), s.mean_edge)) return;
+    if (is_sliver(place[t[0]], place[t[1]], place[t[2]], s.mean_edge)) return;
     for (int kind = 0; kind < 2; ++kind) {
       const TouchCells& cells = kinds[kind].cells;
       if (cells.empty()) continue;
       const Box box = kind == 0 ? looks(t, kinds[0].farthest) : seen[k];
-      const int level = meets_other(piece, box, places) ? cells.level_of(box.min, box.max) : -1;
-      if (level >= 0) candidates[part].push_back({k, kind, level, box});
+      const Box all = shared(piece, {box.min - slack, box.max + slack}, kinds[kind].places);
+      if (!(all.min.x() <= all.max.x())) continue;
+      const int level = cells.level_of(box.min, box.max);
+      if (level >= 0) candidates[part].push_back({k, kind, level, all});
     }
   });
   for (const std::vector<Candidate>& of_part : candidates) {
@@ -197,16 +237,19 @@ void find_touches(State& s, double duration) {
     for (const Candidate& candidate : candidates[part]) {
       const Triangle& t = s.triangles[candidate.triangle];
       const std::int32_t piece = s.component[t[0]];
-      const TouchedTriangle plane(v.position(t[0]), v.position(t[1]), v.position(t[2]));
+      std::optional<TouchedTriangle> plane;
+      const Vec3 &low = candidate.box.min, &high = candidate.box.max;
       kinds[candidate.kind].cells.each_in(
-          candidate.level, candidate.box.min, candidate.box.max, piece,
-          [&](const TouchCells::Entry& e) {
-            const Above at = plane.above(Vec3(e.x[0], e.x[1], e.x[2]));
+          candidate.level, low, high, piece, [&](const TouchCells::Entry& e) {
+            const Vec3 x(e.x[0], e.x[1], e.x[2]);
+            if ((x - low).minCoeff() < 0 || (high - x).minCoeff() < 0) return;  // most
+            if (!plane) plane.emplace(place[t[0]], place[t[1]], place[t[2]]);
+            const Above at = plane->above(x);
             if (!(at.height < reach(t, way[e.vertex]) && at.height > -kDeepest * s.mean_edge))
               return;
             if (at.beside() > kBeside) return;
             // What does not face it is the far side, or a wall that the vertex would stumble over.
-            if (plane.up.dot(Vec3(e.normal[0], e.normal[1], e.normal[2])) > kFacing) return;
+            if (plane->up.dot(Vec3(e.normal[0], e.normal[1], e.normal[2])) > kFacing) return;
             const double off = std::fabs(at.height) + at.beside() * s.mean_edge;
             of_parts[part].push_back({e.vertex, piece, candidate.triangle, -1, off, at});
           });
@@ -229,6 +272,10 @@ void find_touches(State& s, double duration) {
       }
     }
   }
+  const Materials materials(s);
+  const auto friction_of = [&](std::int32_t i) {
+    return materials.at(v.body[i], v.reference[i]).friction;
+  };
   for (const Found& f : found) {
     const std::int32_t i = f.vertex;
     const Triangle& t = s.triangles[f.triangle];
@@ -238,7 +285,7 @@ void find_touches(State& s, double duration) {
                            .above(v.reference[i]);
       if (at.beside() < 1 && std::fabs(at.height) < s.mean_edge) rest = std::min(0.0, at.height);
     }
-    const double friction = std::sqrt(material_of(s, i).friction * material_of(s, t[0]).friction);
+    const double friction = std::sqrt(friction_of(i) * friction_of(t[0]));
     rest -= kSlack * s.mean_edge;
     if (f.at.height < rest) rest = f.at.height + kRecovery * (rest - f.at.height);
     s.touches.add({i, t[0], t[1], t[2]},

@@ -67,13 +67,10 @@ const Material& material_at(const Scene& scene, const Body& body, const Vec3& x)
   return find_material(scene, body.material);
 }
 
-TriangleMesh reference_surface(const State& s, int b) {
-  TriangleMesh mesh;
-  mesh.vertices = s.vertices.reference;
-  for (const Triangle& t : s.triangles) {
-    if (s.vertices.body[t[0]] == b) mesh.triangles.push_back({t[0], t[1], t[2]});
+Materials::Materials(const State& s) : scene_(s.scene) {
+  for (const Body& body : scene_.bodies) {
+    of_body_.push_back(body.inclusions.empty() ? &find_material(scene_, body.material) : nullptr);
   }
-  return mesh;
 }
 
 std::unique_ptr<State> make_state(const Scene& scene, std::vector<std::string>* notes) {

@@ -15,6 +15,20 @@ std::unique_ptr<State> make_state(const Scene& scene, std::vector<std::string>* 
 /// Material of a body at a place of the reference space.
 const Material& material_at(const Scene& scene, const Body& body, const Vec3& x);
 
+/// The same for many places: a body without inclusions is of one.
+class Materials {
+ public:
+  explicit Materials(const State& s);
+  const Material& at(int body, const Vec3& x) const {
+    if (of_body_[body] != nullptr) return *of_body_[body];
+    return material_at(scene_, scene_.bodies[body], x);
+  }
+
+ private:
+  const Scene& scene_;
+  std::vector<const Material*> of_body_;
+};
+
 /// Numbers that bring neighbours in space near each other in memory (Morton's curve): entry k is
 /// the index of the one that comes k-th.
 std::vector<int> morton_order(const std::vector<Vec3>& places);
@@ -45,8 +59,8 @@ int add_internal_links(State& s, int b, const std::vector<int>& starts);
 void add_surface_body(State& s, int b, std::vector<std::string>* notes);
 void add_tet_body(State& s, int b, std::vector<std::string>* notes);
 
-/// The triangles of one body as a mesh in reference space, with all vertices.
-TriangleMesh reference_surface(const State& s, int b);
+/// Of a triangle of the surface in reference space [m^2].
+double area_of(const State& s, const Triangle& t);
 
 }  // namespace pbd
 }  // namespace tissue_sim

@@ -14,6 +14,7 @@
 #include "pbd/constraint_set.h"
 #include "pbd/motion.h"
 #include "pbd/project.h"
+#include "pbd/surface_edges.h"
 #include "pbd/tip_contact.h"
 #include "pbd/touch.h"
 #include "tissue_sim/cut.h"
@@ -86,6 +87,7 @@ struct State {
   std::vector<InternalPair> internal;  ///< by a, then b
   std::vector<double> half_depth;      ///< of each vertex: to the middle of the body [m]
 
+  SurfaceEdges surface_edges;     ///< what links and bends are made from
   ConstraintSet<Distance> links;  ///< edges, then internal links
   int edge_count = 0;             ///< of links: those that are edges
   ConstraintSet<Bending> bends;

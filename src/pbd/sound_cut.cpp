@@ -76,19 +76,23 @@ struct Piece {
 /// By the root of what hangs together.
 std::map<std::int32_t, Piece> measure(const State& s, UnionFind& linked) {
   std::map<std::int32_t, Piece> pieces;
+  std::vector<Piece*> of_root(s.vertices.size(), nullptr);
   const auto& x = s.vertices.reference;
   for (const Triangle& t : s.triangles) {
-    Piece& p = pieces[linked.root(t[0])];
+    const std::int32_t root = linked.root(t[0]);
+    if (of_root[root] == nullptr) of_root[root] = &pieces[root];
+    Piece& p = *of_root[root];
     if (p.vertex < 0) p.first = x[t[0]];
     p.vertex = t[0];
     const Vec3 n = (x[t[1]] - x[t[0]]).cross(x[t[2]] - x[t[0]]);
+    const double area = n.norm();
     p.normal += n;
-    p.area += n.norm();
+    p.area += area;
     p.six_volumes += n.dot(x[t[0]] - p.first);
     for (int i = 0; i < 3; ++i) {
       const Vec3 e = x[t[(i + 1) % 3]] - x[t[i]], f = x[t[(i + 2) % 3]] - x[t[i]];
       p.edge = std::min(p.edge, e.squaredNorm());
-      p.slope = std::max(p.slope, e.dot(f) / n.norm());
+      p.slope = std::max(p.slope, e.dot(f) / area);
     }
   }
   for (auto& [root, p] : pieces) {

@@ -1,6 +1,6 @@
 // One step: predict, project, take velocities from where vertices are.
 #include <cmath>
-#include <map>
+#include <numeric>
 
 #include "pbd/pbd_pieces.h"
 
@@ -8,7 +8,7 @@ namespace tissue_sim {
 namespace pbd {
 namespace {
 
-constexpr int kVerticesOfPart = 2048;
+constexpr int kVerticesOfPart = 2048, kConstraintsOfPart = 2048;
 /// Fewer vertices than this are in a processor's cache anyway.
 constexpr int kLeastChunked = 8192;
 
@@ -174,14 +174,13 @@ void pack(State& s) {
     for (int k = 1; k < 4; ++k) v.x[4 * (n + 4 * lane + k) + k - 1] = 1;
   }
   UnionFind linked = joined(s);
-  std::map<std::int32_t, std::int32_t> number;
   s.component.resize(n);
   s.pushed.assign(n, 0);
-  for (int i = 0; i < n; ++i) {
-    const auto next = static_cast<std::int32_t>(number.size());
-    s.component[i] = number.try_emplace(linked.root(i), next).first->second;
+  s.components = 0;
+  for (int i = 0; i < n; ++i) {  // the root is the lowest, and has its number
+    const std::int32_t root = linked.root(i);
+    s.component[i] = root == i ? s.components++ : s.component[root];
   }
-  s.components = static_cast<int>(number.size());
   find_held(s);
   const std::vector<std::int32_t> levels = levels_of(s);
   s.cpu.for_each(4, [&](int set) {
@@ -195,29 +194,32 @@ void pack(State& s) {
 
 namespace {
 
+/// The same on any number of threads: summed up one by one.
 template <class Kind>
-double sum_energy(const State& s, const ConstraintSet<Kind>& set) {
-  double sum = 0;
-  for (int c = 0; c < set.size(); ++c) {
-    Vertex<float> v[Kind::kVertices];
-    for (int i = 0; i < Kind::kVertices; ++i) {
-      const std::size_t at = 4 * static_cast<std::size_t>(set.vertices[c][i]);
-      const float *x = &s.vertices.x[at], *moved = &s.vertices.moved[at];
-      v[i] = {x[0], x[1], x[2], x[3], {moved[0], moved[1], moved[2]}};
+double sum_energy(State& s, const ConstraintSet<Kind>& set) {
+  const int count = set.size();
+  std::vector<double> of(count);
+  s.cpu.for_each((count + kConstraintsOfPart - 1) / kConstraintsOfPart, [&](int part) {
+    for (int c = part * kConstraintsOfPart; c < std::min(count, (part + 1) * kConstraintsOfPart);
+         ++c) {
+      Vertex<float> v[Kind::kVertices];
+      for (int i = 0; i < Kind::kVertices; ++i) {
+        const std::size_t at = 4 * static_cast<std::size_t>(set.vertices[c][i]);
+        const float *x = &s.vertices.x[at], *moved = &s.vertices.moved[at];
+        v[i] = {x[0], x[1], x[2], x[3], {moved[0], moved[1], moved[2]}};
+      }
+      float number[Kind::kNumbers];
+      std::copy(set.numbers[c].begin(), set.numbers[c].end(), number);
+      of[c] = Kind::energy(v, number);
     }
-    float number[Kind::kNumbers];
-    std::copy(set.numbers[c].begin(), set.numbers[c].end(), number);
-    sum += Kind::energy(v, number);
-  }
-  return sum;
+  });
+  return std::accumulate(of.begin(), of.end(), 0.0);
 }
 
 }  // namespace
 
 double elastic_energy(State& s) {
-  double links = 0, angles = 0;
-  s.cpu.both([&] { links = sum_energy(s, s.links); }, [&] { angles = sum_energy(s, s.bends); });
-  return links + angles + sum_energy(s, s.elastics);
+  return sum_energy(s, s.links) + sum_energy(s, s.bends) + sum_energy(s, s.elastics);
 }
 
 }  // namespace pbd

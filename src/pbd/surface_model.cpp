@@ -25,93 +25,41 @@ namespace tissue_sim {
 namespace pbd {
 namespace {
 
-double area_of(const State& s, const Triangle& t) {
-  const auto& x = s.vertices.reference;
-  return 0.5 * (x[t[1]] - x[t[0]]).cross(x[t[2]] - x[t[0]]).norm();
-}
-
 std::uint64_t pair_key(std::int32_t a, std::int32_t b) {
   return static_cast<std::uint64_t>(std::min(a, b)) << 32 |
          static_cast<std::uint32_t>(std::max(a, b));
 }
 
-/// Colours of constraints by what they join, to be given to those made anew.
+/// Colours of constraints that were there before, to be given to those made anew: both in the order
+/// of the last two of their vertices.
 template <class Kind>
 class OldColours {
  public:
-  void take(ConstraintSet<Kind>& set) {
-    for (int c = 0; c < set.size(); ++c) colours_.emplace_back(set.vertices[c], set.colour[c]);
-    std::stable_sort(colours_.begin(), colours_.end(),
-                     [](const Coloured& a, const Coloured& b) { return a.first < b.first; });
-    set.vertices.clear();
-    set.numbers.clear();
-    set.colour.clear();
+  using Vertices = typename ConstraintSet<Kind>::Vertices;
+  OldColours(std::vector<Vertices>& vertices, std::vector<std::int16_t>& colours) {
+    vertices_.swap(vertices);
+    colours_.swap(colours);
+    end_ = vertices_.size();
   }
-  void restore(ConstraintSet<Kind>& set) const {
-    auto at = colours_.begin();
-    for (int c = 0; c < set.size(); ++c) {
-      const auto& wanted = set.vertices[c];
-      // Most come in the order of before.
-      if (at == colours_.end() || at->first != wanted) {
-        at = std::lower_bound(colours_.begin(), colours_.end(), wanted,
-                              [](const Coloured& a, const auto& v) { return a.first < v; });
-      }
-      if (at != colours_.end() && at->first == wanted) set.colour[c] = (at++)->second;
-    }
+  /// Goes on with those from `begin` to `end`.
+  void part(std::size_t begin, std::size_t end) {
+    at_ = begin;
+    end_ = end;
   }
+  std::int16_t next(const Vertices& wanted) {
+    const auto order = [](const Vertices& v) {
+      return std::make_pair(v[Kind::kVertices - 2], v[Kind::kVertices - 1]);
+    };
+    while (at_ < end_ && order(vertices_[at_]) < order(wanted)) ++at_;
+    return at_ < end_ && vertices_[at_] == wanted ? colours_[at_] : std::int16_t{-1};
+  }
+  std::size_t size() const { return vertices_.size(); }
 
  private:
-  using Coloured = std::pair<typename ConstraintSet<Kind>::Vertices, std::int16_t>;
-  std::vector<Coloured> colours_;
+  std::vector<Vertices> vertices_;
+  std::vector<std::int16_t> colours_;
+  std::size_t at_ = 0, end_ = 0;
 };
-
-struct MeshEdge {
-  std::int32_t a, b;         ///< a < b
-  std::int32_t left, right;  ///< vertices opposite, -1 for none
-  int count;                 ///< of triangles
-  double area, least_area;   ///< of them, and of the smallest [m^2]
-};
-
-/// By a, then b.
-std::vector<MeshEdge> mesh_edges(const State& s) {
-  struct Half {
-    std::int32_t b, opposite;
-    double area;
-  };
-  // Those of a vertex lie side by side, each in the order of the triangles.
-  std::vector<std::int32_t> end(s.vertices.size() + 1, 0);
-  const auto low = [](const Triangle& t, int i) { return std::min(t[i], t[(i + 1) % 3]); };
-  for (const Triangle& t : s.triangles) {
-    for (int i = 0; i < 3; ++i) ++end[low(t, i) + 1];
-  }
-  for (int v = 0; v < s.vertices.size(); ++v) end[v + 1] += end[v];
-  std::vector<Half> halves(3 * s.triangles.size());
-  for (const Triangle& t : s.triangles) {
-    const double area = area_of(s, t);
-    for (int i = 0; i < 3; ++i) {
-      halves[end[low(t, i)]++] = {std::max(t[i], t[(i + 1) % 3]), t[(i + 2) % 3], area};
-    }
-  }
-  std::vector<MeshEdge> edges;
-  edges.reserve(halves.size() / 2);
-  std::int32_t first = 0;
-  for (int a = 0; a < s.vertices.size(); first = end[a++]) {
-    std::stable_sort(halves.begin() + first, halves.begin() + end[a],
-                     [](const Half& p, const Half& q) { return p.b < q.b; });
-    for (std::int32_t h = first; h < end[a]; ++h) {
-      const Half& half = halves[h];
-      if (h == first || edges.back().b != half.b) {
-        edges.push_back({a, half.b, half.opposite, -1, 1, half.area, half.area});
-        continue;
-      }
-      MeshEdge& edge = edges.back();
-      if (++edge.count == 2) edge.right = half.opposite;
-      edge.area += half.area;
-      edge.least_area = std::min(edge.least_area, half.area);
-    }
-  }
-  return edges;
-}
 
 void add_link(State& s, std::int32_t a, std::int32_t b, double stiffness) {
   if (!(stiffness > 0)) return;
@@ -119,52 +67,129 @@ void add_link(State& s, std::int32_t a, std::int32_t b, double stiffness) {
   s.links.add({a, b}, {static_cast<float>(length), static_cast<float>(1 / stiffness)});
 }
 
-/// Two triangles at a wound that lie on one another, as where its wall ran along the skin, are a
-/// flake without thickness: nothing there resists bending, and which way round they lie, a sign,
-/// would turn by rounding [rad]. What a mesh came with stays.
-constexpr float kFolded = 3.0f;
+void make_links(State& s) {
+  const auto edges_before = static_cast<std::size_t>(s.edge_count);
+  OldColours<Distance> old(s.links.vertices, s.links.colour);
+  s.links.numbers.clear();
+  const PbdOptions& pbd = s.scene.pbd;
+  const auto& x = s.vertices.reference;
+  const Materials materials(s);
+  const auto modulus = [&](std::int32_t a, std::int32_t b) {
+    return materials.at(s.vertices.body[a], 0.5 * (x[a] + x[b])).young_modulus;
+  };
+  std::map<std::pair<std::int32_t, std::int32_t>, double> inner;  // volume around a tet's edge
+  for (const Tetrahedron& t : s.tetrahedra) {
+    const double volume =
+        std::fabs((x[t[1]] - x[t[0]]).cross(x[t[2]] - x[t[0]]).dot(x[t[3]] - x[t[0]])) / 6;
+    for (int i = 0; i < 4; ++i) {
+      for (int j = i + 1; j < 4; ++j) inner[{std::min(t[i], t[j]), std::max(t[i], t[j])}] += volume;
+    }
+  }
+  for (const auto& [e, volume] : inner) {
+    const double l2 = (x[e.first] - x[e.second]).squaredNorm();
+    add_link(s, e.first, e.second, pbd.edge * modulus(e.first, e.second) * volume / l2);
+  }
+  for (const SurfaceEdge& e : s.surface_edges.all()) {
+    if (e.compliance >= 0) s.links.add({e.a, e.b}, {e.length, e.compliance});
+  }
+  s.edge_count = s.links.size();
+  for (const InternalPair& p : s.internal) {
+    add_link(s, p.a, p.b, pbd.internal * modulus(p.a, p.b) * p.area / (x[p.a] - x[p.b]).norm());
+  }
+  old.part(0, edges_before);
+  for (int c = 0; c < s.links.size(); ++c) {
+    if (c == s.edge_count) old.part(edges_before, old.size());
+    s.links.colour[c] = old.next(s.links.vertices[c]);
+  }
+  std::fill(s.vertices.whole_links.begin(), s.vertices.whole_links.end(), 0);
+  for (const auto& l : s.links.vertices) {
+    for (const std::int32_t v : l) ++s.vertices.whole_links[v];
+  }
+}
 
-/// What an edge gives; a compliance of 0: none.
-struct EdgeNumbers {
-  double stiffness = 0;  ///< of the link [N/m]
-  std::array<float, Bending::kNumbers> bend = {};
+void make_bends(State& s) {
+  OldColours<Bending> old(s.bends.vertices, s.bends.colour);
+  s.bends.numbers.clear();
+  std::vector<float> w;  // what is resolved hangs on masses
+  for (const double mass : s.vertices.mass) w.push_back(static_cast<float>(1 / mass));
+  const double h = 1 / (s.scene.frame_rate * s.scene.pbd.steps);
+  for (const SurfaceEdge& e : s.surface_edges.all()) {
+    if (!(e.bending > 0)) continue;
+    const float mobility = w[e.left] * e.squares[0] + w[e.right] * e.squares[1] +
+                           w[e.a] * e.squares[2] + w[e.b] * e.squares[3];
+    const double resolved = Bending::kMostOfStep / (h * h * mobility);
+    const auto compliance = static_cast<float>(1 / std::min(e.bending, resolved));
+    if (!(compliance > 0)) continue;
+    s.bends.add({e.left, e.right, e.a, e.b}, {e.angle, compliance});
+    s.bends.colour.back() = old.next(s.bends.vertices.back());
+  }
+}
+
+/// A piece by itself: as rays see it, nothing else is there.
+struct PieceMesh {
+  TriangleMesh mesh;
+  std::vector<int> starts;  ///< of mesh
+  std::vector<int> vertex;  ///< of the state, of each of the mesh's
 };
 
-/// Angle at rest and compliance.
-std::array<float, Bending::kNumbers> bend_of(const State& s, const MeshEdge& e, double stiffness) {
-  if (!(stiffness > 0)) return {};
-  const std::array<std::int32_t, 4> at = {e.left, e.right, e.a, e.b};
-  Vertex<float> v[4];
-  const Vec3& origin = s.vertices.reference[e.a];
-  for (int i = 0; i < 4; ++i) {
-    const Vec3 x = s.vertices.reference[at[i]] - origin;
-    v[i] = {static_cast<float>(x.x()), static_cast<float>(x.y()), static_cast<float>(x.z()),
-            static_cast<float>(1 / s.vertices.mass[at[i]])};
+/// Within each piece: the walls of a wound lie on one another, and a ray would end where it begins.
+/// Those that have any of the `starts` in body `b`, by their lowest vertices.
+std::vector<PieceMesh> pieces_of(const State& s, int b, const std::vector<int>& starts) {
+  UnionFind linked = joined(s);
+  const int count = s.vertices.size();
+  std::vector<std::int32_t> piece_of(count, -1);  // of roots
+  std::vector<std::uint8_t> is_used(count, 0);
+  for (const int v : starts) piece_of[linked.root(v)] = 0;
+  std::vector<PieceMesh> pieces;
+  for (std::int32_t& piece : piece_of) {
+    if (piece < 0) continue;
+    piece = static_cast<std::int32_t>(pieces.size());
+    pieces.emplace_back();
   }
-  const auto parts = Bending::parts(v);
-  const float angle = parts.angle;
-  if (std::fabs(angle) > kFolded && (s.stroke[e.a] >= 0 || s.stroke[e.b] >= 0)) return {};
-  Vector<float> g[4];
-  Bending::gradients(v, parts, g);
-  const double h = 1 / (s.scene.frame_rate * s.scene.pbd.steps);
-  const double resolved = Bending::kMostOfStep / (h * h * Bending::mobility(v, g));
-  return {angle, static_cast<float>(1 / std::min(stiffness, resolved))};
+  const auto piece_at = [&](std::int32_t v) {
+    const std::int32_t piece = piece_of[linked.root(v)];
+    return piece < 0 ? nullptr : &pieces[piece];
+  };
+  for (const Triangle& t : s.triangles) {
+    if (s.vertices.body[t[0]] != b) continue;
+    PieceMesh* piece = piece_at(t[0]);
+    if (piece == nullptr) continue;
+    piece->mesh.triangles.push_back(t);
+    for (const std::int32_t v : t) is_used[v] = 1;
+  }
+  for (const int v : starts) is_used[v] = 1;
+  std::vector<int> number(count, -1);
+  for (int v = 0; v < count; ++v) {
+    if (is_used[v] == 0) continue;
+    PieceMesh& piece = *piece_at(v);
+    number[v] = static_cast<int>(piece.vertex.size());
+    piece.vertex.push_back(v);
+    piece.mesh.vertices.push_back(s.vertices.reference[v]);
+  }
+  for (PieceMesh& piece : pieces) {
+    for (auto& t : piece.mesh.triangles) {
+      for (int& v : t) v = number[v];
+    }
+  }
+  for (const int v : starts) piece_at(v)->starts.push_back(number[v]);
+  return pieces;
 }
 
 /// Of each vertex beside a wound: the blade's normal there, or the way along the surface where that
 /// is not known, towards the triangles that the vertex has.
-std::map<int, Vec3> own_sides(const State& s, const TriangleMesh& mesh,
+std::map<int, Vec3> own_sides(const State& s, const PieceMesh& piece,
                               const std::vector<Vec3>& normals) {
+  const TriangleMesh& mesh = piece.mesh;
   std::map<int, Vec3> side;
   for (const auto& t : mesh.triangles) {
     const Vec3 sum = mesh.vertices[t[0]] + mesh.vertices[t[1]] + mesh.vertices[t[2]];
     for (const int v : t) {
-      if (s.stroke[v] >= 0)
+      if (s.stroke[piece.vertex[v]] >= 0)
         side.try_emplace(v, Vec3::Zero()).first->second += sum - 3 * mesh.vertices[v];
     }
   }
   for (auto& [v, way] : side) {
-    const Vec3& blade = s.blade_normal[v];
+    const Vec3& blade = s.blade_normal[piece.vertex[v]];
     way -= way.dot(normals[v]) * normals[v];
     way = blade.isZero() ? Vec3(way.stableNormalized()) : way.dot(blade) < 0 ? Vec3(-blade) : blade;
   }
@@ -200,66 +225,10 @@ bool stays_on_its_side(const TriangleMesh& mesh, const std::map<int, Vec3>& side
 }  // namespace
 
 void make_surface_constraints(State& s) {
-  OldColours<Distance> links;
-  OldColours<Bending> bends;
-  s.cpu.both([&] { links.take(s.links); }, [&] { bends.take(s.bends); });
   const PbdOptions& pbd = s.scene.pbd;
-  const bool tets = pbd.model == PbdModel::kTetrahedra;
-  if (tets && pbd.elasticity == PbdElasticity::kMaterial) return;
-  const auto& x = s.vertices.reference;
-  std::map<std::pair<std::int32_t, std::int32_t>, double> inner;  // volume around a tet's edge
-  for (const Tetrahedron& t : s.tetrahedra) {
-    const double volume =
-        std::fabs((x[t[1]] - x[t[0]]).cross(x[t[2]] - x[t[0]]).dot(x[t[3]] - x[t[0]])) / 6;
-    for (int i = 0; i < 4; ++i) {
-      for (int j = i + 1; j < 4; ++j) inner[{std::min(t[i], t[j]), std::max(t[i], t[j])}] += volume;
-    }
-  }
-  const auto material = [&s, &x](std::int32_t a, std::int32_t b) -> const Material& {
-    return material_at(s.scene, s.scene.bodies[s.vertices.body[a]], 0.5 * (x[a] + x[b]));
-  };
-  for (const auto& [e, volume] : inner) {
-    const double l2 = (x[e.first] - x[e.second]).squaredNorm();
-    add_link(s, e.first, e.second,
-             pbd.edge * material(e.first, e.second).young_modulus * volume / l2);
-  }
-  const std::vector<MeshEdge> edges = mesh_edges(s);
-  std::vector<EdgeNumbers> numbers(edges.size());
-  const auto count_numbers = [&](const MeshEdge& e) {
-    EdgeNumbers of;
-    const double l2 = (x[e.a] - x[e.b]).squaredNorm();
-    const Material& m = material(e.a, e.b);
-    const double thick = tets ? 0 : 0.5 * (s.half_depth[e.a] + s.half_depth[e.b]);
-    of.stiffness = pbd.edge * m.young_modulus * thick * e.area / l2;
-    if (e.count != 2 || e.left == e.right) return of;  // a triangle and its back have no angle
-    const double even = 2 / std::sqrt(3.0) * 2 * e.least_area / std::sqrt(l2);
-    const double plate = m.young_modulus * std::pow(std::min(std::sqrt(l2), even), 3) /
-                         (12 * (1 - m.poisson_ratio * m.poisson_ratio));
-    of.bend = bend_of(s, e, pbd.bending * 3 * plate * l2 / e.area);
-    return of;
-  };
-  constexpr int kEdgesOfPart = 1024;
-  const int count = static_cast<int>(edges.size());
-  s.cpu.for_each((count + kEdgesOfPart - 1) / kEdgesOfPart, [&](int part) {
-    for (int i = part * kEdgesOfPart; i < std::min(count, (part + 1) * kEdgesOfPart); ++i) {
-      numbers[i] = count_numbers(edges[i]);
-    }
-  });
-  for (int i = 0; i < count; ++i) {
-    const MeshEdge& e = edges[i];
-    add_link(s, e.a, e.b, numbers[i].stiffness);
-    if (numbers[i].bend[1] > 0) s.bends.add({e.left, e.right, e.a, e.b}, numbers[i].bend);
-  }
-  s.edge_count = s.links.size();
-  for (const InternalPair& p : s.internal) {
-    add_link(s, p.a, p.b,
-             pbd.internal * material(p.a, p.b).young_modulus * p.area / (x[p.a] - x[p.b]).norm());
-  }
-  s.cpu.both([&] { links.restore(s.links); }, [&] { bends.restore(s.bends); });
-  for (int i = 0; i < s.vertices.size(); ++i) s.vertices.whole_links[i] = 0;
-  for (const auto& l : s.links.vertices) {
-    for (const std::int32_t v : l) ++s.vertices.whole_links[v];
-  }
+  if (pbd.model == PbdModel::kTetrahedra && pbd.elasticity == PbdElasticity::kMaterial) return;
+  s.surface_edges.update(s);
+  s.cpu.both([&] { make_links(s); }, [&] { make_bends(s); });
 }
 
 /// Whether a blade went between two vertices; not beside them, for they may lie on the wound.
@@ -274,29 +243,25 @@ static bool is_parted(const State& s, const InternalLink& link) {
 }
 
 int add_internal_links(State& s, int b, const std::vector<int>& starts) {
-  // Within each piece: the walls of a wound lie on one another, and a ray would end where it
-  // begins.
-  UnionFind linked = joined(s);
-  std::map<std::int32_t, std::pair<TriangleMesh, std::vector<int>>> pieces;
-  for (const int v : starts) pieces[linked.root(v)].second.push_back(v);
-  for (const auto& t : reference_surface(s, b).triangles) {
-    const auto piece = pieces.find(linked.root(t[0]));
-    if (piece != pieces.end()) piece->second.first.triangles.push_back(t);
-  }
   const bool late = !s.cut_edges.empty();
   const double least = 0.1 * s.mean_edge;
-  std::vector<InternalLink> found;
-  for (auto& [root, piece] : pieces) {
-    auto& [mesh, own] = piece;
-    mesh.vertices = s.vertices.reference;
-    const std::vector<Vec3> normals = vertex_normals(mesh);
-    const std::map<int, Vec3> sides = own_sides(s, mesh, normals);
-    for (const InternalLink& link :
-         find_internal_links(mesh, own, away_from_wounds(sides, normals, own), late ? least : 0)) {
-      if (!stays_on_its_side(mesh, sides, link)) continue;
-      found.push_back(link);
+  const std::vector<PieceMesh> pieces = pieces_of(s, b, starts);
+  std::vector<std::vector<InternalLink>> found_in(pieces.size());
+  s.cpu.for_each(static_cast<int>(pieces.size()), [&](int i) {
+    const PieceMesh& piece = pieces[i];
+    const std::vector<Vec3> normals = vertex_normals(piece.mesh);
+    const std::map<int, Vec3> sides = own_sides(s, piece, normals);
+    const std::vector<Vec3> lean = away_from_wounds(sides, normals, piece.starts);
+    for (InternalLink link :
+         find_internal_links(piece.mesh, piece.starts, lean, late ? least : 0)) {
+      if (!stays_on_its_side(piece.mesh, sides, link)) continue;
+      link.from = piece.vertex[link.from];
+      link.to = piece.vertex[link.to];
+      found_in[i].push_back(link);
     }
-  }
+  });
+  std::vector<InternalLink> found;
+  for (const auto& of : found_in) found.insert(found.end(), of.begin(), of.end());
   std::vector<double> area(s.vertices.size(), 0.0);
   std::vector<std::uint8_t> is_start(s.vertices.size(), 0);
   for (const int v : starts) is_start[v] = 1;
@@ -308,8 +273,9 @@ int add_internal_links(State& s, int b, const std::vector<int>& starts) {
       edges.insert(pair_key(t[i], t[(i + 1) % 3]));
     }
   }
-  std::map<std::pair<std::int32_t, std::int32_t>, InternalPair> pairs;
-  for (const InternalPair& p : s.internal) pairs.insert(pairs.end(), {{p.a, p.b}, p});
+  using Ends = std::pair<std::int32_t, std::int32_t>;
+  const auto is_before = [](const InternalPair& p, const Ends& e) { return Ends(p.a, p.b) < e; };
+  std::map<Ends, InternalPair> fresh;
   for (const InternalLink& link : found) {
     s.half_depth[link.from] = 0.5 * link.length;
     if (link.through_gap || edges.count(pair_key(link.from, link.to)) != 0) continue;
@@ -317,12 +283,19 @@ int add_internal_links(State& s, int b, const std::vector<int>& starts) {
     // Lips of a wound lie on one another; what joins them there has no way to point.
     if ((s.vertices.reference[link.from] - s.vertices.reference[link.to]).norm() < least) continue;
     const std::int32_t low = std::min(link.from, link.to), high = std::max(link.from, link.to);
+    const auto at =
+        std::lower_bound(s.internal.begin(), s.internal.end(), Ends(low, high), is_before);
+    const bool is_there = at != s.internal.end() && at->a == low && at->b == high;
     InternalPair& pair =
-        pairs.try_emplace({low, high}, InternalPair{low, high, 0, late}).first->second;
+        is_there ? *at
+                 : fresh.try_emplace({low, high}, InternalPair{low, high, 0, late}).first->second;
     pair.area += 0.5 * area[link.from];
   }
-  s.internal.clear();
-  for (const auto& [key, pair] : pairs) s.internal.push_back(pair);
+  const auto kept = static_cast<std::ptrdiff_t>(s.internal.size());
+  for (const auto& [ends, pair] : fresh) s.internal.push_back(pair);
+  std::inplace_merge(
+      s.internal.begin(), s.internal.begin() + kept, s.internal.end(),
+      [](const InternalPair& p, const InternalPair& q) { return Ends(p.a, p.b) < Ends(q.a, q.b); });
   // Where no ray meets anything the body is taken to be as deep as it is on the mean.
   double depth = 0;
   int met = 0;
@@ -391,6 +364,11 @@ void add_surface_body(State& s, int b, std::vector<std::string>* notes) {
   }
 }
 
+double area_of(const State& s, const Triangle& t) {
+  const auto& x = s.vertices.reference;
+  return 0.5 * (x[t[1]] - x[t[0]]).cross(x[t[2]] - x[t[0]]).norm();
+}
+
 void share_out_mass(State& s) {
   Vertices& v = s.vertices;
   std::fill(v.volume.begin(), v.volume.end(), 0.0);
@@ -419,10 +397,11 @@ void share_out_mass(State& s) {
   }
   std::fill(whole.begin(), whole.end(), 0.0);
   for (int i = 0; i < v.size(); ++i) whole[v.body[i]] += v.volume[i];
+  const Materials materials(s);
   for (int i = 0; i < v.size(); ++i) {
     const int b = v.body[i];
     v.volume[i] *= s.volume_of_body[b] / whole[b];
-    v.mass[i] = v.volume[i] * material_at(s.scene, s.scene.bodies[b], v.reference[i]).density;
+    v.mass[i] = v.volume[i] * materials.at(b, v.reference[i]).density;
   }
 }
 

@@ -54,25 +54,34 @@ bool first_meeting(const SweepPart& part, const MovingSegment& link, double begi
 }
 
 /// Triangles that a sweep may meet, and their neighbours.
-std::vector<int> near(const State& s, const std::vector<Vec3>& before,
+std::vector<int> near(State& s, const std::vector<Vec3>& before,
                       const std::vector<SweepPart>& parts, const std::vector<std::uint8_t>* whole) {
   Box box;
   for (const SweepPart& p : parts) {
     box.min = box.min.cwiseMin(p.box.min);
     box.max = box.max.cwiseMax(p.box.max);
   }
-  std::vector<std::uint8_t> is_near(s.vertices.size(), 0);
-  for (const Triangle& t : s.triangles) {
-    if (whole != nullptr && (*whole)[t[0]] != 0) continue;
-    Box own;
-    for (const std::int32_t v : t) {
-      for (const Vec3& x : {place_before(s, before, v), s.vertices.position(v)}) {
-        own.min = own.min.cwiseMin(x);
-        own.max = own.max.cwiseMax(x);
+  constexpr int kTrianglesOfPart = 2048;
+  const auto count = static_cast<int>(s.triangles.size());
+  std::vector<std::uint8_t> is_met(count, 0);
+  s.cpu.for_each((count + kTrianglesOfPart - 1) / kTrianglesOfPart, [&](int part) {
+    for (int k = part * kTrianglesOfPart; k < std::min(count, (part + 1) * kTrianglesOfPart); ++k) {
+      const Triangle& t = s.triangles[k];
+      if (whole != nullptr && (*whole)[t[0]] != 0) continue;
+      Box own;
+      for (const std::int32_t v : t) {
+        for (const Vec3& x : {place_before(s, before, v), s.vertices.position(v)}) {
+          own.min = own.min.cwiseMin(x);
+          own.max = own.max.cwiseMax(x);
+        }
       }
+      is_met[k] = (own.max - box.min).minCoeff() < 0 || (box.max - own.min).minCoeff() < 0 ? 0 : 1;
     }
-    if ((own.max - box.min).minCoeff() < 0 || (box.max - own.min).minCoeff() < 0) continue;
-    for (const std::int32_t v : t) is_near[v] = 1;
+  });
+  std::vector<std::uint8_t> is_near(s.vertices.size(), 0);
+  for (int k = 0; k < count; ++k) {
+    if (is_met[k] == 0) continue;
+    for (const std::int32_t v : s.triangles[k]) is_near[v] = 1;
   }
   std::vector<int> found;
   for (std::size_t t = 0; t < s.triangles.size(); ++t) {

@@ -23,10 +23,12 @@ class TouchCells {
   };
 
   explicit TouchCells(double size) : size_(size) {}
-  void add(std::int32_t vertex, std::int32_t piece, const Vec3& x, const Vec3& normal) {
-    if (!x.allFinite()) return;
+  static Entry entry(std::int32_t vertex, std::int32_t piece, const Vec3& x, const Vec3& normal) {
     const Eigen::Vector3f at = x.cast<float>(), n = normal.stableNormalized().cast<float>();
-    entries_.push_back({{at[0], at[1], at[2]}, {n[0], n[1], n[2]}, vertex, piece});
+    return {{at[0], at[1], at[2]}, {n[0], n[1], n[2]}, vertex, piece};
+  }
+  void add(const std::vector<Entry>& entries) {
+    entries_.insert(entries_.end(), entries.begin(), entries.end());
   }
   bool empty() const { return entries_.empty(); }
   /// Which lattice a box is to be looked up in; -1 for none.
@@ -90,7 +92,9 @@ class TouchCells {
     return part(i) << 42 | part(j) << 21 | part(k);
   }
   static std::int64_t cell(double size, double x) {
-    return static_cast<std::int64_t>(std::floor(std::max(-1e15, std::min(1e15, x / size))));
+    const double at = std::max(-1e15, std::min(1e15, x / size));
+    const auto towards_zero = static_cast<std::int64_t>(at);  // std::floor() would be a call
+    return towards_zero - (at < static_cast<double>(towards_zero) ? 1 : 0);
   }
   static double cells(double size, const Vec3& low, const Vec3& high) {
     double product = 1;
@@ -105,17 +109,26 @@ class TouchCells {
       std::uint64_t cell;
       std::int32_t piece, entry;
       bool operator<(const Key& o) const {
-        return std::tie(slot, cell, piece, entry) < std::tie(o.slot, o.cell, o.piece, o.entry);
+        return std::tie(cell, piece, entry) < std::tie(o.cell, o.piece, o.entry);
       }
     };
-    std::vector<Key> keys;
+    const std::size_t slots = std::size_t{1} << 3 * level.bits;
+    std::vector<Key> keys, found;
+    std::vector<std::int32_t> end(slots + 1, 0);  // of the keys of each slot
+    found.reserve(entries_.size());
     for (const Entry& e : entries_) {
       const std::int64_t i = cell(size, e.x[0]), j = cell(size, e.x[1]), k = cell(size, e.x[2]);
-      keys.push_back(
-          {level.slot(i, j, k), key(i, j, k), e.piece, static_cast<std::int32_t>(keys.size())});
+      found.push_back(
+          {level.slot(i, j, k), key(i, j, k), e.piece, static_cast<std::int32_t>(found.size())});
+      ++end[found.back().slot + 1];
     }
-    std::sort(keys.begin(), keys.end());
-    level.begin.assign((std::size_t{1} << 3 * level.bits) + 1, 0);
+    for (std::size_t slot = 1; slot <= slots; ++slot) end[slot] += end[slot - 1];
+    keys.resize(found.size());
+    for (const Key& k : found) keys[end[k.slot]++] = k;
+    for (std::size_t slot = 0; slot < slots; ++slot) {
+      std::sort(keys.begin() + (slot > 0 ? end[slot - 1] : 0), keys.begin() + end[slot]);
+    }
+    level.begin.assign(slots + 1, 0);
     for (const Key& k : keys) {
       const auto at = static_cast<std::int32_t>(level.entries.size());
       if (level.runs.empty() || level.runs.back().cell != k.cell ||

@@ -11,6 +11,7 @@ namespace {
 
 constexpr double kLeastOfCuts = 1;  // [Pa s]
 constexpr double kDensity = 1000;   // [kg/m^3]
+constexpr int kEdgesOfPart = 1024;
 
 void turn(Vertices& v, int i, const Flight& f, const Vec3& spin) {
   const Vec3 add = spin.cross(v.position(i) - f.centre);
@@ -22,20 +23,33 @@ void turn(Vertices& v, int i, const Flight& f, const Vec3& spin) {
 bool make_dampers(State& s, double duration) {
   if (s.damped_for == duration) return s.dampers.size() > 0;
   s.damped_for = duration;
-  s.dampers = {};
-  for (int c = 0; s.tetrahedra.empty() && c < s.edge_count; ++c) {
-    const auto [a, b] = s.links.vertices[c];
-    const Body& body = s.scene.bodies[s.vertices.body[a]];
-    double viscosity = find_material(s.scene, body.material).viscosity;
-    if (!s.wounds.empty()) viscosity = std::max(viscosity, kLeastOfCuts);
-    if (viscosity == 0 || (s.vertices.anchored[a] != 0 && s.vertices.anchored[b] != 0)) continue;
-    const double length = s.links.numbers[c][0];
-    // Tissue between the two drags at the lighter one as if both were as heavy: tips of spikes
-    // swung for seconds.
-    const double m = s.vertices.mass[a], n = s.vertices.mass[b];
-    const double uneven = (m + n) * (m + n) / (4 * m * n);
-    const double lost = 1 - std::exp(-viscosity * duration * uneven / (kDensity * length * length));
-    s.dampers.add({a, b}, {static_cast<float>(lost)});
+  std::vector<double> viscosity;
+  for (const Body& body : s.scene.bodies) {
+    viscosity.push_back(find_material(s.scene, body.material).viscosity);
+    if (!s.wounds.empty()) viscosity.back() = std::max(viscosity.back(), kLeastOfCuts);
+  }
+  const int edges = s.tetrahedra.empty() ? s.edge_count : 0;
+  std::vector<float> lost(edges, -1.0f);  // at each edge; negative: none to be lost
+  s.cpu.for_each((edges + kEdgesOfPart - 1) / kEdgesOfPart, [&](int part) {
+    for (int c = part * kEdgesOfPart; c < std::min(edges, (part + 1) * kEdgesOfPart); ++c) {
+      const auto [a, b] = s.links.vertices[c];
+      const double own = viscosity[s.vertices.body[a]];
+      if (own == 0 || (s.vertices.anchored[a] != 0 && s.vertices.anchored[b] != 0)) continue;
+      const double length = s.links.numbers[c][0];
+      // Tissue between the two drags at the lighter one as if both were as heavy: tips of spikes
+      // swung for seconds.
+      const double m = s.vertices.mass[a], n = s.vertices.mass[b];
+      const double uneven = (m + n) * (m + n) / (4 * m * n);
+      lost[c] =
+          static_cast<float>(1 - std::exp(-own * duration * uneven / (kDensity * length * length)));
+    }
+  });
+  s.dampers.vertices.clear();
+  s.dampers.numbers.clear();
+  s.dampers.colour.clear();
+  for (int c = 0; c < edges; ++c) {
+    if (!(lost[c] >= 0)) continue;
+    s.dampers.add(s.links.vertices[c], {lost[c]});
     s.dampers.colour.back() = s.links.colour[c];
   }
   s.dampers.pack(s.vertices.size(), levels_of(s));

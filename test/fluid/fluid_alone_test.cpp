@@ -56,8 +56,15 @@ TEST(Fluid, SeesOfAWallWhatItEncloses) {
     }
     s.lists.wall_begin = {0, static_cast<std::int32_t>(s.now.size())};
     s.share.resize(s.now.size());
-    s.wall_push.resize(3);
+    s.seen.resize(s.now.size());
+    s.seen_count = {0};
+    s.wall_push.resize(4);
+    s.facing.clear();
+    for (const WallTriangle& t : s.now) {
+      s.facing.insert(s.facing.end(), {t.normal[0], t.normal[1], t.normal[2], 0});
+    }
     const auto share_at = [&](const Vec3& x) {
+      s.seen_at = {{{}, 0, 0, 1}};
       s.place.clear();
       for (int a = 0; a < 4; ++a) s.place.push_back(a < 3 ? static_cast<float>(x[a]) : 1.0f);
       return wall_share(s, 0);
@@ -76,6 +83,18 @@ TEST(Fluid, SeesOfAWallWhatItEncloses) {
       const float share = share_at(x);
       EXPECT_NEAR(share, enclosed, 0.002) << parts << " at " << x.transpose();
       const Array<float> push = s.wall_push;
+      // Where it or the wall moves a little, it follows by its slope.
+      const float aside[3] = {0.02f, -0.01f, 0.02f};
+      for (int a = 0; a < 3; ++a) s.place[a] += aside[a];
+      const float followed = wall_share(s, 0);
+      EXPECT_EQ(s.seen_at[0].share, share);
+      EXPECT_NEAR(followed, share_at(x + Vec3(0.02, -0.01, 0.02)), 3e-4) << parts;
+      EXPECT_EQ(share_at(x), share);
+      for (std::size_t t = 0; t < s.now.size(); ++t) {
+        for (int a = 0; a < 3; ++a) s.facing[4 * t + 3] -= s.now[t].normal[a] * aside[a];
+      }
+      EXPECT_NEAR(wall_share(s, 0), followed, 1e-6);
+      for (std::size_t t = 0; t < s.now.size(); ++t) s.facing[4 * t + 3] = 0;
       const InstructionSet best = s.instructions;
       s.instructions = InstructionSet::kSse2;
       EXPECT_EQ(share_at(x), share);

@@ -23,6 +23,8 @@ constexpr float kRinging = 0.25f;
 constexpr float kPacking = 1.0076f, kResponse = 0.983f;
 /// Of a spacing: nearer to a wall no particle comes.
 constexpr float kRoom = 0.02f;
+/// Of the lists' skin: two that come towards each other stay below it.
+constexpr float kMayMove = 0.48f;
 constexpr int kParticlesEach = 128;
 
 struct Substep {
@@ -491,9 +493,9 @@ int advance_fluid(FluidState& s, const FluidDrive& drive, FluidWalls& walls,
   if (s.lists.corners.size() != walls.end.size()) s.lists.made = false;
   s.walls_moved[0] = s.walls_moved[1];
   s.walls_moved[1] = s.lists.made ? walls_moved(s, walls.end) : 0;
-  if (s.walls_moved[1] > 0.4f * skin) s.lists.made = false;
+  if (s.walls_moved[1] > kMayMove * skin) s.lists.made = false;
   for (int i = 0; i < count; ++i) {
-    const bool make = !s.lists.made || particles_moved(s) > 0.4f * skin;
+    const bool make = !s.lists.made || particles_moved(s) > kMayMove * skin;
     if (make) {
       list_neighbours(s, walls.end, skin);
       see_anew(s);

@@ -109,6 +109,44 @@ TEST(Fluid, SeesOfAWallWhatItEncloses) {
   }
 }
 
+/// Drops that are squeezed in a slit a tenth as wide leave it, at half of sound at most.
+TEST(Fluid, LeavesANarrowSlitAtHalfOfSoundAtMost) {
+  constexpr float kSpacing = 0.002f, kWide = 0.1f * kSpacing, kLong = 4 * kSpacing;
+  Cpu cpu(1);
+  FluidState s;
+  s.cpu = &cpu;
+  s.spacing = kSpacing;
+  s.kernel.reach = kFluidReach * kSpacing;
+  s.laws = {{1000, 0.001f, 1e5f}};
+  FluidWalls walls;
+  for (const bool over : {false, true}) {  // two squares that face one another
+    const float z = over ? kWide : 0, low = -kLong;
+    const float corner[4][2] = {{low, low}, {kLong, low}, {kLong, kLong}, {low, kLong}};
+    for (const int k : {0, 1, 2, 0, 2, 3}) {
+      const int at = over ? 3 - k : k;
+      walls.end.insert(walls.end.end(), {corner[at][0], corner[at][1], z});
+    }
+  }
+  walls.begin = walls.end;
+  for (int i = 0; i < 35; ++i) {
+    const Vec3 place(kLong - (0.3 + i / 7) * kSpacing, (i % 7 - 3) * kSpacing, kWide / 2);
+    add_particle(s, place, Vec3::Zero(), std::pow(kSpacing, 3), 0, -1);
+  }
+  FluidDrive drive;
+  drive.duration = 1e-4;
+  drive.colliders = [](double) { return std::vector<Collider>(); };
+  float fastest = 0;
+  for (int i = 0; i < 100; ++i) {
+    std::vector<ColliderLoad> loads;
+    walls.impulse.assign(walls.end.size(), 0);
+    advance_fluid(s, drive, walls, loads);
+    for (const float v : s.particles.v[0]) fastest = std::max(fastest, v);
+  }
+  EXPECT_GT(s.particles.x[0][0], kLong);
+  EXPECT_GT(fastest, 0.1f * s.laws[0].sound());
+  EXPECT_LT(fastest, 0.5f * s.laws[0].sound());
+}
+
 /// A column at rest presses on the bottom with its weight, and the deeper the more.
 TEST(Fluid, PressesByItsDepth) {
   constexpr double kSide = 0.032, kHeight = 0.06, kSpacing = 0.004;

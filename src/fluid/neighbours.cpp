@@ -7,7 +7,7 @@
 #include <immintrin.h>
 #endif
 
-#include "fluid/fluid_state.h"
+#include "fluid/pair_sums.h"
 
 namespace tissue_sim {
 namespace {
@@ -126,8 +126,8 @@ class Cells {
   }
 #if defined(__x86_64__)
   /// The same bits, a sixth of the time.
-  __attribute__((target("avx512f"), optimize("fp-contract=off"))) int add_rows_avx512(
-      const float* x, const Row* rows, int count, std::int32_t* out) const {
+  TISSUE_SIM_UNFUSED_AVX512 int add_rows_avx512(const float* x, const Row* rows, int count,
+                                                std::int32_t* out) const {
     int found = 0;
     const __m512 x0 = _mm512_set1_ps(x[0]), x1 = _mm512_set1_ps(x[1]), x2 = _mm512_set1_ps(x[2]);
     for (const Row* row = rows; row < rows + count; ++row) {

@@ -5,21 +5,72 @@
 
 #include "compute/choose.h"
 #include "compute/simd.h"
-#include "pbd/lanes.h"
-
-#if defined(__x86_64__)
-// Without TISSUE_SIM_TARGET_*, with which the compiler fuses products and sums: fluid has the same
-// bits with any instructions.
-#define TISSUE_SIM_UNFUSED_AVX2 __attribute__((target("avx2")))
-#define TISSUE_SIM_UNFUSED_AVX512 \
-  __attribute__((target("avx512f,avx512dq,avx512vl,avx512bw"), optimize("fp-contract=off")))
-#endif
 
 namespace tissue_sim {
 namespace lanes {
 namespace {
 
 constexpr int kLanes = kFluidLanes;
+
+/// a where v is negative, else b.
+template <class V>
+TISSUE_SIM_INLINE V where_negative(V v, V a, V b) {
+  return choose(less(v, V{}), a, b);
+}
+template <class V>
+TISSUE_SIM_INLINE V lesser(V a, V b) {
+  return choose(less(a, b), a, b);
+}
+template <class V>
+TISSUE_SIM_INLINE V magnitude(V v) {
+  return where_negative(v, -v, v);
+}
+
+/// Rows and columns change places, in each 16 bytes.
+template <int W>
+TISSUE_SIM_INLINE void transpose(Vec<W> (&r)[4]) {
+  Mask<W> low, high, first, second;
+  for (int i = 0; i < W; i += 4) {
+    low[i] = i, low[i + 1] = i + W, low[i + 2] = i + 1, low[i + 3] = i + 1 + W;
+    high[i] = i + 2, high[i + 1] = i + 2 + W, high[i + 2] = i + 3, high[i + 3] = i + 3 + W;
+    first[i] = i, first[i + 1] = i + 1, first[i + 2] = i + W, first[i + 3] = i + 1 + W;
+    second[i] = i + 2, second[i + 1] = i + 3, second[i + 2] = i + 2 + W, second[i + 3] = i + 3 + W;
+  }
+  const Vec<W> a = permute<W>(r[0], r[1], low), b = permute<W>(r[0], r[1], high);
+  const Vec<W> c = permute<W>(r[2], r[3], low), d = permute<W>(r[2], r[3], high);
+  r[0] = permute<W>(a, c, first);
+  r[1] = permute<W>(a, c, second);
+  r[2] = permute<W>(b, d, first);
+  r[3] = permute<W>(b, d, second);
+}
+
+/// The 16 bytes of W / 4 rows side by side: i, i + 4, i + 8, i + 12. By instructions, for GCC
+/// makes longer vectors of shorter ones number by number.
+template <int W>
+TISSUE_SIM_INLINE Vec<W> load_row(const float* x, const std::int32_t* index, int i) {
+  const auto at = [x, index](int k) -> const Vec<4>& {
+    return *reinterpret_cast<const Vec<4>*>(x + 4 * static_cast<std::ptrdiff_t>(index[k]));
+  };
+  Vec<W> row;
+  if constexpr (W == 4) {
+    row = at(i);
+  } else {
+#if defined(__x86_64__) && !defined(__clang__)
+    if constexpr (W == 8) {
+      asm("vbroadcastf128 %1, %0" : "=x"(row) : "m"(at(i)));
+      asm("vinsertf128 $1, %1, %0, %0" : "+x"(row) : "m"(at(i + 4)));
+    } else {
+      asm("vbroadcastf32x4 %1, %0" : "=v"(row) : "m"(at(i)));
+      asm("vinsertf32x4 $1, %1, %0, %0" : "+v"(row) : "m"(at(i + 4)));
+      asm("vinsertf32x4 $2, %1, %0, %0" : "+v"(row) : "m"(at(i + 8)));
+      asm("vinsertf32x4 $3, %1, %0, %0" : "+v"(row) : "m"(at(i + 12)));
+    }
+#else
+    for (int l = 0; l < W; ++l) row[l] = at(i + l / 4 * 4)[l % 4];
+#endif
+  }
+  return row;
+}
 
 /// Rows of four numbers side by side: of[k] has the k-th of each.
 template <int W>
@@ -31,8 +82,8 @@ struct Columns {
 template <int W>
 TISSUE_SIM_INLINE Columns<W> gather(const float* rows, const std::int32_t* index) {
   Columns<W> c;
-  for (int i = 0; i < 4; ++i) c.of[i] = pbd::load_row<W>(rows, index, i);
-  pbd::transpose<W>(c.of);
+  for (int i = 0; i < 4; ++i) c.of[i] = load_row<W>(rows, index, i);
+  transpose<W>(c.of);
   return c;
 }
 
@@ -66,8 +117,8 @@ TISSUE_SIM_INLINE float neighbour_volume_by(const FluidState& s, int i) {
     for (int part = 0; part < kLanes / W; ++part) {
       const Columns<W> place = gather<W>(s.place.data(), &s.lists.other[e + W * part]);
       const V dx = x[0] - place.of[0], dy = x[1] - place.of[1], dz = x[2] - place.of[2];
-      V t = pbd::root(dx * dx + dy * dy + dz * dz) * by_reach;
-      t = pbd::lesser(t, one);
+      V t = square_root(dx * dx + dy * dy + dz * dz) * by_reach;
+      t = lesser(t, one);
       const V u2 = (one - t) * (one - t);
       sum[part] += place.of[3] * (u2 * u2 * (4 * t + one));
     }
@@ -102,8 +153,8 @@ TISSUE_SIM_INLINE void add_pair_forces_by(const FluidState& s, int i, float* for
       }
       const V dx = x[0] - place.of[0], dy = x[1] - place.of[1], dz = x[2] - place.of[2];
       const V r2 = dx * dx + dy * dy + dz * dz;
-      V t = pbd::root(r2) * by_reach;
-      t = pbd::lesser(t, one);
+      V t = square_root(r2) * by_reach;
+      t = lesser(t, one);
       const V w = one - t;
       const V nearing =
           (v[0] - motion.of[0]) * dx + (v[1] - motion.of[1]) * dy + (v[2] - motion.of[2]) * dz;
@@ -197,8 +248,8 @@ constexpr Places kPlaces;
 /// atan2, within 1e-7 (the polynomial: Abramowitz and Stegun 4.4.49).
 template <class V>
 TISSUE_SIM_INLINE V angle(V y, V x) {
-  const V ax = pbd::magnitude(x), ay = pbd::magnitude(y), lower = ax - ay;
-  const V t = pbd::lesser(ax, ay) / (pbd::greater(ax, ay) + 1e-30f), s = t * t;
+  const V ax = magnitude(x), ay = magnitude(y), lower = ax - ay;
+  const V t = lesser(ax, ay) / (larger(ax, ay) + 1e-30f), s = t * t;
   V p = 0.0028662257f * s - 0.0161657367f;
   p = p * s + 0.0429096138f;
   p = p * s - 0.0752896400f;
@@ -207,9 +258,9 @@ TISSUE_SIM_INLINE V angle(V y, V x) {
   p = p * s + 0.1999355085f;
   p = p * s - 0.3333314528f;
   p = t + t * (s * p);
-  p = pbd::where_negative(lower, kPi / 2 - p, p);
-  p = pbd::where_negative(x, kPi - p, p);
-  return pbd::where_negative(y, -p, p);
+  p = where_negative(lower, kPi / 2 - p, p);
+  p = where_negative(x, kPi - p, p);
+  return where_negative(y, -p, p);
 }
 
 template <class V>
@@ -267,7 +318,7 @@ TISSUE_SIM_INLINE void add_close(const FluidState& s, const float* x, const std:
     V c[3][3], r[3];
     for (int k = 0; k < 9; ++k) c[k / 3][k % 3] = corner[k / 4].of[k % 4] - x[k % 3];
     const V* n = side.of;
-    for (int k = 0; k < 3; ++k) r[k] = pbd::root(dot(c[k], c[k]));
+    for (int k = 0; k < 3; ++k) r[k] = square_root(dot(c[k], c[k]));
     const V area = keep<W>(lanes_between<W>(0, count - W * part), side.of[3]),
             height = -dot(c[0], n);
     // Twice the area along the normal makes the volume that the corners span with the place. What
@@ -284,14 +335,14 @@ TISSUE_SIM_INLINE void add_close(const FluidState& s, const float* x, const std:
       for (int a = 0; a < 3; ++a) {
         at_place[a] = c[0][a] + kPlaces.a[parts][k] * from[a] + kPlaces.b[parts][k] * to[a];
       }
-      const V t = pbd::root(dot(at_place, at_place)) * by_reach, t2 = t * t, u = one - t;
+      const V t = square_root(dot(at_place, at_place)) * by_reach, t2 = t * t, u = one - t;
       const V inside = 14 + t2 * (-84 + t * (140 + t * (-90 + 21 * t)));
-      within += pbd::where_negative(u, one / (t2 * t + 1e-30f), inside);
-      const V near = pbd::where_negative(u, V{}, u), u2 = near * near;
+      within += where_negative(u, one / (t2 * t + 1e-30f), inside);
+      const V near = where_negative(u, V{}, u), u2 = near * near;
       face += u2 * u2 * (4 * t + one);
     }
     sums.share[part] += keep<W>(lanes_between<W>(0, count - W * part),
-                                pbd::where_negative(dot(n, n) - 0.5f, V{}, half)) *
+                                where_negative(dot(n, n) - 0.5f, V{}, half)) *
                             (1 / (2 * kPi)) -
                         area * height * within * (by_places / (4 * kPi * reach * reach * reach));
     sums.keep(triangle + W * part, std::min(W, count - W * part),
@@ -316,8 +367,8 @@ TISSUE_SIM_INLINE void add_far(const FluidState& s, const float* from, const std
       n[a] = normal.of[a];
     }
     const V area = keep<W>(lanes_between<W>(0, count - W * part), normal.of[3]);
-    const V r = pbd::root(dot(x, x));
-    const V t = pbd::lesser(r * all_lanes<V>(1 / s.kernel.reach), one);
+    const V r = square_root(dot(x, x));
+    const V t = lesser(r * all_lanes<V>(1 / s.kernel.reach), one);
     const V t2 = t * t, u2 = (one - t) * (one - t);
     const V beyond = one - t2 * t * (14 + t2 * (-84 + t * (140 + t * (-90 + 21 * t))));
     sums.share[part] += area * beyond * dot(x, n) / (r * r * r + 1e-30f) * (-1 / (4 * kPi));

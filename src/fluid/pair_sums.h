@@ -4,6 +4,18 @@
 
 #include "fluid/fluid_state.h"
 
+#if defined(__x86_64__)
+// Without TISSUE_SIM_TARGET_*, with which the compiler fuses products and sums: fluid has the same
+// bits with any instructions.
+#define TISSUE_SIM_UNFUSED_AVX2 __attribute__((target("avx2")))
+#if defined(__clang__)
+#define TISSUE_SIM_UNFUSED_AVX512 __attribute__((target("avx512f,avx512dq,avx512vl,avx512bw")))
+#else
+#define TISSUE_SIM_UNFUSED_AVX512 \
+  __attribute__((target("avx512f,avx512dq,avx512vl,avx512bw"), optimize("fp-contract=off")))
+#endif
+#endif
+
 namespace tissue_sim {
 
 /// Of volumes by the kernel, the particle's own among them [1].

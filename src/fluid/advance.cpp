@@ -21,8 +21,13 @@ constexpr float kRinging = 0.25f;
 /// density that sum shows (a particle itself does not come nearer): measured in a periodic box for
 /// FluidKernel::reach = kFluidReach spacings.
 constexpr float kPacking = 1.0076f, kResponse = 0.983f;
+/// Of the modulus, the most that a drop presses with: in a slit narrower than it is it would take
+/// off, at 38 m/s out of a cut that bled. What a wave of the fastest speed brings is below it.
+constexpr float kMostStrain = 0.2f;
 /// Of a spacing: nearer to a wall no particle comes.
 constexpr float kRoom = 0.02f;
+/// Of the lists' skin: two that come towards each other stay below it.
+constexpr float kMayMove = 0.48f;
 constexpr int kParticlesEach = 128;
 
 struct Substep {
@@ -42,19 +47,37 @@ float artificial_viscosity(const FluidState& s, const FluidLaw& law) {
   return law.viscosity + 0.1f * kAlpha * law.density * law.sound() * 0.5f * s.kernel.reach;
 }
 
-void place_triangles(FluidState& s, const FluidWalls& walls, float share,
+/// Puts the triangles that fluid meets where `corners` have them.
+void place_triangles(FluidState& s, const std::vector<float>& corners,
                      std::vector<WallTriangle>& out) {
-  out.resize(walls.size());
+  out.resize(corners.size() / 9);
   s.cpu->for_each(
       static_cast<int>(s.lists.met.size()),
       [&](int m) {
         const std::int32_t t = s.lists.met[m];
-        const float *begin = &walls.begin[std::size_t{9} * t],
-                    *end = &walls.end[std::size_t{9} * t];
-        for (int i = 0; i < 9; ++i) {
-          out[t].corner[i / 3][i % 3] = begin[i] + share * (end[i] - begin[i]);
+        out[t].place(&corners[std::size_t{9} * t]);
+      },
+      512);
+}
+
+/// Which way triangles face in s.now, and how far they have come along that since they were listed.
+void face_walls(FluidState& s) {
+  s.facing.resize(4 * s.now.size());
+  s.cpu->for_each(
+      static_cast<int>(s.lists.met.size()),
+      [&](int m) {
+        const std::int32_t t = s.lists.met[m];
+        const WallTriangle& wall = s.now[t];
+        const float* from = &s.lists.corners[std::size_t{9} * t];
+        float* row = &s.facing[4 * static_cast<std::size_t>(t)];
+        float moved = 0;
+        for (int a = 0; a < 3; ++a) {
+          row[a] = wall.normal[a];
+          moved +=
+              wall.normal[a] * ((wall.corner[0][a] - from[a]) + (wall.corner[1][a] - from[3 + a]) +
+                                (wall.corner[2][a] - from[6 + a]));
         }
-        out[t].finish();
+        row[3] = moved / 3;
       },
       512);
 }
@@ -100,8 +123,9 @@ void press(FluidState& s, const Substep& step, int i) {
   FluidParticles& p = s.particles;
   const FluidKernel& w = s.kernel;
   const float x[3] = {p.x[0][i], p.x[1][i], p.x[2][i]};
-  const float sum = p.volume[i] * w.value(0) + neighbour_volume(s, i);
-  const float tissue = wall_share(s, i);
+  const float sum = neighbour_volume(s, i);
+  const bool sees_walls = s.lists.wall_begin[i] < s.lists.wall_begin[i + 1];
+  const float tissue = sees_walls ? wall_share(s, i) : 0;
   // Tools at right angles each take their share of what the others leave; what is tissue is none
   // of theirs.
   float clear = 1;
@@ -120,7 +144,8 @@ void press(FluidState& s, const Substep& step, int i) {
   const float damping = kRinging * law.density * law.sound() * 0.5f * w.reach;
   const float rate = p.dense[i] > 0 ? (dense - p.dense[i]) / step.dt : 0;
   p.dense[i] = dense;
-  p.pressure[i] = dense > 1 ? std::max(0.0f, law.bulk_modulus * (dense - 1) + damping * rate) : 0;
+  const float pressure = law.bulk_modulus * (dense - 1) + damping * rate;
+  p.pressure[i] = dense > 1 ? std::clamp(pressure, 0.0f, kMostStrain * law.bulk_modulus) : 0;
   // Of the energy that the pressure does work against, the slopes by the sum and by the walls.
   const float slope = p.pressure[i] / (dense * dense * kPacking * kResponse * clear);
   s.motion[4 * static_cast<std::size_t>(i) + 3] = slope;
@@ -137,7 +162,7 @@ void push(FluidState& s, const Substep& step, ColliderLoad* loads, int i) {
   float force[3] = {};
   add_pair_forces(s, i, force);
   for (int a = 0; a < 3; ++a) {
-    force[a] += s.strength[i] * s.wall_push[3 * static_cast<std::size_t>(i) + a];
+    force[a] += s.strength[i] * s.wall_push[4 * static_cast<std::size_t>(i) + a];
   }
   for (std::size_t c = 0; c < step.colliders.size(); ++c) {
     if ((s.near[i] & bit_of(c)) == 0) continue;
@@ -190,25 +215,54 @@ bool meets(const WallTriangle& begin, const WallTriangle& end, const float* x, c
   return true;
 }
 
-/// Raises y, where a particle comes to from x, before the triangles that move meanwhile, within
-/// `time`; what they take of its speed is an impulse.
-void stop_at_walls(FluidState& s, float time, int i, const float* x, float* y, float* v) {
+/// Raises y, where a particle comes to from x, before the triangles that move from `begin` to `end`
+/// within `time`; what they take of its speed is an impulse.
+void stop_at_walls(FluidState& s, const std::vector<WallTriangle>& begin,
+                   const std::vector<WallTriangle>& end, float time, int i, const float* x,
+                   float* y, float* v) {
+  if (s.lists.wall_begin[i] == s.lists.wall_near[i]) return;
   const float margin = kRoom * s.spacing;
   const float mass = s.particles.volume[i] * s.laws[s.particles.kind[i]].density;
   FluidState::Touch& touch = s.touches[i];
+  // Both ends of its way are nearer to where its walls were last looked at than these were, less
+  // what they moved by.
+  FluidState::Clear& clear = s.clear[i];
+  const float moved = std::max(s.walls_moved[0], s.walls_moved[1]);
+  const auto way = [&](const float* from) {
+    float before2 = 0, after2 = 0;
+    for (int a = 0; a < 3; ++a) {
+      before2 += (x[a] - from[a]) * (x[a] - from[a]);
+      after2 += (y[a] - from[a]) * (y[a] - from[a]);
+    }
+    return std::sqrt(std::max(before2, after2));
+  };
+  if (way(clear.x) < clear.room - moved) return;
+  const FluidLists& l = s.lists;
+  const float listed[3] = {l.x[0][i], l.x[1][i], l.x[2][i]};
+  const float soon = kSoon * s.spacing - way(listed) - moved;  // nearer than that is none but these
+  const std::int32_t until = soon > margin ? l.wall_soon[i] : l.wall_near[i];
+  float nearest = soon > margin ? soon : s.kernel.reach;
+  for (std::int32_t e = l.wall_begin[i]; e < until; ++e) {
+    const WallTriangle& t = end[l.wall[e]];
+    const float height = std::fabs(t.height(x));
+    if (height < nearest) nearest = std::min(nearest, std::max(height, t.beside(x)));
+  }
+  clear = {{x[0], x[1], x[2]}, nearest - moved - margin};
+  if (way(clear.x) < clear.room - moved) return;
   for (int pass = 0; pass < 3; ++pass) {
     float deepest = 0;
     std::int32_t hit = -1;
-    for (std::int32_t e = s.lists.wall_begin[i]; e < s.lists.wall_near[i]; ++e) {
-      const std::int32_t t = s.lists.wall[e];
+    for (std::int32_t e = l.wall_begin[i]; e < until; ++e) {
+      const std::int32_t t = l.wall[e];
       float raise = 0;
-      if (meets(s.now[t], s.next[t], x, y, margin, raise) && raise > deepest) {
+      if (end[t].height(y) >= margin) continue;
+      if (meets(begin[t], end[t], x, y, margin, raise) && raise > deepest) {
         deepest = raise;
         hit = t;
       }
     }
     if (hit < 0) break;
-    const WallTriangle &from = s.now[hit], &to = s.next[hit];
+    const WallTriangle &from = begin[hit], &to = end[hit];
     float u[3];
     for (int a = 0; a < 3; ++a) {
       u[a] = v[a] - (to.middle[a] - from.middle[a]) / time;
@@ -234,7 +288,7 @@ void move(FluidState& s, const Substep& step, ColliderLoad* loads, int i) {
     v[a] = s.v_next[a][i];
     y[a] = x[a] + step.dt * v[a];
   }
-  stop_at_walls(s, step.dt, i, x, y, v);
+  stop_at_walls(s, s.now, s.now, step.dt, i, x, y, v);
   for (std::size_t c = 0; c < step.colliders.size(); ++c) {
     if ((s.near[i] & bit_of(c)) == 0) continue;
     const Collider& of = step.colliders[c];
@@ -295,16 +349,43 @@ void collect_touches(const FluidState& s, FluidWalls& walls) {
 
 /// What pressure gives triangles in `time` goes to their corners likewise.
 void collect(FluidState& s, float time, FluidWalls& walls) {
+  constexpr int kChunks = 8,
+                kTriangles = 2048;  // whatever the number of threads, for the same bits
+  const FluidLists& l = s.lists;
+  const int triangles = walls.size();
+  s.wall_impulse.resize(std::size_t{kChunks} * triangles);
+  const auto first = [&l](int chunk) {  // of particles that have as many entries in each
+    const auto entry =
+        static_cast<std::int32_t>(std::int64_t{l.wall_begin.back()} * chunk / kChunks);
+    return std::lower_bound(l.wall_begin.begin(), l.wall_begin.end() - 1, entry) -
+           l.wall_begin.begin();
+  };
+  s.cpu->for_each(kChunks, [&](int chunk) {
+    float* sum = &s.wall_impulse[std::size_t{1} * chunk * triangles];
+    std::fill_n(sum, triangles, 0.0f);
+    const auto end = chunk + 1 < kChunks ? first(chunk + 1) : s.particles.size();
+    for (auto i = first(chunk); i < end; ++i) {
+      const float strength = time * s.strength[i];
+      if (strength == 0) continue;
+      const std::int32_t* triangle = &s.seen[l.wall_begin[i]];
+      const float* over = &s.share[l.wall_begin[i]];
+      for (int e = 0; e < s.seen_count[i]; ++e) sum[triangle[e]] += strength * over[e];
+    }
+  });
+  s.cpu->for_each((triangles + kTriangles - 1) / kTriangles, [&](int chunk) {
+    const int begin = chunk * kTriangles, count = std::min(triangles - begin, kTriangles);
+    float* __restrict__ sum = s.wall_impulse.data() + begin;
+    for (int k = 1; k < kChunks; ++k) {
+      const float* part = s.wall_impulse.data() + std::size_t{1} * k * triangles + begin;
+      for (int t = 0; t < count; ++t) sum[t] += part[t];
+    }
+  });
   s.cpu->for_each(
-      static_cast<int>(s.lists.met.size()),
+      static_cast<int>(l.met.size()),
       [&](int m) {
-        const std::int32_t t = s.lists.met[m];
-        float sum = 0;
-        for (std::int32_t k = s.lists.entry_begin[t]; k < s.lists.entry_begin[t + 1]; ++k) {
-          sum += s.share[s.lists.entry[k]] * s.strength[s.lists.entry_particle[k]];
-        }
+        const std::int32_t t = l.met[m];
+        const float sum = s.wall_impulse[t];
         if (sum == 0) return;
-        sum *= time;
         for (int i = 0; i < 9; ++i) {
           walls.impulse[std::size_t{9} * t + i] -= sum * s.now[t].normal[i % 3] / 3;
         }
@@ -315,18 +396,21 @@ void collect(FluidState& s, float time, FluidWalls& walls) {
 
 /// Takes the walls to where they end: the fluid then presses on them as they are, not as they were.
 /// A pressure that lags behind what it presses on would drive it.
-void move_walls(FluidState& s, FluidWalls& walls, float duration) {
-  place_triangles(s, walls, 0, s.now);
-  place_triangles(s, walls, 1, s.next);
+void move_walls(FluidState& s, FluidWalls& walls, float duration, bool were_listed) {
+  if (were_listed) {
+    place_triangles(s, walls.begin, s.before);
+  } else {
+    s.before.swap(s.now);
+    place_triangles(s, walls.end, s.now);
+  }
   FluidParticles& p = s.particles;
   s.touches.assign(p.size(), {-1, {}});
   s.cpu->for_each(
       p.size(),
       [&](int i) {
-        if (s.lists.wall_begin[i] == s.lists.wall_near[i]) return;
         const float x[3] = {p.x[0][i], p.x[1][i], p.x[2][i]};
         float y[3] = {x[0], x[1], x[2]}, v[3] = {p.v[0][i], p.v[1][i], p.v[2][i]};
-        stop_at_walls(s, duration, i, x, y, v);
+        stop_at_walls(s, s.before, s.now, duration, i, x, y, v);
         for (int a = 0; a < 3; ++a) {
           p.x[a][i] = y[a];
           p.v[a][i] = v[a];
@@ -334,7 +418,17 @@ void move_walls(FluidState& s, FluidWalls& walls, float duration) {
       },
       kParticlesEach);
   collect_touches(s, walls);
-  s.now = s.next;
+}
+
+/// After particles and walls were listed: what they see is to be summed.
+void see_anew(FluidState& s) {
+  const std::size_t n = s.particles.size();
+  s.seen_at.assign(n, {{}, 0, 0, 1});
+  s.seen_count.assign(n, 0);
+  s.clear.assign(n, {{}, -1});
+  s.seen.resize(s.lists.wall.size());
+  s.share.resize(s.lists.wall.size());
+  s.wall_push.assign(4 * n, 0.0f);
 }
 
 void substep(FluidState& s, const Substep& step, FluidWalls& walls,
@@ -344,10 +438,10 @@ void substep(FluidState& s, const Substep& step, FluidWalls& walls,
     field->resize(n);
   }
   s.near.resize(n);
-  s.place.resize(4 * static_cast<std::size_t>(n));
-  s.motion.resize(4 * static_cast<std::size_t>(n));
-  s.wall_push.resize(3 * static_cast<std::size_t>(n));
-  s.share.resize(s.lists.wall.size());
+  for (auto* rows : {&s.place, &s.motion}) {
+    rows->resize(4 * static_cast<std::size_t>(n + 1));
+    std::fill(rows->end() - 4, rows->end(), 0.0f);
+  }
   s.touches.assign(n, {-1, {}});
   std::vector<ColliderLoad> forces(step.colliders.size());
   s.cpu->for_each(
@@ -401,16 +495,19 @@ int advance_fluid(FluidState& s, const FluidDrive& drive, FluidWalls& walls,
   for (const FluidLaw& law : s.laws) s.viscosity.push_back(artificial_viscosity(s, law));
   const float skin = 0.15f * s.kernel.reach;
   if (s.lists.corners.size() != walls.end.size()) s.lists.made = false;
-  if (s.lists.made && walls_moved(s, walls.end) > 0.4f * skin) s.lists.made = false;
+  s.walls_moved[0] = s.walls_moved[1];
+  s.walls_moved[1] = s.lists.made ? walls_moved(s, walls.end) : 0;
+  if (s.walls_moved[1] > kMayMove * skin) s.lists.made = false;
   for (int i = 0; i < count; ++i) {
-    const bool make = !s.lists.made || particles_moved(s) > 0.4f * skin;
-    if (make) list_neighbours(s, walls.end, skin);
-    if (i == 0) {
-      move_walls(s, walls, static_cast<float>(drive.duration));
-    } else if (make) {
-      place_triangles(s, walls, 1, s.now);
-      s.next = s.now;
+    const bool make = !s.lists.made || particles_moved(s) > kMayMove * skin;
+    if (make) {
+      list_neighbours(s, walls.end, skin);
+      see_anew(s);
+      s.walls_moved[0] = i == 0 ? walls_moved(s, walls.begin) : 0;
+      s.walls_moved[1] = 0;
     }
+    if (i == 0) move_walls(s, walls, static_cast<float>(drive.duration), make);
+    if (i == 0 || make) face_walls(s);
     const double share = (i + 1.0) / count;
     const std::vector<Collider> colliders = drive.colliders(share);
     const Vec3& g = drive.gravity;
@@ -467,9 +564,6 @@ void push_out_of_walls(FluidState& s, const std::vector<float>& corners) {
   FluidParticles& p = s.particles;
   const float depth = 0.5f * s.spacing, margin = kRoom * s.spacing;
   list_neighbours(s, corners, 0);
-  FluidWalls still;
-  still.begin = still.end = corners;
-  place_triangles(s, still, 0, s.now);
   s.cpu->for_each(
       p.size(),
       [&](int i) {

@@ -75,6 +75,11 @@ struct alignas(32) WallTriangle {
   float edge2;         ///< longest edge, squared [m^2]
   // Numbers in a row, which sums over walls read four at a time.
 
+  /// Nine coordinates.
+  TISSUE_SIM_INLINE void place(const float* corners) {
+    for (int i = 0; i < 9; ++i) corner[i / 3][i % 3] = corners[i];
+    finish();
+  }
   TISSUE_SIM_INLINE void finish() {
     float a[3], b[3];
     edge2 = 0;
@@ -91,14 +96,19 @@ struct alignas(32) WallTriangle {
         l2 += e * e;
         r2 += r * r;
       }
-      edge2 = fmaxf(edge2, l2);
-      radius2 = fmaxf(radius2, r2);
+      edge2 = edge2 > l2 ? edge2 : l2;
+      radius2 = radius2 > r2 ? radius2 : r2;
     }
     radius = sqrtf(radius2);
     cross3(a, b, normal);
     const float twice = sqrtf(dot3(normal, normal));
     area = 0.5f * twice;
     for (float& n : normal) n = twice > 1e-3f * edge2 * 1e-3f ? n / twice : 0.0f;
+  }
+  /// No point of it is nearer [m].
+  TISSUE_SIM_INLINE float beside(const float* x) const {
+    const float d[3] = {x[0] - middle[0], x[1] - middle[1], x[2] - middle[2]};
+    return sqrtf(dot3(d, d)) - radius;
   }
   TISSUE_SIM_INLINE float height(const float* x) const {
     const float d[3] = {x[0] - corner[0][0], x[1] - corner[0][1], x[2] - corner[0][2]};

@@ -47,17 +47,23 @@ struct FluidWalls {
   int size() const { return static_cast<int>(end.size() / 9); }
 };
 
+/// Spacings within which a wall is soon to be touched.
+inline constexpr float kSoon = 0.5f;
+/// Numbers beside one another in sums over neighbours and walls.
+inline constexpr int kFluidLanes = 16;
+
 /// Who may act on whom, until anything moved too far. Each frame begins without any: so they, and
 /// with them the order of sums, are by the state that the frame began with.
 struct FluidLists {
-  std::vector<std::int32_t> begin, other;  ///< particles of each
-  /// Triangles of each: up to wall_near those that it may touch before it is listed again.
-  std::vector<std::int32_t> wall_begin, wall_near, wall;
-  std::vector<std::int32_t> entry_begin, entry;  ///< of each triangle, in `wall`
-  std::vector<std::int32_t> entry_particle;      ///< whose they are
-  Array<float> x[3];                             ///< particles when they were listed
-  std::vector<float> corners;                    ///< and triangles
-  std::vector<std::int32_t> met;                 ///< triangles that are in `wall`
+  /// Particles of each, itself among them, and, to make kFluidLanes of them, the one behind the
+  /// last, which has no volume.
+  std::vector<std::int32_t> begin, other;
+  /// Triangles of each: up to wall_near those that it may touch before it is listed again, first up
+  /// to wall_soon those within kSoon spacings.
+  std::vector<std::int32_t> wall_begin, wall_soon, wall_near, wall;
+  Array<float> x[3];              ///< particles when they were listed
+  std::vector<float> corners;     ///< and triangles
+  std::vector<std::int32_t> met;  ///< triangles that are in `wall`
   bool made = false;
 };
 
@@ -72,14 +78,34 @@ struct FluidState {
   InstructionSet instructions = instruction_set();
 
   // Of a substep.
-  std::vector<WallTriangle> now, next;
-  Array<float> share;            ///< of each entry of lists.wall: the kernel over it [1/m]
-  std::vector<float> viscosity;  ///< of each law, with what keeps jitter down [Pa s]
-  Array<float> place;            ///< of each particle: x, y, z, volume
+  std::vector<WallTriangle> before, now;  ///< walls as an interval begins, and as it ends
+  float walls_moved[2] = {};              ///< at most, from where they were listed to there [m]
+  Array<float> facing;  ///< of each triangle: its normal, and how far it came along it [m]
+  /// Walls of a particle from lists.wall_begin on: triangles that its kernel reaches, and its
+  /// integral over each [1/m]; how many there are.
+  Array<std::int32_t> seen;
+  Array<float> share;
+  std::vector<std::int32_t> seen_count;
+  /// Where a particle was when they were summed, what share they had, and how far they had come.
+  struct Seen {
+    float x[3], share, moved;
+    std::int32_t is_new;
+  };
+  std::vector<Seen> seen_at;
+  /// Where a particle was, and how far nothing comes that it may touch, but for what walls move by
+  /// from where they were listed [m].
+  struct Clear {
+    float x[3], room;
+  };
+  std::vector<Clear> clear;
+  std::vector<float> wall_impulse;  ///< on triangles, by chunks of particles [N s]
+  std::vector<float> viscosity;     ///< of each law, with what keeps jitter down [Pa s]
+  Array<float> place;               ///< of each particle, and of none: x, y, z, volume
   Array<float> motion;         ///< likewise its speed, and what its pressure weighs in a pair [Pa]
   Array<float> strength;       ///< and at a wall [N m]
   Array<float> tool_strength;  ///< and at a tool, over what other tools leave [N m]
-  Array<float> wall_push;      ///< of each particle: normals of its walls by `share` [1/m]
+  Array<float> wall_push;      ///< of each particle: normals of its walls by `share` [1/m], and how
+                               ///< far they came
   std::vector<std::uint64_t> near;  ///< which colliders it may meet, as bits
   Array<float> v_next[3];
   struct Touch {
@@ -106,7 +132,8 @@ double stable_fluid_step(const FluidState& state);
 int advance_fluid(FluidState& state, const FluidDrive& drive, FluidWalls& walls,
                   std::vector<ColliderLoad>& loads);
 
-/// Lists anew who may act on whom, with room for `skin` [m].
+/// Lists anew who may act on whom, with room for `skin` [m], by walls there, which FluidState::now
+/// has then.
 void list_neighbours(FluidState& state, const std::vector<float>& corners, float skin);
 
 /// Puts particles that are beside one another in space near one another in number, and forgets who

@@ -7,120 +7,180 @@
 #include "compute/simd.h"
 
 namespace tissue_sim {
+namespace lanes {
+namespace {
+
+constexpr int kLanes = kFluidLanes;
+
+/// a where v is negative, else b.
+template <class V>
+TISSUE_SIM_INLINE V where_negative(V v, V a, V b) {
+  return choose(less(v, V{}), a, b);
+}
+template <class V>
+TISSUE_SIM_INLINE V lesser(V a, V b) {
+  return choose(less(a, b), a, b);
+}
+template <class V>
+TISSUE_SIM_INLINE V magnitude(V v) {
+  return where_negative(v, -v, v);
+}
+
+/// Rows and columns change places, in each 16 bytes.
+template <int W>
+TISSUE_SIM_INLINE void transpose(Vec<W> (&r)[4]) {
+  Mask<W> low, high, first, second;
+  for (int i = 0; i < W; i += 4) {
+    low[i] = i, low[i + 1] = i + W, low[i + 2] = i + 1, low[i + 3] = i + 1 + W;
+    high[i] = i + 2, high[i + 1] = i + 2 + W, high[i + 2] = i + 3, high[i + 3] = i + 3 + W;
+    first[i] = i, first[i + 1] = i + 1, first[i + 2] = i + W, first[i + 3] = i + 1 + W;
+    second[i] = i + 2, second[i + 1] = i + 3, second[i + 2] = i + 2 + W, second[i + 3] = i + 3 + W;
+  }
+  const Vec<W> a = permute<W>(r[0], r[1], low), b = permute<W>(r[0], r[1], high);
+  const Vec<W> c = permute<W>(r[2], r[3], low), d = permute<W>(r[2], r[3], high);
+  r[0] = permute<W>(a, c, first);
+  r[1] = permute<W>(a, c, second);
+  r[2] = permute<W>(b, d, first);
+  r[3] = permute<W>(b, d, second);
+}
+
+/// The 16 bytes of W / 4 rows side by side: i, i + 4, i + 8, i + 12. By instructions, for GCC
+/// makes longer vectors of shorter ones number by number.
+template <int W>
+TISSUE_SIM_INLINE Vec<W> load_row(const float* x, const std::int32_t* index, int i) {
+  const auto at = [x, index](int k) -> const Vec<4>& {
+    return *reinterpret_cast<const Vec<4>*>(x + 4 * static_cast<std::ptrdiff_t>(index[k]));
+  };
+  Vec<W> row;
+  if constexpr (W == 4) {
+    row = at(i);
+  } else {
+#if defined(__x86_64__) && !defined(__clang__)
+    if constexpr (W == 8) {
+      asm("vbroadcastf128 %1, %0" : "=x"(row) : "m"(at(i)));
+      asm("vinsertf128 $1, %1, %0, %0" : "+x"(row) : "m"(at(i + 4)));
+    } else {
+      asm("vbroadcastf32x4 %1, %0" : "=v"(row) : "m"(at(i)));
+      asm("vinsertf32x4 $1, %1, %0, %0" : "+v"(row) : "m"(at(i + 4)));
+      asm("vinsertf32x4 $2, %1, %0, %0" : "+v"(row) : "m"(at(i + 8)));
+      asm("vinsertf32x4 $3, %1, %0, %0" : "+v"(row) : "m"(at(i + 12)));
+    }
+#else
+    for (int l = 0; l < W; ++l) row[l] = at(i + l / 4 * 4)[l % 4];
+#endif
+  }
+  return row;
+}
+
+/// Rows of four numbers side by side: of[k] has the k-th of each.
+template <int W>
+struct Columns {
+  Vec<W> of[4];
+};
+
+/// Of rows of four numbers those by `index`.
+template <int W>
+TISSUE_SIM_INLINE Columns<W> gather(const float* rows, const std::int32_t* index) {
+  Columns<W> c;
+  for (int i = 0; i < 4; ++i) c.of[i] = load_row<W>(rows, index, i);
+  transpose<W>(c.of);
+  return c;
+}
+
+/// Of all lanes, in the same order whatever vectors they come in.
+template <int W>
+TISSUE_SIM_INLINE float sum_of(const Vec<W>* v) {
+  float lane[kLanes];
+  for (int part = 0; part < kLanes / W; ++part) store<W>(lane + W * part, v[part]);
+  for (int half = kLanes / 2; half > 0; half /= 2) {
+    for (int l = 0; l < half; ++l) lane[l] += lane[l + half];
+  }
+  return lane[0];
+}
+
+}  // namespace
+}  // namespace lanes
+
 namespace pair_sums {
 namespace {
 
-constexpr int kW = 8;
-using V = Vec<kW>;
+using namespace lanes;
 
-/// Rows of four numbers side by side: of[k] has the k-th of each.
-struct Columns {
-  V of[4];
-};
-
-TISSUE_SIM_INLINE V join(Vec<4> a, Vec<4> b) {
-  return V{a[0], a[1], a[2], a[3], b[0], b[1], b[2], b[3]};
-}
-
-/// In registers: what is stored in parts and loaded whole waits.
-TISSUE_SIM_INLINE Columns transpose(const float* const* row) {
-  using Quad = Vec<4>;
-  const Mask<4> low = {0, 4, 1, 5}, high = {2, 6, 3, 7}, left = {0, 1, 4, 5}, right = {2, 3, 6, 7};
-  Quad half[2][4];
-  for (int h = 0; h < 2; ++h) {
-    const Quad a = load<4>(row[4 * h]), b = load<4>(row[4 * h + 1]), c = load<4>(row[4 * h + 2]),
-               d = load<4>(row[4 * h + 3]);
-    const Quad ab = permute<4>(a, b, low), cd = permute<4>(c, d, low);
-    const Quad ab2 = permute<4>(a, b, high), cd2 = permute<4>(c, d, high);
-    half[h][0] = permute<4>(ab, cd, left);
-    half[h][1] = permute<4>(ab, cd, right);
-    half[h][2] = permute<4>(ab2, cd2, left);
-    half[h][3] = permute<4>(ab2, cd2, right);
-  }
-  return {{join(half[0][0], half[1][0]), join(half[0][1], half[1][1]), join(half[0][2], half[1][2]),
-           join(half[0][3], half[1][3])}};
-}
-
-/// Of neighbours side by side four numbers each, from an array of them; those that are not there
-/// have none.
-TISSUE_SIM_INLINE Columns gather(const Array<float>& from, const std::int32_t* other, int n) {
-  static constexpr float kNone[4] = {};
-  const float* row[kW];
-  for (int l = 0; l < kW; ++l) {
-    row[l] = l < n ? &from[4 * static_cast<std::size_t>(other[l])] : kNone;
-  }
-  return transpose(row);
-}
-
-TISSUE_SIM_INLINE float sum_of(V v) {
-  float lane[kW], sum = 0;
-  store<kW>(lane, v);
-  for (const float x : lane) sum += x;
-  return sum;
-}
-
+template <int W>
 TISSUE_SIM_INLINE float neighbour_volume_by(const FluidState& s, int i) {
+  using V = Vec<W>;
   const float* x = &s.place[4 * static_cast<std::size_t>(i)];
   const V one = all_lanes<V>(1), by_reach = all_lanes<V>(1 / s.kernel.reach);
-  V sum = {};
+  V sum[kLanes / W] = {};
   const std::int32_t end = s.lists.begin[i + 1];
-  for (std::int32_t e = s.lists.begin[i]; e < end; e += kW) {
-    const Columns place = gather(s.place, &s.lists.other[e], end - e);
-    const V dx = x[0] - place.of[0], dy = x[1] - place.of[1], dz = x[2] - place.of[2];
-    V t = square_root(dx * dx + dy * dy + dz * dz) * by_reach;
-    t = choose(less(one, t), one, t);
-    const V u2 = (one - t) * (one - t);
-    sum += place.of[3] * (u2 * u2 * (4 * t + one));
+  for (std::int32_t e = s.lists.begin[i]; e < end; e += kLanes) {
+    for (int part = 0; part < kLanes / W; ++part) {
+      const Columns<W> place = gather<W>(s.place.data(), &s.lists.other[e + W * part]);
+      const V dx = x[0] - place.of[0], dy = x[1] - place.of[1], dz = x[2] - place.of[2];
+      V t = square_root(dx * dx + dy * dy + dz * dz) * by_reach;
+      t = lesser(t, one);
+      const V u2 = (one - t) * (one - t);
+      sum[part] += place.of[3] * (u2 * u2 * (4 * t + one));
+    }
   }
-  return s.kernel.value(0) * sum_of(sum);
+  return s.kernel.value(0) * sum_of<W>(sum);
 }
 
+template <int W>
 TISSUE_SIM_INLINE void add_pair_forces_by(const FluidState& s, int i, float* force) {
+  using V = Vec<W>;
   const float* x = &s.place[4 * static_cast<std::size_t>(i)];
   const float* v = &s.motion[4 * static_cast<std::size_t>(i)];
   const V one = all_lanes<V>(1), by_reach = all_lanes<V>(1 / s.kernel.reach);
   const V soft2 = all_lanes<V>(0.0025f * s.kernel.reach * s.kernel.reach);
   const float own = s.viscosity[s.particles.kind[i]];
-  V f[3] = {};
+  V f[3][kLanes / W] = {};
   const bool is_one_fluid = s.viscosity.size() == 1;
   V eta = all_lanes<V>(10 * own);
   const std::int32_t end = s.lists.begin[i + 1];
-  for (std::int32_t e = s.lists.begin[i]; e < end; e += kW) {
-    const std::int32_t* other = &s.lists.other[e];
-    const Columns place = gather(s.place, other, end - e),
-                  motion = gather(s.motion, other, end - e);
-    if (!is_one_fluid) {
-      alignas(32) float of[kW] = {};
-      for (int l = 0; l < std::min<int>(kW, end - e); ++l) {
-        of[l] = 5 * (own + s.viscosity[s.particles.kind[other[l]]]);
+  for (std::int32_t e = s.lists.begin[i]; e < end; e += kLanes) {
+    for (int part = 0; part < kLanes / W; ++part) {
+      const std::int32_t* other = &s.lists.other[e + W * part];
+      const Columns<W> place = gather<W>(s.place.data(), other),
+                       motion = gather<W>(s.motion.data(), other);
+      if (!is_one_fluid) {
+        float of[W];
+        for (int l = 0; l < W; ++l) {
+          const std::int32_t j = other[l] < s.particles.size() ? other[l] : i;
+          of[l] = 5 * (own + s.viscosity[s.particles.kind[j]]);
+        }
+        eta = load<W>(of);
       }
-      eta = load<kW>(of);
+      const V dx = x[0] - place.of[0], dy = x[1] - place.of[1], dz = x[2] - place.of[2];
+      const V r2 = dx * dx + dy * dy + dz * dz;
+      V t = square_root(r2) * by_reach;
+      t = lesser(t, one);
+      const V w = one - t;
+      const V nearing =
+          (v[0] - motion.of[0]) * dx + (v[1] - motion.of[1]) * dy + (v[2] - motion.of[2]) * dz;
+      const V along = eta * nearing / (r2 + soft2) - (v[3] + motion.of[3]);
+      const V scale = place.of[3] * along * (w * w * w);
+      f[0][part] += scale * dx;
+      f[1][part] += scale * dy;
+      f[2][part] += scale * dz;
     }
-    const V dx = x[0] - place.of[0], dy = x[1] - place.of[1], dz = x[2] - place.of[2];
-    const V r2 = dx * dx + dy * dy + dz * dz;
-    V t = square_root(r2) * by_reach;
-    t = choose(less(one, t), one, t);
-    const V w = one - t;
-    const V nearing =
-        (v[0] - motion.of[0]) * dx + (v[1] - motion.of[1]) * dy + (v[2] - motion.of[2]) * dz;
-    const V along = eta * nearing / (r2 + soft2) - (v[3] + motion.of[3]);
-    const V scale = place.of[3] * along * (w * w * w);
-    f[0] += scale * dx;
-    f[1] += scale * dy;
-    f[2] += scale * dz;
   }
   const float all = x[3] * s.kernel.slope_by_r(0);
-  for (int a = 0; a < 3; ++a) force[a] += all * sum_of(f[a]);
+  for (int a = 0; a < 3; ++a) force[a] += all * sum_of<W>(f[a]);
 }
 
 #if defined(__x86_64__)
-// Not TISSUE_SIM_TARGET_AVX2, with which the compiler would fuse.
-__attribute__((target("avx2"))) float neighbour_volume_avx2(const FluidState& s, int i) {
-  return neighbour_volume_by(s, i);
+TISSUE_SIM_UNFUSED_AVX2 float neighbour_volume_avx2(const FluidState& s, int i) {
+  return neighbour_volume_by<8>(s, i);
 }
-__attribute__((target("avx2"))) void add_pair_forces_avx2(const FluidState& s, int i,
-                                                          float* force) {
-  add_pair_forces_by(s, i, force);
+TISSUE_SIM_UNFUSED_AVX2 void add_pair_forces_avx2(const FluidState& s, int i, float* force) {
+  add_pair_forces_by<8>(s, i, force);
+}
+TISSUE_SIM_UNFUSED_AVX512 float neighbour_volume_avx512(const FluidState& s, int i) {
+  return neighbour_volume_by<16>(s, i);
+}
+TISSUE_SIM_UNFUSED_AVX512 void add_pair_forces_avx512(const FluidState& s, int i, float* force) {
+  add_pair_forces_by<16>(s, i, force);
 }
 #endif
 
@@ -129,24 +189,26 @@ __attribute__((target("avx2"))) void add_pair_forces_avx2(const FluidState& s, i
 
 float neighbour_volume(const FluidState& s, int i) {
 #if defined(__x86_64__)
-  if (s.instructions != InstructionSet::kSse2) return pair_sums::neighbour_volume_avx2(s, i);
+  if (s.instructions == InstructionSet::kAvx512) return pair_sums::neighbour_volume_avx512(s, i);
+  if (s.instructions == InstructionSet::kAvx2) return pair_sums::neighbour_volume_avx2(s, i);
 #endif
-  return pair_sums::neighbour_volume_by(s, i);
+  return pair_sums::neighbour_volume_by<4>(s, i);
 }
 
 void add_pair_forces(const FluidState& s, int i, float* force) {
 #if defined(__x86_64__)
-  if (s.instructions != InstructionSet::kSse2) return pair_sums::add_pair_forces_avx2(s, i, force);
+  if (s.instructions == InstructionSet::kAvx512) {
+    return pair_sums::add_pair_forces_avx512(s, i, force);
+  }
+  if (s.instructions == InstructionSet::kAvx2) return pair_sums::add_pair_forces_avx2(s, i, force);
 #endif
-  pair_sums::add_pair_forces_by(s, i, force);
+  pair_sums::add_pair_forces_by<4>(s, i, force);
 }
 
 namespace wall_sums {
 namespace {
 
-using pair_sums::Columns;
-using pair_sums::kW;
-using pair_sums::V;
+using namespace lanes;
 constexpr float kPi = FluidKernel::kPi;
 
 /// Of the reach: a triangle with longer edges is summed in parts; at most so many along an edge.
@@ -154,6 +216,9 @@ constexpr float kPart = 0.75f;
 constexpr int kMostParts = 8;
 /// Radii of a triangle: from there on its middle stands for it, the share within 0.001.
 constexpr float kFar = 4;
+/// A share is summed anew when it changed by so much, or the place by so much of the reach; until
+/// then it follows by its slope.
+constexpr float kKeepShare = 0.015f, kKeep = 0.03f;
 
 /// Places of a triangle by two of their coordinates, three in each of its `n` times `n` parts: they
 /// integrate squares exactly.
@@ -180,13 +245,11 @@ struct Places {
 };
 constexpr Places kPlaces;
 
-TISSUE_SIM_INLINE V absolute(V x) { return choose(less(x, V{}), -x, x); }
-
 /// atan2, within 1e-7 (the polynomial: Abramowitz and Stegun 4.4.49).
+template <class V>
 TISSUE_SIM_INLINE V angle(V y, V x) {
-  const V ax = absolute(x), ay = absolute(y);
-  const auto steep = less(ax, ay);
-  const V t = choose(steep, ax, ay) / (choose(steep, ay, ax) + 1e-30f), s = t * t;
+  const V ax = magnitude(x), ay = magnitude(y), lower = ax - ay;
+  const V t = lesser(ax, ay) / (larger(ax, ay) + 1e-30f), s = t * t;
   V p = 0.0028662257f * s - 0.0161657367f;
   p = p * s + 0.0429096138f;
   p = p * s - 0.0752896400f;
@@ -195,172 +258,239 @@ TISSUE_SIM_INLINE V angle(V y, V x) {
   p = p * s + 0.1999355085f;
   p = p * s - 0.3333314528f;
   p = t + t * (s * p);
-  p = choose(steep, kPi / 2 - p, p);
-  p = choose(less(x, V{}), kPi - p, p);
-  return choose(less(y, V{}), -p, p);
+  p = where_negative(lower, kPi / 2 - p, p);
+  p = where_negative(x, kPi - p, p);
+  return where_negative(y, -p, p);
 }
 
-TISSUE_SIM_INLINE V dot(const V* a, const V* b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
+template <class V>
+TISSUE_SIM_INLINE V dot(const V* a, const V* b) {
+  return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
 
-/// The sum of the first `count` shares; what each face does to the place stays with its entry.
-/// entry.
-TISSUE_SIM_INLINE float keep_shares(FluidState& s, const std::int32_t* entry, int count, V share,
-                                    V face) {
-  alignas(32) float shares[kW], faces[kW];
-  store<kW>(shares, share);
-  store<kW>(faces, face);
-  float sum = 0;
-  for (int l = 0; l < count; ++l) {
-    sum += shares[l];
-    s.share[entry[l]] = faces[l];
+/// What a particle sees of walls, while it is summed.
+template <int W>
+struct Sums {
+  Vec<W> share[kLanes / W] = {};
+  std::int32_t* triangle;  // that the kernel reaches, one after the other
+  float* over;             // and its integral over it
+  int count = 0;
+
+  TISSUE_SIM_INLINE void keep(const std::int32_t* of, int n, Vec<W> face) {
+    float faces[W];
+    store<W>(faces, face);
+    for (int l = 0; l < n; ++l) {
+      triangle[count] = of[l];
+      over[count] = faces[l];
+      count += faces[l] > 0 ? 1 : 0;
+    }
   }
-  return sum;
-}
+};
+
+/// Where triangles begin in rows of four numbers.
+constexpr int kRows = sizeof(WallTriangle) / (4 * sizeof(float));
 
 /// The solid angle is exact; what the kernel has within the triangle, which is smooth, and the
-/// kernel itself are summed over places.
-TISSUE_SIM_INLINE float add_close(FluidState& s, const float* x, const std::int32_t* entry,
-                                  int count, V* push) {
+/// kernel itself are summed over places. `triangle` has kLanes of them; those from `count` on do
+/// not count.
+template <int W>
+TISSUE_SIM_INLINE void add_close(const FluidState& s, const float* x, const std::int32_t* triangle,
+                                 int count, Sums<W>& sums) {
+  using V = Vec<W>;
   const float reach = s.kernel.reach;
-  const float* row[4][kW];  // of a triangle's numbers, from its normal on
+  std::int32_t row[kLanes];
   float longest2 = 0;
-  for (int l = 0; l < kW; ++l) {
-    const WallTriangle& t = s.now[s.lists.wall[entry[l < count ? l : 0]]];
-    for (int k = 0; k < 4; ++k) row[k][l] = t.middle + 4 * (k + 1);
-    longest2 = std::max(longest2, t.edge2);
+  for (int l = 0; l < kLanes; ++l) {
+    row[l] = kRows * triangle[l];
+    longest2 = std::max(longest2, s.now[triangle[l]].edge2);
   }
-  const Columns side = pair_sums::transpose(row[0]);
-  const Columns corner[3] = {pair_sums::transpose(row[1]), pair_sums::transpose(row[2]),
-                             pair_sums::transpose(row[3])};
-  V c[3][3], r[3];
-  for (int k = 0; k < 9; ++k) c[k / 3][k % 3] = corner[k / 4].of[k % 4] - x[k % 3];
-  const V* n = side.of;
-  for (int k = 0; k < 3; ++k) r[k] = square_root(dot(c[k], c[k]));
-  // Those behind the last are the first once more.
-  const V area = keep<kW>(lanes_between<kW>(0, count), side.of[3]), height = -dot(c[0], n);
-  // Twice the area along the normal makes the volume that the corners span with the place. What has
-  // no normal has no angle.
-  const V half =
-      keep<kW>(less(all_lanes<V>(0.5f), dot(n, n)),
-               angle(2 * area * height, r[0] * r[1] * r[2] + dot(c[0], c[1]) * r[2] +
-                                            dot(c[1], c[2]) * r[0] + dot(c[2], c[0]) * r[1]));
   const int parts =
       std::clamp(static_cast<int>(std::ceil(std::sqrt(longest2) / (kPart * reach))), 1, kMostParts);
-  const V one = all_lanes<V>(1), by_reach = all_lanes<V>(1 / reach);
-  V from[3], to[3], within = {}, face = {};
-  for (int a = 0; a < 3; ++a) {
-    from[a] = c[1][a] - c[0][a];
-    to[a] = c[2][a] - c[0][a];
-  }
   const int places = kPlaces.count[parts];
-  for (int k = 0; k < places; ++k) {
-    V at[3];
-    for (int a = 0; a < 3; ++a) {
-      at[a] = c[0][a] + kPlaces.a[parts][k] * from[a] + kPlaces.b[parts][k] * to[a];
-    }
-    const V t = square_root(dot(at, at)) * by_reach, t2 = t * t;
-    const auto near = less(t, one);
-    const V inside = 14 + t2 * (-84 + t * (140 + t * (-90 + 21 * t)));
-    within += choose(near, inside, one / (t2 * t + 1e-30f));
-    const V u = choose(near, one - t, V{}), u2 = u * u;
-    face += u2 * u2 * (4 * t + one);
-  }
   const float by_places = 1.0f / static_cast<float>(places);
-  const V share = half * (1 / (2 * kPi)) -
-                  area * height * within * (by_places / (4 * kPi * reach * reach * reach));
-  const V over = area * face * (by_places * s.kernel.value(0));
-  for (int a = 0; a < 3; ++a) push[a] += over * n[a];
-  return keep_shares(s, entry, count, share, over);
+  const V one = all_lanes<V>(1), by_reach = all_lanes<V>(1 / reach);
+  for (int part = 0; part < kLanes / W && W * part < count; ++part) {
+    const float* at = s.now[0].middle + 4;
+    const Columns<W> side = gather<W>(at, row + W * part);
+    const Columns<W> corner[3] = {gather<W>(at + 4, row + W * part),
+                                  gather<W>(at + 8, row + W * part),
+                                  gather<W>(at + 12, row + W * part)};
+    V c[3][3], r[3];
+    for (int k = 0; k < 9; ++k) c[k / 3][k % 3] = corner[k / 4].of[k % 4] - x[k % 3];
+    const V* n = side.of;
+    for (int k = 0; k < 3; ++k) r[k] = square_root(dot(c[k], c[k]));
+    const V area = keep<W>(lanes_between<W>(0, count - W * part), side.of[3]),
+            height = -dot(c[0], n);
+    // Twice the area along the normal makes the volume that the corners span with the place. What
+    // has no normal has no angle.
+    const V half = angle(2 * area * height, r[0] * r[1] * r[2] + dot(c[0], c[1]) * r[2] +
+                                                dot(c[1], c[2]) * r[0] + dot(c[2], c[0]) * r[1]);
+    V from[3], to[3], within = {}, face = {};
+    for (int a = 0; a < 3; ++a) {
+      from[a] = c[1][a] - c[0][a];
+      to[a] = c[2][a] - c[0][a];
+    }
+    for (int k = 0; k < places; ++k) {
+      V at_place[3];
+      for (int a = 0; a < 3; ++a) {
+        at_place[a] = c[0][a] + kPlaces.a[parts][k] * from[a] + kPlaces.b[parts][k] * to[a];
+      }
+      const V t = square_root(dot(at_place, at_place)) * by_reach, t2 = t * t, u = one - t;
+      const V inside = 14 + t2 * (-84 + t * (140 + t * (-90 + 21 * t)));
+      within += where_negative(u, one / (t2 * t + 1e-30f), inside);
+      const V near = where_negative(u, V{}, u), u2 = near * near;
+      face += u2 * u2 * (4 * t + one);
+    }
+    sums.share[part] += keep<W>(lanes_between<W>(0, count - W * part),
+                                where_negative(dot(n, n) - 0.5f, V{}, half)) *
+                            (1 / (2 * kPi)) -
+                        area * height * within * (by_places / (4 * kPi * reach * reach * reach));
+    sums.keep(triangle + W * part, std::min(W, count - W * part),
+              area * face * (by_places * s.kernel.value(0)));
+  }
 }
 
 /// Triangles that their middles stand for.
-TISSUE_SIM_INLINE float add_far(FluidState& s, const float* from, const std::int32_t* entry,
-                                int count, V* push) {
-  static constexpr float kNone[8] = {};
-  const float *middle[kW], *side[kW];
-  for (int l = 0; l < kW; ++l) {
-    const float* of = l < count ? s.now[s.lists.wall[entry[l]]].middle : kNone;
-    middle[l] = of;
-    side[l] = of + 4;
+template <int W>
+TISSUE_SIM_INLINE void add_far(const FluidState& s, const float* from, const std::int32_t* triangle,
+                               int count, Sums<W>& sums) {
+  using V = Vec<W>;
+  std::int32_t row[kLanes];
+  for (int l = 0; l < kLanes; ++l) row[l] = kRows * triangle[l];
+  const V one = all_lanes<V>(1);
+  for (int part = 0; part < kLanes / W && W * part < count; ++part) {
+    const Columns<W> place = gather<W>(s.now[0].middle, row + W * part),
+                     normal = gather<W>(s.now[0].middle + 4, row + W * part);
+    V x[3], n[3];
+    for (int a = 0; a < 3; ++a) {
+      x[a] = place.of[a] - from[a];
+      n[a] = normal.of[a];
+    }
+    const V area = keep<W>(lanes_between<W>(0, count - W * part), normal.of[3]);
+    const V r = square_root(dot(x, x));
+    const V t = lesser(r * all_lanes<V>(1 / s.kernel.reach), one);
+    const V t2 = t * t, u2 = (one - t) * (one - t);
+    const V beyond = one - t2 * t * (14 + t2 * (-84 + t * (140 + t * (-90 + 21 * t))));
+    sums.share[part] += area * beyond * dot(x, n) / (r * r * r + 1e-30f) * (-1 / (4 * kPi));
+    sums.keep(triangle + W * part, std::min(W, count - W * part),
+              area * (u2 * u2 * (4 * t + one)) * s.kernel.value(0));
   }
-  const Columns place = pair_sums::transpose(middle), normal = pair_sums::transpose(side);
-  V x[3], n[3];
-  for (int a = 0; a < 3; ++a) {
-    x[a] = place.of[a] - from[a];
-    n[a] = normal.of[a];
-  }
-  const V one = all_lanes<V>(1), area = normal.of[3];
-  const V r = square_root(dot(x, x));
-  V t = r * all_lanes<V>(1 / s.kernel.reach);
-  t = choose(less(one, t), one, t);
-  const V t2 = t * t, u2 = (one - t) * (one - t);
-  const V beyond = one - t2 * t * (14 + t2 * (-84 + t * (140 + t * (-90 + 21 * t))));
-  const V over = area * (u2 * u2 * (4 * t + one)) * s.kernel.value(0);
-  for (int a = 0; a < 3; ++a) push[a] += over * n[a];
-  const V share = area * beyond * dot(x, n) / (r * r * r + 1e-30f) * (-1 / (4 * kPi));
-  return keep_shares(s, entry, count, share, over);
 }
 
-TISSUE_SIM_INLINE float wall_share_by(FluidState& s, int i) {
+template <int W>
+TISSUE_SIM_INLINE float see_walls_by(FluidState& s, int i) {
+  using V = Vec<W>;
   const float* x = &s.place[4 * static_cast<std::size_t>(i)];
   const V reach = all_lanes<V>(s.kernel.reach);
-  std::int32_t close[2 * kW], away[2 * kW];  // entries that wait for eight
+  std::int32_t close[2 * kLanes], away[2 * kLanes];  // triangles that wait for the lanes to be full
   int closes = 0, aways = 0;
-  V push[3] = {};
-  float sum = 0;
-  const std::int32_t end = s.lists.wall_begin[i + 1];
-  for (std::int32_t e = s.lists.wall_begin[i]; e < end; e += kW) {
-    const int n = std::min<int>(kW, end - e);
-    const float* row[kW];
-    for (int l = 0; l < kW; ++l) row[l] = s.now[s.lists.wall[e + (l < n ? l : 0)]].middle;
-    alignas(32) float beyond_reach[kW], radii[kW];
-    const Columns middle = pair_sums::transpose(row);
-    const V dx = middle.of[0] - x[0], dy = middle.of[1] - x[1], dz = middle.of[2] - x[2],
-            radius = middle.of[3];
-    const V d2 = dx * dx + dy * dy + dz * dz, far = reach + radius;
-    store<kW>(beyond_reach, d2 - far * far);
-    store<kW>(radii, d2 - kFar * kFar * (radius * radius));
+  const std::int32_t begin = s.lists.wall_begin[i], end = s.lists.wall_begin[i + 1];
+  Sums<W> sums;
+  sums.triangle = s.seen.data() + begin;
+  sums.over = s.share.data() + begin;
+  const auto fill = [](std::int32_t* triangles, int count) {
+    for (int l = count; l < kLanes; ++l) triangles[l] = triangles[0];
+  };
+  for (std::int32_t e = begin; e < end; e += kLanes) {
+    const int n = std::min<int>(kLanes, end - e);
+    std::int32_t row[kLanes];
+    for (int l = 0; l < kLanes; ++l) row[l] = kRows * s.lists.wall[e + (l < n ? l : 0)];
+    float beyond_reach[kLanes], radii[kLanes];
+    for (int part = 0; part < kLanes / W; ++part) {
+      const Columns<W> middle = gather<W>(s.now[0].middle, row + W * part);
+      const V dx = middle.of[0] - x[0], dy = middle.of[1] - x[1], dz = middle.of[2] - x[2],
+              radius = middle.of[3];
+      const V d2 = dx * dx + dy * dy + dz * dz, far = reach + radius;
+      store<W>(beyond_reach + W * part, d2 - far * far);
+      store<W>(radii + W * part, d2 - kFar * kFar * (radius * radius));
+    }
     for (int l = 0; l < n; ++l) {
-      s.share[e + l] = 0;
-      close[closes] = away[aways] = e + l;
+      close[closes] = away[aways] = s.lists.wall[e + l];
       const int there = beyond_reach[l] < 0 ? 1 : 0, is_far = radii[l] > 0 ? 1 : 0;
       closes += there & ~is_far;
       aways += there & is_far;
     }
-    if (aways >= kW) {
-      sum += add_far(s, x, away, kW, push);
-      std::copy(away + kW, away + aways, away);
-      aways -= kW;
+    if (aways >= kLanes) {
+      add_far<W>(s, x, away, kLanes, sums);
+      std::copy(away + kLanes, away + aways, away);
+      aways -= kLanes;
     }
-    if (closes >= kW) {
-      sum += add_close(s, x, close, kW, push);
-      std::copy(close + kW, close + closes, close);
-      closes -= kW;
+    if (closes >= kLanes) {
+      add_close<W>(s, x, close, kLanes, sums);
+      std::copy(close + kLanes, close + closes, close);
+      closes -= kLanes;
     }
   }
-  if (closes > 0) sum += add_close(s, x, close, closes, push);
-  if (aways > 0) sum += add_far(s, x, away, aways, push);
-  for (int a = 0; a < 3; ++a) {
-    s.wall_push[3 * static_cast<std::size_t>(i) + a] = pair_sums::sum_of(push[a]);
+  if (closes > 0) {
+    fill(close, closes);
+    add_close<W>(s, x, close, closes, sums);
   }
-  return sum;
+  if (aways > 0) {
+    fill(away, aways);
+    add_far<W>(s, x, away, aways, sums);
+  }
+  s.seen_count[i] = sums.count;
+  return sum_of<W>(sums.share);
 }
 
 #if defined(__x86_64__)
-// Not TISSUE_SIM_TARGET_AVX2, with which the compiler would fuse.
-__attribute__((target("avx2"))) float wall_share_avx2(FluidState& s, int i) {
-  return wall_share_by(s, i);
+TISSUE_SIM_UNFUSED_AVX2 float see_walls_avx2(FluidState& s, int i) { return see_walls_by<8>(s, i); }
+TISSUE_SIM_UNFUSED_AVX512 float see_walls_avx512(FluidState& s, int i) {
+  return see_walls_by<16>(s, i);
 }
 #endif
+
+/// Sums what the walls' rows have by `share`: normals, and how far they came.
+void add_rows(const FluidState& s, int i, float* sum) {
+  using Row = Vec<4>;
+  const std::int32_t begin = s.lists.wall_begin[i];
+  const std::int32_t* triangle = s.seen.data() + begin;
+  const float* over = s.share.data() + begin;
+  Row part[4] = {};
+  const int count = s.seen_count[i];
+  int k = 0;
+  const auto row = [&s](std::int32_t t) {
+    return load<4>(&s.facing[4 * static_cast<std::size_t>(t)]);
+  };
+  for (; k + 4 <= count; k += 4) {
+    for (int l = 0; l < 4; ++l) part[l] += over[k + l] * row(triangle[k + l]);
+  }
+  for (; k < count; ++k) part[0] += over[k] * row(triangle[k]);
+  store<4>(sum, (part[0] + part[1]) + (part[2] + part[3]));
+}
 
 }  // namespace
 }  // namespace wall_sums
 
 float wall_share(FluidState& s, int i) {
+  using namespace wall_sums;
+  float* push = &s.wall_push[4 * static_cast<std::size_t>(i)];
+  FluidState::Seen& then = s.seen_at[i];
+  const float* x = &s.place[4 * static_cast<std::size_t>(i)];
+  if (then.is_new == 0) {
+    add_rows(s, i, push);
+    const float moved[3] = {x[0] - then.x[0], x[1] - then.x[1], x[2] - then.x[2]};
+    const float change = push[3] - then.moved - dot3(push, moved);
+    const float far = kKeep * s.kernel.reach;
+    if (std::fabs(change) < kKeepShare && dot3(moved, moved) < far * far) {
+      return then.share + change;
+    }
+  }
+  float share;
 #if defined(__x86_64__)
-  if (s.instructions != InstructionSet::kSse2) return wall_sums::wall_share_avx2(s, i);
+  if (s.instructions == InstructionSet::kAvx512) {
+    share = see_walls_avx512(s, i);
+  } else if (s.instructions == InstructionSet::kAvx2) {
+    share = see_walls_avx2(s, i);
+  } else {
+    share = see_walls_by<4>(s, i);
+  }
+#else
+  share = see_walls_by<4>(s, i);
 #endif
-  return wall_sums::wall_share_by(s, i);
+  add_rows(s, i, push);
+  then = {{x[0], x[1], x[2]}, share, push[3], 0};
+  return share;
 }
 
 }  // namespace tissue_sim

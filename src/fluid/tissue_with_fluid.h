@@ -76,7 +76,6 @@ class TissueWithFluid : public Tissue {
   std::vector<float> rest_;  ///< its places at time zero, as when it was made
   std::vector<FillProgress> fills_;
   FluidSources sources_;
-  double interval_ = 0;                ///< at most [s]
   double floor_ = 0;                   ///< below which fluid is lost [m]
   std::vector<ToolLoad> fluid_loads_;  ///< of the last interval
   FrameResult result_;

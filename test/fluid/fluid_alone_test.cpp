@@ -56,8 +56,15 @@ TEST(Fluid, SeesOfAWallWhatItEncloses) {
     }
     s.lists.wall_begin = {0, static_cast<std::int32_t>(s.now.size())};
     s.share.resize(s.now.size());
-    s.wall_push.resize(3);
+    s.seen.resize(s.now.size());
+    s.seen_count = {0};
+    s.wall_push.resize(4);
+    s.facing.clear();
+    for (const WallTriangle& t : s.now) {
+      s.facing.insert(s.facing.end(), {t.normal[0], t.normal[1], t.normal[2], 0});
+    }
     const auto share_at = [&](const Vec3& x) {
+      s.seen_at = {{{}, 0, 0, 1}};
       s.place.clear();
       for (int a = 0; a < 4; ++a) s.place.push_back(a < 3 ? static_cast<float>(x[a]) : 1.0f);
       return wall_share(s, 0);
@@ -76,6 +83,18 @@ TEST(Fluid, SeesOfAWallWhatItEncloses) {
       const float share = share_at(x);
       EXPECT_NEAR(share, enclosed, 0.002) << parts << " at " << x.transpose();
       const Array<float> push = s.wall_push;
+      // Where it or the wall moves a little, it follows by its slope.
+      const float aside[3] = {0.02f, -0.01f, 0.02f};
+      for (int a = 0; a < 3; ++a) s.place[a] += aside[a];
+      const float followed = wall_share(s, 0);
+      EXPECT_EQ(s.seen_at[0].share, share);
+      EXPECT_NEAR(followed, share_at(x + Vec3(0.02, -0.01, 0.02)), 3e-4) << parts;
+      EXPECT_EQ(share_at(x), share);
+      for (std::size_t t = 0; t < s.now.size(); ++t) {
+        for (int a = 0; a < 3; ++a) s.facing[4 * t + 3] -= s.now[t].normal[a] * aside[a];
+      }
+      EXPECT_NEAR(wall_share(s, 0), followed, 1e-6);
+      for (std::size_t t = 0; t < s.now.size(); ++t) s.facing[4 * t + 3] = 0;
       const InstructionSet best = s.instructions;
       s.instructions = InstructionSet::kSse2;
       EXPECT_EQ(share_at(x), share);
@@ -88,6 +107,44 @@ TEST(Fluid, SeesOfAWallWhatItEncloses) {
       }
     }
   }
+}
+
+/// Drops that are squeezed in a slit a tenth as wide leave it, at half of sound at most.
+TEST(Fluid, LeavesANarrowSlitAtHalfOfSoundAtMost) {
+  constexpr float kSpacing = 0.002f, kWide = 0.1f * kSpacing, kLong = 4 * kSpacing;
+  Cpu cpu(1);
+  FluidState s;
+  s.cpu = &cpu;
+  s.spacing = kSpacing;
+  s.kernel.reach = kFluidReach * kSpacing;
+  s.laws = {{1000, 0.001f, 1e5f}};
+  FluidWalls walls;
+  for (const bool over : {false, true}) {  // two squares that face one another
+    const float z = over ? kWide : 0, low = -kLong;
+    const float corner[4][2] = {{low, low}, {kLong, low}, {kLong, kLong}, {low, kLong}};
+    for (const int k : {0, 1, 2, 0, 2, 3}) {
+      const int at = over ? 3 - k : k;
+      walls.end.insert(walls.end.end(), {corner[at][0], corner[at][1], z});
+    }
+  }
+  walls.begin = walls.end;
+  for (int i = 0; i < 35; ++i) {
+    const Vec3 place(kLong - (0.3 + i / 7) * kSpacing, (i % 7 - 3) * kSpacing, kWide / 2);
+    add_particle(s, place, Vec3::Zero(), std::pow(kSpacing, 3), 0, -1);
+  }
+  FluidDrive drive;
+  drive.duration = 1e-4;
+  drive.colliders = [](double) { return std::vector<Collider>(); };
+  float fastest = 0;
+  for (int i = 0; i < 100; ++i) {
+    std::vector<ColliderLoad> loads;
+    walls.impulse.assign(walls.end.size(), 0);
+    advance_fluid(s, drive, walls, loads);
+    for (const float v : s.particles.v[0]) fastest = std::max(fastest, v);
+  }
+  EXPECT_GT(s.particles.x[0][0], kLong);
+  EXPECT_GT(fastest, 0.1f * s.laws[0].sound());
+  EXPECT_LT(fastest, 0.5f * s.laws[0].sound());
 }
 
 /// A column at rest presses on the bottom with its weight, and the deeper the more.

@@ -282,13 +282,18 @@ void look_for_edges(Tissue& tissue, const FrameInput& input, double begin, Resis
       [&](int k) {
         const EdgePiece& piece = edges.pieces[held[k]];
         EdgeHold& hold = edges.holds[held[k]];
-        if (!still_holds(piece, edges.blade_of(piece, input, begin), hold)) hold = {};
+        if (still_holds(piece, edges.blade_of(piece, input, begin), hold)) return;
+        if (hold.place.reference() != hold.swept.reference()) {
+          hold.lets_go = 2;
+        } else {
+          hold = {};
+        }
       },
       kGrain);
   Box box;
   for (std::size_t i = 0; i < edges.pieces.size(); ++i) {
     const EdgePiece& piece = edges.pieces[i];
-    if (edges.holds[i].holds() || !input.tools[piece.tool].present ||
+    if (edges.holds[i].place.body >= 0 || !input.tools[piece.tool].present ||
         !edges.seeks(piece, input, begin)) {
       continue;
     }
@@ -505,7 +510,8 @@ class PushingEdges final : public EdgePushes {
 };
 
 /// Where the cut of pieces that hold on side by side ends: the line through their places [m, in
-/// reference space], without its small corners and so far behind that no piece is behind it.
+/// reference space], without its small corners and so far behind that no piece is behind it; at the
+/// places themselves of those that let go, beside which nothing comes later.
 inline std::vector<Vec3> end_of_cut(const EdgeHold* first, const EdgeHold* last, double corner) {
   std::vector<Vec3> line;
   for (const EdgeHold* h = first; h != last; ++h) {
@@ -518,6 +524,9 @@ inline std::vector<Vec3> end_of_cut(const EdgeHold* first, const EdgeHold* last,
       const double share = static_cast<double>(i - a) / static_cast<double>(b - a);
       line[i] = (1 - share) * line[a] + share * line[b];
     }
+  }
+  for (const EdgeHold* h = first; h != last; ++h) {
+    if (h->lets_go != 0) line[h - first] = h->place.reference();
   }
   return line;
 }

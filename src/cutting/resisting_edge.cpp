@@ -119,7 +119,8 @@ std::vector<BladePath> free_paths(const Scene& scene, const ResistingEdges& edge
       const EdgePiece& piece = edges.pieces[i];
       const Vec3 half = 0.5 * piece.length * piece.along;
       const bool is_free = edges.seeks(piece, input, begin) &&
-                           (edges.holds[i].place.body < 0 || edges.is_past(piece, input, end));
+                           (edges.holds[i].place.body < 0 || edges.holds[i].lets_go == 2 ||
+                            edges.is_past(piece, input, end));
       if (is_free) {
         if (part.edge.empty()) {
           part.edge.push_back(piece.middle - half);

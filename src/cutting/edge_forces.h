@@ -17,6 +17,9 @@
 #include <utility>
 #include <vector>
 
+#include "compute/simd.h"
+#include "cutting/edge_corners.h"
+#include "cutting/edge_pushes.h"
 #include "cutting/resisting_edge.h"
 #include "tools/collider.h"
 #include "tools/tool_motion.h"
@@ -32,18 +35,80 @@ struct EdgeSupport {
   double young_modulus;  ///< [Pa]
 };
 
-/// A short way in the material that is `way` in the world. Where tissue is squeezed flat or turned
-/// inside out, as cells are that are larger than J / E, as if it were not deformed.
-inline Vec3 in_reference(const EdgeSupport& at, const Vec3& way) {
-  constexpr double kFlat = 0.1;
-  return at.F.determinant() > kFlat ? Vec3(at.F.inverse() * way) : way;
+/// The nodes that say how it stands there, and what of that stays as long as no cut goes on.
+struct EdgeStencil {
+  using Weights = Vec<4>;  ///< of a value; of its slopes in reference space [1/m]
+
+  Vec3 place;  ///< in reference space [m]
+  double mobility = 0, toughness = 0, young_modulus = 0;
+  std::vector<std::int32_t> nodes;
+  std::vector<Weights> weights;
+
+  void clear() {
+    mobility = 0;
+    nodes.clear();
+    weights.clear();
+  }
+  void add(std::int32_t node, const Weights& weight, double inv_mass) {
+    nodes.push_back(node);
+    weights.push_back(weight);
+    mobility += double(weight[0]) * weight[0] * inv_mass;
+  }
+};
+
+/// At the place that is `beside` [m] off the stencil's, in reference space: as far as it is linear.
+template <class Tissue>
+EdgeSupport support_of(const Tissue& tissue, const EdgeStencil& stencil,
+                       const Vec3& beside = Vec3::Zero()) {
+  EdgeStencil::Weights u[3] = {};
+  float v[3] = {};
+  for (std::size_t k = 0; k < stencil.nodes.size(); ++k) {
+    float moved[3], speed[3];
+    tissue.motion(stencil.nodes[k], moved, speed);
+    const EdgeStencil::Weights w = stencil.weights[k];
+    for (int a = 0; a < 3; ++a) {
+      u[a] += moved[a] * w;
+      v[a] += w[0] * speed[a];
+    }
+  }
+  EdgeSupport at{Vec3::Zero(),     Vec3(v[0], v[1], v[2]), Eigen::Matrix3d::Identity(),
+                 stencil.mobility, stencil.toughness,      stencil.young_modulus};
+  for (int a = 0; a < 3; ++a) {
+    for (int b = 0; b < 3; ++b) at.F(a, b) += u[a][1 + b];
+    at.x[a] = stencil.place[a] + u[a][0];
+  }
+  at.x += at.F * beside;
+  return at;
 }
+
+/// At a place.
+template <class Tissue>
+EdgeSupport support_at(const Tissue& tissue, const EdgePlace& place) {
+  EdgeStencil stencil;
+  tissue.see(place, stencil);
+  return support_of(tissue, stencil);
+}
+
+/// From short ways in the world to those in the material. Where tissue is squeezed flat or turned
+/// inside out, as cells are that are larger than J / E, as if it were not deformed.
+inline Eigen::Matrix3d to_reference(const EdgeSupport& at) {
+  constexpr double kFlat = 0.1;
+  const Vec3 xy = at.F.col(0).cross(at.F.col(1));
+  const double volume = xy.dot(at.F.col(2));
+  if (!(volume > kFlat)) return Eigen::Matrix3d::Identity();
+  Eigen::Matrix3d inverse;
+  inverse.row(0) = at.F.col(1).cross(at.F.col(2)).transpose();
+  inverse.row(1) = at.F.col(2).cross(at.F.col(0)).transpose();
+  inverse.row(2) = xy.transpose();
+  return inverse * (1 / volume);
+}
+inline Vec3 in_reference(const EdgeSupport& at, const Vec3& way) { return to_reference(at) * way; }
 
 /// What a piece bears at most where its place slides along `slides`, unit [N].
 inline double most_borne(const EdgePiece& piece, const Vec3& along, const EdgeSupport& at,
-                         const Vec3& slides) {
+                         const Eigen::Matrix3d& to_reference, const Vec3& slides) {
   const double dull = at.young_modulus * piece.edge_radius;
-  const double wide = piece.length * in_reference(at, along).norm();
+  const double wide = piece.length * (to_reference * along).norm();
   return (at.toughness + dull) * wide * slides.cross(along).norm();
 }
 
@@ -76,7 +141,7 @@ inline EdgeStand stand_of(const EdgePiece& piece, const Collider& c) {
 struct EdgePush {
   Vec3 force = Vec3::Zero();  ///< on the tissue [N]
   bool begins = false;        ///< to press
-  Vec3 slid = Vec3::Zero();   ///< of the material place, in the world [m]
+  Vec3 slid = Vec3::Zero();   ///< of the material place, in reference space [m]
   double work = 0;            ///< of cutting [J]
 };
 
@@ -90,6 +155,7 @@ inline EdgePush push_of(const EdgePiece& piece, const EdgeStand& edge, const Edg
   constexpr double kDamping = 0.1;  // share of critical
   constexpr double kTurns = 0.25;   // cells of way in which a piece turns to where it slides
   EdgePush push;
+  const Eigen::Matrix3d in_material = to_reference(at);
   Vec3 d = edge.x - at.x;
   const double ahead = d.dot(edge.onward);
   if (!(ahead > 0)) {
@@ -99,7 +165,7 @@ inline EdgePush push_of(const EdgePiece& piece, const EdgeStand& edge, const Edg
   if (hold.presses == 0) {  // comes from free space: nothing across its way holds it yet
     hold.presses = 1;
     push.begins = true;
-    push.slid = d - ahead * edge.onward;
+    push.slid = in_material * (d - ahead * edge.onward);
     d = ahead * edge.onward;
     const Vec3 way = edge.v - at.v;
     const Vec3 first = (way.dot(edge.onward) > 0 ? way : edge.onward).stableNormalized();
@@ -117,13 +183,13 @@ inline EdgePush push_of(const EdgePiece& piece, const EdgeStand& edge, const Edg
   Vec3 force = stiffness * d + damping * (edge.v - at.v);
   if (force.dot(edge.onward) <= 0) return push;
   const Vec3 slides(hold.slides[0], hold.slides[1], hold.slides[2]);
-  const double most = most_borne(piece, edge.along, at, slides), size = force.norm();
+  const double most = most_borne(piece, edge.along, at, in_material, slides), size = force.norm();
   if (size > most) {
     force *= most / size;
     const Vec3 slid = d - force / stiffness;
-    const Vec3 turned = (slides + slid / (kTurns * cell_size)).stableNormalized();
+    const Vec3 turned = (slides + slid / (kTurns * cell_size)).normalized();
     if (turned.dot(edge.onward) > 0) std::copy(turned.data(), turned.data() + 3, hold.slides);
-    push.slid += slid;
+    push.slid += in_material * slid;
     push.work = std::max(0.0, force.dot(slid));
   }
   push.force = force;
@@ -134,21 +200,21 @@ inline EdgePush push_of(const EdgePiece& piece, const EdgeStand& edge, const Edg
 /// of all at a surface, but what lies this far ahead of it [cells].
 inline constexpr double kAhead = 0.75;
 
-/// The support that far ahead of a hold and how far that is [m]: 0 where tissue ends before.
+/// What is seen that far ahead of a hold, and how far that is [m]: 0 where tissue ends before.
 template <class Tissue>
-typename Tissue::Support support_ahead(const Tissue& tissue, EdgeHold& hold, const Vec3& onward,
-                                       double& ahead) {
-  ahead = kAhead * tissue.cell_size();
+double see_ahead(const Tissue& tissue, const EdgeHold& hold, EdgeStencil& stencil) {
+  const double ahead = kAhead * tissue.cell_size();
   EdgePlace place = hold.place;
   const Vec3 way(hold.ahead[0], hold.ahead[1], hold.ahead[2]);
-  if (!tissue.put(hold.place.reference() + ahead * way, place)) {
-    ahead = 0;
-    place = hold.place;
-  }
-  typename Tissue::Support support = tissue.support(place);
-  const Vec3 turned = in_reference(support.at, onward).stableNormalized();
+  const bool is_there = tissue.put(hold.place.reference() + ahead * way, place);
+  tissue.see(is_there ? place : hold.place, stencil);
+  return is_there ? ahead : 0;
+}
+
+/// Turns what is ahead of a hold to where that is in tissue that stands so.
+inline void turn_ahead(const EdgeSupport& at, const Vec3& onward, EdgeHold& hold) {
+  const Vec3 turned = in_reference(at, onward).stableNormalized();
   std::copy(turned.data(), turned.data() + 3, hold.ahead);
-  return support;
 }
 
 /// Whether a piece that holds on there is at the end of its cut: nothing is cut there, or half a
@@ -162,6 +228,14 @@ bool is_at_end(const Tissue& tissue, const EdgePlace& place, const EdgeSupport& 
   return tissue.is_whole(place, X + 0.5 * tissue.cell_size() * ahead, normal);
 }
 
+inline void add(const Vec3& x, Box& box) {
+  box.min = box.min.cwiseMin(x);
+  box.max = box.max.cwiseMax(x);
+}
+inline double distance2(const Box& box, const Vec3& x) {
+  return (x - x.cwiseMax(box.min).cwiseMin(box.max)).squaredNorm();
+}
+
 /// Before blades go on: which pieces hold tissue, and which will on the way from the share `begin`
 /// of the frame. A `Tissue` knows the method's:
 ///   cell_size()
@@ -169,22 +243,23 @@ bool is_at_end(const Tissue& tissue, const EdgePlace& place, const EdgeSupport& 
 ///   find(x, place)          the material place at x [m]; false where none is
 ///   put(X, place)           moves a place to X in reference space; false where no tissue is there
 ///   is_whole(place, X, normal)   whether anything at a reference place still crosses the plane of
-///   a
-///                           blade with this normal, in reference space
-///   support(place)          a Tissue::Support of its place, with `at`, an EdgeSupport
-///   push(support, impulse)  gives the nodes of a support an impulse [N s]
-///   each(n, f)              calls f(i) for i below n, on whatever threads
+///                           a blade with this normal, in reference space
+///   see(place, stencil)     what a place sees
+///   motion(node, u, v)      how a node moved [m], [m/s]
+///   push(node, way, impulse)   gives a node this share of an impulse [N s]
+///   each(n, f, grain)       calls f(i) for i below n, so many at a time, on whatever threads
 template <class Tissue>
 void look_for_edges(Tissue& tissue, const FrameInput& input, double begin, ResistingEdges& edges) {
   constexpr double kStep = 0.125, kBeyond = 1.5;  // cells; of the way in a frame
   constexpr double kAside = 0.125, kBack = 1;  // cells that an edge goes aside, back from its cut
-  constexpr int kMostSteps = 64, kHalvings = 5;
+  constexpr int kMostSteps = 64, kHalvings = 5, kGrain = 16;
   const double cell = tissue.cell_size();
   const auto still_holds = [&](const EdgePiece& piece, const Pose& pose, EdgeHold& hold) {
-    if (!hold.holds()) return false;
     const Vec3 onward = pose.orientation * piece.onward;
-    double reach = 0;
-    const EdgeSupport at = support_ahead(tissue, hold, onward, reach).at;
+    EdgeStencil stencil;
+    const double reach = see_ahead(tissue, hold, stencil);
+    const EdgeSupport at = support_of(tissue, stencil);
+    turn_ahead(at, onward, hold);
     const Vec3 d = pose * piece.middle + reach * onward - at.x;
     const double ahead = d.dot(onward);
     if (hold.presses == 0 &&
@@ -193,27 +268,45 @@ void look_for_edges(Tissue& tissue, const FrameInput& input, double begin, Resis
     }
     return is_at_end(tissue, hold.place, at, pose.orientation * Vec3::UnitY(), onward);
   };
-  std::vector<std::size_t> seek;
+  std::vector<std::size_t> held, seek;
+  for (std::size_t i = 0; i < edges.pieces.size(); ++i) {
+    EdgeHold& hold = edges.holds[i];
+    if (hold.holds() && input.tools[edges.pieces[i].tool].present) {
+      held.push_back(i);
+    } else {
+      hold = {};
+    }
+  }
+  tissue.each(
+      static_cast<int>(held.size()),
+      [&](int k) {
+        const EdgePiece& piece = edges.pieces[held[k]];
+        EdgeHold& hold = edges.holds[held[k]];
+        if (still_holds(piece, edges.blade_of(piece, input, begin), hold)) return;
+        if (hold.place.reference() != hold.swept.reference()) {
+          hold.lets_go = 2;
+        } else {
+          hold = {};
+        }
+      },
+      kGrain);
   Box box;
   for (std::size_t i = 0; i < edges.pieces.size(); ++i) {
     const EdgePiece& piece = edges.pieces[i];
-    if (!input.tools[piece.tool].present) {
-      edges.holds[i] = {};
+    if (edges.holds[i].place.body >= 0 || !input.tools[piece.tool].present ||
+        !edges.seeks(piece, input, begin)) {
       continue;
     }
-    const Pose from = edges.blade_of(piece, input, begin);
-    if (still_holds(piece, from, edges.holds[i])) continue;
-    edges.holds[i] = {};
-    if (!edges.seeks(piece, input, begin)) continue;
     seek.push_back(i);
-    const Vec3 a = from * piece.middle, b = edges.blade_of(piece, input, 1) * piece.middle;
+    const Vec3 a = edges.blade_of(piece, input, begin) * piece.middle;
+    const Vec3 b = edges.blade_of(piece, input, 1) * piece.middle;
     for (const Vec3& x : {a, Vec3(a + kBeyond * (b - a))}) {
       box.min = box.min.cwiseMin(x - Vec3::Constant(cell));
       box.max = box.max.cwiseMax(x + Vec3::Constant(cell));
     }
   }
   if (seek.empty() || !tissue.look_near(box)) return;
-  tissue.each(static_cast<int>(seek.size()), [&](int k) {
+  const auto look = [&](int k) {
     const EdgePiece& piece = edges.pieces[seek[k]];
     EdgeHold& hold = edges.holds[seek[k]];
     const Pose from = edges.blade_of(piece, input, begin);
@@ -227,7 +320,7 @@ void look_for_edges(Tissue& tissue, const FrameInput& input, double begin, Resis
     const auto is_there = [&](double share) {
       EdgePlace there;
       if (!tissue.find(a + share * way, there)) return false;
-      const EdgeSupport at = tissue.support(there).at;
+      const EdgeSupport at = support_at(tissue, there);
       if (!(at.toughness > 0) ||
           !tissue.is_whole(there, there.reference(), at.F.transpose() * normal)) {
         return false;
@@ -248,73 +341,204 @@ void look_for_edges(Tissue& tissue, const FrameInput& input, double begin, Resis
       std::copy(ahead.data(), ahead.data() + 3, hold.ahead);
       return;
     }
-  });
+  };
+  tissue.each(static_cast<int>(seek.size()), look, kGrain);
 }
 
-/// Before a substep of dt seconds, of which the nodes feel `kick`, with the scene's `colliders`
-/// where they will be: pushes nodes, adds what acts on the blades to `loads`. Returns the work of
-/// cutting [J].
+/// What pushes tissue in the substeps of a part of a frame: pieces that hold on side by side do as
+/// one that is a quarter of a cell long, at the middle of their places. What is linear in the place
+/// is so the same, and a support has some three cells of nodes. Places move with it, and what they
+/// see is seen anew after some way.
 template <class Tissue>
-double push_by_edges(Tissue& tissue, const std::vector<Collider>& colliders, double dt, double kick,
-                     ResistingEdges& edges, std::vector<ColliderLoad>& loads) {
-  struct Pushed {
-    std::size_t collider;
+class PushingEdges final : public EdgePushes {
+ public:
+  PushingEdges(const Tissue& tissue, const std::vector<Collider>& colliders, ResistingEdges& edges)
+      : tissue_(tissue), colliders_(colliders), edges_(edges) {}
+
+  double push(double dt, double kick, std::vector<ColliderLoad>& loads) override {
+    if (!is_together_) gather();
+    // What all meet is as it was when the substep began.
+    tissue_.each(
+        static_cast<int>(all_.size()), [&](int i) { meet(dt, all_[i]); }, kGrain);
+    double work = 0;
+    for (Group& g : all_) {
+      const Vec3& force = g.push.force;
+      if (!force.isZero(0)) {
+        const Vec3 impulse = kick * force;
+        for (std::size_t k = 0; k < g.stencil.nodes.size(); ++k) {
+          tissue_.push(g.stencil.nodes[k], g.stencil.weights[k][0], impulse);
+        }
+        const float at[3] = {float(g.x[0]), float(g.x[1]), float(g.x[2])};
+        const float on[3] = {float(force[0]), float(force[1]), float(force[2])};
+        loads[g.collider].push(colliders_[g.collider], at, on, 0);
+        work += g.push.work;
+      }
+      if (g.push.begins || g.moved.squaredNorm() > kSeesAnew * kSeesAnew * cell_ * cell_) {
+        move_places(g);
+        if (is_together_) see(g);
+      }
+    }
+    return work;
+  }
+
+  void end() override {
+    for (Group& g : all_) move_places(g);
+    is_together_ = false;
+  }
+
+ private:
+  static constexpr std::size_t kPieces = 2;      // a quarter of a cell
+  static constexpr double kSeesAnew = 1.0 / 16;  // cells
+  static constexpr int kGrain = 16;
+
+  struct Group {
+    std::size_t first, last, collider;
+    EdgePiece piece;  ///< all of them as one
+    EdgeHold hold;
+    EdgeStencil stencil;
+    double reach;               ///< of the stencil ahead of the place [m]
+    Vec3 moved = Vec3::Zero();  ///< the places, since they were put down; in reference space [m]
+    EdgeStand stand;
+    EdgeSupport at;
     EdgePush push;
-    Vec3 x;
-    typename Tissue::Support support;
+    Vec3 x;  ///< where it pushes [m]
   };
-  std::vector<Pushed> all;
-  // What all pieces meet is as it was when the substep began.
-  for (std::size_t i = 0; i < edges.holds.size(); ++i) {
-    EdgeHold& hold = edges.holds[i];
-    if (!hold.holds()) continue;
-    const EdgePiece& piece = edges.pieces[i];
-    std::size_t c = 1;
-    while (colliders[c].tool != piece.tool) ++c;
-    c += piece.side;
-    EdgeStand stand = stand_of(piece, colliders[c]);
-    double reach = 0;
-    auto support = support_ahead(tissue, hold, stand.onward, reach);
-    stand.x += reach * stand.onward;
-    Pushed pushed{c, {}, stand.x, std::move(support)};
-    const EdgeSupport& at = pushed.support.at;
-    pushed.push = push_of(piece, stand, at, tissue.cell_size(), dt, hold);
-    if (!pushed.push.slid.isZero(0)) {
-      const Vec3 X = hold.place.reference() + in_reference(at, pushed.push.slid);
-      const float* r = colliders[c].rotation;  // of the blade's y
-      const Vec3 across(r[1], r[4], r[7]);
+
+  void gather() {
+    for (Group& g : all_) move_places(g);
+    all_.clear();
+    const std::vector<EdgeHold>& holds = edges_.holds;
+    for (std::size_t i = 0, last = 0; i < holds.size(); i = last) {
+      last = i + 1;
+      if (!holds[i].holds()) continue;
+      const EdgePiece& piece = edges_.pieces[i];
+      const auto goes_on = [&](std::size_t k) {
+        const EdgePiece& other = edges_.pieces[k];
+        return k % kPieces != 0 && other.tool == piece.tool && other.side == piece.side &&
+               other.onward == piece.onward && holds[k].holds() && holds[k].presses != 0 &&
+               holds[k].place.body == holds[i].place.body;
+      };
+      while (holds[i].presses != 0 && last < holds.size() && goes_on(last)) ++last;
+      all_.push_back(together(i, last));
+    }
+    is_together_ = true;
+  }
+  Group together(std::size_t first, std::size_t last) const {
+    Group g;
+    g.first = first;
+    g.last = last;
+    g.piece = edges_.pieces[first];
+    g.piece.middle = 0.5 * (g.piece.middle + edges_.pieces[last - 1].middle);
+    g.collider = 1;
+    while (colliders_[g.collider].tool != g.piece.tool) ++g.collider;
+    g.collider += g.piece.side;
+    const double count = static_cast<double>(last - first);
+    g.piece.length *= count;
+    g.hold = edges_.holds[(first + last) / 2];
+    Vec3 place = Vec3::Zero(), ahead = Vec3::Zero(), slides = Vec3::Zero();
+    g.hold.stiffness = 0;
+    for (std::size_t i = first; i < last; ++i) {
+      const EdgeHold& hold = edges_.holds[i];
+      place += hold.place.reference() / count;
+      ahead += Vec3(hold.ahead[0], hold.ahead[1], hold.ahead[2]);
+      slides += Vec3(hold.slides[0], hold.slides[1], hold.slides[2]);
+      g.hold.stiffness += hold.stiffness;
+    }
+    if (last > first + 1) {
+      const EdgePlace middle = g.hold.place;
+      if (!tissue_.put(place, g.hold.place)) g.hold.place = middle;
+      ahead.stableNormalize();
+      slides.stableNormalize();
+      std::copy(ahead.data(), ahead.data() + 3, g.hold.ahead);
+      std::copy(slides.data(), slides.data() + 3, g.hold.slides);
+    }
+    see(g);
+    return g;
+  }
+  void see(Group& g) const {
+    g.stencil.clear();
+    g.reach = see_ahead(tissue_, g.hold, g.stencil);
+  }
+  void meet(double dt, Group& g) const {
+    g.stand = stand_of(g.piece, colliders_[g.collider]);
+    g.at = support_of(tissue_, g.stencil, g.moved);
+    g.stand.x += g.reach * g.stand.onward;
+    g.x = g.stand.x;
+    g.push = push_of(g.piece, g.stand, g.at, cell_, dt, g.hold);
+    g.moved += g.push.slid;
+  }
+  /// The pieces' places to where they slid.
+  void move_places(Group& g) {
+    turn_ahead(g.at, g.stand.onward, g.hold);
+    const float* r = colliders_[g.collider].rotation;  // of the blade's y
+    const Vec3 across(r[1], r[4], r[7]);
+    for (std::size_t i = g.first; i < g.last; ++i) {
+      EdgeHold& hold = edges_.holds[i];
+      hold.presses = g.hold.presses;
+      hold.stiffness = g.hold.stiffness / static_cast<double>(g.last - g.first);
+      std::copy(g.hold.ahead, g.hold.ahead + 3, hold.ahead);
+      std::copy(g.hold.slides, g.hold.slides + 3, hold.slides);
+      if (g.moved.isZero(0)) continue;
       const EdgePlace before = hold.place;
-      if (!tissue.put(X, hold.place)) {
+      if (!tissue_.put(before.reference() + g.moved, hold.place)) {
         // What is left of the tissue there is cut, too: up to a cell beyond it.
-        const Vec3 from = before.reference(), way = X - from;
-        const double share = std::min(1.0, tissue.cell_size() / way.norm());
+        const Vec3 from = before.reference();
+        const double share = std::min(1.0, cell_ / g.moved.norm());
         hold.place = before;
-        for (int a = 0; a < 3; ++a) hold.place.at[a] = from[a] + share * way[a];
+        for (int a = 0; a < 3; ++a) hold.place.at[a] = from[a] + share * g.moved[a];
         hold.lets_go = 1;
-      } else if (!is_at_end(tissue, hold.place, at, across, stand.onward)) {
+      } else if (!is_at_end(tissue_, hold.place, g.at, across, g.stand.onward)) {
         hold.lets_go = 1;
       }
-      if (pushed.push.begins) hold.swept = hold.place;
+      if (g.push.begins) hold.swept = hold.place;
+      if (hold.lets_go != 0 || g.push.begins) is_together_ = false;
     }
-    if (!pushed.push.force.isZero(0)) all.push_back(std::move(pushed));
+    const EdgePlace before = g.hold.place;
+    if (!tissue_.put(before.reference() + g.moved, g.hold.place)) {
+      g.hold.place = before;
+      is_together_ = false;
+    }
+    g.moved.setZero();
   }
-  double work = 0;
-  for (const Pushed& p : all) {
-    tissue.push(p.support, kick * p.push.force);
-    const Vec3& force = p.push.force;
-    const float at[3] = {float(p.x[0]), float(p.x[1]), float(p.x[2])};
-    const float on[3] = {float(force[0]), float(force[1]), float(force[2])};
-    loads[p.collider].push(colliders[p.collider], at, on, 0);
-    work += p.push.work;
+
+  Tissue tissue_;
+  const std::vector<Collider>& colliders_;
+  ResistingEdges& edges_;
+  const double cell_ = tissue_.cell_size();
+  std::vector<Group> all_;
+  bool is_together_ = false;  ///< all_ are what holds
+};
+
+/// Where the cut of pieces that hold on side by side ends: the line through their places [m, in
+/// reference space], without its small corners and so far behind that no piece is behind it; at the
+/// places themselves of those that let go, beside which nothing comes later.
+inline std::vector<Vec3> end_of_cut(const EdgeHold* first, const EdgeHold* last, double corner) {
+  std::vector<Vec3> line;
+  for (const EdgeHold* h = first; h != last; ++h) {
+    line.push_back(h->place.reference() - corner * Vec3(h->ahead[0], h->ahead[1], h->ahead[2]));
   }
-  return work;
+  const std::vector<std::size_t> kept = corners_of({&line}, corner);
+  for (std::size_t k = 0; k + 1 < kept.size(); ++k) {
+    const std::size_t a = kept[k], b = kept[k + 1];
+    for (std::size_t i = a + 1; i < b; ++i) {
+      const double share = static_cast<double>(i - a) / static_cast<double>(b - a);
+      line[i] = (1 - share) * line[a] + share * line[b];
+    }
+  }
+  for (const EdgeHold* h = first; h != last; ++h) {
+    if (h->lets_go != 0) line[h - first] = h->place.reference();
+  }
+  return line;
 }
 
-/// What edges sweep where they hold on, of tissue as it is: from where their places were when they
-/// were swept last to where they are. After that they are swept.
+/// What edges sweep where they hold on, of tissue as it is: from where their cut ended when they
+/// were swept last to where it ends, once a place went on by a little or lets go. Nothing is cut
+/// that was not paid for, and the next path begins where this one ends.
 template <class Tissue>
 std::vector<BladePath> held_paths(const Tissue& tissue, const FrameInput& input, double end,
                                   ResistingEdges& edges) {
+  constexpr double kCorner = 0.03, kLeast = 0.05, kStraight = 0.002;  // cells
+  const double cell = tissue.cell_size();
   std::vector<BladePath> paths;
   for (std::size_t first = 0, last = 0; first < edges.holds.size(); first = last) {
     last = first + 1;
@@ -325,19 +549,35 @@ std::vector<BladePath> held_paths(const Tissue& tissue, const FrameInput& input,
              edges.holds[i].place.body >= 0;
     };
     while (last < edges.holds.size() && goes_on(last)) ++last;
-    BladePath path{{}, {Pose(), Pose()}, {}};
-    bool slid = false;
-    for (std::size_t i = first; i < last; ++i) {
-      EdgeHold& hold = edges.holds[i];
-      path.edge.push_back(tissue.support(hold.swept).at.x);
-      path.edge_at_end.push_back(tissue.support(hold.place).at.x);
-      slid = slid || hold.swept.reference() != hold.place.reference();
-      hold.swept = hold.place;
-    }
-    if (!slid) continue;
-    // Up to where the next pieces would be: those hold nothing, or meet these at the tip.
+    EdgeHold* const holds = &edges.holds[0];
+    const auto slid = [&](const EdgeHold& h) {
+      const double way = (h.place.reference() - h.swept.reference()).norm();
+      return way > (2 * kCorner + kLeast) * cell || (h.lets_go != 0 && way > 0);
+    };
+    if (std::none_of(holds + first, holds + last, slid)) continue;
     const EdgePiece& piece = edges.pieces[first];
-    const Vec3 by = edges.blade_of(piece, input, end).orientation * piece.along * piece.length;
+    const Quat blade = edges.blade_of(piece, input, end).orientation;
+    const std::vector<Vec3> line = end_of_cut(holds + first, holds + last, kCorner * cell);
+    std::vector<Vec3> before, after;
+    for (std::size_t i = first; i < last; ++i) {
+      EdgeHold& hold = holds[i];
+      before.push_back(support_at(tissue, hold.swept).x -
+                       2 * kStraight * cell * (blade * piece.onward));
+      hold.swept = hold.place;
+      if (!tissue.put(line[i - first],
+                      hold.swept)) {  // beyond the tissue: as its last point sees it
+        hold.swept = hold.place;
+        std::copy(line[i - first].data(), line[i - first].data() + 3, hold.swept.at);
+      }
+      after.push_back(support_at(tissue, hold.swept).x);
+    }
+    BladePath path{{}, {Pose(), Pose()}, {}};
+    for (const std::size_t i : corners_of({&before, &after}, kStraight * cell)) {
+      path.edge.push_back(before[i]);
+      path.edge_at_end.push_back(after[i]);
+    }
+    // Up to where the next pieces would be: those hold nothing, or meet these at the tip.
+    const Vec3 by = blade * piece.along * piece.length;
     for (std::vector<Vec3>* edge : {&path.edge, &path.edge_at_end}) {
       edge->insert(edge->begin(), edge->front() - by);
       edge->push_back(edge->back() + by);

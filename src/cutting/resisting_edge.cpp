@@ -1,7 +1,9 @@
 #include "cutting/resisting_edge.h"
 
 #include <algorithm>
+#include <utility>
 
+#include "cutting/edge_corners.h"
 #include "tools/tool_motion.h"
 
 namespace tissue_sim {
@@ -71,6 +73,34 @@ ResistingEdges resisting_edges(const Scene& scene) {
   return edges;
 }
 
+std::vector<std::size_t> corners_of(std::initializer_list<const std::vector<Vec3>*> lines,
+                                    double by) {
+  std::vector<std::size_t> kept(1, 0);
+  // A stretch [a, b] is straight or is taken apart at what is farthest off.
+  std::vector<std::pair<std::size_t, std::size_t>> left(1, {0, (*lines.begin())->size() - 1});
+  while (!left.empty()) {
+    const auto [a, b] = left.back();
+    left.pop_back();
+    double most = by * by;
+    std::size_t at = b;
+    for (std::size_t i = a + 1; i < b; ++i) {
+      for (const std::vector<Vec3>* line : lines) {
+        const Vec3 way = (*line)[b] - (*line)[a], off = (*line)[i] - (*line)[a];
+        const double along = way.squaredNorm() > 0 ? way.dot(off) / way.squaredNorm() : 0;
+        const double far = (off - std::clamp(along, 0.0, 1.0) * way).squaredNorm();
+        if (far > most) most = far, at = i;
+      }
+    }
+    if (at < b) {
+      left.push_back({at, b});
+      left.push_back({a, at});
+    } else if (b > kept.back()) {
+      kept.push_back(b);
+    }
+  }
+  return kept;
+}
+
 std::vector<BladePath> free_paths(const Scene& scene, const ResistingEdges& edges,
                                   const FrameInput& input, double begin, double end) {
   if (!edges.any_holds()) return blade_paths(scene, input, begin, end);
@@ -84,13 +114,22 @@ std::vector<BladePath> free_paths(const Scene& scene, const ResistingEdges& edge
     if (!input.tools[first.tool].present) continue;
     BladePath part{
         {}, {edges.blade_of(first, input, begin), edges.blade_of(first, input, end)}, {}};
+    std::size_t begun = i;  // the piece with which a straight stretch began
     for (; i < last; ++i) {
       const EdgePiece& piece = edges.pieces[i];
       const Vec3 half = 0.5 * piece.length * piece.along;
       const bool is_free = edges.seeks(piece, input, begin) &&
-                           (edges.holds[i].place.body < 0 || edges.is_past(piece, input, end));
+                           (edges.holds[i].place.body < 0 || edges.holds[i].lets_go == 2 ||
+                            edges.is_past(piece, input, end));
       if (is_free) {
-        if (part.edge.empty()) part.edge.push_back(piece.middle - half);
+        if (part.edge.empty()) {
+          part.edge.push_back(piece.middle - half);
+          begun = i;
+        } else if (piece.onward == edges.pieces[begun].onward) {
+          part.edge.pop_back();
+        } else {
+          begun = i;
+        }
         part.edge.push_back(piece.middle + half);
       }
       if (part.edge.empty() || (is_free && i + 1 < last)) continue;

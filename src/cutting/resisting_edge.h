@@ -39,7 +39,7 @@ struct EdgeHold {
   double slides[3] = {};     ///< the way its place slid of late, in the world, unit
   double stiffness = 0;      ///< of its spring, once it presses [N/m]
   std::int32_t presses = 0;  ///< whether the edge is there, else it comes or went back
-  std::int32_t lets_go = 0;  ///< once what is left is swept
+  std::int32_t lets_go = 0;  ///< once what is left is swept; 2: since before this part of the frame
 
   bool holds() const { return place.body >= 0 && lets_go == 0; }
 };

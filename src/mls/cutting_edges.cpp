@@ -5,7 +5,6 @@
 #include <cmath>
 
 #include "cutting/edge_forces.h"
-#include "frame/leapfrog.h"
 
 namespace tissue_sim {
 namespace {
@@ -18,24 +17,23 @@ class NodeEdges {
   /// `looks`: is_whole() looks at pairs, which holds for a frame.
   NodeEdges(MlsState& state, bool looks) : s_(state), looks_(looks) {}
 
-  struct Support {
-    EdgeSupport at;
-    std::vector<std::pair<std::int32_t, double>> weights;  ///< of nodes
-  };
-
   double cell_size() const { return mls_spacing(s_.scene); }
   template <class F>
-  void each(int count, const F& f) {
-    s_.cpu->for_each(count, f);
+  void each(int count, const F& f, int grain) const {
+    s_.cpu->for_each(count, f, grain);
   }
 
-  Support support(const EdgePlace& place) const {
+  void see(const EdgePlace& place, EdgeStencil& stencil) const {
     const std::int32_t i = place.site[0];
     const Vec3 X = place.reference();
-    const double reach2 = s_.pairs.support[i] * s_.pairs.support[i];
+    stencil.place = X;
+    const Material& material = s_.nodes.material_of(i);
+    stencil.toughness = material.toughness;
+    stencil.young_modulus = material.young_modulus;
+    const double reach2 = s_.pairs.support[i] * s_.pairs.support[i], edge = s_.edge[i];
     struct Near {
       std::int32_t node;
-      Eigen::Vector4d basis, weighed;
+      Eigen::Vector4d weighed;
     };
     std::vector<Near> near;
     Eigen::Matrix4d moment = Eigen::Matrix4d::Zero();
@@ -43,42 +41,40 @@ class NodeEdges {
       const Vec3 r = s_.nodes.place[j] - X;
       const double left = 1 - r.squaredNorm() / reach2;
       if (!(left > 0)) return;
-      const Eigen::Vector4d basis(1, r[0] / s_.edge[i], r[1] / s_.edge[i], r[2] / s_.edge[i]);
-      near.push_back({j, basis, left * left * left * basis});
+      const Eigen::Vector4d basis(1, r[0] / edge, r[1] / edge, r[2] / edge);
+      near.push_back({j, left * left * left * basis});
       moment += near.back().weighed * basis.transpose();
     };
     add(i);
     for (std::int32_t e = s_.pairs.begin[i]; e < s_.pairs.begin[i + 1]; ++e) {
       if (s_.pairs.crossed[e] == 0) add(s_.pairs.other[e]);
     }
-    Support support;
-    EdgeSupport& at = support.at;
-    at = {X, Vec3::Zero(), Eigen::Matrix3d::Identity(), 0, 0, 0};
-    const Material& material = s_.nodes.material_of(i);
-    at.toughness = material.toughness;
-    at.young_modulus = material.young_modulus;
     const Eigen::LDLT<Eigen::Matrix4d> solver(moment);
     constexpr double kFlat = 1e-4;
     const bool spans =
         near.size() > 3 && solver.vectorD().minCoeff() > kFlat * solver.vectorD().maxCoeff();
-    if (!spans) near.assign(1, {i, Eigen::Vector4d::UnitX(), Eigen::Vector4d::UnitX()});
-    for (const Near& n : near) {
-      const Eigen::Vector4d c = spans ? Eigen::Vector4d(solver.solve(n.weighed)) : n.weighed;
-      const Vec3 u = s_.position(n.node) - s_.nodes.place[n.node];
-      at.x += c[0] * u;
-      at.v += c[0] * s_.velocity(n.node);
-      at.F += u * c.tail<3>().transpose() / s_.edge[i];
-      at.mobility += c[0] * c[0] * s_.inv_mass[n.node];
-      support.weights.emplace_back(n.node, c[0]);
+    if (!spans) {
+      stencil.add(i, EdgeStencil::Weights{1, 0, 0, 0}, s_.inv_mass[i]);
+      return;
     }
-    return support;
+    Eigen::Matrix4d inverse = solver.solve(Eigen::Matrix4d::Identity());
+    inverse.bottomRows<3>() /= edge;
+    for (const Near& n : near) {
+      const Eigen::Vector4f c = (inverse * n.weighed).cast<float>();
+      stencil.add(n.node, EdgeStencil::Weights{c[0], c[1], c[2], c[3]}, s_.inv_mass[n.node]);
+    }
   }
 
-  void push(const Support& support, const Vec3& impulse) {
-    for (const auto& [node, weight] : support.weights) {
-      for (int a = 0; a < 3; ++a) {
-        s_.v[4 * node + a] += static_cast<float>(weight * s_.inv_mass[node] * impulse[a]);
-      }
+  void motion(std::int32_t node, float (&u)[3], float (&v)[3]) const {
+    for (int a = 0; a < 3; ++a) {
+      u[a] = s_.u[4 * node + a];
+      v[a] = s_.v[4 * node + a];
+    }
+  }
+
+  void push(std::int32_t node, float weight, const Vec3& impulse) const {
+    for (int a = 0; a < 3; ++a) {
+      s_.v[4 * node + a] += static_cast<float>(weight * s_.inv_mass[node] * impulse[a]);
     }
   }
 
@@ -138,6 +134,7 @@ class NodeEdges {
       const Vec3 x = s_.position(i);
       if ((x.array() < box.min.array()).any() || (x.array() > box.max.array()).any()) continue;
       near_.push_back(i);
+      add(x, near_box_);
     }
     return !near_.empty();
   }
@@ -145,6 +142,7 @@ class NodeEdges {
   /// From the nearest node on, by Newton's method.
   bool find(const Vec3& x, EdgePlace& place) const {
     double least = cell_size() * cell_size();
+    if (distance2(near_box_, x) > least) return false;
     for (const std::int32_t i : near_) {
       const double d = (s_.position(i) - x).squaredNorm();
       if (d < least) least = d, place.site[0] = i, place.body = s_.nodes.body[i];
@@ -153,7 +151,7 @@ class NodeEdges {
     Vec3 X = s_.nodes.place[place.site[0]];
     for (int k = 0; k < 4; ++k) {
       std::copy(X.data(), X.data() + 3, place.at);
-      const EdgeSupport at = support(place).at;
+      const EdgeSupport at = support_at(*this, place);
       if (!(std::fabs(at.F.determinant()) > 1e-3)) return false;
       X += at.F.inverse() * (x - at.x);
     }
@@ -164,6 +162,7 @@ class NodeEdges {
   MlsState& s_;
   bool looks_;
   std::vector<std::int32_t> near_;
+  Box near_box_;  // of these
 };
 
 }  // namespace
@@ -174,10 +173,9 @@ void look_for_edges(MlsState& s, const FrameInput& input, double begin) {
   look_for_edges(tissue, input, begin, s.edges);
 }
 
-double push_by_edges(MlsState& s, float dt, std::vector<ColliderLoad>& loads) {
-  if (s.edges.pieces.empty()) return 0;
-  NodeEdges tissue(s, false);
-  return push_by_edges(tissue, s.colliders, dt, kick_of(s.dt, dt), s.edges, loads);
+std::unique_ptr<EdgePushes> edge_pushes(MlsState& s) {
+  if (!s.edges.any_holds()) return nullptr;
+  return std::make_unique<PushingEdges<NodeEdges>>(NodeEdges(s, false), s.colliders, s.edges);
 }
 
 std::vector<BladePath> held_paths(MlsState& s, const FrameInput& input, double end) {

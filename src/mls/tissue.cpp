@@ -9,6 +9,7 @@
 #include "fragments/piece_colour.h"
 #include "fragments/piece_sums.h"
 #include "frame/checksum.h"
+#include "frame/leapfrog.h"
 #include "frame/out_of_control.h"
 #include "frame/point_fields.h"
 #include "frame/put_faces.h"
@@ -164,6 +165,7 @@ void MlsTissue::save_checkpoint() {
 int MlsTissue::run_part(const FramePart& part) {
   MlsState& s = *state_;
   const Frame& frame = *frame_;
+  const std::unique_ptr<EdgePushes> edges = edge_pushes(s);
   for (int i = 0; i < part.substeps.count; ++i) {
     stop_if_asked();
     const double share = part.substeps.share(i + 1, part.from, part.to);
@@ -175,11 +177,13 @@ int MlsTissue::run_part(const FramePart& part) {
       for (const Collider& c : s.colliders) fastest = std::max(fastest, speed(c));
       update_node_contacts(s, pieces_.of_point, part.substeps.at(i), fastest);
     }
-    result_.cutting_work += push_by_edges(s, part.substeps.at(i), loads);
-    const float acted = substep(s, part.substeps.at(i), loads);
+    const float dt = part.substeps.at(i);
+    if (edges) result_.cutting_work += edges->push(dt, kick_of(s.dt, dt), loads);
+    const float acted = substep(s, dt, loads);
     frame.colliders.add_loads(share, s.colliders.data(), loads.data(), acted / frame.duration,
                               result_.loads);
   }
+  if (edges) edges->end();
   return part.substeps.count;
 }
 

@@ -6,6 +6,7 @@
 #include <utility>
 #include <vector>
 
+#include "cutting/edge_corners.h"
 #include "support/measured.h"
 #include "tissue/each_method.h"
 
@@ -266,6 +267,67 @@ TEST_P(CuttingForce, GoesOnFromASavedState) {
   rest.restore(whole);
   for (int i = 0; i < 4; ++i) EXPECT_EQ(rest.go(down), whole.go(down));
   EXPECT_EQ(rest.simulation().tissue().checksum(), whole.simulation().tissue().checksum());
+}
+
+// What pieces of an edge do is worked out on threads.
+TEST_P(CuttingForce, IsTheSameOnAnyNumberOfThreads) {
+  Slab slab;
+  slab.cell = 0.002;
+  Scene scene = on_this(scene_of(slab));
+  Stroke one(scene, 0.005);
+  scene.threads = 3;
+  Stroke three(scene, 0.005);
+  const Vec3 way(-0.0003, 0, -0.0005);
+  for (int i = 0; i < 16; ++i) EXPECT_EQ(one.go(way), three.go(way));
+  ASSERT_GT(one.cutting_work, 0);
+  EXPECT_EQ(one.simulation().tissue().checksum(), three.simulation().tissue().checksum());
+}
+
+// In frames for hands, in which an edge goes on by less than a hundredth of a cell, the cut follows
+// all the same: what was paid for is parted, and nothing beside it.
+TEST_P(CuttingForce, IsTheSameInShortFrames) {
+  Slab slab;
+  slab.cell = 0.002;
+  slab.height = 0.012;
+  Scene scene = on_this(scene_of(slab));
+  double parted[2] = {}, work[2] = {};
+  for (const int k : {0, 1}) {
+    scene.frame_rate = k == 0 ? 100 : 2000;
+    const double step = 0.03 / scene.frame_rate;
+    Stroke stroke(scene, 0.005);
+    while (stroke.height() > 0.35 * slab.height) {
+      stroke.go(Vec3(0, 0, -step));
+      parted[k] += stroke.last().blade_report.bonds_broken;
+    }
+    work[k] = stroke.cutting_work;
+  }
+  ASSERT_GT(parted[0], 0);
+  EXPECT_TRUE(is_within("frames of 0.5 ms for 10: work of cutting", work[1] / work[0] - 1, 0.05));
+  EXPECT_TRUE(is_within("frames of 0.5 ms for 10: what is parted", parted[1] / parted[0] - 1, 0.1));
+}
+
+TEST(EdgeCorners, StayWhereTheLineIsNotStraight) {
+  std::vector<Vec3> begin, end;
+  for (int i = 0; i <= 20; ++i) {
+    begin.emplace_back(0.1 * i, i == 15 ? 0.02 : 0.0, 0.0);
+    end.emplace_back(0.1 * i, 0.0, i == 7 ? 0.03 : i == 12 ? 0.004 : 0);
+  }
+  const std::vector<std::size_t> kept = corners_of({&begin, &end}, 0.01);
+  EXPECT_EQ(kept.front(), 0u);
+  EXPECT_EQ(kept.back(), 20u);
+  for (const std::size_t corner : {7, 15}) {
+    EXPECT_EQ(std::count(kept.begin(), kept.end(), corner), 1) << corner;
+  }
+  EXPECT_LT(kept.size(), 10u);
+  for (std::size_t k = 0; k + 1 < kept.size(); ++k) {  // none is farther off
+    for (std::size_t i = kept[k]; i < kept[k + 1]; ++i) {
+      const double share = double(i - kept[k]) / double(kept[k + 1] - kept[k]);
+      for (const std::vector<Vec3>* of : {&begin, &end}) {
+        const Vec3 on = (1 - share) * (*of)[kept[k]] + share * (*of)[kept[k + 1]];
+        EXPECT_LE((on - (*of)[i]).norm(), 0.01);
+      }
+    }
+  }
 }
 
 }  // namespace

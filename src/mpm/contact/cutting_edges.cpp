@@ -1,10 +1,9 @@
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 #include "cutting/edge_forces.h"
-#include "frame/leapfrog.h"
 #include "mpm/contact/touching_tissue.h"
+#include "mpm/cpu/cpu_device.h"
 #include "mpm/lattice/bonds.h"
 #include "mpm/surface/facet_motion.h"
 
@@ -20,63 +19,50 @@ class LatticeEdges {
  public:
   explicit LatticeEdges(TouchingTissue& state) : s_(state) {}
 
-  /// The nodes that the point sees.
-  struct Support {
-    EdgeSupport at;
-    std::int32_t node[27];
-    float weight[27];
-  };
-
   double cell_size() const { return s_.scene.cell_size; }
   template <class F>
-  void each(int count, const F& f) {
-    s_.cpu->for_each(count, f);
+  void each(int count, const F& f, int grain) const {
+    s_.cpu->for_each(count, f, grain);
   }
 
-  Support support(const EdgePlace& place) const {
+  /// The nodes that the point sees.
+  void see(const EdgePlace& place, EdgeStencil& stencil) const {
     const LatticeBody& body = s_.bodies[place.body];
     const Points::Site site{
         static_cast<std::int16_t>(place.site[0]), static_cast<std::int16_t>(place.site[1]),
         static_cast<std::int16_t>(place.site[2]), static_cast<std::int16_t>(place.body)};
-    Support support;
-    for (int k = 0; k < 27; ++k) support.node[k] = s_.fields->node(body, site, k);
     const Vec3 middle = body.node_position(site.x >> 1, site.y >> 1, site.z >> 1);
-    float in_cell[3], u[3], v[3], F[9];
+    float in_cell[3], slope[9];
     for (int a = 0; a < 3; ++a) {
       in_cell[a] = static_cast<float>((place.at[a] - middle[a]) / body.cell_size);
     }
     const AxisWeights weights(in_cell);
-    CellNodes around;
-    around.lowest = support.node;
-    around.pitch = 3;
-    around.plane = 9;
-    value_at(CellField{s_.nodes.u, around}, weights, u);
-    value_at(CellField{s_.nodes.v, around}, weights, v);
-    deformation_gradient(CellField{s_.nodes.u, around}, body.cell_size, in_cell, F);
-    EdgeSupport& at = support.at;
-    at.mobility = 0;
+    slopes_at(in_cell, slope);
+    for (float& s : slope) s /= static_cast<float>(body.cell_size);
     for (int k = 0; k < 27; ++k) {
-      float& w = support.weight[k];
-      w = weights.of[k % 3] * weights.of[3 + k / 3 % 3] * weights.of[6 + k / 9];
-      at.mobility += w * w * s_.nodes.inv_mass[support.node[k]];
+      const int node = s_.fields->node(body, site, k), x = k % 3, y = 3 + k / 3 % 3, z = 6 + k / 9;
+      const float *w = weights.of, *s = slope;
+      stencil.add(node,
+                  EdgeStencil::Weights{w[x] * w[y] * w[z], s[x] * w[y] * w[z], w[x] * s[y] * w[z],
+                                       w[x] * w[y] * s[z]},
+                  s_.nodes.inv_mass[node]);
     }
-    for (int a = 0; a < 3; ++a) {
-      at.x[a] = place.at[a] + u[a];
-      at.v[a] = v[a];
-      for (int b = 0; b < 3; ++b) at.F(a, b) = F[3 * a + b];
-    }
+    stencil.place = place.reference();
     const Material& material = body.material_of(s_.points, body.point(site.x, site.y, site.z));
-    at.toughness = material.toughness;
-    at.young_modulus = material.young_modulus;
-    return support;
+    stencil.toughness = material.toughness;
+    stencil.young_modulus = material.young_modulus;
   }
 
-  void push(const Support& support, const Vec3& impulse) {
-    for (int k = 0; k < 27; ++k) {
-      const std::int32_t node = support.node[k];
-      const float share = support.weight[k] * s_.nodes.inv_mass[node];
-      for (int a = 0; a < 3; ++a) s_.nodes.v[a][node] += share * static_cast<float>(impulse[a]);
+  void motion(std::int32_t node, float (&u)[3], float (&v)[3]) const {
+    for (int a = 0; a < 3; ++a) {
+      u[a] = s_.nodes.u[a][node];
+      v[a] = s_.nodes.v[a][node];
     }
+  }
+
+  void push(std::int32_t node, float weight, const Vec3& impulse) const {
+    const float share = weight * s_.nodes.inv_mass[node];
+    for (int a = 0; a < 3; ++a) s_.nodes.v[a][node] += share * static_cast<float>(impulse[a]);
   }
 
   /// It stays with the same point a little beyond its half cell: between the two faces of a cut it
@@ -145,7 +131,9 @@ class LatticeEdges {
       const int count = s_.kernels->lanes_in_box(x, lanes, low, high, scratch.lanes.data());
       for (int k = 0; k < count; ++k) {
         const std::int32_t lane = scratch.lanes[k], p = block.point[lane];
-        if (p >= 0) near_.push_back({Vec3(x[lane], x[lanes + lane], x[2 * lanes + lane]), p});
+        if (p < 0) continue;
+        near_.push_back({Vec3(x[lane], x[lanes + lane], x[2 * lanes + lane]), p});
+        add(near_.back().x, near_box_);
       }
     }
     return !near_.empty();
@@ -155,6 +143,7 @@ class LatticeEdges {
   bool find(const Vec3& x, EdgePlace& place) const {
     const Near* nearest = nullptr;
     double least = cell_size() * cell_size();
+    if (distance2(near_box_, x) > least) return false;
     for (const Near& n : near_) {
       const double d = (n.x - x).squaredNorm();
       if (d < least) least = d, nearest = &n;
@@ -167,7 +156,7 @@ class LatticeEdges {
     Vec3 X = body.site_position(site.x, site.y, site.z);
     for (int i = 0; i < 4; ++i) {
       std::copy(X.data(), X.data() + 3, place.at);
-      const EdgeSupport at = support(place).at;
+      const EdgeSupport at = support_at(*this, place);
       if (!(std::fabs(at.F.determinant()) > 1e-3)) return false;
       X += at.F.inverse() * (x - at.x);
     }
@@ -182,6 +171,7 @@ class LatticeEdges {
   };
   TouchingTissue& s_;
   std::vector<Near> near_;
+  Box near_box_;  // of these
 };
 
 }  // namespace
@@ -192,10 +182,9 @@ void look_for_edges(TouchingTissue& s, const FrameInput& input, double begin) {
   look_for_edges(tissue, input, begin, s.edges);
 }
 
-double push_by_edges(TouchingTissue& s, float dt, std::vector<ColliderLoad>& loads) {
-  if (s.edges.pieces.empty()) return 0;
-  LatticeEdges tissue(s);
-  return push_by_edges(tissue, s.colliders, dt, kick_of(s.dt, dt), s.edges, loads);
+std::unique_ptr<EdgePushes> edge_pushes(TouchingTissue& s) {
+  if (!s.edges.any_holds()) return nullptr;
+  return std::make_unique<PushingEdges<LatticeEdges>>(LatticeEdges(s), s.colliders, s.edges);
 }
 
 std::vector<BladePath> held_paths(TouchingTissue& s, const FrameInput& input, double end) {

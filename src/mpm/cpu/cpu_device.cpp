@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "fragments/piece_colour.h"
+#include "frame/leapfrog.h"
 #include "frame/select_points.h"
 #include "math/lanczos.h"
 #include "mpm/contact/block_contact.h"
@@ -128,6 +129,7 @@ int CpuMpmDevice::run_part(const FramePart& part) {
   const int checks = can_tear(s) ? tear_checks(s, substeps.count, substeps.longest()) : 0;
   run_.work = 0;
   frame.tearing.clear();
+  const std::unique_ptr<EdgePushes> edges = edge_pushes(s);
   int done = 0;
   for (int check = 0; done < substeps.count && frame.tearing.empty(); ++done) {
     stop_if_asked();
@@ -136,7 +138,7 @@ int CpuMpmDevice::run_part(const FramePart& part) {
     frame.colliders.at(share, s.colliders);
     std::vector<ColliderLoad> loads(s.colliders.size());
     find_face_contacts(s, run_.pieces, dt);
-    run_.result.cutting_work += push_by_edges(s, dt, loads);
+    if (edges) run_.result.cutting_work += edges->push(dt, kick_of(s.dt, dt), loads);
     const float acted = substep(s, dt, loads, anchors_at(s.anchors, frame.input, share));
     s.time += dt;
     frame.colliders.add_loads(share, s.colliders.data(), loads.data(), acted / frame.duration,
@@ -146,6 +148,7 @@ int CpuMpmDevice::run_part(const FramePart& part) {
     ++check;
     frame.tearing = tearing_of(s, find_stretched(s, 1));
   }
+  if (edges) edges->end();
   return done;
 }
 

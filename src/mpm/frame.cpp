@@ -5,7 +5,6 @@
 
 #include "mpm/contact/face_contact.h"
 #include "mpm/contact/touching_tissue.h"
-#include "mpm/cpu/cpu_device.h"
 #include "mpm/cut_tissue.h"
 #include "mpm/mpm_tissue.h"
 #include "mpm/tear/debris.h"

@@ -3,7 +3,6 @@
 
 #include "cutting/edge_forces.h"
 #include "mpm/contact/touching_tissue.h"
-#include "mpm/cpu/cpu_device.h"
 #include "mpm/lattice/bonds.h"
 #include "mpm/surface/facet_motion.h"
 

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <vector>
 
 #include "cutting/resisting_edge.h"
@@ -17,5 +18,13 @@ struct TouchingTissue : BlockTissue {
   FaceContacts faces;                        ///< of tissue with tissue
   std::vector<std::int32_t> inertial_index;  ///< per node, in ContactInertia; -1 for none
 };
+
+// Edges of blades in tissue that resists them (cutting/resisting_edge.h), on the lattice of the
+// CPU: as in cutting/edge_forces.h.
+class EdgePushes;
+void look_for_edges(TouchingTissue& state, const FrameInput& input, double begin);
+std::vector<BladePath> held_paths(TouchingTissue& state, const FrameInput& input, double end);
+/// For a part of a frame; null where no edge holds tissue.
+std::unique_ptr<EdgePushes> edge_pushes(TouchingTissue& state);
 
 }  // namespace tissue_sim

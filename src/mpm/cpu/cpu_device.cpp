@@ -6,6 +6,7 @@
 #include <limits>
 #include <utility>
 
+#include "cutting/edge_pushes.h"
 #include "fragments/piece_colour.h"
 #include "frame/leapfrog.h"
 #include "frame/select_points.h"

@@ -1,21 +1,9 @@
 // Tissue of the material point method on the CPU.
 #pragma once
 
-#include <memory>
-#include <vector>
-
-#include "cutting/edge_pushes.h"
 #include "mpm/device.h"
-#include "tissue_sim/cut.h"
 
 namespace tissue_sim {
-
-// Edges of blades in tissue that resists them (cutting/resisting_edge.h), on the lattice of the
-// CPU: as in cutting/edge_forces.h.
-void look_for_edges(TouchingTissue& state, const FrameInput& input, double begin);
-std::vector<BladePath> held_paths(TouchingTissue& state, const FrameInput& input, double end);
-/// For a part of a frame; null where no edge holds tissue.
-std::unique_ptr<EdgePushes> edge_pushes(TouchingTissue& state);
 
 class CpuMpmDevice final : public MpmDevice {
  public:

@@ -28,18 +28,18 @@ namespace tissue_sim {
 
 /// How a method's material stands at a place.
 struct EdgeSupport {
-  Vec3 x, v;             ///< [m], [m/s]
-  Eigen::Matrix3d F;     ///< deformation gradient
-  double mobility;       ///< sum of w^2 / m over its nodes [1/kg]
-  double toughness;      ///< [J/m^2]
-  double young_modulus;  ///< [Pa]
+  Vec3 x = Vec3::Zero(), v = Vec3::Zero();          ///< [m], [m/s]
+  Eigen::Matrix3d F = Eigen::Matrix3d::Identity();  ///< deformation gradient
+  double mobility = 0;                              ///< sum of w^2 / m over its nodes [1/kg]
+  double toughness = 0;                             ///< [J/m^2]
+  double young_modulus = 0;                         ///< [Pa]
 };
 
 /// The nodes that say how it stands there, and what of that stays as long as no cut goes on.
 struct EdgeStencil {
   using Weights = Vec<4>;  ///< of a value; of its slopes in reference space [1/m]
 
-  Vec3 place;  ///< in reference space [m]
+  Vec3 place = Vec3::Zero();  ///< in reference space [m]
   double mobility = 0, toughness = 0, young_modulus = 0;
   std::vector<std::int32_t> nodes;
   std::vector<Weights> weights;
@@ -114,8 +114,8 @@ inline double most_borne(const EdgePiece& piece, const Vec3& along, const EdgeSu
 
 /// In what direction and how far the edge is ahead, and its frame, in the world.
 struct EdgeStand {
-  Vec3 x, v;  ///< of the middle [m], [m/s]
-  Vec3 along, onward;
+  Vec3 x = Vec3::Zero(), v = Vec3::Zero();  ///< of the middle [m], [m/s]
+  Vec3 along = Vec3::Zero(), onward = Vec3::Zero();
 };
 inline EdgeStand stand_of(const EdgePiece& piece, const Collider& c) {
   const auto turned = [&c](const Vec3& a) {
@@ -345,10 +345,8 @@ void look_for_edges(Tissue& tissue, const FrameInput& input, double begin, Resis
   tissue.each(static_cast<int>(seek.size()), look, kGrain);
 }
 
-/// What pushes tissue in the substeps of a part of a frame: pieces that hold on side by side do as
-/// one that is a quarter of a cell long, at the middle of their places. What is linear in the place
-/// is so the same, and a support has some three cells of nodes. Places move with it, and what they
-/// see is seen anew after some way.
+/// What pushes tissue in the substeps of a part of a frame. Places move with what slides, and what
+/// they see is seen anew after some way.
 template <class Tissue>
 class PushingEdges final : public EdgePushes {
  public:
@@ -356,157 +354,108 @@ class PushingEdges final : public EdgePushes {
       : tissue_(tissue), colliders_(colliders), edges_(edges) {}
 
   double push(double dt, double kick, std::vector<ColliderLoad>& loads) override {
-    if (!is_together_) gather();
+    if (all_.empty()) gather();
     // What all meet is as it was when the substep began.
     tissue_.each(
         static_cast<int>(all_.size()), [&](int i) { meet(dt, all_[i]); }, kGrain);
     double work = 0;
-    for (Group& g : all_) {
-      const Vec3& force = g.push.force;
+    for (Pushing& p : all_) {
+      const Vec3& force = p.push.force;
+      if (!p.hold.holds()) continue;
       if (!force.isZero(0)) {
         const Vec3 impulse = kick * force;
-        for (std::size_t k = 0; k < g.stencil.nodes.size(); ++k) {
-          tissue_.push(g.stencil.nodes[k], g.stencil.weights[k][0], impulse);
+        for (std::size_t k = 0; k < p.stencil.nodes.size(); ++k) {
+          tissue_.push(p.stencil.nodes[k], p.stencil.weights[k][0], impulse);
         }
-        const float at[3] = {float(g.x[0]), float(g.x[1]), float(g.x[2])};
+        const float at[3] = {float(p.x[0]), float(p.x[1]), float(p.x[2])};
         const float on[3] = {float(force[0]), float(force[1]), float(force[2])};
-        loads[g.collider].push(colliders_[g.collider], at, on, 0);
-        work += g.push.work;
+        loads[p.collider].push(colliders_[p.collider], at, on, 0);
+        work += p.push.work;
       }
-      if (g.push.begins || g.moved.squaredNorm() > kSeesAnew * kSeesAnew * cell_ * cell_) {
-        move_places(g);
-        if (is_together_) see(g);
+      if (p.push.begins || p.moved.squaredNorm() > kSeesAnew * kSeesAnew * cell_ * cell_) {
+        move_place(p);
+        if (p.hold.holds()) see(p);
       }
     }
     return work;
   }
 
   void end() override {
-    for (Group& g : all_) move_places(g);
-    is_together_ = false;
+    for (Pushing& p : all_) {
+      if (p.hold.holds()) move_place(p);
+    }
+    all_.clear();
   }
 
  private:
-  static constexpr std::size_t kPieces = 2;      // a quarter of a cell
   static constexpr double kSeesAnew = 1.0 / 16;  // cells
   static constexpr int kGrain = 16;
 
-  struct Group {
-    std::size_t first, last, collider;
-    EdgePiece piece;  ///< all of them as one
-    EdgeHold hold;
+  struct Pushing {
+    Pushing(const EdgePiece& of, EdgeHold& holds, std::size_t by)
+        : piece(of), hold(holds), collider(by) {}
+    const EdgePiece& piece;
+    EdgeHold& hold;
+    std::size_t collider;
     EdgeStencil stencil;
-    double reach;               ///< of the stencil ahead of the place [m]
-    Vec3 moved = Vec3::Zero();  ///< the places, since they were put down; in reference space [m]
+    double reach = 0;           ///< of the stencil ahead of the place [m]
+    Vec3 moved = Vec3::Zero();  ///< the place, since it was put down; in reference space [m]
     EdgeStand stand;
     EdgeSupport at;
     EdgePush push;
-    Vec3 x;  ///< where it pushes [m]
+    Vec3 x = Vec3::Zero();  ///< where it pushes [m]
   };
 
   void gather() {
-    for (Group& g : all_) move_places(g);
-    all_.clear();
-    const std::vector<EdgeHold>& holds = edges_.holds;
-    for (std::size_t i = 0, last = 0; i < holds.size(); i = last) {
-      last = i + 1;
-      if (!holds[i].holds()) continue;
+    std::size_t collider = 1;
+    for (std::size_t i = 0; i < edges_.holds.size(); ++i) {
+      if (!edges_.holds[i].holds()) continue;
       const EdgePiece& piece = edges_.pieces[i];
-      const auto goes_on = [&](std::size_t k) {
-        const EdgePiece& other = edges_.pieces[k];
-        return k % kPieces != 0 && other.tool == piece.tool && other.side == piece.side &&
-               other.onward == piece.onward && holds[k].holds() && holds[k].presses != 0 &&
-               holds[k].place.body == holds[i].place.body;
-      };
-      while (holds[i].presses != 0 && last < holds.size() && goes_on(last)) ++last;
-      all_.push_back(together(i, last));
+      while (colliders_[collider].tool != piece.tool) ++collider;
+      all_.emplace_back(piece, edges_.holds[i], collider + piece.side);
+      see(all_.back());
     }
-    is_together_ = true;
   }
-  Group together(std::size_t first, std::size_t last) const {
-    Group g;
-    g.first = first;
-    g.last = last;
-    g.piece = edges_.pieces[first];
-    g.piece.middle = 0.5 * (g.piece.middle + edges_.pieces[last - 1].middle);
-    g.collider = 1;
-    while (colliders_[g.collider].tool != g.piece.tool) ++g.collider;
-    g.collider += g.piece.side;
-    const double count = static_cast<double>(last - first);
-    g.piece.length *= count;
-    g.hold = edges_.holds[(first + last) / 2];
-    Vec3 place = Vec3::Zero(), ahead = Vec3::Zero(), slides = Vec3::Zero();
-    g.hold.stiffness = 0;
-    for (std::size_t i = first; i < last; ++i) {
-      const EdgeHold& hold = edges_.holds[i];
-      place += hold.place.reference() / count;
-      ahead += Vec3(hold.ahead[0], hold.ahead[1], hold.ahead[2]);
-      slides += Vec3(hold.slides[0], hold.slides[1], hold.slides[2]);
-      g.hold.stiffness += hold.stiffness;
-    }
-    if (last > first + 1) {
-      const EdgePlace middle = g.hold.place;
-      if (!tissue_.put(place, g.hold.place)) g.hold.place = middle;
-      ahead.stableNormalize();
-      slides.stableNormalize();
-      std::copy(ahead.data(), ahead.data() + 3, g.hold.ahead);
-      std::copy(slides.data(), slides.data() + 3, g.hold.slides);
-    }
-    see(g);
-    return g;
+  void see(Pushing& p) const {
+    p.stencil.clear();
+    p.reach = see_ahead(tissue_, p.hold, p.stencil);
   }
-  void see(Group& g) const {
-    g.stencil.clear();
-    g.reach = see_ahead(tissue_, g.hold, g.stencil);
+  void meet(double dt, Pushing& p) const {
+    if (!p.hold.holds()) return;
+    p.stand = stand_of(p.piece, colliders_[p.collider]);
+    p.at = support_of(tissue_, p.stencil, p.moved);
+    p.stand.x += p.reach * p.stand.onward;
+    p.x = p.stand.x;
+    p.push = push_of(p.piece, p.stand, p.at, cell_, dt, p.hold);
+    p.moved += p.push.slid;
   }
-  void meet(double dt, Group& g) const {
-    g.stand = stand_of(g.piece, colliders_[g.collider]);
-    g.at = support_of(tissue_, g.stencil, g.moved);
-    g.stand.x += g.reach * g.stand.onward;
-    g.x = g.stand.x;
-    g.push = push_of(g.piece, g.stand, g.at, cell_, dt, g.hold);
-    g.moved += g.push.slid;
-  }
-  /// The pieces' places to where they slid.
-  void move_places(Group& g) {
-    turn_ahead(g.at, g.stand.onward, g.hold);
-    const float* r = colliders_[g.collider].rotation;  // of the blade's y
+  /// The piece's place to where it slid.
+  void move_place(Pushing& p) const {
+    EdgeHold& hold = p.hold;
+    turn_ahead(p.at, p.stand.onward, hold);
+    if (p.moved.isZero(0)) return;
+    const float* r = colliders_[p.collider].rotation;  // of the blade's y
     const Vec3 across(r[1], r[4], r[7]);
-    for (std::size_t i = g.first; i < g.last; ++i) {
-      EdgeHold& hold = edges_.holds[i];
-      hold.presses = g.hold.presses;
-      hold.stiffness = g.hold.stiffness / static_cast<double>(g.last - g.first);
-      std::copy(g.hold.ahead, g.hold.ahead + 3, hold.ahead);
-      std::copy(g.hold.slides, g.hold.slides + 3, hold.slides);
-      if (g.moved.isZero(0)) continue;
-      const EdgePlace before = hold.place;
-      if (!tissue_.put(before.reference() + g.moved, hold.place)) {
-        // What is left of the tissue there is cut, too: up to a cell beyond it.
-        const Vec3 from = before.reference();
-        const double share = std::min(1.0, cell_ / g.moved.norm());
-        hold.place = before;
-        for (int a = 0; a < 3; ++a) hold.place.at[a] = from[a] + share * g.moved[a];
-        hold.lets_go = 1;
-      } else if (!is_at_end(tissue_, hold.place, g.at, across, g.stand.onward)) {
-        hold.lets_go = 1;
-      }
-      if (g.push.begins) hold.swept = hold.place;
-      if (hold.lets_go != 0 || g.push.begins) is_together_ = false;
+    const EdgePlace before = hold.place;
+    if (!tissue_.put(before.reference() + p.moved, hold.place)) {
+      // What is left of the tissue there is cut, too: up to a cell beyond it.
+      const Vec3 from = before.reference();
+      const double share = std::min(1.0, cell_ / p.moved.norm());
+      hold.place = before;
+      for (int a = 0; a < 3; ++a) hold.place.at[a] = from[a] + share * p.moved[a];
+      hold.lets_go = 1;
+    } else if (!is_at_end(tissue_, hold.place, p.at, across, p.stand.onward)) {
+      hold.lets_go = 1;
     }
-    const EdgePlace before = g.hold.place;
-    if (!tissue_.put(before.reference() + g.moved, g.hold.place)) {
-      g.hold.place = before;
-      is_together_ = false;
-    }
-    g.moved.setZero();
+    if (p.push.begins) hold.swept = hold.place;
+    p.moved.setZero();
   }
 
   Tissue tissue_;
   const std::vector<Collider>& colliders_;
   ResistingEdges& edges_;
   const double cell_ = tissue_.cell_size();
-  std::vector<Group> all_;
-  bool is_together_ = false;  ///< all_ are what holds
+  std::vector<Pushing> all_;
 };
 
 /// Where the cut of pieces that hold on side by side ends: the line through their places [m, in

@@ -72,7 +72,8 @@ struct Together {
   }
 };
 
-/// What is beside takes the momentum as a rigid body does: both momenta stay.
+/// What is beside takes the momentum as a rigid body does, so that both momenta stay, unless a node
+/// of it would come to be as fast by it.
 bool slow_down(MlsState& s, const std::vector<std::int32_t>& bit) {
   const MlsPairs& p = s.pairs;
   const Material& material = s.nodes.material_of(bit.front());
@@ -99,13 +100,16 @@ bool slow_down(MlsState& s, const std::vector<std::int32_t>& bit) {
     inertia += s.mass[i] * (r.squaredNorm() * Eigen::Matrix3d::Identity() - r * r.transpose());
   }
   const Vec3 spin = inertia.ldlt().solve((own.place - others.place).cross(momentum));
+  const auto gain = [&](std::int32_t i) -> Vec3 {
+    return momentum / others.mass + spin.cross(s.position(i) - others.place);
+  };
+  const auto gains_little = [&](std::int32_t i) { return gain(i).norm() < most; };
+  if (!std::all_of(beside.begin(), beside.end(), gains_little)) return false;
   const auto add = [&s](std::int32_t i, const Vec3& v) {
     for (int a = 0; a < 3 && s.inv_mass[i] != 0; ++a) s.v[4 * i + a] += static_cast<float>(v[a]);
   };
   for (const std::int32_t i : bit) add(i, -momentum / own.mass);
-  for (const std::int32_t i : beside) {
-    add(i, momentum / others.mass + spin.cross(s.position(i) - others.place));
-  }
+  for (const std::int32_t i : beside) add(i, gain(i));
   return true;
 }
 

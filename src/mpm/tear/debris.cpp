@@ -87,6 +87,25 @@ struct NodesOf {
   }
 };
 
+/// What some nodes gain of speed that get momentum and angular momentum as a rigid body does [m/s].
+struct RigidGain {
+  std::vector<Vec3> of;
+  RigidGain(const Nodes& nodes, const NodesOf& some, const NodesMotion& before,
+            const Vec3& momentum, const Vec3& angular)
+      : of(some.node.size()) {
+    for (std::size_t i = 0; i < of.size(); ++i) {
+      of[i] = some.home[i] + displacement_of(nodes, some.node[i]) - before.place;
+    }
+    const Vec3 spin = inertia_of(nodes, some.node, of).ldlt().solve(angular);
+    for (Vec3& x : of) x = momentum / before.mass + spin.cross(x);
+  }
+  double most() const {
+    double most = 0;
+    for (const Vec3& v : of) most = v.norm() > most || std::isnan(v.norm()) ? v.norm() : most;
+    return most;
+  }
+};
+
 /// The rotation that maps the places X best onto x, by their sum of mass times x X^T.
 Eigen::Matrix3d rotation_of(const Eigen::Matrix3d& x_X) {
   const Eigen::JacobiSVD<Eigen::Matrix3d> svd(x_X, Eigen::ComputeFullU | Eigen::ComputeFullV);
@@ -127,12 +146,15 @@ void slow_down(LatticeTissue& tissue, const LatticeBody& body, const Debris& of_
   if (!(off.norm() > most)) return;
   const Vec3 momentum =
       bit.mass * of_other.mass / (bit.mass + of_other.mass) * (1 - most / off.norm()) * off;
+  const Vec3 apart = bit.place - of_other.place, angular = apart.cross(momentum);
+  const RigidGain gain(tissue.nodes, around, of_other, momentum, angular);
+  if (apart.norm() > 2 * body.cell_size || !(gain.most() < most)) return;
   for (const std::int32_t n : nodes_of_bit.node) {
     for (int a = 0; a < 3; ++a) {
       tissue.nodes.v[a][n] -= static_cast<float>(momentum[a] / bit.mass);
     }
   }
-  push(tissue, other, momentum, (bit.place - of_other.place).cross(momentum));
+  push(tissue, other, momentum, angular);
 }
 
 /// The anchor whose face holds some of these nodes, of which AnchorFaces::at_row says that one
@@ -268,17 +290,12 @@ void push(LatticeTissue& tissue, std::int32_t point, const Vec3& momentum, const
   Nodes& nodes = tissue.nodes;
   const NodesOf around(tissue.bodies[tissue.points.site[point].body], tissue.points, *tissue.fields,
                        std::array<std::int32_t, 1>{point});
-  const NodesMotion before(nodes, around.node, around.home);
-  std::vector<Vec3> x(around.node.size());
-  for (std::size_t i = 0; i < x.size(); ++i) {
-    x[i] = around.home[i] + displacement_of(nodes, around.node[i]) - before.place;
-  }
-  const Vec3 spin = inertia_of(nodes, around.node, x).ldlt().solve(angular);
-  for (std::size_t i = 0; i < x.size(); ++i) {
+  const RigidGain gain(nodes, around, NodesMotion(nodes, around.node, around.home), momentum,
+                       angular);
+  for (std::size_t i = 0; i < gain.of.size(); ++i) {
     const int n = around.node[i];
     if (nodes.inv_mass[n] == 0) continue;  // what holds it takes its share
-    const Vec3 v = momentum / before.mass + spin.cross(x[i]);
-    for (int a = 0; a < 3; ++a) nodes.v[a][n] += static_cast<float>(v[a]);
+    for (int a = 0; a < 3; ++a) nodes.v[a][n] += static_cast<float>(gain.of[i][a]);
   }
 }
 

@@ -3,7 +3,6 @@
 #include <stdexcept>
 #include <utility>
 
-#include "cutting/resisting_edge.h"
 #include "fluid/tissue_with_fluid.h"
 #include "geometry/overlap.h"
 #include "mls/tissue.h"
@@ -86,16 +85,6 @@ std::unique_ptr<Tissue> make_tissue(const Scene& scene) {
           "to auto or cpu");
     }
     return std::make_unique<TissueWithFluid>(scene, std::move(notes), of->on_cpu);
-  }
-  if (resists(scene)) {
-    const std::string why = "toughness of materials, against blades, is for a CPU alone";
-    if (scene.device == Device::kCuda) {
-      throw std::runtime_error("device is cuda: " + why + "; set device to auto or cpu");
-    }
-    if (scene.device == Device::kAuto && of->on_gpu != nullptr) {
-      notes.push_back("runs on the CPU: " + why);
-    }
-    return of->on_cpu(scene, notes);
   }
   if (scene.device == Device::kCpu) return of->on_cpu(scene, notes);
   if (of->on_gpu == nullptr) {

@@ -254,6 +254,7 @@ void look_for_edges(Tissue& tissue, const FrameInput& input, double begin, Resis
   constexpr double kAside = 0.125, kBack = 1;  // cells that an edge goes aside, back from its cut
   constexpr int kMostSteps = 64, kHalvings = 5, kGrain = 16;
   const double cell = tissue.cell_size();
+  edges.bring_held();
   const auto still_holds = [&](const EdgePiece& piece, const Pose& pose, EdgeHold& hold) {
     const Vec3 onward = pose.orientation * piece.onward;
     EdgeStencil stencil;
@@ -355,6 +356,10 @@ class PushingEdges final : public EdgePushes {
 
   double push(double dt, double kick, std::vector<ColliderLoad>& loads) override {
     if (all_.empty()) gather();
+    if (edges_.distant != nullptr) {
+      list_nodes();
+      edges_.distant->bring_motion(nodes_);
+    }
     // What all meet is as it was when the substep began.
     tissue_.each(
         static_cast<int>(all_.size()), [&](int i) { meet(dt, all_[i]); }, kGrain);
@@ -377,6 +382,7 @@ class PushingEdges final : public EdgePushes {
         if (p.hold.holds()) see(p);
       }
     }
+    if (edges_.distant != nullptr) edges_.distant->send_velocities(nodes_);
     return work;
   }
 
@@ -415,6 +421,16 @@ class PushingEdges final : public EdgePushes {
       all_.emplace_back(piece, edges_.holds[i], collider + piece.side);
       see(all_.back());
     }
+  }
+  /// That pieces see.
+  void list_nodes() {
+    nodes_.clear();
+    for (const Pushing& p : all_) {
+      if (!p.hold.holds()) continue;
+      nodes_.insert(nodes_.end(), p.stencil.nodes.begin(), p.stencil.nodes.end());
+    }
+    std::sort(nodes_.begin(), nodes_.end());
+    nodes_.erase(std::unique(nodes_.begin(), nodes_.end()), nodes_.end());
   }
   void see(Pushing& p) const {
     p.stencil.clear();
@@ -456,6 +472,7 @@ class PushingEdges final : public EdgePushes {
   ResistingEdges& edges_;
   const double cell_ = tissue_.cell_size();
   std::vector<Pushing> all_;
+  std::vector<std::int32_t> nodes_;  // where they are not the host's
 };
 
 /// Where the cut of pieces that hold on side by side ends: the line through their places [m, in
@@ -489,6 +506,7 @@ std::vector<BladePath> held_paths(const Tissue& tissue, const FrameInput& input,
   constexpr double kCorner = 0.03, kLeast = 0.05, kStraight = 0.002;  // cells
   const double cell = tissue.cell_size();
   std::vector<BladePath> paths;
+  edges.bring_held();
   for (std::size_t first = 0, last = 0; first < edges.holds.size(); first = last) {
     last = first + 1;
     if (edges.holds[first].place.body < 0) continue;

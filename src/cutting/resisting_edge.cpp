@@ -24,6 +24,17 @@ bool ResistingEdges::any_holds() const {
                      [](const EdgeHold& h) { return h.place.body >= 0; });
 }
 
+void ResistingEdges::bring_held() const {
+  if (distant == nullptr) return;
+  std::vector<EdgePlace> places;
+  for (const EdgeHold& h : holds) {
+    if (h.place.body < 0) continue;
+    places.push_back(h.place);
+    places.push_back(h.swept);
+  }
+  if (!places.empty()) distant->bring_motion_around(places);
+}
+
 Pose ResistingEdges::blade_of(const EdgePiece& piece, const FrameInput& input, double s) const {
   return blade_at(tools[piece.tool], input.tools[piece.tool], s, piece.side);
 }

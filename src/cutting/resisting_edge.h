@@ -44,11 +44,27 @@ struct EdgeHold {
   bool holds() const { return place.body >= 0 && lets_go == 0; }
 };
 
+/// Nodes that live on a GPU, as far as edges need them on the host: the law is there alone, which
+/// costs a few thousand nodes' way there and back in each substep in which edges hold tissue.
+class DistantNodes {
+ public:
+  virtual ~DistantNodes() = default;
+  /// Brings the motion of nodes, of those within some cells of places.
+  virtual void bring_motion(const std::vector<std::int32_t>& nodes) = 0;
+  virtual void bring_motion_around(const std::vector<EdgePlace>& places) = 0;
+  /// Sends velocities back, of nodes that were brought.
+  virtual void send_velocities(const std::vector<std::int32_t>& nodes) = 0;
+};
+
 /// What the edges of a scene hold; empty where no material has toughness.
 struct ResistingEdges {
-  std::vector<EdgePiece> pieces;  ///< of all blades, heel to tip, of scalpels to the spine
-  std::vector<EdgeHold> holds;    ///< of each
-  std::vector<Tool> tools;        ///< the scene's
+  std::vector<EdgePiece> pieces;    ///< of all blades, heel to tip, of scalpels to the spine
+  std::vector<EdgeHold> holds;      ///< of each
+  std::vector<Tool> tools;          ///< the scene's
+  DistantNodes* distant = nullptr;  ///< null where nodes are the host's
+
+  /// What holds see, where nodes are not the host's.
+  void bring_held() const;
 
   bool any_holds() const;
   /// Where the blade of that piece is at the share `s` of a frame.

@@ -1,4 +1,4 @@
-// Edges of blades in tissue that resists them (cutting/resisting_edge.h), on the nodes of the CPU.
+// Edges of blades in tissue that resists them (cutting/resisting_edge.h), on nodes.
 #pragma once
 
 #include <memory>

@@ -2,10 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 #include <stdexcept>
 
 #include "frame/leapfrog.h"
 #include "mls/cuda/on_device.h"
+#include "mls/cutting_edges.h"
 #include "mls/faces.h"
 #include "mls/node_contact.h"
 
@@ -29,6 +31,7 @@ CudaMlsTissue::CudaMlsTissue(const Scene& scene, std::vector<std::string> notes)
                              " parts that touch tissue: on the GPU at most " +
                              std::to_string(kMlsMostColliders - 1) + "; set device to cpu");
   }
+  state_->edges.distant = this;
   upload_nodes();
   push();
   upload_pairs();
@@ -201,6 +204,25 @@ void CudaMlsTissue::push_velocities() {
   d.wait("receive data");
 }
 
+void CudaMlsTissue::bring_motion(const std::vector<std::int32_t>& nodes) {
+  OnDevice& d = *device_;
+  const float4* const from = d.some.bring(d.present(), nodes, d.stream);
+  const std::size_t count = nodes.size();
+  for (std::size_t i = 0; i < count; ++i) {
+    std::memcpy(&state_->u[4 * nodes[i]], from + i, sizeof(float4));
+    std::memcpy(&state_->v[4 * nodes[i]], from + count + i, sizeof(float4));
+  }
+}
+
+void CudaMlsTissue::send_velocities(const std::vector<std::int32_t>& nodes) {
+  OnDevice& d = *device_;
+  float4* const v = d.some.room(nodes.size(), d.stream) + nodes.size();
+  for (std::size_t i = 0; i < nodes.size(); ++i) {
+    std::memcpy(v + i, &state_->v[4 * nodes[i]], sizeof(float4));
+  }
+  d.some.send(nodes, d.present(), d.motion(1 - d.current), d.stream);
+}
+
 void CudaMlsTissue::pull_contact() {
   OnDevice& d = *device_;
   MlsState& s = *state_;
@@ -303,6 +325,8 @@ int CudaMlsTissue::run_part(const FramePart& part) {
   if (part.from == 0) d.held_impulse.clear(d.stream);
   upload_colliders(part);
   const float before = s.dt;
+  const std::unique_ptr<EdgePushes> edges = edge_pushes(s);
+  std::vector<std::vector<ColliderLoad>> edge_loads;
   const std::vector<Box>& reach = frame_->colliders.reach();
   // Tissue gets faster within a part: what it may come to is listed widely, for it costs little.
   const double time = part.substeps.until(part.substeps.count);
@@ -324,6 +348,11 @@ int CudaMlsTissue::run_part(const FramePart& part) {
         fastest = std::max(fastest, speed(d.host_colliders[first + c]));
       }
       search_contacts(dt, fastest);
+    }
+    if (edges) {
+      frame_->colliders.at(part.substeps.share(i + 1, part.from, part.to), s.colliders);
+      std::vector<ColliderLoad>& loads = edge_loads.emplace_back(s.colliders.size());
+      result_.cutting_work += edges->push(dt, kick_of(s.dt, dt), loads);
     }
     CudaMlsStep step;
     step.dt = dt;
@@ -350,11 +379,13 @@ int CudaMlsTissue::run_part(const FramePart& part) {
     s.dt = dt;
     s.time += dt;
   }
-  sum_loads(part, before);
+  if (edges) edges->end();
+  sum_loads(part, before, edge_loads);
   return part.substeps.count;
 }
 
-void CudaMlsTissue::sum_loads(const FramePart& part, float before) {
+void CudaMlsTissue::sum_loads(const FramePart& part, float before,
+                              const std::vector<std::vector<ColliderLoad>>& of_edges) {
   OnDevice& d = *device_;
   d.host_loads.resize(d.loads.size());
   d.loads.download(d.host_loads.data(), d.host_loads.size(), d.stream);
@@ -372,6 +403,7 @@ void CudaMlsTissue::sum_loads(const FramePart& part, float before) {
       load.deepest = kInsideUnit * static_cast<double>(sum[8]);
       sum += kMlsLoadSums;
     }
+    for (std::size_t c = 0; !of_edges.empty() && c < on.size(); ++c) on[c].add(of_edges[i][c]);
     const float acted = kick_of(i == 0 ? before : part.substeps.at(i - 1), part.substeps.at(i));
     frame_->colliders.add_loads(part.substeps.share(i + 1, part.from, part.to),
                                 d.host_colliders.data() + static_cast<std::size_t>(i) * on.size(),
@@ -388,6 +420,7 @@ void CudaMlsTissue::save_checkpoint() {
   saved.held_impulse.copy(d.held_impulse, d.stream);
   saved.touching.copy(d.touching, d.stream);
   saved.node_contacts = state_->node_contacts;
+  saved.edges = state_->edges.holds;
   saved.slip.copy(d.contact_slip, d.stream);
   saved.dt = state_->dt;
   saved.time = state_->time;
@@ -404,6 +437,7 @@ void CudaMlsTissue::reject_part(Verdict) {
   d.touching.copy(saved.touching, d.stream);
   d.host_is_current = false;
   state_->node_contacts = saved.node_contacts;
+  state_->edges.holds = saved.edges;
   push_node_contacts();
   if (d.touching_count > 0) d.contact_slip.copy(saved.slip, d.stream);
   state_->dt = saved.dt;

@@ -9,7 +9,7 @@ namespace tissue_sim {
 
 /// Motion lives on the GPU, and comes to the host where something asks for it. Pairs, cuts and
 /// pieces are the host's, as on the CPU: what a cut changes goes up.
-class CudaMlsTissue final : public MlsTissue {
+class CudaMlsTissue final : public MlsTissue, DistantNodes {
  public:
   /// Throws std::runtime_error where there is no GPU, or not enough memory on it.
   explicit CudaMlsTissue(const Scene& scene, std::vector<std::string> notes = {});
@@ -39,6 +39,10 @@ class CudaMlsTissue final : public MlsTissue {
  private:
   struct OnDevice;
 
+  void bring_motion(const std::vector<std::int32_t>& nodes) override;
+  void bring_motion_around(const std::vector<EdgePlace>& /*places*/) override { pull(); }
+  void send_velocities(const std::vector<std::int32_t>& nodes) override;
+
   void upload_nodes();
   void upload_pairs();  ///< all of them
   void upload_colliders(const FramePart& part);
@@ -47,7 +51,9 @@ class CudaMlsTissue final : public MlsTissue {
   void search_contacts(float dt, double fastest);
   void push_node_contacts();
   void pull_slips();  ///< what nodes that touch remember
-  void sum_loads(const FramePart& part, float before);
+  /// `of_edges`: what acted on blades' edges in each substep; or empty.
+  void sum_loads(const FramePart& part, float before,
+                 const std::vector<std::vector<ColliderLoad>>& of_edges);
 
   std::unique_ptr<OnDevice> device_;
 };

@@ -4,6 +4,7 @@
 #include <cstdint>
 
 #include "compute/device_array.h"
+#include "compute/some_motion.h"
 #include "contact/contact_spring.h"
 #include "mls/anchor_pose.h"
 #include "mls/face_contact.h"
@@ -21,10 +22,7 @@ inline constexpr int kMlsLoadSums = 9;
 inline constexpr int kMlsMostColliders = 32;  ///< a node keeps those that it touches as bits
 
 /// Motion of the nodes: displacement [m] and velocity [m/s], the fourth components 0.
-struct CudaMlsMotion {
-  float4* u;
-  float4* v;
-};
+using CudaMlsMotion = MotionOnGpu;
 
 struct CudaMlsField {
   int count = 0;

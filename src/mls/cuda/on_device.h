@@ -18,6 +18,7 @@ struct CudaMlsTissue::OnDevice {
   std::vector<std::int32_t> host_offset;
 
   DeviceArray<float4> place, u[2], v[2], stress, force;
+  SomeMotion some;
   int current = 0;  ///< which of the two is the present motion
   bool host_is_current = true;
   DeviceArray<std::int32_t> offset, other;
@@ -64,6 +65,7 @@ struct CudaMlsTissue::OnDevice {
     DeviceArray<std::uint32_t> touching;
     MlsNodeContacts node_contacts;
     DeviceArray<MlsSlip> slip;
+    std::vector<EdgeHold> edges;
     float dt = 0;
     double time = 0;
     FrameResult result;

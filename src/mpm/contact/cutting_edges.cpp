@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 
 #include "cutting/edge_forces.h"
 #include "mpm/contact/touching_tissue.h"
@@ -11,6 +12,13 @@ namespace {
 
 Vec3 in_sites(const LatticeBody& body, const Vec3& X) {
   return (X - body.origin) / (0.5 * body.cell_size) - Vec3::Constant(0.5);
+}
+
+std::vector<std::int32_t> nodes_of(const Block& block) {
+  std::vector<std::int32_t> nodes;
+  std::copy_if(block.node.begin(), block.node.end(), std::back_inserter(nodes),
+               [](std::int32_t n) { return n >= 0; });
+  return nodes;
 }
 
 /// The lattice to cutting/edge_forces.h. A hold's site is of the point as which it sees the tissue.
@@ -121,6 +129,7 @@ class LatticeEdges {
         continue;
       }
       const Block& block = *s_.blocks.all[i];
+      if (s_.edges.distant != nullptr) s_.edges.distant->bring_motion(nodes_of(block));
       BlockScratch& scratch = s_.scratch.local();
       const std::size_t lanes = block.lane_count();
       if (scratch.values.size() < 3 * lanes) scratch.values.resize(3 * lanes);

@@ -14,13 +14,13 @@ namespace tissue_sim {
 struct TouchingTissue : BlockTissue {
   std::vector<Collider> colliders;
   Contacts contacts;                         ///< with them
-  ResistingEdges edges;                      ///< of blades, on the CPU
+  ResistingEdges edges;                      ///< of blades
   FaceContacts faces;                        ///< of tissue with tissue
   std::vector<std::int32_t> inertial_index;  ///< per node, in ContactInertia; -1 for none
 };
 
-// Edges of blades in tissue that resists them (cutting/resisting_edge.h), on the lattice of the
-// CPU: as in cutting/edge_forces.h.
+// Edges of blades in tissue that resists them (cutting/resisting_edge.h), on the lattice: as in
+// cutting/edge_forces.h.
 class EdgePushes;
 void look_for_edges(TouchingTissue& state, const FrameInput& input, double begin);
 std::vector<BladePath> held_paths(TouchingTissue& state, const FrameInput& input, double end);

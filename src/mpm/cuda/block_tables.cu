@@ -44,17 +44,6 @@ __global__ void __launch_bounds__(kThreads)
   }
 }
 
-struct Gather {
-  CudaNodes from;
-  const std::int32_t* list;
-  int count;
-  float4* packed;
-  __device__ void operator()(int i) const {
-    packed[i] = from.u[list[i]];
-    packed[count + i] = from.v[list[i]];
-  }
-};
-
 struct PlaceVertex {
   CudaNodes nodes;
   const BoundaryMesh::Vertex* vertices;
@@ -70,17 +59,6 @@ struct PlaceVertex {
       x[0] += w * u.x, x[1] += w * u.y, x[2] += w * u.z;
     }
     for (int a = 0; a < 3; ++a) places[3 * i + a] = static_cast<float>(x[a]);
-  }
-};
-
-struct Scatter {
-  const float4* packed;
-  const std::int32_t* list;
-  int count;
-  CudaNodes to, and_to;
-  __device__ void operator()(int i) const {
-    to.u[list[i]] = and_to.u[list[i]] = packed[i];
-    to.v[list[i]] = and_to.v[list[i]] = packed[count + i];
   }
 };
 
@@ -117,16 +95,6 @@ void launch_move_tables(const CudaBlock* blocks, const CudaBlockOrigin* origins,
   move_tables<<<block_count, kThreads, 0, stream>>>(blocks, origins, Arrays(before), Arrays(made),
                                                     Arrays(to));
   check_cuda(cudaGetLastError(), "start a kernel");
-}
-
-void launch_gather(const CudaNodes& from, const std::int32_t* list, int count, float4* packed,
-                   cudaStream_t stream) {
-  Gpu(stream).for_each(count, Gather{from, list, count, packed});
-}
-
-void launch_scatter(const float4* packed, const std::int32_t* list, int count, const CudaNodes& to,
-                    const CudaNodes& and_to, cudaStream_t stream) {
-  Gpu(stream).for_each(count, Scatter{packed, list, count, to, and_to});
 }
 
 void launch_boundary_places(const CudaNodes& nodes, const BoundaryMesh::Vertex* vertices, int count,

@@ -53,12 +53,6 @@ void launch_move_tables(const CudaBlock* blocks, const CudaBlockOrigin* origins,
                         const BlockTables& before, const BlockTables& made, BlockTables& to,
                         cudaStream_t stream);
 
-/// Packs what the nodes of `list` have: first u and mass of all, then v and inverse mass.
-void launch_gather(const CudaNodes& from, const std::int32_t* list, int count, float4* packed,
-                   cudaStream_t stream);
-/// Puts it back, into two states: what no block moves must be the same in both.
-void launch_scatter(const float4* packed, const std::int32_t* list, int count, const CudaNodes& to,
-                    const CudaNodes& and_to, cudaStream_t stream);
 /// Where nodes put vertices of a surface, three floats each [m].
 void launch_boundary_places(const CudaNodes& nodes, const BoundaryMesh::Vertex* vertices, int count,
                             float* places, cudaStream_t stream);

@@ -2,6 +2,7 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "cutting/edge_pushes.h"
 #include "mpm/cuda/on_device.h"
 #include "tools/frame_colliders.h"
 #include "tools/tool_motion.h"
@@ -51,6 +52,9 @@ void sum_loads(CudaTissue& d) {
       load.deepest = kInsideUnit * static_cast<double>(sum[8]);
       sum += kLoadSums;
     }
+    for (std::size_t c = 0; !d.edge_loads.empty() && c < count; ++c) {
+      on[c].add(d.edge_loads[i][c]);
+    }
     const float acted =
         kick_of(i == 0 ? d.dt_before : d.part.substeps.at(i - 1), d.part.substeps.at(i));
     d.run.frame->colliders.add_loads(d.share_of(i), d.host_colliders.data() + i * count, on.data(),
@@ -59,6 +63,15 @@ void sum_loads(CudaTissue& d) {
         d.run.frame->colliders.power(d.host_colliders.data() + i * count, on.data()) * acted;
   }
   d.loads_of = 0;
+}
+
+/// What edges do in the part's substep `i`, before it: the host's.
+void push_edges(CudaTissue& d, EdgePushes& edges, int i) {
+  const float dt = d.part.substeps.at(i);
+  d.run.frame->colliders.at(d.share_of(i), d.state.colliders);
+  std::vector<ColliderLoad> loads(d.state.colliders.size());
+  d.result.cutting_work += edges.push(dt, kick_of(d.state.dt, dt), loads);
+  d.edge_loads.push_back(std::move(loads));
 }
 
 }  // namespace
@@ -92,6 +105,8 @@ std::string CudaTissue::name() const { return "cuda (" + gpu + ")"; }
 void CudaTissue::begin() {
   CudaTissue& d = *this;
   d.cut_shape = choose_shape(d.state.bodies, d.limits, false);
+  d.state.edges = resisting_edges(d.state.scene);
+  d.state.edges.distant = &d;
   // What touches other tissue keeps its blocks, which know the contacts.
   make_blocks(
       d, d.state.bodies.size() == 1 ? choose_shape(d.state.bodies, d.limits, true) : d.cut_shape,
@@ -120,6 +135,7 @@ void CudaTissue::begin_frame(const FrameInput& input, bool move) {
 
 void CudaTissue::begin_rest() {
   CudaTissue& d = *this;
+  look_for_edges(d.state, d.run.frame->input, d.run.frame->cut_to);
   if (!d.run.frame->blades) return;
   d.u_before.resize(d.u[0].size());
   check_cuda(cudaMemcpyAsync(d.u_before.data(), d.present().u, d.u[0].size() * sizeof(float4),
@@ -139,14 +155,21 @@ int CudaTissue::run_part(const FramePart& part) {
   upload_anchor_places(d);
   find_near(d);
   const bool tears = can_tear(d.state);
+  const std::unique_ptr<EdgePushes> edges = edge_pushes(d.state);
+  d.edge_loads.clear();
   const int checks = tears ? tear_checks(d.state, substeps, part.substeps.longest()) : 1;
   int done = 0;
   for (int check = 0; done < substeps && tearing.empty(); ++check) {
     const int end = tear_check_at(check, checks, substeps);
+    for (; edges && done < end; ++done) {
+      push_edges(d, *edges, done);
+      run_substeps(d, done, done + 1);
+    }
     run_substeps(d, done, end);
     done = end;
     if (tears) tearing = tearing_of(d.state, list_stretched(d, 1));
   }
+  if (edges) edges->end();
   d.loads_of = done;
   leave_anchors(d, done);
   d.host_loads.resize(d.loads.size());
@@ -187,6 +210,7 @@ void CudaTissue::save_motion() {
     saved.figures.copy(f.figures, d.stream);
   }
   saved.kept = d.state.faces.kept;
+  saved.edges = d.state.edges.holds;
   saved.impulse.copy(d.anchors.impulse, d.stream);
   saved.anchors = d.state.anchors.now;
   saved.time = d.state.time;
@@ -218,6 +242,7 @@ void CudaTissue::restore_motion(bool missed) {
     f.figures.copy(saved.figures, d.stream);
   }
   d.state.faces.kept = saved.kept;
+  d.state.edges.holds = saved.edges;
   d.anchors.impulse.copy(saved.impulse, d.stream);
   d.state.anchors.now = saved.anchors;
   search_anew(d);

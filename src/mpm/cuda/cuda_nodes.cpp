@@ -98,20 +98,9 @@ std::vector<std::int32_t> nodes_around(const CudaTissue& d,
   return nodes;
 }
 
-const float4* gather(CudaTissue& d, const CudaNodes& from, const std::vector<std::int32_t>& nodes) {
-  const std::size_t count = nodes.size();
-  d.some_nodes.upload(nodes, d.stream);
-  d.packed.resize(2 * count);
-  launch_gather(from, d.some_nodes.data(), static_cast<int>(count), d.packed.data(), d.stream);
-  d.host_nodes.resize(2 * count);
-  d.packed.download(d.host_nodes.data(), 2 * count, d.stream);
-  check_cuda(cudaStreamSynchronize(d.stream), "send data");
-  return d.host_nodes.data();
-}
-
 void pull_some(CudaTissue& d, const std::vector<std::int32_t>& nodes) {
   const std::size_t count = nodes.size();
-  const float4* const from = gather(d, d.present(), nodes);
+  const float4* const from = d.some.bring(d.present(), nodes, d.stream);
   Nodes& n = d.state.nodes;
   d.state.cpu->for_each(
       static_cast<int>(count),
@@ -130,20 +119,17 @@ void push_some(CudaTissue& d, const std::vector<std::int32_t>& nodes) {
     d.u[i].extend(entries, d.stream);
     d.v[i].extend(entries, d.stream);
   }
-  d.host_nodes.resize(2 * count);
+  float4* const to = d.some.room(count, d.stream);
   const Nodes& n = d.state.nodes;
   d.state.cpu->for_each(
       static_cast<int>(count),
       [&](int i) {
         const std::int32_t k = nodes[i];
-        d.host_nodes[i] = packed(n.u, k, n.mass[k]);
-        d.host_nodes[count + i] = packed(n.v, k, n.inv_mass[k]);
+        to[i] = packed(n.u, k, n.mass[k]);
+        to[count + i] = packed(n.v, k, n.inv_mass[k]);
       },
       kGrain);
-  d.some_nodes.upload(nodes, d.stream);
-  d.packed.upload(d.host_nodes.data(), 2 * count, d.stream);
-  launch_scatter(d.packed.data(), d.some_nodes.data(), static_cast<int>(count), d.present(),
-                 d.nodes(1 - d.current), d.stream);
+  d.some.send(nodes, d.present(), d.nodes(1 - d.current), d.stream);
   check_cuda(cudaStreamSynchronize(d.stream), "receive data");
 }
 
@@ -155,6 +141,25 @@ void CudaTissue::bring_nodes(const std::vector<std::int32_t>& points) {
 void CudaTissue::send_nodes() { push_some(*this, brought); }
 
 void CudaTissue::bring_all_nodes() { pull_nodes(*this); }
+
+void CudaTissue::bring_motion(const std::vector<std::int32_t>& nodes) { pull_some(*this, nodes); }
+
+void CudaTissue::bring_motion_around(const std::vector<EdgePlace>& places) {
+  std::vector<std::int32_t> points;
+  for (const EdgePlace& p : places) {
+    const std::int32_t point = state.bodies[p.body].point(p.site[0], p.site[1], p.site[2]);
+    if (point >= 0) points.push_back(point);
+  }
+  pull_some(*this, nodes_around(*this, points));
+}
+
+void CudaTissue::send_velocities(const std::vector<std::int32_t>& nodes) {
+  float4* const v = some.room(nodes.size(), stream) + nodes.size();
+  for (std::size_t i = 0; i < nodes.size(); ++i) {
+    v[i] = packed(state.nodes.v, nodes[i], v[i].w);
+  }
+  some.send(nodes, present(), this->nodes(1 - current), stream);
+}
 
 void CudaTissue::place_boundary() {
   CudaTissue& d = *this;
@@ -291,7 +296,7 @@ void pass_rim(CudaTissue& d, const BladePath& path, bool moves,
     float4* u_before = d.u_before.data();
     Array<float>* before = d.state.work.u_before;
     for (int a = 0; a < 3; ++a) before[a].resize(d.state.nodes.size());
-    const float4* u = gather(d, {u_before, u_before}, nodes);
+    const float4* u = d.some.bring({u_before, u_before}, nodes, d.stream);
     for (std::size_t i = 0; i < nodes.size(); ++i) unpack(u[i], before, nodes[i]);
     begin = before;
   }

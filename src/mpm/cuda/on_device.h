@@ -36,7 +36,7 @@ struct SweepOnDevice {
 
 /// Nodes and contacts live here; lattice, bonds, blocks and pieces on the host too (`run`), where
 /// nodes around a cut are taken apart between frames.
-struct CudaTissue final : MpmDevice {
+struct CudaTissue final : MpmDevice, DistantNodes {
   const std::size_t others_hold = device_bytes_held;  ///< before this tissue had any
 
   /// Throws std::runtime_error where there is no GPU, or not enough memory on it.
@@ -69,6 +69,9 @@ struct CudaTissue final : MpmDevice {
   void bring_nodes(const std::vector<std::int32_t>& points) override;
   void send_nodes() override;
   void bring_all_nodes() override;
+  void bring_motion(const std::vector<std::int32_t>& nodes) override;
+  void bring_motion_around(const std::vector<EdgePlace>& places) override;
+  void send_velocities(const std::vector<std::int32_t>& nodes) override;
   void place_boundary() override;
   bool fly(double duration, Foresight& foresight, std::vector<StrainedPoint>& strained) override;
   int read_points(const PointSelection& selection, std::vector<std::uint8_t>& cloud) override;
@@ -84,6 +87,7 @@ struct CudaTissue final : MpmDevice {
   FramePart part;       ///< that was run last, ...
   int loads_of = 0;     ///< ... so many substeps of it, as long as their loads are not summed, ...
   float dt_before = 0;  ///< ... and the substep before it [s]
+  std::vector<std::vector<ColliderLoad>> edge_loads;  ///< of blades' edges in those; or empty
   std::vector<std::int32_t> brought;  ///< nodes that the host has as they are, but for its changes
   int nodes_before = 0;               ///< that there were before_parting()
   CudaLimits limits;
@@ -110,8 +114,8 @@ struct CudaTissue final : MpmDevice {
   DeviceArray<CudaBody> bodies;
   BlockTables of_blocks, made, spare;  ///< those that hold; of new blocks; room for the next
   DeviceArray<CudaBlockOrigin> origins;
-  DeviceArray<std::int32_t> piece, place, some_nodes;
-  DeviceArray<float4> packed;  ///< of some nodes: u, then v
+  DeviceArray<std::int32_t> piece, place;
+  SomeMotion some;  ///< u and mass, v and inverse mass
   DeviceArray<std::uint32_t> slot_parts, parts, colour;
   DeviceArray<uint4> first_parts;
   ConnectRoom connect_room;
@@ -154,6 +158,7 @@ struct CudaTissue final : MpmDevice {
     DeviceArray<double> impulse;       ///< AnchorFaces::impulse
     std::vector<RigidMotion> anchors;  ///< AnchorFaces::now
     std::vector<KeptContact> kept;
+    std::vector<EdgeHold> edges;
     bool new_facets = false;  ///< there were some without a spring yet
     double time = 0;
     float dt = 0;
@@ -241,9 +246,6 @@ void push_nodes(CudaTissue& tissue);
 /// The nodes that a cut of these points may change, or looks at.
 std::vector<std::int32_t> nodes_around(const CudaTissue& tissue,
                                        const std::vector<std::int32_t>& points);
-/// First u and mass of all of these, then v and inverse mass: they stay until the next call.
-const float4* gather(CudaTissue& tissue, const CudaNodes& from,
-                     const std::vector<std::int32_t>& nodes);
 void pull_some(CudaTissue& tissue, const std::vector<std::int32_t>& nodes);
 void push_some(CudaTissue& tissue, const std::vector<std::int32_t>& nodes);
 

@@ -10,6 +10,7 @@
 
 #include <cstdint>
 
+#include "compute/some_motion.h"
 #include "contact/contact_spring.h"
 #include "mpm/blocks/update_node.h"
 #include "mpm/cuda/face_rows.h"
@@ -143,10 +144,7 @@ struct CudaMeasure {
 };
 
 /// Displacement and mass, velocity and inverse mass of the nodes (nodes.h).
-struct CudaNodes {
-  float4* u;
-  float4* v;
-};
+using CudaNodes = MotionOnGpu;
 
 /// The fourth figure of CudaOuterPlace::place: the spring there stands for the surface, or is the
 /// point's own.

@@ -357,7 +357,8 @@ class PushingEdges final : public EdgePushes {
   double push(double dt, double kick, std::vector<ColliderLoad>& loads) override {
     if (all_.empty()) gather();
     if (edges_.distant != nullptr) {
-      list_nodes();
+      nodes_.insert(nodes_.end(), fresh_nodes_.begin(), fresh_nodes_.end());
+      fresh_nodes_.clear();
       edges_.distant->bring_motion(nodes_);
     }
     // What all meet is as it was when the substep began.
@@ -422,19 +423,14 @@ class PushingEdges final : public EdgePushes {
       see(all_.back());
     }
   }
-  /// That pieces see.
-  void list_nodes() {
-    nodes_.clear();
-    for (const Pushing& p : all_) {
-      if (!p.hold.holds()) continue;
-      nodes_.insert(nodes_.end(), p.stencil.nodes.begin(), p.stencil.nodes.end());
-    }
-    std::sort(nodes_.begin(), nodes_.end());
-    nodes_.erase(std::unique(nodes_.begin(), nodes_.end()), nodes_.end());
-  }
-  void see(Pushing& p) const {
+  void see(Pushing& p) {
     p.stencil.clear();
     p.reach = see_ahead(tissue_, p.hold, p.stencil);
+    if (edges_.distant == nullptr) return;
+    for (const std::int32_t node : p.stencil.nodes) {
+      if (is_seen_.size() <= static_cast<std::size_t>(node)) is_seen_.resize(node + 1);
+      if (!std::exchange(is_seen_[node], true)) fresh_nodes_.push_back(node);
+    }
   }
   void meet(double dt, Pushing& p) const {
     if (!p.hold.holds()) return;
@@ -472,7 +468,10 @@ class PushingEdges final : public EdgePushes {
   ResistingEdges& edges_;
   const double cell_ = tissue_.cell_size();
   std::vector<Pushing> all_;
-  std::vector<std::int32_t> nodes_;  // where they are not the host's
+  // Where nodes are not the host's: those that were seen in this part of the frame, and since the
+  // last substep.
+  std::vector<std::int32_t> nodes_, fresh_nodes_;
+  std::vector<char> is_seen_;
 };
 
 /// Where the cut of pieces that hold on side by side ends: the line through their places [m, in

@@ -3,7 +3,6 @@
 // between.
 #pragma once
 
-#include <algorithm>
 #include <cmath>
 
 #include "contact/surface_spring.h"
@@ -13,11 +12,10 @@
 
 namespace tissue_sim {
 
-/// Into how many parts along either of its sides a place is taken apart for a collider.
+/// Into how many parts along either of its sides a place is taken apart for a collider: as many as
+/// on a GPU.
 inline int parts_along(const Collider& collider, float cell_size) {
-  constexpr int kMost = 4;
-  if (!(collider.radius > 0 && collider.radius < kThinTip * cell_size)) return 1;
-  return std::min(kMost, static_cast<int>(std::ceil(kThinTip * cell_size / collider.radius)));
+  return collider.radius > 0 && collider.radius < kThinTip * cell_size ? 2 : 1;
 }
 
 /// Axis of the bond that a place stands for.

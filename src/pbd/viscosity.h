@@ -10,10 +10,10 @@ namespace pbd {
 
 /// Neighbours along edges lose what they move by against one another, apart from the rigid motion
 /// of what they hang together with, as their body's viscosity would have it over `duration` [s] and
-/// the edge's length, at the rate eta / (rho l^2): the material's eta, and where surfaces were cut
-/// at least liver's, for constraints of slivers, which nothing else damps, carry what each further
-/// cut adds. Pair by pair, so linear momentum is kept; angular momentum is given back. Nothing for
-/// tetrahedra.
+/// the edge's length, at the rate eta / (rho l^2) or, from 1 Pa s on, 80 / s at least: the
+/// material's eta, and where surfaces were cut at least liver's, for constraints of slivers, which
+/// nothing else damps, carry what each further cut adds. Pair by pair, so linear momentum is kept;
+/// angular momentum is given back. Nothing for tetrahedra.
 void damp_neighbours(State& s, double duration);
 
 /// Makes State::dampers for `duration`, unless they are; whether there are any.

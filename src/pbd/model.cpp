@@ -79,14 +79,6 @@ std::unique_ptr<State> make_state(const Scene& scene, std::vector<std::string>* 
     const auto tell = [&](const std::string& material) {
       const Material& m = find_material(scene, material);
       if (notes == nullptr) return;
-      const bool stated =  // a preset's is nobody's wish
-          std::any_of(scene.materials.begin(), scene.materials.end(),
-                      [&](const Material& own) { return own.name == material; });
-      if (m.viscosity > 0 && stated && scene.pbd.model == PbdModel::kTetrahedra) {
-        notes->push_back(
-            "material '" + m.name +
-            "': tetrahedra of method pbd have no viscosity; they damp by their steps alone");
-      }
       if (m.tear_stretch > 0 && scene.pbd.model == PbdModel::kSurface) {
         notes->push_back("material '" + m.name + "': surfaces of method pbd do not tear");
       } else if (m.tear_stretch > 0 && m.tear_length > 0) {

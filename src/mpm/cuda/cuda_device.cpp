@@ -145,7 +145,7 @@ int CudaTissue::run_part(const FramePart& part) {
     const int end = tear_check_at(check, checks, substeps);
     run_substeps(d, done, end);
     done = end;
-    if (tears) tearing = tearing_of(d.state, list_stretched(d, 1));
+    if (tears) tearing = tearing_of(d.state, list_stretched(d, tear_share(d.state)));
   }
   d.loads_of = done;
   leave_anchors(d, done);

@@ -32,8 +32,8 @@ struct Material {
   /// [-], 1.001 to 100; 0 for tissue that never tears.
   double tear_stretch = 0.0;
   /// How far ahead of its tip a crack must find tissue past tear_stretch to go on [m], 0 to 1: what
-  /// a tip bears depends on it, for strain grows without bound towards a tip. Where it is less than
-  /// 1.5 cells, 1.5 cells it is.
+  /// a tip bears depends on it, for strain grows without bound towards a tip. 0: 1.5 cells. A scene
+  /// file's `tear: measured` works out both, from toughness and cells (docs/cutting.md).
   double tear_length = 0.0;
   /// How far the limit's strain, tear_stretch - 1, varies from point to point: drawn evenly within
   /// this share of it, by Scene::seed and the point's place [-], 0 to 0.9.

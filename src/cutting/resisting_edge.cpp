@@ -112,10 +112,34 @@ std::vector<std::size_t> corners_of(std::initializer_list<const std::vector<Vec3
   return kept;
 }
 
+/// What a scalpel's line so far behind its edges sweeps: tissue there went around them at a side of
+/// a body, where little holds it, or came across their cut. It hangs through the blade.
+static void add_behind(const Scene& scene, const FrameInput& input, double begin, double end,
+                       std::vector<BladePath>& paths) {
+  constexpr double kBehind = 2;  // cells
+  for (std::size_t i = 0; i < scene.tools.size(); ++i) {
+    const Tool& tool = scene.tools[i];
+    if (tool.type != ToolType::kScalpel || !cuts(tool, input.tools[i])) continue;
+    const double behind =
+        std::min({kBehind * scene.cell_size, 0.5 * tool.blade_width, 0.5 * tool.blade_length});
+    BladePath path{
+        blade_path(tool, {}).edge,
+        {blade_at(tool, input.tools[i], begin, 0), blade_at(tool, input.tools[i], end, 0)},
+        {}};
+    for (std::size_t k = 0; k < path.edge.size(); ++k) {
+      path.edge[k] -= behind * Vec3(k < 2 ? 1 : 0, 0, k > 0 ? 1 : 0);
+    }
+    paths.push_back(std::move(path));
+  }
+}
+
 std::vector<BladePath> free_paths(const Scene& scene, const ResistingEdges& edges,
                                   const FrameInput& input, double begin, double end) {
-  if (!edges.any_holds()) return blade_paths(scene, input, begin, end);
+  if (edges.pieces.empty()) return blade_paths(scene, input, begin, end);
   std::vector<BladePath> parts;
+  if (!edges.any_holds()) parts = blade_paths(scene, input, begin, end);
+  add_behind(scene, input, begin, end, parts);
+  if (!edges.any_holds()) return parts;
   for (std::size_t i = 0, last = 0; i < edges.pieces.size(); i = last) {
     const EdgePiece& first = edges.pieces[i];
     while (last < edges.pieces.size() && edges.pieces[last].tool == first.tool &&

@@ -39,6 +39,6 @@ bool moves_mesh(const Body& body) { return is_tet_file(body.mesh); }
 
 }  // namespace
 
-const MethodOptions kMlsOptions = {Method::kMls, list_mls, spacing_of_mls, false, moves_mesh};
+const MethodOptions kMlsOptions = {Method::kMls, list_mls, spacing_of_mls, false, 2, 0, moves_mesh};
 
 }  // namespace tissue_sim

@@ -9,7 +9,7 @@ Spacing mpm_spacing(const Scene& scene) { return {scene.cell_size, "cell_size", 
 
 }  // namespace
 
-const MethodOptions kMpmOptions = {Method::kMpm, list_mpm, mpm_spacing, true,
-                                   [](const Body&) { return false; }};
+const MethodOptions kMpmOptions = {
+    Method::kMpm, list_mpm, mpm_spacing, true, 4.5, 0.5, [](const Body&) { return false; }};
 
 }  // namespace tissue_sim

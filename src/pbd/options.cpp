@@ -32,7 +32,7 @@ Spacing pbd_spacing(const Scene& scene) { return {0, "cell_size", scene.cell_siz
 
 }  // namespace
 
-const MethodOptions kPbdOptions = {Method::kPbd, list_pbd, pbd_spacing, false,
-                                   [](const Body&) { return true; }};
+const MethodOptions kPbdOptions = {
+    Method::kPbd, list_pbd, pbd_spacing, false, 0, 0, [](const Body&) { return true; }};
 
 }  // namespace tissue_sim

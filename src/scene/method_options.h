@@ -49,6 +49,10 @@ struct MethodOptions {
   std::vector<Option> (*list)(OptionSets& options);
   Spacing (*spacing)(const Scene& scene);
   bool takes_network;  ///< Scene::fragment_network
+  /// Of `tear: measured`, over Spacing::lattice: how high the tissue is that a crack relieves, and
+  /// how far ahead of its tip it is to be past the limit (docs/cutting.md); 0 where materials have
+  /// no toughness, and where that is as it is.
+  double tear_height, tear_length;
   /// Whether what moves are the vertices of a body's own mesh.
   bool (*moves_mesh)(const Body& body);
 

@@ -6,6 +6,7 @@
 #include <set>
 #include <stdexcept>
 
+#include "material/tear_limit.h"
 #include "scene/method_options.h"
 #include "scene/scene_text.h"
 
@@ -142,7 +143,8 @@ void check_material(const std::string& path, const Material& m, std::set<std::st
   check_range(path + ".poisson_ratio", m.poisson_ratio, 0, 0.49);
   check_range(path + ".density", m.density, 100, 20000, "kg/m^3");
   check_range(path + ".viscosity", m.viscosity, 0, 1000, "Pa s");
-  if (m.tear_stretch != 0 && !(m.tear_stretch >= 1.001 && m.tear_stretch <= 100)) {
+  if (m.tear_stretch != 0 &&
+      !(m.tear_stretch >= kLeastTearStretch && m.tear_stretch <= kLargestTearStretch)) {
     refuse(path + ".tear_stretch", text(m.tear_stretch),
            "must be 0 (never tears) or lie between 1.001 and 100");
   }

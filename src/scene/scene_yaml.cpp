@@ -4,6 +4,7 @@
 #include <iterator>
 #include <stdexcept>
 
+#include "material/tear_limit.h"
 #include "scene/load_yaml.h"
 #include "scene/method_options.h"
 #include "scene/read_file.h"
@@ -83,11 +84,40 @@ Anchor read_anchor(const YAML::Node& node, const std::string& path) {
   return anchor;
 }
 
-Material read_material(const YAML::Node& node, const std::string& path) {
+/// The limit of tearing that toughness gives in cells of the scene.
+void read_measured_tear(const YamlFields& fields, const Scene& scene, Material& m) {
+  if (!fields.says("tear", "measured")) {
+    fields.refuse("tear", "must be measured, from toughness, or left out: give tear_stretch");
+  }
+  for (const char* given : {"tear_stretch", "tear_length"}) {
+    if (fields.has(given)) fields.refuse("tear", std::string("leaves no room for ") + given);
+  }
+  const MethodOptions& method = options_of(scene.method);
+  if (method.tear_height == 0) {
+    fields.refuse("tear", std::string("materials have no toughness with method ") + method.name());
+  }
+  const double cell = method.spacing(scene).lattice, height = method.tear_height * cell;
+  const bool valid = height > 0 && m.young_modulus > 0 && m.poisson_ratio >= 0 &&
+                     m.poisson_ratio < 0.5 && m.toughness >= 0;
+  if (!valid) return;  // validate() says what is not
+  if (m.toughness == 0) fields.refuse("tear", "needs a toughness above 0, J/m^2");
+  m.tear_stretch = tear_stretch_of(m, height);
+  m.tear_length = method.tear_length * cell;
+  if (m.tear_stretch >= kLeastTearStretch && m.tear_stretch < kLargestTearStretch) return;
+  const bool weak = m.tear_stretch < kLeastTearStretch;
+  fields.refuse("tear", "toughness " + text(m.toughness) + " J/m^2 over young_modulus " +
+                            text(m.young_modulus) + " Pa is too " + (weak ? "little" : "much") +
+                            " for cells of this size, the limit would be " +
+                            (weak ? "below " : "above ") +
+                            text(weak ? kLeastTearStretch : kLargestTearStretch));
+}
+
+/// Of a scene whose method and cells are known.
+Material read_material(const YAML::Node& node, const std::string& path, const Scene& scene) {
   const YamlFields fields(
       node, path,
-      {"name", "law", "young_modulus", "poisson_ratio", "density", "viscosity", "tear_stretch",
-       "tear_length", "tear_scatter", "toughness", "friction", "bleeding"});
+      {"name", "law", "young_modulus", "poisson_ratio", "density", "viscosity", "tear",
+       "tear_stretch", "tear_length", "tear_scatter", "toughness", "friction", "bleeding"});
   fields.require("name", "bodies refer to a material by its name");
   Material m;
   fields.read("name", m.name);
@@ -108,6 +138,7 @@ Material read_material(const YAML::Node& node, const std::string& path) {
   } else {
     fields.read("toughness", m.toughness);
   }
+  if (fields.has("tear")) read_measured_tear(fields, scene, m);
   fields.read("friction", m.friction);
   fields.read_map("bleeding", [&](const YAML::Node& bleeding, const std::string& bleeding_path) {
     const YamlFields of(bleeding, bleeding_path, {"flux", "pressure", "clots_after", "fluid"});
@@ -299,7 +330,7 @@ Scene read_scene(const YAML::Node& node) {
     ground_fields.read("friction", scene.ground.friction);
   });
   fields.read_list("materials", [&](const YAML::Node& item, const std::string& path) {
-    scene.materials.push_back(read_material(item, path));
+    scene.materials.push_back(read_material(item, path, scene));
   });
   fields.read_list("bodies", [&](const YAML::Node& item, const std::string& path) {
     scene.bodies.push_back(read_body(item, path));

@@ -93,6 +93,23 @@ TEST(SceneYaml, TakesToughnessAsItWasMeasured) {
   EXPECT_EQ(toughness("name: liver, toughness: 12"), 12);
 }
 
+// What tissue bears comes of its toughness and of the method's cells, and is written as it came.
+TEST(SceneYaml, WorksOutWhereTissueTearsFromItsToughness) {
+  const auto read = [](const std::string& options) {
+    return scene_from_yaml(options +
+                           "\nbodies: [{}]\nmaterials: [{name: gel, young_modulus: 1e5, " +
+                           "toughness: 100, tear: measured}]");
+  };
+  const Scene fine = read("cell_size: 0.001"), coarse = read("cell_size: 0.004");
+  EXPECT_GT(fine.materials[0].tear_stretch, 1.2 * coarse.materials[0].tear_stretch);
+  EXPECT_DOUBLE_EQ(coarse.materials[0].tear_length, 0.002);
+  const Scene meshless = read("method: mls\nmls: {spacing: 0.002}");
+  EXPECT_GT(meshless.materials[0].tear_stretch, coarse.materials[0].tear_stretch);
+  EXPECT_EQ(meshless.materials[0].tear_length, 0);
+  const Scene again = scene_from_yaml(scene_to_yaml(fine));
+  EXPECT_EQ(again.materials[0].tear_stretch, fine.materials[0].tear_stretch);
+}
+
 TEST(SceneYaml, NamesWhatItRefuses) {
   const std::pair<const char*, const char*> cases[] = {
       {"colour: red\nbodies: [{}]", "colour: unknown field, known here are name, method, "},
@@ -108,6 +125,21 @@ TEST(SceneYaml, NamesWhatItRefuses) {
        "materials[0].toughness is much: must be a number"},
       {"materials: [{name: a, toughness: -1}]\nbodies: [{}]", "materials[0].toughness is -1: "},
       {"materials: [{name: a, toughness: .nan}]\nbodies: [{}]", "materials[0].toughness is .nan: "},
+      {"materials: [{name: a, toughness: 1, tear: much}]",
+       "materials[0].tear is much: must be measured, from toughness, or left out"},
+      {"materials: [{name: a, tear: measured}]",
+       "materials[0].tear is measured: needs a toughness"},
+      {"materials: [{name: a, toughness: 1, tear: measured, tear_stretch: 2}]",
+       "materials[0].tear is measured: leaves no room for tear_stretch"},
+      {"materials: [{name: a, toughness: 1e-7, tear: measured}]",
+       "materials[0].tear is measured: toughness 1e-07 J/m^2 over young_modulus 5000 Pa is too "
+       "little"},
+      {"materials: [{name: a, young_modulus: 1, toughness: 1e5, tear: measured}]",
+       "materials[0].tear is measured: toughness 100000 J/m^2 over young_modulus 1 Pa is too much"},
+      {"materials: [{name: a, toughness: -1, tear: measured}]\nbodies: [{}]",
+       "materials[0].toughness is -1: "},
+      {"method: pbd\nmaterials: [{name: a, toughness: 1, tear: measured}]",
+       "materials[0].tear is measured: materials have no toughness with method pbd"},
       {"method: pbd\nmaterials: [{name: a, toughness: 1}]\nbodies: [{}]",
        "materials[0].toughness is 1: must be 0 with method pbd"},
       {"bodies: [{}]\ntools: [{type: scalpel, edge_radius: 0.0003}]",

@@ -147,7 +147,7 @@ int CpuMpmDevice::run_part(const FramePart& part) {
     run_.work += frame.colliders.power(s.colliders.data(), loads.data()) * acted;
     if (checks == 0 || done + 1 != tear_check_at(check, checks, substeps.count)) continue;
     ++check;
-    frame.tearing = tearing_of(s, find_stretched(s, 1));
+    frame.tearing = tearing_of(s, find_stretched(s, tear_share(s)));
   }
   if (edges) edges->end();
   return done;

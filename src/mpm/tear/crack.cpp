@@ -123,33 +123,40 @@ bool broken_on_line(const LatticeTissue& tissue, const LatticeBody& body, std::i
   return false;
 }
 
-/// Whether the tissue is past its limit up to tear_length ahead of the tip, or to where it ends.
-/// Nodes part 1.5 cells behind the last broken bond (half their support), and that is where the
-/// tissue's own tip is.
+/// Whether the tissue is past its limit tear_length ahead of the tip, or where it ends before:
+/// ahead of the point or behind it, among what the crack has passed.
 static bool finds_enough(const LatticeTissue& tissue, const TearingPoint& t,
                          const CrackNearby& crack, const std::vector<TearingPoint>& tearing) {
   const Points::Site& s = tissue.points.site[t.point];
   const LatticeBody& body = tissue.bodies[s.body];
-  const double length =
-      2 * body.material_of(tissue.points, t.point).tear_length / body.cell_size - 3;  // [points]
+  const double tear_length = body.material_of(tissue.points, t.point).tear_length;
+  const auto past = [&](std::int32_t point) {
+    const TearingPoint* of = entry(tearing, point);
+    return of != nullptr && of->past;
+  };
+  const auto point_at = [&](long i, double aside) {
+    const Vec3 x = Vec3(s.x, s.y, s.z) + (crack.offset + aside) * t.normal + i * crack.ahead;
+    return body.point(static_cast<int>(std::lround(x[0])), static_cast<int>(std::lround(x[1])),
+                      static_cast<int>(std::lround(x[2])));
+  };
+  const long steps = std::lround(2 * (tear_length / body.cell_size - kTipBehind));  // points
+  if (tear_length > 0 && steps < 0) {
+    return past(point_at(steps, -0.5)) || past(point_at(steps, 0.5));
+  }
   std::int32_t last = t.point;
-  for (int i = 1; i <= std::lround(length); ++i) {
-    const Vec3 x = Vec3(s.x, s.y, s.z) + crack.offset * t.normal + i * crack.ahead;
-    const std::int32_t q =
-        body.point(static_cast<int>(std::lround(x[0])), static_cast<int>(std::lround(x[1])),
-                   static_cast<int>(std::lround(x[2])));
+  for (long i = 1; i <= steps; ++i) {
+    const std::int32_t q = point_at(i, 0);
     if (q < 0) break;
     last = q;
   }
-  return entry(tearing, last) != nullptr;
+  return past(last);
 }
 
 bool go_on(const LatticeTissue& tissue, const TearingPoint& t,
            const std::vector<TearingPoint>& tearing, std::vector<Bond>& bonds) {
   const CrackNearby crack = crack_nearby(tissue, t);
-  if (!crack.beside || (!crack.passed && !finds_enough(tissue, t, crack, tearing))) {
-    return crack.any;
-  }
+  if (!crack.beside) return crack.any;
+  if (!(crack.passed ? t.past : finds_enough(tissue, t, crack, tearing))) return crack.any;
   const Points::Site& s = tissue.points.site[t.point];
   const LatticeBody& body = tissue.bodies[s.body];
   const int known = side_by_bonds(tissue, body, t.point, t.normal);

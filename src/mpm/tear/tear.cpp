@@ -153,6 +153,21 @@ int tear_checks(const LatticeTissue& tissue, int substeps, float dt) {
   return static_cast<int>(std::ceil(substeps / every));
 }
 
+/// That of a material in such cells.
+static float tear_share(const Material& m, double cell_size) {
+  return m.tear_stretch > 0 && m.tear_length > 0 && m.tear_length < kTipBehind * cell_size
+             ? kAtFronts
+             : 1.0f;
+}
+
+float tear_share(const LatticeTissue& tissue) {
+  float share = 1;
+  for (const LatticeBody& b : tissue.bodies) {
+    for (const Material& m : b.materials) share = std::min(share, tear_share(m, b.cell_size));
+  }
+  return share;
+}
+
 float least_tear_limit(const Material& m) {
   if (m.tear_stretch <= 0) return 0;
   return static_cast<float>(1 + (m.tear_stretch - 1) * (1 - m.tear_scatter));
@@ -206,8 +221,10 @@ std::vector<TearingPoint> tearing_of(const LatticeTissue& tissue,
     if (tissue.points.anchored[p.point] == Points::kInAnchor)
       continue;  // held fast, it cannot come apart
     const LatticeBody& body = tissue.bodies[tissue.points.site[p.point].body];
-    const float least = least_tear_limit(body.material_of(tissue.points, p.point));
-    if (least == 0) continue;
+    const Material& material = body.material_of(tissue.points, p.point);
+    const float limit = least_tear_limit(material);
+    if (limit == 0) continue;
+    const float least = 1 + tear_share(material, body.cell_size) * (limit - 1);
     Eigen::Matrix3d C;
     C << p.C[0], p.C[3], p.C[4], p.C[3], p.C[1], p.C[5], p.C[4], p.C[5], p.C[2];
     if (!C.allFinite()) continue;  // the frame's end will find out
@@ -221,8 +238,10 @@ std::vector<TearingPoint> tearing_of(const LatticeTissue& tissue,
       const Points::Site& s = tissue.points.site[p.point];
       normal = face_normal(body.body.anchors, body.site_position(s.x, s.y, s.z));
     }
-    tearing.push_back({p.point, static_cast<float>(excess), normal});
+    tearing.push_back({p.point, static_cast<float>(excess), normal, stretch >= limit});
   }
+  const auto is_past = [](const TearingPoint& t) { return t.past; };
+  if (std::none_of(tearing.begin(), tearing.end(), is_past)) tearing.clear();
   return tearing;
 }
 

@@ -21,6 +21,10 @@
 //   tear), and leaves the bond between what is in the anchor and what its face holds: neither would
 //   come off.
 //
+//   With Material::tear_length it goes on only where tissue is past its limit that far ahead of its
+//   tip. Nodes part half their support, 1.5 cells, behind the last broken bond, and there the
+//   tissue's own tip is: a shorter tear_length asks for a place that the crack has passed.
+//
 //   No dust. Along a lattice line, at most one bond breaks within kReach points: a node's support
 //   is six points wide, so the opening of one crack stretches all of them, and each of them would
 //   tear.
@@ -65,18 +69,25 @@ float least_tear_limit(const Material& material);
 /// The same of all materials of a body that tear; 0 if none does.
 float least_tear_limit(const LatticeBody& body);
 
-/// A point past its limit.
+/// A point past the least limit of its material, or past kAtFronts of that where a tip is looked
+/// at.
 struct TearingPoint {
   std::int32_t point;
-  float excess;  ///< strain over that of the limit, (stretch - 1) / (limit - 1), from 1 on
+  float excess;  ///< strain over that of the limit, (stretch - 1) / (limit - 1)
   Vec3 normal;   ///< principal direction of the largest stretch, in reference space
+  bool past;     ///< the least limit of its material
 };
+
+/// How much of its limit's strain a point at a front has at least whose tip is past the limit.
+inline constexpr float kAtFronts = 0.2f;
+/// From what share of the limit's strain on points are listed.
+float tear_share(const LatticeTissue& tissue);
 
 /// Points whose strain is at least `share` of what the weakest material bears that their block may
 /// have, by number.
 std::vector<StretchedPoint> find_stretched(BlockTissue& tissue, double share);
 
-/// Those of them that are past their limits.
+/// Those of them that tear, or are at fronts that may.
 std::vector<TearingPoint> tearing_of(const LatticeTissue& tissue,
                                      const std::vector<StretchedPoint>& stretched);
 
@@ -87,7 +98,8 @@ void tear_bonds(BlockTissue& tissue, TearRecords& records, const std::vector<Tea
 
 // A crack as the bonds show it, and where it goes on: see mpm/tear/tear.h for the rule.
 
-inline constexpr int kReach = 3;  ///< half the support of a node [points]
+inline constexpr int kReach = 3;           ///< half the support of a node [points]
+inline constexpr double kTipBehind = 1.5;  ///< the same [cells]: the tip behind the last bond
 
 /// Bonds that the point had and lost.
 unsigned broken_bonds(const LatticeTissue& tissue, std::int32_t p);

@@ -92,6 +92,7 @@ constexpr float kPushedSkin = 0.25f;
 /// whole face has half a cell. Fluid swings with 0.15 of its spacing, a cell at most, as fast as
 /// its substeps bear.
 constexpr float kBehind = 0.25f;
+
 constexpr int kGrain = 256;
 
 /// Calls f(i, k, node) for the nodes of vertices that take part.
@@ -116,6 +117,7 @@ void keep_moment(const float* taken, float* share) {
     middle += share[k] * at[k];
     now += got[k] * at[k];
   }
+  if (!(sum > 0)) return;
   now /= sum;
   Eigen::Matrix3d spread = Eigen::Matrix3d::Zero();
   for (int k = 0; k < 27; ++k) {

@@ -12,7 +12,10 @@
 namespace tissue_sim {
 namespace {
 
-Vec3 cell_middle(const Points::Site& s) { return {s.x / 2 + 0.5, s.y / 2 + 0.5, s.z / 2 + 0.5}; }
+Vec3 cell_middle(const Points::Site& s) {
+  const int x = s.x / 2, y = s.y / 2, z = s.z / 2;
+  return {x + 0.5, y + 0.5, z + 0.5};
+}
 
 /// Of a bond that a cut or a tear broke, in cubes of points.
 Contour::Plane cut_plane(const LatticeBody& body, const Points& points, std::int32_t p, int bond) {
@@ -111,7 +114,8 @@ void keep_moment(const float* taken, float* share) {
   double sum = 0, got[27];
   Vec3 middle = Vec3::Zero(), now = Vec3::Zero(), at[27];
   for (int k = 0; k < 27; ++k) {
-    at[k] = Vec3(k % 3, k / 3 % 3, k / 9);
+    const int x = k % 3, y = k / 3 % 3, z = k / 9;
+    at[k] = Vec3(x, y, z);
     got[k] = static_cast<double>(taken[k]) * share[k];
     sum += got[k];
     middle += share[k] * at[k];

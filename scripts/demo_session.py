@@ -13,7 +13,7 @@ import rosgraph
 import rospy
 from geometry_msgs.msg import WrenchStamped
 from std_srvs.srv import SetBool, Trigger
-from tissue_sim.msg import FragmentArray, SimulationState
+from tissue_sim.msg import FluidArray, FragmentArray, SimulationState
 from tissue_sim.srv import StartRecording
 
 TOOLS = ("scalpel", "probe")
@@ -34,12 +34,13 @@ class Session:
         self.start_over()
         rospy.Subscriber("/simulator/state", SimulationState, self.on_state)
         rospy.Subscriber("/simulator/fragments", FragmentArray, self.on_fragments)
+        rospy.Subscriber("/simulator/fluids", FluidArray, self.on_fluids)
         for tool in TOOLS:
             rospy.Subscriber("/%s/spatial/measured_cf" % tool, WrenchStamped,
                              self.on_wrench, tool)
 
     def start_over(self):
-        self.state, self.fragments, self.before = None, None, None
+        self.state, self.fragments, self.before, self.fluids = None, None, None, []
         self.peak, self.force = dict.fromkeys(TOOLS, 0.0), dict.fromkeys(TOOLS, 0.0)
 
     def on_state(self, message):
@@ -48,6 +49,9 @@ class Session:
     def on_fragments(self, message):
         self.before = self.before or message
         self.fragments = message
+
+    def on_fluids(self, message):
+        self.fluids = message.fluids
 
     def on_wrench(self, message, tool):
         f = message.wrench.force
@@ -127,6 +131,8 @@ def summary(session, wall):
         if crumbs:
             lines.append("%-10s %d of fewer than %d points, %.3f cm3 together" % (
                 title, len(crumbs), CRUMB, sum(f.volume for f in crumbs) * 1e6))
+    lines += ["%-15s %.2f cm3, %.2f of it ran out" % (f.name, f.total * 1e6, f.spilt * 1e6)
+              for f in session.fluids]
     lines += ["peak force      scalpel %.3f N, probe %.3f N" % (session.peak["scalpel"],
                                                                  session.peak["probe"]),
               "real time       %.2f x (%.1f s simulated in %.1f s)" % (s.time / wall, s.time, wall),

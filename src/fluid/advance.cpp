@@ -24,6 +24,10 @@ constexpr float kPacking = 1.0076f, kResponse = 0.983f;
 /// Of the modulus, the most that a drop presses with: in a slit narrower than it is it would take
 /// off, at 38 m/s out of a cut that bled. What a wave of the fastest speed brings is below it.
 constexpr float kMostStrain = 0.2f;
+/// Of its kernel what walls leave it in a slit of 0.4 spacings: where less is left, between sides
+/// of a cut that close or overlap, it presses with less and less. It would drive them apart with
+/// all that it may press with, however far they went.
+constexpr float kSlit = 0.25f;
 /// Of a spacing: nearer to a wall no particle comes.
 constexpr float kRoom = 0.02f;
 /// Of the lists' skin: two that come towards each other stay below it.
@@ -98,10 +102,11 @@ float largest(Cpu& cpu, int n, const F& f) {
   return chunks > 0 ? *std::max_element(of.begin(), of.end()) : 0;
 }
 
-/// How far triangles that fluid meets are from where they were listed [m].
+/// How far walls are from where they were listed [m].
 float walls_moved(FluidState& s, const std::vector<float>& corners) {
   const FluidLists& lists = s.lists;
   return std::sqrt(largest(*s.cpu, static_cast<int>(corners.size() / 3), [&](int c) {
+    if (!s.is_bit.empty() && s.is_bit[c / 3] != 0) return 0.0f;
     const float *x = &corners[std::size_t{3} * c], *y = &lists.corners[std::size_t{3} * c];
     const float d[3] = {x[0] - y[0], x[1] - y[1], x[2] - y[2]};
     return dot3(d, d);
@@ -138,6 +143,7 @@ void press(FluidState& s, const Substep& step, int i) {
   }
   s.near[i] = near;
   const float of_tools = clear;
+  const float in_slit = std::clamp((clear - tissue) / kSlit, 0.0f, 1.0f);
   clear = std::max(clear - tissue, 0.05f);
   const float dense = 1 + (sum / (kPacking * clear) - 1) / kResponse;
   const FluidLaw& law = s.laws[p.kind[i]];
@@ -145,7 +151,8 @@ void press(FluidState& s, const Substep& step, int i) {
   const float rate = p.dense[i] > 0 ? (dense - p.dense[i]) / step.dt : 0;
   p.dense[i] = dense;
   const float pressure = law.bulk_modulus * (dense - 1) + damping * rate;
-  p.pressure[i] = dense > 1 ? std::clamp(pressure, 0.0f, kMostStrain * law.bulk_modulus) : 0;
+  const float most = kMostStrain * in_slit * in_slit * law.bulk_modulus;
+  p.pressure[i] = dense > 1 ? std::clamp(pressure, 0.0f, most) : 0;
   // Of the energy that the pressure does work against, the slopes by the sum and by the walls.
   const float slope = p.pressure[i] / (dense * dense * kPacking * kResponse * clear);
   s.motion[4 * static_cast<std::size_t>(i) + 3] = slope;

@@ -74,6 +74,7 @@ struct FluidState {
   FluidParticles particles;
   std::uint32_t next_id = 0;
   FluidLists lists;
+  std::vector<std::uint8_t> is_bit;  ///< of each triangle: no wall, of a piece as small as a drop
   Cpu* cpu = nullptr;
   InstructionSet instructions = instruction_set();
 

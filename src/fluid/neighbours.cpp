@@ -205,11 +205,14 @@ struct WallCells {
 };
 
 /// Which triangles are near which particles, of each first those that it may touch.
-void list_walls(const FluidParticles& p, const std::vector<WallTriangle>& walls, float reach,
-                float near, float within, InstructionSet set, Cpu& cpu, FluidLists& l) {
+void list_walls(FluidState& s, float reach, float near, float within) {
+  const FluidParticles& p = s.particles;
+  const std::vector<WallTriangle>& walls = s.now;
+  FluidLists& l = s.lists;
   constexpr int kSizes = 8;  // a few large ones among them do not make all others be looked at
   std::vector<std::int32_t> of_size[kSizes];
   for (std::size_t t = 0; t < walls.size(); ++t) {
+    if (!s.is_bit.empty() && s.is_bit[t] != 0) continue;
     int size = 0;
     for (float r = walls[t].radius; r > 0.3f * reach && size + 1 < kSizes; r *= 0.5f) ++size;
     of_size[size].push_back(static_cast<std::int32_t>(t));
@@ -220,13 +223,13 @@ void list_walls(const FluidParticles& p, const std::vector<WallTriangle>& walls,
   }
   l.wall_soon.assign(p.size(), 0);
   l.wall_near.assign(p.size(), 0);
-  list_each(p.size(), cpu, l.wall_begin, l.wall, [&](int i, Found& list) {
+  list_each(p.size(), *s.cpu, l.wall_begin, l.wall, [&](int i, Found& list) {
     const float x[3] = {p.x[0][i], p.x[1][i], p.x[2][i]};
     const int before = list.count;
     int soon = before, touches = before;
     for (const WallCells& of : cells) {
       int k = list.count;
-      of.cells->add_within(x, reach + of.radius, set, list);
+      of.cells->add_within(x, reach + of.radius, s.instructions, list);
       for (std::int32_t* all = list.all.data(); k < list.count; ++k) {
         const std::int32_t t = of.triangle[all[k]];
         const float distance = walls[t].beside(x);
@@ -268,7 +271,7 @@ void list_neighbours(FluidState& s, const std::vector<float>& corners, float ski
   s.cpu->for_each(
       static_cast<int>(s.now.size()), [&](int t) { s.now[t].place(&corners[std::size_t{9} * t]); },
       512);
-  list_walls(p, s.now, reach, 0.5f * s.kernel.reach, kSoon * s.spacing, s.instructions, *s.cpu, l);
+  list_walls(s, reach, 0.5f * s.kernel.reach, kSoon * s.spacing);
   for (int a = 0; a < 3; ++a) l.x[a] = p.x[a];
   l.corners = corners;
   l.made = true;

@@ -142,11 +142,26 @@ void TissueWithFluid::read_walls() {
   walls_.begin.swap(walls_.end);
   tissue_->read_surface(surface_);
   walls_.end = surface_.corners;
-  if ((made != 0 && surface_.made == made) || rest_ == surface_.rest) return;
+  if (made != 0 && surface_.made == made) return;
+  find_bits();
+  if (rest_ == surface_.rest) return;
   rest_ = surface_.rest;
   walls_.begin = walls_.end;  // a cut or a tear made it anew
   if (sources_.bleeds()) sources_.find_wounds(surface_, tissue_->fragments());
   if (fluid_.particles.size() > 0) push_out_of_walls(fluid_, walls_.end);
+}
+
+void TissueWithFluid::find_bits() {
+  const double drop = std::pow(fluid_.spacing, 3);
+  std::vector<std::uint8_t> is_bit;
+  for (const Fragment& f : tissue_->fragments()) {
+    is_bit.resize(std::max<std::size_t>(is_bit.size(), f.id + 1), 0);
+    is_bit[f.id] = f.volume < drop ? 1 : 0;
+  }
+  fluid_.is_bit.resize(surface_.fragment.size());
+  for (std::size_t t = 0; t < surface_.fragment.size(); ++t) {
+    fluid_.is_bit[t] = is_bit[surface_.fragment[t]];
+  }
 }
 
 void TissueWithFluid::advance(double duration, const FrameInput& input) {

@@ -60,6 +60,7 @@ class TissueWithFluid : public Tissue {
   void each_field(Archive& archive);
   void advance_interval(double duration, const FrameInput& input);
   void read_walls();  ///< the surface as it is becomes the end of an interval
+  void find_bits();
   void fill_up(double duration);
   void drop_lost();
   void follow_orders(Span<const FluidOrder> orders);

@@ -199,20 +199,32 @@ void place_boundary(MpmState& s) {
 }
 
 void push_surface(MpmState& s, Span<const float> impulses) {
-  const BoundaryMesh& mesh = s.boundary;
-  for_pushed_vertices(mesh.faces, mesh.vertices.size(), impulses, [&](int i, const float* impulse) {
-    const BoundaryMesh::Vertex& v = mesh.vertices[i];
-    if (!(s.points.free_volume_of(v.point) > 0)) return;
-    const AxisWeights weights(v.place);
-    float of_moving = 0;  // the rest has no mass that could take a part
-    for (int k = 0; k < 27; ++k) of_moving += s.nodes.inv_mass[v.node[k]] > 0 ? weights.at(k) : 0;
-    if (!(of_moving > 0)) return;
-    for (int k = 0; k < 27; ++k) {
-      const std::int32_t node = v.node[k];
-      const float per_impulse = weights.at(k) / of_moving * s.nodes.inv_mass[node];
-      for (int a = 0; a < 3; ++a) s.nodes.v[a][node] += per_impulse * impulse[a];
-    }
-  });
+  BoundaryMesh& mesh = s.boundary;
+  find_support(s, mesh);
+  BoundaryMesh::Support& by = mesh.support;
+  constexpr int kGrain = 256;
+  std::vector<std::array<float, 3>> push(mesh.vertices.size(), {0, 0, 0});
+  s.cpu->for_each(
+      static_cast<int>(push.size()),
+      [&](int i) {
+        for (std::int32_t e = by.corner_begin[i]; e < by.corner_begin[i + 1]; ++e) {
+          const float* impulse = impulses.data() + std::size_t{3} * by.corner[e];
+          for (int a = 0; a < 3; ++a) push[i][a] += impulse[a];
+        }
+      },
+      kGrain);
+  pass_on(by, push);
+  s.cpu->for_each(
+      static_cast<int>(by.node.size()),
+      [&](int n) {
+        float sum[3] = {};
+        for (std::int32_t e = by.begin[n]; e < by.begin[n + 1]; ++e) {
+          for (int a = 0; a < 3; ++a) sum[a] += by.share[e] * push[by.vertex[e]][a];
+        }
+        const std::int32_t node = by.node[n];
+        for (int a = 0; a < 3; ++a) s.nodes.v[a][node] += s.nodes.inv_mass[node] * sum[a];
+      },
+      kGrain);
 }
 
 void add_point_fields(MpmState& state, const PointSelection& selection,

@@ -82,19 +82,40 @@ BladePath slice(double x, double depth_from, double depth_to) {
   return path;
 }
 
-/// The figure that we reproduce: nothing leaves a whole organ; the further it is cut the more does.
+/// Area of the surface but for what a cut made, over that at rest: how far the wall is stretched.
+double stretch(Tissue& tissue) {
+  SurfaceTriangles surface;
+  tissue.read_surface(surface);
+  const auto area = [](const float* c) {
+    const Vec3 x(c[0], c[1], c[2]);
+    return (Vec3(c[3], c[4], c[5]) - x).cross(Vec3(c[6], c[7], c[8]) - x).norm();
+  };
+  double now = 0, at_rest = 0;
+  for (std::size_t t = 0; t < surface.point.size(); ++t) {
+    if (surface.cut[t] != 0) continue;
+    now += area(&surface.corners[9 * t]);
+    at_rest += area(&surface.rest[9 * t]);
+  }
+  return now / at_rest;
+}
+
+/// The figure that we reproduce: nothing leaves a whole organ; the further it is cut the more does,
+/// and the severed wall contracts.
 TEST(FluidInTissue, LeavesAnOrganThatIsCut) {
   Scene scene = filled_ball(Method::kMpm, 500);
   scene.bodies[0].anchors = {held_below(-0.015)};
   Simulation whole(scene);
   ASSERT_GT(fill_up(whole), 0);
   const std::vector<std::uint8_t> full = whole.save();
+  const double stretched = stretch(whole.tissue());
+  double contracted = 0;
   const auto spilt_after = [&](double share) {
     Simulation simulation(scene);
     simulation.restore({full.data(), full.size()});
     if (share > 0) simulation.cut(slice(0.0004, 0.03, 0.018 - share * 0.036));
     for (int i = 0; i < 12; ++i) EXPECT_FALSE(simulation.advance_frame().result.blew_up);
     const FluidVolume fluid = simulation.tissue().fluid_volumes()[0];
+    contracted = stretch(simulation.tissue());
     return fluid.spilt / fluid.total;
   };
   EXPECT_EQ(spilt_after(0), 0);
@@ -102,8 +123,41 @@ TEST(FluidInTissue, LeavesAnOrganThatIsCut) {
   EXPECT_GT(some, 0.001);
   EXPECT_GT(more, some);
   EXPECT_GT(all, more);
+  EXPECT_GT(stretched, 1.01);
+  EXPECT_NEAR(contracted, 1, 0.003);
   RecordProperty("spilt",
                  std::to_string(some) + " " + std::to_string(more) + " " + std::to_string(all));
+  RecordProperty("stretch", std::to_string(stretched) + " " + std::to_string(contracted));
+}
+
+/// A filled organ that cuts part wholly, into pieces, shreds and bits of a fraction of a point: its
+/// fluid comes out, nothing is thrown, and momentum is what it was.
+TEST(FluidInTissue, LeavesAnOrganThatComesApart) {
+  Simulation simulation(filled_ball(Method::kMpm, 500));
+  ASSERT_GT(fill_up(simulation), 0);
+  const Momentum before = simulation.tissue().momentum();
+  for (int i = 0; i < 4; ++i) {
+    const Quat turn(Eigen::AngleAxisd(0.1 + 0.4 * i, Vec3(0.3, 1, 0.1).normalized()));
+    BladePath path;
+    path.edge = {Vec3(0, -0.04, 0), Vec3(0, 0.04, 0)};
+    for (const double z : {0.03, -0.03}) {
+      path.poses.push_back({turn * Vec3(0.0011 * i - 0.003, 0, z), turn});
+    }
+    simulation.cut(path);
+  }
+  double fastest = 0;
+  for (int i = 0; i < 8; ++i) {
+    const FrameResult result = simulation.advance_frame().result;
+    ASSERT_FALSE(result.blew_up);
+    fastest = std::max<double>(fastest, result.max_speed);
+  }
+  EXPECT_GT(simulation.tissue().fragment_count(), 8);
+  EXPECT_LT(fastest, 2);
+  const FluidVolume fluid = simulation.tissue().fluid_volumes()[0];
+  EXPECT_GT(fluid.spilt / fluid.total, 0.5);
+  const Momentum after = simulation.tissue().momentum();
+  EXPECT_LT((after.linear - before.linear).norm() / (after.mass * fastest), 1e-4);
+  RecordProperty("fastest", std::to_string(fastest));
 }
 
 /// A filled ball grows as Lamé has it for a thick wall, by the pressure that its fluid has.

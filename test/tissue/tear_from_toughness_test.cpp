@@ -107,7 +107,7 @@ class TearFromToughness : public EachMethod {
   void SetUp() override {
     EachMethod::SetUp();
     if (IsSkipped()) return;
-    if (GetParam().method == Method::kPbd || GetParam().device == Device::kCuda) {
+    if (GetParam().method == Method::kPbd) {
       GTEST_SKIP() << "toughness is refused there";
     }
   }

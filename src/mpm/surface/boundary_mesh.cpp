@@ -1,5 +1,6 @@
 #include "mpm/surface/boundary_mesh.h"
 
+#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -11,7 +12,10 @@
 namespace tissue_sim {
 namespace {
 
-Vec3 cell_middle(const Points::Site& s) { return {s.x / 2 + 0.5, s.y / 2 + 0.5, s.z / 2 + 0.5}; }
+Vec3 cell_middle(const Points::Site& s) {
+  const int x = s.x / 2, y = s.y / 2, z = s.z / 2;
+  return {x + 0.5, y + 0.5, z + 0.5};
+}
 
 /// Of a bond that a cut or a tear broke, in cubes of points.
 Contour::Plane cut_plane(const LatticeBody& body, const Points& points, std::int32_t p, int bond) {
@@ -84,7 +88,164 @@ BoundaryMesh::Vertex make_vertex(const LatticeTissue& tissue, const Contour::Ver
   return v;
 }
 
+/// Thickness of the skin, as a share of a point's cube: the lightest that does not swing faster
+/// than fluid before it does.
+constexpr float kPushedSkin = 0.25f;
+/// Tissue that an even pressure meets behind a vertex, in cells, below which the vertex is weak: a
+/// whole face has half a cell. Fluid swings with 0.15 of its spacing, a cell at most, as fast as
+/// its substeps bear.
+constexpr float kBehind = 0.25f;
+
+constexpr int kGrain = 256;
+
+/// Calls f(i, k, node) for the nodes of vertices that take part.
+template <class F>
+void for_each_share(const BoundaryMesh& mesh, const std::vector<float>& share, const F& f) {
+  for (std::size_t i = 0; i < mesh.vertices.size(); ++i) {
+    for (int k = 0; k < 27; ++k) {
+      if (share[27 * i + k] != 0) f(static_cast<std::int32_t>(i), k, mesh.vertices[i].node[k]);
+    }
+  }
+}
+
+/// Replaces the shares of a vertex, of which each node takes but `taken`, by those nearest to them
+/// that have their sum and their middle.
+void keep_moment(const float* taken, float* share) {
+  double sum = 0, got[27];
+  Vec3 middle = Vec3::Zero(), now = Vec3::Zero(), at[27];
+  for (int k = 0; k < 27; ++k) {
+    const int x = k % 3, y = k / 3 % 3, z = k / 9;
+    at[k] = Vec3(x, y, z);
+    got[k] = static_cast<double>(taken[k]) * share[k];
+    sum += got[k];
+    middle += share[k] * at[k];
+    now += got[k] * at[k];
+  }
+  if (!(sum > 0)) return;
+  now /= sum;
+  Eigen::Matrix3d spread = Eigen::Matrix3d::Zero();
+  for (int k = 0; k < 27; ++k) {
+    at[k] -= now;
+    spread += got[k] / sum * at[k] * at[k].transpose();
+  }
+  // Along an axis on which nothing but one layer of nodes has mass no moment can be kept.
+  constexpr double kLeastSpread = 0.02, kMost = 3;
+  Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes;
+  axes.computeDirect(spread);
+  Vec3 slope = Vec3::Zero();
+  for (int a = 0; a < 3; ++a) {
+    if (!(axes.eigenvalues()[a] > kLeastSpread)) continue;
+    const Vec3 axis = axes.eigenvectors().col(a);
+    slope += axis.dot(middle - now) / axes.eigenvalues()[a] * axis;
+  }
+  double largest = 0;
+  for (int k = 0; k < 27; ++k) {
+    if (got[k] != 0) largest = std::max(largest, std::fabs(slope.dot(at[k])));
+  }
+  if (largest > kMost) slope *= kMost / largest;
+  for (int k = 0; k < 27; ++k) {
+    share[k] = static_cast<float>(got[k] / sum * (1 + slope.dot(at[k])));
+  }
+}
+
+/// What each vertex stands for at rest [m^2].
+std::vector<float> areas_of(const BoundaryMesh& mesh) {
+  std::vector<float> area(mesh.vertices.size(), 0.0f);
+  for (const BoundaryMesh::Face& face : mesh.faces) {
+    for (const int second : {1, 2}) {
+      const std::int32_t of[3] = {face.vertex[0], face.vertex[second], face.vertex[second + 1]};
+      const Vec3& x = mesh.vertices[of[0]].rest;
+      const Vec3 twice = (mesh.vertices[of[1]].rest - x).cross(mesh.vertices[of[2]].rest - x);
+      for (const std::int32_t v : of) area[v] += static_cast<float>(twice.norm() / 6);
+    }
+  }
+  return area;
+}
+
+/// Finds the vertices that an even pressure would drive off, and who takes it in their place.
+void find_weak(const LatticeTissue& tissue, BoundaryMesh& mesh) {
+  BoundaryMesh::Support& of = mesh.support;
+  const Nodes& nodes = tissue.nodes;
+  const std::vector<float> area = areas_of(mesh);
+  std::vector<float> by_mass(nodes.size(), 0.0f);  // area that pushes a node, by its mass
+  tissue.cpu->for_each(
+      static_cast<int>(of.node.size()),
+      [&](int n) {
+        float sum = 0;
+        for (std::int32_t e = of.begin[n]; e < of.begin[n + 1]; ++e) {
+          sum += std::fabs(of.share[e]) * area[of.vertex[e]];
+        }
+        by_mass[of.node[n]] = nodes.inv_mass[of.node[n]] * sum;
+      },
+      kGrain);
+  const auto vertices = static_cast<int>(mesh.vertices.size());
+  std::vector<float> takes(vertices, 1.0f);  // more than 1: so many times what is asked
+  tissue.cpu->for_each(
+      vertices,
+      [&](int i) {
+        const BoundaryMesh::Vertex& v = mesh.vertices[i];
+        const AxisWeights weights(v.place);
+        float sum = 0;
+        for (int k = 0; k < 27; ++k) sum += std::fabs(weights.at(k)) * by_mass[v.node[k]];
+        const LatticeBody& body = tissue.bodies[tissue.points.site[v.point].body];
+        const double density = body.material_of(tissue.points, v.point).density;
+        if (sum > 0) takes[i] = static_cast<float>(1 / (kBehind * density * body.cell_size * sum));
+      },
+      kGrain);
+  of.weak.clear();
+  of.around.clear();
+  of.weak_of.assign(vertices, -1);
+  for (int i = 0; i < vertices; ++i) {
+    if (!(takes[i] < 1)) continue;
+    of.weak_of[i] = static_cast<std::int32_t>(of.weak.size());
+    of.weak.push_back({i, takes[i], 0, 0});
+  }
+  std::vector<std::vector<std::int32_t>> around(of.weak.size());
+  for (const BoundaryMesh::Face& face : mesh.faces) {
+    for (int k = 0; k < 4; ++k) {
+      const std::int32_t weak = of.weak_of[face.vertex[k]];
+      for (const int step : {1, 3}) {
+        if (weak >= 0) around[weak].push_back(face.vertex[(k + step) % 4]);
+      }
+    }
+  }
+  for (std::size_t w = 0; w < of.weak.size(); ++w) {
+    float sum = 0;
+    for (const std::int32_t v : around[w]) sum += std::min(1.0f, takes[v]);
+    of.weak[w].begin = static_cast<std::int32_t>(of.around.size());
+    for (const std::int32_t v : around[w]) {
+      if (sum > 0) of.around.push_back({v, std::min(1.0f, takes[v]) / sum});
+    }
+    of.weak[w].end = static_cast<std::int32_t>(of.around.size());
+    if (!(sum > 0)) of.weak[w].takes = 1;
+  }
+}
+
 }  // namespace
+
+void pass_on(const BoundaryMesh::Support& of, std::vector<std::array<float, 3>>& push) {
+  constexpr int kRounds = 6;
+  std::vector<std::array<float, 3>> left(of.weak.size()), next(of.weak.size());
+  for (std::size_t w = 0; w < of.weak.size(); ++w) std::swap(left[w], push[of.weak[w].vertex]);
+  for (int round = 0; round < kRounds; ++round) {
+    std::fill(next.begin(), next.end(), std::array<float, 3>{});
+    for (std::size_t w = 0; w < of.weak.size(); ++w) {
+      const BoundaryMesh::Support::Weak& weak = of.weak[w];
+      const std::array<float, 3>& all = left[w];
+      if (all[0] == 0 && all[1] == 0 && all[2] == 0) continue;
+      for (int a = 0; a < 3; ++a) push[weak.vertex][a] += weak.takes * all[a];
+      for (std::int32_t e = weak.begin; e < weak.end; ++e) {
+        const std::int32_t v = of.around[e].vertex, other = of.weak_of[v];
+        std::array<float, 3>& to = other < 0 ? push[v] : next[other];
+        for (int a = 0; a < 3; ++a) to[a] += (1 - weak.takes) * of.around[e].share * all[a];
+      }
+    }
+    left.swap(next);
+  }
+  for (std::size_t w = 0; w < of.weak.size(); ++w) {
+    for (int a = 0; a < 3; ++a) push[of.weak[w].vertex][a] += left[w][a];
+  }
+}
 
 void update_boundary(const LatticeTissue& tissue, BoundaryMesh& mesh) {
   const Points& points = tissue.points;
@@ -108,6 +269,95 @@ void update_boundary(const LatticeTissue& tissue, BoundaryMesh& mesh) {
   mesh.vertices.clear();
   for (const Contour::Vertex& v : contour.vertices) {
     mesh.vertices.push_back(make_vertex(tissue, v));
+  }
+}
+
+void find_support(const LatticeTissue& tissue, BoundaryMesh& mesh) {
+  BoundaryMesh::Support& of = mesh.support;
+  if (of.made == mesh.made) return;
+  of.made = mesh.made;
+  const Points& points = tissue.points;
+  const Nodes& nodes = tissue.nodes;
+  const auto vertices = static_cast<int>(mesh.vertices.size());
+  std::vector<float> share(std::size_t{27} * vertices, 0.0f), skin(vertices, 0.0f);
+  tissue.cpu->for_each(
+      vertices,
+      [&](int i) {
+        const BoundaryMesh::Vertex& v = mesh.vertices[i];
+        if (!(points.free_volume_of(v.point) > 0)) return;
+        const AxisWeights weights(v.place);
+        float of_moving = 0;  // the rest has no mass that could take a part
+        for (int k = 0; k < 27; ++k) of_moving += nodes.inv_mass[v.node[k]] > 0 ? weights.at(k) : 0;
+        if (!(of_moving > 0)) return;
+        for (int k = 0; k < 27; ++k) {
+          if (!(nodes.inv_mass[v.node[k]] > 0)) continue;
+          share[std::size_t{27} * i + k] = weights.at(k) / of_moving;
+        }
+        const LatticeBody& body = tissue.bodies[points.site[v.point].body];
+        skin[i] = static_cast<float>(kPushedSkin * body.material_of(points, v.point).density *
+                                     std::pow(body.cell_size / 2, 3));
+      },
+      kGrain);
+
+  std::vector<std::int32_t> at(nodes.size() + 1, 0);
+  for_each_share(mesh, share, [&](std::int32_t, int, std::int32_t node) { ++at[node]; });
+  of.node.clear();
+  of.begin.assign(1, 0);
+  for (std::size_t n = 0; n < nodes.size(); ++n) {
+    const std::int32_t count = at[n];
+    at[n] = of.begin.back();
+    if (count == 0) continue;
+    of.node.push_back(static_cast<std::int32_t>(n));
+    of.begin.push_back(of.begin.back() + count);
+  }
+  std::vector<std::size_t> entry(of.begin.back());
+  of.vertex.resize(entry.size());
+  of.share.resize(entry.size());
+  for_each_share(mesh, share, [&](std::int32_t i, int k, std::int32_t node) {
+    of.vertex[at[node]] = i;
+    entry[at[node]++] = std::size_t{27} * i + k;
+  });
+  std::vector<float> takes(nodes.size(), 0.0f);  // of its share, each node
+  const auto count = static_cast<int>(of.node.size());
+  tissue.cpu->for_each(
+      count,
+      [&](int n) {
+        float mass = 0;
+        for (std::int32_t e = of.begin[n]; e < of.begin[n + 1]; ++e) {
+          mass += std::fabs(share[entry[e]]) * skin[of.vertex[e]];
+        }
+        takes[of.node[n]] = std::min(1.0f, nodes.mass[of.node[n]] / mass);
+      },
+      kGrain);
+  tissue.cpu->for_each(
+      vertices,
+      [&](int i) {
+        float taken[27], least = 1, *of_vertex = &share[std::size_t{27} * i];
+        for (int k = 0; k < 27; ++k) {
+          taken[k] = takes[mesh.vertices[i].node[k]];
+          if (of_vertex[k] != 0) least = std::min(least, taken[k]);
+        }
+        if (least < 1) keep_moment(taken, of_vertex);
+      },
+      kGrain);
+  tissue.cpu->for_each(
+      count,
+      [&](int n) {
+        for (std::int32_t e = of.begin[n]; e < of.begin[n + 1]; ++e) of.share[e] = share[entry[e]];
+      },
+      kGrain);
+  find_weak(tissue, mesh);
+
+  of.corner_begin.assign(vertices + 1, 0);
+  for (const BoundaryMesh::Face& face : mesh.faces) {
+    for (const int k : {0, 1, 2, 0, 2, 3}) ++of.corner_begin[face.vertex[k] + 1];
+  }
+  for (int i = 0; i < vertices; ++i) of.corner_begin[i + 1] += of.corner_begin[i];
+  of.corner.resize(of.corner_begin.back());
+  at.assign(of.corner_begin.begin(), of.corner_begin.end() - 1);
+  std::int32_t corner = 0;
+  for (const BoundaryMesh::Face& face : mesh.faces) {
+    for (const int k : {0, 1, 2, 0, 2, 3}) of.corner[at[face.vertex[k]]++] = corner++;
   }
 }
 

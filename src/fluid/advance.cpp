@@ -344,12 +344,38 @@ void with_loads(FluidState& s, std::vector<ColliderLoad>& loads, const F& f) {
   }
 }
 
-/// Of particles that walls met: what they gave them goes to the corners in equal parts.
+/// Of particles that walls met: what they gave them goes to the wall around, as far as a particle
+/// reaches, and in each triangle to the corners in equal parts. A triangle alone may be of a shred
+/// that is lighter than the particle: it would be thrown back faster than it came, time and again.
 void collect_touches(const FluidState& s, FluidWalls& walls) {
-  for (const FluidState::Touch& touch : s.touches) {
+  std::vector<float> weight;
+  for (std::size_t i = 0; i < s.touches.size(); ++i) {
+    const FluidState::Touch& touch = s.touches[i];
     if (touch.triangle < 0) continue;
-    for (int i = 0; i < 9; ++i) {
-      walls.impulse[std::size_t{9} * touch.triangle + i] += touch.impulse[i % 3] / 3;
+    const auto give = [&](std::int32_t triangle, float share) {
+      for (int k = 0; k < 9; ++k) {
+        walls.impulse[std::size_t{9} * triangle + k] += share / 3 * touch.impulse[k % 3];
+      }
+    };
+    const float* normal = s.now[touch.triangle].normal;
+    const std::int32_t begin = s.lists.wall_begin[i], end = s.lists.wall_begin[i + 1];
+    weight.assign(end - begin, 0.0f);
+    float sum = 0;
+    for (std::int32_t e = begin; e < end; ++e) {
+      const WallTriangle& t = s.now[s.lists.wall[e]];
+      float away2 = 0;
+      for (int a = 0; a < 3; ++a) {
+        const float d = t.middle[a] - s.particles.x[a][i];
+        away2 += d * d;
+      }
+      const float left = 1 - away2 / (s.kernel.reach * s.kernel.reach),
+                  facing = dot3(t.normal, normal);
+      if (!(left > 0 && facing > 0)) continue;
+      sum += weight[e - begin] = left * facing * t.area;
+    }
+    if (!(sum > 0)) give(touch.triangle, 1);
+    for (std::int32_t e = begin; e < end && sum > 0; ++e) {
+      if (weight[e - begin] > 0) give(s.lists.wall[e], weight[e - begin] / sum);
     }
   }
 }

@@ -39,7 +39,7 @@ TEST_P(DevicesAgree, OnForcesAtRest) {
     Simulation on_cpu(scene);
     const double force = indentation_force(on_cpu, 0.002);
     EXPECT_GT(force, 1e-3) << tool.name;
-    EXPECT_TRUE(is_within("a ball's, a punch's, a plate's, a thin tip's force, GPU over CPU",
+    EXPECT_TRUE(is_within("ball, punch, plate, thin tip: force, GPU over CPU",
                           indentation_force(on_gpu, 0.002) / force - 1, 1e-4))
         << tool.name << " of " << tool.radius << " m";
   }

@@ -128,7 +128,7 @@ struct MlsState {
   Array<float> held_impulse;  ///< on held nodes, since the frame began [4 n]; empty without any
   std::vector<MlsGroupContact> contact;  ///< per group
   MlsNodeContacts node_contacts;
-  ResistingEdges edges;  ///< of blades, on the CPU
+  ResistingEdges edges;  ///< of blades
   int until_list = 0;    ///< substeps until colliders near groups are listed anew
   float dt = 0;          ///< the last substep, 0 before the first [s]
   double time = 0;       ///< [s]

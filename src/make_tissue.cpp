@@ -53,6 +53,21 @@ constexpr Makers kMakers[] = {
 #endif
 };
 
+std::unique_ptr<Tissue> make_on_cpu(const Makers& of, const Scene& scene, Notes notes) {
+  if (!has_fluid(scene)) return of.on_cpu(scene, std::move(notes));
+  return std::make_unique<TissueWithFluid>(scene, std::move(notes), of.on_cpu);
+}
+
+std::unique_ptr<Tissue> make_on_gpu(const Makers& of, const Scene& scene, Notes notes) {
+#if defined(TISSUE_SIM_CUDA)
+  if (has_fluid(scene)) {
+    return std::make_unique<TissueWithFluid>(scene, std::move(notes), of.on_gpu,
+                                             make_fluid_on_gpu());
+  }
+#endif
+  return of.on_gpu(scene, std::move(notes));
+}
+
 /// Soft tissue has kPa: less than a tenth of one was hardly meant in Pa.
 void note_units(const Scene& scene, Notes& notes) {
   constexpr double kSoftest = 100;  // [Pa]; brain has some 500
@@ -78,28 +93,20 @@ std::unique_ptr<Tissue> make_tissue(const Scene& scene) {
   if (of == std::end(kMakers)) throw std::invalid_argument("method is not in this build");
   Notes notes = overlap_notes(scene);
   note_units(scene, notes);
-  if (has_fluid(scene)) {
-    if (scene.device == Device::kCuda) {
-      throw std::runtime_error(
-          "device is cuda: fluid runs on a CPU alone, and so does tissue that it meets; set device "
-          "to auto or cpu");
-    }
-    return std::make_unique<TissueWithFluid>(scene, std::move(notes), of->on_cpu);
-  }
-  if (scene.device == Device::kCpu) return of->on_cpu(scene, notes);
+  if (scene.device == Device::kCpu) return make_on_cpu(*of, scene, notes);
   if (of->on_gpu == nullptr) {
-    if (scene.device == Device::kAuto) return of->on_cpu(scene, notes);
+    if (scene.device == Device::kAuto) return make_on_cpu(*of, scene, notes);
     throw std::runtime_error(
         "device is cuda: this build has no GPU backend for the scene's method; set device to auto "
         "or cpu, or build where nvcc is found");
   }
   try {
-    return of->on_gpu(scene, notes);
+    return make_on_gpu(*of, scene, notes);
   } catch (const std::runtime_error& e) {
     if (scene.device == Device::kCuda) throw;
     notes.push_back(std::string("runs on the CPU: ") + e.what());
   }
-  return of->on_cpu(scene, notes);
+  return make_on_cpu(*of, scene, notes);
 }
 
 }  // namespace tissue_sim

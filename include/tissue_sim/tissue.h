@@ -86,6 +86,12 @@ struct GpuPoints {
   int gpu = -1;  ///< CUDA's number of it; -1: the tissue is on a CPU
 };
 
+/// Corners of a surface in the memory of the GPU that the tissue is on: nine numbers a triangle [m].
+struct GpuSurface {
+  const float* corners = nullptr;
+  int triangles = 0;
+};
+
 /// All bodies of a scene. One thread owns it; a frame is advance(), then finish(), and what is read
 /// holds until the next one.
 class Tissue {
@@ -111,6 +117,13 @@ class Tissue {
   /// when it must not have advanced: nine numbers a triangle [N s]. They go to what moves a corner.
   virtual void push_surface(Span<const float> /*impulses*/) {
     throw std::logic_error("nothing presses on the surface of this tissue from without");
+  }
+  /// The triangles of `read`, which read_surface() gave last, where they are now; until the tissue
+  /// advances. None where it is not on a GPU, or has others by now.
+  virtual GpuSurface surface_on_gpu(const SurfaceTriangles& /*read*/) { return {}; }
+  /// As push_surface(), of impulses there: three numbers a triangle, which each corner gets.
+  virtual void push_surface_on_gpu(const float* /*impulses*/) {
+    throw std::logic_error("the surface of this tissue is not on a GPU");
   }
   /// Whether that is what the method moves; else it is made of what it moves, when it is read.
   virtual bool moves_surface() const { return false; }

@@ -9,46 +9,42 @@
 namespace tissue_sim {
 namespace {
 
-/// Of sound over a smoothing length (half of the kernel's reach). A cork in water keeps a hundred
-/// times the energy with 0.8, no more with 0.6 than with 0.4.
-constexpr float kCourant = 0.6f;
-/// Viscosity that keeps the particles' own jitter down, as Monaghan's alpha.
-constexpr float kAlpha = 0.02f;
-/// Viscosity against changes of volume alone, over that of sound in a smoothing length: it takes
-/// the ringing out and leaves what flows.
-constexpr float kRinging = 0.25f;
-/// What the kernel sums up to where particles have settled, and how much of a small change of
-/// density that sum shows (a particle itself does not come nearer): measured in a periodic box for
-/// FluidKernel::reach = kFluidReach spacings.
-constexpr float kPacking = 1.0076f, kResponse = 0.983f;
-/// Of the modulus, the most that a drop presses with: in a slit narrower than it is it would take
-/// off, at 38 m/s out of a cut that bled. What a wave of the fastest speed brings is below it.
-constexpr float kMostStrain = 0.2f;
-/// Of its kernel what walls leave it in a slit of 0.4 spacings: where less is left, between sides
-/// of a cut that close or overlap, it presses with less and less. It would drive them apart with
-/// all that it may press with, however far they went.
-constexpr float kSlit = 0.25f;
-/// Of a spacing: nearer to a wall no particle comes.
-constexpr float kRoom = 0.02f;
-/// Of the lists' skin: two that come towards each other stay below it.
-constexpr float kMayMove = 0.48f;
 constexpr int kParticlesEach = 128;
 
-struct Substep {
-  float dt;      // [s]
-  float weight;  // of the interval
-  float gravity[3];
-  float keep;  // of speed, after damping
-  const std::vector<Collider>& colliders;
-};
-
-/// A collider's bit of FluidState::near; those behind the 63rd share one.
-std::uint64_t bit_of(std::size_t collider) {
-  return std::uint64_t{1} << std::min<std::size_t>(collider, 63);
-}
-
-float artificial_viscosity(const FluidState& s, const FluidLaw& law) {
-  return law.viscosity + 0.1f * kAlpha * law.density * law.sound() * 0.5f * s.kernel.reach;
+/// What a substep reads and writes.
+FluidView view_of(FluidState& s) {
+  FluidParticles& p = s.particles;
+  const FluidLists& l = s.lists;
+  FluidView v{};
+  v.size = p.size();
+  v.kernel = s.kernel;
+  v.spacing = s.spacing;
+  v.laws = s.laws.data();
+  v.kind = p.kind.data();
+  v.volume = p.volume.data();
+  for (int a = 0; a < 3; ++a) {
+    v.x[a] = p.x[a].data();
+    v.v[a] = p.v[a].data();
+    v.v_next[a] = s.v_next[a].data();
+    v.listed[a] = l.x[a].data();
+  }
+  v.pressure = p.pressure.data();
+  v.dense = p.dense.data();
+  v.wall_begin = l.wall_begin.data();
+  v.wall_soon = l.wall_soon.data();
+  v.wall_near = l.wall_near.data();
+  v.wall = l.wall.data();
+  v.before = s.before.data();
+  v.now = s.now.data();
+  v.walls_moved = std::max(s.walls_moved[0], s.walls_moved[1]);
+  v.motion = s.motion.data();
+  v.strength = s.strength.data();
+  v.tool_strength = s.tool_strength.data();
+  v.wall_push = s.wall_push.data();
+  v.near = s.near.data();
+  v.clear = s.clear.data();
+  s.touches.resize(p.size());
+  return v;
 }
 
 /// Puts the triangles that fluid meets where `corners` have them.
@@ -123,215 +119,22 @@ float particles_moved(FluidState& s) {
   }));
 }
 
-/// Density, pressure and what it weighs.
-void press(FluidState& s, const Substep& step, int i) {
-  FluidParticles& p = s.particles;
-  const FluidKernel& w = s.kernel;
-  const float x[3] = {p.x[0][i], p.x[1][i], p.x[2][i]};
-  const float sum = neighbour_volume(s, i);
-  const bool sees_walls = s.lists.wall_begin[i] < s.lists.wall_begin[i + 1];
-  const float tissue = sees_walls ? wall_share(s, i) : 0;
-  // Tools at right angles each take their share of what the others leave; what is tissue is none
-  // of theirs.
-  float clear = 1;
-  std::uint64_t near = 0;
-  for (std::size_t c = 0; c < step.colliders.size(); ++c) {
-    const float distance = gap(step.colliders[c], x).distance;
-    if (!(distance < w.reach)) continue;
-    near |= bit_of(c);
-    clear *= 1 - plane_share(w, distance).share;
-  }
-  s.near[i] = near;
-  const float of_tools = clear;
-  const float in_slit = std::clamp((clear - tissue) / kSlit, 0.0f, 1.0f);
-  clear = std::max(clear - tissue, 0.05f);
-  const float dense = 1 + (sum / (kPacking * clear) - 1) / kResponse;
-  const FluidLaw& law = s.laws[p.kind[i]];
-  const float damping = kRinging * law.density * law.sound() * 0.5f * w.reach;
-  const float rate = p.dense[i] > 0 ? (dense - p.dense[i]) / step.dt : 0;
-  p.dense[i] = dense;
-  const float pressure = law.bulk_modulus * (dense - 1) + damping * rate;
-  const float most = kMostStrain * in_slit * in_slit * law.bulk_modulus;
-  p.pressure[i] = dense > 1 ? std::clamp(pressure, 0.0f, most) : 0;
-  // Of the energy that the pressure does work against, the slopes by the sum and by the walls.
-  const float slope = p.pressure[i] / (dense * dense * kPacking * kResponse * clear);
-  s.motion[4 * static_cast<std::size_t>(i) + 3] = slope;
-  s.strength[i] = p.volume[i] * slope * sum / clear;
-  s.tool_strength[i] = s.strength[i] * of_tools;
-}
-
-/// Forces; the speed after them.
-void push(FluidState& s, const Substep& step, ColliderLoad* loads, int i) {
-  FluidParticles& p = s.particles;
-  const FluidKernel& w = s.kernel;
-  const float x[3] = {p.x[0][i], p.x[1][i], p.x[2][i]}, v[3] = {p.v[0][i], p.v[1][i], p.v[2][i]};
-  const FluidLaw& law = s.laws[p.kind[i]];
-  float force[3] = {};
-  add_pair_forces(s, i, force);
-  for (int a = 0; a < 3; ++a) {
-    force[a] += s.strength[i] * s.wall_push[4 * static_cast<std::size_t>(i) + a];
-  }
-  for (std::size_t c = 0; c < step.colliders.size(); ++c) {
-    if ((s.near[i] & bit_of(c)) == 0) continue;
-    const Gap g = gap(step.colliders[c], x);
-    const WallShare of = plane_share(w, g.distance);
-    if (!(of.face > 0)) continue;
-    const float push = s.tool_strength[i] * of.face / (1 - of.share);
-    float on[3], arm[3], turn[3];
-    for (int a = 0; a < 3; ++a) {
-      force[a] += push * g.normal[a];
-      on[a] = -push * g.normal[a];
-      arm[a] = x[a] - g.distance * g.normal[a] - step.colliders[c].position[a];
-    }
-    cross3(arm, on, turn);
-    for (int a = 0; a < 3; ++a) {
-      loads[c].force[a] += on[a];
-      loads[c].torque[a] += turn[a];
-    }
-  }
-  const float by_mass = step.dt / (p.volume[i] * law.density);
-  for (int a = 0; a < 3; ++a) {
-    s.v_next[a][i] = step.keep * (v[a] + step.dt * step.gravity[a] + by_mass * force[a]);
-  }
-}
-
-/// Whether a place that moves from x to y meets a triangle that moves meanwhile, or ends too near
-/// to it; then by how much y is to be raised along its normal.
-bool meets(const WallTriangle& begin, const WallTriangle& end, const float* x, const float* y,
-           float margin, float& raise) {
-  const float before = begin.height(x), after = end.height(y);
-  if (after >= margin || before < -0.5f * margin) return false;
-  // Where it passes the plane, or ends above it.
-  const float share = after < 0 ? std::max(before, 0.0f) / (std::max(before, 0.0f) - after) : 1.0f;
-  float corner[3][3], place[3];
-  for (int a = 0; a < 3; ++a) {
-    place[a] = x[a] + share * (y[a] - x[a]);
-    for (int k = 0; k < 3; ++k) {
-      corner[k][a] = begin.corner[k][a] + share * (end.corner[k][a] - begin.corner[k][a]);
-    }
-  }
-  for (int k = 0; k < 3; ++k) {
-    const float *from = corner[k], *to = corner[(k + 1) % 3];
-    const float e[3] = {to[0] - from[0], to[1] - from[1], to[2] - from[2]};
-    const float d[3] = {place[0] - from[0], place[1] - from[1], place[2] - from[2]};
-    float c[3];
-    cross3(e, d, c);
-    if (dot3(c, end.normal) < -1e-3f * end.edge2) return false;
-  }
-  raise = margin - after;
-  return true;
-}
-
-/// Raises y, where a particle comes to from x, before the triangles that move from `begin` to `end`
-/// within `time`; what they take of its speed is an impulse.
-void stop_at_walls(FluidState& s, const std::vector<WallTriangle>& begin,
-                   const std::vector<WallTriangle>& end, float time, int i, const float* x,
-                   float* y, float* v) {
-  if (s.lists.wall_begin[i] == s.lists.wall_near[i]) return;
-  const float margin = kRoom * s.spacing;
-  const float mass = s.particles.volume[i] * s.laws[s.particles.kind[i]].density;
-  FluidState::Touch& touch = s.touches[i];
-  // Both ends of its way are nearer to where its walls were last looked at than these were, less
-  // what they moved by.
-  FluidState::Clear& clear = s.clear[i];
-  const float moved = std::max(s.walls_moved[0], s.walls_moved[1]);
-  const auto way = [&](const float* from) {
-    float before2 = 0, after2 = 0;
-    for (int a = 0; a < 3; ++a) {
-      before2 += (x[a] - from[a]) * (x[a] - from[a]);
-      after2 += (y[a] - from[a]) * (y[a] - from[a]);
-    }
-    return std::sqrt(std::max(before2, after2));
-  };
-  if (way(clear.x) < clear.room - moved) return;
-  const FluidLists& l = s.lists;
-  const float listed[3] = {l.x[0][i], l.x[1][i], l.x[2][i]};
-  const float soon = kSoon * s.spacing - way(listed) - moved;  // nearer than that is none but these
-  const std::int32_t until = soon > margin ? l.wall_soon[i] : l.wall_near[i];
-  float nearest = soon > margin ? soon : s.kernel.reach;
-  for (std::int32_t e = l.wall_begin[i]; e < until; ++e) {
-    const WallTriangle& t = end[l.wall[e]];
-    const float height = std::fabs(t.height(x));
-    if (height < nearest) nearest = std::min(nearest, std::max(height, t.beside(x)));
-  }
-  clear = {{x[0], x[1], x[2]}, nearest - moved - margin};
-  if (way(clear.x) < clear.room - moved) return;
-  for (int pass = 0; pass < 3; ++pass) {
-    float deepest = 0;
-    std::int32_t hit = -1;
-    for (std::int32_t e = l.wall_begin[i]; e < until; ++e) {
-      const std::int32_t t = l.wall[e];
-      float raise = 0;
-      if (end[t].height(y) >= margin) continue;
-      if (meets(begin[t], end[t], x, y, margin, raise) && raise > deepest) {
-        deepest = raise;
-        hit = t;
-      }
-    }
-    if (hit < 0) break;
-    const WallTriangle &from = begin[hit], &to = end[hit];
-    float u[3];
-    for (int a = 0; a < 3; ++a) {
-      u[a] = v[a] - (to.middle[a] - from.middle[a]) / time;
-      y[a] += deepest * to.normal[a];
-    }
-    const float into = std::min(0.0f, dot3(u, to.normal));
-    touch.triangle = hit;
-    for (int a = 0; a < 3; ++a) {
-      v[a] -= into * to.normal[a];
-      touch.impulse[a] += mass * into * to.normal[a];
-    }
-  }
-}
-
-/// Moves a particle to where no wall is in its way.
-void move(FluidState& s, const Substep& step, ColliderLoad* loads, int i) {
-  FluidParticles& p = s.particles;
-  const float margin = kRoom * s.spacing;
-  const float mass = p.volume[i] * s.laws[p.kind[i]].density;
-  float x[3], y[3], v[3];
-  for (int a = 0; a < 3; ++a) {
-    x[a] = p.x[a][i];
-    v[a] = s.v_next[a][i];
-    y[a] = x[a] + step.dt * v[a];
-  }
-  stop_at_walls(s, s.now, s.now, step.dt, i, x, y, v);
-  for (std::size_t c = 0; c < step.colliders.size(); ++c) {
-    if ((s.near[i] & bit_of(c)) == 0) continue;
-    const Collider& of = step.colliders[c];
-    const Gap g = gap(of, y);
-    if (g.distance >= margin) continue;
-    float u[3], on[3], arm[3], turn[3];
-    velocity_at(of, y, u);
-    for (int a = 0; a < 3; ++a) u[a] = v[a] - u[a];
-    const float into = std::min(0.0f, dot3(u, g.normal));
-    for (int a = 0; a < 3; ++a) {
-      y[a] += (margin - g.distance) * g.normal[a];
-      v[a] -= into * g.normal[a];
-      on[a] = mass * into * g.normal[a] / step.dt;
-      arm[a] = y[a] - of.position[a];
-    }
-    cross3(arm, on, turn);
-    for (int a = 0; a < 3; ++a) {
-      loads[c].force[a] += on[a];
-      loads[c].torque[a] += turn[a];
-    }
-  }
-  for (int a = 0; a < 3; ++a) {
-    p.x[a][i] = y[a];
-    p.v[a][i] = v[a];
-  }
-}
-
-/// Calls f(i, loads) for each particle; loads are summed by chunks, in order.
+/// Calls f(i, add) for each particle; what is added to loads is summed by chunks, in order.
 template <class F>
 void with_loads(FluidState& s, std::vector<ColliderLoad>& loads, const F& f) {
   const int n = s.particles.size(), chunks = (n + kParticlesEach - 1) / kParticlesEach;
   const std::size_t colliders = loads.size();
   std::vector<ColliderLoad> of(chunks * colliders);
   s.cpu->for_each(chunks, [&](int chunk) {
+    ColliderLoad* const to = of.data() + chunk * colliders;
+    const auto add = [to](int c, const float* force, const float* torque) {
+      for (int a = 0; a < 3; ++a) {
+        to[c].force[a] += force[a];
+        to[c].torque[a] += torque[a];
+      }
+    };
     for (int i = chunk * kParticlesEach; i < std::min(n, (chunk + 1) * kParticlesEach); ++i) {
-      f(i, of.data() + chunk * colliders);
+      f(i, add);
     }
   });
   for (int chunk = 0; chunk < chunks; ++chunk) {
@@ -345,12 +148,11 @@ void with_loads(FluidState& s, std::vector<ColliderLoad>& loads, const F& f) {
 }
 
 /// Of particles that walls met: what they gave them goes to the wall around, as far as a particle
-/// reaches, and in each triangle to the corners in equal parts. A triangle alone may be of a shred
-/// that is lighter than the particle: it would be thrown back faster than it came, time and again.
-void collect_touches(const FluidState& s, FluidWalls& walls) {
+/// reaches, and in each triangle to the corners in equal parts.
+void collect_touches(const FluidState& s, const FluidView& view, FluidWalls& walls) {
   std::vector<float> weight;
-  for (std::size_t i = 0; i < s.touches.size(); ++i) {
-    const FluidState::Touch& touch = s.touches[i];
+  for (int i = 0; i < view.size; ++i) {
+    const FluidTouch& touch = s.touches[i];
     if (touch.triangle < 0) continue;
     const auto give = [&](std::int32_t triangle, float share) {
       for (int k = 0; k < 9; ++k) {
@@ -358,20 +160,12 @@ void collect_touches(const FluidState& s, FluidWalls& walls) {
       }
     };
     const float* normal = s.now[touch.triangle].normal;
+    const float x[3] = {view.x[0][i], view.x[1][i], view.x[2][i]};
     const std::int32_t begin = s.lists.wall_begin[i], end = s.lists.wall_begin[i + 1];
     weight.assign(end - begin, 0.0f);
     float sum = 0;
     for (std::int32_t e = begin; e < end; ++e) {
-      const WallTriangle& t = s.now[s.lists.wall[e]];
-      float away2 = 0;
-      for (int a = 0; a < 3; ++a) {
-        const float d = t.middle[a] - s.particles.x[a][i];
-        away2 += d * d;
-      }
-      const float left = 1 - away2 / (s.kernel.reach * s.kernel.reach),
-                  facing = dot3(t.normal, normal);
-      if (!(left > 0 && facing > 0)) continue;
-      sum += weight[e - begin] = left * facing * t.area;
+      sum += weight[e - begin] = fluid::touch_weight(view, x, s.now[s.lists.wall[e]], normal);
     }
     if (!(sum > 0)) give(touch.triangle, 1);
     for (std::int32_t e = begin; e < end && sum > 0; ++e) {
@@ -381,7 +175,7 @@ void collect_touches(const FluidState& s, FluidWalls& walls) {
 }
 
 /// What pressure gives triangles in `time` goes to their corners likewise.
-void collect(FluidState& s, float time, FluidWalls& walls) {
+void collect(FluidState& s, const FluidView& view, float time, FluidWalls& walls) {
   constexpr int kChunks = 8,
                 kTriangles = 2048;  // whatever the number of threads, for the same bits
   const FluidLists& l = s.lists;
@@ -424,7 +218,7 @@ void collect(FluidState& s, float time, FluidWalls& walls) {
         }
       },
       256);
-  collect_touches(s, walls);
+  collect_touches(s, view, walls);
 }
 
 /// Takes the walls to where they end: the fluid then presses on them as they are, not as they were.
@@ -436,21 +230,12 @@ void move_walls(FluidState& s, FluidWalls& walls, float duration, bool were_list
     s.before.swap(s.now);
     place_triangles(s, walls.end, s.now);
   }
-  FluidParticles& p = s.particles;
-  s.touches.assign(p.size(), {-1, {}});
+  const FluidView view = view_of(s);
   s.cpu->for_each(
-      p.size(),
-      [&](int i) {
-        const float x[3] = {p.x[0][i], p.x[1][i], p.x[2][i]};
-        float y[3] = {x[0], x[1], x[2]}, v[3] = {p.v[0][i], p.v[1][i], p.v[2][i]};
-        stop_at_walls(s, s.before, s.now, duration, i, x, y, v);
-        for (int a = 0; a < 3; ++a) {
-          p.x[a][i] = y[a];
-          p.v[a][i] = v[a];
-        }
-      },
+      view.size,
+      [&](int i) { s.touches[i] = fluid::yield_to_walls(view, duration, i, fluid::OneLane()); },
       kParticlesEach);
-  collect_touches(s, walls);
+  collect_touches(s, view, walls);
 }
 
 /// After particles and walls were listed: what they see is to be summed.
@@ -464,7 +249,7 @@ void see_anew(FluidState& s) {
   s.wall_push.assign(4 * n, 0.0f);
 }
 
-void substep(FluidState& s, const Substep& step, FluidWalls& walls,
+void substep(FluidState& s, const FluidSubstep& step, FluidWalls& walls,
              std::vector<ColliderLoad>& loads) {
   const int n = s.particles.size();
   for (auto* field : {&s.strength, &s.tool_strength, &s.v_next[0], &s.v_next[1], &s.v_next[2]}) {
@@ -475,8 +260,8 @@ void substep(FluidState& s, const Substep& step, FluidWalls& walls,
     rows->resize(4 * static_cast<std::size_t>(n + 1));
     std::fill(rows->end() - 4, rows->end(), 0.0f);
   }
-  s.touches.assign(n, {-1, {}});
-  std::vector<ColliderLoad> forces(step.colliders.size());
+  const FluidView view = view_of(s);
+  std::vector<ColliderLoad> forces(step.collider_count);
   s.cpu->for_each(
       n,
       [&](int i) {
@@ -487,10 +272,21 @@ void substep(FluidState& s, const Substep& step, FluidWalls& walls,
       },
       kParticlesEach);
   s.cpu->for_each(
-      n, [&](int i) { press(s, step, i); }, kParticlesEach);
-  with_loads(s, forces, [&](int i, ColliderLoad* of) { push(s, step, of, i); });
-  with_loads(s, forces, [&](int i, ColliderLoad* of) { move(s, step, of, i); });
-  collect(s, step.dt, walls);
+      n,
+      [&](int i) {
+        const bool sees_walls = s.lists.wall_begin[i] < s.lists.wall_begin[i + 1];
+        fluid::press(view, step, i, neighbour_volume(s, i), sees_walls ? wall_share(s, i) : 0);
+      },
+      kParticlesEach);
+  with_loads(s, forces, [&](int i, const auto& add) {
+    float of_pairs[3] = {};
+    add_pair_forces(s, i, of_pairs);
+    fluid::push(view, step, i, of_pairs, add);
+  });
+  with_loads(s, forces, [&](int i, const auto& add) {
+    s.touches[i] = fluid::move(view, step, i, fluid::OneLane(), add);
+  });
+  collect(s, view, step.dt, walls);
   for (std::size_t c = 0; c < forces.size(); ++c) {
     for (int a = 0; a < 3; ++a) {
       loads[c].force[a] += step.weight * forces[c].force[a];
@@ -501,38 +297,55 @@ void substep(FluidState& s, const Substep& step, FluidWalls& walls,
 
 }  // namespace
 
-double stable_fluid_step(const FluidState& s) {
-  float fastest = 0, least = 1e30f;
-  const FluidParticles& p = s.particles;
+float fastest_of(const FluidParticles& p) {
+  float fastest = 0;
   for (int i = 0; i < p.size(); ++i) {
     const float v[3] = {p.v[0][i], p.v[1][i], p.v[2][i]};
     fastest = std::max(fastest, dot3(v, v));
   }
-  fastest = std::sqrt(fastest);
+  return std::sqrt(fastest);
+}
+
+double stable_fluid_step(const FluidState& s, float fastest) {
+  float least = 1e30f;
   const float length = 0.5f * s.kernel.reach;
   for (const FluidLaw& law : s.laws) {
-    const float nu = artificial_viscosity(s, law) / law.density;
-    least =
-        std::min({least, kCourant * length / (law.sound() + fastest), 0.1f * length * length / nu});
+    const float nu = fluid::artificial_viscosity(s.kernel, law) / law.density;
+    least = std::min(
+        {least, fluid::kCourant * length / (law.sound() + fastest), 0.1f * length * length / nu});
   }
   return least;
+}
+
+FluidSubstep fluid_substep(const FluidDrive& drive, int count,
+                           const std::vector<Collider>& colliders) {
+  FluidSubstep step{};
+  step.dt = static_cast<float>(drive.duration / count);
+  step.weight = static_cast<float>(1.0 / count);
+  for (int a = 0; a < 3; ++a) step.gravity[a] = static_cast<float>(drive.gravity[a]);
+  step.keep = static_cast<float>(std::exp(-drive.damping * step.dt));
+  step.colliders = colliders.data();
+  step.collider_count = static_cast<int>(colliders.size());
+  return step;
 }
 
 int advance_fluid(FluidState& s, const FluidDrive& drive, FluidWalls& walls,
                   std::vector<ColliderLoad>& loads) {
   walls.impulse.resize(walls.end.size());
   if (s.particles.size() == 0) return 0;
-  const int count = std::max(1, static_cast<int>(std::ceil(drive.duration / stable_fluid_step(s))));
-  const auto dt = static_cast<float>(drive.duration / count);
+  const int count = std::max(
+      1,
+      static_cast<int>(std::ceil(drive.duration / stable_fluid_step(s, fastest_of(s.particles)))));
   s.viscosity.clear();
-  for (const FluidLaw& law : s.laws) s.viscosity.push_back(artificial_viscosity(s, law));
-  const float skin = 0.15f * s.kernel.reach;
+  for (const FluidLaw& law : s.laws)
+    s.viscosity.push_back(fluid::artificial_viscosity(s.kernel, law));
+  const float skin = fluid::kSkin * s.kernel.reach, far = fluid::kMayMove * s.kernel.reach;
   if (s.lists.corners.size() != walls.end.size()) s.lists.made = false;
   s.walls_moved[0] = s.walls_moved[1];
   s.walls_moved[1] = s.lists.made ? walls_moved(s, walls.end) : 0;
-  if (s.walls_moved[1] > kMayMove * skin) s.lists.made = false;
+  if (s.walls_moved[1] > far) s.lists.made = false;
   for (int i = 0; i < count; ++i) {
-    const bool make = !s.lists.made || particles_moved(s) > kMayMove * skin;
+    const bool make = !s.lists.made || particles_moved(s) > far;
     if (make) {
       list_neighbours(s, walls.end, skin);
       see_anew(s);
@@ -543,13 +356,7 @@ int advance_fluid(FluidState& s, const FluidDrive& drive, FluidWalls& walls,
     if (i == 0 || make) face_walls(s);
     const double share = (i + 1.0) / count;
     const std::vector<Collider> colliders = drive.colliders(share);
-    const Vec3& g = drive.gravity;
-    const Substep step{
-        dt,
-        static_cast<float>(1.0 / count),
-        {static_cast<float>(g[0]), static_cast<float>(g[1]), static_cast<float>(g[2])},
-        static_cast<float>(std::exp(-drive.damping * dt)),
-        colliders};
+    const FluidSubstep step = fluid_substep(drive, count, colliders);
     substep(s, step, walls, loads);
   }
   return count;
@@ -594,35 +401,10 @@ void remove_particles(FluidState& s, const std::vector<std::uint8_t>& gone) {
 }
 
 void push_out_of_walls(FluidState& s, const std::vector<float>& corners) {
-  FluidParticles& p = s.particles;
-  const float depth = 0.5f * s.spacing, margin = kRoom * s.spacing;
   list_neighbours(s, corners, 0);
+  const FluidView view = view_of(s);
   s.cpu->for_each(
-      p.size(),
-      [&](int i) {
-        const float x[3] = {p.x[0][i], p.x[1][i], p.x[2][i]};
-        float nearest = depth;
-        std::int32_t behind = -1;
-        for (std::int32_t e = s.lists.wall_begin[i]; e < s.lists.wall_near[i]; ++e) {
-          const WallTriangle& t = s.now[s.lists.wall[e]];
-          const float above[3] = {x[0] + (depth - t.height(x)) * t.normal[0],
-                                  x[1] + (depth - t.height(x)) * t.normal[1],
-                                  x[2] + (depth - t.height(x)) * t.normal[2]};
-          const float below[3] = {x[0] - (depth + t.height(x)) * t.normal[0],
-                                  x[1] - (depth + t.height(x)) * t.normal[1],
-                                  x[2] - (depth + t.height(x)) * t.normal[2]};
-          float raise;
-          if (std::fabs(t.height(x)) >= nearest || !meets(t, t, above, below, margin, raise))
-            continue;
-          nearest = std::fabs(t.height(x));
-          behind = t.height(x) < margin ? s.lists.wall[e] : -1;
-        }
-        if (behind < 0) return;
-        const WallTriangle& t = s.now[behind];
-        const float raise = margin - t.height(x);
-        for (int a = 0; a < 3; ++a) p.x[a][i] += raise * t.normal[a];
-      },
-      64);
+      view.size, [&](int i) { fluid::leave_wall(view, i); }, 64);
   s.lists.made = false;
 }
 

@@ -78,7 +78,7 @@ void settle(FluidState& s, const std::vector<float>& corners, double density) {
   FluidWalls walls;
   walls.begin = walls.end = corners;
   FluidDrive drive;
-  const double step = stable_fluid_step(s);
+  const double step = stable_fluid_step(s, 0);
   drive.duration = kSteps * step;
   drive.damping = 0.1 / step;
   drive.colliders = [](double) { return std::vector<Collider>(); };

@@ -10,9 +10,24 @@
 
 #include <cmath>
 
+#include "compute/choose.h"
 #include "compute/host_device.h"
 
 namespace tissue_sim {
+
+namespace fluid {
+
+/// a where v is negative, else b.
+template <class V>
+TISSUE_SIM_INLINE V where_negative(V v, V a, V b) {
+  return choose(less(v, V{}), a, b);
+}
+template <class V>
+TISSUE_SIM_INLINE V lesser(V a, V b) {
+  return choose(less(a, b), a, b);
+}
+
+}  // namespace fluid
 
 /// Wendland's C2 kernel in three dimensions; t = r / reach, below 1.
 struct FluidKernel {

@@ -10,21 +10,14 @@
 #include "compute/array.h"
 #include "compute/for_each.h"
 #include "compute/simd.h"
-#include "fluid/fluid_laws.h"
+#include "fluid/particle_steps.h"
 #include "tissue_sim/fluid.h"
 #include "tissue_sim/types.h"
-#include "tools/collider.h"
 
 namespace tissue_sim {
 
 /// Of the spacing, what the kernel reaches.
 inline constexpr float kFluidReach = 2.6f;
-
-/// A Fluid as a substep reads it.
-struct FluidLaw {
-  float density, viscosity, bulk_modulus;
-  float sound() const { return std::sqrt(bulk_modulus / density); }  ///< [m/s]
-};
 
 /// Particles by their number; those beside one another in space are near in it: sort_particles().
 struct FluidParticles {
@@ -47,8 +40,6 @@ struct FluidWalls {
   int size() const { return static_cast<int>(end.size() / 9); }
 };
 
-/// Spacings within which a wall is soon to be touched.
-inline constexpr float kSoon = 0.5f;
 /// Numbers beside one another in sums over neighbours and walls.
 inline constexpr int kFluidLanes = 16;
 
@@ -93,12 +84,7 @@ struct FluidState {
     std::int32_t is_new;
   };
   std::vector<Seen> seen_at;
-  /// Where a particle was, and how far nothing comes that it may touch, but for what walls move by
-  /// from where they were listed [m].
-  struct Clear {
-    float x[3], room;
-  };
-  std::vector<Clear> clear;
+  std::vector<FluidClear> clear;
   std::vector<float> wall_impulse;  ///< on triangles, by chunks of particles [N s]
   std::vector<float> viscosity;     ///< of each law, with what keeps jitter down [Pa s]
   Array<float> place;               ///< of each particle, and of none: x, y, z, volume
@@ -109,11 +95,7 @@ struct FluidState {
                                ///< far they came
   std::vector<std::uint64_t> near;  ///< which colliders it may meet, as bits
   Array<float> v_next[3];
-  struct Touch {
-    std::int32_t triangle;  ///< -1 for none
-    float impulse[3];       ///< of the particle on it [N s]
-  };
-  std::vector<Touch> touches;
+  std::vector<FluidTouch> touches;
 };
 
 /// What moves fluid through an interval.
@@ -125,8 +107,15 @@ struct FluidDrive {
   std::function<std::vector<Collider>(double)> colliders;
 };
 
-/// The longest substep that is stable [s].
-double stable_fluid_step(const FluidState& state);
+/// Of the fastest particle [m/s].
+float fastest_of(const FluidParticles& particles);
+
+/// The longest substep that is stable at the fastest particle's speed [s].
+double stable_fluid_step(const FluidState& state, float fastest);
+
+/// One of `count` substeps of an interval.
+FluidSubstep fluid_substep(const FluidDrive& drive, int count,
+                           const std::vector<Collider>& colliders);
 
 /// Advances the fluid; `walls` receive impulses on their corners, `loads` what acts on the
 /// colliders as the mean over the interval. Returns the number of substeps.

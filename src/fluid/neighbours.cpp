@@ -271,7 +271,7 @@ void list_neighbours(FluidState& s, const std::vector<float>& corners, float ski
   s.cpu->for_each(
       static_cast<int>(s.now.size()), [&](int t) { s.now[t].place(&corners[std::size_t{9} * t]); },
       512);
-  list_walls(s, reach, 0.5f * s.kernel.reach, kSoon * s.spacing);
+  list_walls(s, reach, 0.5f * s.kernel.reach, fluid::kSoon * s.spacing);
   for (int a = 0; a < 3; ++a) l.x[a] = p.x[a];
   l.corners = corners;
   l.made = true;

@@ -6,26 +6,13 @@
 #include "compute/choose.h"
 #include "compute/rows.h"
 #include "compute/simd.h"
+#include "fluid/wall_integrals.h"
 
 namespace tissue_sim {
 namespace lanes {
 namespace {
 
 constexpr int kLanes = kFluidLanes;
-
-/// a where v is negative, else b.
-template <class V>
-TISSUE_SIM_INLINE V where_negative(V v, V a, V b) {
-  return choose(less(v, V{}), a, b);
-}
-template <class V>
-TISSUE_SIM_INLINE V lesser(V a, V b) {
-  return choose(less(a, b), a, b);
-}
-template <class V>
-TISSUE_SIM_INLINE V magnitude(V v) {
-  return where_negative(v, -v, v);
-}
 
 /// Rows of four numbers side by side: of[k] has the k-th of each.
 template <int W>
@@ -73,7 +60,7 @@ TISSUE_SIM_INLINE float neighbour_volume_by(const FluidState& s, int i) {
       const Columns<W> place = gather<W>(s.place.data(), &s.lists.other[e + W * part]);
       const V dx = x[0] - place.of[0], dy = x[1] - place.of[1], dz = x[2] - place.of[2];
       V t = square_root(dx * dx + dy * dy + dz * dz) * by_reach;
-      t = lesser(t, one);
+      t = fluid::lesser(t, one);
       const V u2 = (one - t) * (one - t);
       sum[part] += place.of[3] * (u2 * u2 * (4 * t + one));
     }
@@ -109,7 +96,7 @@ TISSUE_SIM_INLINE void add_pair_forces_by(const FluidState& s, int i, float* for
       const V dx = x[0] - place.of[0], dy = x[1] - place.of[1], dz = x[2] - place.of[2];
       const V r2 = dx * dx + dy * dy + dz * dz;
       V t = square_root(r2) * by_reach;
-      t = lesser(t, one);
+      t = fluid::lesser(t, one);
       const V w = one - t;
       const V nearing =
           (v[0] - motion.of[0]) * dx + (v[1] - motion.of[1]) * dy + (v[2] - motion.of[2]) * dz;
@@ -164,64 +151,26 @@ namespace wall_sums {
 namespace {
 
 using namespace lanes;  // NOLINT: what these sums are made of
-constexpr float kPi = FluidKernel::kPi;
-
-/// Of the reach: a triangle with longer edges is summed in parts; at most so many along an edge.
-constexpr float kPart = 0.75f;
-constexpr int kMostParts = 8;
-/// Radii of a triangle: from there on its middle stands for it, the share within 0.001.
-constexpr float kFar = 4;
 /// A share is summed anew when it changed by so much, or the place by so much of the reach; until
 /// then it follows by its slope.
 constexpr float kKeepShare = 0.015f, kKeep = 0.03f;
 
-/// Places of a triangle by two of their coordinates, three in each of its `n` times `n` parts: they
-/// integrate squares exactly.
+/// Places of a triangle in `n` times `n` parts.
 struct Places {
-  int count[kMostParts + 1];
-  float a[kMostParts + 1][3 * kMostParts * kMostParts],
-      b[kMostParts + 1][3 * kMostParts * kMostParts];
+  int count[fluid::kMostParts + 1];
+  float a[fluid::kMostParts + 1][3 * fluid::kMostParts * fluid::kMostParts],
+      b[fluid::kMostParts + 1][3 * fluid::kMostParts * fluid::kMostParts];
   constexpr Places() : count(), a(), b() {
-    for (int n = 1; n <= kMostParts; ++n) {
+    for (int n = 1; n <= fluid::kMostParts; ++n) {
       int& k = count[n];
-      for (int i = 0; i < n; ++i) {
-        for (int j = 0; i + j < n; ++j) {
-          for (int down = 0; down < (i + j + 1 < n ? 2 : 1); ++down) {
-            for (int c = 0; c < 3; ++c, ++k) {
-              const float u = c == 1 ? 2.0f / 3 : 1.0f / 6, v = c == 2 ? 2.0f / 3 : 1.0f / 6;
-              a[n][k] = (i + (down == 0 ? u : 1 - u)) / n;
-              b[n][k] = (j + (down == 0 ? v : 1 - v)) / n;
-            }
-          }
-        }
+      for (fluid::TrianglePlaces at(n); !at.done(); at.next(), ++k) {
+        a[n][k] = at.a();
+        b[n][k] = at.b();
       }
     }
   }
 };
 constexpr Places kPlaces;
-
-/// atan2, within 1e-7 (the polynomial: Abramowitz and Stegun 4.4.49).
-template <class V>
-TISSUE_SIM_INLINE V angle(V y, V x) {
-  const V ax = magnitude(x), ay = magnitude(y), lower = ax - ay;
-  const V t = lesser(ax, ay) / (larger(ax, ay) + 1e-30f), s = t * t;
-  V p = 0.0028662257f * s - 0.0161657367f;
-  p = p * s + 0.0429096138f;
-  p = p * s - 0.0752896400f;
-  p = p * s + 0.1065626393f;
-  p = p * s - 0.1420889944f;
-  p = p * s + 0.1999355085f;
-  p = p * s - 0.3333314528f;
-  p = t + t * (s * p);
-  p = where_negative(lower, kPi / 2 - p, p);
-  p = where_negative(x, kPi - p, p);
-  return where_negative(y, -p, p);
-}
-
-template <class V>
-TISSUE_SIM_INLINE V dot(const V* a, const V* b) {
-  return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-}
 
 /// What a particle sees of walls, while it is summed.
 template <int W>
@@ -245,9 +194,7 @@ struct Sums {
 /// Where triangles begin in rows of four numbers.
 constexpr int kRows = sizeof(WallTriangle) / (4 * sizeof(float));
 
-/// The solid angle is exact; what the kernel has within the triangle, which is smooth, and the
-/// kernel itself are summed over places. `triangle` has kLanes of them; those from `count` on do
-/// not count.
+/// `triangle` has kLanes of them; those from `count` on do not count.
 template <int W>
 TISSUE_SIM_INLINE void add_close(const FluidState& s, const float* x, const std::int32_t* triangle,
                                  int count, Sums<W>& sums) {
@@ -259,49 +206,20 @@ TISSUE_SIM_INLINE void add_close(const FluidState& s, const float* x, const std:
     row[l] = kRows * triangle[l];
     longest2 = std::max(longest2, s.now[triangle[l]].edge2);
   }
-  const int parts =
-      std::clamp(static_cast<int>(std::ceil(std::sqrt(longest2) / (kPart * reach))), 1, kMostParts);
-  const int places = kPlaces.count[parts];
-  const float by_places = 1.0f / static_cast<float>(places);
-  const V one = all_lanes<V>(1), by_reach = all_lanes<V>(1 / reach);
+  const int parts = fluid::parts_of(longest2, reach), places = kPlaces.count[parts];
   for (int part = 0; part < kLanes / W && W * part < count; ++part) {
     const float* at = s.now[0].middle + 4;
     const Columns<W> side = gather<W>(at, row + W * part);
     const Columns<W> corner[3] = {gather<W>(at + 4, row + W * part),
                                   gather<W>(at + 8, row + W * part),
                                   gather<W>(at + 12, row + W * part)};
-    V c[3][3], r[3];
-    for (int k = 0; k < 9; ++k) c[k / 3][k % 3] = corner[k / 4].of[k % 4] - x[k % 3];
-    const V* n = side.of;
-    for (int k = 0; k < 3; ++k) r[k] = square_root(dot(c[k], c[k]));
-    const V area = keep<W>(lanes_between<W>(0, count - W * part), side.of[3]),
-            height = -dot(c[0], n);
-    // Twice the area along the normal makes the volume that the corners span with the place. What
-    // has no normal has no angle.
-    const V half = angle(2 * area * height, r[0] * r[1] * r[2] + dot(c[0], c[1]) * r[2] +
-                                                dot(c[1], c[2]) * r[0] + dot(c[2], c[0]) * r[1]);
-    V from[3], to[3], within = {}, face = {};
-    for (int a = 0; a < 3; ++a) {
-      from[a] = c[1][a] - c[0][a];
-      to[a] = c[2][a] - c[0][a];
-    }
-    for (int k = 0; k < places; ++k) {
-      V at_place[3];
-      for (int a = 0; a < 3; ++a) {
-        at_place[a] = c[0][a] + kPlaces.a[parts][k] * from[a] + kPlaces.b[parts][k] * to[a];
-      }
-      const V t = square_root(dot(at_place, at_place)) * by_reach, t2 = t * t, u = one - t;
-      const V inside = 14 + t2 * (-84 + t * (140 + t * (-90 + 21 * t)));
-      within += where_negative(u, one / (t2 * t + 1e-30f), inside);
-      const V near = where_negative(u, V{}, u), u2 = near * near;
-      face += u2 * u2 * (4 * t + one);
-    }
-    sums.share[part] += keep<W>(lanes_between<W>(0, count - W * part),
-                                where_negative(dot(n, n) - 0.5f, V{}, half)) *
-                            (1 / (2 * kPi)) -
-                        area * height * within * (by_places / (4 * kPi * reach * reach * reach));
-    sums.keep(triangle + W * part, std::min(W, count - W * part),
-              area * face * (by_places * s.kernel.value(0)));
+    fluid::CloseTriangle<V> t;
+    for (int k = 0; k < 9; ++k) t.c[k / 3][k % 3] = corner[k / 4].of[k % 4] - x[k % 3];
+    t.begin(side.of, keep<W>(lanes_between<W>(0, count - W * part), side.of[3]), reach);
+    for (int k = 0; k < places; ++k) t.add_place(kPlaces.a[parts][k], kPlaces.b[parts][k]);
+    sums.share[part] += keep<W>(lanes_between<W>(0, count - W * part), t.angle_share()) -
+                        t.kernel_share(places, reach);
+    sums.keep(triangle + W * part, std::min(W, count - W * part), t.over(places, s.kernel));
   }
 }
 
@@ -312,7 +230,6 @@ TISSUE_SIM_INLINE void add_far(const FluidState& s, const float* from, const std
   using V = Vec<W>;
   std::int32_t row[kLanes];
   for (int l = 0; l < kLanes; ++l) row[l] = kRows * triangle[l];
-  const V one = all_lanes<V>(1);
   for (int part = 0; part < kLanes / W && W * part < count; ++part) {
     const Columns<W> place = gather<W>(s.now[0].middle, row + W * part),
                      normal = gather<W>(s.now[0].middle + 4, row + W * part);
@@ -322,13 +239,9 @@ TISSUE_SIM_INLINE void add_far(const FluidState& s, const float* from, const std
       n[a] = normal.of[a];
     }
     const V area = keep<W>(lanes_between<W>(0, count - W * part), normal.of[3]);
-    const V r = square_root(dot(x, x));
-    const V t = lesser(r * all_lanes<V>(1 / s.kernel.reach), one);
-    const V t2 = t * t, u2 = (one - t) * (one - t);
-    const V beyond = one - t2 * t * (14 + t2 * (-84 + t * (140 + t * (-90 + 21 * t))));
-    sums.share[part] += area * beyond * dot(x, n) / (r * r * r + 1e-30f) * (-1 / (4 * kPi));
-    sums.keep(triangle + W * part, std::min(W, count - W * part),
-              area * (u2 * u2 * (4 * t + one)) * s.kernel.value(0));
+    const fluid::FarTriangle<V> t(x, n, area, s.kernel);
+    sums.share[part] += t.share;
+    sums.keep(triangle + W * part, std::min(W, count - W * part), t.over);
   }
 }
 
@@ -357,7 +270,7 @@ TISSUE_SIM_INLINE float see_walls_by(FluidState& s, int i) {
               radius = middle.of[3];
       const V d2 = dx * dx + dy * dy + dz * dz, far = reach + radius;
       store<W>(beyond_reach + W * part, d2 - far * far);
-      store<W>(radii + W * part, d2 - kFar * kFar * (radius * radius));
+      store<W>(radii + W * part, d2 - fluid::kFar * fluid::kFar * (radius * radius));
     }
     for (int l = 0; l < n; ++l) {
       close[closes] = away[aways] = s.lists.wall[e + l];

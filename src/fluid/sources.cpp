@@ -196,6 +196,15 @@ void FluidSources::begin_frame(double duration) {
   wound_flow_.assign(wound_triangle_.size(), -1.0);
 }
 
+bool FluidSources::acts(const FrameInput& input) const {
+  for (std::size_t i = 0; i < input.tools.size(); ++i) {
+    const ToolType type = scene_.tools[i].type;
+    const bool is_tube = type == ToolType::kSuction || type == ToolType::kIrrigation;
+    if (is_tube && input.tools[i].present) return true;
+  }
+  return !wound_triangle_.empty() || !drained_.empty();
+}
+
 void FluidSources::act(const FrameInput& input, double duration, const FluidWalls& walls,
                        FluidState& fluid) {
   for (std::size_t i = 0; i < input.tools.size(); ++i) {

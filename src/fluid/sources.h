@@ -30,6 +30,8 @@ class FluidSources {
   /// Whether what was read is of this scene, with a surface of so many triangles.
   bool is_sound(std::size_t triangles) const;
   bool bleeds() const { return bleeds_; }
+  /// Whether act() may change any particle.
+  bool acts(const FrameInput& input) const;
   const std::vector<FluidSums>& sums() const { return sums_; }
   std::vector<FluidSums>& sums() { return sums_; }
   double bleeding(int kind) const { return bled_in_frame_[kind] / frame_; }

@@ -10,7 +10,7 @@
 #include <string>
 #include <vector>
 
-#include "fluid/fluid_state.h"
+#include "fluid/fluid_device.h"
 #include "fluid/sources.h"
 #include "tissue_sim/tissue.h"
 
@@ -28,7 +28,9 @@ class TissueWithFluid : public Tissue {
  public:
   /// What makes the tissue: of a scene with its fluids and hollows. Throws what fill_scene() does.
   using Make = std::unique_ptr<Tissue> (*)(const Scene&, std::vector<std::string>);
-  TissueWithFluid(const Scene& scene, std::vector<std::string> notes, Make make);
+  /// `device`: where the fluid moves; null for the CPU.
+  TissueWithFluid(const Scene& scene, std::vector<std::string> notes, Make make,
+                  std::unique_ptr<FluidDevice> device = nullptr);
 
   void advance(double duration, const FrameInput& input) override;
   FrameResult finish() override { return result_; }
@@ -60,6 +62,9 @@ class TissueWithFluid : public Tissue {
   void each_field(Archive& archive);
   void advance_interval(double duration, const FrameInput& input);
   void read_walls();  ///< the surface as it is becomes the end of an interval
+  /// The same on the host. Returns whether it is another surface, which begins there, too.
+  bool read_walls_on_host();
+  void begin_on_gpu();  ///< with particles, and walls as they are
   void find_bits();
   void fill_up(double duration);
   void drop_lost();
@@ -72,7 +77,11 @@ class TissueWithFluid : public Tissue {
   std::vector<Fluid> kinds_;
   std::unique_ptr<Tissue> tissue_;
   FluidState fluid_;
+  std::unique_ptr<FluidDevice> device_;
   FluidWalls walls_;
+  bool acts_ = false;           ///< what needs walls and particles on the host, in this interval
+  bool pushes_on_gpu_ = false;  ///< what fluid presses does not come to the host
+  bool walls_on_gpu_ = false;   ///< since they were last the host's, too
   SurfaceTriangles surface_;
   std::vector<float> rest_;  ///< its places at time zero, as when it was made
   std::vector<FillProgress> fills_;

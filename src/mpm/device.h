@@ -107,6 +107,9 @@ class MpmDevice {
   virtual void bring_all_nodes() {}
   /// Sets BoundaryMesh::now, of a mesh that is the tissue's.
   virtual void place_boundary() = 0;
+  /// The same where the device is: Tissue::surface_on_gpu(), push_surface_on_gpu().
+  virtual GpuSurface place_boundary_on_gpu() { return {}; }
+  virtual void push_boundary_on_gpu(const float* /*impulses*/) {}
 
   /// The end of a frame with a fragment network: pieces begin to fly. Lists the points that are
   /// strained, and returns whether any piece moved.

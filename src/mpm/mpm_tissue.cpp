@@ -98,6 +98,23 @@ void MpmTissue::read_surface(SurfaceTriangles& surface) {
 
 void MpmTissue::push_surface(Span<const float> impulses) {
   tissue_sim::push_surface(run_->state, impulses);
+  pushed();
+}
+
+GpuSurface MpmTissue::surface_on_gpu(const SurfaceTriangles& read) {
+  BoundaryMesh& mesh = run_->state.boundary;
+  update_boundary(run_->state, mesh);
+  if (read.made == 0 || read.made != mesh.shown) return {};
+  return device_->place_boundary_on_gpu();
+}
+
+void MpmTissue::push_surface_on_gpu(const float* impulses) {
+  find_support(run_->state, run_->state.boundary);
+  device_->push_boundary_on_gpu(impulses);
+  pushed();
+}
+
+void MpmTissue::pushed() {
   has_energies_ = false;
   substep_.acceptance().begin_with(NAN);
 }

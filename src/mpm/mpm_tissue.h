@@ -29,6 +29,8 @@ class MpmTissue : public SteppedTissue<MpmTissue> {
   }
   void read_surface(SurfaceTriangles& surface) override;
   void push_surface(Span<const float> impulses) override;
+  GpuSurface surface_on_gpu(const SurfaceTriangles& read) override;
+  void push_surface_on_gpu(const float* impulses) override;
   bool moves_anchors() const override { return true; }
   int fragment_count() const override { return static_cast<int>(run_->pieces.all.size()); }
   Span<const Fragment> fragments() override;
@@ -59,6 +61,7 @@ class MpmTissue : public SteppedTissue<MpmTissue> {
   friend struct FixedSubsteps;  // test/support/fixed_substeps.h
   template <class Archive>
   void each_field(Archive& archive);
+  void pushed();  ///< nodes have other velocities than was measured
 
   // The steps of advance().
   friend class SteppedTissue<MpmTissue>;

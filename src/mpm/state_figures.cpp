@@ -214,6 +214,8 @@ void push_surface(MpmState& s, Span<const float> impulses) {
       },
       kGrain);
   pass_on(by, push);
+  DistantNodes* const distant = s.edges.distant;
+  if (distant != nullptr) distant->bring_motion(by.node);
   s.cpu->for_each(
       static_cast<int>(by.node.size()),
       [&](int n) {
@@ -225,6 +227,7 @@ void push_surface(MpmState& s, Span<const float> impulses) {
         for (int a = 0; a < 3; ++a) s.nodes.v[a][node] += s.nodes.inv_mass[node] * sum[a];
       },
       kGrain);
+  if (distant != nullptr) distant->send_velocities(by.node);
 }
 
 void add_point_fields(MpmState& state, const PointSelection& selection,

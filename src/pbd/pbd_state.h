@@ -119,8 +119,7 @@ struct State {
   std::vector<double> relieved_in;  ///< of each body: when waves of its last tear crossed it [s]
   double mean_edge = 0;             ///< of the surface when it was made [m]
 
-  double longest_step =
-      0;  ///< of tetrahedra of a material (tet_steps.cpp) [s]; 0: `steps` are given
+  double longest_step = 0;  ///< (tet_steps.cpp) [s]
 
   std::vector<Collider> colliders;  ///< of this step
   std::vector<AtTip> at_tips;       ///< in this part of a frame

@@ -108,6 +108,7 @@ void PbdTissue::read_surface(SurfaceTriangles& surface) {
 }
 
 void PbdTissue::push_surface(Span<const float> impulses) {
+  pull();
   pbd::Vertices& v = state_->vertices;
   const float* impulse = impulses.data();
   for (const Triangle& t : state_->triangles) {
@@ -115,6 +116,7 @@ void PbdTissue::push_surface(Span<const float> impulses) {
       for (int a = 0; a < 3; ++a) v.v[4 * i + a] += v.x[4 * i + 3] * *impulse++;
     }
   }
+  push();
 }
 
 }  // namespace tissue_sim

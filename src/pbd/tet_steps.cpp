@@ -53,17 +53,17 @@ std::string percent(double share) {
 void choose_steps(State& s, std::vector<std::string>* notes) {
   int& steps = s.scene.pbd.steps;
   const bool chosen = steps == 0;
+  const double frame = 1 / s.scene.frame_rate;
   if (s.tetrahedra.empty() || s.scene.pbd.elasticity != PbdElasticity::kMaterial) {
     if (chosen) steps = kStepsOfOthers;
+    s.longest_step = frame / steps;
     return;
   }
-  const double rate = rate_of(s), frame = 1 / s.scene.frame_rate;
+  const double rate = rate_of(s);
   const double longest = std::sqrt(kMost / rate);
   const int enough = steps_within(frame, longest);
-  if (chosen) {
-    steps = enough;
-    s.longest_step = longest;
-  }
+  if (chosen) steps = enough;
+  s.longest_step = chosen ? longest : frame / steps;
   if (s.scene.pbd.iterations > 1 || notes == nullptr) return;
   const double h = frame / steps, soft = kTooSoft * rate * h * h;
   if (soft <= 1.1 * kTooSoft * kMost) return;
@@ -71,13 +71,11 @@ void choose_steps(State& s, std::vector<std::string>* notes) {
                    " steps a frame are few for tetrahedra so fine and stiff: " +
                    "they press back by some " + percent(soft / (1 + soft)) + " too little" +
                    (chosen ? "; coarser ones would need fewer"
-                           : "; " + std::to_string(enough) +
-                                 " would be within 5 %, and are chosen with steps: 0"));
+                           : "; " + std::to_string(enough) + " would be within 5 %" +
+                                 (has_fluid(s.scene) ? "" : ", and are chosen with steps: 0")));
 }
 
-int steps_of(const State& s, double duration) {
-  return s.longest_step > 0 ? steps_within(duration, s.longest_step) : s.scene.pbd.steps;
-}
+int steps_of(const State& s, double duration) { return steps_within(duration, s.longest_step); }
 
 }  // namespace pbd
 }  // namespace tissue_sim

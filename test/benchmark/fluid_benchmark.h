@@ -5,5 +5,6 @@ namespace tissue_sim {
 
 /// Registers `fluid/...` with Google Benchmark: an item is a frame.
 void add_fluid_rows();
+void add_fluid_cuda_rows();
 
 }  // namespace tissue_sim

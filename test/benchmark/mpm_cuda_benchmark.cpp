@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "benchmark/camera_benchmark.h"
+#include "benchmark/fluid_benchmark.h"
 #include "benchmark/mls_benchmark.h"
 #include "benchmark/organ_benchmark.h"
 #include "benchmark/pbd_benchmark.h"
@@ -212,6 +213,7 @@ int main(int argc, char** argv) {
   add_camera_benchmarks(Device::kCuda);
   add_mls_cuda_rows();
   add_pbd_cuda_rows();
+  add_fluid_cuda_rows();
   benchmark::Initialize(&argc, argv);
   benchmark::RunSpecifiedBenchmarks();
   return 0;

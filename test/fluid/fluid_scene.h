@@ -1,13 +1,35 @@
 // Scenes with fluid that tests share.
 #pragma once
 
+#include <gtest/gtest.h>
+
 #include <cstring>
 #include <string>
 #include <vector>
 
+#include "tissue/each_method.h"
 #include "tissue_sim/simulation.h"
 
 namespace tissue_sim {
+
+/// On each device, and with each method that fluid meets.
+template <class T>
+class FluidOn : public testing::TestWithParam<T> {
+ protected:
+  static MethodOnDevice on(Device device) { return {Method::kMpm, device}; }
+  static MethodOnDevice on(const MethodOnDevice& method) { return method; }
+  void SetUp() override {
+    const std::string why = why_not(on(this->GetParam()));
+    if (!why.empty()) GTEST_SKIP() << why;
+  }
+};
+inline std::string name_of_device(const testing::TestParamInfo<Device>& info) {
+  return name_of(info.param, kDeviceNames);
+}
+inline const auto kEachDevice = testing::Values(Device::kCpu, Device::kCuda);
+inline const auto kEachMethodWithFluid = testing::Values(
+    MethodOnDevice{Method::kMpm, Device::kCpu}, MethodOnDevice{Method::kMpm, Device::kCuda},
+    MethodOnDevice{Method::kPbd, Device::kCpu}, MethodOnDevice{Method::kPbd, Device::kCuda});
 
 /// What holds all that is below.
 inline Anchor held_below(double z) {
@@ -72,10 +94,10 @@ inline std::vector<FluidPoint> fluid_of(Simulation& simulation) {
 }
 
 /// A hollow ball of a soft material, filled, without gravity and ground.
-inline Scene filled_ball(Method method, double pressure) {
+inline Scene filled_ball(const MethodOnDevice& on, double pressure) {
   Scene scene;
-  scene.method = method;
-  scene.device = Device::kCpu;
+  scene.method = on.method;
+  scene.device = on.device;
   scene.threads = 1;  // so little that two wait for one another, on a loaded machine for long
   scene.cell_size = 0.003;
   scene.gravity.setZero();

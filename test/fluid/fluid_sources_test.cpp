@@ -12,9 +12,9 @@ namespace {
 FluidVolume volumes(Simulation& simulation) { return simulation.tissue().fluid_volumes()[0]; }
 
 /// A pool on the ground, and a tube whose mouth is above it, looking down.
-Scene pool_and_tube(ToolType type, double flow) {
+Scene pool_and_tube(ToolType type, double flow, Device device = Device::kCpu) {
   Scene scene;
-  scene.device = Device::kCpu;
+  scene.device = device;
   scene.cell_size = 0.004;
   scene.bodies = {far_body(scene.cell_size)};
   Pool pool;
@@ -38,9 +38,12 @@ FrameRequest tube_at(double x, double y, double z, FrameRequest request = {}) {
   return request;
 }
 
-TEST(FluidSources, SuctionTakesItsFlowAndNoMoreThanIsThere) {
+using FluidFromTubes = FluidOn<Device>;
+INSTANTIATE_TEST_SUITE_P(Devices, FluidFromTubes, kEachDevice, name_of_device);
+
+TEST_P(FluidFromTubes, SuctionTakesItsFlowAndNoMoreThanIsThere) {
   constexpr double kFlow = 2e-6, kParticle = 64e-9;
-  Scene scene = pool_and_tube(ToolType::kSuction, kFlow);
+  Scene scene = pool_and_tube(ToolType::kSuction, kFlow, GetParam());
   const auto walls = tank({0, 0, 0}, {0.024, 0.024, 0.05});
   add_tools(walls, scene);
   Simulation away(scene), simulation(scene);
@@ -59,9 +62,9 @@ TEST(FluidSources, SuctionTakesItsFlowAndNoMoreThanIsThere) {
   EXPECT_NEAR((now.sucked + now.total) / poured, 1, 1e-6);
 }
 
-TEST(FluidSources, IrrigationGivesItsFlow) {
+TEST_P(FluidFromTubes, IrrigationGivesItsFlow) {
   constexpr double kFlow = 1e-5, kParticle = 64e-9;
-  Scene scene = pool_and_tube(ToolType::kIrrigation, kFlow);
+  Scene scene = pool_and_tube(ToolType::kIrrigation, kFlow, GetParam());
   scene.pools.clear();
   Simulation simulation(scene);
   EXPECT_EQ(simulation.tissue().fluid_particle_count(), 0);
@@ -84,10 +87,10 @@ TEST(FluidSources, IrrigationGivesItsFlow) {
 }
 
 /// A beam that is held at one end; what a blade opens bleeds.
-Scene beam(Method method) {
+Scene beam(const MethodOnDevice& on) {
   Scene scene;
-  scene.method = method;
-  scene.device = Device::kCpu;
+  scene.method = on.method;
+  scene.device = on.device;
   scene.threads = 1;
   scene.cell_size = 0.004;
   scene.pbd.model = PbdModel::kTetrahedra;
@@ -115,7 +118,8 @@ BladePath across(double x) {
   return path;
 }
 
-class FluidFromWounds : public testing::TestWithParam<Method> {};
+using FluidFromWounds = FluidOn<MethodOnDevice>;
+INSTANTIATE_TEST_SUITE_P(Methods, FluidFromWounds, kEachMethodWithFluid, name_of_case);
 
 TEST_P(FluidFromWounds, BleedsWhatWasOpenedUntilItClots) {
   Scene scene = beam(GetParam());
@@ -143,15 +147,8 @@ TEST_P(FluidFromWounds, BleedsWhatWasOpenedUntilItClots) {
   EXPECT_EQ(volumes(simulation).bleeding, 0);
 }
 
-std::string name_of_method(const testing::TestParamInfo<Method>& info) {
-  return info.param == Method::kMpm ? "Mpm" : "Pbd";
-}
-
-INSTANTIATE_TEST_SUITE_P(Methods, FluidFromWounds, testing::Values(Method::kMpm, Method::kPbd),
-                         name_of_method);
-
-TEST(FluidSources, FillsAndDrainsAnOrgan) {
-  Simulation simulation(filled_ball(Method::kPbd, 300));
+TEST_P(FluidFromTubes, FillsAndDrainsAnOrgan) {
+  Simulation simulation(filled_ball({Method::kPbd, GetParam()}, 300));
   for (int i = 0; i < 10; ++i) simulation.advance_frame();
   const double before = volumes(simulation).total;
   simulation.fill(0, 900);
@@ -171,14 +168,14 @@ TEST(FluidSources, FillsAndDrainsAnOrgan) {
 
 /// What was recorded runs again, and a saved state goes on, with the same bits: with wounds, a
 /// tube, and orders.
-TEST(FluidSources, RunsAgainWithTheSameBits) {
-  Scene scene = beam(Method::kPbd);
+TEST_P(FluidFromTubes, RunsAgainWithTheSameBits) {
+  Scene scene = beam({Method::kPbd, GetParam()});
   Tool tube;
   tube.name = "tube";
   tube.type = ToolType::kSuction;
   tube.flow = 2e-6;
   scene.tools = {tube};
-  scene.bodies.push_back(filled_ball(Method::kPbd, 300).bodies[0]);
+  scene.bodies.push_back(filled_ball({Method::kPbd, GetParam()}, 300).bodies[0]);
   scene.bodies[1].name = "ball";
   scene.bodies[1].material = "liver";
   scene.bodies[1].wall = 0.008;
@@ -226,7 +223,7 @@ std::string refusal(const F& f) {
 }
 
 TEST(FluidSources, AreRefusedInOneLine) {
-  Scene scene = beam(Method::kMpm);
+  Scene scene = beam({Method::kMpm, Device::kCpu});
   scene.materials[0].bleeding.flux = 2;
   EXPECT_NE(refusal([&] { validate(scene); }).find("materials[0].bleeding.flux is 2"),
             std::string::npos);
@@ -244,13 +241,13 @@ TEST(FluidSources, AreRefusedInOneLine) {
             "body 'far' is none of the scene's that are filled");
   EXPECT_EQ(refusal([&] { simulation.drain(7, 1e-6); }),
             "body 7 is none of the scene's that are filled");
-  Simulation filled(filled_ball(Method::kPbd, 100));
+  Simulation filled(filled_ball({Method::kPbd, Device::kCpu}, 100));
   EXPECT_NE(refusal([&] { filled.fill(0, 2e5); }).find("pressure is 200000"), std::string::npos);
   EXPECT_NE(refusal([&] { filled.drain(0, -1); }).find("volume is -1"), std::string::npos);
 }
 
 TEST(FluidSources, ComeBackFromYaml) {
-  Scene scene = beam(Method::kMpm);
+  Scene scene = beam({Method::kMpm, Device::kCpu});
   scene.tools = pool_and_tube(ToolType::kIrrigation, 3e-6).tools;
   scene.tools.push_back(pool_and_tube(ToolType::kSuction, 2e-6).tools[0]);
   scene.tools[1].name = "suction";

@@ -19,7 +19,10 @@ double fill_up(Simulation& simulation) {
   return now;
 }
 
-class FluidIn : public testing::TestWithParam<Method> {};
+using FluidIn = FluidOn<MethodOnDevice>;
+INSTANTIATE_TEST_SUITE_P(Methods, FluidIn, kEachMethodWithFluid, name_of_case);
+using FluidInTissue = FluidOn<Device>;
+INSTANTIATE_TEST_SUITE_P(Devices, FluidInTissue, kEachDevice, name_of_device);
 
 /// A filled organ that falls: what the fluid gains of momentum the wall loses.
 TEST_P(FluidIn, KeepsMomentum) {
@@ -37,10 +40,10 @@ TEST_P(FluidIn, KeepsMomentum) {
 
 /// A closed organ that is shaken: nothing passes its wall of two cells, and it holds the volume
 /// that its fluid has under its pressure.
-TEST(FluidInTissue, StaysInAClosedOrgan) {
+TEST_P(FluidInTissue, StaysInAClosedOrgan) {
   constexpr double kAsked = 5000;
   constexpr int kShakes = 6;
-  Scene scene = filled_ball(Method::kPbd, kAsked);
+  Scene scene = filled_ball({Method::kPbd, GetParam()}, kAsked);
   scene.materials[0].young_modulus = 24 * kAsked;
   scene.bodies[0].anchors = {held_below(-0.015)};
   Simulation simulation(scene);
@@ -66,13 +69,6 @@ TEST(FluidInTissue, StaysInAClosedOrgan) {
   EXPECT_NEAR(packed(after) / at_first, 1, 0.005);
   EXPECT_NEAR(after.pressure / kAsked, 1, 0.2);
 }
-
-std::string method_name(const testing::TestParamInfo<Method>& info) {
-  return info.param == Method::kMpm ? "Mpm" : "Pbd";
-}
-
-INSTANTIATE_TEST_SUITE_P(Methods, FluidIn, testing::Values(Method::kMpm, Method::kPbd),
-                         method_name);
 
 BladePath slice(double x, double depth_from, double depth_to) {
   BladePath path;
@@ -101,8 +97,8 @@ double stretch(Tissue& tissue) {
 
 /// The figure that we reproduce: nothing leaves a whole organ; the further it is cut the more does,
 /// and the severed wall contracts.
-TEST(FluidInTissue, LeavesAnOrganThatIsCut) {
-  Scene scene = filled_ball(Method::kMpm, 500);
+TEST_P(FluidInTissue, LeavesAnOrganThatIsCut) {
+  Scene scene = filled_ball({Method::kMpm, GetParam()}, 500);
   scene.bodies[0].anchors = {held_below(-0.015)};
   Simulation whole(scene);
   ASSERT_GT(fill_up(whole), 0);
@@ -132,8 +128,8 @@ TEST(FluidInTissue, LeavesAnOrganThatIsCut) {
 
 /// A filled organ that cuts part wholly, into pieces, shreds and bits of a fraction of a point: its
 /// fluid comes out, nothing is thrown, and momentum is what it was.
-TEST(FluidInTissue, LeavesAnOrganThatComesApart) {
-  Simulation simulation(filled_ball(Method::kMpm, 500));
+TEST_P(FluidInTissue, LeavesAnOrganThatComesApart) {
+  Simulation simulation(filled_ball({Method::kMpm, GetParam()}, 500));
   ASSERT_GT(fill_up(simulation), 0);
   const Momentum before = simulation.tissue().momentum();
   for (int i = 0; i < 4; ++i) {
@@ -161,8 +157,8 @@ TEST(FluidInTissue, LeavesAnOrganThatComesApart) {
 }
 
 /// A filled ball grows as Lamé has it for a thick wall, by the pressure that its fluid has.
-TEST(FluidInTissue, SwellsAWallAsLameHasIt) {
-  Scene scene = filled_ball(Method::kMpm, 200);
+TEST_P(FluidInTissue, SwellsAWallAsLameHasIt) {
+  Scene scene = filled_ball({Method::kMpm, GetParam()}, 200);
   scene.cell_size = 0.002;  // three cells of wall
   scene.damping = 5;
   Simulation simulation(scene);
@@ -188,11 +184,11 @@ TEST(FluidInTissue, SwellsAWallAsLameHasIt) {
 
 /// Water leaves through a slit of ten spacings in a wall of 1 MPa as fast as Torricelli has it, in
 /// a jet of 0.6 to 0.65 of the slit.
-TEST(FluidInTissue, LeavesThroughASlitAsTorricelliHasIt) {
+TEST_P(FluidInTissue, LeavesThroughASlitAsTorricelliHasIt) {
   constexpr double kSpacing = 0.003, kSlit = 10 * kSpacing, kDepth = 4 * kSpacing;
   constexpr double kBelow = 0.045, kAbove = 0.09, kWidth = 0.075, kTop = kBelow + kSlit + kAbove;
   Scene scene;
-  scene.device = Device::kCpu;
+  scene.device = GetParam();
   scene.threads = 1;
   scene.cell_size = kSpacing;
   scene.ground.enabled = false;
@@ -254,8 +250,8 @@ TEST(FluidInTissue, LeavesThroughASlitAsTorricelliHasIt) {
 }
 
 /// One and two threads, and a state that was saved on the way: the same bits.
-TEST(FluidInTissue, HasTheSameBits) {
-  Scene scene = filled_ball(Method::kMpm, 300);
+TEST_P(FluidInTissue, HasTheSameBits) {
+  Scene scene = filled_ball({Method::kMpm, GetParam()}, 300);
   const auto run = [&](int threads, int restore_at) {
     scene.threads = threads;
     auto simulation = std::make_unique<Simulation>(scene);

@@ -44,24 +44,6 @@ __global__ void __launch_bounds__(kThreads)
   }
 }
 
-struct PlaceVertex {
-  CudaNodes nodes;
-  const BoundaryMesh::Vertex* vertices;
-  float* places;
-  __device__ void operator()(int i) const {
-    const BoundaryMesh::Vertex& v = vertices[i];
-    const AxisWeights weights(v.place);
-    double x[3];
-    for (int a = 0; a < 3; ++a) x[a] = reinterpret_cast<const double*>(&v.rest)[a];
-    for (int k = 0; k < 27; ++k) {
-      const float4 u = nodes.u[v.node[k]];
-      const float w = weights.at(k);
-      x[0] += w * u.x, x[1] += w * u.y, x[2] += w * u.z;
-    }
-    for (int a = 0; a < 3; ++a) places[3 * i + a] = static_cast<float>(x[a]);
-  }
-};
-
 struct Number {
   std::int32_t* slot;
   __device__ void operator()(int i) const { slot[i] = i; }
@@ -95,11 +77,6 @@ void launch_move_tables(const CudaBlock* blocks, const CudaBlockOrigin* origins,
   move_tables<<<block_count, kThreads, 0, stream>>>(blocks, origins, Arrays(before), Arrays(made),
                                                     Arrays(to));
   check_cuda(cudaGetLastError(), "start a kernel");
-}
-
-void launch_boundary_places(const CudaNodes& nodes, const BoundaryMesh::Vertex* vertices, int count,
-                            float* places, cudaStream_t stream) {
-  Gpu(stream).for_each(count, PlaceVertex{nodes, vertices, places});
 }
 
 void connect_slots(const SlotTables& t, std::size_t node_count, ConnectRoom& room,

@@ -7,7 +7,6 @@
 
 #include "compute/device_array.h"
 #include "mpm/cuda/tables.h"
-#include "mpm/surface/boundary_mesh.h"
 
 namespace tissue_sim {
 
@@ -52,10 +51,6 @@ struct BlockTables : BlockTablesIn<DeviceArray> {
 void launch_move_tables(const CudaBlock* blocks, const CudaBlockOrigin* origins, int block_count,
                         const BlockTables& before, const BlockTables& made, BlockTables& to,
                         cudaStream_t stream);
-
-/// Where nodes put vertices of a surface, three floats each [m].
-void launch_boundary_places(const CudaNodes& nodes, const BoundaryMesh::Vertex* vertices, int count,
-                            float* places, cudaStream_t stream);
 
 // Which slots share a node, found on the GPU.
 

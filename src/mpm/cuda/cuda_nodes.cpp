@@ -161,24 +161,6 @@ void CudaTissue::send_velocities(const std::vector<std::int32_t>& nodes) {
   some.send(nodes, present(), this->nodes(1 - current), stream);
 }
 
-void CudaTissue::place_boundary() {
-  CudaTissue& d = *this;
-  const BoundaryMesh& mesh = d.state.boundary;
-  const std::size_t count = mesh.vertices.size();
-  if (d.boundary_made != mesh.made) d.boundary.upload(mesh.vertices, d.stream);
-  d.boundary_made = mesh.made;
-  d.boundary_places.resize(3 * count);
-  d.host_boundary.resize(3 * count);
-  launch_boundary_places(d.present(), d.boundary.data(), static_cast<int>(count),
-                         d.boundary_places.data(), d.stream);
-  d.boundary_places.download(d.host_boundary.data(), 3 * count, d.stream);
-  check_cuda(cudaStreamSynchronize(d.stream), "send data");
-  const float* now = d.host_boundary.data();
-  tissue_sim::place_boundary(d.state, [now](int i) {
-    return std::array<float, 3>{now[3 * i], now[3 * i + 1], now[3 * i + 2]};
-  });
-}
-
 // The front of a cut of tissue that lives on a GPU: the host says which nodes are parted and which
 // cells see them, as on the CPU; how far they are apart lives with the nodes.
 

@@ -11,6 +11,7 @@
 #include "compute/device_array.h"
 #include "compute/lent_points.h"
 #include "mpm/cuda/block_tables.h"
+#include "mpm/cuda/boundary_on_gpu.h"
 #include "mpm/cuda/choose_plan.h"
 #include "mpm/cuda/cuda_linearised_motion.h"
 #include "mpm/cuda/frame_ends.h"
@@ -73,6 +74,8 @@ struct CudaTissue final : MpmDevice, DistantNodes {
   void bring_motion_around(const std::vector<EdgePlace>& places) override;
   void send_velocities(const std::vector<std::int32_t>& nodes) override;
   void place_boundary() override;
+  GpuSurface place_boundary_on_gpu() override;
+  void push_boundary_on_gpu(const float* impulses) override;
   bool fly(double duration, Foresight& foresight, std::vector<StrainedPoint>& strained) override;
   int read_points(const PointSelection& selection, std::vector<std::uint8_t>& cloud) override;
   GpuPoints read_points_on_gpu(const PointSelection& selection) override;
@@ -182,10 +185,7 @@ struct CudaTissue final : MpmDevice, DistantNodes {
   PinnedArray<Point> host_cloud;
   std::array<CudaEvent, 8> cloud_came;         ///< parts of it
   PinnedArray<float4> host_nodes;              ///< u, then v
-  DeviceArray<BoundaryMesh::Vertex> boundary;  ///< as of BoundaryMesh::made
-  std::uint64_t boundary_made = 0;
-  DeviceArray<float> boundary_places;
-  PinnedArray<float> host_boundary;
+  BoundaryOnGpu boundary;
   bool points_changed = true;  ///< pieces must be uploaded
   bool has_missed = false;     ///< missed_contact()
   std::unique_ptr<StateOnHost> to_restore;

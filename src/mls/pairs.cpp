@@ -25,12 +25,12 @@ double support_factor(int neighbours) {
 
 namespace {
 
-/// 315 / 64 pi cancels. Beyond the support, where a mesh's edge joins nodes, as much of moments as
-/// at four fifths of it.
+/// Of the kernel, over h^9: 315 / 64 pi cancels. Beyond the support, where a mesh's edge joins
+/// nodes, as much of moments as at four fifths of it.
 double kernel(double r2, double h) {
   constexpr double kFarthest = 0.8 * 0.8;
-  if (r2 < h * h) return std::pow(h * h - r2, 3) / std::pow(h, 9);
-  return std::pow((1 - kFarthest) / h, 3) * kFarthest * h * h / r2;
+  if (r2 < h * h) return std::pow(h * h - r2, 3);
+  return std::pow((1 - kFarthest) * h * h, 3) * kFarthest * h * h / r2;
 }
 
 /// What no pairs join, but edges of a tetrahedral mesh do, is joined by all of these.
@@ -115,7 +115,7 @@ MlsPairs make_pairs(const MlsNodes& nodes, int neighbours, Cpu& cpu) {
                                     " are at one place: each needs its own");
       }
       const double volumes = static_cast<double>(nodes.volume[i]) * nodes.volume[j];
-      weight[e] = std::sqrt(std::sqrt(volumes)) * kernel(r2, h);
+      weight[e] = std::sqrt(std::sqrt(volumes)) * kernel(r2, h) / std::pow(h, 9);
       sum += weight[e];
     }
   }

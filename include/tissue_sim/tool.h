@@ -73,7 +73,7 @@ struct ToolRequest {
   /// tools/grip.h.
   std::optional<double> jaw;
   /// It does not move there from where it was: it is placed, and comes into tissue along its shaft
-  /// from where it is free. A first pose that is not placed stands there at once.
+  /// from where it is free. So does a first pose that is deeper than two cells; others stand there.
   bool placed = false;
   /// What a grasper's jaws press with at most from this frame on, if given [Pa], 1 to 1e7; 0 for
   /// the scene's Tool::grip_pressure.

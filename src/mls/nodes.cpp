@@ -1,6 +1,7 @@
 #include "mls/nodes.h"
 
 #include <algorithm>
+#include <cmath>
 #include <memory>
 #include <stdexcept>
 
@@ -74,6 +75,18 @@ double mls_spacing(const Scene& scene) {
   return scene.mls.spacing > 0 ? scene.mls.spacing : 0.5 * scene.cell_size;
 }
 
+std::vector<double> usual_spacings(const MlsNodes& nodes) {
+  std::vector<double> volume, count;
+  for (std::int32_t i = 0; i < nodes.count(); ++i) {
+    volume.resize(nodes.body[i] + 1, 0.0);
+    count.resize(nodes.body[i] + 1, 0.0);
+    volume[nodes.body[i]] += nodes.part[i] < 0 ? 0.0 : nodes.volume[i];
+    count[nodes.body[i]] += 1;
+  }
+  for (std::size_t b = 0; b < volume.size(); ++b) volume[b] = std::cbrt(volume[b] / count[b]);
+  return volume;
+}
+
 MlsNodes make_mls_nodes(const Scene& scene, std::vector<std::string>* notes) {
   const double spacing = mls_spacing(scene);
   MlsNodes nodes;
@@ -94,8 +107,9 @@ MlsNodes make_mls_nodes(const Scene& scene, std::vector<std::string>* notes) {
     const LimitWork rest(with_points(work_limits().max_points - nodes.count()));
     const std::int32_t first_node = nodes.count();
     nodes.gaps.emplace_back();
+    MlsMeshEdges edges;
     for (const PlacedNode& n :
-         place_nodes(body, scene.mls, spacing, scene.seed + b, notes, nodes.gaps.back())) {
+         place_nodes(body, scene.mls, spacing, scene.seed + b, notes, nodes.gaps.back(), edges)) {
       nodes.place.push_back(n.place);
       nodes.volume.push_back(static_cast<float>(n.volume));
       nodes.body.push_back(static_cast<std::int16_t>(b));
@@ -118,6 +132,9 @@ MlsNodes make_mls_nodes(const Scene& scene, std::vector<std::string>* notes) {
       }
       nodes.anchor.push_back(anchor);
       nodes.anchored.push_back(anchor >= 0 ? 1 : 0);
+    }
+    for (const auto& e : edges) {
+      nodes.mesh_edges.push_back({first_node + e[0], first_node + e[1]});
     }
     for (std::size_t r = 0; r < anchored.size(); ++r) {
       if (anchored[r] == 0 && !hold_own_face(body, r, first_anchor, spacing, first_node, nodes)) {

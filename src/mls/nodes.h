@@ -1,6 +1,7 @@
 // The nodes of the meshless method: where they are in reference space, and what each stands for.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <string>
 #include <vector>
@@ -27,6 +28,7 @@ struct MlsNodes {
   std::vector<Vec3> normal;            ///< of the surface there, outward; 0 where unknown
   std::vector<Material> materials;     ///< of all bodies and inclusions
   std::vector<NearGaps> gaps;          ///< of each body
+  std::vector<std::array<std::int32_t, 2>> mesh_edges;  ///< of tetrahedral meshes, each once
 
   std::int32_t count() const { return static_cast<std::int32_t>(place.size()); }
   const Material& material_of(std::int32_t node) const { return materials[material[node]]; }
@@ -34,6 +36,9 @@ struct MlsNodes {
 
 /// Spacing of nodes, of graded ones at the surface [m].
 double mls_spacing(const Scene& scene);
+
+/// Of each body whose nodes are given, the spacing of as many even ones; 0 of the others [m].
+std::vector<double> usual_spacings(const MlsNodes& nodes);
 
 /// Places the nodes of a valid scene. The shares add up to each body's volume. Throws
 /// std::invalid_argument where a body cannot be sampled or a region holds no node of its body.

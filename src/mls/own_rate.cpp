@@ -12,7 +12,7 @@ typedef double Two __attribute__((vector_size(16)));
 constexpr int kAtATime = 32;  // entries
 
 /// In units of c^2 / h^2; see strained_volume().
-constexpr double kMostOfWhole = 20, kMostBesideCut = 4.5;
+constexpr double kMostOfWhole = 20, kMostOfGiven = 8, kMostBesideCut = 4.5;
 
 /// own_rate() of a node whose support spans space, over (lambda + 2 mu) times its volume
 /// [1 / (kg m^2)]. Its strain is sum_j (u_j - u_i) (x) w_ij M_i^-1 r_ij: that is
@@ -30,8 +30,9 @@ double rate_of_strain(const MlsState& s, std::int32_t i, const MlsSums& sums) {
 }
 
 /// The volume of the node that swings by itself at `most` c^2 / h^2, (lambda + 2 mu) V rate [m^3].
-double volume_of_rate(const MlsState& s, std::int32_t i, const MlsSums& sums, double most) {
-  const double edge = s.edge[i], rate = rate_of_strain(s, i, sums);
+double volume_of_rate(const MlsState& s, std::int32_t i, const MlsSums& sums, double most,
+                      double edge) {
+  const double rate = rate_of_strain(s, i, sums);
   return rate > 0 ? most / (s.nodes.material_of(i).density * edge * edge * rate) : 1e30;
 }
 
@@ -100,17 +101,21 @@ float strained_volume(const MlsState& s, std::int32_t i) {
 float strained_volume(const MlsState& s, std::int32_t i, const MlsSums& sums) {
   const float whole = s.nodes.strained_volume[i];
   if (s.cut[i] == 0 || s.sprung[i] != 0) return whole;
-  return static_cast<float>(std::min<double>(whole, volume_of_rate(s, i, sums, kMostBesideCut)));
+  return static_cast<float>(
+      std::min<double>(whole, volume_of_rate(s, i, sums, kMostBesideCut, s.edge[i])));
 }
 
 bool bound_own_rates(MlsState& s) {
   bool any = false;
+  const std::vector<double> usual = usual_spacings(s.nodes);
   std::vector<float> bounded(s.count());
   s.cpu->for_each(
       s.count(),
       [&](int i) {
+        const double edge = std::max<double>(s.edge[i], usual[s.nodes.body[i]]),
+                     rate = s.nodes.part[i] < 0 ? kMostOfWhole : kMostOfGiven;
         const double most =
-            s.sprung[i] == 0 ? volume_of_rate(s, i, mls_sums(s, i), kMostOfWhole) : 1e30;
+            s.sprung[i] == 0 ? volume_of_rate(s, i, mls_sums(s, i), rate, edge) : 1e30;
         bounded[i] = static_cast<float>(std::min<double>(s.nodes.strained_volume[i], most));
       },
       256);

@@ -25,7 +25,9 @@ double own_rate(const MlsState& state, std::int32_t node);
 /// go by its substep. So no more of the volume bears strain than what swings by itself at a rate
 /// of 20 c^2 / h^2 while the node is whole (corners of a lattice have 6.0), and of 4.5 beside a
 /// cut (inner nodes of a flat face have 3.3, those at its edge 5.5); c is the speed of pressure
-/// waves, h the distance to its neighbours. The penalty and the mass stay.
+/// waves, h the distance to its neighbours. Of given nodes, whose distances and shares differ by
+/// much, it is 8 while they are whole, and h no less than the spacing of as many even ones. The
+/// penalty and the mass stay.
 float strained_volume(const MlsState& state, std::int32_t node);
 float strained_volume(const MlsState& state, std::int32_t node, const MlsSums& sums);
 

@@ -3,10 +3,8 @@
 #include <algorithm>
 #include <cmath>
 #include <memory>
-#include <set>
 #include <stdexcept>
 #include <string>
-#include <utility>
 
 #include "geometry/nearest.h"
 #include "math/union_find.h"
@@ -24,6 +22,32 @@ std::int32_t MlsPairs::find(std::int32_t node, std::int32_t neighbour) const {
 double support_factor(int neighbours) {
   return neighbours <= 32 ? 1.5 + 0.05 * (neighbours - 18) : 2.2 * std::cbrt(neighbours / 32.0);
 }
+
+namespace {
+
+/// Of the kernel, over h^9: 315 / 64 pi cancels. Beyond the support, where a mesh's edge joins
+/// nodes, as much of moments as at four fifths of it.
+double kernel(double r2, double h) {
+  constexpr double kFarthest = 0.8 * 0.8;
+  if (r2 < h * h) return std::pow(h * h - r2, 3);
+  return std::pow((1 - kFarthest) * h * h, 3) * kFarthest * h * h / r2;
+}
+
+/// What no pairs join, but edges of a tetrahedral mesh do, is joined by all of these.
+void join_as_meshes_do(const MlsNodes& nodes, std::vector<std::vector<std::int32_t>>& of) {
+  if (nodes.mesh_edges.empty()) return;
+  UnionFind linked(nodes.count());
+  for (std::int32_t i = 0; i < nodes.count(); ++i) {
+    for (const std::int32_t j : of[i]) linked.join(i, j);
+  }
+  for (const auto& [i, j] : nodes.mesh_edges) {
+    if (linked.root(i) == linked.root(j)) continue;
+    of[i].insert(std::lower_bound(of[i].begin(), of[i].end(), j), j);
+    of[j].insert(std::lower_bound(of[j].begin(), of[j].end(), i), i);
+  }
+}
+
+}  // namespace
 
 MlsPairs make_pairs(const MlsNodes& nodes, int neighbours, Cpu& cpu) {
   const std::int32_t n = nodes.count();
@@ -67,6 +91,7 @@ MlsPairs make_pairs(const MlsNodes& nodes, int neighbours, Cpu& cpu) {
     });
     first = last;
   }
+  join_as_meshes_do(nodes, of);
   pairs.begin.push_back(0);
   for (std::int32_t i = 0; i < n; ++i) {
     pairs.other.insert(pairs.other.end(), of[i].begin(), of[i].end());
@@ -90,8 +115,7 @@ MlsPairs make_pairs(const MlsNodes& nodes, int neighbours, Cpu& cpu) {
                                     " are at one place: each needs its own");
       }
       const double volumes = static_cast<double>(nodes.volume[i]) * nodes.volume[j];
-      weight[e] = std::sqrt(std::sqrt(volumes)) * std::pow(h * h - r2, 3) /
-                  std::pow(h, 9);  // 315 / 64 pi cancels
+      weight[e] = std::sqrt(std::sqrt(volumes)) * kernel(r2, h) / std::pow(h, 9);
       sum += weight[e];
     }
   }
@@ -102,24 +126,19 @@ MlsPairs make_pairs(const MlsNodes& nodes, int neighbours, Cpu& cpu) {
   return pairs;
 }
 
-void check_parts(const MlsNodes& nodes, const MlsPairs& pairs, std::vector<std::string>& notes) {
-  UnionFind linked(nodes.count());
-  std::set<std::pair<int, std::int32_t>> parts, pieces;  // of a body
+void note_far_pairs(const MlsNodes& nodes, const MlsPairs& pairs, std::vector<std::string>& notes) {
+  int far = 0;
   for (std::int32_t i = 0; i < nodes.count(); ++i) {
     for (std::int32_t e = pairs.begin[i]; e < pairs.begin[i + 1]; ++e) {
-      linked.join(i, pairs.other[e]);
+      const std::int32_t j = pairs.other[e];
+      const double reach = 0.5 * (pairs.support[i] + pairs.support[j]);
+      far += i < j && (nodes.place[j] - nodes.place[i]).squaredNorm() >= reach * reach ? 1 : 0;
     }
   }
-  for (std::int32_t i = 0; i < nodes.count(); ++i) {
-    if (nodes.part[i] < 0) continue;
-    parts.emplace(nodes.body[i], nodes.part[i]);
-    pieces.emplace(nodes.body[i], linked.root(i));
-  }
-  if (pieces.size() == parts.size()) return;
-  notes.push_back("the vertices of tetrahedra, as nodes, hang together in " +
-                  std::to_string(pieces.size()) + " pieces, their meshes in " +
-                  std::to_string(parts.size()) +
-                  ": cells are too long and thin; mesh them more evenly, or take mpm");
+  if (far == 0) return;
+  notes.push_back("the vertices of tetrahedra, as nodes, hang together by " + std::to_string(far) +
+                  " edges of their meshes that reach past what is near: cells are too long and "
+                  "thin; mesh them more evenly, or take mpm");
 }
 
 }  // namespace tissue_sim

@@ -41,16 +41,17 @@ inline double crossing_place(std::uint8_t mark) { return (mark - 1) / 254.0; }
 double support_factor(int neighbours);
 
 /// Pairs nodes of one body that are nearer than the mean of their supports, and that no gap parts;
-/// of a tetrahedral mesh those alone that hang together in it.
+/// of a tetrahedral mesh those alone that hang together in it; what hangs together there but in no
+/// such pairs gets pairs along its edges.
 /// The weight is the kernel (h^2 - r^2)^3 / h^9 of Aras, Shen, Audette 2014, eq. 11, of that mean:
 /// symmetric, so that forces are. Times the fourth root of both volumes, not by whole ones: a node
 /// reads its strain where the middle of its support is, and of graded nodes large shares draw that
 /// inward. Throws std::invalid_argument for nodes at one place.
 MlsPairs make_pairs(const MlsNodes& nodes, int neighbours, Cpu& cpu);
 
-/// Notes where the nodes of a tetrahedral mesh hang together in more pieces than the mesh, whose
-/// cells are too long and thin then.
-void check_parts(const MlsNodes& nodes, const MlsPairs& pairs, std::vector<std::string>& notes);
+/// Notes how many pairs are farther than supports reach: cells of a tetrahedral mesh are too long
+/// and thin then.
+void note_far_pairs(const MlsNodes& nodes, const MlsPairs& pairs, std::vector<std::string>& notes);
 
 /// Changes the weights as little as needed (each in proportion to itself) for uniform stress to
 /// leave all nodes but those at the surface in balance:

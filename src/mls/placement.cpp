@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
+#include <tuple>
 #include <unordered_map>
 
 #include "geometry/chord.h"
@@ -13,6 +14,7 @@
 #include "geometry/nearest.h"
 #include "geometry/tet_mesh.h"
 #include "math/union_find.h"
+#include "scene/scene_text.h"
 
 namespace tissue_sim {
 namespace {
@@ -21,6 +23,7 @@ constexpr int kSamples = 3;      // along each axis, within a spacing
 constexpr double kGrowth = 0.3;  // of the spacing of graded nodes, for each one from the surface
 constexpr double kApart = 0.9;   // least distance of graded nodes at first, in spacings
 constexpr int kLloydSteps = 8;
+constexpr double kGivenApart = 0.5;  // least distance of given nodes, of that of as many evenly
 
 /// A number in [0, 1) that hangs on nothing but the arguments (splitmix64).
 double draw(std::uint64_t seed, std::uint64_t index) {
@@ -196,22 +199,84 @@ std::vector<PlacedNode> graded(const std::vector<PlacedNode>& cubes, double grad
   return nodes;
 }
 
-std::vector<PlacedNode> vertices_of(const TetMesh& mesh) {
-  std::vector<PlacedNode> nodes(mesh.vertices.size());
-  UnionFind joined(nodes.size());
+/// The vertices to keep as nodes so that no two of a part are nearer than `apart`, those at the
+/// surface and then the largest first: of each vertex the number of the one that stands for it.
+std::vector<std::int32_t> thinned_out(const std::vector<PlacedNode>& nodes, double apart) {
+  std::vector<std::int32_t> order(nodes.size());
+  std::iota(order.begin(), order.end(), 0);
+  std::sort(order.begin(), order.end(), [&](std::int32_t a, std::int32_t b) {
+    return std::make_tuple(!nodes[a].surface, -nodes[a].volume, a) <
+           std::make_tuple(!nodes[b].surface, -nodes[b].volume, b);
+  });
+  const std::vector<Vec3> places = places_of(nodes);
+  const NearestPoints tree(places);
+  std::vector<std::int32_t> kept(nodes.size(), -1);
+  std::vector<double> distance2(nodes.size(), apart * apart);
+  std::vector<Neighbour> found;
+  for (const std::int32_t i : order) {
+    if (kept[i] >= 0) continue;
+    tree.within(nodes[i].place, apart, found);
+    for (const Neighbour& n : found) {
+      if (n.index != i && (nodes[n.index].part != nodes[i].part || kept[n.index] == n.index ||
+                           !(n.distance2 < distance2[n.index]))) {
+        continue;
+      }
+      kept[n.index] = i;
+      distance2[n.index] = n.distance2;
+    }
+  }
+  return kept;
+}
+
+std::vector<PlacedNode> vertices_of(const TetMesh& mesh, const std::string& body,
+                                    std::vector<std::string>* notes, MlsMeshEdges& edges) {
+  std::vector<PlacedNode> vertices(mesh.vertices.size());
+  UnionFind joined(vertices.size());
+  double all = 0;
   for (std::size_t t = 0; t < mesh.tetrahedra.size(); ++t) {
     const double share = 0.25 * volume(mesh, static_cast<int>(t));
+    all += 4 * share;
     for (const int v : mesh.tetrahedra[t]) {
-      nodes[v].volume += share;
+      vertices[v].volume += share;
       joined.join(v, mesh.tetrahedra[t][0]);
     }
   }
-  for (std::size_t i = 0; i < nodes.size(); ++i) {
-    nodes[i].place = mesh.vertices[i];
-    nodes[i].part = joined.root(static_cast<std::int32_t>(i));
+  for (std::size_t i = 0; i < vertices.size(); ++i) {
+    vertices[i].place = mesh.vertices[i];
+    vertices[i].part = joined.root(static_cast<std::int32_t>(i));
   }
   for (const std::array<int, 3>& triangle : boundary(mesh)) {
-    for (const int v : triangle) nodes[v].surface = true;
+    for (const int v : triangle) vertices[v].surface = true;
+  }
+  const double apart = kGivenApart * std::cbrt(all / vertices.size());
+  const std::vector<std::int32_t> kept = thinned_out(vertices, apart);
+  std::vector<PlacedNode> nodes;
+  std::vector<std::int32_t> number(vertices.size());
+  for (std::size_t i = 0; i < vertices.size(); ++i) {
+    if (kept[i] != static_cast<std::int32_t>(i)) continue;
+    number[i] = static_cast<std::int32_t>(nodes.size());
+    nodes.push_back(vertices[i]);
+  }
+  for (std::size_t i = 0; i < vertices.size(); ++i) {
+    if (kept[i] != static_cast<std::int32_t>(i))
+      nodes[number[kept[i]]].volume += vertices[i].volume;
+  }
+  for (const auto& t : mesh.tetrahedra) {
+    for (int a = 0; a < 4; ++a) {
+      for (int b = 0; b < a; ++b) {
+        const std::int32_t i = number[kept[t[a]]], j = number[kept[t[b]]];
+        if (i != j) edges.push_back({std::min(i, j), std::max(i, j)});
+      }
+    }
+  }
+  std::sort(edges.begin(), edges.end());
+  edges.erase(std::unique(edges.begin(), edges.end()), edges.end());
+  if (notes != nullptr && nodes.size() < vertices.size()) {
+    notes->push_back("body '" + body + "': " + std::to_string(vertices.size() - nodes.size()) +
+                     " of " + std::to_string(vertices.size()) +
+                     " vertices are nearer to others than " + text(apart) +
+                     " m, half of what is usual there, and are one node with these: substeps would "
+                     "be as short as they are near");
   }
   return nodes;
 }
@@ -224,8 +289,10 @@ bool has_given_nodes(const Body& body) {
 
 std::vector<PlacedNode> place_nodes(const Body& body, const MlsOptions& options, double spacing,
                                     std::uint64_t seed, std::vector<std::string>* notes,
-                                    NearGaps& gaps) {
-  if (has_given_nodes(body)) return vertices_of(load_tets(body, spacing, notes));
+                                    NearGaps& gaps, MlsMeshEdges& edges) {
+  if (has_given_nodes(body)) {
+    return vertices_of(load_tets(body, spacing, notes), body.name, notes, edges);
+  }
   if (options.placement == MlsPlacement::kRegular) return cubes_of(body, spacing, notes, gaps);
   const std::vector<PlacedNode> cubes = cubes_of(body, spacing / kSamples, notes, gaps);
   std::vector<PlacedNode> nodes = graded(cubes, options.grading, spacing, seed);

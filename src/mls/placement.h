@@ -1,6 +1,7 @@
 // Where the nodes of one body go.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <string>
 #include <vector>
@@ -20,12 +21,16 @@ struct PlacedNode {
   int part = -1;         ///< lowest vertex of what it hangs together with in a tetrahedral mesh
 };
 
+/// Pairs of nodes, by their numbers within the body, that an edge of its tetrahedral mesh joins.
+using MlsMeshEdges = std::vector<std::array<std::int32_t, 2>>;
+
 /// Nodes `spacing` apart, on a lattice or graded, as the options say; `seed` scatters them. Of a
-/// tetrahedral mesh its vertices instead, each with a quarter of its tetrahedra. Throws what
-/// make_lattice() and load_tets() throw. `gaps` becomes those of the body's mesh, but for a
-/// tetrahedral one, which joins what it joins.
+/// tetrahedral mesh its vertices instead, each with a quarter of its tetrahedra; those that are
+/// much nearer to one another than usual go together, with a note. Throws what make_lattice() and
+/// load_tets() throw. `gaps` becomes those of the body's mesh, but for a tetrahedral one, which
+/// joins what its `edges` join.
 std::vector<PlacedNode> place_nodes(const Body& body, const MlsOptions& options, double spacing,
                                     std::uint64_t seed, std::vector<std::string>* notes,
-                                    NearGaps& gaps);
+                                    NearGaps& gaps, MlsMeshEdges& edges);
 
 }  // namespace tissue_sim

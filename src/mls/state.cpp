@@ -17,6 +17,7 @@ namespace {
 
 /// Weights are balanced anew after a node's rate was bounded, and rates change with them.
 constexpr int kRoundsOfBounds = 3;
+constexpr double kGivenLayer = 0.4;  // of the usual spacing
 
 template <class T>
 void resize_padded(Array<T>& array, int count, int per_node) {
@@ -24,16 +25,26 @@ void resize_padded(Array<T>& array, int count, int per_node) {
   array.assign(static_cast<std::size_t>(chunks) * kMlsChunk * per_node, T{});
 }
 
+ContactSpring layer_spring(const Material& m, float layer, float volume) {
+  constexpr double kHeld = 2.0 / 3, kFree = 0.25;
+  const double gives = kHeld / (lame_lambda(m) + 2 * lame_mu(m)) + kFree / m.young_modulus;
+  return contact_spring(static_cast<float>(1 / (kContactStiffness * gives)),
+                        static_cast<float>(m.density), layer, volume);
+}
+
 /// What a node touches anything with. It stands for the tissue outside of the node: without it that
 /// would not give way when pressed, and the node's share of the body counts its energy already, so
 /// that it gives way by as much as twice the node's depth. How much of that is as if sides were
 /// held and how much as if they were free follows from finite elements (docs/mls.md, contact).
 ContactSpring node_spring(const Material& m, float edge, float depth, float volume) {
-  constexpr double kHeld = 2.0 / 3, kFree = 0.25;
-  const double gives = kHeld / (lame_lambda(m) + 2 * lame_mu(m)) + kFree / m.young_modulus;
   const float layer = depth > 0 ? std::max(0.8f * edge, std::min(2 * edge, 2 * depth)) : edge;
-  return contact_spring(static_cast<float>(1 / (kContactStiffness * gives)),
-                        static_cast<float>(m.density), layer, volume);
+  return layer_spring(m, layer, volume);
+}
+
+/// Of a given node, which stands at the surface itself: nothing is outside of it. As stiff as
+/// substeps bear, so that a body on the ground lies on it.
+ContactSpring given_spring(const Material& m, double usual, float volume) {
+  return layer_spring(m, static_cast<float>(kGivenLayer * usual), volume);
 }
 
 /// kappa of the penalty while nothing is cut.
@@ -110,7 +121,7 @@ std::unique_ptr<MlsState> make_mls_state(const Scene& scene, std::vector<std::st
   s.cpu = std::make_unique<Cpu>(scene.threads);
   s.nodes = make_mls_nodes(scene, notes);
   s.pairs = make_pairs(s.nodes, scene.mls.neighbours, *s.cpu);
-  if (notes != nullptr) check_parts(s.nodes, s.pairs, *notes);
+  if (notes != nullptr) note_far_pairs(s.nodes, s.pairs, *notes);
   hold_at_faces(scene, support_factor(scene.mls.neighbours), s.nodes, s.pairs);
   s.nodes.strained_volume = s.nodes.free_volume;
   const Array<float> kernel = s.pairs.whole;
@@ -133,6 +144,7 @@ std::unique_ptr<MlsState> make_mls_state(const Scene& scene, std::vector<std::st
   resize_padded(s.cut, n, 1);
   s.contact.resize(s.groups());
   const double factor = support_factor(scene.mls.neighbours);
+  const std::vector<double> usual = usual_spacings(s.nodes);
   std::vector<std::int32_t> all(n);
   for (std::int32_t i = 0; i < n; ++i) {
     const Material& m = s.nodes.material_of(i);
@@ -145,7 +157,9 @@ std::unique_ptr<MlsState> make_mls_state(const Scene& scene, std::vector<std::st
     s.neo_hookean[i] = m.law == Law::kNeoHookean ? 1 : 0;
     s.edge[i] = static_cast<float>(s.pairs.support[i] / factor);
     if (s.edge[i] == 0) s.edge[i] = static_cast<float>(mls_spacing(scene));
-    const ContactSpring spring = node_spring(m, s.edge[i], s.nodes.depth[i], volume);
+    const ContactSpring spring = s.nodes.part[i] < 0
+                                     ? node_spring(m, s.edge[i], s.nodes.depth[i], volume)
+                                     : given_spring(m, usual[s.nodes.body[i]], volume);
     s.contact_stiffness[i] = spring.stiffness;
     s.contact_damping[i] = spring.damping;
     s.outer[i] = s.nodes.surface[i];

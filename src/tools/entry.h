@@ -12,7 +12,8 @@ namespace tissue_sim {
 /// blade is thin and cuts its way: 0.
 ///
 /// A tool that appears within tissue has it on all sides, and between the jaws of a grasper what
-/// closed jaws would have pushed away: it reads almost no force. So it comes in from there.
+/// closed jaws would have pushed away: it reads almost no force. So it comes in from there: one
+/// that is placed, and one that first stands deeper than two cells (Instrument::move()).
 double way_out(const Tool& tool, const Pose& pose, double jaw, Span<const Point> points,
                double step, double farthest);
 

@@ -13,6 +13,9 @@ namespace {
 
 constexpr double kSpeed = 0.1;     // of the way in: as hands are [m/s]
 constexpr double kFarthest = 0.3;  // through any organ [m]
+/// What is no deeper stands there at once if it was not placed, as tests and studies begin. From
+/// farther within, tissue would be thrown off at once: mls took a million substeps for a frame.
+constexpr double kShallow = 2;  // cells
 
 std::string entry_note(const Tool& tool, double way_in) {
   if (way_in < 0) {
@@ -54,13 +57,14 @@ std::string Instrument::move(const Tool& tool, double duration, double cell_size
   motion.jaw_end = static_cast<float>(jaw_);
   const bool appears = is_placed_ || !motion.present;
   if (appears) motion.jaw_begin = motion.jaw_end;
-  if (std::exchange(is_placed_, false)) {
+  if (const bool is_placed = std::exchange(is_placed_, false); appears) {
     std::vector<std::uint8_t> cloud;
     const int count = tissue.read_points({}, cloud);
     way_in_ =
         way_out(tool, asked_, motion.jaw_end,
                 {reinterpret_cast<const Point*>(cloud.data()), static_cast<std::size_t>(count)},
                 0.5 * cell_size, kFarthest);
+    if (!is_placed && way_in_ <= kShallow * cell_size) way_in_ = 0;
     if (way_in_ != 0) note = entry_note(tool, way_in_);
     way_in_ = std::max(way_in_, 0.0);
   }

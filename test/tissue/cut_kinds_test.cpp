@@ -15,11 +15,6 @@ const Vec3 kSize(0.04, 0.03, 0.02);
 
 class CutKinds : public EachMethod {
  protected:
-  /// A tetrahedron beside the place where three planes meet may have no neighbour left on its side:
-  /// it is a ninth piece.
-  bool is_known_to_differ(const CutKind& kind) const {
-    return GetParam().method == Method::kPbd && kind.name == "three planes";
-  }
   /// Which of the first `count` points tell what is parted: all, but of a mesh not the vertices on
   /// the wound. They belong to both sides, and move onto it.
   std::vector<bool> telling(Tissue& tissue, std::size_t count) const {
@@ -82,7 +77,6 @@ std::vector<double> volumes(const CutKind& kind) {
 TEST_P(CutKinds, PartWhatTheirSurfacesPart) {
   for (const CutKind& kind : cut_kinds(kSize)) {
     SCOPED_TRACE(kind.name);
-    if (is_known_to_differ(kind)) continue;
     Simulation simulation(on_this(free_box(kSize, 0.002)));
     std::vector<int> parts;
     for (const Vec3& place : positions(simulation.tissue())) parts.push_back(kind.part(place));
@@ -116,7 +110,6 @@ TEST_P(CutKinds, PartWhatTheirSurfacesPart) {
 TEST_P(CutKinds, SlowPartsWhatFastParts) {
   for (const CutKind& kind : cut_kinds(kSize)) {
     SCOPED_TRACE(kind.name);
-    if (is_known_to_differ(kind)) continue;
     constexpr int kSteps = 8;
     Simulation fast(on_this(free_box(kSize, 0.002))), slow(on_this(free_box(kSize, 0.002)));
     const int points = fast.tissue().point_count();

@@ -3,7 +3,7 @@ import numpy as np
 import skfem
 from scipy.sparse.linalg import eigsh, splu
 
-from references.neo_hookean import Solid, lame, newton
+from references.neo_hookean import Solid, lame, newton, solve
 
 
 def nodes(length, count, low, high):
@@ -43,13 +43,16 @@ def cut_mesh(mesh, x, z):
 
 class Block:
     """[x, y, z] in given node planes; `held` are (axis, place, components) that do not move; `cut` is (x, z): where the
-    plane at x is cut from above down to z."""
+    plane at x is cut from above down to z. `bend` moves the mesh's corners first; where `axis` is a function, held is where
+    that is `place`."""
 
-    def __init__(self, planes, young, poisson, held, body_force=None, cut=None):
+    def __init__(self, planes, young, poisson, held, body_force=None, cut=None, bend=None):
         self.lam, self.mu = lame(young, poisson)
         self.mesh = skfem.MeshHex.init_tensor(*planes)
         if cut is not None:
             self.mesh = cut_mesh(self.mesh, *cut)
+        if bend is not None:
+            self.mesh = skfem.MeshHex(bend(self.mesh.p), self.mesh.t)
         self.basis = skfem.Basis(self.mesh, skfem.ElementVector(skfem.ElementHex2()), intorder=4)
         self.solid = Solid(self.basis, lambda x, g, v: g, lambda x: 1.0, self.lam, self.mu, body_force)
         fixed = [self.dofs(axis, at, components) for axis, at, components in held]
@@ -57,7 +60,8 @@ class Block:
         self.u = np.zeros(self.basis.N)
 
     def dofs(self, axis, at, components):
-        d = self.basis.get_dofs(lambda x: np.abs(x[axis] - at) < 1e-9)
+        place = axis if callable(axis) else lambda x: x[axis]
+        d = self.basis.get_dofs(lambda x: np.abs(place(x) - at) < 1e-9)
         return np.concatenate([d.all(['u^%d' % (c + 1)]) for c in components])
 
     def value(self, place, component, beyond=None):
@@ -81,10 +85,21 @@ class Block:
                 move = np.zeros(self.basis.N)
                 move[dofs] = value * step / load_steps - self.u[dofs]
                 K = self.solid.stiffness(self.u)  # the rest follows at first as if it were linear
-                move[self.free] = splu(K[self.free][:, self.free].tocsc()).solve(-(K @ move)[self.free])
+                move[self.free] = solve(K[self.free][:, self.free], -(K @ move)[self.free])
                 self.u += move
             self.u = newton(self.solid.forces, self.solid.stiffness, self.u, self.free, scale)
         return self
+
+    def follow(self, loads):
+        """The load times each of these in turn; yields each."""
+        full, last, before = self.solid.load.copy(), 0.0, None
+        for load in loads:
+            self.solid.load = load * full
+            guess = self.u if before is None else self.u + (load - last) * before
+            u = newton(self.solid.forces, self.solid.stiffness, guess, self.free, np.abs(full).sum())
+            before = (u - self.u) / (load - last)
+            self.u, last = u, load
+            yield load
 
     def solve_small(self):
         """The load in the limit of small displacements."""

@@ -3,6 +3,17 @@ import numpy as np
 from scipy.sparse import coo_matrix
 from scipy.sparse.linalg import splu
 
+try:
+    import pypardiso  # several times as fast as splu in three dimensions
+except ImportError:
+    pypardiso = None
+
+
+def solve(K, b):
+    if pypardiso is not None:
+        return pypardiso.spsolve(K.tocsr(), b)
+    return splu(K.tocsc()).solve(b)
+
 
 def lame(young, poisson):
     return (young * poisson / ((1 + poisson) * (1 - 2 * poisson)), young / (2 * (1 + poisson)))
@@ -103,7 +114,7 @@ def newton(forces, stiffness, u, free, scale, most=60):
         if np.abs(r).max() < 1e-8 * scale:
             return u
         for exact in (True, False):
-            step = splu(stiffness(u, exact)[free][:, free].tocsc()).solve(-r)
+            step = solve(stiffness(u, exact)[free][:, free], -r)
             length, fits = 1.0, False
             while length > 1e-2 and not fits:
                 trial = u.copy()

@@ -106,9 +106,10 @@ class FrontStresses {
   explicit FrontStresses(const FrontPoints& points) : points_(points) {}
 
   /// Adds that at a gradient, and a viscous one that all points have.
-  TISSUE_SIM_INLINE void add(const Vec<8> (&G)[9], float weight, const float (&viscous)[9]) {
+  TISSUE_SIM_INLINE void add(const Vec<8> (&G)[9], front::Weights weights,
+                             const float (&viscous)[9]) {
     front::deformation(points_, G, F_[waiting_]);
-    weight_[waiting_] = weight;
+    weights_[waiting_] = weights;
     std::copy_n(viscous, 9, viscous_[waiting_]);
     if (++waiting_ == kTogether) work_out<kTogether>();
   }
@@ -128,8 +129,7 @@ class FrontStresses {
   TISSUE_SIM_INLINE void work_out() {
     Vec<8> mu[N], lambda[N];
     for (int i = 0; i < N; ++i) {
-      mu[i] = points_.mu();
-      lambda[i] = points_.lambda();
+      front::weigh(points_, weights_[std::min(i, waiting_ - 1)], mu[i], lambda[i]);
     }
     for (int n = waiting_; n < N; ++n) std::copy_n(F_[0], 9, F_[n]);
     Vec<8> P[N][9];
@@ -137,7 +137,7 @@ class FrontStresses {
     for (int n = 0; n < waiting_; ++n, ++count_) {
       for (int i = 0; i < 9; ++i) {
         const Vec<8> before = count_ == 0 ? Vec<8>{} : sum_[count_][i];
-        sum_[count_ + 1][i] = before + weight_[n] * (P[n][i] + viscous_[n][i]);
+        sum_[count_ + 1][i] = before + P[n][i] + weights_[n].shape * viscous_[n][i];
       }
     }
     waiting_ = 0;
@@ -146,7 +146,8 @@ class FrontStresses {
   const FrontPoints& points_;
   int waiting_ = 0, count_ = 0;
   Vec<8> F_[kTogether][9], sum_[29][9];
-  float weight_[kTogether], viscous_[kTogether][9];
+  front::Weights weights_[kTogether];
+  float viscous_[kTogether][9];
 };
 
 /// What a cell's stress, times volumes, is more than the block's, and the force on the parts that
@@ -194,7 +195,8 @@ TISSUE_SIM_INLINE void front_stresses(const FrontPoints& p, Vec<8> (&sum)[9], fl
       rate.store(0, of_rate);
       add_viscous_stress(F, of_rate, 0.125f * cell.viscosity[j < 0 ? 0 : 1], viscous);
     }
-    stresses.add(G, j < 0 ? -p.part(0).share : p.part(j).step, viscous);
+    const FrontPart& part = p.part(std::max(j, 0));
+    stresses.add(G, j < 0 ? front::whole_weights(part) : front::weights(part), viscous);
   }
   stresses.work_out_rest();
   std::copy_n(stresses.sum(stresses.count()), 9, sum);

@@ -73,8 +73,9 @@ struct FrontWarp {
   __device__ __forceinline__ FrontWarp(const CudaFront& f, int i, int first, int parts)
       : front(f), cell(f.cells[i]), count(parts) {
     const FrontPart* part = front.parts + first + min(lane, count - 1);
-    own = {__ldg(&part->node), __ldg(&part->k), __ldg(&part->side), __ldg(&part->share),
-           __ldg(&part->step)};
+    own = {__ldg(&part->node),       __ldg(&part->k),    __ldg(&part->side),
+           __ldg(&part->share),      __ldg(&part->step), __ldg(&part->volume_share),
+           __ldg(&part->volume_step)};
     own_node = __ldg(cell.node + min(lane, 26));
     inverse_size = __ldg(&cell.inverse_size);
     mu_here = __ldg(cell.mu + point);
@@ -138,11 +139,17 @@ struct FrontWarp {
     return mine;
   }
   /// How much of its energy is the cell's: 0 where there is none of that number. `parts`: its own.
-  __device__ __forceinline__ float weight(int pass, unsigned parts) const {
+  __device__ __forceinline__ front::Weights weights(int pass, unsigned parts) const {
     const unsigned one = parts & steps;
-    const float step = of_lane(own.step, max(__ffs(static_cast<int>(one)) - 1, 0)),
-                largest = of_lane(own.share, 0);
-    return number(pass) == 0 ? -largest : one != 0 ? step : 0.0f;
+    const int which = max(__ffs(static_cast<int>(one)) - 1, 0);
+    const float step = of_lane(own.step, which), volume_step = of_lane(own.volume_step, which),
+                largest = of_lane(own.share, 0), largest_volume = of_lane(own.volume_share, 0);
+    return {number(pass) == 0 ? -largest
+            : one != 0        ? step
+                              : 0.0f,
+            number(pass) == 0 ? -largest_volume
+            : one != 0        ? volume_step
+                              : 0.0f};
   }
 
   /// Adds the gradient of `parts`, bits that are of the group's own.
@@ -220,12 +227,12 @@ struct FrontWarp {
     const unsigned parts = own_parts(pass);
     gradient<false>(pass, parts, G);
     if (viscous) gradient<true>(pass, parts, G_rate);
-    const float share = weight(pass, parts),
-                viscosity = __ldg(cell.viscosity + (number(pass) == 0 ? 0 : 1));
-    front::stress<LawOf>(*this, G, G_rate, viscous ? viscosity : 0.0f, P);
+    const front::Weights share = weights(pass, parts);
+    const float viscosity = __ldg(cell.viscosity + (number(pass) == 0 ? 0 : 1));
+    front::stress<LawOf>(*this, G, G_rate, viscous ? viscosity : 0.0f, share, P);
 #pragma unroll
     for (int i = 0; i < 9; ++i) {  // with those of the groups behind
-      float x = share == 0 ? 0.0f : share * P[i];
+      float x = share.shape == 0 ? 0.0f : P[i];
       float behind = __shfl_down_sync(kAll, x, kPoints);
       x += group < 3 ? behind : 0.0f;
       behind = __shfl_down_sync(kAll, x, 2 * kPoints);
@@ -252,9 +259,11 @@ struct FrontWarp {
       const unsigned parts = own_parts(pass);
       gradient<false>(pass, parts, G);
       front::deformation(*this, G, F[0]);
-      LawOf::template energies<1>(F, &mu_here, &lambda_here, &of_points);
-      const float share = weight(pass, parts);
-      sum += share == 0 ? 0.0 : static_cast<double>(share) * of_points;
+      const front::Weights share = weights(pass, parts);
+      float mu, lambda;
+      front::weigh(*this, share, mu, lambda);
+      LawOf::template energies<1>(F, &mu, &lambda, &of_points);
+      sum += share.shape == 0 ? 0.0f : of_points;
     }
     return all(sum);
   }

@@ -94,15 +94,14 @@ CutPlane find_plane(const LatticeTissue& s, const BoxOfNode& box, const Planes& 
   return plane;
 }
 
-/// How far a node is parted when so much of the plane in its box is cut: in a box of three cells a
-/// cut that ends a cells behind the node's middle has cut (a + 3/2) / 3 of it, and is as compliant
-/// as with the node parted by s where
-///   s / (1 + c (1 - s)) = a, 0 <= a <= 1.
-/// c depends on lambda / mu: measured on edge cracks (nu = 0, 0.3, 0.45, 0.49: 1.4, 1.45, 4, 18),
-/// which are then as deep as they were cut within 0.04 cells.
-float parted_share(double cut, double lambda_over_mu) {
-  const double a = std::min(std::max(3 * cut - 1.5, 0.0), 1.0);
-  const double c = std::hypot(1.4, 0.4 * lambda_over_mu);
+/// How far a node is parted where the cut ends `a` cells beyond it: as much as makes it as
+/// compliant as one that ends there,
+///   s / (1 + c (1 - s)) = a, 0 <= a <= 1,
+/// with c as measured on edge cracks, which are then as deep as they were cut within 0.04 cells;
+/// for the energy of volume see FrontPart::volume_share.
+float parted_share(double beyond) {
+  const double a = std::min(std::max(beyond, 0.0), 1.0);
+  constexpr double c = 1.5;
   return static_cast<float>((1 + c) * a / (1 + c * a));
 }
 
@@ -112,17 +111,43 @@ float parted_share(double cut, double lambda_over_mu) {
 constexpr double kLeastSide = 0.01;
 constexpr int kLeastPoints = 32;
 
-/// The share that the bonds between a node's sides ask for.
+/// The share that the bonds between a node's sides ask for. A cut ends along a line across the way
+/// from the middle of what was cut to that of what is whole, wherever that leaves as much of it.
 float share_of(const LatticeTissue& s, const BoxOfNode& box, const CutPlane& plane,
                const FrontNode& node) {
+  struct Bond {
+    Vec3 place;  // in the plane, from the node [half cells]
+    double area;
+  };
+  std::vector<Bond> bonds;
   double all = 0, cut = 0;
+  Vec3 of_cut = Vec3::Zero(), of_whole = Vec3::Zero();
   for_each_pair(node.all, [&](int i, int j, int axis) {
     if (BoxOfNode::has(node.first_side, i) == BoxOfNode::has(node.first_side, j)) return;
     const double area = std::fabs(plane.normal[axis]);
+    const double passed = area * passed_share(s, box.point[i], axis);
+    Vec3 place = (BoxOfNode::place(i) + BoxOfNode::place(j)) / 2 - Vec3::Constant(2.5);
+    place -= plane.normal.dot(place) * plane.normal;
+    bonds.push_back({place, area});
     all += area;
-    cut += area * passed_share(s, box.point[i], axis);
+    cut += passed;
+    of_cut += passed * place;
+    of_whole += (area - passed) * place;
   });
-  return all > 0 ? parted_share(cut / all, node.lambda_over_mu) : 0;
+  if (!(cut > 0)) return 0;
+  const double whole = all - cut;
+  if (!(whole > 1e-6 * all)) return 1;
+  const Vec3 ahead = (of_whole / whole - of_cut / cut).normalized();
+  double low = -5, high = 5;
+  for (int k = 0; k < 30; ++k) {
+    const double end = (low + high) / 2;
+    double behind = 0;
+    for (const Bond& b : bonds) {
+      behind += b.area * std::min(std::max(end - ahead.dot(b.place) + 0.5, 0.0), 1.0);
+    }
+    (behind < cut ? low : high) = end;
+  }
+  return parted_share((low + high) / 4);
 }
 
 /// Parts a node as far as its bonds say; `before` if it was parted already. Returns a share of 0

@@ -21,10 +21,11 @@ struct FrontCell {
 
 /// A parted node as the points of a cell see it. In a cell the largest share comes first.
 struct FrontPart {
-  std::int32_t node;  ///< among the parted nodes
-  std::int32_t k;     ///< among the cell's 27
-  float side;         ///< its points see u + side d
-  float share, step;  ///< FrontNode::share; by how much it is above the next one's
+  std::int32_t node;                ///< among the parted nodes
+  std::int32_t k;                   ///< among the cell's 27
+  float side;                       ///< its points see u + side d
+  float share, step;                ///< FrontNode::share; by how much it is above the next one's
+  float volume_share, volume_step;  ///< the same for the energy of volume: front_stress.h
 };
 
 /// What the cells' kernel reads: of nodes u and v, of parted nodes d and its rate.

@@ -53,26 +53,11 @@ TEST_P(PointsInside, ATouchIsNone) {
   EXPECT_EQ(inside_warning(scene, result), "");
 }
 
-TEST_P(PointsInside, ATipThinnerThanACellIsSaidWithTheCellsThatWouldHold) {
-  // Tissue of method mls goes around a thinner one.
-  const bool is_mls = GetParam().method == Method::kMls;
-  Scene scene = on_this(block_and_probe(is_mls ? 0.0027 : 0.002));
-  scene.mls.spacing = 0;  // two nodes a cell, or the tip goes in between
+TEST_P(PointsInside, ATipThinnerThanACellHasNoneEither) {
+  const Scene scene = on_this(block_and_probe(0.002));
   const FrameResult result = press(scene, 0.018, 0.3);
-  // Vertices come out of a tool in each step, and the true surface holds that.
-  if (scene.method != Method::kMls) {
-    EXPECT_EQ(result.points_inside, 0);
-    return;
-  }
-  EXPECT_GT(result.points_inside, 0);
-  EXPECT_EQ(result.points_inside, result.loads[0].points_inside);
-  EXPECT_GT(result.inside_depth, 0.0009);  // 0.3 cells
-  EXPECT_LE(result.inside_depth, scene.tools[0].radius + 1e-6);
-  const std::string said = inside_warning(scene, result);
-  EXPECT_NE(said.find("'poker'"), std::string::npos) << said;
-  EXPECT_NE(said.find(is_mls ? "cell_size 0.0027 would hold" : "cell_size 0.002 would hold"),
-            std::string::npos)
-      << said;
+  EXPECT_GT(result.loads[0].mean.force.norm(), 0);
+  EXPECT_EQ(result.points_inside, 0);
 }
 
 TEST_P(PointsInside, ATipBetweenPointsIsSaid) {

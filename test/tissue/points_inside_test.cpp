@@ -60,6 +60,20 @@ TEST_P(PointsInside, ATipThinnerThanACellHasNoneEither) {
   EXPECT_EQ(result.points_inside, 0);
 }
 
+TEST_P(PointsInside, AreSaidWithTheCellsThatWouldHold) {
+  const Scene scene = on_this(block_and_probe(0.002));
+  FrameResult result;
+  result.loads.resize(1);
+  result.loads[0].points_inside = 2;
+  result.loads[0].inside_depth = 0.001;
+  sum_inside(result);
+  EXPECT_EQ(result.points_inside, 2);
+  EXPECT_EQ(result.inside_depth, 0.001);
+  const std::string said = inside_warning(scene, result);
+  EXPECT_NE(said.find("'poker'"), std::string::npos) << said;
+  EXPECT_NE(said.find("cell_size 0.002 would hold"), std::string::npos) << said;
+}
+
 TEST_P(PointsInside, ATipBetweenPointsIsSaid) {
   const Scene scene = on_this(block_and_probe(0.0009));
   FrameResult result;

@@ -2,6 +2,7 @@
 #pragma once
 
 #include "mls/state.h"
+#include "mls/stop_tool.h"
 
 namespace tissue_sim {
 
@@ -12,7 +13,13 @@ bool is_list_due(MlsState& state);
 void list_near(MlsState& state, int group, float dt);
 
 /// Adds to the forces [4 kMlsGroup] on a group's nodes what colliders at their present places push
-/// them with, and notes it in the group's loads.
-void add_contact(MlsState& state, int group, float* force);
+/// them with, in a substep of dt whose forces act for `kick` [s], and notes it in the group's
+/// loads. What stops tools at its nodes goes into `stops`;
+/// returns whether any does.
+bool add_contact(MlsState& state, int group, float dt, float kick, float* force, MlsStop* stops);
+
+/// Change of velocity of a node of the group that stops a tool, and on which `force` acts besides.
+void move_stopping(MlsState& state, int group, std::int32_t node, const MlsStop& stop, float kick,
+                   const float* force, float* dv);
 
 }  // namespace tissue_sim

@@ -27,20 +27,19 @@ bool spans_space(const Eigen::Matrix3d& m) {
 }
 
 /// Springs from a sprung node to its neighbours: each carries its share of what a bar through the
-/// node's volume would.
+/// node's volume would, or a sheet, of which springs all around bear a third along each way.
 void make_springs(MlsState& s, std::int32_t i) {
   if (s.spring.empty()) {
     s.spring.swap(s.spring_room);
     s.spring.resize(s.pairs.other.size(), 0.0f);  // where the room went, and a state was restored
   }
-  double sum = 0;
-  const auto r2 = [&](std::int32_t e) {
-    return (s.nodes.place[s.pairs.other[e]] - s.nodes.place[i]).squaredNorm();
-  };
+  Eigen::Matrix3d m = Eigen::Matrix3d::Zero();
   for (std::int32_t e = s.pairs.begin[i]; e < s.pairs.begin[i + 1]; ++e) {
-    sum += s.pairs.weight[e] * r2(e);
+    const Vec3 r = s.nodes.place[s.pairs.other[e]] - s.nodes.place[i];
+    m += s.pairs.weight[e] * r * r.transpose();
   }
-  const double stiffness = s.nodes.material_of(i).young_modulus * s.nodes.volume[i];
+  const double sum = m.trace(), wide = sum > 0 ? 2 * sum * sum / m.squaredNorm() - 1 : 1;  // 1 to 3
+  const double stiffness = wide * s.nodes.material_of(i).young_modulus * s.nodes.volume[i];
   for (std::int32_t e = s.pairs.begin[i]; e < s.pairs.begin[i + 1]; ++e) {
     s.spring[e] =
         s.pairs.weight[e] > 0 ? static_cast<float>(stiffness * s.pairs.weight[e] / sum) : 0.0f;

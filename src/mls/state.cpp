@@ -85,8 +85,8 @@ void list_springs(MlsState& s) {
   std::partial_sum(springs.begin.begin(), springs.begin.end(), springs.begin.begin());
 }
 
-/// Forces of springs on a chunk's nodes.
-void add_springs(const MlsState& s, const float* u, int chunk, float* force) {
+/// Forces of springs on a chunk's nodes; `rest`: how much of their length is free of force.
+void add_springs(const MlsState& s, const float* u, float rest, int chunk, float* force) {
   for (std::int32_t k = s.springs.begin[chunk]; k < s.springs.begin[chunk + 1]; ++k) {
     const MlsSpring& spring = s.springs.all[k];
     const std::int32_t i = spring.node, j = spring.other;
@@ -96,7 +96,7 @@ void add_springs(const MlsState& s, const float* u, int chunk, float* force) {
       x2 += x[a] * x[a];
     }
     const float length = std::sqrt(x2);
-    const float scale = spring.stiffness * (length - spring.rest) / std::max(length, 1e-12f);
+    const float scale = spring.stiffness * (length - rest * spring.rest) / std::max(length, 1e-12f);
     for (int a = 0; a < 3; ++a) force[4 * (i - chunk * kMlsChunk) + a] += scale * x[a];
   }
 }
@@ -242,19 +242,25 @@ float substep(MlsState& s, float dt, std::vector<ColliderLoad>& loads) {
     alignas(64) float force[4 * kMlsGroup];
     for (int i = first; i < last; i += kMlsChunk) {
       s.kernels->forces(field, i / kMlsChunk, force + 4 * (i - first));
-      add_springs(s, s.u.data(), i / kMlsChunk, force + 4 * (i - first));
+      add_springs(s, s.u.data(), 1, i / kMlsChunk, force + 4 * (i - first));
       if (!s.node_contacts.begin.empty()) {
         add_node_contact(s, i / kMlsChunk, force + 4 * (i - first));
       }
     }
     if (list) list_near(s, group, dt);
-    add_contact(s, group, force);
+    MlsStop stops[kMlsGroup];
+    const bool stopping = add_contact(s, group, dt, kick, force, stops);
     for (int i = first; i < last; ++i) {
       const float inv_mass = s.inv_mass[i];
       Vec<4> v{};
       if (inv_mass > 0) {
         v = keep * load<4>(&s.v[4 * i]) +
             kick * (load<4>(force + 4 * (i - first)) * inv_mass + gravity);
+        if (stopping && stops[i - first].collider >= 0) {
+          alignas(16) float change[4] = {};
+          move_stopping(s, group, i, stops[i - first], kick, force + 4 * (i - first), change);
+          v = keep * load<4>(&s.v[4 * i]) + load<4>(change);
+        }
       }
       Vec<4> u = load<4>(&s.u[4 * i]) + dt * v;
       if (!(inv_mass > 0)) hold_node(s, i, dt, kick * load<4>(force + 4 * (i - first)), u, v);
@@ -293,7 +299,7 @@ float substep(MlsState& s, float dt, std::vector<ColliderLoad>& loads) {
   return kick;
 }
 
-void internal_forces(MlsState& s, const float* u, float* force) {
+void internal_forces(MlsState& s, const float* u, float* force, float rest) {
   const MlsField field = field_of(s, u, nullptr);
   s.cpu->for_each(
       s.chunks(), [&](int chunk) { s.kernels->stresses(field, chunk); }, 4);
@@ -301,7 +307,7 @@ void internal_forces(MlsState& s, const float* u, float* force) {
       s.chunks(),
       [&](int chunk) {
         s.kernels->forces(field, chunk, force + 4 * kMlsChunk * chunk);
-        add_springs(s, u, chunk, force + 4 * kMlsChunk * chunk);
+        add_springs(s, u, rest, chunk, force + 4 * kMlsChunk * chunk);
       },
       4);
 }

@@ -174,7 +174,9 @@ MlsField field_of(MlsState& state);  ///< at the present ones
 float substep(MlsState& state, float dt, std::vector<ColliderLoad>& loads);
 
 /// Internal forces of all nodes at displacements `u` [4 n], into `force` [4 n]: for tests and for
-/// the measure of the highest frequency. Without viscosity and contact.
-void internal_forces(MlsState& state, const float* u, float* force);
+/// the measure of the highest frequency. Without viscosity and contact. `rest`: how much of
+/// springs' lengths is free of force; 0 makes them as stiff across as they are along, and so what
+/// any stretch may make of them.
+void internal_forces(MlsState& state, const float* u, float* force, float rest = 1);
 
 }  // namespace tissue_sim

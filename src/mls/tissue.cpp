@@ -272,7 +272,7 @@ void MlsTissue::measure_stress(std::vector<float>& of_node) {
       4);
 }
 
-void MlsTissue::forces_at(const float* u, float* force) { internal_forces(*state_, u, force); }
+void MlsTissue::forces_at(const float* u, float* force) { internal_forces(*state_, u, force, 0); }
 
 FrameResult MlsTissue::finish() {
   const Figures figures = measure();

@@ -39,6 +39,12 @@ inline void impose(MlsState& s, const Eigen::Matrix3d& A) {
 
 namespace reference {
 
+/// How much stiffer springs of a support with these moments are than a bar's: 1 of one direction, 3
+/// of a plane.
+inline double spring_share(const Eigen::Matrix3d& moments) {
+  return 2 * moments.trace() * moments.trace() / moments.squaredNorm() - 1;
+}
+
 /// H_i of docs/mls.md, in double, from the weights as they are.
 inline std::vector<Eigen::Matrix3d> mls_gradients(const MlsState& s) {
   std::vector<Eigen::Matrix3d> H(s.count(), Eigen::Matrix3d::Zero());
@@ -86,7 +92,8 @@ inline double mls_energy(const MlsState& s, const std::vector<double>& u) {
       for (int e = s.pairs.begin[i]; e < s.pairs.begin[i + 1]; ++e) {
         pair(e, r, d);
         const double stretch = (r + d).norm() - r.norm();
-        sum += 0.5 * m.young_modulus * volume * s.pairs.weight[e] / trace * stretch * stretch;
+        sum += 0.5 * spring_share(M) * m.young_modulus * volume * s.pairs.weight[e] / trace *
+               stretch * stretch;
       }
       continue;
     }
@@ -147,11 +154,12 @@ inline std::vector<Vec3> mls_forces(const MlsState& s) {
   // Springs of supports that span no space.
   const auto share = [&](int i, double w) {
     if (s.sprung[i] == 0) return 0.0;
-    double trace = 0;
+    Eigen::Matrix3d M = Eigen::Matrix3d::Zero();
     for_each_pair(i, [&](int, int, double weight, const Vec3& r, const Vec3&) {
-      trace += weight * r.squaredNorm();
+      M += weight * r * r.transpose();
     });
-    return w > 0 ? s.nodes.material_of(i).young_modulus * s.nodes.volume[i] * w / trace : 0.0;
+    const double stiffness = s.nodes.material_of(i).young_modulus * s.nodes.volume[i];
+    return w > 0 ? spring_share(M) * stiffness * w / M.trace() : 0.0;
   };
   std::vector<Vec3> force(s.count(), Vec3::Zero());
   for (int i = 0; i < s.count(); ++i) {

@@ -49,6 +49,7 @@ void CudaMlsTissue::upload_nodes() {
   const auto count = static_cast<std::size_t>(n);
   d.mass.upload(s.mass.data(), n, d.stream);
   d.inv_mass.upload(s.inv_mass.data(), n, d.stream);
+  d.edge.upload(s.edge.data(), n, d.stream);
   d.neo_hookean.upload(s.neo_hookean.data(), n, d.stream);
   d.viscous = s.viscous;
   std::vector<ContactSpring> springs(count);
@@ -98,16 +99,19 @@ void CudaMlsTissue::upload_pairs() {
   const MlsState& s = *state_;
   const int n = s.count();
   std::vector<float> weight(d.host_offset.back(), 0.0f), spring;
+  std::vector<std::uint8_t> whole(weight.size(), 0);
   d.has_springs = !s.spring.empty();
   if (d.has_springs) spring.assign(weight.size(), 0.0f);
   for (int i = 0; i < n; ++i) {
     std::int32_t at = d.host_offset[i / kMlsSlice] + i % kMlsSlice;
     for (std::int32_t e = s.pairs.begin[i]; e < s.pairs.begin[i + 1]; ++e, at += kMlsSlice) {
       weight[at] = s.pairs.weight[e];
+      whole[at] = s.pairs.crossed[e] == 0;
       if (d.has_springs) spring[at] = s.spring[e] + s.spring[s.pairs.twin[e]];
     }
   }
   d.weight.upload(weight, d.stream);
+  d.whole.upload(whole, d.stream);
   d.spring.upload(spring, d.stream);
   std::vector<float> moments(6 * static_cast<std::size_t>(n));
   for (int k = 0; k < 6; ++k) {
@@ -143,8 +147,9 @@ void CudaMlsTissue::pairs_changed(const std::vector<std::int32_t>& nodes) {
   const auto add = [&](std::int32_t i, std::int32_t e) {
     const std::int32_t at =
         d.host_offset[i / kMlsSlice] + (e - s.pairs.begin[i]) * kMlsSlice + i % kMlsSlice;
-    entries.push_back(
-        {at, s.pairs.weight[e], d.has_springs ? s.spring[e] + s.spring[s.pairs.twin[e]] : 0.0f});
+    entries.push_back({at, s.pairs.weight[e],
+                       d.has_springs ? s.spring[e] + s.spring[s.pairs.twin[e]] : 0.0f,
+                       static_cast<std::uint8_t>(s.pairs.crossed[e] == 0)});
   };
   for (const std::int32_t i : nodes) {
     CudaMlsNodeChange c;
@@ -481,6 +486,7 @@ void CudaMlsTissue::forces_at(const float* u, float* force) {
   OnDevice& d = *device_;
   CudaMlsField field = d.field();
   field.viscous = false;
+  field.spring_rest = 0;
   const CudaMlsMotion at = d.motion(1 - d.current);  // not in use between two parts
   d.u[1 - d.current].upload(reinterpret_cast<const float4*>(u), d.count, d.stream);
   launch_mls_stresses(field, at, {}, d.stream);

@@ -31,6 +31,7 @@ struct CudaMlsField {
   const std::int32_t* other;   ///< per entry; the node itself where there is none
   const float* weight;         ///< 0 where there is none
   const float* spring;  ///< per entry: of both ends where one is sprung [N/m]; null without any
+  const std::uint8_t* whole;    ///< per entry: a pair that no cut passes
   const float* inverse_moment;  ///< [6][count]: 00 11 22 01 02 12
   const float* volume_mu;       ///< [N m], as the next two
   const float* volume_lambda;
@@ -40,9 +41,11 @@ struct CudaMlsField {
   const float* mass;             ///< [kg]
   const float* inv_mass;         ///< 0 where held
   const ContactSpring* contact;  ///< per node
+  const float* edge;             ///< distance to its neighbours [m]
   const std::uint8_t* outer;     ///< at the surface, or a cut passes beside it
   float4* stress;                ///< [3 count]: columns of Q_i, kappa_i in the fourth place
   bool viscous = false;
+  float spring_rest = 1;  ///< how much of springs' lengths is free of force, as internal_forces()
 };
 
 /// Colliders of one substep.
@@ -99,6 +102,7 @@ struct CudaMlsNodeChange {
 struct CudaMlsEntryChange {
   std::int32_t at;
   float weight, spring;
+  std::uint8_t whole;
 };
 
 struct CudaMlsStep {

@@ -23,8 +23,8 @@ struct CudaMlsTissue::OnDevice {
   bool host_is_current = true;
   DeviceArray<std::int32_t> offset, other;
   DeviceArray<float> weight, spring, inverse_moment, volume_mu, volume_lambda, volume_eta, kappa,
-      mass, inv_mass;
-  DeviceArray<std::uint8_t> neo_hookean, outer;
+      mass, inv_mass, edge;
+  DeviceArray<std::uint8_t> neo_hookean, outer, whole;
   DeviceArray<ContactSpring> contact;
   bool has_springs = false, viscous = false;
 
@@ -84,6 +84,7 @@ struct CudaMlsTissue::OnDevice {
     f.other = other.data();
     f.weight = weight.data();
     f.spring = has_springs ? spring.data() : nullptr;
+    f.whole = whole.data();
     f.inverse_moment = inverse_moment.data();
     f.volume_mu = volume_mu.data();
     f.volume_lambda = volume_lambda.data();
@@ -93,6 +94,7 @@ struct CudaMlsTissue::OnDevice {
     f.mass = mass.data();
     f.inv_mass = inv_mass.data();
     f.contact = contact.data();
+    f.edge = edge.data();
     f.outer = outer.data();
     f.stress = stress.data();
     f.viscous = viscous;

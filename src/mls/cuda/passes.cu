@@ -6,6 +6,7 @@
 
 #include "material/laws.h"
 #include "mls/cuda/device_state.h"
+#include "mls/stop_tool.h"
 #include "mls/stretch.h"
 
 namespace tissue_sim {
@@ -147,7 +148,7 @@ __device__ __forceinline__ void pair_forces(const CudaMlsField& f, const float4*
     if (!(s > 0)) continue;
     const float x[3] = {r[0] + d[0], r[1] + d[1], r[2] + d[2]};
     const float length = sqrtf(x[0] * x[0] + x[1] * x[1] + x[2] * x[2]);
-    const float rest = sqrtf(r[0] * r[0] + r[1] * r[1] + r[2] * r[2]);
+    const float rest = f.spring_rest * sqrtf(r[0] * r[0] + r[1] * r[1] + r[2] * r[2]);
     add(sum, s * (length - rest) / fmaxf(length, 1e-12f), {x[0], x[1], x[2], 0});
   }
 }
@@ -156,9 +157,27 @@ __device__ __forceinline__ void add_load(unsigned long long* load, double value)
   atomicAdd(load, static_cast<unsigned long long>(__double2ll_rn(value * (1 / kMlsLoadUnit))));
 }
 
+/// The collider pushes a node at x.
+__device__ __forceinline__ void add_push(const CudaMlsColliders& c, int collider,
+                                         const float (&x)[3], const float (&push)[3]) {
+  unsigned long long* load = c.loads + kMlsLoadSums * collider;
+  double arm[3];
+#pragma unroll
+  for (int a = 0; a < 3; ++a) {
+    arm[a] = static_cast<double>(x[a]) - c.all[collider].position[a];
+  }
+#pragma unroll
+  for (int a = 0; a < 3; ++a) {
+    const int b = (a + 1) % 3, d = (a + 2) % 3;
+    add_load(load + a, -push[a]);
+    add_load(load + 3 + a, -(arm[b] * push[d] - arm[d] * push[b]));
+  }
+}
+
 __device__ __forceinline__ void collider_forces(const CudaMlsField& f, const CudaMlsColliders& c,
-                                                int i, const float (&x)[3], const float (&v)[3],
-                                                float (&sum)[3]) {
+                                                const CudaMlsStep& step, int i, const float (&x)[3],
+                                                const float (&v)[3], float (&sum)[3],
+                                                MlsStop& stop) {
   const std::uint32_t touched = c.touching[i];
   std::uint32_t touches = 0;
   for (std::uint32_t left = c.near; left != 0; left &= left - 1) {
@@ -178,21 +197,13 @@ __device__ __forceinline__ void collider_forces(const CudaMlsField& f, const Cud
       to_local(collider, x, place);
     }
     contact_force(collider, g, f.contact[i], x, v, place, push);
+    bear_spring(f.contact[i].stiffness, __ldg(f.mass + i), k, step.dt, step.kick, stop);
     *held = {place[0], place[1], place[2], 0};
     touches |= 1u << k;
+#pragma unroll
+    for (int a = 0; a < 3; ++a) sum[a] += push[a];
+    add_push(c, k, x, push);
     unsigned long long* load = c.loads + kMlsLoadSums * k;
-    double arm[3];
-#pragma unroll
-    for (int a = 0; a < 3; ++a) {
-      sum[a] += push[a];
-      arm[a] = static_cast<double>(x[a]) - collider.position[a];
-    }
-#pragma unroll
-    for (int a = 0; a < 3; ++a) {
-      const int b = (a + 1) % 3, d = (a + 2) % 3;
-      add_load(load + a, -push[a]);
-      add_load(load + 3 + a, -(arm[b] * push[d] - arm[d] * push[b]));
-    }
     atomicAdd(load + 6, 1ull);
     if (distance < -collider.inside && collider.inside > 0) {
       atomicAdd(load + 7, 1ull);
@@ -200,6 +211,60 @@ __device__ __forceinline__ void collider_forces(const CudaMlsField& f, const Cud
     }
   }
   if (touches != touched) c.touching[i] = touches;
+}
+
+__device__ __forceinline__ MlsStopNode stop_node(const CudaMlsField& f, const float4* u, int i) {
+  const float4 X = __ldg(f.place + i), at = __ldg(u + i);
+  return {{X.x + at.x, X.y + at.y, X.z + at.z}, __ldg(f.edge + i), f.contact[i].stiffness};
+}
+
+/// What stops tools at a node, as add_contact() (mls/contact.cpp): the same in all of its lanes,
+/// which share the triangles.
+template <int L>
+__device__ __forceinline__ void stop_tools(const CudaMlsField& f, const CudaMlsMotion& at,
+                                           const CudaMlsColliders& c, const CudaMlsStep& step,
+                                           const Worker<L>& worker, MlsStop& stop) {
+  const int i = worker.node;
+  const MlsStopNode node = stop_node(f, at.u, i);
+  const Entries entries = entries_of(f, i);
+  const float4 w = at.v[i];
+  const float v[3] = {w.x, w.y, w.z};
+  const auto neighbour = [&](int entry) {  // at the surface; else -1
+    const int e = entries.first + entry * kMlsSlice, j = __ldg(f.other + e);
+    return f.whole[e] != 0 && f.outer[j] != 0 ? j : -1;
+  };
+  for (std::uint32_t left = f.outer[i] != 0 ? c.near : 0; left != 0; left &= left - 1) {
+    const int k = __ffs(static_cast<int>(left)) - 1;
+    const Collider& collider = c.all[k];
+    if (!is_stopped(collider)) continue;
+    const Gap g = gap(collider, node.x);
+    if (g.distance >= kStopReach * node.edge) continue;
+    if (worker.lane == 0) stop_at_node(collider, k, g, node, v, step.dt, step.kick, stop);
+    for (int y = 0; y < entries.count; ++y) {
+      const int to_y = neighbour(y);
+      if (to_y < 0) continue;
+      const MlsStopNode at_y = stop_node(f, at.u, to_y);
+      if (!may_be_stopped(g, node, at_y)) continue;
+      const float4 Y = __ldg(f.place + to_y);
+      for (int z = worker.lane; z < entries.count; z += L) {
+        const int to_z = neighbour(z);
+        if (to_z < 0 || to_z == to_y) continue;
+        const MlsStopNode at_z = stop_node(f, at.u, to_z);
+        if (z < y && may_be_stopped(g, node, at_z)) continue;  // seen from there
+        const float4 Z = __ldg(f.place + to_z);
+        const float d[3] = {Z.x - Y.x, Z.y - Y.y, Z.z - Y.z};
+        if (!makes_triangle(d, at_y.edge, at_z.edge)) continue;
+        stop_beside_node(collider, k, g, node, v, at_y, at_z, step.dt, step.kick, stop);
+      }
+    }
+  }
+  if (__any_sync(0xffffffffu, stop.collider >= 0) == 0) return;
+  worker.add_lanes(stop.force);
+  worker.add_lanes(stop.added);
+#pragma unroll
+  for (int lane = L / 2; lane > 0; lane /= 2) {
+    stop.collider = max(stop.collider, __shfl_xor_sync(0xffffffffu, stop.collider, lane));
+  }
 }
 
 /// What nodes of other pieces push it with, with MlsContact::kNodes (mls/node_contact.h): this
@@ -328,6 +393,8 @@ __global__ void __launch_bounds__(kMlsThreads)
   pair_forces(f, at.u, worker, sum);
   if (contacts.rest != nullptr) node_forces(f, at, contacts, worker, sum);
   worker.add_lanes(sum);
+  MlsStop stop = no_stop();
+  if (colliders.near != 0) stop_tools(f, at, colliders, step, worker, stop);
   if (worker.lane != 0 || worker.is_spare) return;
   const float4 u = at.u[i], v = at.v[i];
   if (contacts.count > 0 && __ldg(contacts.at + i) >= 0) {
@@ -336,19 +403,23 @@ __global__ void __launch_bounds__(kMlsThreads)
     sum[1] += pushed.y;
     sum[2] += pushed.z;
   }
-  if (colliders.near != 0) {
-    const float4 X = __ldg(f.place + i);
-    const float x[3] = {X.x + u.x, X.y + u.y, X.z + u.z}, speed[3] = {v.x, v.y, v.z};
-    collider_forces(f, colliders, i, x, speed, sum);
-  }
   const float inv_mass = __ldg(f.inv_mass + i);
   const float velocity[3] = {v.x, v.y, v.z}, displacement[3] = {u.x, u.y, u.z};
-  float next_v[3], next_u[3];
+  float dv[3] = {}, next_v[3], next_u[3];
+  if (colliders.near != 0) {
+    const float4 X = __ldg(f.place + i);
+    const float x[3] = {X.x + u.x, X.y + u.y, X.z + u.z};
+    collider_forces(f, colliders, step, i, x, velocity, sum, stop);
+    if (stop.collider >= 0 && inv_mass > 0) {
+      float push[3];
+      move_stopping(stop, __ldg(f.mass + i), sum, step.gravity, step.kick, dv, push);
+      add_push(colliders, stop.collider, x, push);
+    }
+  }
 #pragma unroll
   for (int a = 0; a < 3; ++a) {
-    next_v[a] = inv_mass > 0
-                    ? step.keep * velocity[a] + step.kick * (sum[a] * inv_mass + step.gravity[a])
-                    : 0.0f;
+    if (stop.collider < 0) dv[a] = step.kick * (sum[a] * inv_mass + step.gravity[a]);
+    next_v[a] = inv_mass > 0 ? step.keep * velocity[a] + dv[a] : 0.0f;
     next_u[a] = displacement[a] + step.dt * next_v[a];
   }
   if (!(inv_mass > 0)) {
@@ -389,6 +460,7 @@ __global__ void __launch_bounds__(kMlsThreads)
   if (k < entry_count) {
     const CudaMlsEntryChange e = entries[k];
     const_cast<float*>(f.weight)[e.at] = e.weight;
+    const_cast<std::uint8_t*>(f.whole)[e.at] = e.whole;
     if (f.spring != nullptr) const_cast<float*>(f.spring)[e.at] = e.spring;
   }
   if (k >= node_count) return;

@@ -347,7 +347,8 @@ struct NotchedErrors {
   }
 };
 
-// Loads up to large strain.
+// Loads up to large strain, at those places where it holds; the others are in
+// WhereverPlaneAndFrontLie.
 TEST(NotchedBlock, TipAndMouth) {
   for (const Notched& n : kNotched) {
     const NotchedErrors off(n, {"small", "third"});

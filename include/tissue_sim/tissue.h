@@ -86,7 +86,8 @@ struct GpuPoints {
   int gpu = -1;  ///< CUDA's number of it; -1: the tissue is on a CPU
 };
 
-/// Corners of a surface in the memory of the GPU that the tissue is on: nine numbers a triangle [m].
+/// Corners of a surface in the memory of the GPU that the tissue is on: nine numbers a triangle
+/// [m].
 struct GpuSurface {
   const float* corners = nullptr;
   int triangles = 0;

@@ -141,7 +141,7 @@ void MlsTissue::end_frame() {
 }
 
 PartSubsteps MlsTissue::choose_substeps(const FrameInput&, double time) {
-  const MlsForces forces = [this](const float* u, float* force) { forces_at(u, force); };
+  const MlsForces forces = [this](const float* u, float* force) { forces_at(u, force, 0); };
   return substeps_.part(*state_, time, [&](const std::vector<std::uint8_t>&, int) {
     pull();
     return measured_limit(*state_, forces, kLanczosSteps);
@@ -272,7 +272,9 @@ void MlsTissue::measure_stress(std::vector<float>& of_node) {
       4);
 }
 
-void MlsTissue::forces_at(const float* u, float* force) { internal_forces(*state_, u, force, 0); }
+void MlsTissue::forces_at(const float* u, float* force, float rest) {
+  internal_forces(*state_, u, force, rest);
+}
 
 FrameResult MlsTissue::finish() {
   const Figures figures = measure();

@@ -77,8 +77,8 @@ class MlsTissue : public SteppedTissue<MlsTissue> {
   virtual Figures measure();
   /// Von Mises stress of each node over its shear modulus.
   virtual void measure_stress(std::vector<float>& of_node);
-  /// Internal forces at displacements `u`: [4 nodes] both.
-  virtual void forces_at(const float* u, float* force);
+  /// Internal forces at displacements `u`: [4 nodes] both; `rest` as internal_forces() takes it.
+  virtual void forces_at(const float* u, float* force, float rest);
 
   template <class Archive>
   void each_field(Archive& archive);

@@ -47,7 +47,7 @@ void run(benchmark::State& bench, int nodes, bool is_cut) {
   for (auto _ : bench) tissue.run_part(part);
   tissue.pull();
   Array<float> on_gpu(s.u.size()), on_cpu(s.u.size());
-  tissue.forces_at(s.u.data(), on_gpu.data());
+  tissue.forces_at(s.u.data(), on_gpu.data(), 1);
   internal_forces(s, s.u.data(), on_cpu.data());
   double most = 0, off = 0;
   for (std::size_t k = 0; k < 4 * static_cast<std::size_t>(s.count()); ++k) {

@@ -56,7 +56,7 @@ TEST_F(MlsOnGpu, ForcesAreThoseOfTheReference) {
         }
         tissue.push();
         Array<float> force(s.u.size());
-        tissue.forces_at(s.u.data(), force.data());
+        tissue.forces_at(s.u.data(), force.data(), 1);
         EXPECT_LT(difference(reference::mls_forces(s), force), 1e-4)
             << "placement " << static_cast<int>(placement) << (is_cut ? ", cut" : "");
       }

@@ -482,11 +482,11 @@ void CudaMlsTissue::measure_stress(std::vector<float>& of_node) {
   d.wait("measure stress");
 }
 
-void CudaMlsTissue::forces_at(const float* u, float* force) {
+void CudaMlsTissue::forces_at(const float* u, float* force, float rest) {
   OnDevice& d = *device_;
   CudaMlsField field = d.field();
   field.viscous = false;
-  field.spring_rest = 0;
+  field.spring_rest = rest;
   const CudaMlsMotion at = d.motion(1 - d.current);  // not in use between two parts
   d.u[1 - d.current].upload(reinterpret_cast<const float4*>(u), d.count, d.stream);
   launch_mls_stresses(field, at, {}, d.stream);

@@ -28,7 +28,7 @@ class CudaMlsTissue final : public MlsTissue, DistantNodes {
   void pull() override;
   void push_velocities() override;
   void push();  ///< motion and contact to the GPU
-  void forces_at(const float* u, float* force) override;
+  void forces_at(const float* u, float* force, float rest) override;
 
  protected:
   void pairs_changed(const std::vector<std::int32_t>& nodes) override;

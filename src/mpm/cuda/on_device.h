@@ -183,8 +183,8 @@ struct CudaTissue final : MpmDevice, DistantNodes {
   PinnedArray<long long> host_loads;
   PinnedArray<CudaMeasure> host_measures;
   PinnedArray<Point> host_cloud;
-  std::array<CudaEvent, 8> cloud_came;         ///< parts of it
-  PinnedArray<float4> host_nodes;              ///< u, then v
+  std::array<CudaEvent, 8> cloud_came;  ///< parts of it
+  PinnedArray<float4> host_nodes;       ///< u, then v
   BoundaryOnGpu boundary;
   bool points_changed = true;  ///< pieces must be uploaded
   bool has_missed = false;     ///< missed_contact()

@@ -353,8 +353,8 @@ TEST(NotchedBlock, TipAndMouth) {
   for (const Notched& n : kNotched) {
     const NotchedErrors off(n, {"small", "third"});
     for (std::size_t i = 0; i < off.sag.size(); ++i) {
-      EXPECT_TRUE(is_within("a notched block that sags by up to a third of its length: its end",
-                            off.sag[i], 0.03))
+      EXPECT_TRUE(
+          is_within("a notched block that sags by up to a third: its end", off.sag[i], 0.03))
           << n << ", load " << i;
       EXPECT_TRUE(is_within("how far its notch opens", off.mouth[i], 0.05)) << n << ", load " << i;
     }

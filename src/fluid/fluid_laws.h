@@ -5,7 +5,7 @@
 // weight beyond r in a unit of solid angle it is the integral of F over the solid angle of all
 // triangles of the solid's surface (Feldman and Bonet 2007 integrate so over faces), of those that
 // the place is behind with a minus: so what is open again behind an edge, or a wall that is thin,
-// is open. Its gradient is the kernel's integral over the triangles. pair_sums.h has both.
+// is open. Its gradient is the kernel's integral over the triangles. wall_integrals.h has both.
 #pragma once
 
 #include <cmath>

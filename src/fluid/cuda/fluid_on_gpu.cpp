@@ -205,11 +205,12 @@ FluidGrid ParticlesOnGpu::make_grid(float reach) {
   g.edge = 0.5f * reach;
   // Drops that are far apart take larger cells, not more memory.
   const double most = 8.0 * particles_ + 4096;
+  constexpr float kFarthest = 1e6f;  // [m]: of what is not even a number the end of the frame tells
   for (;; g.edge *= 1.5f) {
     double cells = 1;
     for (int a = 0; a < 3; ++a) {
       g.low[a] = box[a];
-      const float across = std::min(1e6f * g.edge, std::max(0.0f, box[3 + a] - box[a]));
+      const float across = std::min(kFarthest, std::max(0.0f, box[3 + a] - box[a]));
       g.size[a] = 1 + static_cast<int>(across / g.edge);
       cells *= g.size[a];
     }

@@ -63,6 +63,7 @@ struct FluidState {
   FluidKernel kernel{0};
   float spacing = 0;  ///< [m]
   FluidParticles particles;
+  FluidParticles sorted;  ///< room to sort them in
   std::uint32_t next_id = 0;
   FluidLists lists;
   std::vector<std::uint8_t> is_bit;  ///< of each triangle: no wall, of a piece as small as a drop

@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <cmath>
 #include <memory>
+#include <utility>
 
 #if defined(__x86_64__)
 #include <immintrin.h>
@@ -28,7 +29,8 @@ class Cells {
  public:
   /// limit(i): how near to i is near [m].
   template <class Limit>
-  Cells(const Array<float> (&x)[3], float edge, const Limit& limit) : edge_(edge) {
+  Cells(const Array<float> (&x)[3], float edge, Cpu& cpu, const Limit& limit) : edge_(edge) {
+    constexpr int kAtOnce = 4096;
     const auto n = static_cast<int>(x[0].size());
     float high[3];
     for (int a = 0; a < 3; ++a) {
@@ -48,20 +50,22 @@ class Cells {
     }
     begin_.assign(static_cast<std::size_t>(n_[0]) * n_[1] * n_[2] + 1, 0);
     std::vector<std::int32_t> cell(n);
-    for (int i = 0; i < n; ++i) {
-      cell[i] = index(at(x[0][i], 0), at(x[1][i], 1), at(x[2][i], 2));
-      ++begin_[cell[i] + 1];
-    }
+    cpu.for_each(
+        n, [&](int i) { cell[i] = index(at(x[0][i], 0), at(x[1][i], 1), at(x[2][i], 2)); },
+        kAtOnce);
+    for (const std::int32_t c : cell) ++begin_[c + 1];
     for (std::size_t c = 1; c < begin_.size(); ++c) begin_[c] += begin_[c - 1];
     sorted_.resize(n);
     std::vector<std::int32_t> next(begin_.begin(), begin_.end() - 1);
     for (int i = 0; i < n; ++i) sorted_[next[cell[i]]++] = i;
-    for (int a = 0; a < 3; ++a) {
-      x_[a].resize(n);
-      for (int k = 0; k < n; ++k) x_[a][k] = x[a][sorted_[k]];
-    }
-    limit2_.resize(n);
-    for (int k = 0; k < n; ++k) limit2_[k] = limit(sorted_[k]) * limit(sorted_[k]);
+    for (auto* field : {&x_[0], &x_[1], &x_[2], &limit2_}) field->resize(n);
+    cpu.for_each(
+        n,
+        [&](int k) {
+          for (int a = 0; a < 3; ++a) x_[a][k] = x[a][sorted_[k]];
+          limit2_[k] = limit(sorted_[k]) * limit(sorted_[k]);
+        },
+        kAtOnce);
   }
 
   /// Those of a row of cells that are near one another, as sorted.
@@ -191,14 +195,15 @@ struct WallCells {
   float radius = 0;                    ///< at most [m]
   std::unique_ptr<Cells> cells;
 
-  WallCells(const std::vector<WallTriangle>& walls, std::vector<std::int32_t> those, float reach)
+  WallCells(const std::vector<WallTriangle>& walls, std::vector<std::int32_t> those, float reach,
+            Cpu& cpu)
       : triangle(std::move(those)) {
     Array<float> x[3];
     for (const std::int32_t t : triangle) {
       for (int a = 0; a < 3; ++a) x[a].push_back(walls[t].middle[a]);
       radius = std::max(radius, walls[t].radius);
     }
-    cells = std::make_unique<Cells>(x, 0.5f * (reach + radius), [&](std::int32_t k) {
+    cells = std::make_unique<Cells>(x, 0.5f * (reach + radius), cpu, [&](std::int32_t k) {
       return reach + walls[triangle[k]].radius;
     });
   }
@@ -219,7 +224,7 @@ void list_walls(FluidState& s, float reach, float near, float within) {
   }
   std::vector<WallCells> cells;
   for (std::vector<std::int32_t>& those : of_size) {
-    if (!those.empty()) cells.emplace_back(walls, std::move(those), reach);
+    if (!those.empty()) cells.emplace_back(walls, std::move(those), reach, *s.cpu);
   }
   l.wall_soon.assign(p.size(), 0);
   l.wall_near.assign(p.size(), 0);
@@ -261,7 +266,7 @@ void list_neighbours(FluidState& s, const std::vector<float>& corners, float ski
   const FluidParticles& p = s.particles;
   FluidLists& l = s.lists;
   const float reach = s.kernel.reach + skin;
-  const Cells cells(p.x, 0.5f * reach, [reach](std::int32_t) { return reach; });
+  const Cells cells(p.x, 0.5f * reach, *s.cpu, [reach](std::int32_t) { return reach; });
   list_each(p.size(), *s.cpu, l.begin, l.other, [&](int i, Found& list) {
     const float x[3] = {p.x[0][i], p.x[1][i], p.x[2][i]};
     cells.add_within(x, reach, s.instructions, list);
@@ -282,22 +287,28 @@ void sort_particles(FluidState& s) {
   s.lists.made = false;
   if (p.size() == 0) return;
   const Array<std::int32_t> order =
-      Cells(p.x, s.kernel.reach, [](std::int32_t) { return 0.0f; }).sorted();
-  const auto put = [&order](auto& field) {
-    auto sorted = field;
-    for (std::size_t i = 0; i < order.size(); ++i) sorted[i] = field[order[i]];
-    field.swap(sorted);
+      Cells(p.x, s.kernel.reach, *s.cpu, [](std::int32_t) { return 0.0f; }).sorted();
+  FluidParticles& to = s.sorted;
+  const auto put = [&order](const auto& from, auto& field) {
+    field.resize(order.size());
+    for (std::size_t i = 0; i < order.size(); ++i) field[i] = from[order[i]];
   };
-  for (int a = 0; a < 3; ++a) {
-    put(p.x[a]);
-    put(p.v[a]);
-  }
-  put(p.volume);
-  put(p.pressure);
-  put(p.dense);
-  put(p.kind);
-  put(p.id);
-  put(p.fill);
+  s.cpu->for_each(6, [&](int k) {
+    if (k < 3) {
+      put(p.x[k], to.x[k]);
+      put(p.v[k], to.v[k]);
+    } else if (k == 3) {
+      put(p.volume, to.volume);
+      put(p.pressure, to.pressure);
+    } else if (k == 4) {
+      put(p.dense, to.dense);
+      put(p.kind, to.kind);
+    } else {
+      put(p.id, to.id);
+      put(p.fill, to.fill);
+    }
+  });
+  std::swap(p, to);
 }
 
 }  // namespace tissue_sim

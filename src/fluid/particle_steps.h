@@ -203,6 +203,24 @@ struct OneLane {
   void meet() const {}
 };
 
+/// How far the farther end of a way is from a place [m].
+TISSUE_SIM_INLINE float farther(const float* x, const float* y, const float* from) {
+  float before2 = 0, after2 = 0;
+  for (int a = 0; a < 3; ++a) {
+    before2 += (x[a] - from[a]) * (x[a] - from[a]);
+    after2 += (y[a] - from[a]) * (y[a] - from[a]);
+  }
+  return sqrtf(larger(before2, after2));
+}
+
+/// Whether no wall can be in a particle's way from x to y: both ends are nearer to where its walls
+/// were last looked at than these were, less what they moved by.
+TISSUE_SIM_INLINE bool is_clear(const FluidView& s, int i, const float* x, const float* y) {
+  if (s.wall_begin[i] == s.wall_near[i]) return true;
+  const FluidClear clear = s.clear[i];
+  return farther(x, y, clear.x) < clear.room - s.walls_moved;
+}
+
 /// Raises y, where a particle comes to from x, before the triangles that move from `begin` to `end`
 /// within `time`; what they take of its speed is an impulse.
 template <class Lanes>
@@ -210,24 +228,12 @@ TISSUE_SIM_INLINE FluidTouch stop_at_walls(const FluidView& s, const WallTriangl
                                            const WallTriangle* end, float time, int i,
                                            const float* x, float* y, float* v, const Lanes& lanes) {
   FluidTouch touch{-1, {}};
-  if (s.wall_begin[i] == s.wall_near[i]) return touch;
+  if (is_clear(s, i, x, y)) return touch;
   const float margin = kRoom * s.spacing;
   const float mass = s.volume[i] * s.laws[s.kind[i]].density;
-  // Both ends of its way are nearer to where its walls were last looked at than these were, less
-  // what they moved by.
-  FluidClear clear = s.clear[i];
-  const auto way = [&](const float* from) {
-    float before2 = 0, after2 = 0;
-    for (int a = 0; a < 3; ++a) {
-      before2 += (x[a] - from[a]) * (x[a] - from[a]);
-      after2 += (y[a] - from[a]) * (y[a] - from[a]);
-    }
-    return sqrtf(larger(before2, after2));
-  };
-  if (way(clear.x) < clear.room - s.walls_moved) return touch;
   const float listed[3] = {s.listed[0][i], s.listed[1][i], s.listed[2][i]};
   // Nearer than that is none but these.
-  const float soon = kSoon * s.spacing - way(listed) - s.walls_moved;
+  const float soon = kSoon * s.spacing - farther(x, y, listed) - s.walls_moved;
   const std::int32_t first = s.wall_begin[i] + lanes.lane;
   const std::int32_t until = soon > margin ? s.wall_soon[i] : s.wall_near[i];
   float nearest = soon > margin ? soon : s.kernel.reach;
@@ -236,9 +242,9 @@ TISSUE_SIM_INLINE FluidTouch stop_at_walls(const FluidView& s, const WallTriangl
     const float height = fabsf(t.height(x));
     if (height < nearest) nearest = lesser(nearest, larger(height, t.beside(x)));
   }
-  clear = {{x[0], x[1], x[2]}, lanes.least(nearest) - s.walls_moved - margin};
+  const FluidClear clear{{x[0], x[1], x[2]}, lanes.least(nearest) - s.walls_moved - margin};
   if (lanes.lane == 0) s.clear[i] = clear;
-  if (way(clear.x) < clear.room - s.walls_moved) return touch;
+  if (farther(x, y, clear.x) < clear.room - s.walls_moved) return touch;
   for (int pass = 0; pass < 3; ++pass) {
     float deepest = 0;
     std::int32_t hit = -1;
@@ -299,21 +305,26 @@ TISSUE_SIM_INLINE FluidTouch yield_to_walls(const FluidView& s, float time, int 
   return touch;
 }
 
-/// Moves a particle to where no wall is in its way; the first lane adds to loads.
-template <class Lanes, class Add>
-TISSUE_SIM_INLINE FluidTouch move(const FluidView& s, const FluidSubstep& step, int i,
-                                  const Lanes& lanes, const Add& add) {
+/// Where a substep takes a particle if nothing is in its way.
+struct FluidWay {
+  float x[3], y[3], v[3];  ///< from, to [m]; its speed [m/s]
+
+  TISSUE_SIM_INLINE FluidWay(const FluidView& s, const FluidSubstep& step, int i) {
+    for (int a = 0; a < 3; ++a) {
+      x[a] = s.x[a][i];
+      v[a] = s.v_next[a][i];
+      y[a] = x[a] + step.dt * v[a];
+    }
+  }
+};
+
+/// A particle comes to where its way ends, or before the colliders there; adds to loads.
+template <class Add>
+TISSUE_SIM_INLINE void arrive(const FluidView& s, const FluidSubstep& step, int i, FluidWay way,
+                              const Add& add) {
   const float margin = kRoom * s.spacing;
   const float mass = s.volume[i] * s.laws[s.kind[i]].density;
-  float x[3], y[3], v[3];
-  for (int a = 0; a < 3; ++a) {
-    x[a] = s.x[a][i];
-    v[a] = s.v_next[a][i];
-    y[a] = x[a] + step.dt * v[a];
-  }
-  const FluidTouch touch = stop_at_walls(s, s.now, s.now, step.dt, i, x, y, v, lanes);
-  lanes.meet();
-  if (lanes.lane != 0) return touch;
+  float(&y)[3] = way.y, (&v)[3] = way.v;
   for (int c = 0; c < step.collider_count; ++c) {
     if ((s.near[i] & bit_of(c)) == 0) continue;
     const Collider& of = step.colliders[c];
@@ -336,6 +347,16 @@ TISSUE_SIM_INLINE FluidTouch move(const FluidView& s, const FluidSubstep& step, 
     s.x[a][i] = y[a];
     s.v[a][i] = v[a];
   }
+}
+
+/// Moves a particle to where no wall is in its way; the first lane adds to loads.
+template <class Lanes, class Add>
+TISSUE_SIM_INLINE FluidTouch move(const FluidView& s, const FluidSubstep& step, int i,
+                                  const Lanes& lanes, const Add& add) {
+  FluidWay way(s, step, i);
+  const FluidTouch touch = stop_at_walls(s, s.now, s.now, step.dt, i, way.x, way.y, way.v, lanes);
+  lanes.meet();
+  if (lanes.lane == 0) arrive(s, step, i, way, add);
   return touch;
 }
 

@@ -9,27 +9,33 @@
 namespace tissue_sim {
 namespace {
 
-/// Threads that sum for a particle, of one warp.
-constexpr int kTeam = 8;
-
-struct Team {
-  static constexpr int kLanes = kTeam;
+/// Threads of one warp that work for a particle or a triangle.
+template <int kThreads>
+struct TeamOf {
+  static constexpr int kLanes = kThreads;
   int lane;
   unsigned mask;
-  __device__ Team() {
-    lane = static_cast<int>(threadIdx.x % kTeam);
-    mask = ((1u << kTeam) - 1) << (threadIdx.x % 32 / kTeam * kTeam);
+  __device__ TeamOf() {
+    lane = static_cast<int>(threadIdx.x % kLanes);
+    mask = (0xffffffffu >> (32 - kLanes)) << first();
+  }
+  /// Of its threads in the warp.
+  __device__ static int first() { return static_cast<int>(threadIdx.x % 32 / kLanes * kLanes); }
+  __device__ int of_lane(int x, int of) const { return __shfl_sync(mask, x, of, kLanes); }
+  /// Those lanes for which it holds.
+  __device__ unsigned which(bool holds) const {
+    return (__ballot_sync(mask, holds) & mask) >> first();
   }
   __device__ float sum(float x) const {
-    for (int step = kTeam / 2; step > 0; step /= 2) x += __shfl_xor_sync(mask, x, step);
+    for (int step = kLanes / 2; step > 0; step /= 2) x += __shfl_xor_sync(mask, x, step);
     return x;
   }
   __device__ float least(float x) const {
-    for (int step = kTeam / 2; step > 0; step /= 2) x = fminf(x, __shfl_xor_sync(mask, x, step));
+    for (int step = kLanes / 2; step > 0; step /= 2) x = fminf(x, __shfl_xor_sync(mask, x, step));
     return x;
   }
   __device__ void deepest(float& raise, std::int32_t& entry) const {
-    for (int step = kTeam / 2; step > 0; step /= 2) {
+    for (int step = kLanes / 2; step > 0; step /= 2) {
       const float other = __shfl_xor_sync(mask, raise, step);
       const std::int32_t of = __shfl_xor_sync(mask, entry, step);
       if (of >= 0 && (entry < 0 || other > raise || (other == raise && of < entry))) {
@@ -39,14 +45,17 @@ struct Team {
     }
   }
   __device__ void meet() const { __syncwarp(mask); }
-  /// Those with a lower number for which it holds; then all.
+  /// How many with a lower number it holds for; then for how many.
   __device__ int before(bool holds, int& all) const {
-    const unsigned which =
-        (__ballot_sync(mask, holds) & mask) >> (threadIdx.x % 32 / kTeam * kTeam);
-    all = __popc(which);
-    return __popc(which & ((1u << lane) - 1));
+    const unsigned those = which(holds);
+    all = __popc(those);
+    return __popc(those & ((1u << lane) - 1));
   }
 };
+/// Who sums over neighbours, and who looks at walls.
+using Team = TeamOf<8>;
+using Warp = TeamOf<32>;
+constexpr int kTeam = Team::kLanes;
 
 __device__ __forceinline__ void most_of_warp(unsigned* most, float x) {
   unsigned bits = __float_as_uint(x);
@@ -121,22 +130,31 @@ struct BeginCells {
   }
 };
 
-/// Calls visit(k, there) for each place in rows of cells around `x`, kLanes at a time; `there`: it
-/// is one, and nearer than `reach`.
-template <int kLanes, class Visit>
+/// Calls visit(k, there) for each place in rows of cells around `x`, a team's at a time; `there`:
+/// it is one, and nearer than `reach`. Lanes look up a row each: most around a triangle are empty.
+template <class Lanes, class Visit>
 __device__ __forceinline__ void visit_near(const FluidGrid& g, const float* x, float reach,
-                                           int lane, const Visit& visit) {
+                                           const Lanes& lanes, const Visit& visit) {
   int from[3], to[3];
   for (int a = 0; a < 3; ++a) {
     if (x[a] + reach < g.low[a] || x[a] - reach > g.low[a] + g.size[a] * g.edge) return;
     from[a] = cell_at(g, x[a] - reach, a);
     to[a] = cell_at(g, x[a] + reach, a);
   }
-  for (int z = from[2]; z <= to[2]; ++z) {
-    for (int y = from[1]; y <= to[1]; ++y) {
-      const std::int32_t end = g.begin[cell_of(g, to[0], y, z) + 1];
-      for (std::int32_t row = g.begin[cell_of(g, from[0], y, z)]; row < end; row += kLanes) {
-        const std::int32_t k = row + lane;
+  const int across = to[1] - from[1] + 1, rows = across * (to[2] - from[2] + 1);
+  for (int first = 0; first < rows; first += Lanes::kLanes) {
+    const int own = first + lanes.lane;
+    std::int32_t own_begin = 0, own_end = 0;
+    if (own < rows) {
+      const int y = from[1] + own % across, z = from[2] + own / across;
+      own_begin = g.begin[cell_of(g, from[0], y, z)];
+      own_end = g.begin[cell_of(g, to[0], y, z) + 1];
+    }
+    for (unsigned full = lanes.which(own_begin < own_end); full != 0; full &= full - 1) {
+      const int of = __ffs(static_cast<int>(full)) - 1;
+      const std::int32_t begin = lanes.of_lane(own_begin, of), end = lanes.of_lane(own_end, of);
+      for (std::int32_t row = begin; row < end; row += Lanes::kLanes) {
+        const std::int32_t k = row + lanes.lane;
         bool there = k < end;
         if (there) {
           const float4 p = g.place[k];
@@ -162,7 +180,7 @@ struct FindNeighbours {
     const float x[3] = {s.x[0][i], s.x[1][i], s.x[2][i]};
     int found = 0;
     std::int32_t* const to = other == nullptr ? nullptr : other + begin[i];
-    visit_near<kTeam>(g, x, reach, team.lane, [&](std::int32_t k, bool there) {
+    visit_near(g, x, reach, team, [&](std::int32_t k, bool there) {
       int all;
       const int before = team.before(there, all);
       if (to != nullptr && there) to[found + before] = g.sorted[k];
@@ -192,16 +210,18 @@ struct FindPairs {
   std::uint32_t* key;
   std::int32_t *number, *triangle, *particle;
   __device__ void operator()(int thread) const {
-    const int t = thread / 32, lane = thread % 32;
+    const int t = thread / 32;
+    const Warp warp;
     const WallTriangle& wall = s.now[t];
     int found = 0;
     const std::int32_t first = key == nullptr ? 0 : begin[t];
     const bool is_wall = of.is_bit == nullptr || of.is_bit[t] == 0;
     if (is_wall) {
-      visit_near<32>(g, wall.middle, of.reach + wall.radius, lane, [&](std::int32_t k, bool there) {
-        const unsigned which = __ballot_sync(0xffffffffu, there);
+      visit_near(g, wall.middle, of.reach + wall.radius, warp, [&](std::int32_t k, bool there) {
+        int all;
+        const int before = warp.before(there, all);
         if (key != nullptr && there) {
-          const std::int32_t at = first + found + __popc(which & ((1u << lane) - 1));
+          const std::int32_t at = first + found + before;
           const float4 p = g.place[k];
           const float x[3] = {p.x, p.y, p.z};
           const float distance = wall.beside(x);
@@ -212,10 +232,10 @@ struct FindPairs {
           triangle[at] = t;
           particle[at] = i;
         }
-        found += __popc(which);
+        found += all;
       });
     }
-    if (key == nullptr && lane == 0) counts[t] = found;
+    if (key == nullptr && warp.lane == 0) counts[t] = found;
   }
 };
 
@@ -223,7 +243,7 @@ struct PutEntries {
   int particles, pairs;
   const std::uint32_t* key;
   const std::int32_t *pair, *triangle;
-  std::int32_t *wall_begin, *wall_soon, *wall_near, *wall, *pair_entry;
+  std::int32_t *wall_begin, *wall_soon, *wall_near, *wall, *wall_of, *pair_entry;
 
   __device__ int first_of(std::uint32_t k) const {
     int low = 0, high = pairs;
@@ -240,6 +260,7 @@ struct PutEntries {
   __device__ void operator()(int i) const {
     if (i < pairs) {
       wall[i] = triangle[pair[i]];
+      wall_of[i] = static_cast<std::int32_t>(key[i] / 4);
       pair_entry[pair[i]] = i;
     }
     if (i > particles) return;
@@ -266,17 +287,9 @@ struct FindWallsMoved {
   }
 };
 
-struct Pack {
+/// What a particle sees of a wall: a thread each, as near triangles are rare and dear.
+struct See {
   FluidOnGpu s;
-  __device__ void operator()(int i) const {
-    s.place[i] = {s.x[0][i], s.x[1][i], s.x[2][i], s.volume[i]};
-    for (int a = 0; a < 3; ++a) s.motion[4 * static_cast<std::size_t>(i) + a] = s.v[a][i];
-  }
-};
-
-struct Press {
-  FluidOnGpu s;
-  FluidSubstep step;
 
   /// What the kernel at x has of a triangle, and its integral over it [1/m].
   __device__ float see(const float* x, const WallTriangle& t, float& over) const {
@@ -302,6 +315,20 @@ struct Press {
     return of.angle_share() - of.kernel_share(places, s.kernel.reach);
   }
 
+  __device__ void operator()(int e) const {
+    const float4 p = s.place[s.wall_of[e]];
+    const float x[3] = {p.x, p.y, p.z};
+    const WallTriangle& t = s.now[s.wall[e]];
+    float over;
+    const float share = see(x, t, over);
+    s.share[e] = over;
+    s.seen[e] = {over * t.normal[0], over * t.normal[1], over * t.normal[2], share};
+  }
+};
+
+struct Press {
+  FluidOnGpu s;
+  FluidSubstep step;
   __device__ void operator()(int thread) const {
     const int i = thread / kTeam;
     const Team team;
@@ -316,11 +343,9 @@ struct Press {
     }
     float tissue = 0, normal[3] = {};
     for (std::int32_t e = s.wall_begin[i] + team.lane; e < s.wall_begin[i + 1]; e += kTeam) {
-      const WallTriangle& t = s.now[s.wall[e]];
-      float over;
-      tissue += see(x, t, over);
-      s.share[e] = over;
-      for (int a = 0; a < 3; ++a) normal[a] += over * t.normal[a];
+      const float4 seen = s.seen[e];
+      tissue += seen.w;
+      normal[0] += seen.x, normal[1] += seen.y, normal[2] += seen.z;
     }
     sum = team.sum(sum);
     tissue = team.sum(tissue);
@@ -405,7 +430,7 @@ struct Push {
 
 /// What walls met a particle with goes to those around, as fluid::touch_weight() says.
 __device__ __forceinline__ void give_touch(const FluidOnGpu& s, int i, const FluidTouch& touch,
-                                           const Team& team) {
+                                           const Warp& team) {
   if (touch.triangle < 0) return;
   team.meet();  // the first of the team put it there
   const float x[3] = {s.x[0][i], s.x[1][i], s.x[2][i]};
@@ -421,40 +446,106 @@ __device__ __forceinline__ void give_touch(const FluidOnGpu& s, int i, const Flu
     }
   };
   float sum = 0;
-  for (std::int32_t e = begin; e < end; e += kTeam) sum += weight(e);
+  for (std::int32_t e = begin; e < end; e += Warp::kLanes) sum += weight(e);
   sum = team.sum(sum);
   if (!(sum > 0)) {
     if (team.lane == 0) give(touch.triangle, 1);
     return;
   }
-  for (std::int32_t e = begin; e < end; e += kTeam) give(s.wall[e], weight(e) / sum);
+  for (std::int32_t e = begin; e < end; e += Warp::kLanes) give(s.wall[e], weight(e) / sum);
 }
 
+/// For the substep that comes next.
+__device__ __forceinline__ void pack(const FluidOnGpu& s, int i) {
+  s.place[i] = {s.x[0][i], s.x[1][i], s.x[2][i], s.volume[i]};
+  for (int a = 0; a < 3; ++a) s.motion[4 * static_cast<std::size_t>(i) + a] = s.v[a][i];
+}
+
+/// Lists a particle that walls may be in the way of.
+__device__ __forceinline__ void list_met(const FluidOnGpu& s, int* count, int i) {
+  const unsigned all = __activemask();
+  const int lane = static_cast<int>(threadIdx.x % 32), leader = __ffs(static_cast<int>(all)) - 1;
+  int first = 0;
+  if (lane == leader) first = atomicAdd(count, __popc(all));
+  first = __shfl_sync(all, first, leader);
+  s.met[first + __popc(all & ((1u << lane) - 1))] = i;
+}
+
+/// Threads that work through those listed, whose number the host does not know: all that an
+/// H200 has at once.
+constexpr int kMetThreads = 1 << 18;
+
+/// Calls f(i, warp) for those listed, a warp each, of `threads` in all.
+template <class F>
+__device__ __forceinline__ void each_met(const FluidOnGpu& s, int count, int thread, int threads,
+                                         const F& f) {
+  const Warp warp;
+  for (int k = thread / 32; k < count; k += threads / 32) f(s.met[k], warp);
+}
+
+/// How fast and how far; x and v of a particle whose `i` is -1 count for nothing.
+__device__ __forceinline__ void measure_most(const FluidOnGpu& s, int i) {
+  float speed2 = 0, moved2 = 0;
+  for (int a = 0; a < 3 && i >= 0; ++a) {
+    const float d = s.x[a][i] - s.listed[a][i];
+    speed2 += s.v[a][i] * s.v[a][i];
+    moved2 += d * d;
+  }
+  most_of_warp(&s.most->speed2, speed2);
+  most_of_warp(&s.most->moved2, moved2);
+}
+
+/// Those that are clear of walls; the others are listed.
 struct Move {
   FluidOnGpu s;
   FluidSubstep step;
-  __device__ void operator()(int thread, const Loads& loads) const {
-    const int i = thread / kTeam;
-    const Team team;
-    give_touch(s, i, fluid::move(s, step, i, team, loads), team);
-    float speed2 = 0, moved2 = 0;
-    for (int a = 0; a < 3 && team.lane == 0; ++a) {
-      const float d = s.x[a][i] - s.listed[a][i];
-      speed2 += s.v[a][i] * s.v[a][i];
-      moved2 += d * d;
+  __device__ void operator()(int i, const Loads& loads) const {
+    const fluid::FluidWay way(s, step, i);
+    const bool is_clear = fluid::is_clear(s, i, way.x, way.y);
+    if (is_clear) {
+      fluid::arrive(s, step, i, way, loads);
+      pack(s, i);
+    } else {
+      list_met(s, &s.most->moved, i);
     }
-    most_of_warp(&s.most->speed2, speed2);
-    most_of_warp(&s.most->moved2, moved2);
+    measure_most(s, is_clear ? i : -1);
+  }
+};
+
+struct MoveAlongWalls {
+  FluidOnGpu s;
+  FluidSubstep step;
+  int threads;
+  __device__ void operator()(int thread, const Loads& loads) const {
+    each_met(s, s.most->moved, thread, threads, [&](int i, const Warp& warp) {
+      give_touch(s, i, fluid::move(s, step, i, warp, loads), warp);
+      if (warp.lane == 0) pack(s, i);
+      measure_most(s, warp.lane == 0 ? i : -1);
+    });
   }
 };
 
 struct Yield {
   FluidOnGpu s;
+  __device__ void operator()(int i) const {
+    const float x[3] = {s.x[0][i], s.x[1][i], s.x[2][i]};
+    if (fluid::is_clear(s, i, x, x)) {
+      pack(s, i);
+    } else {
+      list_met(s, &s.most->yielded, i);
+    }
+  }
+};
+
+struct YieldToWalls {
+  FluidOnGpu s;
   float time;
+  int threads;
   __device__ void operator()(int thread) const {
-    const int i = thread / kTeam;
-    const Team team;
-    give_touch(s, i, fluid::yield_to_walls(s, time, i, team), team);
+    each_met(s, s.most->yielded, thread, threads, [&](int i, const Warp& warp) {
+      give_touch(s, i, fluid::yield_to_walls(s, time, i, warp), warp);
+      if (warp.lane == 0) pack(s, i);
+    });
   }
 };
 
@@ -463,14 +554,17 @@ struct Collect {
   FluidOnGpu s;
   float time;
   bool is_last;
-  __device__ void operator()(int t) const {
+  __device__ void operator()(int thread) const {
+    const int t = thread / kTeam;
+    const Team team;
     const std::int32_t begin = s.pair_begin[t], end = s.pair_begin[t + 1];
     if (begin == end) return;
     float pressed = 0;
-    for (std::int32_t e = begin; e < end; ++e) {
+    for (std::int32_t e = begin + team.lane; e < end; e += kTeam) {
       pressed += s.strength[s.pair_particle[e]] * s.share[s.pair_entry[e]];
     }
-    for (int a = 0; a < 3; ++a) {
+    pressed = team.sum(pressed);
+    if (const int a = team.lane; a < 3) {
       const std::size_t k = 3 * static_cast<std::size_t>(t) + a;
       const double touched = is_last ? from_fixed(s.touched[k], kImpulseUnit) : 0;
       s.impulse[k] += (static_cast<float>(touched) - time * pressed * s.now[t].normal[a]) / 3;
@@ -535,11 +629,11 @@ void launch_fluid_pairs(const FluidView& view, const FluidGrid& grid, const Flui
 void launch_fluid_entries(int particles, int pairs, const std::uint32_t* sorted_key,
                           const std::int32_t* sorted_pair, const std::int32_t* triangle,
                           std::int32_t* wall_begin, std::int32_t* wall_soon,
-                          std::int32_t* wall_near, std::int32_t* wall, std::int32_t* pair_entry,
-                          cudaStream_t stream) {
+                          std::int32_t* wall_near, std::int32_t* wall, std::int32_t* wall_of,
+                          std::int32_t* pair_entry, cudaStream_t stream) {
   const int n = pairs > particles + 1 ? pairs : particles + 1;
   Gpu(stream).for_each(n, PutEntries{particles, pairs, sorted_key, sorted_pair, triangle,
-                                     wall_begin, wall_soon, wall_near, wall, pair_entry});
+                                     wall_begin, wall_soon, wall_near, wall, wall_of, pair_entry});
 }
 
 void launch_fluid_walls_moved(const float* corners, const float* listed, int triangles,
@@ -548,17 +642,20 @@ void launch_fluid_walls_moved(const float* corners, const float* listed, int tri
 }
 
 void launch_fluid_yield(const FluidOnGpu& fluid, float time, cudaStream_t stream) {
-  Gpu(stream).for_each(kTeam * fluid.size, Yield{fluid, time});
+  const Gpu gpu(stream);
+  gpu.for_each(fluid.size, Yield{fluid});
+  gpu.for_each(kMetThreads, YieldToWalls{fluid, time, kMetThreads});
 }
 
 void launch_fluid_substep(const FluidOnGpu& fluid, const FluidSubstep& step, bool is_last,
                           unsigned long long* loads, cudaStream_t stream) {
   const Gpu gpu(stream);
-  gpu.for_each(fluid.size, Pack{fluid});
+  gpu.for_each(fluid.entries, See{fluid});
   gpu.for_each(kTeam * fluid.size, Press{fluid, step});
   launch_with_loads(kTeam * fluid.size, Push{fluid, step}, loads, stream);
-  launch_with_loads(kTeam * fluid.size, Move{fluid, step}, loads, stream);
-  gpu.for_each(fluid.triangles, Collect{fluid, step.dt, is_last});
+  launch_with_loads(fluid.size, Move{fluid, step}, loads, stream);
+  launch_with_loads(kMetThreads, MoveAlongWalls{fluid, step, kMetThreads}, loads, stream);
+  gpu.for_each(kTeam * fluid.triangles, Collect{fluid, step.dt, is_last});
 }
 
 void launch_fluid_leave(const FluidOnGpu& fluid, cudaStream_t stream) {

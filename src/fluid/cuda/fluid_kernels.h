@@ -13,11 +13,13 @@ namespace tissue_sim {
 inline constexpr double kFluidLoadUnit = 1.0 / (1ll << 38);
 inline constexpr int kFluidLoadSums = 6;
 
-/// The largest since cleared, of numbers that are not negative, as bits.
+/// The largest since cleared, of numbers that are not negative, as bits; and how many particles
+/// walls may be in the way of.
 struct FluidMost {
   unsigned speed2;           ///< of a particle [m^2/s^2]
   unsigned moved2;           ///< of a particle, since it was listed [m^2]
   unsigned walls_moved2[2];  ///< of corners, as an interval begins and ends, since listed [m^2]
+  int yielded, moved;        ///< of them, as walls came, and as they move themselves
 };
 
 /// Places of particles in a grid of cells.
@@ -37,7 +39,11 @@ struct FluidOnGpu : FluidView {
   const std::int32_t *begin, *other;  ///< particles of each
   float4* place;                      ///< and volume
   const float* viscosity;             ///< of laws, with what keeps jitter down [Pa s]
-  float* share;                       ///< kernel's integral over the triangle of each entry [1/m]
+  std::int32_t* met;                  ///< those that walls may be in the way of
+  int entries;                        ///< of walls
+  const std::int32_t* wall_of;        ///< the particle of each
+  float* share;                       ///< kernel's integral over its triangle [1/m]
+  float4* seen;                       ///< that along its normal, and what it takes of the kernel
   int triangles;
   const std::int32_t* pair_begin;
   const std::int32_t* pair_particle;
@@ -87,12 +93,12 @@ void launch_fluid_pairs(const FluidView& view, const FluidGrid& grid, const Flui
 void launch_fluid_entries(int particles, int pairs, const std::uint32_t* sorted_key,
                           const std::int32_t* sorted_pair, const std::int32_t* triangle,
                           std::int32_t* wall_begin, std::int32_t* wall_soon,
-                          std::int32_t* wall_near, std::int32_t* wall, std::int32_t* pair_entry,
-                          cudaStream_t stream);
+                          std::int32_t* wall_near, std::int32_t* wall, std::int32_t* wall_of,
+                          std::int32_t* pair_entry, cudaStream_t stream);
 /// FluidMost::walls_moved2[end], of corners that are not of bits.
 void launch_fluid_walls_moved(const float* corners, const float* listed, int triangles,
                               const std::uint8_t* is_bit, unsigned* most, cudaStream_t stream);
-/// fluid::yield_to_walls().
+/// fluid::yield_to_walls(). FluidMost is clear, then and before each substep that is not the first.
 void launch_fluid_yield(const FluidOnGpu& fluid, float time, cudaStream_t stream);
 /// `is_last`: of the interval.
 void launch_fluid_substep(const FluidOnGpu& fluid, const FluidSubstep& step, bool is_last,

@@ -20,7 +20,7 @@ struct ListsOnGpu {
   DeviceArray<std::int32_t> number, in_cells, sorted_pair, counts, cell_begin, begin, other;
   DeviceArray<float4> place;
   DeviceArray<std::int32_t> pair_begin, pair_triangle, pair_particle, pair_entry;
-  DeviceArray<std::int32_t> wall_begin, wall_soon, wall_near, wall;
+  DeviceArray<std::int32_t> wall_begin, wall_soon, wall_near, wall, wall_of;
   DeviceArray<float> x[3], corners, box;
   DeviceArray<std::uint8_t> is_bit;
   DeviceArray<unsigned char> memory;
@@ -65,7 +65,8 @@ class ParticlesOnGpu final : public FluidDevice {
   DeviceArray<float> begin_corners_, end_corners_, impulse_;
   DeviceArray<WallTriangle> before_, now_;
   ListsOnGpu lists_;
-  DeviceArray<float4> place_, motion_, wall_push_;
+  DeviceArray<float4> place_, motion_, wall_push_, seen_;
+  DeviceArray<std::int32_t> met_;
   DeviceArray<float> strength_, tool_strength_, share_;
   DeviceArray<std::uint64_t> near_;
   DeviceArray<FluidClear> clear_;
@@ -102,6 +103,7 @@ void ParticlesOnGpu::send(const FluidState& s) {
   for (auto* rows : {&place_, &motion_, &wall_push_}) rows->resize(n);
   for (auto* field : {&strength_, &tool_strength_}) field->resize(n);
   near_.resize(n);
+  met_.resize(n);
   clear_.resize(n);
   most_.resize(1);
   host_most_.resize(1);
@@ -155,7 +157,11 @@ FluidOnGpu ParticlesOnGpu::view() {
   v.other = lists_.other.data();
   v.place = place_.data();
   v.viscosity = viscosity_.data();
+  v.met = met_.data();
+  v.entries = lists_.pairs;
+  v.wall_of = lists_.wall_of.data();
   v.share = share_.data();
+  v.seen = seen_.data();
   v.triangles = triangles_;
   v.pair_begin = lists_.pair_begin.data();
   v.pair_particle = lists_.pair_particle.data();
@@ -265,7 +271,8 @@ void ParticlesOnGpu::list_walls(const FluidState& s, const FluidGrid& grid, floa
                      nullptr, stream_);
   l.pairs = scan(triangles_, l.pair_begin);
   const auto pairs = static_cast<std::size_t>(l.pairs);
-  for (auto* numbers : {&l.number, &l.pair_triangle, &l.pair_particle, &l.pair_entry, &l.wall}) {
+  for (auto* numbers :
+       {&l.number, &l.pair_triangle, &l.pair_particle, &l.pair_entry, &l.wall, &l.wall_of}) {
     numbers->resize(pairs);
   }
   l.key.resize(pairs);
@@ -278,9 +285,10 @@ void ParticlesOnGpu::list_walls(const FluidState& s, const FluidGrid& grid, floa
   for (auto* ends : {&l.wall_soon, &l.wall_near}) ends->resize(particles_);
   launch_fluid_entries(particles_, l.pairs, l.sorted_key.data(), l.sorted_pair.data(),
                        l.pair_triangle.data(), l.wall_begin.data(), l.wall_soon.data(),
-                       l.wall_near.data(), l.wall.data(), l.pair_entry.data(), stream_);
+                       l.wall_near.data(), l.wall.data(), l.wall_of.data(), l.pair_entry.data(),
+                       stream_);
   share_.resize(pairs);
-  wait();
+  seen_.resize(pairs);
 }
 
 float ParticlesOnGpu::walls_moved(const DeviceArray<float>& corners, int end) {
@@ -341,6 +349,7 @@ int ParticlesOnGpu::advance(const FluidState& s, const FluidDrive& drive,
   const std::size_t sums = kFluidLoadSums * std::max<std::size_t>(loads.size(), 16);
   loads_.resize(sums);
   loads_.clear(stream_);
+  host_loads_.resize(sums);
   double weight = 0;
   for (int i = 0; i < count; ++i) {
     const bool listed = !lists_.made || moved_ > far;
@@ -349,6 +358,7 @@ int ParticlesOnGpu::advance(const FluidState& s, const FluidDrive& drive,
       walls_moved_[0] = i == 0 ? walls_moved(begin_corners_, 0) : 0;
       walls_moved_[1] = 0;
     }
+    most_.clear(stream_);
     if (i == 0) {
       const std::int32_t* const met = lists_.pair_begin.data();
       if (listed) {
@@ -366,16 +376,13 @@ int ParticlesOnGpu::advance(const FluidState& s, const FluidDrive& drive,
     FluidSubstep step = fluid_substep(drive, count, colliders);
     step.colliders = colliders_.data();
     weight = step.weight;
-    most_.clear(stream_);
     launch_fluid_substep(view(), step, i + 1 == count, loads_.data(), stream_);
     most_.download(host_most_.data(), 1, stream_);
+    if (i + 1 == count) loads_.download(host_loads_.data(), sums, stream_);
     wait();
     moved_ = root_of(host_most_[0].moved2);
     fastest_ = root_of(host_most_[0].speed2);
   }
-  host_loads_.resize(sums);
-  loads_.download(host_loads_.data(), sums, stream_);
-  wait();
   for (std::size_t c = 0; c < loads.size(); ++c) {
     for (int a = 0; a < 3; ++a) {
       const auto sum = [&](int k) {

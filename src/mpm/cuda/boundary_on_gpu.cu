@@ -65,19 +65,19 @@ struct TakeWeak {
   }
 };
 
-/// A round of pass_on(); the last: what is left stays.
+/// A round of pass_on(), of which `left` is nothing after; the last: what is left stays.
 struct PassOn {
   const BoundaryMesh::Support::Weak* weak;
   const BoundaryMesh::Support::Neighbour* around;
   const std::int32_t* weak_of;
-  const unsigned long long* left;
-  unsigned long long *next, *pushed;
+  unsigned long long *left, *next, *pushed;
   bool is_last;
   __device__ void operator()(int i) const {
     const BoundaryMesh::Support::Weak& w = weak[i / 3];
     const int a = i % 3;
     if (left[i] == 0) return;
     const double all = from_fixed(left[i], kImpulseUnit);
+    left[i] = 0;
     add_fixed(pushed + 3 * static_cast<std::size_t>(w.vertex) + a, is_last ? all : w.takes * all,
               kImpulseUnit);
     if (is_last) return;
@@ -130,8 +130,8 @@ void launch_push_boundary(const BoundaryOnGpu& of, const float* impulses, const 
   if (weak > 0) {
     unsigned long long *left = of.left.data(), *next = of.next.data();
     gpu.for_each(weak, TakeWeak{of.weak.data(), of.pushed.data(), left});
+    check_cuda(cudaMemsetAsync(next, 0, weak * sizeof *next, stream), "clear memory");
     for (int round = 0; round <= kRounds; ++round) {
-      check_cuda(cudaMemsetAsync(next, 0, weak * sizeof *next, stream), "clear memory");
       gpu.for_each(weak, PassOn{of.weak.data(), of.around.data(), of.weak_of.data(), left, next,
                                 of.pushed.data(), round == kRounds});
       std::swap(left, next);

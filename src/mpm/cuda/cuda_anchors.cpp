@@ -34,6 +34,14 @@ void add_pull(const RigidMotion& before, const RigidMotion& after, const Vec3& o
   }
 }
 
+void push_impulses(CudaTissue& d) {
+  const auto& impulse = d.state.anchors.impulse;
+  static_assert(sizeof(impulse[0]) == 3 * sizeof(double), "three numbers a row");
+  d.anchors.impulse.upload(reinterpret_cast<const double*>(impulse.data()), 3 * impulse.size(),
+                           d.stream);
+  check_cuda(cudaStreamSynchronize(d.stream), "receive data");
+}
+
 }  // namespace
 
 void push_anchors(CudaTissue& d) {
@@ -79,14 +87,6 @@ void push_lightness(CudaTissue& d) {
     if (points.bonds[p] != d.state.whole_bonds[p] && lightness[p] > 0) lightness[p] = 1;
   }
   d.anchors.lightness.upload(lightness, d.stream);
-  check_cuda(cudaStreamSynchronize(d.stream), "receive data");
-}
-
-void push_impulses(CudaTissue& d) {
-  const auto& impulse = d.state.anchors.impulse;
-  static_assert(sizeof(impulse[0]) == 3 * sizeof(double), "three numbers a row");
-  d.anchors.impulse.upload(reinterpret_cast<const double*>(impulse.data()), 3 * impulse.size(),
-                           d.stream);
   check_cuda(cudaStreamSynchronize(d.stream), "receive data");
 }
 

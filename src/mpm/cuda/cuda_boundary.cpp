@@ -64,7 +64,6 @@ void CudaTissue::push_boundary_on_gpu(const float* impulses) {
   }
   on.support_made = support.made;
   launch_push_boundary(on, impulses, present(), nodes(1 - current), stream);
-  check_cuda(cudaStreamSynchronize(stream), "press on a surface");
 }
 
 }  // namespace tissue_sim

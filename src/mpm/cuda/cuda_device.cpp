@@ -129,7 +129,7 @@ void CudaTissue::begin_frame(const FrameInput& input, bool move) {
   if (move) {
     push_anchors(*this);
   } else {
-    push_impulses(*this);
+    anchors.impulse.clear(stream);  // as those of the host
   }
 }
 

@@ -276,7 +276,6 @@ void push_outer_points(CudaTissue& tissue);                                     
 // Anchors.
 void push_anchors(CudaTissue& tissue);  ///< rows that their faces hold: after push_tables(), or
                                         ///< where nodes split
-void push_impulses(CudaTissue& tissue);
 void push_lightness(CudaTissue& tissue);
 void pull_impulses(CudaTissue& tissue);            ///< AnchorFaces::impulse
 void upload_anchor_places(CudaTissue& tissue);     ///< of a part

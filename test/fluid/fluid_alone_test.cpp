@@ -84,11 +84,13 @@ TEST(Fluid, SeesOfAWallWhatItEncloses) {
       EXPECT_NEAR(share, enclosed, 0.002) << parts << " at " << x.transpose();
       const Array<float> push = s.wall_push;
       // Where it or the wall moves a little, it follows by its slope.
-      const float aside[3] = {0.02f, -0.01f, 0.02f};
+      const float aside[3] = {0.01f, -0.005f, 0.01f};
       for (int a = 0; a < 3; ++a) s.place[a] += aside[a];
       const float followed = wall_share(s, 0);
       EXPECT_EQ(s.seen_at[0].share, share);
-      EXPECT_NEAR(followed, share_at(x + Vec3(0.02, -0.01, 0.02)), 3e-4) << parts;
+      EXPECT_NEAR(followed, share_at(x + Vec3(0.01, -0.005, 0.01)), 5e-5) << parts;
+      for (int a = 0; a < 3; ++a) s.place[a] += 4 * aside[a];  // too far for that
+      EXPECT_EQ(wall_share(s, 0), share_at(x + 5 * Vec3(aside[0], aside[1], aside[2])));
       EXPECT_EQ(share_at(x), share);
       for (std::size_t t = 0; t < s.now.size(); ++t) {
         for (int a = 0; a < 3; ++a) s.facing[4 * t + 3] -= s.now[t].normal[a] * aside[a];
@@ -143,7 +145,7 @@ TEST(Fluid, LeavesANarrowSlitAtHalfOfSoundAtMost) {
     for (const float v : s.particles.v[0]) fastest = std::max(fastest, v);
   }
   EXPECT_GT(s.particles.x[0][0], kLong);
-  EXPECT_GT(fastest, 0.1f * s.laws[0].sound());
+  EXPECT_GT(fastest, 0.05f * s.laws[0].sound());
   EXPECT_LT(fastest, 0.5f * s.laws[0].sound());
 }
 
